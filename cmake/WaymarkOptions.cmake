@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+# Rules that hold for all of our code.
+option(WM_TESTS "Build the tests" ON)
+option(WM_FUZZ "Build the fuzz targets (clang)" OFF)
+set(WM_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
+
+set(WM_WARNINGS -Wall -Wextra -Wshadow -Wdouble-promotion -Wvla -Wundef -Werror
+  -Wno-format-truncation) # messages are cut at the end of their buffer on purpose
+
+add_library(wm_rules INTERFACE)
+target_compile_options(wm_rules INTERFACE
+  ${WM_WARNINGS}
+  $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes>
+  $<$<COMPILE_LANGUAGE:CXX>:-Wnon-virtual-dtor>
+  # The same bits on every machine: no fused multiply-add, no reordering (docs/design.md, numbers).
+  -ffp-contract=off -fno-fast-math
+  -fno-omit-frame-pointer)
+target_compile_definitions(wm_rules INTERFACE _GNU_SOURCE EIGEN_DONT_VECTORIZE EIGEN_MPL2_ONLY
+  WM_VERSION="${PROJECT_VERSION}")
+if(WM_SANITIZE)
+  target_compile_options(wm_rules INTERFACE -fsanitize=${WM_SANITIZE} -fno-sanitize-recover=all)
+  target_link_options(wm_rules INTERFACE -fsanitize=${WM_SANITIZE})
+endif()
+if(WM_FUZZ)
+  target_compile_options(wm_rules INTERFACE -fsanitize=fuzzer-no-link)
+endif()
+
+# wm_library(NAME SOURCES a.c b.cpp [USES lib ...]): a library with the rules; USES is public, and is the whole list of what
+# it may include.
+function(wm_library name)
+  cmake_parse_arguments(A "" "" "SOURCES;USES;PRIVATE_USES" ${ARGN})
+  add_library(${name} STATIC ${A_SOURCES})
+  target_link_libraries(${name} PUBLIC ${A_USES} PRIVATE wm_rules ${A_PRIVATE_USES})
+endfunction()
+
+# wm_test(NAME SOURCES x.c USES lib ... [LABELS slow] [TIMEOUT s]): a Unity test program, run by ctest.
+# Label "slow" keeps it out of `./dev test` and in `./dev test --all`. A test gets the repository's root in WM_SOURCE_DIR and the
+# folder of the optional recordings in WM_DATA_DIR.
+function(wm_test name)
+  cmake_parse_arguments(A "" "TIMEOUT" "SOURCES;USES;LABELS;ARGS" ${ARGN})
+  add_executable(${name} ${A_SOURCES})
+  target_link_libraries(${name} PRIVATE ${A_USES} wm_unity wm_rules m)
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+  add_test(NAME ${name} COMMAND ${name} ${A_ARGS} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+  if(NOT A_TIMEOUT)
+    set(A_TIMEOUT 120)
+  endif()
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}" SKIP_RETURN_CODE 77
+    ENVIRONMENT "WM_SOURCE_DIR=${CMAKE_SOURCE_DIR};WM_BIN_DIR=${CMAKE_BINARY_DIR}/bin;WM_DATA_DIR=${CMAKE_SOURCE_DIR}/../shared/data")
+endfunction()
+
+# wm_script_test(NAME COMMAND ... [LABELS slow] [TIMEOUT s]): a test that is a script; exit code 77 means skipped.
+function(wm_script_test name)
+  cmake_parse_arguments(A "" "TIMEOUT" "COMMAND;LABELS" ${ARGN})
+  add_test(NAME ${name} COMMAND ${A_COMMAND} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+  if(NOT A_TIMEOUT)
+    set(A_TIMEOUT 300)
+  endif()
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}" SKIP_RETURN_CODE 77
+    ENVIRONMENT "WM_SOURCE_DIR=${CMAKE_SOURCE_DIR};WM_BIN_DIR=${CMAKE_BINARY_DIR}/bin;WM_DATA_DIR=${CMAKE_SOURCE_DIR}/../shared/data")
+endfunction()
+
+# wm_fuzz(NAME SOURCES x.c USES lib ... [CORPUS dir]): a libFuzzer target; with WM_FUZZ only.
+function(wm_fuzz name)
+  if(NOT WM_FUZZ)
+    return()
+  endif()
+  cmake_parse_arguments(A "" "" "SOURCES;USES" ${ARGN})
+  add_executable(${name} ${A_SOURCES})
+  target_link_libraries(${name} PRIVATE ${A_USES} wm_rules m)
+  target_link_options(${name} PRIVATE -fsanitize=fuzzer)
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz)
+endfunction()

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// A recording (format waymark-recording/1): a folder with what a robot's sensors said. Opening reads the small files
+// (recording.yaml, calibration.yaml, landmarks.csv, can-signals.yaml, vehicle.dbc) whole; the streams are read as they
+// are asked for. Allocates; never on the real-time thread. truth.csv is never opened here.
+#ifndef WAYMARK_RECORDING_H
+#define WAYMARK_RECORDING_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "waymark/can.h"
+#include "waymark/estimator.h"
+#include "waymark/source.h"
+#include "waymark/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define WM_PATH_MAX 512
+#define WM_SENSORS_MAX 32
+
+// Files to take instead of the recording's own; "" where the recording's own is meant.
+typedef struct wm_recording_overrides {
+  char calibration[WM_PATH_MAX];
+  char landmarks[WM_PATH_MAX];
+  char dbc[WM_PATH_MAX];
+  char can_signals[WM_PATH_MAX];
+} wm_recording_overrides;
+
+typedef struct wm_recording wm_recording;
+
+// Unknown keys and other oddities that don't stop are handed to `warn` (may be NULL), one line each.
+typedef void (*wm_warn_fn)(void *context, const char *text);
+
+wm_status wm_recording_open(const char *dir, const wm_recording_overrides *overrides, wm_warn_fn warn, void *context,
+                            wm_recording **out, wm_error *err);
+void wm_recording_close(wm_recording *self);
+
+const char *wm_recording_name(const wm_recording *self);
+const char *wm_recording_dir(const wm_recording *self);
+double wm_recording_duration_s(const wm_recording *self);  // NaN where not given
+const wm_wheels *wm_recording_wheels(const wm_recording *self);
+const wm_sensor *wm_recording_sensors(const wm_recording *self, size_t *count);
+const wm_landmark *wm_recording_landmarks(const wm_recording *self, size_t *count);
+const wm_start *wm_recording_start(const wm_recording *self);  // initial_pose; NaN where unknown
+uint32_t wm_recording_quantities(const wm_recording *self);    // bit per wm_quantity that the CAN binding gives
+// Text of calibration.yaml as read ("" where there is none), for the event log.
+const char *wm_recording_calibration_text(const wm_recording *self, size_t *length);
+
+// The recording's sources, in the order of the format's table of files: can, motion, motion6, then a source a sensor
+// for sightings ("sightings:NAME"), markers ("markers:NAME"), then stereo, points, gnss. Indices are 0, 1, 2 ... in
+// this order. Owned by the recording. Each hands out its events in the order of their arrival.
+wm_source *const *wm_recording_sources(wm_recording *self, size_t *count);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

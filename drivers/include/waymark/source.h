@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// A source of events: a device and a recorded stream are two implementations of this. A source is used by one thread.
+#ifndef WAYMARK_SOURCE_H
+#define WAYMARK_SOURCE_H
+
+#include <stdint.h>
+
+#include "waymark/event.h"
+#include "waymark/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define WM_SOURCE_NAME_MAX 48
+#define WM_SOURCES_MAX 32
+
+// What a source counted. Nothing is lost silently: every datum that doesn't become an event is in one of these.
+typedef struct wm_source_counts {
+  uint64_t received;        // events handed out
+  uint64_t lost;            // missing by the sender's own count (message counters, frame numbers)
+  uint64_t malformed;       // rows, lines or frames that could not be read
+  uint64_t not_finite;      // values that were NaN, infinite or outside of what can be
+  uint64_t out_of_order;    // older than the one before it where the format promises order
+  uint64_t ignored;         // well-formed, but nothing is bound to it (other CAN frames)
+  uint64_t frozen;          // frames whose counter stood still
+  char first_problem[256];  // text of the first malformed one, with file and line; "" where none
+} wm_source_counts;
+
+typedef struct wm_source wm_source;
+
+typedef struct wm_source_ops {
+  // Fills *out (t_ns, arrival_ns, seq, kind, as; `source` is set to self->index) and returns WM_OK; WM_END when it has
+  // no more; WM_AGAIN when nothing is there now (devices). Bad data is counted and skipped, never returned.
+  wm_status (*next)(wm_source *self, wm_event *out, wm_error *err);
+  void (*close)(wm_source *self);
+} wm_source_ops;
+
+struct wm_source {
+  const wm_source_ops *ops;
+  char name[WM_SOURCE_NAME_MAX];  // "can", "motion", "sightings:laser", "gnss"
+  uint16_t index;                 // in the run's table of sources: also the order at equal stamps
+  uint8_t is_motion;              // its events are motion
+  uint32_t kinds;                 // WM_EVENT_BIT of what it hands out
+  wm_source_counts counts;
+};
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// The estimator contract. An estimator is a struct of functions and a size. It gets events in the order of their t_ns
+// and says where the robot is. It has no clock, no file, no thread, no lock, no heap and no printf; its state is plain
+// memory that a copy of continues identically (it may point into the setup, never into itself); the same events give
+// the same bits on every machine. All functions are for one thread at a time.
+#ifndef WAYMARK_ESTIMATOR_H
+#define WAYMARK_ESTIMATOR_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "waymark/event.h"
+#include "waymark/motion.h"
+#include "waymark/params.h"
+#include "waymark/pose.h"
+#include "waymark/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define WM_NAME_MAX 32
+
+typedef struct wm_sensor {
+  char name[WM_NAME_MAX];
+  wm_mounting mounting;
+  double bearing_sigma_rad;  // NaN where not given
+  double range_sigma_m;      // NaN where not given
+  double max_range_m;        // infinity where not given
+  int32_t range_is_depth;    // 1: range_m is along the sensor's x axis
+} wm_sensor;
+
+typedef struct wm_landmark {
+  int32_t id;
+  double p_m[3];
+  double sigma_m;
+  double yaw_rad;  // NaN where not given
+} wm_landmark;
+
+// Start pose. NaN where unknown.
+typedef struct wm_start {
+  wm_time_ns t_ns;  // WM_TIME_NONE: the first motion event
+  double p_m[3];
+  double q_xyzw[4];  // for 6 degrees of freedom; NaN in the plane
+  double heading_rad;
+  double sigma_xy_m;
+  double sigma_heading_rad;
+} wm_start;
+
+// What belongs to a robot and a place. Must live, unchanged, as long as the estimator's state.
+typedef struct wm_setup {
+  const wm_motion_params *motion;
+  wm_wheels wheels;
+  const wm_sensor *sensors;
+  size_t sensor_count;
+  const wm_landmark *landmarks;
+  size_t landmark_count;
+  wm_start start;
+  uint64_t seed;
+} wm_setup;
+
+typedef struct wm_estimator {
+  const char *name;  // `estimator:` in the config, and the key of its parameters there
+  const char *about;
+  uint32_t takes;  // WM_EVENT_BIT of each observation that it takes; motion is always taken
+  wm_param_table params;
+
+  // Bytes of state for these parameters and this setup; 0 with *why set (a constant string) if they don't go together.
+  size_t (*state_bytes)(const void *params, const wm_setup *setup, const char **why);
+  // Makes the state in `state` (16-byte aligned, state_bytes long). The only function that may take long.
+  wm_status (*init)(void *state, const void *params, const wm_setup *setup);
+  // A motion event: the state goes to its t_ns. WM_TIME_RAN_BACK, WM_NOT_FINITE, WM_OUT_OF_RANGE: nothing changed.
+  wm_status (*predict)(void *state, const wm_event *motion);
+  // An observation, SET_POSE or RESET: the state goes to its t_ns and is corrected. Each scalar update writes one
+  // record to `out` (at most `capacity`, *count says how many). A refused datum changes nothing but its counters.
+  wm_status (*correct)(void *state, const wm_event *observation, wm_innovation *out, size_t capacity, size_t *count);
+  // Mean, covariance and state of health at the time of the last event.
+  void (*estimate)(const void *state, wm_estimate *out);
+  // What is known of the motion sensors, for the predictor.
+  void (*motion)(const void *state, wm_motion_calibration *out);
+  // Calibration states with their sigmas; returns how many there are.
+  size_t (*calibration)(const void *state, wm_calibration_value *out, size_t capacity);
+  // Health flags of the motion sensors: bits of WM_MOTION_HEALTH_*.
+  uint32_t (*motion_health)(const void *state);
+  // SLAM: landmarks estimated; NULL where the estimator has none.
+  size_t (*landmarks)(const void *state, wm_landmark *out, double (*cov_xy)[3], size_t capacity);
+} wm_estimator;
+
+#define WM_MOTION_HEALTH_ENCODER_LEFT_DEAD (1u << 0)
+#define WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD (1u << 1)
+#define WM_MOTION_HEALTH_COUNTER_FROZEN (1u << 2)
+#define WM_MOTION_HEALTH_YAW_RATE_STUCK (1u << 3)
+
+#define WM_INNOVATIONS_PER_EVENT_MAX 8
+
+// All registered estimators; constant.
+const wm_estimator *const *wm_estimators(size_t *count);
+// By name, or NULL.
+const wm_estimator *wm_estimator_find(const char *name);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// The motion front end: one for all estimators. It takes motion events (ticks, wheel speeds, yaw rate, steering, gear,
+// twists) and says how base_link moved, with the noise of that. Pure: no clock, no heap, no file.
+#ifndef WAYMARK_MOTION_H
+#define WAYMARK_MOTION_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "waymark/event.h"
+#include "waymark/params.h"
+#include "waymark/pose.h"
+#include "waymark/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define WM_STEERING_TABLE_MAX 64
+
+// calibration.yaml: wheels. NaN where unknown.
+typedef struct wm_wheels {
+  double radius_m, ticks_per_turn, track_m, wheelbase_m, steering_ratio, encoder_offset_m;
+  uint32_t steering_table_count;
+  double actuator_m[WM_STEERING_TABLE_MAX];  // rising
+  double road_wheel_rad[WM_STEERING_TABLE_MAX];
+} wm_wheels;
+
+typedef enum wm_motion_model {
+  WM_MOTION_AUTO = 0,        // the best that the recording's quantities allow, in the order of this list
+  WM_MOTION_TICKS,           // differential from both wheels' ticks
+  WM_MOTION_SPEED_YAW_RATE,  // wheel or vehicle speed and yaw rate
+  WM_MOTION_ACKERMANN,       // speed and steering (table, ratio or road wheel angle)
+  WM_MOTION_TWIST            // motion.csv
+} wm_motion_model;
+
+// `motion:` of the config. The fields and their meaning are in wm_motion_params_table (motion_params.c).
+typedef struct wm_motion_params wm_motion_params;
+extern const wm_param_table wm_motion_params_table;
+
+// What an estimator has learnt of the motion sensors; neutral is scales of 1, all else 0.
+typedef struct wm_motion_calibration {
+  double speed_scale;
+  double yaw_rate_scale;
+  double yaw_rate_bias_radps;  // true = scale * (measured - bias)
+  double left_scale, right_scale, track_scale;
+  double steering_offset_rad;
+  double lag_s;  // the robot does now what its motion source said lag_s ago
+} wm_motion_calibration;
+
+// Dead reckoning in the odom frame, for publishing between what is fused and now. It integrates each motion event as it
+// arrives and never jumps. Plain memory: a copy continues identically.
+typedef struct wm_odometry wm_odometry;
+
+// Where odom is at a time, and how uncertain a stretch is: the difference of two `noise` accumulations.
+typedef struct wm_odom_point {
+  wm_time_ns t_ns;
+  wm_pose2 pose_odom_base;
+  double v_mps, w_radps;
+  double along_var_m2;  // accumulated process variances since the start (rise without end)
+  double across_var_m2;
+  double heading_var_rad2;
+} wm_odom_point;
+
+size_t wm_odometry_bytes(void);
+wm_status wm_odometry_init(wm_odometry *self, const wm_motion_params *params, const wm_wheels *wheels);
+// What was learnt holds from now on; what was integrated stays.
+void wm_odometry_calibrate(wm_odometry *self, const wm_motion_calibration *calibration);
+// Takes a motion event (others are refused with WM_UNSUPPORTED). WM_TIME_RAN_BACK where it is older than the last one.
+wm_status wm_odometry_feed(wm_odometry *self, const wm_event *event);
+// The point at t_ns: extrapolated with the held twist if t_ns is past the last event, else (up to about a second back)
+// interpolated from what was integrated. WM_NOT_FOUND where it is older than that, or no motion has come.
+wm_status wm_odometry_at(const wm_odometry *self, wm_time_ns t_ns, wm_odom_point *out);
+// Stamp of the newest motion event that drives, WM_TIME_NONE before the first.
+wm_time_ns wm_odometry_newest_ns(const wm_odometry *self);
+// The pose `fused` carried on by odometry from its own time to `t_ns`: mean, covariance, twist. Source: composition of
+// pose_map_base(t_f) with pose_odom_base(t_f)^-1 pose_odom_base(t).
+wm_status wm_odometry_carry(const wm_odometry *self, const wm_estimate *fused, wm_time_ns t_ns, wm_estimate *out,
+                            wm_odom_point *odom);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

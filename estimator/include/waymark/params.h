@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Parameters that describe themselves: the config reader fills the struct from YAML by this table, checks the range,
+// and the documentation is printed from it. A new parameter is one line here and nowhere else.
+#ifndef WAYMARK_PARAMS_H
+#define WAYMARK_PARAMS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum wm_param_type {
+  WM_PARAM_F64,   // field is double
+  WM_PARAM_I32,   // field is int32_t
+  WM_PARAM_BOOL,  // field is int32_t, 0 or 1
+  WM_PARAM_ENUM   // field is int32_t, index into names
+} wm_param_type;
+
+typedef struct wm_param {
+  const char *key;  // YAML key, dots for nesting: "states.sensor_yaw_sigma_rad"
+  wm_param_type type;
+  uint32_t offset;           // offsetof(struct, field)
+  double initial, min, max;  // default and inclusive limits
+  const char *const *names;  // ENUM: NULL-terminated
+  const char *about;         // meaning, unit, reason of the default; one sentence or two
+} wm_param;
+
+typedef struct wm_param_table {
+  const wm_param *params;
+  size_t count;
+  size_t bytes;  // sizeof the struct
+} wm_param_table;
+
+// Writes every parameter's default. `out` has table->bytes bytes.
+void wm_params_defaults(const wm_param_table *table, void *out);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

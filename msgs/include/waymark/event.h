@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// An event: one datum with the time at which it was true and the time at which it arrived. Everything that an
+// estimator ever sees is an event; what is in the rings, in the merge and in the event log is this struct.
+// Fixed size, no pointers. A ring that carries only small events has slots of WM_EVENT_SMALL_BYTES.
+#ifndef WAYMARK_EVENT_H
+#define WAYMARK_EVENT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "waymark/frames.h"
+#include "waymark/time.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum wm_event_kind {
+  WM_EVENT_NONE = 0,
+  WM_EVENT_QUANTITIES,  // motion: quantities decoded from one CAN frame
+  WM_EVENT_TWIST2,      // motion: planar twist of base_link
+  WM_EVENT_TWIST6,      // motion: twist in the vehicle's frame
+  WM_EVENT_SIGHTING,    // a landmark seen from a sensor
+  WM_EVENT_POSITION,    // base_link's position in map (GNSS)
+  WM_EVENT_HEADING,     // base_link's heading in map
+  WM_EVENT_MARKER,      // a coded marker's pose in the sensor frame
+  WM_EVENT_STEREO,      // a point in both pictures of a rectified pair
+  WM_EVENT_POINTS,      // edge points on the floor in base_link
+  WM_EVENT_LOOKED,      // a sensor looked and saw nothing
+  WM_EVENT_SET_POSE,    // a person or a program says where the robot is
+  WM_EVENT_RESET,       // start again from the start pose of the setup
+  WM_EVENT_KIND_COUNT
+} wm_event_kind;
+
+#define WM_EVENT_BIT(kind) (UINT32_C(1) << (kind))
+#define WM_MOTION_EVENTS \
+  (WM_EVENT_BIT(WM_EVENT_QUANTITIES) | WM_EVENT_BIT(WM_EVENT_TWIST2) | WM_EVENT_BIT(WM_EVENT_TWIST6))
+
+// Quantities that CAN signals are bound to (recording-format: can-signals.yaml). SI units, forwards and left positive.
+typedef enum wm_quantity {
+  WM_Q_WHEEL_TICKS_LEFT = 0,     // ticks, unwrapped: grows without end when driving forwards
+  WM_Q_WHEEL_TICKS_RIGHT,        // ticks, unwrapped
+  WM_Q_WHEEL_SPEED_FRONT_LEFT,   // m/s
+  WM_Q_WHEEL_SPEED_FRONT_RIGHT,  // m/s
+  WM_Q_WHEEL_SPEED_REAR_LEFT,    // m/s
+  WM_Q_WHEEL_SPEED_REAR_RIGHT,   // m/s
+  WM_Q_VEHICLE_SPEED,            // m/s
+  WM_Q_YAW_RATE,                 // rad/s
+  WM_Q_STEERING_WHEEL,           // rad at the steering wheel
+  WM_Q_ROAD_WHEEL,               // rad at the road wheel
+  WM_Q_STEERING_ACTUATOR,        // m, position of the linear actuator
+  WM_Q_GEAR,                     // -1 reverse, 0 neutral, 1 forward
+  WM_Q_COUNT
+} wm_quantity;
+
+#define WM_QUANTITIES_MAX 8
+#define WM_POINTS_MAX 512
+
+// Bits of wm_quantities.doubt: a value that should not be believed, and must not be taken for standing still.
+#define WM_DOUBT_FROZEN_COUNTER (1u << 0)  // the message's counter stands still: the sender is stuck
+
+typedef struct wm_quantities {
+  uint8_t count;
+  uint8_t doubt;
+  uint16_t lost_before;           // frames of this message that its counter says were lost just before
+  uint8_t id[WM_QUANTITIES_MAX];  // wm_quantity
+  double value[WM_QUANTITIES_MAX];
+} wm_quantities;
+
+typedef struct wm_twist2 {
+  double v_mps, w_radps;
+} wm_twist2;
+
+typedef struct wm_twist6 {
+  double v_mps[3], w_radps[3];
+} wm_twist6;
+
+// Bearing positive to the left of the sensor's x axis. NaN where absent; not both absent.
+typedef struct wm_sighting {
+  uint16_t sensor;      // index into wm_setup.sensors
+  int32_t landmark_id;  // the map's id, or -1 where unknown
+  double bearing_rad;
+  double range_m;
+  double bearing_sigma_rad;  // NaN: the sensor's own
+  double range_sigma_m;      // NaN: the sensor's own
+} wm_sighting;
+
+typedef struct wm_position {
+  double p_m[3];  // z NaN where absent
+  double sigma_xy_m;
+  double sigma_z_m;  // NaN where absent
+} wm_position;
+
+typedef struct wm_heading {
+  double heading_rad;
+  double sigma_rad;
+} wm_heading;
+
+typedef struct wm_marker {
+  uint16_t sensor;
+  int32_t id;
+  double p_m[3];  // in the sensor's frame
+  double yaw_rad;
+} wm_marker;
+
+typedef struct wm_stereo {
+  int32_t id;
+  double left_px[2];  // NaN where that camera doesn't see it
+  double right_px[2];
+} wm_stereo;
+
+typedef struct wm_points {
+  uint32_t count;
+  uint32_t dropped;  // points of this stamp beyond WM_POINTS_MAX
+  float x_m[WM_POINTS_MAX];
+  float y_m[WM_POINTS_MAX];
+} wm_points;
+
+typedef struct wm_looked {
+  uint16_t sensor;
+} wm_looked;
+
+typedef struct wm_set_pose {
+  wm_pose3 pose_map_base;
+  double sigma_xy_m;
+  double sigma_heading_rad;
+} wm_set_pose;
+
+typedef struct wm_event {
+  wm_time_ns t_ns;        // when it was true
+  wm_time_ns arrival_ns;  // when it reached this computer
+  uint32_t seq;           // order within its source, from 0
+  uint16_t source;        // index into the run's table of sources
+  uint8_t kind;           // wm_event_kind
+  uint8_t reserved;       // 0
+  union {
+    wm_quantities quantities;
+    wm_twist2 twist2;
+    wm_twist6 twist6;
+    wm_sighting sighting;
+    wm_position position;
+    wm_heading heading;
+    wm_marker marker;
+    wm_stereo stereo;
+    wm_looked looked;
+    wm_set_pose set_pose;
+    wm_points points;  // the only large one
+  } as;
+} wm_event;
+
+#define WM_EVENT_HEADER_BYTES offsetof(wm_event, as)
+#define WM_EVENT_SMALL_BYTES (WM_EVENT_HEADER_BYTES + 96)
+
+// Bytes of `event` that carry something: copy this many, from a ring or to one. Constant cost. Any thread.
+size_t wm_event_bytes(const wm_event *event);
+
+static inline int wm_event_is_motion(const wm_event *event) { return (WM_MOTION_EVENTS >> event->kind) & 1u; }
+
+// Name of a kind, of a quantity as can-signals.yaml writes it; "?" where there is none.
+const char *wm_event_kind_name(unsigned kind);
+const char *wm_quantity_name(unsigned quantity);
+// Quantity of a name, or -1.
+int wm_quantity_find(const char *name);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

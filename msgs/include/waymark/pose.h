@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is known of the robot at one time, what one update did, and what is sent.
+#ifndef WAYMARK_POSE_H
+#define WAYMARK_POSE_H
+
+#include <stdint.h>
+
+#include "waymark/frames.h"
+#include "waymark/time.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum wm_state {
+  WM_STATE_SEARCHING = 0,       // no pose known yet
+  WM_STATE_TRACKING = 1,        // observations are being fused and fit
+  WM_STATE_DEAD_RECKONING = 2,  // no observation fused for a while; the covariance says how far it may be off
+  WM_STATE_LOST = 3             // observations contradict the pose; being mended
+} wm_state;
+
+const char *wm_state_name(unsigned state);
+
+// An estimate of base_link in map. Covariance 6x6 row by row in (x, y, z, rx, ry, rz): position in map axes, rotation
+// as a vector in the body's axes (R_true = R_est Exp(r)). A planar estimator fills x, y and rz and leaves the rest 0.
+typedef struct wm_estimate {
+  wm_time_ns t_ns;
+  wm_pose3 pose_map_base;
+  double heading_rad;
+  double covariance[36];
+  double v_mps[3];    // body axes
+  double w_radps[3];  // body axes
+  uint32_t resets;    // times that the pose was set anew: start, set_pose, recovery
+  uint8_t dof;        // 3 or 6
+  uint8_t state;      // wm_state
+} wm_estimate;
+
+static inline int wm_cov_index(int row, int column) { return 6 * row + column; }
+
+// What a scalar (or jointly gated) update was about.
+typedef enum wm_residual {
+  WM_RESIDUAL_BEARING = 0,
+  WM_RESIDUAL_RANGE,
+  WM_RESIDUAL_X,
+  WM_RESIDUAL_Y,
+  WM_RESIDUAL_Z,
+  WM_RESIDUAL_HEADING,
+  WM_RESIDUAL_STANDSTILL,
+  WM_RESIDUAL_PIXEL,
+  WM_RESIDUAL_COUNT
+} wm_residual;
+
+typedef enum wm_verdict {
+  WM_FUSED = 0,
+  WM_REJECTED_GATE,            // too far from what was expected
+  WM_REJECTED_UNKNOWN_ID,      // no such landmark in the map
+  WM_REJECTED_NO_ASSOCIATION,  // id -1 and no landmark fits, or more than one
+  WM_REJECTED_OUT_OF_RANGE,    // beyond the sensor's range, or behind it
+  WM_REJECTED_NOT_FINITE,
+  WM_REJECTED_SINGULAR,   // the geometry gives no information (robot on the landmark)
+  WM_REJECTED_SEARCHING,  // kept for the search, not fused
+  WM_REJECTED_BY_CONFIG,  // the config says not to use it
+  WM_VERDICT_COUNT
+} wm_verdict;
+
+const char *wm_residual_name(unsigned residual);
+const char *wm_verdict_name(unsigned verdict);
+
+// One record an update, fused or not: enough to explain it.
+typedef struct wm_innovation {
+  wm_time_ns t_ns;
+  uint16_t source;
+  uint16_t sensor;
+  int32_t landmark_id;  // -1 where none
+  uint8_t residual;     // wm_residual
+  uint8_t verdict;      // wm_verdict
+  double observed;      // SI
+  double expected;
+  double variance;  // of the innovation, HPH' + R
+  double nis;       // normalised innovation squared of the gated group
+  double gate;      // threshold that nis was held against
+  uint8_t gate_dof;
+} wm_innovation;
+
+// A pose as it is sent. Valid at t_ns, made at sent_ns.
+typedef struct wm_published {
+  wm_estimate now;  // carried on by odometry from fused_until_ns to now.t_ns
+  wm_time_ns sent_ns;
+  wm_time_ns fused_until_ns;
+  wm_pose2 pose_odom_base;  // continuous: never jumps
+  uint32_t jumps;           // times that map against odom moved by more than the threshold
+  double last_jump_m, last_jump_rad;
+  uint32_t status_flags;  // WM_PUB_*
+  uint32_t deadlines_missed;
+  int64_t utc_offset_ns;  // UTC minus the monotonic clock; 0 with utc_uncertainty_ns < 0 where unknown
+  int64_t utc_uncertainty_ns;
+} wm_published;
+
+#define WM_PUB_MOTION_STALE (1u << 0)  // no fresh motion: the pose is extrapolated on old speeds
+#define WM_PUB_FUSION_STALE (1u << 1)  // nothing fused for longer than the horizon
+#define WM_PUB_JUMPED (1u << 2)        // map against odom moved since the last message
+
+// A calibration state for health and report.
+typedef struct wm_calibration_value {
+  char name[40];  // e.g. "laser.yaw_rad"
+  double value;
+  double sigma;
+} wm_calibration_value;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
