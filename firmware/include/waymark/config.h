@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+// A configuration names an estimator and its parameters; what belongs to a recording or a robot (calibration,
+// landmarks, DBC, start pose) comes from the recording's folder unless the configuration says otherwise. Read once at
+// start.
+//
+//   format: waymark-config/1
+//   estimator: landmark_ekf
+//   sources:                       # order here is the order at equal stamps; what isn't listed follows with defaults
+//     - {name: sightings, lateness_max_ms: 300}
+//     - {name: gnss, until_s: 25}
+//   calibration: FILE              # all of these optional, relative to the configuration's folder
+//   landmarks: FILE
+//   dbc: FILE
+//   can_signals: FILE
+//   initial_pose: {x_m: 0, y_m: 0, heading_rad: 0, sigma_xy_m: 0.05, sigma_heading_rad: 0.05}
+//   merge: {horizon_ms: 300, ...}  # wm_runtime_params
+//   publish: {rate_hz: 50, ...}
+//   realtime: {priority: 80, ...}
+//   motion: {...}                  # wm_motion_params_table
+//   landmark_ekf: {...}            # the estimator's own table
+#ifndef WAYMARK_CONFIG_H
+#define WAYMARK_CONFIG_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "waymark/estimator.h"
+#include "waymark/recording.h"
+#include "waymark/source.h"
+#include "waymark/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct wm_source_config {
+  char name[WM_SOURCE_NAME_MAX];  // a source's whole name, or what stands before its ':' ("sightings" is each of them)
+  int32_t use;                    // 0: not opened
+  double lateness_max_ms;         // older than this on the arrival clock is final (and late)
+  double period_ms;               // > 0: promises not to speak again before this after a datum
+  double from_s, until_s;         // seconds from the run's first stamp; only data with stamps inside are taken
+  int line;
+} wm_source_config;
+
+// `merge:`, `publish:` and `realtime:`. Meanings and limits are in wm_runtime_params_table.
+typedef struct wm_runtime_params {
+  double merge_horizon_ms;       // largest lateness_max that is allowed
+  int32_t merge_queue_events;    // events that may wait in the merge
+  double merge_lateness_max_ms;  // default of the sources
+  double publish_rate_hz;
+  double publish_jump_m, publish_jump_deg;  // map against odom: larger moves are announced as jumps
+  double publish_motion_stale_ms;
+  int32_t publish_lcm;  // 0: no LCM
+  int32_t realtime_loop_hz;
+  int32_t realtime_priority;  // SCHED_FIFO, 0: normal thread
+  int32_t realtime_cpu;       // -1: any
+  int32_t realtime_lock_memory;
+  int32_t realtime_ring_events;  // slots of each source's ring
+} wm_runtime_params;
+extern const wm_param_table wm_runtime_params_table;
+
+typedef struct wm_config {
+  char path[WM_PATH_MAX];
+  char *text;  // the file as read, for the event log
+  size_t text_length;
+  const wm_estimator *estimator;
+  void *estimator_params;  // estimator->params.bytes bytes
+  wm_motion_params *motion;
+  wm_runtime_params runtime;
+  wm_recording_overrides overrides;
+  int has_initial_pose;
+  wm_start initial_pose;
+  wm_source_config sources[WM_SOURCES_MAX];
+  size_t source_count;
+  char lcm_url[128];        // publish.lcm_url; "" : LCM_DEFAULT_URL or LCM's own default
+  char channel_prefix[48];  // publish.channel_prefix, "WAYMARK_"
+} wm_config;
+
+// Every mistake stops with file, line, key, what is there and what is allowed ("did you mean"). Allocates.
+wm_status wm_config_load(const char *path, wm_config *out, wm_error *err);
+wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_config *out, wm_error *err);
+void wm_config_free(wm_config *config);
+// The settings of the source `name` ("sightings:laser" takes those of "sightings"), and its rank in the config's order.
+void wm_config_source(const wm_config *config, const char *name, wm_source_config *out, int *rank);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
