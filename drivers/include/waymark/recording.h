@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #include "waymark/can.h"
-#include "waymark/estimator.h"
+#include "waymark/setup.h"
 #include "waymark/source.h"
 #include "waymark/status.h"
 

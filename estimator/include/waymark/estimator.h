@@ -13,39 +13,12 @@
 #include "waymark/motion.h"
 #include "waymark/params.h"
 #include "waymark/pose.h"
+#include "waymark/setup.h"
 #include "waymark/status.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-#define WM_NAME_MAX 32
-
-typedef struct wm_sensor {
-  char name[WM_NAME_MAX];
-  wm_mounting mounting;
-  double bearing_sigma_rad;  // NaN where not given
-  double range_sigma_m;      // NaN where not given
-  double max_range_m;        // infinity where not given
-  int32_t range_is_depth;    // 1: range_m is along the sensor's x axis
-} wm_sensor;
-
-typedef struct wm_landmark {
-  int32_t id;
-  double p_m[3];
-  double sigma_m;
-  double yaw_rad;  // NaN where not given
-} wm_landmark;
-
-// Start pose. NaN where unknown.
-typedef struct wm_start {
-  wm_time_ns t_ns;  // WM_TIME_NONE: the first motion event
-  double p_m[3];
-  double q_xyzw[4];  // for 6 degrees of freedom; NaN in the plane
-  double heading_rad;
-  double sigma_xy_m;
-  double sigma_heading_rad;
-} wm_start;
 
 // What belongs to a robot and a place. Must live, unchanged, as long as the estimator's state.
 typedef struct wm_setup {

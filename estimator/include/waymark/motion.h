@@ -10,21 +10,12 @@
 #include "waymark/event.h"
 #include "waymark/params.h"
 #include "waymark/pose.h"
+#include "waymark/setup.h"
 #include "waymark/status.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
-
-#define WM_STEERING_TABLE_MAX 64
-
-// calibration.yaml: wheels. NaN where unknown.
-typedef struct wm_wheels {
-  double radius_m, ticks_per_turn, track_m, wheelbase_m, steering_ratio, encoder_offset_m;
-  uint32_t steering_table_count;
-  double actuator_m[WM_STEERING_TABLE_MAX];  // rising
-  double road_wheel_rad[WM_STEERING_TABLE_MAX];
-} wm_wheels;
 
 typedef enum wm_motion_model {
   WM_MOTION_AUTO = 0,        // the best that the recording's quantities allow, in the order of this list
