@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Checks the house rules of docs/design.md that a compiler does not: who may include whom, what the estimator may not
+touch, and what every source file carries. Reads the working tree only; prints each offence with file and line."""
+import pathlib
+import re
+import sys
+
+ROOT = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else ".").resolve()
+
+# Room -> rooms whose public headers it may include (its own always).
+MAY_USE = {
+    "msgs": [],
+    "estimator": ["msgs"],
+    "drivers": ["msgs"],
+    "firmware": ["msgs", "estimator", "drivers"],
+    "tools": ["msgs", "estimator", "drivers", "firmware"],
+}
+
+# Headers that would give the estimator a clock, a file, a thread, a heap or a terminal.
+ESTIMATOR_NEVER = re.compile(
+    r"<(time\.h|stdio\.h|stdlib\.h|pthread\.h|unistd\.h|errno\.h|sys/.*|linux/.*|chrono|thread|mutex|atomic|iostream|fstream"
+    r"|cstdio|cstdlib|string|vector|map|unordered_map|memory|functional|random|sstream|lcm/.*|opencv2/.*)>")
+
+INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')
+
+
+def public_headers(room):
+    base = ROOT / room / "include"
+    return {str(p.relative_to(base)) for p in base.rglob("*.h")} | {str(p.relative_to(base)) for p in base.rglob("*.hpp")}
+
+
+def check_includes():
+    owner = {header: room for room in MAY_USE for header in public_headers(room)}
+    for room, uses in MAY_USE.items():
+        for path in sources(room):
+            for number, line in enumerate(path.read_text().splitlines(), 1):
+                match = INCLUDE.match(line)
+                if not match:
+                    continue
+                where, header = f"{path.relative_to(ROOT)}:{number}", match.group(2)
+                if header in owner and owner[header] != room and owner[header] not in uses:
+                    yield f"{where}: {room}/ may not include {header}, which is {owner[header]}/'s"
+                elif match.group(1) == '"' and header.startswith("waymark/") and header not in owner \
+                        and not header.startswith("waymark/lcm/"):
+                    yield f"{where}: {header} is in no room's include folder"
+                if room == "estimator" and ESTIMATOR_NEVER.search(line):
+                    yield f"{where}: the estimator is pure: {header} is not for it"
+
+
+def check_sources():
+    for room in [*MAY_USE, "tests"]:
+        for path in sources(room):
+            text = path.read_text()
+            if not text.startswith("// SPDX-License-Identifier: Apache-2.0"):
+                yield f"{path.relative_to(ROOT)}:1: the first line is not the SPDX line"
+            lines = text.count("\n")
+            if lines > 600:
+                yield f"{path.relative_to(ROOT)}: {lines} lines: more than one thing? (600 at most)"
+
+
+def sources(room):
+    return sorted(p for ext in ("*.c", "*.h", "*.cpp", "*.hpp") for p in (ROOT / room).rglob(ext))
+
+
+def main():
+    offences = [*check_includes(), *check_sources()]
+    count = sum(len(sources(room)) for room in MAY_USE)
+    if count == 0:
+        print(f"no sources under {ROOT}: wrong folder?")
+        return 1
+    for offence in offences:
+        print(offence)
+    print(f"{count} files, {len(offences)} offences")
+    return 1 if offences else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
