@@ -59,11 +59,6 @@ typedef struct wm_estimator {
   size_t (*landmarks)(const void *state, wm_landmark *out, double (*cov_xy)[3], size_t capacity);
 } wm_estimator;
 
-#define WM_MOTION_HEALTH_ENCODER_LEFT_DEAD (1u << 0)
-#define WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD (1u << 1)
-#define WM_MOTION_HEALTH_COUNTER_FROZEN (1u << 2)
-#define WM_MOTION_HEALTH_YAW_RATE_STUCK (1u << 3)
-
 #define WM_INNOVATIONS_PER_EVENT_MAX 8
 
 // All registered estimators; constant.

@@ -29,6 +29,12 @@ typedef enum wm_motion_model {
 typedef struct wm_motion_params wm_motion_params;
 extern const wm_param_table wm_motion_params_table;
 
+// Health of the motion sensors, bits of motion_health: what must not be taken for standing still or going straight.
+#define WM_MOTION_HEALTH_ENCODER_LEFT_DEAD (1u << 0)
+#define WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD (1u << 1)
+#define WM_MOTION_HEALTH_COUNTER_FROZEN (1u << 2)
+#define WM_MOTION_HEALTH_YAW_RATE_STUCK (1u << 3)
+
 // What an estimator has learnt of the motion sensors; neutral is scales of 1, all else 0.
 typedef struct wm_motion_calibration {
   double speed_scale;

@@ -1,0 +1,400 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "motion/front_end.hpp"
+
+#include <cstring>
+
+#include "math/elementary.hpp"
+
+namespace wm {
+namespace {
+
+// No land robot does these; what exceeds them is a decoding fault, and refused.
+constexpr double kMaxSpeed = 150.0;    // m/s
+constexpr double kMaxRate = 50.0;      // rad/s
+constexpr double kMaxAngle = 200.0;    // rad, of a steering wheel
+constexpr double kMaxActuator = 10.0;  // m
+constexpr double kMaxTicks = 1e15;     // doubles still count singly there
+constexpr wm_time_ns kMaxTime = INT64_C(1) << 62;
+
+constexpr double kSignedBelow = -0.1;       // m/s: more than a sensor's zero error
+constexpr double kYawStuckAlone_s = 30.0;   // the same bits for so long while driving
+constexpr double kYawStuckAgainst_s = 3.0;  // ... while another sensor sees turning
+constexpr double kYawStuckRate = 0.1;       // rad/s, that turning
+constexpr double kDrivingSpeed = 0.5;       // m/s, for these rules
+constexpr double kDeadEncoderCar_m = 1.0;   // a car's inner wheel never rests while the outer drives so far
+constexpr double kDeadEncoderTurns = 1.0;   // a differential robot may pivot about one wheel, but not on and on
+
+double limit_of(int quantity) {
+  switch (quantity) {
+    case WM_Q_WHEEL_TICKS_LEFT:
+    case WM_Q_WHEEL_TICKS_RIGHT: return kMaxTicks;
+    case WM_Q_YAW_RATE: return kMaxRate;
+    case WM_Q_STEERING_WHEEL:
+    case WM_Q_ROAD_WHEEL: return kMaxAngle;
+    case WM_Q_STEERING_ACTUATOR: return kMaxActuator;
+    case WM_Q_GEAR: return 1.0;
+    default: return kMaxSpeed;
+  }
+}
+
+wm_status check_value(double value, double limit) {
+  if (!finite(value)) return WM_NOT_FINITE;
+  return std::fabs(value) <= limit ? WM_OK : WM_OUT_OF_RANGE;
+}
+
+}  // namespace
+
+void motion_front_end::init(const wm_motion_params *params, const wm_wheels *wheels) {
+  std::memset(static_cast<void *>(this), 0, sizeof *this);
+  params_ = params;
+  wheels_ = *wheels;
+  hold_max_ns_ = wm_ns_from_seconds(params->hold_max_s);
+  now_ns_ = newest_ns_ = still_since_ns_ = yaw_same_since_ns_ = WM_TIME_NONE;
+  for (wm_time_ns &stamp : stamp_ns_) stamp = WM_TIME_NONE;
+  for (tick_wheel &wheel : wheel_) wheel.t_ns = WM_TIME_NONE;
+}
+
+wm_status motion_front_end::check(const wm_event &event) const {
+  if (event.t_ns > kMaxTime || event.t_ns < -kMaxTime) return WM_OUT_OF_RANGE;
+  wm_status status = WM_OK;
+  switch (event.kind) {
+    case WM_EVENT_QUANTITIES: {
+      const wm_quantities &q = event.as.quantities;
+      if (q.count > WM_QUANTITIES_MAX) return WM_OUT_OF_RANGE;
+      for (int i = 0; i < q.count && status == WM_OK; i++)
+        status = q.id[i] < WM_Q_COUNT ? check_value(q.value[i], limit_of(q.id[i])) : WM_OUT_OF_RANGE;
+      break;
+    }
+    case WM_EVENT_TWIST2:
+      status = check_value(event.as.twist2.v_mps, kMaxSpeed);
+      if (status == WM_OK) status = check_value(event.as.twist2.w_radps, kMaxRate);
+      break;
+    case WM_EVENT_TWIST6:
+      for (int i = 0; i < 3 && status == WM_OK; i++) {
+        status = check_value(event.as.twist6.v_mps[i], kMaxSpeed);
+        if (status == WM_OK) status = check_value(event.as.twist6.w_radps[i], kMaxRate);
+      }
+      break;
+    default: return WM_UNSUPPORTED;
+  }
+  if (status == WM_OK && now_ns_ != WM_TIME_NONE && event.t_ns < now_ns_) return WM_TIME_RAN_BACK;
+  return status;
+}
+
+void motion_front_end::feed(const wm_event &event) {
+  if (now_ns_ == WM_TIME_NONE) now_ns_ = event.t_ns;
+  yaw_fresh_ = 0;
+  if (event.kind == WM_EVENT_QUANTITIES) {
+    take_quantities(event);
+    return;
+  }
+  const bool planar = event.kind == WM_EVENT_TWIST2;
+  const double v = planar ? event.as.twist2.v_mps : event.as.twist6.v_mps[0];
+  const double w = planar ? event.as.twist2.w_radps : event.as.twist6.w_radps[2];
+  choose_model(true);
+  if (model_ != WM_MOTION_TWIST) return;
+  watch_standstill(event.t_ns,
+                   std::fabs(v) < params_->standstill_speed_mps && std::fabs(w) < params_->standstill_yaw_rate_radps);
+  push_input(event.t_ns, v, w, false);
+}
+
+void motion_front_end::take_quantities(const wm_event &event) {
+  const wm_quantities &q = event.as.quantities;
+  const bool doubt = (q.doubt & WM_DOUBT_FROZEN_COUNTER) != 0;
+  health_ = doubt ? health_ | WM_MOTION_HEALTH_COUNTER_FROZEN : health_ & ~WM_MOTION_HEALTH_COUNTER_FROZEN;
+  uint32_t fresh = 0;
+  for (int i = 0; i < q.count; i++) {
+    const int id = q.id[i];
+    fresh |= UINT32_C(1) << id;
+    if (doubt) continue;  // what the message said before still holds; its noise grows
+    if (id == WM_Q_WHEEL_TICKS_LEFT || id == WM_Q_WHEEL_TICKS_RIGHT) take_count(id, event.t_ns, q.value[i]);
+    value_[id] = q.value[i];
+    stamp_ns_[id] = event.t_ns;
+  }
+  choose_model(false);
+  const auto has = [fresh](int first, int last) { return (fresh >> first & ((2u << (last - first)) - 1u)) != 0; };
+  const bool ticks = has(WM_Q_WHEEL_TICKS_LEFT, WM_Q_WHEEL_TICKS_RIGHT);
+  const bool speed = has(WM_Q_WHEEL_SPEED_FRONT_LEFT, WM_Q_VEHICLE_SPEED) || ticks;
+  const bool steering = has(WM_Q_STEERING_WHEEL, WM_Q_STEERING_ACTUATOR);
+  const bool rate = has(WM_Q_YAW_RATE, WM_Q_YAW_RATE);
+  if (ticks && !doubt) watch_encoders();
+
+  if (model_ == WM_MOTION_TICKS) {
+    if (ticks) push_ticks(event.t_ns, doubt);
+    return;
+  }
+  double v = 0.0;
+  if (!read_speed(&v)) return;
+  const bool still = watch_standstill(event.t_ns, std::fabs(v) < params_->standstill_speed_mps && !doubt);
+  if (model_ == WM_MOTION_SPEED_YAW_RATE && (speed || rate)) {
+    watch_yaw_rate(event.t_ns, v, rate && !doubt);
+    yaw_fresh_ = rate && !doubt && still;
+    const bool unsure = doubt || silent(WM_Q_YAW_RATE, event.t_ns) || (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK);
+    push_input(event.t_ns, v, value_[WM_Q_YAW_RATE], unsure);
+  } else if (model_ == WM_MOTION_ACKERMANN && (speed || steering)) {
+    double angle = 0.0;
+    if (read_road_wheel(&angle)) push_input(event.t_ns, v, angle, doubt);
+  }
+}
+
+// The best model that the quantities seen so far allow, or the one that the config names.
+void motion_front_end::choose_model(bool twist) {
+  double ignored;
+  const bool speed = read_speed(&ignored);
+  const bool possible[] = {false, counts_ticks() && finite(wheels_.track_m), speed && seen(WM_Q_YAW_RATE),
+                           speed && finite(wheels_.wheelbase_m) && read_road_wheel(&ignored), twist};
+  const int wanted = params_->model;
+  if (wanted != WM_MOTION_AUTO) {
+    if (possible[wanted]) model_ = (uint8_t)wanted;
+    return;
+  }
+  const int last = model_ == WM_MOTION_AUTO ? (int)WM_MOTION_TWIST : model_;
+  for (int model = WM_MOTION_TICKS; model <= last; model++) {
+    if (!possible[model]) continue;
+    model_ = (uint8_t)model;
+    return;
+  }
+}
+
+double motion_front_end::by_gear(double value, bool is_signed) const {
+  const bool reverse = seen(WM_Q_GEAR) && value_[WM_Q_GEAR] < 0.0;
+  return reverse && !is_signed ? -value : value;
+}
+
+// The rear wheels' mean is base_link's own speed; ticks come next (no rounding), then what the dashboard is told, then
+// the front wheels, which go a longer way in turns. A source that fell silent yields to the next.
+bool motion_front_end::read_speed(double *speed_mps) {
+  const auto mean_of = [this](int left, int right, double *out) {
+    const wm_time_ns now = now_ns_;
+    const bool l = seen(left) && !silent(left, now), r = seen(right) && !silent(right, now);
+    if (l || r) *out = l && r ? 0.5 * (value_[left] + value_[right]) : value_[l ? left : right];
+    return l || r;
+  };
+  double speed = 0.0;
+  uint8_t source = kNone;
+  if (mean_of(WM_Q_WHEEL_SPEED_REAR_LEFT, WM_Q_WHEEL_SPEED_REAR_RIGHT, &speed)) {
+    source = kRearWheels;
+  } else if (counts_ticks()) {
+    speed = 0.5 * (wheel_[0].speed_mps + wheel_[1].speed_mps);
+    source = kTicksMean;
+  } else if (mean_of(WM_Q_VEHICLE_SPEED, WM_Q_VEHICLE_SPEED, &speed)) {
+    source = kVehicleSpeed;
+  } else if (mean_of(WM_Q_WHEEL_SPEED_FRONT_LEFT, WM_Q_WHEEL_SPEED_FRONT_RIGHT, &speed)) {
+    source = kFrontWheels;
+  }
+  if (source == kNone) return false;
+  if (source != speed_source_) {
+    speed_source_changed_ |= speed_source_ != kNone;
+    speed_source_ = source;
+  }
+  if (source != kTicksMean) {
+    speed_is_signed_ |= speed < kSignedBelow;
+    speed = by_gear(speed, speed_is_signed_);
+  }
+  *speed_mps = speed;
+  return true;
+}
+
+bool motion_front_end::read_road_wheel(double *angle_rad) const {
+  if (seen(WM_Q_ROAD_WHEEL)) {
+    *angle_rad = value_[WM_Q_ROAD_WHEEL];
+    return std::fabs(*angle_rad) < 1.5;
+  }
+  if (seen(WM_Q_STEERING_ACTUATOR) && wheels_.steering_table_count >= 2) {
+    const double *x = wheels_.actuator_m;
+    const double *y = wheels_.road_wheel_rad;
+    const double position = value_[WM_Q_STEERING_ACTUATOR];
+    uint32_t i = 0;
+    while (i + 2 < wheels_.steering_table_count && position > x[i + 1]) i++;
+    double share = (position - x[i]) / (x[i + 1] - x[i]);
+    share = share < 0.0 ? 0.0 : share > 1.0 ? 1.0 : share;  // the actuator has an end at either side
+    *angle_rad = y[i] + share * (y[i + 1] - y[i]);
+    return finite(*angle_rad);
+  }
+  if (seen(WM_Q_STEERING_WHEEL) && finite(wheels_.steering_ratio)) {
+    *angle_rad = value_[WM_Q_STEERING_WHEEL] / wheels_.steering_ratio;
+    return std::fabs(*angle_rad) < 1.5;
+  }
+  return false;
+}
+
+bool motion_front_end::watch_standstill(wm_time_ns t_ns, bool still) {
+  if (!still) {
+    still_since_ns_ = WM_TIME_NONE;
+    return false;
+  }
+  if (still_since_ns_ == WM_TIME_NONE) still_since_ns_ = t_ns;
+  return wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
+}
+
+void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doubtful) {
+  motion_input input{};
+  input.t_ns = t_ns;
+  input.a = a;
+  input.b = b;
+  input.model = model_;
+  input.doubtful = doubtful;
+  input.standing = still_since_ns_ != WM_TIME_NONE && !doubtful &&
+                   wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
+  if (ticks_drive()) {
+    // The stretch that ends here gets what the counts say, before the last speed carries on.
+    const double dt = wm_seconds_between(now_ns_, t_ns);
+    if (dt > 0.0 && !doubtful) {
+      motion_input done = input;
+      done.t_ns = now_ns_;
+      done.a =
+          0.5 * (wheel_[0].position_m - wheel_[0].integrated_m + wheel_[1].position_m - wheel_[1].integrated_m) / dt;
+      if (wheel_[0].t_ns == t_ns || wheel_[1].t_ns == t_ns) {
+        done.b = history_.empty() ? b : history_.newest().b;
+        done.standing = !history_.empty() && history_.newest().standing;
+        history_.push(done);
+      }
+    }
+  }
+  history_.push(input);
+  newest_ns_ = t_ns;
+}
+
+bool motion_front_end::standstill_yaw_rate(double *yaw_rate_radps) const {
+  *yaw_rate_radps = value_[WM_Q_YAW_RATE];
+  return yaw_fresh_ != 0;
+}
+
+bool motion_front_end::speed_source_changed() {
+  const bool changed = speed_source_changed_ != 0;
+  speed_source_changed_ = 0;
+  return changed;
+}
+
+wm_time_ns motion_front_end::lag_of(const wm_motion_calibration &calibration) const {
+  return ticks_drive() ? 0 : wm_ns_from_seconds(calibration.lag_s);
+}
+
+motion_twist motion_front_end::twist_at(wm_time_ns t_ns, const wm_motion_calibration &calibration) const {
+  motion_twist out{};
+  walk(t_ns, t_ns + 1, calibration,
+       [&out](const motion_stretch &, const motion_twist &twist, const motion_noise &) { out = twist; });
+  return out;
+}
+
+// The same bits for long while driving: a gyro's noise never stands still. Sooner where steering or wheels see a turn.
+void motion_front_end::watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fresh) {
+  if (!fresh) return;
+  double other = 0.0;
+  const bool compare = read_other_turn_rate(speed_mps, &other);
+  const double yaw = value_[WM_Q_YAW_RATE];
+  if (yaw != yaw_last_ || std::fabs(speed_mps) < kDrivingSpeed || yaw_same_since_ns_ == WM_TIME_NONE) {
+    yaw_last_ = yaw;
+    yaw_same_since_ns_ = t_ns;
+    yaw_other_min_ = yaw_other_max_ = other;
+    health_ &= ~WM_MOTION_HEALTH_YAW_RATE_STUCK;
+    return;
+  }
+  if (other < yaw_other_min_) yaw_other_min_ = other;
+  if (other > yaw_other_max_) yaw_other_max_ = other;
+  const double same_s = wm_seconds_between(yaw_same_since_ns_, t_ns);
+  const bool turned = compare && yaw_other_max_ - yaw_other_min_ > kYawStuckRate;
+  if (same_s > kYawStuckAlone_s || (turned && same_s > kYawStuckAgainst_s)) health_ |= WM_MOTION_HEALTH_YAW_RATE_STUCK;
+}
+
+bool motion_front_end::read_other_turn_rate(double speed_mps, double *rate_radps) const {
+  double angle;
+  if (finite(wheels_.wheelbase_m) && read_road_wheel(&angle)) {
+    *rate_radps = speed_mps * tan(angle) / wheels_.wheelbase_m;
+    return true;
+  }
+  if (finite(wheels_.track_m) && seen(WM_Q_WHEEL_SPEED_REAR_LEFT) && seen(WM_Q_WHEEL_SPEED_REAR_RIGHT)) {
+    *rate_radps = (value_[WM_Q_WHEEL_SPEED_REAR_RIGHT] - value_[WM_Q_WHEEL_SPEED_REAR_LEFT]) / wheels_.track_m;
+    return true;
+  }
+  return false;
+}
+
+// ---- ticks ----
+
+bool motion_front_end::counts_ticks() const {
+  return wheel_[0].t_ns != WM_TIME_NONE && wheel_[1].t_ns != WM_TIME_NONE && finite(wheels_.radius_m) &&
+         finite(wheels_.ticks_per_turn) && wheels_.ticks_per_turn > 0.0;
+}
+
+bool motion_front_end::ticks_drive() const {
+  return model_ == WM_MOTION_TICKS ||
+         (speed_source_ == kTicksMean && (model_ == WM_MOTION_SPEED_YAW_RATE || model_ == WM_MOTION_ACKERMANN));
+}
+
+void motion_front_end::take_count(int side, wm_time_ns t_ns, double count) {
+  tick_wheel &wheel = wheel_[side];
+  const double dt = wm_seconds_between(wheel.t_ns, t_ns);
+  if (wheel.t_ns == WM_TIME_NONE || dt <= 0.0) {
+    if (wheel.t_ns == WM_TIME_NONE) wheel.restart(t_ns, count);
+    return;
+  }
+  const double metres_per_tick = kTwoPi * wheels_.radius_m / wheels_.ticks_per_turn;
+  double way = (count - wheel.ticks) * metres_per_tick;
+  wheel.ticks = count;
+  wheel.t_ns = t_ns;
+  if (way < 0.0) wheel.is_signed = true;
+  way = by_gear(way, wheel.is_signed);
+  if (!(std::fabs(way) <= kMaxSpeed * dt)) way = wheel.speed_mps * dt;  // the counter began anew: go on as before
+  const uint32_t dead = side == 0 ? WM_MOTION_HEALTH_ENCODER_LEFT_DEAD : WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD;
+  if (way != 0.0 && (health_ & dead)) wheel.integrated_m = wheel.position_m;  // what it missed, the other one told
+  wheel.position_m += way;
+  wheel.speed_mps = way / dt;
+  tick_wheel &other = wheel_[1 - side];
+  if (way != 0.0) {
+    wheel.still_m = 0.0;
+    other.still_m += std::fabs(way);
+  }
+}
+
+void motion_front_end::watch_encoders() {
+  const bool car = finite(wheels_.wheelbase_m);
+  const double pivot = kTwoPi * (finite(wheels_.track_m) ? wheels_.track_m : 1.0);
+  const double limit = car ? kDeadEncoderCar_m : kDeadEncoderTurns * pivot;
+  const uint32_t flags[2] = {WM_MOTION_HEALTH_ENCODER_LEFT_DEAD, WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD};
+  for (int side = 0; side < 2; side++) {
+    const bool dead = wheel_[side].still_m > limit;
+    health_ = dead ? health_ | flags[side] : health_ & ~flags[side];
+  }
+}
+
+// The stretch that ends here gets what the counts say; from here on the last speeds carry on. A dead encoder's wheel is
+// taken to go with the other one, and the turn is not to be believed.
+void motion_front_end::push_ticks(wm_time_ns t_ns, bool doubtful) {
+  const double dt = wm_seconds_between(now_ns_, t_ns);
+  const bool dead[2] = {(health_ & WM_MOTION_HEALTH_ENCODER_LEFT_DEAD) != 0,
+                        (health_ & WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD) != 0};
+  motion_input done{}, next{};
+  double done_mps[2], next_mps[2];
+  for (int side = 0; side < 2; side++) {
+    const tick_wheel &wheel = wheel_[side];
+    const bool counted = wheel.t_ns == t_ns && dt > 0.0 && !doubtful;
+    done_mps[side] = counted ? (wheel.position_m - wheel.integrated_m) / dt : wheel.speed_mps;
+    next_mps[side] = wheel.speed_mps;
+  }
+  for (int side = 0; side < 2; side++) {
+    if (!dead[side] || dead[1 - side]) continue;
+    done_mps[side] = done_mps[1 - side];
+    next_mps[side] = next_mps[1 - side];
+  }
+  next.t_ns = t_ns;
+  next.a = next_mps[0];
+  next.b = next_mps[1];
+  next.model = model_;
+  next.doubtful = doubtful || dead[0] || dead[1];
+  done = next;
+  done.t_ns = now_ns_;
+  done.a = done_mps[0];
+  done.b = done_mps[1];
+  if (dt > 0.0) history_.push(done);
+  history_.push(next);
+  newest_ns_ = t_ns;
+}
+
+void motion_front_end::hand_out_ticks(const motion_stretch &piece) {
+  const bool both = piece.input.model == WM_MOTION_TICKS;
+  wheel_[0].integrated_m += piece.input.a * piece.dt_s;
+  wheel_[1].integrated_m += (both ? piece.input.b : piece.input.a) * piece.dt_s;
+}
+
+}  // namespace wm

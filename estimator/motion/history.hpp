@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the motion sensors said, each from when on, over the last seconds. Commands that are obeyed late and sightings
+// that are older than their stamp both look back into it.
+#ifndef WAYMARK_ESTIMATOR_MOTION_HISTORY_HPP
+#define WAYMARK_ESTIMATOR_MOTION_HISTORY_HPP
+
+#include <cstdint>
+
+#include "waymark/time.h"
+
+namespace wm {
+
+// A raw input; a and b mean, by model: ticks: speed of the left and the right wheel (m/s); speed_yaw_rate and twist:
+// speed (m/s) and turn rate (rad/s); ackermann: speed (m/s) and road wheel angle (rad).
+struct motion_input {
+  wm_time_ns t_ns;  // holds from here to the next one's
+  double a, b;
+  uint8_t model;     // wm_motion_model; AUTO: nothing known yet
+  uint8_t standing;  // the robot is known to stand
+  uint8_t doubtful;  // not to be believed: frozen counter, dead encoder
+  uint8_t stale;     // set by the walk over the history: held for longer than hold_max
+};
+
+// One piece of an interval of time over which one input holds.
+struct motion_stretch {
+  motion_input input;
+  double dt_s;
+  bool first, last;  // of the interval: their length depends on the lag
+};
+
+class motion_history {
+ public:
+  static constexpr uint32_t kCapacity = 256;  // 1 s of lag at 250 inputs a second; a power of two
+
+  void clear() { count_ = 0; }
+  bool empty() const { return count_ == 0; }
+  const motion_input &newest() const { return at(count_ - 1); }
+
+  void push(const motion_input &input) {
+    if (count_ > 0 && newest().t_ns >= input.t_ns) {
+      ring_[(count_ - 1) & (kCapacity - 1)] = input;
+      return;
+    }
+    ring_[count_ & (kCapacity - 1)] = input;
+    count_++;
+  }
+
+  // Calls visit(stretch) for the pieces of [from_ns, to_ns] in order of time. Before the oldest input nothing is known.
+  template <class Visit>
+  void walk(wm_time_ns from_ns, wm_time_ns to_ns, wm_time_ns hold_max_ns, Visit visit) const {
+    if (to_ns <= from_ns) return;
+    uint64_t next = count_;  // first input that begins after from_ns
+    const uint64_t oldest = count_ > kCapacity ? count_ - kCapacity : 0;
+    while (next > oldest && at(next - 1).t_ns > from_ns) next--;
+    wm_time_ns begin = from_ns;
+    while (begin < to_ns) {
+      motion_stretch piece;
+      wm_time_ns end = next < count_ && at(next).t_ns < to_ns ? at(next).t_ns : to_ns;
+      if (next > oldest) {
+        piece.input = at(next - 1);
+        const wm_time_ns held_until = piece.input.t_ns + hold_max_ns;
+        piece.input.stale = begin >= held_until;
+        if (!piece.input.stale && end > held_until) end = held_until;
+      } else {
+        piece.input = motion_input{};
+      }
+      piece.dt_s = wm_seconds_between(begin, end);
+      piece.first = begin == from_ns;
+      piece.last = end == to_ns;
+      visit(piece);
+      begin = end;
+      while (next < count_ && at(next).t_ns <= begin) next++;
+    }
+  }
+
+ private:
+  const motion_input &at(uint64_t index) const { return ring_[index & (kCapacity - 1)]; }
+
+  motion_input ring_[kCapacity];
+  uint64_t count_;
+};
+
+}  // namespace wm
+
+#endif

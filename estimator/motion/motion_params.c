@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "motion/motion_params.h"
+
+static const char *const kModels[] = {"auto", "ticks", "speed_yaw_rate", "ackermann", "twist", NULL};
+
+#define F64(key, field, initial, min, max, about) \
+  { key, WM_PARAM_F64, offsetof(struct wm_motion_params, field), initial, min, max, NULL, about }
+
+static const wm_param kParams[] = {
+    {"model", WM_PARAM_ENUM, offsetof(struct wm_motion_params, model), WM_MOTION_AUTO, 0, WM_MOTION_TWIST, kModels,
+     "How motion is made of the recording's quantities. auto takes the first of ticks, speed and yaw rate, speed and "
+     "steering, twist that is there; the quantities decide, as they come."},
+    F64("noise.speed_mps", noise_speed_mps, 0.02, 0, 10,
+        "White noise of the speed, m/s per sqrt(s), at any speed. A wheel's slip and a gearbox' play at walking pace."),
+    F64("noise.speed_rel", noise_speed_rel, 0.03, 0, 2,
+        "White noise of the speed in parts of the speed, per sqrt(s); squares are added."),
+    F64("noise.yaw_rate_radps", noise_yaw_rate_radps, 0.01, 0, 10, "White noise of the turn rate, rad/s per sqrt(s)."),
+    F64("noise.yaw_rate_rel", noise_yaw_rate_rel, 0.03, 0, 2,
+        "White noise of the turn rate in parts of the turn rate, per sqrt(s)."),
+    F64("noise.yaw_rate_per_mps", noise_yaw_rate_per_mps, 0.0, 0, 10,
+        "White noise of the turn rate in rad/s per m/s of speed, per sqrt(s): castors, ruts, a wheel that slips."),
+    F64("noise.side_rel", noise_side_rel, 0.01, 0, 2,
+        "White noise of the sideways speed in parts of the speed, per sqrt(s). Wheels slip sideways a little."),
+    F64("noise.rest_factor", noise_rest_factor, 0.22, 0, 1,
+        "What is left of the constant noises while speed and turn rate say zero: a robot at rest stays where it is."),
+    F64("noise.ticks_per_sqrt_m", noise_ticks_per_sqrt_m, 0.005, 0, 1,
+        "Noise of a wheel's way by its ticks: metres per square root of a metre of way (uneven floor, slip)."),
+    F64("noise.steering_rad", noise_steering_rad, 0.005, 0, 1,
+        "White noise of the road wheel's angle, rad per sqrt(s): play and the table's error between its points."),
+    F64("standstill.speed_mps", standstill_speed_mps, 0.02, 0, 1,
+        "A speed below this is none. Below the smallest step of common wheel-speed sensors (0.01 to 0.03 m/s)."),
+    F64("standstill.yaw_rate_radps", standstill_yaw_rate_radps, 0.002, 0, 1,
+        "A twist's turn rate below this is none. Only for twists: a gyro never says zero."),
+    F64("standstill.after_s", standstill_after_s, 0.5, 0, 60,
+        "No speed for so long is standing still: position and heading hold, the gyro shows its bias."),
+    F64("standstill.bias_sigma_radps", standstill_bias_sigma_radps, 0.01, 1e-6, 1,
+        "Sigma of one reading of the yaw rate as a measurement of its bias while standing (steps and vibration)."),
+    F64("hold_max_s", hold_max_s, 2.0, 0.01, 3600,
+        "A speed, rate or twist holds to the next of its kind, but no longer than this; then the motion is unknown. "
+        "Gaps of 1 s are seen on working robots."),
+};
+
+const wm_param_table wm_motion_params_table = {kParams, sizeof kParams / sizeof kParams[0],
+                                               sizeof(struct wm_motion_params)};

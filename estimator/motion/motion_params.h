@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The fields of `motion:`; their meaning is told once, in motion_params.c.
+#ifndef WAYMARK_ESTIMATOR_MOTION_PARAMS_H
+#define WAYMARK_ESTIMATOR_MOTION_PARAMS_H
+
+#include "waymark/motion.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct wm_motion_params {
+  int32_t model;  // wm_motion_model
+  double noise_speed_mps;
+  double noise_speed_rel;
+  double noise_yaw_rate_radps;
+  double noise_yaw_rate_rel;
+  double noise_yaw_rate_per_mps;
+  double noise_side_rel;
+  double noise_rest_factor;
+  double noise_ticks_per_sqrt_m;
+  double noise_steering_rad;
+  double standstill_speed_mps;
+  double standstill_yaw_rate_radps;
+  double standstill_after_s;
+  double standstill_bias_sigma_radps;
+  double hold_max_s;
+};
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "motion/step.hpp"
+
+#include "math/elementary.hpp"
+
+namespace wm {
+namespace {
+
+void add(motion_twist &t, int index, double v_by, double w_by) {
+  t.index[t.count] = index;
+  t.v_by[t.count] = v_by;
+  t.w_by[t.count] = w_by;
+  t.count++;
+}
+
+// v = (l + r)/2, w = (r - l)/b, with l and r each by its own scale and b by the track's.
+motion_twist from_wheels(double left, double right, const wm_motion_calibration &c, double track_m) {
+  motion_twist t{};
+  const double inverse_track = 1.0 / (track_m * c.track_scale);
+  const double l = left * c.left_scale;
+  const double r = right * c.right_scale;
+  t.v = 0.5 * (l + r);
+  t.w = (r - l) * inverse_track;
+  add(t, kLeftScale, 0.5 * left, -left * inverse_track);
+  add(t, kRightScale, 0.5 * right, right * inverse_track);
+  add(t, kTrackScale, 0.0, -t.w / c.track_scale);
+  return t;
+}
+
+motion_twist from_speed_and_rate(double speed, double rate, const wm_motion_calibration &c) {
+  motion_twist t{};
+  t.v = c.speed_scale * speed;
+  t.w = c.yaw_rate_scale * (rate - c.yaw_rate_bias_radps);
+  add(t, kSpeedScale, speed, 0.0);
+  add(t, kYawRateScale, 0.0, rate - c.yaw_rate_bias_radps);
+  add(t, kYawRateBias, 0.0, -c.yaw_rate_scale);
+  return t;
+}
+
+// A twist is what a differential drive's controller makes of its two wheels, where the track is known.
+motion_twist from_twist(double speed, double rate, const wm_motion_calibration &c, double track_m) {
+  if (!finite(track_m)) return from_speed_and_rate(speed, rate, c);
+  const double left = speed - 0.5 * track_m * rate;
+  const double right = speed + 0.5 * track_m * rate;
+  motion_twist t = from_wheels(left, right, c, track_m);
+  const double v = t.v, w = t.w;
+  for (int i = 0; i < t.count; i++) {
+    t.v_by[i] *= c.speed_scale;
+    t.w_by[i] *= c.yaw_rate_scale;
+  }
+  t.v = c.speed_scale * v;
+  t.w = c.yaw_rate_scale * (w - c.yaw_rate_bias_radps);
+  add(t, kSpeedScale, v, 0.0);
+  add(t, kYawRateScale, 0.0, w - c.yaw_rate_bias_radps);
+  add(t, kYawRateBias, 0.0, -c.yaw_rate_scale);
+  return t;
+}
+
+// w = v tan(phi)/L (paper, system 1). An encoder on one side, `offset` to the left of the middle, sees v - w offset.
+motion_twist from_steering(double speed, double road_wheel, const wm_motion_calibration &c, const wm_wheels &wheels) {
+  motion_twist t{};
+  const double tangent = tan(road_wheel + c.steering_offset_rad);
+  const double curvature = tangent / wheels.wheelbase_m;
+  const double offset = finite(wheels.encoder_offset_m) ? wheels.encoder_offset_m : 0.0;
+  const double share = 1.0 - curvature * offset;
+  const double middle = share > 0.2 ? speed / share : speed;
+  t.v = c.speed_scale * middle;
+  t.w = t.v * curvature;
+  add(t, kSpeedScale, middle, middle * curvature);
+  const double curvature_by = (1.0 + tangent * tangent) / wheels.wheelbase_m;
+  const double v_by = share > 0.2 ? t.v * offset / share * curvature_by : 0.0;
+  add(t, kSteeringOffset, v_by, v_by * curvature + t.v * curvature_by);
+  return t;
+}
+
+}  // namespace
+
+motion_twist twist_of(const motion_input &input, const wm_motion_calibration &c, const wm_wheels &wheels) {
+  if (input.standing || input.stale) return motion_twist{};
+  switch (input.model) {
+    case WM_MOTION_TICKS: return from_wheels(input.a, input.b, c, wheels.track_m);
+    case WM_MOTION_SPEED_YAW_RATE: return from_speed_and_rate(input.a, input.b, c);
+    case WM_MOTION_ACKERMANN: return from_steering(input.a, input.b, c, wheels);
+    case WM_MOTION_TWIST: return from_twist(input.a, input.b, c, wheels.track_m);
+    default: return motion_twist{};
+  }
+}
+
+motion_noise noise_of(const motion_input &input, const motion_twist &twist, double dt_s, const wm_motion_params &p,
+                      const wm_wheels &wheels, const wm_motion_calibration &c) {
+  motion_noise n{};
+  const bool unknown = input.stale || input.doubtful || input.model == WM_MOTION_AUTO;
+  if (input.model == WM_MOTION_TICKS && !unknown) {
+    // Paper, system 2: by way, not by time. k^2 |d| instead of (k d)^2, so that it does not depend on the step's
+    // length.
+    const double k2 = square(p.noise_ticks_per_sqrt_m) * dt_s;
+    const double left = k2 * std::fabs(input.a * c.left_scale);
+    const double right = k2 * std::fabs(input.b * c.right_scale);
+    const double track = wheels.track_m * c.track_scale;
+    n.way_m2 = 0.25 * (left + right);
+    n.turn_rad2 = (left + right) / (track * track);
+    n.way_turn = 0.5 * (right - left) / track;
+  } else {
+    const bool slow = std::fabs(input.a) < p.standstill_speed_mps;
+    const bool at_rest =
+        input.standing || (input.model == WM_MOTION_TWIST && slow && std::fabs(input.b) < p.standstill_yaw_rate_radps);
+    const double rest = square(p.noise_rest_factor);
+    const double speed_share = slow && !unknown ? rest : 1.0;
+    const double rate_share = at_rest && !unknown ? rest : 1.0;
+    n.way_m2 = (square(p.noise_speed_mps) * speed_share + square(p.noise_speed_rel * twist.v)) * dt_s;
+    n.turn_rad2 = (square(p.noise_yaw_rate_radps) * rate_share + square(p.noise_yaw_rate_rel * twist.w) +
+                   square(p.noise_yaw_rate_per_mps * twist.v)) *
+                  dt_s;
+    if (input.model == WM_MOTION_ACKERMANN && !unknown) {
+      const double tangent = std::fabs(twist.v) > 1e-9 ? twist.w * wheels.wheelbase_m / twist.v : 0.0;
+      const double curvature = tangent / wheels.wheelbase_m;
+      const double turn_by_angle = twist.v * (1.0 + tangent * tangent) / wheels.wheelbase_m;
+      n.turn_rad2 = square(turn_by_angle * p.noise_steering_rad) * dt_s + curvature * curvature * n.way_m2;
+      n.way_turn = curvature * n.way_m2;
+    }
+  }
+  n.side_m2 = square(p.noise_side_rel * twist.v) * dt_s;
+  if (unknown) {
+    // The robot may go on as it did, or not: as unsure as the motion that was last believed is large.
+    const double speed = std::fabs(input.a), rate = input.model == WM_MOTION_ACKERMANN ? 0.1 : std::fabs(input.b);
+    n.way_m2 += square(speed) * dt_s;
+    n.turn_rad2 += square(input.model == WM_MOTION_TICKS ? 0.3 : rate) * dt_s;
+  }
+  return n;
+}
+
+}  // namespace wm

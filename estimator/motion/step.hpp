@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// The motion models: what a stretch of raw input moves the robot by, with the derivatives by every calibration state
+// and the noise.
+#ifndef WAYMARK_ESTIMATOR_MOTION_STEP_HPP
+#define WAYMARK_ESTIMATOR_MOTION_STEP_HPP
+
+#include "motion/history.hpp"
+#include "motion/motion_params.h"
+
+namespace wm {
+
+// The fields of wm_motion_calibration by number, in its order.
+enum calibration_index {
+  kSpeedScale = 0,
+  kYawRateScale,
+  kYawRateBias,
+  kLeftScale,
+  kRightScale,
+  kTrackScale,
+  kSteeringOffset,
+  kLag,
+  kCalibrationCount
+};
+static_assert(sizeof(wm_motion_calibration) == kCalibrationCount * sizeof(double));
+
+inline constexpr wm_motion_calibration kNeutralCalibration = {1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0};
+
+inline double &calibration_at(wm_motion_calibration &c, int index) { return (&c.speed_scale)[index]; }
+inline double calibration_at(const wm_motion_calibration &c, int index) { return (&c.speed_scale)[index]; }
+
+// Twist (speed in m/s, turn rate in rad/s) of base_link and its derivatives by the calibration; only the first `count`
+// entries of `index`, `v_by`, `w_by` are set. The lag is not among them: it moves the ends of the interval.
+struct motion_twist {
+  double v, w;
+  int count;
+  int index[6];
+  double v_by[6], w_by[6];
+};
+
+// Paper, system 1: V and Phi of the car (motion); system 2: differential from ticks.
+motion_twist twist_of(const motion_input &input, const wm_motion_calibration &calibration, const wm_wheels &wheels);
+
+// Variances of a stretch: way (along), turn, their covariance, and sideways.
+struct motion_noise {
+  double way_m2, turn_rad2, way_turn, side_m2;
+};
+
+motion_noise noise_of(const motion_input &input, const motion_twist &twist, double dt_s, const wm_motion_params &params,
+                      const wm_wheels &wheels, const wm_motion_calibration &calibration);
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+// One wheel with a tick counter. A count is the wheel's position at its stamp; between stamps the last speed carries
+// on, and the next count takes what remains, so that the total is always that of the ticks.
+#ifndef WAYMARK_ESTIMATOR_MOTION_WHEEL_HPP
+#define WAYMARK_ESTIMATOR_MOTION_WHEEL_HPP
+
+#include "waymark/time.h"
+
+namespace wm {
+
+struct tick_wheel {
+  wm_time_ns t_ns;      // of the last count; WM_TIME_NONE before the first
+  double ticks;         // last count
+  double position_m;    // by the counts, signed by the gear where the counter is not
+  double integrated_m;  // what has been handed out as motion
+  double speed_mps;     // between the last two counts
+  double still_m;       // way of the other wheel since this one's count last changed
+  bool is_signed;       // the counter was seen to go down
+
+  void restart(wm_time_ns t, double count) {
+    t_ns = t;
+    ticks = count;
+    position_m = integrated_m = 0.0;
+    speed_mps = 0.0;
+    still_m = 0.0;
+  }
+};
+
+}  // namespace wm
+
+#endif

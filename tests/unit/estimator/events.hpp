@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// Short ways to say an event in the estimator's tests.
+#ifndef WAYMARK_TESTS_ESTIMATOR_EVENTS_HPP
+#define WAYMARK_TESTS_ESTIMATOR_EVENTS_HPP
+
+#include <cmath>
+#include <initializer_list>
+#include <utility>
+
+#include "waymark/event.h"
+#include "waymark/setup.h"
+
+namespace make {
+
+inline wm_time_ns at(double seconds) { return wm_ns_from_seconds(seconds); }
+
+inline wm_event empty(double t_s, wm_event_kind kind) {
+  wm_event e{};
+  e.t_ns = e.arrival_ns = at(t_s);
+  e.kind = (uint8_t)kind;
+  return e;
+}
+
+inline wm_event twist(double t_s, double v, double w) {
+  wm_event e = empty(t_s, WM_EVENT_TWIST2);
+  e.as.twist2 = {v, w};
+  return e;
+}
+
+inline wm_event quantities(double t_s, std::initializer_list<std::pair<wm_quantity, double>> list) {
+  wm_event e = empty(t_s, WM_EVENT_QUANTITIES);
+  for (const auto &[id, value] : list) {
+    e.as.quantities.id[e.as.quantities.count] = (uint8_t)id;
+    e.as.quantities.value[e.as.quantities.count++] = value;
+  }
+  return e;
+}
+
+inline wm_event sighting(double t_s, int32_t id, double bearing, double range, uint16_t sensor = 0) {
+  wm_event e = empty(t_s, WM_EVENT_SIGHTING);
+  e.as.sighting = {sensor, id, bearing, range, NAN, NAN};
+  return e;
+}
+
+inline wm_event position(double t_s, double x, double y, double sigma) {
+  wm_event e = empty(t_s, WM_EVENT_POSITION);
+  e.as.position = {{x, y, NAN}, sigma, NAN};
+  return e;
+}
+
+inline wm_event heading(double t_s, double heading, double sigma) {
+  wm_event e = empty(t_s, WM_EVENT_HEADING);
+  e.as.heading = {heading, sigma};
+  return e;
+}
+
+inline wm_event set_pose(double t_s, double x, double y, double heading, double sigma_xy, double sigma_heading) {
+  wm_event e = empty(t_s, WM_EVENT_SET_POSE);
+  e.as.set_pose.pose_map_base = {{x, y, 0.0}, {0.0, 0.0, std::sin(heading / 2), std::cos(heading / 2)}};
+  e.as.set_pose.sigma_xy_m = sigma_xy;
+  e.as.set_pose.sigma_heading_rad = sigma_heading;
+  return e;
+}
+
+// Wheels of which nothing is known.
+inline wm_wheels no_wheels() { return {NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}}; }
+
+// A differential robot: 0.1 m wheels with 1000 ticks a turn, 0.5 m apart.
+inline wm_wheels two_wheels() { return {0.1, 1000, 0.5, NAN, NAN, NAN, 0, {}, {}}; }
+
+// A car: 2.5 m long, 1.5 m wide, steering ratio 15, an actuator from 0 to 100 mm for -0.5 to 0.5 rad.
+inline wm_wheels car() {
+  wm_wheels w = {0.3, 1000, 1.5, 2.5, 15.0, NAN, 3, {}, {}};
+  const double x[3] = {0.0, 0.05, 0.1}, y[3] = {-0.5, 0.02, 0.5};
+  for (int i = 0; i < 3; i++) w.actuator_m[i] = x[i], w.road_wheel_rad[i] = y[i];
+  return w;
+}
+
+}  // namespace make
+
+#endif

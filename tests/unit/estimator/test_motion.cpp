@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: Apache-2.0
+// The motion front end: models and their derivatives, ticks as positions, signs by the gear, standstill, dead sensors.
+#include <cstring>
+
+#include "events.hpp"
+#include "math/arc.hpp"
+#include "motion/front_end.hpp"
+#include "unity.h"
+
+namespace {
+
+wm_motion_params params;
+wm_wheels wheels;
+wm::motion_front_end front;
+wm_motion_calibration calibration;
+wm_pose2 pose;
+double way_var, turn_var;
+
+void start(const wm_wheels &w, int model = WM_MOTION_AUTO) {
+  wheels = w;
+  wm_params_defaults(&wm_motion_params_table, &params);
+  params.model = model;
+  calibration = wm::kNeutralCalibration;
+  pose = {};
+  way_var = turn_var = 0;
+  front.init(&params, &wheels);
+}
+
+void advance(double t_s) {
+  front.advance(make::at(t_s), calibration,
+                [](const wm::motion_stretch &s, const wm::motion_twist &t, const wm::motion_noise &n) {
+                  const wm::arc a = wm::make_arc(t.v * s.dt_s, t.w * s.dt_s);
+                  pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
+                  way_var += n.way_m2;
+                  turn_var += n.turn_rad2;
+                });
+}
+
+void feed(const wm_event &e) {
+  TEST_ASSERT_EQUAL(WM_OK, front.check(e));
+  front.feed(e);
+  advance(1e-9 * (double)e.t_ns);
+}
+
+void ticks(double t_s, double left, double right) {
+  feed(make::quantities(t_s, {{WM_Q_WHEEL_TICKS_LEFT, left}, {WM_Q_WHEEL_TICKS_RIGHT, right}}));
+}
+
+constexpr double kTick = 2 * M_PI * 0.1 / 1000;  // of make::two_wheels()
+
+// Each model, each calibration state: derivative by central differences, and scales' meaning at a turn.
+void test_every_derivative_of_every_model(void) {
+  const int models[] = {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_ACKERMANN, WM_MOTION_TWIST};
+  int checked = 0;
+  for (int model : models) {
+    wm_wheels w = make::car();
+    w.encoder_offset_m = 0.4;
+    const wm::motion_input input = {0, 1.3, model == WM_MOTION_TICKS ? 1.1 : 0.2, (uint8_t)model, 0, 0, 0};
+    const wm_motion_calibration c = {1.05, 0.93, 0.02, 1.02, 0.97, 1.04, 0.03, 0.1};
+    const wm::motion_twist t = wm::twist_of(input, c, w);
+    TEST_ASSERT_GREATER_THAN(1, t.count);
+    for (int state = 0; state < wm::kLag; state++) {
+      const double h = 1e-6;
+      wm_motion_calibration up = c, down = c;
+      wm::calibration_at(up, state) += h;
+      wm::calibration_at(down, state) -= h;
+      const wm::motion_twist a = wm::twist_of(input, up, w), b = wm::twist_of(input, down, w);
+      double v_by = 0, w_by = 0;
+      for (int i = 0; i < t.count; i++)
+        if (t.index[i] == state) v_by += t.v_by[i], w_by += t.w_by[i];
+      TEST_ASSERT_DOUBLE_WITHIN(1e-8, (a.v - b.v) / (2 * h), v_by);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-8, (a.w - b.w) / (2 * h), w_by);
+      checked += v_by != 0 || w_by != 0;
+    }
+  }
+  TEST_ASSERT_EQUAL(3 + 3 + 2 + 6, checked);
+}
+
+void test_ticks_make_exact_arcs(void) {
+  start(make::two_wheels());
+  ticks(0, 0, 0);
+  ticks(1, 1000, 2000);  // a radius of 0.75 m
+  const double l = 1000 * kTick, r = 2000 * kTick, turn = (r - l) / 0.5, radius = 0.5 * (l + r) / turn;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, radius * sin(turn), pose.x_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, radius * (1 - cos(turn)), pose.y_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, turn, pose.heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.25 * (l + r) * params.noise_ticks_per_sqrt_m * params.noise_ticks_per_sqrt_m,
+                            way_var);
+}
+
+// GIVEN an observation between two counts WHEN the speed changes meanwhile THEN the total is that of the counts.
+void test_counts_are_positions_whatever_comes_between(void) {
+  start(make::two_wheels());
+  ticks(0, 0, 0);
+  ticks(1, 1000, 1000);
+  advance(1.4);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1400 * kTick, pose.x_m);  // the last speed carries on
+  ticks(2, 1500, 1500);                                     // it was slower
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1500 * kTick, pose.x_m);
+  advance(2.1);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1550 * kTick, pose.x_m);
+  ticks(2.1, 1500, 1500);  // stopped, told at the very time already reached
+  ticks(2.2, 1500, 1500);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1500 * kTick, pose.x_m);
+}
+
+void test_counts_of_both_wheels_may_come_one_after_the_other(void) {
+  start(make::two_wheels());
+  for (int i = 0; i <= 100; i++) {
+    feed(make::quantities(0.01 * i, {{WM_Q_WHEEL_TICKS_LEFT, 10.0 * i}}));
+    feed(make::quantities(0.01 * i + 0.003, {{WM_Q_WHEEL_TICKS_RIGHT, 12.0 * i}}));
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 200 * kTick / 0.5, pose.heading_rad);
+  for (int i = 0; i < 2; i++) ticks(1.1 + i, 1000, 1200);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 200 * kTick / 0.5, pose.heading_rad);
+}
+
+void test_an_unsigned_speed_takes_its_sign_from_the_gear(void) {
+  start(make::car());
+  feed(make::quantities(0, {{WM_Q_GEAR, -1}, {WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+  feed(make::quantities(1, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, -1.0, pose.x_m);
+  feed(make::quantities(1, {{WM_Q_GEAR, 1}, {WM_Q_VEHICLE_SPEED, 1.0}}));
+  feed(make::quantities(2, {{WM_Q_VEHICLE_SPEED, -1.0}}));  // so it has a sign of its own
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, pose.x_m);
+  feed(make::quantities(2, {{WM_Q_GEAR, -1}}));
+  feed(make::quantities(3, {{WM_Q_VEHICLE_SPEED, -1.0}}));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, -1.0, pose.x_m);
+}
+
+void test_rear_wheels_are_preferred_and_a_silent_source_yields(void) {
+  start(make::car());
+  feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+  TEST_ASSERT_FALSE(front.speed_source_changed());
+  feed(make::quantities(0, {{WM_Q_WHEEL_SPEED_REAR_LEFT, 1.9}, {WM_Q_WHEEL_SPEED_REAR_RIGHT, 2.1}}));
+  TEST_ASSERT_TRUE(front.speed_source_changed());
+  TEST_ASSERT_FALSE(front.speed_source_changed());
+  feed(make::quantities(1, {{WM_Q_VEHICLE_SPEED, 1.0}}));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0, pose.x_m);
+  for (int i = 11; i <= 100; i++) feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+  TEST_ASSERT_TRUE(front.speed_source_changed());
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, front.twist_at(make::at(10.0), calibration).v);
+}
+
+void test_ackermann_by_table_ratio_and_road_wheel(void) {
+  start(make::car());
+  feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 2.0}, {WM_Q_STEERING_WHEEL, 3.0}}));
+  TEST_ASSERT_EQUAL(WM_MOTION_ACKERMANN, front.model());
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0 * tan(0.2) / 2.5, front.twist_at(0, calibration).w);
+  feed(make::quantities(0, {{WM_Q_STEERING_ACTUATOR, 0.075}}));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0 * tan(0.26) / 2.5, front.twist_at(0, calibration).w);
+  feed(make::quantities(0, {{WM_Q_ROAD_WHEEL, -0.1}}));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0 * tan(-0.1) / 2.5, front.twist_at(0, calibration).w);
+}
+
+void test_standing_still_shows_the_gyros_bias_and_holds_the_heading(void) {
+  start(make::car());
+  double rate;
+  feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.01}}));
+  TEST_ASSERT_FALSE(front.standstill_yaw_rate(&rate));
+  feed(make::quantities(1, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.012}}));
+  TEST_ASSERT_TRUE(front.standstill_yaw_rate(&rate));
+  TEST_ASSERT_EQUAL_DOUBLE(0.012, rate);
+  const double heading = pose.heading_rad;
+  feed(make::quantities(2, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.01}}));
+  TEST_ASSERT_EQUAL_DOUBLE(heading, pose.heading_rad);
+  feed(make::quantities(2.1, {{WM_Q_VEHICLE_SPEED, 0.5}, {WM_Q_YAW_RATE, 0.01}}));
+  TEST_ASSERT_FALSE(front.standstill_yaw_rate(&rate));
+}
+
+// GIVEN a lag WHEN a command comes THEN the robot obeys it that much later, between events, too.
+void test_commands_are_obeyed_late(void) {
+  start(make::no_wheels());
+  calibration.lag_s = 0.25;
+  feed(make::twist(0, 0, 0));
+  feed(make::twist(1, 1, 0));
+  advance(1.25);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, pose.x_m);
+  advance(1.75);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, pose.x_m);
+  feed(make::twist(2, 0, 0));
+  feed(make::twist(3, 0, 0));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, pose.x_m);
+}
+
+void test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn(void) {
+  start(make::car());
+  const double metre = 1000 / (2 * M_PI * 0.3);
+  for (int i = 0; i <= 50; i++) ticks(0.1 * i, 0.2 * metre * i, 0.2 * metre * i);
+  TEST_ASSERT_EQUAL_UINT32(0, front.health());
+  for (int i = 51; i <= 100; i++) ticks(0.1 * i, 0.2 * metre * 50, 0.2 * metre * i);
+  TEST_ASSERT_EQUAL_UINT32(WM_MOTION_HEALTH_ENCODER_LEFT_DEAD, front.health());
+  const double heading = pose.heading_rad, x = pose.x_m;
+  const double before = turn_var;
+  for (int i = 101; i <= 150; i++) ticks(0.1 * i, 0.2 * metre * 50, 0.2 * metre * i);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, heading, pose.heading_rad);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.1, turn_var - before);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(x + 5, x + 10 * cos(heading) + 1);
+  for (int i = 151; i <= 160; i++) ticks(0.1 * i, 0.2 * metre * (i - 100), 0.2 * metre * i);
+  TEST_ASSERT_EQUAL_UINT32(0, front.health());
+}
+
+void test_a_frozen_counter_is_doubt_not_standstill(void) {
+  start(make::car());
+  double rate;
+  for (int i = 0; i < 10; i++) feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 5.0}, {WM_Q_YAW_RATE, 0.0}}));
+  const double before = way_var;
+  for (int i = 10; i < 20; i++) {
+    wm_event e = make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.0}});
+    e.as.quantities.doubt = WM_DOUBT_FROZEN_COUNTER;
+    feed(e);
+    TEST_ASSERT_FALSE(front.standstill_yaw_rate(&rate));
+  }
+  TEST_ASSERT_TRUE(front.health() & WM_MOTION_HEALTH_COUNTER_FROZEN);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 5.0 * 1.9, pose.x_m);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(10.0, way_var - before);
+  feed(make::quantities(2.0, {{WM_Q_VEHICLE_SPEED, 5.0}, {WM_Q_YAW_RATE, 0.0}}));
+  TEST_ASSERT_EQUAL_UINT32(0, front.health());
+}
+
+void test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns(void) {
+  start(make::car());
+  for (int i = 0; i <= 60; i++)
+    feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 5.0}, {WM_Q_YAW_RATE, 0.01}, {WM_Q_ROAD_WHEEL, 0.004 * i}}));
+  TEST_ASSERT_TRUE(front.health() & WM_MOTION_HEALTH_YAW_RATE_STUCK);
+  feed(make::quantities(6.1, {{WM_Q_VEHICLE_SPEED, 5.0}, {WM_Q_YAW_RATE, 0.3}}));
+  TEST_ASSERT_EQUAL_UINT32(0, front.health());
+}
+
+void test_what_can_not_be_is_refused(void) {
+  start(make::car());
+  feed(make::twist(1, 1, 0));
+  TEST_ASSERT_EQUAL(WM_NOT_FINITE, front.check(make::twist(2, NAN, 0)));
+  TEST_ASSERT_EQUAL(WM_NOT_FINITE, front.check(make::quantities(2, {{WM_Q_YAW_RATE, INFINITY}})));
+  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, front.check(make::twist(2, 1e6, 0)));
+  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, front.check(make::quantities(2, {{WM_Q_YAW_RATE, 1e3}})));
+  TEST_ASSERT_EQUAL(WM_TIME_RAN_BACK, front.check(make::twist(0.5, 1, 0)));
+  TEST_ASSERT_EQUAL(WM_UNSUPPORTED, front.check(make::heading(2, 0, 1)));
+  wm_event e = make::twist(2, 1, 0);
+  e.t_ns = INT64_MAX;
+  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, front.check(e));
+}
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_every_derivative_of_every_model);
+  RUN_TEST(test_ticks_make_exact_arcs);
+  RUN_TEST(test_counts_are_positions_whatever_comes_between);
+  RUN_TEST(test_counts_of_both_wheels_may_come_one_after_the_other);
+  RUN_TEST(test_an_unsigned_speed_takes_its_sign_from_the_gear);
+  RUN_TEST(test_rear_wheels_are_preferred_and_a_silent_source_yields);
+  RUN_TEST(test_ackermann_by_table_ratio_and_road_wheel);
+  RUN_TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading);
+  RUN_TEST(test_commands_are_obeyed_late);
+  RUN_TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn);
+  RUN_TEST(test_a_frozen_counter_is_doubt_not_standstill);
+  RUN_TEST(test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns);
+  RUN_TEST(test_what_can_not_be_is_refused);
+  return UNITY_END();
+}

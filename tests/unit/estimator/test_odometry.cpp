@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+// Dead reckoning as the predictor uses it: exact arcs, a short memory, and a pose carried from then to now.
+#include <cstdlib>
+#include <cstring>
+
+#include "events.hpp"
+#include "motion/motion_params.h"
+#include "unity.h"
+#include "waymark/motion.h"
+#include "waymark/random.h"
+
+namespace {
+
+wm_odometry *odom;
+wm_motion_params params;
+wm_wheels wheels;
+
+void start(const wm_wheels &w) {
+  wheels = w;
+  wm_params_defaults(&wm_motion_params_table, &params);
+  TEST_ASSERT_EQUAL(WM_OK, wm_odometry_init(odom, &params, &wheels));
+}
+
+void feed(const wm_event &e) { TEST_ASSERT_EQUAL(WM_OK, wm_odometry_feed(odom, &e)); }
+
+wm_pose2 pose_at(double t_s) {
+  wm_odom_point p;
+  TEST_ASSERT_EQUAL(WM_OK, wm_odometry_at(odom, make::at(t_s), &p));
+  return p.pose_odom_base;
+}
+
+void assert_pose(double x, double y, double heading, wm_pose2 p) {
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, x, p.x_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, y, p.y_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, heading, p.heading_rad);
+}
+
+void test_half_a_circle_by_twists(void) {
+  start(make::no_wheels());
+  for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 1.0, M_PI));
+  assert_pose(0.0, 2.0 / M_PI, M_PI, pose_at(1.0));
+  assert_pose(1.0 / M_PI, 1.0 / M_PI, M_PI / 2, pose_at(0.5));  // looked up
+  assert_pose(sin(M_PI * 0.333) / M_PI, (1 - cos(M_PI * 0.333)) / M_PI, M_PI * 0.333,
+              pose_at(0.333));  // between points
+}
+
+void test_extrapolates_with_the_held_twist_but_not_for_ever(void) {
+  start(make::no_wheels());
+  feed(make::twist(0, 1.0, 0.0));
+  feed(make::twist(1, 1.0, 0.0));
+  assert_pose(1.5, 0, 0, pose_at(1.5));
+  assert_pose(1.0 + params.hold_max_s, 0, 0, pose_at(60));
+}
+
+void test_a_time_too_old_or_before_any_motion_is_not_found(void) {
+  start(make::no_wheels());
+  wm_odom_point p;
+  TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_odometry_at(odom, 0, &p));
+  for (int i = 0; i <= 1000; i++) feed(make::twist(0.01 * i, 1.0, 0.0));
+  TEST_ASSERT_EQUAL(WM_OK, wm_odometry_at(odom, make::at(9.0), &p));
+  TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_odometry_at(odom, make::at(1.0), &p));
+  const wm_event back = make::twist(9.99, 1, 0);
+  TEST_ASSERT_EQUAL(WM_TIME_RAN_BACK, wm_odometry_feed(odom, &back));
+  const wm_event other = make::heading(11, 0, 1);
+  TEST_ASSERT_EQUAL(WM_UNSUPPORTED, wm_odometry_feed(odom, &other));
+  TEST_ASSERT_EQUAL_INT64(make::at(10.0), wm_odometry_newest_ns(odom));
+}
+
+void test_calibration_holds_from_now_on_and_nothing_jumps(void) {
+  start(make::no_wheels());
+  for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 1.0, 0.0));
+  wm_motion_calibration c = {1.1, 1, -0.1, 1, 1, 1, 0, 0};
+  wm_odometry_calibrate(odom, &c);
+  assert_pose(1.0, 0.0, 0.0, pose_at(1.0));
+  for (int i = 101; i <= 200; i++) feed(make::twist(0.01 * i, 1.0, 0.0));
+  assert_pose(1.0 + 1.1 * sin(0.1) / 0.1, 1.1 * (1 - cos(0.1)) / 0.1, 0.1, pose_at(2.0));
+}
+
+// The carried covariance against the spread of many noisy drives, and the carried mean against the drive itself.
+void test_carry_moves_mean_and_covariance(void) {
+  start(make::no_wheels());
+  for (int i = 0; i <= 60; i++) feed(make::twist(0.01 * i, 2.0, 0.8));
+  wm_estimate fused{}, now;
+  fused.t_ns = make::at(0.1);
+  fused.heading_rad = 0.6;
+  fused.pose_map_base.p_m[0] = 5.0;
+  const double p0[3][3] = {{0.04, 0.01, 0.002}, {0.01, 0.09, -0.003}, {0.002, -0.003, 0.01}};
+  const int index[3] = {0, 1, 5};
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) fused.covariance[wm_cov_index(index[i], index[j])] = p0[i][j];
+  wm_odom_point point;
+  TEST_ASSERT_EQUAL(WM_OK, wm_odometry_carry(odom, &fused, make::at(0.5), &now, &point));
+  const double w = 0.8, r = 2.0 / w, a = 0.6, b = 0.6 + w * 0.4;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 5.0 + r * (sin(b) - sin(a)), now.pose_map_base.p_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, r * (cos(a) - cos(b)), now.pose_map_base.p_m[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, b, now.heading_rad);
+  TEST_ASSERT_EQUAL_INT64(make::at(0.5), now.t_ns);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0, now.v_mps[0]);
+
+  // The same by sampling the start and the noise (Cholesky of p0 by hand).
+  const double l00 = 0.2, l10 = 0.05, l20 = 0.01, l11 = sqrt(0.09 - l10 * l10), l21 = (-0.003 - l20 * l10) / l11;
+  const double l22 = sqrt(0.01 - l20 * l20 - l21 * l21);
+  double sum[3] = {}, outer[3][3] = {};
+  const int runs = 40000, steps = 8;
+  for (int run = 0; run < runs; run++) {
+    wm_random rnd = {11, (uint64_t)run, 0};
+    const double n0 = wm_random_next_normal(&rnd), n1 = wm_random_next_normal(&rnd), n2 = wm_random_next_normal(&rnd);
+    double x = 5.0 + l00 * n0, y = l10 * n0 + l11 * n1, h = 0.6 + l20 * n0 + l21 * n1 + l22 * n2;
+    const double dt = 0.4 / steps;
+    const double sv = sqrt((0.02 * 0.02 + 0.06 * 0.06) * dt), sw = sqrt((0.01 * 0.01 + 0.024 * 0.024) * dt);
+    for (int k = 0; k < steps; k++) {
+      const double s = 2.0 * dt + sv * wm_random_next_normal(&rnd), t = w * dt + sw * wm_random_next_normal(&rnd);
+      x += s * cos(h + t / 2), y += s * sin(h + t / 2), h += t;
+    }
+    const double d[3] = {x, y, h};
+    for (int i = 0; i < 3; i++) {
+      sum[i] += d[i];
+      for (int j = 0; j < 3; j++) outer[i][j] += d[i] * d[j];
+    }
+  }
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) {
+      const double sampled = outer[i][j] / runs - sum[i] / runs * sum[j] / runs;
+      const double scale = sqrt((outer[i][i] / runs - sum[i] * sum[i] / runs / runs) *
+                                (outer[j][j] / runs - sum[j] * sum[j] / runs / runs));
+      TEST_ASSERT_DOUBLE_WITHIN(0.03 * scale, sampled, now.covariance[wm_cov_index(index[i], index[j])]);
+    }
+}
+
+void test_a_copy_continues_identically(void) {
+  start(make::two_wheels());
+  for (int i = 0; i <= 50; i++)
+    feed(make::quantities(0.02 * i, {{WM_Q_WHEEL_TICKS_LEFT, 30.0 * i}, {WM_Q_WHEEL_TICKS_RIGHT, 35.0 * i}}));
+  wm_odometry *copy = (wm_odometry *)malloc(wm_odometry_bytes());
+  memcpy((void *)copy, (void *)odom, wm_odometry_bytes());
+  const wm_event e = make::quantities(1.02, {{WM_Q_WHEEL_TICKS_LEFT, 1540}, {WM_Q_WHEEL_TICKS_RIGHT, 1800}});
+  feed(e);
+  TEST_ASSERT_EQUAL(WM_OK, wm_odometry_feed(copy, &e));
+  TEST_ASSERT_EQUAL_MEMORY(odom, copy, wm_odometry_bytes());
+  free(copy);
+}
+
+}  // namespace
+
+void setUp(void) { odom = (wm_odometry *)malloc(wm_odometry_bytes()); }
+void tearDown(void) { free(odom); }
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_half_a_circle_by_twists);
+  RUN_TEST(test_extrapolates_with_the_held_twist_but_not_for_ever);
+  RUN_TEST(test_a_time_too_old_or_before_any_motion_is_not_found);
+  RUN_TEST(test_calibration_holds_from_now_on_and_nothing_jumps);
+  RUN_TEST(test_carry_moves_mean_and_covariance);
+  RUN_TEST(test_a_copy_continues_identically);
+  return UNITY_END();
+}
