@@ -137,7 +137,7 @@ void test_arc_and_its_derivatives(void) {
     TEST_ASSERT_DOUBLE_WITHIN(3e-9, (w.y_m - a.y_m) / h, a.y_by_way);
     if (turn != 0.0) {
       TEST_ASSERT_DOUBLE_WITHIN(3e-9, way * sin(turn) / turn, a.x_m);
-      TEST_ASSERT_DOUBLE_WITHIN(1e-6 * std::fabs(turn), way * (1 - cos(turn)) / turn, a.y_m);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, way * 2 * sin(turn / 2) * sin(turn / 2) / turn, a.y_m);
     }
   }
 }
