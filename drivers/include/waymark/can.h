@@ -27,29 +27,35 @@ typedef struct wm_can_frame {
   uint8_t data[WM_CAN_DATA_MAX];
 } wm_can_frame;
 
-// One line of `candump -l` ("(SECONDS.MICROS) IFACE ID#DATA ..."). `line` needn't be terminated. Empty lines and lines
-// that begin with '#' give WM_AGAIN. What candump prints on the screen is refused with a message that says so.
-// Cost linear in `length`; no allocation. Any thread.
+// One line of `candump -l` ("(SECONDS.MICROS) IFACE ID#DATA ..."): classic (also with a raw DLC, _9 to _F), FD (##),
+// remote and error frames (bit 29 of eight digits), with or without the direction (R, T) at its end. `line` needn't be
+// terminated. WM_AGAIN: an empty line, or one that begins with '#'. WM_BAD_DATA, WM_OUT_OF_RANGE, WM_UNSUPPORTED
+// (CAN XL): the text says why, without file and line. What candump shows on the screen is refused with a message that
+// says so. The time is exact (integers), negative ones included. Cost linear in `length`; no allocation. Any thread.
 wm_status wm_candump_parse(const char *line, size_t length, wm_can_frame *out, wm_error *err);
 
-// A DBC file, read at start. Allocates; not for the real-time thread. Unknown sections are skipped with grace.
+// A DBC file, read at start, UTF-8 or Windows-1252. Allocates (at most a few times the file's size, which is at most
+// 16 MB); not for the real-time thread. WM_BAD_CONFIG with file and line for what is wrong in what Waymark reads (BO_,
+// SG_, SIG_VALTYPE_, SG_MUL_VAL_, VAL_); other sections are passed over. What may stand in a makers' file as long as
+// nobody uses it (a signal that doesn't fit into its message, a multiplexed one without a multiplexer) is refused by
+// wm_can_decoder_make.
 typedef struct wm_dbc wm_dbc;
 wm_status wm_dbc_load(const char *path, wm_dbc **out, wm_error *err);
 wm_status wm_dbc_parse(const char *text, size_t length, const char *path_for_messages, wm_dbc **out, wm_error *err);
-void wm_dbc_free(wm_dbc *dbc);
+void wm_dbc_free(wm_dbc *dbc);  // NULL is fine
 
 // The line of can-signals.yaml that binds signals to one quantity.
 #define WM_CAN_SUM_MAX 4
 #define WM_CAN_VALUES_MAX 32
 typedef struct wm_can_binding {
-  int quantity;  // wm_quantity
-  char message[64];
+  int quantity;                     // wm_quantity
+  char message[64];                 // name in the DBC, short or long
   char signal[WM_CAN_SUM_MAX][64];  // several: their sum
   uint32_t signal_count;
   char bus[WM_CAN_IFACE_MAX];  // "": any
   char unit[16];               // "": the DBC's
   double scale, offset;        // applied after the unit: quantity = scale * si + offset; 1 and 0
-  uint32_t gear_count;         // gear only: raw value -> direction
+  uint32_t gear_count;         // gear only: raw value -> direction; 0: by the names in the DBC's VAL_
   struct {
     double raw;
     double direction;
@@ -58,13 +64,24 @@ typedef struct wm_can_binding {
   char file[192];
 } wm_can_binding;
 
-// Decodes frames into quantities. Allocates when made; decoding doesn't.
+// Decodes frames into quantities. Making one allocates, and copies what it needs: the DBC and the bindings may go.
+// Each quantity may be bound once. WM_BAD_CONFIG with the binding's file and line for what cannot be right (docs/can.md
+// has the list).
 typedef struct wm_can_decoder wm_can_decoder;
 wm_status wm_can_decoder_make(const wm_dbc *dbc, const wm_can_binding *bindings, size_t count, wm_can_decoder **out,
                               wm_error *err);
-void wm_can_decoder_free(wm_can_decoder *self);
-// WM_OK: *out holds the quantities of this frame (ticks unwrapped, units SI). WM_AGAIN: nothing is bound to this frame
-// (counted as ignored), or it is a repeated one. WM_BAD_DATA: counted. `counts` is updated. No allocation.
+void wm_can_decoder_free(wm_can_decoder *self);  // NULL is fine
+
+// WM_OK: *out holds the quantities of this frame (ticks unwrapped, units SI), with `lost_before` and `doubt`.
+// WM_AGAIN: nothing to hand out: nothing is bound to this frame (counts.ignored), it is an error frame (bus_errors) or
+// a repeated one (frozen; from the third on they are handed out with WM_DOUBT_FROZEN_COUNTER).
+// WM_BAD_DATA: shorter than its bound signals (malformed), or all of its signals say that there is no value
+// (not_finite); the text is in *err and, of the first, in counts.first_problem.
+// `counts.received` is not touched: that is for the source that hands the event out.
+// A message's rolling counter, where the DBC has one and it steps by one in the first frames, gives `lost`.
+// Ticks go on from their last value by the shorter way round: a gap must not last longer than half a cycle.
+// No allocation. Cost: for an unbound id a search among the bound ones, about 10 ns; else about 20 ns a signal. One
+// thread at a time.
 wm_status wm_can_decode(wm_can_decoder *self, const wm_can_frame *frame, wm_quantities *out, wm_source_counts *counts,
                         wm_error *err);
 // CAN ids that are needed, for kernel filters; returns how many there are.

@@ -24,6 +24,7 @@ typedef struct wm_source_counts {
   uint64_t out_of_order;    // older than the one before it where the format promises order
   uint64_t ignored;         // well-formed, but nothing is bound to it (other CAN frames)
   uint64_t frozen;          // frames whose counter stood still
+  uint64_t bus_errors;      // CAN error frames: the controller says that the bus is in trouble
   char first_problem[256];  // text of the first malformed one, with file and line; "" where none
 } wm_source_counts;
 

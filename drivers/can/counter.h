@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// A message's rolling counter: what it says was lost, and whether the sender is stuck.
+#ifndef WM_CAN_COUNTER_H
+#define WM_CAN_COUNTER_H
+
+#include <stdint.h>
+
+#include "signal.h"
+
+enum {
+  COUNTER_PROOF = 4,   // steps by one, in a row, before a signal is taken for a counter
+  COUNTER_FROZEN = 3,  // frames without a step before their values are doubted
+};
+
+typedef struct counter {
+  int is_there;
+  signal_bits bits;
+  int has_last;
+  uint64_t last;
+  uint32_t proof;   // steps by one in a row, up to COUNTER_PROOF
+  uint32_t frozen;  // frames since it last moved
+  int seen_zero, seen_top;
+} counter;
+
+// What one more value says. `lost`: frames between this one and the one before; `repeats`: frames in a row in which it
+// stood still, this one included.
+typedef struct counter_step {
+  uint64_t lost;
+  uint32_t repeats;
+} counter_step;
+
+// Many counters leave out a value (AUTOSAR E2E profile 1 counts 0 to 14, others 1 to 15), and the DBC doesn't say so:
+// a counter's cycle is taken to be without its first or last value until that has been seen.
+static inline counter_step counter_next(counter *self, uint64_t value) {
+  counter_step out = {0, 0};
+  uint64_t top = (UINT64_C(1) << self->bits.length) - 1u;
+  self->seen_zero |= value == 0;
+  self->seen_top |= value == top;
+  if (self->has_last) {
+    uint64_t first = self->seen_zero ? 0 : 1, end = self->seen_top ? top : top - 1u, cycle = end - first + 1u;
+    uint64_t step = value >= self->last ? value - self->last : value + cycle - self->last;
+    if (self->proof < COUNTER_PROOF) {
+      self->proof = step == 1 ? self->proof + 1 : 0;
+    } else if (step == 0) {
+      out.repeats = self->frozen < UINT32_MAX ? ++self->frozen : self->frozen;
+    } else {
+      out.lost = step - 1;
+      self->frozen = 0;
+    }
+  }
+  self->last = value;
+  self->has_last = 1;
+  return out;
+}
+
+#endif

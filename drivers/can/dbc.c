@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// Loading a DBC file, and finding things in it.
+#include "dbc.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+enum { kLargestFile = 16 * 1024 * 1024 };
+
+static int by_id(const void *a, const void *b) {
+  const dbc_message *x = a, *y = b;
+  uint64_t i = dbc_key(x->id, x->is_extended), j = dbc_key(y->id, y->is_extended);
+  return i != j ? (i > j) - (i < j) : (x->line > y->line) - (x->line < y->line);
+}
+
+static int by_name(const void *a, const void *b) {
+  const dbc_signal *x = a, *y = b;
+  int order = text_compare(x->name, y->name);
+  return order ? order : (x->line > y->line) - (x->line < y->line);
+}
+
+static wm_status sort_and_refuse_twins(wm_dbc *dbc, wm_error *err) {
+  if (dbc->message_count > 0) qsort(dbc->messages, dbc->message_count, sizeof *dbc->messages, by_id);
+  for (size_t i = 0; i < dbc->message_count; i++) {
+    const dbc_message *m = &dbc->messages[i];
+    if (i > 0 && dbc_key(m->id, m->is_extended) == dbc_key(m[-1].id, m[-1].is_extended))
+      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: BO_ %s: its id 0x%X is that of %s in line %d; one of them has to go",
+                     dbc->path, m->line, wm_text_shown(m->name).text, m->id, wm_text_shown(m[-1].name).text,
+                     m[-1].line);
+    if (m->signal_count == 0) continue;
+    dbc_signal *signals = dbc->signals + m->first_signal;
+    qsort(signals, m->signal_count, sizeof *signals, by_name);
+    for (size_t k = 1; k < m->signal_count; k++)
+      if (text_compare(signals[k].name, signals[k - 1].name) == 0)
+        return wm_fail(err, WM_BAD_CONFIG, "%s:%d: SG_ %s: %s has a signal of this name already, in line %d", dbc->path,
+                       signals[k].line, wm_text_shown(signals[k].name).text, wm_text_shown(m->name).text,
+                       signals[k - 1].line);
+  }
+  return WM_OK;
+}
+
+// "mN" without SG_MUL_VAL_ is selected by the message's only multiplexer that isn't selected itself.
+static void find_plain_selectors(wm_dbc *dbc) {
+  for (size_t i = 0; i < dbc->message_count; i++) {
+    const dbc_message *m = &dbc->messages[i];
+    uint32_t end = m->first_signal + m->signal_count, only = DBC_NONE, count = 0;
+    for (uint32_t k = m->first_signal; k < end; k++)
+      if (dbc->signals[k].is_selector && !dbc->signals[k].is_selected) {
+        only = k;
+        count++;
+      }
+    for (uint32_t k = m->first_signal; k < end; k++)
+      if (dbc->signals[k].is_selected && dbc->signals[k].selector == DBC_NONE && count == 1)
+        dbc->signals[k].selector = only;
+  }
+}
+
+wm_status wm_dbc_parse(const char *source, size_t length, const char *path, wm_dbc **out, wm_error *err) {
+  *out = NULL;
+  if (length > kLargestFile) return wm_fail(err, WM_BAD_CONFIG, "%s: larger than 16 MB: not a DBC file", path);
+  wm_dbc *dbc = calloc(1, sizeof *dbc);
+  if (dbc) dbc->source = malloc(length + 1);
+  if (!dbc || !dbc->source) {
+    wm_dbc_free(dbc);
+    return wm_fail(err, WM_FULL, "%s: no memory", path);
+  }
+  (void)snprintf(dbc->path, sizeof dbc->path, "%s", path);
+  memcpy(dbc->source, source, length);
+  dbc->source[length] = '\0';
+
+  wm_status status = wm_dbc_read(dbc, length, DBC_DEFINITIONS, err);
+  if (status == WM_OK) status = sort_and_refuse_twins(dbc, err);
+  if (status == WM_OK) status = wm_dbc_read(dbc, length, DBC_DETAILS, err);
+  if (status != WM_OK) {
+    wm_dbc_free(dbc);
+    return status;
+  }
+  find_plain_selectors(dbc);
+  *out = dbc;
+  return WM_OK;
+}
+
+static wm_status read_whole(FILE *file, const char *path, char **source, size_t *length, wm_error *err) {
+  char *buffer = malloc(kLargestFile + 1);  // untouched pages cost nothing
+  if (!buffer) return wm_fail(err, WM_FULL, "%s: no memory", path);
+  *length = fread(buffer, 1, kLargestFile + 1, file);
+  if (ferror(file)) {
+    free(buffer);
+    return wm_fail(err, WM_IO, "%s: cannot be read: %s", path, strerror(errno));
+  }
+  *source = buffer;
+  return WM_OK;
+}
+
+wm_status wm_dbc_load(const char *path, wm_dbc **out, wm_error *err) {
+  *out = NULL;
+  FILE *file = fopen(path, "rb");
+  if (!file)
+    return wm_fail(err, errno == ENOENT ? WM_NOT_FOUND : WM_IO, "%s: cannot be opened: %s", path, strerror(errno));
+  char *source = NULL;
+  size_t length = 0;
+  wm_status status = read_whole(file, path, &source, &length, err);
+  (void)fclose(file);
+  if (status == WM_OK) status = wm_dbc_parse(source, length, path, out, err);
+  free(source);
+  return status;
+}
+
+void wm_dbc_free(wm_dbc *dbc) {
+  if (!dbc) return;
+  free(dbc->source);
+  free(dbc->messages);
+  free(dbc->signals);
+  free(dbc->values);
+  free(dbc->ranges);
+  free(dbc);
+}
+
+dbc_message *wm_dbc_find(const wm_dbc *dbc, uint64_t key) {
+  size_t low = 0, high = dbc->message_count;
+  while (low < high) {
+    size_t middle = low + (high - low) / 2;
+    dbc_message *m = &dbc->messages[middle];
+    uint64_t here = dbc_key(m->id, m->is_extended);
+    if (here == key) return m;
+    if (here < key) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  return NULL;
+}
+
+dbc_signal *wm_dbc_find_signal(const wm_dbc *dbc, const dbc_message *message, wm_text name) {
+  size_t low = message->first_signal, high = low + message->signal_count;
+  while (low < high) {
+    size_t middle = low + (high - low) / 2;
+    int order = text_compare(dbc->signals[middle].name, name);
+    if (order == 0) return &dbc->signals[middle];
+    if (order < 0) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  return NULL;
+}
+
+int wm_dbc_selectors(const wm_dbc *dbc, const dbc_signal *signal, uint32_t out[DBC_SELECTORS_MAX]) {
+  int count = 0;
+  while (signal->is_selected) {
+    if (signal->selector == DBC_NONE || count == DBC_SELECTORS_MAX) return -1;
+    out[count++] = signal->selector;
+    signal = &dbc->signals[signal->selector];
+  }
+  return count;
+}
+
+int wm_dbc_selects(const wm_dbc *dbc, const dbc_signal *selected, uint64_t raw) {
+  if (selected->range_count == 0) return raw == selected->selected_by;
+  for (uint32_t i = 0; i < selected->range_count; i++) {
+    const dbc_range *range = &dbc->ranges[selected->first_range + i];
+    if (raw >= range->low && raw <= range->high) return 1;
+  }
+  return 0;
+}

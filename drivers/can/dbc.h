@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// A DBC file as it was read. Texts point into `source`; messages are sorted by id, a message's signals by name.
+#ifndef WM_CAN_DBC_H
+#define WM_CAN_DBC_H
+
+#include "signal.h"
+#include "text.h"
+#include "waymark/can.h"
+
+#define DBC_NONE UINT32_MAX
+#define DBC_SELECTORS_MAX 8  // multiplexers above each other
+
+typedef struct dbc_value {  // of VAL_
+  int64_t raw;
+  wm_text name;
+} dbc_value;
+
+typedef struct dbc_range {  // of SG_MUL_VAL_, both ends in
+  uint64_t low, high;
+} dbc_range;
+
+typedef struct dbc_signal {
+  wm_text name, long_name, unit;
+  int line;
+  signal_bits bits;
+  double factor, offset, min, max;
+  uint8_t is_selector;  // M: its value says which others are there
+  uint8_t is_selected;  // mN: there only for some values of `selector`
+  uint64_t selected_by;
+  uint32_t first_range, range_count;  // of SG_MUL_VAL_; without any, `selected_by` alone
+  uint32_t selector;                  // index into dbc->signals
+  uint32_t first_value, value_count;
+} dbc_signal;
+
+typedef struct dbc_message {
+  wm_text name, long_name;
+  int line;
+  uint32_t id;
+  uint8_t is_extended;
+  uint32_t length;  // bytes; above WM_CAN_DATA_MAX for what goes over several frames
+  uint32_t first_signal, signal_count;
+} dbc_message;
+
+struct wm_dbc {
+  char path[192];
+  char *source;
+  dbc_message *messages;
+  dbc_signal *signals;
+  dbc_value *values;
+  dbc_range *ranges;
+  size_t message_count, signal_count, value_count, range_count;
+  size_t message_room, signal_room, value_room, range_room;
+};
+
+// Sorted by id; `key` is (id << 1 | is_extended). NULL where there is none. Cost: logarithmic.
+dbc_message *wm_dbc_find(const wm_dbc *dbc, uint64_t key);
+static inline uint64_t dbc_key(uint32_t id, int is_extended) { return (uint64_t)id << 1 | (is_extended != 0); }
+// By the DBC's own (short) name. NULL where there is none. Cost: logarithmic.
+dbc_signal *wm_dbc_find_signal(const wm_dbc *dbc, const dbc_message *message, wm_text name);
+
+// The multiplexers above `signal`, nearest first, as indices into dbc->signals; returns how many. -1 where the file
+// does not say by what the signal is selected, or where they select each other in a ring.
+int wm_dbc_selectors(const wm_dbc *dbc, const dbc_signal *signal, uint32_t out[DBC_SELECTORS_MAX]);
+// Whether `selected` is there when the multiplexer above it reads `raw`.
+int wm_dbc_selects(const wm_dbc *dbc, const dbc_signal *selected, uint64_t raw);
+
+// The two readings of the text: messages and signals first, then what is said about them elsewhere in the file.
+typedef enum dbc_pass { DBC_DEFINITIONS, DBC_DETAILS } dbc_pass;
+wm_status wm_dbc_read(wm_dbc *dbc, size_t length, dbc_pass pass, wm_error *err);
+
+#endif

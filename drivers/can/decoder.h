@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// A decoder: everything copied out of the DBC that decoding needs, in four flat tables.
+#ifndef WM_CAN_DECODER_H
+#define WM_CAN_DECODER_H
+
+#include "counter.h"
+#include "dbc.h"
+#include "waymark/can.h"
+
+enum { NO_VALUE_MAX = 8 };
+
+// A multiplexer that has to read one of the values for the signal below it to be there.
+typedef struct bound_selector {
+  signal_bits bits;
+  uint32_t first_range, range_count;
+} bound_selector;
+
+typedef struct bound_signal {
+  signal_bits bits;
+  double factor, offset, si;  // (number * factor + offset) * si
+  uint32_t first_selector, selector_count;
+  uint32_t no_value_count;  // raw values that say "not available"
+  uint64_t no_value[NO_VALUE_MAX];
+  int has_last;  // ticks only
+  uint64_t last;
+  int64_t unwrapped;
+} bound_signal;
+
+typedef struct bound_quantity {
+  int quantity;
+  uint32_t first_signal, signal_count;
+  double scale, offset;
+  uint32_t gear_count;
+  struct {
+    double raw, direction;
+  } gear[WM_CAN_VALUES_MAX];
+} bound_quantity;
+
+// The quantities of one message on one bus.
+typedef struct bound_message {
+  uint64_t key;  // dbc_key()
+  char bus[WM_CAN_IFACE_MAX];
+  char name[64];
+  uint32_t first_quantity, quantity_count;
+  counter counter;
+} bound_message;
+
+struct wm_can_decoder {
+  bound_message *messages;  // sorted by key
+  bound_quantity *quantities;
+  bound_signal *signals;
+  bound_selector *selectors;
+  dbc_range *ranges;
+  size_t message_count, quantity_count, signal_count, selector_count, range_count;
+};
+
+#endif

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// candump's log lines: each form, exact times, and the limits.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "unity.h"
+#include "waymark/can.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static wm_can_frame frame;
+static wm_error err;
+
+static wm_status parse(const char *line) {
+  err.text[0] = '\0';
+  return wm_candump_parse(line, strlen(line), &frame, &err);
+}
+
+static void good(const char *line) { TEST_ASSERT_EQUAL_MESSAGE(WM_OK, parse(line), err.text); }
+
+static void expect(const char *line, uint32_t id, int extended, int remote, int error, int fd, int length) {
+  good(line);
+  TEST_ASSERT_EQUAL_HEX32_MESSAGE(id, frame.id, line);
+  TEST_ASSERT_EQUAL_MESSAGE(extended, frame.is_extended, line);
+  TEST_ASSERT_EQUAL_MESSAGE(remote, frame.is_remote, line);
+  TEST_ASSERT_EQUAL_MESSAGE(error, frame.is_error, line);
+  TEST_ASSERT_EQUAL_MESSAGE(fd, frame.is_fd, line);
+  TEST_ASSERT_EQUAL_MESSAGE(length, frame.length, line);
+}
+
+static void forms(void) {
+  //                                                          id        ext rem err fd length
+  expect("(1700000000.000000) can0 123#", 0x123, 0, 0, 0, 0, 0);
+  expect("(1700000000.000100) can0 123#00", 0x123, 0, 0, 0, 0, 1);
+  expect("(1700000000.000200) can0 7FF#0011223344556677\n", 0x7FF, 0, 0, 0, 0, 8);
+  expect("(1700000000.000300) can0 12345678#DEADBEEF\r\n", 0x12345678, 1, 0, 0, 0, 4);
+  expect("(1700000000.000400) can0 00000123#deadbeef", 0x123, 1, 0, 0, 0, 4);
+  expect("(1700000000.000500) can0 123#R", 0x123, 0, 1, 0, 0, 0);
+  expect("(1700000000.000600) can0 123#R8", 0x123, 0, 1, 0, 0, 8);
+  expect("(2.520002) can2 200#R T", 0x200, 0, 1, 0, 0, 0);
+  expect("(2.520002) can2 200#R3 R", 0x200, 0, 1, 0, 0, 3);
+  expect("(1700000000.000800) can0 123##0", 0x123, 0, 0, 0, 1, 0);
+  expect("(1700000000.000900) can0 123##1DEADBEEF", 0x123, 0, 0, 0, 1, 4);
+  expect("(1700000000.001200) can0 20000004#0004000000000000", 0x4, 0, 0, 1, 0, 8);
+  expect("(30.806898) can4 20000080##0", 0x80, 0, 0, 1, 1, 0);
+  expect("(1700000000.001500) can0 123#1122334455667788_9", 0x123, 0, 0, 0, 0, 8);
+  expect("(1700000000.001500) can0 123#R8_F", 0x123, 0, 1, 0, 0, 8);
+  expect("(1700000000.001600) can0 123#DEADBEEF R", 0x123, 0, 0, 0, 0, 4);
+  expect("(1700000000.001700)    can0  1FFFFFFF#DE.AD.BE.EF T\n", 0x1FFFFFFF, 1, 0, 0, 0, 4);
+  expect("(1594172462.126542) vcan0 064#F001FFFFFFFFFFFFFFFF", 0x64, 0, 0, 0, 1, 10);
+  expect("(1.0) abcdefghijklmno 123#00", 0x123, 0, 0, 0, 0, 1);
+}
+
+static void contents(void) {
+  good("(30.005041) vcan1 1C4D80A7##B12C20304 T");
+  TEST_ASSERT_EQUAL_STRING("vcan1", frame.iface);
+  TEST_ASSERT_EQUAL_HEX8(0xB, frame.fd_flags);
+  const uint8_t data[4] = {0x12, 0xC2, 0x03, 0x04};
+  TEST_ASSERT_EQUAL_HEX8_ARRAY(data, frame.data, 4);
+  char line[256] = "(1.5) can0 123##0";
+  for (int i = 0; i < 64; i++) (void)snprintf(line + strlen(line), sizeof line - strlen(line), "%02X", i);
+  good(line);
+  TEST_ASSERT_EQUAL(64, frame.length);
+  for (int i = 0; i < 64; i++) TEST_ASSERT_EQUAL_HEX8(i, frame.data[i]);
+  (void)snprintf(line + strlen(line), sizeof line - strlen(line), "00");
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, parse(line));
+}
+
+static void times_are_exact(void) {
+  static const struct {
+    const char *line;
+    int64_t t_ns;
+  } cases[] = {
+      {"(1579857014.345944) c 1FF#", INT64_C(1579857014345944000)},
+      {"(0.1) c 1FF#", INT64_C(100000000)},
+      {"(1.000001) c 1FF#", INT64_C(1000001000)},
+      {"(1752918539.123456789) c 1FF#", INT64_C(1752918539123456789)},
+      {"(7) c 1FF#", INT64_C(7000000000)},
+      {"(0000000000.000000) c 1FF#", 0},
+      {"(-0.100000) c 1FF#", INT64_C(-100000000)},
+      {"(9223372035.999999999) c 1FF#", INT64_C(9223372035999999999)},
+  };
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    good(cases[i].line);
+    TEST_ASSERT_EQUAL_INT64_MESSAGE(cases[i].t_ns, frame.t_ns, cases[i].line);
+  }
+  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, parse("(9223372036.0) c 1FF#"));
+  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, parse("(99999999999999999999999999.0) c 1FF#"));
+}
+
+static void nothing_there(void) {
+  TEST_ASSERT_EQUAL(WM_AGAIN, parse(""));
+  TEST_ASSERT_EQUAL(WM_AGAIN, parse(" \t\r\n"));
+  TEST_ASSERT_EQUAL(WM_AGAIN, parse("# recorded on the red robot"));
+}
+
+// Whatever is cut off, the parser says so and reads nothing behind the end: each prefix in a block of its own.
+static void every_prefix(void) {
+  const char *whole = "(1700000000.001500) can0 12345678##1122334455667788 T";
+  for (size_t n = 0; n <= strlen(whole); n++) {
+    char *prefix = malloc(n + 1);
+    memcpy(prefix, whole, n);
+    wm_status status = wm_candump_parse(prefix, n, &frame, &err);
+    free(prefix);
+    TEST_ASSERT_TRUE(status == WM_OK || status == WM_AGAIN || status == WM_BAD_DATA);
+    if (n < strlen("(1700000000.001500) can0 12345678#")) TEST_ASSERT_NOT_EQUAL(WM_OK, status);
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(forms);
+  RUN_TEST(contents);
+  RUN_TEST(times_are_exact);
+  RUN_TEST(nothing_there);
+  RUN_TEST(every_prefix);
+  return UNITY_END();
+}
