@@ -42,6 +42,7 @@ struct wm_source {
   char name[WM_SOURCE_NAME_MAX];  // "can", "motion", "sightings:laser", "gnss"
   uint16_t index;                 // in the run's table of sources: also the order at equal stamps
   uint8_t is_motion;              // its events are motion
+  uint8_t in_order;               // promises that its stamps never go back (a file without arrival_ns, a CAN bus)
   uint32_t kinds;                 // WM_EVENT_BIT of what it hands out
   wm_source_counts counts;
 };

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a run is doing: counts a source, calibration states, deadlines. Fixed size, no pointers. Every datum that a
+// source handed out is in exactly one of: fused, rejected, refused, late, dropped, duplicates, future, or still waiting
+// in the merge.
+#ifndef WAYMARK_HEALTH_H
+#define WAYMARK_HEALTH_H
+
+#include <stdint.h>
+
+#include "waymark/pose.h"
+#include "waymark/status.h"
+#include "waymark/time.h"
+
+#define WM_HEALTH_SOURCES_MAX 32
+#define WM_HEALTH_CALIBRATION_MAX 32
+#define WM_HEALTH_NAME_MAX 48
+#define WM_STATUS_COUNT (WM_INTERNAL + 1)
+
+typedef struct wm_source_health {
+  char name[WM_HEALTH_NAME_MAX];
+  uint64_t received;                    // handed out by the source
+  uint64_t fused;                       // motion taken; observations of which at least one update was fused
+  uint64_t rejected[WM_VERDICT_COUNT];  // observations of which none was fused, by the first update's verdict
+  uint64_t refused[WM_STATUS_COUNT];    // what the estimator would not take, by its status
+  uint64_t late;                        // older than the watermark when it came
+  uint64_t dropped;                     // ring or merge full
+  uint64_t duplicates;                  // the same datum again
+  uint64_t future;                      // stamped later than it arrived
+  uint64_t lost, malformed, not_finite, out_of_order, ignored, frozen;  // the source's own (wm_source_counts)
+  wm_time_ns lateness_p99_ns;                                           // arrival minus stamp
+  wm_time_ns lateness_max_ns;                                           // the config's bound
+  wm_time_ns newest_ns;                                                 // newest stamp, WM_TIME_NONE before the first
+  wm_time_ns silent_ns;                                                 // since its last datum, on the arrival clock
+  uint8_t stale;                                                        // silent for far longer than it used to be
+} wm_source_health;
+
+typedef struct wm_health {
+  wm_time_ns t_ns;            // on the run's clock
+  wm_time_ns fused_until_ns;  // WM_TIME_NONE before the first
+  uint8_t state;              // wm_state
+  uint32_t resets, jumps;
+  uint32_t motion_health;  // bits of WM_MOTION_HEALTH_*
+  uint32_t source_count;
+  wm_source_health sources[WM_HEALTH_SOURCES_MAX];
+  uint32_t calibration_count;
+  wm_calibration_value calibration[WM_HEALTH_CALIBRATION_MAX];
+  uint64_t loops, deadlines_missed;
+  uint64_t outputs_lost;  // records that the sinks didn't take in time
+  uint64_t published;
+} wm_health;
+
+#endif

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Structs of this room as LCM messages of the package `waymark` (msgs/lcm/*.lcm): bytes ready to be published. Pure:
+// any thread, no allocation, no liblcm. Each returns the bytes written, 0 where `capacity` is too small.
+#ifndef WAYMARK_LCM_MESSAGES_H
+#define WAYMARK_LCM_MESSAGES_H
+
+#include <stddef.h>
+
+#include "waymark/event.h"
+#include "waymark/health.h"
+#include "waymark/pose.h"
+#include "waymark/setup.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Enough for any of them: one datagram.
+#define WM_LCM_MESSAGE_MAX 20000
+#define WM_LCM_OBSERVATIONS_MAX 64
+#define WM_LCM_LANDMARKS_MAX 256
+
+size_t wm_lcm_pose(const wm_published *published, void *out, size_t capacity);
+size_t wm_lcm_health(const wm_health *health, void *out, size_t capacity);
+size_t wm_lcm_innovation(const wm_innovation *innovation, void *out, size_t capacity);
+
+// `count` sightings of one sensor at one stamp, the first WM_LCM_OBSERVATIONS_MAX are sent and the others counted.
+size_t wm_lcm_observations(const char *sensor_name, const wm_event *sightings, size_t count, void *out,
+                           size_t capacity);
+
+// Landmarks from `first` on, at most WM_LCM_LANDMARKS_MAX; `total` is how many the map has.
+size_t wm_lcm_landmarks(const wm_landmark *landmarks, size_t total, size_t first, wm_time_ns t_ns, void *out,
+                        size_t capacity);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

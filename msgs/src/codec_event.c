@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/bytes.h"
+#include "waymark/codec.h"
+
+#define EVENT_VERSION 1
+
+static void put_payload(wm_writer *w, const wm_event *e) {
+  switch ((wm_event_kind)e->kind) {
+    case WM_EVENT_QUANTITIES: {
+      const wm_quantities *q = &e->as.quantities;
+      size_t count = q->count < WM_QUANTITIES_MAX ? q->count : WM_QUANTITIES_MAX;
+      wm_put_u8(w, (uint8_t)count);
+      wm_put_u8(w, q->doubt);
+      wm_put_u16(w, q->lost_before);
+      for (size_t i = 0; i < count; i++) {
+        wm_put_u8(w, q->id[i]);
+        wm_put_f64(w, q->value[i]);
+      }
+      break;
+    }
+    case WM_EVENT_TWIST2:
+      wm_put_f64(w, e->as.twist2.v_mps);
+      wm_put_f64(w, e->as.twist2.w_radps);
+      break;
+    case WM_EVENT_TWIST6:
+      wm_put_f64s(w, e->as.twist6.v_mps, 3);
+      wm_put_f64s(w, e->as.twist6.w_radps, 3);
+      break;
+    case WM_EVENT_SIGHTING:
+      wm_put_u16(w, e->as.sighting.sensor);
+      wm_put_i32(w, e->as.sighting.landmark_id);
+      wm_put_f64(w, e->as.sighting.bearing_rad);
+      wm_put_f64(w, e->as.sighting.range_m);
+      wm_put_f64(w, e->as.sighting.bearing_sigma_rad);
+      wm_put_f64(w, e->as.sighting.range_sigma_m);
+      break;
+    case WM_EVENT_POSITION:
+      wm_put_f64s(w, e->as.position.p_m, 3);
+      wm_put_f64(w, e->as.position.sigma_xy_m);
+      wm_put_f64(w, e->as.position.sigma_z_m);
+      break;
+    case WM_EVENT_HEADING:
+      wm_put_f64(w, e->as.heading.heading_rad);
+      wm_put_f64(w, e->as.heading.sigma_rad);
+      break;
+    case WM_EVENT_MARKER:
+      wm_put_u16(w, e->as.marker.sensor);
+      wm_put_i32(w, e->as.marker.id);
+      wm_put_f64s(w, e->as.marker.p_m, 3);
+      wm_put_f64(w, e->as.marker.yaw_rad);
+      break;
+    case WM_EVENT_STEREO:
+      wm_put_i32(w, e->as.stereo.id);
+      wm_put_f64s(w, e->as.stereo.left_px, 2);
+      wm_put_f64s(w, e->as.stereo.right_px, 2);
+      break;
+    case WM_EVENT_POINTS: {
+      const wm_points *p = &e->as.points;
+      uint32_t count = p->count < WM_POINTS_MAX ? p->count : WM_POINTS_MAX;
+      wm_put_u32(w, count);
+      wm_put_u32(w, p->dropped);
+      for (uint32_t i = 0; i < count; i++) {
+        wm_put_f32(w, p->x_m[i]);
+        wm_put_f32(w, p->y_m[i]);
+      }
+      break;
+    }
+    case WM_EVENT_LOOKED: wm_put_u16(w, e->as.looked.sensor); break;
+    case WM_EVENT_SET_POSE:
+      wm_put_f64s(w, e->as.set_pose.pose_map_base.p_m, 3);
+      wm_put_f64s(w, e->as.set_pose.pose_map_base.q_xyzw, 4);
+      wm_put_f64(w, e->as.set_pose.sigma_xy_m);
+      wm_put_f64(w, e->as.set_pose.sigma_heading_rad);
+      break;
+    case WM_EVENT_NONE:
+    case WM_EVENT_RESET:
+    case WM_EVENT_KIND_COUNT: break;
+  }
+}
+
+size_t wm_event_encode(const wm_event *event, void *out, size_t capacity) {
+  wm_writer w = wm_writer_of(out, capacity);
+  wm_put_u8(&w, EVENT_VERSION);
+  wm_put_u8(&w, event->kind);
+  wm_put_u16(&w, event->source);
+  wm_put_u32(&w, event->seq);
+  wm_put_i64(&w, event->t_ns);
+  wm_put_i64(&w, event->arrival_ns);
+  put_payload(&w, event);
+  return w.full ? 0 : w.used;
+}
+
+static void get_quantities(wm_reader *r, wm_quantities *q) {
+  q->count = wm_get_u8(r);
+  q->doubt = wm_get_u8(r);
+  q->lost_before = wm_get_u16(r);
+  if (q->count > WM_QUANTITIES_MAX) r->bad = 1;
+  for (size_t i = 0; i < q->count && !r->bad; i++) {
+    q->id[i] = wm_get_u8(r);
+    q->value[i] = wm_get_f64(r);
+    if (q->id[i] >= WM_Q_COUNT) r->bad = 1;
+  }
+}
+
+static void get_points(wm_reader *r, wm_points *p) {
+  p->count = wm_get_u32(r);
+  p->dropped = wm_get_u32(r);
+  if (p->count > WM_POINTS_MAX) r->bad = 1;
+  for (uint32_t i = 0; i < p->count && !r->bad; i++) {
+    p->x_m[i] = wm_get_f32(r);
+    p->y_m[i] = wm_get_f32(r);
+  }
+}
+
+static void get_payload(wm_reader *r, wm_event *e) {
+  switch ((wm_event_kind)e->kind) {
+    case WM_EVENT_QUANTITIES: get_quantities(r, &e->as.quantities); break;
+    case WM_EVENT_TWIST2:
+      e->as.twist2.v_mps = wm_get_f64(r);
+      e->as.twist2.w_radps = wm_get_f64(r);
+      break;
+    case WM_EVENT_TWIST6:
+      wm_get_f64s(r, e->as.twist6.v_mps, 3);
+      wm_get_f64s(r, e->as.twist6.w_radps, 3);
+      break;
+    case WM_EVENT_SIGHTING:
+      e->as.sighting.sensor = wm_get_u16(r);
+      e->as.sighting.landmark_id = wm_get_i32(r);
+      e->as.sighting.bearing_rad = wm_get_f64(r);
+      e->as.sighting.range_m = wm_get_f64(r);
+      e->as.sighting.bearing_sigma_rad = wm_get_f64(r);
+      e->as.sighting.range_sigma_m = wm_get_f64(r);
+      break;
+    case WM_EVENT_POSITION:
+      wm_get_f64s(r, e->as.position.p_m, 3);
+      e->as.position.sigma_xy_m = wm_get_f64(r);
+      e->as.position.sigma_z_m = wm_get_f64(r);
+      break;
+    case WM_EVENT_HEADING:
+      e->as.heading.heading_rad = wm_get_f64(r);
+      e->as.heading.sigma_rad = wm_get_f64(r);
+      break;
+    case WM_EVENT_MARKER:
+      e->as.marker.sensor = wm_get_u16(r);
+      e->as.marker.id = wm_get_i32(r);
+      wm_get_f64s(r, e->as.marker.p_m, 3);
+      e->as.marker.yaw_rad = wm_get_f64(r);
+      break;
+    case WM_EVENT_STEREO:
+      e->as.stereo.id = wm_get_i32(r);
+      wm_get_f64s(r, e->as.stereo.left_px, 2);
+      wm_get_f64s(r, e->as.stereo.right_px, 2);
+      break;
+    case WM_EVENT_POINTS: get_points(r, &e->as.points); break;
+    case WM_EVENT_LOOKED: e->as.looked.sensor = wm_get_u16(r); break;
+    case WM_EVENT_SET_POSE:
+      wm_get_f64s(r, e->as.set_pose.pose_map_base.p_m, 3);
+      wm_get_f64s(r, e->as.set_pose.pose_map_base.q_xyzw, 4);
+      e->as.set_pose.sigma_xy_m = wm_get_f64(r);
+      e->as.set_pose.sigma_heading_rad = wm_get_f64(r);
+      break;
+    case WM_EVENT_NONE:
+    case WM_EVENT_RESET:
+    case WM_EVENT_KIND_COUNT: break;
+  }
+}
+
+wm_status wm_event_decode(const void *data, size_t size, wm_event *out, size_t *used) {
+  memset(out, 0, WM_EVENT_SMALL_BYTES);
+  wm_reader r = wm_reader_of(data, size);
+  if (wm_get_u8(&r) != EVENT_VERSION) r.bad = 1;
+  out->kind = wm_get_u8(&r);
+  if (out->kind == WM_EVENT_NONE || out->kind >= WM_EVENT_KIND_COUNT) r.bad = 1;
+  out->source = wm_get_u16(&r);
+  out->seq = wm_get_u32(&r);
+  out->t_ns = wm_get_i64(&r);
+  out->arrival_ns = wm_get_i64(&r);
+  if (!r.bad) get_payload(&r, out);
+  *used = r.used;
+  return r.bad ? WM_BAD_DATA : WM_OK;
+}

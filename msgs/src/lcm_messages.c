@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/lcm_messages.h"
+
+#include <string.h>
+
+#include "waymark_health_t.h"
+#include "waymark_innovation_t.h"
+#include "waymark_landmarks_t.h"
+#include "waymark_observations_t.h"
+#include "waymark_pose_t.h"
+
+_Static_assert(sizeof(((waymark_source_health_t *)0)->rejected) / sizeof(int64_t) == WM_VERDICT_COUNT,
+               "a verdict each");
+_Static_assert(sizeof(((waymark_source_health_t *)0)->refused) / sizeof(int64_t) == WM_STATUS_COUNT, "a status each");
+_Static_assert(sizeof(((waymark_health_t *)0)->sources) / sizeof(waymark_source_health_t) == WM_HEALTH_SOURCES_MAX,
+               "a place each");
+_Static_assert(sizeof(((waymark_health_t *)0)->calibration) / sizeof(waymark_calibration_t) ==
+                   WM_HEALTH_CALIBRATION_MAX,
+               "a place each");
+_Static_assert(WAYMARK_POSE_T_STATUS_JUMPED == WM_PUB_JUMPED && WAYMARK_POSE_T_STATE_LOST == WM_STATE_LOST &&
+                   WAYMARK_INNOVATION_T_REJECTED_BY_CONFIG == WM_REJECTED_BY_CONFIG,
+               "the messages' numbers are the structs' numbers");
+
+static size_t written(int bytes) { return bytes > 0 ? (size_t)bytes : 0; }
+static int room(size_t capacity) { return capacity > INT32_MAX ? INT32_MAX : (int)capacity; }
+
+static void put_name(uint8_t *out, size_t capacity, const char *name) {
+  size_t length = strnlen(name, capacity - 1);
+  memset(out, 0, capacity);
+  memcpy(out, name, length);
+}
+
+size_t wm_lcm_pose(const wm_published *p, void *out, size_t capacity) {
+  const wm_estimate *e = &p->now;
+  waymark_pose_t m = {
+      .t_ns = e->t_ns,
+      .sent_ns = p->sent_ns,
+      .fused_until_ns = p->fused_until_ns,
+      .utc_offset_ns = p->utc_offset_ns,
+      .utc_uncertainty_ns = p->utc_uncertainty_ns,
+      .frame = WM_FRAME_MAP,
+      .child_frame = WM_FRAME_BASE,
+      .state = (int8_t)e->state,
+      .dof = (int8_t)e->dof,
+      .status_flags = (int32_t)p->status_flags,
+      .resets = (int32_t)e->resets,
+      .deadlines_missed = (int32_t)p->deadlines_missed,
+      .odom_position_m = {p->pose_odom_base.x_m, p->pose_odom_base.y_m},
+      .odom_heading_rad = p->pose_odom_base.heading_rad,
+      .jumps = (int32_t)p->jumps,
+      .last_jump_m = p->last_jump_m,
+      .last_jump_rad = p->last_jump_rad,
+  };
+  memcpy(m.position_m, e->pose_map_base.p_m, sizeof m.position_m);
+  memcpy(m.orientation_xyzw, e->pose_map_base.q_xyzw, sizeof m.orientation_xyzw);
+  memcpy(m.covariance, e->covariance, sizeof m.covariance);
+  memcpy(m.velocity_mps, e->v_mps, sizeof m.velocity_mps);
+  memcpy(m.rate_radps, e->w_radps, sizeof m.rate_radps);
+  return written(waymark_pose_t_encode(out, 0, room(capacity), &m));
+}
+
+static void put_source(waymark_source_health_t *out, const wm_source_health *s) {
+  put_name(out->name, sizeof out->name, s->name);
+  out->received = (int64_t)s->received;
+  out->fused = (int64_t)s->fused;
+  for (int i = 0; i < WM_VERDICT_COUNT; i++) out->rejected[i] = (int64_t)s->rejected[i];
+  for (int i = 0; i < WM_STATUS_COUNT; i++) out->refused[i] = (int64_t)s->refused[i];
+  out->late = (int64_t)s->late;
+  out->dropped = (int64_t)s->dropped;
+  out->duplicates = (int64_t)s->duplicates;
+  out->future = (int64_t)s->future;
+  out->lost = (int64_t)s->lost;
+  out->malformed = (int64_t)s->malformed;
+  out->not_finite = (int64_t)s->not_finite;
+  out->out_of_order = (int64_t)s->out_of_order;
+  out->ignored = (int64_t)s->ignored;
+  out->frozen = (int64_t)s->frozen;
+  out->lateness_p99_ns = s->lateness_p99_ns;
+  out->lateness_max_ns = s->lateness_max_ns;
+  out->newest_ns = s->newest_ns;
+  out->silent_ns = s->silent_ns;
+  out->stale = (int8_t)s->stale;
+}
+
+size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {
+  waymark_health_t m = {
+      .t_ns = h->t_ns,
+      .fused_until_ns = h->fused_until_ns,
+      .state = (int8_t)h->state,
+      .resets = (int32_t)h->resets,
+      .jumps = (int32_t)h->jumps,
+      .motion_health = (int32_t)h->motion_health,
+      .loops = (int64_t)h->loops,
+      .deadlines_missed = (int64_t)h->deadlines_missed,
+      .outputs_lost = (int64_t)h->outputs_lost,
+      .published = (int64_t)h->published,
+  };
+  m.source_count = (int32_t)(h->source_count < WM_HEALTH_SOURCES_MAX ? h->source_count : WM_HEALTH_SOURCES_MAX);
+  for (int32_t i = 0; i < m.source_count; i++) put_source(&m.sources[i], &h->sources[i]);
+  m.calibration_count =
+      (int32_t)(h->calibration_count < WM_HEALTH_CALIBRATION_MAX ? h->calibration_count : WM_HEALTH_CALIBRATION_MAX);
+  for (int32_t i = 0; i < m.calibration_count; i++) {
+    put_name(m.calibration[i].name, sizeof m.calibration[i].name, h->calibration[i].name);
+    m.calibration[i].value = h->calibration[i].value;
+    m.calibration[i].sigma = h->calibration[i].sigma;
+  }
+  return written(waymark_health_t_encode(out, 0, room(capacity), &m));
+}
+
+size_t wm_lcm_innovation(const wm_innovation *i, void *out, size_t capacity) {
+  waymark_innovation_t m = {
+      .t_ns = i->t_ns,
+      .source = (int16_t)i->source,
+      .sensor = (int16_t)i->sensor,
+      .landmark_id = i->landmark_id,
+      .residual = (int8_t)i->residual,
+      .verdict = (int8_t)i->verdict,
+      .gate_dof = (int8_t)i->gate_dof,
+      .observed = i->observed,
+      .expected = i->expected,
+      .variance = i->variance,
+      .nis = i->nis,
+      .gate = i->gate,
+  };
+  return written(waymark_innovation_t_encode(out, 0, room(capacity), &m));
+}
+
+size_t wm_lcm_observations(const char *sensor_name, const wm_event *sightings, size_t count, void *out,
+                           size_t capacity) {
+  if (count == 0) return 0;
+  waymark_observations_t m = {.t_ns = sightings[0].t_ns, .arrival_ns = sightings[0].arrival_ns};
+  put_name(m.sensor, sizeof m.sensor, sensor_name);
+  m.count = (int32_t)(count < WM_LCM_OBSERVATIONS_MAX ? count : WM_LCM_OBSERVATIONS_MAX);
+  m.dropped = (int32_t)(count - (size_t)m.count);
+  for (int32_t i = 0; i < m.count; i++) {
+    const wm_sighting *s = &sightings[i].as.sighting;
+    m.landmark_id[i] = s->landmark_id;
+    m.bearing_rad[i] = s->bearing_rad;
+    m.range_m[i] = s->range_m;
+  }
+  return written(waymark_observations_t_encode(out, 0, room(capacity), &m));
+}
+
+size_t wm_lcm_landmarks(const wm_landmark *landmarks, size_t total, size_t first, wm_time_ns t_ns, void *out,
+                        size_t capacity) {
+  if (first > total) return 0;
+  size_t count = total - first < WM_LCM_LANDMARKS_MAX ? total - first : WM_LCM_LANDMARKS_MAX;
+  waymark_landmarks_t m = {.t_ns = t_ns, .total = (int32_t)total, .first = (int32_t)first, .count = (int32_t)count};
+  for (size_t i = 0; i < count; i++) {
+    const wm_landmark *l = &landmarks[first + i];
+    m.id[i] = l->id;
+    memcpy(m.position_m[i], l->p_m, sizeof m.position_m[i]);
+    m.sigma_m[i] = l->sigma_m;
+  }
+  return written(waymark_landmarks_t_encode(out, 0, room(capacity), &m));
+}

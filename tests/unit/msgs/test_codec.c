@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "unity.h"
+#include "waymark/bytes.h"
+#include "waymark/codec.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static uint64_t random_state = 42;
+static uint64_t random_bits(void) {
+  random_state += UINT64_C(0x9e3779b97f4a7c15);
+  uint64_t z = random_state;
+  z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
+  z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
+  return z ^ (z >> 31);
+}
+static double random_f64(void) { return ((double)(random_bits() >> 11) * 0x1p-53 - 0.5) * 1e3; }
+
+static void fill(wm_event *e, unsigned kind) {
+  memset(e, 0, sizeof *e);
+  e->kind = (uint8_t)kind;
+  e->t_ns = (wm_time_ns)random_bits();
+  e->arrival_ns = (wm_time_ns)random_bits();
+  e->seq = (uint32_t)random_bits();
+  e->source = (uint16_t)random_bits();
+  switch ((wm_event_kind)kind) {
+    case WM_EVENT_QUANTITIES:
+      e->as.quantities.count = (uint8_t)(random_bits() % (WM_QUANTITIES_MAX + 1));
+      e->as.quantities.doubt = WM_DOUBT_FROZEN_COUNTER;
+      e->as.quantities.lost_before = 65535;
+      for (int i = 0; i < e->as.quantities.count; i++) {
+        e->as.quantities.id[i] = (uint8_t)(random_bits() % WM_Q_COUNT);
+        e->as.quantities.value[i] = random_f64();
+      }
+      break;
+    case WM_EVENT_TWIST2: e->as.twist2 = (wm_twist2){random_f64(), -0.0}; break;
+    case WM_EVENT_TWIST6:
+      for (int i = 0; i < 3; i++) {
+        e->as.twist6.v_mps[i] = random_f64();
+        e->as.twist6.w_radps[i] = random_f64();
+      }
+      break;
+    case WM_EVENT_SIGHTING: e->as.sighting = (wm_sighting){65535, -1, random_f64(), NAN, NAN, random_f64()}; break;
+    case WM_EVENT_POSITION: e->as.position = (wm_position){{random_f64(), random_f64(), NAN}, 1e-300, INFINITY}; break;
+    case WM_EVENT_HEADING: e->as.heading = (wm_heading){random_f64(), random_f64()}; break;
+    case WM_EVENT_MARKER: e->as.marker = (wm_marker){3, INT32_MIN, {1, 2, random_f64()}, random_f64()}; break;
+    case WM_EVENT_STEREO: e->as.stereo = (wm_stereo){INT32_MAX, {random_f64(), 2}, {NAN, NAN}}; break;
+    case WM_EVENT_POINTS:
+      e->as.points.count = (uint32_t)(random_bits() % (WM_POINTS_MAX + 1));
+      e->as.points.dropped = 7;
+      for (uint32_t i = 0; i < e->as.points.count; i++) {
+        e->as.points.x_m[i] = (float)random_f64();
+        e->as.points.y_m[i] = (float)random_f64();
+      }
+      break;
+    case WM_EVENT_LOOKED: e->as.looked.sensor = 9; break;
+    case WM_EVENT_SET_POSE:
+      e->as.set_pose = (wm_set_pose){{{1, 2, 3}, {0, 0, random_f64(), 1}}, random_f64(), random_f64()};
+      break;
+    case WM_EVENT_NONE:
+    case WM_EVENT_RESET:
+    case WM_EVENT_KIND_COUNT: break;
+  }
+}
+
+static void every_event_comes_back_as_it_was(void) {
+  for (int round = 0; round < 200; round++)
+    for (unsigned kind = 1; kind < WM_EVENT_KIND_COUNT; kind++) {
+      wm_event in, out;
+      fill(&in, kind);
+      uint8_t bytes[WM_EVENT_ENCODED_MAX], again[WM_EVENT_ENCODED_MAX];
+      size_t length = wm_event_encode(&in, bytes, sizeof bytes), used;
+      TEST_ASSERT_GREATER_THAN(0, length);
+      memset(&out, 0xA5, sizeof out);
+      TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length, &out, &used));
+      TEST_ASSERT_EQUAL(length, used);
+      TEST_ASSERT_EQUAL(length, wm_event_encode(&out, again, sizeof again));
+      TEST_ASSERT_EQUAL_MEMORY_MESSAGE(bytes, again, length, wm_event_kind_name(kind));
+      if (kind != WM_EVENT_POINTS) TEST_ASSERT_EQUAL_MEMORY(&in, &out, WM_EVENT_SMALL_BYTES);
+    }
+}
+
+static void a_cut_event_is_refused_at_every_length(void) {
+  for (unsigned kind = 1; kind < WM_EVENT_KIND_COUNT; kind++) {
+    wm_event in, out;
+    fill(&in, kind);
+    uint8_t bytes[WM_EVENT_ENCODED_MAX];
+    size_t length = wm_event_encode(&in, bytes, sizeof bytes), used;
+    for (size_t cut = 0; cut < length; cut++) {
+      TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_event_decode(bytes, cut, &out, &used));
+      TEST_ASSERT_LESS_OR_EQUAL(cut, used);
+      TEST_ASSERT_EQUAL(0, wm_event_encode(&in, bytes, cut));
+      wm_event_encode(&in, bytes, sizeof bytes);
+    }
+  }
+}
+
+static void noise_never_gives_an_event_with_indices_out_of_bounds(void) {
+  size_t good = 0;
+  for (int round = 0; round < 20000; round++) {
+    uint8_t bytes[128];
+    for (size_t i = 0; i < sizeof bytes; i++) bytes[i] = (uint8_t)random_bits();
+    bytes[0] = 1;
+    bytes[1] = (uint8_t)(random_bits() % (WM_EVENT_KIND_COUNT + 2));
+    if (round % 2) bytes[24] = (uint8_t)(random_bits() % 10);  // a count that may be good
+    wm_event out;
+    size_t used;
+    if (wm_event_decode(bytes, sizeof bytes, &out, &used) != WM_OK) continue;
+    good++;
+    TEST_ASSERT_LESS_THAN(WM_EVENT_KIND_COUNT, out.kind);
+    if (out.kind == WM_EVENT_QUANTITIES) {
+      TEST_ASSERT_LESS_OR_EQUAL(WM_QUANTITIES_MAX, out.as.quantities.count);
+      for (int i = 0; i < out.as.quantities.count; i++) TEST_ASSERT_LESS_THAN(WM_Q_COUNT, out.as.quantities.id[i]);
+    }
+    if (out.kind == WM_EVENT_POINTS) TEST_ASSERT_LESS_OR_EQUAL(WM_POINTS_MAX, out.as.points.count);
+  }
+  TEST_ASSERT_GREATER_THAN(1000, good);
+}
+
+static void another_version_is_refused(void) {
+  wm_event in, out;
+  fill(&in, WM_EVENT_TWIST2);
+  uint8_t bytes[WM_EVENT_ENCODED_MAX];
+  size_t length = wm_event_encode(&in, bytes, sizeof bytes), used;
+  bytes[0]++;
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_event_decode(bytes, length, &out, &used));
+}
+
+static void bytes_are_little_endian_on_every_machine(void) {
+  wm_event e = {
+      .t_ns = 0x0102030405060708, .arrival_ns = -1, .seq = 0x11223344, .source = 0x5566, .kind = WM_EVENT_LOOKED};
+  e.as.looked.sensor = 0x7788;
+  uint8_t bytes[64];
+  static const uint8_t kWanted[] = {1,    WM_EVENT_LOOKED,
+                                    0x66, 0x55,
+                                    0x44, 0x33,
+                                    0x22, 0x11,
+                                    8,    7,
+                                    6,    5,
+                                    4,    3,
+                                    2,    1,
+                                    0xff, 0xff,
+                                    0xff, 0xff,
+                                    0xff, 0xff,
+                                    0xff, 0xff,
+                                    0x88, 0x77};
+  TEST_ASSERT_EQUAL(sizeof kWanted, wm_event_encode(&e, bytes, sizeof bytes));
+  TEST_ASSERT_EQUAL_MEMORY(kWanted, bytes, sizeof kWanted);
+}
+
+static void a_published_pose_comes_back(void) {
+  wm_published in = {.sent_ns = 5, .fused_until_ns = -3, .jumps = 2, .status_flags = 7, .utc_uncertainty_ns = -1}, out;
+  for (int i = 0; i < 36; i++) in.now.covariance[i] = random_f64();
+  in.now.pose_map_base.q_xyzw[3] = 1;
+  in.now.dof = 3;
+  in.last_jump_m = random_f64();
+  uint8_t bytes[WM_PUBLISHED_ENCODED_MAX], again[WM_PUBLISHED_ENCODED_MAX];
+  size_t length = wm_published_encode(&in, bytes, sizeof bytes), used;
+  TEST_ASSERT_GREATER_THAN(400, length);
+  TEST_ASSERT_EQUAL(WM_OK, wm_published_decode(bytes, length, &out, &used));
+  TEST_ASSERT_EQUAL(length, wm_published_encode(&out, again, sizeof again));
+  TEST_ASSERT_EQUAL_MEMORY(bytes, again, length);
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_published_decode(bytes, length - 1, &out, &used));
+  TEST_ASSERT_EQUAL(0, wm_published_encode(&in, bytes, length - 1));
+}
+
+static void an_innovation_comes_back_and_unknown_verdicts_do_not(void) {
+  wm_innovation in = {.t_ns = 1,
+                      .source = 2,
+                      .sensor = 3,
+                      .landmark_id = -1,
+                      .residual = WM_RESIDUAL_RANGE,
+                      .verdict = WM_REJECTED_GATE,
+                      .observed = 1.5,
+                      .nis = 7,
+                      .gate = 6.6,
+                      .gate_dof = 1},
+                out;
+  uint8_t bytes[WM_INNOVATION_ENCODED_MAX];
+  size_t length = wm_innovation_encode(&in, bytes, sizeof bytes), used;
+  TEST_ASSERT_EQUAL(WM_OK, wm_innovation_decode(bytes, length, &out, &used));
+  TEST_ASSERT_EQUAL(WM_REJECTED_GATE, out.verdict);
+  TEST_ASSERT_EQUAL_DOUBLE(1.5, out.observed);
+  in.verdict = WM_VERDICT_COUNT;
+  wm_innovation_encode(&in, bytes, sizeof bytes);
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_innovation_decode(bytes, length, &out, &used));
+}
+
+static void a_setup_comes_back(void) {
+  uint8_t bytes[2048];
+  size_t used;
+  wm_wheels wheels = {.radius_m = 0.1, .track_m = NAN, .steering_table_count = 3, .actuator_m = {1, 2, 3}}, wheels2;
+  size_t length = wm_wheels_encode(&wheels, bytes, sizeof bytes);
+  TEST_ASSERT_EQUAL(WM_OK, wm_wheels_decode(bytes, length, &wheels2, &used));
+  TEST_ASSERT_EQUAL_MEMORY(&wheels, &wheels2, sizeof wheels);
+  bytes[49] = 65;  // more rows than a table has
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_wheels_decode(bytes, length, &wheels2, &used));
+
+  wm_sensor sensor = {.name = "laser", .mounting = {{1, 2, 3}, {4, 5, 6}}, .max_range_m = INFINITY}, sensor2;
+  length = wm_sensor_encode(&sensor, bytes, sizeof bytes);
+  TEST_ASSERT_EQUAL(WM_OK, wm_sensor_decode(bytes, length, &sensor2, &used));
+  TEST_ASSERT_EQUAL_STRING("laser", sensor2.name);
+  TEST_ASSERT_EQUAL_DOUBLE(6, sensor2.mounting.rpy_rad[2]);
+
+  wm_start start = {.t_ns = WM_TIME_NONE, .heading_rad = NAN, .sigma_xy_m = 0.05}, start2;
+  length = wm_start_encode(&start, bytes, sizeof bytes);
+  TEST_ASSERT_EQUAL(WM_OK, wm_start_decode(bytes, length, &start2, &used));
+  TEST_ASSERT_EQUAL_MEMORY(&start, &start2, sizeof start);
+}
+
+static void the_hash_of_a_map_sees_every_number_and_the_order(void) {
+  wm_landmark map[2] = {{1, {1, 2, 0}, 0.01, NAN}, {2, {3, 4, 0}, 0.01, NAN}};
+  uint64_t hash = wm_landmarks_hash(map, 2);
+  wm_landmark swapped[2] = {map[1], map[0]};
+  TEST_ASSERT_TRUE(hash != wm_landmarks_hash(swapped, 2));
+  TEST_ASSERT_TRUE(hash != wm_landmarks_hash(map, 1));
+  map[1].p_m[1] = nextafter(4, 5);
+  TEST_ASSERT_TRUE(hash != wm_landmarks_hash(map, 2));
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(every_event_comes_back_as_it_was);
+  RUN_TEST(a_cut_event_is_refused_at_every_length);
+  RUN_TEST(noise_never_gives_an_event_with_indices_out_of_bounds);
+  RUN_TEST(another_version_is_refused);
+  RUN_TEST(bytes_are_little_endian_on_every_machine);
+  RUN_TEST(a_published_pose_comes_back);
+  RUN_TEST(an_innovation_comes_back_and_unknown_verdicts_do_not);
+  RUN_TEST(a_setup_comes_back);
+  RUN_TEST(the_hash_of_a_map_sees_every_number_and_the_order);
+  return UNITY_END();
+}

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+// What our encoder writes, the decoders that lcm-gen makes read back.
+#include <math.h>
+#include <string.h>
+
+#include "unity.h"
+#include "waymark/lcm_messages.h"
+#include "waymark_health_t.h"
+#include "waymark_innovation_t.h"
+#include "waymark_landmarks_t.h"
+#include "waymark_observations_t.h"
+#include "waymark_pose_t.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static uint8_t bytes[WM_LCM_MESSAGE_MAX];
+
+static void a_pose_arrives_whole(void) {
+  wm_published p = {.sent_ns = 12,
+                    .fused_until_ns = 7,
+                    .jumps = 3,
+                    .last_jump_m = 0.5,
+                    .status_flags = WM_PUB_JUMPED,
+                    .pose_odom_base = {1, 2, 3},
+                    .deadlines_missed = 4,
+                    .utc_offset_ns = 5,
+                    .utc_uncertainty_ns = -1};
+  p.now.t_ns = INT64_C(1234567890123456789);
+  p.now.state = WM_STATE_DEAD_RECKONING;
+  p.now.dof = 3;
+  for (int i = 0; i < 36; i++) p.now.covariance[i] = i;
+  p.now.pose_map_base.q_xyzw[3] = 1;
+  size_t length = wm_lcm_pose(&p, bytes, sizeof bytes);
+  waymark_pose_t m;
+  TEST_ASSERT_EQUAL(length, waymark_pose_t_decode(bytes, 0, (int)length, &m));
+  TEST_ASSERT_EQUAL_INT64(INT64_C(1234567890123456789), m.t_ns);
+  TEST_ASSERT_EQUAL_DOUBLE(8, m.covariance[1][2]);
+  TEST_ASSERT_EQUAL(WAYMARK_POSE_T_STATE_DEAD_RECKONING, m.state);
+  TEST_ASSERT_EQUAL(WAYMARK_POSE_T_STATUS_JUMPED, m.status_flags);
+  TEST_ASSERT_EQUAL(3, m.jumps);
+  TEST_ASSERT_EQUAL_DOUBLE(3, m.odom_heading_rad);
+  TEST_ASSERT_EQUAL_INT64(-1, m.utc_uncertainty_ns);
+  TEST_ASSERT_EQUAL(0, wm_lcm_pose(&p, bytes, length - 1));
+}
+
+static void health_arrives_with_its_sources(void) {
+  static wm_health h;
+  h = (wm_health){.t_ns = 1, .source_count = 2, .calibration_count = 1, .loops = 77};
+  strcpy(h.sources[1].name, "sightings:laser");
+  h.sources[1].rejected[WM_REJECTED_GATE] = 5;
+  h.sources[1].stale = 1;
+  strcpy(h.calibration[0].name, "laser.yaw_rad");
+  h.calibration[0].value = 0.08;
+  size_t length = wm_lcm_health(&h, bytes, sizeof bytes);
+  TEST_ASSERT_GREATER_THAN(0, length);
+  static waymark_health_t m;
+  TEST_ASSERT_EQUAL(length, waymark_health_t_decode(bytes, 0, (int)length, &m));
+  TEST_ASSERT_EQUAL(2, m.source_count);
+  TEST_ASSERT_EQUAL_STRING("sightings:laser", (const char *)m.sources[1].name);
+  TEST_ASSERT_EQUAL_INT64(5, m.sources[1].rejected[WAYMARK_INNOVATION_T_REJECTED_GATE]);
+  TEST_ASSERT_EQUAL_DOUBLE(0.08, m.calibration[0].value);
+  TEST_ASSERT_EQUAL_INT64(77, m.loops);
+}
+
+static void an_innovation_arrives(void) {
+  wm_innovation i = {.t_ns = 3,
+                     .landmark_id = -1,
+                     .verdict = WM_REJECTED_SINGULAR,
+                     .residual = WM_RESIDUAL_BEARING,
+                     .observed = 1,
+                     .expected = 2,
+                     .variance = 3,
+                     .nis = 4,
+                     .gate = 5,
+                     .gate_dof = 1};
+  size_t length = wm_lcm_innovation(&i, bytes, sizeof bytes);
+  waymark_innovation_t m;
+  TEST_ASSERT_EQUAL(length, waymark_innovation_t_decode(bytes, 0, (int)length, &m));
+  TEST_ASSERT_EQUAL(WAYMARK_INNOVATION_T_REJECTED_SINGULAR, m.verdict);
+  TEST_ASSERT_EQUAL_DOUBLE(5, m.gate);
+}
+
+static void more_sightings_than_fit_are_counted(void) {
+  static wm_event sightings[70];
+  for (int i = 0; i < 70; i++) {
+    sightings[i] = (wm_event){.t_ns = 9, .kind = WM_EVENT_SIGHTING};
+    sightings[i].as.sighting = (wm_sighting){.landmark_id = i, .bearing_rad = i, .range_m = NAN};
+  }
+  size_t length = wm_lcm_observations("front", sightings, 70, bytes, sizeof bytes);
+  static waymark_observations_t m;
+  TEST_ASSERT_EQUAL(length, waymark_observations_t_decode(bytes, 0, (int)length, &m));
+  TEST_ASSERT_EQUAL(64, m.count);
+  TEST_ASSERT_EQUAL(6, m.dropped);
+  TEST_ASSERT_EQUAL(63, m.landmark_id[63]);
+  TEST_ASSERT_TRUE(isnan(m.range_m[0]));
+  TEST_ASSERT_EQUAL_STRING("front", (const char *)m.sensor);
+}
+
+static void a_large_map_goes_in_pieces(void) {
+  static wm_landmark map[300];
+  for (int i = 0; i < 300; i++) map[i] = (wm_landmark){.id = i, .p_m = {i, 0, 1}, .sigma_m = 0.1};
+  static waymark_landmarks_t m;
+  size_t length = wm_lcm_landmarks(map, 300, 256, 11, bytes, sizeof bytes);
+  TEST_ASSERT_EQUAL(length, waymark_landmarks_t_decode(bytes, 0, (int)length, &m));
+  TEST_ASSERT_EQUAL(44, m.count);
+  TEST_ASSERT_EQUAL(300, m.total);
+  TEST_ASSERT_EQUAL(299, m.id[43]);
+  TEST_ASSERT_GREATER_THAN(0, wm_lcm_landmarks(map, 300, 0, 11, bytes, sizeof bytes));
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(a_pose_arrives_whole);
+  RUN_TEST(health_arrives_with_its_sources);
+  RUN_TEST(an_innovation_arrives);
+  RUN_TEST(more_sightings_than_fit_are_counted);
+  RUN_TEST(a_large_map_goes_in_pieces);
+  return UNITY_END();
+}
