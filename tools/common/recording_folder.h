@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a recording has for judging and drawing: truth, GNSS, landmarks, sightings. (The runtime's own reader never
+// opens truth; this one is the desk's.)
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "common/pose.h"
+#include "common/run_folder.h"
+
+namespace wm::tools {
+
+// truth.csv as it stands: the truth's point, `truth_offset_m` away from base_link. Throws Failure: not there, nothing
+// in it, stamps that don't rise.
+std::vector<Pose> load_truth(const std::filesystem::path &recording);
+// gnss.csv as positions without orientation, in the order of their stamps; z 0 where absent.
+std::vector<Pose> load_gnss(const std::filesystem::path &recording);
+
+// A row of sightings.csv.
+struct Sighting {
+  int64_t t_ns;
+  std::string sensor;
+  int64_t id;
+  double bearing_rad, range_m;  // NaN where absent
+};
+// Empty where the recording has none.
+std::vector<Sighting> load_sightings(const std::filesystem::path &recording);
+
+}  // namespace wm::tools

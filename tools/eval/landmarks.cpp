@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// SLAM's map against the true places.
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+
+#include "common/statistics.h"
+#include "eval/figures.h"
+
+namespace wm::tools {
+namespace {
+
+constexpr double kNearestM = 0.5;
+
+struct Pair {
+  const Landmark *estimate;
+  const Landmark *truth;
+};
+
+double apart(const Landmark &a, const Landmark &b, bool planar) {
+  return planar ? (a.p_m - b.p_m).head<2>().norm() : (a.p_m - b.p_m).norm();
+}
+
+const Landmark *nearest(const Landmark &to, const std::vector<Landmark> &among, bool planar) {
+  const Landmark *best = nullptr;
+  for (const Landmark &candidate : among)
+    if (best == nullptr || apart(to, candidate, planar) < apart(to, *best, planar)) best = &candidate;
+  return best;
+}
+
+std::vector<Pair> by_id(const std::vector<Landmark> &estimate, const std::vector<Landmark> &truth) {
+  std::map<int64_t, const Landmark *> known;
+  for (const Landmark &landmark : truth) known[landmark.id] = &landmark;
+  std::map<int64_t, Pair> pairs;  // a true landmark counts once
+  for (const Landmark &landmark : estimate)
+    if (const auto found = known.find(landmark.id); found != known.end())
+      pairs[landmark.id] = {&landmark, found->second};
+  std::vector<Pair> out;
+  for (const auto &[id, pair] : pairs) out.push_back(pair);
+  return out;
+}
+
+std::vector<Pair> by_place(const std::vector<Landmark> &estimate, const std::vector<Landmark> &truth, bool planar) {
+  std::vector<Pair> out;
+  for (const Landmark &landmark : estimate) {
+    const Landmark *there = nearest(landmark, truth, planar);
+    if (there != nullptr && apart(landmark, *there, planar) <= kNearestM &&
+        nearest(*there, estimate, planar) == &landmark)
+      out.push_back({&landmark, there});
+  }
+  return out;
+}
+
+// The estimate's ids are truth's where at least half of them occur there; else they are its own.
+bool shares_ids(const std::vector<Landmark> &estimate, size_t pairs) { return 2 * pairs >= estimate.size(); }
+
+}  // namespace
+
+void add_landmark_figures(const std::vector<Landmark> &estimate, const std::vector<Landmark> &truth,
+                          const Comparison &comparison, Figures *figures) {
+  std::vector<Landmark> aligned = estimate;
+  const Similarity &alignment = comparison.alignment;
+  const double turned = std::atan2(alignment.R(1, 0), alignment.R(0, 0));
+  for (Landmark &landmark : aligned) {
+    landmark.p_m = alignment.scale * (alignment.R * landmark.p_m) + alignment.t;
+    landmark.yaw_rad += turned;
+  }
+  auto pairs = by_id(aligned, truth);
+  const bool same_ids = shares_ids(aligned, pairs.size());
+  if (!same_ids) pairs = by_place(aligned, truth, comparison.planar);
+
+  std::vector<double> off_m;
+  std::vector<double> off_deg;
+  for (const Pair &pair : pairs) {
+    off_m.push_back(apart(*pair.estimate, *pair.truth, comparison.planar));
+    const double turn = wrap(pair.estimate->yaw_rad - pair.truth->yaw_rad);
+    if (std::isfinite(turn)) off_deg.push_back(turn * 180 / std::numbers::pi);
+  }
+  auto &f = *figures;
+  f["landmark_rmse_m"] = number(rms(off_m));
+  f["landmark_heading_rmse_deg"] = number(rms(off_deg));
+  f["landmarks_found"] = pairs.size();
+  f["landmarks_total"] = truth.size();
+  f["landmarks_estimated"] = estimate.size();
+  f["landmarks_matched_by"] = same_ids ? "id" : "place";
+}
+
+}  // namespace wm::tools

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// waymark eval: a run's poses against truth.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+
+#include "common/failure.h"
+#include "common/recording_folder.h"
+#include "eval/compare.h"
+#include "eval/figures.h"
+#include "eval/print.h"
+
+namespace {
+
+using namespace wm::tools;
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::string run, recording, align = "none", against = "truth";
+  bool json = false, published = false;
+  CompareOptions compare;
+};
+
+void parse(CLI::App *app, Arguments *a) {
+  app->description("Holds the poses of a run against the truth of its recording.");
+  app->add_option("RUN", a->run, "folder that a run wrote")->required();
+  app->add_option("REC", a->recording, "folder of the recording, with truth.csv")->required();
+  app->add_flag("--json", a->json, "one JSON object; null where a figure is not defined");
+  app->add_flag("--published", a->published, "judge published.csv, what was sent, instead of the fused poses");
+  app->add_option("--align", a->align, "move the run onto truth first")
+      ->check(CLI::IsMember({"none", "se2", "sim2", "se3"}))
+      ->capture_default_str();
+  app->add_option("--against", a->against, "truth, or positions only against gnss.csv")
+      ->check(CLI::IsMember({"truth", "gnss"}))
+      ->capture_default_str();
+  app->add_option("--from", a->compare.from_s, "judge from this many seconds after the run's first pose");
+  app->add_option("--to", a->compare.to_s, "judge up to this many seconds after the run's first pose");
+  app->footer(
+      "example: waymark eval runs/plan recordings/plan --from 60 --json\n"
+      "docs/eval.md defines each figure. Exit code: 0 done, 1 nothing to judge, 2 usage.");
+}
+
+Alignment alignment_of(const std::string &name) {
+  if (name == "se2") return Alignment::kSe2;
+  if (name == "sim2") return Alignment::kSim2;
+  if (name == "se3") return Alignment::kSe3;
+  return Alignment::kNone;
+}
+
+fs::path true_landmarks(const fs::path &recording) {
+  const fs::path surveyed = recording / "truth-landmarks.csv";
+  return fs::exists(surveyed) ? surveyed : recording / "landmarks.csv";
+}
+
+Figures evaluate(const Arguments &a) {
+  const fs::path run = a.run;
+  const fs::path recording = a.recording;
+  const bool gnss = a.against == "gnss";
+  const Published published = a.published ? load_published(run) : Published{};
+  const Trajectory trajectory = a.published ? published.trajectory : load_trajectory(run);
+  CompareOptions options = a.compare;
+  options.align = alignment_of(a.align);
+  options.against_gnss = gnss;
+
+  const Comparison comparison = compare(trajectory, gnss ? load_gnss(recording) : load_truth(recording), options);
+  Figures figures = pose_figures(comparison, trajectory.has_covariance, gnss);
+  if (fs::exists(recording / "sightings.csv") && fs::exists(recording / "landmarks.csv"))
+    add_sighting_figures(comparison, load_sightings(recording), load_landmarks(recording / "landmarks.csv"), &figures);
+  if (fs::exists(run / "map-estimate.csv") && fs::exists(true_landmarks(recording)))
+    add_landmark_figures(load_landmarks(run / "map-estimate.csv"), load_landmarks(true_landmarks(recording)),
+                         comparison, &figures);
+  if (a.published) add_published_figures(published, &figures);
+  return figures;
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  Arguments arguments;
+  CLI::App app("", "waymark eval");
+  parse(&app, &arguments);
+  try {
+    app.parse(argc, argv);
+    if (arguments.compare.from_s && arguments.compare.to_s && *arguments.compare.from_s >= *arguments.compare.to_s)
+      throw Failure("--from must be before --to", kUsage);
+    const Figures figures = evaluate(arguments);
+    const std::string title = arguments.run + (arguments.published ? " (published)" : "");
+    const std::string text = arguments.json ? figures.dump(1) + "\n" : figures_table(figures, title, arguments.against);
+    std::fputs(text.c_str(), stdout);
+    return kDone;
+  } catch (const CLI::ParseError &problem) {
+    return app.exit(problem) == 0 ? kDone : kUsage;
+  } catch (const Failure &problem) {
+    std::fprintf(stderr, "waymark eval: %s\n", problem.what());
+    return problem.exit_code;
+  } catch (const std::exception &problem) {
+    std::fprintf(stderr, "waymark eval: %s\n", problem.what());
+    return kFailed;
+  }
+}
