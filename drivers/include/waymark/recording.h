@@ -12,6 +12,7 @@
 #include "waymark/setup.h"
 #include "waymark/source.h"
 #include "waymark/status.h"
+#include "waymark/yaml.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -48,9 +49,17 @@ uint32_t wm_recording_quantities(const wm_recording *self);    // bit per wm_qua
 // Text of calibration.yaml as read ("" where there is none), for the event log.
 const char *wm_recording_calibration_text(const wm_recording *self, size_t *length);
 
+// `initial_pose` of recording.yaml and of a configuration: t_ns, x_m, y_m, z_m, heading_rad or heading_deg, qx, qy, qz,
+// qw, sigma_xy_m, sigma_heading_rad or _deg; what is absent is unknown. Unknown keys are the caller's to check, by
+// wm_start_keys (NULL-terminated). With a quaternion alone, heading_rad is that of the quaternion.
+extern const char *const wm_start_keys[];
+void wm_start_init(wm_start *out);
+wm_status wm_start_read(const wm_yaml_node *map, wm_start *out, wm_error *err);
+
 // The recording's sources, in the order of the format's table of files: can, motion, motion6, then a source a sensor
 // for sightings ("sightings:NAME"), markers ("markers:NAME"), then stereo, points, gnss. Indices are 0, 1, 2 ... in
-// this order. Owned by the recording. Each hands out its events in the order of their arrival.
+// this order. Owned by the recording. Each hands out its events in the order of their arrival: a
+// row that is older than the one above it arrived with that one; it is counted as out of order and handed out.
 wm_source *const *wm_recording_sources(wm_recording *self, size_t *count);
 
 #ifdef __cplusplus

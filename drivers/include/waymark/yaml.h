@@ -34,6 +34,7 @@ int wm_yaml_is_scalar(const wm_yaml_node *node);
 int wm_yaml_line(const wm_yaml_node *node);  // from 1
 const char *wm_yaml_file(const wm_yaml_node *node);
 size_t wm_yaml_count(const wm_yaml_node *node);  // items of a list, pairs of a map
+// Items and values are handed out as they stand, also where they are null.
 wm_yaml_node wm_yaml_item(const wm_yaml_node *list, size_t i);
 wm_yaml_node wm_yaml_value(const wm_yaml_node *map, size_t i, const char **key, int *key_line);
 // Child by key ("a.b" goes down); id 0 where it isn't there or is null.
@@ -41,6 +42,7 @@ wm_yaml_node wm_yaml_get(const wm_yaml_node *map, const char *key);
 static inline int wm_yaml_there(const wm_yaml_node *node) { return node->id != 0; }
 
 // Typed reads. Wrong type or range: WM_BAD_CONFIG and a message with file, line, key, what is there, what is allowed.
+// Limits are inclusive; a min of DBL_MIN reads "above 0", an infinite limit is none.
 wm_status wm_yaml_f64(const wm_yaml_node *node, double min, double max, double *out, wm_error *err);
 wm_status wm_yaml_i64(const wm_yaml_node *node, int64_t min, int64_t max, int64_t *out, wm_error *err);
 wm_status wm_yaml_bool(const wm_yaml_node *node, int *out, wm_error *err);
@@ -49,9 +51,13 @@ wm_status wm_yaml_choice(const wm_yaml_node *node, const char *const *names, int
 wm_status wm_yaml_f64_list(const wm_yaml_node *node, size_t min_count, size_t max_count, double *out, size_t *count,
                            wm_error *err);
 
+// Says "FILE:LINE: KEY: ..." of this place and returns WM_BAD_CONFIG.
+wm_status wm_yaml_fail(const wm_yaml_node *node, wm_error *err, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
 // Unknown keys of a map. `known` is NULL-terminated. STRICT: any unknown key is an error (config). NEAR: an error where
-// it is within two letters of a known one, else counted in *unknown with the first one's text in err->text and WM_OK
-// (calibration.yaml); keys that begin with "x_" are anyone's.
+// it is within two letters of a known one, else counted in *unknown with a line about each in err->text and WM_OK
+// (calibration.yaml); keys that begin with "x_" are anyone's. What isn't a map is an error, what isn't there is none.
 typedef enum wm_yaml_strictness { WM_YAML_STRICT, WM_YAML_NEAR } wm_yaml_strictness;
 wm_status wm_yaml_check_keys(const wm_yaml_node *map, const char *const *known, wm_yaml_strictness strictness,
                              size_t *unknown, wm_error *err);

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// calibration.yaml, landmarks.csv, initial_pose and can-signals.yaml: what is read whole when a recording is opened.
+#ifndef WM_RECORDING_CALIBRATION_H
+#define WM_RECORDING_CALIBRATION_H
+
+#include "waymark/recording.h"
+#include "waymark/yaml.h"
+
+#define CAMERAS_MAX 16
+
+typedef struct warner {
+  wm_warn_fn fn;
+  void *context;
+} warner;
+
+// One line to the caller's `warn`, printf-like; nothing where there is none.
+void warn_line(const warner *warn, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+typedef struct camera {
+  char name[WM_NAME_MAX];
+  wm_mounting mounting;
+} camera;
+
+typedef struct calibration {
+  wm_wheels wheels;
+  camera cameras[CAMERAS_MAX];
+  size_t camera_count;
+  wm_sensor sensors[WM_SENSORS_MAX];
+  size_t sensor_count;
+} calibration;
+
+// Nothing known: no wheels, no sensors.
+void calibration_init(calibration *self);
+// Reads and checks all of it; cameras' models are checked, of them the mountings are kept.
+wm_status calibration_read(const wm_yaml *doc, const warner *warn, calibration *out, wm_error *err);
+
+// Checks keys as calibration.yaml wants it: near misses are errors, other unknown keys are warned of.
+wm_status calibration_keys(const wm_yaml_node *map, const char *const *known, const warner *warn, wm_error *err);
+// Reads `mounting` of `parent` (xyz_m, rpy_deg or rpy_rad); what is missing is 0.
+wm_status calibration_mounting(const wm_yaml_node *parent, const warner *warn, wm_mounting *out, wm_error *err);
+// One camera: model, size, intrinsics, distortion, readout, mounting.
+wm_status calibration_camera(const wm_yaml_node *node, const warner *warn, camera *out, wm_error *err);
+// Reads NAME_rad or NAME_deg of `map`, limits in radians; leaves *out where neither is there. Both are an error.
+wm_status calibration_angle(const wm_yaml_node *map, const char *name, double min_rad, double max_rad, double *out_rad,
+                            wm_error *err);
+
+// landmarks.csv; *out is the caller's to free.
+wm_status landmarks_read(const char *path, const warner *warn, wm_landmark **out, size_t *count, wm_error *err);
+// can-signals.yaml; *out is the caller's to free.
+wm_status can_signals_read(const char *path, wm_can_binding **out, size_t *count, wm_error *err);
+
+#endif

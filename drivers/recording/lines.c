@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lines.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+wm_status lines_open(line_reader *self, const char *path, wm_error *err) {
+  *self = (line_reader){.fd = -1};
+  snprintf(self->path, sizeof self->path, "%s", path);
+  self->fd = open(path, O_RDONLY | O_CLOEXEC);
+  if (self->fd < 0 && errno == ENOENT) return wm_fail(err, WM_NOT_FOUND, "%s: there is no such file", path);
+  if (self->fd < 0) return wm_fail(err, WM_IO, "%s: cannot be opened: %s", path, strerror(errno));
+  self->buffer = malloc(LINES_BUFFER_BYTES);
+  if (self->buffer) return WM_OK;
+  lines_close(self);
+  return wm_fail(err, WM_IO, "%s: no memory to read it", path);
+}
+
+void lines_close(line_reader *self) {
+  if (self->fd >= 0) close(self->fd);
+  free(self->buffer);
+  self->fd = -1;
+  self->buffer = NULL;
+}
+
+// Moves what is left to the buffer's front and reads on behind it.
+static wm_status fill(line_reader *self, wm_error *err) {
+  if (self->begin > 0) memmove(self->buffer, self->buffer + self->begin, self->end - self->begin);
+  self->end -= self->begin;
+  self->begin = 0;
+  ssize_t n;
+  do {
+    n = read(self->fd, self->buffer + self->end, LINES_BUFFER_BYTES - self->end);
+  } while (n < 0 && errno == EINTR);
+  if (n < 0) return wm_fail(err, WM_IO, "%s: cannot be read: %s", self->path, strerror(errno));
+  self->ended = n == 0;
+  self->end += (size_t)n;
+  return WM_OK;
+}
+
+wm_status lines_next(line_reader *self, const char **text, size_t *length, int *too_long, wm_error *err) {
+  size_t searched = 0;
+  *too_long = 0;
+  for (;;) {
+    size_t there = self->end - self->begin;
+    const char *from = self->buffer + self->begin;
+    const char *newline = there > searched ? memchr(from + searched, '\n', there - searched) : NULL;
+    if (!newline && !self->ended) {
+      if (there == LINES_BUFFER_BYTES) {  // forget what is there, go on to the line's end
+        *too_long = 1;
+        self->begin = self->end = 0;
+        there = 0;
+      }
+      searched = there;
+      wm_status status = fill(self, err);
+      if (status != WM_OK) return status;
+      continue;
+    }
+    if (!newline && there == 0 && !*too_long) return WM_END;
+    size_t n = newline ? (size_t)(newline - from) : there;
+    self->begin += n + (newline ? 1 : 0);
+    self->number++;
+    if (n > 0 && from[n - 1] == '\r') n--;
+    if (self->number == 1 && n >= 3 && memcmp(from, "\xEF\xBB\xBF", 3) == 0) {
+      from += 3;
+      n -= 3;
+    }
+    *text = from;
+    *length = *too_long ? 0 : n;
+    return WM_OK;
+  }
+}

@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/recording.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "calibration.h"
+#include "can_stream.h"
+#include "streams.h"
+#include "waymark/text.h"
+#include "waymark/yaml.h"
+
+#define CALIBRATION_BYTES_MAX (1u << 20)
+
+struct wm_recording {
+  char dir[WM_PATH_MAX];
+  char name[128];
+  double duration_s;
+  wm_start start;
+  wm_yaml *about;  // recording.yaml
+  wm_recording_overrides overrides;
+  warner warn;
+  char *calibration_text;
+  size_t calibration_length;
+  calibration calibration;
+  wm_landmark *landmarks;
+  size_t landmark_count;
+  sensor_names sighting_sensors, marker_sensors;
+  uint32_t quantities;
+  wm_source *sources[WM_SOURCES_MAX];
+  size_t source_count;
+};
+
+static wm_status path_of(const wm_recording *self, const char *file, char out[WM_PATH_MAX], wm_error *err) {
+  if (snprintf(out, WM_PATH_MAX, "%s/%s", self->dir, file) >= WM_PATH_MAX)
+    return wm_fail(err, WM_BAD_USAGE, "%s/%s: the path is longer than %d bytes", self->dir, file, WM_PATH_MAX - 1);
+  return WM_OK;
+}
+
+// The override where there is one, else the recording's own file; `*there` says whether it is.
+static wm_status choose(const wm_recording *self, const char *override, const char *file, char out[WM_PATH_MAX],
+                        int *there, wm_error *err) {
+  if (*override) {
+    *there = 1;
+    snprintf(out, WM_PATH_MAX, "%s", override);
+    return WM_OK;
+  }
+  wm_status status = path_of(self, file, out, err);
+  *there = status == WM_OK && access(out, F_OK) == 0;
+  return status;
+}
+
+static wm_status check_format(const wm_yaml_node *root, wm_error *err) {
+  char format[64];
+  wm_yaml_node node = wm_yaml_get(root, "format");
+  if (!wm_yaml_there(&node))
+    return wm_yaml_fail(root, err, "format: is missing; 'format: waymark-recording/1' is needed");
+  wm_status status = wm_yaml_string(&node, format, sizeof format, err);
+  if (status == WM_OK && strcmp(format, "waymark-recording/1") != 0)
+    return wm_yaml_fail(&node, err, "'%s' is not a format that this program reads; it reads waymark-recording/1",
+                        format);
+  return status;
+}
+
+// Every file that `streams` names must be there.
+static wm_status check_streams(const wm_recording *self, const wm_yaml_node *streams, wm_error *err) {
+  if (wm_yaml_there(streams) && !wm_yaml_is_list(streams))
+    return wm_yaml_fail(streams, err, "a list of the files that are there is needed");
+  for (size_t i = 0; i < wm_yaml_count(streams); i++) {
+    char file[256], path[WM_PATH_MAX];
+    wm_yaml_node item = wm_yaml_item(streams, i);
+    wm_status status = wm_yaml_string(&item, file, sizeof file, err);
+    if (status == WM_OK) status = path_of(self, file, path, err);
+    if (status != WM_OK) return status;
+    if (access(path, F_OK) != 0)
+      return wm_yaml_fail(&item, err, "'%s' is not in the folder; put it there or take it off the list", file);
+  }
+  return WM_OK;
+}
+
+static wm_status read_start(wm_recording *self, const wm_yaml_node *root, wm_error *err) {
+  wm_error said;
+  size_t unknown;
+  wm_start_init(&self->start);
+  wm_yaml_node pose = wm_yaml_get(root, "vehicle.initial_pose");
+  if (!wm_yaml_there(&pose)) return WM_OK;
+  // Unknown keys are allowed in recording.yaml; a misspelt one is worth a word.
+  if (wm_yaml_check_keys(&pose, wm_start_keys, WM_YAML_NEAR, &unknown, &said) != WM_OK || unknown)
+    warn_line(&self->warn, "%s", said.text);
+  return wm_start_read(&pose, &self->start, err);
+}
+
+static wm_status read_about(wm_recording *self, wm_error *err) {
+  char path[WM_PATH_MAX];
+  wm_status status = path_of(self, "recording.yaml", path, err);
+  if (status != WM_OK) return status;
+  status = wm_yaml_load(path, &self->about, err);
+  if (status == WM_NOT_FOUND)
+    return wm_fail(err, WM_NOT_FOUND, "%s: there is no recording.yaml in it: is it a recording's folder?", self->dir);
+  if (status != WM_OK) return status;
+  wm_yaml_node root = wm_yaml_root(self->about);
+  if (!wm_yaml_is_map(&root))
+    return wm_yaml_fail(&root, err, "a map that begins with 'format: waymark-recording/1' is needed");
+  wm_yaml_node name = wm_yaml_get(&root, "name"), duration = wm_yaml_get(&root, "duration_s"),
+               offset = wm_yaml_get(&root, "truth_offset_m"), streams = wm_yaml_get(&root, "streams");
+  double offset_m[3];
+  status = check_format(&root, err);
+  if (status == WM_OK && wm_yaml_there(&name)) status = wm_yaml_string(&name, self->name, sizeof self->name, err);
+  if (status == WM_OK && wm_yaml_there(&duration)) status = wm_yaml_f64(&duration, 0, 1e9, &self->duration_s, err);
+  if (status == WM_OK && wm_yaml_there(&offset)) status = wm_yaml_f64_list(&offset, 3, 3, offset_m, NULL, err);
+  if (status == WM_OK) status = check_streams(self, &streams, err);
+  return status == WM_OK ? read_start(self, &root, err) : status;
+}
+
+static wm_status read_calibration(wm_recording *self, wm_error *err) {
+  char path[WM_PATH_MAX];
+  int there;
+  calibration_init(&self->calibration);
+  wm_status status = choose(self, self->overrides.calibration, "calibration.yaml", path, &there, err);
+  if (status != WM_OK || !there) return status;
+  status = wm_text_read_file(path, CALIBRATION_BYTES_MAX, &self->calibration_text, &self->calibration_length, err);
+  if (status != WM_OK) return status;
+  wm_yaml *doc;
+  status = wm_yaml_parse(self->calibration_text, self->calibration_length, path, &doc, err);
+  if (status != WM_OK) return status;
+  status = calibration_read(doc, &self->warn, &self->calibration, err);
+  wm_yaml_free(doc);
+  return status;
+}
+
+static wm_status read_landmarks(wm_recording *self, wm_error *err) {
+  char path[WM_PATH_MAX];
+  int there;
+  wm_status status = choose(self, self->overrides.landmarks, "landmarks.csv", path, &there, err);
+  if (status != WM_OK || !there) return status;
+  return landmarks_read(path, &self->warn, &self->landmarks, &self->landmark_count, err);
+}
+
+static int is_listed(const wm_recording *self, const char *file) {
+  wm_yaml_node root = wm_yaml_root(self->about), streams = wm_yaml_get(&root, "streams");
+  for (size_t i = 0; i < wm_yaml_count(&streams); i++) {
+    char listed[256];
+    wm_yaml_node item = wm_yaml_item(&streams, i);
+    if (wm_yaml_string(&item, listed, sizeof listed, NULL) == WM_OK && strcmp(listed, file) == 0) return 1;
+  }
+  return !wm_yaml_there(&streams);
+}
+
+// Whether the stream's file is in the folder. One that `streams` forgets is read all the same.
+static wm_status find_stream(const wm_recording *self, const char *file, char path[WM_PATH_MAX], int *there,
+                             wm_error *err) {
+  wm_status status = choose(self, "", file, path, there, err);
+  if (status == WM_OK && *there && !is_listed(self, file))
+    warn_line(&self->warn, "%s: is not listed under streams in recording.yaml, but there: it is read", path);
+  return status;
+}
+
+static wm_status add_source(wm_recording *self, wm_source *source, wm_error *err) {
+  if (self->source_count == WM_SOURCES_MAX) {
+    source->ops->close(source);
+    return wm_fail(err, WM_FULL, "%s: more than %d sources (a sensor in a file is one)", self->dir, WM_SOURCES_MAX);
+  }
+  source->index = (uint16_t)self->source_count;
+  self->sources[self->source_count++] = source;
+  return WM_OK;
+}
+
+static wm_status add_stream(wm_recording *self, const stream_kind *kind, wm_error *err) {
+  char path[WM_PATH_MAX];
+  int there;
+  wm_source *source;
+  wm_status status = find_stream(self, stream_file(kind), path, &there, err);
+  if (status != WM_OK || !there) return status;
+  status = stream_open(path, kind, NULL, 0, NULL, 0, self->warn.fn, self->warn.context, &source, err);
+  return status == WM_OK ? add_source(self, source, err) : status;
+}
+
+static const wm_mounting *camera_mounting(const calibration *known, const char *name) {
+  for (size_t i = 0; i < known->camera_count; i++)
+    if (strcmp(known->cameras[i].name, name) == 0) return &known->cameras[i].mounting;
+  return NULL;
+}
+
+// Index of the sensor; one that `sensors` of calibration.yaml doesn't have sits where the camera of its name sits, or
+// at base_link.
+static wm_status sensor_index(wm_recording *self, const char *path, const char *name, uint16_t *out, wm_error *err) {
+  calibration *known = &self->calibration;
+  for (size_t i = 0; i < known->sensor_count; i++) {
+    *out = (uint16_t)i;
+    if (strcmp(known->sensors[i].name, name) == 0) return WM_OK;
+  }
+  if (known->sensor_count == WM_SENSORS_MAX)
+    return wm_fail(err, WM_FULL, "%s: more than %d sensors, with those of calibration.yaml", path, WM_SENSORS_MAX);
+  const wm_mounting *mounting = camera_mounting(known, name);
+  wm_sensor *sensor = &known->sensors[known->sensor_count];
+  *sensor = (wm_sensor){.bearing_sigma_rad = (double)NAN, .range_sigma_m = (double)NAN, .max_range_m = HUGE_VAL};
+  snprintf(sensor->name, sizeof sensor->name, "%s", name);
+  if (mounting)
+    sensor->mounting = *mounting;
+  else
+    warn_line(&self->warn,
+              "%s: the sensor '%s' is not in calibration.yaml; it is taken to sit at base_link, sigmas unknown", path,
+              name);
+  *out = (uint16_t)known->sensor_count++;
+  return WM_OK;
+}
+
+// A source a sensor: each reads the file by itself, so that memory stays bounded however unevenly they are asked.
+static wm_status add_sensor_streams(wm_recording *self, const stream_kind *kind, sensor_names *names, wm_error *err) {
+  char path[WM_PATH_MAX];
+  int there;
+  wm_status status = find_stream(self, stream_file(kind), path, &there, err);
+  if (status != WM_OK || !there) return status;
+  status = stream_find_sensors(path, kind, names, err);
+  for (size_t i = 0; status == WM_OK && i < names->count; i++) {
+    uint16_t index;
+    wm_source *source;
+    status = sensor_index(self, path, names->name[i], &index, err);
+    if (status != WM_OK) break;
+    status = stream_open(path, kind, names->name[i], index, names, i == 0, i == 0 ? self->warn.fn : NULL,
+                         self->warn.context, &source, err);
+    if (status == WM_OK) status = add_source(self, source, err);
+  }
+  return status;
+}
+
+static wm_status add_can(wm_recording *self, wm_error *err) {
+  char log[WM_PATH_MAX], dbc[WM_PATH_MAX], signals[WM_PATH_MAX], motion[WM_PATH_MAX], motion6[WM_PATH_MAX];
+  int have_log, have_dbc, have_signals, have_motion, have_motion6;
+  wm_status status = find_stream(self, "can.log", log, &have_log, err);
+  if (status != WM_OK || !have_log) return status;
+  status = choose(self, self->overrides.dbc, "vehicle.dbc", dbc, &have_dbc, err);
+  if (status == WM_OK)
+    status = choose(self, self->overrides.can_signals, "can-signals.yaml", signals, &have_signals, err);
+  if (status == WM_OK) status = choose(self, "", "motion.csv", motion, &have_motion, err);
+  if (status == WM_OK) status = choose(self, "", "motion6.csv", motion6, &have_motion6, err);
+  if (status != WM_OK) return status;
+  if (!have_dbc || !have_signals) {
+    const char *missing = have_dbc ? signals : dbc;
+    if (!have_motion && !have_motion6)
+      return wm_fail(err, WM_NOT_FOUND,
+                     "%s: is not there, but needed to read can.log; name one in the configuration or put "
+                     "it into the folder",
+                     missing);
+    warn_line(&self->warn, "%s: is not there; can.log is not read", missing);
+    return WM_OK;
+  }
+  wm_source *source;
+  status = can_stream_open(log, dbc, signals, &source, &self->quantities, err);
+  return status == WM_OK ? add_source(self, source, err) : status;
+}
+
+static wm_status add_sources(wm_recording *self, wm_error *err) {
+  wm_status status = add_can(self, err);
+  if (status == WM_OK) status = add_stream(self, &kStreamMotion, err);
+  if (status == WM_OK) status = add_stream(self, &kStreamMotion6, err);
+  if (status == WM_OK && self->source_count == 0)
+    return wm_fail(err, WM_BAD_CONFIG, "%s: no motion source: can.log, motion.csv or motion6.csv is needed", self->dir);
+  if (status == WM_OK) status = add_sensor_streams(self, &kStreamSightings, &self->sighting_sensors, err);
+  if (status == WM_OK) status = add_sensor_streams(self, &kStreamMarkers, &self->marker_sensors, err);
+  if (status == WM_OK) status = add_stream(self, &kStreamStereo, err);
+  if (status == WM_OK) status = add_stream(self, &kStreamPoints, err);
+  if (status == WM_OK) status = add_stream(self, &kStreamGnss, err);
+  return status;
+}
+
+wm_status wm_recording_open(const char *dir, const wm_recording_overrides *overrides, wm_warn_fn warn, void *context,
+                            wm_recording **out, wm_error *err) {
+  *out = NULL;
+  wm_recording *self = calloc(1, sizeof *self);
+  if (!self) return wm_fail(err, WM_IO, "%s: no memory to open it", dir);
+  size_t length = strlen(dir);
+  while (length > 1 && dir[length - 1] == '/') length--;
+  snprintf(self->dir, sizeof self->dir, "%.*s", (int)(length < WM_PATH_MAX ? length : WM_PATH_MAX - 1), dir);
+  const char *slash = strrchr(self->dir, '/');
+  snprintf(self->name, sizeof self->name, "%s", slash && slash[1] ? slash + 1 : self->dir);
+  self->duration_s = (double)NAN;
+  self->warn = (warner){warn, context};
+  if (overrides) self->overrides = *overrides;
+  wm_status status = read_about(self, err);
+  if (status == WM_OK) status = read_calibration(self, err);
+  if (status == WM_OK) status = read_landmarks(self, err);
+  if (status == WM_OK) status = add_sources(self, err);
+  if (status != WM_OK) {
+    wm_recording_close(self);
+    return status;
+  }
+  *out = self;
+  return WM_OK;
+}
+
+void wm_recording_close(wm_recording *self) {
+  if (!self) return;
+  for (size_t i = 0; i < self->source_count; i++) self->sources[i]->ops->close(self->sources[i]);
+  wm_yaml_free(self->about);
+  free(self->calibration_text);
+  free(self->landmarks);
+  free(self);
+}
+
+const char *wm_recording_name(const wm_recording *self) { return self->name; }
+const char *wm_recording_dir(const wm_recording *self) { return self->dir; }
+double wm_recording_duration_s(const wm_recording *self) { return self->duration_s; }
+const wm_wheels *wm_recording_wheels(const wm_recording *self) { return &self->calibration.wheels; }
+
+const wm_sensor *wm_recording_sensors(const wm_recording *self, size_t *count) {
+  *count = self->calibration.sensor_count;
+  return self->calibration.sensors;
+}
+
+const wm_landmark *wm_recording_landmarks(const wm_recording *self, size_t *count) {
+  *count = self->landmark_count;
+  return self->landmarks;
+}
+
+const wm_start *wm_recording_start(const wm_recording *self) { return &self->start; }
+uint32_t wm_recording_quantities(const wm_recording *self) { return self->quantities; }
+
+const char *wm_recording_calibration_text(const wm_recording *self, size_t *length) {
+  *length = self->calibration_length;
+  return self->calibration_text ? self->calibration_text : "";
+}
+
+wm_source *const *wm_recording_sources(wm_recording *self, size_t *count) {
+  *count = self->source_count;
+  return self->sources;
+}

@@ -1,0 +1,346 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "streams.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "arrival.h"
+
+// Limits of what can be: wide enough for anything that drives or swims, tight enough for a broken value.
+#define SPEED -1000.0, 1000.0
+#define RATE -1000.0, 1000.0
+#define ANGLE -6.2832, 6.2832
+#define RANGE DBL_MIN, 1e5
+#define PLACE -1e8, 1e8
+#define SIGMA DBL_MIN, 1e6
+#define PIXEL -1e5, 1e5
+#define ANY_ID 0.0, 2147483647.0
+#define ID_OR_UNKNOWN -1.0, 2147483647.0
+
+// Every stream begins so.
+enum { T, ARRIVAL, FIRST };
+#define STAMPS \
+  {"t_ns", CSV_TIME, CSV_NEEDED, 0, 0}, { "arrival_ns", CSV_TIME, CSV_OPTIONAL, 0, 0 }
+
+struct stream_kind {
+  const char *file;
+  const char *name;
+  wm_event_kind event;
+  csv_format format;
+  // Fills the event's body from a row. A row that says nothing: the reason, else NULL.
+  const char *(*fill)(const csv_row *row, uint16_t sensor, wm_event *out);
+};
+
+typedef struct stream {
+  wm_source base;
+  const stream_kind *kind;
+  csv_reader csv;
+  char sensor[WM_NAME_MAX];
+  uint16_t sensor_index;
+  const sensor_names *names;
+  int takes_broken;
+  arrival_order order;
+  uint32_t seq;
+  int held;  // points: the row that was read, but belongs to the next stamp
+  csv_row row;
+} stream;
+
+static const char *fill_motion(const csv_row *row, uint16_t sensor, wm_event *out) {
+  (void)sensor;
+  out->as.twist2 = (wm_twist2){row->number[FIRST], row->number[FIRST + 1]};
+  return NULL;
+}
+
+static const char *fill_motion6(const csv_row *row, uint16_t sensor, wm_event *out) {
+  (void)sensor;
+  for (int i = 0; i < 3; i++) {
+    out->as.twist6.v_mps[i] = row->number[FIRST + i];
+    out->as.twist6.w_radps[i] = row->number[FIRST + 3 + i];
+  }
+  return NULL;
+}
+
+// Into (-pi, pi] from at most one turn beyond.
+static double wrapped(double angle_rad) {
+  if (angle_rad > M_PI) return angle_rad - 2.0 * M_PI;
+  if (angle_rad <= -M_PI) return angle_rad + 2.0 * M_PI;
+  return angle_rad;
+}
+
+static const char *fill_sighting(const csv_row *row, uint16_t sensor, wm_event *out) {
+  double bearing_rad = row->number[FIRST + 2], range_m = row->number[FIRST + 3];
+  if (isnan(bearing_rad) && isnan(range_m)) return "bearing_rad and range_m are both empty; the row is skipped";
+  int64_t id = row->whole[FIRST + 1];
+  out->as.sighting = (wm_sighting){.sensor = sensor,
+                                   .landmark_id = id == WM_TIME_NONE ? -1 : (int32_t)id,
+                                   .bearing_rad = wrapped(bearing_rad),
+                                   .range_m = range_m,
+                                   .bearing_sigma_rad = (double)NAN,
+                                   .range_sigma_m = (double)NAN};
+  return NULL;
+}
+
+static const char *fill_marker(const csv_row *row, uint16_t sensor, wm_event *out) {
+  const double *p = &row->number[FIRST + 2];
+  out->as.marker = (wm_marker){
+      .sensor = sensor, .id = (int32_t)row->whole[FIRST + 1], .p_m = {p[0], p[1], p[2]}, .yaw_rad = wrapped(p[3])};
+  return NULL;
+}
+
+static const char *fill_stereo(const csv_row *row, uint16_t sensor, wm_event *out) {
+  (void)sensor;
+  const double *px = &row->number[FIRST + 1];
+  if (isnan(px[0]) != isnan(px[1]) || isnan(px[2]) != isnan(px[3]))
+    return "one of u and v is empty; the row is skipped";
+  if (isnan(px[0]) && isnan(px[2])) return "no camera sees the point; the row is skipped";
+  out->as.stereo = (wm_stereo){.id = (int32_t)row->whole[FIRST], .left_px = {px[0], px[1]}, .right_px = {px[2], px[3]}};
+  return NULL;
+}
+
+static const char *fill_gnss(const csv_row *row, uint16_t sensor, wm_event *out) {
+  (void)sensor;
+  const double *n = &row->number[FIRST];
+  out->as.position = (wm_position){.p_m = {n[0], n[1], n[2]}, .sigma_xy_m = n[3], .sigma_z_m = n[4]};
+  return NULL;
+}
+
+static const char *fill_point(const csv_row *row, uint16_t sensor, wm_event *out) {
+  (void)sensor;
+  wm_points *points = &out->as.points;
+  if (points->count >= WM_POINTS_MAX) {
+    points->dropped++;
+    return NULL;
+  }
+  points->x_m[points->count] = (float)row->number[FIRST];
+  points->y_m[points->count++] = (float)row->number[FIRST + 1];
+  return NULL;
+}
+
+const stream_kind kStreamMotion = {
+    "motion.csv",
+    "motion",
+    WM_EVENT_TWIST2,
+    {{STAMPS, {"v_mps", CSV_NUMBER, CSV_NEEDED, SPEED}, {"w_radps", CSV_NUMBER, CSV_NEEDED, RATE}}},
+    fill_motion};
+
+const stream_kind kStreamMotion6 = {"motion6.csv",
+                                    "motion6",
+                                    WM_EVENT_TWIST6,
+                                    {{STAMPS,
+                                      {"vx_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
+                                      {"vy_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
+                                      {"vz_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
+                                      {"wx_radps", CSV_NUMBER, CSV_NEEDED, RATE},
+                                      {"wy_radps", CSV_NUMBER, CSV_NEEDED, RATE},
+                                      {"wz_radps", CSV_NUMBER, CSV_NEEDED, RATE}}},
+                                    fill_motion6};
+
+const stream_kind kStreamSightings = {"sightings.csv",
+                                      "sightings",
+                                      WM_EVENT_SIGHTING,
+                                      {{STAMPS,
+                                        {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
+                                        {"id", CSV_WHOLE, CSV_MAY_EMPTY, ID_OR_UNKNOWN},
+                                        {"bearing_rad", CSV_NUMBER, CSV_ONE_OF, ANGLE},
+                                        {"range_m", CSV_NUMBER, CSV_ONE_OF, RANGE}}},
+                                      fill_sighting};
+
+const stream_kind kStreamMarkers = {"markers.csv",
+                                    "markers",
+                                    WM_EVENT_MARKER,
+                                    {{STAMPS,
+                                      {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
+                                      {"id", CSV_WHOLE, CSV_NEEDED, ANY_ID},
+                                      {"x_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                      {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                      {"z_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                      {"yaw_rad", CSV_NUMBER, CSV_NEEDED, ANGLE}}},
+                                    fill_marker};
+
+const stream_kind kStreamStereo = {"stereo.csv",
+                                   "stereo",
+                                   WM_EVENT_STEREO,
+                                   {{STAMPS,
+                                     {"id", CSV_WHOLE, CSV_NEEDED, ID_OR_UNKNOWN},
+                                     {"ul_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
+                                     {"vl_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
+                                     {"ur_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
+                                     {"vr_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL}}},
+                                   fill_stereo};
+
+const stream_kind kStreamPoints = {
+    "points.csv",
+    "points",
+    WM_EVENT_POINTS,
+    {{STAMPS, {"x_m", CSV_NUMBER, CSV_NEEDED, PLACE}, {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE}}},
+    fill_point};
+
+const stream_kind kStreamGnss = {"gnss.csv",
+                                 "gnss",
+                                 WM_EVENT_POSITION,
+                                 {{STAMPS,
+                                   {"x_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                   {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                   {"z_m", CSV_NUMBER, CSV_OPTIONAL, PLACE},
+                                   {"sigma_xy_m", CSV_NUMBER, CSV_NEEDED, SIGMA},
+                                   {"sigma_z_m", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
+                                 fill_gnss};
+
+const char *stream_file(const stream_kind *kind) { return kind->file; }
+
+static int is_name(csv_field field, const char *name) {
+  return strlen(name) == field.length && memcmp(name, field.text, field.length) == 0;
+}
+
+static int is_among(csv_field field, const sensor_names *names) {
+  for (size_t i = 0; i < names->count; i++)
+    if (is_name(field, names->name[i])) return 1;
+  return 0;
+}
+
+static int is_printable(csv_field field) {
+  for (size_t i = 0; i < field.length; i++)
+    if ((unsigned char)field.text[i] <= ' ' || field.text[i] == 0x7F) return 0;
+  return 1;
+}
+
+wm_status stream_find_sensors(const char *path, const stream_kind *kind, sensor_names *out, wm_error *err) {
+  csv_reader csv;
+  out->count = 0;
+  wm_status status = csv_open(&csv, path, &kind->format, NULL, NULL, err);
+  if (status != WM_OK) return status;
+  while ((status = csv_next(&csv, err)) == WM_OK) {
+    csv_field name = csv_name(&csv);
+    if (csv.fields_found != csv.field_count || name.length == 0 || name.length >= WM_NAME_MAX || !is_printable(name) ||
+        is_among(name, out))
+      continue;
+    if (out->count == WM_SENSORS_MAX) {
+      status = csv_fail(&csv, err, WM_FULL, "more than 32 different sensors");
+      break;
+    }
+    memcpy(out->name[out->count], name.text, name.length);
+    out->name[out->count++][name.length] = '\0';
+  }
+  csv_close(&csv);
+  return status == WM_END ? WM_OK : status;
+}
+
+static int is_mine(const stream *self) {
+  if (!self->names) return 1;
+  csv_field name = csv_name(&self->csv);
+  if (is_name(name, self->sensor)) return 1;
+  return self->takes_broken && !is_among(name, self->names);
+}
+
+static void count_bad(stream *self, wm_status status, const wm_error *why) {
+  wm_source_counts *counts = &self->base.counts;
+  if (status == WM_NOT_FINITE)
+    counts->not_finite++;
+  else
+    counts->malformed++;
+  if (!counts->first_problem[0]) snprintf(counts->first_problem, sizeof counts->first_problem, "%s", why->text);
+}
+
+// The next good row of this source, into self->row; bad ones are counted.
+static wm_status next_row(stream *self, wm_error *err) {
+  for (;;) {
+    wm_error why;
+    wm_status status = csv_next(&self->csv, err);
+    if (status != WM_OK) return status;
+    if (!is_mine(self)) continue;
+    status = csv_read(&self->csv, &self->row, &why);
+    if (status == WM_OK && self->names && !is_name(csv_name(&self->csv), self->sensor))
+      status = csv_fail(&self->csv, &why, WM_BAD_DATA, "the sensor's name is broken; the row is skipped");
+    if (status == WM_OK) return WM_OK;
+    count_bad(self, status, &why);
+  }
+}
+
+static void begin_event(stream *self, wm_event *out) {
+  memset(out, 0, self->kind->event == WM_EVENT_POINTS ? sizeof *out : WM_EVENT_SMALL_BYTES);
+  out->t_ns = self->row.whole[T];
+  out->source = self->base.index;
+  out->kind = (uint8_t)self->kind->event;
+}
+
+static void hand_out(stream *self, wm_time_ns arrival_ns, wm_event *out) {
+  out->arrival_ns = arrival_order_next(&self->order, arrival_ns, &self->base.counts);
+  out->seq = self->seq++;
+  self->base.counts.received++;
+}
+
+static wm_time_ns arrival_of(const csv_row *row) {
+  return row->whole[ARRIVAL] == WM_TIME_NONE ? row->whole[T] : row->whole[ARRIVAL];
+}
+
+static wm_status next_single(wm_source *base, wm_event *out, wm_error *err) {
+  stream *self = (stream *)base;
+  for (;;) {
+    wm_error why;
+    wm_status status = next_row(self, err);
+    if (status != WM_OK) return status;
+    begin_event(self, out);
+    const char *problem = self->kind->fill(&self->row, self->sensor_index, out);
+    if (!problem) {
+      hand_out(self, arrival_of(&self->row), out);
+      return WM_OK;
+    }
+    count_bad(self, csv_fail(&self->csv, &why, WM_BAD_DATA, problem), &why);
+  }
+}
+
+// All rows of a stamp are one event; it has arrived when the last of them has.
+static wm_status next_points(wm_source *base, wm_event *out, wm_error *err) {
+  stream *self = (stream *)base;
+  wm_status status = self->held ? WM_OK : next_row(self, err);
+  if (status != WM_OK) return status;
+  self->held = 0;
+  begin_event(self, out);
+  wm_time_ns arrival_ns = arrival_of(&self->row);
+  for (;;) {
+    (void)self->kind->fill(&self->row, 0, out);
+    if (arrival_of(&self->row) > arrival_ns) arrival_ns = arrival_of(&self->row);
+    status = next_row(self, err);
+    if (status != WM_OK && status != WM_END) return status;
+    if (status == WM_OK && self->row.whole[T] == out->t_ns) continue;
+    self->held = status == WM_OK;
+    hand_out(self, arrival_ns, out);
+    return WM_OK;
+  }
+}
+
+static void close_stream(wm_source *base) {
+  csv_close(&((stream *)base)->csv);
+  free(base);
+}
+
+static const wm_source_ops kSingle = {next_single, close_stream};
+static const wm_source_ops kPoints = {next_points, close_stream};
+
+wm_status stream_open(const char *path, const stream_kind *kind, const char *sensor, uint16_t sensor_index,
+                      const sensor_names *others, int takes_broken, wm_warn_fn warn, void *context, wm_source **out,
+                      wm_error *err) {
+  *out = NULL;
+  stream *self = calloc(1, sizeof *self);
+  if (!self) return wm_fail(err, WM_IO, "%s: no memory to read it", path);
+  wm_status status = csv_open(&self->csv, path, &kind->format, warn, context, err);
+  if (status != WM_OK) {
+    free(self);
+    return status;
+  }
+  self->base.ops = kind->event == WM_EVENT_POINTS ? &kPoints : &kSingle;
+  self->base.is_motion = (WM_MOTION_EVENTS >> kind->event) & 1u;
+  self->base.kinds = WM_EVENT_BIT(kind->event);
+  self->base.in_order = self->csv.place[ARRIVAL] < 0;
+  snprintf(self->base.name, sizeof self->base.name, "%s%s%s", kind->name, sensor ? ":" : "", sensor ? sensor : "");
+  snprintf(self->sensor, sizeof self->sensor, "%s", sensor ? sensor : "");
+  self->kind = kind;
+  self->sensor_index = sensor_index;
+  self->names = others;
+  self->takes_broken = takes_broken;
+  *out = &self->base;
+  return WM_OK;
+}

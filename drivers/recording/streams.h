@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The recording's CSV streams as sources.
+#ifndef WM_RECORDING_STREAMS_H
+#define WM_RECORDING_STREAMS_H
+
+#include "csv.h"
+#include "waymark/source.h"
+
+typedef struct stream_kind stream_kind;
+
+// In the order of the format's table of files.
+extern const stream_kind kStreamMotion, kStreamMotion6, kStreamSightings, kStreamMarkers, kStreamStereo, kStreamPoints,
+    kStreamGnss;
+
+const char *stream_file(const stream_kind *kind);  // "motion.csv"
+
+// Names of the sensors in a file of sightings or markers.
+typedef struct sensor_names {
+  char name[WM_SENSORS_MAX][WM_NAME_MAX];
+  size_t count;
+} sensor_names;
+
+// Reads the file once for the sensors that it names; a line that can't be split or a name above 31 letters is left to
+// the source to count. WM_FULL above 32 of them.
+wm_status stream_find_sensors(const char *path, const stream_kind *kind, sensor_names *out, wm_error *err);
+
+// A source on a stream's file. `sensor`: only rows of this one, with `sensor_index` in their events; NULL where the
+// file has no sensors. `others`: the names that other sources take; a row of none of them (broken beyond that) is
+// counted by the source with `takes_broken`. The names must live as long as the source.
+wm_status stream_open(const char *path, const stream_kind *kind, const char *sensor, uint16_t sensor_index,
+                      const sensor_names *others, int takes_broken, wm_warn_fn warn, void *context, wm_source **out,
+                      wm_error *err);
+
+#endif

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// Opens every recording of WM_DATA_DIR and holds what its sources hand out against the `counts` that its
+// recording.yaml gives.
+#include <dirent.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "unity.h"
+#include "waymark/recording.h"
+
+static const char *data_dir;
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static void print_warning(void *context, const char *text) { printf("  %s: %s\n", (const char *)context, text); }
+
+// What the source's kind is called under `counts`, NULL where nothing is.
+static const char *count_key(const wm_source *source) {
+  if (strcmp(source->name, "motion") == 0 || strcmp(source->name, "motion6") == 0) return "motion_rows";
+  if (strncmp(source->name, "sightings:", 10) == 0) return "sightings";
+  if (strcmp(source->name, "gnss") == 0) return "gnss_rows";
+  if (strcmp(source->name, "stereo") == 0) return "stereo_rows";
+  return NULL;
+}
+
+static void drain(wm_source *source, const char *name) {
+  static wm_event event;
+  wm_error err = {0};
+  wm_time_ns newest_ns = WM_TIME_NONE;
+  uint64_t events = 0;
+  wm_status status;
+  while ((status = source->ops->next(source, &event, &err)) == WM_OK) {
+    TEST_ASSERT_TRUE_MESSAGE(event.arrival_ns >= newest_ns, name);
+    TEST_ASSERT_EQUAL_UINT32(events, event.seq);
+    TEST_ASSERT_EQUAL(source->index, event.source);
+    TEST_ASSERT_TRUE(source->kinds & WM_EVENT_BIT(event.kind));
+    newest_ns = event.arrival_ns;
+    events++;
+  }
+  TEST_ASSERT_EQUAL_MESSAGE(WM_END, status, err.text);
+  TEST_ASSERT_EQUAL_UINT64(events, source->counts.received);
+  TEST_ASSERT_EQUAL_UINT64_MESSAGE(0, source->counts.malformed, source->counts.first_problem);
+  TEST_ASSERT_EQUAL_UINT64_MESSAGE(0, source->counts.not_finite, source->counts.first_problem);
+}
+
+static void check_count(const wm_yaml_node *root, const wm_source *source, const char *name) {
+  char key[64];
+  if (!count_key(source)) return;
+  snprintf(key, sizeof key, "counts.%s", count_key(source));
+  wm_yaml_node node = wm_yaml_get(root, key);
+  if (!wm_yaml_there(&node)) return;
+  int64_t expected;
+  wm_error err;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_yaml_i64(&node, 0, INT64_MAX, &expected, &err), err.text);
+  TEST_ASSERT_EQUAL_UINT64_MESSAGE((uint64_t)expected, source->counts.received, name);
+}
+
+static void check_recording(const char *name) {
+  char dir[512], about[600];
+  wm_error err = {0};
+  wm_recording *recording;
+  wm_yaml *doc;
+  snprintf(dir, sizeof dir, "%s/%s", data_dir, name);
+  snprintf(about, sizeof about, "%s/recording.yaml", dir);
+  wm_status status = wm_recording_open(dir, NULL, print_warning, (void *)name, &recording, &err);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_yaml_load(about, &doc, &err), err.text);
+  wm_yaml_node root = wm_yaml_root(doc);
+  size_t count;
+  wm_source *const *sources = wm_recording_sources(recording, &count);
+  int has_motion = 0;
+  for (size_t i = 0; i < count; i++) {
+    drain(sources[i], name);
+    check_count(&root, sources[i], name);
+    has_motion += sources[i]->is_motion && sources[i]->counts.received > 0;
+    printf("  %-22s %-18s %8llu events, %llu out of order\n", name, sources[i]->name,
+           (unsigned long long)sources[i]->counts.received, (unsigned long long)sources[i]->counts.out_of_order);
+  }
+  TEST_ASSERT_TRUE_MESSAGE(has_motion, name);
+  wm_yaml_free(doc);
+  wm_recording_close(recording);
+}
+
+static void every_recording(void) {
+  DIR *dir = opendir(data_dir);
+  TEST_ASSERT_NOT_NULL(dir);
+  int checked = 0;
+  for (struct dirent *entry; (entry = readdir(dir));) {
+    char about[1024];
+    snprintf(about, sizeof about, "%s/%s/recording.yaml", data_dir, entry->d_name);
+    if (access(about, R_OK) != 0) continue;
+    check_recording(entry->d_name);
+    checked++;
+  }
+  closedir(dir);
+  TEST_ASSERT_GREATER_THAN(0, checked);
+}
+
+int main(void) {
+  data_dir = getenv("WM_DATA_DIR");
+  if (!data_dir || access(data_dir, R_OK) != 0) {
+    puts("skipped: no recordings in WM_DATA_DIR");
+    return 77;
+  }
+  UNITY_BEGIN();
+  RUN_TEST(every_recording);
+  return UNITY_END();
+}

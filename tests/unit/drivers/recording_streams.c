@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+// The CSV streams: columns by name, stamps to the last digit, and each kind of broken row.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "folder.h"
+#include "unity.h"
+#include "waymark/recording.h"
+
+static wm_recording *recording;
+static wm_error err;
+static char warnings[4096];
+
+void setUp(void) {
+  folder_make();
+  folder_write("recording.yaml", "format: waymark-recording/1\n");
+  folder_write("motion.csv", "t_ns,v_mps,w_radps\n0,0,0\n");
+  recording = NULL;
+  warnings[0] = '\0';
+}
+
+void tearDown(void) {
+  wm_recording_close(recording);
+  folder_remove();
+}
+
+static void keep_warning(void *context, const char *text) {
+  (void)context;
+  strncat(warnings, text, sizeof warnings - strlen(warnings) - 2);
+  strcat(warnings, "\n");
+}
+
+static wm_source *source(const char *name) {
+  if (!recording) {
+    wm_status status = wm_recording_open(folder_path("."), NULL, keep_warning, NULL, &recording, &err);
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, err.text);
+  }
+  size_t count;
+  wm_source *const *sources = wm_recording_sources(recording, &count);
+  for (size_t i = 0; i < count; i++)
+    if (strcmp(sources[i]->name, name) == 0) return sources[i];
+  TEST_FAIL_MESSAGE(name);
+  return NULL;
+}
+
+static wm_event next(wm_source *from) {
+  static wm_event event;
+  memset(&event, 0xA5, sizeof event);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, from->ops->next(from, &event, &err), from->counts.first_problem);
+  return event;
+}
+
+static void at_end(wm_source *from) {
+  wm_event event;
+  TEST_ASSERT_EQUAL(WM_END, from->ops->next(from, &event, &err));
+  TEST_ASSERT_EQUAL(WM_END, from->ops->next(from, &event, &err));
+}
+
+static void motion_exact(void) {
+  folder_write("motion.csv", "t_ns,v_mps,w_radps\n9007199254740993,0.1,-0.25\n9007199254740994,-1e-3,.5\n");
+  wm_source *motion = source("motion");
+  wm_event event = next(motion);
+  TEST_ASSERT_TRUE(event.t_ns == INT64_C(9007199254740993) && event.arrival_ns == event.t_ns);
+  TEST_ASSERT_TRUE(event.as.twist2.v_mps == 0.1 && event.as.twist2.w_radps == -0.25);
+  TEST_ASSERT_EQUAL(WM_EVENT_TWIST2, event.kind);
+  TEST_ASSERT_EQUAL(0, event.seq);
+  event = next(motion);
+  TEST_ASSERT_TRUE(event.as.twist2.v_mps == -1e-3 && event.as.twist2.w_radps == 0.5);
+  TEST_ASSERT_EQUAL(1, event.seq);
+  at_end(motion);
+  TEST_ASSERT_TRUE(motion->is_motion);
+  TEST_ASSERT_EQUAL(2, motion->counts.received);
+}
+
+// The same data, written in the ways that the format allows.
+static void spellings(void) {
+  static const char *const kFiles[] = {
+      "w_radps,t_ns,v_mps\n2,10,1\n4,20,3\n",
+      "t_ns,v_mps,w_radps,arrival_ns\n10,1,2,\n20,3,4,20\n",
+      "\xEF\xBB\xBFt_ns,v_mps,w_radps\r\n10,1,2\r\n20,3,4\r\n",
+      " t_ns , v_mps,\tw_radps \n\n10, 1 ,2\n\r\n20,3,4",
+      "t_ns,note,v_mps,w_radps\n10,fine,1,2\n20,,3,4\n",
+  };
+  for (size_t i = 0; i < sizeof kFiles / sizeof *kFiles; i++) {
+    folder_write("motion.csv", kFiles[i]);
+    wm_source *motion = source("motion");
+    for (int row = 0; row < 2; row++) {
+      wm_event event = next(motion);
+      TEST_ASSERT_TRUE(event.t_ns == 10 * (row + 1) && event.arrival_ns == event.t_ns);
+      TEST_ASSERT_TRUE(event.as.twist2.v_mps == 1 + 2 * row && event.as.twist2.w_radps == 2 + 2 * row);
+    }
+    at_end(motion);
+    TEST_ASSERT_EQUAL(0, motion->counts.malformed + motion->counts.out_of_order);
+    wm_recording_close(recording);
+    recording = NULL;
+  }
+  TEST_ASSERT_NOT_NULL(strstr(warnings, "motion.csv:1: unknown column 'note', ignored"));
+}
+
+static void broken_rows(void) {
+  static char text[200000];
+  strcpy(text,
+         "t_ns,v_mps,w_radps\n1,1,1\nx,1,1\n2,1\n3,1,1,1\n4,nan,0\n5,1e9,0\n6,,0\n99999999999999999999,1,1\n1.5,1,1\n");
+  size_t n = strlen(text);
+  memset(text + n, '7', 150000);
+  strcpy(text + n + 150000, "\n7,2,2");
+  folder_write("motion.csv", text);
+  wm_source *motion = source("motion");
+  TEST_ASSERT_EQUAL(1, next(motion).t_ns);
+  wm_event event = next(motion);
+  TEST_ASSERT_EQUAL(7, event.t_ns);
+  TEST_ASSERT_EQUAL(1, event.seq);
+  at_end(motion);
+  TEST_ASSERT_EQUAL(6, motion->counts.malformed);
+  TEST_ASSERT_EQUAL(3, motion->counts.not_finite);
+  TEST_ASSERT_EQUAL(2, motion->counts.received);
+  const char *tail = "motion.csv:3: t_ns: 'x' is not a whole number; the row is skipped";
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(motion->counts.first_problem, tail), motion->counts.first_problem);
+}
+
+static void zero_bytes(void) {
+  static const char kText[] = "t_ns,v_mps,w_radps\n1,1,1\n2,\0,1\n\0\0\0\n3,1,1\n";
+  folder_write_bytes("motion.csv", kText, sizeof kText - 1);
+  wm_source *motion = source("motion");
+  next(motion);
+  TEST_ASSERT_EQUAL(3, next(motion).t_ns);
+  at_end(motion);
+  TEST_ASSERT_EQUAL(2, motion->counts.malformed);
+}
+
+// Many buffers' worth of rows, so that lines fall across the buffer's end.
+static void long_file(void) {
+  enum { ROWS = 20000 };
+  char *text = malloc(ROWS * 48);
+  size_t n = (size_t)sprintf(text, "t_ns,v_mps,w_radps\n");
+  for (int i = 0; i < ROWS; i++) n += (size_t)sprintf(text + n, "%lld,%d.%d,%d\n", i * 1000003LL, i % 7, i, i % 3);
+  folder_write_bytes("motion.csv", text, n);
+  free(text);
+  wm_source *motion = source("motion");
+  for (int i = 0; i < ROWS; i++) {
+    wm_event event = next(motion);
+    TEST_ASSERT_TRUE(event.t_ns == i * INT64_C(1000003) && event.as.twist2.w_radps == i % 3);
+  }
+  at_end(motion);
+}
+
+static void order_of_arrival(void) {
+  folder_write("motion.csv", "t_ns,v_mps,w_radps\n10,1,0\n30,2,0\n20,3,0\n40,4,0\n");
+  folder_write("gnss.csv",
+               "t_ns,x_m,y_m,z_m,sigma_xy_m,sigma_z_m,arrival_ns\n10,1,1,,2,,200\n5,2,2,3,2,4,210\n20,3,3,,2,,205\n");
+  wm_source *motion = source("motion"), *gnss = source("gnss");
+  static const int kStamps[] = {10, 30, 20, 40}, kArrivals[] = {10, 30, 30, 40};
+  for (int i = 0; i < 4; i++) {
+    wm_event event = next(motion);
+    TEST_ASSERT_EQUAL(kStamps[i], event.t_ns);
+    TEST_ASSERT_EQUAL(kArrivals[i], event.arrival_ns);
+  }
+  TEST_ASSERT_EQUAL(1, motion->counts.out_of_order);
+  wm_event event = next(gnss);
+  TEST_ASSERT_TRUE(isnan(event.as.position.p_m[2]) && isnan(event.as.position.sigma_z_m));
+  TEST_ASSERT_EQUAL(200, event.arrival_ns);
+  event = next(gnss);
+  TEST_ASSERT_EQUAL(5, event.t_ns);
+  TEST_ASSERT_EQUAL(210, event.arrival_ns);
+  TEST_ASSERT_EQUAL_DOUBLE(4, event.as.position.sigma_z_m);
+  TEST_ASSERT_EQUAL(210, next(gnss).arrival_ns);
+  TEST_ASSERT_EQUAL(1, gnss->counts.out_of_order);
+}
+
+static void sightings_by_sensor(void) {
+  folder_write("calibration.yaml",
+               "sensors:\n  right: {mounting: {xyz_m: [0, -1, 0], rpy_deg: [0, 0, 90]}, bearing_sigma_rad: 0.01}\n"
+               "cameras:\n  front: {model: equidistant, size: [640, 480], intrinsics: [300, 300, 320, 240], mounting: "
+               "{xyz_m: [2, 0, 1]}}\n");
+  folder_write("sightings.csv",
+               "t_ns,sensor,id,bearing_rad,range_m\n1,left,7,0.5,\n1,right,8,,2.5\n2,left,,4.0,1\n3,front,9,,\n3,front,"
+               "9,0.1,\n4,right,1\n"
+               "5,,1,0,1\n6,left,-2,0,1\n7,right,3,0,0\n");
+  wm_source *left = source("sightings:left"), *right = source("sightings:right"), *front = source("sightings:front");
+  size_t count;
+  const wm_sensor *sensors = wm_recording_sensors(recording, &count);
+  TEST_ASSERT_EQUAL(3, count);
+  wm_event event = next(left);
+  TEST_ASSERT_EQUAL_STRING("left", sensors[event.as.sighting.sensor].name);
+  TEST_ASSERT_EQUAL(7, event.as.sighting.landmark_id);
+  TEST_ASSERT_TRUE(event.as.sighting.bearing_rad == 0.5 && isnan(event.as.sighting.range_m) &&
+                   isnan(event.as.sighting.bearing_sigma_rad));
+  event = next(left);
+  TEST_ASSERT_EQUAL(-1, event.as.sighting.landmark_id);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 4.0 - 2 * M_PI, event.as.sighting.bearing_rad);
+  at_end(left);
+  event = next(right);
+  TEST_ASSERT_EQUAL(0, event.as.sighting.sensor);
+  TEST_ASSERT_TRUE(isnan(event.as.sighting.bearing_rad) && event.as.sighting.range_m == 2.5);
+  at_end(right);
+  event = next(front);
+  TEST_ASSERT_EQUAL_DOUBLE(2.0, sensors[event.as.sighting.sensor].mounting.xyz_m[0]);
+  at_end(front);
+  TEST_ASSERT_EQUAL(1, left->counts.malformed);   // the row without a sensor is the first source's
+  TEST_ASSERT_EQUAL(1, left->counts.not_finite);  // id -2
+  TEST_ASSERT_EQUAL(1, right->counts.malformed);
+  TEST_ASSERT_EQUAL(1, right->counts.not_finite);  // range 0
+  TEST_ASSERT_EQUAL(1, front->counts.malformed);
+  TEST_ASSERT_NOT_NULL(strstr(warnings, "the sensor 'left' is not in calibration.yaml"));
+  TEST_ASSERT_NULL(strstr(warnings, "'front'"));
+}
+
+static void points_by_stamp(void) {
+  folder_write("points.csv", "t_ns,x_m,y_m\n1,1,2\n1,3,4\n2,5,6\n");
+  wm_source *points = source("points");
+  wm_event event = next(points);
+  TEST_ASSERT_EQUAL(2, event.as.points.count);
+  TEST_ASSERT_EQUAL_FLOAT(3, event.as.points.x_m[1]);
+  event = next(points);
+  TEST_ASSERT_EQUAL(2, event.t_ns);
+  TEST_ASSERT_EQUAL(1, event.as.points.count);
+  TEST_ASSERT_EQUAL_FLOAT(6, event.as.points.y_m[0]);
+  at_end(points);
+}
+
+static void too_many_points(void) {
+  char *text = malloc(20000);
+  size_t n = (size_t)sprintf(text, "t_ns,x_m,y_m\n");
+  for (int i = 0; i < WM_POINTS_MAX + 5; i++) n += (size_t)sprintf(text + n, "1,%d,0\n", i);
+  folder_write_bytes("points.csv", text, n);
+  free(text);
+  wm_event event = next(source("points"));
+  TEST_ASSERT_EQUAL(WM_POINTS_MAX, event.as.points.count);
+  TEST_ASSERT_EQUAL(5, event.as.points.dropped);
+}
+
+static void other_streams(void) {
+  folder_write("motion6.csv", "t_ns,vx_mps,vy_mps,vz_mps,wx_radps,wy_radps,wz_radps\n1,1,2,3,4,5,6\n");
+  folder_write("markers.csv", "t_ns,sensor,id,x_m,y_m,z_m,yaw_rad\n1,up,10,1,2,3,-3.2\n");
+  folder_write("stereo.csv", "t_ns,id,ul_px,vl_px,ur_px,vr_px\n1,4,1,2,,\n2,4,1,,3,4\n3,4,,,,\n4,4,1,2,3,4\n");
+  wm_event event = next(source("motion6"));
+  TEST_ASSERT_EQUAL_DOUBLE(3, event.as.twist6.v_mps[2]);
+  TEST_ASSERT_EQUAL_DOUBLE(4, event.as.twist6.w_radps[0]);
+  event = next(source("markers:up"));
+  TEST_ASSERT_EQUAL(10, event.as.marker.id);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 2 * M_PI - 3.2, event.as.marker.yaw_rad);
+  wm_source *stereo = source("stereo");
+  event = next(stereo);
+  TEST_ASSERT_TRUE(event.as.stereo.left_px[1] == 2 && isnan(event.as.stereo.right_px[0]));
+  TEST_ASSERT_EQUAL(4, next(stereo).t_ns);
+  TEST_ASSERT_EQUAL(2, stereo->counts.malformed);
+  static const char *const kOrder[] = {"motion", "motion6", "markers:up", "stereo"};
+  size_t count;
+  wm_source *const *sources = wm_recording_sources(recording, &count);
+  TEST_ASSERT_EQUAL(4, count);
+  for (size_t i = 0; i < count; i++) {
+    TEST_ASSERT_EQUAL_STRING(kOrder[i], sources[i]->name);
+    TEST_ASSERT_EQUAL(i, sources[i]->index);
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(motion_exact);
+  RUN_TEST(spellings);
+  RUN_TEST(broken_rows);
+  RUN_TEST(zero_bytes);
+  RUN_TEST(long_file);
+  RUN_TEST(order_of_arrival);
+  RUN_TEST(sightings_by_sensor);
+  RUN_TEST(points_by_stamp);
+  RUN_TEST(too_many_points);
+  RUN_TEST(other_streams);
+  return UNITY_END();
+}

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "unity.h"
+#include "waymark/yaml.h"
+
+static wm_yaml *doc;
+static wm_error err;
+
+void setUp(void) { doc = NULL; }
+void tearDown(void) { wm_yaml_free(doc); }
+
+static wm_yaml_node parse(const char *text) {
+  wm_status status = wm_yaml_parse(text, strlen(text), "x.yaml", &doc, &err);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, err.text);
+  return wm_yaml_root(doc);
+}
+
+static void refused(const char *text, const char *message) {
+  TEST_ASSERT_EQUAL_MESSAGE(WM_BAD_CONFIG, wm_yaml_parse(text, strlen(text), "x.yaml", &doc, &err), text);
+  TEST_ASSERT_NULL(doc);
+  TEST_ASSERT_EQUAL_STRING(message, err.text);
+}
+
+static void walks(void) {
+  wm_yaml_node root = parse("a: 1\nb:\n  c: [1, 2.5, 3]\n  d: ~\n  'e f': \"7\"\n");
+  TEST_ASSERT_TRUE(wm_yaml_is_map(&root));
+  TEST_ASSERT_EQUAL(2, wm_yaml_count(&root));
+  wm_yaml_node c = wm_yaml_get(&root, "b.c");
+  TEST_ASSERT_EQUAL(3, wm_yaml_line(&c));
+  TEST_ASSERT_EQUAL_STRING("b.c", c.path);
+  TEST_ASSERT_EQUAL(3, wm_yaml_count(&c));
+  wm_yaml_node second = wm_yaml_item(&c, 1), none = wm_yaml_item(&c, 3);
+  double value;
+  TEST_ASSERT_EQUAL(WM_OK, wm_yaml_f64(&second, 0, 10, &value, &err));
+  TEST_ASSERT_EQUAL_DOUBLE(2.5, value);
+  TEST_ASSERT_EQUAL_STRING("b.c[1]", second.path);
+  TEST_ASSERT_FALSE(wm_yaml_there(&none));
+  wm_yaml_node d = wm_yaml_get(&root, "b.d"), x = wm_yaml_get(&root, "b.x"), deep = wm_yaml_get(&root, "a.b.c");
+  TEST_ASSERT_FALSE(wm_yaml_there(&d) || wm_yaml_there(&x) || wm_yaml_there(&deep));
+  const char *key;
+  int line;
+  wm_yaml_node b = wm_yaml_get(&root, "b"), last = wm_yaml_value(&b, 2, &key, &line);
+  TEST_ASSERT_EQUAL_STRING("e f", key);
+  TEST_ASSERT_EQUAL(5, line);
+  TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_yaml_f64(&last, 0, 10, &value, &err));
+  TEST_ASSERT_EQUAL_STRING("x.yaml:5: b.e f: the text '7' is not a number; a number from 0 to 10 is needed", err.text);
+}
+
+static void says(wm_status status, const char *message) {
+  TEST_ASSERT_EQUAL(WM_BAD_CONFIG, status);
+  TEST_ASSERT_EQUAL_STRING(message, err.text);
+}
+
+static void typed_reads(void) {
+  wm_yaml_node root = parse(
+      "f: abc\nbig: 5000\ni: 1.5\nb: 'true'\nc: mpas\nl: [1, x]\ninf: .inf\nnan: .nan\nyes: true\nhuge: 1e999\nt: "
+      "9007199254740993\n");
+  static const char *const kNames[] = {"maps", "none", NULL};
+  double f = 7;
+  int64_t i = 7;
+  int b = 7;
+  int32_t c = 7;
+  char s[4];
+  wm_yaml_node n = wm_yaml_get(&root, "f");
+  says(wm_yaml_f64(&n, 0, 1000, &f, &err), "x.yaml:1: f: 'abc' is not a number; a number from 0 to 1000 is needed");
+  says(wm_yaml_string(&n, s, 3, &err), "x.yaml:1: f: 'abc' is longer than the 2 bytes that are allowed");
+  TEST_ASSERT_EQUAL(WM_OK, wm_yaml_string(&n, s, 4, &err));
+  n = wm_yaml_get(&root, "big");
+  says(wm_yaml_f64(&n, DBL_MIN, 1000, &f, &err),
+       "x.yaml:2: big: '5000' is out of range; a number above 0 and up to 1000 is needed");
+  says(wm_yaml_i64(&n, 0, 10, &i, &err),
+       "x.yaml:2: big: '5000' is out of range; a whole number from 0 to 10 is needed");
+  n = wm_yaml_get(&root, "i");
+  says(wm_yaml_i64(&n, 0, 10, &i, &err),
+       "x.yaml:3: i: '1.5' is not a whole number; a whole number from 0 to 10 is needed");
+  n = wm_yaml_get(&root, "b");
+  says(wm_yaml_bool(&n, &b, &err), "x.yaml:4: b: the text 'true' is neither true nor false");
+  n = wm_yaml_get(&root, "c");
+  says(wm_yaml_choice(&n, kNames, &c, &err),
+       "x.yaml:5: c: 'mpas' is unknown; did you mean 'maps'? (one of: maps, none)");
+  n = wm_yaml_get(&root, "l");
+  double list[2];
+  says(wm_yaml_f64_list(&n, 2, 2, list, NULL, &err),
+       "x.yaml:6: l[1]: 'x' is not a number; a number from -1.797693135e+308 to 1.797693135e+308 is needed");
+  says(wm_yaml_f64_list(&n, 3, 4, list, NULL, &err), "x.yaml:6: l: has 2 values; a list of 3 to 4 numbers is needed");
+  n = wm_yaml_get(&root, "inf");
+  TEST_ASSERT_EQUAL(WM_OK, wm_yaml_f64(&n, 0, HUGE_VAL, &f, &err));
+  says(wm_yaml_f64(&n, 0, 10, &f, &err),
+       "x.yaml:7: inf: '.inf' is not a finite number; a number from 0 to 10 is needed");
+  n = wm_yaml_get(&root, "nan");
+  says(wm_yaml_f64(&n, -HUGE_VAL, HUGE_VAL, &f, &err),
+       "x.yaml:8: nan: '.nan' is not a finite number; a number is needed");
+  n = wm_yaml_get(&root, "yes");
+  TEST_ASSERT_EQUAL(WM_OK, wm_yaml_bool(&n, &b, &err));
+  TEST_ASSERT_EQUAL(1, b);
+  n = wm_yaml_get(&root, "huge");
+  says(wm_yaml_f64(&n, 0, HUGE_VAL, &f, &err),
+       "x.yaml:10: huge: '1e999' is out of range; a number of at least 0 is needed");
+  n = wm_yaml_get(&root, "t");
+  TEST_ASSERT_EQUAL(WM_OK, wm_yaml_i64(&n, INT64_MIN, INT64_MAX, &i, &err));
+  TEST_ASSERT_TRUE(i == INT64_C(9007199254740993));
+}
+
+static void unknown_keys(void) {
+  static const char *const kKnown[] = {"gate", "window_s", NULL};
+  wm_yaml_node root = parse("gaet: 1\n");
+  says(wm_yaml_check_keys(&root, kKnown, WM_YAML_NEAR, NULL, &err),
+       "x.yaml:1: gaet: unknown key; did you mean 'gate'?");
+  wm_yaml_free(doc);
+  root = parse("gate: 1\nx_mine: 2\nlaser: 3\nlidar: 4\n");
+  size_t unknown;
+  TEST_ASSERT_EQUAL(WM_OK, wm_yaml_check_keys(&root, kKnown, WM_YAML_NEAR, &unknown, &err));
+  TEST_ASSERT_EQUAL(2, unknown);
+  TEST_ASSERT_EQUAL_STRING("x.yaml:3: laser: unknown key, ignored\nx.yaml:4: lidar: unknown key, ignored", err.text);
+  says(wm_yaml_check_keys(&root, kKnown, WM_YAML_STRICT, &unknown, &err),
+       "x.yaml:2: x_mine: unknown key; known are: gate, window_s");
+  wm_yaml_free(doc);
+  root = parse("[1]\n");
+  says(wm_yaml_check_keys(&root, kKnown, WM_YAML_NEAR, &unknown, &err), "x.yaml:1: a list is not a map (KEY: VALUE)");
+}
+
+static void bad_documents(void) {
+  refused("a: 1\nb: 2\na: 3\n", "x.yaml:3: a: the key stands here twice (first in line 1)");
+  refused("a: [1, 2\nb: 3\n",
+          "x.yaml:2: not valid YAML: did not find expected ',' or ']', while parsing a flow sequence that begins in "
+          "line 1");
+  refused("a: 1\n\tb: 2\n",
+          "x.yaml:2: not valid YAML: found a tab character that violates indentation, while scanning a plain scalar "
+          "that begins in line 1");
+  refused("a: 1\n\n\xFF\n", "x.yaml:3: not valid YAML: invalid leading UTF-8 octet");
+  refused("a: *b\n", "x.yaml:1: an alias whose anchor (&NAME) doesn't stand before it");
+  refused("a: &b [1, *b]\n", "x.yaml:1: an alias stands inside of its own anchor: it would never end");
+  refused("a: 1\n---\nb: 2\n", "x.yaml:2: a second document (---) in the file; one is needed");
+  refused("? [1, 2]\n: 3\n", "x.yaml:1: a key must be plain text");
+  refused("&a &b c: 1\n", "x.yaml:1: not valid YAML: did not find expected key, while parsing a block mapping");
+}
+
+static void bounded(void) {
+  char text[4096] = "a: &a [x, x, x, x, x, x, x, x, x, x]\n";
+  for (char c = 'b'; c < 'j'; c++) {
+    char line[128];
+    snprintf(line, sizeof line, "%c: &%c [*%c, *%c, *%c, *%c, *%c, *%c, *%c, *%c, *%c, *%c]\n", c, c, c - 1, c - 1,
+             c - 1, c - 1, c - 1, c - 1, c - 1, c - 1, c - 1, c - 1);
+    strcat(text, line);
+  }
+  refused(text, "x.yaml:6: aliases written out make more than 1000000 values");
+  memset(text, '[', 200);
+  text[200] = '\0';
+  refused(text, "x.yaml:1: nested deeper than 64 levels");
+  wm_yaml_node root = parse("a: &a {x: 1}\nb: *a\n");
+  wm_yaml_node x = wm_yaml_get(&root, "b.x");
+  TEST_ASSERT_TRUE(wm_yaml_there(&x));
+}
+
+static void empty_documents(void) {
+  wm_yaml_node root = parse("");
+  TEST_ASSERT_FALSE(wm_yaml_there(&root) || wm_yaml_is_map(&root));
+  wm_yaml_node a = wm_yaml_get(&root, "a");
+  TEST_ASSERT_FALSE(wm_yaml_there(&a));
+  wm_yaml_free(doc);
+  root = parse("# nothing\n");
+  TEST_ASSERT_EQUAL(0, wm_yaml_count(&root));
+  double f;
+  says(wm_yaml_f64(&a, 0, 1, &f, &err), "x.yaml:1: a: nothing is not a number; a number from 0 to 1 is needed");
+}
+
+static void missing_file(void) {
+  TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_yaml_load("no/such.yaml", &doc, &err));
+  TEST_ASSERT_EQUAL_STRING("no/such.yaml: there is no such file", err.text);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(walks);
+  RUN_TEST(typed_reads);
+  RUN_TEST(unknown_keys);
+  RUN_TEST(bad_documents);
+  RUN_TEST(bounded);
+  RUN_TEST(empty_documents);
+  RUN_TEST(missing_file);
+  return UNITY_END();
+}
