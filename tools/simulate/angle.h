@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+
+namespace wm::sim {
+
+inline constexpr double kPi = 3.14159265358979323846;
+
+// To (-pi, pi].
+inline double wrap(double rad) {
+  const double turned = rad - 2 * kPi * std::floor((rad + kPi) / (2 * kPi));
+  return turned <= -kPi ? turned + 2 * kPi : turned;
+}
+
+}  // namespace wm::sim

@@ -1,0 +1,364 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulate/scenario.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <set>
+
+#include "simulate/angle.h"
+#include "waymark/yaml.h"
+
+namespace wm::sim {
+namespace {
+
+constexpr double kDeg = kPi / 180;
+constexpr double kMilli = 1e-3, kPercent = 1e-2;
+constexpr double kFar_m = 1e5;
+
+// Reads values out of maps until something is wrong; from then on does nothing and keeps the first error.
+class Reader {
+ public:
+  explicit Reader(wm_error *err) : err_(err) {}
+  wm_status status() const { return status_; }
+  bool ok() const { return status_ == WM_OK; }
+  wm_error *error() const { return err_; }
+  void take(wm_status status) {
+    if (ok()) status_ = status;
+  }
+
+  // Refuses what is not a map, and keys that are not in `known` (NULL-terminated).
+  void keys(const wm_yaml_node &map, const char *const *known) {
+    if (ok()) take(wm_yaml_check_keys(&map, known, WM_YAML_STRICT, nullptr, err_));
+  }
+  wm_yaml_node child(const wm_yaml_node &map, const char *key, bool required) {
+    wm_yaml_node node{};
+    if (!ok()) return node;
+    node = wm_yaml_get(&map, key);
+    if (required && !wm_yaml_there(&node)) fail(map, (std::string("`") + key + "` is missing here").c_str());
+    return node;
+  }
+  // out = scale * value; left alone when the key isn't there.
+  void number(const wm_yaml_node &map, const char *key, double min, double max, double scale, double &out,
+              bool required = false) {
+    const wm_yaml_node node = child(map, key, required);
+    if (!ok() || !wm_yaml_there(&node)) return;
+    double value = 0;
+    take(wm_yaml_f64(&node, min, max, &value, err_));
+    if (ok()) out = value * scale;
+  }
+  void integer(const wm_yaml_node &map, const char *key, int64_t min, int64_t max, int64_t &out,
+               bool required = false) {
+    const wm_yaml_node node = child(map, key, required);
+    if (ok() && wm_yaml_there(&node)) take(wm_yaml_i64(&node, min, max, &out, err_));
+  }
+  void text(const wm_yaml_node &map, const char *key, std::string &out, bool required = false) {
+    const wm_yaml_node node = child(map, key, required);
+    if (!ok() || !wm_yaml_there(&node)) return;
+    char buffer[512];
+    take(wm_yaml_string(&node, buffer, sizeof buffer, err_));
+    if (ok()) out = buffer;
+  }
+  size_t numbers(const wm_yaml_node &map, const char *key, size_t min_count, size_t max_count, double *out,
+                 bool required = false) {
+    const wm_yaml_node node = child(map, key, required);
+    size_t count = 0;
+    if (ok() && wm_yaml_there(&node)) take(wm_yaml_f64_list(&node, min_count, max_count, out, &count, err_));
+    return count;
+  }
+  // The items of a list.
+  size_t list(const wm_yaml_node &node) {
+    if (!ok() || !wm_yaml_there(&node)) return 0;
+    if (!wm_yaml_is_list(&node)) fail(node, "a list is wanted here");
+    return ok() ? wm_yaml_count(&node) : 0;
+  }
+  void fail(const wm_yaml_node &node, const char *what) {
+    if (ok())
+      take(wm_fail(err_, WM_BAD_CONFIG, "%s:%d: %s: %s", wm_yaml_file(&node), wm_yaml_line(&node),
+                   node.path[0] ? node.path : "scenario", what));
+  }
+
+ private:
+  wm_error *err_;
+  wm_status status_ = WM_OK;
+};
+
+void read_landmarks(Reader &r, const wm_yaml_node &world, Scenario &out) {
+  static const char *const known[] = {"landmarks", nullptr};
+  r.keys(world, known);
+  const wm_yaml_node list = r.child(world, "landmarks", false);
+  std::set<int32_t> ids;
+  for (size_t i = 0, n = r.list(list); i < n && r.ok(); i++) {
+    static const char *const known_item[] = {"id", "what", "xyz_m", nullptr};
+    const wm_yaml_node item = wm_yaml_item(&list, i);
+    r.keys(item, known_item);
+    wm_landmark landmark{};
+    landmark.yaw_rad = NAN;
+    int64_t id = 0;
+    r.integer(item, "id", 0, INT32_MAX, id, true);
+    r.numbers(item, "xyz_m", 3, 3, landmark.p_m, true);
+    landmark.id = static_cast<int32_t>(id);
+    if (r.ok() && !ids.insert(landmark.id).second)
+      r.fail(item, "this id is there already; each landmark needs its own");
+    out.landmarks.push_back(landmark);
+  }
+}
+
+void read_robot(Reader &r, const wm_yaml_node &map, Robot &out) {
+  static const char *const known[] = {"wheel_radius_m", "ticks_per_turn", "track_m",
+                                      "wheelbase_m",    "steering_table", nullptr};
+  r.keys(map, known);
+  wm_wheels &w = out.wheels;
+  w.steering_ratio = NAN;
+  w.encoder_offset_m = 0;
+  r.number(map, "wheel_radius_m", 0.01, 2, 1, w.radius_m, true);
+  r.number(map, "ticks_per_turn", 1, 1e6, 1, w.ticks_per_turn, true);
+  r.number(map, "track_m", 0.05, 5, 1, w.track_m, true);
+  r.number(map, "wheelbase_m", 0.05, 10, 1, w.wheelbase_m, true);
+
+  static const char *const known_table[] = {"actuator_mm", "road_wheel_deg", nullptr};
+  const wm_yaml_node table = r.child(map, "steering_table", false);
+  if (!r.ok() || !wm_yaml_there(&table)) return;
+  r.keys(table, known_table);
+  const size_t n = r.numbers(table, "actuator_mm", 2, WM_STEERING_TABLE_MAX, w.actuator_m, true);
+  const size_t m = r.numbers(table, "road_wheel_deg", 2, WM_STEERING_TABLE_MAX, w.road_wheel_rad, true);
+  if (r.ok() && n != m) r.fail(table, "actuator_mm and road_wheel_deg must have the same number of values");
+  for (size_t i = 0; i < n && r.ok(); i++) {
+    w.actuator_m[i] *= kMilli;
+    w.road_wheel_rad[i] *= kDeg;
+    if (i > 0 && (w.actuator_m[i] <= w.actuator_m[i - 1] || w.road_wheel_rad[i] <= w.road_wheel_rad[i - 1]))
+      r.fail(table, "both columns must rise from each value to the next");
+  }
+  w.steering_table_count = static_cast<uint32_t>(n);
+}
+
+void read_camera(Reader &r, const wm_yaml_node &map, Camera &out) {
+  static const char *const known[] = {"name",
+                                      "xyz_m",
+                                      "yaw_deg",
+                                      "field_of_view_deg",
+                                      "range_m",
+                                      "rate_hz",
+                                      "phase_ms",
+                                      "bearing_sigma_deg",
+                                      "outlier_percent",
+                                      "latency_ms",
+                                      "latency_jitter_ms",
+                                      nullptr};
+  r.keys(map, known);
+  r.text(map, "name", out.name, true);
+  r.numbers(map, "xyz_m", 3, 3, out.xyz_m, true);
+  r.number(map, "yaw_deg", -180, 180, kDeg, out.yaw_rad, true);
+  r.number(map, "field_of_view_deg", 1, 360, kDeg, out.field_of_view_rad, true);
+  r.number(map, "range_m", 0.1, kFar_m, 1, out.range_m, true);
+  r.number(map, "rate_hz", 0.1, 1000, 1, out.rate_hz, true);
+  r.number(map, "phase_ms", 0, 1e5, kMilli, out.phase_s);
+  r.number(map, "bearing_sigma_deg", 0, 45, kDeg, out.bearing_sigma_rad, true);
+  r.number(map, "outlier_percent", 0, 100, kPercent, out.outlier_fraction);
+  r.number(map, "latency_ms", 0, 1e4, kMilli, out.latency_s);
+  r.number(map, "latency_jitter_ms", 0, 1e4, kMilli, out.latency_jitter_s);
+  if (!r.ok()) return;
+  if (out.name.empty() || out.name.size() >= WM_NAME_MAX || out.name.find_first_of(", \t\n:") != std::string::npos)
+    r.fail(map, "name: 1 to 31 letters without blanks, commas or colons");
+}
+
+void read_cameras(Reader &r, const wm_yaml_node &list, Scenario &out) {
+  std::set<std::string> names;
+  for (size_t i = 0, n = r.list(list); i < n && r.ok(); i++) {
+    const wm_yaml_node item = wm_yaml_item(&list, i);
+    Camera camera;
+    read_camera(r, item, camera);
+    if (r.ok() && !names.insert(camera.name).second)
+      r.fail(item, "this name is there already; each camera needs its own");
+    out.cameras.push_back(camera);
+  }
+}
+
+void read_leg(Reader &r, const wm_yaml_node &map, Leg &out) {
+  static const char *const known[] = {"stand_s", "straight_m", "turn_deg",  "radius_m",
+                                      "ease_m",  "speed_mps",  "backwards", nullptr};
+  r.keys(map, known);
+  const wm_yaml_node stand = r.child(map, "stand_s", false), straight = r.child(map, "straight_m", false),
+                     turn = r.child(map, "turn_deg", false);
+  if (!r.ok()) return;
+  const int kinds = wm_yaml_there(&stand) + wm_yaml_there(&straight) + wm_yaml_there(&turn);
+  if (kinds != 1)
+    return r.fail(map,
+                  "a leg is one of stand_s, straight_m (with speed_mps) and turn_deg (with radius_m, "
+                  "ease_m, speed_mps)");
+  r.number(map, "stand_s", 0.01, 1e5, 1, out.stand_s);
+  if (wm_yaml_there(&stand)) return;
+  out.kind = wm_yaml_there(&straight) ? Leg::Kind::straight : Leg::Kind::turn;
+  const bool turns = out.kind == Leg::Kind::turn;
+  r.number(map, "straight_m", 0.01, kFar_m, 1, out.length_m);
+  r.number(map, "turn_deg", -3600, 3600, kDeg, out.turn_rad);
+  r.number(map, "radius_m", 0.1, kFar_m, 1, out.radius_m, turns);
+  r.number(map, "ease_m", 0, kFar_m, 1, out.ease_m, turns);
+  r.number(map, "speed_mps", 0.01, 100, 1, out.speed_mps, true);
+  const wm_yaml_node backwards = r.child(map, "backwards", false);
+  int flag = 0;
+  if (r.ok() && wm_yaml_there(&backwards)) r.take(wm_yaml_bool(&backwards, &flag, r.error()));
+  if (!r.ok()) return;
+  out.reverse = flag != 0;
+  if (turns && out.turn_rad == 0) r.fail(map, "turn_deg 0 is no turn; use straight_m");
+}
+
+void read_route(Reader &r, const wm_yaml_node &map, Route &out) {
+  static const char *const known[] = {"start", "acceleration_mps2", "laps", "legs", nullptr};
+  static const char *const known_start[] = {"x_m", "y_m", "heading_deg", nullptr};
+  r.keys(map, known);
+  const wm_yaml_node start = r.child(map, "start", true), legs = r.child(map, "legs", true);
+  r.keys(start, known_start);
+  r.number(start, "x_m", -kFar_m, kFar_m, 1, out.x_m, true);
+  r.number(start, "y_m", -kFar_m, kFar_m, 1, out.y_m, true);
+  r.number(start, "heading_deg", -360, 360, kDeg, out.heading_rad, true);
+  r.number(map, "acceleration_mps2", 0.01, 20, 1, out.acceleration_mps2);
+  int64_t laps = 1;
+  r.integer(map, "laps", 1, 1000, laps);
+  out.laps = static_cast<int>(laps);
+  for (size_t i = 0, n = r.list(legs); i < n && r.ok(); i++) {
+    Leg leg;
+    read_leg(r, wm_yaml_item(&legs, i), leg);
+    out.legs.push_back(leg);
+  }
+  if (r.ok() && out.legs.empty()) r.fail(legs, "a route needs at least one leg");
+}
+
+void read_bus(Reader &r, const wm_yaml_node &map, Bus &out) {
+  static const char *const known[] = {"wheels_hz", "yaw_rate_hz", "steering_hz", "gear_hz", "stamp_jitter_ms", nullptr};
+  if (!r.ok() || !wm_yaml_there(&map)) return;
+  r.keys(map, known);
+  r.number(map, "wheels_hz", 1, 1000, 1, out.wheels_hz);
+  r.number(map, "yaw_rate_hz", 1, 1000, 1, out.yaw_rate_hz);
+  r.number(map, "steering_hz", 1, 1000, 1, out.steering_hz);
+  r.number(map, "gear_hz", 1, 1000, 1, out.gear_hz);
+  r.number(map, "stamp_jitter_ms", 0, 100, kMilli, out.stamp_jitter_s);
+}
+
+void read_errors(Reader &r, const wm_yaml_node &map, Errors &out) {
+  static const char *const known[] = {"wheel_radius_percent",
+                                      "track_percent",
+                                      "yaw_rate_bias_mradps",
+                                      "yaw_rate_bias_walk_mradps_per_sqrt_min",
+                                      "yaw_rate_noise_mradps",
+                                      "steering_offset_deg",
+                                      "landmark_m",
+                                      "camera_yaw_deg",
+                                      "start_xy_m",
+                                      "start_heading_deg",
+                                      nullptr};
+  if (!r.ok() || !wm_yaml_there(&map)) return;
+  r.keys(map, known);
+  r.number(map, "wheel_radius_percent", 0, 20, kPercent, out.wheel_radius);
+  r.number(map, "track_percent", 0, 20, kPercent, out.track);
+  r.number(map, "yaw_rate_bias_mradps", 0, 1000, kMilli, out.yaw_rate_bias_radps);
+  r.number(map, "yaw_rate_bias_walk_mradps_per_sqrt_min", 0, 1000, kMilli / std::sqrt(60.0), out.yaw_rate_bias_walk);
+  r.number(map, "yaw_rate_noise_mradps", 0, 1000, kMilli, out.yaw_rate_noise_radps);
+  r.number(map, "steering_offset_deg", 0, 20, kDeg, out.steering_offset_rad);
+  r.number(map, "landmark_m", 0, 10, 1, out.landmark_m);
+  r.number(map, "camera_yaw_deg", 0, 45, kDeg, out.camera_yaw_rad);
+  r.number(map, "start_xy_m", 0, 10, 1, out.start_xy_m);
+  r.number(map, "start_heading_deg", 0, 180, kDeg, out.start_heading_rad);
+}
+
+void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
+  static const char *const known[] = {"can_lost_percent",
+                                      "can_duplicated_percent",
+                                      "can_reordered_percent",
+                                      "sightings_lost_percent",
+                                      "sightings_duplicated_percent",
+                                      "frames_late_percent",
+                                      "frames_late_ms",
+                                      "camera_clock_offset_ms",
+                                      "dead_encoder",
+                                      "start_offset",
+                                      nullptr};
+  static const char *const known_dead[] = {"wheel", "from_s", nullptr};
+  static const char *const known_start[] = {"x_m", "y_m", "heading_deg", nullptr};
+  static const char *const wheels[] = {"left", "right", nullptr};
+  if (!r.ok() || !wm_yaml_there(&map)) return;
+  r.keys(map, known);
+  r.number(map, "can_lost_percent", 0, 100, kPercent, out.can_lost);
+  r.number(map, "can_duplicated_percent", 0, 100, kPercent, out.can_duplicated);
+  r.number(map, "can_reordered_percent", 0, 100, kPercent, out.can_reordered);
+  r.number(map, "sightings_lost_percent", 0, 100, kPercent, out.sightings_lost);
+  r.number(map, "sightings_duplicated_percent", 0, 100, kPercent, out.sightings_duplicated);
+  r.number(map, "frames_late_percent", 0, 100, kPercent, out.frames_late);
+  r.number(map, "frames_late_ms", 0, 1e5, kMilli, out.frames_late_s);
+  r.number(map, "camera_clock_offset_ms", -1e4, 1e4, kMilli, out.camera_clock_offset_s);
+
+  const wm_yaml_node dead = r.child(map, "dead_encoder", false);
+  if (r.ok() && wm_yaml_there(&dead)) {
+    r.keys(dead, known_dead);
+    const wm_yaml_node wheel = r.child(dead, "wheel", true);
+    int32_t side = -1;
+    if (r.ok()) r.take(wm_yaml_choice(&wheel, wheels, &side, r.error()));
+    out.dead_encoder = side;
+    r.number(dead, "from_s", 0, 1e6, 1, out.dead_encoder_from_s, true);
+  }
+  const wm_yaml_node start = r.child(map, "start_offset", false);
+  if (r.ok() && wm_yaml_there(&start)) {
+    r.keys(start, known_start);
+    r.number(start, "x_m", -kFar_m, kFar_m, 1, out.start_x_m);
+    r.number(start, "y_m", -kFar_m, kFar_m, 1, out.start_y_m);
+    r.number(start, "heading_deg", -360, 360, kDeg, out.start_heading_rad);
+  }
+}
+
+void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
+  static const char *const known[] = {"format",  "name",  "about", "seed",   "clock_start_s", "world", "robot",
+                                      "cameras", "route", "bus",   "errors", "faults",        nullptr};
+  r.keys(root, known);
+  std::string format;
+  r.text(root, "format", format, true);
+  if (r.ok() && format != "waymark-scenario/1")
+    r.fail(wm_yaml_get(&root, "format"), ("is '" + format + "'; this program reads waymark-scenario/1").c_str());
+  r.text(root, "name", out.name, true);
+  r.text(root, "about", out.about);
+  int64_t seed = 1;
+  r.integer(root, "seed", 0, INT64_MAX, seed);
+  out.seed = static_cast<uint64_t>(seed);
+  r.number(root, "clock_start_s", 0, 1e9, 1, out.clock_start_s);
+  read_landmarks(r, r.child(root, "world", true), out);
+  read_robot(r, r.child(root, "robot", true), out.robot);
+  read_cameras(r, r.child(root, "cameras", false), out);
+  read_route(r, r.child(root, "route", true), out.route);
+  read_bus(r, r.child(root, "bus", false), out.bus);
+  read_errors(r, r.child(root, "errors", false), out.errors);
+  read_faults(r, r.child(root, "faults", false), out.faults);
+}
+
+wm_status read_document(wm_status loaded, wm_yaml *doc, Scenario &out, wm_error *err) {
+  if (loaded != WM_OK) return loaded;
+  out = Scenario{};
+  Reader reader(err);
+  read_scenario(reader, wm_yaml_root(doc), out);
+  wm_yaml_free(doc);
+  return reader.status();
+}
+
+}  // namespace
+
+wm_status load_scenario(const std::string &path, Scenario &out, wm_error *err) {
+  wm_yaml *doc = nullptr;
+  const wm_status loaded = wm_yaml_load(path.c_str(), &doc, err);
+  return read_document(loaded, doc, out, err);
+}
+
+wm_status parse_scenario(const std::string &text, const std::string &path, Scenario &out, wm_error *err) {
+  wm_yaml *doc = nullptr;
+  const wm_status loaded = wm_yaml_parse(text.data(), text.size(), path.c_str(), &doc, err);
+  return read_document(loaded, doc, out, err);
+}
+
+void make_perfect(Scenario &scenario) {
+  scenario.errors = Errors{};
+  scenario.faults = Faults{};
+  scenario.bus.stamp_jitter_s = 0;
+  for (Camera &camera : scenario.cameras) {
+    camera.bearing_sigma_rad = 0;
+    camera.outlier_fraction = 0;
+  }
+}
+
+}  // namespace wm::sim

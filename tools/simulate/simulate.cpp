@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulate/simulate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "math/elementary.hpp"
+#include "simulate/angle.h"
+#include "simulate/bus.h"
+#include "simulate/faults.h"
+#include "simulate/random.h"
+
+namespace wm::sim {
+namespace {
+
+constexpr double kTruth_hz = 50;
+
+wm_time_ns to_ns(double s) { return static_cast<wm_time_ns>(std::llround(s * 1e9)); }
+// candump writes microseconds.
+wm_time_ns to_us(double s) { return static_cast<wm_time_ns>(std::llround(s * 1e6)) * WM_NS_PER_US; }
+
+Drawn draw_constants(const Scenario &sc, const Random &random) {
+  Drawn d{};
+  for (uint64_t i = 0; i < 2; i++) d.wheel_radius[i] = sc.errors.wheel_radius * random.normal(Stream::wheel_radius, i);
+  d.track = sc.errors.track * random.normal(Stream::track, 0);
+  d.yaw_rate_bias_radps = sc.errors.yaw_rate_bias_radps * random.normal(Stream::yaw_rate_bias, 0);
+  d.steering_offset_rad = sc.errors.steering_offset_rad * random.normal(Stream::steering_offset, 0);
+  for (uint64_t i = 0; i < sc.cameras.size(); i++)
+    d.camera_yaw_rad.push_back(sc.errors.camera_yaw_rad * random.normal(Stream::camera_yaw, i));
+  return d;
+}
+
+// A message of the bus, sent at a fixed rate from the recording's start to its end.
+class Sender {
+ public:
+  Sender(const Scenario &sc, const Random &random, Bus_message which, Recording &out)
+      : scenario_(sc), random_(random), which_(which), message_(message(which)), out_(out) {}
+
+  // fill(k, t_s, frame) packs sample k, taken t_s after the start.
+  template <class Fill>
+  void run(double rate_hz, double phase_s, Fill fill) {
+    for (uint64_t k = 0;; k++) {
+      const double t_s = phase_s + static_cast<double>(k) / rate_hz;
+      if (t_s > out_.drive.duration_s()) return;
+      wm_can_frame frame{};
+      std::strcpy(frame.iface, "can0");
+      frame.id = message_.id;
+      frame.length = static_cast<uint8_t>(message_.length);
+      const double jitter = scenario_.bus.stamp_jitter_s *
+                            std::clamp(random_.normal(Stream::can_jitter, k, static_cast<uint64_t>(which_)), -3.0, 3.0);
+      frame.t_ns = out_.clock_start_ns + std::max<wm_time_ns>(0, to_us(t_s + jitter));
+      fill(k, t_s, frame);
+      pack_count(message_.signals[message_.counter()], static_cast<int64_t>(k), frame);
+      out_.can.push_back(frame);
+    }
+  }
+
+ private:
+  const Scenario &scenario_;
+  const Random &random_;
+  Bus_message which_;
+  const Message &message_;
+  Recording &out_;
+};
+
+// Counts of the rear wheels: what they rolled, by their own radius, over the true track. A closed form of way and
+// heading, so nothing drifts but what the errors make drift.
+void send_wheels(const Scenario &sc, const Random &random, Recording &out) {
+  const wm_wheels &w = sc.robot.wheels;
+  const double track_m = w.track_m * (1 + out.drawn.track), heading0 = out.drive.at(0).heading_rad;
+  const Message &m = message(Bus_message::wheels);
+  Sender(sc, random, Bus_message::wheels, out).run(sc.bus.wheels_hz, 0, [&](uint64_t, double t_s, wm_can_frame &frame) {
+    for (int side = 0; side < 2; side++) {
+      const bool dead = sc.faults.dead_encoder == side && t_s >= sc.faults.dead_encoder_from_s;
+      const State s = out.drive.at(dead ? sc.faults.dead_encoder_from_s : t_s);
+      const double rolled_m = s.way_m + (side == 0 ? -0.5 : 0.5) * track_m * (s.heading_rad - heading0);
+      const double turns = rolled_m / (2 * kPi * w.radius_m * (1 + out.drawn.wheel_radius[side]));
+      const double phase = random.uniform(Stream::encoder_phase, static_cast<uint64_t>(side)) * 65536;
+      pack_count(m.signals[static_cast<size_t>(side)],
+                 static_cast<int64_t>(std::floor(turns * w.ticks_per_turn + phase)), frame);
+    }
+  });
+}
+
+// A rate holds from its stamp to the next one (recording-format.md), so a sample is the mean rate of that interval.
+void send_yaw_rate(const Scenario &sc, const Random &random, Recording &out) {
+  const Message &m = message(Bus_message::yaw_rate);
+  const double step_s = 1 / sc.bus.yaw_rate_hz;
+  double walk = 0;
+  Sender(sc, random, Bus_message::yaw_rate, out)
+      .run(sc.bus.yaw_rate_hz, 0, [&](uint64_t k, double t_s, wm_can_frame &frame) {
+        const double turned = out.drive.at(t_s + step_s).heading_rad - out.drive.at(t_s).heading_rad;
+        const double noise = sc.errors.yaw_rate_noise_radps * random.normal(Stream::yaw_rate_noise, k);
+        const double rate = turned / step_s + out.drawn.yaw_rate_bias_radps + walk + noise;
+        walk += sc.errors.yaw_rate_bias_walk * std::sqrt(step_s) * random.normal(Stream::yaw_rate_walk, k);
+        pack(m.signals[0], rate * 180 / kPi, frame);
+      });
+}
+
+void send_steering(const Scenario &sc, const Random &random, Recording &out) {
+  const wm_wheels &w = sc.robot.wheels;
+  const Message &m = message(Bus_message::steering);
+  const uint32_t n = w.steering_table_count;
+  if (n < 2) return;
+  Sender(sc, random, Bus_message::steering, out)
+      .run(sc.bus.steering_hz, 0.3 / sc.bus.steering_hz, [&](uint64_t, double t_s, wm_can_frame &frame) {
+        const double angle =
+            wm::atan2(w.wheelbase_m * out.drive.at(t_s).curvature_1pm, 1.0) + out.drawn.steering_offset_rad;
+        uint32_t i = 1;
+        while (i + 1 < n && angle > w.road_wheel_rad[i]) i++;
+        const double share =
+            std::clamp((angle - w.road_wheel_rad[i - 1]) / (w.road_wheel_rad[i] - w.road_wheel_rad[i - 1]), 0.0, 1.0);
+        const double at_m = w.actuator_m[i - 1] + share * (w.actuator_m[i] - w.actuator_m[i - 1]);
+        pack(m.signals[0], 1000 * at_m, frame);
+      });
+}
+
+void send_gear(const Scenario &sc, const Random &random, Recording &out) {
+  const Message &m = message(Bus_message::gear);
+  double gear = 1;  // stays in while standing
+  Sender(sc, random, Bus_message::gear, out)
+      .run(sc.bus.gear_hz, 0.6 / sc.bus.gear_hz, [&](uint64_t, double t_s, wm_can_frame &frame) {
+        const double v = out.drive.at(t_s).speed_mps;
+        if (v != 0) gear = v > 0 ? 1 : -1;
+        pack(m.signals[0], gear, frame);
+      });
+}
+
+// One camera's sightings: true bearings from the camera's true place to the true landmarks, with noise and outliers.
+void look(const Scenario &sc, const Random &random, uint16_t sensor, Recording &out) {
+  const Camera &c = sc.cameras[sensor];
+  for (uint64_t k = 0;; k++) {
+    const double t_s = c.phase_s + static_cast<double>(k) / c.rate_hz;
+    if (t_s > out.drive.duration_s()) return;
+    const State s = out.drive.at(t_s);
+    const double cos_h = wm::cos(s.heading_rad), sin_h = wm::sin(s.heading_rad);
+    const double x = s.x_m + cos_h * c.xyz_m[0] - sin_h * c.xyz_m[1];
+    const double y = s.y_m + sin_h * c.xyz_m[0] + cos_h * c.xyz_m[1];
+    const double axis = s.heading_rad + c.yaw_rad + out.drawn.camera_yaw_rad[sensor];
+    const double latency = c.latency_s + c.latency_jitter_s * random.uniform(Stream::frame_latency, k, sensor);
+    for (size_t i = 0; i < out.landmarks.size(); i++) {
+      const double dx = out.landmarks[i].p_m[0] - x, dy = out.landmarks[i].p_m[1] - y;
+      const double bearing = wrap(wm::atan2(dy, dx) - axis);
+      if (std::fabs(bearing) > 0.5 * c.field_of_view_rad || std::sqrt(dx * dx + dy * dy) > c.range_m) continue;
+      // Draws are told apart by camera and landmark, so that a landmark more doesn't change what is seen of the others.
+      const uint64_t sub = sensor * uint64_t{4096} + static_cast<uint64_t>(i);
+      Sighting seen{};
+      seen.t_ns = out.clock_start_ns + to_ns(t_s + sc.faults.camera_clock_offset_s);
+      seen.arrival_ns = out.clock_start_ns + to_ns(t_s + latency);
+      seen.sensor = sensor;
+      seen.id = out.landmarks[i].id;
+      seen.outlier = random.uniform(Stream::bearing_outlier, k, sub) < c.outlier_fraction;
+      seen.bearing_rad = seen.outlier
+                             ? (random.uniform(Stream::bearing_outlier_value, k, sub) - 0.5) * c.field_of_view_rad
+                             : wrap(bearing + c.bearing_sigma_rad * random.normal(Stream::bearing_noise, k, sub));
+      out.sightings.push_back(seen);
+    }
+  }
+}
+
+void make_map(const Scenario &sc, const Random &random, size_t landmarks, Recording &out) {
+  const size_t count = std::min(landmarks, sc.landmarks.size());
+  out.landmarks.assign(sc.landmarks.begin(), sc.landmarks.begin() + static_cast<std::ptrdiff_t>(count));
+  out.map = out.landmarks;
+  for (uint64_t i = 0; i < count; i++) {
+    out.landmarks[i].sigma_m = 0;
+    out.map[i].sigma_m = sc.errors.landmark_m;
+    for (uint64_t axis = 0; axis < 2; axis++)
+      out.map[i].p_m[axis] += sc.errors.landmark_m * random.normal(Stream::landmark_map, i, axis);
+  }
+}
+
+void make_sensors(const Scenario &sc, Recording &out) {
+  for (const Camera &c : sc.cameras) {
+    wm_sensor sensor{};
+    std::snprintf(sensor.name, sizeof sensor.name, "%s", c.name.c_str());
+    std::copy(c.xyz_m, c.xyz_m + 3, sensor.mounting.xyz_m);
+    sensor.mounting.rpy_rad[2] = c.yaw_rad;
+    sensor.bearing_sigma_rad = c.bearing_sigma_rad;
+    sensor.range_sigma_m = NAN;
+    sensor.max_range_m = INFINITY;
+    out.sensors.push_back(sensor);
+  }
+}
+
+void make_start(const Scenario &sc, const Random &random, Recording &out) {
+  const State s = out.drive.at(0);
+  const Errors &e = sc.errors;
+  const auto draw = [&](uint64_t i) { return random.normal(Stream::start_pose, i); };
+  out.start.t_ns = WM_TIME_NONE;
+  out.start.p_m[0] = s.x_m + e.start_xy_m * draw(0) + sc.faults.start_x_m;
+  out.start.p_m[1] = s.y_m + e.start_xy_m * draw(1) + sc.faults.start_y_m;
+  out.start.p_m[2] = 0;
+  out.start.heading_rad = wrap(s.heading_rad + e.start_heading_rad * draw(2) + sc.faults.start_heading_rad);
+  for (double &q : out.start.q_xyzw) q = NAN;
+  // A perfect start is stated as a very good one: a sigma of zero is no sigma.
+  out.start.sigma_xy_m = std::max(e.start_xy_m, 1e-3);
+  out.start.sigma_heading_rad = std::max(e.start_heading_rad, 1e-4);
+}
+
+}  // namespace
+
+wm_status simulate(const Scenario &sc, uint64_t seed, size_t landmarks, Recording &out, wm_error *err) {
+  out = Recording{};
+  out.seed = seed;
+  out.clock_start_ns = to_us(sc.clock_start_s);
+  if (const wm_status status = Drive::plan(sc.route, out.drive, err); status != WM_OK) return status;
+  const Random random(seed);
+  out.drawn = draw_constants(sc, random);
+  make_map(sc, random, landmarks, out);
+  make_sensors(sc, out);
+  make_start(sc, random, out);
+
+  send_wheels(sc, random, out);
+  send_yaw_rate(sc, random, out);
+  send_steering(sc, random, out);
+  send_gear(sc, random, out);
+  std::stable_sort(out.can.begin(), out.can.end(),
+                   [](const wm_can_frame &a, const wm_can_frame &b) { return a.t_ns < b.t_ns; });
+  for (size_t i = 0; i < sc.cameras.size(); i++) look(sc, random, static_cast<uint16_t>(i), out);
+  apply_faults(sc, random, out);
+  std::stable_sort(out.sightings.begin(), out.sightings.end(),
+                   [](const Sighting &a, const Sighting &b) { return a.arrival_ns < b.arrival_ns; });
+
+  for (uint64_t k = 0; static_cast<double>(k) / kTruth_hz <= out.drive.duration_s(); k++) {
+    const double t_s = static_cast<double>(k) / kTruth_hz;
+    out.truth.push_back({out.clock_start_ns + to_ns(t_s), out.drive.at(t_s)});
+  }
+  return WM_OK;
+}
+
+}  // namespace wm::sim
