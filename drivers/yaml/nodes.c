@@ -187,6 +187,8 @@ wm_status wm_yaml_choice(const wm_yaml_node *node, const char *const *names, int
     return WM_OK;
   }
   list_of(names, all, sizeof all);
+  if (!wm_yaml_there(node) || at(node)->kind == YAML_KIND_NULL)
+    return wm_yaml_fail(node, err, "is missing; one of these is needed: %s", all);
   const char *nearest = wm_word_nearest(text, names);
   if (nearest)
     return wm_yaml_fail(node, err, "%s is unknown; did you mean '%s'? (one of: %s)", what_is(node, is), nearest, all);

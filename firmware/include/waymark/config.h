@@ -23,6 +23,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #include "waymark/estimator.h"
 #include "waymark/recording.h"
@@ -82,6 +83,8 @@ wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_
 void wm_config_free(wm_config *config);
 // The settings of the source `name` ("sightings:laser" takes those of "sightings"), and its rank in the config's order.
 void wm_config_source(const wm_config *config, const char *name, wm_source_config *out, int *rank);
+// Every key with its range, default, unit and meaning as markdown, from the tables that read them.
+void wm_config_reference(FILE *to);
 
 #ifdef __cplusplus
 }

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/config.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "keys.h"
+#include "sources.h"
+#include "waymark/text.h"
+#include "waymark/yaml.h"
+
+#define CONFIG_BYTES_MAX (1u << 20)
+
+static wm_status check_format(const wm_yaml_node *root, wm_error *err) {
+  char format[64];
+  wm_yaml_node node = wm_yaml_get(root, "format");
+  if (!wm_yaml_there(&node)) return wm_yaml_fail(root, err, "format: is missing; 'format: waymark-config/1' is needed");
+  wm_status status = wm_yaml_string(&node, format, sizeof format, err);
+  if (status == WM_OK && strcmp(format, "waymark-config/1") != 0)
+    return wm_yaml_fail(&node, err, "'%s' is not a format that this program reads; it reads waymark-config/1", format);
+  return status;
+}
+
+static wm_status read_estimator(const wm_yaml_node *root, wm_config *out, wm_error *err) {
+  const char *names[CONFIG_SECTIONS_MAX + 1] = {NULL};
+  size_t count;
+  const wm_estimator *const *all = wm_estimators(&count);
+  for (size_t i = 0; i < count && i < CONFIG_SECTIONS_MAX; i++) names[i] = all[i]->name;
+  wm_yaml_node node = wm_yaml_get(root, "estimator");
+  int32_t chosen;
+  wm_status status = wm_yaml_choice(&node, names, &chosen, err);
+  if (status == WM_OK) out->estimator = all[chosen];
+  return status;
+}
+
+// A section of an estimator that isn't chosen is checked, too: it will be chosen one day.
+static wm_status check_other_estimator(const wm_yaml_node *section, const wm_param_table *table, wm_error *err) {
+  void *scratch = malloc(table->bytes + 1);
+  if (!scratch) return wm_fail(err, WM_IO, "%s: no memory to read it", wm_yaml_file(section));
+  wm_params_defaults(table, scratch);
+  wm_status status = config_fill(section, table, "", scratch, err);
+  free(scratch);
+  return status;
+}
+
+static wm_status read_sections(const wm_yaml_node *root, wm_config *out, wm_error *err) {
+  for (size_t i = 0; i < wm_yaml_count(root); i++) {
+    const char *key;
+    int line;
+    wm_yaml_node value = wm_yaml_value(root, i, &key, &line);
+    const wm_estimator *estimator = wm_estimator_find(key);
+    wm_status status = WM_OK;
+    if (estimator == out->estimator && estimator)
+      status = config_fill(&value, &estimator->params, "", out->estimator_params, err);
+    else if (estimator)
+      status = check_other_estimator(&value, &estimator->params, err);
+    else if (strcmp(key, "motion") == 0)
+      status = config_fill(&value, &wm_motion_params_table, "", out->motion, err);
+    if (status != WM_OK) return status;
+  }
+  return WM_OK;
+}
+
+// All keys at the top: sections of estimators and of motion are looked at by read_sections.
+static wm_status check_top(const wm_yaml_node *root, wm_config *out, wm_error *err) {
+  static const char *const kGroups[] = {"merge", "publish", "realtime", NULL};
+  for (size_t i = 0; i < wm_yaml_count(root); i++) {
+    const char *key;
+    int line, known = 0;
+    wm_yaml_node value = wm_yaml_value(root, i, &key, &line);
+    for (size_t k = 0; kConfigKeys[k].key; k++) known |= strcmp(kConfigKeys[k].key, key) == 0;
+    if (known || strcmp(key, "motion") == 0 || wm_estimator_find(key)) continue;
+    for (size_t g = 0; kGroups[g]; g++) {
+      if (strcmp(kGroups[g], key) != 0) continue;
+      char prefix[16];
+      snprintf(prefix, sizeof prefix, "%s.", key);
+      wm_status status = config_fill(&value, &wm_runtime_params_table, prefix, &out->runtime, err);
+      if (status != WM_OK) return status;
+      known = 1;
+    }
+    if (!known) return config_unknown(&value, line, err);
+  }
+  return WM_OK;
+}
+
+// A file that the configuration names, relative to the configuration's folder.
+static wm_status read_file_name(const wm_yaml_node *root, const char *key, const char *config_path,
+                                char out[WM_PATH_MAX], wm_error *err) {
+  char name[WM_PATH_MAX];
+  wm_yaml_node node = wm_yaml_get(root, key);
+  if (!wm_yaml_there(&node)) return WM_OK;
+  wm_status status = wm_yaml_string(&node, name, sizeof name, err);
+  if (status != WM_OK) return status;
+  const char *slash = strrchr(config_path, '/');
+  int folder = name[0] == '/' || !slash ? 0 : (int)(slash - config_path) + 1;
+  if (snprintf(out, WM_PATH_MAX, "%.*s%s", folder, config_path, name) >= WM_PATH_MAX)
+    return wm_yaml_fail(&node, err, "the path is longer than %d bytes", WM_PATH_MAX - 1);
+  if (access(out, R_OK) != 0) return wm_yaml_fail(&node, err, "'%s' cannot be read (looked for %s)", name, out);
+  return WM_OK;
+}
+
+static wm_status read_files(const wm_yaml_node *root, wm_config *out, wm_error *err) {
+  wm_status status = read_file_name(root, "calibration", out->path, out->overrides.calibration, err);
+  if (status == WM_OK) status = read_file_name(root, "landmarks", out->path, out->overrides.landmarks, err);
+  if (status == WM_OK) status = read_file_name(root, "dbc", out->path, out->overrides.dbc, err);
+  if (status == WM_OK) status = read_file_name(root, "can_signals", out->path, out->overrides.can_signals, err);
+  return status;
+}
+
+static wm_status read_start(const wm_yaml_node *root, wm_config *out, wm_error *err) {
+  wm_start_init(&out->initial_pose);
+  wm_yaml_node pose = wm_yaml_get(root, "initial_pose");
+  if (!wm_yaml_there(&pose)) return WM_OK;
+  out->has_initial_pose = 1;
+  wm_status status = wm_yaml_check_keys(&pose, wm_start_keys, WM_YAML_STRICT, NULL, err);
+  return status == WM_OK ? wm_start_read(&pose, &out->initial_pose, err) : status;
+}
+
+static wm_status read_texts(const wm_yaml_node *root, wm_config *out, wm_error *err) {
+  snprintf(out->channel_prefix, sizeof out->channel_prefix, "WAYMARK_");
+  wm_yaml_node url = wm_yaml_get(root, "publish.lcm_url"), prefix = wm_yaml_get(root, "publish.channel_prefix");
+  wm_status status = WM_OK;
+  if (wm_yaml_there(&url)) status = wm_yaml_string(&url, out->lcm_url, sizeof out->lcm_url, err);
+  if (status == WM_OK && wm_yaml_there(&prefix))
+    status = wm_yaml_string(&prefix, out->channel_prefix, sizeof out->channel_prefix, err);
+  return status;
+}
+
+static wm_status allocate(wm_config *out, wm_error *err) {
+  const wm_param_table *table = &out->estimator->params;
+  out->estimator_params = calloc(1, table->bytes + 1);
+  out->motion = calloc(1, wm_motion_params_table.bytes + 1);
+  if (!out->estimator_params || !out->motion) return wm_fail(err, WM_IO, "%s: no memory to read it", out->path);
+  wm_params_defaults(table, out->estimator_params);
+  wm_params_defaults(&wm_motion_params_table, out->motion);
+  return WM_OK;
+}
+
+static wm_status read_all(const wm_yaml_node *root, wm_config *out, wm_error *err) {
+  if (!wm_yaml_is_map(root))
+    return wm_yaml_fail(root, err, "a map that begins with 'format: waymark-config/1' is needed");
+  wm_params_defaults(&wm_runtime_params_table, &out->runtime);
+  wm_status status = check_format(root, err);
+  if (status == WM_OK) status = check_top(root, out, err);
+  if (status == WM_OK) status = read_estimator(root, out, err);
+  if (status == WM_OK) status = allocate(out, err);
+  if (status == WM_OK) status = read_sections(root, out, err);
+  if (status == WM_OK) status = config_read_sources(root, out, err);
+  if (status == WM_OK) status = read_files(root, out, err);
+  if (status == WM_OK) status = read_texts(root, out, err);
+  return status == WM_OK ? read_start(root, out, err) : status;
+}
+
+wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_config *out, wm_error *err) {
+  memset(out, 0, sizeof *out);
+  snprintf(out->path, sizeof out->path, "%s", path);
+  wm_yaml *doc;
+  wm_status status = wm_yaml_parse(text, length, path, &doc, err);
+  if (status != WM_OK) return status;
+  wm_yaml_node root = wm_yaml_root(doc);
+  status = read_all(&root, out, err);
+  wm_yaml_free(doc);
+  if (status == WM_OK) {
+    out->text = malloc(length + 1);
+    if (!out->text) status = wm_fail(err, WM_IO, "%s: no memory to keep it", path);
+  }
+  if (status != WM_OK) {
+    wm_config_free(out);
+    return status;
+  }
+  memcpy(out->text, text, length);
+  out->text[length] = '\0';
+  out->text_length = length;
+  return WM_OK;
+}
+
+wm_status wm_config_load(const char *path, wm_config *out, wm_error *err) {
+  char *text;
+  size_t length;
+  memset(out, 0, sizeof *out);
+  wm_status status = wm_text_read_file(path, CONFIG_BYTES_MAX, &text, &length, err);
+  if (status != WM_OK) return status;
+  status = wm_config_parse(text, length, path, out, err);
+  free(text);
+  return status;
+}
+
+void wm_config_free(wm_config *config) {
+  free(config->text);
+  free(config->estimator_params);
+  free(config->motion);
+  config->text = NULL;
+  config->estimator_params = NULL;
+  config->motion = NULL;
+}

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "keys.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "waymark/text.h"
+
+const config_key kConfigKeys[] = {
+    {"format", "text", "needed", "`waymark-config/1`."},
+    {"estimator", "text", "needed", "Name of the estimator; its parameters stand under the key of its name."},
+    {"sources", "list", "none", "Settings of sources, in the order that holds at equal stamps. See below."},
+    {"calibration", "file", "the recording's", "calibration.yaml to take instead of the recording's."},
+    {"landmarks", "file", "the recording's", "landmarks.csv to take instead of the recording's."},
+    {"dbc", "file", "the recording's", "DBC file to take instead of the recording's vehicle.dbc."},
+    {"can_signals", "file", "the recording's", "can-signals.yaml to take instead of the recording's."},
+    {"initial_pose", "map", "the recording's",
+     "Start pose: `t_ns`, `x_m`, `y_m`, `z_m`, `heading_rad` or `heading_deg`, `qx`, `qy`, `qz`, `qw`, `sigma_xy_m`, "
+     "`sigma_heading_rad` or `sigma_heading_deg`; what is absent is unknown."},
+    {"publish.lcm_url", "text", "LCM's own", "LCM provider, e.g. `udpm://239.255.76.67:7667?ttl=0`."},
+    {"publish.channel_prefix", "text", "WAYMARK_", "What each channel's name begins with."},
+    {NULL, NULL, NULL, NULL},
+};
+
+const config_key kConfigSourceKeys[] = {
+    {"name", "text", "needed",
+     "`can`, `motion`, `motion6`, `sightings`, `markers`, `stereo`, `points` or `gnss`; `sightings:SENSOR` for one "
+     "sensor."},
+    {"use", "true or false", "true", "false: the source is not opened."},
+    {"lateness_max_ms", "number from 0 to merge.horizon_ms", "merge.lateness_max_ms",
+     "ms. A datum that arrives later than this after its stamp is late, and dropped."},
+    {"period_ms", "number from 0 to 60000", "0",
+     "ms. Above 0: after a datum the source promises silence for so long, and the merge need not wait for it."},
+    {"from_s", "number", "the beginning", "s from the run's first stamp. Earlier data are not taken."},
+    {"until_s", "number", "the end", "s from the run's first stamp. Later data are not taken."},
+    {NULL, NULL, NULL, NULL},
+};
+
+size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]) {
+  out[0] = (config_section){"runtime", "", &wm_runtime_params_table};
+  out[1] = (config_section){"motion", "motion.", &wm_motion_params_table};
+  size_t count = 2, estimators;
+  const wm_estimator *const *all = wm_estimators(&estimators);
+  for (size_t i = 0; i < estimators && count < CONFIG_SECTIONS_MAX; i++, count++) {
+    out[count] = (config_section){all[i]->name, "", &all[i]->params};
+    snprintf(out[count].prefix, sizeof out[count].prefix, "%s.", all[i]->name);
+  }
+  return count;
+}
+
+// Finds the known key that a wrong one most likely means: alike as a whole, else by its last part alone, which also
+// finds a key that stands in the wrong section.
+typedef struct search {
+  const char *wrong;
+  int best;  // lower is nearer
+  char found[96];
+} search;
+
+static const char *last_part(const char *key) {
+  const char *dot = strrchr(key, '.');
+  return dot ? dot + 1 : key;
+}
+
+static int same_section(const char *a, const char *b) {
+  size_t n = strcspn(a, ".");
+  return n == strcspn(b, ".") && strncmp(a, b, n) == 0;
+}
+
+static void consider(search *self, const char *prefix, const char *key) {
+  char full[96];
+  snprintf(full, sizeof full, "%s%s", prefix, key);
+  const char *const known[] = {full, NULL}, *const last[] = {last_part(full), NULL};
+  int score = 100;
+  if (wm_word_nearest(self->wrong, known))
+    score = wm_word_distance(self->wrong, full);
+  else if (strcmp(last_part(self->wrong), last[0]) == 0 || wm_word_nearest(last_part(self->wrong), last))
+    score = 10 + 2 * wm_word_distance(last_part(self->wrong), last[0]) + !same_section(self->wrong, full);
+  if (score >= self->best) return;
+  self->best = score;
+  snprintf(self->found, sizeof self->found, "%s", full);
+}
+
+wm_status config_unknown(const wm_yaml_node *value, int line, wm_error *err) {
+  config_section sections[CONFIG_SECTIONS_MAX];
+  search nearest = {.wrong = value->path, .best = 100};
+  size_t count = config_sections(sections);
+  for (size_t s = 0; s < count; s++) {
+    if (sections[s].prefix[0]) consider(&nearest, "", sections[s].name);
+    for (size_t i = 0; i < sections[s].table->count; i++)
+      consider(&nearest, sections[s].prefix, sections[s].table->params[i].key);
+  }
+  static const char *const kGroups[] = {"merge", "publish", "realtime", NULL};
+  for (size_t i = 0; kGroups[i]; i++) consider(&nearest, "", kGroups[i]);
+  for (size_t i = 0; kConfigKeys[i].key; i++) consider(&nearest, "", kConfigKeys[i].key);
+  if (nearest.best < 100)
+    return wm_fail(err, WM_BAD_CONFIG, "%s:%d: %s: unknown key; did you mean '%s'?", wm_yaml_file(value), line,
+                   value->path, nearest.found);
+  return wm_fail(err, WM_BAD_CONFIG, "%s:%d: %s: unknown key; docs/config.md lists those that there are",
+                 wm_yaml_file(value), line, value->path);
+}
+
+static const wm_param *find(const wm_param_table *table, const char *key) {
+  for (size_t i = 0; i < table->count; i++)
+    if (strcmp(table->params[i].key, key) == 0) return &table->params[i];
+  return NULL;
+}
+
+static int is_group(const wm_param_table *table, const char *key) {
+  size_t n = strlen(key);
+  for (size_t i = 0; i < table->count; i++)
+    if (strncmp(table->params[i].key, key, n) == 0 && table->params[i].key[n] == '.') return 1;
+  return 0;
+}
+
+static int is_other_key(const char *path) {
+  for (size_t i = 0; kConfigKeys[i].key; i++)
+    if (strcmp(kConfigKeys[i].key, path) == 0) return 1;
+  return 0;
+}
+
+static wm_status read_param(const wm_yaml_node *node, const wm_param *param, void *out, wm_error *err) {
+  void *field = (char *)out + param->offset;
+  double number;
+  int64_t whole = 0;
+  int32_t choice = 0;
+  int yes = 0;
+  wm_status status = WM_OK;
+  switch (param->type) {
+    case WM_PARAM_F64:
+      status = wm_yaml_f64(node, param->min, param->max, &number, err);
+      if (status == WM_OK) memcpy(field, &number, sizeof number);
+      return status;
+    case WM_PARAM_I32:
+      status = wm_yaml_i64(node, (int64_t)param->min, (int64_t)param->max, &whole, err);
+      choice = (int32_t)whole;
+      break;
+    case WM_PARAM_BOOL:
+      status = wm_yaml_bool(node, &yes, err);
+      choice = yes;
+      break;
+    case WM_PARAM_ENUM: status = wm_yaml_choice(node, param->names, &choice, err); break;
+  }
+  if (status == WM_OK) memcpy(field, &choice, sizeof choice);
+  return status;
+}
+
+wm_status config_fill(const wm_yaml_node *map, const wm_param_table *table, const char *prefix, void *out,
+                      wm_error *err) {
+  if (!wm_yaml_is_map(map) && wm_yaml_there(map))
+    return wm_yaml_fail(map, err, "a map of parameters (KEY: VALUE) is needed");
+  for (size_t i = 0; i < wm_yaml_count(map); i++) {
+    const char *name;
+    int line;
+    char key[128];
+    wm_yaml_node value = wm_yaml_value(map, i, &name, &line);
+    snprintf(key, sizeof key, "%s%s", prefix, name);
+    const wm_param *param = find(table, key);
+    wm_status status = WM_OK;
+    if (param) {
+      status = read_param(&value, param, out, err);
+    } else if (is_group(table, key)) {
+      snprintf(key, sizeof key, "%s%s.", prefix, name);
+      if (wm_yaml_is_map(&value) || wm_yaml_is_list(&value) || wm_yaml_is_scalar(&value))
+        status = config_fill(&value, table, key, out, err);
+    } else if (!is_other_key(value.path)) {
+      status = config_unknown(&value, line, err);
+    }
+    if (status != WM_OK) return status;
+  }
+  return WM_OK;
+}

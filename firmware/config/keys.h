@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// The keys that a configuration may have, and the reading of a section by its table.
+#ifndef WM_CONFIG_KEYS_H
+#define WM_CONFIG_KEYS_H
+
+#include "waymark/config.h"
+#include "waymark/yaml.h"
+
+// A key of a configuration that no table has.
+typedef struct config_key {
+  const char *key;      // dotted, from the top
+  const char *type;     // "text", "list", "map", "file"
+  const char *initial;  // for the reference
+  const char *about;
+} config_key;
+
+// Ends with a NULL key.
+extern const config_key kConfigKeys[];
+extern const config_key kConfigSourceKeys[];
+
+// A table and where it stands in the file: `prefix` is "" for the runtime's, else "motion." or "ESTIMATOR.".
+typedef struct config_section {
+  const char *name;
+  char prefix[WM_NAME_MAX + 2];
+  const wm_param_table *table;
+} config_section;
+
+#define CONFIG_SECTIONS_MAX 32
+// All tables: the runtime's, motion's, each registered estimator's. Returns how many there are.
+size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]);
+
+// "FILE:LINE: KEY: unknown key" with the known key that was most likely meant. WM_BAD_CONFIG.
+wm_status config_unknown(const wm_yaml_node *value, int line, wm_error *err);
+
+// Reads `map`, which stands at `prefix` of the table, into `out` (which has its defaults). Every key must be the
+// table's or one of kConfigKeys, which are left alone.
+wm_status config_fill(const wm_yaml_node *map, const wm_param_table *table, const char *prefix, void *out,
+                      wm_error *err);
+
+#endif

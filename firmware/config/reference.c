@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// Prints what a configuration may hold, from the tables that read it.
+#include <float.h>
+#include <math.h>
+
+#include "keys.h"
+
+static void print_type(FILE *to, const wm_param *p) {
+  switch (p->type) {
+    case WM_PARAM_F64:
+      if (p->min == DBL_MIN)
+        fprintf(to, "number above 0%s", isfinite(p->max) ? "" : " |");
+      else
+        fprintf(to, isfinite(p->max) ? "number from %.10g" : "number of at least %.10g |", p->min);
+      if (isfinite(p->max)) fprintf(to, " to %.10g |", p->max);
+      break;
+    case WM_PARAM_I32: fprintf(to, "whole number from %.0f to %.0f |", p->min, p->max); break;
+    case WM_PARAM_BOOL: fprintf(to, "true or false |"); break;
+    case WM_PARAM_ENUM:
+      for (size_t i = 0; p->names[i]; i++) fprintf(to, "%s`%s`", i ? ", " : "", p->names[i]);
+      fprintf(to, " |");
+      break;
+  }
+}
+
+static void print_initial(FILE *to, const wm_param *p) {
+  if (p->type == WM_PARAM_ENUM)
+    fprintf(to, " %s |", p->names[(int)p->initial]);
+  else if (p->type == WM_PARAM_BOOL)
+    fprintf(to, " %s |", p->initial != 0.0 ? "true" : "false");
+  else
+    fprintf(to, " %.10g |", p->initial);
+}
+
+static void print_keys(FILE *to, const config_key *keys) {
+  fprintf(to, "| key | value | default | meaning |\n| --- | --- | --- | --- |\n");
+  for (; keys->key; keys++) fprintf(to, "| `%s` | %s | %s | %s |\n", keys->key, keys->type, keys->initial, keys->about);
+}
+
+static void print_table(FILE *to, const config_section *section) {
+  fprintf(to, "| key | value | default | meaning |\n| --- | --- | --- | --- |\n");
+  for (size_t i = 0; i < section->table->count; i++) {
+    const wm_param *p = &section->table->params[i];
+    fprintf(to, "| `%s%s` | ", section->prefix, p->key);
+    print_type(to, p);
+    print_initial(to, p);
+    fprintf(to, " %s |\n", p->about);
+  }
+}
+
+void wm_config_reference(FILE *to) {
+  config_section sections[CONFIG_SECTIONS_MAX];
+  size_t count = config_sections(sections);
+  fprintf(to, "## At the top\n\n");
+  print_keys(to, kConfigKeys);
+  fprintf(to, "\n## Each entry of `sources`\n\n");
+  print_keys(to, kConfigSourceKeys);
+  fprintf(to, "\n## `merge`, `publish`, `realtime`\n\n");
+  print_table(to, &sections[0]);
+  fprintf(to, "\n## `motion`\n\n");
+  print_table(to, &sections[1]);
+  for (size_t i = 2; i < count; i++) {
+    fprintf(to, "\n## `%s`\n\n%s\n\n", sections[i].name, wm_estimator_find(sections[i].name)->about);
+    print_table(to, &sections[i]);
+  }
+}

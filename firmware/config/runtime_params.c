@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <stddef.h>
+
+#include "waymark/config.h"
+
+#define F64(key, field, initial, min, max, about) \
+  { key, WM_PARAM_F64, offsetof(wm_runtime_params, field), initial, min, max, NULL, about }
+#define I32(key, field, initial, min, max, about) \
+  { key, WM_PARAM_I32, offsetof(wm_runtime_params, field), initial, min, max, NULL, about }
+#define BOOL(key, field, initial, about) \
+  { key, WM_PARAM_BOOL, offsetof(wm_runtime_params, field), initial, 0, 1, NULL, about }
+
+static const wm_param kParams[] = {
+    F64("merge.horizon_ms", merge_horizon_ms, 300, 1, 60000,
+        "ms. Largest lateness_max_ms that a source may have, and how far in the future a stamp may lie. The fused time "
+        "is never older than this, so it bounds what the published pose owes to odometry."),
+    F64("merge.lateness_max_ms", merge_lateness_max_ms, 150, 0, 60000,
+        "ms. Default of the sources: a datum that reaches this computer later than this after its stamp is late, and "
+        "dropped. A camera's exposure, transfer and detection take 50 to 150 ms."),
+    I32("merge.queue_events", merge_queue_events, 4096, 16, 1048576,
+        "Events that may wait to be in order. 300 ms of a busy CAN bus (2000 frames/s) and cameras are under 1000."),
+    F64("publish.rate_hz", publish_rate_hz, 50, 0.1, 1000,
+        "Hz. How often the pose is sent, carried on to the moment of sending. Controllers of slow robots run at 20 to "
+        "50."),
+    F64("publish.jump_m", publish_jump_m, 0.1, 0, 1000,
+        "m. A correction that moves the map pose against odom by more than this is announced as a jump."),
+    F64("publish.jump_deg", publish_jump_deg, 2.0, 0, 360, "degrees. As jump_m, for the heading."),
+    F64("publish.motion_stale_ms", publish_motion_stale_ms, 200, 1, 60000,
+        "ms. Motion older than this sets the flag that the pose is carried on by old speeds. Wheel encoders speak "
+        "every "
+        "10 to 50 ms."),
+    BOOL("publish.lcm", publish_lcm, 1,
+         "Whether poses are sent over LCM. Without a network the run goes on all the same."),
+    I32("realtime.loop_hz", realtime_loop_hz, 200, 1, 10000,
+        "Hz. How often the estimator's thread wakes. At 200 a datum waits 5 ms at most."),
+    I32("realtime.priority", realtime_priority, 80, 0, 98,
+        "SCHED_FIFO priority of the estimator's thread; 0 is a normal thread. 80 is above the kernel's threaded "
+        "interrupts (50); 99 is the kernel's own."),
+    I32("realtime.cpu", realtime_cpu, -1, -1, 1023, "The CPU that the estimator's thread is bound to; -1 is any."),
+    BOOL("realtime.lock_memory", realtime_lock_memory, 1,
+         "Whether memory is locked (mlockall), so that no page fault stops the estimator's thread."),
+    I32("realtime.ring_events", realtime_ring_events, 1024, 16, 1048576,
+        "Slots of the ring between a source's thread and the estimator's. 1024 is half a second of a busy CAN bus."),
+};
+
+const wm_param_table wm_runtime_params_table = {kParams, sizeof kParams / sizeof *kParams, sizeof(wm_runtime_params)};

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+// `sources:` of a configuration.
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "sources.h"
+#include "waymark/text.h"
+
+static const char *const kNames[] = {"can",    "motion", "motion6", "sightings", "markers",
+                                     "stereo", "points", "gnss",    NULL};
+
+static wm_source_config defaults(const wm_config *config) {
+  return (wm_source_config){
+      .use = 1, .lateness_max_ms = config->runtime.merge_lateness_max_ms, .from_s = -HUGE_VAL, .until_s = HUGE_VAL};
+}
+
+static wm_status read_name(const wm_yaml_node *item, const wm_config *config, wm_source_config *out, wm_error *err) {
+  char base[WM_SOURCE_NAME_MAX];
+  int32_t kind;
+  wm_yaml_node name = wm_yaml_get(item, "name");
+  if (!wm_yaml_there(&name)) return wm_yaml_fail(item, err, "name: is missing");
+  wm_status status = wm_yaml_string(&name, out->name, sizeof out->name, err);
+  if (status != WM_OK) return status;
+  snprintf(base, sizeof base, "%.*s", (int)strcspn(out->name, ":"), out->name);
+  // With a sensor's name behind the colon the part before it is judged, but the whole is shown.
+  if (strcmp(base, out->name) == 0) {
+    status = wm_yaml_choice(&name, kNames, &kind, err);
+    if (status != WM_OK) return status;
+  } else if (strcmp(base, "sightings") != 0 && strcmp(base, "markers") != 0) {
+    return wm_yaml_fail(&name, err, "'%s' has a sensor's name; only sightings:SENSOR and markers:SENSOR are possible",
+                        out->name);
+  }
+  for (size_t i = 0; i < config->source_count; i++)
+    if (strcmp(config->sources[i].name, out->name) == 0)
+      return wm_yaml_fail(&name, err, "'%s' stands there twice (first in line %d)", out->name, config->sources[i].line);
+  return WM_OK;
+}
+
+static wm_status number(const wm_yaml_node *item, const char *key, double min, double max, double *out, wm_error *err) {
+  wm_yaml_node node = wm_yaml_get(item, key);
+  return wm_yaml_there(&node) ? wm_yaml_f64(&node, min, max, out, err) : WM_OK;
+}
+
+static wm_status check_lateness(const wm_yaml_node *node, double lateness_ms, double horizon_ms, wm_error *err) {
+  if (lateness_ms <= horizon_ms) return WM_OK;
+  return wm_yaml_fail(
+      node, err, "%.10g is above merge.horizon_ms (%.10g); at most %.10g is possible, or set merge.horizon_ms to %.10g",
+      lateness_ms, horizon_ms, horizon_ms, lateness_ms);
+}
+
+static wm_status read_source(const wm_yaml_node *item, const wm_config *config, wm_source_config *out, wm_error *err) {
+  static const char *const kKeys[] = {"name", "use", "lateness_max_ms", "period_ms", "from_s", "until_s", NULL};
+  *out = defaults(config);
+  out->line = wm_yaml_line(item);
+  if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {name: NAME, ...} is needed");
+  wm_status status = wm_yaml_check_keys(item, kKeys, WM_YAML_STRICT, NULL, err);
+  if (status == WM_OK) status = read_name(item, config, out, err);
+  wm_yaml_node use = wm_yaml_get(item, "use"), lateness = wm_yaml_get(item, "lateness_max_ms"),
+               until = wm_yaml_get(item, "until_s");
+  int yes = 1;
+  if (status == WM_OK && wm_yaml_there(&use)) status = wm_yaml_bool(&use, &yes, err);
+  out->use = yes;
+  if (status == WM_OK) status = number(item, "lateness_max_ms", 0, 60000, &out->lateness_max_ms, err);
+  if (status == WM_OK && wm_yaml_there(&lateness))
+    status = check_lateness(&lateness, out->lateness_max_ms, config->runtime.merge_horizon_ms, err);
+  if (status == WM_OK) status = number(item, "period_ms", 0, 60000, &out->period_ms, err);
+  if (status == WM_OK) status = number(item, "from_s", -HUGE_VAL, 1e9, &out->from_s, err);
+  if (status == WM_OK) status = number(item, "until_s", -1e9, HUGE_VAL, &out->until_s, err);
+  if (status == WM_OK && out->until_s <= out->from_s)
+    return wm_yaml_fail(&until, err, "%.10g is not after from_s (%.10g): nothing would be taken", out->until_s,
+                        out->from_s);
+  return status;
+}
+
+wm_status config_read_sources(const wm_yaml_node *root, wm_config *out, wm_error *err) {
+  wm_yaml_node lateness = wm_yaml_get(root, "merge.lateness_max_ms"), list = wm_yaml_get(root, "sources");
+  // Where the horizon is what was set too small, the fault is shown there.
+  if (!wm_yaml_there(&lateness)) lateness = wm_yaml_get(root, "merge.horizon_ms");
+  wm_status status = WM_OK;
+  if (wm_yaml_there(&lateness) && out->runtime.merge_lateness_max_ms > out->runtime.merge_horizon_ms)
+    return wm_yaml_fail(&lateness, err,
+                        "merge.lateness_max_ms (%.10g) is above merge.horizon_ms (%.10g); set lateness_max_ms to at "
+                        "most %.10g, or horizon_ms to %.10g",
+                        out->runtime.merge_lateness_max_ms, out->runtime.merge_horizon_ms,
+                        out->runtime.merge_horizon_ms, out->runtime.merge_lateness_max_ms);
+  if (!wm_yaml_there(&list)) return WM_OK;
+  if (!wm_yaml_is_list(&list)) return wm_yaml_fail(&list, err, "a list of {name: NAME, ...} is needed");
+  if (wm_yaml_count(&list) > WM_SOURCES_MAX) return wm_yaml_fail(&list, err, "more than %d sources", WM_SOURCES_MAX);
+  for (size_t i = 0; status == WM_OK && i < wm_yaml_count(&list); i++) {
+    wm_yaml_node item = wm_yaml_item(&list, i);
+    status = read_source(&item, out, &out->sources[i], err);
+    if (status == WM_OK) out->source_count = i + 1;
+  }
+  return status;
+}
+
+void wm_config_source(const wm_config *config, const char *name, wm_source_config *out, int *rank) {
+  size_t base = strcspn(name, ":"), chosen = config->source_count;
+  for (size_t i = config->source_count; i-- > 0;) {
+    const char *listed = config->sources[i].name;
+    if (strcmp(listed, name) == 0) {
+      chosen = i;
+      break;
+    }
+    if (strlen(listed) == base && strncmp(listed, name, base) == 0) chosen = i;
+  }
+  *rank = (int)chosen;
+  *out = chosen < config->source_count ? config->sources[chosen] : defaults(config);
+  snprintf(out->name, sizeof out->name, "%s", name);
+}

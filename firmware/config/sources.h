@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef WM_CONFIG_SOURCES_H
+#define WM_CONFIG_SOURCES_H
+
+#include "waymark/config.h"
+#include "waymark/yaml.h"
+
+// Reads `sources:`; out->runtime is already there, and lateness is held against its horizon.
+wm_status config_read_sources(const wm_yaml_node *root, wm_config *out, wm_error *err);
+
+#endif

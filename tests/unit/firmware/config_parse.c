@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "config_registry.h"
+#include "unity.h"
+#include "waymark/config.h"
+
+static wm_config config;
+static wm_error err;
+
+void setUp(void) { memset(&config, 0, sizeof config); }
+void tearDown(void) { wm_config_free(&config); }
+
+#define HEAD "format: waymark-config/1\nestimator: pole_filter\n"
+
+static void parse(const char *text) {
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, strlen(text), "dir/x.yaml", &config, &err), err.text);
+}
+
+static void refused(const char *text, const char *message) {
+  TEST_ASSERT_EQUAL_MESSAGE(WM_BAD_CONFIG, wm_config_parse(text, strlen(text), "dir/x.yaml", &config, &err), text);
+  TEST_ASSERT_EQUAL_STRING(message, err.text);
+  TEST_ASSERT_NULL(config.text);
+}
+
+static const registry_params *params(void) { return config.estimator_params; }
+
+static void defaults(void) {
+  parse(HEAD);
+  TEST_ASSERT_EQUAL_STRING("pole_filter", config.estimator->name);
+  TEST_ASSERT_TRUE(params()->gate == 9.0 && params()->slots == 2 && params()->on == 1 && params()->model == 0);
+  TEST_ASSERT_EQUAL_DOUBLE(300, config.runtime.merge_horizon_ms);
+  TEST_ASSERT_EQUAL_DOUBLE(50, config.runtime.publish_rate_hz);
+  TEST_ASSERT_EQUAL_STRING("WAYMARK_", config.channel_prefix);
+  TEST_ASSERT_EQUAL_STRING("", config.lcm_url);
+  TEST_ASSERT_FALSE(config.has_initial_pose);
+  TEST_ASSERT_EQUAL_STRING("", config.overrides.dbc);
+  TEST_ASSERT_EQUAL_STRING(HEAD, config.text);
+  TEST_ASSERT_EQUAL(strlen(HEAD), config.text_length);
+}
+
+static void everything(void) {
+  parse(HEAD
+        "sources:\n  - {name: gnss, until_s: 25, from_s: -1}\n  - {name: sightings, lateness_max_ms: 300}\n"
+        "  - {name: 'sightings:laser', use: false, period_ms: 90}\n"
+        "initial_pose: {x_m: 1, heading_deg: 90, sigma_xy_m: 0.2}\n"
+        "merge: {horizon_ms: 400, lateness_max_ms: 200, queue_events: 100}\n"
+        "publish: {rate_hz: 20, lcm: false, lcm_url: 'memq://', channel_prefix: R1_}\n"
+        "realtime:\n  cpu: 1\n"
+        "motion: {noise: {speed_mps: 0.5}}\n"
+        "pole_filter: {gate: 4, states: {slots: 3, deep: {on: false}}, model: robust, states.yaw_sigma_rad: 0.3}\n"
+        "cloud_filter: {window_s: 7}\n");
+  TEST_ASSERT_TRUE(params()->gate == 4 && params()->slots == 3 && params()->on == 0 && params()->model == 1);
+  TEST_ASSERT_EQUAL_DOUBLE(0.3, params()->yaw_sigma_rad);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, *(const double *)(const void *)config.motion);
+  TEST_ASSERT_EQUAL_DOUBLE(400, config.runtime.merge_horizon_ms);
+  TEST_ASSERT_EQUAL(100, config.runtime.merge_queue_events);
+  TEST_ASSERT_EQUAL(0, config.runtime.publish_lcm);
+  TEST_ASSERT_EQUAL(1, config.runtime.realtime_cpu);
+  TEST_ASSERT_EQUAL_STRING("memq://", config.lcm_url);
+  TEST_ASSERT_EQUAL_STRING("R1_", config.channel_prefix);
+  TEST_ASSERT_TRUE(config.has_initial_pose && config.initial_pose.p_m[0] == 1 && isnan(config.initial_pose.p_m[1]));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, M_PI / 2, config.initial_pose.heading_rad);
+  TEST_ASSERT_TRUE(config.initial_pose.sigma_xy_m == 0.2 && config.initial_pose.sigma_heading_rad == 0.05);
+}
+
+static void source_settings(void) {
+  parse(HEAD
+        "merge: {lateness_max_ms: 100}\n"
+        "sources:\n  - {name: gnss, until_s: 25}\n  - {name: sightings, lateness_max_ms: 300}\n"
+        "  - {name: 'sightings:laser', use: false}\n");
+  wm_source_config s;
+  int rank;
+  wm_config_source(&config, "gnss", &s, &rank);
+  TEST_ASSERT_TRUE(rank == 0 && s.until_s == 25 && s.lateness_max_ms == 100 && isinf(s.from_s));
+  wm_config_source(&config, "sightings:radar", &s, &rank);
+  TEST_ASSERT_TRUE(rank == 1 && s.lateness_max_ms == 300 && s.use);
+  TEST_ASSERT_EQUAL_STRING("sightings:radar", s.name);
+  wm_config_source(&config, "sightings:laser", &s, &rank);
+  TEST_ASSERT_TRUE(rank == 2 && !s.use);
+  wm_config_source(&config, "can", &s, &rank);
+  TEST_ASSERT_TRUE(rank == 3 && s.use && s.lateness_max_ms == 100 && isinf(s.until_s));
+}
+
+static void misspelt(void) {
+  refused(HEAD "pole_filter:\n  gaet: 5\n",
+          "dir/x.yaml:4: pole_filter.gaet: unknown key; did you mean 'pole_filter.gate'?");
+  refused(HEAD "pole_filtr: {gate: 5}\n", "dir/x.yaml:3: pole_filtr: unknown key; did you mean 'pole_filter'?");
+  refused(HEAD "horizon_ms: 5\n", "dir/x.yaml:3: horizon_ms: unknown key; did you mean 'merge.horizon_ms'?");
+  refused(HEAD "publish: {lcm_ulr: x}\n",
+          "dir/x.yaml:3: publish.lcm_ulr: unknown key; did you mean 'publish.lcm_url'?");
+  refused(HEAD "pole_filter: {slots: 3}\n",
+          "dir/x.yaml:3: pole_filter.slots: unknown key; did you mean 'pole_filter.states.slots'?");
+  refused(HEAD "motion: {noise: {sped_mps: 1}}\n",
+          "dir/x.yaml:3: motion.noise.sped_mps: unknown key; did you mean 'motion.noise.speed_mps'?");
+  refused(HEAD "cloud_filter: {windows: 1}\n",
+          "dir/x.yaml:3: cloud_filter.windows: unknown key; did you mean 'cloud_filter.window_s'?");
+  refused(HEAD "something: 1\n", "dir/x.yaml:3: something: unknown key; docs/config.md lists those that there are");
+  refused("format: waymark-config/1\nestimator: pole_filtre\n",
+          "dir/x.yaml:2: estimator: 'pole_filtre' is unknown; did you mean 'pole_filter'? (one of: pole_filter, "
+          "cloud_filter)");
+  refused("format: waymark-config/1\nmerge: {}\n",
+          "dir/x.yaml:1: estimator: is missing; one of these is needed: pole_filter, cloud_filter");
+}
+
+static void wrong_values(void) {
+  refused(HEAD "pole_filter: {gate: abc}\n",
+          "dir/x.yaml:3: pole_filter.gate: 'abc' is not a number; a number from 0 to 1000 is needed");
+  refused(HEAD "pole_filter: {states: {slots: 17}}\n",
+          "dir/x.yaml:3: pole_filter.states.slots: '17' is out of range; a whole number from 0 to 16 is needed");
+  refused(HEAD "pole_filter: {model: rubust}\n",
+          "dir/x.yaml:3: pole_filter.model: 'rubust' is unknown; did you mean 'robust'? (one of: plain, robust)");
+  refused(HEAD "pole_filter: {gate: }\n",
+          "dir/x.yaml:3: pole_filter.gate: nothing is not a number; a number from 0 to 1000 is needed");
+  refused(HEAD "pole_filter: 3\n", "dir/x.yaml:3: pole_filter: a map of parameters (KEY: VALUE) is needed");
+  refused(HEAD "pole_filter: {states: 3}\n",
+          "dir/x.yaml:3: pole_filter.states: a map of parameters (KEY: VALUE) is needed");
+  refused(HEAD "publish: {rate_hz: 0}\n",
+          "dir/x.yaml:3: publish.rate_hz: '0' is out of range; a number from 0.1 to 1000 is needed");
+  refused("estimator: pole_filter\n", "dir/x.yaml:1: format: is missing; 'format: waymark-config/1' is needed");
+  refused("", "dir/x.yaml:1: a map that begins with 'format: waymark-config/1' is needed");
+}
+
+static void wrong_sources(void) {
+  refused(HEAD "sources: [{name: gnss, lateness_max_ms: 500}]\n",
+          "dir/x.yaml:3: sources[0].lateness_max_ms: 500 is above merge.horizon_ms (300); at most 300 is possible, or "
+          "set merge.horizon_ms to 500");
+  refused(HEAD "merge: {lateness_max_ms: 500}\n",
+          "dir/x.yaml:3: merge.lateness_max_ms: merge.lateness_max_ms (500) is above merge.horizon_ms (300); set "
+          "lateness_max_ms to at most 300, or horizon_ms to 500");
+  refused(HEAD "merge: {horizon_ms: 100}\n",
+          "dir/x.yaml:3: merge.horizon_ms: merge.lateness_max_ms (150) is above merge.horizon_ms (100); set "
+          "lateness_max_ms to at most 100, or horizon_ms to 150");
+  refused(HEAD "sources: [{name: gpss}]\n",
+          "dir/x.yaml:3: sources[0].name: 'gpss' is unknown; did you mean 'gnss'? (one of: can, motion, motion6, "
+          "sightings, markers, stereo, points, gnss)");
+  refused(HEAD "sources:\n- {name: gnss}\n- {name: gnss}\n",
+          "dir/x.yaml:5: sources[1].name: 'gnss' stands there twice (first in line 4)");
+  refused(HEAD "sources: [{name: gnss, from_s: 5, until_s: 2}]\n",
+          "dir/x.yaml:3: sources[0].until_s: 2 is not after from_s (5): nothing would be taken");
+  refused(HEAD "sources: [{name: 'gnss:top'}]\n",
+          "dir/x.yaml:3: sources[0].name: 'gnss:top' has a sensor's name; only sightings:SENSOR and markers:SENSOR are "
+          "possible");
+  refused(HEAD "sources: [{nmae: gnss}]\n", "dir/x.yaml:3: sources[0].nmae: unknown key; did you mean 'name'?");
+  refused(HEAD "sources: gnss\n", "dir/x.yaml:3: sources: a list of {name: NAME, ...} is needed");
+}
+
+static void files(void) {
+  refused(HEAD "dbc: car.dbc\n", "dir/x.yaml:3: dbc: 'car.dbc' cannot be read (looked for dir/car.dbc)");
+  static const char kText[] = HEAD "dbc: ../LICENSE\ncalibration: LICENSE\n";
+  TEST_ASSERT_EQUAL_MESSAGE(WM_BAD_CONFIG, wm_config_parse(kText, sizeof kText - 1, "docs/x.yaml", &config, &err),
+                            err.text);
+  TEST_ASSERT_EQUAL_STRING("docs/x.yaml:4: calibration: 'LICENSE' cannot be read (looked for docs/LICENSE)", err.text);
+  static const char kGood[] = HEAD "dbc: ../LICENSE\n";
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(kGood, sizeof kGood - 1, "docs/x.yaml", &config, &err), err.text);
+  TEST_ASSERT_EQUAL_STRING("docs/../LICENSE", config.overrides.dbc);
+  wm_config_free(&config);
+  TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_config_load("no/such.yaml", &config, &err));
+  TEST_ASSERT_EQUAL_STRING("no/such.yaml: there is no such file", err.text);
+}
+
+static void reference_names_all(void) {
+  char *text = NULL;
+  size_t length;
+  FILE *to = open_memstream(&text, &length);
+  wm_config_reference(to);
+  fclose(to);
+  static const char *const kRows[] = {"| `pole_filter.states.deep.on` | true or false | true | On. |",
+                                      "| `pole_filter.gate` | number from 0 to 1000 | 9 | Gate. |",
+                                      "| `pole_filter.model` | `plain`, `robust` | plain | Model. |",
+                                      "| `pole_filter.states.slots` | whole number from 0 to 16 | 2 | Slots. |",
+                                      "| `merge.horizon_ms` | number from 1 to 60000 | 300 |",
+                                      "| `motion.noise.speed_mps` |",
+                                      "| `lateness_max_ms` |",
+                                      "| `initial_pose` |"};
+  for (size_t i = 0; i < sizeof kRows / sizeof *kRows; i++)
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(text, kRows[i]), kRows[i]);
+  free(text);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(defaults);
+  RUN_TEST(everything);
+  RUN_TEST(source_settings);
+  RUN_TEST(misspelt);
+  RUN_TEST(wrong_values);
+  RUN_TEST(wrong_sources);
+  RUN_TEST(files);
+  RUN_TEST(reference_names_all);
+  return UNITY_END();
+}

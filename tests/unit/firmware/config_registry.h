@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef WM_TEST_CONFIG_REGISTRY_H
+#define WM_TEST_CONFIG_REGISTRY_H
+
+#include "waymark/estimator.h"
+
+// Parameters of the test's estimator "pole_filter".
+typedef struct registry_params {
+  double gate;
+  double yaw_sigma_rad;
+  int32_t slots, on, model;
+} registry_params;
+
+#endif
