@@ -3,4 +3,10 @@ add_executable(can_judge ${CMAKE_SOURCE_DIR}/tests/judges/can_judge.c)
 target_link_libraries(can_judge PRIVATE wm_can wm_rules)
 target_include_directories(can_judge PRIVATE ${CMAKE_SOURCE_DIR}/drivers/can)
 set_target_properties(can_judge PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
+wm_test(can_bits SOURCES can_bits.c USES wm_can)
+target_include_directories(can_bits PRIVATE ${CMAKE_SOURCE_DIR}/drivers/can)
 wm_test(can_candump SOURCES can_candump.c USES wm_can)
+wm_test(can_decode SOURCES can_decode.c USES wm_can)
+
+# Outside judges: python-can for logs, cantools for DBC (tests/judges/setup.sh installs them).
+wm_script_test(can_judge COMMAND tests/judges/run.sh tests/judges/can_judge.py $<TARGET_FILE:can_judge>)

@@ -1,0 +1,361 @@
+// SPDX-License-Identifier: Apache-2.0
+// From frames to quantities: units, sums, gears, multiplexing, ticks that wrap, counters, and what is counted.
+#include <math.h>
+
+#include "can_fixture.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+#define PI 3.14159265358979323846
+
+static fixture f;
+
+// ── units ───────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static double si_of(int quantity, const char *unit) {
+  char dbc[256];
+  (void)snprintf(dbc, sizeof dbc, "BO_ 291 M: 8 X\n SG_ S : 0|16@1- (0.5,1) [0|0] \"%s\" X\n", unit);
+  open_one(&f, dbc, binding(quantity, "M", "S"));
+  double one = value_of(&f, "can0 123#1200");  // 18 * 0.5 + 1 = 10
+  close_it(&f);
+  return one / 10.0;
+}
+
+static void units_of_speed(void) {
+  const char *kmh[] = {"km/h", "kph", "KMH", "km / h", "km/hr", "Unit_KiloMeterPerHour"};
+  for (size_t i = 0; i < sizeof kmh / sizeof *kmh; i++)
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, 1 / 3.6, si_of(WM_Q_VEHICLE_SPEED, kmh[i]));
+  TEST_ASSERT_EQUAL_DOUBLE(1.0, si_of(WM_Q_WHEEL_SPEED_REAR_LEFT, "m/s"));
+  TEST_ASSERT_EQUAL_DOUBLE(1.0, si_of(WM_Q_WHEEL_SPEED_FRONT_RIGHT, "mps"));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.44704, si_of(WM_Q_VEHICLE_SPEED, "mph"));
+}
+
+static void units_of_angles_and_lengths(void) {
+  const char *degrees[] = {"deg", "Degree", "degrees", "\xC2\xB0", "\xB0", "Unit_DegreeOfArc"};
+  for (size_t i = 0; i < sizeof degrees / sizeof *degrees; i++)
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, PI / 180, si_of(WM_Q_STEERING_WHEEL, degrees[i]));
+  const char *rates[] = {"deg/s", "degree/s", "\xC2\xB0/s", "\xB0/s", "deg/sec", "\xB0 / s"};
+  for (size_t i = 0; i < sizeof rates / sizeof *rates; i++)
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, PI / 180, si_of(WM_Q_YAW_RATE, rates[i]));
+  TEST_ASSERT_EQUAL_DOUBLE(1.0, si_of(WM_Q_YAW_RATE, "rad/s"));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 2 * PI / 60, si_of(WM_Q_YAW_RATE, "rpm"));
+  TEST_ASSERT_EQUAL_DOUBLE(1.0, si_of(WM_Q_ROAD_WHEEL, "rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.001, si_of(WM_Q_STEERING_ACTUATOR, "mm"));
+}
+
+static void unit_scale_and_offset_of_the_binding(void) {
+  wm_can_binding b = binding(WM_Q_YAW_RATE, "M", "S");
+  (void)snprintf(b.unit, sizeof b.unit, "deg/s");
+  b.scale = -1.0;
+  b.offset = 0.25;
+  open_one(&f, "BO_ 291 M: 2 X\n SG_ S : 7|16@0- (0.1,0) [0|0] \"\" X\n", b);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.25 - 90.0 * PI / 180, value_of(&f, "can0 123#0384"));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.25 + 90.0 * PI / 180, value_of(&f, "can0 123#FC7C"));
+  close_it(&f);
+}
+
+static void sum_of_signals(void) {
+  wm_can_binding b = binding(WM_Q_STEERING_WHEEL, "M", "COARSE");
+  (void)snprintf(b.signal[1], sizeof b.signal[1], "FINE");
+  b.signal_count = 2;
+  open_one(&f,
+           "BO_ 37 M: 8 X\n SG_ COARSE : 3|12@0- (1.5,0) [0|0] \"deg\" X\n"
+           " SG_ FINE : 39|4@0- (0.1,0) [0|0] \"deg\" X\n",
+           b);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, (3.0 - 0.7) * PI / 180, value_of(&f, "can0 025#0002000090000000"));
+  close_it(&f);
+}
+
+static void floats(void) {
+  const char *dbc =
+      "BO_ 291 M: 8 X\n SG_ S : 0|32@1- (1,0) [0|0] \"m/s\" X\n SG_ D : 7|64@0- (1,0) [0|0] \"m/s\" X\n"
+      "SIG_VALTYPE_ 291 S : 1;\nSIG_VALTYPE_ 291 D : 2;\n";
+  open_one(&f, dbc, binding(WM_Q_VEHICLE_SPEED, "M", "S"));
+  TEST_ASSERT_EQUAL_DOUBLE(1.5, value_of(&f, "can0 123#0000C03F00000000"));
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 123#0000C07F00000000"));  // NaN
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 123#0000807F00000000"));  // infinity
+  TEST_ASSERT_EQUAL_UINT64(2, f.counts.not_finite);
+  close_it(&f);
+  open_one(&f, dbc, binding(WM_Q_VEHICLE_SPEED, "M", "D"));
+  TEST_ASSERT_EQUAL_DOUBLE(-2.5, value_of(&f, "can0 123#C004000000000000"));
+  close_it(&f);
+}
+
+// ── gears ───────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+#define GEAR_DBC "BO_ 956 G: 8 X\n SG_ GEAR : 13|6@0+ (1,0) [0|63] \"\" X\n"
+
+static void gears_by_names(void) {
+  open_one(&f, GEAR_DBC "VAL_ 956 GEAR 0 \"D\" 1 \"S\" 8 \"N\" 16 \"R\" 32 \"P\" 63 \"SNA\";\n",
+           binding(WM_Q_GEAR, "G", "GEAR"));
+  TEST_ASSERT_EQUAL_DOUBLE(1, value_of(&f, "can0 3BC#0000000000000000"));
+  TEST_ASSERT_EQUAL_DOUBLE(1, value_of(&f, "can0 3BC#0001000000000000"));
+  TEST_ASSERT_EQUAL_DOUBLE(0, value_of(&f, "can0 3BC#0008000000000000"));
+  TEST_ASSERT_EQUAL_DOUBLE(-1, value_of(&f, "can0 3BC#0010000000000000"));
+  TEST_ASSERT_EQUAL_DOUBLE(0, value_of(&f, "can0 3BC#0020000000000000"));
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 3BC#003F000000000000"));  // SNA
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 3BC#0002000000000000"));  // a value without a name
+  TEST_ASSERT_EQUAL_UINT64(2, f.counts.not_finite);
+  close_it(&f);
+}
+
+static void gears_by_makers_words(void) {
+  static const struct {
+    const char *name;
+    double direction;
+  } rows[] = {{"DRIVE", 1},
+              {"forward", 1},
+              {"D1", 1},
+              {"Gear 3 | Engaged", 1},
+              {"2nd", 1},
+              {"Sport", 1},
+              {"Reverse gear", -1},
+              {"Gang_R", -1},
+              {"backward", -1},
+              {"Neutral", 0},
+              {"parking", 0},
+              {"P (Park) | Disengaged", 0}};
+  for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
+    char dbc[256];
+    (void)snprintf(dbc, sizeof dbc, GEAR_DBC "VAL_ 956 GEAR 5 \"%s\" ;\n", rows[i].name);
+    open_one(&f, dbc, binding(WM_Q_GEAR, "G", "GEAR"));
+    TEST_ASSERT_EQUAL_DOUBLE(rows[i].direction, value_of(&f, "can0 3BC#0005000000000000"));
+    close_it(&f);
+  }
+}
+
+static void gears_by_values(void) {
+  wm_can_binding b = binding(WM_Q_GEAR, "G", "GEAR");
+  b.gear_count = 2;
+  b.gear[0].raw = 4;
+  b.gear[0].direction = 1;
+  b.gear[1].raw = -1;
+  b.gear[1].direction = -1;
+  open_one(&f, "BO_ 956 G: 8 X\n SG_ GEAR : 0|4@1- (1,0) [-1|1] \"\" X\nVAL_ 956 GEAR 4 \"R\" ;\n", b);
+  TEST_ASSERT_EQUAL_DOUBLE(1, value_of(&f, "can0 3BC#04"));  // the binding's word counts, not VAL_'s
+  TEST_ASSERT_EQUAL_DOUBLE(-1, value_of(&f, "can0 3BC#0F"));
+  close_it(&f);
+}
+
+// ── multiplexing ────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static void only_when_the_multiplexer_fits(void) {
+  open_one(&f,
+           "BO_ 291 M: 8 X\n SG_ MUX M : 0|8@1+ (1,0) [0|0] \"\" X\n SG_ A m3 : 8|8@1+ (1,0) [0|0] \"m/s\" X\n"
+           " SG_ B m4 : 8|56@1+ (1,0) [0|0] \"m/s\" X\n",
+           binding(WM_Q_VEHICLE_SPEED, "M", "A"));
+  TEST_ASSERT_EQUAL_DOUBLE(7, value_of(&f, "can0 123#0307"));  // a short frame: B isn't in it
+  TEST_ASSERT_EQUAL(WM_AGAIN, feed(&f, "can0 123#0407060504030201"));
+  TEST_ASSERT_EQUAL_UINT64(1, f.counts.ignored);
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can0 123#03"));
+  TEST_ASSERT_EQUAL_UINT64(1, f.counts.malformed);
+  close_it(&f);
+}
+
+static void multiplexers_above_each_other(void) {
+  open_one(&f,
+           "BO_ 2147483649 M: 8 X\n SG_ A M : 0|8@1+ (1,0) [0|0] \"\" X\n SG_ B m2M : 8|8@1+ (1,0) [0|0] \"\" X\n"
+           " SG_ C m1 : 16|8@1+ (1,0) [0|0] \"m/s\" X\n"
+           "SG_MUL_VAL_ 2147483649 B A 2-2;\nSG_MUL_VAL_ 2147483649 C B 1-1, 5-7;\n",
+           binding(WM_Q_VEHICLE_SPEED, "M", "C"));
+  TEST_ASSERT_EQUAL_DOUBLE(9, value_of(&f, "can0 00000001#020109"));
+  TEST_ASSERT_EQUAL_DOUBLE(9, value_of(&f, "can0 00000001#020709"));
+  TEST_ASSERT_EQUAL(WM_AGAIN, feed(&f, "can0 00000001#020809"));
+  TEST_ASSERT_EQUAL(WM_AGAIN, feed(&f, "can0 00000001#010109"));
+  TEST_ASSERT_EQUAL(WM_AGAIN, feed(&f, "can0 001#020109"));  // 11 bits: another message
+  close_it(&f);
+}
+
+// ── ticks ───────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static void ticks_of(const char *bits, const char *const *frames, const double *want, size_t count) {
+  char dbc[160];
+  (void)snprintf(dbc, sizeof dbc, "BO_ 257 W: 8 X\n SG_ T : %s (1,0) [0|0] \"\" X\n", bits);
+  open_one(&f, dbc, binding(WM_Q_WHEEL_TICKS_LEFT, "W", "T"));
+  for (size_t i = 0; i < count; i++) TEST_ASSERT_EQUAL_DOUBLE_MESSAGE(want[i], value_of(&f, frames[i]), frames[i]);
+  close_it(&f);
+}
+
+static void ticks_wrap(void) {
+  const char *frames16[] = {"c 101#F0FF", "c 101#0A00", "c 101#F0FF", "c 101#F07F", "c 101#EFFF"};
+  const double want16[] = {65520, 65546, 65520, 32752, 65519};  // half a cycle down, then one short of half up
+  ticks_of("0|16@1+", frames16, want16, 5);
+  const char *frames8[] = {"c 101#FE", "c 101#01", "c 101#7F", "c 101#81", "c 101#FE"};
+  const double want8[] = {254, 257, 383, 385, 510};
+  ticks_of("0|8@1+", frames8, want8, 5);
+  const char *signed16[] = {"c 101#7FFF", "c 101#8001", "c 101#7FFE"};
+  const double want_signed16[] = {32767, 32769, 32766};
+  ticks_of("7|16@0-", signed16, want_signed16, 3);
+  const char *frames12[] = {"c 101#FF0F", "c 101#0200"};
+  const double want12[] = {4095, 4098};
+  ticks_of("0|12@1+", frames12, want12, 2);
+  const char *frames64[] = {"c 101#FFFFFFFFFFFFFF7F", "c 101#FFFFFFFFFFFFFF7F"};
+  const double want64[] = {9223372036854775807.0, 9223372036854775807.0};
+  ticks_of("0|64@1+", frames64, want64, 2);
+}
+
+static void ticks_grow_without_end(void) {
+  open_one(&f, "BO_ 257 W: 2 X\n SG_ T : 0|8@1+ (2,5) [0|0] \"\" X\n", binding(WM_Q_WHEEL_TICKS_RIGHT, "W", "T"));
+  double last = 0;
+  for (unsigned i = 0; i < 3000; i++) {
+    char text[32];
+    (void)snprintf(text, sizeof text, "c 101#%02X", (i * 100) & 0xFF);
+    last = value_of(&f, text);
+  }
+  TEST_ASSERT_EQUAL_DOUBLE(2.0 * 2999 * 100 + 5, last);
+  close_it(&f);
+}
+
+// ── counters ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static void open_counted(const char *counter) {
+  char dbc[200];
+  (void)snprintf(dbc, sizeof dbc, "BO_ 257 W: 3 X\n SG_ V : 0|16@1+ (1,0) [0|0] \"m/s\" X\n SG_ %s X\n", counter);
+  open_one(&f, dbc, binding(WM_Q_VEHICLE_SPEED, "W", "V"));
+}
+
+static wm_status count(unsigned value) {
+  char text[32];
+  (void)snprintf(text, sizeof text, "c 101#0100%02X", value);
+  return feed(&f, text);
+}
+
+static void lost_by_the_counter(void) {
+  open_counted("WS_ALIVE : 16|8@1+ (1,0) [0|255] \"\"");
+  for (unsigned i = 250; i < 270; i++) TEST_ASSERT_EQUAL(WM_OK, count(i & 0xFF));
+  TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost);
+  TEST_ASSERT_EQUAL(WM_OK, count(17));  // 14, 15, 16 are missing
+  TEST_ASSERT_EQUAL_UINT64(3, f.counts.lost);
+  TEST_ASSERT_EQUAL(3, f.got.lost_before);
+  TEST_ASSERT_EQUAL(WM_OK, count(18));
+  TEST_ASSERT_EQUAL(0, f.got.lost_before);
+  TEST_ASSERT_EQUAL(WM_OK, count(16));  // 253 missing
+  TEST_ASSERT_EQUAL_UINT64(256, f.counts.lost);
+  close_it(&f);
+}
+
+static void frozen_counter(void) {
+  open_counted("MsgCounter : 16|4@1+ (1,0) [0|15] \"\"");
+  for (unsigned i = 0; i < 20; i++) TEST_ASSERT_EQUAL(WM_OK, count(i & 15));
+  TEST_ASSERT_EQUAL(WM_AGAIN, count(3));  // a repeated frame or two say nothing
+  TEST_ASSERT_EQUAL(WM_AGAIN, count(3));
+  for (int i = 0; i < 4; i++) {
+    TEST_ASSERT_EQUAL(WM_OK, count(3));
+    TEST_ASSERT_EQUAL(WM_DOUBT_FROZEN_COUNTER, f.got.doubt);
+  }
+  TEST_ASSERT_EQUAL_UINT64(6, f.counts.frozen);
+  TEST_ASSERT_EQUAL(WM_OK, count(4));
+  TEST_ASSERT_EQUAL(0, f.got.doubt);
+  TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost);
+  close_it(&f);
+}
+
+// AUTOSAR E2E profile 1 counts 0 to 14, others 1 to 15.
+static void counters_that_leave_a_value_out(void) {
+  open_counted("COUNTER : 16|4@1+ (1,0) [0|14] \"\"");
+  for (unsigned i = 0; i < 60; i++) TEST_ASSERT_EQUAL(WM_OK, count(i % 15));
+  TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost);
+  close_it(&f);
+  open_counted("COUNTER : 16|4@1+ (1,0) [0|14] \"\"");
+  for (unsigned i = 0; i < 60; i++) TEST_ASSERT_EQUAL(WM_OK, count(i % 15 + 1));
+  TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost);
+  close_it(&f);
+}
+
+static void what_only_looks_like_a_counter(void) {
+  open_counted("ERROR_COUNT : 16|8@1+ (1,0) [0|255] \"\"");  // never steps: no proof, no doubt
+  for (unsigned i = 0; i < 50; i++) TEST_ASSERT_EQUAL(WM_OK, count(i / 10));
+  TEST_ASSERT_EQUAL_UINT64(0, f.counts.lost + f.counts.frozen);
+  close_it(&f);
+  open_counted("WHEEL_CNT_LEFT : 16|8@1+ (1,0) [0|255] \"\"");  // counts the way
+  for (unsigned i = 0; i < 50; i++) TEST_ASSERT_EQUAL(WM_OK, count(i < 20 ? i : 20));
+  TEST_ASSERT_EQUAL_UINT64(0, f.counts.frozen);
+  close_it(&f);
+}
+
+// ── what is no value, what is no frame ──────────────────────────────────────────────────────────────────────────────
+
+static void no_value(void) {
+  open_one(&f,
+           "BO_ 257 W: 3 X\n SG_ V : 0|16@1+ (0.01,0) [0|100] \"m/s\" X\n"
+           "VAL_ 257 V 65534 \"Error\" 300 \"three\";\n",
+           binding(WM_Q_VEHICLE_SPEED, "W", "V"));
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "c 101#FEFF"));  // VAL_ says so
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "c 101#FFFF"));  // all bits set, and outside of the range
+  TEST_ASSERT_EQUAL_UINT64(2, f.counts.not_finite);
+  TEST_ASSERT_NOT_NULL(strstr(f.counts.first_problem, "no value"));
+  TEST_ASSERT_EQUAL_DOUBLE(3, value_of(&f, "c 101#2C01"));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 300,
+                            value_of(&f, "c 101#3075"));  // outside of the range: makers' ranges are wrong too often
+  close_it(&f);
+}
+
+static void what_is_not_decoded(void) {
+  wm_can_binding b = binding(WM_Q_VEHICLE_SPEED, "W", "V");
+  (void)snprintf(b.bus, sizeof b.bus, "can1");
+  open_one(&f, "BO_ 257 W: 3 X\n SG_ V : 0|16@1+ (1,0) [0|0] \"m/s\" X\n", b);
+  TEST_ASSERT_EQUAL(WM_AGAIN, feed(&f, "can0 101#0100"));  // another bus
+  TEST_ASSERT_EQUAL(WM_AGAIN, feed(&f, "can1 102#0100"));  // another id
+  TEST_ASSERT_EQUAL(WM_AGAIN, feed(&f, "can1 101#R2"));
+  TEST_ASSERT_EQUAL_UINT64(3, f.counts.ignored);
+  TEST_ASSERT_EQUAL(WM_AGAIN, feed(&f, "can1 20000101#0100"));
+  TEST_ASSERT_EQUAL_UINT64(1, f.counts.bus_errors);
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can1 101#01"));
+  TEST_ASSERT_EQUAL_UINT64(1, f.counts.malformed);
+  TEST_ASSERT_EQUAL_STRING("can1: W (id 101, 1 bytes): the frame is shorter than the signals that are bound",
+                           f.counts.first_problem);
+  TEST_ASSERT_EQUAL_DOUBLE(1, value_of(&f, "can1 101#0100"));
+  close_it(&f);
+}
+
+static void several_quantities_and_ids(void) {
+  const wm_can_binding b[] = {binding(WM_Q_WHEEL_TICKS_LEFT, "W", "L"), binding(WM_Q_YAW_RATE, "Y", "R"),
+                              binding(WM_Q_WHEEL_TICKS_RIGHT, "W", "R")};
+  wm_status status = open_with(&f,
+                               "BO_ 2147483905 W: 4 X\n SG_ L : 0|16@1+ (1,0) [0|0] \"\" X\n"
+                               " SG_ R : 16|16@1+ (1,0) [0|0] \"\" X\nBO_ 16 Y: 2 X\n"
+                               " SG_ R : 0|16@1- (1,0) [0|0] \"rad/s\" X\n",
+                               b, 3);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, status, f.err.text);
+  TEST_ASSERT_EQUAL(WM_OK, feed(&f, "can0 00000101#01000200"));
+  TEST_ASSERT_EQUAL(2, f.got.count);
+  TEST_ASSERT_EQUAL(WM_Q_WHEEL_TICKS_LEFT, f.got.id[0]);
+  TEST_ASSERT_EQUAL(WM_Q_WHEEL_TICKS_RIGHT, f.got.id[1]);
+  TEST_ASSERT_EQUAL_DOUBLE(2, f.got.value[1]);
+  uint32_t ids[4];
+  uint8_t extended[4];
+  TEST_ASSERT_EQUAL(2, wm_can_decoder_ids(f.decoder, ids, extended, 4));
+  TEST_ASSERT_EQUAL_HEX32(16, ids[0]);
+  TEST_ASSERT_EQUAL(0, extended[0]);
+  TEST_ASSERT_EQUAL_HEX32(0x101, ids[1]);
+  TEST_ASSERT_EQUAL(1, extended[1]);
+  TEST_ASSERT_EQUAL(2, wm_can_decoder_ids(f.decoder, ids, extended, 0));
+  TEST_ASSERT_EQUAL_HEX32(1u << WM_Q_WHEEL_TICKS_LEFT | 1u << WM_Q_WHEEL_TICKS_RIGHT | 1u << WM_Q_YAW_RATE,
+                          wm_can_decoder_quantities(f.decoder));
+  close_it(&f);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(units_of_speed);
+  RUN_TEST(units_of_angles_and_lengths);
+  RUN_TEST(unit_scale_and_offset_of_the_binding);
+  RUN_TEST(sum_of_signals);
+  RUN_TEST(floats);
+  RUN_TEST(gears_by_names);
+  RUN_TEST(gears_by_makers_words);
+  RUN_TEST(gears_by_values);
+  RUN_TEST(only_when_the_multiplexer_fits);
+  RUN_TEST(multiplexers_above_each_other);
+  RUN_TEST(ticks_wrap);
+  RUN_TEST(ticks_grow_without_end);
+  RUN_TEST(lost_by_the_counter);
+  RUN_TEST(frozen_counter);
+  RUN_TEST(counters_that_leave_a_value_out);
+  RUN_TEST(what_only_looks_like_a_counter);
+  RUN_TEST(no_value);
+  RUN_TEST(what_is_not_decoded);
+  RUN_TEST(several_quantities_and_ids);
+  return UNITY_END();
+}
