@@ -91,3 +91,9 @@ wm_status landmarks_read(const char *path, const warner *warn, wm_landmark **out
   *count = 0;
   return status;
 }
+
+wm_status wm_landmarks_load(const char *path, wm_warn_fn warn, void *context, wm_landmark **out, size_t *count,
+                            wm_error *err) {
+  const warner to = {warn, context};
+  return landmarks_read(path, &to, out, count, err);
+}

@@ -56,6 +56,10 @@ extern const char *const wm_start_keys[];
 void wm_start_init(wm_start *out);
 wm_status wm_start_read(const wm_yaml_node *map, wm_start *out, wm_error *err);
 
+// landmarks.csv alone; *out is the caller's to free.
+wm_status wm_landmarks_load(const char *path, wm_warn_fn warn, void *context, wm_landmark **out, size_t *count,
+                            wm_error *err);
+
 // The recording's sources, in the order of the format's table of files: can, motion, motion6, then a source a sensor
 // for sightings ("sightings:NAME"), markers ("markers:NAME"), then stereo, points, gnss. Indices are 0, 1, 2 ... in
 // this order. Owned by the recording. Each hands out its events in the order of their arrival: a

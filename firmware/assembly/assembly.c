@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/assembly.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static wm_time_ns ns_from_ms(double ms) { return wm_ns_from_seconds(ms * 1e-3); }
+
+static void leave_out(wm_assembly *self, const char *name, const char *why) {
+  char *line = self->unused[self->unused_count++];
+  (void)snprintf(line, sizeof self->unused[0], "%s: %s", name, why);
+}
+
+// Sources that the estimator can't use are not opened at all: they would hold the watermark back for nothing.
+static const char *reason_to_leave_out(const wm_config *config, const wm_source *source,
+                                       const wm_source_config *wanted) {
+  uint32_t takes = config->estimator->takes | WM_MOTION_EVENTS;
+  if (!wanted->use) return "the configuration says `use: false`";
+  if (!(source->kinds & takes)) return "the estimator doesn't take what it says";
+  return NULL;
+}
+
+static void add_source(wm_assembly *self, wm_source *source) {
+  wm_source_config wanted;
+  int rank = 0;
+  wm_config_source(self->config, source->name, &wanted, &rank);
+  const char *why_not = reason_to_leave_out(self->config, source, &wanted);
+  if (why_not) {
+    leave_out(self, source->name, why_not);
+    return;
+  }
+  wm_time_ns lateness_ns = ns_from_ms(wanted.lateness_max_ms);
+  wm_time_ns horizon_ns = ns_from_ms(self->config->runtime.merge_horizon_ms);
+  wm_assembled_source *s = &self->sources[self->source_count++];
+  (void)snprintf(s->name, sizeof s->name, "%s", source->name);
+  s->source = source;
+  s->kinds = source->kinds;
+  s->from_s = wanted.from_s;
+  s->until_s = wanted.until_s;
+  s->merge = (wm_merge_source){.rank = rank,
+                               .is_motion = source->is_motion,
+                               .in_order = source->in_order,
+                               .lateness_max_ns = lateness_ns < horizon_ns ? lateness_ns : horizon_ns,
+                               .period_ns = ns_from_ms(wanted.period_ms)};
+  self->kinds |= source->kinds;
+}
+
+static wm_status check_estimator(const wm_assembly *self, wm_error *err) {
+  const wm_config *config = self->config;
+  const char *why = NULL;
+  if (config->estimator->state_bytes(config->estimator_params, &self->setup, &why) == 0)
+    return wm_fail(err, WM_BAD_CONFIG, "%s: estimator '%s' can't work with '%s': %s", config->path,
+                   config->estimator->name, self->recording, why ? why : "it doesn't say why");
+  return WM_OK;
+}
+
+wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t seed, wm_assembly *out,
+                      wm_error *err) {
+  memset(out, 0, sizeof *out);
+  out->config = config;
+  (void)snprintf(out->recording, sizeof out->recording, "%s", wm_recording_name(recording));
+  out->calibration_text = wm_recording_calibration_text(recording, &out->calibration_length);
+
+  wm_setup *setup = &out->setup;
+  setup->motion = config->motion;
+  setup->wheels = *wm_recording_wheels(recording);
+  setup->sensors = wm_recording_sensors(recording, &setup->sensor_count);
+  setup->landmarks = wm_recording_landmarks(recording, &setup->landmark_count);
+  setup->start = config->has_initial_pose ? config->initial_pose : *wm_recording_start(recording);
+  setup->seed = seed;
+
+  size_t count;
+  wm_source *const *sources = wm_recording_sources(recording, &count);
+  for (size_t i = 0; i < count && i < WM_SOURCES_MAX; i++) add_source(out, sources[i]);
+  if (!(out->kinds & WM_MOTION_EVENTS))
+    return wm_fail(err, WM_BAD_CONFIG,
+                   "%s: no motion: neither can.log with can-signals.yaml nor motion.csv is there or used; the pose "
+                   "can't be carried on without one",
+                   wm_recording_dir(recording));
+  out->driving = wm_driving_choose(out->kinds, wm_recording_quantities(recording));
+  return check_estimator(out, err);
+}
+
+const char *wm_assembly_source_name(const wm_assembly *self, size_t source) {
+  return source < self->source_count ? self->sources[source].name : "?";
+}
+
+const char *wm_assembly_sensor_name(const wm_assembly *self, size_t sensor) {
+  return sensor < self->setup.sensor_count ? self->setup.sensors[sensor].name : "";
+}

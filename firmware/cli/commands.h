@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+// The program's commands. Each takes the words after its name and returns the exit code.
+#ifndef WAYMARK_FIRMWARE_COMMANDS_H
+#define WAYMARK_FIRMWARE_COMMANDS_H
+
+#include "waymark/config.h"
+#include "waymark/replay.h"
+#include "waymark/status.h"
+
+enum { EXIT_DONE = 0, EXIT_WORK_FAILED = 1, EXIT_USAGE = 2 };
+
+int command_replay(int argc, char *const *argv);
+int command_check(int argc, char *const *argv);
+
+// ── shared by the commands ──────────────────────────────────────────────────────────────────────────────────────────
+
+// Exit code of a status: configuration and usage are 2, the rest is 1.
+int exit_code(wm_status status);
+// "waymark: TEXT" on standard error; returns the exit code of the error.
+int complain(const wm_error *err);
+// A wm_warn_fn and wm_finding_fn: "note: TEXT" on standard error.
+void print_note(void *context, const char *text);
+// `--landmarks` and `--calibration` stand above what the configuration says.
+wm_status override_path(char out[WM_PATH_MAX], const char *path, wm_error *err);
+// Counts and state of a run, for a person, on standard output.
+void print_report(const wm_run_report *report, const char *name, const char *out_dir, double took_s);
+
+// A line on a terminal with the time that is left, from two seconds on; nothing when the output is not a terminal.
+typedef struct progress_line {
+  wm_time_ns begin_ns;
+  int shown;
+} progress_line;
+void progress_begin(progress_line *self);
+void progress_show(void *self, double done);  // a wm_progress_fn
+void progress_end(progress_line *self);
+
+#endif

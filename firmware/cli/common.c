@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "commands.h"
+#include "waymark/clock.h"
+
+int exit_code(wm_status status) {
+  if (status == WM_OK) return EXIT_DONE;
+  return status == WM_BAD_USAGE || status == WM_BAD_CONFIG ? EXIT_USAGE : EXIT_WORK_FAILED;
+}
+
+int complain(const wm_error *err) {
+  (void)fprintf(stderr, "waymark: %s\n", err->text);
+  return exit_code(err->status);
+}
+
+void print_note(void *context, const char *text) {
+  (void)context;
+  (void)fprintf(stderr, "note: %s\n", text);
+}
+
+wm_status override_path(char out[WM_PATH_MAX], const char *path, wm_error *err) {
+  if (!path) return WM_OK;
+  if (strlen(path) >= WM_PATH_MAX) return wm_fail(err, WM_BAD_USAGE, "'%.60s...': the path is too long", path);
+  strcpy(out, path);
+  return WM_OK;
+}
+
+static void print_source(const wm_source_health *s) {
+  (void)printf("  %-20s %8" PRIu64 " received  %8" PRIu64 " fused", s->name, s->received, s->fused);
+  for (unsigned i = 1; i < WM_VERDICT_COUNT; i++)
+    if (s->rejected[i]) (void)printf("  %" PRIu64 " %s", s->rejected[i], wm_verdict_name(i));
+  for (unsigned i = 1; i < WM_STATUS_COUNT; i++)
+    if (s->refused[i]) (void)printf("  %" PRIu64 " %s", s->refused[i], wm_status_text((wm_status)i));
+  if (s->late) (void)printf("  %" PRIu64 " late", s->late);
+  if (s->dropped) (void)printf("  %" PRIu64 " dropped", s->dropped);
+  (void)putchar('\n');
+}
+
+void print_report(const wm_run_report *r, const char *name, const char *out_dir, double took_s) {
+  (void)printf("%s: %.1f s, %" PRIu64 " events, %" PRIu64 " poses; %.1f MB of memory; took %.2f s\n", name,
+               r->recorded_s, r->events, r->poses, (double)r->memory_bytes * 1e-6, took_s);
+  for (uint32_t i = 0; i < r->health.source_count; i++) print_source(&r->health.sources[i]);
+  for (uint32_t i = 0; i < r->health.calibration_count; i++)
+    (void)printf("  %-32s %10.5g  +- %.2g\n", r->health.calibration[i].name, r->health.calibration[i].value,
+                 r->health.calibration[i].sigma);
+  (void)printf("  %s at the end; written to %s\n", wm_state_name(r->health.state), out_dir);
+  (void)fflush(stdout);
+  (void)wm_findings(&r->health, print_note, NULL);
+}
+
+// ── progress ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+void progress_begin(progress_line *self) { *self = (progress_line){.begin_ns = wm_monotonic_ns()}; }
+
+void progress_show(void *context, double done) {
+  progress_line *self = context;
+  double elapsed_s = wm_seconds_between(self->begin_ns, wm_monotonic_ns());
+  if (elapsed_s < 2.0 || !isatty(STDERR_FILENO)) return;
+  self->shown = 1;
+  if (done > 0 && done <= 1) {
+    (void)fprintf(stderr, "\r\033[K%3.0f %%, %.0f s left", done * 100, elapsed_s * (1 - done) / done);
+  } else {
+    (void)fprintf(stderr, "\r\033[K%.0f s", elapsed_s);
+  }
+}
+
+void progress_end(progress_line *self) {
+  if (self->shown) (void)fputs("\r\033[K", stderr);
+}

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "commands.h"
+#include "waymark/text.h"
+
+static const char kHelp[] =
+    "waymark tells a robot where it is.\n"
+    "\n"
+    "usage: waymark COMMAND ...\n"
+    "\n"
+    "  run       localize live: a recording at real speed, poses over LCM\n"
+    "  replay    localize from a recording or an event log, as fast as it goes\n"
+    "  check     say what can be known of a configuration and a recording before driving\n"
+    "  help      this text; `waymark COMMAND --help` tells more\n"
+    "\n"
+    "The desk's commands (waymark eval, report, simulate ...) are programs named waymark-COMMAND beside this one.\n"
+    "\n"
+    "exit code: 0 done, 1 the work failed, 2 usage or configuration\n"
+    "\n"
+    "example:\n"
+    "  waymark replay RECORDING --config config/starry-night-plan.yaml --out out/run\n";
+
+static const struct {
+  const char *name;
+  int (*run)(int argc, char *const *argv);
+} kCommands[] = {{"replay", command_replay}, {"check", command_check}};
+#define COMMANDS (sizeof kCommands / sizeof kCommands[0])
+
+// Programs named waymark-COMMAND in this one's folder, then in PATH, as git finds its own. Returns only if there is
+// none.
+static void try_external(const char *command, char **argv) {
+  if (strchr(command, '/')) return;
+  char self[WM_PATH_MAX], path[WM_PATH_MAX + 80];
+  ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
+  if (length > 0) {
+    self[length] = '\0';
+    char *slash = strrchr(self, '/');
+    if (slash) *slash = '\0';
+    (void)snprintf(path, sizeof path, "%s/waymark-%s", self, command);
+    (void)execv(path, argv);
+  }
+  (void)snprintf(path, sizeof path, "waymark-%s", command);
+  (void)execvp(path, argv);
+}
+
+int main(int argc, char **argv) {
+  const char *command = argc > 1 ? argv[1] : NULL;
+  if (!command) {
+    (void)fputs(kHelp, stderr);
+    return EXIT_USAGE;
+  }
+  if (strcmp(command, "help") == 0 || strcmp(command, "--help") == 0 || strcmp(command, "-h") == 0) {
+    (void)fputs(kHelp, stdout);
+    return EXIT_DONE;
+  }
+  if (strcmp(command, "--version") == 0) {
+    (void)puts("waymark " WM_VERSION);
+    return EXIT_DONE;
+  }
+  for (size_t i = 0; i < COMMANDS; i++)
+    if (strcmp(command, kCommands[i].name) == 0) return kCommands[i].run(argc - 2, argv + 2);
+
+  try_external(command, argv + 1);
+  static const char *const kNames[] = {"run", "replay", "check", "help", "eval", "report", "simulate", NULL};
+  const char *nearest = wm_word_nearest(command, kNames);
+  if (nearest && strcmp(nearest, command) != 0) {
+    (void)fprintf(stderr, "waymark: '%s' is no command; did you mean '%s'? (waymark help lists them)\n", command,
+                  nearest);
+  } else {
+    (void)fprintf(stderr, "waymark: '%s' is no command, and there is no program waymark-%s (waymark help lists them)\n",
+                  command, command);
+  }
+  return EXIT_USAGE;
+}

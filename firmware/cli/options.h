@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+// A command line: `--name VALUE` or `--name=VALUE`, flags, and words in between. An option that isn't known is answered
+// with the nearest one.
+#ifndef WAYMARK_FIRMWARE_OPTIONS_H
+#define WAYMARK_FIRMWARE_OPTIONS_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "waymark/status.h"
+
+typedef enum option_kind { OPTION_TEXT, OPTION_U64, OPTION_F64, OPTION_FLAG } option_kind;
+
+typedef struct option {
+  const char *name;  // "--out"
+  option_kind kind;
+  void *out;  // const char **, uint64_t *, double *, int *
+} option;
+
+// Fills the options' places and puts the other words into `words` (at most `capacity`). WM_BAD_USAGE with the reason.
+wm_status options_parse(int argc, char *const *argv, const option *options, size_t count, const char **words,
+                        size_t capacity, size_t *word_count, wm_error *err);
+
+#endif

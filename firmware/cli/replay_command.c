@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "commands.h"
+#include "options.h"
+#include "waymark/clock.h"
+#include "waymark/codec.h"
+#include "waymark/eventlog.h"
+
+static const char kHelp[] =
+    "usage: waymark replay RECORDING --config FILE --out FOLDER [options]\n"
+    "       waymark replay events.wmlog --out FOLDER [options]\n"
+    "\n"
+    "Localizes from a recording (docs/recording-format.md), or makes the trajectory of a run again, bit by bit, from "
+    "its\n"
+    "event log, which needs no recording.\n"
+    "\n"
+    "  --config FILE       which estimator, and its parameters; of an event log: another one than its own\n"
+    "  --out FOLDER        where trajectory, published poses, event log, health and timing are written\n"
+    "  --seed N            of random numbers (default 1; an event log brings its own)\n"
+    "  --landmarks FILE    instead of the recording's map; an event log refuses any map but its own\n"
+    "  --calibration FILE  instead of the recording's\n"
+    "\n"
+    "example:\n"
+    "  waymark replay RECORDING --config config/starry-night-plan.yaml --out out/run\n"
+    "  waymark replay out/run/events.wmlog --out out/again\n";
+
+typedef struct arguments {
+  const char *config, *out, *landmarks, *calibration;
+  uint64_t seed;
+  const char *what;
+} arguments;
+
+static int replay_recording(const arguments *args) {
+  wm_error err = {0};
+  wm_config config;
+  if (wm_config_load(args->config, &config, &err) != WM_OK) return complain(&err);
+  wm_recording *recording = NULL;
+  wm_status status = override_path(config.overrides.landmarks, args->landmarks, &err);
+  if (status == WM_OK) status = override_path(config.overrides.calibration, args->calibration, &err);
+  if (status == WM_OK) status = wm_recording_open(args->what, &config.overrides, print_note, NULL, &recording, &err);
+  if (status == WM_OK) {
+    progress_line progress;
+    progress_begin(&progress);
+    const wm_replay_options options = {args->out, args->seed, progress_show, &progress};
+    static wm_run_report report;
+    status = wm_replay_recording(&config, recording, &options, &report, &err);
+    progress_end(&progress);
+    if (status == WM_OK)
+      print_report(&report, wm_recording_name(recording), args->out,
+                   wm_seconds_between(progress.begin_ns, wm_monotonic_ns()));
+  }
+  wm_recording_close(recording);
+  wm_config_free(&config);
+  return status == WM_OK ? EXIT_DONE : complain(&err);
+}
+
+// A log's poses belong to its map: another one is refused, not silently used.
+static wm_status check_map(const char *file, const wm_log_head *head, const char *log, wm_error *err) {
+  if (!file) return WM_OK;
+  wm_landmark *landmarks;
+  size_t count;
+  wm_status status = wm_landmarks_load(file, print_note, NULL, &landmarks, &count, err);
+  if (status != WM_OK) return status;
+  uint64_t hash = wm_landmarks_hash(landmarks, count);
+  free(landmarks);
+  if (hash == head->landmark_hash) return WM_OK;
+  return wm_fail(err, WM_BAD_CONFIG,
+                 "%s: was made with another map: its %zu landmarks have the hash %016" PRIx64
+                 ", the %zu of %s have "
+                 "%016" PRIx64 ". Without --landmarks the log's own map is used; a new map needs the recording",
+                 log, head->landmark_count, head->landmark_hash, count, file, hash);
+}
+
+static int replay_log(const arguments *args) {
+  wm_error err = {0};
+  wm_log_reader *log;
+  if (args->calibration) {
+    (void)fputs("waymark: --calibration: an event log brings its own; another one needs the recording\n", stderr);
+    return EXIT_USAGE;
+  }
+  if (wm_log_open(args->what, &log, &err) != WM_OK) return complain(&err);
+  const wm_log_head *head = wm_log_reader_head(log);
+  wm_status status = check_map(args->landmarks, head, args->what, &err);
+  wm_config config;
+  memset(&config, 0, sizeof config);
+  if (status == WM_OK)
+    status = args->config ? wm_config_load(args->config, &config, &err)
+                          : wm_config_parse(head->config_text, head->config_length, head->config_path, &config, &err);
+  if (status == WM_OK) {
+    if (strcmp(head->program, WM_VERSION) != 0)
+      (void)fprintf(stderr, "note: %s was written by waymark %s; this is %s: the last bits may differ\n", args->what,
+                    head->program, WM_VERSION);
+    wm_time_ns begin_ns = wm_monotonic_ns();
+    const wm_replay_options options = {.out_dir = args->out};
+    static wm_run_report report;
+    status = wm_replay_log(&config, log, &options, &report, &err);
+    if (report.log_was_cut)
+      (void)fprintf(stderr, "note: %s was not closed in order (power cut?): it holds what was fused until then\n",
+                    args->what);
+    if (report.events_missing > 0)
+      (void)fprintf(stderr, "note: %s lacks %" PRIu64 " events: poses after them are not those of the run\n",
+                    args->what, report.events_missing);
+    if (status == WM_OK)
+      print_report(&report, head->recording, args->out, wm_seconds_between(begin_ns, wm_monotonic_ns()));
+  }
+  wm_config_free(&config);
+  wm_log_reader_close(log);
+  return status == WM_OK ? EXIT_DONE : complain(&err);
+}
+
+int command_replay(int argc, char *const *argv) {
+  arguments args = {.seed = 1};
+  int help = 0;
+  const option options[] = {{"--config", OPTION_TEXT, &args.config},
+                            {"--out", OPTION_TEXT, &args.out},
+                            {"--seed", OPTION_U64, &args.seed},
+                            {"--landmarks", OPTION_TEXT, &args.landmarks},
+                            {"--calibration", OPTION_TEXT, &args.calibration},
+                            {"--help", OPTION_FLAG, &help},
+                            {"-h", OPTION_FLAG, &help}};
+  wm_error err = {0};
+  size_t words;
+  if (options_parse(argc, argv, options, sizeof options / sizeof options[0], &args.what, 1, &words, &err) != WM_OK)
+    return complain(&err);
+  if (help) {
+    (void)fputs(kHelp, stdout);
+    return EXIT_DONE;
+  }
+  struct stat there;
+  if (words == 0 || !args.out) {
+    (void)fprintf(stderr, "waymark: replay needs %s\n\n%s", words == 0 ? "a recording or an event log" : "--out FOLDER",
+                  kHelp);
+    return EXIT_USAGE;
+  }
+  if (stat(args.what, &there) == 0 && !S_ISDIR(there.st_mode)) return replay_log(&args);
+  if (!args.config) {
+    (void)fprintf(stderr, "waymark: replay of a recording needs --config FILE\n\n%s", kHelp);
+    return EXIT_USAGE;
+  }
+  return replay_recording(&args);
+}

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/fuser.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "waymark/clock.h"
+
+#define Q_BIT(q) (UINT32_C(1) << (q))
+#define TICKS (Q_BIT(WM_Q_WHEEL_TICKS_LEFT) | Q_BIT(WM_Q_WHEEL_TICKS_RIGHT))
+#define SPEEDS                                                                                                    \
+  (Q_BIT(WM_Q_WHEEL_SPEED_FRONT_LEFT) | Q_BIT(WM_Q_WHEEL_SPEED_FRONT_RIGHT) | Q_BIT(WM_Q_WHEEL_SPEED_REAR_LEFT) | \
+   Q_BIT(WM_Q_WHEEL_SPEED_REAR_RIGHT) | Q_BIT(WM_Q_VEHICLE_SPEED))
+
+size_t wm_output_bytes(uint32_t kinds) {
+  size_t bytes = sizeof(wm_published);
+  if (bytes < WM_EVENT_SMALL_BYTES) bytes = WM_EVENT_SMALL_BYTES;
+  if (kinds & WM_EVENT_BIT(WM_EVENT_POINTS)) bytes = sizeof(wm_event);
+  return bytes;
+}
+
+wm_driving wm_driving_choose(uint32_t kinds, uint32_t quantities) {
+  static const uint32_t kPreferred[] = {TICKS, Q_BIT(WM_Q_YAW_RATE), SPEEDS};
+  if (kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES))
+    for (size_t i = 0; i < sizeof kPreferred / sizeof kPreferred[0]; i++)
+      if (quantities & kPreferred[i])
+        return (wm_driving){.kinds = WM_EVENT_BIT(WM_EVENT_QUANTITIES), .quantities = kPreferred[i]};
+  return (wm_driving){.kinds = WM_EVENT_BIT(WM_EVENT_TWIST2) | WM_EVENT_BIT(WM_EVENT_TWIST6)};
+}
+
+int wm_driving_is(const wm_driving *driving, const wm_event *event) {
+  if (!(driving->kinds & WM_EVENT_BIT(event->kind))) return 0;
+  if (event->kind != WM_EVENT_QUANTITIES) return 1;
+  for (size_t i = 0; i < event->as.quantities.count; i++)
+    if (driving->quantities & Q_BIT(event->as.quantities.id[i])) return 1;
+  return 0;
+}
+
+void wm_fuser_init(wm_fuser *self, const wm_estimator *estimator, void *state, wm_driving driving, wm_output output) {
+  memset(self, 0, sizeof *self);
+  self->estimator = estimator;
+  self->state = state;
+  self->driving = driving;
+  self->output = output;
+  self->row_ns = WM_TIME_NONE;
+  self->last_row_ns = WM_TIME_NONE;
+  self->until_ns = WM_TIME_NONE;
+}
+
+int wm_estimate_has_pose(const wm_estimate *e) {
+  const double *p = e->pose_map_base.p_m;
+  return e->state != WM_STATE_SEARCHING && isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]) &&
+         isfinite(e->heading_rad);
+}
+
+static void write_row(wm_fuser *self) {
+  wm_estimate estimate;
+  self->estimator->estimate(self->state, &estimate);
+  self->row_ns = WM_TIME_NONE;
+  if (!wm_estimate_has_pose(&estimate) || estimate.t_ns <= self->last_row_ns) return;
+  self->last_row_ns = estimate.t_ns;
+  self->poses++;
+  self->output.put(self->output.context, WM_OUTPUT_POSE, &estimate, sizeof estimate);
+}
+
+static wm_status predict(wm_fuser *self, const wm_event *event) {
+  wm_time_ns begin_ns = wm_monotonic_ns();
+  wm_status status = self->estimator->predict(self->state, event);
+  wm_histogram_add(&self->predict_ns, wm_monotonic_ns() - begin_ns);
+  return status;
+}
+
+static wm_status correct(wm_fuser *self, const wm_event *event) {
+  wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
+  size_t count = 0;
+  wm_time_ns begin_ns = wm_monotonic_ns();
+  wm_status status = self->estimator->correct(self->state, event, out, WM_INNOVATIONS_PER_EVENT_MAX, &count);
+  wm_histogram_add(&self->correct_ns, wm_monotonic_ns() - begin_ns);
+  if (status != WM_OK && count == 0) return status;
+
+  wm_fuser_counts *counts = &self->counts[event->source];
+  int any_fused = count == 0;  // SET_POSE, RESET, LOOKED: taken, with nothing to explain
+  for (size_t i = 0; i < count; i++) {
+    any_fused |= out[i].verdict == WM_FUSED;
+    out[i].source = event->source;
+    self->innovations++;
+    self->output.put(self->output.context, WM_OUTPUT_INNOVATION, &out[i], sizeof out[i]);
+  }
+  if (any_fused) {
+    counts->fused++;
+  } else {
+    counts->rejected[out[0].verdict]++;
+  }
+  return WM_OK;
+}
+
+void wm_fuser_feed(wm_fuser *self, const wm_event *event) {
+  if (self->row_ns != WM_TIME_NONE && event->t_ns > self->row_ns) write_row(self);
+  self->output.put(self->output.context, WM_OUTPUT_EVENT, event, wm_event_bytes(event));
+  self->events++;
+
+  wm_fuser_counts *counts = &self->counts[event->source];
+  if (wm_event_is_motion(event)) {
+    wm_status status = predict(self, event);
+    if (status != WM_OK) {
+      counts->refused[status]++;
+      return;
+    }
+    counts->fused++;
+    if (wm_driving_is(&self->driving, event)) self->row_ns = event->t_ns;
+  } else {
+    wm_status status = correct(self, event);
+    if (status != WM_OK) {
+      counts->refused[status]++;
+      return;
+    }
+  }
+  self->until_ns = event->t_ns;
+}
+
+void wm_fuser_finish(wm_fuser *self) {
+  if (self->row_ns != WM_TIME_NONE) write_row(self);
+}

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the estimator's side says to the sinks: one function that takes tagged records. In replay it writes files; in a
+// run it puts the record into a ring and returns at once.
+#ifndef WAYMARK_OUTPUT_H
+#define WAYMARK_OUTPUT_H
+
+#include <stddef.h>
+
+#include "waymark/event.h"
+#include "waymark/health.h"
+#include "waymark/pose.h"
+
+typedef enum wm_output_kind {
+  WM_OUTPUT_EVENT = 1,   // wm_event: handed to the estimator now
+  WM_OUTPUT_POSE,        // wm_estimate: fused, at a stamp of the driving motion
+  WM_OUTPUT_INNOVATION,  // wm_innovation
+  WM_OUTPUT_PUBLISHED,   // wm_published
+  WM_OUTPUT_HEALTH       // wm_health
+} wm_output_kind;
+
+typedef struct wm_output {
+  void (*put)(void *context, wm_output_kind kind, const void *record, size_t bytes);
+  void *context;
+} wm_output;
+
+// The largest record that isn't health, for events of these kinds (bits).
+size_t wm_output_bytes(uint32_t kinds);
+
+#endif

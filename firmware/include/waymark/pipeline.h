@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// The estimator's side of a run as one object: merge, estimator, predictor. Replay and run call the same four functions
+// in the same order; only who calls them, and what stands behind `output`, differs.
+//
+//   arrive(event)      an event has arrived            (integrated for now, queued for its time)
+//   advance(now)       the arrival clock is at now     (what is final is fused)
+//   publish(now)       a message is due                (fused pose carried to now)
+//   finish()           nothing will come any more      (what waits is fused)
+//
+// No allocation, no lock, no system call after start. One thread.
+#ifndef WAYMARK_PIPELINE_H
+#define WAYMARK_PIPELINE_H
+
+#include "waymark/arena.h"
+#include "waymark/assembly.h"
+#include "waymark/fuser.h"
+#include "waymark/histogram.h"
+#include "waymark/merge.h"
+#include "waymark/output.h"
+#include "waymark/predictor.h"
+
+#define WM_PIPELINE_NEEDS 3
+
+typedef struct wm_pipeline {
+  const wm_assembly *assembly;
+  wm_output output;
+  wm_merge *merge;
+  wm_fuser fuser;
+  wm_predictor predictor;
+  uint64_t published;
+  wm_histogram arrive_ns, publish_ns;
+  void *merge_memory, *state_memory, *odometry_memory;
+} wm_pipeline;
+
+// The memory that it wants, for a table of wm_arena_need; the addresses land in *self.
+void wm_pipeline_needs(wm_pipeline *self, const wm_assembly *assembly, wm_arena_need needs[WM_PIPELINE_NEEDS]);
+// With the memory in place. The only function of these that may take long.
+wm_status wm_pipeline_start(wm_pipeline *self, wm_output output, wm_error *err);
+
+void wm_pipeline_arrive(wm_pipeline *self, const wm_event *event);
+void wm_pipeline_advance(wm_pipeline *self, wm_time_ns now_ns);
+// The pose of `now_ns` into *out, not yet sent. 0 where there is none to tell.
+int wm_pipeline_publish(wm_pipeline *self, wm_time_ns now_ns, wm_published *out);
+void wm_pipeline_finish(wm_pipeline *self);
+
+// Fills all but what sources and loop count themselves. Not cheap (tens of us): once a second.
+void wm_pipeline_health(const wm_pipeline *self, wm_time_ns now_ns, wm_health *out);
+
+#endif

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// The folder that a run writes (docs/recording-format.md): trajectory.tum, trajectory.csv, published.csv,
+// innovations.csv, events.wmlog as it goes; health.json and timing.json at the end. Buffers are its own: no allocation
+// after it is open. One thread, never the estimator's in a live run.
+#ifndef WAYMARK_RUN_FOLDER_H
+#define WAYMARK_RUN_FOLDER_H
+
+#include <stdint.h>
+
+#include "waymark/assembly.h"
+#include "waymark/health.h"
+#include "waymark/histogram.h"
+#include "waymark/output.h"
+#include "waymark/status.h"
+
+typedef struct wm_run_folder wm_run_folder;
+
+// Makes `dir` if it isn't there; files of an earlier run in it are written anew.
+wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_run_folder **out, wm_error *err);
+// Where records go: give it to the pipeline, or call it from a sink thread.
+wm_output wm_run_folder_output(wm_run_folder *self);
+// Events that the sink lost are marked in the log, so that a replay of it knows.
+void wm_run_folder_gap(wm_run_folder *self, uint64_t missing_events);
+// To the system, so that a power cut costs at most what came since.
+void wm_run_folder_flush(wm_run_folder *self);
+
+typedef struct wm_timing_stage {
+  const char *name;
+  const wm_histogram *histogram;
+} wm_timing_stage;
+
+typedef struct wm_timing {
+  const wm_timing_stage *stages;
+  size_t stage_count;
+  int64_t allocations_after_start;  // of the estimator's thread; -1 where they can't be counted
+  int64_t page_faults_after_start;
+  uint64_t deadlines_missed, deadlines_total;
+  size_t memory_bytes;
+} wm_timing;
+
+wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_error *err);
+wm_status wm_run_folder_timing(wm_run_folder *self, const wm_timing *timing, wm_error *err);
+// Closes everything. WM_IO with the first thing that could not be written.
+wm_status wm_run_folder_close(wm_run_folder *self, wm_error *err);
+
+#endif

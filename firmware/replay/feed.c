@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/feed.h"
+
+#include <math.h>
+#include <string.h>
+
+static wm_time_ns limit(wm_time_ns first_ns, double seconds, wm_time_ns none) {
+  if (!isfinite(seconds) || fabs(seconds) > 1e9) return none;
+  wm_time_ns t_ns;
+  if (__builtin_add_overflow(first_ns, wm_ns_from_seconds(seconds), &t_ns)) return none;
+  return t_ns;
+}
+
+static wm_status read_one(wm_feed *self, wm_error *err) {
+  wm_status status = self->source->ops->next(self->source, &self->next, err);
+  self->has_next = status == WM_OK;
+  self->next.source = self->index;
+  return status == WM_END || status == WM_AGAIN ? WM_OK : status;
+}
+
+static int inside(const wm_feed *self) { return self->next.t_ns >= self->from_ns && self->next.t_ns <= self->until_ns; }
+
+static wm_status skip_outside(wm_feed *self, wm_error *err) {
+  while (self->has_next && !inside(self)) {
+    self->outside++;
+    wm_status status = read_one(self, err);
+    if (status != WM_OK) return status;
+  }
+  return WM_OK;
+}
+
+wm_status wm_feed_advance(wm_feed *self, wm_error *err) {
+  wm_status status = read_one(self, err);
+  return status == WM_OK ? skip_outside(self, err) : status;
+}
+
+wm_status wm_feeds_open(const wm_assembly *assembly, wm_feed *feeds, wm_time_ns *first_ns, wm_error *err) {
+  *first_ns = INT64_MAX;
+  for (size_t i = 0; i < assembly->source_count; i++) {
+    wm_feed *feed = &feeds[i];
+    memset(feed, 0, sizeof *feed);
+    feed->source = assembly->sources[i].source;
+    feed->index = (uint16_t)i;
+    wm_status status = read_one(feed, err);
+    if (status != WM_OK) return status;
+    if (feed->has_next && feed->next.t_ns < *first_ns) *first_ns = feed->next.t_ns;
+  }
+  if (*first_ns == INT64_MAX)
+    return wm_fail(err, WM_BAD_DATA, "'%s' has nothing to say: none of its %zu sources holds a datum that can be used",
+                   assembly->recording, assembly->source_count);
+  for (size_t i = 0; i < assembly->source_count; i++) {
+    feeds[i].from_ns = limit(*first_ns, assembly->sources[i].from_s, INT64_MIN);
+    feeds[i].until_ns = limit(*first_ns, assembly->sources[i].until_s, INT64_MAX);
+    wm_status status = skip_outside(&feeds[i], err);
+    if (status != WM_OK) return status;
+  }
+  return WM_OK;
+}
+
+wm_feed *wm_feeds_earliest(wm_feed *feeds, size_t count) {
+  wm_feed *earliest = NULL;
+  for (size_t i = 0; i < count; i++)
+    if (feeds[i].has_next && (!earliest || feeds[i].next.arrival_ns < earliest->next.arrival_ns)) earliest = &feeds[i];
+  return earliest;
+}
+
+void wm_feeds_health(const wm_feed *feeds, size_t count, wm_health *health) {
+  for (size_t i = 0; i < count && i < health->source_count; i++) {
+    const wm_source_counts *counts = &feeds[i].source->counts;
+    wm_source_health *out = &health->sources[i];
+    out->lost = counts->lost;
+    out->malformed = counts->malformed;
+    out->not_finite = counts->not_finite;
+    out->out_of_order = counts->out_of_order;
+    out->ignored = counts->ignored + feeds[i].outside;
+    out->frozen = counts->frozen;
+  }
+}

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/replay.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "waymark/arena.h"
+#include "waymark/clock.h"
+#include "waymark/feed.h"
+#include "waymark/pipeline.h"
+#include "waymark/run_folder.h"
+#include "waymark/steady.h"
+
+#define STACK_BYTES ((size_t)256 << 10)
+#define PROGRESS_EVERY_NS (200 * WM_NS_PER_MS)
+
+typedef struct replay {
+  wm_assembly assembly;
+  wm_arena arena;
+  wm_pipeline pipeline;
+  wm_feed *feeds;
+  wm_run_folder *folder;
+  wm_output output;
+  wm_time_ns first_ns, now_ns;          // the run's clock is that of the arrivals
+  wm_time_ns publish_ns, next_tick_ns;  // period and next due message
+  int64_t allocations, page_faults;     // before the start; after it: since
+} replay;
+
+// ── start ───────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_status take_memory(replay *self, wm_error *err) {
+  wm_arena_need needs[WM_PIPELINE_NEEDS + 1];
+  wm_pipeline_needs(&self->pipeline, &self->assembly, needs);
+  needs[WM_PIPELINE_NEEDS] =
+      (wm_arena_need){"feeds", self->assembly.source_count * sizeof(wm_feed), (void **)&self->feeds};
+  return wm_arena_fill(&self->arena, needs, WM_PIPELINE_NEEDS + 1, 0, err);
+}
+
+static void begin_steady(replay *self) {
+  wm_touch_program();
+  wm_touch_stack(STACK_BYTES);
+  self->allocations = wm_allocations_of_this_thread();
+  self->page_faults = wm_page_faults_of_this_thread();
+}
+
+static void end_steady(replay *self) {
+  self->page_faults = wm_page_faults_of_this_thread() - self->page_faults;
+  int64_t allocations = wm_allocations_of_this_thread();
+  self->allocations = allocations < 0 ? -1 : allocations - self->allocations;
+}
+
+// ── the loop ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+// Messages that were due before `now_ns`: at absolute ticks of the arrival clock, with no computing time.
+static void publish_until(replay *self, wm_time_ns now_ns) {
+  while (self->next_tick_ns < now_ns) {
+    wm_published published;
+    wm_pipeline_advance(&self->pipeline, self->next_tick_ns);
+    if (wm_pipeline_publish(&self->pipeline, self->next_tick_ns, &published)) {
+      published.sent_ns = self->next_tick_ns;
+      self->output.put(self->output.context, WM_OUTPUT_PUBLISHED, &published, sizeof published);
+    }
+    self->next_tick_ns += self->publish_ns;
+  }
+}
+
+static wm_time_ns first_tick(wm_time_ns now_ns, wm_time_ns period_ns) {
+  wm_time_ns remainder_ns = now_ns % period_ns;
+  if (remainder_ns < 0) remainder_ns += period_ns;
+  return remainder_ns ? now_ns - remainder_ns + period_ns : now_ns;
+}
+
+// A gap of the arrival clock that no run has: a corrupt stamp. Time is not played through it tick by tick.
+#define LONGEST_SILENCE_NS (24 * 3600 * WM_NS_PER_S)
+
+static wm_status play(replay *self, const wm_replay_options *options, double duration_s, wm_error *err) {
+  size_t count = self->assembly.source_count;
+  wm_time_ns told_ns = wm_monotonic_ns();
+  uint64_t events = 0;
+  self->now_ns = WM_TIME_NONE;
+  for (wm_feed *feed; (feed = wm_feeds_earliest(self->feeds, count)) != NULL;) {
+    wm_time_ns arrival_ns = feed->next.arrival_ns;
+    if (self->now_ns == WM_TIME_NONE || arrival_ns / 2 - self->now_ns / 2 > LONGEST_SILENCE_NS / 2)
+      self->next_tick_ns = first_tick(arrival_ns, self->publish_ns);
+    publish_until(self, arrival_ns);
+    self->now_ns = arrival_ns;
+    wm_pipeline_advance(&self->pipeline, arrival_ns);
+    wm_pipeline_arrive(&self->pipeline, &feed->next);
+    wm_status status = wm_feed_advance(feed, err);
+    if (status != WM_OK) return status;
+    if (options->progress && ++events % 256 == 0 && wm_monotonic_ns() - told_ns > PROGRESS_EVERY_NS) {
+      told_ns = wm_monotonic_ns();
+      options->progress(options->progress_context, wm_seconds_between(self->first_ns, self->now_ns) / duration_s);
+    }
+  }
+  publish_until(self, self->now_ns + 1);
+  wm_pipeline_finish(&self->pipeline);
+  return WM_OK;
+}
+
+// ── what is left to write ───────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_status write_summary(replay *self, wm_run_report *report, wm_error *err) {
+  wm_pipeline_health(&self->pipeline, self->now_ns, &report->health);
+  wm_feeds_health(self->feeds, self->assembly.source_count, &report->health);
+  report->poses = self->pipeline.fuser.poses;
+  report->events = self->pipeline.fuser.events;
+  report->recorded_s = wm_seconds_between(self->first_ns, self->now_ns);
+  report->memory_bytes = self->arena.bytes;
+  report->allocations_after_start = self->allocations;
+  report->page_faults_after_start = self->page_faults;
+
+  const wm_timing_stage stages[] = {{"arrive", &self->pipeline.arrive_ns},
+                                    {"predict", &self->pipeline.fuser.predict_ns},
+                                    {"correct", &self->pipeline.fuser.correct_ns},
+                                    {"publish", &self->pipeline.publish_ns}};
+  const wm_timing timing = {.stages = stages,
+                            .stage_count = sizeof stages / sizeof stages[0],
+                            .allocations_after_start = self->allocations,
+                            .page_faults_after_start = self->page_faults,
+                            .memory_bytes = self->arena.bytes};
+  wm_status status = wm_run_folder_health(self->folder, &report->health, err);
+  return status == WM_OK ? wm_run_folder_timing(self->folder, &timing, err) : status;
+}
+
+static wm_status run(replay *self, const wm_config *config, wm_recording *recording, const wm_replay_options *options,
+                     wm_run_report *report, wm_error *err) {
+  wm_status status = wm_assemble(config, recording, options->seed, &self->assembly, err);
+  if (status == WM_OK) status = take_memory(self, err);
+  if (status == WM_OK) status = wm_run_folder_open(options->out_dir, &self->assembly, &self->folder, err);
+  if (status != WM_OK) return status;
+  self->output = wm_run_folder_output(self->folder);
+  self->publish_ns = wm_ns_from_seconds(1.0 / config->runtime.publish_rate_hz);
+  status = wm_pipeline_start(&self->pipeline, self->output, err);
+  if (status == WM_OK) status = wm_feeds_open(&self->assembly, self->feeds, &self->first_ns, err);
+  if (status != WM_OK) return status;
+
+  begin_steady(self);
+  status = play(self, options, wm_recording_duration_s(recording), err);
+  end_steady(self);
+  return status == WM_OK ? write_summary(self, report, err) : status;
+}
+
+wm_status wm_replay_recording(const wm_config *config, wm_recording *recording, const wm_replay_options *options,
+                              wm_run_report *report, wm_error *err) {
+  memset(report, 0, sizeof *report);
+  replay *self = calloc(1, sizeof *self);
+  if (!self) return wm_fail(err, WM_IO, "no memory for a replay");
+  wm_status status = run(self, config, recording, options, report, err);
+  wm_error close_error;
+  wm_status closed = wm_run_folder_close(self->folder, &close_error);
+  if (status == WM_OK && closed != WM_OK) {
+    status = closed;
+    if (err) *err = close_error;
+  }
+  wm_arena_close(&self->arena);
+  free(self);
+  return status;
+}

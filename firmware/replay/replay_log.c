@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: Apache-2.0
+// The event log of a run: its events, as they were fused, into the estimator again.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "waymark/arena.h"
+#include "waymark/replay.h"
+#include "waymark/run_folder.h"
+#include "waymark/steady.h"
+
+typedef struct log_replay {
+  wm_assembly assembly;
+  wm_arena arena;
+  void *state;
+  wm_fuser fuser;
+  wm_run_folder *folder;
+  uint64_t received[WM_SOURCES_MAX];
+  wm_time_ns first_ns, last_ns;
+} log_replay;
+
+static void assemble(log_replay *self, const wm_config *config, const wm_log_head *head) {
+  wm_assembly *a = &self->assembly;
+  a->config = config;
+  a->setup = (wm_setup){.motion = config->motion,
+                        .wheels = head->wheels,
+                        .sensors = head->sensors,
+                        .sensor_count = head->sensor_count,
+                        .landmarks = head->landmarks,
+                        .landmark_count = head->landmark_count,
+                        .start = head->start,
+                        .seed = head->seed};
+  a->driving = head->driving;
+  a->source_count = head->source_count;
+  for (size_t i = 0; i < a->source_count; i++) {
+    (void)snprintf(a->sources[i].name, sizeof a->sources[i].name, "%s", head->sources[i].name);
+    a->sources[i].kinds = head->sources[i].kinds;
+    a->kinds |= head->sources[i].kinds;
+  }
+  a->calibration_text = head->calibration_text;
+  a->calibration_length = head->calibration_length;
+  (void)snprintf(a->recording, sizeof a->recording, "%s", head->recording);
+}
+
+static wm_status start(log_replay *self, const wm_replay_options *options, wm_error *err) {
+  const wm_config *config = self->assembly.config;
+  const char *why = NULL;
+  size_t bytes = config->estimator->state_bytes(config->estimator_params, &self->assembly.setup, &why);
+  if (bytes == 0)
+    return wm_fail(err, WM_BAD_CONFIG, "%s: estimator '%s' can't work with this log: %s", config->path,
+                   config->estimator->name, why ? why : "it doesn't say why");
+  wm_arena_need need = {"estimator", bytes, &self->state};
+  wm_status status = wm_arena_fill(&self->arena, &need, 1, 0, err);
+  if (status != WM_OK) return status;
+  status = config->estimator->init(self->state, config->estimator_params, &self->assembly.setup);
+  if (status != WM_OK)
+    return wm_fail(err, status, "estimator '%s' can't start: %s", config->estimator->name, wm_status_text(status));
+  status = wm_run_folder_open(options->out_dir, &self->assembly, &self->folder, err);
+  if (status != WM_OK) return status;
+  wm_fuser_init(&self->fuser, config->estimator, self->state, self->assembly.driving,
+                wm_run_folder_output(self->folder));
+  return WM_OK;
+}
+
+static wm_status play(log_replay *self, wm_log_reader *log, wm_run_report *report, wm_error *err) {
+  wm_event event;
+  wm_status status;
+  while ((status = wm_log_next(log, &event, &report->events_missing, &report->log_was_cut, err)) == WM_OK) {
+    if (self->fuser.events == 0) self->first_ns = event.t_ns;
+    self->last_ns = event.t_ns;
+    self->received[event.source]++;
+    wm_fuser_feed(&self->fuser, &event);
+  }
+  wm_fuser_finish(&self->fuser);
+  return status == WM_END ? WM_OK : status;
+}
+
+static void fill_health(const log_replay *self, wm_health *out) {
+  const wm_estimator *estimator = self->assembly.config->estimator;
+  wm_estimate estimate;
+  estimator->estimate(self->state, &estimate);
+  out->t_ns = self->last_ns;
+  out->fused_until_ns = self->fuser.until_ns;
+  out->state = estimate.state;
+  out->resets = estimate.resets;
+  if (estimator->motion_health) out->motion_health = estimator->motion_health(self->state);
+  if (estimator->calibration)
+    out->calibration_count = (uint32_t)estimator->calibration(self->state, out->calibration, WM_HEALTH_CALIBRATION_MAX);
+  out->source_count = (uint32_t)self->assembly.source_count;
+  for (uint32_t i = 0; i < out->source_count; i++) {
+    wm_source_health *s = &out->sources[i];
+    const wm_fuser_counts *counts = &self->fuser.counts[i];
+    (void)snprintf(s->name, sizeof s->name, "%s", self->assembly.sources[i].name);
+    s->received = self->received[i];
+    s->fused = counts->fused;
+    memcpy(s->rejected, counts->rejected, sizeof s->rejected);
+    memcpy(s->refused, counts->refused, sizeof s->refused);
+    s->newest_ns = WM_TIME_NONE;
+  }
+}
+
+static wm_status write_summary(log_replay *self, wm_run_report *report, wm_error *err) {
+  fill_health(self, &report->health);
+  report->poses = self->fuser.poses;
+  report->events = self->fuser.events;
+  report->recorded_s = wm_seconds_between(self->first_ns, self->last_ns);
+  report->memory_bytes = self->arena.bytes;
+  const wm_timing_stage stages[] = {{"predict", &self->fuser.predict_ns}, {"correct", &self->fuser.correct_ns}};
+  const wm_timing timing = {.stages = stages,
+                            .stage_count = 2,
+                            .allocations_after_start = report->allocations_after_start,
+                            .page_faults_after_start = report->page_faults_after_start,
+                            .memory_bytes = self->arena.bytes};
+  wm_status status = wm_run_folder_health(self->folder, &report->health, err);
+  return status == WM_OK ? wm_run_folder_timing(self->folder, &timing, err) : status;
+}
+
+static wm_status run(log_replay *self, wm_log_reader *log, const wm_replay_options *options, wm_run_report *report,
+                     wm_error *err) {
+  wm_status status = start(self, options, err);
+  if (status != WM_OK) return status;
+  wm_touch_program();
+  int64_t allocations = wm_allocations_of_this_thread(), page_faults = wm_page_faults_of_this_thread();
+  status = play(self, log, report, err);
+  report->page_faults_after_start = wm_page_faults_of_this_thread() - page_faults;
+  report->allocations_after_start = allocations < 0 ? -1 : wm_allocations_of_this_thread() - allocations;
+  wm_error summary_error;
+  wm_status summary = write_summary(self, report, &summary_error);  // also of what stands before a damage
+  if (status == WM_OK && summary != WM_OK) {
+    if (err) *err = summary_error;
+    return summary;
+  }
+  return status;
+}
+
+wm_status wm_replay_log(const wm_config *config, wm_log_reader *log, const wm_replay_options *options,
+                        wm_run_report *report, wm_error *err) {
+  memset(report, 0, sizeof *report);
+  log_replay *self = calloc(1, sizeof *self);
+  if (!self) return wm_fail(err, WM_IO, "no memory for a replay");
+  assemble(self, config, wm_log_reader_head(log));
+  wm_status status = run(self, log, options, report, err);
+  wm_error close_error;
+  wm_status closed = wm_run_folder_close(self->folder, &close_error);
+  if (status == WM_OK && closed != WM_OK) {
+    status = closed;
+    if (err) *err = close_error;
+  }
+  wm_arena_close(&self->arena);
+  free(self);
+  return status;
+}

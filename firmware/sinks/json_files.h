@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
+// health.json and timing.json.
+#ifndef WAYMARK_FIRMWARE_JSON_FILES_H
+#define WAYMARK_FIRMWARE_JSON_FILES_H
+
+#include "waymark/run_folder.h"
+
+wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, const wm_health *health, wm_error *err);
+wm_status wm_write_timing_json(const char *dir, const wm_timing *timing, wm_error *err);
+
+#endif

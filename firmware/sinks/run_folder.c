@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/run_folder.h"
+
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "json_files.h"
+#include "row.h"
+#include "waymark/eventlog.h"
+
+typedef struct table {
+  char path[WM_PATH_MAX + 32];
+  FILE *file;
+  int failed;  // errno of the first failure
+  char buffer[1 << 16];
+} table;
+
+enum { TRAJECTORY_TUM, TRAJECTORY, PUBLISHED, INNOVATIONS, TABLE_COUNT };
+static const char *const kTables[TABLE_COUNT] = {"trajectory.tum", "trajectory.csv", "published.csv",
+                                                 "innovations.csv"};
+
+struct wm_run_folder {
+  char dir[WM_PATH_MAX];
+  const wm_assembly *assembly;
+  table tables[TABLE_COUNT];
+  int trajectory_has_head, published_has_head;
+  wm_log_writer log;
+  wm_row line;
+};
+
+static const char kAxes[6][3] = {"x", "y", "z", "rx", "ry", "rz"};
+
+// ── columns that trajectory and published share ─────────────────────────────────────────────────────────────────────
+
+static void pose_head(wm_row *line, int dof) {
+  wm_row_text(line, "x_m,y_m,z_m,qx,qy,qz,qw");
+  if (dof == 6) {
+    for (int i = 0; i < 6; i++)
+      for (int j = i; j < 6; j++) {
+        wm_row_text(line, ",cov_");
+        wm_row_text(line, kAxes[i]);
+        wm_row_text(line, kAxes[j]);
+      }
+  } else {
+    wm_row_text(line, ",cov_xx,cov_xy,cov_yy,cov_xt,cov_yt,cov_tt");
+  }
+  wm_row_text(line, ",state");
+}
+
+static void pose_columns(wm_row *line, const wm_estimate *e, void (*number)(wm_row *, double)) {
+  static const uint8_t kPlanar[6][2] = {{0, 0}, {0, 1}, {1, 1}, {0, 5}, {1, 5}, {5, 5}};
+  for (int i = 0; i < 3; i++) {
+    number(line, e->pose_map_base.p_m[i]);
+    wm_row_char(line, ',');
+  }
+  for (int i = 0; i < 4; i++) {
+    number(line, e->pose_map_base.q_xyzw[i]);
+    wm_row_char(line, ',');
+  }
+  if (e->dof == 6) {
+    for (int i = 0; i < 6; i++)
+      for (int j = i; j < 6; j++) {
+        number(line, e->covariance[wm_cov_index(i, j)]);
+        wm_row_char(line, ',');
+      }
+  } else {
+    for (int i = 0; i < 6; i++) {
+      number(line, e->covariance[wm_cov_index(kPlanar[i][0], kPlanar[i][1])]);
+      wm_row_char(line, ',');
+    }
+  }
+  wm_row_text(line, wm_state_name(e->state));
+}
+
+// ── rows ────────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_row *begin(wm_run_folder *self) {
+  self->line.length = 0;
+  return &self->line;
+}
+
+static void end(wm_run_folder *self, int which) {
+  table *t = &self->tables[which];
+  wm_row_char(&self->line, '\n');
+  if (!t->failed && fwrite(self->line.bytes, 1, self->line.length, t->file) != self->line.length)
+    t->failed = errno ? errno : EIO;
+}
+
+static void fused_pose(wm_run_folder *self, const wm_estimate *e) {
+  if (!self->trajectory_has_head) {
+    wm_row *head = begin(self);
+    wm_row_text(head, "t_ns,");
+    pose_head(head, e->dof);
+    end(self, TRAJECTORY);
+    self->trajectory_has_head = 1;
+  }
+  wm_row *line = begin(self);
+  wm_row_int(line, e->t_ns);
+  wm_row_char(line, ',');
+  pose_columns(line, e, wm_row_exact);
+  end(self, TRAJECTORY);
+
+  line = begin(self);
+  wm_row_seconds(line, e->t_ns);
+  for (int i = 0; i < 3; i++) {
+    wm_row_char(line, ' ');
+    wm_row_fixed(line, e->pose_map_base.p_m[i], 9);
+  }
+  for (int i = 0; i < 4; i++) {
+    wm_row_char(line, ' ');
+    wm_row_fixed(line, e->pose_map_base.q_xyzw[i], 9);
+  }
+  end(self, TRAJECTORY_TUM);
+}
+
+static void published(wm_run_folder *self, const wm_published *p) {
+  if (!self->published_has_head) {
+    wm_row *head = begin(self);
+    wm_row_text(head, "t_ns,sent_ns,fused_until_ns,");
+    pose_head(head, p->now.dof);
+    wm_row_text(head, ",odom_x_m,odom_y_m,odom_heading_rad,resets");
+    end(self, PUBLISHED);
+    self->published_has_head = 1;
+  }
+  wm_row *line = begin(self);
+  wm_row_int(line, p->now.t_ns);
+  wm_row_char(line, ',');
+  wm_row_int(line, p->sent_ns);
+  wm_row_char(line, ',');
+  wm_row_int(line, p->fused_until_ns);
+  wm_row_char(line, ',');
+  pose_columns(line, &p->now, wm_row_exact);
+  const double odom[3] = {p->pose_odom_base.x_m, p->pose_odom_base.y_m, p->pose_odom_base.heading_rad};
+  for (int i = 0; i < 3; i++) {
+    wm_row_char(line, ',');
+    wm_row_fixed(line, odom[i], 9);
+  }
+  wm_row_char(line, ',');
+  wm_row_int(line, p->jumps);
+  end(self, PUBLISHED);
+}
+
+static void innovation(wm_run_folder *self, const wm_innovation *i) {
+  wm_row *line = begin(self);
+  wm_row_int(line, i->t_ns);
+  wm_row_char(line, ',');
+  wm_row_text(line, wm_assembly_source_name(self->assembly, i->source));
+  wm_row_char(line, ',');
+  wm_row_text(line, wm_assembly_sensor_name(self->assembly, i->sensor));
+  wm_row_char(line, ',');
+  if (i->landmark_id >= 0) wm_row_int(line, i->landmark_id);
+  wm_row_char(line, ',');
+  wm_row_text(line, wm_residual_name(i->residual));
+  const double numbers[5] = {i->observed, i->expected, i->variance, i->nis, i->gate};
+  for (int k = 0; k < 5; k++) {
+    wm_row_char(line, ',');
+    wm_row_short(line, numbers[k]);
+  }
+  wm_row_char(line, ',');
+  wm_row_text(line, wm_verdict_name(i->verdict));
+  end(self, INNOVATIONS);
+}
+
+static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
+  (void)bytes;
+  wm_run_folder *self = context;
+  switch (kind) {
+    case WM_OUTPUT_EVENT: wm_log_write_event(&self->log, record); break;
+    case WM_OUTPUT_POSE: fused_pose(self, record); break;
+    case WM_OUTPUT_INNOVATION: innovation(self, record); break;
+    case WM_OUTPUT_PUBLISHED: published(self, record); break;
+    case WM_OUTPUT_HEALTH: break;  // written once, at the end
+  }
+}
+
+wm_output wm_run_folder_output(wm_run_folder *self) { return (wm_output){.put = put, .context = self}; }
+
+void wm_run_folder_gap(wm_run_folder *self, uint64_t missing_events) { wm_log_write_gap(&self->log, missing_events); }
+
+// ── open and close ──────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_status make_dir(const char *dir, wm_error *err) {
+  char path[WM_PATH_MAX];
+  if (strlen(dir) >= sizeof path) return wm_fail(err, WM_BAD_USAGE, "%s: the path is too long", dir);
+  strcpy(path, dir);
+  for (char *slash = path + 1; *slash; slash++) {
+    if (*slash != '/') continue;
+    *slash = '\0';
+    (void)mkdir(path, 0777);  // what can't be made shows below
+    *slash = '/';
+  }
+  struct stat there;
+  if (mkdir(path, 0777) != 0 && errno != EEXIST)
+    return wm_fail(err, WM_IO, "%s: the folder can't be made: %s", dir, strerror(errno));
+  if (stat(path, &there) != 0 || !S_ISDIR(there.st_mode))
+    return wm_fail(err, WM_IO, "%s: there is a file of this name; choose another --out", dir);
+  return WM_OK;
+}
+
+static wm_status open_table(wm_run_folder *self, int which, wm_error *err) {
+  table *t = &self->tables[which];
+  (void)snprintf(t->path, sizeof t->path, "%s/%s", self->dir, kTables[which]);
+  t->file = fopen(t->path, "we");
+  if (!t->file) return wm_fail(err, WM_IO, "%s: can't be written: %s", t->path, strerror(errno));
+  setvbuf(t->file, t->buffer, _IOFBF, sizeof t->buffer);
+  return WM_OK;
+}
+
+wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_run_folder **out, wm_error *err) {
+  *out = NULL;
+  wm_status status = make_dir(dir, err);
+  if (status != WM_OK) return status;
+  wm_run_folder *self = calloc(1, sizeof *self);
+  if (!self) return wm_fail(err, WM_IO, "%s: no memory", dir);
+  (void)snprintf(self->dir, sizeof self->dir, "%s", dir);
+  self->assembly = assembly;
+  for (int i = 0; i < TABLE_COUNT && status == WM_OK; i++) status = open_table(self, i, err);
+  if (status == WM_OK) {
+    char path[WM_PATH_MAX + 32];
+    (void)snprintf(path, sizeof path, "%s/events.wmlog", dir);
+    status = wm_log_create(&self->log, path, assembly, err);
+  }
+  if (status != WM_OK) {
+    (void)wm_run_folder_close(self, NULL);
+    return status;
+  }
+  wm_row_text(begin(self), "t_ns,source,sensor,landmark,residual,observed,expected,variance,nis,gate,verdict");
+  end(self, INNOVATIONS);
+  *out = self;
+  return WM_OK;
+}
+
+void wm_run_folder_flush(wm_run_folder *self) {
+  for (int i = 0; i < TABLE_COUNT; i++)
+    if (fflush(self->tables[i].file) != 0 && !self->tables[i].failed) self->tables[i].failed = errno;
+  wm_log_flush(&self->log);
+}
+
+wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_error *err) {
+  return wm_write_health_json(self->dir, self->assembly, health, err);
+}
+
+wm_status wm_run_folder_timing(wm_run_folder *self, const wm_timing *timing, wm_error *err) {
+  return wm_write_timing_json(self->dir, timing, err);
+}
+
+wm_status wm_run_folder_close(wm_run_folder *self, wm_error *err) {
+  if (!self) return WM_OK;
+  wm_status status = wm_log_close(&self->log, err);
+  for (int i = 0; i < TABLE_COUNT; i++) {
+    table *t = &self->tables[i];
+    if (!t->file) continue;
+    if (fclose(t->file) != 0 && !t->failed) t->failed = errno;
+    if (t->failed && status == WM_OK)
+      status = wm_fail(err, WM_IO, "%s: could not be written whole: %s", t->path, strerror(t->failed));
+  }
+  free(self);
+  return status;
+}
