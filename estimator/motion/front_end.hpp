@@ -51,6 +51,7 @@ class motion_front_end {
   wm_time_ns now_ns() const { return now_ns_; }
   wm_time_ns newest_ns() const { return newest_ns_; }  // newest event that drives
   uint32_t health() const { return health_; }
+  const wm_motion_params &params() const { return *params_; }
   int model() const { return model_; }
   // True once after the speed came to be taken from another sensor, whose scale is another.
   bool speed_source_changed();

@@ -1,0 +1,401 @@
+// SPDX-License-Identifier: Apache-2.0
+// From an observation to an update: validity, the pose when it was true, expectation, gate, update.
+#include "filters/landmark_ekf/landmark_ekf.hpp"
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kFarthest_m = 1e6;
+constexpr double kOneNumber = 6.635 / 9.210;  // 99 % of chi2 with one degree of freedom against two
+
+wm_innovation record_of(const wm_event &event, wm_residual kind) {
+  wm_innovation r{};
+  r.t_ns = event.t_ns;
+  r.source = event.source;
+  r.landmark_id = -1;
+  r.residual = (uint8_t)kind;
+  return r;
+}
+
+wm_status refuse(innovation_list records, wm_innovation record, wm_status status) {
+  record.verdict = status == WM_NOT_FINITE ? WM_REJECTED_NOT_FINITE : WM_REJECTED_OUT_OF_RANGE;
+  records.add(record);
+  return status;
+}
+
+bool is_sigma(double value) { return std::isnan(value) || (value > 0.0 && value < 1e6); }
+
+}  // namespace
+
+landmark_ekf::past_pose landmark_ekf::look_back(double age_s) const {
+  past_pose out;
+  const wm_time_ns now = filter_.now_ns();
+  const wm_time_ns then = now - wm_ns_from_seconds(age_s);
+  motion_twist twist{};
+  wm_pose2 step{};  // from now's base_link to then's
+  if (then < now) {
+    step = between(filter_.path(then, now, &twist), wm_pose2{});
+  } else if (then > now) {
+    step = filter_.path(now, then, &twist);
+  } else {
+    filter_.path(now - 1, now, &twist);
+  }
+  out.pose = compose(filter_.pose(), step);
+  out.odom = compose(filter_.odom(), step);
+  out.lever_x = out.pose.x_m - filter_.pose().x_m;
+  out.lever_y = out.pose.y_m - filter_.pose().y_m;
+  const sin_cos h = sincos(out.pose.heading_rad);
+  out.age_by[0] = -twist.v * h.cos;
+  out.age_by[1] = -twist.v * h.sin;
+  out.age_by[2] = -twist.w;
+  return out;
+}
+
+// A derivative by the past pose becomes one by the pose now and by the time offset.
+void landmark_ekf::add_pose(sparse_row &row, const double by[3], const past_pose &past, int time_state) {
+  row.add(kX, by[0]);
+  row.add(kY, by[1]);
+  row.add(kHeading, by[2] - by[0] * past.lever_y + by[1] * past.lever_x);
+  row.add(time_state, by[0] * past.age_by[0] + by[1] * past.age_by[1] + by[2] * past.age_by[2]);
+}
+
+double landmark_ekf::sensor_value(int sensor, int which, double neutral) const {
+  const int state = sensor_state_[sensor][which];
+  return state < 0 ? neutral : filter_.value(state);
+}
+
+int landmark_ekf::find_landmark(int32_t id) const {
+  const int *order = landmark_order();
+  int low = 0, high = (int)setup_->landmark_count;
+  while (low < high) {
+    const int middle = (low + high) / 2;
+    if (setup_->landmarks[order[middle]].id < id)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low < (int)setup_->landmark_count && setup_->landmarks[order[low]].id == id ? order[low] : -1;
+}
+
+// The one landmark that a sighting without an id fits: within half the gate, and no other within all of it.
+int landmark_ekf::associate(const wm_event &event, const past_pose &past) {
+  const wm_sighting &s = event.as.sighting;
+  const mounted_sensor &sensor = sensor_[s.sensor];
+  const sensor_errors errors = {sensor_value(s.sensor, kYaw, 0.0), sensor_value(s.sensor, kRangeScale, 1.0),
+                                sensor_value(s.sensor, kRangeBias, 0.0)};
+  int best = -1, fitting = 0;
+  double least = params_.gate_soft;
+  for (int i = 0; i < (int)setup_->landmark_count; i++) {
+    const expected_sighting e = expect(sensor, errors, past.pose, setup_->landmarks[i].p_m);
+    if (!e.possible || e.distance_m > 1.5 * sensor.max_range_m) continue;
+    double chi2 = 0.0;
+    const auto test = [&](double observed, double expected, const double by[4], double sigma, bool angle) {
+      if (std::isnan(observed)) return;
+      sparse_row row;
+      add_pose(row, by, past, sensor_state_[s.sensor][kTimeOffset]);
+      row.add(sensor_state_[s.sensor][kYaw], by[3]);
+      projection p;
+      filter_.project(row, &p);
+      const double difference = angle ? wrap(observed - expected) : observed - expected;
+      chi2 += square(difference) / (p.variance + square(sigma));
+    };
+    test(s.bearing_rad, e.bearing_rad, e.bearing_by, params_.bearing_sigma_default_rad, true);
+    test(s.range_m, e.range_m, e.range_by, params_.range_sigma_default_m, false);
+    fitting += chi2 < params_.gate_soft;
+    if (chi2 < 0.5 * least) {
+      least = 2.0 * chi2;
+      best = i;
+    }
+  }
+  return fitting == 1 ? best : -1;
+}
+
+// States for what lasts: the error of this sensor on this landmark, and the landmark's error on the map.
+void landmark_ekf::lend_states(int sensor, int landmark, wm_time_ns t_ns, int *lasting, int *map) {
+  *lasting = *map = -1;
+  bool fresh;
+  if (auto *slot = lasting_.take(landmark * kMaxSensors + sensor, &fresh)) {
+    *lasting = slot->state;
+    const int width = (lasting_bearing_offset_ >= 0) + (lasting_range_offset_ >= 0);
+    const double left = fresh ? 0.0 : exp(-wm_seconds_between(slot->used_ns, t_ns) / params_.lasting_tau_s);
+    for (int k = 0; k < width; k++) {
+      if (fresh)
+        filter_.forget(slot->state + k, 0.0, 1.0);
+      else if (left < 1.0)
+        filter_.fade(slot->state + k, left, 1.0 - left * left);
+    }
+    slot->used_ns = t_ns;
+  }
+  const double sigma = setup_->landmarks[landmark].sigma_m;
+  if (!(sigma > 0.0)) return;
+  if (auto *slot = map_.take(landmark, &fresh)) {
+    *map = slot->state;
+    if (fresh) {
+      filter_.forget(slot->state, 0.0, square(sigma));
+      filter_.forget(slot->state + 1, 0.0, square(sigma));
+    }
+    slot->used_ns = t_ns;
+  }
+}
+
+wm_status landmark_ekf::fuse_sighting(const wm_event &event, innovation_list records) {
+  const wm_sighting &s = event.as.sighting;
+  const bool has_bearing = !std::isnan(s.bearing_rad), has_range = !std::isnan(s.range_m);
+  wm_innovation blank = record_of(event, has_bearing ? WM_RESIDUAL_BEARING : WM_RESIDUAL_RANGE);
+  blank.sensor = s.sensor;
+  blank.landmark_id = s.landmark_id;
+  blank.observed = has_bearing ? s.bearing_rad : s.range_m;
+  if ((!has_bearing && !has_range) || std::isinf(s.bearing_rad) || std::isinf(s.range_m))
+    return refuse(records, blank, WM_NOT_FINITE);
+  if (s.sensor >= setup_->sensor_count || (has_bearing && std::fabs(s.bearing_rad) > 100.0) ||
+      (has_range && !(s.range_m >= 0.0 && s.range_m < kFarthest_m)) || !is_sigma(s.bearing_sigma_rad) ||
+      !is_sigma(s.range_sigma_m))
+    return refuse(records, blank, WM_OUT_OF_RANGE);
+  const wm_status status = filter_.check_time(event.t_ns);
+  if (status != WM_OK) return status;
+  filter_.move_to(event.t_ns);
+
+  const auto drop = [&](wm_verdict verdict) {
+    blank.verdict = (uint8_t)verdict;
+    records.add(blank);
+    return WM_OK;
+  };
+  const mounted_sensor &sensor = sensor_[s.sensor];
+  const bool use_bearing = has_bearing && params_.use_bearing, use_range = has_range && params_.use_range;
+  if (!use_bearing && !use_range) return drop(WM_REJECTED_BY_CONFIG);
+  if (has_range && s.range_m > sensor.max_range_m) return drop(WM_REJECTED_OUT_OF_RANGE);
+  const past_pose past = look_back(sensor_value(s.sensor, kTimeOffset, 0.0));
+  int landmark = s.landmark_id >= 0 ? find_landmark(s.landmark_id) : -1;
+  if (s.landmark_id >= 0 && landmark < 0) return drop(WM_REJECTED_UNKNOWN_ID);
+  if (landmark < 0 && params_.associate_unknown && state_ == WM_STATE_TRACKING) landmark = associate(event, past);
+  if (landmark < 0) return drop(WM_REJECTED_NO_ASSOCIATION);
+  const wm_landmark &target = setup_->landmarks[landmark];
+
+  const auto first_number = [](double a, double b, double c) { return finite(a) ? a : finite(b) ? b : c; };
+  const double bearing_sigma =
+      params_.bearing_sigma_factor *
+      first_number(s.bearing_sigma_rad, sensor.bearing_sigma_rad, params_.bearing_sigma_default_rad);
+  const double range_sigma =
+      params_.range_sigma_factor * first_number(s.range_sigma_m, sensor.range_sigma_m, params_.range_sigma_default_m);
+  const sensor_errors errors = {sensor_value(s.sensor, kYaw, 0.0), sensor_value(s.sensor, kRangeScale, 1.0),
+                                sensor_value(s.sensor, kRangeBias, 0.0)};
+
+  search_clue clue{};
+  clue.t_ns = event.t_ns;
+  clue.kind = (use_bearing ? kClueBearing : 0u) | (use_range ? kClueRange : 0u);
+  clue.key = landmark * kMaxSensors + s.sensor;
+  clue.sensor = compose(past.odom, {sensor.x_m, sensor.y_m, sensor.yaw_rad + errors.yaw_rad});
+  clue.place_m[0] = target.p_m[0];
+  clue.place_m[1] = target.p_m[1];
+  clue.bearing_rad = s.bearing_rad;
+  const double along = use_range && sensor.range_is_depth && has_bearing ? cos(s.bearing_rad) : 1.0;
+  clue.range_m = (s.range_m - errors.range_bias_m) / errors.range_scale / (along > 0.1 ? along : 0.1);
+  clue.sigma_angle_rad = std::sqrt(square(bearing_sigma) + square(params_.lasting_bearing_rad));
+  clue.sigma_length_m = std::sqrt(square(range_sigma) + square(params_.lasting_range_m) + square(target.sigma_m) +
+                                  square((params_.range_sigma_rel + params_.lasting_range_rel) * clue.range_m));
+  note_clue(clue);
+  if (state_ == WM_STATE_SEARCHING) {
+    drop(WM_REJECTED_SEARCHING);
+    search(event.t_ns - wm_ns_from_seconds(params_.recover_window_s));
+    return WM_OK;
+  }
+
+  const expected_sighting e = expect(sensor, errors, past.pose, target.p_m);
+  if (!e.possible && e.distance_m < 0.05) return drop(WM_REJECTED_SINGULAR);
+  if (!e.possible) {
+    drop(WM_REJECTED_OUT_OF_RANGE);
+    note(event.t_ns, clue.key, 1.0);
+    return WM_OK;
+  }
+  int lasting, map;
+  lend_states(s.sensor, landmark, event.t_ns, &lasting, &map);
+  residual residuals[2];
+  int count = 0;
+  const auto add = [&](wm_residual kind, double observed, double expected, const double by[4], double variance,
+                       int lasting_offset, double lasting_size) -> residual & {
+    residual &r = residuals[count++];
+    add_pose(r.row, by, past, sensor_state_[s.sensor][kTimeOffset]);
+    r.row.add(sensor_state_[s.sensor][kYaw], by[3]);
+    double unit = 0.0;
+    if (lasting >= 0 && lasting_offset >= 0) {
+      r.row.add(lasting + lasting_offset, lasting_size);
+      unit += lasting_size * filter_.value(lasting + lasting_offset);
+    } else {
+      variance += square(lasting_size);
+    }
+    if (map >= 0) {
+      r.row.add(map, -by[0]);
+      r.row.add(map + 1, -by[1]);
+      unit -= by[0] * filter_.value(map) + by[1] * filter_.value(map + 1);
+    } else {
+      variance += square(target.sigma_m) * (square(by[0]) + square(by[1]));
+    }
+    r.record = blank;
+    r.record.residual = (uint8_t)kind;
+    r.record.observed = observed;
+    r.record.expected = expected + unit;
+    const double difference = observed - r.record.expected;
+    r.innovation = kind == WM_RESIDUAL_BEARING ? wrap(difference) : difference;
+    r.noise = variance;
+    return r;
+  };
+  if (use_bearing)
+    add(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad, e.bearing_by, square(bearing_sigma), lasting_bearing_offset_,
+        params_.lasting_bearing_rad);
+  if (use_range) {
+    const double lasting_size =
+        std::sqrt(square(params_.lasting_range_m) + square(params_.lasting_range_rel * e.range_m));
+    residual &r =
+        add(WM_RESIDUAL_RANGE, s.range_m, e.range_m, e.range_by,
+            square(range_sigma) + square(params_.range_sigma_rel * e.range_m), lasting_range_offset_, lasting_size);
+    r.row.add(sensor_state_[s.sensor][kRangeBias], 1.0);
+    r.row.add(sensor_state_[s.sensor][kRangeScale], e.range_by_scale);
+  }
+  note(event.t_ns, clue.key, fuse(residuals, count, records));
+  return WM_OK;
+}
+
+wm_status landmark_ekf::fuse_position(const wm_event &event, innovation_list records) {
+  const wm_position &p = event.as.position;
+  wm_innovation blank = record_of(event, WM_RESIDUAL_X);
+  blank.observed = p.p_m[0];
+  if (!finite(p.p_m[0]) || !finite(p.p_m[1]) || !finite(p.sigma_xy_m)) return refuse(records, blank, WM_NOT_FINITE);
+  if (std::fabs(p.p_m[0]) > 1e7 || std::fabs(p.p_m[1]) > 1e7 || !(p.sigma_xy_m > 0.0 && p.sigma_xy_m < 1e6))
+    return refuse(records, blank, WM_OUT_OF_RANGE);
+  const wm_status status = filter_.check_time(event.t_ns);
+  if (status != WM_OK) return status;
+  filter_.move_to(event.t_ns);
+  if (!params_.use_position) {
+    blank.verdict = WM_REJECTED_BY_CONFIG;
+    records.add(blank);
+    return WM_OK;
+  }
+  double sigma = params_.gnss_sigma_factor * p.sigma_xy_m;
+  if (sigma < params_.gnss_sigma_min_m) sigma = params_.gnss_sigma_min_m;
+  if (gnss_lasting_state_ >= 0) {
+    const double left = gnss_lasting_ns_ == WM_TIME_NONE
+                            ? 1.0
+                            : exp(-wm_seconds_between(gnss_lasting_ns_, event.t_ns) / params_.gnss_lasting_tau_s);
+    if (left < 1.0)
+      for (int k = 0; k < 2; k++)
+        filter_.fade(gnss_lasting_state_ + k, left, (1.0 - left * left) * square(params_.gnss_lasting_m));
+    gnss_lasting_ns_ = event.t_ns;
+  }
+  const past_pose past = look_back(gnss_time_state_ < 0 ? 0.0 : filter_.value(gnss_time_state_));
+  search_clue clue{};
+  clue.t_ns = event.t_ns;
+  clue.kind = kCluePosition;
+  clue.key = -2;
+  clue.sensor = past.odom;
+  clue.place_m[0] = p.p_m[0];
+  clue.place_m[1] = p.p_m[1];
+  clue.sigma_length_m = std::sqrt(square(sigma) + square(params_.gnss_lasting_m));
+  note_clue(clue);
+  if (state_ == WM_STATE_SEARCHING) {
+    blank.verdict = WM_REJECTED_SEARCHING;
+    records.add(blank);
+    search(event.t_ns - wm_ns_from_seconds(params_.recover_window_s));
+    return WM_OK;
+  }
+  residual residuals[2];
+  for (int k = 0; k < 2; k++) {
+    residual &r = residuals[k];
+    const double by[3] = {k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, 0.0};
+    add_pose(r.row, by, past, gnss_time_state_);
+    double expected = k == 0 ? past.pose.x_m : past.pose.y_m;
+    if (gnss_lasting_state_ >= 0) {
+      r.row.add(gnss_lasting_state_ + k, 1.0);
+      expected += filter_.value(gnss_lasting_state_ + k);
+    }
+    r.record = record_of(event, k == 0 ? WM_RESIDUAL_X : WM_RESIDUAL_Y);
+    r.record.observed = p.p_m[k];
+    r.record.expected = expected;
+    r.innovation = p.p_m[k] - expected;
+    r.noise = square(sigma);
+  }
+  note(event.t_ns, clue.key, fuse(residuals, 2, records));
+  return WM_OK;
+}
+
+wm_status landmark_ekf::fuse_heading(const wm_event &event, innovation_list records) {
+  const wm_heading &h = event.as.heading;
+  residual r;
+  r.record = record_of(event, WM_RESIDUAL_HEADING);
+  r.record.observed = h.heading_rad;
+  if (!finite(h.heading_rad) || !finite(h.sigma_rad)) return refuse(records, r.record, WM_NOT_FINITE);
+  if (std::fabs(h.heading_rad) > 100.0 || !(h.sigma_rad > 0.0 && h.sigma_rad < 100.0))
+    return refuse(records, r.record, WM_OUT_OF_RANGE);
+  const wm_status status = filter_.check_time(event.t_ns);
+  if (status != WM_OK) return status;
+  filter_.move_to(event.t_ns);
+  if (!params_.use_heading) {
+    r.record.verdict = WM_REJECTED_BY_CONFIG;
+    records.add(r.record);
+    return WM_OK;
+  }
+  search_clue clue{};
+  clue.t_ns = event.t_ns;
+  clue.kind = kClueHeading;
+  clue.key = -3;
+  clue.sensor = filter_.odom();
+  clue.bearing_rad = h.heading_rad;
+  clue.sigma_angle_rad = h.sigma_rad;
+  note_clue(clue);
+  if (state_ == WM_STATE_SEARCHING) {
+    r.record.verdict = WM_REJECTED_SEARCHING;
+    records.add(r.record);
+    search(event.t_ns - wm_ns_from_seconds(params_.recover_window_s));
+    return WM_OK;
+  }
+  r.row.add(kHeading, 1.0);
+  r.record.expected = filter_.pose().heading_rad;
+  r.innovation = wrap(h.heading_rad - r.record.expected);
+  r.noise = square(h.sigma_rad);
+  note(event.t_ns, clue.key, fuse(&r, 1, records));
+  return WM_OK;
+}
+
+// The numbers of one observation are gated together: a wrong one spoils its fellow. Between the two gates the
+// measurement counts less, as a Student distribution would have it; above, not at all. Then one number after the other
+// (paper, system 1), each with the innovation that the ones before left of it: the same as both at once.
+double landmark_ekf::fuse(residual *r, int count, innovation_list records) {
+  projection first, second;
+  filter_.project(r[0].row, &first);
+  const double s00 = first.variance + r[0].noise;
+  double nis = square(r[0].innovation) / s00;
+  double cross = 0.0;
+  r[0].record.variance = s00;
+  if (count == 2) {
+    filter_.project(r[1].row, &second);
+    cross = filter_.project_onto(r[1].row, first);
+    const double s11 = second.variance + r[1].noise;
+    r[1].record.variance = s11;
+    const double determinant = s00 * s11 - cross * cross;
+    nis = (s11 * square(r[0].innovation) - 2.0 * cross * r[0].innovation * r[1].innovation +
+           s00 * square(r[1].innovation)) /
+          determinant;
+  }
+  const double scale = count == 2 ? 1.0 : kOneNumber;
+  const double hard = params_.gate_hard * scale, soft = params_.gate_soft * scale;
+  const bool fused = nis <= hard;
+  for (int i = 0; i < count; i++) {
+    r[i].record.nis = nis;
+    r[i].record.gate = hard;
+    r[i].record.gate_dof = (uint8_t)count;
+    r[i].record.verdict = fused ? WM_FUSED : WM_REJECTED_GATE;
+    records.add(r[i].record);
+  }
+  if (!fused) return 1.0;
+  const double weaker = nis > soft ? nis / soft : 1.0;
+  filter_.update(first, r[0].innovation, r[0].noise * weaker);
+  if (count == 2) {
+    const double left = r[1].innovation - cross / (first.variance + r[0].noise * weaker) * r[0].innovation;
+    filter_.project(r[1].row, &second);
+    filter_.update(second, left, r[1].noise * weaker);
+  }
+  fused_ns_ = filter_.now_ns();
+  return nis > soft ? 0.6 : 0.0;
+}
+
+}  // namespace wm

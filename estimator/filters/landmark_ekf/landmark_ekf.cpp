@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/landmark_ekf/landmark_ekf.hpp"
+
+#include <cstring>
+
+#include "filters/planar/set_pose.hpp"
+#include "filters/registry.h"
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+constexpr const char *kSensorStateNames[] = {"yaw_rad", "time_offset_s", "range_bias_m", "range_scale"};
+
+int lasting_states(const wm_landmark_ekf_params &p) {
+  if (p.lasting_slots == 0) return 0;
+  return (p.lasting_bearing_rad > 0.0) + (p.lasting_range_m > 0.0 || p.lasting_range_rel > 0.0);
+}
+
+int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
+  const int each_sensor = (p.sensor_yaw_sigma_rad > 0.0) + (p.sensor_time_offset_sigma_s > 0.0) +
+                          (p.range_bias_sigma_m > 0.0) + (p.range_scale_sigma > 0.0);
+  return kPoseStates + planar_filter::count_motion_states(p.motion) + each_sensor * (int)setup.sensor_count +
+         (p.gnss_time_offset_sigma_s > 0.0) + 2 * (p.gnss_lasting_m > 0.0) + p.lasting_slots * lasting_states(p) +
+         2 * p.map_slots;
+}
+
+}  // namespace
+
+size_t landmark_ekf::bytes(const wm_landmark_ekf_params &params, const wm_setup &setup, const char **why) {
+  if (setup.sensor_count > kMaxSensors) {
+    *why = "landmark_ekf takes at most 16 sensors";
+    return 0;
+  }
+  if (count_states(params, setup) > kMaxStates) {
+    *why =
+        "landmark_ekf holds at most 64 states: pose 3, one for each states.*_sigma that is not 0 (those of sensors "
+        "once for each sensor), one or two for each of lasting.slots, two for each of states.map_slots, two for "
+        "lasting.gnss_m; lower lasting.slots or states.map_slots";
+    return 0;
+  }
+  return sizeof(landmark_ekf) + setup.landmark_count * sizeof(int);
+}
+
+void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &setup) {
+  std::memset(static_cast<void *>(this), 0, sizeof *this);
+  setup_ = &setup;
+  params_ = params;
+  filter_.init(setup, params.motion);
+  const auto add = [this](double value, double sigma) { return sigma > 0.0 ? filter_.add_state(value, sigma) : -1; };
+  for (size_t i = 0; i < setup.sensor_count; i++) {
+    sensor_[i].init(setup.sensors[i]);
+    sensor_state_[i][kYaw] = add(0.0, params.sensor_yaw_sigma_rad);
+    sensor_state_[i][kTimeOffset] = add(0.0, params.sensor_time_offset_sigma_s);
+    sensor_state_[i][kRangeBias] = add(0.0, params.range_bias_sigma_m);
+    sensor_state_[i][kRangeScale] = add(1.0, params.range_scale_sigma);
+  }
+  gnss_time_state_ = add(0.0, params.gnss_time_offset_sigma_s);
+  gnss_lasting_state_ = add(0.0, params.gnss_lasting_m);
+  if (gnss_lasting_state_ >= 0) add(0.0, params.gnss_lasting_m);
+  gnss_lasting_ns_ = WM_TIME_NONE;
+  lasting_bearing_offset_ = params.lasting_bearing_rad > 0.0 ? 0 : -1;
+  lasting_range_offset_ =
+      params.lasting_range_m > 0.0 || params.lasting_range_rel > 0.0 ? (lasting_bearing_offset_ >= 0 ? 1 : 0) : -1;
+  for (int i = 0; i < params.lasting_slots && lasting_states(params) > 0; i++) {
+    lasting_.add(filter_.states());
+    for (int k = 0; k < lasting_states(params); k++) filter_.add_state(0.0, 1.0);
+  }
+  for (int i = 0; i < params.map_slots; i++) {
+    map_.add(filter_.states());
+    for (int k = 0; k < 2; k++) filter_.add_state(0.0, 0.0);
+  }
+  // Landmarks by rising id, for the search by halves. Insertion: once, at the start.
+  int *order = landmark_order();
+  for (int i = 0; i < (int)setup.landmark_count; i++) {
+    int at = i;
+    for (; at > 0 && setup.landmarks[order[at - 1]].id > setup.landmarks[i].id; at--) order[at] = order[at - 1];
+    order[at] = i;
+  }
+  fused_ns_ = lost_ns_ = searched_ns_ = inflated_ns_ = WM_TIME_NONE;
+  start_again();
+}
+
+// Known start: track from it. Unknown: what is known of it becomes a clue for the search.
+void landmark_ekf::start_again() {
+  const wm_start &start = setup_->start;
+  monitor_.clear();
+  clues_.clear();
+  prior_count_ = 0;
+  resets_++;
+  state_ = start_is_known(start) ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
+  if (state_ == WM_STATE_TRACKING) return;
+  search_clue clue{};
+  clue.t_ns = filter_.now_ns();
+  clue.key = -1;
+  clue.sensor = filter_.odom();
+  clue.travelled_m = filter_.travelled_m();
+  clue.turned_rad = filter_.turned_rad();
+  const bool place = finite(start.p_m[0]) && finite(start.p_m[1]), heading = finite(start.heading_rad);
+  const double sigma_xy = finite(start.sigma_xy_m) ? start.sigma_xy_m : 0.05;
+  const double sigma_heading = finite(start.sigma_heading_rad) ? start.sigma_heading_rad : 0.05;
+  if (place) {
+    clue.kind = kCluePosition;
+    clue.place_m[0] = start.p_m[0];
+    clue.place_m[1] = start.p_m[1];
+    clue.sigma_length_m = sigma_xy;
+    prior_[prior_count_++] = clue;
+  }
+  if (heading) {
+    clue.kind = kClueHeading;
+    clue.bearing_rad = start.heading_rad;
+    clue.sigma_angle_rad = sigma_heading;
+    prior_[prior_count_++] = clue;
+  }
+  const double xy = square(place ? sigma_xy : kUnknownPosition_m);
+  const double covariance[3][3] = {
+      {xy, 0, 0}, {0, xy, 0}, {0, 0, square(heading ? sigma_heading : kUnknownHeading_rad)}};
+  filter_.set_pose(filter_.pose(), covariance);
+}
+
+wm_status landmark_ekf::predict(const wm_event &motion) {
+  const wm_status status = filter_.check_motion(motion);
+  if (status == WM_OK) filter_.move(motion);
+  return status;
+}
+
+wm_status landmark_ekf::correct(const wm_event &event, innovation_list records) {
+  switch (event.kind) {
+    case WM_EVENT_SIGHTING: return fuse_sighting(event, records);
+    case WM_EVENT_POSITION: return fuse_position(event, records);
+    case WM_EVENT_HEADING: return fuse_heading(event, records);
+    case WM_EVENT_SET_POSE:
+    case WM_EVENT_RESET: return take_pose(event);
+    case WM_EVENT_LOOKED: {
+      const wm_status status = filter_.check_time(event.t_ns);
+      if (status == WM_OK) filter_.move_to(event.t_ns);
+      return status;
+    }
+    default: return WM_UNSUPPORTED;
+  }
+}
+
+wm_status landmark_ekf::take_pose(const wm_event &event) {
+  if (event.kind == WM_EVENT_RESET) {
+    const wm_status status = reset_pose(filter_, setup_->start, event.t_ns);
+    if (status == WM_OK) start_again();
+    return status;
+  }
+  const wm_status status = set_pose(filter_, event);
+  if (status != WM_OK) return status;
+  monitor_.clear();
+  clues_.clear();
+  prior_count_ = 0;
+  resets_++;
+  state_ = WM_STATE_TRACKING;
+  return WM_OK;
+}
+
+void landmark_ekf::estimate(wm_estimate *out) const {
+  filter_.estimate(out);
+  out->resets = resets_;
+  const bool fresh =
+      fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, filter_.now_ns()) <= params_.dead_reckoning_after_s;
+  out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
+}
+
+size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
+  size_t count = filter_.list_calibration(out, capacity);
+  const auto add = [&](const char *whose, const char *what, int state) {
+    if (state < 0) return;
+    if (count < capacity) {
+      wm_calibration_value &value = out[count];
+      std::memset(&value, 0, sizeof value);
+      size_t length = std::strlen(whose);
+      const size_t room = sizeof value.name - 2 - std::strlen(what);
+      if (length > room) length = room;
+      std::memcpy(value.name, whose, length);
+      value.name[length] = '.';
+      std::memcpy(value.name + length + 1, what, std::strlen(what));
+      value.value = filter_.value(state);
+      value.sigma = std::sqrt(filter_.variance(state));
+    }
+    count++;
+  };
+  for (size_t i = 0; i < setup_->sensor_count; i++)
+    for (int k = 0; k < kSensorStates; k++) add(setup_->sensors[i].name, kSensorStateNames[k], sensor_state_[i][k]);
+  add("gnss", "time_offset_s", gnss_time_state_);
+  return count;
+}
+
+}  // namespace wm
+
+// ---- the contract ----
+
+namespace {
+
+wm::landmark_ekf &of(void *state) { return *static_cast<wm::landmark_ekf *>(state); }
+const wm::landmark_ekf &of(const void *state) { return *static_cast<const wm::landmark_ekf *>(state); }
+const wm_landmark_ekf_params &params_of(const void *params) {
+  return *static_cast<const wm_landmark_ekf_params *>(params);
+}
+
+size_t state_bytes(const void *params, const wm_setup *setup, const char **why) {
+  return wm::landmark_ekf::bytes(params_of(params), *setup, why);
+}
+
+wm_status init(void *state, const void *params, const wm_setup *setup) {
+  of(state).init(params_of(params), *setup);
+  return WM_OK;
+}
+
+wm_status predict(void *state, const wm_event *motion) { return of(state).predict(*motion); }
+
+wm_status correct(void *state, const wm_event *event, wm_innovation *out, size_t capacity, size_t *count) {
+  *count = 0;
+  return of(state).correct(*event, {out, capacity, count});
+}
+
+void estimate(const void *state, wm_estimate *out) { of(state).estimate(out); }
+void motion(const void *state, wm_motion_calibration *out) { *out = of(state).filter().calibration(); }
+size_t calibration(const void *state, wm_calibration_value *out, size_t capacity) {
+  return of(state).list_calibration(out, capacity);
+}
+uint32_t motion_health(const void *state) { return of(state).filter().motion_health(); }
+
+}  // namespace
+
+const wm_estimator wm_landmark_ekf_estimator = {"landmark_ekf",
+                                                "Extended Kalman filter over the pose and the sensors' own errors: "
+                                                "bearings and ranges to known landmarks, positions, "
+                                                "headings. Finds the pose when lost.",
+                                                WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_POSITION) |
+                                                    WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
+                                                    WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
+                                                wm_landmark_ekf_params_table,
+                                                state_bytes,
+                                                init,
+                                                predict,
+                                                correct,
+                                                estimate,
+                                                motion,
+                                                calibration,
+                                                motion_health,
+                                                nullptr};

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: Apache-2.0
+// The landmark filter of system 1 with self-calibration, lasting errors and recovery. docs/estimators.md has the model.
+#ifndef WAYMARK_ESTIMATOR_LANDMARK_EKF_HPP
+#define WAYMARK_ESTIMATOR_LANDMARK_EKF_HPP
+
+#include "filters/landmark_ekf/fit_monitor.hpp"
+#include "filters/landmark_ekf/params.h"
+#include "filters/landmark_ekf/search.hpp"
+#include "filters/landmark_ekf/sensor_model.hpp"
+#include "filters/landmark_ekf/slots.hpp"
+#include "filters/planar/planar_filter.hpp"
+
+namespace wm {
+
+inline constexpr int kMaxSensors = 16;
+
+// Records of one event's updates.
+struct innovation_list {
+  wm_innovation *out;
+  size_t capacity;
+  size_t *count;
+  void add(const wm_innovation &record) {
+    if (out && *count < capacity) out[(*count)++] = record;
+  }
+};
+
+class landmark_ekf {
+ public:
+  static size_t bytes(const wm_landmark_ekf_params &params, const wm_setup &setup, const char **why);
+  void init(const wm_landmark_ekf_params &params, const wm_setup &setup);
+
+  wm_status predict(const wm_event &motion);
+  wm_status correct(const wm_event &event, innovation_list records);
+  void estimate(wm_estimate *out) const;
+  size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
+  const planar_filter &filter() const { return filter_; }
+
+ private:
+  enum sensor_state { kYaw, kTimeOffset, kRangeBias, kRangeScale, kSensorStates };
+
+  // The pose when an observation was true, `age` before its stamp, and what moves it.
+  struct past_pose {
+    wm_pose2 pose;            // base_link in map
+    wm_pose2 odom;            // the same in the odometry's frame
+    double lever_x, lever_y;  // from now's position to it: what a heading error now makes of it
+    double age_by[3];         // of x, y, heading by the time offset
+  };
+  past_pose look_back(double age_s) const;
+  static void add_pose(sparse_row &row, const double by[3], const past_pose &past, int time_state);
+
+  wm_status fuse_sighting(const wm_event &event, innovation_list records);
+  wm_status fuse_position(const wm_event &event, innovation_list records);
+  wm_status fuse_heading(const wm_event &event, innovation_list records);
+  wm_status take_pose(const wm_event &event);
+
+  // Gates one or two numbers jointly, weakens or rejects, updates, writes the records. Returns the misfit.
+  struct residual {
+    sparse_row row;
+    double innovation, noise;
+    wm_innovation record;
+  };
+  double fuse(residual *residuals, int count, innovation_list records);
+
+  int find_landmark(int32_t id) const;
+  int associate(const wm_event &event, const past_pose &past);
+  void lend_states(int sensor, int landmark, wm_time_ns t_ns, int *lasting, int *map);
+  double sensor_value(int sensor, int which, double neutral) const;
+
+  // Recovery.
+  void note(wm_time_ns t_ns, int key, double misfit);
+  void note_clue(const search_clue &clue);
+  void search(wm_time_ns since_ns);
+  void start_again();
+
+  int *landmark_order() { return reinterpret_cast<int *>(this + 1); }
+  const int *landmark_order() const { return reinterpret_cast<const int *>(this + 1); }
+
+  planar_filter filter_;
+  const wm_setup *setup_;
+  wm_landmark_ekf_params params_;
+  mounted_sensor sensor_[kMaxSensors];
+  int sensor_state_[kMaxSensors][kSensorStates];
+  int gnss_time_state_, gnss_lasting_state_;
+  wm_time_ns gnss_lasting_ns_;
+  state_slots<24> lasting_;
+  int lasting_bearing_offset_, lasting_range_offset_;  // within a slot; -1: not carried
+  state_slots<16> map_;
+  fit_monitor monitor_;
+  pose_search clues_;
+  search_clue prior_[2];
+  int prior_count_;
+  wm_time_ns fused_ns_, lost_ns_, searched_ns_, inflated_ns_;
+  uint32_t resets_;
+  uint8_t state_;  // wm_state, without dead reckoning
+};
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/landmark_ekf/params.h"
+
+#include <stddef.h>
+
+typedef struct wm_landmark_ekf_params params;
+
+#define F64(key, field, initial, min, max, about) \
+  { key, WM_PARAM_F64, offsetof(params, field), initial, min, max, NULL, about }
+#define I32(key, field, initial, min, max, about) \
+  { key, WM_PARAM_I32, offsetof(params, field), initial, min, max, NULL, about }
+#define BOOL(key, field, initial, about) \
+  { key, WM_PARAM_BOOL, offsetof(params, field), initial, 0, 1, NULL, about }
+
+static const wm_param kParams[] = {
+    WM_MOTION_STATE_PARAMS(params, motion),
+    F64("states.sensor_yaw_sigma_rad", sensor_yaw_sigma_rad, 0, 0, 3.2,
+        "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off."),
+    F64("states.sensor_yaw_walk_rad", sensor_yaw_walk_rad, 0, 0, 1,
+        "Random walk of the mounting yaw, rad per sqrt(s). A bolted sensor has none."),
+    F64("states.sensor_time_offset_sigma_s", sensor_time_offset_sigma_s, 0, 0, 1,
+        "Start sigma of each sensor's time offset, s: its sightings are that much older than their stamps. 0: off."),
+    F64("states.range_bias_sigma_m", range_bias_sigma_m, 0, 0, 10,
+        "Start sigma of each sensor's range bias, m. 0: off."),
+    F64("states.range_scale_sigma", range_scale_sigma, 0, 0, 1,
+        "Start sigma of each sensor's range scale about 1. 0: off. Needs ranges of many lengths beside a range bias."),
+    F64("states.range_scale_walk", range_scale_walk, 0, 0, 1, "Random walk of the range scale per sqrt(s)."),
+    F64("states.gnss_time_offset_sigma_s", gnss_time_offset_sigma_s, 0, 0, 1,
+        "Start sigma of the receiver's time offset, s: its positions are that much older than their stamps. 0: off."),
+    I32("states.map_slots", map_slots, 0, 0, 16,
+        "Landmarks (the last seen ones) whose error on the map, by their sigma_m, is carried as states. 0: the map's "
+        "error is taken as fresh noise of each sighting, which is too sure of itself where one landmark is seen "
+        "often."),
+    BOOL("use.bearing", use_bearing, 1, "Fuse bearings."),
+    BOOL("use.range", use_range, 1, "Fuse ranges."),
+    BOOL("use.position", use_position, 1, "Fuse positions (GNSS)."),
+    BOOL("use.heading", use_heading, 1, "Fuse headings."),
+    F64("noise.bearing_default_rad", bearing_sigma_default_rad, 0.02, 1e-5, 3,
+        "Sigma of a bearing where neither the sighting nor the sensor gives one, rad."),
+    F64("noise.range_default_m", range_sigma_default_m, 0.1, 1e-4, 100,
+        "Sigma of a range where neither the sighting nor the sensor gives one, m."),
+    F64("noise.bearing_factor", bearing_sigma_factor, 1, 0.01, 100,
+        "Times the bearing's sigma. More than 1 where errors of following sightings are alike and not modelled."),
+    F64("noise.range_factor", range_sigma_factor, 1, 0.01, 100, "Times the range's sigma."),
+    F64("noise.range_rel", range_sigma_rel, 0, 0, 1, "Noise of a range in parts of it; squares are added."),
+    F64("noise.gnss_factor", gnss_sigma_factor, 1, 0.01, 100, "Times the position's sigma."),
+    F64("noise.gnss_min_m", gnss_sigma_min_m, 0.01, 0, 1000, "A position's sigma is never taken to be smaller, m."),
+    I32("lasting.slots", lasting_slots, 0, 0, 24,
+        "Pairs of sensor and landmark (the last seen ones) whose lasting error is carried as states (Gauss-Markov)."),
+    F64("lasting.bearing_rad", lasting_bearing_rad, 0, 0, 3, "Sigma of a bearing's lasting error, rad. 0: none."),
+    F64("lasting.range_m", lasting_range_m, 0, 0, 100, "Sigma of a range's lasting error, m."),
+    F64("lasting.range_rel", lasting_range_rel, 0, 0, 1, "The same in parts of the range; squares are added."),
+    F64("lasting.tau_s", lasting_tau_s, 2, 0.01, 1e6, "Time after which a lasting error has fallen to 1/e, s."),
+    F64("lasting.gnss_m", gnss_lasting_m, 0, 0, 1000,
+        "Sigma of a position's lasting error on each axis, m (reflections, atmosphere). 0: none."),
+    F64("lasting.gnss_tau_s", gnss_lasting_tau_s, 60, 0.1, 1e6, "Time after which that has fallen to 1/e, s."),
+    F64("gate.soft", gate_soft, 9, 1, 1e6,
+        "Normalised innovation squared for two numbers above which the measurement is believed less, as a "
+        "distribution with long tails does; for one number it is scaled. 99 % of good ones lie below 9.2."),
+    F64("gate.hard", gate_hard, 25, 1, 1e6, "The same, above which it is rejected and counted: a misread code."),
+    BOOL("gate.associate_unknown", associate_unknown, 0,
+         "Sightings without an id: fuse them with the one landmark that fits, where no other does."),
+    F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
+        "Nothing fused for so long: the state says dead reckoning."),
+    BOOL("recover.on", recover, 1, "Search the pose anew when observations keep contradicting it."),
+    F64("recover.window_s", recover_window_s, 20, 1, 600,
+        "Observations that are used to find the pose are at most so old; odometry carries them together."),
+    F64("recover.sigma_xy_m", recover_sigma_xy_m, 1, 0.001, 100,
+        "A pose found anew is taken when it is known at least so well, m (GNSS alone: a few metres)."),
+    F64("recover.sigma_heading_rad", recover_sigma_heading_rad, 0.25, 0.001, 3, "The same for the heading, rad."),
+};
+
+const wm_param_table wm_landmark_ekf_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params)};

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lost and found: notices that observations keep contradicting the pose, says so, and mends it.
+#include "filters/landmark_ekf/landmark_ekf.hpp"
+#include "math/elementary.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kSearchEvery_s = 0.25;  // bounds the cost: one search is about a tenth of a millisecond
+constexpr double kInflateAfter_s = 3.0;  // lost for so long and not found: open the gates
+constexpr double kInflateEvery_s = 1.0;
+constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;
+constexpr double kInflateUpTo_m = 30.0;
+
+}  // namespace
+
+void landmark_ekf::note_clue(const search_clue &clue) {
+  if (!params_.recover) return;
+  search_clue kept = clue;
+  kept.travelled_m = filter_.travelled_m();
+  kept.turned_rad = filter_.turned_rad();
+  clues_.add(kept);
+}
+
+void landmark_ekf::note(wm_time_ns t_ns, int key, double misfit) {
+  if (!params_.recover) return;
+  monitor_.note(t_ns, key, misfit);
+  if (state_ == WM_STATE_TRACKING && monitor_.contradicted(t_ns)) {
+    state_ = WM_STATE_LOST;
+    lost_ns_ = inflated_ns_ = t_ns;
+  }
+  if (state_ != WM_STATE_LOST) return;
+  if (monitor_.fits()) {
+    state_ = WM_STATE_TRACKING;
+    return;
+  }
+  const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
+  const wm_time_ns bad_since = monitor_.bad_since_ns();
+  search(bad_since > window ? bad_since : window);
+  if (state_ != WM_STATE_LOST || wm_seconds_between(lost_ns_, t_ns) < kInflateAfter_s) return;
+  if (wm_seconds_between(inflated_ns_, t_ns) >= kInflateEvery_s && filter_.variance(kX) < square(kInflateUpTo_m)) {
+    filter_.inflate_pose(square(kInflate_m), square(kInflate_rad));
+    inflated_ns_ = t_ns;
+  }
+}
+
+// Looks for the pose among the clues since `since_ns`; takes it where it is sure.
+void landmark_ekf::search(wm_time_ns since_ns) {
+  const wm_time_ns now = filter_.now_ns();
+  if (!params_.recover) return;
+  if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now) < kSearchEvery_s) return;
+  searched_ns_ = now;
+  const search_limits limits = {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad};
+  search_result result = clues_.find(since_ns, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), prior_,
+                                     state_ == WM_STATE_SEARCHING ? prior_count_ : 0, limits);
+  if (!result.found) return;
+  // What the mounting's yaw may still be off by, the heading found is off by, too.
+  for (size_t i = 0; i < setup_->sensor_count; i++) {
+    const int yaw = sensor_state_[i][kYaw];
+    if (yaw >= 0) result.covariance[2][2] += filter_.variance(yaw);
+  }
+  filter_.set_pose(result.pose, result.covariance);
+  monitor_.clear();
+  prior_count_ = 0;
+  resets_++;
+  fused_ns_ = now;
+  state_ = WM_STATE_TRACKING;
+}
+
+}  // namespace wm

@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/landmark_ekf/search.hpp"
+
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+constexpr wm_time_ns kSpacing_ns = 300 * WM_NS_PER_MS;
+constexpr int kHeadings = 72;  // every 5 degrees: well inside Gauss-Newton's reach
+constexpr int kCandidates = 4;
+constexpr int kRefinements = 10;
+constexpr double kOutlierChi2 = 9.0;  // a residual beyond counts this much and no more
+constexpr double kMarginChi2 = 9.0;   // the second best place must be worse by this
+constexpr double kAgreeing = 0.7;     // share of observations that must agree
+constexpr double kWayError = 0.05;    // odometry's error in parts of the way and of the turn, before calibration
+constexpr double kTurnError = 0.07;
+constexpr double kFirstGuess_m = 4.0;  // distance of a landmark of which only the bearing is known
+
+// The frame of odometry in map: position of its origin, rotation.
+struct placement {
+  double x, y, turn;
+  double cost;
+};
+
+struct problem {
+  struct item {
+    const search_clue *clue;
+    double weight_angle, weight_length;  // 1 / variance
+    double dir_x, dir_y;                 // of the line of sight, in the odometry's frame
+  };
+  item items[pose_search::kCapacity + 4];
+  int count = 0;
+
+  void add(const search_clue &clue, double travelled_m, double turned_rad) {
+    item &it = items[count++];
+    it.clue = &clue;
+    const double way = kWayError * (travelled_m - clue.travelled_m);
+    const double turn = kTurnError * (turned_rad - clue.turned_rad);
+    const double lever = (clue.kind & kClueRange) ? clue.range_m : kFirstGuess_m;
+    it.weight_angle = 1.0 / (square(clue.sigma_angle_rad) + square(turn) + square(way / (lever > 0.5 ? lever : 0.5)));
+    it.weight_length = 1.0 / (square(clue.sigma_length_m) + square(way));
+    const sin_cos d = sincos(clue.sensor.heading_rad + clue.bearing_rad);
+    it.dir_x = d.cos;
+    it.dir_y = d.sin;
+  }
+};
+
+double clipped(double chi2) { return chi2 < kOutlierChi2 ? chi2 : kOutlierChi2; }
+
+// Weight of a residual with bounded influence (Geman-McClure, scaled to the clipping).
+double bounded_weight(double chi2) { return square(kOutlierChi2 / (kOutlierChi2 + chi2)); }
+
+struct residuals {
+  double angle_chi2, length_chi2;  // negative: not observed
+};
+
+// Residuals of one clue without an arctangent: sin(error) = cross / distance; behind counts as an outlier.
+residuals look(const problem::item &it, const placement &p, const sin_cos &turn) {
+  const search_clue &c = *it.clue;
+  residuals out = {-1.0, -1.0};
+  if (c.kind & kClueHeading) {
+    out.angle_chi2 = square(wrap(c.bearing_rad - c.sensor.heading_rad - p.turn)) * it.weight_angle;
+    return out;
+  }
+  const double sx = p.x + turn.cos * c.sensor.x_m - turn.sin * c.sensor.y_m;
+  const double sy = p.y + turn.sin * c.sensor.x_m + turn.cos * c.sensor.y_m;
+  const double dx = c.place_m[0] - sx, dy = c.place_m[1] - sy;
+  if (c.kind & kCluePosition) {
+    out.length_chi2 = 0.5 * (dx * dx + dy * dy) * it.weight_length;
+    return out;
+  }
+  const double distance = std::sqrt(dx * dx + dy * dy);
+  if (c.kind & kClueBearing) {
+    const double ux = turn.cos * it.dir_x - turn.sin * it.dir_y, uy = turn.sin * it.dir_x + turn.cos * it.dir_y;
+    const double ahead = ux * dx + uy * dy, across = ux * dy - uy * dx;
+    out.angle_chi2 = ahead > 0.0 && distance > 1e-6 ? square(across / distance) * it.weight_angle : 1e3;
+  }
+  if (c.kind & kClueRange) out.length_chi2 = square(distance - c.range_m) * it.weight_length;
+  return out;
+}
+
+double cost_of(const problem &all, const placement &p, int *agreeing) {
+  const sin_cos turn = sincos(p.turn);
+  double cost = 0.0;
+  *agreeing = 0;
+  for (int i = 0; i < all.count; i++) {
+    const residuals r = look(all.items[i], p, turn);
+    bool fits = true;
+    if (r.angle_chi2 >= 0.0) {
+      cost += clipped(r.angle_chi2);
+      fits = fits && r.angle_chi2 < kOutlierChi2;
+    }
+    if (r.length_chi2 >= 0.0) {
+      cost += clipped(r.length_chi2);
+      fits = fits && r.length_chi2 < kOutlierChi2;
+    }
+    *agreeing += fits;
+  }
+  return cost;
+}
+
+// Best position for a given rotation: each bearing is a line, each bearing with range a point, each range alone a
+// circle (whose square is linear in x, y and x^2 + y^2). Two rounds; the second believes those that fitted.
+placement place_at(const problem &all, double rotation) {
+  placement p = {0.0, 0.0, rotation, 0.0};
+  const sin_cos turn = sincos(rotation);
+  for (int round = 0; round < 3; round++) {
+    double a[3][3] = {}, b[3] = {};
+    const auto add_row = [&](double x, double y, double z, double value, double weight) {
+      const double row[3] = {x, y, z};
+      for (int i = 0; i < 3; i++) {
+        b[i] += weight * row[i] * value;
+        for (int j = 0; j < 3; j++) a[i][j] += weight * row[i] * row[j];
+      }
+    };
+    bool circles = true;
+    for (int i = 0; i < all.count; i++)
+      circles = circles && (all.items[i].clue->kind & (kClueBearing | kCluePosition)) == 0;
+    for (int i = 0; i < all.count; i++) {
+      const problem::item &it = all.items[i];
+      const search_clue &c = *it.clue;
+      if (c.kind & kClueHeading) continue;
+      const residuals r = round > 0 ? look(it, p, turn) : residuals{0.0, 0.0};
+      const double sx = turn.cos * c.sensor.x_m - turn.sin * c.sensor.y_m;
+      const double sy = turn.sin * c.sensor.x_m + turn.cos * c.sensor.y_m;
+      const double tx = c.place_m[0] - sx, ty = c.place_m[1] - sy;
+      const double trust_angle = bounded_weight(r.angle_chi2 > 0 ? r.angle_chi2 : 0.0);
+      const double trust_length = bounded_weight(r.length_chi2 > 0 ? r.length_chi2 : 0.0);
+      if (c.kind & kCluePosition) {
+        add_row(1, 0, 0, tx, it.weight_length * trust_length);
+        add_row(0, 1, 0, ty, it.weight_length * trust_length);
+        continue;
+      }
+      const double ux = turn.cos * it.dir_x - turn.sin * it.dir_y, uy = turn.sin * it.dir_x + turn.cos * it.dir_y;
+      if (c.kind & kClueBearing) {
+        double distance = (c.kind & kClueRange) ? c.range_m : kFirstGuess_m;
+        if (round > 0 && !(c.kind & kClueRange)) distance = std::sqrt(square(tx - p.x) + square(ty - p.y)) + 0.1;
+        add_row(-uy, ux, 0, ux * ty - uy * tx, it.weight_angle / square(distance > 0.2 ? distance : 0.2) * trust_angle);
+        if (c.kind & kClueRange) add_row(ux, uy, 0, ux * tx + uy * ty - c.range_m, it.weight_length * trust_length);
+      } else if ((c.kind & kClueRange) && circles) {
+        const double weight = it.weight_length / (4.0 * square(c.range_m > 0.2 ? c.range_m : 0.2));
+        add_row(2 * tx, 2 * ty, -1.0, tx * tx + ty * ty - square(c.range_m), weight * trust_length);
+      }
+    }
+    if (!circles) a[2][2] += 1.0;
+    for (int i = 0; i < 3; i++) a[i][i] += 1e-9;  // what nothing says stays where it is
+    // Cramer's rule is enough for three numbers.
+    const auto det3 = [](const double m[3][3]) {
+      return m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0]) +
+             m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+    };
+    const double det = det3(a);
+    if (!(det > 0.0)) break;
+    double solution[2];
+    for (int k = 0; k < 2; k++) {
+      double m[3][3];
+      for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) m[i][j] = j == k ? b[i] : a[i][j];
+      solution[k] = det3(m) / det;
+    }
+    p.x = solution[0];
+    p.y = solution[1];
+  }
+  int agreeing;
+  p.cost = cost_of(all, p, &agreeing);
+  return p;
+}
+
+// Normal equations of Gauss-Newton about p, over (x, y, turn); residuals bounded in influence.
+void normal_equations(const problem &all, const placement &p, double a[3][3], double b[3]) {
+  const sin_cos turn = sincos(p.turn);
+  for (int i = 0; i < 3; i++) {
+    b[i] = 0.0;
+    for (int j = 0; j < 3; j++) a[i][j] = 0.0;
+  }
+  const auto add_row = [&](const double row[3], double residual, double weight) {
+    const double w = weight * bounded_weight(square(residual) * weight);
+    for (int i = 0; i < 3; i++) {
+      b[i] += w * row[i] * residual;
+      for (int j = 0; j < 3; j++) a[i][j] += w * row[i] * row[j];
+    }
+  };
+  for (int i = 0; i < all.count; i++) {
+    const problem::item &it = all.items[i];
+    const search_clue &c = *it.clue;
+    if (c.kind & kClueHeading) {
+      const double row[3] = {0, 0, 1};
+      add_row(row, wrap(c.bearing_rad - c.sensor.heading_rad - p.turn), it.weight_angle);
+      continue;
+    }
+    const double rx = turn.cos * c.sensor.x_m - turn.sin * c.sensor.y_m;
+    const double ry = turn.sin * c.sensor.x_m + turn.cos * c.sensor.y_m;
+    const double dx = c.place_m[0] - p.x - rx, dy = c.place_m[1] - p.y - ry;
+    if (c.kind & kCluePosition) {
+      const double row_x[3] = {1, 0, -ry}, row_y[3] = {0, 1, rx};
+      add_row(row_x, dx, it.weight_length);
+      add_row(row_y, dy, it.weight_length);
+      continue;
+    }
+    const double q = dx * dx + dy * dy;
+    if (!(q > 1e-6)) continue;
+    if (c.kind & kClueBearing) {
+      const double row[3] = {dy / q, -dx / q, -(rx * dx + ry * dy) / q - 1.0};
+      add_row(row, wrap(c.sensor.heading_rad + c.bearing_rad + p.turn - atan2(dy, dx)), it.weight_angle);
+    }
+    if (c.kind & kClueRange) {
+      const double d = std::sqrt(q);
+      const double row[3] = {-dx / d, -dy / d, (ry * dx - rx * dy) / d};
+      add_row(row, c.range_m - d, it.weight_length);
+    }
+  }
+}
+
+bool invert(const double a[3][3], double out[3][3]) {
+  const double c00 = a[1][1] * a[2][2] - a[1][2] * a[2][1], c01 = a[1][2] * a[2][0] - a[1][0] * a[2][2];
+  const double c02 = a[1][0] * a[2][1] - a[1][1] * a[2][0];
+  const double det = a[0][0] * c00 + a[0][1] * c01 + a[0][2] * c02;
+  if (!(det > 1e-12 * a[0][0] * a[1][1] * a[2][2]) || !finite(det) || !(det > 0.0)) return false;
+  const double inverse = 1.0 / det;
+  out[0][0] = c00 * inverse;
+  out[0][1] = out[1][0] = c01 * inverse;
+  out[0][2] = out[2][0] = c02 * inverse;
+  out[1][1] = (a[0][0] * a[2][2] - a[0][2] * a[2][0]) * inverse;
+  out[1][2] = out[2][1] = (a[0][2] * a[1][0] - a[0][0] * a[1][2]) * inverse;
+  out[2][2] = (a[0][0] * a[1][1] - a[0][1] * a[1][0]) * inverse;
+  return true;
+}
+
+}  // namespace
+
+void pose_search::add(const search_clue &clue) {
+  const int oldest = count_ > kCapacity ? count_ - kCapacity : 0;
+  for (int i = count_ - 1; i >= oldest; i--) {
+    const search_clue &c = clue_[i % kCapacity];
+    if (clue.t_ns - c.t_ns >= kSpacing_ns) break;
+    if (c.key == clue.key) return;
+  }
+  clue_[count_ % kCapacity] = clue;
+  count_++;
+  if (count_ == 4 * kCapacity) count_ -= 2 * kCapacity;  // the index stays small; its place in the ring is the same
+}
+
+search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, double travelled_m, double turned_rad,
+                                const search_clue *prior, int prior_count, const search_limits &limits) const {
+  search_result out{};
+  problem all;
+  const int oldest = count_ > kCapacity ? count_ - kCapacity : 0;
+  for (int i = oldest; i < count_; i++)
+    if (clue_[i % kCapacity].t_ns >= since_ns) all.add(clue_[i % kCapacity], travelled_m, turned_rad);
+  out.used = all.count;
+  for (int i = 0; i < prior_count; i++) all.add(prior[i], travelled_m, turned_rad);
+  if (out.used < 3) return out;
+
+  // Coarse: every heading; the best few that are not neighbours.
+  placement best[kCandidates];
+  int found = 0;
+  placement grid[kHeadings];
+  for (int i = 0; i < kHeadings; i++) grid[i] = place_at(all, wrap(kTwoPi * i / kHeadings));
+  for (int i = 0; i < kHeadings; i++) {
+    if (grid[i].cost > grid[(i + 1) % kHeadings].cost || grid[i].cost >= grid[(i + kHeadings - 1) % kHeadings].cost)
+      continue;
+    int at = found < kCandidates ? found++ : kCandidates;
+    while (at > 0 && best[at - 1].cost > grid[i].cost) {
+      if (at < kCandidates) best[at] = best[at - 1];
+      at--;
+    }
+    if (at < kCandidates) best[at] = grid[i];
+  }
+  // Fine.
+  double a[3][3], b[3], inverse[3][3];
+  int winner = -1, agreeing[kCandidates];
+  for (int k = 0; k < found; k++) {
+    placement &p = best[k];
+    for (int step = 0; step < kRefinements; step++) {
+      normal_equations(all, p, a, b);
+      for (int i = 0; i < 3; i++) a[i][i] += 1e-6 * (1.0 + a[i][i]);
+      if (!invert(a, inverse)) break;
+      double move[3];
+      for (int i = 0; i < 3; i++) move[i] = inverse[i][0] * b[0] + inverse[i][1] * b[1] + inverse[i][2] * b[2];
+      p.x += move[0];
+      p.y += move[1];
+      p.turn = wrap(p.turn + move[2]);
+      if (!finite(p.x) || !finite(p.y) || !finite(p.turn)) break;
+    }
+    p.cost = finite(p.x + p.y + p.turn) ? cost_of(all, p, &agreeing[k]) : 1e30;
+    if (winner < 0 || p.cost < best[winner].cost) winner = k;
+  }
+  if (winner < 0) return out;
+  const placement &w = best[winner];
+  out.agreeing = agreeing[winner];
+  if (out.agreeing < kAgreeing * all.count || out.agreeing < 3) return out;
+  normal_equations(all, w, a, b);
+  if (!invert(a, inverse)) return out;
+  const wm_pose2 frame = {w.x, w.y, w.turn};
+  out.pose = compose(frame, odom_now);
+  for (int k = 0; k < found; k++) {
+    const wm_pose2 other = compose({best[k].x, best[k].y, best[k].turn}, odom_now);
+    const double away = std::fabs(other.x_m - out.pose.x_m) + std::fabs(other.y_m - out.pose.y_m);
+    const bool same = away < 3.0 * limits.sigma_xy_m && std::fabs(wrap(other.heading_rad - out.pose.heading_rad)) < 0.3;
+    if (!same && best[k].cost < w.cost + kMarginChi2) return out;  // two places explain what was seen
+  }
+  // From the frame's covariance to the pose's: its origin is `lever` away.
+  const double lever_x = out.pose.x_m - w.x, lever_y = out.pose.y_m - w.y;
+  const double j[3][3] = {{1, 0, -lever_y}, {0, 1, lever_x}, {0, 0, 1}};
+  // Following clues share the odometry's and the sensor's errors, so their number promises too much.
+  const double caution = 4.0;
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 3; c++) {
+      double sum = 0.0;
+      for (int m = 0; m < 3; m++)
+        for (int n = 0; n < 3; n++) sum += j[r][m] * inverse[m][n] * j[c][n];
+      out.covariance[r][c] = caution * sum;
+    }
+  out.found = out.covariance[0][0] + out.covariance[1][1] < 2.0 * square(limits.sigma_xy_m) &&
+              out.covariance[2][2] < square(limits.sigma_heading_rad);
+  return out;
+}
+
+}  // namespace wm

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// Finding the pose anew: recent observations, carried together by odometry, against the map. For each of many headings
+// the position is a linear problem; the best ones are refined by Gauss-Newton with bounded influence, and one is taken
+// only when most observations agree with it and no other place explains them as well. Fixed cost.
+#ifndef WAYMARK_ESTIMATOR_SEARCH_HPP
+#define WAYMARK_ESTIMATOR_SEARCH_HPP
+
+#include <cstdint>
+
+#include "waymark/frames.h"
+#include "waymark/time.h"
+
+namespace wm {
+
+// One observation, in the odometry's frame.
+struct search_clue {
+  wm_time_ns t_ns;
+  uint32_t kind;       // bits of search_kind
+  int32_t key;         // what was seen: index of the landmark; negative: a position, a heading
+  wm_pose2 sensor;     // the sensor (base_link for a position or a heading) in the odometry's frame, at the observation
+  double place_m[2];   // of the landmark, or the position itself, in map
+  double bearing_rad;  // or the heading in map
+  double range_m;      // on the floor
+  double sigma_angle_rad, sigma_length_m;
+  double travelled_m, turned_rad;  // so far, at the observation: odometry's own error grows with them
+};
+enum search_kind : uint32_t { kClueBearing = 1, kClueRange = 2, kCluePosition = 4, kClueHeading = 8 };
+
+struct search_result {
+  bool found;
+  wm_pose2 pose;  // base_link in map, now
+  double covariance[3][3];
+  int used, agreeing;
+};
+
+struct search_limits {
+  double sigma_xy_m, sigma_heading_rad;  // a pose less sure is not taken
+};
+
+class pose_search {
+ public:
+  static constexpr int kCapacity = 64;
+
+  void clear() { count_ = 0; }
+  // Keeps the clue; of one key at most one in 0.3 s, so that a fast sensor does not crowd out time.
+  void add(const search_clue &clue);
+  int count() const { return count_; }
+  const search_clue &newest() const { return clue_[(count_ - 1) % kCapacity]; }
+  // The pose now, from clues not older than `since_ns`. `prior` (may be null) is a clue that does not age.
+  search_result find(wm_time_ns since_ns, const wm_pose2 &odom_now, double travelled_m, double turned_rad,
+                     const search_clue *prior, int prior_count, const search_limits &limits) const;
+
+ private:
+  search_clue clue_[kCapacity];
+  int count_;
+};
+
+}  // namespace wm
+
+#endif

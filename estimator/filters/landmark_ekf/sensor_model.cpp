@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/landmark_ekf/sensor_model.hpp"
+
+#include "math/elementary.hpp"
+
+namespace wm {
+
+void mounted_sensor::init(const wm_sensor &sensor) {
+  x_m = sensor.mounting.xyz_m[0];
+  y_m = sensor.mounting.xyz_m[1];
+  z_m = sensor.mounting.xyz_m[2];
+  yaw_rad = wrap(sensor.mounting.rpy_rad[2]);
+  const sin_cos r = sincos(sensor.mounting.rpy_rad[0]), p = sincos(sensor.mounting.rpy_rad[1]);
+  // Ry(pitch) Rx(roll), transposed: rows are the sensor's axes in levelled coordinates.
+  const double rows[3][3] = {
+      {p.cos, 0.0, -p.sin}, {p.sin * r.sin, r.cos, p.cos * r.sin}, {p.sin * r.cos, -r.sin, p.cos * r.cos}};
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) axis[i][j] = rows[i][j];
+  bearing_sigma_rad = sensor.bearing_sigma_rad;
+  range_sigma_m = sensor.range_sigma_m;
+  max_range_m = sensor.max_range_m;
+  range_is_depth = sensor.range_is_depth != 0;
+}
+
+expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &errors, const wm_pose2 &pose,
+                         const double landmark_m[3]) {
+  expected_sighting out{};
+  const sin_cos h = sincos(pose.heading_rad);
+  const sin_cos m = sincos(sensor.yaw_rad + errors.yaw_rad);
+  const double dx = landmark_m[0] - pose.x_m, dy = landmark_m[1] - pose.y_m;
+  // The landmark in base_link, then from the sensor in levelled axes along its yaw (paper: x_c, y_c, alpha).
+  const double base_x = h.cos * dx + h.sin * dy, base_y = h.cos * dy - h.sin * dx;
+  const double from_x = base_x - sensor.x_m, from_y = base_y - sensor.y_m;
+  const double up = finite(landmark_m[2]) ? landmark_m[2] - sensor.z_m : 0.0;
+  const double level[3] = {m.cos * from_x + m.sin * from_y, m.cos * from_y - m.sin * from_x, up};
+  // Derivatives of `level` (its third is constant) by x, y, heading and mounting yaw.
+  const double c = h.cos * m.cos - h.sin * m.sin, s = h.sin * m.cos + h.cos * m.sin;  // heading + yaw
+  const double by[4][2] = {
+      {-c, s}, {-s, -c}, {m.cos * base_y - m.sin * base_x, -m.cos * base_x - m.sin * base_y}, {level[1], -level[0]}};
+  double seen[3];
+  for (int i = 0; i < 3; i++) {
+    const double *row = sensor.axis[i];
+    seen[i] = row[0] * level[0] + row[1] * level[1] + row[2] * level[2];
+  }
+  const double q = seen[0] * seen[0] + seen[1] * seen[1];
+  const double length = std::sqrt(q + seen[2] * seen[2]);
+  out.distance_m = std::sqrt(from_x * from_x + from_y * from_y);
+  out.possible = q > 1e-6 && (!sensor.range_is_depth || seen[0] > 0.02);
+  if (!(q > 1e-6)) return out;
+  out.bearing_rad = atan2(seen[1], seen[0]);
+  const double plain = sensor.range_is_depth ? seen[0] : length;
+  out.range_m = errors.range_scale * plain + errors.range_bias_m;
+  out.range_by_scale = plain;
+  const double over_q = 1.0 / q, over_length = 1.0 / length;
+  for (int k = 0; k < 4; k++) {
+    double d[3];
+    for (int i = 0; i < 3; i++) {
+      const double *row = sensor.axis[i];
+      d[i] = row[0] * by[k][0] + row[1] * by[k][1];
+    }
+    out.bearing_by[k] = (seen[0] * d[1] - seen[1] * d[0]) * over_q;
+    out.range_by[k] = errors.range_scale *
+                      (sensor.range_is_depth ? d[0] : (seen[0] * d[0] + seen[1] * d[1] + seen[2] * d[2]) * over_length);
+  }
+  return out;
+}
+
+}  // namespace wm

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a mounted sensor should see of a landmark, with all derivatives. Paper, system 1, observation, with the print's
+// signs mended; height, pitch and roll of the mounting are respected, and range may be a distance or a depth.
+#ifndef WAYMARK_ESTIMATOR_SENSOR_MODEL_HPP
+#define WAYMARK_ESTIMATOR_SENSOR_MODEL_HPP
+
+#include "waymark/frames.h"
+#include "waymark/setup.h"
+
+namespace wm {
+
+// A sensor's mounting, ready for use.
+struct mounted_sensor {
+  double x_m, y_m, z_m, yaw_rad;
+  double axis[3][3];  // the sensor's axes in levelled axes along its yaw: (Ry(pitch) Rx(roll))'
+  double bearing_sigma_rad, range_sigma_m, max_range_m;
+  bool range_is_depth;
+
+  void init(const wm_sensor &sensor);
+};
+
+// What differs from calibration.yaml.
+struct sensor_errors {
+  double yaw_rad = 0.0, range_scale = 1.0, range_bias_m = 0.0;
+};
+
+struct expected_sighting {
+  bool possible;  // false: on the sensor itself, or (for a depth) behind it
+  double bearing_rad, range_m;
+  double distance_m;  // on the floor
+  // By x, y, heading of the pose, and by the mounting's yaw. By the landmark's x, y: minus those by the pose's.
+  double bearing_by[4], range_by[4];
+  double range_by_scale;
+};
+
+expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &errors, const wm_pose2 &pose_map_base,
+                         const double landmark_m[3]);
+
+}  // namespace wm
+
+#endif

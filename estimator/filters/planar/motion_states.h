@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which calibration states of the motion sensors a planar filter carries, and how sure it is of them at the start.
+// Shared by the filters, so that the same keys mean the same everywhere.
+#ifndef WAYMARK_ESTIMATOR_PLANAR_MOTION_STATES_H
+#define WAYMARK_ESTIMATOR_PLANAR_MOTION_STATES_H
+
+#include "waymark/params.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// In the order of wm_motion_calibration.
+typedef struct wm_motion_states {
+  double sigma[8];  // at the start; 0: not a state
+  double walk[8];   // random walk, per sqrt(s)
+} wm_motion_states;
+
+#define WM_MOTION_STATE(type, member, i, key, unit, walk_default, max_sigma, about)                             \
+  {"states." key "_sigma" unit, WM_PARAM_F64, offsetof(type, member.sigma[i]), 0, 0, max_sigma, NULL, about}, { \
+    "states." key "_walk" unit, WM_PARAM_F64, offsetof(type, member.walk[i]), walk_default, 0, max_sigma, NULL, \
+        "Random walk of that state per sqrt(s): what it changes by on its own."                                 \
+  }
+
+#define WM_MOTION_STATE_PARAMS(type, member)                                                                     \
+  WM_MOTION_STATE(                                                                                               \
+      type, member, 0, "speed_scale", "", 0.0, 1,                                                                \
+      "Start sigma of the speed's scale about 1 (tyres, a controller that gives less than asked). 0: off."),     \
+      WM_MOTION_STATE(type, member, 1, "yaw_rate_scale", "", 0.0, 1,                                             \
+                      "Start sigma of the turn rate's scale about 1. 0: off."),                                  \
+      WM_MOTION_STATE(type, member, 2, "yaw_rate_bias", "_radps", 0.0001, 1,                                     \
+                      "Start sigma of the turn rate's bias, rad/s (a cheap gyro: 0.02). 0: off."),               \
+      WM_MOTION_STATE(type, member, 3, "left_scale", "", 0.0, 1,                                                 \
+                      "Start sigma of the left wheel's scale about 1, for ticks. 0: off."),                      \
+      WM_MOTION_STATE(type, member, 4, "right_scale", "", 0.0, 1,                                                \
+                      "Start sigma of the right wheel's scale about 1, for ticks. 0: off."),                     \
+      WM_MOTION_STATE(type, member, 5, "track_scale", "", 0.0, 1,                                                \
+                      "Start sigma of the track's scale about 1, for ticks. 0: off."),                           \
+      WM_MOTION_STATE(type, member, 6, "steering_offset", "_rad", 0.0, 1,                                        \
+                      "Start sigma of the road wheel's zero, rad, for speed and steering. 0: off."),             \
+      WM_MOTION_STATE(type, member, 7, "lag", "_s", 0.0, 1,                                                      \
+                      "Start sigma of what the robot is late by behind its motion source, s: commands that are " \
+                      "obeyed late. 0: off.")
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// The part that planar Kalman filters share: pose and calibration states with their covariance, moved by the motion
+// front end and corrected by scalar measurements.
+#ifndef WAYMARK_ESTIMATOR_PLANAR_FILTER_HPP
+#define WAYMARK_ESTIMATOR_PLANAR_FILTER_HPP
+
+#include "filters/planar/motion_states.h"
+#include "motion/front_end.hpp"
+#include "waymark/estimator.h"
+
+namespace wm {
+
+inline constexpr int kMaxStates = 64;
+enum pose_state { kX = 0, kY = 1, kHeading = 2, kPoseStates = 3 };
+
+// A row of a measurement's derivative: few entries are not zero.
+struct sparse_row {
+  static constexpr int kMax = 16;
+  int count = 0;
+  int index[kMax];
+  double by[kMax];
+
+  void add(int state, double derivative) {  // state < 0: not a state, or off
+    if (state < 0 || derivative == 0.0) return;
+    index[count] = state;
+    by[count] = derivative;
+    count++;
+  }
+};
+
+// P H' of a row, and H P H'.
+struct projection {
+  alignas(16) double gain[kMaxStates];  // P H', not yet divided by the innovation's variance
+  double variance;
+};
+
+class planar_filter {
+ public:
+  // How many states the motion's calibration takes.
+  static int count_motion_states(const wm_motion_states &states);
+
+  void init(const wm_setup &setup, const wm_motion_states &states);
+  // A new state behind the others; returns its index.
+  int add_state(double value, double sigma);
+
+  // Time that the state stands at; WM_TIME_NONE before the first event.
+  wm_time_ns now_ns() const { return front_.now_ns(); }
+  bool before_start(wm_time_ns t_ns) const { return t_ns < start_ns_; }
+  wm_status check_motion(const wm_event &event) const { return front_.check(event); }
+  wm_status check_time(wm_time_ns t_ns) const;
+  // Takes a motion event that check_motion() lets pass; the state goes to its t_ns.
+  void move(const wm_event &motion);
+  void move_to(wm_time_ns t_ns);
+
+  // Motion from `from_ns` to `to_ns` (which may be later or earlier than now), as seen from its beginning; *twist is
+  // that at `from_ns`.
+  wm_pose2 path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const;
+
+  void project(const sparse_row &row, projection *out) const;
+  double project_onto(const sparse_row &row, const projection &other) const;  // H_row P H_other'
+  // Scalar update with innovation `innovation` and measurement variance `noise`. Source: Joseph's form,
+  // P = (I - KH) P (I - KH)' + K R K', written out for one row: P - K g' - g K' + s K K', g = P H', s = H g + R.
+  void update(const projection &projected, double innovation, double noise);
+
+  void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
+  void inflate_pose(double variance_m2, double variance_rad2);
+  // Fills mean, covariance and twist.
+  void estimate(wm_estimate *out) const;
+  const wm_motion_calibration &calibration() const { return calibration_; }
+  size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
+  uint32_t motion_health() const { return front_.health(); }
+
+  wm_pose2 pose() const { return {x_[kX], x_[kY], x_[kHeading]}; }
+  wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time
+  double travelled_m() const { return travelled_m_; }
+  double turned_rad() const { return turned_rad_; }
+  double value(int state) const { return x_[state]; }
+  void set_value(int state, double value) { x_[state] = value; }
+  double covariance(int i, int j) const { return p_[i * stride_ + j]; }
+  double variance(int state) const { return covariance(state, state); }
+  int states() const { return n_; }
+
+  // x := factor x + noise, for a state that no other one's motion depends on (Gauss-Markov, lazily carried on).
+  void fade(int state, double factor, double added_variance);
+  void forget(int state, double value, double variance);
+
+ private:
+  void propagate(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise);
+  void take_calibration();
+
+  int n_, stride_;
+  motion_front_end front_;
+  wm_motion_calibration calibration_;
+  int motion_state_[kCalibrationCount];
+  double walk_[kCalibrationCount];
+  double start_variance_[kCalibrationCount];
+  wm_time_ns start_ns_;
+  wm_pose2 odom_;
+  double travelled_m_, turned_rad_;
+  double v_mps_, w_radps_;
+  alignas(16) double x_[kMaxStates];
+  alignas(16) double p_[kMaxStates * kMaxStates];
+};
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/planar/set_pose.hpp"
+
+#include "math/elementary.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kFarthest_m = 1e7;
+
+// Heading of a quaternion (x, y, z, w): that of the body's x axis seen from above.
+double heading_of(const double q[4]) {
+  return atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), 1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]));
+}
+
+void set(planar_filter &filter, const wm_pose2 &pose, double sigma_xy, double sigma_heading) {
+  const double covariance[3][3] = {{square(sigma_xy), 0, 0}, {0, square(sigma_xy), 0}, {0, 0, square(sigma_heading)}};
+  filter.set_pose(pose, covariance);
+}
+
+}  // namespace
+
+wm_status set_pose(planar_filter &filter, const wm_event &event) {
+  const wm_set_pose &s = event.as.set_pose;
+  const double *p = s.pose_map_base.p_m;
+  const double *q = s.pose_map_base.q_xyzw;
+  double length = 0.0;
+  for (int i = 0; i < 4; i++) length += q[i] * q[i];
+  if (!finite(p[0]) || !finite(p[1]) || !finite(length) || !finite(s.sigma_xy_m) || !finite(s.sigma_heading_rad))
+    return WM_NOT_FINITE;
+  if (std::fabs(p[0]) > kFarthest_m || std::fabs(p[1]) > kFarthest_m || std::fabs(length - 1.0) > 0.01 ||
+      !(s.sigma_xy_m > 0.0 && s.sigma_xy_m <= kFarthest_m) ||
+      !(s.sigma_heading_rad > 0.0 && s.sigma_heading_rad < 10.0))
+    return WM_OUT_OF_RANGE;
+  const wm_status status = filter.check_time(event.t_ns);
+  if (status != WM_OK) return status;
+  filter.move_to(event.t_ns);
+  set(filter, {p[0], p[1], heading_of(q)}, s.sigma_xy_m, s.sigma_heading_rad);
+  return WM_OK;
+}
+
+wm_status reset_pose(planar_filter &filter, const wm_start &start, wm_time_ns t_ns) {
+  const wm_status status = filter.check_time(t_ns);
+  if (status != WM_OK) return status;
+  filter.move_to(t_ns);
+  const bool place = finite(start.p_m[0]) && finite(start.p_m[1]), heading = finite(start.heading_rad);
+  set(filter, {place ? start.p_m[0] : 0.0, place ? start.p_m[1] : 0.0, heading ? start.heading_rad : 0.0},
+      place ? (finite(start.sigma_xy_m) ? start.sigma_xy_m : 0.05) : kUnknownPosition_m,
+      heading ? (finite(start.sigma_heading_rad) ? start.sigma_heading_rad : 0.05) : kUnknownHeading_rad);
+  return WM_OK;
+}
+
+}  // namespace wm

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Poses given from outside: a start, SET_POSE, RESET.
+#ifndef WAYMARK_ESTIMATOR_PLANAR_SET_POSE_HPP
+#define WAYMARK_ESTIMATOR_PLANAR_SET_POSE_HPP
+
+#include "filters/planar/planar_filter.hpp"
+#include "math/elementary.hpp"
+
+namespace wm {
+
+inline bool start_is_known(const wm_start &start) {
+  return finite(start.p_m[0]) && finite(start.p_m[1]) && finite(start.heading_rad);
+}
+
+// As unsure as one can be of a place that may be anywhere.
+inline constexpr double kUnknownPosition_m = 1000.0;
+inline constexpr double kUnknownHeading_rad = kPi;
+
+// Sets the pose that the event names, at its time. WM_NOT_FINITE, WM_OUT_OF_RANGE, WM_TIME_RAN_BACK: nothing changed.
+wm_status set_pose(planar_filter &filter, const wm_event &event);
+// Back to the start pose, at t_ns; what is unknown of it gets a covariance that says so. Calibration stays.
+wm_status reset_pose(planar_filter &filter, const wm_start &start, wm_time_ns t_ns);
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/registry.h"
+
+#include <string.h>
+
+static const wm_estimator *const kEstimators[] = {&wm_odometry_estimator, &wm_landmark_ekf_estimator};
+static const size_t kCount = sizeof kEstimators / sizeof kEstimators[0];
+
+const wm_estimator *const *wm_estimators(size_t *count) {
+  *count = kCount;
+  return kEstimators;
+}
+
+const wm_estimator *wm_estimator_find(const char *name) {
+  for (size_t i = 0; i < kCount; i++)
+    if (strcmp(kEstimators[i]->name, name) == 0) return kEstimators[i];
+  return NULL;
+}

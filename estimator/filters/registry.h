@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// A new estimator: one line here, one in registry.c, one folder beside them.
+#ifndef WAYMARK_ESTIMATOR_REGISTRY_H
+#define WAYMARK_ESTIMATOR_REGISTRY_H
+
+#include "waymark/estimator.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+extern const wm_estimator wm_odometry_estimator;
+extern const wm_estimator wm_landmark_ekf_estimator;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
