@@ -41,6 +41,16 @@ static wm_status fail_field(const csv_reader *self, wm_error *err, wm_status sta
   return csv_fail(self, err, status, text);
 }
 
+static wm_status fail_range(const csv_reader *self, wm_error *err, size_t column, csv_field field, double min,
+                            double max) {
+  char why[96];
+  if (min == DBL_MIN)
+    snprintf(why, sizeof why, "is outside of what can be (above 0, up to %.10g)", max);
+  else
+    snprintf(why, sizeof why, "is outside of what can be (%.10g to %.10g)", min, max);
+  return fail_field(self, err, WM_NOT_FINITE, column, field, why);
+}
+
 wm_status csv_next(csv_reader *self, wm_error *err) {
   for (;;) {
     const char *text;
@@ -173,29 +183,25 @@ static wm_status read_whole(const csv_reader *self, size_t column, csv_field fie
   int64_t min = c->type == CSV_TIME ? -TIME_LIMIT : (int64_t)c->min,
           max = c->type == CSV_TIME ? TIME_LIMIT : (int64_t)c->max;
   wm_text_number kind = wm_text_to_i64(field.text, field.length, out);
-  if (kind == WM_TEXT_NOT_A_NUMBER)
-    return fail_field(self, err, WM_BAD_DATA, column, field, "is not a whole number; the row is skipped");
+  if (kind == WM_TEXT_NOT_A_NUMBER) return fail_field(self, err, WM_BAD_DATA, column, field, "is not a whole number");
   if (kind == WM_TEXT_OK && *out >= min && *out <= max) return WM_OK;
-  return fail_field(self, err, WM_NOT_FINITE, column, field, "is outside of what can be; the row is skipped");
+  return fail_range(self, err, column, field, (double)min, (double)max);
 }
 
 static wm_status read_number(const csv_reader *self, size_t column, csv_field field, double *out, wm_error *err) {
   const csv_column *c = &self->format->columns[column];
   wm_text_number kind = wm_text_to_f64(field.text, field.length, out);
-  if (kind == WM_TEXT_NOT_A_NUMBER)
-    return fail_field(self, err, WM_BAD_DATA, column, field, "is not a number; the row is skipped");
-  if (kind == WM_TEXT_NOT_FINITE)
-    return fail_field(self, err, WM_NOT_FINITE, column, field, "is not a finite number; the row is skipped");
+  if (kind == WM_TEXT_NOT_A_NUMBER) return fail_field(self, err, WM_BAD_DATA, column, field, "is not a number");
+  if (kind == WM_TEXT_NOT_FINITE) return fail_field(self, err, WM_NOT_FINITE, column, field, "is not a finite number");
   if (kind == WM_TEXT_OK && *out >= c->min && *out <= c->max) return WM_OK;
-  return fail_field(self, err, WM_NOT_FINITE, column, field, "is outside of what can be; the row is skipped");
+  return fail_range(self, err, column, field, c->min, c->max);
 }
 
 wm_status csv_read(csv_reader *self, csv_row *row, wm_error *err) {
   char text[96];
-  if (self->too_long) return csv_fail(self, err, WM_BAD_DATA, "the line is longer than 65536 bytes; it is skipped");
+  if (self->too_long) return csv_fail(self, err, WM_BAD_DATA, "the line is longer than 65536 bytes");
   if (self->fields_found != self->field_count) {
-    snprintf(text, sizeof text, "%zu fields where the header has %zu; the row is skipped", self->fields_found,
-             self->field_count);
+    snprintf(text, sizeof text, "%zu fields where the header has %zu", self->fields_found, self->field_count);
     return csv_fail(self, err, WM_BAD_DATA, text);
   }
   for (size_t i = 0; self->format->columns[i].name; i++) {
@@ -203,8 +209,10 @@ wm_status csv_read(csv_reader *self, csv_row *row, wm_error *err) {
     csv_field field = self->place[i] >= 0 ? self->fields[self->place[i]] : (csv_field){"", 0};
     row->whole[i] = WM_TIME_NONE;
     row->number[i] = NAN;
-    if (field.length == 0 && column->need == CSV_NEEDED)
-      return fail_field(self, err, WM_BAD_DATA, i, field, "is empty, but needed; the row is skipped");
+    if (field.length == 0 && column->need == CSV_NEEDED) {
+      snprintf(text, sizeof text, "%s: is empty, but needed", column->name);
+      return csv_fail(self, err, WM_BAD_DATA, text);
+    }
     if (field.length == 0) continue;
     wm_status status = WM_OK;
     if (column->type == CSV_NAME)

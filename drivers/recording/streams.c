@@ -72,7 +72,7 @@ static double wrapped(double angle_rad) {
 
 static const char *fill_sighting(const csv_row *row, uint16_t sensor, wm_event *out) {
   double bearing_rad = row->number[FIRST + 2], range_m = row->number[FIRST + 3];
-  if (isnan(bearing_rad) && isnan(range_m)) return "bearing_rad and range_m are both empty; the row is skipped";
+  if (isnan(bearing_rad) && isnan(range_m)) return "bearing_rad and range_m are both empty";
   int64_t id = row->whole[FIRST + 1];
   out->as.sighting = (wm_sighting){.sensor = sensor,
                                    .landmark_id = id == WM_TIME_NONE ? -1 : (int32_t)id,
@@ -93,9 +93,8 @@ static const char *fill_marker(const csv_row *row, uint16_t sensor, wm_event *ou
 static const char *fill_stereo(const csv_row *row, uint16_t sensor, wm_event *out) {
   (void)sensor;
   const double *px = &row->number[FIRST + 1];
-  if (isnan(px[0]) != isnan(px[1]) || isnan(px[2]) != isnan(px[3]))
-    return "one of u and v is empty; the row is skipped";
-  if (isnan(px[0]) && isnan(px[2])) return "no camera sees the point; the row is skipped";
+  if (isnan(px[0]) != isnan(px[1]) || isnan(px[2]) != isnan(px[3])) return "one of u and v is empty";
+  if (isnan(px[0]) && isnan(px[2])) return "no camera sees the point";
   out->as.stereo = (wm_stereo){.id = (int32_t)row->whole[FIRST], .left_px = {px[0], px[1]}, .right_px = {px[2], px[3]}};
   return NULL;
 }
@@ -241,7 +240,8 @@ static void count_bad(stream *self, wm_status status, const wm_error *why) {
     counts->not_finite++;
   else
     counts->malformed++;
-  if (!counts->first_problem[0]) snprintf(counts->first_problem, sizeof counts->first_problem, "%s", why->text);
+  if (!counts->first_problem[0])
+    snprintf(counts->first_problem, sizeof counts->first_problem, "%s; the row is skipped", why->text);
 }
 
 // The next good row of this source, into self->row; bad ones are counted.
@@ -253,7 +253,7 @@ static wm_status next_row(stream *self, wm_error *err) {
     if (!is_mine(self)) continue;
     status = csv_read(&self->csv, &self->row, &why);
     if (status == WM_OK && self->names && !is_name(csv_name(&self->csv), self->sensor))
-      status = csv_fail(&self->csv, &why, WM_BAD_DATA, "the sensor's name is broken; the row is skipped");
+      status = csv_fail(&self->csv, &why, WM_BAD_DATA, "the sensor's name is broken");
     if (status == WM_OK) return WM_OK;
     count_bad(self, status, &why);
   }

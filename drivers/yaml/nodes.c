@@ -97,21 +97,23 @@ static const char *what_is(const wm_yaml_node *node, char out[WM_SHOW_TEXT_MAX +
 }
 
 static const char *number_needed(const char *noun, double min, double max, char out[96]) {
-  if (isfinite(max) && min == DBL_MIN)
+  if (max < DBL_MAX && min == DBL_MIN)
     snprintf(out, 96, "%s above 0 and up to %.10g", noun, max);
-  else if (isfinite(min) && isfinite(max))
+  else if (min > -DBL_MAX && max < DBL_MAX)
     snprintf(out, 96, "%s from %.10g to %.10g", noun, min, max);
   else if (min == DBL_MIN)
     snprintf(out, 96, "%s above 0", noun);
-  else if (isfinite(min))
+  else if (min > -DBL_MAX)
     snprintf(out, 96, "%s of at least %.10g", noun, min);
-  else if (isfinite(max))
+  else if (max < DBL_MAX)
     snprintf(out, 96, "%s of at most %.10g", noun, max);
   else
     snprintf(out, 96, "%s", noun);
   return out;
 }
 
+// Not there, or there with nothing behind the colon.
+static int is_null(const wm_yaml_node *node) { return at(node)->kind == YAML_KIND_NULL; }
 static int is_plain(const wm_yaml_node *node) { return wm_yaml_is_scalar(node) && !at(node)->quoted; }
 
 wm_status wm_yaml_f64(const wm_yaml_node *node, double min, double max, double *out, wm_error *err) {
@@ -125,6 +127,7 @@ wm_status wm_yaml_f64(const wm_yaml_node *node, double min, double max, double *
     return WM_OK;
   }
   number_needed("a number", min, max, needed);
+  if (is_null(node)) return wm_yaml_fail(node, err, "has no value; %s is needed", needed);
   if (kind == WM_TEXT_OK || kind == WM_TEXT_TOO_LARGE)
     return wm_yaml_fail(node, err, "%s is out of range; %s is needed", what_is(node, is), needed);
   if (kind == WM_TEXT_NOT_FINITE)
@@ -143,6 +146,7 @@ wm_status wm_yaml_i64(const wm_yaml_node *node, int64_t min, int64_t max, int64_
   }
   if (min != INT64_MIN || max != INT64_MAX)
     snprintf(needed, sizeof needed, "a whole number from %lld to %lld", (long long)min, (long long)max);
+  if (is_null(node)) return wm_yaml_fail(node, err, "has no value; %s is needed", needed);
   return wm_yaml_fail(node, err, "%s is %s; %s is needed", what_is(node, is),
                       kind == WM_TEXT_NOT_A_NUMBER ? "not a whole number" : "out of range", needed);
 }
@@ -151,6 +155,7 @@ wm_status wm_yaml_bool(const wm_yaml_node *node, int *out, wm_error *err) {
   char is[WM_SHOW_TEXT_MAX + 16];
   const char *text = is_plain(node) ? yaml_text(node->doc, node->id) : "";
   int yes = strcasecmp(text, "true") == 0;
+  if (is_null(node)) return wm_yaml_fail(node, err, "has no value; true or false is needed");
   if (!yes && strcasecmp(text, "false") != 0)
     return wm_yaml_fail(node, err, "%s is neither true nor false", what_is(node, is));
   *out = yes;
@@ -159,6 +164,7 @@ wm_status wm_yaml_bool(const wm_yaml_node *node, int *out, wm_error *err) {
 
 wm_status wm_yaml_string(const wm_yaml_node *node, char *out, size_t capacity, wm_error *err) {
   char is[WM_SHOW_TEXT_MAX + 16];
+  if (is_null(node)) return wm_yaml_fail(node, err, "has no value; text is needed");
   if (!wm_yaml_is_scalar(node)) return wm_yaml_fail(node, err, "%s is not text", what_is(node, is));
   const char *text = yaml_text(node->doc, node->id);
   if (strlen(text) != at(node)->count) return wm_yaml_fail(node, err, "the text holds a zero byte");
@@ -187,8 +193,7 @@ wm_status wm_yaml_choice(const wm_yaml_node *node, const char *const *names, int
     return WM_OK;
   }
   list_of(names, all, sizeof all);
-  if (!wm_yaml_there(node) || at(node)->kind == YAML_KIND_NULL)
-    return wm_yaml_fail(node, err, "is missing; one of these is needed: %s", all);
+  if (is_null(node)) return wm_yaml_fail(node, err, "is missing; one of these is needed: %s", all);
   const char *nearest = wm_word_nearest(text, names);
   if (nearest)
     return wm_yaml_fail(node, err, "%s is unknown; did you mean '%s'? (one of: %s)", what_is(node, is), nearest, all);

@@ -66,9 +66,7 @@ static int same_section(const char *a, const char *b) {
   return n == strcspn(b, ".") && strncmp(a, b, n) == 0;
 }
 
-static void consider(search *self, const char *prefix, const char *key) {
-  char full[96];
-  snprintf(full, sizeof full, "%s%s", prefix, key);
+static void consider_one(search *self, const char *full) {
   const char *const known[] = {full, NULL}, *const last[] = {last_part(full), NULL};
   int score = 100;
   if (wm_word_nearest(self->wrong, known))
@@ -80,17 +78,25 @@ static void consider(search *self, const char *prefix, const char *key) {
   snprintf(self->found, sizeof self->found, "%s", full);
 }
 
+// The key and the sections that it stands in.
+static void consider(search *self, const char *prefix, const char *key) {
+  char full[96];
+  snprintf(full, sizeof full, "%s%s", prefix, key);
+  for (;;) {
+    consider_one(self, full);
+    char *dot = strrchr(full, '.');
+    if (!dot) return;
+    *dot = '\0';
+  }
+}
+
 wm_status config_unknown(const wm_yaml_node *value, int line, wm_error *err) {
   config_section sections[CONFIG_SECTIONS_MAX];
   search nearest = {.wrong = value->path, .best = 100};
   size_t count = config_sections(sections);
-  for (size_t s = 0; s < count; s++) {
-    if (sections[s].prefix[0]) consider(&nearest, "", sections[s].name);
+  for (size_t s = 0; s < count; s++)
     for (size_t i = 0; i < sections[s].table->count; i++)
       consider(&nearest, sections[s].prefix, sections[s].table->params[i].key);
-  }
-  static const char *const kGroups[] = {"merge", "publish", "realtime", NULL};
-  for (size_t i = 0; kGroups[i]; i++) consider(&nearest, "", kGroups[i]);
   for (size_t i = 0; kConfigKeys[i].key; i++) consider(&nearest, "", kConfigKeys[i].key);
   if (nearest.best < 100)
     return wm_fail(err, WM_BAD_CONFIG, "%s:%d: %s: unknown key; did you mean '%s'?", wm_yaml_file(value), line,

@@ -85,8 +85,7 @@ static void typed_reads(void) {
        "x.yaml:5: c: 'mpas' is unknown; did you mean 'maps'? (one of: maps, none)");
   n = wm_yaml_get(&root, "l");
   double list[2];
-  says(wm_yaml_f64_list(&n, 2, 2, list, NULL, &err),
-       "x.yaml:6: l[1]: 'x' is not a number; a number from -1.797693135e+308 to 1.797693135e+308 is needed");
+  says(wm_yaml_f64_list(&n, 2, 2, list, NULL, &err), "x.yaml:6: l[1]: 'x' is not a number; a number is needed");
   says(wm_yaml_f64_list(&n, 3, 4, list, NULL, &err), "x.yaml:6: l: has 2 values; a list of 3 to 4 numbers is needed");
   n = wm_yaml_get(&root, "inf");
   TEST_ASSERT_EQUAL(WM_OK, wm_yaml_f64(&n, 0, HUGE_VAL, &f, &err));
@@ -166,7 +165,7 @@ static void empty_documents(void) {
   root = parse("# nothing\n");
   TEST_ASSERT_EQUAL(0, wm_yaml_count(&root));
   double f;
-  says(wm_yaml_f64(&a, 0, 1, &f, &err), "x.yaml:1: a: nothing is not a number; a number from 0 to 1 is needed");
+  says(wm_yaml_f64(&a, 0, 1, &f, &err), "x.yaml:1: a: has no value; a number from 0 to 1 is needed");
 }
 
 static void missing_file(void) {

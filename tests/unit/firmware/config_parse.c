@@ -114,7 +114,7 @@ static void wrong_values(void) {
   refused(HEAD "pole_filter: {model: rubust}\n",
           "dir/x.yaml:3: pole_filter.model: 'rubust' is unknown; did you mean 'robust'? (one of: plain, robust)");
   refused(HEAD "pole_filter: {gate: }\n",
-          "dir/x.yaml:3: pole_filter.gate: nothing is not a number; a number from 0 to 1000 is needed");
+          "dir/x.yaml:3: pole_filter.gate: has no value; a number from 0 to 1000 is needed");
   refused(HEAD "pole_filter: 3\n", "dir/x.yaml:3: pole_filter: a map of parameters (KEY: VALUE) is needed");
   refused(HEAD "pole_filter: {states: 3}\n",
           "dir/x.yaml:3: pole_filter.states: a map of parameters (KEY: VALUE) is needed");

@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Makes docs/config.md and docs/errors.md from the programs that know: the tables of parameters, and the tests of the
+messages. docs.py check|write BUILD. `check` prints what differs and fails; `write` brings the files up to date."""
+import difflib
+import pathlib
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+CONFIG_HEAD = """# Configuration
+
+A configuration names an estimator and its parameters. What belongs to a robot or a place (calibration, landmarks, DBC,
+start pose) comes from the recording's folder unless the configuration says otherwise, so that one configuration serves
+every recording of its kind. It is YAML, read once at start; a mistake stops with file, line, key, what is there and what
+is allowed ([errors.md](errors.md) shows them). A key that isn't given has its default; a key that nobody knows is an error.
+
+```yaml
+format: waymark-config/1
+estimator: landmark_ekf
+sources:                        # the order that holds at equal stamps; what isn't listed follows
+  - {name: sightings, lateness_max_ms: 200}
+  - {name: gnss, until_s: 25}
+merge: {horizon_ms: 300}
+publish: {rate_hz: 50}
+landmark_ekf:
+  states: {sensor_yaw_sigma_rad: 0.1}
+```
+
+Dots in the tables below are nested maps: `publish.rate_hz` is `publish: {rate_hz: 50}`. Units stand in the names.
+
+<!-- Made by tests/golden/docs.py from the tables that read the configuration: change them there. -->
+
+"""
+
+ERRORS_HEAD = """# What Waymark says of bad input
+
+Each row is a test: this input gives this message. Bad configuration stops at start, before anything moves; bad data is
+counted, reported and skipped, and the drive goes on. `rec` is the recording's folder; the lines of a configuration follow
+`format: waymark-config/1` and `estimator: landmark_ekf`; → is a tab.
+
+<!-- Made by tests/golden/docs.py from the tests' own tables: change them there. -->
+
+"""
+
+ERRORS_PARTS = [("wm_errors_config", "Configuration, recording, calibration"), ("wm_errors_can", "CAN: candump, DBC, binding")]
+
+
+def run(program, *args):
+    return subprocess.run([program, *args], check=True, capture_output=True, text=True).stdout
+
+
+def config_md(tests):
+    return CONFIG_HEAD + run(tests / "config_reference")
+
+
+def errors_md(tests):
+    text, rows = ERRORS_HEAD, 0
+    for program, title in ERRORS_PARTS:
+        if not (tests / program).exists():
+            sys.exit(f"{tests / program} is not built: cmake --build the whole first")
+        part = run(tests / program, "--markdown")
+        rows += part.count("\n")
+        text += f"## {title}\n\n| case | input | message |\n| --- | --- | --- |\n{part}\n"
+    print(f"{rows} cases")
+    return text.rstrip("\n") + "\n"
+
+
+def main():
+    if len(sys.argv) != 3 or sys.argv[1] not in ("check", "write"):
+        sys.exit(__doc__)
+    tests = pathlib.Path(sys.argv[2]) / "tests"
+    stale = 0
+    for name, make in (("config.md", config_md), ("errors.md", errors_md)):
+        path = ROOT / "docs" / name
+        fresh = make(tests)
+        old = path.read_text() if path.exists() else ""
+        if fresh == old:
+            continue
+        if sys.argv[1] == "write":
+            path.write_text(fresh)
+            print(f"wrote docs/{name}")
+            continue
+        stale = 1
+        sys.stdout.writelines(difflib.unified_diff(old.splitlines(True), fresh.splitlines(True), f"docs/{name}", "as made now"))
+        print(f"docs/{name} is not up to date: python3 tests/golden/docs.py write BUILD")
+    return stale
+
+
+if __name__ == "__main__":
+    sys.exit(main())
