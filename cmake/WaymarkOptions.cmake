@@ -5,7 +5,7 @@ option(WM_FUZZ "Build the fuzz targets (clang)" OFF)
 set(WM_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
 
 set(WM_WARNINGS -Wall -Wextra -Wshadow -Wdouble-promotion -Wvla -Wundef -Werror
-  -Wno-format-truncation) # messages are cut at the end of their buffer on purpose
+  $<$<C_COMPILER_ID:GNU>:-Wno-format-truncation>) # messages are cut at the end of their buffer on purpose
 
 add_library(wm_rules INTERFACE)
 target_compile_options(wm_rules INTERFACE

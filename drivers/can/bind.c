@@ -205,6 +205,8 @@ static wm_status bind_signal(maker *m, const char *name) {
   if (signal_bytes(&s->bits) > m->message->length)
     return refuse(m, "%s (%s:%d) needs %u bytes, but %s has %u; one of the two is wrong in the DBC", name, m->dbc->path,
                   s->line, signal_bytes(&s->bits), m->binding->message, m->message->length);
+  if (s->factor == 0.0)
+    return refuse(m, "%s (%s:%d) has the factor 0 in the DBC, so it says nothing", name, m->dbc->path, s->line);
   int is_float = s->bits.kind == SIGNAL_FLOAT || s->bits.kind == SIGNAL_DOUBLE;
   if (is_float && (is_ticks(m->binding) || is_gear(m->binding)))
     return refuse(m, "%s is a floating-point number; an integer signal is needed", name);
@@ -236,8 +238,9 @@ static wm_status bind_gear_by_names(maker *m, bound_quantity *q) {
     q->gear[q->gear_count++].direction = direction;
   }
   if (q->gear_count > 0) return WM_OK;
-  return refuse(m, "%s; write `values: {forward: [1], reverse: [2], neutral: [0]}` with the signal's raw values",
-                s->value_count ? "none of the names in VAL_ is a gear" : "the DBC has no VAL_ names for this signal");
+  return refuse(m, "%s%s%s; write `values: {forward: [1], reverse: [2], neutral: [0]}` with the signal's raw values",
+                names[0] ? "none of the names in VAL_ (" : "the DBC has no VAL_ names for this signal", names,
+                names[0] ? ") is a gear" : "");
 }
 
 static wm_status bind_gear(maker *m, bound_quantity *q) {

@@ -162,6 +162,12 @@ static wm_status parse_payload(cursor *in, wm_can_frame *out, wm_error *err) {
   return WM_OK;
 }
 
+static int is_interface(wm_text name) {
+  for (size_t i = 0; i < name.length; i++)
+    if (name.at[i] <= ' ' || name.at[i] > '~') return 0;
+  return name.length > 0 && name.length < WM_CAN_IFACE_MAX;
+}
+
 wm_status wm_candump_parse(const char *line, size_t length, wm_can_frame *out, wm_error *err) {
   cursor in = {line, line + length};
   memset(out, 0, sizeof *out);
@@ -180,7 +186,7 @@ wm_status wm_candump_parse(const char *line, size_t length, wm_can_frame *out, w
   if (status != WM_OK) return status;
 
   wm_text iface = next_word(&in);
-  if (iface.length == 0 || iface.length >= WM_CAN_IFACE_MAX)
+  if (!is_interface(iface))
     return wm_fail(err, WM_BAD_DATA, "behind the time comes the interface's name, 1 to %d letters; '%s' is not one",
                    WM_CAN_IFACE_MAX - 1, wm_text_shown(iface).text);
   memcpy(out->iface, iface.at, iface.length);

@@ -17,6 +17,7 @@ typedef struct reader {
   wm_error *err;
   lexer lex;
   token now;
+  int line;              // where the statement at hand begins
   dbc_message *message;  // whose signals follow; NULL where none
   int skip_signals;      // of VECTOR__INDEPENDENT_SIG_MSG
 } reader;
@@ -32,18 +33,12 @@ __attribute__((format(printf, 3, 4))) static wm_status bad(reader *r, int line, 
 
 static void advance(reader *r) { r->now = wm_dbc_lexer_next(&r->lex); }
 
-static const char *name_of_token(const token *t, shown *buffer) {
-  *buffer = wm_text_shown(t->text);
-  if (t->kind == TOKEN_END) return "the end of the file";
-  if (t->kind == TOKEN_OPEN_STRING) return "a string that never ends";
-  return buffer->text;
-}
-
 // "BO_ MESSAGE: expected A, found B".
 static wm_status expected(reader *r, const char *statement, wm_text subject, const char *what) {
-  shown buffer;
-  return bad(r, r->now.line, "%s %s: expected %s, found '%s'", statement, wm_text_shown(subject).text, what,
-             name_of_token(&r->now, &buffer));
+  int at_line_end = r->now.is_first || r->now.kind == TOKEN_END;
+  return bad(r, at_line_end ? r->line : r->now.line, "%s %s: expected %s, found %s%s%s", statement,
+             wm_text_shown(subject).text, what, at_line_end ? "the end of the line" : "'",
+             at_line_end ? "" : wm_text_shown(r->now.text).text, at_line_end ? "" : "'");
 }
 
 static int take(reader *r, int kind) {
@@ -151,7 +146,7 @@ static void *room_for_one(void *items, size_t count, size_t *room, size_t item_b
 
 // BO_ ID NAME: LENGTH [SENDER]
 static wm_status read_message(reader *r) {
-  dbc_message m = {.line = r->now.line, .first_signal = (uint32_t)r->dbc->signal_count};
+  dbc_message m = {.line = r->line, .first_signal = (uint32_t)r->dbc->signal_count};
   r->message = NULL;
   r->skip_signals = 0;
   uint64_t id = 0, length = 0;
@@ -159,8 +154,10 @@ static wm_status read_message(reader *r) {
   m.name = r->now.text;
   if (!take(r, TOKEN_WORD)) return expected(r, "BO_", m.name, "the message's name");
   if (!take(r, ':')) return expected(r, "BO_", m.name, "a colon behind the message's name");
-  if (!take_u64(r, &length) || length > kMessageBytesMax)
-    return expected(r, "BO_", m.name, "the length in bytes, 0 to 64 (to 1785 for what goes over several frames)");
+  if (!take_u64(r, &length)) return expected(r, "BO_", m.name, "the length in bytes");
+  if (length > kMessageBytesMax)
+    return bad(r, m.line, "BO_ %s: %llu bytes; a frame has 0 to 64, and what goes over several frames at most %d",
+               wm_text_shown(m.name).text, (unsigned long long)length, kMessageBytesMax);
   if (text_is(m.name, "VECTOR__INDEPENDENT_SIG_MSG")) {  // holds signals that belong to no message
     r->skip_signals = 1;
     return skip_line(r);
@@ -227,11 +224,8 @@ static wm_status read_bits(reader *r, dbc_signal *s) {
 
 // (FACTOR,OFFSET) [MIN|MAX] "UNIT"
 static wm_status read_scaling(reader *r, dbc_signal *s) {
-  int line = r->now.line;
   if (!take(r, '(') || !take_double(r, &s->factor) || !take(r, ',') || !take_double(r, &s->offset) || !take(r, ')'))
     return expected(r, "SG_", s->name, "(FACTOR,OFFSET), two numbers with a decimal point");
-  if (s->factor == 0.0)
-    return bad(r, line, "SG_ %s: the factor is 0, so the signal says nothing", wm_text_shown(s->name).text);
   if (!take(r, '[') || !take_double(r, &s->min) || !take(r, '|') || !take_double(r, &s->max) || !take(r, ']'))
     return expected(r, "SG_", s->name, "[MIN|MAX], two numbers ([0|0] where there is no range)");
   s->unit = r->now.text;
@@ -240,7 +234,8 @@ static wm_status read_scaling(reader *r, dbc_signal *s) {
 }
 
 // SG_ NAME [M|mN|mNM] : BITS SCALING [RECEIVERS]
-static wm_status read_signal(reader *r, int line) {
+static wm_status read_signal(reader *r) {
+  int line = r->line;
   if (r->skip_signals) return skip_line(r);
   dbc_signal s = {.line = line, .name = r->now.text, .selector = DBC_NONE};
   if (!take(r, TOKEN_WORD)) return expected(r, "SG_", r->now.text, "the signal's name");
@@ -277,7 +272,8 @@ static int take_signal(reader *r, const dbc_message **message, dbc_signal **sign
 }
 
 // SIG_VALTYPE_ ID SIGNAL : 0|1|2; integer, float, double
-static wm_status read_value_type(reader *r, int line) {
+static wm_status read_value_type(reader *r) {
+  int line = r->line;
   const dbc_message *m = NULL;
   dbc_signal *s = NULL;
   if (!take_signal(r, &m, &s)) return skip_statement(r);
@@ -369,29 +365,29 @@ static wm_status read_attribute(reader *r) {
 // ── the file ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static wm_status unknown_statement(reader *r) {
-  shown buffer;
-  const char *found = name_of_token(&r->now, &buffer);
+  shown found = wm_text_shown(r->now.text);
   if (r->now.text.length > 0 && (r->now.text.at[0] == '<' || r->now.text.at[0] == '{'))
     return bad(r, r->now.line, "this is XML or JSON, not DBC; export the database as DBC (cantools convert does it)");
   const char *close = NULL;
   for (size_t i = 0; i < sizeof kUsualSections / sizeof *kUsualSections && r->now.kind == TOKEN_WORD; i++)
     if (wm_text_distance(r->now.text, text_of(kUsualSections[i]), 1) <= 1) close = kUsualSections[i];
-  if (close) return bad(r, r->now.line, "expected a statement, found '%s'; did you mean %s?", found, close);
-  return bad(r, r->now.line, "expected a statement such as BO_, SG_ or VAL_, found '%s'", found);
+  if (close) return bad(r, r->now.line, "expected a statement, found '%s'; did you mean %s?", found.text, close);
+  return bad(r, r->now.line, "expected a statement such as BO_, SG_ or VAL_, found '%s'", found.text);
 }
 
 static wm_status read_statement(reader *r, dbc_pass pass) {
   wm_text keyword = r->now.text;
-  int line = r->now.line, defining = pass == DBC_DEFINITIONS;
+  int defining = pass == DBC_DEFINITIONS;
+  r->line = r->now.line;
   if (r->now.kind != TOKEN_WORD || !is_section(keyword)) return unknown_statement(r);
   advance(r);
   if (text_is(keyword, "BO_")) return defining ? read_message(r) : skip_line(r);
-  if (text_is(keyword, "SG_")) return defining ? read_signal(r, line) : skip_line(r);
+  if (text_is(keyword, "SG_")) return defining ? read_signal(r) : skip_line(r);
   r->message = NULL;
   r->skip_signals = 0;
   if (text_is(keyword, "NS_")) return skip_new_symbols(r);
   if (defining) return skip_statement(r);
-  if (text_is(keyword, "SIG_VALTYPE_")) return read_value_type(r, line);
+  if (text_is(keyword, "SIG_VALTYPE_")) return read_value_type(r);
   if (text_is(keyword, "SG_MUL_VAL_")) return read_selection(r);
   if (text_is(keyword, "VAL_")) return read_values(r);
   if (text_is(keyword, "BA_")) return read_attribute(r);

@@ -6,6 +6,9 @@ set_target_properties(can_judge PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINA
 wm_test(can_bits SOURCES can_bits.c USES wm_can)
 target_include_directories(can_bits PRIVATE ${CMAKE_SOURCE_DIR}/drivers/can)
 wm_test(can_candump SOURCES can_candump.c USES wm_can)
+wm_test(can_dbc SOURCES can_dbc.c USES wm_can)
+target_include_directories(can_dbc PRIVATE ${CMAKE_SOURCE_DIR}/drivers/can)
+wm_test(wm_errors_can SOURCES can_errors.c USES wm_can)
 wm_test(can_decode SOURCES can_decode.c USES wm_can)
 
 # Outside judges: python-can for logs, cantools for DBC (tests/judges/setup.sh installs them).
