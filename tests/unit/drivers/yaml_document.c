@@ -141,7 +141,7 @@ static void bad_documents(void) {
 
 static void bounded(void) {
   char text[4096] = "a: &a [x, x, x, x, x, x, x, x, x, x]\n";
-  for (char c = 'b'; c < 'j'; c++) {
+  for (int c = 'b'; c < 'j'; c++) {
     char line[128];
     snprintf(line, sizeof line, "%c: &%c [*%c, *%c, *%c, *%c, *%c, *%c, *%c, *%c, *%c, *%c]\n", c, c, c - 1, c - 1,
              c - 1, c - 1, c - 1, c - 1, c - 1, c - 1, c - 1, c - 1);
