@@ -162,15 +162,16 @@ wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_
   wm_yaml_node root = wm_yaml_root(doc);
   status = read_all(&root, out, err);
   wm_yaml_free(doc);
-  char *kept = malloc(length + 1);
-  if (status != WM_OK || !kept) {
-    free(kept);
-    wm_config_free(out);
-    return status != WM_OK ? status : wm_fail(err, WM_IO, "%s: no memory to keep it", path);
+  if (status == WM_OK) {
+    out->text = malloc(length + 1);
+    if (!out->text) status = wm_fail(err, WM_IO, "%s: no memory to keep it", path);
   }
-  memcpy(kept, text, length);
-  kept[length] = '\0';
-  out->text = kept;
+  if (status != WM_OK) {
+    wm_config_free(out);
+    return status;
+  }
+  memcpy(out->text, text, length);
+  out->text[length] = '\0';
   out->text_length = length;
   return WM_OK;
 }

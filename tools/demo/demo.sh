@@ -1,0 +1,55 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# The demo: a car turns left at a crossing with 0, 1, 2 and 3 known landmarks in view. Simulates, localizes, judges;
+# prints a table and makes a report and a picture. Needs the programs in build/bin (./dev demo builds them first).
+# usage: demo.sh [OUT]    OUT is build/demo if it isn't given
+set -euo pipefail
+cd "$(dirname "$(readlink -f "$0")")/../.."
+export LC_ALL=C
+
+waymark=build/bin/waymark
+out=${1:-build/demo}
+scenario=config/worlds/crossing.yaml
+config=config/crossing.yaml
+
+step() { printf '\033[1m== %s\033[0m\n' "$*"; }
+quietly() { # COMMAND... : shows its output only when it fails
+  local log="$out/log.txt"
+  "$@" >"$log" 2>&1 || { printf 'demo: this failed: %s\n' "$*" >&2; cat "$log" >&2; exit 1; }
+}
+figure() { # FILE KEY : a number out of the JSON of `waymark eval`
+  local value
+  value=$(sed -n "s/.*\"$2\": *\([-0-9.e+]*\).*/\1/p" "$1" | head -1)
+  [ -n "$value" ] || { echo "demo: $1 has no $2" >&2; exit 1; }
+  echo "$value"
+}
+
+[ -x "$waymark" ] || { echo "demo: $waymark isn't there; ./dev demo builds it" >&2; exit 1; }
+rm -rf "$out"
+mkdir -p "$out"
+
+for n in 0 1 2 3; do
+  step "a drive with $n landmarks: simulate, localize, judge"
+  quietly "$waymark" simulate "$scenario" --landmarks "$n" --out "$out/recording-$n"
+  quietly "$waymark" replay "$out/recording-$n" --config "$config" --out "$out/run-$n"
+  "$waymark" eval "$out/run-$n" "$out/recording-$n" --json >"$out/eval-$n.json"
+done
+
+step "report and picture"
+quietly "$waymark" report "$out/run-3" "$out/recording-3" --out "$out/report.html"
+quietly python3 tools/demo/picture.py "$out" "$out/demo.svg"
+
+printf '\n%s m with a turn, truth known exactly. Errors of the position in m, of the heading in degrees:\n\n' \
+  "$(figure "$out/eval-3.json" distance_m | awk '{printf "%.0f", $1}')"
+printf '%10s | %12s | %12s | %12s | %14s | %12s\n' landmarks 'at the end' RMS largest 'heading RMS' 'inside 95 %'
+printf -- '-----------+--------------+--------------+--------------+----------------+-------------\n'
+for n in 0 1 2 3; do
+  e=$out/eval-$n.json
+  awk -v n="$n" -v end="$(figure "$e" position_end_m)" -v rms="$(figure "$e" position_rmse_m)" \
+    -v max="$(figure "$e" position_max_m)" -v heading="$(figure "$e" heading_rmse_deg)" \
+    -v inside="$(figure "$e" nees_inside_95)" \
+    'BEGIN { printf "%10d | %12.3f | %12.3f | %12.3f | %14.2f | %10.0f %%\n", n, end, rms, max, heading, 100 * inside }'
+done
+printf '\nOne drive (seed 1). Many drives, and how near they come to what is possible: docs/consistency.md.\n'
+printf 'Report of the drive with three landmarks: %s\n' "$(realpath "$out")/report.html"
+printf 'Picture of all four:                      %s\n' "$(realpath "$out")/demo.svg"

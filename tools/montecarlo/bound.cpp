@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "montecarlo/bound.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+#include "simulate/angle.h"
+
+namespace wm::montecarlo {
+namespace {
+
+enum { kX, kY, kHeading, kBias, kLeft, kRight, kTrack, kMap };
+
+// What happens, in the order of time.
+struct Moment {
+  double t_s;
+  enum Kind { gyro, frame, wanted } kind;
+  size_t index;  // of the camera or of the wanted time
+};
+
+class Recursion {
+ public:
+  Recursion(const sim::Scenario &scenario, const sim::Drive &drive, size_t landmarks)
+      : sc_(scenario), drive_(drive), landmarks_(std::min(landmarks, scenario.landmarks.size())) {
+    const auto n = static_cast<Eigen::Index>(kMap + 2 * landmarks_);
+    const sim::Errors &e = sc_.errors;
+    Eigen::VectorXd sigma = Eigen::VectorXd::Constant(n, e.landmark_m);
+    sigma.head<kMap>() << e.start_xy_m, e.start_xy_m, e.start_heading_rad, e.yaw_rate_bias_radps, e.wheel_radius,
+        e.wheel_radius, e.track;
+    cov_ = sigma.cwiseAbs2().asDiagonal();
+  }
+
+  // Along the truth: what the wheels counted, times their radii, moves the robot.
+  void move_to(double t_s) {
+    if (t_s <= t_s_) return;
+    const sim::State from = drive_.at(t_s_), to = drive_.at(t_s);
+    const double track = sc_.robot.wheels.track_m;
+    const double ds = to.way_m - from.way_m, dh = to.heading_rad - from.heading_rad;
+    const double left = ds - 0.5 * track * dh, right = ds + 0.5 * track * dh;
+    const double mid = from.heading_rad + 0.5 * dh, c = std::cos(mid), s = std::sin(mid);
+    Eigen::MatrixXd f = Eigen::MatrixXd::Identity(cov_.rows(), cov_.cols());
+    const double ds_by[3] = {0.5 * left, 0.5 * right, 0}, dh_by[3] = {-left / track, right / track, -dh};
+    f(kX, kHeading) = -(to.y_m - from.y_m);
+    f(kY, kHeading) = to.x_m - from.x_m;
+    for (int i = 0; i < 3; i++) {
+      f(kX, kLeft + i) = c * ds_by[i] - 0.5 * ds * s * dh_by[i];
+      f(kY, kLeft + i) = s * ds_by[i] + 0.5 * ds * c * dh_by[i];
+      f(kHeading, kLeft + i) = dh_by[i];
+    }
+    cov_ = f * cov_ * f.transpose();
+    const double walk = sc_.errors.yaw_rate_bias_walk;
+    cov_(kBias, kBias) += walk * walk * (t_s - t_s_);
+    t_s_ = t_s;
+  }
+
+  // One sample of the yaw-rate sensor over [t - step, t]: a second opinion of how the robot turned.
+  void gyro(double step_s) {
+    const sim::State from = drive_.at(t_s_ - step_s), to = drive_.at(t_s_);
+    const double track = sc_.robot.wheels.track_m;
+    const double ds = to.way_m - from.way_m, dh = to.heading_rad - from.heading_rad;
+    Eigen::VectorXd h = Eigen::VectorXd::Zero(cov_.rows());
+    // Expected from the wheels less measured by the sensor.
+    h[kLeft] = -(ds - 0.5 * track * dh) / track / step_s;
+    h[kRight] = (ds + 0.5 * track * dh) / track / step_s;
+    h[kTrack] = -dh / step_s;
+    h[kBias] = 1;
+    const double sigma = sc_.errors.yaw_rate_noise_radps;
+    inform(h, sigma * sigma);
+  }
+
+  void frame(const sim::Camera &camera) {
+    const sim::State s = drive_.at(t_s_);
+    const double c = std::cos(s.heading_rad), n = std::sin(s.heading_rad);
+    const double arm_x = c * camera.xyz_m[0] - n * camera.xyz_m[1], arm_y = n * camera.xyz_m[0] + c * camera.xyz_m[1];
+    for (size_t i = 0; i < landmarks_; i++) {
+      const double dx = sc_.landmarks[i].p_m[0] - s.x_m - arm_x, dy = sc_.landmarks[i].p_m[1] - s.y_m - arm_y;
+      const double q = dx * dx + dy * dy;
+      const double bearing = sim::wrap(std::atan2(dy, dx) - s.heading_rad - camera.yaw_rad);
+      if (std::fabs(bearing) > 0.5 * camera.field_of_view_rad || std::sqrt(q) > camera.range_m) continue;
+      Eigen::VectorXd h = Eigen::VectorXd::Zero(cov_.rows());
+      h[kX] = dy / q;
+      h[kY] = -dx / q;
+      h[kHeading] = -(dx * arm_x + dy * arm_y) / q - 1;
+      const auto at = static_cast<Eigen::Index>(kMap + 2 * i);
+      h[at] = -dy / q;
+      h[at + 1] = dx / q;
+      inform(h, camera.bearing_sigma_rad * camera.bearing_sigma_rad / (1 - camera.outlier_fraction));
+    }
+  }
+
+  Bound now() const { return {cov_(kX, kX), cov_(kY, kY), cov_(kHeading, kHeading)}; }
+
+ private:
+  // Adds the information h h' / variance, in covariance form.
+  void inform(const Eigen::VectorXd &h, double variance) {
+    const Eigen::VectorXd ph = cov_ * h;
+    cov_ -= ph * ph.transpose() / (h.dot(ph) + variance);
+  }
+
+  const sim::Scenario &sc_;
+  const sim::Drive &drive_;
+  size_t landmarks_;
+  double t_s_ = 0;
+  Eigen::MatrixXd cov_;
+};
+
+}  // namespace
+
+std::vector<Bound> bound(const sim::Scenario &sc, const sim::Drive &drive, size_t landmarks,
+                         const std::vector<double> &times_s) {
+  std::vector<Moment> moments;
+  const double end_s = drive.duration_s(), step_s = 1 / sc.bus.yaw_rate_hz;
+  for (double t = step_s; t <= end_s; t += step_s) moments.push_back({t, Moment::gyro, 0});
+  for (size_t i = 0; i < sc.cameras.size(); i++)
+    for (double t = sc.cameras[i].phase_s; t <= end_s; t += 1 / sc.cameras[i].rate_hz)
+      moments.push_back({t, Moment::frame, i});
+  for (size_t i = 0; i < times_s.size(); i++) moments.push_back({times_s[i], Moment::wanted, i});
+  std::stable_sort(moments.begin(), moments.end(), [](const Moment &a, const Moment &b) { return a.t_s < b.t_s; });
+
+  std::vector<Bound> out(times_s.size());
+  Recursion recursion(sc, drive, landmarks);
+  for (const Moment &m : moments) {
+    recursion.move_to(m.t_s);
+    if (m.kind == Moment::gyro) recursion.gyro(step_s);
+    if (m.kind == Moment::frame) recursion.frame(sc.cameras[m.index]);
+    if (m.kind == Moment::wanted) out[m.index] = recursion.now();
+  }
+  return out;
+}
+
+}  // namespace wm::montecarlo

@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+// waymark-montecarlo SCENARIO --config F: consistency and efficiency of an estimator over many seeds.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cinttypes>
+#include <cstdio>
+#include <optional>
+
+#include "common/failure.h"
+#include "montecarlo/montecarlo.h"
+#include "simulate/angle.h"
+
+namespace {
+
+using wm::montecarlo::Statistics;
+
+double degrees(double rad) { return rad * 180 / wm::sim::kPi; }
+
+void print_header() {
+  std::printf(
+      "          |   position at the end   |    whole way    |   heading at the end  |    NEES/dof    |    NIS/dof\n"
+      "landmarks |  RMS m  bound m   eff.  |  RMS m    eff.  |  RMS deg  bound  eff. |  mean  in band |  mean  in "
+      "band\n"
+      "----------+-------------------------+-----------------+-----------------------+----------------+---------------"
+      "\n");
+}
+
+double ratio(double bound, double value) { return value > 0 ? bound / value : 0; }
+
+void print_row(const Statistics &s) {
+  const double pe = s.position_end_m(), pr = s.position_rms_m(), he = s.heading_end_rad();
+  std::printf("%9zu | %6.3f %8.3f %7.2f | %6.3f %8.2f | %8.3f %6.3f %5.2f | %5.2f %6.1f %% |", s.landmarks, pe,
+              s.bound_position_end_m(), ratio(s.bound_position_end_m(), pe), pr, ratio(s.bound_position_rms_m(), pr),
+              degrees(he), degrees(s.bound_heading_end_rad()), ratio(s.bound_heading_end_rad(), he), s.nees_mean(),
+              100 * s.nees_inside(0.8, 1.25));
+  if (s.fused > 0)
+    std::printf(" %5.2f %6.1f %%\n", s.nis_mean(), 100 * s.nis_inside(0.8, 1.25));
+  else
+    std::printf("     -        -\n");
+}
+
+void print_counts(const std::vector<Statistics> &all) {
+  std::printf("\nIn band: share of the 0.1 s steps whose mean over the drives lies in [0.8, 1.25].\n");
+  for (const Statistics &s : all)
+    std::printf("%zu landmarks: %" PRIu64 " drives, %" PRIu64 " lost; sightings: %" PRIu64 " fused, %" PRIu64
+                " rejected; outliers were %" PRIu64 "\n",
+                s.landmarks, s.runs, s.lost, s.fused, s.rejected, s.outliers);
+}
+
+bool write_steps(const std::string &path, const std::vector<Statistics> &all) {
+  FILE *f = std::fopen(path.c_str(), "w");
+  if (!f) return false;
+  std::fprintf(
+      f, "landmarks,t_s,position_rms_m,bound_position_m,heading_rms_rad,bound_heading_rad,nees_per_dof,nis_per_dof\n");
+  for (const Statistics &s : all)
+    for (const wm::montecarlo::Step &p : s.steps) {
+      const double n = static_cast<double>(p.runs ? p.runs : 1);
+      std::fprintf(f, "%zu,%.1f,%.6f,%.6f,%.6f,%.6f,%.4f,", s.landmarks, p.t_s, std::sqrt(p.position_sq_m2 / n),
+                   std::sqrt(p.bound_position_sq_m2 / n), std::sqrt(p.heading_sq_rad2 / n),
+                   std::sqrt(p.bound_heading_sq_rad2 / n), p.nees / (3 * n));
+      if (p.nis_dof) std::fprintf(f, "%.4f", p.nis / static_cast<double>(p.nis_dof));
+      std::fprintf(f, "\n");
+    }
+  return std::fclose(f) == 0;
+}
+
+struct Arguments {
+  std::string scenario, config, csv;
+  uint64_t seeds = 200, first = 1;
+  std::optional<int> laps;
+  std::vector<size_t> landmarks = {0, 1, 2, 3};
+};
+
+void parse(CLI::App *app, Arguments *a) {
+  app->description(
+      "Runs an estimator over many simulated drives and prints, beside each figure, the Cramer-Rao bound.\n"
+      "Efficiency is the bound divided by the figure; 1 is the best possible.");
+  app->add_option("SCENARIO", a->scenario, "scenario file (YAML)")->required();
+  app->add_option("--config", a->config, "configuration of the estimator")->required();
+  app->add_option("--seeds", a->seeds, "number of drives")->check(CLI::Range(1, 1000000))->capture_default_str();
+  app->add_option("--first-seed", a->first, "the first one's seed")->capture_default_str();
+  app->add_option("--landmarks", a->landmarks, "how many of the scenario's landmarks, a list")->delimiter(',');
+  app->add_option("--laps", a->laps, "instead of the route's laps")->check(CLI::Range(1, 1000));
+  app->add_option("--csv", a->csv, "writes the figures of each step of 0.1 s here");
+  app->footer(
+      "example: waymark-montecarlo config/worlds/crossing.yaml --config config/crossing.yaml --seeds 200\n"
+      "docs/consistency.md defines each figure. Exit code: 0 done, 1 failed, 2 usage or configuration.");
+}
+
+wm_status run_all(const Arguments &a, const wm::sim::Scenario &scenario, const wm_config &config, wm_error *err) {
+  std::printf("%s, %s of %s, %" PRIu64 " drives\n\n", scenario.name.c_str(), config.estimator->name, a.config.c_str(),
+              a.seeds);
+  print_header();
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  std::vector<Statistics> all;
+  for (const size_t landmarks : a.landmarks) {
+    const auto progress = [&](uint64_t done) {
+      if (terminal)
+        std::fprintf(stderr, "\r%zu landmarks: %" PRIu64 " of %" PRIu64 " drives ", landmarks, done, a.seeds);
+    };
+    Statistics statistics;
+    const wm_status status =
+        wm::montecarlo::run(scenario, config, landmarks, a.first, a.seeds, progress, statistics, err);
+    if (terminal) std::fprintf(stderr, "\r%60s\r", "");
+    if (status != WM_OK) return status;
+    print_row(statistics);
+    std::fflush(stdout);
+    all.push_back(std::move(statistics));
+  }
+  print_counts(all);
+  if (!a.csv.empty() && !write_steps(a.csv, all)) return wm_fail(err, WM_IO, "%s: can't write", a.csv.c_str());
+  return WM_OK;
+}
+
+wm_status load_and_run(const Arguments &a, wm_error *err) {
+  wm::sim::Scenario scenario;
+  if (const wm_status s = wm::sim::load_scenario(a.scenario, scenario, err); s != WM_OK) return s;
+  if (a.laps) scenario.route.laps = *a.laps;
+  wm_config config{};
+  wm_status status = wm_config_load(a.config.c_str(), &config, err);
+  if (status == WM_OK) status = run_all(a, scenario, config, err);
+  wm_config_free(&config);
+  return status;
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  CLI::App app("", "waymark-montecarlo");
+  try {
+    Arguments arguments;
+    parse(&app, &arguments);
+    app.parse(argc, argv);
+    wm_error err{};
+    const wm_status status = load_and_run(arguments, &err);
+    if (status == WM_OK) return wm::tools::kDone;
+    std::fprintf(stderr, "waymark-montecarlo: %s\n", err.text[0] ? err.text : wm_status_text(status));
+    return status == WM_BAD_CONFIG || status == WM_NOT_FOUND ? wm::tools::kUsage : wm::tools::kFailed;
+  } catch (const CLI::ParseError &problem) {
+    return app.exit(problem) == 0 ? wm::tools::kDone : wm::tools::kUsage;
+  } catch (const std::exception &problem) {
+    std::fprintf(stderr, "waymark-montecarlo: %s\n", problem.what());
+    return wm::tools::kFailed;
+  }
+}

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Many simulated drives of one scenario through one estimator, in this process: is it as good as it says (consistency),
+// and how near does it come to what is possible at all (efficiency)? docs/consistency.md.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "simulate/scenario.h"
+#include "waymark/config.h"
+
+namespace wm::montecarlo {
+
+constexpr double kStep_s = 0.1;  // figures are taken this often
+
+// Means over the runs at one time of the drive.
+struct Step {
+  double t_s = 0;
+  uint64_t runs = 0;
+  double position_sq_m2 = 0, heading_sq_rad2 = 0;              // sums of squared errors
+  double nees = 0;                                             // sum of 3-dof normalised errors squared
+  double nis = 0;                                              // sum over fused updates since the step before
+  uint64_t nis_dof = 0;                                        // their degrees of freedom
+  double bound_position_sq_m2 = 0, bound_heading_sq_rad2 = 0;  // Cramér-Rao
+};
+
+struct Statistics {
+  size_t landmarks = 0;
+  uint64_t runs = 0, lost = 0;  // lost: at the end off by more than 2 m or 15 degrees, or searching
+  uint64_t fused = 0, rejected = 0, outliers = 0;
+  std::vector<Step> steps;
+
+  // Root mean squares over the runs, at the end and over the whole drive.
+  double position_end_m() const, position_rms_m() const, heading_end_rad() const, heading_rms_rad() const;
+  double bound_position_end_m() const, bound_position_rms_m() const, bound_heading_end_rad() const,
+      bound_heading_rms_rad() const;
+  // Root mean square of the position's error from `from_s` to `to_s` of the drive, and the bound there.
+  double position_m(double from_s, double to_s) const, bound_position_m(double from_s, double to_s) const;
+  // Share of the steps whose mean NEES (NIS) divided by its degrees of freedom lies in [low, high]; steps without a
+  // fused update don't count for NIS.
+  double nees_inside(double low, double high) const, nis_inside(double low, double high) const;
+  double nees_mean() const, nis_mean() const;  // over all, divided by the degrees of freedom
+};
+
+// Runs seeds first, first + 1, ... through the estimator of `config`, every datum in the order of its stamp.
+// `progress` (may be empty) is called after each run. Errors are those of the scenario and of the estimator's init.
+wm_status run(const sim::Scenario &scenario, const wm_config &config, size_t landmarks, uint64_t first_seed,
+              uint64_t seeds, const std::function<void(uint64_t done)> &progress, Statistics &out, wm_error *err);
+
+}  // namespace wm::montecarlo
