@@ -42,8 +42,8 @@ static int all_digits(const char *word) { return *word && strspn(word, "01234567
 
 int wm_gear_direction(wm_text name, double *direction) {
   static const char *const kAbout[] = {"GEAR", "GANG", "LEVER", "SELECTOR", "SHIFTER", "POSITION", "POS", NULL};
-  static const char *const kForward[] = {"D",     "DRIVE", "FORWARD", "FORWARDS", "FWD",    "F",   "S",
-                                         "SPORT", "B",     "L",       "LOW",      "MANUAL", "ECO", NULL};
+  static const char *const kForward[] = {"D", "DRIVE", "FORWARD", "FORWARDS", "FWD", "F",   "S", "SPORT",
+                                         "B", "L",     "LOW",     "MANUAL",   "M",   "ECO", NULL};
   static const char *const kReverse[] = {"R", "REVERSE", "REV", "BACKWARD", "BACKWARDS", "BACK", NULL};
   static const char *const kStanding[] = {"N", "NEUTRAL", "P", "PARK", "PARKING", "PARKED", NULL};
   words w;

@@ -80,8 +80,8 @@ void wm_can_decoder_free(wm_can_decoder *self);  // NULL is fine
 // `counts.received` is not touched: that is for the source that hands the event out.
 // A message's rolling counter, where the DBC has one and it steps by one in the first frames, gives `lost`.
 // Ticks go on from their last value by the shorter way round: a gap must not last longer than half a cycle.
-// No allocation. Cost: for an unbound id a search among the bound ones, about 10 ns; else about 20 ns a signal. One
-// thread at a time.
+// No allocation. Cost: a search among the bound ids, then linear in the bound signals; on a desk computer 6 ns for an
+// unbound id and 55 ns for a frame of four signals. One thread at a time.
 wm_status wm_can_decode(wm_can_decoder *self, const wm_can_frame *frame, wm_quantities *out, wm_source_counts *counts,
                         wm_error *err);
 // CAN ids that are needed, for kernel filters; returns how many there are.
