@@ -6,6 +6,7 @@
 
 #include "common/csv.h"
 #include "common/failure.h"
+#include "common/yaml.h"
 
 namespace wm::tools {
 namespace {
@@ -55,6 +56,14 @@ std::vector<Pose> load_truth(const fs::path &recording) {
         recording.string() + ": has no truth.csv" +
         (fs::exists(recording / "gnss.csv") ? "; `--against gnss` compares positions with its gnss.csv" : ""));
   return load_positions(recording / "truth.csv", true);
+}
+
+Eigen::Vector3d load_truth_offset(const fs::path &recording) {
+  const Yaml about(recording / "recording.yaml");
+  for (const char *key :
+       {"vehicle.truth_offset_m", "truth_offset_m"})  // the format doesn't say in which; both are clear
+    if (const auto xyz = about.numbers(key); xyz.size() == 3) return {xyz[0], xyz[1], xyz[2]};
+  return Eigen::Vector3d::Zero();
 }
 
 std::vector<Pose> load_gnss(const fs::path &recording) {

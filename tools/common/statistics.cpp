@@ -8,8 +8,6 @@
 namespace wm::tools {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 template <class Each>
 double mean_of(const std::vector<double> &values, Each each) {
   if (values.empty()) return kNan;

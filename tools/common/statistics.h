@@ -2,9 +2,13 @@
 // Plain statistics of a list of numbers. NaN where the list is empty.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 namespace wm::tools {
+
+// Not defined.
+inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 double mean(const std::vector<double> &values);
 double mean_abs(const std::vector<double> &values);

@@ -6,11 +6,10 @@
 #include <limits>
 
 #include "common/failure.h"
+#include "common/statistics.h"
 
 namespace wm::tools {
 namespace {
-
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 // e^T P^-1 e; NaN where P is not positive definite.
 template <int N>

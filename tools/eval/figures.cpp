@@ -12,7 +12,6 @@
 namespace wm::tools {
 namespace {
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kCountedStepM = 0.01;
 constexpr double kBeyondSigmas = 3.5;

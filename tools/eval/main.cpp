@@ -61,6 +61,7 @@ Figures evaluate(const Arguments &a) {
   CompareOptions options = a.compare;
   options.align = alignment_of(a.align);
   options.against_gnss = gnss;
+  if (!gnss) options.truth_offset_m = load_truth_offset(recording);
 
   const Comparison comparison = compare(trajectory, gnss ? load_gnss(recording) : load_truth(recording), options);
   Figures figures = pose_figures(comparison, trajectory.has_covariance, gnss);

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+// The report: what it says in words, that it draws no peak away, that it is one page with nothing beside it.
+#include <limits>
+
+#include "common/failure.h"
+#include "made.h"
+#include "report/axes.h"
+#include "report/data.h"
+#include "report/page.h"
+#include "report/picture.h"
+#include "report/words.h"
+#include "unity.h"
+
+using namespace wm::tools;
+using made::format;
+using made::stamp;
+
+void setUp() {}
+void tearDown() {}
+
+namespace {
+
+void says(const std::string &expected, const std::string &said) {
+  TEST_ASSERT_EQUAL_STRING(expected.c_str(), said.c_str());
+}
+
+bool has(const std::string &text, const std::string &part) { return text.find(part) != std::string::npos; }
+
+void test_numbers_in_words() {
+  says("3.2\u202fmm", length_text(0.0032));
+  says("1.4\u202fcm", length_text(0.0142));
+  says("82\u202fcm", length_text(0.8213));
+  says("12.3\u202fm", length_text(12.34));
+  says("1.01\u202fkm", length_text(1011));
+  says("–", length_text(NAN));
+  says("59.9\u202fs", duration_text(59.91));
+  says("10\u202fmin 30\u202fs", duration_text(630.4));
+  says("2\u202fh 5\u202fmin", duration_text(7500));
+  says("94\u202f%", percent_text(0.9412));
+  says("0.4\u202f%", percent_text(0.004));
+  says("31\u202f302", count_text(31302));
+  says("0", fixed(-0.0001, 0));
+  says("−0.5", number_text(-0.5, 1));
+  says("a&lt;b&gt; &amp; &quot;c&quot;", escape("a<b> & \"c\""));
+}
+
+void test_ticks_are_round() {
+  const auto ticks = round_ticks(-0.31, 1.0, 4);
+  TEST_ASSERT_EQUAL(3, ticks.size());
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, ticks[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5, ticks[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 120, time_ticks(0, 630, 8)[1]);
+}
+
+void test_no_peak_is_lost() {
+  // 100 000 points, one of them high: the path must reach it.
+  std::vector<double> x;
+  std::vector<double> v;
+  for (int i = 0; i < 100000; ++i) {
+    x.push_back(i * 0.001);
+    v.push_back(i == 54321 ? 9.0 : 0.0);
+  }
+  Panel panel({0, 100}, {-10, 10});
+  panel.line(x, v, "value", 1);
+  const std::string html = panel.html({});
+  TEST_ASSERT_TRUE(has(html, "V50") || has(html, " 50"));  // (10 - 9) / 20 of the height
+  TEST_ASSERT_TRUE(html.size() < 30000);
+}
+
+void test_a_gap_is_a_gap() {
+  Panel panel({0, 10}, {0, 1});
+  panel.line({1, 2, 8, 9}, {0.5, 0.5, 0.5, 0.5}, "value", 3);
+  const std::string html = panel.html({});
+  TEST_ASSERT_TRUE(has(html, "M100 500"));
+  TEST_ASSERT_TRUE(has(html, "M800 500"));
+}
+
+// A drive of 10 s with a sighting, a run of it, and everything that a run may write.
+void make(const made::Folder &run, const made::Folder &recording) {
+  std::string truth = made::kTruthHeader;
+  std::string poses = made::kPlanarHeader;
+  for (int i = 0; i <= 100; ++i) {
+    truth += stamp(0.1 * i) + made::pose(0.1 * i, 0, 0) + "\n";
+    poses += stamp(0.1 * i) + made::pose(0.1 * i, 0.05, 0) + ",0.01,0,0.01,0,0,0.01," + (i < 60 ? "tracking" : "lost") +
+             "\n";
+  }
+  recording.write("recording.yaml", "format: waymark-recording/1\nname: a <made> drive\n");
+  recording.write("truth.csv", truth);
+  recording.write("landmarks.csv", "id,x_m,y_m,z_m,sigma_m\n7,5,2,0,0.01\n");
+  recording.write("sightings.csv", "t_ns,sensor,id,bearing_rad,range_m\n1000000000,eye,7,0.4,4.4\n");
+  recording.write("calibration.yaml", "sensors: {eye: {mounting: {xyz_m: [0.2, 0, 0], rpy_deg: [0, 0, 90]}}}\n");
+  run.write("trajectory.csv", poses);
+  run.write("innovations.csv",
+            "t_ns,source,sensor,landmark,residual,observed,expected,variance,nis,gate,gate_dof,verdict\n"
+            "1000000000,sightings:eye,eye,7,bearing,0.41,0.4,0.01,0.01,10.8,1,fused\n"
+            "2000000000,sightings:eye,eye,7,bearing,3.1,0.4,0.01,729,10.8,1,gate\n");
+  run.write("health.json",
+            R"({"state":"lost","sources":{"sightings:eye":{"received":2,"fused":1,"rejected":{"gate":1},"late":4}},
+                "calibration":[{"name":"eye.yaw_rad","value":0.0803,"sigma":0.0007}]})");
+  run.write("timing.json", R"({"predict":{"count":100,"p50_us":0.4,"p90_us":0.5,"p99_us":1,"p999_us":2,"max_us":31},
+                               "allocations_after_start":0,"deadlines_missed":2,"deadlines_total":500})");
+}
+
+void test_page_says_what_happened() {
+  made::Folder run;
+  made::Folder recording;
+  make(run, recording);
+  const std::string page = report_page(load_report_data(run.path(), recording.path()));
+  for (const char *words : {"a &lt;made&gt; drive", "<em>10.0\u202fm</em>", "<em>5.0\u202fcm</em>", "It was never lost",
+                            "How far off it was", "Bearing of sightings by eye", "1 too far from what was expected",
+                            "eye: yaw", "<b>4.601</b> ± 0.040", "2 of 500", "slowest 31 µs",
+                            "lost: what it saw contradicted its pose, being mended (40"})
+    TEST_ASSERT_TRUE_MESSAGE(has(page, words), words);
+  if (has(page, "nan")) TEST_FAIL_MESSAGE(page.substr(page.find("nan") - 60, 80).c_str());
+  TEST_ASSERT_FALSE(has(page, "<made>"));
+  // Nothing is fetched from anywhere.
+  for (const char *outside : {"http:", "https:", "src=", "@import", "url(//"})
+    TEST_ASSERT_FALSE_MESSAGE(has(page, outside), outside);
+}
+
+void test_page_without_truth_and_without_recording() {
+  made::Folder run;
+  made::Folder recording;
+  make(run, recording);
+  std::filesystem::remove(recording.path() / "truth.csv");
+  const std::string page = report_page(load_report_data(run.path(), recording.path()));
+  TEST_ASSERT_TRUE(has(page, "There is no truth to hold this against"));
+  TEST_ASSERT_TRUE(has(page, "How sure it was"));
+  TEST_ASSERT_FALSE(has(page, "How far off it was"));
+  const std::string alone = report_page(load_report_data(run.path(), ""));
+  TEST_ASSERT_TRUE(has(alone, "Where it drove"));
+  // A trajectory and nothing else.
+  for (const char *file : {"innovations.csv", "health.json", "timing.json", "trajectory.csv"})
+    std::filesystem::remove(run.path() / file);
+  run.write("trajectory.tum", "0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n");
+  const std::string bare = report_page(load_report_data(run.path(), ""));
+  TEST_ASSERT_TRUE(has(bare, "Where it drove"));
+  TEST_ASSERT_FALSE(has(bare, "What the sensors said"));
+  if (has(bare, "nan")) TEST_FAIL_MESSAGE(bare.substr(bare.find("nan") - 60, 80).c_str());
+}
+
+void test_odd_files_are_survived_or_refused_with_words() {
+  made::Folder run;
+  made::Folder recording;
+  make(run, recording);
+  run.write("health.json", R"({"sources":[1,2],"calibration":{"a":1}})");
+  run.write("timing.json", R"({"predict":{"p50_us":null},"deadlines_missed":"many"})");
+  TEST_ASSERT_TRUE(has(report_page(load_report_data(run.path(), recording.path())), "Where it drove"));
+  run.write("health.json", "{");
+  try {
+    load_report_data(run.path(), recording.path());
+    TEST_FAIL_MESSAGE("broken JSON was taken");
+  } catch (const Failure &problem) {
+    TEST_ASSERT_TRUE(has(problem.what(), "health.json: is no JSON"));
+  }
+}
+
+void test_lines_of_sight_start_at_the_sensor() {
+  made::Folder run;
+  made::Folder recording;
+  make(run, recording);
+  const ReportData data = load_report_data(run.path(), recording.path());
+  const Picture picture = draw_picture(data, true);
+  TEST_ASSERT_TRUE(picture.sight_lines);
+  // The sensor is 0.2 m ahead of (1.0, 0.05).
+  const auto at = [&picture](double x, double y) {
+    return fixed((x - picture.left_top_m.x()) * picture.scale, 1) + " " +
+           fixed(40 + (picture.left_top_m.y() - y) * picture.scale, 1);
+  };
+  TEST_ASSERT_TRUE(has(picture.svg, "M" + at(1.2, 0.05) + "L" + at(5, 2)));
+}
+
+void test_a_small_pgm_becomes_a_png() {
+  made::Folder recording;
+  std::filesystem::create_directory(recording.path() / "map");
+  recording.write("map/map.yaml", "image: m.pgm\nresolution: 0.5\norigin: [-1, -2, 0]\n");
+  recording.write("map/m.pgm", std::string("P5\n# made\n3 2\n255\n") + std::string("\x00\xff\x7f\xff\x00\xff", 6));
+  std::vector<std::string> notes;
+  const auto raster = load_raster(recording.path(), &notes);
+  TEST_ASSERT_TRUE(raster.has_value());
+  TEST_ASSERT_EQUAL(3, raster->width);
+  TEST_ASSERT_EQUAL(2, raster->height);
+  TEST_ASSERT_TRUE(raster->png.starts_with("\x89PNG"));
+  recording.write("map/m.pgm", "P5\n3 2\n255\nxx");
+  try {
+    load_raster(recording.path(), &notes);
+    TEST_FAIL_MESSAGE("a PGM cut short was taken");
+  } catch (const Failure &problem) {
+    TEST_ASSERT_TRUE(has(problem.what(), "cut short"));
+  }
+}
+
+}  // namespace
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_numbers_in_words);
+  RUN_TEST(test_ticks_are_round);
+  RUN_TEST(test_no_peak_is_lost);
+  RUN_TEST(test_a_gap_is_a_gap);
+  RUN_TEST(test_page_says_what_happened);
+  RUN_TEST(test_page_without_truth_and_without_recording);
+  RUN_TEST(test_odd_files_are_survived_or_refused_with_words);
+  RUN_TEST(test_lines_of_sight_start_at_the_sensor);
+  RUN_TEST(test_a_small_pgm_becomes_a_png);
+  return UNITY_END();
+}

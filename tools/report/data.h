@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// Everything that a report is made of, read from a run's folder and, where it is given, its recording's.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/recording_folder.h"
+#include "eval/compare.h"
+#include "eval/figures.h"
+
+namespace wm::tools {
+
+// A row of innovations.csv.
+struct Innovation {
+  int64_t t_ns;
+  std::string source, sensor, residual;
+  int64_t landmark;  // -1 where none
+  double observed, expected, variance, nis, gate;
+  int gate_dof;
+  std::string verdict;
+
+  [[nodiscard]] bool fused() const { return verdict == "fused"; }
+  // Observed minus expected; angles wrapped.
+  [[nodiscard]] double value() const;
+};
+
+// The map as a picture: an image file and where it lies.
+struct Raster {
+  std::string png;         // the file's bytes
+  int width, height;       // px
+  double resolution_m;     // m/px
+  Eigen::Vector3d origin;  // outer corner of the lower left pixel: x, y, yaw
+};
+
+struct ReportData {
+  std::string name;   // the recording's, or the run folder's
+  std::string about;  // what the recording says of itself; may be empty
+  Trajectory trajectory;
+  int64_t start_ns;  // first pose
+  std::optional<Comparison> truth;
+  Figures figures;  // null without truth
+  std::vector<Innovation> innovations;
+  nlohmann::json health, timing;  // null where not there
+  std::vector<Landmark> landmarks, estimated_landmarks;
+  std::vector<Pose> gnss;
+  std::vector<Sighting> sightings;
+  std::map<std::string, Pose> mountings;  // sensor in base_link
+  std::optional<Raster> raster;
+  std::vector<std::string> notes;  // what a reader should know of the page itself
+
+  [[nodiscard]] double seconds(int64_t t_ns) const { return static_cast<double>(t_ns - start_ns) * 1e-9; }
+  [[nodiscard]] double end_s() const { return seconds(trajectory.poses.back().t_ns); }
+};
+
+// Absent files leave their part empty; a file that is there and broken throws Failure. `recording` may be empty.
+ReportData load_report_data(const std::filesystem::path &run, const std::filesystem::path &recording);
+
+// map/map.yaml of a recording and its image (PNG as it is, PGM made into one); nothing where there is no map, or where
+// its image is too large, which `notes` then says.
+std::optional<Raster> load_raster(const std::filesystem::path &recording, std::vector<std::string> *notes);
+
+}  // namespace wm::tools

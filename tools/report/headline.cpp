@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a person wants to know first, in words and a few figures.
+#include <algorithm>
+#include <cmath>
+
+#include "common/statistics.h"
+#include "report/page.h"
+#include "report/words.h"
+#include "waymark/pose.h"
+
+namespace wm::tools {
+namespace {
+
+struct Tile {
+  std::string value, words;
+};
+
+std::string tiles(const std::vector<Tile> &all) {
+  std::string out = "<div class=\"tiles\">";
+  for (const Tile &tile : all) out += "<div><b>" + tile.value + "</b><span>" + tile.words + "</span></div>";
+  return out + "</div>\n";
+}
+
+double figure(const ReportData &data, const char *key) {
+  return data.figures.contains(key) && data.figures[key].is_number() ? data.figures[key].get<double>() : kNan;
+}
+
+std::string strong(const std::string &text) { return "<em>" + text + "</em>"; }
+
+// Whether the stated uncertainty can be believed, by how often truth lay in the stated 95 % region.
+std::string honesty(double inside, double nees_per_dof) {
+  const std::string share = strong(percent_text(inside));
+  if (!std::isfinite(inside)) return "";
+  if (inside >= 0.995 && nees_per_dof < 0.4)
+    return " It was more careful than it had to be: truth lay inside of its 95&nbsp;% region " + share +
+           " of the time.";
+  if (inside >= 0.85)
+    return " Its own word on its accuracy can be trusted: truth lay inside of its 95&nbsp;% region " + share +
+           " of the time.";
+  if (inside >= 0.6)
+    return " It was somewhat surer of itself than it should have been: truth lay inside of its 95&nbsp;% region only " +
+           share + " of the time.";
+  return " Its own word on its accuracy can’t be trusted: truth lay inside of its 95&nbsp;% region only " + share +
+         " of the time.";
+}
+
+std::string losing(const ReportData &data) {
+  const double count = figure(data, "lost_count");
+  if (!(count > 0)) return " It was never lost.";
+  return " It was lost " + strong(times_text(static_cast<int64_t>(count))) + ", for " +
+         duration_text(figure(data, "lost_s")) + " in all.";
+}
+
+// Radius in metres of the stated 95 % region, its longer half axis.
+std::vector<double> stated_radii(const Trajectory &trajectory) {
+  std::vector<double> out;
+  const double reach = std::sqrt(chi2_quantile(0.95, 2));
+  for (const Pose &pose : trajectory.poses) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(pose.covariance.topLeftCorner<2, 2>());
+    const double largest = axes.eigenvalues()[1];
+    if (std::isfinite(largest) && largest >= 0) out.push_back(reach * std::sqrt(largest));
+  }
+  return out;
+}
+
+std::string with_truth(const ReportData &data) {
+  const double rmse = figure(data, "position_rmse_m");
+  std::string text = "The robot drove " + strong(length_text(figure(data, "distance_m"))) + " in " +
+                     strong(duration_text(figure(data, "duration_s"))) + ". It was typically " +
+                     strong(length_text(rmse)) + " from where it believed to be, at worst " +
+                     strong(length_text(figure(data, "position_max_m")));
+  if (const double heading = figure(data, "heading_rmse_deg"); std::isfinite(heading))
+    text += ", and its heading was off by " + strong(angle_text(heading));
+  text += "." + honesty(figure(data, "nees_inside_95"), figure(data, "nees_mean") / figure(data, "anees_dof")) +
+          losing(data);
+
+  std::vector<Tile> all{{length_text(rmse), "position error, root mean square"},
+                        {length_text(figure(data, "position_p95_m")), "95 of 100 moments are better than this"},
+                        {length_text(figure(data, "position_end_m")),
+                         "at the end: " + fixed(figure(data, "position_end_percent"), 2) + "&nbsp;% of the way"}};
+  if (std::isfinite(figure(data, "heading_rmse_deg")))
+    all.push_back({angle_text(figure(data, "heading_rmse_deg")),
+                   "heading error, root mean square; at worst " + angle_text(figure(data, "heading_max_deg"))});
+  if (std::isfinite(figure(data, "nees_inside_95")))
+    all.push_back({percent_text(figure(data, "nees_inside_95")),
+                   "of the time truth lay where the robot said; 95&nbsp;% is ideal"});
+  if (figure(data, "coverage") < 0.995)
+    all.push_back({percent_text(figure(data, "coverage")), "of truth’s stamps have a pose to compare with"});
+  return "<p class=\"headline\">" + text + "</p>" + tiles(all);
+}
+
+std::string without_truth(const ReportData &data) {
+  const double way = path_length(data.trajectory.poses, data.trajectory.planar);
+  const auto radii = stated_radii(data.trajectory);
+  const bool known = data.trajectory.has_covariance && !radii.empty();
+  std::string text = "By its own reckoning the robot drove " + strong(length_text(way)) + " in " +
+                     strong(duration_text(data.end_s())) + ".";
+  if (known)
+    text += " It says that it typically knew its position to " + strong(length_text(percentile(radii, 50))) +
+            " and at worst to " + strong(length_text(max_abs(radii))) + ", with 95&nbsp;% confidence.";
+  text += " There is no truth to hold this against.";
+  std::vector<Tile> all{{length_text(way), "driven, by its own reckoning"},
+                        {duration_text(data.end_s()), "from the first pose to the last"}};
+  if (known) {
+    all.push_back({length_text(percentile(radii, 50)), "radius of its 95&nbsp;% region, median"});
+    all.push_back({length_text(radii.back()), "the same at the end"});
+  }
+  return "<p class=\"headline\">" + text + "</p>" + tiles(all);
+}
+
+}  // namespace
+
+std::string headline_section(const ReportData &data) {
+  std::string about = data.about.empty() ? "" : "<p class=\"note\">The recording: " + escape(data.about) + "</p>\n";
+  return "<header><h1>" + escape(data.name) + "</h1>" + (data.truth ? with_truth(data) : without_truth(data)) + about +
+         "</header>\n";
+}
+
+}  // namespace wm::tools

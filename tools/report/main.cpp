@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+// waymark report: a run as one page.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "common/failure.h"
+#include "report/data.h"
+#include "report/page.h"
+#include "report/picture.h"
+
+namespace {
+
+using namespace wm::tools;
+
+struct Arguments {
+  std::string run, recording, out, svg;
+};
+
+void parse(CLI::App *app, Arguments *a) {
+  app->description("Shows a run as one self-contained page: where, how far off, how sure, and why.");
+  app->add_option("RUN", a->run, "folder that a run wrote")->required();
+  app->add_option("REC", a->recording, "folder of the recording, for truth, landmarks and map");
+  app->add_option("--out", a->out, "the page to write (HTML)");
+  app->add_option("--svg", a->svg, "the picture of the trajectory alone, as an SVG file");
+  app->footer(
+      "example: waymark report runs/plan recordings/plan --out plan.html\n"
+      "docs/report.md shows one. Exit code: 0 done, 1 it could not be made, 2 usage.");
+}
+
+void write(const std::string &path, const std::string &text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw Failure(path + ": can't be written; does its folder exist, and may you write there?");
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  Arguments arguments;
+  CLI::App app("", "waymark report");
+  parse(&app, &arguments);
+  try {
+    app.parse(argc, argv);
+    if (arguments.out.empty() && arguments.svg.empty())
+      throw Failure("where to? --out FILE.html, or --svg FILE.svg, or both", kUsage);
+    const ReportData data = load_report_data(arguments.run, arguments.recording);
+    if (!arguments.out.empty()) write(arguments.out, report_page(data));
+    if (!arguments.svg.empty()) write(arguments.svg, draw_picture(data, true).svg);
+    return kDone;
+  } catch (const CLI::ParseError &problem) {
+    return app.exit(problem) == 0 ? kDone : kUsage;
+  } catch (const Failure &problem) {
+    std::fprintf(stderr, "waymark report: %s\n", problem.what());
+    return problem.exit_code;
+  } catch (const std::exception &problem) {
+    std::fprintf(stderr, "waymark report: %s\n", problem.what());
+    return kFailed;
+  }
+}

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// The raster map as a PNG that a page can carry.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "common/failure.h"
+#include "common/yaml.h"
+#include "report/data.h"
+
+namespace wm::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr size_t kImageAtMost = 1'200'000;  // bytes
+
+std::string read_all(const fs::path &file) {
+  std::ifstream in(file, std::ios::binary);
+  if (!in) throw Failure(file.string() + ": can't be opened; map.yaml names it");
+  return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+}
+
+std::string big_endian(uint32_t value) {
+  return {static_cast<char>(value >> 24), static_cast<char>(value >> 16), static_cast<char>(value >> 8),
+          static_cast<char>(value)};
+}
+
+uint32_t crc32(const std::string &bytes) {  // PNG specification, annex D
+  uint32_t crc = 0xffffffffu;
+  for (const char byte : bytes) {
+    crc ^= static_cast<unsigned char>(byte);
+    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ ((crc & 1u) != 0 ? 0xedb88320u : 0u);
+  }
+  return ~crc;
+}
+
+uint32_t adler32(const std::string &bytes) {  // RFC 1950
+  uint32_t a = 1;
+  uint32_t b = 0;
+  for (const char byte : bytes) {
+    a = (a + static_cast<unsigned char>(byte)) % 65521;
+    b = (b + a) % 65521;
+  }
+  return b << 16 | a;
+}
+
+std::string chunk(const std::string &type, const std::string &data) {
+  return big_endian(static_cast<uint32_t>(data.size())) + type + data + big_endian(crc32(type + data));
+}
+
+// Grey levels of two bits, in stored blocks (RFC 1951, 3.2.4): no compressor needed, and small enough.
+std::string grey_png(const std::vector<uint8_t> &grey, int width, int height) {
+  std::string rows;
+  for (int y = 0; y < height; ++y) {
+    rows += '\0';  // filter type: none
+    for (int x = 0; x < width; x += 4) {
+      unsigned packed = 0;
+      for (int k = 0; k < 4; ++k) {
+        const unsigned level = x + k < width ? grey[static_cast<size_t>(y * width + x + k)] / 64u : 0u;
+        packed = packed << 2 | level;
+      }
+      rows += static_cast<char>(packed);
+    }
+  }
+  std::string deflated = "\x78\x01";
+  for (size_t at = 0; at < rows.size(); at += 65535) {
+    const size_t size = std::min<size_t>(65535, rows.size() - at);
+    const auto low = [](size_t value) { return static_cast<char>(value & 0xff); };
+    deflated += static_cast<char>(at + size == rows.size() ? 1 : 0);
+    deflated += {low(size), low(size >> 8), low(~size), low(~size >> 8)};
+    deflated += rows.substr(at, size);
+  }
+  deflated += big_endian(adler32(rows));
+  return "\x89PNG\r\n\x1a\n" +
+         chunk("IHDR", big_endian(static_cast<uint32_t>(width)) + big_endian(static_cast<uint32_t>(height)) +
+                           std::string("\x02\x00\x00\x00\x00", 5)) +
+         chunk("IDAT", deflated) + chunk("IEND", "");
+}
+
+// A binary PGM, made smaller to at most 1600 px a side: each pixel the darkest of those that it stands for, so that
+// thin walls stay.
+Raster pgm_to_png(const std::string &pgm, const fs::path &file, Raster raster) {
+  std::istringstream in(pgm);
+  std::string magic;
+  const auto number = [&in] {
+    int value = 0;
+    while ((in >> std::ws).peek() == '#') in.ignore(4096, '\n');
+    in >> value;
+    return value;
+  };
+  in >> magic;
+  const int width = number();
+  const int height = number();
+  const int white = number();
+  in.get();
+  const auto offset = static_cast<size_t>(in.tellg());
+  if (magic != "P5" || width <= 0 || height <= 0 || width > 30000 || height > 30000 || white != 255 ||
+      pgm.size() < offset + static_cast<size_t>(width) * static_cast<size_t>(height))
+    throw Failure(file.string() + ": is no binary PGM (P5) of 8 bits, or is cut short");
+  const int times = (std::max(width, height) + 1599) / 1600;
+  const int w = (width + times - 1) / times;
+  const int h = (height + times - 1) / times;
+  std::vector<uint8_t> grey(static_cast<size_t>(w * h), 255);
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x) {
+      uint8_t &cell = grey[static_cast<size_t>(y / times * w + x / times)];
+      cell = std::min(cell,
+                      static_cast<uint8_t>(
+                          pgm[offset + static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)]));
+    }
+  // The last cells may reach beyond the picture: to the right, and below its lowest row.
+  raster.width = w * times;
+  raster.height = h * times;
+  const double below_m = (h * times - height) * raster.resolution_m;
+  raster.origin.x() += std::sin(raster.origin.z()) * below_m;
+  raster.origin.y() -= std::cos(raster.origin.z()) * below_m;
+  raster.png = grey_png(grey, w, h);
+  return raster;
+}
+
+}  // namespace
+
+std::optional<Raster> load_raster(const fs::path &recording, std::vector<std::string> *notes) {
+  const fs::path folder = recording / "map";
+  if (!fs::exists(folder / "map.yaml")) return std::nullopt;
+  const Yaml map(folder / "map.yaml");
+  const auto origin = map.numbers("origin");
+  Raster out{"", 0, 0, std::atof(map.text("resolution").c_str()), Eigen::Vector3d::Zero()};
+  if (origin.size() != 3 || !(out.resolution_m > 0))
+    throw Failure((folder / "map.yaml").string() + ": resolution (m/px, above 0) and origin [x, y, yaw] are needed");
+  out.origin = {origin[0], origin[1], origin[2]};
+  const fs::path image = folder / map.text("image");
+  const std::string bytes = read_all(image);
+  if (bytes.size() > 24 && bytes.starts_with("\x89PNG")) {
+    const auto size = [&bytes](size_t at) {
+      int value = 0;
+      for (size_t i = at; i < at + 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes[i]);
+      return value;
+    };
+    out.width = size(16);
+    out.height = size(20);
+    out.png = bytes;
+  } else {
+    out = pgm_to_png(bytes, image, out);
+  }
+  if (out.png.size() <= kImageAtMost) return out;
+  notes->push_back("The map's image is larger than 1.2 MB and was left out, so that this page stays light.");
+  return std::nullopt;
+}
+
+}  // namespace wm::tools

@@ -1,0 +1,227 @@
+// SPDX-License-Identifier: Apache-2.0
+// What became of the data, what the robot thought of its own state, and what it learned about itself.
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "common/statistics.h"
+#include "report/page.h"
+#include "report/words.h"
+#include "waymark/pose.h"
+
+namespace wm::tools {
+namespace {
+
+using Json = nlohmann::json;
+
+// A count of health.json; a map of counts is summed; 0 where it is not there.
+int64_t counted(const Json &source, const char *key) {
+  if (!source.is_object() || !source.contains(key)) return 0;
+  const Json &value = source[key];
+  if (value.is_number()) return static_cast<int64_t>(value.get<double>());
+  int64_t sum = 0;
+  if (value.is_object())
+    for (const auto &[name, part] : value.items())
+      if (part.is_number()) sum += static_cast<int64_t>(part.get<double>());
+  return sum;
+}
+
+const char *reason_in_words(const std::string &reason) {
+  static constexpr std::array<std::pair<const char *, const char *>, 8> kReasons{{
+      {"gate", "too far from what was expected"},
+      {"unknown_id", "no such landmark in the map"},
+      {"no_association", "no landmark fits, or more than one"},
+      {"out_of_range", "beyond the sensor’s range"},
+      {"not_finite", "not a number"},
+      {"singular", "from there it says nothing"},
+      {"searching", "seen while the pose was not known yet"},
+      {"by_config", "the configuration says not to use it"},
+  }};
+  for (const auto &[name, words] : kReasons)
+    if (reason == name) return words;
+  return nullptr;
+}
+
+std::string reasons(const Json &source) {
+  std::string out;
+  if (source.contains("rejected") && source["rejected"].is_object())
+    for (const auto &[reason, n] : source["rejected"].items()) {
+      if (!n.is_number() || n.get<double>() == 0) continue;
+      const char *words = reason_in_words(reason);
+      out += (out.empty() ? "" : "; ") + count_text(static_cast<int64_t>(n.get<double>())) + " " +
+             (words != nullptr ? words : escape(plain(reason)));
+    }
+  return out;
+}
+
+std::string cell(int64_t n, bool is_loss) {
+  return std::string(is_loss && n > 0 ? "<td class=\"some\">" : "<td>") + count_text(n) + "</td>";
+}
+
+std::string share_bar(int64_t fused, int64_t refused, int64_t lost) {
+  const double all = static_cast<double>(std::max<int64_t>(1, fused + refused + lost));
+  const auto part = [all](const char *css, int64_t n) {
+    return n > 0 ? std::string("<i class=\"") + css +
+                       "\" style=\"width:" + fixed(100 * static_cast<double>(n) / all, 2) + "%\"></i>"
+                 : "";
+  };
+  return "<span class=\"share\">" + part("f", fused) + part("r", refused) + part("d", lost) + "</span>";
+}
+
+// A calibration value in the unit that people use, and what it means.
+struct Meaning {
+  double factor, offset;
+  const char *unit;
+  std::string words;
+};
+
+Meaning meaning_of(const std::string &name) {
+  const size_t dot = name.rfind('.');
+  const std::string what = dot == std::string::npos ? name : name.substr(dot + 1);
+  const std::string who = dot == std::string::npos ? "" : plain(name.substr(0, dot));
+  const std::string sensor = who.empty() || who == "motion" ? "the sensor" : "“" + escape(who) + "”";
+  const double degrees = 180 / M_PI;
+  if (what == "yaw_rad") return {degrees, 0, "°", sensor + " is turned to the left by this, against its calibration"};
+  if (what == "bearing_bias_rad") return {degrees, 0, "°", sensor + " measures bearings too large by this"};
+  if (what == "time_offset_s" || what == "delay_s")
+    return {1e3, 0, "ms", "what " + sensor + " reports is older than its stamp by this"};
+  if (what == "lag_s") return {1e3, 0, "ms", "the robot follows its motion data this much later"};
+  if (what == "range_bias_m") return {100, 0, "cm", sensor + " measures ranges too long by this"};
+  if (what == "range_scale") return {100, -100, "%", sensor + " measures ranges too long by this share"};
+  if (what == "speed_scale") return {100, -100, "%", "the robot drives this much farther than its speed says"};
+  if (what == "yaw_rate_scale") return {100, -100, "%", "the robot turns this much more than its turn rate says"};
+  if (what == "yaw_rate_bias_radps") return {degrees, 0, "°/s", "the gyro says this much while nothing turns"};
+  if (what == "left_scale") return {100, -100, "%", "the left wheel rolls this much farther a turn than stated"};
+  if (what == "right_scale") return {100, -100, "%", "the right wheel rolls this much farther a turn than stated"};
+  if (what == "track_scale") return {100, -100, "%", "the wheels act as if this much farther apart than stated"};
+  if (what == "steering_offset_rad")
+    return {degrees, 0, "°", "the wheels point this far to the left when the steering says straight"};
+  if (what.ends_with("_radps")) return {degrees, 0, "°/s", ""};
+  if (what.ends_with("_rad")) return {degrees, 0, "°", ""};
+  if (what.ends_with("_s")) return {1e3, 0, "ms", ""};
+  if (what.ends_with("_m")) return {100, 0, "cm", ""};
+  if (what.ends_with("_scale")) return {100, -100, "%", ""};
+  return {1, 0, "", ""};
+}
+
+// "laser.yaw_rad" as "laser: yaw".
+std::string title_of(std::string name) {
+  for (const char *unit : {"_radps", "_rad", "_mps", "_m", "_s"})
+    if (name.ends_with(unit)) {
+      name.resize(name.size() - std::char_traits<char>::length(unit));
+      break;
+    }
+  name = plain(name);
+  if (const size_t dot = name.find('.'); dot != std::string::npos) name.replace(dot, 1, ": ");
+  return name;
+}
+
+int decimals_for(double sigma) {
+  if (!(sigma > 0)) return 2;
+  return std::clamp(static_cast<int>(std::ceil(1 - std::log10(sigma) - 1e-9)), 0, 5);
+}
+
+}  // namespace
+
+std::string source_section(const ReportData &data) {
+  if (!data.health.is_object() || !data.health.contains("sources") || !data.health["sources"].is_object()) return "";
+  std::string rows;
+  bool has_lateness = false;
+  for (const auto &[name, source] : data.health["sources"].items())
+    has_lateness = has_lateness || source.contains("lateness_p99_ms");
+  for (const auto &[name, source] : data.health["sources"].items()) {
+    const int64_t fused = counted(source, "fused");
+    const int64_t refused = counted(source, "rejected");
+    const int64_t late = counted(source, "late");
+    const int64_t dropped = counted(source, "dropped");
+    const int64_t lost = counted(source, "lost");
+    const int64_t malformed = counted(source, "malformed") + counted(source, "not_finite");
+    rows += "<tr><td>" + escape(plain(name)) + share_bar(fused, refused, late + dropped + lost + malformed) + "</td>" +
+            cell(counted(source, "received"), false) + cell(fused, false) + cell(refused, true) + cell(late, true) +
+            cell(dropped, true) + cell(lost, true) + cell(malformed, true);
+    if (has_lateness)
+      rows += "<td>" +
+              (source.contains("lateness_p99_ms") && source["lateness_p99_ms"].is_number()
+                   ? fixed(source["lateness_p99_ms"].get<double>(), 1) + " ms"
+                   : std::string("–")) +
+              "</td>";
+    rows += "<td class=\"words\">" + reasons(source) + "</td></tr>";
+  }
+  return section(
+      "What became of the data",
+      "Nothing is lost silently: each datum that a source gave was used, or is counted here with the reason why not. A "
+      "refused datum "
+      "contradicted what the robot knew; late ones came after their moment was closed; lost ones are missing by the "
+      "sender’s own count.",
+      "<div "
+      "class=\"wide\"><table><tr><th>source</th><th>received</th><th>used</th><th>refused</th><th>late</"
+      "th><th>dropped</th><th>lost</th>"
+      "<th>unreadable</th>" +
+          std::string(has_lateness ? "<th>lateness, 99&nbsp;%</th>" : "") +
+          "<th class=\"words\">refused because</th></tr>" + rows + "</table></div>" +
+          legend({{"<i class=\"key\" style=\"background:var(--blue)\"></i>", "used"},
+                  {"<i class=\"key\" style=\"background:var(--orange)\"></i>", "refused"},
+                  {"<i class=\"key\" style=\"background:var(--amber)\"></i>", "late, dropped, lost or unreadable"}}));
+}
+
+std::string state_section(const ReportData &data) {
+  const auto &poses = data.trajectory.poses;
+  if (poses.front().state < 0) return "";
+  static constexpr std::array<const char *, 4> kWords{"searching: no pose known yet",
+                                                      "tracking: what it saw fitted and was used",
+                                                      "dead reckoning: nothing to see, it went by its motion alone",
+                                                      "lost: what it saw contradicted its pose, being mended"};
+  std::array<double, 4> spent{};
+  std::string strip;
+  for (size_t begin = 0; begin < poses.size();) {
+    size_t end = begin + 1;
+    while (end < poses.size() && poses[end].state == poses[begin].state) ++end;
+    const double from = data.seconds(poses[begin].t_ns);
+    const double to = data.seconds(poses[std::min(end, poses.size() - 1)].t_ns);
+    const int state = poses[begin].state;
+    if (state >= 0 && state < 4) {
+      spent[static_cast<size_t>(state)] += to - from;
+      strip += "<span class=\"" + std::string(wm_state_name(static_cast<unsigned>(state))) +
+               "\" style=\"flex:" + fixed(to - from, 3) + " 0 0\" title=\"" +
+               escape(plain(wm_state_name(static_cast<unsigned>(state)))) + " from " + fixed(from, 1) + " s to " +
+               fixed(to, 1) + " s\"></span>";
+    }
+    begin = end;
+  }
+  std::vector<std::pair<std::string, std::string>> marks;
+  for (size_t k = 0; k < spent.size(); ++k)
+    if (spent[k] > 0)
+      marks.emplace_back("<i class=\"key " + std::string(wm_state_name(static_cast<unsigned>(k))) + "\"></i>",
+                         std::string(kWords[k]) + " (" + percent_text(spent[k] / std::max(data.end_s(), 1e-9)) + ")");
+  return section("What state it was in", "The whole drive from left to right, as the robot judged itself.",
+                 "<figure><div class=\"strip\">" + strip + "</div>" + legend(marks) + "</figure>");
+}
+
+std::string calibration_section(const ReportData &data) {
+  if (!data.health.is_object() || !data.health.contains("calibration") || !data.health["calibration"].is_array())
+    return "";
+  std::string rows;
+  for (const Json &state : data.health["calibration"]) {
+    if (!state.is_object() || !state.contains("name") || !state.contains("value") || !state["value"].is_number())
+      continue;
+    const auto name = state["name"].get<std::string>();
+    const double value = state["value"].get<double>();
+    const double sigma = state.contains("sigma") && state["sigma"].is_number() ? state["sigma"].get<double>() : kNan;
+    const Meaning m = meaning_of(name);
+    const int decimals = decimals_for(sigma * m.factor);
+    const std::string sign = value * m.factor + m.offset > 0 && m.offset != 0 ? "+" : "";
+    rows += "<tr><td>" + escape(title_of(name)) + "</td><td><b>" + sign +
+            number_text(value * m.factor + m.offset, decimals) + "</b> ± " + fixed(sigma * m.factor, decimals) +
+            "\u202f" + m.unit + "</td><td class=\"words\">" + m.words + "</td></tr>";
+  }
+  if (rows.empty()) return "";
+  return section(
+      "What it learned about itself",
+      "These are not constants from a data sheet but states that the robot estimated while driving, each with its "
+      "standard "
+      "deviation at the end. A value within two standard deviations of zero says that the calibration was right.",
+      "<div class=\"wide\"><table><tr><th>state</th><th>value ± σ</th><th class=\"words\">what it means</th></tr>" +
+          rows + "</table></div>");
+}
+
+}  // namespace wm::tools

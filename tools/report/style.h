@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a report looks: colours that also the colour-blind can tell apart (after Okabe and Ito), for light and dark, for
+// a phone, a desk and paper.
+#pragma once
+
+#include <string>
+
+namespace wm::tools {
+
+std::string page_style();
+// For a picture that is a file of its own.
+std::string picture_style_alone();
+
+}  // namespace wm::tools
