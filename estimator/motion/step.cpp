@@ -37,12 +37,20 @@ motion_twist from_speed_and_rate(double speed, double rate, const wm_motion_cali
   return t;
 }
 
-// A twist is what a differential drive's controller makes of its two wheels, where the track is known.
+// A commanded twist. Where the track is known, it is what a controller makes of two wheels. Drives that must keep their
+// faster wheel below a limit, or round to coarse wheel speeds, give less speed the more they turn.
 motion_twist from_twist(double speed, double rate, const wm_motion_calibration &c, double track_m) {
-  if (!finite(track_m)) return from_speed_and_rate(speed, rate, c);
-  const double left = speed - 0.5 * track_m * rate;
-  const double right = speed + 0.5 * track_m * rate;
-  motion_twist t = from_wheels(left, right, c, track_m);
+  const double size = std::fabs(speed);
+  const double slower = c.turn_slowdown_m * std::fabs(rate);
+  const double share = size > 0.0 && slower < size ? (size - slower) / size : size > 0.0 ? 0.0 : 1.0;
+  const double driven = share * speed;
+  motion_twist t = finite(track_m)
+                       ? from_wheels(driven - 0.5 * track_m * rate, driven + 0.5 * track_m * rate, c, track_m)
+                       : motion_twist{};
+  if (!finite(track_m)) {
+    t.v = driven;
+    t.w = rate;
+  }
   const double v = t.v, w = t.w;
   for (int i = 0; i < t.count; i++) {
     t.v_by[i] *= c.speed_scale;
@@ -53,6 +61,14 @@ motion_twist from_twist(double speed, double rate, const wm_motion_calibration &
   add(t, kSpeedScale, v, 0.0);
   add(t, kYawRateScale, 0.0, w - c.yaw_rate_bias_radps);
   add(t, kYawRateBias, 0.0, -c.yaw_rate_scale);
+  if (share > 0.0 && size > 0.0) {
+    // Both wheels lose the same, so with unlike wheels the turn changes a little, too.
+    const double lost = speed > 0.0 ? -std::fabs(rate) : std::fabs(rate);
+    const bool wheels = finite(track_m);
+    const double v_by = wheels ? 0.5 * (c.left_scale + c.right_scale) : 1.0;
+    const double w_by = wheels ? (c.right_scale - c.left_scale) / (track_m * c.track_scale) : 0.0;
+    add(t, kTurnSlowdown, c.speed_scale * v_by * lost, c.yaw_rate_scale * w_by * lost);
+  }
   return t;
 }
 

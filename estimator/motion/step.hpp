@@ -19,11 +19,12 @@ enum calibration_index {
   kTrackScale,
   kSteeringOffset,
   kLag,
+  kTurnSlowdown,
   kCalibrationCount
 };
 static_assert(sizeof(wm_motion_calibration) == kCalibrationCount * sizeof(double));
 
-inline constexpr wm_motion_calibration kNeutralCalibration = {1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0};
+inline constexpr wm_motion_calibration kNeutralCalibration = {1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
 
 inline double &calibration_at(wm_motion_calibration &c, int index) { return (&c.speed_scale)[index]; }
 inline double calibration_at(const wm_motion_calibration &c, int index) { return (&c.speed_scale)[index]; }
@@ -33,8 +34,8 @@ inline double calibration_at(const wm_motion_calibration &c, int index) { return
 struct motion_twist {
   double v, w;
   int count;
-  int index[6];
-  double v_by[6], w_by[6];
+  int index[8];
+  double v_by[8], w_by[8];
 };
 
 // Paper, system 1: V and Phi of the car (motion); system 2: differential from ticks.

@@ -65,6 +65,22 @@ double landmark_ekf::sensor_value(int sensor, int which, double neutral) const {
   return state < 0 ? neutral : filter_.value(state);
 }
 
+sensor_errors landmark_ekf::errors_of(int sensor) const {
+  return {sensor_value(sensor, kYaw, 0.0), sensor_value(sensor, kMountX, 0.0), sensor_value(sensor, kMountY, 0.0),
+          sensor_value(sensor, kRangeScale, 1.0), sensor_value(sensor, kRangeBias, 0.0)};
+}
+
+void landmark_ekf::add_mounting(sparse_row &row, int sensor, const double by[6]) const {
+  row.add(sensor_state_[sensor][kYaw], by[3]);
+  row.add(sensor_state_[sensor][kMountX], by[4]);
+  row.add(sensor_state_[sensor][kMountY], by[5]);
+}
+
+double landmark_ekf::map_sigma(int landmark) const {
+  const double sigma = setup_->landmarks[landmark].sigma_m;
+  return sigma > params_.map_sigma_min_m ? sigma : params_.map_sigma_min_m;
+}
+
 int landmark_ekf::find_landmark(int32_t id) const {
   const int *order = landmark_order();
   int low = 0, high = (int)setup_->landmark_count;
@@ -82,19 +98,18 @@ int landmark_ekf::find_landmark(int32_t id) const {
 int landmark_ekf::associate(const wm_event &event, const past_pose &past) {
   const wm_sighting &s = event.as.sighting;
   const mounted_sensor &sensor = sensor_[s.sensor];
-  const sensor_errors errors = {sensor_value(s.sensor, kYaw, 0.0), sensor_value(s.sensor, kRangeScale, 1.0),
-                                sensor_value(s.sensor, kRangeBias, 0.0)};
+  const sensor_errors errors = errors_of(s.sensor);
   int best = -1, fitting = 0;
   double least = params_.gate_soft;
   for (int i = 0; i < (int)setup_->landmark_count; i++) {
     const expected_sighting e = expect(sensor, errors, past.pose, setup_->landmarks[i].p_m);
     if (!e.possible || e.distance_m > 1.5 * sensor.max_range_m) continue;
     double chi2 = 0.0;
-    const auto test = [&](double observed, double expected, const double by[4], double sigma, bool angle) {
+    const auto test = [&](double observed, double expected, const double by[6], double sigma, bool angle) {
       if (std::isnan(observed)) return;
       sparse_row row;
       add_pose(row, by, past, sensor_state_[s.sensor][kTimeOffset]);
-      row.add(sensor_state_[s.sensor][kYaw], by[3]);
+      add_mounting(row, s.sensor, by);
       projection p;
       filter_.project(row, &p);
       const double difference = angle ? wrap(observed - expected) : observed - expected;
@@ -127,7 +142,7 @@ void landmark_ekf::lend_states(int sensor, int landmark, wm_time_ns t_ns, int *l
     }
     slot->used_ns = t_ns;
   }
-  const double sigma = setup_->landmarks[landmark].sigma_m;
+  const double sigma = map_sigma(landmark);
   if (!(sigma > 0.0)) return;
   if (auto *slot = map_.take(landmark, &fresh)) {
     *map = slot->state;
@@ -178,21 +193,20 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, innovation_list rec
       first_number(s.bearing_sigma_rad, sensor.bearing_sigma_rad, params_.bearing_sigma_default_rad);
   const double range_sigma =
       params_.range_sigma_factor * first_number(s.range_sigma_m, sensor.range_sigma_m, params_.range_sigma_default_m);
-  const sensor_errors errors = {sensor_value(s.sensor, kYaw, 0.0), sensor_value(s.sensor, kRangeScale, 1.0),
-                                sensor_value(s.sensor, kRangeBias, 0.0)};
+  const sensor_errors errors = errors_of(s.sensor);
 
   search_clue clue{};
   clue.t_ns = event.t_ns;
   clue.kind = (use_bearing ? kClueBearing : 0u) | (use_range ? kClueRange : 0u);
   clue.key = landmark * kMaxSensors + s.sensor;
-  clue.sensor = compose(past.odom, {sensor.x_m, sensor.y_m, sensor.yaw_rad + errors.yaw_rad});
+  clue.sensor = compose(past.odom, {sensor.x_m + errors.x_m, sensor.y_m + errors.y_m, sensor.yaw_rad + errors.yaw_rad});
   clue.place_m[0] = target.p_m[0];
   clue.place_m[1] = target.p_m[1];
   clue.bearing_rad = s.bearing_rad;
   const double along = use_range && sensor.range_is_depth && has_bearing ? cos(s.bearing_rad) : 1.0;
   clue.range_m = (s.range_m - errors.range_bias_m) / errors.range_scale / (along > 0.1 ? along : 0.1);
   clue.sigma_angle_rad = std::sqrt(square(bearing_sigma) + square(params_.lasting_bearing_rad));
-  clue.sigma_length_m = std::sqrt(square(range_sigma) + square(params_.lasting_range_m) + square(target.sigma_m) +
+  clue.sigma_length_m = std::sqrt(square(range_sigma) + square(params_.lasting_range_m) + square(map_sigma(landmark)) +
                                   square((params_.range_sigma_rel + params_.lasting_range_rel) * clue.range_m));
   note_clue(clue);
   if (state_ == WM_STATE_SEARCHING) {
@@ -212,11 +226,11 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, innovation_list rec
   lend_states(s.sensor, landmark, event.t_ns, &lasting, &map);
   residual residuals[2];
   int count = 0;
-  const auto add = [&](wm_residual kind, double observed, double expected, const double by[4], double variance,
+  const auto add = [&](wm_residual kind, double observed, double expected, const double by[6], double variance,
                        int lasting_offset, double lasting_size) -> residual & {
     residual &r = residuals[count++];
     add_pose(r.row, by, past, sensor_state_[s.sensor][kTimeOffset]);
-    r.row.add(sensor_state_[s.sensor][kYaw], by[3]);
+    add_mounting(r.row, s.sensor, by);
     double unit = 0.0;
     if (lasting >= 0 && lasting_offset >= 0) {
       r.row.add(lasting + lasting_offset, lasting_size);
@@ -229,7 +243,7 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, innovation_list rec
       r.row.add(map + 1, -by[1]);
       unit -= by[0] * filter_.value(map) + by[1] * filter_.value(map + 1);
     } else {
-      variance += square(target.sigma_m) * (square(by[0]) + square(by[1]));
+      variance += square(map_sigma(landmark)) * (square(by[0]) + square(by[1]));
     }
     r.record = blank;
     r.record.residual = (uint8_t)kind;
@@ -240,9 +254,11 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, innovation_list rec
     r.noise = variance;
     return r;
   };
+  const double distance = e.distance_m > 0.1 ? e.distance_m : 0.1;
   if (use_bearing)
-    add(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad, e.bearing_by, square(bearing_sigma), lasting_bearing_offset_,
-        params_.lasting_bearing_rad);
+    add(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad, e.bearing_by,
+        square(bearing_sigma) + square(params_.lateral_sigma_m / distance), lasting_bearing_offset_,
+        std::sqrt(square(params_.lasting_bearing_rad) + square(params_.lasting_lateral_m / distance)));
   if (use_range) {
     const double lasting_size =
         std::sqrt(square(params_.lasting_range_m) + square(params_.lasting_range_rel * e.range_m));

@@ -10,16 +10,18 @@
 namespace wm {
 namespace {
 
-constexpr const char *kSensorStateNames[] = {"yaw_rad", "time_offset_s", "range_bias_m", "range_scale"};
+constexpr const char *kSensorStateNames[] = {"yaw_rad", "x_m", "y_m", "time_offset_s", "range_bias_m", "range_scale"};
 
 int lasting_states(const wm_landmark_ekf_params &p) {
   if (p.lasting_slots == 0) return 0;
-  return (p.lasting_bearing_rad > 0.0) + (p.lasting_range_m > 0.0 || p.lasting_range_rel > 0.0);
+  return (p.lasting_bearing_rad > 0.0 || p.lasting_lateral_m > 0.0) +
+         (p.lasting_range_m > 0.0 || p.lasting_range_rel > 0.0);
 }
 
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
-  const int each_sensor = (p.sensor_yaw_sigma_rad > 0.0) + (p.sensor_time_offset_sigma_s > 0.0) +
-                          (p.range_bias_sigma_m > 0.0) + (p.range_scale_sigma > 0.0);
+  const int each_sensor = (p.sensor_yaw_sigma_rad > 0.0) + 2 * (p.sensor_xy_sigma_m > 0.0) +
+                          (p.sensor_time_offset_sigma_s > 0.0) + (p.range_bias_sigma_m > 0.0) +
+                          (p.range_scale_sigma > 0.0);
   return kPoseStates + planar_filter::count_motion_states(p.motion) + each_sensor * (int)setup.sensor_count +
          (p.gnss_time_offset_sigma_s > 0.0) + 2 * (p.gnss_lasting_m > 0.0) + p.lasting_slots * lasting_states(p) +
          2 * p.map_slots;
@@ -51,6 +53,8 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   for (size_t i = 0; i < setup.sensor_count; i++) {
     sensor_[i].init(setup.sensors[i]);
     sensor_state_[i][kYaw] = add(0.0, params.sensor_yaw_sigma_rad);
+    sensor_state_[i][kMountX] = add(0.0, params.sensor_xy_sigma_m);
+    sensor_state_[i][kMountY] = add(0.0, params.sensor_xy_sigma_m);
     sensor_state_[i][kTimeOffset] = add(0.0, params.sensor_time_offset_sigma_s);
     sensor_state_[i][kRangeBias] = add(0.0, params.range_bias_sigma_m);
     sensor_state_[i][kRangeScale] = add(1.0, params.range_scale_sigma);
@@ -59,7 +63,7 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   gnss_lasting_state_ = add(0.0, params.gnss_lasting_m);
   if (gnss_lasting_state_ >= 0) add(0.0, params.gnss_lasting_m);
   gnss_lasting_ns_ = WM_TIME_NONE;
-  lasting_bearing_offset_ = params.lasting_bearing_rad > 0.0 ? 0 : -1;
+  lasting_bearing_offset_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
   lasting_range_offset_ =
       params.lasting_range_m > 0.0 || params.lasting_range_rel > 0.0 ? (lasting_bearing_offset_ >= 0 ? 1 : 0) : -1;
   for (int i = 0; i < params.lasting_slots && lasting_states(params) > 0; i++) {

@@ -36,7 +36,7 @@ class landmark_ekf {
   const planar_filter &filter() const { return filter_; }
 
  private:
-  enum sensor_state { kYaw, kTimeOffset, kRangeBias, kRangeScale, kSensorStates };
+  enum sensor_state { kYaw, kMountX, kMountY, kTimeOffset, kRangeBias, kRangeScale, kSensorStates };
 
   // The pose when an observation was true, `age` before its stamp, and what moves it.
   struct past_pose {
@@ -61,10 +61,13 @@ class landmark_ekf {
   };
   double fuse(residual *residuals, int count, innovation_list records);
 
+  double map_sigma(int landmark) const;
   int find_landmark(int32_t id) const;
   int associate(const wm_event &event, const past_pose &past);
   void lend_states(int sensor, int landmark, wm_time_ns t_ns, int *lasting, int *map);
   double sensor_value(int sensor, int which, double neutral) const;
+  sensor_errors errors_of(int sensor) const;
+  void add_mounting(sparse_row &row, int sensor, const double by[6]) const;
 
   // Recovery.
   void note(wm_time_ns t_ns, int key, double misfit);

@@ -14,7 +14,7 @@ extern "C" {
 typedef struct wm_landmark_ekf_params {
   wm_motion_states motion;
   // states, one of each kind a sensor; 0: off
-  double sensor_yaw_sigma_rad, sensor_yaw_walk_rad;
+  double sensor_yaw_sigma_rad, sensor_yaw_walk_rad, sensor_xy_sigma_m;
   double sensor_time_offset_sigma_s;
   double range_bias_sigma_m;
   double range_scale_sigma, range_scale_walk;
@@ -24,11 +24,11 @@ typedef struct wm_landmark_ekf_params {
   int32_t use_bearing, use_range, use_position, use_heading;
   double bearing_sigma_default_rad, range_sigma_default_m;
   double bearing_sigma_factor, range_sigma_factor;
-  double range_sigma_rel;
+  double range_sigma_rel, lateral_sigma_m, map_sigma_min_m;
   double gnss_sigma_factor, gnss_sigma_min_m;
   // errors that last
   int32_t lasting_slots;
-  double lasting_bearing_rad, lasting_range_m, lasting_range_rel, lasting_tau_s;
+  double lasting_bearing_rad, lasting_lateral_m, lasting_range_m, lasting_range_rel, lasting_tau_s;
   double gnss_lasting_m, gnss_lasting_tau_s;
   // gates, and what is done when they keep closing
   double gate_soft, gate_hard;

@@ -30,13 +30,17 @@ expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &erro
   const double dx = landmark_m[0] - pose.x_m, dy = landmark_m[1] - pose.y_m;
   // The landmark in base_link, then from the sensor in levelled axes along its yaw (paper: x_c, y_c, alpha).
   const double base_x = h.cos * dx + h.sin * dy, base_y = h.cos * dy - h.sin * dx;
-  const double from_x = base_x - sensor.x_m, from_y = base_y - sensor.y_m;
+  const double from_x = base_x - sensor.x_m - errors.x_m, from_y = base_y - sensor.y_m - errors.y_m;
   const double up = finite(landmark_m[2]) ? landmark_m[2] - sensor.z_m : 0.0;
   const double level[3] = {m.cos * from_x + m.sin * from_y, m.cos * from_y - m.sin * from_x, up};
-  // Derivatives of `level` (its third is constant) by x, y, heading and mounting yaw.
+  // Derivatives of `level` (its third is constant) by x, y, heading, and the mounting's yaw, x, y.
   const double c = h.cos * m.cos - h.sin * m.sin, s = h.sin * m.cos + h.cos * m.sin;  // heading + yaw
-  const double by[4][2] = {
-      {-c, s}, {-s, -c}, {m.cos * base_y - m.sin * base_x, -m.cos * base_x - m.sin * base_y}, {level[1], -level[0]}};
+  const double by[6][2] = {{-c, s},
+                           {-s, -c},
+                           {m.cos * base_y - m.sin * base_x, -m.cos * base_x - m.sin * base_y},
+                           {level[1], -level[0]},
+                           {-m.cos, m.sin},
+                           {-m.sin, -m.cos}};
   double seen[3];
   for (int i = 0; i < 3; i++) {
     const double *row = sensor.axis[i];
@@ -52,7 +56,7 @@ expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &erro
   out.range_m = errors.range_scale * plain + errors.range_bias_m;
   out.range_by_scale = plain;
   const double over_q = 1.0 / q, over_length = 1.0 / length;
-  for (int k = 0; k < 4; k++) {
+  for (int k = 0; k < 6; k++) {
     double d[3];
     for (int i = 0; i < 3; i++) {
       const double *row = sensor.axis[i];

@@ -21,15 +21,15 @@ struct mounted_sensor {
 
 // What differs from calibration.yaml.
 struct sensor_errors {
-  double yaw_rad = 0.0, range_scale = 1.0, range_bias_m = 0.0;
+  double yaw_rad = 0.0, x_m = 0.0, y_m = 0.0, range_scale = 1.0, range_bias_m = 0.0;
 };
 
 struct expected_sighting {
   bool possible;  // false: on the sensor itself, or (for a depth) behind it
   double bearing_rad, range_m;
   double distance_m;  // on the floor
-  // By x, y, heading of the pose, and by the mounting's yaw. By the landmark's x, y: minus those by the pose's.
-  double bearing_by[4], range_by[4];
+  // By x, y, heading of the pose, then by yaw, x, y of the mounting. By the landmark's x, y: minus those by the pose's.
+  double bearing_by[6], range_by[6];
   double range_by_scale;
 };
 

@@ -12,35 +12,38 @@ extern "C" {
 
 // In the order of wm_motion_calibration.
 typedef struct wm_motion_states {
-  double sigma[8];  // at the start; 0: not a state
-  double walk[8];   // random walk, per sqrt(s)
+  double sigma[9];  // at the start; 0: not a state
+  double walk[9];   // random walk, per sqrt(s)
 } wm_motion_states;
 
-#define WM_MOTION_STATE(type, member, i, key, unit, walk_default, max_sigma, about)                             \
-  {"states." key "_sigma" unit, WM_PARAM_F64, offsetof(type, member.sigma[i]), 0, 0, max_sigma, NULL, about}, { \
-    "states." key "_walk" unit, WM_PARAM_F64, offsetof(type, member.walk[i]), walk_default, 0, max_sigma, NULL, \
-        "Random walk of that state per sqrt(s): what it changes by on its own."                                 \
-  }
+#define WM_MOTION_STATE(type, member, i, key, unit, walk_default, about)                                     \
+  {"states." key "_sigma" unit, WM_PARAM_F64, offsetof(type, member.sigma[i]), 0, 0, 1, NULL, about},         \
+      {"states." key "_walk" unit, WM_PARAM_F64, offsetof(type, member.walk[i]), walk_default, 0, 1, NULL,     \
+       "Random walk of that state per sqrt(s): what it changes by on its own."}
 
-#define WM_MOTION_STATE_PARAMS(type, member)                                                                     \
-  WM_MOTION_STATE(                                                                                               \
-      type, member, 0, "speed_scale", "", 0.0, 1,                                                                \
-      "Start sigma of the speed's scale about 1 (tyres, a controller that gives less than asked). 0: off."),     \
-      WM_MOTION_STATE(type, member, 1, "yaw_rate_scale", "", 0.0, 1,                                             \
-                      "Start sigma of the turn rate's scale about 1. 0: off."),                                  \
-      WM_MOTION_STATE(type, member, 2, "yaw_rate_bias", "_radps", 0.0001, 1,                                     \
-                      "Start sigma of the turn rate's bias, rad/s (a cheap gyro: 0.02). 0: off."),               \
-      WM_MOTION_STATE(type, member, 3, "left_scale", "", 0.0, 1,                                                 \
-                      "Start sigma of the left wheel's scale about 1, for ticks. 0: off."),                      \
-      WM_MOTION_STATE(type, member, 4, "right_scale", "", 0.0, 1,                                                \
-                      "Start sigma of the right wheel's scale about 1, for ticks. 0: off."),                     \
-      WM_MOTION_STATE(type, member, 5, "track_scale", "", 0.0, 1,                                                \
-                      "Start sigma of the track's scale about 1, for ticks. 0: off."),                           \
-      WM_MOTION_STATE(type, member, 6, "steering_offset", "_rad", 0.0, 1,                                        \
-                      "Start sigma of the road wheel's zero, rad, for speed and steering. 0: off."),             \
-      WM_MOTION_STATE(type, member, 7, "lag", "_s", 0.0, 1,                                                      \
-                      "Start sigma of what the robot is late by behind its motion source, s: commands that are " \
-                      "obeyed late. 0: off.")
+// clang-format off
+#define WM_MOTION_STATE_PARAMS(type, member) \
+  WM_MOTION_STATE(type, member, 0, "speed_scale", "", 0.0, \
+                  "Start sigma of the speed's scale about 1 (tyres, a controller that gives less than asked). 0: " \
+                  "off."), \
+  WM_MOTION_STATE(type, member, 1, "yaw_rate_scale", "", 0.0, \
+                  "Start sigma of the turn rate's scale about 1. 0: off."), \
+  WM_MOTION_STATE(type, member, 2, "yaw_rate_bias", "_radps", 0.0001, \
+                  "Start sigma of the turn rate's bias, rad/s (a cheap gyro: 0.02). 0: off."), \
+  WM_MOTION_STATE(type, member, 3, "left_scale", "", 0.0, \
+                  "Start sigma of the left wheel's scale about 1, for ticks. 0: off."), \
+  WM_MOTION_STATE(type, member, 4, "right_scale", "", 0.0, \
+                  "Start sigma of the right wheel's scale about 1, for ticks. 0: off."), \
+  WM_MOTION_STATE(type, member, 5, "track_scale", "", 0.0, \
+                  "Start sigma of the track's scale about 1, for ticks. 0: off."), \
+  WM_MOTION_STATE(type, member, 6, "steering_offset", "_rad", 0.0, \
+                  "Start sigma of the road wheel's zero, rad, for speed and steering. 0: off."), \
+  WM_MOTION_STATE(type, member, 7, "lag", "_s", 0.0, \
+                  "Start sigma of what the robot is late by behind its commands, s. 0: off."), \
+  WM_MOTION_STATE(type, member, 8, "turn_slowdown", "_m", 0.0, \
+                  "Start sigma of what a commanded speed loses in turns, m/s per rad/s (drives that limit or round " \
+                  "their wheels' speeds; half a track at most). 0: off.")
+// clang-format on
 
 #ifdef __cplusplus
 }

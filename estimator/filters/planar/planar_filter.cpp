@@ -10,13 +10,14 @@ namespace wm {
 namespace {
 
 const char *const kMotionStateNames[kCalibrationCount] = {
-    "motion.speed_scale", "motion.yaw_rate_scale", "motion.yaw_rate_bias_radps", "motion.left_scale",
-    "motion.right_scale", "motion.track_scale",    "motion.steering_offset_rad", "motion.lag_s"};
+    "motion.speed_scale",         "motion.yaw_rate_scale", "motion.yaw_rate_bias_radps",
+    "motion.left_scale",          "motion.right_scale",    "motion.track_scale",
+    "motion.steering_offset_rad", "motion.lag_s",          "motion.turn_slowdown_m"};
 
 // What a state can be at all. An update beyond is cut: a model that wants more is wrong, and a scale of 0 or a lag
 // beyond the history would take the filter with it.
-constexpr double kLowest[kCalibrationCount] = {0.3, 0.3, -1.0, 0.3, 0.3, 0.3, -0.5, 0.0};
-constexpr double kHighest[kCalibrationCount] = {3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8};
+constexpr double kLowest[kCalibrationCount] = {0.3, 0.3, -1.0, 0.3, 0.3, 0.3, -0.5, 0.0, -1.0};
+constexpr double kHighest[kCalibrationCount] = {3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0};
 
 }  // namespace
 
@@ -112,7 +113,7 @@ void planar_filter::propagate(const motion_stretch &piece, const motion_twist &t
   const double dy = h.sin * a.x_m + h.cos * a.y_m;
 
   // Derivatives of the new pose that F has beside the identity, by column.
-  constexpr int kMaxColumns = 8;
+  constexpr int kMaxColumns = 10;
   int column[kMaxColumns];
   double by[kMaxColumns][3];
   int columns = 0;
@@ -134,11 +135,16 @@ void planar_filter::propagate(const motion_stretch &piece, const motion_twist &t
     const int state = motion_state_[twist.index[i]];
     if (state >= 0) add_column(state, twist.v_by[i] * dt, twist.w_by[i] * dt);
   }
+  // More lag: the interval takes in more of what was said before it (at its beginning, and all that follows is turned by
+  // that), and less of what was said last.
   const int lag = motion_state_[kLag];
-  // More lag: the first piece gets longer, the last one shorter.
-  if (lag >= 0 && piece.first != piece.last) {
-    const double longer = piece.first ? 1.0 : -1.0;
-    add_column(lag, longer * twist.v, longer * twist.w);
+  if (lag >= 0 && (piece.first || piece.last)) {
+    add_column(lag, piece.last ? -twist.v : 0.0, piece.last ? -twist.w : 0.0);
+    if (piece.first) {
+      by[columns - 1][0] += h.cos * v_mps_ - dy * w_radps_;
+      by[columns - 1][1] += h.sin * v_mps_ + dx * w_radps_;
+      by[columns - 1][2] += w_radps_;
+    }
   }
 
   // Rows: T = F P, in place. Rows 0 and 1 need the old row 2, so it comes last.

@@ -69,7 +69,7 @@ void test_a_time_too_old_or_before_any_motion_is_not_found(void) {
 void test_calibration_holds_from_now_on_and_nothing_jumps(void) {
   start(make::no_wheels());
   for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 1.0, 0.0));
-  wm_motion_calibration c = {1.1, 1, -0.1, 1, 1, 1, 0, 0};
+  wm_motion_calibration c = {1.1, 1, -0.1, 1, 1, 1, 0, 0, 0};
   wm_odometry_calibrate(odom, &c);
   assert_pose(1.0, 0.0, 0.0, pose_at(1.0));
   for (int i = 101; i <= 200; i++) feed(make::twist(0.01 * i, 1.0, 0.0));
