@@ -285,7 +285,7 @@ static int is_bound(const maker *m, const bound_message *message, const dbc_sign
   for (uint32_t q = 0; q < message->quantity_count; q++) {
     const bound_quantity *quantity = &m->self->quantities[message->first_quantity + q];
     for (uint32_t i = 0; i < quantity->signal_count; i++)
-      if (memcmp(&m->self->signals[quantity->first_signal + i].bits, &s->bits, sizeof s->bits) == 0) return 1;
+      if (signal_same(&m->self->signals[quantity->first_signal + i].bits, &s->bits)) return 1;
   }
   return 0;
 }

@@ -81,16 +81,18 @@ wm_status wm_dbc_parse(const char *source, size_t length, const char *path, wm_d
   return WM_OK;
 }
 
-static wm_status read_whole(FILE *file, const char *path, char **source, size_t *length, wm_error *err) {
-  char *buffer = malloc(kLargestFile + 1);  // untouched pages cost nothing
-  if (!buffer) return wm_fail(err, WM_FULL, "%s: no memory", path);
-  *length = fread(buffer, 1, kLargestFile + 1, file);
-  if (ferror(file)) {
-    free(buffer);
-    return wm_fail(err, WM_IO, "%s: cannot be read: %s", path, strerror(errno));
+// NULL where it cannot be read, with the reason in *err.
+static char *read_whole(FILE *file, const char *path, size_t *length, wm_error *err) {
+  char *source = malloc(kLargestFile + 1);  // untouched pages cost nothing
+  if (!source) {
+    (void)wm_fail(err, WM_IO, "%s: no memory", path);
+    return NULL;
   }
-  *source = buffer;
-  return WM_OK;
+  *length = fread(source, 1, kLargestFile + 1, file);
+  if (!ferror(file)) return source;
+  (void)wm_fail(err, WM_IO, "%s: cannot be read: %s", path, strerror(errno));
+  free(source);
+  return NULL;
 }
 
 wm_status wm_dbc_load(const char *path, wm_dbc **out, wm_error *err) {
@@ -98,11 +100,10 @@ wm_status wm_dbc_load(const char *path, wm_dbc **out, wm_error *err) {
   FILE *file = fopen(path, "rb");
   if (!file)
     return wm_fail(err, errno == ENOENT ? WM_NOT_FOUND : WM_IO, "%s: cannot be opened: %s", path, strerror(errno));
-  char *source = NULL;
   size_t length = 0;
-  wm_status status = read_whole(file, path, &source, &length, err);
+  char *source = read_whole(file, path, &length, err);
   (void)fclose(file);
-  if (status == WM_OK) status = wm_dbc_parse(source, length, path, out, err);
+  wm_status status = source ? wm_dbc_parse(source, length, path, out, err) : WM_IO;
   free(source);
   return status;
 }

@@ -53,7 +53,7 @@ token wm_dbc_lexer_next(lexer *self) {
       out = read_string(self);
     } else if (is_mark(*from)) {
       self->at++;
-      out.kind = *from;
+      out.kind = (unsigned char)*from;
       out.text.length = 1;
     } else {
       while (self->at < self->end && !is_space(*self->at) && !is_mark(*self->at) && *self->at != '"') self->at++;

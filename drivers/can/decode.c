@@ -1,15 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // From frame to quantities. No allocation; a frame that nothing is bound to costs one search among a few ids.
 #include <math.h>
-#include <stdio.h>
 
 #include "decoder.h"
 #include "waymark/event.h"
-
-static void remember(wm_source_counts *counts, const char *problem) {
-  if (counts->first_problem[0] == '\0')
-    (void)snprintf(counts->first_problem, sizeof counts->first_problem, "%s", problem);
-}
 
 static size_t first_of(const wm_can_decoder *self, uint64_t key) {
   size_t low = 0, high = self->message_count;
@@ -119,12 +113,9 @@ static int watch_counter(bound_message *m, const payload *data, unsigned length,
   return 1;
 }
 
-static wm_status bad_frame(const bound_message *m, const wm_can_frame *frame, const char *what,
-                           wm_source_counts *counts, wm_error *err) {
-  (void)wm_fail(err, WM_BAD_DATA, "%.15s: %s (id %X, %u bytes): %s", frame->iface, m->name, frame->id, frame->length,
-                what);
-  if (err) remember(counts, err->text);
-  return WM_BAD_DATA;
+static wm_status bad_frame(const bound_message *m, const wm_can_frame *frame, const char *what, wm_error *err) {
+  return wm_fail(err, WM_BAD_DATA, "%.15s: %s (id %X, %u bytes): %s", frame->iface, m->name, frame->id, frame->length,
+                 what);
 }
 
 static wm_status decode_message(wm_can_decoder *self, bound_message *m, const wm_can_frame *frame, const payload *data,
@@ -135,7 +126,7 @@ static wm_status decode_message(wm_can_decoder *self, bound_message *m, const wm
     there[i] = all_present(self, &quantities[i], data, frame->length);
     if (there[i] != TOO_SHORT) continue;
     counts->malformed++;
-    return bad_frame(m, frame, "the frame is shorter than the signals that are bound", counts, err);
+    return bad_frame(m, frame, "the frame is shorter than the signals that are bound", err);
   }
   if (!watch_counter(m, data, frame->length, out, counts)) return WM_AGAIN;
 
@@ -152,7 +143,7 @@ static wm_status decode_message(wm_can_decoder *self, bound_message *m, const wm
     given++;
   }
   counts->not_finite += (uint64_t)refused;
-  if (refused > 0 && given == 0) return bad_frame(m, frame, "its signals say that there is no value", counts, err);
+  if (refused > 0 && given == 0) return bad_frame(m, frame, "its signals say that there is no value", err);
   if (given == 0) counts->ignored++;  // none of this frame's multiplexed signals is bound
   return given > 0 ? WM_OK : WM_AGAIN;
 }

@@ -29,6 +29,10 @@ typedef struct signal_bits {
   uint8_t kind;  // signal_kind
 } signal_bits;
 
+static inline int signal_same(const signal_bits *a, const signal_bits *b) {
+  return a->start == b->start && a->length == b->length && a->is_motorola == b->is_motorola && a->kind == b->kind;
+}
+
 // Position of the first bit when the payload is read as one stream: from each byte's lowest bit for Intel, from each
 // byte's highest bit for Motorola.
 static inline unsigned signal_first(const signal_bits *s) {

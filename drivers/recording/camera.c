@@ -70,7 +70,7 @@ static wm_status read_distortion(const wm_yaml_node *node, const camera_model *m
 wm_status calibration_camera(const wm_yaml_node *node, const warner *warn, camera *out, wm_error *err) {
   static const char *const kKeys[] = {"model", "size", "intrinsics", "distortion", "mounting", "readout_ns", NULL};
   int32_t kind;
-  double size[2];
+  double size[2] = {0, 0};
   if (!wm_yaml_is_map(node)) return wm_yaml_fail(node, err, "a map with model, size, intrinsics ... is needed");
   wm_status status = calibration_keys(node, kKeys, warn, err);
   if (status != WM_OK) return status;

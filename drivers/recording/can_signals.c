@@ -115,20 +115,14 @@ static wm_status read_bindings(const wm_yaml_node *list, wm_can_binding *out, wm
   return WM_OK;
 }
 
-wm_status can_signals_read(const char *path, wm_can_binding **out, size_t *count, wm_error *err) {
-  wm_yaml *doc;
-  *out = NULL;
-  *count = 0;
-  wm_status status = wm_yaml_load(path, &doc, err);
-  if (status != WM_OK) return status;
-  wm_yaml_node root = wm_yaml_root(doc);
-  size_t n = wm_yaml_count(&root);
-  if (!wm_yaml_is_list(&root) || n < 1 || n > BINDINGS_MAX)
-    status = wm_yaml_fail(&root, err, "a list of {quantity, message, signal} is needed, with at least one entry");
-  wm_can_binding *bindings = status == WM_OK ? calloc(n, sizeof *bindings) : NULL;
-  if (status == WM_OK && !bindings) status = wm_fail(err, WM_IO, "%s: no memory to read it", path);
-  if (status == WM_OK) status = read_bindings(&root, bindings, err);
-  wm_yaml_free(doc);
+static wm_status read_list(const wm_yaml_node *root, wm_can_binding **out, size_t *count, wm_error *err) {
+  size_t n = wm_yaml_count(root);
+  if (!wm_yaml_is_list(root) || n < 1 || n > BINDINGS_MAX)
+    return wm_yaml_fail(root, err, "a list of {quantity, message, signal} is needed, with 1 to %d entries",
+                        BINDINGS_MAX);
+  wm_can_binding *bindings = calloc(BINDINGS_MAX, sizeof *bindings);
+  if (!bindings) return wm_fail(err, WM_IO, "%s: no memory to read it", wm_yaml_file(root));
+  wm_status status = read_bindings(root, bindings, err);
   if (status != WM_OK) {
     free(bindings);
     return status;
@@ -136,4 +130,16 @@ wm_status can_signals_read(const char *path, wm_can_binding **out, size_t *count
   *out = bindings;
   *count = n;
   return WM_OK;
+}
+
+wm_status can_signals_read(const char *path, wm_can_binding **out, size_t *count, wm_error *err) {
+  wm_yaml *doc;
+  *out = NULL;
+  *count = 0;
+  wm_status status = wm_yaml_load(path, &doc, err);
+  if (status != WM_OK) return status;
+  wm_yaml_node root = wm_yaml_root(doc);
+  status = read_list(&root, out, count, err);
+  wm_yaml_free(doc);
+  return status;
 }

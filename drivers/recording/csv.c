@@ -208,7 +208,7 @@ wm_status csv_read(csv_reader *self, csv_row *row, wm_error *err) {
     const csv_column *column = &self->format->columns[i];
     csv_field field = self->place[i] >= 0 ? self->fields[self->place[i]] : (csv_field){"", 0};
     row->whole[i] = WM_TIME_NONE;
-    row->number[i] = NAN;
+    row->number[i] = (double)NAN;
     if (field.length == 0 && column->need == CSV_NEEDED) {
       snprintf(text, sizeof text, "%s: is empty, but needed", column->name);
       return csv_fail(self, err, WM_BAD_DATA, text);

@@ -183,7 +183,7 @@ static int add_collection(builder *b, const yaml_event_t *start, int depth) {
   }
   wm_yaml *doc = b->doc;
   size_t count = b->stack_count - base;
-  if (is_map && !check_map(b, b->stack + base, count / 2)) return 0;
+  if (is_map && count > 0 && !check_map(b, b->stack + base, count / 2)) return 0;
   if (!room_for(&doc->links, &doc->link_capacity, doc->link_count + count + 1, sizeof *doc->links)) return no_memory(b);
   size_t expanded = 1;
   for (size_t i = 0; i < count; i++) {

@@ -48,7 +48,7 @@ static int spells_not_finite(const char *word, double *out) {
   double sign = 1.0;
   if (*word == '+' || *word == '-') sign = *word++ == '-' ? -1.0 : 1.0;
   if (strcasecmp(word, "nan") == 0 || strcasecmp(word, ".nan") == 0) {
-    *out = NAN;
+    *out = (double)NAN;
     return 1;
   }
   for (size_t i = 0; kInfinite[i]; i++) {

@@ -28,7 +28,7 @@ static const char kHelp[] =
 static const struct {
   const char *name;
   int (*run)(int argc, char *const *argv);
-} kCommands[] = {{"replay", command_replay}, {"check", command_check}};
+} kCommands[] = {{"run", command_run}, {"replay", command_replay}, {"check", command_check}};
 #define COMMANDS (sizeof kCommands / sizeof kCommands[0])
 
 // Programs named waymark-COMMAND in this one's folder, then in PATH, as git finds its own. Returns only if there is

@@ -162,16 +162,15 @@ wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_
   wm_yaml_node root = wm_yaml_root(doc);
   status = read_all(&root, out, err);
   wm_yaml_free(doc);
-  if (status == WM_OK) {
-    out->text = malloc(length + 1);
-    if (!out->text) status = wm_fail(err, WM_IO, "%s: no memory to keep it", path);
-  }
-  if (status != WM_OK) {
+  char *kept = malloc(length + 1);
+  if (status != WM_OK || !kept) {
+    free(kept);
     wm_config_free(out);
-    return status;
+    return status != WM_OK ? status : wm_fail(err, WM_IO, "%s: no memory to keep it", path);
   }
-  memcpy(out->text, text, length);
-  out->text[length] = '\0';
+  memcpy(kept, text, length);
+  kept[length] = '\0';
+  out->text = kept;
   out->text_length = length;
   return WM_OK;
 }

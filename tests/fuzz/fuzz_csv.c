@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes as one of the recording's CSV streams: what is handed out is finite where it must be and in the order of
 // arrival. The first byte picks the kind of stream.
-#define _GNU_SOURCE
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>

@@ -38,7 +38,8 @@ ERRORS_HEAD = """# What Waymark says of bad input
 
 Each row is a test: this input gives this message. Bad configuration stops at start, before anything moves; bad data is
 counted, reported and skipped, and the drive goes on. `rec` is the recording's folder; the lines of a configuration follow
-`format: waymark-config/1` and `estimator: landmark_ekf`; → is a tab.
+`format: waymark-config/1` and `estimator: landmark_ekf`; → is a tab, ⏎ a line's end. In a recording, the source puts
+`can.log:LINE:` before what it says of a candump line.
 
 <!-- Made by tests/golden/docs.py from the tests' own tables: change them there. -->
 

@@ -76,8 +76,8 @@ void wm_can_decoder_free(wm_can_decoder *self);  // NULL is fine
 // WM_AGAIN: nothing to hand out: nothing is bound to this frame (counts.ignored), it is an error frame (bus_errors) or
 // a repeated one (frozen; from the third on they are handed out with WM_DOUBT_FROZEN_COUNTER).
 // WM_BAD_DATA: shorter than its bound signals (malformed), or all of its signals say that there is no value
-// (not_finite); the text is in *err and, of the first, in counts.first_problem.
-// `counts.received` is not touched: that is for the source that hands the event out.
+// (not_finite); the text is in *err.
+// `counts.received` and `counts.first_problem` are for the source, which hands the event out and knows file and line.
 // A message's rolling counter, where the DBC has one and it steps by one in the first frames, gives `lost`.
 // Ticks go on from their last value by the shorter way round: a gap must not last longer than half a cycle.
 // No allocation. Cost: a search among the bound ids, then linear in the bound signals; on a desk computer 6 ns for an

@@ -284,7 +284,7 @@ static void no_value(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "c 101#FEFF"));  // VAL_ says so
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "c 101#FFFF"));  // all bits set, and outside of the range
   TEST_ASSERT_EQUAL_UINT64(2, f.counts.not_finite);
-  TEST_ASSERT_NOT_NULL(strstr(f.counts.first_problem, "no value"));
+  TEST_ASSERT_NOT_NULL(strstr(f.err.text, "no value"));
   TEST_ASSERT_EQUAL_DOUBLE(3, value_of(&f, "c 101#2C01"));
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 300,
                             value_of(&f, "c 101#3075"));  // outside of the range: makers' ranges are wrong too often
@@ -304,7 +304,7 @@ static void what_is_not_decoded(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "can1 101#01"));
   TEST_ASSERT_EQUAL_UINT64(1, f.counts.malformed);
   TEST_ASSERT_EQUAL_STRING("can1: W (id 101, 1 bytes): the frame is shorter than the signals that are bound",
-                           f.counts.first_problem);
+                           f.err.text);
   TEST_ASSERT_EQUAL_DOUBLE(1, value_of(&f, "can1 101#0100"));
   close_it(&f);
 }

@@ -141,7 +141,7 @@ static void bad_documents(void) {
 
 static void bounded(void) {
   char text[4096] = "a: &a [x, x, x, x, x, x, x, x, x, x]\n";
-  for (char c = 'b'; c < 'j'; c++) {
+  for (int c = 'b'; c < 'j'; c++) {
     char line[128];
     snprintf(line, sizeof line, "%c: &%c [*%c, *%c, *%c, *%c, *%c, *%c, *%c, *%c, *%c, *%c]\n", c, c, c - 1, c - 1,
              c - 1, c - 1, c - 1, c - 1, c - 1, c - 1, c - 1, c - 1);
@@ -161,11 +161,14 @@ static void empty_documents(void) {
   TEST_ASSERT_FALSE(wm_yaml_there(&root) || wm_yaml_is_map(&root));
   wm_yaml_node a = wm_yaml_get(&root, "a");
   TEST_ASSERT_FALSE(wm_yaml_there(&a));
+  double f;
+  says(wm_yaml_f64(&a, 0, 1, &f, &err), "x.yaml:1: a: has no value; a number from 0 to 1 is needed");
+  wm_yaml_free(doc);
+  root = parse("{}");
+  TEST_ASSERT_TRUE(wm_yaml_is_map(&root) && wm_yaml_count(&root) == 0);
   wm_yaml_free(doc);
   root = parse("# nothing\n");
   TEST_ASSERT_EQUAL(0, wm_yaml_count(&root));
-  double f;
-  says(wm_yaml_f64(&a, 0, 1, &f, &err), "x.yaml:1: a: has no value; a number from 0 to 1 is needed");
 }
 
 static void missing_file(void) {

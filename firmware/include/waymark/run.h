@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// A live run with real threads: a thread a source, the estimator's real-time thread, a sink thread. Its sources are a
+// recording's, played at real speed on the monotonic clock. The threads, their priorities, stacks and rings stand in
+// one table, firmware/runtime/threads.c; docs/runtime.md draws it.
+#ifndef WAYMARK_RUN_H
+#define WAYMARK_RUN_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+#include "waymark/config.h"
+#include "waymark/recording.h"
+#include "waymark/replay.h"
+#include "waymark/status.h"
+
+typedef struct wm_run_options {
+  const char *out_dir;  // NULL: nothing is written
+  uint64_t seed;
+  double duration_s;  // 0: to the recording's end
+  double speed;       // 1: real speed
+  // Set it to 1 (from a signal handler or another thread) and the run ends in order. May be NULL.
+  atomic_int *stop;
+  // What a person or a log should know while it runs, a line each; from any of the run's normal threads.
+  wm_finding_fn say;
+  void *say_context;
+} wm_run_options;
+
+typedef struct wm_live_report {
+  wm_run_report run;
+  uint64_t deadlines_missed, deadlines_total;
+  wm_time_ns wake_p99_ns, wake_max_ns;  // how late the estimator's thread woke
+  wm_time_ns loop_p99_ns, loop_max_ns;  // how long a cycle took
+  wm_time_ns age_p99_ns;                // sent_ns minus t_ns of the poses
+  int is_realtime, memory_locked;
+} wm_live_report;
+
+// Returns when the recording is over, the duration is reached or *stop is set, and all is written. The calling thread
+// waits; signals are its own business.
+wm_status wm_run_live(const wm_config *config, wm_recording *recording, const wm_run_options *options,
+                      wm_live_report *report, wm_error *err);
+
+#endif

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/run.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "live.h"
+#include "threads.h"
+#include "waymark/steady.h"
+
+#define BEFORE_FIRST_NS (100 * WM_NS_PER_MS)  // for the threads to stand ready
+#define LOOK_EVERY_NS (20 * WM_NS_PER_MS)
+
+void live_say(live *self, const char *format, ...) {
+  if (!self->options->say) return;
+  char line[400];
+  va_list arguments;
+  va_start(arguments, format);
+  (void)vsnprintf(line, sizeof line, format, arguments);
+  va_end(arguments);
+  self->options->say(self->options->say_context, line);
+}
+
+static void say_nothing(void *context, const char *line) {
+  (void)context;
+  (void)line;
+}
+
+// ── memory ──────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+#define NEEDS_MAX (WM_PIPELINE_NEEDS + 3 + WM_SOURCES_MAX)
+
+static size_t record_bytes(const live *self) { return OUTPUT_RECORD_HEAD + wm_output_bytes(self->assembly.kinds); }
+
+static size_t list_needs(live *self, wm_arena_need needs[NEEDS_MAX]) {
+  live_estimator *e = &self->estimator;
+  size_t n = WM_PIPELINE_NEEDS, slots = (size_t)self->config->runtime.realtime_ring_events;
+  wm_pipeline_needs(&e->pipeline, &self->assembly, needs);
+  needs[n++] = (wm_arena_need){"feeds", self->assembly.source_count * sizeof(wm_feed), (void **)&self->feeds};
+  needs[n++] = (wm_arena_need){"outputs ring", wm_ring_bytes(kThreads[THREAD_ESTIMATOR].ring_slots, record_bytes(self)),
+                               &e->outputs_memory};
+  needs[n++] = (wm_arena_need){"health ring", wm_ring_bytes(HEALTH_RING_SLOTS, sizeof(wm_health)), &e->healths_memory};
+  for (size_t i = 0; i < self->assembly.source_count; i++) {
+    size_t slot_bytes = wm_merge_slot_bytes(self->assembly.sources[i].kinds);
+    needs[n++] = (wm_arena_need){self->assembly.sources[i].name, wm_ring_bytes(slots, slot_bytes),
+                                 &self->sources[i].ring_memory};
+  }
+  return n;
+}
+
+static wm_status take_memory(live *self, wm_error *err) {
+  wm_arena_need needs[NEEDS_MAX];
+  size_t count = list_needs(self, needs);
+  wm_status status = wm_arena_fill(&self->arena, needs, count, self->config->runtime.realtime_lock_memory, err);
+  if (status != WM_OK) return status;
+  live_estimator *e = &self->estimator;
+  wm_ring_init(&e->outputs, e->outputs_memory, kThreads[THREAD_ESTIMATOR].ring_slots, record_bytes(self));
+  wm_ring_init(&e->healths, e->healths_memory, HEALTH_RING_SLOTS, sizeof(wm_health));
+  for (size_t i = 0; i < self->assembly.source_count; i++)
+    wm_ring_init(&self->sources[i].ring, self->sources[i].ring_memory,
+                 (size_t)self->config->runtime.realtime_ring_events,
+                 wm_merge_slot_bytes(self->assembly.sources[i].kinds));
+  return WM_OK;
+}
+
+// ── start ───────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
+  wm_status status = wm_assemble(self->config, recording, self->options->seed, &self->assembly, err);
+  if (status == WM_OK) status = take_memory(self, err);
+  if (status == WM_OK) status = wm_pipeline_start(&self->estimator.pipeline, estimator_output(&self->estimator), err);
+  wm_time_ns first_ns;
+  if (status == WM_OK) status = wm_feeds_open(&self->assembly, self->feeds, &first_ns, err);
+  if (status == WM_OK && self->options->out_dir)
+    status = wm_run_folder_open(self->options->out_dir, &self->assembly, &self->sink.folder, err);
+  if (status != WM_OK) return status;
+
+  const wm_runtime_params *params = &self->config->runtime;
+  self->estimator.loop_ns = WM_NS_PER_S / params->realtime_loop_hz;
+  self->estimator.publish_ns = wm_ns_from_seconds(1.0 / params->publish_rate_hz);
+  for (size_t i = 0; i < self->assembly.source_count; i++) {
+    self->sources[i].run = self;
+    self->sources[i].feed = &self->feeds[i];
+  }
+  lcm_sink_open(&self->sink.lcm, params->publish_lcm, self->config->lcm_url, self->config->channel_prefix,
+                &self->assembly, self->options->say ? self->options->say : say_nothing, self->options->say_context,
+                NULL);
+  notify_open(&self->sink.notify);
+  return WM_OK;
+}
+
+static void start_clock(live *self) {
+  const wm_feed *first = wm_feeds_earliest(self->feeds, self->assembly.source_count);
+  wm_time_ns begin_ns = wm_monotonic_ns() + BEFORE_FIRST_NS;
+  self->clock = (run_clock){begin_ns, first ? first->next.arrival_ns : 0, self->options->speed};
+  self->estimator.next_publish_ns = self->clock.run_ns;
+  self->estimator.next_health_ns = self->clock.run_ns;
+}
+
+// What the real-time thread needs and a desk's user may lack is said, and the run goes on without.
+static void steady_memory(live *self, wm_live_report *report) {
+  if (self->config->runtime.realtime_lock_memory) {
+    report->memory_locked = wm_lock_memory();
+    if (!report->memory_locked)
+      live_say(self,
+               "memory could not be locked (it needs CAP_IPC_LOCK or a larger `ulimit -l`): page faults are "
+               "possible when memory is short");
+  }
+  wm_touch_program();
+}
+
+typedef struct thread_list {
+  pthread_t source[WM_SOURCES_MAX], estimator, sink;
+  size_t sources_started;
+  int estimator_started, sink_started;
+} thread_list;
+
+static wm_status start_threads(live *self, thread_list *threads, wm_live_report *report, wm_error *err) {
+  int is_realtime;
+  wm_status status = thread_start(THREAD_SINK, 0, self->config, sink_thread, self, &threads->sink, &is_realtime, err);
+  if (status != WM_OK) return status;
+  threads->sink_started = 1;
+  status = thread_start(THREAD_ESTIMATOR, 0, self->config, estimator_thread, self, &threads->estimator,
+                        &report->is_realtime, err);
+  if (status != WM_OK) return status;
+  threads->estimator_started = 1;
+  if (!report->is_realtime && self->config->runtime.realtime_priority > 0)
+    live_say(self,
+             "no right to real-time priority (it needs CAP_SYS_NICE or `ulimit -r`): the estimator runs as a "
+             "normal thread; deadlines may be missed");
+  for (size_t i = 0; i < self->assembly.source_count && status == WM_OK; i++) {
+    status = thread_start(THREAD_SOURCE, i, self->config, source_thread, &self->sources[i], &threads->source[i],
+                          &is_realtime, err);
+    if (status == WM_OK) threads->sources_started++;
+  }
+  return status;
+}
+
+// ── while it runs, and its end ──────────────────────────────────────────────────────────────────────────────────────
+
+static void wait_for_end(live *self) {
+  wm_time_ns end_ns = INT64_MAX;
+  if (self->options->duration_s > 0)
+    end_ns = self->clock.monotonic_ns + wm_ns_from_seconds(fmin(self->options->duration_s, 1e9));
+  while (!atomic_load_explicit(&self->estimator.done, memory_order_acquire)) {
+    sleep_until(wm_monotonic_ns() + LOOK_EVERY_NS);
+    if ((self->options->stop && atomic_load(self->options->stop)) || wm_monotonic_ns() >= end_ns)
+      atomic_store(&self->stop, 1);
+  }
+}
+
+static void join_threads(live *self, thread_list *threads) {
+  atomic_store(&self->stop, 1);
+  for (size_t i = threads->sources_started; i < self->assembly.source_count; i++)
+    atomic_store_explicit(&self->sources[i].done, 1, memory_order_release);  // never began
+  for (size_t i = 0; i < threads->sources_started; i++) pthread_join(threads->source[i], NULL);
+  if (threads->estimator_started) {
+    pthread_join(threads->estimator, NULL);
+  } else {
+    atomic_store_explicit(&self->estimator.done, 1, memory_order_release);
+  }
+  if (threads->sink_started) pthread_join(threads->sink, NULL);
+}
+
+static void fill_report(live *self, wm_live_report *report) {
+  live_estimator *e = &self->estimator;
+  wm_run_report *run = &report->run;
+  wm_time_ns end_ns = run_now(&self->clock);
+  wm_pipeline_health(&e->pipeline, end_ns, &run->health);
+  wm_feeds_health(self->feeds, self->assembly.source_count, &run->health);
+  for (size_t i = 0; i < self->assembly.source_count; i++) {
+    uint64_t no_room = wm_ring_dropped(&self->sources[i].ring);
+    run->health.sources[i].received += no_room;
+    run->health.sources[i].dropped += no_room;
+  }
+  run->health.loops = e->loops;
+  run->health.deadlines_missed = e->deadlines_missed;
+  run->health.outputs_lost = wm_ring_dropped(&e->outputs);
+  run->poses = e->pipeline.fuser.poses;
+  run->events = e->pipeline.fuser.events;
+  run->recorded_s = wm_seconds_between(self->clock.run_ns, end_ns);
+  run->memory_bytes = self->arena.bytes;
+  run->allocations_after_start = e->allocations;
+  run->page_faults_after_start = e->page_faults;
+  report->deadlines_missed = e->deadlines_missed;
+  report->deadlines_total = e->loops + e->deadlines_missed;
+  report->wake_p99_ns = wm_histogram_quantile(&e->wake_ns, 0.99);
+  report->wake_max_ns = e->wake_ns.max_ns;
+  report->loop_p99_ns = wm_histogram_quantile(&e->cycle_ns, 0.99);
+  report->loop_max_ns = e->cycle_ns.max_ns;
+  report->age_p99_ns = wm_histogram_quantile(&e->age_ns, 0.99);
+}
+
+static wm_status write_summary(live *self, const wm_live_report *report, wm_error *err) {
+  if (!self->sink.folder) return WM_OK;
+  const live_estimator *e = &self->estimator;
+  const wm_timing_stage stages[] = {{"wake", &e->wake_ns},
+                                    {"loop", &e->cycle_ns},
+                                    {"arrive", &e->pipeline.arrive_ns},
+                                    {"predict", &e->pipeline.fuser.predict_ns},
+                                    {"correct", &e->pipeline.fuser.correct_ns},
+                                    {"publish", &e->pipeline.publish_ns},
+                                    {"age", &e->age_ns}};
+  const wm_timing timing = {.stages = stages,
+                            .stage_count = sizeof stages / sizeof stages[0],
+                            .allocations_after_start = e->allocations,
+                            .page_faults_after_start = e->page_faults,
+                            .deadlines_missed = report->deadlines_missed,
+                            .deadlines_total = report->deadlines_total,
+                            .memory_bytes = self->arena.bytes};
+  wm_status status = wm_run_folder_health(self->sink.folder, &report->run.health, err);
+  return status == WM_OK ? wm_run_folder_timing(self->sink.folder, &timing, err) : status;
+}
+
+static wm_status first_source_error(const live *self, wm_error *err) {
+  for (size_t i = 0; i < self->assembly.source_count; i++)
+    if (self->sources[i].status != WM_OK) {
+      if (err) *err = self->sources[i].error;
+      return self->sources[i].status;
+    }
+  return WM_OK;
+}
+
+static wm_status run(live *self, wm_recording *recording, wm_live_report *report, wm_error *err) {
+  wm_status status = prepare(self, recording, err);
+  if (status != WM_OK) return status;
+  steady_memory(self, report);
+  start_clock(self);
+  thread_list threads = {0};
+  status = start_threads(self, &threads, report, err);
+  if (status == WM_OK) wait_for_end(self);
+  join_threads(self, &threads);
+  notify_close(&self->sink.notify);
+  if (status != WM_OK) return status;
+  fill_report(self, report);
+  status = write_summary(self, report, err);
+  return status == WM_OK ? first_source_error(self, err) : status;
+}
+
+wm_status wm_run_live(const wm_config *config, wm_recording *recording, const wm_run_options *options,
+                      wm_live_report *report, wm_error *err) {
+  memset(report, 0, sizeof *report);
+  live *self = aligned_alloc(WM_CACHE_LINE, (sizeof *self + WM_CACHE_LINE - 1) / WM_CACHE_LINE * WM_CACHE_LINE);
+  if (!self) return wm_fail(err, WM_IO, "no memory for a run");
+  memset(self, 0, sizeof *self);
+  self->config = config;
+  self->options = options;
+  wm_status status = run(self, recording, report, err);
+  wm_error close_error;
+  wm_status closed = wm_run_folder_close(self->sink.folder, &close_error);
+  if (status == WM_OK && closed != WM_OK) {
+    status = closed;
+    if (err) *err = close_error;
+  }
+  wm_arena_close(&self->arena);
+  free(self);
+  return status;
+}

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// The normal thread behind the estimator's: files, event log, LCM, watchdog. It may be slow; the rings say so.
+#include <string.h>
+#include <time.h>
+
+#include "live.h"
+#include "threads.h"
+#include "waymark/steady.h"
+
+#define FLUSH_EVERY_NS WM_NS_PER_S
+#define LANDMARKS_EVERY_NS (5 * WM_NS_PER_S)
+
+// UTC minus the run's clock, between two readings of the monotonic clock. Unknown where the run isn't at real speed.
+static void tell_utc(const live *run, wm_published *published) {
+  if (run->clock.speed != 1.0) return;
+  struct timespec utc;
+  wm_time_ns before_ns = wm_monotonic_ns();
+  clock_gettime(CLOCK_REALTIME, &utc);
+  wm_time_ns after_ns = wm_monotonic_ns();
+  wm_time_ns middle_ns = before_ns + (after_ns - before_ns) / 2;
+  published->utc_offset_ns =
+      (wm_time_ns)utc.tv_sec * WM_NS_PER_S + utc.tv_nsec - run_from_monotonic(&run->clock, middle_ns);
+  published->utc_uncertainty_ns = (after_ns - before_ns) / 2 + 1;
+}
+
+static void send_pose(live *run, const wm_published *record) {
+  wm_published published = *record;
+  tell_utc(run, &published);
+  lcm_sink_pose(&run->sink.lcm, &published);
+  notify_pose(&run->sink.notify, &published);
+}
+
+static void take_output(live *run, const output_record *record) {
+  live_sink *self = &run->sink;
+  switch (record->kind) {
+    case OUTPUT_GAP:
+      if (self->folder) wm_run_folder_gap(self->folder, record->as.gap);
+      return;
+    case WM_OUTPUT_EVENT: lcm_sink_event(&self->lcm, &record->as.event); break;
+    case WM_OUTPUT_INNOVATION: lcm_sink_innovation(&self->lcm, &record->as.innovation); break;
+    case WM_OUTPUT_PUBLISHED: send_pose(run, &record->as.published); break;
+    default: break;
+  }
+  if (self->folder) {
+    wm_output output = wm_run_folder_output(self->folder);
+    output.put(output.context, (wm_output_kind)record->kind, &record->as, 0);
+  }
+}
+
+static void take_outputs(live *run) {
+  for (const output_record *record; (record = wm_ring_front(&run->estimator.outputs)) != NULL;
+       wm_ring_pop(&run->estimator.outputs))
+    take_output(run, record);
+}
+
+// What the sources count themselves is theirs to say; the estimator's thread doesn't know it.
+static void add_source_counts(live *run, wm_health *health) {
+  for (size_t i = 0; i < run->assembly.source_count; i++) {
+    live_source *from = &run->sources[i];
+    wm_source_health *to = &health->sources[i];
+    uint64_t no_room = wm_ring_dropped(&from->ring);
+    to->received += no_room;
+    to->dropped += no_room;
+    to->lost = atomic_load_explicit(&from->lost, memory_order_relaxed);
+    to->malformed = atomic_load_explicit(&from->malformed, memory_order_relaxed);
+    to->not_finite = atomic_load_explicit(&from->not_finite, memory_order_relaxed);
+    to->out_of_order = atomic_load_explicit(&from->out_of_order, memory_order_relaxed);
+    to->ignored = atomic_load_explicit(&from->ignored, memory_order_relaxed);
+    to->frozen = atomic_load_explicit(&from->frozen, memory_order_relaxed);
+  }
+}
+
+static void take_healths(live *run) {
+  for (const wm_health *record; (record = wm_ring_front(&run->estimator.healths)) != NULL;
+       wm_ring_pop(&run->estimator.healths)) {
+    wm_health health = *record;
+    add_source_counts(run, &health);
+    lcm_sink_health(&run->sink.lcm, &health);
+  }
+}
+
+static void do_what_is_due(live *run, wm_time_ns now_ns) {
+  live_sink *self = &run->sink;
+  lcm_sink_tick(&self->lcm, now_ns);
+  notify_tick(&self->notify, now_ns);
+  if (self->folder && now_ns >= self->next_flush_ns) {
+    wm_run_folder_flush(self->folder);
+    self->next_flush_ns = now_ns + FLUSH_EVERY_NS;
+  }
+  if (now_ns >= self->next_landmarks_ns) {
+    lcm_sink_landmarks(&self->lcm, run_from_monotonic(&run->clock, now_ns));
+    self->next_landmarks_ns = now_ns + LANDMARKS_EVERY_NS;
+  }
+}
+
+void *sink_thread(void *argument) {
+  live *run = argument;
+  wm_touch_stack(kThreads[THREAD_SINK].stack_bytes);
+  for (int last = 0; !last;) {
+    sleep_until(wm_monotonic_ns() + kThreads[THREAD_SINK].period_ns);
+    last = atomic_load_explicit(&run->estimator.done, memory_order_acquire);  // before the rings are emptied
+    take_outputs(run);
+    take_healths(run);
+    do_what_is_due(run, wm_monotonic_ns());
+  }
+  lcm_sink_close(&run->sink.lcm);
+  notify_stopping(&run->sink.notify);
+  return NULL;
+}

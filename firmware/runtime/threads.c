@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "threads.h"
+
+#include <errno.h>
+#include <sched.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "waymark/source.h"
+
+// clang-format off
+const thread_spec kThreads[THREAD_ROLES] = {
+  //                   name        real time  stack               ring slots  period               never
+  [THREAD_SOURCE]    = {"wm-source",  0, (size_t)256 << 10,            0,  0,                   "touches the estimator"},
+  [THREAD_ESTIMATOR] = {"wm-estimate", 1, (size_t)512 << 10,         8192,  0,                   "allocates, locks, makes a system call but its sleep"},
+  [THREAD_SINK]      = {"wm-sink",    0, (size_t)512 << 10,            0,  2 * WM_NS_PER_MS,    "holds the estimator up"},
+};
+// clang-format on
+
+static int start_with(const pthread_attr_t *attributes, void *(*body)(void *), void *argument, pthread_t *out) {
+  return pthread_create(out, attributes, body, argument);
+}
+
+static void want_realtime(pthread_attr_t *attributes, const wm_runtime_params *params) {
+  struct sched_param priority = {.sched_priority = params->realtime_priority};
+  pthread_attr_setinheritsched(attributes, PTHREAD_EXPLICIT_SCHED);
+  pthread_attr_setschedpolicy(attributes, SCHED_FIFO);
+  pthread_attr_setschedparam(attributes, &priority);
+}
+
+static void bind_to_cpu(pthread_attr_t *attributes, int cpu) {
+  if (cpu < 0) return;
+  cpu_set_t cpus;
+  CPU_ZERO(&cpus);
+  CPU_SET((size_t)cpu, &cpus);
+  pthread_attr_setaffinity_np(attributes, sizeof cpus, &cpus);
+}
+
+wm_status thread_start(thread_role role, size_t number, const wm_config *config, void *(*body)(void *), void *argument,
+                       pthread_t *out, int *is_realtime, wm_error *err) {
+  const thread_spec *spec = &kThreads[role];
+  pthread_attr_t attributes;
+  pthread_attr_init(&attributes);
+  pthread_attr_setstacksize(&attributes, spec->stack_bytes * 2);  // what is touched, and as much for the libraries
+  *is_realtime = spec->is_realtime && config->runtime.realtime_priority > 0;
+  if (*is_realtime) want_realtime(&attributes, &config->runtime);
+  if (spec->is_realtime) bind_to_cpu(&attributes, config->runtime.realtime_cpu);
+
+  int failed = start_with(&attributes, body, argument, out);
+  if (failed == EPERM && *is_realtime) {
+    *is_realtime = 0;
+    pthread_attr_setinheritsched(&attributes, PTHREAD_INHERIT_SCHED);
+    failed = start_with(&attributes, body, argument, out);
+  }
+  pthread_attr_destroy(&attributes);
+  if (failed == EINVAL && spec->is_realtime && config->runtime.realtime_cpu >= 0)
+    return wm_fail(err, WM_BAD_CONFIG, "%s: realtime.cpu: this computer has no CPU %d", config->path,
+                   config->runtime.realtime_cpu);
+  if (failed) return wm_fail(err, WM_IO, "thread %s can't be started: %s", spec->name, strerror(failed));
+
+  char name[16];
+  if (role == THREAD_SOURCE) {
+    (void)snprintf(name, sizeof name, "%s-%zu", spec->name, number % WM_SOURCES_MAX);
+  } else {
+    (void)snprintf(name, sizeof name, "%s", spec->name);
+  }
+  pthread_setname_np(*out, name);
+  return WM_OK;
+}

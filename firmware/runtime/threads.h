@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// The threads of a run, in one table.
+#ifndef WAYMARK_FIRMWARE_THREADS_H
+#define WAYMARK_FIRMWARE_THREADS_H
+
+#include <pthread.h>
+#include <stddef.h>
+
+#include "waymark/config.h"
+#include "waymark/status.h"
+#include "waymark/time.h"
+
+typedef enum thread_role { THREAD_SOURCE, THREAD_ESTIMATOR, THREAD_SINK, THREAD_ROLES } thread_role;
+
+typedef struct thread_spec {
+  const char *name;      // as `ps -T` and `top -H` show it
+  int is_realtime;       // SCHED_FIFO at realtime.priority of the configuration; the others are normal threads
+  size_t stack_bytes;    // touched before the thread's work begins
+  size_t ring_slots;     // of the ring that it fills; 0: realtime.ring_events of the configuration
+  wm_time_ns period_ns;  // how often it wakes; 0: realtime.loop_hz, or as its data come
+  const char *never;     // what it never does
+} thread_spec;
+
+extern const thread_spec kThreads[THREAD_ROLES];
+
+// Health records wait in a ring of their own: they are large and rare.
+#define HEALTH_RING_SLOTS 4
+
+// Starts a thread of that role. `number` tells the sources apart in the name. *is_realtime says whether it got its
+// priority; without the right to it (CAP_SYS_NICE, RLIMIT_RTPRIO) it runs as a normal thread.
+wm_status thread_start(thread_role role, size_t number, const wm_config *config, void *(*body)(void *), void *argument,
+                       pthread_t *out, int *is_realtime, wm_error *err);
+
+#endif
