@@ -20,4 +20,12 @@ static inline wm_time_ns arrival_order_next(arrival_order *self, wm_time_ns arri
   return self->newest_ns;
 }
 
+// A broken stamp far ahead would make all that follows late. It shows by the datum after it, which goes back by more
+// than any lateness to about where the data before were. (Were it the later one that is broken, it would go back
+// further.)
+#define ARRIVAL_LEAP_NS (10 * WM_NS_PER_S)
+static inline int arrival_order_leaps(const arrival_order *self, wm_time_ns arrival_ns, wm_time_ns next_ns) {
+  return arrival_ns - next_ns > ARRIVAL_LEAP_NS && (!self->started || next_ns >= self->newest_ns - ARRIVAL_LEAP_NS);
+}
+
 #endif

@@ -10,6 +10,11 @@
 #include "lines.h"
 #include "waymark/can.h"
 
+typedef struct log_frame {
+  wm_can_frame can;
+  long line;
+} log_frame;
+
 typedef struct can_stream {
   wm_source base;
   line_reader lines;
@@ -17,18 +22,17 @@ typedef struct can_stream {
   wm_can_decoder *decoder;
   arrival_order order;
   uint32_t seq;
+  log_frame frame, ahead;
+  int has_ahead;  // `ahead` was read, but not yet handed on
 } can_stream;
 
-static void count_bad(can_stream *self, const char *why) {
-  wm_source_counts *counts = &self->base.counts;
-  counts->malformed++;
-  if (!counts->first_problem[0])
-    snprintf(counts->first_problem, sizeof counts->first_problem, "%s:%ld: %s", self->lines.path, self->lines.number,
-             why);
+static void keep_problem(can_stream *self, long line, const char *why) {
+  char *first = self->base.counts.first_problem;
+  if (!first[0]) snprintf(first, sizeof self->base.counts.first_problem, "%s:%ld: %s", self->lines.path, line, why);
 }
 
 // The next frame of the log; lines that aren't one are counted.
-static wm_status next_frame(can_stream *self, wm_can_frame *frame, wm_error *err) {
+static wm_status read_frame(can_stream *self, log_frame *out, wm_error *err) {
   for (;;) {
     const char *text;
     size_t length;
@@ -36,35 +40,52 @@ static wm_status next_frame(can_stream *self, wm_can_frame *frame, wm_error *err
     wm_error why = {0};
     wm_status status = lines_next(&self->lines, &text, &length, &too_long, err);
     if (status != WM_OK) return status;
-    if (too_long) {
-      count_bad(self, "the line is longer than 65536 bytes; it is skipped");
-      continue;
-    }
-    status = wm_candump_parse(text, length, frame, &why);
+    out->line = self->lines.number;
+    status = too_long ? wm_fail(&why, WM_BAD_DATA, "the line is longer than %d bytes", LINES_BUFFER_BYTES)
+                      : wm_candump_parse(text, length, &out->can, &why);
     if (status == WM_OK) return WM_OK;
-    if (status != WM_AGAIN) count_bad(self, why.text);
+    if (status == WM_AGAIN) continue;
+    self->base.counts.malformed++;
+    keep_problem(self, out->line, why.text);
+  }
+}
+
+// The next frame, into self->frame. One is read ahead: a stamp is judged by the one after it.
+static wm_status next_frame(can_stream *self, wm_error *err) {
+  wm_status status = self->has_ahead ? WM_OK : read_frame(self, &self->ahead, err);
+  if (status != WM_OK) return status;
+  for (;;) {
+    self->frame = self->ahead;
+    status = read_frame(self, &self->ahead, err);
+    if (status != WM_OK && status != WM_END) return status;
+    self->has_ahead = status == WM_OK;
+    wm_time_ns here_ns = self->frame.can.t_ns, next_ns = self->has_ahead ? self->ahead.can.t_ns : here_ns;
+    if (!arrival_order_leaps(&self->order, here_ns, next_ns)) return WM_OK;
+    char why[96];
+    snprintf(why, sizeof why, "the stamp lies %.0f s after the next line's; the frame is skipped",
+             wm_seconds_between(next_ns, here_ns));
+    self->base.counts.not_finite++;
+    keep_problem(self, self->frame.line, why);
   }
 }
 
 static wm_status next_quantities(wm_source *base, wm_event *out, wm_error *err) {
   can_stream *self = (can_stream *)base;
   for (;;) {
-    wm_can_frame frame;
     wm_error why = {0};
-    wm_status status = next_frame(self, &frame, err);
+    wm_status status = next_frame(self, err);
     if (status != WM_OK) return status;
+    const wm_can_frame *frame = &self->frame.can;
     memset(out, 0, WM_EVENT_SMALL_BYTES);
-    status = wm_can_decode(self->decoder, &frame, &out->as.quantities, &base->counts, &why);
+    status = wm_can_decode(self->decoder, frame, &out->as.quantities, &base->counts, &why);
     if (status != WM_OK) {  // counted by the decoder
-      if (why.text[0] && !base->counts.first_problem[0])
-        snprintf(base->counts.first_problem, sizeof base->counts.first_problem, "%s:%ld: %s", self->lines.path,
-                 self->lines.number, why.text);
+      if (why.text[0]) keep_problem(self, self->frame.line, why.text);
       continue;
     }
     out->kind = WM_EVENT_QUANTITIES;
     out->source = base->index;
-    out->t_ns = frame.t_ns;
-    out->arrival_ns = arrival_order_next(&self->order, frame.t_ns, &base->counts);
+    out->t_ns = frame->t_ns;
+    out->arrival_ns = arrival_order_next(&self->order, frame->t_ns, &base->counts);
     out->seq = self->seq++;
     base->counts.received++;
     return WM_OK;

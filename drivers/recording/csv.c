@@ -93,6 +93,9 @@ static wm_status fail_missing(const csv_reader *self, int column, wm_error *err)
     if (find_column(self->format, self->fields[i]) < 0 && wm_word_nearest(shown, wanted))
       snprintf(hint, sizeof hint, " (the header has '%s': is it meant?)", shown);
   }
+  if (self->field_count == 1 && (memchr(self->fields[0].text, ';', self->fields[0].length) ||
+                                 memchr(self->fields[0].text, '\t', self->fields[0].length)))
+    snprintf(hint, sizeof hint, " (commas part the fields)");
   snprintf(text, sizeof text, "the column '%s' is missing%s; needed in the header, in any order: %s", wanted[0], hint,
            columns_of(self->format, all, sizeof all));
   return csv_fail(self, err, WM_BAD_CONFIG, text);
@@ -204,6 +207,7 @@ wm_status csv_read(csv_reader *self, csv_row *row, wm_error *err) {
     snprintf(text, sizeof text, "%zu fields where the header has %zu", self->fields_found, self->field_count);
     return csv_fail(self, err, WM_BAD_DATA, text);
   }
+  row->line = self->lines.number;
   for (size_t i = 0; self->format->columns[i].name; i++) {
     const csv_column *column = &self->format->columns[i];
     csv_field field = self->place[i] >= 0 ? self->fields[self->place[i]] : (csv_field){"", 0};

@@ -40,6 +40,7 @@ typedef struct csv_row {
   double number[CSV_COLUMNS_MAX];  // CSV_NUMBER; NaN where absent
   const char *name;                // CSV_NAME; not terminated, holds until the next row
   size_t name_length;
+  long line;
 } csv_row;
 
 typedef struct csv_field {

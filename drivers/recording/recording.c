@@ -86,6 +86,10 @@ static wm_status read_start(wm_recording *self, const wm_yaml_node *root, wm_err
   size_t unknown;
   wm_start_init(&self->start);
   wm_yaml_node pose = wm_yaml_get(root, "vehicle.initial_pose");
+  wm_yaml_node misplaced = wm_yaml_get(root, "initial_pose");
+  if (wm_yaml_there(&misplaced))
+    warn_line(&self->warn, "%s:%d: initial_pose: belongs under vehicle; here it is ignored", wm_yaml_file(root),
+              wm_yaml_line(&misplaced));
   if (!wm_yaml_there(&pose)) return WM_OK;
   // Unknown keys are allowed in recording.yaml; a misspelt one is worth a word.
   if (wm_yaml_check_keys(&pose, wm_start_keys, WM_YAML_NEAR, &unknown, &said) != WM_OK || unknown)

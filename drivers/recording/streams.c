@@ -44,8 +44,9 @@ typedef struct stream {
   int takes_broken;
   arrival_order order;
   uint32_t seq;
-  int held;  // points: the row that was read, but belongs to the next stamp
-  csv_row row;
+  csv_row row, ahead;
+  int has_ahead;  // `ahead` was read, but not yet handed on
+  int row_waits;  // points: `row` belongs to the next stamp
 } stream;
 
 static const char *fill_motion(const csv_row *row, uint16_t sensor, wm_event *out) {
@@ -234,28 +235,55 @@ static int is_mine(const stream *self) {
   return self->takes_broken && !is_among(name, self->names);
 }
 
-static void count_bad(stream *self, wm_status status, const wm_error *why) {
+static void count_bad(stream *self, wm_status status, const char *why) {
   wm_source_counts *counts = &self->base.counts;
   if (status == WM_NOT_FINITE)
     counts->not_finite++;
   else
     counts->malformed++;
   if (!counts->first_problem[0])
-    snprintf(counts->first_problem, sizeof counts->first_problem, "%s; the row is skipped", why->text);
+    snprintf(counts->first_problem, sizeof counts->first_problem, "%s; the row is skipped", why);
 }
 
-// The next good row of this source, into self->row; bad ones are counted.
-static wm_status next_row(stream *self, wm_error *err) {
+static void count_bad_row(stream *self, wm_status status, const csv_row *row, const char *why) {
+  char text[WM_PATH_MAX + 128];
+  snprintf(text, sizeof text, "%s:%ld: %s", self->csv.lines.path, row->line, why);
+  count_bad(self, status, text);
+}
+
+// The next row of this source that can be read; others are counted.
+static wm_status read_row(stream *self, csv_row *row, wm_error *err) {
   for (;;) {
     wm_error why;
     wm_status status = csv_next(&self->csv, err);
     if (status != WM_OK) return status;
     if (!is_mine(self)) continue;
-    status = csv_read(&self->csv, &self->row, &why);
+    status = csv_read(&self->csv, row, &why);
     if (status == WM_OK && self->names && !is_name(csv_name(&self->csv), self->sensor))
       status = csv_fail(&self->csv, &why, WM_BAD_DATA, "the sensor's name is broken");
     if (status == WM_OK) return WM_OK;
-    count_bad(self, status, &why);
+    count_bad(self, status, why.text);
+  }
+}
+
+static wm_time_ns arrival_of(const csv_row *row) {
+  return row->whole[ARRIVAL] == WM_TIME_NONE ? row->whole[T] : row->whole[ARRIVAL];
+}
+
+// The next good row, into self->row. One row is read ahead: a stamp is judged by the one after it.
+static wm_status next_row(stream *self, wm_error *err) {
+  wm_status status = self->has_ahead ? WM_OK : read_row(self, &self->ahead, err);
+  if (status != WM_OK) return status;
+  for (;;) {
+    self->row = self->ahead;
+    status = read_row(self, &self->ahead, err);
+    if (status != WM_OK && status != WM_END) return status;
+    self->has_ahead = status == WM_OK;
+    wm_time_ns here_ns = arrival_of(&self->row), next_ns = self->has_ahead ? arrival_of(&self->ahead) : here_ns;
+    if (!arrival_order_leaps(&self->order, here_ns, next_ns)) return WM_OK;
+    char why[96];
+    snprintf(why, sizeof why, "t_ns: lies %.0f s after the next row's", wm_seconds_between(next_ns, here_ns));
+    count_bad_row(self, WM_NOT_FINITE, &self->row, why);
   }
 }
 
@@ -272,14 +300,9 @@ static void hand_out(stream *self, wm_time_ns arrival_ns, wm_event *out) {
   self->base.counts.received++;
 }
 
-static wm_time_ns arrival_of(const csv_row *row) {
-  return row->whole[ARRIVAL] == WM_TIME_NONE ? row->whole[T] : row->whole[ARRIVAL];
-}
-
 static wm_status next_single(wm_source *base, wm_event *out, wm_error *err) {
   stream *self = (stream *)base;
   for (;;) {
-    wm_error why;
     wm_status status = next_row(self, err);
     if (status != WM_OK) return status;
     begin_event(self, out);
@@ -288,16 +311,16 @@ static wm_status next_single(wm_source *base, wm_event *out, wm_error *err) {
       hand_out(self, arrival_of(&self->row), out);
       return WM_OK;
     }
-    count_bad(self, csv_fail(&self->csv, &why, WM_BAD_DATA, problem), &why);
+    count_bad_row(self, WM_BAD_DATA, &self->row, problem);
   }
 }
 
 // All rows of a stamp are one event; it has arrived when the last of them has.
 static wm_status next_points(wm_source *base, wm_event *out, wm_error *err) {
   stream *self = (stream *)base;
-  wm_status status = self->held ? WM_OK : next_row(self, err);
+  wm_status status = self->row_waits ? WM_OK : next_row(self, err);
   if (status != WM_OK) return status;
-  self->held = 0;
+  self->row_waits = 0;
   begin_event(self, out);
   wm_time_ns arrival_ns = arrival_of(&self->row);
   for (;;) {
@@ -306,7 +329,7 @@ static wm_status next_points(wm_source *base, wm_event *out, wm_error *err) {
     status = next_row(self, err);
     if (status != WM_OK && status != WM_END) return status;
     if (status == WM_OK && self->row.whole[T] == out->t_ns) continue;
-    self->held = status == WM_OK;
+    self->row_waits = status == WM_OK;
     hand_out(self, arrival_ns, out);
     return WM_OK;
   }

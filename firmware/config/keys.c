@@ -152,7 +152,7 @@ static wm_status read_param(const wm_yaml_node *node, const wm_param *param, voi
 
 wm_status config_fill(const wm_yaml_node *map, const wm_param_table *table, const char *prefix, void *out,
                       wm_error *err) {
-  if (!wm_yaml_is_map(map) && wm_yaml_there(map))
+  if (wm_yaml_is_list(map) || wm_yaml_is_scalar(map))  // nothing behind the colon is an empty section
     return wm_yaml_fail(map, err, "a map of parameters (KEY: VALUE) is needed");
   for (size_t i = 0; i < wm_yaml_count(map); i++) {
     const char *name;
@@ -166,8 +166,7 @@ wm_status config_fill(const wm_yaml_node *map, const wm_param_table *table, cons
       status = read_param(&value, param, out, err);
     } else if (is_group(table, key)) {
       snprintf(key, sizeof key, "%s%s.", prefix, name);
-      if (wm_yaml_is_map(&value) || wm_yaml_is_list(&value) || wm_yaml_is_scalar(&value))
-        status = config_fill(&value, table, key, out, err);
+      status = config_fill(&value, table, key, out, err);
     } else if (!is_other_key(value.path)) {
       status = config_unknown(&value, line, err);
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes as one of the recording's CSV streams: what is handed out is finite where it must be and in the order of
-// arrival. The first byte picks the kind of stream.
+// Any bytes as one of a recording's files: what a stream hands out is finite where it must be and in the order of
+// arrival; landmarks.csv and can-signals.yaml are read or refused. The first byte picks the kind of file.
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -8,6 +8,7 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include "calibration.h"
 #include "streams.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
@@ -53,13 +54,38 @@ static void read_as(const char *path, const stream_kind *kind) {
   }
 }
 
+static void read_landmarks(const char *path) {
+  const warner quiet = {NULL, NULL};
+  wm_landmark *all;
+  size_t count;
+  wm_error err;
+  if (landmarks_read(path, &quiet, &all, &count, &err) != WM_OK) return;
+  for (size_t i = 0; i < count; i++) check(isfinite(all[i].p_m[2]) && all[i].sigma_m >= 0 && all[i].id >= 0);
+  free(all);
+}
+
+static void read_can_signals(const char *path) {
+  wm_can_binding *all;
+  size_t count;
+  wm_error err;
+  if (can_signals_read(path, &all, &count, &err) != WM_OK) return;
+  for (size_t i = 0; i < count; i++) check(all[i].signal_count > 0 && all[i].scale != 0.0 && all[i].line > 0);
+  free(all);
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   if (size == 0) return 0;
   int fd = memfd_create("stream.csv", 0);
   char path[64];
   snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
   check(fd >= 0 && write(fd, data + 1, size - 1) == (ssize_t)(size - 1));
-  read_as(path, kKinds[data[0] % (sizeof kKinds / sizeof *kKinds)]);
+  size_t streams = sizeof kKinds / sizeof *kKinds, kind = data[0] % (streams + 2);
+  if (kind < streams)
+    read_as(path, kKinds[kind]);
+  else if (kind == streams)
+    read_landmarks(path);
+  else
+    read_can_signals(path);
   close(fd);
   return 0;
 }

@@ -46,6 +46,17 @@ static void drain(wm_source *source, const char *name) {
   TEST_ASSERT_EQUAL_UINT64_MESSAGE(0, source->counts.not_finite, source->counts.first_problem);
 }
 
+// CAN: every frame of the log becomes an event or is counted.
+static void check_frames(const wm_yaml_node *root, const wm_source *source) {
+  wm_yaml_node node = wm_yaml_get(root, "counts.can_frames");
+  if (strcmp(source->name, "can") != 0 || !wm_yaml_there(&node)) return;
+  int64_t expected;
+  wm_error err;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_yaml_i64(&node, 0, INT64_MAX, &expected, &err), err.text);
+  const wm_source_counts *n = &source->counts;
+  TEST_ASSERT_EQUAL_UINT64((uint64_t)expected, n->received + n->ignored + n->frozen);
+}
+
 static void check_count(const wm_yaml_node *root, const wm_source *source, const char *name) {
   char key[64];
   if (!count_key(source)) return;
@@ -75,6 +86,7 @@ static void check_recording(const char *name) {
   for (size_t i = 0; i < count; i++) {
     drain(sources[i], name);
     check_count(&root, sources[i], name);
+    check_frames(&root, sources[i]);
     has_motion += sources[i]->is_motion && sources[i]->counts.received > 0;
     printf("  %-22s %-18s %8llu events, %llu out of order\n", name, sources[i]->name,
            (unsigned long long)sources[i]->counts.received, (unsigned long long)sources[i]->counts.out_of_order);

@@ -86,11 +86,13 @@ static void start_pose(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, M_PI / 20, start->sigma_heading_rad);
   TEST_ASSERT_EQUAL_DOUBLE(0.05, start->sigma_xy_m);
   folder_write("recording.yaml", ABOUT
-               "vehicle:\n  initial_pose: {x_m: 1, z_m: 3, qx: 0, qy: 0, qz: 0.70711, qw: 0.70711, hedaing_rad: 1}\n");
+               "vehicle:\n  initial_pose: {x_m: 1, z_m: 3, qx: 0, qy: 0, qz: 0.70711, qw: 0.70711, hedaing_rad: "
+               "1}\ninitial_pose: {}\n");
   open_it();
   start = wm_recording_start(recording);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, sqrt(0.5), start->q_xyzw[2]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, M_PI / 2, start->heading_rad);
+  TEST_ASSERT_NOT_NULL(strstr(warnings, "recording.yaml:7: initial_pose: belongs under vehicle; here it is ignored"));
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(warnings, "hedaing_rad: unknown key; did you mean 'heading_rad'?"), warnings);
 }
 
@@ -206,7 +208,8 @@ static void can_and_its_binding(void) {
                "- {quantity: vehicle_speed, message: SPEED, signal: [A, B], scale: -1, offset: 0.5}\n"
                "- {quantity: gear, message: SPEED, signal: G, values: {forward: [4, 5], reverse: 2, neutral: [3]}}\n");
   folder_write("can.log",
-               "(1.000001) can0 123#03020400\nrubbish\n\n# word\n(1.000000) can0 123#01000200\n(1.5) can0 7FF#00\n");
+               "(1.000001) can0 123#03020400\nrubbish\n\n# word\n(900000.5) can0 123#00000000\n(1.000000) can0 "
+               "123#01000200\n(1.5) can0 7FF#00\n");
   (void)unlink(folder_path("motion.csv"));
   open_it();
   TEST_ASSERT_EQUAL((1u << WM_Q_VEHICLE_SPEED) | (1u << WM_Q_GEAR), wm_recording_quantities(recording));
@@ -224,6 +227,7 @@ static void can_and_its_binding(void) {
   TEST_ASSERT_EQUAL(1, can->counts.out_of_order);
   TEST_ASSERT_EQUAL(WM_END, can->ops->next(can, &event, &err));
   TEST_ASSERT_EQUAL(1, can->counts.malformed);
+  TEST_ASSERT_EQUAL(1, can->counts.not_finite);  // 900000.5 s
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(can->counts.first_problem, "can.log:2: "), can->counts.first_problem);
   (void)unlink(folder_path("vehicle.dbc"));
   refused("vehicle.dbc: is not there, but needed to read can.log");

@@ -169,6 +169,23 @@ static void order_of_arrival(void) {
   TEST_ASSERT_EQUAL(1, gnss->counts.out_of_order);
 }
 
+// One stamp far ahead must not make the rest of the drive late.
+static void leaping_stamps(void) {
+  folder_write(
+      "motion.csv",
+      "t_ns,v_mps,w_radps\n900000000000000,1,0\n0,1,0\n100,2,0\n3000000000000000000,3,0\n300,4,0\n60000000300,5,0\n"
+      "60000000200,6,0\n");
+  wm_source *motion = source("motion");
+  static const int64_t kStamps[] = {0, 100, 300, 60000000300, 60000000200};
+  for (int i = 0; i < 5; i++) TEST_ASSERT_EQUAL_INT64(kStamps[i], next(motion).t_ns);
+  at_end(motion);
+  TEST_ASSERT_EQUAL(2, motion->counts.not_finite);
+  TEST_ASSERT_EQUAL(1, motion->counts.out_of_order);  // a tenth of a microsecond back is no leap
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(motion->counts.first_problem,
+                                      "motion.csv:2: t_ns: lies 900000 s after the next row's; the row is skipped"),
+                               motion->counts.first_problem);
+}
+
 static void sightings_by_sensor(void) {
   folder_write("calibration.yaml",
                "sensors:\n  right: {mounting: {xyz_m: [0, -1, 0], rpy_deg: [0, 0, 90]}, bearing_sigma_rad: 0.01}\n"
@@ -264,6 +281,7 @@ int main(void) {
   RUN_TEST(zero_bytes);
   RUN_TEST(long_file);
   RUN_TEST(order_of_arrival);
+  RUN_TEST(leaping_stamps);
   RUN_TEST(sightings_by_sensor);
   RUN_TEST(points_by_stamp);
   RUN_TEST(too_many_points);

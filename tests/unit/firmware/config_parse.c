@@ -28,6 +28,11 @@ static void refused(const char *text, const char *message) {
 
 static const registry_params *params(void) { return config.estimator_params; }
 
+static void empty_sections(void) {
+  parse(HEAD "merge:\npole_filter:\n  states:\nmotion:\n  # noise: {speed_mps: 1}\nsources:\n");
+  TEST_ASSERT_TRUE(params()->slots == 2 && config.source_count == 0);
+}
+
 static void defaults(void) {
   parse(HEAD);
   TEST_ASSERT_EQUAL_STRING("pole_filter", config.estimator->name);
@@ -183,6 +188,7 @@ static void reference_names_all(void) {
 
 int main(void) {
   UNITY_BEGIN();
+  RUN_TEST(empty_sections);
   RUN_TEST(defaults);
   RUN_TEST(everything);
   RUN_TEST(source_settings);

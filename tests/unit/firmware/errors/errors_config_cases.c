@@ -157,6 +157,9 @@ const error_case kErrorCases[] = {
      "in any order: t_ns,v_mps,w_radps"},
     {REC, "Column missing", "gnss.csv", "t_ns,x_m,y_m\n0,0,0\n",
      "rec/gnss.csv:1: the column 'sigma_xy_m' is missing; needed in the header, in any order: t_ns,x_m,y_m,sigma_xy_m"},
+    {REC, "Semicolons", "motion.csv", "t_ns;v_mps;w_radps\n0;0;0\n",
+     "rec/motion.csv:1: the column 't_ns' is missing (commas part the fields); needed in the header, in any order: "
+     "t_ns,v_mps,w_radps"},
     {REC, "Column twice", "motion.csv", "t_ns,v_mps,v_mps,w_radps\n0,0,0,0\n",
      "rec/motion.csv:1: the column 'v_mps' stands there twice"},
     {REC, "Empty stream", "motion.csv", "", "rec/motion.csv:1: no header line; needed: t_ns,v_mps,w_radps"},
@@ -186,6 +189,8 @@ const error_case kErrorCases[] = {
      "rec/motion.csv:2: 2 fields where the header has 3; the row is skipped"},
     {ROW, "Stamp that is not whole", "motion.csv", "t_ns,v_mps,w_radps\n0.5,0,0\n",
      "rec/motion.csv:2: t_ns: '0.5' is not a whole number; the row is skipped"},
+    {ROW, "Stamp that leaps", "motion.csv", "t_ns,v_mps,w_radps\n0,1,0\n900000000000000,1,0\n100000000,1,0\n",
+     "rec/motion.csv:3: t_ns: lies 900000 s after the next row's; the row is skipped"},
     {ROW, "Value that is no number", "motion.csv", "t_ns,v_mps,w_radps\n0,fast,0\n",
      "rec/motion.csv:2: v_mps: 'fast' is not a number; the row is skipped"},
     {ROW, "Value that is not finite", "motion.csv", "t_ns,v_mps,w_radps\n0,inf,0\n",
