@@ -11,6 +11,9 @@
 #define MADV_POPULATE_WRITE 23
 #endif
 
+// Larger mappings are reservations (a sanitizer's shadow, a garbage collector's arena), not a program's own.
+#define LARGEST_MAPPING ((unsigned long)256 << 20)
+
 int64_t wm_page_faults_of_this_thread(void) {
   struct rusage usage;
   if (getrusage(RUSAGE_THREAD, &usage) != 0) return -1;
@@ -25,6 +28,7 @@ void wm_touch_program(void) {
     unsigned long from, to;
     char may[5];
     if (sscanf(line, "%lx-%lx %4s", &from, &to, may) != 3 || may[0] != 'r') continue;
+    if (to - from > LARGEST_MAPPING) continue;
     int advice = may[1] == 'w' && may[3] == 'p' ? MADV_POPULATE_WRITE : MADV_POPULATE_READ;
     (void)madvise((void *)from, to - from, advice);  // special mappings refuse; nothing is lost
   }

@@ -95,7 +95,7 @@ static void do_what_is_due(live *run, wm_time_ns now_ns) {
 
 void *sink_thread(void *argument) {
   live *run = argument;
-  wm_touch_stack(kThreads[THREAD_SINK].stack_bytes);
+  wm_touch_stack(THREAD_TOUCHED_BYTES);
   for (int last = 0; !last;) {
     sleep_until(wm_monotonic_ns() + kThreads[THREAD_SINK].period_ns);
     last = atomic_load_explicit(&run->estimator.done, memory_order_acquire);  // before the rings are emptied

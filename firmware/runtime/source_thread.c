@@ -40,7 +40,7 @@ static void share_counts(live_source *self) {
 
 void *source_thread(void *argument) {
   live_source *self = argument;
-  wm_touch_stack(kThreads[THREAD_SOURCE].stack_bytes);
+  wm_touch_stack(THREAD_TOUCHED_BYTES);
   while (self->feed->has_next &&
          wait_until(self->run, monotonic_from_run(&self->run->clock, self->feed->next.arrival_ns))) {
     hand_out(self);

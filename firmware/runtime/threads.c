@@ -10,10 +10,10 @@
 
 // clang-format off
 const thread_spec kThreads[THREAD_ROLES] = {
-  //                   name        real time  stack               ring slots  period               never
-  [THREAD_SOURCE]    = {"wm-source",  0, (size_t)256 << 10,            0,  0,                   "touches the estimator"},
-  [THREAD_ESTIMATOR] = {"wm-estimate", 1, (size_t)512 << 10,         8192,  0,                   "allocates, locks, makes a system call but its sleep"},
-  [THREAD_SINK]      = {"wm-sink",    0, (size_t)512 << 10,            0,  2 * WM_NS_PER_MS,    "holds the estimator up"},
+  //                   name          real time  stack            ring slots  period             never
+  [THREAD_SOURCE]    = {"wm-source",   0,         (size_t)2 << 20, 0,          0,                 "touches the estimator"},
+  [THREAD_ESTIMATOR] = {"wm-estimate", 1,         (size_t)2 << 20, 8192,       0,                 "allocates, locks, makes a system call but its sleep"},
+  [THREAD_SINK]      = {"wm-sink",     0,         (size_t)2 << 20, 0,          2 * WM_NS_PER_MS,  "holds the estimator up"},
 };
 // clang-format on
 
@@ -41,7 +41,7 @@ wm_status thread_start(thread_role role, size_t number, const wm_config *config,
   const thread_spec *spec = &kThreads[role];
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
-  pthread_attr_setstacksize(&attributes, spec->stack_bytes * 2);  // what is touched, and as much for the libraries
+  pthread_attr_setstacksize(&attributes, spec->stack_bytes);
   *is_realtime = spec->is_realtime && config->runtime.realtime_priority > 0;
   if (*is_realtime) want_realtime(&attributes, &config->runtime);
   if (spec->is_realtime) bind_to_cpu(&attributes, config->runtime.realtime_cpu);

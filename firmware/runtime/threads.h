@@ -15,11 +15,14 @@ typedef enum thread_role { THREAD_SOURCE, THREAD_ESTIMATOR, THREAD_SINK, THREAD_
 typedef struct thread_spec {
   const char *name;      // as `ps -T` and `top -H` show it
   int is_realtime;       // SCHED_FIFO at realtime.priority of the configuration; the others are normal threads
-  size_t stack_bytes;    // touched before the thread's work begins
+  size_t stack_bytes;    // THREAD_TOUCHED_BYTES of it are touched before the thread's work begins
   size_t ring_slots;     // of the ring that it fills; 0: realtime.ring_events of the configuration
   wm_time_ns period_ns;  // how often it wakes; 0: realtime.loop_hz, or as its data come
   const char *never;     // what it never does
 } thread_spec;
+
+// The rest is address space: for the libraries, and for sanitizers, which keep most of a megabyte there.
+#define THREAD_TOUCHED_BYTES ((size_t)256 << 10)
 
 extern const thread_spec kThreads[THREAD_ROLES];
 

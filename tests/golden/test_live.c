@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// A run with its real threads: its log gives its poses, it stops when told, LCM goes on without a way out.
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "small_recording.h"
+#include "unity.h"
+#include "waymark/eventlog.h"
+#include "waymark/run.h"
+
+static const char kConfig[] =
+    "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm: false}\n"
+    "realtime: {priority: 0, lock_memory: false}\n";
+
+static wm_live_report live;
+static wm_run_report report;
+
+void setUp(void) {}
+void tearDown(void) { test_folder_remove(); }
+
+static wm_time_ns some_late(size_t frame) { return (wm_time_ns)(frame % 5) * 30 * WM_NS_PER_MS; }
+
+static void run_live(const char *recording, const char *config_text, const wm_run_options *options) {
+  wm_error err = {0};
+  wm_config config;
+  wm_recording *opened = NULL;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(config_text, strlen(config_text), "test.yaml", &config, &err),
+                            err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(
+      WM_OK, wm_recording_open(in_folder(recording), &config.overrides, NULL, NULL, &opened, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, opened, options, &live, &err), err.text);
+  wm_recording_close(opened);
+  wm_config_free(&config);
+}
+
+static void replay_log_into(const char *log_path, const char *run) {
+  wm_error err;
+  wm_log_reader *log;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(in_folder(log_path), &log, &err), err.text);
+  const wm_log_head *head = wm_log_reader_head(log);
+  wm_config config;
+  TEST_ASSERT_EQUAL(WM_OK, wm_config_parse(head->config_text, head->config_length, head->config_path, &config, &err));
+  const wm_replay_options options = {.out_dir = in_folder(run)};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_replay_log(&config, log, &options, &report, &err), err.text);
+  wm_config_free(&config);
+  wm_log_reader_close(log);
+}
+
+static void the_log_of_a_run_gives_exactly_its_fused_poses(void) {
+  small_recording_write("rec",
+                        &(small_recording){.seconds = 3, .late_ns = some_late, .frame_hz = 20, .motion_hz = 100});
+  const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 1};
+  run_live("rec", kConfig, &options);
+  TEST_ASSERT_EQUAL_UINT64(300, live.run.poses);
+  TEST_ASSERT_EQUAL_UINT64(0, live.run.health.outputs_lost);
+  replay_log_into("run/events.wmlog", "again");
+  TEST_ASSERT_EQUAL(0, report.log_was_cut);
+  TEST_ASSERT_EQUAL_UINT64(live.run.events, report.events);
+  assert_same_file("run", "again", "trajectory.csv");
+  assert_same_file("run", "again", "innovations.csv");
+}
+
+static void the_estimators_thread_allocates_nothing_and_misses_no_page(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 2, .motion_hz = 100});
+  const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 1};
+  run_live("rec", kConfig, &options);
+  TEST_ASSERT_GREATER_THAN(100, live.deadlines_total);
+  if (live.run.allocations_after_start < 0) TEST_IGNORE_MESSAGE("a sanitizer's malloc is in place");
+  TEST_ASSERT_EQUAL_INT64(0, live.run.allocations_after_start);
+  TEST_ASSERT_EQUAL_INT64(0, live.run.page_faults_after_start);
+}
+
+// Nothing that arrived is lost between the threads, at sixteen times real speed.
+static void everything_that_arrived_is_fused(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 30, .motion_hz = 100});
+  const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 16};
+  run_live("rec",
+           "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm: false}\n"
+           "merge: {horizon_ms: 3000, lateness_max_ms: 3000}\nrealtime: {priority: 0, lock_memory: false}\n",
+           &options);
+  for (uint32_t i = 0; i < live.run.health.source_count; i++) {
+    const wm_source_health *s = &live.run.health.sources[i];
+    TEST_ASSERT_GREATER_THAN(500, s->received);
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(0, s->dropped + s->late + s->duplicates, s->name);
+  }
+  TEST_ASSERT_EQUAL_UINT64(3000, live.run.poses);
+}
+
+static atomic_int stop;
+static void *stop_soon(void *unused) {
+  (void)unused;
+  (void)usleep(500000);
+  atomic_store(&stop, 1);
+  return NULL;
+}
+
+static void a_stop_ends_the_run_and_everything_is_written(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 60});
+  pthread_t thread;
+  atomic_store(&stop, 0);
+  TEST_ASSERT_EQUAL(0, pthread_create(&thread, NULL, stop_soon, NULL));
+  const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 1, .stop = &stop};
+  run_live("rec", kConfig, &options);
+  pthread_join(thread, NULL);
+  TEST_ASSERT_TRUE(live.run.recorded_s < 20);
+  TEST_ASSERT_GREATER_THAN(2, live.run.poses);
+  replay_log_into("run/events.wmlog", "again");
+  TEST_ASSERT_EQUAL(0, report.log_was_cut);
+  assert_same_file("run", "again", "trajectory.csv");
+}
+
+static void a_duration_ends_the_run(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 60});
+  const wm_run_options options = {.seed = 1, .speed = 1, .duration_s = 0.5};  // and nothing is written
+  run_live("rec", kConfig, &options);
+  TEST_ASSERT_TRUE(live.run.recorded_s < 20);
+  TEST_ASSERT_GREATER_THAN(2, live.run.poses);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(the_log_of_a_run_gives_exactly_its_fused_poses);
+  RUN_TEST(the_estimators_thread_allocates_nothing_and_misses_no_page);
+  RUN_TEST(everything_that_arrived_is_fused);
+  RUN_TEST(a_stop_ends_the_run_and_everything_is_written);
+  RUN_TEST(a_duration_ends_the_run);
+  return UNITY_END();
+}

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+// A recording in, files out: the same bytes every time, whatever arrives late, and an account of every datum.
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "small_recording.h"
+#include "unity.h"
+#include "waymark/eventlog.h"
+
+#define MS WM_NS_PER_MS
+
+static const char kConfig[] = "format: waymark-config/1\nestimator: landmark_ekf\n";
+static const char kConfig300[] =
+    "format: waymark-config/1\nestimator: landmark_ekf\nsources:\n  - {name: sightings, lateness_max_ms: 300}\n";
+
+static wm_run_report report;
+
+void setUp(void) {}
+void tearDown(void) { test_folder_remove(); }
+
+static const wm_source_health *source(const char *name) {
+  for (uint32_t i = 0; i < report.health.source_count; i++)
+    if (strcmp(report.health.sources[i].name, name) == 0) return &report.health.sources[i];
+  TEST_FAIL_MESSAGE(name);
+  return NULL;
+}
+
+static void the_same_replay_twice_gives_the_same_bytes(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 20});
+  replay_into("rec", kConfig, "one", &report);
+  replay_into("rec", kConfig, "two", &report);
+  static const char *const kFiles[] = {"trajectory.csv", "trajectory.tum",  "published.csv",
+                                       "events.wmlog",   "innovations.csv", "health.json"};
+  for (size_t i = 0; i < sizeof kFiles / sizeof kFiles[0]; i++) assert_same_file("one", "two", kFiles[i]);
+  TEST_ASSERT_EQUAL_UINT64(400, report.poses);  // one at each of the driving stream's stamps
+}
+
+static void nothing_is_allocated_and_no_page_is_missing_after_the_start(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 20});
+  replay_into("rec", kConfig, "run", &report);
+  if (report.allocations_after_start < 0) TEST_IGNORE_MESSAGE("a sanitizer's malloc is in place");
+  TEST_ASSERT_EQUAL_INT64(0, report.allocations_after_start);
+  TEST_ASSERT_EQUAL_INT64(0, report.page_faults_after_start);
+  size_t length;
+  char *timing = read_all(in_folder("run/timing.json"), &length);
+  TEST_ASSERT_NOT_NULL(strstr(timing, "\"allocations_after_start\": 0,"));
+  TEST_ASSERT_NOT_NULL(strstr(timing, "\"page_faults_after_start\": 0,"));
+  free(timing);
+}
+
+static void the_event_log_gives_the_same_poses_without_the_recording(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 20});
+  replay_into("rec", kConfig, "run", &report);
+  wm_error err;
+  wm_log_reader *log;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(in_folder("run/events.wmlog"), &log, &err), err.text);
+  const wm_log_head *head = wm_log_reader_head(log);
+  wm_config config;
+  TEST_ASSERT_EQUAL(WM_OK, wm_config_parse(head->config_text, head->config_length, head->config_path, &config, &err));
+  const wm_replay_options options = {.out_dir = in_folder("again")};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_replay_log(&config, log, &options, &report, &err), err.text);
+  TEST_ASSERT_EQUAL(0, report.log_was_cut);
+  wm_config_free(&config);
+  wm_log_reader_close(log);
+  assert_same_file("run", "again", "trajectory.csv");
+  assert_same_file("run", "again", "trajectory.tum");
+  assert_same_file("run", "again", "innovations.csv");
+  assert_same_file("run", "again", "events.wmlog");
+}
+
+// ── late frames ─────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_time_ns all_150(size_t frame) { return (void)frame, 150 * MS; }
+static wm_time_ns all_250(size_t frame) { return (void)frame, 250 * MS; }
+static wm_time_ns one_in_seven_150(size_t frame) { return frame % 7 == 3 ? 150 * MS : 5 * MS; }
+static wm_time_ns one_in_nine_250(size_t frame) { return frame % 9 == 4 ? 250 * MS : 20 * MS; }
+static wm_time_ns all_200(size_t frame) { return (void)frame, 200 * MS; }
+
+static void compare_late(wm_time_ns (*late_ns)(size_t), const char *config) {
+  small_recording_write("fresh", &(small_recording){.seconds = 20});
+  small_recording_write("late", &(small_recording){.seconds = 20, .late_ns = late_ns});
+  replay_into("fresh", config, "fresh-run", &report);
+  replay_into("late", config, "late-run", &report);
+  assert_same_file("fresh-run", "late-run", "trajectory.csv");
+  assert_same_file("fresh-run", "late-run", "innovations.csv");
+  TEST_ASSERT_EQUAL_UINT64(0, source("sightings:eye")->late);
+}
+
+static void frames_that_are_all_150_ms_late_change_nothing(void) { compare_late(all_150, kConfig); }
+static void a_single_frame_150_ms_late_changes_nothing(void) { compare_late(one_in_seven_150, kConfig); }
+static void frames_that_are_all_250_ms_late_change_nothing(void) { compare_late(all_250, kConfig300); }
+static void a_single_frame_250_ms_late_changes_nothing(void) { compare_late(one_in_nine_250, kConfig300); }
+
+static char finding[512];
+static void keep_finding(void *context, const char *line) {
+  (void)context;
+  if (strstr(line, "lateness_max_ms")) (void)snprintf(finding, sizeof finding, "%s", line);
+}
+
+static void what_is_too_late_is_counted_and_the_number_that_is_told_would_do(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 10, .late_ns = all_200});
+  replay_into("rec", kConfig, "run", &report);
+  const wm_source_health *eye = source("sightings:eye");
+  TEST_ASSERT_GREATER_THAN(100, eye->received);
+  TEST_ASSERT_EQUAL_UINT64(eye->received, eye->late);
+  TEST_ASSERT_GREATER_THAN(0, wm_findings(&report.health, keep_finding, NULL));
+  const char *number = strstr(finding, "`lateness_max_ms: ");
+  TEST_ASSERT_NOT_NULL_MESSAGE(number, finding);
+  char config[256];
+  (void)snprintf(config, sizeof config, "%ssources:\n  - {name: sightings, lateness_max_ms: %d}\n", kConfig,
+                 atoi(number + strlen("`lateness_max_ms: ")));
+  replay_into("rec", config, "mended", &report);
+  TEST_ASSERT_EQUAL_UINT64(0, source("sightings:eye")->late);
+}
+
+// ── silence ─────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_time_ns all_140(size_t frame) { return (void)frame, 140 * MS; }
+
+static void the_first_datum_after_a_silence_is_fused(void) {
+  small_recording_write(
+      "rec", &(small_recording){.seconds = 20, .late_ns = all_140, .silent_from_s = 5, .silent_until_s = 12});
+  replay_into("rec", kConfig, "run", &report);
+  TEST_ASSERT_EQUAL_UINT64(0, source("sightings:eye")->late);
+  size_t length;
+  char *innovations = read_all(in_folder("run/innovations.csv"), &length);
+  const char *first = strstr(innovations, "\n12000000000,sightings:eye,");
+  TEST_ASSERT_NOT_NULL(first);
+  const char *end = strchr(first + 1, '\n');
+  TEST_ASSERT_NOT_NULL(end);
+  TEST_ASSERT_EQUAL_STRING_LEN(",fused\n", end - 6, 7);
+  TEST_ASSERT_NULL(strstr(innovations, "\n8000000000,"));
+  free(innovations);
+}
+
+// In the silence the fused time lags by lateness_max, and poses go on being published for now.
+static void silence_costs_the_published_pose_nothing(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 20, .silent_from_s = 5, .silent_until_s = 12});
+  replay_into("rec", kConfig, "run", &report);
+  size_t length;
+  char *published = read_all(in_folder("run/published.csv"), &length);
+  int64_t last_ns = INT64_MIN, rows = 0, in_silence = 0;
+  for (char *line = strchr(published, '\n'); line && line[1]; line = strchr(line + 1, '\n')) {
+    int64_t t_ns, sent_ns, fused_ns;
+    TEST_ASSERT_EQUAL(3, sscanf(line + 1, "%" SCNd64 ",%" SCNd64 ",%" SCNd64, &t_ns, &sent_ns, &fused_ns));
+    TEST_ASSERT_GREATER_THAN_INT64(last_ns, t_ns);
+    TEST_ASSERT_LESS_OR_EQUAL_INT64(10 * MS, sent_ns - t_ns);
+    last_ns = t_ns;
+    rows++;
+    if (t_ns <= 6 * WM_NS_PER_S || t_ns > 12 * WM_NS_PER_S) continue;
+    in_silence++;
+    TEST_ASSERT_LESS_OR_EQUAL_INT64(200 * MS, t_ns - fused_ns);  // lateness_max and a motion period
+  }
+  TEST_ASSERT_GREATER_THAN(950, rows);
+  TEST_ASSERT_EQUAL_INT64(300, in_silence);
+  free(published);
+}
+
+// ── accounts ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_time_ns some_too_late(size_t frame) { return (wm_time_ns)(frame % 11) * 40 * MS; }
+
+static void every_datum_is_accounted_for(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 30, .late_ns = some_too_late});
+  replay_into("rec", kConfig, "run", &report);
+  for (uint32_t i = 0; i < report.health.source_count; i++) {
+    const wm_source_health *s = &report.health.sources[i];
+    uint64_t sum = s->fused + s->late + s->dropped + s->duplicates + s->future;
+    for (int k = 0; k < WM_VERDICT_COUNT; k++) sum += s->rejected[k];
+    for (int k = 0; k < WM_STATUS_COUNT; k++) sum += s->refused[k];
+    TEST_ASSERT_GREATER_THAN(0, s->received);
+    TEST_ASSERT_EQUAL_UINT64_MESSAGE(s->received, sum, s->name);
+  }
+  TEST_ASSERT_GREATER_THAN(0, source("sightings:eye")->late);
+}
+
+static void from_and_until_take_a_part_of_a_source(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 20});
+  replay_into("rec",
+              "format: waymark-config/1\nestimator: landmark_ekf\nsources:\n"
+              "  - {name: sightings, from_s: 2, until_s: 5}\n",
+              "run", &report);
+  size_t length;
+  char *innovations = read_all(in_folder("run/innovations.csv"), &length);
+  TEST_ASSERT_NOT_NULL(strstr(innovations, "\n2000000000,"));
+  TEST_ASSERT_NULL(strstr(innovations, "\n1900000000,"));
+  TEST_ASSERT_NULL(strstr(innovations, "\n5100000000,"));
+  free(innovations);
+  TEST_ASSERT_GREATER_THAN(0, source("sightings:eye")->ignored);
+}
+
+static void a_source_that_is_not_used_does_not_hold_time_back(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 5});
+  replay_into("rec", "format: waymark-config/1\nestimator: odometry\n", "run", &report);
+  TEST_ASSERT_EQUAL_UINT32(1, report.health.source_count);
+  TEST_ASSERT_EQUAL_UINT64(100, report.poses);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(the_same_replay_twice_gives_the_same_bytes);
+  RUN_TEST(nothing_is_allocated_and_no_page_is_missing_after_the_start);
+  RUN_TEST(the_event_log_gives_the_same_poses_without_the_recording);
+  RUN_TEST(frames_that_are_all_150_ms_late_change_nothing);
+  RUN_TEST(a_single_frame_150_ms_late_changes_nothing);
+  RUN_TEST(frames_that_are_all_250_ms_late_change_nothing);
+  RUN_TEST(a_single_frame_250_ms_late_changes_nothing);
+  RUN_TEST(what_is_too_late_is_counted_and_the_number_that_is_told_would_do);
+  RUN_TEST(the_first_datum_after_a_silence_is_fused);
+  RUN_TEST(silence_costs_the_published_pose_nothing);
+  RUN_TEST(every_datum_is_accounted_for);
+  RUN_TEST(from_and_until_take_a_part_of_a_source);
+  RUN_TEST(a_source_that_is_not_used_does_not_hold_time_back);
+  return UNITY_END();
+}
