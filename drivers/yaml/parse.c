@@ -87,11 +87,12 @@ static int push(builder *b, int id) {
   return 1;
 }
 
-// Remembers the anchor and returns its index + 1; 0 where memory is out. A name may be given anew: the last one holds.
-static size_t add_anchor(builder *b, const yaml_char_t *name) {
-  if (!room_for(&b->anchors, &b->anchor_capacity, b->anchor_count + 1, sizeof *b->anchors)) return 0;
+// Remembers the anchor and returns its index + 1; 0 where it fails. A name may be given anew: the last one holds.
+static size_t add_anchor(builder *b, const yaml_char_t *name, size_t line) {
+  if (b->anchor_count >= WM_YAML_ANCHORS_MAX) return (size_t)fail_at(b, line, "more than 1000 anchors");
+  if (!room_for(&b->anchors, &b->anchor_capacity, b->anchor_count + 1, sizeof *b->anchors)) return (size_t)no_memory(b);
   char *copy = strdup((const char *)name);
-  if (!copy) return 0;
+  if (!copy) return (size_t)no_memory(b);
   b->anchors[b->anchor_count++] = (anchor){.name = copy};
   return b->anchor_count;
 }
@@ -207,7 +208,7 @@ static int build(builder *b, yaml_event_t *event, int depth) {
   if (event->type == YAML_SEQUENCE_START_EVENT) name = event->data.sequence_start.anchor;
   if (event->type == YAML_MAPPING_START_EVENT) name = event->data.mapping_start.anchor;
   size_t place = 0;
-  if (name && !(place = add_anchor(b, name))) return no_memory(b);
+  if (name && !(place = add_anchor(b, name, event->start_mark.line + 1))) return 0;
   int id = event->type == YAML_SCALAR_EVENT ? add_scalar(b, event) : add_collection(b, event, depth);
   if (place) b->anchors[place - 1].id = id;
   return id;

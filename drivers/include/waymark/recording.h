@@ -56,14 +56,16 @@ extern const char *const wm_start_keys[];
 void wm_start_init(wm_start *out);
 wm_status wm_start_read(const wm_yaml_node *map, wm_start *out, wm_error *err);
 
-// landmarks.csv alone; *out is the caller's to free.
+// landmarks.csv alone; *out is the caller's to free. An empty z_m or sigma_m is 0 (z_m with a warning), an empty
+// yaw_rad NaN; an id that stands there twice, or a row that can't be read, is an error.
 wm_status wm_landmarks_load(const char *path, wm_warn_fn warn, void *context, wm_landmark **out, size_t *count,
                             wm_error *err);
 
 // The recording's sources, in the order of the format's table of files: can, motion, motion6, then a source a sensor
 // for sightings ("sightings:NAME"), markers ("markers:NAME"), then stereo, points, gnss. Indices are 0, 1, 2 ... in
 // this order. Owned by the recording. Each hands out its events in the order of their arrival: a
-// row that is older than the one above it arrived with that one; it is counted as out of order and handed out.
+// row that is older than the one above it arrived with that one; it is counted as out of order and handed out. A single
+// stamp far ahead of the rows around it is counted (not_finite) and skipped.
 wm_source *const *wm_recording_sources(wm_recording *self, size_t *count);
 
 #ifdef __cplusplus

@@ -148,6 +148,11 @@ static void bounded(void) {
     strcat(text, line);
   }
   refused(text, "x.yaml:6: aliases written out make more than 1000000 values");
+  char *many = malloc(1100 * 16);
+  size_t n = 0;
+  for (int i = 0; i < 1100; i++) n += (size_t)sprintf(many + n, "k%d: &a%d b\n", i, i);
+  refused(many, "x.yaml:1001: more than 1000 anchors");
+  free(many);
   memset(text, '[', 200);
   text[200] = '\0';
   refused(text, "x.yaml:1: nested deeper than 64 levels");
