@@ -76,10 +76,21 @@ static wm_status list_in(const wm_yaml_node *list, size_t min_count, size_t max_
   return WM_OK;
 }
 
-wm_status calibration_mounting(const wm_yaml_node *parent, const warner *warn, wm_mounting *out, wm_error *err) {
+const wm_mounting *calibration_camera_mounting(const calibration *self, const char *name) {
+  for (size_t i = 0; i < self->camera_count; i++)
+    if (strcmp(self->cameras[i].name, name) == 0) return &self->cameras[i].mounting;
+  return NULL;
+}
+
+wm_status calibration_mounting(const wm_yaml_node *parent, const wm_mounting *otherwise, const warner *warn,
+                               wm_mounting *out, wm_error *err) {
   static const char *const kKeys[] = {"xyz_m", "rpy_deg", "rpy_rad", NULL};
   memset(out, 0, sizeof *out);
   wm_yaml_node mounting = wm_yaml_get(parent, "mounting");
+  if (!wm_yaml_there(&mounting) && otherwise) {
+    *out = *otherwise;
+    return WM_OK;
+  }
   if (!wm_yaml_there(&mounting)) {
     warn_line(warn, "%s:%d: %s: no mounting given; it is taken to sit at base_link", wm_yaml_file(parent),
               wm_yaml_line(parent), parent->path);
@@ -122,13 +133,15 @@ static wm_status read_cameras(const wm_yaml_node *cameras, const warner *warn, c
   return WM_OK;
 }
 
-static wm_status read_sensor(const wm_yaml_node *node, const warner *warn, wm_sensor *out, wm_error *err) {
+// A sensor that has a camera's name sits where the camera sits, unless it says otherwise.
+static wm_status read_sensor(const wm_yaml_node *node, const calibration *known, const warner *warn, wm_sensor *out,
+                             wm_error *err) {
   static const char *const kKeys[] = {
       "mounting", "bearing_sigma_rad", "bearing_sigma_deg", "range_sigma_m", "max_range_m", "range_is", NULL};
   static const char *const kRanges[] = {"distance", "depth", NULL};
   if (!wm_yaml_is_map(node)) return wm_yaml_fail(node, err, "a map with mounting, bearing_sigma_rad ... is needed");
   TRY(calibration_keys(node, kKeys, warn, err));
-  TRY(calibration_mounting(node, warn, &out->mounting, err));
+  TRY(calibration_mounting(node, calibration_camera_mounting(known, out->name), warn, &out->mounting, err));
   out->bearing_sigma_rad = out->range_sigma_m = (double)NAN;
   out->max_range_m = HUGE_VAL;
   TRY(calibration_angle(node, "bearing_sigma", DBL_MIN, M_PI, &out->bearing_sigma_rad, err));
@@ -149,7 +162,7 @@ static wm_status read_sensors(const wm_yaml_node *sensors, const warner *warn, c
     wm_yaml_node node = wm_yaml_value(sensors, i, &key, &line);
     wm_sensor *sensor = &out->sensors[out->sensor_count++];
     TRY(read_name(&node, key, line, sensor->name, err));
-    TRY(read_sensor(&node, warn, sensor, err));
+    TRY(read_sensor(&node, out, warn, sensor, err));
   }
   return WM_OK;
 }
@@ -204,8 +217,7 @@ static wm_status check_camera_name(const wm_yaml_node *stereo, const char *side,
   wm_yaml_node node = wm_yaml_get(stereo, side);
   if (!wm_yaml_there(&node)) return wm_yaml_fail(stereo, err, "%s: the name of a camera is needed", side);
   TRY(wm_yaml_string(&node, name, sizeof name, err));
-  for (size_t i = 0; i < known->camera_count; i++)
-    if (strcmp(known->cameras[i].name, name) == 0) return WM_OK;
+  if (calibration_camera_mounting(known, name)) return WM_OK;
   return wm_yaml_fail(&node, err, "there is no camera '%s' under cameras", name);
 }
 

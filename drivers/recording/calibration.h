@@ -36,8 +36,12 @@ wm_status calibration_read(const wm_yaml *doc, const warner *warn, calibration *
 
 // Checks keys as calibration.yaml wants it: near misses are errors, other unknown keys are warned of.
 wm_status calibration_keys(const wm_yaml_node *map, const char *const *known, const warner *warn, wm_error *err);
-// Reads `mounting` of `parent` (xyz_m, rpy_deg or rpy_rad); what is missing is 0.
-wm_status calibration_mounting(const wm_yaml_node *parent, const warner *warn, wm_mounting *out, wm_error *err);
+// Mounting of the camera of this name, or NULL.
+const wm_mounting *calibration_camera_mounting(const calibration *self, const char *name);
+// Reads `mounting` of `parent` (xyz_m, rpy_deg or rpy_rad; what is missing is 0). Where there is none: `otherwise`, or
+// base_link with a warning where that is NULL.
+wm_status calibration_mounting(const wm_yaml_node *parent, const wm_mounting *otherwise, const warner *warn,
+                               wm_mounting *out, wm_error *err);
 // One camera: model, size, intrinsics, distortion, readout, mounting.
 wm_status calibration_camera(const wm_yaml_node *node, const warner *warn, camera *out, wm_error *err);
 // Reads NAME_rad or NAME_deg of `map`, limits in radians; leaves *out where neither is there. Both are an error.

@@ -83,5 +83,5 @@ wm_status calibration_camera(const wm_yaml_node *node, const warner *warn, camer
   if (status == WM_OK) status = read_distortion(node, &kFields[kind], err);
   int64_t readout_ns;
   if (status == WM_OK && wm_yaml_there(&readout)) status = wm_yaml_i64(&readout, 0, 1000000000, &readout_ns, err);
-  return status == WM_OK ? calibration_mounting(node, warn, &out->mounting, err) : status;
+  return status == WM_OK ? calibration_mounting(node, NULL, warn, &out->mounting, err) : status;
 }

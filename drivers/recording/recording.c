@@ -182,12 +182,6 @@ static wm_status add_stream(wm_recording *self, const stream_kind *kind, wm_erro
   return status == WM_OK ? add_source(self, source, err) : status;
 }
 
-static const wm_mounting *camera_mounting(const calibration *known, const char *name) {
-  for (size_t i = 0; i < known->camera_count; i++)
-    if (strcmp(known->cameras[i].name, name) == 0) return &known->cameras[i].mounting;
-  return NULL;
-}
-
 // Index of the sensor; one that `sensors` of calibration.yaml doesn't have sits where the camera of its name sits, or
 // at base_link.
 static wm_status sensor_index(wm_recording *self, const char *path, const char *name, uint16_t *out, wm_error *err) {
@@ -198,7 +192,7 @@ static wm_status sensor_index(wm_recording *self, const char *path, const char *
   }
   if (known->sensor_count == WM_SENSORS_MAX)
     return wm_fail(err, WM_FULL, "%s: more than %d sensors, with those of calibration.yaml", path, WM_SENSORS_MAX);
-  const wm_mounting *mounting = camera_mounting(known, name);
+  const wm_mounting *mounting = calibration_camera_mounting(known, name);
   wm_sensor *sensor = &known->sensors[known->sensor_count];
   *sensor = (wm_sensor){.bearing_sigma_rad = (double)NAN, .range_sigma_m = (double)NAN, .max_range_m = HUGE_VAL};
   snprintf(sensor->name, sizeof sensor->name, "%s", name);

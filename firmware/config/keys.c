@@ -6,6 +6,9 @@
 
 #include "waymark/text.h"
 
+#define KEY_MAX 96
+#define NO_LIKENESS 100
+
 const config_key kConfigKeys[] = {
     {"format", "text", "needed", "`waymark-config/1`."},
     {"estimator", "text", "needed", "Name of the estimator; its parameters stand under the key of its name."},
@@ -48,12 +51,25 @@ size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]) {
   return count;
 }
 
+// Hands every known key, dotted from the top, to `take`.
+static void each_key(void (*take)(void *context, const char *key), void *context) {
+  config_section sections[CONFIG_SECTIONS_MAX];
+  size_t count = config_sections(sections);
+  for (size_t i = 0; kConfigKeys[i].key; i++) take(context, kConfigKeys[i].key);
+  for (size_t s = 0; s < count; s++)
+    for (size_t i = 0; i < sections[s].table->count; i++) {
+      char full[KEY_MAX];
+      snprintf(full, sizeof full, "%s%s", sections[s].prefix, sections[s].table->params[i].key);
+      take(context, full);
+    }
+}
+
 // Finds the known key that a wrong one most likely means: alike as a whole, else by its last part alone, which also
 // finds a key that stands in the wrong section.
 typedef struct search {
   const char *wrong;
   int best;  // lower is nearer
-  char found[96];
+  char found[KEY_MAX];
 } search;
 
 static const char *last_part(const char *key) {
@@ -68,7 +84,7 @@ static int same_section(const char *a, const char *b) {
 
 static void consider_one(search *self, const char *full) {
   const char *const known[] = {full, NULL}, *const last[] = {last_part(full), NULL};
-  int score = 100;
+  int score = NO_LIKENESS;
   if (wm_word_nearest(self->wrong, known))
     score = wm_word_distance(self->wrong, full);
   else if (strcmp(last_part(self->wrong), last[0]) == 0 || wm_word_nearest(last_part(self->wrong), last))
@@ -79,30 +95,49 @@ static void consider_one(search *self, const char *full) {
 }
 
 // The key and the sections that it stands in.
-static void consider(search *self, const char *prefix, const char *key) {
-  char full[96];
-  snprintf(full, sizeof full, "%s%s", prefix, key);
-  for (;;) {
-    consider_one(self, full);
-    char *dot = strrchr(full, '.');
-    if (!dot) return;
-    *dot = '\0';
+static void consider(void *context, const char *key) {
+  char full[KEY_MAX];
+  snprintf(full, sizeof full, "%s", key);
+  for (char *dot = full; dot; dot = strrchr(full, '.')) {
+    if (dot != full) *dot = '\0';
+    consider_one(context, full);
   }
 }
 
+// Collects the names that may stand where the wrong key stands.
+typedef struct neighbours {
+  const char *wrong;
+  size_t level;  // bytes of `wrong` before its last part
+  size_t used;
+  char names[480];  // "a, b, c"
+} neighbours;
+
+static int is_listed(const char *names, const char *name, size_t length) {
+  for (const char *at = names; (at = strstr(at, name)); at += length)
+    if ((at == names || at[-1] == ' ') && (at[length] == ',' || at[length] == '\0')) return 1;
+  return 0;
+}
+
+static void add_neighbour(void *context, const char *key) {
+  neighbours *self = context;
+  char name[KEY_MAX];
+  if (strncmp(key, self->wrong, self->level) != 0) return;
+  int n = snprintf(name, sizeof name, "%.*s", (int)strcspn(key + self->level, "."), key + self->level);
+  if (n <= 0 || is_listed(self->names, name, (size_t)n) || self->used + (size_t)n + 3 > sizeof self->names) return;
+  self->used +=
+      (size_t)snprintf(self->names + self->used, sizeof self->names - self->used, "%s%s", self->used ? ", " : "", name);
+}
+
 wm_status config_unknown(const wm_yaml_node *value, int line, wm_error *err) {
-  config_section sections[CONFIG_SECTIONS_MAX];
-  search nearest = {.wrong = value->path, .best = 100};
-  size_t count = config_sections(sections);
-  for (size_t s = 0; s < count; s++)
-    for (size_t i = 0; i < sections[s].table->count; i++)
-      consider(&nearest, sections[s].prefix, sections[s].table->params[i].key);
-  for (size_t i = 0; kConfigKeys[i].key; i++) consider(&nearest, "", kConfigKeys[i].key);
-  if (nearest.best < 100)
+  search nearest = {.wrong = value->path, .best = NO_LIKENESS};
+  each_key(consider, &nearest);
+  if (nearest.best < NO_LIKENESS)
     return wm_fail(err, WM_BAD_CONFIG, "%s:%d: %s: unknown key; did you mean '%s'?", wm_yaml_file(value), line,
                    value->path, nearest.found);
-  return wm_fail(err, WM_BAD_CONFIG, "%s:%d: %s: unknown key; docs/config.md lists those that there are",
-                 wm_yaml_file(value), line, value->path);
+  neighbours here = {.wrong = value->path, .level = (size_t)(last_part(value->path) - value->path)};
+  each_key(add_neighbour, &here);
+  return wm_fail(err, WM_BAD_CONFIG, "%s:%d: %s: unknown key; known here: %s", wm_yaml_file(value), line, value->path,
+                 here.names);
 }
 
 static const wm_param *find(const wm_param_table *table, const char *key) {

@@ -17,7 +17,8 @@ const error_case kErrorCases[] = {
     {CONFIG, "Parameter in the wrong place", FILE_, "horizon_ms: 500\n",
      "config/robot.yaml:3: horizon_ms: unknown key; did you mean 'merge.horizon_ms'?"},
     {CONFIG, "Key that nobody knows", FILE_, "colour: red\n",
-     "config/robot.yaml:3: colour: unknown key; docs/config.md lists those that there are"},
+     "config/robot.yaml:3: colour: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
+     "can_signals, initial_pose, publish, merge, realtime, motion, odometry, landmark_ekf"},
     {CONFIG, "Text where a number is needed", FILE_, "landmark_ekf: {gate: {hard: abc}}\n",
      "config/robot.yaml:3: landmark_ekf.gate.hard: 'abc' is not a number; a number from 1 to 1000000 is needed"},
     {CONFIG, "Number in quotes", FILE_, "publish: {rate_hz: '50'}\n",
