@@ -1,0 +1,13 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Runs every benchmark, one after the other: run.sh FOLDER. Figures are medians, and ratios within one run, because
+# machines are shared and noisy; instruction counts where valgrind is there (same binary, same count).
+set -euo pipefail
+folder=${1:-build/bench}
+shopt -s nullglob
+benches=("$folder"/wm_bench_*)
+[ ${#benches[@]} -gt 0 ] || { echo "no benchmark in $folder" >&2; exit 1; }
+for bench in "${benches[@]}"; do
+  echo "== $(basename "$bench")"
+  "$bench"
+done
