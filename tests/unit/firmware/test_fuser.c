@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <stdio.h>
+
+#include "tiny_estimator.h"
+#include "unity.h"
+#include "waymark/fuser.h"
+
+#define MS WM_NS_PER_MS
+
+static tiny_state state;
+static wm_fuser fuser;
+static char said[4096];
+
+// What came out, as text: "E10" an event, "P10:0.5" a pose with its x, "I10" an innovation.
+static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
+  (void)context, (void)bytes;
+  char word[64] = "";
+  const wm_estimate *pose = record;
+  const wm_event *event = record;
+  const wm_innovation *innovation = record;
+  if (kind == WM_OUTPUT_EVENT) (void)snprintf(word, sizeof word, "E%lld ", (long long)(event->t_ns / MS));
+  if (kind == WM_OUTPUT_INNOVATION) (void)snprintf(word, sizeof word, "I%lld ", (long long)(innovation->t_ns / MS));
+  if (kind == WM_OUTPUT_POSE)
+    (void)snprintf(word, sizeof word, "P%lld:%g,%g ", (long long)(pose->t_ns / MS), pose->pose_map_base.p_m[0],
+                   pose->pose_map_base.p_m[1]);
+  strncat(said, word, sizeof said - strlen(said) - 1);
+}
+
+void setUp(void) {
+  said[0] = '\0';
+  tiny_init(&state, NULL, NULL);
+  wm_fuser_init(&fuser, &kTiny, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){put, NULL});
+}
+void tearDown(void) {}
+
+static void twist(wm_time_ns ms, double v) {
+  wm_event e = {.t_ns = ms * MS, .arrival_ns = ms * MS, .kind = WM_EVENT_TWIST2};
+  e.as.twist2.v_mps = v;
+  wm_fuser_feed(&fuser, &e);
+}
+
+static void sighting(wm_time_ns ms, double bearing) {
+  wm_event e = {.t_ns = ms * MS, .arrival_ns = ms * MS, .kind = WM_EVENT_SIGHTING, .source = 1};
+  e.as.sighting.bearing_rad = bearing;
+  wm_fuser_feed(&fuser, &e);
+}
+
+static void a_row_holds_the_state_after_all_events_up_to_its_stamp(void) {
+  twist(0, 1);
+  sighting(0, 0.5);  // at the row's stamp: in the row
+  sighting(50, 0.5);
+  twist(100, 1);
+  wm_fuser_finish(&fuser);
+  TEST_ASSERT_EQUAL_STRING("E0 E0 I0 P0:0,0.25 E50 I50 E100 P100:0.1,0.5 ", said);
+  TEST_ASSERT_EQUAL_UINT64(2, fuser.poses);
+}
+
+static void refused_motion_makes_no_row(void) {
+  twist(0, 1);
+  twist(100, NAN);
+  twist(50, 1);
+  twist(20, 1);
+  wm_fuser_finish(&fuser);
+  TEST_ASSERT_EQUAL_STRING("E0 P0:0,0 E100 E50 E20 P50:0.05,0 ", said);
+  TEST_ASSERT_EQUAL_UINT64(1, fuser.counts[0].refused[WM_NOT_FINITE]);
+  TEST_ASSERT_EQUAL_UINT64(1, fuser.counts[0].refused[WM_TIME_RAN_BACK]);
+  TEST_ASSERT_EQUAL_UINT64(2, fuser.counts[0].fused);
+}
+
+static void observations_are_counted_by_their_verdict(void) {
+  twist(0, 1);
+  sighting(1, 0.5);
+  sighting(2, 2);
+  sighting(3, 2);
+  TEST_ASSERT_EQUAL_UINT64(1, fuser.counts[1].fused);
+  TEST_ASSERT_EQUAL_UINT64(2, fuser.counts[1].rejected[WM_REJECTED_GATE]);
+}
+
+static void without_a_pose_there_is_no_row(void) {
+  state.state = WM_STATE_SEARCHING;
+  twist(0, 1);
+  twist(10, 1);
+  state.state = WM_STATE_TRACKING;
+  twist(20, 1);
+  wm_fuser_finish(&fuser);
+  TEST_ASSERT_EQUAL_STRING("E0 E10 P10:0.01,0 E20 P20:0.02,0 ", said);
+}
+
+static void ticks_drive_before_yaw_rate_before_speed_before_twists(void) {
+  uint32_t q = WM_EVENT_BIT(WM_EVENT_QUANTITIES), t = WM_EVENT_BIT(WM_EVENT_TWIST2);
+  uint32_t ticks = 1u << WM_Q_WHEEL_TICKS_LEFT, yaw = 1u << WM_Q_YAW_RATE, speed = 1u << WM_Q_VEHICLE_SPEED;
+  TEST_ASSERT_TRUE(wm_driving_choose(q | t, ticks | yaw | speed).quantities & ticks);
+  TEST_ASSERT_EQUAL_UINT32(yaw, wm_driving_choose(q | t, yaw | speed).quantities);
+  TEST_ASSERT_TRUE(wm_driving_choose(q | t, speed).quantities & speed);
+  TEST_ASSERT_TRUE(wm_driving_choose(q | t, 1u << WM_Q_GEAR).kinds & t);
+  TEST_ASSERT_TRUE(wm_driving_choose(t, ticks).kinds & t);
+  wm_driving driving = wm_driving_choose(q, yaw | speed);
+  wm_event e = {.kind = WM_EVENT_QUANTITIES};
+  e.as.quantities.count = 1;
+  e.as.quantities.id[0] = WM_Q_VEHICLE_SPEED;
+  TEST_ASSERT_FALSE(wm_driving_is(&driving, &e));
+  e.as.quantities.count = 2;
+  e.as.quantities.id[1] = WM_Q_YAW_RATE;
+  TEST_ASSERT_TRUE(wm_driving_is(&driving, &e));
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(a_row_holds_the_state_after_all_events_up_to_its_stamp);
+  RUN_TEST(refused_motion_makes_no_row);
+  RUN_TEST(observations_are_counted_by_their_verdict);
+  RUN_TEST(without_a_pose_there_is_no_row);
+  RUN_TEST(ticks_drive_before_yaw_rate_before_speed_before_twists);
+  return UNITY_END();
+}

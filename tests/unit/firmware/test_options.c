@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <string.h>
+
+#include "options.h"
+#include "unity.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+static const char *out_dir;
+static uint64_t seed;
+static double speed;
+static int help;
+static const char *words[2];
+static size_t word_count;
+static wm_error err;
+
+static wm_status parse(int argc, char **argv) {
+  static const option kOptions[] = {{"--out", OPTION_TEXT, &out_dir},
+                                    {"--seed", OPTION_U64, &seed},
+                                    {"--speed", OPTION_F64, &speed},
+                                    {"--help", OPTION_FLAG, &help}};
+  return options_parse(argc, argv, kOptions, 4, words, 2, &word_count, &err);
+}
+#define PARSE(...) parse((int)(sizeof((char *[]){__VA_ARGS__}) / sizeof(char *)), (char *[]){__VA_ARGS__})
+
+static void values_stand_behind_a_blank_or_an_equals_sign(void) {
+  TEST_ASSERT_EQUAL(WM_OK, PARSE("rec", "--out", "run", "--seed=7", "--speed", "0.5", "--help", "--", "--strange"));
+  TEST_ASSERT_EQUAL_STRING("run", out_dir);
+  TEST_ASSERT_EQUAL_UINT64(7, seed);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, speed);
+  TEST_ASSERT_EQUAL(1, help);
+  TEST_ASSERT_EQUAL(2, word_count);
+  TEST_ASSERT_EQUAL_STRING("--strange", words[1]);
+}
+
+static void refuse(const char *message, wm_status status) {
+  TEST_ASSERT_EQUAL(WM_BAD_USAGE, status);
+  TEST_ASSERT_EQUAL_STRING(message, err.text);
+}
+
+static void mistakes_are_told(void) {
+  refuse("option '--sed' is unknown; did you mean '--seed'?", PARSE("--sed", "7"));
+  refuse("option '--sed' is unknown; did you mean '--seed'?", PARSE("--sed=7"));
+  refuse("option '-x' is unknown", PARSE("-x"));
+  refuse("--out: its value is missing", PARSE("--out"));
+  refuse("--out: is empty", PARSE("--out="));
+  refuse("--help: takes no value", PARSE("--help=1"));
+  refuse("--seed: '-1' is no whole number from 0 to 18446744073709551615", PARSE("--seed", "-1"));
+  refuse("--seed: '18446744073709551616' is no whole number from 0 to 18446744073709551615",
+         PARSE("--seed", "18446744073709551616"));
+  refuse("--speed: '0' is no number above 0", PARSE("--speed", "0"));
+  refuse("--speed: 'fast' is no number above 0", PARSE("--speed", "fast"));
+  refuse("--speed: 'nan' is no number above 0", PARSE("--speed", "nan"));
+  refuse("'c': one word too many", PARSE("a", "b", "c"));
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(values_stand_behind_a_blank_or_an_equals_sign);
+  RUN_TEST(mistakes_are_told);
+  return UNITY_END();
+}

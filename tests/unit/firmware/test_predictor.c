@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "unity.h"
+#include "waymark/predictor.h"
+
+#define MS WM_NS_PER_MS
+
+static const wm_predictor_params kParams = {
+    .jump_m = 0.1, .jump_rad = 0.05, .motion_stale_ns = 200 * MS, .fusion_stale_ns = 300 * MS};
+static const wm_motion_calibration kNeutral = {
+    .speed_scale = 1, .yaw_rate_scale = 1, .left_scale = 1, .right_scale = 1, .track_scale = 1};
+static wm_predictor predictor;
+static wm_odometry *odometry;
+static wm_motion_params *motion;
+
+void setUp(void) {
+  wm_wheels wheels;
+  memset(&wheels, 0, sizeof wheels);
+  wheels.radius_m = wheels.ticks_per_turn = wheels.track_m = wheels.wheelbase_m = wheels.steering_ratio = NAN;
+  motion = malloc(wm_motion_params_table.bytes);
+  wm_params_defaults(&wm_motion_params_table, motion);
+  odometry = aligned_alloc(64, (wm_odometry_bytes() + 63) / 64 * 64);
+  TEST_ASSERT_EQUAL(WM_OK, wm_odometry_init(odometry, motion, &wheels));
+  wm_predictor_init(&predictor, &kParams, odometry);
+}
+
+void tearDown(void) {
+  free(odometry);
+  free(motion);
+}
+
+static void move(wm_time_ns ms, double v, double w) {
+  wm_event e = {.t_ns = ms * MS, .arrival_ns = ms * MS, .kind = WM_EVENT_TWIST2};
+  e.as.twist2 = (wm_twist2){v, w};
+  wm_predictor_motion(&predictor, &e);
+}
+
+static void fuse(wm_time_ns ms, double x, double y, double heading, uint32_t resets) {
+  wm_estimate e = {.t_ns = ms * MS, .heading_rad = heading, .dof = 3, .state = WM_STATE_TRACKING, .resets = resets};
+  e.pose_map_base = (wm_pose3){{x, y, 0}, {0, 0, sin(heading / 2), cos(heading / 2)}};
+  for (int i = 0; i < 6; i++) e.covariance[wm_cov_index(i, i)] = 1e-4;
+  wm_predictor_fused(&predictor, &e, &kNeutral);
+}
+
+static void it_carries_the_fused_pose_to_now(void) {
+  wm_published p;
+  TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 0, &p));  // nothing known yet
+  for (int ms = 0; ms <= 200; ms += 10) move(ms, 1, 0);
+  fuse(100, 5, 2, M_PI / 2, 0);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 220 * MS, &p));
+  TEST_ASSERT_EQUAL_INT64(220 * MS, p.now.t_ns);
+  TEST_ASSERT_EQUAL_INT64(100 * MS, p.fused_until_ns);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 5, p.now.pose_map_base.p_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.12, p.now.pose_map_base.p_m[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.22, p.pose_odom_base.x_m);
+  TEST_ASSERT_TRUE(p.now.covariance[wm_cov_index(1, 1)] >= 1e-4);
+  TEST_ASSERT_EQUAL_UINT32(0, p.status_flags);
+}
+
+static void stamps_rise_strictly(void) {
+  wm_published p;
+  move(0, 1, 0);
+  fuse(0, 0, 0, 0, 0);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 20 * MS, &p));
+  TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 20 * MS, &p));
+  TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 10 * MS, &p));
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 21 * MS, &p));
+}
+
+static void a_move_of_map_against_odom_is_announced_once(void) {
+  wm_published p;
+  for (int ms = 0; ms <= 100; ms += 10) move(ms, 1, 0.5);
+  fuse(50, 0, 0, 0.3, 0);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 100 * MS, &p));
+  TEST_ASSERT_EQUAL_UINT32(0, p.jumps);  // the first message is no jump
+  fuse(51, 0.001, 0, 0.3005, 0);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 120 * MS, &p));
+  TEST_ASSERT_EQUAL_UINT32(0, p.jumps);  // driving and small corrections are none
+  wm_pose2 odom_before = p.pose_odom_base;
+  fuse(52, 0.5, 0, 0.3, 0);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 140 * MS, &p));
+  TEST_ASSERT_EQUAL_UINT32(1, p.jumps);
+  TEST_ASSERT_TRUE(p.status_flags & WM_PUB_JUMPED);
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.5, p.last_jump_m);
+  TEST_ASSERT_DOUBLE_WITHIN(2e-3, 0.0, p.last_jump_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(0.03, odom_before.x_m, p.pose_odom_base.x_m);  // odom goes on as it was
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 160 * MS, &p));
+  TEST_ASSERT_EQUAL_UINT32(1, p.jumps);
+  TEST_ASSERT_FALSE(p.status_flags & WM_PUB_JUMPED);
+  fuse(53, 0.5, 0, 0.4, 0);  // a turn is one, too
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 180 * MS, &p));
+  TEST_ASSERT_EQUAL_UINT32(2, p.jumps);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.1, p.last_jump_rad);
+}
+
+static void a_pose_set_anew_is_announced_however_small_the_move(void) {
+  wm_published p;
+  move(0, 0, 0);
+  fuse(0, 1, 1, 0, 1);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 20 * MS, &p));
+  fuse(1, 1, 1, 0, 2);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 40 * MS, &p));
+  TEST_ASSERT_EQUAL_UINT32(1, p.jumps);
+}
+
+static void old_motion_and_old_fusion_are_said(void) {
+  wm_published p;
+  move(0, 0, 0);
+  fuse(0, 1, 1, 0, 0);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 150 * MS, &p));
+  TEST_ASSERT_EQUAL_UINT32(0, p.status_flags);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 250 * MS, &p));
+  TEST_ASSERT_EQUAL_UINT32(WM_PUB_MOTION_STALE, p.status_flags);
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 350 * MS, &p));
+  TEST_ASSERT_EQUAL_UINT32(WM_PUB_MOTION_STALE | WM_PUB_FUSION_STALE, p.status_flags);
+}
+
+static void without_a_pose_nothing_is_said(void) {
+  wm_published p;
+  move(0, 0, 0);
+  wm_estimate e = {.t_ns = 0, .state = WM_STATE_SEARCHING};
+  wm_predictor_fused(&predictor, &e, &kNeutral);
+  TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 20 * MS, &p));
+  fuse(0, NAN, 1, 0, 0);
+  TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 40 * MS, &p));
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(it_carries_the_fused_pose_to_now);
+  RUN_TEST(stamps_rise_strictly);
+  RUN_TEST(a_move_of_map_against_odom_is_announced_once);
+  RUN_TEST(a_pose_set_anew_is_announced_however_small_the_move);
+  RUN_TEST(old_motion_and_old_fusion_are_said);
+  RUN_TEST(without_a_pose_nothing_is_said);
+  return UNITY_END();
+}

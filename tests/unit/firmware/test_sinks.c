@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the sink thread speaks: LCM (memq: published and received in one process) and systemd's protocol.
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "lcm_sink.h"
+#include "log_fixture.h"
+#include "notify.h"
+#include "unity.h"
+#include "waymark_health_t.h"
+#include "waymark_innovation_t.h"
+#include "waymark_landmarks_t.h"
+#include "waymark_observations_t.h"
+#include "waymark_pose_t.h"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+// ── LCM ─────────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_config config;
+static wm_assembly assembly;
+static lcm_sink sink;
+static waymark_pose_t pose;
+static waymark_observations_t observations;
+static waymark_landmarks_t landmarks;
+static int poses, innovations, healths, observed, maps;
+
+static void received(const lcm_recv_buf_t *b, const char *channel, void *user) {
+  (void)user;
+  int n = (int)b->data_size;
+  static waymark_innovation_t innovation;
+  static waymark_health_t health;
+  if (strcmp(channel, "TEST_POSE") == 0) poses += waymark_pose_t_decode(b->data, 0, n, &pose) == n;
+  if (strcmp(channel, "TEST_INNOVATION") == 0)
+    innovations += waymark_innovation_t_decode(b->data, 0, n, &innovation) == n;
+  if (strcmp(channel, "TEST_HEALTH") == 0) healths += waymark_health_t_decode(b->data, 0, n, &health) == n;
+  if (strcmp(channel, "TEST_OBSERVATIONS") == 0)
+    observed += waymark_observations_t_decode(b->data, 0, n, &observations) == n;
+  if (strcmp(channel, "TEST_LANDMARKS") == 0) maps += waymark_landmarks_t_decode(b->data, 0, n, &landmarks) == n;
+}
+
+static char said[1000];
+static int lines;
+static void say(void *context, const char *line) {
+  (void)context;
+  (void)snprintf(said, sizeof said, "%s", line);
+  lines++;
+}
+
+static void messages_arrive_over_memq(void) {
+  fixture_assembly(&config, &assembly);
+  lcm_t *lcm = lcm_create("memq://");
+  TEST_ASSERT_NOT_NULL(lcm);
+  lcm_subscribe(lcm, "TEST_.*", received, NULL);
+  lcm_sink_open(&sink, 1, "memq://", "TEST_", &assembly, say, NULL, lcm);
+
+  wm_published p = {.sent_ns = 12};
+  p.now.t_ns = 11;
+  lcm_sink_pose(&sink, &p);
+  wm_innovation i = {.t_ns = 3};
+  lcm_sink_innovation(&sink, &i);
+  static wm_health h;
+  lcm_sink_health(&sink, &h);
+  lcm_sink_landmarks(&sink, 5);
+  for (uint32_t k = 1; k < 8; k += 2) {  // four sightings, the last at another stamp
+    wm_event e = fixture_event(k);
+    e.t_ns = k < 7 ? 100 : 200;
+    lcm_sink_event(&sink, &e);
+  }
+  wm_event motion = fixture_event(0);
+  lcm_sink_event(&sink, &motion);
+  while (lcm_handle_timeout(lcm, 10) > 0) {
+  }
+  TEST_ASSERT_EQUAL(1, poses);
+  TEST_ASSERT_EQUAL_INT64(11, pose.t_ns);
+  TEST_ASSERT_EQUAL(1, innovations);
+  TEST_ASSERT_EQUAL(1, healths);
+  TEST_ASSERT_EQUAL(1, maps);
+  TEST_ASSERT_EQUAL(3, landmarks.total);
+  TEST_ASSERT_EQUAL(2, observed);  // three at 100, one at 200
+  TEST_ASSERT_EQUAL(1, observations.count);
+  TEST_ASSERT_EQUAL_STRING("left", (const char *)observations.sensor);
+  TEST_ASSERT_EQUAL_UINT64(6, sink.sent);
+  lcm_sink_close(&sink);
+  lcm_destroy(lcm);
+}
+
+static void no_way_out_is_said_once_and_tried_again(void) {
+  fixture_assembly(&config, &assembly);
+  lines = 0;
+  lcm_sink_open(&sink, 1, "udpm://0.0.0.300:7667", "TEST_", &assembly, say, NULL, NULL);
+  lcm_sink_close(&sink);  // never opened: nothing to close
+  lcm_sink_open(&sink, 1, "nosuchprovider://", "TEST_", &assembly, say, NULL, NULL);
+  for (wm_time_ns t = 0; t < 10 * WM_NS_PER_S; t += 500 * WM_NS_PER_MS) lcm_sink_tick(&sink, t);
+  TEST_ASSERT_EQUAL(1, lines);
+  TEST_ASSERT_NOT_NULL(strstr(said, "Localizing goes on"));
+  wm_published p = {.sent_ns = 1};
+  lcm_sink_pose(&sink, &p);
+  TEST_ASSERT_EQUAL_UINT64(1, sink.not_sent);
+  TEST_ASSERT_EQUAL(1, lines);
+  lcm_sink_close(&sink);
+}
+
+// ── systemd ─────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static int manager;
+static char heard[256];
+
+static const char *hear(void) {
+  ssize_t n = recv(manager, heard, sizeof heard - 1, MSG_DONTWAIT);
+  heard[n > 0 ? n : 0] = '\0';
+  return heard;
+}
+
+static void open_manager(notify *n, const char *watchdog_usec) {
+  struct sockaddr_un address = {.sun_family = AF_UNIX};
+  int length = snprintf(address.sun_path + 1, sizeof address.sun_path - 1, "waymark-test-%d", (int)getpid());
+  manager = socket(AF_UNIX, SOCK_DGRAM, 0);
+  TEST_ASSERT_EQUAL(0, bind(manager, (struct sockaddr *)&address,
+                            (socklen_t)(offsetof(struct sockaddr_un, sun_path) + 1 + (size_t)length)));
+  char name[64];
+  (void)snprintf(name, sizeof name, "@%s", address.sun_path + 1);
+  setenv("NOTIFY_SOCKET", name, 1);
+  setenv("WATCHDOG_USEC", watchdog_usec, 1);
+  unsetenv("WATCHDOG_PID");
+  notify_open(n);
+}
+
+static void close_manager(notify *n) {
+  notify_close(n);
+  (void)close(manager);
+  unsetenv("NOTIFY_SOCKET");
+  unsetenv("WATCHDOG_USEC");
+}
+
+static void the_watchdog_is_fed_only_while_the_fused_time_advances_with_fresh_motion(void) {
+  notify n;
+  open_manager(&n, "2000000");
+  TEST_ASSERT_TRUE(n.socket >= 0);
+  wm_time_ns now = n.opened_ns;
+  notify_tick(&n, now);
+  TEST_ASSERT_EQUAL_STRING("", hear());
+  wm_published p = {.fused_until_ns = 100};
+  notify_pose(&n, &p);
+  TEST_ASSERT_EQUAL_STRING("READY=1\nSTATUS=localizing", hear());
+  notify_tick(&n, now += WM_NS_PER_S);
+  TEST_ASSERT_EQUAL_STRING("WATCHDOG=1", hear());
+  notify_pose(&n, &p);  // the fused time stands still
+  notify_tick(&n, now += 2 * WM_NS_PER_S);
+  TEST_ASSERT_EQUAL_STRING("", hear());
+  p.fused_until_ns = 200;
+  p.status_flags = WM_PUB_MOTION_STALE;
+  notify_pose(&n, &p);
+  notify_tick(&n, now += 2 * WM_NS_PER_S);
+  TEST_ASSERT_EQUAL_STRING("", hear());
+  p.fused_until_ns = 300;
+  p.status_flags = 0;
+  notify_pose(&n, &p);
+  notify_tick(&n, now += WM_NS_PER_S);
+  TEST_ASSERT_EQUAL_STRING("WATCHDOG=1", hear());
+  p.fused_until_ns = 400;
+  notify_pose(&n, &p);
+  notify_tick(&n, now + WM_NS_PER_S / 2);  // not yet due
+  TEST_ASSERT_EQUAL_STRING("", hear());
+  notify_stopping(&n);
+  TEST_ASSERT_EQUAL_STRING("STOPPING=1", hear());
+  close_manager(&n);
+}
+
+static void without_a_pose_ready_says_so(void) {
+  notify n;
+  open_manager(&n, "junk");
+  TEST_ASSERT_EQUAL_INT64(0, n.feed_every_ns);
+  notify_tick(&n, n.opened_ns + 11 * WM_NS_PER_S);
+  TEST_ASSERT_EQUAL_STRING("READY=1\nSTATUS=no pose yet: searching, or no motion", hear());
+  close_manager(&n);
+}
+
+static void without_a_service_manager_nothing_happens(void) {
+  notify n;
+  unsetenv("NOTIFY_SOCKET");
+  notify_open(&n);
+  TEST_ASSERT_EQUAL(-1, n.socket);
+  wm_published p = {.fused_until_ns = 1};
+  notify_pose(&n, &p);
+  notify_tick(&n, n.opened_ns + WM_NS_PER_S);
+  notify_close(&n);
+  setenv("NOTIFY_SOCKET", "not/absolute", 1);
+  notify_open(&n);
+  TEST_ASSERT_EQUAL(-1, n.socket);
+  unsetenv("NOTIFY_SOCKET");
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(messages_arrive_over_memq);
+  RUN_TEST(no_way_out_is_said_once_and_tried_again);
+  RUN_TEST(the_watchdog_is_fed_only_while_the_fused_time_advances_with_fresh_motion);
+  RUN_TEST(without_a_pose_ready_says_so);
+  RUN_TEST(without_a_service_manager_nothing_happens);
+  return UNITY_END();
+}
