@@ -7,6 +7,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "folder.h"
 #include "unity.h"
 #include "waymark/recording.h"
 
@@ -111,6 +112,57 @@ static void every_recording(void) {
   TEST_ASSERT_GREATER_THAN(0, checked);
 }
 
+// A line of a CSV with its columns in reverse order, the stamp once more as arrival_ns, and a CRLF.
+static void write_reversed(FILE *to, char *line, int is_header) {
+  char *field[16];
+  size_t count = 0;
+  line[strcspn(line, "\r\n")] = '\0';
+  for (char *rest = line; rest && count < 16; count++) field[count] = strsep(&rest, ",");
+  for (size_t i = count; i-- > 0;) fprintf(to, "%s,", field[i]);
+  fprintf(to, "%s\r\n", is_header ? "arrival_ns" : field[0]);
+}
+
+static void copy_reversed(const char *dir, const char *file) {
+  char path[512], line[512];
+  snprintf(path, sizeof path, "%s/%s", dir, file);
+  FILE *from = fopen(path, "r"), *to = fopen(folder_path(file), "w");
+  TEST_ASSERT_TRUE(from && to);
+  for (int first = 1; fgets(line, sizeof line, from); first = 0) write_reversed(to, line, first);
+  fclose(from);
+  fclose(to);
+}
+
+// The same data in another order of columns, with CRLF and arrival_ns, are the same events to the last bit.
+static void columns_in_any_order(void) {
+  static wm_event a, b;
+  char dir[512];
+  wm_error err = {0};
+  wm_recording *plain, *turned;
+  size_t count, turned_count;
+  snprintf(dir, sizeof dir, "%s/starry-night-plan-a", data_dir);
+  if (access(dir, R_OK) != 0) TEST_IGNORE_MESSAGE("no starry-night-plan-a");
+  folder_make();
+  folder_write("recording.yaml", "format: waymark-recording/1\n");
+  copy_reversed(dir, "motion.csv");
+  copy_reversed(dir, "sightings.csv");
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_recording_open(dir, NULL, NULL, NULL, &plain, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_recording_open(folder_path(""), NULL, NULL, NULL, &turned, &err), err.text);
+  wm_source *const *sources = wm_recording_sources(plain, &count);
+  wm_source *const *others = wm_recording_sources(turned, &turned_count);
+  TEST_ASSERT_EQUAL(count, turned_count);
+  for (size_t i = 0; i < count; i++) {
+    while (sources[i]->ops->next(sources[i], &a, &err) == WM_OK) {
+      TEST_ASSERT_EQUAL(WM_OK, others[i]->ops->next(others[i], &b, &err));
+      TEST_ASSERT_EQUAL_MEMORY(&a, &b, WM_EVENT_SMALL_BYTES);
+    }
+    TEST_ASSERT_EQUAL(WM_END, others[i]->ops->next(others[i], &b, &err));
+    TEST_ASSERT_TRUE(sources[i]->in_order && !others[i]->in_order);
+  }
+  wm_recording_close(plain);
+  wm_recording_close(turned);
+  folder_remove();
+}
+
 int main(void) {
   data_dir = getenv("WM_DATA_DIR");
   if (!data_dir || access(data_dir, R_OK) != 0) {
@@ -119,5 +171,6 @@ int main(void) {
   }
   UNITY_BEGIN();
   RUN_TEST(every_recording);
+  RUN_TEST(columns_in_any_order);
   return UNITY_END();
 }
