@@ -52,6 +52,14 @@ class motion_front_end {
   wm_time_ns newest_ns() const { return newest_ns_; }  // newest event that drives
   uint32_t health() const { return health_; }
   const wm_motion_params &params() const { return *params_; }
+  const wm_wheels &wheels() const { return wheels_; }
+  // How far the left and the right wheel have rolled by their counts, when the last event counted both and they are
+  // what the speed comes from.
+  bool counted_ways(double way_m[2]) const {
+    if (!ticks_drive() || wheel_[0].t_ns != newest_ns_ || wheel_[1].t_ns != newest_ns_) return false;
+    for (int side = 0; side < 2; side++) way_m[side] = wheel_[side].position_m;
+    return true;
+  }
   int model() const { return model_; }
   // True once after the speed came to be taken from another sensor, whose scale is another.
   bool speed_source_changed();

@@ -14,6 +14,7 @@ extern "C" {
 typedef struct wm_motion_states {
   double sigma[9];  // at the start; 0: not a state
   double walk[9];   // random walk, per sqrt(s)
+  double wheel_difference_sigma, wheel_difference_walk;
 } wm_motion_states;
 
 #define WM_MOTION_STATE(type, member, i, key, unit, walk_default, about)                                     \
@@ -42,7 +43,12 @@ typedef struct wm_motion_states {
                   "Start sigma of what the robot is late by behind its commands, s. 0: off."), \
   WM_MOTION_STATE(type, member, 8, "turn_slowdown", "_m", 0.0, \
                   "Start sigma of what a commanded speed loses in turns, m/s per rad/s (drives that limit or round " \
-                  "their wheels' speeds; half a track at most). 0: off.")
+                  "their wheels' speeds; half a track at most). 0: off."), \
+  {"states.wheel_difference_sigma", WM_PARAM_F64, offsetof(type, member.wheel_difference_sigma), 0, 0, 1, NULL, \
+   "With speed by ticks and the heading by a yaw rate: start sigma of the relative difference of the wheels' radii. " \
+   "The ticks are then a second opinion of the heading, which keeps the gyro's noise from adding up. 0: off."}, \
+  {"states.wheel_difference_walk", WM_PARAM_F64, offsetof(type, member.wheel_difference_walk), 0.00001, 0, 1, NULL, \
+   "Random walk of that state per sqrt(m): tyres warm up, loads move."}
 // clang-format on
 
 #ifdef __cplusplus

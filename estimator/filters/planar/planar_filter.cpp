@@ -24,7 +24,7 @@ constexpr double kHighest[kCalibrationCount] = {3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.
 int planar_filter::count_motion_states(const wm_motion_states &states) {
   int count = 0;
   for (double sigma : states.sigma) count += sigma > 0.0;
-  return count;
+  return count + wheel_heading::count_states(states);
 }
 
 void planar_filter::init(const wm_setup &setup, const wm_motion_states &states) {
@@ -44,6 +44,7 @@ void planar_filter::init(const wm_setup &setup, const wm_motion_states &states) 
     start_variance_[i] = square(states.sigma[i]);
     if (states.sigma[i] > 0.0) motion_state_[i] = add_state(calibration_at(calibration_, i), states.sigma[i]);
   }
+  wheels_.init(*this, states);
 }
 
 int planar_filter::add_state(double value, double sigma) {
@@ -84,6 +85,7 @@ void planar_filter::move(const wm_event &motion) {
     project(row, &projected);
     update(projected, rate - calibration_.yaw_rate_bias_radps, square(front_.params().standstill_bias_sigma_radps));
   }
+  wheels_.listen(*this, front_);
 }
 
 void planar_filter::move_to(wm_time_ns t_ns) {
@@ -135,8 +137,8 @@ void planar_filter::propagate(const motion_stretch &piece, const motion_twist &t
     const int state = motion_state_[twist.index[i]];
     if (state >= 0) add_column(state, twist.v_by[i] * dt, twist.w_by[i] * dt);
   }
-  // More lag: the interval takes in more of what was said before it (at its beginning, and all that follows is turned by
-  // that), and less of what was said last.
+  // More lag: the interval takes in more of what was said before it (at its beginning, and all that follows is turned
+  // by that), and less of what was said last.
   const int lag = motion_state_[kLag];
   if (lag >= 0 && (piece.first || piece.last)) {
     add_column(lag, piece.last ? -twist.v : 0.0, piece.last ? -twist.w : 0.0);
@@ -250,6 +252,23 @@ void planar_filter::forget(int state, double value, double variance) {
   take_calibration();
 }
 
+void planar_filter::carry_state(int state, const sparse_row &by, double change, double added_variance) {
+  double *row = p_ + state * stride_;
+  for (int k = 0; k < by.count; k++) vectors::add_scaled(row, p_ + by.index[k] * stride_, by.by[k], stride_);
+  for (int k = 0; k < by.count; k++) row[state] += by.by[k] * row[by.index[k]];
+  row[state] += added_variance;
+  for (int j = 0; j < n_; j++) p_[j * stride_ + state] = row[j];
+  x_[state] += change;
+}
+
+void planar_filter::copy_state(int state, int from, double added_variance) {
+  double *row = p_ + state * stride_;
+  const double *source = p_ + from * stride_;
+  for (int j = 0; j < n_; j++) row[j] = p_[j * stride_ + state] = source[j];
+  row[state] = source[from] + added_variance;
+  x_[state] = x_[from];
+}
+
 void planar_filter::fade(int state, double factor, double added_variance) {
   for (int j = 0; j < n_; j++) {
     if (j == state) continue;
@@ -266,12 +285,14 @@ void planar_filter::set_pose(const wm_pose2 &pose, const double covariance[3][3]
   for (int i = 0; i < 3; i++) forget(i, value[i], 0.0);
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) p_[i * stride_ + j] = i <= j ? covariance[i][j] : covariance[j][i];
+  wheels_.restart();
 }
 
 void planar_filter::inflate_pose(double variance_m2, double variance_rad2) {
   p_[kX * stride_ + kX] += variance_m2;
   p_[kY * stride_ + kY] += variance_m2;
   p_[kHeading * stride_ + kHeading] += variance_rad2;
+  wheels_.restart();
 }
 
 void planar_filter::estimate(wm_estimate *out) const {
@@ -293,18 +314,19 @@ void planar_filter::estimate(wm_estimate *out) const {
 
 size_t planar_filter::list_calibration(wm_calibration_value *out, size_t capacity) const {
   size_t count = 0;
-  for (int i = 0; i < kCalibrationCount; i++) {
-    const int state = motion_state_[i];
-    if (state < 0) continue;
+  const auto add = [&](const char *name, int state) {
+    if (state < 0) return;
     if (count < capacity) {
       wm_calibration_value *value = &out[count];
       std::memset(value, 0, sizeof *value);
-      std::memcpy(value->name, kMotionStateNames[i], std::strlen(kMotionStateNames[i]));
+      std::memcpy(value->name, name, std::strlen(name));
       value->value = x_[state];
       value->sigma = std::sqrt(variance(state));
     }
     count++;
-  }
+  };
+  for (int i = 0; i < kCalibrationCount; i++) add(kMotionStateNames[i], motion_state_[i]);
+  add("motion.wheel_difference", wheels_.difference_state());
   return count;
 }
 

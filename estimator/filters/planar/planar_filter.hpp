@@ -5,6 +5,7 @@
 #define WAYMARK_ESTIMATOR_PLANAR_FILTER_HPP
 
 #include "filters/planar/motion_states.h"
+#include "filters/planar/wheel_heading.hpp"
 #include "motion/front_end.hpp"
 #include "waymark/estimator.h"
 
@@ -79,10 +80,15 @@ class planar_filter {
   double covariance(int i, int j) const { return p_[i * stride_ + j]; }
   double variance(int state) const { return covariance(state, state); }
   int states() const { return n_; }
+  int motion_state(int calibration_index) const { return motion_state_[calibration_index]; }  // -1: off
 
   // x := factor x + noise, for a state that no other one's motion depends on (Gauss-Markov, lazily carried on).
   void fade(int state, double factor, double added_variance);
   void forget(int state, double value, double variance);
+  // x += change and P = F P F' + added_variance, F the identity but for this state's row, which has `by` besides.
+  void carry_state(int state, const sparse_row &by, double change, double added_variance);
+  // The state becomes a copy of `from`, as unsure, correlated alike, and `added_variance` apart from it.
+  void copy_state(int state, int from, double added_variance);
 
  private:
   void propagate(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise);
@@ -98,6 +104,7 @@ class planar_filter {
   wm_pose2 odom_;
   double travelled_m_, turned_rad_;
   double v_mps_, w_radps_;
+  wheel_heading wheels_;
   alignas(16) double x_[kMaxStates];
   alignas(16) double p_[kMaxStates * kMaxStates];
 };

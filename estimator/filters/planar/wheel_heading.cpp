@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/planar/wheel_heading.hpp"
+
+#include "filters/planar/planar_filter.hpp"
+#include "math/elementary.hpp"
+
+namespace wm {
+namespace {
+
+// Often enough that the gyro's noise in between is small, and many counts apart, so that their rounding is new each
+// time.
+constexpr double kTieEvery_m = 0.5;
+// A slipping wheel is worth more than four sigma within half a metre; less is within the noise of the ticks.
+constexpr double kSlip_nis = 16.0;
+constexpr uint32_t kNotBelieved =
+    WM_MOTION_HEALTH_ENCODER_LEFT_DEAD | WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD | WM_MOTION_HEALTH_COUNTER_FROZEN;
+
+double track_m(const planar_filter &filter, const motion_front_end &front) {
+  return front.wheels().track_m * filter.calibration().track_scale;
+}
+
+// Each of the two counts is rounded to a tick, evenly: a twelfth of its square.
+double rounding_rad2(const planar_filter &filter, const motion_front_end &front) {
+  const double tick_m = kTwoPi * front.wheels().radius_m / front.wheels().ticks_per_turn;
+  return square(tick_m / track_m(filter, front)) / 6.0;
+}
+
+}  // namespace
+
+void wheel_heading::init(planar_filter &filter, const wm_motion_states &states) {
+  heading_ = difference_ = -1;
+  running_ = false;
+  if (count_states(states) == 0) return;
+  walk_ = states.wheel_difference_walk;
+  difference_ = filter.add_state(0.0, states.wheel_difference_sigma);
+  heading_ = filter.add_state(0.0, 0.0);
+}
+
+void wheel_heading::listen(planar_filter &filter, const motion_front_end &front) {
+  if (heading_ < 0) return;
+  if (front.model() != WM_MOTION_SPEED_YAW_RATE || (front.health() & kNotBelieved) ||
+      filter.before_start(filter.now_ns())) {
+    running_ = false;
+    return;
+  }
+  double way_m[2];
+  if (!front.counted_ways(way_m)) return;
+  if (running_) {
+    const double left = way_m[0] - way_m_[0], right = way_m[1] - way_m_[1];
+    if (std::fabs(left) + std::fabs(right) < 2.0 * kTieEvery_m) return;
+    carry(filter, front, left, right);
+    running_ = tie(filter, front);
+  }
+  if (!running_) filter.copy_state(heading_, kHeading, rounding_rad2(filter, front));
+  running_ = true;
+  way_m_[0] = way_m[0];
+  way_m_[1] = way_m[1];
+}
+
+// turn = ((1 + e_r) r - (1 + e_l) l) / b: the mean of e_l and e_r is the speed's scale, their difference is a state.
+void wheel_heading::carry(planar_filter &filter, const motion_front_end &front, double left_m, double right_m) {
+  const wm_motion_calibration &c = filter.calibration();
+  const double track = track_m(filter, front), middle_m = 0.5 * (left_m + right_m);
+  const double turn = (c.speed_scale * (right_m - left_m) + filter.value(difference_) * middle_m) / track;
+  sparse_row by;
+  by.add(filter.motion_state(kSpeedScale), (right_m - left_m) / track);
+  by.add(filter.motion_state(kTrackScale), -turn / c.track_scale);
+  by.add(difference_, middle_m / track);
+  const double driven_m = std::fabs(left_m) + std::fabs(right_m);
+  filter.carry_state(heading_, by, turn, square(front.params().noise_ticks_per_sqrt_m / track) * driven_m);
+  filter.carry_state(difference_, {}, 0.0, square(walk_) * 0.5 * driven_m);
+}
+
+bool wheel_heading::tie(planar_filter &filter, const motion_front_end &front) {
+  sparse_row row;
+  row.add(kHeading, 1.0);
+  row.add(heading_, -1.0);
+  projection projected;
+  filter.project(row, &projected);
+  const double apart = wrap(filter.value(heading_) - filter.value(kHeading)), noise = rounding_rad2(filter, front);
+  if (square(apart) > kSlip_nis * (projected.variance + noise)) return false;
+  filter.update(projected, apart, noise);
+  return true;
+}
+
+}  // namespace wm

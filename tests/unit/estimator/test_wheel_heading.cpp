@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+// The heading by the wheels' counts beside that of the gyro: each finds the other's errors, a slip is not believed.
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "events.hpp"
+#include "filters/planar/planar_filter.hpp"
+#include "math/elementary.hpp"
+#include "unity.h"
+#include "waymark/random.h"
+
+namespace {
+
+constexpr double kTick_m = 2 * M_PI * 0.3 / 1000, kTrack_m = 1.5;
+constexpr double kGyroNoise = 0.02;  // rad/s each sample: a bad one, 0.002 rad per sqrt(s)
+
+struct Car {
+  wm_motion_params motion;
+  wm_setup setup = {};
+  wm_motion_states states = {};
+  std::unique_ptr<wm::planar_filter> filter = std::make_unique<wm::planar_filter>();
+  double t_s = 0, left_m = 0, right_m = 0;
+  uint64_t sample = 0;
+
+  explicit Car(bool with_wheels) {
+    wm_params_defaults(&wm_motion_params_table, &motion);
+    motion.model = WM_MOTION_SPEED_YAW_RATE;
+    motion.noise_speed_mps = motion.noise_speed_rel = motion.noise_side_rel = 0.001;
+    motion.noise_yaw_rate_radps = 0.1 * kGyroNoise;  // 100 samples a second
+    motion.noise_yaw_rate_rel = 0;
+    motion.noise_ticks_per_sqrt_m = 0.0002;
+    motion.standstill_bias_sigma_radps = kGyroNoise;
+    setup.motion = &motion;
+    setup.wheels = make::car();
+    setup.start.t_ns = WM_TIME_NONE;
+    setup.start.sigma_xy_m = 0.01;
+    setup.start.sigma_heading_rad = 0.001;
+    states.sigma[wm::kYawRateBias] = 0.005;
+    states.sigma[wm::kTrackScale] = 0.01;
+    states.wheel_difference_sigma = with_wheels ? 0.0141 : 0.0;
+    filter->init(setup, states);
+  }
+
+  // One step of 10 ms; the right wheel is larger than stated by `difference`.
+  void step(double v, double w, double bias, double difference, double slip_m = 0) {
+    const double rate = w + bias + kGyroNoise * wm_random_normal(5, 1, sample);
+    filter->move(make::quantities(t_s, {{WM_Q_YAW_RATE, rate}}));
+    if (sample % 2 == 0)
+      filter->move(make::quantities(t_s, {{WM_Q_WHEEL_TICKS_LEFT, std::floor(left_m / kTick_m)},
+                                          {WM_Q_WHEEL_TICKS_RIGHT, std::floor(right_m / kTick_m)}}));
+    left_m += 0.01 * (v - 0.5 * kTrack_m * w);
+    right_m += 0.01 * (v + 0.5 * kTrack_m * w) / (1 + difference) + slip_m;
+    t_s += 0.01;
+    sample++;
+  }
+  double sigma_heading() const { return std::sqrt(filter->variance(wm::kHeading)); }
+};
+
+// Found values are asked by their names, as a person would.
+wm_calibration_value named(const Car &car, const char *name) {
+  wm_calibration_value values[16];
+  const size_t count = car.filter->list_calibration(values, 16);
+  for (size_t i = 0; i < count; i++)
+    if (std::string(values[i].name) == name) return values[i];
+  TEST_FAIL_MESSAGE(name);
+  return {};
+}
+
+void test_the_gyro_tells_the_wheels_and_the_wheels_hold_the_heading(void) {
+  Car with(true), without(false);
+  double heading = 0;
+  for (int i = 0; i < 12000; i++) {  // two minutes with an S now and then; bias and radii differ in how speed acts
+    const double w = i % 2000 < 400 ? 0.25 : i % 2000 < 800 ? -0.25 : 0.0;
+    const double v = i < 1000 ? 0.0 : i % 3000 < 1000 ? 1.0 : 4.0;
+    for (Car *car : {&with, &without}) car->step(v, v > 0 ? w : 0, 0.004, 0.01);
+    if (v == 0) continue;
+    heading += 0.01 * w;
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(4 * with.sigma_heading(), 0, wm::wrap(with.filter->pose().heading_rad - heading));
+  const wm_calibration_value difference = named(with, "motion.wheel_difference");
+  TEST_ASSERT_DOUBLE_WITHIN(4 * difference.sigma, 0.01, difference.value);
+  TEST_ASSERT_TRUE(difference.sigma < 0.001);
+  const wm_calibration_value bias = named(with, "motion.yaw_rate_bias_radps");
+  TEST_ASSERT_DOUBLE_WITHIN(4 * bias.sigma, 0.004, bias.value);
+  // The bad gyro alone has walked by 0.002 sqrt(120) and more, by its bias.
+  std::printf("sigma of the heading %g with the wheels, %g without; difference %g +- %g\n", with.sigma_heading(),
+              without.sigma_heading(), difference.value, difference.sigma);
+  TEST_ASSERT_TRUE(without.sigma_heading() > 0.02);
+  TEST_ASSERT_TRUE(with.sigma_heading() < 0.6 * without.sigma_heading());
+  for (int i = 0; i < with.filter->states(); i++) {
+    TEST_ASSERT_TRUE(with.filter->variance(i) >= 0);
+    for (int j = 0; j < i; j++) TEST_ASSERT_EQUAL_DOUBLE(with.filter->covariance(i, j), with.filter->covariance(j, i));
+  }
+}
+
+void test_a_slip_is_not_believed(void) {
+  Car slipping(true), holding(true);
+  for (int i = 0; i < 6000; i++) {
+    holding.step(2.0, 0, 0.0, 0.01);
+    slipping.step(2.0, 0, 0.0, 0.01, i == 4000 ? 0.3 : 0);  // as if turned by 0.2 rad
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(0.03, holding.filter->pose().heading_rad, slipping.filter->pose().heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.01, named(slipping, "motion.wheel_difference").value);
+}
+
+void test_a_pose_given_from_outside_is_kept(void) {
+  Car car(true);
+  for (int i = 0; i < 2000; i++) car.step(2.0, 0, 0.0, 0.0);
+  const double exact[3][3] = {{1e-6, 0, 0}, {0, 1e-6, 0}, {0, 0, 1e-8}};
+  car.filter->set_pose({0, 0, 1.0}, exact);
+  for (int i = 0; i < 200; i++) car.step(2.0, 0, 0.0, 0.0);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.0, car.filter->pose().heading_rad);
+}
+
+}  // namespace
+
+extern "C" {
+void setUp(void) {}
+void tearDown(void) {}
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_the_gyro_tells_the_wheels_and_the_wheels_hold_the_heading);
+  RUN_TEST(test_a_slip_is_not_believed);
+  RUN_TEST(test_a_pose_given_from_outside_is_kept);
+  return UNITY_END();
+}
