@@ -74,7 +74,7 @@ wm_status write_recording_yaml(const Scenario &sc, const Recording &r, const std
 
 wm_status write_calibration(const Scenario &sc, const Recording &r, const std::string &path, wm_error *err) {
   File f(path);
-  f.print("sensors:\n");
+  f.text("sensors:\n");
   for (size_t i = 0; i < r.sensors.size(); i++) {
     const wm_sensor &s = r.sensors[i];
     f.print("  %s:\n    mounting: {xyz_m: [%.6g, %.6g, %.6g], rpy_deg: [0, 0, %.9g]}\n", s.name, s.mounting.xyz_m[0],
@@ -85,11 +85,11 @@ wm_status write_calibration(const Scenario &sc, const Recording &r, const std::s
   f.print("wheels:\n  radius_m: %.6g\n  ticks_per_turn: %.6g\n  track_m: %.6g\n  wheelbase_m: %.6g\n", w.radius_m,
           w.ticks_per_turn, w.track_m, w.wheelbase_m);
   if (w.steering_table_count > 0) {
-    f.print("  steering_table:\n    actuator_mm: [");
+    f.text("  steering_table:\n    actuator_mm: [");
     for (uint32_t i = 0; i < w.steering_table_count; i++) f.print("%s%.6g", i ? ", " : "", 1000 * w.actuator_m[i]);
-    f.print("]\n    road_wheel_rad: [");
+    f.text("]\n    road_wheel_rad: [");
     for (uint32_t i = 0; i < w.steering_table_count; i++) f.print("%s%.9g", i ? ", " : "", w.road_wheel_rad[i]);
-    f.print("]\n");
+    f.text("]\n");
   }
   return f.close(err);
 }
@@ -100,14 +100,14 @@ wm_status write_can(const Recording &r, const std::string &path, wm_error *err) 
     f.print("(%" PRId64 ".%06" PRId64 ") %s %03X#", c.t_ns / WM_NS_PER_S, c.t_ns % WM_NS_PER_S / WM_NS_PER_US, c.iface,
             c.id);
     for (int i = 0; i < c.length; i++) f.print("%02X", c.data[i]);
-    f.print("\n");
+    f.text("\n");
   }
   return f.close(err);
 }
 
 wm_status write_sightings(const Recording &r, const std::string &path, wm_error *err) {
   File f(path);
-  f.print("t_ns,sensor,id,bearing_rad,range_m,arrival_ns\n");
+  f.text("t_ns,sensor,id,bearing_rad,range_m,arrival_ns\n");
   for (const Sighting &s : r.sightings)
     f.print("%" PRId64 ",%s,%d,%.9f,,%" PRId64 "\n", s.t_ns, r.sensors[s.sensor].name, s.id, s.bearing_rad,
             s.arrival_ns);
@@ -116,7 +116,7 @@ wm_status write_sightings(const Recording &r, const std::string &path, wm_error 
 
 wm_status write_landmarks(const std::vector<wm_landmark> &landmarks, const std::string &path, wm_error *err) {
   File f(path);
-  f.print("id,x_m,y_m,z_m,sigma_m\n");
+  f.text("id,x_m,y_m,z_m,sigma_m\n");
   for (const wm_landmark &l : landmarks)
     f.print("%d,%.6f,%.6f,%.6f,%.6g\n", l.id, l.p_m[0], l.p_m[1], l.p_m[2], l.sigma_m);
   return f.close(err);
@@ -124,7 +124,7 @@ wm_status write_landmarks(const std::vector<wm_landmark> &landmarks, const std::
 
 wm_status write_truth(const Recording &r, const std::string &path, wm_error *err) {
   File f(path);
-  f.print("t_ns,x_m,y_m,z_m,qx,qy,qz,qw\n");
+  f.text("t_ns,x_m,y_m,z_m,qx,qy,qz,qw\n");
   for (const Truth &t : r.truth) {
     const double half = 0.5 * wrap(t.state.heading_rad);
     f.print("%" PRId64 ",%.6f,%.6f,0,0,0,%.9f,%.9f\n", t.t_ns, t.state.x_m, t.state.y_m, wm::sin(half), wm::cos(half));
