@@ -38,7 +38,10 @@ typedef struct arguments {
 static int replay_recording(const arguments *args) {
   wm_error err = {0};
   wm_config config;
-  if (wm_config_load(args->config, &config, &err) != WM_OK) return complain(&err);
+  if (wm_config_load(args->config, &config, &err) != WM_OK) {
+    (void)complain(&err);
+    return EXIT_USAGE;
+  }
   wm_recording *recording = NULL;
   wm_status status = override_path(config.overrides.landmarks, args->landmarks, &err);
   if (status == WM_OK) status = override_path(config.overrides.calibration, args->calibration, &err);

@@ -26,10 +26,13 @@
 
 #if COUNTED
 
+// glibc's own names for what it would have been called by.
+// NOLINTBEGIN(bugprone-reserved-identifier)
 extern void *__libc_malloc(size_t bytes);
 extern void *__libc_calloc(size_t count, size_t bytes);
 extern void *__libc_realloc(void *old, size_t bytes);
 extern void *__libc_memalign(size_t alignment, size_t bytes);
+// NOLINTEND(bugprone-reserved-identifier)
 
 static _Thread_local int64_t calls;
 

@@ -1,0 +1,89 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# The command line: exit codes, help with an example each, "did you mean", what is said where something is missing.
+set -uo pipefail
+waymark=$WM_BIN_DIR/waymark
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+failures=0
+
+# expect CODE PATTERN ARGS...: the exit code, and a text that must be in the output.
+expect() {
+  local code=$1 pattern=$2 output got
+  shift 2
+  output=$("$waymark" "$@" 2>&1 </dev/null)
+  got=$?
+  if [ "$got" -ne "$code" ] || ! grep -qF -- "$pattern" <<<"$output"; then
+    echo "waymark $*: exit code $got (expected $code), and this should hold '$pattern':"
+    echo "$output"
+    failures=$((failures + 1))
+  fi
+}
+
+# A recording of two seconds: straight on.
+mkdir "$work/rec"
+printf 'format: waymark-recording/1\nname: straight\nduration_s: 2\nstreams: [motion.csv]\nvehicle: {initial_pose: {t_ns: 0, x_m: 1, y_m: 2, heading_rad: 0}}\n' >"$work/rec/recording.yaml"
+{ echo t_ns,v_mps,w_radps; for i in $(seq 0 19); do echo "$((i * 100000000)),0.5,0"; done; } >"$work/rec/motion.csv"
+printf 'format: waymark-config/1\nestimator: odometry\npublish: {lcm: false}\nrealtime: {lock_memory: false}\n' >"$work/good.yaml"
+printf 'format: waymark-config/1\nestimator: odometri\n' >"$work/bad.yaml"
+mkdir "$work/nomotion"
+printf 'format: waymark-recording/1\nname: nomotion\nduration_s: 2\nstreams: []\n' >"$work/nomotion/recording.yaml"
+
+expect 2 "usage: waymark COMMAND"
+expect 0 "usage: waymark COMMAND" help
+expect 0 "example:" --help
+expect 0 "waymark " --version
+expect 2 "did you mean 'replay'" repaly
+expect 2 "'dance' is no command" dance
+for command in run replay check; do expect 0 "example:" "$command" --help; done
+
+expect 2 "replay needs a recording" replay
+expect 2 "replay needs --out" replay "$work/rec"
+expect 2 "needs --config" replay "$work/rec" --out "$work/out"
+expect 2 "did you mean '--config'" replay "$work/rec" --confg x --out "$work/out"
+expect 2 "nowhere.yaml" replay "$work/rec" --config "$work/nowhere.yaml" --out "$work/out"
+expect 2 "did you mean 'odometry'" replay "$work/rec" --config "$work/bad.yaml" --out "$work/out"
+expect 1 "nosuch" replay "$work/nosuch" --config "$work/good.yaml" --out "$work/out"
+expect 2 "no motion" replay "$work/nomotion" --config "$work/good.yaml" --out "$work/out"
+expect 1 "there is a file of this name" replay "$work/rec" --config "$work/good.yaml" --out "$work/good.yaml"
+expect 0 "20 poses" replay "$work/rec" --config "$work/good.yaml" --out "$work/deep/er/out"
+expect 0 "20 poses" replay "$work/deep/er/out/events.wmlog" --out "$work/again"
+expect 2 "another one needs the recording" replay "$work/deep/er/out/events.wmlog" --out "$work/again" --calibration x
+expect 1 "not an event log" replay "$work/good.yaml" --out "$work/again"
+printf 'id,x_m,y_m,z_m,sigma_m\n1,2,3,0,0.1\n' >"$work/map.csv"
+expect 2 "was made with another map" replay "$work/deep/er/out/events.wmlog" --out "$work/again" --landmarks "$work/map.csv"
+
+expect 2 "check needs a configuration" check
+expect 0 "good" check "$work/good.yaml"
+expect 0 "20 data, 10.0 a second" check "$work/good.yaml" "$work/rec"
+expect 0 "x 1.000 m, y 2.000 m" check "$work/good.yaml" "$work/rec"
+expect 2 "did you mean 'odometry'" check "$work/bad.yaml" "$work/rec"
+expect 2 "no motion" check "$work/good.yaml" "$work/nomotion"
+
+expect 2 "run needs --config" run
+expect 2 "run needs --recording" run --config "$work/good.yaml"
+expect 2 "'0' is no number above 0" run --config "$work/good.yaml" --recording "$work/rec" --duration 0
+expect 0 "20 poses" run --config "$work/good.yaml" --recording "$work/rec" --out "$work/live"
+cmp -s "$work/deep/er/out/trajectory.csv" "$work/live/trajectory.csv" || { echo "run and replay differ"; failures=$((failures + 1)); }
+
+# A command of another program is found beside this one, with its arguments and exit code.
+mkdir "$work/bin"
+cp "$waymark" "$work/bin/"
+printf '#!/bin/sh\necho "hello $1"\nexit 7\n' >"$work/bin/waymark-greet"
+chmod +x "$work/bin/waymark-greet"
+waymark=$work/bin/waymark
+expect 7 "hello you" greet you
+
+# Ctrl-C ends a run in order: the log is closed and everything is there.
+waymark=$WM_BIN_DIR/waymark
+"$waymark" run --config "$work/good.yaml" --recording "$work/rec" --out "$work/stopped" --speed 0.05 >"$work/said" 2>&1 &
+pid=$!
+sleep 1
+kill -INT $pid
+wait $pid || { echo "SIGINT: exit code $?"; cat "$work/said"; failures=$((failures + 1)); }
+[ -s "$work/stopped/health.json" ] && [ -s "$work/stopped/timing.json" ] || { echo "SIGINT: files are missing"; failures=$((failures + 1)); }
+expect 0 "poses" replay "$work/stopped/events.wmlog" --out "$work/again"
+"$waymark" replay "$work/stopped/events.wmlog" --out "$work/again" 2>&1 | grep -q "not closed in order" && { echo "SIGINT: the log was not closed"; failures=$((failures + 1)); }
+
+[ $failures -eq 0 ] && echo "good"
+exit $((failures > 0))
