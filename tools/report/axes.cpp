@@ -131,7 +131,7 @@ void Panel::band(const std::vector<double> &x, const std::vector<double> &low, c
         const Column &c = all[i];
         const double from = across(c.first_x);
         d += (i == begin ? "M" : "L") + point(from, down(inner ? c.inner_high : c.high));
-        back = "L" + point(from, down(inner ? c.inner_low : c.low)) + back;
+        back.insert(0, "L" + point(from, down(inner ? c.inner_low : c.low)));
       }
       const Column &last = all[end - 1];
       d += "L" + point(across(last.last_x), down(inner ? last.inner_high : last.high));

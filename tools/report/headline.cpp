@@ -69,8 +69,10 @@ std::string with_truth(const ReportData &data) {
                      strong(duration_text(figure(data, "duration_s"))) + ". It was typically " +
                      strong(length_text(rmse)) + " from where it believed to be, at worst " +
                      strong(length_text(figure(data, "position_max_m")));
-  if (const double heading = figure(data, "heading_rmse_deg"); std::isfinite(heading))
-    text += ", and its heading was off by " + strong(angle_text(heading));
+  const std::string turn = data.trajectory.planar ? "heading" : "rotation";  // in space the whole of it
+  const double turned = figure(data, (turn + "_rmse_deg").c_str());
+  const std::string turn_words = data.trajectory.planar ? "heading" : "orientation";
+  if (std::isfinite(turned)) text += ", and its " + turn_words + " was off by " + strong(angle_text(turned));
   text += "." + honesty(figure(data, "nees_inside_95"), figure(data, "nees_mean") / figure(data, "anees_dof")) +
           losing(data);
 
@@ -78,9 +80,9 @@ std::string with_truth(const ReportData &data) {
                         {length_text(figure(data, "position_p95_m")), "95 of 100 moments are better than this"},
                         {length_text(figure(data, "position_end_m")),
                          "at the end: " + fixed(figure(data, "position_end_percent"), 2) + "&nbsp;% of the way"}};
-  if (std::isfinite(figure(data, "heading_rmse_deg")))
-    all.push_back({angle_text(figure(data, "heading_rmse_deg")),
-                   "heading error, root mean square; at worst " + angle_text(figure(data, "heading_max_deg"))});
+  if (std::isfinite(turned))
+    all.push_back({angle_text(turned), turn_words + " error, root mean square; at worst " +
+                                           angle_text(figure(data, (turn + "_max_deg").c_str()))});
   if (std::isfinite(figure(data, "nees_inside_95")))
     all.push_back({percent_text(figure(data, "nees_inside_95")),
                    "of the time truth lay where the robot said; 95&nbsp;% is ideal"});

@@ -55,10 +55,12 @@ std::string section(const std::string &title, const std::string &how_to_read, co
 std::string legend(const std::vector<std::pair<std::string, std::string>> &marks_and_words) {
   std::string out = "<ul class=\"legend\">";
   for (const auto &[mark, words] : marks_and_words) {
-    const bool key = mark.starts_with("<i");
-    out += "<li>" +
-           (key ? mark : "<svg class=\"swatch\" viewBox=\"0 -8 28 16\" aria-hidden=\"true\">" + mark + "</svg>") +
-           words + "</li>";
+    out += "<li>";
+    if (mark.starts_with("<i"))
+      out += mark;
+    else
+      out.append("<svg class=\"swatch\" viewBox=\"0 -8 28 16\" aria-hidden=\"true\">").append(mark).append("</svg>");
+    out.append(words).append("</li>");
   }
   return out + "</ul>";
 }

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kWidth = 1000;
 constexpr double kLowest = 400;  // height of the drawing, at least and at most
-constexpr double kHighest = 860;
+constexpr double kHighest = 680;
 constexpr double kMargin = 28;  // around what is drawn
 constexpr double kFoot = 40;    // for the numbers of the x axis
 constexpr size_t kEllipses = 28;

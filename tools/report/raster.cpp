@@ -47,6 +47,10 @@ uint32_t adler32(const std::string &bytes) {  // RFC 1950
   return b << 16 | a;
 }
 
+size_t index(int x, int y, int width) {
+  return static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
+}
+
 std::string chunk(const std::string &type, const std::string &data) {
   return big_endian(static_cast<uint32_t>(data.size())) + type + data + big_endian(crc32(type + data));
 }
@@ -59,7 +63,7 @@ std::string grey_png(const std::vector<uint8_t> &grey, int width, int height) {
     for (int x = 0; x < width; x += 4) {
       unsigned packed = 0;
       for (int k = 0; k < 4; ++k) {
-        const unsigned level = x + k < width ? grey[static_cast<size_t>(y * width + x + k)] / 64u : 0u;
+        const unsigned level = x + k < width ? grey[index(x + k, y, width)] / 64u : 0u;
         packed = packed << 2 | level;
       }
       rows += static_cast<char>(packed);
@@ -103,13 +107,11 @@ Raster pgm_to_png(const std::string &pgm, const fs::path &file, Raster raster) {
   const int times = (std::max(width, height) + 1599) / 1600;
   const int w = (width + times - 1) / times;
   const int h = (height + times - 1) / times;
-  std::vector<uint8_t> grey(static_cast<size_t>(w * h), 255);
+  std::vector<uint8_t> grey(index(0, h, w), 255);
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x) {
-      uint8_t &cell = grey[static_cast<size_t>(y / times * w + x / times)];
-      cell = std::min(cell,
-                      static_cast<uint8_t>(
-                          pgm[offset + static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x)]));
+      uint8_t &cell = grey[index(x / times, y / times, w)];
+      cell = std::min(cell, static_cast<uint8_t>(pgm[offset + index(x, y, width)]));
     }
   // The last cells may reach beyond the picture: to the right, and below its lowest row.
   raster.width = w * times;

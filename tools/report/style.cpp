@@ -6,14 +6,14 @@ namespace {
 
 constexpr const char *kColours = R"(
 :root{--paper:#fbfbf9;--card:#fff;--ink:#1a1f25;--soft:#58626d;--rule:#d8dce0;--grid:#e9ebee;--blue:#0b66b2;--band:#0b66b21c;
---truth:#1a1f25;--green:#007a5e;--orange:#cc5500;--amber:#b98200;--purple:#9a4a8c;--pale:#b9c1c9;--halo:#ffffffd9;--raster:1}
+--truth:#1a1f25;--green:#007a5e;--orange:#cc5500;--amber:#b98200;--purple:#9a4a8c;--pale:#b9c1c9;--halo:#ffffffd9;--raster:none}
 @media (prefers-color-scheme:dark){:root{--paper:#101418;--card:#171c21;--ink:#e8ebee;--soft:#9ca7b2;--rule:#313941;--grid:#242b32;
 --blue:#62b2f4;--band:#62b2f426;--truth:#f4f5f6;--green:#3cc79f;--orange:#ff9452;--amber:#eab93f;--purple:#d58ac7;--pale:#55606b;
---halo:#171c21d9;--raster:.82}}
+--halo:#171c21d9;--raster:invert(.88) hue-rotate(180deg)}}
 )";
 
 constexpr const char *kPicture = R"(
-.frame{fill:var(--card)}.raster{opacity:var(--raster);image-rendering:auto}
+.frame{fill:var(--card)}.raster{filter:var(--raster)}
 .grid{fill:none;stroke:var(--grid);stroke-width:1;vector-effect:non-scaling-stroke}
 .truth{fill:none;stroke:var(--truth);stroke-width:4.2;stroke-linejoin:round;stroke-linecap:round;opacity:.34}
 .estimate{fill:none;stroke:var(--blue);stroke-width:1.9;stroke-linejoin:round;stroke-linecap:round}
@@ -105,7 +105,7 @@ border-radius:99px;white-space:nowrap;pointer-events:none;opacity:0;transition:o
 .map .tick text,.map .start text,.map .end text{font-size:31px}.map .ids text{font-size:24px}.map .ids .spare{display:none}
 .map .estimate{stroke-width:3.4}.map .truth{stroke-width:7.5}.map .sight{stroke-width:2}.map .landmark{stroke-width:1}}
 @media print{:root{--paper:#fff;--card:#fff;--ink:#000;--soft:#444;--rule:#bbb;--grid:#e4e4e4;--blue:#0b66b2;--band:#0b66b21c;--truth:#000;
---green:#007a5e;--orange:#cc5500;--amber:#b98200;--purple:#9a4a8c;--pale:#b9c1c9;--halo:#ffffffd9}
+--green:#007a5e;--orange:#cc5500;--amber:#b98200;--purple:#9a4a8c;--pale:#b9c1c9;--halo:#ffffffd9;--raster:none}
 body{font-size:10.5pt;-webkit-print-color-adjust:exact;print-color-adjust:exact}main{max-width:none;padding:0}h2{margin-top:26px}
 h2,h3,.how,.axis{break-after:avoid}figure,.panel,.pair,table,.tiles{break-inside:avoid}#readout,.hair-line{display:none!important}
 details:not([open])>*{display:none}@page{margin:16mm}}

@@ -105,7 +105,7 @@ std::string timing_section(const ReportData &data) {
                                 microseconds(value_of(stage, "max_us")) + " · " +
                                 count_text(static_cast<int64_t>(value_of(stage, "count"))) + " times";
     body += box.html({.title = "<span>" + escape(plain(name)) + "</span><small>" + figures + "</small>",
-                      .describes = name + ": " + figures,
+                      .describes = figures,
                       .x_time = false,
                       .x_text = k + 1 == stages.size(),
                       .height_px = bins ? 62 : 30,
