@@ -13,6 +13,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Updates that were gated together have one NIS between them; how many they are is its degrees of freedom.
+void count_gated_together(std::vector<Innovation> *all) {
+  for (size_t begin = 0; begin < all->size();) {
+    const Innovation &first = (*all)[begin];
+    size_t end = begin + 1;
+    while (end < all->size() && (*all)[end].t_ns == first.t_ns && (*all)[end].landmark == first.landmark &&
+           (*all)[end].sensor == first.sensor && (*all)[end].nis == first.nis)
+      ++end;
+    const int dof = static_cast<int>(end - begin);
+    for (; begin < end; ++begin) (*all)[begin].gate_dof = dof;
+  }
+}
+
 std::vector<Innovation> load_innovations(const fs::path &file) {
   if (!fs::exists(file)) return {};
   const Csv csv = Csv::load(file);
@@ -41,6 +54,7 @@ std::vector<Innovation> load_innovations(const fs::path &file) {
                    csv.number(row, expected), csv.number(row, variance), csv.number(row, nis), csv.number(row, gate),
                    std::isfinite(dof_value) ? static_cast<int>(dof_value) : 1, std::string(csv.text(row, verdict))});
   }
+  if (!dof) count_gated_together(&out);
   return out;
 }
 

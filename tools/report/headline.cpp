@@ -31,7 +31,7 @@ std::string strong(const std::string &text) { return "<em>" + text + "</em>"; }
 std::string honesty(double inside, double nees_per_dof) {
   const std::string share = strong(percent_text(inside));
   if (!std::isfinite(inside)) return "";
-  if (inside >= 0.995 && nees_per_dof < 0.4)
+  if (inside >= 0.97 && nees_per_dof < 0.4)
     return " It was more careful than it had to be: truth lay inside of its 95&nbsp;% region " + share +
            " of the time.";
   if (inside >= 0.85)
@@ -49,6 +49,18 @@ std::string losing(const ReportData &data) {
   if (!(count > 0)) return " It was never lost.";
   return " It was lost " + strong(times_text(static_cast<int64_t>(count))) + ", for " +
          duration_text(figure(data, "lost_s")) + " in all.";
+}
+
+// How much of the time it went by its motion alone, where that is worth a word.
+std::string blindness(const ReportData &data) {
+  const auto &poses = data.trajectory.poses;
+  double blind_s = 0;
+  for (size_t i = 1; i < poses.size(); ++i)
+    if (poses[i - 1].state == WM_STATE_DEAD_RECKONING)
+      blind_s += data.seconds(poses[i].t_ns) - data.seconds(poses[i - 1].t_ns);
+  const double share = blind_s / std::max(data.end_s(), 1e-9);
+  if (share < 0.05) return "";
+  return " For " + strong(percent_text(share)) + " of the time it saw nothing to go by but its own motion.";
 }
 
 // Radius in metres of the stated 95 % region, its longer half axis.
@@ -100,7 +112,7 @@ std::string without_truth(const ReportData &data) {
   if (known)
     text += " It says that it typically knew its position to " + strong(length_text(percentile(radii, 50))) +
             " and at worst to " + strong(length_text(max_abs(radii))) + ", with 95&nbsp;% confidence.";
-  text += " There is no truth to hold this against.";
+  text += blindness(data) + " There is no truth to hold this against.";
   std::vector<Tile> all{{length_text(way), "driven, by its own reckoning"},
                         {duration_text(data.end_s()), "from the first pose to the last"}};
   if (known) {

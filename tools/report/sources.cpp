@@ -85,6 +85,8 @@ Meaning meaning_of(const std::string &name) {
   if (what == "bearing_bias_rad") return {degrees, 0, "°", sensor + " measures bearings too large by this"};
   if (what == "time_offset_s" || what == "delay_s")
     return {1e3, 0, "ms", "what " + sensor + " reports is older than its stamp by this"};
+  if (what == "turn_slowdown_m")
+    return {100, 0, "cm", "while it turns, the robot drives slower by this much a radian turned"};
   if (what == "lag_s") return {1e3, 0, "ms", "the robot follows its motion data this much later"};
   if (what == "range_bias_m") return {100, 0, "cm", sensor + " measures ranges too long by this"};
   if (what == "range_scale") return {100, -100, "%", sensor + " measures ranges too long by this share"};
@@ -114,6 +116,52 @@ std::string title_of(std::string name) {
   name = plain(name);
   if (const size_t dot = name.find('.'); dot != std::string::npos) name.replace(dot, 1, ": ");
   return name;
+}
+
+struct CalibrationState {
+  std::string name;
+  double value, sigma;
+};
+
+// health.json's `calibration`: {NAME: {value, sigma}, ...}, or a list of {name, value, sigma}.
+std::vector<CalibrationState> calibration_of(const Json &health) {
+  std::vector<CalibrationState> out;
+  if (!health.is_object() || !health.contains("calibration")) return out;
+  for (const auto &[key, state] : health["calibration"].items()) {
+    if (!state.is_object() || !state.contains("value") || !state["value"].is_number()) continue;
+    const bool named = state.contains("name") && state["name"].is_string();
+    const bool sure = state.contains("sigma") && state["sigma"].is_number();
+    out.push_back({named ? state["name"].get<std::string>() : key, state["value"].get<double>(),
+                   sure ? state["sigma"].get<double>() : kNan});
+  }
+  return out;
+}
+
+// What the run had to complain of beside its counts.
+std::string complaints(const Json &health) {
+  static constexpr std::array<std::pair<const char *, const char *>, 4> kMotion{{
+      {"encoder_left_dead", "The left wheel’s encoder stood still while the robot drove: it is taken for dead."},
+      {"encoder_right_dead", "The right wheel’s encoder stood still while the robot drove: it is taken for dead."},
+      {"counter_frozen", "A motion message kept coming with a counter that stood still: its sender hung."},
+      {"yaw_rate_stuck", "The gyro gave one and the same value while the robot turned: it is taken for stuck."},
+  }};
+  std::string out;
+  const auto each = [&health](const char *key, const auto &then) {
+    if (!health.contains(key) || !health[key].is_array()) return;
+    for (const Json &name : health[key])
+      if (name.is_string()) then(name.get<std::string>());
+  };
+  each("motion_health", [&out](const std::string &name) {
+    for (const auto &[key, words] : kMotion)
+      if (name == key) out += "<p class=\"note\">" + std::string(words) + "</p>";
+  });
+  each("stale", [&out](const std::string &name) {
+    out += "<p class=\"note\">" + escape(plain(name)) + " had fallen silent by the end.</p>";
+  });
+  each("unused", [&out](const std::string &name) {
+    out += "<p class=\"note\">" + escape(plain(name)) + " was there, but this estimator doesn’t take it.</p>";
+  });
+  return out;
 }
 
 int decimals_for(double sigma) {
@@ -158,7 +206,7 @@ std::string source_section(const ReportData &data) {
       "th><th>dropped</th><th>lost</th>"
       "<th>unreadable</th>" +
           std::string(has_lateness ? "<th>lateness, 99&nbsp;%</th>" : "") +
-          "<th class=\"words\">refused because</th></tr>" + rows + "</table></div>" +
+          "<th class=\"words\">refused because</th></tr>" + rows + "</table></div>" + complaints(data.health) +
           legend({{"<i class=\"key\" style=\"background:var(--blue)\"></i>", "used"},
                   {"<i class=\"key\" style=\"background:var(--orange)\"></i>", "refused"},
                   {"<i class=\"key\" style=\"background:var(--amber)\"></i>", "late, dropped, lost or unreadable"}}));
@@ -198,21 +246,15 @@ std::string state_section(const ReportData &data) {
 }
 
 std::string calibration_section(const ReportData &data) {
-  if (!data.health.is_object() || !data.health.contains("calibration") || !data.health["calibration"].is_array())
-    return "";
   std::string rows;
-  for (const Json &state : data.health["calibration"]) {
-    if (!state.is_object() || !state.contains("name") || !state.contains("value") || !state["value"].is_number())
-      continue;
-    const auto name = state["name"].get<std::string>();
-    const double value = state["value"].get<double>();
-    const double sigma = state.contains("sigma") && state["sigma"].is_number() ? state["sigma"].get<double>() : kNan;
-    const Meaning m = meaning_of(name);
-    const int decimals = decimals_for(sigma * m.factor);
-    const std::string sign = value * m.factor + m.offset > 0 && m.offset != 0 ? "+" : "";
-    rows += "<tr><td>" + escape(title_of(name)) + "</td><td><b>" + sign +
-            number_text(value * m.factor + m.offset, decimals) + "</b> ± " + fixed(sigma * m.factor, decimals) +
-            "\u202f" + m.unit + "</td><td class=\"words\">" + m.words + "</td></tr>";
+  for (const CalibrationState &state : calibration_of(data.health)) {
+    const Meaning m = meaning_of(state.name);
+    const double value = state.value * m.factor + m.offset;
+    const int decimals = decimals_for(state.sigma * m.factor);
+    const std::string sign = value > 0 && m.offset != 0 ? "+" : "";
+    rows += "<tr><td>" + escape(title_of(state.name)) + "</td><td><b>" + sign + number_text(value, decimals) +
+            "</b> ± " + fixed(state.sigma * m.factor, decimals) + "\u202f" + m.unit + "</td><td class=\"words\">" +
+            m.words + "</td></tr>";
   }
   if (rows.empty()) return "";
   return section(

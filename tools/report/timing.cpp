@@ -35,6 +35,15 @@ std::string microseconds(double us) {
   return fixed(us / 1e6, us == 1e6 ? 0 : 1) + " s";
 }
 
+// What a stage does.
+std::string stage_words(const std::string &name) {
+  if (name == "arrive") return "arrive: a datum is put in its order";
+  if (name == "predict") return "predict: the pose is moved on by the motion";
+  if (name == "correct") return "correct: an observation is used";
+  if (name == "publish") return "publish: a pose is carried on to now and sent";
+  return plain(name);
+}
+
 // Lowest and highest duration over all stages, on whole decades.
 Range decades(const std::vector<std::pair<std::string, Json>> &stages) {
   double low = 1e9;
@@ -104,7 +113,7 @@ std::string timing_section(const ReportData &data) {
                                 microseconds(value_of(stage, "p99_us")) + " · slowest " +
                                 microseconds(value_of(stage, "max_us")) + " · " +
                                 count_text(static_cast<int64_t>(value_of(stage, "count"))) + " times";
-    body += box.html({.title = "<span>" + escape(plain(name)) + "</span><small>" + figures + "</small>",
+    body += box.html({.title = "<span>" + escape(stage_words(name)) + "</span><small>" + figures + "</small>",
                       .describes = figures,
                       .x_time = false,
                       .x_text = k + 1 == stages.size(),

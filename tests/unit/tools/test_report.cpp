@@ -96,7 +96,8 @@ void make(const made::Folder &run, const made::Folder &recording) {
             "2000000000,sightings:eye,eye,7,bearing,3.1,0.4,0.01,729,10.8,1,gate\n");
   run.write("health.json",
             R"({"state":"lost","sources":{"sightings:eye":{"received":2,"fused":1,"rejected":{"gate":1},"late":4}},
-                "calibration":[{"name":"eye.yaw_rad","value":0.0803,"sigma":0.0007}]})");
+                "motion_health":["encoder_left_dead"],"stale":["gnss"],
+                "calibration":{"eye.yaw_rad":{"value":0.0803,"sigma":0.0007}}})");
   run.write("timing.json", R"({"predict":{"count":100,"p50_us":0.4,"p90_us":0.5,"p99_us":1,"p999_us":2,"max_us":31},
                                "allocations_after_start":0,"deadlines_missed":2,"deadlines_total":500})");
 }
@@ -106,10 +107,11 @@ void test_page_says_what_happened() {
   made::Folder recording;
   make(run, recording);
   const std::string page = report_page(load_report_data(run.path(), recording.path()));
-  for (const char *words : {"a &lt;made&gt; drive", "<em>10.0\u202fm</em>", "<em>5.0\u202fcm</em>", "It was never lost",
-                            "How far off it was", "Bearing of sightings by eye", "1 too far from what was expected",
-                            "eye: yaw", "<b>4.601</b> ± 0.040", "2 of 500", "slowest 31 µs",
-                            "lost: what it saw contradicted its pose, being mended (40"})
+  for (const char *words :
+       {"a &lt;made&gt; drive", "<em>10.0\u202fm</em>", "<em>5.0\u202fcm</em>", "It was never lost",
+        "How far off it was", "Bearing of sightings by eye", "1 too far from what was expected", "eye: yaw",
+        "<b>4.601</b> ± 0.040", "2 of 500", "left wheel’s encoder stood still", "gnss had fallen silent",
+        "slowest 31 µs", "lost: what it saw contradicted its pose, being mended (40"})
     TEST_ASSERT_TRUE_MESSAGE(has(page, words), words);
   if (has(page, "nan")) TEST_FAIL_MESSAGE(page.substr(page.find("nan") - 60, 80).c_str());
   TEST_ASSERT_FALSE(has(page, "<made>"));
