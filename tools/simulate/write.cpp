@@ -62,7 +62,7 @@ wm_status write_recording_yaml(const Scenario &sc, const Recording &r, const std
   if (!sc.about.empty()) f.print("about: %s\n", quoted(sc.about).c_str());
   f.print("source: waymark simulate, seed %" PRIu64 ", %zu landmarks\n", r.seed, r.map.size());
   f.print("licence: CC0-1.0\nduration_s: %.3f\n", r.drive.duration_s());
-  f.print(
+  f.text(
       "streams: [can.log, vehicle.dbc, can-signals.yaml, calibration.yaml, landmarks.csv, sightings.csv, truth.csv, "
       "truth-landmarks.csv]\n");
   f.print("vehicle:\n  kind: car-like\n  wheelbase_m: %.6g\n  track_m: %.6g\n", sc.robot.wheels.wheelbase_m,
