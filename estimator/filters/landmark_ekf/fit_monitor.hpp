@@ -38,10 +38,12 @@ class fit_monitor {
     return (keys_ >= 2 && misfits_ >= 6 && for_s > 0.3) || (misfits_ >= 20 && for_s > 3.0);
   }
   bool fits() const { return share_ < kGood; }
+  // More than one misread code, less than proof: the pose is less sure than its covariance says.
+  bool doubtful() const { return share_ >= kDoubtful; }
   wm_time_ns bad_since_ns() const { return bad_since_ns_; }
 
  private:
-  static constexpr double kMemory = 0.15, kGood = 0.3, kBad = 0.6;
+  static constexpr double kMemory = 0.15, kGood = 0.3, kDoubtful = 0.35, kBad = 0.6;
   static constexpr int kKeys = 4;
 
   void clear_streak() {

@@ -7,6 +7,8 @@ namespace wm {
 namespace {
 
 constexpr double kFarthest_m = 1e6;
+constexpr double kLoosen = 1.5;               // times the pose's sigmas, while misfits go on ...
+constexpr double kLoosenEvery_s = 1.0;        // ... and not faster than a search may find the pose
 constexpr double kOneNumber = 6.635 / 9.210;  // 99 % of chi2 with one degree of freedom against two
 
 wm_innovation record_of(const wm_event &event, wm_residual kind) {
@@ -68,6 +70,15 @@ double landmark_ekf::sensor_value(int sensor, int which, double neutral) const {
 sensor_errors landmark_ekf::errors_of(int sensor) const {
   return {sensor_value(sensor, kYaw, 0.0), sensor_value(sensor, kMountX, 0.0), sensor_value(sensor, kMountY, 0.0),
           sensor_value(sensor, kRangeScale, 1.0), sensor_value(sensor, kRangeBias, 0.0)};
+}
+
+// A wrong pose bends what is known of the sensors; a search must not start from that.
+sensor_errors landmark_ekf::remembered_errors_of(int sensor) const {
+  const auto value = [&](int which, double neutral) {
+    const int state = sensor_state_[sensor][which];
+    return state < 0 ? neutral : memory_[1].value[state];
+  };
+  return {value(kYaw, 0.0), value(kMountX, 0.0), value(kMountY, 0.0), value(kRangeScale, 1.0), value(kRangeBias, 0.0)};
 }
 
 void landmark_ekf::add_mounting(sparse_row &row, int sensor, const double by[6]) const {
@@ -195,16 +206,17 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, innovation_list rec
       params_.range_sigma_factor * first_number(s.range_sigma_m, sensor.range_sigma_m, params_.range_sigma_default_m);
   const sensor_errors errors = errors_of(s.sensor);
 
+  const sensor_errors sure = remembered_errors_of(s.sensor);
   search_clue clue{};
   clue.t_ns = event.t_ns;
   clue.kind = (use_bearing ? kClueBearing : 0u) | (use_range ? kClueRange : 0u);
   clue.key = landmark * kMaxSensors + s.sensor;
-  clue.sensor = compose(past.odom, {sensor.x_m + errors.x_m, sensor.y_m + errors.y_m, sensor.yaw_rad + errors.yaw_rad});
+  clue.sensor = compose(past.odom, {sensor.x_m + sure.x_m, sensor.y_m + sure.y_m, sensor.yaw_rad + sure.yaw_rad});
   clue.place_m[0] = target.p_m[0];
   clue.place_m[1] = target.p_m[1];
   clue.bearing_rad = s.bearing_rad;
   const double along = use_range && sensor.range_is_depth && has_bearing ? cos(s.bearing_rad) : 1.0;
-  clue.range_m = (s.range_m - errors.range_bias_m) / errors.range_scale / (along > 0.1 ? along : 0.1);
+  clue.range_m = (s.range_m - sure.range_bias_m) / sure.range_scale / (along > 0.1 ? along : 0.1);
   clue.sigma_angle_rad = std::sqrt(square(bearing_sigma) + square(params_.lasting_bearing_rad));
   clue.sigma_length_m = std::sqrt(square(range_sigma) + square(params_.lasting_range_m) + square(map_sigma(landmark)) +
                                   square((params_.range_sigma_rel + params_.lasting_range_rel) * clue.range_m));
@@ -402,6 +414,15 @@ double landmark_ekf::fuse(residual *r, int count, innovation_list records) {
     r[i].record.verdict = fused ? WM_FUSED : WM_REJECTED_GATE;
     records.add(r[i].record);
   }
+  const wm_time_ns now = filter_.now_ns();
+  if (nis > soft && monitor_.doubtful() &&
+      (loosened_ns_ == WM_TIME_NONE || wm_seconds_between(loosened_ns_, now) > kLoosenEvery_s)) {
+    loosened_ns_ = now;
+    // Several misfits lately: it is the pose that is less sure than it claims, not only this measurement.
+    filter_.loosen_pose(kLoosen);
+    filter_.project(r[0].row, &first);
+    if (count == 2) cross = filter_.project_onto(r[1].row, first);
+  }
   if (!fused) return 1.0;
   const double weaker = nis > soft ? nis / soft : 1.0;
   filter_.update(first, r[0].innovation, r[0].noise * weaker);
@@ -411,7 +432,7 @@ double landmark_ekf::fuse(residual *r, int count, innovation_list records) {
     filter_.update(second, left, r[1].noise * weaker);
   }
   fused_ns_ = filter_.now_ns();
-  return nis > soft ? 0.6 : 0.0;
+  return nis > soft ? 0.8 : 0.0;
 }
 
 }  // namespace wm

@@ -63,6 +63,7 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   gnss_lasting_state_ = add(0.0, params.gnss_lasting_m);
   if (gnss_lasting_state_ >= 0) add(0.0, params.gnss_lasting_m);
   gnss_lasting_ns_ = WM_TIME_NONE;
+  calibration_states_ = filter_.states();
   lasting_bearing_offset_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
   lasting_range_offset_ =
       params.lasting_range_m > 0.0 || params.lasting_range_rel > 0.0 ? (lasting_bearing_offset_ >= 0 ? 1 : 0) : -1;
@@ -81,7 +82,9 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
     for (; at > 0 && setup.landmarks[order[at - 1]].id > setup.landmarks[i].id; at--) order[at] = order[at - 1];
     order[at] = i;
   }
-  fused_ns_ = lost_ns_ = searched_ns_ = inflated_ns_ = WM_TIME_NONE;
+  remembered_ns_ = WM_TIME_NONE;
+  remember_calibration(WM_TIME_NONE);
+  fused_ns_ = lost_ns_ = searched_ns_ = inflated_ns_ = loosened_ns_ = WM_TIME_NONE;
   start_again();
 }
 

@@ -67,12 +67,15 @@ class landmark_ekf {
   void lend_states(int sensor, int landmark, wm_time_ns t_ns, int *lasting, int *map);
   double sensor_value(int sensor, int which, double neutral) const;
   sensor_errors errors_of(int sensor) const;
+  sensor_errors remembered_errors_of(int sensor) const;
   void add_mounting(sparse_row &row, int sensor, const double by[6]) const;
 
   // Recovery.
   void note(wm_time_ns t_ns, int key, double misfit);
   void note_clue(const search_clue &clue);
   void search(wm_time_ns since_ns);
+  void remember_calibration(wm_time_ns t_ns);
+  void restore_calibration();
   void start_again();
 
   int *landmark_order() { return reinterpret_cast<int *>(this + 1); }
@@ -88,11 +91,18 @@ class landmark_ekf {
   state_slots<24> lasting_;
   int lasting_bearing_offset_, lasting_range_offset_;  // within a slot; -1: not carried
   state_slots<16> map_;
+  // What was known of the sensors while the observations still fitted: two generations, the older one is safe.
+  struct calibration_memory {
+    double value[kMaxStates], variance[kMaxStates];
+  };
+  calibration_memory memory_[2];
+  wm_time_ns remembered_ns_;
+  int calibration_states_;  // pose and calibration; the lent states come behind
   fit_monitor monitor_;
   pose_search clues_;
   search_clue prior_[2];
   int prior_count_;
-  wm_time_ns fused_ns_, lost_ns_, searched_ns_, inflated_ns_;
+  wm_time_ns fused_ns_, lost_ns_, searched_ns_, inflated_ns_, loosened_ns_;
   uint32_t resets_;
   uint8_t state_;  // wm_state, without dead reckoning
 };

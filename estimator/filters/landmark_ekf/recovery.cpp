@@ -9,6 +9,7 @@ namespace {
 constexpr double kSearchEvery_s = 0.25;  // bounds the cost: one search is about a tenth of a millisecond
 constexpr double kInflateAfter_s = 3.0;  // lost for so long and not found: open the gates
 constexpr double kInflateEvery_s = 1.0;
+constexpr double kRememberEvery_s = 10.0;
 constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;
 constexpr double kInflateUpTo_m = 30.0;
 
@@ -29,6 +30,7 @@ void landmark_ekf::note(wm_time_ns t_ns, int key, double misfit) {
     state_ = WM_STATE_LOST;
     lost_ns_ = inflated_ns_ = t_ns;
   }
+  if (state_ == WM_STATE_TRACKING && monitor_.fits()) remember_calibration(t_ns);
   if (state_ != WM_STATE_LOST) return;
   if (monitor_.fits()) {
     state_ = WM_STATE_TRACKING;
@@ -42,6 +44,26 @@ void landmark_ekf::note(wm_time_ns t_ns, int key, double misfit) {
     filter_.inflate_pose(square(kInflate_m), square(kInflate_rad));
     inflated_ns_ = t_ns;
   }
+}
+
+void landmark_ekf::remember_calibration(wm_time_ns t_ns) {
+  const bool first = remembered_ns_ == WM_TIME_NONE;
+  if (t_ns != WM_TIME_NONE && !first && wm_seconds_between(remembered_ns_, t_ns) < kRememberEvery_s) return;
+  remembered_ns_ = t_ns;
+  memory_[1] = memory_[0];
+  for (int i = kPoseStates; i < calibration_states_; i++) {
+    memory_[0].value[i] = filter_.value(i);
+    memory_[0].variance[i] = filter_.variance(i);
+  }
+  if (t_ns == WM_TIME_NONE) memory_[1] = memory_[0];
+}
+
+// A wrong pose teaches wrong things of the sensors.
+void landmark_ekf::restore_calibration() {
+  for (int i = kPoseStates; i < calibration_states_; i++)
+    filter_.forget(i, memory_[1].value[i], memory_[1].variance[i]);
+  lasting_.release_all();
+  map_.release_all();
 }
 
 // Looks for the pose among the clues since `since_ns`; takes it where it is sure.
@@ -59,6 +81,7 @@ void landmark_ekf::search(wm_time_ns since_ns) {
     const int yaw = sensor_state_[i][kYaw];
     if (yaw >= 0) result.covariance[2][2] += filter_.variance(yaw);
   }
+  restore_calibration();
   filter_.set_pose(result.pose, result.covariance);
   monitor_.clear();
   prior_count_ = 0;

@@ -295,6 +295,12 @@ void planar_filter::inflate_pose(double variance_m2, double variance_rad2) {
   wheels_.restart();
 }
 
+void planar_filter::loosen_pose(double factor) {
+  for (int i = 0; i < n_; i++)
+    for (int j = 0; j < n_; j++)
+      p_[i * stride_ + j] *= (i < kPoseStates ? factor : 1.0) * (j < kPoseStates ? factor : 1.0);
+}
+
 void planar_filter::estimate(wm_estimate *out) const {
   std::memset(out, 0, sizeof *out);
   out->t_ns = now_ns();

@@ -65,6 +65,8 @@ class planar_filter {
 
   void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
   void inflate_pose(double variance_m2, double variance_rad2);
+  // Scales the pose's sigmas; what it shares with other states keeps its correlation.
+  void loosen_pose(double factor);
   // Fills mean, covariance and twist.
   void estimate(wm_estimate *out) const;
   const wm_motion_calibration &calibration() const { return calibration_; }
