@@ -25,8 +25,9 @@ void print_note(void *context, const char *text) {
 
 wm_status override_path(char out[WM_PATH_MAX], const char *path, wm_error *err) {
   if (!path) return WM_OK;
-  if (strlen(path) >= WM_PATH_MAX) return wm_fail(err, WM_BAD_USAGE, "'%.60s...': the path is too long", path);
-  strcpy(out, path);
+  size_t length = strlen(path);
+  if (length >= WM_PATH_MAX) return wm_fail(err, WM_BAD_USAGE, "'%.60s...': the path is too long", path);
+  memcpy(out, path, length + 1);
   return WM_OK;
 }
 

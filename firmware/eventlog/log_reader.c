@@ -245,7 +245,7 @@ static wm_status take_event(wm_log_reader *self, const record *r, wm_event *out,
 
 wm_status wm_log_next(wm_log_reader *self, wm_event *out, uint64_t *missing, int *cut, wm_error *err) {
   for (;;) {
-    record r;
+    record r = {0};
     wm_status status = read_record(self, &r, cut, err);
     if (status == WM_END) *cut |= !self->closed;
     if (status != WM_OK) return status;

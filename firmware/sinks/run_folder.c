@@ -183,8 +183,9 @@ void wm_run_folder_gap(wm_run_folder *self, uint64_t missing_events) { wm_log_wr
 
 static wm_status make_dir(const char *dir, wm_error *err) {
   char path[WM_PATH_MAX];
-  if (strlen(dir) >= sizeof path) return wm_fail(err, WM_BAD_USAGE, "%s: the path is too long", dir);
-  strcpy(path, dir);
+  size_t length = strlen(dir);
+  if (length >= sizeof path) return wm_fail(err, WM_BAD_USAGE, "%s: the path is too long", dir);
+  memcpy(path, dir, length + 1);
   for (char *slash = path + 1; *slash; slash++) {
     if (*slash != '/') continue;
     *slash = '\0';
