@@ -324,11 +324,12 @@ bool motion_front_end::ticks_drive() const {
 
 void motion_front_end::take_count(int side, wm_time_ns t_ns, double count) {
   tick_wheel &wheel = wheel_[side];
-  const double dt = wm_seconds_between(wheel.t_ns, t_ns);
-  if (wheel.t_ns == WM_TIME_NONE || dt <= 0.0) {
-    if (wheel.t_ns == WM_TIME_NONE) wheel.restart(t_ns, count);
+  if (wheel.t_ns == WM_TIME_NONE) {
+    wheel.restart(t_ns, count);
     return;
   }
+  const double dt = wm_seconds_between(wheel.t_ns, t_ns);
+  if (dt <= 0.0) return;
   const double metres_per_tick = kTwoPi * wheels_.radius_m / wheels_.ticks_per_turn;
   double way = (count - wheel.ticks) * metres_per_tick;
   wheel.ticks = count;

@@ -234,10 +234,14 @@ const wm_log_head *wm_log_reader_head(const wm_log_reader *self) { return &self-
 
 // ── the events ──────────────────────────────────────────────────────────────────────────────────────────────────────
 
+// Differences of stamps must fit: no clock goes for 146 years.
+static int is_stamp(wm_time_ns t_ns) { return t_ns > -(INT64_MAX / 2) && t_ns < INT64_MAX / 2; }
+
 static wm_status take_event(wm_log_reader *self, const record *r, wm_event *out, wm_error *err) {
   size_t used;
   if (wm_event_decode(r->content, r->count, out, &used) != WM_OK || used != r->count)
     return bad(self, err, "an event that can't be read");
+  if (!is_stamp(out->t_ns) || !is_stamp(out->arrival_ns)) return bad(self, err, "an event with an impossible stamp");
   if (out->source >= self->head.source_count) return bad(self, err, "an event of a source that the head doesn't name");
   self->events++;
   return WM_OK;

@@ -71,8 +71,8 @@ static wm_time_ns first_tick(wm_time_ns now_ns, wm_time_ns period_ns) {
   return remainder_ns ? now_ns - remainder_ns + period_ns : now_ns;
 }
 
-// A gap of the arrival clock that no run has: a corrupt stamp. Time is not played through it tick by tick.
-#define LONGEST_SILENCE_NS (24 * 3600 * WM_NS_PER_S)
+// A silence of all sources that no drive has (recordings joined together, a corrupt stamp): not played tick by tick.
+#define LONGEST_SILENCE_NS (600 * WM_NS_PER_S)
 
 static wm_status play(replay *self, const wm_replay_options *options, double duration_s, wm_error *err) {
   size_t count = self->assembly.source_count;

@@ -41,7 +41,6 @@ static void read_log(const uint8_t *data, size_t size) {
     if (event.source >= head->source_count || event.kind >= WM_EVENT_KIND_COUNT) abort();
     if (event.kind == WM_EVENT_QUANTITIES && event.as.quantities.count > WM_QUANTITIES_MAX) abort();
     if (event.kind == WM_EVENT_POINTS && event.as.points.count > WM_POINTS_MAX) abort();
-    event.t_ns /= 4;  // differences of stamps are formulas' business; here they fit
     wm_fuser_feed(&fuser, &event);
   }
   wm_fuser_finish(&fuser);
