@@ -7,6 +7,7 @@ namespace wm {
 namespace {
 
 constexpr double kSearchEvery_s = 0.25;  // bounds the cost: one search is about a tenth of a millisecond
+constexpr double kSayLost_s = 0.1;       // lost is lost for at least so long: whoever listens must hear it
 constexpr double kInflateAfter_s = 3.0;  // lost for so long and not found: open the gates
 constexpr double kInflateEvery_s = 1.0;
 constexpr double kRememberEvery_s = 10.0;
@@ -36,6 +37,7 @@ void landmark_ekf::note(wm_time_ns t_ns, int key, double misfit) {
     state_ = WM_STATE_TRACKING;
     return;
   }
+  if (wm_seconds_between(lost_ns_, t_ns) < kSayLost_s) return;
   const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
   const wm_time_ns bad_since = monitor_.bad_since_ns();
   search(bad_since > window ? bad_since : window);

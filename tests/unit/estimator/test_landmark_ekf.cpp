@@ -1,0 +1,454 @@
+// SPDX-License-Identifier: Apache-2.0
+// The landmark filter in a simulated room: what it expects, that it finds its sensors' errors, and that it notices,
+// says and mends it when it is lost. Scenarios are GIVEN / WHEN / THEN; all noise is drawn from fixed seeds.
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+
+#include "events.hpp"
+#include "filters/landmark_ekf/params.h"
+#include "filters/landmark_ekf/sensor_model.hpp"
+#include "math/arc.hpp"
+#include "math/elementary.hpp"
+#include "motion/motion_params.h"
+#include "unity.h"
+#include "waymark/estimator.h"
+#include "waymark/random.h"
+
+namespace {
+
+const wm_estimator *ekf;
+wm_motion_params motion;
+wm_landmark_ekf_params params;
+wm_setup setup;
+wm_sensor sensor;
+wm_landmark landmarks[8];
+void *state;
+wm_random noise;
+wm_pose2 truth;
+double now_s;
+
+// What is wrong with the robot, unknown to the filter.
+struct faults {
+  double speed_scale = 1, yaw_scale = 1, yaw_bias = 0, lag_s = 0, sensor_yaw = 0, delay_s = 0, range_bias = 0;
+  double misread = 0, gnss_delay_s = 0;
+} fault;
+struct past {
+  double t_s;
+  wm_pose2 pose;
+};
+past trace[100000];
+int traced;
+
+const double kAbsent = std::numeric_limits<double>::quiet_NaN();
+
+double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
+
+void make_room() {
+  ekf = wm_estimator_find("landmark_ekf");
+  wm_params_defaults(&wm_motion_params_table, &motion);
+  wm_params_defaults(&ekf->params, &params);
+  const double places[8][2] = {{6, 0}, {0, 6}, {-6, 1}, {1, -6}, {5, 5}, {-4, -5}, {-5, 4}, {4, -4}};
+  for (int i = 0; i < 8; i++) landmarks[i] = {100 + 7 * i, {places[i][0], places[i][1], 0}, 0.0, NAN};
+  sensor = {};
+  std::strcpy(sensor.name, "camera");
+  sensor.mounting.xyz_m[0] = 0.3;
+  sensor.mounting.rpy_rad[2] = 0.2;
+  sensor.bearing_sigma_rad = 0.01;
+  sensor.range_sigma_m = 0.05;
+  sensor.max_range_m = INFINITY;
+  setup = {};
+  setup.motion = &motion;
+  setup.wheels = make::no_wheels();
+  setup.sensors = &sensor;
+  setup.sensor_count = 1;
+  setup.landmarks = landmarks;
+  setup.landmark_count = 8;
+  setup.start = {WM_TIME_NONE, {2, 0, 0}, {0, 0, 0, 1}, wm::kHalfPi, 0.05, 0.05};
+  truth = {2, 0, wm::kHalfPi};
+  noise = {42, 1, 0};
+  now_s = 0;
+  traced = 0;
+  fault = {};
+}
+
+void begin() {
+  const char *why = nullptr;
+  const size_t bytes = ekf->state_bytes(&params, &setup, &why);
+  TEST_ASSERT_GREATER_THAN(0, bytes);
+  state = aligned_alloc(16, (bytes + 15) / 16 * 16);
+  TEST_ASSERT_EQUAL(WM_OK, ekf->init(state, &params, &setup));
+}
+
+wm_estimate estimate() {
+  wm_estimate e;
+  ekf->estimate(state, &e);
+  return e;
+}
+
+double off() {
+  const wm_estimate e = estimate();
+  return std::hypot(e.pose_map_base.p_m[0] - truth.x_m, e.pose_map_base.p_m[1] - truth.y_m);
+}
+double heading_off() { return std::fabs(wm::wrap(estimate().heading_rad - truth.heading_rad)); }
+
+double calibration(const char *name, double *sigma = nullptr) {
+  wm_calibration_value values[64];
+  const size_t count = ekf->calibration(state, values, 64);
+  for (size_t i = 0; i < count; i++)
+    if (std::strcmp(values[i].name, name) == 0) {
+      if (sigma) *sigma = values[i].sigma;
+      return values[i].value;
+    }
+  TEST_FAIL_MESSAGE(name);
+  return NAN;
+}
+
+wm_pose2 pose_at(double t_s) {
+  for (int i = traced - 1; i > 0; i--)
+    if (trace[i - 1].t_s <= t_s) {
+      const double share = (t_s - trace[i - 1].t_s) / (trace[i].t_s - trace[i - 1].t_s);
+      return wm::compose(trace[i - 1].pose, wm::part_of(wm::between(trace[i - 1].pose, trace[i].pose), share));
+    }
+  return traced > 0 ? trace[0].pose : truth;
+}
+
+// A winding drive round the room.
+double speed_at(double t_s) { return t_s < 0.5 ? 0.0 : 0.8 + 0.3 * sin(0.9 * t_s); }
+double rate_at(double t_s) { return t_s < 0.5 ? 0.0 : 0.4 + 0.25 * sin(0.5 * t_s); }
+
+enum sees : unsigned { kNothing = 0, kBearings = 1, kRanges = 2, kPositions = 4 };
+
+// Drives for so long; sees up to three landmarks every 0.2 s. Returns how many innovations were fused.
+int drive(double for_s, unsigned sight, int seen = 3, bool carried_blind = false) {
+  int fused = 0;
+  const double until = now_s + for_s;
+  const double dt = 0.02;
+  for (int step = 0; now_s < until; step++) {
+    const wm_event twist = make::twist(now_s, carried_blind ? 0 : speed_at(now_s), carried_blind ? 0 : rate_at(now_s));
+    TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &twist));
+    // The robot does what was said lag ago, in its own scale; white noise as the parameters say.
+    const double v = fault.speed_scale * speed_at(now_s - fault.lag_s);
+    const double w = fault.yaw_scale * (rate_at(now_s - fault.lag_s) - fault.yaw_bias);
+    trace[traced++] = {now_s, truth};
+    if (!carried_blind) {
+      const double way = v * dt + gauss(0.02 * sqrt(dt)), turn = w * dt + gauss(0.01 * sqrt(dt));
+      const wm::arc a = wm::make_arc(way, turn);
+      truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
+    }
+    now_s += dt;
+    trace[traced] = {now_s, truth};
+    if (step % 10 != 9 || sight == kNothing) continue;
+    wm_innovation records[8];
+    size_t count;
+    if (sight & kPositions) {
+      traced++;
+      const wm_pose2 p = pose_at(now_s - fault.gnss_delay_s);
+      traced--;
+      const wm_event e = make::position(now_s, p.x_m + gauss(0.3), p.y_m + gauss(0.3), 0.3);
+      TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &e, records, 8, &count));
+      for (size_t k = 0; k < count; k++) fused += records[k].verdict == WM_FUSED;
+      continue;
+    }
+    for (int k = 0; k < seen; k++) {
+      const wm_landmark &target = landmarks[(step / 10 + 3 * k) % 8];
+      traced++;
+      const wm_pose2 p = pose_at(now_s - fault.delay_s);
+      traced--;
+      const wm_pose2 eye = wm::compose(p, {0.3, 0, 0.2 + fault.sensor_yaw});
+      const double dx = target.p_m[0] - eye.x_m, dy = target.p_m[1] - eye.y_m;
+      const bool wrong = wm_random_next_uniform(&noise) < fault.misread;
+      const double bearing = wm::wrap(atan2(dy, dx) - eye.heading_rad + gauss(0.01));
+      const double range = std::sqrt(dx * dx + dy * dy) + fault.range_bias + gauss(0.05);
+      const wm_event e = make::sighting(now_s, wrong ? landmarks[(step / 10 + 3 * k + 1) % 8].id : target.id,
+                                        sight & kBearings ? bearing : kAbsent, sight & kRanges ? range : kAbsent);
+      TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &e, records, 8, &count));
+      for (size_t r = 0; r < count; r++) fused += records[r].verdict == WM_FUSED;
+    }
+  }
+  return fused;
+}
+
+// ---- the model ----
+
+void test_expected_sighting_and_its_derivatives(void) {
+  wm_sensor s = sensor;
+  s.mounting = {{0.4, -0.2, 0.7}, {0.1, 0.35, 2.2}};
+  const double landmark[3] = {3.0, -1.5, 1.9};
+  for (int depth = 0; depth < 2; depth++) {
+    s.range_is_depth = depth;
+    wm::mounted_sensor m;
+    m.init(s);
+    const wm_pose2 pose = {0.5, 0.3, depth ? -2.4 : 0.8};
+    const wm::sensor_errors errors = {0.05, 0.02, -0.03, 1.04, 0.1};
+    const wm::expected_sighting e = wm::expect(m, errors, pose, landmark);
+    TEST_ASSERT_TRUE(e.possible);
+    const double h = 1e-6;
+    for (int k = 0; k < 6; k++) {
+      wm_pose2 pu = pose, pd = pose;
+      wm::sensor_errors eu = errors, ed = errors;
+      double *up[6] = {&pu.x_m, &pu.y_m, &pu.heading_rad, &eu.yaw_rad, &eu.x_m, &eu.y_m};
+      double *down[6] = {&pd.x_m, &pd.y_m, &pd.heading_rad, &ed.yaw_rad, &ed.x_m, &ed.y_m};
+      *up[k] += h;
+      *down[k] -= h;
+      const wm::expected_sighting a = wm::expect(m, eu, pu, landmark), b = wm::expect(m, ed, pd, landmark);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-7, wm::wrap(a.bearing_rad - b.bearing_rad) / (2 * h), e.bearing_by[k]);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-7, (a.range_m - b.range_m) / (2 * h), e.range_by[k]);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, e.range_m, errors.range_scale * e.range_by_scale + errors.range_bias_m);
+  }
+}
+
+// The paper's own formula, for a level sensor: alpha = atan2(y_b - y_c, x_b - x_c) - theta - theta_c.
+void test_expected_bearing_is_the_papers(void) {
+  wm::mounted_sensor m;
+  m.init(sensor);
+  const wm_pose2 pose = {1, 2, 0.7};
+  const double landmark[3] = {-3, 4, 0};
+  const double xc = 1 + 0.3 * cos(0.7), yc = 2 + 0.3 * sin(0.7);
+  const wm::expected_sighting e = wm::expect(m, {}, pose, landmark);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, atan2(4 - yc, -3 - xc) - 0.7 - 0.2, e.bearing_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, std::hypot(4 - yc, -3 - xc), e.range_m);
+  const double on_it[3] = {xc, yc, 0};
+  TEST_ASSERT_FALSE(wm::expect(m, {}, pose, on_it).possible);
+}
+
+// ---- accuracy and self-calibration ----
+
+void test_it_tracks_and_its_covariance_is_honest(void) {
+  begin();
+  int inside = 0, steps = 0;
+  for (int i = 0; i < 100; i++) {
+    drive(0.5, kBearings | kRanges);
+    const wm_estimate e = estimate();
+    const double dx = e.pose_map_base.p_m[0] - truth.x_m, dy = e.pose_map_base.p_m[1] - truth.y_m;
+    const double xx = e.covariance[0], xy = e.covariance[1], yy = e.covariance[7];
+    inside += (dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx) / (xx * yy - xy * xy) < 5.991;
+    steps++;
+  }
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
+  TEST_ASSERT_GREATER_OR_EQUAL(88, inside * 100 / steps);
+  TEST_ASSERT_EQUAL_UINT32(1, estimate().resets);
+}
+
+void test_it_finds_every_error_of_its_sensors(void) {
+  params.motion.sigma[0] = 0.1;
+  params.motion.sigma[1] = 0.1;
+  params.motion.sigma[2] = 0.05;
+  params.motion.sigma[7] = 0.2;
+  params.sensor_yaw_sigma_rad = 0.2;
+  params.sensor_time_offset_sigma_s = 0.1;
+  params.range_bias_sigma_m = 0.2;
+  fault.speed_scale = 0.93;
+  fault.yaw_scale = 1.06;
+  fault.yaw_bias = 0.03;
+  fault.lag_s = 0.18;
+  fault.sensor_yaw = -0.12;
+  fault.delay_s = 0.1;
+  fault.range_bias = 0.15;
+  begin();
+  drive(120, kBearings | kRanges);
+  const struct {
+    const char *name;
+    double value;
+  } want[] = {{"motion.speed_scale", 0.93}, {"motion.yaw_rate_scale", 1.06}, {"motion.yaw_rate_bias_radps", 0.03},
+              {"motion.lag_s", 0.18},       {"camera.yaw_rad", -0.12},       {"camera.time_offset_s", 0.1},
+              {"camera.range_bias_m", 0.15}};
+  for (const auto &w : want) {
+    double sigma;
+    const double got = calibration(w.name, &sigma);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(4 * sigma, w.value, got, w.name);
+    TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(0.03, sigma, w.name);
+  }
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.06, off());
+}
+
+void test_gnss_and_its_delay(void) {
+  params.gnss_time_offset_sigma_s = 0.5;
+  fault.gnss_delay_s = 0.3;
+  begin();
+  drive(150, kPositions);
+  TEST_ASSERT_DOUBLE_WITHIN(0.08, 0.3, calibration("gnss.time_offset_s"));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.2, off());
+}
+
+void test_misread_codes_are_rejected_and_do_no_harm(void) {
+  fault.misread = 0.1;
+  begin();
+  drive(60, kBearings | kRanges);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.06, off());
+  TEST_ASSERT_EQUAL_UINT32(1, estimate().resets);
+}
+
+// GIVEN one landmark whose place on the map is wrong WHEN it is seen again and again THEN the filter does not get surer
+// than the map.
+void test_a_maps_error_is_not_averaged_away(void) {
+  landmarks[0].sigma_m = landmarks[3].sigma_m = landmarks[6].sigma_m = 0.2;
+  params.map_slots = 4;
+  setup.landmark_count = 1;
+  begin();
+  for (int i = 0; i < 200; i++) {
+    const wm_event twist = make::twist(0.1 * i, 0, 0);
+    TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &twist));
+    wm_innovation records[8];
+    size_t count;
+    const wm_event e = make::sighting(0.1 * i, landmarks[0].id, wm::wrap(atan2(-0.3, 4.0) - wm::kHalfPi - 0.2), 4.0);
+    ekf->correct(state, &e, records, 8, &count);
+  }
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.02, sqrt(estimate().covariance[0]));
+}
+
+// ---- lost and found ----
+
+void test_given_a_wrong_start_when_landmarks_contradict_it_then_it_is_said_and_mended(void) {
+  setup.start.p_m[0] = -3;
+  setup.start.p_m[1] = 2;
+  setup.start.heading_rad = -1;
+  begin();
+  bool lost = false;
+  for (int i = 0; i < 40 && off() > 0.3; i++) {
+    drive(0.2, kBearings | kRanges);
+    lost = lost || estimate().state == WM_STATE_LOST;
+  }
+  TEST_ASSERT_TRUE(lost);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
+  TEST_ASSERT_EQUAL_UINT32(2, estimate().resets);
+  drive(20, kBearings | kRanges);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
+  TEST_ASSERT_EQUAL_UINT32(2, estimate().resets);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.06, off());
+}
+
+void test_given_a_kidnapped_robot_when_it_sees_bearings_only_then_it_finds_itself(void) {
+  begin();
+  drive(20, kBearings);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+  truth = {-2, -2, 2.5};
+  drive(15, kBearings);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
+  TEST_ASSERT_GREATER_THAN(1, estimate().resets);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.15, off());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, heading_off());
+}
+
+void test_given_an_unknown_heading_when_landmarks_are_seen_then_it_is_found(void) {
+  setup.start.heading_rad = NAN;
+  begin();
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, estimate().state);
+  drive(5, kBearings);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.15, off());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, heading_off());
+}
+
+void test_given_no_start_at_all_when_it_sees_then_it_knows(void) {
+  setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
+  begin();
+  drive(1, kNothing);
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, estimate().state);
+  drive(6, kBearings | kRanges);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+}
+
+void test_given_no_start_when_positions_come_and_it_drives_then_its_heading_is_found(void) {
+  setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
+  begin();
+  drive(30, kPositions);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.4, off());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.2, heading_off());
+}
+
+void test_given_silence_then_it_says_dead_reckoning_and_grows_unsure(void) {
+  begin();
+  drive(10, kBearings | kRanges);
+  const double before = estimate().covariance[0];
+  drive(10, kNothing);
+  TEST_ASSERT_EQUAL(WM_STATE_DEAD_RECKONING, estimate().state);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(3 * before, estimate().covariance[0]);
+  drive(2, kBearings | kRanges);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
+}
+
+void test_set_pose_and_reset(void) {
+  begin();
+  drive(3, kNothing);
+  wm_innovation records[8];
+  size_t count;
+  wm_event e = make::set_pose(now_s, truth.x_m + 1, truth.y_m, truth.heading_rad, 0.5, 0.1);
+  TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &e, records, 8, &count));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, off());
+  TEST_ASSERT_EQUAL_UINT32(2, estimate().resets);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.25, estimate().covariance[0]);
+  e = make::empty(now_s, WM_EVENT_RESET);
+  TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &e, records, 8, &count));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0, estimate().pose_map_base.p_m[0]);
+  TEST_ASSERT_EQUAL_UINT32(3, estimate().resets);
+}
+
+// ---- refusals explain themselves ----
+
+void test_each_refusal_has_its_verdict(void) {
+  sensor.max_range_m = 10;
+  begin();
+  drive(1, kNothing);
+  wm_innovation r[8];
+  size_t n;
+  const auto verdict = [&](const wm_event &e, wm_status status = WM_OK) {
+    TEST_ASSERT_EQUAL(status, ekf->correct(state, &e, r, 8, &n));
+    TEST_ASSERT_EQUAL(1, n > 0 ? 1 : 0);
+    return (int)r[0].verdict;
+  };
+  TEST_ASSERT_EQUAL(WM_REJECTED_UNKNOWN_ID, verdict(make::sighting(now_s, 5, 0, 1)));
+  TEST_ASSERT_EQUAL(WM_REJECTED_NO_ASSOCIATION, verdict(make::sighting(now_s, -1, 0, 1)));
+  TEST_ASSERT_EQUAL(WM_REJECTED_OUT_OF_RANGE, verdict(make::sighting(now_s, 100, 0, 11)));
+  TEST_ASSERT_EQUAL(WM_REJECTED_NOT_FINITE, verdict(make::sighting(now_s, 100, NAN, NAN), WM_NOT_FINITE));
+  TEST_ASSERT_EQUAL(WM_REJECTED_GATE, verdict(make::sighting(now_s, 100, 3, NAN)));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(r[0].gate, r[0].nis);
+  params.use_range = 0;
+  free(state);
+  begin();
+  drive(1, kNothing);
+  TEST_ASSERT_EQUAL(WM_REJECTED_BY_CONFIG, verdict(make::sighting(now_s, 100, NAN, 2)));
+}
+
+void test_too_many_states_are_refused_with_the_reason(void) {
+  params.lasting_slots = 24;
+  params.lasting_bearing_rad = params.lasting_range_m = 0.1;
+  params.map_slots = 16;
+  const char *why = nullptr;
+  TEST_ASSERT_EQUAL(0, ekf->state_bytes(&params, &setup, &why));
+  TEST_ASSERT_NOT_NULL(strstr(why, "lasting.slots"));
+}
+
+}  // namespace
+
+void setUp(void) {
+  make_room();
+  state = nullptr;
+}
+void tearDown(void) { free(state); }
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_expected_sighting_and_its_derivatives);
+  RUN_TEST(test_expected_bearing_is_the_papers);
+  RUN_TEST(test_it_tracks_and_its_covariance_is_honest);
+  RUN_TEST(test_it_finds_every_error_of_its_sensors);
+  RUN_TEST(test_gnss_and_its_delay);
+  RUN_TEST(test_misread_codes_are_rejected_and_do_no_harm);
+  RUN_TEST(test_a_maps_error_is_not_averaged_away);
+  RUN_TEST(test_given_a_wrong_start_when_landmarks_contradict_it_then_it_is_said_and_mended);
+  RUN_TEST(test_given_a_kidnapped_robot_when_it_sees_bearings_only_then_it_finds_itself);
+  RUN_TEST(test_given_an_unknown_heading_when_landmarks_are_seen_then_it_is_found);
+  RUN_TEST(test_given_no_start_at_all_when_it_sees_then_it_knows);
+  RUN_TEST(test_given_no_start_when_positions_come_and_it_drives_then_its_heading_is_found);
+  RUN_TEST(test_given_silence_then_it_says_dead_reckoning_and_grows_unsure);
+  RUN_TEST(test_set_pose_and_reset);
+  RUN_TEST(test_each_refusal_has_its_verdict);
+  RUN_TEST(test_too_many_states_are_refused_with_the_reason);
+  return UNITY_END();
+}

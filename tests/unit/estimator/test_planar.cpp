@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+// The planar filter's algebra: kernels and their scalar twins, prediction's derivatives against finite differences,
+// Joseph's form against the plain one, one number after the other against all at once.
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+#include "events.hpp"
+#include "filters/planar/planar_filter.hpp"
+#include "math/arc.hpp"
+#include "math/covariance.hpp"
+#include "math/elementary.hpp"
+#include "motion/motion_params.h"
+#include "unity.h"
+#include "waymark/random.h"
+
+namespace {
+
+constexpr int kMax = 16;
+wm_motion_params params;
+wm_motion_states states;
+wm_setup setup;
+wm::planar_filter *filter;
+
+double random_number(uint64_t i) { return wm_random_normal(5, 2, i); }
+
+void make_setup(const wm_wheels &wheels) {
+  wm_params_defaults(&wm_motion_params_table, &params);
+  setup = {};
+  setup.motion = &params;
+  setup.wheels = wheels;
+  setup.start = {WM_TIME_NONE, {1, 2, 0}, {0, 0, 0, 1}, 0.4, 0.1, 0.1};
+  states = {};
+}
+
+// A filter with everything on that twists can teach, driven for a while so that all is correlated.
+// No lag: it is held at 0 and above, which is not linear.
+void make_busy_filter() {
+  wm_wheels wheels = make::no_wheels();
+  wheels.track_m = 0.5;
+  make_setup(wheels);
+  const double sigma[9] = {0.1, 0.1, 0.02, 0.05, 0.05, 0.05, 0, 0, 0.05};
+  std::memcpy(states.sigma, sigma, sizeof sigma);
+  filter->init(setup, states);
+  for (int i = 0; i <= 20; i++) filter->move(make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i)));
+}
+
+void copy_covariance(double out[kMax][kMax]) {
+  for (int i = 0; i < filter->states(); i++)
+    for (int j = 0; j < filter->states(); j++) out[i][j] = filter->covariance(i, j);
+}
+
+void test_kernels_and_their_scalar_twins_give_the_same_bits(void) {
+  for (int n = 1; n <= 13; n++) {
+    const int stride = wm::even(n);
+    alignas(16) double p[14 * 14] = {}, q[14 * 14], k[14] = {}, b[14] = {};
+    for (int i = 0; i < n; i++) {
+      k[i] = random_number((uint64_t)(100 * n + i));
+      b[i] = random_number((uint64_t)(100 * n + 50 + i));
+      for (int j = 0; j <= i; j++)
+        p[i * stride + j] = p[j * stride + i] = random_number((uint64_t)(1000 * n + 20 * i + j));
+    }
+    std::memcpy(q, p, sizeof p);
+    wm::vectors::add_symmetric_outer(p, k, b, n, stride);
+    wm::scalar::add_symmetric_outer(q, k, b, n, stride);
+    TEST_ASSERT_EQUAL_MEMORY(q, p, sizeof p);
+    for (int i = 0; i < n; i++)
+      for (int j = 0; j < n; j++) TEST_ASSERT_EQUAL_MEMORY(&p[i * stride + j], &p[j * stride + i], sizeof(double));
+    wm::vectors::add_scaled(p, p + stride * (n - 1), 1.7, stride);
+    wm::scalar::add_scaled(q, q + stride * (n - 1), 1.7, stride);
+    wm::vectors::set_scaled(p + stride * (n - 1), p, -0.3, stride);
+    wm::scalar::set_scaled(q + stride * (n - 1), q, -0.3, stride);
+    TEST_ASSERT_EQUAL_MEMORY(q, p, sizeof p);
+  }
+}
+
+// The pose after a drive as a function of the start pose and the calibration.
+wm_pose2 drive(const double x0[3], const wm_motion_calibration &c, const wm_wheels &wheels) {
+  wm::motion_front_end front;
+  front.init(&params, &wheels);
+  wm_pose2 pose = {x0[0], x0[1], x0[2]};
+  for (int i = 0; i <= 20; i++) {
+    const wm_event e = make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i));
+    front.feed(e);
+    front.advance(e.t_ns, c, [&](const wm::motion_stretch &s, const wm::motion_twist &t, const wm::motion_noise &) {
+      const wm::arc a = wm::make_arc(t.v * s.dt_s, t.w * s.dt_s);
+      pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
+    });
+  }
+  return pose;
+}
+
+// With a diagonal start and no noise, the covariance of (pose, state) after the drive is derivative times variance:
+// every calibration column, the lag's too, against differences.
+void test_prediction_carries_the_right_derivatives(void) {
+  wm_wheels wheels = make::no_wheels();
+  wheels.track_m = 0.5;
+  make_setup(wheels);
+  params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
+  params.noise_side_rel = 0;
+  const double sigma[9] = {0.1, 0.1, 0.02, 0.05, 0.05, 0.05, 0, 0.1, 0.05};
+  std::memcpy(states.sigma, sigma, sizeof sigma);
+  filter->init(setup, states);
+  for (int i = 0; i <= 20; i++) filter->move(make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i)));
+  int state = 3, checked = 0;
+  for (int k = 0; k < wm::kCalibrationCount; k++) {
+    if (sigma[k] == 0) continue;
+    const double start[3] = {1, 2, 0.4};
+    wm_motion_calibration cu = wm::kNeutralCalibration, cd = wm::kNeutralCalibration;
+    // The lag's derivative is one-sided at 0: commands that are still to come are not obeyed early.
+    const double h = k == wm::kLag ? 1e-4 : 1e-5, below = k == wm::kLag ? 0.0 : h;
+    wm::calibration_at(cu, k) += h;
+    wm::calibration_at(cd, k) -= below;
+    const wm_pose2 a = drive(start, cu, wheels), b = drive(start, cd, wheels);
+    const double variance = sigma[k] * sigma[k];
+    const double scale = variance / (h + below);
+    const int column = state++;
+    const double want[3] = {(a.x_m - b.x_m) * scale, (a.y_m - b.y_m) * scale,
+                            wm::wrap(a.heading_rad - b.heading_rad) * scale};
+    const double tolerance = (k == wm::kLag ? 1e-3 : 1e-6) * (std::fabs(want[0]) + std::fabs(want[1]) + variance);
+    TEST_ASSERT_DOUBLE_WITHIN(tolerance, want[0], filter->covariance(0, column));
+    TEST_ASSERT_DOUBLE_WITHIN(tolerance, want[1], filter->covariance(1, column));
+    TEST_ASSERT_DOUBLE_WITHIN(tolerance, want[2], filter->covariance(2, column));
+    checked++;
+  }
+  TEST_ASSERT_EQUAL(8, checked);
+}
+
+void test_josephs_form_is_the_plain_one_at_the_best_gain(void) {
+  make_busy_filter();
+  const int n = filter->states();
+  double p[kMax][kMax];
+  copy_covariance(p);
+  wm::sparse_row row;
+  row.add(0, 0.3);
+  row.add(2, -1.1);
+  row.add(5, 0.7);
+  double h[kMax] = {};
+  h[0] = 0.3, h[2] = -1.1, h[5] = 0.7;
+  wm::projection projected;
+  filter->project(row, &projected);
+  double g[kMax] = {}, s = 0.05;
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++) g[i] += p[i][j] * h[j];
+  for (int i = 0; i < n; i++) s += h[i] * g[i];
+  TEST_ASSERT_DOUBLE_WITHIN(1e-14, s - 0.05, projected.variance);
+  filter->update(projected, 0.2, 0.05);
+  for (int i = 0; i < n; i++) {
+    for (int j = 0; j < n; j++) {
+      // (I - KH) P (I - KH)' + K R K', written out in full.
+      double joseph = g[i] / s * 0.05 * g[j] / s;
+      for (int a = 0; a < n; a++)
+        for (int b = 0; b < n; b++) joseph += ((i == a) - g[i] / s * h[a]) * p[a][b] * ((j == b) - g[j] / s * h[b]);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-13, joseph, filter->covariance(i, j));
+      TEST_ASSERT_DOUBLE_WITHIN(1e-13, p[i][j] - g[i] * g[j] / s, filter->covariance(i, j));
+      const double ij = filter->covariance(i, j), ji = filter->covariance(j, i);
+      TEST_ASSERT_EQUAL_MEMORY(&ij, &ji, sizeof ij);
+    }
+  }
+}
+
+// Theorem (e.g. Bar-Shalom, Estimation with Applications, 2001, 7.2): with uncorrelated noises, updating by one row
+// after the other is the same as by all at once. Premise, asserted: the prior couples the two rows.
+void test_one_number_after_the_other_is_all_at_once(void) {
+  make_busy_filter();
+  const int n = filter->states();
+  double p[kMax][kMax], x[kMax];
+  copy_covariance(p);
+  for (int i = 0; i < n; i++) x[i] = filter->value(i);
+  double h[2][kMax] = {};
+  h[0][0] = 1.0, h[0][2] = 0.4, h[1][1] = -0.8, h[1][2] = 0.9, h[1][4] = 0.5;
+  const double z[2] = {0.03, -0.05}, r[2] = {0.01, 0.02};
+  double s[2][2] = {{r[0], 0}, {0, r[1]}}, g[2][kMax] = {};
+  for (int k = 0; k < 2; k++)
+    for (int i = 0; i < n; i++)
+      for (int j = 0; j < n; j++) g[k][i] += p[i][j] * h[k][j];
+  for (int a = 0; a < 2; a++)
+    for (int b = 0; b < 2; b++)
+      for (int i = 0; i < n; i++) s[a][b] += h[a][i] * g[b][i];
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.05, std::fabs(s[0][1]) / sqrt(s[0][0] * s[1][1]));
+  const double det = s[0][0] * s[1][1] - s[0][1] * s[1][0];
+  const double inverse[2][2] = {{s[1][1] / det, -s[0][1] / det}, {-s[1][0] / det, s[0][0] / det}};
+
+  wm::sparse_row row[2];
+  for (int k = 0; k < 2; k++)
+    for (int i = 0; i < n; i++) row[k].add(i, h[k][i]);
+  wm::projection first, second;
+  filter->project(row[0], &first);
+  const double cross = filter->project_onto(row[1], first);
+  filter->update(first, z[0], r[0]);
+  filter->project(row[1], &second);
+  filter->update(second, z[1] - cross / (first.variance + r[0]) * z[0], r[1]);
+
+  for (int i = 0; i < n; i++) {
+    double want = x[i];
+    for (int a = 0; a < 2; a++)
+      for (int b = 0; b < 2; b++) want += g[a][i] * inverse[a][b] * z[b];
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, want, filter->value(i));
+    for (int j = 0; j < n; j++) {
+      double left = p[i][j];
+      for (int a = 0; a < 2; a++)
+        for (int b = 0; b < 2; b++) left -= g[a][i] * inverse[a][b] * g[b][j];
+      TEST_ASSERT_DOUBLE_WITHIN(1e-12, left, filter->covariance(i, j));
+    }
+  }
+}
+
+// GIVEN a car that stands WHEN its gyro says 0.015 rad/s THEN that is its bias.
+void test_standing_still_teaches_the_gyros_bias(void) {
+  make_setup(make::car());
+  states.sigma[2] = 0.02;
+  filter->init(setup, states);
+  for (int i = 0; i < 300; i++)
+    filter->move(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.015 + 0.002 * (i % 2)}}));
+  TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.016, filter->calibration().yaw_rate_bias_radps);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.002, sqrt(filter->variance(3)));
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.4, filter->pose().heading_rad);
+}
+
+void test_fading_and_forgetting_keep_the_rest(void) {
+  make_busy_filter();
+  const double other = filter->covariance(0, 1), own = filter->variance(4), with = filter->covariance(0, 4);
+  filter->fade(4, 0.5, 0.1);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.25 * own + 0.1, filter->variance(4));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.5 * with, filter->covariance(0, 4));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.5 * with, filter->covariance(4, 0));
+  filter->forget(4, 1.0, 0.3);
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, filter->covariance(0, 4));
+  TEST_ASSERT_EQUAL_DOUBLE(0.3, filter->variance(4));
+  TEST_ASSERT_EQUAL_DOUBLE(other, filter->covariance(0, 1));
+}
+
+}  // namespace
+
+void setUp(void) {
+  filter = static_cast<wm::planar_filter *>(aligned_alloc(16, (sizeof(wm::planar_filter) + 15) / 16 * 16));
+}
+void tearDown(void) { free(filter); }
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_kernels_and_their_scalar_twins_give_the_same_bits);
+  RUN_TEST(test_prediction_carries_the_right_derivatives);
+  RUN_TEST(test_josephs_form_is_the_plain_one_at_the_best_gain);
+  RUN_TEST(test_one_number_after_the_other_is_all_at_once);
+  RUN_TEST(test_standing_still_teaches_the_gyros_bias);
+  RUN_TEST(test_fading_and_forgetting_keep_the_rest);
+  return UNITY_END();
+}
