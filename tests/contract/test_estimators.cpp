@@ -1,0 +1,378 @@
+// SPDX-License-Identifier: Apache-2.0
+// The estimator contract (waymark/estimator.h) over every registered estimator.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "unity.h"
+#include "waymark/estimator.h"
+#include "waymark/random.h"
+
+// Any allocation while the trap is set fails the test: estimators have no heap.
+namespace {
+bool trapped = false;
+int allocations = 0;
+}  // namespace
+
+extern "C" {
+void *__libc_malloc(size_t);
+void *__libc_calloc(size_t, size_t);
+void *__libc_realloc(void *, size_t);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+void *malloc(size_t n) {
+  allocations += trapped;
+  return __libc_malloc(n);
+}
+void *calloc(size_t n, size_t size) {
+  allocations += trapped;
+  return __libc_calloc(n, size);
+}
+void *realloc(void *p, size_t n) {
+  allocations += trapped;
+  return __libc_realloc(p, n);
+}
+#endif
+}
+
+namespace {
+
+const double kAbsent = std::numeric_limits<double>::quiet_NaN();
+const wm_estimator *estimator;
+std::vector<char> motion_params, params;
+wm_setup setup;
+wm_sensor sensor;
+wm_landmark landmarks[4];
+
+struct machine {
+  void *state;
+  size_t bytes;
+  machine() {
+    const char *why = "";
+    bytes = estimator->state_bytes(params.data(), &setup, &why);
+    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
+    state = aligned_alloc(16, (bytes + 15) / 16 * 16);
+    std::memset(state, 0xA5, bytes);
+    TEST_ASSERT_EQUAL(WM_OK, estimator->init(state, params.data(), &setup));
+  }
+  ~machine() { free(state); }
+  machine(const machine &) = delete;
+  wm_status take(const wm_event &e, size_t *count = nullptr) {
+    if (wm_event_is_motion(&e)) return estimator->predict(state, &e);
+    wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
+    size_t n = 0;
+    const wm_status status = estimator->correct(state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &n);
+    TEST_ASSERT_LESS_OR_EQUAL(WM_INNOVATIONS_PER_EVENT_MAX, n);
+    if (count) *count = n;
+    return status;
+  }
+  wm_estimate estimate() const {
+    wm_estimate e;
+    estimator->estimate(state, &e);
+    return e;
+  }
+};
+
+bool takes(unsigned kind) {
+  return ((estimator->takes | WM_MOTION_EVENTS) & WM_EVENT_BIT(kind & 31)) != 0 && kind < 32;
+}
+
+// A drive of events of every kind, some of them nonsense for the pose: any order of kinds that time allows.
+wm_event event_at(uint64_t i, double t_s) {
+  const double u = wm_random_uniform(1, 1, i), a = wm_random_normal(1, 2, i), b = wm_random_normal(1, 3, i);
+  wm_event e{};
+  e.t_ns = wm_ns_from_seconds(t_s);
+  if (u < 0.5) {
+    e.kind = WM_EVENT_TWIST2;
+    e.as.twist2 = {0.5 + 0.1 * a, 0.3 * sin(0.1 * t_s) + 0.1 * b};
+  } else if (u < 0.85) {
+    e.kind = WM_EVENT_SIGHTING;
+    const wm_landmark &l = landmarks[i % 4];
+    e.as.sighting = {0, l.id, 0.3 * a, u < 0.7 ? 4 + std::fabs(b) : kAbsent, kAbsent, kAbsent};
+  } else if (u < 0.93) {
+    e.kind = WM_EVENT_POSITION;
+    e.as.position = {{2 * a, 2 * b, NAN}, 3.0, NAN};
+  } else if (u < 0.97) {
+    e.kind = WM_EVENT_HEADING;
+    e.as.heading = {a, 0.5};
+  } else if (u < 0.99) {
+    e.kind = WM_EVENT_LOOKED;
+  } else {
+    e.kind = WM_EVENT_SET_POSE;
+    e.as.set_pose.pose_map_base = {{a, b, 0}, {0, 0, 0.6, 0.8}};
+    e.as.set_pose.sigma_xy_m = 0.3;
+    e.as.set_pose.sigma_heading_rad = 0.2;
+  }
+  return e;
+}
+
+void assert_sound(const wm_estimate &e) {
+  double p[3][3];
+  const int at[3] = {0, 1, 5};
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) {
+      p[i][j] = e.covariance[wm_cov_index(at[i], at[j])];
+      TEST_ASSERT_TRUE(std::isfinite(p[i][j]));
+      const double mirrored = e.covariance[wm_cov_index(at[j], at[i])];
+      TEST_ASSERT_EQUAL_MEMORY(&mirrored, &p[i][j], sizeof mirrored);
+    }
+  const double minor = p[0][0] * p[1][1] - p[0][1] * p[0][1];
+  const double det = p[2][2] * minor - p[0][2] * (p[0][2] * p[1][1] - p[0][1] * p[1][2]) +
+                     p[1][2] * (p[0][2] * p[0][1] - p[1][2] * p[0][0]);
+  TEST_ASSERT_TRUE(p[0][0] > 0 && p[1][1] > 0 && p[2][2] > 0);
+  TEST_ASSERT_TRUE(minor > -1e-9 * p[0][0] * p[1][1]);
+  TEST_ASSERT_TRUE(det > -1e-9 * p[0][0] * p[1][1] * p[2][2]);
+  TEST_ASSERT_TRUE(std::isfinite(e.pose_map_base.p_m[0]) && std::isfinite(e.pose_map_base.p_m[1]));
+  TEST_ASSERT_TRUE(e.heading_rad > -3.1415926535897936 && e.heading_rad <= 3.1415926535897936);
+  const double *q = e.pose_map_base.q_xyzw;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  TEST_ASSERT_TRUE(e.state <= WM_STATE_LOST);
+}
+
+void test_the_same_events_give_the_same_bytes_and_a_copy_goes_on_alike(void) {
+  machine a, b;
+  TEST_ASSERT_EQUAL_MEMORY(a.state, b.state, a.bytes);
+  for (uint64_t i = 0; i < 3000; i++) {
+    const wm_event e = event_at(i, 0.02 * (double)i);
+    if (!takes(e.kind)) continue;
+    TEST_ASSERT_EQUAL(a.take(e), b.take(e));
+    if (i == 1500) std::memcpy(b.state, a.state, a.bytes);  // a copy
+  }
+  TEST_ASSERT_EQUAL_MEMORY(a.state, b.state, a.bytes);
+}
+
+void test_it_never_allocates(void) {
+  machine a;
+  std::vector<wm_event> events;
+  for (uint64_t i = 0; i < 3000; i++) events.push_back(event_at(i, 0.02 * (double)i));
+  allocations = 0;
+  trapped = true;
+  for (const wm_event &e : events) a.take(e);
+  wm_estimate out;
+  estimator->estimate(a.state, &out);
+  wm_calibration_value values[64];
+  estimator->calibration(a.state, values, 64);
+  wm_motion_calibration calibration;
+  estimator->motion(a.state, &calibration);
+  estimator->motion_health(a.state);
+  trapped = false;
+  TEST_ASSERT_EQUAL(0, allocations);
+}
+
+void test_the_estimate_is_sound_at_every_event_and_stands_at_its_time(void) {
+  machine a;
+  int taken = 0;
+  for (uint64_t i = 0; i < 5000; i++) {
+    const wm_event e = event_at(i, 0.02 * (double)i);
+    if (a.take(e) != WM_OK) continue;
+    const wm_estimate out = a.estimate();
+    TEST_ASSERT_EQUAL_INT64(e.t_ns, out.t_ns);
+    assert_sound(out);
+    taken++;
+  }
+  TEST_ASSERT_GREATER_THAN(2000, taken);
+}
+
+void assert_refused(machine &a, const wm_event &e, wm_status want) {
+  std::vector<char> before((char *)a.state, (char *)a.state + a.bytes);
+  TEST_ASSERT_EQUAL(takes(e.kind) ? want : WM_UNSUPPORTED, a.take(e));
+  TEST_ASSERT_EQUAL_MEMORY(before.data(), a.state, a.bytes);
+}
+
+void test_nonsense_is_refused_with_a_status_and_changes_nothing(void) {
+  machine a;
+  for (uint64_t i = 0; i < 500; i++) a.take(event_at(i, 0.02 * (double)i));
+  const wm_time_ns t = a.estimate().t_ns + WM_NS_PER_S;
+  const double bad[] = {NAN, INFINITY, -INFINITY, 1e300};
+  for (double x : bad) {
+    const wm_status want = std::isfinite(x) ? WM_OUT_OF_RANGE : WM_NOT_FINITE;
+    wm_event e{};
+    e.t_ns = t;
+    e.kind = WM_EVENT_TWIST2;
+    e.as.twist2 = {x, 0};
+    assert_refused(a, e, want);
+    e.as.twist2 = {0, x};
+    assert_refused(a, e, want);
+    e.kind = WM_EVENT_QUANTITIES;
+    e.as.quantities = {};
+    e.as.quantities.count = 1;
+    for (uint8_t q = 0; q < WM_Q_COUNT; q++) {
+      e.as.quantities.id[0] = q;
+      e.as.quantities.value[0] = x;
+      assert_refused(a, e, want);
+    }
+    e.kind = WM_EVENT_POSITION;
+    e.as.position = {{x, 0, NAN}, 1, NAN};
+    assert_refused(a, e, want);
+    e.as.position = {{0, x, NAN}, 1, NAN};
+    assert_refused(a, e, want);
+    e.as.position = {{0, 0, NAN}, x, NAN};
+    assert_refused(a, e, want);
+    e.kind = WM_EVENT_HEADING;
+    e.as.heading = {x, 1};
+    assert_refused(a, e, want);
+    e.kind = WM_EVENT_SET_POSE;
+    e.as.set_pose = {{{x, 0, 0}, {0, 0, 0, 1}}, 1, 1};
+    assert_refused(a, e, want);
+    e.as.set_pose = {{{0, 0, 0}, {0, 0, 0, 1}}, x, 1};
+    assert_refused(a, e, want);
+    if (std::isnan(x)) continue;
+    e.kind = WM_EVENT_SIGHTING;
+    e.as.sighting = {0, landmarks[0].id, x, 1, NAN, NAN};
+    assert_refused(a, e, want);
+    e.as.sighting = {0, landmarks[0].id, 0, x, NAN, NAN};
+    assert_refused(a, e, want);
+  }
+  wm_event e{};
+  e.t_ns = t;
+  e.kind = WM_EVENT_SIGHTING;
+  e.as.sighting = {0, landmarks[0].id, NAN, NAN, NAN, NAN};
+  assert_refused(a, e, WM_NOT_FINITE);
+  e.as.sighting = {77, landmarks[0].id, 0, 1, NAN, NAN};
+  assert_refused(a, e, WM_OUT_OF_RANGE);
+  e.as.sighting = {0, landmarks[0].id, 0, -1, NAN, NAN};
+  assert_refused(a, e, WM_OUT_OF_RANGE);
+  e.as.sighting = {0, landmarks[0].id, 0, 1, -0.1, NAN};
+  assert_refused(a, e, WM_OUT_OF_RANGE);
+  e.kind = WM_EVENT_SET_POSE;
+  e.as.set_pose = {{{0, 0, 0}, {0, 0, 0, 0}}, 1, 1};
+  assert_refused(a, e, WM_OUT_OF_RANGE);
+  e.kind = WM_EVENT_QUANTITIES;
+  e.as.quantities = {};
+  e.as.quantities.count = 255;
+  assert_refused(a, e, WM_OUT_OF_RANGE);
+  e.as.quantities.count = 1;
+  e.as.quantities.id[0] = 200;
+  assert_refused(a, e, WM_OUT_OF_RANGE);
+  e.kind = WM_EVENT_TWIST2;
+  e.as.twist2 = {0, 0};
+  e.t_ns = INT64_MAX;
+  assert_refused(a, e, WM_OUT_OF_RANGE);
+  e.kind = 250;
+  assert_refused(a, e, WM_UNSUPPORTED);
+}
+
+void test_time_never_runs_back(void) {
+  machine a;
+  for (uint64_t i = 0; i < 500; i++) a.take(event_at(i, 0.02 * (double)i));
+  for (uint64_t i = 0; i < 200; i++) {
+    const wm_event old = event_at(i, 5.0);
+    assert_refused(a, old, WM_TIME_RAN_BACK);
+  }
+}
+
+void test_set_pose_works_at_any_time(void) {
+  machine a;
+  uint32_t resets = a.estimate().resets;
+  for (int k = 0; k < 20; k++) {
+    for (uint64_t i = 0; i < 50; i++) a.take(event_at(i, 2.0 * k + 0.02 * (double)i));
+    wm_event e{};
+    e.t_ns = a.estimate().t_ns + 1000;
+    e.kind = WM_EVENT_SET_POSE;
+    e.as.set_pose = {{{10.0 * k, -3, 0}, {0, 0, 0.6, 0.8}}, 0.3, 0.2};
+    resets = a.estimate().resets;
+    TEST_ASSERT_EQUAL(WM_OK, a.take(e));
+    const wm_estimate out = a.estimate();
+    TEST_ASSERT_EQUAL_DOUBLE(10.0 * k, out.pose_map_base.p_m[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2 * asin(0.6), out.heading_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.09, out.covariance[0]);
+    TEST_ASSERT_EQUAL_UINT32(resets + 1, out.resets);
+    TEST_ASSERT_TRUE(out.state != WM_STATE_SEARCHING && out.state != WM_STATE_LOST);
+  }
+}
+
+// A day: twists at 10 Hz, a sighting now and then, and hours of rest.
+void test_a_day_without_drift_of_symmetry(void) {
+  machine a;
+  for (uint64_t i = 0; i < 864000; i++) {
+    const double t = 0.1 * (double)i;
+    wm_event e{};
+    e.t_ns = wm_ns_from_seconds(t);
+    e.kind = WM_EVENT_TWIST2;
+    const bool rests = (i / 36000) % 3 == 2;
+    e.as.twist2 = {rests ? 0 : 0.4, rests ? 0 : 0.1};
+    TEST_ASSERT_EQUAL(WM_OK, a.take(e));
+    if (i % 50 == 7) {
+      wm_event o = event_at(i, t);
+      if (!wm_event_is_motion(&o) && takes(o.kind)) TEST_ASSERT_EQUAL(WM_OK, a.take(o));
+    }
+    if (i % 1000 == 0) assert_sound(a.estimate());
+  }
+}
+
+void test_what_is_learnt_is_listed_and_given_to_the_predictor(void) {
+  machine a;
+  for (uint64_t i = 0; i < 500; i++) a.take(event_at(i, 0.02 * (double)i));
+  wm_calibration_value values[64];
+  const size_t count = estimator->calibration(a.state, values, 64);
+  TEST_ASSERT_GREATER_THAN(0, count);
+  TEST_ASSERT_EQUAL(count, estimator->calibration(a.state, values, 1));
+  wm_motion_calibration c;
+  estimator->motion(a.state, &c);
+  TEST_ASSERT_TRUE(std::isfinite(c.speed_scale) && c.speed_scale > 0);
+  for (size_t i = 0; i < count && i < 1; i++) {
+    TEST_ASSERT_TRUE(std::isfinite(values[i].value) && values[i].sigma > 0);
+    TEST_ASSERT_GREATER_THAN(0, strlen(values[i].name));
+  }
+}
+
+void set_param(const wm_param_table &table, std::vector<char> &out, const char *key, double value) {
+  for (size_t i = 0; i < table.count; i++)
+    if (std::strcmp(table.params[i].key, key) == 0) {
+      TEST_ASSERT_EQUAL(WM_PARAM_F64, table.params[i].type);
+      std::memcpy(&out[table.params[i].offset], &value, sizeof value);
+    }
+}
+
+}  // namespace
+
+void setUp(void) {
+  motion_params.resize(wm_motion_params_table.bytes);
+  wm_params_defaults(&wm_motion_params_table, motion_params.data());
+  params.resize(estimator->params.bytes);
+  wm_params_defaults(&estimator->params, params.data());
+  // Everything that may be learnt is switched on, where the estimator has it.
+  const char *sigmas[] = {"states.speed_scale_sigma",         "states.yaw_rate_scale_sigma",
+                          "states.yaw_rate_bias_sigma_radps", "states.lag_sigma_s",
+                          "states.sensor_yaw_sigma_rad",      "states.sensor_time_offset_sigma_s",
+                          "states.range_bias_sigma_m",        "lasting.gnss_m"};
+  for (const char *key : sigmas) set_param(estimator->params, params, key, 0.1);
+  sensor = {};
+  std::strcpy(sensor.name, "eye");
+  sensor.bearing_sigma_rad = sensor.range_sigma_m = NAN;
+  sensor.max_range_m = INFINITY;
+  for (int i = 0; i < 4; i++) landmarks[i] = {40 - i, {5.0 * cos(i), 5.0 * sin(i), 0}, 0.01, NAN};
+  setup = {};
+  setup.motion = reinterpret_cast<const wm_motion_params *>(motion_params.data());
+  setup.wheels = {NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}};
+  setup.sensors = &sensor;
+  setup.sensor_count = 1;
+  setup.landmarks = landmarks;
+  setup.landmark_count = 4;
+  setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0, 0.05, 0.05};
+  setup.seed = 1;
+}
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  size_t count;
+  const wm_estimator *const *all = wm_estimators(&count);
+  for (size_t i = 0; i < count; i++) {
+    estimator = all[i];
+    printf("-- %s\n", estimator->name);
+    if (wm_estimator_find(estimator->name) != estimator) return 1;
+    RUN_TEST(test_the_same_events_give_the_same_bytes_and_a_copy_goes_on_alike);
+    RUN_TEST(test_it_never_allocates);
+    RUN_TEST(test_the_estimate_is_sound_at_every_event_and_stands_at_its_time);
+    RUN_TEST(test_nonsense_is_refused_with_a_status_and_changes_nothing);
+    RUN_TEST(test_time_never_runs_back);
+    RUN_TEST(test_set_pose_works_at_any_time);
+    RUN_TEST(test_a_day_without_drift_of_symmetry);
+    RUN_TEST(test_what_is_learnt_is_listed_and_given_to_the_predictor);
+  }
+  if (wm_estimator_find("no such") || count < 2) return 1;
+  return UNITY_END();
+}
