@@ -11,7 +11,7 @@ PANEL_W, PANEL_H, GAP, HEAD = 430, 400, 20, 34
 CHI2_95_2DOF = 5.991
 ELLIPSE_EVERY_S = 3.0
 SIGHT_LINES_AT_S = (8.5, 17.5, 33.0)
-LOUPE_AT, LOUPE_PX, LOUPE_M = (14, 46), 130, 2
+LOUPE_AT, LOUPE_PX = (14, 46), 130
 TITLES = ("no landmark: dead reckoning", "one landmark", "two landmarks", "three landmarks")
 
 
@@ -79,16 +79,17 @@ def polyline(view, points, style):
 
 def closeup(drive):
     """The end of the drive, magnified: the true place is the cross in the middle."""
-    scale, half = LOUPE_PX / LOUPE_M, LOUPE_PX / 2
     dx, dy = drive.end_error()
     axes, degrees = ellipse(drive.poses[-1])
+    across_m = 2.5 if axes[0] > 0.3 else 0.4
+    scale, half = LOUPE_PX / across_m, LOUPE_PX / 2
     return (f'<g transform="translate({LOUPE_AT[0]} {LOUPE_AT[1]})"><svg width="{LOUPE_PX}" height="{LOUPE_PX}">'
             f'<rect class="loupe" width="{LOUPE_PX}" height="{LOUPE_PX}"/><g transform="translate({half} {half})">'
             f'<ellipse class="ellipse" rx="{axes[0] * scale:.2f}" ry="{axes[1] * scale:.2f}" '
             f'transform="translate({dx * scale:.1f} {-dy * scale:.1f}) rotate({-degrees:.1f})"/>'
             f'<circle class="spot" r="3" cx="{dx * scale:.1f}" cy="{-dy * scale:.1f}"/>'
             f'<path class="cross" d="M-7 0h14M0 -7v14"/></g></svg>'
-            f'<text class="name" x="0" y="{LOUPE_PX + 14}">the end, {LOUPE_M} m across</text></g>')
+            f'<text class="name" x="0" y="{LOUPE_PX + 14}">the end, {across_m} m across</text></g>')
 
 
 def panel(drive, view):

@@ -13,6 +13,8 @@
 
 namespace {
 
+using wm::montecarlo::Band;
+using wm::montecarlo::band_of;
 using wm::montecarlo::Statistics;
 
 double degrees(double rad) { return rad * 180 / wm::sim::kPi; }
@@ -33,15 +35,17 @@ void print_row(const Statistics &s) {
   std::printf("%9zu | %6.3f %8.3f %7.2f | %6.3f %8.2f | %8.3f %6.3f %5.2f | %5.2f %6.1f %% |", s.landmarks, pe,
               s.bound_position_end_m(), ratio(s.bound_position_end_m(), pe), pr, ratio(s.bound_position_rms_m(), pr),
               degrees(he), degrees(s.bound_heading_end_rad()), ratio(s.bound_heading_end_rad(), he), s.nees_mean(),
-              100 * s.nees_inside(0.8, 1.25));
+              100 * s.nees_inside(band_of(s.runs)));
   if (s.fused > 0)
-    std::printf(" %5.2f %6.1f %%\n", s.nis_mean(), 100 * s.nis_inside(0.8, 1.25));
+    std::printf(" %5.2f %6.1f %%\n", s.nis_mean(), 100 * s.nis_inside(band_of(s.runs)));
   else
     std::printf("     -        -\n");
 }
 
 void print_counts(const std::vector<Statistics> &all) {
-  std::printf("\nIn band: share of the 0.1 s steps whose mean over the drives lies in [0.8, 1.25].\n");
+  const Band band = band_of(all.empty() ? 0 : all[0].runs);
+  std::printf("\nIn band: share of the 0.1 s steps whose mean over the drives lies in [%.2f, %.2f].\n", band.low,
+              band.high);
   for (const Statistics &s : all)
     std::printf("%zu landmarks: %" PRIu64 " drives, %" PRIu64 " lost; sightings: %" PRIu64 " fused, %" PRIu64
                 " rejected; outliers were %" PRIu64 "\n",

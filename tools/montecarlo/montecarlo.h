@@ -14,6 +14,13 @@ namespace wm::montecarlo {
 
 constexpr double kStep_s = 0.1;  // figures are taken this often
 
+// In which a consistent mean of normalised errors squared lies, nearly always: [0.8, 1.25] for 200 drives and more,
+// wider by the square root for fewer.
+struct Band {
+  double low, high;
+};
+Band band_of(uint64_t drives);
+
 // Means over the runs at one time of the drive.
 struct Step {
   double t_s = 0;
@@ -37,9 +44,9 @@ struct Statistics {
       bound_heading_rms_rad() const;
   // Root mean square of the position's error from `from_s` to `to_s` of the drive, and the bound there.
   double position_m(double from_s, double to_s) const, bound_position_m(double from_s, double to_s) const;
-  // Share of the steps whose mean NEES (NIS) divided by its degrees of freedom lies in [low, high]; steps without a
-  // fused update don't count for NIS.
-  double nees_inside(double low, double high) const, nis_inside(double low, double high) const;
+  // Share of the steps whose mean NEES (NIS) divided by its degrees of freedom lies in the band; steps without a fused
+  // update don't count for NIS.
+  double nees_inside(Band band) const, nis_inside(Band band) const;
   double nees_mean() const, nis_mean() const;  // over all, divided by the degrees of freedom
 };
 

@@ -23,6 +23,11 @@ double at_end(const std::vector<Step> &steps, double Step::*field) {
 
 }  // namespace
 
+Band band_of(uint64_t drives) {
+  const double wider = drives == 0 ? 1 : std::fmax(1, std::sqrt(200 / static_cast<double>(drives)));
+  return {1 - 0.2 * wider, 1 + 0.25 * wider};
+}
+
 double Statistics::position_end_m() const { return at_end(steps, &Step::position_sq_m2); }
 double Statistics::position_rms_m() const { return over(steps, &Step::position_sq_m2); }
 double Statistics::heading_end_rad() const { return at_end(steps, &Step::heading_sq_rad2); }
@@ -38,24 +43,24 @@ double Statistics::bound_position_m(double from_s, double to_s) const {
   return over(steps, &Step::bound_position_sq_m2, from_s, to_s);
 }
 
-double Statistics::nees_inside(double low, double high) const {
+double Statistics::nees_inside(Band band) const {
   size_t inside = 0, all = 0;
   for (const Step &s : steps) {
     if (s.runs == 0) continue;
     const double mean = s.nees / (3 * static_cast<double>(s.runs));
     all++;
-    inside += mean >= low && mean <= high;
+    inside += mean >= band.low && mean <= band.high;
   }
   return all ? static_cast<double>(inside) / static_cast<double>(all) : 0;
 }
 
-double Statistics::nis_inside(double low, double high) const {
+double Statistics::nis_inside(Band band) const {
   size_t inside = 0, all = 0;
   for (const Step &s : steps) {
     if (s.nis_dof == 0) continue;
     const double mean = s.nis / static_cast<double>(s.nis_dof);
     all++;
-    inside += mean >= low && mean <= high;
+    inside += mean >= band.low && mean <= band.high;
   }
   return all ? static_cast<double>(inside) / static_cast<double>(all) : 0;
 }

@@ -37,8 +37,8 @@ Statistics drives(const char *world, const char *config_name, size_t landmarks) 
   wm_config_free(&config);
   std::printf("%s %s, %zu landmarks: end %.4f m (bound %.4f), %.3f deg; NEES %.3f, %.1f %%; NIS %.3f, %.1f %%\n", world,
               config_name, landmarks, s.position_end_m(), s.bound_position_end_m(),
-              s.heading_end_rad() * 180 / sim::kPi, s.nees_mean(), 100 * s.nees_inside(0.8, 1.25), s.nis_mean(),
-              100 * s.nis_inside(0.8, 1.25));
+              s.heading_end_rad() * 180 / sim::kPi, s.nees_mean(), 100 * s.nees_inside(montecarlo::band_of(seeds)),
+              s.nis_mean(), 100 * s.nis_inside(montecarlo::band_of(seeds)));
   return s;
 }
 
@@ -53,12 +53,11 @@ void is_between(double low, double high, double value, const char *what) {
 // Means over n drives of a quantity with `dof` degrees of freedom scatter by sqrt(2 / (n dof)): with 200 drives the
 // band [0.8, 1.25] is 3 to 4 of that wide, with fewer it is widened by as much.
 void is_consistent(const Statistics &s) {
-  const double wider = std::sqrt(200.0 / static_cast<double>(seeds));
-  const double low = 1 - 0.2 * wider, high = 1 + 0.25 * wider;
-  is_between(0.9, 1, s.nees_inside(low, high), "share of the steps with a consistent NEES");
-  is_between(1 - 0.15 * wider, 1 + 0.1 * wider, s.nees_mean(), "mean NEES");
+  const montecarlo::Band band = montecarlo::band_of(seeds);
+  is_between(0.9, 1, s.nees_inside(band), "share of the steps with a consistent NEES");
+  is_between(band.low, band.high, s.nees_mean(), "mean NEES");
   if (s.landmarks == 0) return;
-  is_between(0.9, 1, s.nis_inside(low, high), "share of the steps with a consistent NIS");
+  is_between(0.9, 1, s.nis_inside(band), "share of the steps with a consistent NIS");
   is_between(0.95, 1.05, s.nis_mean(), "mean NIS");
   // Outliers that fall near the truth pass the gate; hardly anything else is refused.
   const double refused = static_cast<double>(s.rejected) / static_cast<double>(s.outliers);

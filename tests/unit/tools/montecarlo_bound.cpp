@@ -127,10 +127,10 @@ void test_statistics_by_hand() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, std::sqrt(0.125), s.position_rms_m());
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.3, s.position_m(0, 0.15));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.2, s.nees_mean());
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5, s.nees_inside(0.8, 1.25));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5, s.nees_inside({0.8, 1.25}));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2, s.nis_mean());
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, s.nis_inside(0.8, 1.25));  // the step without updates doesn't count
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1, s.nis_inside(0.8, 2.5));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, s.nis_inside({0.8, 1.25}));  // the step without updates doesn't count
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1, s.nis_inside({0.8, 2.5}));
 }
 
 }  // namespace
