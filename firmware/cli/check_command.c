@@ -46,6 +46,14 @@ static void print_driving(const wm_driving *driving) {
   (void)puts("(CAN): a row of the trajectory at each");
 }
 
+static void print_quantities(uint32_t quantities) {
+  if (quantities == 0) return;
+  (void)printf("CAN gives   ");
+  for (unsigned q = 0; q < WM_Q_COUNT; q++)
+    if ((quantities >> q) & 1u) (void)printf(" %s", wm_quantity_name(q));
+  (void)putchar('\n');
+}
+
 typedef struct source_facts {
   uint64_t events;
   wm_time_ns first_ns, last_ns, latest_ns;
@@ -94,12 +102,15 @@ static wm_status check_recording(const wm_config *config, const char *dir, wm_er
     (void)printf("setup        %zu sensors, %zu landmarks\n", assembly.setup.sensor_count,
                  assembly.setup.landmark_count);
     print_start(&assembly.setup.start);
+    print_quantities(wm_recording_quantities(recording));
     print_driving(&assembly.driving);
     static wm_pipeline pipeline;
     wm_arena_need needs[WM_PIPELINE_NEEDS];
     wm_pipeline_needs(&pipeline, &assembly, needs);
-    (void)printf("memory       %.2f MB for merge, estimator and odometry\n",
-                 (double)wm_arena_sum(needs, WM_PIPELINE_NEEDS) * 1e-6);
+    (void)printf("memory       %.2f MB:", (double)wm_arena_sum(needs, WM_PIPELINE_NEEDS) * 1e-6);
+    for (size_t i = 0; i < WM_PIPELINE_NEEDS; i++)
+      (void)printf(" %s %.3f", needs[i].name, (double)needs[i].bytes * 1e-6);
+    (void)putchar('\n');
     for (size_t i = 0; status == WM_OK && i < assembly.source_count; i++)
       status = print_source(&assembly.sources[i], err);
     for (size_t i = 0; i < assembly.unused_count; i++) (void)printf("not used     %s\n", assembly.unused[i]);

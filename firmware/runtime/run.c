@@ -100,6 +100,17 @@ static void start_clock(live *self) {
   self->estimator.next_health_ns = self->clock.run_ns;
 }
 
+static void tell_memory(live *self) {
+  char parts[300];
+  size_t length = 0;
+  for (size_t i = 0; i < self->arena.part_count && length < sizeof parts - 1; i++) {
+    int n = snprintf(parts + length, sizeof parts - length, "%s%s %.2f", i ? ", " : "", self->arena.parts[i].name,
+                     (double)self->arena.parts[i].bytes * 1e-6);
+    length += n > 0 ? (size_t)n : 0;
+  }
+  live_say(self, "memory: %.2f MB, taken before the start: %s", (double)self->arena.bytes * 1e-6, parts);
+}
+
 // What the real-time thread needs and a desk's user may lack is said, and the run goes on without.
 static void steady_memory(live *self, wm_live_report *report) {
   if (self->config->runtime.realtime_lock_memory) {
@@ -227,6 +238,7 @@ static wm_status first_source_error(const live *self, wm_error *err) {
 static wm_status run(live *self, wm_recording *recording, wm_live_report *report, wm_error *err) {
   wm_status status = prepare(self, recording, err);
   if (status != WM_OK) return status;
+  tell_memory(self);
   steady_memory(self, report);
   start_clock(self);
   thread_list threads = {0};

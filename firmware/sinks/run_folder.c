@@ -142,13 +142,21 @@ static void published(wm_run_folder *self, const wm_published *p) {
   end(self, PUBLISHED);
 }
 
+// A position or heading has no sensor of the calibration.
+static const char *sensor_of(const wm_assembly *assembly, const wm_innovation *i) {
+  const uint32_t by_sensor =
+      WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) | WM_EVENT_BIT(WM_EVENT_LOOKED);
+  if (i->source >= assembly->source_count || !(assembly->sources[i->source].kinds & by_sensor)) return "";
+  return wm_assembly_sensor_name(assembly, i->sensor);
+}
+
 static void innovation(wm_run_folder *self, const wm_innovation *i) {
   wm_row *line = begin(self);
   wm_row_int(line, i->t_ns);
   wm_row_char(line, ',');
   wm_row_text(line, wm_assembly_source_name(self->assembly, i->source));
   wm_row_char(line, ',');
-  wm_row_text(line, wm_assembly_sensor_name(self->assembly, i->sensor));
+  wm_row_text(line, sensor_of(self->assembly, i));
   wm_row_char(line, ',');
   if (i->landmark_id >= 0) wm_row_int(line, i->landmark_id);
   wm_row_char(line, ',');

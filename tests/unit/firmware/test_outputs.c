@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+// The estimator's thread never waits for its sinks: what finds no room is counted, and a hole in the log is marked.
+#include <stdlib.h>
+
+#include "live.h"
+#include "log_fixture.h"
+#include "unity.h"
+
+#define SLOTS 4
+
+static live_estimator *estimator;
+static wm_output output;
+static void *memory;
+
+void setUp(void) {
+  estimator = aligned_alloc(WM_CACHE_LINE, (sizeof *estimator + WM_CACHE_LINE - 1) / WM_CACHE_LINE * WM_CACHE_LINE);
+  memset(estimator, 0, sizeof *estimator);
+  size_t slot_bytes = OUTPUT_RECORD_HEAD + wm_output_bytes(0);
+  memory = malloc(wm_ring_bytes(SLOTS, slot_bytes));
+  wm_ring_init(&estimator->outputs, memory, SLOTS, slot_bytes);
+  output = estimator_output(estimator);
+}
+
+void tearDown(void) {
+  free(memory);
+  free(estimator);
+}
+
+static void put_event(uint32_t i) {
+  wm_event e = fixture_event(i);
+  output.put(output.context, WM_OUTPUT_EVENT, &e, wm_event_bytes(&e));
+}
+
+static uint64_t take(uint64_t *what) {
+  const output_record *record = wm_ring_front(&estimator->outputs);
+  if (!record) return 0;
+  uint64_t kind = record->kind;
+  *what = kind == OUTPUT_GAP ? record->as.gap : record->as.event.seq;
+  wm_ring_pop(&estimator->outputs);
+  return kind;
+}
+
+static void events_that_found_no_room_are_marked_before_the_next_one(void) {
+  uint64_t what;
+  for (uint32_t i = 0; i < 7; i++) put_event(i);  // 4, 5 and 6 find no room
+  for (uint32_t i = 0; i < SLOTS; i++) {
+    TEST_ASSERT_EQUAL_UINT64(WM_OUTPUT_EVENT, take(&what));
+    TEST_ASSERT_EQUAL_UINT64(i, what);
+  }
+  put_event(7);
+  TEST_ASSERT_EQUAL_UINT64(OUTPUT_GAP, take(&what));
+  TEST_ASSERT_EQUAL_UINT64(3, what);
+  TEST_ASSERT_EQUAL_UINT64(WM_OUTPUT_EVENT, take(&what));
+  TEST_ASSERT_EQUAL_UINT64(7, what);
+  TEST_ASSERT_EQUAL_UINT64(0, take(&what));
+}
+
+// Room for the mark, but not for the event behind it: the event counts into the next mark.
+static void a_mark_without_its_event_is_followed_by_another(void) {
+  uint64_t what, marked = 0, events = 0;
+  for (uint32_t i = 0; i < 6; i++) put_event(i);
+  TEST_ASSERT_EQUAL_UINT64(WM_OUTPUT_EVENT, take(&what));
+  put_event(6);
+  put_event(7);
+  while (take(&what)) {
+  }
+  put_event(8);
+  for (uint64_t kind; (kind = take(&what)) != 0;) {
+    if (kind == OUTPUT_GAP) marked += what;
+    if (kind == WM_OUTPUT_EVENT) events++;
+  }
+  TEST_ASSERT_EQUAL_UINT64(2, marked);  // 6 and 7; 4 and 5 were marked before
+  TEST_ASSERT_EQUAL_UINT64(1, events);
+}
+
+static void poses_that_find_no_room_are_counted(void) {
+  wm_published published = {.sent_ns = 1};
+  for (int i = 0; i < 10; i++) output.put(output.context, WM_OUTPUT_PUBLISHED, &published, sizeof published);
+  TEST_ASSERT_EQUAL_UINT64(10 - SLOTS, wm_ring_dropped(&estimator->outputs));
+  TEST_ASSERT_EQUAL_UINT64(0, estimator->events_lost);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(events_that_found_no_room_are_marked_before_the_next_one);
+  RUN_TEST(a_mark_without_its_event_is_followed_by_another);
+  RUN_TEST(poses_that_find_no_room_are_counted);
+  return UNITY_END();
+}
