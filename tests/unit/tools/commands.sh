@@ -1,0 +1,96 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# The desk's commands as a person calls them: exit codes, what is said, what is written.
+set -u
+bin=$WM_BIN_DIR
+dir=$(mktemp -d)
+trap 'rm -r "$dir"' EXIT
+failures=0
+
+# expect CODE TEXT COMMAND...: the command ends with CODE and says TEXT.
+expect() {
+  local code=$1 text=$2 said got
+  shift 2
+  said=$("$@" 2>&1)
+  got=$?
+  if [ "$got" -ne "$code" ] || ! grep -qF -- "$text" <<<"$said"; then
+    echo "FAIL: $*"
+    echo "  exit code $got, expected $code; expected to read '$text' in:"
+    sed 's/^/  | /' <<<"$said"
+    failures=$((failures + 1))
+  fi
+}
+
+mkdir "$dir/rec" "$dir/run" "$dir/empty"
+{
+  echo 't_ns,x_m,y_m,z_m,qx,qy,qz,qw'
+  for i in $(seq 0 9); do echo "${i}00000000,0.$i,0,0,0,0,0,1"; done
+} >"$dir/rec/truth.csv"
+{
+  echo 't_ns,x_m,y_m,z_m,qx,qy,qz,qw,cov_xx,cov_xy,cov_yy,cov_xt,cov_yt,cov_tt,state'
+  for i in $(seq 0 9); do echo "${i}00000000,0.$i,0.1,0,0,0,0,1,0.01,0,0.01,0,0,0.01,tracking"; done
+} >"$dir/run/trajectory.csv"
+
+expect 0 '"position_max_m": 0.1,' "$bin/waymark-eval" "$dir/run" "$dir/rec" --json
+expect 0 '"landmark_rmse_m": null' "$bin/waymark-eval" "$dir/run" "$dir/rec" --json
+expect 0 'position m' "$bin/waymark-eval" "$dir/run" "$dir/rec"
+expect 0 'example: waymark eval' "$bin/waymark-eval" --help
+expect 2 'REC is required' "$bin/waymark-eval" "$dir/run"
+expect 2 'se4' "$bin/waymark-eval" "$dir/run" "$dir/rec" --align se4
+expect 2 '--from must be before --to' "$bin/waymark-eval" "$dir/run" "$dir/rec" --from 3 --to 2
+expect 2 'is no folder' "$bin/waymark-eval" "$dir/nowhere" "$dir/rec"
+expect 1 'has neither trajectory.csv nor trajectory.tum' "$bin/waymark-eval" "$dir/empty" "$dir/rec"
+expect 1 'has no truth.csv' "$bin/waymark-eval" "$dir/run" "$dir/empty"
+expect 1 'gnss.csv: can' "$bin/waymark-eval" "$dir/run" "$dir/rec" --against gnss
+expect 1 'published.csv: can' "$bin/waymark-eval" "$dir/run" "$dir/rec" --published
+expect 1 'nothing to compare' "$bin/waymark-eval" "$dir/run" "$dir/rec" --from 50
+expect 1 'all at one place' "$bin/waymark-eval" "$dir/run" "$dir/rec" --align se2 --from 0.85
+printf 't_ns,x_m,y_m,z_m,sigma_xy_m,sigma_z_m\n100000000,0.1,0.4,,2,\n' >"$dir/rec/gnss.csv"
+expect 0 '"nees_mean": null' "$bin/waymark-eval" "$dir/run" "$dir/rec" --against gnss --json
+expect 0 '"lost_count": null' "$bin/waymark-eval" "$dir/run" "$dir/rec" --against gnss --json
+
+# JSON is JSON: every field of the format is there, nothing is NaN.
+if ! "$bin/waymark-eval" "$dir/run" "$dir/rec" --json | python3 -c '
+import json, sys
+figures = json.load(sys.stdin, parse_constant=lambda text: sys.exit("not JSON: " + text))
+fields = "distance_m duration_s poses coverage position_mean_m position_median_m position_rmse_m position_p95_m position_max_m " \
+  "position_end_m position_end_percent longitudinal_mean_m longitudinal_mean_abs_m longitudinal_std_m longitudinal_max_m " \
+  "lateral_mean_m lateral_mean_abs_m lateral_std_m lateral_max_m heading_mean_deg heading_mean_abs_deg heading_rmse_deg " \
+  "heading_max_deg rotation_rmse_deg rotation_max_deg nees_mean nees_inside_95 anees_dof lost_count lost_s landmark_rmse_m " \
+  "landmark_heading_rmse_deg landmarks_found landmarks_total".split()
+missing = [field for field in fields if field not in figures]
+sys.exit("missing: " + " ".join(missing) if missing else 0)'; then
+  failures=$((failures + 1))
+fi
+
+expect 2 'where to?' "$bin/waymark-report" "$dir/run" "$dir/rec"
+expect 0 '' "$bin/waymark-report" "$dir/run" "$dir/rec" --out "$dir/page.html" --svg "$dir/picture.svg"
+expect 1 "can't be written" "$bin/waymark-report" "$dir/run" --out "$dir/nowhere/page.html"
+if ! python3 -c '
+import sys, xml.dom.minidom, html.parser
+xml.dom.minidom.parse(sys.argv[1])
+class Balanced(html.parser.HTMLParser):
+    """Every element that must be closed is, in order."""
+    void = {"meta", "path", "rect", "circle", "ellipse", "image"}
+    def __init__(self):
+        super().__init__()
+        self.open = []
+    def handle_starttag(self, tag, attrs):
+        if tag not in self.void: self.open.append(tag)
+    def handle_startendtag(self, tag, attrs): pass
+    def handle_endtag(self, tag):
+        if tag not in self.void and (not self.open or self.open.pop() != tag): sys.exit(f"page.html: </{tag}> closes nothing")
+parser = Balanced()
+parser.feed(open(sys.argv[2], encoding="utf-8").read())
+sys.exit("page.html: not closed: " + " ".join(parser.open) if parser.open else 0)' "$dir/picture.svg" "$dir/page.html"; then
+  failures=$((failures + 1))
+fi
+
+expect 0 'The two runs are the same' "$bin/waymark-diff" "$dir/run" "$dir/run"
+cp -r "$dir/run" "$dir/other"
+sed -i '5s/0.1,/0.2,/' "$dir/other/trajectory.csv"
+expect 1 'first at row 4, t = 0.3 s' "$bin/waymark-diff" "$dir/run" "$dir/other"
+expect 2 "is no run's folder" "$bin/waymark-diff" "$dir/run" "$dir/empty"
+
+[ "$failures" -eq 0 ] && echo "all as expected"
+exit $((failures > 0))
