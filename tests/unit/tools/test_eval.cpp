@@ -94,6 +94,10 @@ void test_nees_uses_the_whole_covariance() {
   // P = [2 1 0; 1 2 0; 0 0 1], truth minus estimate = (-1, -2, -0.5): 2 + 0.25.
   run.write("trajectory.csv", made::kPlanarHeader + ("0," + made::pose(1, 2, 0.5)) + ",2,1,2,0,0,1,tracking\n");
   expect(judge(run, recording), "nees_mean", 2.25, 1e-9);
+  // Position and heading correlated, P = [1 0 0.5; 0 1 0; 0.5 0 1], the same error: (1 + 0.25 - 0.5) / 0.75 + 4. With
+  // one sign wrong it would be (1 + 0.25 + 0.5) / 0.75 + 4.
+  run.write("trajectory.csv", made::kPlanarHeader + ("0," + made::pose(1, 2, 0.5)) + ",1,0,1,0.5,0,1,tracking\n");
+  expect(judge(run, recording), "nees_mean", 5, 1e-9);
 }
 
 void test_interpolation_between_the_nearest_and_no_further() {
