@@ -30,6 +30,7 @@ struct wm_merge {
   uint8_t *slots;
   size_t capacity, slot_bytes, waiting;
   wm_time_ns watermark_ns, horizon_ns;
+  wm_time_ns start_ns;  // of the arrival clock: its first advance
 };
 
 // Stamps come from files and devices: what can't be said in 64 bits is the largest or smallest that can.
@@ -76,6 +77,7 @@ wm_merge *wm_merge_init(void *memory, const wm_merge_source *sources, size_t sou
   self->waiting = 0;
   self->watermark_ns = WM_TIME_NONE;
   self->horizon_ns = horizon_ns;
+  self->start_ns = WM_TIME_NONE;
   for (size_t i = 0; i < queue_events; i++) self->free_slots[i] = (uint32_t)i;
   for (size_t i = 0; i < source_count; i++) {
     memset(&self->sources[i], 0, sizeof self->sources[i]);
@@ -130,6 +132,7 @@ static wm_time_ns final_before(const source_state *s, wm_time_ns now_ns) {
 }
 
 void wm_merge_advance(wm_merge *self, wm_time_ns now_ns) {
+  if (self->start_ns == WM_TIME_NONE) self->start_ns = now_ns;
   wm_time_ns earliest = INT64_MAX;
   for (size_t i = 0; i < self->source_count; i++) {
     wm_time_ns bound = final_before(&self->sources[i], now_ns);
@@ -237,11 +240,16 @@ wm_time_ns wm_merge_lateness_p99(const wm_merge *self, size_t source) {
   return counts->lateness_worst_ns;
 }
 
+wm_time_ns wm_merge_silent_ns(const wm_merge *self, size_t source, wm_time_ns now_ns) {
+  wm_time_ns since_ns = self->sources[source].counts.last_arrival_ns;
+  if (since_ns == WM_TIME_NONE) since_ns = self->start_ns;
+  return since_ns == WM_TIME_NONE ? 0 : minus(now_ns, since_ns);
+}
+
 int wm_merge_is_stale(const wm_merge *self, size_t source, wm_time_ns now_ns) {
   const wm_merge_counts *counts = &self->sources[source].counts;
-  if (counts->last_arrival_ns == WM_TIME_NONE) return 1;
-  wm_time_ns silent = minus(now_ns, counts->last_arrival_ns);
-  wm_time_ns spoken = minus(counts->newest_ns, counts->first_ns);
-  wm_time_ns period = counts->stamps > 1 ? spoken / (wm_time_ns)(counts->stamps - 1) : 0;
-  return silent > WM_NS_PER_S && silent / 10 > period;
+  wm_time_ns silent_ns = wm_merge_silent_ns(self, source, now_ns);
+  wm_time_ns period_ns =
+      counts->stamps > 1 ? minus(counts->newest_ns, counts->first_ns) / (wm_time_ns)(counts->stamps - 1) : 0;
+  return silent_ns > WM_NS_PER_S && silent_ns / 10 > period_ns;
 }

@@ -111,7 +111,7 @@ static void source_health(const wm_pipeline *self, size_t i, wm_time_ns now_ns, 
   out->lateness_p99_ns = wm_merge_lateness_p99(self->merge, i);
   out->lateness_max_ns = self->assembly->sources[i].merge.lateness_max_ns;
   out->newest_ns = merged->newest_ns;
-  out->silent_ns = merged->last_arrival_ns == WM_TIME_NONE ? 0 : now_ns - merged->last_arrival_ns;
+  out->silent_ns = wm_merge_silent_ns(self->merge, i, now_ns);
   out->stale = (uint8_t)wm_merge_is_stale(self->merge, i, now_ns);
 }
 

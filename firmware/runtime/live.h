@@ -50,6 +50,10 @@ typedef struct live_sink {
   lcm_sink lcm;
   notify notify;
   wm_time_ns next_flush_ns, next_landmarks_ns;
+  int said_unwritable;
+  // What was said of the sources and the motion sensors, so that only a change is said.
+  uint8_t said_stale[WM_SOURCES_MAX];
+  uint32_t said_motion_health;
 } live_sink;
 
 struct live {

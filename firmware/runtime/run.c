@@ -239,6 +239,10 @@ static wm_status run(live *self, wm_recording *recording, wm_live_report *report
   wm_status status = prepare(self, recording, err);
   if (status != WM_OK) return status;
   tell_memory(self);
+  const wm_runtime_params *params = &self->config->runtime;
+  if (params->publish_rate_hz > params->realtime_loop_hz)
+    live_say(self, "publish.rate_hz %g is more than realtime.loop_hz %d: poses go out at %d Hz",
+             params->publish_rate_hz, params->realtime_loop_hz, params->realtime_loop_hz);
   steady_memory(self, report);
   start_clock(self);
   thread_list threads = {0};

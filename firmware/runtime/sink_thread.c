@@ -70,13 +70,40 @@ static void add_source_counts(live *run, wm_health *health) {
   }
 }
 
+// What fell silent or broke, and what came back: once each.
+static void say_changes(live *run, const wm_health *health) {
+  live_sink *self = &run->sink;
+  for (uint32_t i = 0; i < health->source_count; i++) {
+    const wm_source_health *s = &health->sources[i];
+    if (s->stale == self->said_stale[i]) continue;
+    self->said_stale[i] = s->stale;
+    if (s->stale) {
+      live_say(run, "%s: silent for %.1f s", s->name, (double)s->silent_ns * 1e-9);
+    } else {
+      live_say(run, "%s: is back", s->name);
+    }
+  }
+  if (health->motion_health != self->said_motion_health)
+    live_say(run, health->motion_health ? "motion: a sensor is dead or stuck (health has which)"
+                                        : "motion: the sensors work again");
+  self->said_motion_health = health->motion_health;
+}
+
 static void take_healths(live *run) {
   for (const wm_health *record; (record = wm_ring_front(&run->estimator.healths)) != NULL;
        wm_ring_pop(&run->estimator.healths)) {
     wm_health health = *record;
     add_source_counts(run, &health);
     lcm_sink_health(&run->sink.lcm, &health);
+    say_changes(run, &health);
   }
+}
+
+static void flush(live *run) {
+  wm_error err;
+  if (wm_run_folder_flush(run->sink.folder, &err) == WM_OK || run->sink.said_unwritable) return;
+  run->sink.said_unwritable = 1;
+  live_say(run, "%s. Localizing goes on", err.text);
 }
 
 static void do_what_is_due(live *run, wm_time_ns now_ns) {
@@ -84,7 +111,7 @@ static void do_what_is_due(live *run, wm_time_ns now_ns) {
   lcm_sink_tick(&self->lcm, now_ns);
   notify_tick(&self->notify, now_ns);
   if (self->folder && now_ns >= self->next_flush_ns) {
-    wm_run_folder_flush(self->folder);
+    flush(run);
     self->next_flush_ns = now_ns + FLUSH_EVERY_NS;
   }
   if (now_ns >= self->next_landmarks_ns) {

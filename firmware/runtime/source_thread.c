@@ -48,6 +48,7 @@ void *source_thread(void *argument) {
     share_counts(self);
     if (self->status != WM_OK) break;
   }
+  if (self->status != WM_OK) live_say(self->run, "%s: ends here: %s", self->feed->source->name, self->error.text);
   atomic_store_explicit(&self->done, 1, memory_order_release);
   return NULL;
 }

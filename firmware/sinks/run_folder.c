@@ -241,10 +241,16 @@ wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_ru
   return WM_OK;
 }
 
-void wm_run_folder_flush(wm_run_folder *self) {
-  for (int i = 0; i < TABLE_COUNT; i++)
-    if (fflush(self->tables[i].file) != 0 && !self->tables[i].failed) self->tables[i].failed = errno;
+wm_status wm_run_folder_flush(wm_run_folder *self, wm_error *err) {
   wm_log_flush(&self->log);
+  if (self->log.failed)
+    return wm_fail(err, WM_IO, "%s/events.wmlog: can't be written on: %s", self->dir, strerror(self->log.failed));
+  for (int i = 0; i < TABLE_COUNT; i++) {
+    table *t = &self->tables[i];
+    if (fflush(t->file) != 0 && !t->failed) t->failed = errno ? errno : EIO;
+    if (t->failed) return wm_fail(err, WM_IO, "%s: can't be written on: %s", t->path, strerror(t->failed));
+  }
+  return WM_OK;
 }
 
 wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_error *err) {

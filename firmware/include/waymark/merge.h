@@ -76,6 +76,8 @@ size_t wm_merge_waiting_of(const wm_merge *self, size_t source);
 const wm_merge_counts *wm_merge_source_counts(const wm_merge *self, size_t source);
 // Lateness (arrival minus stamp) that 99 of 100 data keep below, rounded up to a millisecond. 0 before the first.
 wm_time_ns wm_merge_lateness_p99(const wm_merge *self, size_t source);
+// On the arrival clock since its last datum, or since the start where it never spoke.
+wm_time_ns wm_merge_silent_ns(const wm_merge *self, size_t source, wm_time_ns now_ns);
 // Silent for longer than a second and than ten times its mean period. A message, not a rule of the merge.
 int wm_merge_is_stale(const wm_merge *self, size_t source, wm_time_ns now_ns);
 
