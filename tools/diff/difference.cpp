@@ -18,6 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr size_t kCountersAtMost = 40;
+constexpr size_t kFieldsAtMost = 3;
 
 std::string seconds_text(int64_t t_ns) {
   char text[48];
@@ -41,15 +42,16 @@ std::string about(const Csv &csv, size_t row) {
   return text;
 }
 
-// Fields of a row that are not the same in both.
+// Fields of a row that are not the same in both; the first few in full.
 std::string changed_fields(const Csv &a, const Csv &b, size_t row_a, size_t row_b) {
   std::string text;
+  size_t changed = 0;
   for (size_t column = 0; column < a.columns().size(); ++column) {
-    const auto there = b.find(a.columns()[column]);
-    if (!there || a.text(row_a, column) == b.text(row_b, *there)) continue;
+    if (a.text(row_a, column) == b.text(row_b, column) || ++changed > kFieldsAtMost) continue;
     text += (text.empty() ? "" : ", ") + a.columns()[column] + " " + std::string(a.text(row_a, column)) + " -> " +
-            std::string(b.text(row_b, *there));
+            std::string(b.text(row_b, column));
   }
+  if (changed > kFieldsAtMost) text += ", and " + std::to_string(changed - kFieldsAtMost) + " more fields";
   return text;
 }
 
