@@ -154,7 +154,9 @@ typedef struct wm_event {
 // Bytes of `event` that carry something: copy this many, from a ring or to one. Constant cost. Any thread.
 size_t wm_event_bytes(const wm_event *event);
 
-static inline int wm_event_is_motion(const wm_event *event) { return (WM_MOTION_EVENTS >> event->kind) & 1u; }
+static inline int wm_event_is_motion(const wm_event *event) {
+  return event->kind < 32 && ((WM_MOTION_EVENTS >> event->kind) & 1u);
+}
 
 // Name of a kind, of a quantity as can-signals.yaml writes it; "?" where there is none.
 const char *wm_event_kind_name(unsigned kind);
