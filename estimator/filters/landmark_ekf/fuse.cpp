@@ -74,9 +74,10 @@ sensor_errors landmark_ekf::errors_of(int sensor) const {
 
 // A wrong pose bends what is known of the sensors; a search must not start from that.
 sensor_errors landmark_ekf::remembered_errors_of(int sensor) const {
+  const calibration_memory &memory = memory_to_trust();
   const auto value = [&](int which, double neutral) {
     const int state = sensor_state_[sensor][which];
-    return state < 0 ? neutral : memory_[1].value[state];
+    return state < 0 ? neutral : memory.value[state];
   };
   return {value(kYaw, 0.0), value(kMountX, 0.0), value(kMountY, 0.0), value(kRangeScale, 1.0), value(kRangeBias, 0.0)};
 }
@@ -425,11 +426,13 @@ double landmark_ekf::fuse(residual *r, int count, innovation_list records) {
   }
   if (!fused) return 1.0;
   const double weaker = nis > soft ? nis / soft : 1.0;
-  filter_.update(first, r[0].innovation, r[0].noise * weaker);
+  // What hardly fits may move the pose, but teaches nothing of the sensors.
+  const int kept = nis > soft ? calibration_states_ : kPoseStates;
+  filter_.update(first, r[0].innovation, r[0].noise * weaker, kPoseStates, kept);
   if (count == 2) {
     const double left = r[1].innovation - cross / (first.variance + r[0].noise * weaker) * r[0].innovation;
     filter_.project(r[1].row, &second);
-    filter_.update(second, left, r[1].noise * weaker);
+    filter_.update(second, left, r[1].noise * weaker, kPoseStates, kept);
   }
   fused_ns_ = filter_.now_ns();
   return nis > soft ? 0.8 : 0.0;

@@ -36,6 +36,12 @@ class landmark_ekf {
   const planar_filter &filter() const { return filter_; }
 
  private:
+  // What was known of the sensors while the observations still fitted: two generations, of which the older one is safe,
+  // and the start's.
+  struct calibration_memory {
+    double value[kMaxStates], variance[kMaxStates];
+  };
+
   enum sensor_state { kYaw, kMountX, kMountY, kTimeOffset, kRangeBias, kRangeScale, kSensorStates };
 
   // The pose when an observation was true, `age` before its stamp, and what moves it.
@@ -68,6 +74,7 @@ class landmark_ekf {
   double sensor_value(int sensor, int which, double neutral) const;
   sensor_errors errors_of(int sensor) const;
   sensor_errors remembered_errors_of(int sensor) const;
+  const calibration_memory &memory_to_trust() const;
   void add_mounting(sparse_row &row, int sensor, const double by[6]) const;
 
   // Recovery.
@@ -91,18 +98,14 @@ class landmark_ekf {
   state_slots<24> lasting_;
   int lasting_bearing_offset_, lasting_range_offset_;  // within a slot; -1: not carried
   state_slots<16> map_;
-  // What was known of the sensors while the observations still fitted: two generations, the older one is safe.
-  struct calibration_memory {
-    double value[kMaxStates], variance[kMaxStates];
-  };
-  calibration_memory memory_[2];
+  calibration_memory memory_[3];
   wm_time_ns remembered_ns_;
   int calibration_states_;  // pose and calibration; the lent states come behind
   fit_monitor monitor_;
   pose_search clues_;
   search_clue prior_[2];
   int prior_count_;
-  wm_time_ns fused_ns_, lost_ns_, searched_ns_, inflated_ns_, loosened_ns_;
+  wm_time_ns fused_ns_, lost_ns_, searched_ns_, inflated_ns_, loosened_ns_, found_ns_;
   uint32_t resets_;
   uint8_t state_;  // wm_state, without dead reckoning
 };

@@ -10,6 +10,7 @@ constexpr double kSearchEvery_s = 0.25;  // bounds the cost: one search is about
 constexpr double kSayLost_s = 0.1;       // lost is lost for at least so long: whoever listens must hear it
 constexpr double kInflateAfter_s = 3.0;  // lost for so long and not found: open the gates
 constexpr double kInflateEvery_s = 1.0;
+constexpr double kFoundWrongly_s = 60.0;
 constexpr double kRememberEvery_s = 10.0;
 constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;
 constexpr double kInflateUpTo_m = 30.0;
@@ -57,7 +58,14 @@ void landmark_ekf::remember_calibration(wm_time_ns t_ns) {
     memory_[0].value[i] = filter_.value(i);
     memory_[0].variance[i] = filter_.variance(i);
   }
-  if (t_ns == WM_TIME_NONE) memory_[1] = memory_[0];
+  if (t_ns == WM_TIME_NONE) memory_[1] = memory_[2] = memory_[0];
+}
+
+// Lost again soon after being found: then what was remembered is wrong, too (a mounting's yaw and a heading that are
+// off by the same angle look alike until the robot has driven a while). Begin from calibration.yaml.
+const landmark_ekf::calibration_memory &landmark_ekf::memory_to_trust() const {
+  const bool again = found_ns_ != WM_TIME_NONE && wm_seconds_between(found_ns_, filter_.now_ns()) < kFoundWrongly_s;
+  return memory_[again ? 2 : 1];
 }
 
 // A wrong pose teaches wrong things of the sensors.
@@ -84,6 +92,7 @@ void landmark_ekf::search(wm_time_ns since_ns) {
     if (yaw >= 0) result.covariance[2][2] += filter_.variance(yaw);
   }
   restore_calibration();
+  found_ns_ = now;
   filter_.set_pose(result.pose, result.covariance);
   monitor_.clear();
   prior_count_ = 0;

@@ -219,12 +219,13 @@ double planar_filter::project_onto(const sparse_row &row, const projection &othe
   return sum;
 }
 
-void planar_filter::update(const projection &projected, double innovation, double noise) {
+void planar_filter::update(const projection &projected, double innovation, double noise, int kept_from, int kept_to) {
   const double s = projected.variance + noise;
   if (!(s > 0.0)) return;
   const double inverse = 1.0 / s;
   alignas(16) double k[kMaxStates], b[kMaxStates];
   vectors::set_scaled(k, projected.gain, inverse, stride_);
+  for (int i = kept_from; i < kept_to; i++) k[i] = 0.0;
   // K b' + b K' with b = s/2 K - g is Joseph's form for one row.
   vectors::set_scaled(b, k, 0.5 * s, stride_);
   vectors::add_scaled(b, projected.gain, -1.0, stride_);

@@ -61,7 +61,12 @@ class planar_filter {
   double project_onto(const sparse_row &row, const projection &other) const;  // H_row P H_other'
   // Scalar update with innovation `innovation` and measurement variance `noise`. Source: Joseph's form,
   // P = (I - KH) P (I - KH)' + K R K', written out for one row: P - K g' - g K' + s K K', g = P H', s = H g + R.
-  void update(const projection &projected, double innovation, double noise);
+  void update(const projection &projected, double innovation, double noise) {
+    update(projected, innovation, noise, 0, 0);
+  }
+  // The same, but the states from `kept_from` up to `kept_to` keep their values: they are considered, not corrected
+  // (S. F. Schmidt, 1966). Joseph's form holds for any gain.
+  void update(const projection &projected, double innovation, double noise, int kept_from, int kept_to);
 
   void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
   void inflate_pose(double variance_m2, double variance_rad2);
