@@ -23,6 +23,8 @@ int complain(const wm_error *err);
 void print_note(void *context, const char *text);
 // `--landmarks` and `--calibration` stand above what the configuration says.
 wm_status override_path(char out[WM_PATH_MAX], const char *path, wm_error *err);
+// Refuses an output folder in which writing would destroy what is read: a recording, or the log being replayed.
+wm_status check_out_dir(const char *out_dir, const char *input, wm_error *err);
 // Counts and state of a run, for a person, on standard output.
 void print_report(const wm_run_report *report, const char *name, const char *out_dir, double took_s);
 

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "commands.h"
@@ -28,6 +29,19 @@ wm_status override_path(char out[WM_PATH_MAX], const char *path, wm_error *err) 
   size_t length = strlen(path);
   if (length >= WM_PATH_MAX) return wm_fail(err, WM_BAD_USAGE, "'%.60s...': the path is too long", path);
   memcpy(out, path, length + 1);
+  return WM_OK;
+}
+
+wm_status check_out_dir(const char *out_dir, const char *input, wm_error *err) {
+  char path[WM_PATH_MAX + 32];
+  struct stat inside, read;
+  (void)snprintf(path, sizeof path, "%s/recording.yaml", out_dir);
+  if (stat(path, &inside) == 0)
+    return wm_fail(err, WM_BAD_USAGE, "--out: %s is a recording; a run is written to a folder of its own", out_dir);
+  (void)snprintf(path, sizeof path, "%s/events.wmlog", out_dir);
+  if (stat(path, &inside) == 0 && stat(input, &read) == 0 && inside.st_ino == read.st_ino &&
+      inside.st_dev == read.st_dev)
+    return wm_fail(err, WM_BAD_USAGE, "--out: %s holds the log that is to be replayed; choose another folder", out_dir);
   return WM_OK;
 }
 

@@ -116,6 +116,15 @@ static int replay_log(const arguments *args) {
   return status == WM_OK ? EXIT_DONE : complain(&err);
 }
 
+// A run's folder where a recording's was meant: its log can be replayed.
+static int is_run_folder(const char *dir) {
+  char recording[WM_PATH_MAX + 32], log[WM_PATH_MAX + 32];
+  struct stat there;
+  (void)snprintf(recording, sizeof recording, "%s/recording.yaml", dir);
+  (void)snprintf(log, sizeof log, "%s/events.wmlog", dir);
+  return stat(recording, &there) != 0 && stat(log, &there) == 0;
+}
+
 int command_replay(int argc, char *const *argv) {
   arguments args = {.seed = 1};
   int help = 0;
@@ -138,6 +147,12 @@ int command_replay(int argc, char *const *argv) {
   if (words == 0 || !args.out) {
     (void)fprintf(stderr, "waymark: replay needs %s\n\n%s", words == 0 ? "a recording or an event log" : "--out FOLDER",
                   kHelp);
+    return EXIT_USAGE;
+  }
+  if (check_out_dir(args.out, args.what, &err) != WM_OK) return complain(&err);
+  if (is_run_folder(args.what)) {
+    (void)fprintf(stderr, "waymark: %s is a run, not a recording; did you mean its log, %s/events.wmlog?\n", args.what,
+                  args.what);
     return EXIT_USAGE;
   }
   if (stat(args.what, &there) == 0 && !S_ISDIR(there.st_mode)) return replay_log(&args);

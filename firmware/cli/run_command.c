@@ -111,5 +111,6 @@ int command_run(int argc, char *const *argv) {
                   kHelp);
     return EXIT_USAGE;
   }
+  if (args.run.out_dir && check_out_dir(args.run.out_dir, args.recording, &err) != WM_OK) return complain(&err);
   return run(&args);
 }

@@ -55,10 +55,13 @@ void notify_pose(notify *self, const wm_published *published) {
     send_text(self, "READY=1\nSTATUS=localizing");
     self->said_ready = 1;
   }
-  if (published->fused_until_ns > self->fused_until_ns && !(published->status_flags & WM_PUB_MOTION_STALE)) {
-    self->fused_until_ns = published->fused_until_ns;
-    self->is_fresh = 1;
-  }
+  notify_progress(self, published->fused_until_ns, !(published->status_flags & WM_PUB_MOTION_STALE));
+}
+
+void notify_progress(notify *self, wm_time_ns fused_until_ns, int motion_is_fresh) {
+  if (fused_until_ns <= self->fused_until_ns || !motion_is_fresh) return;
+  self->fused_until_ns = fused_until_ns;
+  self->is_fresh = 1;
 }
 
 void notify_tick(notify *self, wm_time_ns now_ns) {

@@ -18,8 +18,11 @@ typedef struct notify {
 } notify;
 
 void notify_open(notify *self);
-// A pose went out: the watchdog may be fed when the fused time advances with fresh motion. READY=1 with the first one.
+// A pose went out. READY=1 with the first one; the rest as notify_progress.
 void notify_pose(notify *self, const wm_published *published);
+// How far is fused, and whether motion is fresh: the watchdog is fed only for what advanced with fresh motion. Also
+// while no pose is known yet: searching is no reason to be restarted.
+void notify_progress(notify *self, wm_time_ns fused_until_ns, int motion_is_fresh);
 // Called often: feeds the watchdog when it is due and deserved; says READY=1 in a stated degraded state when no pose
 // has come for a while.
 void notify_tick(notify *self, wm_time_ns now_ns);

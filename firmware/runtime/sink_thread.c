@@ -89,12 +89,20 @@ static void say_changes(live *run, const wm_health *health) {
   self->said_motion_health = health->motion_health;
 }
 
+static int motion_is_fresh(const live *run, const wm_health *health) {
+  wm_time_ns stale_ns = wm_ns_from_seconds(run->config->runtime.publish_motion_stale_ms * 1e-3);
+  for (uint32_t i = 0; i < health->source_count; i++)
+    if (run->assembly.sources[i].merge.is_motion && health->sources[i].silent_ns <= stale_ns) return 1;
+  return 0;
+}
+
 static void take_healths(live *run) {
   for (const wm_health *record; (record = wm_ring_front(&run->estimator.healths)) != NULL;
        wm_ring_pop(&run->estimator.healths)) {
     wm_health health = *record;
     add_source_counts(run, &health);
     lcm_sink_health(&run->sink.lcm, &health);
+    notify_progress(&run->sink.notify, health.fused_until_ns, motion_is_fresh(run, &health));
     say_changes(run, &health);
   }
 }

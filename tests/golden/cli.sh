@@ -24,7 +24,7 @@ expect() {
 mkdir "$work/rec"
 printf 'format: waymark-recording/1\nname: straight\nduration_s: 2\nstreams: [motion.csv]\nvehicle: {initial_pose: {t_ns: 0, x_m: 1, y_m: 2, heading_rad: 0}}\n' >"$work/rec/recording.yaml"
 { echo t_ns,v_mps,w_radps; for i in $(seq 0 19); do echo "$((i * 100000000)),0.5,0"; done; } >"$work/rec/motion.csv"
-printf 'format: waymark-config/1\nestimator: odometry\npublish: {lcm: false}\nrealtime: {lock_memory: false}\n' >"$work/good.yaml"
+printf 'format: waymark-config/1\nestimator: odometry\npublish: {lcm: false}\nrealtime: {lock_memory: false}\nmerge: {horizon_ms: 900, lateness_max_ms: 900}\n' >"$work/good.yaml"
 printf 'format: waymark-config/1\nestimator: odometri\n' >"$work/bad.yaml"
 mkdir "$work/nomotion"
 printf 'format: waymark-recording/1\nname: nomotion\nduration_s: 2\nstreams: []\n' >"$work/nomotion/recording.yaml"
@@ -50,6 +50,10 @@ expect 0 "20 poses" replay "$work/rec" --config "$work/good.yaml" --out "$work/d
 expect 0 "20 poses" replay "$work/deep/er/out/events.wmlog" --out "$work/again"
 expect 2 "another one needs the recording" replay "$work/deep/er/out/events.wmlog" --out "$work/again" --calibration x
 expect 1 "not an event log" replay "$work/good.yaml" --out "$work/again"
+expect 2 "holds the log that is to be replayed" replay "$work/deep/er/out/events.wmlog" --out "$work/deep/er/out"
+expect 2 "is a recording" replay "$work/rec" --config "$work/good.yaml" --out "$work/rec"
+expect 2 "did you mean its log" replay "$work/deep/er/out" --config "$work/good.yaml" --out "$work/again"
+expect 2 "is a recording" run --recording "$work/rec" --config "$work/good.yaml" --out "$work/rec"
 printf 'id,x_m,y_m,z_m,sigma_m\n1,2,3,0,0.1\n' >"$work/map.csv"
 expect 2 "was made with another map" replay "$work/deep/er/out/events.wmlog" --out "$work/again" --landmarks "$work/map.csv"
 

@@ -171,6 +171,21 @@ static void the_watchdog_is_fed_only_while_the_fused_time_advances_with_fresh_mo
   close_manager(&n);
 }
 
+static void searching_with_fresh_motion_is_no_reason_to_be_restarted(void) {
+  notify n;
+  open_manager(&n, "2000000");
+  wm_time_ns now = n.opened_ns;
+  for (int i = 1; i < 4; i++) {
+    notify_progress(&n, i * WM_NS_PER_S, 1);
+    notify_tick(&n, now += WM_NS_PER_S);
+    TEST_ASSERT_EQUAL_STRING("WATCHDOG=1", hear());
+  }
+  notify_progress(&n, 9 * WM_NS_PER_S, 0);
+  notify_tick(&n, now + WM_NS_PER_S);
+  TEST_ASSERT_EQUAL_STRING("", hear());
+  close_manager(&n);
+}
+
 static void without_a_pose_ready_says_so(void) {
   notify n;
   open_manager(&n, "junk");
@@ -200,6 +215,7 @@ int main(void) {
   RUN_TEST(messages_arrive_over_memq);
   RUN_TEST(no_way_out_is_said_once_and_tried_again);
   RUN_TEST(the_watchdog_is_fed_only_while_the_fused_time_advances_with_fresh_motion);
+  RUN_TEST(searching_with_fresh_motion_is_no_reason_to_be_restarted);
   RUN_TEST(without_a_pose_ready_says_so);
   RUN_TEST(without_a_service_manager_nothing_happens);
   return UNITY_END();
