@@ -49,7 +49,8 @@ enum class Wrap { repeat, clamp };
 // What a surface looks up. Never changes once made; any thread.
 class Texture {
  public:
-  // Copies the picture and makes its pyramid: about 11 bytes a pixel. Values are cut to [0, 1].
+  // Copies the picture and makes its pyramid: about 11 bytes a pixel. Values are cut to [0, 1]. A clamped picture under
+  // 256 pixels (a marker, a small sign) is enlarged by repeating pixels, so that their edges stay sharp.
   static std::shared_ptr<const Texture> make(const Picture &picture, Wrap wrap = Wrap::repeat);
 
   int width() const { return levels_.front().width; }
