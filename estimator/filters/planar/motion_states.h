@@ -17,10 +17,11 @@ typedef struct wm_motion_states {
   double wheel_difference_sigma, wheel_difference_walk;
 } wm_motion_states;
 
-#define WM_MOTION_STATE(type, member, i, key, unit, walk_default, about)                                     \
-  {"states." key "_sigma" unit, WM_PARAM_F64, offsetof(type, member.sigma[i]), 0, 0, 1, NULL, about},         \
-      {"states." key "_walk" unit, WM_PARAM_F64, offsetof(type, member.walk[i]), walk_default, 0, 1, NULL,     \
-       "Random walk of that state per sqrt(s): what it changes by on its own."}
+#define WM_MOTION_STATE(type, member, i, key, unit, walk_default, about)                                \
+  {"states." key "_sigma" unit, WM_PARAM_F64, offsetof(type, member.sigma[i]), 0, 0, 1, NULL, about}, { \
+    "states." key "_walk" unit, WM_PARAM_F64, offsetof(type, member.walk[i]), walk_default, 0, 1, NULL, \
+        "Random walk of that state per sqrt(s): what it changes by on its own."                         \
+  }
 
 // clang-format off
 #define WM_MOTION_STATE_PARAMS(type, member) \
