@@ -5,3 +5,5 @@ wm_test(run_live SOURCES test_live.c small_recording.c USES wm_run pthread LABEL
 wm_script_test(run_command_line COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/cli.sh)
 wm_script_test(run_lcm_tools COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_tools.py LABELS release-only)
 wm_script_test(run_system_calls COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/system_calls.py LABELS release-only)
+wm_script_test(run_recordings COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/recordings.py LABELS release-only)
+wm_script_test(run_live_minute COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/recordings.py live LABELS slow release-only)
