@@ -86,12 +86,12 @@ void landmark_ekf::search(wm_time_ns since_ns) {
   search_result result = clues_.find(since_ns, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), prior_,
                                      state_ == WM_STATE_SEARCHING ? prior_count_ : 0, limits);
   if (!result.found) return;
+  restore_calibration();
   // What the mounting's yaw may still be off by, the heading found is off by, too.
   for (size_t i = 0; i < setup_->sensor_count; i++) {
     const int yaw = sensor_state_[i][kYaw];
     if (yaw >= 0) result.covariance[2][2] += filter_.variance(yaw);
   }
-  restore_calibration();
   found_ns_ = now;
   filter_.set_pose(result.pose, result.covariance);
   monitor_.clear();
