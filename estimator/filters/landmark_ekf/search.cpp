@@ -294,12 +294,6 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
   if (!invert(a, inverse)) return out;
   const wm_pose2 frame = {w.x, w.y, w.turn};
   out.pose = compose(frame, odom_now);
-  for (int k = 0; k < found; k++) {
-    const wm_pose2 other = compose({best[k].x, best[k].y, best[k].turn}, odom_now);
-    const double away = std::fabs(other.x_m - out.pose.x_m) + std::fabs(other.y_m - out.pose.y_m);
-    const bool same = away < 3.0 * limits.sigma_xy_m && std::fabs(wrap(other.heading_rad - out.pose.heading_rad)) < 0.3;
-    if (!same && best[k].cost < w.cost + kMarginChi2) return out;  // two places explain what was seen
-  }
   // From the frame's covariance to the pose's: its origin is `lever` away.
   const double lever_x = out.pose.x_m - w.x, lever_y = out.pose.y_m - w.y;
   const double j[3][3] = {{1, 0, -lever_y}, {0, 1, lever_x}, {0, 0, 1}};
@@ -312,6 +306,14 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
         for (int n = 0; n < 3; n++) sum += j[r][m] * inverse[m][n] * j[c][n];
       out.covariance[r][c] = caution * sum;
     }
+  const double near_m = 0.3 + 3.0 * std::sqrt(out.covariance[0][0] + out.covariance[1][1]);
+  const double near_rad = 0.2 + 3.0 * std::sqrt(out.covariance[2][2]);
+  for (int k = 0; k < found; k++) {
+    const wm_pose2 other = compose({best[k].x, best[k].y, best[k].turn}, odom_now);
+    const double away = std::fabs(other.x_m - out.pose.x_m) + std::fabs(other.y_m - out.pose.y_m);
+    const bool same = away < near_m && std::fabs(wrap(other.heading_rad - out.pose.heading_rad)) < near_rad;
+    if (!same && best[k].cost < w.cost + kMarginChi2) return out;  // two places explain what was seen
+  }
   out.found = out.covariance[0][0] + out.covariance[1][1] < 2.0 * square(limits.sigma_xy_m) &&
               out.covariance[2][2] < square(limits.sigma_heading_rad);
   return out;
