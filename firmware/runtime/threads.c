@@ -10,16 +10,12 @@
 
 // clang-format off
 const thread_spec kThreads[THREAD_ROLES] = {
-  //                   name          real time  stack            ring slots  period             never
-  [THREAD_SOURCE]    = {"wm-source",   0,         (size_t)2 << 20, 0,          0,                 "touches the estimator"},
-  [THREAD_ESTIMATOR] = {"wm-estimate", 1,         (size_t)2 << 20, 8192,       0,                 "allocates, locks, makes a system call but its sleep"},
-  [THREAD_SINK]      = {"wm-sink",     0,         (size_t)2 << 20, 0,          2 * WM_NS_PER_MS,  "holds the estimator up"},
+  //                   name         real time  stack            ring slots  wakes every         never
+  [THREAD_SOURCE]    = {"wm-source",   0,      (size_t)2 << 20, 0,          0                }, // touches the estimator
+  [THREAD_ESTIMATOR] = {"wm-estimate", 1,      (size_t)2 << 20, 8192,       0                }, // allocates, locks, makes a system call but its sleep
+  [THREAD_SINK]      = {"wm-sink",     0,      (size_t)2 << 20, 0,          2 * WM_NS_PER_MS }, // holds the estimator up
 };
 // clang-format on
-
-static int start_with(const pthread_attr_t *attributes, void *(*body)(void *), void *argument, pthread_t *out) {
-  return pthread_create(out, attributes, body, argument);
-}
 
 static void want_realtime(pthread_attr_t *attributes, const wm_runtime_params *params) {
   struct sched_param priority = {.sched_priority = params->realtime_priority};
@@ -46,11 +42,11 @@ wm_status thread_start(thread_role role, size_t number, const wm_config *config,
   if (*is_realtime) want_realtime(&attributes, &config->runtime);
   if (spec->is_realtime) bind_to_cpu(&attributes, config->runtime.realtime_cpu);
 
-  int failed = start_with(&attributes, body, argument, out);
+  int failed = pthread_create(out, &attributes, body, argument);
   if (failed == EPERM && *is_realtime) {
     *is_realtime = 0;
     pthread_attr_setinheritsched(&attributes, PTHREAD_INHERIT_SCHED);
-    failed = start_with(&attributes, body, argument, out);
+    failed = pthread_create(out, &attributes, body, argument);
   }
   pthread_attr_destroy(&attributes);
   if (failed == EINVAL && spec->is_realtime && config->runtime.realtime_cpu >= 0)

@@ -18,7 +18,6 @@ typedef struct thread_spec {
   size_t stack_bytes;    // THREAD_TOUCHED_BYTES of it are touched before the thread's work begins
   size_t ring_slots;     // of the ring that it fills; 0: realtime.ring_events of the configuration
   wm_time_ns period_ns;  // how often it wakes; 0: realtime.loop_hz, or as its data come
-  const char *never;     // what it never does
 } thread_spec;
 
 // The rest is address space: for the libraries, and for sanitizers, which keep most of a megabyte there.

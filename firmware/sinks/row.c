@@ -2,8 +2,9 @@
 #include "row.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
+
+#include "number.h"
 
 void wm_row_text(wm_row *self, const char *string) {
   size_t n = strlen(string), room = sizeof self->bytes - self->length;
@@ -31,15 +32,13 @@ void wm_row_int(wm_row *self, int64_t value) {
   put_unsigned(self, value < 0 ? (uint64_t)0 - (uint64_t)value : (uint64_t)value, 1);
 }
 
-static void put_format(wm_row *self, const char *format, double value) {
-  if (isnan(value)) return;
-  char text[40];
-  (void)snprintf(text, sizeof text, format, value);
-  wm_row_text(self, text);
+static void put_number(wm_row *self, double value, size_t (*format)(double, char *)) {
+  if (isnan(value) || sizeof self->bytes - self->length < WM_NUMBER_MAX) return;
+  self->length += format(value, self->bytes + self->length);
 }
 
-void wm_row_exact(wm_row *self, double value) { put_format(self, "%.17g", value); }
-void wm_row_short(wm_row *self, double value) { put_format(self, "%.9g", value); }
+void wm_row_exact(wm_row *self, double value) { put_number(self, value, wm_number_exact); }
+void wm_row_short(wm_row *self, double value) { put_number(self, value, wm_number_short); }
 
 void wm_row_fixed(wm_row *self, double value, int decimals) {
   static const uint64_t kTens[] = {1, 10, 100, 1000, 10000, 100000, 1000000, 10000000, 100000000, 1000000000};

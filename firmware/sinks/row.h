@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A line of a table, put together in a fixed buffer. Numbers are written the same everywhere: '.' as decimal point,
-// never grouped, an absent one (NaN) is an empty field. (The program never calls setlocale, so the C library's
-// conversions are those of the "C" locale.)
+// never grouped, an absent one (NaN) is an empty field.
 #ifndef WAYMARK_FIRMWARE_ROW_H
 #define WAYMARK_FIRMWARE_ROW_H
 
@@ -18,7 +17,7 @@ typedef struct wm_row {
 void wm_row_text(wm_row *self, const char *string);
 void wm_row_char(wm_row *self, char c);
 void wm_row_int(wm_row *self, int64_t value);
-// All bits: 17 significant digits.
+// All bits: the shortest text that reads back to the same double.
 void wm_row_exact(wm_row *self, double value);
 // `decimals` digits behind the point, at most 9; what is too large for that is written exactly.
 void wm_row_fixed(wm_row *self, double value, int decimals);

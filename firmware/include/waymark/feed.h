@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One used source, one event ahead: the events inside of the configuration's from_s and until_s, numbered as the run's
-// table of sources does. Replay reads all feeds by the order of arrival; in a run each has a thread. One thread each.
+// table of sources does. For recorded sources: one that has nothing now has nothing more. Replay reads all feeds by the
+// order of arrival; in a run each has a thread. One thread each.
 #ifndef WAYMARK_FEED_H
 #define WAYMARK_FEED_H
 
