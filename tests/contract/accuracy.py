@@ -1,0 +1,193 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""What the shipped configurations reach on the real recordings, and on the same recordings with their calibration, clocks
+and scales disturbed: replayed by `waymark replay`, judged by `waymark eval`. Skips (77) where the recordings are not there.
+
+    accuracy.py BIN_DIR SOURCE_DIR DATA_DIR"""
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+BIN, SOURCE, DATA = (pathlib.Path(p).resolve() for p in sys.argv[1:4])
+failures = []
+
+
+def rows(path):
+    head, *lines = path.read_text().splitlines()
+    names = head.split(",")
+    return [dict(zip(names, line.split(","))) for line in lines]
+
+
+def longest_beyond(trajectory, truth, sigmas):
+    """Longest time in s that the position's error stays beyond so many sigma of its 2 x 2 covariance (Mahalanobis)."""
+    poses = [[float(r[k]) for k in ("t_ns", "x_m", "y_m", "cov_xx", "cov_xy", "cov_yy")] for r in trajectory]
+    longest = since = at = 0
+    last = None
+    for row in truth:
+        t = float(row["t_ns"])
+        while at + 1 < len(poses) and poses[at + 1][0] <= t:
+            at += 1
+        if at + 1 >= len(poses) or poses[at][0] > t:
+            continue
+        a, b = poses[at], poses[at + 1]
+        share = (t - a[0]) / (b[0] - a[0])
+        x, y, xx, xy, yy = (p + share * (q - p) for p, q in zip(a[1:], b[1:]))
+        dx, dy = float(row["x_m"]) - x, float(row["y_m"]) - y
+        beyond = (dx * dx * yy - 2 * dx * dy * xy + dy * dy * xx) / (xx * yy - xy * xy) > sigmas ** 2
+        since = since + (t - last) * 1e-9 if beyond and last is not None else 0
+        longest, last = max(longest, since), t
+    return longest
+
+
+def run(recording, config, *eval_options):
+    with tempfile.TemporaryDirectory() as out:
+        for command in ([BIN / "waymark", "replay", recording, "--config", SOURCE / "config" / f"{config}.yaml", "--out", out],
+                        [BIN / "waymark-eval", out, recording, "--json", *eval_options]):
+            done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
+            if done.returncode != 0:
+                sys.exit(f"{' '.join(str(c) for c in command)}: {done.returncode}\n{done.stdout}{done.stderr}")
+        figures = json.loads(done.stdout)
+        figures["longest_beyond_s"] = longest_beyond(rows(pathlib.Path(out) / "trajectory.csv"), rows(recording / "truth.csv"), 3.5)
+    return figures
+
+
+def bar(what, value, most=None, least=None):
+    good = (most is None or value <= most) and (least is None or value >= least)
+    print(f"{'ok  ' if good else 'FAIL'} {what}: {value:.4f}" + (f" (at most {most:.4f})" if most is not None else "")
+          + (f" (at least {least:.4f})" if least is not None else ""), flush=True)
+    if not good:
+        failures.append(what)
+
+
+class disturbed:
+    """A copy of a recording in which some files read differently: {name: function(text) -> text}."""
+
+    def __init__(self, recording, changes):
+        self.recording, self.changes = recording, changes
+
+    def __enter__(self):
+        self.folder = tempfile.TemporaryDirectory()
+        here = pathlib.Path(self.folder.name) / self.recording.name
+        here.mkdir()
+        for file in self.recording.iterdir():
+            if file.name in self.changes:
+                before = file.read_text()
+                after = self.changes[file.name](before)
+                assert after != before, f"{file}: the disturbance changed nothing"
+                (here / file.name).write_text(after)
+            else:
+                (here / file.name).symlink_to(file)
+        return here
+
+    def __exit__(self, *_):
+        self.folder.cleanup()
+
+
+def each_row(change):
+    def whole(text):
+        head, *rows = text.splitlines()
+        names = head.split(",")
+        out = []
+        for row in rows:
+            fields = dict(zip(names, row.split(",")))
+            change(fields)
+            out.append(",".join(fields[n] for n in names))
+        return "\n".join([head, *out]) + "\n"
+    return whole
+
+
+def shifted(seconds):
+    def change(f):
+        f["t_ns"] = str(int(f["t_ns"]) + round(seconds * 1e9))
+    return each_row(change)
+
+
+def scaled(column, factor):
+    def change(f):
+        f[column] = repr(float(f[column]) * factor) if f[column] else ""
+    return each_row(change)
+
+
+def turned(degrees):
+    return lambda text: re.sub(r"rpy_deg: \[([^,]+), ([^,]+), ([^\]]+)\]",
+                               lambda m: f"rpy_deg: [{m[1]}, {m[2]}, {float(m[3]) + degrees}]", text)
+
+
+def yaw_rate_offset(radps):
+    def change(text):
+        return re.sub(r"(SG_ YAW_RATE : \S+ \()([^,]+),([^)]+)\)",
+                      lambda m: f"{m[1]}{m[2]},{float(m[3]) + radps * 57.29577951308232})", text)
+    return change
+
+
+def starry():
+    recording = DATA / "starry-night-plan-a"
+    for config, most in (("starry-night-plan", 0.0165), ("starry-night-plan-bearings", 0.024)):
+        plain = run(recording, config)
+        bar(f"{config}: position RMSE", plain["position_rmse_m"], most=most)
+        bar(f"{config}: heading RMSE", plain["heading_rmse_deg"], most=0.6)
+        bar(f"{config}: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
+        settled = run(recording, config, "--from", "60")["position_rmse_m"]
+        changes = {"laser turned by +10 deg": {"calibration.yaml": turned(10)},
+                   "laser turned by -10 deg": {"calibration.yaml": turned(-10)},
+                   "sightings 0.1 s later": {"sightings.csv": shifted(0.1)},
+                   "sightings 0.1 s earlier": {"sightings.csv": shifted(-0.1)},
+                   "range + 5 %": {"sightings.csv": scaled("range_m", 1.05)},
+                   "range - 5 %": {"sightings.csv": scaled("range_m", 0.95)},
+                   "speed + 5 %": {"motion.csv": scaled("v_mps", 1.05)},
+                   "speed - 5 %": {"motion.csv": scaled("v_mps", 0.95)}}
+        for what, change in changes.items():
+            with disturbed(recording, change) as folder:
+                bar(f"{config}, {what}: RMSE over the undisturbed one's, after 60 s",
+                    run(folder, config, "--from", "60")["position_rmse_m"] / settled, most=1.15)
+
+
+def mrclam():
+    seen = []
+    for config, most in (("mrclam", 0.14), ("mrclam-bearings", 0.17)):
+        results = [run(DATA / f"mrclam-d6-r{i}", config) for i in range(1, 6)]
+        bar(f"{config}: mean position RMSE", sum(r["position_rmse_m"] for r in results) / 5, most=most)
+        for i, r in enumerate(results, 1):
+            bar(f"{config}, robot {i}: largest error", r["position_max_m"], most=1.3)
+            bar(f"{config}, robot {i}: longest time beyond 3.5 sigma, s", r["longest_beyond_s"], most=2.0)
+            bar(f"{config}, robot {i}: NEES inside 95 %", r["nees_inside_95"], least=0.80)
+        if config == "mrclam":
+            seen = [r["position_rmse_landmark_seen_m"] for r in results]
+    bar("mrclam: mean RMSE where a landmark was seen within 2 s", sum(seen) / 5, most=0.08)
+
+
+def comma():
+    recording = DATA / "comma2k19-a"
+    plain = run(recording, "comma2k19")
+    bar("comma2k19: position RMSE", plain["position_rmse_m"], most=0.75)
+    bar("comma2k19: largest error", plain["position_max_m"], most=2.5)
+    bar("comma2k19-tunnel: end error in % of the way without GNSS",
+        run(recording, "comma2k19-tunnel", "--from", "25")["position_end_percent"], most=1.5)
+    settled = run(recording, "comma2k19", "--from", "20")["position_rmse_m"]
+    changes = {"GNSS 0.1 s later": {"gnss.csv": shifted(0.1)}, "GNSS 0.1 s earlier": {"gnss.csv": shifted(-0.1)},
+               "yaw rate + 0.01 rad/s": {"vehicle.dbc": yaw_rate_offset(0.01)},
+               "yaw rate - 0.01 rad/s": {"vehicle.dbc": yaw_rate_offset(-0.01)}}
+    for what, change in changes.items():
+        with disturbed(recording, change) as folder:
+            bar(f"comma2k19, {what}: RMSE over the undisturbed one's, after 20 s",
+                run(folder, "comma2k19", "--from", "20")["position_rmse_m"] / settled, most=1.15)
+
+
+def main():
+    names = ["starry-night-plan-a", "comma2k19-a", *(f"mrclam-d6-r{i}" for i in range(1, 6))]
+    missing = [n for n in names if not (DATA / n).is_dir()]
+    if missing:
+        print(f"skipped: no recording {missing[0]} in {DATA}")
+        return 77
+    starry()
+    mrclam()
+    comma()
+    print(f"{len(failures)} bars missed")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
