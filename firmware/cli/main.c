@@ -66,7 +66,7 @@ int main(int argc, char **argv) {
     if (strcmp(command, kCommands[i].name) == 0) return kCommands[i].run(argc - 2, argv + 2);
 
   try_external(command, argv + 1);
-  static const char *const kNames[] = {"run", "replay", "check", "help", "eval", "report", "simulate", NULL};
+  static const char *const kNames[] = {"run", "replay", "check", "help", "eval", "report", "simulate", "diff", NULL};
   const char *nearest = wm_word_nearest(command, kNames);
   if (nearest && strcmp(nearest, command) != 0) {
     (void)fprintf(stderr, "waymark: '%s' is no command; did you mean '%s'? (waymark help lists them)\n", command,

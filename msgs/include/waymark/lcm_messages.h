@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Structs of this room as LCM messages of the package `waymark` (msgs/lcm/*.lcm): bytes ready to be published. Pure:
-// any thread, no allocation, no liblcm. Each returns the bytes written, 0 where `capacity` is too small.
+// Structs of this room as LCM messages of the package `waymark` (msgs/lcm/*.lcm): bytes ready to be published. No
+// allocation, no liblcm. One thread at a time: the first call of a kind computes its fingerprint. Each returns the
+// bytes written, 0 where `capacity` is too small.
 #ifndef WAYMARK_LCM_MESSAGES_H
 #define WAYMARK_LCM_MESSAGES_H
 
