@@ -12,7 +12,7 @@
 #include "waymark/run.h"
 
 static const char kConfig[] =
-    "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm: false}\n"
+    "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm_url: \"memq://\"}\n"
     "realtime: {priority: 0, lock_memory: false}\n";
 
 static wm_live_report live;
