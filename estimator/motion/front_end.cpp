@@ -175,7 +175,7 @@ bool motion_front_end::read_speed(double *speed_mps) {
   if (mean_of(WM_Q_WHEEL_SPEED_REAR_LEFT, WM_Q_WHEEL_SPEED_REAR_RIGHT, &speed)) {
     source = kRearWheels;
   } else if (counts_ticks()) {
-    speed = 0.5 * (wheel_[0].speed_mps + wheel_[1].speed_mps);
+    speed = mean_of_wheels(wheel_[0].speed_mps, wheel_[1].speed_mps);
     source = kTicksMean;
   } else if (mean_of(WM_Q_VEHICLE_SPEED, WM_Q_VEHICLE_SPEED, &speed)) {
     source = kVehicleSpeed;
@@ -243,7 +243,8 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
       motion_input done = input;
       done.t_ns = now_ns_;
       done.a =
-          0.5 * (wheel_[0].position_m - wheel_[0].integrated_m + wheel_[1].position_m - wheel_[1].integrated_m) / dt;
+          mean_of_wheels(wheel_[0].position_m - wheel_[0].integrated_m, wheel_[1].position_m - wheel_[1].integrated_m) /
+          dt;
       if (wheel_[0].t_ns == t_ns || wheel_[1].t_ns == t_ns) {
         done.b = history_.empty() ? b : history_.newest().b;
         done.standing = !history_.empty() && history_.newest().standing;
@@ -315,6 +316,13 @@ bool motion_front_end::read_other_turn_rate(double speed_mps, double *rate_radps
 bool motion_front_end::counts_ticks() const {
   return wheel_[0].t_ns != WM_TIME_NONE && wheel_[1].t_ns != WM_TIME_NONE && finite(wheels_.radius_m) &&
          finite(wheels_.ticks_per_turn) && wheels_.ticks_per_turn > 0.0;
+}
+
+double motion_front_end::mean_of_wheels(double left, double right) const {
+  const bool left_dead = health_ & WM_MOTION_HEALTH_ENCODER_LEFT_DEAD;
+  const bool right_dead = health_ & WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD;
+  if (left_dead != right_dead) return left_dead ? right : left;
+  return 0.5 * (left + right);
 }
 
 bool motion_front_end::ticks_drive() const {

@@ -81,8 +81,9 @@ class motion_front_end {
   void push_input(wm_time_ns t_ns, double a, double b, bool doubtful);
   void push_ticks(wm_time_ns t_ns, bool doubtful);
   void hand_out_ticks(const motion_stretch &piece);
-  bool counts_ticks() const;  // both wheels, and what a tick is worth
-  bool ticks_drive() const;   // the way comes from ticks
+  bool counts_ticks() const;                               // both wheels, and what a tick is worth
+  bool ticks_drive() const;                                // the way comes from ticks
+  double mean_of_wheels(double left, double right) const;  // a dead encoder's wheel goes with the other one
   bool seen(int quantity) const { return stamp_ns_[quantity] != WM_TIME_NONE; }
   bool silent(int quantity, wm_time_ns t_ns) const { return t_ns - stamp_ns_[quantity] > hold_max_ns_; }
   double by_gear(double value, bool is_signed) const;

@@ -12,6 +12,8 @@ namespace {
 constexpr double kTieEvery_m = 0.5;
 // A slipping wheel is worth more than four sigma within half a metre; less is within the noise of the ticks.
 constexpr double kSlip_nis = 16.0;
+// Of two roundings, one at each end of a stretch.
+constexpr double kTurn_nis = 2.0 * 9.0;
 constexpr uint32_t kNotBelieved =
     WM_MOTION_HEALTH_ENCODER_LEFT_DEAD | WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD | WM_MOTION_HEALTH_COUNTER_FROZEN;
 
@@ -37,7 +39,7 @@ void wheel_heading::init(planar_filter &filter, const wm_motion_states &states) 
 }
 
 void wheel_heading::listen(planar_filter &filter, const motion_front_end &front) {
-  if (heading_ < 0) return;
+  if (heading_ < 0 || !(front.wheels().track_m > 0.0)) return;
   if (front.model() != WM_MOTION_SPEED_YAW_RATE || (front.health() & kNotBelieved) ||
       filter.before_start(filter.now_ns())) {
     running_ = false;
@@ -57,15 +59,20 @@ void wheel_heading::listen(planar_filter &filter, const motion_front_end &front)
   way_m_[1] = way_m[1];
 }
 
-// turn = ((1 + e_r) r - (1 + e_l) l) / b: the mean of e_l and e_r is the speed's scale, their difference is a state.
+// turn = ((1 + e_r) r - (1 + e_l) l) / b = k (r - l + d (r + l)/2) / b, k the speed's scale: written so, scale and
+// track act on the turn alone and d on the way alone. A turn that rounding alone could make has no derivative by scale
+// and track: it is the noise that the tie will measure, and a derivative that shares its measurement's noise finds a
+// scale in it.
 void wheel_heading::carry(planar_filter &filter, const motion_front_end &front, double left_m, double right_m) {
   const wm_motion_calibration &c = filter.calibration();
   const double track = track_m(filter, front), middle_m = 0.5 * (left_m + right_m);
-  const double turn = (c.speed_scale * (right_m - left_m) + filter.value(difference_) * middle_m) / track;
+  const double turn = c.speed_scale * (right_m - left_m + filter.value(difference_) * middle_m) / track;
   sparse_row by;
-  by.add(filter.motion_state(kSpeedScale), (right_m - left_m) / track);
-  by.add(filter.motion_state(kTrackScale), -turn / c.track_scale);
-  by.add(difference_, middle_m / track);
+  if (square(turn) > kTurn_nis * rounding_rad2(filter, front)) {
+    by.add(filter.motion_state(kSpeedScale), turn / c.speed_scale);
+    by.add(filter.motion_state(kTrackScale), -turn / c.track_scale);
+  }
+  by.add(difference_, c.speed_scale * middle_m / track);
   const double driven_m = std::fabs(left_m) + std::fabs(right_m);
   filter.carry_state(heading_, by, turn, square(front.params().noise_ticks_per_sqrt_m / track) * driven_m);
   filter.carry_state(difference_, {}, 0.0, square(walk_) * 0.5 * driven_m);

@@ -114,6 +114,33 @@ void test_a_pose_given_from_outside_is_kept(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.0, car.filter->pose().heading_rad);
 }
 
+// A day, with stops and turns: covariances stay covariances.
+void test_a_day_leaves_the_covariance_sound(void) {
+  Car car(true);
+  for (int i = 0; i < 24 * 3600 * 4; i++) {
+    const double v = i % 4000 < 300 ? 0.0 : i % 4000 < 2000 ? 0.5 : -0.4;
+    car.step(v, v > 0 && i % 200 < 100 ? 0.3 : 0.0, 0.002, -0.008);
+    if (i % 1000) continue;
+    for (int a = 0; a < car.filter->states(); a++)
+      for (int b = 0; b <= a; b++) {
+        const double bound = std::sqrt(car.filter->variance(a) * car.filter->variance(b));
+        TEST_ASSERT_TRUE(std::fabs(car.filter->covariance(a, b)) <= bound * (1 + 1e-9) + 1e-15);
+        TEST_ASSERT_TRUE(car.filter->covariance(a, b) == car.filter->covariance(b, a));
+      }
+  }
+  const wm_calibration_value difference = named(car, "motion.wheel_difference");
+  TEST_ASSERT_DOUBLE_WITHIN(5 * difference.sigma, -0.008, difference.value);
+}
+
+void test_wheels_of_unknown_track_are_left_alone(void) {
+  Car car(true);
+  car.setup.wheels.track_m = NAN;
+  car.filter->init(car.setup, car.states);
+  for (int i = 0; i < 2000; i++) car.step(2.0, 0.1, 0.0, 0.01);
+  TEST_ASSERT_TRUE(wm::finite(car.filter->pose().heading_rad) && wm::finite(car.sigma_heading()));
+  TEST_ASSERT_EQUAL_DOUBLE(0, named(car, "motion.wheel_difference").value);
+}
+
 }  // namespace
 
 extern "C" {
@@ -126,5 +153,7 @@ int main(void) {
   RUN_TEST(test_the_gyro_tells_the_wheels_and_the_wheels_hold_the_heading);
   RUN_TEST(test_a_slip_is_not_believed);
   RUN_TEST(test_a_pose_given_from_outside_is_kept);
+  RUN_TEST(test_a_day_leaves_the_covariance_sound);
+  RUN_TEST(test_wheels_of_unknown_track_are_left_alone);
   return UNITY_END();
 }
