@@ -16,7 +16,7 @@ struct Point {
   double x_m = 0, y_m = 0;
 };
 
-enum class Surface : uint8_t { wall, door, jamb, lintel, window, pillar, shelf, carton };
+enum class Surface : uint8_t { wall, door, jamb, lintel, window, pillar, shelf, desk, carton };
 
 struct Face {
   Point a, b;                      // free space to the left

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "simulate/worlds/tags.h"
+
+extern "C" {
+#include <apriltag/apriltag.h>
+#include <apriltag/tag36h11.h>
+}
+
+#include <memory>
+
+namespace wm::sim {
+
+int tag36h11_count() {
+  const std::unique_ptr<apriltag_family_t, decltype(&tag36h11_destroy)> family(tag36h11_create(), tag36h11_destroy);
+  return static_cast<int>(family->ncodes);
+}
+
+render::Picture tag36h11_picture(int id, int module_px) {
+  const std::unique_ptr<apriltag_family_t, decltype(&tag36h11_destroy)> family(tag36h11_create(), tag36h11_destroy);
+  const int width = family->total_width, rim = (family->total_width - family->width_at_border) / 2;
+  constexpr float kWhite = 0.85f, kBlack = 0.04f;
+  render::Picture picture(width * module_px, width * module_px, 1, kWhite);
+  const auto module = [&](int x, int y, float value) {
+    for (int j = 0; j < module_px; j++)
+      for (int i = 0; i < module_px; i++) picture.at(x * module_px + i, y * module_px + j) = value;
+  };
+  for (int y = rim; y < width - rim; y++)
+    for (int x = rim; x < width - rim; x++) module(x, y, kBlack);
+  // Bits from the most significant one on; their places are counted from the black square's corner.
+  const uint64_t code = family->codes[id];
+  for (uint32_t bit = 0; bit < family->nbits; bit++)
+    if (code >> (family->nbits - 1 - bit) & 1)
+      module(rim + static_cast<int>(family->bit_x[bit]), rim + static_cast<int>(family->bit_y[bit]), kWhite);
+  return picture;
+}
+
+}  // namespace wm::sim
