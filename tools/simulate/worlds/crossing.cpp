@@ -269,7 +269,7 @@ class Builder {
       if (shop) {
         const double width = std::min(f.length - 1, dice.uniform(2.4, 4.0)),
                      s = dice.uniform(0.5 * width + 0.3, f.length - 0.5 * width - 0.3);
-        landmark(f, s, 2.86, width, 0.62, 0.06, shop_board(number, width / 0.62), "shop board");
+        landmark(f, s, 2.86, width, 0.62, 0.028, shop_board(number, width / 0.62), "shop board");
       }
       if (dice.chance(0.8))
         landmark(f, door_s + (door_bay + 1 < bays ? 0.95 : -0.95), 2.1, 0.42, 0.42, 0.03,
@@ -302,7 +302,7 @@ class Builder {
                 const char *what) {
     const Vec3 middle = at(f, s, z, out);
     scene_.add(render::picture(middle, f.along, {0, 0, 1}, width, height, picture_material(picture, width, height)));
-    if (out > 0.03)
+    if (width > 2)
       scene_.add(bar(f, s - 0.5 * width, s + 0.5 * width, z - 0.5 * height, z + 0.5 * height, out - 0.004,
                      plain(Colour(0.1f))));
     note(middle, f.along, f.normal, width, height, what);

@@ -148,7 +148,9 @@ void dress(const Plan &plan, const BuildingStyle &style, render::Scene &scene) {
     floors.push_back(scene.add(flooring(style.floorings[i], seed + 20 + i, style.hard, dice.uniform(0.28, 0.48))));
   const uint32_t strip = scene.add(plain(Colour(0.16f)));
   Mesh mesh;
-  for (const auto &piece : floor_pieces(plan, style.borders_m)) {
+  Plan floor = plan;
+  std::erase_if(floor.faces, [](const Face &f) { return f.surface == Surface::desk; });
+  for (const auto &piece : floor_pieces(floor, style.borders_m)) {
     const double x = 0.5 * (piece[0].x_m + piece[1].x_m);
     size_t zone = 0;
     while (zone < style.borders_m.size() && x > style.borders_m[zone]) zone++;
@@ -181,7 +183,11 @@ void dress(const Plan &plan, const BuildingStyle &style, render::Scene &scene) {
         break;
       }
       case Surface::jamb: mesh.append(upright(f, f.bottom_m, f.top_m, jamb)); break;
-      case Surface::desk: mesh.append(upright(f, f.bottom_m, f.top_m, desk)); break;
+      case Surface::desk:  // a board on legs
+        mesh.append(upright(f, f.top_m - 0.04, f.top_m, desk));
+        mesh.append(render::box(render::pose_xyz_rpy({f.a.x_m, f.a.y_m, 0.5 * (f.top_m - 0.04)}, 0, 0, 0),
+                                {0.05, 0.05, f.top_m - 0.04}, jamb));
+        break;
       case Surface::carton: mesh.append(upright(f, f.bottom_m, f.top_m, carton)); break;
       case Surface::door:
       case Surface::window:
@@ -209,13 +215,16 @@ void dress(const Plan &plan, const BuildingStyle &style, render::Scene &scene) {
       }
     }
   }
-  for (const Lid &lid : plan.lids)
+  for (const Lid &lid : plan.lids) {
+    if (lid.surface == Surface::desk)
+      mesh.append(render::flat_polygon(outline(lid.outline), lid.z_m - 0.04, false, desk));
     mesh.append(render::flat_polygon(outline(lid.outline), lid.z_m, lid.up,
                                      lid.surface == Surface::carton  ? carton
                                      : lid.surface == Surface::desk  ? desk
                                      : lid.surface == Surface::shelf ? shelf_side
                                      : lid.surface == Surface::jamb  ? jamb
                                                                      : wall));
+  }
   scene.add(mesh);
   if (style.posters) hang_posters(plan, style, scene);
 }

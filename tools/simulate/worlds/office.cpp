@@ -81,6 +81,30 @@ void markers_on_walls(uint64_t seed, bool hard, World &world) {
   }
 }
 
+// Screens and papers on the desks.
+void furnish(uint64_t seed, const Plan &plan, render::Scene &scene) {
+  Dice dice(seed, Part::shelves);
+  render::Material dark, paper;
+  dark.albedo = render::Colour(0.03f);
+  dark.mirror = 0.04;
+  paper.albedo = render::Colour(0.7f);
+  const uint32_t screen = scene.add(dark), sheet = scene.add(paper);
+  for (const Lid &lid : plan.lids) {
+    if (lid.surface != Surface::desk) continue;
+    const Point a = lid.outline[0], c = lid.outline[2];
+    for (const double side : {0.3, 0.7}) {
+      const double x = a.x_m + (c.x_m - a.x_m) * dice.uniform(0.35, 0.65), y = a.y_m + (c.y_m - a.y_m) * side;
+      const render::Pose T = render::pose_xyz_rpy({x, y, lid.z_m}, 0, 0, dice.uniform(-0.3, 0.3));
+      const auto put = [&](const Vec3 &at, const Vec3 &size, uint32_t material) {
+        scene.add(render::box(T * render::pose_xyz_rpy(at, 0, 0, 0), size, material));
+      };
+      put({0, 0, 0.08}, {0.06, 0.06, 0.16}, screen);
+      put({0, 0, 0.31}, {0.54, 0.03, 0.34}, screen);
+      put({dice.uniform(-0.25, 0.25), side < 0.5 ? -0.3 : 0.3, 0.006}, {0.21, 0.3, 0.012}, sheet);
+    }
+  }
+}
+
 WorldCamera office_camera(bool ahead) {
   WorldCamera c;
   c.name = ahead ? "front" : "ceiling";
@@ -117,6 +141,7 @@ wm_status make_office(const WorldRequest &request, World &world, wm_error *err) 
   style.ceiling_panels = true;
   style.posters = !request.markers_on_walls || request.hard;
   dress(world.plan, style, world.scene);
+  furnish(request.seed, world.plan, world.scene);
   Dice dice(request.seed, Part::lamps);
   std::vector<CeilingLamp> lamps = lamps_for(world.plan, 2.3);
   const double yaw = dice.chance(0.5) ? 0 : 90 * kDeg;

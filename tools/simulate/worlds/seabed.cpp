@@ -151,7 +151,7 @@ wm_status make_seabed(const WorldRequest &request, World &world, wm_error *err) 
   const render::Picture blotches = render::noise(request.seed + 1, 1024, 12, 7, 0.72);
   for (int y = 0; y < bottom.height; y++)
     for (int x = 0; x < bottom.width; x++)
-      bottom.set(x, y, bottom.colour(x, y) * std::clamp(4.f * (blotches.at(x, y) - 0.5f) + 0.9f, 0.35f, 1.6f));
+      bottom.set(x, y, bottom.colour(x, y) * std::clamp(2.4f * (blotches.at(x, y) - 0.5f) + 1.f, 0.45f, 1.6f));
   Material sand;
   sand.albedo = Colour(1.f);
   sand.texture = Texture::make(bottom);
@@ -221,7 +221,7 @@ wm_status make_seabed(const WorldRequest &request, World &world, wm_error *err) 
   }
 
   render::Scene &scene = world.scene;
-  scene.ambient.up = Colour(0.12f, 0.17f, 0.18f) * (request.hard ? 0.4f : 1.f);
+  scene.ambient.up = Colour(0.2f, 0.27f, 0.28f) * (request.hard ? 0.4f : 1.f);
   scene.ambient.down = Colour(0.05f, 0.08f, 0.08f) * (request.hard ? 0.4f : 1.f);
   scene.ambient.contact_m = 0.2;
   scene.light_cell_m = 0.3;
@@ -238,7 +238,7 @@ wm_status make_seabed(const WorldRequest &request, World &world, wm_error *err) 
     lamp.position = {0.45, y, 0.05};
     lamp.direction = Vec3(0.7, -0.12 * y, -0.7).normalized();
     lamp.half_angle_rad = 0.5;
-    lamp.power = request.hard ? 4.0 : 5.0;
+    lamp.power = request.hard ? 6.0 : 7.0;
     scene.add(lamp);
   }
 
