@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <ctime>
 #include <vector>
 
 #include "render_corridor.h"
@@ -15,6 +16,9 @@ using namespace wm::render;
 namespace {
 
 double seconds() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+// Of all threads: what a shared machine doesn't stretch.
+double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
 
 double median(std::vector<double> v) {
   std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
@@ -37,15 +41,15 @@ double measure(const char *name, const Scene &scene, const Camera &camera, const
   auto renderer = Renderer::make(scene, camera, quality, 1, false, error);
   if (!renderer) return std::fprintf(stderr, "%s\n", error.c_str()), 0;
   Image image;
-  std::vector<double> times;
+  std::vector<double> times, cpu;
   renderer->render(shot_of(0, exposure_ns), image);
   for (int i = 1; i <= frames; i++) {
-    const double begin = seconds();
+    const double begin = seconds(), cpu_begin = cpu_seconds();
     renderer->render(shot_of(static_cast<uint64_t>(i), exposure_ns), image);
-    times.push_back(seconds() - begin);
+    times.push_back(seconds() - begin), cpu.push_back(cpu_seconds() - cpu_begin);
   }
   const double t = median(times);
-  std::printf("%-44s %7.1f ms  %6.1f frames/s\n", name, 1e3 * t, 1 / t);
+  std::printf("%-44s %7.1f ms  %6.1f frames/s  %7.1f ms of processor\n", name, 1e3 * t, 1 / t, 1e3 * median(cpu));
   std::fflush(stdout);
   return t;
 }

@@ -56,7 +56,7 @@ double from_place(const Lamp &lamp, const Vec3 &place, RTCScene still, const Vec
                        fade(d, lamp.reach_m);
   // The last stretch is left out: the lamp's own glass must not shade it.
   const double share = std::max(0.0, (d - 0.05 - lamp.radius_m) / d);
-  if (still && lamp.shadow && light > 1e-5 && blocked(still, point, way * share)) return 0;
+  if (still && lamp.shadow && light > 1e-5 && blocked(still, point + normal * kLift, way * share)) return 0;
   return light;
 }
 
@@ -64,22 +64,22 @@ double from_place(const Lamp &lamp, const Vec3 &place, RTCScene still, const Vec
 
 Colour lamp_light(const Scene &scene, RTCScene still, const Vec3 &point, const Vec3 &normal) {
   Colour sum;
-  const Vec3 lifted = point + normal * kLift;
   for (const Lamp &lamp : scene.data().lamps) {
     double light = 0;
     if (lamp.kind == Lamp::Kind::point) {
-      light = from_place(lamp, lamp.position, still, lifted, normal);
+      light = from_place(lamp, lamp.position, still, point, normal);
     } else {
       for (double i : {-0.25, 0.25})
         for (double j : {-0.25, 0.25})
-          light += 0.25 * from_place(lamp, lamp.position + i * lamp.edge_u + j * lamp.edge_v, still, lifted, normal);
+          light += 0.25 * from_place(lamp, lamp.position + i * lamp.edge_u + j * lamp.edge_v, still, point, normal);
     }
     sum = sum + lamp.colour * static_cast<float>(light);
   }
   const Sun &sun = scene.sun;
   const Vec3 towards = sun.towards.normalized();
   const double facing = normal.dot(towards);
-  if (sun.power.grey() > 0 && facing > 0 && !(still && sun.shadow && blocked(still, lifted, towards * 1000)))
+  if (sun.power.grey() > 0 && facing > 0 &&
+      !(still && sun.shadow && blocked(still, point + normal * kLift, towards * 1000)))
     sum = sum + sun.power * static_cast<float>(facing);
   return sum;
 }

@@ -35,10 +35,17 @@ struct Packet {
   bool met(int lane) const { return rays.hit.geomID[lane] != RTC_INVALID_GEOMETRY_ID; }
   float3 origin(int i) const { return {rays.ray.org_x[i], rays.ray.org_y[i], rays.ray.org_z[i]}; }
   float3 direction(int i) const { return {rays.ray.dir_x[i], rays.ray.dir_y[i], rays.ray.dir_z[i]}; }
-  Met what(int i, float span) const {
-    return {origin(i),          direction(i),          rays.ray.tfar[i],
-            rays.hit.u[i],      rays.hit.v[i],         {rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]},
-            rays.hit.primID[i], rays.hit.instID[0][i], span};
+  Met what(int i, float span, bool mirrored) const {
+    return {origin(i),
+            direction(i),
+            rays.ray.tfar[i],
+            rays.hit.u[i],
+            rays.hit.v[i],
+            {rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]},
+            rays.hit.primID[i],
+            rays.hit.instID[0][i],
+            span,
+            mirrored};
   }
 };
 
@@ -203,20 +210,20 @@ void Renderer::Data::shade_packet(Packet &packet, const Eye &eye, const float *s
       continue;
     }
     const float distance = packet.rays.ray.tfar[i];
-    sent[i] = shade(air, eye, packet.what(i, span[i] * distance));
+    sent[i] = shade(air, eye, packet.what(i, span[i] * distance, false));
     if (!quality.mirrors || sent[i].mirror < kLeastMirror) continue;
     const float3 at = packet.origin(i) + packet.direction(i) * distance + sent[i].normal * 1e-3f;
     mirrored.set(i, at, reflected(packet.direction(i), sent[i], dice(keys[i])), 0, eye.time);
     any_mirror = true;
   }
   if (any_mirror) {
-    trace(mirrored, false);
+    trace(mirrored, true);
     for (int i = 0; i < kLanes; i++) {
       if (!mirrored.valid[i]) continue;
       const float distance = mirrored.rays.ray.tfar[i];
       const float blur = span[i] * packet.rays.ray.tfar[i] + (span[i] + sent[i].roughness) * distance;
-      const float4 seen =
-          mirrored.met(i) ? shade(air, eye, mirrored.what(i, blur)).radiance : shade_sky(air, mirrored.direction(i));
+      const float4 seen = mirrored.met(i) ? shade(air, eye, mirrored.what(i, blur, true)).radiance
+                                          : shade_sky(air, mirrored.direction(i));
       sent[i].radiance += seen * splat(sent[i].mirror);
     }
   }

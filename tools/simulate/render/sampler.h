@@ -2,19 +2,20 @@
 // The inner loop of textures, for the renderer: four colour values at a time in one vector register.
 #pragma once
 
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
 
 #include "simulate/render/texture.h"
 
 namespace wm::render {
 
 typedef float float4 __attribute__((vector_size(16)));
-typedef int32_t int4 __attribute__((vector_size(16)));
-typedef int16_t short4 __attribute__((vector_size(8)));
 
 inline float4 splat(float v) { return float4{v, v, v, v}; }
 inline float4 as_float4(Colour c) { return float4{c.r, c.g, c.b, 0}; }
@@ -34,7 +35,8 @@ inline float rough_log2(float v) {
 }
 
 struct TextureSampler {
-  static float4 sample(const Texture &texture, float s, float t, float span) {
+  // `between_levels` false: the coarser level alone, which is enough for what is seen in a mirror.
+  static float4 sample(const Texture &texture, float s, float t, float span, bool between_levels = true) {
     const auto last = static_cast<int>(texture.levels_.size()) - 1;
     // Linear interpolation blurs over one pixel by itself: a level is right where its pixel is as wide as the span.
     const float level = span > 0 ? rough_log2(span * static_cast<float>(texture.levels_[0].width)) : 0;
@@ -42,15 +44,19 @@ struct TextureSampler {
     const int fine = std::min(static_cast<int>(level), last);
     if (fine == last) return bilinear(texture, last, s, t);
     const float share = level - static_cast<float>(fine);
+    if (!between_levels) return bilinear(texture, std::min(fine + 1, last), s, t);
     const float4 a = bilinear(texture, fine, s, t), b = bilinear(texture, fine + 1, s, t);
     return a + (b - a) * splat(share);
   }
 
  private:
   static float4 texel(const uint16_t *at) {
-    short4 raw;
-    std::memcpy(&raw, at, sizeof raw);
-    return __builtin_convertvector(raw, float4);
+#ifdef __SSE2__  // gcc 12 converts short vectors one element after another
+    const __m128i raw = _mm_loadl_epi64(reinterpret_cast<const __m128i *>(at));
+    return _mm_cvtepi32_ps(_mm_unpacklo_epi16(raw, _mm_setzero_si128()));
+#else
+    return float4{static_cast<float>(at[0]), static_cast<float>(at[1]), static_cast<float>(at[2]), 0};
+#endif
   }
 
   static int place(int i, int n, Wrap wrap) {

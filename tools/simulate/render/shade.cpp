@@ -56,7 +56,7 @@ Sent shade(const Air &air, const Eye &eye, const Met &met) {
     // A slanted surface is cut long by the pixel: the mean of its width and its length is the blur that errs least.
     const float span = met.span / std::sqrt(std::max(facing, 0.02f)) * facet.span_per_m;
     albedo *= TextureSampler::sample(*surface.texture, w * facet.s[0] + u * facet.s[1] + v * facet.s[2],
-                                     w * facet.t[0] + u * facet.t[1] + v * facet.t[2], span);
+                                     w * facet.t[0] + u * facet.t[1] + v * facet.t[2], span, !met.mirrored);
   }
 
   const float up = 0.5f + 0.5f * normal.z;
@@ -83,7 +83,7 @@ Sent shade(const Air &air, const Eye &eye, const Met &met) {
 
   Sent sent{albedo * light, 0, normal, surface.roughness};
   if (surface.emits) sent.radiance += surface.emission * splat(air.light);
-  if (surface.mirror > 0) {
+  if (surface.mirror > 0 && !met.mirrored) {
     const float a = 1 - facing, a2 = a * a;
     sent.mirror = surface.mirror + (1 - surface.mirror) * surface.glance * a2 * a2 * a;
     sent.radiance *= splat(1 - sent.mirror);

@@ -70,6 +70,7 @@ struct Met {
   uint32_t facet;
   uint32_t mover;  // RTC_INVALID_GEOMETRY_ID: what stands still
   float span;      // width on a surface that faces the ray, m
+  bool mirrored;   // seen in a mirror: a rougher look will do
 };
 
 // What a surface sends back along the ray. When it mirrors: `mirror` > 0 says which share of what comes from
