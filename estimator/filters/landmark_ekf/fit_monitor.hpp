@@ -10,8 +10,9 @@ namespace wm {
 
 class fit_monitor {
  public:
+  // A pose that was set or found is not yet proven: one misfit makes it doubtful.
   void clear() {
-    share_ = 0.0;
+    share_ = kUnproven;
     bad_since_ns_ = WM_TIME_NONE;
     misfits_ = 0;
     keys_ = 0;
@@ -43,7 +44,7 @@ class fit_monitor {
   wm_time_ns bad_since_ns() const { return bad_since_ns_; }
 
  private:
-  static constexpr double kMemory = 0.15, kGood = 0.3, kDoubtful = 0.35, kBad = 0.6;
+  static constexpr double kMemory = 0.15, kUnproven = 0.25, kGood = 0.3, kDoubtful = 0.35, kBad = 0.6;
   static constexpr int kKeys = 4;
 
   void clear_streak() {

@@ -426,8 +426,8 @@ double landmark_ekf::fuse(residual *r, int count, innovation_list records) {
   }
   if (!fused) return 1.0;
   const double weaker = nis > soft ? nis / soft : 1.0;
-  // What hardly fits may move the pose, but teaches nothing of the sensors.
-  const int kept = nis > soft ? calibration_states_ : kPoseStates;
+  // While several did not fit, what hardly fits may move the pose, but teaches nothing of the sensors.
+  const int kept = nis > soft && monitor_.doubtful() ? calibration_states_ : kPoseStates;
   filter_.update(first, r[0].innovation, r[0].noise * weaker, kPoseStates, kept);
   if (count == 2) {
     const double left = r[1].innovation - cross / (first.variance + r[0].noise * weaker) * r[0].innovation;
