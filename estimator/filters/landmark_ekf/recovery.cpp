@@ -6,7 +6,7 @@
 namespace wm {
 namespace {
 
-constexpr double kSearchEvery_s = 0.25;  // bounds the cost: one search is about a tenth of a millisecond
+constexpr double kSearchEvery_s = 0.25;  // bounds the cost: one search over 64 observations is about half a millisecond
 constexpr double kSayLost_s = 0.1;       // lost is lost for at least so long: whoever listens must hear it
 constexpr double kInflateAfter_s = 3.0;  // lost for so long and not found: open the gates
 constexpr double kInflateEvery_s = 1.0;
