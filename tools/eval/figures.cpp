@@ -79,14 +79,15 @@ bool beyond_sigmas(const Sample &s, bool planar) {
 Figures number(double value) { return std::isfinite(value) ? Figures(value) : Figures(nullptr); }
 
 double path_length(const std::vector<Pose> &path, bool planar) {
+  if (path.empty()) return 0;
   double length = 0;
-  const Pose *last = path.empty() ? nullptr : &path.front();
+  Eigen::Vector3d last_m = path.front().p_m;
   for (const Pose &pose : path) {
-    Eigen::Vector3d step = pose.p_m - last->p_m;
+    Eigen::Vector3d step = pose.p_m - last_m;
     if (planar) step.z() = 0;
     if (step.norm() < kCountedStepM) continue;
     length += step.norm();
-    last = &pose;
+    last_m = pose.p_m;
   }
   return length;
 }
