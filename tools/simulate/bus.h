@@ -25,14 +25,18 @@ struct Message {
   size_t counter() const { return signals.size() - 1; }
 };
 
-enum class Bus_message { wheels, yaw_rate, steering, gear };
+enum class Bus_message { wheels, yaw_rate, steering, gear, wheel_speeds };
 
 const Message &message(Bus_message which);
 
+// Which messages a bus has.
+using Messages = std::vector<Bus_message>;
+Messages car_messages();  // with rolling counts
+
 // Text of vehicle.dbc; what binds its signals to quantities, and the same as text of can-signals.yaml.
-std::string dbc_text();
-std::vector<wm_can_binding> bindings();
-std::string can_signals_text();
+std::string dbc_text(const Messages &sent = car_messages());
+std::vector<wm_can_binding> bindings(const Messages &sent = car_messages());
+std::string can_signals_text(const Messages &sent = car_messages());
 
 // Writes a physical value, rounded and limited to the signal's range (a sensor saturates), into the frame's bits.
 void pack(const Signal &signal, double physical, wm_can_frame &frame);

@@ -28,6 +28,15 @@ enum class Stream : uint64_t {
   frame_latency,
   frame_fault,
   sighting_fault,
+  slip,
+  camera_mounting,
+  camera_intrinsics,
+  frame_jitter,
+  frame_lost,
+  velocity_scale,
+  velocity_noise,
+  rate_bias,
+  rate_noise,
 };
 
 class Random {

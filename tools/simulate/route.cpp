@@ -81,7 +81,10 @@ void Drive::add_ramp(double duration, double v0, double v1) {
 
 wm_status Drive::plan(const Route &route, Drive &out, wm_error *err) {
   out = Drive{};
-  out.start_ = {route.x_m, route.y_m, route.heading_rad, 0, 0, 0, 0};
+  out.start_ = {};
+  out.start_.x_m = route.x_m;
+  out.start_.y_m = route.y_m;
+  out.start_.heading_rad = route.heading_rad;
   std::vector<Leg> legs;
   for (int lap = 0; lap < route.laps; lap++) legs.insert(legs.end(), route.legs.begin(), route.legs.end());
 
@@ -126,11 +129,35 @@ wm_status Drive::plan(const Route &route, Drive &out, wm_error *err) {
     out.add_ramp(std::max(cruise_m, 0.0) / top, top, top);
     out.add_ramp(ramp_s(top, v1, a), top, v1);
   }
+  out.planned_s_ = out.duration_s_;
+  return WM_OK;
+}
+
+void Drive::cut(double duration_s) { duration_s_ = std::min(duration_s_, duration_s); }
+
+wm_status Drive::carry(double at_s, double forward_s, wm_error *err) {
+  if (at_s + forward_s >= duration_s_)
+    return wm_fail(err, WM_BAD_CONFIG, "faults.kidnap: at_s + forward_s is %g s, but the drive ends after %g s",
+                   at_s + forward_s, duration_s_);
+  const State from = driven(at_s), to = driven(at_s + forward_s);
+  carry_way_m_ = to.way_m - from.way_m;
+  carry_heading_rad_ = to.heading_rad - from.heading_rad;
+  carry_at_s_ = at_s;
+  carry_forward_s_ = forward_s;
+  duration_s_ -= forward_s;
   return WM_OK;
 }
 
 State Drive::at(double t_s) const {
-  const double t = std::clamp(t_s, 0.0, duration_s_);
+  if (carry_forward_s_ <= 0 || t_s < carry_at_s_) return driven(t_s);
+  State s = driven(t_s + carry_forward_s_);
+  s.carried_way_m = carry_way_m_;
+  s.carried_heading_rad = carry_heading_rad_;
+  return s;
+}
+
+State Drive::driven(double t_s) const {
+  const double t = std::clamp(t_s, 0.0, planned_s_);
   double path_m = 0, speed = 0;
   if (!ramps_.empty()) {
     auto ramp =
@@ -138,7 +165,7 @@ State Drive::at(double t_s) const {
     ramp = ramp == ramps_.begin() ? ramp : ramp - 1;
     const double u = std::clamp((t - ramp->start_s) / ramp->duration_s, 0.0, 1.0), dv = ramp->v1 - ramp->v0;
     path_m = ramp->start_m + ramp->duration_s * (ramp->v0 * u + dv * (u * u * u - 0.5 * u * u * u * u));
-    speed = t_s < 0 || t_s > duration_s_ ? 0 : ramp->v0 + dv * (3 * u * u - 2 * u * u * u);
+    speed = t_s < 0 || t_s > planned_s_ ? 0 : ramp->v0 + dv * (3 * u * u - 2 * u * u * u);
   }
   if (pieces_.empty()) return start_;
   auto piece =

@@ -16,7 +16,8 @@ struct State {
   double way_m;        // signed: backwards counts down
   double speed_mps;    // signed
   double yaw_rate_radps;
-  double curvature_1pm;  // tan(road wheel angle) / wheelbase
+  double curvature_1pm;                               // tan(road wheel angle) / wheelbase
+  double carried_way_m = 0, carried_heading_rad = 0;  // of these it was carried so much: no wheel, no gyro says so
 };
 
 class Drive {
@@ -26,6 +27,11 @@ class Drive {
 
   double duration_s() const { return duration_s_; }
   double length_m() const { return length_m_; }  // driven, forwards and backwards
+  // Ends the drive there, where it is longer.
+  void cut(double duration_s);
+  // At `at_s` the vehicle is put where it would be `forward_s` later, and drives on from there. WM_BAD_CONFIG when the
+  // drive is too short. Wheels and gyro measure nothing of it.
+  wm_status carry(double at_s, double forward_s, wm_error *err);
   // At t in seconds from the start; before and after it the robot stands. O(log n).
   State at(double t_s) const;
 
@@ -44,13 +50,16 @@ class Drive {
 
   void add_path(double length_m, int sign, double curvature0, double curvature1);
   void add_ramp(double duration_s, double v0, double v1);
+  State driven(double t_s) const;
   static void end_of(const Piece &piece, double along_m, double &x, double &y, double &heading);
 
   std::vector<Piece> pieces_;
   std::vector<Ramp> ramps_;
   double duration_s_ = 0, length_m_ = 0;
   double planned_m_ = 0;  // way of the ramps
+  double planned_s_ = 0;  // their duration
   State start_ = {};
+  double carry_at_s_ = 0, carry_forward_s_ = 0, carry_way_m_ = 0, carry_heading_rad_ = 0;
 };
 
 }  // namespace wm::sim

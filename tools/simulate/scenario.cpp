@@ -6,87 +6,25 @@
 #include <cstring>
 #include <set>
 
-#include "simulate/angle.h"
-#include "waymark/yaml.h"
+#include "simulate/scenario_reader.h"
 
 namespace wm::sim {
 namespace {
 
-constexpr double kDeg = kPi / 180;
-constexpr double kMilli = 1e-3, kPercent = 1e-2;
-constexpr double kFar_m = 1e5;
-
-// Reads values out of maps until something is wrong; from then on does nothing and keeps the first error.
-class Reader {
- public:
-  explicit Reader(wm_error *err) : err_(err) {}
-  wm_status status() const { return status_; }
-  bool ok() const { return status_ == WM_OK; }
-  wm_error *error() const { return err_; }
-  void take(wm_status status) {
-    if (ok()) status_ = status;
-  }
-
-  // Refuses what is not a map, and keys that are not in `known` (NULL-terminated).
-  void keys(const wm_yaml_node &map, const char *const *known) {
-    if (ok()) take(wm_yaml_check_keys(&map, known, WM_YAML_STRICT, nullptr, err_));
-  }
-  wm_yaml_node child(const wm_yaml_node &map, const char *key, bool required) {
-    wm_yaml_node node{};
-    if (!ok()) return node;
-    node = wm_yaml_get(&map, key);
-    if (required && !wm_yaml_there(&node)) fail(map, (std::string("`") + key + "` is missing here").c_str());
-    return node;
-  }
-  // out = scale * value; left alone when the key isn't there.
-  void number(const wm_yaml_node &map, const char *key, double min, double max, double scale, double &out,
-              bool required = false) {
-    const wm_yaml_node node = child(map, key, required);
-    if (!ok() || !wm_yaml_there(&node)) return;
-    double value = 0;
-    take(wm_yaml_f64(&node, min, max, &value, err_));
-    if (ok()) out = value * scale;
-  }
-  void integer(const wm_yaml_node &map, const char *key, int64_t min, int64_t max, int64_t &out,
-               bool required = false) {
-    const wm_yaml_node node = child(map, key, required);
-    if (ok() && wm_yaml_there(&node)) take(wm_yaml_i64(&node, min, max, &out, err_));
-  }
-  void text(const wm_yaml_node &map, const char *key, std::string &out, bool required = false) {
-    const wm_yaml_node node = child(map, key, required);
-    if (!ok() || !wm_yaml_there(&node)) return;
-    char buffer[512];
-    take(wm_yaml_string(&node, buffer, sizeof buffer, err_));
-    if (ok()) out = buffer;
-  }
-  size_t numbers(const wm_yaml_node &map, const char *key, size_t min_count, size_t max_count, double *out,
-                 bool required = false) {
-    const wm_yaml_node node = child(map, key, required);
-    size_t count = 0;
-    if (ok() && wm_yaml_there(&node)) take(wm_yaml_f64_list(&node, min_count, max_count, out, &count, err_));
-    return count;
-  }
-  // The items of a list.
-  size_t list(const wm_yaml_node &node) {
-    if (!ok() || !wm_yaml_there(&node)) return 0;
-    if (!wm_yaml_is_list(&node)) fail(node, "a list is wanted here");
-    return ok() ? wm_yaml_count(&node) : 0;
-  }
-  void fail(const wm_yaml_node &node, const char *what) {
-    if (ok())
-      take(wm_fail(err_, WM_BAD_CONFIG, "%s:%d: %s: %s", wm_yaml_file(&node), wm_yaml_line(&node),
-                   node.path[0] ? node.path : "scenario", what));
-  }
-
- private:
-  wm_error *err_;
-  wm_status status_ = WM_OK;
-};
-
-void read_landmarks(Reader &r, const wm_yaml_node &world, Scenario &out) {
-  static const char *const known[] = {"landmarks", nullptr};
+void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
+  static const char *const known[] = {"landmarks", "kind", "variant", "markers_on_walls", nullptr};
+  static const char *const kinds[] = {"features", "crossing", "corridor", "office", "hall", "seabed", nullptr};
+  static const char *const variants[] = {"easy", "hard", nullptr};
   r.keys(world, known);
+  int kind = 0, variant = 0;
+  r.word(world, "kind", kinds, kind);
+  r.word(world, "variant", variants, variant);
+  r.flag(world, "markers_on_walls", out.world.markers_on_walls);
+  out.world.hard = variant == 1;
+  if (kind > 0) out.world.kind = kinds[kind];
   const wm_yaml_node list = r.child(world, "landmarks", false);
+  if (r.ok() && kind > 0 && wm_yaml_there(&list))
+    return r.fail(list, "a world of this kind draws its own landmarks; leave the key out");
   std::set<int32_t> ids;
   for (size_t i = 0, n = r.list(list); i < n && r.ok(); i++) {
     static const char *const known_item[] = {"id", "what", "xyz_m", nullptr};
@@ -104,17 +42,23 @@ void read_landmarks(Reader &r, const wm_yaml_node &world, Scenario &out) {
   }
 }
 
-void read_robot(Reader &r, const wm_yaml_node &map, Robot &out) {
-  static const char *const known[] = {"wheel_radius_m", "ticks_per_turn", "track_m",
-                                      "wheelbase_m",    "steering_table", nullptr};
+void read_robot(Reader &r, const wm_yaml_node &map, bool steered, Robot &out) {
+  static const char *const known[] = {"wheel_radius_m", "ticks_per_turn", "track_m", "wheelbase_m",
+                                      "steering_table", "wheels_send",    nullptr};
+  static const char *const sends[] = {"ticks", "speeds", nullptr};
   r.keys(map, known);
   wm_wheels &w = out.wheels;
   w.steering_ratio = NAN;
   w.encoder_offset_m = 0;
+  w.wheelbase_m = 1;
   r.number(map, "wheel_radius_m", 0.01, 2, 1, w.radius_m, true);
   r.number(map, "ticks_per_turn", 1, 1e6, 1, w.ticks_per_turn, true);
   r.number(map, "track_m", 0.05, 5, 1, w.track_m, true);
-  r.number(map, "wheelbase_m", 0.05, 10, 1, w.wheelbase_m, true);
+  r.number(map, "wheelbase_m", 0.05, 10, 1, w.wheelbase_m, steered);
+
+  int speeds = 0;
+  r.word(map, "wheels_send", sends, speeds);
+  out.sends_speeds = speeds == 1;
 
   static const char *const known_table[] = {"actuator_mm", "road_wheel_deg", nullptr};
   const wm_yaml_node table = r.child(map, "steering_table", false);
@@ -229,9 +173,9 @@ void read_bus(Reader &r, const wm_yaml_node &map, Bus &out) {
   if (!r.ok() || !wm_yaml_there(&map)) return;
   r.keys(map, known);
   r.number(map, "wheels_hz", 1, 1000, 1, out.wheels_hz);
-  r.number(map, "yaw_rate_hz", 1, 1000, 1, out.yaw_rate_hz);
-  r.number(map, "steering_hz", 1, 1000, 1, out.steering_hz);
-  r.number(map, "gear_hz", 1, 1000, 1, out.gear_hz);
+  r.number(map, "yaw_rate_hz", 0, 1000, 1, out.yaw_rate_hz);
+  r.number(map, "steering_hz", 0, 1000, 1, out.steering_hz);
+  r.number(map, "gear_hz", 0, 1000, 1, out.gear_hz);
   r.number(map, "stamp_jitter_ms", 0, 100, kMilli, out.stamp_jitter_s);
 }
 
@@ -246,6 +190,13 @@ void read_errors(Reader &r, const wm_yaml_node &map, Errors &out) {
                                       "camera_yaw_deg",
                                       "start_xy_m",
                                       "start_heading_deg",
+                                      "slip_percent",
+                                      "camera_mounting_deg",
+                                      "camera_mounting_mm",
+                                      "camera_intrinsics_percent",
+                                      "frame_stamp_jitter_ms",
+                                      "speed_percent",
+                                      "speed_noise_mps",
                                       nullptr};
   if (!r.ok() || !wm_yaml_there(&map)) return;
   r.keys(map, known);
@@ -259,6 +210,24 @@ void read_errors(Reader &r, const wm_yaml_node &map, Errors &out) {
   r.number(map, "camera_yaw_deg", 0, 45, kDeg, out.camera_yaw_rad);
   r.number(map, "start_xy_m", 0, 10, 1, out.start_xy_m);
   r.number(map, "start_heading_deg", 0, 180, kDeg, out.start_heading_rad);
+  r.number(map, "slip_percent", 0, 20, kPercent, out.slip);
+  r.number(map, "camera_mounting_deg", 0, 45, kDeg, out.camera_mounting_rad);
+  r.number(map, "camera_mounting_mm", 0, 1000, kMilli, out.camera_mounting_m);
+  r.number(map, "camera_intrinsics_percent", 0, 10, kPercent, out.camera_intrinsics);
+  r.number(map, "frame_stamp_jitter_ms", 0, 100, kMilli, out.frame_stamp_jitter_s);
+  r.number(map, "speed_percent", 0, 20, kPercent, out.speed);
+  r.number(map, "speed_noise_mps", 0, 10, 1, out.speed_noise_mps);
+}
+
+// The map under `key`, with the stretch of time that it must give.
+wm_yaml_node read_span(Reader &r, const wm_yaml_node &map, const char *key, const char *const *known, Span &out) {
+  const wm_yaml_node node = r.child(map, key, false);
+  if (!r.ok() || !wm_yaml_there(&node)) return node;
+  r.keys(node, known);
+  r.number(node, "from_s", 0, 1e9, 1, out.from_s, true);
+  r.number(node, "to_s", 0, 1e9, 1, out.to_s, true);
+  if (r.ok() && out.to_s <= out.from_s) r.fail(node, "to_s must be after from_s");
+  return node;
 }
 
 void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
@@ -272,6 +241,13 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
                                       "camera_clock_offset_ms",
                                       "dead_encoder",
                                       "start_offset",
+                                      "frames_lost_percent",
+                                      "camera_clock_drift_ppm",
+                                      "camera_dropout",
+                                      "frozen_picture",
+                                      "lights_off",
+                                      "wheel_slip",
+                                      "kidnap",
                                       nullptr};
   static const char *const known_dead[] = {"wheel", "from_s", nullptr};
   static const char *const known_start[] = {"x_m", "y_m", "heading_deg", nullptr};
@@ -286,6 +262,28 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
   r.number(map, "frames_late_percent", 0, 100, kPercent, out.frames_late);
   r.number(map, "frames_late_ms", 0, 1e5, kMilli, out.frames_late_s);
   r.number(map, "camera_clock_offset_ms", -1e4, 1e4, kMilli, out.camera_clock_offset_s);
+
+  r.number(map, "frames_lost_percent", 0, 100, kPercent, out.frames_lost);
+  r.number(map, "camera_clock_drift_ppm", -1e5, 1e5, 1e-6, out.camera_clock_drift);
+  static const char *const known_span[] = {"from_s", "to_s", nullptr};
+  static const char *const known_lights[] = {"from_s", "to_s", "left_percent", nullptr};
+  static const char *const known_slip[] = {"from_s", "to_s", "wheel", "percent", nullptr};
+  static const char *const known_kidnap[] = {"at_s", "forward_s", nullptr};
+  read_span(r, map, "camera_dropout", known_span, out.camera_dropout);
+  read_span(r, map, "frozen_picture", known_span, out.frozen_picture);
+  const wm_yaml_node lights = read_span(r, map, "lights_off", known_lights, out.lights_off);
+  if (r.ok() && wm_yaml_there(&lights)) r.number(lights, "left_percent", 0, 100, kPercent, out.lights_left);
+  const wm_yaml_node slip = read_span(r, map, "wheel_slip", known_slip, out.wheel_slip);
+  if (r.ok() && wm_yaml_there(&slip)) {
+    r.word(slip, "wheel", wheels, out.wheel_slip_wheel, true);
+    r.number(slip, "percent", -100, 1000, kPercent, out.wheel_slip_share, true);
+  }
+  const wm_yaml_node kidnap = r.child(map, "kidnap", false);
+  if (r.ok() && wm_yaml_there(&kidnap)) {
+    r.keys(kidnap, known_kidnap);
+    r.number(kidnap, "at_s", 0, 1e9, 1, out.kidnap_at_s, true);
+    r.number(kidnap, "forward_s", 0.1, 1e9, 1, out.kidnap_forward_s, true);
+  }
 
   const wm_yaml_node dead = r.child(map, "dead_encoder", false);
   if (r.ok() && wm_yaml_there(&dead)) {
@@ -306,8 +304,8 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
 }
 
 void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
-  static const char *const known[] = {"format",  "name",  "about", "seed",   "clock_start_s", "world", "robot",
-                                      "cameras", "route", "bus",   "errors", "faults",        nullptr};
+  static const char *const known[] = {"format",  "name",  "about", "seed",   "clock_start_s", "world",    "robot",
+                                      "cameras", "route", "bus",   "errors", "faults",        "pictures", nullptr};
   r.keys(root, known);
   std::string format;
   r.text(root, "format", format, true);
@@ -319,10 +317,22 @@ void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
   r.integer(root, "seed", 0, INT64_MAX, seed);
   out.seed = static_cast<uint64_t>(seed);
   r.number(root, "clock_start_s", 0, 1e9, 1, out.clock_start_s);
-  read_landmarks(r, r.child(root, "world", true), out);
-  read_robot(r, r.child(root, "robot", true), out.robot);
-  read_cameras(r, r.child(root, "cameras", false), out);
-  read_route(r, r.child(root, "route", true), out.route);
+  read_world(r, r.child(root, "world", true), out);
+  const bool pictured = out.world.pictured(), six = out.world.kind == "seabed";
+  const wm_yaml_node robot = r.child(root, "robot", !six), cameras = r.child(root, "cameras", false),
+                     route = r.child(root, "route", !pictured), pictures = r.child(root, "pictures", false);
+  if (r.ok() && six && wm_yaml_there(&robot)) r.fail(robot, "this vehicle has no wheels; leave the key out");
+  if (r.ok() && six && wm_yaml_there(&route)) r.fail(route, "this world draws its way by itself; leave the key out");
+  if (r.ok() && !pictured && wm_yaml_there(&pictures))
+    r.fail(pictures, "there are pictures only in a world that has a `kind`");
+  const bool steered = out.world.kind != "office" && out.world.kind != "hall";
+  if (!six) read_robot(r, robot, steered, out.robot);
+  if (pictured)
+    read_pixel_cameras(r, cameras, out);
+  else
+    read_cameras(r, cameras, out);
+  if (r.ok() && wm_yaml_there(&route)) read_route(r, route, out.route);
+  read_pictures(r, pictures, out.pictures);
   read_bus(r, r.child(root, "bus", false), out.bus);
   read_errors(r, r.child(root, "errors", false), out.errors);
   read_faults(r, r.child(root, "faults", false), out.faults);
@@ -355,6 +365,8 @@ void make_perfect(Scenario &scenario) {
   scenario.errors = Errors{};
   scenario.faults = Faults{};
   scenario.bus.stamp_jitter_s = 0;
+  scenario.pictures.noise_scale = 0;
+  scenario.pictures.gain_drift = 0;
   for (Camera &camera : scenario.cameras) {
     camera.bearing_sigma_rad = 0;
     camera.outlier_fraction = 0;

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,7 +34,16 @@ struct Route {
 };
 
 struct Robot {
-  wm_wheels wheels = {};  // as calibration.yaml says; the true ones differ by what `errors` draws
+  wm_wheels wheels = {};      // as calibration.yaml says; the true ones differ by what `errors` draws
+  bool sends_speeds = false;  // the bus gives the wheels' speeds, without sign, instead of rolling counts
+};
+
+// What is rendered: a maker of worlds, which draws building, landmarks, cameras and route by the seed.
+struct WorldKind {
+  std::string kind;  // crossing, corridor, office, hall, seabed; empty: features only
+  bool hard = false;
+  bool markers_on_walls = false;  // office
+  bool pictured() const { return !kind.empty(); }
 };
 
 // A camera with a landmark detector behind it: features only, no pixels.
@@ -49,6 +59,33 @@ struct Camera {
   double outlier_fraction = 0;  // of the sightings: anything in the field of view instead
   double latency_s = 0;         // arrival after the middle of the exposure
   double latency_jitter_s = 0;  // uniform, added
+};
+
+// What a scenario changes of the world's camera of this name; what is absent stays.
+struct PixelCamera {
+  std::string name;
+  std::string model;
+  int width = 0, height = 0;  // given without intrinsics: these are scaled
+  std::vector<double> intrinsics, distortion;
+  std::optional<double> field_of_view_rad, rate_hz, exposure_s, readout_s;
+  std::vector<double> xyz_m, rpy_rad;  // of the mounting
+  std::optional<bool> colour;
+};
+
+// How pictures are made, of all cameras.
+struct Pictures {
+  int samples = 2;            // rays a pixel
+  double psf_sigma_px = 0.5;  // the lens' point spread
+  int jpeg_quality = 60;
+  bool lossless = false;                     // grey bytes instead of JPEG
+  double latency_s = 0.02;                   // arrival after the middle of the exposure
+  double latency_jitter_s = 0.04;            // uniform, added
+  double shot = 1.0 / 20000, read = 0.0008;  // variance of a white pixel's shot noise, deviation of the read noise
+  double vignetting = 0.3;                   // light that is missing in the corners
+  double response_power = 0.55;              // grey = light^power, with a shoulder
+  double brightness = 0.26;                  // mean signal that the exposure aims at
+  double gain_drift = 0.004;                 // wandering of the gain a frame, relative
+  double noise_scale = 1;                    // 0: none
 };
 
 struct Bus {
@@ -67,6 +104,19 @@ struct Errors {
   double landmark_m = 0;            // each coordinate of the map, x and y
   double camera_yaw_rad = 0;        // each camera's mounting
   double start_xy_m = 0, start_heading_rad = 0;
+  double slip = 0;                  // of each wheel, wandering; relative
+  double camera_mounting_rad = 0;   // cameras with pixels: each axis
+  double camera_mounting_m = 0;     // each axis
+  double camera_intrinsics = 0;     // each number, relative
+  double frame_stamp_jitter_s = 0;  // each picture
+  double speed = 0;                 // six degrees of freedom: scale of the velocity, relative
+  double speed_noise_mps = 0;       // each axis and sample
+};
+
+// A stretch of time, from the start of the recording.
+struct Span {
+  double from_s = 0, to_s = 0;  // empty when to_s <= from_s
+  bool holds(double t_s) const { return t_s >= from_s && t_s < to_s; }
 };
 
 // Things that go wrong on request; all off by default.
@@ -78,16 +128,30 @@ struct Faults {
   int dead_encoder = -1;                                       // 0 left, 1 right: its count stands still
   double dead_encoder_from_s = 0;
   double start_x_m = 0, start_y_m = 0, start_heading_rad = 0;  // added to the start pose that the recording states
+  double frames_lost = 0;                                      // fraction of the pictures
+  double camera_clock_drift = 0;                               // of the cameras' clock, relative
+  Span camera_dropout;                                         // no pictures
+  Span frozen_picture;                                         // the last picture again and again
+  Span lights_off;
+  double lights_left = 0.02;                     // what is left of the light then
+  Span wheel_slip;                               // one wheel turns more (or less) than it rolls
+  int wheel_slip_wheel = 0;                      // 0 left, 1 right
+  double wheel_slip_share = 0;                   // relative
+  double kidnap_at_s = 0, kidnap_forward_s = 0;  // carried to where it would be so much later; 0: not
 };
 
 struct Scenario {
   std::string name, about;
   uint64_t seed = 1;
-  double clock_start_s = 0;            // first stamp of the recording's clock
+  double clock_start_s = 0;  // first stamp of the recording's clock
+  double duration_s = 0;     // the recording ends then; 0: with the drive
+  WorldKind world;
   std::vector<wm_landmark> landmarks;  // true places
   Robot robot;
   std::vector<Camera> cameras;
-  Route route;
+  std::vector<PixelCamera> pixel_cameras;
+  Pictures pictures;
+  Route route;  // without legs: the world's own
   Bus bus;
   Errors errors;
   Faults faults;

@@ -10,6 +10,7 @@
 #include "simulate/bus.h"
 #include "simulate/faults.h"
 #include "simulate/random.h"
+#include "simulate/wheels.h"
 
 namespace wm::sim {
 namespace {
@@ -64,23 +65,43 @@ class Sender {
   Recording &out_;
 };
 
-// Counts of the rear wheels: what they rolled, by their own radius, over the true track. A closed form of way and
-// heading, so nothing drifts but what the errors make drift.
-void send_wheels(const Scenario &sc, const Random &random, Recording &out) {
-  const wm_wheels &w = sc.robot.wheels;
-  const double track_m = w.track_m * (1 + out.drawn.track), heading0 = out.drive.at(0).heading_rad;
+bool dead(const Scenario &sc, int side, double t_s) {
+  return sc.faults.dead_encoder == side && t_s >= sc.faults.dead_encoder_from_s;
+}
+
+void send_wheel_counts(const Scenario &sc, const Random &random, const Wheels &wheels, Recording &out) {
   const Message &m = message(Bus_message::wheels);
   Sender(sc, random, Bus_message::wheels, out).run(sc.bus.wheels_hz, 0, [&](uint64_t, double t_s, wm_can_frame &frame) {
     for (int side = 0; side < 2; side++) {
-      const bool dead = sc.faults.dead_encoder == side && t_s >= sc.faults.dead_encoder_from_s;
-      const State s = out.drive.at(dead ? sc.faults.dead_encoder_from_s : t_s);
-      const double rolled_m = s.way_m + (side == 0 ? -0.5 : 0.5) * track_m * (s.heading_rad - heading0);
-      const double turns = rolled_m / (2 * kPi * w.radius_m * (1 + out.drawn.wheel_radius[side]));
+      const double at_s = dead(sc, side, t_s) ? sc.faults.dead_encoder_from_s : t_s;
       const double phase = random.uniform(Stream::encoder_phase, static_cast<uint64_t>(side)) * 65536;
+      const double turned = wheels.turns(static_cast<size_t>(side), at_s);
       pack_count(m.signals[static_cast<size_t>(side)],
-                 static_cast<int64_t>(std::floor(turns * w.ticks_per_turn + phase)), frame);
+                 static_cast<int64_t>(std::floor(turned * sc.robot.wheels.ticks_per_turn + phase)), frame);
     }
   });
+}
+
+// Mean speeds of the intervals that they hold for, by the nominal radius, without sign. What rounding leaves over goes
+// into the next value, as in a control unit that counts ticks: the sum of the speeds is the way.
+void send_wheel_speeds(const Scenario &sc, const Random &random, const Wheels &wheels, Recording &out) {
+  const Message &m = message(Bus_message::wheel_speeds);
+  const double step_s = 1 / sc.bus.wheels_hz, rim_m = 2 * kPi * sc.robot.wheels.radius_m;
+  double left_over[2] = {0, 0};
+  Sender(sc, random, Bus_message::wheel_speeds, out)
+      .run(sc.bus.wheels_hz, 0, [&](uint64_t, double t_s, wm_can_frame &frame) {
+        for (int side = 0; side < 2; side++) {
+          if (dead(sc, side, t_s)) continue;
+          const auto i = static_cast<size_t>(side);
+          const Signal &signal = m.signals[i];
+          const double speed = (wheels.turns(i, t_s + step_s) - wheels.turns(i, t_s)) * rim_m / step_s;
+          if (speed == 0) left_over[i] = 0;
+          const double wanted = std::fabs(speed) + left_over[i];
+          const double sent = signal.factor * static_cast<double>(std::llround(std::max(wanted, 0.0) / signal.factor));
+          left_over[i] = wanted - sent;
+          pack(signal, sent, frame);
+        }
+      });
 }
 
 // A rate holds from its stamp to the next one (recording-format.md), so a sample is the mean rate of that interval.
@@ -90,7 +111,8 @@ void send_yaw_rate(const Scenario &sc, const Random &random, Recording &out) {
   double walk = 0;
   Sender(sc, random, Bus_message::yaw_rate, out)
       .run(sc.bus.yaw_rate_hz, 0, [&](uint64_t k, double t_s, wm_can_frame &frame) {
-        const double turned = out.drive.at(t_s + step_s).heading_rad - out.drive.at(t_s).heading_rad;
+        const State from = out.drive.at(t_s), to = out.drive.at(t_s + step_s);
+        const double turned = to.heading_rad - to.carried_heading_rad - (from.heading_rad - from.carried_heading_rad);
         const double noise = sc.errors.yaw_rate_noise_radps * random.normal(Stream::yaw_rate_noise, k);
         const double rate = turned / step_s + out.drawn.yaw_rate_bias_radps + walk + noise;
         walk += sc.errors.yaw_rate_bias_walk * std::sqrt(step_s) * random.normal(Stream::yaw_rate_walk, k);
@@ -201,21 +223,43 @@ void make_start(const Scenario &sc, const Random &random, Recording &out) {
 
 }  // namespace
 
+Messages messages_of(const Scenario &sc) {
+  if (!sc.world.pictured()) return car_messages();
+  Messages sent = {sc.robot.sends_speeds ? Bus_message::wheel_speeds : Bus_message::wheels};
+  if (sc.bus.yaw_rate_hz > 0) sent.push_back(Bus_message::yaw_rate);
+  if (sc.bus.steering_hz > 0 && sc.robot.wheels.steering_table_count >= 2) sent.push_back(Bus_message::steering);
+  if (sc.bus.gear_hz > 0) sent.push_back(Bus_message::gear);
+  return sent;
+}
+
 wm_status simulate(const Scenario &sc, uint64_t seed, size_t landmarks, Recording &out, wm_error *err) {
   out = Recording{};
   out.seed = seed;
   out.clock_start_ns = to_us(sc.clock_start_s);
   if (const wm_status status = Drive::plan(sc.route, out.drive, err); status != WM_OK) return status;
+  if (sc.faults.kidnap_forward_s > 0)
+    if (const wm_status s = out.drive.carry(sc.faults.kidnap_at_s, sc.faults.kidnap_forward_s, err); s != WM_OK)
+      return s;
+  if (sc.duration_s > 0) out.drive.cut(sc.duration_s);
+  out.duration_s = out.drive.duration_s();
+  out.length_m = out.drive.length_m();
   const Random random(seed);
   out.drawn = draw_constants(sc, random);
   make_map(sc, random, landmarks, out);
   make_sensors(sc, out);
   make_start(sc, random, out);
 
-  send_wheels(sc, random, out);
-  send_yaw_rate(sc, random, out);
-  send_steering(sc, random, out);
-  send_gear(sc, random, out);
+  const Wheels wheels(sc, random, out.drive, out.drawn);
+  const auto send = [&](Bus_message which) {
+    switch (which) {
+      case Bus_message::wheels: return send_wheel_counts(sc, random, wheels, out);
+      case Bus_message::wheel_speeds: return send_wheel_speeds(sc, random, wheels, out);
+      case Bus_message::yaw_rate: return send_yaw_rate(sc, random, out);
+      case Bus_message::steering: return send_steering(sc, random, out);
+      case Bus_message::gear: return send_gear(sc, random, out);
+    }
+  };
+  for (const Bus_message which : messages_of(sc)) send(which);
   std::stable_sort(out.can.begin(), out.can.end(),
                    [](const wm_can_frame &a, const wm_can_frame &b) { return a.t_ns < b.t_ns; });
   for (size_t i = 0; i < sc.cameras.size(); i++) look(sc, random, static_cast<uint16_t>(i), out);

@@ -5,8 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "simulate/bus.h"
 #include "simulate/route.h"
 #include "simulate/scenario.h"
+#include "simulate/worlds/path6.h"
 #include "waymark/can.h"
 
 namespace wm::sim {
@@ -22,6 +24,16 @@ struct Sighting {
 struct Truth {
   wm_time_ns t_ns;
   State state;
+};
+
+// Six degrees of freedom: a pose, and the twist that a speed log and gyros say.
+struct Truth6 {
+  wm_time_ns t_ns;
+  double xyz_m[3], q_xyzw[4];
+};
+struct Twist6 {
+  wm_time_ns t_ns;
+  double v_mps[3], w_radps[3];
 };
 
 // What the seed drew: for tests and for the bound, never for an estimator.
@@ -43,13 +55,25 @@ struct Recording {
   std::vector<wm_landmark> map;        // with its errors
   std::vector<wm_landmark> landmarks;  // true
   std::vector<Truth> truth;
-  wm_start start;  // as recording.yaml says
+  double duration_s, length_m;
+  Path6 path;  // six degrees of freedom: instead of the drive
+  std::vector<Truth6> truth6;
+  std::vector<Twist6> motion6;
+  std::string camera_calibration;            // text of calibration.yaml on cameras with pixels
+  std::vector<std::string> picture_streams;  // files of pictures, map and labels, for recording.yaml
+  wm_start start;                            // as recording.yaml says
   Drawn drawn;
 };
+
+// What the robot's bus carries.
+Messages messages_of(const Scenario &scenario);
 
 // `landmarks`: how many of the scenario's landmarks are there, the first ones; more than it has means all.
 // The same scenario, seed and number give the same recording; sensors draw independently, so that what the wheels say
 // doesn't change with the landmarks. WM_BAD_CONFIG when the route can't be driven.
 wm_status simulate(const Scenario &scenario, uint64_t seed, size_t landmarks, Recording &out, wm_error *err);
+
+// The same for a vehicle with six degrees of freedom on `path`: motion6 instead of CAN.
+void simulate_six(const Scenario &scenario, uint64_t seed, const Path6 &path, Recording &out);
 
 }  // namespace wm::sim

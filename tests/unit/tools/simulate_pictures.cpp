@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+// Each shipped world with pictures becomes a recording that the reader opens: small pictures of a short piece of the
+// drive. The same seed gives the same bytes; perfect wheels and gyro give the truth back, also backwards.
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "simulate/film.h"
+#include "simulate/write.h"
+#include "waymark/recording.h"
+
+extern "C" {
+#include "unity.h"
+void setUp(void);
+void tearDown(void);
+}
+
+using namespace wm::sim;
+
+namespace {
+
+std::string folder;
+
+Scenario load(const std::string &name) {
+  Scenario scenario;
+  wm_error err{};
+  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/" + name + ".yaml";
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(path, scenario, &err), err.text);
+  return scenario;
+}
+
+// A few small pictures, coarse: what this is about is all around them.
+void shrink(Scenario &scenario, std::initializer_list<const char *> cameras, int width, int height) {
+  scenario.duration_s = 1.05;
+  scenario.pictures.samples = 1;
+  scenario.faults.frames_lost = 0;
+  for (const char *name : cameras) {
+    PixelCamera camera;
+    camera.name = name;
+    camera.width = width;
+    camera.height = height;
+    camera.rate_hz = 4;
+    scenario.pixel_cameras.push_back(camera);
+  }
+}
+
+std::string bytes_of(const std::string &path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+size_t lines_of(const std::string &path) {
+  const std::string text = bytes_of(path);
+  return static_cast<size_t>(std::count(text.begin(), text.end(), '\n'));
+}
+
+void write(const Film &film, const std::string &dir) {
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, write_sensors(film.scenario, film.recording, dir, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, write_pictures(film, dir, nullptr, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, finish_recording(film.scenario, film.recording, dir, &err), err.text);
+}
+
+std::string warnings;
+
+void note(void *, const char *text) { warnings += std::string(text) + "\n"; }
+
+void check_world(const char *name, std::initializer_list<const char *> cameras, int width, int height) {
+  Scenario scenario = load(name);
+  shrink(scenario, cameras, width, height);
+  Film film;
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, film, &err), err.text);
+  TEST_ASSERT_EQUAL(cameras.size(), film.cameras.size());
+  write(film, folder + "/a");
+
+  wm_recording *opened = nullptr;
+  warnings.clear();
+  const std::string a = folder + "/a";
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_recording_open(a.c_str(), nullptr, note, nullptr, &opened, &err), err.text);
+  TEST_ASSERT_EQUAL_STRING("", warnings.c_str());
+  wm_recording_close(opened);
+
+  for (const char *camera : cameras) TEST_ASSERT_EQUAL(1 + 4, lines_of(a + "/video/" + camera + ".csv"));
+  TEST_ASSERT_GREATER_THAN_MESSAGE(1, lines_of(a + "/" + film.world->label_file), film.world->label_file.c_str());
+
+  Film again;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, again, &err), err.text);
+  write(again, folder + "/b");
+  size_t files = 0;
+  for (const auto &entry : std::filesystem::recursive_directory_iterator(a)) {
+    if (!entry.is_regular_file()) continue;
+    files++;
+    const std::string other = folder + "/b/" + std::filesystem::relative(entry.path(), a).string();
+    TEST_ASSERT_TRUE_MESSAGE(bytes_of(entry.path().string()) == bytes_of(other), other.c_str());
+  }
+  TEST_ASSERT_GREATER_THAN(5, files);
+}
+
+void test_corridor_is_a_recording() { check_world("corridor-easy", {"front"}, 160, 90); }
+void test_corridor_hard_is_a_recording() { check_world("corridor-hard", {"front"}, 160, 90); }
+void test_office_is_a_recording() { check_world("office-easy", {"ceiling"}, 160, 120); }
+void test_hall_is_a_recording() { check_world("hall-easy", {"omni"}, 120, 120); }
+void test_seabed_is_a_recording() { check_world("seabed-easy", {"left", "right"}, 160, 120); }
+void test_crossing_is_a_recording() { check_world("crossing-easy", {"left", "right"}, 160, 120); }
+
+// Wheel speeds without sign, the gear and the yaw rate, added up.
+void test_perfect_sensors_follow_the_truth_also_backwards() {
+  Scenario scenario = load("corridor-easy");
+  make_perfect(scenario);
+  Film film;
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, film, &err), err.text);
+  const Recording &r = film.recording;
+  const State start = r.drive.at(0);
+  double x = start.x_m, y = start.y_m, heading = start.heading_rad, speed = 0, rate = 0, backwards_m = 0, worst_m = 0;
+  int gear = 1;
+  wm_time_ns last_ns = r.clock_start_ns;
+  for (const wm_can_frame &f : r.can) {
+    const double dt = static_cast<double>(f.t_ns - last_ns) * 1e-9;
+    const double middle = heading + 0.5 * rate * dt;
+    x += gear * speed * dt * std::cos(middle);
+    y += gear * speed * dt * std::sin(middle);
+    heading += rate * dt;
+    backwards_m += gear < 0 ? speed * dt : 0;
+    last_ns = f.t_ns;
+    const auto word = [&](int i) { return f.data[i] | f.data[i + 1] << 8; };
+    if (f.id == message(Bus_message::wheel_speeds).id) speed = 0.5 * 0.001 * (word(0) + word(2));
+    if (f.id == message(Bus_message::yaw_rate).id)
+      rate = 0.002 * static_cast<int16_t>(word(0)) * 3.14159265358979 / 180;
+    if (f.id == message(Bus_message::gear).id) gear = (f.data[0] & 15) == 15 ? -1 : f.data[0] & 15;
+    const State truth = r.drive.at(static_cast<double>(f.t_ns - r.clock_start_ns) * 1e-9);
+    worst_m = std::max(worst_m, std::hypot(x - truth.x_m, y - truth.y_m));
+  }
+  TEST_ASSERT_GREATER_THAN(10, static_cast<int>(backwards_m));
+  TEST_ASSERT_DOUBLE_WITHIN(0.03, 0, worst_m);
+}
+
+// The wheels and the gyro go on as if nothing had happened; the truth jumps.
+void test_who_is_carried_does_not_feel_it() {
+  Scenario scenario = load("corridor-easy");
+  make_perfect(scenario);
+  scenario.faults.kidnap_at_s = 20;
+  scenario.faults.kidnap_forward_s = 15;
+  Film film;
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, film, &err), err.text);
+  const Drive &drive = film.recording.drive;
+  const State before = drive.at(19.9999), after = drive.at(20.0001);
+  TEST_ASSERT_GREATER_THAN(3, static_cast<int>(std::hypot(after.x_m - before.x_m, after.y_m - before.y_m)));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, before.way_m - before.carried_way_m, after.way_m - after.carried_way_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, before.heading_rad - before.carried_heading_rad,
+                            after.heading_rad - after.carried_heading_rad);
+  for (const wm_can_frame &f : film.recording.can)
+    if (f.id == message(Bus_message::wheel_speeds).id) TEST_ASSERT_LESS_THAN(3000, f.data[0] | f.data[1] << 8);
+}
+
+void test_drop_outs_and_clock_errors_are_in_the_stamps() {
+  Scenario scenario = load("corridor-easy");
+  make_perfect(scenario);
+  scenario.duration_s = 20;
+  scenario.faults.camera_dropout = {5, 7};
+  scenario.faults.camera_clock_offset_s = 0.010;
+  scenario.faults.camera_clock_drift = 1e-4;
+  Film film;
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, film, &err), err.text);
+  const std::vector<FrameTime> times = frame_times(film, 0);
+  TEST_ASSERT_EQUAL(180, times.size());
+  for (size_t i = 0; i < times.size(); i++) {
+    const FrameTime &t = times[i];
+    TEST_ASSERT_FALSE(t.t_s >= 5 && t.t_s < 7);
+    TEST_ASSERT_INT64_WITHIN(2, film.recording.clock_start_ns + std::llround(1e9 * (t.t_s * 1.0001 + 0.010)),
+                             t.stamp_ns);
+    const double late_s = static_cast<double>(t.arrival_ns - film.recording.clock_start_ns) * 1e-9 - t.t_s;
+    TEST_ASSERT_TRUE(late_s >= 0.0199 && late_s <= 0.0601);
+  }
+}
+
+void test_an_unknown_camera_is_told_with_the_ones_there_are() {
+  Scenario scenario = load("corridor-easy");
+  PixelCamera camera;
+  camera.name = "rear";
+  scenario.pixel_cameras = {camera};
+  Film film;
+  wm_error err{};
+  TEST_ASSERT_EQUAL(WM_BAD_CONFIG, prepare(scenario, 1, film, &err));
+  TEST_ASSERT_EQUAL_STRING("cameras: this world has no camera `rear`; it has front", err.text);
+}
+
+}  // namespace
+
+void setUp(void) {
+  folder = "simulate_pictures." + std::to_string(getpid());
+  std::filesystem::create_directories(folder);
+}
+void tearDown(void) { std::filesystem::remove_all(folder); }
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_corridor_is_a_recording);
+  RUN_TEST(test_corridor_hard_is_a_recording);
+  RUN_TEST(test_office_is_a_recording);
+  RUN_TEST(test_hall_is_a_recording);
+  RUN_TEST(test_seabed_is_a_recording);
+  RUN_TEST(test_crossing_is_a_recording);
+  RUN_TEST(test_perfect_sensors_follow_the_truth_also_backwards);
+  RUN_TEST(test_who_is_carried_does_not_feel_it);
+  RUN_TEST(test_drop_outs_and_clock_errors_are_in_the_stamps);
+  RUN_TEST(test_an_unknown_camera_is_told_with_the_ones_there_are);
+  return UNITY_END();
+}

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+
+#include "simulate/angle.h"
+#include "simulate/film.h"
+
+namespace wm::sim {
+namespace {
+
+using render::Pose;
+using render::Vec3;
+
+void add(std::string &text, const char *format, ...) __attribute__((format(printf, 2, 3)));
+void add(std::string &text, const char *format, ...) {
+  char line[512];
+  va_list args;
+  va_start(args, format);
+  std::vsnprintf(line, sizeof line, format, args);
+  va_end(args);
+  text += line;
+}
+
+void scale_to(int width, int height, render::Camera &camera) {
+  const double share = static_cast<double>(width) / camera.width;
+  const size_t first = camera.intrinsics.size() - 4;
+  for (size_t i = first; i < first + 2; i++) camera.intrinsics[i] *= share;
+  // A pixel's middle is its integer coordinate.
+  camera.intrinsics[first + 2] = (camera.intrinsics[first + 2] + 0.5) * share - 0.5;
+  camera.intrinsics[first + 3] =
+      (camera.intrinsics[first + 3] - 0.5 * (camera.height - 1)) * share + 0.5 * (height - 1);
+  camera.width = width;
+  camera.height = height;
+}
+
+void change(const PixelCamera &wish, FilmCamera &out) {
+  render::Camera &c = out.believed;
+  if (!wish.model.empty()) {
+    render::model_from_name(wish.model, c.model);
+    c.distortion.clear();
+  }
+  if (wish.width > 0 && wish.intrinsics.empty()) scale_to(wish.width, wish.height, c);
+  if (wish.width > 0) c.width = wish.width, c.height = wish.height;
+  if (!wish.intrinsics.empty()) c.intrinsics = wish.intrinsics;
+  if (!wish.distortion.empty()) c.distortion = wish.distortion;
+  if (wish.field_of_view_rad) c.fov_rad = *wish.field_of_view_rad;
+  if (!wish.xyz_m.empty()) c.T_base_camera.translation() = Vec3(wish.xyz_m[0], wish.xyz_m[1], wish.xyz_m[2]);
+  if (!wish.rpy_rad.empty())
+    c.T_base_camera =
+        render::pose_xyz_rpy(c.T_base_camera.translation(), wish.rpy_rad[0], wish.rpy_rad[1], wish.rpy_rad[2]);
+  if (wish.readout_s) c.readout_ns = std::llround(*wish.readout_s * 1e9);
+  out.rate_hz = wish.rate_hz.value_or(out.rate_hz);
+  out.exposure_s = wish.exposure_s.value_or(out.exposure_s);
+  out.colour = wish.colour.value_or(out.colour);
+}
+
+// The camera as it is: the mounting off on each axis, each number of the intrinsics off by a share of itself.
+render::Camera draw_truth(const Errors &e, const Random &random, uint64_t camera, const render::Camera &believed) {
+  render::Camera c = believed;
+  const auto draw = [&](uint64_t i) { return random.normal(Stream::camera_mounting, i, camera); };
+  const Pose turn = render::pose_xyz_rpy({0, 0, 0}, e.camera_mounting_rad * draw(0), e.camera_mounting_rad * draw(1),
+                                         e.camera_mounting_rad * draw(2));
+  c.T_base_camera = believed.T_base_camera * turn;
+  c.T_base_camera.translation() += e.camera_mounting_m * Vec3(draw(3), draw(4), draw(5));
+  for (size_t i = c.intrinsics.size() - 4; i < c.intrinsics.size(); i++)
+    c.intrinsics[i] *= 1 + e.camera_intrinsics * random.normal(Stream::camera_intrinsics, i, camera);
+  return c;
+}
+
+wm_status set_up_cameras(const Scenario &sc, uint64_t seed, Film &out, wm_error *err) {
+  const Random random(seed);
+  for (const WorldCamera &c : out.world->cameras) {
+    FilmCamera film{c.name, c.camera, c.camera, c.rate_hz, c.exposure_s, c.colour};
+    for (const PixelCamera &wish : sc.pixel_cameras)
+      if (wish.name == c.name) change(wish, film);
+    std::string problem;
+    if (!render::camera_valid(film.believed, problem))
+      return wm_fail(err, WM_BAD_CONFIG, "cameras: %s: %s", c.name.c_str(), problem.c_str());
+    film.truth = draw_truth(sc.errors, random, out.cameras.size(), film.believed);
+    if (film.colour && sc.pictures.lossless)
+      return wm_fail(err, WM_BAD_CONFIG, "cameras: %s: pictures.coding grey has no colour", c.name.c_str());
+    out.cameras.push_back(film);
+  }
+  for (const PixelCamera &wish : sc.pixel_cameras) {
+    const auto &all = out.cameras;
+    if (std::any_of(all.begin(), all.end(), [&](const FilmCamera &c) { return c.name == wish.name; })) continue;
+    std::string names;
+    for (const FilmCamera &c : all) names += (names.empty() ? "" : ", ") + c.name;
+    return wm_fail(err, WM_BAD_CONFIG, "cameras: this world has no camera `%s`; it has %s", wish.name.c_str(),
+                   names.c_str());
+  }
+  return WM_OK;
+}
+
+// Rz(yaw) Ry(pitch) Rx(roll) in degrees; straight up or down, where only their sum counts, roll is 0.
+Vec3 rpy_deg(const Pose &T) {
+  const auto R = T.linear();
+  const double pitch = std::atan2(-R(2, 0), std::sqrt(R(0, 0) * R(0, 0) + R(1, 0) * R(1, 0)));
+  Vec3 rpy(std::atan2(R(2, 1), R(2, 2)), pitch, std::atan2(R(1, 0), R(0, 0)));
+  if (std::fabs(R(2, 0)) > 1 - 1e-12) rpy = Vec3(0, pitch, std::atan2(-R(0, 1), R(1, 1)));
+  return rpy * (180 / kPi);
+}
+
+std::string calibration_of(const Film &film) {
+  std::string text = "cameras:\n";
+  const auto list = [&](const char *key, const std::vector<double> &values) {
+    add(text, "    %s: [", key);
+    for (size_t i = 0; i < values.size(); i++) add(text, "%s%.9g", i ? ", " : "", values[i]);
+    text += "]\n";
+  };
+  for (const FilmCamera &c : film.cameras) {
+    const render::Camera &b = c.believed;
+    const Vec3 xyz = b.T_base_camera.translation(), rpy = rpy_deg(b.T_base_camera);
+    add(text, "  %s:\n    model: %s\n    size: [%d, %d]\n", c.name.c_str(), render::model_name(b.model), b.width,
+        b.height);
+    list("intrinsics", b.intrinsics);
+    list("distortion", b.distortion.empty() ? std::vector<double>(4, 0.0) : b.distortion);
+    add(text, "    mounting: {xyz_m: [%.6g, %.6g, %.6g], rpy_deg: [%.6f, %.6f, %.6f]}\n    readout_ns: %lld\n", xyz.x(),
+        xyz.y(), xyz.z(), rpy.x(), rpy.y(), rpy.z(), static_cast<long long>(b.readout_ns));
+  }
+  const auto named = [&](const std::string &name) {
+    return std::find_if(film.cameras.begin(), film.cameras.end(), [&](const FilmCamera &c) { return c.name == name; });
+  };
+  const auto left = named(film.world->stereo_left), right = named(film.world->stereo_right);
+  if (left != film.cameras.end() && right != film.cameras.end()) {
+    const std::vector<double> &k = left->believed.intrinsics;
+    const double baseline_m =
+        (left->believed.T_base_camera.translation() - right->believed.T_base_camera.translation()).norm();
+    add(text, "stereo:\n  left: %s\n  right: %s\n  baseline_m: %.6g\n  rectified: [%.9g, %.9g, %.9g, %.9g]\n",
+        left->name.c_str(), right->name.c_str(), baseline_m, k[0], k[1], k[2], k[3]);
+  }
+  if (film.world->marker_size_m > 0)
+    add(text, "markers: {family: tag36h11, size_m: %.6g}\n", film.world->marker_size_m);
+  return text;
+}
+
+std::vector<wm_landmark> landmarks_of(const World &world, const std::vector<WorldLandmark> &from) {
+  std::vector<wm_landmark> out;
+  for (const WorldLandmark &l : from) {
+    wm_landmark landmark{};
+    landmark.id = l.id;
+    for (int i = 0; i < 3; i++) landmark.p_m[i] = l.p[i];
+    landmark.sigma_m = l.sigma_m;
+    landmark.yaw_rad = world.labels == World::Labels::markers ? l.yaw_rad : static_cast<double>(NAN);
+    out.push_back(landmark);
+  }
+  return out;
+}
+
+}  // namespace
+
+wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *err) {
+  out.scenario = scenario;
+  WorldRequest request;
+  request.name = scenario.world.kind;
+  request.hard = scenario.world.hard;
+  request.markers_on_walls = scenario.world.markers_on_walls;
+  request.seed = seed;
+  if (!scenario.route.legs.empty()) request.route = scenario.route;
+  out.world = make_world(request, err);
+  if (!out.world) return err->text[0] ? WM_BAD_CONFIG : WM_INTERNAL;
+  out.scenario.route = out.world->route;
+  if (out.scenario.about.empty()) out.scenario.about = out.world->about;
+  if (const wm_status s = set_up_cameras(scenario, seed, out, err); s != WM_OK) return s;
+
+  Recording &r = out.recording;
+  if (out.world->vehicle == Vehicle::six)
+    simulate_six(out.scenario, seed, out.world->path, r);
+  else if (const wm_status s = simulate(out.scenario, seed, SIZE_MAX, r, err); s != WM_OK)
+    return s;
+  r.landmarks = landmarks_of(*out.world, out.world->truth);
+  r.map = landmarks_of(*out.world, out.world->landmarks);
+  r.camera_calibration = calibration_of(out);
+  if (out.world->map) r.picture_streams.push_back("map/map.yaml");
+  for (const FilmCamera &c : out.cameras) {
+    r.picture_streams.push_back("video/" + c.name + ".avi");
+    r.picture_streams.push_back("video/" + c.name + ".csv");
+  }
+  r.picture_streams.push_back(out.world->label_file);
+  return WM_OK;
+}
+
+}  // namespace wm::sim
