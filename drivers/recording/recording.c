@@ -65,7 +65,16 @@ static wm_status check_format(const wm_yaml_node *root, wm_error *err) {
   return status;
 }
 
-// Every file that `streams` names must be there.
+static int is_read(const char *file) {
+  static const char *const kRead[] = {"can.log",     "vehicle.dbc", "can-signals.yaml", "motion.csv",
+                                      "motion6.csv", "points.csv",  "sightings.csv",    "markers.csv",
+                                      "stereo.csv",  "gnss.csv",    "landmarks.csv",    "calibration.yaml"};
+  for (size_t i = 0; i < sizeof kRead / sizeof kRead[0]; i++)
+    if (strcmp(file, kRead[i]) == 0) return 1;
+  return 0;
+}
+
+// Every file that `streams` names must be there; of files that nothing here reads (videos, truth) a word is enough.
 static wm_status check_streams(const wm_recording *self, const wm_yaml_node *streams, wm_error *err) {
   if (wm_yaml_there(streams) && !wm_yaml_is_list(streams))
     return wm_yaml_fail(streams, err, "a list of the files that are there is needed");
@@ -75,8 +84,11 @@ static wm_status check_streams(const wm_recording *self, const wm_yaml_node *str
     wm_status status = wm_yaml_string(&item, file, sizeof file, err);
     if (status == WM_OK) status = path_of(self, file, path, err);
     if (status != WM_OK) return status;
-    if (access(path, F_OK) != 0)
+    if (access(path, F_OK) == 0) continue;
+    if (is_read(file))
       return wm_yaml_fail(&item, err, "'%s' is not in the folder; put it there or take it off the list", file);
+    warn_line(&self->warn, "%s:%d: streams: '%s' is not in the folder; nothing here reads it", wm_yaml_file(&item),
+              wm_yaml_line(&item), file);
   }
   return WM_OK;
 }

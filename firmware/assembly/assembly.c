@@ -55,6 +55,16 @@ static wm_status check_estimator(const wm_assembly *self, wm_error *err) {
   return WM_OK;
 }
 
+// A model without its input would leave the pose where it is, and the state would not tell.
+static wm_status check_motion(const wm_assembly *self, uint32_t quantities, wm_error *err) {
+  const char *lacks = wm_motion_lacks(self->config->motion, &self->setup.wheels, self->kinds, quantities);
+  if (!lacks) return WM_OK;
+  return wm_fail(err, WM_BAD_CONFIG,
+                 "%s: motion.model: with '%s' it needs %s; put that there, or take another model (auto takes the first "
+                 "that is possible)",
+                 self->config->path, self->recording, lacks);
+}
+
 wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t seed, wm_assembly *out,
                       wm_error *err) {
   memset(out, 0, sizeof *out);
@@ -79,7 +89,8 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
                    "can't be carried on without one",
                    wm_recording_dir(recording));
   out->driving = wm_driving_choose(out->kinds, wm_recording_quantities(recording));
-  return check_estimator(out, err);
+  wm_status status = check_motion(out, wm_recording_quantities(recording), err);
+  return status == WM_OK ? check_estimator(out, err) : status;
 }
 
 const char *wm_assembly_source_name(const wm_assembly *self, size_t source) {

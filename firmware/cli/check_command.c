@@ -98,7 +98,9 @@ static wm_status check_recording(const wm_config *config, const char *dir, wm_er
   static wm_assembly assembly;
   status = wm_assemble(config, recording, 1, &assembly, err);
   if (status == WM_OK) {
-    (void)printf("recording    %s, %.1f s\n", wm_recording_name(recording), wm_recording_duration_s(recording));
+    (void)printf("recording    %s", wm_recording_name(recording));
+    if (isfinite(wm_recording_duration_s(recording))) (void)printf(", %.1f s", wm_recording_duration_s(recording));
+    (void)putchar('\n');
     (void)printf("setup        %zu sensors, %zu landmarks\n", assembly.setup.sensor_count,
                  assembly.setup.landmark_count);
     print_start(&assembly.setup.start);

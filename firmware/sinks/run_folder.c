@@ -88,14 +88,27 @@ static void end(wm_run_folder *self, int which) {
     t->failed = errno ? errno : EIO;
 }
 
+static void trajectory_head(wm_run_folder *self, int dof) {
+  if (self->trajectory_has_head) return;
+  wm_row *head = begin(self);
+  wm_row_text(head, "t_ns,");
+  pose_head(head, dof);
+  end(self, TRAJECTORY);
+  self->trajectory_has_head = 1;
+}
+
+static void published_head(wm_run_folder *self, int dof) {
+  if (self->published_has_head) return;
+  wm_row *head = begin(self);
+  wm_row_text(head, "t_ns,sent_ns,fused_until_ns,");
+  pose_head(head, dof);
+  wm_row_text(head, ",odom_x_m,odom_y_m,odom_heading_rad,resets");
+  end(self, PUBLISHED);
+  self->published_has_head = 1;
+}
+
 static void fused_pose(wm_run_folder *self, const wm_estimate *e) {
-  if (!self->trajectory_has_head) {
-    wm_row *head = begin(self);
-    wm_row_text(head, "t_ns,");
-    pose_head(head, e->dof);
-    end(self, TRAJECTORY);
-    self->trajectory_has_head = 1;
-  }
+  trajectory_head(self, e->dof);
   wm_row *line = begin(self);
   wm_row_int(line, e->t_ns);
   wm_row_char(line, ',');
@@ -116,14 +129,7 @@ static void fused_pose(wm_run_folder *self, const wm_estimate *e) {
 }
 
 static void published(wm_run_folder *self, const wm_published *p) {
-  if (!self->published_has_head) {
-    wm_row *head = begin(self);
-    wm_row_text(head, "t_ns,sent_ns,fused_until_ns,");
-    pose_head(head, p->now.dof);
-    wm_row_text(head, ",odom_x_m,odom_y_m,odom_heading_rad,resets");
-    end(self, PUBLISHED);
-    self->published_has_head = 1;
-  }
+  published_head(self, p->now.dof);
   wm_row *line = begin(self);
   wm_row_int(line, p->now.t_ns);
   wm_row_char(line, ',');
@@ -263,6 +269,8 @@ wm_status wm_run_folder_timing(wm_run_folder *self, const wm_timing *timing, wm_
 
 wm_status wm_run_folder_close(wm_run_folder *self, wm_error *err) {
   if (!self) return WM_OK;
+  if (self->tables[TRAJECTORY].file) trajectory_head(self, 3);  // a run that found no pose is a table without rows
+  if (self->tables[PUBLISHED].file) published_head(self, 3);
   wm_status status = wm_log_close(&self->log, err);
   for (int i = 0; i < TABLE_COUNT; i++) {
     table *t = &self->tables[i];

@@ -64,6 +64,23 @@ expect 0 "x 1.000 m, y 2.000 m" check "$work/good.yaml" "$work/rec"
 expect 2 "did you mean 'odometry'" check "$work/bad.yaml" "$work/rec"
 expect 2 "no motion" check "$work/good.yaml" "$work/nomotion"
 
+# A model whose input the recording doesn't have is refused, not silently left without motion.
+sed 's/^estimator.*/&\nmotion: {model: speed_yaw_rate}/' "$work/good.yaml" >"$work/model.yaml"
+expect 2 "it needs a speed over CAN" replay "$work/rec" --config "$work/model.yaml" --out "$work/out"
+expect 2 "it needs a speed over CAN" check "$work/model.yaml" "$work/rec"
+
+# Without a start pose, odometry finds none: that is said, and the tables have their heads.
+mkdir "$work/lost"
+cp "$work/rec/motion.csv" "$work/lost"
+printf 'format: waymark-recording/1\nname: lost\nstreams: [motion.csv, video/front.avi]\n' >"$work/lost/recording.yaml"
+expect 0 "no pose was ever found" replay "$work/lost" --config "$work/good.yaml" --out "$work/nopose"
+expect 0 "'video/front.avi' is not in the folder; nothing here reads it" check "$work/good.yaml" "$work/lost"
+expect 0 "recording    lost" check "$work/good.yaml" "$work/lost"
+"$waymark" check "$work/good.yaml" "$work/lost" 2>&1 | grep -q "nan" && { echo "check prints nan"; failures=$((failures + 1)); }
+for table in trajectory published; do
+  grep -q "^t_ns,.*state" "$work/nopose/$table.csv" || { echo "$table.csv has no head"; failures=$((failures + 1)); }
+done
+
 expect 2 "run needs --config" run
 expect 2 "run needs --recording" run --config "$work/good.yaml"
 expect 2 "'0' is no number above 0" run --config "$work/good.yaml" --recording "$work/rec" --duration 0

@@ -29,6 +29,12 @@ typedef enum wm_motion_model {
 typedef struct wm_motion_params wm_motion_params;
 extern const wm_param_table wm_motion_params_table;
 
+// What the wanted model lacks of what the sources can give (`kinds`: WM_EVENT_BIT; `quantities`: a bit per wm_quantity)
+// and of the wheels' calibration, as a text ("yaw_rate over CAN"); NULL where nothing is missing. `auto` lacks something
+// only where no model is possible. Constant cost.
+const char *wm_motion_lacks(const wm_motion_params *params, const wm_wheels *wheels, uint32_t kinds,
+                            uint32_t quantities);
+
 // Health of the motion sensors, bits of motion_health: what must not be taken for standing still or going straight.
 #define WM_MOTION_HEALTH_ENCODER_LEFT_DEAD (1u << 0)
 #define WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD (1u << 1)
