@@ -18,7 +18,7 @@ using render::Texture;
 using render::Vec3;
 
 constexpr double kDeg = kPi / 180;
-constexpr double kHalf_m = 14, kCell_m = 0.1;
+constexpr double kHalf_m = 14, kCell_m = 0.12;
 
 // The bed's height: long waves, dunes, and rocks as bumps, each a sum with continuous slope.
 class Bed {
@@ -224,7 +224,7 @@ wm_status make_seabed(const WorldRequest &request, World &world, wm_error *err) 
   scene.ambient.up = Colour(0.2f, 0.27f, 0.28f) * (request.hard ? 0.4f : 1.f);
   scene.ambient.down = Colour(0.05f, 0.08f, 0.08f) * (request.hard ? 0.4f : 1.f);
   scene.ambient.contact_m = 0.2;
-  scene.light_cell_m = 0.3;
+  scene.light_cell_m = 0.4;
   scene.water.there = true;
   scene.water.attenuation_per_m = Colour(0.26f, 0.10f, 0.09f) * (request.hard ? 2.f : 1.f);
   scene.water.haze = Colour(0.03f, 0.065f, 0.07f) * (request.hard ? 0.7f : 1.f);
@@ -238,7 +238,7 @@ wm_status make_seabed(const WorldRequest &request, World &world, wm_error *err) 
     lamp.position = {0.45, y, 0.05};
     lamp.direction = Vec3(0.7, -0.12 * y, -0.7).normalized();
     lamp.half_angle_rad = 0.5;
-    lamp.power = request.hard ? 6.0 : 7.0;
+    lamp.power = request.hard ? 4.0 : 7.0;
     scene.add(lamp);
   }
 

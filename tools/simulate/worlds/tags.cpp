@@ -26,11 +26,13 @@ render::Picture tag36h11_picture(int id, int module_px) {
   };
   for (int y = rim; y < width - rim; y++)
     for (int x = rim; x < width - rim; x++) module(x, y, kBlack);
-  // Bits from the most significant one on; their places are counted from the black square's corner.
+  // Bits from the most significant one on; their places are counted from the black square's corner, here from the lower
+  // right one: ArUco and the recordings read this family the other way up than AprilTag's own pictures.
   const uint64_t code = family->codes[id];
   for (uint32_t bit = 0; bit < family->nbits; bit++)
     if (code >> (family->nbits - 1 - bit) & 1)
-      module(rim + static_cast<int>(family->bit_x[bit]), rim + static_cast<int>(family->bit_y[bit]), kWhite);
+      module(width - 1 - rim - static_cast<int>(family->bit_x[bit]),
+             width - 1 - rim - static_cast<int>(family->bit_y[bit]), kWhite);
   return picture;
 }
 
