@@ -49,6 +49,18 @@ struct Packet {
   }
 };
 
+// A mirrored ray that is still to be followed, and the pixels that it is for.
+struct Echo {
+  float3 origin, direction, normal;
+  uint32_t material;
+  float span, spread;  // width where it starts, m, and how it grows with the way, rad
+  int x;
+  float share, share_next;  // of pixel x and, when it is more than 0, of pixel x + 1
+};
+
+// What a rough surface mirrors is blurred by more than a pixel: there two neighbours make do with one mirrored ray.
+constexpr float kRoughEnough = 0.003f;
+
 float3 toward_map(const Eye &eye, float x, float y, float z) {
   const float *r = eye.rotation;
   const float3 d{r[0] * x + r[1] * y + r[2] * z, r[3] * x + r[4] * y + r[5] * z, r[6] * x + r[7] * y + r[8] * z};
@@ -110,8 +122,10 @@ struct Renderer::Data {
   void prepare(const Shot &shot);
   void place_movers(const Shot &shot, double reach_ns);
   void render_row(int y);
-  void trace(Packet &packet, bool coherent) const;
-  void shade_packet(Packet &packet, const Eye &eye, const float *span, const uint64_t *keys, float4 *out) const;
+  void trace(Packet &packet) const;
+  void shade_packet(const Packet &packet, const Eye &eye, int x, const float *span, const uint64_t *keys, float4 *sum,
+                    std::vector<Echo> &echoes) const;
+  void follow(const std::vector<Echo> &echoes, const Eye &eye, float4 *sum) const;
 };
 
 // ── before the rays ─────────────────────────────────────────────────────────────────────────────────────────────────
@@ -187,52 +201,65 @@ void Renderer::Data::place_movers(const Shot &shot, double reach_ns) {
 
 // ── rays ────────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-void Renderer::Data::trace(Packet &packet, bool coherent) const {
+void Renderer::Data::trace(Packet &packet) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   rtcIntersect8(packet.valid, air.data->still, &context, &packet.rays);
   if (moving) rtcIntersect8(packet.valid, moving, &context, &packet.rays);
 }
 
-void Renderer::Data::shade_packet(Packet &packet, const Eye &eye, const float *span, const uint64_t *keys,
-                                  float4 *out) const {
+void Renderer::Data::shade_packet(const Packet &packet, const Eye &eye, int x, const float *span, const uint64_t *keys,
+                                  float4 *sum, std::vector<Echo> &echoes) const {
   const bool wet = scene.water.there;
-  Sent sent[kLanes];
-  Packet mirrored;
-  bool any_mirror = false;
   for (int i = 0; i < kLanes; i++) {
-    mirrored.valid[i] = 0;
     if (!packet.valid[i]) continue;
-    sent[i].mirror = 0;
     if (!packet.met(i)) {
-      sent[i].radiance = wet ? splat(0) : shade_sky(air, packet.direction(i));
+      sum[x + i] +=
+          wet ? through_water(air, eye, packet.origin(i), packet.direction(i), 1e6f, dice_part(keys[i], 3), splat(0))
+              : shade_sky(air, packet.direction(i));
       continue;
     }
     const float distance = packet.rays.ray.tfar[i];
-    sent[i] = shade(air, eye, packet.what(i, span[i] * distance, false));
-    if (!quality.mirrors || sent[i].mirror < kLeastMirror) continue;
-    const float3 at = packet.origin(i) + packet.direction(i) * distance + sent[i].normal * 1e-3f;
-    mirrored.set(i, at, reflected(packet.direction(i), sent[i], dice(keys[i])), 0, eye.time);
-    any_mirror = true;
-  }
-  if (any_mirror) {
-    trace(mirrored, true);
-    for (int i = 0; i < kLanes; i++) {
-      if (!mirrored.valid[i]) continue;
-      const float distance = mirrored.rays.ray.tfar[i];
-      const float blur = span[i] * packet.rays.ray.tfar[i] + (span[i] + sent[i].roughness) * distance;
-      const float4 seen = mirrored.met(i) ? shade(air, eye, mirrored.what(i, blur, true)).radiance
-                                          : shade_sky(air, mirrored.direction(i));
-      sent[i].radiance += seen * splat(sent[i].mirror);
+    const Sent sent = shade(air, eye, packet.what(i, span[i] * distance, false));
+    if (wet) {
+      sum[x + i] += through_water(air, eye, packet.origin(i), packet.direction(i), distance, dice_part(keys[i], 3),
+                                  sent.radiance);
+      continue;
     }
+    sum[x + i] += sent.radiance;
+    if (!quality.mirrors || sent.mirror < kLeastMirror) continue;
+    Echo *last = echoes.empty() ? nullptr : &echoes.back();
+    if (last && sent.roughness >= kRoughEnough && last->x == x + i - 1 && last->share_next == 0 &&
+        last->material == sent.material && dot(last->normal, sent.normal) > 0.9999f) {
+      last->share_next = sent.mirror;
+      continue;
+    }
+    const float3 at = packet.origin(i) + packet.direction(i) * distance + sent.normal * 1e-3f;
+    echoes.push_back({at, reflected(packet.direction(i), sent, dice(keys[i])), sent.normal, sent.material,
+                      span[i] * distance, span[i] + sent.roughness, x + i, sent.mirror, 0});
   }
-  for (int i = 0; i < kLanes; i++) {
-    if (!packet.valid[i]) continue;
-    const float distance = packet.met(i) ? packet.rays.ray.tfar[i] : 1e6f;
-    out[i] += wet ? through_water(air, eye, packet.origin(i), packet.direction(i), distance, dice_part(keys[i], 3),
-                                  sent[i].radiance)
-                  : sent[i].radiance;
+}
+
+void Renderer::Data::follow(const std::vector<Echo> &echoes, const Eye &eye, float4 *sum) const {
+  Packet packet;
+  for (size_t first = 0; first < echoes.size(); first += kLanes) {
+    for (size_t i = 0; i < kLanes; i++) {
+      packet.valid[i] = 0;
+      if (first + i >= echoes.size()) continue;
+      const Echo &echo = echoes[first + i];
+      packet.set(static_cast<int>(i), echo.origin, echo.direction, 0, eye.time);
+    }
+    trace(packet);
+    for (int i = 0; i < kLanes; i++) {
+      if (!packet.valid[i]) continue;
+      const Echo &echo = echoes[first + static_cast<size_t>(i)];
+      const float width = echo.span + echo.spread * packet.rays.ray.tfar[i];
+      const float4 seen =
+          packet.met(i) ? shade(air, eye, packet.what(i, width, true)).radiance : shade_sky(air, packet.direction(i));
+      sum[echo.x] += seen * splat(echo.share);
+      if (echo.share_next > 0) sum[echo.x + 1] += seen * splat(echo.share_next);
+    }
   }
 }
 
@@ -244,6 +271,9 @@ void Renderer::Data::render_row(int y) {
                            directions.z.data() + corner_row};
   const auto below = static_cast<size_t>(width) + 1;
   std::vector<float4> sum(static_cast<size_t>(width) + kLanes, splat(0));
+
+  std::vector<Echo> echoes;
+  echoes.reserve(static_cast<size_t>(width));
 
   Packet packet;
   float span[kLanes];
@@ -275,13 +305,15 @@ void Renderer::Data::render_row(int y) {
         any = true;
       }
       if (!any) continue;
-      trace(packet, true);
-      shade_packet(packet, eye, span, keys, sum.data() + x);
+      trace(packet);
+      shade_packet(packet, eye, x, span, keys, sum.data(), echoes);
       if (!depth.empty() && s == samples / 2)
         for (int i = 0; i < kLanes; i++)
           if (packet.valid[i])
             depth[pixel_row + static_cast<size_t>(x + i)] = packet.met(i) ? packet.rays.ray.tfar[i] : 1e6f;
     }
+    follow(echoes, eye, sum.data());
+    echoes.clear();
   }
   const float share = 1.0f / static_cast<float>(samples);
   for (size_t x = 0; x < static_cast<size_t>(width); x++) {

@@ -24,6 +24,7 @@ struct Material {
   std::shared_ptr<const Texture> texture;  // none: plain
   Vec2 texture_size_m{1, 1};               // what one copy of the texture covers, in u and v
   Vec2 texture_origin_m{0, 0};             // u and v of its lower left corner
+  // Under water nothing mirrors. Where it is rough (3 mrad and more) two neighbouring pixels share one mirrored ray.
   double mirror = 0;         // share reflected when looked at straight on; rises to 1 at a glance (Schlick)
   double mirror_glance = 1;  // how much of that rise there is: 0 for wax, 1 for wet or polished stone
   double roughness_rad = 0;  // standard deviation of the mirrored ray's direction

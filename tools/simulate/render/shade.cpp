@@ -81,9 +81,9 @@ Sent shade(const Air &air, const Eye &eye, const Met &met) {
     light += power * splat(std::max(dot(normal, way), 0.0f));
   }
 
-  Sent sent{albedo * light, 0, normal, surface.roughness};
+  Sent sent{albedo * light, 0, normal, surface.roughness, facet.material};
   if (surface.emits) sent.radiance += surface.emission * splat(air.light);
-  if (surface.mirror > 0 && !met.mirrored) {
+  if (surface.mirror > 0 && !met.mirrored && !air.scene->water.there) {
     const float a = 1 - facing, a2 = a * a;
     sent.mirror = surface.mirror + (1 - surface.mirror) * surface.glance * a2 * a2 * a;
     sent.radiance *= splat(1 - sent.mirror);

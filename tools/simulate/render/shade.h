@@ -80,6 +80,7 @@ struct Sent {
   float mirror;
   float3 normal;  // unit, towards the viewer
   float roughness;
+  uint32_t material;
 };
 Sent shade(const Air &air, const Eye &eye, const Met &met);
 // What is seen where the ray meets nothing.
