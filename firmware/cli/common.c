@@ -65,6 +65,10 @@ void print_report(const wm_run_report *r, const char *name, const char *out_dir,
                  r->health.calibration[i].sigma);
   (void)printf("  %s at the end; written to %s\n", wm_state_name(r->health.state), out_dir);
   (void)fflush(stdout);
+  if (r->poses == 0)
+    print_note(NULL,
+               "no pose was ever found: give x_m, y_m and heading_rad as vehicle.initial_pose in recording.yaml or as "
+               "initial_pose in the configuration");
   (void)wm_findings(&r->health, print_note, NULL);
 }
 

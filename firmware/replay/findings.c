@@ -69,13 +69,6 @@ static void about_motion(speaker *to, uint32_t bits) {
     if ((bits >> i) & 1u) say(to, kLines[i]);
 }
 
-static void about_pose(speaker *to, const wm_health *health) {
-  if (health->published > 0 || health->t_ns == WM_TIME_NONE) return;
-  say(to,
-      "no pose was ever found, and none was sent: give x_m, y_m and heading_rad as vehicle.initial_pose in "
-      "recording.yaml or as initial_pose in the configuration");
-}
-
 size_t wm_findings(const wm_health *health, wm_finding_fn function, void *context) {
   speaker to = {function, context, 0};
   for (uint32_t i = 0; i < health->source_count; i++) {
@@ -84,7 +77,6 @@ size_t wm_findings(const wm_health *health, wm_finding_fn function, void *contex
     about_silence(&to, &health->sources[i]);
   }
   about_motion(&to, health->motion_health);
-  about_pose(&to, health);
   if (health->outputs_lost > 0) {
     char line[160];
     (void)snprintf(line, sizeof line, "outputs: %" PRIu64 " records were lost because the sinks were too slow",

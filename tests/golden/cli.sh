@@ -48,6 +48,7 @@ expect 2 "no motion" replay "$work/nomotion" --config "$work/good.yaml" --out "$
 expect 1 "there is a file of this name" replay "$work/rec" --config "$work/good.yaml" --out "$work/good.yaml"
 expect 0 "20 poses" replay "$work/rec" --config "$work/good.yaml" --out "$work/deep/er/out"
 expect 0 "20 poses" replay "$work/deep/er/out/events.wmlog" --out "$work/again"
+"$waymark" replay "$work/deep/er/out/events.wmlog" --out "$work/again" 2>&1 | grep "no pose was" && { echo "a log's replay says that it found no pose"; failures=$((failures + 1)); }
 expect 2 "another one needs the recording" replay "$work/deep/er/out/events.wmlog" --out "$work/again" --calibration x
 expect 1 "not an event log" replay "$work/good.yaml" --out "$work/again"
 expect 2 "holds the log that is to be replayed" replay "$work/deep/er/out/events.wmlog" --out "$work/deep/er/out"
