@@ -138,7 +138,34 @@ void test_perfect_sensors_follow_the_truth_also_backwards() {
     worst_m = std::max(worst_m, std::hypot(x - truth.x_m, y - truth.y_m));
   }
   TEST_ASSERT_GREATER_THAN(10, static_cast<int>(backwards_m));
-  TEST_ASSERT_DOUBLE_WITHIN(0.03, 0, worst_m);
+  TEST_ASSERT_DOUBLE_WITHIN(0.005, 0, worst_m);
+}
+
+// Twists in the vehicle's axes, added up in space.
+void test_perfect_twists_follow_the_truth_under_water() {
+  Scenario scenario = load("seabed-easy");
+  make_perfect(scenario);
+  Film film;
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 3, film, &err), err.text);
+  const Recording &r = film.recording;
+  TEST_ASSERT_EQUAL(r.truth6.size(), r.motion6.size());
+  Eigen::Quaterniond q(r.truth6[0].q_xyzw[3], r.truth6[0].q_xyzw[0], r.truth6[0].q_xyzw[1], r.truth6[0].q_xyzw[2]);
+  Eigen::Vector3d p(r.truth6[0].xyz_m);
+  double worst_m = 0, worst_rad = 0;
+  for (size_t i = 0; i + 1 < r.motion6.size(); i++) {
+    const double dt = static_cast<double>(r.motion6[i + 1].t_ns - r.motion6[i].t_ns) * 1e-9;
+    const Eigen::Vector3d v(r.motion6[i].v_mps), w(r.motion6[i].w_radps);
+    const auto turn = [&](double t) { return Eigen::Quaterniond(Eigen::AngleAxisd(w.norm() * t, w.normalized())); };
+    p += (q * turn(0.5 * dt)) * v * dt;
+    q = q * turn(dt);
+    const Truth6 &truth = r.truth6[i + 1];
+    worst_m = std::max(worst_m, (p - Eigen::Vector3d(truth.xyz_m)).norm());
+    worst_rad = std::max(worst_rad, q.angularDistance(Eigen::Quaterniond(truth.q_xyzw[3], truth.q_xyzw[0],
+                                                                         truth.q_xyzw[1], truth.q_xyzw[2])));
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(0.005, 0, worst_m);
+  TEST_ASSERT_DOUBLE_WITHIN(0.001, 0, worst_rad);
 }
 
 // The wheels and the gyro go on as if nothing had happened; the truth jumps.
@@ -210,6 +237,7 @@ int main(void) {
   RUN_TEST(test_seabed_is_a_recording);
   RUN_TEST(test_crossing_is_a_recording);
   RUN_TEST(test_perfect_sensors_follow_the_truth_also_backwards);
+  RUN_TEST(test_perfect_twists_follow_the_truth_under_water);
   RUN_TEST(test_who_is_carried_does_not_feel_it);
   RUN_TEST(test_drop_outs_and_clock_errors_are_in_the_stamps);
   RUN_TEST(test_an_unknown_camera_is_told_with_the_ones_there_are);
