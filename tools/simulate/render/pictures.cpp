@@ -36,7 +36,10 @@ Picture8 shrunk(const Picture8 &picture, int width) {
         int sum = 0;
         for (int v = y0; v < y1; v++)
           for (int u = x0; u < x1; u++)
-            sum += picture.bytes[static_cast<size_t>((v * picture.width + u) * picture.channels + c)];
+            sum +=
+                picture.bytes[(static_cast<size_t>(v) * static_cast<size_t>(picture.width) + static_cast<size_t>(u)) *
+                                  static_cast<size_t>(picture.channels) +
+                              static_cast<size_t>(c)];
         const int n = (y1 - y0) * (x1 - x0);
         out.bytes[to++] = static_cast<uint8_t>((sum + n / 2) / n);
       }
@@ -72,7 +75,10 @@ Picture8 contact_sheet(const std::vector<SheetEntry> &entries, int columns, int 
     const int left = kGap + i % columns * pitch_x, top = kGap + i / columns * pitch_y;
     for (int y = 0; y < cell.height; y++)
       for (int x = 0; x < std::min(cell.width, cell_width); x++)
-        put(left + x, top + y, &cell.bytes[static_cast<size_t>((y * cell.width + x) * cell.channels)], cell.channels);
+        put(left + x, top + y,
+            &cell.bytes[(static_cast<size_t>(y) * static_cast<size_t>(cell.width) + static_cast<size_t>(x)) *
+                        static_cast<size_t>(cell.channels)],
+            cell.channels);
     if (entries[static_cast<size_t>(i)].caption.empty()) continue;
     Picture text(cell_width, kCaption, 1, 1.0f);
     draw_text(entries[static_cast<size_t>(i)].caption.c_str(), 1, kCaption - 3, 8, Colour(0.0f), text);

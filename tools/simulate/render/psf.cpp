@@ -21,7 +21,7 @@ void spread(double sigma_px, Workers &workers, Image &from, Image &out) {
   const auto stride = static_cast<size_t>(row);
   workers.run(from.height, 16, [&](int begin, int end, int) {
     // A row with its ends repeated outwards, so that the inner loop has no edges.
-    std::vector<float> padded(static_cast<size_t>(row + 2 * radius * step));
+    std::vector<float> padded(stride + 2 * static_cast<size_t>(radius) * static_cast<size_t>(step));
     const int before = radius * step;
     for (int y = begin; y < end; y++) {
       float *line = from.values.data() + static_cast<size_t>(y) * stride;

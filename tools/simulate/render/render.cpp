@@ -279,7 +279,9 @@ void Renderer::Data::render_row(int y) {
   float span[kLanes];
   uint64_t keys[kLanes];
   for (int s = 0; s < samples; s++) {
-    const Eye &eye = eyes[static_cast<size_t>(camera.readout_ns > 0 ? y * samples + s : s)];
+    const Eye &eye =
+        eyes[camera.readout_ns > 0 ? static_cast<size_t>(y) * static_cast<size_t>(samples) + static_cast<size_t>(s)
+                                   : static_cast<size_t>(s)];
     // Places in the pixel: a sequence that fills the square evenly, begun elsewhere in each pixel (R2: M. Roberts,
     // 2018).
     const float shift_u = static_cast<float>(s * 0.7548776662466927 - std::floor(s * 0.7548776662466927));
