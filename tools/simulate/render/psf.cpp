@@ -18,7 +18,7 @@ void spread(double sigma_px, Workers &workers, Image &from, Image &out) {
     weight[static_cast<size_t>(i)] = static_cast<float>(wm::exp(-0.5 * i * i / (sigma_px * sigma_px)) / sum);
 
   const int row = from.width * from.channels, step = from.channels;
-  const auto stride = static_cast<size_t>(row);
+  const size_t stride = static_cast<size_t>(from.width) * static_cast<size_t>(step);
   workers.run(from.height, 16, [&](int begin, int end, int) {
     // A row with its ends repeated outwards, so that the inner loop has no edges.
     std::vector<float> padded(stride + 2 * static_cast<size_t>(radius) * static_cast<size_t>(step));
