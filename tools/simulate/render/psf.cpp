@@ -28,7 +28,7 @@ void spread(double sigma_px, Workers &workers, Image &from, Image &out) {
       std::copy(line, line + row, padded.begin() + before);
       for (int i = 0; i < before; i++) {
         padded[static_cast<size_t>(i)] = line[i % step];
-        padded[static_cast<size_t>(before + row + i)] = line[row - step + i % step];
+        padded[stride + static_cast<size_t>(before) + static_cast<size_t>(i)] = line[row - step + i % step];
       }
       const float *middle = padded.data() + before;
       for (int i = 0; i < row; i++) line[i] = weight[0] * middle[i];
