@@ -30,8 +30,8 @@ typedef struct wm_motion_params wm_motion_params;
 extern const wm_param_table wm_motion_params_table;
 
 // What the wanted model lacks of what the sources can give (`kinds`: WM_EVENT_BIT; `quantities`: a bit per wm_quantity)
-// and of the wheels' calibration, as a text ("yaw_rate over CAN"); NULL where nothing is missing. `auto` lacks something
-// only where no model is possible. Constant cost.
+// and of the wheels' calibration, as a text ("yaw_rate over CAN"); NULL where nothing is missing. `auto` lacks
+// something only where no model is possible. Constant cost.
 const char *wm_motion_lacks(const wm_motion_params *params, const wm_wheels *wheels, uint32_t kinds,
                             uint32_t quantities);
 

@@ -129,7 +129,8 @@ std::vector<std::vector<Point>> floor_pieces(const Plan &plan, const std::vector
 }
 
 double clearance_m(const Plan &plan, const Footprint &body, double x, double y, double heading) {
-  const auto [s, c] = wm::sincos(heading);
+  const auto turned = wm::sincos(heading);
+  const double s = turned.sin, c = turned.cos;
   // The rim every 5 cm or so; what is thinner than that is nothing to bump into.
   constexpr int kAcross = 16, kAlong = 32;
   double nearest = 1e9;
