@@ -35,6 +35,9 @@ function(wm_library name)
   target_link_libraries(${name} PUBLIC ${A_USES} PRIVATE wm_rules ${A_PRIVATE_USES})
 endfunction()
 
+# What runs under the thread sanitizer: the tests with the label "threads".
+add_custom_target(wm_thread_tests)
+
 # wm_test(NAME SOURCES x.c USES lib ... [LABELS slow] [TIMEOUT s]): a Unity test program, run by ctest.
 # Label "slow" keeps it out of `./dev test` and in `./dev test --all`. A test gets the repository's root in WM_SOURCE_DIR and the
 # folder of the optional recordings in WM_DATA_DIR.
@@ -46,6 +49,9 @@ function(wm_test name)
   add_test(NAME ${name} COMMAND ${name} ${A_ARGS} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
   if(NOT A_TIMEOUT)
     set(A_TIMEOUT 120)
+  endif()
+  if("threads" IN_LIST A_LABELS)
+    add_dependencies(wm_thread_tests ${name})
   endif()
   set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}" SKIP_RETURN_CODE 77
     ENVIRONMENT "WM_SOURCE_DIR=${CMAKE_SOURCE_DIR};WM_BIN_DIR=${CMAKE_BINARY_DIR}/bin;WM_DATA_DIR=${CMAKE_SOURCE_DIR}/../shared/data")

@@ -290,7 +290,7 @@ void Renderer::Data::render_row(int y) {
       bool any = false;
       for (int i = 0; i < kLanes; i++) {
         packet.valid[i] = 0;
-        const size_t at = static_cast<size_t>(x + i);
+        const size_t at = static_cast<size_t>(x) + static_cast<size_t>(i);
         if (x + i >= width || !directions.there[pixel_row + at]) continue;
         const uint64_t bits = dice(frame_key + pixel_row + at);
         keys[i] = bits + static_cast<uint64_t>(s) + 1;
