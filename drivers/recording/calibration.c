@@ -29,6 +29,7 @@ void calibration_init(calibration *self) {
   memset(self, 0, sizeof *self);
   wm_wheels *w = &self->wheels;
   w->radius_m = w->ticks_per_turn = w->track_m = w->wheelbase_m = w->steering_ratio = w->encoder_offset_m = (double)NAN;
+  wm_rig_init(&self->rig);
 }
 
 wm_status calibration_keys(const wm_yaml_node *map, const char *const *known, const warner *warn, wm_error *err) {
@@ -77,9 +78,8 @@ static wm_status list_in(const wm_yaml_node *list, size_t min_count, size_t max_
 }
 
 const wm_mounting *calibration_camera_mounting(const calibration *self, const char *name) {
-  for (size_t i = 0; i < self->camera_count; i++)
-    if (strcmp(self->cameras[i].name, name) == 0) return &self->cameras[i].mounting;
-  return NULL;
+  int camera = wm_rig_find_camera(&self->rig, name);
+  return camera < 0 ? NULL : &self->rig.cameras[camera].mounting;
 }
 
 wm_status calibration_mounting(const wm_yaml_node *parent, const wm_mounting *otherwise, const warner *warn,
@@ -121,12 +121,13 @@ static wm_status read_name(const wm_yaml_node *value, const char *key, int line,
 static wm_status read_cameras(const wm_yaml_node *cameras, const warner *warn, calibration *out, wm_error *err) {
   if (wm_yaml_there(cameras) && !wm_yaml_is_map(cameras))
     return wm_yaml_fail(cameras, err, "a map of cameras by their names is needed");
-  if (wm_yaml_count(cameras) > CAMERAS_MAX) return wm_yaml_fail(cameras, err, "more than %d cameras", CAMERAS_MAX);
+  if (wm_yaml_count(cameras) > WM_CAMERAS_MAX)
+    return wm_yaml_fail(cameras, err, "more than %d cameras", WM_CAMERAS_MAX);
   for (size_t i = 0; i < wm_yaml_count(cameras); i++) {
     const char *key;
     int line;
     wm_yaml_node node = wm_yaml_value(cameras, i, &key, &line);
-    camera *one = &out->cameras[out->camera_count++];
+    wm_camera *one = &out->rig.cameras[out->rig.camera_count++];
     TRY(read_name(&node, key, line, one->name, err));
     TRY(calibration_camera(&node, warn, one, err));
   }
@@ -211,45 +212,43 @@ static wm_status read_wheels(const wm_yaml_node *wheels, const warner *warn, wm_
   return wm_yaml_there(&table) ? read_steering_table(&table, warn, out, err) : WM_OK;
 }
 
-static wm_status check_camera_name(const wm_yaml_node *stereo, const char *side, const calibration *known,
-                                   wm_error *err) {
+static wm_status read_camera_of_pair(const wm_yaml_node *stereo, const char *side, const wm_rig *rig, int32_t *out,
+                                     wm_error *err) {
   char name[WM_NAME_MAX];
   wm_yaml_node node = wm_yaml_get(stereo, side);
   if (!wm_yaml_there(&node)) return wm_yaml_fail(stereo, err, "%s: the name of a camera is needed", side);
   TRY(wm_yaml_string(&node, name, sizeof name, err));
-  if (calibration_camera_mounting(known, name)) return WM_OK;
-  return wm_yaml_fail(&node, err, "there is no camera '%s' under cameras", name);
+  *out = wm_rig_find_camera(rig, name);
+  return *out >= 0 ? WM_OK : wm_yaml_fail(&node, err, "there is no camera '%s' under cameras", name);
 }
 
-static wm_status check_stereo(const wm_yaml_node *stereo, const warner *warn, const calibration *known, wm_error *err) {
+static wm_status read_stereo(const wm_yaml_node *stereo, const warner *warn, wm_rig *rig, wm_error *err) {
   static const char *const kKeys[] = {"left", "right", "baseline_m", "rectified", "sigma_px", NULL};
-  double value, list[4];
+  wm_stereo_pair *pair = &rig->stereo;
   TRY(calibration_keys(stereo, kKeys, warn, err));
-  TRY(check_camera_name(stereo, "left", known, err));
-  TRY(check_camera_name(stereo, "right", known, err));
-  TRY(number(stereo, "baseline_m", DBL_MIN, 100, &value, err));
+  TRY(read_camera_of_pair(stereo, "left", rig, &pair->left, err));
+  TRY(read_camera_of_pair(stereo, "right", rig, &pair->right, err));
+  TRY(number(stereo, "baseline_m", DBL_MIN, 100, &pair->baseline_m, err));
   wm_yaml_node rectified = wm_yaml_get(stereo, "rectified"), sigma = wm_yaml_get(stereo, "sigma_px");
-  if (wm_yaml_there(&rectified)) TRY(list_in(&rectified, 4, 4, -1e5, 1e5, list, NULL, err));
-  return wm_yaml_there(&sigma) ? list_in(&sigma, 4, 4, DBL_MIN, 1e4, list, NULL, err) : WM_OK;
+  if (wm_yaml_there(&rectified)) TRY(list_in(&rectified, 4, 4, -1e5, 1e5, pair->rectified_px, NULL, err));
+  return wm_yaml_there(&sigma) ? list_in(&sigma, 4, 4, DBL_MIN, 1e4, pair->sigma_px, NULL, err) : WM_OK;
 }
 
-static wm_status check_markers(const wm_yaml_node *markers, const warner *warn, wm_error *err) {
+static wm_status read_markers(const wm_yaml_node *markers, const warner *warn, wm_rig *rig, wm_error *err) {
   static const char *const kKeys[] = {"family", "size_m", NULL};
-  char family[WM_NAME_MAX];
-  double size_m;
   TRY(calibration_keys(markers, kKeys, warn, err));
   wm_yaml_node node = wm_yaml_get(markers, "family");
-  if (wm_yaml_there(&node)) TRY(wm_yaml_string(&node, family, sizeof family, err));
-  return number(markers, "size_m", DBL_MIN, 10, &size_m, err);
+  if (wm_yaml_there(&node)) TRY(wm_yaml_string(&node, rig->marker_family, sizeof rig->marker_family, err));
+  return number(markers, "size_m", DBL_MIN, 10, &rig->marker_size_m, err);
 }
 
-static wm_status check_motion6(const wm_yaml_node *motion6, const warner *warn, wm_error *err) {
+static wm_status read_motion6(const wm_yaml_node *motion6, const warner *warn, wm_rig *rig, wm_error *err) {
   static const char *const kKeys[] = {"sigma_v_mps", "sigma_w_radps", NULL};
-  double list[3];
+  double *const outs[] = {rig->twist6_sigma_v_mps, rig->twist6_sigma_w_radps};
   TRY(calibration_keys(motion6, kKeys, warn, err));
   for (int i = 0; kKeys[i]; i++) {
     wm_yaml_node sigma = wm_yaml_get(motion6, kKeys[i]);
-    if (wm_yaml_there(&sigma)) TRY(list_in(&sigma, 3, 3, DBL_MIN, 1000, list, NULL, err));
+    if (wm_yaml_there(&sigma)) TRY(list_in(&sigma, 3, 3, DBL_MIN, 1000, outs[i], NULL, err));
   }
   return WM_OK;
 }
@@ -265,7 +264,7 @@ wm_status calibration_read(const wm_yaml *doc, const warner *warn, calibration *
   TRY(read_cameras(&cameras, warn, out, err));
   TRY(read_sensors(&sensors, warn, out, err));
   TRY(read_wheels(&wheels, warn, &out->wheels, err));
-  if (wm_yaml_there(&stereo)) TRY(check_stereo(&stereo, warn, out, err));
-  TRY(check_markers(&markers, warn, err));
-  return check_motion6(&motion6, warn, err);
+  if (wm_yaml_there(&stereo)) TRY(read_stereo(&stereo, warn, &out->rig, err));
+  TRY(read_markers(&markers, warn, &out->rig, err));
+  return read_motion6(&motion6, warn, &out->rig, err);
 }

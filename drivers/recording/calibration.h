@@ -6,8 +6,6 @@
 #include "waymark/recording.h"
 #include "waymark/yaml.h"
 
-#define CAMERAS_MAX 16
-
 typedef struct warner {
   wm_warn_fn fn;
   void *context;
@@ -16,22 +14,16 @@ typedef struct warner {
 // One line to the caller's `warn`, printf-like; nothing where there is none.
 void warn_line(const warner *warn, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-typedef struct camera {
-  char name[WM_NAME_MAX];
-  wm_mounting mounting;
-} camera;
-
 typedef struct calibration {
   wm_wheels wheels;
-  camera cameras[CAMERAS_MAX];
-  size_t camera_count;
+  wm_rig rig;
   wm_sensor sensors[WM_SENSORS_MAX];
   size_t sensor_count;
 } calibration;
 
 // Nothing known: no wheels, no sensors.
 void calibration_init(calibration *self);
-// Reads and checks all of it; cameras' models are checked, of them the mountings are kept.
+// Reads and checks all of it.
 wm_status calibration_read(const wm_yaml *doc, const warner *warn, calibration *out, wm_error *err);
 
 // Checks keys as calibration.yaml wants it: near misses are errors, other unknown keys are warned of.
@@ -43,7 +35,7 @@ const wm_mounting *calibration_camera_mounting(const calibration *self, const ch
 wm_status calibration_mounting(const wm_yaml_node *parent, const wm_mounting *otherwise, const warner *warn,
                                wm_mounting *out, wm_error *err);
 // One camera: model, size, intrinsics, distortion, readout, mounting.
-wm_status calibration_camera(const wm_yaml_node *node, const warner *warn, camera *out, wm_error *err);
+wm_status calibration_camera(const wm_yaml_node *node, const warner *warn, wm_camera *out, wm_error *err);
 // Reads NAME_rad or NAME_deg of `map`, limits in radians; leaves *out where neither is there. Both are an error.
 wm_status calibration_angle(const wm_yaml_node *map, const char *name, double min_rad, double max_rad, double *out_rad,
                             wm_error *err);

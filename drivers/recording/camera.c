@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera's entry in calibration.yaml: every model's fields are checked here; the models themselves are vision's.
+// A camera's entry in calibration.yaml: every model's fields are read and checked here; the models themselves are
+// vision's.
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
 #include "calibration.h"
-
-#define INTRINSICS_MAX 16
 
 typedef struct camera_model {
   size_t intrinsics_min, intrinsics_max;
@@ -21,7 +20,7 @@ static const camera_model kFields[] = {
     {4, 4, 0, 4, 5, "[fx, fy, cx, cy]"},
     {5, 5, 1, 4, 5, "[xi, fx, fy, cx, cy]"},
     {6, 6, 2, 0, 0, "[xi, alpha, fx, fy, cx, cy]"},
-    {5, INTRINSICS_MAX, -1, 0, INTRINSICS_MAX, "the polynomial, centre and affine values"},
+    {5, WM_INTRINSICS_MAX, -1, 0, WM_INTRINSICS_MAX, "the polynomial, centre and affine values"},
 };
 
 static wm_status read_size(const wm_yaml_node *node, double size[2], wm_error *err) {
@@ -39,14 +38,15 @@ static wm_status read_size(const wm_yaml_node *node, double size[2], wm_error *e
 }
 
 static wm_status read_intrinsics(const wm_yaml_node *node, const camera_model *model, const double size[2],
-                                 wm_error *err) {
-  double values[INTRINSICS_MAX];
+                                 wm_camera *out, wm_error *err) {
+  double *values = out->intrinsics;
   wm_yaml_node list = wm_yaml_get(node, "intrinsics");
   if (!wm_yaml_there(&list)) return wm_yaml_fail(node, err, "intrinsics: %s is needed", model->fields);
   size_t n = wm_yaml_count(&list);
   if (!wm_yaml_is_list(&list) || n < model->intrinsics_min || n > model->intrinsics_max)
     return wm_yaml_fail(&list, err, "has %zu values; this model needs %s", n, model->fields);
   wm_status status = wm_yaml_f64_list(&list, n, n, values, NULL, err);
+  out->intrinsics_count = (uint32_t)n;
   for (size_t i = 0; status == WM_OK && model->focal >= 0 && i < n; i++) {
     size_t focal = (size_t)model->focal;
     wm_yaml_node item = wm_yaml_item(&list, i);
@@ -60,14 +60,17 @@ static wm_status read_intrinsics(const wm_yaml_node *node, const camera_model *m
   return status;
 }
 
-static wm_status read_distortion(const wm_yaml_node *node, const camera_model *model, wm_error *err) {
-  double values[INTRINSICS_MAX];
+static wm_status read_distortion(const wm_yaml_node *node, const camera_model *model, wm_camera *out, wm_error *err) {
+  size_t count;
   wm_yaml_node list = wm_yaml_get(node, "distortion");
   if (!wm_yaml_there(&list) || (wm_yaml_is_list(&list) && wm_yaml_count(&list) == 0)) return WM_OK;  // none: zeros
-  return wm_yaml_f64_list(&list, model->distortion_min, model->distortion_max, values, NULL, err);
+  wm_status status =
+      wm_yaml_f64_list(&list, model->distortion_min, model->distortion_max, out->distortion, &count, err);
+  if (status == WM_OK) out->distortion_count = (uint32_t)count;
+  return status;
 }
 
-wm_status calibration_camera(const wm_yaml_node *node, const warner *warn, camera *out, wm_error *err) {
+wm_status calibration_camera(const wm_yaml_node *node, const warner *warn, wm_camera *out, wm_error *err) {
   static const char *const kKeys[] = {"model", "size", "intrinsics", "distortion", "mounting", "readout_ns", NULL};
   int32_t kind;
   double size[2] = {0, 0};
@@ -79,9 +82,11 @@ wm_status calibration_camera(const wm_yaml_node *node, const warner *warn, camer
     return wm_yaml_fail(node, err, "model: one of equidistant, pinhole-radtan, omni, double-sphere, ocam is needed");
   status = wm_yaml_choice(&model, kModels, &kind, err);
   if (status == WM_OK) status = read_size(node, size, err);
-  if (status == WM_OK) status = read_intrinsics(node, &kFields[kind], size, err);
-  if (status == WM_OK) status = read_distortion(node, &kFields[kind], err);
-  int64_t readout_ns;
-  if (status == WM_OK && wm_yaml_there(&readout)) status = wm_yaml_i64(&readout, 0, 1000000000, &readout_ns, err);
+  if (status == WM_OK) status = read_intrinsics(node, &kFields[kind], size, out, err);
+  if (status == WM_OK) status = read_distortion(node, &kFields[kind], out, err);
+  out->model = kind;  // the names stand in the order of wm_camera_model
+  out->width_px = (uint32_t)size[0];
+  out->height_px = (uint32_t)size[1];
+  if (status == WM_OK && wm_yaml_there(&readout)) status = wm_yaml_i64(&readout, 0, 1000000000, &out->readout_ns, err);
   return status == WM_OK ? calibration_mounting(node, NULL, warn, &out->mounting, err) : status;
 }

@@ -326,6 +326,7 @@ const wm_landmark *wm_recording_landmarks(const wm_recording *self, size_t *coun
   return self->landmarks;
 }
 
+const wm_rig *wm_recording_rig(const wm_recording *self) { return &self->calibration.rig; }
 const wm_start *wm_recording_start(const wm_recording *self) { return &self->start; }
 uint32_t wm_recording_quantities(const wm_recording *self) { return self->quantities; }
 

@@ -114,6 +114,8 @@ static const char *fill_point(const csv_row *row, uint16_t sensor, wm_event *out
     points->dropped++;
     return NULL;
   }
+  points->camera = -1;
+  points->normal_rad[points->count] = points->sigma_m[points->count] = NAN;
   points->x_m[points->count] = (float)row->number[FIRST];
   points->y_m[points->count++] = (float)row->number[FIRST + 1];
   return NULL;

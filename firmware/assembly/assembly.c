@@ -77,6 +77,7 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   setup->wheels = *wm_recording_wheels(recording);
   setup->sensors = wm_recording_sensors(recording, &setup->sensor_count);
   setup->landmarks = wm_recording_landmarks(recording, &setup->landmark_count);
+  setup->rig = wm_recording_rig(recording);
   setup->start = config->has_initial_pose ? config->initial_pose : *wm_recording_start(recording);
   setup->seed = seed;
 

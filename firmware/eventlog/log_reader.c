@@ -7,7 +7,7 @@
 #include "waymark/bytes.h"
 #include "waymark/eventlog.h"
 
-#define MAGIC "WMLOG 1\n"
+#define MAGIC "WMLOG 2\n"
 #define RECORD_MAX (UINT32_C(16) << 20)  // a configuration is text; nothing is larger
 
 struct wm_log_reader {
@@ -160,6 +160,10 @@ static wm_status take_head_record(wm_log_reader *self, const record *r, wm_error
       self->saw_wheels = 1;
       if (wm_wheels_decode(r->content, r->count, &h->wheels, &used) != WM_OK) bytes.bad = 1;
       break;
+    case WM_LOG_RIG:
+      if (wm_rig_decode(r->content, r->count, &h->rig, &used) != WM_OK) bytes.bad = 1;
+      break;
+    case WM_LOG_MAP_HASH: h->map_hash = wm_get_u64(&bytes); break;
     case WM_LOG_START:
       self->saw_start = 1;
       if (wm_start_decode(r->content, r->count, &h->start, &used) != WM_OK) bytes.bad = 1;
@@ -182,7 +186,7 @@ static wm_status take_head_record(wm_log_reader *self, const record *r, wm_error
 static wm_status read_head(wm_log_reader *self, wm_error *err) {
   char magic[sizeof MAGIC - 1];
   if (fread(magic, 1, sizeof magic, self->file) != sizeof magic || memcmp(magic, MAGIC, sizeof magic) != 0)
-    return wm_fail(err, WM_BAD_DATA, "%s: not an event log (it should begin with \"WMLOG 1\")", self->path);
+    return wm_fail(err, WM_BAD_DATA, "%s: not an event log (it should begin with \"WMLOG 2\")", self->path);
   self->offset = sizeof magic;
   for (;;) {
     record r;

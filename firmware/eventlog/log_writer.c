@@ -6,7 +6,7 @@
 #include "waymark/bytes.h"
 #include "waymark/eventlog.h"
 
-static const char kMagic[8] = {'W', 'M', 'L', 'O', 'G', ' ', '1', '\n'};
+static const char kMagic[8] = {'W', 'M', 'L', 'O', 'G', ' ', '2', '\n'};
 
 static void write_all(wm_log_writer *self, const void *bytes, size_t count) {
   if (self->failed || count == 0) return;
@@ -37,13 +37,15 @@ static void write_u64(wm_log_writer *self, wm_log_tag tag, uint64_t value) {
 }
 
 static void write_setup(wm_log_writer *self, const wm_setup *setup) {
-  uint8_t bytes[2048];
+  uint8_t bytes[WM_RIG_ENCODED_MAX];
   write_record(self, WM_LOG_WHEELS, bytes, wm_wheels_encode(&setup->wheels, bytes, sizeof bytes));
   write_record(self, WM_LOG_START, bytes, wm_start_encode(&setup->start, bytes, sizeof bytes));
   for (size_t i = 0; i < setup->sensor_count; i++)
     write_record(self, WM_LOG_SENSOR, bytes, wm_sensor_encode(&setup->sensors[i], bytes, sizeof bytes));
   for (size_t i = 0; i < setup->landmark_count; i++)
     write_record(self, WM_LOG_LANDMARK, bytes, wm_landmark_encode(&setup->landmarks[i], bytes, sizeof bytes));
+  if (setup->rig) write_record(self, WM_LOG_RIG, bytes, wm_rig_encode(setup->rig, bytes, sizeof bytes));
+  if (setup->map) write_u64(self, WM_LOG_MAP_HASH, setup->map->hash);
   write_u64(self, WM_LOG_LANDMARK_HASH, wm_landmarks_hash(setup->landmarks, setup->landmark_count));
 }
 

@@ -29,6 +29,7 @@ static void assemble(log_replay *self, const wm_config *config, const wm_log_hea
                         .sensor_count = head->sensor_count,
                         .landmarks = head->landmarks,
                         .landmark_count = head->landmark_count,
+                        .rig = &head->rig,
                         .start = head->start,
                         .seed = head->seed};
   a->driving = head->driving;

@@ -2,7 +2,7 @@
 #include "waymark/bytes.h"
 #include "waymark/codec.h"
 
-#define EVENT_VERSION 1
+#define EVENT_VERSION 2
 
 static void put_payload(wm_writer *w, const wm_event *e) {
   switch ((wm_event_kind)e->kind) {
@@ -59,9 +59,12 @@ static void put_payload(wm_writer *w, const wm_event *e) {
       uint32_t count = p->count < WM_POINTS_MAX ? p->count : WM_POINTS_MAX;
       wm_put_u32(w, count);
       wm_put_u32(w, p->dropped);
+      wm_put_i32(w, p->camera);
       for (uint32_t i = 0; i < count; i++) {
         wm_put_f32(w, p->x_m[i]);
         wm_put_f32(w, p->y_m[i]);
+        wm_put_f32(w, p->normal_rad[i]);
+        wm_put_f32(w, p->sigma_m[i]);
       }
       break;
     }
@@ -105,10 +108,13 @@ static void get_quantities(wm_reader *r, wm_quantities *q) {
 static void get_points(wm_reader *r, wm_points *p) {
   p->count = wm_get_u32(r);
   p->dropped = wm_get_u32(r);
+  p->camera = wm_get_i32(r);
   if (p->count > WM_POINTS_MAX) r->bad = 1;
   for (uint32_t i = 0; i < p->count && !r->bad; i++) {
     p->x_m[i] = wm_get_f32(r);
     p->y_m[i] = wm_get_f32(r);
+    p->normal_rad[i] = wm_get_f32(r);
+    p->sigma_m[i] = wm_get_f32(r);
   }
 }
 

@@ -44,6 +44,7 @@ double wm_recording_duration_s(const wm_recording *self);  // NaN where not give
 const wm_wheels *wm_recording_wheels(const wm_recording *self);
 const wm_sensor *wm_recording_sensors(const wm_recording *self, size_t *count);
 const wm_landmark *wm_recording_landmarks(const wm_recording *self, size_t *count);
+const wm_rig *wm_recording_rig(const wm_recording *self);      // cameras; an empty one where calibration.yaml has none
 const wm_start *wm_recording_start(const wm_recording *self);  // initial_pose; NaN where unknown
 uint32_t wm_recording_quantities(const wm_recording *self);    // bit per wm_quantity that the CAN binding gives
 // Text of calibration.yaml as read ("" where there is none), for the event log.

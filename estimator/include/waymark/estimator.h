@@ -28,6 +28,8 @@ typedef struct wm_setup {
   size_t sensor_count;
   const wm_landmark *landmarks;
   size_t landmark_count;
+  const wm_rig *rig;     // cameras and what else calibration.yaml has; NULL where nothing is known
+  const wm_raster *map;  // NULL where there is none
   wm_start start;
   uint64_t seed;
 } wm_setup;

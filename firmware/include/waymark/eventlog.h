@@ -2,7 +2,7 @@
 // events.wmlog: what was fused, in its order, with all that is needed to fuse it again: enough to make the same
 // trajectory bit by bit without the recording. No wall-clock time in it.
 //
-//   file    = magic (8 bytes "WMLOG 1\n") record*
+//   file    = magic (8 bytes "WMLOG 2\n") record*
 //   record  = length u32, crc32 u32 (of what follows), tag u8, content (length - 1 bytes)
 //   content = by tag: a text, a setup struct, an event (waymark/codec.h), a gap's count
 //
@@ -34,6 +34,8 @@ typedef enum wm_log_tag {
   WM_LOG_LANDMARK_HASH,  // u64
   WM_LOG_DRIVING,        // kinds u32, quantities u32
   WM_LOG_SOURCE,         // kinds u32, name text, one record a source
+  WM_LOG_RIG,            // struct: cameras
+  WM_LOG_MAP_HASH,       // u64; absent where there was no map
   WM_LOG_HEAD_END,
   WM_LOG_EVENT,  // struct
   WM_LOG_GAP,    // u64: events that the sink could not write in time and that are missing here
@@ -66,10 +68,12 @@ typedef struct wm_log_reader wm_log_reader;
 typedef struct wm_log_head {
   char program[32], estimator[WM_NAME_MAX], recording[WM_NAME_MAX + 96], config_path[WM_PATH_MAX];
   uint64_t seed, landmark_hash;
+  uint64_t map_hash;  // 0: there was no map
   const char *config_text, *calibration_text;
   size_t config_length, calibration_length;
   wm_wheels wheels;
   wm_start start;
+  wm_rig rig;
   const wm_sensor *sensors;
   size_t sensor_count;
   const wm_landmark *landmarks;

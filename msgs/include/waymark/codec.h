@@ -20,7 +20,7 @@ extern "C" {
 #endif
 
 // Enough for any event.
-#define WM_EVENT_ENCODED_MAX (32 + 8 + 8 * WM_POINTS_MAX)
+#define WM_EVENT_ENCODED_MAX (32 + 12 + 16 * WM_POINTS_MAX)
 #define WM_PUBLISHED_ENCODED_MAX 640
 #define WM_INNOVATION_ENCODED_MAX 80
 
@@ -38,6 +38,11 @@ wm_status wm_wheels_decode(const void *data, size_t size, wm_wheels *out, size_t
 
 size_t wm_sensor_encode(const wm_sensor *sensor, void *out, size_t capacity);
 wm_status wm_sensor_decode(const void *data, size_t size, wm_sensor *out, size_t *used);
+
+// Enough for any rig.
+#define WM_RIG_ENCODED_MAX (512 + WM_CAMERAS_MAX * 384)
+size_t wm_rig_encode(const wm_rig *rig, void *out, size_t capacity);
+wm_status wm_rig_decode(const void *data, size_t size, wm_rig *out, size_t *used);
 
 size_t wm_landmark_encode(const wm_landmark *landmark, void *out, size_t capacity);
 wm_status wm_landmark_decode(const void *data, size_t size, wm_landmark *out, size_t *used);

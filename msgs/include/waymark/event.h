@@ -109,11 +109,15 @@ typedef struct wm_stereo {
   double right_px[2];
 } wm_stereo;
 
+// Edge points on the floor. The normal of an edge points from its bright to its dark side.
 typedef struct wm_points {
   uint32_t count;
-  uint32_t dropped;  // points of this stamp beyond WM_POINTS_MAX
-  float x_m[WM_POINTS_MAX];
+  uint32_t dropped;          // points of this stamp beyond WM_POINTS_MAX
+  int32_t camera;            // index into wm_rig.cameras, or -1 where unknown
+  float x_m[WM_POINTS_MAX];  // in base_link, by the calibration's mounting
   float y_m[WM_POINTS_MAX];
+  float normal_rad[WM_POINTS_MAX];  // direction of the edge's normal in base_link; NaN where unknown
+  float sigma_m[WM_POINTS_MAX];     // across the edge, by the detector (pixels alone); NaN where unknown
 } wm_points;
 
 typedef struct wm_looked {

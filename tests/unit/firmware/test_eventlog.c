@@ -134,7 +134,7 @@ static void what_is_no_log_is_said_to_be_none(void) {
   wm_log_reader *log;
   uint8_t text[] = "t_ns,v_mps,w_radps\n0,1,2\n";
   TEST_ASSERT_EQUAL(WM_BAD_DATA, open_bytes(text, sizeof text - 1, &log));
-  TEST_ASSERT_EQUAL_STRING("log: not an event log (it should begin with \"WMLOG 1\")", err.text);
+  TEST_ASSERT_EQUAL_STRING("log: not an event log (it should begin with \"WMLOG 2\")", err.text);
   TEST_ASSERT_NULL(log);
   TEST_ASSERT_EQUAL(WM_IO, wm_log_open("/nowhere/events.wmlog", &log, &err));
 }

@@ -52,9 +52,12 @@ static void fill(wm_event *e, unsigned kind) {
     case WM_EVENT_POINTS:
       e->as.points.count = (uint32_t)(random_bits() % (WM_POINTS_MAX + 1));
       e->as.points.dropped = 7;
+      e->as.points.camera = -1;
       for (uint32_t i = 0; i < e->as.points.count; i++) {
         e->as.points.x_m[i] = (float)random_f64();
         e->as.points.y_m[i] = (float)random_f64();
+        e->as.points.normal_rad[i] = (float)random_f64();
+        e->as.points.sigma_m[i] = (float)random_f64();
       }
       break;
     case WM_EVENT_LOOKED: e->as.looked.sensor = 9; break;
@@ -104,7 +107,7 @@ static void noise_never_gives_an_event_with_indices_out_of_bounds(void) {
   for (int round = 0; round < 20000; round++) {
     uint8_t bytes[128];
     for (size_t i = 0; i < sizeof bytes; i++) bytes[i] = (uint8_t)random_bits();
-    bytes[0] = 1;
+    bytes[0] = 2;
     bytes[1] = (uint8_t)(random_bits() % (WM_EVENT_KIND_COUNT + 2));
     if (round % 2) bytes[24] = (uint8_t)(random_bits() % 10);  // a count that may be good
     wm_event out;
@@ -135,7 +138,7 @@ static void bytes_are_little_endian_on_every_machine(void) {
       .t_ns = 0x0102030405060708, .arrival_ns = -1, .seq = 0x11223344, .source = 0x5566, .kind = WM_EVENT_LOOKED};
   e.as.looked.sensor = 0x7788;
   uint8_t bytes[64];
-  static const uint8_t kWanted[] = {1,    WM_EVENT_LOOKED,
+  static const uint8_t kWanted[] = {2,    WM_EVENT_LOOKED,
                                     0x66, 0x55,
                                     0x44, 0x33,
                                     0x22, 0x11,
@@ -212,6 +215,41 @@ static void a_setup_comes_back(void) {
   TEST_ASSERT_EQUAL_MEMORY(&start, &start2, sizeof start);
 }
 
+static void a_rig_comes_back_and_a_cut_one_is_refused(void) {
+  wm_rig rig, back;
+  wm_rig_init(&rig);
+  rig.camera_count = 2;
+  for (int c = 0; c < 2; c++) {
+    wm_camera *camera = &rig.cameras[c];
+    camera->name[0] = c == 0 ? 'l' : 'r';
+    camera->model = WM_CAMERA_OMNI;
+    camera->width_px = 640;
+    camera->height_px = 480;
+    camera->intrinsics_count = 5;
+    camera->distortion_count = 4;
+    for (int i = 0; i < 5; i++) camera->intrinsics[i] = random_f64();
+    for (int i = 0; i < 4; i++) camera->distortion[i] = random_f64();
+    camera->readout_ns = 33;
+    camera->mounting.rpy_rad[2] = 0.5;
+  }
+  rig.stereo.left = 0;
+  rig.stereo.right = 1;
+  rig.marker_size_m = 0.2;
+  uint8_t bytes[WM_RIG_ENCODED_MAX], again[WM_RIG_ENCODED_MAX];
+  size_t used, count = wm_rig_encode(&rig, bytes, sizeof bytes);
+  TEST_ASSERT_GREATER_THAN(0, count);
+  TEST_ASSERT_EQUAL(WM_OK, wm_rig_decode(bytes, count, &back, &used));
+  TEST_ASSERT_EQUAL(count, used);
+  TEST_ASSERT_EQUAL(count, wm_rig_encode(&back, again, sizeof again));
+  TEST_ASSERT_EQUAL_MEMORY(bytes, again, count);
+  TEST_ASSERT_EQUAL(1, wm_rig_find_camera(&back, "r"));
+  TEST_ASSERT_EQUAL(-1, wm_rig_find_camera(&back, "x"));
+  for (size_t cut = 0; cut < count; cut++) TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_rig_decode(bytes, cut, &back, &used));
+  rig.stereo.right = 2;  // no such camera
+  count = wm_rig_encode(&rig, bytes, sizeof bytes);
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_rig_decode(bytes, count, &back, &used));
+}
+
 static void the_hash_of_a_map_sees_every_number_and_the_order(void) {
   wm_landmark map[2] = {{1, {1, 2, 0}, 0.01, NAN}, {2, {3, 4, 0}, 0.01, NAN}};
   uint64_t hash = wm_landmarks_hash(map, 2);
@@ -232,6 +270,7 @@ int main(void) {
   RUN_TEST(a_published_pose_comes_back);
   RUN_TEST(an_innovation_comes_back_and_unknown_verdicts_do_not);
   RUN_TEST(a_setup_comes_back);
+  RUN_TEST(a_rig_comes_back_and_a_cut_one_is_refused);
   RUN_TEST(the_hash_of_a_map_sees_every_number_and_the_order);
   return UNITY_END();
 }
