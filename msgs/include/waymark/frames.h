@@ -7,7 +7,7 @@
 
 #include <stdint.h>
 
-typedef enum wm_frame { WM_FRAME_MAP = 0, WM_FRAME_ODOM = 1, WM_FRAME_BASE = 2 } wm_frame;
+typedef enum wm_frame_id { WM_FRAME_MAP = 0, WM_FRAME_ODOM = 1, WM_FRAME_BASE = 2 } wm_frame_id;
 
 // Pose in the plane. heading_rad in (-pi, pi], positive to the left.
 typedef struct wm_pose2 {
