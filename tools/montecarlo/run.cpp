@@ -37,15 +37,20 @@ wm_status make_events(const sim::Recording &recording, const wm_dbc *dbc, std::v
     e.kind = WM_EVENT_QUANTITIES;
     out.push_back(e);
   }
-  for (const sim::Sighting &s : recording.sightings) {
-    wm_event e{};
-    e.t_ns = s.t_ns;
-    e.arrival_ns = s.arrival_ns;
-    e.source = static_cast<uint16_t>(1 + s.sensor);
-    e.kind = WM_EVENT_SIGHTING;
-    e.as.sighting = {s.sensor, s.id, s.bearing_rad, NAN, NAN, NAN};
-    out.push_back(e);
-  }
+  const auto add = [&](const auto &seen, wm_event_kind kind) -> wm_event & {
+    wm_event &e = out.emplace_back();
+    e.t_ns = seen.t_ns;
+    e.arrival_ns = seen.arrival_ns;
+    e.source = static_cast<uint16_t>(1 + seen.sensor);
+    e.kind = static_cast<uint8_t>(kind);
+    return e;
+  };
+  for (const sim::Sighting &s : recording.sightings)
+    add(s, WM_EVENT_SIGHTING).as.sighting = {s.sensor, s.id, s.bearing_rad, s.range_m, NAN, NAN};
+  for (const sim::MarkerSeen &m : recording.markers)
+    add(m, WM_EVENT_MARKER).as.marker = {m.sensor, m.id, {m.p_m[0], m.p_m[1], m.p_m[2]}, m.yaw_rad};
+  for (const sim::Fix &f : recording.fixes)
+    add(f, WM_EVENT_POSITION).as.position = {{f.p_m[0], f.p_m[1], f.p_m[2]}, f.sigma_xy_m, f.sigma_z_m};
   std::stable_sort(out.begin(), out.end(), [](const wm_event &a, const wm_event &b) {
     return a.t_ns != b.t_ns ? a.t_ns < b.t_ns : a.source < b.source;
   });

@@ -6,7 +6,7 @@
 
 namespace wm::sim {
 
-// What the scenario's `faults` do to frames and sightings that were sent right: lost, duplicated, reordered, late.
-void apply_faults(const Scenario &scenario, const Random &random, Recording &recording);
+// What the scenario's `faults` do to CAN frames that were sent right: lost, late, duplicated, reordered.
+void fault_can(const Faults &faults, const Random &random, std::vector<wm_can_frame> &frames);
 
 }  // namespace wm::sim

@@ -82,8 +82,10 @@ wm_status simulate_features(const Arguments &a, const sim::Scenario &scenario, u
   sim::Recording made;
   if (sim::simulate(scenario, seed, a.landmarks, made, err) != WM_OK) return wm_fail_in(err, "%s", a.scenario.c_str());
   if (const wm_status s = sim::write_recording(scenario, made, a.out, err); s != WM_OK) return s;
-  std::printf("%s: seed %" PRIu64 ", %.1f s, %.1f m, %zu CAN frames, %zu sightings of %zu landmarks\n", a.out.c_str(),
-              made.seed, made.duration_s, made.length_m, made.can.size(), made.sightings.size(), made.map.size());
+  std::printf("%s: seed %" PRIu64 ", %.1f s, %.1f m, %zu %s, %zu features of %zu landmarks\n", a.out.c_str(), made.seed,
+              made.duration_s, made.length_m, made.can.size() + made.motion6.size(),
+              made.motion6.empty() ? "CAN frames" : "twists",
+              made.sightings.size() + made.markers.size() + made.stereo.size(), made.landmarks.size());
   return WM_OK;
 }
 

@@ -37,6 +37,14 @@ enum class Stream : uint64_t {
   velocity_noise,
   rate_bias,
   rate_noise,
+  landmark_place,
+  way,
+  feature_noise,
+  feature_outlier,
+  feature_missed,
+  position_wander,
+  compass,
+  start_place,
 };
 
 class Random {

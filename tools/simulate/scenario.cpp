@@ -12,7 +12,8 @@ namespace wm::sim {
 namespace {
 
 void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
-  static const char *const known[] = {"landmarks", "kind", "variant", "markers_on_walls", nullptr};
+  static const char *const known[] = {"landmarks", "kind", "variant", "markers_on_walls", "scatter", "map", nullptr};
+  static const char *const maps[] = {"all", "listed", "none", nullptr};
   static const char *const kinds[] = {"features", "crossing", "corridor", "office", "hall", "seabed", nullptr};
   static const char *const variants[] = {"easy", "hard", nullptr};
   r.keys(world, known);
@@ -40,6 +41,15 @@ void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
       r.fail(item, "this id is there already; each landmark needs its own");
     out.landmarks.push_back(landmark);
   }
+  const wm_yaml_node scatter = r.child(world, "scatter", false), map = r.child(world, "map", false);
+  if (r.ok() && kind > 0 && wm_yaml_there(&scatter))
+    return r.fail(scatter, "a world of this kind draws its own landmarks; leave the key out");
+  if (r.ok() && kind > 0 && wm_yaml_there(&map))
+    return r.fail(map, "a world of this kind has its own map; leave the key out");
+  read_scatter(r, scatter, out);
+  int mapped = 0;
+  r.word(world, "map", maps, mapped);
+  out.mapped = static_cast<Mapped>(mapped);
 }
 
 void read_robot(Reader &r, const wm_yaml_node &map, bool steered, Robot &out) {
@@ -47,6 +57,7 @@ void read_robot(Reader &r, const wm_yaml_node &map, bool steered, Robot &out) {
                                       "steering_table", "wheels_send",    nullptr};
   static const char *const sends[] = {"ticks", "speeds", nullptr};
   r.keys(map, known);
+  const wm_yaml_node table = r.child(map, "steering_table", false);
   wm_wheels &w = out.wheels;
   w.steering_ratio = NAN;
   w.encoder_offset_m = 0;
@@ -54,6 +65,9 @@ void read_robot(Reader &r, const wm_yaml_node &map, bool steered, Robot &out) {
   r.number(map, "wheel_radius_m", 0.01, 2, 1, w.radius_m, true);
   r.number(map, "ticks_per_turn", 1, 1e6, 1, w.ticks_per_turn, true);
   r.number(map, "track_m", 0.05, 5, 1, w.track_m, true);
+  const wm_yaml_node wheelbase = r.child(map, "wheelbase_m", false);
+  steered = steered || (r.ok() && wm_yaml_there(&wheelbase)) || wm_yaml_there(&table);
+  out.differential = !steered;
   r.number(map, "wheelbase_m", 0.05, 10, 1, w.wheelbase_m, steered);
 
   int speeds = 0;
@@ -61,7 +75,6 @@ void read_robot(Reader &r, const wm_yaml_node &map, bool steered, Robot &out) {
   out.sends_speeds = speeds == 1;
 
   static const char *const known_table[] = {"actuator_mm", "road_wheel_deg", nullptr};
-  const wm_yaml_node table = r.child(map, "steering_table", false);
   if (!r.ok() || !wm_yaml_there(&table)) return;
   r.keys(table, known_table);
   const size_t n = r.numbers(table, "actuator_mm", 2, WM_STEERING_TABLE_MAX, w.actuator_m, true);
@@ -197,6 +210,8 @@ void read_errors(Reader &r, const wm_yaml_node &map, Errors &out) {
                                       "frame_stamp_jitter_ms",
                                       "speed_percent",
                                       "speed_noise_mps",
+                                      "start_within_m",
+                                      "compass_deg",
                                       nullptr};
   if (!r.ok() || !wm_yaml_there(&map)) return;
   r.keys(map, known);
@@ -210,6 +225,8 @@ void read_errors(Reader &r, const wm_yaml_node &map, Errors &out) {
   r.number(map, "camera_yaw_deg", 0, 45, kDeg, out.camera_yaw_rad);
   r.number(map, "start_xy_m", 0, 10, 1, out.start_xy_m);
   r.number(map, "start_heading_deg", 0, 180, kDeg, out.start_heading_rad);
+  r.number(map, "start_within_m", 0, 1000, 1, out.start_within_m);
+  r.number(map, "compass_deg", 0, 180, kDeg, out.compass_rad);
   r.number(map, "slip_percent", 0, 20, kPercent, out.slip);
   r.number(map, "camera_mounting_deg", 0, 45, kDeg, out.camera_mounting_rad);
   r.number(map, "camera_mounting_mm", 0, 1000, kMilli, out.camera_mounting_m);
@@ -234,6 +251,8 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
   static const char *const known[] = {"can_lost_percent",
                                       "can_duplicated_percent",
                                       "can_reordered_percent",
+                                      "can_late_percent",
+                                      "can_late_ms",
                                       "sightings_lost_percent",
                                       "sightings_duplicated_percent",
                                       "frames_late_percent",
@@ -257,6 +276,8 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
   r.number(map, "can_lost_percent", 0, 100, kPercent, out.can_lost);
   r.number(map, "can_duplicated_percent", 0, 100, kPercent, out.can_duplicated);
   r.number(map, "can_reordered_percent", 0, 100, kPercent, out.can_reordered);
+  r.number(map, "can_late_percent", 0, 100, kPercent, out.can_late);
+  r.number(map, "can_late_ms", 0, 1e5, kMilli, out.can_late_s);
   r.number(map, "sightings_lost_percent", 0, 100, kPercent, out.sightings_lost);
   r.number(map, "sightings_duplicated_percent", 0, 100, kPercent, out.sightings_duplicated);
   r.number(map, "frames_late_percent", 0, 100, kPercent, out.frames_late);
@@ -304,8 +325,9 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
 }
 
 void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
-  static const char *const known[] = {"format",  "name",  "about", "seed",   "clock_start_s", "world",    "robot",
-                                      "cameras", "route", "bus",   "errors", "faults",        "pictures", nullptr};
+  static const char *const known[] = {"format", "name",     "about",   "seed", "clock_start_s", "world",
+                                      "robot",  "cameras",  "route",   "path", "bus",           "errors",
+                                      "faults", "pictures", "sensors", nullptr};
   r.keys(root, known);
   std::string format;
   r.text(root, "format", format, true);
@@ -318,19 +340,27 @@ void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
   out.seed = static_cast<uint64_t>(seed);
   r.number(root, "clock_start_s", 0, 1e9, 1, out.clock_start_s);
   read_world(r, r.child(root, "world", true), out);
-  const bool pictured = out.world.pictured(), six = out.world.kind == "seabed";
+  const bool pictured = out.world.pictured();
+  const wm_yaml_node path = r.child(root, "path", false);
+  if (r.ok() && pictured && wm_yaml_there(&path))
+    r.fail(path, "a world of this kind draws its way by itself; leave the key out");
+  read_path(r, path, out);
+  const bool six = out.world.kind == "seabed" || out.swims();
   const wm_yaml_node robot = r.child(root, "robot", !six), cameras = r.child(root, "cameras", false),
-                     route = r.child(root, "route", !pictured), pictures = r.child(root, "pictures", false);
+                     route = r.child(root, "route", !pictured && !six), pictures = r.child(root, "pictures", false);
   if (r.ok() && six && wm_yaml_there(&robot)) r.fail(robot, "this vehicle has no wheels; leave the key out");
-  if (r.ok() && six && wm_yaml_there(&route)) r.fail(route, "this world draws its way by itself; leave the key out");
+  if (r.ok() && six && wm_yaml_there(&route)) r.fail(route, "this vehicle swims; it has a `path`, and no route");
+  if (r.ok() && out.swims() && wm_yaml_there(&cameras))
+    r.fail(cameras, "this vehicle's eyes are a sensor of kind stereo");
   if (r.ok() && !pictured && wm_yaml_there(&pictures))
     r.fail(pictures, "there are pictures only in a world that has a `kind`");
-  const bool steered = out.world.kind != "office" && out.world.kind != "hall";
+  const bool steered = out.world.kind == "crossing" || out.world.kind == "corridor";
   if (!six) read_robot(r, robot, steered, out.robot);
   if (pictured)
     read_pixel_cameras(r, cameras, out);
   else
     read_cameras(r, cameras, out);
+  read_sensors(r, r.child(root, "sensors", false), out);
   if (r.ok() && wm_yaml_there(&route)) read_route(r, route, out.route);
   read_pictures(r, pictures, out.pictures);
   read_bus(r, r.child(root, "bus", false), out.bus);
@@ -370,6 +400,11 @@ void make_perfect(Scenario &scenario) {
   for (Camera &camera : scenario.cameras) {
     camera.bearing_sigma_rad = 0;
     camera.outlier_fraction = 0;
+  }
+  for (Sensor &s : scenario.sensors) {
+    s.bearing_sigma_rad = s.range_sigma_m = s.heading_sigma_rad = s.range_sigma = s.sigma_px = s.wander_m = 0;
+    s.outlier_fraction = s.missed_fraction = s.one_side_fraction = 0;
+    s.noisy = false;
   }
 }
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "simulate/worlds/path6.h"
 #include "waymark/estimator.h"
 #include "waymark/status.h"
 
@@ -36,6 +37,29 @@ struct Route {
 struct Robot {
   wm_wheels wheels = {};      // as calibration.yaml says; the true ones differ by what `errors` draws
   bool sends_speeds = false;  // the bus gives the wheels' speeds, without sign, instead of rolling counts
+  bool differential = false;  // two driven wheels, no steering
+};
+
+// Landmarks that the seed draws, in a world of features alone.
+struct Scatter {
+  int count = 0;                   // so many in all; or
+  int per_view = 0;                // six degrees of freedom: so many before the stereo pair at any time
+  int32_t first_id = 1;            // their ids follow one another from here
+  double aside_m[2] = {1, 4};      // wheels: distance from the way, to either side
+  double height_m[2] = {0, 0};     // wheels: z
+  double apart_m = 0.5;            // wheels: from one another
+  double ahead_m[2] = {1.5, 4.5};  // six degrees of freedom: distance from the stereo pair when it comes by
+};
+
+// Which of the landmarks landmarks.csv has; the others are SLAM's to find.
+enum class Mapped { all, listed, none };
+
+// A way under water that the seed draws: rounds of about one radius, heading along the way, rolling and pitching.
+struct Rounds {
+  double duration_s = 0;  // 0: none
+  double radius_m = 3, height_m = 3, rounds = 2;
+  double wobble_m = 0.3;   // how the radius wanders; the height wanders half as much
+  double tilt_rad = 0.05;  // standard deviation of roll and pitch
 };
 
 // What is rendered: a maker of worlds, which draws building, landmarks, cameras and route by the seed.
@@ -59,6 +83,33 @@ struct Camera {
   double outlier_fraction = 0;  // of the sightings: anything in the field of view instead
   double latency_s = 0;         // arrival after the middle of the exposure
   double latency_jitter_s = 0;  // uniform, added
+};
+
+// A sensor that gives features, or a position or a direction.
+struct Sensor {
+  enum class Kind { landmarks, markers, stereo, gnss, depth, compass };
+  Kind kind = Kind::landmarks;
+  std::string name;
+  std::string camera;                                   // worlds with pictures: whose pictures it looks at
+  bool beside_pictures = false;                         // given also where there are pictures
+  bool noisy = true;                                    // gnss and depth: false measures exactly, sigmas as stated
+  double xyz_m[3] = {0, 0, 0}, rpy_rad[3] = {0, 0, 0};  // mounting in base_link
+  double rate_hz = 10, phase_s = 0;
+  double field_of_view_rad = 6.283185307179586, range_m = 1e5;  // what lies outside is not seen
+  int32_t ids[2] = {0, INT32_MAX};                              // only these landmarks are seen
+  bool gives_bearing = false, gives_range = false, range_is_depth = false;
+  double bearing_sigma_rad = 0, range_sigma_m = 0, heading_sigma_rad = 0;
+  double range_sigma = 0;                            // relative, added
+  double outlier_fraction = 0, missed_fraction = 0;  // of what is seen
+  double outlier_m = 0;                              // ranges: an outlier is up to so much too long; gnss: off
+  double latency_s = 0, latency_jitter_s = 0;        // arrival; the jitter is uniform and added
+  // stereo: a rectified pair, its left camera at xyz_m; level sigma of each coordinate
+  double sigma_px = 0, focal_px = 420, centre_px[2] = {319.5, 239.5}, baseline_m = 0.3;
+  int size_px[2] = {640, 480};
+  double one_side_fraction = 0;  // only one of both pictures has the point
+  // gnss and depth
+  double sigma_xy_m = 0, sigma_z_m = 0;
+  double wander_m = 0, wander_s = 30;  // gnss: each axis wanders so much, with this correlation time
 };
 
 // What a scenario changes of the world's camera of this name; what is absent stays.
@@ -104,6 +155,8 @@ struct Errors {
   double landmark_m = 0;            // each coordinate of the map, x and y
   double camera_yaw_rad = 0;        // each camera's mounting
   double start_xy_m = 0, start_heading_rad = 0;
+  double start_within_m = 0;        // start place: anywhere so near, each place as likely
+  double compass_rad = 0;           // each compass' deviation
   double slip = 0;                  // of each wheel, wandering; relative
   double camera_mounting_rad = 0;   // cameras with pixels: each axis
   double camera_mounting_m = 0;     // each axis
@@ -122,6 +175,7 @@ struct Span {
 // Things that go wrong on request; all off by default.
 struct Faults {
   double can_lost = 0, can_duplicated = 0, can_reordered = 0;  // fractions of the frames
+  double can_late = 0, can_late_s = 0;                         // this fraction is received so much later
   double sightings_lost = 0, sightings_duplicated = 0;         // fractions of the sightings
   double frames_late = 0, frames_late_s = 0;                   // this fraction of camera frames arrives so much later
   double camera_clock_offset_s = 0;                            // added to the stamps of all sightings
@@ -147,11 +201,17 @@ struct Scenario {
   double duration_s = 0;     // the recording ends then; 0: with the drive
   WorldKind world;
   std::vector<wm_landmark> landmarks;  // true places
+  Scatter scatter;
+  Mapped mapped = Mapped::all;
   Robot robot;
   std::vector<Camera> cameras;
+  std::vector<Sensor> sensors;
   std::vector<PixelCamera> pixel_cameras;
   Pictures pictures;
-  Route route;  // without legs: the world's own
+  Route route;               // without legs: the world's own
+  std::vector<Knot6> knots;  // six degrees of freedom: the way, or
+  Rounds rounds;             // drawn by the seed
+  bool swims() const { return !knots.empty() || rounds.duration_s > 0; }
   Bus bus;
   Errors errors;
   Faults faults;

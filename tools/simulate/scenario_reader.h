@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdio>
 #include <string>
 
 #include "simulate/angle.h"
@@ -68,6 +69,19 @@ class Reader {
     const wm_yaml_node node = child(map, key, required);
     if (ok() && wm_yaml_there(&node)) take(wm_yaml_choice(&node, words, &out, err_));
   }
+  // Two numbers, the second at least the first.
+  void range(const wm_yaml_node &map, const char *key, double min, double max, double *out) {
+    double both[2];
+    const wm_yaml_node node = child(map, key, false);
+    if (!ok() || !wm_yaml_there(&node) || numbers(map, key, 2, 2, both) != 2 || !ok()) return;
+    if (both[0] < min || both[1] > max || both[0] > both[1]) {
+      char text[128];
+      std::snprintf(text, sizeof text, "two numbers from %g to %g, the smaller one first", min, max);
+      return fail(node, text);
+    }
+    out[0] = both[0];
+    out[1] = both[1];
+  }
   size_t numbers(const wm_yaml_node &map, const char *key, size_t min_count, size_t max_count, double *out,
                  bool required = false) {
     const wm_yaml_node node = child(map, key, required);
@@ -95,5 +109,9 @@ class Reader {
 // Keys that only worlds with pictures have: `pictures`, and `cameras` that change the world's own.
 void read_pictures(Reader &r, const wm_yaml_node &map, Pictures &out);
 void read_pixel_cameras(Reader &r, const wm_yaml_node &list, Scenario &out);
+// Sensors; landmarks drawn by the seed; the way of a vehicle with six degrees of freedom.
+void read_sensors(Reader &r, const wm_yaml_node &list, Scenario &out);
+void read_scatter(Reader &r, const wm_yaml_node &map, Scenario &out);
+void read_path(Reader &r, const wm_yaml_node &map, Scenario &out);
 
 }  // namespace wm::sim

@@ -9,7 +9,9 @@
 #include "simulate/angle.h"
 #include "simulate/bus.h"
 #include "simulate/faults.h"
+#include "simulate/motion.h"
 #include "simulate/random.h"
+#include "simulate/scatter.h"
 #include "simulate/wheels.h"
 
 namespace wm::sim {
@@ -149,63 +151,6 @@ void send_gear(const Scenario &sc, const Random &random, Recording &out) {
       });
 }
 
-// One camera's sightings: true bearings from the camera's true place to the true landmarks, with noise and outliers.
-void look(const Scenario &sc, const Random &random, uint16_t sensor, Recording &out) {
-  const Camera &c = sc.cameras[sensor];
-  for (uint64_t k = 0;; k++) {
-    const double t_s = c.phase_s + static_cast<double>(k) / c.rate_hz;
-    if (t_s > out.drive.duration_s()) return;
-    const State s = out.drive.at(t_s);
-    const double cos_h = wm::cos(s.heading_rad), sin_h = wm::sin(s.heading_rad);
-    const double x = s.x_m + cos_h * c.xyz_m[0] - sin_h * c.xyz_m[1];
-    const double y = s.y_m + sin_h * c.xyz_m[0] + cos_h * c.xyz_m[1];
-    const double axis = s.heading_rad + c.yaw_rad + out.drawn.camera_yaw_rad[sensor];
-    const double latency = c.latency_s + c.latency_jitter_s * random.uniform(Stream::frame_latency, k, sensor);
-    for (size_t i = 0; i < out.landmarks.size(); i++) {
-      const double dx = out.landmarks[i].p_m[0] - x, dy = out.landmarks[i].p_m[1] - y;
-      const double bearing = wrap(wm::atan2(dy, dx) - axis);
-      if (std::fabs(bearing) > 0.5 * c.field_of_view_rad || std::sqrt(dx * dx + dy * dy) > c.range_m) continue;
-      // Draws are told apart by camera and landmark, so that a landmark more doesn't change what is seen of the others.
-      const uint64_t sub = sensor * uint64_t{4096} + static_cast<uint64_t>(i);
-      Sighting seen{};
-      seen.t_ns = out.clock_start_ns + to_ns(t_s + sc.faults.camera_clock_offset_s);
-      seen.arrival_ns = out.clock_start_ns + to_ns(t_s + latency);
-      seen.sensor = sensor;
-      seen.id = out.landmarks[i].id;
-      seen.outlier = random.uniform(Stream::bearing_outlier, k, sub) < c.outlier_fraction;
-      seen.bearing_rad = seen.outlier
-                             ? (random.uniform(Stream::bearing_outlier_value, k, sub) - 0.5) * c.field_of_view_rad
-                             : wrap(bearing + c.bearing_sigma_rad * random.normal(Stream::bearing_noise, k, sub));
-      out.sightings.push_back(seen);
-    }
-  }
-}
-
-void make_map(const Scenario &sc, const Random &random, size_t landmarks, Recording &out) {
-  const size_t count = std::min(landmarks, sc.landmarks.size());
-  out.landmarks.assign(sc.landmarks.begin(), sc.landmarks.begin() + static_cast<std::ptrdiff_t>(count));
-  out.map = out.landmarks;
-  for (uint64_t i = 0; i < count; i++) {
-    out.landmarks[i].sigma_m = 0;
-    out.map[i].sigma_m = sc.errors.landmark_m;
-    for (uint64_t axis = 0; axis < 2; axis++)
-      out.map[i].p_m[axis] += sc.errors.landmark_m * random.normal(Stream::landmark_map, i, axis);
-  }
-}
-
-void make_sensors(const Scenario &sc, Recording &out) {
-  for (const Camera &c : sc.cameras) {
-    wm_sensor sensor{};
-    std::snprintf(sensor.name, sizeof sensor.name, "%s", c.name.c_str());
-    std::copy(c.xyz_m, c.xyz_m + 3, sensor.mounting.xyz_m);
-    sensor.mounting.rpy_rad[2] = c.yaw_rad;
-    sensor.bearing_sigma_rad = c.bearing_sigma_rad;
-    sensor.range_sigma_m = NAN;
-    sensor.max_range_m = INFINITY;
-    out.sensors.push_back(sensor);
-  }
-}
-
 void make_start(const Scenario &sc, const Random &random, Recording &out) {
   const State s = out.drive.at(0);
   const Errors &e = sc.errors;
@@ -217,14 +162,16 @@ void make_start(const Scenario &sc, const Random &random, Recording &out) {
   out.start.heading_rad = wrap(s.heading_rad + e.start_heading_rad * draw(2) + sc.faults.start_heading_rad);
   for (double &q : out.start.q_xyzw) q = NAN;
   // A perfect start is stated as a very good one: a sigma of zero is no sigma.
-  out.start.sigma_xy_m = std::max(e.start_xy_m, 1e-3);
+  double away[3];
+  start_away(e, random, 2, away);
+  for (int i = 0; i < 2; i++) out.start.p_m[i] += away[i];
+  out.start.sigma_xy_m = std::max({e.start_xy_m, 0.5 * e.start_within_m, 1e-3});  // of a disc, each axis
   out.start.sigma_heading_rad = std::max(e.start_heading_rad, 1e-4);
 }
 
 }  // namespace
 
 Messages messages_of(const Scenario &sc) {
-  if (!sc.world.pictured()) return car_messages();
   Messages sent = {sc.robot.sends_speeds ? Bus_message::wheel_speeds : Bus_message::wheels};
   if (sc.bus.yaw_rate_hz > 0) sent.push_back(Bus_message::yaw_rate);
   if (sc.bus.steering_hz > 0 && sc.robot.wheels.steering_table_count >= 2) sent.push_back(Bus_message::steering);
@@ -232,7 +179,10 @@ Messages messages_of(const Scenario &sc) {
   return sent;
 }
 
-wm_status simulate(const Scenario &sc, uint64_t seed, size_t landmarks, Recording &out, wm_error *err) {
+namespace {
+
+// All that wheels, gyro and steering say, and the truth.
+wm_status simulate_drive(const Scenario &sc, uint64_t seed, Recording &out, wm_error *err) {
   out = Recording{};
   out.seed = seed;
   out.clock_start_ns = to_us(sc.clock_start_s);
@@ -245,8 +195,6 @@ wm_status simulate(const Scenario &sc, uint64_t seed, size_t landmarks, Recordin
   out.length_m = out.drive.length_m();
   const Random random(seed);
   out.drawn = draw_constants(sc, random);
-  make_map(sc, random, landmarks, out);
-  make_sensors(sc, out);
   make_start(sc, random, out);
 
   const Wheels wheels(sc, random, out.drive, out.drawn);
@@ -262,15 +210,52 @@ wm_status simulate(const Scenario &sc, uint64_t seed, size_t landmarks, Recordin
   for (const Bus_message which : messages_of(sc)) send(which);
   std::stable_sort(out.can.begin(), out.can.end(),
                    [](const wm_can_frame &a, const wm_can_frame &b) { return a.t_ns < b.t_ns; });
-  for (size_t i = 0; i < sc.cameras.size(); i++) look(sc, random, static_cast<uint16_t>(i), out);
-  apply_faults(sc, random, out);
-  std::stable_sort(out.sightings.begin(), out.sightings.end(),
-                   [](const Sighting &a, const Sighting &b) { return a.arrival_ns < b.arrival_ns; });
-
+  fault_can(sc.faults, random, out.can);
   for (uint64_t k = 0; static_cast<double>(k) / kTruth_hz <= out.drive.duration_s(); k++) {
     const double t_s = static_cast<double>(k) / kTruth_hz;
     out.truth.push_back({out.clock_start_ns + to_ns(t_s), out.drive.at(t_s)});
   }
+  return WM_OK;
+}
+
+// The first `landmarks` that the scenario lists and draws, and what the map says of them.
+wm_status place_landmarks(const Scenario &sc, size_t landmarks, Recording &out, wm_error *err) {
+  const Random random(out.seed);
+  std::vector<wm_landmark> drawn;
+  if (const wm_status s = scatter_landmarks(sc, out, drawn, err); s != WM_OK) return s;
+  out.landmarks = sc.landmarks;
+  out.landmarks.insert(out.landmarks.end(), drawn.begin(), drawn.end());
+  if (landmarks < out.landmarks.size()) out.landmarks.resize(landmarks);
+  const size_t mapped = sc.mapped == Mapped::none     ? 0
+                        : sc.mapped == Mapped::listed ? std::min(out.landmarks.size(), sc.landmarks.size())
+                                                      : out.landmarks.size();
+  for (wm_landmark &l : out.landmarks) l.sigma_m = 0;
+  out.map.assign(out.landmarks.begin(), out.landmarks.begin() + static_cast<std::ptrdiff_t>(mapped));
+  misplace(sc, out);
+  return WM_OK;
+}
+
+}  // namespace
+
+void misplace(const Scenario &sc, Recording &out) {
+  const Random random(out.seed);
+  const uint64_t axes = out.motion6.empty() ? 2 : 3;
+  for (uint64_t i = 0; i < out.map.size(); i++) {
+    out.map[i].sigma_m = sc.errors.landmark_m;
+    for (uint64_t axis = 0; axis < axes; axis++)
+      out.map[i].p_m[axis] += sc.errors.landmark_m * random.normal(Stream::landmark_map, i, axis);
+  }
+}
+
+wm_status simulate(const Scenario &sc, uint64_t seed, size_t landmarks, Recording &out, wm_error *err) {
+  if (sc.swims())
+    simulate_six(sc, seed, sc.knots.empty() ? swum_path(sc.rounds, seed) : Path6(sc.knots), out);
+  else if (const wm_status s = simulate_drive(sc, seed, out, err); s != WM_OK)
+    return s;
+  if (sc.world.pictured()) return WM_OK;
+  if (const wm_status s = place_landmarks(sc, landmarks, out, err); s != WM_OK) return s;
+  observe(sc, out);
+  settle(sc, out);
   return WM_OK;
 }
 

@@ -13,13 +13,43 @@
 
 namespace wm::sim {
 
+// `sensor` is an index into Recording::sensors; `outlier` is for statistics only and not written.
 struct Sighting {
   wm_time_ns t_ns, arrival_ns;
   uint16_t sensor;
   int32_t id;
-  double bearing_rad;
-  bool outlier;  // for statistics only; not written
+  double bearing_rad, range_m;  // NaN where it has none
+  bool outlier;
 };
+
+struct MarkerSeen {
+  wm_time_ns t_ns, arrival_ns;
+  uint16_t sensor;
+  int32_t id;
+  double p_m[3], yaw_rad;  // in the sensor's frame
+  bool outlier;
+};
+
+struct StereoSeen {
+  wm_time_ns t_ns, arrival_ns;
+  uint16_t sensor;
+  int32_t id;
+  double left_px[2], right_px[2];  // NaN where that picture hasn't got it
+  bool outlier;
+};
+
+// A row of gnss.csv. A depth sensor's row knows nothing of x and y: sigma_xy_m is kNoIdea_m.
+inline constexpr double kNoIdea_m = 1e6;
+struct Fix {
+  wm_time_ns t_ns, arrival_ns;
+  uint16_t sensor;  // into Scenario::sensors
+  double p_m[3], sigma_xy_m, sigma_z_m;
+  bool outlier;
+};
+
+// A compass looks at this landmark, so far to the north (+y) that a place makes no difference.
+inline constexpr int32_t kNorthId = 1000000;
+inline constexpr double kNorth_m = 1e7;
 
 struct Truth {
   wm_time_ns t_ns;
@@ -49,8 +79,11 @@ struct Recording {
   uint64_t seed;
   Drive drive;  // the truth at any time since clock_start_ns
   wm_time_ns clock_start_ns;
-  std::vector<wm_can_frame> can;       // by arrival
-  std::vector<Sighting> sightings;     // by arrival
+  std::vector<wm_can_frame> can;    // by arrival
+  std::vector<Sighting> sightings;  // by arrival, as all that follows
+  std::vector<MarkerSeen> markers;
+  std::vector<StereoSeen> stereo;
+  std::vector<Fix> fixes;
   std::vector<wm_sensor> sensors;      // as calibration.yaml says
   std::vector<wm_landmark> map;        // with its errors
   std::vector<wm_landmark> landmarks;  // true
@@ -72,6 +105,16 @@ Messages messages_of(const Scenario &scenario);
 // The same scenario, seed and number give the same recording; sensors draw independently, so that what the wheels say
 // doesn't change with the landmarks. WM_BAD_CONFIG when the route can't be driven.
 wm_status simulate(const Scenario &scenario, uint64_t seed, size_t landmarks, Recording &out, wm_error *err);
+
+// What the sensors say, added to a recording that has its motion, `landmarks` and `map`: `cameras` of a world of
+// features, and the `sensors` that need no pictures. Lists all in `sensors`. simulate() has done it for features.
+void observe(const Scenario &scenario, Recording &recording);
+void list_sensors(const Scenario &scenario, Recording &recording);
+// The lists sorted by arrival, after `faults` have lost, doubled and delayed some of them.
+void settle(const Scenario &scenario, Recording &recording);
+
+// Makes the recording's map wrong by `errors.landmark_m` on each axis, and states that in it.
+void misplace(const Scenario &scenario, Recording &recording);
 
 // The same for a vehicle with six degrees of freedom on `path`: motion6 instead of CAN.
 void simulate_six(const Scenario &scenario, uint64_t seed, const Path6 &path, Recording &out);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "math/elementary.hpp"
+#include "simulate/motion.h"
 #include "simulate/random.h"
 #include "simulate/simulate.h"
 
@@ -43,6 +44,28 @@ void send_motion(const Scenario &sc, const Random &random, Recording &out) {
   }
 }
 
+void start(const Scenario &sc, const Random &random, Recording &out) {
+  const Errors &e = sc.errors;
+  const State6 s = out.path.at(0);
+  double away[3], turned[3];
+  start_away(e, random, 3, away);
+  out.start.t_ns = WM_TIME_NONE;
+  for (uint64_t i = 0; i < 3; i++) {
+    out.start.p_m[i] = s.xyz_m[i] + e.start_xy_m * random.normal(Stream::start_pose, i) + away[i];
+    turned[i] = e.start_heading_rad * random.normal(Stream::start_pose, 3 + i);
+  }
+  out.start.p_m[0] += sc.faults.start_x_m;
+  out.start.p_m[1] += sc.faults.start_y_m;
+  const double nowhere[3] = {0, 0, 0};
+  turned[2] += sc.faults.start_heading_rad;
+  const Eigen::Matrix3d R = pose_of(nowhere, s.rpy_rad.data()).linear() * pose_of(nowhere, turned).linear();
+  out.start.heading_rad = wm::atan2(R(1, 0), R(0, 0));
+  const double pitch = wm::atan2(-R(2, 0), std::sqrt(R(0, 0) * R(0, 0) + R(1, 0) * R(1, 0)));
+  quaternion({wm::atan2(R(2, 1), R(2, 2)), pitch, out.start.heading_rad}, out.start.q_xyzw);
+  out.start.sigma_xy_m = std::max({e.start_xy_m, e.start_within_m / std::sqrt(5.0), 1e-3});  // of a ball, each axis
+  out.start.sigma_heading_rad = std::max(e.start_heading_rad, 1e-3);
+}
+
 }  // namespace
 
 void simulate_six(const Scenario &sc, uint64_t seed, const Path6 &path, Recording &out) {
@@ -67,14 +90,7 @@ void simulate_six(const Scenario &sc, uint64_t seed, const Path6 &path, Recordin
     }
     out.truth6.push_back(truth);
   }
-  const State6 s = path.at(0);
-  out.start.t_ns = WM_TIME_NONE;
-  for (uint64_t i = 0; i < 3; i++)
-    out.start.p_m[i] = s.xyz_m[i] + sc.errors.start_xy_m * random.normal(Stream::start_pose, i);
-  quaternion(s.rpy_rad, out.start.q_xyzw);
-  out.start.heading_rad = s.rpy_rad[2];
-  out.start.sigma_xy_m = std::max(sc.errors.start_xy_m, 1e-3);
-  out.start.sigma_heading_rad = 1e-3;
+  start(sc, random, out);
 }
 
 }  // namespace wm::sim

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: Apache-2.0
+// Worlds of features alone: what each kind of sensor says, read back by drivers/recording, against the truth: geometry,
+// noise, outliers, misses; and what mistakes in a scenario say.
+#include <unistd.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <map>
+
+#include "simulate/angle.h"
+#include "simulate/motion.h"
+#include "simulate/simulate.h"
+#include "simulate/write.h"
+#include "waymark/recording.h"
+
+extern "C" {
+#include "unity.h"
+void setUp(void);
+void tearDown(void);
+}
+
+using namespace wm::sim;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double kDegree = kPi / 180;
+
+Scenario scenario;
+Recording made;
+
+void load(const char *name) {
+  wm_error err{};
+  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/" + name + ".yaml";
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(path, scenario, &err), err.text);
+}
+void make(uint64_t seed) {
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, simulate(scenario, seed, SIZE_MAX, made, &err), err.text);
+}
+double since_start(wm_time_ns t_ns) { return static_cast<double>(t_ns - made.clock_start_ns) * 1e-9; }
+
+Vector3d place(int32_t id) {
+  for (const wm_landmark &l : made.landmarks)
+    if (l.id == id) return Vector3d(l.p_m);
+  TEST_FAIL_MESSAGE("a landmark that isn't there was seen");
+  return {};
+}
+
+// Mean and variance of what is added.
+struct Sum {
+  double n = 0, sum = 0, squares = 0;
+  void add(double v) { n++, sum += v, squares += v * v; }
+  double mean() const { return sum / n; }
+  double rms() const { return std::sqrt(squares / n); }
+};
+
+void check_rms(double wanted, const Sum &s) {
+  TEST_ASSERT_TRUE(s.n > 200);
+  TEST_ASSERT_DOUBLE_WITHIN(4 / std::sqrt(2 * s.n), 1, s.rms() / wanted);
+  TEST_ASSERT_DOUBLE_WITHIN(4 * wanted / std::sqrt(s.n), 0, s.mean());
+}
+void check_share(double wanted, double part, double all) {
+  TEST_ASSERT_DOUBLE_WITHIN(4 * std::sqrt(wanted * (1 - wanted) / all), wanted, part / all);
+}
+
+void test_markers_have_their_noise() {
+  load("loops-markers");
+  scenario.sensors[0].outlier_fraction = 0.03;
+  Sum distance, direction, heading, height;
+  double outliers = 0, all = 0;
+  for (uint64_t seed = 1; seed <= 5; seed++) {
+    make(seed);
+    TEST_ASSERT_EQUAL(30, made.landmarks.size());
+    TEST_ASSERT_EQUAL(0, made.map.size());
+    for (const MarkerSeen &m : made.markers) {
+      all++;
+      outliers += m.outlier;
+      TEST_ASSERT_EQUAL_INT64(60000000, m.arrival_ns - m.t_ns);
+      if (m.outlier) continue;
+      const State at = made.drive.at(since_start(m.t_ns));
+      const Vector3d p =
+          Eigen::AngleAxisd(-at.heading_rad, Vector3d::UnitZ()) * (place(m.id) - Vector3d(at.x_m, at.y_m, 0)) -
+          Vector3d(0.06, 0, 0.34);
+      distance.add(std::hypot(m.p_m[0], m.p_m[1]) - std::hypot(p.x(), p.y()));
+      direction.add(wrap(std::atan2(m.p_m[1], m.p_m[0]) - std::atan2(p.y(), p.x())));
+      height.add(m.p_m[2] - p.z());
+      for (const wm_landmark &l : made.landmarks)
+        if (l.id == m.id) heading.add(wrap(m.yaw_rad - l.yaw_rad + at.heading_rad));
+      TEST_ASSERT_TRUE(std::hypot(p.x(), p.y()) <= 2);
+    }
+  }
+  check_rms(0.01, distance);
+  check_rms(0.5 * kDegree, direction);
+  check_rms(1 * kDegree, heading);
+  check_rms(0.01, height);
+  check_share(0.03, outliers, all);
+}
+
+void test_stereo_pixels_have_their_noise() {
+  load("seabed-slam");
+  scenario.sensors[0].one_side_fraction = 0.04;
+  Sum noise[4];
+  double outliers = 0, all = 0, one_side = 0;
+  make(3);
+  std::map<wm_time_ns, int> both;
+  for (const StereoSeen &s : made.stereo) {
+    const Eigen::Isometry3d T = true_pose(made, since_start(s.t_ns));
+    const double rpy[3] = {0, 48 * kDegree, 0}, xyz[3] = {0.4, 0.15, -0.1};
+    const Vector3d p = (T * pose_of(xyz, rpy)).inverse() * place(s.id);
+    const double u = 321 - 420 * p.y() / p.x(), v = 238.5 - 420 * p.z() / p.x(), right = u - 420 * 0.3 / p.x();
+    const bool l = !std::isnan(s.left_px[0]), r = !std::isnan(s.right_px[0]);
+    TEST_ASSERT_TRUE(l || r);
+    if (u < 639.5 && right > -0.5) {
+      all++;
+      outliers += s.outlier;
+      one_side += !l || !r;
+    }
+    both[s.t_ns] += l && r;
+    if (s.outlier) continue;
+    if (l) noise[0].add(s.left_px[0] - u), noise[1].add(s.left_px[1] - v);
+    if (r) noise[2].add(s.right_px[0] - right), noise[3].add(s.right_px[1] - v);
+  }
+  for (const Sum &n : noise) check_rms(0.5, n);
+  check_share(0.01, outliers, all);
+  check_share(0.04, one_side, all);
+  double sum = 0;
+  for (const auto &step : both) sum += step.second;
+  // 30, less 5 % that are missed and 4 % that one side has.
+  TEST_ASSERT_DOUBLE_WITHIN(1.5, 30 * 0.95 * 0.96, sum / static_cast<double>(both.size()));
+}
+
+void test_fifteen_points_are_seen_well_enough() {
+  load("seabed-points");
+  double few = 0, steps = 0;
+  Sum start;
+  double farthest = 0;
+  for (uint64_t seed = 1; seed <= 40; seed++) {
+    make(seed);
+    std::map<wm_time_ns, int> both;
+    for (const StereoSeen &s : made.stereo) both[s.t_ns] += !std::isnan(s.left_px[0]) && !std::isnan(s.right_px[0]);
+    for (const auto &step : both) few += step.second < 3, steps++;
+    const Vector3d away = Vector3d(made.start.p_m) - Vector3d(made.truth6[0].xyz_m);
+    for (int i = 0; i < 3; i++) start.add(away[i]);
+    farthest = std::max(farthest, away.norm());
+    TEST_ASSERT_TRUE(away.norm() <= 20);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 20 / std::sqrt(5.0), made.start.sigma_xy_m);
+  }
+  TEST_ASSERT_TRUE(few / steps < 0.05);
+  TEST_ASSERT_TRUE(farthest > 17);
+  TEST_ASSERT_DOUBLE_WITHIN(0.2, 1, start.rms() / (20 / std::sqrt(5.0)));
+}
+
+// Ranges with echoes, depth, compass: through files and the reader.
+void test_instruments_under_water() {
+  load("seabed-acoustic");
+  const std::string folder = "simulate_features." + std::to_string(getpid());
+  Sum range, depth, compass, deviation;
+  double echoes = 0, ranges = 0;
+  for (uint64_t seed = 1; seed <= 20; seed++) {
+    wm_error err{};
+    make(seed);
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, write_recording(scenario, made, folder, &err), err.text);
+    wm_recording *opened = nullptr;
+    TEST_ASSERT_EQUAL_MESSAGE(
+        WM_OK,
+        wm_recording_open(
+            folder.c_str(), nullptr, [](void *, const char *text) { TEST_FAIL_MESSAGE(text); }, nullptr, &opened, &err),
+        err.text);
+    size_t count = 0, seen = 0;
+    Sum north;
+    wm_source *const *sources = wm_recording_sources(opened, &count);
+    for (size_t i = 0; i < count; i++) {
+      wm_event e{};
+      while (sources[i]->ops->next(sources[i], &e, &err) == WM_OK) {
+        const Eigen::Isometry3d T = true_pose(made, since_start(e.t_ns));
+        if (e.kind == WM_EVENT_POSITION) {
+          TEST_ASSERT_EQUAL_DOUBLE(1e6, e.as.position.sigma_xy_m);
+          TEST_ASSERT_EQUAL_DOUBLE(0.02, e.as.position.sigma_z_m);
+          depth.add(e.as.position.p_m[2] - T.translation().z());
+        } else if (e.kind == WM_EVENT_SIGHTING && e.as.sighting.landmark_id == kNorthId) {
+          const Vector3d n = T.linear().transpose() * Vector3d::UnitY();
+          north.add(wrap(e.as.sighting.bearing_rad - std::atan2(n.y(), n.x())));
+        } else if (e.kind == WM_EVENT_SIGHTING) {
+          TEST_ASSERT_TRUE(std::isnan(e.as.sighting.bearing_rad));
+          const double off =
+              e.as.sighting.range_m - (place(e.as.sighting.landmark_id) - T * Vector3d(0, 0, 0.2)).norm();
+          ranges++;
+          if (std::fabs(off) > 0.3) {
+            echoes++;
+            TEST_ASSERT_TRUE(off > 0 && off < 5);
+          } else if (std::fabs(off) < 0.2) {
+            range.add(off);
+          }
+        }
+        seen++;
+      }
+      TEST_ASSERT_EQUAL_MESSAGE(0, sources[i]->counts.malformed, sources[i]->counts.first_problem);
+    }
+    TEST_ASSERT_EQUAL(made.motion6.size() + made.sightings.size() + made.stereo.size() + made.fixes.size(), seen);
+    wm_recording_close(opened);
+    compass.add(std::sqrt(north.squares / north.n - north.mean() * north.mean()));
+    deviation.add(north.mean());
+  }
+  std::filesystem::remove_all(folder);
+  TEST_ASSERT_DOUBLE_WITHIN(0.003, 0.05, range.rms());  // cut at 4 sigma, with a few small echoes
+  check_share(0.2 * 4.7 / 5, echoes, ranges);
+  check_rms(0.02, depth);
+  TEST_ASSERT_DOUBLE_WITHIN(0.03, 1, compass.mean() / (1 * kDegree));
+  TEST_ASSERT_DOUBLE_WITHIN(0.45, 1, deviation.rms() / (0.5 * kDegree));
+}
+
+void test_gnss_wanders_and_jumps() {
+  load("loops-lines");
+  Sensor gnss;
+  gnss.kind = Sensor::Kind::gnss;
+  gnss.name = "gnss";
+  gnss.rate_hz = 5;
+  gnss.sigma_xy_m = 0.5;
+  gnss.sigma_z_m = 1;
+  gnss.wander_m = 2;
+  gnss.wander_s = 10;
+  gnss.outlier_fraction = 0.02;
+  gnss.outlier_m = 30;
+  scenario.sensors.push_back(gnss);
+  Sum whole, step;
+  double outliers = 0;
+  for (uint64_t seed = 1; seed <= 60; seed++) {
+    make(seed);
+    double last = NAN;
+    for (const Fix &f : made.fixes) {
+      outliers += f.outlier;
+      const double e = f.p_m[0] - made.drive.at(since_start(f.t_ns)).x_m;
+      if (f.outlier) continue;
+      whole.add(e);
+      if (!std::isnan(last)) step.add(e - last);
+      last = e;
+    }
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(0.1, 1, whole.rms() / std::sqrt(0.5 * 0.5 + 2 * 2));
+  // From one to the next: two draws of noise, and what wandered in 0.2 s of 10 s.
+  TEST_ASSERT_DOUBLE_WITHIN(0.05, 1, step.rms() / std::sqrt(2 * 0.25 + 2 * 4 * (1 - std::exp(-0.02))));
+  check_share(0.02, outliers, whole.n + outliers);
+}
+
+void test_perfect_is_perfect() {
+  load("seabed-acoustic");
+  make_perfect(scenario);
+  make(2);
+  for (const Fix &f : made.fixes)
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, true_pose(made, since_start(f.t_ns)).translation().z(), f.p_m[2]);
+  for (const StereoSeen &s : made.stereo)
+    if (!std::isnan(s.left_px[0]) && !std::isnan(s.right_px[0]))
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9, s.left_px[1], s.right_px[1]);
+  for (size_t i = 0; i + 1 < made.map.size(); i++)
+    TEST_ASSERT_EQUAL_DOUBLE(made.landmarks[i].p_m[2], made.map[i].p_m[2]);
+}
+
+void test_a_landmark_less_changes_nothing_of_the_others() {
+  load("loops-lines");
+  wm_error err{};
+  Recording all, ten;
+  TEST_ASSERT_EQUAL(WM_OK, simulate(scenario, 4, SIZE_MAX, all, &err));
+  TEST_ASSERT_EQUAL(WM_OK, simulate(scenario, 4, 10, ten, &err));
+  size_t next = 0;
+  for (const Sighting &s : all.sightings) {
+    if (s.id > 10) continue;
+    TEST_ASSERT_TRUE(next < ten.sightings.size());
+    TEST_ASSERT_EQUAL_DOUBLE(s.bearing_rad, ten.sightings[next++].bearing_rad);
+  }
+  TEST_ASSERT_EQUAL(ten.sightings.size(), next);
+}
+
+void refuse(const char *extra, const char *wanted) {
+  const std::string text = std::string(
+                               "format: waymark-scenario/1\nname: x\nworld: {}\npath: {rounds: {duration_s: 20}}\n"
+                               "sensors:\n  - ") +
+                           extra + "\n";
+  wm_error err{};
+  Scenario out;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_BAD_CONFIG, parse_scenario(text, "x.yaml", out, &err), extra);
+  TEST_ASSERT_EQUAL_STRING(wanted, err.text);
+}
+
+void test_mistakes_are_told() {
+  refuse("{kind: landmarks}",
+         "x.yaml:6: sensors[0]: bearing_sigma_deg, range_sigma_m or both say what this sensor measures");
+  refuse("{kind: landmarks, bearing_sigma_deg: 1, sigma_px: 1}",
+         "x.yaml:6: sensors[0].sigma_px: only a sensor of kind stereo has this");
+  refuse("{kind: stereo}", "x.yaml:6: sensors[0]: `sigma_px` is missing here");
+  refuse("{kind: markers, bearing_sigma_deg: 1, range_sigma_m: 0.1, heading_sigma_deg: 1}",
+         "x.yaml:6: sensors[0]: markers.csv is for robots on wheels");
+  refuse("{kind: depth, sigma_z_m: 0.1}\n  - {kind: depth, sigma_z_m: 0.1}",
+         "x.yaml:7: sensors[1]: the name 'depth' is there already; give this sensor a `name` of its own");
+  refuse("{kind: landmarks, bearing_sigma_deg: 1, ids: [9, 3]}",
+         "x.yaml:6: sensors[0].ids: two numbers from 0 to 2.14748e+09, the smaller one first");
+}
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_markers_have_their_noise);
+  RUN_TEST(test_stereo_pixels_have_their_noise);
+  RUN_TEST(test_fifteen_points_are_seen_well_enough);
+  RUN_TEST(test_instruments_under_water);
+  RUN_TEST(test_gnss_wanders_and_jumps);
+  RUN_TEST(test_perfect_is_perfect);
+  RUN_TEST(test_a_landmark_less_changes_nothing_of_the_others);
+  RUN_TEST(test_mistakes_are_told);
+  return UNITY_END();
+}
