@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// waymark eval: a run's poses against truth.
+// waymark eval: a run's poses against truth, or its detections against labels.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
@@ -7,6 +7,8 @@
 #include "common/failure.h"
 #include "common/recording_folder.h"
 #include "eval/compare.h"
+#include "eval/detector.h"
+#include "eval/detector_command.h"
 #include "eval/figures.h"
 #include "eval/print.h"
 
@@ -16,7 +18,8 @@ using namespace wm::tools;
 namespace fs = std::filesystem;
 
 struct Arguments {
-  std::string run, recording, align = "none", against = "truth";
+  std::string run, recording, align = "none", against = "truth", detector, camera;
+  std::vector<double> view_m;
   bool json = false, published = false;
   CompareOptions compare;
 };
@@ -35,8 +38,18 @@ void parse(CLI::App *app, Arguments *a) {
       ->capture_default_str();
   app->add_option("--from", a->compare.from_s, "judge from this many seconds after the run's first pose");
   app->add_option("--to", a->compare.to_s, "judge up to this many seconds after the run's first pose");
+  app->add_option("--detector", a->detector, "judge what a detector saw (RUN/detections) by the recording's labels")
+      ->check(CLI::IsMember({"edges"}));
+  app->add_option("--camera", a->camera, "--detector: of this camera; needed where there are several");
+  app->add_option("--view", a->view_m,
+                  "--detector: the floor that it looks at, x from, x to, y from, y to in base_link, m: true edges "
+                  "outside are left out")
+      ->delimiter(',')
+      ->expected(4);
   app->footer(
-      "example: waymark eval runs/plan recordings/plan --from 60 --json\n"
+      "examples:\n"
+      "  waymark eval runs/plan recordings/plan --from 60 --json\n"
+      "  waymark eval runs/corridor recordings/corridor --detector edges --view 1.3,6,-3,3\n"
       "docs/eval.md defines each figure. Exit code: 0 done, 1 nothing to judge, 2 usage.");
 }
 
@@ -84,6 +97,12 @@ int main(int argc, char **argv) {
     app.parse(argc, argv);
     if (arguments.compare.from_s && arguments.compare.to_s && *arguments.compare.from_s >= *arguments.compare.to_s)
       throw Failure("--from must be before --to", kUsage);
+    if (!arguments.detector.empty()) {
+      const DetectorArguments detector{arguments.run, arguments.recording, arguments.camera, arguments.view_m};
+      const Figures figures = evaluate_detector(detector);
+      std::fputs((arguments.json ? figures.dump(1) + "\n" : detector_table(figures, arguments.run)).c_str(), stdout);
+      return kDone;
+    }
     const Figures figures = evaluate(arguments);
     const std::string title = arguments.run + (arguments.published ? " (published)" : "");
     const std::string text = arguments.json ? figures.dump(1) + "\n" : figures_table(figures, title, arguments.against);

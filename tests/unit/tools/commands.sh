@@ -34,7 +34,7 @@ mkdir "$dir/rec" "$dir/run" "$dir/empty"
 expect 0 '"position_max_m": 0.1,' "$bin/waymark-eval" "$dir/run" "$dir/rec" --json
 expect 0 '"landmark_rmse_m": null' "$bin/waymark-eval" "$dir/run" "$dir/rec" --json
 expect 0 'position m' "$bin/waymark-eval" "$dir/run" "$dir/rec"
-expect 0 'example: waymark eval' "$bin/waymark-eval" --help
+expect 0 'waymark eval runs/corridor' "$bin/waymark-eval" --help
 expect 2 'REC is required' "$bin/waymark-eval" "$dir/run"
 expect 2 'se4' "$bin/waymark-eval" "$dir/run" "$dir/rec" --align se4
 expect 2 '--from must be before --to' "$bin/waymark-eval" "$dir/run" "$dir/rec" --from 3 --to 2
@@ -45,6 +45,19 @@ expect 1 'gnss.csv: can' "$bin/waymark-eval" "$dir/run" "$dir/rec" --against gns
 expect 1 'published.csv: can' "$bin/waymark-eval" "$dir/run" "$dir/rec" --published
 expect 1 'nothing to compare' "$bin/waymark-eval" "$dir/run" "$dir/rec" --from 50
 expect 1 'all at one place' "$bin/waymark-eval" "$dir/run" "$dir/rec" --align se2 --from 0.85
+# A detector against labels: a straight edge on the floor, found half.
+mkdir -p "$dir/rec/labels" "$dir/run/detections"
+printf 'frame,polyline,u_px,v_px\n0,0,400,500\n0,0,800,500\n' >"$dir/rec/labels/edges.csv"
+expect 1 'has no cameras' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges
+printf 'cameras:\n  front: {model: equidistant, size: [1280, 720], intrinsics: [520, 520, 640, 360], distortion: [0, 0, 0, 0], mounting: {xyz_m: [1, 0, 0.4], rpy_deg: [0, 22, 0]}}\n' >"$dir/rec/calibration.yaml"
+expect 1 'front-edges.csv: is not there' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges
+printf 'frame,polyline,u_px,v_px\n0,0,400,505\n0,0,600,505\n' >"$dir/run/detections/front-edges.csv"
+expect 0 '"length_precision": 1.0' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges --json
+expect 0 '"left_out_of_view": 1' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges --json --view 3,6,-3,3
+expect 0 'precision 100.0 %' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges
+expect 2 "no camera 'back'; it has front" "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges --camera back
+expect 2 'lines' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector lines
+expect 1 'labels/edges.csv: is not there' "$bin/waymark-eval" "$dir/run" "$dir/empty" --detector edges
 printf 't_ns,x_m,y_m,z_m,sigma_xy_m,sigma_z_m\n100000000,0.1,0.4,,2,\n' >"$dir/rec/gnss.csv"
 expect 0 '"nees_mean": null' "$bin/waymark-eval" "$dir/run" "$dir/rec" --against gnss --json
 expect 0 '"lost_count": null' "$bin/waymark-eval" "$dir/run" "$dir/rec" --against gnss --json
