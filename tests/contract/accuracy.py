@@ -176,8 +176,16 @@ def comma():
                 run(folder, "comma2k19", "--from", "20")["position_rmse_m"] / settled, most=1.15)
 
 
+def stereo():
+    recording = DATA / "starry-night-stereo-a"
+    plain = run(recording, "starry-night-stereo")
+    bar("starry-night-stereo: position RMSE", plain["position_rmse_m"], most=0.031)
+    bar("starry-night-stereo: rotation RMSE", plain["rotation_rmse_deg"], most=3.8)
+    bar("starry-night-stereo: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
+
+
 def main():
-    names = ["starry-night-plan-a", "comma2k19-a", *(f"mrclam-d6-r{i}" for i in range(1, 6))]
+    names = ["starry-night-plan-a", "starry-night-stereo-a", "comma2k19-a", *(f"mrclam-d6-r{i}" for i in range(1, 6))]
     missing = [n for n in names if not (DATA / n).is_dir()]
     if missing:
         print(f"skipped: no recording {missing[0]} in {DATA}")
@@ -185,6 +193,7 @@ def main():
     starry()
     mrclam()
     comma()
+    stereo()
     print(f"{len(failures)} bars missed")
     return 1 if failures else 0
 

@@ -337,7 +337,8 @@ void setUp(void) {
   const char *sigmas[] = {"states.speed_scale_sigma",         "states.yaw_rate_scale_sigma",
                           "states.yaw_rate_bias_sigma_radps", "states.lag_sigma_s",
                           "states.sensor_yaw_sigma_rad",      "states.sensor_time_offset_sigma_s",
-                          "states.range_bias_sigma_m",        "lasting.gnss_m"};
+                          "states.range_bias_sigma_m",        "lasting.gnss_m",
+                          "states.rate_bias_sigma_radps",     "states.velocity_scale_sigma"};
   for (const char *key : sigmas) set_param(estimator->params, params, key, 0.1);
   sensor = {};
   std::strcpy(sensor.name, "eye");

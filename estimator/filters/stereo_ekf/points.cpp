@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+// Points found on the way: added, kept while they help, removed.
+#include <cstring>
+#include <limits>
+
+#include "filters/stereo_ekf/stereo_ekf.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kInside_px = 8.0;  // so far from the picture's edge a point is expected to be seen
+
+}  // namespace
+
+int stereo_ekf::find_slot(int32_t id) const {
+  const int count = filter_.point_count();
+  for (int i = 0; i < count; i++)
+    if (info()[i].id == id) return i;
+  return -1;
+}
+
+void stereo_ekf::begin_picture(wm_time_ns t_ns) { picture_ns_ = t_ns; }
+
+// Paper, system 3: a point that is out of view goes, one that is expected and not seen is kept unused for some steps.
+// Here one that is out of view is kept for a while, too: the vehicle may come back.
+void stereo_ekf::end_picture() {
+  if (picture_ns_ == WM_TIME_NONE) return;
+  filter_.settle();
+  if (filter_.point_count() > 0) {
+    const past_pose past = look_back(filter_.head1(kTimeOffset, 0.0));
+    const mat3 B = rig_.R_base_optical * matrix_of(turn_by(filter_.head3(kCameraRotation)));
+    const vec3 eye = rig_.place + filter_.head3(kCameraPlace);
+    for (int slot = filter_.point_count() - 1; slot >= 0; slot--) {
+      point_info &point = info()[slot];
+      if (point.seen_ns == picture_ns_) continue;
+      const vec3 x = transposed_times(B, transposed_times(past.R, filter_.point(slot) - past.at.p) - eye);
+      if (rig_.in_view(x, kInside_px)) {
+        if (++point.unseen > params_.keep_unseen_steps) remove_point(slot);
+      } else if (wm_seconds_between(point.seen_ns, picture_ns_) > params_.keep_outside_s) {
+        remove_point(slot);
+      }
+    }
+  }
+  picture_ns_ = WM_TIME_NONE;
+}
+
+void stereo_ekf::remove_point(int slot) {
+  const int last = filter_.point_count() - 1;
+  filter_.remove_point(slot);
+  info()[slot] = info()[last];
+}
+
+// The one that was not seen for longest leaves; none of those that the running picture shows.
+bool stereo_ekf::make_room() {
+  int oldest = -1;
+  for (int i = 0; i < filter_.point_count(); i++)
+    if (info()[i].seen_ns != picture_ns_ && (oldest < 0 || info()[i].seen_ns < info()[oldest].seen_ns)) oldest = i;
+  if (oldest < 0) return false;
+  remove_point(oldest);
+  return true;
+}
+
+void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, record_list records) {
+  wm_innovation record = blank;
+  const double px[4] = {seen.left_px[0], seen.left_px[1], seen.right_px[0], seen.right_px[1]};
+  vec3 x;
+  double by[3][4];
+  if (std::isnan(px[0]) || std::isnan(px[2]) || !rig_.triangulate(px, params_.disparity_min_px, &x, by)) {
+    record.verdict = WM_REJECTED_UNKNOWN_ID;
+    records.add(record);
+    return;
+  }
+  // Left and right of a rectified pair lie in one row: what doesn't is a wrong match.
+  const double row_variance = square(sigma_px_[1]) + square(sigma_px_[3]);
+  record.observed = px[1] - px[3];
+  record.variance = row_variance;
+  record.nis = square(record.observed) / row_variance;
+  record.gate = params_.gate_soft;
+  if (record.nis > params_.gate_soft) {
+    record.verdict = WM_REJECTED_GATE;
+    records.add(record);
+    return;
+  }
+  if (filter_.point_count() == filter_.point_capacity() && !make_room()) {
+    record.verdict = WM_REJECTED_NO_ASSOCIATION;
+    records.add(record);
+    return;
+  }
+  mat3 noise;
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) {
+      noise.m[i][j] = 0.0;
+      for (int k = 0; k < 4; k++) noise.m[i][j] += by[i][k] * by[j][k] * square(sigma_px_[k]);
+    }
+  const past_pose past = look_back(filter_.head1(kTimeOffset, 0.0));
+  const mat3 B = rig_.R_base_optical * matrix_of(turn_by(filter_.head3(kCameraRotation)));
+  const vec3 place = past.at.p + past.R * (rig_.place + filter_.head3(kCameraPlace) + B * x);
+  const point_view view = view_point(place, past);
+  const int slot = filter_.point_count();
+  filter_.add_point(place, view.by, view.A, noise);
+  info()[slot] = {picture_ns_, seen.id, 0};
+  record.verdict = WM_FUSED;
+  records.add(record);
+}
+
+size_t stereo_ekf::list_points(wm_landmark *out, double (*cov_xy)[3], size_t capacity) const {
+  const auto count = (size_t)filter_.point_count();
+  for (size_t i = 0; i < count && i < capacity; i++) {
+    const int state = filter_.point_state((int)i);
+    const vec3 place = filter_.point((int)i) + filter_.pending(state);
+    std::memset(&out[i], 0, sizeof out[i]);
+    out[i].id = info()[i].id;
+    for (int k = 0; k < 3; k++) out[i].p_m[k] = place[k];
+    out[i].sigma_m =
+        std::sqrt((filter_.variance(state) + filter_.variance(state + 1) + filter_.variance(state + 2)) / 3.0);
+    out[i].yaw_rad = std::numeric_limits<double>::quiet_NaN();
+    if (!cov_xy) continue;
+    cov_xy[i][0] = filter_.covariance(state, state);
+    cov_xy[i][1] = filter_.covariance(state, state + 1);
+    cov_xy[i][2] = filter_.covariance(state + 1, state + 1);
+  }
+  return count;
+}
+
+}  // namespace wm

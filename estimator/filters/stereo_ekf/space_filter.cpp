@@ -1,0 +1,426 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/stereo_ekf/space_filter.hpp"
+
+#include <cstring>
+
+namespace wm {
+namespace {
+
+int head_size(const head_model models[kHeadStates]) {
+  int n = kPose6;
+  for (int k = 0; k < kHeadStates; k++)
+    if (models[k].sigma > 0.0) n += kHeadWidth[k];
+  return n;
+}
+
+constexpr double kNeutral[kHeadStates] = {0, 0, 0, 1, 0, 0, 0, 0, 0, 0};
+
+void add_block(double out[kPose6][3], int row, const mat3 &m) {
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) out[row + i][j] += m.m[i][j];
+}
+
+}  // namespace
+
+size_t space_filter::tail_bytes(const head_model models[kHeadStates], int points_max) {
+  const auto stride = (size_t)even(head_size(models) + 3 * points_max);
+  return (kRowsBefore + 1 + stride) * stride * sizeof(double);
+}
+
+void space_filter::init(size_t tail, const head_model models[kHeadStates], int points_max) {
+  tail_ = tail;
+  std::memcpy(models_, models, sizeof models_);
+  points_max_ = points_max;
+  n_ = first_point_ = head_size(models);
+  stride_ = even(n_ + 3 * points_max);
+  std::memset(this->tail(), 0, tail_bytes(models, points_max));
+  int state = kPose6;
+  for (int k = 0; k < kHeadStates; k++) {
+    at_[k] = models[k].sigma > 0.0 ? state : -1;
+    if (at_[k] >= 0) state += kHeadWidth[k];
+  }
+  pose_ = {{0, 0, 0}, kNoTurn};
+  r_ = kIdentity3;
+  pending_ = false;
+  std::memset(head_, 0, sizeof head_);
+  restart_head();
+}
+
+void space_filter::restart_head() {
+  for (int k = 0; k < kHeadStates; k++) {
+    if (at_[k] < 0) continue;
+    forget(at_[k], kHeadWidth[k], square(models_[k].sigma));
+    for (int i = 0; i < kHeadWidth[k]; i++) head_[at_[k] + i] = kNeutral[k];
+  }
+}
+
+vec3 space_filter::head3(int which) const { return at_[which] < 0 ? vec3{0, 0, 0} : vec_of(head_ + at_[which]); }
+
+double space_filter::head1(int which, double off) const { return at_[which] < 0 ? off : head_[at_[which]]; }
+
+void space_filter::forget(int state, int width, double variance) {
+  for (int i = state; i < state + width; i++) {
+    for (int j = 0; j < i; j++) p()[j * stride_ + i] = 0.0;
+    for (int j = i; j < stride_; j++) p()[i * stride_ + j] = 0.0;
+    p()[i * stride_ + i] = variance;
+    correction()[i] = 0.0;
+  }
+}
+
+// dp' = dp - D x dr + ..., dr' = dr + ..., D the way moved in map axes: the invariant error stays as it is under
+// motion, but for its noise and for what the sensors' states add. Rates that are wrong by b while turning evenly turn
+// the end by b dt and swing the way by half of that.
+void space_filter::propagate(const body_stretch &s) {
+  settle();
+  const double dt = s.dt_s;
+  if (!(dt > 0.0)) return;
+  const bool has_rates = at_[kRates] >= 0;
+  const double scale = head1(kVelocityScale, 1.0);
+  const vec3 v = has_rates ? head3(kVelocity) : scale * s.v_mps;
+  const vec3 w = has_rates ? head3(kRates) : s.w_radps - head3(kRateBias);
+  const mat3 mean = r_ * mean_turn(dt * w);
+  const vec3 way = dt * (mean * v);
+  const mat3 swing = skew(way);
+
+  // F's rows of the pose: their columns beside the identity.
+  struct column_block {
+    int state, width;
+    double by[kPose6][3];
+  };
+  column_block blocks[4];
+  int count = 0;
+  const auto add = [&](int state, int width) -> column_block & {
+    column_block &b = blocks[count++];
+    std::memset(&b, 0, sizeof b);
+    b.state = state;
+    b.width = width;
+    return b;
+  };
+  add_block(add(kTurn, 3).by, kPlace, -1.0 * swing);
+  const auto add_turning = [&](int state, double sign) {
+    const mat3 turn = (sign * dt) * mean;
+    column_block &b = add(state, 3);
+    add_block(b.by, kTurn, turn);
+    add_block(b.by, kPlace, -0.5 * (swing * turn));
+  };
+  if (has_rates) {
+    add_block(add(at_[kVelocity], 3).by, kPlace, dt * mean);
+    add_turning(at_[kRates], 1.0);
+  } else {
+    if (at_[kRateBias] >= 0) add_turning(at_[kRateBias], -1.0);
+    if (at_[kVelocityScale] >= 0) {
+      const vec3 by = dt * (mean * s.v_mps);
+      column_block &b = add(at_[kVelocityScale], 1);
+      for (int i = 0; i < 3; i++) b.by[kPlace + i][0] = by[i];
+    }
+  }
+
+  // P' = F P F'. Below, `head` is what F moves and what it moves by; columns of all other states follow F's rows.
+  double *P = p();
+  const int head = first_point_;
+  double old_rows[kPose6][kHeadMax], new_rows[kPose6][kHeadMax];
+  for (int i = 0; i < kPose6; i++)
+    for (int j = 0; j < head; j++) old_rows[i][j] = entry(P, i, j, stride_);
+  for (int i = 0; i < kPose6; i++)
+    for (int j = 0; j < head; j++) {
+      double sum = old_rows[i][j];
+      for (int b = 0; b < count; b++)
+        for (int k = 0; k < blocks[b].width; k++) {
+          const int from = blocks[b].state + k;
+          sum += blocks[b].by[i][k] * (from < kPose6 ? old_rows[from][j] : entry(P, from, j, stride_));
+        }
+      new_rows[i][j] = sum;
+    }
+  for (int i = 0; i < kPose6; i++)
+    for (int j = i; j < kPose6; j++) {
+      double sum = new_rows[i][j];
+      for (int b = 0; b < count; b++)
+        for (int k = 0; k < blocks[b].width; k++) sum += blocks[b].by[j][k] * new_rows[i][blocks[b].state + k];
+      P[i * stride_ + j] = sum;
+    }
+  for (int i = 0; i < kPose6; i++)
+    for (int j = kPose6; j < head; j++) P[i * stride_ + j] = new_rows[i][j];
+  // Points: rows of the place first, as those of the rotation are still the old ones then.
+  if (n_ > head) {
+    const int from = head & ~1, width = even(n_) - from;
+    double keep[kPose6] = {};  // where the head's size is odd its last column comes along; it is done already
+    for (int i = 0; i < kPose6; i++) keep[i] = P[i * stride_ + from];
+    for (int i = 0; i < kPose6; i++)
+      for (int b = 0; b < count; b++)
+        for (int k = 0; k < blocks[b].width; k++)
+          if (blocks[b].by[i][k] != 0.0)
+            vectors::add_scaled(P + i * stride_ + from, P + (blocks[b].state + k) * stride_ + from, blocks[b].by[i][k],
+                                width);
+    if (from < head)
+      for (int i = 0; i < kPose6; i++) P[i * stride_ + from] = keep[i];
+  }
+
+  // Noise: white along the stretch, so that a turn made evenly on the way swings what is left of it.
+  mat3 place_noise, turn_noise;
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) {
+      place_noise.m[i][j] = turn_noise.m[i][j] = 0.0;
+      for (int k = 0; k < 3; k++) {
+        place_noise.m[i][j] += mean.m[i][k] * mean.m[j][k] * s.place_m2[k];
+        turn_noise.m[i][j] += mean.m[i][k] * mean.m[j][k] * s.turn_rad2[k];
+      }
+    }
+  const mat3 cross_noise = -0.5 * (swing * turn_noise);
+  const mat3 lever_noise = (1.0 / 3) * (swing * (turn_noise * transposed(swing)));
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) {
+      if (i <= j) P[i * stride_ + j] += place_noise.m[i][j] + lever_noise.m[i][j];
+      if (i <= j) P[(kTurn + i) * stride_ + kTurn + j] += turn_noise.m[i][j];
+      P[i * stride_ + kTurn + j] += cross_noise.m[i][j];
+    }
+  walk(dt);
+  if (has_rates) {
+    walk_through(kVelocity, kPlace, dt, mean);
+    walk_through(kRates, kTurn, dt, mean);
+  }
+
+  pose_.p = pose_.p + way;
+  pose_.q = normalized(pose_.q * turn_by(dt * w));
+  r_ = matrix_of(pose_.q);
+}
+
+// What a rate walks by on the way is in the pose, too: q dt^2/2 with the rate, q dt^3/3 on its own.
+void space_filter::walk_through(int which, int into, double dt_s, const mat3 &mean) {
+  const head_model &m = models_[which];
+  const double q = m.tau_s > 0.0 ? 2.0 * square(m.sigma) / m.tau_s : square(m.walk);
+  double *P = p();
+  for (int i = 0; i < 3; i++) {
+    P[(into + i) * stride_ + into + i] += q * dt_s * dt_s * dt_s / 3.0;
+    for (int j = 0; j < 3; j++) P[(into + i) * stride_ + at_[which] + j] += 0.5 * q * dt_s * dt_s * mean.m[i][j];
+  }
+}
+
+void space_filter::walk(double dt_s) {
+  double *P = p();
+  for (int k = 0; k < kHeadStates; k++) {
+    if (at_[k] < 0) continue;
+    const bool fades = models_[k].tau_s > 0.0;
+    const double left = fades ? exp(-dt_s / models_[k].tau_s) : 1.0;
+    const double added = fades ? (1.0 - left * left) * square(models_[k].sigma) : square(models_[k].walk) * dt_s;
+    for (int i = at_[k]; i < at_[k] + kHeadWidth[k]; i++) {
+      if (fades) {
+        for (int j = 0; j < i; j++) P[j * stride_ + i] *= left;
+        P[i * stride_ + i] *= left * left;
+        for (int j = i + 1; j < n_; j++) P[i * stride_ + j] *= left;
+        head_[i] = kNeutral[k] + left * (head_[i] - kNeutral[k]);
+      }
+      P[i * stride_ + i] += added;
+    }
+  }
+}
+
+// gains = P H'. Rows that are not there are zero.
+void space_filter::project(const row_block &block) {
+  const int width = even(n_);
+  double *column = scratch();
+  for (int k = 0; k < kRank; k++) std::memset(gains() + k * stride_, 0, (size_t)width * sizeof(double));
+  for (int c = 0; c < block.columns; c++) {
+    copy_column(p(), block.index[c], column, n_, stride_);
+    if (width > n_) column[n_] = 0.0;
+    for (int k = 0; k < block.rows; k++)
+      if (block.by[k][c] != 0.0) vectors::add_scaled(gains() + k * stride_, column, block.by[k][c], width);
+  }
+}
+
+row_verdict space_filter::fuse(const row_block &block, const gates &limits) {
+  row_verdict out{};
+  project(block);
+  const int rows = block.rows;
+  double factor[kRank][kRank] = {}, left[kRank], d[kRank];
+  for (int k = 0; k < rows; k++) {
+    const double *gain = gains() + k * stride_;
+    double expected_change = 0.0;
+    for (int c = 0; c < block.columns; c++) expected_change += block.by[k][c] * correction()[block.index[c]];
+    out.innovation[k] = block.innovation[k] - expected_change;
+    for (int l = k; l < rows; l++) {
+      double sum = 0.0;
+      for (int c = 0; c < block.columns; c++) sum += block.by[l][c] * gain[block.index[c]];
+      factor[l][k] = sum;  // the innovations' covariance without noise; its factor below
+    }
+  }
+  for (int k = 0; k < rows; k++) {
+    left[k] = out.innovation[k];
+    d[k] = factor[k][k] + block.noise[k];
+    for (int m = 0; m < k; m++) {
+      left[k] -= factor[k][m] * left[m];
+      d[k] -= square(factor[k][m]) * d[m];
+    }
+    const double nis = square(left[k]) / d[k];
+    out.variance[k] = d[k];
+    out.nis[k] = nis;
+    if (!(d[k] > 0.0) || !(nis <= limits.hard)) return out;
+    if (nis > limits.soft) {
+      out.doubtful = true;
+      d[k] += block.noise[k] * (nis / limits.soft - 1.0);
+    }
+    for (int l = k + 1; l < rows; l++) {
+      for (int m = 0; m < k; m++) factor[l][k] -= factor[l][m] * factor[k][m] * d[m];
+      factor[l][k] /= d[k];
+    }
+  }
+  const int width = even(n_);
+  for (int k = 0; k < rows; k++) {
+    double *gain = gains() + k * stride_;
+    for (int m = 0; m < k; m++)  // the earlier ones are scaled by 1 / sqrt(d) already
+      vectors::add_scaled(gain, gains() + m * stride_, -factor[k][m] * std::sqrt(d[m]), width);
+    vectors::add_scaled(correction(), gain, left[k] / d[k], width);
+    vectors::set_scaled(gain, gain, 1.0 / std::sqrt(d[k]), width);
+  }
+  vectors::subtract_gram(p(), gains(), n_, stride_);
+  pending_ = true;
+  out.fused = true;
+  return out;
+}
+
+placed space_filter::pose() const {
+  if (!pending_) return pose_;
+  const vec3 turn = pending(kTurn);
+  return {pose_.p + mean_turn(turn) * pending(kPlace), normalized(turn_by(turn) * pose_.q)};
+}
+
+// The invariant error stays while the estimate moves; in plain coordinates dp' = dp - D x dr for the pose and each
+// point, D what it was moved by. P' = M P M' with M = 1 + a e', e choosing dr: P + a b' + b a', b = P e + P_rr a / 2.
+void space_filter::settle() {
+  if (!pending_) return;
+  pending_ = false;
+  double *x = correction();
+  const vec3 turn = vec_of(x + kTurn);
+  const mat3 spread = mean_turn(turn);
+  double *a = gains(), *b = scratch();
+  const int width = even(n_);
+  std::memset(a, 0, (size_t)kTurns * (size_t)stride_ * sizeof(double));
+  const auto moved = [&](int state, const vec3 &by) {
+    const mat3 m = -1.0 * skew(by);
+    for (int i = 0; i < 3; i++)
+      for (int k = 0; k < kTurns; k++) a[k * stride_ + state + i] = m.m[i][k];
+  };
+  const vec3 place = spread * vec_of(x + kPlace);
+  pose_.p = pose_.p + place;
+  pose_.q = normalized(turn_by(turn) * pose_.q);
+  r_ = matrix_of(pose_.q);
+  moved(kPlace, place);
+  for (int i = kPose6; i < first_point_; i++) head_[i] += x[i];
+  for (int slot = 0; slot < point_count(); slot++) {
+    const int state = point_state(slot);
+    const vec3 by = spread * vec_of(x + state);
+    for (int i = 0; i < 3; i++) points()[3 * slot + i] += by[i];
+    moved(state, by);
+  }
+  double turn_block[3][3];
+  for (int k = 0; k < kTurns; k++) {
+    copy_column(p(), kTurn + k, b + k * stride_, n_, stride_);
+    if (width > n_) b[k * stride_ + n_] = 0.0;
+    for (int l = 0; l < kTurns; l++) turn_block[k][l] = entry(p(), kTurn + k, kTurn + l, stride_);
+  }
+  for (int k = 0; k < kTurns; k++)
+    for (int l = 0; l < kTurns; l++)
+      vectors::add_scaled(b + k * stride_, a + l * stride_, 0.5 * turn_block[k][l], width);
+  vectors::add_mixed(p(), a, b, n_, stride_);
+  std::memset(x, 0, (size_t)stride_ * sizeof(double));
+}
+
+void space_filter::add_point(const vec3 &place, const row_block &block, const mat3 &A, const mat3 &noise) {
+  const int state = n_, width = even(n_);
+  project(block);
+  mat3 covariance = noise;
+  vec3 change;
+  for (int k = 0; k < 3; k++) {
+    change[k] = 0.0;
+    for (int c = 0; c < block.columns; c++) change[k] += block.by[k][c] * correction()[block.index[c]];
+    for (int l = 0; l < 3; l++)
+      for (int c = 0; c < block.columns; c++)
+        covariance.m[k][l] += block.by[l][c] * gains()[k * stride_ + block.index[c]];
+  }
+  covariance = transposed(A) * (covariance * A);
+  change = -1.0 * transposed_times(A, change);
+  for (int i = 0; i < 3; i++) {
+    double *row = scratch();
+    vectors::set_scaled(row, gains(), -A.m[0][i], width);
+    vectors::add_scaled(row, gains() + stride_, -A.m[1][i], width);
+    vectors::add_scaled(row, gains() + 2 * stride_, -A.m[2][i], width);
+    for (int j = 0; j < state; j++) p()[j * stride_ + state + i] = row[j];
+    for (int j = i; j < 3; j++)
+      p()[(state + i) * stride_ + state + j] = 0.5 * (covariance.m[i][j] + covariance.m[j][i]);
+    correction()[state + i] = change[i];
+    points()[state - first_point_ + i] = place[i];
+  }
+  n_ += 3;
+  if (even(n_) > n_) correction()[n_] = 0.0;
+}
+
+void space_filter::remove_point(int slot) {
+  const int last = point_count() - 1, from = point_state(last), to = point_state(slot);
+  if (slot != last) {
+    for (int i = 0; i < 3; i++) {
+      for (int j = 0; j < from; j++) {
+        const double value = entry(p(), j, from + i, stride_);
+        if (j >= to && j < to + 3) continue;
+        if (j < to)
+          p()[j * stride_ + to + i] = value;
+        else
+          p()[(to + i) * stride_ + j] = value;
+      }
+      for (int j = i; j < 3; j++) p()[(to + i) * stride_ + to + j] = p()[(from + i) * stride_ + from + j];
+      points()[3 * slot + i] = points()[3 * last + i];
+      correction()[to + i] = correction()[from + i];
+    }
+  }
+  for (int i = 0; i < 3; i++) correction()[from + i] = 0.0;
+  n_ -= 3;
+}
+
+void space_filter::set_pose(const placed &pose, const double covariance[6][6]) {
+  settle();
+  remove_points();
+  forget(kPlace, kPose6, 0.0);
+  pose_ = {pose.p, normalized(pose.q)};
+  r_ = matrix_of(pose_.q);
+  for (int i = 0; i < kPose6; i++)
+    for (int j = i; j < kPose6; j++) p()[i * stride_ + j] = covariance[i][j];
+}
+
+void space_filter::inflate_pose(double place_m2, double turn_rad2) {
+  for (int i = 0; i < 3; i++) {
+    p()[(kPlace + i) * stride_ + kPlace + i] += place_m2;
+    p()[(kTurn + i) * stride_ + kTurn + i] += turn_rad2;
+  }
+}
+
+void space_filter::estimate(wm_estimate *out) const {
+  const placed at = pose();
+  const mat3 r = matrix_of(at.q), swing = -1.0 * skew(at.p - pose_.p), turn = transposed(r);
+  // Rows: position in map axes (moved by what is pending), rotation in the body's.
+  double m[kPose6][kPose6] = {};
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) {
+      m[i][j] = i == j;
+      m[i][kTurn + j] = swing.m[i][j];
+      m[kTurn + i][kTurn + j] = turn.m[i][j];
+    }
+  double half[kPose6][kPose6];
+  for (int i = 0; i < kPose6; i++)
+    for (int j = 0; j < kPose6; j++) {
+      half[i][j] = 0.0;
+      for (int k = 0; k < kPose6; k++) half[i][j] += m[i][k] * covariance(k, j);
+    }
+  for (int i = 0; i < kPose6; i++)
+    for (int j = i; j < kPose6; j++) {
+      double sum = 0.0;
+      for (int k = 0; k < kPose6; k++) sum += half[i][k] * m[j][k];
+      out->covariance[wm_cov_index(i, j)] = out->covariance[wm_cov_index(j, i)] = sum;
+    }
+  for (int i = 0; i < 3; i++) {
+    out->pose_map_base.p_m[i] = at.p[i];
+    out->pose_map_base.q_xyzw[i] = at.q.v[i];
+  }
+  out->pose_map_base.q_xyzw[3] = at.q.w;
+  out->heading_rad = atan2(r.m[1][0], r.m[0][0]);
+  out->dof = 6;
+}
+
+}  // namespace wm

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// The core of filters in space: pose, states of the sensors and points, with their covariance.
+//
+// Errors are in map axes: R_true = Exp(dr) R, p_true = p + dp, l_true = l + dl. The covariance is that of the
+// right-invariant error (A. Barrau, S. Bonnabel, "An EKF-SLAM algorithm with consistency properties", 2015):
+// e_p = dp + p x dr, e_l = dl + l x dr. That one neither changes when the whole scene is turned and moved nor learns
+// from points where it can't. It is carried in plain coordinates; when the estimate moves by D, dp becomes dp - D x dr.
+//
+// Corrections gather (`correction`) while one instant is observed and are applied when time goes on: all rows of one
+// instant are taken about one point, so that a picture is one update however many events it comes in.
+#ifndef WAYMARK_ESTIMATOR_SPACE_FILTER_HPP
+#define WAYMARK_ESTIMATOR_SPACE_FILTER_HPP
+
+#include <cstddef>
+
+#include "math/rotation.hpp"
+#include "math/symmetric.hpp"
+#include "waymark/pose.h"
+
+namespace wm {
+
+enum space_state { kPlace = 0, kTurn = 3, kPose6 = 6 };
+
+// What a filter may carry behind the pose, in this order; -1 where it is off.
+enum head_state {
+  kVelocity,  // m/s in body axes
+  kRates,     // rad/s
+  kRateBias,
+  kVelocityScale,
+  kCameraRotation,
+  kCameraPlace,
+  kTimeOffset,
+  kRangeBias,
+  kVelocityLag,  // s: velocity and rates as states are so much behind what is measured of them
+  kRateLag,
+  kHeadStates
+};
+inline constexpr int kHeadWidth[kHeadStates] = {3, 3, 3, 1, 3, 3, 1, 1, 1, 1};
+inline constexpr int kHeadMax = kPose6 + 20;
+
+// How a state begins and what it does on its own: a random walk, or (tau_s > 0) a Gauss-Markov process of that sigma.
+struct head_model {
+  double sigma, walk, tau_s;
+};
+
+// Up to four rows of one observation and the states that they are about.
+struct row_block {
+  static constexpr int kColumns = 24;
+  int rows = 0, columns = 0;
+  int index[kColumns];
+  double by[kRank][kColumns];
+  double observed[kRank], expected[kRank];  // expected: at the point of linearisation
+  double innovation[kRank];                 // observed - expected, wrapped where it is an angle
+  double noise[kRank];                      // variances
+
+  int add_columns(int state, int width) {
+    const int first = columns;
+    for (int i = 0; i < width; i++, columns++) {
+      index[columns] = state + i;
+      for (double(&row)[kColumns] : by) row[columns] = 0.0;
+    }
+    return first;
+  }
+};
+
+struct gates {
+  double soft, hard;  // of one row's normalised innovation squared
+};
+
+struct row_verdict {
+  bool fused;
+  bool doubtful;  // beyond the soft gate
+  double variance[kRank], nis[kRank], innovation[kRank];
+};
+
+// A stretch of constant twist in body axes, and the variances of what it integrates to on each axis.
+struct body_stretch {
+  double dt_s;
+  vec3 v_mps, w_radps;
+  double place_m2[3], turn_rad2[3];
+};
+
+struct placed {
+  vec3 p;
+  quat q;
+};
+
+class space_filter {
+ public:
+  static size_t tail_bytes(const head_model models[kHeadStates], int points_max);
+  // `tail`: bytes from `this` to the tail_bytes() that belong to this filter; 16-byte aligned.
+  void init(size_t tail, const head_model models[kHeadStates], int points_max);
+
+  void propagate(const body_stretch &s);
+  // Gates row after row, each with the innovation that those before left of it; one beyond the hard gate refuses all.
+  // Between the gates its noise is raised in proportion. Source: the sequential update of a Kalman filter by the LDL'
+  // factors of the innovations' covariance; P - G S^-1 G' is exact for this gain and symmetric by storage.
+  row_verdict fuse(const row_block &block, const gates &limits);
+  // Applies what was gathered. After this, nothing is pending.
+  void settle();
+
+  // The estimate with what is pending.
+  placed pose() const;
+  void estimate(wm_estimate *out) const;
+
+  // The point of linearisation: without what is pending.
+  const placed &nominal() const { return pose_; }
+  const mat3 &R() const { return r_; }
+  double head(int state) const { return head_[state]; }
+  vec3 head3(int which) const;  // zero where it is off
+  double head1(int which, double off) const;
+  int at(int which) const { return at_[which]; }
+  vec3 point(int slot) const { return vec_of(points() + 3 * slot); }
+  int point_state(int slot) const { return first_point_ + 3 * slot; }
+  int point_count() const { return (n_ - first_point_) / 3; }
+  int point_capacity() const { return points_max_; }
+
+  // A point behind the others. `block`: three rows, how its place in the sensor's frame depends on the states, with
+  // the observation's covariance; `A` turns the map into that frame. Paper, system 3, with J_x P J_x' in place of
+  // nothing: P_ll = A'(D P D' + N)A, P_lx = -A' D P.
+  void add_point(const vec3 &place, const row_block &block, const mat3 &A, const mat3 &noise);
+  // The last point takes the removed one's slot.
+  void remove_point(int slot);
+  void remove_points() { n_ = first_point_; }
+
+  void set_pose(const placed &pose, const double covariance[6][6]);
+  // Back to the start's value and variance, uncorrelated.
+  void restart_head();
+  void inflate_pose(double place_m2, double turn_rad2);
+  double covariance(int i, int j) const { return entry(p(), i, j, stride_); }
+  double variance(int i) const { return p()[i * stride_ + i]; }
+  vec3 pending(int state) const { return vec_of(correction() + state); }
+  double pending1(int state) const { return correction()[state]; }
+  int states() const { return n_; }
+
+ private:
+  double *tail() { return reinterpret_cast<double *>(reinterpret_cast<char *>(this) + tail_); }
+  const double *tail() const { return reinterpret_cast<const double *>(reinterpret_cast<const char *>(this) + tail_); }
+  // Rows of the tail: correction, gains, scratch, points, then the covariance.
+  double *correction() { return tail(); }
+  const double *correction() const { return tail(); }
+  double *gains() { return tail() + stride_; }
+  double *scratch() { return tail() + (1 + kRank) * stride_; }
+  double *points() { return tail() + kRowsBefore * stride_; }
+  const double *points() const { return tail() + kRowsBefore * stride_; }
+  double *p() { return tail() + (kRowsBefore + 1) * stride_; }
+  const double *p() const { return tail() + (kRowsBefore + 1) * stride_; }
+  static constexpr int kRowsBefore = 1 + kRank + 2 * kTurns;
+
+  void project(const row_block &block);
+  void move_errors(const vec3 &moved_place);
+  void walk(double dt_s);
+  void walk_through(int which, int into, double dt_s, const mat3 &mean);
+  void forget(int state, int width, double variance);
+
+  size_t tail_;
+  int n_, stride_, first_point_, points_max_;
+  int at_[kHeadStates];
+  head_model models_[kHeadStates];
+  bool pending_;
+  placed pose_;
+  mat3 r_;
+  double head_[kHeadMax];  // by state; the pose's own are not used
+};
+
+}  // namespace wm
+
+#endif

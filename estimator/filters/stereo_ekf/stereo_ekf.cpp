@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/stereo_ekf/stereo_ekf.hpp"
+
+#include <cstring>
+
+#include "filters/registry.h"
+
+namespace wm {
+namespace {
+
+constexpr wm_time_ns kMaxTime = INT64_C(1) << 62;
+// Velocity and rates as states are carried in steps so long.
+constexpr double kStep_s = 0.05;
+constexpr int kStepsMax = 40;
+constexpr size_t kLandmarksMax = 1u << 20;
+
+constexpr size_t rounded(size_t bytes) { return (bytes + 15) / 16 * 16; }
+
+void models_of(const wm_stereo_ekf_params &p, head_model out[kHeadStates]) {
+  const bool rates = p.prediction == WM_PREDICT_CONSTANT_VELOCITY;
+  out[kVelocity] = {rates ? p.cv_v_sigma : 0.0, p.cv_v_walk, p.cv_tau_s};
+  out[kRates] = {rates ? p.cv_w_sigma : 0.0, p.cv_w_walk, p.cv_tau_s};
+  out[kRateBias] = {p.rate_bias_sigma, p.rate_bias_walk, 0};
+  out[kVelocityScale] = {p.velocity_scale_sigma, 0, 0};
+  out[kCameraRotation] = {p.camera_rotation_sigma, 0, p.camera_rotation_tau_s};
+  out[kCameraPlace] = {p.camera_place_sigma, 0, p.camera_place_tau_s};
+  out[kTimeOffset] = {p.time_offset_sigma, 0, 0};
+  out[kRangeBias] = {p.range_bias_sigma, 0, 0};
+  out[kVelocityLag] = out[kRateLag] = {rates ? p.twist_lag_sigma : 0.0, 0, 0};
+}
+
+const char *const kStateNames[kHeadStates][3] = {
+    {"motion.vx_mps", "motion.vy_mps", "motion.vz_mps"},
+    {"motion.wx_radps", "motion.wy_radps", "motion.wz_radps"},
+    {"motion.rate_bias_x_radps", "motion.rate_bias_y_radps", "motion.rate_bias_z_radps"},
+    {"motion.velocity_scale", nullptr, nullptr},
+    {"stereo.turn_right_rad", "stereo.turn_down_rad", "stereo.turn_ahead_rad"},
+    {"stereo.x_m", "stereo.y_m", "stereo.z_m"},
+    {"stereo.time_offset_s", nullptr, nullptr},
+    {"range.bias_m", nullptr, nullptr},
+    {"motion.velocity_lag_s", nullptr, nullptr},
+    {"motion.rate_lag_s", nullptr, nullptr}};
+
+}  // namespace
+
+size_t stereo_ekf::bytes(const wm_stereo_ekf_params &params, const wm_setup &setup, const char **why) {
+  stereo_rig rig;
+  if (!rig.init(setup.rig, why)) return 0;
+  if (setup.landmark_count > kLandmarksMax) {
+    *why = "the map has more than 1048576 landmarks";
+    return 0;
+  }
+  if (params.points_max > 0 && !rig.there) {
+    *why = "slam.points is above 0, but calibration.yaml has no `stereo`";
+    return 0;
+  }
+  if (rig.there && !(params.pixel_px > 0.0) && !(rig.sigma_px[0] > 0.0)) {
+    *why = "noise.pixel_px is 0, and calibration.yaml's stereo has no sigma_px; give one of them";
+    return 0;
+  }
+  head_model models[kHeadStates];
+  models_of(params, models);
+  return rounded(sizeof(stereo_ekf)) + rounded(setup.landmark_count * sizeof(int)) +
+         rounded((size_t)params.points_max * sizeof(point_info)) + space_filter::tail_bytes(models, params.points_max);
+}
+
+void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup) {
+  const char *why = "";
+  std::memset(static_cast<void *>(this), 0, bytes(params, setup, &why));
+  params_ = params;
+  setup_ = &setup;
+  (void)rig_.init(setup.rig, &why);
+  for (int i = 0; i < 4; i++) sigma_px_[i] = params.pixel_px > 0.0 ? params.pixel_px : rig_.sigma_px[i];
+  motion_.init(setup, params);
+  info_offset_ = rounded(sizeof(stereo_ekf)) + rounded(setup.landmark_count * sizeof(int));
+  const size_t tail = info_offset_ + rounded((size_t)params.points_max * sizeof(point_info));
+  head_model models[kHeadStates];
+  models_of(params, models);
+  const auto before = (size_t)(reinterpret_cast<char *>(&filter_) - reinterpret_cast<char *>(this));
+  filter_.init(tail - before, models, params.points_max);
+  // Landmarks by rising id: found by halving. Insertion by binary search; start may take its time.
+  int *order = landmark_order();
+  for (size_t i = 0; i < setup.landmark_count; i++) {
+    size_t low = 0, high = i;
+    while (low < high) {
+      const size_t middle = (low + high) / 2;
+      if (setup.landmarks[order[middle]].id <= setup.landmarks[i].id)
+        low = middle + 1;
+      else
+        high = middle;
+    }
+    std::memmove(order + low + 1, order + low, (i - low) * sizeof(int));
+    order[low] = (int)i;
+  }
+  now_ns_ = picture_ns_ = fused_ns_ = lost_ns_ = searched_ns_ = inflated_ns_ = WM_TIME_NONE;
+  start_ns_ = setup.start.t_ns;
+  odom_ = {{0, 0, 0}, kNoTurn};
+  start_pose();
+}
+
+int stereo_ekf::find_landmark(int32_t id) const {
+  const int *order = landmark_order();
+  size_t low = 0, high = setup_->landmark_count;
+  while (low < high) {
+    const size_t middle = (low + high) / 2;
+    if (setup_->landmarks[order[middle]].id < id)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low < setup_->landmark_count && setup_->landmarks[order[low]].id == id ? order[low] : -1;
+}
+
+wm_status stereo_ekf::check_time(wm_time_ns t_ns) const {
+  if (t_ns > kMaxTime || t_ns < -kMaxTime) return WM_OUT_OF_RANGE;
+  if (start_ns_ != WM_TIME_NONE && t_ns < start_ns_) return WM_TIME_RAN_BACK;
+  return now_ns_ != WM_TIME_NONE && t_ns < now_ns_ ? WM_TIME_RAN_BACK : WM_OK;
+}
+
+void stereo_ekf::move_to(wm_time_ns t_ns) {
+  if (now_ns_ == WM_TIME_NONE) now_ns_ = t_ns;
+  if (t_ns <= now_ns_) return;
+  end_picture();
+  const auto carry = [this](const body_stretch &s) {
+    filter_.propagate(s);
+    const bool rates = constant_velocity();
+    const vec3 v = rates ? filter_.head3(kVelocity) : s.v_mps;
+    const vec3 w = rates ? filter_.head3(kRates) : s.w_radps;
+    const vec3 way = s.dt_s * (mean_turn(s.dt_s * w) * v);
+    odom_.p = odom_.p + matrix_of(odom_.q) * way;
+    odom_.q = normalized(odom_.q * turn_by(s.dt_s * w));
+    way_m_ += length(way);
+    turn_rad_ += s.dt_s * length(w);
+  };
+  if (constant_velocity()) {
+    const double dt_s = wm_seconds_between(now_ns_, t_ns);
+    const int steps = dt_s < kStepsMax * kStep_s ? 1 + (int)(dt_s / kStep_s) : kStepsMax;
+    for (int i = 0; i < steps; i++) carry({dt_s / steps, {0, 0, 0}, {0, 0, 0}, {}, {}});
+  } else {
+    motion_.walk(now_ns_, t_ns, carry);
+  }
+  now_ns_ = t_ns;
+}
+
+wm_status stereo_ekf::predict(const wm_event &motion) {
+  wm_status status = motion_.check(motion);
+  if (status != WM_OK) return status;
+  const bool early = start_ns_ != WM_TIME_NONE && motion.t_ns < start_ns_;
+  if (now_ns_ != WM_TIME_NONE && motion.t_ns < now_ns_) return WM_TIME_RAN_BACK;
+  motion_.feed(motion);
+  if (early) {  // the pose is known later on: until then only what holds is kept
+    now_ns_ = motion.t_ns;
+    return WM_OK;
+  }
+  if (now_ns_ != WM_TIME_NONE && start_ns_ != WM_TIME_NONE && now_ns_ < start_ns_) now_ns_ = start_ns_;
+  move_to(motion.t_ns);
+  if (constant_velocity() && motion.kind != WM_EVENT_QUANTITIES) fuse_twist(motion);
+  return WM_OK;
+}
+
+// With velocity and rates as states a measured twist is six rows like any other. Where it runs ahead of the vehicle by
+// a lag (or, below 0, behind it), what it said a lag ago is what the vehicle does now.
+void stereo_ekf::fuse_twist(const wm_event &motion) {
+  vec3 v, w, v_var, w_var, v_slope, w_slope;
+  motion_.sample_noise(&v_var, &w_var);
+  if (!motion_.sample_now(&v, &w, &v_slope, &w_slope)) return;
+  const bool planar = motion.kind == WM_EVENT_TWIST2;
+  for (int which = kVelocity; which <= kRates; which++) {
+    const bool linear = which == kVelocity;
+    const int lag_state = linear ? kVelocityLag : kRateLag;
+    const double lag_s = filter_.head1(lag_state, 0.0);
+    const vec3 slope = linear ? v_slope : w_slope;
+    const vec3 measured = (linear ? v : w) - lag_s * slope;
+    const vec3 state = filter_.head3(which);
+    row_block block;
+    const int first = block.add_columns(filter_.at(which), 3);
+    const int lag = filter_.at(lag_state) >= 0 ? block.add_columns(filter_.at(lag_state), 1) : -1;
+    for (int i = 0; i < 3; i++) {
+      if (planar && i != (linear ? 0 : 2)) continue;
+      const int row = block.rows++;
+      block.by[row][first + i] = 1.0;
+      if (lag >= 0) block.by[row][lag] = slope[i];
+      block.innovation[row] = measured[i] - state[i];
+      block.noise[row] = linear ? v_var[i] : w_var[i];
+    }
+    (void)filter_.fuse(block, limits());
+  }
+}
+
+wm_status stereo_ekf::correct(const wm_event &event, record_list records) {
+  switch (event.kind) {
+    case WM_EVENT_STEREO: return fuse_stereo(event, records);
+    case WM_EVENT_SIGHTING: return fuse_sighting(event, records);
+    case WM_EVENT_POSITION: return fuse_position(event, records);
+    case WM_EVENT_HEADING: return fuse_heading(event, records);
+    case WM_EVENT_SET_POSE:
+    case WM_EVENT_RESET: return take_pose(event);
+    case WM_EVENT_LOOKED: {
+      const wm_status status = check_time(event.t_ns);
+      if (status != WM_OK) return status;
+      move_to(event.t_ns);
+      begin_picture(event.t_ns);
+      return WM_OK;
+    }
+    default: return WM_UNSUPPORTED;
+  }
+}
+
+void stereo_ekf::estimate(wm_estimate *out) const {
+  std::memset(out, 0, sizeof *out);
+  filter_.estimate(out);
+  out->t_ns = now_ns_;
+  const bool rates = constant_velocity();
+  const vec3 v = rates ? filter_.head3(kVelocity) : filter_.head1(kVelocityScale, 1.0) * motion_.v_mps();
+  const vec3 w = rates ? filter_.head3(kRates) : motion_.w_radps() - filter_.head3(kRateBias);
+  for (int i = 0; i < 3; i++) {
+    out->v_mps[i] = v[i];
+    out->w_radps[i] = w[i];
+  }
+  out->resets = resets_;
+  const bool fresh =
+      fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, now_ns_) <= params_.dead_reckoning_after_s;
+  out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
+}
+
+size_t stereo_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
+  size_t count = 0;
+  for (int k = 0; k < kHeadStates; k++) {
+    if (filter_.at(k) < 0) continue;
+    for (int i = 0; i < kHeadWidth[k]; i++, count++) {
+      if (count >= capacity) continue;
+      wm_calibration_value &value = out[count];
+      std::memset(&value, 0, sizeof value);
+      std::memcpy(value.name, kStateNames[k][i], std::strlen(kStateNames[k][i]));
+      value.value = filter_.head(filter_.at(k) + i) + filter_.pending1(filter_.at(k) + i);
+      value.sigma = std::sqrt(filter_.variance(filter_.at(k) + i));
+    }
+  }
+  return count;
+}
+
+}  // namespace wm
+
+// ---- the contract ----
+
+namespace {
+
+wm::stereo_ekf &of(void *state) { return *static_cast<wm::stereo_ekf *>(state); }
+const wm::stereo_ekf &of(const void *state) { return *static_cast<const wm::stereo_ekf *>(state); }
+const wm_stereo_ekf_params &params_of(const void *params) { return *static_cast<const wm_stereo_ekf_params *>(params); }
+
+size_t state_bytes(const void *params, const wm_setup *setup, const char **why) {
+  return wm::stereo_ekf::bytes(params_of(params), *setup, why);
+}
+
+wm_status init(void *state, const void *params, const wm_setup *setup) {
+  of(state).init(params_of(params), *setup);
+  return WM_OK;
+}
+
+wm_status predict(void *state, const wm_event *motion) { return of(state).predict(*motion); }
+
+wm_status correct(void *state, const wm_event *event, wm_innovation *out, size_t capacity, size_t *count) {
+  *count = 0;
+  return of(state).correct(*event, {out, capacity, count});
+}
+
+void estimate(const void *state, wm_estimate *out) { of(state).estimate(out); }
+void motion(const void *, wm_motion_calibration *out) { *out = wm::kNeutralCalibration; }
+size_t calibration(const void *state, wm_calibration_value *out, size_t capacity) {
+  return of(state).list_calibration(out, capacity);
+}
+uint32_t motion_health(const void *state) { return of(state).motion_health(); }
+size_t landmarks(const void *state, wm_landmark *out, double (*cov_xy)[3], size_t capacity) {
+  return of(state).list_points(out, cov_xy, capacity);
+}
+
+}  // namespace
+
+const wm_estimator wm_stereo_ekf_estimator = {
+    "stereo_ekf",
+    "Extended Kalman filter in six degrees of freedom: points in a stereo pair's pictures, known or found on the way, "
+    "ranges to beacons, depth, heading, velocity. Finds the pose when lost.",
+    WM_EVENT_BIT(WM_EVENT_STEREO) | WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_POSITION) |
+        WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
+        WM_EVENT_BIT(WM_EVENT_RESET),
+    wm_stereo_ekf_params_table,
+    state_bytes,
+    init,
+    predict,
+    correct,
+    estimate,
+    motion,
+    calibration,
+    motion_health,
+    landmarks};

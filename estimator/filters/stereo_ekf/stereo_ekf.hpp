@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// System 3 of the papers: a stereo camera, acoustic ranges, depth, heading and a velocity log in six degrees of
+// freedom; known points, points found on the way, or both. docs/estimators.md has the model.
+#ifndef WAYMARK_ESTIMATOR_STEREO_EKF_HPP
+#define WAYMARK_ESTIMATOR_STEREO_EKF_HPP
+
+#include "filters/landmark_ekf/fit_monitor.hpp"
+#include "filters/stereo_ekf/body_motion.hpp"
+#include "filters/stereo_ekf/consensus.hpp"
+#include "filters/stereo_ekf/params.h"
+#include "filters/stereo_ekf/space_filter.hpp"
+#include "filters/stereo_ekf/stereo_rig.hpp"
+#include "waymark/estimator.h"
+
+namespace wm {
+
+// Records of one event's updates.
+struct record_list {
+  wm_innovation *out;
+  size_t capacity;
+  size_t *count;
+  void add(const wm_innovation &record) {
+    if (out && *count < capacity) out[(*count)++] = record;
+  }
+};
+
+class stereo_ekf {
+ public:
+  static size_t bytes(const wm_stereo_ekf_params &params, const wm_setup &setup, const char **why);
+  void init(const wm_stereo_ekf_params &params, const wm_setup &setup);
+
+  wm_status predict(const wm_event &motion);
+  wm_status correct(const wm_event &event, record_list records);
+  void estimate(wm_estimate *out) const;
+  size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
+  size_t list_points(wm_landmark *out, double (*cov_xy)[3], size_t capacity) const;
+  uint32_t motion_health() const { return motion_.health(); }
+
+ private:
+  // A point of the state: whose it is and when it was seen last.
+  struct point_info {
+    wm_time_ns seen_ns;
+    int32_t id;
+    int32_t unseen;  // pictures in which it was expected and not seen, or did not fit
+  };
+  // The pose when an observation was true, and the twist then, in body axes.
+  struct past_pose {
+    placed at;
+    mat3 R;
+    vec3 v_mps, w_radps;
+  };
+  // A point in the left camera's axes, its derivatives by the states (three rows) and by the point's own place.
+  struct point_view {
+    vec3 x;
+    row_block by;
+    mat3 A;
+  };
+
+  bool constant_velocity() const { return params_.prediction == WM_PREDICT_CONSTANT_VELOCITY; }
+  wm_status check_time(wm_time_ns t_ns) const;
+  void move_to(wm_time_ns t_ns);
+  void fuse_twist(const wm_event &motion);
+
+  // fuse.cpp
+  wm_status fuse_stereo(const wm_event &event, record_list records);
+  wm_status fuse_sighting(const wm_event &event, record_list records);
+  wm_status fuse_position(const wm_event &event, record_list records);
+  wm_status fuse_heading(const wm_event &event, record_list records);
+  past_pose look_back(double age_s) const;
+  void add_place(row_block *block, const past_pose &past, const vec3 &arm, const double (*by)[3], int rows) const;
+  point_view view_point(const vec3 &place, const past_pose &past) const;
+  bool fuse_point(const wm_stereo &seen, const vec3 &place, double place_sigma_m, int slot, const wm_innovation &blank,
+                  record_list records, row_verdict *verdict);
+  row_verdict fuse_rows(const row_block &block, const wm_residual *kinds, const wm_innovation &blank,
+                        record_list records);
+
+  // points.cpp
+  void begin_picture(wm_time_ns t_ns);
+  void end_picture();
+  int find_slot(int32_t id) const;
+  void add_point(const wm_stereo &seen, const wm_innovation &blank, record_list records);
+  bool make_room();
+  void remove_point(int slot);
+
+  // recovery.cpp
+  wm_status take_pose(const wm_event &event);
+  void start_pose();
+  void set_pose(const placed &pose, double sigma_m, double sigma_rad);
+  void keep_clue(const wm_stereo &seen, const wm_landmark &landmark, wm_time_ns t_ns);
+  void note(wm_time_ns t_ns, int key, double misfit);
+  void search(wm_time_ns since_ns);
+
+  int find_landmark(int32_t id) const;
+  int *landmark_order() { return reinterpret_cast<int *>(this + 1); }
+  const int *landmark_order() const { return reinterpret_cast<const int *>(this + 1); }
+  point_info *info() { return reinterpret_cast<point_info *>(reinterpret_cast<char *>(this) + info_offset_); }
+  const point_info *info() const {
+    return reinterpret_cast<const point_info *>(reinterpret_cast<const char *>(this) + info_offset_);
+  }
+  gates limits() const { return {params_.gate_soft, params_.gate_hard}; }
+
+  space_filter filter_;
+  body_motion motion_;
+  stereo_rig rig_;
+  wm_stereo_ekf_params params_;
+  const wm_setup *setup_;
+  size_t info_offset_;
+  double sigma_px_[4];
+  wm_time_ns now_ns_, start_ns_;
+  wm_time_ns picture_ns_;  // the picture that points are being taken of; NONE between pictures
+  placed odom_;            // motion alone
+  double way_m_, turn_rad_;
+  fit_monitor monitor_;
+  pose_consensus clues_;
+  wm_time_ns fused_ns_, lost_ns_, searched_ns_, inflated_ns_;
+  uint32_t resets_;
+  uint8_t state_;  // wm_state, without dead reckoning
+};
+
+}  // namespace wm
+
+#endif

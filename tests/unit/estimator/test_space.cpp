@@ -1,0 +1,332 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rotations, kernels on a triangle, and the filter core in space against slow and plain references.
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "filters/stereo_ekf/consensus.hpp"
+#include "filters/stereo_ekf/space_filter.hpp"
+#include "unity.h"
+#include "waymark/random.h"
+
+using namespace wm;
+
+namespace {
+
+double normal(int i) { return wm_random_normal(7, 1, static_cast<uint64_t>(i)); }
+vec3 random_vec(int i) { return {normal(3 * i), normal(3 * i + 1), normal(3 * i + 2)}; }
+
+void assert_near(const vec3 &want, const vec3 &got, double within) {
+  for (int i = 0; i < 3; i++) TEST_ASSERT_DOUBLE_WITHIN(within, want[i], got[i]);
+}
+
+// A filter with room for its tail behind it.
+struct machine {
+  char *memory;
+  space_filter *filter;
+  explicit machine(const head_model *models, int points) {
+    const size_t own = (sizeof(space_filter) + 15) / 16 * 16;
+    const size_t bytes = own + space_filter::tail_bytes(models, points);
+    memory = static_cast<char *>(aligned_alloc(16, (bytes + 15) / 16 * 16));
+    std::memset(memory, 0, bytes);
+    filter = reinterpret_cast<space_filter *>(memory);
+    filter->init(own, models, points);
+  }
+  ~machine() { free(memory); }
+  machine(const machine &) = delete;
+  machine &operator=(const machine &) = delete;
+};
+
+const head_model kNone[kHeadStates] = {};
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+void test_turns_there_and_back(void) {
+  for (int i = 0; i < 200; i++) {
+    vec3 r = (i % 2 ? 1e-5 : 0.8) * random_vec(i);
+    if (length(r) > 3.1) r = (3.1 / length(r)) * r;
+    const quat q = turn_by(r);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-15, 1.0, q.w * q.w + dot(q.v, q.v));
+    assert_near(r, turn_of(q), 1e-13);
+    const quat again = quat_of(matrix_of(q));
+    const double sign = again.w * q.w + dot(again.v, q.v) < 0 ? -1 : 1;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-14, q.w, sign * again.w);
+    assert_near(q.v, sign * again.v, 1e-14);
+    const vec3 x = random_vec(1000 + i);
+    assert_near(matrix_of(turn_by(0.5 * r)) * (matrix_of(turn_by(0.5 * r)) * x), matrix_of(q) * x, 1e-13);
+  }
+}
+
+// The mean rotation against the sum of many small ones; and across the seam between series and closed form.
+void test_the_mean_turn_is_the_mean(void) {
+  for (int i = 0; i < 40; i++) {
+    vec3 r = random_vec(i);
+    r = ((i % 2 ? 0.0999 : 0.1001) * (i < 20 ? 1.0 : 20.0) / length(r)) * r;
+    const vec3 v = random_vec(500 + i);
+    vec3 sum = {0, 0, 0};
+    const int steps = 2000;
+    for (int k = 0; k < steps; k++) sum = sum + (1.0 / steps) * (matrix_of(turn_by((k + 0.5) / steps * r)) * v);
+    assert_near(sum, mean_turn(r) * v, 1e-6);
+  }
+}
+
+void test_kernels_have_scalar_twins(void) {
+  for (const int n : {1, 2, 7, 24, 109}) {
+    const int stride = even(n) + 2;
+    const auto row = static_cast<size_t>(stride);
+    std::vector<double> room(row * (2 * row + 8) + 2);
+    auto *base =
+        reinterpret_cast<double *>((reinterpret_cast<uintptr_t>(room.data()) + 15) & ~static_cast<uintptr_t>(15));
+    double *p = base, *twin = p + stride * stride, *a = twin + stride * stride, *b = a + 4 * stride;
+    for (int i = 0; i < stride * stride; i++) p[i] = twin[i] = normal(i);
+    for (int i = 0; i < 8 * stride; i++) a[i] = i % stride < n ? normal(5000 + i) : 0.0;
+    vectors::subtract_gram(p, a, n, stride);
+    scalar::subtract_gram(twin, a, n, stride);
+    vectors::add_mixed(p, a, b, n, stride);
+    scalar::add_mixed(twin, a, b, n, stride);
+    TEST_ASSERT_EQUAL_MEMORY(twin, p, sizeof(double) * row * row);
+  }
+}
+
+// A small error in pose or sensor states, carried by the motion itself, against its covariance carried by the filter.
+void test_propagation_carries_errors_as_the_motion_does(void) {
+  head_model models[kHeadStates] = {};
+  models[kRateBias] = {0.01, 0, 0};
+  models[kVelocityScale] = {0.02, 0, 0};
+  const body_stretch s = {0.3, {0.8, -0.2, 0.4}, {0.3, 1.1, -0.7}, {}, {}};
+  for (int wrong = 0; wrong < 6; wrong++) {
+    const double epsilon = 1e-5;
+    const placed start = {{3, -2, 5}, turn_by({0.4, -1.0, 2.0})};
+    placed off = start;
+    vec3 e = {0, 0, 0};
+    e[wrong % 3] = epsilon;
+    if (wrong < 3)
+      off.p = off.p + e;
+    else
+      off.q = normalized(turn_by(e) * off.q);
+    machine a(models, 0), b(models, 0);
+    double covariance[6][6] = {};
+    covariance[wrong][wrong] = square(epsilon);
+    const double none[6][6] = {};
+    a.filter->set_pose(start, covariance);
+    b.filter->set_pose(off, none);
+    const double before_bias = a.filter->variance(6);
+    a.filter->propagate(s);
+    b.filter->propagate(s);
+    TEST_ASSERT_EQUAL_DOUBLE(before_bias, a.filter->variance(6));
+    const vec3 place = b.filter->pose().p - a.filter->pose().p;
+    const vec3 turn = turn_of(b.filter->pose().q * conjugate(a.filter->pose().q));
+    double got[6][6], want[6];
+    for (int i = 0; i < 3; i++) {
+      want[i] = place[i];
+      want[3 + i] = turn[i];
+    }
+    // What the sensors' states add is there in both; the difference to a filter without start error is the error's.
+    machine c(models, 0);
+    c.filter->set_pose(start, none);
+    c.filter->propagate(s);
+    for (int i = 0; i < 6; i++)
+      for (int j = 0; j < 6; j++) {
+        got[i][j] = a.filter->covariance(i, j) - c.filter->covariance(i, j);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-3 * square(epsilon), want[i] * want[j], got[i][j]);
+      }
+  }
+}
+
+void test_sensor_states_swing_the_way_as_they_should(void) {
+  head_model models[kHeadStates] = {};
+  models[kRateBias] = {1e-4, 0, 0};
+  models[kVelocityScale] = {1e-4, 0, 0};
+  const double none[6][6] = {};
+  machine a(models, 0);
+  a.filter->set_pose({{0, 0, 0}, turn_by({0.2, 0.3, -0.4})}, none);
+  double covariance[6][6] = {};
+  for (int k = 0; k < 4; k++) {
+    machine b(models, 0), zero(models, 0);
+    for (machine *m : {&b, &zero}) m->filter->set_pose({{0, 0, 0}, turn_by({0.2, 0.3, -0.4})}, none);
+    body_stretch s = {0.02, {0.8, -0.2, 0.4}, {0.3, 1.1, -0.7}, {}, {}};
+    body_stretch wrong = s;
+    if (k < 3)
+      wrong.w_radps[k] -= 1e-4;
+    else
+      wrong.v_mps = (1 + 1e-4) * s.v_mps;
+    for (int i = 0; i < 50; i++) {
+      b.filter->propagate(wrong);
+      zero.filter->propagate(s);
+      if (k == 0) a.filter->propagate(s);
+    }
+    const vec3 place = b.filter->pose().p - zero.filter->pose().p;
+    const vec3 turn = turn_of(b.filter->pose().q * conjugate(zero.filter->pose().q));
+    for (int i = 0; i < 6; i++)
+      for (int j = 0; j < 6; j++)
+        covariance[i][j] += (i < 3 ? place[i] : turn[i - 3]) * (j < 3 ? place[j] : turn[j - 3]);
+  }
+  for (int i = 0; i < 6; i++)
+    for (int j = 0; j < 6; j++)
+      TEST_ASSERT_DOUBLE_WITHIN(2e-3 * std::sqrt(covariance[i][i] * covariance[j][j]) + 1e-12, covariance[i][j],
+                                a.filter->covariance(i, j));
+}
+
+// One block of rows against the textbook's dense update; then points added, removed and their correlations.
+void test_an_update_is_kalmans(void) {
+  machine m(kNone, 8);
+  double covariance[6][6];
+  for (int i = 0; i < 6; i++)
+    for (int j = 0; j < 6; j++) {
+      covariance[i][j] = i == j ? 0.02 : 0.0;
+      for (int k = 0; k < 3; k++) covariance[i][j] += 0.01 * normal(10 * k + i) * normal(10 * k + j);
+    }
+  m.filter->set_pose({{1, 2, 3}, turn_by({0.1, 0.2, 0.3})}, covariance);
+  row_block see;
+  see.rows = 3;
+  see.add_columns(0, 6);
+  const mat3 A = transposed(m.filter->R());
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 6; j++) see.by[i][j] = j < 3 ? -A.m[i][j] : normal(100 + 6 * i + j);
+  for (int k = 0; k < 3; k++) m.filter->add_point(random_vec(50 + k), see, A, 0.01 * kIdentity3);
+  TEST_ASSERT_EQUAL(3, m.filter->point_count());
+  const int n = m.filter->states();
+  TEST_ASSERT_EQUAL(15, n);
+  row_block rows;
+  rows.rows = 4;
+  rows.add_columns(0, 6);
+  rows.add_columns(m.filter->point_state(1), 3);
+  double P[15][15], H[4][15] = {}, x[15] = {};
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++) P[i][j] = m.filter->covariance(i, j);
+  for (int k = 0; k < 4; k++) {
+    for (int c = 0; c < rows.columns; c++) H[k][rows.index[c]] = rows.by[k][c] = normal(300 + 20 * k + c);
+    rows.innovation[k] = 0.1 * normal(400 + k);
+    rows.noise[k] = 0.1 + 0.05 * k;
+  }
+  // One number after the other: the same as all at once.
+  for (int k = 0; k < 4; k++) {
+    double g[15] = {};
+    double s = rows.noise[k], nu = rows.innovation[k];
+    for (int i = 0; i < n; i++) {
+      for (int j = 0; j < n; j++) g[i] += P[i][j] * H[k][j];
+      nu -= H[k][i] * x[i];
+    }
+    for (int i = 0; i < n; i++) s += H[k][i] * g[i];
+    for (int i = 0; i < n; i++) {
+      x[i] += g[i] / s * nu;
+      for (int j = 0; j < n; j++) P[i][j] -= g[i] * g[j] / s;
+    }
+  }
+  const row_verdict verdict = m.filter->fuse(rows, {1e9, 1e9});
+  TEST_ASSERT_TRUE(verdict.fused);
+  for (int i = 0; i < n; i++) {
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, x[i], m.filter->pending1(i));
+    for (int j = 0; j < n; j++) TEST_ASSERT_DOUBLE_WITHIN(1e-12, P[i][j], m.filter->covariance(i, j));
+  }
+  // A row beyond the gate refuses all and changes nothing.
+  rows.innovation[3] = 100.0;
+  TEST_ASSERT_FALSE(m.filter->fuse(rows, {7, 20}).fused);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, x[0], m.filter->pending1(0));
+  // The first point leaves; the last takes its place with all that it shares.
+  const int last = m.filter->point_state(2);
+  double shared[3], between[3];
+  for (int i = 0; i < 3; i++) {
+    shared[i] = m.filter->covariance(1, last + i);
+    between[i] = m.filter->covariance(m.filter->point_state(1), last + i);
+  }
+  m.filter->remove_point(0);
+  TEST_ASSERT_EQUAL(2, m.filter->point_count());
+  for (int i = 0; i < 3; i++) {
+    TEST_ASSERT_EQUAL_DOUBLE(shared[i], m.filter->covariance(1, m.filter->point_state(0) + i));
+    TEST_ASSERT_EQUAL_DOUBLE(between[i], m.filter->covariance(m.filter->point_state(1), m.filter->point_state(0) + i));
+  }
+}
+
+// A scene turned and moved as a whole looks the same: no update may make the filter surer of such a motion. With points
+// seen again and again from a moving vehicle, the information about it must stay zero.
+void test_what_cannot_be_seen_is_not_learnt(void) {
+  machine m(kNone, 4);
+  double covariance[6][6] = {};
+  for (int i = 0; i < 6; i++) covariance[i][i] = i < 3 ? 1e-2 : 1e-3;
+  m.filter->set_pose({{5, -3, 2}, turn_by({0.1, 0.2, 0.3})}, covariance);
+  const vec3 truth[4] = {{8, -3, 2}, {7, -1, 2.5}, {8, -4, 1}, {6, -3, 4}};
+  int draw = 9000;
+  for (int step = 0; step < 60; step++) {
+    for (int k = 0; k < 4; k++) {
+      const mat3 A = transposed(m.filter->R());
+      const bool fresh = step == 0;
+      const vec3 l = fresh ? truth[k] : m.filter->point(k);
+      row_block rows;
+      rows.rows = 3;
+      rows.add_columns(kPlace, 3);
+      rows.add_columns(kTurn, 3);
+      const mat3 turn = A * skew(l - m.filter->nominal().p);
+      for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+          rows.by[i][j] = -A.m[i][j];
+          rows.by[i][3 + j] = turn.m[i][j];
+        }
+      if (fresh) {
+        m.filter->add_point(l, rows, A, 1e-4 * kIdentity3);
+        continue;
+      }
+      rows.add_columns(m.filter->point_state(k), 3);
+      for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) rows.by[i][6 + j] = A.m[i][j];
+        rows.innovation[i] = 0.05 * normal(draw++);
+        rows.noise[i] = 1e-4;
+      }
+      TEST_ASSERT_TRUE(m.filter->fuse(rows, {1e9, 1e9}).fused);
+    }
+    m.filter->settle();
+    m.filter->propagate({0.1, {0.3, 0.1, 0}, {0.2, -0.1, 0.3}, {1e-6, 1e-6, 1e-6}, {1e-6, 1e-6, 1e-6}});
+  }
+  // Variance of the whole scene turned about the map's z axis, read from the pose and three points' common turn: the
+  // invariant error of rotation can't fall below what it began with.
+  for (int i = 0; i < 3; i++) TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.999e-3, m.filter->variance(kTurn + i));
+}
+
+void test_orientation_is_found_with_a_third_wrong(void) {
+  for (int trial = 0; trial < 50; trial++) {
+    auto consensus = std::make_unique<pose_consensus>();
+    consensus->clear();
+    const placed map_odom = {10.0 * random_vec(10 + trial), turn_by(random_vec(900 + trial))};
+    const mat3 R = matrix_of(map_odom.q);
+    for (int i = 0; i < 12; i++) {
+      const vec3 seen = 3.0 * random_vec(2000 + 50 * trial + i);
+      vec3 place = map_odom.p + R * seen + 0.01 * random_vec(40000 + 50 * trial + i);
+      if (i % 3 == 0) place = place + 5.0 * random_vec(70000 + 50 * trial + i);
+      consensus->add({i, i, seen, place, 0.02, 0, 0});
+    }
+    const placed odom = {{1, 2, 3}, turn_by({0.3, 0.2, 0.1})};
+    const pose_found found = consensus->find(0, odom, 0, 0, 0.5, 0.25, static_cast<uint64_t>(trial));
+    TEST_ASSERT_TRUE(found.found);
+    assert_near(map_odom.p + R * odom.p, found.pose.p, 0.05);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, length(turn_of(found.pose.q * conjugate(map_odom.q * odom.q))));
+  }
+}
+
+void test_no_orientation_of_a_line_or_of_contradictions(void) {
+  auto consensus = std::make_unique<pose_consensus>();
+  consensus->clear();
+  for (int i = 0; i < 12; i++) consensus->add({i, i, {1.0 * i, 0, 0}, {0, 1.0 * i, 0}, 0.02, 0, 0});
+  TEST_ASSERT_FALSE(consensus->find(0, {{0, 0, 0}, kNoTurn}, 0, 0, 0.5, 0.25, 1).found);
+  consensus->clear();
+  for (int i = 0; i < 12; i++) consensus->add({i, i, random_vec(i), 5.0 * random_vec(100 + i), 0.02, 0, 0});
+  TEST_ASSERT_FALSE(consensus->find(0, {{0, 0, 0}, kNoTurn}, 0, 0, 0.5, 0.25, 1).found);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_turns_there_and_back);
+  RUN_TEST(test_the_mean_turn_is_the_mean);
+  RUN_TEST(test_kernels_have_scalar_twins);
+  RUN_TEST(test_propagation_carries_errors_as_the_motion_does);
+  RUN_TEST(test_sensor_states_swing_the_way_as_they_should);
+  RUN_TEST(test_an_update_is_kalmans);
+  RUN_TEST(test_what_cannot_be_seen_is_not_learnt);
+  RUN_TEST(test_orientation_is_found_with_a_third_wrong);
+  RUN_TEST(test_no_orientation_of_a_line_or_of_contradictions);
+  return UNITY_END();
+}
