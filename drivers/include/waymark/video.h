@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// The pictures of a recording's camera: video/CAMERA.avi, video/CAMERA.mkv (MJPEG, or uncompressed Y800) or a folder
+// video/CAMERA/ of NNNNNN.jpg, with the stamps of video/CAMERA.csv (frame,t_ns,exposure_ns[,arrival_ns]). The
+// container's own rate, count and stamps are ignored. Colour is dropped while decoding (the luma as it is stored).
+//
+// Memory is fixed once it is open: two compressed pictures of the largest size that the camera's can have, one
+// decoded. libturbojpeg has a heap of its own. Nothing in a file makes this stop a program: what can't be used is
+// counted and passed over. One thread at a time.
+#ifndef WAYMARK_VIDEO_H
+#define WAYMARK_VIDEO_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "waymark/frame.h"
+#include "waymark/recording.h"
+#include "waymark/setup.h"
+#include "waymark/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Every picture and every row that doesn't become a frame is in one of these.
+typedef struct wm_video_counts {
+  uint64_t frames;           // handed out
+  uint64_t skipped;          // passed over on demand (wm_video_skip)
+  uint64_t lost;             // pictures that are missing by the stamps: gaps of more than 1.5 usual periods
+  uint64_t duplicated;       // the same stamp, or the same bytes, as the picture before: a camera that is stuck
+  uint64_t empty;            // chunks of length 0
+  uint64_t damaged;          // JPEGs that are cut or can't be decoded
+  uint64_t wrong_size;       // of another size than the camera's
+  uint64_t malformed;        // rows that can't be read, or whose frame goes back
+  uint64_t out_of_order;     // rows whose arrival lies before that of the row above: arrived with that one
+  uint64_t without_stamp;    // pictures that no row names
+  uint64_t without_picture;  // rows whose picture isn't there
+  char first_problem[256];   // text of the first of these, with file and place; "" where none
+} wm_video_counts;
+
+typedef struct wm_video wm_video;
+
+// Whether the recording has pictures of this camera (in whatever format, .mp4 too).
+int wm_video_there(const char *recording_dir, const char *camera_name);
+
+// Opens the pictures of `camera`, whose index in the rig is `index` (the `camera` of the frames). A camera without a
+// size (width_px 0) takes that of its first picture. What is odd but does not stop is handed to `warn` (may be NULL).
+// WM_NOT_FOUND: no pictures, or no CSV. WM_UNSUPPORTED: a format that has to be converted first. WM_BAD_CONFIG: the CSV
+// has no such columns. WM_BAD_DATA: not a container at all. Allocates.
+wm_status wm_video_open(const char *recording_dir, const wm_camera *camera, int32_t index, wm_warn_fn warn,
+                        void *context, wm_video **out, wm_error *err);
+void wm_video_close(wm_video *self);  // NULL is fine
+
+uint32_t wm_video_width(const wm_video *self);
+uint32_t wm_video_height(const wm_video *self);
+
+// Stamps and number of the next picture, not decoded: grey is NULL. WM_OK, WM_END, WM_IO. A few system calls.
+wm_status wm_video_peek(wm_video *self, wm_frame *out, wm_error *err);
+// The next picture that can be decoded. The pixels stay until the next call with this video. WM_OK, WM_END, WM_IO.
+// Cost: about 2 ms for 1280x720 at a desk.
+wm_status wm_video_next(wm_video *self, wm_frame *out, wm_error *err);
+// The same into the caller's memory: height rows of `stride_bytes` (at least the width).
+wm_status wm_video_next_into(wm_video *self, uint8_t *grey, uint32_t stride_bytes, wm_frame *out, wm_error *err);
+// Passes over the next picture without reading it; counted. WM_OK, WM_END, WM_IO.
+wm_status wm_video_skip(wm_video *self, wm_error *err);
+
+const wm_video_counts *wm_video_counted(const wm_video *self);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

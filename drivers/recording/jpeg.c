@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "jpeg.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <turbojpeg.h>
+
+wm_status jpeg_open(jpeg_decoder *self, wm_error *err) {
+  self->handle = tjInitDecompress();
+  return self->handle ? WM_OK : wm_fail(err, WM_IO, "no memory for a JPEG decoder");
+}
+
+void jpeg_close(jpeg_decoder *self) {
+  if (self->handle) (void)tjDestroy(self->handle);
+  self->handle = NULL;
+}
+
+size_t jpeg_bytes_max(uint32_t width_px, uint32_t height_px) {
+  return tjBufSize((int)width_px, (int)height_px, TJSAMP_444);
+}
+
+jpeg_verdict jpeg_size(jpeg_decoder *self, const uint8_t *data, size_t length, uint32_t *width_px,
+                       uint32_t *height_px) {
+  int width, height, sampling, space;
+  if (tjDecompressHeader3(self->handle, data, length, &width, &height, &sampling, &space) != 0 || width < 1 ||
+      height < 1)
+    return JPEG_DAMAGED;
+  *width_px = (uint32_t)width;
+  *height_px = (uint32_t)height;
+  return JPEG_GOOD;
+}
+
+jpeg_verdict jpeg_decode(jpeg_decoder *self, const uint8_t *data, size_t length, uint32_t width_px, uint32_t height_px,
+                         uint8_t *grey, uint32_t stride_bytes, char *why, size_t why_bytes) {
+  uint32_t width, height;
+  if (!self->handle) self->handle = tjInitDecompress();
+  if (!self->handle || jpeg_size(self, data, length, &width, &height) != JPEG_GOOD) {
+    (void)snprintf(why, why_bytes, "no JPEG: %s", tjGetErrorStr2(self->handle));
+    jpeg_close(self);  // libjpeg-turbo 2.1 reads the next head as this one's continuation otherwise
+    return JPEG_DAMAGED;
+  }
+  if (width != width_px || height != height_px) {
+    (void)snprintf(why, why_bytes, "has %u x %u pixels, the camera %u x %u", width, height, width_px, height_px);
+    return JPEG_WRONG_SIZE;
+  }
+  if (tjDecompress2(self->handle, data, length, grey, (int)width_px, (int)stride_bytes, (int)height_px, TJPF_GRAY,
+                    TJFLAG_ACCURATEDCT | TJFLAG_LIMITSCANS) == 0)
+    return JPEG_GOOD;
+  // Stray bytes between the parts of a picture do no harm, and some cameras always write them.
+  const char *said = tjGetErrorStr2(self->handle);
+  if (tjGetErrorCode(self->handle) == TJERR_WARNING && strstr(said, "extraneous bytes")) return JPEG_GOOD;
+  (void)snprintf(why, why_bytes, "%s", said);
+  return JPEG_DAMAGED;
+}

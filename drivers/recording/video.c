@@ -1,0 +1,442 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/video.h"
+
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "arrival.h"
+#include "calibration.h"
+#include "container.h"
+#include "csv.h"
+#include "jpeg.h"
+
+#define PICTURE_SIDE_MAX 16384
+#define INTERVALS 9  // whose middle is the usual period
+
+enum { FRAME, T, EXPOSURE, ARRIVAL };
+static const csv_format kFormat = {{{"frame", CSV_WHOLE, CSV_NEEDED, 0, 2147483647.0},
+                                    {"t_ns", CSV_TIME, CSV_NEEDED, 0, 0},
+                                    {"exposure_ns", CSV_TIME, CSV_OPTIONAL, 0, 0},
+                                    {"arrival_ns", CSV_TIME, CSV_OPTIONAL, 0, 0}}};
+
+// The picture and the row that belong together and come next.
+typedef struct located {
+  int there;
+  payload picture;
+  wm_frame head;
+} located;
+
+struct wm_video {
+  container file;
+  csv_reader csv;
+  jpeg_decoder jpeg;
+  int32_t camera;
+  uint32_t width_px, height_px;
+  uint8_t *bytes[2], *pixels;  // compressed: this picture and the one before
+  size_t bytes_max, before_length;
+  csv_row row, ahead;
+  int has_row, has_ahead, rows_ended, pictures_ended;
+  payload picture;  // read from the container, waiting for its row
+  int has_picture;
+  int64_t newest_row;
+  arrival_order order;
+  located next;
+  wm_time_ns last_ns, interval_ns[INTERVALS];
+  size_t intervals;
+  wm_video_counts counts;
+};
+
+// ── finding the files ───────────────────────────────────────────────────────────────────────────────────────────────
+
+typedef struct place {
+  const char *suffix;
+  int is_folder;
+} place;
+static const place kPlaces[] = {{".avi", 0}, {".mkv", 0}, {"", 1}, {".mp4", 0}};
+#define PLACE_COUNT (sizeof kPlaces / sizeof kPlaces[0])
+
+static int video_path(const char *dir, const char *camera, const char *suffix, char out[WM_PATH_MAX]) {
+  return snprintf(out, WM_PATH_MAX, "%s/video/%s%s", dir, camera, suffix) < WM_PATH_MAX;
+}
+
+// Index into kPlaces of the first place from `from` on where there are pictures, or PLACE_COUNT.
+static size_t find_place(const char *dir, const char *camera, size_t from, char out[WM_PATH_MAX]) {
+  for (size_t i = from; i < PLACE_COUNT; i++) {
+    struct stat about;
+    if (video_path(dir, camera, kPlaces[i].suffix, out) && stat(out, &about) == 0 &&
+        (S_ISDIR(about.st_mode) != 0) == kPlaces[i].is_folder)
+      return i;
+  }
+  return PLACE_COUNT;
+}
+
+int wm_video_there(const char *recording_dir, const char *camera_name) {
+  char path[WM_PATH_MAX];
+  return find_place(recording_dir, camera_name, 0, path) < PLACE_COUNT;
+}
+
+static wm_status open_pictures(wm_video *self, const char *dir, const char *camera, const warner *warn, wm_error *err) {
+  char path[WM_PATH_MAX], other[WM_PATH_MAX];
+  size_t found = find_place(dir, camera, 0, path);
+  if (found == PLACE_COUNT)
+    return wm_fail(err, WM_NOT_FOUND,
+                   "%s/video: no pictures of the camera '%s': %s.avi, %s.mkv or a folder %s/ of JPEGs", dir, camera,
+                   camera, camera, camera);
+  if (find_place(dir, camera, found + 1, other) < PLACE_COUNT) warn_line(warn, "%s: is not read; %s is", other, path);
+  return kPlaces[found].is_folder ? folder_open(&self->file, path, err) : container_open(&self->file, path, err);
+}
+
+// ── what is odd ─────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static void count(wm_video *self, uint64_t *counter, const char *format, ...) __attribute__((format(printf, 3, 4)));
+static void count(wm_video *self, uint64_t *counter, const char *format, ...) {
+  (*counter)++;
+  if (self->counts.first_problem[0]) return;
+  va_list args;
+  va_start(args, format);
+  (void)vsnprintf(self->counts.first_problem, sizeof self->counts.first_problem, format, args);
+  va_end(args);
+}
+
+// ── rows ────────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_time_ns arrival_of(const csv_row *row) {
+  return row->whole[ARRIVAL] == WM_TIME_NONE ? row->whole[T] : row->whole[ARRIVAL];
+}
+
+static wm_status read_row(wm_video *self, csv_row *row, wm_error *err) {
+  for (;;) {
+    wm_error why;
+    wm_status status = csv_next(&self->csv, err);
+    if (status != WM_OK) return status;
+    status = csv_read(&self->csv, row, &why);
+    if (status == WM_OK && row->whole[FRAME] > self->newest_row) {
+      self->newest_row = row->whole[FRAME];
+      return WM_OK;
+    }
+    if (status == WM_OK)
+      count(self, &self->counts.malformed, "%s:%ld: frame: %" PRId64 " after %" PRId64 "; the row is skipped",
+            self->csv.lines.path, row->line, row->whole[FRAME], self->newest_row);
+    else
+      count(self, &self->counts.malformed, "%.200s; the row is skipped", why.text);
+  }
+}
+
+// The next good row, into self->row. One row is read ahead: a stamp is judged by the one after it.
+static wm_status next_row(wm_video *self, wm_error *err) {
+  if (self->rows_ended) return WM_END;
+  wm_status status = self->has_ahead ? WM_OK : read_row(self, &self->ahead, err);
+  while (status == WM_OK) {
+    self->row = self->ahead;
+    status = read_row(self, &self->ahead, err);
+    if (status != WM_OK && status != WM_END) return status;
+    self->has_ahead = status == WM_OK;
+    wm_time_ns here_ns = arrival_of(&self->row), next_ns = self->has_ahead ? arrival_of(&self->ahead) : here_ns;
+    if (!arrival_order_leaps(&self->order, here_ns, next_ns)) {
+      self->rows_ended = !self->has_ahead;
+      return WM_OK;
+    }
+    count(self, &self->counts.malformed, "%s:%ld: t_ns: lies %.0f s after the next row's; the row is skipped",
+          self->csv.lines.path, self->row.line, wm_seconds_between(next_ns, here_ns));
+  }
+  if (status == WM_END) self->rows_ended = 1;
+  return status;
+}
+
+// ── pictures ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+// The container's next picture into self->picture; WM_END for good when it has no more or can't be told apart.
+static wm_status next_picture(wm_video *self, wm_error *err) {
+  wm_error why;
+  if (self->has_picture) return WM_OK;
+  if (self->pictures_ended) return WM_END;
+  wm_status status = self->file.next(&self->file, &self->picture, &why);
+  self->counts.empty = self->file.empty;
+  if (status == WM_OK) {
+    self->has_picture = 1;
+    return WM_OK;
+  }
+  if (status == WM_IO) {
+    if (err) *err = why;
+    return WM_IO;
+  }
+  if (status == WM_BAD_DATA) count(self, &self->counts.damaged, "%.200s; the pictures end here", why.text);
+  self->pictures_ended = 1;
+  return WM_END;
+}
+
+// Walks on to the picture that self->row names. WM_END: it isn't there, and is counted.
+static wm_status find_picture(wm_video *self, payload *out, wm_error *err) {
+  uint64_t wanted = (uint64_t)self->row.whole[FRAME];
+  if (self->file.fd < 0) {
+    wm_error why;
+    if (folder_find(&self->file, wanted, out, &why) == WM_OK) return WM_OK;
+    count(self, &self->counts.without_picture, "%.200s", why.text);
+    return WM_END;
+  }
+  for (;;) {
+    wm_status status = next_picture(self, err);
+    if (status == WM_IO) return status;
+    if (status == WM_END || self->picture.frame > wanted) {
+      count(self, &self->counts.without_picture, "%s:%ld: frame %" PRIu64 " is not in the video", self->csv.lines.path,
+            self->row.line, wanted);
+      return WM_END;
+    }
+    self->has_picture = 0;
+    if (self->picture.frame == wanted) {
+      *out = self->picture;
+      return WM_OK;
+    }
+    count(self, &self->counts.without_stamp, "%s: no row names the picture %" PRIu64, self->csv.lines.path,
+          self->picture.frame);
+  }
+}
+
+static int by_length(const void *a, const void *b) {
+  wm_time_ns x = *(const wm_time_ns *)a, y = *(const wm_time_ns *)b;
+  return (x > y) - (x < y);
+}
+
+// Gaps against the usual period, which is the middle of the last few. An hour is a recording joined to another.
+static void count_gap(wm_video *self, wm_time_ns t_ns) {
+  if (self->last_ns == WM_TIME_NONE) return;
+  wm_time_ns gap_ns = t_ns - self->last_ns;
+  if (gap_ns <= 0 || gap_ns > 3600 * WM_NS_PER_S) return;
+  wm_time_ns sorted[INTERVALS];
+  size_t n = self->intervals < INTERVALS ? self->intervals : INTERVALS;
+  memcpy(sorted, self->interval_ns, n * sizeof sorted[0]);
+  qsort(sorted, n, sizeof sorted[0], by_length);
+  if (n >= 3) {
+    wm_time_ns usual_ns = sorted[n / 2];
+    if (gap_ns > usual_ns + usual_ns / 2) self->counts.lost += (uint64_t)((gap_ns + usual_ns / 2) / usual_ns - 1);
+  }
+  self->interval_ns[self->intervals++ % INTERVALS] = gap_ns;
+}
+
+// The next row and its picture, into self->next.
+static wm_status locate(wm_video *self, wm_error *err) {
+  while (!self->next.there) {
+    if (!self->has_row) {
+      wm_status status = next_row(self, err);
+      if (status == WM_END) {
+        if (self->file.fd < 0) return WM_END;
+        while ((status = next_picture(self, err)) == WM_OK) {
+          self->has_picture = 0;
+          count(self, &self->counts.without_stamp, "%s: no row names the picture %" PRIu64, self->csv.lines.path,
+                self->picture.frame);
+        }
+        return status;
+      }
+      if (status != WM_OK) return status;
+      self->has_row = 1;
+    }
+    wm_status status = find_picture(self, &self->next.picture, err);
+    if (status == WM_IO) return status;
+    self->has_row = 0;
+    if (status != WM_OK) continue;
+    wm_time_ns t_ns = self->row.whole[T], exposure_ns = self->row.whole[EXPOSURE];
+    if (t_ns == self->last_ns) {
+      count(self, &self->counts.duplicated, "%s:%ld: t_ns: stands there twice", self->csv.lines.path, self->row.line);
+      continue;
+    }
+    count_gap(self, t_ns);
+    self->last_ns = t_ns;
+    wm_source_counts order = {0};
+    self->next.head = (wm_frame){.t_ns = t_ns,
+                                 .arrival_ns = arrival_order_next(&self->order, arrival_of(&self->row), &order),
+                                 .exposure_ns = exposure_ns < 0 ? 0 : exposure_ns,
+                                 .number = (uint64_t)self->row.whole[FRAME],
+                                 .camera = self->camera,
+                                 .width_px = self->width_px,
+                                 .height_px = self->height_px};
+    self->counts.out_of_order += order.out_of_order;
+    self->next.there = 1;
+  }
+  return WM_OK;
+}
+
+// ── decoding ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static void copy_rows(uint8_t *to, uint32_t to_stride, const uint8_t *from, uint32_t from_stride, uint32_t width,
+                      uint32_t height) {
+  for (uint32_t y = 0; y < height; y++) memcpy(to + (size_t)y * to_stride, from + (size_t)y * from_stride, width);
+}
+
+static jpeg_verdict decode(wm_video *self, size_t length, uint8_t *grey, uint32_t stride_bytes, char *why,
+                           size_t why_bytes) {
+  if (self->file.coding == PICTURE_JPEG)
+    return jpeg_decode(&self->jpeg, self->bytes[0], length, self->width_px, self->height_px, grey, stride_bytes, why,
+                       why_bytes);
+  // Rows as they are, or filled up to four bytes each.
+  uint32_t padded = (self->width_px + 3) & ~UINT32_C(3), stride = self->width_px;
+  if (length == (size_t)padded * self->height_px) stride = padded;
+  if (length != (size_t)stride * self->height_px) {
+    (void)snprintf(why, why_bytes, "has %zu bytes, the camera %u x %u pixels", length, self->width_px, self->height_px);
+    return JPEG_WRONG_SIZE;
+  }
+  copy_rows(grey, stride_bytes, self->bytes[0], stride, self->width_px, self->height_px);
+  return JPEG_GOOD;
+}
+
+// 1: a frame; 0: not one, counted; the rest by *status.
+static int take(wm_video *self, uint8_t *grey, uint32_t stride_bytes, wm_status *status, wm_error *err) {
+  const payload *picture = &self->next.picture;
+  char why[256];
+  if (picture->length > self->bytes_max) {
+    count(self, &self->counts.damaged,
+          "%s: frame %" PRIu64 ": %" PRIu64 " bytes are more than a picture of %u x %u has", self->file.path,
+          picture->frame, picture->length, self->width_px, self->height_px);
+    return 0;
+  }
+  wm_error read_error;
+  *status = container_read(&self->file, picture, self->bytes[0], &read_error);
+  if (*status != WM_OK) {
+    int is_io = *status == WM_IO;
+    if (is_io && err) *err = read_error;
+    if (!is_io) count(self, &self->counts.damaged, "%.200s", read_error.text);
+    *status = is_io ? WM_IO : WM_OK;
+    return 0;
+  }
+  size_t length = (size_t)picture->length;
+  if (length == self->before_length && memcmp(self->bytes[0], self->bytes[1], length) == 0) {
+    count(self, &self->counts.duplicated, "%s: frame %" PRIu64 " is the one before, byte by byte", self->file.path,
+          picture->frame);
+    return 0;
+  }
+  jpeg_verdict verdict = decode(self, length, grey, stride_bytes, why, sizeof why);
+  if (verdict != JPEG_GOOD) {
+    count(self, verdict == JPEG_DAMAGED ? &self->counts.damaged : &self->counts.wrong_size, "%s: frame %" PRIu64 ": %s",
+          self->file.path, picture->frame, why);
+    return 0;
+  }
+  uint8_t *before = self->bytes[1];
+  self->bytes[1] = self->bytes[0];
+  self->bytes[0] = before;
+  self->before_length = length;
+  return 1;
+}
+
+wm_status wm_video_next_into(wm_video *self, uint8_t *grey, uint32_t stride_bytes, wm_frame *out, wm_error *err) {
+  for (;;) {
+    wm_status status = locate(self, err);
+    if (status != WM_OK) return status;
+    int is_frame = take(self, grey, stride_bytes, &status, err);
+    if (status != WM_OK) return status;
+    self->next.there = 0;
+    if (!is_frame) continue;
+    *out = self->next.head;
+    out->grey = grey;
+    out->stride_bytes = stride_bytes;
+    self->counts.frames++;
+    return WM_OK;
+  }
+}
+
+wm_status wm_video_next(wm_video *self, wm_frame *out, wm_error *err) {
+  return wm_video_next_into(self, self->pixels, self->width_px, out, err);
+}
+
+wm_status wm_video_peek(wm_video *self, wm_frame *out, wm_error *err) {
+  wm_status status = locate(self, err);
+  if (status == WM_OK) *out = self->next.head;
+  return status;
+}
+
+wm_status wm_video_skip(wm_video *self, wm_error *err) {
+  wm_status status = locate(self, err);
+  if (status != WM_OK) return status;
+  self->next.there = 0;
+  self->counts.skipped++;
+  return WM_OK;
+}
+
+// ── opening ─────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+// A camera of unknown size has that of its first picture.
+static wm_status size_of_first(wm_video *self, wm_error *err) {
+  self->width_px = self->file.width_px;
+  self->height_px = self->file.height_px;
+  if (self->file.coding == PICTURE_GREY) return WM_OK;
+  wm_status status = locate(self, err);
+  if (status != WM_OK && status != WM_END) return status;
+  uint64_t length = status == WM_OK ? self->next.picture.length : 0;
+  jpeg_verdict verdict = JPEG_DAMAGED;
+  uint8_t *bytes = length > 0 && length <= (UINT64_C(1) << 28) ? malloc((size_t)length) : NULL;
+  if (bytes && container_read(&self->file, &self->next.picture, bytes, NULL) == WM_OK)
+    verdict = jpeg_size(&self->jpeg, bytes, (size_t)length, &self->width_px, &self->height_px);
+  free(bytes);
+  self->next.head.width_px = self->width_px;
+  self->next.head.height_px = self->height_px;
+  if (verdict == JPEG_GOOD) return WM_OK;
+  return wm_fail(err, WM_BAD_DATA, "%s: the first picture can't be read, and nothing else says how large they are",
+                 self->file.path);
+}
+
+static wm_status take_memory(wm_video *self, wm_error *err) {
+  if (self->width_px < 1 || self->height_px < 1 || self->width_px > PICTURE_SIDE_MAX ||
+      self->height_px > PICTURE_SIDE_MAX)
+    return wm_fail(err, WM_BAD_DATA, "%s: pictures of %u x %u pixels are not read (1 to %d a side)", self->file.path,
+                   self->width_px, self->height_px, PICTURE_SIDE_MAX);
+  self->bytes_max = jpeg_bytes_max(self->width_px, self->height_px);
+  self->bytes[0] = malloc(self->bytes_max);
+  self->bytes[1] = malloc(self->bytes_max);
+  self->pixels = malloc((size_t)self->width_px * self->height_px);
+  if (self->bytes[0] && self->bytes[1] && self->pixels) return WM_OK;
+  return wm_fail(err, WM_IO, "%s: no memory for its pictures", self->file.path);
+}
+
+static wm_status open_all(wm_video *self, const char *dir, const wm_camera *camera, const warner *warn, wm_error *err) {
+  char path[WM_PATH_MAX];
+  wm_status status = open_pictures(self, dir, camera->name, warn, err);
+  if (status != WM_OK) return status;
+  if (!video_path(dir, camera->name, ".csv", path))
+    return wm_fail(err, WM_NOT_FOUND, "%s: the path is longer than %d bytes", dir, WM_PATH_MAX - 1);
+  status = csv_open(&self->csv, path, &kFormat, warn->fn, warn->context, err);
+  if (status == WM_NOT_FOUND)
+    return wm_fail(err, WM_NOT_FOUND, "%s: is not there; it has to say when each picture of %s was taken", path,
+                   self->file.path);
+  if (status == WM_OK) status = jpeg_open(&self->jpeg, err);
+  if (status != WM_OK) return status;
+  self->width_px = camera->width_px;
+  self->height_px = camera->height_px;
+  if (self->width_px == 0) status = size_of_first(self, err);
+  return status == WM_OK ? take_memory(self, err) : status;
+}
+
+wm_status wm_video_open(const char *recording_dir, const wm_camera *camera, int32_t index, wm_warn_fn warn,
+                        void *context, wm_video **out, wm_error *err) {
+  *out = NULL;
+  wm_video *self = calloc(1, sizeof *self);
+  if (!self) return wm_fail(err, WM_IO, "%s: no memory to open its video", recording_dir);
+  self->file.fd = self->csv.lines.fd = -1;
+  self->camera = index;
+  self->newest_row = -1;
+  self->last_ns = WM_TIME_NONE;
+  const warner told = {warn, context};
+  wm_status status = open_all(self, recording_dir, camera, &told, err);
+  if (status != WM_OK) {
+    wm_video_close(self);
+    return status;
+  }
+  *out = self;
+  return WM_OK;
+}
+
+void wm_video_close(wm_video *self) {
+  if (!self) return;
+  container_close(&self->file);
+  csv_close(&self->csv);
+  jpeg_close(&self->jpeg);
+  free(self->bytes[0]);
+  free(self->bytes[1]);
+  free(self->pixels);
+  free(self);
+}
+
+uint32_t wm_video_width(const wm_video *self) { return self->width_px; }
+uint32_t wm_video_height(const wm_video *self) { return self->height_px; }
+const wm_video_counts *wm_video_counted(const wm_video *self) { return &self->counts; }

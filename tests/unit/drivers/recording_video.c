@@ -1,0 +1,303 @@
+// SPDX-License-Identifier: Apache-2.0
+// Videos of a recording: what is there becomes frames with their stamps, what isn't right is counted.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "folder.h"
+#include "unity.h"
+#include "video_files.h"
+#include "waymark/video.h"
+
+#define W 64
+#define H 48
+
+static wm_video *video;
+static wm_error err;
+static bytes file;
+static uint8_t jpeg[65536];
+static char dir[256];
+static wm_camera camera;
+
+void setUp(void) {
+  (void)snprintf(dir, sizeof dir, "%s", folder_make());
+  (void)mkdir(folder_path("video"), 0777);
+  camera = (wm_camera){.name = "front", .width_px = W, .height_px = H};
+  video = NULL;
+  file.size = 0;
+}
+
+void tearDown(void) {
+  char command[400];
+  wm_video_close(video);
+  (void)snprintf(command, sizeof command, "rm -r '%s'", dir);
+  TEST_ASSERT_EQUAL(0, system(command));
+}
+
+static void rows(const char *text) { folder_write("video/front.csv", text); }
+
+static void numbered_rows(int count) {
+  char text[4096] = "frame,t_ns,exposure_ns,arrival_ns\n", row[80];
+  for (int i = 0; i < count; i++) {
+    (void)snprintf(row, sizeof row, "%d,%d00000000,5000000,%d30000000\n", i, i + 1, i + 1);
+    strcat(text, row);
+  }
+  rows(text);
+}
+
+static void save(const char *name) { folder_write_bytes(name, (const char *)file.data, file.size); }
+
+static void add_jpeg(int level) {
+  size_t size = make_jpeg(W, H, level, jpeg, sizeof jpeg);
+  avi_chunk(&file, "00dc", jpeg, size);
+}
+
+static void open_it(void) {
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_video_open(dir, &camera, 3, NULL, NULL, &video, &err), err.text);
+}
+
+// The next frame; its left half has this level.
+static wm_frame expect_frame(uint64_t number, int level) {
+  wm_frame frame;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_video_next(video, &frame, &err), wm_video_counted(video)->first_problem);
+  TEST_ASSERT_EQUAL_UINT64(number, frame.number);
+  TEST_ASSERT_EQUAL(W, frame.width_px);
+  TEST_ASSERT_EQUAL(H, frame.height_px);
+  TEST_ASSERT_INT_WITHIN(4, level, frame.grey[5 * frame.stride_bytes + 5]);
+  TEST_ASSERT_INT_WITHIN(4, 255 - level, frame.grey[5 * frame.stride_bytes + W - 5]);
+  return frame;
+}
+
+static void expect_end(void) {
+  wm_frame frame;
+  TEST_ASSERT_EQUAL(WM_END, wm_video_next(video, &frame, &err));
+  TEST_ASSERT_EQUAL(WM_END, wm_video_next(video, &frame, &err));
+  TEST_ASSERT_EQUAL(WM_END, wm_video_peek(video, &frame, &err));
+}
+
+static void avi_of_jpegs(void) {
+  avi_head(&file, "MJPG", W, H, 1);
+  size_t size = make_jpeg(W, H, 20, jpeg, sizeof jpeg);
+  avi_chunk(&file, "00wb", "sound", 5);
+  avi_chunk(&file, "01dc", jpeg, size);
+  bytes_put(&file, "LIST\0\0\0\0rec ", 12);
+  size = make_jpeg(W, H, 60, jpeg, sizeof jpeg);
+  avi_chunk(&file, "01dc", jpeg, size);
+  bytes_put(&file, "RIFF\0\0\0\0AVIXLIST\0\0\0\0movi", 24);
+  size = make_jpeg(W, H, 90, jpeg, sizeof jpeg);
+  avi_chunk(&file, "01dc", jpeg, size);
+  avi_chunk(&file, "idx1", "whatever", 8);
+  save("video/front.avi");
+  numbered_rows(3);
+  TEST_ASSERT_TRUE(wm_video_there(dir, "front"));
+  TEST_ASSERT_FALSE(wm_video_there(dir, "rear"));
+  open_it();
+  wm_frame head;
+  TEST_ASSERT_EQUAL(WM_OK, wm_video_peek(video, &head, &err));
+  TEST_ASSERT_NULL(head.grey);
+  TEST_ASSERT_EQUAL_INT64(100000000, head.t_ns);
+  wm_frame frame = expect_frame(0, 20);
+  TEST_ASSERT_EQUAL_INT64(100000000, frame.t_ns);
+  TEST_ASSERT_EQUAL_INT64(130000000, frame.arrival_ns);
+  TEST_ASSERT_EQUAL_INT64(5000000, frame.exposure_ns);
+  TEST_ASSERT_EQUAL(3, frame.camera);
+  TEST_ASSERT_EQUAL(WM_OK, wm_video_skip(video, &err));
+  expect_frame(2, 90);
+  expect_end();
+  TEST_ASSERT_EQUAL_UINT64(2, wm_video_counted(video)->frames);
+  TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(video)->skipped);
+  TEST_ASSERT_EQUAL_STRING("", wm_video_counted(video)->first_problem);
+}
+
+static void matroska(void) {
+  mkv_head(&file, "V_MJPEG", W, H);
+  for (int i = 0; i < 3; i++) {
+    size_t size = make_jpeg(W, H, 30 * i, jpeg, sizeof jpeg);
+    mkv_block(&file, 1, "sound", 5);
+    mkv_block(&file, 2, jpeg, size);
+    if (i == 1) mkv_block(&file, 2, jpeg, 0);
+  }
+  save("video/front.mkv");
+  numbered_rows(3);
+  open_it();
+  for (int i = 0; i < 3; i++) expect_frame((uint64_t)i, 30 * i);
+  expect_end();
+  TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(video)->empty);
+}
+
+static void uncompressed(void) {
+  uint8_t pixels[W * H];
+  avi_head(&file, "Y800", W, H, 0);
+  for (int i = 0; i < 2; i++) {
+    for (int y = 0; y < H; y++)
+      for (int x = 0; x < W; x++) pixels[y * W + x] = (uint8_t)(x < W / 2 ? 40 + i : 215 - i);
+    avi_chunk(&file, "00db", pixels, sizeof pixels);
+  }
+  avi_chunk(&file, "00db", pixels, sizeof pixels - 1);
+  save("video/front.avi");
+  numbered_rows(3);
+  camera.width_px = camera.height_px = 0;  // the container says it
+  open_it();
+  expect_frame(0, 40);
+  expect_frame(1, 41);
+  expect_end();
+  TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(video)->wrong_size);
+}
+
+static void a_folder_of_files(void) {
+  (void)mkdir(folder_path("video/front"), 0777);
+  for (int i = 0; i < 4; i++) {
+    char name[64];
+    size_t size = make_jpeg(W, H, 10 * i, jpeg, sizeof jpeg);
+    (void)snprintf(name, sizeof name, "video/front/%06d.jpg", i);
+    if (i != 2) folder_write_bytes(name, (const char *)jpeg, size);
+  }
+  numbered_rows(4);
+  camera.width_px = camera.height_px = 0;  // the first picture says it
+  open_it();
+  TEST_ASSERT_EQUAL(W, wm_video_width(video));
+  expect_frame(0, 0);
+  expect_frame(1, 10);
+  expect_frame(3, 30);
+  expect_end();
+  TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(video)->without_picture);
+}
+
+static void colour_is_its_luma(void) {
+  avi_head(&file, "MJPG", W, H, 0);
+  size_t size = make_colour_jpeg(W, H, jpeg, sizeof jpeg);
+  avi_chunk(&file, "00dc", jpeg, size);
+  save("video/front.avi");
+  numbered_rows(1);
+  open_it();
+  wm_frame frame;
+  TEST_ASSERT_EQUAL(WM_OK, wm_video_next(video, &frame, &err));
+  TEST_ASSERT_INT_WITHIN(3, 95, frame.grey[100]);  // 0.299 * 200 + 0.701 * 50
+}
+
+static void what_is_not_right_is_counted(void) {
+  avi_head(&file, "MJPG", W, H, 0);
+  add_jpeg(10);                                     // 0
+  avi_chunk(&file, "00dc", "", 0);                  // no picture
+  add_jpeg(10);                                     // 1: the same again
+  avi_chunk(&file, "00dc", "this is no JPEG", 15);  // 2
+  size_t size = make_jpeg(W, H, 77, jpeg, sizeof jpeg);
+  avi_chunk(&file, "00dc", jpeg, size / 2);  // 3: cut
+  size = make_jpeg(2 * W, H, 77, jpeg, sizeof jpeg);
+  avi_chunk(&file, "00dc", jpeg, size);  // 4: too wide
+  add_jpeg(50);                          // 5
+  add_jpeg(60);                          // 6: no row
+  add_jpeg(70);                          // 7
+  add_jpeg(80);                          // 8: at the stamp of 7
+  add_jpeg(90);                          // 9: no row
+  save("video/front.avi");
+  rows("frame,t_ns,exposure_ns\n0,100,\n1,200,\n2,300,\n3,400,\n4,500,\nx,1,\n5,1000,\n4,1050,\n7,1100,\n8,1100,\n");
+  open_it();
+  expect_frame(0, 10);
+  expect_frame(5, 50);
+  expect_frame(7, 70);
+  expect_end();
+  const wm_video_counts *c = wm_video_counted(video);
+  TEST_ASSERT_EQUAL_UINT64(3, c->frames);
+  TEST_ASSERT_EQUAL_UINT64(1, c->empty);
+  TEST_ASSERT_EQUAL_UINT64(2, c->duplicated);
+  TEST_ASSERT_EQUAL_UINT64(2, c->damaged);
+  TEST_ASSERT_EQUAL_UINT64(1, c->wrong_size);
+  TEST_ASSERT_EQUAL_UINT64(2, c->malformed);
+  TEST_ASSERT_EQUAL_UINT64(2, c->without_stamp);
+  TEST_ASSERT_EQUAL_UINT64(4, c->lost);  // 500 to 1000 at a period of 100
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(c->first_problem, "frame 1 is the one before"), c->first_problem);
+}
+
+static void a_damaged_container_ends_the_pictures(void) {
+  avi_head(&file, "MJPG", W, H, 0);
+  add_jpeg(10);
+  bytes_put(&file, "\0\1\2\3\4\5\6\7\10", 9);
+  add_jpeg(20);
+  save("video/front.avi");
+  numbered_rows(2);
+  open_it();
+  expect_frame(0, 10);
+  expect_end();
+  TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(video)->damaged);
+  TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(video)->without_picture);
+  TEST_ASSERT_NOT_NULL(strstr(wm_video_counted(video)->first_problem, "the file is damaged"));
+}
+
+static void cut_files_end_where_they_end(void) {
+  for (int is_mkv = 0; is_mkv < 2; is_mkv++) {
+    if (is_mkv) {
+      mkv_head(&file, "V_MJPEG", W, H);
+    } else {
+      avi_head(&file, "MJPG", W, H, 0);
+    }
+    size_t head = file.size;
+    for (int i = 0; i < 2; i++) {
+      size_t size = make_jpeg(W, H, 10 + i, jpeg, sizeof jpeg);
+      if (is_mkv) {
+        mkv_block(&file, 2, jpeg, size);
+      } else {
+        avi_chunk(&file, "00dc", jpeg, size);
+      }
+    }
+    numbered_rows(2);
+    const char *name = is_mkv ? "video/front.mkv" : "video/front.avi";
+    for (size_t n = 0; n < file.size; n += 7) {
+      folder_write_bytes(name, (const char *)file.data, n);
+      wm_status status = wm_video_open(dir, &camera, 0, NULL, NULL, &video, &err);
+      TEST_ASSERT_TRUE(status == WM_OK || (n < head && err.text[0]));
+      wm_frame frame;
+      uint64_t frames = 0;
+      while (status == WM_OK && wm_video_next(video, &frame, &err) == WM_OK) frames++;
+      if (status == WM_OK) {
+        const wm_video_counts *c = wm_video_counted(video);
+        TEST_ASSERT_TRUE(frames < 2 && frames + c->without_picture + c->damaged >= 2);
+      }
+      wm_video_close(video);
+      video = NULL;
+    }
+    (void)unlink(folder_path(name));
+  }
+}
+
+static void refused(wm_status status, const char *text) {
+  TEST_ASSERT_EQUAL_MESSAGE(status, wm_video_open(dir, &camera, 0, NULL, NULL, &video, &err), err.text);
+  TEST_ASSERT_NULL(video);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, text), err.text);
+}
+
+static void what_is_refused(void) {
+  refused(WM_NOT_FOUND, "no pictures of the camera 'front'");
+  folder_write("video/front.mp4", "....ftypisom....");
+  refused(WM_UNSUPPORTED, "waymark import");
+  avi_head(&file, "H264", W, H, 0);
+  save("video/front.avi");
+  refused(WM_UNSUPPORTED, "'H264'");
+  mkv_head(&file, "V_MPEG4/ISO/AVC", W, H);
+  save("video/front.avi");  // by its bytes, not by its name
+  refused(WM_UNSUPPORTED, "V_MPEG4/ISO/AVC");
+  avi_head(&file, "MJPG", W, H, 0);
+  add_jpeg(1);
+  save("video/front.avi");
+  refused(WM_NOT_FOUND, "has to say when each picture");
+  rows("frame,exposure_ns\n");
+  refused(WM_BAD_CONFIG, "t_ns");
+  folder_write("video/front.avi", "RIFF");
+  refused(WM_BAD_DATA, "not a video");
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(avi_of_jpegs);
+  RUN_TEST(matroska);
+  RUN_TEST(uncompressed);
+  RUN_TEST(a_folder_of_files);
+  RUN_TEST(colour_is_its_luma);
+  RUN_TEST(what_is_not_right_is_counted);
+  RUN_TEST(a_damaged_container_ends_the_pictures);
+  RUN_TEST(cut_files_end_where_they_end);
+  RUN_TEST(what_is_refused);
+  return UNITY_END();
+}
