@@ -18,7 +18,7 @@ const error_case kErrorCases[] = {
      "config/robot.yaml:3: horizon_ms: unknown key; did you mean 'merge.horizon_ms'?"},
     {CONFIG, "Key that nobody knows", FILE_, "colour: red\n",
      "config/robot.yaml:3: colour: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
-     "can_signals, initial_pose, publish, merge, realtime, motion, odometry, landmark_ekf"},
+     "can_signals, initial_pose, publish, merge, realtime, motion, odometry, landmark_ekf, stereo_ekf"},
     {CONFIG, "Text where a number is needed", FILE_, "landmark_ekf: {gate: {hard: abc}}\n",
      "config/robot.yaml:3: landmark_ekf.gate.hard: 'abc' is not a number; a number from 1 to 1000000 is needed"},
     {CONFIG, "Number in quotes", FILE_, "publish: {rate_hz: '50'}\n",
@@ -38,9 +38,9 @@ const error_case kErrorCases[] = {
      "config/robot.yaml:3: merge: a map of parameters (KEY: VALUE) is needed"},
     {CONFIG, "Unknown estimator", FILE_, "format: waymark-config/1\nestimator: landmark_ukf\n",
      "config/robot.yaml:2: estimator: 'landmark_ukf' is unknown; did you mean 'landmark_ekf'? (one of: odometry, "
-     "landmark_ekf)"},
+     "landmark_ekf, stereo_ekf)"},
     {CONFIG, "No estimator", FILE_, "format: waymark-config/1\n",
-     "config/robot.yaml:1: estimator: is missing; one of these is needed: odometry, landmark_ekf"},
+     "config/robot.yaml:1: estimator: is missing; one of these is needed: odometry, landmark_ekf, stereo_ekf"},
     {CONFIG, "Another format", FILE_, "format: waymark-config/9\n",
      "config/robot.yaml:1: format: 'waymark-config/9' is not a format that this program reads; it reads "
      "waymark-config/1"},
