@@ -143,3 +143,16 @@ wm_status can_signals_read(const char *path, wm_can_binding **out, size_t *count
   wm_yaml_free(doc);
   return status;
 }
+
+wm_status wm_can_decoder_load(const char *dbc_path, const char *signals_path, wm_can_decoder **out, wm_error *err) {
+  wm_dbc *dbc = NULL;
+  wm_can_binding *bindings = NULL;
+  size_t count = 0;
+  *out = NULL;
+  wm_status status = wm_dbc_load(dbc_path, &dbc, err);
+  if (status == WM_OK) status = can_signals_read(signals_path, &bindings, &count, err);
+  if (status == WM_OK) status = wm_can_decoder_make(dbc, bindings, count, out, err);
+  free(bindings);
+  wm_dbc_free(dbc);
+  return status;
+}

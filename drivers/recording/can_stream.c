@@ -6,7 +6,6 @@
 #include <string.h>
 
 #include "arrival.h"
-#include "calibration.h"
 #include "lines.h"
 #include "waymark/can.h"
 
@@ -18,7 +17,6 @@ typedef struct log_frame {
 typedef struct can_stream {
   wm_source base;
   line_reader lines;
-  wm_dbc *dbc;
   wm_can_decoder *decoder;
   arrival_order order;
   uint32_t seq;
@@ -95,8 +93,7 @@ static wm_status next_quantities(wm_source *base, wm_event *out, wm_error *err) 
 static void close_can(wm_source *base) {
   can_stream *self = (can_stream *)base;
   lines_close(&self->lines);
-  if (self->decoder) wm_can_decoder_free(self->decoder);
-  if (self->dbc) wm_dbc_free(self->dbc);
+  wm_can_decoder_free(self->decoder);
   free(self);
 }
 
@@ -113,13 +110,8 @@ wm_status can_stream_open(const char *log, const char *dbc, const char *signals,
   self->base.kinds = WM_EVENT_BIT(WM_EVENT_QUANTITIES);
   self->lines.fd = -1;
   snprintf(self->base.name, sizeof self->base.name, "can");
-  wm_can_binding *bindings = NULL;
-  size_t count = 0;
-  wm_status status = wm_dbc_load(dbc, &self->dbc, err);
-  if (status == WM_OK) status = can_signals_read(signals, &bindings, &count, err);
-  if (status == WM_OK) status = wm_can_decoder_make(self->dbc, bindings, count, &self->decoder, err);
+  wm_status status = wm_can_decoder_load(dbc, signals, &self->decoder, err);
   if (status == WM_OK) status = lines_open(&self->lines, log, err);
-  free(bindings);
   if (status != WM_OK) {
     close_can(&self->base);
     return status;

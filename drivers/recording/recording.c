@@ -18,6 +18,7 @@
 struct wm_recording {
   char dir[WM_PATH_MAX];
   char name[128];
+  int is_robot;  // no folder: the overrides' files and devices
   double duration_s;
   wm_start start;
   wm_yaml *about;  // recording.yaml
@@ -49,7 +50,7 @@ static wm_status choose(const wm_recording *self, const char *override, const ch
     return WM_OK;
   }
   wm_status status = path_of(self, file, out, err);
-  *there = status == WM_OK && access(out, F_OK) == 0;
+  *there = status == WM_OK && !self->is_robot && access(out, F_OK) == 0;
   return status;
 }
 
@@ -301,6 +302,35 @@ wm_status wm_recording_open(const char *dir, const wm_recording_overrides *overr
   *out = self;
   return WM_OK;
 }
+
+wm_status wm_recording_open_robot(const char *name, const wm_recording_overrides *overrides, wm_warn_fn warn,
+                                  void *context, wm_recording **out, wm_error *err) {
+  *out = NULL;
+  wm_recording *self = calloc(1, sizeof *self);
+  if (!self) return wm_fail(err, WM_IO, "%s: no memory for it", name);
+  snprintf(self->name, sizeof self->name, "%s", name);
+  snprintf(self->dir, sizeof self->dir, "%s", name);
+  self->is_robot = 1;
+  self->duration_s = (double)NAN;
+  self->warn = (warner){warn, context};
+  self->overrides = *overrides;
+  wm_start_init(&self->start);
+  wm_status status = read_calibration(self, err);
+  if (status == WM_OK) status = read_landmarks(self, err);
+  if (status != WM_OK) {
+    wm_recording_close(self);
+    return status;
+  }
+  *out = self;
+  return WM_OK;
+}
+
+wm_status wm_recording_add_device(wm_recording *self, wm_source *device, uint32_t quantities, wm_error *err) {
+  self->quantities |= quantities;
+  return add_source(self, device, err);
+}
+
+int wm_recording_is_robot(const wm_recording *self) { return self->is_robot; }
 
 void wm_recording_close(wm_recording *self) {
   if (!self) return;

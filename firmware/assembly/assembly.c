@@ -85,10 +85,10 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   wm_source *const *sources = wm_recording_sources(recording, &count);
   for (size_t i = 0; i < count && i < WM_SOURCES_MAX; i++) add_source(out, sources[i]);
   if (!(out->kinds & WM_MOTION_EVENTS))
-    return wm_fail(err, WM_BAD_CONFIG,
-                   "%s: no motion: neither can.log with can-signals.yaml nor motion.csv is there or used; the pose "
-                   "can't be carried on without one",
-                   wm_recording_dir(recording));
+    return wm_fail(err, WM_BAD_CONFIG, "%s: no motion: %s is there or used; the pose can't be carried on without one",
+                   wm_recording_dir(recording),
+                   wm_recording_is_robot(recording) ? "no CAN interface (devices.can)"
+                                                    : "neither can.log with can-signals.yaml nor motion.csv");
   out->driving = wm_driving_choose(out->kinds, wm_recording_quantities(recording));
   wm_status status = check_motion(out, wm_recording_quantities(recording), err);
   return status == WM_OK ? check_estimator(out, err) : status;

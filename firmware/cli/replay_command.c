@@ -92,8 +92,9 @@ static int replay_log(const arguments *args) {
   wm_config config;
   memset(&config, 0, sizeof config);
   if (status == WM_OK)
-    status = args->config ? wm_config_load(args->config, &config, &err)
-                          : wm_config_parse(head->config_text, head->config_length, head->config_path, &config, &err);
+    status = args->config
+                 ? wm_config_load(args->config, &config, &err)
+                 : wm_config_parse_logged(head->config_text, head->config_length, head->config_path, &config, &err);
   if (status == WM_OK) {
     if (strcmp(head->program, WM_VERSION) != 0)
       (void)fprintf(stderr, "note: %s was written by waymark %s; this is %s: the last bits may differ\n", args->what,

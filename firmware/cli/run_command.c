@@ -6,18 +6,20 @@
 #include "commands.h"
 #include "options.h"
 #include "waymark/clock.h"
+#include "waymark/robot.h"
 #include "waymark/run.h"
 
 static const char kHelp[] =
-    "usage: waymark run --config FILE --recording RECORDING [options]\n"
+    "usage: waymark run --config FILE [--recording RECORDING] [options]\n"
     "\n"
     "Localizes live: a thread a source, the estimator on a real-time thread, poses over LCM (channel WAYMARK_POSE) "
     "and,\n"
-    "with --out, into files and an event log. The sources are a recording's, played at real speed. Ends with the\n"
-    "recording, after --duration, or by Ctrl-C, and writes everything then.\n"
+    "with --out, into files and an event log. The sources are the configuration's devices or, with --recording, a\n"
+    "recording's, played at real speed. Ends with the recording, after --duration, or by Ctrl-C (SIGTERM), and writes\n"
+    "everything then.\n"
     "\n"
     "  --config FILE          which estimator, and its parameters\n"
-    "  --recording RECORDING  what the sensors say\n"
+    "  --recording RECORDING  what the sensors say, instead of devices\n"
     "  --out FOLDER           trajectory, published poses, event log, health and timing\n"
     "  --duration S           seconds, then stop\n"
     "  --speed X              times real speed (default 1)\n"
@@ -26,6 +28,7 @@ static const char kHelp[] =
     "  --calibration FILE     instead of the recording's\n"
     "\n"
     "example:\n"
+    "  waymark run --config /etc/waymark/robot.yaml\n"
     "  waymark run --config config/starry-night-plan.yaml --recording RECORDING --out out/run --duration 60\n";
 
 typedef struct arguments {
@@ -68,7 +71,8 @@ static int run(const arguments *args) {
   wm_status status = override_path(config.overrides.landmarks, args->landmarks, &err);
   if (status == WM_OK) status = override_path(config.overrides.calibration, args->calibration, &err);
   if (status == WM_OK)
-    status = wm_recording_open(args->recording, &config.overrides, print_note, NULL, &recording, &err);
+    status = args->recording ? wm_recording_open(args->recording, &config.overrides, print_note, NULL, &recording, &err)
+                             : wm_robot_open(&config, print_note, NULL, &recording, &err);
   if (status == WM_OK) {
     static wm_live_report report;
     wm_time_ns begin_ns = wm_monotonic_ns();
@@ -106,11 +110,15 @@ int command_run(int argc, char *const *argv) {
     (void)fputs(kHelp, stdout);
     return EXIT_DONE;
   }
-  if (!args.config || !args.recording) {
-    (void)fprintf(stderr, "waymark: run needs %s\n\n%s", args.config ? "--recording RECORDING" : "--config FILE",
-                  kHelp);
+  if (!args.config) {
+    (void)fprintf(stderr, "waymark: run needs --config FILE\n\n%s", kHelp);
     return EXIT_USAGE;
   }
-  if (args.run.out_dir && check_out_dir(args.run.out_dir, args.recording, &err) != WM_OK) return complain(&err);
+  if (!args.recording && args.run.speed != 1) {
+    (void)wm_fail(&err, WM_BAD_USAGE, "--speed: devices run at real speed; it is for a recording (--recording)");
+    return complain(&err);
+  }
+  if (args.run.out_dir && check_out_dir(args.run.out_dir, args.recording ? args.recording : "", &err) != WM_OK)
+    return complain(&err);
   return run(&args);
 }

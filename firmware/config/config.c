@@ -6,6 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "devices.h"
 #include "keys.h"
 #include "sources.h"
 #include "waymark/text.h"
@@ -86,26 +87,28 @@ static wm_status check_top(const wm_yaml_node *root, wm_config *out, wm_error *e
 }
 
 // A file that the configuration names, relative to the configuration's folder.
-static wm_status read_file_name(const wm_yaml_node *root, const char *key, const char *config_path,
-                                char out[WM_PATH_MAX], wm_error *err) {
-  char name[WM_PATH_MAX];
+static wm_status read_file_name(const wm_yaml_node *root, const char *key, const char *path, char out[WM_PATH_MAX],
+                                int must_be_there, wm_error *err) {
   wm_yaml_node node = wm_yaml_get(root, key);
   if (!wm_yaml_there(&node)) return WM_OK;
-  wm_status status = wm_yaml_string(&node, name, sizeof name, err);
-  if (status != WM_OK) return status;
-  const char *slash = strrchr(config_path, '/');
-  int folder = name[0] == '/' || !slash ? 0 : (int)(slash - config_path) + 1;
-  if (snprintf(out, WM_PATH_MAX, "%.*s%s", folder, config_path, name) >= WM_PATH_MAX)
-    return wm_yaml_fail(&node, err, "the path is longer than %d bytes", WM_PATH_MAX - 1);
-  if (access(out, R_OK) != 0) return wm_yaml_fail(&node, err, "'%s' cannot be read (looked for %s)", name, out);
-  return WM_OK;
+  wm_status status = config_path(&node, path, out, err);
+  if (status != WM_OK || !must_be_there || access(out, R_OK) == 0) return status;
+  char name[WM_PATH_MAX] = "";
+  (void)wm_yaml_string(&node, name, sizeof name, NULL);
+  return wm_yaml_fail(&node, err, "'%s' cannot be read (looked for %s)", name, out);
 }
 
-static wm_status read_files(const wm_yaml_node *root, wm_config *out, wm_error *err) {
-  wm_status status = read_file_name(root, "calibration", out->path, out->overrides.calibration, err);
-  if (status == WM_OK) status = read_file_name(root, "landmarks", out->path, out->overrides.landmarks, err);
-  if (status == WM_OK) status = read_file_name(root, "dbc", out->path, out->overrides.dbc, err);
-  if (status == WM_OK) status = read_file_name(root, "can_signals", out->path, out->overrides.can_signals, err);
+static wm_status read_files(const wm_yaml_node *root, int must_be_there, wm_config *out, wm_error *err) {
+  const struct {
+    const char *key;
+    char *path;
+  } files[] = {{"calibration", out->overrides.calibration},
+               {"landmarks", out->overrides.landmarks},
+               {"dbc", out->overrides.dbc},
+               {"can_signals", out->overrides.can_signals}};
+  wm_status status = WM_OK;
+  for (size_t i = 0; status == WM_OK && i < sizeof files / sizeof files[0]; i++)
+    status = read_file_name(root, files[i].key, out->path, files[i].path, must_be_there, err);
   return status;
 }
 
@@ -138,7 +141,7 @@ static wm_status allocate(wm_config *out, wm_error *err) {
   return WM_OK;
 }
 
-static wm_status read_all(const wm_yaml_node *root, wm_config *out, wm_error *err) {
+static wm_status read_all(const wm_yaml_node *root, int files_must_be_there, wm_config *out, wm_error *err) {
   if (!wm_yaml_is_map(root))
     return wm_yaml_fail(root, err, "a map that begins with 'format: waymark-config/1' is needed");
   wm_params_defaults(&wm_runtime_params_table, &out->runtime);
@@ -148,19 +151,21 @@ static wm_status read_all(const wm_yaml_node *root, wm_config *out, wm_error *er
   if (status == WM_OK) status = allocate(out, err);
   if (status == WM_OK) status = read_sections(root, out, err);
   if (status == WM_OK) status = config_read_sources(root, out, err);
-  if (status == WM_OK) status = read_files(root, out, err);
+  if (status == WM_OK) status = read_files(root, files_must_be_there, out, err);
+  if (status == WM_OK) status = config_read_devices(root, out, err);
   if (status == WM_OK) status = read_texts(root, out, err);
   return status == WM_OK ? read_start(root, out, err) : status;
 }
 
-wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_config *out, wm_error *err) {
+static wm_status parse(const char *text, size_t length, const char *path, int files_must_be_there, wm_config *out,
+                       wm_error *err) {
   memset(out, 0, sizeof *out);
   snprintf(out->path, sizeof out->path, "%s", path);
   wm_yaml *doc;
   wm_status status = wm_yaml_parse(text, length, path, &doc, err);
   if (status != WM_OK) return status;
   wm_yaml_node root = wm_yaml_root(doc);
-  status = read_all(&root, out, err);
+  status = read_all(&root, files_must_be_there, out, err);
   wm_yaml_free(doc);
   char *kept = malloc(length + 1);
   if (status != WM_OK || !kept) {
@@ -173,6 +178,14 @@ wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_
   out->text = kept;
   out->text_length = length;
   return WM_OK;
+}
+
+wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_config *out, wm_error *err) {
+  return parse(text, length, path, 1, out, err);
+}
+
+wm_status wm_config_parse_logged(const char *text, size_t length, const char *path, wm_config *out, wm_error *err) {
+  return parse(text, length, path, 0, out, err);
 }
 
 wm_status wm_config_load(const char *path, wm_config *out, wm_error *err) {

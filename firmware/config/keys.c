@@ -17,6 +17,7 @@ const config_key kConfigKeys[] = {
     {"landmarks", "file", "the recording's", "landmarks.csv to take instead of the recording's."},
     {"dbc", "file", "the recording's", "DBC file to take instead of the recording's vehicle.dbc."},
     {"can_signals", "file", "the recording's", "can-signals.yaml to take instead of the recording's."},
+    {"devices", "map", "none", "The robot's own devices, for `waymark run` without a recording: `can`. See below."},
     {"initial_pose", "map", "the recording's",
      "Start pose: `t_ns`, `x_m`, `y_m`, `z_m`, `heading_rad` or `heading_deg`, `qx`, `qy`, `qz`, `qw`, `sigma_xy_m`, "
      "`sigma_heading_rad` or `sigma_heading_deg`; what is absent is unknown."},
@@ -36,6 +37,13 @@ const config_key kConfigSourceKeys[] = {
      "ms. Above 0: after a datum the source promises silence for so long, and the merge need not wait for it."},
     {"from_s", "number", "the beginning", "s from the run's first stamp. Earlier data are not taken."},
     {"until_s", "number", "the end", "s from the run's first stamp. Later data are not taken."},
+    {NULL, NULL, NULL, NULL},
+};
+
+const config_key kConfigCanDeviceKeys[] = {
+    {"interface", "text", "needed", "SocketCAN's name of it, e.g. `can0`. It needn't be there yet."},
+    {"dbc", "file", "`dbc` at the top", "DBC file of this bus."},
+    {"can_signals", "file", "`can_signals` at the top", "Which signals of this bus are which quantities."},
     {NULL, NULL, NULL, NULL},
 };
 

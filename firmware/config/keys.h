@@ -17,6 +17,7 @@ typedef struct config_key {
 // Ends with a NULL key.
 extern const config_key kConfigKeys[];
 extern const config_key kConfigSourceKeys[];
+extern const config_key kConfigCanDeviceKeys[];
 
 // A table and where it stands in the file: `prefix` is "" for the runtime's, else "motion." or "ESTIMATOR.".
 typedef struct config_section {

@@ -55,6 +55,8 @@ void wm_config_reference(FILE *to) {
   print_keys(to, kConfigKeys);
   fprintf(to, "\n## Each entry of `sources`\n\n");
   print_keys(to, kConfigSourceKeys);
+  fprintf(to, "\n## Each entry of `devices.can`\n\n");
+  print_keys(to, kConfigCanDeviceKeys);
   fprintf(to, "\n## `merge`, `publish`, `realtime`\n\n");
   print_table(to, &sections[0]);
   fprintf(to, "\n## `motion`\n\n");

@@ -27,9 +27,10 @@ static wm_status read_name(const wm_yaml_node *item, const wm_config *config, wm
   if (strcmp(base, out->name) == 0) {
     status = wm_yaml_choice(&name, kNames, &kind, err);
     if (status != WM_OK) return status;
-  } else if (strcmp(base, "sightings") != 0 && strcmp(base, "markers") != 0) {
-    return wm_yaml_fail(&name, err, "'%s' has a sensor's name; only sightings:SENSOR and markers:SENSOR are possible",
-                        out->name);
+  } else if (strcmp(base, "sightings") != 0 && strcmp(base, "markers") != 0 && strcmp(base, "can") != 0) {
+    return wm_yaml_fail(
+        &name, err, "'%s' has a sensor's name; only sightings:SENSOR, markers:SENSOR and can:INTERFACE are possible",
+        out->name);
   }
   for (size_t i = 0; i < config->source_count; i++)
     if (strcmp(config->sources[i].name, out->name) == 0)

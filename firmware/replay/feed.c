@@ -34,17 +34,22 @@ wm_status wm_feed_advance(wm_feed *self, wm_error *err) {
   return status == WM_OK ? skip_outside(self, err) : status;
 }
 
-wm_status wm_feeds_open(const wm_assembly *assembly, wm_feed *feeds, wm_time_ns *first_ns, wm_error *err) {
+wm_status wm_feeds_open(const wm_assembly *assembly, wm_feed *feeds, wm_time_ns now_ns, wm_time_ns *first_ns,
+                        wm_error *err) {
+  int recorded = 0;
   *first_ns = INT64_MAX;
   for (size_t i = 0; i < assembly->source_count; i++) {
     wm_feed *feed = &feeds[i];
     memset(feed, 0, sizeof *feed);
     feed->source = assembly->sources[i].source;
     feed->index = (uint16_t)i;
+    if (feed->source->is_live) continue;
+    recorded = 1;
     wm_status status = read_one(feed, err);
     if (status != WM_OK) return status;
     if (feed->has_next && feed->next.t_ns < *first_ns) *first_ns = feed->next.t_ns;
   }
+  if (!recorded) *first_ns = now_ns;
   if (*first_ns == INT64_MAX)
     return wm_fail(err, WM_BAD_DATA, "'%s' has nothing to say: none of its %zu sources holds a datum that can be used",
                    assembly->recording, assembly->source_count);
@@ -74,5 +79,9 @@ void wm_feeds_health(const wm_feed *feeds, size_t count, wm_health *health) {
     out->out_of_order = counts->out_of_order;
     out->ignored = counts->ignored + feeds[i].outside;
     out->frozen = counts->frozen;
+    out->overflows = counts->overflows;
+    out->bus_errors = counts->bus_errors;
+    out->device = counts->device;
+    out->stamp_uncertainty_ns = counts->stamp_uncertainty_ns;
   }
 }

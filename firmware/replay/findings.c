@@ -39,7 +39,9 @@ static void about_losses(speaker *to, const wm_source_health *s) {
                {s->out_of_order, "were older than the one before"},
                {s->duplicates, "were sent twice and fused once"},
                {s->future, "had stamps from the future"},
-               {s->frozen, "came with a counter that stands still"}};
+               {s->frozen, "came with a counter that stands still"},
+               {s->overflows, "were dropped by the kernel or the device because nobody took them in time"},
+               {s->bus_errors, "error frames on the bus"}};
   for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
     if (kinds[i].count == 0) continue;
     char line[240];
@@ -59,6 +61,13 @@ static void about_silence(speaker *to, const wm_source_health *s) {
   say(to, line);
 }
 
+static void about_device(speaker *to, const wm_source_health *s) {
+  if (s->device == WM_DEVICE_NONE || s->device == WM_DEVICE_WORKS) return;
+  char line[120];
+  (void)snprintf(line, sizeof line, "%s: its device is %s", s->name, wm_device_state_name(s->device));
+  say(to, line);
+}
+
 static void about_motion(speaker *to, uint32_t bits) {
   static const char *const kLines[] = {
       "motion: the left encoder stood still while the robot moved (dead?)",
@@ -75,6 +84,7 @@ size_t wm_findings(const wm_health *health, wm_finding_fn function, void *contex
     about_lateness(&to, &health->sources[i]);
     about_losses(&to, &health->sources[i]);
     about_silence(&to, &health->sources[i]);
+    about_device(&to, &health->sources[i]);
   }
   about_motion(&to, health->motion_health);
   if (health->outputs_lost > 0) {

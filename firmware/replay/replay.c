@@ -133,7 +133,7 @@ static wm_status run(replay *self, const wm_config *config, wm_recording *record
   self->output = wm_run_folder_output(self->folder);
   self->publish_ns = wm_ns_from_seconds(1.0 / config->runtime.publish_rate_hz);
   status = wm_pipeline_start(&self->pipeline, self->output, err);
-  if (status == WM_OK) status = wm_feeds_open(&self->assembly, self->feeds, &self->first_ns, err);
+  if (status == WM_OK) status = wm_feeds_open(&self->assembly, self->feeds, 0, &self->first_ns, err);
   if (status != WM_OK) return status;
 
   begin_steady(self);

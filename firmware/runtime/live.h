@@ -28,7 +28,10 @@ typedef struct live_source {
   wm_status status;  // of the thread, once it is done
   wm_error error;
   // What the source counted, for the health message.
-  _Atomic uint64_t lost, malformed, not_finite, out_of_order, ignored, frozen;
+  _Atomic uint64_t lost, malformed, not_finite, out_of_order, ignored, frozen, overflows, bus_errors;
+  _Atomic int64_t stamp_uncertainty_ns;
+  atomic_uint device;   // wm_device_state
+  uint8_t said_device;  // the thread's own
 } live_source;
 
 // The estimator's thread.

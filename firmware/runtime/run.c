@@ -73,7 +73,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   if (status == WM_OK) status = take_memory(self, err);
   if (status == WM_OK) status = wm_pipeline_start(&self->estimator.pipeline, estimator_output(&self->estimator), err);
   wm_time_ns first_ns;
-  if (status == WM_OK) status = wm_feeds_open(&self->assembly, self->feeds, &first_ns, err);
+  if (status == WM_OK) status = wm_feeds_open(&self->assembly, self->feeds, wm_monotonic_ns(), &first_ns, err);
   if (status == WM_OK && self->options->out_dir)
     status = wm_run_folder_open(self->options->out_dir, &self->assembly, &self->sink.folder, err);
   if (status != WM_OK) return status;
@@ -95,7 +95,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
 static void start_clock(live *self) {
   const wm_feed *first = wm_feeds_earliest(self->feeds, self->assembly.source_count);
   wm_time_ns begin_ns = wm_monotonic_ns() + BEFORE_FIRST_NS;
-  self->clock = (run_clock){begin_ns, first ? first->next.arrival_ns : 0, self->options->speed};
+  self->clock = (run_clock){begin_ns, first ? first->next.arrival_ns : begin_ns, self->options->speed};
   self->estimator.next_publish_ns = self->clock.run_ns;
   self->estimator.next_health_ns = self->clock.run_ns;
 }
@@ -152,13 +152,25 @@ static wm_status start_threads(live *self, thread_list *threads, wm_live_report 
 
 // ── while it runs, and its end ──────────────────────────────────────────────────────────────────────────────────────
 
+// A recording that is played is over. Devices have no end.
+static int recording_is_over(live *self) {
+  int recorded = 0;
+  for (size_t i = 0; i < self->assembly.source_count; i++) {
+    if (self->feeds[i].source->is_live) continue;
+    recorded = 1;
+    if (!atomic_load_explicit(&self->sources[i].done, memory_order_acquire)) return 0;
+  }
+  return recorded;
+}
+
 static void wait_for_end(live *self) {
   wm_time_ns end_ns = INT64_MAX;
   if (self->options->duration_s > 0)
     end_ns = self->clock.monotonic_ns + wm_ns_from_seconds(fmin(self->options->duration_s, 1e9));
   while (!atomic_load_explicit(&self->estimator.done, memory_order_acquire)) {
     sleep_until(wm_monotonic_ns() + LOOK_EVERY_NS);
-    if ((self->options->stop && atomic_load(self->options->stop)) || wm_monotonic_ns() >= end_ns)
+    if ((self->options->stop && atomic_load(self->options->stop)) || wm_monotonic_ns() >= end_ns ||
+        recording_is_over(self))
       atomic_store(&self->stop, 1);
   }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The run's clock: that of the recording, beginning when the run begins and running with the monotonic clock. On
-// devices it would be the monotonic clock itself.
+// devices it is the monotonic clock itself.
 #ifndef WAYMARK_FIRMWARE_RUN_CLOCK_H
 #define WAYMARK_FIRMWARE_RUN_CLOCK_H
 

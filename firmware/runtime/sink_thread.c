@@ -67,6 +67,10 @@ static void add_source_counts(live *run, wm_health *health) {
     to->out_of_order = atomic_load_explicit(&from->out_of_order, memory_order_relaxed);
     to->ignored = atomic_load_explicit(&from->ignored, memory_order_relaxed);
     to->frozen = atomic_load_explicit(&from->frozen, memory_order_relaxed);
+    to->overflows = atomic_load_explicit(&from->overflows, memory_order_relaxed);
+    to->bus_errors = atomic_load_explicit(&from->bus_errors, memory_order_relaxed);
+    to->stamp_uncertainty_ns = atomic_load_explicit(&from->stamp_uncertainty_ns, memory_order_relaxed);
+    to->device = (uint8_t)atomic_load_explicit(&from->device, memory_order_relaxed);
   }
 }
 

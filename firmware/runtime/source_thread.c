@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hands a source's events out when they are due and puts them into its ring. A device's thread is the same without the
-// waiting.
+// Puts a source's events into its ring: a recording's when they are due, a device's as they come.
 #include <string.h>
 
 #include "live.h"
@@ -19,9 +18,8 @@ static int wait_until(const live *run, wm_time_ns monotonic_ns) {
   }
 }
 
-static void hand_out(live_source *self) {
-  wm_event *event = &self->feed->next;
-  event->arrival_ns = run_now(&self->run->clock);  // it arrives now, whatever the recording says
+static void put(live_source *self) {
+  const wm_event *event = &self->feed->next;
   void *slot = wm_ring_reserve(&self->ring);
   if (!slot) return;  // counted by the ring
   memcpy(slot, event, wm_event_bytes(event));
@@ -36,17 +34,51 @@ static void share_counts(live_source *self) {
   atomic_store_explicit(&self->out_of_order, counts->out_of_order, memory_order_relaxed);
   atomic_store_explicit(&self->ignored, counts->ignored + self->feed->outside, memory_order_relaxed);
   atomic_store_explicit(&self->frozen, counts->frozen, memory_order_relaxed);
+  atomic_store_explicit(&self->overflows, counts->overflows, memory_order_relaxed);
+  atomic_store_explicit(&self->bus_errors, counts->bus_errors, memory_order_relaxed);
+  atomic_store_explicit(&self->stamp_uncertainty_ns, counts->stamp_uncertainty_ns, memory_order_relaxed);
+  atomic_store_explicit(&self->device, counts->device, memory_order_relaxed);
+}
+
+static void play_recording(live_source *self) {
+  const run_clock *clock = &self->run->clock;
+  while (self->feed->has_next && wait_until(self->run, monotonic_from_run(clock, self->feed->next.arrival_ns))) {
+    self->feed->next.arrival_ns = run_now(clock);  // it arrives now, whatever the recording says
+    put(self);
+    self->status = wm_feed_advance(self->feed, &self->error);
+    share_counts(self);
+    if (self->status != WM_OK) break;
+  }
+}
+
+static void say_device(live_source *self) {
+  const wm_source_counts *counts = &self->feed->source->counts;
+  if (counts->device == self->said_device) return;
+  self->said_device = counts->device;
+  live_say(self->run, "%s: %s", self->feed->source->name, counts->device_note);
+}
+
+static void listen_to_device(live_source *self) {
+  const run_clock *clock = &self->run->clock;
+  while (!atomic_load_explicit(&self->run->stop, memory_order_relaxed)) {
+    self->status = wm_feed_advance(self->feed, &self->error);
+    share_counts(self);
+    say_device(self);
+    if (self->status != WM_OK) break;
+    if (!self->feed->has_next) continue;
+    self->feed->next.t_ns = run_from_monotonic(clock, self->feed->next.t_ns);
+    self->feed->next.arrival_ns = run_from_monotonic(clock, self->feed->next.arrival_ns);
+    put(self);
+  }
 }
 
 void *source_thread(void *argument) {
   live_source *self = argument;
   wm_touch_stack(THREAD_TOUCHED_BYTES);
-  while (self->feed->has_next &&
-         wait_until(self->run, monotonic_from_run(&self->run->clock, self->feed->next.arrival_ns))) {
-    hand_out(self);
-    self->status = wm_feed_advance(self->feed, &self->error);
-    share_counts(self);
-    if (self->status != WM_OK) break;
+  if (self->feed->source->is_live) {
+    listen_to_device(self);
+  } else {
+    play_recording(self);
   }
   if (self->status != WM_OK) live_say(self->run, "%s: ends here: %s", self->feed->source->name, self->error.text);
   atomic_store_explicit(&self->done, 1, memory_order_release);

@@ -84,6 +84,11 @@ static void put_source(FILE *f, const wm_source_health *s) {
                 ", \"out_of_order\": %" PRIu64 ", \"ignored\": %" PRIu64 ", \"frozen\": %" PRIu64,
                 s->late, s->dropped, s->lost, s->duplicates, s->future, s->malformed, s->not_finite, s->out_of_order,
                 s->ignored, s->frozen);
+  if (s->device != WM_DEVICE_NONE)
+    (void)fprintf(f,
+                  ", \"device\": \"%s\", \"overflows\": %" PRIu64 ", \"bus_errors\": %" PRIu64
+                  ", \"stamp_uncertainty_ms\": %.9g",
+                  wm_device_state_name(s->device), s->overflows, s->bus_errors, (double)s->stamp_uncertainty_ns * 1e-6);
   (void)fprintf(f, ", \"lateness_p99_ms\": %.9g, \"lateness_max_ms\": %.9g", (double)s->lateness_p99_ns * 1e-6,
                 (double)s->lateness_max_ns * 1e-6);
   (void)fputs(", \"newest_ns\": ", f);

@@ -80,6 +80,10 @@ static void put_source(waymark_source_health_t *out, const wm_source_health *s) 
   out->newest_ns = s->newest_ns;
   out->silent_ns = s->silent_ns;
   out->stale = (int8_t)s->stale;
+  out->overflows = (int64_t)s->overflows;
+  out->bus_errors = (int64_t)s->bus_errors;
+  out->stamp_uncertainty_ns = s->stamp_uncertainty_ns;
+  out->device = (int8_t)s->device;
 }
 
 size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {

@@ -83,7 +83,8 @@ for table in trajectory published; do
 done
 
 expect 2 "run needs --config" run
-expect 2 "run needs --recording" run --config "$work/good.yaml"
+expect 2 "devices: is missing, and no recording is given" run --config "$work/good.yaml"
+expect 2 "devices run at real speed" run --config "$work/good.yaml" --speed 2
 expect 2 "'0' is no number above 0" run --config "$work/good.yaml" --recording "$work/rec" --duration 0
 expect 0 "20 poses" run --config "$work/good.yaml" --recording "$work/rec" --out "$work/live"
 cmp -s "$work/deep/er/out/trajectory.csv" "$work/live/trajectory.csv" || { echo "run and replay differ"; failures=$((failures + 1)); }

@@ -34,6 +34,13 @@ typedef struct wm_recording wm_recording;
 // Unknown keys and other oddities that don't stop are handed to `warn` (may be NULL), one line each.
 typedef void (*wm_warn_fn)(void *context, const char *text);
 
+// A robot instead of a recording: calibration and landmarks as the overrides name them, no streams. Its sources are
+// devices, added before they are asked for.
+wm_status wm_recording_open_robot(const char *name, const wm_recording_overrides *overrides, wm_warn_fn warn,
+                                  void *context, wm_recording **out, wm_error *err);
+// Takes the source over, also where it fails (WM_FULL). `quantities`: bit per wm_quantity that it can give.
+wm_status wm_recording_add_device(wm_recording *self, wm_source *device, uint32_t quantities, wm_error *err);
+
 wm_status wm_recording_open(const char *dir, const wm_recording_overrides *overrides, wm_warn_fn warn, void *context,
                             wm_recording **out, wm_error *err);
 void wm_recording_close(wm_recording *self);
@@ -46,7 +53,8 @@ const wm_sensor *wm_recording_sensors(const wm_recording *self, size_t *count);
 const wm_landmark *wm_recording_landmarks(const wm_recording *self, size_t *count);
 const wm_rig *wm_recording_rig(const wm_recording *self);      // cameras; an empty one where calibration.yaml has none
 const wm_start *wm_recording_start(const wm_recording *self);  // initial_pose; NaN where unknown
-uint32_t wm_recording_quantities(const wm_recording *self);    // bit per wm_quantity that the CAN binding gives
+int wm_recording_is_robot(const wm_recording *self);
+uint32_t wm_recording_quantities(const wm_recording *self);  // bit per wm_quantity that the CAN binding gives
 // Text of calibration.yaml as read ("" where there is none), for the event log.
 const char *wm_recording_calibration_text(const wm_recording *self, size_t *length);
 
@@ -56,6 +64,9 @@ const char *wm_recording_calibration_text(const wm_recording *self, size_t *leng
 extern const char *const wm_start_keys[];
 void wm_start_init(wm_start *out);
 wm_status wm_start_read(const wm_yaml_node *map, wm_start *out, wm_error *err);
+
+// A decoder from a DBC file and a can-signals.yaml. Allocates.
+wm_status wm_can_decoder_load(const char *dbc_path, const char *signals_path, wm_can_decoder **out, wm_error *err);
 
 // landmarks.csv alone; *out is the caller's to free. An empty z_m or sigma_m is 0 (z_m with a warning), an empty
 // yaw_rad NaN; an id that stands there twice, or a row that can't be read, is an error.

@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "waymark/event.h"
+#include "waymark/health.h"
 #include "waymark/status.h"
 
 #ifdef __cplusplus
@@ -25,14 +26,23 @@ typedef struct wm_source_counts {
   uint64_t ignored;         // well-formed, but nothing is bound to it (other CAN frames)
   uint64_t frozen;          // frames whose counter stood still
   uint64_t bus_errors;      // CAN error frames: the controller says that the bus is in trouble
+  uint64_t overflows;       // dropped by the kernel or the controller because nobody took them in time
   char first_problem[256];  // text of the first malformed one, with file and line; "" where none
+  // Devices: wm_device_state with what a person should know of it, and how far a stamp may be off.
+  uint8_t device;
+  char device_note[160];
+  wm_time_ns stamp_uncertainty_ns;
 } wm_source_counts;
+
+// A device's `next` gives up waiting after this, so that a stop is noticed.
+#define WM_DEVICE_WAIT_MS 50
 
 typedef struct wm_source wm_source;
 
 typedef struct wm_source_ops {
   // Fills *out (t_ns, arrival_ns, seq, kind, as; `source` is set to self->index) and returns WM_OK; WM_END when it has
-  // no more; WM_AGAIN when nothing is there now (devices). Bad data is counted and skipped, never returned.
+  // no more; WM_AGAIN when nothing came for a while (devices: they wait for up to WM_DEVICE_WAIT_MS, and never end).
+  // Bad data is counted and skipped, never returned. Devices stamp by CLOCK_MONOTONIC.
   wm_status (*next)(wm_source *self, wm_event *out, wm_error *err);
   void (*close)(wm_source *self);
 } wm_source_ops;
@@ -42,6 +52,7 @@ struct wm_source {
   char name[WM_SOURCE_NAME_MAX];  // "can", "motion", "sightings:laser", "gnss"
   uint16_t index;                 // in the run's table of sources: also the order at equal stamps
   uint8_t is_motion;              // its events are motion
+  uint8_t is_live;                // a device: its data come when they come
   uint8_t in_order;               // promises that its stamps never go back (a file without arrival_ns, a CAN bus)
   uint32_t kinds;                 // WM_EVENT_BIT of what it hands out
   wm_source_counts counts;

@@ -12,6 +12,7 @@
 //   landmarks: FILE
 //   dbc: FILE
 //   can_signals: FILE
+//   devices: {can: [{interface: can0}]}    # the robot's own, where there is no recording
 //   initial_pose: {x_m: 0, y_m: 0, heading_rad: 0, sigma_xy_m: 0.05, sigma_heading_rad: 0.05}
 //   merge: {horizon_ms: 300, ...}  # wm_runtime_params
 //   publish: {rate_hz: 50, ...}
@@ -25,6 +26,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#include "waymark/devices.h"
 #include "waymark/estimator.h"
 #include "waymark/recording.h"
 #include "waymark/source.h"
@@ -69,6 +71,7 @@ typedef struct wm_config {
   wm_motion_params *motion;
   wm_runtime_params runtime;
   wm_recording_overrides overrides;
+  wm_devices_config devices;
   int has_initial_pose;
   wm_start initial_pose;
   wm_source_config sources[WM_SOURCES_MAX];
@@ -80,6 +83,8 @@ typedef struct wm_config {
 // Every mistake stops with file, line, key, what is there and what is allowed ("did you mean"). Allocates.
 wm_status wm_config_load(const char *path, wm_config *out, wm_error *err);
 wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_config *out, wm_error *err);
+// As wm_config_parse, for the text in an event log: the files that it names needn't be on this computer.
+wm_status wm_config_parse_logged(const char *text, size_t length, const char *path, wm_config *out, wm_error *err);
 void wm_config_free(wm_config *config);
 // The settings of the source `name` ("sightings:laser" takes those of "sightings"), and its rank in the config's order.
 void wm_config_source(const wm_config *config, const char *name, wm_source_config *out, int *rank);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // One used source, one event ahead: the events inside of the configuration's from_s and until_s, numbered as the run's
-// table of sources does. For recorded sources: one that has nothing now has nothing more. Replay reads all feeds by the
-// order of arrival; in a run each has a thread. One thread each.
+// table of sources does. Replay reads all feeds by the order of arrival; in a run each has a thread. A recorded source
+// that has nothing now has nothing more; a device's feed (source->is_live) is empty at first and after a wait in vain,
+// and never ends. One thread each.
 #ifndef WAYMARK_FEED_H
 #define WAYMARK_FEED_H
 
@@ -19,10 +20,13 @@ typedef struct wm_feed {
   wm_event next;
 } wm_feed;
 
-// Reads the first event of each used source and takes the earliest stamp for the run's beginning (*first_ns).
-// `feeds` has room for assembly->source_count. WM_BAD_DATA where no source has anything to say.
-wm_status wm_feeds_open(const wm_assembly *assembly, wm_feed *feeds, wm_time_ns *first_ns, wm_error *err);
-// The next event into self->next, or self->has_next becomes 0. Fails only where the source can't be read on.
+// Reads the first event of each recorded source and takes the earliest stamp for the run's beginning (*first_ns); with
+// devices alone it is `now_ns`. `feeds` has room for assembly->source_count. WM_BAD_DATA where no source has anything
+// to say.
+wm_status wm_feeds_open(const wm_assembly *assembly, wm_feed *feeds, wm_time_ns now_ns, wm_time_ns *first_ns,
+                        wm_error *err);
+// The next event into self->next, or self->has_next becomes 0. Fails only where the source can't be read on. Of a
+// device: waits for up to WM_DEVICE_WAIT_MS.
 wm_status wm_feed_advance(wm_feed *self, wm_error *err);
 // The feed whose next event arrived first (the first in the table at equal arrivals), or NULL.
 wm_feed *wm_feeds_earliest(wm_feed *feeds, size_t count);

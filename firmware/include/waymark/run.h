@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A live run with real threads: a thread a source, the estimator's real-time thread, a sink thread. Its sources are a
-// recording's, played at real speed on the monotonic clock. The threads, their priorities, stacks and rings stand in
-// one table, firmware/runtime/threads.c; docs/runtime.md draws it.
+// A live run with real threads: a thread a source, the estimator's real-time thread, a sink thread. Its sources are
+// devices, or a recording's, played at real speed on the monotonic clock. The threads, their priorities, stacks and
+// rings stand in one table, firmware/runtime/threads.c; docs/runtime.md draws it.
 #ifndef WAYMARK_RUN_H
 #define WAYMARK_RUN_H
 
@@ -16,8 +16,8 @@
 typedef struct wm_run_options {
   const char *out_dir;  // NULL: nothing is written
   uint64_t seed;
-  double duration_s;  // 0: to the recording's end
-  double speed;       // 1: real speed
+  double duration_s;  // 0: to the recording's end; on devices until *stop
+  double speed;       // 1: real speed; on devices it has to be 1
   // Set it to 1 (from a signal handler or another thread) and the run ends in order. May be NULL.
   atomic_int *stop;
   // What a person or a log should know while it runs, a line each; from any of the run's normal threads.

@@ -16,6 +16,22 @@
 #define WM_HEALTH_NAME_MAX 48
 #define WM_STATUS_COUNT (WM_INTERNAL + 1)
 
+// A live source's device. A recording has none.
+typedef enum wm_device_state {
+  WM_DEVICE_NONE = 0,
+  WM_DEVICE_WORKS,
+  WM_DEVICE_ABSENT,   // unplugged, or never there; looked for again and again
+  WM_DEVICE_DOWN,     // there, but switched off (a CAN interface that is down)
+  WM_DEVICE_PASSIVE,  // a CAN controller that saw many errors
+  WM_DEVICE_BUS_OFF,  // a CAN controller that left the bus
+  WM_DEVICE_STALLED,  // a camera that gives no pictures
+  WM_DEVICE_FROZEN,   // a camera that gives the same picture again and again
+  WM_DEVICE_STATE_COUNT
+} wm_device_state;
+
+// "works", "absent" ...; "" for a recording, "?" beyond.
+const char *wm_device_state_name(unsigned state);
+
 typedef struct wm_source_health {
   char name[WM_HEALTH_NAME_MAX];
   uint64_t received;                    // handed out by the source
@@ -27,11 +43,14 @@ typedef struct wm_source_health {
   uint64_t duplicates;                  // the same datum again
   uint64_t future;                      // stamped later than it arrived
   uint64_t lost, malformed, not_finite, out_of_order, ignored, frozen;  // the source's own (wm_source_counts)
+  uint64_t overflows, bus_errors;                                       // likewise
   wm_time_ns lateness_p99_ns;                                           // arrival minus stamp
   wm_time_ns lateness_max_ns;                                           // the config's bound
   wm_time_ns newest_ns;                                                 // newest stamp, WM_TIME_NONE before the first
   wm_time_ns silent_ns;                                                 // since its last datum, on the arrival clock
+  wm_time_ns stamp_uncertainty_ns;                                      // of a device; 0 for a recording
   uint8_t stale;                                                        // silent for far longer than it used to be
+  uint8_t device;                                                       // wm_device_state
 } wm_source_health;
 
 typedef struct wm_health {

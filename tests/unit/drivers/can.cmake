@@ -13,3 +13,7 @@ wm_test(can_decode SOURCES can_decode.c USES wm_can)
 
 # Outside judges: python-can for logs, cantools for DBC (tests/judges/setup.sh installs them).
 wm_script_test(can_judge COMMAND tests/judges/run.sh tests/judges/can_judge.py $<TARGET_FILE:can_judge>)
+
+# A CAN interface as a source, on a system that does what the test says.
+wm_test(can_device SOURCES can_device.c fake_can.c USES wm_can_device wm_clock)
+target_include_directories(can_device PRIVATE ${CMAKE_SOURCE_DIR}/drivers/can)

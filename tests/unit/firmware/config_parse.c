@@ -90,6 +90,27 @@ static void source_settings(void) {
   TEST_ASSERT_TRUE(rank == 3 && s.use && s.lateness_max_ms == 100 && isinf(s.until_s));
 }
 
+static void devices(void) {
+  parse(HEAD
+        "devices:\n  can:\n    - {interface: can0, dbc: car.dbc, can_signals: /etc/s.yaml}\n"
+        "    - {interface: can1, dbc: b.dbc, can_signals: c.yaml}\n");
+  TEST_ASSERT_EQUAL(2, config.devices.can_count);
+  TEST_ASSERT_EQUAL_STRING("can0", config.devices.can[0].interface);
+  TEST_ASSERT_EQUAL_STRING("dir/car.dbc", config.devices.can[0].dbc);
+  TEST_ASSERT_EQUAL_STRING("/etc/s.yaml", config.devices.can[0].can_signals);
+  TEST_ASSERT_EQUAL_STRING("can1", config.devices.can[1].interface);
+  refused(HEAD "devices:\n  can:\n    - {interfce: can0}\n",
+          "dir/x.yaml:5: devices.can[0].interfce: unknown key; did you mean 'interface'?");
+  refused(HEAD "devices:\n  can:\n    - {interface: can0, dbc: a}\n",
+          "dir/x.yaml:5: devices.can[0]: can_signals: is missing; name one here or at the top of the configuration");
+  refused(HEAD "devices: {can: {interface: can0}}\n",
+          "dir/x.yaml:3: devices.can: a list of {interface: NAME, ...} is needed");
+  refused(HEAD
+          "devices:\n  can:\n    - {interface: can0, dbc: a, can_signals: b}\n"
+          "    - {interface: can0, dbc: a, can_signals: b}\n",
+          "dir/x.yaml:6: devices.can[1].interface: 'can0' stands there twice (first in line 5)");
+}
+
 static void misspelt(void) {
   refused(HEAD "pole_filter:\n  gaet: 5\n",
           "dir/x.yaml:4: pole_filter.gaet: unknown key; did you mean 'pole_filter.gate'?");
@@ -105,7 +126,7 @@ static void misspelt(void) {
           "dir/x.yaml:3: cloud_filter.windows: unknown key; did you mean 'cloud_filter.window_s'?");
   refused(HEAD "something: 1\n",
           "dir/x.yaml:3: something: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
-          "can_signals, initial_pose, publish, merge, realtime, motion, pole_filter, cloud_filter");
+          "can_signals, devices, initial_pose, publish, merge, realtime, motion, pole_filter, cloud_filter");
   refused(HEAD "pole_filter: {states: {other: 1}}\n",
           "dir/x.yaml:3: pole_filter.states.other: unknown key; known here: yaw_sigma_rad, slots, deep");
   refused("format: waymark-config/1\nestimator: pole_filtre\n",
@@ -151,7 +172,8 @@ static void wrong_sources(void) {
   refused(HEAD "sources: [{name: gnss, from_s: 5, until_s: 2}]\n",
           "dir/x.yaml:3: sources[0].until_s: 2 is not after from_s (5): nothing would be taken");
   refused(HEAD "sources: [{name: 'gnss:top'}]\n",
-          "dir/x.yaml:3: sources[0].name: 'gnss:top' has a sensor's name; only sightings:SENSOR and markers:SENSOR are "
+          "dir/x.yaml:3: sources[0].name: 'gnss:top' has a sensor's name; only sightings:SENSOR, markers:SENSOR and "
+          "can:INTERFACE are "
           "possible");
   refused(HEAD "sources: [{nmae: gnss}]\n", "dir/x.yaml:3: sources[0].nmae: unknown key; did you mean 'name'?");
   refused(HEAD "sources: gnss\n", "dir/x.yaml:3: sources: a list of {name: NAME, ...} is needed");
@@ -196,6 +218,7 @@ int main(void) {
   RUN_TEST(defaults);
   RUN_TEST(everything);
   RUN_TEST(source_settings);
+  RUN_TEST(devices);
   RUN_TEST(misspelt);
   RUN_TEST(wrong_values);
   RUN_TEST(wrong_sources);

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "can_device.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "can_clock.h"
+
+#define IDS_MAX 4096
+#define LOOK_EVERY_NS (500 * WM_NS_PER_MS)  // for an interface that isn't there, or is another one by the same name
+
+typedef struct can_device {
+  wm_source base;
+  char interface[WM_CAN_IFACE_MAX];
+  wm_can_decoder *decoder;
+  uint32_t *ids;
+  uint8_t *is_extended;
+  size_t id_count;
+  const can_io *io;
+  void *io_context;
+  int socket;  // -1: not open
+  unsigned interface_index;
+  wm_time_ns next_look_ns;
+  can_clock clock;
+  uint32_t queue_dropped;
+  uint32_t seq;
+} can_device;
+
+static void set_state(can_device *self, wm_device_state state, const char *note) {
+  wm_source_counts *counts = &self->base.counts;
+  if (counts->device == state) return;
+  counts->device = (uint8_t)state;
+  (void)snprintf(counts->device_note, sizeof counts->device_note, "%s %s", self->interface, note);
+}
+
+// ── the interface comes and goes ────────────────────────────────────────────────────────────────────────────────────
+
+static void drop_socket(can_device *self) {
+  if (self->socket >= 0) self->io->close(self->io_context, self->socket);
+  self->socket = -1;
+  self->queue_dropped = 0;
+}
+
+static void refused(can_device *self, int reason) {
+  char note[120];
+  (void)snprintf(note, sizeof note, "can't be opened: %s; trying again", strerror(reason));
+  set_state(self, WM_DEVICE_ABSENT, note);
+}
+
+static void open_it(can_device *self, unsigned index) {
+  int fd = self->io->open(self->io_context, index, self->ids, self->is_extended, self->id_count);
+  if (fd < 0) {
+    refused(self, -fd);
+    return;
+  }
+  self->socket = fd;
+  self->interface_index = index;
+}
+
+// An adapter that was unplugged comes back under the same name with another index: the old socket would wait for ever.
+static void look_for_interface(can_device *self, wm_time_ns now_ns) {
+  if (now_ns < self->next_look_ns) return;
+  self->next_look_ns = now_ns + LOOK_EVERY_NS;
+  int is_up = 0;
+  unsigned index = self->io->find(self->io_context, self->interface, &is_up);
+  if (self->socket >= 0 && index != self->interface_index) drop_socket(self);
+  if (index == 0) {
+    set_state(self, WM_DEVICE_ABSENT, "is not there (adapter unplugged, or its driver not loaded); looking for it");
+    return;
+  }
+  if (self->socket < 0) open_it(self, index);
+  if (self->socket < 0) return;
+  int was_away = self->base.counts.device == WM_DEVICE_ABSENT || self->base.counts.device == WM_DEVICE_DOWN;
+  if (!is_up) {
+    set_state(self, WM_DEVICE_DOWN, "is down (`ip link set ... up type can bitrate ...`); waiting");
+  } else if (was_away || self->base.counts.device == WM_DEVICE_NONE) {
+    set_state(self, WM_DEVICE_WORKS, "is up");
+  }
+}
+
+static void take_failure(can_device *self, int reason) {
+  if (reason == ENETDOWN) {  // the same socket receives again once it is up
+    set_state(self, WM_DEVICE_DOWN, "went down; waiting for it");
+    return;
+  }
+  drop_socket(self);
+  char note[120];
+  (void)snprintf(note, sizeof note, "is gone (%s); looking for it", strerror(reason));
+  set_state(self, WM_DEVICE_ABSENT, note);
+}
+
+// ── frames ──────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static void count_queue(can_device *self, const can_received *received) {
+  if (!received->has_queue_dropped) return;
+  self->base.counts.overflows += (uint32_t)(received->queue_dropped - self->queue_dropped);
+  self->queue_dropped = received->queue_dropped;
+}
+
+// 1: an event.
+static int take_frame(can_device *self, can_received *received, wm_event *out) {
+  wm_source_counts *counts = &self->base.counts;
+  wm_can_frame *frame = &received->frame;
+  wm_error why = {0};
+  wm_time_ns arrival_ns = self->io->monotonic_ns(self->io_context);
+  frame->t_ns = can_clock_stamp(&self->clock, received, arrival_ns, self->io->realtime_ns(self->io_context));
+  counts->stamp_uncertainty_ns = self->clock.uncertainty_ns;
+  (void)snprintf(frame->iface, sizeof frame->iface, "%s", self->interface);
+  count_queue(self, received);
+  if (frame->is_error) {
+    can_error_take(frame, self->interface, counts);
+    return 0;
+  }
+  if (counts->device != WM_DEVICE_PASSIVE) set_state(self, WM_DEVICE_WORKS, "speaks again");
+  memset(out, 0, WM_EVENT_SMALL_BYTES);
+  wm_status status = wm_can_decode(self->decoder, frame, &out->as.quantities, counts, &why);
+  if (status == WM_BAD_DATA && !counts->first_problem[0])
+    (void)snprintf(counts->first_problem, sizeof counts->first_problem, "%.255s", why.text);
+  if (status != WM_OK) return 0;  // counted by the decoder
+  out->kind = WM_EVENT_QUANTITIES;
+  out->source = self->base.index;
+  out->t_ns = frame->t_ns;
+  out->arrival_ns = arrival_ns;
+  out->seq = self->seq++;
+  counts->received++;
+  return 1;
+}
+
+static wm_status next_quantities(wm_source *base, wm_event *out, wm_error *err) {
+  (void)err;
+  can_device *self = (can_device *)base;
+  wm_time_ns begin_ns = self->io->monotonic_ns(self->io_context);
+  for (;;) {
+    wm_time_ns now_ns = self->io->monotonic_ns(self->io_context);
+    if (now_ns - begin_ns >= WM_DEVICE_WAIT_MS * WM_NS_PER_MS) return WM_AGAIN;
+    look_for_interface(self, now_ns);
+    if (self->socket < 0) {
+      self->io->sleep_ms(self->io_context, WM_DEVICE_WAIT_MS);
+      return WM_AGAIN;
+    }
+    can_received received;
+    int got = self->io->receive(self->io_context, self->socket, WM_DEVICE_WAIT_MS, &received);
+    if (got < 0) take_failure(self, -got);
+    if (got <= 0) {
+      if (got < 0) self->io->sleep_ms(self->io_context, 10);  // a socket that only fails must not take the processor
+      return WM_AGAIN;
+    }
+    if (take_frame(self, &received, out)) return WM_OK;
+  }
+}
+
+static void close_device(wm_source *base) {
+  can_device *self = (can_device *)base;
+  drop_socket(self);
+  wm_can_decoder_free(self->decoder);
+  free(self->ids);
+  free(self->is_extended);
+  free(self);
+}
+
+static const wm_source_ops kCanDevice = {next_quantities, close_device};
+
+wm_status can_device_make(const char *interface, wm_can_decoder *decoder, const can_io *io, void *io_context,
+                          wm_source **out, wm_error *err) {
+  *out = NULL;
+  can_device *self = calloc(1, sizeof *self);
+  if (!self) {
+    wm_can_decoder_free(decoder);
+    return wm_fail(err, WM_IO, "%s: no memory to open it", interface);
+  }
+  self->base.ops = &kCanDevice;
+  self->base.is_motion = self->base.is_live = self->base.in_order = 1;
+  self->base.kinds = WM_EVENT_BIT(WM_EVENT_QUANTITIES);
+  self->decoder = decoder;
+  self->io = io;
+  self->io_context = io_context;
+  self->socket = -1;
+  (void)snprintf(self->base.name, sizeof self->base.name, "can");
+  (void)snprintf(self->interface, sizeof self->interface, "%s", interface);
+  self->ids = calloc(IDS_MAX, sizeof *self->ids);
+  self->is_extended = calloc(IDS_MAX, sizeof *self->is_extended);
+  if (!self->ids || !self->is_extended) {
+    close_device(&self->base);
+    return wm_fail(err, WM_IO, "%s: no memory to open it", interface);
+  }
+  self->id_count = wm_can_decoder_ids(decoder, self->ids, self->is_extended, IDS_MAX);
+  if (self->id_count > IDS_MAX) self->id_count = IDS_MAX;
+  *out = &self->base;
+  return WM_OK;
+}

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// The few things that a CAN device asks of the system, as a table: the real one is SocketCAN's, a test's says what it
+// likes.
+#ifndef WM_CAN_IO_H
+#define WM_CAN_IO_H
+
+#include <sys/socket.h>
+
+#include "waymark/can.h"
+
+// What one reading of the socket gave.
+typedef struct can_received {
+  wm_can_frame frame;      // t_ns unset
+  wm_time_ns software_ns;  // CLOCK_REALTIME, by the kernel when the frame came; 0: none
+  wm_time_ns hardware_ns;  // the adapter's own clock; 0: none
+  uint32_t queue_dropped;  // frames that the socket's queue lost since it was opened (SO_RXQ_OVFL)
+  int has_queue_dropped;
+} can_received;
+
+typedef struct can_io {
+  // Index of the interface, 0 where there is none of this name; *is_up by its flags.
+  unsigned (*find)(void *context, const char *interface, int *is_up);
+  // A bound raw socket for these ids and all error frames: its number, or -errno.
+  int (*open)(void *context, unsigned interface_index, const uint32_t *ids, const uint8_t *is_extended, size_t count);
+  // 1: *out is filled; 0: nothing came within `wait_ms`; -errno.
+  int (*receive)(void *context, int socket, int wait_ms, can_received *out);
+  void (*close)(void *context, int socket);
+  void (*sleep_ms)(void *context, int ms);
+  wm_time_ns (*monotonic_ns)(void *context);
+  wm_time_ns (*realtime_ns)(void *context);
+} can_io;
+
+extern const can_io kSocketCan;
+
+// A message of `bytes` bytes as the kernel hands it out (struct can_frame or canfd_frame, stamps and drop count beside
+// it) into *out. 0 where it is none. Pure.
+int can_message_read(const struct msghdr *message, size_t bytes, can_received *out);
+
+#endif

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "can_device.h"
+#include "waymark/devices.h"
+
+wm_status wm_can_device_open(const wm_can_device_config *config, wm_source **out, uint32_t *quantities, wm_error *err) {
+  wm_can_decoder *decoder;
+  *out = NULL;
+  wm_status status = wm_can_decoder_load(config->dbc, config->can_signals, &decoder, err);
+  if (status != WM_OK) return status;
+  *quantities = wm_can_decoder_quantities(decoder);
+  return can_device_make(config->interface, decoder, &kSocketCan, NULL, out, err);
+}
