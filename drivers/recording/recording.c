@@ -10,6 +10,7 @@
 #include "calibration.h"
 #include "can_stream.h"
 #include "streams.h"
+#include "waymark/map.h"
 #include "waymark/text.h"
 #include "waymark/yaml.h"
 
@@ -29,6 +30,8 @@ struct wm_recording {
   calibration calibration;
   wm_landmark *landmarks;
   size_t landmark_count;
+  char map_path[WM_PATH_MAX];  // "" where there is none
+  wm_map *map;                 // NULL until it is asked for
   sensor_names sighting_sensors, marker_sensors;
   uint32_t quantities;
   wm_source *sources[WM_SOURCES_MAX];
@@ -154,6 +157,13 @@ static wm_status read_landmarks(wm_recording *self, wm_error *err) {
   wm_status status = choose(self, self->overrides.landmarks, "landmarks.csv", path, &there, err);
   if (status != WM_OK || !there) return status;
   return landmarks_read(path, &self->warn, &self->landmarks, &self->landmark_count, err);
+}
+
+static wm_status find_map(wm_recording *self, wm_error *err) {
+  int there;
+  wm_status status = choose(self, self->overrides.map, "map/map.yaml", self->map_path, &there, err);
+  if (!there) self->map_path[0] = '\0';
+  return status;
 }
 
 static int is_listed(const wm_recording *self, const char *file) {
@@ -294,6 +304,7 @@ wm_status wm_recording_open(const char *dir, const wm_recording_overrides *overr
   wm_status status = read_about(self, err);
   if (status == WM_OK) status = read_calibration(self, err);
   if (status == WM_OK) status = read_landmarks(self, err);
+  if (status == WM_OK) status = find_map(self, err);
   if (status == WM_OK) status = add_sources(self, err);
   if (status != WM_OK) {
     wm_recording_close(self);
@@ -338,6 +349,7 @@ void wm_recording_close(wm_recording *self) {
   wm_yaml_free(self->about);
   free(self->calibration_text);
   free(self->landmarks);
+  wm_map_free(self->map);
   free(self);
 }
 
@@ -354,6 +366,17 @@ const wm_sensor *wm_recording_sensors(const wm_recording *self, size_t *count) {
 const wm_landmark *wm_recording_landmarks(const wm_recording *self, size_t *count) {
   *count = self->landmark_count;
   return self->landmarks;
+}
+
+const char *wm_recording_map_path(const wm_recording *self) { return self->map_path; }
+
+wm_status wm_recording_map(wm_recording *self, const wm_raster **out, wm_error *err) {
+  *out = NULL;
+  if (!self->map_path[0]) return WM_OK;
+  wm_status status =
+      self->map ? WM_OK : wm_map_load(self->map_path, self->warn.fn, self->warn.context, &self->map, err);
+  if (status == WM_OK) *out = wm_map_raster(self->map);
+  return status;
 }
 
 const wm_rig *wm_recording_rig(const wm_recording *self) { return &self->calibration.rig; }

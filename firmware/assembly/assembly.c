@@ -65,6 +65,13 @@ static wm_status check_motion(const wm_assembly *self, uint32_t quantities, wm_e
                  self->config->path, self->recording, lacks);
 }
 
+// Only who takes points on a map's edges is given one: it may be large.
+static wm_status add_map(wm_assembly *self, wm_recording *recording, wm_error *err) {
+  if (!(self->config->estimator->takes & WM_EVENT_BIT(WM_EVENT_POINTS))) return WM_OK;
+  self->map_path = wm_recording_map_path(recording);
+  return wm_recording_map(recording, &self->setup.map, err);
+}
+
 wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t seed, wm_assembly *out,
                       wm_error *err) {
   memset(out, 0, sizeof *out);
@@ -81,6 +88,8 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   setup->start = config->has_initial_pose ? config->initial_pose : *wm_recording_start(recording);
   setup->seed = seed;
 
+  wm_status status = add_map(out, recording, err);
+  if (status != WM_OK) return status;
   size_t count;
   wm_source *const *sources = wm_recording_sources(recording, &count);
   for (size_t i = 0; i < count && i < WM_SOURCES_MAX; i++) add_source(out, sources[i]);
@@ -90,7 +99,7 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
                    wm_recording_is_robot(recording) ? "no CAN interface (devices.can)"
                                                     : "neither can.log with can-signals.yaml nor motion.csv");
   out->driving = wm_driving_choose(out->kinds, wm_recording_quantities(recording));
-  wm_status status = check_motion(out, wm_recording_quantities(recording), err);
+  status = check_motion(out, wm_recording_quantities(recording), err);
   return status == WM_OK ? check_estimator(out, err) : status;
 }
 

@@ -21,6 +21,7 @@ static const char kHelp[] =
     "\n"
     "  --landmarks FILE    instead of the recording's map\n"
     "  --calibration FILE  instead of the recording's\n"
+    "  --map FILE          a map.yaml instead of the recording's\n"
     "\n"
     "example:\n"
     "  waymark check config/starry-night-plan.yaml RECORDING\n";
@@ -33,6 +34,13 @@ static void print_start(const wm_start *start) {
   (void)printf("start        x %.3f m, y %.3f m, heading %.1f deg; sigma %.3f m, %.2f deg\n", start->p_m[0],
                start->p_m[1], start->heading_rad * 180 / M_PI, start->sigma_xy_m,
                start->sigma_heading_rad * 180 / M_PI);
+}
+
+static void print_map(const wm_raster *map, const char *path) {
+  if (!map) return;
+  (void)printf("map          %s: %u x %u pixels of %.4f m (%.1f x %.1f m)%s%s\n", path, map->width_px, map->height_px,
+               map->resolution_m, map->width_px * map->resolution_m, map->height_px * map->resolution_m,
+               map->edges ? "" : ", no edges", map->drivable ? "" : ", no drivable");
 }
 
 static void print_driving(const wm_driving *driving) {
@@ -103,6 +111,7 @@ static wm_status check_recording(const wm_config *config, const char *dir, wm_er
     (void)putchar('\n');
     (void)printf("setup        %zu sensors, %zu landmarks\n", assembly.setup.sensor_count,
                  assembly.setup.landmark_count);
+    print_map(assembly.setup.map, assembly.map_path);
     print_start(&assembly.setup.start);
     print_quantities(wm_recording_quantities(recording));
     print_driving(&assembly.driving);
@@ -122,10 +131,11 @@ static wm_status check_recording(const wm_config *config, const char *dir, wm_er
 }
 
 int command_check(int argc, char *const *argv) {
-  const char *words[2], *landmarks = NULL, *calibration = NULL;
+  const char *words[2], *landmarks = NULL, *calibration = NULL, *map = NULL;
   int help = 0;
   const option options[] = {{"--landmarks", OPTION_TEXT, &landmarks},
                             {"--calibration", OPTION_TEXT, &calibration},
+                            {"--map", OPTION_TEXT, &map},
                             {"--help", OPTION_FLAG, &help},
                             {"-h", OPTION_FLAG, &help}};
   wm_error err = {0};
@@ -149,6 +159,7 @@ int command_check(int argc, char *const *argv) {
   (void)printf("config       %s: estimator %s (%s)\n", words[0], config.estimator->name, config.estimator->about);
   status = override_path(config.overrides.landmarks, landmarks, &err);
   if (status == WM_OK) status = override_path(config.overrides.calibration, calibration, &err);
+  if (status == WM_OK) status = override_path(config.overrides.map, map, &err);
   if (status == WM_OK && count > 1) status = check_recording(&config, words[1], &err);
   wm_config_free(&config);
   if (status == WM_OK) {

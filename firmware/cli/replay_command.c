@@ -10,6 +10,7 @@
 #include "waymark/clock.h"
 #include "waymark/codec.h"
 #include "waymark/eventlog.h"
+#include "waymark/map.h"
 
 static const char kHelp[] =
     "usage: waymark replay RECORDING --config FILE --out FOLDER [options]\n"
@@ -24,13 +25,14 @@ static const char kHelp[] =
     "  --seed N            of random numbers (default 1; an event log brings its own)\n"
     "  --landmarks FILE    instead of the recording's map; an event log refuses any map but its own\n"
     "  --calibration FILE  instead of the recording's\n"
+    "  --map FILE          a map.yaml instead of the recording's; an event log refuses any but its own\n"
     "\n"
     "example:\n"
     "  waymark replay RECORDING --config config/starry-night-plan.yaml --out out/run\n"
     "  waymark replay out/run/events.wmlog --out out/again\n";
 
 typedef struct arguments {
-  const char *config, *out, *landmarks, *calibration;
+  const char *config, *out, *landmarks, *calibration, *map;
   uint64_t seed;
   const char *what;
 } arguments;
@@ -45,11 +47,12 @@ static int replay_recording(const arguments *args) {
   wm_recording *recording = NULL;
   wm_status status = override_path(config.overrides.landmarks, args->landmarks, &err);
   if (status == WM_OK) status = override_path(config.overrides.calibration, args->calibration, &err);
+  if (status == WM_OK) status = override_path(config.overrides.map, args->map, &err);
   if (status == WM_OK) status = wm_recording_open(args->what, &config.overrides, print_note, NULL, &recording, &err);
   if (status == WM_OK) {
     progress_line progress;
     progress_begin(&progress);
-    const wm_replay_options options = {args->out, args->seed, progress_show, &progress};
+    const wm_replay_options options = {args->out, args->seed, progress_show, &progress, NULL};
     static wm_run_report report;
     status = wm_replay_recording(&config, recording, &options, &report, &err);
     progress_end(&progress);
@@ -79,6 +82,13 @@ static wm_status check_map(const char *file, const wm_log_head *head, const char
                  log, head->landmark_count, head->landmark_hash, count, file, hash);
 }
 
+// The raster map that the log names, from where it was or from --map.
+static wm_status load_map(const char *file, const wm_log_head *head, wm_map **out, wm_error *err) {
+  *out = NULL;
+  if (!head->map_hash) return WM_OK;
+  return wm_map_load(file ? file : head->map_path, print_note, NULL, out, err);
+}
+
 static int replay_log(const arguments *args) {
   wm_error err = {0};
   wm_log_reader *log;
@@ -89,6 +99,8 @@ static int replay_log(const arguments *args) {
   if (wm_log_open(args->what, &log, &err) != WM_OK) return complain(&err);
   const wm_log_head *head = wm_log_reader_head(log);
   wm_status status = check_map(args->landmarks, head, args->what, &err);
+  wm_map *map = NULL;
+  if (status == WM_OK) status = load_map(args->map, head, &map, &err);
   wm_config config;
   memset(&config, 0, sizeof config);
   if (status == WM_OK)
@@ -100,7 +112,7 @@ static int replay_log(const arguments *args) {
       (void)fprintf(stderr, "note: %s was written by waymark %s; this is %s: the last bits may differ\n", args->what,
                     head->program, WM_VERSION);
     wm_time_ns begin_ns = wm_monotonic_ns();
-    const wm_replay_options options = {.out_dir = args->out};
+    const wm_replay_options options = {.out_dir = args->out, .map = map ? wm_map_raster(map) : NULL};
     static wm_run_report report;
     status = wm_replay_log(&config, log, &options, &report, &err);
     if (report.log_was_cut)
@@ -113,6 +125,7 @@ static int replay_log(const arguments *args) {
       print_report(&report, head->recording, args->out, wm_seconds_between(begin_ns, wm_monotonic_ns()));
   }
   wm_config_free(&config);
+  wm_map_free(map);
   wm_log_reader_close(log);
   return status == WM_OK ? EXIT_DONE : complain(&err);
 }
@@ -134,6 +147,7 @@ int command_replay(int argc, char *const *argv) {
                             {"--seed", OPTION_U64, &args.seed},
                             {"--landmarks", OPTION_TEXT, &args.landmarks},
                             {"--calibration", OPTION_TEXT, &args.calibration},
+                            {"--map", OPTION_TEXT, &args.map},
                             {"--help", OPTION_FLAG, &help},
                             {"-h", OPTION_FLAG, &help}};
   wm_error err = {0};

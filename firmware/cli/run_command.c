@@ -25,6 +25,7 @@ static const char kHelp[] =
     "  --speed X              times real speed (default 1)\n"
     "  --seed N               of random numbers (default 1)\n"
     "  --landmarks FILE       instead of the recording's map\n"
+    "  --map FILE             a map.yaml instead of the recording's\n"
     "  --calibration FILE     instead of the recording's\n"
     "\n"
     "example:\n"
@@ -32,7 +33,7 @@ static const char kHelp[] =
     "  waymark run --config config/starry-night-plan.yaml --recording RECORDING --out out/run --duration 60\n";
 
 typedef struct arguments {
-  const char *config, *recording, *landmarks, *calibration;
+  const char *config, *recording, *landmarks, *calibration, *map;
   wm_run_options run;
 } arguments;
 
@@ -70,6 +71,7 @@ static int run(const arguments *args) {
   wm_recording *recording = NULL;
   wm_status status = override_path(config.overrides.landmarks, args->landmarks, &err);
   if (status == WM_OK) status = override_path(config.overrides.calibration, args->calibration, &err);
+  if (status == WM_OK) status = override_path(config.overrides.map, args->map, &err);
   if (status == WM_OK)
     status = args->recording ? wm_recording_open(args->recording, &config.overrides, print_note, NULL, &recording, &err)
                              : wm_robot_open(&config, print_note, NULL, &recording, &err);
@@ -100,6 +102,7 @@ int command_run(int argc, char *const *argv) {
                             {"--seed", OPTION_U64, &args.run.seed},
                             {"--landmarks", OPTION_TEXT, &args.landmarks},
                             {"--calibration", OPTION_TEXT, &args.calibration},
+                            {"--map", OPTION_TEXT, &args.map},
                             {"--help", OPTION_FLAG, &help},
                             {"-h", OPTION_FLAG, &help}};
   wm_error err = {0};

@@ -105,7 +105,8 @@ static wm_status read_files(const wm_yaml_node *root, int must_be_there, wm_conf
   } files[] = {{"calibration", out->overrides.calibration},
                {"landmarks", out->overrides.landmarks},
                {"dbc", out->overrides.dbc},
-               {"can_signals", out->overrides.can_signals}};
+               {"can_signals", out->overrides.can_signals},
+               {"map", out->overrides.map}};
   wm_status status = WM_OK;
   for (size_t i = 0; status == WM_OK && i < sizeof files / sizeof files[0]; i++)
     status = read_file_name(root, files[i].key, out->path, files[i].path, must_be_there, err);

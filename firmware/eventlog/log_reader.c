@@ -141,6 +141,7 @@ static wm_status take_head_record(wm_log_reader *self, const record *r, wm_error
     case WM_LOG_ESTIMATOR: get_text(h->estimator, sizeof h->estimator, r); break;
     case WM_LOG_RECORDING: get_text(h->recording, sizeof h->recording, r); break;
     case WM_LOG_CONFIG_PATH: get_text(h->config_path, sizeof h->config_path, r); break;
+    case WM_LOG_MAP_PATH: get_text(h->map_path, sizeof h->map_path, r); break;
     case WM_LOG_SEED: h->seed = wm_get_u64(&bytes); break;
     case WM_LOG_LANDMARK_HASH:
       h->landmark_hash = wm_get_u64(&bytes);

@@ -45,8 +45,14 @@ static void write_setup(wm_log_writer *self, const wm_setup *setup) {
   for (size_t i = 0; i < setup->landmark_count; i++)
     write_record(self, WM_LOG_LANDMARK, bytes, wm_landmark_encode(&setup->landmarks[i], bytes, sizeof bytes));
   if (setup->rig) write_record(self, WM_LOG_RIG, bytes, wm_rig_encode(setup->rig, bytes, sizeof bytes));
-  if (setup->map) write_u64(self, WM_LOG_MAP_HASH, setup->map->hash);
   write_u64(self, WM_LOG_LANDMARK_HASH, wm_landmarks_hash(setup->landmarks, setup->landmark_count));
+}
+
+static void write_map(wm_log_writer *self, const wm_assembly *assembly) {
+  const wm_raster *map = assembly->setup.map;
+  if (!map) return;
+  write_u64(self, WM_LOG_MAP_HASH, map->hash);
+  if (assembly->map_path) write_text(self, WM_LOG_MAP_PATH, assembly->map_path);
 }
 
 static void write_sources(wm_log_writer *self, const wm_assembly *assembly) {
@@ -80,6 +86,7 @@ wm_status wm_log_create(wm_log_writer *self, const char *path, const wm_assembly
   write_record(self, WM_LOG_CONFIG, config->text, config->text_length);
   write_record(self, WM_LOG_CALIBRATION, assembly->calibration_text, assembly->calibration_length);
   write_setup(self, &assembly->setup);
+  write_map(self, assembly);
   write_sources(self, assembly);
   write_record(self, WM_LOG_HEAD_END, "", 0);
   return WM_OK;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The event log of a run: its events, as they were fused, into the estimator again.
+#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -20,7 +21,7 @@ typedef struct log_replay {
   wm_time_ns first_ns, last_ns;
 } log_replay;
 
-static void assemble(log_replay *self, const wm_config *config, const wm_log_head *head) {
+static void assemble(log_replay *self, const wm_config *config, const wm_log_head *head, const wm_raster *map) {
   wm_assembly *a = &self->assembly;
   a->config = config;
   a->setup = (wm_setup){.motion = config->motion,
@@ -30,8 +31,10 @@ static void assemble(log_replay *self, const wm_config *config, const wm_log_hea
                         .landmarks = head->landmarks,
                         .landmark_count = head->landmark_count,
                         .rig = &head->rig,
+                        .map = map,
                         .start = head->start,
                         .seed = head->seed};
+  a->map_path = head->map_path;
   a->driving = head->driving;
   a->source_count = head->source_count;
   for (size_t i = 0; i < a->source_count; i++) {
@@ -42,6 +45,16 @@ static void assemble(log_replay *self, const wm_config *config, const wm_log_hea
   a->calibration_text = head->calibration_text;
   a->calibration_length = head->calibration_length;
   (void)snprintf(a->recording, sizeof a->recording, "%s", head->recording);
+}
+
+// A log's poses belong to its map, which is not in it: another one is refused, not silently used.
+static wm_status check_map(const wm_log_head *head, const wm_raster *map, wm_error *err) {
+  const uint64_t hash = map ? map->hash : 0;
+  if (hash == head->map_hash) return WM_OK;
+  return wm_fail(err, WM_BAD_CONFIG,
+                 "%s: the log was made with the map of hash %016" PRIx64 ", this one has %016" PRIx64
+                 "; name the right one by --map, or replay the recording",
+                 head->map_path, head->map_hash, hash);
 }
 
 static wm_status start(log_replay *self, const wm_replay_options *options, wm_error *err) {
@@ -138,9 +151,11 @@ static wm_status run(log_replay *self, wm_log_reader *log, const wm_replay_optio
 wm_status wm_replay_log(const wm_config *config, wm_log_reader *log, const wm_replay_options *options,
                         wm_run_report *report, wm_error *err) {
   memset(report, 0, sizeof *report);
+  wm_status right = check_map(wm_log_reader_head(log), options->map, err);
+  if (right != WM_OK) return right;
   log_replay *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "no memory for a replay");
-  assemble(self, config, wm_log_reader_head(log));
+  assemble(self, config, wm_log_reader_head(log), options->map);
   wm_status status = run(self, log, options, report, err);
   wm_error close_error;
   wm_status closed = wm_run_folder_close(self->folder, &close_error);

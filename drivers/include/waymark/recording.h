@@ -27,6 +27,7 @@ typedef struct wm_recording_overrides {
   char landmarks[WM_PATH_MAX];
   char dbc[WM_PATH_MAX];
   char can_signals[WM_PATH_MAX];
+  char map[WM_PATH_MAX];  // a map.yaml
 } wm_recording_overrides;
 
 typedef struct wm_recording wm_recording;
@@ -54,6 +55,11 @@ const wm_landmark *wm_recording_landmarks(const wm_recording *self, size_t *coun
 const wm_rig *wm_recording_rig(const wm_recording *self);      // cameras; an empty one where calibration.yaml has none
 const wm_start *wm_recording_start(const wm_recording *self);  // initial_pose; NaN where unknown
 int wm_recording_is_robot(const wm_recording *self);
+// Path of the map's YAML: the override, else map/map.yaml of the folder; "" where neither is there.
+const char *wm_recording_map_path(const wm_recording *self);
+// The raster map, read when first asked for and kept as long as the recording; NULL where there is none. Errors as
+// wm_map_load (waymark/map.h).
+wm_status wm_recording_map(wm_recording *self, const wm_raster **out, wm_error *err);
 uint32_t wm_recording_quantities(const wm_recording *self);  // bit per wm_quantity that the CAN binding gives
 // Text of calibration.yaml as read ("" where there is none), for the event log.
 const char *wm_recording_calibration_text(const wm_recording *self, size_t *length);

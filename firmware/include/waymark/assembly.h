@@ -34,6 +34,7 @@ typedef struct wm_assembly {
   size_t unused_count;
   const char *calibration_text;
   size_t calibration_length;
+  const char *map_path;              // NULL where the estimator takes no map
   char recording[WM_NAME_MAX + 96];  // the recording's name
 } wm_assembly;
 

@@ -13,6 +13,7 @@
 //   dbc: FILE
 //   can_signals: FILE
 //   devices: {can: [{interface: can0}]}    # the robot's own, where there is no recording
+//   map: FILE                      # a map.yaml
 //   initial_pose: {x_m: 0, y_m: 0, heading_rad: 0, sigma_xy_m: 0.05, sigma_heading_rad: 0.05}
 //   merge: {horizon_ms: 300, ...}  # wm_runtime_params
 //   publish: {rate_hz: 50, ...}

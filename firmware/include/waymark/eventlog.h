@@ -36,6 +36,7 @@ typedef enum wm_log_tag {
   WM_LOG_SOURCE,         // kinds u32, name text, one record a source
   WM_LOG_RIG,            // struct: cameras
   WM_LOG_MAP_HASH,       // u64; absent where there was no map
+  WM_LOG_MAP_PATH,       // text: where the map was; it is not in the log
   WM_LOG_HEAD_END,
   WM_LOG_EVENT,  // struct
   WM_LOG_GAP,    // u64: events that the sink could not write in time and that are missing here
@@ -66,7 +67,8 @@ typedef struct wm_log_reader wm_log_reader;
 
 // What the head says. Pointers live as long as the reader.
 typedef struct wm_log_head {
-  char program[32], estimator[WM_NAME_MAX], recording[WM_NAME_MAX + 96], config_path[WM_PATH_MAX];
+  char program[32], estimator[WM_NAME_MAX], recording[WM_NAME_MAX + 96], config_path[WM_PATH_MAX],
+      map_path[WM_PATH_MAX];
   uint64_t seed, landmark_hash;
   uint64_t map_hash;  // 0: there was no map
   const char *config_text, *calibration_text;

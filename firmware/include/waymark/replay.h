@@ -20,6 +20,7 @@ typedef struct wm_replay_options {
   uint64_t seed;
   wm_progress_fn progress;  // may be NULL
   void *progress_context;
+  const wm_raster *map;  // event log only: the map whose hash it names; NULL where it names none
 } wm_replay_options;
 
 typedef struct wm_run_report {
@@ -37,6 +38,7 @@ wm_status wm_replay_recording(const wm_config *config, wm_recording *recording, 
                               wm_run_report *report, wm_error *err);
 
 // `config` is the log's own (wm_config_parse of its text) or another one to try. The seed is the log's.
+// WM_BAD_CONFIG where options->map doesn't have the hash that the log names.
 wm_status wm_replay_log(const wm_config *config, wm_log_reader *log, const wm_replay_options *options,
                         wm_run_report *report, wm_error *err);
 

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// A raster map in ROS map_server's YAML with layers (recording-format: map/map.yaml): `image`, `resolution`, `origin`
+// with its rotation, `negate`, `occupied_thresh`, `free_thresh`, and `layers: {edges: FILE, drivable: FILE}`. Pictures
+// are PNG of any kind, or PGM (P2, P5, 8 or 16 bit). Start only; allocates.
+#ifndef WAYMARK_MAP_H
+#define WAYMARK_MAP_H
+
+#include "waymark/recording.h"
+#include "waymark/setup.h"
+#include "waymark/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Pixels along an edge, and in all: 20000 x 20000.
+#define WM_MAP_EDGE_MAX 32768u
+#define WM_MAP_PIXELS_MAX 400000000u
+
+typedef struct wm_map wm_map;
+
+// Reads map.yaml and its layers; every pixel of them becomes 255 (grey of 128 and more) or 0. Without `layers.drivable`
+// what `image` says is free by `negate` and `free_thresh` is drivable; without `layers.edges` the raster has no edges
+// (an estimator that needs them says so). `image` itself is read only for that. WM_BAD_CONFIG, WM_NOT_FOUND, WM_IO with
+// file, line and key: missing keys, a resolution that isn't above 0, layers of different sizes, pictures that are
+// broken or too large. Unknown keys are handed to `warn` (may be NULL). Cost: linear in the pixels.
+wm_status wm_map_load(const char *path, wm_warn_fn warn, void *context, wm_map **out, wm_error *err);
+void wm_map_free(wm_map *self);
+// Lives as long as the map.
+const wm_raster *wm_map_raster(const wm_map *self);
+
+// Hash of a raster's geometry and layers, as the event log names it; the layers' pixels must be 0 or 255. Linear.
+uint64_t wm_raster_hash(const wm_raster *raster);
+
+// A grey picture, row 0 at the top.
+typedef struct wm_grey {
+  uint32_t width_px, height_px;
+  uint8_t *pixels;  // width x height; the caller's to free
+} wm_grey;
+
+// Reads a PNG (colours become grey, what shines through is white) or a PGM. `path` is for messages. WM_BAD_DATA where
+// it is neither, broken or cut; WM_OUT_OF_RANGE beyond the limits above.
+wm_status wm_grey_load(const char *path, wm_grey *out, wm_error *err);
+wm_status wm_grey_decode(const void *bytes, size_t size, const char *path, wm_grey *out, wm_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

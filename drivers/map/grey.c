@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <png.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "waymark/map.h"
+#include "waymark/text.h"
+
+#define FILE_BYTES_MAX ((size_t)1 << 30)
+
+static wm_status check_size(uint64_t width, uint64_t height, const char *path, wm_error *err) {
+  if (width == 0 || height == 0) return wm_fail(err, WM_BAD_DATA, "%s: a picture without pixels", path);
+  if (width > WM_MAP_EDGE_MAX || height > WM_MAP_EDGE_MAX || width * height > WM_MAP_PIXELS_MAX)
+    return wm_fail(err, WM_OUT_OF_RANGE,
+                   "%s: %llu x %llu pixels are too many: at most %u along an edge and %u in all; cut the map or take a "
+                   "coarser resolution",
+                   path, (unsigned long long)width, (unsigned long long)height, WM_MAP_EDGE_MAX, WM_MAP_PIXELS_MAX);
+  return WM_OK;
+}
+
+static wm_status allocate(uint64_t width, uint64_t height, const char *path, wm_grey *out, wm_error *err) {
+  wm_status status = check_size(width, height, path, err);
+  if (status != WM_OK) return status;
+  out->width_px = (uint32_t)width;
+  out->height_px = (uint32_t)height;
+  out->pixels = malloc((size_t)width * height);
+  return out->pixels ? WM_OK : wm_fail(err, WM_IO, "%s: no memory for its pixels", path);
+}
+
+// ── PGM ─────────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+typedef struct text_at {
+  const uint8_t *bytes;
+  size_t size, at;
+} text_at;
+
+static int is_space(uint8_t c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
+
+// The next number, behind white space and comments (from # to the end of the line).
+static int next_number(text_at *t, uint32_t max, uint32_t *out) {
+  while (t->at < t->size && (is_space(t->bytes[t->at]) || t->bytes[t->at] == '#')) {
+    if (t->bytes[t->at] == '#')
+      while (t->at < t->size && t->bytes[t->at] != '\n') t->at++;
+    else
+      t->at++;
+  }
+  uint64_t value = 0;
+  size_t digits = 0;
+  for (; t->at < t->size && t->bytes[t->at] >= '0' && t->bytes[t->at] <= '9'; t->at++, digits++) {
+    value = value * 10 + (uint64_t)(t->bytes[t->at] - '0');
+    if (value > max) return 0;
+  }
+  *out = (uint32_t)value;
+  return digits > 0;
+}
+
+static wm_status read_pgm(const uint8_t *bytes, size_t size, const char *path, wm_grey *out, wm_error *err) {
+  const int plain = bytes[1] == '2';
+  text_at t = {bytes, size, 2};
+  uint32_t width, height, white;
+  if (!next_number(&t, UINT32_MAX, &width) || !next_number(&t, UINT32_MAX, &height) ||
+      !next_number(&t, 65535, &white) || white == 0 || t.at >= size || !is_space(bytes[t.at]))
+    return wm_fail(err, WM_BAD_DATA,
+                   "%s: the head of the PGM is broken: width, height and white (1 to 65535) follow P%c", path,
+                   bytes[1]);
+  t.at++;
+  wm_status status = check_size(width, height, path, err);
+  if (status != WM_OK) return status;
+  const size_t count = (size_t)width * height, depth = white > 255 ? 2 : 1;
+  // A plain number takes two bytes at least, so memory is asked for only where the pixels can be there.
+  if ((size - t.at) < (plain ? 2 * count - 1 : depth * count))
+    return wm_fail(err, WM_BAD_DATA, "%s: the PGM is cut: %zu pixels of %zu bytes are promised, %zu bytes are left",
+                   path, count, depth, size - t.at);
+  status = allocate(width, height, path, out, err);
+  if (status != WM_OK) return status;
+  for (size_t i = 0; i < count; i++) {
+    uint32_t value = 0;
+    if (plain) {
+      if (!next_number(&t, white, &value))
+        return wm_fail(err, WM_BAD_DATA, "%s: pixel %zu of the PGM is no number up to %u", path, i, white);
+    } else {
+      value = depth == 1 ? bytes[t.at + i] : (uint32_t)bytes[t.at + 2 * i] << 8 | bytes[t.at + 2 * i + 1];
+      if (value > white) value = white;
+    }
+    out->pixels[i] = white == 255 ? (uint8_t)value : (uint8_t)((value * 255u + white / 2) / white);
+  }
+  return WM_OK;
+}
+
+// ── PNG ─────────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_status read_png(const uint8_t *bytes, size_t size, const char *path, wm_grey *out, wm_error *err) {
+  png_image png = {.version = PNG_IMAGE_VERSION};
+  if (!png_image_begin_read_from_memory(&png, bytes, size))
+    return wm_fail(err, WM_BAD_DATA, "%s: a broken PNG: %s", path, png.message);
+  wm_status status = allocate(png.width, png.height, path, out, err);
+  if (status != WM_OK) {
+    png_image_free(&png);
+    return status;
+  }
+  const png_color white = {255, 255, 255};
+  png.format = PNG_FORMAT_GRAY;
+  if (!png_image_finish_read(&png, &white, out->pixels, 0, NULL))
+    return wm_fail(err, WM_BAD_DATA, "%s: a broken PNG: %s", path, png.message);
+  return WM_OK;
+}
+
+wm_status wm_grey_decode(const void *data, size_t size, const char *path, wm_grey *out, wm_error *err) {
+  const uint8_t *bytes = data;
+  wm_status status;
+  *out = (wm_grey){0};
+  if (size >= 2 && bytes[0] == 'P' && (bytes[1] == '2' || bytes[1] == '5'))
+    status = read_pgm(bytes, size, path, out, err);
+  else if (size >= 4 && memcmp(bytes, "\x89PNG", 4) == 0)
+    status = read_png(bytes, size, path, out, err);
+  else
+    return wm_fail(err, WM_BAD_DATA, "%s: neither PNG nor PGM (P2, P5); save it as one of these", path);
+  if (status == WM_OK) return WM_OK;
+  free(out->pixels);
+  *out = (wm_grey){0};
+  return status;
+}
+
+wm_status wm_grey_load(const char *path, wm_grey *out, wm_error *err) {
+  char *bytes;
+  size_t size;
+  *out = (wm_grey){0};
+  wm_status status = wm_text_read_file(path, FILE_BYTES_MAX, &bytes, &size, err);
+  if (status != WM_OK) return status;
+  status = wm_grey_decode(bytes, size, path, out, err);
+  free(bytes);
+  return status;
+}
