@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+// Detector `edges`: where the floor ends, as points on the floor.
+#include <cmath>
+#include <cstring>
+
+#include "vision/edges/params.h"
+#include "vision/edges/rays.hpp"
+#include "vision/registry.h"
+
+namespace wm {
+
+namespace {
+
+struct edges_state {
+  wm_edges_params params;
+  int32_t camera_index;
+  mounted_camera camera;
+  ray_fan fan;
+};
+
+constexpr size_t kAlign = 64;
+size_t rounded(size_t bytes) { return (bytes + kAlign - 1) / kAlign * kAlign; }
+
+const wm_camera *camera_of(const wm_view *view, const char **why) {
+  *why = nullptr;
+  const int32_t index = view->cameras[0];
+  if (!view->rig || index < 0 || index >= static_cast<int32_t>(view->rig->camera_count)) {
+    *why = "there is no such camera";
+    return nullptr;
+  }
+  return &view->rig->cameras[index];
+}
+
+// Puts the state's parts one behind the other; returns the bytes of all.
+size_t lay_out(edges_state *state, uint32_t rays, uint32_t samples) {
+  size_t used = rounded(sizeof *state);
+  const auto take = [&](size_t bytes) {
+    const size_t at = used;
+    used += rounded(bytes);
+    return at;
+  };
+  auto *base = reinterpret_cast<uint8_t *>(state);
+  const size_t at_rays = take(rays * sizeof(ray)), at_samples = take(samples * sizeof(ray_sample)),
+               at_ranges = take(samples * sizeof(float));
+  if (base) {
+    state->fan.rays = reinterpret_cast<ray *>(base + at_rays);
+    state->fan.samples = reinterpret_cast<ray_sample *>(base + at_samples);
+    state->fan.range_m = reinterpret_cast<float *>(base + at_ranges);
+  }
+  return used;
+}
+
+size_t state_bytes(const void *params, const wm_view *view, const char **why) {
+  const wm_camera *camera = camera_of(view, why);
+  if (!camera) return 0;
+  mounted_camera mounted;
+  *why = mounted_camera_init(&mounted, *camera);
+  if (*why) return 0;
+  uint32_t rays, samples;
+  ray_fan_count(mounted, *static_cast<const wm_edges_params *>(params), &rays, &samples);
+  if (rays == 0) {
+    *why = "the camera sees no floor within the range: is its mounting right (height above 0, pitch down positive)?";
+    return 0;
+  }
+  return lay_out(nullptr, rays, samples);
+}
+
+wm_status init(void *memory, const void *params, const wm_view *view) {
+  const char *why;
+  const wm_camera *camera = camera_of(view, &why);
+  if (!camera) return WM_BAD_CONFIG;
+  auto *state = static_cast<edges_state *>(memory);
+  std::memset(static_cast<void *>(state), 0, sizeof *state);
+  state->params = *static_cast<const wm_edges_params *>(params);
+  state->camera_index = view->cameras[0];
+  if (mounted_camera_init(&state->camera, *camera)) return WM_BAD_CONFIG;
+  uint32_t rays, samples;
+  ray_fan_count(state->camera, state->params, &rays, &samples);
+  lay_out(state, rays, samples);
+  ray_fan_make(state->camera, state->params, &state->fan);
+  return WM_OK;
+}
+
+// Brightness' slope in the picture about the pixel, grey levels a pixel, by Sobel's operator of five rows and columns,
+// which is nearly the same in all directions.
+void slope_at(const wm_frame &frame, const pixel &at, double *gu, double *gv) {
+  constexpr int32_t kSmooth[5] = {1, 4, 6, 4, 1}, kDifference[5] = {-1, -2, 0, 2, 1};
+  const int u = static_cast<int>(at.u + 0.5) - 2, v = static_cast<int>(at.v + 0.5) - 2;
+  int32_t across = 0, down = 0;
+  for (int i = 0; i < 5; i++) {
+    const uint8_t *row = frame.grey + static_cast<size_t>(v + i) * frame.stride_bytes + u;
+    for (int k = 0; k < 5; k++) {
+      across += kSmooth[i] * kDifference[k] * row[k];
+      down += kDifference[i] * kSmooth[k] * row[k];
+    }
+  }
+  *gu = across / 128.0;
+  *gv = down / 128.0;
+}
+
+// The edge as a point on the floor with its normal and sigma. False where the picture doesn't tell.
+bool floor_point(const edges_state &state, const ray_edge &edge, const wm_frame &frame, wm_points *out) {
+  const ray &r = state.fan.rays[edge.ray];
+  const double range = range_at(state.fan, r, static_cast<double>(edge.sample));
+  const vec3 centre = state.camera.centre_m;
+  const double x = centre.x + range * r.cos, y = centre.y + range * r.sin;
+  const double step = 1e-3 * range;
+  pixel at, at_x, at_y;
+  if (!pixel_of(state.camera, {x, y, 0}, 2.5, &at) || !pixel_of(state.camera, {x + step, y, 0}, 0, &at_x) ||
+      !pixel_of(state.camera, {x, y + step, 0}, 0, &at_y))
+    return false;
+  double gu, gv;
+  slope_at(frame, at, &gu, &gv);
+  const double gx = (gu * (at_x.u - at.u) + gv * (at_x.v - at.v)) / step,
+               gy = (gu * (at_y.u - at.u) + gv * (at_y.v - at.v)) / step;
+  const double picture = std::sqrt(gu * gu + gv * gv), floor = std::sqrt(gx * gx + gy * gy);
+  if (!(picture > 0.2) || !(floor > 0)) return false;
+  const double noise = state.params.noise_grey / picture / 3;  // the mean of about ten pixels
+  const double sigma_px = std::sqrt(square(state.params.sigma_px) + square(noise));
+  const uint32_t i = out->count++;
+  out->x_m[i] = static_cast<float>(x);
+  out->y_m[i] = static_cast<float>(y);
+  out->normal_rad[i] = static_cast<float>(atan2(-gy, -gx));
+  out->sigma_m[i] = static_cast<float>(sigma_px * picture / floor);
+  return true;
+}
+
+wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_event *out, size_t capacity,
+                 size_t *count) {
+  const auto *state = static_cast<const edges_state *>(memory);
+  const wm_frame &frame = frames[0];
+  *count = 0;
+  if (frame.width_px != state->camera.width_px || frame.height_px != state->camera.height_px) return WM_BAD_DATA;
+  if (capacity == 0) return WM_FULL;
+  wm_points *points = &out->as.points;
+  std::memset(static_cast<void *>(out), 0, WM_EVENT_HEADER_BYTES);
+  points->count = points->dropped = 0;
+  points->camera = state->camera_index;
+  for (uint32_t i = 0; i < state->fan.ray_count; i++) {
+    ray_edge edge;
+    if (!find_first_edge(state->fan, i, frame, state->params, &edge)) continue;
+    if (points->count == WM_POINTS_MAX) {
+      points->dropped++;
+    } else {
+      floor_point(*state, edge, frame, points);
+    }
+  }
+  if (points->count == 0) return WM_OK;
+  out->t_ns = frame.t_ns;
+  out->kind = WM_EVENT_POINTS;
+  *count = 1;
+  return WM_OK;
+}
+
+}  // namespace
+
+}  // namespace wm
+
+extern "C" const wm_detector wm_edges_detector = {
+    "edges",
+    "where the floor ends: edges of walls, doors and pillars on the floor",
+    WM_EVENT_BIT(WM_EVENT_POINTS),
+    1,
+    wm_edges_params_table,
+    wm::state_bytes,
+    wm::init,
+    wm::detect,
+};

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vision/edges/params.h"
+
+static const char *const kSigns[] = {"bright_to_dark", "any", NULL};
+
+#define F64(key, field, initial, min, max, about) \
+  { key, WM_PARAM_F64, offsetof(struct wm_edges_params, field), initial, min, max, NULL, about }
+
+static const wm_param kParams[] = {
+    F64("rays.step_rad", rays_step_rad, 0.011, 0.001, 0.2,
+        "rad. Angle between two rays from the camera's foot point over the floor; each gives at most one point."),
+    F64("rays.range_min_m", rays_range_min_m, 0.2, 0.0, 50,
+        "m from the camera's foot point. Nearer floor is not searched."),
+    F64("rays.range_max_m", rays_range_max_m, 6.0, 0.1, 100,
+        "m from the camera's foot point. Farther floor is not searched: a pixel is 0.17 m of floor at 6 m."),
+    {"rays.sign", WM_PARAM_ENUM, offsetof(struct wm_edges_params, rays_sign), EDGES_BRIGHT_TO_DARK, 0, EDGES_ANY_SIGN,
+     kSigns,
+     "Which edges are looked for, seen from the robot outwards. Skirting boards and doors are darker than floors; "
+     "their "
+     "upper edges go the other way and must not be taken for the joint of wall and floor."},
+    F64("rays.contrast_grey", rays_contrast_grey, 6.0, 0.5, 255,
+        "Grey levels. Smallest difference of both sides, averaged over four pixels each: above noise and compression."),
+    F64("rays.contrast_rel", rays_contrast_rel, 0.12, 0.0, 1,
+        "Smallest difference of both sides over their sum: above that of neighbouring boards, stains and reflections."),
+    F64("rays.line_rel", rays_line_rel, 0.05, 0.0, 1,
+        "In parts of the range. A dark band that is narrower on the floor is a line (a tile's joint, a cable), no "
+        "wall: "
+        "the height of a board over the camera's height, less than half of the lowest skirting."),
+    F64("sigma_px", sigma_px, 0.3, 0.01, 10, "px. Error of an edge's place across the edge where contrast is good."),
+    F64("noise_grey", noise_grey, 2.0, 0.0, 100,
+        "Grey levels. Noise of a pixel; over an edge's slope it is an error of its place that is added to sigma_px."),
+};
+
+const wm_param_table wm_edges_params_table = {kParams, sizeof kParams / sizeof kParams[0],
+                                              sizeof(struct wm_edges_params)};

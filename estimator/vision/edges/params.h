@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef WAYMARK_ESTIMATOR_VISION_EDGES_PARAMS_H
+#define WAYMARK_ESTIMATOR_VISION_EDGES_PARAMS_H
+
+#include <stdint.h>
+
+#include "waymark/params.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct wm_edges_params {
+  double rays_step_rad, rays_range_min_m, rays_range_max_m;
+  int32_t rays_sign;  // edges_sign
+  double rays_contrast_grey, rays_contrast_rel, rays_line_rel;
+  double sigma_px, noise_grey;
+};
+
+enum edges_sign { EDGES_BRIGHT_TO_DARK, EDGES_ANY_SIGN };
+
+extern const wm_param_table wm_edges_params_table;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Rays over the floor from the camera's foot point, as their ways through the picture: made once, walked in each
+// picture. A step is a pixel. The first edge from bright to dark on such a ray is where the floor ends.
+#ifndef WAYMARK_ESTIMATOR_VISION_RAYS_HPP
+#define WAYMARK_ESTIMATOR_VISION_RAYS_HPP
+
+#include "vision/camera/lens.hpp"
+#include "vision/edges/params.h"
+#include "waymark/frame.h"
+
+namespace wm {
+
+inline constexpr int kRaySamplesMax = 2048;
+inline constexpr int kRaysMax = 6400;
+
+// A place in the picture, in 1/256 px: column and row of the upper left of four pixels, and the way between them.
+struct ray_sample {
+  uint16_t column, row;
+  uint8_t right, down;
+  uint16_t pad;
+};
+
+struct ray {
+  uint32_t first, count;  // samples
+  double direction_rad, cos, sin;
+};
+
+// An edge on a ray.
+struct ray_edge {
+  int32_t ray;
+  float sample;         // place on the ray, in samples
+  float before, after;  // grey levels on both sides
+  float slope;          // grey levels a pixel
+};
+
+struct ray_fan {
+  uint32_t ray_count, sample_count;
+  ray *rays;
+  ray_sample *samples;
+  float *range_m;  // of each sample
+};
+
+// How much memory the fan of this camera needs: counts rays and samples (rays and samples are not written).
+void ray_fan_count(const mounted_camera &camera, const wm_edges_params &params, uint32_t *rays, uint32_t *samples);
+// Fills the fan, whose arrays are as large as counted.
+void ray_fan_make(const mounted_camera &camera, const wm_edges_params &params, ray_fan *out);
+
+// First edge on the ray that is one of a wall. False where there is none.
+bool find_first_edge(const ray_fan &fan, uint32_t index, const wm_frame &frame, const wm_edges_params &params,
+                     ray_edge *out);
+
+// Range at a place between samples.
+double range_at(const ray_fan &fan, const ray &r, double sample);
+
+}  // namespace wm
+
+#endif

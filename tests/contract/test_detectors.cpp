@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+// The detector contract (waymark/detector.h) over every registered detector.
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "unity.h"
+#include "vision/camera/lens.hpp"
+#include "waymark/detector.h"
+#include "waymark/random.h"
+
+namespace {
+bool trapped = false;
+int allocations = 0;
+}  // namespace
+
+extern "C" {
+void *__libc_malloc(size_t);
+void *__libc_calloc(size_t, size_t);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+void *malloc(size_t n) {
+  allocations += trapped;
+  return __libc_malloc(n);
+}
+void *calloc(size_t n, size_t size) {
+  allocations += trapped;
+  return __libc_calloc(n, size);
+}
+#endif
+}
+
+namespace {
+
+constexpr uint32_t kWidth = 640, kHeight = 360;
+constexpr size_t kEvents = 64;
+const wm_detector *detector;
+std::vector<char> params;
+wm_rig rig;
+int32_t cameras[2] = {0, 1};
+wm_view view;
+using Picture = std::vector<uint8_t>;
+
+void make_rig() {
+  wm_rig_init(&rig);
+  rig.camera_count = 2;
+  for (int i = 0; i < 2; i++) {
+    wm_camera &c = rig.cameras[i];
+    c = wm_camera{};
+    c.model = WM_CAMERA_EQUIDISTANT;
+    c.width_px = kWidth;
+    c.height_px = kHeight;
+    const double intrinsics[] = {260, 260, 320, 180};
+    c.intrinsics_count = 4;
+    std::copy(intrinsics, intrinsics + 4, c.intrinsics);
+    c.mounting = {{0.5, 0.1 - 0.2 * i, 0.4}, {0, 22 * M_PI / 180, 0}};
+  }
+  rig.stereo = {0, 1, 0.2, {260, 260, 320, 180}, {1, 1, 1, 1}};
+  std::strcpy(rig.marker_family, "tag36h11");
+  rig.marker_size_m = 0.2;
+  view = {&rig, cameras};
+}
+
+struct machine {
+  void *state;
+  size_t bytes;
+  machine() {
+    const char *why = "";
+    bytes = detector->state_bytes(params.data(), &view, &why);
+    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
+    state = aligned_alloc(64, (bytes + 63) / 64 * 64);
+    std::memset(state, 0xA5, bytes);
+    TEST_ASSERT_EQUAL(WM_OK, detector->init(state, params.data(), &view));
+  }
+  ~machine() { free(state); }
+};
+
+wm_event events[kEvents];
+
+size_t look(machine &m, const Picture &picture, wm_status expected = WM_OK, uint32_t width = kWidth) {
+  wm_frame frames[2] = {};
+  for (int i = 0; i < 2; i++) {
+    frames[i] = {1000, 2000, 0, 7, i, width, kHeight, width, picture.data()};
+  }
+  size_t count = 99;
+  trapped = true;
+  const wm_status status = detector->detect(m.state, frames, nullptr, events, kEvents, &count);
+  trapped = false;
+  TEST_ASSERT_EQUAL(expected, status);
+  TEST_ASSERT_LESS_OR_EQUAL(kEvents, count);
+  return count;
+}
+
+Picture plain(uint8_t level) { return Picture(kWidth * kHeight, level); }
+
+Picture noise(uint64_t seed) {
+  Picture p(kWidth * kHeight);
+  for (size_t i = 0; i < p.size(); i++) p[i] = static_cast<uint8_t>(256 * wm_random_uniform(seed, 1, i));
+  return p;
+}
+
+// A room: bright floor, dark wall at x = 3 m and at y = +-2 m, and a soft grain.
+Picture room() {
+  wm::mounted_camera camera;
+  TEST_ASSERT_NULL(wm::mounted_camera_init(&camera, rig.cameras[0]));
+  Picture p(kWidth * kHeight);
+  for (uint32_t v = 0; v < kHeight; v++)
+    for (uint32_t u = 0; u < kWidth; u++) {
+      double sum = 0;
+      for (int i = 0; i < 16; i++) {  // pixels are areas
+        double x, y;
+        const bool hits = wm::floor_of(camera, {u - 0.375 + 0.25 * (i % 4), v - 0.375 + 0.25 * (i / 4)}, &x, &y);
+        sum += hits && x < 3 && std::fabs(y) < 2 ? 140 : 60;
+      }
+      p[v * kWidth + u] = static_cast<uint8_t>(sum / 16 + 3 * wm_random_uniform(1, 2, v * kWidth + u));
+    }
+  return p;
+}
+
+void check_events(size_t count) {
+  for (size_t i = 0; i < count; i++) {
+    const wm_event &e = events[i];
+    TEST_ASSERT_TRUE(detector->gives & WM_EVENT_BIT(e.kind));
+    TEST_ASSERT_EQUAL_INT64(1000, e.t_ns);
+    if (e.kind != WM_EVENT_POINTS) continue;
+    const wm_points &points = e.as.points;
+    TEST_ASSERT_TRUE(points.count > 0 && points.count <= WM_POINTS_MAX);
+    TEST_ASSERT_EQUAL(0, points.camera);
+    for (uint32_t k = 0; k < points.count; k++) {
+      TEST_ASSERT_TRUE(std::isfinite(points.x_m[k]) && std::isfinite(points.y_m[k]));
+      TEST_ASSERT_TRUE(std::isnan(points.normal_rad[k]) || std::fabs(points.normal_rad[k]) <= 3.1416F);
+      TEST_ASSERT_TRUE(std::isnan(points.sigma_m[k]) || points.sigma_m[k] > 0);
+    }
+  }
+}
+
+void same_picture_same_bytes() {
+  machine a, b;
+  const Picture pictures[] = {room(), noise(3), room()};
+  for (const Picture &p : pictures) {
+    const size_t count = look(a, p);
+    check_events(count);
+    std::vector<wm_event> first(events, events + count);
+    TEST_ASSERT_EQUAL(count, look(b, p));
+    for (size_t i = 0; i < count; i++) {
+      TEST_ASSERT_EQUAL(wm_event_bytes(&first[i]), wm_event_bytes(&events[i]));
+      TEST_ASSERT_EQUAL_MEMORY(&first[i], &events[i], wm_event_bytes(&first[i]));
+    }
+  }
+  TEST_ASSERT_EQUAL(0, allocations);
+}
+
+void nothing_to_see_is_nothing_seen() {
+  machine m;
+  for (int level : {0, 1, 90, 254, 255}) TEST_ASSERT_EQUAL(0, look(m, plain(static_cast<uint8_t>(level))));
+  for (uint64_t seed = 0; seed < 4; seed++) check_events(look(m, noise(seed)));
+}
+
+void another_size_is_refused() {
+  machine m;
+  TEST_ASSERT_EQUAL(0, (look(m, plain(100), WM_BAD_DATA, kWidth / 2) % 99));
+}
+
+void what_does_not_go_together_is_told() {
+  const char *why = nullptr;
+  const wm_rig good = rig;
+  for (int k = 0; k < 2; k++) rig.cameras[k].model = 77;
+  TEST_ASSERT_EQUAL(0, detector->state_bytes(params.data(), &view, &why));
+  TEST_ASSERT_NOT_NULL(why);
+  rig = good;
+  rig.camera_count = 0;
+  why = nullptr;
+  TEST_ASSERT_EQUAL(0, detector->state_bytes(params.data(), &view, &why));
+  TEST_ASSERT_NOT_NULL(why);
+  rig = good;
+}
+
+void edges_lie_where_the_wall_stands() {
+  if (std::strcmp(detector->name, "edges") != 0) TEST_IGNORE_MESSAGE("another detector");
+  machine m;
+  TEST_ASSERT_EQUAL(1, look(m, room()));
+  const wm_points &p = events[0].as.points;
+  TEST_ASSERT_GREATER_THAN(60, p.count);
+  uint32_t right = 0;
+  for (uint32_t i = 0; i < p.count; i++) {
+    const double x = static_cast<double>(p.x_m[i]), y = static_cast<double>(p.y_m[i]), side = 2 - std::fabs(y);
+    const double off = std::fmin(std::fabs(x - 3), std::fabs(side)), normal = static_cast<double>(p.normal_rad[i]);
+    const double expected = std::fabs(x - 3) < std::fabs(side) ? 0 : y > 0 ? M_PI / 2 : -M_PI / 2;
+    right +=
+        off < 3 * static_cast<double>(p.sigma_m[i]) && std::fabs(std::remainder(normal - expected, 2 * M_PI)) < 0.3;
+  }
+  TEST_ASSERT_GREATER_OR_EQUAL(p.count * 95 / 100, right);
+}
+
+}  // namespace
+
+void setUp() { make_rig(); }
+void tearDown() {}
+
+int main() {
+  size_t count;
+  const wm_detector *const *all = wm_detectors(&count);
+  UNITY_BEGIN();
+  for (size_t i = 0; i < count; i++) {
+    detector = all[i];
+    TEST_ASSERT_TRUE(wm_detector_find(detector->name) == detector);
+    TEST_ASSERT_TRUE(detector->pictures == 1 || detector->pictures == 2);
+    params.resize(detector->params.bytes + 1);
+    wm_params_defaults(&detector->params, params.data());
+    RUN_TEST(same_picture_same_bytes);
+    RUN_TEST(nothing_to_see_is_nothing_seen);
+    RUN_TEST(another_size_is_refused);
+    RUN_TEST(what_does_not_go_together_is_told);
+    RUN_TEST(edges_lie_where_the_wall_stands);
+  }
+  return UNITY_END();
+}
