@@ -62,6 +62,22 @@ printf 't_ns,x_m,y_m,z_m,sigma_xy_m,sigma_z_m\n100000000,0.1,0.4,,2,\n' >"$dir/r
 expect 0 '"nees_mean": null' "$bin/waymark-eval" "$dir/run" "$dir/rec" --against gnss --json
 expect 0 '"lost_count": null' "$bin/waymark-eval" "$dir/run" "$dir/rec" --against gnss --json
 
+# Calibrations of other programs.
+printf 'cam0:\n  camera_model: ds\n  distortion_model: none\n  intrinsics: [-0.2, 0.59, 290, 291, 370, 240]\n  resolution: [752, 480]\n' >"$dir/camchain.yaml"
+expect 0 'waymark calibrate import camchain.yaml' "$bin/waymark-calibrate" import --help
+expect 0 'waymark calibrate import' "$bin/waymark-calibrate" --help
+expect 2 'A subcommand is required' "$bin/waymark-calibrate"
+expect 0 'model: double-sphere' "$bin/waymark-calibrate" import "$dir/camchain.yaml"
+expect 0 'intrinsics: [-0.2, 0.59, 290, 291, 370, 240]' "$bin/waymark-calibrate" import "$dir/camchain.yaml"
+expect 0 'px in the mean, at most' "$bin/waymark-calibrate" import "$dir/camchain.yaml" --model equidistant --name front --out "$dir/rec/imported.yaml"
+expect 2 'not written over' "$bin/waymark-calibrate" import "$dir/camchain.yaml" --out "$dir/rec/imported.yaml"
+expect 2 'cannot be read' "$bin/waymark-calibrate" import "$dir/nowhere.yaml"
+expect 2 'is a folder' "$bin/waymark-calibrate" import "$dir/rec"
+expect 2 'is not WIDTHxHEIGHT' "$bin/waymark-calibrate" import "$dir/camchain.yaml" --size big
+# What was imported is what eval reads.
+cp "$dir/rec/imported.yaml" "$dir/rec/calibration.yaml"
+expect 1 'front-edges.csv: is not there' "$bin/waymark-eval" "$dir/empty" "$dir/rec" --detector edges
+
 # JSON is JSON: every field of the format is there, nothing is NaN.
 if ! "$bin/waymark-eval" "$dir/run" "$dir/rec" --json | python3 -c '
 import json, sys

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: Apache-2.0
+// Calibrations of other programs: each format is read, its rays are those of the other program's own forward formula
+// (written down here anew), and mistakes are named with file, line and key.
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+
+#include "calibrate/fit.h"
+#include "calibrate/foreign.h"
+#include "common/failure.h"
+#include "made.h"
+#include "unity.h"
+
+using namespace wm::calibrate;
+using wm::render::Model;
+
+void setUp() {}
+void tearDown() {}
+
+namespace {
+
+ForeignCamera read(const std::string &text, const ImportHints &hints = {}) {
+  const made::Folder folder;
+  folder.write("camera.yaml", text);
+  return read_foreign(folder.path() / "camera.yaml", hints).at(0);
+}
+
+void refused(const char *message, const std::string &text, const ImportHints &hints = {}) {
+  try {
+    read(text, hints);
+  } catch (const wm::tools::Failure &problem) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(problem.what(), message), problem.what());
+    return;
+  }
+  TEST_FAIL_MESSAGE(message);
+}
+
+// The other program's way from a direction to a pixel, and back through ours.
+template <typename Forward>
+void rays_agree(const ForeignCamera &camera, double widest_rad, Forward forward) {
+  for (double angle = 0.02; angle < widest_rad; angle += 0.09)
+    for (double azimuth = 0; azimuth < 6.2; azimuth += 0.37) {
+      const Vec3 d(std::sin(angle) * std::cos(azimuth), std::sin(angle) * std::sin(azimuth), std::cos(angle));
+      Vec3 back(0, 0, 1);
+      TEST_ASSERT_TRUE(camera.unproject(forward(d), back));
+      TEST_ASSERT_DOUBLE_WITHIN(1e-8, 0, (back - d).norm());
+    }
+}
+
+const char *const kOpenCv =
+    "%YAML:1.0\n---\ncalibration_time: \"Sat 01 Jan 2026\"\nimage_width: 1280\nimage_height: 720\n"
+    "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n"
+    "   data: [ 9.1e+02, 0., 6.44e+02, 0., 9.2e+02, 3.55e+02, 0., 0., 1. ]\n"
+    "distortion_coefficients: !!opencv-matrix\n   rows: 8\n   cols: 1\n   dt: d\n"
+    "   data: [ 0.31, 0.12, 1.0e-03, -2.0e-03, 0.01, 0.62, 0.21, 0.03 ]\n";
+
+void test_opencv_rational() {
+  const ForeignCamera camera = read(kOpenCv);
+  TEST_ASSERT_FALSE(camera.same.has_value());
+  rays_agree(camera, 0.7, [](const Vec3 &d) {
+    const double x = d.x() / d.z(), y = d.y() / d.z(), r2 = x * x + y * y;
+    const double q =
+        (1 + 0.31 * r2 + 0.12 * r2 * r2 + 0.01 * r2 * r2 * r2) / (1 + 0.62 * r2 + 0.21 * r2 * r2 + 0.03 * r2 * r2 * r2);
+    return Vec2(910 * (x * q + 2e-3 * x * y - 2e-3 * (r2 + 2 * x * x)) + 644,
+                920 * (y * q + 1e-3 * (r2 + 2 * y * y) - 4e-3 * x * y) + 355);
+  });
+  const Fit fit = fit_model(Model::pinhole_radtan, camera.unproject, 1280, 720, camera.centre);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, fit.max_px);  // ours has the tangential part, and a polynomial for the quotient
+  TEST_ASSERT_GREATER_THAN_DOUBLE(1e-6, fit.max_px);
+}
+
+void test_opencv_xml_and_fisheye() {
+  const std::string xml =
+      "<?xml version=\"1.0\"?>\n<!-- made at a desk -->\n<opencv_storage>\n<image_size>1280 720</image_size>\n"
+      "<fisheye_model>1</fisheye_model>\n<K type_id=\"opencv-matrix\"><rows>3</rows><cols>3</cols><dt>d</dt>\n"
+      "<data>522. 0. 642. 0. 523. 357. 0. 0. 1.</data></K>\n<D type_id=\"opencv-matrix\"><rows>4</rows>"
+      "<data>-0.005 0.002 -0.0016 0.0002</data></D>\n</opencv_storage>\n";
+  const ForeignCamera camera = read(xml);
+  TEST_ASSERT_TRUE(camera.same.has_value());
+  TEST_ASSERT_TRUE(camera.same->model == Model::equidistant);
+  TEST_ASSERT_EQUAL_DOUBLE(-0.0016, camera.same->distortion[2]);
+  TEST_ASSERT_EQUAL(720, camera.height);
+  refused("has no end", "<opencv_storage>\n<K");
+  refused("never closed", "<opencv_storage>\n<K>");
+  refused("camera.yaml:3: </D> closes", "<opencv_storage>\n<K>\n</D>");
+}
+
+void test_four_coefficients_need_a_word() {
+  const std::string text = "K: [[500, 0, 320], [0, 500, 240], [0, 0, 1]]\nD: [0.1, 0.01, 0, 0]\nsize: [640, 480]\n";
+  refused("camera.yaml:2: D: four coefficients", text);
+  ImportHints hints;
+  hints.lens = "plain";
+  TEST_ASSERT_TRUE(read(text, hints).same->model == Model::pinhole_radtan);
+  hints.lens = "fisheye";
+  TEST_ASSERT_TRUE(read(text, hints).same->model == Model::equidistant);
+}
+
+void test_skew_is_honoured() {
+  const ForeignCamera camera =
+      read("K: [500, 2.5, 320, 0, 510, 240, 0, 0, 1]\nD: [0.1, 0.01, 0, 0, 0]\nimage_size: [640, 480]\n");
+  TEST_ASSERT_FALSE(camera.same.has_value());
+  rays_agree(camera, 0.6, [](const Vec3 &d) {
+    const double x = d.x() / d.z(), y = d.y() / d.z(), r2 = x * x + y * y, q = 1 + 0.1 * r2 + 0.01 * r2 * r2;
+    return Vec2(500 * x * q + 2.5 * y * q + 320, 510 * y * q + 240);
+  });
+}
+
+void test_kalibr() {
+  const std::string head = "cam0:\n  cam_overlaps: [1]\n  resolution: [752, 480]\n  rostopic: /cam0\n  ";
+  const ForeignCamera equi = read(head +
+                                  "camera_model: pinhole\n  distortion_model: equidistant\n  intrinsics: [380, 381, "
+                                  "370, 240]\n  distortion_coeffs: [0.01, 0.02, -0.01, 0.001]\n");
+  TEST_ASSERT_TRUE(equi.same->model == Model::equidistant);
+  TEST_ASSERT_EQUAL_STRING("cam0", equi.name.c_str());
+  const ForeignCamera ds = read(head +
+                                "camera_model: ds\n  distortion_model: none\n  intrinsics: [-0.2, 0.59, 290, "
+                                "291, 370, 240]\n  distortion_coeffs: []\n");
+  TEST_ASSERT_TRUE(ds.same->model == Model::double_sphere);
+
+  rays_agree(read(head + "camera_model: pinhole\n  distortion_model: fov\n  intrinsics: [380, 381, 370, 240]\n"
+                         "  distortion_coeffs: [0.92]\n"),
+             1.2, [](const Vec3 &d) {
+               const double r = d.head<2>().norm() / d.z(), k = std::atan(2 * r * std::tan(0.46)) / (0.92 * r);
+               return Vec2(380 * k * d.x() / d.z() + 370, 381 * k * d.y() / d.z() + 240);
+             });
+  const ForeignCamera eucm = read(head +
+                                  "camera_model: eucm\n  distortion_model: none\n"
+                                  "  intrinsics: [0.61, 1.1, 290, 291, 370, 240]\n");
+  rays_agree(eucm, 1.5, [](const Vec3 &d) {
+    const double rho = std::sqrt(1.1 * d.head<2>().squaredNorm() + d.z() * d.z()), under = 0.61 * rho + 0.39 * d.z();
+    return Vec2(290 * d.x() / under + 370, 291 * d.y() / under + 240);
+  });
+  const Fit fit = fit_model(Model::double_sphere, eucm.unproject, 752, 480, eucm.centre);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.5, fit.max_px);
+  TEST_ASSERT_EQUAL(0, fit.failed);
+  refused("camera.yaml:5: cam0.camera_model: 'thick' with 'radtan' is not known",
+          head + "camera_model: thick\n  distortion_model: radtan\n");
+  refused("intrinsics has 3 numbers; 4 are needed",
+          head + "camera_model: pinhole\n  distortion_model: radtan\n  intrinsics: [1, 2, 3]\n");
+  refused("camera.yaml:7: cam0.intrinsics: 'x' is not a number",
+          head + "camera_model: pinhole\n  distortion_model: radtan\n  intrinsics: [1, 2, 3, x]\n");
+}
+
+void test_ros() {
+  const std::string text =
+      "image_width: 640\nimage_height: 480\ncamera_name: head\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
+      "  data: [400, 0, 320, 0, 401, 240, 0, 0, 1]\ndistortion_model: MODEL\ndistortion_coefficients:\n  rows: 1\n"
+      "  cols: 5\n  data: [-0.3, 0.1, 0.001, 0.002, -0.01]\nprojection_matrix:\n  data: [1, 0, 0]\n";
+  const auto with = [&](const char *model) {
+    std::string out = text;
+    return out.replace(out.find("MODEL"), 5, model);
+  };
+  const ForeignCamera camera = read(with("plumb_bob"));
+  TEST_ASSERT_EQUAL_STRING("head", camera.name.c_str());
+  TEST_ASSERT_EQUAL_DOUBLE(-0.01, camera.same->distortion[4]);
+  refused("distortion_model: 'banana' is unknown", with("banana"));
+  // As `ros2 topic echo` prints it.
+  TEST_ASSERT_EQUAL(480, read("header:\n  stamp:\n    sec: 1\nheight: 480\nwidth: 640\ndistortion_model: plumb_bob\n"
+                              "d:\n- 0.1\n- 0.0\n- 0.0\n- 0.0\n- 0.0\nk:\n- 400.0\n- 0.0\n- 320.0\n- 0.0\n- 401.0\n"
+                              "- 240.0\n- 0.0\n- 0.0\n- 1.0\n")
+                             .same->height);
+}
+
+const char *const kOcam =
+    "#polynomial coefficients for the DIRECT mapping function\n\n5 -5.517655e+002 0.000000e+000 8.372454e-004 "
+    "-6.474789e-007 1.235631e-009\n\n#inverse\n\n1 0\n\n#center: \"row\" and \"column\"\n\n381.777786 505.480427\n\n"
+    "#affine\n\n1.001 0.002 -0.001\n\n#image size: \"height\" and \"width\"\n\n768 1024\n";
+
+void test_ocamcalib() {
+  const ForeignCamera camera = read(kOcam);
+  TEST_ASSERT_EQUAL(1024, camera.width);
+  // Its own forward way: rho along the ray by bisection of the polynomial, then the affine map to (row, column).
+  rays_agree(camera, 1.6, [](const Vec3 &d) {
+    const double tangent = d.z() / d.head<2>().norm();  // its -z over the radius
+    const auto off = [&](double r) {
+      return -(-551.7655 + r * r * (8.372454e-4 + r * (-6.474789e-7 + r * 1.235631e-9))) - tangent * r;
+    };
+    double low = 0, high = 1000;
+    for (int i = 0; i < 200; i++) (off((low + high) / 2) > 0 ? low : high) = (low + high) / 2;
+    const double x = low * d.y() / d.head<2>().norm(), y = low * d.x() / d.head<2>().norm();
+    return Vec2(-0.001 * x + y + 505.480427, 1.001 * x + 0.002 * y + 381.777786);
+  });
+  const Fit fit = fit_model(Model::equidistant, camera.unproject, 1024, 768, camera.centre);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.5, fit.max_px);  // the affine part is not in the model
+  refused("5: polynomial, inverse", std::string(kOcam).substr(0, std::strlen(kOcam) / 2));
+  refused("camera.yaml:3: 'x' is not a number", "#polynomial\n\n5 x\n");
+}
+
+void test_what_is_no_calibration() {
+  refused("no camera matrix", "a: 1\n");
+  refused("calibration.yaml of ours already", "cameras:\n  front: {model: equidistant}\n");
+  refused("give --size WIDTHxHEIGHT", "K: [500, 0, 320, 0, 500, 240, 0, 0, 1]\n");
+  refused("KEY: VALUE lines are needed", "[1, 2]\n");
+}
+
+void test_a_fit_to_the_same_model_is_exact() {
+  wm::render::Camera camera;
+  camera.intrinsics = {-0.18, 0.62, 310, 312, 640, 360};
+  camera.model = Model::double_sphere;
+  const ForeignCamera foreign = our_camera(camera);
+  const Fit fit = fit_model(Model::double_sphere, foreign.unproject, 1280, 720, foreign.centre);
+  TEST_ASSERT_LESS_THAN_DOUBLE(1e-6, fit.max_px);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.62, fit.camera.intrinsics[1]);
+}
+
+// A real file, whose own inverse polynomial is the judge.
+void test_real_ocamcalib() {
+  const char *data = std::getenv("WM_DATA_DIR");
+  const std::filesystem::path file =
+      std::filesystem::path(data == nullptr ? "" : data) / "pictures/fisheye-ocamcalib/calib_results_fisheye.txt";
+  if (!std::filesystem::exists(file)) TEST_IGNORE_MESSAGE("the optional pictures are not there");
+  const ForeignCamera camera = read_foreign(file, {}).at(0);
+  const double inverse[] = {730.949123,  315.876984,  -177.960849, -352.468231,
+                            -678.144608, -615.917273, -262.086205, -42.961956};
+  for (double angle = 0.1; angle < 1.2; angle += 0.1) {
+    const double theta = angle - wm::render::kPi / 2;
+    double rho = 0;
+    for (int i = 7; i >= 0; i--) rho = rho * theta + inverse[i];
+    Vec3 d(0, 0, 1);
+    TEST_ASSERT_TRUE(camera.unproject({505.480427 + rho, 381.777786}, d));
+    TEST_ASSERT_DOUBLE_WITHIN(0.002, angle, std::atan2(d.x(), d.z()));
+  }
+  const Fit fit = fit_model(Model::equidistant, camera.unproject, 1024, 768, camera.centre);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.5, fit.max_px);
+}
+
+}  // namespace
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_opencv_rational);
+  RUN_TEST(test_opencv_xml_and_fisheye);
+  RUN_TEST(test_four_coefficients_need_a_word);
+  RUN_TEST(test_skew_is_honoured);
+  RUN_TEST(test_kalibr);
+  RUN_TEST(test_ros);
+  RUN_TEST(test_ocamcalib);
+  RUN_TEST(test_what_is_no_calibration);
+  RUN_TEST(test_a_fit_to_the_same_model_is_exact);
+  RUN_TEST(test_real_ocamcalib);
+  return UNITY_END();
+}

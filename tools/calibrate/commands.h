@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+// The subcommands of `waymark calibrate`: each adds its options to the command line and returns what to run.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+namespace wm::calibrate {
+
+// The returned function throws tools::Failure; its value is the exit code.
+std::function<int()> import_command(CLI::App &app);
+
+}  // namespace wm::calibrate

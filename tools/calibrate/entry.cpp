@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calibrate/entry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "common/failure.h"
+
+namespace wm::calibrate {
+namespace {
+
+std::string list(const std::vector<double> &values) {
+  std::string out = "[";
+  for (const double v : values) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%s%.10g", out.size() > 1 ? ", " : "", v);
+    out += text;
+  }
+  return out + "]";
+}
+
+// Roll, pitch and yaw in degrees of Rz(yaw) Ry(pitch) Rx(roll).
+std::vector<double> rpy_deg(const Eigen::Matrix3d &R) {
+  constexpr double kDeg = 180 / render::kPi;
+  return {std::atan2(R(2, 1), R(2, 2)) * kDeg, -std::asin(std::clamp(R(2, 0), -1.0, 1.0)) * kDeg,
+          std::atan2(R(1, 0), R(0, 0)) * kDeg};
+}
+
+}  // namespace
+
+std::string calibration_yaml(const std::vector<Entry> &entries) {
+  std::string out = "cameras:\n";
+  for (const Entry &entry : entries) {
+    const render::Camera &c = entry.camera;
+    if (!entry.remark.empty()) out += "  # " + entry.remark + "\n";
+    out += "  " + entry.name + ":\n    model: " + render::model_name(c.model) + "\n    size: [" +
+           std::to_string(c.width) + ", " + std::to_string(c.height) + "]\n    intrinsics: " + list(c.intrinsics) +
+           "\n";
+    if (!c.distortion.empty()) out += "    distortion: " + list(c.distortion) + "\n";
+    if (entry.mounted) {
+      const render::Vec3 p = c.T_base_camera.translation();
+      out += "    mounting: {xyz_m: " + list({p.x(), p.y(), p.z()}) +
+             ", rpy_deg: " + list(rpy_deg(c.T_base_camera.linear())) + "}\n";
+    } else {
+      out +=
+          "    mounting: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}  # to be measured: x ahead, y left, z up from the "
+          "rear axle on the floor; positive pitch looks down\n";
+    }
+  }
+  return out;
+}
+
+void write_new(const std::string &path, const std::string &text) {
+  if (path.empty() || path == "-") {
+    std::fputs(text.c_str(), stdout);
+    return;
+  }
+  if (std::filesystem::exists(path))
+    throw tools::Failure(path + ": is there already and is not written over; name another file", tools::kUsage);
+  std::ofstream file(path);
+  file << text;
+  file.close();
+  if (!file) throw tools::Failure(path + ": could not be written");
+}
+
+}  // namespace wm::calibrate

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// waymark calibrate: cameras and mountings.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "calibrate/commands.h"
+#include "common/failure.h"
+
+int main(int argc, char **argv) {
+  using namespace wm;
+  CLI::App app("What a robot's cameras are like and how they sit on it.", "waymark calibrate");
+  app.require_subcommand(1);
+  app.footer("example: waymark calibrate import camchain.yaml\nwaymark calibrate SUBCOMMAND --help says more.");
+  CLI::App *import_app = app.add_subcommand("import", "calibrations of OpenCV, Kalibr, ROS and OCamCalib into ours");
+  const auto import = calibrate::import_command(*import_app);
+  try {
+    app.parse(argc, argv);
+    return import();
+  } catch (const CLI::ParseError &problem) {
+    return app.exit(problem) == 0 ? tools::kDone : tools::kUsage;
+  } catch (const std::exception &problem) {
+    std::fprintf(stderr, "waymark calibrate: %s\n", problem.what());
+    const auto *failure = dynamic_cast<const tools::Failure *>(&problem);
+    return failure != nullptr ? failure->exit_code : tools::kFailed;
+  }
+}
