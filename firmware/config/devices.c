@@ -49,6 +49,90 @@ static wm_status read_can(const wm_yaml_node *item, wm_config *config, wm_error 
   return status;
 }
 
+// Where the text is there, it is read; else *out stays.
+static wm_status text(const wm_yaml_node *item, const char *key, char *out, size_t capacity, wm_error *err) {
+  wm_yaml_node node = wm_yaml_get(item, key);
+  return wm_yaml_there(&node) ? wm_yaml_string(&node, out, capacity, err) : WM_OK;
+}
+
+static wm_status number(const wm_yaml_node *item, const char *key, double max, double *out, wm_error *err) {
+  wm_yaml_node node = wm_yaml_get(item, key);
+  return wm_yaml_there(&node) ? wm_yaml_f64(&node, 0, max, out, err) : WM_OK;
+}
+
+static wm_status choice(const wm_yaml_node *item, const char *key, const char *const *names, int32_t *out,
+                        wm_error *err) {
+  wm_yaml_node node = wm_yaml_get(item, key);
+  return wm_yaml_there(&node) ? wm_yaml_choice(&node, names, out, err) : WM_OK;
+}
+
+static wm_status read_controls(const wm_yaml_node *item, wm_camera_device_config *out, wm_error *err) {
+  wm_yaml_node controls = wm_yaml_get(item, "controls");
+  if (!wm_yaml_there(&controls)) return WM_OK;
+  if (!wm_yaml_is_map(&controls)) return wm_yaml_fail(&controls, err, "a map {CONTROL: VALUE} is needed");
+  if (wm_yaml_count(&controls) > WM_CAMERA_CONTROLS_MAX)
+    return wm_yaml_fail(&controls, err, "more than %d controls", WM_CAMERA_CONTROLS_MAX);
+  for (size_t i = 0; i < wm_yaml_count(&controls); i++) {
+    const char *name;
+    int line;
+    int64_t value;
+    wm_yaml_node node = wm_yaml_value(&controls, i, &name, &line);
+    wm_status status = wm_yaml_i64(&node, INT32_MIN, INT32_MAX, &value, err);
+    if (status != WM_OK) return status;
+    if (snprintf(out->controls[i].name, sizeof out->controls[i].name, "%s", name) >= (int)sizeof out->controls[i].name)
+      return wm_yaml_fail(&node, err, "no control has such a long name (`v4l2-ctl -l` lists them)");
+    out->controls[i].value = (int32_t)value;
+    out->control_count++;
+  }
+  return WM_OK;
+}
+
+static wm_status camera_is_new(const wm_yaml_node *item, const wm_config *config, const wm_camera_device_config *camera,
+                               wm_error *err) {
+  for (size_t i = 0; i < config->devices.camera_count; i++) {
+    const wm_camera_device_config *other = &config->devices.cameras[i];
+    if (strcmp(other->name, camera->name) == 0)
+      return wm_yaml_fail(item, err, "the camera '%s' stands there twice (first in line %d)", camera->name,
+                          other->line);
+    if (camera->device[0] && strcmp(other->device, camera->device) == 0)
+      return wm_yaml_fail(item, err, "the device '%s' stands there twice (first in line %d)", camera->device,
+                          other->line);
+  }
+  return WM_OK;
+}
+
+static wm_status read_camera(const wm_yaml_node *item, wm_config *config, wm_error *err) {
+  static const char *const kKeys[] = {"name",        "device",     "card",  "bus",      "format", "rate_hz",
+                                      "exposure_ms", "latency_ms", "stamp", "controls", NULL};
+  static const char *const kStamps[] = {"auto", "start", "end", NULL};  // wm_stamp_point
+  wm_camera_device_config *out = &config->devices.cameras[config->devices.camera_count];
+  int32_t format = -1;
+  out->line = wm_yaml_line(item);
+  if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {name: CAMERA, device: /dev/video0, ...} is needed");
+  wm_status status = wm_yaml_check_keys(item, kKeys, WM_YAML_STRICT, NULL, err);
+  if (status == WM_OK) status = text(item, "name", out->name, sizeof out->name, err);
+  if (status == WM_OK && !out->name[0])
+    return wm_yaml_fail(item, err, "name: is missing: the camera's name in calibration.yaml");
+  if (status == WM_OK) status = text(item, "device", out->device, sizeof out->device, err);
+  if (status == WM_OK) status = text(item, "card", out->card, sizeof out->card, err);
+  if (status == WM_OK) status = text(item, "bus", out->bus, sizeof out->bus, err);
+  if (status == WM_OK && !out->device[0] && !out->card[0] && !out->bus[0])
+    return wm_yaml_fail(
+        item, err,
+        "device: is missing: a path (/dev/v4l/by-id/... stays the same when it is plugged in again), or "
+        "card or bus as `v4l2-ctl -D` says them");
+  if (status == WM_OK) status = choice(item, "format", wm_camera_formats, &format, err);
+  if (format >= 0) snprintf(out->format, sizeof out->format, "%s", wm_camera_formats[format]);
+  if (status == WM_OK) status = number(item, "rate_hz", 1000, &out->rate_hz, err);
+  if (status == WM_OK) status = number(item, "exposure_ms", 1000, &out->exposure_ms, err);
+  if (status == WM_OK) status = number(item, "latency_ms", 1000, &out->latency_ms, err);
+  if (status == WM_OK) status = choice(item, "stamp", kStamps, &out->stamp, err);
+  if (status == WM_OK) status = read_controls(item, out, err);
+  if (status == WM_OK) status = camera_is_new(item, config, out, err);
+  config->devices.camera_count++;
+  return status;
+}
+
 static wm_status read_list(const wm_yaml_node *list, size_t max, const char *what,
                            wm_status (*read)(const wm_yaml_node *, wm_config *, wm_error *), wm_config *config,
                            wm_error *err) {
@@ -64,10 +148,13 @@ static wm_status read_list(const wm_yaml_node *list, size_t max, const char *wha
 }
 
 wm_status config_read_devices(const wm_yaml_node *root, wm_config *out, wm_error *err) {
-  static const char *const kKeys[] = {"can", NULL};
-  wm_yaml_node devices = wm_yaml_get(root, "devices"), can = wm_yaml_get(root, "devices.can");
+  static const char *const kKeys[] = {"can", "cameras", NULL};
+  wm_yaml_node devices = wm_yaml_get(root, "devices"), can = wm_yaml_get(root, "devices.can"),
+               cameras = wm_yaml_get(root, "devices.cameras");
   if (!wm_yaml_there(&devices)) return WM_OK;
   wm_status status = wm_yaml_check_keys(&devices, kKeys, WM_YAML_STRICT, NULL, err);
   if (status == WM_OK) status = read_list(&can, WM_CAN_DEVICES_MAX, "{interface: NAME, ...}", read_can, out, err);
+  if (status == WM_OK)
+    status = read_list(&cameras, WM_CAMERA_DEVICES_MAX, "{name: CAMERA, device: PATH, ...}", read_camera, out, err);
   return status;
 }

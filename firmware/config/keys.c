@@ -17,7 +17,8 @@ const config_key kConfigKeys[] = {
     {"landmarks", "file", "the recording's", "landmarks.csv to take instead of the recording's."},
     {"dbc", "file", "the recording's", "DBC file to take instead of the recording's vehicle.dbc."},
     {"can_signals", "file", "the recording's", "can-signals.yaml to take instead of the recording's."},
-    {"devices", "map", "none", "The robot's own devices, for `waymark run` without a recording: `can`. See below."},
+    {"devices", "map", "none",
+     "The robot's own devices, for `waymark run` without a recording: `can`, `cameras`. See below."},
     {"map", "file", "the recording's map/map.yaml", "Raster map (a map.yaml) to take instead of the recording's."},
     {"initial_pose", "map", "the recording's",
      "Start pose: `t_ns`, `x_m`, `y_m`, `z_m`, `heading_rad` or `heading_deg`, `qx`, `qy`, `qz`, `qw`, `sigma_xy_m`, "
@@ -45,6 +46,23 @@ const config_key kConfigCanDeviceKeys[] = {
     {"interface", "text", "needed", "SocketCAN's name of it, e.g. `can0`. It needn't be there yet."},
     {"dbc", "file", "`dbc` at the top", "DBC file of this bus."},
     {"can_signals", "file", "`can_signals` at the top", "Which signals of this bus are which quantities."},
+    {NULL, NULL, NULL, NULL},
+};
+
+const config_key kConfigCameraDeviceKeys[] = {
+    {"name", "text", "needed", "The camera's name in calibration.yaml, which has its size."},
+    {"device", "path", "by card and bus",
+     "`/dev/video0`, or a name that stays the same when it is plugged in again: `/dev/v4l/by-id/...`."},
+    {"card", "text", "as first opened",
+     "The model, as `v4l2-ctl -D` says it: another camera is not taken for this one."},
+    {"bus", "text", "as first opened", "Where it is plugged in, as `v4l2-ctl -D` says it."},
+    {"format", "`GREY`, `YUYV`, `UYVY`, `NV12`, `Y10`, `Y16`, `MJPG`", "the driver's", "What the camera sends."},
+    {"rate_hz", "number from 0 to 1000", "the driver's", "Pictures a second."},
+    {"exposure_ms", "number from 0 to 1000", "the driver's",
+     "ms. Exposure, where the driver doesn't tell it: a picture's time is the middle of it."},
+    {"latency_ms", "number from 0 to 1000", "0", "ms. From the exposure's start or end to the driver's stamp."},
+    {"stamp", "`auto`, `start`, `end`", "auto", "What the driver's stamp is of; auto believes the driver."},
+    {"controls", "map", "none", "V4L2 controls by the names of `v4l2-ctl -l`, e.g. `{auto_exposure: 1, gain: 20}`."},
     {NULL, NULL, NULL, NULL},
 };
 

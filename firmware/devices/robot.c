@@ -29,6 +29,12 @@ wm_status wm_robot_open(const wm_config *config, wm_warn_fn warn, void *context,
   wm_recording *robot;
   wm_status status = wm_recording_open_robot("robot", &config->overrides, warn, context, &robot, err);
   if (status != WM_OK) return status;
+  for (size_t i = 0; i < config->devices.camera_count && warn; i++) {
+    char line[160];
+    snprintf(line, sizeof line, "camera %s: nothing looks at its pictures in a run yet; it is not opened",
+             config->devices.cameras[i].name);
+    warn(context, line);
+  }
   status = add_can(config, robot, err);
   if (status != WM_OK) {
     wm_recording_close(robot);

@@ -99,6 +99,21 @@ static void devices(void) {
   TEST_ASSERT_EQUAL_STRING("dir/car.dbc", config.devices.can[0].dbc);
   TEST_ASSERT_EQUAL_STRING("/etc/s.yaml", config.devices.can[0].can_signals);
   TEST_ASSERT_EQUAL_STRING("can1", config.devices.can[1].interface);
+  parse(HEAD
+        "devices:\n  cameras:\n    - name: front\n      device: /dev/video2\n      format: Y10\n      stamp: start\n"
+        "      exposure_ms: 4.5\n      controls: {auto_exposure: 1, gain: -3}\n");
+  const wm_camera_device_config *camera = &config.devices.cameras[0];
+  TEST_ASSERT_EQUAL(1, config.devices.camera_count);
+  TEST_ASSERT_EQUAL_STRING("Y10", camera->format);
+  TEST_ASSERT_TRUE(camera->stamp == WM_STAMP_START && camera->exposure_ms == 4.5 && camera->rate_hz == 0);
+  TEST_ASSERT_EQUAL(2, camera->control_count);
+  TEST_ASSERT_EQUAL_STRING("gain", camera->controls[1].name);
+  TEST_ASSERT_EQUAL_INT32(-3, camera->controls[1].value);
+  refused(HEAD "devices: {cameras: [{name: a, device: b, format: RGB}]}\n",
+          "dir/x.yaml:3: devices.cameras[0].format: 'RGB' is unknown; one of these is needed: GREY, YUYV, UYVY, NV12, "
+          "Y10, Y16, MJPG");
+  refused(HEAD "devices: {cameras: [{name: a, device: b}, {name: c, device: b}]}\n",
+          "dir/x.yaml:3: devices.cameras[1]: the device 'b' stands there twice (first in line 3)");
   refused(HEAD "devices:\n  can:\n    - {interfce: can0}\n",
           "dir/x.yaml:5: devices.can[0].interfce: unknown key; did you mean 'interface'?");
   refused(HEAD "devices:\n  can:\n    - {interface: can0, dbc: a}\n",
