@@ -44,6 +44,7 @@ inline double wrap(double angle_rad) {
 }
 
 inline double square(double x) { return x * x; }
+inline double larger(double a, double b) { return a > b ? a : b; }
 inline bool finite(double x) { return std::isfinite(x); }
 
 }  // namespace wm

@@ -121,6 +121,8 @@ static wm_status write_summary(replay *self, wm_run_report *report, wm_error *er
                             .page_faults_after_start = self->page_faults,
                             .memory_bytes = self->arena.bytes};
   wm_status status = wm_run_folder_health(self->folder, &report->health, err);
+  const wm_fuser *fuser = &self->pipeline.fuser;
+  if (status == WM_OK) status = wm_run_folder_map(self->folder, fuser->estimator, fuser->state, err);
   return status == WM_OK ? wm_run_folder_timing(self->folder, &timing, err) : status;
 }
 

@@ -235,6 +235,8 @@ static wm_status write_summary(live *self, const wm_live_report *report, wm_erro
                             .deadlines_total = report->deadlines_total,
                             .memory_bytes = self->arena.bytes};
   wm_status status = wm_run_folder_health(self->sink.folder, &report->run.health, err);
+  const wm_fuser *fuser = &e->pipeline.fuser;
+  if (status == WM_OK) status = wm_run_folder_map(self->sink.folder, fuser->estimator, fuser->state, err);
   return status == WM_OK ? wm_run_folder_timing(self->sink.folder, &timing, err) : status;
 }
 

@@ -267,6 +267,10 @@ wm_status wm_run_folder_timing(wm_run_folder *self, const wm_timing *timing, wm_
   return wm_write_timing_json(self->dir, timing, err);
 }
 
+wm_status wm_run_folder_map(wm_run_folder *self, const wm_estimator *estimator, const void *state, wm_error *err) {
+  return wm_write_map(self->dir, estimator, state, err);
+}
+
 wm_status wm_run_folder_close(wm_run_folder *self, wm_error *err) {
   if (!self) return WM_OK;
   if (self->tables[TRAJECTORY].file) trajectory_head(self, 3);  // a run that found no pose is a table without rows

@@ -7,19 +7,6 @@
 #include "math/covariance.hpp"
 
 namespace wm {
-namespace {
-
-const char *const kMotionStateNames[kCalibrationCount] = {
-    "motion.speed_scale",         "motion.yaw_rate_scale", "motion.yaw_rate_bias_radps",
-    "motion.left_scale",          "motion.right_scale",    "motion.track_scale",
-    "motion.steering_offset_rad", "motion.lag_s",          "motion.turn_slowdown_m"};
-
-// What a state can be at all. An update beyond is cut: a model that wants more is wrong, and a scale of 0 or a lag
-// beyond the history would take the filter with it.
-constexpr double kLowest[kCalibrationCount] = {0.3, 0.3, -1.0, 0.3, 0.3, 0.3, -0.5, 0.0, -1.0};
-constexpr double kHighest[kCalibrationCount] = {3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0};
-
-}  // namespace
 
 int planar_filter::count_motion_states(const wm_motion_states &states) {
   int count = 0;
@@ -106,84 +93,33 @@ void planar_filter::move_to(wm_time_ns t_ns) {
   }
 }
 
-// Paper, system 1: F and W, with exact arcs in place of the first-order step, and a column for each calibration state.
 void planar_filter::propagate(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
-  const double dt = piece.dt_s;
-  const arc a = make_arc(twist.v * dt, twist.w * dt);
-  const sin_cos h = sincos(x_[kHeading]);
-  const double dx = h.cos * a.x_m - h.sin * a.y_m;
-  const double dy = h.sin * a.x_m + h.cos * a.y_m;
-
-  // Derivatives of the new pose that F has beside the identity, by column.
-  constexpr int kMaxColumns = 10;
-  int column[kMaxColumns];
-  double by[kMaxColumns][3];
-  int columns = 0;
-  column[0] = kHeading;
-  by[0][0] = -dy;
-  by[0][1] = dx;
-  by[0][2] = 0.0;
-  columns = 1;
-  const auto add_column = [&](int state, double way_by, double turn_by) {
-    const double bx = a.x_by_way * way_by + a.x_by_turn * turn_by;
-    const double by_body = a.y_by_way * way_by + a.y_by_turn * turn_by;
-    column[columns] = state;
-    by[columns][0] = h.cos * bx - h.sin * by_body;
-    by[columns][1] = h.sin * bx + h.cos * by_body;
-    by[columns][2] = turn_by;
-    columns++;
-  };
-  for (int i = 0; i < twist.count; i++) {
-    const int state = motion_state_[twist.index[i]];
-    if (state >= 0) add_column(state, twist.v_by[i] * dt, twist.w_by[i] * dt);
-  }
-  // More lag: the interval takes in more of what was said before it (at its beginning, and all that follows is turned
-  // by that), and less of what was said last.
-  const int lag = motion_state_[kLag];
-  if (lag >= 0 && (piece.first || piece.last)) {
-    add_column(lag, piece.last ? -twist.v : 0.0, piece.last ? -twist.w : 0.0);
-    if (piece.first) {
-      by[columns - 1][0] += h.cos * v_mps_ - dy * w_radps_;
-      by[columns - 1][1] += h.sin * v_mps_ + dx * w_radps_;
-      by[columns - 1][2] += w_radps_;
-    }
-  }
-
+  const double before[2] = {v_mps_, w_radps_};
+  const pose_step step = make_pose_step(piece, twist, noise, x_[kHeading], before, motion_state_);
   // Rows: T = F P, in place. Rows 0 and 1 need the old row 2, so it comes last.
   double *rows[3] = {p_, p_ + stride_, p_ + 2 * stride_};
   for (int r = 0; r < 3; r++)
-    for (int k = 0; k < columns; k++)
-      if (by[k][r] != 0.0) vectors::add_scaled(rows[r], p_ + column[k] * stride_, by[k][r], stride_);
+    for (int k = 0; k < step.columns; k++)
+      if (step.by[k][r] != 0.0) vectors::add_scaled(rows[r], p_ + step.column[k] * stride_, step.by[k][r], stride_);
   // The pose's own block of T F', then the mirror of the rest.
   double block[3][3];
   for (int r = 0; r < 3; r++)
     for (int c = r; c < 3; c++) {
       double sum = rows[r][c];
-      for (int k = 0; k < columns; k++) sum += by[k][c] * rows[r][column[k]];
-      block[r][c] = sum;
+      for (int k = 0; k < step.columns; k++) sum += step.by[k][c] * rows[r][step.column[k]];
+      block[r][c] = sum + step.noise[r][c];
     }
-  // Noise: along the way, in the turn, sideways.
-  const double way_x = h.cos * a.x_by_way - h.sin * a.y_by_way, way_y = h.sin * a.x_by_way + h.cos * a.y_by_way;
-  const double turn_x = h.cos * a.x_by_turn - h.sin * a.y_by_turn, turn_y = h.sin * a.x_by_turn + h.cos * a.y_by_turn;
-  const double qww = noise.way_m2, qtt = noise.turn_rad2, qwt = noise.way_turn, qss = noise.side_m2;
-  block[0][0] += way_x * way_x * qww + 2.0 * way_x * turn_x * qwt + turn_x * turn_x * qtt + way_y * way_y * qss;
-  block[0][1] +=
-      way_x * way_y * qww + (way_x * turn_y + turn_x * way_y) * qwt + turn_x * turn_y * qtt - way_x * way_y * qss;
-  block[1][1] += way_y * way_y * qww + 2.0 * way_y * turn_y * qwt + turn_y * turn_y * qtt + way_x * way_x * qss;
-  block[0][2] += way_x * qwt + turn_x * qtt;
-  block[1][2] += way_y * qwt + turn_y * qtt;
-  block[2][2] += qtt;
   for (int r = 0; r < 3; r++)
     for (int c = r; c < 3; c++) rows[r][c] = rows[c][r] = block[r][c];
   for (int i = kPoseStates; i < n_; i++)
     for (int r = 0; r < 3; r++) p_[i * stride_ + r] = rows[r][i];
 
-  x_[kX] += dx;
-  x_[kY] += dy;
-  x_[kHeading] = wrap(x_[kHeading] + a.turn_rad);
-  odom_ = compose(odom_, {a.x_m, a.y_m, a.turn_rad});
-  travelled_m_ += std::fabs(twist.v) * dt;
-  turned_rad_ += std::fabs(a.turn_rad);
+  x_[kX] += step.x_m;
+  x_[kY] += step.y_m;
+  x_[kHeading] = wrap(x_[kHeading] + step.turn_rad);
+  odom_ = compose(odom_, step.body);
+  travelled_m_ += std::fabs(twist.v) * piece.dt_s;
+  turned_rad_ += std::fabs(step.turn_rad);
   v_mps_ = twist.v;
   w_radps_ = twist.w;
 }
@@ -239,10 +175,7 @@ void planar_filter::take_calibration() {
   for (int i = 0; i < kCalibrationCount; i++) {
     const int state = motion_state_[i];
     if (state < 0) continue;
-    double &value = x_[state];
-    if (value < kLowest[i]) value = kLowest[i];
-    if (value > kHighest[i]) value = kHighest[i];
-    calibration_at(calibration_, i) = value;
+    calibration_at(calibration_, i) = x_[state] = motion_state_within_limits(i, x_[state]);
   }
 }
 

@@ -5,6 +5,7 @@
 #define WAYMARK_ESTIMATOR_PLANAR_FILTER_HPP
 
 #include "filters/planar/motion_states.h"
+#include "filters/planar/pose_step.hpp"
 #include "filters/planar/wheel_heading.hpp"
 #include "motion/front_end.hpp"
 #include "waymark/estimator.h"
@@ -12,7 +13,6 @@
 namespace wm {
 
 inline constexpr int kMaxStates = 64;
-enum pose_state { kX = 0, kY = 1, kHeading = 2, kPoseStates = 3 };
 
 // A row of a measurement's derivative: few entries are not zero.
 struct sparse_row {

@@ -20,7 +20,7 @@ void set(planar_filter &filter, const wm_pose2 &pose, double sigma_xy, double si
 
 }  // namespace
 
-wm_status set_pose(planar_filter &filter, const wm_event &event) {
+wm_status read_set_pose(const wm_event &event, given_pose *out) {
   const wm_set_pose &s = event.as.set_pose;
   const double *p = s.pose_map_base.p_m;
   const double *q = s.pose_map_base.q_xyzw;
@@ -32,10 +32,17 @@ wm_status set_pose(planar_filter &filter, const wm_event &event) {
       !(s.sigma_xy_m > 0.0 && s.sigma_xy_m <= kFarthest_m) ||
       !(s.sigma_heading_rad > 0.0 && s.sigma_heading_rad < 10.0))
     return WM_OUT_OF_RANGE;
-  const wm_status status = filter.check_time(event.t_ns);
+  *out = {{p[0], p[1], heading_of(q)}, s.sigma_xy_m, s.sigma_heading_rad};
+  return WM_OK;
+}
+
+wm_status set_pose(planar_filter &filter, const wm_event &event) {
+  given_pose given;
+  wm_status status = read_set_pose(event, &given);
+  if (status == WM_OK) status = filter.check_time(event.t_ns);
   if (status != WM_OK) return status;
   filter.move_to(event.t_ns);
-  set(filter, {p[0], p[1], heading_of(q)}, s.sigma_xy_m, s.sigma_heading_rad);
+  set(filter, given.pose, given.sigma_xy_m, given.sigma_heading_rad);
   return WM_OK;
 }
 

@@ -103,7 +103,7 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
   records.add(record);
 }
 
-size_t stereo_ekf::list_points(wm_landmark *out, double (*cov_xy)[3], size_t capacity) const {
+size_t stereo_ekf::list_points(wm_landmark *out, double (*covariance)[4], size_t capacity) const {
   const auto count = (size_t)filter_.point_count();
   for (size_t i = 0; i < count && i < capacity; i++) {
     const int state = filter_.point_state((int)i);
@@ -114,10 +114,11 @@ size_t stereo_ekf::list_points(wm_landmark *out, double (*cov_xy)[3], size_t cap
     out[i].sigma_m =
         std::sqrt((filter_.variance(state) + filter_.variance(state + 1) + filter_.variance(state + 2)) / 3.0);
     out[i].yaw_rad = std::numeric_limits<double>::quiet_NaN();
-    if (!cov_xy) continue;
-    cov_xy[i][0] = filter_.covariance(state, state);
-    cov_xy[i][1] = filter_.covariance(state, state + 1);
-    cov_xy[i][2] = filter_.covariance(state + 1, state + 1);
+    if (!covariance) continue;
+    covariance[i][0] = filter_.covariance(state, state);
+    covariance[i][1] = filter_.covariance(state, state + 1);
+    covariance[i][2] = filter_.covariance(state + 1, state + 1);
+    covariance[i][3] = std::nan("");
   }
   return count;
 }

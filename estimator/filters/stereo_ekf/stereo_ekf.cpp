@@ -271,8 +271,8 @@ size_t calibration(const void *state, wm_calibration_value *out, size_t capacity
   return of(state).list_calibration(out, capacity);
 }
 uint32_t motion_health(const void *state) { return of(state).motion_health(); }
-size_t landmarks(const void *state, wm_landmark *out, double (*cov_xy)[3], size_t capacity) {
-  return of(state).list_points(out, cov_xy, capacity);
+size_t landmarks(const void *state, wm_landmark *out, double (*covariance)[4], size_t capacity) {
+  return of(state).list_points(out, covariance, capacity);
 }
 
 }  // namespace

@@ -57,8 +57,9 @@ typedef struct wm_estimator {
   size_t (*calibration)(const void *state, wm_calibration_value *out, size_t capacity);
   // Health flags of the motion sensors: bits of WM_MOTION_HEALTH_*.
   uint32_t (*motion_health)(const void *state);
-  // SLAM: landmarks estimated; NULL where the estimator has none.
-  size_t (*landmarks)(const void *state, wm_landmark *out, double (*cov_xy)[3], size_t capacity);
+  // SLAM: landmarks estimated, with their covariances (xx, xy, yy in m2, heading in rad2; NaN where there is none);
+  // returns how many there are. NULL where the estimator has none.
+  size_t (*landmarks)(const void *state, wm_landmark *out, double (*covariance)[4], size_t capacity);
 } wm_estimator;
 
 #define WM_INNOVATIONS_PER_EVENT_MAX 8

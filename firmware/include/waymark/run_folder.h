@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The folder that a run writes (docs/recording-format.md): trajectory.tum, trajectory.csv, published.csv,
-// innovations.csv, events.wmlog as it goes; health.json and timing.json at the end. Buffers are its own: no allocation
-// after it is open. One thread, never the estimator's in a live run.
+// innovations.csv, events.wmlog as it goes; health.json, timing.json and (SLAM) map-estimate.csv at the end. Buffers
+// are its own: no allocation after it is open. One thread, never the estimator's in a live run.
 #ifndef WAYMARK_RUN_FOLDER_H
 #define WAYMARK_RUN_FOLDER_H
 
@@ -41,6 +41,8 @@ typedef struct wm_timing {
 
 wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_error *err);
 wm_status wm_run_folder_timing(wm_run_folder *self, const wm_timing *timing, wm_error *err);
+// map-estimate.csv: the landmarks that the estimator found; nothing where it has none.
+wm_status wm_run_folder_map(wm_run_folder *self, const wm_estimator *estimator, const void *state, wm_error *err);
 // Closes everything. WM_IO with the first thing that could not be written.
 wm_status wm_run_folder_close(wm_run_folder *self, wm_error *err);
 

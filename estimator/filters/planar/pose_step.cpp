@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/planar/pose_step.hpp"
+
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kLowest[kCalibrationCount] = {0.3, 0.3, -1.0, 0.3, 0.3, 0.3, -0.5, 0.0, -1.0};
+constexpr double kHighest[kCalibrationCount] = {3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0};
+
+}  // namespace
+
+const char *const kMotionStateNames[kCalibrationCount] = {
+    "motion.speed_scale",         "motion.yaw_rate_scale", "motion.yaw_rate_bias_radps",
+    "motion.left_scale",          "motion.right_scale",    "motion.track_scale",
+    "motion.steering_offset_rad", "motion.lag_s",          "motion.turn_slowdown_m"};
+
+double motion_state_within_limits(int calibration_index, double value) {
+  if (value < kLowest[calibration_index]) return kLowest[calibration_index];
+  return value > kHighest[calibration_index] ? kHighest[calibration_index] : value;
+}
+
+pose_step make_pose_step(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise,
+                         double heading_rad, const double before[2], const int motion_state[kCalibrationCount]) {
+  pose_step out;
+  const double dt = piece.dt_s;
+  const arc a = make_arc(twist.v * dt, twist.w * dt);
+  const sin_cos h = sincos(heading_rad);
+  const double dx = h.cos * a.x_m - h.sin * a.y_m;
+  const double dy = h.sin * a.x_m + h.cos * a.y_m;
+  out.x_m = dx;
+  out.y_m = dy;
+  out.turn_rad = a.turn_rad;
+  out.body = {a.x_m, a.y_m, a.turn_rad};
+
+  out.column[0] = kHeading;
+  out.by[0][0] = -dy;
+  out.by[0][1] = dx;
+  out.by[0][2] = 0.0;
+  out.columns = 1;
+  const auto add_column = [&](int state, double way_by, double turn_by) {
+    const double bx = a.x_by_way * way_by + a.x_by_turn * turn_by;
+    const double by_body = a.y_by_way * way_by + a.y_by_turn * turn_by;
+    double *by = out.by[out.columns];
+    out.column[out.columns++] = state;
+    by[0] = h.cos * bx - h.sin * by_body;
+    by[1] = h.sin * bx + h.cos * by_body;
+    by[2] = turn_by;
+  };
+  for (int i = 0; i < twist.count; i++) {
+    const int state = motion_state[twist.index[i]];
+    if (state >= 0) add_column(state, twist.v_by[i] * dt, twist.w_by[i] * dt);
+  }
+  // More lag: the interval takes in more of what was said before it (at its beginning, and all that follows is turned
+  // by that), and less of what was said last.
+  const int lag = motion_state[kLag];
+  if (lag >= 0 && (piece.first || piece.last)) {
+    add_column(lag, piece.last ? -twist.v : 0.0, piece.last ? -twist.w : 0.0);
+    if (piece.first) {
+      double *by = out.by[out.columns - 1];
+      by[0] += h.cos * before[0] - dy * before[1];
+      by[1] += h.sin * before[0] + dx * before[1];
+      by[2] += before[1];
+    }
+  }
+
+  // Noise: along the way, in the turn, sideways.
+  const double way_x = h.cos * a.x_by_way - h.sin * a.y_by_way, way_y = h.sin * a.x_by_way + h.cos * a.y_by_way;
+  const double turn_x = h.cos * a.x_by_turn - h.sin * a.y_by_turn, turn_y = h.sin * a.x_by_turn + h.cos * a.y_by_turn;
+  const double qww = noise.way_m2, qtt = noise.turn_rad2, qwt = noise.way_turn, qss = noise.side_m2;
+  out.noise[0][0] = way_x * way_x * qww + 2.0 * way_x * turn_x * qwt + turn_x * turn_x * qtt + way_y * way_y * qss;
+  out.noise[0][1] =
+      way_x * way_y * qww + (way_x * turn_y + turn_x * way_y) * qwt + turn_x * turn_y * qtt - way_x * way_y * qss;
+  out.noise[1][1] = way_y * way_y * qww + 2.0 * way_y * turn_y * qwt + turn_y * turn_y * qtt + way_x * way_x * qss;
+  out.noise[0][2] = way_x * qwt + turn_x * qtt;
+  out.noise[1][2] = way_y * qwt + turn_y * qtt;
+  out.noise[2][2] = qtt;
+  return out;
+}
+
+}  // namespace wm

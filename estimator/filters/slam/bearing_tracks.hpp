@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// Landmarks that are seen by bearings alone and wait for parallax: for each the bearings from a few poses of the past
+// (clones in the state), and from them the landmark's place with its joint distribution.
+#ifndef WAYMARK_ESTIMATOR_SLAM_BEARING_TRACKS_HPP
+#define WAYMARK_ESTIMATOR_SLAM_BEARING_TRACKS_HPP
+
+#include "filters/slam/joint_state.hpp"
+
+namespace wm {
+
+inline constexpr int kLinePoses = 8;
+
+// Lines of sight from poses (x, y, heading of the sensor), and how unsure they are.
+struct line_bundle {
+  int count;
+  wm_pose2 pose[kLinePoses];
+  double azimuth_rad[kLinePoses], sigma_rad[kLinePoses];
+  double pose_covariance[3 * kLinePoses][3 * kLinePoses];
+};
+
+// A landmark found from a bundle: its place, its derivative by each pose's x, y, heading, and the covariance of what
+// comes besides (azimuths' noise and what the derivative doesn't tell).
+struct line_landmark {
+  bool solved;  // the lines cross, ahead of every pose
+  double place_m[2];
+  double by_pose[2][3 * kLinePoses];
+  double noise[2][2];
+  double parallax_rad;  // largest angle between two of the lines at the landmark
+  double distance_m;    // from the last pose
+  double misfit;        // mean squared angle by which the lines miss it, in units of its variance
+};
+
+// System 5, initialisation: each pose gives one homogeneous equation, the singular vector of the smallest singular
+// value is the place; its distribution by the unscented transform over (poses 2..k relative to the first,
+// azimuths 1..k), or by one linearisation. Mended: the poses' joint covariance is used whole and the result stays
+// correlated with every one of them; and the place must lie ahead along each azimuth.
+line_landmark find_line(const line_bundle &bundle, bool unscented);
+
+// Which bearings wait for which landmark. Plain memory.
+class bearing_tracks {
+ public:
+  static constexpr int kTracks = 128;
+  struct track {
+    int32_t id;  // -1: free
+    int sensor, count, misfits;
+    wm_time_ns last_ns;
+    int clone[kLinePoses];
+    double azimuth_rad[kLinePoses], sigma_rad[kLinePoses];
+  };
+
+  // At most so many clones and tracks.
+  void clear(int clones, int tracks);
+  int index(const track &t) const { return (int)(&t - track_); }
+  track *find(int32_t id, int sensor);
+  // A free track; the one not seen for longest where there is none.
+  track *begin(int32_t id, int sensor);
+  static void end(track *t) { t->id = -1; }
+  // Full (`most`): the bearing goes that was taken nearest to its neighbour, so that what is left sees from far apart.
+  void add(track *t, int clone, double azimuth_rad, double sigma_rad, int most);
+  // A clone's number to use anew, for a sensor at (x, y): one that no track needs, else the one that lies nearest to
+  // another, which leaves its tracks.
+  int take_clone(int sensor, wm_time_ns t_ns, double x_m, double y_m);
+  // The clone of this sensor at this stamp, -1 where there is none.
+  int find_clone(int sensor, wm_time_ns t_ns) const;
+  static constexpr int kClones = 40;
+
+ private:
+  static void remove(track *t, int which);
+  double apart2(int a, int b) const;
+  track track_[kTracks];
+  int clones_, tracks_;
+  wm_time_ns clone_ns_[kClones];
+  int clone_sensor_[kClones];
+  double clone_m_[kClones][2];  // where it was taken: for choosing alone
+};
+
+}  // namespace wm
+
+#endif

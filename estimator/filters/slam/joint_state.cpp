@@ -1,0 +1,418 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/slam/joint_state.hpp"
+
+#include <cstring>
+
+#include "math/arc.hpp"
+
+namespace wm {
+
+// ---- start ----
+
+size_t joint_state::doubles(const joint_layout &layout) {
+  const int capacity = even(even(layout.robot_states) + layout.landmarks * layout.landmark_width);
+  return half_covariance::doubles(capacity) + static_cast<size_t>(capacity) * static_cast<size_t>(1 + kRows + 2);
+}
+
+void joint_state::init(const wm_setup &setup, const joint_layout &layout, double *arrays) {
+  offset_ = reinterpret_cast<char *>(arrays) - reinterpret_cast<char *>(this);
+  layout_ = layout;
+  layout_.robot_states = even(layout.robot_states);
+  capacity_ = even(layout_.robot_states + layout.landmarks * layout.landmark_width);
+  std::memset(arrays, 0, doubles(layout) * sizeof(double));
+  n_ = layout_.robot_states;
+  landmarks_ = 0;
+  front_.init(setup.motion, &setup.wheels);
+  calibration_ = kNeutralCalibration;
+  for (int &state : motion_state_) state = -1;
+  start_ns_ = setup.start.t_ns;
+  odom_ = {};
+  travelled_m_ = turned_rad_ = twist_[0] = twist_[1] = 0.0;
+}
+
+int joint_state::count_motion_states(const wm_motion_states &states) {
+  int count = 0;
+  for (double sigma : states.sigma) count += sigma > 0.0;
+  return count;
+}
+
+void joint_state::set_motion_states(const wm_motion_states &states, int first) {
+  for (int i = 0; i < kCalibrationCount; i++) {
+    walk_[i] = square(states.walk[i]);
+    start_variance_[i] = square(states.sigma[i]);
+    if (!(states.sigma[i] > 0.0)) continue;
+    motion_state_[i] = first++;
+    forget(motion_state_[i], calibration_at(kNeutralCalibration, i), start_variance_[i]);
+  }
+}
+
+// ---- time and motion ----
+
+wm_status joint_state::check_time(wm_time_ns t_ns) const {
+  constexpr wm_time_ns kMaxTime = INT64_C(1) << 62;
+  if (t_ns > kMaxTime || t_ns < -kMaxTime) return WM_OUT_OF_RANGE;
+  if (t_ns < start_ns_ || (now_ns() != WM_TIME_NONE && t_ns < now_ns())) return WM_TIME_RAN_BACK;
+  return WM_OK;
+}
+
+void joint_state::move(const wm_event &motion) {
+  front_.feed(motion);
+  if (front_.speed_source_changed() && motion_state_[kSpeedScale] >= 0)
+    forget(motion_state_[kSpeedScale], 1.0, start_variance_[kSpeedScale]);
+  move_to(motion.t_ns);
+  double rate;
+  if (motion_state_[kYawRateBias] >= 0 && front_.standstill_yaw_rate(&rate)) {
+    // Standing still: what the gyro shows is its bias.
+    joint_row row;
+    row.add(motion_state_[kYawRateBias], 1.0);
+    const double innovation = rate - calibration_.yaw_rate_bias_radps;
+    const double noise = square(front_.params().standstill_bias_sigma_radps), none = 0.0;
+    innovation_block block;
+    prepare(&row, &innovation, &noise, 1, &block);
+    fuse(block, &none, false);
+  }
+}
+
+void joint_state::move_to(wm_time_ns t_ns) {
+  if (now_ns() == WM_TIME_NONE) front_.set_now(t_ns);
+  if (now_ns() < start_ns_) {  // the pose is known later on: until then only what holds is kept
+    front_.advance(t_ns < start_ns_ ? t_ns : start_ns_, calibration_,
+                   [](const motion_stretch &, const motion_twist &, const motion_noise &) {});
+  }
+  if (t_ns <= now_ns()) return;
+  const double dt = wm_seconds_between(now_ns(), t_ns);
+  front_.advance(t_ns, calibration_,
+                 [this](const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
+                   propagate(piece, twist, noise);
+                 });
+  for (int i = 0; i < kCalibrationCount; i++) {
+    const int state = motion_state_[i];
+    if (state >= 0) p().row(state)[state] += walk_[i] * dt;
+  }
+}
+
+wm_pose2 joint_state::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const {
+  wm_pose2 sum{};
+  bool first = true;
+  front_.walk(from_ns, to_ns, calibration_,
+              [&](const motion_stretch &piece, const motion_twist &t, const motion_noise &) {
+                if (first) *twist = t;
+                first = false;
+                const arc a = make_arc(t.v * piece.dt_s, t.w * piece.dt_s);
+                sum = compose(sum, {a.x_m, a.y_m, a.turn_rad});
+              });
+  if (first) *twist = front_.twist_at(from_ns, calibration_);
+  return sum;
+}
+
+// Paper, system 2: time update of P_rr and P_rm alone.
+void joint_state::propagate(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
+  const pose_step step = make_pose_step(piece, twist, noise, value(kHeading), twist_, motion_state_);
+  const half_covariance cov = p();
+  const int robot = layout_.robot_states;
+  // Rows of T = F P over the robot's own states, where the columns of F lie on both sides of the diagonal ...
+  double t[kPoseStates][kMaxRobot];
+  for (int j = 0; j < robot; j++)
+    for (int r = 0; r < kPoseStates; r++) {
+      t[r][j] = cov.at(r, j);
+      for (int k = 0; k < step.columns; k++)
+        if (step.by[k][r] != 0.0) t[r][j] += step.by[k][r] * cov.at(step.column[k], j);
+    }
+  // ... and over the landmarks, where they are parts of rows. Rows 0 and 1 need the old row 2, so it comes last.
+  for (int r = 0; r < kPoseStates; r++)
+    for (int k = 0; k < step.columns; k++)
+      if (step.by[k][r] != 0.0)
+        vectors::add_scaled(cov.row(r) + robot, cov.row(step.column[k]) + robot, step.by[k][r], even(n_ - robot));
+  for (int r = 0; r < kPoseStates; r++)
+    for (int c = r; c < kPoseStates; c++) {
+      double sum = t[r][c];
+      for (int k = 0; k < step.columns; k++) sum += step.by[k][c] * t[r][step.column[k]];
+      cov.set(r, c, sum + step.noise[r][c]);
+    }
+  for (int r = 0; r < kPoseStates; r++)
+    for (int j = kPoseStates; j < robot; j++) cov.set(r, j, t[r][j]);
+
+  double *mean = x();
+  mean[kX] += step.x_m;
+  mean[kY] += step.y_m;
+  mean[kHeading] = wrap(mean[kHeading] + step.turn_rad);
+  odom_ = compose(odom_, step.body);
+  travelled_m_ += std::fabs(twist.v) * piece.dt_s;
+  turned_rad_ += std::fabs(step.turn_rad);
+  twist_[0] = twist.v;
+  twist_[1] = twist.w;
+}
+
+size_t joint_state::list_calibration(wm_calibration_value *out, size_t capacity) const {
+  size_t count = 0;
+  for (int i = 0; i < kCalibrationCount; i++) {
+    if (motion_state_[i] < 0) continue;
+    if (count < capacity) {
+      std::memset(&out[count], 0, sizeof out[count]);
+      std::memcpy(out[count].name, kMotionStateNames[i], std::strlen(kMotionStateNames[i]));
+      out[count].value = value(motion_state_[i]);
+      out[count].sigma = std::sqrt(variance(motion_state_[i]));
+    }
+    count++;
+  }
+  return count;
+}
+
+void joint_state::estimate(wm_estimate *out) const {
+  std::memset(out, 0, sizeof *out);
+  out->t_ns = now_ns();
+  out->pose_map_base.p_m[0] = value(kX);
+  out->pose_map_base.p_m[1] = value(kY);
+  const sin_cos half = sincos(0.5 * value(kHeading));
+  out->pose_map_base.q_xyzw[2] = half.sin;
+  out->pose_map_base.q_xyzw[3] = half.cos;
+  out->heading_rad = value(kHeading);
+  const int at[3] = {0, 1, 5};
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) out->covariance[wm_cov_index(at[i], at[j])] = covariance(i, j);
+  out->v_mps[0] = twist_[0];
+  out->w_radps[2] = twist_[1];
+  out->dof = 3;
+}
+
+void joint_state::take_calibration() {
+  for (int i = 0; i < kCalibrationCount; i++) {
+    const int state = motion_state_[i];
+    if (state >= 0) calibration_at(calibration_, i) = x()[state] = motion_state_within_limits(i, x()[state]);
+  }
+}
+
+// ---- the state ----
+
+void joint_state::forget(int state, double value, double variance) {
+  const half_covariance cov = p();
+  for (int j = 0; j < n_; j++) cov.set(state, j, 0.0);
+  cov.set(state, state, variance);
+  x()[state] = value;
+  take_calibration();
+}
+
+void joint_state::fade(int state, double factor, double added_variance) {
+  const half_covariance cov = p();
+  const double own = cov.at(state, state);
+  for (int j = 0; j < n_; j++)
+    if (j != state) cov.set(state, j, factor * cov.at(state, j));
+  cov.set(state, state, own * factor * factor + added_variance);
+  x()[state] *= factor;
+}
+
+void joint_state::set_pose(const wm_pose2 &pose, const double covariance[3][3]) {
+  const double value[3] = {pose.x_m, pose.y_m, wrap(pose.heading_rad)};
+  for (int i = 0; i < 3; i++) forget(i, value[i], 0.0);
+  for (int i = 0; i < 3; i++)
+    for (int j = i; j < 3; j++) p().set(i, j, covariance[i][j]);
+}
+
+void joint_state::assign(int first, int count, const joint_row *rows, const double (*noise)[3], const double *values) {
+  const half_covariance cov = p();
+  double own[3][3];
+  for (int k = 0; k < count; k++) project(rows[k], gain(k));
+  for (int k = 0; k < count; k++)
+    for (int l = k; l < count; l++) own[k][l] = dot(rows[l], gain(k)) + noise[k][l];
+  for (int k = 0; k < count; k++)
+    for (int j = 0; j < n_; j++)
+      if (j < first || j >= first + count) cov.set(first + k, j, gain(k)[j]);
+  for (int k = 0; k < count; k++) {
+    for (int l = k; l < count; l++) cov.set(first + k, first + l, own[k][l]);
+    x()[first + k] = values[k];
+  }
+}
+
+// ---- landmarks ----
+
+int joint_state::add_landmark(const joint_row *rows, const double (*noise)[3], const double *values) {
+  const int landmark = landmarks_++;
+  const int first = landmark_state(landmark);
+  assign(first, layout_.landmark_width, rows, noise, values);
+  n_ += layout_.landmark_width;
+  return landmark;
+}
+
+void joint_state::remove_landmark(int landmark) {
+  const half_covariance cov = p();
+  const int width = layout_.landmark_width, gone = landmark_state(landmark), last = n_ - width;
+  for (int k = 0; k < width && gone != last; k++) {
+    for (int j = 0; j < last; j++)
+      if (j < gone || j >= gone + width) cov.set(gone + k, j, cov.at(last + k, j));
+    for (int l = k; l < width; l++) cov.set(gone + k, gone + l, cov.at(last + k, last + l));
+    x()[gone + k] = x()[last + k];
+  }
+  for (int k = 0; k < width; k++) {  // what lies behind the state is zero
+    for (int j = 0; j < n_; j++) cov.set(last + k, j, 0.0);
+    x()[last + k] = 0.0;
+  }
+  n_ = last;
+  landmarks_--;
+}
+
+// ---- correction ----
+
+void joint_state::project(const joint_row &row, double *out) const {
+  const half_covariance cov = p();
+  for (int j = 0; j < even(n_); j++) out[j] = 0.0;
+  for (int k = 0; k < row.count; k++) {
+    const int state = row.index[k], begin = half_covariance::first(state);
+    for (int j = 0; j < begin; j++) out[j] += row.by[k] * cov.row(j)[state];
+    vectors::add_scaled(out + begin, cov.row(state) + begin, row.by[k], even(n_ - begin));
+  }
+}
+
+double joint_state::dot(const joint_row &row, const double *gain) const {
+  double sum = 0.0;
+  for (int k = 0; k < row.count; k++) sum += row.by[k] * gain[row.index[k]];
+  return sum;
+}
+
+double joint_state::covariance_of(const joint_row &a, const joint_row &b) const {
+  const half_covariance cov = p();
+  double sum = 0.0;
+  for (int k = 0; k < a.count; k++) {
+    double inner = 0.0;
+    for (int l = 0; l < b.count; l++) inner += b.by[l] * cov.at(a.index[k], b.index[l]);
+    sum += a.by[k] * inner;
+  }
+  return sum;
+}
+
+double joint_state::variance_of(const joint_row &row) const { return covariance_of(row, row); }
+
+namespace {
+
+// Cholesky: s = l l', in place of the lower half. False where s is no covariance.
+bool factor(double (*l)[joint_state::kRows], int n) {
+  for (int j = 0; j < n; j++) {
+    for (int k = 0; k < j; k++) l[j][j] -= l[j][k] * l[j][k];
+    if (!(l[j][j] > 0.0)) return false;
+    l[j][j] = std::sqrt(l[j][j]);
+    for (int i = j + 1; i < n; i++) {
+      for (int k = 0; k < j; k++) l[i][j] -= l[i][k] * l[j][k];
+      l[i][j] /= l[j][j];
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+void joint_state::prepare(const joint_row *rows, const double *innovations, const double *noise, int count,
+                          innovation_block *out) {
+  out->rows = count;
+  for (int k = 0; k < count; k++) project(rows[k], gain(k));
+  for (int k = 0; k < count; k++) {
+    for (int l = 0; l <= k; l++) out->s[k][l] = dot(rows[k], gain(l));
+    out->s[k][k] += noise[k];
+    out->innovation[k] = innovations[k];
+  }
+  double l[kRows][kRows], y[kRows];
+  std::memcpy(l, out->s, sizeof l);
+  out->nis = 1e300;
+  if (!factor(l, count)) return;
+  out->nis = 0.0;
+  for (int k = 0; k < count; k++) {
+    y[k] = innovations[k];
+    for (int i = 0; i < k; i++) y[k] -= l[k][i] * y[i];
+    y[k] /= l[k][k];
+    out->nis += square(y[k]);
+  }
+}
+
+void joint_state::fuse(innovation_block &block, const double *more_noise, bool frozen) {
+  const int rows = block.rows;
+  for (int k = 0; k < rows; k++) block.s[k][k] += more_noise[k];
+  double l[kRows][kRows], y[kRows];
+  std::memcpy(l, block.s, sizeof l);
+  if (!factor(l, rows)) return;
+  // W = G L'^-1 in place of the gains; K innovation = W y, y = L^-1 innovation; P - G S^-1 G' = P - W W'.
+  for (int k = 0; k < rows; k++) {
+    y[k] = block.innovation[k];
+    for (int i = 0; i < k; i++) {
+      y[k] -= l[k][i] * y[i];
+      vectors::add_scaled(gain(k), gain(i), -l[k][i], even(n_));
+    }
+    const double inverse = 1.0 / l[k][k];
+    y[k] *= inverse;
+    vectors::set_scaled(gain(k), gain(k), inverse, even(n_));
+  }
+  double *e = column(1 + kRows), *r = column(2 + kRows);
+  vectors::set_scaled(r, gain(0), y[0], even(n_));
+  for (int k = 1; k < rows; k++) vectors::add_scaled(r, gain(k), y[k], even(n_));
+  if (frozen) return fuse_frozen(rows, r);
+  move_mean(r, e);
+  half_update update{rows, {gain(0), gain(1), gain(2)}, nullptr, nullptr};
+  if (layout_.invariant) {
+    // T P T' = P + e r' + r e' with r = P h + (h' P h) e / 2, of P as the correction leaves it.
+    const half_covariance cov = p();
+    for (int j = 0; j < kHeading; j++) r[j] = cov.row(j)[kHeading];
+    std::memcpy(r + kHeading, cov.row(kHeading) + kHeading, static_cast<size_t>(even(n_) - kHeading) * sizeof *r);
+    for (int k = 0; k < rows; k++) vectors::add_scaled(r, gain(k), -gain(k)[kHeading], even(n_));
+    vectors::add_scaled(r, e, 0.5 * r[kHeading], even(n_));
+    update.e = e;
+    update.r = r;
+  }
+  vectors::apply(p(), update, n_);
+}
+
+// The correction of the mean: on the group of turns and places for the invariant filter (the map turns as a whole with
+// the heading, it doesn't shear), by addition for the plain one. e: what T needs.
+void joint_state::move_mean(const double *change, double *e) {
+  double *mean = x();
+  for (int j = 0; j < even(n_); j++) e[j] = 0.0;
+  if (layout_.invariant) {
+    const double turn = change[kHeading];
+    const sin_cos t = sincos(turn);
+    const arc a = make_arc(1.0, turn);
+    const double way[2] = {a.x_m, a.y_m};  // sin(turn)/turn, (1 - cos(turn))/turn
+    move_place(kX, change, t, way, e);
+    mean[kHeading] += turn;
+    for (int j = kPoseStates; j < layout_.first_clone; j++) mean[j] += change[j];
+    for (int c = 0; c < layout_.clones; c++) {
+      const int state = layout_.first_clone + 3 * c;
+      move_place(state, change, t, way, e);
+      mean[state + 2] = wrap(mean[state + 2] + change[state + 2]);
+    }
+    for (int i = 0; i < landmarks_; i++) {
+      const int state = landmark_state(i);
+      move_place(state, change, t, way, e);
+      if (layout_.landmark_width == 3) mean[state + 2] = wrap(mean[state + 2] + change[state + 2]);
+    }
+  } else {
+    for (int j = 0; j < n_; j++) mean[j] += change[j];
+  }
+  mean[kHeading] = wrap(mean[kHeading]);
+  take_calibration();
+}
+
+// p <- R p + V xi, xi = change - J p turn: the group's exponential.
+void joint_state::move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e) {
+  double *place = x() + state;
+  const double px = place[0], py = place[1];
+  const double xi_x = change[state] + py * change[kHeading], xi_y = change[state + 1] - px * change[kHeading];
+  place[0] = turn.cos * px - turn.sin * py + way[0] * xi_x - way[1] * xi_y;
+  place[1] = turn.sin * px + turn.cos * py + way[1] * xi_x + way[0] * xi_y;
+  e[state] = py - place[1];  // J (new - old)
+  e[state + 1] = place[0] - px;
+}
+
+// Landmarks are considered, not corrected: of the optimal gain only the robot's rows are applied, and Joseph's form for
+// that gain is P_rr - W_r W_r', P_rm - W_r W_m', P_mm as it is.
+void joint_state::fuse_frozen(int rows, const double *change) {
+  const half_covariance cov = p();
+  const int robot = layout_.robot_states;
+  for (int i = 0; i < robot; i++)
+    for (int j = half_covariance::first(i); j < n_; j++) {
+      double sum = 0.0;
+      for (int k = 0; k < rows; k++) sum += gain(k)[i] * gain(k)[j];
+      cov.row(i)[j] -= sum;
+    }
+  double *mean = x();
+  for (int j = 0; j < robot; j++) mean[j] += change[j];
+  mean[kHeading] = wrap(mean[kHeading]);
+  take_calibration();
+}
+
+}  // namespace wm

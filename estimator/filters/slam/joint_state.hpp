@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+// The core of planar SLAM: robot, calibration, lent states and clones in front, landmarks of two or three numbers each
+// behind them, one joint covariance (upper half), all in one block of memory.
+//
+// Consistency: a plain EKF-SLAM evaluates its derivatives at estimates that move, and so gains heading from nothing.
+// Here every correction carries the covariance over to the places that it moved: P <- T P T', T = I + e h', h the
+// heading, e = J (new place - old place) for each place in the state. That is the right-invariant filter (A. Barrau,
+// S. Bonnabel, "An EKF-SLAM algorithm with consistency properties", 2015; T. Zhang et al., "Convergence and consistency
+// analysis for a 3-D invariant-EKF SLAM", RA-L 2(2), 2017) written in map coordinates: its error of a place is
+// p_est - Exp(heading error) p, and what the change of coordinates between two estimates does is T. In this form the
+// prediction touches the pose's rows alone.
+//
+// Cost: prediction O(n), correction O(n^2) with one pass over the half for up to three rows.
+#ifndef WAYMARK_ESTIMATOR_SLAM_JOINT_STATE_HPP
+#define WAYMARK_ESTIMATOR_SLAM_JOINT_STATE_HPP
+
+#include "filters/planar/motion_states.h"
+#include "filters/planar/pose_step.hpp"
+#include "math/elementary.hpp"
+#include "math/half_covariance.hpp"
+#include "motion/front_end.hpp"
+#include "waymark/estimator.h"
+
+namespace wm {
+
+// A row of a derivative: few entries are not zero. The same state may stand there twice; entries add up.
+struct joint_row {
+  static constexpr int kMax = 64;
+  int count = 0;
+  int index[kMax];
+  double by[kMax];
+
+  void add(int state, double derivative) {  // state < 0: not a state, or off
+    if (state < 0 || derivative == 0.0 || count == kMax) return;
+    index[count] = state;
+    by[count] = derivative;
+    count++;
+  }
+  void add(const joint_row &other, double factor) {
+    for (int i = 0; i < other.count; i++) add(other.index[i], factor * other.by[i]);
+  }
+};
+
+struct joint_layout {
+  int robot_states;  // pose, calibration, lent states and clones; made even
+  int first_clone;   // clones are x, y, heading each, from here to the end of the robot's states
+  int clones;
+  int landmark_width;  // 2: x, y; 3: x, y, heading
+  int landmarks;       // capacity
+  bool invariant;      // false: the plain EKF, for comparison
+};
+
+class joint_state {
+ public:
+  static constexpr int kMaxRobot = 192;
+  static constexpr int kRows = half_update::kRows;  // of one correction
+
+  // Doubles that the arrays behind need.
+  static size_t doubles(const joint_layout &layout);
+  // `arrays` lies in the same block of memory as *this, at a distance that copies keep.
+  void init(const wm_setup &setup, const joint_layout &layout, double *arrays);
+  void set_motion_states(const wm_motion_states &states, int first);  // makes them, from state `first` on
+  static int count_motion_states(const wm_motion_states &states);
+
+  // ---- time and motion (as planar_filter) ----
+  wm_time_ns now_ns() const { return front_.now_ns(); }
+  wm_status check_motion(const wm_event &event) const { return front_.check(event); }
+  wm_status check_time(wm_time_ns t_ns) const;
+  void move(const wm_event &motion);
+  void move_to(wm_time_ns t_ns);
+  // Motion from `from_ns` to `to_ns`, as seen from its beginning; *twist is that at `from_ns`.
+  wm_pose2 path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const;
+  const wm_motion_calibration &calibration() const { return calibration_; }
+  uint32_t motion_health() const { return front_.health(); }
+  size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
+  void estimate(wm_estimate *out) const;
+  wm_pose2 odom() const { return odom_; }
+  double travelled_m() const { return travelled_m_; }
+  double turned_rad() const { return turned_rad_; }
+
+  // ---- the state ----
+  wm_pose2 pose() const { return {value(kX), value(kY), value(kHeading)}; }
+  int states() const { return n_; }
+  double value(int state) const { return x()[state]; }
+  double covariance(int i, int j) const { return p().at(i, j); }
+  double variance(int state) const { return p().at(state, state); }
+  void set_value(int state, double value) { x()[state] = value; }
+  // The state becomes `value`, as unsure as `variance`, independent of all others.
+  void forget(int state, double value, double variance);
+  // x := factor x + noise (Gauss-Markov), for a state that no other one's motion depends on.
+  void fade(int state, double factor, double added_variance);
+  // States first..first+count-1 become rows[k] of the state plus noise of covariance `noise`.
+  void assign(int first, int count, const joint_row *rows, const double (*noise)[3], const double *values);
+  void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
+
+  // ---- landmarks ----
+  int landmarks() const { return landmarks_; }
+  int landmark_capacity() const { return layout_.landmarks; }
+  int landmark_state(int landmark) const { return layout_.robot_states + landmark * layout_.landmark_width; }
+  // Joins a landmark behind the others; there must be room.
+  int add_landmark(const joint_row *rows, const double (*noise)[3], const double *values);
+  // The last landmark takes the place of the one that leaves.
+  void remove_landmark(int landmark);
+
+  // ---- correction ----
+  // P H' of up to three rows and S = H P H' + diag(noise); then their innovation squared. What `prepare` made is used
+  // by the calls after it, until the state changes.
+  struct innovation_block {
+    int rows;
+    double s[kRows][kRows];
+    double innovation[kRows];
+    double nis;
+  };
+  void prepare(const joint_row *rows, const double *innovations, const double *noise, int count, innovation_block *out);
+  // Fuses what `prepare` made, with `more_noise[k]` added to each row's. `frozen`: landmarks keep their values and
+  // covariance (S. F. Schmidt, 1966).
+  void fuse(innovation_block &block, const double *more_noise, bool frozen);
+
+  // P H' of a single row, without changing what `prepare` made; n doubles.
+  void project(const joint_row &row, double *gain) const;
+  double dot(const joint_row &row, const double *gain) const;
+  double variance_of(const joint_row &row) const;  // H P H', without a pass over the state
+  double covariance_of(const joint_row &a, const joint_row &b) const;
+
+ private:
+  double *arrays() { return reinterpret_cast<double *>(reinterpret_cast<char *>(this) + offset_); }
+  const double *arrays() const {
+    return reinterpret_cast<const double *>(reinterpret_cast<const char *>(this) + offset_);
+  }
+  // Behind the covariance: the mean, the gains, e and r.
+  half_covariance p() const { return {const_cast<double *>(arrays()), capacity_}; }
+  double *column(int k) { return arrays() + half_covariance::doubles(capacity_) + static_cast<size_t>(k * capacity_); }
+  double *x() { return column(0); }
+  const double *x() const { return const_cast<joint_state *>(this)->column(0); }
+  double *gain(int k) { return column(1 + k); }
+
+  void propagate(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise);
+  void move_mean(const double *change, double *e);
+  void move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e);
+  void fuse_frozen(int rows, const double *change);
+  void take_calibration();
+
+  std::ptrdiff_t offset_;
+  joint_layout layout_;
+  int capacity_, n_, landmarks_;
+  motion_front_end front_;
+  wm_motion_calibration calibration_;
+  int motion_state_[kCalibrationCount];
+  double walk_[kCalibrationCount], start_variance_[kCalibrationCount];
+  wm_time_ns start_ns_;
+  wm_pose2 odom_;
+  double travelled_m_, turned_rad_;
+  double twist_[2];
+};
+
+}  // namespace wm
+
+#endif

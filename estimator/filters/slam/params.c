@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/slam/params.h"
+
+#include <stddef.h>
+
+typedef struct wm_slam_params params;
+
+#define F64(key, field, initial, min, max, about) \
+  { key, WM_PARAM_F64, offsetof(params, field), initial, min, max, NULL, about }
+#define I32(key, field, initial, min, max, about) \
+  { key, WM_PARAM_I32, offsetof(params, field), initial, min, max, NULL, about }
+#define BOOL(key, field, initial, about) \
+  { key, WM_PARAM_BOOL, offsetof(params, field), initial, 0, 1, NULL, about }
+#define ENUM(key, field, initial, last, names, about) \
+  { key, WM_PARAM_ENUM, offsetof(params, field), initial, 0, last, names, about }
+
+static const char *const kConsistency[] = {"invariant", "plain", NULL};
+static const char *const kMaps[] = {"none", "extend", "frozen", NULL};
+static const char *const kMethods[] = {"unscented", "linear", "inverse_distance", NULL};
+
+static const wm_param kParams[] = {
+    WM_MOTION_STATE_PARAMS(params, motion),
+    F64("states.sensor_yaw_sigma_rad", sensor_yaw_sigma_rad, 0, 0, 3.2,
+        "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off."),
+    F64("states.sensor_xy_sigma_m", sensor_xy_sigma_m, 0, 0, 10,
+        "Start sigma of each sensor's place on the robot about calibration.yaml's, forwards and sideways, m. 0: off."),
+    F64("states.sensor_time_offset_sigma_s", sensor_time_offset_sigma_s, 0, 0, 1,
+        "Start sigma of each sensor's time offset, s: its sightings are that much older than their stamps. 0: off."),
+    F64("states.range_bias_sigma_m", range_bias_sigma_m, 0, 0, 10,
+        "Start sigma of each sensor's range bias, m. 0: off."),
+    F64("states.range_scale_sigma", range_scale_sigma, 0, 0, 1,
+        "Start sigma of each sensor's range scale about 1. 0: off. It is found against the motion's scale alone."),
+    BOOL("use.bearing", use_bearing, 1, "Fuse bearings."),
+    BOOL("use.range", use_range, 1, "Fuse ranges. Without them landmarks join once their parallax suffices."),
+    F64("noise.bearing_default_rad", bearing_sigma_default_rad, 0.02, 1e-5, 3,
+        "Sigma of a bearing where neither the sighting nor the sensor gives one, rad."),
+    F64("noise.range_default_m", range_sigma_default_m, 0.1, 1e-4, 100,
+        "Sigma of a range where neither the sighting nor the sensor gives one, m."),
+    F64("noise.bearing_factor", bearing_sigma_factor, 1, 0.01, 100,
+        "Times the bearing's sigma. More than 1 where errors of following sightings are alike and not modelled."),
+    F64("noise.range_factor", range_sigma_factor, 1, 0.01, 100, "Times the range's sigma."),
+    F64("noise.range_rel", range_sigma_rel, 0, 0, 1, "Noise of a range in parts of it; squares are added."),
+    F64("noise.lateral_m", lateral_sigma_m, 0, 0, 10,
+        "Noise of a landmark's place across the line of sight, m: it is as broad as it is, and near by that is a large "
+        "angle. Added to the bearing's variance as (this / distance)^2."),
+    I32("lasting.slots", lasting_slots, 0, 0, 24,
+        "Pairs of sensor and landmark (the last seen ones) whose lasting error is carried as states (Gauss-Markov)."),
+    F64("lasting.bearing_rad", lasting_bearing_rad, 0, 0, 3, "Sigma of a bearing's lasting error, rad. 0: none."),
+    F64("lasting.lateral_m", lasting_lateral_m, 0, 0, 10,
+        "Sigma of the lasting error across the line of sight, m; squares are added to the bearing's."),
+    F64("lasting.range_m", lasting_range_m, 0, 0, 100, "Sigma of a range's lasting error, m."),
+    F64("lasting.range_rel", lasting_range_rel, 0, 0, 1, "The same in parts of the range; squares are added."),
+    F64("lasting.tau_s", lasting_tau_s, 2, 0.01, 1e6, "Time after which a lasting error has fallen to 1/e, s."),
+    F64("gate.soft", gate_soft, 9, 1, 1e6,
+        "Normalised innovation squared for two numbers above which the measurement is believed less, as a "
+        "distribution with long tails does; for one or three numbers it is scaled. 99 % of good ones lie below 9.2."),
+    F64("gate.hard", gate_hard, 25, 1, 1e6, "The same, above which it is rejected and counted: a misread code."),
+    ENUM("landmarks.map", map, WM_SLAM_MAP_NONE, WM_SLAM_MAP_FROZEN, kMaps,
+         "What landmarks.csv is for. none: nothing, all are found anew; extend: they are in the state from the start, "
+         "as unsure as their sigma_m, and new ones join; frozen: they stay as they are and only the robot is located."),
+    I32("landmarks.capacity", landmark_capacity, 256, 1, 2000,
+        "Landmarks that there is room for. Memory and the cost of a correction grow with the square of how many are in "
+        "the state."),
+    I32("landmarks.confirm_seen", confirm_seen, 3, 1, 1000,
+        "A landmark seen so often is one; before, it leaves when it isn't seen again."),
+    F64("landmarks.leave_after_s", leave_after_s, 10, 0.1, 1e6,
+        "An unconfirmed landmark leaves when it wasn't seen for so long, s."),
+    I32("landmarks.moved_after", moved_after, 12, 2, 1000,
+        "So many sightings of a landmark in a row that don't fit, while others do: it was moved. It leaves, counted, "
+        "and joins anew where it is."),
+    BOOL("association.unknown", associate_unknown, 0, "Take sightings without an identity."),
+    F64("association.gate", associate_gate, 9.2, 1, 1000,
+        "Such a sighting is one of the nearest landmark's where its normalised innovation squared is below this, no "
+        "sighting of the same stamp was that landmark's, and no other landmark comes near."),
+    F64("association.new_gate", new_gate, 40, 1, 1e6,
+        "It is a new landmark's where all landmarks are farther than this. What lies between is left alone."),
+    F64("association.near_m", associate_near_m, 8, 0.01, 1000,
+        "Landmarks farther than this from where the sighting points are not looked at, m."),
+    F64("association.max_range_m", associate_max_range_m, 1e4, 0.1, 1e6,
+        "Sightings without an identity are taken up to this range, m: far ones are few pixels or one beam wide."),
+    I32("lines.clones", line_clones, 0, 0, 40,
+        "Poses of the past that are kept in the state for landmarks seen by bearings alone. 0: such landmarks are not "
+        "taken. 12 to 24 do."),
+    I32("lines.poses", line_poses, 6, 3, 8, "A landmark is initialised from at most so many poses."),
+    ENUM(
+        "lines.method", line_method, WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_INVERSE_DISTANCE, kMethods,
+        "How such a landmark joins. unscented: when the parallax suffices, its distribution by the unscented transform "
+        "over poses and bearings; linear: the same by one linearisation (for comparison); inverse_distance: at once, "
+        "as "
+        "a ray with the inverse of its length, which holds the heading where dead reckoning can't."),
+    F64("lines.near_m", line_near_m, 0.5, 0.01, 1000,
+        "inverse_distance: landmarks are rarely nearer than this when first seen, m."),
+    F64("lines.patience_s", line_patience_s, 10, 0.1, 1e6,
+        "inverse_distance: a ray not seen for so long is begun anew; where the robot is unsure of its way by then, the "
+        "old "
+        "one's bearing is far from linear, s."),
+    F64("lines.parallax_rad", line_parallax_rad, 0.15, 0.001, 3,
+        "A landmark is initialised when its lines of sight cross at this angle at least, rad."),
+    F64("lines.step_m", line_step_m, 0.15, 0.001, 100, "A pose is kept after so much way, m."),
+    F64("lines.sigma_rel", line_sigma_rel, 0.25, 0.001, 1,
+        "And when its place is known to this part of its distance (one sigma)."),
+    ENUM("consistency", consistency, WM_SLAM_INVARIANT, WM_SLAM_PLAIN, kConsistency,
+         "invariant: the right-invariant filter, which knows what it can't know (the map's heading and place); plain: "
+         "the textbook's, which becomes too sure of its heading (for comparison)."),
+    F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
+        "Nothing fused for so long: the state says dead reckoning."),
+};
+
+const wm_param_table wm_slam_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params)};

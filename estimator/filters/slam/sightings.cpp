@@ -1,0 +1,397 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a sighting to a correction or to a new landmark.
+#include "filters/slam/slam.hpp"
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kFarthest_m = 1e6;
+constexpr double kOneNumber = 6.635 / 9.210;  // 99 % of chi2 with one degree of freedom against two
+constexpr double kOthersFit_s = 3.0;          // a landmark was moved where others were fused so lately
+
+bool is_sigma(double value) { return std::isnan(value) || (value > 0.0 && value < 1e6); }
+double first_number(double a, double b, double c) { return finite(a) ? a : finite(b) ? b : c; }
+
+}  // namespace
+
+slam::past_pose slam::look_back(double age_s) const {
+  past_pose out;
+  const wm_time_ns now = joint_.now_ns();
+  const wm_time_ns then = now - wm_ns_from_seconds(age_s);
+  motion_twist twist{};
+  wm_pose2 step{};  // from now's base_link to then's
+  if (then < now) {
+    step = between(joint_.path(then, now, &twist), wm_pose2{});
+  } else if (then > now) {
+    step = joint_.path(now, then, &twist);
+  } else {
+    joint_.path(now - 1, now, &twist);
+  }
+  out.pose = compose(joint_.pose(), step);
+  out.lever_x = out.pose.x_m - joint_.value(kX);
+  out.lever_y = out.pose.y_m - joint_.value(kY);
+  const sin_cos h = sincos(out.pose.heading_rad);
+  out.age_by[0] = -twist.v * h.cos;
+  out.age_by[1] = -twist.v * h.sin;
+  out.age_by[2] = -twist.w;
+  return out;
+}
+
+// A derivative by the past pose becomes one by the pose now and by the time offset.
+void slam::add_pose(joint_row &row, const double by[3], const past_pose &past, int time_state) const {
+  row.add(kX, by[0]);
+  row.add(kY, by[1]);
+  row.add(kHeading, by[2] - by[0] * past.lever_y + by[1] * past.lever_x);
+  row.add(time_state, by[0] * past.age_by[0] + by[1] * past.age_by[1] + by[2] * past.age_by[2]);
+}
+
+double slam::sensor_value(int sensor, int which, double neutral) const {
+  const int state = sensor_state_[sensor][which];
+  return state < 0 ? neutral : joint_.value(state);
+}
+
+sensor_errors slam::errors_of(int sensor) const {
+  return {sensor_value(sensor, kYaw, 0.0), sensor_value(sensor, kMountX, 0.0), sensor_value(sensor, kMountY, 0.0),
+          sensor_value(sensor, kRangeScale, 1.0), sensor_value(sensor, kRangeBias, 0.0)};
+}
+
+wm_pose2 slam::sensor_pose(int sensor, const past_pose &past) const {
+  const mounted_sensor &m = sensor_[sensor];
+  const sensor_errors e = errors_of(sensor);
+  return compose(past.pose, {m.x_m + e.x_m, m.y_m + e.y_m, m.yaw_rad + e.yaw_rad});
+}
+
+// The error of this sensor on this landmark that lasts: a slot of states, faded to now. -1 where none is carried.
+int slam::lend(int sensor, int32_t id, wm_time_ns t_ns) {
+  bool fresh;
+  auto *slot = lasting_.take(id * kSlamSensors + sensor, &fresh);
+  if (!slot) return -1;
+  const int width = (lasting_bearing_offset_ >= 0) + (lasting_range_offset_ >= 0);
+  const double left = fresh ? 0.0 : exp(-wm_seconds_between(slot->used_ns, t_ns) / params_.lasting_tau_s);
+  for (int k = 0; k < width; k++) {
+    if (fresh)
+      joint_.forget(slot->state + k, 0.0, 1.0);
+    else if (left < 1.0)
+      joint_.fade(slot->state + k, left, 1.0 - left * left);
+  }
+  slot->used_ns = t_ns;
+  return slot->state;
+}
+
+void slam::see(const wm_sighting &s, const reading &r, const past_pose &past, const double place[2], int lasting,
+               view *out) const {
+  const int sensor = s.sensor;
+  const double at[3] = {place[0], place[1], std::nan("")};
+  const expected_sighting e = expect(sensor_[sensor], errors_of(sensor), past.pose, at);
+  const int *states = sensor_state_[sensor];
+  out->count = 0;
+  out->possible = e.possible;
+  out->distance_m = e.distance_m;
+  if (!e.possible) return;
+  const auto add = [&](wm_residual kind, double observed, double expected, const double by[6], double variance,
+                       int lasting_offset, double lasting_size) {
+    const int i = out->count++;
+    joint_row &row = out->row[i];
+    row.count = 0;
+    add_pose(row, by, past, states[kTimeOffset]);
+    row.add(states[kYaw], by[3]);
+    row.add(states[kMountX], by[4]);
+    row.add(states[kMountY], by[5]);
+    if (lasting >= 0 && lasting_offset >= 0) {
+      row.add(lasting + lasting_offset, lasting_size);
+      expected += lasting_size * joint_.value(lasting + lasting_offset);
+    } else {
+      variance += square(lasting_size);
+    }
+    out->by_landmark[i][0] = -by[0];
+    out->by_landmark[i][1] = -by[1];
+    out->kind[i] = kind;
+    out->observed[i] = observed;
+    out->expected[i] = expected;
+    out->innovation[i] = kind == WM_RESIDUAL_BEARING ? wrap(observed - expected) : observed - expected;
+    out->noise[i] = variance;
+  };
+  const double distance = e.distance_m > 0.1 ? e.distance_m : 0.1;
+  if (r.bearing)
+    add(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad, e.bearing_by,
+        square(r.bearing_sigma) + square(params_.lateral_sigma_m / distance), lasting_bearing_offset_,
+        std::sqrt(square(params_.lasting_bearing_rad) + square(params_.lasting_lateral_m / distance)));
+  if (r.range) {
+    add(WM_RESIDUAL_RANGE, s.range_m, e.range_m, e.range_by,
+        square(r.range_sigma) + square(params_.range_sigma_rel * e.range_m), lasting_range_offset_,
+        std::sqrt(square(params_.lasting_range_m) + square(params_.lasting_range_rel * e.range_m)));
+    out->row[out->count - 1].add(states[kRangeBias], 1.0);
+    out->row[out->count - 1].add(states[kRangeScale], e.range_by_scale);
+  }
+}
+
+wm_status slam::check_sighting(const wm_sighting &s) const {
+  const bool has_bearing = !std::isnan(s.bearing_rad), has_range = !std::isnan(s.range_m);
+  if ((!has_bearing && !has_range) || std::isinf(s.bearing_rad) || std::isinf(s.range_m)) return WM_NOT_FINITE;
+  if (s.sensor >= setup_->sensor_count || (has_bearing && std::fabs(s.bearing_rad) > 100.0) ||
+      (has_range && !(s.range_m >= 0.0 && s.range_m < kFarthest_m)) || !is_sigma(s.bearing_sigma_rad) ||
+      !is_sigma(s.range_sigma_m))
+    return WM_OUT_OF_RANGE;
+  return WM_OK;
+}
+
+wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
+  const wm_sighting &s = event.as.sighting;
+  wm_innovation blank{};
+  blank.t_ns = event.t_ns;
+  blank.source = event.source;
+  blank.sensor = s.sensor;
+  blank.landmark_id = s.landmark_id;
+  blank.residual = (uint8_t)(std::isnan(s.bearing_rad) ? WM_RESIDUAL_RANGE : WM_RESIDUAL_BEARING);
+  blank.observed = std::isnan(s.bearing_rad) ? s.range_m : s.bearing_rad;
+  const auto drop = [&](wm_verdict verdict) {
+    blank.verdict = (uint8_t)verdict;
+    records.add(blank);
+    return WM_OK;
+  };
+  wm_status status = check_sighting(s);
+  if (status != WM_OK) {
+    drop(status == WM_NOT_FINITE ? WM_REJECTED_NOT_FINITE : WM_REJECTED_OUT_OF_RANGE);
+    return status;
+  }
+  status = joint_.check_time(event.t_ns);
+  if (status != WM_OK) return status;
+  joint_.move_to(event.t_ns);
+  look_after(event.t_ns);
+
+  const mounted_sensor &sensor = sensor_[s.sensor];
+  reading r;
+  r.bearing = !std::isnan(s.bearing_rad) && params_.use_bearing;
+  r.range = !std::isnan(s.range_m) && params_.use_range;
+  r.bearing_sigma = params_.bearing_sigma_factor *
+                    first_number(s.bearing_sigma_rad, sensor.bearing_sigma_rad, params_.bearing_sigma_default_rad);
+  r.range_sigma =
+      params_.range_sigma_factor * first_number(s.range_sigma_m, sensor.range_sigma_m, params_.range_sigma_default_m);
+  if (!r.bearing && !r.range) return drop(WM_REJECTED_BY_CONFIG);
+  if (!std::isnan(s.range_m) && s.range_m > sensor.max_range_m) return drop(WM_REJECTED_OUT_OF_RANGE);
+
+  const past_pose past = look_back(sensor_value(s.sensor, kTimeOffset, 0.0));
+  int32_t id = s.landmark_id;
+  int landmark = id >= 0 ? find_landmark(id) : -1;
+  if (id < 0) {
+    bool fresh = false;
+    if (params_.associate_unknown && r.bearing && r.range && s.range_m <= params_.associate_max_range_m)
+      landmark = associate(s, r, past, &fresh);
+    if (landmark < 0 && !fresh) return drop(WM_REJECTED_NO_ASSOCIATION);
+    id = landmark < 0 ? own_id() : notes()[landmark].id;
+    blank.landmark_id = id;
+  }
+  const bool may_join = params_.map != WM_SLAM_MAP_FROZEN && r.bearing && (r.range || params_.line_clones > 0);
+  if (landmark >= 0)
+    fuse_known(landmark, s, r, past, blank, records);
+  else if (!may_join)
+    drop(WM_REJECTED_UNKNOWN_ID);
+  else if (r.range)
+    join_seen(id, s, r, past, blank, records);
+  else if (params_.line_method == WM_SLAM_LINE_INVERSE_DISTANCE)
+    follow_ray(id, s, r, past, blank, records);
+  else
+    track_bearing(id, s, r, past, blank, records);
+  return WM_OK;
+}
+
+// Bearing and range are gated together: a wrong one spoils its fellow. Between the two gates a sighting counts less, as
+// a Student distribution would have it; above, not at all.
+void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
+                      record_list records) {
+  landmark_note &note = notes()[landmark];
+  const int state = joint_.landmark_state(landmark);
+  const double place[2] = {joint_.value(state), joint_.value(state + 1)};
+  const wm_time_ns now = joint_.now_ns();
+  view v;
+  see(s, r, past, place, lend(s.sensor, note.id, now), &v);
+  if (!v.possible) {
+    blank.verdict = v.distance_m < 0.05 ? WM_REJECTED_SINGULAR : WM_REJECTED_OUT_OF_RANGE;
+    records.add(blank);
+    return;
+  }
+  for (int i = 0; i < v.count; i++) {
+    v.row[i].add(state, v.by_landmark[i][0]);
+    v.row[i].add(state + 1, v.by_landmark[i][1]);
+  }
+  joint_state::innovation_block block;
+  joint_.prepare(v.row, v.innovation, v.noise, v.count, &block);
+  const double scale = v.count == 2 ? 1.0 : kOneNumber;
+  const double hard = params_.gate_hard * scale, soft = params_.gate_soft * scale;
+  const bool fused = block.nis <= hard;
+  for (int i = 0; i < v.count; i++) {
+    wm_innovation record = blank;
+    record.residual = (uint8_t)v.kind[i];
+    record.observed = v.observed[i];
+    record.expected = v.expected[i];
+    record.variance = block.s[i][i];
+    record.nis = block.nis;
+    record.gate = hard;
+    record.gate_dof = (uint8_t)v.count;
+    record.verdict = fused ? WM_FUSED : WM_REJECTED_GATE;
+    records.add(record);
+  }
+  if (!fused) {
+    misfit(landmark);
+    return;
+  }
+  const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
+  const double more[2] = {v.noise[0] * weaker, v.count == 2 ? v.noise[1] * weaker : 0.0};
+  joint_.fuse(block, more, params_.map == WM_SLAM_MAP_FROZEN);
+  note.misfits = 0;
+  note.seen++;
+  note.last_ns = now;
+  fused_ns_ = now;
+  if (other_fused_id_[0] != note.id) {
+    other_fused_id_[1] = other_fused_id_[0];
+    other_fused_ns_[1] = other_fused_ns_[0];
+  }
+  other_fused_id_[0] = note.id;
+  other_fused_ns_[0] = now;
+}
+
+// A landmark that doesn't fit again and again, while others do, was moved.
+void slam::misfit(int landmark) {
+  landmark_note &note = notes()[landmark];
+  note.misfits++;
+  if (note.misfits < params_.moved_after || params_.map == WM_SLAM_MAP_FROZEN) return;
+  for (int i = 0; i < 2; i++) {
+    if (other_fused_id_[i] < 0 || other_fused_id_[i] == note.id) continue;
+    if (wm_seconds_between(other_fused_ns_[i], joint_.now_ns()) > kOthersFit_s) continue;
+    counts_.moved++;
+    drop_landmark(landmark);
+    return;
+  }
+}
+
+// Paper, system 2, new marker: P_aa = G_x P G_x' + G_z R G_z' with all cross terms. G by the sighting's own
+// derivatives: 0 = H_x dx + H_l dl + v, so dl = -H_l^-1 (H_x dx + v).
+void slam::join_seen(int32_t id, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
+                     record_list records) {
+  const sensor_errors errors = errors_of(s.sensor);
+  double range = (s.range_m - errors.range_bias_m) / errors.range_scale;
+  if (sensor_[s.sensor].range_is_depth) range /= larger(cos(s.bearing_rad), 0.1);
+  const wm_pose2 from = sensor_pose(s.sensor, past);
+  const sin_cos ray = sincos(from.heading_rad + s.bearing_rad);
+  double place[3] = {from.x_m + range * ray.cos, from.y_m + range * ray.sin, 0.0};
+  const int lasting = lend(s.sensor, id, joint_.now_ns());
+  view v;
+  double inverse[2][2];
+  for (int step = 0;; step++) {  // a sensor that isn't level sees another place than the first guess
+    see(s, r, past, place, lasting, &v);
+    const double(*h)[2] = v.by_landmark;
+    const double determinant = v.possible ? h[0][0] * h[1][1] - h[0][1] * h[1][0] : 0.0;
+    if (!(std::fabs(determinant) > 1e-9) || !(range > 0.05)) {
+      blank.verdict = WM_REJECTED_SINGULAR;
+      records.add(blank);
+      return;
+    }
+    inverse[0][0] = h[1][1] / determinant;
+    inverse[0][1] = -h[0][1] / determinant;
+    inverse[1][0] = -h[1][0] / determinant;
+    inverse[1][1] = h[0][0] / determinant;
+    if (step == 3) break;
+    for (int k = 0; k < 2; k++) place[k] += inverse[k][0] * v.innovation[0] + inverse[k][1] * v.innovation[1];
+  }
+  if (!finite(place[0]) || !finite(place[1]) || !make_room()) {
+    blank.verdict = WM_REJECTED_NO_ASSOCIATION;
+    records.add(blank);
+    return;
+  }
+  joint_row rows[3];
+  double noise[3][3] = {};
+  for (int k = 0; k < 2; k++)
+    for (int i = 0; i < 2; i++) {
+      rows[k].add(v.row[i], -inverse[k][i]);
+      for (int l = 0; l < 2; l++) noise[k][l] += inverse[k][i] * v.noise[i] * inverse[l][i];
+    }
+  note_landmark(id, joint_.add_landmark(rows, noise, place), joint_.now_ns());
+  fused_ns_ = joint_.now_ns();
+  blank.verdict = WM_FUSED;
+  blank.expected = blank.observed;  // it defines the landmark; there was nothing to hold it against
+  records.add(blank);
+}
+
+// The sensor's pose in map when a sighting was true, as a clone in the state.
+int slam::keep_clone(int sensor, const past_pose &past, wm_time_ns t_ns) {
+  const int there = tracks_.find_clone(sensor, t_ns);
+  if (there >= 0) return there;
+  const wm_pose2 pose = sensor_pose(sensor, past);
+  const int clone = tracks_.take_clone(sensor, t_ns, pose.x_m, pose.y_m);
+  const double lever_x = pose.x_m - past.pose.x_m, lever_y = pose.y_m - past.pose.y_m;
+  const sin_cos h = sincos(past.pose.heading_rad);
+  const int *states = sensor_state_[sensor];
+  const double by[3][6] = {{1, 0, -lever_y, 0, h.cos, -h.sin}, {0, 1, lever_x, 0, h.sin, h.cos}, {0, 0, 1, 1, 0, 0}};
+  joint_row rows[3];
+  for (int k = 0; k < 3; k++) {
+    add_pose(rows[k], by[k], past, states[kTimeOffset]);
+    rows[k].add(states[kYaw], by[k][3]);
+    rows[k].add(states[kMountX], by[k][4]);
+    rows[k].add(states[kMountY], by[k][5]);
+  }
+  const double none[3][3] = {}, values[3] = {pose.x_m, pose.y_m, pose.heading_rad};
+  joint_.assign(clone_state(clone), 3, rows, none, values);
+  return clone;
+}
+
+void slam::track_bearing(int32_t id, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
+                         record_list records) {
+  const wm_time_ns now = joint_.now_ns();
+  blank.verdict = WM_REJECTED_SEARCHING;  // kept until the parallax suffices
+  bearing_tracks::track *track = tracks_.find(id, s.sensor);
+  if (!track) track = tracks_.begin(id, s.sensor);
+  track->last_ns = now;
+  const wm_pose2 here = sensor_pose(s.sensor, past);
+  if (track->count > 0) {
+    const int last = clone_state(track->clone[track->count - 1]);
+    const double dx = here.x_m - joint_.value(last), dy = here.y_m - joint_.value(last + 1);
+    if (dx * dx + dy * dy < square(params_.line_step_m)) {
+      records.add(blank);
+      return;
+    }
+  }
+  const double sigma = std::sqrt(square(r.bearing_sigma) + square(params_.lasting_bearing_rad));
+  const int clone = keep_clone(s.sensor, past, now);
+  tracks_.add(track, clone, s.bearing_rad, sigma, params_.line_poses);
+  if (track->count >= 3 && join_line(id, *track)) {
+    bearing_tracks::end(track);
+    fused_ns_ = now;
+    blank.verdict = WM_FUSED;
+    blank.expected = blank.observed;
+  }
+  records.add(blank);
+}
+
+bool slam::join_line(int32_t id, const bearing_tracks::track &track) {
+  line_bundle bundle;
+  bundle.count = track.count;
+  for (int i = 0; i < track.count; i++) {
+    const int state = clone_state(track.clone[i]);
+    bundle.pose[i] = {joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};
+    bundle.azimuth_rad[i] = track.azimuth_rad[i];
+    bundle.sigma_rad[i] = track.sigma_rad[i];
+    for (int j = 0; j < track.count; j++)
+      for (int k = 0; k < 3; k++)
+        for (int l = 0; l < 3; l++)
+          bundle.pose_covariance[3 * i + k][3 * j + l] = joint_.covariance(state + k, clone_state(track.clone[j]) + l);
+  }
+  const line_landmark line = find_line(bundle, params_.line_method == WM_SLAM_LINE_UNSCENTED);
+  if (!line.solved || line.parallax_rad < params_.line_parallax_rad || line.misfit > params_.gate_soft) return false;
+  joint_row rows[3];
+  double noise[3][3] = {};
+  for (int r = 0; r < 2; r++) {
+    for (int j = 0; j < 3 * track.count; j++) rows[r].add(clone_state(track.clone[j / 3]) + j % 3, line.by_pose[r][j]);
+    for (int c = 0; c < 2; c++) noise[r][c] = line.noise[r][c];
+  }
+  // How well it is known from the last pose: the poses' own common error is not the landmark's.
+  joint_row relative[2] = {rows[0], rows[1]};
+  const int last = clone_state(track.clone[track.count - 1]);
+  for (int r = 0; r < 2; r++) relative[r].add(last + r, -1.0);
+  const double variance = joint_.variance_of(relative[0]) + joint_.variance_of(relative[1]) + noise[0][0] + noise[1][1];
+  if (variance > square(params_.line_sigma_rel * line.distance_m) || !make_room()) return false;
+  note_landmark(id, joint_.add_landmark(rows, noise, line.place_m), joint_.now_ns());
+  return true;
+}
+
+}  // namespace wm

@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+// SLAM's start, its poses from outside, its landmarks' coming and going, and the contract.
+#include "filters/slam/slam.hpp"
+
+#include <cstring>
+#include <limits>
+
+#include "filters/planar/set_pose.hpp"
+#include "filters/registry.h"
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+constexpr const char *kSensorStateNames[] = {"yaw_rad", "x_m", "y_m", "time_offset_s", "range_bias_m", "range_scale"};
+constexpr double kOwnFrame_m = 1e-3, kOwnFrame_rad = 1e-3;  // the map begins where the robot starts
+constexpr double kSurveyed_m = 1e-4;                        // no map is better
+
+int lasting_states(const wm_slam_params &p) {
+  if (p.lasting_slots == 0) return 0;
+  return (p.lasting_bearing_rad > 0.0 || p.lasting_lateral_m > 0.0) +
+         (p.lasting_range_m > 0.0 || p.lasting_range_rel > 0.0);
+}
+
+int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
+  const int each_sensor = (p.sensor_yaw_sigma_rad > 0.0) + 2 * (p.sensor_xy_sigma_m > 0.0) +
+                          (p.sensor_time_offset_sigma_s > 0.0) + (p.range_bias_sigma_m > 0.0) +
+                          (p.range_scale_sigma > 0.0);
+  return kPoseStates + joint_state::count_motion_states(p.motion) + each_sensor * (int)setup.sensor_count +
+         p.lasting_slots * lasting_states(p);
+}
+
+// Azimuth and inverse distance for each ray, of which there are as many as clones.
+int ray_states(const wm_slam_params &p) {
+  return p.line_method == WM_SLAM_LINE_INVERSE_DISTANCE ? 2 * p.line_clones : 0;
+}
+
+joint_layout layout_of(const wm_slam_params &p, const wm_setup &setup) {
+  joint_layout out{};
+  out.first_clone = states_before_clones(p, setup) + ray_states(p);
+  out.clones = p.line_clones;
+  out.robot_states = out.first_clone + 3 * p.line_clones;
+  out.landmark_width = 2;
+  out.landmarks = p.landmark_capacity;
+  out.invariant = p.consistency == WM_SLAM_INVARIANT;
+  return out;
+}
+
+size_t aligned(size_t bytes) { return (bytes + 15) / 16 * 16; }
+
+size_t arrays_at(const wm_slam_params &p) {
+  return aligned(sizeof(slam) + (size_t)p.landmark_capacity * sizeof(landmark_note));
+}
+
+}  // namespace
+
+size_t slam::bytes(const wm_slam_params &params, const wm_setup &setup, const char **why) {
+  if (setup.sensor_count > kSlamSensors) {
+    *why = "slam takes at most 8 sensors";
+    return 0;
+  }
+  const joint_layout layout = layout_of(params, setup);
+  if (layout.robot_states > joint_state::kMaxRobot) {
+    *why =
+        "slam holds at most 192 states beside the landmarks: pose 3, one for each states.*_sigma that is not 0 (those "
+        "of sensors once for each sensor), one or two for each of lasting.slots, three for each of lines.clones; lower "
+        "lasting.slots or lines.clones";
+    return 0;
+  }
+  if (params.map != WM_SLAM_MAP_NONE && setup.landmark_count > (size_t)params.landmark_capacity) {
+    *why = "landmarks.csv has more landmarks than landmarks.capacity; raise it";
+    return 0;
+  }
+  return arrays_at(params) + joint_state::doubles(layout) * sizeof(double);
+}
+
+void slam::init(const wm_slam_params &params, const wm_setup &setup) {
+  std::memset(static_cast<void *>(this), 0, arrays_at(params));
+  setup_ = &setup;
+  params_ = params;
+  const joint_layout layout = layout_of(params, setup);
+  joint_.init(setup, layout, reinterpret_cast<double *>(reinterpret_cast<char *>(this) + arrays_at(params)));
+  first_clone_ = layout.first_clone;
+  first_ray_ = first_clone_ - ray_states(params);
+  int next = kPoseStates;
+  joint_.set_motion_states(params.motion, next);
+  next += joint_state::count_motion_states(params.motion);
+  const auto add = [&](double value, double sigma) {
+    if (!(sigma > 0.0)) return -1;
+    joint_.forget(next, value, square(sigma));
+    return next++;
+  };
+  for (size_t i = 0; i < setup.sensor_count; i++) {
+    sensor_[i].init(setup.sensors[i]);
+    sensor_state_[i][kYaw] = add(0.0, params.sensor_yaw_sigma_rad);
+    sensor_state_[i][kMountX] = add(0.0, params.sensor_xy_sigma_m);
+    sensor_state_[i][kMountY] = add(0.0, params.sensor_xy_sigma_m);
+    sensor_state_[i][kTimeOffset] = add(0.0, params.sensor_time_offset_sigma_s);
+    sensor_state_[i][kRangeBias] = add(0.0, params.range_bias_sigma_m);
+    sensor_state_[i][kRangeScale] = add(1.0, params.range_scale_sigma);
+  }
+  lasting_bearing_offset_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
+  lasting_range_offset_ =
+      params.lasting_range_m > 0.0 || params.lasting_range_rel > 0.0 ? (lasting_bearing_offset_ >= 0 ? 1 : 0) : -1;
+  lasting_.clear();
+  for (int i = 0; i < params.lasting_slots && lasting_states(params) > 0; i++) {
+    lasting_.add(next);
+    for (int k = 0; k < lasting_states(params); k++) add(0.0, 1.0);
+  }
+  start_again();
+}
+
+// The map begins where the robot starts, unless a start or a map says otherwise.
+void slam::start_again() {
+  const wm_start &start = setup_->start;
+  const bool place = finite(start.p_m[0]) && finite(start.p_m[1]), heading = finite(start.heading_rad);
+  const double sigma_xy = place ? (finite(start.sigma_xy_m) ? start.sigma_xy_m : 0.05) : kOwnFrame_m;
+  const double sigma_heading =
+      heading ? (finite(start.sigma_heading_rad) ? start.sigma_heading_rad : 0.05) : kOwnFrame_rad;
+  while (joint_.landmarks() > 0) joint_.remove_landmark(joint_.landmarks() - 1);
+  const double xy = square(sigma_xy);
+  const double covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(sigma_heading)}};
+  joint_.set_pose({place ? start.p_m[0] : 0.0, place ? start.p_m[1] : 0.0, heading ? start.heading_rad : 0.0},
+                  covariance);
+  for (int state = first_ray_; state < first_clone_ + 3 * params_.line_clones; state++) joint_.forget(state, 0.0, 0.0);
+  lasting_.release_all();
+  forget_tracks();
+  fused_ns_ = WM_TIME_NONE;
+  next_id_ = 0;
+  cursor_ = 0;
+  for (int i = 0; i < 2; i++) {
+    other_fused_ns_[i] = WM_TIME_NONE;
+    other_fused_id_[i] = -1;
+  }
+  resets_++;
+  if (params_.map != WM_SLAM_MAP_NONE) load_map();
+}
+
+void slam::forget_tracks() {
+  const bool rays = params_.line_method == WM_SLAM_LINE_INVERSE_DISTANCE;
+  tracks_.clear(params_.line_clones, rays ? params_.line_clones : bearing_tracks::kTracks);
+}
+
+void slam::load_map() {
+  for (size_t i = 0; i < setup_->landmark_count; i++) {
+    const wm_landmark &l = setup_->landmarks[i];
+    if (!finite(l.p_m[0]) || !finite(l.p_m[1])) continue;
+    const double variance = square(finite(l.sigma_m) && l.sigma_m > kSurveyed_m ? l.sigma_m : kSurveyed_m);
+    const double noise[3][3] = {{variance, 0, 0}, {0, variance, 0}, {0, 0, 0}};
+    const joint_row rows[3] = {};
+    const int landmark = joint_.add_landmark(rows, noise, l.p_m);
+    notes()[landmark] = {l.id, 0, WM_TIME_NONE, WM_TIME_NONE, l.p_m[2], 0, 1};
+  }
+}
+
+wm_status slam::predict(const wm_event &motion) {
+  const wm_status status = joint_.check_motion(motion);
+  if (status == WM_OK) joint_.move(motion);
+  return status;
+}
+
+wm_status slam::correct(const wm_event &event, record_list records) {
+  switch (event.kind) {
+    case WM_EVENT_SIGHTING: return fuse_sighting(event, records);
+    case WM_EVENT_SET_POSE:
+    case WM_EVENT_RESET: return take_pose(event);
+    case WM_EVENT_LOOKED: {
+      const wm_status status = joint_.check_time(event.t_ns);
+      if (status == WM_OK) joint_.move_to(event.t_ns);
+      return status;
+    }
+    default: return WM_UNSUPPORTED;
+  }
+}
+
+// RESET begins a new map. SET_POSE moves the robot within this one.
+wm_status slam::take_pose(const wm_event &event) {
+  if (event.kind == WM_EVENT_RESET) {
+    const wm_status status = joint_.check_time(event.t_ns);
+    if (status != WM_OK) return status;
+    joint_.move_to(event.t_ns);
+    start_again();
+    return WM_OK;
+  }
+  given_pose given;
+  wm_status status = read_set_pose(event, &given);
+  if (status == WM_OK) status = joint_.check_time(event.t_ns);
+  if (status != WM_OK) return status;
+  joint_.move_to(event.t_ns);
+  const double xy = square(given.sigma_xy_m);
+  const double covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(given.sigma_heading_rad)}};
+  joint_.set_pose(given.pose, covariance);
+  forget_tracks();
+  resets_++;
+  return WM_OK;
+}
+
+void slam::estimate(wm_estimate *out) const {
+  joint_.estimate(out);
+  out->resets = resets_;
+  const bool fresh =
+      fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, joint_.now_ns()) <= params_.dead_reckoning_after_s;
+  out->state = (uint8_t)(fresh ? WM_STATE_TRACKING : WM_STATE_DEAD_RECKONING);
+}
+
+size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const {
+  size_t count = joint_.list_calibration(out, capacity);
+  const auto add = [&](const char *whose, const char *what, double value, double variance) {
+    if (count < capacity) {
+      wm_calibration_value &v = out[count];
+      std::memset(&v, 0, sizeof v);
+      size_t length = std::strlen(whose);
+      const size_t room = sizeof v.name - 2 - std::strlen(what);
+      if (length > room) length = room;
+      std::memcpy(v.name, whose, length);
+      v.name[length] = '.';
+      std::memcpy(v.name + length + 1, what, std::strlen(what));
+      v.value = value;
+      v.sigma = std::sqrt(variance);
+    }
+    count++;
+  };
+  for (size_t i = 0; i < setup_->sensor_count; i++)
+    for (int k = 0; k < kSensorStates; k++)
+      if (const int state = sensor_state_[i][k]; state >= 0)
+        add(setup_->sensors[i].name, kSensorStateNames[k], joint_.value(state), joint_.variance(state));
+  add("map", "landmarks", joint_.landmarks(), 0.0);
+  add("map", "joined", (double)counts_.joined, 0.0);
+  add("map", "left", (double)counts_.left, 0.0);
+  add("map", "moved", (double)counts_.moved, 0.0);
+  add("map", "no_room", (double)counts_.no_room, 0.0);
+  return count;
+}
+
+size_t slam::list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const {
+  size_t count = 0;
+  for (int i = 0; i < joint_.landmarks(); i++) {
+    const landmark_note &note = notes()[i];
+    if (!note.surveyed && note.seen < (uint32_t)params_.confirm_seen) continue;
+    if (count < capacity) {
+      const int s = joint_.landmark_state(i);
+      const double xx = joint_.variance(s), xy = joint_.covariance(s, s + 1), yy = joint_.variance(s + 1);
+      const double most = 0.5 * (xx + yy) + std::sqrt(square(0.5 * (xx - yy)) + square(xy));
+      out[count] = {note.id,
+                    {joint_.value(s), joint_.value(s + 1), note.z_m},
+                    std::sqrt(most),
+                    std::numeric_limits<double>::quiet_NaN()};
+      if (covariance) {
+        const double c[4] = {xx, xy, yy, std::numeric_limits<double>::quiet_NaN()};
+        std::memcpy(covariance[count], c, sizeof c);
+      }
+    }
+    count++;
+  }
+  return count;
+}
+
+// ---- landmarks come and go ----
+
+int slam::find_landmark(int32_t id) const {
+  for (int i = 0; i < joint_.landmarks(); i++)
+    if (notes()[i].id == id) return i;
+  return -1;
+}
+
+int32_t slam::own_id() {
+  while (find_landmark(next_id_) >= 0) next_id_++;
+  return next_id_++;
+}
+
+void slam::drop_landmark(int landmark) {
+  joint_.remove_landmark(landmark);
+  notes()[landmark] = notes()[joint_.landmarks()];
+  counts_.left++;
+}
+
+// Room for one more: the unconfirmed landmark that wasn't seen for longest leaves. False: all are confirmed.
+bool slam::make_room() {
+  if (joint_.landmarks() < joint_.landmark_capacity()) return true;
+  int oldest = -1;
+  for (int i = 0; i < joint_.landmarks(); i++) {
+    const landmark_note &note = notes()[i];
+    if (note.surveyed || note.seen >= (uint32_t)params_.confirm_seen) continue;
+    if (oldest < 0 || note.last_ns < notes()[oldest].last_ns) oldest = i;
+  }
+  if (oldest < 0) {
+    counts_.no_room++;
+    return false;
+  }
+  drop_landmark(oldest);
+  return true;
+}
+
+// One landmark at a time, so that the cost stays bounded.
+void slam::look_after(wm_time_ns t_ns) {
+  if (joint_.landmarks() == 0 || params_.map == WM_SLAM_MAP_FROZEN) return;
+  cursor_ = (cursor_ + 1) % joint_.landmarks();
+  const landmark_note &note = notes()[cursor_];
+  const bool unconfirmed = !note.surveyed && note.seen < (uint32_t)params_.confirm_seen;
+  if (unconfirmed && wm_seconds_between(note.last_ns, t_ns) > params_.leave_after_s) drop_landmark(cursor_);
+}
+
+int slam::note_landmark(int32_t id, int landmark, wm_time_ns t_ns) {
+  notes()[landmark] = {id, 1, t_ns, t_ns, 0.0, 0, 0};
+  counts_.joined++;
+  return landmark;
+}
+
+}  // namespace wm
+
+// ---- the contract ----
+
+namespace {
+
+wm::slam &of(void *state) { return *static_cast<wm::slam *>(state); }
+const wm::slam &of(const void *state) { return *static_cast<const wm::slam *>(state); }
+const wm_slam_params &params_of(const void *params) { return *static_cast<const wm_slam_params *>(params); }
+
+size_t state_bytes(const void *params, const wm_setup *setup, const char **why) {
+  return wm::slam::bytes(params_of(params), *setup, why);
+}
+
+wm_status init(void *state, const void *params, const wm_setup *setup) {
+  of(state).init(params_of(params), *setup);
+  return WM_OK;
+}
+
+wm_status predict(void *state, const wm_event *motion) { return of(state).predict(*motion); }
+
+wm_status correct(void *state, const wm_event *event, wm_innovation *out, size_t capacity, size_t *count) {
+  *count = 0;
+  return of(state).correct(*event, {out, capacity, count});
+}
+
+void estimate(const void *state, wm_estimate *out) { of(state).estimate(out); }
+void motion(const void *state, wm_motion_calibration *out) { *out = of(state).state().calibration(); }
+size_t calibration(const void *state, wm_calibration_value *out, size_t capacity) {
+  return of(state).list_calibration(out, capacity);
+}
+uint32_t motion_health(const void *state) { return of(state).state().motion_health(); }
+size_t landmarks(const void *state, wm_landmark *out, double (*covariance)[4], size_t capacity) {
+  return of(state).list_landmarks(out, covariance, capacity);
+}
+
+}  // namespace
+
+const wm_estimator wm_slam_estimator = {"slam",
+                                        "EKF-SLAM in the plane, right-invariant: the robot, its sensors' errors and "
+                                        "landmarks whose places nobody measured, "
+                                        "from bearings and ranges or bearings alone, with or without identities.",
+                                        WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
+                                            WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
+                                        wm_slam_params_table,
+                                        state_bytes,
+                                        init,
+                                        predict,
+                                        correct,
+                                        estimate,
+                                        motion,
+                                        calibration,
+                                        motion_health,
+                                        landmarks};

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: Apache-2.0
+// Planar SLAM on sightings: landmarks whose places nobody measured. docs/estimators.md has the model.
+#ifndef WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
+#define WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
+
+#include "filters/landmark_ekf/sensor_model.hpp"
+#include "filters/landmark_ekf/slots.hpp"
+#include "filters/slam/bearing_tracks.hpp"
+#include "filters/slam/joint_state.hpp"
+#include "filters/slam/params.h"
+
+namespace wm {
+
+inline constexpr int kSlamSensors = 8;
+
+// Records of one event's updates.
+struct record_list {
+  wm_innovation *out;
+  size_t capacity;
+  size_t *count;
+  void add(const wm_innovation &record) {
+    if (out && *count < capacity) out[(*count)++] = record;
+  }
+};
+
+// What is known of a landmark beside its place.
+struct landmark_note {
+  int32_t id;
+  uint32_t seen;  // sightings fused
+  wm_time_ns first_ns, last_ns;
+  double z_m;
+  int32_t misfits;   // in a row
+  int32_t surveyed;  // from the map that was given: it doesn't leave
+};
+
+struct slam_counts {
+  uint64_t joined, left, moved, no_room;
+};
+
+class slam {
+ public:
+  static size_t bytes(const wm_slam_params &params, const wm_setup &setup, const char **why);
+  void init(const wm_slam_params &params, const wm_setup &setup);
+
+  wm_status predict(const wm_event &motion);
+  wm_status correct(const wm_event &event, record_list records);
+  void estimate(wm_estimate *out) const;
+  size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
+  size_t list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const;
+  const joint_state &state() const { return joint_; }
+
+ private:
+  enum sensor_state { kYaw, kMountX, kMountY, kTimeOffset, kRangeBias, kRangeScale, kSensorStates };
+
+  // The pose when a sighting was true, `age` before its stamp, and what moves it.
+  struct past_pose {
+    wm_pose2 pose;
+    double lever_x, lever_y;  // from now's position to it: what a heading error now makes of it
+    double age_by[3];         // of x, y, heading by the time offset
+  };
+  // A sighting as rows: what is expected, derivatives by the state (the landmark's apart), noise.
+  struct view {
+    int count;
+    wm_residual kind[2];
+    joint_row row[2];
+    double observed[2], expected[2], innovation[2], noise[2];
+    double by_landmark[2][2];
+    bool possible;
+    double distance_m;
+  };
+  // What a sighting is compared with: sigmas and which numbers count.
+  struct reading {
+    bool bearing, range;
+    double bearing_sigma, range_sigma;
+  };
+
+  past_pose look_back(double age_s) const;
+  void add_pose(joint_row &row, const double by[3], const past_pose &past, int time_state) const;
+  double sensor_value(int sensor, int which, double neutral) const;
+  sensor_errors errors_of(int sensor) const;
+  wm_pose2 sensor_pose(int sensor, const past_pose &past) const;
+
+  wm_status fuse_sighting(const wm_event &event, record_list records);
+  wm_status check_sighting(const wm_sighting &s) const;
+  wm_status take_pose(const wm_event &event);
+  void see(const wm_sighting &s, const reading &r, const past_pose &past, const double place[2], int lasting,
+           view *out) const;
+  // A known landmark: gate, update, records.
+  void fuse_known(int landmark, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
+                  record_list records);
+  // A new one, from bearing and range.
+  void join_seen(int32_t id, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
+                 record_list records);
+  // A new one that is seen by bearings alone.
+  void track_bearing(int32_t id, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
+                     record_list records);
+  void begin_ray(int32_t id, const wm_sighting &s, const reading &r, const past_pose &past);
+  void follow_ray(int32_t id, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
+                  record_list records);
+  void settle_ray(int32_t id, bearing_tracks::track *track, const wm_pose2 &from);
+  void end_ray(bearing_tracks::track *track);
+  int ray_state(const bearing_tracks::track &track) const { return first_ray_ + 2 * tracks_.index(track); }
+  bool join_line(int32_t id, const bearing_tracks::track &track);
+  void misfit(int landmark);
+  int clone_state(int clone) const { return first_clone_ + 3 * clone; }
+  int keep_clone(int sensor, const past_pose &past, wm_time_ns t_ns);
+  int associate(const wm_sighting &s, const reading &r, const past_pose &past, bool *fresh) const;
+
+  int lend(int sensor, int32_t id, wm_time_ns t_ns);
+  int find_landmark(int32_t id) const;
+  int note_landmark(int32_t id, int landmark, wm_time_ns t_ns);
+  void drop_landmark(int landmark);
+  bool make_room();
+  void look_after(wm_time_ns t_ns);
+  int32_t own_id();
+  void start_again();
+  void load_map();
+  void forget_tracks();
+
+  landmark_note *notes() { return reinterpret_cast<landmark_note *>(this + 1); }
+  const landmark_note *notes() const { return reinterpret_cast<const landmark_note *>(this + 1); }
+
+  joint_state joint_;
+  const wm_setup *setup_;
+  wm_slam_params params_;
+  mounted_sensor sensor_[kSlamSensors];
+  int sensor_state_[kSlamSensors][kSensorStates];
+  state_slots<24> lasting_;
+  int lasting_bearing_offset_, lasting_range_offset_;  // within a slot; -1: not carried
+  bearing_tracks tracks_;
+  int first_ray_, first_clone_;
+  slam_counts counts_;
+  wm_time_ns fused_ns_;
+  int32_t next_id_;
+  int cursor_;                    // of look_after
+  wm_time_ns other_fused_ns_[2];  // when the last two different landmarks were fused
+  int32_t other_fused_id_[2];
+  uint32_t resets_;
+};
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: Apache-2.0
+// SLAM's core against the textbook: the half matrix and its kernels, prediction, correction, landmarks that come and
+// go, and what the invariant form promises. The reference keeps the whole matrix and knows nothing of sparsity.
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <new>
+#include <vector>
+
+#include "events.hpp"
+#include "filters/slam/joint_state.hpp"
+#include "math/arc.hpp"
+#include "unity.h"
+#include "waymark/random.h"
+
+namespace {
+
+using wm::half_covariance;
+using wm::joint_row;
+using wm::joint_state;
+using matrix = std::vector<std::vector<double>>;
+
+wm_random dice;
+double gauss() { return wm_random_next_normal(&dice); }
+
+struct made {
+  std::vector<char> motion, memory;
+  wm_setup setup{};
+  joint_state *state;
+
+  explicit made(bool invariant, int width = 2, int landmarks = 8) : motion(wm_motion_params_table.bytes) {
+    wm_params_defaults(&wm_motion_params_table, motion.data());
+    setup.motion = reinterpret_cast<const wm_motion_params *>(motion.data());
+    setup.wheels = make::no_wheels();
+    setup.start.t_ns = WM_TIME_NONE;
+    const wm::joint_layout layout = {10, 7, 1, width, landmarks, invariant};
+    const size_t head = (sizeof(joint_state) + 15) / 16 * 16;
+    memory.resize(head + joint_state::doubles(layout) * sizeof(double) + 16);
+    char *at = memory.data() + (16 - reinterpret_cast<uintptr_t>(memory.data()) % 16) % 16;
+    state = new (at) joint_state;
+    state->init(setup, layout, reinterpret_cast<double *>(at + head));
+    wm_motion_states states{};
+    states.sigma[wm::kSpeedScale] = 0.05;
+    states.sigma[wm::kYawRateScale] = 0.05;
+    states.sigma[wm::kYawRateBias] = 0.01;
+    states.sigma[wm::kLag] = 0.02;
+    state->set_motion_states(states, wm::kPoseStates);
+    const double start[3][3] = {{0.01, 0, 0}, {0, 0.01, 0}, {0, 0, 0.01}};
+    state->set_pose({1, 2, 0.3}, start);
+  }
+
+  int add(double x, double y) {
+    joint_row rows[3];
+    rows[0].add(wm::kX, 1.0);
+    rows[0].add(wm::kHeading, state->value(wm::kY) - y);
+    rows[1].add(wm::kY, 1.0);
+    rows[1].add(wm::kHeading, x - state->value(wm::kX));
+    const double noise[3][3] = {{0.02, 0.001, 0}, {0.001, 0.03, 0}, {0, 0, 0.1}}, place[3] = {x, y, 0.1};
+    return state->add_landmark(rows, noise, place);
+  }
+
+  matrix covariance() const {
+    matrix p((size_t)state->states(), std::vector<double>((size_t)state->states()));
+    for (int i = 0; i < state->states(); i++)
+      for (int j = 0; j < state->states(); j++) p[(size_t)i][(size_t)j] = state->covariance(i, j);
+    return p;
+  }
+};
+
+void assert_near(const matrix &want, const matrix &got) {
+  TEST_ASSERT_EQUAL(want.size(), got.size());
+  for (size_t i = 0; i < want.size(); i++)
+    for (size_t j = 0; j < want.size(); j++) TEST_ASSERT_DOUBLE_WITHIN(1e-12, want[i][j], got[i][j]);
+}
+
+matrix times(const matrix &a, const matrix &b, bool transposed) {
+  const size_t n = a.size();
+  matrix out(n, std::vector<double>(n));
+  for (size_t i = 0; i < n; i++)
+    for (size_t j = 0; j < n; j++)
+      for (size_t k = 0; k < n; k++) out[i][j] += a[i][k] * (transposed ? b[j][k] : b[k][j]);
+  return out;
+}
+
+void test_rows_of_the_half_lie_one_behind_the_other_and_begin_at_pairs(void) {
+  for (int capacity : {2, 4, 10, 64}) {
+    std::vector<int> hits(half_covariance::doubles(capacity));
+    std::vector<double> data(half_covariance::doubles(capacity));
+    const half_covariance p = {data.data(), capacity};
+    for (int i = 0; i < capacity; i++)
+      for (int j = half_covariance::first(i); j < capacity; j++) hits[(size_t)(&p.row(i)[j] - data.data())]++;
+    for (int h : hits) TEST_ASSERT_EQUAL(1, h);
+    for (int i = 0; i < capacity; i++) TEST_ASSERT_EQUAL(0, (&p.row(i)[half_covariance::first(i)] - data.data()) % 2);
+  }
+}
+
+void test_the_kernel_and_its_scalar_twin_give_the_same_bits(void) {
+  const int capacity = 38;
+  for (int n : {1, 2, 7, 8, 37, 38})
+    for (int rows = 0; rows <= 3; rows++)
+      for (int transport = 0; transport < 2; transport++) {
+        alignas(16) double a[38 * 38], b[38 * 38], v[5][38];
+        for (double &x : a) x = gauss();
+        for (auto &column : v)
+          for (double &x : column) x = gauss();
+        const half_covariance pa = {a, capacity}, pb = {b, capacity};
+        for (int i = 0; i < capacity; i += 2) pa.row(i + 1)[i] = pa.row(i)[i + 1];
+        std::memcpy(b, a, sizeof a);
+        const wm::half_update u = {rows, {v[0], v[1], v[2]}, transport ? v[3] : nullptr, v[4]};
+        wm::vectors::apply(pa, u, n);
+        wm::scalar::apply(pb, u, n);
+        TEST_ASSERT_EQUAL_MEMORY(b, a, sizeof a);
+        for (int i = 0; i < capacity; i += 2)
+          TEST_ASSERT_EQUAL_MEMORY(&pa.row(i)[i + 1], &pa.row(i + 1)[i], sizeof(double));
+      }
+}
+
+// F by differences of the mean: what the prediction's derivatives are, landmarks included.
+void test_prediction_is_that_of_the_whole_matrix(void) {
+  made a(true);
+  a.add(4, 3);
+  a.add(-2, 5);
+  a.state->move(make::twist(0.0, 0.8, 0.4));
+  a.state->move(make::twist(0.1, 0.8, 0.4));
+  const size_t n = (size_t)a.state->states();
+  matrix f(n, std::vector<double>(n));
+  const auto end = [&](int changed, double by) {
+    made b(true);
+    b.memory = a.memory;
+    const std::ptrdiff_t at = reinterpret_cast<char *>(a.state) - a.memory.data();
+    joint_state *copy = reinterpret_cast<joint_state *>(b.memory.data() + at);
+    if (changed >= 0) {
+      copy->set_value(changed, copy->value(changed) + by);
+      const double exact = copy->value(changed);
+      copy->forget(changed, exact, 1.0);  // the calibration takes the new value
+    }
+    copy->move(make::twist(0.3, 0.8, 0.4));
+    std::vector<double> x;
+    for (int i = 0; i < copy->states(); i++) x.push_back(copy->value(i));
+    return x;
+  };
+  const std::vector<double> middle = end(-1, 0.0);
+  for (size_t j = 0; j < n; j++) {
+    if (j == 6) {  // the lag moves both ends of the interval, where it is not smooth: taken as the filter's own
+      f[j][j] = 1.0;
+      continue;
+    }
+    const std::vector<double> plus = end((int)j, 1e-6), minus = end((int)j, -1e-6);
+    for (size_t i = 0; i < n; i++) f[i][j] = (plus[i] - minus[i]) / 2e-6;
+  }
+  const matrix before = a.covariance();
+  a.state->move(make::twist(0.3, 0.8, 0.4));
+  const matrix after = a.covariance(), want = times(times(f, before, false), f, true);
+  for (size_t i = 0; i < n; i++)
+    for (size_t j = 3; j < n; j++)  // the pose's own block has noise and lag besides
+      if (i != 6 && j != 6) TEST_ASSERT_DOUBLE_WITHIN(1e-8, want[i][j], after[i][j]);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(want[0][0], after[0][0]);
+}
+
+// The plain form is the textbook's P - K S K'; the invariant one carries it over by T besides.
+void test_correction_is_that_of_the_whole_matrix(void) {
+  for (bool invariant : {false, true}) {
+    made a(invariant, 3);
+    a.add(4, 3);
+    a.add(-2, 5);
+    a.state->move(make::twist(0.0, 0.8, 0.4));
+    a.state->move(make::twist(0.5, 0.8, 0.4));
+    const int s = a.state->landmark_state(1);
+    joint_row rows[3];
+    matrix h(3, std::vector<double>((size_t)a.state->states()));
+    for (int k = 0; k < 3; k++)
+      for (int state : {0, 1, 2, 5, s, s + 1, s + 2}) {
+        const double by = gauss();
+        rows[k].add(state, by);
+        h[(size_t)k][(size_t)state] += by;
+      }
+    const double innovation[3] = {0.02, -0.01, 0.03}, noise[3] = {0.01, 0.02, 0.03}, none[3] = {};
+    const matrix p = a.covariance();
+    std::vector<double> x;
+    for (int i = 0; i < a.state->states(); i++) x.push_back(a.state->value(i));
+    joint_state::innovation_block block;
+    a.state->prepare(rows, innovation, noise, 3, &block);
+    a.state->fuse(block, none, false);
+
+    const size_t n = p.size();
+    matrix want = p;
+    std::vector<double> mean = x, left(innovation, innovation + 3);
+    for (size_t k = 0; k < 3; k++) {  // one number after the other is the same as all at once
+      std::vector<double> g(n);
+      for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++) g[i] += want[i][j] * h[k][j];
+      double variance = noise[k], moved = 0.0;
+      for (size_t j = 0; j < n; j++) {
+        variance += h[k][j] * g[j];
+        moved += h[k][j] * (mean[j] - x[j]);
+      }
+      for (size_t i = 0; i < n; i++) mean[i] += g[i] / variance * (left[k] - moved);
+      for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++) want[i][j] -= g[i] * g[j] / variance;
+    }
+    if (!invariant) {
+      for (size_t i = 0; i < n; i++) TEST_ASSERT_DOUBLE_WITHIN(1e-12, mean[i], a.state->value((int)i));
+      assert_near(want, a.covariance());
+      continue;
+    }
+    matrix t(n, std::vector<double>(n));
+    for (size_t i = 0; i < n; i++) t[i][i] = 1.0;
+    for (size_t place : {size_t{0}, (size_t)a.state->landmark_state(0), (size_t)s}) {
+      t[place][2] -= a.state->value((int)place + 1) - x[place + 1];
+      t[place + 1][2] += a.state->value((int)place) - x[place];
+      TEST_ASSERT_DOUBLE_WITHIN(2e-3, mean[place], a.state->value((int)place));  // apart by the turn's square
+    }
+    assert_near(times(times(t, want, false), t, true), a.covariance());
+  }
+}
+
+void test_a_landmark_that_leaves_takes_its_part_of_the_matrix_and_nothing_else(void) {
+  made a(true), b(true);
+  a.add(4, 3);
+  a.add(-2, 5);
+  a.add(1, 1);
+  b.add(4, 3);
+  b.add(1, 1);
+  a.state->remove_landmark(1);
+  assert_near(b.covariance(), a.covariance());
+  a.add(7, 7);
+  b.add(7, 7);
+  assert_near(b.covariance(), a.covariance());
+}
+
+void test_frozen_landmarks_stay_and_the_robot_is_corrected(void) {
+  made a(true);
+  const int s = a.state->landmark_state(a.add(4, 3));
+  const matrix before = a.covariance();
+  joint_row row;
+  row.add(s, 1.0);
+  const double innovation = 0.1, noise = 0.01, none = 0.0;
+  joint_state::innovation_block block;
+  a.state->prepare(&row, &innovation, &noise, 1, &block);
+  a.state->fuse(block, &none, true);
+  TEST_ASSERT_EQUAL_DOUBLE(4.0, a.state->value(s));
+  TEST_ASSERT_EQUAL_DOUBLE(before[(size_t)s][(size_t)s], a.state->variance(s));
+  TEST_ASSERT_TRUE(a.state->variance(wm::kX) < before[0][0]);
+  TEST_ASSERT_TRUE(a.state->value(wm::kX) != 1.0);
+}
+
+// A robot that sees the same landmark again and again while its estimates move learns nothing of the map's heading: it
+// can't be seen. The plain form believes that it does.
+double heading_sigma_after_many_views(bool invariant) {
+  made a(invariant);
+  a.state->move(make::twist(0.0, 0.0, 0.0));
+  const int s = a.state->landmark_state(a.add(1.6, 2.1));
+  for (int i = 0; i < 400; i++) {
+    const double dx = a.state->value(s) - a.state->value(0), dy = a.state->value(s + 1) - a.state->value(1);
+    const wm::sin_cos h = wm::sincos(a.state->value(2));
+    joint_row rows[2];
+    rows[0].add(0, -h.cos), rows[0].add(1, -h.sin), rows[0].add(s, h.cos), rows[0].add(s + 1, h.sin);
+    rows[0].add(2, h.cos * dy - h.sin * dx);
+    rows[1].add(0, h.sin), rows[1].add(1, -h.cos), rows[1].add(s, -h.sin), rows[1].add(s + 1, h.cos);
+    rows[1].add(2, -h.cos * dx - h.sin * dy);
+    const double innovation[2] = {0.3 * gauss(), 0.3 * gauss()}, noise[2] = {0.09, 0.09}, none[2] = {};
+    joint_state::innovation_block block;
+    a.state->prepare(rows, innovation, noise, 2, &block);
+    a.state->fuse(block, none, false);
+  }
+  return std::sqrt(a.state->variance(wm::kHeading));
+}
+
+void test_the_map_s_heading_is_not_learnt_from_looking(void) {
+  const double invariant = heading_sigma_after_many_views(true);
+  dice.next = 0;
+  const double plain = heading_sigma_after_many_views(false);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.1, invariant);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.099, plain);
+}
+
+}  // namespace
+
+void setUp(void) { dice = {7, 1, 0}; }
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_rows_of_the_half_lie_one_behind_the_other_and_begin_at_pairs);
+  RUN_TEST(test_the_kernel_and_its_scalar_twin_give_the_same_bits);
+  RUN_TEST(test_prediction_is_that_of_the_whole_matrix);
+  RUN_TEST(test_correction_is_that_of_the_whole_matrix);
+  RUN_TEST(test_a_landmark_that_leaves_takes_its_part_of_the_matrix_and_nothing_else);
+  RUN_TEST(test_frozen_landmarks_stay_and_the_robot_is_corrected);
+  RUN_TEST(test_the_map_s_heading_is_not_learnt_from_looking);
+  return UNITY_END();
+}
