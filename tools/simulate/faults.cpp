@@ -10,9 +10,10 @@ namespace {
 
 enum { kLost, kDuplicated, kReordered, kLate };
 
-// Features that were seen right. `list` tells apart the lists, so that each draws for itself.
+// Features that were seen right. `list` tells apart the lists, so that each draws for itself; `frames`: they come as
+// camera frames do, and are late as these.
 template <class Seen>
-void fault(const Faults &f, const Random &random, uint64_t list, std::vector<Seen> &all) {
+void fault(const Faults &f, const Random &random, uint64_t list, bool frames, std::vector<Seen> &all) {
   const uint64_t base = list * 16;
   std::vector<Seen> kept;
   kept.reserve(all.size());
@@ -20,7 +21,7 @@ void fault(const Faults &f, const Random &random, uint64_t list, std::vector<See
     Seen s = all[i];
     if (random.uniform(Stream::sighting_fault, i, base + kLost) < f.sightings_lost) continue;
     // A frame is late as a whole: the draw depends on its stamp and sensor.
-    if (random.uniform(Stream::frame_fault, static_cast<uint64_t>(s.t_ns), s.sensor) < f.frames_late)
+    if (frames && random.uniform(Stream::frame_fault, static_cast<uint64_t>(s.t_ns), s.sensor) < f.frames_late)
       s.arrival_ns += std::llround(f.frames_late_s * 1e9);
     kept.push_back(s);
     if (random.uniform(Stream::sighting_fault, i, base + kDuplicated) < f.sightings_duplicated) kept.push_back(s);
@@ -56,10 +57,11 @@ void fault_can(const Faults &f, const Random &random, std::vector<wm_can_frame> 
 
 void settle(const Scenario &sc, Recording &r) {
   const Random random(r.seed);
-  fault(sc.faults, random, 0, r.sightings);
-  fault(sc.faults, random, 1, r.markers);
-  fault(sc.faults, random, 2, r.stereo);
-  fault(sc.faults, random, 3, r.fixes);
+  const bool frames = !sc.world.pictured();  // pictures have been late already
+  fault(sc.faults, random, 0, frames, r.sightings);
+  fault(sc.faults, random, 1, frames, r.markers);
+  fault(sc.faults, random, 2, frames, r.stereo);
+  fault(sc.faults, random, 3, false, r.fixes);
 }
 
 }  // namespace wm::sim

@@ -6,6 +6,7 @@
 
 #include "simulate/angle.h"
 #include "simulate/film.h"
+#include "simulate/motion.h"
 
 namespace wm::sim {
 namespace {
@@ -59,14 +60,23 @@ void change(const PixelCamera &wish, FilmCamera &out) {
 // The camera as it is: the mounting off on each axis, each number of the intrinsics off by a share of itself.
 render::Camera draw_truth(const Errors &e, const Random &random, uint64_t camera, const render::Camera &believed) {
   render::Camera c = believed;
-  const auto draw = [&](uint64_t i) { return random.normal(Stream::camera_mounting, i, camera); };
-  const Pose turn = render::pose_xyz_rpy({0, 0, 0}, e.camera_mounting_rad * draw(0), e.camera_mounting_rad * draw(1),
-                                         e.camera_mounting_rad * draw(2));
-  c.T_base_camera = believed.T_base_camera * turn;
-  c.T_base_camera.translation() += e.camera_mounting_m * Vec3(draw(3), draw(4), draw(5));
+  c.T_base_camera = true_mounting(believed.T_base_camera, e, random.seed(), camera);
   for (size_t i = c.intrinsics.size() - 4; i < c.intrinsics.size(); i++)
     c.intrinsics[i] *= 1 + e.camera_intrinsics * random.normal(Stream::camera_intrinsics, i, camera);
   return c;
+}
+
+// A rectified pair is one rigid instrument: the right camera sits to the left one as calibrated, with its intrinsics.
+void join_pair(Film &film) {
+  FilmCamera *left = nullptr, *right = nullptr;
+  for (FilmCamera &c : film.cameras) {
+    if (c.name == film.world->stereo_left) left = &c;
+    if (c.name == film.world->stereo_right) right = &c;
+  }
+  if (left == nullptr || right == nullptr) return;
+  right->truth.T_base_camera =
+      left->truth.T_base_camera * left->believed.T_base_camera.inverse() * right->believed.T_base_camera;
+  if (right->believed.intrinsics == left->believed.intrinsics) right->truth.intrinsics = left->truth.intrinsics;
 }
 
 wm_status set_up_cameras(const Scenario &sc, uint64_t seed, Film &out, wm_error *err) {
@@ -91,6 +101,7 @@ wm_status set_up_cameras(const Scenario &sc, uint64_t seed, Film &out, wm_error 
     return wm_fail(err, WM_BAD_CONFIG, "cameras: this world has no camera `%s`; it has %s", wish.name.c_str(),
                    names.c_str());
   }
+  join_pair(out);
   return WM_OK;
 }
 
@@ -130,19 +141,21 @@ std::string calibration_of(const Film &film) {
         (left->believed.T_base_camera.translation() - right->believed.T_base_camera.translation()).norm();
     add(text, "stereo:\n  left: %s\n  right: %s\n  baseline_m: %.6g\n  rectified: [%.9g, %.9g, %.9g, %.9g]\n",
         left->name.c_str(), right->name.c_str(), baseline_m, k[0], k[1], k[2], k[3]);
+    for (const Sensor &s : film.scenario.sensors)
+      if (s.kind == Sensor::Kind::stereo && s.sigma_px > 0)
+        add(text, "  sigma_px: [%.6g, %.6g, %.6g, %.6g]\n", s.sigma_px, s.sigma_px, s.sigma_px, s.sigma_px);
   }
   if (film.world->marker_size_m > 0)
     add(text, "markers: {family: tag36h11, size_m: %.6g}\n", film.world->marker_size_m);
   return text;
 }
 
-std::vector<wm_landmark> landmarks_of(const World &world, const std::vector<WorldLandmark> &from) {
+std::vector<wm_landmark> landmarks_of(const World &world) {
   std::vector<wm_landmark> out;
-  for (const WorldLandmark &l : from) {
+  for (const WorldLandmark &l : world.truth) {
     wm_landmark landmark{};
     landmark.id = l.id;
     for (int i = 0; i < 3; i++) landmark.p_m[i] = l.p[i];
-    landmark.sigma_m = l.sigma_m;
     landmark.yaw_rad = world.labels == World::Labels::markers ? l.yaw_rad : static_cast<double>(NAN);
     out.push_back(landmark);
   }
@@ -170,10 +183,12 @@ wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *
     simulate_six(out.scenario, seed, out.world->path, r);
   else if (const wm_status s = simulate(out.scenario, seed, SIZE_MAX, r, err); s != WM_OK)
     return s;
-  r.landmarks = landmarks_of(*out.world, out.world->truth);
-  r.map = landmarks_of(*out.world, out.world->landmarks);
+  r.landmarks = landmarks_of(*out.world);
+  if (out.world->landmarks_known) r.map = r.landmarks;
+  misplace(out.scenario, 3, r);
   r.camera_calibration = calibration_of(out);
   if (out.world->map) r.picture_streams.push_back("map/map.yaml");
+  if (scenario.pictures.none) return WM_OK;
   for (const FilmCamera &c : out.cameras) {
     r.picture_streams.push_back("video/" + c.name + ".avi");
     r.picture_streams.push_back("video/" + c.name + ".csv");

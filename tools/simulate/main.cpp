@@ -36,7 +36,8 @@ void parse(CLI::App *app, Arguments *a) {
   app->add_option("--landmarks", a->landmarks, "only the scenario's first N landmarks");
   app->add_option("--laps", a->laps, "instead of the route's laps")->check(CLI::Range(1, 1000));
   app->add_option("--duration", a->duration_s, "end the recording after S seconds")->check(CLI::PositiveNumber);
-  app->add_flag("--no-video", a->no_video, "worlds with pictures: all but the pictures and their labels");
+  app->add_flag("--no-video", a->no_video,
+                "worlds with pictures: all but the pictures and their labels; what `sensors` find in them instead");
   auto *frame = app->add_option("--frame", a->frame_s, "one picture, taken T seconds after the start; no recording");
   app->add_option("--png", a->png, "where to write it (PNG)")->needs(frame);
   app->add_option("--camera", a->camera, "whose picture; the first camera's if not given")->needs(frame);
@@ -110,8 +111,8 @@ wm_status simulate_pictures(const Arguments &a, const sim::Scenario &scenario, u
     if (const wm_status s = sim::contact_sheet(film, 12, 3, 300, sheet, err); s != WM_OK) return s;
     return save(sheet, a.sheet, err);
   }
-  if (a.no_video) film.recording.picture_streams.clear();
-  if (a.no_video && film.world->map) film.recording.picture_streams = {"map/map.yaml"};
+  if (const wm_status s = sim::observe_pictures(film, err); s != WM_OK)
+    return wm_fail_in(err, "%s", a.scenario.c_str());
   if (const wm_status s = sim::write_sensors(film.scenario, film.recording, a.out, err); s != WM_OK) return s;
   Meter meter;
   const wm_status pictured =
@@ -137,6 +138,7 @@ wm_status simulate(const Arguments &a, wm_error *err) {
   if (a.laps) scenario.route.laps = *a.laps;
   if (a.duration_s) scenario.duration_s = *a.duration_s;
   if (a.perfect) sim::make_perfect(scenario);
+  scenario.pictures.none = a.no_video;
   const uint64_t seed = a.seed.value_or(scenario.seed);
   return scenario.world.pictured() ? simulate_pictures(a, scenario, seed, err)
                                    : simulate_features(a, scenario, seed, err);

@@ -51,6 +51,8 @@ class Random {
  public:
   explicit Random(uint64_t seed) : seed_(seed) {}
 
+  uint64_t seed() const { return seed_; }
+
   // In [0, 1). `sub` (below 2^32) tells apart several draws of one index.
   double uniform(Stream stream, uint64_t index, uint64_t sub = 0) const {
     return wm_random_uniform(seed_, number(stream, sub), index);

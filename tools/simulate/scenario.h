@@ -125,6 +125,7 @@ struct PixelCamera {
 
 // How pictures are made, of all cameras.
 struct Pictures {
+  bool none = false;          // all but the pictures
   int samples = 2;            // rays a pixel
   double psf_sigma_px = 0.5;  // the lens' point spread
   int jpeg_quality = 60;

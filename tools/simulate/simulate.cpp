@@ -18,6 +18,7 @@ namespace wm::sim {
 namespace {
 
 constexpr double kTruth_hz = 50;
+constexpr wm_time_ns kFrame_ns = 250000;  // what a frame takes on a bus of 500 kbit/s
 
 wm_time_ns to_ns(double s) { return static_cast<wm_time_ns>(std::llround(s * 1e9)); }
 // candump writes microseconds.
@@ -43,6 +44,7 @@ class Sender {
   // fill(k, t_s, frame) packs sample k, taken t_s after the start.
   template <class Fill>
   void run(double rate_hz, double phase_s, Fill fill) {
+    wm_time_ns last_ns = out_.clock_start_ns - kFrame_ns;
     for (uint64_t k = 0;; k++) {
       const double t_s = phase_s + static_cast<double>(k) / rate_hz;
       if (t_s > out_.drive.duration_s()) return;
@@ -52,7 +54,9 @@ class Sender {
       frame.length = static_cast<uint8_t>(message_.length);
       const double jitter = scenario_.bus.stamp_jitter_s *
                             std::clamp(random_.normal(Stream::can_jitter, k, static_cast<uint64_t>(which_)), -3.0, 3.0);
-      frame.t_ns = out_.clock_start_ns + std::max<wm_time_ns>(0, to_us(t_s + jitter));
+      // Frames of one message never overtake one another, however their stamps jitter.
+      frame.t_ns = std::max(last_ns + kFrame_ns, out_.clock_start_ns + std::max<wm_time_ns>(0, to_us(t_s + jitter)));
+      last_ns = frame.t_ns;
       fill(k, t_s, frame);
       pack_count(message_.signals[message_.counter()], static_cast<int64_t>(k), frame);
       out_.can.push_back(frame);
@@ -231,15 +235,14 @@ wm_status place_landmarks(const Scenario &sc, size_t landmarks, Recording &out, 
                                                       : out.landmarks.size();
   for (wm_landmark &l : out.landmarks) l.sigma_m = 0;
   out.map.assign(out.landmarks.begin(), out.landmarks.begin() + static_cast<std::ptrdiff_t>(mapped));
-  misplace(sc, out);
+  misplace(sc, out.motion6.empty() ? 2 : 3, out);
   return WM_OK;
 }
 
 }  // namespace
 
-void misplace(const Scenario &sc, Recording &out) {
+void misplace(const Scenario &sc, uint64_t axes, Recording &out) {
   const Random random(out.seed);
-  const uint64_t axes = out.motion6.empty() ? 2 : 3;
   for (uint64_t i = 0; i < out.map.size(); i++) {
     out.map[i].sigma_m = sc.errors.landmark_m;
     for (uint64_t axis = 0; axis < axes; axis++)

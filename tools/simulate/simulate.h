@@ -113,8 +113,8 @@ void list_sensors(const Scenario &scenario, Recording &recording);
 // The lists sorted by arrival, after `faults` have lost, doubled and delayed some of them.
 void settle(const Scenario &scenario, Recording &recording);
 
-// Makes the recording's map wrong by `errors.landmark_m` on each axis, and states that in it.
-void misplace(const Scenario &scenario, Recording &recording);
+// Makes the recording's map wrong by `errors.landmark_m` on each of the first `axes` axes, and states that in it.
+void misplace(const Scenario &scenario, uint64_t axes, Recording &recording);
 
 // The same for a vehicle with six degrees of freedom on `path`: motion6 instead of CAN.
 void simulate_six(const Scenario &scenario, uint64_t seed, const Path6 &path, Recording &out);

@@ -154,8 +154,8 @@ wm_status write_calibration(const Scenario &sc, const Recording &r, const std::s
   File f(path);
   f.text(r.camera_calibration);
   for (const Sensor &s : sc.sensors) {
-    if (s.kind != Sensor::Kind::stereo) continue;
-    if (!sc.world.pictured()) print_pair(f, s);
+    if (s.kind != Sensor::Kind::stereo || sc.world.pictured()) continue;
+    print_pair(f, s);
     if (s.sigma_px > 0)
       f.print("  sigma_px: [%.6g, %.6g, %.6g, %.6g]\n", s.sigma_px, s.sigma_px, s.sigma_px, s.sigma_px);
   }

@@ -24,7 +24,7 @@ using render::Vec2;
 using render::Vec3;
 
 constexpr double kDeg = kPi / 180;
-constexpr double kKerb_m = 0.12, kLandmarkSigma_m = 0.02;
+constexpr double kKerb_m = 0.12;
 
 // Two roads that cross: one along x, one along y. Each is given by its middle and the half widths of carriageway and of
 // the space between the house fronts.
@@ -311,7 +311,7 @@ class Builder {
     const int32_t id = static_cast<int32_t>(world_.truth.size()) + 1;
     const Vec3 r = 0.5 * width * right, u(0, 0, 0.5 * height);
     world_.panels.push_back({id, {middle - r + u, middle + r + u, middle + r - u, middle - r - u}, normal});
-    world_.truth.push_back({id, middle, 0, 0, what});
+    world_.truth.push_back({id, middle, 0, what});
   }
 
   // Signs on posts at the crossing's corners.
@@ -458,13 +458,7 @@ wm_status make_crossing(const WorldRequest &request, World &world, wm_error *) {
   world.footprint = {2.3, -0.4, 0.75};
   world.route = request.route ? *request.route : drawn_route(request.seed);
   Builder(request, world).build(streets_around(world.route, request.seed));
-  Dice dice(request.seed, Part::map_error);
-  for (WorldLandmark landmark : world.truth) {
-    const double sigma = (request.hard ? 2 : 1) * kLandmarkSigma_m;
-    landmark.p += sigma * Vec3(dice.normal(), dice.normal(), dice.normal());
-    landmark.sigma_m = sigma;
-    world.landmarks.push_back(landmark);
-  }
+  world.landmarks_known = true;
   world.cameras = {fisheye("left", 0.4, 50 * kDeg), fisheye("right", -0.4, -50 * kDeg)};
   world.labels = World::Labels::landmarks;
   world.label_file = "labels/landmarks.csv";

@@ -34,7 +34,7 @@ void put_marker(int id, const Vec3 &middle, const Vec3 &right, const Vec3 &up, W
   panel.corners[3] = middle - r - u;
   panel.normal = right.cross(up).normalized();
   world.panels.push_back(panel);
-  world.truth.push_back({id, middle, wm::atan2(right.y(), right.x()), 0, "marker"});
+  world.truth.push_back({id, middle, wm::atan2(right.y(), right.x()), "marker"});
 }
 
 int fresh_id(Dice &dice, const World &world) {

@@ -192,7 +192,6 @@ wm_status make_seabed(const WorldRequest &request, World &world, wm_error *err) 
 
   // Beacons: moored spheres beside the way.
   Dice dice(request.seed, Part::beacons);
-  Dice error(request.seed, Part::map_error);
   Material rope;
   rope.albedo = Colour(0.15f);
   const uint32_t line = world.scene.add(rope);
@@ -213,10 +212,7 @@ wm_status make_seabed(const WorldRequest &request, World &world, wm_error *err) 
     world.scene.add(render::sphere(p, radius, 24, world.scene.add(m)));
     world.scene.add(render::cylinder(render::pose_xyz_rpy({x, y, p.z() - height - 0.1}, 0, 0, 0), 0.006,
                                      height + 0.1 - radius, 6, line));
-    world.truth.push_back({id, p, 0, 0, "beacon"});
-    const double sigma = request.hard ? 0.01 : 0.005;
-    world.landmarks.push_back(
-        {id, p + sigma * Vec3(error.normal(), error.normal(), error.normal()), 0, sigma, "beacon"});
+    world.truth.push_back({id, p, 0, "beacon"});
     id++;
   }
 
@@ -249,6 +245,7 @@ wm_status make_seabed(const WorldRequest &request, World &world, wm_error *err) 
   world.label_file = "labels/beacons.csv";
   world.label_header = "frame,camera,id,u_px,v_px";
   world.label_reach_m = 9;
+  world.landmarks_known = true;
   return WM_OK;
 }
 

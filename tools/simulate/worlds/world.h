@@ -40,7 +40,6 @@ struct WorldLandmark {
   int32_t id = 0;
   render::Vec3 p{0, 0, 0};  // map
   double yaw_rad = 0;       // markers: of the print's edge from upper left to upper right
-  double sigma_m = 0;
   std::string what;
 };
 
@@ -61,7 +60,7 @@ struct World {
   std::vector<WorldCamera> cameras;
   std::optional<RasterMap> map;           // corridor
   std::vector<WorldLandmark> truth;       // true places: landmarks, markers, vertical lines, beacons
-  std::vector<WorldLandmark> landmarks;   // what landmarks.csv says; empty where the map is what SLAM has to find
+  bool landmarks_known = false;           // landmarks.csv says where they are; else that is what SLAM has to find
   double marker_size_m = 0;               // office
   std::string stereo_left, stereo_right;  // seabed: names of the cameras of the rectified pair
   std::string label_file, label_header;   // "labels/edges.csv", "frame,polyline,u_px,v_px"
