@@ -101,7 +101,7 @@ double worst_square(const NamedCamera &named, const Shot &shot, int samples, int
   Material bright;
   bright.albedo = Colour(0.0f), bright.emission = Colour(1.0f);
   const uint32_t lamp = scene.add(bright);
-  scene.sky = {Colour(0.0f), Colour(0.0f), Colour(0.0f), nullptr};
+  scene.sky = {Colour(0.0f), Colour(0.0f), Colour(0.0f)};
   const Vec3 centre = camera_centre(named.camera, shot, (named.camera.height - 1) / 2.0);
   const std::vector<Square> squares = squares_around(named, centre);
   for (const Square &s : squares) scene.add(quad(s.corner, s.u, s.v, lamp));

@@ -86,6 +86,14 @@ void test_bits_do_not_depend_on_threads(void) {
     TEST_ASSERT_EQUAL_size_t(one.values.size(), many.values.size());
     TEST_ASSERT_EQUAL_INT(0, std::memcmp(one.values.data(), many.values.data(), one.values.size() * sizeof(float)));
   }
+  // Nor on whether the machine has AVX2, in grey and in colour.
+  for (bool colour : {false, true}) {
+    quality.plain = false;
+    const Image fast = render(first, camera, quality, at({-1.5, 0, 0}, 0, 8000000), colour);
+    quality.plain = true;
+    const Image plain = render(first, camera, quality, at({-1.5, 0, 0}, 0, 8000000), colour);
+    TEST_ASSERT_EQUAL_INT(0, std::memcmp(fast.values.data(), plain.values.data(), fast.values.size() * sizeof(float)));
+  }
   // And they do depend on the frame's number: places in pixels are drawn anew.
   Shot other = at({-1.5, 0, 0}, 0, 8000000);
   other.frame = 1;
@@ -213,7 +221,7 @@ void test_mirror_shows_what_stands_on_it(void) {
     const uint32_t f = scene.add(floor), g = scene.add(glow);
     scene.add(quad({0, -5, 0}, {20, 0, 0}, {0, 10, 0}, f));
     scene.add(quad({10, -5, 0}, {0, 10, 0}, {0, 0, 10}, g));
-    scene.sky = {Colour(0.0f), Colour(0.0f), Colour(0.0f), nullptr};
+    scene.sky = {Colour(0.0f), Colour(0.0f), Colour(0.0f)};
     commit(scene);
     Camera camera = pinhole(21, 21, 100);
     camera.T_base_camera = pose_xyz_rpy({1, 0, 2}, 0, kPi / 4, 0);
@@ -231,7 +239,7 @@ void test_motion_blur_smears_what_moves(void) {
   glow.albedo = Colour(0.0f), glow.emission = Colour(1.0f);
   const uint32_t g = scene.add(glow);
   scene.add(quad({1, -2, -2}, {4, 0, 0}, {0, 0, 4}, g));  // an edge at x = 1, seen from the side
-  scene.sky = {Colour(0.0f), Colour(0.0f), Colour(0.0f), nullptr};
+  scene.sky = {Colour(0.0f), Colour(0.0f), Colour(0.0f)};
   commit(scene);
   Camera camera = pinhole(201, 11, 100);
   Quality quality{.samples = 64, .psf_sigma_px = 0};
@@ -273,7 +281,7 @@ void test_what_cannot_be_is_refused(void) {
   TEST_ASSERT_EQUAL_STRING("a mesh uses material 3, which isn't there", error.c_str());
   // Nothing at all is a picture of the sky.
   Scene empty;
-  empty.sky = {Colour(0.3f), Colour(0.3f), Colour(0.3f), nullptr};
+  empty.sky = {Colour(0.3f), Colour(0.3f), Colour(0.3f)};
   commit(empty);
   TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.3f, render(empty, pinhole(9, 9, 9), {}, at({0, 0, 0})).values[40]);
 }

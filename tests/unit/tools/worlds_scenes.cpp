@@ -187,9 +187,10 @@ void corridor_labels_lie_on_edges_of_the_picture() {
 // An outside judge: AprilTag's own detector, whose pixel centres lie at +0.5. Its corners run counter-clockwise from
 // the lower left one; the recordings' upper left corner (ArUco's) is its lower right one.
 void office_labels_are_what_apriltag_finds() {
+  // The detector looks into its family when it is destroyed: the family goes last.
+  std::unique_ptr<apriltag_family_t, decltype(&tag36h11_destroy)> family(tag36h11_create(), tag36h11_destroy);
   std::unique_ptr<apriltag_detector_t, decltype(&apriltag_detector_destroy)> detector(apriltag_detector_create(),
                                                                                       apriltag_detector_destroy);
-  std::unique_ptr<apriltag_family_t, decltype(&tag36h11_destroy)> family(tag36h11_create(), tag36h11_destroy);
   apriltag_detector_add_family(detector.get(), family.get());
   detector->quad_decimate = 1;
   for (const bool on_walls : {false, true}) {

@@ -7,9 +7,11 @@ namespace wm::render {
 
 Directions::Directions(const Camera &camera) : width(camera.width), height(camera.height) {
   const size_t columns = static_cast<size_t>(width) + 1, rows = static_cast<size_t>(height) + 1;
-  x.assign(columns * rows, 0), y = x, z = x;
+  // Eight are read at a time, also at the end.
+  constexpr size_t kBeyond = 8;
+  x.assign(columns * rows + kBeyond, 0), y = x, z = x;
   there.assign(static_cast<size_t>(width) * static_cast<size_t>(height), 0);
-  angle_rad.assign(there.size(), 0);
+  angle_rad.assign(there.size() + kBeyond, 0);
   std::vector<uint8_t> known(columns * rows);
   for (size_t v = 0, i = 0; v < rows; v++) {
     for (size_t u = 0; u < columns; u++, i++) {

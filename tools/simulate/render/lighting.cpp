@@ -104,68 +104,78 @@ float open_share(const Ambient &ambient, RTCScene still, const Vec3 &point, cons
 namespace {
 
 // Corners of neighbours are lit once: same place, same normal.
-struct Place {
+struct Key {
   float v[6];
-  bool operator==(const Place &other) const { return std::equal(v, v + 6, other.v); }
+  bool operator==(const Key &other) const { return std::equal(v, v + 6, other.v); }
 };
-struct PlaceHash {
-  size_t operator()(const Place &p) const {
+struct KeyHash {
+  size_t operator()(const Key &p) const {
     uint64_t h = 0;
     for (float v : p.v) h = (h ^ std::bit_cast<uint32_t>(v)) * 0x9e3779b97f4a7c15ull, h ^= h >> 29;
     return static_cast<size_t>(h);
   }
 };
 
-struct LitPlace {
-  Vec3 position, normal;
-  Vec3 inwards{0, 0, 0};  // sum of the ways to the middles of its triangles: away from walls it stands at
-  float4 light[2];
-};
-
-void light_place(const Scene &scene, RTCScene still, LitPlace &place) {
+void light_place(const Scene &scene, RTCScene still, Place &place) {
   // A corner lies on the walls that meet there; its light is that of a point a little inside of its surfaces.
   Vec3 point = place.position;
   const double inwards = place.inwards.norm();
   if (inwards > 1e-3) point += place.inwards * (2 * kLift / inwards);
   for (int side = 0; side < 2; side++) {
     const Vec3 normal = side == 0 ? place.normal : -place.normal;
-    const Colour lamps = lamp_light(scene, still, point, normal);
-    place.light[side] = float4{lamps.r, lamps.g, lamps.b, open_share(scene.ambient, still, point, normal)};
+    place.lit.lamps[side] = lamp_light(scene, still, point, normal);
+    place.lit.open[side] = open_share(scene.ambient, still, point, normal);
   }
 }
 
 }  // namespace
 
-void light_facets(const Scene &scene, RTCScene still, const std::vector<Triangle> &triangles,
-                  std::vector<Facet> &facets) {
-  std::unordered_map<Place, uint32_t, PlaceHash> known;
-  std::vector<LitPlace> places;
-  std::vector<std::array<uint32_t, 3>> corners(triangles.size());
+void find_places(const std::vector<Triangle> &triangles, Shape &shape) {
+  std::unordered_map<Key, uint32_t, KeyHash> known;
   known.reserve(triangles.size());
   for (size_t i = 0; i < triangles.size(); i++) {
     const Triangle &t = triangles[i];
     const Vec3 middle = (t[0].position + t[1].position + t[2].position) / 3;
     for (size_t k = 0; k < 3; k++) {
-      Place key;
+      Key key;
       for (int a = 0; a < 3; a++) {
         key.v[a] = static_cast<float>(t[k].position[a]);
         key.v[3 + a] = static_cast<float>(std::lround(t[k].normal[a] * 1000));
       }
-      const auto [it, fresh] = known.try_emplace(key, static_cast<uint32_t>(places.size()));
-      if (fresh) places.push_back({t[k].position, t[k].normal, Vec3(0, 0, 0), {}});
-      places[it->second].inwards += middle - t[k].position;
-      corners[i][k] = it->second;
+      const auto [it, fresh] = known.try_emplace(key, static_cast<uint32_t>(shape.places.size()));
+      if (fresh) shape.places.push_back({t[k].position, t[k].normal, Vec3(0, 0, 0), {}});
+      shape.places[it->second].inwards += middle - t[k].position;
+      shape.pieces[i].places[k] = it->second;
     }
   }
+}
+
+void light_places(const Scene &scene, RTCScene still, std::vector<Place> &places) {
   auto work = [&](size_t first) {
     for (size_t i = first; i < places.size(); i += 2) light_place(scene, still, places[i]);
   };
   std::thread second(work, 1);
   work(0);
   second.join();
-  for (size_t i = 0; i < facets.size(); i++)
-    for (size_t k = 0; k < 3; k++)
-      for (int side = 0; side < 2; side++) facets[i].light[side][k] = places[corners[i][k]].light[side];
+}
+
+void light_mover(const Scene &scene, const Shape &shape, const Pose &T_map_mover, std::vector<Lit> &out) {
+  std::vector<const Lamp *> near;
+  for (const Lamp &lamp : scene.data().lamps)
+    if ((lamp.position - T_map_mover * shape.middle).norm() < lamp.reach_m + shape.radius_m) near.push_back(&lamp);
+  const Vec3 sun = scene.sun.towards.normalized();
+  out.resize(shape.places.size());
+  for (size_t i = 0; i < out.size(); i++) {
+    const Vec3 point = T_map_mover * shape.places[i].position, normal = T_map_mover.linear() * shape.places[i].normal;
+    for (int side = 0; side < 2; side++) {
+      const Vec3 facing = side == 0 ? normal : -normal;
+      Colour sum = scene.sun.power * static_cast<float>(std::max(facing.dot(sun), 0.0));
+      for (const Lamp *lamp : near)
+        sum = sum + lamp->colour * static_cast<float>(from_place(*lamp, lamp->position, nullptr, point, facing));
+      out[i].lamps[side] = sum;
+      out[i].open[side] = 1;
+    }
+  }
 }
 
 }  // namespace wm::render

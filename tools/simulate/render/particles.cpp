@@ -13,20 +13,31 @@ namespace {
 
 constexpr double kCell = 0.5;  // m
 
+Colour passed(const Frame<3> &frame, double distance) {
+  const auto i = static_cast<size_t>(
+      std::clamp(distance / double(kAttenuationStep_m), 0.0, static_cast<double>(kAttenuationSteps - 1)));
+  const auto *table = frame.water.passed;
+  return {table[0][i], table[1][i], table[2][i]};
+}
+
 // Light on a speck: what surrounds it and the vehicle's lamps.
-float4 light_at(const Air &air, const Eye &eye, float3 place) {
-  float4 light = air.ambient_up * splat(0.5f * air.ambient);
-  for (const Beam &beam : eye.beams) {
-    const float3 way = beam.position - place;
-    const float d2 = std::max(dot(way, way), 1e-2f), d = std::sqrt(d2);
-    const float off = (1 + dot(way, beam.direction) / d) * beam.narrow;
-    light += beam.power * splat(1 / ((1 + off * off) * d2)) * air.attenuation(d);
+Colour light_at(const Frame<3> &frame, const Eye &eye, const Vec3 &place) {
+  const float *up = frame.ambient_up;
+  Colour light = Colour(up[0], up[1], up[2]) * (0.5f * frame.ambient);
+  for (int i = 0; i < frame.beam_count; i++) {
+    const Beam &beam = eye.beams[i];
+    const auto vector = [](const float *v) { return Vec3(double(v[0]), double(v[1]), double(v[2])); };
+    const Vec3 way = vector(beam.position) - place;
+    const double d2 = std::max(way.squaredNorm(), 1e-2), d = std::sqrt(d2);
+    const double off = (1 + way.dot(vector(beam.direction)) / d) * double(beam.narrow);
+    const Colour power(beam.power[0], beam.power[1], beam.power[2]);
+    light = light + power * passed(frame, d) * static_cast<float>(1 / ((1 + off * off) * d2));
   }
   return light;
 }
 
 // A round Gaussian of the given whole weight.
-void blot(const Vec2 &middle, double sigma, float4 weight, float distance, const std::vector<float> &depth,
+void blot(const Vec2 &middle, double sigma, Colour weight, float distance, const std::vector<float> &depth,
           Image &image) {
   const int reach = static_cast<int>(std::ceil(3 * sigma));
   const int cx = static_cast<int>(std::floor(middle.x() + 0.5)), cy = static_cast<int>(std::floor(middle.y() + 0.5));
@@ -35,13 +46,12 @@ void blot(const Vec2 &middle, double sigma, float4 weight, float distance, const
       const size_t at = static_cast<size_t>(y) * static_cast<size_t>(image.width) + static_cast<size_t>(x);
       if (depth[at] <= distance) continue;
       const double dx = x - middle.x(), dy = y - middle.y();
-      const float4 c =
-          weight *
-          splat(static_cast<float>(wm::exp(-0.5 * (dx * dx + dy * dy) / (sigma * sigma)) / (2 * kPi * sigma * sigma)));
+      const Colour c = weight * static_cast<float>(wm::exp(-0.5 * (dx * dx + dy * dy) / (sigma * sigma)) /
+                                                   (2 * kPi * sigma * sigma));
       if (image.channels == 3) {
-        for (size_t k = 0; k < 3; k++) image.values[3 * at + k] += c[static_cast<int>(k)];
+        image.values[3 * at] += c.r, image.values[3 * at + 1] += c.g, image.values[3 * at + 2] += c.b;
       } else {
-        image.values[at] += 0.2126f * c[0] + 0.7152f * c[1] + 0.0722f * c[2];
+        image.values[at] += c.grey();
       }
     }
   }
@@ -49,9 +59,9 @@ void blot(const Vec2 &middle, double sigma, float4 weight, float distance, const
 
 }  // namespace
 
-void draw_particles(const Air &air, const Camera &camera, const Shot &shot, const Eye &eye, uint64_t seed,
-                    const std::vector<float> &depth, Image &image) {
-  const Water &water = air.scene->water;
+void draw_particles(const Scene &scene, const Frame<3> &frame, const Camera &camera, const Shot &shot, const Eye &eye,
+                    uint64_t seed, const std::vector<float> &depth, Image &image) {
+  const Water &water = scene.water;
   const Pose T_map_optical = shot.T_map_base(static_cast<double>(shot.t_ns)) * T_base_optical(camera);
   const Pose T_optical_map = T_map_optical.inverse();
   const Vec3 drift = water.current_mps * (static_cast<double>(shot.t_ns) * 1e-9);
@@ -83,8 +93,8 @@ void draw_particles(const Air &air, const Camera &camera, const Shot &shot, cons
           const double radius_px = camera.intrinsics[camera.intrinsics.size() - 4] * radius / distance;
           // Near ones are out of focus as well.
           const double sigma = std::clamp(0.5 * radius_px + 0.3 / distance, 0.4, 8.0);
-          const float4 weight = light_at(air, eye, to_float3(place)) * air.attenuation(static_cast<float>(distance)) *
-                                splat(static_cast<float>(kPi * radius_px * radius_px));
+          const Colour weight =
+              light_at(frame, eye, place) * passed(frame, distance) * static_cast<float>(kPi * radius_px * radius_px);
           blot(pixel, sigma, weight, static_cast<float>(distance), depth, image);
         }
       }

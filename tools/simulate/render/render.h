@@ -17,7 +17,8 @@ struct Quality {
   double psf_sigma_px = 0.5;  // the lens: a Gaussian over the picture, after the rays; 0: none
   bool mirrors = true;
   bool movers = true;
-  int threads = 0;  // 0: as many as the machine has. Bits don't depend on it
+  int threads = 0;     // 0: as many as the machine has. Bits don't depend on it
+  bool plain = false;  // without AVX2 where the machine has it. Bits don't depend on it
 };
 
 struct Shot {

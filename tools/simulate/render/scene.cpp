@@ -43,14 +43,16 @@ RTCScene tree(RTCDevice device, const std::vector<Triangle> &triangles) {
   return out;
 }
 
-Facet facet(const Triangle &t, uint32_t material, const Material &look) {
-  Facet out{};
+Piece piece(const Triangle &t, uint32_t material, const Material &look) {
+  Piece out{};
   out.material = material;
   for (size_t k = 0; k < 3; k++) {
     out.s[k] = static_cast<float>((t[k].uv.x() - look.texture_origin_m.x()) / look.texture_size_m.x());
     out.t[k] = static_cast<float>((t[k].uv.y() - look.texture_origin_m.y()) / look.texture_size_m.y());
   }
-  const double area = (t[1].position - t[0].position).cross(t[2].position - t[0].position).norm();
+  const Vec3 across = (t[1].position - t[0].position).cross(t[2].position - t[0].position);
+  const double area = across.norm();
+  out.normal = across / area;
   const Vec2 u = t[1].uv - t[0].uv, v = t[2].uv - t[0].uv;
   out.span_per_m =
       static_cast<float>(std::sqrt(std::fabs(u.x() * v.y() - u.y() * v.x()) / area) / look.texture_size_m.x());
@@ -72,16 +74,14 @@ bool check(const Mesh &mesh, size_t materials, std::string &error) {
   return true;
 }
 
-Surface surface(const Material &m) {
-  Surface out{};
-  out.albedo = as_float4(m.albedo);
-  out.emission = as_float4(m.emission);
-  out.emits = m.emission.grey() > 0;
-  out.texture = m.texture.get();
-  out.mirror = static_cast<float>(m.mirror);
-  out.glance = m.mirror > 0 ? static_cast<float>(m.mirror_glance) : 0;
-  out.roughness = static_cast<float>(m.roughness_rad);
-  return out;
+// A ball that holds the shape.
+void enclose(Shape &shape) {
+  Eigen::AlignedBox3d box;
+  for (const Place &place : shape.places) box.extend(place.position);
+  if (box.isEmpty()) return;
+  shape.middle = box.center();
+  for (const Place &place : shape.places)
+    shape.radius_m = std::max(shape.radius_m, (place.position - shape.middle).norm());
 }
 
 void ray_of(const Vec3 &from, const Vec3 &direction, RTCRay &ray) {
@@ -111,8 +111,8 @@ bool occluded(RTCScene scene, const Vec3 &from, const Vec3 &target, double slack
 }  // namespace
 
 Scene::Data::~Data() {
-  for (MoverShape &shape : mover_shapes) rtcReleaseScene(shape.scene);
-  if (still) rtcReleaseScene(still);
+  for (Shape &shape : mover_shapes) rtcReleaseScene(shape.scene);
+  if (still.scene) rtcReleaseScene(still.scene);
   if (device) rtcReleaseDevice(device);
 }
 
@@ -142,24 +142,23 @@ bool Scene::commit(std::string &error) {
   if (!d.device) d.device = rtcNewDevice(kDeviceAny);
   if (!d.device) return error = "Embree has no device for this machine", false;
 
-  for (const Material &m : d.materials) d.surfaces.push_back(surface(m));
-  auto facets_of = [&](const std::vector<Triangle> &triangles, const std::vector<uint32_t> &materials) {
-    std::vector<Facet> facets;
-    facets.reserve(triangles.size());
-    for (size_t i = 0; i < triangles.size(); i++)
-      facets.push_back(facet(triangles[i], materials[i], d.materials[materials[i]]));
-    return facets;
-  };
   std::vector<Triangle> triangles;
   std::vector<uint32_t> materials;
-  for (const Mesh &mesh : d.meshes) split(mesh, light_cell_m, triangles, materials);
-  d.still = tree(d.device, triangles);
-  d.facets = facets_of(triangles, materials);
-  light_facets(*this, d.still, triangles, d.facets);
-  for (const Mover &mover : d.movers) {
+  const auto finish = [&](Shape &shape) {
+    shape.scene = tree(d.device, triangles);
+    shape.pieces.reserve(triangles.size());
+    for (size_t i = 0; i < triangles.size(); i++)
+      shape.pieces.push_back(piece(triangles[i], materials[i], d.materials[materials[i]]));
+    find_places(triangles, shape);
     triangles.clear(), materials.clear();
+  };
+  for (const Mesh &mesh : d.meshes) split(mesh, light_cell_m, triangles, materials);
+  finish(d.still);
+  light_places(*this, d.still.scene, d.still.places);
+  for (const Mover &mover : d.movers) {
     split(mover.mesh, 0, triangles, materials);
-    d.mover_shapes.push_back({tree(d.device, triangles), facets_of(triangles, materials)});
+    finish(d.mover_shapes.emplace_back());
+    enclose(d.mover_shapes.back());
   }
   if (const RTCError code = rtcGetDeviceError(d.device); code != RTC_ERROR_NONE)
     return error = "Embree failed with its code " + std::to_string(code) + " (2: argument, 4: memory)", false;
@@ -177,7 +176,7 @@ Hit Scene::cast(const Vec3 &from, const Vec3 &direction) const {
   ray_of(from, unit, ray.ray);
   ray.ray.tfar = INFINITY;
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(data_->still, &context, &ray);
+  rtcIntersect1(data_->still.scene, &context, &ray);
   Hit out;
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return out;
   out.there = true;
@@ -187,12 +186,12 @@ Hit Scene::cast(const Vec3 &from, const Vec3 &direction) const {
       Vec3(static_cast<double>(ray.hit.Ng_x), static_cast<double>(ray.hit.Ng_y), static_cast<double>(ray.hit.Ng_z))
           .normalized();
   if (out.normal.dot(unit) > 0) out.normal = -out.normal;
-  out.material = data_->facets[ray.hit.primID].material;
+  out.material = data_->still.pieces[ray.hit.primID].material;
   return out;
 }
 
 bool Scene::visible(const Vec3 &from, const Vec3 &target, double slack_m) const {
-  return !occluded(data_->still, from, target, slack_m);
+  return !occluded(data_->still.scene, from, target, slack_m);
 }
 
 bool Scene::visible(const Vec3 &from, const Vec3 &target, int64_t t_ns, double slack_m) const {
@@ -204,6 +203,6 @@ bool Scene::visible(const Vec3 &from, const Vec3 &target, int64_t t_ns, double s
   return true;
 }
 
-size_t Scene::triangle_count() const { return data_->facets.size(); }
+size_t Scene::triangle_count() const { return data_->still.pieces.size(); }
 
 }  // namespace wm::render

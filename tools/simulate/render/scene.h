@@ -62,8 +62,6 @@ struct Sun {
 // Seen where nothing stands.
 struct Sky {
   Colour zenith{0.02f}, horizon{0.02f}, ground{0.02f};
-  std::shared_ptr<const Texture>
-      panorama;  // instead of the above; s: azimuth from -pi to pi, t: from straight down to up
 };
 
 struct Water {

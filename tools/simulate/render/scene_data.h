@@ -6,38 +6,44 @@
 
 #include <vector>
 
-#include "simulate/render/sampler.h"
 #include "simulate/render/scene.h"
 
 namespace wm::render {
 
-// What a hit needs to be shaded, in two cache lines. `light`: for the side of the normal and for the other, at the
-// three corners: lamps' irradiance (red, green, blue) and the open share of the surroundings.
-struct alignas(64) Facet {
-  float4 light[2][3];
+// How a place of a surface is lit: the side of its normal, and the other.
+struct Lit {
+  Colour lamps[2];  // irradiance / pi of lamps and sun
+  float open[2];    // share of the surroundings that is seen
+};
+
+// A corner of triangles; neighbours with the same normal share it.
+struct Place {
+  Vec3 position, normal;
+  Vec3 inwards;  // sum of the ways to the middles of its triangles: away from walls it stands at
+  Lit lit;
+};
+
+// A triangle as it is shaded.
+struct Piece {
+  std::array<uint32_t, 3> places;
   float s[3], t[3];  // texture coordinates at the corners
+  Vec3 normal;
   float span_per_m;  // texture widths a metre on the surface
   uint32_t material;
 };
-static_assert(sizeof(Facet) == 128);
 
-struct Surface {
-  float4 albedo, emission;
-  const Texture *texture;
-  float mirror, glance, roughness;
-  bool emits;
-};
-
-struct MoverShape {
+struct Shape {
   RTCScene scene = nullptr;
-  std::vector<Facet> facets;
+  std::vector<Piece> pieces;  // by primID
+  std::vector<Place> places;
+  Vec3 middle{0, 0, 0};  // movers: of a ball that holds it
+  double radius_m = 0;
 };
 
 struct Scene::Data {
   ~Data();
 
   RTCDevice device = nullptr;
-  RTCScene still = nullptr;
   bool committed = false;
 
   std::vector<Material> materials;
@@ -46,9 +52,8 @@ struct Scene::Data {
   std::vector<Mover> movers;
   std::vector<HeadLamp> head_lamps;
 
-  std::vector<Surface> surfaces;
-  std::vector<Facet> facets;  // of `still`, by primID
-  std::vector<MoverShape> mover_shapes;
+  Shape still;
+  std::vector<Shape> mover_shapes;
 };
 
 // A triangle on its way into the scene: corners with what belongs to them.
@@ -67,8 +72,11 @@ void split(const Mesh &mesh, double cell_m, std::vector<Triangle> &triangles, st
 Colour lamp_light(const Scene &scene, RTCScene still, const Vec3 &point, const Vec3 &normal);
 // Share of the surroundings that a point sees within the ambient's contact_m.
 float open_share(const Ambient &ambient, RTCScene still, const Vec3 &point, const Vec3 &normal);
-// Fills Facet::light of every facet; two threads.
-void light_facets(const Scene &scene, RTCScene still, const std::vector<Triangle> &triangles,
-                  std::vector<Facet> &facets);
+// Finds the places of the triangles, which become the shape's pieces' corners.
+void find_places(const std::vector<Triangle> &triangles, Shape &shape);
+// Lights them, with shadows; two threads.
+void light_places(const Scene &scene, RTCScene still, std::vector<Place> &places);
+// How a mover's places are lit where it is: without shadows, and lamps as if they were points.
+void light_mover(const Scene &scene, const Shape &shape, const Pose &T_map_mover, std::vector<Lit> &out);
 
 }  // namespace wm::render

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "simulate/render/sampler.h"
-
 namespace wm::render {
 
 namespace {
@@ -53,7 +51,42 @@ Picture enlarged(const Picture &from, int times) {
   return out;
 }
 
+// Appends a channel, with its first column and row once more at the ends (clamped: the last ones).
+template <class Value>
+void append(const Picture &from, Wrap wrap, std::vector<uint16_t> &plane, Value value) {
+  const auto edge = [&](int i, int n) { return i < n ? i : wrap == Wrap::repeat ? 0 : n - 1; };
+  for (int y = 0; y <= from.height; y++)
+    for (int x = 0; x <= from.width; x++) {
+      const float v = std::clamp(value(edge(x, from.width), edge(y, from.height)), 0.0f, 1.0f);
+      plane.push_back(static_cast<uint16_t>(v * 65535.0f + 0.5f));
+    }
+}
+
+float value_at(const std::vector<uint16_t> &plane, const TextureLevel &level, bool repeat, double s, double t) {
+  const auto in = [&](double v) { return repeat ? v - std::floor(v) : v; };
+  const auto place = [&](double v, int n, int &i) {
+    if (!repeat) v = std::clamp(v, 0.0, n - 1.0);
+    const double whole = std::floor(v);
+    i = whole < 0 ? n - 1 : std::min(static_cast<int>(whole), n - 1);
+    return v - whole;
+  };
+  int x = 0, y = 0;
+  const double fx = place(in(s)*level.width - 0.5, level.width, x);
+  const double fy = place((1 - in(t)) * level.height - 0.5, level.height, y);
+  const uint16_t *at = plane.data() + level.first + static_cast<ptrdiff_t>(y) * level.stride + x;
+  const double upper = at[0] + (at[1] - at[0]) * fx;
+  const double lower = at[level.stride] + (at[level.stride + 1] - at[level.stride]) * fx;
+  return static_cast<float>((upper + (lower - upper) * fy) / 65535);
+}
+
 }  // namespace
+
+void Texture::add_level(const Picture &level) {
+  levels_.push_back({level.width, level.height, level.width + 1, static_cast<uint32_t>(grey_.size())});
+  append(level, wrap_, grey_, [&](int x, int y) { return level.colour(x, y).grey(); });
+  for (int c = 0; level.channels == 3 && c < 3; c++)
+    append(level, wrap_, colour_[c], [&](int x, int y) { return level.at(x, y, c); });
+}
 
 std::shared_ptr<const Texture> Texture::make(const Picture &picture, Wrap wrap) {
   if (picture.width < 1 || picture.height < 1) return nullptr;
@@ -62,24 +95,35 @@ std::shared_ptr<const Texture> Texture::make(const Picture &picture, Wrap wrap) 
   constexpr int kSharp = 512;
   const int times = wrap == Wrap::clamp ? std::max(kSharp / std::max(picture.width, picture.height), 1) : 1;
   for (Picture level = times > 1 ? enlarged(picture, times) : picture;; level = halved(level)) {
-    Level packed{level.width, level.height, {}};
-    packed.rgb0.reserve(static_cast<size_t>(level.width) * static_cast<size_t>(level.height) * 4);
-    for (int y = 0; y < level.height; y++) {
-      for (int x = 0; x < level.width; x++) {
-        const Colour c = level.colour(x, y);
-        for (float v : {c.r, c.g, c.b, 0.0f})
-          packed.rgb0.push_back(static_cast<uint16_t>(std::lround(std::clamp(v, 0.0f, 1.0f) * 32767.0f)));
-      }
-    }
-    out->levels_.push_back(std::move(packed));
+    out->add_level(level);
     if (level.width == 1 && level.height == 1) break;
   }
   return out;
 }
 
+TextureView Texture::grey() const {
+  return {
+      levels_.data(), static_cast<int>(levels_.size()) - 1, wrap_ == Wrap::repeat, {grey_.data(), nullptr, nullptr}};
+}
+
+TextureView Texture::colour() const {
+  TextureView view = grey();
+  for (size_t c = 0; c < 3; c++) view.plane[c] = colour_[c].empty() ? grey_.data() : colour_[c].data();
+  return view;
+}
+
 Colour Texture::sample(float s, float t, float span) const {
-  const float4 c = TextureSampler::sample(*this, s, t, span);
-  return {c[0], c[1], c[2]};
+  const double level = std::max(0.0, std::log2(std::max(double(span) * width(), 1e-6)));
+  const auto last = levels_.size() - 1, fine = std::min(static_cast<size_t>(level), last);
+  const auto share = static_cast<float>(fine < last ? level - static_cast<double>(fine) : 0);
+  float out[3];
+  for (size_t c = 0; c < 3; c++) {
+    const std::vector<uint16_t> &plane = colour_[c].empty() ? grey_ : colour_[c];
+    const bool repeat = wrap_ == Wrap::repeat;
+    out[c] = value_at(plane, levels_[fine], repeat, double(s), double(t));
+    if (share > 0) out[c] += (value_at(plane, levels_[fine + 1], repeat, double(s), double(t)) - out[c]) * share;
+  }
+  return {out[0], out[1], out[2]};
 }
 
 }  // namespace wm::render

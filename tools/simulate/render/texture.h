@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "simulate/render/texture_view.h"
 #include "simulate/render/types.h"
 
 namespace wm::render {
@@ -49,8 +50,9 @@ enum class Wrap { repeat, clamp };
 // What a surface looks up. Never changes once made; any thread.
 class Texture {
  public:
-  // Copies the picture and makes its pyramid: about 11 bytes a pixel. Values are cut to [0, 1]. A clamped picture under
-  // 256 pixels (a marker, a small sign) is enlarged by repeating pixels, so that their edges stay sharp.
+  // Copies the picture and makes its pyramid: about 3 bytes a pixel, with colour 11. Values are cut to [0, 1]. A
+  // clamped picture under 256 pixels (a marker, a small sign) is enlarged by repeating pixels, so that their edges stay
+  // sharp.
   static std::shared_ptr<const Texture> make(const Picture &picture, Wrap wrap = Wrap::repeat);
 
   int width() const { return levels_.front().width; }
@@ -59,15 +61,16 @@ class Texture {
   // square of `span` of the picture's width. Linear between pixels and between levels.
   Colour sample(float s, float t, float span) const;
 
- private:
-  struct Level {
-    int width, height;
-    std::vector<uint16_t> rgb0;  // four values a pixel: one 8-byte load
-  };
-  Wrap wrap_ = Wrap::repeat;
-  std::vector<Level> levels_;
+  // What the renderer's inner loop reads, as grey or in colour; lives as long as the texture.
+  TextureView grey() const;
+  TextureView colour() const;
 
-  friend struct TextureSampler;
+ private:
+  void add_level(const Picture &level);
+
+  Wrap wrap_ = Wrap::repeat;
+  std::vector<TextureLevel> levels_;
+  std::vector<uint16_t> grey_, colour_[3];  // without colour there is grey alone
 };
 
 }  // namespace wm::render
