@@ -354,6 +354,15 @@ wm_status wm_video_skip(wm_video *self, wm_error *err) {
   return WM_OK;
 }
 
+wm_status wm_video_skip_to(wm_video *self, wm_time_ns now_ns, wm_error *err) {
+  wm_status status;
+  while ((status = locate(self, err)) == WM_OK && self->has_ahead && arrival_of(&self->ahead) <= now_ns) {
+    self->next.there = 0;
+    self->counts.skipped++;
+  }
+  return status == WM_END ? WM_OK : status;
+}
+
 // ── opening ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 // A camera of unknown size has that of its first picture.

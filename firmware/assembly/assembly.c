@@ -72,6 +72,20 @@ static wm_status add_map(wm_assembly *self, wm_recording *recording, wm_error *e
   return wm_recording_map(recording, &self->setup.map, err);
 }
 
+static wm_status add_vision(wm_assembly *self, wm_recording *recording, wm_error *err) {
+  const wm_config *config = self->config;
+  for (size_t i = 0; i < config->vision_count; i++)
+    if (!(config->vision[i].detector->gives & config->estimator->takes))
+      leave_out(self, config->vision[i].detector->name, "the estimator doesn't take what it says");
+  wm_status status = wm_vision_open(config, recording, NULL, NULL, &self->vision, err);
+  for (size_t i = 0; status == WM_OK && i < wm_vision_count(self->vision); i++) {
+    if (self->source_count == WM_SOURCES_MAX)
+      return wm_fail(err, WM_FULL, "%s: more than %d sources", config->path, WM_SOURCES_MAX);
+    add_source(self, wm_vision_source(self->vision, i));
+  }
+  return status;
+}
+
 wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t seed, wm_assembly *out,
                       wm_error *err) {
   memset(out, 0, sizeof *out);
@@ -93,6 +107,8 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   size_t count;
   wm_source *const *sources = wm_recording_sources(recording, &count);
   for (size_t i = 0; i < count && i < WM_SOURCES_MAX; i++) add_source(out, sources[i]);
+  status = add_vision(out, recording, err);
+  if (status != WM_OK) return status;
   if (!(out->kinds & WM_MOTION_EVENTS))
     return wm_fail(err, WM_BAD_CONFIG, "%s: no motion: %s is there or used; the pose can't be carried on without one",
                    wm_recording_dir(recording),
@@ -101,6 +117,11 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   out->driving = wm_driving_choose(out->kinds, wm_recording_quantities(recording));
   status = check_motion(out, wm_recording_quantities(recording), err);
   return status == WM_OK ? check_estimator(out, err) : status;
+}
+
+void wm_assembly_close(wm_assembly *self) {
+  wm_vision_close(self->vision);
+  self->vision = NULL;
 }
 
 const char *wm_assembly_source_name(const wm_assembly *self, size_t source) {

@@ -99,11 +99,25 @@ static wm_status print_source(const wm_assembled_source *s, wm_error *err) {
   return WM_OK;
 }
 
+// Says how much memory a replay takes, and takes it: detectors need theirs to read their sources.
+static wm_status take_memory(wm_assembly *assembly, wm_arena *arena, wm_error *err) {
+  static wm_pipeline pipeline;
+  wm_arena_need needs[WM_PIPELINE_NEEDS + WM_VISION_NEEDS];
+  wm_pipeline_needs(&pipeline, assembly, needs);
+  size_t count = WM_PIPELINE_NEEDS + wm_vision_needs(assembly->vision, needs + WM_PIPELINE_NEEDS);
+  (void)printf("memory       %.2f MB:", (double)wm_arena_sum(needs, count) * 1e-6);
+  for (size_t i = 0; i < count; i++) (void)printf(" %s %.3f", needs[i].name, (double)needs[i].bytes * 1e-6);
+  (void)putchar('\n');
+  wm_status status = wm_arena_fill(arena, needs, count, 0, err);
+  return status == WM_OK ? wm_vision_start(assembly->vision, err) : status;
+}
+
 static wm_status check_recording(const wm_config *config, const char *dir, wm_error *err) {
   wm_recording *recording;
   wm_status status = wm_recording_open(dir, &config->overrides, print_note, NULL, &recording, err);
   if (status != WM_OK) return status;
   static wm_assembly assembly;
+  wm_arena arena = {0};
   status = wm_assemble(config, recording, 1, &assembly, err);
   if (status == WM_OK) {
     (void)printf("recording    %s", wm_recording_name(recording));
@@ -115,17 +129,13 @@ static wm_status check_recording(const wm_config *config, const char *dir, wm_er
     print_start(&assembly.setup.start);
     print_quantities(wm_recording_quantities(recording));
     print_driving(&assembly.driving);
-    static wm_pipeline pipeline;
-    wm_arena_need needs[WM_PIPELINE_NEEDS];
-    wm_pipeline_needs(&pipeline, &assembly, needs);
-    (void)printf("memory       %.2f MB:", (double)wm_arena_sum(needs, WM_PIPELINE_NEEDS) * 1e-6);
-    for (size_t i = 0; i < WM_PIPELINE_NEEDS; i++)
-      (void)printf(" %s %.3f", needs[i].name, (double)needs[i].bytes * 1e-6);
-    (void)putchar('\n');
+    status = take_memory(&assembly, &arena, err);
     for (size_t i = 0; status == WM_OK && i < assembly.source_count; i++)
       status = print_source(&assembly.sources[i], err);
     for (size_t i = 0; i < assembly.unused_count; i++) (void)printf("not used     %s\n", assembly.unused[i]);
   }
+  wm_assembly_close(&assembly);
+  wm_arena_close(&arena);
   wm_recording_close(recording);
   return status;
 }

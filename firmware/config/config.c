@@ -9,6 +9,7 @@
 #include "devices.h"
 #include "keys.h"
 #include "sources.h"
+#include "vision.h"
 #include "waymark/text.h"
 #include "waymark/yaml.h"
 
@@ -152,6 +153,7 @@ static wm_status read_all(const wm_yaml_node *root, int files_must_be_there, wm_
   if (status == WM_OK) status = allocate(out, err);
   if (status == WM_OK) status = read_sections(root, out, err);
   if (status == WM_OK) status = config_read_sources(root, out, err);
+  if (status == WM_OK) status = config_read_vision(root, out, err);
   if (status == WM_OK) status = read_files(root, files_must_be_there, out, err);
   if (status == WM_OK) status = config_read_devices(root, out, err);
   if (status == WM_OK) status = read_texts(root, out, err);
@@ -204,7 +206,9 @@ void wm_config_free(wm_config *config) {
   free(config->text);
   free(config->estimator_params);
   free(config->motion);
+  for (size_t i = 0; i < config->vision_count; i++) free(config->vision[i].params);
   config->text = NULL;
   config->estimator_params = NULL;
   config->motion = NULL;
+  config->vision_count = 0;
 }

@@ -23,6 +23,10 @@ const config_key kConfigKeys[] = {
     {"initial_pose", "map", "the recording's",
      "Start pose: `t_ns`, `x_m`, `y_m`, `z_m`, `heading_rad` or `heading_deg`, `qx`, `qy`, `qz`, `qw`, `sigma_xy_m`, "
      "`sigma_heading_rad` or `sigma_heading_deg`; what is absent is unknown."},
+    {"vision", "map", "none",
+     "Detectors that look at pictures, each with its parameters: `{edges: {}}`. See below. Beside them `cameras: "
+     "[NAME]` "
+     "says at whose; without it at those of all cameras that have any."},
     {"publish.lcm_url", "text", "LCM's own", "LCM provider, e.g. `udpm://239.255.76.67:7667?ttl=0`."},
     {"publish.channel_prefix", "text", "WAYMARK_", "What each channel's name begins with."},
     {NULL, NULL, NULL, NULL},
@@ -31,7 +35,7 @@ const config_key kConfigKeys[] = {
 const config_key kConfigSourceKeys[] = {
     {"name", "text", "needed",
      "`can`, `motion`, `motion6`, `sightings`, `markers`, `stereo`, `points` or `gnss`; `sightings:SENSOR` for one "
-     "sensor."},
+     "sensor; a detector under `vision`, or `DETECTOR:CAMERA`."},
     {"use", "true or false", "true", "false: the source is not opened."},
     {"lateness_max_ms", "number from 0 to merge.horizon_ms", "merge.lateness_max_ms",
      "ms. A datum that arrives later than this after its stamp is late, and dropped."},
@@ -67,13 +71,19 @@ const config_key kConfigCameraDeviceKeys[] = {
 };
 
 size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]) {
-  out[0] = (config_section){"runtime", "", &wm_runtime_params_table};
-  out[1] = (config_section){"motion", "motion.", &wm_motion_params_table};
+  out[0] = (config_section){"runtime", "", "", &wm_runtime_params_table};
+  out[1] = (config_section){"motion", "", "motion.", &wm_motion_params_table};
   size_t count = 2, estimators;
   const wm_estimator *const *all = wm_estimators(&estimators);
   for (size_t i = 0; i < estimators && count < CONFIG_SECTIONS_MAX; i++, count++) {
-    out[count] = (config_section){all[i]->name, "", &all[i]->params};
+    out[count] = (config_section){all[i]->name, all[i]->about, "", &all[i]->params};
     snprintf(out[count].prefix, sizeof out[count].prefix, "%s.", all[i]->name);
+  }
+  size_t detectors;
+  const wm_detector *const *seen = wm_detectors(&detectors);
+  for (size_t i = 0; i < detectors && count < CONFIG_SECTIONS_MAX; i++, count++) {
+    out[count] = (config_section){.name = seen[i]->name, .about = seen[i]->about, .table = &seen[i]->params};
+    snprintf(out[count].prefix, sizeof out[count].prefix, "vision.%s.", seen[i]->name);
   }
   return count;
 }
@@ -180,10 +190,16 @@ static int is_group(const wm_param_table *table, const char *key) {
   return 0;
 }
 
+// A detector's cameras stand beside its parameters.
+static int is_cameras(const char *path) {
+  size_t n = strlen(path), tail = strlen(".cameras");
+  return strncmp(path, "vision.", 7) == 0 && n > tail && strcmp(path + n - tail, ".cameras") == 0;
+}
+
 static int is_other_key(const char *path) {
   for (size_t i = 0; kConfigKeys[i].key; i++)
     if (strcmp(kConfigKeys[i].key, path) == 0) return 1;
-  return 0;
+  return is_cameras(path);
 }
 
 static wm_status read_param(const wm_yaml_node *node, const wm_param *param, void *out, wm_error *err) {

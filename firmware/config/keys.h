@@ -20,15 +20,16 @@ extern const config_key kConfigSourceKeys[];
 extern const config_key kConfigCanDeviceKeys[];
 extern const config_key kConfigCameraDeviceKeys[];
 
-// A table and where it stands in the file: `prefix` is "" for the runtime's, else "motion." or "ESTIMATOR.".
+// A table and where it stands in the file: `prefix` is "" for the runtime's, else "motion.", "ESTIMATOR."
+// or "vision.DETECTOR.".
 typedef struct config_section {
-  const char *name;
-  char prefix[WM_NAME_MAX + 2];
+  const char *name, *about;
+  char prefix[WM_NAME_MAX + 10];
   const wm_param_table *table;
 } config_section;
 
 #define CONFIG_SECTIONS_MAX 32
-// All tables: the runtime's, motion's, each registered estimator's. Returns how many there are.
+// All tables: the runtime's, motion's, each registered estimator's and detector's. Returns how many there are.
 size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]);
 
 // "FILE:LINE: KEY: unknown key" with the known key that was most likely meant. WM_BAD_CONFIG.

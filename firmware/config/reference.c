@@ -2,6 +2,7 @@
 // Prints what a configuration may hold, from the tables that read it.
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 #include "keys.h"
 
@@ -64,7 +65,8 @@ void wm_config_reference(FILE *to) {
   fprintf(to, "\n## `motion`\n\n");
   print_table(to, &sections[1]);
   for (size_t i = 2; i < count; i++) {
-    fprintf(to, "\n## `%s`\n\n%s\n\n", sections[i].name, wm_estimator_find(sections[i].name)->about);
+    int is_vision = strncmp(sections[i].prefix, "vision.", 7) == 0;
+    fprintf(to, "\n## `%s%s`\n\n%s\n\n", is_vision ? "vision." : "", sections[i].name, sections[i].about);
     print_table(to, &sections[i]);
   }
 }

@@ -22,6 +22,12 @@ void wm_histogram_add(wm_histogram *self, wm_time_ns duration_ns) {
   if (duration_ns > self->max_ns) self->max_ns = duration_ns;
 }
 
+void wm_histogram_merge(wm_histogram *self, const wm_histogram *other) {
+  for (unsigned bin = 0; bin < WM_HISTOGRAM_BINS; bin++) self->bins[bin] += other->bins[bin];
+  self->count += other->count;
+  if (other->max_ns > self->max_ns) self->max_ns = other->max_ns;
+}
+
 wm_time_ns wm_histogram_quantile(const wm_histogram *self, double quantile) {
   if (self->count == 0) return 0;
   uint64_t rank = (uint64_t)(quantile * (double)self->count);

@@ -30,11 +30,12 @@ typedef struct replay {
 // ── start ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static wm_status take_memory(replay *self, wm_error *err) {
-  wm_arena_need needs[WM_PIPELINE_NEEDS + 1];
+  wm_arena_need needs[WM_PIPELINE_NEEDS + 1 + WM_VISION_NEEDS];
+  size_t count = WM_PIPELINE_NEEDS;
   wm_pipeline_needs(&self->pipeline, &self->assembly, needs);
-  needs[WM_PIPELINE_NEEDS] =
-      (wm_arena_need){"feeds", self->assembly.source_count * sizeof(wm_feed), (void **)&self->feeds};
-  return wm_arena_fill(&self->arena, needs, WM_PIPELINE_NEEDS + 1, 0, err);
+  needs[count++] = (wm_arena_need){"feeds", self->assembly.source_count * sizeof(wm_feed), (void **)&self->feeds};
+  count += wm_vision_needs(self->assembly.vision, needs + count);
+  return wm_arena_fill(&self->arena, needs, count, 0, err);
 }
 
 static void begin_steady(replay *self) {
@@ -111,7 +112,11 @@ static wm_status write_summary(replay *self, wm_run_report *report, wm_error *er
   report->allocations_after_start = self->allocations;
   report->page_faults_after_start = self->page_faults;
 
-  const wm_timing_stage stages[] = {{"arrive", &self->pipeline.arrive_ns},
+  wm_histogram decode_ns, detect_ns;
+  wm_vision_times(self->assembly.vision, &decode_ns, &detect_ns);
+  const wm_timing_stage stages[] = {{"decode", &decode_ns},
+                                    {"detect", &detect_ns},
+                                    {"arrive", &self->pipeline.arrive_ns},
                                     {"predict", &self->pipeline.fuser.predict_ns},
                                     {"correct", &self->pipeline.fuser.correct_ns},
                                     {"publish", &self->pipeline.publish_ns}};
@@ -135,6 +140,8 @@ static wm_status run(replay *self, const wm_config *config, wm_recording *record
   self->output = wm_run_folder_output(self->folder);
   self->publish_ns = wm_ns_from_seconds(1.0 / config->runtime.publish_rate_hz);
   status = wm_pipeline_start(&self->pipeline, self->output, err);
+  if (status == WM_OK) status = wm_vision_start(self->assembly.vision, err);
+  if (status == WM_OK) status = wm_vision_run_ahead(self->assembly.vision, err);
   if (status == WM_OK) status = wm_feeds_open(&self->assembly, self->feeds, 0, &self->first_ns, err);
   if (status != WM_OK) return status;
 
@@ -156,6 +163,7 @@ wm_status wm_replay_recording(const wm_config *config, wm_recording *recording, 
     status = closed;
     if (err) *err = close_error;
   }
+  wm_assembly_close(&self->assembly);
   wm_arena_close(&self->arena);
   free(self);
   return status;

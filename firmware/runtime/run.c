@@ -31,7 +31,7 @@ static void say_nothing(void *context, const char *line) {
 
 // ── memory ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-#define NEEDS_MAX (WM_PIPELINE_NEEDS + 3 + WM_SOURCES_MAX)
+#define NEEDS_MAX (WM_PIPELINE_NEEDS + 3 + WM_SOURCES_MAX + WM_VISION_NEEDS)
 
 static size_t record_bytes(const live *self) { return OUTPUT_RECORD_HEAD + wm_output_bytes(self->assembly.kinds); }
 
@@ -48,6 +48,7 @@ static size_t list_needs(live *self, wm_arena_need needs[NEEDS_MAX]) {
     needs[n++] = (wm_arena_need){self->assembly.sources[i].name, wm_ring_bytes(slots, slot_bytes),
                                  &self->sources[i].ring_memory};
   }
+  n += wm_vision_needs(self->assembly.vision, needs + n);
   return n;
 }
 
@@ -73,6 +74,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   if (status == WM_OK) status = take_memory(self, err);
   if (status == WM_OK) status = wm_pipeline_start(&self->estimator.pipeline, estimator_output(&self->estimator), err);
   wm_time_ns first_ns;
+  if (status == WM_OK) status = wm_vision_start(self->assembly.vision, err);
   if (status == WM_OK) status = wm_feeds_open(&self->assembly, self->feeds, wm_monotonic_ns(), &first_ns, err);
   if (status == WM_OK && self->options->out_dir)
     status = wm_run_folder_open(self->options->out_dir, &self->assembly, &self->sink.folder, err);
@@ -220,7 +222,11 @@ static void fill_report(live *self, wm_live_report *report) {
 static wm_status write_summary(live *self, const wm_live_report *report, wm_error *err) {
   if (!self->sink.folder) return WM_OK;
   const live_estimator *e = &self->estimator;
-  const wm_timing_stage stages[] = {{"wake", &e->wake_ns},
+  wm_histogram decode_ns, detect_ns;
+  wm_vision_times(self->assembly.vision, &decode_ns, &detect_ns);
+  const wm_timing_stage stages[] = {{"decode", &decode_ns},
+                                    {"detect", &detect_ns},
+                                    {"wake", &e->wake_ns},
                                     {"loop", &e->cycle_ns},
                                     {"arrive", &e->pipeline.arrive_ns},
                                     {"predict", &e->pipeline.fuser.predict_ns},
@@ -285,6 +291,7 @@ wm_status wm_run_live(const wm_config *config, wm_recording *recording, const wm
     status = closed;
     if (err) *err = close_error;
   }
+  wm_assembly_close(&self->assembly);
   wm_arena_close(&self->arena);
   free(self);
   return status;

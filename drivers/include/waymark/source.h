@@ -56,6 +56,9 @@ struct wm_source {
   uint8_t in_order;               // promises that its stamps never go back (a file without arrival_ns, a CAN bus)
   uint32_t kinds;                 // WM_EVENT_BIT of what it hands out
   wm_source_counts counts;
+  // NULL where everything is to be told. Pictures are large and take long: those that aren't the newest any more at
+  // `now_ns`, on the clock of the arrivals, are passed over and counted (overflows).
+  void (*skip_to)(wm_source *self, wm_time_ns now_ns);
 };
 
 #ifdef __cplusplus

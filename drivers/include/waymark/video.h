@@ -24,7 +24,7 @@ extern "C" {
 // Every picture and every row that doesn't become a frame is in one of these.
 typedef struct wm_video_counts {
   uint64_t frames;           // handed out
-  uint64_t skipped;          // passed over on demand (wm_video_skip)
+  uint64_t skipped;          // passed over on demand
   uint64_t lost;             // pictures that are missing by the stamps: gaps of more than 1.5 usual periods
   uint64_t duplicated;       // the same stamp, or the same bytes, as the picture before: a camera that is stuck
   uint64_t empty;            // chunks of length 0
@@ -62,6 +62,10 @@ wm_status wm_video_next(wm_video *self, wm_frame *out, wm_error *err);
 wm_status wm_video_next_into(wm_video *self, uint8_t *grey, uint32_t stride_bytes, wm_frame *out, wm_error *err);
 // Passes over the next picture without reading it; counted. WM_OK, WM_END, WM_IO.
 wm_status wm_video_skip(wm_video *self, wm_error *err);
+
+// Passes over pictures that are no longer the newest at `now_ns` (on the clock of arrival_ns): those whose follower has
+// arrived. Counted as skipped. WM_OK also at the end; WM_IO.
+wm_status wm_video_skip_to(wm_video *self, wm_time_ns now_ns, wm_error *err);
 
 const wm_video_counts *wm_video_counted(const wm_video *self);
 

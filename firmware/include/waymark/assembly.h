@@ -13,6 +13,7 @@
 #include "waymark/merge.h"
 #include "waymark/recording.h"
 #include "waymark/source.h"
+#include "waymark/vision.h"
 
 // A source that is used; its place in the table is the `source` of its events.
 typedef struct wm_assembled_source {
@@ -30,17 +31,21 @@ typedef struct wm_assembly {
   uint32_t kinds;  // of all used sources
   wm_assembled_source sources[WM_SOURCES_MAX];
   size_t source_count;
-  char unused[WM_SOURCES_MAX][WM_SOURCE_NAME_MAX + 64];  // "NAME: why not"
+  char unused[WM_SOURCES_MAX + WM_VISION_MAX][WM_SOURCE_NAME_MAX + 64];  // "NAME: why not"
   size_t unused_count;
   const char *calibration_text;
   size_t calibration_length;
+  wm_vision *vision;                 // sources of pictures; NULL where there are none
   const char *map_path;              // NULL where the estimator takes no map
   char recording[WM_NAME_MAX + 96];  // the recording's name
 } wm_assembly;
 
 // `config` and `recording` outlive the assembly. WM_BAD_CONFIG where they don't go together: no motion, a source named
 // in the configuration that isn't there under any recording's name, an estimator that can't work with this setup.
+// Where it fails, too, wm_assembly_close is to be called.
 wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t seed, wm_assembly *out, wm_error *err);
+// Closes what it opened: the pictures. Before the recording is closed, and before the memory of the run.
+void wm_assembly_close(wm_assembly *self);
 
 // "can", "sightings:laser" ... by index; "?" beyond.
 const char *wm_assembly_source_name(const wm_assembly *self, size_t source);

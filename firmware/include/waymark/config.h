@@ -19,6 +19,7 @@
 //   publish: {rate_hz: 50, ...}
 //   realtime: {priority: 80, ...}
 //   motion: {...}                  # wm_motion_params_table
+//   vision: {edges: {cameras: [front], ...}}   # detectors on pictures, with their tables
 //   landmark_ekf: {...}            # the estimator's own table
 #ifndef WAYMARK_CONFIG_H
 #define WAYMARK_CONFIG_H
@@ -27,6 +28,7 @@
 #include <stdint.h>
 #include <stdio.h>
 
+#include "waymark/detector.h"
 #include "waymark/devices.h"
 #include "waymark/estimator.h"
 #include "waymark/recording.h"
@@ -63,6 +65,17 @@ typedef struct wm_runtime_params {
 } wm_runtime_params;
 extern const wm_param_table wm_runtime_params_table;
 
+#define WM_VISION_MAX 8
+
+// A detector under `vision:`.
+typedef struct wm_vision_config {
+  const wm_detector *detector;
+  void *params;  // detector->params.bytes bytes
+  char cameras[WM_CAMERAS_MAX][WM_NAME_MAX];
+  uint32_t camera_count;  // 0: all that have pictures
+  int line;
+} wm_vision_config;
+
 typedef struct wm_config {
   char path[WM_PATH_MAX];
   char *text;  // the file as read, for the event log
@@ -72,6 +85,8 @@ typedef struct wm_config {
   wm_motion_params *motion;
   wm_runtime_params runtime;
   wm_recording_overrides overrides;
+  wm_vision_config vision[WM_VISION_MAX];
+  size_t vision_count;
   wm_devices_config devices;
   int has_initial_pose;
   wm_start initial_pose;

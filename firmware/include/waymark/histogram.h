@@ -18,6 +18,8 @@ typedef struct wm_histogram {
 
 // Negative durations count as 0. Constant time.
 void wm_histogram_add(wm_histogram *self, wm_time_ns duration_ns);
+// Adds all of `other`.
+void wm_histogram_merge(wm_histogram *self, const wm_histogram *other);
 // Upper edge of the bin in which the quantile (0 to 1) lies, at most the maximum; 0 where nothing was added.
 wm_time_ns wm_histogram_quantile(const wm_histogram *self, double quantile);
 

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures to observations: each detector that the configuration names under `vision:` is a source of events for each
+// of its cameras (or for the stereo pair), called DETECTOR:CAMERA. A picture that shows nothing gives WM_EVENT_LOOKED
+// where the estimator takes that. A detector's state, and the pictures that it looks at, are in the run's memory.
+//
+// In a run the source's own thread decodes and detects, and passes over pictures that have become old meanwhile. In a
+// replay a thread for each source works ahead, a few pictures at most; the order, and the bytes, are the same.
+#ifndef WAYMARK_VISION_H
+#define WAYMARK_VISION_H
+
+#include <stddef.h>
+
+#include "waymark/arena.h"
+#include "waymark/config.h"
+#include "waymark/histogram.h"
+#include "waymark/recording.h"
+#include "waymark/source.h"
+
+#define WM_VISION_SOURCES_MAX 8
+#define WM_VISION_NEEDS (2 * WM_VISION_SOURCES_MAX)
+
+typedef struct wm_vision wm_vision;
+
+// Opens the pictures of the detectors whose observations the estimator takes. WM_BAD_CONFIG: no such camera, or a
+// camera that the detector can't work with. Allocates. *out is NULL where there is nothing to look at.
+wm_status wm_vision_open(const wm_config *config, wm_recording *recording, wm_warn_fn warn, void *context,
+                         wm_vision **out, wm_error *err);
+void wm_vision_close(wm_vision *self);  // NULL is fine; ends its threads
+
+size_t wm_vision_count(const wm_vision *self);  // 0 for NULL
+wm_source *wm_vision_source(wm_vision *self, size_t i);
+
+// The memory that it wants; at most WM_VISION_NEEDS lines. Returns how many.
+size_t wm_vision_needs(wm_vision *self, wm_arena_need *needs);
+// With the memory in place: makes the detectors' tables. Takes a while.
+wm_status wm_vision_start(wm_vision *self, wm_error *err);
+// From here on a thread a source works ahead of who asks for its events. Not for a run.
+wm_status wm_vision_run_ahead(wm_vision *self, wm_error *err);
+
+// How long decoding and detecting take, of all sources together (valid when the threads have ended or the run is over).
+void wm_vision_times(const wm_vision *self, wm_histogram *decode_ns, wm_histogram *detect_ns);
+
+#endif

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vision_source.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "waymark/clock.h"
+
+#define PAIR_TOLERANCE_NS (2 * WM_NS_PER_MS)  // pictures of a pair are triggered together
+
+// What the videos counted, in the terms of a source.
+static void take_counts(vision_source *self) {
+  wm_source_counts *out = &self->counts;
+  out->lost = out->malformed = out->frozen = out->overflows = 0;
+  for (uint32_t i = 0; i < self->detector->pictures; i++) {
+    const wm_video_counts *c = wm_video_counted(self->videos[i]);
+    out->lost += c->lost + c->empty + c->without_picture;
+    out->malformed += c->malformed + c->damaged + c->wrong_size + c->without_stamp;
+    out->frozen += c->duplicated;
+    out->overflows += c->skipped;
+    if (!out->first_problem[0]) (void)snprintf(out->first_problem, sizeof out->first_problem, "%s", c->first_problem);
+  }
+}
+
+// Of a pair, passes over pictures whose other half is missing. The heads of what belongs together into `heads`.
+static wm_status find_together(vision_source *self, wm_frame *heads, wm_error *err) {
+  for (;;) {
+    for (uint32_t i = 0; i < self->detector->pictures; i++) {
+      wm_status status = wm_video_peek(self->videos[i], &heads[i], err);
+      if (status != WM_OK) return status;
+    }
+    if (self->detector->pictures == 1) return WM_OK;
+    wm_time_ns apart_ns = heads[1].t_ns - heads[0].t_ns;
+    if (apart_ns <= PAIR_TOLERANCE_NS && apart_ns >= -PAIR_TOLERANCE_NS) return WM_OK;
+    wm_status status = wm_video_skip(self->videos[apart_ns < 0], err);
+    if (status != WM_OK) return status;
+  }
+}
+
+// Decodes what belongs together. WM_AGAIN where one of a pair turned out to be damaged.
+static wm_status decode(vision_source *self, wm_frame *frames, wm_error *err) {
+  wm_frame heads[PICTURES_MAX] = {0};
+  wm_status status = find_together(self, heads, err);
+  wm_time_ns begin_ns = wm_monotonic_ns();
+  for (uint32_t i = 0; status == WM_OK && i < self->detector->pictures; i++)
+    status = wm_video_next(self->videos[i], &frames[i], err);
+  if (status != WM_OK) return status;
+  wm_histogram_add(&self->decode_ns, wm_monotonic_ns() - begin_ns);
+  if (self->detector->pictures == 1) return WM_OK;
+  wm_time_ns apart_ns = frames[1].t_ns - frames[0].t_ns;
+  return apart_ns <= PAIR_TOLERANCE_NS && apart_ns >= -PAIR_TOLERANCE_NS ? WM_OK : WM_AGAIN;
+}
+
+// Looks at the next picture: self->events, from the first.
+static wm_status look(vision_source *self, wm_error *err) {
+  wm_frame frames[PICTURES_MAX] = {0};
+  self->event_count = self->next_event = 0;
+  wm_status status = decode(self, frames, err);
+  if (status == WM_AGAIN) return WM_OK;
+  if (status != WM_OK) return status;
+  // A camera's pictures come in their order; who goes back has a broken clock.
+  if (self->newest_ns != WM_TIME_NONE && frames[0].t_ns <= self->newest_ns) {
+    self->counts.out_of_order++;
+    return WM_OK;
+  }
+  self->newest_ns = frames[0].t_ns;
+  wm_time_ns arrival_ns = frames[0].arrival_ns;
+  if (self->detector->pictures == 2 && frames[1].arrival_ns > arrival_ns) arrival_ns = frames[1].arrival_ns;
+
+  wm_time_ns begin_ns = wm_monotonic_ns();
+  status = self->detector->detect(self->state, frames, NULL, self->events, self->capacity, &self->event_count);
+  wm_histogram_add(&self->detect_ns, wm_monotonic_ns() - begin_ns);
+  if (status != WM_OK) {
+    self->counts.malformed++;
+    self->event_count = 0;
+    return WM_OK;
+  }
+  if (self->event_count == 0 && self->gives_looked) {
+    wm_event *event = &self->events[self->event_count++];
+    memset(event, 0, WM_EVENT_SMALL_BYTES);
+    event->kind = WM_EVENT_LOOKED;
+    event->t_ns = frames[0].t_ns;
+    event->as.looked.sensor = self->sensor;
+  }
+  for (size_t i = 0; i < self->event_count; i++) {
+    self->events[i].arrival_ns = arrival_ns;
+    self->events[i].source = self->base.index;
+    self->events[i].seq = self->seq++;
+    self->events[i].reserved = 0;
+  }
+  return WM_OK;
+}
+
+wm_status vision_next(vision_source *self, wm_event *out, wm_error *err) {
+  while (self->next_event == self->event_count) {
+    wm_status status = look(self, err);
+    take_counts(self);
+    if (status != WM_OK) return status;
+  }
+  const wm_event *event = &self->events[self->next_event++];
+  memcpy(out, event, wm_event_bytes(event));
+  self->counts.received++;
+  return WM_OK;
+}
+
+void vision_skip_to(vision_source *self, wm_time_ns now_ns) {
+  if (self->next_event < self->event_count) return;  // of a picture that was looked at
+  for (uint32_t i = 0; i < self->detector->pictures; i++) (void)wm_video_skip_to(self->videos[i], now_ns, NULL);
+  take_counts(self);
+}

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// One detector on one camera, or on a pair: a source of events.
+#ifndef WM_FIRMWARE_VISION_SOURCE_H
+#define WM_FIRMWARE_VISION_SOURCE_H
+
+#include <pthread.h>
+
+#include "waymark/detector.h"
+#include "waymark/video.h"
+#include "waymark/vision.h"
+
+#define PICTURES_MAX 2
+#define AHEAD_EVENTS 8
+
+typedef struct vision_source vision_source;
+
+// Events that a thread made ahead of who asks for them.
+typedef struct vision_ahead {
+  pthread_t thread;
+  pthread_mutex_t lock;
+  pthread_cond_t changed;
+  int started, stop, ended;
+  size_t first, count;
+  wm_event *events;  // AHEAD_EVENTS
+  wm_status status;  // at the end
+  wm_error error;
+  wm_source_counts counts;  // as they were with the newest event
+} vision_ahead;
+
+struct vision_source {
+  wm_source base;
+  const wm_detector *detector;
+  const void *params;
+  wm_view view;
+  int32_t cameras[PICTURES_MAX];
+  wm_video *videos[PICTURES_MAX];
+  uint16_t sensor;  // of WM_EVENT_LOOKED
+  int gives_looked;
+  size_t state_bytes, capacity;
+  void *state, *events_memory;
+  wm_event *events;  // of the newest picture: `capacity`, then those made ahead
+  size_t event_count, next_event;
+  wm_time_ns newest_ns;
+  uint32_t seq;
+  wm_source_counts counts;  // the working thread's own
+  wm_histogram decode_ns, detect_ns;
+  vision_ahead ahead;
+};
+
+// The next event, by the thread that calls.
+wm_status vision_next(vision_source *self, wm_event *out, wm_error *err);
+// Passes over pictures that are no longer the newest at `now_ns`.
+void vision_skip_to(vision_source *self, wm_time_ns now_ns);
+
+wm_status vision_ahead_start(vision_source *self, wm_error *err);
+void vision_ahead_stop(vision_source *self);
+wm_status vision_ahead_next(vision_source *self, wm_event *out, wm_error *err);
+
+#endif

@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+// Detectors as sources: pictures in, events out, in their order, whoever works ahead; what is asked for and isn't
+// there.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <turbojpeg.h>
+
+#include "../drivers/folder.h"
+#include "unity.h"
+#include "waymark/vision.h"
+
+#define W 320
+#define H 180
+#define FRAMES 12
+
+static char dir[256];
+static wm_error err;
+static wm_config config;
+static wm_recording *recording;
+static wm_estimator taker;
+static wm_vision *vision;
+static wm_arena arena;
+
+static void write_jpeg(const char *name, const uint8_t *pixels) {
+  tjhandle handle = tjInitCompress();
+  unsigned char *made = NULL;
+  unsigned long size = 0;
+  TEST_ASSERT_EQUAL(0, tjCompress2(handle, pixels, W, 0, H, TJPF_GRAY, &made, &size, TJSAMP_GRAY, 95, 0));
+  folder_write_bytes(name, (const char *)made, size);
+  tjFree(made);
+  (void)tjDestroy(handle);
+}
+
+// A floor that ends in row 90 + i, or nothing at all in every third picture.
+static void write_pictures(const char *camera) {
+  static uint8_t pixels[W * H];
+  char name[64], csv[1024] = "frame,t_ns,exposure_ns,arrival_ns\n", row[80];
+  (void)snprintf(name, sizeof name, "video/%s", camera);
+  (void)mkdir(folder_path(name), 0777);
+  for (int i = 0; i < FRAMES; i++) {
+    for (int k = 0; k < W * H; k++) pixels[k] = (uint8_t)(i % 3 == 2 ? 100 + i : k / W < 90 + i ? 60 : 150);
+    (void)snprintf(name, sizeof name, "video/%s/%06d.jpg", camera, i);
+    write_jpeg(name, pixels);
+    (void)snprintf(row, sizeof row, "%d,%d,0,%d\n", i, 100000000 * (i + 1), 100000000 * (i + 1) + 30000000);
+    (void)strcat(csv, row);
+  }
+  (void)snprintf(name, sizeof name, "video/%s.csv", camera);
+  folder_write(name, csv);
+}
+
+#define CAMERA(name)                                                           \
+  "  " name                                                                    \
+  ": {model: equidistant, size: [320, 180], intrinsics: [130, 130, 160, 90], " \
+  "distortion: [0, 0, 0, 0], mounting: {xyz_m: [0.5, 0, 0.4], rpy_deg: [0, 22, 0]}}\n"
+
+void setUp(void) {
+  (void)snprintf(dir, sizeof dir, "%s", folder_make());
+  (void)mkdir(folder_path("video"), 0777);
+  folder_write("recording.yaml", "format: waymark-recording/1\n");
+  folder_write("motion.csv", "t_ns,v_mps,w_radps\n0,0,0\n");
+  folder_write("calibration.yaml", "cameras:\n" CAMERA("front") CAMERA("rear"));
+  write_pictures("front");
+  write_pictures("rear");
+  memset(&config, 0, sizeof config);
+  recording = NULL;
+  vision = NULL;
+  memset(&arena, 0, sizeof arena);
+}
+
+void tearDown(void) {
+  char command[400];
+  wm_vision_close(vision);
+  wm_recording_close(recording);
+  wm_config_free(&config);
+  wm_arena_close(&arena);
+  (void)snprintf(command, sizeof command, "rm -r '%s'", dir);
+  TEST_ASSERT_EQUAL(0, system(command));
+}
+
+static void parse(const char *section, uint32_t takes) {
+  char text[512];
+  (void)snprintf(text, sizeof text, "format: waymark-config/1\nestimator: odometry\n%s", section);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, strlen(text), "test.yaml", &config, &err), err.text);
+  taker = *config.estimator;
+  taker.takes |= takes;
+  config.estimator = &taker;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_recording_open(dir, NULL, NULL, NULL, &recording, &err), err.text);
+}
+
+static void open_it(const char *section, uint32_t takes) {
+  wm_arena_need needs[WM_VISION_NEEDS];
+  parse(section, takes);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_vision_open(&config, recording, NULL, NULL, &vision, &err), err.text);
+  size_t count = wm_vision_needs(vision, needs);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_arena_fill(&arena, needs, count, 0, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_vision_start(vision, &err), err.text);
+}
+
+#define POINTS WM_EVENT_BIT(WM_EVENT_POINTS)
+#define LOOKED WM_EVENT_BIT(WM_EVENT_LOOKED)
+
+// All events of the source, one after another, as bytes.
+static size_t drain(wm_source *source, uint8_t *out, size_t capacity) {
+  static wm_event event;
+  size_t used = 0;
+  int i = 0;
+  while (source->ops->next(source, &event, &err) == WM_OK) {
+    TEST_ASSERT_EQUAL_INT64(100000000 * (i + 1), event.t_ns);
+    TEST_ASSERT_EQUAL_INT64(event.t_ns + 30000000, event.arrival_ns);
+    TEST_ASSERT_EQUAL(i, event.seq);
+    TEST_ASSERT_EQUAL(i % 3 == 2 ? WM_EVENT_LOOKED : WM_EVENT_POINTS, event.kind);
+    if (event.kind == WM_EVENT_POINTS) TEST_ASSERT_GREATER_THAN(20, event.as.points.count);
+    size_t n = wm_event_bytes(&event);
+    TEST_ASSERT_TRUE(n <= capacity - used);
+    memcpy(out + used, &event, n);
+    used += n;
+    i++;
+  }
+  TEST_ASSERT_EQUAL(FRAMES, i);
+  TEST_ASSERT_EQUAL_UINT64(FRAMES, source->counts.received);
+  return used;
+}
+
+static void events_of_pictures(void) {
+  static uint8_t here[FRAMES * sizeof(wm_event)], ahead[FRAMES * sizeof(wm_event)];
+  open_it("vision: {edges: {cameras: [front], rays: {range_max_m: 5}}}\n", POINTS | LOOKED);
+  TEST_ASSERT_EQUAL(1, wm_vision_count(vision));
+  wm_source *source = wm_vision_source(vision, 0);
+  TEST_ASSERT_EQUAL_STRING("edges:front", source->name);
+  TEST_ASSERT_TRUE(source->in_order);
+  TEST_ASSERT_EQUAL_HEX32(POINTS | LOOKED, source->kinds);
+  size_t bytes = drain(source, here, sizeof here);
+  tearDown();
+  setUp();
+  open_it("vision: {edges: {cameras: [front], rays: {range_max_m: 5}}}\n", POINTS | LOOKED);
+  TEST_ASSERT_EQUAL(WM_OK, wm_vision_run_ahead(vision, &err));
+  TEST_ASSERT_EQUAL(bytes, drain(wm_vision_source(vision, 0), ahead, sizeof ahead));
+  TEST_ASSERT_EQUAL_MEMORY(here, ahead, bytes);
+}
+
+static void ended_in_the_middle(void) {
+  open_it("vision: {edges: {}}\n", POINTS);
+  TEST_ASSERT_EQUAL(2, wm_vision_count(vision));  // both cameras have pictures
+  TEST_ASSERT_EQUAL(WM_OK, wm_vision_run_ahead(vision, &err));
+  static wm_event event;
+  wm_source *source = wm_vision_source(vision, 1);
+  TEST_ASSERT_EQUAL_STRING("edges:rear", source->name);
+  for (int i = 0; i < 3; i++) TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
+  // Nothing is told of a picture with nothing in it to an estimator that doesn't ask for that: 0, 1, 3.
+  TEST_ASSERT_EQUAL_INT64(400000000, event.t_ns);
+}
+
+static void old_pictures_are_passed_over(void) {
+  open_it("vision: {edges: {cameras: [front]}}\n", POINTS);
+  static wm_event event;
+  wm_source *source = wm_vision_source(vision, 0);
+  TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
+  source->skip_to(source, 535000000);  // the fifth has arrived
+  TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
+  TEST_ASSERT_EQUAL_INT64(500000000, event.t_ns);
+  TEST_ASSERT_EQUAL_UINT64(3, source->counts.overflows);
+  source->skip_to(source, INT64_MAX);
+  TEST_ASSERT_EQUAL(WM_END, source->ops->next(source, &event, &err));  // the last one shows nothing
+}
+
+static void only_for_who_takes_it(void) {
+  parse("vision: {edges: {cameras: [front]}}\n", 0);
+  TEST_ASSERT_EQUAL(WM_OK, wm_vision_open(&config, recording, NULL, NULL, &vision, &err));
+  TEST_ASSERT_NULL(vision);
+  TEST_ASSERT_EQUAL(0, wm_vision_count(vision));
+}
+
+static void refused(const char *section, const char *text) {
+  wm_recording_close(recording);
+  wm_config_free(&config);
+  parse(section, POINTS);
+  TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_vision_open(&config, recording, NULL, NULL, &vision, &err));
+  TEST_ASSERT_NULL(vision);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, text), err.text);
+}
+
+static void what_is_not_there(void) {
+  refused("vision: {edges: {cameras: [left]}}\n", "test.yaml:3: vision.edges.cameras: 'left' is no camera");
+  folder_write("calibration.yaml", "cameras:\n" CAMERA("side"));
+  refused("vision: {edges: {}}\n", "has no pictures");
+  folder_write("calibration.yaml",
+               "cameras:\n  front: {model: equidistant, size: [320, 180], intrinsics: [130, 130, 160, 90], "
+               "mounting: {xyz_m: [0.5, 0, 0.4], rpy_deg: [0, -80, 0]}}\n");
+  refused("vision: {edges: {}}\n", "sees no floor");
+}
+
+static void wrong_text(const char *section, const char *text) {
+  char all[512];
+  (void)snprintf(all, sizeof all, "format: waymark-config/1\nestimator: odometry\n%s", section);
+  TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_config_parse(all, strlen(all), "test.yaml", &config, &err));
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, text), err.text);
+}
+
+static void wrong_configurations(void) {
+  wrong_text("vision: {edgs: {}}\n", "did you mean 'vision.edges'");
+  wrong_text("vision: {edges: {rays: {range_max: 5}}}\n", "did you mean 'vision.edges.rays.range_max_m'");
+  wrong_text("vision: {edges: {cameras: front}}\n", "a list of cameras");
+  wrong_text("vision: [edges]\n", "a map of detectors");
+  wrong_text("vision: {edges: {rays: {range_max_m: -1}}}\n", "vision.edges.rays.range_max_m");
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(events_of_pictures);
+  RUN_TEST(ended_in_the_middle);
+  RUN_TEST(old_pictures_are_passed_over);
+  RUN_TEST(only_for_who_takes_it);
+  RUN_TEST(what_is_not_there);
+  RUN_TEST(wrong_configurations);
+  return UNITY_END();
+}
