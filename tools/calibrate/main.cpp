@@ -12,10 +12,12 @@ int main(int argc, char **argv) {
   app.require_subcommand(1);
   app.footer("example: waymark calibrate import camchain.yaml\nwaymark calibrate SUBCOMMAND --help says more.");
   CLI::App *import_app = app.add_subcommand("import", "calibrations of OpenCV, Kalibr, ROS and OCamCalib into ours");
+  CLI::App *camera_app = app.add_subcommand("camera", "a camera's model from pictures of a chessboard or an AprilGrid");
   const auto import = calibrate::import_command(*import_app);
+  const auto camera = calibrate::camera_command(*camera_app);
   try {
     app.parse(argc, argv);
-    return import();
+    return import_app->parsed() ? import() : camera();
   } catch (const CLI::ParseError &problem) {
     return app.exit(problem) == 0 ? tools::kDone : tools::kUsage;
   } catch (const std::exception &problem) {

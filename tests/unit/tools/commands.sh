@@ -74,6 +74,13 @@ expect 2 'not written over' "$bin/waymark-calibrate" import "$dir/camchain.yaml"
 expect 2 'cannot be read' "$bin/waymark-calibrate" import "$dir/nowhere.yaml"
 expect 2 'is a folder' "$bin/waymark-calibrate" import "$dir/rec"
 expect 2 'is not WIDTHxHEIGHT' "$bin/waymark-calibrate" import "$dir/camchain.yaml" --size big
+expect 0 'waymark calibrate camera pictures/' "$bin/waymark-calibrate" camera --help
+expect 2 'no such file or folder' "$bin/waymark-calibrate" camera "$dir/nowhere"
+expect 2 'has no pictures in it' "$bin/waymark-calibrate" camera "$dir/empty"
+expect 2 'waymark import' "$bin/waymark-calibrate" camera "$dir/camchain.yaml"
+expect 2 'is not COLUMNSxROWS' "$bin/waymark-calibrate" camera "$dir/empty" --chessboard nine
+printf 'P5 64 48 255\n%3072s' '' >"$dir/blank.pgm"
+expect 1 'a board was found in 0 of 1 pictures' "$bin/waymark-calibrate" camera "$dir/blank.pgm" --chessboard 9x6
 # What was imported is what eval reads.
 cp "$dir/rec/imported.yaml" "$dir/rec/calibration.yaml"
 expect 1 'front-edges.csv: is not there' "$bin/waymark-eval" "$dir/empty" "$dir/rec" --detector edges

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// Calibration boards in a picture. What a calibration needs is a lattice: corners with whole numbers (column, row).
+// Where the lattice begins and which way it runs doesn't matter, as each view has a pose of its own; so a chessboard
+// that is half out of the picture, or half beyond the lens' rim, counts with what is seen of it.
+#pragma once
+
+#include <vector>
+
+#include "common/grey_picture.h"
+#include "simulate/render/types.h"
+
+namespace wm::calibrate {
+
+using render::Vec2;
+using render::Vec3;
+
+struct BoardCorner {
+  Vec2 pixel;
+  Vec2 board;  // on the board, in squares (chessboard) or metres (AprilGrid)
+};
+
+struct CornerCandidate {
+  Vec2 pixel;
+  float response;
+};
+
+// Saddles of black and white: the response of S. Bennett and J. Lasenby, "ChESS - Quick and robust detection of
+// chess-board features" (CVIU 2014), at full and at half size, refined to a fraction of a pixel.
+std::vector<CornerCandidate> find_saddles(const tools::GreyPicture &picture);
+
+// Moves a corner to where all gradients around it point past it (Foerstner and Guelch 1987). False where it runs off
+// by more than its window or where there is no texture.
+bool refine_corner(const tools::GreyPicture &picture, int half_window, Vec2 &corner);
+
+// The largest lattice that saddles make: grown from corner to corner along edges that have black on one side and
+// white on the other, the next one where the lattice's last steps say. Empty where there is none of at least 3 x 3 and
+// 12 corners. `columns` x `rows` inner corners: a larger lattice than the board is no board; 0: not known.
+std::vector<BoardCorner> find_chessboard(const tools::GreyPicture &picture, int columns, int rows);
+
+// Kalibr's AprilGrid (tag36h11), tags counted from the lower left one row by row: `tag_m` the black square's edge,
+// `gap_m` between two of them.
+std::vector<BoardCorner> find_aprilgrid(const tools::GreyPicture &picture, int columns, int rows, double tag_m,
+                                        double gap_m);
+
+}  // namespace wm::calibrate
