@@ -25,6 +25,8 @@ static void add_source(wm_assembly *self, wm_source *source) {
   wm_source_config wanted;
   int rank = 0;
   wm_config_source(self->config, source->name, &wanted, &rank);
+  if ((size_t)rank == self->config->source_count && source->lateness_max_ms > 0)
+    wanted.lateness_max_ms = source->lateness_max_ms;
   const char *why_not = reason_to_leave_out(self->config, source, &wanted);
   if (why_not) {
     leave_out(self, source->name, why_not);

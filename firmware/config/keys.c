@@ -27,6 +27,9 @@ const config_key kConfigKeys[] = {
      "Detectors that look at pictures, each with its parameters: `{edges: {}}`. See below. Beside them `cameras: "
      "[NAME]` "
      "says at whose; without it at those of all cameras that have any."},
+    {"start.saved_pose", "path", "none",
+     "File that keeps the robot's last pose, on devices: a run begins there, if it isn't older than start.max_age_s, "
+     "whatever `initial_pose` says."},
     {"publish.lcm_url", "text", "LCM's own", "LCM provider, e.g. `udpm://239.255.76.67:7667?ttl=0`."},
     {"publish.channel_prefix", "text", "WAYMARK_", "What each channel's name begins with."},
     {NULL, NULL, NULL, NULL},

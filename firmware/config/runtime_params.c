@@ -31,6 +31,17 @@ static const wm_param kParams[] = {
         "10 to 50 ms."),
     BOOL("publish.lcm", publish_lcm, 1,
          "Whether poses are sent over LCM. Without a network the run goes on all the same."),
+    F64("publish.useless_m", publish_useless_m, 1.0, 1e-3, 1000,
+        "m. Sigma of position from which on a pose is of no use: health says how many metres and seconds of dead "
+        "reckoning are left until there."),
+    F64("start.max_age_s", start_max_age_s, 86400, 0, 1e9,
+        "s. A saved pose that is older than this is not used: by then somebody may have carried the robot away."),
+    F64("start.moved_m", start_moved_m, 0.2, 0, 1000,
+        "m. Sigma of what may have moved the robot while it was off, added to that of the saved pose."),
+    F64("start.moved_deg", start_moved_deg, 3.0, 0, 180, "degrees. As moved_m, for the heading."),
+    F64("start.save_every_s", start_save_every_s, 1.0, 0.1, 3600,
+        "s. How often the pose is saved: a run that was killed begins so far behind. Each time costs a write to the "
+        "disk."),
     I32("realtime.loop_hz", realtime_loop_hz, 200, 1, 10000,
         "Hz. How often the estimator's thread wakes. At 200 a datum waits 5 ms at most."),
     I32("realtime.priority", realtime_priority, 80, 0, 98,

@@ -50,6 +50,7 @@ wm_status wm_pipeline_start(wm_pipeline *self, wm_output output, wm_error *err) 
                                 .motion_stale_ns = ns_from_ms(config->runtime.publish_motion_stale_ms),
                                 .fusion_stale_ns = ns_from_ms(config->runtime.merge_horizon_ms)};
   wm_predictor_init(&self->predictor, &params, self->odometry_memory);
+  wm_budget_init(&self->budget, config->runtime.publish_useless_m);
   return WM_OK;
 }
 
@@ -112,10 +113,21 @@ static void source_health(const wm_pipeline *self, size_t i, wm_time_ns now_ns, 
   out->lateness_max_ns = self->assembly->sources[i].merge.lateness_max_ns;
   out->newest_ns = merged->newest_ns;
   out->silent_ns = wm_merge_silent_ns(self->merge, i, now_ns);
-  out->stale = (uint8_t)wm_merge_is_stale(self->merge, i, now_ns);
+  const wm_source *source = self->assembly->sources[i].source;
+  out->stale = (uint8_t)(!(source && source->is_rare) && wm_merge_is_stale(self->merge, i, now_ns));
 }
 
-void wm_pipeline_health(const wm_pipeline *self, wm_time_ns now_ns, wm_health *out) {
+// Of the fused pose: the published one's is a little less.
+static void reckoning_left(wm_pipeline *self, const wm_estimate *fused, wm_health *out) {
+  wm_odom_point odom;
+  out->reckoning_left_m = out->reckoning_left_s = (double)NAN;
+  if (!wm_estimate_has_pose(fused)) return;
+  if (wm_odometry_at(self->odometry_memory, wm_odometry_newest_ns(self->odometry_memory), &odom) != WM_OK) return;
+  wm_budget_take(&self->budget, fused, &odom);
+  wm_budget_left(&self->budget, fused, &out->reckoning_left_m, &out->reckoning_left_s);
+}
+
+void wm_pipeline_health(wm_pipeline *self, wm_time_ns now_ns, wm_health *out) {
   memset(out, 0, sizeof *out);
   wm_estimate estimate;
   self->fuser.estimator->estimate(self->fuser.state, &estimate);
@@ -127,6 +139,7 @@ void wm_pipeline_health(const wm_pipeline *self, wm_time_ns now_ns, wm_health *o
   out->published = self->published;
   if (self->fuser.estimator->motion_health)
     out->motion_health = self->fuser.estimator->motion_health(self->fuser.state);
+  reckoning_left(self, &estimate, out);
   out->source_count = (uint32_t)self->assembly->source_count;
   for (size_t i = 0; i < self->assembly->source_count; i++) source_health(self, i, now_ns, &out->sources[i]);
   if (self->fuser.estimator->calibration)

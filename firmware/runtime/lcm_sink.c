@@ -1,35 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lcm_sink.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
+#include "lcm_way.h"
 #include "waymark/clock.h"
 
-#define TRY_AGAIN_NS (2 * WM_NS_PER_S)
-#define DEFAULT_URL "udpm://239.255.76.67:7667?ttl=0"
-
 // ── finding a way out ───────────────────────────────────────────────────────────────────────────────────────────────
-
-// liblcm prints a page of help on standard error each time that it finds no route; so ask the kernel first. Returns 0,
-// or the reason. What is not "udpm://ADDRESS:PORT..." is left to LCM.
-static int no_route(const char *url) {
-  char address[64];
-  int port;
-  if (sscanf(url, "udpm://%63[0-9.]:%d", address, &port) != 2) return 0;
-  struct sockaddr_in to = {.sin_family = AF_INET, .sin_port = htons((uint16_t)port)};
-  if (inet_pton(AF_INET, address, &to.sin_addr) != 1) return 0;
-  int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (fd < 0) return errno;
-  int reason = connect(fd, (const struct sockaddr *)&to, sizeof to) == 0 ? 0 : errno;
-  (void)close(fd);
-  return reason;
-}
 
 static void say_once(lcm_sink *self, const char *what, const char *why) {
   if (self->said_trouble) return;
@@ -43,14 +22,10 @@ static void say_once(lcm_sink *self, const char *what, const char *why) {
 }
 
 static void try_open(lcm_sink *self) {
-  int reason = no_route(self->url);
-  if (reason) {
-    say_once(self, "no way out", strerror(reason));
-    return;
-  }
-  self->lcm = lcm_create(self->url);
+  const char *why;
+  self->lcm = lcm_way_open(self->url, &why);
   if (!self->lcm) {
-    say_once(self, "can't be opened", "see LCM's message above");
+    say_once(self, "no way out", why);
     return;
   }
   if (self->said_trouble) {
@@ -62,9 +37,7 @@ static void try_open(lcm_sink *self) {
 void lcm_sink_open(lcm_sink *self, int is_on, const char *url, const char *prefix, const wm_assembly *assembly,
                    wm_finding_fn say, void *say_context, lcm_t *lent) {
   memset(self, 0, sizeof *self);
-  const char *from_environment = getenv("LCM_DEFAULT_URL");
-  const char *chosen = url[0] ? url : (from_environment && from_environment[0] ? from_environment : DEFAULT_URL);
-  (void)snprintf(self->url, sizeof self->url, "%s", chosen);
+  (void)snprintf(self->url, sizeof self->url, "%s", lcm_way_url(url));
   (void)snprintf(self->prefix, sizeof self->prefix, "%s", prefix);
   self->is_on = is_on;
   self->assembly = assembly;
@@ -75,7 +48,7 @@ void lcm_sink_open(lcm_sink *self, int is_on, const char *url, const char *prefi
 
 void lcm_sink_tick(lcm_sink *self, wm_time_ns monotonic_ns) {
   if (!self->is_on || self->lcm || monotonic_ns < self->next_try_ns) return;
-  self->next_try_ns = monotonic_ns + TRY_AGAIN_NS;
+  self->next_try_ns = monotonic_ns + LCM_TRY_AGAIN_NS;
   try_open(self);
 }
 

@@ -54,6 +54,10 @@ typedef struct live_sink {
   notify notify;
   wm_time_ns next_flush_ns, next_landmarks_ns;
   int said_unwritable;
+  // The last pose that was worth keeping, and whether it is on the disk.
+  wm_estimate last_pose;
+  int keeps_pose, has_last_pose, said_unsaved;
+  wm_time_ns next_save_ns;
   // What was said of the sources and the motion sensors, so that only a change is said.
   uint8_t said_stale[WM_SOURCES_MAX];
   uint32_t said_motion_health;

@@ -6,9 +6,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
+#include "lcm_commands.h"
 #include "live.h"
 #include "threads.h"
+#include "waymark/saved_pose.h"
 #include "waymark/steady.h"
 
 #define BEFORE_FIRST_NS (100 * WM_NS_PER_MS)  // for the threads to stand ready
@@ -69,8 +72,47 @@ static wm_status take_memory(live *self, wm_error *err) {
 
 // ── start ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
+static double utc_s(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_REALTIME, &now);
+  return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
+// The saved pose where there is one that holds; else the configuration's start.
+static void start_where_it_was(live *self) {
+  const wm_runtime_params *params = &self->config->runtime;
+  const char *path = self->config->saved_pose;
+  wm_start *start = &self->assembly.setup.start;
+  wm_saved_pose saved;
+  wm_error err;
+  if (!path[0]) return;
+  wm_status status = wm_saved_pose_read(path, &saved, &err);
+  if (status != WM_OK) {
+    live_say(self, "start: no saved pose is used: %s", err.text);
+    return;
+  }
+  double age_s = utc_s() - saved.utc_s;
+  if (!wm_saved_pose_start(&saved, utc_s(), params->start_max_age_s, params->start_moved_m,
+                           params->start_moved_deg * M_PI / 180, start)) {
+    live_say(self, "start: the saved pose is %.0f s old, more than start.max_age_s; it is not used", age_s);
+    return;
+  }
+  live_say(self, "start: where it was %.0f s ago: x %.2f m, y %.2f m, heading %.1f deg, sigma %.2f m", age_s,
+           start->p_m[0], start->p_m[1], start->heading_rad * 180 / M_PI, start->sigma_xy_m);
+}
+
+// What is told over LCM is a source as any other, so that it is in its place in time, and in the log.
+static wm_status add_commands(live *self, wm_recording *recording, wm_error *err) {
+  if (!self->config->runtime.publish_lcm) return WM_OK;
+  wm_source *commands;
+  wm_status status = lcm_commands_open(self->config->lcm_url, self->config->channel_prefix, NULL, &commands, err);
+  return status == WM_OK ? wm_recording_add_device(recording, commands, 0, err) : status;
+}
+
 static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
-  wm_status status = wm_assemble(self->config, recording, self->options->seed, &self->assembly, err);
+  wm_status status = add_commands(self, recording, err);
+  if (status == WM_OK) status = wm_assemble(self->config, recording, self->options->seed, &self->assembly, err);
+  if (status == WM_OK && wm_recording_is_robot(recording)) start_where_it_was(self);
   if (status == WM_OK) status = take_memory(self, err);
   if (status == WM_OK) status = wm_pipeline_start(&self->estimator.pipeline, estimator_output(&self->estimator), err);
   wm_time_ns first_ns;
@@ -91,6 +133,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
                 &self->assembly, self->options->say ? self->options->say : say_nothing, self->options->say_context,
                 NULL);
   notify_open(&self->sink.notify);
+  self->sink.keeps_pose = wm_recording_is_robot(recording) && self->config->saved_pose[0];
   return WM_OK;
 }
 

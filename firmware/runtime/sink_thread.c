@@ -5,6 +5,7 @@
 
 #include "live.h"
 #include "threads.h"
+#include "waymark/saved_pose.h"
 #include "waymark/steady.h"
 
 #define FLUSH_EVERY_NS WM_NS_PER_S
@@ -27,6 +28,10 @@ static void send_pose(live *run, const wm_published *record) {
   wm_published published = *record;
   tell_utc(run, &published);
   lcm_sink_pose(&run->sink.lcm, &published);
+  if (run->sink.keeps_pose && wm_saved_pose_is_worth_it(&published.now)) {
+    run->sink.last_pose = published.now;
+    run->sink.has_last_pose = 1;
+  }
   notify_pose(&run->sink.notify, &published);
 }
 
@@ -118,6 +123,20 @@ static void flush(live *run) {
   live_say(run, "%s. Localizing goes on", err.text);
 }
 
+static void save_pose(live *run) {
+  live_sink *self = &run->sink;
+  struct timespec utc;
+  wm_error err;
+  if (!self->has_last_pose) return;
+  self->has_last_pose = 0;
+  clock_gettime(CLOCK_REALTIME, &utc);
+  double utc_s = (double)utc.tv_sec + (double)utc.tv_nsec * 1e-9;
+  if (wm_saved_pose_write(run->config->saved_pose, &self->last_pose, utc_s, &err) == WM_OK || self->said_unsaved)
+    return;
+  self->said_unsaved = 1;
+  live_say(run, "%s. Localizing goes on; the next start will not know where the robot is", err.text);
+}
+
 static void do_what_is_due(live *run, wm_time_ns now_ns) {
   live_sink *self = &run->sink;
   lcm_sink_tick(&self->lcm, now_ns);
@@ -125,6 +144,10 @@ static void do_what_is_due(live *run, wm_time_ns now_ns) {
   if (self->folder && now_ns >= self->next_flush_ns) {
     flush(run);
     self->next_flush_ns = now_ns + FLUSH_EVERY_NS;
+  }
+  if (now_ns >= self->next_save_ns) {
+    save_pose(run);
+    self->next_save_ns = now_ns + wm_ns_from_seconds(run->config->runtime.start_save_every_s);
   }
   if (now_ns >= self->next_landmarks_ns) {
     lcm_sink_landmarks(&self->lcm, run_from_monotonic(&run->clock, now_ns));
@@ -142,6 +165,7 @@ void *sink_thread(void *argument) {
     take_healths(run);
     do_what_is_due(run, wm_monotonic_ns());
   }
+  save_pose(run);
   lcm_sink_close(&run->sink.lcm);
   notify_stopping(&run->sink.notify);
   return NULL;

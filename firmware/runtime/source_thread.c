@@ -57,7 +57,7 @@ static void say_device(live_source *self) {
   const wm_source_counts *counts = &self->feed->source->counts;
   if (counts->device == self->said_device) return;
   self->said_device = counts->device;
-  live_say(self->run, "%s: %s", self->feed->source->name, counts->device_note);
+  if (counts->device_note[0]) live_say(self->run, "%s: %s", self->feed->source->name, counts->device_note);
 }
 
 static void listen_to_device(live_source *self) {

@@ -152,6 +152,10 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
   string(f, wm_state_name(h->state));
   (void)fputs(",\n  \"t_ns\": ", f);
   time_or_null(f, h->t_ns);
+  (void)fputs(",\n  \"reckoning_left_m\": ", f);
+  number(f, h->reckoning_left_m);
+  (void)fputs(",\n  \"reckoning_left_s\": ", f);
+  number(f, h->reckoning_left_s);
   (void)fputs(",\n  \"fused_until_ns\": ", f);
   time_or_null(f, h->fused_until_ns);
   (void)fprintf(f,

@@ -98,6 +98,8 @@ size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {
       .deadlines_missed = (int64_t)h->deadlines_missed,
       .outputs_lost = (int64_t)h->outputs_lost,
       .published = (int64_t)h->published,
+      .reckoning_left_m = h->reckoning_left_m,
+      .reckoning_left_s = h->reckoning_left_s,
   };
   m.source_count = (int32_t)(h->source_count < WM_HEALTH_SOURCES_MAX ? h->source_count : WM_HEALTH_SOURCES_MAX);
   for (int32_t i = 0; i < m.source_count; i++) put_source(&m.sources[i], &h->sources[i]);

@@ -93,6 +93,8 @@ def check_logger(work):
                 "WAYMARK_LANDMARKS": waymark.landmarks_t}
     heard = {channel: [] for channel in decoders}
     for event in lcm.EventLog(str(log), "r"):
+        if event.channel == "LCM_SELF_TEST":  # liblcm's own, from who begins to listen
+            continue
         heard[event.channel].append(decoders[event.channel].decode(event.data))
     counts = {channel: len(messages) for channel, messages in heard.items()}
     print("lcm-logger recorded, and LCM's Python binding decoded:", counts)
@@ -111,12 +113,33 @@ def check_logger(work):
     assert counts["WAYMARK_HEALTH"] >= 2 and counts["WAYMARK_LANDMARKS"] >= 1
     health = heard["WAYMARK_HEALTH"][-1]
     names = [bytes(s.name).rstrip(b"\0").decode() for s in health.sources[:health.source_count]]
-    assert names == ["motion", "sightings:eye"], names
+    assert names == ["motion", "sightings:eye", "commands"], names
     assert [tuple(p) for p in heard["WAYMARK_LANDMARKS"][0].position_m[:2]] == [(5, 0, 0), (0, 5, 0)]
     with open(work / "heard/innovations.csv", newline="") as f:
         assert counts["WAYMARK_INNOVATION"] == sum(1 for _ in csv.DictReader(f))
     seen = heard["WAYMARK_OBSERVATIONS"]
     assert all(bytes(o.sensor).rstrip(b"\0") == b"eye" and o.count == 4 for o in seen) and len(seen) > 20
+
+
+def check_commands(work):
+    """While it drives it is told that it stands elsewhere, in a message that LCM's own tools made."""
+    import lcm
+    import waymark
+
+    node = lcm.LCM(URL)
+    config = (work / "config.yaml").read_text().replace("landmark_ekf", "odometry")
+    (work / "odometry.yaml").write_text(config)
+    process = run(work / "recording", work / "odometry.yaml", work / "told")
+    time.sleep(1.5)
+    told = waymark.set_pose_t()
+    told.position_m, told.orientation_xyzw = [100, -50, 0], [0, 0, 0, 1]
+    told.sigma_xy_m, told.sigma_heading_rad = 0.1, 0.1
+    node.publish("WAYMARK_SET_POSE", told.encode())
+    node.publish("WAYMARK_SET_POSE", b"rubbish")
+    finish(process)
+    rows = list(published(work / "told").values())
+    assert abs(float(rows[0]["x_m"])) < 1 and abs(float(rows[-1]["x_m"]) - 100) < 5, rows[-1]
+    print("told to stand at 100, -50: ends at", rows[-1]["x_m"], rows[-1]["y_m"])
 
 
 def check_no_route(work):
@@ -143,6 +166,7 @@ def inside():
             "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm_url: '" + URL + "'}\n"
             "realtime: {lock_memory: false}\n")
         check_logger(work)
+        check_commands(work)
         check_no_route(work)
     finally:
         shutil.rmtree(work)

@@ -13,6 +13,7 @@
 #include "waymark/eventlog.h"
 #include "waymark/robot.h"
 #include "waymark/run.h"
+#include "waymark/saved_pose.h"
 
 static const char kConfig[] =
     "format: waymark-config/1\nestimator: odometry\npublish: {lcm_url: \"memq://\"}\n"
@@ -159,6 +160,30 @@ static void the_log_of_a_run_on_devices_gives_its_poses_again(void) {
   assert_same_file("run", "again", "trajectory.csv");
 }
 
+// The second run begins where the first one ended, whatever the configuration says.
+static void a_run_begins_where_the_last_one_ended(void) {
+  wm_error err = {0};
+  wm_config config;
+  char text[1200];
+  double ended_x_m = 0;
+  (void)snprintf(text, sizeof text, "%sstart: {saved_pose: %s, save_every_s: 0.1}\n", kConfig, in_folder("pose.yaml"));
+  for (int run = 0; run < 2; run++) {
+    bus can = {0};
+    wm_saved_pose saved;
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, strlen(text), "test.yaml", &config, &err), err.text);
+    wm_recording *robot = robot_on(&can, &config);
+    const wm_run_options options = {.seed = 1, .speed = 1, .duration_s = 0.8, .say = hear};
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, robot, &options, &live, &err), err.text);
+    wm_recording_close(robot);
+    wm_config_free(&config);
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(in_folder("pose.yaml"), &saved, &err), err.text);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 2, saved.start.p_m[1]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.4, ended_x_m + (run ? 0.8 : 1.8), saved.start.p_m[0]);
+    ended_x_m = saved.start.p_m[0];
+  }
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "start: where it was"), said);
+}
+
 // An interface that isn't there, by the configuration and the real kernel.
 static void a_run_without_its_interface_waits_and_says_so(void) {
   wm_error err = {0};
@@ -189,6 +214,7 @@ static void a_run_without_its_interface_waits_and_says_so(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(the_log_of_a_run_on_devices_gives_its_poses_again);
+  RUN_TEST(a_run_begins_where_the_last_one_ended);
   RUN_TEST(a_run_without_its_interface_waits_and_says_so);
   return UNITY_END();
 }

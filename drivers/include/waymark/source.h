@@ -53,7 +53,9 @@ struct wm_source {
   uint16_t index;                 // in the run's table of sources: also the order at equal stamps
   uint8_t is_motion;              // its events are motion
   uint8_t is_live;                // a device: its data come when they come
+  uint8_t is_rare;                // speaks when someone asks for it: its silence means nothing
   uint8_t in_order;               // promises that its stamps never go back (a file without arrival_ns, a CAN bus)
+  double lateness_max_ms;         // where the configuration doesn't name the source; 0: merge.lateness_max_ms
   uint32_t kinds;                 // WM_EVENT_BIT of what it hands out
   wm_source_counts counts;
   // NULL where everything is to be told. Pictures are large and take long: those that aren't the newest any more at

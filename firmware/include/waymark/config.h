@@ -18,6 +18,7 @@
 //   merge: {horizon_ms: 300, ...}  # wm_runtime_params
 //   publish: {rate_hz: 50, ...}
 //   realtime: {priority: 80, ...}
+//   start: {saved_pose: FILE, ...}
 //   motion: {...}                  # wm_motion_params_table
 //   vision: {edges: {cameras: [front], ...}}   # detectors on pictures, with their tables
 //   landmark_ekf: {...}            # the estimator's own table
@@ -56,7 +57,11 @@ typedef struct wm_runtime_params {
   double publish_rate_hz;
   double publish_jump_m, publish_jump_deg;  // map against odom: larger moves are announced as jumps
   double publish_motion_stale_ms;
-  int32_t publish_lcm;  // 0: no LCM
+  int32_t publish_lcm;                    // 0: no LCM
+  double publish_useless_m;               // sigma of position from which on a pose is of no use
+  double start_max_age_s;                 // of the saved pose
+  double start_moved_m, start_moved_deg;  // sigmas of what may have happened to the robot while it was off
+  double start_save_every_s;
   int32_t realtime_loop_hz;
   int32_t realtime_priority;  // SCHED_FIFO, 0: normal thread
   int32_t realtime_cpu;       // -1: any
@@ -92,8 +97,9 @@ typedef struct wm_config {
   wm_start initial_pose;
   wm_source_config sources[WM_SOURCES_MAX];
   size_t source_count;
-  char lcm_url[128];        // publish.lcm_url; "" : LCM_DEFAULT_URL or LCM's own default
-  char channel_prefix[48];  // publish.channel_prefix, "WAYMARK_"
+  char lcm_url[128];             // publish.lcm_url; "" : LCM_DEFAULT_URL or LCM's own default
+  char saved_pose[WM_PATH_MAX];  // start.saved_pose; "": none
+  char channel_prefix[48];       // publish.channel_prefix, "WAYMARK_"
 } wm_config;
 
 // Every mistake stops with file, line, key, what is there and what is allowed ("did you mean"). Allocates.

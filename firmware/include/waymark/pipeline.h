@@ -13,6 +13,7 @@
 
 #include "waymark/arena.h"
 #include "waymark/assembly.h"
+#include "waymark/budget.h"
 #include "waymark/fuser.h"
 #include "waymark/histogram.h"
 #include "waymark/merge.h"
@@ -27,6 +28,7 @@ typedef struct wm_pipeline {
   wm_merge *merge;
   wm_fuser fuser;
   wm_predictor predictor;
+  wm_budget budget;
   uint64_t published;
   wm_histogram arrive_ns, publish_ns;
   void *merge_memory, *state_memory, *odometry_memory;
@@ -44,6 +46,6 @@ int wm_pipeline_publish(wm_pipeline *self, wm_time_ns now_ns, wm_published *out)
 void wm_pipeline_finish(wm_pipeline *self);
 
 // Fills all but what sources and loop count themselves. Not cheap (tens of us): once a second.
-void wm_pipeline_health(const wm_pipeline *self, wm_time_ns now_ns, wm_health *out);
+void wm_pipeline_health(wm_pipeline *self, wm_time_ns now_ns, wm_health *out);
 
 #endif

@@ -66,6 +66,8 @@ typedef struct wm_health {
   uint64_t loops, deadlines_missed;
   uint64_t outputs_lost;  // records that the sinks didn't take in time
   uint64_t published;
+  // What is left of dead reckoning until the pose is of no use: infinite while the robot stands, NaN without a pose.
+  double reckoning_left_m, reckoning_left_s;
 } wm_health;
 
 #endif

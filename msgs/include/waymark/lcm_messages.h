@@ -23,6 +23,12 @@ extern "C" {
 
 size_t wm_lcm_pose(const wm_published *published, void *out, size_t capacity);
 size_t wm_lcm_health(const wm_health *health, void *out, size_t capacity);
+// Messages to the robot: NULL and *out (t_ns 0: now; arrival unset), or what is wrong with it. Cost fixed.
+const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *out);
+const char *wm_lcm_read_reset(const void *message, size_t length, wm_event *out);
+// For who sends one (`t_ns` 0: now).
+size_t wm_lcm_set_pose(const wm_set_pose *pose, wm_time_ns t_ns, void *out, size_t capacity);
+
 size_t wm_lcm_innovation(const wm_innovation *innovation, void *out, size_t capacity);
 
 // `count` sightings of one sensor at one stamp, the first WM_LCM_OBSERVATIONS_MAX are sent and the others counted.

@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the sink thread speaks: LCM (memq: published and received in one process) and systemd's protocol.
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "lcm_commands.h"
 #include "lcm_sink.h"
 #include "log_fixture.h"
 #include "notify.h"
 #include "unity.h"
+#include "waymark/clock.h"
 #include "waymark_health_t.h"
 #include "waymark_innovation_t.h"
 #include "waymark_landmarks_t.h"
 #include "waymark_observations_t.h"
 #include "waymark_pose_t.h"
+#include "waymark_reset_t.h"
 
 void setUp(void) {}
 void tearDown(void) {}
@@ -210,6 +214,64 @@ static void without_a_service_manager_nothing_happens(void) {
   unsetenv("NOTIFY_SOCKET");
 }
 
+// ── commands ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static void poses_and_resets_that_are_told_become_events(void) {
+  wm_source *source;
+  wm_event event;
+  wm_error err;
+  uint8_t bytes[512];
+  wm_set_pose there = {.pose_map_base = {{1, -2, 0}, {0, 0, 0, 1}}, .sigma_xy_m = 0.5, .sigma_heading_rad = 0.1};
+  lcm_t *lcm = lcm_create("memq://");
+  TEST_ASSERT_EQUAL(WM_OK, lcm_commands_open("memq://", "T_", lcm, &source, &err));
+  TEST_ASSERT_TRUE(source->is_live && source->is_rare);
+  wm_time_ns before_ns = wm_monotonic_ns();
+  size_t length = wm_lcm_set_pose(&there, 0, bytes, sizeof bytes);
+  TEST_ASSERT_GREATER_THAN(0, length);
+  lcm_publish(lcm, "T_SET_POSE", bytes, (unsigned)length);
+  TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
+  TEST_ASSERT_EQUAL(WM_EVENT_SET_POSE, event.kind);
+  TEST_ASSERT_TRUE(event.t_ns >= before_ns && event.t_ns <= wm_monotonic_ns() && event.arrival_ns == event.t_ns);
+  TEST_ASSERT_EQUAL_DOUBLE(-2, event.as.set_pose.pose_map_base.p_m[1]);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, event.as.set_pose.sigma_xy_m);
+
+  waymark_reset_t reset = {.t_ns = 77};
+  int reset_bytes = waymark_reset_t_encode(bytes, 0, sizeof bytes, &reset);
+  lcm_publish(lcm, "T_RESET", bytes, (unsigned)reset_bytes);
+  TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
+  TEST_ASSERT_EQUAL(WM_EVENT_RESET, event.kind);
+  TEST_ASSERT_EQUAL_INT64(77, event.t_ns);
+  TEST_ASSERT_EQUAL_UINT32(1, event.seq);
+  source->ops->close(source);
+  lcm_destroy(lcm);
+}
+
+static void nonsense_that_is_told_is_refused(void) {
+  wm_source *source;
+  wm_event event;
+  wm_error err;
+  uint8_t bytes[512];
+  const wm_set_pose wrong[] = {
+      {.pose_map_base = {{NAN, 0, 0}, {0, 0, 0, 1}}, .sigma_xy_m = 1, .sigma_heading_rad = 1},
+      {.pose_map_base = {{1, 0, 0}, {0, 0, 0, 0}}, .sigma_xy_m = 1, .sigma_heading_rad = 1},
+      {.pose_map_base = {{1, 0, 0}, {0, 0, 0, 1}}, .sigma_xy_m = -1, .sigma_heading_rad = 1},
+      {.pose_map_base = {{1, 0, 0}, {0, 0, 0, 1}}, .sigma_xy_m = 1, .sigma_heading_rad = NAN},
+  };
+  lcm_t *lcm = lcm_create("memq://");
+  TEST_ASSERT_EQUAL(WM_OK, lcm_commands_open("memq://", "T_", lcm, &source, &err));
+  for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    size_t length = wm_lcm_set_pose(&wrong[i], 0, bytes, sizeof bytes);
+    lcm_publish(lcm, "T_SET_POSE", bytes, (unsigned)length);
+    TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
+    TEST_ASSERT_EQUAL_UINT64(i + 1, source->counts.malformed);
+  }
+  lcm_publish(lcm, "T_SET_POSE", "rubbish", 7);
+  TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
+  TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "T_SET_POSE: position_m is not finite"));
+  source->ops->close(source);
+  lcm_destroy(lcm);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(messages_arrive_over_memq);
@@ -218,5 +280,7 @@ int main(void) {
   RUN_TEST(searching_with_fresh_motion_is_no_reason_to_be_restarted);
   RUN_TEST(without_a_pose_ready_says_so);
   RUN_TEST(without_a_service_manager_nothing_happens);
+  RUN_TEST(poses_and_resets_that_are_told_become_events);
+  RUN_TEST(nonsense_that_is_told_is_refused);
   return UNITY_END();
 }

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/saved_pose.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "waymark/recording.h"
+#include "waymark/yaml.h"
+
+// ── writing ─────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+// The larger axis of the position's ellipse in the plane: the start takes one sigma for both.
+static double sigma_xy(const double *p) {
+  double a = p[wm_cov_index(0, 0)], b = p[wm_cov_index(0, 1)], c = p[wm_cov_index(1, 1)];
+  double half = 0.5 * (a - c), root = sqrt(half * half + b * b);
+  return sqrt(fmax(0.5 * (a + c) + root, 0));
+}
+
+static double sigma_heading(const double *p) { return sqrt(fmax(p[wm_cov_index(5, 5)], 0)); }
+
+int wm_saved_pose_is_worth_it(const wm_estimate *e) {
+  if (e->state != WM_STATE_TRACKING && e->state != WM_STATE_DEAD_RECKONING) return 0;
+  for (int i = 0; i < 3; i++)
+    if (!isfinite(e->pose_map_base.p_m[i])) return 0;
+  return isfinite(e->heading_rad) && sigma_xy(e->covariance) < 1.0 && sigma_heading(e->covariance) < 0.5;
+}
+
+// To the disk and not only to the system: a name that points to an empty file would be worse than none.
+static int write_through(int fd, const char *text, size_t length) {
+  while (length > 0) {
+    ssize_t written = write(fd, text, length);
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    text += written;
+    length -= (size_t)written;
+  }
+  return fsync(fd) == 0 ? 0 : errno;
+}
+
+static int rename_through(const char *from, const char *to) {
+  char folder[WM_PATH_MAX];
+  if (rename(from, to) != 0) return errno;
+  (void)snprintf(folder, sizeof folder, "%s", to);
+  char *slash = strrchr(folder, '/');
+  if (slash == folder) slash++;
+  if (slash) *slash = '\0';
+  int fd = open(slash ? folder : ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return 0;  // the file is there; its name may be lost with the power
+  (void)fsync(fd);
+  (void)close(fd);
+  return 0;
+}
+
+wm_status wm_saved_pose_write(const char *path, const wm_estimate *e, double utc_s, wm_error *err) {
+  char text[640], beside[WM_PATH_MAX + 8];
+  const double *p = e->pose_map_base.p_m, *q = e->pose_map_base.q_xyzw;
+  int length = snprintf(text, sizeof text,
+                        "# Where the robot was last; written and read by waymark run.\n"
+                        "format: waymark-pose/1\nutc_s: %.3f\n"
+                        "pose: {x_m: %.6f, y_m: %.6f, z_m: %.6f, heading_rad: %.9f, qx: %.12f, qy: %.12f, qz: %.12f, "
+                        "qw: %.12f, sigma_xy_m: %.6f, sigma_heading_rad: %.6f}\n",
+                        utc_s, p[0], p[1], p[2], e->heading_rad, q[0], q[1], q[2], q[3],
+                        fmax(sigma_xy(e->covariance), 1e-6), fmax(sigma_heading(e->covariance), 1e-6));
+  (void)snprintf(beside, sizeof beside, "%s.new", path);
+  int fd = open(beside, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (fd < 0) return wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(errno));
+  int failed = write_through(fd, text, (size_t)length);
+  if (close(fd) != 0 && !failed) failed = errno;
+  if (!failed) failed = rename_through(beside, path);
+  if (!failed) return WM_OK;
+  (void)unlink(beside);
+  return wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(failed));
+}
+
+// ── reading ─────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_status read_root(const wm_yaml_node *root, wm_saved_pose *out, wm_error *err) {
+  char format[64];
+  wm_yaml_node version = wm_yaml_get(root, "format"), utc = wm_yaml_get(root, "utc_s"),
+               pose = wm_yaml_get(root, "pose");
+  if (!wm_yaml_is_map(root) || !wm_yaml_there(&version) || !wm_yaml_there(&utc) || !wm_yaml_there(&pose))
+    return wm_yaml_fail(root, err, "is no saved pose (format, utc_s, pose)");
+  wm_status status = wm_yaml_string(&version, format, sizeof format, err);
+  if (status == WM_OK && strcmp(format, "waymark-pose/1") != 0)
+    return wm_yaml_fail(&version, err, "'%s' is not a format that this program reads; it reads waymark-pose/1", format);
+  if (status == WM_OK) status = wm_yaml_f64(&utc, -1e12, 1e12, &out->utc_s, err);
+  if (status == WM_OK) status = wm_start_read(&pose, &out->start, err);
+  out->start.t_ns = WM_TIME_NONE;
+  if (status == WM_OK && !isfinite(out->start.p_m[0] + out->start.p_m[1] + out->start.heading_rad))
+    return wm_yaml_fail(&pose, err, "x_m, y_m or heading_rad is missing");
+  return status;
+}
+
+wm_status wm_saved_pose_read(const char *path, wm_saved_pose *out, wm_error *err) {
+  wm_yaml *doc;
+  memset(out, 0, sizeof *out);
+  if (access(path, F_OK) != 0) return wm_fail(err, WM_NOT_FOUND, "%s: is not there", path);
+  wm_status status = wm_yaml_load(path, &doc, err);
+  if (status != WM_OK) return status;
+  wm_yaml_node root = wm_yaml_root(doc);
+  status = read_root(&root, out, err);
+  wm_yaml_free(doc);
+  return status;
+}
+
+// A clock that went back (a board without a battery, before its time is set) tells nothing of the age.
+int wm_saved_pose_start(const wm_saved_pose *saved, double utc_s, double max_age_s, double moved_m, double moved_rad,
+                        wm_start *out) {
+  if (utc_s - saved->utc_s > max_age_s) return 0;
+  *out = saved->start;
+  out->sigma_xy_m = sqrt(out->sigma_xy_m * out->sigma_xy_m + moved_m * moved_m);
+  out->sigma_heading_rad = sqrt(out->sigma_heading_rad * out->sigma_heading_rad + moved_rad * moved_rad);
+  return 1;
+}

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: Apache-2.0
+// The last pose on disk, and how far dead reckoning would carry.
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "unity.h"
+#include "waymark/budget.h"
+#include "waymark/saved_pose.h"
+
+static char folder[64], path[128];
+static wm_error err;
+
+void setUp(void) {
+  (void)snprintf(folder, sizeof folder, "/tmp/wm_state_XXXXXX");
+  TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+  (void)snprintf(path, sizeof path, "%s/pose.yaml", folder);
+}
+void tearDown(void) {
+  (void)unlink(path);
+  (void)rmdir(folder);  // fails the next test's count where something else was left there
+}
+
+static wm_estimate tracking(double x_m, double sigma_m) {
+  wm_estimate e = {.state = WM_STATE_TRACKING, .heading_rad = M_PI / 2, .dof = 3};
+  e.pose_map_base = (wm_pose3){{x_m, -2, 0.5}, {0, 0, sqrt(0.5), sqrt(0.5)}};
+  e.covariance[wm_cov_index(0, 0)] = sigma_m * sigma_m;
+  e.covariance[wm_cov_index(1, 1)] = sigma_m * sigma_m / 4;
+  e.covariance[wm_cov_index(5, 5)] = 0.01 * 0.01;
+  return e;
+}
+
+static void a_pose_is_there_again(void) {
+  wm_estimate e = tracking(12.25, 0.3);
+  wm_saved_pose saved;
+  wm_start start;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1000, &err), err.text);
+  e.pose_map_base.p_m[0] = 13.5;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 2000, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
+  TEST_ASSERT_EQUAL_DOUBLE(13.5, saved.start.p_m[0]);
+  TEST_ASSERT_EQUAL_DOUBLE(2000, saved.utc_s);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-8, M_PI / 2, saved.start.heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.3, saved.start.sigma_xy_m);
+  TEST_ASSERT_EQUAL_INT64(WM_TIME_NONE, saved.start.t_ns);
+
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 2100, 600, 0.4, 0, &start));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-5, 0.5, start.sigma_xy_m);
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 5, 600, 0, 0, &start));  // the clock isn't set yet
+  TEST_ASSERT_FALSE(wm_saved_pose_start(&saved, 2700, 600, 0, 0, &start));
+}
+
+static void a_pose_that_is_worth_nothing_is_not_kept(void) {
+  wm_estimate good = tracking(1, 0.3), e = good;
+  TEST_ASSERT_TRUE(wm_saved_pose_is_worth_it(&good));
+  e.state = WM_STATE_LOST;
+  TEST_ASSERT_FALSE(wm_saved_pose_is_worth_it(&e));
+  e = tracking(1, 3);
+  TEST_ASSERT_FALSE(wm_saved_pose_is_worth_it(&e));
+  e = tracking(NAN, 0.3);
+  TEST_ASSERT_FALSE(wm_saved_pose_is_worth_it(&e));
+}
+
+static void put(const char *text) {
+  FILE *f = fopen(path, "w");
+  TEST_ASSERT_NOT_NULL(f);
+  (void)fputs(text, f);
+  (void)fclose(f);
+}
+
+static void a_file_that_is_none_is_refused_with_its_line(void) {
+  wm_saved_pose saved;
+  TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_saved_pose_read(path, &saved, &err));
+  const char *const wrong[] = {"",
+                               "hello",
+                               "format: waymark-pose/2\nutc_s: 1\npose: {x_m: 1, y_m: 1, heading_rad: 0}\n",
+                               "format: waymark-pose/1\nutc_s: 1\npose: {x_m: 1, heading_rad: 0}\n",
+                               "format: waymark-pose/1\nutc_s: 1\npose: {x_m: .nan, y_m: 1, heading_rad: 0}\n",
+                               "format: waymark-pose/1\nutc_s: 1\npose: {x_m: 1, y_m"};
+  for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    put(wrong[i]);
+    TEST_ASSERT_TRUE_MESSAGE(wm_saved_pose_read(path, &saved, &err) != WM_OK, wrong[i]);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, "pose.yaml"), err.text);
+  }
+}
+
+static void where_it_cant_be_written_the_old_one_stays(void) {
+  wm_estimate e = tracking(1, 0.3);
+  TEST_ASSERT_EQUAL(WM_IO, wm_saved_pose_write("/proc/nowhere/pose.yaml", &e, 1, &err));
+  TEST_ASSERT_NOT_NULL(strstr(err.text, "/proc/nowhere/pose.yaml: can't be written"));
+}
+
+// ── budget ──────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+// Drives straight at 1 m/s for `seconds`; the odometry's variances grow per metre as told.
+static void drive(wm_budget *budget, wm_estimate *e, int seconds, double along_m2, double heading_rad2) {
+  for (int i = 0; i < seconds; i++) {
+    wm_odom_point odom = {.t_ns = i * WM_NS_PER_S,
+                          .pose_odom_base = {i, 0, 0},
+                          .v_mps = 1,
+                          .along_var_m2 = along_m2 * i,
+                          .heading_var_rad2 = heading_rad2 * i};
+    wm_budget_take(budget, e, &odom);
+  }
+}
+
+static void the_way_left_is_where_the_variance_reaches_the_limit(void) {
+  wm_budget budget;
+  wm_estimate e = tracking(0, 0.1);
+  double way_m, time_s;
+  e.covariance[wm_cov_index(5, 5)] = 0;
+  wm_budget_init(&budget, 1.0);
+  drive(&budget, &e, 20, 0.01, 0);
+  wm_budget_left(&budget, &e, &way_m, &time_s);
+  TEST_ASSERT_DOUBLE_WITHIN(0.1, 99, way_m);  // 0.1^2 + 0.01 d = 1
+  TEST_ASSERT_DOUBLE_WITHIN(0.2, 99, time_s);
+
+  e.covariance[wm_cov_index(5, 5)] = 0.1 * 0.1;  // six degrees: a metre after ten
+  wm_budget_left(&budget, &e, &way_m, &time_s);
+  TEST_ASSERT_DOUBLE_WITHIN(0.1, 9.46, way_m);  // 0.01 + 0.01 d + 0.01 d^2 = 1
+  e = tracking(0, 2);
+  wm_budget_left(&budget, &e, &way_m, &time_s);
+  TEST_ASSERT_EQUAL_DOUBLE(0, way_m);
+  TEST_ASSERT_EQUAL_DOUBLE(0, time_s);
+}
+
+static void a_robot_that_stands_has_time_without_end(void) {
+  wm_budget budget;
+  wm_estimate e = tracking(0, 0.1);
+  double way_m, time_s;
+  wm_budget_init(&budget, 1.0);
+  for (int i = 0; i < 10; i++) wm_budget_take(&budget, &e, &(wm_odom_point){.t_ns = i * WM_NS_PER_S});
+  wm_budget_left(&budget, &e, &way_m, &time_s);
+  TEST_ASSERT_TRUE(isinf(time_s));
+}
+
+// The estimator's covariance grows faster than the odometry's noise alone (scales, biases): that is believed.
+static void growth_that_is_seen_while_reckoning_counts(void) {
+  wm_budget budget;
+  wm_estimate e = tracking(0, 0.1);
+  double way_m, time_s;
+  e.covariance[wm_cov_index(5, 5)] = 0;
+  wm_budget_init(&budget, 1.0);
+  e.state = WM_STATE_DEAD_RECKONING;
+  drive(&budget, &e, 11, 0.001, 0);
+  e.covariance[wm_cov_index(0, 0)] += 0.5;
+  wm_budget_left(&budget, &e, &way_m, &time_s);
+  TEST_ASSERT_DOUBLE_WITHIN(0.1, 9.8, way_m);  // 0.05 a metre, 0.49 left
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(a_pose_is_there_again);
+  RUN_TEST(a_pose_that_is_worth_nothing_is_not_kept);
+  RUN_TEST(a_file_that_is_none_is_refused_with_its_line);
+  RUN_TEST(where_it_cant_be_written_the_old_one_stays);
+  RUN_TEST(the_way_left_is_where_the_variance_reaches_the_limit);
+  RUN_TEST(a_robot_that_stands_has_time_without_end);
+  RUN_TEST(growth_that_is_seen_while_reckoning_counts);
+  return UNITY_END();
+}
