@@ -45,6 +45,9 @@ std::vector<char> motion_params, params;
 wm_setup setup;
 wm_sensor sensor;
 wm_landmark landmarks[4];
+constexpr int kSide = 240;  // a room of 10 m in a map of 12 m
+uint8_t edges[kSide * kSide], drivable[kSide * kSide];
+wm_raster map;
 
 struct machine {
   void *state;
@@ -87,6 +90,16 @@ wm_event event_at(uint64_t i, double t_s) {
   if (u < 0.5) {
     e.kind = WM_EVENT_TWIST2;
     e.as.twist2 = {0.5 + 0.1 * a, 0.3 * sin(0.1 * t_s) + 0.1 * b};
+  } else if (u < 0.85 && (estimator->takes & WM_EVENT_BIT(WM_EVENT_POINTS))) {
+    e.kind = WM_EVENT_POINTS;
+    e.as.points.count = (uint32_t)(i % 60);
+    e.as.points.camera = i % 3 ? -1 : 0;
+    for (uint32_t k = 0; k < e.as.points.count; k++) {
+      e.as.points.x_m[k] = (float)(1.0 + 0.08 * k + 0.1 * a);
+      e.as.points.y_m[k] = (float)(k % 2 ? 1.5 + 0.2 * b : -1.0);
+      e.as.points.normal_rad[k] = k % 5 ? NAN : (float)a;
+      e.as.points.sigma_m[k] = k % 3 ? NAN : 0.02f;
+    }
   } else if (u < 0.85) {
     e.kind = WM_EVENT_SIGHTING;
     const wm_landmark &l = landmarks[i % 4];
@@ -218,6 +231,12 @@ void test_nonsense_is_refused_with_a_status_and_changes_nothing(void) {
     assert_refused(a, e, want);
     e.as.set_pose = {{{0, 0, 0}, {0, 0, 0, 1}}, x, 1};
     assert_refused(a, e, want);
+    e.kind = WM_EVENT_POINTS;
+    e.as.points = {};
+    e.as.points.count = 2;
+    e.as.points.camera = -1;
+    e.as.points.x_m[1] = (float)(std::isfinite(x) ? 1e30 : x);
+    assert_refused(a, e, want);
     if (std::isnan(x)) continue;
     e.kind = WM_EVENT_SIGHTING;
     e.as.sighting = {0, landmarks[0].id, x, 1, NAN, NAN};
@@ -245,6 +264,10 @@ void test_nonsense_is_refused_with_a_status_and_changes_nothing(void) {
   assert_refused(a, e, WM_OUT_OF_RANGE);
   e.as.quantities.count = 1;
   e.as.quantities.id[0] = 200;
+  assert_refused(a, e, WM_OUT_OF_RANGE);
+  e.kind = WM_EVENT_POINTS;
+  e.as.points = {};
+  e.as.points.count = WM_POINTS_MAX + 1;
   assert_refused(a, e, WM_OUT_OF_RANGE);
   e.kind = WM_EVENT_TWIST2;
   e.as.twist2 = {0, 0};
@@ -352,6 +375,15 @@ void setUp(void) {
   setup.sensor_count = 1;
   setup.landmarks = landmarks;
   setup.landmark_count = 4;
+  for (int row = 0; row < kSide; row++)
+    for (int column = 0; column < kSide; column++) {
+      const bool in = row >= 20 && row < 220 && column >= 20 && column < 220;
+      const bool deep = row >= 21 && row < 219 && column >= 21 && column < 219;
+      edges[row * kSide + column] = in && !deep ? 255 : 0;
+      drivable[row * kSide + column] = deep ? 255 : 0;
+    }
+  map = {kSide, kSide, 0.05, -6, -6, 0, edges, drivable, 1};
+  setup.map = &map;
   setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0, 0.05, 0.05};
   setup.seed = 1;
 }

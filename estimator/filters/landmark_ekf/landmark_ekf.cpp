@@ -248,4 +248,5 @@ const wm_estimator wm_landmark_ekf_estimator = {"landmark_ekf",
                                                 motion,
                                                 calibration,
                                                 motion_health,
+                                                nullptr,
                                                 nullptr};

@@ -90,4 +90,5 @@ const wm_estimator wm_odometry_estimator = {
     motion,
     calibration,
     motion_health,
+    nullptr,
     nullptr};

@@ -359,4 +359,5 @@ const wm_estimator wm_slam_estimator = {"slam",
                                         motion,
                                         calibration,
                                         motion_health,
-                                        landmarks};
+                                        landmarks,
+                                        nullptr};

@@ -293,4 +293,5 @@ const wm_estimator wm_stereo_ekf_estimator = {
     motion,
     calibration,
     motion_health,
-    landmarks};
+    landmarks,
+    nullptr};

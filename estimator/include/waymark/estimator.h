@@ -34,6 +34,12 @@ typedef struct wm_setup {
   uint64_t seed;
 } wm_setup;
 
+// One of the poses that a cloud of particles thinks possible.
+typedef struct wm_particle {
+  double x_m, y_m, heading_rad;  // base_link in map
+  double weight;                 // of all of them: 1
+} wm_particle;
+
 typedef struct wm_estimator {
   const char *name;  // `estimator:` in the config, and the key of its parameters there
   const char *about;
@@ -60,6 +66,8 @@ typedef struct wm_estimator {
   // SLAM: landmarks estimated, with their covariances (xx, xy, yy in m2, heading in rad2; NaN where there is none);
   // returns how many there are. NULL where the estimator has none.
   size_t (*landmarks)(const void *state, wm_landmark *out, double (*covariance)[4], size_t capacity);
+  // Particles, for who draws them; returns how many there are. NULL where the estimator has none.
+  size_t (*particles)(const void *state, wm_particle *out, size_t capacity);
 } wm_estimator;
 
 #define WM_INNOVATIONS_PER_EVENT_MAX 8

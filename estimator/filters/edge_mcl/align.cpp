@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/edge_mcl/align.hpp"
+
+#include "math/elementary.hpp"
+
+namespace wm {
+namespace {
+
+// A = L L'; false where A isn't positive definite.
+bool factor(const double a[kAlignStates][kAlignStates], int n, double lower[kAlignStates][kAlignStates]) {
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j <= i; j++) {
+      double sum = a[i][j];
+      for (int k = 0; k < j; k++) sum -= lower[i][k] * lower[j][k];
+      if (i != j)
+        lower[i][j] = sum / lower[j][j];
+      else if (!(sum > 0.0))
+        return false;
+      else
+        lower[i][i] = std::sqrt(sum);
+    }
+  return true;
+}
+
+void solve(const double lower[kAlignStates][kAlignStates], const double *b, int n, double *x) {
+  for (int i = 0; i < n; i++) {
+    x[i] = b[i];
+    for (int k = 0; k < i; k++) x[i] -= lower[i][k] * x[k];
+    x[i] /= lower[i][i];
+  }
+  for (int i = n - 1; i >= 0; i--) {
+    for (int k = i + 1; k < n; k++) x[i] -= lower[k][i] * x[k];
+    x[i] /= lower[i][i];
+  }
+}
+
+}  // namespace
+
+bool solve_positive(const double a[kAlignStates][kAlignStates], const double *b, int n, double *x) {
+  double lower[kAlignStates][kAlignStates];
+  if (!factor(a, n, lower)) return false;
+  solve(lower, b, n, x);
+  return true;
+}
+
+bool invert_positive(const double a[kAlignStates][kAlignStates], int n, double out[kAlignStates][kAlignStates]) {
+  double lower[kAlignStates][kAlignStates];
+  if (!factor(a, n, lower)) return false;
+  for (int j = 0; j < n; j++) {
+    double unit[kAlignStates] = {}, column[kAlignStates];
+    unit[j] = 1.0;
+    solve(lower, unit, n, column);
+    for (int i = 0; i < n; i++) out[i][j] = column[i];
+  }
+  return true;
+}
+
+double align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, double gate_m, double explained_m,
+                  int iterations, wm_pose2 *pose) {
+  int explained = 0;
+  for (int round = 0; round <= iterations; round++) {
+    double a[kAlignStates][kAlignStates] = {}, b[kAlignStates] = {}, step[kAlignStates];
+    const sin_cos h = sincos(pose->heading_rad);
+    explained = 0;
+    for (int i = 0; i < count; i++) {
+      const double px = (double)x_m[i], py = (double)y_m[i];
+      const double rx = h.cos * px - h.sin * py, ry = h.sin * px + h.cos * py;
+      const edge_line line = map.nearest(pose->x_m + rx, pose->y_m + ry);
+      if (!line.found || line.distance_m > gate_m) continue;
+      explained += line.distance_m <= explained_m;
+      const double row[3] = {line.normal_x, line.normal_y, line.normal_y * rx - line.normal_x * ry};
+      const double weight = 1.0 / (1.0 + square(line.offset_m / explained_m));
+      for (int r = 0; r < 3; r++) {
+        b[r] += weight * row[r] * line.offset_m;
+        for (int c = 0; c < 3; c++) a[r][c] += weight * row[r] * row[c];
+      }
+    }
+    if (round == iterations) break;
+    for (int r = 0; r < 3; r++) a[r][r] += 1.0;  // what the scan doesn't say stays
+    if (!solve_positive(a, b, 3, step)) break;
+    pose->x_m += step[0];
+    pose->y_m += step[1];
+    pose->heading_rad = wrap(pose->heading_rad + step[2]);
+  }
+  return count > 0 ? (double)explained / count : 0.0;
+}
+
+}  // namespace wm

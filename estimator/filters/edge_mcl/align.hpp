@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// Aligning a scan of edge points with the map's lines: point to line, Gauss-Newton with bounded influence.
+#ifndef WAYMARK_ESTIMATOR_EDGE_MCL_ALIGN_HPP
+#define WAYMARK_ESTIMATOR_EDGE_MCL_ALIGN_HPP
+
+#include "filters/edge_mcl/floor_camera.hpp"
+#include "maps/edge_map.hpp"
+#include "waymark/event.h"
+
+namespace wm {
+
+// What an alignment is about, by number; the pose comes first.
+enum align_state {
+  kAlignX,
+  kAlignY,
+  kAlignHeading,
+  kAlignCamera,
+  kAlignTime = kAlignCamera + kCameraErrors,
+  kAlignEdge,
+  kAlignStates
+};
+
+// Normal equations about a place: information and gradient of 1/2 sum of weighted squares, and how well it fitted.
+struct normal_equations {
+  double information[kAlignStates][kAlignStates];
+  double gradient[kAlignStates];  // towards the better
+  int seen;                       // points looked up
+  int explained;                  // of them: as near to an edge as they may be
+};
+
+// Solves A x = b for a symmetric positive definite A of n <= kAlignStates rows; false where it isn't.
+bool solve_positive(const double a[kAlignStates][kAlignStates], const double *b, int n, double *x);
+bool invert_positive(const double a[kAlignStates][kAlignStates], int n, double out[kAlignStates][kAlignStates]);
+
+// Aligns points in base_link by the pose alone, from `pose` on; returns the share of points explained there. For
+// candidates of a search. O(iterations * points).
+double align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, double gate_m, double explained_m,
+                  int iterations, wm_pose2 *pose);
+
+}  // namespace wm
+
+#endif

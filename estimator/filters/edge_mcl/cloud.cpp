@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/edge_mcl/cloud.hpp"
+
+#include <cstring>
+
+#include "math/arc.hpp"
+#include "waymark/random.h"
+
+namespace wm {
+
+void cholesky3(const double covariance[3][3], double lower[3][3]) {
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j <= i; j++) {
+      double sum = covariance[i][j];
+      for (int k = 0; k < j; k++) sum -= lower[i][k] * lower[j][k];
+      if (i == j)
+        lower[i][i] = sum > 0.0 ? std::sqrt(sum) : 0.0;
+      else
+        lower[i][j] = lower[j][j] > 0.0 ? sum / lower[j][j] : 0.0;
+    }
+}
+
+void cloud::init(int count, uint64_t seed, void *memory) {
+  count_ = count;
+  seed_ = seed;
+  step_ = 0;
+  memory_at_ = (ptrdiff_t)(reinterpret_cast<uintptr_t>(memory) - reinterpret_cast<uintptr_t>(this));
+  std::memset(memory, 0, bytes(count));
+}
+
+// Four numbers of variance 1 from one block of random bits: each the sum of three uniform ones of 10 bits. A step's
+// noise need not have the normal's tails; it must be cheap.
+void cloud::normals(int particle, double out[4]) const {
+  uint32_t block[4];
+  wm_random_block(seed_, step_, (uint64_t)particle, block);
+  for (int k = 0; k < 4; k++) {
+    const int sum = (int)(block[k] & 1023u) + (int)(block[k] >> 10 & 1023u) + (int)(block[k] >> 20 & 1023u);
+    out[k] = (sum - 1534.5) * (1.0 / 512.0);  // variance of the sum: 3 (1024^2 - 1)/12 = 512^2
+  }
+}
+
+void cloud::spread(const wm_pose2 &pose, const double covariance[3][3]) {
+  spread_some(0, count_, pose, covariance);
+  for (int i = 0; i < count_; i++) array(3)[i] = 1.0 / count_;
+}
+
+void cloud::spread_some(int from, int to, const wm_pose2 &pose, const double covariance[3][3]) {
+  double lower[3][3] = {};
+  cholesky3(covariance, lower);
+  step_++;
+  for (int i = from; i < to; i++) {
+    double n[4];
+    normals(i, n);
+    array(0)[i] = pose.x_m + lower[0][0] * n[0];
+    array(1)[i] = pose.y_m + lower[1][0] * n[0] + lower[1][1] * n[1];
+    array(2)[i] = wrap(pose.heading_rad + lower[2][0] * n[0] + lower[2][1] * n[1] + lower[2][2] * n[2]);
+  }
+}
+
+void cloud::move(const wm_pose2 &increment, const step_noise &noise) {
+  double *x = array(0), *y = array(1), *heading = array(2);
+  step_++;
+  for (int i = 0; i < count_; i++) {
+    double n[4];
+    normals(i, n);
+    // Half of the turn's noise comes before the way, half behind it.
+    const double turn = noise.turn_rad * n[2];
+    const double dx = increment.x_m + noise.along_m * n[0], dy = increment.y_m + noise.across_m * n[1];
+    const sin_cos h = sincos(heading[i] + 0.5 * turn);
+    x[i] += h.cos * dx - h.sin * dy;
+    y[i] += h.sin * dx + h.cos * dy;
+    heading[i] = wrap(heading[i] + increment.heading_rad + turn);
+  }
+}
+
+bool cloud::weigh(const edge_map &map, const scan_points &points, const score_table &table, double exponent, bool sum) {
+  const double *x = array(0), *y = array(1), *heading = array(2);
+  double *weight = array(3), *scored = array(4);
+  double best = 0.0;
+  bool any = false;
+  for (int i = 0; i < count_; i++) {
+    scored[i] = -1.0e300;
+    if (!map.drivable(x[i], y[i])) continue;
+    const sin_cos h = sincos(heading[i]);
+    scored[i] = kScoreUnit * score(map, points, table, x[i], y[i], h.cos, h.sin);
+    if (!any || scored[i] > best) best = scored[i];
+    any = true;
+  }
+  if (!any || (sum && !(best > 0.0))) return false;
+  double total = 0.0;
+  for (int i = 0; i < count_; i++) {
+    const double likelihood = scored[i] <= -1.0e300 ? 0.0 : sum ? scored[i] / best : exp(exponent * (scored[i] - best));
+    scored[i] = weight[i] * likelihood;
+    total += scored[i];
+  }
+  if (!(total > 1e-280)) return false;
+  for (int i = 0; i < count_; i++) weight[i] = scored[i] / total;
+  return true;
+}
+
+double cloud::effective() const {
+  const double *weight = array(3);
+  double squares = 0.0;
+  for (int i = 0; i < count_; i++) squares += weight[i] * weight[i];
+  return squares > 0.0 ? 1.0 / squares : 0.0;
+}
+
+// Low variance: one random number, then equal steps through the sum of the weights.
+void cloud::resample() {
+  step_++;
+  const double step = 1.0 / count_;
+  double at = step * wm_random_uniform(seed_, step_, 0), sum = array(3)[0];
+  int from = 0;
+  for (int i = 0; i < count_; i++, at += step) {
+    while (sum < at && from + 1 < count_) sum += array(3)[++from];
+    for (int k = 0; k < 3; k++) array(4 + k)[i] = array(k)[from];
+  }
+  for (int k = 0; k < 3; k++) std::memcpy(array(k), array(4 + k), (size_t)count_ * sizeof(double));
+  for (int i = 0; i < count_; i++) array(3)[i] = step;
+}
+
+void cloud::pull(const wm_pose2 &target, const double gain[3][3], double gate_m, double gate_rad) {
+  double *at[3] = {array(0), array(1), array(2)};
+  for (int i = 0; i < count_; i++) {
+    const double d[3] = {target.x_m - at[0][i], target.y_m - at[1][i], wrap(target.heading_rad - at[2][i])};
+    if (d[0] * d[0] + d[1] * d[1] > gate_m * gate_m || std::fabs(d[2]) > gate_rad) continue;
+    for (int r = 0; r < 3; r++) at[r][i] += gain[r][0] * d[0] + gain[r][1] * d[1] + gain[r][2] * d[2];
+    at[2][i] = wrap(at[2][i]);
+  }
+}
+
+int cloud::best() const {
+  int best = 0;
+  for (int i = 1; i < count_; i++)
+    if (weight(i) > weight(best)) best = i;
+  return best;
+}
+
+cloud_moments cloud::moments() const { return moments_near({x(best()), y(best()), heading(best())}, 1e9, 10.0); }
+
+cloud_moments cloud::moments_near(const wm_pose2 &centre, double radius_m, double radius_rad) const {
+  cloud_moments out{};
+  const auto near = [&](int i) {
+    return square(x(i) - centre.x_m) + square(y(i) - centre.y_m) <= radius_m * radius_m &&
+           std::fabs(wrap(heading(i) - centre.heading_rad)) <= radius_rad;
+  };
+  double sum[2] = {}, circle[2] = {};
+  for (int i = 0; i < count_; i++) {
+    if (!near(i)) continue;
+    const double w = weight(i);
+    const sin_cos h = sincos(heading(i));
+    out.share += w;
+    sum[0] += w * (x(i) - centre.x_m);
+    sum[1] += w * (y(i) - centre.y_m);
+    circle[0] += w * h.cos;
+    circle[1] += w * h.sin;
+  }
+  if (!(out.share > 0.0)) {
+    out.mean = centre;
+    return out;
+  }
+  out.mean = {centre.x_m + sum[0] / out.share, centre.y_m + sum[1] / out.share, atan2(circle[1], circle[0])};
+  for (int i = 0; i < count_; i++) {
+    if (!near(i)) continue;
+    const double d[3] = {x(i) - out.mean.x_m, y(i) - out.mean.y_m, wrap(heading(i) - out.mean.heading_rad)};
+    for (int r = 0; r < 3; r++)
+      for (int c = 0; c < 3; c++) out.covariance[r][c] += weight(i) * d[r] * d[c];
+  }
+  for (auto &row : out.covariance)
+    for (double &value : row) value /= out.share;
+  return out;
+}
+
+}  // namespace wm

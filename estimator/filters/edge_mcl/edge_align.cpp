@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+// How a scan moves the filter: aligned with the map's lines from the prediction on, together with what the camera may
+// be off by, and taken in as one measurement.
+#include "filters/edge_mcl/edge_mcl.hpp"
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+constexpr int kRounds = 4;
+
+}  // namespace
+
+edge_mcl::alignment edge_mcl::alignment_of(int camera) const {
+  alignment a{};
+  a.camera = camera;
+  for (int k = 0; k < kAlignStates; k++) a.state[k] = -1;
+  for (int k = 0; k < kPoseStates; k++) a.state[k] = k;
+  if (camera >= 0)
+    for (int k = 0; k <= kCameraErrors; k++) a.state[kAlignCamera + k] = camera_state_[camera][k];
+  a.state[kAlignEdge] = edge_state_;
+  for (int k = 0; k < kAlignStates; k++)
+    if (a.state[k] >= 0) a.value[k] = filter_.value(a.state[k]);
+  return a;
+}
+
+edge_mcl::taken_from edge_mcl::look_back(const alignment &a) const {
+  const wm_time_ns now = filter_.now_ns(), age = wm_ns_from_seconds(a.value[kAlignTime]);
+  taken_from t{};
+  motion_twist twist{};
+  const wm_pose2 way = age >= 0 ? filter_.path(now - age, now, &twist) : filter_.path(now, now - age, &twist);
+  t.from_now = age >= 0 ? between(way, wm_pose2{}) : way;
+  t.pose = compose({a.value[kAlignX], a.value[kAlignY], a.value[kAlignHeading]}, t.from_now);
+  t.v_mps = twist.v;
+  t.w_radps = twist.w;
+  return t;
+}
+
+void edge_mcl::accumulate(const wm_points &points, const alignment &a, double gate_m, normal_equations *out) const {
+  *out = normal_equations{};
+  const taken_from then = look_back(a);
+  const sin_cos h = sincos(then.pose.heading_rad);
+  const double seen_from[2] = {a.camera >= 0 ? camera_[a.camera].x_m : 0.0,
+                               a.camera >= 0 ? camera_[a.camera].y_m : 0.0};
+  const double eye_x = then.pose.x_m + h.cos * seen_from[0] - h.sin * seen_from[1];
+  const double eye_y = then.pose.y_m + h.sin * seen_from[0] + h.cos * seen_from[1];
+  const double cos_gate = cos(params_.normal_gate_rad);
+  for (uint32_t i = 0; i < points.count; i++) {
+    floor_point p{(double)points.x_m[i], (double)points.y_m[i], {}, {}};
+    if (a.camera >= 0) {
+      if (camera_[a.camera].range(p.x, p.y) > params_.range_max_m) continue;
+      if (!camera_[a.camera].correct(p.x, p.y, a.value + kAlignCamera, &p)) continue;
+    }
+    const double rx = h.cos * p.x - h.sin * p.y, ry = h.sin * p.x + h.cos * p.y;  // from base_link then, in map axes
+    const double x = then.pose.x_m + rx, y = then.pose.y_m + ry;
+    out->seen++;
+    edge_line line = map_.nearest(x, y);
+    if (!line.found || line.distance_m > gate_m) continue;
+    // What is seen of an edge is the floor on this side of it: its normal points away.
+    if (line.normal_x * (x - eye_x) + line.normal_y * (y - eye_y) < 0.0) {
+      line.normal_x = -line.normal_x;
+      line.normal_y = -line.normal_y;
+      line.offset_m = -line.offset_m;
+    }
+    if (finite((double)points.normal_rad[i])) {
+      const sin_cos n = sincos((double)points.normal_rad[i] + then.pose.heading_rad);
+      if (n.cos * line.normal_x + n.sin * line.normal_y < cos_gate) continue;
+    }
+    const double sigma2 = square(point_sigma(points, i, a.camera)) + square(params_.point_sigma_m);
+    const double residual = line.offset_m - (edge_state_ >= 0 ? a.value[kAlignEdge] : 0.0);
+    const double misfit = residual * residual / sigma2;
+    out->explained += line.distance_m < 0.06 || misfit < 9.0;
+
+    double row[kAlignStates] = {};
+    row[kAlignX] = line.normal_x;
+    row[kAlignY] = line.normal_y;
+    row[kAlignHeading] = line.normal_y * (x - a.value[kAlignX]) - line.normal_x * (y - a.value[kAlignY]);
+    for (int k = 0; k < kCameraErrors; k++)
+      row[kAlignCamera + k] = line.normal_x * (h.cos * p.x_by[k] - h.sin * p.y_by[k]) +
+                              line.normal_y * (h.sin * p.x_by[k] + h.cos * p.y_by[k]);
+    row[kAlignTime] = -(line.normal_x * (then.v_mps * h.cos - then.w_radps * ry) +
+                        line.normal_y * (then.v_mps * h.sin + then.w_radps * rx));
+    row[kAlignEdge] = 1.0;
+    // Student's distribution with 4 degrees of freedom: what doesn't fit has little to say.
+    const double weight = 5.0 / (4.0 + misfit) / (sigma2 * params_.correlated);
+    for (int r = 0; r < kAlignStates; r++) {
+      if (a.state[r] < 0) continue;
+      out->gradient[r] += weight * row[r] * residual;
+      for (int c = 0; c < kAlignStates; c++)
+        if (a.state[c] >= 0) out->information[r][c] += weight * row[r] * row[c];
+    }
+  }
+}
+
+// Iterated: minimises the prediction's and the scan's misfit together, then takes in what the scan says there as scalar
+// measurements, one for each row of the information's factor. Source: the iterated extended Kalman filter (B. M. Bell,
+// F. W. Cathey, "The iterated Kalman filter update as a Gauss-Newton method", 1993), in information form.
+bool edge_mcl::align(const wm_points &points, int camera, wm_innovation *record) {
+  alignment a = alignment_of(camera);
+  const alignment prior = a;
+  int index[kAlignStates], n = 0;
+  for (int k = 0; k < kAlignStates; k++)
+    if (a.state[k] >= 0) index[n++] = k;
+  double covariance[kAlignStates][kAlignStates], inverse[kAlignStates][kAlignStates];
+  for (int r = 0; r < n; r++)
+    for (int c = 0; c < n; c++) covariance[r][c] = filter_.covariance(a.state[index[r]], a.state[index[c]]);
+  if (!invert_positive(covariance, n, inverse)) return false;
+
+  const double sigma_xy = std::sqrt(filter_.variance(kX) + filter_.variance(kY) + 9.0 * filter_.variance(kHeading));
+  normal_equations e;
+  for (int round = 0; round < kRounds; round++) {
+    // From as far as the pose may be off down to the gate.
+    const double wide = params_.gate_m + (round < 2 ? 3.0 * sigma_xy : 0.0);
+    accumulate(points, a, wide > 0.5 ? 0.5 : wide, &e);
+    if (round + 1 == kRounds) break;
+    double total[kAlignStates][kAlignStates], right[kAlignStates], step[kAlignStates];
+    for (int r = 0; r < n; r++) {
+      right[r] = e.gradient[index[r]];
+      for (int c = 0; c < n; c++) {
+        double off = prior.value[index[c]] - a.value[index[c]];
+        if (index[c] == kAlignHeading) off = wrap(off);
+        total[r][c] = inverse[r][c] + e.information[index[r]][index[c]];
+        right[r] += inverse[r][c] * off;
+      }
+    }
+    if (!solve_positive(total, right, n, step)) return false;
+    for (int r = 0; r < n; r++) a.value[index[r]] += step[r];
+    a.value[kAlignHeading] = wrap(a.value[kAlignHeading]);
+  }
+  record->observed = e.seen > 0 ? (double)e.explained / e.seen : 0.0;
+  record->expected = explained_;
+  record->gate_dof = 3;
+  record->verdict = e.explained < 5 ? (uint8_t)WM_REJECTED_SINGULAR : (uint8_t)WM_FUSED;
+  if (e.explained < 5) return false;
+
+  // information = L D L'; the rows of L' measure what the scan knows, with variances 1/D.
+  double lower[kAlignStates][kAlignStates] = {}, d[kAlignStates];
+  for (int i = 0; i < n; i++) {
+    d[i] = e.information[index[i]][index[i]];
+    for (int k = 0; k < i; k++) d[i] -= lower[i][k] * lower[i][k] * d[k];
+    if (!(d[i] > 1e-9 * e.information[index[i]][index[i]])) d[i] = 0.0;
+    lower[i][i] = 1.0;
+    for (int j = i + 1; j < n; j++) {
+      double sum = e.information[index[j]][index[i]];
+      for (int k = 0; k < i; k++) sum -= lower[j][k] * lower[i][k] * d[k];
+      lower[j][i] = d[i] > 0.0 ? sum / d[i] : 0.0;
+    }
+  }
+  double forward[kAlignStates];  // L^-1 gradient
+  for (int i = 0; i < n; i++) {
+    forward[i] = e.gradient[index[i]];
+    for (int k = 0; k < i; k++) forward[i] -= lower[i][k] * forward[k];
+  }
+  for (int i = 0; i < n; i++) {
+    if (!(d[i] > 0.0)) continue;
+    sparse_row row;
+    double innovation = forward[i] / d[i];
+    for (int j = i; j < n; j++) {
+      const int state = a.state[index[j]];
+      double off = a.value[index[j]] - filter_.value(state);
+      if (index[j] == kAlignHeading) off = wrap(off);
+      row.add(state, lower[j][i]);
+      innovation += lower[j][i] * off;
+    }
+    projection projected;
+    filter_.project(row, &projected);
+    if (i == 0) {
+      record->variance = projected.variance + 1.0 / d[i];
+      record->nis = innovation * innovation / record->variance;
+    }
+    filter_.update(projected, innovation, 1.0 / d[i]);
+  }
+  pull_cloud(e);
+  return true;
+}
+
+// The optimal proposal's mean, as far as a Gauss approximation about the aligned pose goes: gain (Q^-1 + A)^-1 A.
+void edge_mcl::pull_cloud(const normal_equations &e) {
+  if (params_.pull <= 0.0) return;
+  double total[kAlignStates][kAlignStates] = {}, inverse[kAlignStates][kAlignStates], gain[3][3];
+  const double step = params_.noise_way * std::sqrt(0.1), turn = params_.noise_turn * std::sqrt(0.1);
+  const double own[3] = {1.0 / square(step + 1e-4), 1.0 / square(step + 1e-4), 1.0 / square(turn + 1e-4)};
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 3; c++) total[r][c] = e.information[r][c] + (r == c ? own[r] : 0.0);
+  if (!invert_positive(total, 3, inverse)) return;
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 3; c++) {
+      gain[r][c] = 0.0;
+      for (int k = 0; k < 3; k++) gain[r][c] += params_.pull * inverse[r][k] * e.information[k][c];
+    }
+  cloud_.pull(filter_.pose(), gain, 0.3, 0.1);
+}
+
+}  // namespace wm

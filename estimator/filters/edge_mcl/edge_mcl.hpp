@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+// Localization by edges on the floor against a raster map (system 4): a cloud of particles for where the robot could
+// be, and about its main cluster a Kalman filter that aligns each scan with the map's lines and learns what is wrong
+// with motion sensors and camera. docs/estimators.md has the model.
+#ifndef WAYMARK_ESTIMATOR_EDGE_MCL_HPP
+#define WAYMARK_ESTIMATOR_EDGE_MCL_HPP
+
+#include "filters/edge_mcl/align.hpp"
+#include "filters/edge_mcl/cloud.hpp"
+#include "filters/edge_mcl/params.h"
+#include "filters/edge_mcl/place_search.hpp"
+#include "filters/planar/planar_filter.hpp"
+#include "waymark/estimator.h"
+
+namespace wm {
+
+class edge_mcl {
+ public:
+  static constexpr int kCamerasMax = 2;
+
+  static size_t bytes(const wm_edge_mcl_params &params, const wm_setup &setup, const char **why);
+  void init(const wm_edge_mcl_params &params, const wm_setup &setup);
+
+  wm_status predict(const wm_event &motion);
+  wm_status correct(const wm_event &event, wm_innovation *out, size_t capacity, size_t *count);
+  void estimate(wm_estimate *out) const;
+  size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
+  size_t list_particles(wm_particle *out, size_t capacity) const;
+  const planar_filter &filter() const { return filter_; }
+
+ private:
+  // What an alignment changes, and where the scan was taken by the newest guess of the time offset.
+  struct alignment {
+    int camera, count;
+    int state[kAlignStates];  // of the filter; -1: not one
+    double value[kAlignStates];
+  };
+  struct taken_from {
+    wm_pose2 pose;      // base_link in map when the picture was taken
+    wm_pose2 from_now;  // the same as seen from now's base_link
+    double v_mps, w_radps;
+  };
+
+  wm_status take_points(const wm_event &event, wm_innovation *out, size_t capacity, size_t *count);
+  wm_status take_pose(const wm_event &event);
+  void start_again(bool known);
+
+  int camera_of(const wm_points &points) const;
+  double point_sigma(const wm_points &points, uint32_t i, int camera) const;
+  void prepare(const wm_points &points, int camera);
+  void move_cloud();
+  void weigh_cloud();
+  alignment alignment_of(int camera) const;
+  taken_from look_back(const alignment &a) const;
+  void accumulate(const wm_points &points, const alignment &a, double gate_m, normal_equations *out) const;
+  bool align(const wm_points &points, int camera, wm_innovation *record);
+  void pull_cloud(const normal_equations &equations);
+  void watch(double explained, int seen, double dt_s);
+  void heed_cloud();
+  void search();
+  void take_place(const place &p);
+
+  const wm_setup *setup_;
+  wm_edge_mcl_params params_;
+  planar_filter filter_;
+  edge_map map_;
+  cloud cloud_;
+  score_table table_;
+  scan_points scan_;
+  place_search search_;
+  floor_camera camera_[kCamerasMax];
+  int camera_count_;
+  int camera_state_[kCamerasMax][kCameraErrors + 1];  // and the time offset
+  int edge_state_;
+  int calibration_states_;
+  wm_pose2 cloud_odom_;
+  double cloud_travelled_m_, cloud_turned_rad_;
+  wm_time_ns cloud_ns_, fused_ns_, watched_ns_;
+  double lost_odds_;  // logarithm of
+  double explained_;  // share, smoothed
+  double apart_s_;    // the cloud's main cluster has been elsewhere, and better
+  uint32_t resets_;
+  uint8_t state_;
+};
+
+}  // namespace wm
+
+#endif

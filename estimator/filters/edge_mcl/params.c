@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/edge_mcl/params.h"
+
+#include <stddef.h>
+
+typedef struct wm_edge_mcl_params params;
+
+static const char *const kWeights[] = {"product", "sum", NULL};
+static const char *const kPoses[] = {"refined", "cloud", NULL};
+
+#define F64(key, field, initial, min, max, about) \
+  { key, WM_PARAM_F64, offsetof(params, field), initial, min, max, NULL, about }
+#define I32(key, field, initial, min, max, about) \
+  { key, WM_PARAM_I32, offsetof(params, field), initial, min, max, NULL, about }
+#define ENUM(key, field, initial, max, names, about) \
+  { key, WM_PARAM_ENUM, offsetof(params, field), initial, 0, max, names, about }
+
+static const wm_param kParams[] = {
+    WM_MOTION_STATE_PARAMS(params, motion),
+    F64("states.pitch_sigma_rad", pitch_sigma_rad, 0.005, 0, 0.5,
+        "Start sigma of each camera's pitch about calibration.yaml's, rad. 0.1 degrees are 7 cm of floor at 4 m. 0: "
+        "off."),
+    F64("states.roll_sigma_rad", roll_sigma_rad, 0.003, 0, 0.5, "The same of its roll about the view, rad. 0: off."),
+    F64("states.yaw_sigma_rad", yaw_sigma_rad, 0.003, 0, 0.5, "The same of its yaw, rad. 0: off."),
+    F64("states.height_sigma_m", height_sigma_m, 0.005, 0, 0.5, "The same of its height above the floor, m. 0: off."),
+    F64("states.angle_walk_rad", angle_walk_rad, 0.00002, 0, 0.1,
+        "Random walk of pitch, roll and yaw, rad per sqrt(s): springs, loads."),
+    F64("states.time_offset_sigma_s", time_offset_sigma_s, 0.01, 0, 0.3,
+        "Start sigma of each camera's time offset, s: its pictures are that much older than their stamps. 0: off."),
+    F64("states.edge_offset_sigma_m", edge_offset_sigma_m, 0.01, 0, 0.3,
+        "Start sigma of what lies between the edge that the detector sees and the map's, m: skirting, contact shadow. "
+        "0: off."),
+
+    I32("particles", particles, 200, 10, 20000, "How many particles."),
+    ENUM("weight", weight, EDGE_MCL_PRODUCT, 1, kWeights,
+         "A particle's weight: `product` of its points' likelihoods, tempered; or their `sum`, as the paper has it."),
+    ENUM("pose", pose, EDGE_MCL_REFINED, 1, kPoses,
+         "What is given out while the cloud is one cluster: `refined`, by aligning the scan with the map's lines from "
+         "the filter's prediction; or the `cloud`'s weighted mean on the circle and covariance."),
+    F64("exponent", exponent, 0.08, 0.001, 1,
+        "What the product of the points' likelihoods is raised to: neighbouring points err together, so that 180 of "
+        "them say as much as about 15."),
+    F64("sigma_m", sigma_m, 0.05, 0.005, 0.5,
+        "Sigma of the likelihood field besides the point's own, m: map, mounting and the coarseness of a small cloud."),
+    F64("floor", floor, 0.05, 0.0001, 0.9,
+        "Share of points that are no edge of the map: what any point counts at least."),
+    F64("resample_below", resample_below, 0.5, 0, 1,
+        "Resampling when the effective number of particles falls below this share of them."),
+    F64("noise.way", noise_way, 0.02, 0, 1, "Of the cloud: noise along the way, m per sqrt(m)."),
+    F64("noise.side", noise_side, 0.01, 0, 1,
+        "Of the cloud: noise across the way, m per sqrt(m). A robot does not go exactly where it points; without it a "
+        "cloud that drives backwards is lost."),
+    F64("noise.turn", noise_turn, 0.01, 0, 1, "Of the cloud: noise of the heading, rad per sqrt(m)."),
+    F64("noise.turn_rest", noise_turn_rest, 0.003, 0, 1, "Of the cloud: noise of the heading, rad per sqrt(s)."),
+    F64("noise.turn_rel", noise_turn_rel, 0.02, 0, 1, "Of the cloud: noise of the heading, rad per sqrt(rad) of turn."),
+    F64("pull", pull, 0.5, 0, 1,
+        "Share of the way to the aligned scan's maximum that the particles near it are moved: towards the optimal "
+        "proposal. 0: the motion alone proposes."),
+
+    F64("points.pixel_px", pixel_px, 0.5, 0.01, 10,
+        "Sigma of an edge in the picture, pixels, where the detector doesn't give it in metres."),
+    F64("points.sigma_m", point_sigma_m, 0.012, 0.001, 1, "Sigma of a point besides: map and edge, m."),
+    F64("points.correlated", correlated, 30, 1, 1000,
+        "As many points of successive scans err together: the alignment counts each as so many times less."),
+    F64("points.range_max_m", range_max_m, 6.0, 0.5, 50, "Points farther from the camera are not used, m."),
+    F64("points.gate_m", gate_m, 0.15, 0.01, 0.6, "A point farther from the map's edge than this is not aligned, m."),
+    F64("points.normal_gate_rad", normal_gate_rad, 0.6, 0.05, 1.6,
+        "Nor is one whose edge runs otherwise than the map's by more than this, rad."),
+    F64("lasting.xy_m", lasting_xy_m, 0.004, 0, 1,
+        "What the pose is unsure of beside the filter's covariance, m: errors that last longer than it remembers."),
+    F64("lasting.heading_rad", lasting_heading_rad, 0.0005, 0, 1, "The same of the heading, rad."),
+
+    F64("lost.explained", lost_explained, 0.5, 0.05, 0.95,
+        "Share of the points that the map explains at which a scan speaks neither for nor against being lost."),
+    F64("lost.gain", lost_gain, 4.0, 0.1, 100,
+        "How much a scan speaks: the logarithm of the odds changes by this times the share's difference."),
+    F64("lost.per_s", lost_per_s, 0.0001, 0, 1, "Probability of being lost out of the blue, per s (someone lifts it)."),
+    F64("search.way_m", search_way_m, 2.0, 0, 100, "Way that is looked at together before a search takes a place, m."),
+    F64("search.explained", search_explained, 0.65, 0.05, 1, "Share of these points that the place must explain."),
+    F64("search.margin", search_margin, 0.1, 0, 1,
+        "And by how much more than the second best place, in shares of the points."),
+    I32("search.poses", search_poses, 4000, 100, 1000000, "Poses tried a scan while searching."),
+    F64("dead_reckoning_after_s", dead_reckoning_after_s, 1.0, 0.05, 3600,
+        "Nothing fused for so long: the state says dead reckoning."),
+};
+
+const wm_param_table wm_edge_mcl_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params)};

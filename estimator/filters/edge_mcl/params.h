@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef WAYMARK_ESTIMATOR_EDGE_MCL_PARAMS_H
+#define WAYMARK_ESTIMATOR_EDGE_MCL_PARAMS_H
+
+#include <stdint.h>
+
+#include "filters/planar/motion_states.h"
+#include "waymark/params.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum edge_mcl_weight { EDGE_MCL_PRODUCT, EDGE_MCL_SUM };
+enum edge_mcl_pose { EDGE_MCL_REFINED, EDGE_MCL_CLOUD };
+
+typedef struct wm_edge_mcl_params {
+  wm_motion_states motion;
+  double pitch_sigma_rad, roll_sigma_rad, yaw_sigma_rad, height_sigma_m, time_offset_sigma_s, edge_offset_sigma_m;
+  double angle_walk_rad;
+
+  int32_t particles, weight, pose;
+  double exponent, sigma_m, floor, resample_below;
+  double noise_way, noise_side, noise_turn, noise_turn_rest, noise_turn_rel;
+  double pull;
+
+  double pixel_px, point_sigma_m, correlated, range_max_m;
+  double gate_m, normal_gate_rad;
+  double lasting_xy_m, lasting_heading_rad;
+
+  double lost_explained, lost_gain, lost_per_s;
+  double search_way_m, search_explained, search_margin;
+  int32_t search_poses;
+  double dead_reckoning_after_s;
+} wm_edge_mcl_params;
+
+extern const wm_param_table wm_edge_mcl_params_table;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where on the map could this be? The points of the last metres, put together by odometry, against every place where
+// the robot may stand: a sweep over a grid, some thousand poses a scan, then the best are aligned and compared.
+#ifndef WAYMARK_ESTIMATOR_EDGE_MCL_PLACE_SEARCH_HPP
+#define WAYMARK_ESTIMATOR_EDGE_MCL_PLACE_SEARCH_HPP
+
+#include "filters/edge_mcl/likelihood.hpp"
+#include "filters/edge_mcl/params.h"
+#include "waymark/frames.h"
+
+namespace wm {
+
+struct place {
+  wm_pose2 pose;     // base_link in map when the sweep began
+  int32_t score;     // on the grid
+  double explained;  // share of the points, aligned
+};
+
+class place_search {
+ public:
+  static constexpr int kPlaces = 24;
+
+  void init(const edge_map &map);
+  // Forgets what was seen.
+  void clear();
+  // A scan in base_link and where odometry says it was taken; kept if the robot has moved since the last one kept.
+  void see(const scan_points &scan, const wm_pose2 &odom);
+  // Goes on by about `poses` poses. True when a sweep has ended: places() are then sorted by what they explain.
+  bool step(const edge_map &map, int poses, const wm_pose2 &odom);
+  const place *places(int *count) const {
+    *count = place_count_;
+    return places_;
+  }
+  wm_pose2 odom_of_places() const { return odom_; }
+  double way_m() const { return way_m_; }  // that is looked at together
+
+ private:
+  static constexpr int kKeyframes = 16, kPointsEach = 32, kSweepPoints = 96;
+
+  void begin(const wm_pose2 &odom);
+  void offer(const wm_pose2 &pose, int32_t score);
+  void refine(const edge_map &map);
+
+  struct keyframe {
+    wm_pose2 odom;
+    int count;
+    float x_m[kPointsEach], y_m[kPointsEach];
+  };
+  keyframe keyframes_[kKeyframes];
+  uint64_t seen_;
+  double way_m_;
+  score_table wide_;
+  scan_points all_, few_;  // in base_link at odom_
+  wm_pose2 odom_;
+  bool running_;
+  int64_t next_;  // pose of the sweep
+  int refined_;
+  place places_[kPlaces];
+  int place_count_;
+};
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "maps/edge_map.hpp"
+
+#include <cstring>
+
+#include "math/elementary.hpp"
+
+namespace wm {
+namespace {
+
+constexpr size_t aligned(size_t bytes) { return (bytes + 63) & ~(size_t)63; }
+constexpr int kLineRadius = 6;  // pixels on each side that a line is fitted to
+constexpr double kLineUnit_px = 1.0 / 32;
+constexpr double kLineVariance_px2 = 0.7;  // across it; a line of one pixel's width has up to 1/6
+constexpr int8_t kNoLine = -128;
+
+int tiles_along(uint32_t pixels) { return (int)((pixels + edge_map::kTile - 1) >> edge_map::kTileShift); }
+
+int reach_of(const wm_raster &raster) {
+  const double pixels = edge_map::kReach_m / raster.resolution_m;
+  return pixels < 2.0 ? 2 : pixels > edge_map::kReachPixelsMax ? edge_map::kReachPixelsMax : (int)pixels;
+}
+
+// Calls visit(tile column, tile row) for every tile with an edge in it.
+template <class Visit>
+void each_tile_with_edges(const wm_raster &raster, Visit visit) {
+  const int columns = tiles_along(raster.width_px), rows = tiles_along(raster.height_px);
+  for (int row = 0; row < rows; row++)
+    for (int column = 0; column < columns; column++) {
+      const size_t x = (size_t)column << edge_map::kTileShift, y0 = (size_t)row << edge_map::kTileShift;
+      const size_t width = raster.width_px - x < edge_map::kTile ? raster.width_px - x : edge_map::kTile;
+      bool found = false;
+      for (size_t y = y0; y < y0 + edge_map::kTile && y < raster.height_px && !found; y++) {
+        const uint8_t *at = raster.edges + y * raster.width_px + x;
+        size_t i = 0;
+        uint64_t any = 0, eight;
+        for (; i + 8 <= width; i += 8) {
+          std::memcpy(&eight, at + i, 8);
+          any |= eight;
+        }
+        for (; i < width; i++) any |= at[i];
+        found = any != 0;
+      }
+      if (found) visit(column, row);
+    }
+}
+
+// Whether a tile is within reach of one with edges: a neighbour at most, as the reach is less than two tiles.
+constexpr int kNeighbours = (edge_map::kReachPixelsMax + edge_map::kTile - 1) / edge_map::kTile;
+
+}  // namespace
+
+// Counts the tiles within reach with the marks of five rows of tiles at a time.
+size_t edge_map::bytes(const wm_raster &raster) {
+  if (!raster.edges || raster.width_px == 0 || raster.height_px == 0 || raster.width_px > 32768 ||
+      raster.height_px > 32768 || !(raster.resolution_m > 0.0))
+    return 0;
+  const int columns = tiles_along(raster.width_px), rows = tiles_along(raster.height_px);
+  static_assert(32768 / kTile <= 512);
+  bool marked[5][512 + 4] = {};  // rows of tiles: two above, this, two below
+  int newest = -1;
+  size_t count = 1;
+  const auto close_row = [&](int row) {  // counts what is within reach in `row`
+    for (int c = 0; c < columns; c++) {
+      bool near = false;
+      for (int dy = -kNeighbours; dy <= kNeighbours; dy++)
+        for (int dx = -kNeighbours; dx <= kNeighbours; dx++) near |= marked[(row + dy + 5) % 5][c + dx + 2];
+      count += near;
+    }
+  };
+  const auto open_row = [&](int row) { std::memset(marked[(row + 5) % 5], 0, sizeof marked[0]); };
+  const auto advance = [&](int row) {  // rows up to `row` are complete but for `row` itself
+    while (newest < row) {
+      newest++;
+      if (newest >= kNeighbours + 1) close_row(newest - kNeighbours - 1);
+      open_row(newest);
+    }
+  };
+  each_tile_with_edges(raster, [&](int column, int row) {
+    advance(row);
+    marked[row % 5][column + 2] = true;
+  });
+  advance(rows + kNeighbours);
+  if (count > kTilesMax) return 0;
+  return aligned((size_t)columns * (size_t)rows * sizeof(uint32_t)) + count * kTilePixels * (1 + sizeof(offset)) +
+         aligned((size_t)3 * raster.width_px * sizeof(int32_t));
+}
+
+void edge_map::init(const wm_raster &raster, void *memory) {
+  raster_ = &raster;
+  const sin_cos yaw = sincos(raster.origin_yaw_rad);
+  cos_yaw_ = yaw.cos;
+  sin_yaw_ = yaw.sin;
+  reach_px_ = reach_of(raster);
+  unit_m_ = reach_px_ * raster.resolution_m / (kFar - 1);
+  tile_columns_ = tiles_along(raster.width_px);
+  tile_rows_ = tiles_along(raster.height_px);
+  const int directory = tile_columns_ * tile_rows_;
+  const auto place = [this](const void *there) {
+    return (ptrdiff_t)(reinterpret_cast<uintptr_t>(there) - reinterpret_cast<uintptr_t>(this));
+  };
+  uint32_t *tile = static_cast<uint32_t *>(memory);
+  tile_at_ = place(tile);
+  std::memset(tile, 0, (size_t)directory * sizeof(uint32_t));
+  each_tile_with_edges(raster, [&](int column, int row) {
+    for (int y = row - kNeighbours; y <= row + kNeighbours; y++)
+      for (int x = column - kNeighbours; x <= column + kNeighbours; x++)
+        if (x >= 0 && y >= 0 && x < tile_columns_ && y < tile_rows_) tile[y * tile_columns_ + x] = 1;
+  });
+  uint32_t count = 1;
+  for (int i = 0; i < directory; i++)
+    if (tile[i]) tile[i] = count++ * kTilePixels;
+  uint8_t *next = static_cast<uint8_t *>(memory) + aligned((size_t)directory * sizeof(uint32_t));
+  distance_at_ = place(next);
+  std::memset(next, kFar, (size_t)count * kTilePixels);
+  next += (size_t)count * kTilePixels;
+  offset_at_ = place(next);
+  next += (size_t)count * kTilePixels * sizeof(offset);
+  scratch_at_ = place(next);
+  sweep_columns();
+  for (int row = 0; row < (int)raster.height_px; row++) sweep_row(row);
+  fit_lines();
+}
+
+// First pass: to the nearest edge in the same column, in offset.y; reach + 1 where there is none.
+void edge_map::sweep_columns() {
+  const int none = reach_px_ + 1;
+  for (int tx = 0; tx < tile_columns_; tx++) {
+    const int x0 = tx << kTileShift;
+    const int width = (int)raster_->width_px - x0 < kTile ? (int)raster_->width_px - x0 : kTile;
+    int above[kTile], below[kTile];
+    for (int &a : above) a = none;
+    for (int &b : below) b = none;
+    for (int row = 0; row < (int)raster_->height_px; row++) {
+      const uint32_t tile = tiles()[(row >> kTileShift) * tile_columns_ + tx];
+      if (!tile) continue;  // out of reach: so is every edge above it
+      const uint8_t *edges = raster_->edges + (size_t)row * raster_->width_px + (size_t)x0;
+      offset *to = offsets() + tile + in_row(0, row);
+      for (int i = 0; i < width; i++) {
+        above[i] = edges[i] ? 0 : above[i] < none ? above[i] + 1 : none;
+        to[i].y = (int8_t)-above[i];
+      }
+    }
+    for (int row = (int)raster_->height_px - 1; row >= 0; row--) {
+      const uint32_t tile = tiles()[(row >> kTileShift) * tile_columns_ + tx];
+      if (!tile) continue;
+      const uint8_t *edges = raster_->edges + (size_t)row * raster_->width_px + (size_t)x0;
+      offset *to = offsets() + tile + in_row(0, row);
+      for (int i = 0; i < width; i++) {
+        below[i] = edges[i] ? 0 : below[i] < none ? below[i] + 1 : none;
+        if (below[i] < -to[i].y) to[i].y = (int8_t)below[i];
+      }
+    }
+  }
+}
+
+// Second pass: the lower envelope of the parabolas that stand over a row's columns.
+void edge_map::sweep_row(int row) {
+  const uint32_t *tile = tiles() + (row >> kTileShift) * tile_columns_;
+  uint8_t *distance = at<uint8_t>(distance_at_);
+  offset *edge_offset = offsets();
+  const int width = (int)raster_->width_px, none = reach_px_ + 1;
+  int32_t *site = at<int32_t>(scratch_at_), *site_y = site + width, *start = site_y + width;
+  int count = 0;
+  for (int tx = 0; tx < tile_columns_; tx++) {
+    if (!tile[tx]) continue;
+    const int end = (tx + 1) << kTileShift < width ? (tx + 1) << kTileShift : width;
+    for (int column = tx << kTileShift; column < end; column++) {
+      const int y = edge_offset[tile[tx] + in_row(column, row)].y;
+      if (y == none || y == -none) continue;
+      int from = INT32_MIN;
+      while (count > 0) {
+        // From here on this one is the lower: (own - other)/(2 (column - other's)), rounded up.
+        const int other = site[count - 1], twice = 2 * (column - other);
+        const int difference = y * y + column * column - site_y[count - 1] * site_y[count - 1] - other * other;
+        from = difference <= 0 ? -((-difference) / twice) : (difference + twice - 1) / twice;
+        if (from > start[count - 1]) break;
+        count--;
+      }
+      site[count] = column;
+      site_y[count] = y;
+      start[count] = count == 0 ? INT32_MIN : from;
+      count++;
+    }
+  }
+  int at = 0;
+  for (int tx = 0; tx < tile_columns_ && count > 0; tx++) {
+    if (!tile[tx]) continue;
+    const int end = (tx + 1) << kTileShift < width ? (tx + 1) << kTileShift : width;
+    for (int column = tx << kTileShift; column < end; column++) {
+      while (at + 1 < count && start[at + 1] <= column) at++;
+      const int dx = site[at] - column, dy = site_y[at];
+      const int square_px = dx * dx + dy * dy;
+      if (square_px > reach_px_ * reach_px_) continue;
+      edge_offset[tile[tx] + in_row(column, row)] = {(int8_t)dx, (int8_t)dy};
+      const double steps = std::sqrt((double)square_px) * raster_->resolution_m / unit_m_ + 0.5;
+      distance[tile[tx] + (uint32_t)inside(column, row)] = steps < kFar ? (uint8_t)steps : (uint8_t)(kFar - 1);
+    }
+  }
+}
+
+// The line through an edge's pixels near by: mean and principal axis. Where they don't lie on one (corners, ends of
+// three walls), the pixel has none.
+void edge_map::fit_lines() {
+  for (int row = 0; row < (int)raster_->height_px; row++)
+    for (int column = 0; column < (int)raster_->width_px; column++) {
+      if (!tile_of(column, row)) {
+        column |= kTile - 1;
+        continue;
+      }
+      if (!is_edge(column, row)) continue;
+      int n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
+      for (int y = -kLineRadius; y <= kLineRadius; y++)
+        for (int x = -kLineRadius; x <= kLineRadius; x++) {
+          if (!is_edge(column + x, row + y)) continue;
+          n++;
+          sx += x;
+          sy += y;
+          sxx += x * x;
+          sxy += x * y;
+          syy += y * y;
+        }
+      const double mean_x = (double)sx / n, mean_y = (double)sy / n;
+      const double xx = (double)sxx / n - mean_x * mean_x, yy = (double)syy / n - mean_y * mean_y;
+      const double xy = (double)sxy / n - mean_x * mean_y;
+      const double half = 0.5 * (xx + yy), spread = std::sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy);
+      offset &to = offsets()[tile_of(column, row) + in_row(column, row)];
+      to = {0, kNoLine};
+      if (half - spread > kLineVariance_px2 || half + spread < 1.0) continue;
+      const double normal = 0.5 * atan2(2.0 * xy, xx - yy) + kHalfPi;  // (0, pi]
+      const int turn = (int)(normal * (256.0 / kPi) + 0.5) & 255;
+      const sin_cos a = sincos(turn * (kPi / 256.0));
+      const double way = (a.cos * mean_x + a.sin * mean_y) / kLineUnit_px;
+      to = {(int8_t)(uint8_t)turn, (int8_t)(int)std::floor(way + 0.5)};
+    }
+}
+
+void edge_map::to_pixels(double x_m, double y_m, double *column, double *row) const {
+  const double dx = x_m - raster_->origin_x_m, dy = y_m - raster_->origin_y_m;
+  const double inverse = 1.0 / raster_->resolution_m;
+  *column = (cos_yaw_ * dx + sin_yaw_ * dy) * inverse;
+  *row = (double)raster_->height_px - (cos_yaw_ * dy - sin_yaw_ * dx) * inverse;
+}
+
+void edge_map::to_map(double column, double row, double *x_m, double *y_m) const {
+  const double x = column * raster_->resolution_m;
+  const double y = ((double)raster_->height_px - row) * raster_->resolution_m;
+  *x_m = raster_->origin_x_m + cos_yaw_ * x - sin_yaw_ * y;
+  *y_m = raster_->origin_y_m + sin_yaw_ * x + cos_yaw_ * y;
+}
+
+bool edge_map::inside_map(double column, double row) const {
+  return column >= 0.0 && row >= 0.0 && column < raster_->width_px && row < raster_->height_px;
+}
+
+edge_line edge_map::nearest(double x_m, double y_m) const {
+  edge_line out{};
+  double u, v;
+  to_pixels(x_m, y_m, &u, &v);
+  if (!inside_map(u, v)) return out;
+  int column = (int)u, row = (int)v;
+  const int steps = distance_of(column, row);
+  if (steps == kFar) return out;
+  if (steps > 0) {
+    const offset way = offsets()[tile_of(column, row) + in_row(column, row)];
+    column += way.x;
+    row += way.y;
+  }
+  const offset line = offsets()[tile_of(column, row) + in_row(column, row)];
+  const double du = column + 0.5 - u, dv = row + 0.5 - v;
+  out.distance_m = std::sqrt(du * du + dv * dv) * raster_->resolution_m;
+  if (line.y == kNoLine) return out;
+  const sin_cos a = sincos((uint8_t)line.x * (kPi / 256.0));
+  out.offset_m = (a.cos * du + a.sin * dv + line.y * kLineUnit_px) * raster_->resolution_m;
+  out.normal_x = cos_yaw_ * a.cos + sin_yaw_ * a.sin;  // rows grow downwards
+  out.normal_y = sin_yaw_ * a.cos - cos_yaw_ * a.sin;
+  out.found = true;
+  return out;
+}
+
+bool edge_map::drivable(double x_m, double y_m) const {
+  double u, v;
+  to_pixels(x_m, y_m, &u, &v);
+  if (!inside_map(u, v)) return false;
+  return !raster_->drivable || raster_->drivable[(size_t)(int)v * raster_->width_px + (size_t)(int)u];
+}
+
+}  // namespace wm

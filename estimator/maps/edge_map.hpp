@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+// A raster map's edges made ready for looking up: from any pixel how far the nearest edge is, and where, and the line
+// that the edge's pixels lie on, to a part of a pixel. Tiles of 64 x 64 pixels; those beyond the reach of any edge
+// share one, so that memory goes by the length of the edges, not by the area. A distance takes a byte; 8 x 8 of them
+// are a cache line, so that particles that are close together look into the same ones.
+#ifndef WAYMARK_ESTIMATOR_MAPS_EDGE_MAP_HPP
+#define WAYMARK_ESTIMATOR_MAPS_EDGE_MAP_HPP
+
+#include <cstddef>
+#include <cstdint>
+
+#include "waymark/frames.h"
+#include "waymark/setup.h"
+
+namespace wm {
+
+// Where the nearest edge is seen from a place, in map axes.
+struct edge_line {
+  double normal_x, normal_y;  // unit; which of its two sides it points to says nothing
+  double offset_m;            // normal . (line - place)
+  double distance_m;          // to the nearest edge pixel
+  bool found;                 // within reach
+};
+
+class edge_map {
+ public:
+  static constexpr int kTileShift = 6, kTile = 1 << kTileShift, kTilePixels = kTile * kTile;
+  static constexpr int kReachPixelsMax = 120;      // offsets are kept in a byte
+  static constexpr double kReach_m = 0.6;          // beyond it an edge is none
+  static constexpr int kFar = 255;                 // distance of what is out of reach
+  static constexpr uint32_t kTilesMax = 1u << 19;  // 3 bytes a pixel: 6 GB
+
+  // Bytes that init() needs for this raster, 0 where it has no edges layer. Linear in the pixels.
+  static size_t bytes(const wm_raster &raster);
+  // Builds it in `memory` (64-byte aligned), which keeps its distance from this object when both are copied. The raster
+  // outlives it. Linear in the pixels near edges. Exact Euclidean distances: P. Felzenszwalb, D. Huttenlocher,
+  // "Distance transforms of sampled functions", 2012.
+  void init(const wm_raster &raster, void *memory);
+
+  // Place in the map to pixels: column and row of which whole numbers are pixels' corners, row from the top.
+  void to_pixels(double x_m, double y_m, double *column, double *row) const;
+  void to_map(double column, double row, double *x_m, double *y_m) const;
+  bool inside_map(double column, double row) const;
+  double unit_m() const { return unit_m_; }  // of a distance byte
+  double pixel_m() const { return raster_->resolution_m; }
+  double yaw_cos() const { return cos_yaw_; }
+  double yaw_sin() const { return sin_yaw_; }
+  const wm_raster &raster() const { return *raster_; }
+
+  // For kernels: byte of pixel (column, row), both inside the map, is distances()[tiles()[tile] + inside].
+  const uint8_t *distances() const { return at<const uint8_t>(distance_at_); }
+  const uint32_t *tiles() const { return at<const uint32_t>(tile_at_); }
+  int tile_columns() const { return tile_columns_; }
+  static int inside(int column, int row) {
+    return (row & 56) << 6 | (column & 56) << 3 | (row & 7) << 3 | (column & 7);
+  }
+  int distance_of(int column, int row) const {
+    return distances()[tile_of(column, row) + (uint32_t)inside(column, row)];
+  }
+
+  edge_line nearest(double x_m, double y_m) const;
+  // Whether base_link may be there: by the drivable layer; outside of the map never, without the layer anywhere in it.
+  bool drivable(double x_m, double y_m) const;
+
+ private:
+  struct offset {  // to the nearest edge pixel; of an edge's own pixel: its line
+    int8_t x, y;   // or: normal in 1/256 of half a turn (unsigned), way along it to the line in 1/32 pixels
+  };
+  uint32_t tile_of(int column, int row) const {
+    return tiles()[(row >> kTileShift) * tile_columns_ + (column >> kTileShift)];
+  }
+  static uint32_t in_row(int column, int row) {
+    return (uint32_t)((row & (kTile - 1)) << kTileShift | (column & (kTile - 1)));
+  }
+  offset *offsets() const { return at<offset>(offset_at_); }
+  bool is_edge(int column, int row) const {
+    return column >= 0 && row >= 0 && column < (int)raster_->width_px && row < (int)raster_->height_px &&
+           raster_->edges[(size_t)row * raster_->width_px + (size_t)column];
+  }
+  void sweep_columns();
+  void sweep_row(int row);
+  void fit_lines();
+
+  const wm_raster *raster_;
+  double cos_yaw_, sin_yaw_, unit_m_;
+  int reach_px_, tile_columns_, tile_rows_;
+  // Bytes from this object on, so that a copy of the whole state has a map of its own. Of each tile the index of its
+  // first pixel, 0 where it is out of reach; then distances, offsets and a row's work space.
+  ptrdiff_t tile_at_, distance_at_, offset_at_, scratch_at_;
+  template <class T>
+  T *at(ptrdiff_t bytes) const {
+    return reinterpret_cast<T *>(reinterpret_cast<uintptr_t>(this) + (uintptr_t)bytes);
+  }
+};
+
+}  // namespace wm
+
+#endif
