@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <future>
+#include <optional>
 
 #include "simulate/render/sensor.h"
 #include "simulate/render/video.h"
@@ -71,12 +73,13 @@ class Lens {
     return s;
   }
 
-  void take(double t_s, uint64_t frame, render::Picture8 &out) {
-    renderer_->render(shot(t_s, frame), image_);
+  void expose(double t_s, uint64_t frame, render::Image &out) { renderer_->render(shot(t_s, frame), out); }
+  // In the order of the pictures: the exposure follows the light.
+  void develop(const render::Image &image, uint64_t frame, render::Picture8 &out) {
     render::Exposure exposure;
-    exposure.gain = exposure_.next(image_, frame);
+    exposure.gain = exposure_.next(image, frame);
     exposure.noise_scale = film_.scenario.pictures.noise_scale;
-    sensor_.develop(image_, exposure, frame, out);
+    sensor_.develop(image, exposure, frame, out);
   }
 
  private:
@@ -98,7 +101,6 @@ class Lens {
   render::Sensor sensor_;
   render::AutoExposure exposure_;
   std::unique_ptr<render::Renderer> renderer_;
-  render::Image image_;
 };
 
 // A camera's video, with its stamps.
@@ -126,21 +128,13 @@ class Reel {
     return WM_OK;
   }
 
-  // Picture `index` of the video; its labels are appended to `labels`.
-  wm_status add(size_t index, std::string &labels, wm_error *err) {
-    const FrameTime &time = times_[index];
-    const bool frozen = film_.scenario.faults.frozen_picture.holds(time.t_s) && index > 0;
-    if (!frozen) {
-      lens_.take(time.t_s, time.number, picture_);
-      film_.world->label(number_, camera_.truth, lens_.shot(time.t_s, index), labels);
-    }
-    std::string problem;
-    if (!video_.add(picture_, film_.scenario.pictures.jpeg_quality, problem))
-      return wm_fail(err, WM_IO, "%s", problem.c_str());
-    char row[128];
-    std::snprintf(row, sizeof row, "%zu,%" PRId64 ",%" PRId64 ",%" PRId64 "\n", index, time.stamp_ns,
-                  to_ns(camera_.exposure_s), time.arrival_ns);
-    csv_.write(row);
+  // Renders picture `index` of the video; the one before is being developed, labelled and written meanwhile. Its labels
+  // are appended to `labels`. At index = count() nothing is left to render.
+  wm_status step(size_t index, std::string &labels, wm_error *err) {
+    if (index < times_.size() && !repeats(index))
+      lens_.expose(times_[index].t_s, times_[index].number, images_[index % 2]);
+    if (const wm_status s = finish(labels, err); s != WM_OK) return s;
+    if (index < times_.size()) behind_ = std::async(std::launch::async, [this, index] { return write(index); });
     return WM_OK;
   }
 
@@ -151,6 +145,40 @@ class Reel {
   }
 
  private:
+  struct Written {
+    wm_status status = WM_OK;
+    wm_error err{};
+    std::string labels;
+  };
+
+  bool frozen(size_t index) const { return film_.scenario.faults.frozen_picture.holds(times_[index].t_s) && index > 0; }
+  bool repeats(size_t index) const { return frozen(index) || times_[index].again; }
+
+  wm_status finish(std::string &labels, wm_error *err) {
+    if (!behind_.valid()) return WM_OK;
+    const Written written = behind_.get();
+    labels += written.labels;
+    if (written.status != WM_OK && err) *err = written.err;
+    return written.status;
+  }
+
+  Written write(size_t index) {
+    const FrameTime &time = times_[index];
+    Written out;
+    if (!repeats(index)) lens_.develop(images_[index % 2], time.number, picture_);
+    if (!frozen(index)) film_.world->label(number_, camera_.truth, lens_.shot(time.t_s, index), out.labels);
+    std::string problem;
+    if (!video_.add(picture_, film_.scenario.pictures.jpeg_quality, problem)) {
+      out.status = wm_fail(&out.err, WM_IO, "%s", problem.c_str());
+      return out;
+    }
+    char row[128];
+    std::snprintf(row, sizeof row, "%zu,%" PRId64 ",%" PRId64 ",%" PRId64 "\n", index, time.stamp_ns,
+                  to_ns(camera_.exposure_s), time.arrival_ns);
+    csv_.write(row);
+    return out;
+  }
+
   const Film &film_;
   const FilmCamera &camera_;
   size_t number_;
@@ -159,7 +187,9 @@ class Reel {
   std::vector<FrameTime> times_;
   TextFile csv_;
   render::AviWriter video_;
+  render::Image images_[2];
   render::Picture8 picture_;
+  std::future<Written> behind_;  // last: it is waited for before the others go
 };
 
 wm_status make_folder(const std::string &path, wm_error *err) {
@@ -192,9 +222,16 @@ std::vector<FrameTime> frame_times(const Film &film, size_t camera) {
   const uint64_t clock = film.world->stereo_left.empty() ? camera : 0;
   const double step_s = 1 / film.cameras[camera].rate_hz;
   std::vector<FrameTime> times;
+  std::optional<FrameTime> held;  // comes after the next one
+  // Pictures come one after another through one cable: none overtakes, unless it is held.
+  const auto add = [&times](FrameTime time, wm_time_ns after_ns) {
+    if (!times.empty())
+      time.arrival_ns = std::max(time.arrival_ns, times.back().arrival_ns + std::max(after_ns, WM_NS_PER_US));
+    times.push_back(time);
+  };
   for (uint64_t k = 0;; k++) {
     const double t_s = (static_cast<double>(k) + 0.5) * step_s;
-    if (t_s > r.duration_s) return times;
+    if (t_s > r.duration_s) break;
     const double jitter = std::clamp(random.normal(Stream::frame_jitter, k, clock), -3.0, 3.0);
     const double latency = p.latency_s + p.latency_jitter_s * random.uniform(Stream::frame_latency, k, camera);
     const bool late = random.uniform(Stream::frame_fault, k, camera) < f.frames_late;
@@ -205,16 +242,29 @@ std::vector<FrameTime> frame_times(const Film &film, size_t camera) {
     time.stamp_ns = r.clock_start_ns + to_ns(t_s * (1 + f.camera_clock_drift) + f.camera_clock_offset_s +
                                              film.scenario.errors.frame_stamp_jitter_s * jitter);
     time.arrival_ns = r.clock_start_ns + to_ns(t_s + latency + (late ? f.frames_late_s : 0));
-    // Pictures come one after another through one cable: none overtakes.
-    if (!times.empty()) time.arrival_ns = std::max(time.arrival_ns, times.back().arrival_ns + WM_NS_PER_US);
-    times.push_back(time);
+    if (held) {
+      add(time, 0);
+      add(*held, WM_NS_PER_MS);
+      held.reset();
+    } else if (random.uniform(Stream::frame_reordered, k, camera) < f.frames_reordered) {
+      held = time;
+    } else {
+      add(time, 0);
+      time.again = true;
+      if (random.uniform(Stream::frame_duplicated, k, camera) < f.frames_duplicated) add(time, WM_NS_PER_MS);
+    }
   }
+  if (held) add(*held, 0);
+  return times;
 }
 
 wm_status take_picture(const Film &film, size_t camera, double t_s, render::Picture8 &out, wm_error *err) {
   Lens lens(film, camera);
   if (const wm_status s = lens.open(err); s != WM_OK) return s;
-  lens.take(t_s, static_cast<uint64_t>(std::max(0.0, t_s * film.cameras[camera].rate_hz)), out);
+  const auto frame = static_cast<uint64_t>(std::max(0.0, t_s * film.cameras[camera].rate_hz));
+  render::Image image;
+  lens.expose(t_s, frame, image);
+  lens.develop(image, frame, out);
   return WM_OK;
 }
 
@@ -257,12 +307,12 @@ wm_status write_pictures(const Film &film, const std::string &dir, const Progres
     most = std::max(most, reels.back()->count());
     total += reels.back()->count();
   }
-  for (size_t i = 0; i < most; i++) {
+  for (size_t i = 0; i <= most; i++) {
     std::string rows;
     for (const auto &reel : reels) {
-      if (i >= reel->count()) continue;
-      if (const wm_status s = reel->add(i, rows, err); s != WM_OK) return s;
-      if (progress) progress(++done, total);
+      if (i > reel->count()) continue;
+      if (const wm_status s = reel->step(i, rows, err); s != WM_OK) return s;
+      if (progress && i < reel->count()) progress(++done, total);
     }
     labels.write(rows);
   }

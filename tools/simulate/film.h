@@ -46,6 +46,7 @@ struct FrameTime {
   uint64_t number;  // of the trigger; lost ones count
   double t_s;       // middle of the exposure, from the start
   wm_time_ns stamp_ns, arrival_ns;
+  bool again;  // the picture before, once more
 };
 // The pictures of a camera that arrive, in the order of the video.
 std::vector<FrameTime> frame_times(const Film &film, size_t camera);

@@ -45,6 +45,8 @@ enum class Stream : uint64_t {
   position_wander,
   compass,
   start_place,
+  frame_duplicated,
+  frame_reordered,
 };
 
 class Random {

@@ -261,6 +261,8 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
                                       "dead_encoder",
                                       "start_offset",
                                       "frames_lost_percent",
+                                      "frames_duplicated_percent",
+                                      "frames_reordered_percent",
                                       "camera_clock_drift_ppm",
                                       "camera_dropout",
                                       "frozen_picture",
@@ -285,6 +287,8 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
   r.number(map, "camera_clock_offset_ms", -1e4, 1e4, kMilli, out.camera_clock_offset_s);
 
   r.number(map, "frames_lost_percent", 0, 100, kPercent, out.frames_lost);
+  r.number(map, "frames_duplicated_percent", 0, 100, kPercent, out.frames_duplicated);
+  r.number(map, "frames_reordered_percent", 0, 100, kPercent, out.frames_reordered);
   r.number(map, "camera_clock_drift_ppm", -1e5, 1e5, 1e-6, out.camera_clock_drift);
   static const char *const known_span[] = {"from_s", "to_s", nullptr};
   static const char *const known_lights[] = {"from_s", "to_s", "left_percent", nullptr};

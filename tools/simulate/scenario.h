@@ -183,6 +183,7 @@ struct Faults {
   int dead_encoder = -1;                                       // 0 left, 1 right: its count stands still
   double dead_encoder_from_s = 0;
   double start_x_m = 0, start_y_m = 0, start_heading_rad = 0;  // added to the start pose that the recording states
+  double frames_duplicated = 0, frames_reordered = 0;          // fractions of the pictures
   double frames_lost = 0;                                      // fraction of the pictures
   double camera_clock_drift = 0;                               // of the cameras' clock, relative
   Span camera_dropout;                                         // no pictures
