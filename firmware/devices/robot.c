@@ -19,6 +19,24 @@ static wm_status add_can(const wm_config *config, wm_recording *robot, wm_error 
   return status;
 }
 
+// Cameras are opened by who looks at their pictures (wm_vision_open).
+static wm_status check_cameras(const wm_config *config, const wm_recording *robot, wm_warn_fn warn, void *context,
+                               wm_error *err) {
+  const wm_devices_config *devices = &config->devices;
+  for (size_t i = 0; i < devices->camera_count; i++) {
+    int index = wm_rig_find_camera(wm_recording_rig(robot), devices->cameras[i].name);
+    if (index < 0)
+      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: devices.cameras[%zu].name: '%s' is no camera of the calibration",
+                     config->path, devices->cameras[i].line, i, devices->cameras[i].name);
+    if (wm_recording_rig(robot)->cameras[index].width_px == 0)
+      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: devices.cameras[%zu]: the calibration of '%s' says no image_size",
+                     config->path, devices->cameras[i].line, i, devices->cameras[i].name);
+  }
+  if (devices->camera_count > 0 && config->vision_count == 0 && warn)
+    warn(context, "devices.cameras: nothing looks at their pictures: `vision:` names no detector");
+  return WM_OK;
+}
+
 wm_status wm_robot_open(const wm_config *config, wm_warn_fn warn, void *context, wm_recording **out, wm_error *err) {
   *out = NULL;
   if (config->devices.can_count == 0)
@@ -29,13 +47,8 @@ wm_status wm_robot_open(const wm_config *config, wm_warn_fn warn, void *context,
   wm_recording *robot;
   wm_status status = wm_recording_open_robot("robot", &config->overrides, warn, context, &robot, err);
   if (status != WM_OK) return status;
-  for (size_t i = 0; i < config->devices.camera_count && warn; i++) {
-    char line[160];
-    snprintf(line, sizeof line, "camera %s: nothing looks at its pictures in a run yet; it is not opened",
-             config->devices.cameras[i].name);
-    warn(context, line);
-  }
-  status = add_can(config, robot, err);
+  status = check_cameras(config, robot, warn, context, err);
+  if (status == WM_OK) status = add_can(config, robot, err);
   if (status != WM_OK) {
     wm_recording_close(robot);
     return status;

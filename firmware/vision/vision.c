@@ -48,6 +48,28 @@ static uint16_t sensor_of(wm_recording *recording, const char *camera) {
   return NO_SENSOR;
 }
 
+static const wm_camera_device_config *device_of(const wm_config *config, const char *camera) {
+  for (size_t i = 0; i < config->devices.camera_count; i++)
+    if (strcmp(config->devices.cameras[i].name, camera) == 0) return &config->devices.cameras[i];
+  return NULL;
+}
+
+static wm_status open_device(vision_source *self, const wm_config *config, const wm_vision_config *wanted,
+                             const wm_camera *camera, wm_warn_fn warn, void *context, wm_error *err) {
+  const wm_camera_device_config *device = device_of(config, camera->name);
+  if (self->detector->pictures != 1)
+    return wm_fail(err, WM_UNSUPPORTED,
+                   "%s:%d: vision.%s: looks at pairs of pictures; of devices only single cameras "
+                   "are possible",
+                   config->path, wanted->line, self->detector->name);
+  if (!device)
+    return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s.cameras: '%s' is not in devices.cameras", config->path,
+                   wanted->line, self->detector->name, camera->name);
+  self->base.is_live = 1;
+  self->base.skip_to = NULL;
+  return wm_camera_device_open(device, camera, self->cameras[0], warn, context, &self->device, err);
+}
+
 // A source of this detector on as many of `cameras` as it takes at once.
 static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_config *wanted, wm_recording *recording,
                      const int32_t cameras[PICTURES_MAX], wm_warn_fn warn, void *context, wm_error *err) {
@@ -72,6 +94,7 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   if (s->state_bytes == 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s: can't work with the camera '%s': %s", config->path,
                    wanted->line, s->detector->name, first->name, why ? why : "it doesn't say why");
+  if (wm_recording_is_robot(recording)) return open_device(s, config, wanted, first, warn, context, err);
   for (uint32_t i = 0; i < s->detector->pictures; i++) {
     wm_status status = wm_video_open(wm_recording_dir(recording), &rig->cameras[s->cameras[i]], s->cameras[i], warn,
                                      context, &s->videos[i], err);
@@ -97,6 +120,11 @@ static int is_wanted(const wm_vision_config *wanted, const char *camera) {
   return 0;
 }
 
+static int has_pictures(const wm_config *config, wm_recording *recording, const char *camera) {
+  if (wm_recording_is_robot(recording)) return device_of(config, camera) != NULL;
+  return wm_video_there(wm_recording_dir(recording), camera);
+}
+
 // The cameras that are named, or else all that have pictures.
 static wm_status add_singles(wm_vision *self, const wm_config *config, const wm_vision_config *wanted,
                              wm_recording *recording, wm_warn_fn warn, void *context, wm_error *err) {
@@ -108,13 +136,15 @@ static wm_status add_singles(wm_vision *self, const wm_config *config, const wm_
   size_t before = self->count;
   for (int32_t i = 0; i < (int32_t)rig->camera_count; i++) {
     const char *name = rig->cameras[i].name;
-    if (wanted->camera_count > 0 ? !is_wanted(wanted, name) : !wm_video_there(wm_recording_dir(recording), name))
-      continue;
+    if (wanted->camera_count > 0 ? !is_wanted(wanted, name) : !has_pictures(config, recording, name)) continue;
     const int32_t cameras[2] = {i, i};
     wm_status status = add(self, config, wanted, recording, cameras, warn, context, err);
     if (status != WM_OK) return status;
   }
   if (self->count > before) return WM_OK;
+  if (wm_recording_is_robot(recording))
+    return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s: there is no camera to look through: devices.cameras",
+                   config->path, wanted->line, wanted->detector->name);
   return wm_fail(err, WM_BAD_CONFIG,
                  "%s:%d: vision.%s: '%s' has no pictures (video/CAMERA.avi, .mkv or a folder of JPEG) of a camera of "
                  "calibration.yaml",
@@ -147,6 +177,7 @@ void wm_vision_close(wm_vision *self) {
   for (size_t i = 0; i < self->count; i++) {
     vision_ahead_stop(&self->sources[i]);
     for (size_t k = 0; k < PICTURES_MAX; k++) wm_video_close(self->sources[i].videos[k]);
+    wm_camera_device_close(self->sources[i].device);
   }
   free(self);
 }

@@ -9,7 +9,7 @@
 #define PAIR_TOLERANCE_NS (2 * WM_NS_PER_MS)  // pictures of a pair are triggered together
 
 // What the videos counted, in the terms of a source.
-static void take_counts(vision_source *self) {
+static void take_video_counts(vision_source *self) {
   wm_source_counts *out = &self->counts;
   out->lost = out->malformed = out->frozen = out->overflows = 0;
   for (uint32_t i = 0; i < self->detector->pictures; i++) {
@@ -19,6 +19,28 @@ static void take_counts(vision_source *self) {
     out->frozen += c->duplicated;
     out->overflows += c->skipped;
     if (!out->first_problem[0]) (void)snprintf(out->first_problem, sizeof out->first_problem, "%s", c->first_problem);
+  }
+}
+
+static void take_device_counts(vision_source *self) {
+  wm_source_counts *out = &self->counts;
+  const wm_camera_counts *c = wm_camera_device_counted(self->device);
+  out->lost = c->lost;
+  out->malformed = c->damaged;
+  out->frozen = c->duplicated;
+  out->overflows = c->skipped;
+  out->out_of_order = c->out_of_order;
+  out->not_finite = c->bad_stamps;
+  out->device = c->device;
+  out->stamp_uncertainty_ns = c->stamp_uncertainty_ns;
+  memcpy(out->device_note, c->device_note, sizeof out->device_note);
+}
+
+static void take_counts(vision_source *self) {
+  if (self->device) {
+    take_device_counts(self);
+  } else {
+    take_video_counts(self);
   }
 }
 
@@ -37,8 +59,9 @@ static wm_status find_together(vision_source *self, wm_frame *heads, wm_error *e
   }
 }
 
-// Decodes what belongs together. WM_AGAIN where one of a pair turned out to be damaged.
+// Decodes what belongs together. WM_AGAIN where one of a pair turned out to be damaged, or a device has nothing yet.
 static wm_status decode(vision_source *self, wm_frame *frames, wm_error *err) {
+  if (self->device) return wm_camera_device_next(self->device, &frames[0], err);
   wm_frame heads[PICTURES_MAX] = {0};
   wm_status status = find_together(self, heads, err);
   wm_time_ns begin_ns = wm_monotonic_ns();
@@ -56,7 +79,7 @@ static wm_status look(vision_source *self, wm_error *err) {
   wm_frame frames[PICTURES_MAX] = {0};
   self->event_count = self->next_event = 0;
   wm_status status = decode(self, frames, err);
-  if (status == WM_AGAIN) return WM_OK;
+  if (status == WM_AGAIN) return self->device ? WM_AGAIN : WM_OK;
   if (status != WM_OK) return status;
   // A camera's pictures come in their order; who goes back has a broken clock.
   if (self->newest_ns != WM_TIME_NONE && frames[0].t_ns <= self->newest_ns) {

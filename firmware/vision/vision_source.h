@@ -6,6 +6,7 @@
 #include <pthread.h>
 
 #include "waymark/detector.h"
+#include "waymark/devices.h"
 #include "waymark/video.h"
 #include "waymark/vision.h"
 
@@ -34,7 +35,8 @@ struct vision_source {
   wm_view view;
   int32_t cameras[PICTURES_MAX];
   wm_video *videos[PICTURES_MAX];
-  uint16_t sensor;  // of WM_EVENT_LOOKED
+  wm_camera_device *device;  // instead of videos: the robot's own camera
+  uint16_t sensor;           // of WM_EVENT_LOOKED
   int gives_looked;
   size_t state_bytes, capacity;
   void *state, *events_memory;
