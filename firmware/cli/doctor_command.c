@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <stdio.h>
+#include <string.h>
+
+#include "commands.h"
+#include "doctor.h"
+#include "lcm_way.h"
+#include "options.h"
+
+static const char kHelp[] =
+    "usage: waymark doctor [CONFIG] [options]\n"
+    "\n"
+    "Says what is wrong with this computer, and how to mend it: kernel, real-time rights, clocks, governors,\n"
+    "temperature, LCM's way; with a configuration also its CAN interfaces and cameras. Measures for 5 s how late a\n"
+    "thread wakes. Changes nothing. Exit code 1 where something is bad.\n"
+    "\n"
+    "  --json       for programs\n"
+    "  --seconds S  of measuring (default 5)\n"
+    "\n"
+    "example:\n"
+    "  waymark doctor /etc/waymark/robot.yaml\n";
+
+static int look(const wm_config *config, double seconds, int as_json) {
+  static findings found;
+  static wm_histogram wake_ns;
+  int is_realtime, priority = config ? config->runtime.realtime_priority : 80;
+  doctor_kernel("", &found);
+  doctor_clocks("", &found);
+  doctor_power("", &found);
+  doctor_limits(&found);
+  doctor_lcm(lcm_way_url(config ? config->lcm_url : ""), &found);
+  doctor_can("", config, &found);
+  doctor_cameras(config, &found);
+  doctor_latency(seconds, priority, &wake_ns, &is_realtime);
+  doctor_judge_latency(&wake_ns, is_realtime, &found);
+  if (as_json) {
+    findings_json(&found, &wake_ns, stdout);
+  } else {
+    findings_print(&found, stdout);
+  }
+  int bad = 0;
+  for (size_t i = 0; i < found.count; i++) bad |= found.at[i].level == FINDING_BAD;
+  return bad ? EXIT_WORK_FAILED : EXIT_DONE;
+}
+
+int command_doctor(int argc, char *const *argv) {
+  const char *words[1];
+  double seconds = 5;
+  int help = 0, as_json = 0;
+  const option options[] = {{"--json", OPTION_FLAG, &as_json},
+                            {"--seconds", OPTION_F64, &seconds},
+                            {"--help", OPTION_FLAG, &help},
+                            {"-h", OPTION_FLAG, &help}};
+  wm_error err = {0};
+  size_t count;
+  if (options_parse(argc, argv, options, sizeof options / sizeof options[0], words, 1, &count, &err) != WM_OK)
+    return complain(&err);
+  if (help) {
+    (void)fputs(kHelp, stdout);
+    return EXIT_DONE;
+  }
+  if (seconds > 3600) {
+    (void)wm_fail(&err, WM_BAD_USAGE, "--seconds: %g is more than an hour", seconds);
+    return complain(&err);
+  }
+  if (count == 0) return look(NULL, seconds, as_json);
+  wm_config config;
+  if (wm_config_load(words[0], &config, &err) != WM_OK) {
+    (void)complain(&err);
+    return EXIT_USAGE;
+  }
+  int result = look(&config, seconds, as_json);
+  wm_config_free(&config);
+  return result;
+}

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+// The doctor's findings on a computer that the test breaks.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "doctor.h"
+#include "unity.h"
+
+static char root[64];
+static findings found;
+
+void setUp(void) {
+  memset(&found, 0, sizeof found);
+  (void)snprintf(root, sizeof root, "/tmp/wm_doctor_XXXXXX");
+  TEST_ASSERT_NOT_NULL(mkdtemp(root));
+}
+void tearDown(void) {
+  char command[128];
+  (void)snprintf(command, sizeof command, "rm -rf %s", root);
+  TEST_ASSERT_EQUAL(0, system(command));
+}
+
+static void put(const char *path, const char *text) {
+  char whole[256], command[400];
+  (void)snprintf(whole, sizeof whole, "%s%s", root, path);
+  (void)snprintf(command, sizeof command, "mkdir -p $(dirname %s)", whole);
+  TEST_ASSERT_EQUAL(0, system(command));
+  FILE *f = fopen(whole, "w");
+  TEST_ASSERT_NOT_NULL(f);
+  (void)fputs(text, f);
+  (void)fclose(f);
+}
+
+static const finding *about(const char *what) {
+  for (size_t i = 0; i < found.count; i++)
+    if (strcmp(found.at[i].about, what) == 0) return &found.at[i];
+  TEST_FAIL_MESSAGE(what);
+  return NULL;
+}
+
+// Everything that isn't good says what to do.
+static void expect(const char *what, finding_level level, const char *text) {
+  const finding *f = about(what);
+  TEST_ASSERT_EQUAL_MESSAGE(level, f->level, f->text);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(f->text, text), f->text);
+  TEST_ASSERT_EQUAL_MESSAGE(level == FINDING_GOOD, f->mend[0] == '\0', f->mend);
+}
+
+static void a_good_computer_is_found_good(void) {
+  put("/sys/kernel/realtime", "1\n");
+  put("/proc/sys/kernel/sched_rt_runtime_us", "950000\n");
+  put("/sys/devices/system/clocksource/clocksource0/current_clocksource", "tsc\n");
+  put("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "performance\n");
+  put("/sys/class/thermal/thermal_zone0/temp", "45000\n");
+  doctor_kernel(root, &found);
+  doctor_clocks(root, &found);
+  doctor_power(root, &found);
+  expect("kernel", FINDING_GOOD, "PREEMPT_RT");
+  expect("throttling", FINDING_GOOD, "95 %");
+  expect("clock", FINDING_GOOD, "tsc");
+  expect("governor", FINDING_GOOD, "performance");
+  expect("temperature", FINDING_GOOD, "45 degrees");
+}
+
+static void what_is_broken_is_found(void) {
+  put("/proc/sys/kernel/sched_rt_runtime_us", "-1\n");
+  put("/sys/devices/system/clocksource/clocksource0/current_clocksource", "hpet\n");
+  put("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "performance\n");
+  put("/sys/devices/system/cpu/cpu1/cpufreq/scaling_governor", "powersave\n");
+  put("/sys/class/thermal/thermal_zone0/temp", "45000\n");
+  put("/sys/class/thermal/thermal_zone1/temp", "91000\n");
+  doctor_kernel(root, &found);
+  doctor_clocks(root, &found);
+  doctor_power(root, &found);
+  expect("kernel", FINDING_NOTE, "is not PREEMPT_RT");
+  expect("throttling", FINDING_NOTE, "is off");
+  expect("clock", FINDING_BAD, "hpet");
+  expect("governor", FINDING_BAD, "1 of 2 CPUs have the governor powersave");
+  expect("temperature", FINDING_BAD, "91 degrees");
+}
+
+static void can_interfaces_are_looked_at(void) {
+  static wm_config config;
+  const char *const names[] = {"can0", "can1", "can2", "eth0"};
+  for (size_t i = 0; i < 4; i++)
+    (void)snprintf(config.devices.can[i].interface, sizeof config.devices.can[i].interface, "%s", names[i]);
+  config.devices.can_count = 4;
+  put("/sys/class/net/can0/type", "280\n");
+  put("/sys/class/net/can0/flags", "0x40c1\n");
+  put("/sys/class/net/can0/statistics/rx_over_errors", "7\n");
+  put("/sys/class/net/can1/type", "280\n");
+  put("/sys/class/net/can1/flags", "0x40c0\n");
+  put("/sys/class/net/eth0/type", "1\n");
+  doctor_can(root, &config, &found);
+  expect("can can0", FINDING_BAD, "lost 7 frames");
+  expect("can can1", FINDING_BAD, "is down");
+  expect("can can2", FINDING_BAD, "no interface");
+  expect("can eth0", FINDING_BAD, "is no CAN interface");
+}
+
+static void cameras_are_looked_at(void) {
+  static wm_config config;
+  config.devices.camera_count = 2;
+  (void)snprintf(config.devices.cameras[0].name, WM_NAME_MAX, "front");
+  (void)snprintf(config.devices.cameras[0].device, sizeof config.devices.cameras[0].device, "/dev/nosuchvideo");
+  (void)snprintf(config.devices.cameras[1].name, WM_NAME_MAX, "rear");
+  (void)snprintf(config.devices.cameras[1].device, sizeof config.devices.cameras[1].device, "/dev/null");
+  doctor_cameras(&config, &found);
+  expect("camera front", FINDING_BAD, "No such file");
+  expect("camera rear", FINDING_GOOD, "/dev/null is there");
+}
+
+static void no_way_for_messages_is_found(void) {
+  doctor_lcm("udpm://239.255.76.67:7667?ttl=1", &found);
+  const finding *f = about("lcm");
+  TEST_ASSERT_TRUE(f->level == FINDING_NOTE || f->level == FINDING_BAD);  // without a network it is the latter
+  TEST_ASSERT_TRUE(f->mend[0] != '\0');
+}
+
+static void latency_is_measured(void) {
+  static wm_histogram wake_ns;
+  int is_realtime;
+  doctor_latency(0.2, 0, &wake_ns, &is_realtime);
+  TEST_ASSERT_FALSE(is_realtime);
+  TEST_ASSERT_GREATER_THAN_UINT64(20, wake_ns.count);
+  TEST_ASSERT_GREATER_THAN_INT64(0, wake_ns.max_ns);
+  doctor_judge_latency(&wake_ns, 0, &found);
+  TEST_ASSERT_NOT_NULL(strstr(about("latency")->text, "a normal thread wakes late by"));
+  memset(&wake_ns, 0, sizeof wake_ns);
+  memset(&found, 0, sizeof found);
+  wm_histogram_add(&wake_ns, 20 * WM_NS_PER_MS);
+  doctor_judge_latency(&wake_ns, 1, &found);
+  expect("latency", FINDING_BAD, "a real-time thread");
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(a_good_computer_is_found_good);
+  RUN_TEST(what_is_broken_is_found);
+  RUN_TEST(can_interfaces_are_looked_at);
+  RUN_TEST(cameras_are_looked_at);
+  RUN_TEST(no_way_for_messages_is_found);
+  RUN_TEST(latency_is_measured);
+  return UNITY_END();
+}
