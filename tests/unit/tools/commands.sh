@@ -85,6 +85,22 @@ expect 1 'a board was found in 0 of 1 pictures' "$bin/waymark-calibrate" camera 
 cp "$dir/rec/imported.yaml" "$dir/rec/calibration.yaml"
 expect 1 'front-edges.csv: is not there' "$bin/waymark-eval" "$dir/empty" "$dir/rec" --detector edges
 
+# Maps.
+{ printf 'P5 80 60 255\n'; python3 -c '
+import sys
+rows = [[255 if 9 < x < 70 and 9 < y < 50 else 0 for x in range(80)] for y in range(60)]
+sys.stdout.buffer.write(bytes(sum(rows, [])))'; } >"$dir/plan.pgm"
+expect 0 'waymark map make plan.png' "$bin/waymark-map" make --help
+expect 2 '--resolution is needed' "$bin/waymark-map" make "$dir/plan.pgm" --out "$dir/map"
+expect 2 'there is no such file' "$bin/waymark-map" make "$dir/nowhere.png" --resolution 0.05
+expect 2 'not X,Y' "$bin/waymark-map" make "$dir/plan.pgm" --resolution 0.05 --inside here
+expect 0 'in 1 areas' "$bin/waymark-map" make "$dir/plan.pgm" --resolution 0.05 --origin=-1,-1 --out "$dir/map"
+expect 2 'not written over' "$bin/waymark-map" make "$dir/plan.pgm" --resolution 0.05 --out "$dir/map"
+expect 1 'no wall in the plan' "$bin/waymark-map" make "$dir/blank.pgm" --walls-below 1 --resolution 0.05 --out "$dir/map2"
+expect 0 'good' "$bin/waymark-map" check "$dir/map/map.yaml" --draw "$dir/drawn.png"
+expect 0 'in 1 areas' "$bin/waymark-map" make "$dir/map/map.yaml" --out "$dir/map3"
+expect 2 'nowhere' "$bin/waymark-map" check "$dir/nowhere.yaml"
+
 # JSON is JSON: every field of the format is there, nothing is NaN.
 if ! "$bin/waymark-eval" "$dir/run" "$dir/rec" --json | python3 -c '
 import json, sys

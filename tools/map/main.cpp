@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+// waymark map: raster maps made and checked.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+
+#include "common/failure.h"
+#include "common/yaml.h"
+#include "map/check.h"
+#include "map/layers.h"
+#include "simulate/render/pictures.h"
+
+namespace {
+
+using namespace wm::tools;
+namespace fs = std::filesystem;
+
+struct Make {
+  std::string plan, out = "map";
+  std::vector<double> origin{0, 0, 0};
+  std::vector<std::string> inside;
+  double resolution_m = 0;
+  int walls_below = 128;
+  bool negate = false;
+  LayerOptions layers;
+};
+
+struct Check {
+  std::string map, recording, draw;
+};
+
+void parse_make(CLI::App &app, Make &a) {
+  app.description("Makes the layers edges and drivable from a floor plan, or from a ROS occupancy map.");
+  app.add_option("PLAN", a.plan,
+                 "a picture with dark walls on a light floor (PNG, PGM, JPEG), or ROS map_server's map.yaml")
+      ->required();
+  app.add_option("--resolution", a.resolution_m, "m of a pixel of the picture; a map.yaml says it itself")
+      ->check(CLI::Range(1e-4, 1.0));
+  app.add_option("--origin", a.origin, "X,Y[,YAW_DEG]: where the lower left corner of the picture lies in the map")
+      ->delimiter(',')
+      ->expected(2, 3);
+  app.add_option("--inside", a.inside, "X,Y in the map: only floor connected with it is drivable; may be given again");
+  app.add_option("--walls-below", a.walls_below, "grey value, 1 to 255: darker is wall")
+      ->check(CLI::Range(1, 255))
+      ->capture_default_str();
+  app.add_flag("--negate", a.negate, "walls are light on a dark floor");
+  app.add_option("--fine", a.layers.resolution_m, "largest pixel of the layers, m")
+      ->check(CLI::Range(0.002, 1.0))
+      ->capture_default_str();
+  app.add_option("--speck", a.layers.speck_m, "walls that fit into a square of this edge, m, are dirt")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  app.add_option("--clearance", a.layers.clearance_m, "drivable ends so far from walls, m")
+      ->check(CLI::Range(0.0, 5.0))
+      ->capture_default_str();
+  app.add_option("--out", a.out, "the folder to write: map.yaml, edges.png, drivable.png, picture.png")
+      ->capture_default_str();
+  app.footer(
+      "examples:\n"
+      "  waymark map make plan.png --resolution 0.02 --out recordings/drive/map\n"
+      "  waymark map make plan.png --resolution 0.05 --inside 3,2 --clearance 0.1\n"
+      "  waymark map make warehouse/map.yaml --out map\n"
+      "picture.png is what came out, with a line every 5 m: look at it. docs/edges.md goes through it.");
+}
+
+void parse_check(CLI::App &app, Check &a) {
+  app.description("Says what a raster map is like, and what is wrong with it.");
+  app.add_option("MAP", a.map, "a map.yaml")->required();
+  app.add_option("--recording", a.recording, "also asks whether its start pose lies on the map");
+  app.add_option("--draw", a.draw, "a PNG to draw");
+  app.footer(
+      "example: waymark map check map/map.yaml --recording recordings/drive --draw map.png\n"
+      "Exit code: 0 good, 1 something is wrong, 2 it can't be read.");
+}
+
+void write_layer(const fs::path &file, const Layers &layers, const std::vector<uint8_t> &layer) {
+  std::string error;
+  if (!wm::render::write_png(file, {layers.width, layers.height, 1, layer}, error)) throw Failure(error);
+}
+
+Plan read_plan(const Make &a) {
+  const std::string ending = fs::path(a.plan).extension();
+  if (!fs::exists(a.plan)) throw Failure(a.plan + ": there is no such file", kUsage);
+  if (ending == ".yaml" || ending == ".yml") return plan_from_occupancy(a.plan);
+  if (!(a.resolution_m > 0))
+    throw Failure("--resolution is needed: metres of a pixel. A door of 0.9 m that is 45 px wide makes 0.02", kUsage);
+  GreyPicture picture = load_picture(a.plan);
+  if (a.negate)
+    for (uint8_t &v : picture.pixels) v = static_cast<uint8_t>(255 - v);
+  Plan plan = plan_from_picture(picture, a.walls_below);
+  plan.resolution_m = a.resolution_m;
+  plan.origin_x_m = a.origin[0], plan.origin_y_m = a.origin[1];
+  plan.origin_yaw_rad = a.origin.size() > 2 ? a.origin[2] * 3.14159265358979323846 / 180 : 0;
+  return plan;
+}
+
+int make(Make &a) {
+  for (const std::string &text : a.inside) {
+    double x = 0, y = 0;
+    char rest = 0;
+    if (std::sscanf(text.c_str(), "%lf,%lf%c", &x, &y, &rest) != 2)
+      throw Failure("--inside: '" + text + "' is not X,Y, as in 3.5,-2", kUsage);
+    a.layers.inside.emplace_back(x, y);
+  }
+  const fs::path folder = a.out;
+  if (fs::exists(folder / "map.yaml"))
+    throw Failure((folder / "map.yaml").string() + ": is there already and is not written over; name another --out",
+                  kUsage);
+  const Plan plan = read_plan(a);
+  const Layers layers = make_layers(plan, a.layers);
+  std::error_code problem;
+  fs::create_directories(folder, problem);
+  if (problem) throw Failure(folder.string() + ": " + problem.message());
+  write_layer(folder / "edges.png", layers, layers.edges);
+  write_layer(folder / "drivable.png", layers, layers.drivable);
+  draw_map(layers, plan, 5, 1600, {}, folder / "picture.png");
+  char text[512];
+  std::snprintf(text, sizeof text,
+                "image: drivable.png\nresolution: %.12g\norigin: [%.9g, %.9g, %.9g]\nnegate: 0\noccupied_thresh: 0.65\n"
+                "free_thresh: 0.196\nlayers:\n  edges: edges.png\n  drivable: drivable.png\n",
+                layers.resolution_m, plan.origin_x_m, plan.origin_y_m, plan.origin_yaw_rad);
+  std::ofstream yaml(folder / "map.yaml");
+  yaml << text;
+  yaml.close();
+  if (!yaml) throw Failure((folder / "map.yaml").string() + ": could not be written");
+  std::printf(
+      "%s: %d x %d px of %.4g m, %.1f x %.1f m\n  drivable %.1f m2 in %d areas, edges about %.0f m, %zu specks taken "
+      "away\n  look at %s (a line every 5 m)\n",
+      folder.c_str(), layers.width, layers.height, layers.resolution_m, layers.width * layers.resolution_m,
+      layers.height * layers.resolution_m, layers.drivable_m2, layers.rooms, layers.edges_m, layers.specks,
+      (folder / "picture.png").c_str());
+  return kDone;
+}
+
+int check(const Check &a) {
+  std::vector<Eigen::Vector2d> starts;
+  if (!a.recording.empty()) {
+    const fs::path file = fs::path(a.recording) / "recording.yaml";
+    if (!fs::exists(file)) throw Failure(file.string() + ": is not there", kUsage);
+    const Yaml yaml(file);
+    const std::string x = yaml.text("vehicle.initial_pose.x_m"), y = yaml.text("vehicle.initial_pose.y_m");
+    if (!x.empty() && !y.empty()) starts.emplace_back(std::atof(x.c_str()), std::atof(y.c_str()));
+  }
+  const MapReport report = check_map(a.map, starts);
+  for (const std::string &line : report.facts) std::printf("%s\n", line.c_str());
+  for (const std::string &line : report.wrong) std::printf("wrong: %s\n", line.c_str());
+  for (const std::string &line : report.odd) std::printf("odd: %s\n", line.c_str());
+  if (report.wrong.empty()) std::printf("good\n");
+  if (!a.draw.empty()) draw_map(report.layers, report.place, 5, 1600, starts, a.draw);
+  return report.wrong.empty() ? kDone : kFailed;
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  CLI::App app("Raster maps: made from plans, and checked.", "waymark map");
+  app.require_subcommand(1);
+  app.footer("example: waymark map make plan.png --resolution 0.02\nwaymark map SUBCOMMAND --help says more.");
+  Make make_arguments;
+  Check check_arguments;
+  CLI::App *make_app = app.add_subcommand("make", "layers from a floor plan or an occupancy map");
+  CLI::App *check_app = app.add_subcommand("check", "what a map is like, and what is wrong with it");
+  parse_make(*make_app, make_arguments);
+  parse_check(*check_app, check_arguments);
+  try {
+    app.parse(argc, argv);
+    return make_app->parsed() ? make(make_arguments) : check(check_arguments);
+  } catch (const CLI::ParseError &problem) {
+    return app.exit(problem) == 0 ? kDone : kUsage;
+  } catch (const std::exception &problem) {
+    std::fprintf(stderr, "waymark map: %s\n", problem.what());
+    const auto *failure = dynamic_cast<const Failure *>(&problem);
+    return failure != nullptr ? failure->exit_code : kFailed;
+  }
+}
