@@ -9,7 +9,7 @@ namespace wm {
 namespace {
 
 constexpr int kInputs = 4 * kLinePoses - 3;  // poses 2..k relative to the first, azimuths 1..k
-constexpr double kAlpha = 0.5, kBeta = 2.0;  // the print's alpha and kappa are lost; kappa = 0
+constexpr double kAlpha = 0.5;               // the print's alpha and kappa are lost; kappa = 0
 constexpr double kStep = 1e-6;               // of the linear method's derivatives
 
 // Eigenvector of the smallest eigenvalue of a symmetric 3 x 3 matrix, by Jacobi's rotations: of A'A it is the singular
@@ -121,25 +121,23 @@ struct distribution {
   double by[2][kInputs];
 };
 
-// Mean, covariance and regression on the inputs, by sigma points (S. J. Julier, J. K. Uhlmann, 1997).
+// Covariance and regression on the inputs, by sigma points (S. J. Julier, J. K. Uhlmann, 1997), about the place of the
+// measured inputs. Not about the points' mean, as printed: what is measured scatters about the truth, so the place of
+// the measured inputs has that bend in it already, and the points' mean would add it once more (a quarter more error at
+// two degrees of parallax).
 bool transform(const problem &p, const double *input, double (*l)[kInputs], int n, distribution *out) {
-  const double lambda = (square(kAlpha) - 1.0) * n, spread = std::sqrt(n + lambda);
-  const double weight = 0.5 / (n + lambda), mean_weight = lambda / (n + lambda);
-  const double covariance_weight = mean_weight + 1.0 - square(kAlpha) + kBeta;
-  double centre[2], point[kInputs], at[2 * kInputs][2];
-  if (!solve(p, input, centre)) return false;
-  out->mean[0] = out->mean[1] = 0.0;
+  const double spread = kAlpha * std::sqrt(n), weight = 0.5 / square(spread);
+  double point[kInputs], at[2 * kInputs][2];
+  if (!solve(p, input, out->mean)) return false;
   for (int i = 0; i < 2 * n; i++) {
     const int j = i / 2;
     const double way = i % 2 == 0 ? spread : -spread;
     for (int k = 0; k < n; k++) point[k] = input[k] + way * l[k][j];
     if (!solve(p, point, at[i])) return false;
-    for (int k = 0; k < 2; k++) out->mean[k] += weight * (at[i][k] - centre[k]);
   }
-  for (int k = 0; k < 2; k++) out->mean[k] += centre[k];
   for (int r = 0; r < 2; r++)
     for (int c = 0; c < 2; c++) {
-      out->covariance[r][c] = covariance_weight * (centre[r] - out->mean[r]) * (centre[c] - out->mean[c]);
+      out->covariance[r][c] = 0.0;
       for (int i = 0; i < 2 * n; i++)
         out->covariance[r][c] += weight * (at[i][r] - out->mean[r]) * (at[i][c] - out->mean[c]);
     }

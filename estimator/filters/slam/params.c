@@ -43,6 +43,12 @@ static const wm_param kParams[] = {
     F64("noise.lateral_m", lateral_sigma_m, 0, 0, 10,
         "Noise of a landmark's place across the line of sight, m: it is as broad as it is, and near by that is a large "
         "angle. Added to the bearing's variance as (this / distance)^2."),
+    BOOL("markers.on", markers, 0,
+         "Take coded markers: each landmark has a heading, too, and a marker gives all three at once."),
+    F64("markers.sigma_m", marker_sigma_m, 0.002, 1e-5, 10,
+        "Noise of a marker's place, m; the sensor's sigmas, along and across, are added in squares."),
+    F64("markers.sigma_rel", marker_sigma_rel, 0, 0, 1, "The same in parts of the distance."),
+    F64("markers.heading_sigma_rad", marker_heading_sigma_rad, 0.02, 1e-5, 3, "Noise of a marker's heading, rad."),
     I32("lasting.slots", lasting_slots, 0, 0, 24,
         "Pairs of sensor and landmark (the last seen ones) whose lasting error is carried as states (Gauss-Markov)."),
     F64("lasting.bearing_rad", lasting_bearing_rad, 0, 0, 3, "Sigma of a bearing's lasting error, rad. 0: none."),

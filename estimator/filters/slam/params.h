@@ -28,6 +28,9 @@ typedef struct wm_slam_params {
   int32_t lasting_slots;
   double lasting_bearing_rad, lasting_lateral_m, lasting_range_m, lasting_range_rel, lasting_tau_s;
   double gate_soft, gate_hard;
+  // coded markers
+  int32_t markers;
+  double marker_sigma_m, marker_sigma_rel, marker_heading_sigma_rad;
   // landmarks
   int32_t map, landmark_capacity;
   int32_t confirm_seen;

@@ -200,7 +200,7 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
 // a Student distribution would have it; above, not at all.
 void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
                       record_list records) {
-  landmark_note &note = notes()[landmark];
+  const landmark_note &note = notes()[landmark];
   const int state = joint_.landmark_state(landmark);
   const double place[2] = {joint_.value(state), joint_.value(state + 1)};
   const wm_time_ns now = joint_.now_ns();
@@ -239,6 +239,12 @@ void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, cons
   const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
   const double more[2] = {v.noise[0] * weaker, v.count == 2 ? v.noise[1] * weaker : 0.0};
   joint_.fuse(block, more, params_.map == WM_SLAM_MAP_FROZEN);
+  note_fused(landmark);
+}
+
+void slam::note_fused(int landmark) {
+  landmark_note &note = notes()[landmark];
+  const wm_time_ns now = joint_.now_ns();
   note.misfits = 0;
   note.seen++;
   note.last_ns = now;
@@ -306,6 +312,7 @@ void slam::join_seen(int32_t id, const wm_sighting &s, const reading &r, const p
       rows[k].add(v.row[i], -inverse[k][i]);
       for (int l = 0; l < 2; l++) noise[k][l] += inverse[k][i] * v.noise[i] * inverse[l][i];
     }
+  noise[2][2] = square(kPi);  // a heading, where landmarks have one, is unknown
   note_landmark(id, joint_.add_landmark(rows, noise, place), joint_.now_ns());
   fused_ns_ = joint_.now_ns();
   blank.verdict = WM_FUSED;
@@ -390,7 +397,9 @@ bool slam::join_line(int32_t id, const bearing_tracks::track &track) {
   for (int r = 0; r < 2; r++) relative[r].add(last + r, -1.0);
   const double variance = joint_.variance_of(relative[0]) + joint_.variance_of(relative[1]) + noise[0][0] + noise[1][1];
   if (variance > square(params_.line_sigma_rel * line.distance_m) || !make_room()) return false;
-  note_landmark(id, joint_.add_landmark(rows, noise, line.place_m), joint_.now_ns());
+  noise[2][2] = square(kPi);
+  const double place[3] = {line.place_m[0], line.place_m[1], 0.0};
+  note_landmark(id, joint_.add_landmark(rows, noise, place), joint_.now_ns());
   return true;
 }
 

@@ -14,7 +14,8 @@ namespace {
 
 constexpr const char *kSensorStateNames[] = {"yaw_rad", "x_m", "y_m", "time_offset_s", "range_bias_m", "range_scale"};
 constexpr double kOwnFrame_m = 1e-3, kOwnFrame_rad = 1e-3;  // the map begins where the robot starts
-constexpr double kSurveyed_m = 1e-4;                        // no map is better
+constexpr double kSurveyed_m = 1e-4, kSurveyed_rad = 0.01;  // no map is better; headings come without a sigma
+const double kAbsent = std::numeric_limits<double>::quiet_NaN();
 
 int lasting_states(const wm_slam_params &p) {
   if (p.lasting_slots == 0) return 0;
@@ -40,7 +41,7 @@ joint_layout layout_of(const wm_slam_params &p, const wm_setup &setup) {
   out.first_clone = states_before_clones(p, setup) + ray_states(p);
   out.clones = p.line_clones;
   out.robot_states = out.first_clone + 3 * p.line_clones;
-  out.landmark_width = 2;
+  out.landmark_width = p.markers ? 3 : 2;
   out.landmarks = p.landmark_capacity;
   out.invariant = p.consistency == WM_SLAM_INVARIANT;
   return out;
@@ -146,9 +147,12 @@ void slam::load_map() {
     const wm_landmark &l = setup_->landmarks[i];
     if (!finite(l.p_m[0]) || !finite(l.p_m[1])) continue;
     const double variance = square(finite(l.sigma_m) && l.sigma_m > kSurveyed_m ? l.sigma_m : kSurveyed_m);
-    const double noise[3][3] = {{variance, 0, 0}, {0, variance, 0}, {0, 0, 0}};
+    const double heading = finite(l.yaw_rad) ? wrap(l.yaw_rad) : 0.0;
+    const double heading_sigma = finite(l.yaw_rad) ? kSurveyed_rad : kPi;
+    const double noise[3][3] = {{variance, 0, 0}, {0, variance, 0}, {0, 0, square(heading_sigma)}};
+    const double place[3] = {l.p_m[0], l.p_m[1], heading};
     const joint_row rows[3] = {};
-    const int landmark = joint_.add_landmark(rows, noise, l.p_m);
+    const int landmark = joint_.add_landmark(rows, noise, place);
     notes()[landmark] = {l.id, 0, WM_TIME_NONE, WM_TIME_NONE, l.p_m[2], 0, 1};
   }
 }
@@ -162,6 +166,7 @@ wm_status slam::predict(const wm_event &motion) {
 wm_status slam::correct(const wm_event &event, record_list records) {
   switch (event.kind) {
     case WM_EVENT_SIGHTING: return fuse_sighting(event, records);
+    case WM_EVENT_MARKER: return fuse_marker(event, records);
     case WM_EVENT_SET_POSE:
     case WM_EVENT_RESET: return take_pose(event);
     case WM_EVENT_LOOKED: {
@@ -244,9 +249,9 @@ size_t slam::list_landmarks(wm_landmark *out, double (*covariance)[4], size_t ca
       out[count] = {note.id,
                     {joint_.value(s), joint_.value(s + 1), note.z_m},
                     std::sqrt(most),
-                    std::numeric_limits<double>::quiet_NaN()};
+                    params_.markers ? joint_.value(s + 2) : kAbsent};
       if (covariance) {
-        const double c[4] = {xx, xy, yy, std::numeric_limits<double>::quiet_NaN()};
+        const double c[4] = {xx, xy, yy, params_.markers ? joint_.variance(s + 2) : kAbsent};
         std::memcpy(covariance[count], c, sizeof c);
       }
     }
@@ -344,20 +349,21 @@ size_t landmarks(const void *state, wm_landmark *out, double (*covariance)[4], s
 
 }  // namespace
 
-const wm_estimator wm_slam_estimator = {"slam",
-                                        "EKF-SLAM in the plane, right-invariant: the robot, its sensors' errors and "
-                                        "landmarks whose places nobody measured, "
-                                        "from bearings and ranges or bearings alone, with or without identities.",
-                                        WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
-                                            WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
-                                        wm_slam_params_table,
-                                        state_bytes,
-                                        init,
-                                        predict,
-                                        correct,
-                                        estimate,
-                                        motion,
-                                        calibration,
-                                        motion_health,
-                                        landmarks,
-                                        nullptr};
+const wm_estimator wm_slam_estimator = {
+    "slam",
+    "EKF-SLAM in the plane, right-invariant: the robot, its sensors' errors and "
+    "landmarks whose places nobody measured, "
+    "from coded markers, bearings and ranges, or bearings alone, with or without identities.",
+    WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
+        WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
+    wm_slam_params_table,
+    state_bytes,
+    init,
+    predict,
+    correct,
+    estimate,
+    motion,
+    calibration,
+    motion_health,
+    landmarks,
+    nullptr};

@@ -74,6 +74,18 @@ class slam {
     double bearing_sigma, range_sigma;
   };
 
+  // A marker, levelled: along the sensor's yaw, on the floor.
+  struct marker_reading {
+    double level[2], along[2];  // place; unit vector towards it
+    double yaw_rad, z_m;
+    double noise[3];  // along, across, heading
+  };
+  struct marker_view {
+    joint_row row[3];
+    double observed[3], expected[3], innovation[3];
+    double by_landmark[3][3];
+  };
+
   past_pose look_back(double age_s) const;
   void add_pose(joint_row &row, const double by[3], const past_pose &past, int time_state) const;
   double sensor_value(int sensor, int which, double neutral) const;
@@ -100,6 +112,14 @@ class slam {
   void settle_ray(int32_t id, bearing_tracks::track *track, const wm_pose2 &from);
   void end_ray(bearing_tracks::track *track);
   int ray_state(const bearing_tracks::track &track) const { return first_ray_ + 2 * tracks_.index(track); }
+  wm_status fuse_marker(const wm_event &event, record_list records);
+  void see_marker(int sensor, const marker_reading &r, const past_pose &past, const double place[3],
+                  marker_view *out) const;
+  void fuse_known_marker(int landmark, const wm_marker &m, const marker_reading &r, const past_pose &past,
+                         wm_innovation blank, record_list records);
+  void join_marker(const wm_marker &m, const marker_reading &r, const past_pose &past, wm_innovation blank,
+                   record_list records);
+  void note_fused(int landmark);
   bool join_line(int32_t id, const bearing_tracks::track &track);
   void misfit(int landmark);
   int clone_state(int clone) const { return first_clone_ + 3 * clone; }

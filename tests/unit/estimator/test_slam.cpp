@@ -32,7 +32,7 @@ wm_random noise;
 wm_pose2 truth;
 double now_s;
 double false_share;  // of sightings that are of nothing
-bool hidden, twice, nameless;
+bool hidden, twice, nameless, coded;
 int fused, rejected;
 
 double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
@@ -65,7 +65,7 @@ void make_room() {
   truth = {2, 0, wm::kHalfPi};
   noise = {42, 1, 0};
   now_s = false_share = 0.0;
-  hidden = twice = nameless = false;
+  hidden = twice = nameless = coded = false;
   fused = rejected = 0;
 }
 
@@ -102,6 +102,13 @@ void drive(double seconds, bool range = true) {
         const bool wrong = wm_random_next_uniform(&noise) < false_share;
         const double b = wrong ? gauss(0.7) : bearing + gauss(0.01);
         const double r = wrong ? 1.0 + 5.0 * wm_random_next_uniform(&noise) : distance + gauss(0.03);
+        if (coded) {
+          wm_event seen = make::empty(now_s, WM_EVENT_MARKER);
+          seen.as.marker = {
+              0, 10 + i, {r * wm::cos(b), r * wm::sin(b), 2.2}, wm::wrap(0.5 * i - truth.heading_rad + gauss(0.01))};
+          see(seen);
+          continue;
+        }
         see(make::sighting(now_s, nameless ? -1 : 10 + i, b, range ? r : kAbsent));
         if (twice) see(make::sighting(now_s, nameless ? -1 : 10 + i, b, range ? r : kAbsent));
       }
@@ -175,6 +182,45 @@ void test_landmarks_are_found_by_bearings_alone_whatever_the_method(void) {
     TEST_ASSERT_GREATER_OR_EQUAL(kCount - 1, found);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
   }
+}
+
+void test_coded_markers_give_place_and_heading_at_once(void) {
+  coded = true;
+  params.markers = 1;
+  params.marker_heading_sigma_rad = 0.01;
+  begin();
+  drive(40);
+  size_t found;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_landmark(&found));
+  TEST_ASSERT_EQUAL(kCount, found);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+  wm_landmark l[kCount];
+  double covariance[kCount][4];
+  slam->landmarks(state, l, covariance, kCount);
+  for (const wm_landmark &m : l) {
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, wm::wrap(m.yaw_rad - 0.5 * (m.id - 10)));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.2, m.p_m[2]);
+  }
+}
+
+void test_absurd_markers_are_refused_and_change_nothing(void) {
+  params.markers = 1;
+  begin();
+  drive(1);
+  wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
+  size_t count = 0;
+  for (double bad : {kAbsent, HUGE_VAL, 1e9}) {
+    wm_event e = make::empty(now_s, WM_EVENT_MARKER);
+    e.as.marker = {0, 3, {bad, 0, 1}, 0};
+    TEST_ASSERT_EQUAL(std::isfinite(bad) ? WM_OUT_OF_RANGE : WM_NOT_FINITE, slam->correct(state, &e, out, 8, &count));
+    e.as.marker = {0, 3, {1, 0, 1}, bad};
+    TEST_ASSERT_EQUAL(std::isfinite(bad) ? WM_OUT_OF_RANGE : WM_NOT_FINITE, slam->correct(state, &e, out, 8, &count));
+  }
+  wm_event e = make::empty(now_s, WM_EVENT_MARKER);
+  e.as.marker = {7, 3, {1, 0, 1}, 0};
+  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, slam->correct(state, &e, out, 8, &count));
+  e.as.marker = {0, -1, {1, 0, 1}, 0};
+  TEST_ASSERT_EQUAL(WM_REJECTED_NO_ASSOCIATION, see(e));
 }
 
 void test_landmarks_without_identity_are_told_apart(void) {
@@ -346,6 +392,8 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_landmarks_are_found_by_bearing_and_range);
   RUN_TEST(test_landmarks_are_found_by_bearings_alone_whatever_the_method);
+  RUN_TEST(test_coded_markers_give_place_and_heading_at_once);
+  RUN_TEST(test_absurd_markers_are_refused_and_change_nothing);
   RUN_TEST(test_landmarks_without_identity_are_told_apart);
   RUN_TEST(test_a_landmark_seen_twice_in_a_frame_without_identity_is_fused_once);
   RUN_TEST(test_the_same_identity_twice_in_a_frame_at_two_places_keeps_one);

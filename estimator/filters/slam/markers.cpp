@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+// Coded markers: place and heading of the print from one sighting. Paper, system 2, observation, as distance, direction
+// and heading, because these are what a camera's errors belong to.
+#include "filters/slam/slam.hpp"
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kFarthest_m = 1e4;
+constexpr double kThreeNumbers = 11.345 / 9.210;  // 99 % of chi2 with three degrees of freedom against two
+
+double first_number(double a, double b) { return finite(a) ? a : b; }
+
+}  // namespace
+
+wm_status slam::fuse_marker(const wm_event &event, record_list records) {
+  const wm_marker &m = event.as.marker;
+  wm_innovation blank{};
+  blank.t_ns = event.t_ns;
+  blank.source = event.source;
+  blank.sensor = m.sensor;
+  blank.landmark_id = m.id;
+  blank.residual = WM_RESIDUAL_X;
+  const auto drop = [&](wm_verdict verdict) {
+    blank.verdict = (uint8_t)verdict;
+    records.add(blank);
+    return WM_OK;
+  };
+  if (!finite(m.p_m[0]) || !finite(m.p_m[1]) || !finite(m.p_m[2]) || !finite(m.yaw_rad)) {
+    drop(WM_REJECTED_NOT_FINITE);
+    return WM_NOT_FINITE;
+  }
+  if (m.sensor >= setup_->sensor_count || std::fabs(m.p_m[0]) > kFarthest_m || std::fabs(m.p_m[1]) > kFarthest_m ||
+      std::fabs(m.p_m[2]) > kFarthest_m || std::fabs(m.yaw_rad) > 100.0) {
+    drop(WM_REJECTED_OUT_OF_RANGE);
+    return WM_OUT_OF_RANGE;
+  }
+  const wm_status status = joint_.check_time(event.t_ns);
+  if (status != WM_OK) return status;
+  joint_.move_to(event.t_ns);
+  look_after(event.t_ns);
+  if (!params_.markers) return drop(WM_REJECTED_BY_CONFIG);
+  if (m.id < 0) return drop(WM_REJECTED_NO_ASSOCIATION);
+
+  // Levelled: along the sensor's yaw, on the floor. axis is (Ry(pitch) Rx(roll))', its columns are the sensor's axes.
+  const mounted_sensor &sensor = sensor_[m.sensor];
+  double level[3];
+  for (int i = 0; i < 3; i++)
+    level[i] = sensor.axis[0][i] * m.p_m[0] + sensor.axis[1][i] * m.p_m[1] + sensor.axis[2][i] * m.p_m[2];
+  const double length = std::sqrt(level[0] * level[0] + level[1] * level[1] + level[2] * level[2]);
+  if (length > sensor.max_range_m) return drop(WM_REJECTED_OUT_OF_RANGE);
+  marker_reading r;
+  const double floor_m = std::sqrt(level[0] * level[0] + level[1] * level[1]);
+  r.along[0] = floor_m > 1e-6 ? level[0] / floor_m : 1.0;
+  r.along[1] = floor_m > 1e-6 ? level[1] / floor_m : 0.0;
+  r.level[0] = level[0];
+  r.level[1] = level[1];
+  r.yaw_rad = m.yaw_rad;
+  const double across = params_.bearing_sigma_factor *
+                        first_number(sensor.bearing_sigma_rad, params_.bearing_sigma_default_rad) * floor_m;
+  const double range = params_.range_sigma_factor * first_number(sensor.range_sigma_m, params_.range_sigma_default_m);
+  const double least = square(params_.marker_sigma_m) + square(params_.marker_sigma_rel * length);
+  r.noise[0] = least + square(range);
+  r.noise[1] = least + square(across);
+  r.noise[2] = square(params_.marker_heading_sigma_rad);
+  r.z_m = sensor.z_m + level[2];
+
+  const past_pose past = look_back(sensor_value(m.sensor, kTimeOffset, 0.0));
+  const int landmark = find_landmark(m.id);
+  if (landmark >= 0)
+    fuse_known_marker(landmark, m, r, past, blank, records);
+  else if (params_.map == WM_SLAM_MAP_FROZEN)
+    drop(WM_REJECTED_UNKNOWN_ID);
+  else
+    join_marker(m, r, past, blank, records);
+  return WM_OK;
+}
+
+// Along and across the line of sight, and the heading: expected from `place` (x, y, heading in map). Rows by the state
+// without the landmark; those by the landmark apart.
+void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past, const double place[3],
+                      marker_view *out) const {
+  const sensor_errors errors = errors_of(sensor);
+  const wm_pose2 from = sensor_pose(sensor, past);
+  const sin_cos h = sincos(from.heading_rad), base = sincos(past.pose.heading_rad);
+  const double dx = place[0] - from.x_m, dy = place[1] - from.y_m;
+  const double u[2] = {h.cos * dx + h.sin * dy, h.cos * dy - h.sin * dx};
+  const double lever_x = from.x_m - past.pose.x_m, lever_y = from.y_m - past.pose.y_m;
+  const int *states = sensor_state_[sensor];
+  for (int k = 0; k < 2; k++) {
+    const double a[2] = {k == 0 ? r.along[0] : -r.along[1], k == 0 ? r.along[1] : r.along[0]};
+    const double scale = k == 0 ? errors.range_scale : 1.0;
+    // By the place: a' R(-heading).
+    const double g[2] = {scale * (a[0] * h.cos - a[1] * h.sin), scale * (a[0] * h.sin + a[1] * h.cos)};
+    const double turn = scale * (a[0] * u[1] - a[1] * u[0]);
+    const double by[3] = {-g[0], -g[1], turn + g[0] * lever_y - g[1] * lever_x};
+    const double plain = a[0] * u[0] + a[1] * u[1];
+    out->row[k].count = 0;
+    add_pose(out->row[k], by, past, states[kTimeOffset]);
+    out->row[k].add(states[kYaw], turn);
+    out->row[k].add(states[kMountX], -g[0] * base.cos - g[1] * base.sin);
+    out->row[k].add(states[kMountY], g[0] * base.sin - g[1] * base.cos);
+    if (k == 0) out->row[k].add(states[kRangeScale], plain);
+    out->by_landmark[k][0] = g[0];
+    out->by_landmark[k][1] = g[1];
+    out->by_landmark[k][2] = 0.0;
+    out->observed[k] = a[0] * r.level[0] + a[1] * r.level[1];
+    out->expected[k] = scale * plain;
+    out->innovation[k] = out->observed[k] - out->expected[k];
+  }
+  const double by[3] = {0.0, 0.0, -1.0};
+  out->row[2].count = 0;
+  add_pose(out->row[2], by, past, states[kTimeOffset]);
+  out->row[2].add(states[kYaw], -1.0);
+  out->by_landmark[2][0] = out->by_landmark[2][1] = 0.0;
+  out->by_landmark[2][2] = 1.0;
+  out->observed[2] = wrap(r.yaw_rad);
+  out->expected[2] = wrap(place[2] - from.heading_rad);
+  out->innovation[2] = wrap(out->observed[2] - out->expected[2]);
+}
+
+void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_reading &r, const past_pose &past,
+                             wm_innovation blank, record_list records) {
+  static constexpr wm_residual kKinds[3] = {WM_RESIDUAL_X, WM_RESIDUAL_Y, WM_RESIDUAL_HEADING};
+  const int state = joint_.landmark_state(landmark);
+  const double place[3] = {joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};
+  marker_view v;
+  see_marker(m.sensor, r, past, place, &v);
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 3; k++) v.row[i].add(state + k, v.by_landmark[i][k]);
+  joint_state::innovation_block block;
+  joint_.prepare(v.row, v.innovation, r.noise, 3, &block);
+  const double hard = params_.gate_hard * kThreeNumbers, soft = params_.gate_soft * kThreeNumbers;
+  for (int i = 0; i < 3; i++) {
+    wm_innovation record = blank;
+    record.residual = (uint8_t)kKinds[i];
+    record.observed = v.observed[i];
+    record.expected = v.expected[i];
+    record.variance = block.s[i][i];
+    record.nis = block.nis;
+    record.gate = hard;
+    record.gate_dof = 3;
+    record.verdict = block.nis <= hard ? WM_FUSED : WM_REJECTED_GATE;
+    records.add(record);
+  }
+  if (block.nis > hard) return misfit(landmark);
+  const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
+  const double more[3] = {r.noise[0] * weaker, r.noise[1] * weaker, r.noise[2] * weaker};
+  joint_.fuse(block, more, params_.map == WM_SLAM_MAP_FROZEN);
+  landmark_note &note = notes()[landmark];
+  if (!note.surveyed) note.z_m += (r.z_m - note.z_m) / (note.seen + 1.0);
+  note_fused(landmark);
+}
+
+// Paper, system 2, new marker: P_aa = G_x P G_x' + G_z R G_z' with all cross terms.
+void slam::join_marker(const wm_marker &m, const marker_reading &r, const past_pose &past, wm_innovation blank,
+                       record_list records) {
+  const wm_pose2 from = sensor_pose(m.sensor, past);
+  const double scale = errors_of(m.sensor).range_scale;
+  const wm_pose2 there = compose(from, {r.level[0] / scale, r.level[1] / scale, r.yaw_rad});
+  const double place[3] = {there.x_m, there.y_m, there.heading_rad};
+  blank.verdict = make_room() ? WM_FUSED : WM_REJECTED_NO_ASSOCIATION;
+  records.add(blank);
+  if (blank.verdict != WM_FUSED) return;
+  marker_view v;
+  see_marker(m.sensor, r, past, place, &v);
+  // The block by the landmark is a turn times the scale, and 1.
+  const double(*g)[3] = v.by_landmark;
+  const double determinant = g[0][0] * g[1][1] - g[0][1] * g[1][0];
+  const double inverse[3][3] = {{g[1][1] / determinant, -g[0][1] / determinant, 0},
+                                {-g[1][0] / determinant, g[0][0] / determinant, 0},
+                                {0, 0, 1}};
+  joint_row rows[3];
+  double noise[3][3] = {};
+  for (int k = 0; k < 3; k++)
+    for (int i = 0; i < 3; i++) {
+      if (inverse[k][i] != 0.0) rows[k].add(v.row[i], -inverse[k][i]);
+      for (int l = 0; l < 3; l++) noise[k][l] += inverse[k][i] * r.noise[i] * inverse[l][i];
+    }
+  const int landmark = note_landmark(m.id, joint_.add_landmark(rows, noise, place), joint_.now_ns());
+  notes()[landmark].z_m = r.z_m;
+  fused_ns_ = joint_.now_ns();
+}
+
+}  // namespace wm
