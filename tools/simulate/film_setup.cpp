@@ -162,6 +162,26 @@ std::vector<wm_landmark> landmarks_of(const World &world) {
   return out;
 }
 
+// Whether the robot gets along its route without bumping into the building.
+wm_status check_clear(const World &world, wm_error *err) {
+  Drive drive;
+  if (const wm_status s = Drive::plan(world.route, drive, err); s != WM_OK) return s;
+  Plan mapped = world.plan;  // clutter keeps out of the way by itself
+  std::erase_if(mapped.faces, [](const Face &f) { return !f.mapped; });
+  double way_m = -1;
+  for (double t_s = 0; t_s <= drive.duration_s(); t_s += 0.05) {
+    const State at = drive.at(t_s);
+    if (way_m >= 0 && std::fabs(at.way_m - way_m) < 0.05) continue;
+    way_m = at.way_m;
+    if (clearance_m(mapped, world.footprint, at.x_m, at.y_m, at.heading_rad) > 0) continue;
+    return wm_fail(
+        err, WM_BAD_CONFIG,
+        "route: %.1f s after the start, at (%.2f, %.2f), the robot (%.2f m wide) is inside of a wall or touches it",
+        t_s, at.x_m, at.y_m, 2 * world.footprint.half_width_m);
+  }
+  return WM_OK;
+}
+
 }  // namespace
 
 wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *err) {
@@ -172,9 +192,17 @@ wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *
   request.markers_on_walls = scenario.world.markers_on_walls;
   request.seed = seed;
   if (!scenario.route.legs.empty()) request.route = scenario.route;
+  if (!scenario.world.plan.empty()) {
+    request.plan.emplace();
+    if (const wm_status s = load_building(scenario.world.plan, scenario.world.ceiling_m, *request.plan, err);
+        s != WM_OK)
+      return s;
+  }
   out.world = make_world(request, err);
   if (!out.world) return err->text[0] ? WM_BAD_CONFIG : WM_INTERNAL;
   out.scenario.route = out.world->route;
+  if (request.plan)
+    if (const wm_status s = check_clear(*out.world, err); s != WM_OK) return s;
   if (out.scenario.about.empty()) out.scenario.about = out.world->about;
   if (const wm_status s = set_up_cameras(scenario, seed, out, err); s != WM_OK) return s;
 

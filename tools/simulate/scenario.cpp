@@ -7,12 +7,14 @@
 #include <set>
 
 #include "simulate/scenario_reader.h"
+#include "simulate/worlds/waypoints.h"
 
 namespace wm::sim {
 namespace {
 
 void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
-  static const char *const known[] = {"landmarks", "kind", "variant", "markers_on_walls", "scatter", "map", nullptr};
+  static const char *const known[] = {"landmarks", "kind",      "variant", "markers_on_walls", "scatter", "map",
+                                      "plan",      "ceiling_m", nullptr};
   static const char *const maps[] = {"all", "listed", "none", nullptr};
   static const char *const kinds[] = {"features", "crossing", "corridor", "office", "hall", "seabed", nullptr};
   static const char *const variants[] = {"easy", "hard", nullptr};
@@ -23,6 +25,15 @@ void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
   r.flag(world, "markers_on_walls", out.world.markers_on_walls);
   out.world.hard = variant == 1;
   if (kind > 0) out.world.kind = kinds[kind];
+  r.text(world, "plan", out.world.plan);
+  r.number(world, "ceiling_m", 0.5, 50, 1, out.world.ceiling_m);
+  const bool building = out.world.kind == "corridor" || out.world.kind == "office" || out.world.kind == "hall";
+  if (r.ok() && !out.world.plan.empty() && !building)
+    return r.fail(r.child(world, "plan", false), "only corridor, office and hall have a plan");
+  if (!out.world.plan.empty() && out.world.plan[0] != '/') {
+    const std::string file = wm_yaml_file(&world);
+    out.world.plan = file.substr(0, file.find_last_of('/') + 1) + out.world.plan;
+  }
   const wm_yaml_node list = r.child(world, "landmarks", false);
   if (r.ok() && kind > 0 && wm_yaml_there(&list))
     return r.fail(list, "a world of this kind draws its own landmarks; leave the key out");
@@ -160,11 +171,64 @@ void read_leg(Reader &r, const wm_yaml_node &map, Leg &out) {
   if (turns && out.turn_rad == 0) r.fail(map, "turn_deg 0 is no turn; use straight_m");
 }
 
+// A route through points: straight lines, cut at the corners by turns.
+void read_way(Reader &r, const wm_yaml_node &map, Route &out) {
+  static const char *const known_start[] = {"x_m", "y_m", nullptr};
+  static const char *const known[] = {"xy_m", "speed_mps", "radius_m", "stand_s", "backwards", nullptr};
+  const wm_yaml_node start = r.child(map, "start", true), points = r.child(map, "points", true),
+                     legs = r.child(map, "legs", false);
+  if (r.ok() && wm_yaml_there(&legs)) return r.fail(legs, "`points` are there already; one of both");
+  r.keys(start, known_start);
+  Point from;
+  WaypointRules rules;
+  Waypoint usual;
+  usual.speed_mps = 0.6;
+  usual.radius_m = 0.8;
+  int64_t laps = 1;
+  r.number(start, "x_m", -kFar_m, kFar_m, 1, from.x_m, true);
+  r.number(start, "y_m", -kFar_m, kFar_m, 1, from.y_m, true);
+  r.integer(map, "laps", 1, 1000, laps);
+  r.number(map, "acceleration_mps2", 0.01, 20, 1, rules.acceleration_mps2);
+  r.number(map, "stand_s", 0, 1e5, 1, rules.start_stand_s);
+  r.number(map, "speed_mps", 0.01, 100, 1, usual.speed_mps);
+  r.number(map, "radius_m", 0.1, kFar_m, 1, usual.radius_m);
+  rules.turn_speed_mps = 0.7 * usual.speed_mps;
+  r.number(map, "turn_speed_mps", 0.01, 100, 1, rules.turn_speed_mps);
+  std::vector<Waypoint> way;
+  for (size_t i = 0, n = r.list(points); i < n && r.ok(); i++) {
+    const wm_yaml_node item = wm_yaml_item(&points, i);
+    Waypoint w = usual;
+    double xy[2] = {0, 0};
+    if (wm_yaml_is_list(&item)) {
+      r.take(wm_yaml_f64_list(&item, 2, 2, xy, nullptr, r.error()));
+    } else {
+      r.keys(item, known);
+      r.numbers(item, "xy_m", 2, 2, xy, true);
+      r.number(item, "speed_mps", 0.01, 100, 1, w.speed_mps);
+      r.number(item, "radius_m", 0.1, kFar_m, 1, w.radius_m);
+      r.number(item, "stand_s", 0, 1e5, 1, w.stand_s);
+      r.flag(item, "backwards", w.reverse);
+    }
+    w.p = {xy[0], xy[1]};
+    way.push_back(w);
+  }
+  if (!r.ok()) return;
+  wm_error why{};
+  if (route_through(from, way, rules, out, &why) != WM_OK) return r.fail(points, why.text);
+  out.laps = static_cast<int>(laps);
+}
+
 void read_route(Reader &r, const wm_yaml_node &map, Route &out) {
-  static const char *const known[] = {"start", "acceleration_mps2", "laps", "legs", nullptr};
+  static const char *const known[] = {"start",     "acceleration_mps2", "laps",     "legs",    "points",
+                                      "speed_mps", "turn_speed_mps",    "radius_m", "stand_s", nullptr};
   static const char *const known_start[] = {"x_m", "y_m", "heading_deg", nullptr};
   r.keys(map, known);
-  const wm_yaml_node start = r.child(map, "start", true), legs = r.child(map, "legs", true);
+  const wm_yaml_node start = r.child(map, "start", true), points = r.child(map, "points", false);
+  if (r.ok() && wm_yaml_there(&points)) return read_way(r, map, out);
+  for (const char *key : {"speed_mps", "turn_speed_mps", "radius_m", "stand_s"})
+    if (const wm_yaml_node node = r.child(map, key, false); r.ok() && wm_yaml_there(&node))
+      return r.fail(node, "belongs to `points`; of legs each has its own");
+  const wm_yaml_node legs = r.child(map, "legs", true);
   r.keys(start, known_start);
   r.number(start, "x_m", -kFar_m, kFar_m, 1, out.x_m, true);
   r.number(start, "y_m", -kFar_m, kFar_m, 1, out.y_m, true);
@@ -366,6 +430,8 @@ void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
     read_cameras(r, cameras, out);
   read_sensors(r, r.child(root, "sensors", false), out);
   if (r.ok() && wm_yaml_there(&route)) read_route(r, route, out.route);
+  if (r.ok() && !out.world.plan.empty() && out.route.legs.empty())
+    r.fail(r.child(root, "world", true), "a plan of one's own needs a `route` through it");
   read_pictures(r, pictures, out.pictures);
   read_bus(r, r.child(root, "bus", false), out.bus);
   read_errors(r, r.child(root, "errors", false), out.errors);

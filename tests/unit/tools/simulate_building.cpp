@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: Apache-2.0
+// Buildings of one's own: the shipped polyline plan and the same flat as a ROS map become worlds that agree; what a
+// wrong plan, map or route says.
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+
+#include "made.h"
+#include "simulate/film.h"
+
+extern "C" {
+#include "unity.h"
+void setUp(void);
+void tearDown(void);
+}
+
+using namespace wm::sim;
+
+namespace {
+
+std::string worlds() { return std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/"; }
+
+Plan building(const std::string &file) {
+  Plan plan;
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_building(worlds() + file, 2.5, plan, &err), err.text);
+  return plan;
+}
+
+void test_plan_and_map_of_a_flat_agree() {
+  const Plan drawn = building("plans/flat.yaml"), mapped = building("plans/map.yaml");
+  size_t asked = 0;
+  for (double x = 0.125; x < 9; x += 0.25)
+    for (double y = 0.125; y < 7.5; y += 0.25) {
+      const Point p{x, y};
+      if (!drawn.free(p, false) || drawn.clearance_m(p, false) < 0.1) continue;
+      asked++;
+      TEST_ASSERT_TRUE(mapped.free(p));
+      TEST_ASSERT_DOUBLE_WITHIN(0.1, drawn.clearance_m(p, false), mapped.clearance_m(p));  // a cell either way
+    }
+  TEST_ASSERT_TRUE(asked > 500);
+  TEST_ASSERT_TRUE(drawn.faces.size() > 20 && mapped.faces.size() > 10);
+}
+
+void test_shipped_scenarios_with_a_building_can_be_driven() {
+  for (const char *name : {"own-plan.yaml", "own-map.yaml"}) {
+    Scenario scenario;
+    Film film;
+    wm_error err{};
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario(worlds() + name, scenario, &err), err.text);
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 1, film, &err), err.text);
+    TEST_ASSERT_TRUE(film.recording.length_m > 15);
+    TEST_ASSERT_TRUE(film.world->map.has_value());
+    const State start = film.recording.drive.at(0), end = film.recording.drive.at(1e9);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 3.14159265358979 / 2, start.heading_rad);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 5.4, end.x_m);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2.4, end.y_m);
+    TEST_ASSERT_TRUE(film.recording.drive.at(film.recording.duration_s - 1).speed_mps < 0);  // backwards
+  }
+}
+
+void refuse(const std::string &world, const std::string &route, const char *wanted) {
+  const made::Folder folder;
+  folder.write("empty.yaml", "colour: red\n");
+  folder.write("white.pgm", "P5\n4 4\n255\n" + std::string(16, '\xff'));
+  folder.write("white.yaml", "image: white.pgm\nresolution: 0.1\norigin: [0, 0, 0]\n");
+  folder.write("unscaled.yaml", "image: white.pgm\n");
+  folder.write("room.yaml", "format: waymark-plan/1\noutside: solid\nrooms: [[[0, 0], [6, 0], [6, 4], [0, 4]]]\n");
+  folder.write("x.yaml", "format: waymark-scenario/1\nname: x\nworld: {" + world +
+                             "}\nrobot: {wheel_radius_m: 0.1, ticks_per_turn: 100, track_m: 0.5, wheelbase_m: 1}\n" +
+                             route);
+  Scenario scenario;
+  Film film;
+  wm_error err{};
+  const std::string path = (folder.path() / "x.yaml").string();
+  wm_status status = load_scenario(path, scenario, &err);
+  if (status == WM_OK) status = prepare(scenario, 1, film, &err);
+  TEST_ASSERT_TRUE_MESSAGE(status == WM_BAD_CONFIG || status == WM_NOT_FOUND || status == WM_IO, wanted);
+  std::string said = err.text;
+  for (size_t at; (at = said.find(folder.path().string() + "/")) != std::string::npos;)
+    said.erase(at, folder.path().string().size() + 1);
+  TEST_ASSERT_EQUAL_STRING(wanted, said.c_str());
+}
+
+void test_mistakes_are_told() {
+  const std::string along = "route: {start: {x_m: 1, y_m: 2}, points: [[4, 2]]}\n";
+  refuse("kind: corridor, plan: room.yaml", "", "x.yaml:3: world: a plan of one's own needs a `route` through it");
+  refuse("kind: crossing, plan: room.yaml", along, "x.yaml:3: world.plan: only corridor, office and hall have a plan");
+  refuse("kind: corridor, plan: empty.yaml", along,
+         "empty.yaml:1: neither a plan (`format: waymark-plan/1`) nor a ROS map (`image: FILE`)");
+  refuse("kind: corridor, plan: unscaled.yaml", along, "unscaled.yaml:1: `resolution`, metres of a pixel, is missing");
+  refuse("kind: corridor, plan: white.yaml", along,
+         "white.pgm: no pixel is occupied (darker than grey 90); is `negate` right?");
+  refuse("kind: corridor, plan: room.yaml", "route: {start: {x_m: 1, y_m: 2}, points: [[5.5, 2]]}\n",
+         "route: 10.3 s after the start, at (4.90, 2.00), the robot (0.70 m wide) is inside of a wall or touches it");
+  refuse("kind: corridor, plan: room.yaml", "route: {start: {x_m: 1, y_m: 2}, points: [[1.5, 2], [1.5, 3.5]]}\n",
+         "x.yaml:5: route.points: route: point 1: its turn needs 0.56 m more of the straight before it");
+}
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_plan_and_map_of_a_flat_agree);
+  RUN_TEST(test_shipped_scenarios_with_a_building_can_be_driven);
+  RUN_TEST(test_mistakes_are_told);
+  return UNITY_END();
+}
