@@ -1,26 +1,57 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "eval/detector_command.h"
 
+#include <algorithm>
+
 #include "common/cameras.h"
+#include "common/edge_points.h"
 #include "common/failure.h"
 #include "eval/detector.h"
 
 namespace wm::tools {
+namespace {
 
 namespace fs = std::filesystem;
 
+// Neighbouring rays' points that are this near in the picture are one line: some three times the distance of two rays
+// on a wall that is looked at straight on.
+constexpr double kGap_px = 40;
+
+// What the run's log says that was seen, frame by frame; a labelled frame that the run passed over is not judged.
+FramePolylines polylines_of_log(const fs::path &run, const fs::path &recording, const NamedCamera &camera,
+                                int32_t index, FramePolylines *truth) {
+  const auto stamps = load_frame_stamps(recording, camera.name);
+  FramePolylines out;
+  for (const EdgePoints &points : load_edge_points(run)) {
+    if (points.camera != index && points.camera >= 0) continue;
+    const auto at = std::lower_bound(stamps.begin(), stamps.end(), std::pair<int64_t, int64_t>(points.t_ns, INT64_MIN));
+    if (at != stamps.end() && at->first == points.t_ns)
+      out[at->second] = picture_polylines(points, camera.camera, kGap_px * camera.camera.width / 1280);
+  }
+  if (out.empty()) throw Failure((run / "events.wmlog").string() + ": has no edge points of this camera");
+  std::erase_if(*truth, [&](const auto &entry) { return !out.contains(entry.first); });
+  return out;
+}
+
+}  // namespace
+
 Figures evaluate_detector(const DetectorArguments &a) {
-  const fs::path calibration = fs::path(a.recording) / "calibration.yaml",
-                 labels = fs::path(a.recording) / "labels/edges.csv";
+  const fs::path run = a.run, recording = a.recording, calibration = recording / "calibration.yaml",
+                 labels = recording / "labels/edges.csv";
   if (!fs::exists(labels))
     throw Failure(labels.string() +
                   ": is not there; a detector is judged by labelled pictures (waymark simulate "
                   "writes them for its worlds)");
   const std::vector<NamedCamera> cameras = load_cameras(calibration);
   const NamedCamera &camera = choose_camera(cameras, a.camera, calibration);
-  const fs::path detections = fs::path(a.run) / "detections" / (camera.name + "-edges.csv");
-  if (!fs::exists(detections))
-    throw Failure(detections.string() + ": is not there: this run wrote no detections of that camera");
+  const fs::path detections = run / "detections" / (camera.name + "-edges.csv");
+  FramePolylines truth = load_polylines(labels);
+  if (!fs::exists(detections) && !fs::exists(run / "events.wmlog"))
+    throw Failure(detections.string() + ": is not there, nor an events.wmlog: this run saw no edges");
+  const FramePolylines detected =
+      fs::exists(detections)
+          ? load_polylines(detections)
+          : polylines_of_log(run, recording, camera, static_cast<int32_t>(&camera - cameras.data()), &truth);
 
   DetectorMetric metric;
   metric.omega_px = 14.0 * camera.camera.width / 1920;
@@ -30,7 +61,7 @@ Figures evaluate_detector(const DetectorArguments &a) {
     return a.view_m.empty() || (floor->x() >= a.view_m[0] && floor->x() <= a.view_m[1] && floor->y() >= a.view_m[2] &&
                                 floor->y() <= a.view_m[3]);
   };
-  return detector_figures(load_polylines(labels), load_polylines(detections), metric);
+  return detector_figures(truth, detected, metric);
 }
 
 }  // namespace wm::tools

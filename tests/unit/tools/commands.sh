@@ -50,7 +50,7 @@ mkdir -p "$dir/rec/labels" "$dir/run/detections"
 printf 'frame,polyline,u_px,v_px\n0,0,400,500\n0,0,800,500\n' >"$dir/rec/labels/edges.csv"
 expect 1 'has no cameras' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges
 printf 'cameras:\n  front: {model: equidistant, size: [1280, 720], intrinsics: [520, 520, 640, 360], distortion: [0, 0, 0, 0], mounting: {xyz_m: [1, 0, 0.4], rpy_deg: [0, 22, 0]}}\n' >"$dir/rec/calibration.yaml"
-expect 1 'front-edges.csv: is not there' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges
+expect 1 'this run saw no edges' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges
 printf 'frame,polyline,u_px,v_px\n0,0,400,505\n0,0,600,505\n' >"$dir/run/detections/front-edges.csv"
 expect 0 '"length_precision": 1.0' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges --json
 expect 0 '"left_out_of_view": 1' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges --json --view 3,6,-3,3
@@ -83,7 +83,7 @@ printf 'P5 64 48 255\n%3072s' '' >"$dir/blank.pgm"
 expect 1 'a board was found in 0 of 1 pictures' "$bin/waymark-calibrate" camera "$dir/blank.pgm" --chessboard 9x6
 # What was imported is what eval reads.
 cp "$dir/rec/imported.yaml" "$dir/rec/calibration.yaml"
-expect 1 'front-edges.csv: is not there' "$bin/waymark-eval" "$dir/empty" "$dir/rec" --detector edges
+expect 1 'this run saw no edges' "$bin/waymark-eval" "$dir/empty" "$dir/rec" --detector edges
 
 # Maps.
 { printf 'P5 80 60 255\n'; python3 -c '
