@@ -5,6 +5,7 @@
 
 #include "vision/edges/params.h"
 #include "vision/edges/rays.hpp"
+#include "vision/edges/support.hpp"
 #include "vision/registry.h"
 
 namespace wm {
@@ -16,6 +17,7 @@ struct edges_state {
   int32_t camera_index;
   mounted_camera camera;
   ray_fan fan;
+  ray_work work;
 };
 
 constexpr size_t kAlign = 64;
@@ -98,6 +100,19 @@ void slope_at(const wm_frame &frame, const pixel &at, double *gu, double *gv) {
   *gv = down / 128.0;
 }
 
+// Whether the band behind the edge is a line also across, not only along the ray: `width_px` away it is as it was.
+bool is_narrow(const wm_frame &frame, const ray_edge &edge, const pixel &at, double du, double dv, double width_px) {
+  // Towards the side that the ray comes to: down the slope of a fall, up that of a rise.
+  const double sign = edge.is_fall ? -1 : 1, middle = static_cast<double>(edge.middle);
+  for (int k = 2; k < width_px; k++) {
+    const int u = static_cast<int>(at.u + sign * k * du + 0.5), v = static_cast<int>(at.v + sign * k * dv + 0.5);
+    if (u < 0 || v < 0 || u >= static_cast<int>(frame.width_px) || v >= static_cast<int>(frame.height_px)) return false;
+    const double grey = frame.grey[static_cast<size_t>(v) * frame.stride_bytes + static_cast<size_t>(u)];
+    if (edge.is_fall ? grey > middle : grey < middle) return true;
+  }
+  return false;
+}
+
 // The edge as a point on the floor with its normal and sigma. False where the picture doesn't tell.
 bool floor_point(const edges_state &state, const ray_edge &edge, const wm_frame &frame, wm_points *out) {
   const ray &r = state.fan.rays[edge.ray];
@@ -115,6 +130,10 @@ bool floor_point(const edges_state &state, const ray_edge &edge, const wm_frame 
                gy = (gu * (at_y.u - at.u) + gv * (at_y.v - at.v)) / step;
   const double picture = std::sqrt(gu * gu + gv * gv), floor = std::sqrt(gx * gx + gy * gy);
   if (!(picture > 0.2) || !(floor > 0)) return false;
+  // An upright board that is just no line lies along the ray in the picture, too.
+  const double along = gx * r.cos + gy * r.sin,
+               board_px = state.params.rays_line_rel * range * std::fabs(along) / picture;
+  if (is_narrow(frame, edge, at, gu / picture, gv / picture, board_px)) return false;
   const double noise = state.params.noise_grey / picture / 3;  // the mean of about ten pixels
   const double sigma_px = std::sqrt(square(state.params.sigma_px) + square(noise));
   const uint32_t i = out->count++;
@@ -127,7 +146,7 @@ bool floor_point(const edges_state &state, const ray_edge &edge, const wm_frame 
 
 wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_event *out, size_t capacity,
                  size_t *count) {
-  const auto *state = static_cast<const edges_state *>(memory);
+  auto *state = static_cast<edges_state *>(memory);
   const wm_frame &frame = frames[0];
   *count = 0;
   if (frame.width_px != state->camera.width_px || frame.height_px != state->camera.height_px) return WM_BAD_DATA;
@@ -136,15 +155,19 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
   std::memset(static_cast<void *>(out), 0, WM_EVENT_HEADER_BYTES);
   points->count = points->dropped = 0;
   points->camera = state->camera_index;
+  int32_t rays[WM_POINTS_MAX];
+  const double usual = usual_floor(state->fan, frame);
   for (uint32_t i = 0; i < state->fan.ray_count; i++) {
     ray_edge edge;
-    if (!find_first_edge(state->fan, i, frame, state->params, &edge)) continue;
-    if (points->count == WM_POINTS_MAX) {
+    if (!find_first_edge(state->fan, i, frame, usual, state->params, &state->work, &edge)) continue;
+    const uint32_t place = points->count;
+    if (place == WM_POINTS_MAX) {
       points->dropped++;
-    } else {
-      floor_point(*state, edge, frame, points);
+    } else if (floor_point(*state, edge, frame, points)) {
+      rays[place] = edge.ray;
     }
   }
+  keep_supported(points, rays, state->camera.centre_m.x, state->camera.centre_m.y, state->params.rays_support_min);
   if (points->count == 0) return WM_OK;
   out->t_ns = frame.t_ns;
   out->kind = WM_EVENT_POINTS;

@@ -26,6 +26,12 @@ static const wm_param kParams[] = {
         "In parts of the range. A dark band that is narrower on the floor is a line (a tile's joint, a cable), no "
         "wall: "
         "the height of a board over the camera's height, less than half of the lowest skirting."),
+    F64("rays.mirror_rel", rays_mirror_rel, 0.3, 0.0, 2,
+        "In parts of the range. How far behind an edge a stronger one is taken instead: glossy floors mirror a "
+        "skirting "
+        "board, whose image begins before the joint by the board's height over the camera's."),
+    {"rays.support_min", WM_PARAM_I32, offsetof(struct wm_edges_params, rays_support_min), 3, 0, 8, NULL,
+     "Of the four rays to each side, so many must have a point on a line with this one; else it is left out."},
     F64("sigma_px", sigma_px, 0.3, 0.01, 10, "px. Error of an edge's place across the edge where contrast is good."),
     F64("noise_grey", noise_grey, 2.0, 0.0, 100,
         "Grey levels. Noise of a pixel; over an edge's slope it is an error of its place that is added to sigma_px."),

@@ -13,7 +13,8 @@ extern "C" {
 struct wm_edges_params {
   double rays_step_rad, rays_range_min_m, rays_range_max_m;
   int32_t rays_sign;  // edges_sign
-  double rays_contrast_grey, rays_contrast_rel, rays_line_rel;
+  double rays_contrast_grey, rays_contrast_rel, rays_line_rel, rays_mirror_rel;
+  int32_t rays_support_min;
   double sigma_px, noise_grey;
 };
 

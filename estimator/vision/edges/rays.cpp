@@ -67,6 +67,113 @@ int read_profile(const ray_fan &fan, const ray &r, const wm_frame &frame, int32_
 
 constexpr int kSide = 4;  // samples that are averaged on each side of an edge
 
+// Grey levels along a ray, in 1/256, with their ranges.
+struct profile {
+  const int32_t *grey;
+  const float *range_m;
+  int count;
+
+  // How much darker it gets here, over two pixels on each side.
+  int32_t drop(int i) const { return grey[i - 2] + grey[i - 1] - grey[i + 1] - grey[i + 2]; }
+  bool is_fall(int i) const { return drop(i) > drop(i - 1) && drop(i) >= drop(i + 1); }
+  bool is_rise(int i) const { return drop(i) < drop(i - 1) && drop(i) <= drop(i + 1); }
+  double mean(int first) const {
+    static_assert(kSide == 4);
+    return (grey[first] + grey[first + 1] + grey[first + 2] + grey[first + 3]) / 4.0;
+  }
+  double before(int i) const { return mean(i - kSide); }
+  double after(int i) const { return mean(i + 1); }
+  double range(int i) const { return static_cast<double>(range_m[i]); }
+  int first() const { return kSide + 1; }
+  int end() const { return count - kSide - 1; }
+};
+
+// What the floor's brightness has been along the ray: follows it down faster than up, by steps that don't depend on how
+// far off it is, so that neither a lamp's reflection nor a dark line counts for much.
+struct floor_level {
+  static constexpr double kUp = 0.25 * 256, kDown = 1.0 * 256;  // a sample
+  double grey;
+  void see(int32_t sample) {
+    const double off = sample - grey;
+    grey += off > kUp ? kUp : off < -kDown ? -kDown : off;
+  }
+};
+
+// A place where it gets darker (or brighter) for good.
+struct step {
+  int at;
+  double level, after;  // of the floor before, of what comes behind
+  bool is_fall;
+};
+
+// Whether the band behind the step is so narrow that it is no wall's: soon it is as it was.
+bool is_line(const profile &p, const step &s, double narrow_rel) {
+  const double middle = 0.5 * (s.level + s.after), until = p.range(s.at) * (1 + narrow_rel);
+  for (int k = s.at + 2; k < p.count && p.range(k) < until; k++)
+    if (s.is_fall ? p.grey[k] > middle : p.grey[k] < middle) return true;
+  return false;
+}
+
+bool find_first_step(const profile &p, double usual_grey, const wm_edges_params &params, step *out) {
+  constexpr double kBrighter = 1.3;  // towards a window, but not a lamp itself
+  const double begin = p.mean(0);
+  floor_level floor = {begin < kBrighter * usual_grey ? begin : kBrighter * usual_grey};
+  for (int i = p.first(), seen = 0; i < p.end(); i++) {
+    for (; seen < i - kSide; seen++) floor.see(p.grey[seen]);
+    const bool is_fall = p.is_fall(i);
+    if (!is_fall && !(params.rays_sign == EDGES_ANY_SIGN && p.is_rise(i))) continue;
+    // A lamp's reflection ends with a fall to what the floor was all the time: only what falls below that counts.
+    const double before = p.before(i), level = is_fall && floor.grey < before ? floor.grey : before;
+    *out = {i, level, p.after(i), is_fall};
+    const double change = is_fall ? out->level - out->after : out->after - out->level;
+    if (change < params.rays_contrast_grey * 256 || change < params.rays_contrast_rel * (out->level + out->after))
+      continue;
+    if (!is_line(p, *out, params.rays_line_rel)) return true;
+  }
+  return false;
+}
+
+// Where it is bright again behind the step: the upper edge of a skirting board. 0 where it is not within reach.
+int find_upper_edge(const profile &p, const step &s, double reach_rel) {
+  const double until = p.range(s.at) * (1 + reach_rel) / (1 - reach_rel);
+  double darkest = s.after;
+  for (int k = s.at + 1; k < p.end() && p.range(k) < until; k++) {
+    if (p.grey[k] < darkest) darkest = p.grey[k];
+    if (p.grey[k] < 0.5 * (s.level + darkest)) continue;
+    int steepest = k;
+    for (int i = k - 2; i <= k + 2 && i < p.end(); i++)
+      if (i > s.at && p.drop(i) < p.drop(steepest)) steepest = i;
+    return steepest;
+  }
+  return 0;
+}
+
+// A glossy floor mirrors the skirting board: the first step may be the mirror image of its upper edge. By the law of
+// reflection the joint then lies at the harmonic mean of both ranges: image, joint and edge are at h/(h+s), 1 and
+// h/(h-s) of it for a camera at h and a board of height s. Or a weak edge on the floor came just before the joint.
+int joint_behind(const profile &p, const step &first, const wm_edges_params &params) {
+  constexpr double kWeak = 0.25;     // of the first step, where the place is foretold
+  constexpr double kStronger = 1.2;  // where it isn't
+  const int upper = find_upper_edge(p, first, params.rays_mirror_rel);
+  const double foretold = upper > 0 ? 2 / (1 / p.range(first.at) + 1 / p.range(upper)) : 0;
+  const double until = p.range(first.at) * (1 + params.rays_mirror_rel);
+  const int end = upper > 0 ? upper - 1 : p.end();
+  const double first_change = p.before(first.at) - p.after(first.at);
+  double strongest = first_change;
+  int chosen = first.at;
+  for (int i = first.at + 2; i < end && p.range(i) < until; i++) {
+    if (!p.is_fall(i)) continue;
+    const double before = p.before(i), change = before - p.after(i);
+    const bool is_near = upper > 0 && p.range(i - 2) < foretold && p.range(i + 2) > foretold;
+    if (is_near && change > kWeak * first_change && change > 0.5 * params.rays_contrast_grey * 256) return i;
+    if (change > kStronger * strongest) {
+      strongest = change;
+      chosen = i;
+    }
+  }
+  return chosen;
+}
+
 }  // namespace
 
 void ray_fan_count(const mounted_camera &camera, const wm_edges_params &params, uint32_t *rays, uint32_t *samples) {
@@ -106,43 +213,35 @@ double range_at(const ray_fan &fan, const ray &r, double sample) {
   return a + (at - i) * (b - a);
 }
 
-bool find_first_edge(const ray_fan &fan, uint32_t index, const wm_frame &frame, const wm_edges_params &params,
-                     ray_edge *out) {
-  int32_t grey[kRaySamplesMax], drop[kRaySamplesMax];
-  const ray &r = fan.rays[index];
-  const int count = read_profile(fan, r, frame, grey);
-  const int first = kSide, end = count - kSide;
-  // How much darker it gets here, over two pixels on each side.
-  for (int i = first; i < end; i++) drop[i] = grey[i - 2] + grey[i - 1] - grey[i + 1] - grey[i + 2];
-  const double smallest = params.rays_contrast_grey * 256;
-  for (int i = first + 1; i + 1 < end; i++) {
-    const bool is_peak = drop[i] > drop[i - 1] && drop[i] >= drop[i + 1];
-    const bool is_dip = params.rays_sign == EDGES_ANY_SIGN && drop[i] < drop[i - 1] && drop[i] <= drop[i + 1];
-    if (!is_peak && !is_dip) continue;
-    int32_t a = 0, b = 0;
-    for (int k = 1; k <= kSide; k++) {
-      a += grey[i - k];
-      b += grey[i + k];
-    }
-    const double before = static_cast<double>(a) / kSide, after = static_cast<double>(b) / kSide;
-    const double fall = is_peak ? before - after : after - before;
-    if (fall < smallest || fall < params.rays_contrast_rel * (before + after)) continue;
-    // A line: soon it is as it was.
-    const float *range = fan.range_m + r.first;
-    const double far_end = static_cast<double>(range[i]) * (1 + params.rays_line_rel);
-    const double middle = 0.5 * (before + after);
-    bool is_line = false;
-    for (int k = i + 2; k < count && static_cast<double>(range[k]) < far_end; k++)
-      is_line |= is_peak ? grey[k] > middle : grey[k] < middle;
-    if (is_line) continue;
-    // Sub-pixel: the parabola through the three steepest.
-    const double left = drop[i - 1], here = drop[i], right = drop[i + 1], bend = left - 2 * here + right;
-    const double shift = bend != 0 ? 0.5 * (left - right) / bend : 0;
-    *out = {static_cast<int32_t>(index), static_cast<float>(i + shift), static_cast<float>(before / 256),
-            static_cast<float>(after / 256), static_cast<float>((here < 0 ? -here : here) / (6 * 256.0))};
-    return true;
+double usual_floor(const ray_fan &fan, const wm_frame &frame) {
+  constexpr int kBins = 256;
+  uint32_t counts[kBins] = {0};
+  for (uint32_t i = 0; i < fan.ray_count; i++) {
+    const ray_sample s = fan.samples[fan.rays[i].first];
+    counts[frame.grey[static_cast<size_t>(s.row) * frame.stride_bytes + s.column]]++;
   }
-  return false;
+  int bin = 0;
+  for (uint32_t seen = counts[0]; 2 * seen < fan.ray_count; seen += counts[bin]) bin++;
+  return 256.0 * bin;
+}
+
+bool find_first_edge(const ray_fan &fan, uint32_t index, const wm_frame &frame, double usual_grey,
+                     const wm_edges_params &params, ray_work *work, ray_edge *out) {
+  profile p;
+  const ray &r = fan.rays[index];
+  p.range_m = fan.range_m + r.first;
+  p.grey = work->grey;
+  p.count = read_profile(fan, r, frame, work->grey);
+  step first;
+  if (!find_first_step(p, usual_grey, params, &first)) return false;
+  const int i = first.is_fall ? joint_behind(p, first, params) : first.at;
+  // Sub-pixel: the parabola through the three steepest.
+  const double left = p.drop(i - 1), here = p.drop(i), right = p.drop(i + 1), bend = left - 2 * here + right;
+  const double shift = bend != 0 ? 0.5 * (left - right) / bend : 0;
+  *out = {static_cast<int32_t>(index), first.is_fall, static_cast<float>(i + shift),
+          static_cast<float>((here < 0 ? -here : here) / (6 * 256.0)),
+          static_cast<float>((p.before(i) + p.after(i)) / 512)};
+  return true;
 }
 
 }  // namespace wm

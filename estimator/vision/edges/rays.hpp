@@ -28,9 +28,10 @@ struct ray {
 // An edge on a ray.
 struct ray_edge {
   int32_t ray;
-  float sample;         // place on the ray, in samples
-  float before, after;  // grey levels on both sides
-  float slope;          // grey levels a pixel
+  int32_t is_fall;  // from bright to dark
+  float sample;     // place on the ray, in samples
+  float slope;      // grey levels a pixel
+  float middle;     // grey level halfway between both sides
 };
 
 struct ray_fan {
@@ -45,9 +46,18 @@ void ray_fan_count(const mounted_camera &camera, const wm_edges_params &params, 
 // Fills the fan, whose arrays are as large as counted.
 void ray_fan_make(const mounted_camera &camera, const wm_edges_params &params, ray_fan *out);
 
+// What floors look like just before the robot: the middle of all rays' beginnings, in 1/256 grey levels. Lamps mirrored
+// there are not the floor.
+double usual_floor(const ray_fan &fan, const wm_frame &frame);
+
+// Work space for one ray at a time: its grey levels, in 1/256.
+struct ray_work {
+  int32_t grey[kRaySamplesMax];
+};
+
 // First edge on the ray that is one of a wall. False where there is none.
-bool find_first_edge(const ray_fan &fan, uint32_t index, const wm_frame &frame, const wm_edges_params &params,
-                     ray_edge *out);
+bool find_first_edge(const ray_fan &fan, uint32_t index, const wm_frame &frame, double usual_grey,
+                     const wm_edges_params &params, ray_work *work, ray_edge *out);
 
 // Range at a place between samples.
 double range_at(const ray_fan &fan, const ray &r, double sample);

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// Walls are straight: an edge point has neighbours on a line with it. That tells false points, and gives the direction
+// of the edge far better than a few pixels do.
+#ifndef WAYMARK_ESTIMATOR_VISION_SUPPORT_HPP
+#define WAYMARK_ESTIMATOR_VISION_SUPPORT_HPP
+
+#include "waymark/event.h"
+
+namespace wm {
+
+inline constexpr int kNeighbours = 4;  // rays to each side
+
+// Leaves out points that fewer than `support_min` others within kNeighbours rays lie on a line with; where four or more
+// do, the normal is that of the line through them, on the side where the gradient's is.
+// `ray` has the ray of each point, rising; the eye is where they come from.
+void keep_supported(wm_points *points, const int32_t *ray, double eye_x_m, double eye_y_m, int32_t support_min);
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+// What makes false edges on a floor: lamps' reflections, joints of tiles, the mirror image of a skirting board; and
+// that the edge that is looked for is found among them, with its normal.
+#include <cmath>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "unity.h"
+#include "vision/camera/lens.hpp"
+#include "waymark/detector.h"
+#include "waymark/random.h"
+
+namespace {
+
+constexpr uint32_t kWidth = 1280, kHeight = 720;
+constexpr double kWall_m = 3, kBoard_m = 0.08;
+
+wm_rig rig;
+wm::mounted_camera camera;
+std::vector<char> params;
+std::vector<uint8_t> state_memory, picture;
+wm_event events[2];
+
+void set(const char *key, double value) {
+  const wm_param_table &table = wm_detector_find("edges")->params;
+  for (size_t i = 0; i < table.count; i++) {
+    if (std::string(table.params[i].key) != key) continue;
+    char *field = params.data() + table.params[i].offset;
+    if (table.params[i].type == WM_PARAM_F64) {
+      *reinterpret_cast<double *>(field) = value;
+    } else {
+      *reinterpret_cast<int32_t *>(field) = static_cast<int32_t>(value);
+    }
+    return;
+  }
+  TEST_FAIL_MESSAGE(key);
+}
+
+// A wall with a skirting board across the way, seen over a floor of this brightness, which mirrors a share of it.
+using Floor = std::function<double(double x, double y)>;
+double brightness(const wm::vec3 &d, const Floor &floor, double mirror) {
+  const double to_wall = (kWall_m - camera.centre_m.x) / d.x, height = camera.centre_m.z + to_wall * d.z;
+  const auto wall = [](double z) { return z < kBoard_m ? 50.0 : 170.0; };
+  if (d.x > 0 && height > 0) return wall(height);
+  const double to_floor = -camera.centre_m.z / d.z;
+  const double seen = floor(camera.centre_m.x + to_floor * d.x, camera.centre_m.y + to_floor * d.y);
+  return d.x > 0 ? seen + mirror * (wall(-height) - seen) : seen;
+}
+
+void draw(const Floor &floor, double mirror) {
+  picture.assign(kWidth * kHeight, 0);
+  for (uint32_t v = 0; v < kHeight; v++)
+    for (uint32_t u = 0; u < kWidth; u++) {
+      double sum = 0;
+      for (int i = 0; i < 4; i++) {
+        wm::vec3 ray;
+        if (wm::unproject(camera.optics, {u - 0.25 + 0.5 * (i % 2), v - 0.25 + 0.5 * (i / 2)}, &ray))
+          sum += brightness(camera.R_base_optical * ray, floor, mirror) / 4;
+      }
+      picture[v * kWidth + u] = static_cast<uint8_t>(sum + 4 * wm_random_uniform(1, 2, v * kWidth + u));
+    }
+}
+
+const wm_points &look() {
+  const wm_detector *edges = wm_detector_find("edges");
+  const int32_t front = 0;
+  const wm_view view = {&rig, &front};
+  const char *why = "";
+  state_memory.resize(edges->state_bytes(params.data(), &view, &why) + 64);
+  void *state = state_memory.data() + (64 - reinterpret_cast<uintptr_t>(state_memory.data()) % 64);
+  TEST_ASSERT_EQUAL(WM_OK, edges->init(state, params.data(), &view));
+  const wm_frame frame = {10, 20, 0, 0, 0, kWidth, kHeight, kWidth, picture.data()};
+  size_t count;
+  TEST_ASSERT_EQUAL(WM_OK, edges->detect(state, &frame, nullptr, events, 2, &count));
+  TEST_ASSERT_EQUAL(1, count);
+  return events[0].as.points;
+}
+
+// At least this share lies at the wall, and these look straight away from the robot.
+void expect_wall(double share) {
+  const wm_points &p = look();
+  uint32_t right = 0;
+  double normal_off = 0;
+  for (uint32_t i = 0; i < p.count; i++) {
+    if (std::fabs(static_cast<double>(p.x_m[i]) - kWall_m) > 4 * static_cast<double>(p.sigma_m[i])) continue;
+    right++;
+    normal_off += std::fabs(static_cast<double>(p.normal_rad[i]));
+  }
+  TEST_ASSERT_GREATER_THAN(100, p.count);
+  TEST_ASSERT_GREATER_OR_EQUAL(static_cast<uint32_t>(share * p.count), right);
+  TEST_ASSERT_TRUE(normal_off / right < 0.03);
+}
+
+double plain_floor(double, double) { return 130; }
+
+void a_plain_floor() {
+  draw(plain_floor, 0);
+  expect_wall(1);
+}
+
+void lamps_in_the_floor() {
+  draw([](double x, double y) { return std::fabs(y) < 0.4 && std::fmod(x, 1.2) < 0.3 ? 220.0 : 130.0; }, 0);
+  expect_wall(0.97);
+}
+
+void joints_of_tiles() {
+  draw([](double x, double y) { return std::fmod(x, 0.6) < 0.01 || std::fmod(y + 9, 0.6) < 0.01 ? 60.0 : 130.0; }, 0);
+  expect_wall(0.9);
+}
+
+void a_floor_that_mirrors() {
+  draw(plain_floor, 0.35);
+  expect_wall(0.9);
+  // Without the law of reflection the image's edge would be taken.
+  set("rays.mirror_rel", 0);
+  const wm_points &p = look();
+  uint32_t images = 0;
+  const double image_m = camera.centre_m.x + (kWall_m - camera.centre_m.x) * 0.4 / (0.4 + kBoard_m);
+  for (uint32_t i = 0; i < p.count; i++) images += std::fabs(static_cast<double>(p.x_m[i]) - image_m) < 0.05;
+  TEST_ASSERT_GREATER_THAN(p.count / 2, images);
+}
+
+void a_lone_point_is_left_out() {
+  // A dark spot on the floor, two rays wide.
+  draw([](double x, double y) { return std::fabs(y) < 0.02 && x > 1.8 && x < 2.2 ? 40.0 : 130.0; }, 0);
+  expect_wall(1);
+}
+
+}  // namespace
+
+void setUp() {
+  wm_rig_init(&rig);
+  rig.camera_count = 1;
+  wm_camera &c = rig.cameras[0];
+  c = wm_camera{};
+  c.model = WM_CAMERA_EQUIDISTANT;
+  c.width_px = kWidth;
+  c.height_px = kHeight;
+  c.intrinsics_count = 4;
+  const double intrinsics[] = {522, 522, 640, 360};
+  std::copy(intrinsics, intrinsics + 4, c.intrinsics);
+  c.mounting = {{0.5, 0, 0.4}, {0, 22 * M_PI / 180, 0}};
+  TEST_ASSERT_NULL(wm::mounted_camera_init(&camera, c));
+  const wm_param_table &table = wm_detector_find("edges")->params;
+  params.assign(table.bytes + 1, 0);
+  wm_params_defaults(&table, params.data());
+}
+void tearDown() {}
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(a_plain_floor);
+  RUN_TEST(lamps_in_the_floor);
+  RUN_TEST(joints_of_tiles);
+  RUN_TEST(a_floor_that_mirrors);
+  RUN_TEST(a_lone_point_is_left_out);
+  return UNITY_END();
+}
