@@ -210,8 +210,26 @@ def stereo():
     bar("starry-night-stereo: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
 
 
+def ranges_and_fixes():
+    uwb = run(DATA / "labyrinth-uwb", "labyrinth-uwb")
+    bar("labyrinth-uwb, ranges only, heading unknown: position RMSE", uwb["position_rmse_m"], most=0.15)
+    bar("labyrinth-uwb: NEES inside 95 %", uwb["nees_inside_95"], least=0.80)
+    recording = DATA / "smartloc-potsdamer-a"
+    plain = run(recording, "smartloc")
+    bar("smartloc: position RMSE", plain["position_rmse_m"], most=11.5)
+    bar("smartloc: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
+    for begin, east, north in ((60, 20, 0), (60, -20, 0), (100, 0, 20), (30, 20, 20)):
+        def pulled(f, begin=begin, east=east, north=north):
+            if begin <= int(f["t_ns"]) * 1e-9 <= begin + 7:
+                f["x_m"], f["y_m"] = repr(float(f["x_m"]) + east), repr(float(f["y_m"]) + north)
+        with disturbed(recording, {"gnss.csv": each_row(pulled)}) as folder:
+            bar(f"smartloc, positions {east} m east and {north} m north off for 7 s from {begin} s on: RMSE",
+                run(folder, "smartloc")["position_rmse_m"], most=11.5)
+
+
 def main():
-    names = ["starry-night-plan-a", "starry-night-stereo-a", "comma2k19-a", "victoria-park-a", *(f"mrclam-d6-r{i}" for i in range(1, 6))]
+    names = ["starry-night-plan-a", "starry-night-stereo-a", "comma2k19-a", "victoria-park-a", "labyrinth-uwb",
+             "smartloc-potsdamer-a", *(f"mrclam-d6-r{i}" for i in range(1, 6))]
     missing = [n for n in names if not (DATA / n).is_dir()]
     if missing:
         print(f"skipped: no recording {missing[0]} in {DATA}")
@@ -222,6 +240,7 @@ def main():
     park()
     comma()
     stereo()
+    ranges_and_fixes()
     print(f"{len(failures)} bars missed")
     return 1 if failures else 0
 

@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cinttypes>
 #include <cstdio>
 #include <optional>
@@ -72,6 +73,7 @@ bool write_steps(const std::string &path, const std::vector<Statistics> &all) {
 struct Arguments {
   std::string scenario, config, csv;
   uint64_t seeds = 200, first = 1;
+  wm::montecarlo::Options6 six;
   std::optional<int> laps;
   std::vector<size_t> landmarks = {0, 1, 2, 3};
 };
@@ -86,6 +88,12 @@ void parse(CLI::App *app, Arguments *a) {
   app->add_option("--first-seed", a->first, "the first one's seed")->capture_default_str();
   app->add_option("--landmarks", a->landmarks, "how many of the scenario's landmarks, a list")->delimiter(',');
   app->add_option("--laps", a->laps, "instead of the route's laps")->check(CLI::Range(1, 1000));
+  app->add_option("--settled", a->six.settled_s, "six degrees of freedom: figures from so many seconds on")
+      ->capture_default_str();
+  app->add_option("--until", a->six.until_s, "six degrees of freedom: ... to so many");
+  app->add_option("--blind-from", a->six.blind_from_s,
+                  "six degrees of freedom: no picture shows anything from here, s");
+  app->add_option("--blind-to", a->six.blind_to_s, "... to here");
   app->add_option("--csv", a->csv, "writes the figures of each step of 0.1 s here");
   app->footer(
       "example: waymark-montecarlo config/worlds/crossing.yaml --config config/crossing.yaml --seeds 200\n"
@@ -117,13 +125,56 @@ wm_status run_all(const Arguments &a, const wm::sim::Scenario &scenario, const w
   return WM_OK;
 }
 
+// Six degrees of freedom: no bound, but each run's own error, and the points found.
+wm_status run_and_print_six(const Arguments &a, const wm::sim::Scenario &scenario, const wm_config &config,
+                            wm_error *err) {
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  const auto progress = [&](uint64_t done) {
+    if (terminal) std::fprintf(stderr, "\r%" PRIu64 " of %" PRIu64 " drives ", done, a.seeds);
+  };
+  wm::montecarlo::Statistics6 s;
+  wm::montecarlo::Options6 options = a.six;
+  options.first_seed = a.first;
+  options.seeds = a.seeds;
+  const wm_status status = wm::montecarlo::run_six(scenario, config, options, progress, s, err);
+  if (terminal) std::fprintf(stderr, "\r%60s\r", "");
+  if (status != WM_OK) return status;
+  std::vector<double> rms, largest, turned;
+  for (const auto &run : s.each) {
+    rms.push_back(run.position_rms_m);
+    largest.push_back(run.position_max_m);
+    turned.push_back(degrees(run.rotation_rms_rad));
+  }
+  const auto print = [](const char *what, std::vector<double> v) {
+    std::sort(v.begin(), v.end());
+    std::printf("%-36s median %8.4f  p95 %8.4f  worst %8.4f\n", what, v[v.size() / 2], v[(v.size() - 1) * 95 / 100],
+                v.back());
+  };
+  const Band band = band_of(s.runs);
+  std::printf("%s, %s of %s, %" PRIu64 " drives, each from %.3g s on\n\n", scenario.name.c_str(),
+              config.estimator->name, a.config.c_str(), s.runs, a.six.settled_s);
+  print("position RMS of a drive, m", rms);
+  print("largest position error of a drive, m", largest);
+  print("rotation RMS of a drive, deg", turned);
+  std::printf("NEES/6: mean %.3f, %.1f %% of the 0.1 s steps in [%.2f, %.2f]\n", s.nees_mean(),
+              100 * s.nees_inside(band), band.low, band.high);
+  std::printf("observations: %" PRIu64 " fused, %" PRIu64 " not; wrong matches made: %" PRIu64 "\n", s.fused,
+              s.rejected, s.outliers);
+  if (s.points > 0)
+    std::printf("points: %" PRIu64 " found, mean error %.4f m, wrong %.2f %%\n", s.points,
+                s.point_error_sum_m / static_cast<double>(s.points),
+                100 * static_cast<double>(s.wrong_points) / static_cast<double>(s.points));
+  return WM_OK;
+}
+
 wm_status load_and_run(const Arguments &a, wm_error *err) {
   wm::sim::Scenario scenario;
   if (const wm_status s = wm::sim::load_scenario(a.scenario, scenario, err); s != WM_OK) return s;
   if (a.laps) scenario.route.laps = *a.laps;
   wm_config config{};
   wm_status status = wm_config_load(a.config.c_str(), &config, err);
-  if (status == WM_OK) status = run_all(a, scenario, config, err);
+  if (status == WM_OK)
+    status = scenario.swims() ? run_and_print_six(a, scenario, config, err) : run_all(a, scenario, config, err);
   wm_config_free(&config);
   return status;
 }

@@ -55,4 +55,41 @@ struct Statistics {
 wm_status run(const sim::Scenario &scenario, const wm_config &config, size_t landmarks, uint64_t first_seed,
               uint64_t seeds, const std::function<void(uint64_t done)> &progress, Statistics &out, wm_error *err);
 
+// The same in six degrees of freedom: errors against the truth at one time of the drive, summed over the runs.
+struct Step6 {
+  double t_s = 0;
+  uint64_t runs = 0;  // with a pose by then
+  double position_sq_m2 = 0, rotation_sq_rad2 = 0;
+  double nees = 0;  // 6 degrees of freedom
+};
+
+// One run: root mean square of the position's error from `settled_s` on, and the largest.
+struct Run6 {
+  uint64_t seed = 0;
+  double position_rms_m = 0, position_max_m = 0, rotation_rms_rad = 0;
+};
+
+struct Statistics6 {
+  uint64_t runs = 0, fused = 0, rejected = 0, outliers = 0;
+  std::vector<Step6> steps;
+  std::vector<Run6> each;
+  // Points found on the way, each as it was when it was last in the state; wrong: off by more than 0.1 m, or by more
+  // than 4 sigma on the map's plane.
+  uint64_t points = 0, wrong_points = 0;
+  double point_error_sum_m = 0;
+  double nees_mean() const;             // divided by its degrees of freedom
+  double nees_inside(Band band) const;  // share of the steps
+};
+
+struct Options6 {
+  uint64_t first_seed = 1, seeds = 1;
+  double settled_s = 2;                     // figures of a run count from here ...
+  double until_s = 1e9;                     // ... to here
+  double blind_from_s = 0, blind_to_s = 0;  // no picture shows anything meanwhile
+};
+
+// As run(), for a scenario that swims.
+wm_status run_six(const sim::Scenario &scenario, const wm_config &config, const Options6 &options,
+                  const std::function<void(uint64_t done)> &progress, Statistics6 &out, wm_error *err);
+
 }  // namespace wm::montecarlo

@@ -62,8 +62,8 @@ void start(const Scenario &sc, const Random &random, Recording &out) {
   out.start.heading_rad = wm::atan2(R(1, 0), R(0, 0));
   const double pitch = wm::atan2(-R(2, 0), std::sqrt(R(0, 0) * R(0, 0) + R(1, 0) * R(1, 0)));
   quaternion({wm::atan2(R(2, 1), R(2, 2)), pitch, out.start.heading_rad}, out.start.q_xyzw);
-  out.start.sigma_xy_m = std::max({e.start_xy_m, e.start_within_m / std::sqrt(5.0), 1e-3});  // of a ball, each axis
-  out.start.sigma_heading_rad = std::max(e.start_heading_rad, 1e-3);
+  out.start.sigma_xy_m = std::max({e.start_xy_m, e.start_within_m / std::sqrt(5.0), 1e-4});  // of a ball, each axis
+  out.start.sigma_heading_rad = std::max(e.start_heading_rad, 1e-4);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kFarthest_m = 1e6;
 constexpr double kFarthest_px = 1e6;
+constexpr double kMeaningless_m = 1e5;
 constexpr double kNearest_m = 0.05;
 constexpr double kUpright = 0.1;  // of the nose's horizontal part, below which there is no heading
 
@@ -171,8 +172,10 @@ wm_status stereo_ekf::fuse_stereo(const wm_event &event, record_list records) {
       return WM_OK;
     }
     row_verdict verdict;
-    const double sigma = landmark.sigma_m > params_.map_min_m ? landmark.sigma_m : params_.map_min_m;
-    const bool possible = fuse_point(s, vec_of(landmark.p_m), sigma, -1, blank, records, &verdict);
+    const int slot = slot_of_known(known);
+    const bool possible = slot >= 0
+                              ? fuse_point(s, filter_.point(slot), 0.0, slot, blank, records, &verdict)
+                              : fuse_point(s, vec_of(landmark.p_m), map_sigma(landmark), -1, blank, records, &verdict);
     if (!possible) drop(WM_REJECTED_OUT_OF_RANGE);
     note(event.t_ns, s.id, !possible || !verdict.fused ? 1.0 : verdict.doubtful ? 0.8 : 0.0);
     return WM_OK;
@@ -235,12 +238,12 @@ wm_status stereo_ekf::fuse_sighting(const wm_event &event, record_list records) 
 
   const past_pose past = look_back(0.0);
   const vec3 arm = vec_of(sensor.mounting.xyz_m);
-  const vec3 target = vec_of(setup_->landmarks[known].p_m);
+  const int slot = has_range ? slot_of_known(known) : -1;
+  const vec3 target = slot >= 0 ? filter_.point(slot) : vec_of(setup_->landmarks[known].p_m);
   const vec3 to = target - past.at.p - past.R * arm;
   const double distance = length(to);
   if (!(distance > kNearest_m)) return drop(WM_REJECTED_SINGULAR);
-  const double map =
-      setup_->landmarks[known].sigma_m > params_.map_min_m ? setup_->landmarks[known].sigma_m : params_.map_min_m;
+  const double map = slot >= 0 ? 0.0 : map_sigma(setup_->landmarks[known]);
   double by[2][3];
   row_block block;
   wm_residual kinds[2];
@@ -273,13 +276,20 @@ wm_status stereo_ekf::fuse_sighting(const wm_event &event, record_list records) 
     for (int j = 0; j < 3; j++) turn_by_row.m[row][j] = turned[j];
     kinds[row] = WM_RESIDUAL_BEARING;
     block.observed[row] = s.bearing_rad;
-    block.innovation[row] = wrap(s.bearing_rad - atan2(x.y, x.x));
+    block.innovation[row] = wrap(s.bearing_rad - atan2(x.y, x.x) - filter_.head1(kBearingBias, 0.0));
     block.noise[row] = square(sigma) + square(map) / q;
   }
   add_place(&block, past, arm, by, block.rows);
   for (int k = 0; k < block.rows; k++)
     for (int j = 0; j < 3; j++) block.by[k][3 + j] += turn_by_row.m[k][j];
   if (has_range && filter_.at(kRangeBias) >= 0) block.by[0][block.add_columns(filter_.at(kRangeBias), 1)] = 1.0;
+  if (has_bearing && filter_.at(kBearingBias) >= 0)
+    block.by[block.rows - 1][block.add_columns(filter_.at(kBearingBias), 1)] = 1.0;
+  if (slot >= 0) {
+    const int column = block.add_columns(filter_.point_state(slot), 3);
+    for (int k = 0; k < block.rows; k++)
+      for (int j = 0; j < 3; j++) block.by[k][column + j] = -by[k][j];
+  }
   const row_verdict verdict = fuse_rows(block, kinds, blank, records);
   note(event.t_ns, s.landmark_id, !verdict.fused ? 1.0 : verdict.doubtful ? 0.8 : 0.0);
   return WM_OK;
@@ -288,7 +298,9 @@ wm_status stereo_ekf::fuse_sighting(const wm_event &event, record_list records) 
 // A position, or (without x and y) a depth.
 wm_status stereo_ekf::fuse_position(const wm_event &event, record_list records) {
   const wm_position &p = event.as.position;
-  const bool depth_only = std::isnan(p.p_m[0]) && std::isnan(p.p_m[1]) && finite(p.p_m[2]);
+  // Depth alone comes without x and y, or with a sigma that makes them meaningless.
+  const bool depth_only =
+      finite(p.p_m[2]) && ((std::isnan(p.p_m[0]) && std::isnan(p.p_m[1])) || p.sigma_xy_m >= kMeaningless_m);
   wm_innovation blank = record_of(event, depth_only ? WM_RESIDUAL_Z : WM_RESIDUAL_X);
   const bool has_z = finite(p.p_m[2]) && finite(p.sigma_z_m);
   if (depth_only ? !finite(p.sigma_z_m) : !finite(p.p_m[0]) || !finite(p.p_m[1]) || !finite(p.sigma_xy_m))
@@ -349,8 +361,9 @@ wm_status stereo_ekf::fuse_heading(const wm_event &event, record_list records) {
   block.by[0][turn] = -nose.x * nose.z / level2;
   block.by[0][turn + 1] = -nose.y * nose.z / level2;
   block.by[0][turn + 2] = 1.0;
+  if (filter_.at(kBearingBias) >= 0) block.by[0][block.add_columns(filter_.at(kBearingBias), 1)] = 1.0;
   block.observed[0] = h.heading_rad;
-  block.innovation[0] = wrap(h.heading_rad - atan2(nose.y, nose.x));
+  block.innovation[0] = wrap(h.heading_rad - atan2(nose.y, nose.x) - filter_.head1(kBearingBias, 0.0));
   block.noise[0] = square(h.sigma_rad);
   const wm_residual kind = WM_RESIDUAL_HEADING;
   const row_verdict verdict = fuse_rows(block, &kind, blank, records);

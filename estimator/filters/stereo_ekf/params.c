@@ -60,6 +60,8 @@ static const wm_param kParams[] = {
     F64("states.time_offset_sigma_s", time_offset_sigma, 0, 0, 0.2,
         "Start sigma of the pictures' time offset, s: they are that much older than their stamps. 0: off."),
     F64("states.range_bias_sigma_m", range_bias_sigma, 0, 0, 10, "Start sigma of acoustic ranges' bias, m. 0: off."),
+    F64("states.bearing_bias_sigma_rad", bearing_bias_sigma, 0, 0, 1,
+        "Start sigma of the bias of bearings and headings (a compass' deviation), rad. 0: off."),
     F64("states.twist_lag_sigma_s", twist_lag_sigma, 0, 0, 0.2,
         "Start sigma of what the measured velocity, and apart from it the measured rates, run ahead of the vehicle by, "
         "s; with constant_velocity only. 0: off."),
@@ -76,8 +78,9 @@ static const wm_param kParams[] = {
     F64("gate.hard", gate_hard, 20, 1, 1e6,
         "The same, above which the row is rejected and with it the point that it is of: a wrong match."),
     I32("slam.points", points_max, 0, 0, 256,
-        "Points without a place on the map that the state has room for: found by stereo, kept while they help. 0: only "
-        "known points."),
+        "Points that the state has room for: those without a place on the map, found by stereo, and those of the map, "
+        "whose "
+        "error on it (sigma_m) is the same in each picture. 0: known points only, their error taken as new each time."),
     I32("slam.keep_unseen_steps", keep_unseen_steps, 5, 0, 1000000,
         "Pictures in which a point of the state may be expected and not seen; then it is removed."),
     F64("slam.keep_outside_s", keep_outside_s, 10, 0, 1e6,

@@ -28,7 +28,7 @@ typedef struct wm_stereo_ekf_params {
   double camera_rotation_sigma, camera_rotation_tau_s;
   double camera_place_sigma, camera_place_tau_s;
   double time_offset_sigma;
-  double range_bias_sigma;
+  double range_bias_sigma, bearing_bias_sigma;
   double twist_lag_sigma;
   // noise of one row
   double pixel_px, range_m, bearing_rad, map_min_m;

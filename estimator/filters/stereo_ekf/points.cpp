@@ -32,7 +32,7 @@ void stereo_ekf::end_picture() {
     const vec3 eye = rig_.place + filter_.head3(kCameraPlace);
     for (int slot = filter_.point_count() - 1; slot >= 0; slot--) {
       point_info &point = info()[slot];
-      if (point.seen_ns == picture_ns_) continue;
+      if (point.seen_ns == picture_ns_ || point.unseen == kOfMap) continue;
       const vec3 x = transposed_times(B, transposed_times(past.R, filter_.point(slot) - past.at.p) - eye);
       if (rig_.in_view(x, kInside_px)) {
         if (++point.unseen > params_.keep_unseen_steps) remove_point(slot);
@@ -54,10 +54,26 @@ void stereo_ekf::remove_point(int slot) {
 bool stereo_ekf::make_room() {
   int oldest = -1;
   for (int i = 0; i < filter_.point_count(); i++)
-    if (info()[i].seen_ns != picture_ns_ && (oldest < 0 || info()[i].seen_ns < info()[oldest].seen_ns)) oldest = i;
+    if (info()[i].unseen != kOfMap && info()[i].seen_ns != picture_ns_ &&
+        (oldest < 0 || info()[i].seen_ns < info()[oldest].seen_ns))
+      oldest = i;
   if (oldest < 0) return false;
   remove_point(oldest);
   return true;
+}
+
+// A known point's error on the map is the same whenever it is seen: a state, where there is room for it.
+int stereo_ekf::slot_of_known(int landmark) {
+  const wm_landmark &known = setup_->landmarks[landmark];
+  const double sigma = map_sigma(known);
+  if (params_.points_max == 0 || !(sigma > 0.0)) return -1;
+  const int found = find_slot(known.id);
+  if (found >= 0) return found;
+  if (filter_.point_count() == filter_.point_capacity() && !make_room()) return -1;
+  const int slot = filter_.point_count();
+  filter_.add_point(vec_of(known.p_m), sigma);
+  info()[slot] = {now_ns_, known.id, kOfMap};
+  return slot;
 }
 
 void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, record_list records) {

@@ -13,7 +13,7 @@ int head_size(const head_model models[kHeadStates]) {
   return n;
 }
 
-constexpr double kNeutral[kHeadStates] = {0, 0, 0, 1, 0, 0, 0, 0, 0, 0};
+constexpr double kNeutral[kHeadStates] = {0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0};
 
 void add_block(double out[kPose6][3], int row, const mat3 &m) {
   for (int i = 0; i < 3; i++)
@@ -351,6 +351,14 @@ void space_filter::add_point(const vec3 &place, const row_block &block, const ma
   }
   n_ += 3;
   if (even(n_) > n_) correction()[n_] = 0.0;
+}
+
+void space_filter::add_point(const vec3 &place, double sigma_m) {
+  const int state = n_;
+  n_ += 3;
+  if (even(n_) > n_) correction()[n_] = 0.0;
+  for (int i = 0; i < 3; i++) points()[state - first_point_ + i] = place[i];
+  forget(state, 3, square(sigma_m));
 }
 
 void space_filter::remove_point(int slot) {

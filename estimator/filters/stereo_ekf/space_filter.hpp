@@ -31,12 +31,13 @@ enum head_state {
   kCameraPlace,
   kTimeOffset,
   kRangeBias,
+  kBearingBias,
   kVelocityLag,  // s: velocity and rates as states are so much behind what is measured of them
   kRateLag,
   kHeadStates
 };
-inline constexpr int kHeadWidth[kHeadStates] = {3, 3, 3, 1, 3, 3, 1, 1, 1, 1};
-inline constexpr int kHeadMax = kPose6 + 20;
+inline constexpr int kHeadWidth[kHeadStates] = {3, 3, 3, 1, 3, 3, 1, 1, 1, 1, 1};
+inline constexpr int kHeadMax = kPose6 + 21;
 
 // How a state begins and what it does on its own: a random walk, or (tau_s > 0) a Gauss-Markov process of that sigma.
 struct head_model {
@@ -119,6 +120,8 @@ class space_filter {
   // the observation's covariance; `A` turns the map into that frame. Paper, system 3, with J_x P J_x' in place of
   // nothing: P_ll = A'(D P D' + N)A, P_lx = -A' D P.
   void add_point(const vec3 &place, const row_block &block, const mat3 &A, const mat3 &noise);
+  // A point that nothing has to do with yet: its place on a map, with the map's sigma.
+  void add_point(const vec3 &place, double sigma_m);
   // The last point takes the removed one's slot.
   void remove_point(int slot);
   void remove_points() { n_ = first_point_; }

@@ -26,6 +26,7 @@ void models_of(const wm_stereo_ekf_params &p, head_model out[kHeadStates]) {
   out[kCameraPlace] = {p.camera_place_sigma, 0, p.camera_place_tau_s};
   out[kTimeOffset] = {p.time_offset_sigma, 0, 0};
   out[kRangeBias] = {p.range_bias_sigma, 0, 0};
+  out[kBearingBias] = {p.bearing_bias_sigma, 0, 0};
   out[kVelocityLag] = out[kRateLag] = {rates ? p.twist_lag_sigma : 0.0, 0, 0};
 }
 
@@ -38,6 +39,7 @@ const char *const kStateNames[kHeadStates][3] = {
     {"stereo.x_m", "stereo.y_m", "stereo.z_m"},
     {"stereo.time_offset_s", nullptr, nullptr},
     {"range.bias_m", nullptr, nullptr},
+    {"bearing.bias_rad", nullptr, nullptr},
     {"motion.velocity_lag_s", nullptr, nullptr},
     {"motion.rate_lag_s", nullptr, nullptr}};
 

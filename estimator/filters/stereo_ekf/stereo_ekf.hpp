@@ -38,10 +38,11 @@ class stereo_ekf {
 
  private:
   // A point of the state: whose it is and when it was seen last.
+  static constexpr int32_t kOfMap = -1;
   struct point_info {
     wm_time_ns seen_ns;
     int32_t id;
-    int32_t unseen;  // pictures in which it was expected and not seen, or did not fit
+    int32_t unseen;  // kOfMap, or pictures in which it was expected and not seen, or did not fit
   };
   // The pose when an observation was true, and the twist then, in body axes.
   struct past_pose {
@@ -75,6 +76,7 @@ class stereo_ekf {
                         record_list records);
 
   // points.cpp
+  int slot_of_known(int landmark);
   void begin_picture(wm_time_ns t_ns);
   void end_picture();
   int find_slot(int32_t id) const;
@@ -91,6 +93,9 @@ class stereo_ekf {
   void search(wm_time_ns since_ns);
 
   int find_landmark(int32_t id) const;
+  double map_sigma(const wm_landmark &landmark) const {
+    return landmark.sigma_m > params_.map_min_m ? landmark.sigma_m : params_.map_min_m;
+  }
   int *landmark_order() { return reinterpret_cast<int *>(this + 1); }
   const int *landmark_order() const { return reinterpret_cast<const int *>(this + 1); }
   point_info *info() { return reinterpret_cast<point_info *>(reinterpret_cast<char *>(this) + info_offset_); }
