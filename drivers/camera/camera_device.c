@@ -32,6 +32,7 @@ struct wm_camera_device {
   camera_mode mode;
   int format;
   int has_held, was_told;
+  camera_buffer newest;
   uint32_t held;   // the buffer whose pixels the caller has
   uint32_t stale;  // buffers still to be thrown away
   frame_clock clock;
@@ -316,11 +317,16 @@ wm_status wm_camera_device_next(wm_camera_device *self, wm_frame *out, wm_error 
     return WM_AGAIN;
   }
   self->held = kept.index;
+  self->newest = kept;
   self->has_held = 1;
   if (!see(self, &kept, out)) return WM_AGAIN;
   set_state(self, WM_DEVICE_WORKS, "gives pictures");
   self->counts.frames++;
   return WM_OK;
+}
+
+void wm_camera_device_raw(const wm_camera_device *self, wm_camera_raw *out) {
+  *out = (wm_camera_raw){self->newest.data, self->newest.bytes, self->format == PIXELS_MJPEG, self->mode.rate_hz};
 }
 
 const wm_camera_counts *wm_camera_device_counted(const wm_camera_device *self) { return &self->counts; }

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "can_clock.h"
+#include "waymark/devices.h"
 
 #define IDS_MAX 4096
 #define LOOK_EVERY_NS (500 * WM_NS_PER_MS)  // for an interface that isn't there, or is another one by the same name
@@ -99,21 +100,28 @@ static void count_queue(can_device *self, const can_received *received) {
   self->queue_dropped = received->queue_dropped;
 }
 
-// 1: an event.
-static int take_frame(can_device *self, can_received *received, wm_event *out) {
+// Stamps and counts it; what the controller says of itself is taken. *arrival_ns: when it was read.
+static void look_at_frame(can_device *self, can_received *received, wm_time_ns *when_ns) {
   wm_source_counts *counts = &self->base.counts;
   wm_can_frame *frame = &received->frame;
-  wm_error why = {0};
   wm_time_ns arrival_ns = self->io->monotonic_ns(self->io_context);
+  *when_ns = arrival_ns;
   frame->t_ns = can_clock_stamp(&self->clock, received, arrival_ns, self->io->realtime_ns(self->io_context));
   counts->stamp_uncertainty_ns = self->clock.uncertainty_ns;
   (void)snprintf(frame->iface, sizeof frame->iface, "%s", self->interface);
   count_queue(self, received);
   if (frame->is_error) {
     can_error_take(frame, self->interface, counts);
-    return 0;
+  } else if (counts->device != WM_DEVICE_PASSIVE) {
+    set_state(self, WM_DEVICE_WORKS, "speaks again");
   }
-  if (counts->device != WM_DEVICE_PASSIVE) set_state(self, WM_DEVICE_WORKS, "speaks again");
+}
+
+// 1: an event.
+static int take_frame(can_device *self, const wm_can_frame *frame, wm_time_ns arrival_ns, wm_event *out) {
+  wm_source_counts *counts = &self->base.counts;
+  wm_error why = {0};
+  if (frame->is_error) return 0;
   memset(out, 0, WM_EVENT_SMALL_BYTES);
   wm_status status = wm_can_decode(self->decoder, frame, &out->as.quantities, counts, &why);
   if (status == WM_BAD_DATA && !counts->first_problem[0])
@@ -128,27 +136,40 @@ static int take_frame(can_device *self, can_received *received, wm_event *out) {
   return 1;
 }
 
+// The next frame of any kind, or WM_AGAIN when none came until `end_ns`.
+static wm_status next_frame(can_device *self, wm_time_ns end_ns, can_received *received, wm_time_ns *arrival_ns) {
+  wm_time_ns now_ns = self->io->monotonic_ns(self->io_context);
+  if (now_ns >= end_ns) return WM_AGAIN;
+  look_for_interface(self, now_ns);
+  if (self->socket < 0) {
+    self->io->sleep_ms(self->io_context, WM_DEVICE_WAIT_MS);
+    return WM_AGAIN;
+  }
+  int got = self->io->receive(self->io_context, self->socket, WM_DEVICE_WAIT_MS, received);
+  if (got < 0) {
+    take_failure(self, -got);
+    self->io->sleep_ms(self->io_context, 10);  // a socket that only fails must not take the processor
+  }
+  if (got <= 0) return WM_AGAIN;
+  look_at_frame(self, received, arrival_ns);
+  return WM_OK;
+}
+
+static wm_time_ns until(const can_device *self) {
+  return self->io->monotonic_ns(self->io_context) + WM_DEVICE_WAIT_MS * WM_NS_PER_MS;
+}
+
 static wm_status next_quantities(wm_source *base, wm_event *out, wm_error *err) {
   (void)err;
   can_device *self = (can_device *)base;
-  wm_time_ns begin_ns = self->io->monotonic_ns(self->io_context);
-  for (;;) {
-    wm_time_ns now_ns = self->io->monotonic_ns(self->io_context);
-    if (now_ns - begin_ns >= WM_DEVICE_WAIT_MS * WM_NS_PER_MS) return WM_AGAIN;
-    look_for_interface(self, now_ns);
-    if (self->socket < 0) {
-      self->io->sleep_ms(self->io_context, WM_DEVICE_WAIT_MS);
-      return WM_AGAIN;
-    }
-    can_received received;
-    int got = self->io->receive(self->io_context, self->socket, WM_DEVICE_WAIT_MS, &received);
-    if (got < 0) take_failure(self, -got);
-    if (got <= 0) {
-      if (got < 0) self->io->sleep_ms(self->io_context, 10);  // a socket that only fails must not take the processor
-      return WM_AGAIN;
-    }
-    if (take_frame(self, &received, out)) return WM_OK;
+  can_received received;
+  wm_time_ns arrival_ns = 0, end_ns = until(self);
+  wm_status status;
+  while ((status = next_frame(self, end_ns, &received, &arrival_ns)) == WM_OK) {
+    if (take_frame(self, &received.frame, arrival_ns, out)) return WM_OK;
+    if (received.frame.is_error) return WM_AGAIN;  // so that each change of the controller is seen
   }
+  return status;
 }
 
 static void close_device(wm_source *base) {
@@ -185,8 +206,35 @@ wm_status can_device_make(const char *interface, wm_can_decoder *decoder, const 
     close_device(&self->base);
     return wm_fail(err, WM_IO, "%s: no memory to open it", interface);
   }
-  self->id_count = wm_can_decoder_ids(decoder, self->ids, self->is_extended, IDS_MAX);
+  if (decoder) self->id_count = wm_can_decoder_ids(decoder, self->ids, self->is_extended, IDS_MAX);
   if (self->id_count > IDS_MAX) self->id_count = IDS_MAX;
   *out = &self->base;
   return WM_OK;
+}
+
+// ── all frames, as they are ─────────────────────────────────────────────────────────────────────────────────────────
+
+wm_status wm_can_listener_open(const char *interface, wm_can_listener **out, wm_error *err) {
+  wm_source *source;
+  wm_status status = can_device_make(interface, NULL, &kSocketCan, NULL, &source, err);
+  *out = (wm_can_listener *)source;
+  return status;
+}
+
+wm_status wm_can_listener_next(wm_can_listener *self, wm_can_frame *out, wm_error *err) {
+  (void)err;
+  can_device *device = (can_device *)self;
+  can_received received;
+  wm_time_ns arrival_ns;
+  wm_status status = next_frame(device, until(device), &received, &arrival_ns);
+  if (status == WM_OK) *out = received.frame;
+  return status;
+}
+
+const wm_source_counts *wm_can_listener_counted(const wm_can_listener *self) {
+  return &((const can_device *)self)->base.counts;
+}
+
+void wm_can_listener_close(wm_can_listener *self) {
+  if (self) close_device((wm_source *)self);
 }

@@ -6,7 +6,8 @@
 #include "can_io.h"
 #include "waymark/source.h"
 
-// Takes the decoder over, also where it fails. The interface needn't be there: it is looked for again and again.
+// Takes the decoder over, also where it fails; without one (NULL) it asks for all frames and gives no events. The
+// interface needn't be there: it is looked for again and again.
 wm_status can_device_make(const char *interface, wm_can_decoder *decoder, const can_io *io, void *io_context,
                           wm_source **out, wm_error *err);
 // What an error frame says of the controller (linux/can/error.h), counted into `counts`. Pure.

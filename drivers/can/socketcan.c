@@ -36,7 +36,7 @@ static unsigned find_interface(void *context, const char *interface, int *is_up)
 // Only what is bound to something reaches this process. More ids than the kernel takes: all do, and the decoder sorts.
 static int set_filters(int fd, const uint32_t *ids, const uint8_t *is_extended, size_t count) {
   struct can_filter filters[CAN_RAW_FILTER_MAX];
-  if (count > CAN_RAW_FILTER_MAX) return 0;
+  if (count == 0 || count > CAN_RAW_FILTER_MAX) return 0;
   for (size_t i = 0; i < count; i++) {
     filters[i].can_id = ids[i] | (is_extended[i] ? CAN_EFF_FLAG : 0);
     filters[i].can_mask = (is_extended[i] ? CAN_EFF_MASK : CAN_SFF_MASK) | CAN_EFF_FLAG | CAN_RTR_FLAG;

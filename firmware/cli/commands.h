@@ -12,6 +12,7 @@ enum { EXIT_DONE = 0, EXIT_WORK_FAILED = 1, EXIT_USAGE = 2 };
 int command_run(int argc, char *const *argv);
 int command_replay(int argc, char *const *argv);
 int command_check(int argc, char *const *argv);
+int command_record(int argc, char *const *argv);
 int command_doctor(int argc, char *const *argv);
 
 // ── shared by the commands ──────────────────────────────────────────────────────────────────────────────────────────

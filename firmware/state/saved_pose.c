@@ -11,6 +11,10 @@
 #include "waymark/recording.h"
 #include "waymark/yaml.h"
 
+// A doubtful pose is kept with its doubt: an older one would be as far off, and not say so.
+#define SIGMA_XY_MAX_M 50.0
+#define SIGMA_HEADING_MAX_RAD 1.5
+
 // ── writing ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 // The larger axis of the position's ellipse in the plane: the start takes one sigma for both.
@@ -26,7 +30,8 @@ int wm_saved_pose_is_worth_it(const wm_estimate *e) {
   if (e->state != WM_STATE_TRACKING && e->state != WM_STATE_DEAD_RECKONING) return 0;
   for (int i = 0; i < 3; i++)
     if (!isfinite(e->pose_map_base.p_m[i])) return 0;
-  return isfinite(e->heading_rad) && sigma_xy(e->covariance) < 1.0 && sigma_heading(e->covariance) < 0.5;
+  return isfinite(e->heading_rad) && sigma_xy(e->covariance) < SIGMA_XY_MAX_M &&
+         sigma_heading(e->covariance) < SIGMA_HEADING_MAX_RAD;
 }
 
 // To the disk and not only to the system: a name that points to an empty file would be worse than none.

@@ -34,6 +34,10 @@ typedef struct wm_can_frame {
 // says so. The time is exact (integers), negative ones included. Cost linear in `length`; no allocation. Any thread.
 wm_status wm_candump_parse(const char *line, size_t length, wm_can_frame *out, wm_error *err);
 
+// The same line from a frame, with its end, terminated; stamps to the microsecond. Its length, 0 where it doesn't
+// fit (256 bytes are enough). No allocation. Any thread.
+size_t wm_candump_write(const wm_can_frame *frame, char *out, size_t capacity);
+
 // A DBC file, read at start, UTF-8 or Windows-1252. Allocates (at most a few times the file's size, which is at most
 // 16 MB); not for the real-time thread. WM_BAD_CONFIG with file and line for what is wrong in what Waymark reads (BO_,
 // SG_, SIG_VALTYPE_, SG_MUL_VAL_, VAL_); other sections are passed over. What may stand in a makers' file as long as

@@ -21,6 +21,14 @@ typedef struct wm_can_device_config {
   int line;
 } wm_can_device_config;
 
+// All frames of an interface, of whatever kind, stamped on the monotonic clock: for a recorder. As the source: it waits
+// for up to WM_DEVICE_WAIT_MS, then WM_AGAIN; the interface needn't be there. One thread.
+typedef struct wm_can_listener wm_can_listener;
+wm_status wm_can_listener_open(const char *interface, wm_can_listener **out, wm_error *err);
+wm_status wm_can_listener_next(wm_can_listener *self, wm_can_frame *out, wm_error *err);
+const wm_source_counts *wm_can_listener_counted(const wm_can_listener *self);
+void wm_can_listener_close(wm_can_listener *self);  // NULL is fine
+
 typedef enum wm_stamp_point { WM_STAMP_AUTO, WM_STAMP_START, WM_STAMP_END } wm_stamp_point;
 
 #define WM_CAMERA_CONTROLS_MAX 16
@@ -71,6 +79,14 @@ wm_status wm_camera_device_open(const wm_camera_device_config *config, const wm_
 // `number` is the driver's count, from 0 at each start. The pixels stay until the next call: GREY and NV12 as the
 // driver has them, the others decoded or copied (1 ms for 640x400 MJPEG at a desk). One thread.
 wm_status wm_camera_device_next(wm_camera_device *self, wm_frame *out, wm_error *err);
+// The picture that wm_camera_device_next gave last, as the camera sent it; until the next call.
+typedef struct wm_camera_raw {
+  const uint8_t *data;
+  uint32_t bytes;
+  int is_jpeg;
+  double rate_hz;  // 0: unknown
+} wm_camera_raw;
+void wm_camera_device_raw(const wm_camera_device *self, wm_camera_raw *out);
 const wm_camera_counts *wm_camera_device_counted(const wm_camera_device *self);
 void wm_camera_device_close(wm_camera_device *self);  // NULL is fine
 

@@ -17,7 +17,7 @@ typedef struct wm_saved_pose {
 wm_status wm_saved_pose_write(const char *path, const wm_estimate *pose, double utc_s, wm_error *err);
 // WM_NOT_FOUND: there is none. WM_BAD_CONFIG: it can't be read. Allocates.
 wm_status wm_saved_pose_read(const char *path, wm_saved_pose *out, wm_error *err);
-// Whether a pose is good enough to begin with: finite, not searching, not lost, sigma below a metre and 0.5 rad.
+// Whether a pose tells anything to begin with: finite, not searching, not lost, sigma below 50 m and 1.5 rad.
 int wm_saved_pose_is_worth_it(const wm_estimate *pose);
 // As a start: older than max_age_s (by `utc_s` now) it is none: 0. The robot may have been moved since: moved_m and
 // moved_rad are added to its sigmas.

@@ -59,6 +59,8 @@ static void a_pose_that_is_worth_nothing_is_not_kept(void) {
   e.state = WM_STATE_LOST;
   TEST_ASSERT_FALSE(wm_saved_pose_is_worth_it(&e));
   e = tracking(1, 3);
+  TEST_ASSERT_TRUE(wm_saved_pose_is_worth_it(&e));
+  e = tracking(1, 60);
   TEST_ASSERT_FALSE(wm_saved_pose_is_worth_it(&e));
   e = tracking(NAN, 0.3);
   TEST_ASSERT_FALSE(wm_saved_pose_is_worth_it(&e));

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+# In the guest: cameras by V4L2, recorded by waymark; vivid gives the faults, v4l2loopback a producer that dies.
+set -u
+waymark=/run/waymark
+cp -r /host/camera /host/waymark /run/
+cd /run/camera || exit 1
+modprobe vivid n_devs=1 node_types=0x1 num_inputs=1 input_types=0 || exit 1
+modprobe v4l2loopback devices=1 video_nr=10 exclusive_caps=0 || exit 1
+for tool in "v4l2-ctl -d /dev/video0 -D" "$waymark help"; do $tool >/dev/null 2>&1; done
+fails=0
+fail() { echo "FAIL: $*"; fails=$((fails + 1)); }
+control() { v4l2-ctl -d /dev/video0 -c "$1"; }
+
+# record NAME SECONDS: in the background; what it says is in NAME.txt.
+record() { $waymark record --config robot.yaml --out "/run/$1" --duration "$2" --free-mb 50 >"$1.txt" 2>&1 & recording=$!; }
+finish() { wait $recording || fail "waymark record ($1): exit code $?"; cat "$1.txt"; }
+said() { grep -qF "$2" "$1.txt" || fail "$1: not said: $2"; }
+pictures() { grep -c , "/run/$1/video/front.csv"; }
+
+echo "== pictures as they come"
+record plain 4
+finish plain
+said plain "front gives pictures"
+[ "$(pictures plain)" -gt 30 ] || fail "plain: only $(pictures plain) pictures"
+
+echo "== dropped buffers, a damaged one, numbers and stamps that wrap"
+record faults 9
+sleep 2
+control percentage_of_dropped_buffers=30
+sleep 1
+control percentage_of_dropped_buffers=0
+control inject_v4l2_buf_flag_error=1
+sleep 1
+control wrap_timestamp=1
+sleep 2
+control wrap_timestamp=0
+finish faults
+[ "$(pictures faults)" -gt 50 ] || fail "faults: only $(pictures faults) pictures"
+cp -r /run/faults /host/out/camera-faults
+
+echo "== unplugged and back"
+record unplugged 9
+sleep 2
+echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind
+sleep 2
+echo vivid.0 >/sys/bus/platform/drivers/vivid/bind
+finish unplugged
+said unplugged "looking for it"
+[ "$(grep -c 'front gives pictures' unplugged.txt)" = 2 ] || fail "unplugged: it doesn't come back"
+
+echo "== a producer that dies, and another one"
+sed -i 's#/dev/video0#/dev/video10#' robot.yaml
+./feed /dev/video10 320 180 15 1000 & feeder=$!
+sleep 1
+record dies 10
+sleep 3
+kill -9 $feeder
+sleep 3
+./feed /dev/video10 320 180 15 1000 & feeder=$!
+finish dies
+kill $feeder
+said dies "gives no pictures"
+[ "$(grep -c 'front gives pictures' dies.txt)" -ge 2 ] || fail "dies: it doesn't come back"
+exit $((fails > 0))

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+# In the guest: waymark on a real CAN controller's driver, fed by another one on the same bus. Everything is copied into
+# memory and run once before it counts: under the instruction clock, waiting for the disk takes the guest's time.
+set -u
+waymark=/run/waymark
+cp -r /host/scenario /host/waymark /run/
+cd /run/scenario || exit 1
+modprobe -a kvaser_pci can-raw || exit 1
+for tool in "canplayer -h" "cansend -h" "ip -s link" "$waymark help"; do $tool >/dev/null 2>&1; done
+cat can.log >/dev/null
+fails=0
+fail() { echo "FAIL: $*"; fails=$((fails + 1)); }
+play() { canplayer -I can.log can1=can0; }
+play_again_and_again() { while :; do play 2>/dev/null; sleep 0.2; done; }
+up() { ip link set "$1" up type can bitrate 500000 restart-ms 100; ip link set "$1" txqueuelen 2000; }
+
+echo "== the doctor on an interface that is down, then up"
+$waymark doctor robot.yaml --seconds 0.5 >doctor.txt
+grep -q "can can0 *is down" doctor.txt || fail "the doctor doesn't see that can0 is down"
+grep -q "PREEMPT_RT" doctor.txt || fail "the doctor doesn't see the kernel"
+up can0
+up can1
+$waymark doctor robot.yaml --seconds 0.5 >doctor.txt
+grep -q "can can0 *is up" doctor.txt || fail "the doctor doesn't see that can0 is up"
+
+echo "== drive"
+$waymark run --config robot.yaml --out /run/drive --duration "$(cat duration)" &
+run=$!
+sleep 2
+play
+wait $run || fail "waymark run: exit code $?"
+errors=$(cat /sys/class/net/can0/statistics/rx_errors)
+[ "$errors" = 0 ] || fail "the controller lost frames: $errors"
+cp -r /run/drive /host/out/
+
+echo "== the interface goes down and up, the adapter is removed and comes back"
+play_again_and_again &
+player=$!
+$waymark run --config robot.yaml --out /run/faults --duration 22 >faults.txt 2>&1 &
+run=$!
+sleep 5
+ip link set can0 down
+sleep 3
+ip link set can0 up
+sleep 3
+device=$(readlink -f /sys/class/net/can0/device)
+echo 1 >"$device/remove"
+sleep 3
+echo 1 >/sys/bus/pci/rescan
+sleep 1
+up can0
+wait $run || fail "waymark run among faults: exit code $?"
+cat faults.txt
+for said in "can0 went down" "can0 speaks again" "can0 is gone (No such device)" "can: is back"; do
+  grep -qF "$said" faults.txt || fail "not said: $said"
+done
+cp -r /run/faults /host/out/
+
+echo "== killed and started again"
+$waymark run --config robot.yaml &
+run=$!
+sleep 5
+kill -9 $run
+wait $run
+$waymark run --config robot.yaml --duration 3 --out /run/restart >restart.txt 2>&1
+cat restart.txt
+grep -q "start: where it was" restart.txt || fail "a killed run doesn't begin where it was"
+cp -r /run/restart /host/out/
+kill $player
+
+echo "== bus-off, error-passive and restart, as error frames"
+modprobe vcan && ip link add dev vcan0 type vcan && ip link set vcan0 up
+sed 's/interface: can0/interface: vcan0/' robot.yaml >virtual.yaml
+$waymark run --config virtual.yaml --duration 5 >errors.txt 2>&1 &
+run=$!
+sleep 2
+cansend vcan0 20000004#0010000000000000
+cansend vcan0 20000040#0000000000000000
+sleep 0.5
+cansend vcan0 20000100#0000000000000000
+wait $run || fail "waymark run among error frames: exit code $?"
+cat errors.txt
+for said in "error-passive" "bus-off" "is on the bus again"; do
+  grep -qF "$said" errors.txt || fail "not said: $said"
+done
+exit $((fails > 0))

@@ -1,0 +1,139 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Hardware in the loop: the same daemon and configuration as on a robot, in a guest with Debian's PREEMPT_RT kernel and a
+real (emulated) CAN controller, under qemu's instruction clock, fed from a recording at its own times.
+
+usage: hil.py WORK WAYMARK WAYMARK_SIMULATE   (WORK keeps the guest's image from run to run)
+
+Judged on the host: the guest's own checks; the log of its run gives its poses bit by bit; its poses are those of a replay
+of the same frames."""
+import csv
+import math
+import pathlib
+import shutil
+import subprocess
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+POSITION_M, HEADING_DEG = 0.02, 0.2
+
+
+def boot(work, script, *devices):
+    """Runs guest/SCRIPT; everything that it prints is shown and kept. Judged by its last word, not by qemu's."""
+    log = work / f"{script}.log"
+    command = ["timeout", "-k", "5", "600", "qemu-system-x86_64", "-accel", "tcg,thread=single", "-smp", "1",
+               "-icount", "shift=2,sleep=on", "-machine", "q35", "-cpu", "max", "-m", "1024", "-no-reboot",
+               "-kernel", work / "image/vmlinuz", "-initrd", work / "image/init.cpio.gz",
+               "-append", f"console=ttyS0 quiet panic=-1 hil={script}",
+               "-drive", f"file={work}/image/root.ext4,if=virtio,format=raw,readonly=on",
+               "-virtfs", f"local,path={work}/share,mount_tag=host,security_model=none,id=host",
+               "-display", "none", "-monitor", "none", "-serial", "stdio", "-nic", "none", *devices]
+    with open(log, "w") as out:
+        subprocess.run([str(c) for c in command], stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)
+    text = log.read_text(errors="replace")
+    print(text)
+    return "GUEST-RC 0" in text
+
+
+def poses(path):
+    with open(path, newline="") as f:
+        return [(int(r["t_ns"]), float(r["x_m"]), float(r["y_m"]), 2 * math.atan2(float(r["qz"]), float(r["qw"])))
+                for r in csv.DictReader(f)]
+
+
+def worst_difference(a, b):
+    """Row by row: each belongs to the same CAN frame. The player's jitter moves stamps, not frames."""
+    worst_m = max(math.hypot(p[1] - q[1], p[2] - q[2]) for p, q in zip(a, b))
+    worst_deg = max(abs(math.degrees(math.remainder(p[3] - q[3], 2 * math.pi))) for p, q in zip(a, b))
+    worst_ms = max(abs((p[0] - a[0][0]) - (q[0] - b[0][0])) for p, q in zip(a, b)) / 1e6
+    return worst_m, worst_deg, worst_ms
+
+
+def scenario_can(work, waymark, simulate):
+    recording, scenario = work / "recording", work / "share/scenario"
+    shutil.rmtree(recording, ignore_errors=True)
+    subprocess.run([simulate, ROOT / "config/worlds/crossing.yaml", "--out", recording], check=True)
+    scenario.mkdir(parents=True)
+    for name in ("can.log", "vehicle.dbc", "can-signals.yaml", "calibration.yaml"):
+        shutil.copy(recording / name, scenario)
+    start = next(line for line in (recording / "recording.yaml").read_text().splitlines() if "initial_pose:" in line)
+    # The configuration of the same drive at the desk, and the robot's own files and devices.
+    (scenario / "robot.yaml").write_text(
+        (ROOT / "config/crossing-odometry.yaml").read_text() + f"\n{start.strip()}\n"
+        "calibration: calibration.yaml\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\n"
+        "devices: {can: [{interface: can0}]}\nstart: {saved_pose: /run/pose.yaml}\n")
+    lines = (recording / "can.log").read_text().splitlines()
+    seconds = float(lines[-1][1:].split(")")[0]) - float(lines[0][1:].split(")")[0])
+    (scenario / "duration").write_text(f"{seconds + 5:.0f}\n")
+    return recording
+
+
+def scenario_camera(work):
+    scenario = work / "share/camera"
+    scenario.mkdir(parents=True)
+    (scenario / "calibration.yaml").write_text(
+        "cameras:\n  front:\n    model: equidistant\n    size: [320, 180]\n"
+        "    intrinsics: [130, 130, 159.5, 89.5]\n    distortion: [0, 0, 0, 0]\n"
+        "    mounting: {xyz_m: [1, 0, 0.4], rpy_deg: [0, 22, 0]}\n")
+    (scenario / "robot.yaml").write_text(
+        "format: waymark-config/1\nestimator: odometry\ncalibration: calibration.yaml\n"
+        "devices: {cameras: [{name: front, device: /dev/video0, format: GREY, rate_hz: 15}]}\n")
+    subprocess.run(["cc", "-O2", "-static", HERE / "feed.c", "-o", scenario / "feed"], check=True)
+
+
+def judge_camera(work):
+    """Stamps of the recording: each later than the one before, no more than their arrival, most a period apart."""
+    with open(work / "share/out/camera-faults/video/front.csv", newline="") as f:
+        rows = [(int(r["t_ns"]), int(r["arrival_ns"])) for r in csv.DictReader(f)]
+    failures = []
+    if any(b[0] <= a[0] for a, b in zip(rows, rows[1:])):
+        failures.append("stamps of pictures go back")
+    late = [a - t for t, a in rows]
+    print(f"camera: {len(rows)} pictures, {min(late) / 1e6:.1f} to {max(late) / 1e6:.1f} ms old when they arrive")
+    if min(late) < 0 or max(late) > 1e9:
+        failures.append("stamps of pictures can't be")
+    return failures
+
+
+def judge_can(work, waymark, recording):
+    out, failures = work / "share/out", []
+    subprocess.run([waymark, "replay", out / "drive/events.wmlog", "--out", work / "again"], check=True,
+                   stdout=subprocess.DEVNULL)
+    if (out / "drive/trajectory.csv").read_bytes() != (work / "again/trajectory.csv").read_bytes():
+        failures.append("the guest's log doesn't give its poses bit by bit")
+    subprocess.run([waymark, "replay", recording, "--config", ROOT / "config/crossing-odometry.yaml", "--out", work / "desk"],
+                   check=True, stdout=subprocess.DEVNULL)
+    guest, desk = poses(out / "drive/trajectory.csv"), poses(work / "desk/trajectory.csv")
+    worst_m, worst_deg, worst_ms = worst_difference(guest, desk)
+    print(f"can: {len(guest)} poses in the guest, {len(desk)} at the desk: at most {worst_m:.4f} m and {worst_deg:.4f} "
+          f"degrees apart; the player was off its times by {worst_ms:.1f} ms at most")
+    if len(guest) != len(desk) or worst_m > POSITION_M or worst_deg > HEADING_DEG:
+        failures.append("the guest's poses are not the desk's")
+    return failures
+
+
+def main():
+    work, waymark, simulate = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
+    if shutil.which("qemu-system-x86_64") is None or shutil.which("mmdebstrap") is None:
+        print("qemu-system-x86_64 or mmdebstrap is not there: skipped")
+        return 77
+    subprocess.run(["bash", HERE / "prepare.sh", work / "image"], check=True)
+    shutil.rmtree(work / "share", ignore_errors=True)
+    (work / "share/out").mkdir(parents=True)
+    shutil.copytree(HERE / "guest", work / "share/guest")
+    shutil.copy(waymark, work / "share/waymark")
+    recording = scenario_can(work, waymark, simulate)
+    failures = [] if boot(work, "can.sh", "-object", "can-bus,id=cb0", "-device", "kvaser_pci,canbus=cb0",
+                          "-device", "kvaser_pci,canbus=cb0") else ["the guest's own checks failed (can.sh)"]
+    failures += judge_can(work, waymark, recording)
+    scenario_camera(work)
+    failures += judge_camera(work) if boot(work, "camera.sh") else ["the guest's own checks failed (camera.sh)"]
+    for failure in failures:
+        print("FAIL:", failure)
+    print("hil:", "failed" if failures else "good")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

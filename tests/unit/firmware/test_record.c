@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a recorder writes is read again: candump's lines, and an AVI that was cut at any byte.
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "avi_writer.h"
+#include "unity.h"
+#include "waymark/can.h"
+#include "waymark/record.h"
+#include "waymark/video.h"
+
+static char folder[64], video[128], stamps[128], avi[128];
+static wm_error err;
+
+void setUp(void) {
+  (void)snprintf(folder, sizeof folder, "/tmp/wm_record_XXXXXX");
+  TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+  (void)snprintf(video, sizeof video, "%s/video", folder);
+  (void)snprintf(avi, sizeof avi, "%s/front.avi", video);
+  (void)snprintf(stamps, sizeof stamps, "%s/front.csv", video);
+  TEST_ASSERT_EQUAL(0, mkdir(video, 0777));
+}
+void tearDown(void) {
+  char command[128];
+  (void)snprintf(command, sizeof command, "rm -rf %s", folder);
+  TEST_ASSERT_EQUAL(0, system(command));
+}
+
+static void expect_again(const char *line) {
+  wm_can_frame frame;
+  char written[256];
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_candump_parse(line, strlen(line), &frame, &err), err.text);
+  size_t length = wm_candump_write(&frame, written, sizeof written);
+  TEST_ASSERT_EQUAL(strlen(line) + 1, length);
+  TEST_ASSERT_EQUAL_STRING_LEN(line, written, strlen(line));
+}
+
+static void lines_of_candump_are_written_as_they_were_read(void) {
+  expect_again("(1700000000.002500) can0 101#0CFEFFFF00000000");
+  expect_again("(0.000000) vcan12 7FF#");
+  expect_again("(5.999999) can0 12345678#01");
+  expect_again("(5.000001) can0 123#R8");
+  expect_again("(5.000001) can0 123#R");
+  expect_again("(5.000001) can0 20000004#0010000000000000");
+  expect_again("(5.000001) can0 123##1112233445566778899AABBCC");
+  expect_again("(-0.000001) can0 123#00");
+  wm_can_frame frame = {.length = 64, .is_fd = 1, .iface = "can0"};
+  char tight[100];
+  TEST_ASSERT_EQUAL(0, wm_candump_write(&frame, tight, sizeof tight));
+}
+
+#define W 18
+#define H 5
+#define PICTURES 4
+
+static size_t write_video(void) {
+  uint8_t grey[20 * H];
+  FILE *f = fopen(avi, "wb"), *csv = fopen(stamps, "w");
+  TEST_ASSERT_TRUE(f && csv);
+  TEST_ASSERT_EQUAL(0, avi_begin(f, "Y800", W, H, 30));
+  (void)fputs("frame,t_ns,exposure_ns,arrival_ns\n", csv);
+  for (int i = 0; i < PICTURES; i++) {
+    memset(grey, 10 + i, sizeof grey);
+    TEST_ASSERT_EQUAL(0, avi_picture(f, grey, W, H, 20));
+    (void)fprintf(csv, "%d,%d,0,%d\n", i, 1000 + i * 33000000, 2000 + i * 33000000);
+  }
+  size_t length = (size_t)ftell(f);
+  (void)fclose(f);
+  (void)fclose(csv);
+  return length;
+}
+
+static int pictures_in(void) {
+  wm_video *opened;
+  wm_frame frame;
+  wm_camera camera = {.name = "front", .width_px = W, .height_px = H};
+  int count = 0;
+  if (wm_video_open(folder, &camera, 0, NULL, NULL, &opened, &err) != WM_OK) return -1;
+  while (wm_video_next(opened, &frame, &err) == WM_OK) {
+    TEST_ASSERT_EQUAL_UINT8(10 + count, frame.grey[(H - 1) * frame.stride_bytes + W - 1]);
+    count++;
+  }
+  wm_video_close(opened);
+  return count;
+}
+
+static void a_video_that_was_cut_anywhere_is_read_up_to_there(void) {
+  size_t length = write_video(), picture = 8 + W * H;
+  TEST_ASSERT_EQUAL(PICTURES, pictures_in());
+  for (size_t cut = length; cut-- > length - picture * 2 - 3;) {
+    TEST_ASSERT_EQUAL(0, truncate(avi, (off_t)cut));
+    int whole = cut >= length - picture ? PICTURES - 1 : cut >= length - 2 * picture ? PICTURES - 2 : PICTURES - 3;
+    TEST_ASSERT_EQUAL(whole, pictures_in());
+  }
+}
+
+static void an_empty_configuration_is_refused(void) {
+  static wm_config config;
+  wm_record_report report;
+  const wm_record_options options = {.out_dir = folder};
+  TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_record(&config, &options, &report, &err));
+}
+
+// A camera that isn't there: the folder is a recording all the same, from its beginning on.
+static void without_its_devices_a_recording_is_begun_and_ended(void) {
+  const char *text =
+      "format: waymark-config/1\nestimator: odometry\n"
+      "devices: {can: [{interface: nocan7, dbc: /dev/null, can_signals: /dev/null}]}\n";
+  char out[128], path[160];
+  wm_config config;
+  wm_record_report report;
+  (void)snprintf(out, sizeof out, "%s/rec", folder);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, strlen(text), "x.yaml", &config, &err), err.text);
+  const wm_record_options options = {.out_dir = out, .duration_s = 0.3};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_record(&config, &options, &report, &err), err.text);
+  const char *const files[] = {"recording.yaml", "config.yaml", "can.log"};
+  for (size_t i = 0; i < 3; i++) {
+    (void)snprintf(path, sizeof path, "%s/%s", out, files[i]);
+    TEST_ASSERT_EQUAL_MESSAGE(0, access(path, R_OK), path);
+  }
+  wm_config_free(&config);
+}
+
+// A disk that is full from the beginning.
+static void a_full_disk_ends_it_and_says_so(void) {
+  const char *text =
+      "format: waymark-config/1\nestimator: odometry\n"
+      "devices: {can: [{interface: nocan7, dbc: /dev/null, can_signals: /dev/null}]}\n";
+  char out[128];
+  wm_config config;
+  wm_record_report report;
+  (void)snprintf(out, sizeof out, "%s/rec", folder);
+  TEST_ASSERT_EQUAL(WM_OK, wm_config_parse(text, strlen(text), "x.yaml", &config, &err));
+  const wm_record_options options = {.out_dir = out, .bytes_free_min = UINT64_MAX};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_record(&config, &options, &report, &err), err.text);
+  TEST_ASSERT_TRUE(report.is_full);
+  wm_config_free(&config);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(lines_of_candump_are_written_as_they_were_read);
+  RUN_TEST(a_video_that_was_cut_anywhere_is_read_up_to_there);
+  RUN_TEST(an_empty_configuration_is_refused);
+  RUN_TEST(without_its_devices_a_recording_is_begun_and_ended);
+  RUN_TEST(a_full_disk_ends_it_and_says_so);
+  return UNITY_END();
+}
