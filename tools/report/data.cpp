@@ -115,7 +115,11 @@ ReportData load_report_data(const fs::path &run, const fs::path &recording) {
   out.health = load_json(run / "health.json");
   out.timing = load_json(run / "timing.json");
   if (fs::exists(run / "map-estimate.csv")) out.estimated_landmarks = load_landmarks(run / "map-estimate.csv");
-  if (!recording.empty()) load_recording(recording, &out);
+  if (!recording.empty()) {
+    load_recording(recording, &out);
+    out.frames = load_frames(recording, &out, 4);
+    mark_sightings(recording, out, &out.frames);
+  }
   return out;
 }
 

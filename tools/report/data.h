@@ -12,6 +12,7 @@
 #include "common/recording_folder.h"
 #include "eval/compare.h"
 #include "eval/figures.h"
+#include "report/frames.h"
 
 namespace wm::tools {
 
@@ -51,7 +52,8 @@ struct ReportData {
   std::vector<Sighting> sightings;
   std::map<std::string, Pose> mountings;  // sensor in base_link
   std::optional<Raster> raster;
-  std::vector<std::string> notes;  // what a reader should know of the page itself
+  std::vector<ReportFrame> frames;  // by time
+  std::vector<std::string> notes;   // what a reader should know of the page itself
 
   [[nodiscard]] double seconds(int64_t t_ns) const { return static_cast<double>(t_ns - start_ns) * 1e-9; }
   [[nodiscard]] double end_s() const { return seconds(trajectory.poses.back().t_ns); }

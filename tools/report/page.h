@@ -15,6 +15,7 @@ std::string report_page(const ReportData &data);
 // it.
 std::string headline_section(const ReportData &data);
 std::string map_section(const ReportData &data);
+std::string frames_section(const ReportData &data);       // with pictures
 std::string error_section(const ReportData &data);        // with truth
 std::string uncertainty_section(const ReportData &data);  // without
 std::string consistency_section(const ReportData &data);

@@ -51,6 +51,12 @@ border-radius:10px;overflow:hidden;margin:0 0 8px}
 .tiles b{display:block;font-size:23px;line-height:1.2;font-weight:600;letter-spacing:-.01em;white-space:nowrap}
 .tiles span{display:block;font-size:13px;line-height:1.35;color:var(--soft);margin-top:3px}
 figure{margin:0}
+.shots{display:grid;grid-template-columns:repeat(auto-fill,minmax(300px,1fr));gap:14px}
+.shot svg{display:block;width:100%;height:auto;border-radius:8px}
+.shot figcaption{font-size:13px;color:var(--soft);margin-top:3px}
+.shot text{fill:#ffe98a;paint-order:stroke;stroke:#000a;stroke-width:3px;stroke-linejoin:round;font-family:system-ui,'DejaVu Sans',sans-serif}
+.hope{fill:none;stroke:#ffd23d;stroke-width:2;vector-effect:non-scaling-stroke}.hit{fill:#35e0a8;stroke:#063;stroke-width:1;vector-effect:non-scaling-stroke}
+.miss{fill:#ff5b3a;stroke:#400;stroke-width:1;vector-effect:non-scaling-stroke}
 .map{display:block;width:100%;height:auto;border:1px solid var(--rule);border-radius:10px;background:var(--card)}
 .legend{display:flex;flex-wrap:wrap;gap:4px 20px;margin:10px 0 0;padding:0;list-style:none;font-size:14px;color:var(--soft)}
 .legend li{display:flex;align-items:center;gap:8px}

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "report/frames.h"
+
+#include <turbojpeg.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "common/cameras.h"
+#include "report/data.h"
+#include "report/page.h"
+#include "report/words.h"
+#include "waymark/video.h"
+
+namespace wm::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kWidth_px = 480, kQuality = 72;
+
+using Opened = std::unique_ptr<wm_recording, decltype(&wm_recording_close)>;
+using Video = std::unique_ptr<wm_video, decltype(&wm_video_close)>;
+
+// The mean of each block of `times` x `times` pixels, as a JPEG. Empty where it can't be made.
+std::string small_jpeg(const wm_frame &frame, uint32_t times) {
+  const uint32_t width = frame.width_px / times, height = frame.height_px / times;
+  std::vector<uint8_t> grey(static_cast<size_t>(width) * height);
+  for (uint32_t y = 0; y < height; y++)
+    for (uint32_t x = 0; x < width; x++) {
+      uint32_t sum = 0;
+      for (uint32_t j = 0; j < times; j++)
+        for (uint32_t i = 0; i < times; i++)
+          sum += frame.grey[static_cast<size_t>(y * times + j) * frame.stride_bytes + x * times + i];
+      grey[static_cast<size_t>(y) * width + x] = static_cast<uint8_t>(sum / (times * times));
+    }
+  const std::unique_ptr<void, decltype(&tjDestroy)> coder(tjInitCompress(), tjDestroy);
+  unsigned char *bytes = nullptr;
+  unsigned long size = 0;
+  std::string out;
+  if (tjCompress2(coder.get(), grey.data(), static_cast<int>(width), 0, static_cast<int>(height), TJPF_GRAY, &bytes,
+                  &size, TJSAMP_GRAY, kQuality, 0) == 0)
+    out.assign(reinterpret_cast<const char *>(bytes), size);
+  tjFree(bytes);
+  return out;
+}
+
+std::string base64(const std::string &bytes) {
+  static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    const auto byte = [&](size_t k) { return k < bytes.size() ? static_cast<unsigned char>(bytes[k]) : 0u; };
+    const unsigned three = byte(i) << 16 | byte(i + 1) << 8 | byte(i + 2);
+    for (int k = 0; k < 4; k++)
+      out += i + static_cast<size_t>(k) > bytes.size() ? '=' : letters[three >> (18 - 6 * k) & 63];
+  }
+  return out;
+}
+
+// The pictures nearest to `each` times spread over the run.
+void frames_of(const fs::path &recording, const wm_camera &camera, int32_t index, size_t each, ReportData *data,
+               std::vector<ReportFrame> *out) {
+  wm_error err{};
+  wm_video *made = nullptr;
+  if (wm_video_open(recording.c_str(), &camera, index, nullptr, nullptr, &made, &err) != WM_OK) {
+    data->notes.push_back(std::string("No pictures of ") + camera.name + ": " + err.text);
+    return;
+  }
+  const Video video(made, wm_video_close);
+  const int64_t from = data->start_ns, to = data->trajectory.poses.back().t_ns;
+  for (size_t i = 0; i < each; i++) {
+    const int64_t wanted = from + static_cast<int64_t>(static_cast<double>(to - from) * (static_cast<double>(i) + 0.5) /
+                                                       static_cast<double>(each));
+    wm_frame frame{};
+    while (wm_video_peek(video.get(), &frame, &err) == WM_OK && frame.t_ns < wanted)
+      if (wm_video_skip(video.get(), &err) != WM_OK) return;
+    if (wm_video_next(video.get(), &frame, &err) != WM_OK) return;
+    const uint32_t times = std::max<uint32_t>(1, (frame.width_px + kWidth_px / 2) / kWidth_px);
+    out->push_back({camera.name,
+                    frame.t_ns,
+                    static_cast<int>(frame.width_px),
+                    static_cast<int>(frame.height_px),
+                    small_jpeg(frame, times),
+                    {}});
+  }
+}
+
+std::string drawn(const ReportData &data, const ReportFrame &frame) {
+  const double unit = frame.width_px / 480.0;  // marks are as large whatever the picture's size
+  std::string svg;
+  for (const FrameMark &m : frame.marks) {
+    const std::string at = fixed(m.u_px, 1) + "\" cy=\"" + fixed(m.v_px, 1);
+    const char *name = m.kind == FrameMark::Kind::seen ? "hit" : m.kind == FrameMark::Kind::rejected ? "miss" : "hope";
+    svg += std::string("<circle class=\"") + name + "\" cx=\"" + at + "\" r=\"" +
+           fixed((m.kind == FrameMark::Kind::expected ? 8 : 3.2) * unit, 1) + "\"/>";
+    if (!m.text.empty())
+      svg += "<text x=\"" + fixed(m.u_px + 11 * unit, 1) + "\" y=\"" + fixed(m.v_px + 4 * unit, 1) + "\" font-size=\"" +
+             fixed(12 * unit, 1) + "\">" + escape(m.text) + "</text>";
+  }
+  const std::string box = std::to_string(frame.width_px) + " " + std::to_string(frame.height_px);
+  return "<figure class=\"shot\"><svg viewBox=\"-0.5 -0.5 " + box + "\" role=\"img\" aria-label=\"Picture of camera " +
+         escape(frame.camera) + "\"><image x=\"-0.5\" y=\"-0.5\" width=\"" + std::to_string(frame.width_px) +
+         "\" height=\"" + std::to_string(frame.height_px) +
+         "\" preserveAspectRatio=\"none\" href=\"data:image/jpeg;base64," + base64(frame.jpeg) + "\"/>" + svg +
+         "</svg><figcaption>" + escape(frame.camera) + ", " + fixed(data.seconds(frame.t_ns), 1) +
+         " s</figcaption></figure>";
+}
+
+}  // namespace
+
+std::vector<ReportFrame> load_frames(const fs::path &recording, ReportData *data, size_t each) {
+  std::vector<ReportFrame> out;
+  wm_recording *made = nullptr;
+  wm_error err{};
+  if (!fs::exists(recording / "video")) return out;
+  if (wm_recording_open(recording.c_str(), nullptr, nullptr, nullptr, &made, &err) != WM_OK) {
+    data->notes.push_back(std::string("No pictures: ") + err.text);
+    return out;
+  }
+  const Opened opened(made, wm_recording_close);
+  const wm_rig *rig = wm_recording_rig(opened.get());
+  for (uint32_t i = 0; i < rig->camera_count; i++)
+    if (wm_video_there(recording.c_str(), rig->cameras[i].name))
+      frames_of(recording, rig->cameras[i], static_cast<int32_t>(i), each, data, &out);
+  std::stable_sort(out.begin(), out.end(), [](const ReportFrame &a, const ReportFrame &b) { return a.t_ns < b.t_ns; });
+  return out;
+}
+
+void mark_sightings(const fs::path &recording, const ReportData &data, std::vector<ReportFrame> *frames) {
+  if (frames->empty() || data.innovations.empty()) return;
+  const std::vector<NamedCamera> cameras = load_cameras(recording / "calibration.yaml");
+  for (ReportFrame &frame : *frames) {
+    const auto camera =
+        std::find_if(cameras.begin(), cameras.end(), [&](const NamedCamera &c) { return c.name == frame.camera; });
+    const auto mounting = data.mountings.find(frame.camera);
+    const auto pose = pose_at(data.trajectory.poses, frame.t_ns, kMaxGapNs);
+    if (camera == cameras.end() || mounting == data.mountings.end() || !pose) continue;
+    const auto mark = [&](FrameMark::Kind kind, const Eigen::Vector3d &base, const std::string &text) {
+      render::Vec2 pixel;
+      if (render::project(camera->camera, render::T_base_optical(camera->camera).inverse() * base, pixel) &&
+          pixel.x() > 0 && pixel.y() > 0 && pixel.x() < frame.width_px && pixel.y() < frame.height_px)
+        frame.marks.push_back({kind, pixel.x(), pixel.y(), text});
+    };
+    for (const Innovation &saw : data.innovations) {
+      if (saw.t_ns != frame.t_ns || saw.sensor != frame.camera || saw.residual != "bearing") continue;
+      const auto landmark = std::find_if(data.landmarks.begin(), data.landmarks.end(),
+                                         [&](const Landmark &l) { return l.id == saw.landmark; });
+      if (landmark == data.landmarks.end()) continue;
+      const Eigen::Vector3d expected = pose->q.conjugate() * (landmark->p_m - pose->p_m);
+      const Eigen::Vector3d from = mounting->second.q.conjugate() * (expected - mounting->second.p_m);
+      const double level_m = from.head<2>().norm();
+      mark(FrameMark::Kind::expected, expected, std::to_string(saw.landmark));
+      mark(saw.fused() ? FrameMark::Kind::seen : FrameMark::Kind::rejected,
+           mounting->second.q *
+                   Eigen::Vector3d(level_m * std::cos(saw.observed), level_m * std::sin(saw.observed), from.z()) +
+               mounting->second.p_m,
+           "");
+    }
+  }
+}
+
+std::string frames_section(const ReportData &data) {
+  if (data.frames.empty()) return "";
+  std::string body = "<div class=\"shots\">";
+  bool marks = false;
+  for (const ReportFrame &frame : data.frames) {
+    body += drawn(data, frame);
+    marks = marks || !frame.marks.empty();
+  }
+  body += "</div>";
+  if (marks)
+    body +=
+        legend({{"<circle class=\"hope\" cx=\"14\" r=\"6\"/>", "where the robot expected a landmark, with its number"},
+                {"<circle class=\"hit\" cx=\"14\" r=\"4\"/>", "the direction in which it was seen, believed"},
+                {"<circle class=\"miss\" cx=\"14\" r=\"4\"/>", "seen, and not believed"}});
+  return section("What it saw", "Pictures of its cameras, spread over the drive.", body);
+}
+
+}  // namespace wm::tools
