@@ -3,7 +3,20 @@
 #include <cstring>
 
 #include "math/arc.hpp"
+#include "math/rotation.hpp"
 #include "motion/front_end.hpp"
+
+namespace {
+
+// Where a twist in space began to hold, in an odometry's frame of its own.
+struct space_point {
+  wm_time_ns t_ns;
+  wm::vec3 p;
+  wm::quat q;
+  wm::vec3 v_mps, w_radps;
+};
+
+}  // namespace
 
 struct wm_odometry {
   static constexpr uint32_t kPoints = 256;                     // a power of two
@@ -14,6 +27,8 @@ struct wm_odometry {
   wm_odom_point head;  // at the last event
   wm_odom_point ring[kPoints];
   uint64_t count;
+  space_point space[kPoints];  // only where twists in space come
+  uint64_t space_count;
 };
 
 namespace {
@@ -40,6 +55,81 @@ wm_odom_point interpolate(const wm_odom_point &a, const wm_odom_point &b, wm_tim
   return out;
 }
 
+space_point carried(const space_point &from, wm_time_ns t_ns) {
+  const double dt_s = wm_seconds_between(from.t_ns, t_ns);
+  space_point out = from;
+  out.t_ns = t_ns;
+  out.p = from.p + wm::matrix_of(from.q) * (dt_s * (wm::mean_turn(dt_s * from.w_radps) * from.v_mps));
+  out.q = wm::normalized(from.q * wm::turn_by(dt_s * from.w_radps));
+  return out;
+}
+
+void feed_space(wm_odometry *self, const wm_event &event) {
+  const uint64_t n = self->space_count;
+  space_point now = {event.t_ns, {0, 0, 0}, wm::kNoTurn, {}, {}};
+  if (n > 0) now = carried(self->space[(n - 1) % wm_odometry::kPoints], event.t_ns);
+  now.v_mps = wm::vec_of(event.as.twist6.v_mps);
+  now.w_radps = wm::vec_of(event.as.twist6.w_radps);
+  self->space[n % wm_odometry::kPoints] = now;
+  self->space_count = n + 1;
+}
+
+bool space_at(const wm_odometry *self, wm_time_ns t_ns, space_point *out) {
+  const uint64_t n = self->space_count, oldest = n > wm_odometry::kPoints ? n - wm_odometry::kPoints : 0;
+  for (uint64_t i = n; i > oldest; i--) {
+    const space_point &point = self->space[(i - 1) % wm_odometry::kPoints];
+    if (point.t_ns > t_ns) continue;
+    *out = carried(point, t_ns);
+    return true;
+  }
+  return false;
+}
+
+// p' = p + R D, R' = R T: dp' = dp - R (D x r), r' = T' r, with r in the body's axes; and noise on the way.
+void carry_space(const wm_odometry *self, const space_point &from, const space_point &to, wm_estimate *out) {
+  const wm::quat start = wm::quat_of(out->pose_map_base.q_xyzw);
+  const wm::mat3 R = wm::matrix_of(start);
+  const wm::vec3 moved = wm::transposed_times(wm::matrix_of(from.q), to.p - from.p);
+  const wm::quat turned = wm::normalized(wm::conjugate(from.q) * to.q);
+  const wm::vec3 place = wm::vec_of(out->pose_map_base.p_m) + R * moved;
+  const wm::quat q = wm::normalized(start * turned);
+  const wm::mat3 lever = -1.0 * (R * wm::skew(moved)), turn = wm::transposed(wm::matrix_of(turned));
+  double f[6][6] = {}, half[6][6], carried_cov[6][6];
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) {
+      f[i][j] = i == j;
+      f[i][3 + j] = lever.m[i][j];
+      f[3 + i][3 + j] = turn.m[i][j];
+    }
+  for (int i = 0; i < 6; i++)
+    for (int j = 0; j < 6; j++) {
+      half[i][j] = 0.0;
+      for (int k = 0; k < 6; k++) half[i][j] += f[i][k] * out->covariance[wm_cov_index(k, j)];
+    }
+  for (int i = 0; i < 6; i++)
+    for (int j = i; j < 6; j++) {
+      carried_cov[i][j] = 0.0;
+      for (int k = 0; k < 6; k++) carried_cov[i][j] += half[i][k] * f[j][k];
+    }
+  const double dt_s = wm_seconds_between(from.t_ns, to.t_ns);
+  const wm_motion_params &params = self->front.params();
+  const double grown[2] = {wm::square(params.noise_speed_mps) * dt_s, wm::square(params.noise_yaw_rate_radps) * dt_s};
+  for (int i = 0; i < 6; i++)
+    for (int j = i; j < 6; j++) {
+      if (i == j && dt_s > 0.0) carried_cov[i][i] += grown[i / 3];
+      out->covariance[wm_cov_index(i, j)] = out->covariance[wm_cov_index(j, i)] = carried_cov[i][j];
+    }
+  for (int i = 0; i < 3; i++) {
+    out->pose_map_base.p_m[i] = place[i];
+    out->pose_map_base.q_xyzw[i] = q.v[i];
+    out->v_mps[i] = to.v_mps[i];
+    out->w_radps[i] = to.w_radps[i];
+  }
+  out->pose_map_base.q_xyzw[3] = q.w;
+  const wm::mat3 end = wm::matrix_of(q);
+  out->heading_rad = wm::atan2(end.m[1][0], end.m[0][0]);
+}
+
 double growth(double from, double to) { return to > from ? to - from : 0.0; }
 
 }  // namespace
@@ -62,6 +152,7 @@ wm_status wm_odometry_feed(wm_odometry *self, const wm_event *event) {
   const wm_status status = self->front.check(*event);
   if (status != WM_OK) return status;
   self->front.feed(*event);
+  if (event->kind == WM_EVENT_TWIST6) feed_space(self, *event);
   wm_odom_point &head = self->head;
   self->front.advance(event->t_ns, self->calibration,
                       [&head](const wm::motion_stretch &piece, const wm::motion_twist &twist,
@@ -110,6 +201,19 @@ wm_status wm_odometry_carry(const wm_odometry *self, const wm_estimate *fused, w
   wm_status status = wm_odometry_at(self, fused->t_ns, &from);
   if (status == WM_OK) status = wm_odometry_at(self, t_ns, &to);
   if (status != WM_OK) return status;
+  space_point space_from, space_to;
+  if (fused->dof == 6 && space_at(self, fused->t_ns, &space_from) && space_at(self, t_ns, &space_to)) {
+    *out = *fused;
+    out->t_ns = t_ns;
+    carry_space(self, space_from, space_to, out);
+    if (odom) {
+      // Seen from above: so that map and odom move alike for a vehicle that swims sideways or noses up.
+      const wm::mat3 R = wm::matrix_of(space_to.q);
+      *odom = to;
+      odom->pose_odom_base = {space_to.p.x, space_to.p.y, wm::atan2(R.m[1][0], R.m[0][0])};
+    }
+    return WM_OK;
+  }
   const wm_pose2 step = wm::between(from.pose_odom_base, to.pose_odom_base);
   const wm_pose2 start = {fused->pose_map_base.p_m[0], fused->pose_map_base.p_m[1], fused->heading_rad};
   const wm_pose2 end = wm::compose(start, step);

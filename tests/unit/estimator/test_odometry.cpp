@@ -145,6 +145,36 @@ void test_a_copy_continues_identically(void) {
 void setUp(void) { odom = (wm_odometry *)malloc(wm_odometry_bytes()); }
 void tearDown(void) { free(odom); }
 
+// In space the newest fused pose goes on by the twists that came since; roll and pitch stay what they are.
+void test_a_pose_in_space_is_carried_in_space(void) {
+  start({NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}});
+  for (int i = 0; i <= 10; i++) {
+    wm_event e = make::empty(0.1 * i, WM_EVENT_TWIST6);
+    e.as.twist6 = {{0, 0.2, 1}, {0.5, 0, 0}};
+    feed(e);
+  }
+  wm_estimate fused{}, out{};
+  fused.t_ns = make::at(0.5);
+  fused.dof = 6;
+  fused.pose_map_base.q_xyzw[1] = std::sqrt(0.5);  // the nose points straight down
+  fused.pose_map_base.q_xyzw[3] = std::sqrt(0.5);
+  for (int i = 0; i < 6; i++) fused.covariance[wm_cov_index(i, i)] = 0.01;
+  TEST_ASSERT_EQUAL(WM_OK, wm_odometry_carry(odom, &fused, make::at(1.05), &out, nullptr));
+  const double turn = 0.5 * 0.55;
+  // Body z is map x there, body y is map y; a roll turns y towards z.
+  const double y = (0.2 * std::sin(turn) - (1 - std::cos(turn))) / 0.5,
+               z = (std::sin(turn) + 0.2 * (1 - std::cos(turn))) / 0.5;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, z, out.pose_map_base.p_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, y, out.pose_map_base.p_m[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0, out.pose_map_base.p_m[2]);
+  const double *q = out.pose_map_base.q_xyzw;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, std::sqrt(0.5) * std::sin(0.5 * turn), q[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, std::sqrt(0.5) * std::cos(0.5 * turn), q[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, std::sqrt(0.5) * std::cos(0.5 * turn), q[3]);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.01, out.covariance[wm_cov_index(0, 0)]);
+  TEST_ASSERT_EQUAL_DOUBLE(out.covariance[wm_cov_index(0, 4)], out.covariance[wm_cov_index(4, 0)]);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_half_a_circle_by_twists);
@@ -153,5 +183,6 @@ int main(void) {
   RUN_TEST(test_calibration_holds_from_now_on_and_nothing_jumps);
   RUN_TEST(test_carry_moves_mean_and_covariance);
   RUN_TEST(test_a_copy_continues_identically);
+  RUN_TEST(test_a_pose_in_space_is_carried_in_space);
   return UNITY_END();
 }
