@@ -55,6 +55,15 @@ bool invert_positive(const double a[kAlignStates][kAlignStates], int n, double o
   return true;
 }
 
+bool on_a_line(const wm_points &points, uint32_t i) {
+  if (i == 0 || i + 1 >= points.count) return false;
+  const double ax = (double)points.x_m[i - 1], ay = (double)points.y_m[i - 1];
+  const double bx = (double)points.x_m[i + 1], by = (double)points.y_m[i + 1];
+  const double x = (double)points.x_m[i], y = (double)points.y_m[i];
+  const double length2 = square(bx - ax) + square(by - ay), across = (bx - ax) * (y - ay) - (by - ay) * (x - ax);
+  return length2 < square(0.6) && square(across) < square(0.03 + 0.005 * (x * x + y * y)) * length2;
+}
+
 double align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, double gate_m, double explained_m,
                   int iterations, wm_pose2 *pose) {
   int explained = 0;

@@ -24,13 +24,18 @@ enum align_state {
 struct normal_equations {
   double information[kAlignStates][kAlignStates];
   double gradient[kAlignStates];  // towards the better
-  int seen;                       // points looked up
+  double cost;                    // half of the weighted squares, as Student has them; what finds no edge pays the gate
+  int seen;                       // points that are explained or lie on a line
   int explained;                  // of them: as near to an edge as they may be
 };
 
 // Solves A x = b for a symmetric positive definite A of n <= kAlignStates rows; false where it isn't.
 bool solve_positive(const double a[kAlignStates][kAlignStates], const double *b, int n, double *x);
 bool invert_positive(const double a[kAlignStates][kAlignStates], int n, double out[kAlignStates][kAlignStates]);
+
+// Whether a point lies between its neighbours, as an edge's do. What noise and reflections leave is scattered, and
+// unexplained without saying anything about the pose.
+bool on_a_line(const wm_points &points, uint32_t i);
 
 // Aligns points in base_link by the pose alone, from `pose` on; returns the share of points explained there. For
 // candidates of a search. O(iterations * points).

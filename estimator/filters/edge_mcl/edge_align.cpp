@@ -8,6 +8,9 @@ namespace wm {
 namespace {
 
 constexpr int kRounds = 4;
+constexpr double kStartStep_m = 0.12, kStartSigmas = 2.5;
+constexpr int kStartsMax = 6;  // on each side
+constexpr double kDoubtOdds = -1.5;
 
 }  // namespace
 
@@ -53,8 +56,12 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
     }
     const double rx = h.cos * p.x - h.sin * p.y, ry = h.sin * p.x + h.cos * p.y;  // from base_link then, in map axes
     const double x = then.pose.x_m + rx, y = then.pose.y_m + ry;
-    out->seen++;
+    const int before = out->explained;
+    out->seen += on_a_line(points, i);
     edge_line line = map_.nearest(x, y);
+    const double sigma2 = square(point_sigma(points, i, a.camera)) + square(params_.point_sigma_m);
+    const double none = 2.5 * log(1.0 + square(params_.gate_m) / (4.0 * sigma2)) / params_.correlated;
+    out->cost += none;
     if (!line.found || line.distance_m > gate_m) continue;
     // What is seen of an edge is the floor on this side of it: its normal points away.
     if (line.normal_x * (x - eye_x) + line.normal_y * (y - eye_y) < 0.0) {
@@ -66,10 +73,12 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
       const sin_cos n = sincos((double)points.normal_rad[i] + then.pose.heading_rad);
       if (n.cos * line.normal_x + n.sin * line.normal_y < cos_gate) continue;
     }
-    const double sigma2 = square(point_sigma(points, i, a.camera)) + square(params_.point_sigma_m);
     const double residual = line.offset_m - (edge_state_ >= 0 ? a.value[kAlignEdge] : 0.0);
     const double misfit = residual * residual / sigma2;
+    const double cost = 2.5 * log(1.0 + 0.25 * misfit) / params_.correlated;
+    if (cost < none) out->cost += cost - none;
     out->explained += line.distance_m < 0.06 || misfit < 9.0;
+    out->seen += out->explained > before && !on_a_line(points, i);
 
     double row[kAlignStates] = {};
     row[kAlignX] = line.normal_x;
@@ -92,6 +101,71 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
   }
 }
 
+// Gauss-Newton from a.value on; the cost of prediction and scan together where it ends, equations there.
+double edge_mcl::descend(const wm_points &points, const alignment &prior,
+                         const double inverse[kAlignStates][kAlignStates], const int *index, int n, double slack_m,
+                         alignment *a, normal_equations *e) const {
+  const auto off = [&](int k) {
+    const double d = prior.value[index[k]] - a->value[index[k]];
+    return index[k] == kAlignHeading ? wrap(d) : d;
+  };
+  for (int round = 0; round < kRounds; round++) {
+    // From as far as the pose may be off down to the gate.
+    const double gate = params_.gate_m + (round < 2 ? slack_m : 0.0);
+    accumulate(points, *a, gate > 0.5 ? 0.5 : gate, e);
+    if (round + 1 == kRounds) break;
+    double total[kAlignStates][kAlignStates], right[kAlignStates], step[kAlignStates];
+    for (int r = 0; r < n; r++) {
+      right[r] = e->gradient[index[r]];
+      for (int c = 0; c < n; c++) {
+        total[r][c] = inverse[r][c] + e->information[index[r]][index[c]];
+        right[r] += inverse[r][c] * off(c);
+      }
+    }
+    if (!solve_positive(total, right, n, step)) break;
+    for (int r = 0; r < n; r++) a->value[index[r]] += step[r];
+    a->value[kAlignHeading] = wrap(a->value[kAlignHeading]);
+  }
+  double cost = e->cost;
+  for (int r = 0; r < n; r++)
+    for (int c = 0; c < n; c++) cost += 0.5 * off(r) * inverse[r][c] * off(c);
+  return cost;
+}
+
+// A scan has several places where it fits nearly (doors, pillars). Where the prediction is sure it says which; along an
+// axis that it isn't sure of, every step of half a door's depth is a start, and the least cost decides.
+void edge_mcl::descend_from_several(const wm_points &points, const alignment &prior,
+                                    const double inverse[kAlignStates][kAlignStates], const int *index, int n,
+                                    alignment *best, normal_equations *e) const {
+  const double xx = filter_.variance(kX), yy = filter_.variance(kY), xy = filter_.covariance(kX, kY);
+  const double half = 0.5 * (xx + yy), spread = std::sqrt(square(0.5 * (xx - yy)) + square(xy));
+  const double sigma = std::sqrt(half + spread), angle = 0.5 * atan2(2.0 * xy, xx - yy);
+  const sin_cos axis = sincos(angle);
+  double step = kStartStep_m;
+  int sides = (int)(kStartSigmas * sigma / step);
+  if (sides > kStartsMax) {
+    sides = kStartsMax;
+    step = kStartSigmas * sigma / sides;
+  }
+  const double slack = sides > 0 ? step : 3.0 * std::sqrt(half + spread + 9.0 * filter_.variance(kHeading));
+  double least = 0.0;
+  for (int k = -sides; k <= sides; k++) {
+    // The prediction's mean, given that it is k steps along the axis.
+    alignment a = prior;
+    for (int i = 0; i < n; i++) {
+      const int state = prior.state[index[i]];
+      const double shared = axis.cos * filter_.covariance(state, kX) + axis.sin * filter_.covariance(state, kY);
+      a.value[index[i]] += k * step * shared / square(sigma);
+    }
+    normal_equations found;
+    const double cost = descend(points, prior, inverse, index, n, slack, &a, &found);
+    if (k > -sides && cost >= least) continue;
+    least = cost;
+    *best = a;
+    *e = found;
+  }
+}
+
 // Iterated: minimises the prediction's and the scan's misfit together, then takes in what the scan says there as scalar
 // measurements, one for each row of the information's factor. Source: the iterated extended Kalman filter (B. M. Bell,
 // F. W. Cathey, "The iterated Kalman filter update as a Gauss-Newton method", 1993), in information form.
@@ -106,30 +180,12 @@ bool edge_mcl::align(const wm_points &points, int camera, wm_innovation *record)
     for (int c = 0; c < n; c++) covariance[r][c] = filter_.covariance(a.state[index[r]], a.state[index[c]]);
   if (!invert_positive(covariance, n, inverse)) return false;
 
-  const double sigma_xy = std::sqrt(filter_.variance(kX) + filter_.variance(kY) + 9.0 * filter_.variance(kHeading));
   normal_equations e;
-  for (int round = 0; round < kRounds; round++) {
-    // From as far as the pose may be off down to the gate.
-    const double wide = params_.gate_m + (round < 2 ? 3.0 * sigma_xy : 0.0);
-    accumulate(points, a, wide > 0.5 ? 0.5 : wide, &e);
-    if (round + 1 == kRounds) break;
-    double total[kAlignStates][kAlignStates], right[kAlignStates], step[kAlignStates];
-    for (int r = 0; r < n; r++) {
-      right[r] = e.gradient[index[r]];
-      for (int c = 0; c < n; c++) {
-        double off = prior.value[index[c]] - a.value[index[c]];
-        if (index[c] == kAlignHeading) off = wrap(off);
-        total[r][c] = inverse[r][c] + e.information[index[r]][index[c]];
-        right[r] += inverse[r][c] * off;
-      }
-    }
-    if (!solve_positive(total, right, n, step)) return false;
-    for (int r = 0; r < n; r++) a.value[index[r]] += step[r];
-    a.value[kAlignHeading] = wrap(a.value[kAlignHeading]);
-  }
+  descend_from_several(points, prior, inverse, index, n, &a, &e);
   record->observed = e.seen > 0 ? (double)e.explained / e.seen : 0.0;
   record->expected = explained_;
   record->gate_dof = 3;
+  record->gate = e.seen;
   record->verdict = e.explained < 5 ? (uint8_t)WM_REJECTED_SINGULAR : (uint8_t)WM_FUSED;
   if (e.explained < 5) return false;
 
@@ -168,7 +224,9 @@ bool edge_mcl::align(const wm_points &points, int camera, wm_innovation *record)
       record->variance = projected.variance + 1.0 / d[i];
       record->nis = innovation * innovation / record->variance;
     }
-    filter_.update(projected, innovation, 1.0 / d[i]);
+    // In doubt of the pose a scan teaches nothing of sensors and camera.
+    filter_.update(projected, innovation, 1.0 / d[i], kPoseStates,
+                   lost_odds_ > kDoubtOdds ? filter_.states() : kPoseStates);
   }
   pull_cloud(e);
   return true;

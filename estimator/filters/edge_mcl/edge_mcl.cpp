@@ -11,6 +11,7 @@ namespace wm {
 namespace {
 
 constexpr double kClassSigma_m[kSigmaClasses] = {0.01, 0.03, 0.06, 0.12};  // of a point; the last: and above
+constexpr double kNewView_m = 0.4;
 constexpr double kFarthest_m = 1000.0;
 constexpr double kCluster_m = 0.5, kCluster_rad = 0.35;
 constexpr size_t kAlign = 64;
@@ -64,7 +65,11 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   for (int k = 0; k < kSigmaClasses; k++) sigma[k] = std::sqrt(square(params.sigma_m) + square(kClassSigma_m[k]));
   make_score_table(map_, sigma, params.floor, params.weight == EDGE_MCL_SUM, &table_);
   search_.init(map_);
-  fused_ns_ = watched_ns_ = WM_TIME_NONE;
+  usual_ = params.lost_explained;
+  fused_ns_ = watched_ns_ = remembered_ns_ = WM_TIME_NONE;
+  remember_calibration();
+  remembered_ns_ = WM_TIME_NONE;
+  remember_calibration();
   start_again(start_is_known(setup.start));
 }
 
@@ -82,6 +87,8 @@ void edge_mcl::start_again(bool known) {
   fused_ns_ = WM_TIME_NONE;
   explained_ = params_.lost_explained;
   apart_s_ = 0.0;
+  seeded_m_ = -1.0;
+  on_trial_ = false;
   lost_odds_ = known ? -4.0 : 6.0;
   state_ = known ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
   resets_++;
@@ -130,16 +137,15 @@ wm_status edge_mcl::take_points(const wm_event &event, wm_innovation *out, size_
 
   const int camera = camera_of(points);
   prepare(points, camera);
-  move_cloud();
-  weigh_cloud();
+  weigh_cloud(move_cloud());
   wm_innovation record{};
   record.t_ns = event.t_ns;
   record.source = event.source;
   record.landmark_id = -1;
   record.residual = WM_RESIDUAL_PIXEL;
   if (align(points, camera, &record)) fused_ns_ = event.t_ns;
-  watch(record.observed, scan_.count, dt);
-  search_.see(scan_, filter_.odom());
+  watch(record.observed, (int)record.gate, dt);
+  search_.see(lined_, filter_.odom());
   if (state_ == WM_STATE_TRACKING)
     heed_cloud();
   else
@@ -193,9 +199,20 @@ void edge_mcl::prepare(const wm_points &points, int camera) {
   scan_.count = next;
   scan_.reach_m = (float)reach;
   for (int i = next; i < next + kScanLanes; i++) scan_.x_m[i] = scan_.y_m[i] = 0.0f;
+
+  lined_.count = 0;
+  for (uint32_t i = 0; i < points.count; i++) {
+    floor_point p{(double)points.x_m[i], (double)points.y_m[i], {}, {}};
+    if (!on_a_line(points, i)) continue;
+    if (camera >= 0 && (camera_[camera].range(p.x, p.y) > params_.range_max_m ||
+                        !camera_[camera].correct(p.x, p.y, a.value + kAlignCamera, &p)))
+      continue;
+    lined_.x_m[lined_.count] = (float)(then.from_now.x_m + h.cos * p.x - h.sin * p.y);
+    lined_.y_m[lined_.count++] = (float)(then.from_now.y_m + h.sin * p.x + h.cos * p.y);
+  }
 }
 
-void edge_mcl::move_cloud() {
+double edge_mcl::move_cloud() {
   const wm_pose2 increment = between(cloud_odom_, filter_.odom());
   const double way = filter_.travelled_m() - cloud_travelled_m_, turn = filter_.turned_rad() - cloud_turned_rad_;
   const double dt = cloud_ns_ == WM_TIME_NONE ? 0.0 : wm_seconds_between(cloud_ns_, filter_.now_ns());
@@ -203,18 +220,21 @@ void edge_mcl::move_cloud() {
   cloud_travelled_m_ = filter_.travelled_m();
   cloud_turned_rad_ = filter_.turned_rad();
   cloud_ns_ = filter_.now_ns();
-  if (way <= 0.0 && turn <= 0.0) return;  // a robot at rest stays where it is
+  if (way <= 0.0 && turn <= 0.0) return 0.0;  // a robot at rest stays where it is
   step_noise noise;
   noise.along_m = params_.noise_way * std::sqrt(way);
   noise.across_m = params_.noise_side * std::sqrt(way);
   noise.turn_rad = std::sqrt(square(params_.noise_turn) * way + square(params_.noise_turn_rest) * dt +
                              square(params_.noise_turn_rel) * turn);
   cloud_.move(increment, noise);
+  return way + 0.5 * turn;
 }
 
-void edge_mcl::weigh_cloud() {
+// Lost, many places are compared over many scans: what is seen from nearly the same place says nearly the same.
+void edge_mcl::weigh_cloud(double way_m) {
   if (scan_.count == 0) return;
-  if (!cloud_.weigh(map_, scan_, table_, params_.exponent, params_.weight == EDGE_MCL_SUM)) return;
+  const double share = state_ == WM_STATE_TRACKING || way_m > kNewView_m ? 1.0 : way_m / kNewView_m;
+  if (!cloud_.weigh(map_, scan_, table_, share * params_.exponent, params_.weight == EDGE_MCL_SUM)) return;
   if (cloud_.effective() < params_.resample_below * cloud_.count()) cloud_.resample();
 }
 

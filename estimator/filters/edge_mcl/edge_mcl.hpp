@@ -48,17 +48,25 @@ class edge_mcl {
   int camera_of(const wm_points &points) const;
   double point_sigma(const wm_points &points, uint32_t i, int camera) const;
   void prepare(const wm_points &points, int camera);
-  void move_cloud();
-  void weigh_cloud();
+  double move_cloud();  // returns the way
+  void weigh_cloud(double way_m);
   alignment alignment_of(int camera) const;
   taken_from look_back(const alignment &a) const;
   void accumulate(const wm_points &points, const alignment &a, double gate_m, normal_equations *out) const;
+  double descend(const wm_points &points, const alignment &prior, const double inverse[kAlignStates][kAlignStates],
+                 const int *index, int n, double slack_m, alignment *a, normal_equations *e) const;
+  void descend_from_several(const wm_points &points, const alignment &prior,
+                            const double inverse[kAlignStates][kAlignStates], const int *index, int n, alignment *best,
+                            normal_equations *e) const;
   bool align(const wm_points &points, int camera, wm_innovation *record);
   void pull_cloud(const normal_equations &equations);
   void watch(double explained, int seen, double dt_s);
   void heed_cloud();
   void search();
-  void take_place(const place &p);
+  void seed_cloud();
+  void take_place(const wm_pose2 &pose);
+  void remember_calibration();
+  void restore_calibration();
 
   const wm_setup *setup_;
   wm_edge_mcl_params params_;
@@ -66,21 +74,30 @@ class edge_mcl {
   edge_map map_;
   cloud cloud_;
   score_table table_;
-  scan_points scan_;
+  scan_points scan_, lined_;  // all, and those that lie on a line with their neighbours
   place_search search_;
   floor_camera camera_[kCamerasMax];
   int camera_count_;
   int camera_state_[kCamerasMax][kCameraErrors + 1];  // and the time offset
   int edge_state_;
   int calibration_states_;
+  // What was known of sensors and camera while the scans still fitted: two generations, of which the older is safe.
+  struct calibration_memory {
+    double value[kMaxStates], variance[kMaxStates];
+  };
+  calibration_memory memory_[2];
+  wm_time_ns remembered_ns_;
   wm_pose2 cloud_odom_;
   double cloud_travelled_m_, cloud_turned_rad_;
   wm_time_ns cloud_ns_, fused_ns_, watched_ns_;
   double lost_odds_;  // logarithm of
   double explained_;  // share, smoothed
+  double usual_;      // the same over a longer time, while the pose is trusted
+  double seeded_m_;   // way when the cloud was last seeded with places
   double apart_s_;    // the cloud's main cluster has been elsewhere, and better
   uint32_t resets_;
   uint8_t state_;
+  bool on_trial_;  // a place was taken, the scans have not confirmed it yet
 };
 
 }  // namespace wm

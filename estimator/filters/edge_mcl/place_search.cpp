@@ -71,20 +71,29 @@ void place_search::see(const scan_points &scan, const wm_pose2 &odom) {
   }
 }
 
-void place_search::begin(const wm_pose2 &odom) {
-  odom_ = odom;
-  all_.count = few_.count = 0;
+void place_search::gather(const wm_pose2 &odom, scan_points *out) const {
+  out->count = 0;
   const uint64_t oldest = seen_ > kKeyframes ? seen_ - kKeyframes : 0;
   for (uint64_t n = oldest; n < seen_; n++) {
     const keyframe &k = keyframes_[n % kKeyframes];
     const wm_pose2 from = between(odom, k.odom);
     const sin_cos h = sincos(from.heading_rad);
-    for (int i = 0; i < k.count && all_.count < WM_POINTS_MAX; i++) {
+    for (int i = 0; i < k.count && out->count < WM_POINTS_MAX; i++) {
       const double x = (double)k.x_m[i], y = (double)k.y_m[i];
-      all_.x_m[all_.count] = (float)(from.x_m + h.cos * x - h.sin * y);
-      all_.y_m[all_.count++] = (float)(from.y_m + h.sin * x + h.cos * y);
+      out->x_m[out->count] = (float)(from.x_m + h.cos * x - h.sin * y);
+      out->y_m[out->count++] = (float)(from.y_m + h.sin * x + h.cos * y);
     }
   }
+}
+
+double place_search::explained(const edge_map &map, const wm_pose2 &odom, wm_pose2 *pose) {
+  gather(odom, &now_);
+  return align_pose(map, now_.x_m, now_.y_m, now_.count, 0.3, 0.1, 4, pose);
+}
+
+void place_search::begin(const wm_pose2 &odom) {
+  odom_ = odom;
+  gather(odom, &all_);
   few_.count = all_.count < kSweepPoints ? all_.count : kSweepPoints;
   for (int i = 0; i < few_.count; i++) {
     const int from = (int)((int64_t)i * all_.count / few_.count);
@@ -122,7 +131,7 @@ void place_search::offer(const wm_pose2 &pose, int32_t score) {
 void place_search::refine(const edge_map &map) {
   for (int n = 0; n < kRefinedAScan && refined_ < place_count_; n++, refined_++) {
     place &p = places_[refined_];
-    (void)align_pose(map, all_.x_m, all_.y_m, all_.count, 0.4, 0.2, 6, &p.pose);
+    (void)align_pose(map, all_.x_m, all_.y_m, all_.count, 0.4, 0.2, 5, &p.pose);
     p.explained = align_pose(map, all_.x_m, all_.y_m, all_.count, 0.2, 0.1, 4, &p.pose);
     if (!map.drivable(p.pose.x_m, p.pose.y_m)) p.explained = 0.0;
   }

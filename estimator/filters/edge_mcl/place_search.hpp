@@ -31,6 +31,8 @@ class place_search {
     *count = place_count_;
     return places_;
   }
+  // Share of what was seen lately that the map explains about `pose` (base_link in map now, which is aligned).
+  double explained(const edge_map &map, const wm_pose2 &odom, wm_pose2 *pose);
   wm_pose2 odom_of_places() const { return odom_; }
   double way_m() const { return way_m_; }  // that is looked at together
 
@@ -38,6 +40,8 @@ class place_search {
   static constexpr int kKeyframes = 16, kPointsEach = 32, kSweepPoints = 96;
 
   void begin(const wm_pose2 &odom);
+  // Points of all keyframes in base_link at `odom`.
+  void gather(const wm_pose2 &odom, scan_points *out) const;
   void offer(const wm_pose2 &pose, int32_t score);
   void refine(const edge_map &map);
 
@@ -51,6 +55,7 @@ class place_search {
   double way_m_;
   score_table wide_;
   scan_points all_, few_;  // in base_link at odom_
+  scan_points now_;        // work space
   wm_pose2 odom_;
   bool running_;
   int64_t next_;  // pose of the sweep
