@@ -168,6 +168,22 @@ static wm_status read_sensors(const wm_yaml_node *sensors, const warner *warn, c
   return WM_OK;
 }
 
+// A camera that sees coded markers is a sensor, whether or not it is named among them.
+static void add_marker_cameras(calibration *out) {
+  for (uint32_t i = 0; i < out->rig.camera_count; i++) {
+    const wm_camera *camera = &out->rig.cameras[i];
+    int known = 0;
+    for (size_t k = 0; k < out->sensor_count; k++) known |= strcmp(out->sensors[k].name, camera->name) == 0;
+    if (known || out->sensor_count == WM_SENSORS_MAX) continue;
+    wm_sensor *sensor = &out->sensors[out->sensor_count++];
+    memset(sensor, 0, sizeof *sensor);
+    memcpy(sensor->name, camera->name, sizeof sensor->name);
+    sensor->mounting = camera->mounting;
+    sensor->bearing_sigma_rad = sensor->range_sigma_m = (double)NAN;
+    sensor->max_range_m = HUGE_VAL;
+  }
+}
+
 // actuator_mm against road_wheel_rad: two lists of one length, the positions rising (or falling: then turned round).
 static wm_status read_steering_table(const wm_yaml_node *table, const warner *warn, wm_wheels *out, wm_error *err) {
   static const char *const kKeys[] = {"actuator_mm", "road_wheel_rad", "road_wheel_deg", NULL};
@@ -266,5 +282,6 @@ wm_status calibration_read(const wm_yaml *doc, const warner *warn, calibration *
   TRY(read_wheels(&wheels, warn, &out->wheels, err));
   if (wm_yaml_there(&stereo)) TRY(read_stereo(&stereo, warn, &out->rig, err));
   TRY(read_markers(&markers, warn, &out->rig, err));
+  if (out->rig.marker_family[0]) add_marker_cameras(out);
   return read_motion6(&motion6, warn, &out->rig, err);
 }

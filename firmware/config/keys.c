@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "keys.h"
+#include "detectors.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -82,11 +83,10 @@ size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]) {
     out[count] = (config_section){all[i]->name, all[i]->about, "", &all[i]->params};
     snprintf(out[count].prefix, sizeof out[count].prefix, "%s.", all[i]->name);
   }
-  size_t detectors;
-  const wm_detector *const *seen = wm_detectors(&detectors);
-  for (size_t i = 0; i < detectors && count < CONFIG_SECTIONS_MAX; i++, count++) {
-    out[count] = (config_section){.name = seen[i]->name, .about = seen[i]->about, .table = &seen[i]->params};
-    snprintf(out[count].prefix, sizeof out[count].prefix, "vision.%s.", seen[i]->name);
+  const wm_detector *seen;
+  for (size_t i = 0; (seen = config_detector(i)) != NULL && count < CONFIG_SECTIONS_MAX; i++, count++) {
+    out[count] = (config_section){.name = seen->name, .about = seen->about, .table = &seen->params};
+    snprintf(out[count].prefix, sizeof out[count].prefix, "vision.%s.", seen->name);
   }
   return count;
 }

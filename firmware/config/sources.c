@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "detectors.h"
 #include "sources.h"
 #include "waymark/text.h"
 
@@ -24,7 +25,7 @@ static wm_status read_name(const wm_yaml_node *item, const wm_config *config, wm
   if (status != WM_OK) return status;
   snprintf(base, sizeof base, "%.*s", (int)strcspn(out->name, ":"), out->name);
   // With a sensor's name behind the colon the part before it is judged, but the whole is shown.
-  if (wm_detector_find(base)) {
+  if (config_detector_find(base)) {
     status = WM_OK;  // DETECTOR, or DETECTOR:CAMERA
   } else if (strcmp(base, out->name) == 0) {
     status = wm_yaml_choice(&name, kNames, &kind, err);

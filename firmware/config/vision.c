@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // `vision:` of a configuration: the detectors that look at pictures, and at whose.
 #include "vision.h"
+#include "detectors.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -46,7 +47,7 @@ wm_status config_read_vision(const wm_yaml_node *root, wm_config *out, wm_error 
     const char *name;
     int line;
     wm_yaml_node section = wm_yaml_value(&vision, i, &name, &line);
-    const wm_detector *detector = wm_detector_find(name);
+    const wm_detector *detector = config_detector_find(name);
     wm_status status =
         detector ? read_detector(&section, detector, line, out, err) : config_unknown(&section, line, err);
     if (status != WM_OK) return status;

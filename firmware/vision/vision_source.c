@@ -106,6 +106,8 @@ static wm_status look(vision_source *self, wm_error *err) {
     event->as.looked.sensor = self->sensor;
   }
   for (size_t i = 0; i < self->event_count; i++) {
+    if (self->events[i].kind == WM_EVENT_MARKER) self->events[i].as.marker.sensor = self->sensor;
+    if (self->events[i].kind == WM_EVENT_SIGHTING) self->events[i].as.sighting.sensor = self->sensor;
     self->events[i].arrival_ns = arrival_ns;
     self->events[i].source = self->base.index;
     self->events[i].seq = self->seq++;

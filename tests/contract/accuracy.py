@@ -185,6 +185,20 @@ def park():
             run(recording, "victoria-park", "--against", "gnss", "--align", "se2", *options)["position_rmse_m"], most=4.2)
 
 
+def office():
+    """Markers on a ceiling, from pixels and CAN; nothing of the map is given."""
+    recording = DATA / "office-a"
+    plain = run(recording, "office")
+    bar("office: position RMSE", plain["position_rmse_m"], most=0.02)
+    bar("office: heading RMSE", plain["heading_rmse_deg"], most=0.4)
+    bar("office: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
+    bar("office: markers found", plain["landmarks_found"], least=plain["landmarks_total"])
+    bar("office: marker RMSE", plain["landmark_rmse_m"], most=0.015)
+    scaled_ = run(recording, "office", "--align", "sim2")
+    bar("office: position RMSE, aligned with scale", scaled_["position_rmse_m"], most=0.01)
+    bar("office: marker RMSE, aligned with scale", scaled_["landmark_rmse_m"], most=0.01)
+
+
 def comma():
     recording = DATA / "comma2k19-a"
     plain = run(recording, "comma2k19")
@@ -228,7 +242,7 @@ def ranges_and_fixes():
 
 
 def main():
-    names = ["starry-night-plan-a", "starry-night-stereo-a", "comma2k19-a", "victoria-park-a", "labyrinth-uwb",
+    names = ["starry-night-plan-a", "starry-night-stereo-a", "comma2k19-a", "victoria-park-a", "office-a", "labyrinth-uwb",
              "smartloc-potsdamer-a", *(f"mrclam-d6-r{i}" for i in range(1, 6))]
     missing = [n for n in names if not (DATA / n).is_dir()]
     if missing:
@@ -238,6 +252,7 @@ def main():
     mrclam()
     slam()
     park()
+    office()
     comma()
     stereo()
     ranges_and_fixes()

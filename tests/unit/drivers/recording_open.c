@@ -119,7 +119,8 @@ static void whole_calibration(void) {
   open_it();
   size_t count;
   const wm_sensor *sensors = wm_recording_sensors(recording, &count);
-  TEST_ASSERT_EQUAL(3, count);
+  TEST_ASSERT_EQUAL(3 + 5, count);  // with coded markers the other cameras are sensors, too
+  TEST_ASSERT_EQUAL_STRING("a", sensors[3].name);
   TEST_ASSERT_EQUAL_DOUBLE(9, sensors[2].mounting.xyz_m[0]);  // the camera's of the same name
   TEST_ASSERT_EQUAL_STRING("laser", sensors[0].name);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, M_PI / 2, sensors[0].mounting.rpy_rad[1]);

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// Detector `apriltag` on drawn pictures of markers of known pose: place, direction, distance, and that the growing of
+// white which a camera's response makes doesn't change the distance.
+#include <apriltag/apriltag.h>
+#include <apriltag/tag36h11.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "unity.h"
+#include "waymark/detectors.h"
+
+namespace {
+
+constexpr int kWidth = 640, kHeight = 480, kTag = 23;
+constexpr double kSize_m = 0.2;
+
+const wm_detector *detector;
+std::vector<char> params;
+wm_rig rig;
+void *state;
+std::vector<double> light;
+std::vector<uint8_t> grey;
+
+// The camera looks up (pitch -90 degrees); the print hangs level at (x, y, z) of the camera's body, turned by `yaw`.
+struct pose {
+  double x, y, z, yaw;
+};
+
+// u, v from -1 to 1 over the black square, v down. The library draws its tags upside down, as readers of the format see
+// them (the order of ArUco's corners).
+double print_at(image_u8_t *tag, double u, double v) {
+  const int modules = tag->width;  // with the white rim
+  const double cells = modules - 2;
+  const int i = (int)std::floor((1 - u) / 2 * cells + 1), j = (int)std::floor((1 - v) / 2 * cells + 1);
+  if (i < 0 || j < 0 || i >= modules || j >= modules) return 0.5;
+  return tag->buf[j * tag->stride + i] ? 0.9 : 0.1;
+}
+
+// Light by 5 x 5 samples a pixel and a blur; `gamma` bends it into grey levels, which makes white grow.
+void draw(const pose &p, double gamma) {
+  apriltag_family_t *family = tag36h11_create();
+  image_u8_t *tag = apriltag_to_image(family, kTag);
+  const wm_camera &c = rig.cameras[0];
+  light.assign(kWidth * kHeight, 0.0);
+  for (int row = 0; row < kHeight; row++)
+    for (int column = 0; column < kWidth; column++)
+      for (int k = 0; k < 25; k++) {
+        const double px = column + (k % 5 - 2) / 5.0, py = row + (k / 5 - 2) / 5.0;
+        // Body: x forward (up), y left, z up of the body; optical x = -y, y = -z.
+        const double rx = (px - c.intrinsics[2]) / c.intrinsics[0], ry = (py - c.intrinsics[3]) / c.intrinsics[1];
+        const double dy = -rx * p.x - p.y, dz = -ry * p.x - p.z;  // on the print's plane, from its centre
+        // Seen from above (levelled: x = -z of the body, y = y): the print's upper edge points along yaw; seen from
+        // below its "down" is to the right of that by the reader's eye, which looks up.
+        const double lx = -dz, ly = dy;
+        const double u = (std::cos(p.yaw) * lx + std::sin(p.yaw) * ly) / (0.5 * kSize_m);
+        const double v = (-std::sin(p.yaw) * lx + std::cos(p.yaw) * ly) / (0.5 * kSize_m);
+        light[(size_t)(row * kWidth + column)] += print_at(tag, u, v) / 25.0;
+      }
+  for (int pass = 0; pass < 2; pass++) {  // [1 2 1] twice, both ways
+    std::vector<double> from = light;
+    for (int i = kWidth + 1; i < kWidth * kHeight - kWidth - 1; i++) {
+      double sum = 0.0;
+      for (int a = -1; a <= 1; a++)
+        for (int b = -1; b <= 1; b++) sum += from[(size_t)(i + a * kWidth + b)] * (2 - std::abs(a)) * (2 - std::abs(b));
+      light[(size_t)i] = sum / 16.0;
+    }
+  }
+  grey.resize(light.size());
+  for (size_t i = 0; i < light.size(); i++) grey[i] = (uint8_t)(255.0 * std::pow(light[i], gamma) + 0.5);
+  std::free(tag->buf);
+  std::free(tag);
+  tag36h11_destroy(family);
+}
+
+void begin() {
+  size_t count;
+  detector = wm_library_detectors(&count)[0];
+  params.assign(detector->params.bytes, 0);
+  wm_params_defaults(&detector->params, params.data());
+  wm_rig_init(&rig);
+  rig.camera_count = 1;
+  wm_camera &c = rig.cameras[0];
+  std::strcpy(c.name, "ceiling");
+  c.model = WM_CAMERA_PINHOLE_RADTAN;
+  c.width_px = kWidth;
+  c.height_px = kHeight;
+  c.intrinsics_count = 4;
+  const double k[4] = {450, 452, 322.5, 237.0};
+  std::memcpy(c.intrinsics, k, sizeof k);
+  c.mounting.rpy_rad[1] = -1.5707963267948966;
+  std::strcpy(rig.marker_family, "tag36h11");
+  rig.marker_size_m = kSize_m;
+  static const int32_t cameras[1] = {0};
+  static wm_view view;
+  view = {&rig, cameras};
+  const char *why = "";
+  const size_t bytes = detector->state_bytes(params.data(), &view, &why);
+  TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
+  std::free(state);
+  state = std::aligned_alloc(64, (bytes + 63) / 64 * 64);
+  TEST_ASSERT_EQUAL(WM_OK, detector->init(state, params.data(), &view));
+}
+
+size_t look(wm_event *out) {
+  wm_frame frame{};
+  frame.t_ns = 5;
+  frame.width_px = kWidth;
+  frame.height_px = kHeight;
+  frame.stride_bytes = kWidth;
+  frame.grey = grey.data();
+  size_t count = 9;
+  TEST_ASSERT_EQUAL(WM_OK, detector->detect(state, &frame, nullptr, out, 4, &count));
+  return count;
+}
+
+void test_place_direction_and_distance_are_right_whatever_the_response(void) {
+  for (double gamma : {1.0, 0.5})
+    for (double yaw : {0.3, -2.4}) {
+      begin();
+      const pose want = {2.26, 0.5, -0.3, yaw};
+      draw(want, gamma);
+      wm_event seen[4];
+      for (int i = 0; i < 3; i++) TEST_ASSERT_EQUAL(1, look(seen));
+      const wm_marker &m = seen[0].as.marker;
+      TEST_ASSERT_EQUAL(WM_EVENT_MARKER, seen[0].kind);
+      TEST_ASSERT_EQUAL(kTag, m.id);
+      TEST_ASSERT_EQUAL_INT64(5, seen[0].t_ns);
+      TEST_ASSERT_DOUBLE_WITHIN(0.007 * want.x, want.x, m.p_m[0]);  // outer edges alone: 0.02
+      TEST_ASSERT_DOUBLE_WITHIN(0.004, want.y, m.p_m[1]);
+      TEST_ASSERT_DOUBLE_WITHIN(0.004, want.z, m.p_m[2]);
+      TEST_ASSERT_DOUBLE_WITHIN(0.006, 0.0, std::remainder(m.yaw_rad - yaw, 6.283185307179586));
+    }
+}
+
+void test_an_empty_picture_and_one_of_another_size(void) {
+  begin();
+  grey.assign(kWidth * kHeight, 128);
+  wm_event seen[4];
+  TEST_ASSERT_EQUAL(0, look(seen));
+  wm_frame frame{};
+  frame.width_px = 32;
+  frame.height_px = 32;
+  frame.stride_bytes = 32;
+  frame.grey = grey.data();
+  size_t count = 9;
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, detector->detect(state, &frame, nullptr, seen, 4, &count));
+  TEST_ASSERT_EQUAL(0, count);
+}
+
+void test_what_it_lacks_is_said(void) {
+  begin();
+  static const int32_t cameras[1] = {0};
+  const wm_view view = {&rig, cameras};
+  const char *why = "";
+  rig.marker_size_m = std::nan("");
+  TEST_ASSERT_EQUAL(0, detector->state_bytes(params.data(), &view, &why));
+  TEST_ASSERT_NOT_NULL(std::strstr(why, "size_m"));
+  std::strcpy(rig.marker_family, "mr");
+  TEST_ASSERT_EQUAL(0, detector->state_bytes(params.data(), &view, &why));
+  TEST_ASSERT_NOT_NULL(std::strstr(why, "family"));
+}
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_place_direction_and_distance_are_right_whatever_the_response);
+  RUN_TEST(test_an_empty_picture_and_one_of_another_size);
+  RUN_TEST(test_what_it_lacks_is_said);
+  std::free(state);
+  return UNITY_END();
+}
