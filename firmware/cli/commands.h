@@ -13,6 +13,7 @@ int command_run(int argc, char *const *argv);
 int command_replay(int argc, char *const *argv);
 int command_check(int argc, char *const *argv);
 int command_record(int argc, char *const *argv);
+int command_watch(int argc, char *const *argv);
 int command_doctor(int argc, char *const *argv);
 
 // ── shared by the commands ──────────────────────────────────────────────────────────────────────────────────────────

@@ -16,6 +16,7 @@ static const char kHelp[] =
     "  run       localize live, on the robot's devices or a recording at real speed; poses over LCM\n"
     "  replay    localize from a recording or an event log, as fast as it goes\n"
     "  record    write what the robot's devices say into a recording\n"
+    "  watch     show a run as it goes, in a terminal\n"
     "  check     say what can be known of a configuration and a recording before driving\n"
     "  doctor    say what is wrong with this computer, and how to mend it\n"
     "  help      this text; `waymark COMMAND --help` tells more\n"
@@ -30,11 +31,8 @@ static const char kHelp[] =
 static const struct {
   const char *name;
   int (*run)(int argc, char *const *argv);
-} kCommands[] = {{"run", command_run},
-                 {"replay", command_replay},
-                 {"check", command_check},
-                 {"record", command_record},
-                 {"doctor", command_doctor}};
+} kCommands[] = {{"run", command_run},       {"replay", command_replay}, {"check", command_check},
+                 {"record", command_record}, {"watch", command_watch},   {"doctor", command_doctor}};
 #define COMMANDS (sizeof kCommands / sizeof kCommands[0])
 
 // Programs named waymark-COMMAND in this one's folder, then in PATH, as git finds its own. Returns only if there is
@@ -72,8 +70,8 @@ int main(int argc, char **argv) {
     if (strcmp(command, kCommands[i].name) == 0) return kCommands[i].run(argc - 2, argv + 2);
 
   try_external(command, argv + 1);
-  static const char *const kNames[] = {"run",  "replay", "record",   "check", "doctor", "help",
-                                       "eval", "report", "simulate", "diff",  NULL};
+  static const char *const kNames[] = {"run",  "replay", "record", "watch",    "check", "doctor",
+                                       "help", "eval",   "report", "simulate", "diff",  NULL};
   const char *nearest = wm_word_nearest(command, kNames);
   if (nearest && strcmp(nearest, command) != 0) {
     (void)fprintf(stderr, "waymark: '%s' is no command; did you mean '%s'? (waymark help lists them)\n", command,

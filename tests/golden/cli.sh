@@ -35,7 +35,7 @@ expect 0 "example:" --help
 expect 0 "waymark " --version
 expect 2 "did you mean 'replay'" repaly
 expect 2 "'dance' is no command" dance
-for command in run replay check doctor record; do expect 0 "example:" "$command" --help; done
+for command in run replay check doctor record watch; do expect 0 "example:" "$command" --help; done
 
 expect 2 "replay needs a recording" replay
 expect 2 "replay needs --out" replay "$work/rec"

@@ -17,6 +17,7 @@ import sys
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 POSITION_M, HEADING_DEG = 0.02, 0.2
+PLAYER_M, PLAYER_DEG = 0.1, 0.5
 
 
 def boot(work, script, *devices):
@@ -104,12 +105,22 @@ def judge_can(work, waymark, recording):
         failures.append("the guest's log doesn't give its poses bit by bit")
     subprocess.run([waymark, "replay", recording, "--config", ROOT / "config/crossing-odometry.yaml", "--out", work / "desk"],
                    check=True, stdout=subprocess.DEVNULL)
-    guest, desk = poses(out / "drive/trajectory.csv"), poses(work / "desk/trajectory.csv")
-    worst_m, worst_deg, worst_ms = worst_difference(guest, desk)
-    print(f"can: {len(guest)} poses in the guest, {len(desk)} at the desk: at most {worst_m:.4f} m and {worst_deg:.4f} "
-          f"degrees apart; the player was off its times by {worst_ms:.1f} ms at most")
-    if len(guest) != len(desk) or worst_m > POSITION_M or worst_deg > HEADING_DEG:
-        failures.append("the guest's poses are not the desk's")
+    heard = work / "heard"
+    shutil.rmtree(heard, ignore_errors=True)
+    shutil.copytree(recording, heard)
+    shutil.copy(out / "heard.log", heard / "can.log")
+    subprocess.run([waymark, "replay", heard, "--config", ROOT / "config/crossing-odometry.yaml", "--out", work / "witness"],
+                   check=True, stdout=subprocess.DEVNULL)
+    guest = poses(out / "drive/trajectory.csv")
+    for name, limit_m, limit_deg, what in (
+            ("witness", POSITION_M, HEADING_DEG, "what candump heard beside it"),
+            ("desk", PLAYER_M, PLAYER_DEG, "the recording itself, whose times the player can't keep")):
+        other = poses(work / name / "trajectory.csv")
+        worst_m, worst_deg, worst_ms = worst_difference(guest, other)
+        print(f"can: {len(guest)} poses in the guest, {len(other)} by {what}: at most {worst_m:.5f} m and "
+              f"{worst_deg:.5f} degrees apart, stamps {worst_ms:.3f} ms")
+        if len(guest) != len(other) or worst_m > limit_m or worst_deg > limit_deg:
+            failures.append(f"the guest's poses are not those by {what}")
     return failures
 
 

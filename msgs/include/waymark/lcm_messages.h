@@ -26,6 +26,9 @@ size_t wm_lcm_health(const wm_health *health, void *out, size_t capacity);
 // Messages to the robot: NULL and *out (t_ns 0: now; arrival unset), or what is wrong with it. Cost fixed.
 const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *out);
 const char *wm_lcm_read_reset(const void *message, size_t length, wm_event *out);
+// Messages of a run, for who watches it: NULL, or what is wrong with it.
+const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *out);
+const char *wm_lcm_read_health(const void *message, size_t length, wm_health *out);
 // For who sends one (`t_ns` 0: now).
 size_t wm_lcm_set_pose(const wm_set_pose *pose, wm_time_ns t_ns, void *out, size_t capacity);
 

@@ -23,12 +23,16 @@ up can1
 $waymark doctor robot.yaml --seconds 0.5 >doctor.txt
 grep -q "can can0 *is up" doctor.txt || fail "the doctor doesn't see that can0 is up"
 
-echo "== drive"
+echo "== drive, with candump as a witness"
+candump -L -T 6000 can0 >heard.log &
+witness=$!
 $waymark run --config robot.yaml --out /run/drive --duration "$(cat duration)" &
 run=$!
 sleep 2
 play
 wait $run || fail "waymark run: exit code $?"
+wait $witness
+cp heard.log /host/out/
 errors=$(cat /sys/class/net/can0/statistics/rx_errors)
 [ "$errors" = 0 ] || fail "the controller lost frames: $errors"
 cp -r /run/drive /host/out/

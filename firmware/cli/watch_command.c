@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#include "commands.h"
+#include "lcm_way.h"
+#include "options.h"
+#include "watch.h"
+#include "waymark/clock.h"
+
+static const char kHelp[] =
+    "usage: waymark watch [options]\n"
+    "\n"
+    "Shows a run as it goes, from its messages: state and why, pose, what is left of dead reckoning, sources. Until\n"
+    "Ctrl-C. On a terminal the view stays in its place; into a pipe or a file it is written anew each second.\n"
+    "\n"
+    "  --url URL      LCM's (default: LCM_DEFAULT_URL, else this computer's)\n"
+    "  --prefix TEXT  of the channels (default WAYMARK_)\n"
+    "  --duration S   seconds, then stop\n"
+    "\n"
+    "example:\n"
+    "  waymark watch\n";
+
+#define SHOW_EVERY_NS (500 * WM_NS_PER_MS)
+
+static atomic_int stop;
+
+static void on_signal(int number) {
+  (void)number;
+  atomic_store(&stop, 1);
+}
+
+static void on_pose(const lcm_recv_buf_t *message, const char *channel, void *context) {
+  (void)channel;
+  watch_pose(context, message->data, message->data_size, wm_monotonic_ns());
+}
+
+static void on_health(const lcm_recv_buf_t *message, const char *channel, void *context) {
+  (void)channel;
+  watch_health(context, message->data, message->data_size, wm_monotonic_ns());
+}
+
+static watch seen;
+
+static void show(lcm_t *lcm, double duration_s) {
+  int is_terminal = isatty(STDOUT_FILENO);
+  wm_time_ns begin_ns = wm_monotonic_ns(), next_ns = begin_ns;
+  wm_time_ns end_ns = duration_s > 0 ? begin_ns + wm_ns_from_seconds(duration_s) : INT64_MAX;
+  while (!atomic_load(&stop) && wm_monotonic_ns() < end_ns) {
+    if (lcm_handle_timeout(lcm, 100) < 0) break;
+    if (wm_monotonic_ns() < next_ns) continue;
+    next_ns = wm_monotonic_ns() + (is_terminal ? SHOW_EVERY_NS : WM_NS_PER_S);
+    if (is_terminal) (void)fputs("\033[H\033[J", stdout);
+    watch_print(&seen, wm_monotonic_ns(), stdout);
+    (void)fflush(stdout);
+  }
+}
+
+int command_watch(int argc, char *const *argv) {
+  const char *url = "", *prefix = "WAYMARK_", *why;
+  double duration_s = 0;
+  int help = 0;
+  const option options[] = {{"--url", OPTION_TEXT, &url},
+                            {"--prefix", OPTION_TEXT, &prefix},
+                            {"--duration", OPTION_F64, &duration_s},
+                            {"--help", OPTION_FLAG, &help},
+                            {"-h", OPTION_FLAG, &help}};
+  wm_error err = {0};
+  size_t words;
+  char channel[96];
+  if (options_parse(argc, argv, options, sizeof options / sizeof options[0], NULL, 0, &words, &err) != WM_OK)
+    return complain(&err);
+  if (help) {
+    (void)fputs(kHelp, stdout);
+    return EXIT_DONE;
+  }
+  lcm_t *lcm = lcm_way_open(lcm_way_url(url), &why);
+  if (!lcm) {
+    (void)wm_fail(&err, WM_IO,
+                  "LCM: no way in on %s: %s (`ip route add 224.0.0.0/4 dev lo` makes a route on this computer)",
+                  lcm_way_url(url), why);
+    return complain(&err);
+  }
+  (void)snprintf(channel, sizeof channel, "%.80sPOSE", prefix);
+  (void)lcm_subscribe(lcm, channel, on_pose, &seen);
+  (void)snprintf(channel, sizeof channel, "%.80sHEALTH", prefix);
+  (void)lcm_subscribe(lcm, channel, on_health, &seen);
+  struct sigaction action = {.sa_handler = on_signal};
+  (void)sigaction(SIGINT, &action, NULL);
+  (void)sigaction(SIGTERM, &action, NULL);
+  show(lcm, duration_s);
+  lcm_destroy(lcm);
+  return EXIT_DONE;
+}

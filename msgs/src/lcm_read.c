@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// Messages of a run, read again.
+#include <string.h>
+
+#include "waymark/lcm_messages.h"
+#include "waymark_health_t.h"
+#include "waymark_pose_t.h"
+
+static int room(size_t length) { return length > INT32_MAX ? INT32_MAX : (int)length; }
+
+static void take_name(char *out, size_t capacity, const uint8_t *name, size_t length) {
+  size_t n = length < capacity ? length : capacity;
+  memcpy(out, name, n);
+  out[n - 1] = '\0';
+}
+
+const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *out) {
+  waymark_pose_t m;
+  if (waymark_pose_t_decode(message, 0, room(length), &m) < 0) return "is no pose_t of this version";
+  *out = (wm_published){.sent_ns = m.sent_ns,
+                        .fused_until_ns = m.fused_until_ns,
+                        .pose_odom_base = {m.odom_position_m[0], m.odom_position_m[1], m.odom_heading_rad},
+                        .jumps = (uint32_t)m.jumps,
+                        .last_jump_m = m.last_jump_m,
+                        .last_jump_rad = m.last_jump_rad,
+                        .status_flags = (uint32_t)m.status_flags,
+                        .deadlines_missed = (uint32_t)m.deadlines_missed,
+                        .utc_offset_ns = m.utc_offset_ns,
+                        .utc_uncertainty_ns = m.utc_uncertainty_ns};
+  wm_estimate *e = &out->now;
+  e->t_ns = m.t_ns;
+  memcpy(e->pose_map_base.p_m, m.position_m, sizeof m.position_m);
+  memcpy(e->pose_map_base.q_xyzw, m.orientation_xyzw, sizeof m.orientation_xyzw);
+  memcpy(e->covariance, m.covariance, sizeof m.covariance);
+  memcpy(e->v_mps, m.velocity_mps, sizeof m.velocity_mps);
+  memcpy(e->w_radps, m.rate_radps, sizeof m.rate_radps);
+  e->resets = (uint32_t)m.resets;
+  e->dof = (uint8_t)m.dof;
+  e->state = (uint8_t)m.state;
+  return NULL;
+}
+
+static void take_source(wm_source_health *out, const waymark_source_health_t *s) {
+  memset(out, 0, sizeof *out);
+  take_name(out->name, sizeof out->name, s->name, sizeof s->name);
+  out->received = (uint64_t)s->received;
+  out->fused = (uint64_t)s->fused;
+  for (int i = 0; i < WM_VERDICT_COUNT; i++) out->rejected[i] = (uint64_t)s->rejected[i];
+  for (int i = 0; i < WM_STATUS_COUNT; i++) out->refused[i] = (uint64_t)s->refused[i];
+  out->late = (uint64_t)s->late;
+  out->dropped = (uint64_t)s->dropped;
+  out->duplicates = (uint64_t)s->duplicates;
+  out->future = (uint64_t)s->future;
+  out->lost = (uint64_t)s->lost;
+  out->malformed = (uint64_t)s->malformed;
+  out->not_finite = (uint64_t)s->not_finite;
+  out->out_of_order = (uint64_t)s->out_of_order;
+  out->ignored = (uint64_t)s->ignored;
+  out->frozen = (uint64_t)s->frozen;
+  out->overflows = (uint64_t)s->overflows;
+  out->bus_errors = (uint64_t)s->bus_errors;
+  out->lateness_p99_ns = s->lateness_p99_ns;
+  out->lateness_max_ns = s->lateness_max_ns;
+  out->newest_ns = s->newest_ns;
+  out->silent_ns = s->silent_ns;
+  out->stamp_uncertainty_ns = s->stamp_uncertainty_ns;
+  out->stale = (uint8_t)s->stale;
+  out->device = (uint8_t)s->device;
+}
+
+const char *wm_lcm_read_health(const void *message, size_t length, wm_health *out) {
+  static _Thread_local waymark_health_t m;  // large
+  if (waymark_health_t_decode(message, 0, room(length), &m) < 0) return "is no health_t of this version";
+  memset(out, 0, sizeof *out);
+  out->t_ns = m.t_ns;
+  out->fused_until_ns = m.fused_until_ns;
+  out->state = (uint8_t)m.state;
+  out->resets = (uint32_t)m.resets;
+  out->jumps = (uint32_t)m.jumps;
+  out->motion_health = (uint32_t)m.motion_health;
+  out->loops = (uint64_t)m.loops;
+  out->deadlines_missed = (uint64_t)m.deadlines_missed;
+  out->outputs_lost = (uint64_t)m.outputs_lost;
+  out->published = (uint64_t)m.published;
+  out->reckoning_left_m = m.reckoning_left_m;
+  out->reckoning_left_s = m.reckoning_left_s;
+  for (int32_t i = 0; i < m.source_count && i < WM_HEALTH_SOURCES_MAX; i++)
+    take_source(&out->sources[out->source_count++], &m.sources[i]);
+  for (int32_t i = 0; i < m.calibration_count && i < WM_HEALTH_CALIBRATION_MAX; i++) {
+    wm_calibration_value *c = &out->calibration[out->calibration_count++];
+    take_name(c->name, sizeof c->name, m.calibration[i].name, sizeof m.calibration[i].name);
+    c->value = m.calibration[i].value;
+    c->sigma = m.calibration[i].sigma;
+  }
+  return NULL;
+}

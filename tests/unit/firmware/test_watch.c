@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a person sees of a run, from its messages.
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "unity.h"
+#include "watch.h"
+#include "waymark/lcm_messages.h"
+
+static watch seen;
+static wm_health health;
+static wm_published pose;
+static uint8_t bytes[WM_LCM_MESSAGE_MAX];
+static char why[240], shown[4000];
+
+void setUp(void) {
+  memset(&seen, 0, sizeof seen);
+  memset(&pose, 0, sizeof pose);
+  memset(&health, 0, sizeof health);
+  health.state = WM_STATE_TRACKING;
+  health.source_count = 2;
+  (void)snprintf(health.sources[0].name, WM_HEALTH_NAME_MAX, "can");
+  (void)snprintf(health.sources[1].name, WM_HEALTH_NAME_MAX, "edges:front");
+  health.sources[0].device = health.sources[1].device = WM_DEVICE_WORKS;
+  health.sources[1].rejected[WM_REJECTED_GATE] = 7;
+  health.reckoning_left_m = 41.6;
+  health.reckoning_left_s = (double)INFINITY;
+}
+void tearDown(void) {}
+
+static const char *state_of_health(void) {
+  size_t length = wm_lcm_health(&health, bytes, sizeof bytes);
+  TEST_ASSERT_GREATER_THAN(0, length);
+  watch_health(&seen, bytes, length, 10 * WM_NS_PER_S);
+  return watch_state(&seen, 10 * WM_NS_PER_S, why, sizeof why);
+}
+
+static void the_state_says_what_is_wrong(void) {
+  TEST_ASSERT_EQUAL_STRING("waiting", watch_state(&seen, 0, why, sizeof why));
+  TEST_ASSERT_EQUAL_STRING("tracking", state_of_health());
+  TEST_ASSERT_EQUAL_STRING("", why);
+  health.sources[1].device = WM_DEVICE_STALLED;
+  TEST_ASSERT_EQUAL_STRING("degraded", state_of_health());
+  TEST_ASSERT_EQUAL_STRING("edges:front stalled", why);
+  health.sources[0].device = WM_DEVICE_ABSENT;
+  health.state = WM_STATE_SEARCHING;
+  TEST_ASSERT_EQUAL_STRING("waiting for sensors", state_of_health());
+  TEST_ASSERT_EQUAL_STRING("can absent, edges:front stalled", why);
+  health.state = WM_STATE_LOST;
+  TEST_ASSERT_EQUAL_STRING("lost", state_of_health());
+  TEST_ASSERT_EQUAL_STRING("silent", watch_state(&seen, 20 * WM_NS_PER_S, why, sizeof why));
+}
+
+static void a_message_is_read_as_it_was_sent(void) {
+  wm_health read;
+  wm_published read_pose;
+  health.sources[1].overflows = 5;
+  health.sources[1].stamp_uncertainty_ns = 77;
+  health.calibration_count = 1;
+  (void)snprintf(health.calibration[0].name, sizeof health.calibration[0].name, "laser.yaw_rad");
+  health.calibration[0].value = 0.25;
+  size_t length = wm_lcm_health(&health, bytes, sizeof bytes);
+  TEST_ASSERT_NULL(wm_lcm_read_health(bytes, length, &read));
+  TEST_ASSERT_EQUAL_MEMORY(&health, &read, sizeof read);
+  pose.now.t_ns = 5;
+  pose.now.covariance[7] = 0.5;
+  pose.now.v_mps[0] = 1.5;
+  pose.status_flags = WM_PUB_JUMPED;
+  length = wm_lcm_pose(&pose, bytes, sizeof bytes);
+  TEST_ASSERT_NULL(wm_lcm_read_pose(bytes, length, &read_pose));
+  TEST_ASSERT_EQUAL_MEMORY(&pose, &read_pose, sizeof pose);
+  TEST_ASSERT_NOT_NULL(wm_lcm_read_pose("rubbish", 7, &read_pose));
+  TEST_ASSERT_NOT_NULL(wm_lcm_read_health(bytes, 20, &read));
+}
+
+static void the_view_has_pose_sources_and_what_is_left(void) {
+  pose.now.pose_map_base = (wm_pose3){{12.5, -3, 0}, {0, 0, sqrt(0.5), sqrt(0.5)}};
+  watch_pose(&seen, bytes, wm_lcm_pose(&pose, bytes, sizeof bytes), 10 * WM_NS_PER_S);
+  (void)state_of_health();
+  FILE *f = fmemopen(shown, sizeof shown, "w");
+  watch_print(&seen, 10 * WM_NS_PER_S, f);
+  (void)fclose(f);
+  const char *const parts[] = {"state      tracking",  "x    12.50 m", "heading    90.0 deg", "useful for 42 m",
+                               "as long as it stands", "edges:front",  "7 rejected"};
+  for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++)
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(shown, parts[i]), shown);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(the_state_says_what_is_wrong);
+  RUN_TEST(a_message_is_read_as_it_was_sent);
+  RUN_TEST(the_view_has_pose_sources_and_what_is_left);
+  return UNITY_END();
+}
