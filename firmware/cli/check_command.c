@@ -10,6 +10,7 @@
 #include "waymark/arena.h"
 #include "waymark/assembly.h"
 #include "waymark/pipeline.h"
+#include "waymark/robot.h"
 
 static const char kHelp[] =
     "usage: waymark check CONFIG [RECORDING]\n"
@@ -17,7 +18,8 @@ static const char kHelp[] =
     "Says what can be known before driving: whether the configuration is right and, with a recording, whether its\n"
     "calibration, map and CAN binding are, which sources there are and how often they speak, the start pose, the "
     "motion\n"
-    "model's input and the memory that is needed. Exit code 2 where something must be mended first.\n"
+    "model's input and the memory that is needed. Without one, the same for the robot's devices, if it has any. Exit "
+    "code 2 where something must be mended first.\n"
     "\n"
     "  --landmarks FILE    instead of the recording's map\n"
     "  --calibration FILE  instead of the recording's\n"
@@ -84,6 +86,10 @@ static wm_status read_all(wm_source *source, source_facts *facts, wm_error *err)
 
 static wm_status print_source(const wm_assembled_source *s, wm_error *err) {
   source_facts facts;
+  if (s->source->is_live) {
+    (void)printf("source       %-20s a device (`waymark doctor` says whether it is there)\n", s->name);
+    return WM_OK;
+  }
   wm_status status = read_all(s->source, &facts, err);
   if (status != WM_OK) return status;
   double seconds = facts.events > 1 ? wm_seconds_between(facts.first_ns, facts.last_ns) : 0;
@@ -112,9 +118,11 @@ static wm_status take_memory(wm_assembly *assembly, wm_arena *arena, wm_error *e
   return status == WM_OK ? wm_vision_start(assembly->vision, err) : status;
 }
 
+// With a recording's folder, or with the robot's own devices (NULL).
 static wm_status check_recording(const wm_config *config, const char *dir, wm_error *err) {
   wm_recording *recording;
-  wm_status status = wm_recording_open(dir, &config->overrides, print_note, NULL, &recording, err);
+  wm_status status = dir ? wm_recording_open(dir, &config->overrides, print_note, NULL, &recording, err)
+                         : wm_robot_open(config, print_note, NULL, &recording, err);
   if (status != WM_OK) return status;
   static wm_assembly assembly;
   wm_arena arena = {0};
@@ -170,7 +178,9 @@ int command_check(int argc, char *const *argv) {
   status = override_path(config.overrides.landmarks, landmarks, &err);
   if (status == WM_OK) status = override_path(config.overrides.calibration, calibration, &err);
   if (status == WM_OK) status = override_path(config.overrides.map, map, &err);
-  if (status == WM_OK && count > 1) status = check_recording(&config, words[1], &err);
+  int has_devices = config.devices.can_count + config.devices.camera_count > 0;
+  if (status == WM_OK && (count > 1 || has_devices))
+    status = check_recording(&config, count > 1 ? words[1] : NULL, &err);
   wm_config_free(&config);
   if (status == WM_OK) {
     (void)puts("good");

@@ -58,6 +58,12 @@ expect 2 "is a recording" run --recording "$work/rec" --config "$work/good.yaml"
 printf 'id,x_m,y_m,z_m,sigma_m\n1,2,3,0,0.1\n' >"$work/map.csv"
 expect 2 "was made with another map" replay "$work/deep/er/out/events.wmlog" --out "$work/again" --landmarks "$work/map.csv"
 
+printf 'BO_ 256 M: 2 X\n SG_ V : 0|16@1+ (0.001,0) [0|65] "m/s" X\n SG_ W : 8|8@1- (0.01,0) [-1|1] "rad/s" X\n' >"$work/car.dbc"
+printf -- '- {quantity: vehicle_speed, message: M, signal: V}\n- {quantity: yaw_rate, message: M, signal: W}\n' >"$work/signals.yaml"
+printf 'format: waymark-config/1\nestimator: odometry\ndevices: {can: [{interface: nocan7, dbc: car.dbc, can_signals: signals.yaml}]}\n' >"$work/robot.yaml"
+expect 0 "can                  a device" check "$work/robot.yaml"
+sed -i 's/signal: V/signal: Vee/' "$work/signals.yaml"
+expect 2 "signals.yaml:1" check "$work/robot.yaml"
 expect 2 "check needs a configuration" check
 expect 0 "good" check "$work/good.yaml"
 expect 0 "20 data, 10.0 a second" check "$work/good.yaml" "$work/rec"
