@@ -6,6 +6,7 @@
 #include "vision/edges/params.h"
 #include "vision/edges/rays.hpp"
 #include "vision/edges/support.hpp"
+#include "vision/edges/windows.hpp"
 #include "vision/registry.h"
 
 namespace wm {
@@ -18,6 +19,7 @@ struct edges_state {
   mounted_camera camera;
   ray_fan fan;
   ray_work work;
+  bird_view bird;  // where lines are found by windows
 };
 
 constexpr size_t kAlign = 64;
@@ -34,7 +36,7 @@ const wm_camera *camera_of(const wm_view *view, const char **why) {
 }
 
 // Puts the state's parts one behind the other; returns the bytes of all.
-size_t lay_out(edges_state *state, uint32_t rays, uint32_t samples) {
+size_t lay_out(edges_state *state, uint32_t rays, uint32_t samples, const bird_view &bird) {
   size_t used = rounded(sizeof *state);
   const auto take = [&](size_t bytes) {
     const size_t at = used;
@@ -44,12 +46,33 @@ size_t lay_out(edges_state *state, uint32_t rays, uint32_t samples) {
   auto *base = reinterpret_cast<uint8_t *>(state);
   const size_t at_rays = take(rays * sizeof(ray)), at_samples = take(samples * sizeof(ray_sample)),
                at_ranges = take(samples * sizeof(float));
+  const size_t area = static_cast<size_t>(bird.width) * static_cast<size_t>(bird.height);
+  const size_t at_table = take(area * sizeof(bird_pixel)), at_grey = take(area), at_edge = take(area),
+               at_inner = take(area), at_whole = take(static_cast<size_t>(bird.windows)),
+               at_hough = take(sizeof(hough_work));
   if (base) {
+    state->bird = bird;
+    state->bird.table = reinterpret_cast<bird_pixel *>(base + at_table);
+    state->bird.grey = base + at_grey;
+    state->bird.edge = base + at_edge;
+    state->bird.inner = base + at_inner;
+    state->bird.whole = base + at_whole;
+    state->bird.hough = reinterpret_cast<hough_work *>(base + at_hough);
     state->fan.rays = reinterpret_cast<ray *>(base + at_rays);
     state->fan.samples = reinterpret_cast<ray_sample *>(base + at_samples);
     state->fan.range_m = reinterpret_cast<float *>(base + at_ranges);
   }
   return used;
+}
+
+// The bird's-eye view, empty where it isn't used; why it can't be, or NULL.
+const char *view_of(const wm_edges_params &params, bird_view *out) {
+  *out = bird_view{};
+  if (params.mode != EDGES_BY_WINDOWS) return nullptr;
+  bird_view_size(params, out);
+  if (out->windows < 1) return "the bird's-eye view has no room for a window (bird.*, windows.*)";
+  return static_cast<double>(out->width) * out->height > 4e7 ? "the bird's-eye view is above 40 million pixels"
+                                                             : nullptr;
 }
 
 size_t state_bytes(const void *params, const wm_view *view, const char **why) {
@@ -64,7 +87,9 @@ size_t state_bytes(const void *params, const wm_view *view, const char **why) {
     *why = "the camera sees no floor within the range: is its mounting right (height above 0, pitch down positive)?";
     return 0;
   }
-  return lay_out(nullptr, rays, samples);
+  bird_view bird;
+  *why = view_of(*static_cast<const wm_edges_params *>(params), &bird);
+  return *why ? 0 : lay_out(nullptr, rays, samples, bird);
 }
 
 wm_status init(void *memory, const void *params, const wm_view *view) {
@@ -78,7 +103,10 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   if (mounted_camera_init(&state->camera, *camera)) return WM_BAD_CONFIG;
   uint32_t rays, samples;
   ray_fan_count(state->camera, state->params, &rays, &samples);
-  lay_out(state, rays, samples);
+  bird_view bird;
+  if (view_of(state->params, &bird)) return WM_BAD_CONFIG;
+  lay_out(state, rays, samples, bird);
+  if (bird.windows > 0) bird_view_make(state->camera, state->params, &state->bird);
   ray_fan_make(state->camera, state->params, &state->fan);
   return WM_OK;
 }
@@ -144,17 +172,7 @@ bool floor_point(const edges_state &state, const ray_edge &edge, const wm_frame 
   return true;
 }
 
-wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_event *out, size_t capacity,
-                 size_t *count) {
-  auto *state = static_cast<edges_state *>(memory);
-  const wm_frame &frame = frames[0];
-  *count = 0;
-  if (frame.width_px != state->camera.width_px || frame.height_px != state->camera.height_px) return WM_BAD_DATA;
-  if (capacity == 0) return WM_FULL;
-  wm_points *points = &out->as.points;
-  std::memset(static_cast<void *>(out), 0, WM_EVENT_HEADER_BYTES);
-  points->count = points->dropped = 0;
-  points->camera = state->camera_index;
+void points_of_rays(edges_state *state, const wm_frame &frame, wm_points *points) {
   int32_t rays[WM_POINTS_MAX];
   const double usual = usual_floor(state->fan, frame);
   for (uint32_t i = 0; i < state->fan.ray_count; i++) {
@@ -168,6 +186,58 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
     }
   }
   keep_supported(points, rays, state->camera.centre_m.x, state->camera.centre_m.y, state->params.rays_support_min);
+}
+
+// Points along each line, with the side that is bright.
+void points_of_windows(const edges_state &state, const wm_frame &frame, wm_points *points) {
+  constexpr int kPieces = 512;
+  line_piece pieces[kPieces];
+  const bird_view &bird = state.bird;
+  const int count = find_pieces(bird, frame, state.params, pieces, kPieces);
+  for (int i = 0; i < count; i++) {
+    const line_piece &p = pieces[i];
+    const double dx = static_cast<double>(p.x1 - p.x0), dy = static_cast<double>(p.y1 - p.y0);
+    const double size = std::sqrt(dx * dx + dy * dy);
+    const int steps = 1 + static_cast<int>(size / (state.params.windows_spacing_m * bird.px_per_m));
+    const double normal = size > 0 ? atan2(dx, -dy) : 0;
+    const sin_cos n = sincos(normal);
+    for (int k = 0; k < steps; k++) {
+      const double x = static_cast<double>(p.x0) + (k + 0.5) / steps * dx,
+                   y = static_cast<double>(p.y0) + (k + 0.5) / steps * dy;
+      const auto grey_at = [&](double off) {
+        const int u = static_cast<int>(x + off * n.cos + 0.5), v = static_cast<int>(y + off * n.sin + 0.5);
+        if (u < 0 || v < 0 || u >= bird.width || v >= bird.height) return 0;
+        return static_cast<int>(bird.grey[v * bird.width + u]);
+      };
+      if (points->count == WM_POINTS_MAX) {
+        points->dropped++;
+        continue;
+      }
+      const uint32_t to = points->count++;
+      points->x_m[to] = static_cast<float>(bird.x_min_m + x / bird.px_per_m);
+      points->y_m[to] = static_cast<float>(bird.y_min_m + y / bird.px_per_m);
+      points->normal_rad[to] = static_cast<float>(grey_at(-2) >= grey_at(2) ? wrap(normal) : wrap(normal + kPi));
+      points->sigma_m[to] = static_cast<float>(state.params.windows_sigma_m);
+    }
+  }
+}
+
+wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_event *out, size_t capacity,
+                 size_t *count) {
+  auto *state = static_cast<edges_state *>(memory);
+  const wm_frame &frame = frames[0];
+  *count = 0;
+  if (frame.width_px != state->camera.width_px || frame.height_px != state->camera.height_px) return WM_BAD_DATA;
+  if (capacity == 0) return WM_FULL;
+  wm_points *points = &out->as.points;
+  std::memset(static_cast<void *>(out), 0, WM_EVENT_HEADER_BYTES);
+  points->count = points->dropped = 0;
+  points->camera = state->camera_index;
+  if (state->params.mode == EDGES_BY_WINDOWS) {
+    points_of_windows(*state, frame, points);
+  } else {
+    points_of_rays(state, frame, points);
+  }
   if (points->count == 0) return WM_OK;
   out->t_ns = frame.t_ns;
   out->kind = WM_EVENT_POINTS;

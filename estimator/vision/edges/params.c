@@ -3,10 +3,17 @@
 
 static const char *const kSigns[] = {"bright_to_dark", "any", NULL};
 
+static const char *const kModes[] = {"rays", "windows", NULL};
+
 #define F64(key, field, initial, min, max, about) \
   { key, WM_PARAM_F64, offsetof(struct wm_edges_params, field), initial, min, max, NULL, about }
 
 static const wm_param kParams[] = {
+    {"mode", WM_PARAM_ENUM, offsetof(struct wm_edges_params, mode), EDGES_BY_RAYS, 0, EDGES_BY_WINDOWS, kModes,
+     "rays: the first edge along each ray over the floor, in the camera's picture itself. windows: the paper's way, "
+     "the "
+     "strongest line in each window of the bird's-eye view. Rays are more accurate, and tell a wall's foot from "
+     "joints."},
     F64("rays.step_rad", rays_step_rad, 0.011, 0.001, 0.2,
         "rad. Angle between two rays from the camera's foot point over the floor; each gives at most one point."),
     F64("rays.range_min_m", rays_range_min_m, 0.2, 0.0, 50,
@@ -32,6 +39,18 @@ static const wm_param kParams[] = {
         "board, whose image begins before the joint by the board's height over the camera's."),
     {"rays.support_min", WM_PARAM_I32, offsetof(struct wm_edges_params, rays_support_min), 3, 0, 8, NULL,
      "Of the four rays to each side, so many must have a point on a line with this one; else it is left out."},
+    F64("bird.px_per_m", bird_px_per_m, 75, 10, 500, "px/m of the bird's-eye view; the paper's."),
+    F64("bird.x_min_m", bird_x_min_m, 1.5, -20, 50, "m ahead of base_link: where the view begins."),
+    F64("bird.x_max_m", bird_x_max_m, 7.1, -20, 50, "m ahead of base_link: where the view ends."),
+    F64("bird.side_m", bird_side_m, 3.0, 0.2, 50, "m to the left and to the right that are viewed."),
+    {"windows.px", WM_PARAM_I32, offsetof(struct wm_edges_params, windows_px), 50, 8, 64, NULL,
+     "px. Side of a window; the paper's."},
+    {"windows.overlap_px", WM_PARAM_I32, offsetof(struct wm_edges_params, windows_overlap_px), 10, 0, 63, NULL,
+     "px that neighbouring windows share; the paper's."},
+    F64("windows.variance_min", windows_variance_min, 5000, 0, 1e9,
+        "A window has a line where the sums of its most varied slope vary by more than this; the paper's."),
+    F64("windows.spacing_m", windows_spacing_m, 0.1, 0.01, 5, "m between two points of a line."),
+    F64("windows.sigma_m", windows_sigma_m, 0.03, 1e-4, 5, "m. Error of a line's points across it."),
     F64("sigma_px", sigma_px, 0.3, 0.01, 10, "px. Error of an edge's place across the edge where contrast is good."),
     F64("noise_grey", noise_grey, 2.0, 0.0, 100,
         "Grey levels. Noise of a pixel; over an edge's slope it is an error of its place that is added to sigma_px."),

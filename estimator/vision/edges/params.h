@@ -11,13 +11,18 @@ extern "C" {
 #endif
 
 struct wm_edges_params {
+  int32_t mode;  // edges_mode
   double rays_step_rad, rays_range_min_m, rays_range_max_m;
   int32_t rays_sign;  // edges_sign
   double rays_contrast_grey, rays_contrast_rel, rays_line_rel, rays_mirror_rel;
   int32_t rays_support_min;
+  double bird_px_per_m, bird_x_min_m, bird_x_max_m, bird_side_m;
+  int32_t windows_px, windows_overlap_px;
+  double windows_variance_min, windows_spacing_m, windows_sigma_m;
   double sigma_px, noise_grey;
 };
 
+enum edges_mode { EDGES_BY_RAYS, EDGES_BY_WINDOWS };
 enum edges_sign { EDGES_BRIGHT_TO_DARK, EDGES_ANY_SIGN };
 
 extern const wm_param_table wm_edges_params_table;

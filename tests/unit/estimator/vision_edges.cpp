@@ -121,6 +121,20 @@ void a_floor_that_mirrors() {
   TEST_ASSERT_GREATER_THAN(p.count / 2, images);
 }
 
+// The paper's way finds the foot of the wall, but the board's upper edge as well.
+void by_windows() {
+  draw(plain_floor, 0);
+  set("mode", 1);
+  const wm_points &p = look();
+  uint32_t right = 0;
+  for (uint32_t i = 0; i < p.count; i++) {
+    const double x = static_cast<double>(p.x_m[i]), normal = std::fabs(static_cast<double>(p.normal_rad[i]));
+    if (std::fabs(x - kWall_m) < 0.05 && normal < 0.2) right++;
+  }
+  TEST_ASSERT_GREATER_THAN(20, right);
+  TEST_ASSERT_TRUE(std::isfinite(static_cast<double>(p.sigma_m[0])));
+}
+
 void a_lone_point_is_left_out() {
   // A dark spot on the floor, two rays wide.
   draw([](double x, double y) { return std::fabs(y) < 0.02 && x > 1.8 && x < 2.2 ? 40.0 : 130.0; }, 0);
@@ -154,6 +168,7 @@ int main() {
   RUN_TEST(lamps_in_the_floor);
   RUN_TEST(joints_of_tiles);
   RUN_TEST(a_floor_that_mirrors);
+  RUN_TEST(by_windows);
   RUN_TEST(a_lone_point_is_left_out);
   return UNITY_END();
 }

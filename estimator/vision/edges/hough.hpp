@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// Fast Hough transform of a square window: sums along all dyadic lines, by halves of halves, so that each partial sum
+// is made once. Integers; rows are added in vectors, and a scalar twin gives the same bits. Sources: M. L. Brady, "A
+// fast discrete approximation algorithm for the Radon transform", SIAM J. Computing 27(1), 1998; E. I. Ershov et al.,
+// "Fast Hough transform and approximation properties of dyadic patterns", 2017; windows whose side is no power of two
+// are halved as they come.
+#ifndef WAYMARK_ESTIMATOR_VISION_HOUGH_HPP
+#define WAYMARK_ESTIMATOR_VISION_HOUGH_HPP
+
+#include <cstdint>
+
+namespace wm {
+
+inline constexpr int kHoughSideMax = 64;
+// Offsets from -(side - 1) to side - 1, and zeros: a sum reads up to half a side beyond.
+inline constexpr int kHoughStride = 2 * kHoughSideMax + 48;
+
+// One quadrant: sums[t * kHoughStride + o] is the sum over rows y of the window at column o - (side - 1) + the dyadic
+// line's way at y, which goes from 0 in the first row to t in the last. What lies beside the window is 0.
+struct hough_plane {
+  alignas(16) int16_t sums[kHoughSideMax * kHoughStride];
+};
+
+// All zero before its first use, and for windows of one side alone: what lies right of the window stays 0.
+struct hough_work {
+  hough_plane a, b;
+};
+
+// A window of `side` (2 to 64) rows of `side` values from 0 to 255: value (y, x) is at in[y * row + x * column], which
+// is how quadrants are chosen (transposed, mirrored). Returns the plane with the result, one of the work's.
+const hough_plane *hough_transform(const uint8_t *in, int side, int row, int column, hough_work *work);
+const hough_plane *hough_transform_scalar(const uint8_t *in, int side, int row, int column, hough_work *work);
+
+// Column that the dyadic line of slope t has in row y, from 0 to t.
+int hough_line(int side, int t, int y);
+
+// The slope whose sums vary most, and its largest sum.
+struct hough_peak {
+  int32_t t, offset, sum;
+  float variance;
+};
+hough_peak hough_find(const hough_plane &plane, int side);
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// The paper's way: the floor as a bird sees it, by a table made once; magnitude of its gradient; in overlapping windows
+// the strongest line by the fast Hough transform. Source: M. P. Abramov et al. 2019, "Edge detection based mobile robot
+// indoor localization", section on the detector.
+#ifndef WAYMARK_ESTIMATOR_VISION_WINDOWS_HPP
+#define WAYMARK_ESTIMATOR_VISION_WINDOWS_HPP
+
+#include "vision/camera/lens.hpp"
+#include "vision/edges/hough.hpp"
+#include "vision/edges/params.h"
+#include "waymark/frame.h"
+
+namespace wm {
+
+// A pixel of the bird's-eye view: the upper left of four pixels of the picture, and the way between them in 1/256.
+struct bird_pixel {
+  uint16_t column, row;  // column kNoFloor: not in the picture
+  uint8_t right, down;
+};
+inline constexpr uint16_t kNoFloor = 0xFFFF;
+
+// Rows go to the robot's left (y), columns ahead (x), from (x_min, y_min) on.
+struct bird_view {
+  int32_t width, height, windows;
+  double x_min_m, y_min_m, px_per_m;
+  bird_pixel *table;
+  uint8_t *grey, *edge;  // brightness; gradient's magnitude
+  uint8_t *inner;        // 255 where the pixel and its four neighbours are in the picture, else 0
+  uint8_t *whole;        // a byte a window: it shows floor enough to be looked at
+  hough_work *hough;
+};
+
+// A line piece in the bird's-eye view, px.
+struct line_piece {
+  float x0, y0, x1, y1;
+};
+
+// Sizes of the view by the parameters; counts its windows.
+void bird_view_size(const wm_edges_params &params, bird_view *out);
+// Fills the table; its arrays are width x height, `hough` is zero.
+void bird_view_make(const mounted_camera &camera, const wm_edges_params &params, bird_view *out);
+// The strongest line of each window that has one. Returns how many there are, at most `capacity`.
+int find_pieces(const bird_view &view, const wm_frame &frame, const wm_edges_params &params, line_piece *out,
+                int capacity);
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the detector of edges costs: the transform of a 50x50 window, and the search for its strongest line.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <memory>
+#include <vector>
+
+#include "vision/edges/hough.hpp"
+#include "vision/edges/windows.hpp"
+#include "waymark/detector.h"
+#include "waymark/random.h"
+
+namespace {
+
+// Time of this thread alone: other work on the machine is not counted.
+double thread_us() {
+  timespec now;
+  (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
+}
+
+template <class Work>
+double median_us(int rounds, Work work) {
+  std::vector<double> times;
+  for (int i = 0; i < 101; i++) {
+    const double begin = thread_us();
+    for (int k = 0; k < rounds; k++) work();
+    times.push_back((thread_us() - begin) / rounds);
+  }
+  std::nth_element(times.begin(), times.begin() + 50, times.end());
+  return times[50];
+}
+
+// Both ways of the detector on a 1280x720 fisheye picture of a room: floor, board and wall. The view of windows is at
+// least 0.5 to 6 m ahead of the camera and 3 m to each side.
+void whole_pictures() {
+  constexpr uint32_t kWidth = 1280, kHeight = 720;
+  wm_rig rig;
+  wm_rig_init(&rig);
+  rig.camera_count = 1;
+  wm_camera &c = rig.cameras[0];
+  c = wm_camera{};
+  c.width_px = kWidth;
+  c.height_px = kHeight;
+  c.intrinsics_count = 4;
+  const double intrinsics[] = {522, 522, 640, 360};
+  std::copy(intrinsics, intrinsics + 4, c.intrinsics);
+  c.mounting = {{1.06, 0, 0.4}, {0, 22 * 3.14159265 / 180, 0}};
+  wm::mounted_camera camera;
+  wm::mounted_camera_init(&camera, c);
+  std::vector<uint8_t> picture(kWidth * kHeight);
+  for (uint32_t v = 0; v < kHeight; v++)
+    for (uint32_t u = 0; u < kWidth; u++) {
+      double x, y;
+      const bool is_floor = wm::floor_of(camera, {1.0 * u, 1.0 * v}, &x, &y) && x < 5 && y < 1.2 && y > -1.5;
+      picture[v * kWidth + u] =
+          static_cast<uint8_t>((is_floor ? 130 : 60) + 4 * wm_random_uniform(1, 2, v * kWidth + u));
+    }
+  const wm_detector *edges = wm_detector_find("edges");
+  std::vector<char> params(edges->params.bytes);
+  static wm_event events[2];
+  const int32_t front = 0;
+  const wm_view view = {&rig, &front};
+  const wm_frame frame = {0, 0, 0, 0, 0, kWidth, kHeight, kWidth, picture.data()};
+  for (int mode = 0; mode < 2; mode++) {
+    wm_params_defaults(&edges->params, params.data());
+    reinterpret_cast<wm_edges_params *>(params.data())->mode = mode;
+    const char *why = "";
+    const size_t bytes = (edges->state_bytes(params.data(), &view, &why) + 63) / 64 * 64;
+    void *state = std::aligned_alloc(64, bytes);
+    if (!state || edges->init(state, params.data(), &view) != WM_OK) return;
+    size_t count = 0;
+    const double us = median_us(1, [&] { (void)edges->detect(state, &frame, nullptr, events, 2, &count); });
+    wm::bird_view bird;
+    wm::bird_view_size(*reinterpret_cast<wm_edges_params *>(params.data()), &bird);
+    std::printf("edges_1280x720_%s_us %.0f (%u points", mode ? "windows" : "rays", us,
+                count ? events[0].as.points.count : 0);
+    if (mode) std::printf(", %d windows", bird.windows);
+    std::printf(")\n");
+    std::free(state);
+  }
+}
+
+}  // namespace
+
+int main() {
+  uint8_t window[50 * 50];
+  for (size_t i = 0; i < sizeof window; i++) window[i] = static_cast<uint8_t>(256 * wm_random_uniform(1, 1, i));
+  uint8_t turned[50 * 50];
+  for (int y = 0; y < 50; y++)
+    for (int x = 0; x < 50; x++) turned[x * 50 + y] = window[y * 50 + x];
+  const auto work = std::make_unique<wm::hough_work>();
+  volatile int kept = 0;
+  const auto all = [&](auto transform) {
+    for (int q = 0; q < 4; q++) {
+      const uint8_t *from = q & 1 ? turned : window;
+      const wm::hough_plane *plane = transform(q & 2 ? from + 49 : from, 50, 50, q & 2 ? -1 : 1, work.get());
+      kept = kept + plane->sums[60];
+    }
+  };
+  std::printf("hough_50x50_us %.2f\n", median_us(50, [&] { all(wm::hough_transform); }));
+  std::printf("hough_50x50_scalar_us %.2f\n", median_us(50, [&] { all(wm::hough_transform_scalar); }));
+  std::printf("hough_50x50_find_us %.2f\n", median_us(50, [&] {
+                for (int q = 0; q < 4; q++) kept = kept + wm::hough_find(work->a, 50).t;
+              }));
+  whole_pictures();
+}
