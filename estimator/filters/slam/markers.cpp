@@ -8,7 +8,8 @@ namespace wm {
 namespace {
 
 constexpr double kFarthest_m = 1e4;
-constexpr double kThreeNumbers = 11.345 / 9.210;  // 99 % of chi2 with three degrees of freedom against two
+constexpr double kAgree_m = 0.2, kAgree_rad = 0.1;  // of two markers on where the robot is
+constexpr double kThreeNumbers = 11.345 / 9.210;    // 99 % of chi2 with three degrees of freedom against two
 
 double first_number(double a, double b) { return finite(a) ? a : b; }
 
@@ -66,8 +67,9 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   r.noise[2] = square(params_.marker_heading_sigma_rad);
   r.z_m = sensor.z_m + level[2];
 
-  const past_pose past = look_back(sensor_value(m.sensor, kTimeOffset, 0.0));
   const int landmark = find_landmark(m.id);
+  if (searching_ && !(landmark >= 0 && find_start(landmark, m, r))) return drop(WM_REJECTED_SEARCHING);
+  const past_pose past = look_back(sensor_value(m.sensor, kTimeOffset, 0.0));
   if (landmark >= 0)
     fuse_known_marker(landmark, m, r, past, blank, records);
   else if (params_.map == WM_SLAM_MAP_FROZEN)
@@ -75,6 +77,30 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   else
     join_marker(m, r, past, blank, records);
   return WM_OK;
+}
+
+// Lost on a map: each marker of it says where the robot is. Two different ones that agree are believed.
+bool slam::find_start(int landmark, const wm_marker &m, const marker_reading &r) {
+  const int state = joint_.landmark_state(landmark);
+  const mounted_sensor &sensor = sensor_[m.sensor];
+  const wm_pose2 marker = {joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};
+  const wm_pose2 seen = compose({sensor.x_m, sensor.y_m, sensor.yaw_rad}, {r.level[0], r.level[1], r.yaw_rad});
+  const wm_pose2 here = compose(marker, between(seen, wm_pose2{}));
+  const wm_pose2 other = compose(candidate_, between(candidate_odom_, joint_.odom()));
+  const bool agree = candidate_id_ >= 0 && candidate_id_ != m.id &&
+                     square(here.x_m - other.x_m) + square(here.y_m - other.y_m) < square(kAgree_m) &&
+                     std::fabs(wrap(here.heading_rad - other.heading_rad)) < kAgree_rad;
+  if (candidate_id_ != m.id) {
+    candidate_id_ = m.id;
+    candidate_ = here;
+    candidate_odom_ = joint_.odom();
+  }
+  if (!agree) return false;
+  const double xy = square(kAgree_m), covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(kAgree_rad)}};
+  joint_.set_pose(here, covariance);
+  searching_ = false;
+  resets_++;
+  return true;
 }
 
 // Along and across the line of sight, and the heading: expected from `place` (x, y, heading in map). Rows by the state

@@ -134,6 +134,8 @@ void slam::start_again() {
     other_fused_id_[i] = -1;
   }
   resets_++;
+  searching_ = params_.map != WM_SLAM_MAP_NONE && params_.markers && !(place && heading);
+  candidate_id_ = -1;
   if (params_.map != WM_SLAM_MAP_NONE) load_map();
 }
 
@@ -196,6 +198,7 @@ wm_status slam::take_pose(const wm_event &event) {
   const double covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(given.sigma_heading_rad)}};
   joint_.set_pose(given.pose, covariance);
   forget_tracks();
+  searching_ = false;
   resets_++;
   return WM_OK;
 }
@@ -205,7 +208,8 @@ void slam::estimate(wm_estimate *out) const {
   out->resets = resets_;
   const bool fresh =
       fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, joint_.now_ns()) <= params_.dead_reckoning_after_s;
-  out->state = (uint8_t)(fresh ? WM_STATE_TRACKING : WM_STATE_DEAD_RECKONING);
+  out->state =
+      searching_ ? (uint8_t)WM_STATE_SEARCHING : (uint8_t)(fresh ? WM_STATE_TRACKING : WM_STATE_DEAD_RECKONING);
 }
 
 size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const {

@@ -119,6 +119,7 @@ class slam {
                          wm_innovation blank, record_list records);
   void join_marker(const wm_marker &m, const marker_reading &r, const past_pose &past, wm_innovation blank,
                    record_list records);
+  bool find_start(int landmark, const wm_marker &m, const marker_reading &r);
   void note_fused(int landmark);
   bool join_line(int32_t id, const bearing_tracks::track &track);
   void misfit(int landmark);
@@ -156,6 +157,10 @@ class slam {
   wm_time_ns other_fused_ns_[2];  // when the last two different landmarks were fused
   int32_t other_fused_id_[2];
   uint32_t resets_;
+  // Started somewhere on a map that was given: no pose until two of its markers say the same.
+  bool searching_;
+  int32_t candidate_id_;  // the marker that said it first; -1: none
+  wm_pose2 candidate_, candidate_odom_;
 };
 
 }  // namespace wm

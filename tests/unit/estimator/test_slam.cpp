@@ -341,6 +341,25 @@ void test_a_saved_map_frozen_or_extended_needs_no_first_lap(void) {
   }
 }
 
+void test_started_lost_on_a_map_of_markers_it_finds_itself(void) {
+  coded = true;
+  params.markers = 1;
+  params.map = WM_SLAM_MAP_FROZEN;
+  for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
+  setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = kAbsent;
+  begin();
+  wm_estimate e;
+  slam->estimate(state, &e);
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, e.state);
+  false_share = 0.3;  // wrong ones don't agree
+  drive(3);
+  slam->estimate(state, &e);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, e.state);
+  false_share = 0.0;
+  drive(3);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+}
+
 void test_a_map_with_nan_loses_those_landmarks_alone(void) {
   params.map = WM_SLAM_MAP_EXTEND;
   known[3].p_m[1] = kAbsent;
@@ -403,6 +422,7 @@ int main(void) {
   RUN_TEST(test_landmarks_that_are_never_seen_again_leave);
   RUN_TEST(test_a_full_map_goes_on_with_what_it_has);
   RUN_TEST(test_a_saved_map_frozen_or_extended_needs_no_first_lap);
+  RUN_TEST(test_started_lost_on_a_map_of_markers_it_finds_itself);
   RUN_TEST(test_a_map_with_nan_loses_those_landmarks_alone);
   RUN_TEST(test_a_line_is_found_and_keeps_its_ties_to_every_pose);
   return UNITY_END();
