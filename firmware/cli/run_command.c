@@ -2,12 +2,14 @@
 #include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "commands.h"
 #include "options.h"
 #include "waymark/clock.h"
 #include "waymark/robot.h"
 #include "waymark/run.h"
+#include "waymark/saved_pose.h"
 
 static const char kHelp[] =
     "usage: waymark run --config FILE [--recording RECORDING] [options]\n"
@@ -16,7 +18,8 @@ static const char kHelp[] =
     "and,\n"
     "with --out, into files and an event log. The sources are the configuration's devices or, with --recording, a\n"
     "recording's, played at real speed. Ends with the recording, after --duration, or by Ctrl-C (SIGTERM), and writes\n"
-    "everything then.\n"
+    "everything then. On devices SIGHUP reads the configuration again: a good one is taken, from the present pose and\n"
+    "into FOLDER.2 ...; a wrong one is told, and the run goes on.\n"
     "\n"
     "  --config FILE          which estimator, and its parameters\n"
     "  --recording RECORDING  what the sensors say, instead of devices\n"
@@ -37,14 +40,23 @@ typedef struct arguments {
   wm_run_options run;
 } arguments;
 
-static atomic_int stop;
+#define BLIND_S 0.5  // from the end of one run to the first motion of the next, in one process
+
+static atomic_int stop, reload_asked;
 
 static void on_signal(int number) {
   (void)number;
   atomic_store(&stop, 1);
 }
 
+static void on_hangup(int number) {
+  (void)number;
+  atomic_store(&reload_asked, 1);
+}
+
 static void catch_signals(void) {
+  struct sigaction hangup = {.sa_handler = on_hangup, .sa_flags = SA_RESTART};
+  (void)sigaction(SIGHUP, &hangup, NULL);
   struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESTART};
   (void)sigaction(SIGINT, &action, NULL);
   (void)sigaction(SIGTERM, &action, NULL);
@@ -61,33 +73,90 @@ static void print_times(const wm_live_report *r) {
                (double)r->loop_max_ns * 1e-6, (double)r->age_p99_ns * 1e-6);
 }
 
-static int run(const arguments *args) {
-  wm_error err = {0};
+// What one configuration opens.
+typedef struct opened {
   wm_config config;
-  if (wm_config_load(args->config, &config, &err) != WM_OK) {
-    (void)complain(&err);
-    return EXIT_USAGE;
-  }
-  wm_recording *recording = NULL;
-  wm_status status = override_path(config.overrides.landmarks, args->landmarks, &err);
-  if (status == WM_OK) status = override_path(config.overrides.calibration, args->calibration, &err);
-  if (status == WM_OK) status = override_path(config.overrides.map, args->map, &err);
+  wm_recording *recording;
+} opened;
+
+static void close_all(opened *self) {
+  wm_recording_close(self->recording);
+  wm_config_free(&self->config);
+  self->recording = NULL;
+}
+
+static wm_status open_all(const arguments *args, opened *out, wm_error *err) {
+  wm_config *config = &out->config;
+  memset(out, 0, sizeof *out);
+  wm_status status = wm_config_load(args->config, config, err);
+  if (status != WM_OK) return err->status = WM_BAD_CONFIG;  // also where it isn't there
+  status = override_path(config->overrides.landmarks, args->landmarks, err);
+  if (status == WM_OK) status = override_path(config->overrides.calibration, args->calibration, err);
+  if (status == WM_OK) status = override_path(config->overrides.map, args->map, err);
   if (status == WM_OK)
-    status = args->recording ? wm_recording_open(args->recording, &config.overrides, print_note, NULL, &recording, &err)
-                             : wm_robot_open(&config, print_note, NULL, &recording, &err);
-  if (status == WM_OK) {
-    static wm_live_report report;
-    wm_time_ns begin_ns = wm_monotonic_ns();
-    catch_signals();
-    status = wm_run_live(&config, recording, &args->run, &report, &err);
-    if (status == WM_OK) {
-      print_report(&report.run, wm_recording_name(recording), args->run.out_dir ? args->run.out_dir : "nowhere",
-                   wm_seconds_between(begin_ns, wm_monotonic_ns()));
-      print_times(&report);
+    status = args->recording
+                 ? wm_recording_open(args->recording, &config->overrides, print_note, NULL, &out->recording, err)
+                 : wm_robot_open(config, print_note, NULL, &out->recording, err);
+  if (status != WM_OK) close_all(out);
+  return status;
+}
+
+// Another configuration, opened and put together while the present one drives on.
+typedef struct reloading {
+  const arguments *args;
+  opened next;
+} reloading;
+
+static wm_status open_next(void *context, wm_error *err) {
+  reloading *self = context;
+  static wm_assembly assembly;
+  wm_status status = open_all(self->args, &self->next, err);
+  if (status != WM_OK) return status;
+  status = wm_assemble(&self->next.config, self->next.recording, self->args->run.seed, &assembly, err);
+  wm_assembly_close(&assembly);
+  if (status != WM_OK) close_all(&self->next);
+  return status;
+}
+
+static wm_status run_once(const opened *with, const wm_run_options *options, wm_live_report *report, wm_error *err) {
+  wm_time_ns begin_ns = wm_monotonic_ns();
+  wm_status status = wm_run_live(&with->config, with->recording, options, report, err);
+  if (status != WM_OK) return status;
+  print_report(&report->run, wm_recording_name(with->recording), options->out_dir ? options->out_dir : "nowhere",
+               wm_seconds_between(begin_ns, wm_monotonic_ns()));
+  print_times(report);
+  return status;
+}
+
+static int run(const arguments *args) {
+  static opened now;
+  static reloading reload;
+  static wm_live_report report;
+  wm_error err = {0};
+  if (open_all(args, &now, &err) != WM_OK) return complain(&err);
+  wm_run_options options = args->run;
+  wm_start start;
+  char out_dir[WM_PATH_MAX + 16];
+  reload.args = args;
+  options.reload = open_next;
+  options.reload_context = &reload;
+  options.reload_asked = args->recording ? NULL : &reload_asked;
+  catch_signals();
+  wm_status status = run_once(&now, &options, &report, &err);
+  for (int part = 2; status == WM_OK && report.wants_restart; part++) {
+    close_all(&now);
+    now = reload.next;
+    options.start = NULL;
+    if (report.has_last && wm_saved_pose_is_worth_it(&report.last)) {
+      wm_start_from_estimate(&report.last, BLIND_S, &start);
+      options.start = &start;
     }
+    // A log holds one configuration.
+    (void)snprintf(out_dir, sizeof out_dir, "%s.%d", args->run.out_dir ? args->run.out_dir : "", part);
+    if (args->run.out_dir) options.out_dir = out_dir;
+    status = run_once(&now, &options, &report, &err);
   }
-  wm_recording_close(recording);
-  wm_config_free(&config);
+  close_all(&now);
   return status == WM_OK ? EXIT_DONE : complain(&err);
 }
 

@@ -57,6 +57,8 @@ typedef struct live_sink {
   // The last pose that was worth keeping, and whether it is on the disk.
   wm_estimate last_pose;
   int keeps_pose, has_last_pose, said_unsaved;
+  int has_published;
+  wm_estimate last_published;
   wm_time_ns next_save_ns;
   // What was said of the sources and the motion sensors, so that only a change is said.
   uint8_t said_stale[WM_SOURCES_MAX];
@@ -73,7 +75,8 @@ struct live {
   live_source sources[WM_SOURCES_MAX];
   live_estimator estimator;
   live_sink sink;
-  atomic_int stop;  // sources: say no more
+  atomic_int stop;        // sources: say no more
+  atomic_int restarting;  // it goes on with another configuration: no end for the service manager
 };
 
 // One record in the output ring.

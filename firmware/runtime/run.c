@@ -112,7 +112,11 @@ static wm_status add_commands(live *self, wm_recording *recording, wm_error *err
 static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   wm_status status = add_commands(self, recording, err);
   if (status == WM_OK) status = wm_assemble(self->config, recording, self->options->seed, &self->assembly, err);
-  if (status == WM_OK && wm_recording_is_robot(recording)) start_where_it_was(self);
+  if (status == WM_OK && self->options->start) {
+    self->assembly.setup.start = *self->options->start;
+  } else if (status == WM_OK && wm_recording_is_robot(recording)) {
+    start_where_it_was(self);
+  }
   if (status == WM_OK) status = take_memory(self, err);
   if (status == WM_OK) status = wm_pipeline_start(&self->estimator.pipeline, estimator_output(&self->estimator), err);
   wm_time_ns first_ns;
@@ -208,12 +212,27 @@ static int recording_is_over(live *self) {
   return recorded;
 }
 
-static void wait_for_end(live *self) {
+static void look_for_reload(live *self, wm_live_report *report) {
+  const wm_run_options *options = self->options;
+  wm_error why = {0};
+  if (!options->reload_asked || !atomic_exchange(options->reload_asked, 0)) return;
+  if (options->reload(options->reload_context, &why) != WM_OK) {
+    live_say(self, "reload: %s. The run goes on as it was", why.text);
+    return;
+  }
+  live_say(self, "reload: goes on with the new configuration, from the present pose");
+  report->wants_restart = 1;
+  atomic_store(&self->restarting, 1);
+  atomic_store(&self->stop, 1);
+}
+
+static void wait_for_end(live *self, wm_live_report *report) {
   wm_time_ns end_ns = INT64_MAX;
   if (self->options->duration_s > 0)
     end_ns = self->clock.monotonic_ns + wm_ns_from_seconds(fmin(self->options->duration_s, 1e9));
   while (!atomic_load_explicit(&self->estimator.done, memory_order_acquire)) {
     sleep_until(wm_monotonic_ns() + LOOK_EVERY_NS);
+    look_for_reload(self, report);
     if ((self->options->stop && atomic_load(self->options->stop)) || wm_monotonic_ns() >= end_ns ||
         recording_is_over(self))
       atomic_store(&self->stop, 1);
@@ -253,6 +272,8 @@ static void fill_report(live *self, wm_live_report *report) {
   run->memory_bytes = self->arena.bytes;
   run->allocations_after_start = e->allocations;
   run->page_faults_after_start = e->page_faults;
+  report->has_last = self->sink.has_published;
+  report->last = self->sink.last_published;
   report->deadlines_missed = e->deadlines_missed;
   report->deadlines_total = e->loops + e->deadlines_missed;
   report->wake_p99_ns = wm_histogram_quantile(&e->wake_ns, 0.99);
@@ -310,7 +331,7 @@ static wm_status run(live *self, wm_recording *recording, wm_live_report *report
   start_clock(self);
   thread_list threads = {0};
   status = start_threads(self, &threads, report, err);
-  if (status == WM_OK) wait_for_end(self);
+  if (status == WM_OK) wait_for_end(self, report);
   join_threads(self, &threads);
   notify_close(&self->sink.notify);
   if (status != WM_OK) return status;

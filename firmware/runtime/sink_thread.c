@@ -28,6 +28,8 @@ static void send_pose(live *run, const wm_published *record) {
   wm_published published = *record;
   tell_utc(run, &published);
   lcm_sink_pose(&run->sink.lcm, &published);
+  run->sink.last_published = published.now;
+  run->sink.has_published = 1;
   if (run->sink.keeps_pose && wm_saved_pose_is_worth_it(&published.now)) {
     run->sink.last_pose = published.now;
     run->sink.has_last_pose = 1;
@@ -167,6 +169,6 @@ void *sink_thread(void *argument) {
   }
   save_pose(run);
   lcm_sink_close(&run->sink.lcm);
-  notify_stopping(&run->sink.notify);
+  if (!atomic_load(&run->restarting)) notify_stopping(&run->sink.notify);
   return NULL;
 }

@@ -121,3 +121,15 @@ int wm_saved_pose_start(const wm_saved_pose *saved, double utc_s, double max_age
   out->sigma_heading_rad = sqrt(out->sigma_heading_rad * out->sigma_heading_rad + moved_rad * moved_rad);
   return 1;
 }
+
+void wm_start_from_estimate(const wm_estimate *e, double blind_s, wm_start *out) {
+  double speed_mps = sqrt(e->v_mps[0] * e->v_mps[0] + e->v_mps[1] * e->v_mps[1]);
+  double xy = sigma_xy(e->covariance), heading = sigma_heading(e->covariance);
+  double blind_m = speed_mps * blind_s, blind_rad = fabs(e->w_radps[2]) * blind_s;
+  wm_start_init(out);
+  memcpy(out->p_m, e->pose_map_base.p_m, sizeof out->p_m);
+  memcpy(out->q_xyzw, e->pose_map_base.q_xyzw, sizeof out->q_xyzw);
+  out->heading_rad = e->heading_rad;
+  out->sigma_xy_m = sqrt(xy * xy + blind_m * blind_m);
+  out->sigma_heading_rad = sqrt(heading * heading + blind_rad * blind_rad);
+}

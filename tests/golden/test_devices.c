@@ -184,6 +184,45 @@ static void a_run_begins_where_the_last_one_ended(void) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "start: where it was"), said);
 }
 
+static int reloads;
+static wm_status refuse_then_take(void *context, wm_error *err) {
+  atomic_int *asked = context;
+  if (reloads++ > 0) return WM_OK;
+  atomic_store(asked, 1);  // and again
+  return wm_fail(err, WM_BAD_CONFIG, "robot.yaml:3: is wrong");
+}
+
+// A wrong configuration is told and nothing else; a good one ends the run, which says where it is.
+static void another_configuration_is_taken_while_it_drives(void) {
+  wm_error err = {0};
+  wm_config config;
+  wm_start start;
+  bus can = {0};
+  atomic_int asked = 0;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(kConfig, strlen(kConfig), "test.yaml", &config, &err), err.text);
+  wm_recording *robot = robot_on(&can, &config);
+  wm_run_options options = {.seed = 1, .speed = 1, .duration_s = 0.6, .say = hear};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, robot, &options, &live, &err), err.text);
+  TEST_ASSERT_TRUE(live.has_last && !live.wants_restart);
+  wm_start_from_estimate(&live.last, 0.5, &start);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, live.last.pose_map_base.p_m[0], start.p_m[0]);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.45, start.sigma_xy_m);  // half a second at 1 m/s
+  wm_recording_close(robot);
+
+  robot = robot_on(&can, &config);
+  options = (wm_run_options){.seed = 1, .speed = 1, .duration_s = 30, .say = hear, .start = &start};
+  atomic_store(&asked, 1);
+  options.reload_asked = &asked;
+  options.reload = refuse_then_take;
+  options.reload_context = &asked;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, robot, &options, &live, &err), err.text);
+  TEST_ASSERT_EQUAL(2, reloads);
+  TEST_ASSERT_TRUE(live.wants_restart);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "robot.yaml:3: is wrong. The run goes on as it was"), said);
+  wm_recording_close(robot);
+  wm_config_free(&config);
+}
+
 // An interface that isn't there, by the configuration and the real kernel.
 static void a_run_without_its_interface_waits_and_says_so(void) {
   wm_error err = {0};
@@ -215,6 +254,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(the_log_of_a_run_on_devices_gives_its_poses_again);
   RUN_TEST(a_run_begins_where_the_last_one_ended);
+  RUN_TEST(another_configuration_is_taken_while_it_drives);
   RUN_TEST(a_run_without_its_interface_waits_and_says_so);
   return UNITY_END();
 }

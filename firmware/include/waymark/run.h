@@ -20,6 +20,13 @@ typedef struct wm_run_options {
   double speed;       // 1: real speed; on devices it has to be 1
   // Set it to 1 (from a signal handler or another thread) and the run ends in order. May be NULL.
   atomic_int *stop;
+  // Set it to 1 and `reload` is asked whether there is another configuration to go on with: WM_OK ends the run so that
+  // the caller can begin anew from report->last (report->wants_restart); an error is said, and the run goes on. On
+  // devices only. May be NULL.
+  atomic_int *reload_asked;
+  wm_status (*reload)(void *context, wm_error *err);
+  void *reload_context;
+  const wm_start *start;  // NULL: the saved pose, or the configuration's
   // What a person or a log should know while it runs, a line each; from any of the run's normal threads.
   wm_finding_fn say;
   void *say_context;
@@ -32,6 +39,9 @@ typedef struct wm_live_report {
   wm_time_ns loop_p99_ns, loop_max_ns;  // how long a cycle took
   wm_time_ns age_p99_ns;                // sent_ns minus t_ns of the poses
   int is_realtime, memory_locked;
+  int wants_restart;
+  int has_last;      // a pose was published
+  wm_estimate last;  // the last one
 } wm_live_report;
 
 // Returns when the recording is over, the duration is reached or *stop is set, and all is written. The calling thread

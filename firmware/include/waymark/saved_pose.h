@@ -19,6 +19,8 @@ wm_status wm_saved_pose_write(const char *path, const wm_estimate *pose, double 
 wm_status wm_saved_pose_read(const char *path, wm_saved_pose *out, wm_error *err);
 // Whether a pose tells anything to begin with: finite, not searching, not lost, sigma below 50 m and 1.5 rad.
 int wm_saved_pose_is_worth_it(const wm_estimate *pose);
+// The same as a start at once, in this process: `blind_s` of motion at its speed are added to its sigma.
+void wm_start_from_estimate(const wm_estimate *pose, double blind_s, wm_start *out);
 // As a start: older than max_age_s (by `utc_s` now) it is none: 0. The robot may have been moved since: moved_m and
 // moved_rad are added to its sigmas.
 int wm_saved_pose_start(const wm_saved_pose *saved, double utc_s, double max_age_s, double moved_m, double moved_rad,
