@@ -23,7 +23,7 @@ static wm_status allocate(uint64_t width, uint64_t height, const char *path, wm_
   if (status != WM_OK) return status;
   out->width_px = (uint32_t)width;
   out->height_px = (uint32_t)height;
-  out->pixels = malloc((size_t)width * height);
+  out->pixels = malloc((size_t)width * height + 1);
   return out->pixels ? WM_OK : wm_fail(err, WM_IO, "%s: no memory for its pixels", path);
 }
 

@@ -120,7 +120,8 @@ static wm_status read_layers(const wm_yaml_node *root, wm_warn_fn warn, void *co
   }
   wm_status status = drivable_of_image(root, &self->drivable, err);
   if (status != WM_OK) return status;
-  const wm_grey *e = &self->edges, *d = &self->drivable;
+  const wm_grey *e = &self->edges;
+  const wm_grey *d = &self->drivable;
   if (!e->pixels && !d->pixels)
     return wm_yaml_fail(root, err, "image: is missing, and so are layers.edges and layers.drivable; a map needs one");
   if (e->pixels && d->pixels && (e->width_px != d->width_px || e->height_px != d->height_px))
@@ -139,11 +140,12 @@ wm_status wm_map_load(const char *path, wm_warn_fn warn, void *context, wm_map *
   wm_status status = wm_yaml_load(path, &doc, err);
   if (status != WM_OK) return status;
   wm_map *self = calloc(1, sizeof *self);
+  if (!self) {
+    wm_yaml_free(doc);
+    return wm_fail(err, WM_IO, "%s: no memory to read it", path);
+  }
   wm_yaml_node root = wm_yaml_root(doc);
-  if (!self)
-    status = wm_fail(err, WM_IO, "%s: no memory to read it", path);
-  else if (!wm_yaml_is_map(&root))
-    status = wm_yaml_fail(&root, err, "a map with image, resolution and origin is needed");
+  if (!wm_yaml_is_map(&root)) status = wm_yaml_fail(&root, err, "a map with image, resolution and origin is needed");
   if (status == WM_OK) status = check_keys(&root, kKeys, warn, context, err);
   if (status == WM_OK) status = read_geometry(&root, &self->raster, err);
   if (status == WM_OK) status = read_layers(&root, warn, context, self, err);

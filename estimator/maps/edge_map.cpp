@@ -16,6 +16,12 @@ constexpr int8_t kNoLine = -128;
 
 int tiles_along(uint32_t pixels) { return (int)((pixels + edge_map::kTile - 1) >> edge_map::kTileShift); }
 
+int shift_for(int columns) {
+  int shift = 0;
+  while ((1 << shift) < columns) shift++;
+  return shift;
+}
+
 int reach_of(const wm_raster &raster) {
   const double pixels = edge_map::kReach_m / raster.resolution_m;
   return pixels < 2.0 ? 2 : pixels > edge_map::kReachPixelsMax ? edge_map::kReachPixelsMax : (int)pixels;
@@ -82,8 +88,8 @@ size_t edge_map::bytes(const wm_raster &raster) {
   });
   advance(rows + kNeighbours);
   if (count > kTilesMax) return 0;
-  return aligned((size_t)columns * (size_t)rows * sizeof(uint32_t)) + count * kTilePixels * (1 + sizeof(offset)) +
-         aligned((size_t)3 * raster.width_px * sizeof(int32_t));
+  return aligned(((size_t)(rows + 2) << shift_for(columns + 2)) * sizeof(uint32_t)) +
+         count * kTilePixels * (1 + sizeof(offset)) + aligned((size_t)3 * raster.width_px * sizeof(int32_t));
 }
 
 void edge_map::init(const wm_raster &raster, void *memory) {
@@ -95,7 +101,8 @@ void edge_map::init(const wm_raster &raster, void *memory) {
   unit_m_ = reach_px_ * raster.resolution_m / (kFar - 1);
   tile_columns_ = tiles_along(raster.width_px);
   tile_rows_ = tiles_along(raster.height_px);
-  const int directory = tile_columns_ * tile_rows_;
+  row_shift_ = shift_for(tile_columns_ + 2);
+  const int directory = (tile_rows_ + 2) << row_shift_;
   const auto place = [this](const void *there) {
     return (ptrdiff_t)(reinterpret_cast<uintptr_t>(there) - reinterpret_cast<uintptr_t>(this));
   };
@@ -105,7 +112,7 @@ void edge_map::init(const wm_raster &raster, void *memory) {
   each_tile_with_edges(raster, [&](int column, int row) {
     for (int y = row - kNeighbours; y <= row + kNeighbours; y++)
       for (int x = column - kNeighbours; x <= column + kNeighbours; x++)
-        if (x >= 0 && y >= 0 && x < tile_columns_ && y < tile_rows_) tile[y * tile_columns_ + x] = 1;
+        if (x >= 0 && y >= 0 && x < tile_columns_ && y < tile_rows_) tile[(y + 1) << row_shift_ | (x + 1)] = 1;
   });
   uint32_t count = 1;
   for (int i = 0; i < directory; i++)
@@ -132,7 +139,7 @@ void edge_map::sweep_columns() {
     for (int &a : above) a = none;
     for (int &b : below) b = none;
     for (int row = 0; row < (int)raster_->height_px; row++) {
-      const uint32_t tile = tiles()[(row >> kTileShift) * tile_columns_ + tx];
+      const uint32_t tile = tiles()[((row >> kTileShift) + 1) << row_shift_ | (tx + 1)];
       if (!tile) continue;  // out of reach: so is every edge above it
       const uint8_t *edges = raster_->edges + (size_t)row * raster_->width_px + (size_t)x0;
       offset *to = offsets() + tile + in_row(0, row);
@@ -142,7 +149,7 @@ void edge_map::sweep_columns() {
       }
     }
     for (int row = (int)raster_->height_px - 1; row >= 0; row--) {
-      const uint32_t tile = tiles()[(row >> kTileShift) * tile_columns_ + tx];
+      const uint32_t tile = tiles()[((row >> kTileShift) + 1) << row_shift_ | (tx + 1)];
       if (!tile) continue;
       const uint8_t *edges = raster_->edges + (size_t)row * raster_->width_px + (size_t)x0;
       offset *to = offsets() + tile + in_row(0, row);
@@ -156,7 +163,7 @@ void edge_map::sweep_columns() {
 
 // Second pass: the lower envelope of the parabolas that stand over a row's columns.
 void edge_map::sweep_row(int row) {
-  const uint32_t *tile = tiles() + (row >> kTileShift) * tile_columns_;
+  const uint32_t *tile = tiles() + (((row >> kTileShift) + 1) << row_shift_) + 1;
   uint8_t *distance = at<uint8_t>(distance_at_);
   offset *edge_offset = offsets();
   const int width = (int)raster_->width_px, none = reach_px_ + 1;
@@ -166,7 +173,7 @@ void edge_map::sweep_row(int row) {
     if (!tile[tx]) continue;
     const int end = (tx + 1) << kTileShift < width ? (tx + 1) << kTileShift : width;
     for (int column = tx << kTileShift; column < end; column++) {
-      const int y = edge_offset[tile[tx] + in_row(column, row)].y;
+      const int y = (int)edge_offset[tile[tx] + in_row(column, row)].y;  // signed
       if (y == none || y == -none) continue;
       int from = INT32_MIN;
       while (count > 0) {

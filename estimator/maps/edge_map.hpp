@@ -47,13 +47,15 @@ class edge_map {
   double yaw_sin() const { return sin_yaw_; }
   const wm_raster &raster() const { return *raster_; }
 
-  // For kernels: byte of pixel (column, row), both inside the map, is distances()[tiles()[tile] + inside].
+  // For kernels. The directory has a ring of tiles around the map in which every edge is out of reach, so that with
+  // kTile added and clamped to [0, padded_columns()), [0, padded_rows()) any pixel may be looked up: its byte is
+  // distances()[tiles()[row / kTile << row_shift() | column / kTile] + inside].
   const uint8_t *distances() const { return at<const uint8_t>(distance_at_); }
   const uint32_t *tiles() const { return at<const uint32_t>(tile_at_); }
-  int tile_columns() const { return tile_columns_; }
-  static int inside(int column, int row) {
-    return (row & 56) << 6 | (column & 56) << 3 | (row & 7) << 3 | (column & 7);
-  }
+  int padded_columns() const { return (tile_columns_ + 2) << kTileShift; }
+  int padded_rows() const { return (tile_rows_ + 2) << kTileShift; }
+  int row_shift() const { return row_shift_; }  // a row of tiles is 2^row_shift() of them
+  static int inside(int column, int row) { return (row & (kTile - 1)) << kTileShift | (column & (kTile - 1)); }
   int distance_of(int column, int row) const {
     return distances()[tile_of(column, row) + (uint32_t)inside(column, row)];
   }
@@ -67,11 +69,9 @@ class edge_map {
     int8_t x, y;   // or: normal in 1/256 of half a turn (unsigned), way along it to the line in 1/32 pixels
   };
   uint32_t tile_of(int column, int row) const {
-    return tiles()[(row >> kTileShift) * tile_columns_ + (column >> kTileShift)];
+    return tiles()[((row >> kTileShift) + 1) << row_shift_ | ((column >> kTileShift) + 1)];
   }
-  static uint32_t in_row(int column, int row) {
-    return (uint32_t)((row & (kTile - 1)) << kTileShift | (column & (kTile - 1)));
-  }
+  static uint32_t in_row(int column, int row) { return (uint32_t)inside(column, row); }
   offset *offsets() const { return at<offset>(offset_at_); }
   bool is_edge(int column, int row) const {
     return column >= 0 && row >= 0 && column < (int)raster_->width_px && row < (int)raster_->height_px &&
@@ -83,7 +83,7 @@ class edge_map {
 
   const wm_raster *raster_;
   double cos_yaw_, sin_yaw_, unit_m_;
-  int reach_px_, tile_columns_, tile_rows_;
+  int reach_px_, tile_columns_, tile_rows_, row_shift_;
   // Bytes from this object on, so that a copy of the whole state has a map of its own. Of each tile the index of its
   // first pixel, 0 where it is out of reach; then distances, offsets and a row's work space.
   ptrdiff_t tile_at_, distance_at_, offset_at_, scratch_at_;

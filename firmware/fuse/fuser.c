@@ -6,6 +6,7 @@
 
 #include "waymark/clock.h"
 
+#define PARTICLES_EVERY_NS WM_NS_PER_S
 #define Q_BIT(q) (UINT32_C(1) << (q))
 #define TICKS (Q_BIT(WM_Q_WHEEL_TICKS_LEFT) | Q_BIT(WM_Q_WHEEL_TICKS_RIGHT))
 #define SPEEDS                                                                                                    \
@@ -45,6 +46,7 @@ void wm_fuser_init(wm_fuser *self, const wm_estimator *estimator, void *state, w
   self->row_ns = WM_TIME_NONE;
   self->last_row_ns = WM_TIME_NONE;
   self->until_ns = WM_TIME_NONE;
+  self->particles_ns = WM_TIME_NONE;
 }
 
 int wm_estimate_has_pose(const wm_estimate *e) {
@@ -94,6 +96,20 @@ static wm_status correct(wm_fuser *self, const wm_event *event) {
   return WM_OK;
 }
 
+// Records have the size of the largest event, so who takes no points has no room for them.
+static void write_particles(wm_fuser *self, const wm_event *event) {
+  _Static_assert(sizeof(wm_particle_set) <= sizeof(wm_event), "a set fits where an event of points does");
+  const wm_estimator *e = self->estimator;
+  if (!e->particles || event->kind != WM_EVENT_POINTS) return;
+  if (self->particles_ns != WM_TIME_NONE && event->t_ns - self->particles_ns < PARTICLES_EVERY_NS) return;
+  self->particles_ns = event->t_ns;
+  wm_particle_set *set = &self->particles;
+  set->t_ns = event->t_ns;
+  set->total = (uint32_t)e->particles(self->state, set->particles, WM_PARTICLES_MAX);
+  set->count = set->total < WM_PARTICLES_MAX ? set->total : WM_PARTICLES_MAX;
+  self->output.put(self->output.context, WM_OUTPUT_PARTICLES, set, sizeof *set);
+}
+
 void wm_fuser_feed(wm_fuser *self, const wm_event *event) {
   if (self->row_ns != WM_TIME_NONE && event->t_ns > self->row_ns) write_row(self);
   self->output.put(self->output.context, WM_OUTPUT_EVENT, event, wm_event_bytes(event));
@@ -114,6 +130,7 @@ void wm_fuser_feed(wm_fuser *self, const wm_event *event) {
       counts->refused[status]++;
       return;
     }
+    write_particles(self, event);
   }
   self->until_ns = event->t_ns;
 }

@@ -87,6 +87,7 @@ typedef struct output_record {
     wm_estimate pose;
     wm_innovation innovation;
     wm_published published;
+    wm_particle_set particles;
     uint64_t gap;
   } as;
 } output_record;

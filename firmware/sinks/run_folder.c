@@ -17,9 +17,9 @@ typedef struct table {
   char buffer[1 << 16];
 } table;
 
-enum { TRAJECTORY_TUM, TRAJECTORY, PUBLISHED, INNOVATIONS, TABLE_COUNT };
-static const char *const kTables[TABLE_COUNT] = {"trajectory.tum", "trajectory.csv", "published.csv",
-                                                 "innovations.csv"};
+enum { TRAJECTORY_TUM, TRAJECTORY, PUBLISHED, INNOVATIONS, PARTICLES, TABLE_COUNT };
+static const char *const kTables[TABLE_COUNT] = {"trajectory.tum", "trajectory.csv", "published.csv", "innovations.csv",
+                                                 "particles.csv"};
 
 struct wm_run_folder {
   char dir[WM_PATH_MAX];
@@ -177,6 +177,20 @@ static void innovation(wm_run_folder *self, const wm_innovation *i) {
   end(self, INNOVATIONS);
 }
 
+static void particles(wm_run_folder *self, const wm_particle_set *set) {
+  for (uint32_t i = 0; i < set->count; i++) {
+    const wm_particle *p = &set->particles[i];
+    const double numbers[4] = {p->x_m, p->y_m, p->heading_rad, p->weight};
+    wm_row *line = begin(self);
+    wm_row_int(line, set->t_ns);
+    for (int k = 0; k < 4; k++) {
+      wm_row_char(line, ',');
+      wm_row_short(line, numbers[k]);
+    }
+    end(self, PARTICLES);
+  }
+}
+
 static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
   (void)bytes;
   wm_run_folder *self = context;
@@ -185,6 +199,7 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
     case WM_OUTPUT_POSE: fused_pose(self, record); break;
     case WM_OUTPUT_INNOVATION: innovation(self, record); break;
     case WM_OUTPUT_PUBLISHED: published(self, record); break;
+    case WM_OUTPUT_PARTICLES: particles(self, record); break;
     case WM_OUTPUT_HEALTH: break;  // written once, at the end
   }
 }
@@ -216,6 +231,7 @@ static wm_status make_dir(const char *dir, wm_error *err) {
 
 static wm_status open_table(wm_run_folder *self, int which, wm_error *err) {
   table *t = &self->tables[which];
+  if (which == PARTICLES && !self->assembly->config->estimator->particles) return WM_OK;
   (void)snprintf(t->path, sizeof t->path, "%s/%s", self->dir, kTables[which]);
   t->file = fopen(t->path, "we");
   if (!t->file) return wm_fail(err, WM_IO, "%s: can't be written: %s", t->path, strerror(errno));
@@ -243,6 +259,10 @@ wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_ru
   }
   wm_row_text(begin(self), "t_ns,source,sensor,landmark,residual,observed,expected,variance,nis,gate,verdict");
   end(self, INNOVATIONS);
+  if (self->tables[PARTICLES].file) {
+    wm_row_text(begin(self), "t_ns,x_m,y_m,heading_rad,weight");
+    end(self, PARTICLES);
+  }
   *out = self;
   return WM_OK;
 }
@@ -253,6 +273,7 @@ wm_status wm_run_folder_flush(wm_run_folder *self, wm_error *err) {
     return wm_fail(err, WM_IO, "%s/events.wmlog: can't be written on: %s", self->dir, strerror(self->log.failed));
   for (int i = 0; i < TABLE_COUNT; i++) {
     table *t = &self->tables[i];
+    if (!t->file) continue;
     if (fflush(t->file) != 0 && !t->failed) t->failed = errno ? errno : EIO;
     if (t->failed) return wm_fail(err, WM_IO, "%s: can't be written on: %s", t->path, strerror(t->failed));
   }

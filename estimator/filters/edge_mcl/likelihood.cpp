@@ -6,43 +6,29 @@
 namespace wm {
 namespace {
 
-typedef float lanes __attribute__((vector_size(4 * kScanLanes), aligned(16), may_alias));
-typedef int32_t int_lanes __attribute__((vector_size(4 * kScanLanes), aligned(16), may_alias));
+constexpr int kLanes = 4;  // SSE2 and NEON have them everywhere
+typedef float lanes __attribute__((vector_size(4 * kLanes), may_alias));
+typedef int32_t int_lanes __attribute__((vector_size(4 * kLanes), may_alias));
 
-// The pose as what takes a point to pixels: column = c0 + c x - s y, row = r0 - s x - c y.
+// The pose as what takes a point to pixels of the padded map: column = c0 + c x - s y, row = r0 - s x - c y.
 struct pixel_pose {
   float c0, r0, c, s;
-  bool whole;  // every point falls into the map
 };
 
-pixel_pose pose_in_pixels(const edge_map &map, const scan_points &points, double x_m, double y_m, double heading_cos,
-                          double heading_sin) {
+pixel_pose pose_in_pixels(const edge_map &map, double x_m, double y_m, double heading_cos, double heading_sin) {
   double u, v;
   map.to_pixels(x_m, y_m, &u, &v);
   const double inverse = 1.0 / map.pixel_m();
   const double c = (heading_cos * map.yaw_cos() + heading_sin * map.yaw_sin()) * inverse;
   const double s = (heading_sin * map.yaw_cos() - heading_cos * map.yaw_sin()) * inverse;
-  const double reach = (double)points.reach_m * inverse + 2.0;
-  const wm_raster &r = map.raster();
-  const bool whole = u >= reach && v >= reach && u + reach < r.width_px && v + reach < r.height_px;
-  return {(float)u, (float)v, (float)c, (float)s, whole};
+  return {(float)(u + edge_map::kTile), (float)(v + edge_map::kTile), (float)c, (float)s};
 }
 
-// A map's byte under one point; the same operations in the same order as a lane's.
-int byte_under(const edge_map &map, const pixel_pose &p, float x, float y) {
-  const float column = p.c0 + (p.c * x - p.s * y), row = p.r0 - (p.s * x + p.c * y);
-  const wm_raster &r = map.raster();
-  if (!(column >= 0.0f && row >= 0.0f && column < (float)r.width_px && row < (float)r.height_px)) return edge_map::kFar;
-  return map.distance_of((int)column, (int)row);
-}
-
-int32_t score_one_by_one(const edge_map &map, const scan_points &points, const score_table &table,
-                         const pixel_pose &p) {
-  int32_t sum = 0;
-  for (int k = 0, from = 0; k < kSigmaClasses; from = points.class_end[k++])
-    for (int i = from; i < points.class_end[k]; i++)
-      sum += table.value[k][byte_under(map, p, points.x_m[i], points.y_m[i])];
-  return sum;
+// NaN becomes 0: the ring.
+template <class Number>
+Number clamp(Number value, Number zero, Number most) {
+  value = value > zero ? value : zero;
+  return value < most ? value : most;
 }
 
 }  // namespace
@@ -61,24 +47,39 @@ void make_score_table(const edge_map &map, const double sigma_m[kSigmaClasses], 
 
 int32_t score_scalar(const edge_map &map, const scan_points &points, const score_table &table, double x_m, double y_m,
                      double heading_cos, double heading_sin) {
-  return score_one_by_one(map, points, table, pose_in_pixels(map, points, x_m, y_m, heading_cos, heading_sin));
+  const pixel_pose p = pose_in_pixels(map, x_m, y_m, heading_cos, heading_sin);
+  const float most_column = (float)(map.padded_columns() - 1), most_row = (float)(map.padded_rows() - 1);
+  int32_t sum = 0;
+  for (int k = 0, i = 0; k < kSigmaClasses; k++)
+    for (; i < points.class_end[k]; i++) {
+      const float x = points.x_m[i], y = points.y_m[i];
+      const int column = (int)clamp(p.c0 + (p.c * x - p.s * y), 0.0f, most_column);
+      const int row = (int)clamp(p.r0 - (p.s * x + p.c * y), 0.0f, most_row);
+      const uint32_t tile =
+          map.tiles()[(row >> edge_map::kTileShift) << map.row_shift() | (column >> edge_map::kTileShift)];
+      sum += table.value[k][map.distances()[tile + (uint32_t)edge_map::inside(column, row)]];
+    }
+  return sum;
 }
 
 int32_t score(const edge_map &map, const scan_points &points, const score_table &table, double x_m, double y_m,
               double heading_cos, double heading_sin) {
-  const pixel_pose p = pose_in_pixels(map, points, x_m, y_m, heading_cos, heading_sin);
-  if (!p.whole) return score_one_by_one(map, points, table, p);
+  const pixel_pose p = pose_in_pixels(map, x_m, y_m, heading_cos, heading_sin);
+  const lanes zero = {}, most_column = zero + (float)(map.padded_columns() - 1),
+              most_row = zero + (float)(map.padded_rows() - 1);
   // First where each point falls, then what is there: the second loop is loads and additions only.
   alignas(16) int32_t tile[WM_POINTS_MAX + kScanLanes], inside[WM_POINTS_MAX + kScanLanes];
-  const int32_t columns = map.tile_columns();
-  for (int i = 0; i < points.count; i += kScanLanes) {
+  const int shift = map.row_shift();
+  for (int i = 0; i < points.count; i += kLanes) {
     const lanes x = *reinterpret_cast<const lanes *>(points.x_m + i);
     const lanes y = *reinterpret_cast<const lanes *>(points.y_m + i);
-    const int_lanes column = __builtin_convertvector(p.c0 + (p.c * x - p.s * y), int_lanes);
-    const int_lanes row = __builtin_convertvector(p.r0 - (p.s * x + p.c * y), int_lanes);
+    const lanes u = clamp(p.c0 + (p.c * x - p.s * y), zero, most_column);
+    const lanes v = clamp(p.r0 - (p.s * x + p.c * y), zero, most_row);
+    const int_lanes column = __builtin_convertvector(u, int_lanes), row = __builtin_convertvector(v, int_lanes);
     *reinterpret_cast<int_lanes *>(tile + i) =
-        (row >> edge_map::kTileShift) * columns + (column >> edge_map::kTileShift);
-    *reinterpret_cast<int_lanes *>(inside + i) = (row & 56) << 6 | (column & 56) << 3 | (row & 7) << 3 | (column & 7);
+        (row >> edge_map::kTileShift) << shift | (column >> edge_map::kTileShift);
+    *reinterpret_cast<int_lanes *>(inside + i) =
+        (row & (edge_map::kTile - 1)) << edge_map::kTileShift | (column & (edge_map::kTile - 1));
   }
   const uint32_t *tiles = map.tiles();
   const uint8_t *distances = map.distances();

@@ -148,9 +148,9 @@ bool place_search::step(const edge_map &map, int poses, const wm_pose2 &odom) {
   const int64_t cells = columns * rows;
   int cells_left = 20 * poses;  // a map of little floor is not swept in one go, either
   for (; next_ < cells && poses > 0 && cells_left > 0; next_++, cells_left--) {
+    const int64_t column = next_ % columns, row = next_ / columns;
     wm_pose2 pose;
-    map.to_map(((double)(next_ % columns) + 0.5) * grid_px, ((double)(next_ / columns) + 0.5) * grid_px, &pose.x_m,
-               &pose.y_m);
+    map.to_map(((double)column + 0.5) * grid_px, ((double)row + 0.5) * grid_px, &pose.x_m, &pose.y_m);
     if (!map.drivable(pose.x_m, pose.y_m)) continue;
     for (int k = 0; k < kHeadings; k++) {
       pose.heading_rad = wrap(k * (kTwoPi / kHeadings));

@@ -42,6 +42,8 @@ typedef struct wm_fuser {
   uint64_t events, innovations, poses;
   wm_fuser_counts counts[WM_SOURCES_MAX];
   wm_histogram predict_ns, correct_ns;
+  wm_time_ns particles_ns;  // when they were written last
+  wm_particle_set particles;
 } wm_fuser;
 
 // `state` is made by estimator->init already.

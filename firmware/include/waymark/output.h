@@ -6,6 +6,7 @@
 
 #include <stddef.h>
 
+#include "waymark/estimator.h"
 #include "waymark/event.h"
 #include "waymark/health.h"
 #include "waymark/pose.h"
@@ -15,8 +16,17 @@ typedef enum wm_output_kind {
   WM_OUTPUT_POSE,        // wm_estimate: fused, at a stamp of the driving motion
   WM_OUTPUT_INNOVATION,  // wm_innovation
   WM_OUTPUT_PUBLISHED,   // wm_published
-  WM_OUTPUT_HEALTH       // wm_health
+  WM_OUTPUT_HEALTH,      // wm_health
+  WM_OUTPUT_PARTICLES    // wm_particle_set, once a second
 } wm_output_kind;
+
+// A cloud of particles, or as much of it as a record of points has room for.
+#define WM_PARTICLES_MAX 240
+typedef struct wm_particle_set {
+  wm_time_ns t_ns;
+  uint32_t count, total;
+  wm_particle particles[WM_PARTICLES_MAX];
+} wm_particle_set;
 
 typedef struct wm_output {
   void (*put)(void *context, wm_output_kind kind, const void *record, size_t bytes);

@@ -20,7 +20,7 @@ struct drawn {
   wm::edge_map map;
   void *memory;
 
-  drawn(int w, int h, double yaw) : width(w), height(h), edges((size_t)(w * h), 0), memory(nullptr) {
+  drawn(int w, int h, double yaw) : width(w), height(h), edges((size_t)w * (size_t)h, 0), memory(nullptr) {
     raster = {(uint32_t)w, (uint32_t)h, kPixel_m, -3.0, 2.0, yaw, edges.data(), nullptr, 0};
   }
   ~drawn() { free(memory); }
@@ -38,7 +38,7 @@ struct drawn {
   void line(double x0, double y0, double x1, double y1) {
     for (int i = 0; i <= 4000; i++) {
       const int x = (int)(x0 + (x1 - x0) * i / 4000), y = (int)(y0 + (y1 - y0) * i / 4000);
-      edges[(size_t)(y * width + x)] = 255;
+      edges[(size_t)y * (size_t)width + (size_t)x] = 255;
     }
   }
 };
@@ -55,7 +55,7 @@ void distances_are_exact(void) {
       int best = 1 << 30;
       for (int y = row - reach; y <= row + reach; y++)
         for (int x = column - reach; x <= column + reach; x++)
-          if (x >= 0 && y >= 0 && x < d.width && y < d.height && d.edges[(size_t)(y * d.width + x)]) {
+          if (x >= 0 && y >= 0 && x < d.width && y < d.height && d.edges[(size_t)y * (size_t)d.width + (size_t)x]) {
             const int square = (x - column) * (x - column) + (y - row) * (y - row);
             if (square < best) best = square;
           }

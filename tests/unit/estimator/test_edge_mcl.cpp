@@ -228,11 +228,11 @@ void setUp(void) {
     for (int i = 0; i <= 4000; i++) {
       const int column = (int)((w.ax + (w.bx - w.ax) * i / 4000) / kPixel_m);
       const int row = kHeight - 1 - (int)((w.ay + (w.by - w.ay) * i / 4000) / kPixel_m);
-      edges[(size_t)(row * kWidth + column)] = 255;
+      edges[(size_t)row * kWidth + (size_t)column] = 255;
     }
   for (int row = 0; row < kHeight; row++)
     for (int column = 0; column < kWidth; column++)
-      drivable[(size_t)(row * kWidth + column)] =
+      drivable[(size_t)row * kWidth + (size_t)column] =
           inside((column + 0.5) * kPixel_m, (kHeight - 0.5 - row) * kPixel_m) ? 255 : 0;
   map = {kWidth, kHeight, kPixel_m, 0, 0, 0, edges.data(), drivable.data(), 1};
   wm_rig_init(&rig);

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// What edge_mcl's parts cost on a map of 4676 x 1372 pixels at 75 a metre: making the map ready, the update of a
+// cloud's weights by 180 points, one whole scan. Medians of single calls, one thread. With a map.yaml as its argument,
+// that file's loading and making ready.
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "filters/edge_mcl/cloud.hpp"
+#include "waymark/estimator.h"
+#include "waymark/map.h"
+#include "waymark/random.h"
+
+namespace {
+
+constexpr int kWidth = 4676, kHeight = 1372;
+constexpr double kPixel_m = 1.0 / 75;
+
+double now_us() {
+  timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return (double)t.tv_sec * 1e6 + (double)t.tv_nsec * 1e-3;
+}
+
+double median(std::vector<double> v) {
+  std::nth_element(v.begin(), v.begin() + (std::ptrdiff_t)v.size() / 2, v.end());
+  return v[v.size() / 2];
+}
+
+template <class Work>
+double time_us(int runs, Work work) {
+  std::vector<double> each;
+  for (int i = 0; i < runs; i++) {
+    const double begin = now_us();
+    work();
+    each.push_back(now_us() - begin);
+  }
+  return median(each);
+}
+
+// Two corridors and what joins them, with recesses, as a building of this size has.
+std::vector<uint8_t> draw() {
+  std::vector<uint8_t> edges((size_t)kWidth * kHeight, 0);
+  const auto line = [&](int x0, int y0, int x1, int y1) {
+    const int steps = std::max(std::abs(x1 - x0), std::abs(y1 - y0));
+    for (int i = 0; i <= steps; i++)
+      edges[(size_t)(y0 + (y1 - y0) * i / steps) * kWidth + (size_t)(x0 + (x1 - x0) * i / steps)] = 255;
+  };
+  for (int y : {150, 330, 1000, 1180})
+    for (int x = 100; x < 4500; x += 200) {
+      line(x, y, x + 130, y);
+      line(x + 130, y, x + 130, y + 15);
+      line(x + 130, y + 15, x + 200, y + 15);
+      line(x + 200, y + 15, x + 200, y);
+    }
+  for (int x : {1000, 1180, 3000, 3180}) line(x, 345, x, 1000);
+  return edges;
+}
+
+struct ready_map {
+  wm::edge_map map;
+  void *memory = nullptr;
+  size_t bytes = 0;
+  ~ready_map() { free(memory); }
+  void make(const wm_raster &raster) {
+    bytes = wm::edge_map::bytes(raster);
+    if (!memory) memory = aligned_alloc(64, (bytes + 63) / 64 * 64);
+    map.init(raster, memory);
+  }
+};
+
+void bench_cloud(const wm::edge_map &map, int particles) {
+  std::vector<double> memory(wm::cloud::bytes(particles) / sizeof(double));
+  const auto cloud = std::make_unique<wm::cloud>();
+  cloud->init(particles, 1, memory.data());
+  double x, y;
+  map.to_map(2000, 240, &x, &y);
+  const double covariance[3][3] = {{0.0025, 0, 0}, {0, 0.0025, 0}, {0, 0, 0.0004}};
+  const auto points = std::make_unique<wm::scan_points>();
+  points->count = 180;
+  points->reach_m = 6.0f;
+  for (int i = 0; i < 180; i++) {
+    const double range = 1 + 5 * wm_random_uniform(1, 1, (uint64_t)i), side = i % 2 ? 1.2 : -1.2;
+    points->x_m[i] = (float)range;
+    points->y_m[i] = (float)side;
+  }
+  for (int k = 0; k < wm::kSigmaClasses; k++) points->class_end[k] = 45 * (k + 1);
+  const double sigma[wm::kSigmaClasses] = {0.05, 0.06, 0.08, 0.12};
+  wm::score_table table;
+  wm::make_score_table(map, sigma, 0.05, false, &table);
+  volatile int32_t sink = 0;
+  cloud->spread({x, y, 0}, covariance);
+  const double likelihood = time_us(2001, [&] {
+    int32_t sum = 0;
+    for (int i = 0; i < particles; i++)
+      sum += wm::score(map, *points, table, cloud->x(i), cloud->y(i), 1.0 - 1e-4 * i / particles, 0.01 * i / particles);
+    sink = sink + sum;
+  });
+  const double update = time_us(2001, [&] {
+    cloud->spread({x, y, 0}, covariance);
+    (void)cloud->weigh(map, *points, table, 0.08, false);
+  });
+  const double spread = time_us(2001, [&] { cloud->spread({x, y, 0}, covariance); });
+  const double move = time_us(2001, [&] { cloud->move({0.05, 0, 0.001}, {0.005, 0.003, 0.003}); });
+  const double resample = time_us(2001, [&] { cloud->resample(); });
+  std::printf(
+      "%5d particles x 180 points: likelihood %8.1f us, weights %8.1f us, moving %7.1f us, resampling %7.1f us\n",
+      particles, likelihood, update - spread, move, resample);
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  const std::vector<uint8_t> edges = draw();
+  const wm_raster raster = {kWidth, kHeight, kPixel_m, 0, 0, 0, edges.data(), nullptr, 0};
+  ready_map made;
+  const double ready = time_us(11, [&] { made.make(raster); });
+  std::printf("map of %d x %d pixels made ready in %.1f ms, %.1f MB\n", kWidth, kHeight, ready * 1e-3,
+              (double)made.bytes * 1e-6);
+  bench_cloud(made.map, 200);
+  bench_cloud(made.map, 2000);
+  if (argc > 1) {
+    wm_map *loaded = nullptr;
+    wm_error err = {};
+    const double load = time_us(5, [&] {
+      wm_map_free(loaded);
+      if (wm_map_load(argv[1], nullptr, nullptr, &loaded, &err) != WM_OK) std::fprintf(stderr, "%s\n", err.text);
+    });
+    if (!loaded) return 1;
+    ready_map real;
+    const double build = time_us(5, [&] { real.make(*wm_map_raster(loaded)); });
+    std::printf("%s: %u x %u pixels loaded in %.1f ms, made ready in %.1f ms, %.1f MB\n", argv[1],
+                wm_map_raster(loaded)->width_px, wm_map_raster(loaded)->height_px, load * 1e-3, build * 1e-3,
+                (double)real.bytes * 1e-6);
+    wm_map_free(loaded);
+  }
+  return 0;
+}
