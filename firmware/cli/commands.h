@@ -31,6 +31,10 @@ wm_status check_out_dir(const char *out_dir, const char *input, wm_error *err);
 // Counts and state of a run, for a person, on standard output.
 void print_report(const wm_run_report *report, const char *name, const char *out_dir, double took_s);
 
+// A desk's command: the program waymark-COMMAND in this one's folder, then in PATH, as git finds its own, in the place
+// of this one. Returns only if there is none.
+void run_desk_command(const char *command, char *const *argv);
+
 // A line on a terminal with the time that is left, from two seconds on; nothing when the output is not a terminal.
 typedef struct progress_line {
   wm_time_ns begin_ns;

@@ -91,3 +91,18 @@ void progress_show(void *context, double done) {
 void progress_end(progress_line *self) {
   if (self->shown) (void)fputs("\r\033[K", stderr);
 }
+
+void run_desk_command(const char *command, char *const *argv) {
+  if (strchr(command, '/')) return;
+  char self[WM_PATH_MAX], path[WM_PATH_MAX + 80];
+  ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
+  if (length > 0) {
+    self[length] = '\0';
+    char *slash = strrchr(self, '/');
+    if (slash) *slash = '\0';
+    (void)snprintf(path, sizeof path, "%s/waymark-%s", self, command);
+    (void)execv(path, argv);
+  }
+  (void)snprintf(path, sizeof path, "waymark-%s", command);
+  (void)execvp(path, argv);
+}

@@ -35,23 +35,6 @@ static const struct {
                  {"record", command_record}, {"watch", command_watch},   {"doctor", command_doctor}};
 #define COMMANDS (sizeof kCommands / sizeof kCommands[0])
 
-// Programs named waymark-COMMAND in this one's folder, then in PATH, as git finds its own. Returns only if there is
-// none.
-static void try_external(const char *command, char **argv) {
-  if (strchr(command, '/')) return;
-  char self[WM_PATH_MAX], path[WM_PATH_MAX + 80];
-  ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
-  if (length > 0) {
-    self[length] = '\0';
-    char *slash = strrchr(self, '/');
-    if (slash) *slash = '\0';
-    (void)snprintf(path, sizeof path, "%s/waymark-%s", self, command);
-    (void)execv(path, argv);
-  }
-  (void)snprintf(path, sizeof path, "waymark-%s", command);
-  (void)execvp(path, argv);
-}
-
 int main(int argc, char **argv) {
   const char *command = argc > 1 ? argv[1] : NULL;
   if (!command) {
@@ -69,9 +52,10 @@ int main(int argc, char **argv) {
   for (size_t i = 0; i < COMMANDS; i++)
     if (strcmp(command, kCommands[i].name) == 0) return kCommands[i].run(argc - 2, argv + 2);
 
-  try_external(command, argv + 1);
-  static const char *const kNames[] = {"run",  "replay", "record", "watch",    "check", "doctor",
-                                       "help", "eval",   "report", "simulate", "diff",  NULL};
+  run_desk_command(command, argv + 1);
+  static const char *const kNames[] = {"run",    "replay",    "record", "watch",     "check",
+                                       "doctor", "help",      "eval",   "report",    "simulate",
+                                       "diff",   "calibrate", "map",    "reference", NULL};
   const char *nearest = wm_word_nearest(command, kNames);
   if (nearest && strcmp(nearest, command) != 0) {
     (void)fprintf(stderr, "waymark: '%s' is no command; did you mean '%s'? (waymark help lists them)\n", command,

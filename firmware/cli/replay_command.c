@@ -26,6 +26,8 @@ static const char kHelp[] =
     "  --landmarks FILE    instead of the recording's map; an event log refuses any map but its own\n"
     "  --calibration FILE  instead of the recording's\n"
     "  --map FILE          a map.yaml instead of the recording's; an event log refuses any but its own\n"
+    "  --reference         also reference.csv: all of the drive looked at as a whole (edges on a raster map; at a "
+    "desk)\n"
     "\n"
     "example:\n"
     "  waymark replay RECORDING --config config/starry-night-plan.yaml --out out/run\n"
@@ -34,6 +36,7 @@ static const char kHelp[] =
 typedef struct arguments {
   const char *config, *out, *landmarks, *calibration, *map;
   uint64_t seed;
+  int reference;
   const char *what;
 } arguments;
 
@@ -130,6 +133,17 @@ static int replay_log(const arguments *args) {
   return status == WM_OK ? EXIT_DONE : complain(&err);
 }
 
+// The desk's program goes on where the replay ended.
+static int make_reference(const arguments *args) {
+  char program[] = "waymark-reference", map[] = "--map";
+  char *const words[] = {program, (char *)args->out, (char *)args->what, args->map ? map : NULL, (char *)args->map,
+                         NULL};
+  (void)fflush(stdout);
+  run_desk_command("reference", words);
+  (void)fputs("waymark: --reference needs the desk's program waymark-reference (package waymark-tools)\n", stderr);
+  return EXIT_WORK_FAILED;
+}
+
 // A run's folder where a recording's was meant: its log can be replayed.
 static int is_run_folder(const char *dir) {
   char recording[WM_PATH_MAX + 32], log[WM_PATH_MAX + 32];
@@ -148,6 +162,7 @@ int command_replay(int argc, char *const *argv) {
                             {"--landmarks", OPTION_TEXT, &args.landmarks},
                             {"--calibration", OPTION_TEXT, &args.calibration},
                             {"--map", OPTION_TEXT, &args.map},
+                            {"--reference", OPTION_FLAG, &args.reference},
                             {"--help", OPTION_FLAG, &help},
                             {"-h", OPTION_FLAG, &help}};
   wm_error err = {0};
@@ -170,10 +185,15 @@ int command_replay(int argc, char *const *argv) {
                   args.what);
     return EXIT_USAGE;
   }
-  if (stat(args.what, &there) == 0 && !S_ISDIR(there.st_mode)) return replay_log(&args);
+  if (stat(args.what, &there) == 0 && !S_ISDIR(there.st_mode)) {
+    if (!args.reference) return replay_log(&args);
+    (void)fputs("waymark: --reference needs the recording, whose map it takes\n", stderr);
+    return EXIT_USAGE;
+  }
   if (!args.config) {
     (void)fprintf(stderr, "waymark: replay of a recording needs --config FILE\n\n%s", kHelp);
     return EXIT_USAGE;
   }
-  return replay_recording(&args);
+  const int code = replay_recording(&args);
+  return code == EXIT_DONE && args.reference ? make_reference(&args) : code;
 }

@@ -140,6 +140,16 @@ Trajectory load_trajectory(const fs::path &run) {
   return out;
 }
 
+Trajectory load_reference(const fs::path &run) {
+  if (!fs::exists(run / "reference.csv"))
+    throw Failure((run / "reference.csv").string() + ": is not there; waymark replay --reference writes it");
+  Trajectory out = load_csv(run / "reference.csv");
+  out.planar = true;
+  out.has_covariance = false;
+  if (out.poses.empty()) throw Failure((run / "reference.csv").string() + ": has no pose in it");
+  return out;
+}
+
 Published load_published(const fs::path &run) {
   if (!fs::is_directory(run))
     throw Failure(run.string() + ": is no folder; RUN is what `waymark replay --out RUN` wrote", kUsage);

@@ -21,6 +21,9 @@ struct Trajectory {
 // same stamp the last counts. Throws Failure: neither file there, nothing in it, stamps that run back.
 Trajectory load_trajectory(const std::filesystem::path &run);
 
+// reference.csv: the smoothed trajectory. Throws Failure: not there, nothing in it.
+Trajectory load_reference(const std::filesystem::path &run);
+
 // A row of published.csv beyond the pose itself.
 struct PublishedRow {
   int64_t t_ns, sent_ns, fused_until_ns;

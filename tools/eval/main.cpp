@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 struct Arguments {
   std::string run, recording, align = "none", against = "truth", detector, camera;
   std::vector<double> view_m;
-  bool json = false, published = false;
+  bool json = false, published = false, reference = false;
   CompareOptions compare;
 };
 
@@ -30,6 +30,7 @@ void parse(CLI::App *app, Arguments *a) {
   app->add_option("REC", a->recording, "folder of the recording, with truth.csv")->required();
   app->add_flag("--json", a->json, "one JSON object; null where a figure is not defined");
   app->add_flag("--published", a->published, "judge published.csv, what was sent, instead of the fused poses");
+  app->add_flag("--reference", a->reference, "judge reference.csv, the smoothed trajectory")->excludes("--published");
   app->add_option("--align", a->align, "move the run onto truth first")
       ->check(CLI::IsMember({"none", "se2", "sim2", "se3"}))
       ->capture_default_str();
@@ -70,7 +71,8 @@ Figures evaluate(const Arguments &a) {
   const fs::path recording = a.recording;
   const bool gnss = a.against == "gnss";
   const Published published = a.published ? load_published(run) : Published{};
-  const Trajectory trajectory = a.published ? published.trajectory : load_trajectory(run);
+  const Trajectory trajectory =
+      a.published ? published.trajectory : (a.reference ? load_reference(run) : load_trajectory(run));
   CompareOptions options = a.compare;
   options.align = alignment_of(a.align);
   options.against_gnss = gnss;
@@ -104,7 +106,8 @@ int main(int argc, char **argv) {
       return kDone;
     }
     const Figures figures = evaluate(arguments);
-    const std::string title = arguments.run + (arguments.published ? " (published)" : "");
+    const std::string title =
+        arguments.run + (arguments.published ? " (published)" : (arguments.reference ? " (reference)" : ""));
     const std::string text = arguments.json ? figures.dump(1) + "\n" : figures_table(figures, title, arguments.against);
     std::fputs(text.c_str(), stdout);
     return kDone;

@@ -101,6 +101,14 @@ expect 0 'good' "$bin/waymark-map" check "$dir/map/map.yaml" --draw "$dir/drawn.
 expect 0 'in 1 areas' "$bin/waymark-map" make "$dir/map/map.yaml" --out "$dir/map3"
 expect 2 'nowhere' "$bin/waymark-map" check "$dir/nowhere.yaml"
 
+# The reference trajectory.
+expect 0 'waymark replay recordings/corridor' "$bin/waymark-reference" --help
+expect 2 'map.yaml' "$bin/waymark-reference" "$dir/run" "$dir/empty"
+expect 1 'published.csv' "$bin/waymark-reference" "$dir/run" "$dir/empty" --map "$dir/map/map.yaml"
+expect 1 'waymark replay --reference writes it' "$bin/waymark-eval" "$dir/run" "$dir/rec" --reference
+printf 't_ns,x_m,y_m,z_m,qx,qy,qz,qw\n0,0,0.2,0,0,0,0,1\n900000000,0.9,0.2,0,0,0,0,1\n' >"$dir/run/reference.csv"
+expect 0 '(reference) against truth' "$bin/waymark-eval" "$dir/run" "$dir/rec" --reference
+
 # JSON is JSON: every field of the format is there, nothing is NaN.
 if ! "$bin/waymark-eval" "$dir/run" "$dir/rec" --json | python3 -c '
 import json, sys
