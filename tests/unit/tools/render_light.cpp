@@ -254,6 +254,21 @@ void test_motion_blur_smears_what_moves(void) {
   TEST_ASSERT_INT_WITHIN(2, 16, width(400000000));
 }
 
+// Somebody who turns round within the exposure is still there in its middle, where a single ray looks.
+void test_who_turns_round_at_once_stays_whole(void) {
+  Scene scene;
+  Material glow;
+  glow.albedo = Colour(0.0f), glow.emission = Colour(1.0f);
+  Mover mover;
+  mover.mesh = cylinder(Pose::Identity(), 0.5, 2, 16, scene.add(glow));
+  mover.T_map_mover = [](int64_t t_ns) { return pose_xyz_rpy({3, 0, -1}, 0, 0, t_ns < 0 ? 0 : kPi); };
+  scene.add(std::move(mover));
+  scene.sky = {Colour(0.0f), Colour(0.0f), Colour(0.0f)};
+  commit(scene);
+  const Image image = render(scene, pinhole(21, 21, 20), {.samples = 1}, at({0, 0, 0}, 0, 8000000));
+  TEST_ASSERT_FLOAT_WITHIN(0.01f, 1, image.values[10 * 21 + 10]);
+}
+
 void test_water_dims_and_hazes(void) {
   Scene scene;
   Material wall;
@@ -298,6 +313,7 @@ int main(void) {
   RUN_TEST(test_textures_far_away_become_their_mean);
   RUN_TEST(test_mirror_shows_what_stands_on_it);
   RUN_TEST(test_motion_blur_smears_what_moves);
+  RUN_TEST(test_who_turns_round_at_once_stays_whole);
   RUN_TEST(test_water_dims_and_hazes);
   RUN_TEST(test_what_cannot_be_is_refused);
   return UNITY_END();

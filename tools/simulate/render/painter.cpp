@@ -221,9 +221,12 @@ void PainterOf<C>::place_movers(const Shot &shot, double reach_ns) {
     RTCGeometry instance = rtcNewGeometry(data.device, RTC_GEOMETRY_TYPE_INSTANCE);
     rtcSetGeometryInstancedScene(instance, shape.scene);
     rtcSetGeometryTimeStepCount(instance, 2);
+    const Pose middle = mover.T_map_mover(shot.t_ns);
     Vec3 ends[2];
     for (unsigned step = 0; step < 2; step++) {
-      const Pose T = mover.T_map_mover(shot.t_ns + std::llround(step ? reach_ns : -reach_ns));
+      Pose T = mover.T_map_mover(shot.t_ns + std::llround(step ? reach_ns : -reach_ns));
+      // Who turns round at once would be flat in between, where matrices go linearly: their inverse has no numbers.
+      if ((middle.linear().transpose() * T.linear()).trace() < 2) T.linear() = middle.linear();  // 60 degrees
       float columns[12];
       for (int k = 0; k < 12; k++) columns[k] = static_cast<float>(T.matrix()(k % 3, k / 3));
       rtcSetGeometryTransform(instance, step, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns);
@@ -233,7 +236,7 @@ void PainterOf<C>::place_movers(const Shot &shot, double reach_ns) {
     rtcAttachGeometryByID(frame_.moving, instance, static_cast<unsigned>(i));
     rtcReleaseGeometry(instance);
 
-    const Pose T = mover.T_map_mover(shot.t_ns);
+    const Pose &T = middle;
     Moving<C> moving{};
     put(0.5 * (ends[0] + ends[1]), moving.centre);
     // A little more than it is: rays are weighed in single precision.
