@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# The demo: a car turns left at a crossing with 0, 1, 2 and 3 known landmarks in view. Simulates, localizes, judges;
-# prints a table and makes a report and a picture. Needs the programs in build/bin (./dev demo builds them first).
+# The demo: a car turns left at a crossing. First in a rendered world with two fisheye cameras, then with 0, 1, 2 and 3
+# known landmarks in view. Simulates, localizes, judges; prints tables and makes a report and a picture. Needs the
+# programs in build/bin (./dev demo builds them first).
 # usage: demo.sh [OUT]    OUT is build/demo if it isn't given
 set -euo pipefail
 cd "$(dirname "$(readlink -f "$0")")/../.."
@@ -9,6 +10,8 @@ export LC_ALL=C
 
 waymark=build/bin/waymark
 out=${1:-build/demo}
+world=config/worlds/crossing-demo.yaml
+world_config=config/crossing-cameras.yaml
 scenario=config/worlds/crossing.yaml
 config=config/crossing.yaml
 drives=40
@@ -29,6 +32,15 @@ figure() { # FILE KEY : a number out of the JSON of `waymark eval`
 rm -rf "$out"
 mkdir -p "$out"
 
+step "a drive in a rendered world: build it, take the pictures, localize, judge"
+quietly "$waymark" simulate "$world" --duration 20 --out "$out/recording"
+for run in cameras odometry; do
+  config_of_run=$world_config
+  [ $run = cameras ] || config_of_run=config/crossing-odometry.yaml
+  quietly "$waymark" replay "$out/recording" --config "$config_of_run" --out "$out/run-$run"
+  "$waymark" eval "$out/run-$run" "$out/recording" --json >"$out/eval-$run.json"
+done
+
 for n in 0 1 2 3; do
   step "a drive with $n landmarks: simulate, localize, judge"
   quietly "$waymark" simulate "$scenario" --landmarks "$n" --out "$out/recording-$n"
@@ -37,14 +49,18 @@ for n in 0 1 2 3; do
 done
 
 step "report and picture"
-quietly "$waymark" report "$out/run-3" "$out/recording-3" --out "$out/report.html"
+quietly "$waymark" report "$out/run-cameras" "$out/recording" --out "$out/report.html"
 quietly python3 tools/demo/picture.py "$out" "$out/demo.svg"
 
 step "$drives drives each, with other wheels, biases, maps and noise"
 statistics=$(build/bin/waymark-montecarlo "$scenario" --config "$config" --seeds "$drives" | sed -n '3,/^$/p')
 
-printf '\n%s m with a turn, truth known exactly. Errors of the position in m, of the heading in degrees:\n\n' \
-  "$(figure "$out/eval-3.json" distance_m | awk '{printf "%.0f", $1}')"
+printf '\nA rendered crossing, %s m, %s pictures: RMS error %.3f m and %.2f deg with two cameras, %.3f m with the wheels alone.\n' \
+  "$(figure "$out/eval-cameras.json" distance_m | awk '{printf "%.0f", $1}')" \
+  "$(cat "$out"/recording/video/*.csv | grep -vc frame)" \
+  "$(figure "$out/eval-cameras.json" position_rmse_m)" "$(figure "$out/eval-cameras.json" heading_rmse_deg)" \
+  "$(figure "$out/eval-odometry.json" position_rmse_m)"
+printf '\nThe same turn with landmarks alone, truth known exactly. Errors of the position in m, of the heading in degrees:\n\n'
 printf '%10s | %12s | %12s | %12s | %14s | %12s\n' landmarks 'at the end' RMS largest 'heading RMS' 'inside 95 %'
 printf -- '-----------+--------------+--------------+--------------+----------------+-------------\n'
 for n in 0 1 2 3; do
@@ -58,5 +74,5 @@ printf '\nThat was one drive. RMS over %s drives, beside the least that any esti
 printf 'the other), and whether the errors are as large as the estimate says (NEES and NIS: 1; docs/consistency.md):\n\n%s\n\n' \
   "$statistics"
 
-printf 'Report of the drive with three landmarks: %s\n' "$(realpath "$out")/report.html"
-printf 'Picture of all four:                      %s\n' "$(realpath "$out")/demo.svg"
+printf 'Report of the rendered drive, pictures in it: %s\n' "$(realpath "$out")/report.html"
+printf 'Picture of the four without pictures:         %s\n' "$(realpath "$out")/demo.svg"
