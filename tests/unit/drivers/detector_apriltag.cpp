@@ -48,7 +48,8 @@ void draw(const pose &p, double gamma) {
   for (int row = 0; row < kHeight; row++)
     for (int column = 0; column < kWidth; column++)
       for (int k = 0; k < 25; k++) {
-        const double px = column + (k % 5 - 2) / 5.0, py = row + (k / 5 - 2) / 5.0;
+        const int across = k % 5 - 2, down = k / 5 - 2;
+        const double px = column + across / 5.0, py = row + down / 5.0;
         // Body: x forward (up), y left, z up of the body; optical x = -y, y = -z.
         const double rx = (px - c.intrinsics[2]) / c.intrinsics[0], ry = (py - c.intrinsics[3]) / c.intrinsics[1];
         const double dy = -rx * p.x - p.y, dz = -ry * p.x - p.z;  // on the print's plane, from its centre
@@ -57,14 +58,14 @@ void draw(const pose &p, double gamma) {
         const double lx = -dz, ly = dy;
         const double u = (std::cos(p.yaw) * lx + std::sin(p.yaw) * ly) / (0.5 * kSize_m);
         const double v = (-std::sin(p.yaw) * lx + std::cos(p.yaw) * ly) / (0.5 * kSize_m);
-        light[(size_t)(row * kWidth + column)] += print_at(tag, u, v) / 25.0;
+        light[static_cast<size_t>(row) * kWidth + static_cast<size_t>(column)] += print_at(tag, u, v) / 25.0;
       }
   for (int pass = 0; pass < 2; pass++) {  // [1 2 1] twice, both ways
     std::vector<double> from = light;
     for (int i = kWidth + 1; i < kWidth * kHeight - kWidth - 1; i++) {
       double sum = 0.0;
       for (int a = -1; a <= 1; a++)
-        for (int b = -1; b <= 1; b++) sum += from[(size_t)(i + a * kWidth + b)] * (2 - std::abs(a)) * (2 - std::abs(b));
+        for (int b = -1; b <= 1; b++) sum += from.data()[i + a * kWidth + b] * (2 - std::abs(a)) * (2 - std::abs(b));
       light[(size_t)i] = sum / 16.0;
     }
   }
