@@ -67,8 +67,8 @@ struct WorldKind {
   std::string kind;  // crossing, corridor, office, hall, seabed; empty: features only
   bool hard = false;
   bool markers_on_walls = false;  // office
-  std::string plan;               // corridor, office, hall: the file of a building of one's own; empty: drawn by the seed
-  double ceiling_m = 2.6;         // of a ROS map
+  std::string plan;        // corridor, office, hall: the file of a building of one's own; empty: drawn by the seed
+  double ceiling_m = 2.6;  // of a ROS map
   bool pictured() const { return !kind.empty(); }
 };
 

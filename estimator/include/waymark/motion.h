@@ -78,8 +78,8 @@ wm_status wm_odometry_at(const wm_odometry *self, wm_time_ns t_ns, wm_odom_point
 // Stamp of the newest motion event that drives, WM_TIME_NONE before the first.
 wm_time_ns wm_odometry_newest_ns(const wm_odometry *self);
 // The pose `fused` carried on by odometry from its own time to `t_ns`: mean, covariance, twist. Source: composition of
-// pose_map_base(t_f) with pose_odom_base(t_f)^-1 pose_odom_base(t). An estimate of six degrees of freedom is carried on in
-// space by the twists that came (WM_EVENT_TWIST6); `odom` is that way seen from above.
+// pose_map_base(t_f) with pose_odom_base(t_f)^-1 pose_odom_base(t). An estimate of six degrees of freedom is carried on
+// in space by the twists that came (WM_EVENT_TWIST6); `odom` is that way seen from above.
 wm_status wm_odometry_carry(const wm_odometry *self, const wm_estimate *fused, wm_time_ns t_ns, wm_estimate *out,
                             wm_odom_point *odom);
 
