@@ -173,7 +173,7 @@ void edge_map::sweep_row(int row) {
     if (!tile[tx]) continue;
     const int end = (tx + 1) << kTileShift < width ? (tx + 1) << kTileShift : width;
     for (int column = tx << kTileShift; column < end; column++) {
-      const int y = (int)edge_offset[tile[tx] + in_row(column, row)].y;  // signed
+      const int y = +edge_offset[tile[tx] + in_row(column, row)].y;  // signed
       if (y == none || y == -none) continue;
       int from = INT32_MIN;
       while (count > 0) {

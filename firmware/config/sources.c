@@ -25,12 +25,12 @@ static wm_status read_name(const wm_yaml_node *item, const wm_config *config, wm
   if (status != WM_OK) return status;
   snprintf(base, sizeof base, "%.*s", (int)strcspn(out->name, ":"), out->name);
   // With a sensor's name behind the colon the part before it is judged, but the whole is shown.
-  if (config_detector_find(base)) {
-    status = WM_OK;  // DETECTOR, or DETECTOR:CAMERA
-  } else if (strcmp(base, out->name) == 0) {
+  int is_detector = config_detector_find(base) != NULL;  // DETECTOR, or DETECTOR:CAMERA
+  if (!is_detector && strcmp(base, out->name) == 0) {
     status = wm_yaml_choice(&name, kNames, &kind, err);
     if (status != WM_OK) return status;
-  } else if (strcmp(base, "sightings") != 0 && strcmp(base, "markers") != 0 && strcmp(base, "can") != 0) {
+  } else if (!is_detector && strcmp(base, "sightings") != 0 && strcmp(base, "markers") != 0 &&
+             strcmp(base, "can") != 0) {
     return wm_yaml_fail(
         &name, err, "'%s' has a sensor's name; only sightings:SENSOR, markers:SENSOR and can:INTERFACE are possible",
         out->name);

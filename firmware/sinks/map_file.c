@@ -37,13 +37,13 @@ wm_status wm_write_map(const char *dir, const wm_estimator *estimator, const voi
   entry *entries = calloc(count + 1, sizeof *entries);
   wm_landmark *landmarks = calloc(count + 1, sizeof *landmarks);
   double(*covariances)[4] = calloc(count + 1, sizeof *covariances);
-  wm_status status =
-      entries && landmarks && covariances ? WM_OK : wm_fail(err, WM_IO, "%s: no memory for the map", dir);
+  int have_memory = entries && landmarks && covariances;
+  wm_status status = have_memory ? WM_OK : wm_fail(err, WM_IO, "%s: no memory for the map", dir);
   char path[WM_PATH_MAX + 32];
   (void)snprintf(path, sizeof path, "%s/map-estimate.csv", dir);
   FILE *file = status == WM_OK ? fopen(path, "we") : NULL;
   if (status == WM_OK && !file) status = wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(errno));
-  if (file) {
+  if (file && entries && landmarks && covariances) {
     estimator->landmarks(state, landmarks, covariances, count);
     for (size_t i = 0; i < count; i++) {
       entries[i].landmark = landmarks[i];

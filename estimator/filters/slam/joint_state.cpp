@@ -111,7 +111,7 @@ void joint_state::propagate(const motion_stretch &piece, const motion_twist &twi
   const half_covariance cov = p();
   const int robot = layout_.robot_states;
   // Rows of T = F P over the robot's own states, where the columns of F lie on both sides of the diagonal ...
-  double t[kPoseStates][kMaxRobot];
+  double t[kPoseStates][kMaxRobot] = {};
   for (int j = 0; j < robot; j++)
     for (int r = 0; r < kPoseStates; r++) {
       t[r][j] = cov.at(r, j);
@@ -324,7 +324,7 @@ void joint_state::prepare(const joint_row *rows, const double *innovations, cons
 void joint_state::fuse(innovation_block &block, const double *more_noise, bool frozen) {
   const int rows = block.rows;
   for (int k = 0; k < rows; k++) block.s[k][k] += more_noise[k];
-  double l[kRows][kRows], y[kRows];
+  double l[kRows][kRows], y[kRows] = {};
   std::memcpy(l, block.s, sizeof l);
   if (!factor(l, rows)) return;
   // W = G L'^-1 in place of the gains; K innovation = W y, y = L^-1 innovation; P - G S^-1 G' = P - W W'.

@@ -320,7 +320,7 @@ wm_status stereo_ekf::fuse_position(const wm_event &event, record_list records) 
   static constexpr wm_residual kKinds[3] = {WM_RESIDUAL_X, WM_RESIDUAL_Y, WM_RESIDUAL_Z};
   row_block block;
   double by[3][3] = {};
-  wm_residual kinds[3];
+  wm_residual kinds[3] = {};
   for (int i = depth_only ? 2 : 0; i < (has_z ? 3 : 2); i++) {
     const int row = block.rows++;
     by[row][i] = 1.0;

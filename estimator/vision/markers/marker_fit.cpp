@@ -63,7 +63,7 @@ bool grey_at(const wm_marker_fit &self, const wm_frame &frame, const flat &p, do
 bool find_edge(const wm_marker_fit &self, const wm_frame &frame, const flat &at, const flat &normal, double reach,
                double *offset) {
   constexpr int kMost = 16;
-  double grey[kMost + 1];
+  double grey[kMost + 1] = {};
   const int steps = (int)(2.0 * reach / kStep_px + 0.5);
   if (steps > kMost) return false;
   for (int i = 0; i <= steps; i++) {
