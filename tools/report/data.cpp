@@ -7,6 +7,7 @@
 #include "common/csv.h"
 #include "common/failure.h"
 #include "common/yaml.h"
+#include "report/edges.h"
 
 namespace wm::tools {
 namespace {
@@ -119,6 +120,7 @@ ReportData load_report_data(const fs::path &run, const fs::path &recording) {
     load_recording(recording, &out);
     out.frames = load_frames(recording, &out, 4);
     mark_sightings(recording, out, &out.frames);
+    load_edges(run, recording, &out);
   }
   return out;
 }

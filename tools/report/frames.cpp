@@ -10,6 +10,7 @@
 #include "common/cameras.h"
 #include "report/data.h"
 #include "report/page.h"
+#include "report/png.h"
 #include "report/words.h"
 #include "waymark/video.h"
 
@@ -46,18 +47,6 @@ std::string small_jpeg(const wm_frame &frame, uint32_t times) {
   return out;
 }
 
-std::string base64(const std::string &bytes) {
-  static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    const auto byte = [&](size_t k) { return k < bytes.size() ? static_cast<unsigned char>(bytes[k]) : 0u; };
-    const unsigned three = byte(i) << 16 | byte(i + 1) << 8 | byte(i + 2);
-    for (int k = 0; k < 4; k++)
-      out += i + static_cast<size_t>(k) > bytes.size() ? '=' : letters[three >> (18 - 6 * k) & 63];
-  }
-  return out;
-}
-
 // The pictures nearest to `each` times spread over the run.
 void frames_of(const fs::path &recording, const wm_camera &camera, int32_t index, size_t each, ReportData *data,
                std::vector<ReportFrame> *out) {
@@ -86,9 +75,15 @@ void frames_of(const fs::path &recording, const wm_camera &camera, int32_t index
   }
 }
 
+std::string dots(const char *css, const std::vector<Eigen::Vector2d> &pixels) {
+  std::string d;
+  for (const Eigen::Vector2d &pixel : pixels) d += "M" + fixed(pixel.x(), 0) + " " + fixed(pixel.y(), 0) + "h0";
+  return d.empty() ? d : std::string("<path class=\"") + css + "\" d=\"" + d + "\"/>";
+}
+
 std::string drawn(const ReportData &data, const ReportFrame &frame) {
   const double unit = frame.width_px / 480.0;  // marks are as large whatever the picture's size
-  std::string svg;
+  std::string svg = dots("edge-seen", frame.edges_seen) + dots("edge-mapped", frame.edges_mapped);
   for (const FrameMark &m : frame.marks) {
     const std::string at = fixed(m.u_px, 1) + "\" cy=\"" + fixed(m.v_px, 1);
     const char *name = m.kind == FrameMark::Kind::seen ? "hit" : m.kind == FrameMark::Kind::rejected ? "miss" : "hope";
@@ -163,10 +158,11 @@ void mark_sightings(const fs::path &recording, const ReportData &data, std::vect
 std::string frames_section(const ReportData &data) {
   if (data.frames.empty()) return "";
   std::string body = "<div class=\"shots\">";
-  bool marks = false;
+  bool marks = false, edges = false;
   for (const ReportFrame &frame : data.frames) {
     body += drawn(data, frame);
     marks = marks || !frame.marks.empty();
+    edges = edges || !frame.edges_seen.empty();
   }
   body += "</div>";
   if (marks)
@@ -174,6 +170,12 @@ std::string frames_section(const ReportData &data) {
         legend({{"<circle class=\"hope\" cx=\"14\" r=\"6\"/>", "where the robot expected a landmark, with its number"},
                 {"<circle class=\"hit\" cx=\"14\" r=\"4\"/>", "the direction in which it was seen, believed"},
                 {"<circle class=\"miss\" cx=\"14\" r=\"4\"/>", "seen, and not believed"}});
+  if (edges)
+    body += legend(
+        {{"<path class=\"edge-seen\" d=\"M4 0h0M14 0h0M24 0h0\"/>",
+          "edges of the floor that were found in the picture"},
+         {"<path class=\"edge-mapped\" d=\"M2 0h0M6 0h0M10 0h0M14 0h0M18 0h0M22 0h0M26 0h0\"/>",
+          "the map’s edges, as they look from where the robot said it was: on the found ones, where it was right"}});
   return section("What it saw", "Pictures of its cameras, spread over the drive.", body);
 }
 

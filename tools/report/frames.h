@@ -2,6 +2,7 @@
 // Pictures of a recording's cameras, small enough for a page, with what was seen drawn into them.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -25,6 +26,7 @@ struct ReportFrame {
   int width_px, height_px;  // as the camera took it
   std::string jpeg;         // made smaller
   std::vector<FrameMark> marks;
+  std::vector<Eigen::Vector2d> edges_seen{}, edges_mapped{};  // pixels: by the detector, and by map and pose
 };
 
 // `each` pictures of every camera that has a video, spread over the run's time. What can't be read leaves its part

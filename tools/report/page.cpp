@@ -80,6 +80,9 @@ std::string map_section(const ReportData &data) {
     marks.emplace_back("<path class=\"landmark\" d=\"M14-7l7 7l-7 7l-7-7Z\"/>", "landmark, with its number");
   if (!data.estimated_landmarks.empty())
     marks.emplace_back("<path class=\"guess\" d=\"M8 0h12m-6-6v12\"/>", "landmark as the robot mapped it");
+  if (data.edge_layer) marks.emplace_back("<path class=\"edges\" d=\"M0 0H28\"/>", "edges of the map");
+  if (!data.cloud.empty())
+    marks.emplace_back("<path class=\"cloud\" d=\"M4 0h0M14 0h0M24 0h0\"/>", "particles at some instants");
   if (picture.sight_lines) marks.emplace_back("<path class=\"sight\" d=\"M0 0H28\"/>", "what it saw at some instants");
   if (!data.truth && !data.gnss.empty())
     marks.emplace_back("<path class=\"gnss\" d=\"M4 0h0M14 0h0M24 0h0\"/>", "GNSS positions");

@@ -6,6 +6,7 @@
 
 #include "common/statistics.h"
 #include "report/axes.h"
+#include "report/png.h"
 #include "report/style.h"
 #include "report/words.h"
 
@@ -79,12 +80,12 @@ std::string trace(const std::vector<Pose> &poses, const Canvas &canvas, int64_t 
   return d;
 }
 
-std::string dots(const std::vector<Pose> &positions, const Canvas &canvas) {
+// Those that are `apart` units of the picture from the one before.
+std::string dots(const std::vector<Eigen::Vector2d> &positions, double apart, const Canvas &canvas) {
   std::string d;
   Eigen::Vector2d drawn{1e300, 0};
-  for (const Pose &position : positions) {
-    const Eigen::Vector2d here = position.p_m.head<2>();
-    if ((here - drawn).norm() * canvas.scale() < 2) continue;
+  for (const Eigen::Vector2d &here : positions) {
+    if ((here - drawn).norm() * canvas.scale() < apart) continue;
     d += "M" + canvas.at(here) + "h0";
     drawn = here;
   }
@@ -206,22 +207,10 @@ std::string landmark_marks(const ReportData &data, const Canvas &canvas) {
   return out;
 }
 
-std::string base64(const std::string &bytes) {
-  static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    uint32_t three = 0;
-    for (size_t k = 0; k < 3; ++k)
-      three = three << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : kDigits[three >> (18 - 6 * k) & 63u];
-  }
-  return out;
-}
-
-std::string raster_image(const Raster &raster, const Canvas &canvas) {
+std::string raster_image(const Raster &raster, const Canvas &canvas, const char *css) {
   const double wide = raster.width * raster.resolution_m * canvas.scale();
   const double high = raster.height * raster.resolution_m * canvas.scale();
-  return "<image class=\"raster\" width=\"" + fixed(wide, 2) + "\" height=\"" + fixed(high, 2) +
+  return std::string("<image class=\"") + css + "\" width=\"" + fixed(wide, 2) + "\" height=\"" + fixed(high, 2) +
          "\" transform=\"translate(" + canvas.at(raster.origin.head<2>()) + ") rotate(" +
          fixed(-raster.origin.z() * 180 / M_PI, 3) + ") translate(0 " + fixed(-high, 2) +
          ")\" preserveAspectRatio=\"none\" href=\"data:image/png;base64," + base64(raster.png) + "\"/>";
@@ -258,6 +247,8 @@ std::string legend(const ReportData &data, const Picture &picture) {
                                     : "95 % ellipses");
   if (!data.truth && !data.gnss.empty()) entry("<path class=\"gnss\" d=\"M4 0h0M14 0h0M24 0h0\"/>", "GNSS");
   if (!data.landmarks.empty()) entry("<path class=\"landmark\" d=\"M14-8l8 8l-8 8l-8-8Z\"/>", "landmarks");
+  if (data.edge_layer) entry("<path class=\"edges\" d=\"M0 0H28\"/>", "edges of the map");
+  if (!data.cloud.empty()) entry("<path class=\"cloud\" d=\"M4 0h0M14 0h0M24 0h0\"/>", "particles at some instants");
   if (picture.sight_lines) entry("<path class=\"sight\" d=\"M0 0H28\"/>", "lines of sight at some instants");
   return "<g class=\"legend\">" + out + "</g>";
 }
@@ -297,13 +288,19 @@ Picture draw_picture(const ReportData &data, bool standalone) {
   picture.height = canvas.height();
 
   std::string body;
-  if (data.raster) body += raster_image(*data.raster, canvas);
+  if (data.raster) body += raster_image(*data.raster, canvas, "raster");
+  if (data.edge_layer) body += raster_image(*data.edge_layer, canvas, "edges");
   body += grid(canvas);
   if (picture.sight_lines) body += "<path class=\"sight\" d=\"" + sights + "\"/>";
   body += ellipses;
   if (data.truth) body += "<path class=\"truth\" d=\"" + trace(data.truth->truth, canvas, 1'500'000'000) + "\"/>";
-  if (!data.truth && !data.gnss.empty()) body += "<path class=\"gnss\" d=\"" + dots(data.gnss, canvas) + "\"/>";
+  if (!data.truth && !data.gnss.empty()) {
+    std::vector<Eigen::Vector2d> positions;
+    for (const Pose &position : data.gnss) positions.push_back(position.p_m.head<2>());
+    body += "<path class=\"gnss\" d=\"" + dots(positions, 2, canvas) + "\"/>";
+  }
   body += "<path class=\"estimate\" d=\"" + trace(poses, canvas, 1'500'000'000) + "\"/>";
+  if (!data.cloud.empty()) body += "<path class=\"cloud\" d=\"" + dots(data.cloud, 0.7, canvas) + "\"/>";
   body += landmark_marks(data, canvas) + ends(poses, canvas);
   const std::string size = "viewBox=\"0 0 " + fixed(kWidth, 0) + " " + fixed(canvas.height(), 0) + "\"";
   const std::string frame = "<rect class=\"frame\" y=\"" + fixed(canvas.head(), 0) + "\" width=\"" + fixed(kWidth, 0) +

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The raster map as a PNG that a page can carry.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <fstream>
 #include <sstream>
@@ -9,6 +8,7 @@
 #include "common/failure.h"
 #include "common/yaml.h"
 #include "report/data.h"
+#include "report/png.h"
 
 namespace wm::tools {
 namespace {
@@ -23,65 +23,8 @@ std::string read_all(const fs::path &file) {
   return {std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
 }
 
-std::string big_endian(uint32_t value) {
-  return {static_cast<char>(value >> 24), static_cast<char>(value >> 16), static_cast<char>(value >> 8),
-          static_cast<char>(value)};
-}
-
-uint32_t crc32(const std::string &bytes) {  // PNG specification, annex D
-  uint32_t crc = 0xffffffffu;
-  for (const char byte : bytes) {
-    crc ^= static_cast<unsigned char>(byte);
-    for (int bit = 0; bit < 8; ++bit) crc = (crc >> 1) ^ ((crc & 1u) != 0 ? 0xedb88320u : 0u);
-  }
-  return ~crc;
-}
-
-uint32_t adler32(const std::string &bytes) {  // RFC 1950
-  uint32_t a = 1;
-  uint32_t b = 0;
-  for (const char byte : bytes) {
-    a = (a + static_cast<unsigned char>(byte)) % 65521;
-    b = (b + a) % 65521;
-  }
-  return b << 16 | a;
-}
-
 size_t index(int x, int y, int width) {
   return static_cast<size_t>(y) * static_cast<size_t>(width) + static_cast<size_t>(x);
-}
-
-std::string chunk(const std::string &type, const std::string &data) {
-  return big_endian(static_cast<uint32_t>(data.size())) + type + data + big_endian(crc32(type + data));
-}
-
-// Grey levels of two bits, in stored blocks (RFC 1951, 3.2.4): no compressor needed, and small enough.
-std::string grey_png(const std::vector<uint8_t> &grey, int width, int height) {
-  std::string rows;
-  for (int y = 0; y < height; ++y) {
-    rows += '\0';  // filter type: none
-    for (int x = 0; x < width; x += 4) {
-      unsigned packed = 0;
-      for (int k = 0; k < 4; ++k) {
-        const unsigned level = x + k < width ? grey[index(x + k, y, width)] / 64u : 0u;
-        packed = packed << 2 | level;
-      }
-      rows += static_cast<char>(packed);
-    }
-  }
-  std::string deflated = "\x78\x01";
-  for (size_t at = 0; at < rows.size(); at += 65535) {
-    const size_t size = std::min<size_t>(65535, rows.size() - at);
-    const auto low = [](size_t value) { return static_cast<char>(value & 0xff); };
-    deflated += static_cast<char>(at + size == rows.size() ? 1 : 0);
-    deflated += {low(size), low(size >> 8), low(~size), low(~size >> 8)};
-    deflated += rows.substr(at, size);
-  }
-  deflated += big_endian(adler32(rows));
-  return "\x89PNG\r\n\x1a\n" +
-         chunk("IHDR", big_endian(static_cast<uint32_t>(width)) + big_endian(static_cast<uint32_t>(height)) +
-                           std::string("\x02\x00\x00\x00\x00", 5)) +
-         chunk("IDAT", deflated) + chunk("IEND", "");
 }
 
 // A binary PGM, made smaller to at most 1600 px a side: each pixel the darkest of those that it stands for, so that

@@ -18,6 +18,7 @@ constexpr const char *kPicture = R"(
 .truth{fill:none;stroke:var(--truth);stroke-width:4.2;stroke-linejoin:round;stroke-linecap:round;opacity:.34}
 .estimate{fill:none;stroke:var(--blue);stroke-width:1.9;stroke-linejoin:round;stroke-linecap:round}
 .gnss{fill:none;stroke:var(--amber);stroke-width:5;stroke-linecap:round;opacity:.7}
+.cloud{fill:none;stroke:var(--purple);stroke-width:4;stroke-linecap:round}.edges{stroke:#cc5500;fill:none}
 .ellipse{fill:var(--band);stroke:var(--blue);stroke-width:1}
 .guess{fill:none;stroke:var(--purple);stroke-width:1.6}
 .landmark{fill:var(--green);stroke:var(--card);stroke-width:1.5}
@@ -56,6 +57,8 @@ figure{margin:0}
 .shot figcaption{font-size:13px;color:var(--soft);margin-top:3px}
 .shot text{fill:#ffe98a;paint-order:stroke;stroke:#000a;stroke-width:3px;stroke-linejoin:round;font-family:system-ui,'DejaVu Sans',sans-serif}
 .hope{fill:none;stroke:#ffd23d;stroke-width:2;vector-effect:non-scaling-stroke}.hit{fill:#35e0a8;stroke:#063;stroke-width:1;vector-effect:non-scaling-stroke}
+.edge-seen,.edge-mapped{fill:none;stroke-linecap:round;vector-effect:non-scaling-stroke}.edge-seen{stroke:#ffd23d;stroke-width:4.5}
+.edge-mapped{stroke:#1fa2ff;stroke-width:1.8}
 .miss{fill:#ff5b3a;stroke:#400;stroke-width:1;vector-effect:non-scaling-stroke}
 .map{display:block;width:100%;height:auto;border:1px solid var(--rule);border-radius:10px;background:var(--card)}
 .legend{display:flex;flex-wrap:wrap;gap:4px 20px;margin:10px 0 0;padding:0;list-style:none;font-size:14px;color:var(--soft)}

@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 // The report: what it says in words, that it draws no peak away, that it is one page with nothing beside it.
+#include <cstring>
 #include <limits>
+#include <memory>
 
 #include "common/failure.h"
 #include "made.h"
 #include "report/axes.h"
 #include "report/data.h"
+#include "report/edges.h"
 #include "report/page.h"
 #include "report/picture.h"
 #include "report/words.h"
 #include "unity.h"
+extern "C" {
+#include "waymark/eventlog.h"
+}
 
 using namespace wm::tools;
 using made::format;
@@ -192,6 +198,89 @@ void test_a_small_pgm_becomes_a_png() {
   }
 }
 
+// A run's event log with one point of camera 0, 0.5 m ahead and 0.5 m to the right, after 5 s.
+void log_a_point(const made::Folder &run) {
+  const auto log = std::make_unique<wm_log_writer>();
+  const auto config = std::make_unique<wm_config>();
+  const auto assembly = std::make_unique<wm_assembly>();
+  wm_estimator estimator{};
+  estimator.name = "edge_mcl";
+  config->estimator = &estimator;
+  char text[] = "format: waymark-config/1\n";
+  config->text = text;
+  config->text_length = std::strlen(text);
+  assembly->config = config.get();
+  assembly->calibration_text = "";
+  assembly->source_count = 1;
+  wm_error error{};
+  TEST_ASSERT_EQUAL(WM_OK, wm_log_create(log.get(), (run.path() / "events.wmlog").c_str(), assembly.get(), &error));
+  wm_event event{};
+  event.t_ns = 5'000'000'000;
+  event.kind = WM_EVENT_POINTS;
+  event.as.points.count = 1;
+  event.as.points.x_m[0] = 0.5f;
+  event.as.points.y_m[0] = -0.5f;
+  wm_log_write_event(log.get(), &event);
+  TEST_ASSERT_EQUAL(WM_OK, wm_log_close(log.get(), &error));
+}
+
+// Cells of 0.05 m, 100 x 100; `set` says which are white.
+template <class Set>
+std::string layer(const Set &set) {
+  std::string pgm = "P5\n100 100\n255\n";
+  for (int row = 0; row < 100; row++)
+    for (int column = 0; column < 100; column++) pgm += set(column, row) ? '\xff' : '\0';
+  return pgm;
+}
+
+void test_edges_are_drawn_where_they_are_seen() {
+  made::Folder run;
+  made::Folder recording;
+  make(run, recording);
+  log_a_point(run);
+  run.write("particles.csv", "t_ns,x_m,y_m,heading_rad,weight\n5000000000,4.5,0.25,0,1\n");
+  // A camera that looks straight down from 1 m: its picture's top is ahead.
+  recording.write("calibration.yaml",
+                  "cameras: {front: {model: equidistant, size: [640, 480], intrinsics: [300, 300, 320, 240],\n"
+                  "  distortion: [0, 0, 0, 0], mounting: {xyz_m: [0, 0, 1], rpy_deg: [0, 90, 0]}}}\n");
+  // An edge at (5.5, 0.05), half a metre ahead of the pose after 5 s; another at (6, 0.05), behind a wall.
+  std::filesystem::create_directory(recording.path() / "map");
+  recording.write("map/map.yaml",
+                  "image: edges.pgm\nresolution: 0.05\norigin: [2.975, -2.475, 0]\nnegate: 0\noccupied_thresh: 0.65\n"
+                  "free_thresh: 0.196\nlayers: {edges: edges.pgm, drivable: drivable.pgm}\n");
+  recording.write("map/edges.pgm",
+                  layer([](int column, int row) { return row == 49 && (column == 50 || column == 60); }));
+  recording.write("map/drivable.pgm", layer([](int column, int) { return column < 53 || column > 56; }));
+
+  ReportData data = load_report_data(run.path(), recording.path());
+  data.frames.push_back({"front", 5'000'000'000, 640, 480, "", {}});
+  load_edges(run.path(), recording.path(), &data);
+  for (const std::string &note : data.notes) TEST_FAIL_MESSAGE(note.c_str());
+  const ReportFrame &frame = data.frames.front();
+  TEST_ASSERT_EQUAL(1, frame.edges_seen.size());
+  const double seen_px = 300 * std::atan(std::sqrt(0.5)) * std::sqrt(0.5);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 320 + seen_px, frame.edges_seen[0].x());
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 240 - seen_px, frame.edges_seen[0].y());
+  TEST_ASSERT_EQUAL(1, frame.edges_mapped.size());
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 320, frame.edges_mapped[0].x());
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 240 - 300 * std::atan(0.5), frame.edges_mapped[0].y());
+  TEST_ASSERT_TRUE(has(frames_section(data), "class=\"edge-seen\" d=\"M451 109h0\""));
+
+  const Picture picture = draw_picture(data, false);
+  TEST_ASSERT_TRUE(has(picture.svg, "<image class=\"edges\" width=\"" + fixed(5 * picture.scale, 2)));
+  const std::string particle = "M" + fixed((4.5 - picture.left_top_m.x()) * picture.scale, 1) + " " +
+                               fixed((picture.left_top_m.y() - 0.25) * picture.scale, 1) + "h0";
+  TEST_ASSERT_TRUE(has(picture.svg, "<path class=\"cloud\" d=\"" + particle + "\"/>"));
+
+  // Without edge points in the log the page is as it was.
+  std::filesystem::remove(run.path() / "events.wmlog");
+  const std::string page = report_page(load_report_data(run.path(), recording.path()));
+  TEST_ASSERT_FALSE(has(page, "class=\"edges\"") || has(page, "class=\"cloud\""));
+  // A log that is none is told, and costs nothing else.
+  run.write("events.wmlog", "no log");
+  TEST_ASSERT_TRUE(has(report_page(load_report_data(run.path(), recording.path())), "Edges are not shown: "));
+}
+
 }  // namespace
 
 int main() {
@@ -205,5 +294,6 @@ int main() {
   RUN_TEST(test_odd_files_are_survived_or_refused_with_words);
   RUN_TEST(test_lines_of_sight_start_at_the_sensor);
   RUN_TEST(test_a_small_pgm_becomes_a_png);
+  RUN_TEST(test_edges_are_drawn_where_they_are_seen);
   return UNITY_END();
 }
