@@ -16,11 +16,18 @@ void tearDown(void) { wm_config_free(&config); }
 
 #define HEAD "format: waymark-config/1\nestimator: pole_filter\n"
 
+static void start_anew(void) {
+  tearDown();
+  setUp();
+}
+
 static void parse(const char *text) {
+  start_anew();
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, strlen(text), "dir/x.yaml", &config, &err), err.text);
 }
 
 static void refused(const char *text, const char *message) {
+  start_anew();
   TEST_ASSERT_EQUAL_MESSAGE(WM_BAD_CONFIG, wm_config_parse(text, strlen(text), "dir/x.yaml", &config, &err), text);
   TEST_ASSERT_EQUAL_STRING(message, err.text);
   TEST_ASSERT_NULL(config.text);
