@@ -2,6 +2,7 @@
 // A run on devices with its real threads and the real clock; the CAN interface behind the socket is the test's.
 #include <errno.h>
 #include <pthread.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -27,34 +28,41 @@ static const char kSignals[] =
     "- {quantity: vehicle_speed, message: Motion, signal: V}\n- {quantity: yaw_rate, message: Motion, signal: W}\n";
 
 #define FRAME_NS (10 * WM_NS_PER_MS)
-#define DOWN_FROM_NS (1000 * WM_NS_PER_MS)
-#define DOWN_UNTIL_NS (1800 * WM_NS_PER_MS)
+#define LONGEST_S \
+  60  // a run ends when its bus has given all its frames; a busy machine takes longer, and that is no fault
 
-// Drives at 1 m/s, 100 frames a second; the interface is down for a while.
+// Drives at 1 m/s, 100 frames a second, stamped as they are given. Where it is asked for, the interface goes down after
+// `down_after` frames and comes back when it was looked for twice. What happens depends on frames and looks alone,
+// never on how long anything took.
 typedef struct bus {
-  wm_time_ns begin_ns, next_ns;
-  int said_down;
+  int frames, down_after;  // down_after -1: never
+  int given, went_down, is_down, looks_while_down;
+  wm_time_ns first_ns;
 } bus;
 
 static wm_run_report report;
 static wm_live_report live;
 static char said[4096];
+static atomic_int over;        // ends the run
+static const char *is_enough;  // so does this line, when it is heard
 
-void setUp(void) { said[0] = '\0'; }
+void setUp(void) {
+  said[0] = '\0';
+  is_enough = NULL;
+  atomic_store(&over, 0);
+}
 void tearDown(void) { test_folder_remove(); }
 
-static int is_down(const bus *self, wm_time_ns now_ns) {
-  return now_ns - self->begin_ns >= DOWN_FROM_NS && now_ns - self->begin_ns < DOWN_UNTIL_NS;
-}
-
-static void sleep_to(wm_time_ns t_ns) {
-  struct timespec until = {t_ns / WM_NS_PER_S, t_ns % WM_NS_PER_S};
-  (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL);
+static void sleep_for(wm_time_ns duration_ns) {
+  struct timespec left = {duration_ns / WM_NS_PER_S, duration_ns % WM_NS_PER_S};
+  (void)clock_nanosleep(CLOCK_MONOTONIC, 0, &left, NULL);
 }
 
 static unsigned bus_find(void *context, const char *interface, int *is_up) {
+  bus *self = context;
   (void)interface;
-  *is_up = !is_down(context, wm_monotonic_ns());
+  if (self->is_down && ++self->looks_while_down == 2) self->is_down = 0;
+  *is_up = !self->is_down;
   return 3;
 }
 
@@ -66,23 +74,22 @@ static int bus_open(void *context, unsigned index, const uint32_t *ids, const ui
 static int bus_receive(void *context, int fd, int wait_ms, can_received *out) {
   (void)fd;
   bus *self = context;
-  wm_time_ns now_ns = wm_monotonic_ns();
-  if (is_down(self, now_ns)) {
-    if (!self->said_down) {
-      self->said_down = 1;
-      return -ENETDOWN;
-    }
-    sleep_to(now_ns + wait_ms * WM_NS_PER_MS);
-    self->next_ns = wm_monotonic_ns();
+  if (self->given == self->down_after && !self->went_down) {
+    self->went_down = self->is_down = 1;
+    return -ENETDOWN;
+  }
+  if (self->is_down || self->given == self->frames) {
+    sleep_for(wait_ms * WM_NS_PER_MS);
     return 0;
   }
-  sleep_to(self->next_ns);
-  *out = (can_received){.software_ns = self->next_ns + kSocketCan.realtime_ns(NULL) - kSocketCan.monotonic_ns(NULL)};
+  sleep_for(FRAME_NS);
+  *out = (can_received){.software_ns = kSocketCan.realtime_ns(NULL)};
+  if (self->given++ == 0) self->first_ns = wm_monotonic_ns();
   out->frame.id = 256;
   out->frame.length = 4;
   out->frame.data[0] = 1000 & 0xff;
   out->frame.data[1] = 1000 >> 8;
-  self->next_ns += FRAME_NS;
+  if (self->given == self->frames) atomic_store(&over, 1);
   return 1;
 }
 
@@ -95,6 +102,7 @@ static void hear(void *context, const char *line) {
   pthread_mutex_lock(&lock);
   size_t used = strlen(said);
   (void)snprintf(said + used, sizeof said - used, "%s\n", line);
+  if (is_enough && strstr(line, is_enough)) atomic_store(&over, 1);
   pthread_mutex_unlock(&lock);
 }
 
@@ -124,30 +132,32 @@ static wm_recording *robot_on(bus *can, const wm_config *config) {
   TEST_ASSERT_EQUAL(WM_OK, can_device_make("can0", decoder, &io, can, &source, &err));
   TEST_ASSERT_EQUAL(WM_OK,
                     wm_recording_add_device(robot, source, 1u << WM_Q_VEHICLE_SPEED | 1u << WM_Q_YAW_RATE, &err));
-  can->begin_ns = can->next_ns = wm_monotonic_ns();
   return robot;
 }
 
 static void a_run_on_can_survives_an_interface_that_goes_down(void) {
   wm_error err = {0};
   wm_config config;
-  bus can = {0};
+  bus can = {.frames = 200, .down_after = 100};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(kConfig, strlen(kConfig), "test.yaml", &config, &err), err.text);
   wm_recording *robot = robot_on(&can, &config);
-  const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 1, .duration_s = 3, .say = hear};
+  const wm_run_options options = {
+      .out_dir = in_folder("run"), .seed = 1, .speed = 1, .duration_s = LONGEST_S, .stop = &over, .say = hear};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, robot, &options, &live, &err), err.text);
   wm_recording_close(robot);
   wm_config_free(&config);
 
-  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "can: can0 went down"), said);
-  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "can: can0 is up"), said);
+  const char *down = strstr(said, "can: can0 went down");
+  TEST_ASSERT_NOT_NULL_MESSAGE(down, said);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(down, "can: can0 is up"), said);
   const wm_source_health *health = &live.run.health.sources[0];
   TEST_ASSERT_EQUAL_STRING("can", health->name);
   TEST_ASSERT_EQUAL(WM_DEVICE_WORKS, health->device);
+  // Each frame ended in one place, most of them in the pose; a thread that is held up for 150 ms makes some late.
+  TEST_ASSERT_EQUAL_UINT64(200, health->received);
+  TEST_ASSERT_EQUAL_UINT64(200, health->fused + health->late);
   TEST_ASSERT_GREATER_THAN_UINT64(100, health->fused);
-  TEST_ASSERT_EQUAL_UINT64(0, health->dropped + health->future);
-  TEST_ASSERT_LESS_THAN_UINT64(health->received / 4, health->late);  // of a thread that was held up for 150 ms
-  TEST_ASSERT_GREATER_THAN_UINT64(40, live.run.health.published);    // 50 a second, where no thread was held up
+  TEST_ASSERT_GREATER_THAN_UINT64(10, live.run.health.published);
 }
 
 static void the_log_of_a_run_on_devices_gives_its_poses_again(void) {
@@ -171,23 +181,32 @@ static void a_run_begins_where_the_last_one_ended(void) {
   wm_error err = {0};
   wm_config config;
   char text[1200];
-  double ended_x_m = 0;
+  double ended_x_m = 1;
   (void)snprintf(text, sizeof text, "%sstart: {saved_pose: %s, save_every_s: 0.1}\n", kConfig, in_folder("pose.yaml"));
   for (int run = 0; run < 2; run++) {
-    bus can = {0};
+    bus can = {.frames = 60, .down_after = -1};
     wm_saved_pose saved;
+    setUp();
     TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, strlen(text), "test.yaml", &config, &err), err.text);
     wm_recording *robot = robot_on(&can, &config);
-    const wm_run_options options = {.seed = 1, .speed = 1, .duration_s = 0.8, .say = hear};
+    const wm_run_options options = {.seed = 1, .speed = 1, .duration_s = LONGEST_S, .stop = &over, .say = hear};
     TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, robot, &options, &live, &err), err.text);
+    double longest_m = wm_seconds_between(can.first_ns, wm_monotonic_ns());
     wm_recording_close(robot);
     wm_config_free(&config);
     TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(in_folder("pose.yaml"), &saved, &err), err.text);
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 2, saved.start.p_m[1]);
-    TEST_ASSERT_DOUBLE_WITHIN(0.75, ended_x_m + (run ? 0.8 : 1.8), saved.start.p_m[0]);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(ended_x_m, saved.start.p_m[0]);
+    TEST_ASSERT_LESS_THAN_DOUBLE(ended_x_m + longest_m, saved.start.p_m[0]);
+    if (run == 1) {
+      double began_x_m = 0;
+      const char *start = strstr(said, "start: where it was");
+      TEST_ASSERT_NOT_NULL_MESSAGE(start, said);
+      TEST_ASSERT_EQUAL_MESSAGE(1, sscanf(strchr(start, 'x'), "x %lf", &began_x_m), start);
+      TEST_ASSERT_DOUBLE_WITHIN(0.0051, ended_x_m, began_x_m);  // it is said in centimetres
+    }
     ended_x_m = saved.start.p_m[0];
   }
-  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "start: where it was"), said);
 }
 
 static int reloads;
@@ -203,11 +222,11 @@ static void another_configuration_is_taken_while_it_drives(void) {
   wm_error err = {0};
   wm_config config;
   wm_start start;
-  bus can = {0};
+  bus can = {.frames = 60, .down_after = -1};
   atomic_int asked = 0;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(kConfig, strlen(kConfig), "test.yaml", &config, &err), err.text);
   wm_recording *robot = robot_on(&can, &config);
-  wm_run_options options = {.seed = 1, .speed = 1, .duration_s = 0.6, .say = hear};
+  wm_run_options options = {.seed = 1, .speed = 1, .duration_s = LONGEST_S, .stop = &over, .say = hear};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, robot, &options, &live, &err), err.text);
   TEST_ASSERT_TRUE(live.has_last && !live.wants_restart);
   wm_start_from_estimate(&live.last, 0.5, &start);
@@ -216,7 +235,7 @@ static void another_configuration_is_taken_while_it_drives(void) {
   wm_recording_close(robot);
 
   robot = robot_on(&can, &config);
-  options = (wm_run_options){.seed = 1, .speed = 1, .duration_s = 30, .say = hear, .start = &start};
+  options = (wm_run_options){.seed = 1, .speed = 1, .duration_s = LONGEST_S, .say = hear, .start = &start};
   atomic_store(&asked, 1);
   options.reload_asked = &asked;
   options.reload = refuse_then_take;
@@ -248,11 +267,12 @@ static void a_run_without_its_interface_waits_and_says_so(void) {
                  "%sdevices: {can: [{interface: nocan7, dbc: car.dbc, can_signals: signals.yaml}]}\n", kConfig);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, strlen(text), path, &config, &err), err.text);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_robot_open(&config, NULL, NULL, &robot, &err), err.text);
-  const wm_run_options options = {.seed = 1, .speed = 1, .duration_s = 0.5, .say = hear};
+  is_enough = "nocan7 is not there";
+  const wm_run_options options = {.seed = 1, .speed = 1, .duration_s = LONGEST_S, .stop = &over, .say = hear};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, robot, &options, &live, &err), err.text);
   wm_recording_close(robot);
   wm_config_free(&config);
-  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "nocan7 is not there"), said);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, is_enough), said);
   TEST_ASSERT_EQUAL(WM_DEVICE_ABSENT, live.run.health.sources[0].device);
 }
 

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "small_recording.h"
@@ -73,13 +74,14 @@ static void the_estimators_thread_allocates_nothing_and_misses_no_page(void) {
   TEST_ASSERT_EQUAL_INT64(0, live.run.page_faults_after_start);
 }
 
-// Nothing that arrived is lost between the threads, at sixteen times real speed.
+// Nothing that arrived is lost between the threads, at sixteen times real speed, where a thread may be held up for two
+// seconds.
 static void everything_that_arrived_is_fused(void) {
   small_recording_write("rec", &(small_recording){.seconds = 30, .motion_hz = 100});
   const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 16};
   run_live("rec",
            "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm: false}\n"
-           "merge: {horizon_ms: 3000, lateness_max_ms: 3000}\nrealtime: {priority: 0, lock_memory: false}\n",
+           "merge: {horizon_ms: 30000, lateness_max_ms: 30000}\nrealtime: {priority: 0, lock_memory: false}\n",
            &options);
   for (uint32_t i = 0; i < live.run.health.source_count; i++) {
     const wm_source_health *s = &live.run.health.sources[i];
@@ -89,10 +91,11 @@ static void everything_that_arrived_is_fused(void) {
   TEST_ASSERT_EQUAL_UINT64(3000, live.run.poses);
 }
 
+// Once poses are on the disk, however long that takes on a busy machine.
 static atomic_int stop;
-static void *stop_soon(void *unused) {
-  (void)unused;
-  (void)usleep(500000);
+static void *stop_when_poses_are_written(void *path) {
+  struct stat file;
+  for (int i = 0; i < 3000 && (stat(path, &file) != 0 || file.st_size < 1000); i++) (void)usleep(10000);
   atomic_store(&stop, 1);
   return NULL;
 }
@@ -100,12 +103,14 @@ static void *stop_soon(void *unused) {
 static void a_stop_ends_the_run_and_everything_is_written(void) {
   small_recording_write("rec", &(small_recording){.seconds = 60});
   pthread_t thread;
+  char path[600];
+  (void)snprintf(path, sizeof path, "%s", in_folder("run/trajectory.csv"));
   atomic_store(&stop, 0);
-  TEST_ASSERT_EQUAL(0, pthread_create(&thread, NULL, stop_soon, NULL));
+  TEST_ASSERT_EQUAL(0, pthread_create(&thread, NULL, stop_when_poses_are_written, path));
   const wm_run_options options = {.out_dir = in_folder("run"), .seed = 1, .speed = 1, .stop = &stop};
   run_live("rec", kConfig, &options);
   pthread_join(thread, NULL);
-  TEST_ASSERT_TRUE(live.run.recorded_s < 20);
+  TEST_ASSERT_TRUE(live.run.recorded_s < 60);
   TEST_ASSERT_GREATER_THAN(2, live.run.poses);
   replay_log_into("run/events.wmlog", "again");
   TEST_ASSERT_EQUAL(0, report.log_was_cut);
@@ -114,7 +119,7 @@ static void a_stop_ends_the_run_and_everything_is_written(void) {
 
 static void a_duration_ends_the_run(void) {
   small_recording_write("rec", &(small_recording){.seconds = 60});
-  const wm_run_options options = {.seed = 1, .speed = 1, .duration_s = 0.5};  // and nothing is written
+  const wm_run_options options = {.seed = 1, .speed = 1, .duration_s = 2};  // and nothing is written
   run_live("rec", kConfig, &options);
   TEST_ASSERT_TRUE(live.run.recorded_s < 20);
   TEST_ASSERT_GREATER_THAN(2, live.run.poses);
