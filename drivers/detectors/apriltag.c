@@ -109,6 +109,7 @@ static int put(apriltag_state *self, const wm_frame *frame, const apriltag_detec
   const double cp = cos(rpy[1]), sp = sin(rpy[1]), cr = cos(rpy[0]), sr = sin(rpy[0]);
   const double x = cp * upper[0] + sp * (sr * upper[1] + cr * upper[2]), y = cr * upper[1] - sr * upper[2];
   out->as.marker.yaw_rad = atan2(y, x);
+  out->as.marker.edge_shift_px = wm_marker_fit_shift_px(fit_of(self));
   return 1;
 }
 

@@ -2,7 +2,7 @@
 #include "waymark/bytes.h"
 #include "waymark/codec.h"
 
-#define EVENT_VERSION 2
+#define EVENT_VERSION 3
 
 static void put_payload(wm_writer *w, const wm_event *e) {
   switch ((wm_event_kind)e->kind) {
@@ -45,9 +45,15 @@ static void put_payload(wm_writer *w, const wm_event *e) {
       break;
     case WM_EVENT_MARKER:
       wm_put_u16(w, e->as.marker.sensor);
+      wm_put_u16(w, e->as.marker.poses);
       wm_put_i32(w, e->as.marker.id);
       wm_put_f64s(w, e->as.marker.p_m, 3);
       wm_put_f64(w, e->as.marker.yaw_rad);
+      wm_put_f64s(w, e->as.marker.other_p_m, 3);
+      wm_put_f64(w, e->as.marker.other_yaw_rad);
+      wm_put_f64(w, e->as.marker.along_sigma_m);
+      wm_put_f64(w, e->as.marker.yaw_sigma_rad);
+      wm_put_f64(w, e->as.marker.edge_shift_px);
       break;
     case WM_EVENT_STEREO:
       wm_put_i32(w, e->as.stereo.id);
@@ -148,9 +154,15 @@ static void get_payload(wm_reader *r, wm_event *e) {
       break;
     case WM_EVENT_MARKER:
       e->as.marker.sensor = wm_get_u16(r);
+      e->as.marker.poses = wm_get_u16(r);
       e->as.marker.id = wm_get_i32(r);
       wm_get_f64s(r, e->as.marker.p_m, 3);
       e->as.marker.yaw_rad = wm_get_f64(r);
+      wm_get_f64s(r, e->as.marker.other_p_m, 3);
+      e->as.marker.other_yaw_rad = wm_get_f64(r);
+      e->as.marker.along_sigma_m = wm_get_f64(r);
+      e->as.marker.yaw_sigma_rad = wm_get_f64(r);
+      e->as.marker.edge_shift_px = wm_get_f64(r);
       break;
     case WM_EVENT_STEREO:
       e->as.stereo.id = wm_get_i32(r);

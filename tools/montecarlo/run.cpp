@@ -47,8 +47,13 @@ wm_status make_events(const sim::Recording &recording, const wm_dbc *dbc, std::v
   };
   for (const sim::Sighting &s : recording.sightings)
     add(s, WM_EVENT_SIGHTING).as.sighting = {s.sensor, s.id, s.bearing_rad, s.range_m, NAN, NAN};
-  for (const sim::MarkerSeen &m : recording.markers)
-    add(m, WM_EVENT_MARKER).as.marker = {m.sensor, m.id, {m.p_m[0], m.p_m[1], m.p_m[2]}, m.yaw_rad};
+  for (const sim::MarkerSeen &m : recording.markers) {
+    wm_marker &seen = add(m, WM_EVENT_MARKER).as.marker;
+    seen.sensor = m.sensor;
+    seen.id = m.id;
+    for (int k = 0; k < 3; k++) seen.p_m[k] = m.p_m[k];
+    seen.yaw_rad = m.yaw_rad;
+  }
   for (const sim::Fix &f : recording.fixes)
     add(f, WM_EVENT_POSITION).as.position = {{f.p_m[0], f.p_m[1], f.p_m[2]}, f.sigma_xy_m, f.sigma_z_m};
   std::stable_sort(out.begin(), out.end(), [](const wm_event &a, const wm_event &b) {

@@ -10,10 +10,61 @@ namespace {
 constexpr double kFarthest_m = 1e4;
 constexpr double kAgree_m = 0.2, kAgree_rad = 0.1;  // of two markers on where the robot is
 constexpr double kThreeNumbers = 11.345 / 9.210;    // 99 % of chi2 with three degrees of freedom against two
+constexpr double kPlain = 9.0;                      // of two poses one is 90 times as likely
 
 double first_number(double a, double b) { return finite(a) ? a : b; }
 
+wm_status check_marker(const wm_marker &m, size_t sensors) {
+  const bool two = m.poses == 2;
+  const double numbers[] = {m.p_m[0],
+                            m.p_m[1],
+                            m.p_m[2],
+                            two ? m.other_p_m[0] : 0.0,
+                            two ? m.other_p_m[1] : 0.0,
+                            two ? m.other_p_m[2] : 0.0,
+                            m.along_sigma_m};
+  const double angles[] = {m.yaw_rad, two ? m.other_yaw_rad : 0.0, m.yaw_sigma_rad, m.edge_shift_px};
+  for (double n : numbers)
+    if (!finite(n)) return WM_NOT_FINITE;
+  for (double a : angles)
+    if (!finite(a)) return WM_NOT_FINITE;
+  if (m.sensor >= sensors || m.along_sigma_m < 0.0 || m.yaw_sigma_rad < 0.0) return WM_OUT_OF_RANGE;
+  for (double n : numbers)
+    if (std::fabs(n) > kFarthest_m) return WM_OUT_OF_RANGE;
+  for (double a : angles)
+    if (std::fabs(a) > 100.0) return WM_OUT_OF_RANGE;
+  return WM_OK;
+}
+
 }  // namespace
+
+// Levelled: along the sensor's yaw, on the floor. axis is (Ry(pitch) Rx(roll))', its columns are the sensor's axes.
+slam::marker_reading slam::read_marker(const wm_marker &m, const double p_m[3], double yaw_rad) const {
+  const mounted_sensor &sensor = sensor_[m.sensor];
+  double level[3];
+  for (int i = 0; i < 3; i++)
+    level[i] = sensor.axis[0][i] * p_m[0] + sensor.axis[1][i] * p_m[1] + sensor.axis[2][i] * p_m[2];
+  marker_reading r;
+  const double floor_m = std::sqrt(level[0] * level[0] + level[1] * level[1]);
+  r.length_m = std::sqrt(level[0] * level[0] + level[1] * level[1] + level[2] * level[2]);
+  r.along[0] = floor_m > 1e-6 ? level[0] / floor_m : 1.0;
+  r.along[1] = floor_m > 1e-6 ? level[1] / floor_m : 0.0;
+  r.level[0] = level[0];
+  r.level[1] = level[1];
+  r.yaw_rad = yaw_rad;
+  const double across = params_.bearing_sigma_factor *
+                        first_number(sensor.bearing_sigma_rad, params_.bearing_sigma_default_rad) * floor_m;
+  const double range = params_.range_sigma_factor * first_number(sensor.range_sigma_m, params_.range_sigma_default_m);
+  const double least = square(params_.marker_sigma_m) + square(params_.marker_sigma_rel * r.length_m);
+  // The line of sight's share that lies on the floor.
+  const double along = r.length_m > 1e-6 ? m.along_sigma_m * floor_m / r.length_m : 0.0;
+  r.noise[0] = least + square(range) + square(along);
+  r.noise[1] = least + square(across);
+  r.noise[2] = square(m.yaw_sigma_rad > 0.0 ? m.yaw_sigma_rad : params_.marker_heading_sigma_rad);
+  r.z_m = sensor.z_m + level[2];
+  r.turned = true;
+  return r;
+}
 
 wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   const wm_marker &m = event.as.marker;
@@ -28,48 +79,34 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
     records.add(blank);
     return WM_OK;
   };
-  if (!finite(m.p_m[0]) || !finite(m.p_m[1]) || !finite(m.p_m[2]) || !finite(m.yaw_rad)) {
-    drop(WM_REJECTED_NOT_FINITE);
-    return WM_NOT_FINITE;
+  wm_status status = check_marker(m, setup_->sensor_count);
+  if (status != WM_OK) {
+    drop(status == WM_NOT_FINITE ? WM_REJECTED_NOT_FINITE : WM_REJECTED_OUT_OF_RANGE);
+    return status;
   }
-  if (m.sensor >= setup_->sensor_count || std::fabs(m.p_m[0]) > kFarthest_m || std::fabs(m.p_m[1]) > kFarthest_m ||
-      std::fabs(m.p_m[2]) > kFarthest_m || std::fabs(m.yaw_rad) > 100.0) {
-    drop(WM_REJECTED_OUT_OF_RANGE);
-    return WM_OUT_OF_RANGE;
-  }
-  const wm_status status = joint_.check_time(event.t_ns);
+  status = joint_.check_time(event.t_ns);
   if (status != WM_OK) return status;
   joint_.move_to(event.t_ns);
   look_after(event.t_ns);
   if (!params_.markers) return drop(WM_REJECTED_BY_CONFIG);
   if (m.id < 0) return drop(WM_REJECTED_NO_ASSOCIATION);
+  if (m.edge_shift_px != 0.0) edge_shift_px_[m.sensor] = m.edge_shift_px;
 
-  // Levelled: along the sensor's yaw, on the floor. axis is (Ry(pitch) Rx(roll))', its columns are the sensor's axes.
-  const mounted_sensor &sensor = sensor_[m.sensor];
-  double level[3];
-  for (int i = 0; i < 3; i++)
-    level[i] = sensor.axis[0][i] * m.p_m[0] + sensor.axis[1][i] * m.p_m[1] + sensor.axis[2][i] * m.p_m[2];
-  const double length = std::sqrt(level[0] * level[0] + level[1] * level[1] + level[2] * level[2]);
-  if (length > sensor.max_range_m) return drop(WM_REJECTED_OUT_OF_RANGE);
-  marker_reading r;
-  const double floor_m = std::sqrt(level[0] * level[0] + level[1] * level[1]);
-  r.along[0] = floor_m > 1e-6 ? level[0] / floor_m : 1.0;
-  r.along[1] = floor_m > 1e-6 ? level[1] / floor_m : 0.0;
-  r.level[0] = level[0];
-  r.level[1] = level[1];
-  r.yaw_rad = m.yaw_rad;
-  const double across = params_.bearing_sigma_factor *
-                        first_number(sensor.bearing_sigma_rad, params_.bearing_sigma_default_rad) * floor_m;
-  const double range = params_.range_sigma_factor * first_number(sensor.range_sigma_m, params_.range_sigma_default_m);
-  const double least = square(params_.marker_sigma_m) + square(params_.marker_sigma_rel * length);
-  r.noise[0] = least + square(range);
-  r.noise[1] = least + square(across);
-  r.noise[2] = square(params_.marker_heading_sigma_rad);
-  r.z_m = sensor.z_m + level[2];
-
+  marker_reading r = read_marker(m, m.p_m, m.yaw_rad);
+  if (r.length_m > sensor_[m.sensor].max_range_m) return drop(WM_REJECTED_OUT_OF_RANGE);
   const int landmark = find_landmark(m.id);
-  if (searching_ && !(landmark >= 0 && find_start(landmark, m, r))) return drop(WM_REJECTED_SEARCHING);
+  const bool two = m.poses == 2;
+  if (searching_ && (two || landmark < 0 || !find_start(landmark, m, r))) return drop(WM_REJECTED_SEARCHING);
   const past_pose past = look_back(sensor_value(m.sensor, kTimeOffset, 0.0));
+  if (two) {
+    // Seen nearly face on a print has two poses, which differ in its heading. The filter tells them apart where it
+    // knows better; where not, the place alone is taken: the same side would be the wrong one sighting after sighting.
+    const marker_reading other = read_marker(m, m.other_p_m, m.other_yaw_rad);
+    const double nis = landmark < 0 ? 0.0 : marker_nis(landmark, m, r, past);
+    const double other_nis = landmark < 0 ? 0.0 : marker_nis(landmark, m, other, past);
+    if (other_nis < nis) r = other;
+    r.turned = std::fabs(other_nis - nis) > kPlain;
+  }
   if (landmark >= 0)
     fuse_known_marker(landmark, m, r, past, blank, records);
   else if (params_.map == WM_SLAM_MAP_FROZEN)
@@ -146,9 +183,8 @@ void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past
   out->innovation[2] = wrap(out->observed[2] - out->expected[2]);
 }
 
-void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_reading &r, const past_pose &past,
-                             wm_innovation blank, record_list records) {
-  static constexpr wm_residual kKinds[3] = {WM_RESIDUAL_X, WM_RESIDUAL_Y, WM_RESIDUAL_HEADING};
+// How badly a known marker's sighting fits.
+double slam::marker_nis(int landmark, const wm_marker &m, const marker_reading &r, const past_pose &past) {
   const int state = joint_.landmark_state(landmark);
   const double place[3] = {joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};
   marker_view v;
@@ -157,8 +193,24 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
     for (int k = 0; k < 3; k++) v.row[i].add(state + k, v.by_landmark[i][k]);
   joint_state::innovation_block block;
   joint_.prepare(v.row, v.innovation, r.noise, 3, &block);
-  const double hard = params_.gate_hard * kThreeNumbers, soft = params_.gate_soft * kThreeNumbers;
-  for (int i = 0; i < 3; i++) {
+  return block.nis;
+}
+
+void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_reading &r, const past_pose &past,
+                             wm_innovation blank, record_list records) {
+  static constexpr wm_residual kKinds[3] = {WM_RESIDUAL_X, WM_RESIDUAL_Y, WM_RESIDUAL_HEADING};
+  const int state = joint_.landmark_state(landmark);
+  const double place[3] = {joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};
+  const int count = r.turned ? 3 : 2;
+  marker_view v;
+  see_marker(m.sensor, r, past, place, &v);
+  for (int i = 0; i < count; i++)
+    for (int k = 0; k < 3; k++) v.row[i].add(state + k, v.by_landmark[i][k]);
+  joint_state::innovation_block block;
+  joint_.prepare(v.row, v.innovation, r.noise, count, &block);
+  const double scale = r.turned ? kThreeNumbers : 1.0;
+  const double hard = params_.gate_hard * scale, soft = params_.gate_soft * scale;
+  for (int i = 0; i < count; i++) {
     wm_innovation record = blank;
     record.residual = (uint8_t)kKinds[i];
     record.observed = v.observed[i];
@@ -166,7 +218,7 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
     record.variance = block.s[i][i];
     record.nis = block.nis;
     record.gate = hard;
-    record.gate_dof = 3;
+    record.gate_dof = (uint8_t)count;
     record.verdict = block.nis <= hard ? WM_FUSED : WM_REJECTED_GATE;
     records.add(record);
   }
@@ -204,6 +256,7 @@ void slam::join_marker(const wm_marker &m, const marker_reading &r, const past_p
       if (inverse[k][i] != 0.0) rows[k].add(v.row[i], -inverse[k][i]);
       for (int l = 0; l < 3; l++) noise[k][l] += inverse[k][i] * r.noise[i] * inverse[l][i];
     }
+  if (!r.turned) noise[2][2] += square(kPi);
   const int landmark = note_landmark(m.id, joint_.add_landmark(rows, noise, place), joint_.now_ns());
   notes()[landmark].z_m = r.z_m;
   fused_ns_ = joint_.now_ns();

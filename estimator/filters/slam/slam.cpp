@@ -233,6 +233,8 @@ size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const 
     for (int k = 0; k < kSensorStates; k++)
       if (const int state = sensor_state_[i][k]; state >= 0)
         add(setup_->sensors[i].name, kSensorStateNames[k], joint_.value(state), joint_.variance(state));
+  for (size_t i = 0; i < setup_->sensor_count; i++)
+    if (edge_shift_px_[i] != 0.0) add(setup_->sensors[i].name, "edge_shift_px", edge_shift_px_[i], 0.0);
   add("map", "landmarks", joint_.landmarks(), 0.0);
   add("map", "joined", (double)counts_.joined, 0.0);
   add("map", "left", (double)counts_.left, 0.0);

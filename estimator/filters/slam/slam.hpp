@@ -79,6 +79,8 @@ class slam {
     double level[2], along[2];  // place; unit vector towards it
     double yaw_rad, z_m;
     double noise[3];  // along, across, heading
+    double length_m;
+    bool turned;  // its heading is one, not one of two
   };
   struct marker_view {
     joint_row row[3];
@@ -113,6 +115,8 @@ class slam {
   void end_ray(bearing_tracks::track *track);
   int ray_state(const bearing_tracks::track &track) const { return first_ray_ + 2 * tracks_.index(track); }
   wm_status fuse_marker(const wm_event &event, record_list records);
+  marker_reading read_marker(const wm_marker &m, const double p_m[3], double yaw_rad) const;
+  double marker_nis(int landmark, const wm_marker &m, const marker_reading &r, const past_pose &past);
   void see_marker(int sensor, const marker_reading &r, const past_pose &past, const double place[3],
                   marker_view *out) const;
   void fuse_known_marker(int landmark, const wm_marker &m, const marker_reading &r, const past_pose &past,
@@ -151,6 +155,7 @@ class slam {
   bearing_tracks tracks_;
   int first_ray_, first_clone_;
   slam_counts counts_;
+  double edge_shift_px_[kSlamSensors];  // by the last marker that says it; 0: none did
   wm_time_ns fused_ns_;
   int32_t next_id_;
   int cursor_;                    // of look_after

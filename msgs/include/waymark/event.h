@@ -96,11 +96,18 @@ typedef struct wm_heading {
   double sigma_rad;
 } wm_heading;
 
+// A coded marker. What is 0 behind `yaw_rad` is not known.
 typedef struct wm_marker {
   uint16_t sensor;
+  uint16_t poses;  // 2: the corners allow a second pose as well, other_*; else there is one
   int32_t id;
   double p_m[3];  // in the sensor's frame
   double yaw_rad;
+  double other_p_m[3], other_yaw_rad;
+  double along_sigma_m;  // of its distance along the line of sight; 0: the configuration's
+  double yaw_sigma_rad;  // 0: the configuration's
+  double
+      edge_shift_px;  // how far white grows over an edge in this camera, as far as it is known by now; 0: not measured
 } wm_marker;
 
 typedef struct wm_stereo {

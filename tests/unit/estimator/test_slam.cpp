@@ -32,7 +32,7 @@ wm_random noise;
 wm_pose2 truth;
 double now_s;
 double false_share;  // of sightings that are of nothing
-bool hidden, twice, nameless, coded;
+bool hidden, twice, nameless, coded, two_poses;
 int fused, rejected;
 
 double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
@@ -65,7 +65,7 @@ void make_room() {
   truth = {2, 0, wm::kHalfPi};
   noise = {42, 1, 0};
   now_s = false_share = 0.0;
-  hidden = twice = nameless = coded = false;
+  hidden = twice = nameless = coded = two_poses = false;
   fused = rejected = 0;
 }
 
@@ -87,6 +87,16 @@ wm_verdict see(const wm_event &e) {
   return (wm_verdict)out[0].verdict;
 }
 
+wm_marker marker(int32_t id, double x, double y, double z, double yaw_rad) {
+  wm_marker m{};
+  m.id = id;
+  m.p_m[0] = x;
+  m.p_m[1] = y;
+  m.p_m[2] = z;
+  m.yaw_rad = yaw_rad;
+  return m;
+}
+
 // Drives a circle of 2 m and looks around five times a second.
 void drive(double seconds, bool range = true) {
   const double v = 0.5, w = 0.25, until = now_s + seconds;
@@ -104,8 +114,15 @@ void drive(double seconds, bool range = true) {
         const double r = wrong ? 1.0 + 5.0 * wm_random_next_uniform(&noise) : distance + gauss(0.03);
         if (coded) {
           wm_event seen = make::empty(now_s, WM_EVENT_MARKER);
-          seen.as.marker = {
-              0, 10 + i, {r * wm::cos(b), r * wm::sin(b), 2.2}, wm::wrap(0.5 * i - truth.heading_rad + gauss(0.01))};
+          seen.as.marker =
+              marker(10 + i, r * wm::cos(b), r * wm::sin(b), 2.2, wm::wrap(0.5 * i - truth.heading_rad + gauss(0.01)));
+          if (two_poses) {  // the wrong one first, turned to the other side of the line of sight
+            wm_marker &m = seen.as.marker;
+            m.poses = 2;
+            std::memcpy(m.other_p_m, m.p_m, sizeof m.p_m);
+            m.other_yaw_rad = m.yaw_rad;
+            m.yaw_rad = wm::wrap(m.yaw_rad + (bearing > 0 ? 0.4 : -0.4));
+          }
           see(seen);
           continue;
         }
@@ -211,16 +228,48 @@ void test_absurd_markers_are_refused_and_change_nothing(void) {
   size_t count = 0;
   for (double bad : {kAbsent, HUGE_VAL, 1e9}) {
     wm_event e = make::empty(now_s, WM_EVENT_MARKER);
-    e.as.marker = {0, 3, {bad, 0, 1}, 0};
+    e.as.marker = marker(3, bad, 0, 1, 0);
     TEST_ASSERT_EQUAL(std::isfinite(bad) ? WM_OUT_OF_RANGE : WM_NOT_FINITE, slam->correct(state, &e, out, 8, &count));
-    e.as.marker = {0, 3, {1, 0, 1}, bad};
+    e.as.marker = marker(3, 1, 0, 1, bad);
     TEST_ASSERT_EQUAL(std::isfinite(bad) ? WM_OUT_OF_RANGE : WM_NOT_FINITE, slam->correct(state, &e, out, 8, &count));
   }
   wm_event e = make::empty(now_s, WM_EVENT_MARKER);
-  e.as.marker = {7, 3, {1, 0, 1}, 0};
+  e.as.marker = marker(3, 1, 0, 1, 0);
+  e.as.marker.sensor = 7;
   TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, slam->correct(state, &e, out, 8, &count));
-  e.as.marker = {0, -1, {1, 0, 1}, 0};
+  e.as.marker = marker(-1, 1, 0, 1, 0);
   TEST_ASSERT_EQUAL(WM_REJECTED_NO_ASSOCIATION, see(e));
+}
+
+void test_of_two_poses_the_one_is_taken_that_fits_the_map(void) {
+  coded = true;
+  params.markers = 1;
+  params.marker_heading_sigma_rad = 0.01;
+  begin();
+  drive(20);
+  two_poses = true;
+  rejected = 0;
+  drive(20);
+  TEST_ASSERT_EQUAL(0, rejected);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+  wm_landmark l[kCount];
+  double covariance[kCount][4];
+  TEST_ASSERT_EQUAL(kCount, slam->landmarks(state, l, covariance, kCount));
+  for (const wm_landmark &m : l) TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, wm::wrap(m.yaw_rad - 0.5 * (m.id - 10)));
+}
+
+void test_markers_with_two_poses_from_the_start_have_a_place_and_no_heading(void) {
+  coded = two_poses = true;
+  params.markers = 1;
+  begin();
+  drive(40);
+  size_t found;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&found));
+  TEST_ASSERT_EQUAL(kCount, found);
+  wm_landmark l[kCount];
+  double covariance[kCount][4];
+  slam->landmarks(state, l, covariance, kCount);
+  for (const auto &c : covariance) TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, c[3]);
 }
 
 void test_landmarks_without_identity_are_told_apart(void) {
@@ -413,6 +462,8 @@ int main(void) {
   RUN_TEST(test_landmarks_are_found_by_bearings_alone_whatever_the_method);
   RUN_TEST(test_coded_markers_give_place_and_heading_at_once);
   RUN_TEST(test_absurd_markers_are_refused_and_change_nothing);
+  RUN_TEST(test_of_two_poses_the_one_is_taken_that_fits_the_map);
+  RUN_TEST(test_markers_with_two_poses_from_the_start_have_a_place_and_no_heading);
   RUN_TEST(test_landmarks_without_identity_are_told_apart);
   RUN_TEST(test_a_landmark_seen_twice_in_a_frame_without_identity_is_fused_once);
   RUN_TEST(test_the_same_identity_twice_in_a_frame_at_two_places_keeps_one);

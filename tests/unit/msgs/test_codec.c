@@ -47,7 +47,18 @@ static void fill(wm_event *e, unsigned kind) {
     case WM_EVENT_SIGHTING: e->as.sighting = (wm_sighting){65535, -1, random_f64(), NAN, NAN, random_f64()}; break;
     case WM_EVENT_POSITION: e->as.position = (wm_position){{random_f64(), random_f64(), NAN}, 1e-300, INFINITY}; break;
     case WM_EVENT_HEADING: e->as.heading = (wm_heading){random_f64(), random_f64()}; break;
-    case WM_EVENT_MARKER: e->as.marker = (wm_marker){3, INT32_MIN, {1, 2, random_f64()}, random_f64()}; break;
+    case WM_EVENT_MARKER:
+      e->as.marker = (wm_marker){3,
+                                 2,
+                                 INT32_MIN,
+                                 {1, 2, random_f64()},
+                                 random_f64(),
+                                 {random_f64(), 4, 5},
+                                 random_f64(),
+                                 random_f64(),
+                                 random_f64(),
+                                 random_f64()};
+      break;
     case WM_EVENT_STEREO: e->as.stereo = (wm_stereo){INT32_MAX, {random_f64(), 2}, {NAN, NAN}}; break;
     case WM_EVENT_POINTS:
       e->as.points.count = (uint32_t)(random_bits() % (WM_POINTS_MAX + 1));
@@ -107,7 +118,7 @@ static void noise_never_gives_an_event_with_indices_out_of_bounds(void) {
   for (int round = 0; round < 20000; round++) {
     uint8_t bytes[128];
     for (size_t i = 0; i < sizeof bytes; i++) bytes[i] = (uint8_t)random_bits();
-    bytes[0] = 2;
+    bytes[0] = 3;
     bytes[1] = (uint8_t)(random_bits() % (WM_EVENT_KIND_COUNT + 2));
     if (round % 2) bytes[24] = (uint8_t)(random_bits() % 10);  // a count that may be good
     wm_event out;
@@ -138,7 +149,7 @@ static void bytes_are_little_endian_on_every_machine(void) {
       .t_ns = 0x0102030405060708, .arrival_ns = -1, .seq = 0x11223344, .source = 0x5566, .kind = WM_EVENT_LOOKED};
   e.as.looked.sensor = 0x7788;
   uint8_t bytes[64];
-  static const uint8_t kWanted[] = {2,    WM_EVENT_LOOKED,
+  static const uint8_t kWanted[] = {3,    WM_EVENT_LOOKED,
                                     0x66, 0x55,
                                     0x44, 0x33,
                                     0x22, 0x11,
