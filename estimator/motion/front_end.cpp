@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "math/elementary.hpp"
+#include "motion/event_time.hpp"
 
 namespace wm {
 namespace {
@@ -14,7 +15,6 @@ constexpr double kMaxRate = 50.0;      // rad/s
 constexpr double kMaxAngle = 200.0;    // rad, of a steering wheel
 constexpr double kMaxActuator = 10.0;  // m
 constexpr double kMaxTicks = 1e15;     // doubles still count singly there
-constexpr wm_time_ns kMaxTime = INT64_C(1) << 62;
 
 constexpr double kSignedBelow = -0.1;       // m/s: more than a sensor's zero error
 constexpr double kYawStuckAlone_s = 30.0;   // the same bits for so long while driving

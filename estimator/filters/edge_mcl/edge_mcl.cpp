@@ -3,6 +3,7 @@
 
 #include <cstring>
 
+#include "filters/contract.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
 #include "math/arc.hpp"
@@ -100,9 +101,9 @@ wm_status edge_mcl::predict(const wm_event &motion) {
   return status;
 }
 
-wm_status edge_mcl::correct(const wm_event &event, wm_innovation *out, size_t capacity, size_t *count) {
+wm_status edge_mcl::correct(const wm_event &event, record_list records) {
   switch (event.kind) {
-    case WM_EVENT_POINTS: return take_points(event, out, capacity, count);
+    case WM_EVENT_POINTS: return take_points(event, records);
     case WM_EVENT_SET_POSE:
     case WM_EVENT_RESET: return take_pose(event);
     case WM_EVENT_LOOKED: {
@@ -121,7 +122,7 @@ wm_status edge_mcl::take_pose(const wm_event &event) {
   return status;
 }
 
-wm_status edge_mcl::take_points(const wm_event &event, wm_innovation *out, size_t capacity, size_t *count) {
+wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
   const wm_points &points = event.as.points;
   wm_status status = filter_.check_time(event.t_ns);
   if (status != WM_OK) return status;
@@ -150,7 +151,7 @@ wm_status edge_mcl::take_points(const wm_event &event, wm_innovation *out, size_
     heed_cloud();
   else
     search();
-  if (out && *count < capacity) out[(*count)++] = record;
+  records.add(record);
   return WM_OK;
 }
 
@@ -268,32 +269,19 @@ void edge_mcl::estimate(wm_estimate *out) const {
 size_t edge_mcl::list_calibration(wm_calibration_value *out, size_t capacity) const {
   static constexpr const char *kNames[kCameraErrors + 1] = {"pitch_rad", "roll_rad", "yaw_rad", "height_m",
                                                             "time_offset_s"};
-  size_t count = filter_.list_calibration(out, capacity);
-  const auto add = [&](const char *whose, const char *what, double value, double sigma) {
-    if (count < capacity) {
-      wm_calibration_value &v = out[count];
-      std::memset(&v, 0, sizeof v);
-      size_t length = std::strlen(whose);
-      const size_t room = sizeof v.name - 2 - std::strlen(what);
-      if (length > room) length = room;
-      std::memcpy(v.name, whose, length);
-      v.name[length] = '.';
-      std::memcpy(v.name + length + 1, what, std::strlen(what));
-      v.value = value;
-      v.sigma = sigma;
-    }
-    count++;
-  };
+  calibration_list list(out, capacity);
+  filter_.list_motion_states(&list);
   for (int c = 0; c < camera_count_; c++)
     for (int k = 0; k <= kCameraErrors; k++) {
       const int state = camera_state_[c][k];
       if (state >= 0)
-        add(setup_->rig->cameras[c].name, kNames[k], filter_.value(state), std::sqrt(filter_.variance(state)));
+        list.add(setup_->rig->cameras[c].name, kNames[k], filter_.value(state), std::sqrt(filter_.variance(state)));
     }
-  if (edge_state_ >= 0) add("edges", "offset_m", filter_.value(edge_state_), std::sqrt(filter_.variance(edge_state_)));
-  add("edges", "explained", explained_, 0.0);
-  add("edges", "lost_probability", 1.0 / (1.0 + exp(-lost_odds_)), 0.0);
-  return count;
+  if (edge_state_ >= 0)
+    list.add("edges", "offset_m", filter_.value(edge_state_), std::sqrt(filter_.variance(edge_state_)));
+  list.add("edges", "explained", explained_, 0.0);
+  list.add("edges", "lost_probability", 1.0 / (1.0 + exp(-lost_odds_)), 0.0);
+  return list.count();
 }
 
 size_t edge_mcl::list_particles(wm_particle *out, size_t capacity) const {
@@ -305,55 +293,10 @@ size_t edge_mcl::list_particles(wm_particle *out, size_t capacity) const {
 
 }  // namespace wm
 
-// ---- the contract ----
-
-namespace {
-
-wm::edge_mcl &of(void *state) { return *static_cast<wm::edge_mcl *>(state); }
-const wm::edge_mcl &of(const void *state) { return *static_cast<const wm::edge_mcl *>(state); }
-const wm_edge_mcl_params &params_of(const void *params) { return *static_cast<const wm_edge_mcl_params *>(params); }
-
-size_t state_bytes(const void *params, const wm_setup *setup, const char **why) {
-  return wm::edge_mcl::bytes(params_of(params), *setup, why);
-}
-
-wm_status init(void *state, const void *params, const wm_setup *setup) {
-  of(state).init(params_of(params), *setup);
-  return WM_OK;
-}
-
-wm_status predict(void *state, const wm_event *motion) { return of(state).predict(*motion); }
-
-wm_status correct(void *state, const wm_event *event, wm_innovation *out, size_t capacity, size_t *count) {
-  *count = 0;
-  return of(state).correct(*event, out, capacity, count);
-}
-
-void estimate(const void *state, wm_estimate *out) { of(state).estimate(out); }
-void motion(const void *state, wm_motion_calibration *out) { *out = of(state).filter().calibration(); }
-size_t calibration(const void *state, wm_calibration_value *out, size_t capacity) {
-  return of(state).list_calibration(out, capacity);
-}
-uint32_t motion_health(const void *state) { return of(state).filter().motion_health(); }
-size_t particles(const void *state, wm_particle *out, size_t capacity) {
-  return of(state).list_particles(out, capacity);
-}
-
-}  // namespace
-
-const wm_estimator wm_edge_mcl_estimator = {"edge_mcl",
-                                            "Particles over a raster map of edges on the floor, and an aligned scan's "
-                                            "Kalman filter about their main cluster. Finds the pose when lost.",
-                                            WM_EVENT_BIT(WM_EVENT_POINTS) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
-                                                WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
-                                            wm_edge_mcl_params_table,
-                                            state_bytes,
-                                            init,
-                                            predict,
-                                            correct,
-                                            estimate,
-                                            motion,
-                                            calibration,
-                                            motion_health,
-                                            nullptr,
-                                            particles};
+const wm_estimator wm_edge_mcl_estimator = wm::estimator_of<wm::edge_mcl, wm_edge_mcl_params>(
+    "edge_mcl",
+    "Particles over a raster map of edges on the floor, and an aligned scan's "
+    "Kalman filter about their main cluster. Finds the pose when lost.",
+    WM_EVENT_BIT(WM_EVENT_POINTS) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
+        WM_EVENT_BIT(WM_EVENT_RESET),
+    wm_edge_mcl_params_table);

@@ -10,6 +10,7 @@
 #include "filters/edge_mcl/params.h"
 #include "filters/edge_mcl/place_search.hpp"
 #include "filters/planar/planar_filter.hpp"
+#include "filters/record_list.hpp"
 #include "waymark/estimator.h"
 
 namespace wm {
@@ -22,11 +23,12 @@ class edge_mcl {
   void init(const wm_edge_mcl_params &params, const wm_setup &setup);
 
   wm_status predict(const wm_event &motion);
-  wm_status correct(const wm_event &event, wm_innovation *out, size_t capacity, size_t *count);
+  wm_status correct(const wm_event &event, record_list records);
   void estimate(wm_estimate *out) const;
   size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
   size_t list_particles(wm_particle *out, size_t capacity) const;
-  const planar_filter &filter() const { return filter_; }
+  const wm_motion_calibration &motion_calibration() const { return filter_.calibration(); }
+  uint32_t motion_health() const { return filter_.motion_health(); }
 
  private:
   // What an alignment changes, and where the scan was taken by the newest guess of the time offset.
@@ -41,7 +43,7 @@ class edge_mcl {
     double v_mps, w_radps;
   };
 
-  wm_status take_points(const wm_event &event, wm_innovation *out, size_t capacity, size_t *count);
+  wm_status take_points(const wm_event &event, record_list records);
   wm_status take_pose(const wm_event &event);
   void start_again(bool known);
 

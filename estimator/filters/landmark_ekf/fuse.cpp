@@ -20,7 +20,7 @@ wm_innovation record_of(const wm_event &event, wm_residual kind) {
   return r;
 }
 
-wm_status refuse(innovation_list records, wm_innovation record, wm_status status) {
+wm_status refuse(record_list records, wm_innovation record, wm_status status) {
   record.verdict = status == WM_NOT_FINITE ? WM_REJECTED_NOT_FINITE : WM_REJECTED_OUT_OF_RANGE;
   records.add(record);
   return status;
@@ -166,7 +166,7 @@ void landmark_ekf::lend_states(int sensor, int landmark, wm_time_ns t_ns, int *l
   }
 }
 
-wm_status landmark_ekf::fuse_sighting(const wm_event &event, innovation_list records) {
+wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records) {
   const wm_sighting &s = event.as.sighting;
   const bool has_bearing = !std::isnan(s.bearing_rad), has_range = !std::isnan(s.range_m);
   wm_innovation blank = record_of(event, has_bearing ? WM_RESIDUAL_BEARING : WM_RESIDUAL_RANGE);
@@ -285,7 +285,7 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, innovation_list rec
   return WM_OK;
 }
 
-wm_status landmark_ekf::fuse_position(const wm_event &event, innovation_list records) {
+wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records) {
   const wm_position &p = event.as.position;
   wm_innovation blank = record_of(event, WM_RESIDUAL_X);
   blank.observed = p.p_m[0];
@@ -347,7 +347,7 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, innovation_list rec
   return WM_OK;
 }
 
-wm_status landmark_ekf::fuse_heading(const wm_event &event, innovation_list records) {
+wm_status landmark_ekf::fuse_heading(const wm_event &event, record_list records) {
   const wm_heading &h = event.as.heading;
   residual r;
   r.record = record_of(event, WM_RESIDUAL_HEADING);
@@ -388,7 +388,7 @@ wm_status landmark_ekf::fuse_heading(const wm_event &event, innovation_list reco
 // The numbers of one observation are gated together: a wrong one spoils its fellow. Between the two gates the
 // measurement counts less, as a Student distribution would have it; above, not at all. Then one number after the other
 // (paper, system 1), each with the innovation that the ones before left of it: the same as both at once.
-double landmark_ekf::fuse(residual *r, int count, innovation_list records) {
+double landmark_ekf::fuse(residual *r, int count, record_list records) {
   projection first, second;
   filter_.project(r[0].row, &first);
   const double s00 = first.variance + r[0].noise;

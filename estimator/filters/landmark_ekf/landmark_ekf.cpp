@@ -3,6 +3,7 @@
 
 #include <cstring>
 
+#include "filters/contract.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
 #include "math/arc.hpp"
@@ -131,7 +132,7 @@ wm_status landmark_ekf::predict(const wm_event &motion) {
   return status;
 }
 
-wm_status landmark_ekf::correct(const wm_event &event, innovation_list records) {
+wm_status landmark_ekf::correct(const wm_event &event, record_list records) {
   switch (event.kind) {
     case WM_EVENT_SIGHTING: return fuse_sighting(event, records);
     case WM_EVENT_POSITION: return fuse_position(event, records);
@@ -172,81 +173,24 @@ void landmark_ekf::estimate(wm_estimate *out) const {
 }
 
 size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
-  size_t count = filter_.list_calibration(out, capacity);
+  calibration_list list(out, capacity);
+  filter_.list_motion_states(&list);
   const auto add = [&](const char *whose, const char *what, int state) {
-    if (state < 0) return;
-    if (count < capacity) {
-      wm_calibration_value &value = out[count];
-      std::memset(&value, 0, sizeof value);
-      size_t length = std::strlen(whose);
-      const size_t room = sizeof value.name - 2 - std::strlen(what);
-      if (length > room) length = room;
-      std::memcpy(value.name, whose, length);
-      value.name[length] = '.';
-      std::memcpy(value.name + length + 1, what, std::strlen(what));
-      value.value = filter_.value(state);
-      value.sigma = std::sqrt(filter_.variance(state));
-    }
-    count++;
+    if (state >= 0) list.add(whose, what, filter_.value(state), std::sqrt(filter_.variance(state)));
   };
   for (size_t i = 0; i < setup_->sensor_count; i++)
     for (int k = 0; k < kSensorStates; k++) add(setup_->sensors[i].name, kSensorStateNames[k], sensor_state_[i][k]);
   add("gnss", "time_offset_s", gnss_time_state_);
-  return count;
+  return list.count();
 }
 
 }  // namespace wm
 
-// ---- the contract ----
-
-namespace {
-
-wm::landmark_ekf &of(void *state) { return *static_cast<wm::landmark_ekf *>(state); }
-const wm::landmark_ekf &of(const void *state) { return *static_cast<const wm::landmark_ekf *>(state); }
-const wm_landmark_ekf_params &params_of(const void *params) {
-  return *static_cast<const wm_landmark_ekf_params *>(params);
-}
-
-size_t state_bytes(const void *params, const wm_setup *setup, const char **why) {
-  return wm::landmark_ekf::bytes(params_of(params), *setup, why);
-}
-
-wm_status init(void *state, const void *params, const wm_setup *setup) {
-  of(state).init(params_of(params), *setup);
-  return WM_OK;
-}
-
-wm_status predict(void *state, const wm_event *motion) { return of(state).predict(*motion); }
-
-wm_status correct(void *state, const wm_event *event, wm_innovation *out, size_t capacity, size_t *count) {
-  *count = 0;
-  return of(state).correct(*event, {out, capacity, count});
-}
-
-void estimate(const void *state, wm_estimate *out) { of(state).estimate(out); }
-void motion(const void *state, wm_motion_calibration *out) { *out = of(state).filter().calibration(); }
-size_t calibration(const void *state, wm_calibration_value *out, size_t capacity) {
-  return of(state).list_calibration(out, capacity);
-}
-uint32_t motion_health(const void *state) { return of(state).filter().motion_health(); }
-
-}  // namespace
-
-const wm_estimator wm_landmark_ekf_estimator = {"landmark_ekf",
-                                                "Extended Kalman filter over the pose and the sensors' own errors: "
-                                                "bearings and ranges to known landmarks, positions, "
-                                                "headings. Finds the pose when lost.",
-                                                WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_POSITION) |
-                                                    WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
-                                                    WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
-                                                wm_landmark_ekf_params_table,
-                                                state_bytes,
-                                                init,
-                                                predict,
-                                                correct,
-                                                estimate,
-                                                motion,
-                                                calibration,
-                                                motion_health,
-                                                nullptr,
-                                                nullptr};
+const wm_estimator wm_landmark_ekf_estimator = wm::estimator_of<wm::landmark_ekf, wm_landmark_ekf_params>(
+    "landmark_ekf",
+    "Extended Kalman filter over the pose and the sensors' own errors: "
+    "bearings and ranges to known landmarks, positions, "
+    "headings. Finds the pose when lost.",
+    WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_POSITION) | WM_EVENT_BIT(WM_EVENT_HEADING) |
+        WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
+    wm_landmark_ekf_params_table);

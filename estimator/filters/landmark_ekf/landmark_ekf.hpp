@@ -9,20 +9,11 @@
 #include "filters/landmark_ekf/sensor_model.hpp"
 #include "filters/landmark_ekf/slots.hpp"
 #include "filters/planar/planar_filter.hpp"
+#include "filters/record_list.hpp"
 
 namespace wm {
 
 inline constexpr int kMaxSensors = 16;
-
-// Records of one event's updates.
-struct innovation_list {
-  wm_innovation *out;
-  size_t capacity;
-  size_t *count;
-  void add(const wm_innovation &record) {
-    if (out && *count < capacity) out[(*count)++] = record;
-  }
-};
 
 class landmark_ekf {
  public:
@@ -30,10 +21,11 @@ class landmark_ekf {
   void init(const wm_landmark_ekf_params &params, const wm_setup &setup);
 
   wm_status predict(const wm_event &motion);
-  wm_status correct(const wm_event &event, innovation_list records);
+  wm_status correct(const wm_event &event, record_list records);
   void estimate(wm_estimate *out) const;
   size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
-  const planar_filter &filter() const { return filter_; }
+  const wm_motion_calibration &motion_calibration() const { return filter_.calibration(); }
+  uint32_t motion_health() const { return filter_.motion_health(); }
 
  private:
   // What was known of the sensors while the observations still fitted: two generations, of which the older one is safe,
@@ -54,9 +46,9 @@ class landmark_ekf {
   past_pose look_back(double age_s) const;
   static void add_pose(sparse_row &row, const double by[3], const past_pose &past, int time_state);
 
-  wm_status fuse_sighting(const wm_event &event, innovation_list records);
-  wm_status fuse_position(const wm_event &event, innovation_list records);
-  wm_status fuse_heading(const wm_event &event, innovation_list records);
+  wm_status fuse_sighting(const wm_event &event, record_list records);
+  wm_status fuse_position(const wm_event &event, record_list records);
+  wm_status fuse_heading(const wm_event &event, record_list records);
   wm_status take_pose(const wm_event &event);
 
   // Gates one or two numbers jointly, weakens or rejects, updates, writes the records. Returns the misfit.
@@ -65,7 +57,7 @@ class landmark_ekf {
     double innovation, noise;
     wm_innovation record;
   };
-  double fuse(residual *residuals, int count, innovation_list records);
+  double fuse(residual *residuals, int count, record_list records);
 
   double map_sigma(int landmark) const;
   int find_landmark(int32_t id) const;

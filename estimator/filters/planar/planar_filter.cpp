@@ -3,7 +3,6 @@
 
 #include <cstring>
 
-#include "math/arc.hpp"
 #include "math/covariance.hpp"
 
 namespace wm {
@@ -17,19 +16,15 @@ int planar_filter::count_motion_states(const wm_motion_states &states) {
 void planar_filter::init(const wm_setup &setup, const wm_motion_states &states) {
   std::memset(static_cast<void *>(this), 0, sizeof *this);
   stride_ = even(kMaxStates);
-  front_.init(setup.motion, &setup.wheels);
-  calibration_ = kNeutralCalibration;
-  start_ns_ = setup.start.t_ns;
+  init_motion(setup);
   const double sigma_xy = finite(setup.start.sigma_xy_m) ? setup.start.sigma_xy_m : 0.05;
   const double sigma_heading = finite(setup.start.sigma_heading_rad) ? setup.start.sigma_heading_rad : 0.05;
   add_state(finite(setup.start.p_m[0]) ? setup.start.p_m[0] : 0.0, sigma_xy);
   add_state(finite(setup.start.p_m[1]) ? setup.start.p_m[1] : 0.0, sigma_xy);
   add_state(finite(setup.start.heading_rad) ? wrap(setup.start.heading_rad) : 0.0, sigma_heading);
   for (int i = 0; i < kCalibrationCount; i++) {
-    motion_state_[i] = -1;
-    walk_[i] = square(states.walk[i]);
-    start_variance_[i] = square(states.sigma[i]);
-    if (states.sigma[i] > 0.0) motion_state_[i] = add_state(calibration_at(calibration_, i), states.sigma[i]);
+    const bool on = states.sigma[i] > 0.0;
+    set_motion_state(states, i, on ? add_state(calibration_at(calibration_, i), states.sigma[i]) : -1);
   }
   wheels_.init(*this, states);
 }
@@ -51,51 +46,31 @@ int planar_filter::add_state(double value, double sigma) {
   return state;
 }
 
-wm_status planar_filter::check_time(wm_time_ns t_ns) const {
-  constexpr wm_time_ns kMaxTime = INT64_C(1) << 62;
-  if (t_ns > kMaxTime || t_ns < -kMaxTime) return WM_OUT_OF_RANGE;
-  if (t_ns < start_ns_ || (now_ns() != WM_TIME_NONE && t_ns < now_ns())) return WM_TIME_RAN_BACK;
-  return WM_OK;
-}
-
 void planar_filter::move(const wm_event &motion) {
-  front_.feed(motion);
-  if (front_.speed_source_changed() && motion_state_[kSpeedScale] >= 0)
-    forget(motion_state_[kSpeedScale], 1.0, start_variance_[kSpeedScale]);
+  if (const int state = feed(motion); state >= 0) forget(state, 1.0, start_variance_[kSpeedScale]);
   move_to(motion.t_ns);
-  double rate;
-  if (motion_state_[kYawRateBias] >= 0 && front_.standstill_yaw_rate(&rate)) {
-    // Standing still: what the gyro shows is its bias.
+  double innovation, variance;
+  if (standstill_bias(&innovation, &variance)) {
     sparse_row row;
     row.add(motion_state_[kYawRateBias], 1.0);
     projection projected;
     project(row, &projected);
-    update(projected, rate - calibration_.yaw_rate_bias_radps, square(front_.params().standstill_bias_sigma_radps));
+    update(projected, innovation, variance);
   }
   wheels_.listen(*this, front_);
 }
 
 void planar_filter::move_to(wm_time_ns t_ns) {
-  if (now_ns() == WM_TIME_NONE) front_.set_now(t_ns);
-  if (now_ns() < start_ns_) {  // the pose is known later on: until then only what holds is kept
-    front_.advance(t_ns < start_ns_ ? t_ns : start_ns_, calibration_,
-                   [](const motion_stretch &, const motion_twist &, const motion_noise &) {});
-  }
-  if (t_ns <= now_ns()) return;
-  const double dt = wm_seconds_between(now_ns(), t_ns);
-  front_.advance(t_ns, calibration_,
-                 [this](const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
-                   propagate(piece, twist, noise);
-                 });
-  for (int i = 0; i < kCalibrationCount; i++) {
-    const int state = motion_state_[i];
-    if (state >= 0) p_[state * stride_ + state] += walk_[i] * dt;
-  }
+  advance(
+      t_ns,
+      [this](const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
+        propagate(piece, twist, noise);
+      },
+      [this](int state, double variance) { p_[state * stride_ + state] += variance; });
 }
 
 void planar_filter::propagate(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
-  const double before[2] = {v_mps_, w_radps_};
-  const pose_step step = make_pose_step(piece, twist, noise, x_[kHeading], before, motion_state_);
+  const pose_step step = make_pose_step(piece, twist, noise, x_[kHeading], twist_, motion_state_);
   // Rows: T = F P, in place. Rows 0 and 1 need the old row 2, so it comes last.
   double *rows[3] = {p_, p_ + stride_, p_ + 2 * stride_};
   for (int r = 0; r < 3; r++)
@@ -117,25 +92,7 @@ void planar_filter::propagate(const motion_stretch &piece, const motion_twist &t
   x_[kX] += step.x_m;
   x_[kY] += step.y_m;
   x_[kHeading] = wrap(x_[kHeading] + step.turn_rad);
-  odom_ = compose(odom_, step.body);
-  travelled_m_ += std::fabs(twist.v) * piece.dt_s;
-  turned_rad_ += std::fabs(step.turn_rad);
-  v_mps_ = twist.v;
-  w_radps_ = twist.w;
-}
-
-wm_pose2 planar_filter::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const {
-  wm_pose2 sum{};
-  bool first = true;
-  front_.walk(from_ns, to_ns, calibration_,
-              [&](const motion_stretch &piece, const motion_twist &t, const motion_noise &) {
-                if (first) *twist = t;
-                first = false;
-                const arc a = make_arc(t.v * piece.dt_s, t.w * piece.dt_s);
-                sum = compose(sum, {a.x_m, a.y_m, a.turn_rad});
-              });
-  if (first) *twist = front_.twist_at(from_ns, calibration_);
-  return sum;
+  take_step(piece, twist, step);
 }
 
 void planar_filter::project(const sparse_row &row, projection *out) const {
@@ -168,22 +125,14 @@ void planar_filter::update(const projection &projected, double innovation, doubl
   vectors::add_symmetric_outer(p_, k, b, n_, stride_);
   vectors::add_scaled(x_, k, innovation, stride_);
   x_[kHeading] = wrap(x_[kHeading]);
-  take_calibration();
-}
-
-void planar_filter::take_calibration() {
-  for (int i = 0; i < kCalibrationCount; i++) {
-    const int state = motion_state_[i];
-    if (state < 0) continue;
-    calibration_at(calibration_, i) = x_[state] = motion_state_within_limits(i, x_[state]);
-  }
+  take_calibration(x_);
 }
 
 void planar_filter::forget(int state, double value, double variance) {
   for (int j = 0; j < n_; j++) p_[state * stride_ + j] = p_[j * stride_ + state] = 0.0;
   p_[state * stride_ + state] = variance;
   x_[state] = value;
-  take_calibration();
+  take_calibration(x_);
 }
 
 void planar_filter::carry_state(int state, const sparse_row &by, double change, double added_variance) {
@@ -238,36 +187,16 @@ void planar_filter::loosen_pose(double factor) {
 void planar_filter::estimate(wm_estimate *out) const {
   std::memset(out, 0, sizeof *out);
   out->t_ns = now_ns();
-  out->pose_map_base.p_m[0] = x_[kX];
-  out->pose_map_base.p_m[1] = x_[kY];
-  const sin_cos half = sincos(0.5 * x_[kHeading]);
-  out->pose_map_base.q_xyzw[2] = half.sin;
-  out->pose_map_base.q_xyzw[3] = half.cos;
-  out->heading_rad = x_[kHeading];
-  const int at[3] = {0, 1, 5};
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) out->covariance[wm_cov_index(at[i], at[j])] = covariance(i, j);
-  out->v_mps[0] = v_mps_;
-  out->w_radps[2] = w_radps_;
-  out->dof = 3;
+  put_planar_estimate(
+      pose(), [this](int i, int j) { return covariance(i, j); }, out);
+  out->v_mps[0] = twist_[0];
+  out->w_radps[2] = twist_[1];
 }
 
-size_t planar_filter::list_calibration(wm_calibration_value *out, size_t capacity) const {
-  size_t count = 0;
-  const auto add = [&](const char *name, int state) {
-    if (state < 0) return;
-    if (count < capacity) {
-      wm_calibration_value *value = &out[count];
-      std::memset(value, 0, sizeof *value);
-      std::memcpy(value->name, name, std::strlen(name));
-      value->value = x_[state];
-      value->sigma = std::sqrt(variance(state));
-    }
-    count++;
-  };
-  for (int i = 0; i < kCalibrationCount; i++) add(kMotionStateNames[i], motion_state_[i]);
-  add("motion.wheel_difference", wheels_.difference_state());
-  return count;
+void planar_filter::list_motion_states(calibration_list *list) const {
+  list_motion_states_of(*this, list);
+  if (const int state = wheels_.difference_state(); state >= 0)
+    list->add("motion.wheel_difference", x_[state], std::sqrt(variance(state)));
 }
 
 }  // namespace wm

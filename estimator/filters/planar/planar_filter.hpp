@@ -4,11 +4,8 @@
 #ifndef WAYMARK_ESTIMATOR_PLANAR_FILTER_HPP
 #define WAYMARK_ESTIMATOR_PLANAR_FILTER_HPP
 
-#include "filters/planar/motion_states.h"
-#include "filters/planar/pose_step.hpp"
+#include "filters/planar/planar_motion.hpp"
 #include "filters/planar/wheel_heading.hpp"
-#include "motion/front_end.hpp"
-#include "waymark/estimator.h"
 
 namespace wm {
 
@@ -35,7 +32,7 @@ struct projection {
   double variance;
 };
 
-class planar_filter {
+class planar_filter : public planar_motion {
  public:
   // How many states the motion's calibration takes.
   static int count_motion_states(const wm_motion_states &states);
@@ -44,18 +41,9 @@ class planar_filter {
   // A new state behind the others; returns its index.
   int add_state(double value, double sigma);
 
-  // Time that the state stands at; WM_TIME_NONE before the first event.
-  wm_time_ns now_ns() const { return front_.now_ns(); }
-  bool before_start(wm_time_ns t_ns) const { return t_ns < start_ns_; }
-  wm_status check_motion(const wm_event &event) const { return front_.check(event); }
-  wm_status check_time(wm_time_ns t_ns) const;
   // Takes a motion event that check_motion() lets pass; the state goes to its t_ns.
   void move(const wm_event &motion);
   void move_to(wm_time_ns t_ns);
-
-  // Motion from `from_ns` to `to_ns` (which may be later or earlier than now), as seen from its beginning; *twist is
-  // that at `from_ns`.
-  wm_pose2 path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const;
 
   void project(const sparse_row &row, projection *out) const;
   double project_onto(const sparse_row &row, const projection &other) const;  // H_row P H_other'
@@ -74,20 +62,14 @@ class planar_filter {
   void loosen_pose(double factor);
   // Fills mean, covariance and twist.
   void estimate(wm_estimate *out) const;
-  const wm_motion_calibration &calibration() const { return calibration_; }
-  size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
-  uint32_t motion_health() const { return front_.health(); }
+  void list_motion_states(calibration_list *list) const;
 
   wm_pose2 pose() const { return {x_[kX], x_[kY], x_[kHeading]}; }
-  wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time
-  double travelled_m() const { return travelled_m_; }
-  double turned_rad() const { return turned_rad_; }
   double value(int state) const { return x_[state]; }
   void set_value(int state, double value) { x_[state] = value; }
   double covariance(int i, int j) const { return p_[i * stride_ + j]; }
   double variance(int state) const { return covariance(state, state); }
   int states() const { return n_; }
-  int motion_state(int calibration_index) const { return motion_state_[calibration_index]; }  // -1: off
 
   // x := factor x + noise, for a state that no other one's motion depends on (Gauss-Markov, lazily carried on).
   void fade(int state, double factor, double added_variance);
@@ -99,18 +81,8 @@ class planar_filter {
 
  private:
   void propagate(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise);
-  void take_calibration();
 
   int n_, stride_;
-  motion_front_end front_;
-  wm_motion_calibration calibration_;
-  int motion_state_[kCalibrationCount];
-  double walk_[kCalibrationCount];
-  double start_variance_[kCalibrationCount];
-  wm_time_ns start_ns_;
-  wm_pose2 odom_;
-  double travelled_m_, turned_rad_;
-  double v_mps_, w_radps_;
   wheel_heading wheels_;
   alignas(16) double x_[kMaxStates];
   alignas(16) double p_[kMaxStates * kMaxStates];

@@ -22,12 +22,7 @@ void joint_state::init(const wm_setup &setup, const joint_layout &layout, double
   std::memset(arrays, 0, doubles(layout) * sizeof(double));
   n_ = layout_.robot_states;
   landmarks_ = 0;
-  front_.init(setup.motion, &setup.wheels);
-  calibration_ = kNeutralCalibration;
-  for (int &state : motion_state_) state = -1;
-  start_ns_ = setup.start.t_ns;
-  odom_ = {};
-  travelled_m_ = turned_rad_ = twist_[0] = twist_[1] = 0.0;
+  init_motion(setup);
 }
 
 int joint_state::count_motion_states(const wm_motion_states &states) {
@@ -38,71 +33,35 @@ int joint_state::count_motion_states(const wm_motion_states &states) {
 
 void joint_state::set_motion_states(const wm_motion_states &states, int first) {
   for (int i = 0; i < kCalibrationCount; i++) {
-    walk_[i] = square(states.walk[i]);
-    start_variance_[i] = square(states.sigma[i]);
-    if (!(states.sigma[i] > 0.0)) continue;
-    motion_state_[i] = first++;
-    forget(motion_state_[i], calibration_at(kNeutralCalibration, i), start_variance_[i]);
+    const bool on = states.sigma[i] > 0.0;
+    set_motion_state(states, i, on ? first++ : -1);
+    if (on) forget(motion_state_[i], calibration_at(kNeutralCalibration, i), start_variance_[i]);
   }
 }
 
 // ---- time and motion ----
 
-wm_status joint_state::check_time(wm_time_ns t_ns) const {
-  constexpr wm_time_ns kMaxTime = INT64_C(1) << 62;
-  if (t_ns > kMaxTime || t_ns < -kMaxTime) return WM_OUT_OF_RANGE;
-  if (t_ns < start_ns_ || (now_ns() != WM_TIME_NONE && t_ns < now_ns())) return WM_TIME_RAN_BACK;
-  return WM_OK;
-}
-
 void joint_state::move(const wm_event &motion) {
-  front_.feed(motion);
-  if (front_.speed_source_changed() && motion_state_[kSpeedScale] >= 0)
-    forget(motion_state_[kSpeedScale], 1.0, start_variance_[kSpeedScale]);
+  if (const int state = feed(motion); state >= 0) forget(state, 1.0, start_variance_[kSpeedScale]);
   move_to(motion.t_ns);
-  double rate;
-  if (motion_state_[kYawRateBias] >= 0 && front_.standstill_yaw_rate(&rate)) {
-    // Standing still: what the gyro shows is its bias.
+  double innovation, variance;
+  if (standstill_bias(&innovation, &variance)) {
     joint_row row;
     row.add(motion_state_[kYawRateBias], 1.0);
-    const double innovation = rate - calibration_.yaw_rate_bias_radps;
-    const double noise = square(front_.params().standstill_bias_sigma_radps), none = 0.0;
+    const double none = 0.0;
     innovation_block block;
-    prepare(&row, &innovation, &noise, 1, &block);
+    prepare(&row, &innovation, &variance, 1, &block);
     fuse(block, &none, false);
   }
 }
 
 void joint_state::move_to(wm_time_ns t_ns) {
-  if (now_ns() == WM_TIME_NONE) front_.set_now(t_ns);
-  if (now_ns() < start_ns_) {  // the pose is known later on: until then only what holds is kept
-    front_.advance(t_ns < start_ns_ ? t_ns : start_ns_, calibration_,
-                   [](const motion_stretch &, const motion_twist &, const motion_noise &) {});
-  }
-  if (t_ns <= now_ns()) return;
-  const double dt = wm_seconds_between(now_ns(), t_ns);
-  front_.advance(t_ns, calibration_,
-                 [this](const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
-                   propagate(piece, twist, noise);
-                 });
-  for (int i = 0; i < kCalibrationCount; i++) {
-    const int state = motion_state_[i];
-    if (state >= 0) p().row(state)[state] += walk_[i] * dt;
-  }
-}
-
-wm_pose2 joint_state::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const {
-  wm_pose2 sum{};
-  bool first = true;
-  front_.walk(from_ns, to_ns, calibration_,
-              [&](const motion_stretch &piece, const motion_twist &t, const motion_noise &) {
-                if (first) *twist = t;
-                first = false;
-                const arc a = make_arc(t.v * piece.dt_s, t.w * piece.dt_s);
-                sum = compose(sum, {a.x_m, a.y_m, a.turn_rad});
-              });
-  if (first) *twist = front_.twist_at(from_ns, calibration_);
-  return sum;
+  advance(
+      t_ns,
+      [this](const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
+        propagate(piece, twist, noise);
+      },
+      [this](int state, double variance) { p().row(state)[state] += variance; });
 }
 
 // Paper, system 2: time update of P_rr and P_rm alone.
@@ -136,50 +95,18 @@ void joint_state::propagate(const motion_stretch &piece, const motion_twist &twi
   mean[kX] += step.x_m;
   mean[kY] += step.y_m;
   mean[kHeading] = wrap(mean[kHeading] + step.turn_rad);
-  odom_ = compose(odom_, step.body);
-  travelled_m_ += std::fabs(twist.v) * piece.dt_s;
-  turned_rad_ += std::fabs(step.turn_rad);
-  twist_[0] = twist.v;
-  twist_[1] = twist.w;
+  take_step(piece, twist, step);
 }
 
-size_t joint_state::list_calibration(wm_calibration_value *out, size_t capacity) const {
-  size_t count = 0;
-  for (int i = 0; i < kCalibrationCount; i++) {
-    if (motion_state_[i] < 0) continue;
-    if (count < capacity) {
-      std::memset(&out[count], 0, sizeof out[count]);
-      std::memcpy(out[count].name, kMotionStateNames[i], std::strlen(kMotionStateNames[i]));
-      out[count].value = value(motion_state_[i]);
-      out[count].sigma = std::sqrt(variance(motion_state_[i]));
-    }
-    count++;
-  }
-  return count;
-}
+void joint_state::list_motion_states(calibration_list *list) const { list_motion_states_of(*this, list); }
 
 void joint_state::estimate(wm_estimate *out) const {
   std::memset(out, 0, sizeof *out);
   out->t_ns = now_ns();
-  out->pose_map_base.p_m[0] = value(kX);
-  out->pose_map_base.p_m[1] = value(kY);
-  const sin_cos half = sincos(0.5 * value(kHeading));
-  out->pose_map_base.q_xyzw[2] = half.sin;
-  out->pose_map_base.q_xyzw[3] = half.cos;
-  out->heading_rad = value(kHeading);
-  const int at[3] = {0, 1, 5};
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) out->covariance[wm_cov_index(at[i], at[j])] = covariance(i, j);
+  put_planar_estimate(
+      pose(), [this](int i, int j) { return covariance(i, j); }, out);
   out->v_mps[0] = twist_[0];
   out->w_radps[2] = twist_[1];
-  out->dof = 3;
-}
-
-void joint_state::take_calibration() {
-  for (int i = 0; i < kCalibrationCount; i++) {
-    const int state = motion_state_[i];
-    if (state >= 0) calibration_at(calibration_, i) = x()[state] = motion_state_within_limits(i, x()[state]);
-  }
 }
 
 // ---- the state ----
@@ -189,7 +116,7 @@ void joint_state::forget(int state, double value, double variance) {
   for (int j = 0; j < n_; j++) cov.set(state, j, 0.0);
   cov.set(state, state, variance);
   x()[state] = value;
-  take_calibration();
+  take_calibration(x());
 }
 
 void joint_state::fade(int state, double factor, double added_variance) {
@@ -384,7 +311,7 @@ void joint_state::move_mean(const double *change, double *e) {
     for (int j = 0; j < n_; j++) mean[j] += change[j];
   }
   mean[kHeading] = wrap(mean[kHeading]);
-  take_calibration();
+  take_calibration(x());
 }
 
 // p <- R p + V xi, xi = change - J p turn: the group's exponential.
@@ -412,7 +339,7 @@ void joint_state::fuse_frozen(int rows, const double *change) {
   double *mean = x();
   for (int j = 0; j < robot; j++) mean[j] += change[j];
   mean[kHeading] = wrap(mean[kHeading]);
-  take_calibration();
+  take_calibration(x());
 }
 
 }  // namespace wm

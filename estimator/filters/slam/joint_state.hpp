@@ -14,12 +14,9 @@
 #ifndef WAYMARK_ESTIMATOR_SLAM_JOINT_STATE_HPP
 #define WAYMARK_ESTIMATOR_SLAM_JOINT_STATE_HPP
 
-#include "filters/planar/motion_states.h"
-#include "filters/planar/pose_step.hpp"
+#include "filters/planar/planar_motion.hpp"
 #include "math/elementary.hpp"
 #include "math/half_covariance.hpp"
-#include "motion/front_end.hpp"
-#include "waymark/estimator.h"
 
 namespace wm {
 
@@ -50,7 +47,7 @@ struct joint_layout {
   bool invariant;      // false: the plain EKF, for comparison
 };
 
-class joint_state {
+class joint_state : public planar_motion {
  public:
   static constexpr int kMaxRobot = 192;
   static constexpr int kRows = half_update::kRows;  // of one correction
@@ -62,21 +59,11 @@ class joint_state {
   void set_motion_states(const wm_motion_states &states, int first);  // makes them, from state `first` on
   static int count_motion_states(const wm_motion_states &states);
 
-  // ---- time and motion (as planar_filter) ----
-  wm_time_ns now_ns() const { return front_.now_ns(); }
-  wm_status check_motion(const wm_event &event) const { return front_.check(event); }
-  wm_status check_time(wm_time_ns t_ns) const;
+  // ---- time and motion ----
   void move(const wm_event &motion);
   void move_to(wm_time_ns t_ns);
-  // Motion from `from_ns` to `to_ns`, as seen from its beginning; *twist is that at `from_ns`.
-  wm_pose2 path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const;
-  const wm_motion_calibration &calibration() const { return calibration_; }
-  uint32_t motion_health() const { return front_.health(); }
-  size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
+  void list_motion_states(calibration_list *list) const;
   void estimate(wm_estimate *out) const;
-  wm_pose2 odom() const { return odom_; }
-  double travelled_m() const { return travelled_m_; }
-  double turned_rad() const { return turned_rad_; }
 
   // ---- the state ----
   wm_pose2 pose() const { return {value(kX), value(kY), value(kHeading)}; }
@@ -138,19 +125,10 @@ class joint_state {
   void move_mean(const double *change, double *e);
   void move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e);
   void fuse_frozen(int rows, const double *change);
-  void take_calibration();
 
   std::ptrdiff_t offset_;
   joint_layout layout_;
   int capacity_, n_, landmarks_;
-  motion_front_end front_;
-  wm_motion_calibration calibration_;
-  int motion_state_[kCalibrationCount];
-  double walk_[kCalibrationCount], start_variance_[kCalibrationCount];
-  wm_time_ns start_ns_;
-  wm_pose2 odom_;
-  double travelled_m_, turned_rad_;
-  double twist_[2];
 };
 
 }  // namespace wm

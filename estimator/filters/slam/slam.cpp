@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 
+#include "filters/contract.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
 #include "math/arc.hpp"
@@ -213,34 +214,20 @@ void slam::estimate(wm_estimate *out) const {
 }
 
 size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const {
-  size_t count = joint_.list_calibration(out, capacity);
-  const auto add = [&](const char *whose, const char *what, double value, double variance) {
-    if (count < capacity) {
-      wm_calibration_value &v = out[count];
-      std::memset(&v, 0, sizeof v);
-      size_t length = std::strlen(whose);
-      const size_t room = sizeof v.name - 2 - std::strlen(what);
-      if (length > room) length = room;
-      std::memcpy(v.name, whose, length);
-      v.name[length] = '.';
-      std::memcpy(v.name + length + 1, what, std::strlen(what));
-      v.value = value;
-      v.sigma = std::sqrt(variance);
-    }
-    count++;
-  };
+  calibration_list list(out, capacity);
+  joint_.list_motion_states(&list);
   for (size_t i = 0; i < setup_->sensor_count; i++)
     for (int k = 0; k < kSensorStates; k++)
       if (const int state = sensor_state_[i][k]; state >= 0)
-        add(setup_->sensors[i].name, kSensorStateNames[k], joint_.value(state), joint_.variance(state));
+        list.add(setup_->sensors[i].name, kSensorStateNames[k], joint_.value(state), std::sqrt(joint_.variance(state)));
   for (size_t i = 0; i < setup_->sensor_count; i++)
-    if (edge_shift_px_[i] != 0.0) add(setup_->sensors[i].name, "edge_shift_px", edge_shift_px_[i], 0.0);
-  add("map", "landmarks", joint_.landmarks(), 0.0);
-  add("map", "joined", (double)counts_.joined, 0.0);
-  add("map", "left", (double)counts_.left, 0.0);
-  add("map", "moved", (double)counts_.moved, 0.0);
-  add("map", "no_room", (double)counts_.no_room, 0.0);
-  return count;
+    if (edge_shift_px_[i] != 0.0) list.add(setup_->sensors[i].name, "edge_shift_px", edge_shift_px_[i], 0.0);
+  list.add("map", "landmarks", joint_.landmarks(), 0.0);
+  list.add("map", "joined", (double)counts_.joined, 0.0);
+  list.add("map", "left", (double)counts_.left, 0.0);
+  list.add("map", "moved", (double)counts_.moved, 0.0);
+  list.add("map", "no_room", (double)counts_.no_room, 0.0);
+  return list.count();
 }
 
 size_t slam::list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const {
@@ -319,57 +306,11 @@ int slam::note_landmark(int32_t id, int landmark, wm_time_ns t_ns) {
 
 }  // namespace wm
 
-// ---- the contract ----
-
-namespace {
-
-wm::slam &of(void *state) { return *static_cast<wm::slam *>(state); }
-const wm::slam &of(const void *state) { return *static_cast<const wm::slam *>(state); }
-const wm_slam_params &params_of(const void *params) { return *static_cast<const wm_slam_params *>(params); }
-
-size_t state_bytes(const void *params, const wm_setup *setup, const char **why) {
-  return wm::slam::bytes(params_of(params), *setup, why);
-}
-
-wm_status init(void *state, const void *params, const wm_setup *setup) {
-  of(state).init(params_of(params), *setup);
-  return WM_OK;
-}
-
-wm_status predict(void *state, const wm_event *motion) { return of(state).predict(*motion); }
-
-wm_status correct(void *state, const wm_event *event, wm_innovation *out, size_t capacity, size_t *count) {
-  *count = 0;
-  return of(state).correct(*event, {out, capacity, count});
-}
-
-void estimate(const void *state, wm_estimate *out) { of(state).estimate(out); }
-void motion(const void *state, wm_motion_calibration *out) { *out = of(state).state().calibration(); }
-size_t calibration(const void *state, wm_calibration_value *out, size_t capacity) {
-  return of(state).list_calibration(out, capacity);
-}
-uint32_t motion_health(const void *state) { return of(state).state().motion_health(); }
-size_t landmarks(const void *state, wm_landmark *out, double (*covariance)[4], size_t capacity) {
-  return of(state).list_landmarks(out, covariance, capacity);
-}
-
-}  // namespace
-
-const wm_estimator wm_slam_estimator = {
+const wm_estimator wm_slam_estimator = wm::estimator_of<wm::slam, wm_slam_params>(
     "slam",
     "EKF-SLAM in the plane, right-invariant: the robot, its sensors' errors and "
     "landmarks whose places nobody measured, "
     "from coded markers, bearings and ranges, or bearings alone, with or without identities.",
     WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
         WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
-    wm_slam_params_table,
-    state_bytes,
-    init,
-    predict,
-    correct,
-    estimate,
-    motion,
-    calibration,
-    motion_health,
-    landmarks,
-    nullptr};
+    wm_slam_params_table);

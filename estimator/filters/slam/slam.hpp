@@ -5,6 +5,7 @@
 
 #include "filters/landmark_ekf/sensor_model.hpp"
 #include "filters/landmark_ekf/slots.hpp"
+#include "filters/record_list.hpp"
 #include "filters/slam/bearing_tracks.hpp"
 #include "filters/slam/joint_state.hpp"
 #include "filters/slam/params.h"
@@ -12,16 +13,6 @@
 namespace wm {
 
 inline constexpr int kSlamSensors = 8;
-
-// Records of one event's updates.
-struct record_list {
-  wm_innovation *out;
-  size_t capacity;
-  size_t *count;
-  void add(const wm_innovation &record) {
-    if (out && *count < capacity) out[(*count)++] = record;
-  }
-};
 
 // What is known of a landmark beside its place.
 struct landmark_note {
@@ -47,7 +38,8 @@ class slam {
   void estimate(wm_estimate *out) const;
   size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
   size_t list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const;
-  const joint_state &state() const { return joint_; }
+  const wm_motion_calibration &motion_calibration() const { return joint_.calibration(); }
+  uint32_t motion_health() const { return joint_.motion_health(); }
 
  private:
   enum sensor_state { kYaw, kMountX, kMountY, kTimeOffset, kRangeBias, kRangeScale, kSensorStates };

@@ -119,7 +119,7 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
   records.add(record);
 }
 
-size_t stereo_ekf::list_points(wm_landmark *out, double (*covariance)[4], size_t capacity) const {
+size_t stereo_ekf::list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const {
   const auto count = (size_t)filter_.point_count();
   for (size_t i = 0; i < count && i < capacity; i++) {
     const int state = filter_.point_state((int)i);

@@ -3,12 +3,14 @@
 
 #include <cstring>
 
+#include "filters/calibration_list.hpp"
+#include "filters/contract.hpp"
 #include "filters/registry.h"
+#include "motion/event_time.hpp"
 
 namespace wm {
 namespace {
 
-constexpr wm_time_ns kMaxTime = INT64_C(1) << 62;
 // Velocity and rates as states are carried in steps so long.
 constexpr double kStep_s = 0.05;
 constexpr int kStepsMax = 40;
@@ -113,11 +115,7 @@ int stereo_ekf::find_landmark(int32_t id) const {
   return low < setup_->landmark_count && setup_->landmarks[order[low]].id == id ? order[low] : -1;
 }
 
-wm_status stereo_ekf::check_time(wm_time_ns t_ns) const {
-  if (t_ns > kMaxTime || t_ns < -kMaxTime) return WM_OUT_OF_RANGE;
-  if (start_ns_ != WM_TIME_NONE && t_ns < start_ns_) return WM_TIME_RAN_BACK;
-  return now_ns_ != WM_TIME_NONE && t_ns < now_ns_ ? WM_TIME_RAN_BACK : WM_OK;
-}
+wm_status stereo_ekf::check_time(wm_time_ns t_ns) const { return check_event_time(t_ns, start_ns_, now_ns_); }
 
 void stereo_ekf::move_to(wm_time_ns t_ns) {
   if (now_ns_ == WM_TIME_NONE) now_ns_ = t_ns;
@@ -225,75 +223,25 @@ void stereo_ekf::estimate(wm_estimate *out) const {
   out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
 }
 
+wm_motion_calibration stereo_ekf::motion_calibration() const { return kNeutralCalibration; }
+
 size_t stereo_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
-  size_t count = 0;
+  calibration_list list(out, capacity);
   for (int k = 0; k < kHeadStates; k++) {
-    if (filter_.at(k) < 0) continue;
-    for (int i = 0; i < kHeadWidth[k]; i++, count++) {
-      if (count >= capacity) continue;
-      wm_calibration_value &value = out[count];
-      std::memset(&value, 0, sizeof value);
-      std::memcpy(value.name, kStateNames[k][i], std::strlen(kStateNames[k][i]));
-      value.value = filter_.head(filter_.at(k) + i) + filter_.pending1(filter_.at(k) + i);
-      value.sigma = std::sqrt(filter_.variance(filter_.at(k) + i));
-    }
+    const int first = filter_.at(k);
+    for (int i = first; first >= 0 && i < first + kHeadWidth[k]; i++)
+      list.add(kStateNames[k][i - first], filter_.head(i) + filter_.pending1(i), std::sqrt(filter_.variance(i)));
   }
-  return count;
+  return list.count();
 }
 
 }  // namespace wm
 
-// ---- the contract ----
-
-namespace {
-
-wm::stereo_ekf &of(void *state) { return *static_cast<wm::stereo_ekf *>(state); }
-const wm::stereo_ekf &of(const void *state) { return *static_cast<const wm::stereo_ekf *>(state); }
-const wm_stereo_ekf_params &params_of(const void *params) { return *static_cast<const wm_stereo_ekf_params *>(params); }
-
-size_t state_bytes(const void *params, const wm_setup *setup, const char **why) {
-  return wm::stereo_ekf::bytes(params_of(params), *setup, why);
-}
-
-wm_status init(void *state, const void *params, const wm_setup *setup) {
-  of(state).init(params_of(params), *setup);
-  return WM_OK;
-}
-
-wm_status predict(void *state, const wm_event *motion) { return of(state).predict(*motion); }
-
-wm_status correct(void *state, const wm_event *event, wm_innovation *out, size_t capacity, size_t *count) {
-  *count = 0;
-  return of(state).correct(*event, {out, capacity, count});
-}
-
-void estimate(const void *state, wm_estimate *out) { of(state).estimate(out); }
-void motion(const void *, wm_motion_calibration *out) { *out = wm::kNeutralCalibration; }
-size_t calibration(const void *state, wm_calibration_value *out, size_t capacity) {
-  return of(state).list_calibration(out, capacity);
-}
-uint32_t motion_health(const void *state) { return of(state).motion_health(); }
-size_t landmarks(const void *state, wm_landmark *out, double (*covariance)[4], size_t capacity) {
-  return of(state).list_points(out, covariance, capacity);
-}
-
-}  // namespace
-
-const wm_estimator wm_stereo_ekf_estimator = {
+const wm_estimator wm_stereo_ekf_estimator = wm::estimator_of<wm::stereo_ekf, wm_stereo_ekf_params>(
     "stereo_ekf",
     "Extended Kalman filter in six degrees of freedom: points in a stereo pair's pictures, known or found on the way, "
     "ranges to beacons, depth, heading, velocity. Finds the pose when lost.",
     WM_EVENT_BIT(WM_EVENT_STEREO) | WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_POSITION) |
         WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
         WM_EVENT_BIT(WM_EVENT_RESET),
-    wm_stereo_ekf_params_table,
-    state_bytes,
-    init,
-    predict,
-    correct,
-    estimate,
-    motion,
-    calibration,
-    motion_health,
-    landmarks,
-    nullptr};
+    wm_stereo_ekf_params_table);

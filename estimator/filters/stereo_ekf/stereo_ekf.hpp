@@ -5,6 +5,7 @@
 #define WAYMARK_ESTIMATOR_STEREO_EKF_HPP
 
 #include "filters/landmark_ekf/fit_monitor.hpp"
+#include "filters/record_list.hpp"
 #include "filters/stereo_ekf/body_motion.hpp"
 #include "filters/stereo_ekf/consensus.hpp"
 #include "filters/stereo_ekf/params.h"
@@ -13,16 +14,6 @@
 #include "waymark/estimator.h"
 
 namespace wm {
-
-// Records of one event's updates.
-struct record_list {
-  wm_innovation *out;
-  size_t capacity;
-  size_t *count;
-  void add(const wm_innovation &record) {
-    if (out && *count < capacity) out[(*count)++] = record;
-  }
-};
 
 class stereo_ekf {
  public:
@@ -33,7 +24,8 @@ class stereo_ekf {
   wm_status correct(const wm_event &event, record_list records);
   void estimate(wm_estimate *out) const;
   size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
-  size_t list_points(wm_landmark *out, double (*covariance)[4], size_t capacity) const;
+  size_t list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const;
+  wm_motion_calibration motion_calibration() const;
   uint32_t motion_health() const { return motion_.health(); }
 
  private:

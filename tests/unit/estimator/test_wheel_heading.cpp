@@ -61,8 +61,9 @@ struct Car {
 // Found values are asked by their names, as a person would.
 wm_calibration_value named(const Car &car, const char *name) {
   wm_calibration_value values[16];
-  const size_t count = car.filter->list_calibration(values, 16);
-  for (size_t i = 0; i < count; i++)
+  wm::calibration_list list(values, 16);
+  car.filter->list_motion_states(&list);
+  for (size_t i = 0; i < list.count(); i++)
     if (std::string(values[i].name) == name) return values[i];
   TEST_FAIL_MESSAGE(name);
   return {};

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// The estimator contract for a class: `estimator_of<filter, params>(name, about, takes, table)` gives the struct of
+// functions. The filter is trivially copyable and has
+//   static size_t bytes(const params &, const wm_setup &, const char **why);   void init(const params &, const wm_setup
+//   &); wm_status predict(const wm_event &);   wm_status correct(const wm_event &, record_list); void
+//   estimate(wm_estimate *) const;   wm_motion_calibration motion_calibration() const; uint32_t motion_health() const;
+//   size_t list_calibration(wm_calibration_value *, size_t) const;
+// and, if it has a map or particles of its own, list_landmarks() or list_particles().
+#ifndef WAYMARK_ESTIMATOR_CONTRACT_HPP
+#define WAYMARK_ESTIMATOR_CONTRACT_HPP
+
+#include <type_traits>
+
+#include "filters/record_list.hpp"
+#include "waymark/estimator.h"
+
+namespace wm {
+
+template <class filter, class params>
+wm_estimator estimator_of(const char *name, const char *about, uint32_t takes, wm_param_table table) {
+  static_assert(std::is_trivially_copyable_v<filter>, "a copy of the state continues identically");
+  wm_estimator e{};
+  e.name = name;
+  e.about = about;
+  e.takes = takes;
+  e.params = table;
+  e.state_bytes = [](const void *p, const wm_setup *setup, const char **why) {
+    return filter::bytes(*static_cast<const params *>(p), *setup, why);
+  };
+  e.init = [](void *state, const void *p, const wm_setup *setup) {
+    static_cast<filter *>(state)->init(*static_cast<const params *>(p), *setup);
+    return WM_OK;
+  };
+  e.predict = [](void *state, const wm_event *motion) { return static_cast<filter *>(state)->predict(*motion); };
+  e.correct = [](void *state, const wm_event *event, wm_innovation *out, size_t capacity, size_t *count) {
+    *count = 0;
+    return static_cast<filter *>(state)->correct(*event, record_list{out, capacity, count});
+  };
+  e.estimate = [](const void *state, wm_estimate *out) { static_cast<const filter *>(state)->estimate(out); };
+  e.motion = [](const void *state, wm_motion_calibration *out) {
+    *out = static_cast<const filter *>(state)->motion_calibration();
+  };
+  e.calibration = [](const void *state, wm_calibration_value *out, size_t capacity) {
+    return static_cast<const filter *>(state)->list_calibration(out, capacity);
+  };
+  e.motion_health = [](const void *state) { return static_cast<const filter *>(state)->motion_health(); };
+  if constexpr (requires(const filter &f) { f.list_landmarks(nullptr, nullptr, 0); })
+    e.landmarks = [](const void *state, wm_landmark *out, double(*covariance)[4], size_t capacity) {
+      return static_cast<const filter *>(state)->list_landmarks(out, covariance, capacity);
+    };
+  if constexpr (requires(const filter &f) { f.list_particles(nullptr, 0); })
+    e.particles = [](const void *state, wm_particle *out, size_t capacity) {
+      return static_cast<const filter *>(state)->list_particles(out, capacity);
+    };
+  return e;
+}
+
+}  // namespace wm
+
+#endif

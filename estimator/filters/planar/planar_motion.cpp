@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/planar/planar_motion.hpp"
+
+#include "math/arc.hpp"
+
+namespace wm {
+
+void planar_motion::init_motion(const wm_setup &setup) {
+  front_.init(setup.motion, &setup.wheels);
+  calibration_ = kNeutralCalibration;
+  for (int &state : motion_state_) state = -1;
+  start_ns_ = setup.start.t_ns;
+  odom_ = {};
+  travelled_m_ = turned_rad_ = twist_[0] = twist_[1] = 0.0;
+}
+
+void planar_motion::set_motion_state(const wm_motion_states &states, int i, int state) {
+  walk_[i] = square(states.walk[i]);
+  start_variance_[i] = square(states.sigma[i]);
+  motion_state_[i] = state;
+}
+
+wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const {
+  wm_pose2 sum{};
+  bool first = true;
+  front_.walk(from_ns, to_ns, calibration_,
+              [&](const motion_stretch &piece, const motion_twist &t, const motion_noise &) {
+                if (first) *twist = t;
+                first = false;
+                const arc a = make_arc(t.v * piece.dt_s, t.w * piece.dt_s);
+                sum = compose(sum, {a.x_m, a.y_m, a.turn_rad});
+              });
+  if (first) *twist = front_.twist_at(from_ns, calibration_);
+  return sum;
+}
+
+void planar_motion::take_step(const motion_stretch &piece, const motion_twist &twist, const pose_step &step) {
+  odom_ = compose(odom_, step.body);
+  travelled_m_ += std::fabs(twist.v) * piece.dt_s;
+  turned_rad_ += std::fabs(step.turn_rad);
+  twist_[0] = twist.v;
+  twist_[1] = twist.w;
+}
+
+void planar_motion::take_calibration(double *states) {
+  for (int i = 0; i < kCalibrationCount; i++) {
+    const int state = motion_state_[i];
+    if (state >= 0) calibration_at(calibration_, i) = states[state] = motion_state_within_limits(i, states[state]);
+  }
+}
+
+}  // namespace wm

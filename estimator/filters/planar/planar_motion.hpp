@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// What planar filters share, whatever their covariance's storage: the motion front end, the motion's calibration and
+// which of it is a state, odometry, and when an event may be taken.
+#ifndef WAYMARK_ESTIMATOR_PLANAR_MOTION_HPP
+#define WAYMARK_ESTIMATOR_PLANAR_MOTION_HPP
+
+#include <cmath>
+
+#include "filters/calibration_list.hpp"
+#include "filters/planar/motion_states.h"
+#include "filters/planar/pose_step.hpp"
+#include "math/elementary.hpp"
+#include "motion/event_time.hpp"
+#include "motion/front_end.hpp"
+#include "waymark/estimator.h"
+
+namespace wm {
+
+class planar_motion {
+ public:
+  // Time that the state stands at; WM_TIME_NONE before the first event.
+  wm_time_ns now_ns() const { return front_.now_ns(); }
+  bool before_start(wm_time_ns t_ns) const { return t_ns < start_ns_; }
+  wm_status check_motion(const wm_event &event) const { return front_.check(event); }
+  wm_status check_time(wm_time_ns t_ns) const { return check_event_time(t_ns, start_ns_, now_ns()); }
+
+  // Motion from `from_ns` to `to_ns` (which may be later or earlier than now), as seen from its beginning; *twist is
+  // that at `from_ns`.
+  wm_pose2 path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const;
+
+  const wm_motion_calibration &calibration() const { return calibration_; }
+  uint32_t motion_health() const { return front_.health(); }
+  wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time
+  double travelled_m() const { return travelled_m_; }
+  double turned_rad() const { return turned_rad_; }
+  int motion_state(int calibration_index) const { return motion_state_[calibration_index]; }  // -1: off
+
+ protected:
+  // All calibration neutral, none of it a state.
+  void init_motion(const wm_setup &setup);
+  // What a calibration state starts with and walks by; its index comes from the filter.
+  void set_motion_state(const wm_motion_states &states, int i, int state);
+
+  // Takes a motion event that check_motion() lets pass; move the state to its t_ns next. The state that it makes
+  // unknown again, or -1: the speed comes from another sensor now, whose scale is another.
+  int feed(const wm_event &motion) {
+    front_.feed(motion);
+    return front_.speed_source_changed() ? motion_state_[kSpeedScale] : -1;
+  }
+  // Standing still, what the gyro shows is its bias: true with the innovation of that state and its variance.
+  bool standstill_bias(double *innovation, double *variance) const {
+    double rate;
+    if (motion_state_[kYawRateBias] < 0 || !front_.standstill_yaw_rate(&rate)) return false;
+    *innovation = rate - calibration_.yaw_rate_bias_radps;
+    *variance = square(front_.params().standstill_bias_sigma_radps);
+    return true;
+  }
+
+  // propagate(piece, twist, noise) for each piece of motion until `t_ns`, then walk(state, variance) for each
+  // calibration state.
+  template <class Propagate, class Walk>
+  void advance(wm_time_ns t_ns, Propagate propagate, Walk walk) {
+    if (now_ns() == WM_TIME_NONE) front_.set_now(t_ns);
+    if (now_ns() < start_ns_) {  // the pose is known later on: until then only what holds is kept
+      front_.advance(t_ns < start_ns_ ? t_ns : start_ns_, calibration_,
+                     [](const motion_stretch &, const motion_twist &, const motion_noise &) {});
+    }
+    if (t_ns <= now_ns()) return;
+    const double dt = wm_seconds_between(now_ns(), t_ns);
+    front_.advance(t_ns, calibration_, propagate);
+    for (int i = 0; i < kCalibrationCount; i++)
+      if (motion_state_[i] >= 0) walk(motion_state_[i], walk_[i] * dt);
+  }
+  // Odometry over one such piece.
+  void take_step(const motion_stretch &piece, const motion_twist &twist, const pose_step &step);
+  // The calibration becomes what the states say, and they what a calibration can be.
+  void take_calibration(double *states);
+
+  template <class Filter>
+  void list_motion_states_of(const Filter &filter, calibration_list *out) const {
+    for (int i = 0; i < kCalibrationCount; i++)
+      if (const int state = motion_state_[i]; state >= 0)
+        out->add(kMotionStateNames[i], filter.value(state), std::sqrt(filter.variance(state)));
+  }
+
+  motion_front_end front_;
+  wm_motion_calibration calibration_;
+  int motion_state_[kCalibrationCount];
+  double walk_[kCalibrationCount], start_variance_[kCalibrationCount];
+  wm_time_ns start_ns_;
+  wm_pose2 odom_;
+  double travelled_m_, turned_rad_;
+  double twist_[2];  // m/s and rad/s, of the last piece
+};
+
+// A planar pose's estimate; covariance(i, j) is that of x, y and heading.
+template <class Covariance>
+void put_planar_estimate(const wm_pose2 &pose, Covariance covariance, wm_estimate *out) {
+  out->pose_map_base.p_m[0] = pose.x_m;
+  out->pose_map_base.p_m[1] = pose.y_m;
+  const sin_cos half = sincos(0.5 * pose.heading_rad);
+  out->pose_map_base.q_xyzw[2] = half.sin;
+  out->pose_map_base.q_xyzw[3] = half.cos;
+  out->heading_rad = pose.heading_rad;
+  const int at[3] = {0, 1, 5};
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) out->covariance[wm_cov_index(at[i], at[j])] = covariance(i, j);
+  out->dof = 3;
+}
+
+}  // namespace wm
+
+#endif
