@@ -20,6 +20,15 @@ static const char kHelp[] =
     "example:\n"
     "  waymark doctor /etc/waymark/robot.yaml\n";
 
+static void print_json(const findings *found, const wm_histogram *wake_ns) {
+  (void)fputs("{\n  \"findings\": ", stdout);
+  findings_json(found, stdout);
+  (void)printf(",\n  \"wake_ms\": {\"p50\": %.6f, \"p99\": %.6f, \"p999\": %.6f, \"max\": %.6f, \"count\": %llu}\n}\n",
+               (double)wm_histogram_quantile(wake_ns, 0.5) * 1e-6, (double)wm_histogram_quantile(wake_ns, 0.99) * 1e-6,
+               (double)wm_histogram_quantile(wake_ns, 0.999) * 1e-6, (double)wake_ns->max_ns * 1e-6,
+               (unsigned long long)wake_ns->count);
+}
+
 static int look(const wm_config *config, double seconds, int as_json) {
   static findings found;
   static wm_histogram wake_ns;
@@ -34,13 +43,11 @@ static int look(const wm_config *config, double seconds, int as_json) {
   doctor_latency(seconds, priority, &wake_ns, &is_realtime);
   doctor_judge_latency(&wake_ns, is_realtime, &found);
   if (as_json) {
-    findings_json(&found, &wake_ns, stdout);
+    print_json(&found, &wake_ns);
   } else {
     findings_print(&found, stdout);
   }
-  int bad = 0;
-  for (size_t i = 0; i < found.count; i++) bad |= found.at[i].level == FINDING_BAD;
-  return bad ? EXIT_WORK_FAILED : EXIT_DONE;
+  return findings_of(&found, FINDING_BAD) > 0 ? EXIT_WORK_FAILED : EXIT_DONE;
 }
 
 int command_doctor(int argc, char *const *argv) {

@@ -3,7 +3,7 @@
 #include <dirent.h>
 #include <errno.h>
 #include <sched.h>
-#include <stdarg.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
@@ -12,18 +12,6 @@
 #include <unistd.h>
 
 #include "doctor.h"
-
-void find(findings *out, finding_level level, const char *about, const char *mend, const char *format, ...) {
-  if (out->count == FINDINGS_MAX) return;
-  finding *f = &out->at[out->count++];
-  f->level = level;
-  (void)snprintf(f->about, sizeof f->about, "%s", about);
-  (void)snprintf(f->mend, sizeof f->mend, "%s", mend);
-  va_list arguments;
-  va_start(arguments, format);
-  (void)vsnprintf(f->text, sizeof f->text, format, arguments);
-  va_end(arguments);
-}
 
 // The first line of a small file; 0 where it isn't there.
 static int line_of(const char *root, const char *path, char *out, size_t capacity) {

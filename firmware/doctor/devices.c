@@ -2,6 +2,7 @@
 // LCM, CAN, cameras.
 #include <errno.h>
 #include <fcntl.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>

@@ -3,30 +3,9 @@
 #ifndef WAYMARK_FIRMWARE_DOCTOR_H
 #define WAYMARK_FIRMWARE_DOCTOR_H
 
-#include <stddef.h>
-#include <stdio.h>
-
+#include "findings.h"
 #include "waymark/config.h"
 #include "waymark/histogram.h"
-
-typedef enum finding_level { FINDING_GOOD, FINDING_NOTE, FINDING_BAD } finding_level;
-
-typedef struct finding {
-  finding_level level;
-  char about[32];  // "kernel", "clock", "can can0"
-  char text[200];
-  char mend[240];  // "" where nothing is to be done
-} finding;
-
-#define FINDINGS_MAX 64
-typedef struct findings {
-  finding at[FINDINGS_MAX];
-  size_t count;
-} findings;
-
-// Adds one; beyond FINDINGS_MAX they are left out. `mend` may be "".
-void find(findings *out, finding_level level, const char *about, const char *mend, const char *format, ...)
-    __attribute__((format(printf, 5, 6)));
 
 // `root` stands before every path ("" on a real computer; a test has its own tree).
 void doctor_kernel(const char *root, findings *out);  // preemption, real-time throttling, isolated CPUs
@@ -39,8 +18,5 @@ void doctor_cameras(const wm_config *config, findings *out);
 // Wakes 1000 times a second for `seconds` at the priority of a run. *is_realtime: it got it.
 void doctor_latency(double seconds, int priority, wm_histogram *wake_ns, int *is_realtime);
 void doctor_judge_latency(const wm_histogram *wake_ns, int is_realtime, findings *out);
-
-void findings_print(const findings *self, FILE *to);
-void findings_json(const findings *self, const wm_histogram *wake_ns, FILE *to);
 
 #endif

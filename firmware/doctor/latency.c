@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How late a thread wakes, measured as a run's estimator wakes; and what is said of it all.
+// How late a thread wakes, measured as a run's estimator wakes.
 #include <errno.h>
 #include <pthread.h>
 #include <string.h>
@@ -59,49 +59,4 @@ void doctor_judge_latency(const wm_histogram *wake_ns, int is_realtime, findings
        is_realtime ? "real-time" : "normal", (double)wm_histogram_quantile(wake_ns, 0.5) * 1e-6,
        (double)wm_histogram_quantile(wake_ns, 0.99) * 1e-6, (double)wm_histogram_quantile(wake_ns, 0.999) * 1e-6,
        (double)wake_ns->max_ns * 1e-6, (unsigned long long)wake_ns->count);
-}
-
-// ── saying it ───────────────────────────────────────────────────────────────────────────────────────────────────────
-
-static const char *const kLevels[] = {"good", "note", "bad"};
-
-void findings_print(const findings *self, FILE *to) {
-  for (size_t i = 0; i < self->count; i++) {
-    const finding *f = &self->at[i];
-    (void)fprintf(to, "%-5s %-14s %s\n", kLevels[f->level], f->about, f->text);
-    if (f->mend[0]) (void)fprintf(to, "%-20s mend: %s\n", "", f->mend);
-  }
-}
-
-static void json_string(FILE *to, const char *text) {
-  (void)fputc('"', to);
-  for (; *text; text++) {
-    unsigned char c = (unsigned char)*text;
-    if (c == '"' || c == '\\')
-      (void)fprintf(to, "\\%c", c);
-    else if (c < 0x20)
-      (void)fprintf(to, "\\u%04x", c);
-    else
-      (void)fputc(c, to);
-  }
-  (void)fputc('"', to);
-}
-
-void findings_json(const findings *self, const wm_histogram *wake_ns, FILE *to) {
-  (void)fputs("{\n  \"findings\": [", to);
-  for (size_t i = 0; i < self->count; i++) {
-    const finding *f = &self->at[i];
-    (void)fprintf(to, "%s\n    {\"level\": \"%s\", \"about\": ", i ? "," : "", kLevels[f->level]);
-    json_string(to, f->about);
-    (void)fputs(", \"text\": ", to);
-    json_string(to, f->text);
-    (void)fputs(", \"mend\": ", to);
-    json_string(to, f->mend);
-    (void)fputc('}', to);
-  }
-  (void)fprintf(
-      to, "\n  ],\n  \"wake_ms\": {\"p50\": %.6f, \"p99\": %.6f, \"p999\": %.6f, \"max\": %.6f, \"count\": %llu}\n}\n",
-      (double)wm_histogram_quantile(wake_ns, 0.5) * 1e-6, (double)wm_histogram_quantile(wake_ns, 0.99) * 1e-6,
-      (double)wm_histogram_quantile(wake_ns, 0.999) * 1e-6, (double)wake_ns->max_ns * 1e-6,
-      (unsigned long long)wake_ns->count);
 }

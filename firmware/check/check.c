@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a configuration may say, and hardly means.
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "check.h"
+
+static void messages(const wm_config *config, findings *out) {
+  static const char *const kWays[] = {"udpm://", "tcpq://", "memq://", "file://"};
+  const char *url = config->lcm_url;
+  const wm_runtime_params *p = &config->runtime;
+  if (p->publish_rate_hz > p->realtime_loop_hz)
+    find(out, FINDING_NOTE, "publish", "a higher realtime.loop_hz, or a lower publish.rate_hz",
+         "publish.rate_hz %g is more than realtime.loop_hz %d: poses would go out at %d Hz", p->publish_rate_hz,
+         (int)p->realtime_loop_hz, (int)p->realtime_loop_hz);
+  if (!url[0] || !p->publish_lcm) return;
+  int known = 0;
+  for (size_t i = 0; i < sizeof kWays / sizeof kWays[0]; i++) known |= strncmp(url, kWays[i], strlen(kWays[i])) == 0;
+  const char *ttl = strstr(url, "ttl=");
+  if (!known)
+    find(out, FINDING_BAD, "publish", "udpm://239.255.76.67:7667?ttl=0 keeps messages on this computer",
+         "publish.lcm_url: '%s' is no way that LCM knows (udpm, tcpq, memq, file)", url);
+  else if (ttl && strtol(ttl + 4, NULL, 10) > 0)
+    find(out, FINDING_NOTE, "publish", "ttl=0 keeps messages on this computer",
+         "publish.lcm_url: poses go out into the network, and commands may come from it (%s)", url);
+}
+
+// The folder is needed, not the file.
+static void saved_pose(const wm_config *config, findings *out) {
+  const char *path = config->saved_pose, *slash = strrchr(path, '/');
+  char folder[WM_PATH_MAX];
+  if (!path[0]) return;
+  (void)snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
+  if (access(folder, F_OK) != 0)
+    find(out, FINDING_BAD, "start", "mkdir -p it, or StateDirectory=waymark in the unit, which makes /var/lib/waymark",
+         "start.saved_pose: the folder %s is not there: no pose would be kept", folder);
+  else if (access(folder, W_OK) != 0)
+    find(out, FINDING_BAD, "start", "give it to the run's user, or name a folder that is the user's",
+         "start.saved_pose: this user may not write into %s", folder);
+}
+
+void check_config(const wm_config *config, findings *out) {
+  messages(config, out);
+  saved_pose(config, out);
+}
