@@ -363,6 +363,10 @@ const wm_sensor *wm_recording_sensors(const wm_recording *self, size_t *count) {
   return self->calibration.sensors;
 }
 
+wm_status wm_recording_camera_sensor(wm_recording *self, const char *camera, uint16_t *out, wm_error *err) {
+  return sensor_index(self, self->dir, camera, out, err);
+}
+
 const wm_landmark *wm_recording_landmarks(const wm_recording *self, size_t *count) {
   *count = self->landmark_count;
   return self->landmarks;

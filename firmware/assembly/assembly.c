@@ -111,6 +111,7 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   for (size_t i = 0; i < count && i < WM_SOURCES_MAX; i++) add_source(out, sources[i]);
   status = add_vision(out, recording, err);
   if (status != WM_OK) return status;
+  setup->sensors = wm_recording_sensors(recording, &setup->sensor_count);  // cameras have joined
   if (!(out->kinds & WM_MOTION_EVENTS))
     return wm_fail(err, WM_BAD_CONFIG, "%s: no motion: %s is there or used; the pose can't be carried on without one",
                    wm_recording_dir(recording),

@@ -18,6 +18,8 @@ struct wm_vision {
 #define EVENTS_WITH_POINTS 2
 #define EVENTS_SMALL 256
 #define NO_SENSOR UINT16_MAX
+// What an estimator holds against a sensor's mounting.
+static const uint32_t kSaidOfSensors = WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER);
 
 static wm_status next(wm_source *base, wm_event *out, wm_error *err) {
   vision_source *self = (vision_source *)base;
@@ -88,6 +90,10 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   s->gives_looked = (config->estimator->takes & WM_EVENT_BIT(WM_EVENT_LOOKED)) != 0;
   s->base.kinds = s->detector->gives | (s->gives_looked ? WM_EVENT_BIT(WM_EVENT_LOOKED) : 0);
   s->sensor = sensor_of(recording, first->name);
+  if (s->sensor == NO_SENSOR && (s->detector->gives & kSaidOfSensors)) {
+    wm_status status = wm_recording_camera_sensor(recording, first->name, &s->sensor, err);
+    if (status != WM_OK) return status;
+  }
   s->capacity = s->detector->gives & WM_EVENT_BIT(WM_EVENT_POINTS) ? EVENTS_WITH_POINTS : EVENTS_SMALL;
   const char *why = NULL;
   s->state_bytes = s->detector->state_bytes(s->params, &s->view, &why);

@@ -122,6 +122,12 @@ void check_events(size_t count) {
     const wm_event &e = events[i];
     TEST_ASSERT_TRUE(detector->gives & WM_EVENT_BIT(e.kind));
     TEST_ASSERT_EQUAL_INT64(1000, e.t_ns);
+    if (e.kind == WM_EVENT_SIGHTING) {
+      const wm_sighting &seen = e.as.sighting;
+      TEST_ASSERT_TRUE(std::fabs(seen.bearing_rad) <= 3.1416 && std::isnan(seen.range_m));
+      TEST_ASSERT_TRUE(seen.bearing_sigma_rad > 0 && seen.landmark_id > 0);
+      for (size_t k = 0; k < i; k++) TEST_ASSERT_TRUE(events[k].as.sighting.landmark_id != seen.landmark_id);
+    }
     if (e.kind != WM_EVENT_POINTS) continue;
     const wm_points &points = e.as.points;
     TEST_ASSERT_TRUE(points.count > 0 && points.count <= WM_POINTS_MAX);

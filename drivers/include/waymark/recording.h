@@ -51,6 +51,9 @@ const char *wm_recording_dir(const wm_recording *self);
 double wm_recording_duration_s(const wm_recording *self);  // NaN where not given
 const wm_wheels *wm_recording_wheels(const wm_recording *self);
 const wm_sensor *wm_recording_sensors(const wm_recording *self, size_t *count);
+// Index of the sensor that the camera's detectors speak for. One that `sensors` of calibration.yaml doesn't have is
+// added where the camera sits, sigmas unknown: ask for the sensors afterwards. WM_FULL: no room.
+wm_status wm_recording_camera_sensor(wm_recording *self, const char *camera, uint16_t *out, wm_error *err);
 const wm_landmark *wm_recording_landmarks(const wm_recording *self, size_t *count);
 const wm_rig *wm_recording_rig(const wm_recording *self);      // cameras; an empty one where calibration.yaml has none
 const wm_start *wm_recording_start(const wm_recording *self);  // initial_pose; NaN where unknown

@@ -4,6 +4,12 @@
 #include "math/elementary.hpp"
 
 namespace wm {
+namespace {
+
+constexpr double kSteep = 0.7071;  // 45 degrees
+constexpr double kLevel[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+
+}  // namespace
 
 void mounted_sensor::init(const wm_sensor &sensor) {
   x_m = sensor.mounting.xyz_m[0];
@@ -16,6 +22,7 @@ void mounted_sensor::init(const wm_sensor &sensor) {
       {p.cos, 0.0, -p.sin}, {p.sin * r.sin, r.cos, p.cos * r.sin}, {p.sin * r.cos, -r.sin, p.cos * r.cos}};
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) axis[i][j] = rows[i][j];
+  is_steep = std::fabs(axis[0][2]) > kSteep;
   bearing_sigma_rad = sensor.bearing_sigma_rad;
   range_sigma_m = sensor.range_sigma_m;
   max_range_m = sensor.max_range_m;
@@ -41,9 +48,10 @@ expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &erro
                            {level[1], -level[0]},
                            {-m.cos, m.sin},
                            {-m.sin, -m.cos}};
+  const double(*axis)[3] = sensor.is_steep ? kLevel : sensor.axis;
   double seen[3];
   for (int i = 0; i < 3; i++) {
-    const double *row = sensor.axis[i];
+    const double *row = axis[i];
     seen[i] = row[0] * level[0] + row[1] * level[1] + row[2] * level[2];
   }
   const double q = seen[0] * seen[0] + seen[1] * seen[1];
@@ -59,7 +67,7 @@ expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &erro
   for (int k = 0; k < 6; k++) {
     double d[3];
     for (int i = 0; i < 3; i++) {
-      const double *row = sensor.axis[i];
+      const double *row = axis[i];
       d[i] = row[0] * by[k][0] + row[1] * by[k][1];
     }
     out.bearing_by[k] = (seen[0] * d[1] - seen[1] * d[0]) * over_q;

@@ -15,6 +15,9 @@ struct mounted_sensor {
   double axis[3][3];  // the sensor's axes in levelled axes along its yaw: (Ry(pitch) Rx(roll))'
   double bearing_sigma_rad, range_sigma_m, max_range_m;
   bool range_is_depth;
+  // Its x axis points up or down rather than ahead (a hemispherical camera): bearings are azimuths about the
+  // mounting's yaw, as of a level sensor.
+  bool is_steep;
 
   void init(const wm_sensor &sensor);
 };

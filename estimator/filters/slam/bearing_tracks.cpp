@@ -71,6 +71,14 @@ int bearing_tracks::find_clone(int sensor, wm_time_ns t_ns) const {
   return -1;
 }
 
+int bearing_tracks::newest_clone(int sensor) const {
+  int newest = -1;
+  for (int i = 0; i < clones_; i++)
+    if (clone_ns_[i] != WM_TIME_NONE && clone_sensor_[i] == sensor && (newest < 0 || clone_ns_[i] > clone_ns_[newest]))
+      newest = i;
+  return newest;
+}
+
 int bearing_tracks::take_clone(int sensor, wm_time_ns t_ns, double x_m, double y_m) {
   bool used[kClones] = {};
   for (const track &t : track_)

@@ -62,6 +62,8 @@ class bearing_tracks {
   int take_clone(int sensor, wm_time_ns t_ns, double x_m, double y_m);
   // The clone of this sensor at this stamp, -1 where there is none.
   int find_clone(int sensor, wm_time_ns t_ns) const;
+  // The sensor's newest clone, -1 where there is none.
+  int newest_clone(int sensor) const;
   static constexpr int kClones = 40;
 
  private:

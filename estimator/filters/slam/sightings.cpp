@@ -349,10 +349,12 @@ void slam::track_bearing(int32_t id, const wm_sighting &s, const reading &r, con
   bearing_tracks::track *track = tracks_.find(id, s.sensor);
   if (!track) track = tracks_.begin(id, s.sensor);
   track->last_ns = now;
+  // All lines of a picture share a clone, and pictures that are too near to the last one have none.
   const wm_pose2 here = sensor_pose(s.sensor, past);
-  if (track->count > 0) {
-    const int last = clone_state(track->clone[track->count - 1]);
-    const double dx = here.x_m - joint_.value(last), dy = here.y_m - joint_.value(last + 1);
+  const int newest = tracks_.newest_clone(s.sensor);
+  if (newest >= 0 && tracks_.find_clone(s.sensor, now) < 0) {
+    const int state = clone_state(newest);
+    const double dx = here.x_m - joint_.value(state), dy = here.y_m - joint_.value(state + 1);
     if (dx * dx + dy * dy < square(params_.line_step_m)) {
       records.add(blank);
       return;

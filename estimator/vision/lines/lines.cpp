@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+// Detector `lines`: upright lines by their azimuths, each with a number that it keeps while it is followed.
+#include <cmath>
+#include <cstring>
+#include <initializer_list>
+#include <limits>
+
+#include "vision/lines/line_tracks.hpp"
+#include "vision/registry.h"
+
+namespace wm {
+
+namespace {
+
+struct lines_state {
+  wm_lines_params params;
+  mounted_camera camera;
+  sin_cos yaw;        // of the bearings' axis against base_link's
+  bool levelled;      // bearings are azimuths about that axis; else directions in the camera's own axes
+  double tilt[2][3];  // rows of the body's x and y axes in base_link
+  polar_view polar;
+  vote_work work;
+  zenith up;
+  line_tracks tracks;
+  radial_edge edges[kRadialEdgesMax];
+};
+
+constexpr size_t kAlign = 64;
+constexpr double kSteep = 0.7071;         // as in the filters' sensor model
+constexpr double kZenithWalk_rad = 2e-5;  // a picture: a robot on its springs
+constexpr int kLeanSeen = 3;              // only lines that were followed tell of the zenith
+size_t rounded(size_t bytes) { return (bytes + kAlign - 1) / kAlign * kAlign; }
+
+const wm_camera *camera_of(const wm_view *view, const char **why) {
+  *why = nullptr;
+  const int32_t index = view->cameras[0];
+  if (!view->rig || index < 0 || index >= static_cast<int32_t>(view->rig->camera_count)) {
+    *why = "there is no such camera";
+    return nullptr;
+  }
+  return &view->rig->cameras[index];
+}
+
+// Puts the state's parts one behind the other; returns the bytes of all.
+size_t lay_out(lines_state *state, const polar_view &polar) {
+  size_t used = rounded(sizeof(lines_state));
+  auto *base = reinterpret_cast<uint8_t *>(state);
+  const auto take = [&](size_t bytes) {
+    uint8_t *at = base ? base + used : nullptr;
+    used += rounded(bytes);
+    return at;
+  };
+  const size_t columns = static_cast<size_t>(polar.columns), rows = static_cast<size_t>(polar.rows);
+  uint8_t *row = take(rows * sizeof(polar_row)), *table = take(rows * columns * sizeof(polar_sample)),
+          *grey = take(rows * static_cast<size_t>(polar.stride()) * sizeof(int16_t)),
+          *work = take(11 * columns * sizeof(int16_t));
+  if (!base) return used;
+  state->polar = polar;
+  state->polar.row = reinterpret_cast<polar_row *>(row);
+  state->polar.table = reinterpret_cast<polar_sample *>(table);
+  state->polar.grey = reinterpret_cast<int16_t *>(grey);
+  auto *next = reinterpret_cast<int16_t *>(work);
+  const auto give = [&](size_t count) {
+    int16_t *at = next;
+    next += count;
+    return at;
+  };
+  vote_work &w = state->work;
+  w.slope = give(columns);
+  w.running = give(2 * columns);
+  w.begin = give(2 * columns);
+  for (votes *v : {&w.rise, &w.fall}) *v = {give(columns), give(columns), give(columns)};
+  return used;
+}
+
+size_t state_bytes(const void *params, const wm_view *view, const char **why) {
+  const wm_camera *camera = camera_of(view, why);
+  if (!camera) return 0;
+  mounted_camera mounted;
+  polar_view polar;
+  *why = mounted_camera_init(&mounted, *camera);
+  if (!*why) *why = polar_size(mounted, *static_cast<const wm_lines_params *>(params), &polar);
+  return *why ? 0 : lay_out(nullptr, polar);
+}
+
+wm_status init(void *memory, const void *params, const wm_view *view) {
+  const char *why;
+  const wm_camera *camera = camera_of(view, &why);
+  if (!camera) return WM_BAD_CONFIG;
+  auto *state = static_cast<lines_state *>(memory);
+  std::memset(static_cast<void *>(state), 0, sizeof *state);
+  state->params = *static_cast<const wm_lines_params *>(params);
+  polar_view polar;
+  if (mounted_camera_init(&state->camera, *camera) || polar_size(state->camera, state->params, &polar))
+    return WM_BAD_CONFIG;
+  lay_out(state, polar);
+  polar_make(state->camera, state->params, &state->polar);
+  const mat3 body = matrix_of_rpy(camera->mounting.rpy_rad);
+  state->levelled = std::fabs(body.m[2][0]) > kSteep;
+  state->yaw = sincos(camera->mounting.rpy_rad[2]);
+  for (int i = 0; i < 2; i++)
+    for (int k = 0; k < 3; k++) state->tilt[i][k] = body.m[k][i];
+  const double variance = square(larger(state->params.tilt_sigma_rad, 1e-6));
+  state->up = {0, 0, variance, 0, variance};
+  state->tracks.clear();
+  return WM_OK;
+}
+
+// The azimuth as a sighting of the camera's sensor says it (recording format: bearing positive to the left of the
+// sensor's x axis). A camera that looks up or down has no such axis on the floor: then about its mounting's yaw.
+double bearing_of(const lines_state &self, double azimuth_rad) {
+  const sin_cos a = sincos(azimuth_rad);
+  if (self.levelled)
+    return atan2(self.yaw.cos * a.sin - self.yaw.sin * a.cos, self.yaw.cos * a.cos + self.yaw.sin * a.sin);
+  return atan2(self.tilt[1][0] * a.cos + self.tilt[1][1] * a.sin, self.tilt[0][0] * a.cos + self.tilt[0][1] * a.sin);
+}
+
+void put(const lines_state &self, const line_track &track, wm_time_ns t_ns, wm_event *out) {
+  const radial_edge &edge = self.edges[track.edge];
+  std::memset(static_cast<void *>(out), 0, WM_EVENT_SMALL_BYTES);
+  out->t_ns = t_ns;
+  out->kind = WM_EVENT_SIGHTING;
+  out->as.sighting = {0,
+                      track.id,
+                      bearing_of(self, edge.azimuth_rad),
+                      std::numeric_limits<double>::quiet_NaN(),
+                      edge.sigma_rad,
+                      std::numeric_limits<double>::quiet_NaN()};
+}
+
+wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_event *out, size_t capacity,
+                 size_t *count) {
+  auto *state = static_cast<lines_state *>(memory);
+  const wm_frame &frame = frames[0];
+  *count = 0;
+  if (frame.width_px != state->camera.width_px || frame.height_px != state->camera.height_px) return WM_BAD_DATA;
+  polar_fill(&state->polar, frame);
+  const int found = find_radial_edges(state->polar, state->params, state->up, &state->work, state->edges);
+  state->tracks.follow(state->edges, found, frame.t_ns, state->params);
+  if (state->params.tilt_sigma_rad > 0) {
+    state->up.xx += square(kZenithWalk_rad);
+    state->up.yy += square(kZenithWalk_rad);
+  }
+  for (const line_track &track : state->tracks.track) {
+    if (track.id == 0 || track.edge < 0 || track.seen < state->params.confirm_seen) continue;
+    if (state->params.tilt_sigma_rad > 0 && track.seen >= kLeanSeen)
+      correct_zenith(state->edges[track.edge], &state->up);
+    if (*count == capacity) return WM_FULL;
+    put(*state, track, frame.t_ns, &out[(*count)++]);
+  }
+  return WM_OK;
+}
+
+}  // namespace
+
+}  // namespace wm
+
+extern "C" const wm_detector wm_lines_detector = {
+    "lines",
+    "upright lines (corners, door frames, pillars), followed from picture to picture: azimuths with a number each",
+    WM_EVENT_BIT(WM_EVENT_SIGHTING),
+    1,
+    wm_lines_params_table,
+    wm::state_bytes,
+    wm::init,
+    wm::detect,
+};

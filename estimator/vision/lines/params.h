@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef WAYMARK_ESTIMATOR_VISION_LINES_PARAMS_H
+#define WAYMARK_ESTIMATOR_VISION_LINES_PARAMS_H
+
+#include <stdint.h>
+
+#include "waymark/params.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct wm_lines_params {
+  double elevation_min_rad, elevation_max_rad, row_step_rad;
+  double contrast_grey, length_min_rad, begin_max_rad;
+  double blur_px, sigma_px;
+  double tilt_sigma_rad;
+  double turn_max_rad, gate_rad, appearance_grey;
+  int32_t confirm_seen, keep_unseen;
+};
+
+extern const wm_param_table wm_lines_params_table;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vision/lines/polar.hpp"
+
+#include <cstring>
+
+namespace wm {
+
+namespace {
+
+constexpr double kMargin_px = 1.0;
+constexpr int kProbes = 64;  // azimuths at which a row's scale is measured
+constexpr double kProbe_rad = 1e-3;
+
+bool pixel_at(const mounted_camera &camera, double azimuth, double elevation, double margin_px, pixel *out) {
+  const sin_cos a = sincos(azimuth), e = sincos(elevation);
+  return pixel_of(camera, camera.centre_m + vec3{e.cos * a.cos, e.cos * a.sin, e.sin}, margin_px, out);
+}
+
+// Way in the picture by an angle of azimuth (or of elevation), px/rad, the mean where the row is in the picture; 0: it
+// is nowhere.
+double px_per_rad(const mounted_camera &camera, double elevation, bool along_row) {
+  double sum = 0;
+  int count = 0;
+  for (int i = 0; i < kProbes; i++) {
+    const double azimuth = (i + 0.5) * kTwoPi / kProbes;
+    pixel a, b;
+    if (!pixel_at(camera, azimuth, elevation, kMargin_px, &a) ||
+        !pixel_at(camera, azimuth + (along_row ? kProbe_rad : 0), elevation + (along_row ? 0 : kProbe_rad), kMargin_px,
+                  &b))
+      continue;
+    sum += std::sqrt(square(b.u - a.u) + square(b.v - a.v)) / kProbe_rad;
+    count++;
+  }
+  return count > 0 ? sum / count : 0;
+}
+
+// Calls take(elevation, px/rad of azimuth) for each row that is in the picture.
+template <class Take>
+void each_row(const mounted_camera &camera, const wm_lines_params &params, Take take) {
+  int count = 0;
+  for (int r = 0; count < kPolarRowsMax; r++) {
+    const double elevation = params.elevation_min_rad + r * params.row_step_rad;
+    if (elevation > params.elevation_max_rad || elevation > kHalfPi - params.row_step_rad) break;
+    const double scale = px_per_rad(camera, elevation, true);
+    if (!(scale > 0)) continue;
+    take(elevation, scale);
+    count++;
+  }
+}
+
+}  // namespace
+
+const char *polar_size(const mounted_camera &camera, const wm_lines_params &params, polar_view *out) {
+  *out = polar_view{};
+  double largest = 0;
+  each_row(camera, params, [&](double, double scale) {
+    out->rows++;
+    if (scale > largest) largest = scale;
+  });
+  if (out->rows * params.row_step_rad < params.length_min_rad)
+    return "the camera sees too little between elevation_min_rad and elevation_max_rad: is its mounting right?";
+  const int wanted = static_cast<int>(kTwoPi * largest) / 16 * 16;
+  out->columns = wanted < 256 ? 256 : wanted > kPolarColumnsMax ? kPolarColumnsMax : wanted;
+  out->step_rad = kTwoPi / out->columns;
+  return nullptr;
+}
+
+void polar_make(const mounted_camera &camera, const wm_lines_params &params, polar_view *out) {
+  int r = 0;
+  each_row(camera, params, [&](double elevation, double scale) {
+    polar_row &row = out->row[r];
+    row.elevation_rad = elevation;
+    row.tan = tan(elevation);
+    row.px_per_column = scale * out->step_rad;
+    row.half = row.px_per_column > 0.65 ? 2 : row.px_per_column > 0.33 ? 4 : 8;
+    polar_sample *samples = out->table + static_cast<size_t>(r) * static_cast<size_t>(out->columns);
+    // A place outside of the picture takes over what is beside it: where the view ends is no edge.
+    int last = -1;
+    for (int pass = 0; pass < 2; pass++)
+      for (int c = 0; c < out->columns; c++) {
+        pixel at;
+        if (pixel_at(camera, out->azimuth_of(c), elevation, kMargin_px, &at)) {
+          const int u = static_cast<int>(at.u), v = static_cast<int>(at.v);
+          samples[c] = {static_cast<uint16_t>(u), static_cast<uint16_t>(v), static_cast<uint8_t>((at.u - u) * 256),
+                        static_cast<uint8_t>((at.v - v) * 256)};
+          last = c;
+        } else if (last >= 0) {
+          samples[c] = samples[last];
+        }
+      }
+    r++;
+  });
+  out->row_px = px_per_rad(camera, out->row[out->rows / 2].elevation_rad, false) * params.row_step_rad;
+}
+
+void polar_fill(polar_view *view, const wm_frame &frame) {
+  const uint32_t stride = frame.stride_bytes;
+  const uint8_t *const grey = frame.grey;
+  for (int r = 0; r < view->rows; r++) {
+    const polar_sample *samples = view->table + static_cast<size_t>(r) * static_cast<size_t>(view->columns);
+    int16_t *out = view->line(r);
+    for (int c = 0; c < view->columns; c++) {
+      const polar_sample s = samples[c];
+      const uint8_t *p = grey + static_cast<size_t>(s.row) * stride + s.column;
+      const uint8_t *q = p + stride;
+      const int32_t right = s.right, down = s.down;
+      const int32_t upper = p[0] * 256 + (p[1] - p[0]) * right, lower = q[0] * 256 + (q[1] - q[0]) * right;
+      out[c] = static_cast<int16_t>((upper * 256 + (lower - upper) * down + 2048) >> 12);
+    }
+    std::memcpy(out - kPolarPad, out + view->columns - kPolarPad, kPolarPad * sizeof(int16_t));
+    std::memcpy(out + view->columns, out, kPolarPad * sizeof(int16_t));
+  }
+}
+
+}  // namespace wm
