@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A raster map's edges made ready for looking up: from any pixel how far the nearest edge is, and where, and the line
 // that the edge's pixels lie on, to a part of a pixel. Tiles of 64 x 64 pixels; those beyond the reach of any edge
-// share one, so that memory goes by the length of the edges, not by the area. A distance takes a byte; 8 x 8 of them
-// are a cache line, so that particles that are close together look into the same ones.
+// share one, so that memory goes by the length of the edges, not by the area. A distance takes a byte; a tile's
+// are a page of memory, so that places that are close together are also near in memory.
 #ifndef WAYMARK_ESTIMATOR_MAPS_EDGE_MAP_HPP
 #define WAYMARK_ESTIMATOR_MAPS_EDGE_MAP_HPP
 
@@ -58,6 +58,12 @@ class edge_map {
   static int inside(int column, int row) { return (row & (kTile - 1)) << kTileShift | (column & (kTile - 1)); }
   int distance_of(int column, int row) const {
     return distances()[tile_of(column, row) + (uint32_t)inside(column, row)];
+  }
+
+  // The distances of a row's part that begins at `column`, a multiple of kTile; NULL where all is out of reach.
+  const uint8_t *tile_row(int column, int row) const {
+    const uint32_t tile = tile_of(column, row);
+    return tile ? distances() + tile + (uint32_t)inside(column, row) : nullptr;
   }
 
   edge_line nearest(double x_m, double y_m) const;

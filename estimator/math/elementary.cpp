@@ -5,43 +5,13 @@
 #include <cstring>
 #include <limits>
 
+#include "math/series.hpp"
+
 namespace wm {
 namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-// Adding and taking away 1.5 * 2^52 rounds to the nearest integer, in every IEEE machine's default mode.
-constexpr double kRounder = 6755399441055744.0;
-inline double nearest(double x) { return (x + kRounder) - kRounder; }
-
-// pi/2 in three parts; the first two have 33 bits, so that n * part is exact for n below 2^20.
-constexpr double kHalfPi1 = 0x1.921fb54400000p+0;
-constexpr double kHalfPi2 = 0x1.0b4611a600000p-34;
-constexpr double kHalfPi3 = 0x1.3198a2e037073p-69;
-
-// Taylor series on [-pi/4, pi/4]; the first term left out is below 1e-17 of the result.
-inline double sin_kernel(double x, double tail) {
-  const double z = x * x;
-  const double p =
-      -1.0 / 6 +
-      z * (1.0 / 120 +
-           z * (-1.0 / 5040 +
-                z * (1.0 / 362880 + z * (-1.0 / 39916800 + z * (1.0 / 6227020800.0 + z * (-1.0 / 1307674368000.0))))));
-  return x + (x * z * p + tail * (1.0 - 0.5 * z));
-}
-
-inline double cos_kernel(double x, double tail) {
-  const double z = x * x;
-  const double p =
-      1.0 / 24 +
-      z * (-1.0 / 720 +
-           z * (1.0 / 40320 + z * (-1.0 / 3628800 + z * (1.0 / 479001600.0 +
-                                                         z * (-1.0 / 87178291200.0 + z * (1.0 / 20922789888000.0))))));
-  const double half = 0.5 * z;
-  const double head = 1.0 - half;
-  return head + (((1.0 - head) - half) + (z * z * p - x * tail));
-}
 
 // atan(k/8).
 constexpr double kAtanTable[9] = {0.0,
@@ -61,25 +31,15 @@ inline double two_to(int exponent) {  // -1022 .. 1023
   return out;
 }
 
-constexpr double kLn2High = 0x1.62e42fee00000p-1;  // 32 bits
-constexpr double kLn2Low = 0x1.a39ef35793c76p-33;
-
 }  // namespace
 
 sin_cos sincos(double angle_rad) {
   if (!finite(angle_rad)) return {kNaN, kNaN};
   if (!(angle_rad < 1e15 && angle_rad > -1e15)) return {0.0, 1.0};  // no digit of the angle is left
-  const double n = nearest(angle_rad * (2.0 / kPi));
-  const double a = angle_rad - n * kHalfPi1;
-  const double b = n * kHalfPi2;
-  const double first = a - b;
-  const double lost = (a - first) - b;
-  const double c = n * kHalfPi3 - lost;
-  const double x = first - c;
-  const double tail = (first - x) - c;
+  double n, x, tail, s, k;
+  reduce_angle(angle_rad, &n, &x, &tail);
   if (!(x < 1.0 && x > -1.0)) return {0.0, 1.0};  // beyond 1e9 rad the reduction has lost the angle
-  const double s = sin_kernel(x, tail);
-  const double k = cos_kernel(x, tail);
+  sin_cos_series(x, tail, &s, &k);
   switch ((int64_t)n & 3) {
     case 0: return {s, k};
     case 1: return {k, -s};
@@ -123,24 +83,8 @@ double exp(double x) {
   if (std::isnan(x)) return x;
   if (x > 709.782712893384) return kInfinity;
   if (x < -745.2) return 0.0;
-  const double n = nearest(x * 0x1.71547652b82fep+0);
-  const double high = x - n * kLn2High;
-  const double low = n * kLn2Low;
-  const double r = high - low;
-  const double tail = (high - r) - low;
-  double p = 1.0 / 6227020800.0;
-  p = p * r + 1.0 / 479001600.0;
-  p = p * r + 1.0 / 39916800;
-  p = p * r + 1.0 / 3628800;
-  p = p * r + 1.0 / 362880;
-  p = p * r + 1.0 / 40320;
-  p = p * r + 1.0 / 5040;
-  p = p * r + 1.0 / 720;
-  p = p * r + 1.0 / 120;
-  p = p * r + 1.0 / 24;
-  p = p * r + 1.0 / 6;
-  p = p * r + 0.5;
-  const double value = 1.0 + (r + (r * r * p + tail));
+  double n, value;
+  exp_series(x, &n, &value);
   const int exponent = (int)n;
   if (exponent > 1000) return value * two_to(1000) * two_to(exponent - 1000);
   if (exponent < -1000) return value * two_to(-1000) * two_to(exponent + 1000);

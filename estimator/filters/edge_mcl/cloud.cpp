@@ -73,16 +73,40 @@ void cloud::move(const wm_pose2 &increment, const step_noise &noise) {
   }
 }
 
-bool cloud::weigh(const edge_map &map, const scan_points &points, const score_table &table, double exponent, bool sum) {
+// All particles against a block of points, block after block.
+void cloud::score_by_field(const edge_map &map, const score_field &field, const scan_points &points, double *scored) {
+  packed_scan packed;
+  field.pack(map, points, &packed);
+  auto *words = reinterpret_cast<int16_t *>(array(5));
+  const field_poses poses = {words,
+                             words + count_,
+                             words + (ptrdiff_t)2 * count_,
+                             words + (ptrdiff_t)3 * count_,
+                             words + (ptrdiff_t)4 * count_,
+                             words + (ptrdiff_t)5 * count_};
+  auto *sums = reinterpret_cast<int32_t *>(array(7));
+  field.place(map, packed, count_, array(0), array(1), array(2), poses);
+  field.score(packed, poses, count_, sums);
+  const double least = field.floor() * points.count;
+  for (int i = 0; i < count_; i++) scored[i] = least + field.unit() * sums[i];
+}
+
+bool cloud::weigh(const edge_map &map, const score_field &field, const scan_points &points, const score_table &table,
+                  double exponent, bool sum) {
   const double *x = array(0), *y = array(1), *heading = array(2);
   double *weight = array(3), *scored = array(4);
+  if (field.ready()) score_by_field(map, field, points, scored);
   double best = 0.0;
   bool any = false;
   for (int i = 0; i < count_; i++) {
-    scored[i] = -1.0e300;
-    if (!map.drivable(x[i], y[i])) continue;
-    const sin_cos h = sincos(heading[i]);
-    scored[i] = kScoreUnit * score(map, points, table, x[i], y[i], h.cos, h.sin);
+    if (!map.drivable(x[i], y[i])) {
+      scored[i] = -1.0e300;
+      continue;
+    }
+    if (!field.ready()) {
+      const sin_cos h = sincos(heading[i]);
+      scored[i] = kScoreUnit * score(map, points, table, x[i], y[i], h.cos, h.sin);
+    }
     if (!any || scored[i] > best) best = scored[i];
     any = true;
   }

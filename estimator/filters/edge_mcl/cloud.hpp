@@ -5,7 +5,7 @@
 
 #include <cstddef>
 
-#include "filters/edge_mcl/likelihood.hpp"
+#include "filters/edge_mcl/score_field.hpp"
 #include "waymark/frames.h"
 
 namespace wm {
@@ -39,7 +39,9 @@ class cloud {
   void move(const wm_pose2 &increment, const step_noise &noise);
   // Multiplies the weights by exp(exponent * score), or by the score itself (`sum`), and by 0 where it can't be driven,
   // and normalises them. False where all were 0: the weights stay.
-  bool weigh(const edge_map &map, const scan_points &points, const score_table &table, double exponent, bool sum);
+  // By the field, or where that isn't ready by the table.
+  bool weigh(const edge_map &map, const score_field &field, const scan_points &points, const score_table &table,
+             double exponent, bool sum);
   double effective() const;  // number of particles
   void resample();
   // Moves those within the gate of `target` towards it.
@@ -54,6 +56,7 @@ class cloud {
     return reinterpret_cast<double *>(reinterpret_cast<uintptr_t>(this) + (uintptr_t)memory_at_) +
            (ptrdiff_t)k * count_;
   }
+  void score_by_field(const edge_map &map, const score_field &field, const scan_points &points, double *scored);
   void normals(int particle, double out[4]) const;
 
   int count_;

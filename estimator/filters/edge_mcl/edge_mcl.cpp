@@ -39,7 +39,8 @@ size_t edge_mcl::bytes(const wm_edge_mcl_params &params, const wm_setup &setup, 
     *why = "edge_mcl takes at most 2 cameras";
     return 0;
   }
-  return aligned(sizeof(edge_mcl)) + aligned(cloud::bytes(params.particles)) + aligned(map) + kAlign;
+  return aligned(sizeof(edge_mcl)) + aligned(cloud::bytes(params.particles)) + aligned(map) +
+         score_field::bytes(*setup.map) + kAlign;
 }
 
 void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
@@ -65,6 +66,7 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   double sigma[kSigmaClasses];
   for (int k = 0; k < kSigmaClasses; k++) sigma[k] = std::sqrt(square(params.sigma_m) + square(kClassSigma_m[k]));
   make_score_table(map_, sigma, params.floor, params.weight == EDGE_MCL_SUM, &table_);
+  field_.init(map_, table_, behind + aligned(edge_map::bytes(*setup.map)));
   search_.init(map_);
   usual_ = params.lost_explained;
   fused_ns_ = watched_ns_ = remembered_ns_ = WM_TIME_NONE;
@@ -235,7 +237,7 @@ double edge_mcl::move_cloud() {
 void edge_mcl::weigh_cloud(double way_m) {
   if (scan_.count == 0) return;
   const double share = state_ == WM_STATE_TRACKING || way_m > kNewView_m ? 1.0 : way_m / kNewView_m;
-  if (!cloud_.weigh(map_, scan_, table_, share * params_.exponent, params_.weight == EDGE_MCL_SUM)) return;
+  if (!cloud_.weigh(map_, field_, scan_, table_, share * params_.exponent, params_.weight == EDGE_MCL_SUM)) return;
   if (cloud_.effective() < params_.resample_below * cloud_.count()) cloud_.resample();
 }
 

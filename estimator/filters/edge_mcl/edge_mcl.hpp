@@ -76,6 +76,7 @@ class edge_mcl {
   edge_map map_;
   cloud cloud_;
   score_table table_;
+  score_field field_;
   scan_points scan_, lined_;  // all, and those that lie on a line with their neighbours
   place_search search_;
   floor_camera camera_[kCamerasMax];

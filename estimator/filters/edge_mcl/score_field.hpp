@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a cloud of particles costs: for every particle and every point of a scan one look-up. So what a point counts is
+// baked into the map when it is made ready: a layer of bytes for each class of sigma, in tiles of 256 x 256, a row of
+// 16 bits on which a column of 16 bits stands: an address is put together without a multiplication, and one dependent
+// load is left of each point. Integers all the way: the order of summation is nobody's business, and vectors of any
+// width give the same bits.
+#ifndef WAYMARK_ESTIMATOR_EDGE_MCL_SCORE_FIELD_HPP
+#define WAYMARK_ESTIMATOR_EDGE_MCL_SCORE_FIELD_HPP
+
+#include "filters/edge_mcl/likelihood.hpp"
+
+namespace wm {
+
+// A scan in fixed point, 16 points of one class at a time.
+struct packed_scan {
+  static constexpr int kBlock = 16, kBlocksMax = WM_POINTS_MAX / kBlock + kSigmaClasses;
+  int count;  // of points
+  int blocks;
+  int shift;  // 2^-shift pixels are the unit of a turned point; half of it of one that is not
+  uint8_t layer[kBlocksMax];
+  alignas(32) int16_t x[kBlocksMax * kBlock];     // ahead
+  alignas(32) int16_t y[kBlocksMax * kBlock];     // to the left
+  alignas(32) int16_t used[kBlocksMax * kBlock];  // -1; 0 where a block isn't full
+};
+
+// Where particles are, for the kernel: pixel of the field, the part of a pixel beyond it in the scan's unit, cosine and
+// sine of the heading against the map's rows in 1/32767. Structure of arrays.
+struct field_poses {
+  int16_t *column, *row, *column_part, *row_part, *cosine, *sine;
+};
+
+class score_field {
+ public:
+  static constexpr size_t kBytesMax = (size_t)1 << 28;  // of all layers: 64 million pixels
+  static constexpr int kPixelsMax = 16000;              // along a side
+  static constexpr int kReachPixels = 8000;             // points farther away don't count
+
+  // Bytes that init() needs for a map of this size; 0 where it is too large, and particles look at distances instead.
+  static size_t bytes(const wm_raster &raster);
+  // Bakes the table's values over the map's distances. A field of a map that is too large is not ready.
+  void init(const edge_map &map, const score_table &table, void *memory);
+  bool ready() const { return tile_columns_ > 0; }
+
+  // A sum of look-ups times unit(), plus floor() a point, is what score() gives in kScoreUnit, rounded to bytes.
+  double unit() const { return unit_; }
+  double floor() const { return floor_; }
+
+  void pack(const edge_map &map, const scan_points &points, packed_scan *out) const;
+  // `count` poses in the map to pixels. Headings of at most 1e5 rad.
+  void place(const edge_map &map, const packed_scan &scan, int count, const double *x_m, const double *y_m,
+             const double *heading_rad, const field_poses &out) const;
+  // sums[i] = sum over the points of what each counts seen from pose i. O(count * points).
+  void score(const packed_scan &scan, const field_poses &poses, int count, int32_t *sums) const;
+
+ private:
+  const uint8_t *layers() const {
+    return reinterpret_cast<const uint8_t *>(reinterpret_cast<uintptr_t>(this) + (uintptr_t)layers_at_);
+  }
+  void bake(const edge_map &map, const uint8_t *value, uint8_t *layer) const;
+
+  int tile_columns_, tile_rows_;
+  double unit_, floor_;
+  ptrdiff_t layers_at_;  // from this object on, so that a copy of the whole state has a field of its own
+};
+
+}  // namespace wm
+
+#endif
