@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/edge_mcl/params.h"
 
-#include <stddef.h>
+#include "filters/param_rows.h"
 
 typedef struct wm_edge_mcl_params params;
 
 static const char *const kWeights[] = {"product", "sum", NULL};
 static const char *const kPoses[] = {"refined", "cloud", NULL};
-
-#define F64(key, field, initial, min, max, about) \
-  { key, WM_PARAM_F64, offsetof(params, field), initial, min, max, NULL, about }
-#define I32(key, field, initial, min, max, about) \
-  { key, WM_PARAM_I32, offsetof(params, field), initial, min, max, NULL, about }
-#define ENUM(key, field, initial, max, names, about) \
-  { key, WM_PARAM_ENUM, offsetof(params, field), initial, 0, max, names, about }
 
 static const wm_param kParams[] = {
     WM_MOTION_STATE_PARAMS(params, motion),

@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/landmark_ekf/params.h"
 
-#include <stddef.h>
+#include "filters/planar/sighting_params.h"
 
 typedef struct wm_landmark_ekf_params params;
-
-#define F64(key, field, initial, min, max, about) \
-  { key, WM_PARAM_F64, offsetof(params, field), initial, min, max, NULL, about }
-#define I32(key, field, initial, min, max, about) \
-  { key, WM_PARAM_I32, offsetof(params, field), initial, min, max, NULL, about }
-#define BOOL(key, field, initial, about) \
-  { key, WM_PARAM_BOOL, offsetof(params, field), initial, 0, 1, NULL, about }
 
 static const wm_param kParams[] = {
     WM_MOTION_STATE_PARAMS(params, motion),
@@ -18,12 +11,7 @@ static const wm_param kParams[] = {
         "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off."),
     F64("states.sensor_yaw_walk_rad", sensor_yaw_walk_rad, 0, 0, 1,
         "Random walk of the mounting yaw, rad per sqrt(s). A bolted sensor has none."),
-    F64("states.sensor_xy_sigma_m", sensor_xy_sigma_m, 0, 0, 10,
-        "Start sigma of each sensor's place on the robot about calibration.yaml's, forwards and sideways, m. 0: off."),
-    F64("states.sensor_time_offset_sigma_s", sensor_time_offset_sigma_s, 0, 0, 1,
-        "Start sigma of each sensor's time offset, s: its sightings are that much older than their stamps. 0: off."),
-    F64("states.range_bias_sigma_m", range_bias_sigma_m, 0, 0, 10,
-        "Start sigma of each sensor's range bias, m. 0: off."),
+    WM_SENSOR_STATE_PARAMS,
     F64("states.range_scale_sigma", range_scale_sigma, 0, 0, 1,
         "Start sigma of each sensor's range scale about 1. 0: off. Needs ranges of many lengths beside a range bias."),
     F64("states.range_scale_walk", range_scale_walk, 0, 0, 1, "Random walk of the range scale per sqrt(s)."),
@@ -37,29 +25,12 @@ static const wm_param kParams[] = {
     BOOL("use.range", use_range, 1, "Fuse ranges."),
     BOOL("use.position", use_position, 1, "Fuse positions (GNSS)."),
     BOOL("use.heading", use_heading, 1, "Fuse headings."),
-    F64("noise.bearing_default_rad", bearing_sigma_default_rad, 0.02, 1e-5, 3,
-        "Sigma of a bearing where neither the sighting nor the sensor gives one, rad."),
-    F64("noise.range_default_m", range_sigma_default_m, 0.1, 1e-4, 100,
-        "Sigma of a range where neither the sighting nor the sensor gives one, m."),
-    F64("noise.bearing_factor", bearing_sigma_factor, 1, 0.01, 100,
-        "Times the bearing's sigma. More than 1 where errors of following sightings are alike and not modelled."),
-    F64("noise.range_factor", range_sigma_factor, 1, 0.01, 100, "Times the range's sigma."),
-    F64("noise.range_rel", range_sigma_rel, 0, 0, 1, "Noise of a range in parts of it; squares are added."),
-    F64("noise.lateral_m", lateral_sigma_m, 0, 0, 10,
-        "Noise of a landmark's place across the line of sight, m: it is as broad as it is, and near by that is a large "
-        "angle. Added to the bearing's variance as (this / distance)^2."),
+    WM_SIGHTING_NOISE_PARAMS,
     F64("noise.map_min_m", map_sigma_min_m, 0, 0, 10,
         "A landmark's sigma on the map is never taken to be smaller, m (maps promise more than they keep)."),
     F64("noise.gnss_factor", gnss_sigma_factor, 1, 0.01, 100, "Times the position's sigma."),
     F64("noise.gnss_min_m", gnss_sigma_min_m, 0.01, 0, 1000, "A position's sigma is never taken to be smaller, m."),
-    I32("lasting.slots", lasting_slots, 0, 0, 24,
-        "Pairs of sensor and landmark (the last seen ones) whose lasting error is carried as states (Gauss-Markov)."),
-    F64("lasting.bearing_rad", lasting_bearing_rad, 0, 0, 3, "Sigma of a bearing's lasting error, rad. 0: none."),
-    F64("lasting.lateral_m", lasting_lateral_m, 0, 0, 10,
-        "Sigma of the lasting error across the line of sight, m; squares are added to the bearing's."),
-    F64("lasting.range_m", lasting_range_m, 0, 0, 100, "Sigma of a range's lasting error, m."),
-    F64("lasting.range_rel", lasting_range_rel, 0, 0, 1, "The same in parts of the range; squares are added."),
-    F64("lasting.tau_s", lasting_tau_s, 2, 0.01, 1e6, "Time after which a lasting error has fallen to 1/e, s."),
+    WM_LASTING_PARAMS,
     F64("lasting.gnss_m", gnss_lasting_m, 0, 0, 1000,
         "Sigma of a position's lasting error on each axis, m (reflections, atmosphere). 0: none."),
     F64("lasting.gnss_tau_s", gnss_lasting_tau_s, 60, 0.1, 1e6, "Time after which that has fallen to 1/e, s."),

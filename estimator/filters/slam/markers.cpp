@@ -95,6 +95,7 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   marker_reading r = read_marker(m, m.p_m, m.yaw_rad);
   if (r.length_m > sensor_[m.sensor].max_range_m) return drop(WM_REJECTED_OUT_OF_RANGE);
   const int landmark = find_landmark(m.id);
+  if (doubled(m.id, landmark, m.sensor)) return drop(WM_REJECTED_NO_ASSOCIATION);
   const bool two = m.poses == 2;
   if (searching_ && (two || landmark < 0 || !find_start(landmark, m, r))) return drop(WM_REJECTED_SEARCHING);
   const past_pose past = look_back(sensor_value(m.sensor, kTimeOffset, 0.0));
@@ -228,7 +229,7 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
   joint_.fuse(block, more, params_.map == WM_SLAM_MAP_FROZEN);
   landmark_note &note = notes()[landmark];
   if (!note.surveyed) note.z_m += (r.z_m - note.z_m) / (note.seen + 1.0);
-  note_fused(landmark);
+  note_fused(landmark, m.sensor);
 }
 
 // Paper, system 2, new marker: P_aa = G_x P G_x' + G_z R G_z' with all cross terms.
@@ -257,7 +258,7 @@ void slam::join_marker(const wm_marker &m, const marker_reading &r, const past_p
       for (int l = 0; l < 3; l++) noise[k][l] += inverse[k][i] * r.noise[i] * inverse[l][i];
     }
   if (!r.turned) noise[2][2] += square(kPi);
-  const int landmark = note_landmark(m.id, joint_.add_landmark(rows, noise, place), joint_.now_ns());
+  const int landmark = note_landmark(m.id, joint_.add_landmark(rows, noise, place), m.sensor, joint_.now_ns());
   notes()[landmark].z_m = r.z_m;
   fused_ns_ = joint_.now_ns();
 }

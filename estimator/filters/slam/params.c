@@ -1,18 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/slam/params.h"
 
-#include <stddef.h>
+#include "filters/planar/sighting_params.h"
 
 typedef struct wm_slam_params params;
-
-#define F64(key, field, initial, min, max, about) \
-  { key, WM_PARAM_F64, offsetof(params, field), initial, min, max, NULL, about }
-#define I32(key, field, initial, min, max, about) \
-  { key, WM_PARAM_I32, offsetof(params, field), initial, min, max, NULL, about }
-#define BOOL(key, field, initial, about) \
-  { key, WM_PARAM_BOOL, offsetof(params, field), initial, 0, 1, NULL, about }
-#define ENUM(key, field, initial, last, names, about) \
-  { key, WM_PARAM_ENUM, offsetof(params, field), initial, 0, last, names, about }
 
 static const char *const kConsistency[] = {"invariant", "plain", NULL};
 static const char *const kMaps[] = {"none", "extend", "frozen", NULL};
@@ -22,41 +13,19 @@ static const wm_param kParams[] = {
     WM_MOTION_STATE_PARAMS(params, motion),
     F64("states.sensor_yaw_sigma_rad", sensor_yaw_sigma_rad, 0, 0, 3.2,
         "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off."),
-    F64("states.sensor_xy_sigma_m", sensor_xy_sigma_m, 0, 0, 10,
-        "Start sigma of each sensor's place on the robot about calibration.yaml's, forwards and sideways, m. 0: off."),
-    F64("states.sensor_time_offset_sigma_s", sensor_time_offset_sigma_s, 0, 0, 1,
-        "Start sigma of each sensor's time offset, s: its sightings are that much older than their stamps. 0: off."),
-    F64("states.range_bias_sigma_m", range_bias_sigma_m, 0, 0, 10,
-        "Start sigma of each sensor's range bias, m. 0: off."),
+    WM_SENSOR_STATE_PARAMS,
     F64("states.range_scale_sigma", range_scale_sigma, 0, 0, 1,
         "Start sigma of each sensor's range scale about 1. 0: off. It is found against the motion's scale alone."),
     BOOL("use.bearing", use_bearing, 1, "Fuse bearings."),
     BOOL("use.range", use_range, 1, "Fuse ranges. Without them landmarks join once their parallax suffices."),
-    F64("noise.bearing_default_rad", bearing_sigma_default_rad, 0.02, 1e-5, 3,
-        "Sigma of a bearing where neither the sighting nor the sensor gives one, rad."),
-    F64("noise.range_default_m", range_sigma_default_m, 0.1, 1e-4, 100,
-        "Sigma of a range where neither the sighting nor the sensor gives one, m."),
-    F64("noise.bearing_factor", bearing_sigma_factor, 1, 0.01, 100,
-        "Times the bearing's sigma. More than 1 where errors of following sightings are alike and not modelled."),
-    F64("noise.range_factor", range_sigma_factor, 1, 0.01, 100, "Times the range's sigma."),
-    F64("noise.range_rel", range_sigma_rel, 0, 0, 1, "Noise of a range in parts of it; squares are added."),
-    F64("noise.lateral_m", lateral_sigma_m, 0, 0, 10,
-        "Noise of a landmark's place across the line of sight, m: it is as broad as it is, and near by that is a large "
-        "angle. Added to the bearing's variance as (this / distance)^2."),
+    WM_SIGHTING_NOISE_PARAMS,
     BOOL("markers.on", markers, 0,
          "Take coded markers: each landmark has a heading, too, and a marker gives all three at once."),
     F64("markers.sigma_m", marker_sigma_m, 0.002, 1e-5, 10,
         "Noise of a marker's place, m; the sensor's sigmas, along and across, are added in squares."),
     F64("markers.sigma_rel", marker_sigma_rel, 0, 0, 1, "The same in parts of the distance."),
     F64("markers.heading_sigma_rad", marker_heading_sigma_rad, 0.02, 1e-5, 3, "Noise of a marker's heading, rad."),
-    I32("lasting.slots", lasting_slots, 0, 0, 24,
-        "Pairs of sensor and landmark (the last seen ones) whose lasting error is carried as states (Gauss-Markov)."),
-    F64("lasting.bearing_rad", lasting_bearing_rad, 0, 0, 3, "Sigma of a bearing's lasting error, rad. 0: none."),
-    F64("lasting.lateral_m", lasting_lateral_m, 0, 0, 10,
-        "Sigma of the lasting error across the line of sight, m; squares are added to the bearing's."),
-    F64("lasting.range_m", lasting_range_m, 0, 0, 100, "Sigma of a range's lasting error, m."),
-    F64("lasting.range_rel", lasting_range_rel, 0, 0, 1, "The same in parts of the range; squares are added."),
-    F64("lasting.tau_s", lasting_tau_s, 2, 0.01, 1e6, "Time after which a lasting error has fallen to 1/e, s."),
+    WM_LASTING_PARAMS,
     F64("gate.soft", gate_soft, 9, 1, 1e6,
         "Normalised innovation squared for two numbers above which the measurement is believed less, as a "
         "distribution with long tails does; for one or three numbers it is scaled. 99 % of good ones lie below 9.2."),

@@ -136,7 +136,7 @@ void slam::settle_ray(int32_t id, bearing_tracks::track *track, const wm_pose2 &
     rows[k].add(state + 1, -square(distance) * (k == 0 ? ray.cos : ray.sin));
   }
   const double none[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, square(kPi)}};
-  note_landmark(id, joint_.add_landmark(rows, none, place), joint_.now_ns());
+  note_landmark(id, joint_.add_landmark(rows, none, place), track->sensor, joint_.now_ns());
   end_ray(track);
 }
 

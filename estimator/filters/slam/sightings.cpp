@@ -181,6 +181,8 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
     if (landmark < 0 && !fresh) return drop(WM_REJECTED_NO_ASSOCIATION);
     id = landmark < 0 ? own_id() : notes()[landmark].id;
     blank.landmark_id = id;
+  } else if (doubled(id, landmark, s.sensor)) {
+    return drop(WM_REJECTED_NO_ASSOCIATION);
   }
   const bool may_join = params_.map != WM_SLAM_MAP_FROZEN && r.bearing && (r.range || params_.line_clones > 0);
   if (landmark >= 0)
@@ -239,15 +241,16 @@ void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, cons
   const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
   const double more[2] = {v.noise[0] * weaker, v.count == 2 ? v.noise[1] * weaker : 0.0};
   joint_.fuse(block, more, params_.map == WM_SLAM_MAP_FROZEN);
-  note_fused(landmark);
+  note_fused(landmark, s.sensor);
 }
 
-void slam::note_fused(int landmark) {
+void slam::note_fused(int landmark, int sensor) {
   landmark_note &note = notes()[landmark];
   const wm_time_ns now = joint_.now_ns();
   note.misfits = 0;
   note.seen++;
   note.last_ns = now;
+  note.sensor = sensor;
   fused_ns_ = now;
   if (other_fused_id_[0] != note.id) {
     other_fused_id_[1] = other_fused_id_[0];
@@ -257,18 +260,29 @@ void slam::note_fused(int landmark) {
   other_fused_ns_[0] = now;
 }
 
-// A landmark that doesn't fit again and again, while others do, was moved.
+// A landmark that doesn't fit again and again, while others do, was moved: it joins anew where it is. One that was
+// moved and now is elsewhere again is two of one identity; they are left alone.
 void slam::misfit(int landmark) {
   landmark_note &note = notes()[landmark];
   note.misfits++;
-  if (note.misfits < params_.moved_after || params_.map == WM_SLAM_MAP_FROZEN) return;
+  const bool frozen = params_.map == WM_SLAM_MAP_FROZEN;
+  if (note.misfits < params_.moved_after || (frozen && moved_.has(note.id))) return;
   for (int i = 0; i < 2; i++) {
     if (other_fused_id_[i] < 0 || other_fused_id_[i] == note.id) continue;
     if (wm_seconds_between(other_fused_ns_[i], joint_.now_ns()) > kOthersFit_s) continue;
     counts_.moved++;
-    drop_landmark(landmark);
+    (moved_.has(note.id) ? doubled_ : moved_).add(note.id);
+    if (!frozen) drop_landmark(landmark);
     return;
   }
+}
+
+bool slam::doubled(int32_t id, int landmark, int sensor) {
+  const bool twice =
+      landmark >= 0 && notes()[landmark].last_ns == joint_.now_ns() && notes()[landmark].sensor == sensor;
+  if (!twice && !doubled_.has(id)) return false;
+  counts_.doubled++;
+  return true;
 }
 
 // Paper, system 2, new marker: P_aa = G_x P G_x' + G_z R G_z' with all cross terms. G by the sighting's own
@@ -313,7 +327,7 @@ void slam::join_seen(int32_t id, const wm_sighting &s, const reading &r, const p
       for (int l = 0; l < 2; l++) noise[k][l] += inverse[k][i] * v.noise[i] * inverse[l][i];
     }
   noise[2][2] = square(kPi);  // a heading, where landmarks have one, is unknown
-  note_landmark(id, joint_.add_landmark(rows, noise, place), joint_.now_ns());
+  note_landmark(id, joint_.add_landmark(rows, noise, place), s.sensor, joint_.now_ns());
   fused_ns_ = joint_.now_ns();
   blank.verdict = WM_FUSED;
   blank.expected = blank.observed;  // it defines the landmark; there was nothing to hold it against
@@ -401,7 +415,7 @@ bool slam::join_line(int32_t id, const bearing_tracks::track &track) {
   if (variance > square(params_.line_sigma_rel * line.distance_m) || !make_room()) return false;
   noise[2][2] = square(kPi);
   const double place[3] = {line.place_m[0], line.place_m[1], 0.0};
-  note_landmark(id, joint_.add_landmark(rows, noise, place), joint_.now_ns());
+  note_landmark(id, joint_.add_landmark(rows, noise, place), track.sensor, joint_.now_ns());
   return true;
 }
 

@@ -134,6 +134,7 @@ void slam::start_again() {
     other_fused_ns_[i] = WM_TIME_NONE;
     other_fused_id_[i] = -1;
   }
+  moved_.count = doubled_.count = 0;
   resets_++;
   searching_ = params_.map != WM_SLAM_MAP_NONE && params_.markers && !(place && heading);
   candidate_id_ = -1;
@@ -156,7 +157,7 @@ void slam::load_map() {
     const double place[3] = {l.p_m[0], l.p_m[1], heading};
     const joint_row rows[3] = {};
     const int landmark = joint_.add_landmark(rows, noise, place);
-    notes()[landmark] = {l.id, 0, WM_TIME_NONE, WM_TIME_NONE, l.p_m[2], 0, 1};
+    notes()[landmark] = {l.id, 0, WM_TIME_NONE, WM_TIME_NONE, l.p_m[2], 0, 1, -1};
   }
 }
 
@@ -226,6 +227,7 @@ size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const 
   list.add("map", "joined", (double)counts_.joined, 0.0);
   list.add("map", "left", (double)counts_.left, 0.0);
   list.add("map", "moved", (double)counts_.moved, 0.0);
+  list.add("map", "doubled", (double)counts_.doubled, 0.0);
   list.add("map", "no_room", (double)counts_.no_room, 0.0);
   return list.count();
 }
@@ -298,8 +300,8 @@ void slam::look_after(wm_time_ns t_ns) {
   if (unconfirmed && wm_seconds_between(note.last_ns, t_ns) > params_.leave_after_s) drop_landmark(cursor_);
 }
 
-int slam::note_landmark(int32_t id, int landmark, wm_time_ns t_ns) {
-  notes()[landmark] = {id, 1, t_ns, t_ns, 0.0, 0, 0};
+int slam::note_landmark(int32_t id, int landmark, int sensor, wm_time_ns t_ns) {
+  notes()[landmark] = {id, 1, t_ns, t_ns, 0.0, 0, 0, sensor};
   counts_.joined++;
   return landmark;
 }

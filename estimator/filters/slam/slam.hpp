@@ -22,10 +22,24 @@ struct landmark_note {
   double z_m;
   int32_t misfits;   // in a row
   int32_t surveyed;  // from the map that was given: it doesn't leave
+  int32_t sensor;    // that saw it last
 };
 
 struct slam_counts {
-  uint64_t joined, left, moved, no_room;
+  uint64_t joined, left, moved, doubled, no_room;
+};
+
+// The last identities of which something is to be remembered.
+struct identity_list {
+  static constexpr int kMost = 16;
+  int32_t id[kMost];
+  int count;
+  bool has(int32_t one) const {
+    for (int i = 0; i < count && i < kMost; i++)
+      if (id[i] == one) return true;
+    return false;
+  }
+  void add(int32_t one) { id[count++ % kMost] = one; }
 };
 
 class slam {
@@ -116,7 +130,9 @@ class slam {
   void join_marker(const wm_marker &m, const marker_reading &r, const past_pose &past, wm_innovation blank,
                    record_list records);
   bool find_start(int landmark, const wm_marker &m, const marker_reading &r);
-  void note_fused(int landmark);
+  void note_fused(int landmark, int sensor);
+  // Is this identity not one landmark's: seen twice in a picture, or at two places in turn?
+  bool doubled(int32_t id, int landmark, int sensor);
   bool join_line(int32_t id, const bearing_tracks::track &track);
   void misfit(int landmark);
   int clone_state(int clone) const { return first_clone_ + 3 * clone; }
@@ -125,7 +141,7 @@ class slam {
 
   int lend(int sensor, int32_t id, wm_time_ns t_ns);
   int find_landmark(int32_t id) const;
-  int note_landmark(int32_t id, int landmark, wm_time_ns t_ns);
+  int note_landmark(int32_t id, int landmark, int sensor, wm_time_ns t_ns);
   void drop_landmark(int landmark);
   bool make_room();
   void look_after(wm_time_ns t_ns);
@@ -153,6 +169,7 @@ class slam {
   int cursor_;                    // of look_after
   wm_time_ns other_fused_ns_[2];  // when the last two different landmarks were fused
   int32_t other_fused_id_[2];
+  identity_list moved_, doubled_;
   uint32_t resets_;
   // Started somewhere on a map that was given: no pose until two of its markers say the same.
   bool searching_;

@@ -1,16 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/stereo_ekf/params.h"
 
-#include <stddef.h>
+#include "filters/param_rows.h"
 
 typedef struct wm_stereo_ekf_params params;
-
-#define F64(key, field, initial, min, max, about) \
-  { key, WM_PARAM_F64, offsetof(params, field), initial, min, max, NULL, about }
-#define I32(key, field, initial, min, max, about) \
-  { key, WM_PARAM_I32, offsetof(params, field), initial, min, max, NULL, about }
-#define BOOL(key, field, initial, about) \
-  { key, WM_PARAM_BOOL, offsetof(params, field), initial, 0, 1, NULL, about }
 
 static const char *const kPredictions[] = {"twist", "constant_velocity", NULL};
 static const char *const kSampleAt[] = {"beginning", "end", NULL};

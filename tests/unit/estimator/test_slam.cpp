@@ -124,6 +124,7 @@ void drive(double seconds, bool range = true) {
             m.yaw_rad = wm::wrap(m.yaw_rad + (bearing > 0 ? 0.4 : -0.4));
           }
           see(seen);
+          if (twice) see(seen);
           continue;
         }
         see(make::sighting(now_s, nameless ? -1 : 10 + i, b, range ? r : kAbsent));
@@ -308,6 +309,97 @@ void test_the_same_identity_twice_in_a_frame_at_two_places_keeps_one(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, before);
 }
 
+wm_event copy_of(int i, double x, double y) {  // marker i's code as it hangs at (x, y), seen now
+  const double dx = x - truth.x_m, dy = y - truth.y_m;
+  const wm::sin_cos h = wm::sincos(truth.heading_rad);
+  wm_event e = make::empty(now_s, WM_EVENT_MARKER);
+  e.as.marker = marker(10 + i, h.cos * dx + h.sin * dy - 0.2, h.cos * dy - h.sin * dx, 2.2, 1.0);
+  return e;
+}
+
+wm_state published_state() {
+  wm_estimate e;
+  slam->estimate(state, &e);
+  return (wm_state)e.state;
+}
+
+void test_a_marker_seen_twice_in_a_picture_is_fused_once_and_told(void) {
+  coded = twice = true;
+  params.markers = 1;
+  begin();
+  drive(40);
+  TEST_ASSERT_EQUAL(fused, rejected);
+  TEST_ASSERT_EQUAL_DOUBLE(rejected, counted("map.doubled"));
+  size_t found;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_landmark(&found));
+  TEST_ASSERT_EQUAL(kCount, found);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+}
+
+void test_two_markers_of_one_identity_are_told_and_left_alone(void) {
+  coded = true;
+  params.markers = 1;
+  begin();
+  drive(30);
+  for (int i = 0; i < 400; i++) {  // marker 0's place is out of view for half of the time; its copy is seen instead
+    drive(0.1);
+    if (i / 30 % 2 == 0) see(copy_of(0, 1.0, 1.0));
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+  }
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, counted("map.moved") + counted("map.doubled"));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+}
+
+void test_a_marker_of_two_places_in_turn_is_no_landmark_any_more(void) {
+  coded = true;
+  params.markers = 1;
+  begin();
+  drive(30);
+  const double before[2] = {place[0][0], place[0][1]};
+  for (int turn = 1; turn <= 3; turn++) {
+    place[0][0] = before[0] + (turn % 2 ? 1.5 : 0.0);
+    drive(40);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+  }
+  TEST_ASSERT_EQUAL_DOUBLE(2, counted("map.moved"));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(10, counted("map.doubled"));
+  size_t found;
+  worst_landmark(&found);
+  TEST_ASSERT_EQUAL(kCount - 1, found);
+}
+
+void test_a_marker_that_moved_is_told_on_a_frozen_map_too(void) {
+  coded = true;
+  params.markers = 1;
+  params.map = WM_SLAM_MAP_FROZEN;
+  for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
+  place[0][0] += 1.5;
+  begin();
+  drive(60);
+  TEST_ASSERT_EQUAL_DOUBLE(1, counted("map.moved"));
+  TEST_ASSERT_EQUAL_DOUBLE(kCount, counted("map.landmarks"));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+}
+
+void test_half_a_minute_without_markers_is_said_and_mended(void) {
+  coded = true;
+  params.markers = 1;
+  begin();
+  drive(30);
+  const double sure = sigma();
+  hidden = true;
+  drive(30);
+  TEST_ASSERT_EQUAL(WM_STATE_DEAD_RECKONING, published_state());
+  TEST_ASSERT_GREATER_THAN_DOUBLE(2.0 * sure, sigma());
+  TEST_ASSERT_LESS_THAN_DOUBLE(4.0 * sigma(), off());
+  hidden = false;
+  drive(5);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+}
+
 void test_a_landmark_that_moved_leaves_is_counted_and_joins_anew(void) {
   begin();
   drive(30);
@@ -467,6 +559,11 @@ int main(void) {
   RUN_TEST(test_landmarks_without_identity_are_told_apart);
   RUN_TEST(test_a_landmark_seen_twice_in_a_frame_without_identity_is_fused_once);
   RUN_TEST(test_the_same_identity_twice_in_a_frame_at_two_places_keeps_one);
+  RUN_TEST(test_a_marker_seen_twice_in_a_picture_is_fused_once_and_told);
+  RUN_TEST(test_two_markers_of_one_identity_are_told_and_left_alone);
+  RUN_TEST(test_a_marker_of_two_places_in_turn_is_no_landmark_any_more);
+  RUN_TEST(test_a_marker_that_moved_is_told_on_a_frozen_map_too);
+  RUN_TEST(test_half_a_minute_without_markers_is_said_and_mended);
   RUN_TEST(test_a_landmark_that_moved_leaves_is_counted_and_joins_anew);
   RUN_TEST(test_most_sightings_false_are_survived);
   RUN_TEST(test_half_a_minute_without_landmarks_is_said_and_mended);
