@@ -26,6 +26,8 @@ static const char kHelp[] =
     "  --landmarks FILE    instead of the recording's map; an event log refuses any map but its own\n"
     "  --calibration FILE  instead of the recording's\n"
     "  --map FILE          a map.yaml instead of the recording's; an event log refuses any but its own\n"
+    "  --frames-of LOG     only the pictures that a run fed from this recording saw, by its event log: what it lost\n"
+    "                      is lost here, too, and its poses can be compared\n"
     "  --reference         also reference.csv: all of the drive looked at as a whole (edges on a raster map; at a "
     "desk)\n"
     "\n"
@@ -34,7 +36,7 @@ static const char kHelp[] =
     "  waymark replay out/run/events.wmlog --out out/again\n";
 
 typedef struct arguments {
-  const char *config, *out, *landmarks, *calibration, *map;
+  const char *config, *out, *landmarks, *calibration, *map, *frames_of;
   uint64_t seed;
   int reference;
   const char *what;
@@ -55,13 +57,20 @@ static int replay_recording(const arguments *args) {
   if (status == WM_OK) {
     progress_line progress;
     progress_begin(&progress);
-    const wm_replay_options options = {args->out, args->seed, progress_show, &progress, NULL};
+    const wm_replay_options options = {.out_dir = args->out,
+                                       .seed = args->seed,
+                                       .progress = progress_show,
+                                       .progress_context = &progress,
+                                       .frames_of = args->frames_of};
     static wm_run_report report;
     status = wm_replay_recording(&config, recording, &options, &report, &err);
     progress_end(&progress);
     if (status == WM_OK)
       print_report(&report, wm_recording_name(recording), args->out,
                    wm_seconds_between(progress.begin_ns, wm_monotonic_ns()));
+    if (status == WM_OK && args->frames_of)
+      (void)printf("  %s: its clock is %" PRId64 " ns ahead of the recording's\n", args->frames_of,
+                   report.log_ahead_ns);
   }
   wm_recording_close(recording);
   wm_config_free(&config);
@@ -162,6 +171,7 @@ int command_replay(int argc, char *const *argv) {
                             {"--landmarks", OPTION_TEXT, &args.landmarks},
                             {"--calibration", OPTION_TEXT, &args.calibration},
                             {"--map", OPTION_TEXT, &args.map},
+                            {"--frames-of", OPTION_TEXT, &args.frames_of},
                             {"--reference", OPTION_FLAG, &args.reference},
                             {"--help", OPTION_FLAG, &help},
                             {"-h", OPTION_FLAG, &help}};
@@ -186,8 +196,8 @@ int command_replay(int argc, char *const *argv) {
     return EXIT_USAGE;
   }
   if (stat(args.what, &there) == 0 && !S_ISDIR(there.st_mode)) {
-    if (!args.reference) return replay_log(&args);
-    (void)fputs("waymark: --reference needs the recording, whose map it takes\n", stderr);
+    if (!args.reference && !args.frames_of) return replay_log(&args);
+    (void)fprintf(stderr, "waymark: %s needs the recording\n", args.reference ? "--reference" : "--frames-of");
     return EXIT_USAGE;
   }
   if (!args.config) {

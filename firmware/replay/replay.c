@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "frames_of.h"
 #include "waymark/arena.h"
 #include "waymark/clock.h"
 #include "waymark/feed.h"
@@ -135,6 +136,8 @@ static wm_status run(replay *self, const wm_config *config, wm_recording *record
                      wm_run_report *report, wm_error *err) {
   wm_status status = wm_assemble(config, recording, options->seed, &self->assembly, err);
   if (status == WM_OK) status = take_memory(self, err);
+  if (status == WM_OK && options->frames_of)
+    status = frames_of_apply(options->frames_of, recording, &self->assembly, &report->log_ahead_ns, err);
   if (status == WM_OK) status = wm_run_folder_open(options->out_dir, &self->assembly, &self->folder, err);
   if (status != WM_OK) return status;
   self->output = wm_run_folder_output(self->folder);

@@ -184,12 +184,17 @@ void wm_vision_close(wm_vision *self) {
     vision_ahead_stop(&self->sources[i]);
     for (size_t k = 0; k < PICTURES_MAX; k++) wm_video_close(self->sources[i].videos[k]);
     wm_camera_device_close(self->sources[i].device);
+    free(self->sources[i].only_ns);
   }
   free(self);
 }
 
 size_t wm_vision_count(const wm_vision *self) { return self ? self->count : 0; }
 wm_source *wm_vision_source(wm_vision *self, size_t i) { return &self->sources[i].base; }
+
+void wm_vision_look_only_at(wm_vision *self, size_t i, wm_time_ns *t_ns, size_t count) {
+  vision_look_only_at(&self->sources[i], t_ns, count);
+}
 
 // ── memory, start ───────────────────────────────────────────────────────────────────────────────────────────────────
 

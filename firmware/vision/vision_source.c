@@ -2,6 +2,7 @@
 #include "vision_source.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "waymark/clock.h"
@@ -44,6 +45,40 @@ static void take_counts(vision_source *self) {
   }
 }
 
+#define ONLY_TOLERANCE_NS (50 * WM_NS_PER_MS)  // of a run's stamp from the recording's; or less than half a period
+
+// Whether no other stamp of the recording is meant: the nearest that is wanted lies within less than half a period.
+static int is_wanted(const vision_source *self, wm_time_ns t_ns) {
+  size_t low = 0, high = self->only_count;
+  while (low < high) {
+    size_t middle = low + (high - low) / 2;
+    if (self->only_ns[middle] < t_ns)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  wm_time_ns after_ns = low < self->only_count ? self->only_ns[low] - t_ns : INT64_MAX;
+  wm_time_ns before_ns = low > 0 ? t_ns - self->only_ns[low - 1] : INT64_MAX;
+  return (after_ns < before_ns ? after_ns : before_ns) <= self->only_tolerance_ns;
+}
+
+static wm_status skip_all(vision_source *self, wm_error *err) {
+  wm_status status = WM_OK;
+  for (uint32_t i = 0; status == WM_OK && i < self->detector->pictures; i++)
+    status = wm_video_skip(self->videos[i], err);
+  return status;
+}
+
+void vision_look_only_at(vision_source *self, wm_time_ns *t_ns, size_t count) {
+  wm_time_ns nearest_ns = INT64_MAX;
+  for (size_t i = 1; i < count; i++)
+    if (t_ns[i] - t_ns[i - 1] < nearest_ns) nearest_ns = t_ns[i] - t_ns[i - 1];
+  free(self->only_ns);
+  self->only_ns = t_ns;
+  self->only_count = count;
+  self->only_tolerance_ns = nearest_ns / 5 * 2 < ONLY_TOLERANCE_NS ? nearest_ns / 5 * 2 : ONLY_TOLERANCE_NS;
+}
+
 // Of a pair, passes over pictures whose other half is missing. The heads of what belongs together into `heads`.
 static wm_status find_together(vision_source *self, wm_frame *heads, wm_error *err) {
   for (;;) {
@@ -51,10 +86,10 @@ static wm_status find_together(vision_source *self, wm_frame *heads, wm_error *e
       wm_status status = wm_video_peek(self->videos[i], &heads[i], err);
       if (status != WM_OK) return status;
     }
-    if (self->detector->pictures == 1) return WM_OK;
-    wm_time_ns apart_ns = heads[1].t_ns - heads[0].t_ns;
-    if (apart_ns <= PAIR_TOLERANCE_NS && apart_ns >= -PAIR_TOLERANCE_NS) return WM_OK;
-    wm_status status = wm_video_skip(self->videos[apart_ns < 0], err);
+    wm_time_ns apart_ns = self->detector->pictures == 1 ? 0 : heads[1].t_ns - heads[0].t_ns;
+    int is_together = apart_ns <= PAIR_TOLERANCE_NS && apart_ns >= -PAIR_TOLERANCE_NS;
+    if (is_together && (!self->only_ns || is_wanted(self, heads[0].t_ns))) return WM_OK;
+    wm_status status = is_together ? skip_all(self, err) : wm_video_skip(self->videos[apart_ns < 0], err);
     if (status != WM_OK) return status;
   }
 }

@@ -46,6 +46,9 @@ struct vision_source {
   uint32_t seq;
   wm_source_counts counts;  // the working thread's own
   wm_histogram decode_ns, detect_ns;
+  wm_time_ns *only_ns;  // the only pictures to be looked at, rising; NULL: all
+  size_t only_count;
+  wm_time_ns only_tolerance_ns;
   vision_ahead ahead;
 };
 
@@ -53,6 +56,9 @@ struct vision_source {
 wm_status vision_next(vision_source *self, wm_event *out, wm_error *err);
 // Passes over pictures that are no longer the newest at `now_ns`.
 void vision_skip_to(vision_source *self, wm_time_ns now_ns);
+
+// Takes `t_ns` (rising, from malloc) over.
+void vision_look_only_at(vision_source *self, wm_time_ns *t_ns, size_t count);
 
 wm_status vision_ahead_start(vision_source *self, wm_error *err);
 void vision_ahead_stop(vision_source *self);

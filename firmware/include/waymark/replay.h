@@ -20,7 +20,8 @@ typedef struct wm_replay_options {
   uint64_t seed;
   wm_progress_fn progress;  // may be NULL
   void *progress_context;
-  const wm_raster *map;  // event log only: the map whose hash it names; NULL where it names none
+  const wm_raster *map;   // event log only: the map whose hash it names; NULL where it names none
+  const char *frames_of;  // recording only: the event log of a run fed from it, whose pictures alone are looked at
 } wm_replay_options;
 
 typedef struct wm_run_report {
@@ -31,6 +32,7 @@ typedef struct wm_run_report {
   size_t memory_bytes;
   int64_t allocations_after_start, page_faults_after_start;
   uint64_t events_missing;  // event log only: lost by the sink of the run that wrote it
+  wm_time_ns log_ahead_ns;  // frames_of only: the log's clock minus the recording's
   int log_was_cut;          // event log only: it ends within a record or was not closed
 } wm_run_report;
 

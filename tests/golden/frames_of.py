@@ -1,0 +1,90 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`waymark replay --frames-of`: the log of a drive whose pictures came only in part, on another clock; the replay of the whole
+drive by this log looks at the same pictures and gives the same poses. A log of another drive is refused."""
+import csv
+import json
+import math
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
+BIN = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin"))
+CONFIG = ROOT / "config/corridor.yaml"
+failures = []
+
+
+def check(good, text):
+    print(("  good  " if good else "  BAD   ") + text)
+    if not good:
+        failures.append(text)
+
+
+def run(program, *words, expect=0):
+    done = subprocess.run([BIN / program, *map(str, words)], capture_output=True, text=True)
+    if done.returncode != expect:
+        sys.exit(f"{program} {words}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+    return done.stdout + done.stderr
+
+
+def simulate(folder, seed, seconds):
+    world = (ROOT / "config/worlds/corridor-easy.yaml").read_text().replace(
+        "\npictures:", "\ncameras: [{name: front, size: [320, 180], rate_hz: 10, colour: false}]\n\npictures:")
+    (folder / "world.yaml").write_text(world)
+    run("waymark-simulate", folder / "world.yaml", "--seed", seed, "--duration", seconds, "--out", folder / f"drive-{seed}")
+    return folder / f"drive-{seed}"
+
+
+def fused(folder):
+    return json.loads((folder / "health.json").read_text())["sources"]["edges:front"]["fused"]
+
+
+def lose_pictures(drive, out, ahead_s):
+    """The same drive on a clock that is ahead, of every three pictures two."""
+    shutil.copytree(drive, out)
+    table = out / "video/front.csv"
+    head, *rows = table.read_text().splitlines()
+    rows = [row.split(",") for i, row in enumerate(rows) if i % 3]
+    later = lambda t: str(int(t) + ahead_s * 10**9)
+    table.write_text("\n".join([head] + [",".join((n, later(t), e, later(a))) for n, t, e, a in rows]) + "\n")
+    log = out / "can.log"
+    moved = []
+    for line in log.read_text().splitlines():
+        seconds, rest = line[1:].split(")", 1)
+        whole, fraction = seconds.split(".")
+        moved.append(f"({int(whole) + ahead_s}.{fraction}){rest}\n")
+    log.write_text("".join(moved))
+    about = out / "recording.yaml"
+    about.write_text(re.sub(r"(t_ns: *)(\d+)", lambda m: m.group(1) + later(m.group(2)), about.read_text()))
+    return out
+
+
+def poses(folder, ahead_s=0):
+    with open(folder / "trajectory.csv", newline="") as f:
+        return {int(r["t_ns"]) - ahead_s * 10**9: (float(r["x_m"]), float(r["y_m"])) for r in csv.DictReader(f)}
+
+
+with tempfile.TemporaryDirectory() as temporary:
+    work = pathlib.Path(temporary)
+    drive = simulate(work, 1, 4)
+    part = lose_pictures(drive, work / "part", 7)
+    run("waymark", "replay", part, "--config", CONFIG, "--out", work / "lossy")
+    run("waymark", "replay", drive, "--config", CONFIG, "--out", work / "all")
+    said = run("waymark", "replay", drive, "--config", CONFIG, "--frames-of", work / "lossy/events.wmlog", "--out", work / "same")
+    check("its clock is 7000000000 ns ahead" in said, "the run's clock is found")
+    check(0 < fused(work / "lossy") < fused(work / "all"), f"{fused(work / 'lossy')} of {fused(work / 'all')} pictures in the run")
+    check(fused(work / "same") == fused(work / "lossy"), f"{fused(work / 'same')} of them in the replay")
+    a, b, all_of_them = poses(work / "lossy", 7), poses(work / "same"), poses(work / "all")
+    check(len(a) > 300 and set(a) == set(b), f"{len(a)} poses in the run, {len(b)} in the replay")
+    worst = max(math.dist(p, b.get(t, (1e9, 1e9))) for t, p in a.items())
+    check(worst < 1e-6, f"at most {worst:.9f} m apart")
+    check(max(math.dist(p, all_of_them[t]) for t, p in a.items()) > 1e-4, "with all pictures they would be others")
+    other = simulate(work, 2, 1)
+    said = run("waymark", "replay", other, "--config", CONFIG, "--frames-of", work / "lossy/events.wmlog", "--out", work / "x", expect=1)
+    check("no motion in common" in said, "the log of another drive is refused")
+sys.exit(bool(failures))
