@@ -56,7 +56,7 @@ void make_rig() {
     c.mounting = {{0.5, 0.1 - 0.2 * i, 0.4}, {0, 22 * M_PI / 180, 0}};
   }
   rig.stereo = {0, 1, 0.2, {260, 260, 320, 180}, {1, 1, 1, 1}};
-  std::strcpy(rig.marker_family, "tag36h11");
+  std::strcpy(rig.marker_family, "mr");
   rig.marker_size_m = 0.2;
   view = {&rig, cameras};
 }

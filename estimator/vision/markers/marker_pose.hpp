@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a print's corners to its place in space.
+#ifndef WAYMARK_ESTIMATOR_VISION_MARKER_POSE_HPP
+#define WAYMARK_ESTIMATOR_VISION_MARKER_POSE_HPP
+
+#include "vision/markers/homography.hpp"
+#include "waymark/marker_fit.h"
+
+namespace wm {
+
+// In optical axes.
+struct marker_pose {
+  vec3 centre_m, right;  // right: from the print's left to its right, length 1
+};
+
+struct marker_poses {
+  marker_pose best, other;
+  bool has_other;
+  double range_sigma_m, turn_sigma_rad;  // of a print that is upright; else 0
+};
+
+// `corner`: the print's corners in the view. `up`: the vertical in optical axes. False where no pose fits.
+bool pose_of(const tangent_view &view, const wm_marker_print &print, const flat *corner, const vec3 &up,
+             marker_poses *out);
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vision/markers/mr_read.hpp"
+
+namespace wm {
+
+namespace {
+
+constexpr double kShapeMisfit = 0.03;  // of the outline's radius: a pentagon that is no regular one seen askew
+constexpr double kSharpen = 0.25;      // a module's blur from its neighbours, as AprilTag's decoder undoes it
+
+// Brightness over the print as a + b x + c y, by least squares.
+struct shade {
+  double normal[3][3], right[3], a, b, c;
+
+  void add(double x, double y, double grey) {
+    const double row[3] = {1, x, y};
+    for (int i = 0; i < 3; i++) {
+      right[i] += row[i] * grey;
+      for (int k = 0; k < 3; k++) normal[i][k] += row[i] * row[k];
+    }
+  }
+  bool solve() {
+    const double(*n)[3] = normal;
+    const vec3 r0 = {n[0][0], n[0][1], n[0][2]}, r1 = {n[1][0], n[1][1], n[1][2]}, r2 = {n[2][0], n[2][1], n[2][2]};
+    const double det = dot(r0, cross(r1, r2));
+    if (!(std::fabs(det) > 1e-12)) return false;
+    const vec3 x = (1 / det) * (right[0] * cross(r1, r2) + right[1] * cross(r2, r0) + right[2] * cross(r0, r1));
+    a = x.x, b = x.y, c = x.z;
+    return true;
+  }
+  double at(double x, double y) const { return a + b * x + c * y; }
+};
+
+struct reader {
+  const tangent_view &view;
+  const wm_frame &frame;
+  homography h;
+
+  bool grey(double x, double y, double *out) const { return grey_at(view, frame, h(x, y), out); }
+  // Mean over the middle of a module.
+  bool module(double x, double y, double *out) const {
+    constexpr double kOff = 0.2 * WM_MR_MODULE;
+    double sum = 0, one;
+    for (int i = 0; i < 5; i++) {
+      const double dx = i == 0 ? 0 : i % 2 ? kOff : -kOff, dy = i == 0 ? 0 : i < 3 ? kOff : -kOff;
+      if (!grey(x + dx, y + dy, &one)) return false;
+      sum += one;
+    }
+    *out = sum / 5;
+    return true;
+  }
+};
+
+// White from the rim and from the gaps inside the ring, black from the ring.
+bool measure_shades(const reader &r, shade *white, shade *black) {
+  *white = *black = shade{};
+  for (int side = 0; side < 5; side++) {
+    double a[2], b[2];
+    wm_mr_vertex(side, a);
+    wm_mr_vertex(side + 1, b);
+    for (int i = 0; i < 12; i++) {
+      const double t = (i + 0.5) / 12, x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]);
+      constexpr double kRing = 0.5 * (1 + WM_MR_INNER), kRim = 1 + 0.9 * (1 - kRing);
+      double grey;
+      if (!r.grey(kRing * x, kRing * y, &grey)) return false;
+      black->add(kRing * x, kRing * y, grey);
+      if (!r.grey(kRim * x, kRim * y, &grey)) return false;
+      white->add(kRim * x, kRim * y, grey);
+    }
+  }
+  return white->solve() && black->solve();
+}
+
+// Whether the tip alone has its black module; the places below the two nearest vertices are free of modules.
+bool points_up(const reader &r, const shade &white, const shade &black, double turn_sin, double turn_cos) {
+  for (int k = -1; k <= 1; k++) {
+    const double s = k * turn_sin, c = k == 0 ? 1 : turn_cos, x = -s * WM_MR_TIP_Y, y = c * WM_MR_TIP_Y;
+    double grey;
+    if (!r.module(x, y, &grey)) return false;
+    const bool is_black = grey < 0.5 * (white.at(x, y) + black.at(x, y));
+    if (is_black != (k == 0)) return false;
+  }
+  return true;
+}
+
+// How far each module is on white's side, from -0.5 (black) to 0.5.
+bool read_modules(const reader &r, const shade &white, const shade &black, double level[64]) {
+  for (int i = 0; i < 64; i++) {
+    const int column = i % 8, row = i / 8;
+    const double x = WM_MR_CODE_LEFT + (column + 0.5) * WM_MR_MODULE, y = WM_MR_CODE_TOP + (row + 0.5) * WM_MR_MODULE;
+    double grey;
+    if (!r.module(x, y, &grey)) return false;
+    const double low = black.at(x, y), high = white.at(x, y);
+    if (!(high - low > 1)) return false;
+    level[i] = (grey - 0.5 * (low + high)) / (high - low);
+  }
+  return true;
+}
+
+uint64_t decide(const double level[64], double sharpen) {
+  uint64_t modules = 0;
+  for (int i = 0; i < 64; i++) {
+    const int x = i % 8, y = i / 8;
+    double around = 0;
+    int count = 0;
+    const auto add = [&](bool there, int k) {
+      if (there) around += level[k], count++;
+    };
+    add(x > 0, i - 1);
+    add(x < 7, i + 1);
+    add(y > 0, i - 8);
+    add(y < 7, i + 8);
+    if (level[i] + sharpen * (count * level[i] - around) < 0) modules |= UINT64_C(1) << i;
+  }
+  return modules;
+}
+
+}  // namespace
+
+bool mr_read(const tangent_view &view, const wm_frame &frame, const flat corner[5], uint32_t id_max, int contrast,
+             mr_reading *out) {
+  double outline[5][2];
+  for (int i = 0; i < 5; i++) wm_mr_vertex(i, outline[i]);
+  double turn[2];  // from a vertex to the next
+  wm_mr_vertex(1, turn);
+  const double turn_sin = turn[0] / WM_MR_CIRCUMRADIUS, turn_cos = -turn[1] / WM_MR_CIRCUMRADIUS;
+  for (int tip = 0; tip < 5; tip++) {
+    flat turned[5];
+    for (int i = 0; i < 5; i++) turned[i] = corner[(tip + i) % 5];
+    reader r = {view, frame, {}};
+    if (!homography_init(&r.h, outline, turned, 5)) return false;
+    if (tip == 0) {  // five points say more than a homography has numbers; the same in each direction
+      const flat middle = r.h(0, 0);
+      double off = 0, size = 0;
+      for (int i = 0; i < 5; i++) {
+        off += length(r.h(outline[i][0], outline[i][1]) - turned[i]);
+        size += length(turned[i] - middle);
+      }
+      if (!(off < kShapeMisfit * size)) return false;
+    }
+    shade white, black;
+    if (!measure_shades(r, &white, &black) || white.at(0, 0) - black.at(0, 0) < contrast) return false;
+    if (!points_up(r, white, black, turn_sin, turn_cos)) continue;
+    double level[64];
+    if (!read_modules(r, white, black, level)) return false;
+    constexpr double kTries[2] = {kSharpen, 0.0};
+    for (const double sharpen : kTries) {
+      if (!wm_mr_decode(decide(level, sharpen), &out->id, &out->wrong) || out->id > id_max) continue;
+      out->tip = tip;
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace wm
