@@ -12,6 +12,7 @@ extern "C" {
 extern const wm_detector wm_edges_detector;
 extern const wm_detector wm_lines_detector;
 extern const wm_detector wm_mr_detector;
+extern const wm_detector wm_stereo_detector;
 
 #ifdef __cplusplus
 }

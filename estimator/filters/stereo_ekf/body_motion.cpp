@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kDefaultSigmaV_mps = 0.03, kDefaultSigmaW_radps = 0.01;
 constexpr double kFirstPeriod_s = 0.02;
+constexpr double kSteady_s = 0.3;
 
 double first_of(double set, double calibrated, double otherwise) {
   if (set > 0.0) return set;
@@ -97,18 +98,17 @@ body_stretch body_motion::make(const vec3 &v, const vec3 &w, double dt_s, double
 void body_motion::remember(const body_stretch &s) {
   ring_[ring_next_] = {s.dt_s, s.v_mps, s.w_radps};
   ring_next_ = (ring_next_ + 1) % kPast;
+  const double share = s.dt_s / (s.dt_s + kSteady_s);
+  smooth_.v = smooth_.v + share * (s.v_mps - smooth_.v);
+  smooth_.w = smooth_.w + share * (s.w_radps - smooth_.w);
 }
 
-placed body_motion::moved_since(double age_s, vec3 *v_mps, vec3 *w_radps) const {
+placed body_motion::moved_since(double age_s) const {
   placed since = {{0, 0, 0}, kNoTurn};
-  *v_mps = last_.v;
-  *w_radps = last_.w;
   const auto before = [&](const vec3 &v, const vec3 &w, double dt) {  // this piece came before all that is in `since`
     const quat turn = turn_by(dt * w);
     since.p = dt * (mean_turn(dt * w) * v) + matrix_of(turn) * since.p;
     since.q = turn * since.q;
-    *v_mps = v;
-    *w_radps = w;
   };
   if (age_s < 0.0) before(last_.v, last_.w, age_s);
   for (int k = 0; k < kPast && age_s > 0.0; k++) {

@@ -24,9 +24,15 @@ class body_motion {
   void walk(wm_time_ns from_ns, wm_time_ns to_ns, Visit visit);
 
   // How the body moved from `age_s` ago until now, seen from where it was then, by what was handed out; a negative age
-  // looks ahead with the twist that holds. *twist is that at the end looked for.
-  placed moved_since(double age_s, vec3 *v_mps, vec3 *w_radps) const;
+  // looks ahead with the twist that holds.
+  placed moved_since(double age_s) const;
 
+  // The twist smoothed over a third of a second, as it was at the picture before: what a derivative by time needs. The
+  // newest samples' noise moved the pose that the picture corrects; were it in the derivative, too, the two together
+  // would look like pictures that are late.
+  const vec3 &steady_v_mps() const { return steady_[0].v; }
+  const vec3 &steady_w_radps() const { return steady_[0].w; }
+  void begin_picture() { steady_[0] = steady_[1], steady_[1] = smooth_; }
   const vec3 &v_mps() const { return last_.v; }
   const vec3 &w_radps() const { return last_.w; }
   // The sample that the vehicle does now what it says of, and by how much it differs from the one before it, per
@@ -58,6 +64,10 @@ class body_motion {
   bool has_sample_, has_before_, has_older_;
   sample last_, before_, older_;  // the newest sample and the ones before it
   double period_s_;               // between the last two samples that were no gap
+  struct steady_twist {
+    vec3 v, w;
+  };
+  steady_twist smooth_, steady_[2];  // now; at the picture before the newest, and at the newest
   past ring_[kPast];
   int ring_next_;
 };

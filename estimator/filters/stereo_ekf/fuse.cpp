@@ -48,14 +48,14 @@ stereo_ekf::past_pose stereo_ekf::look_back(double age_s) const {
     out.v_mps = filter_.head3(kVelocity);
     out.w_radps = filter_.head3(kRates);
   } else {
-    out.v_mps = motion_.v_mps();
-    out.w_radps = motion_.w_radps();
+    out.v_mps = motion_.steady_v_mps();
+    out.w_radps = motion_.steady_w_radps();
   }
   out.at = filter_.nominal();
   out.R = filter_.R();
   if (age_s != 0.0) {
     placed since = rates ? placed{age_s * (mean_turn(age_s * out.w_radps) * out.v_mps), turn_by(age_s * out.w_radps)}
-                         : motion_.moved_since(age_s, &out.v_mps, &out.w_radps);
+                         : motion_.moved_since(age_s);
     out.at.q = normalized(out.at.q * conjugate(since.q));
     out.R = matrix_of(out.at.q);
     out.at.p = out.at.p - out.R * since.p;
@@ -113,6 +113,7 @@ row_verdict stereo_ekf::fuse_rows(const row_block &block, const wm_residual *kin
 bool stereo_ekf::fuse_point(const wm_stereo &seen, const vec3 &place, double place_sigma_m, int slot,
                             const wm_innovation &blank, record_list records, row_verdict *verdict) {
   const past_pose past = look_back(filter_.head1(kTimeOffset, 0.0));
+  filter_.set_turn_rate(past.w_radps);
   point_view view = view_point(place, past);
   if (!(view.x.z > kNearest_m)) return false;
   if (slot >= 0) put(&view.by, 0, view.by.add_columns(filter_.point_state(slot), 3), view.A);

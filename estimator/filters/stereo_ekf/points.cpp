@@ -19,7 +19,11 @@ int stereo_ekf::find_slot(int32_t id) const {
   return -1;
 }
 
-void stereo_ekf::begin_picture(wm_time_ns t_ns) { picture_ns_ = t_ns; }
+void stereo_ekf::begin_picture(wm_time_ns t_ns) {
+  if (picture_ns_ == t_ns) return;
+  picture_ns_ = t_ns;
+  motion_.begin_picture();
+}
 
 // Paper, system 3: a point that is out of view goes, one that is expected and not seen is kept unused for some steps.
 // Here one that is out of view is kept for a while, too: the vehicle may come back.

@@ -40,7 +40,8 @@ void space_filter::init(size_t tail, const head_model models[kHeadStates], int p
     if (at_[k] >= 0) state += kHeadWidth[k];
   }
   pose_ = {{0, 0, 0}, kNoTurn};
-  r_ = kIdentity3;
+  r_ = camera_axes_ = kIdentity3;
+  turn_rate_ = {0, 0, 0};
   pending_ = false;
   std::memset(head_, 0, sizeof head_);
   restart_head();
@@ -283,15 +284,18 @@ placed space_filter::pose() const {
   return {pose_.p + mean_turn(turn) * pending(kPlace), normalized(turn_by(turn) * pose_.q)};
 }
 
-// The invariant error stays while the estimate moves; in plain coordinates dp' = dp - D x dr for the pose and each
-// point, D what it was moved by. P' = M P M' with M = 1 + a e', e choosing dr: P + a b' + b a', b = P e + P_rr a / 2.
+// The invariant error stays while the estimate moves; in plain coordinates dp' = dp - D x dc for the pose and each
+// point, D what it was moved by and dc the camera's turn in map axes: the vehicle's and, where those are states, the
+// camera's own against the vehicle and what the vehicle turns in the pictures' time offset. (With the vehicle's alone,
+// points that move would tell how the camera is mounted and when it looks, which pictures alone can't.) P' = M P M'
+// with M = 1 + a e', e choosing dc: P + a b' + b a', b = P e + e'P e a / 2.
 void space_filter::settle() {
   if (!pending_) return;
   pending_ = false;
   double *x = correction();
   const vec3 turn = vec_of(x + kTurn);
   const mat3 spread = mean_turn(turn);
-  double *a = gains(), *b = scratch();
+  double *a = gains(), *column = gains() + (ptrdiff_t)kTurns * stride_, *b = scratch();
   const int width = even(n_);
   std::memset(a, 0, (size_t)kTurns * (size_t)stride_ * sizeof(double));
   const auto moved = [&](int state, const vec3 &by) {
@@ -311,12 +315,34 @@ void space_filter::settle() {
     for (int i = 0; i < 3; i++) points()[3 * slot + i] += by[i];
     moved(state, by);
   }
-  double turn_block[3][3];
-  for (int k = 0; k < kTurns; k++) {
-    copy_column(p(), kTurn + k, b + k * stride_, n_, stride_);
-    if (width > n_) b[k * stride_ + n_] = 0.0;
-    for (int l = 0; l < kTurns; l++) turn_block[k][l] = entry(p(), kTurn + k, kTurn + l, stride_);
+  // e's columns beside dr itself.
+  struct {
+    int state;
+    vec3 by;
+  } others[4];
+  int count = 0;
+  if (at_[kCameraRotation] >= 0) {
+    const mat3 camera = r_ * (camera_axes_ * matrix_of(turn_by(head3(kCameraRotation))));
+    for (int j = 0; j < 3; j++)
+      others[count++] = {at_[kCameraRotation] + j, {camera.m[0][j], camera.m[1][j], camera.m[2][j]}};
   }
+  if (at_[kTimeOffset] >= 0) others[count++] = {at_[kTimeOffset], -1.0 * (r_ * turn_rate_)};
+  for (int k = 0; k < kTurns; k++) {
+    double *turned = b + k * stride_;
+    copy_column(p(), kTurn + k, turned, n_, stride_);
+    if (width > n_) turned[n_] = 0.0;
+    for (int j = 0; j < count; j++) {
+      copy_column(p(), others[j].state, column, n_, stride_);
+      if (width > n_) column[n_] = 0.0;
+      vectors::add_scaled(turned, column, others[j].by[k], width);
+    }
+  }
+  double turn_block[3][3];
+  for (int k = 0; k < kTurns; k++)
+    for (int l = 0; l < kTurns; l++) {
+      turn_block[k][l] = b[k * stride_ + kTurn + l];
+      for (int j = 0; j < count; j++) turn_block[k][l] += others[j].by[l] * b[k * stride_ + others[j].state];
+    }
   for (int k = 0; k < kTurns; k++)
     for (int l = 0; l < kTurns; l++)
       vectors::add_scaled(b + k * stride_, a + l * stride_, 0.5 * turn_block[k][l], width);

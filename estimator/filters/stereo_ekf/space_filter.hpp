@@ -5,6 +5,8 @@
 // right-invariant error (A. Barrau, S. Bonnabel, "An EKF-SLAM algorithm with consistency properties", 2015):
 // e_p = dp + p x dr, e_l = dl + l x dr. That one neither changes when the whole scene is turned and moved nor learns
 // from points where it can't. It is carried in plain coordinates; when the estimate moves by D, dp becomes dp - D x dr.
+// Where the camera's own rotation or its time offset are states, dr in this is the camera's turn: the vehicle's and
+// theirs.
 //
 // Corrections gather (`correction`) while one instant is observed and are applied when time goes on: all rows of one
 // instant are taken about one point, so that a picture is one update however many events it comes in.
@@ -91,6 +93,10 @@ class space_filter {
   static size_t tail_bytes(const head_model models[kHeadStates], int points_max);
   // `tail`: bytes from `this` to the tail_bytes() that belong to this filter; 16-byte aligned.
   void init(size_t tail, const head_model models[kHeadStates], int points_max);
+  // Axes of the camera in the body, as they are without the state of its rotation.
+  void set_camera_axes(const mat3 &R_base_camera) { camera_axes_ = R_base_camera; }
+  // How the vehicle turned when the newest picture was taken, rad/s in body axes.
+  void set_turn_rate(const vec3 &w_radps) { turn_rate_ = w_radps; }
 
   void propagate(const body_stretch &s);
   // Gates row after row, each with the innovation that those before left of it; one beyond the hard gate refuses all.
@@ -151,7 +157,6 @@ class space_filter {
   static constexpr int kRowsBefore = 1 + kRank + 2 * kTurns;
 
   void project(const row_block &block);
-  void move_errors(const vec3 &moved_place);
   void walk(double dt_s);
   void walk_through(int which, int into, double dt_s, const mat3 &mean);
   void forget(int state, int width, double variance);
@@ -162,7 +167,8 @@ class space_filter {
   head_model models_[kHeadStates];
   bool pending_;
   placed pose_;
-  mat3 r_;
+  mat3 r_, camera_axes_;
+  vec3 turn_rate_;
   double head_[kHeadMax];  // by state; the pose's own are not used
 };
 

@@ -82,6 +82,7 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   models_of(params, models);
   const auto before = (size_t)(reinterpret_cast<char *>(&filter_) - reinterpret_cast<char *>(this));
   filter_.init(tail - before, models, params.points_max);
+  if (rig_.there) filter_.set_camera_axes(rig_.R_base_optical);
   // Landmarks by rising id: found by halving. Insertion by binary search; start may take its time.
   int *order = landmark_order();
   for (size_t i = 0; i < setup.landmark_count; i++) {

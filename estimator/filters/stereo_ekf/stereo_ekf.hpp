@@ -36,7 +36,7 @@ class stereo_ekf {
     int32_t id;
     int32_t unseen;  // kOfMap, or pictures in which it was expected and not seen, or did not fit
   };
-  // The pose when an observation was true, and the twist then, in body axes.
+  // The pose when an observation was true, and the twist about then, in body axes.
   struct past_pose {
     placed at;
     mat3 R;

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef WAYMARK_ESTIMATOR_VISION_STEREO_PARAMS_H
+#define WAYMARK_ESTIMATOR_VISION_STEREO_PARAMS_H
+
+#include <stdint.h>
+
+#include "waymark/params.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define STEREO_TRACKS_MAX 240
+
+struct wm_stereo_params {
+  int32_t tracks, cell_px, confirm_seen;
+  double noise_grey, sigma_max_px, fit_min;
+  double disparity_min_px, disparity_max_px, row_px, agree_px;
+};
+
+extern const wm_param_table wm_stereo_params_table;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vision/stereo/patch.hpp"
+
+#include <initializer_list>
+
+namespace wm {
+namespace {
+
+constexpr int kMiddle = 1020;  // of 0 to 2040
+constexpr int kSourceSide = kPatch + 2;
+constexpr double kFlat = 1e-4;  // of the largest sum: below it a direction has no contrast
+
+// In sixteenths of a pixel: columns and rows right of and below of the point that is asked for.
+struct place16 {
+  int32_t column, row, right, down;
+};
+
+place16 place_of(const pixel &at) {
+  const auto u = static_cast<int32_t>(std::floor(at.u * 16 + 0.5)),
+             v = static_cast<int32_t>(std::floor(at.v * 16 + 0.5));
+  return {u >> 4, v >> 4, u & 15, v & 15};
+}
+
+bool is_near(const pixel &at) { return at.u > -1e6 && at.u < 1e6 && at.v > -1e6 && at.v < 1e6; }
+
+// The patch about a place, between pixels by halves of halves of halves of halves. False where it leaves the picture.
+bool sample(const grey_plane &picture, const place16 &at, int16_t *out) {
+  const int32_t left = at.column - kPatchHalf, top = at.row - kPatchHalf;
+  if (left < 0 || top < 0 || left + kPatch >= picture.width || top + kPatch >= picture.height) return false;
+  const auto fx = static_cast<uint16_t>(at.right), fy = static_cast<uint16_t>(at.down);
+  const auto cx = static_cast<uint16_t>(16 - fx), cy = static_cast<uint16_t>(16 - fy);
+  uint16_t rows[2][kPatch];
+  for (int i = 0; i <= kPatch; i++) {
+    const uint8_t *from = picture.grey + static_cast<size_t>(top + i) * static_cast<size_t>(picture.width) + left;
+    uint16_t *now = rows[i & 1];
+    for (int j = 0; j < kPatch; j++) now[j] = static_cast<uint16_t>(from[j] * cx + from[j + 1] * fx);
+    if (i == 0) continue;
+    const uint16_t *before = rows[(i - 1) & 1];
+    int16_t *to = out + (i - 1) * kPatch;
+    for (int j = 0; j < kPatch; j++) {
+      const auto sum = static_cast<uint16_t>(before[j] * cy + now[j] * fy);  // at most 255 * 256
+      to[j] = static_cast<int16_t>((sum >> 5) - kMiddle);
+    }
+  }
+  return true;
+}
+
+int32_t sum_of(const int16_t *a) {
+  int32_t sum = 0;
+  for (int i = 0; i < kPatchPixels; i++) sum += a[i];
+  return sum;
+}
+
+int32_t sum_of(const int16_t *a, const int16_t *b) {
+  int32_t sum = 0;
+  for (int i = 0; i < kPatchPixels; i++) sum += a[i] * b[i];
+  return sum;
+}
+
+// Inverse of a symmetric positive matrix by Cholesky's factors; false where a direction is all but empty.
+template <int n>
+bool invert(const double a[n][n], double out[n][n]) {
+  double l[n][n] = {}, inverse[n][n] = {};
+  for (int j = 0; j < n; j++)
+    for (int i = j; i < n; i++) {
+      double sum = a[i][j];
+      for (int k = 0; k < j; k++) sum -= l[i][k] * l[j][k];
+      if (i == j) {
+        if (!(sum > kFlat * a[j][j])) return false;
+        l[j][j] = std::sqrt(sum);
+      } else {
+        l[i][j] = sum / l[j][j];
+      }
+    }
+  for (int j = 0; j < n; j++)
+    for (int i = j; i < n; i++) {
+      double sum = i == j ? 1.0 : 0.0;
+      for (int k = j; k < i; k++) sum -= l[i][k] * inverse[k][j];
+      inverse[i][j] = sum / l[i][i];
+    }
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j < n; j++) {
+      out[i][j] = 0.0;
+      for (int k = i > j ? i : j; k < n; k++) out[i][j] += inverse[k][i] * inverse[k][j];
+    }
+  return true;
+}
+
+// What a picture's patch has in common with the template.
+struct likeness {
+  double gain, step_u, step_v;  // the template's contrast there; from the patch's place to the template's
+  double fit, left;             // share of the variance explained, and the rest, squared eighths of a grey level
+};
+
+bool compare(const patch_template &what, const int16_t *patch, likeness *out) {
+  constexpr double n = kPatchPixels;
+  const double mean = sum_of(patch) / n;
+  const double variance = sum_of(patch, patch) - n * mean * mean;
+  const double right[3] = {sum_of(what.grey, patch) - n * what.mean[0] * mean,
+                           sum_of(what.across, patch) - n * what.mean[1] * mean,
+                           sum_of(what.down, patch) - n * what.mean[2] * mean};
+  double x[3];
+  for (int i = 0; i < 3; i++)
+    x[i] = what.inverse[i][0] * right[0] + what.inverse[i][1] * right[1] + what.inverse[i][2] * right[2];
+  if (!(x[0] > 0.1) || !(x[0] < 10.0) || !(variance > 0.0)) return false;
+  const double explained = x[0] * right[0] + x[1] * right[1] + x[2] * right[2];
+  *out = {x[0], -x[1] / x[0], -x[2] / x[0], explained / variance, variance - explained};
+  return true;
+}
+
+}  // namespace
+
+bool make_template(const grey_plane &picture, const pixel &at, const warp2 &warp, patch_template *out) {
+  constexpr double kOne = 65536.0;
+  constexpr int kHalf = kSourceSide / 2;
+  if (!is_near(at)) return false;
+  for (const double w : {warp.uu, warp.uv, warp.vu, warp.vv})
+    if (!(w > -4.0 && w < 4.0)) return false;
+  const auto fixed = [](double x) { return static_cast<int32_t>(std::floor(x * kOne + 0.5)); };
+  // Grey levels of the patch and a border of one pixel, in eighths.
+  int16_t source[kSourceSide][kSourceSide];
+  const int32_t uu = fixed(warp.uu), uv = fixed(warp.uv), vu = fixed(warp.vu), vv = fixed(warp.vv);
+  const auto whole_u = static_cast<int32_t>(std::floor(at.u)), whole_v = static_cast<int32_t>(std::floor(at.v));
+  const int32_t u0 = fixed(at.u - whole_u), v0 = fixed(at.v - whole_v);
+  for (const int i : {-kHalf, kHalf - 1})
+    for (const int j : {-kHalf, kHalf - 1}) {
+      const int32_t u = whole_u + ((u0 + uu * j + uv * i) >> 16), v = whole_v + ((v0 + vu * j + vv * i) >> 16);
+      if (u < 0 || v < 0 || u + 1 >= picture.width || v + 1 >= picture.height) return false;
+    }
+  for (int i = 0; i < kSourceSide; i++)
+    for (int j = 0; j < kSourceSide; j++) {
+      const int32_t u = u0 + uu * (j - kHalf) + uv * (i - kHalf), v = v0 + vu * (j - kHalf) + vv * (i - kHalf);
+      const uint8_t *from = picture.grey +
+                            static_cast<ptrdiff_t>(whole_v + (v >> 16)) * static_cast<ptrdiff_t>(picture.width) +
+                            whole_u + (u >> 16);
+      const int32_t fx = (u >> 8) & 255, fy = (v >> 8) & 255;
+      const int32_t above = from[0] * (256 - fx) + from[1] * fx;
+      const int32_t below = from[picture.width] * (256 - fx) + from[picture.width + 1] * fx;
+      source[i][j] = static_cast<int16_t>(((above * (256 - fy) + below * fy) >> 13) - kMiddle);
+    }
+  for (int i = 0; i < kPatch; i++)
+    for (int j = 0; j < kPatch; j++) {
+      const int at_pixel = i * kPatch + j;
+      out->grey[at_pixel] = source[i + 1][j + 1];
+      out->across[at_pixel] = static_cast<int16_t>((source[i + 1][j + 2] - source[i + 1][j]) / 2);
+      out->down[at_pixel] = static_cast<int16_t>((source[i + 2][j + 1] - source[i][j + 1]) / 2);
+    }
+  constexpr double n = kPatchPixels;
+  const int16_t *parts[3] = {out->grey, out->across, out->down};
+  double sums[3][3];
+  for (int i = 0; i < 3; i++) out->mean[i] = sum_of(parts[i]) / n;
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++)
+      sums[i][j] = j < i ? sums[j][i] : sum_of(parts[i], parts[j]) - n * out->mean[i] * out->mean[j];
+  return sums[0][0] > n && sums[1][1] > n && sums[2][2] > n && invert<3>(sums, out->inverse);
+}
+
+bool align(const patch_template &what, const grey_plane &picture, const pixel &start, double reach_px, int rounds,
+           alignment *out) {
+  alignas(16) int16_t patch[kPatchPixels];
+  if (!is_near(start)) return false;
+  pixel at = start;
+  place16 place = place_of(at);
+  likeness like;
+  for (int round = 0;; round++) {
+    if (!sample(picture, place, patch) || !compare(what, patch, &like)) return false;
+    // A step goes no farther than what the slopes know of.
+    const double size = std::sqrt(like.step_u * like.step_u + like.step_v * like.step_v);
+    const double scale = size > 2.0 ? 2.0 / size : 1.0;
+    at = {place.column + place.right / 16.0 + scale * like.step_u, place.row + place.down / 16.0 + scale * like.step_v};
+    if (!(std::fabs(at.u - start.u) <= reach_px) || !(std::fabs(at.v - start.v) <= reach_px)) return false;
+    const place16 next = place_of(at);
+    const bool stays =
+        next.column == place.column && next.row == place.row && next.right == place.right && next.down == place.down;
+    if (stays || round + 1 >= rounds) break;
+    place = next;
+  }
+  if (!(std::fabs(like.step_u) < 0.5) || !(std::fabs(like.step_v) < 0.5)) return false;  // it doesn't settle
+  const double left = like.left > 0.0 ? like.left : 0.0;
+  const double worse = what.inverse[1][1] > what.inverse[2][2] ? what.inverse[1][1] : what.inverse[2][2];
+  *out = {at, like.fit, std::sqrt(left / (kPatchPixels - 4) * worse) / like.gain};
+  return true;
+}
+
+bool fit_slopes(const patch_template &what, const grey_plane &picture, const pixel &at, double slope[2]) {
+  constexpr int kColumns = 5;
+  constexpr double n = kPatchPixels;
+  int16_t patch[kPatchPixels];
+  if (!is_near(at) || !sample(picture, place_of(at), patch)) return false;
+  double sums[kColumns][kColumns] = {}, right[kColumns] = {}, mean[kColumns] = {}, mean_patch = 0;
+  for (int i = 0; i < kPatch; i++)
+    for (int j = 0; j < kPatch; j++) {
+      const int k = i * kPatch + j;
+      const double u = j - kPatchHalf, v = i - kPatchHalf, across = what.across[k];
+      const double column[kColumns] = {static_cast<double>(what.grey[k]), across, static_cast<double>(what.down[k]),
+                                       across * u, across * v};
+      for (int a = 0; a < kColumns; a++) {
+        mean[a] += column[a] / n;
+        right[a] += column[a] * patch[k];
+        for (int b = 0; b <= a; b++) sums[a][b] += column[a] * column[b];
+      }
+      mean_patch += patch[k] / n;
+    }
+  for (int a = 0; a < kColumns; a++) {
+    right[a] -= n * mean[a] * mean_patch;
+    for (int b = 0; b <= a; b++) sums[a][b] = sums[b][a] = sums[a][b] - n * mean[a] * mean[b];
+  }
+  double inverse[kColumns][kColumns], x[kColumns] = {};
+  if (!invert<kColumns>(sums, inverse)) return false;
+  for (int a = 0; a < kColumns; a++)
+    for (int b = 0; b < kColumns; b++) x[a] += inverse[a][b] * right[b];
+  if (!(x[0] > 0.1)) return false;
+  slope[0] = -x[3] / x[0];
+  slope[1] = -x[4] / x[0];
+  return true;
+}
+
+bool search_row(const patch_template &what, const grey_plane &picture, int32_t first, int32_t last, int32_t v,
+                int32_t *u, double *best, double *second) {
+  constexpr double n = kPatchPixels;
+  constexpr int kApart = 2;
+  constexpr int32_t kPlacesMax = 1024;
+  float score[kPlacesMax];
+  alignas(16) int16_t patch[kPatchPixels];
+  const double own = sum_of(what.grey, what.grey) - n * what.mean[0] * what.mean[0];
+  if (last - first >= kPlacesMax) first = last - kPlacesMax + 1;
+  int32_t at = -1;
+  for (int32_t i = 0; i <= last - first; i++) {
+    score[i] = -1.0F;
+    if (!sample(picture, {first + i, v, 0, 0}, patch)) continue;
+    const double mean = sum_of(patch) / n;
+    const double variance = sum_of(patch, patch) - n * mean * mean;
+    const double together = sum_of(what.grey, patch) - n * what.mean[0] * mean;
+    if (variance > n && together > 0.0) score[i] = static_cast<float>(together * together / (variance * own));
+    if (at < 0 || score[i] > score[at]) at = i;
+  }
+  if (at < 0 || !(score[at] > 0.0F)) return false;
+  *u = first + at;
+  *best = static_cast<double>(score[at]);
+  *second = 0.0;
+  for (int32_t i = 0; i <= last - first; i++)
+    if ((i < at - kApart || i > at + kApart) && static_cast<double>(score[i]) > *second)
+      *second = static_cast<double>(score[i]);
+  return true;
+}
+
+}  // namespace wm

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// A picture in several sizes, each half of the one before: pixel (x, y) of a level is at (2x, 2y) of the one below.
+#ifndef WAYMARK_ESTIMATOR_VISION_PYRAMID_HPP
+#define WAYMARK_ESTIMATOR_VISION_PYRAMID_HPP
+
+#include <cstddef>
+#include <cstdint>
+
+namespace wm {
+
+inline constexpr int kLevels = 4;
+
+// Grey pixels, row after row.
+struct grey_plane {
+  uint8_t *grey;
+  int32_t width, height;
+};
+
+struct pyramid {
+  grey_plane level[kLevels];
+};
+
+// Bytes of all levels; a multiple of 64.
+size_t pyramid_bytes(int32_t width, int32_t height);
+// Lays the levels into `memory`, which is pyramid_bytes long.
+void pyramid_lay(pyramid *out, int32_t width, int32_t height, uint8_t *memory);
+// Makes all levels above the first, smoothed by 1-2-1. `row` has room for 16 bits a pixel of a row. Integers.
+void pyramid_build(pyramid *self, uint16_t *row);
+
+}  // namespace wm
+
+#endif

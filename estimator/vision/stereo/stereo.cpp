@@ -1,0 +1,272 @@
+// SPDX-License-Identifier: Apache-2.0
+// Detector `stereo`: points of the world that both cameras of a pair see, followed from picture to picture.
+#include <cstring>
+
+#include "vision/registry.h"
+#include "vision/stereo/corners.hpp"
+#include "vision/stereo/rectify.hpp"
+#include "vision/stereo/track.hpp"
+
+namespace wm {
+
+namespace {
+
+constexpr int32_t kFirstId = 1 << 30;  // maps' landmarks have smaller numbers
+constexpr double kMemory_s = 1.0;      // after a longer gap nothing is where it was
+constexpr int32_t kMargin_px = 12;     // of the full picture
+constexpr int kLevelsKnown = 1, kLevelsUnknown = kLevels - 1;
+
+struct stereo_state {
+  wm_stereo_params params;
+  pair_geometry pair;
+  rectification cameras[2];
+  pyramid pictures[3];  // left, right, the left one before
+  uint16_t *row;
+  void *corner_work;
+  uint8_t *taken;
+  corner *corners;
+  track *tracks;
+  int32_t cell, cell_count;  // of the picture of half the size
+
+  int32_t track_count, next_id;
+  wm_time_ns before_ns;  // WM_TIME_NONE: nothing was seen before
+  bool knows_motion;
+  vec3 turn_radps, move_mps;  // of the newest step: camera before to camera now
+  rigid world_camera;
+  uint64_t number;
+  bool was_said[STEREO_TRACKS_MAX];
+};
+
+constexpr size_t kAlign = 64;
+size_t rounded(size_t bytes) { return (bytes + kAlign - 1) / kAlign * kAlign; }
+
+const char *cameras_of(const wm_view *view, rectification out[2]) {
+  if (!view->rig) return "there is no calibration";
+  for (int i = 0; i < 2; i++)
+    if (view->cameras[i] < 0 || view->cameras[i] >= static_cast<int32_t>(view->rig->camera_count))
+      return "there is no such camera";
+  const wm_camera &left = view->rig->cameras[view->cameras[0]], &right = view->rig->cameras[view->cameras[1]];
+  const wm_stereo_pair &pair = view->rig->stereo;
+  for (int i = 0; i < 2; i++) {
+    const char *why = rectification_init(&out[i], i == 0 ? left : right, left, pair.rectified_px);
+    if (why) return why;
+  }
+  if (out[0].width < 64 || out[0].height < 64) return "the pictures are smaller than 64 pixels";
+  if (!(pair.baseline_m > 0.0) || !finite(pair.baseline_m)) return "calibration.yaml: stereo needs baseline_m";
+  const vec3 beside = transposed_times(out[0].R_base_rectified, out[1].camera.centre_m - out[0].camera.centre_m);
+  const vec3 off = beside - vec3{pair.baseline_m, 0, 0};
+  if (!(length(off) < 0.1 * pair.baseline_m))
+    return "the right camera isn't baseline_m to the right of the left one, by their mountings: are they swapped?";
+  return nullptr;
+}
+
+// Puts the state's parts one behind the other; returns the bytes of all.
+size_t lay_out(stereo_state *state, const rectification cameras[2], const wm_stereo_params &params) {
+  const int32_t width = cameras[0].width, height = cameras[0].height, cell = params.cell_px / 2;
+  const int32_t cells = cells_across(width / 2, cell) * cells_across(height / 2, cell);
+  const size_t area = static_cast<size_t>(width) * static_cast<size_t>(height);
+  size_t used = rounded(sizeof *state);
+  auto *base = reinterpret_cast<uint8_t *>(state);
+  const auto take = [&](size_t bytes) {
+    const size_t at = used;
+    used += rounded(bytes);
+    return at;
+  };
+  size_t at_picture[3], at_table[2];
+  for (size_t &at : at_picture) at = take(pyramid_bytes(width, height));
+  for (int i = 0; i < 2; i++) at_table[i] = take(cameras[i].as_it_is ? 0 : area * sizeof(raw_pixel));
+  const size_t at_row = take(static_cast<size_t>(width) * sizeof(uint16_t)), at_work = take(corners_bytes(width / 2)),
+               at_taken = take(static_cast<size_t>(cells)),
+               at_corners = take(static_cast<size_t>(cells) * sizeof(corner)),
+               at_tracks = take(static_cast<size_t>(params.tracks) * sizeof(track));
+  if (base) {
+    for (int i = 0; i < 3; i++) pyramid_lay(&state->pictures[i], width, height, base + at_picture[i]);
+    for (int i = 0; i < 2; i++) {
+      state->cameras[i] = cameras[i];
+      state->cameras[i].table = reinterpret_cast<raw_pixel *>(base + at_table[i]);
+    }
+    state->row = reinterpret_cast<uint16_t *>(base + at_row);
+    state->corner_work = base + at_work;
+    state->taken = base + at_taken;
+    state->corners = reinterpret_cast<corner *>(base + at_corners);
+    state->tracks = reinterpret_cast<track *>(base + at_tracks);
+    state->cell = cell;
+    state->cell_count = cells;
+  }
+  return used;
+}
+
+size_t state_bytes(const void *params, const wm_view *view, const char **why) {
+  rectification cameras[2];
+  *why = cameras_of(view, cameras);
+  return *why ? 0 : lay_out(nullptr, cameras, *static_cast<const wm_stereo_params *>(params));
+}
+
+wm_status init(void *memory, const void *params, const wm_view *view) {
+  rectification cameras[2];
+  if (cameras_of(view, cameras)) return WM_BAD_CONFIG;
+  auto *state = static_cast<stereo_state *>(memory);
+  const auto &wanted = *static_cast<const wm_stereo_params *>(params);
+  std::memset(memory, 0, lay_out(nullptr, cameras, wanted));
+  lay_out(state, cameras, wanted);
+  state->params = wanted;
+  const double *px = view->rig->stereo.rectified_px;
+  state->pair = {px[0], px[1], px[2], px[3], view->rig->stereo.baseline_m};
+  for (rectification &camera : state->cameras) rectification_table(&camera);
+  state->before_ns = WM_TIME_NONE;
+  state->next_id = kFirstId;
+  state->world_camera = kNoMotion;
+  return WM_OK;
+}
+
+// Both pictures, and the left one before, as rectified pyramids. False where they are the very same as before: a camera
+// that is stuck.
+bool take_pictures(stereo_state *self, const wm_frame *frames) {
+  const pyramid before = self->pictures[2];
+  self->pictures[2] = self->pictures[0];
+  self->pictures[0] = before;
+  for (int i = 0; i < 2; i++) {
+    rectify(self->cameras[i], frames[i], self->pictures[i].level[0]);
+    pyramid_build(&self->pictures[i], self->row);
+  }
+  const grey_plane &now = self->pictures[0].level[0], &then = self->pictures[2].level[0];
+  return std::memcmp(now.grey, then.grey, static_cast<size_t>(now.width) * static_cast<size_t>(now.height)) != 0;
+}
+
+void forget(stereo_state *self) {
+  self->track_count = 0;
+  self->knows_motion = false;
+}
+
+bool are_seen(const stereo_state &self, const track &one) {
+  return sees(self.cameras[0], one.left, kMargin_px) && sees(self.cameras[1], one.right, kMargin_px);
+}
+
+// Follows all tracks into the newest pictures and leaves out what is gone or moves otherwise than most of them.
+void follow(stereo_state *self, double dt_s) {
+  rigid expected = kNoMotion;
+  if (self->knows_motion) expected = {matrix_of(turn_by(dt_s * self->turn_radps)), dt_s * self->move_mps};
+  const pair_pictures pictures = {&self->pictures[2], &self->pictures[0], &self->pictures[1]};
+  const rigid camera_world = expected * inverse(self->world_camera);
+  const int levels = self->knows_motion ? kLevelsKnown : kLevelsUnknown;
+  seen_twice points[STEREO_TRACKS_MAX];
+  int32_t kept = 0;
+  for (int32_t i = 0; i < self->track_count; i++) {
+    track &one = self->tracks[i];
+    const vec3 before = one.place;
+    if (!follow_track(self->pair, pictures, self->params, expected, camera_world, levels, &one)) continue;
+    if (!are_seen(*self, one)) continue;
+    points[kept] = {before, {one.left.u, one.left.v, one.right.u}};
+    if (kept != i) self->tracks[kept] = one;
+    kept++;
+  }
+  self->track_count = kept;
+  uint8_t agrees[STEREO_TRACKS_MAX];
+  rigid moved;
+  if (!find_motion(self->pair, points, kept, self->knows_motion ? &expected : nullptr, self->params.agree_px,
+                   self->number, &moved, agrees)) {
+    forget(self);
+    return;
+  }
+  self->track_count = 0;
+  for (int32_t i = 0; i < kept; i++)
+
+    if (agrees[i]) {
+      if (self->track_count != i) self->tracks[self->track_count] = self->tracks[i];
+      self->track_count++;
+    }
+  self->world_camera = self->world_camera * inverse(moved);
+  self->turn_radps = (1.0 / dt_s) * turn_of(quat_of(moved.R));
+  self->move_mps = (1.0 / dt_s) * moved.t;
+  self->knows_motion = true;
+}
+
+bool is_crowded(const stereo_state &self, const pixel &at) {
+  const double apart = 0.6 * self.params.cell_px;
+  for (int32_t i = 0; i < self.track_count; i++)
+    if (std::fabs(self.tracks[i].left.u - at.u) < apart && std::fabs(self.tracks[i].left.v - at.v) < apart) return true;
+  return false;
+}
+
+// New tracks where there are none, the best corners first.
+void begin(stereo_state *self) {
+  const int32_t wanted = self->params.tracks;
+  if (self->track_count == wanted) return;
+  const grey_plane &half = self->pictures[0].level[1];
+  const int32_t columns = cells_across(half.width, self->cell);
+  std::memset(self->taken, 0, static_cast<size_t>(self->cell_count));
+  for (int32_t i = 0; i < self->track_count; i++) {
+    const pixel &at = self->tracks[i].left;
+    const auto column = static_cast<int32_t>(at.u / 2) / self->cell, row = static_cast<int32_t>(at.v / 2) / self->cell;
+    const int32_t cell = row * columns + column;
+    if (cell >= 0 && cell < self->cell_count) self->taken[cell] = 1;
+  }
+  find_corners(half, self->cell, kMargin_px / 2, self->taken, self->corner_work, self->corners);
+  const pair_pictures pictures = {&self->pictures[2], &self->pictures[0], &self->pictures[1]};
+  const double weakest = square(self->params.noise_grey / self->params.sigma_max_px);
+  while (self->track_count < wanted) {
+    corner *best = nullptr;
+    for (int32_t i = 0; i < self->cell_count; i++)
+      if (self->corners[i].strength > (best ? best->strength : 0.0F)) best = &self->corners[i];
+    if (!best || static_cast<double>(best->strength) < weakest) return;
+    best->strength = 0.0F;
+    const pixel at = {2.0 * best->u, 2.0 * best->v};
+    track &one = self->tracks[self->track_count];
+    if (is_crowded(*self, at)) continue;
+    if (!begin_track(self->pair, pictures, self->params, at, self->world_camera, &one) || !are_seen(*self, one))
+      continue;
+    one.id = self->next_id;
+    self->next_id = self->next_id == INT32_MAX ? kFirstId : self->next_id + 1;
+    self->track_count++;
+  }
+}
+
+size_t tell(const stereo_state &self, wm_time_ns t_ns, wm_event *out, size_t capacity) {
+  size_t count = 0;
+  for (int32_t i = 0; i < self.track_count && count < capacity; i++) {
+    const track &one = self.tracks[i];
+    if (one.seen < self.params.confirm_seen) continue;
+    wm_event &event = out[count++];
+    std::memset(static_cast<void *>(&event), 0, WM_EVENT_SMALL_BYTES);
+    event.t_ns = t_ns;
+    event.kind = WM_EVENT_STEREO;
+    event.as.stereo = {one.id, {one.left.u, one.left.v}, {one.right.u, one.right.v}};
+  }
+  return count;
+}
+
+wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_event *out, size_t capacity,
+                 size_t *count) {
+  auto *self = static_cast<stereo_state *>(memory);
+  *count = 0;
+  for (int i = 0; i < 2; i++)
+    if (frames[i].width_px != self->cameras[i].camera.width_px ||
+        frames[i].height_px != self->cameras[i].camera.height_px)
+      return WM_BAD_DATA;
+  const wm_time_ns t_ns = frames[0].t_ns;
+  const double dt_s = self->before_ns == WM_TIME_NONE ? -1.0 : wm_seconds_between(self->before_ns, t_ns);
+  self->number++;
+  const bool is_new = take_pictures(self, frames);
+  if (!(dt_s > 0.0) || dt_s > kMemory_s) forget(self);
+  if (!is_new && dt_s > 0.0) return WM_OK;
+  self->before_ns = t_ns;
+  if (self->track_count > 0) follow(self, dt_s);
+  begin(self);
+  *count = tell(*self, t_ns, out, capacity);
+  return WM_OK;
+}
+
+}  // namespace
+
+}  // namespace wm
+
+extern "C" const wm_detector wm_stereo_detector = {
+    "stereo",
+    "Points of the world that both cameras of a pair see, followed from picture to picture: for stereo_ekf",
+    WM_EVENT_BIT(WM_EVENT_STEREO),
+    2,
+    wm_stereo_params_table,
+    wm::state_bytes,
+    wm::init,
+    wm::detect,
+};
