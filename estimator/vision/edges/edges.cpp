@@ -19,8 +19,14 @@ struct edges_state {
   mounted_camera camera;
   ray_fan fan;
   ray_work work;
-  bird_view bird;  // where lines are found by windows
+  // Where lines are found by windows.
+  bird_view bird;
+  piece_graph graph;
+  line_piece *pieces;
+  line_vertex *vertices;
 };
+
+constexpr int32_t kPiecesMax = 512;  // lines of windows that are joined; those of more windows are not looked for
 
 constexpr size_t kAlign = 64;
 size_t rounded(size_t bytes) { return (bytes + kAlign - 1) / kAlign * kAlign; }
@@ -50,6 +56,10 @@ size_t lay_out(edges_state *state, uint32_t rays, uint32_t samples, const bird_v
   const size_t at_table = take(area * sizeof(bird_pixel)), at_grey = take(area), at_edge = take(area),
                at_inner = take(area), at_whole = take(static_cast<size_t>(bird.windows)),
                at_hough = take(sizeof(hough_work));
+  const int32_t pieces = bird.windows < kPiecesMax ? bird.windows : kPiecesMax;
+  const size_t at_graph = take(piece_graph_bytes(pieces)),
+               at_pieces = take(static_cast<size_t>(pieces) * sizeof(line_piece)),
+               at_vertices = take(2 * static_cast<size_t>(pieces) * sizeof(line_vertex));
   if (base) {
     state->bird = bird;
     state->bird.table = reinterpret_cast<bird_pixel *>(base + at_table);
@@ -58,6 +68,9 @@ size_t lay_out(edges_state *state, uint32_t rays, uint32_t samples, const bird_v
     state->bird.inner = base + at_inner;
     state->bird.whole = base + at_whole;
     state->bird.hough = reinterpret_cast<hough_work *>(base + at_hough);
+    piece_graph_place(&state->graph, pieces, base + at_graph);
+    state->pieces = reinterpret_cast<line_piece *>(base + at_pieces);
+    state->vertices = reinterpret_cast<line_vertex *>(base + at_vertices);
     state->fan.rays = reinterpret_cast<ray *>(base + at_rays);
     state->fan.samples = reinterpret_cast<ray_sample *>(base + at_samples);
     state->fan.range_m = reinterpret_cast<float *>(base + at_ranges);
@@ -188,37 +201,40 @@ void points_of_rays(edges_state *state, const wm_frame &frame, wm_points *points
   keep_supported(points, rays, state->camera.centre_m.x, state->camera.centre_m.y, state->params.rays_support_min);
 }
 
-// Points along each line, with the side that is bright.
-void points_of_windows(const edges_state &state, const wm_frame &frame, wm_points *points) {
-  constexpr int kPieces = 512;
-  line_piece pieces[kPieces];
+// Points along a link of a polyline, with the side that is bright.
+void points_of_link(const edges_state &state, const line_vertex &from, const line_vertex &to, wm_points *points) {
   const bird_view &bird = state.bird;
-  const int count = find_pieces(bird, frame, state.params, pieces, kPieces);
-  for (int i = 0; i < count; i++) {
-    const line_piece &p = pieces[i];
-    const double dx = static_cast<double>(p.x1 - p.x0), dy = static_cast<double>(p.y1 - p.y0);
-    const double size = std::sqrt(dx * dx + dy * dy);
-    const int steps = 1 + static_cast<int>(size / (state.params.windows_spacing_m * bird.px_per_m));
-    const double normal = size > 0 ? atan2(dx, -dy) : 0;
-    const sin_cos n = sincos(normal);
-    for (int k = 0; k < steps; k++) {
-      const double x = static_cast<double>(p.x0) + (k + 0.5) / steps * dx,
-                   y = static_cast<double>(p.y0) + (k + 0.5) / steps * dy;
-      const auto grey_at = [&](double off) {
-        const int u = static_cast<int>(x + off * n.cos + 0.5), v = static_cast<int>(y + off * n.sin + 0.5);
-        if (u < 0 || v < 0 || u >= bird.width || v >= bird.height) return 0;
-        return static_cast<int>(bird.grey[v * bird.width + u]);
-      };
-      if (points->count == WM_POINTS_MAX) {
-        points->dropped++;
-        continue;
-      }
-      const uint32_t to = points->count++;
-      points->x_m[to] = static_cast<float>(bird.x_min_m + x / bird.px_per_m);
-      points->y_m[to] = static_cast<float>(bird.y_min_m + y / bird.px_per_m);
-      points->normal_rad[to] = static_cast<float>(grey_at(-2) >= grey_at(2) ? wrap(normal) : wrap(normal + kPi));
-      points->sigma_m[to] = static_cast<float>(state.params.windows_sigma_m);
+  const double dx = static_cast<double>(to.x - from.x), dy = static_cast<double>(to.y - from.y);
+  const double size = std::sqrt(dx * dx + dy * dy);
+  const int steps = 1 + static_cast<int>(size / (state.params.windows_spacing_m * bird.px_per_m));
+  const double normal = size > 0 ? atan2(dx, -dy) : 0;
+  const sin_cos n = sincos(normal);
+  for (int k = 0; k < steps; k++) {
+    const double x = static_cast<double>(from.x) + (k + 0.5) / steps * dx,
+                 y = static_cast<double>(from.y) + (k + 0.5) / steps * dy;
+    const auto grey_at = [&](double off) {
+      const int u = static_cast<int>(x + off * n.cos + 0.5), v = static_cast<int>(y + off * n.sin + 0.5);
+      if (u < 0 || v < 0 || u >= bird.width || v >= bird.height) return 0;
+      return static_cast<int>(bird.grey[v * bird.width + u]);
+    };
+    if (points->count == WM_POINTS_MAX) {
+      points->dropped++;
+      continue;
     }
+    const uint32_t i = points->count++;
+    points->x_m[i] = static_cast<float>(bird.x_min_m + x / bird.px_per_m);
+    points->y_m[i] = static_cast<float>(bird.y_min_m + y / bird.px_per_m);
+    points->normal_rad[i] = static_cast<float>(grey_at(-2) >= grey_at(2) ? wrap(normal) : wrap(normal + kPi));
+    points->sigma_m[i] = static_cast<float>(state.params.windows_sigma_m);
+  }
+}
+
+void points_of_windows(edges_state *state, const wm_frame &frame, wm_points *points) {
+  const int pieces = find_pieces(state->bird, frame, state->params, state->pieces, state->graph.capacity);
+  const int vertices = make_polylines(state->pieces, pieces, state->params, &state->graph, state->vertices);
+  for (int i = 1; i < vertices; i++) {
+    const line_vertex &from = state->vertices[i - 1], &to = state->vertices[i];
+    if (from.line == to.line) points_of_link(*state, from, to, points);
   }
 }
 
@@ -234,7 +250,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
   points->count = points->dropped = 0;
   points->camera = state->camera_index;
   if (state->params.mode == EDGES_BY_WINDOWS) {
-    points_of_windows(*state, frame, points);
+    points_of_windows(state, frame, points);
   } else {
     points_of_rays(state, frame, points);
   }

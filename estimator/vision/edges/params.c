@@ -49,6 +49,17 @@ static const wm_param kParams[] = {
      "px that neighbouring windows share; the paper's."},
     F64("windows.variance_min", windows_variance_min, 5000, 0, 1e9,
         "A window has a line where the sums of its most varied slope vary by more than this; the paper's."),
+    F64("windows.join_px", windows_join_px, 10, 0, 1000,
+        "px between the nearest ends of two lines, from which on they don't continue each other; the paper's."),
+    F64("windows.join_angle_rad", windows_join_angle_rad, 2.792526803190927, 0, 3.1416,
+        "rad. Nor do they if the angle between them, which is pi where they are one line, is smaller than this; the "
+        "paper's 160 degrees."),
+    F64("windows.straight_px", windows_straight_px, 3, 0, 1000,
+        "px from the line through the two ends farthest from each other at which an end of a line is still on it; the "
+        "paper's."),
+    F64("windows.straight_share", windows_straight_share, 0.3333333333333333, 0, 1,
+        "Connected lines of which more than this share of ends are on that line are replaced by it; the paper's third. "
+        "Others become a polyline along the longest of the shortest ways through them."),
     F64("windows.spacing_m", windows_spacing_m, 0.1, 0.01, 5, "m between two points of a line."),
     F64("windows.sigma_m", windows_sigma_m, 0.03, 1e-4, 5, "m. Error of a line's points across it."),
     F64("sigma_px", sigma_px, 0.3, 0.01, 10, "px. Error of an edge's place across the edge where contrast is good."),

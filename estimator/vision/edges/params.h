@@ -18,7 +18,8 @@ struct wm_edges_params {
   int32_t rays_support_min;
   double bird_px_per_m, bird_x_min_m, bird_x_max_m, bird_side_m;
   int32_t windows_px, windows_overlap_px;
-  double windows_variance_min, windows_spacing_m, windows_sigma_m;
+  double windows_variance_min, windows_join_px, windows_join_angle_rad, windows_straight_px, windows_straight_share;
+  double windows_spacing_m, windows_sigma_m;
   double sigma_px, noise_grey;
 };
 

@@ -8,6 +8,7 @@
 #include "vision/camera/lens.hpp"
 #include "vision/edges/hough.hpp"
 #include "vision/edges/params.h"
+#include "vision/edges/polylines.hpp"
 #include "waymark/frame.h"
 
 namespace wm {
@@ -28,11 +29,6 @@ struct bird_view {
   uint8_t *inner;        // 255 where the pixel and its four neighbours are in the picture, else 0
   uint8_t *whole;        // a byte a window: it shows floor enough to be looked at
   hough_work *hough;
-};
-
-// A line piece in the bird's-eye view, px.
-struct line_piece {
-  float x0, y0, x1, y1;
 };
 
 // Sizes of the view by the parameters; counts its windows.

@@ -7,6 +7,7 @@
 #include "unity.h"
 #include "vision/edges/hough.hpp"
 #include "waymark/random.h"
+#include "waymark/vectors.h"
 
 namespace {
 
@@ -56,9 +57,15 @@ void vectors_and_scalars_agree() {
       const int row = quadrant & 1 ? 1 : 50, column = quadrant & 1 ? 50 : 1;
       const uint8_t *from = quadrant & 2 ? window + 49 * column : window;
       const int step = quadrant & 2 ? -column : column;
-      const wm::hough_plane *p = wm::hough_transform(from, 50, row, step, a.get());
       const wm::hough_plane *q = wm::hough_transform_scalar(from, 50, row, step, b.get());
-      TEST_ASSERT_EQUAL_MEMORY(p->sums, q->sums, 50 * wm::kHoughStride * sizeof(int16_t));
+      wm::hough_peak peak[2];
+      for (int plain = 0; plain < 2; plain++) {
+        wm_vectors_limit(plain != 0);
+        const wm::hough_plane *p = wm::hough_transform(from, 50, row, step, a.get());
+        TEST_ASSERT_EQUAL_MEMORY(p->sums, q->sums, 50 * wm::kHoughStride * sizeof(int16_t));
+        peak[plain] = wm::hough_find(*p, 50);
+      }
+      TEST_ASSERT_EQUAL_MEMORY(&peak[0], &peak[1], sizeof peak[0]);
     }
   }
 }

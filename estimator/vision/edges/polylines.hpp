@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// Line pieces of the windows joined to polylines, as M. P. Abramov et al. 2019 do: pieces are the vertices of a graph,
+// an edge is where two continue each other, and of every connected part one polyline is made.
+#ifndef WAYMARK_ESTIMATOR_VISION_POLYLINES_HPP
+#define WAYMARK_ESTIMATOR_VISION_POLYLINES_HPP
+
+#include <cstddef>
+#include <cstdint>
+
+#include "vision/edges/params.h"
+
+namespace wm {
+
+// A line piece in the bird's-eye view, px.
+struct line_piece {
+  float x0, y0, x1, y1;
+};
+
+struct line_vertex {
+  float x, y;
+  int32_t line;  // number of the polyline that it belongs to; those of one follow each other
+};
+
+// Work space for up to `capacity` pieces.
+struct piece_graph {
+  int32_t capacity;
+  float *way;              // capacity^2: of the shortest path between two pieces; below 0 where there is none
+  uint16_t *hops, *next;   // capacity^2: its edges; the piece after the first
+  int32_t *part, *member;  // capacity: each piece's connected part; the pieces of the part at work
+};
+
+// Bytes of the arrays, and where they lie in `memory` (64-byte aligned).
+size_t piece_graph_bytes(int32_t capacity);
+void piece_graph_place(piece_graph *graph, int32_t capacity, void *memory);
+
+// Polylines of `count` (at most the graph's capacity) pieces; returns how many vertices there are, at most twice the
+// pieces. Two pieces are joined where their nearest ends are less than windows.join_px apart and they make an angle of
+// at least windows.join_angle_rad there. A part of which more than windows.straight_share of the ends lie within
+// windows.straight_px of the line through its two ends farthest from each other is that line; else it is the longest of
+// the shortest paths between its pieces (R. W. Floyd 1962), of equals the one with the fewest, through the pieces'
+// intersections. O(count^3) in the worst case, of a part that is not straight.
+int make_polylines(const line_piece *pieces, int count, const wm_edges_params &params, piece_graph *graph,
+                   line_vertex *out);
+
+}  // namespace wm
+
+#endif
