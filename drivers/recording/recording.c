@@ -328,6 +328,7 @@ wm_status wm_recording_open_robot(const char *name, const wm_recording_overrides
   wm_start_init(&self->start);
   wm_status status = read_calibration(self, err);
   if (status == WM_OK) status = read_landmarks(self, err);
+  if (status == WM_OK) status = find_map(self, err);
   if (status != WM_OK) {
     wm_recording_close(self);
     return status;

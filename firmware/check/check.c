@@ -26,21 +26,22 @@ static void messages(const wm_config *config, findings *out) {
          "publish.lcm_url: poses go out into the network, and commands may come from it (%s)", url);
 }
 
-// The folder is needed, not the file.
-static void saved_pose(const wm_config *config, findings *out) {
-  const char *path = config->saved_pose, *slash = strrchr(path, '/');
+// The folder in which something is to be made.
+static void folder_of(const char *key, const char *path, const char *what, findings *out) {
   char folder[WM_PATH_MAX];
+  const char *slash = strrchr(path, '/');
   if (!path[0]) return;
   (void)snprintf(folder, sizeof folder, "%.*s", slash ? (int)(slash - path) + 1 : 1, slash ? path : ".");
   if (access(folder, F_OK) != 0)
     find(out, FINDING_BAD, "start", "mkdir -p it, or StateDirectory=waymark in the unit, which makes /var/lib/waymark",
-         "start.saved_pose: the folder %s is not there: no pose would be kept", folder);
+         "%s: the folder %s is not there: %s", key, folder, what);
   else if (access(folder, W_OK) != 0)
     find(out, FINDING_BAD, "start", "give it to the run's user, or name a folder that is the user's",
-         "start.saved_pose: this user may not write into %s", folder);
+         "%s: this user may not write into %s: %s", key, folder, what);
 }
 
 void check_config(const wm_config *config, findings *out) {
   messages(config, out);
-  saved_pose(config, out);
+  folder_of("start.saved_pose", config->saved_pose, "no pose would be kept", out);
+  folder_of("black_box.folder", config->black_box, "nothing would be kept", out);
 }

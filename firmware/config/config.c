@@ -67,7 +67,7 @@ static wm_status read_sections(const wm_yaml_node *root, wm_config *out, wm_erro
 
 // All keys at the top: sections of estimators and of motion are looked at by read_sections.
 static wm_status check_top(const wm_yaml_node *root, wm_config *out, wm_error *err) {
-  static const char *const kGroups[] = {"merge", "publish", "realtime", "start", NULL};
+  static const char *const kGroups[] = {"merge", "publish", "realtime", "start", "black_box", NULL};
   for (size_t i = 0; i < wm_yaml_count(root); i++) {
     const char *key;
     int line, known = 0;
@@ -129,6 +129,8 @@ static wm_status read_texts(const wm_yaml_node *root, wm_config *out, wm_error *
   wm_status status = WM_OK;
   wm_yaml_node saved = wm_yaml_get(root, "start.saved_pose");
   if (wm_yaml_there(&saved)) status = config_path(&saved, out->path, out->saved_pose, err);
+  wm_yaml_node box = wm_yaml_get(root, "black_box.folder");
+  if (status == WM_OK && wm_yaml_there(&box)) status = config_path(&box, out->path, out->black_box, err);
   if (status == WM_OK && wm_yaml_there(&url)) status = wm_yaml_string(&url, out->lcm_url, sizeof out->lcm_url, err);
   if (status == WM_OK && wm_yaml_there(&prefix))
     status = wm_yaml_string(&prefix, out->channel_prefix, sizeof out->channel_prefix, err);

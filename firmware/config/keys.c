@@ -31,6 +31,9 @@ const config_key kConfigKeys[] = {
     {"start.saved_pose", "path", "none",
      "File that keeps the robot's last pose, on devices: a run begins there, if it isn't older than start.max_age_s, "
      "whatever `initial_pose` says."},
+    {"black_box.folder", "path", "none",
+     "Folder, on devices, with the last seconds of what was fused, as event logs; kept there where the robot gets lost "
+     "or a run died, the newest 20 times."},
     {"publish.lcm_url", "text", "LCM's own", "LCM provider, e.g. `udpm://239.255.76.67:7667?ttl=0`."},
     {"publish.channel_prefix", "text", "WAYMARK_", "What each channel's name begins with."},
     {NULL, NULL, NULL, NULL},

@@ -42,6 +42,9 @@ static const wm_param kParams[] = {
     F64("start.save_every_s", start_save_every_s, 1.0, 0.1, 3600,
         "s. How often the pose is saved: a run that was killed begins so far behind. Each time costs a write to the "
         "disk."),
+    F64("black_box.keep_s", black_box_keep_s, 60, 1, 3600,
+        "s. So much and up to twice as much of what was fused is on the disk at any time, for when the robot gets lost "
+        "or the run dies; a quarter more of what follows a loss."),
     I32("realtime.loop_hz", realtime_loop_hz, 200, 1, 10000,
         "Hz. How often the estimator's thread wakes. At 200 a datum waits 5 ms at most."),
     I32("realtime.priority", realtime_priority, 80, 0, 98,

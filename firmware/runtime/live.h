@@ -6,6 +6,7 @@
 
 #include <stdatomic.h>
 
+#include "black_box.h"
 #include "lcm_sink.h"
 #include "notify.h"
 #include "run_clock.h"
@@ -51,6 +52,7 @@ typedef struct live_estimator {
 typedef struct live_sink {
   wm_run_folder *folder;  // NULL: nothing is written
   lcm_sink lcm;
+  black_box box;
   notify notify;
   wm_time_ns next_flush_ns, next_landmarks_ns;
   int said_unwritable;

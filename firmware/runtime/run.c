@@ -136,6 +136,8 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   lcm_sink_open(&self->sink.lcm, params->publish_lcm, self->config->lcm_url, self->config->channel_prefix,
                 &self->assembly, self->options->say ? self->options->say : say_nothing, self->options->say_context,
                 NULL);
+  black_box_open(&self->sink.box, wm_recording_is_robot(recording) ? self->config->black_box : "",
+                 params->black_box_keep_s, &self->assembly, self->options->say, self->options->say_context);
   notify_open(&self->sink.notify);
   self->sink.keeps_pose = wm_recording_is_robot(recording) && self->config->saved_pose[0];
   return WM_OK;

@@ -28,6 +28,7 @@ static void send_pose(live *run, const wm_published *record) {
   wm_published published = *record;
   tell_utc(run, &published);
   lcm_sink_pose(&run->sink.lcm, &published);
+  black_box_pose(&run->sink.box, &published.now, wm_monotonic_ns());
   run->sink.last_published = published.now;
   run->sink.has_published = 1;
   if (run->sink.keeps_pose && wm_saved_pose_is_worth_it(&published.now)) {
@@ -43,7 +44,10 @@ static void take_output(live *run, const output_record *record) {
     case OUTPUT_GAP:
       if (self->folder) wm_run_folder_gap(self->folder, record->as.gap);
       return;
-    case WM_OUTPUT_EVENT: lcm_sink_event(&self->lcm, &record->as.event); break;
+    case WM_OUTPUT_EVENT:
+      lcm_sink_event(&self->lcm, &record->as.event);
+      black_box_event(&self->box, &record->as.event);
+      break;
     case WM_OUTPUT_INNOVATION: lcm_sink_innovation(&self->lcm, &record->as.innovation); break;
     case WM_OUTPUT_PUBLISHED: send_pose(run, &record->as.published); break;
     default: break;
@@ -143,8 +147,9 @@ static void do_what_is_due(live *run, wm_time_ns now_ns) {
   live_sink *self = &run->sink;
   lcm_sink_tick(&self->lcm, now_ns);
   notify_tick(&self->notify, now_ns);
-  if (self->folder && now_ns >= self->next_flush_ns) {
-    flush(run);
+  if (now_ns >= self->next_flush_ns) {
+    if (self->folder) flush(run);
+    black_box_flush(&self->box);
     self->next_flush_ns = now_ns + FLUSH_EVERY_NS;
   }
   if (now_ns >= self->next_save_ns) {
@@ -168,6 +173,7 @@ void *sink_thread(void *argument) {
     do_what_is_due(run, wm_monotonic_ns());
   }
   save_pose(run);
+  black_box_close(&run->sink.box);
   lcm_sink_close(&run->sink.lcm);
   if (!atomic_load(&run->restarting)) notify_stopping(&run->sink.notify);
   return NULL;

@@ -26,6 +26,17 @@ estimator: edge_mcl
 initial_pose: {x_m: 0, y_m: 0, heading_rad: 0}
 vision: {edges: {}}
 """
+ROBOT = """format: waymark-config/1
+estimator: edge_mcl
+calibration: rec/calibration.yaml
+dbc: rec/vehicle.dbc
+can_signals: rec/can-signals.yaml
+map: rec/map/map.yaml
+initial_pose: {x_m: 0, y_m: 0, heading_rad: 0}
+realtime: {priority: 0, lock_memory: false}
+vision: {edges: {}}
+devices: {can: [{interface: nocan0}], cameras: [{name: front, device: /dev/nosuchvideo}]}
+"""
 DBC = """BO_ 256 Speeds: 6 X
  SG_ Left : 0|16@1- (0.001,0) [-32|32] "m/s" X
  SG_ Right : 16|16@1- (0.001,0) [-32|32] "m/s" X
@@ -103,7 +114,7 @@ def avi(width=64, height=48, pictures=4):
 
 
 GOOD = {
-    "config.yaml": CONFIG, "edges.yaml": EDGES, "rec/recording.yaml": RECORDING, "rec/vehicle.dbc": DBC,
+    "config.yaml": CONFIG, "edges.yaml": EDGES, "robot.yaml": ROBOT, "rec/recording.yaml": RECORDING, "rec/vehicle.dbc": DBC,
     "rec/can-signals.yaml": SIGNALS, "rec/calibration.yaml": CALIBRATION, "rec/landmarks.csv": LANDMARKS,
     "rec/can.log": can_log(), "rec/sightings.csv": sightings(), "rec/map/map.yaml": MAP,
     "rec/map/edges.pgm": pgm(lambda c, r: 255 if c % 40 == 0 else 0),
@@ -124,6 +135,7 @@ FAULTS = [
     ("way of messages that isn't any", C, C, "rate_hz: 50", "lcm_url: 'udp://x'", "is no way that LCM knows"),
     ("poses leave the computer", C, C, "rate_hz: 50", "lcm_url: 'udpm://239.255.76.67:7667?ttl=1'", "out into the network"),
     ("nowhere to save the pose", C, C, "initial_pose", "start: {saved_pose: /nonexistent/pose.yaml}\ninitial_pose", "no pose would be kept"),
+    ("nowhere for the black box", C, C, "initial_pose", "black_box: {folder: /nonexistent/box}\ninitial_pose", "nothing would be kept"),
     ("stream that isn't there", C, "rec/recording.yaml", "sightings.csv", "gnss.csv", "is not in the folder"),
     ("recording of another format", C, "rec/recording.yaml", "recording/1", "recording/7", "is not a format"),
     ("wheel in mm", C, CAL, "radius_m: 0.1", "radius_m: 9.9", "wheels.radius_m: 9.9 m is nothing"),
@@ -190,6 +202,8 @@ def main():
             lay_out(folder, GOOD)
             for f in check(folder / config, folder / "rec"):
                 failures.append(f"the good robot, {config}: {f['text']}")
+        for f in check(folder / "robot.yaml"):
+            failures.append(f"the good robot's devices: {f['text']}")
         for config in sorted((ROOT / "config").glob("*.yaml")):
             for f in check(config):
                 failures.append(f"{config.name}: {f['text']}")

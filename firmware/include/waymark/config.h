@@ -19,6 +19,7 @@
 //   publish: {rate_hz: 50, ...}
 //   realtime: {priority: 80, ...}
 //   start: {saved_pose: FILE, ...}
+//   black_box: {folder: FOLDER, ...}
 //   motion: {...}                  # wm_motion_params_table
 //   vision: {edges: {cameras: [front], ...}}   # detectors on pictures, with their tables
 //   landmark_ekf: {...}            # the estimator's own table
@@ -62,6 +63,7 @@ typedef struct wm_runtime_params {
   double start_max_age_s;                 // of the saved pose
   double start_moved_m, start_moved_deg;  // sigmas of what may have happened to the robot while it was off
   double start_save_every_s;
+  double black_box_keep_s;
   int32_t realtime_loop_hz;
   int32_t realtime_priority;  // SCHED_FIFO, 0: normal thread
   int32_t realtime_cpu;       // -1: any
@@ -99,6 +101,7 @@ typedef struct wm_config {
   size_t source_count;
   char lcm_url[128];             // publish.lcm_url; "" : LCM_DEFAULT_URL or LCM's own default
   char saved_pose[WM_PATH_MAX];  // start.saved_pose; "": none
+  char black_box[WM_PATH_MAX];   // black_box.folder; "": none
   char channel_prefix[48];       // publish.channel_prefix, "WAYMARK_"
 } wm_config;
 

@@ -1,0 +1,174 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is left of the last seconds, after a loss, a death, and an end in order.
+#include <glob.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "black_box.h"
+#include "unity.h"
+
+static const char kConfig[] = "format: waymark-config/1\nestimator: odometry\n";
+static char folder[64], said[4096];
+static wm_config config;
+static wm_assembly assembly;
+static black_box box;
+static double x_m;
+static wm_time_ns now_ns;
+
+static void hear(void *context, const char *line) {
+  (void)context;
+  (void)snprintf(said + strlen(said), sizeof said - strlen(said), "%s\n", line);
+}
+
+void setUp(void) {
+  wm_error err;
+  said[0] = '\0';
+  (void)snprintf(folder, sizeof folder, "/tmp/wm_black_box_XXXXXX");
+  TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+  TEST_ASSERT_EQUAL(WM_OK, wm_config_parse(kConfig, strlen(kConfig), "robot.yaml", &config, &err));
+  memset(&assembly, 0, sizeof assembly);
+  assembly.config = &config;
+  assembly.calibration_text = "";
+  assembly.setup.motion = config.motion;
+  assembly.kinds = WM_EVENT_BIT(WM_EVENT_TWIST2);
+  assembly.source_count = 1;
+  (void)snprintf(assembly.sources[0].name, sizeof assembly.sources[0].name, "motion");
+  assembly.sources[0].kinds = assembly.kinds;
+  x_m = 0;
+  now_ns = 1000 * WM_NS_PER_S;
+}
+
+void tearDown(void) {
+  char command[128];
+  wm_config_free(&config);
+  (void)snprintf(command, sizeof command, "rm -rf %s", folder);
+  TEST_ASSERT_EQUAL(0, system(command));
+}
+
+static void open_box(void) { black_box_open(&box, folder, 10, &assembly, hear, NULL); }
+
+// Ten events and a pose a second.
+static void drive(int seconds, wm_state state) {
+  for (int i = 0; i < seconds * 10; i++) {
+    wm_event event = {.kind = WM_EVENT_TWIST2, .t_ns = now_ns, .arrival_ns = now_ns, .as.twist2 = {1, 0}};
+    wm_estimate pose = {.t_ns = now_ns, .state = (uint8_t)state, .dof = 3};
+    pose.pose_map_base.p_m[0] = x_m;
+    pose.pose_map_base.q_xyzw[3] = 1;
+    black_box_pose(&box, &pose, now_ns);
+    black_box_event(&box, &event);
+    if (i % 10 == 0) black_box_flush(&box);
+    x_m += 0.1;
+    now_ns += WM_NS_PER_S / 10;
+  }
+}
+
+static size_t files(const char *pattern) {
+  glob_t found;
+  char path[128];
+  (void)snprintf(path, sizeof path, "%s/%s", folder, pattern);
+  size_t count = glob(path, 0, NULL, &found) == 0 ? found.gl_pathc : 0;
+  globfree(&found);
+  return count;
+}
+
+// Events of a log, and where it begins.
+static int events_of(const char *name, double *begins_x_m) {
+  char path[128];
+  wm_error err;
+  wm_log_reader *log;
+  static wm_event event;
+  uint64_t missing = 0;
+  int cut = 0, count = 0;
+  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(path, &log, &err), name);
+  *begins_x_m = wm_log_reader_head(log)->start.p_m[0];
+  while (wm_log_next(log, &event, &missing, &cut, &err) == WM_OK) count++;
+  wm_log_reader_close(log);
+  return count;
+}
+
+static void a_loss_is_kept_with_what_was_before_and_after(void) {
+  double begins_x_m;
+  open_box();
+  drive(34, WM_STATE_TRACKING);
+  TEST_ASSERT_EQUAL(2, files("*.wmlog"));
+  drive(2, WM_STATE_LOST);
+  TEST_ASSERT_EQUAL(0, files("lost-*"));  // a quarter of the time after it
+  drive(1, WM_STATE_LOST);
+  TEST_ASSERT_EQUAL(2, files("lost-0001-*.wmlog"));
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "black box: kept as"), said);
+  TEST_ASSERT_EQUAL(100, events_of("lost-0001-before.wmlog", &begins_x_m));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 20, begins_x_m);
+  TEST_ASSERT_EQUAL(65, events_of("lost-0001-now.wmlog", &begins_x_m));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 30, begins_x_m);
+  drive(30, WM_STATE_LOST);  // still the same loss
+  TEST_ASSERT_EQUAL(2, files("lost-*"));
+  drive(30, WM_STATE_TRACKING);
+  drive(3, WM_STATE_LOST);
+  TEST_ASSERT_EQUAL(2, files("lost-0002-*"));
+  black_box_close(&box);
+}
+
+static void a_run_that_died_leaves_its_last_seconds(void) {
+  double begins_x_m;
+  open_box();
+  drive(15, WM_STATE_TRACKING);
+  (void)fclose(box.log.file);  // as the kernel does at a death: no end is written
+  open_box();
+  TEST_ASSERT_EQUAL(2, files("died-0001-*"));
+  TEST_ASSERT_GREATER_THAN(40, events_of("died-0001-now.wmlog", &begins_x_m));
+  drive(1, WM_STATE_TRACKING);
+  black_box_close(&box);
+}
+
+static void an_end_in_order_leaves_nothing_to_keep(void) {
+  open_box();
+  drive(15, WM_STATE_TRACKING);
+  black_box_close(&box);
+  open_box();
+  drive(1, WM_STATE_TRACKING);
+  black_box_close(&box);
+  TEST_ASSERT_EQUAL(0, files("died-*") + files("lost-*"));
+}
+
+static void an_end_soon_after_a_loss_keeps_it(void) {
+  open_box();
+  drive(5, WM_STATE_TRACKING);
+  drive(1, WM_STATE_LOST);
+  black_box_close(&box);
+  TEST_ASSERT_EQUAL(1, files("lost-0001-*"));
+}
+
+static void the_oldest_go(void) {
+  open_box();
+  for (int i = 0; i < 25; i++) {
+    drive(1, WM_STATE_TRACKING);
+    drive(4, WM_STATE_LOST);
+  }
+  black_box_close(&box);
+  TEST_ASSERT_EQUAL(1, files("lost-0025-now.wmlog"));
+  TEST_ASSERT_EQUAL(0, files("lost-0001-*"));
+  TEST_ASSERT_EQUAL(BLACK_BOX_KEPT_MAX, files("lost-*-now.wmlog"));
+}
+
+static void a_disk_that_takes_nothing_is_said_once(void) {
+  black_box_open(&box, "/proc/nowhere", 10, &assembly, hear, NULL);
+  drive(25, WM_STATE_TRACKING);
+  black_box_close(&box);
+  const char *first = strstr(said, "black box: can't be written");
+  TEST_ASSERT_NOT_NULL_MESSAGE(first, said);
+  TEST_ASSERT_NULL_MESSAGE(strstr(first + 1, "black box: can't be written"), said);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(a_loss_is_kept_with_what_was_before_and_after);
+  RUN_TEST(a_run_that_died_leaves_its_last_seconds);
+  RUN_TEST(an_end_in_order_leaves_nothing_to_keep);
+  RUN_TEST(an_end_soon_after_a_loss_keeps_it);
+  RUN_TEST(the_oldest_go);
+  RUN_TEST(a_disk_that_takes_nothing_is_said_once);
+  return UNITY_END();
+}
