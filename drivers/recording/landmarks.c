@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "calibration.h"
 #include "csv.h"
 
 #define LANDMARKS_MAX 1000000
 
-enum { ID, X, Y, Z, SIGMA, YAW };
+enum { ID, X, Y, Z, SIGMA, YAW, COV_XX, COV_XY, COV_YY, COV_TT };
 static const csv_format kLandmarks = {{{"id", CSV_WHOLE, CSV_NEEDED, 0, 2147483647.0},
                                        {"x_m", CSV_NUMBER, CSV_NEEDED, -1e8, 1e8},
                                        {"y_m", CSV_NUMBER, CSV_NEEDED, -1e8, 1e8},
                                        {"z_m", CSV_NUMBER, CSV_OPTIONAL, -1e8, 1e8},
                                        {"sigma_m", CSV_NUMBER, CSV_OPTIONAL, 0, 1e6},
-                                       {"yaw_rad", CSV_NUMBER, CSV_OPTIONAL, -6.2832, 6.2832}}};
+                                       {"yaw_rad", CSV_NUMBER, CSV_OPTIONAL, -6.2832, 6.2832},
+                                       {"cov_xx", CSV_NUMBER, CSV_OPTIONAL, 0, 1e12},
+                                       {"cov_xy", CSV_NUMBER, CSV_OPTIONAL, -1e12, 1e12},
+                                       {"cov_yy", CSV_NUMBER, CSV_OPTIONAL, 0, 1e12},
+                                       {"cov_tt", CSV_NUMBER, CSV_OPTIONAL, 0, 100}}};
 
 typedef struct landmark_line {
   int32_t id;
@@ -37,12 +42,17 @@ static wm_status check_twice(const char *path, landmark_line *lines, size_t coun
 }
 
 static wm_landmark landmark_of(const csv_row *row) {
-  return (wm_landmark){
+  wm_landmark out = {
       .id = (int32_t)row->whole[ID],
       .p_m = {row->number[X], row->number[Y], isnan(row->number[Z]) ? 0.0 : row->number[Z]},
       .sigma_m = isnan(row->number[SIGMA]) ? 0.0 : row->number[SIGMA],
       .yaw_rad = row->number[YAW],
+      .yaw_sigma_rad = isnan(row->number[COV_TT]) ? 0.0 : sqrt(row->number[COV_TT]),
   };
+  // As a run writes its map. What is no covariance (not positive) is none.
+  const double xx = row->number[COV_XX], xy = row->number[COV_XY], yy = row->number[COV_YY];
+  if (xx > 0.0 && yy > 0.0 && xy * xy < xx * yy) memcpy(out.cov_m2, (const double[3]){xx, xy, yy}, sizeof out.cov_m2);
+  return out;
 }
 
 static wm_status read_rows(csv_reader *csv, wm_landmark **out, landmark_line **lines, size_t *count, size_t *flat,

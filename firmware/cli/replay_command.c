@@ -28,6 +28,8 @@ static const char kHelp[] =
     "  --map FILE          a map.yaml instead of the recording's; an event log refuses any but its own\n"
     "  --frames-of LOG     only the pictures that a run fed from this recording saw, by its event log: what it lost\n"
     "                      is lost here, too, and its poses can be compared\n"
+    "  --from S, --until S only this part of the recording, s from its first stamp\n"
+    "  --lost              begin without a start pose, whatever the recording says\n"
     "  --reference         also reference.csv: all of the drive looked at as a whole (edges on a raster map; at a "
     "desk)\n"
     "\n"
@@ -38,7 +40,8 @@ static const char kHelp[] =
 typedef struct arguments {
   const char *config, *out, *landmarks, *calibration, *map, *frames_of;
   uint64_t seed;
-  int reference;
+  double from_s, until_s;
+  int lost, reference;
   const char *what;
 } arguments;
 
@@ -48,6 +51,10 @@ static int replay_recording(const arguments *args) {
   if (wm_config_load(args->config, &config, &err) != WM_OK) {
     (void)complain(&err);
     return EXIT_USAGE;
+  }
+  if (args->lost) {
+    config.has_initial_pose = 1;
+    wm_start_init(&config.initial_pose);
   }
   wm_recording *recording = NULL;
   wm_status status = override_path(config.overrides.landmarks, args->landmarks, &err);
@@ -61,7 +68,9 @@ static int replay_recording(const arguments *args) {
                                        .seed = args->seed,
                                        .progress = progress_show,
                                        .progress_context = &progress,
-                                       .frames_of = args->frames_of};
+                                       .frames_of = args->frames_of,
+                                       .from_s = args->from_s,
+                                       .until_s = args->until_s};
     static wm_run_report report;
     status = wm_replay_recording(&config, recording, &options, &report, &err);
     progress_end(&progress);
@@ -172,6 +181,9 @@ int command_replay(int argc, char *const *argv) {
                             {"--calibration", OPTION_TEXT, &args.calibration},
                             {"--map", OPTION_TEXT, &args.map},
                             {"--frames-of", OPTION_TEXT, &args.frames_of},
+                            {"--from", OPTION_F64, &args.from_s},
+                            {"--until", OPTION_F64, &args.until_s},
+                            {"--lost", OPTION_FLAG, &args.lost},
                             {"--reference", OPTION_FLAG, &args.reference},
                             {"--help", OPTION_FLAG, &help},
                             {"-h", OPTION_FLAG, &help}};
@@ -196,8 +208,18 @@ int command_replay(int argc, char *const *argv) {
     return EXIT_USAGE;
   }
   if (stat(args.what, &there) == 0 && !S_ISDIR(there.st_mode)) {
-    if (!args.reference && !args.frames_of) return replay_log(&args);
-    (void)fprintf(stderr, "waymark: %s needs the recording\n", args.reference ? "--reference" : "--frames-of");
+    const int part = args.from_s > 0 || args.until_s > 0 || args.lost;
+    if (!args.reference && !args.frames_of && !part) return replay_log(&args);
+    (void)fprintf(stderr, "waymark: %s needs the recording; a log is what was fused, whole\n",
+                  args.reference   ? "--reference"
+                  : args.frames_of ? "--frames-of"
+                                   : "a part of a drive (--from, --until, --lost)");
+    return EXIT_USAGE;
+  }
+  if (args.from_s < 0 || args.until_s < 0 || (args.until_s > 0 && args.until_s <= args.from_s)) {
+    (void)fprintf(stderr,
+                  "waymark: --from %g, --until %g: seconds from the recording's first stamp, the later one last\n",
+                  args.from_s, args.until_s);
     return EXIT_USAGE;
   }
   if (!args.config) {

@@ -135,6 +135,12 @@ static wm_status write_summary(replay *self, wm_run_report *report, wm_error *er
 static wm_status run(replay *self, const wm_config *config, wm_recording *recording, const wm_replay_options *options,
                      wm_run_report *report, wm_error *err) {
   wm_status status = wm_assemble(config, recording, options->seed, &self->assembly, err);
+  for (size_t i = 0; status == WM_OK && i < self->assembly.source_count; i++) {
+    if (options->from_s > 0.0)
+      self->assembly.sources[i].from_s = fmax(self->assembly.sources[i].from_s, options->from_s);
+    if (options->until_s > 0.0)
+      self->assembly.sources[i].until_s = fmin(self->assembly.sources[i].until_s, options->until_s);
+  }
   if (status == WM_OK) status = take_memory(self, err);
   if (status == WM_OK && options->frames_of)
     status = frames_of_apply(options->frames_of, recording, &self->assembly, &report->log_ahead_ns, err);

@@ -4,10 +4,10 @@
 
 #define WHEELS_VERSION 1
 #define SENSOR_VERSION 1
-#define LANDMARK_VERSION 1
+#define LANDMARK_VERSION 2
 #define START_VERSION 1
 
-#define LANDMARK_ENCODED_BYTES 45
+#define LANDMARK_ENCODED_BYTES 77
 
 size_t wm_wheels_encode(const wm_wheels *v, void *out, size_t capacity) {
   uint32_t count = v->steering_table_count < WM_STEERING_TABLE_MAX ? v->steering_table_count : WM_STEERING_TABLE_MAX;
@@ -82,6 +82,8 @@ size_t wm_landmark_encode(const wm_landmark *v, void *out, size_t capacity) {
   wm_put_f64s(&w, v->p_m, 3);
   wm_put_f64(&w, v->sigma_m);
   wm_put_f64(&w, v->yaw_rad);
+  wm_put_f64s(&w, v->cov_m2, 3);
+  wm_put_f64(&w, v->yaw_sigma_rad);
   return w.full ? 0 : w.used;
 }
 
@@ -93,6 +95,8 @@ wm_status wm_landmark_decode(const void *data, size_t size, wm_landmark *out, si
   wm_get_f64s(&r, out->p_m, 3);
   out->sigma_m = wm_get_f64(&r);
   out->yaw_rad = wm_get_f64(&r);
+  wm_get_f64s(&r, out->cov_m2, 3);
+  out->yaw_sigma_rad = wm_get_f64(&r);
   *used = r.used;
   return r.bad ? WM_BAD_DATA : WM_OK;
 }

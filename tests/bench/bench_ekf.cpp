@@ -65,7 +65,7 @@ void bench(const char *title, std::initializer_list<setting> settings, bool rang
   sensor.range_sigma_m = 0.1;
   sensor.max_range_m = 100;
   wm_landmark landmarks[4];
-  for (int i = 0; i < 4; i++) landmarks[i] = {i, {6 * cos(1.57 * i), 6 * sin(1.57 * i), 0}, 0.01, kAbsent};
+  for (int i = 0; i < 4; i++) landmarks[i] = {i, {6 * cos(1.57 * i), 6 * sin(1.57 * i), 0}, 0.01, kAbsent, {}, 0};
   wm_setup setup{};
   setup.motion = reinterpret_cast<const wm_motion_params *>(motion.data());
   setup.wheels = {kAbsent, kAbsent, kAbsent, kAbsent, kAbsent, kAbsent, 0, {}, {}};

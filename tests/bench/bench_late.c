@@ -21,8 +21,10 @@
 
 static const char kConfig[] =
     "format: waymark-config/1\nestimator: landmark_ekf\nmerge: {horizon_ms: 300, lateness_max_ms: 300}\n";
-static wm_landmark landmarks[SEEN] = {
-    {0, {6, 0, 0}, 0.01, NAN}, {1, {0, 6, 0}, 0.01, NAN}, {2, {-6, 0, 0}, 0.01, NAN}, {3, {0, -6, 0}, 0.01, NAN}};
+static wm_landmark landmarks[SEEN] = {{.id = 0, .p_m = {6, 0, 0}, .sigma_m = 0.01, .yaw_rad = NAN},
+                                      {.id = 1, .p_m = {0, 6, 0}, .sigma_m = 0.01, .yaw_rad = NAN},
+                                      {.id = 2, .p_m = {-6, 0, 0}, .sigma_m = 0.01, .yaw_rad = NAN},
+                                      {.id = 3, .p_m = {0, -6, 0}, .sigma_m = 0.01, .yaw_rad = NAN}};
 static wm_sensor sensor = {.name = "eye", .bearing_sigma_rad = 0.01, .range_sigma_m = 0.05};
 
 static wm_event *events;

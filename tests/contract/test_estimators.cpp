@@ -367,7 +367,7 @@ void setUp(void) {
   std::strcpy(sensor.name, "eye");
   sensor.bearing_sigma_rad = sensor.range_sigma_m = NAN;
   sensor.max_range_m = INFINITY;
-  for (int i = 0; i < 4; i++) landmarks[i] = {40 - i, {5.0 * cos(i), 5.0 * sin(i), 0}, 0.01, NAN};
+  for (int i = 0; i < 4; i++) landmarks[i] = {40 - i, {5.0 * cos(i), 5.0 * sin(i), 0}, 0.01, NAN, {}, 0};
   setup = {};
   setup.motion = reinterpret_cast<const wm_motion_params *>(motion_params.data());
   setup.wheels = {NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}};

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // SLAM's map against the true places.
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -55,6 +56,23 @@ std::vector<Pair> by_place(const std::vector<Landmark> &estimate, const std::vec
 // The estimate's ids are truth's where at least half of them occur there; else they are its own.
 bool shares_ids(const std::vector<Landmark> &estimate, size_t pairs) { return 2 * pairs >= estimate.size(); }
 
+// What is left when the map as a whole is laid over the true one: its shape alone, wherever a causal trajectory says
+// that it lies. NaN with fewer than three landmarks.
+double rms_by_own_fit(const std::vector<Pair> &pairs, Alignment kind) {
+  if (pairs.size() < 3) return std::numeric_limits<double>::quiet_NaN();
+  std::vector<Eigen::Vector3d> from;
+  std::vector<Eigen::Vector3d> to;
+  for (const Pair &pair : pairs) {
+    from.push_back(pair.estimate->p_m);
+    to.push_back(pair.truth->p_m);
+  }
+  const Similarity fit = align(from, to, kind);
+  std::vector<double> off_m;
+  for (size_t i = 0; i < from.size(); ++i)
+    off_m.push_back((fit.scale * (fit.R * from[i]) + fit.t - to[i]).head<2>().norm());
+  return rms(off_m);
+}
+
 }  // namespace
 
 void add_landmark_figures(const std::vector<Landmark> &estimate, const std::vector<Landmark> &truth,
@@ -83,6 +101,11 @@ void add_landmark_figures(const std::vector<Landmark> &estimate, const std::vect
   f["landmarks_found"] = pairs.size();
   f["landmarks_total"] = truth.size();
   f["landmarks_estimated"] = estimate.size();
+  f["landmark_max_m"] =
+      number(off_m.empty() ? std::numeric_limits<double>::quiet_NaN() : *std::max_element(off_m.begin(), off_m.end()));
+  f["landmark_rmse_own_fit_m"] =
+      number(comparison.planar ? rms_by_own_fit(pairs, alignment.scale == 1 ? Alignment::kSe2 : Alignment::kSim2)
+                               : std::numeric_limits<double>::quiet_NaN());
   f["landmarks_matched_by"] = same_ids ? "id" : "place";
 }
 

@@ -60,7 +60,9 @@ std::string figures_table(const Figures &f, const std::string &title, const std:
   if (f["landmarks_total"].is_number())
     out += "  landmarks: " + cell(f, "landmarks_found", 0) + " of " + cell(f, "landmarks_total", 0) + " found (by " +
            f["landmarks_matched_by"].get<std::string>() + "), rms " + cell(f, "landmark_rmse_m", 3, " m") +
-           ", heading " + cell(f, "landmark_heading_rmse_deg", 2, " deg") + "\n";
+           ", largest " + cell(f, "landmark_max_m", 3, " m") + ", map laid over the true one " +
+           cell(f, "landmark_rmse_own_fit_m", 3, " m") + ", heading " +
+           cell(f, "landmark_heading_rmse_deg", 2, " deg") + "\n";
   if (f.contains("published"))
     out += "  published: " + cell(f, "published", 0) + " poses, t_ns " +
            (f["t_strictly_rising"].get<bool>() ? "rises strictly" : "DOES NOT ALWAYS RISE") + ", age p99 " +

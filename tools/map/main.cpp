@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// waymark map: raster maps made and checked.
+// waymark map: raster maps made and checked, maps of landmarks surveyed.
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
@@ -9,6 +9,7 @@
 #include "common/yaml.h"
 #include "map/check.h"
 #include "map/layers.h"
+#include "map/survey.h"
 #include "simulate/render/pictures.h"
 
 namespace {
@@ -29,6 +30,22 @@ struct Make {
 struct Check {
   std::string map, recording, draw;
 };
+
+struct SurveyArguments {
+  std::string run;
+  bool json = false;
+};
+
+void parse_survey(CLI::App &app, SurveyArguments &a) {
+  app.description("How well each landmark of a run's map fits, and which ones moved, stand twice or are misread.");
+  app.add_option("RUN", a.run, "the folder that `waymark replay` or `waymark run` wrote")->required();
+  app.add_flag("--json", a.json, "one object instead of a table");
+  app.footer(
+      "example: waymark map survey out/run\n"
+      "Residuals are observed less expected: bearing (rad) and range (m), or along and across the line of sight (x, y, "
+      "m) and\nheading (rad) of coded markers. docs/estimators.md says what is fused when.\n"
+      "Exit code: 0 good, 1 something was found or can't be read.");
+}
 
 void parse_make(CLI::App &app, Make &a) {
   app.description("Makes the layers edges and drivable from a floor plan, or from a ROS occupancy map.");
@@ -151,20 +168,34 @@ int check(const Check &a) {
   return report.wrong.empty() ? kDone : kFailed;
 }
 
+int survey(const SurveyArguments &a) {
+  const Survey found = survey_run(a.run);
+  if (a.json)
+    std::printf("%s\n", survey_json(found).dump(2).c_str());
+  else
+    std::fputs(survey_table(found).c_str(), stdout);
+  return found.findings() == 0 ? kDone : kFailed;
+}
+
 }  // namespace
 
 int main(int argc, char **argv) {
-  CLI::App app("Raster maps: made from plans, and checked.", "waymark map");
+  CLI::App app("Maps: raster maps made from plans and checked, landmarks surveyed.", "waymark map");
   app.require_subcommand(1);
   app.footer("example: waymark map make plan.png --resolution 0.02\nwaymark map SUBCOMMAND --help says more.");
   Make make_arguments;
   Check check_arguments;
+  SurveyArguments survey_arguments;
   CLI::App *make_app = app.add_subcommand("make", "layers from a floor plan or an occupancy map");
   CLI::App *check_app = app.add_subcommand("check", "what a map is like, and what is wrong with it");
+  CLI::App *survey_app =
+      app.add_subcommand("survey", "how well the landmarks of a run fit, and what is odd about them");
+  parse_survey(*survey_app, survey_arguments);
   parse_make(*make_app, make_arguments);
   parse_check(*check_app, check_arguments);
   try {
     app.parse(argc, argv);
+    if (survey_app->parsed()) return survey(survey_arguments);
     return make_app->parsed() ? make(make_arguments) : check(check_arguments);
   } catch (const CLI::ParseError &problem) {
     return app.exit(problem) == 0 ? kDone : kUsage;

@@ -146,15 +146,37 @@ void slam::forget_tracks() {
   tracks_.clear(params_.line_clones, rays ? params_.line_clones : bearing_tracks::kTracks);
 }
 
+namespace {
+
+// What all landmarks are unsure of alike is where the map's own axes lie, which is no error on the map.
+double common_yaw_variance(const wm_setup &setup) {
+  double least = square(kPi);
+  for (size_t i = 0; i < setup.landmark_count; i++) {
+    const double variance = square(setup.landmarks[i].yaw_sigma_rad);
+    if (variance < least) least = variance;
+  }
+  return least;
+}
+
+}  // namespace
+
 void slam::load_map() {
+  const double common = common_yaw_variance(*setup_);
   for (size_t i = 0; i < setup_->landmark_count; i++) {
     const wm_landmark &l = setup_->landmarks[i];
     if (!finite(l.p_m[0]) || !finite(l.p_m[1])) continue;
-    const double variance = square(finite(l.sigma_m) && l.sigma_m > kSurveyed_m ? l.sigma_m : kSurveyed_m);
-    const double heading = finite(l.yaw_rad) ? wrap(l.yaw_rad) : 0.0;
-    const double heading_sigma = finite(l.yaw_rad) ? kSurveyed_rad : kPi;
-    const double noise[3][3] = {{variance, 0, 0}, {0, variance, 0}, {0, 0, square(heading_sigma)}};
-    const double place[3] = {l.p_m[0], l.p_m[1], heading};
+    const double least = square(kSurveyed_m);
+    double xx = larger(square(finite(l.sigma_m) ? l.sigma_m : 0.0), least), xy = 0.0, yy = xx;
+    const double *c = l.cov_m2;
+    if (c[0] > 0.0 && c[2] > 0.0 && square(c[1]) < c[0] * c[2] && finite(c[0] + c[2])) {
+      xx = c[0] + least;
+      xy = c[1];
+      yy = c[2] + least;
+    }
+    const bool turned = finite(l.yaw_rad), sure = l.yaw_sigma_rad > 0.0 && l.yaw_sigma_rad < kPi;
+    const double turn = !turned ? square(kPi) : square(kSurveyed_rad) + (sure ? square(l.yaw_sigma_rad) - common : 0.0);
+    const double noise[3][3] = {{xx, xy, 0}, {xy, yy, 0}, {0, 0, turn}};
+    const double place[3] = {l.p_m[0], l.p_m[1], turned ? wrap(l.yaw_rad) : 0.0};
     const joint_row rows[3] = {};
     const int landmark = joint_.add_landmark(rows, noise, place);
     notes()[landmark] = {l.id, 0, WM_TIME_NONE, WM_TIME_NONE, l.p_m[2], 0, 1, -1};
@@ -241,12 +263,12 @@ size_t slam::list_landmarks(wm_landmark *out, double (*covariance)[4], size_t ca
       const int s = joint_.landmark_state(i);
       const double xx = joint_.variance(s), xy = joint_.covariance(s, s + 1), yy = joint_.variance(s + 1);
       const double most = 0.5 * (xx + yy) + std::sqrt(square(0.5 * (xx - yy)) + square(xy));
-      out[count] = {note.id,
-                    {joint_.value(s), joint_.value(s + 1), note.z_m},
-                    std::sqrt(most),
-                    params_.markers ? joint_.value(s + 2) : kAbsent};
+      const double turn = params_.markers ? joint_.variance(s + 2) : kAbsent;
+      out[count] = {note.id,         {joint_.value(s), joint_.value(s + 1), note.z_m},
+                    std::sqrt(most), params_.markers ? joint_.value(s + 2) : kAbsent,
+                    {xx, xy, yy},    params_.markers ? std::sqrt(turn) : 0.0};
       if (covariance) {
-        const double c[4] = {xx, xy, yy, params_.markers ? joint_.variance(s + 2) : kAbsent};
+        const double c[4] = {xx, xy, yy, turn};
         std::memcpy(covariance[count], c, sizeof c);
       }
     }

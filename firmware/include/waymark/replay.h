@@ -20,8 +20,9 @@ typedef struct wm_replay_options {
   uint64_t seed;
   wm_progress_fn progress;  // may be NULL
   void *progress_context;
-  const wm_raster *map;   // event log only: the map whose hash it names; NULL where it names none
-  const char *frames_of;  // recording only: the event log of a run fed from it, whose pictures alone are looked at
+  const wm_raster *map;    // event log only: the map whose hash it names; NULL where it names none
+  const char *frames_of;   // recording only: the event log of a run fed from it, whose pictures alone are looked at
+  double from_s, until_s;  // recording only: this part of it, s from its first stamp; until_s 0: to its end
 } wm_replay_options;
 
 typedef struct wm_run_report {

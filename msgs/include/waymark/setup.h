@@ -97,7 +97,9 @@ typedef struct wm_landmark {
   int32_t id;
   double p_m[3];
   double sigma_m;
-  double yaw_rad;  // NaN where not given
+  double yaw_rad;        // NaN where not given
+  double cov_m2[3];      // xx, xy, yy of the place; all 0 where not given: sigma_m on each axis
+  double yaw_sigma_rad;  // 0 where not given
 } wm_landmark;
 
 // Start pose. NaN where unknown.

@@ -176,6 +176,16 @@ static void landmarks(void) {
   TEST_ASSERT_TRUE(all[0].id == 7 && all[0].p_m[2] == 0 && all[0].sigma_m == 0.5 && isnan(all[0].yaw_rad));
   TEST_ASSERT_TRUE(all[1].id == 3 && all[1].p_m[2] == 6 && all[1].sigma_m == 0 && all[1].yaw_rad == 1.5);
   TEST_ASSERT_NOT_NULL(strstr(warnings, "z_m: empty for 1 of 2 landmarks; taken as 0"));
+  // As a run writes its map; what is no covariance is none.
+  folder_write("landmarks.csv",
+               "id,x_m,y_m,z_m,sigma_m,cov_xx,cov_xy,cov_yy,yaw_rad,cov_tt\n"
+               "1,1,2,3,0.2,0.04,0.01,0.01,0.5,0.0004\n2,1,2,3,0.2,0.04,0.03,0.01,,\n");
+  open_it();
+  all = wm_recording_landmarks(recording, &count);
+  TEST_ASSERT_TRUE(all[0].cov_m2[0] == 0.04 && all[0].cov_m2[1] == 0.01 && all[0].cov_m2[2] == 0.01);
+  TEST_ASSERT_EQUAL_DOUBLE(0.02, all[0].yaw_sigma_rad);
+  TEST_ASSERT_TRUE(all[1].cov_m2[0] == 0 && all[1].cov_m2[1] == 0 && all[1].yaw_sigma_rad == 0);
+
   folder_write("landmarks.csv", "id,x_m,y_m\n1,0,0\n2,0\n");
   refused("landmarks.csv:3: 2 fields where the header has 3");
 }

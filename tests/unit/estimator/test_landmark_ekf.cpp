@@ -50,7 +50,7 @@ void make_room() {
   wm_params_defaults(&wm_motion_params_table, &motion);
   wm_params_defaults(&ekf->params, &params);
   const double places[8][2] = {{6, 0}, {0, 6}, {-6, 1}, {1, -6}, {5, 5}, {-4, -5}, {-5, 4}, {4, -4}};
-  for (int i = 0; i < 8; i++) landmarks[i] = {100 + 7 * i, {places[i][0], places[i][1], 0}, 0.0, NAN};
+  for (int i = 0; i < 8; i++) landmarks[i] = {100 + 7 * i, {places[i][0], places[i][1], 0}, 0.0, NAN, {}, 0};
   sensor = {};
   std::strcpy(sensor.name, "camera");
   sensor.mounting.xyz_m[0] = 0.3;

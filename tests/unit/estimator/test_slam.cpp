@@ -46,7 +46,7 @@ void make_room() {
     const double radius = i % 2 == 0 ? 5.0 : 3.5;
     place[i][0] = radius * a.cos;
     place[i][1] = radius * a.sin;
-    known[i] = {10 + i, {place[i][0], place[i][1], 0}, 0.01, kAbsent};
+    known[i] = {10 + i, {place[i][0], place[i][1], 0}, 0.01, kAbsent, {}, 0};
   }
   sensor = {};
   std::strcpy(sensor.name, "camera");

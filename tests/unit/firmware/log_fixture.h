@@ -13,8 +13,9 @@
 #include "waymark/eventlog.h"
 
 static wm_sensor fixture_sensors[2] = {{.name = "left"}, {.name = "right"}};
-static wm_landmark fixture_landmarks[3] = {
-    {1, {1, 2, 0}, 0.01, NAN}, {2, {3, 4, 0}, 0.01, NAN}, {9, {5, 6, 0}, 0.01, NAN}};
+static wm_landmark fixture_landmarks[3] = {{.id = 1, .p_m = {1, 2, 0}, .sigma_m = 0.01, .yaw_rad = NAN},
+                                           {.id = 2, .p_m = {3, 4, 0}, .sigma_m = 0.01, .yaw_rad = NAN},
+                                           {.id = 9, .p_m = {5, 6, 0}, .sigma_m = 0.01, .yaw_rad = NAN}};
 static char fixture_config_text[] = "format: waymark-config/1\nestimator: tiny\n";
 
 static void fixture_assembly(wm_config *config, wm_assembly *assembly) {

@@ -262,7 +262,8 @@ static void a_rig_comes_back_and_a_cut_one_is_refused(void) {
 }
 
 static void the_hash_of_a_map_sees_every_number_and_the_order(void) {
-  wm_landmark map[2] = {{1, {1, 2, 0}, 0.01, NAN}, {2, {3, 4, 0}, 0.01, NAN}};
+  wm_landmark map[2] = {{.id = 1, .p_m = {1, 2, 0}, .sigma_m = 0.01, .yaw_rad = NAN},
+                        {.id = 2, .p_m = {3, 4, 0}, .sigma_m = 0.01, .yaw_rad = NAN}};
   uint64_t hash = wm_landmarks_hash(map, 2);
   wm_landmark swapped[2] = {map[1], map[0]};
   TEST_ASSERT_TRUE(hash != wm_landmarks_hash(swapped, 2));

@@ -312,7 +312,11 @@ void test_landmarks_by_id_and_by_place() {
   expect(f, "landmarks_total", 3);
   expect(f, "landmark_rmse_m", std::sqrt((0.09 + 0.16) / 2));
   expect(f, "landmark_heading_rmse_deg", 0.1 * 180 / kPi, 1e-7);
+  expect(f, "landmark_max_m", 0.4);
+  TEST_ASSERT_TRUE(f["landmark_rmse_own_fit_m"].is_null());  // two landmarks have no shape
   TEST_ASSERT_EQUAL_STRING("id", f["landmarks_matched_by"].get<std::string>().c_str());
+  add_landmark_figures({at(1, 1, 2, 0), at(2, 1, 7, 0), at(3, -4, 2, 0)}, truth, comparison, &f);  // turned and moved
+  expect(f, "landmark_rmse_own_fit_m", 0);
   // Ids of its own: the one beyond 0.5 m is not found, of two near one landmark the nearer.
   add_landmark_figures({at(101, 0.3, 0, NAN), at(102, 0.1, 0, NAN), at(103, 5, 0.6, NAN)}, truth, comparison, &f);
   expect(f, "landmarks_found", 1);
