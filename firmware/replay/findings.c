@@ -2,6 +2,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "waymark/motion.h"
 #include "waymark/replay.h"
@@ -78,6 +79,24 @@ static void about_motion(speaker *to, uint32_t bits) {
     if ((bits >> i) & 1u) say(to, kLines[i]);
 }
 
+// What SLAM counts of landmarks that are not what they seem.
+static void about_map(speaker *to, const wm_health *health) {
+  static const struct {
+    const char *name, *what;
+  } kCounts[] = {
+      {"map.moved", "times a landmark was elsewhere than before; `waymark map survey RUN` says which"},
+      {"map.doubled", "sightings of identities that stand on two landmarks; `waymark map survey RUN` says which"},
+      {"map.no_room", "times a new landmark found no room; raise slam.landmarks.capacity"}};
+  for (uint32_t i = 0; i < health->calibration_count; i++)
+    for (size_t k = 0; k < sizeof kCounts / sizeof kCounts[0]; k++) {
+      const wm_calibration_value *value = &health->calibration[i];
+      if (!(value->value > 0.0) || strcmp(value->name, kCounts[k].name) != 0) continue;
+      char line[200];
+      (void)snprintf(line, sizeof line, "map: %.0f %s", value->value, kCounts[k].what);
+      say(to, line);
+    }
+}
+
 size_t wm_findings(const wm_health *health, wm_finding_fn function, void *context) {
   speaker to = {function, context, 0};
   for (uint32_t i = 0; i < health->source_count; i++) {
@@ -87,6 +106,7 @@ size_t wm_findings(const wm_health *health, wm_finding_fn function, void *contex
     about_device(&to, &health->sources[i]);
   }
   about_motion(&to, health->motion_health);
+  about_map(&to, health);
   if (health->outputs_lost > 0) {
     char line[160];
     (void)snprintf(line, sizeof line, "outputs: %" PRIu64 " records were lost because the sinks were too slow",

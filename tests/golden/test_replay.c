@@ -115,6 +115,19 @@ static void what_is_too_late_is_counted_and_the_number_that_is_told_would_do(voi
   TEST_ASSERT_EQUAL_UINT64(0, source("sightings:eye")->late);
 }
 
+static void keep_any(void *context, const char *line) {
+  (void)context;
+  (void)snprintf(finding, sizeof finding, "%s", line);
+}
+
+static void landmarks_that_moved_are_told(void) {
+  static const wm_health health = {.calibration_count = 2,
+                                   .calibration = {{.name = "map.moved", .value = 2}, {.name = "map.doubled"}}};
+  TEST_ASSERT_EQUAL(1, wm_findings(&health, keep_any, NULL));
+  TEST_ASSERT_EQUAL_STRING("map: 2 times a landmark was elsewhere than before; `waymark map survey RUN` says which",
+                           finding);
+}
+
 // ── silence ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static wm_time_ns all_140(size_t frame) { return (void)frame, 140 * MS; }
@@ -207,6 +220,7 @@ int main(void) {
   RUN_TEST(a_single_frame_150_ms_late_changes_nothing);
   RUN_TEST(frames_that_are_all_250_ms_late_change_nothing);
   RUN_TEST(a_single_frame_250_ms_late_changes_nothing);
+  RUN_TEST(landmarks_that_moved_are_told);
   RUN_TEST(what_is_too_late_is_counted_and_the_number_that_is_told_would_do);
   RUN_TEST(the_first_datum_after_a_silence_is_fused);
   RUN_TEST(silence_costs_the_published_pose_nothing);
