@@ -10,5 +10,6 @@ namespace wm::calibrate {
 // The returned function throws tools::Failure; its value is the exit code.
 std::function<int()> import_command(CLI::App &app);
 std::function<int()> camera_command(CLI::App &app);
+std::function<int()> mounting_command(CLI::App &app);
 
 }  // namespace wm::calibrate

@@ -13,11 +13,13 @@ int main(int argc, char **argv) {
   app.footer("example: waymark calibrate import camchain.yaml\nwaymark calibrate SUBCOMMAND --help says more.");
   CLI::App *import_app = app.add_subcommand("import", "calibrations of OpenCV, Kalibr, ROS and OCamCalib into ours");
   CLI::App *camera_app = app.add_subcommand("camera", "a camera's model from pictures of a chessboard or an AprilGrid");
+  CLI::App *mounting_app = app.add_subcommand("mounting", "how a camera sits on the robot, from a drive with a map");
   const auto import = calibrate::import_command(*import_app);
   const auto camera = calibrate::camera_command(*camera_app);
+  const auto mounting = calibrate::mounting_command(*mounting_app);
   try {
     app.parse(argc, argv);
-    return import_app->parsed() ? import() : camera();
+    return import_app->parsed() ? import() : mounting_app->parsed() ? mounting() : camera();
   } catch (const CLI::ParseError &problem) {
     return app.exit(problem) == 0 ? tools::kDone : tools::kUsage;
   } catch (const std::exception &problem) {

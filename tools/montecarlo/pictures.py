@@ -1,20 +1,22 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Many rendered drives through one configuration: each seed is another building, route, light and set of errors. Renders at
-reduced cost, replays from the pictures, and prints a row a drive and the spread of all.
+"""Edge localization over many rendered drives: each seed is another building, route, light and set of errors. Renders
+what the cache lacks (at reduced cost), keeps what the detector saw and not the pictures, and then runs the filter over
+all: as driven, set down elsewhere, started anywhere, set down where it looks the same.
 
-    pictures.py SCENARIO --config FILE [--seeds N] [--first-seed N] [--duration S] [--size WxH] [--kidnap AT,FORWARD] [--keep FOLDER]
+    pictures.py SCENARIO --config FILE --cache FOLDER [--drives N] [--duration S] [--size WxH] [--rate HZ] [-- OPTION ...]
 
-example: tools/montecarlo/pictures.py config/worlds/corridor-hard.yaml --config config/corridor.yaml --seeds 100
-Drives that --keep holds already are not rendered again. A drive of 60 s takes about 20 s of processor at 640x360."""
+example: tools/montecarlo/pictures.py config/worlds/corridor-hard.yaml --config config/corridor.yaml --cache out/drives --drives 100
+A drive of 120 s takes about 20 s of processor to render at 640x360 and 5 Hz, one ray a pixel, and 4.5 MB to keep. What
+is there already is taken as it is: stop it and go on at will; another detector wants another cache. Options behind --
+go to waymark-montecarlo-edges (--trials kidnap, --diagram lost.svg, --scans scans.csv, --quiet ...)."""
 import argparse
-import csv
-import json
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
-import tempfile
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -23,70 +25,56 @@ def call(*command):
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
     if done.returncode != 0:
         sys.exit(f"{' '.join(str(c) for c in command)}: {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout
 
 
-def cheaper(text, size, kidnap):
-    """The scenario with one ray a pixel and smaller pictures, and the robot carried away, where that is wanted."""
+def cheaper(text, size, rate):
+    """The scenario with one ray a pixel and smaller and fewer pictures."""
     text = re.sub(r"samples: \d+", "samples: 1", text)
-    text = text.replace("pictures:\n", f"cameras: [{{name: front, size: [{size.replace('x', ', ')}]}}]\n\npictures:\n", 1)
-    if kidnap:
-        at, forward = kidnap.split(",")
-        text = text.replace("faults:\n", f"faults:\n  kidnap: {{at_s: {at}, forward_s: {forward}}}\n", 1)
-    return text
+    camera = f"{{name: front, size: [{size.replace('x', ', ')}], rate_hz: {rate:g}}}"
+    return text.replace("pictures:\n", f"cameras: [{camera}]\n\npictures:\n", 1)
 
 
-def states(run):
-    """Seconds in each state, by the fused poses, and when the first one that isn't tracking came."""
-    with open(run / "trajectory.csv") as file:
-        rows = [(int(r["t_ns"]), r["state"]) for r in csv.DictReader(file)]
-    seconds = {}
-    for (t, state), (later, _) in zip(rows, rows[1:]):
-        seconds[state] = seconds.get(state, 0.0) + (later - t) * 1e-9
-    return seconds
-
-
-def quantile(values, share):
-    values = sorted(values)
-    return values[min(len(values) - 1, int(share * len(values)))]
+def make_drive(a, scenario, seed, folder):
+    """A recording without pictures, with the event log of a replay: complete, or not there."""
+    part, run = folder.with_suffix(".part"), folder.with_suffix(".run")
+    for left in (part, run):
+        shutil.rmtree(left, ignore_errors=True)
+    call(a.bin / "waymark-simulate", scenario, "--seed", seed, "--duration", a.duration, "--out", part)
+    call(a.bin / "waymark", "replay", part, "--config", a.config, "--out", run, "--seed", seed)
+    shutil.move(run / "events.wmlog", part / "events.wmlog")
+    for gone in (run, part / "video", part / "labels"):
+        shutil.rmtree(gone, ignore_errors=True)
+    part.rename(folder)
 
 
 def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("scenario", type=pathlib.Path)
     p.add_argument("--config", type=pathlib.Path, required=True)
-    p.add_argument("--seeds", type=int, default=10)
+    p.add_argument("--cache", type=pathlib.Path, required=True, help="folder of the drives")
+    p.add_argument("--drives", type=int, default=10)
     p.add_argument("--first-seed", type=int, default=1)
-    p.add_argument("--duration", type=float, default=60)
+    p.add_argument("--duration", type=float, default=120)
     p.add_argument("--size", default="640x360")
-    p.add_argument("--kidnap", help="AT,FORWARD: carried at AT s to where it would be FORWARD s later")
-    p.add_argument("--keep", type=pathlib.Path, help="folder of the recordings")
+    p.add_argument("--rate", type=float, default=5, help="pictures a second")
     p.add_argument("--bin", type=pathlib.Path, default=ROOT / "build" / "bin")
+    p.add_argument("rest", nargs="*", help="options of waymark-montecarlo-edges, behind --")
     a = p.parse_args()
-    figures = []
-    with tempfile.TemporaryDirectory() as work:
-        work = pathlib.Path(work)
-        scenario = work / a.scenario.name
-        scenario.write_text(cheaper(a.scenario.read_text(), a.size, a.kidnap))
-        print(" seed |  mean m   p95 m   max m |  heading deg | NEES in 95 % | lost | seconds lost or searching")
-        for seed in range(a.first_seed, a.first_seed + a.seeds):
-            recording = (a.keep or work) / f"{a.scenario.stem}-{seed}"
-            if not (recording / "recording.yaml").exists():
-                call(a.bin / "waymark-simulate", scenario, "--seed", seed, "--duration", a.duration, "--out", recording)
-            run = work / "run"
-            call(a.bin / "waymark", "replay", recording, "--config", a.config, "--out", run, "--seed", seed)
-            f = json.loads(call(a.bin / "waymark-eval", run, recording, "--json"))
-            times = states(run)
-            f["astray_s"] = times.get("lost", 0.0) + times.get("searching", 0.0)
-            figures.append(f)
-            print(f"{seed:5d} | {f['position_mean_m']:7.4f} {f['position_p95_m']:7.3f} {f['position_max_m']:7.3f} |"
-                  f" {f['heading_mean_abs_deg']:12.3f} | {f['nees_inside_95']:12.3f} | {f['lost_count']:4d} | {f['astray_s']:6.1f}",
-                  flush=True)
-    for name, key in (("mean", "position_mean_m"), ("max", "position_max_m"), ("heading", "heading_mean_abs_deg")):
-        values = [f[key] for f in figures]
-        print(f"{name}: median {quantile(values, 0.5):.4f}, 90 of 100 below {quantile(values, 0.9):.4f}, worst {max(values):.4f}")
-    print(f"{len(figures)} drives, {sum(f['lost_count'] > 0 for f in figures)} lost, "
-          f"{sum(f['astray_s'] > 0 for f in figures)} that said they were")
+    a.cache.mkdir(parents=True, exist_ok=True)
+    scenario = a.cache / a.scenario.name
+    wanted = cheaper(a.scenario.read_text(), a.size, a.rate)
+    if scenario.exists() and scenario.read_text() != wanted:
+        sys.exit(f"{a.cache}: holds drives of another scenario, size or rate; name another --cache")
+    scenario.write_text(wanted)
+    seeds = range(a.first_seed, a.first_seed + a.drives)
+    missing = [s for s in seeds if not (a.cache / str(s) / "events.wmlog").exists()]
+    begun = time.monotonic()
+    for done, seed in enumerate(missing):
+        left = f", {(time.monotonic() - begun) / done * (len(missing) - done) / 60:.0f} min left" if done else ""
+        print(f"rendering seed {seed}, {done + 1} of {len(missing)}{left}", file=sys.stderr, flush=True)
+        make_drive(a, scenario, seed, a.cache / str(seed))
+    command = [a.bin / "waymark-montecarlo-edges", a.cache, "--config", a.config, *a.rest]
+    sys.exit(subprocess.run([str(c) for c in command]).returncode)
 
 
 if __name__ == "__main__":
