@@ -13,6 +13,9 @@ namespace wm {
 
 namespace {
 
+constexpr int kLinesCrossed = 4;  // of a ray, before it gives up
+constexpr double kBlur_px = 1.0;  // what a line is wider in the picture
+
 struct edges_state {
   wm_edges_params params;
   int32_t camera_index;
@@ -154,8 +157,11 @@ bool is_narrow(const wm_frame &frame, const ray_edge &edge, const pixel &at, dou
   return false;
 }
 
-// The edge as a point on the floor with its normal and sigma. False where the picture doesn't tell.
-bool floor_point(const edges_state &state, const ray_edge &edge, const wm_frame &frame, wm_points *out) {
+enum class found { kPoint, kLine, kNothing };
+
+// The edge as a point on the floor with its normal and sigma. kLine: the band behind it is narrow across, such as that
+// of a joint between tiles that the ray meets at a flat angle. kNothing: the picture doesn't tell.
+found floor_point(const edges_state &state, const ray_edge &edge, const wm_frame &frame, wm_points *out) {
   const ray &r = state.fan.rays[edge.ray];
   const double range = range_at(state.fan, r, static_cast<double>(edge.sample));
   const vec3 centre = state.camera.centre_m;
@@ -164,17 +170,19 @@ bool floor_point(const edges_state &state, const ray_edge &edge, const wm_frame 
   pixel at, at_x, at_y;
   if (!pixel_of(state.camera, {x, y, 0}, 2.5, &at) || !pixel_of(state.camera, {x + step, y, 0}, 0, &at_x) ||
       !pixel_of(state.camera, {x, y + step, 0}, 0, &at_y))
-    return false;
+    return found::kNothing;
   double gu, gv;
   slope_at(frame, at, &gu, &gv);
   const double gx = (gu * (at_x.u - at.u) + gv * (at_x.v - at.v)) / step,
                gy = (gu * (at_y.u - at.u) + gv * (at_y.v - at.v)) / step;
   const double picture = std::sqrt(gu * gu + gv * gv), floor = std::sqrt(gx * gx + gy * gy);
-  if (!(picture > 0.2) || !(floor > 0)) return false;
+  if (!(picture > 0.2) || !(floor > 0)) return found::kNothing;
   // An upright board that is just no line lies along the ray in the picture, too.
   const double along = gx * r.cos + gy * r.sin,
-               board_px = state.params.rays_line_rel * range * std::fabs(along) / picture;
-  if (is_narrow(frame, edge, at, gu / picture, gv / picture, board_px)) return false;
+               board_px = state.params.rays_line_rel * range * std::fabs(along) / picture,
+               line_px = kBlur_px + state.params.rays_line_m * floor / picture;
+  if (is_narrow(frame, edge, at, gu / picture, gv / picture, board_px > line_px ? board_px : line_px))
+    return found::kLine;
   const double noise = state.params.noise_grey / picture / 3;  // the mean of about ten pixels
   const double sigma_px = std::sqrt(square(state.params.sigma_px) + square(noise));
   const uint32_t i = out->count++;
@@ -182,20 +190,26 @@ bool floor_point(const edges_state &state, const ray_edge &edge, const wm_frame 
   out->y_m[i] = static_cast<float>(y);
   out->normal_rad[i] = static_cast<float>(atan2(-gy, -gx));
   out->sigma_m[i] = static_cast<float>(sigma_px * picture / floor);
-  return true;
+  return found::kPoint;
 }
 
 void points_of_rays(edges_state *state, const wm_frame &frame, wm_points *points) {
   int32_t rays[WM_POINTS_MAX];
   const double usual = usual_floor(state->fan, frame);
   for (uint32_t i = 0; i < state->fan.ray_count; i++) {
+    int from = 0;
     ray_edge edge;
-    if (!find_first_edge(state->fan, i, frame, usual, state->params, &state->work, &edge)) continue;
-    const uint32_t place = points->count;
-    if (place == WM_POINTS_MAX) {
-      points->dropped++;
-    } else if (floor_point(*state, edge, frame, points)) {
-      rays[place] = edge.ray;
+    for (int lines = 0; lines <= kLinesCrossed; lines++, from = static_cast<int>(edge.sample) + 2) {
+      if (!find_first_edge(state->fan, i, frame, usual, state->params, from, &state->work, &edge)) break;
+      const uint32_t place = points->count;
+      if (place == WM_POINTS_MAX) {
+        points->dropped++;
+        break;
+      }
+      const found what = floor_point(*state, edge, frame, points);
+      if (what == found::kLine) continue;
+      if (what == found::kPoint) rays[place] = edge.ray;
+      break;
     }
   }
   keep_supported(points, rays, state->camera.centre_m.x, state->camera.centre_m.y, state->params.rays_support_min);

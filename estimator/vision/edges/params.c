@@ -27,12 +27,15 @@ static const wm_param kParams[] = {
      "upper edges go the other way and must not be taken for the joint of wall and floor."},
     F64("rays.contrast_grey", rays_contrast_grey, 6.0, 0.5, 255,
         "Grey levels. Smallest difference of both sides, averaged over four pixels each: above noise and compression."),
-    F64("rays.contrast_rel", rays_contrast_rel, 0.12, 0.0, 1,
+    F64("rays.contrast_rel", rays_contrast_rel, 0.10, 0.0, 1,
         "Smallest difference of both sides over their sum: above that of neighbouring boards, stains and reflections."),
     F64("rays.line_rel", rays_line_rel, 0.05, 0.0, 1,
         "In parts of the range. A dark band that is narrower on the floor is a line (a tile's joint, a cable), no "
         "wall: "
         "the height of a board over the camera's height, less than half of the lowest skirting."),
+    F64("rays.line_m", rays_line_m, 0.035, 0.0, 1,
+        "m. A dark band that is narrower across is a line, too: a ray meets the joints that run along the robot's way "
+        "at a flat angle. Nearer walls than a few times this, beside the camera, are not seen."),
     F64("rays.mirror_rel", rays_mirror_rel, 0.3, 0.0, 2,
         "In parts of the range. How far behind an edge a stronger one is taken instead: glossy floors mirror a "
         "skirting "

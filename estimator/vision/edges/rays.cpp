@@ -114,14 +114,14 @@ bool is_line(const profile &p, const step &s, double narrow_rel) {
   return false;
 }
 
-bool find_first_step(const profile &p, double usual_grey, const wm_edges_params &params, step *out) {
+bool find_first_step(const profile &p, double usual_grey, const wm_edges_params &params, int from, step *out) {
   constexpr double kBrighter = 1.3;  // towards a window, but not a lamp itself
   const double begin = p.mean(0);
   floor_level floor = {begin < kBrighter * usual_grey ? begin : kBrighter * usual_grey};
   for (int i = p.first(), seen = 0; i < p.end(); i++) {
     for (; seen < i - kSide; seen++) floor.see(p.grey[seen]);
     const bool is_fall = p.is_fall(i);
-    if (!is_fall && !(params.rays_sign == EDGES_ANY_SIGN && p.is_rise(i))) continue;
+    if (i < from || (!is_fall && !(params.rays_sign == EDGES_ANY_SIGN && p.is_rise(i)))) continue;
     // A lamp's reflection ends with a fall to what the floor was all the time: only what falls below that counts.
     const double before = p.before(i), level = is_fall && floor.grey < before ? floor.grey : before;
     *out = {i, level, p.after(i), is_fall};
@@ -226,14 +226,14 @@ double usual_floor(const ray_fan &fan, const wm_frame &frame) {
 }
 
 bool find_first_edge(const ray_fan &fan, uint32_t index, const wm_frame &frame, double usual_grey,
-                     const wm_edges_params &params, ray_work *work, ray_edge *out) {
+                     const wm_edges_params &params, int from, ray_work *work, ray_edge *out) {
   profile p;
   const ray &r = fan.rays[index];
   p.range_m = fan.range_m + r.first;
   p.grey = work->grey;
   p.count = read_profile(fan, r, frame, work->grey);
   step first;
-  if (!find_first_step(p, usual_grey, params, &first)) return false;
+  if (!find_first_step(p, usual_grey, params, from, &first)) return false;
   const int i = first.is_fall ? joint_behind(p, first, params) : first.at;
   // Sub-pixel: the parabola through the three steepest.
   const double left = p.drop(i - 1), here = p.drop(i), right = p.drop(i + 1), bend = left - 2 * here + right;

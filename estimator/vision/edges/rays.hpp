@@ -55,9 +55,9 @@ struct ray_work {
   int32_t grey[kRaySamplesMax];
 };
 
-// First edge on the ray that is one of a wall. False where there is none.
+// First edge on the ray that is one of a wall, from sample `from` on. False where there is none.
 bool find_first_edge(const ray_fan &fan, uint32_t index, const wm_frame &frame, double usual_grey,
-                     const wm_edges_params &params, ray_work *work, ray_edge *out);
+                     const wm_edges_params &params, int from, ray_work *work, ray_edge *out);
 
 // Range at a place between samples.
 double range_at(const ray_fan &fan, const ray &r, double sample);
