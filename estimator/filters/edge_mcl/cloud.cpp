@@ -41,6 +41,10 @@ void cloud::normals(int particle, double out[4]) const {
 
 void cloud::spread(const wm_pose2 &pose, const double covariance[3][3]) {
   spread_some(0, count_, pose, covariance);
+  level();
+}
+
+void cloud::level() {
   for (int i = 0; i < count_; i++) array(3)[i] = 1.0 / count_;
 }
 

@@ -35,6 +35,7 @@ class cloud {
   // All particles normally about `pose`, weighted alike; or `from` to `to` of them only.
   void spread(const wm_pose2 &pose, const double covariance[3][3]);
   void spread_some(int from, int to, const wm_pose2 &pose, const double covariance[3][3]);
+  void level();  // all weigh the same
   // Each by the increment (in its own frame at the beginning) with its own noise.
   void move(const wm_pose2 &increment, const step_noise &noise);
   // Multiplies the weights by exp(exponent * score), or by the score itself (`sum`), and by 0 where it can't be driven,

@@ -6,11 +6,18 @@
 namespace wm {
 namespace {
 
-constexpr double kOddsMax = 7.0;
+constexpr double kOddsMax = 6.0;
 constexpr double kLostOdds = 1.0, kFoundOdds = -2.0, kTrustedOdds = -3.0, kMemory_s = 2.0, kUsual_s = 10.0;
 constexpr double kApart_m = 0.3, kApart_rad = 0.15, kApart_s = 1.0;
 constexpr double kFoundSigma_m = 0.1, kFoundSigma_rad = 0.03;
-constexpr double kCluster_m = 0.6, kCluster_rad = 0.3, kProof_m = 1.5, kBetter = 0.15;
+constexpr double kFresh_s = 0.5, kFresh_m = 0.2;  // scans further apart speak each for itself
+constexpr double kWander_m = 0.1, kLoosened_m2ps = 0.002, kLoosened_rad2ps = 0.0002;
+constexpr double kDoubtOdds = -2.0;
+constexpr int kFewKeyframes = 4, kManyKeyframes = 10;  // 0.4 m each
+constexpr int kLeisure = 8, kWeighedInDoubt = 6;
+constexpr double kBetter = 0.15;
+constexpr double kCarriedOff = 7.0;  // odds that nobody has carried it off in the last metres, logarithm of
+constexpr double kNowhere = -1e3;
 
 bool near(const wm_pose2 &a, const wm_pose2 &b) {
   const wm_pose2 way = between(a, b);
@@ -20,10 +27,13 @@ bool near(const wm_pose2 &a, const wm_pose2 &b) {
 }  // namespace
 
 // The odds of being lost: each scan speaks by the share of its points that the map explains from the pose, scans of one
-// moment together no more than once; and out of the blue somebody lifts the robot.
+// moment or of one place together no more than once; and out of the blue somebody lifts the robot.
 void edge_mcl::watch(double explained, int seen, double dt_s) {
   if (seen < 8) return;
-  const double fresh = dt_s > 0.5 ? 1.0 : dt_s / 0.5;
+  const double way = filter_.travelled_m() + filter_.turned_rad() - watched_m_;
+  watched_m_ += way;
+  double fresh = dt_s / kFresh_s < way / kFresh_m ? dt_s / kFresh_s : way / kFresh_m;
+  if (fresh > 1.0) fresh = 1.0;
   explained_ += fresh * (explained - explained_);
   // Places differ in how much of them a map explains: what is usual here sets the bar.
   const double relative = params_.lost_relative * usual_;
@@ -35,26 +45,31 @@ void edge_mcl::watch(double explained, int seen, double dt_s) {
   lost_odds_ = log(blue / (1.0 - blue));
   if (!(lost_odds_ < kOddsMax)) lost_odds_ = kOddsMax;
   if (!(lost_odds_ > -kOddsMax)) lost_odds_ = -kOddsMax;
+
+  if (state_ == WM_STATE_TRACKING && said < 0.0 && lost_odds_ < kTrustedOdds) search_.mark();
   if (state_ == WM_STATE_TRACKING && lost_odds_ > kLostOdds) {
     state_ = WM_STATE_LOST;
     restore_calibration();
-    search_.clear();
-    seeded_m_ = -1.0;
-  } else if (on_trial_ && lost_odds_ > kLostOdds) {
-    on_trial_ = false;
-    search_.clear();
   } else if (state_ != WM_STATE_TRACKING && lost_odds_ < kFoundOdds) {
     state_ = WM_STATE_TRACKING;
+    on_trial_ = false;
     apart_s_ = 0.0;
+  } else if (on_trial_ && lost_odds_ > kLostOdds) {
+    on_trial_ = false;
+  }
+  if (!in_doubt_ && lost_odds_ > kDoubtOdds) {
+    in_doubt_ = true;
+    search_.begin_at_mark();
+  } else if (in_doubt_ && lost_odds_ < kTrustedOdds) {
+    in_doubt_ = false;
   }
   if (state_ == WM_STATE_TRACKING && lost_odds_ < kTrustedOdds) {
     remember_calibration();
     usual_ += dt_s / kUsual_s * (explained - usual_);
   }
-  if (state_ != WM_STATE_TRACKING) {
-    const double grow = dt_s > 1.0 ? 1.0 : dt_s;
-    if (filter_.variance(kX) < 1e4) filter_.inflate_pose(0.05 * grow, 0.002 * grow);
-  }
+  // Its own place stays one of those that are possible, so it is not left to wander to what happens to fit.
+  if (state_ != WM_STATE_TRACKING && filter_.variance(kX) < square(kWander_m))
+    filter_.inflate_pose(kLoosened_m2ps * dt_s, kLoosened_rad2ps * dt_s);
 }
 
 void edge_mcl::remember_calibration() {
@@ -100,53 +115,86 @@ void edge_mcl::heed_cloud() {
   resets_++;
 }
 
-// Lost: sweeps over the map bring places, the cloud carries them on and weighs them until one is left.
-void edge_mcl::search() {
-  if (lost_odds_ <= kLostOdds) return;  // a place was taken, and is on trial
-  if (search_.way_m() >= params_.search_way_m && search_.step(map_, params_.search_poses, filter_.odom())) seed_cloud();
-  if (seeded_m_ < 0.0 || filter_.travelled_m() - seeded_m_ < kProof_m) return;
-  const int best = cloud_.best();
-  const cloud_moments m =
-      cloud_.moments_near({cloud_.x(best), cloud_.y(best), cloud_.heading(best)}, kCluster_m, kCluster_rad);
-  if (m.share < params_.search_share) return;
-  // It must explain the scans of the last metres, and better than where the filter has stayed.
-  wm_pose2 pose = m.mean, stayed = filter_.pose();
-  const double here = search_.explained(map_, filter_.odom(), &stayed);
-  const double there = search_.explained(map_, filter_.odom(), &pose);
-  if (there < params_.search_explained || (there < here + kBetter && !near(stayed, pose))) return;
-  take_place(pose);
-}
-
-// Half of the particles, those that weigh least, go to the places found.
-void edge_mcl::seed_cloud() {
-  int count;
-  const place *places = search_.places(&count);
-  if (count == 0) return;
-  const wm_pose2 since = between(search_.odom_of_places(), filter_.odom());
-  const double covariance[3][3] = {
-      {square(kFoundSigma_m), 0, 0}, {0, square(kFoundSigma_m), 0}, {0, 0, square(kFoundSigma_rad)}};
-  const bool first = seeded_m_ < 0.0;
-  cloud_.resample();
-  // Where the filter has stayed is one of them.
-  const int from = first ? 0 : cloud_.count() / 2, each = (cloud_.count() - from + count) / (count + 1);
-  for (int i = 0; i <= count; i++) {
-    const int begin = from + i * each, end = begin + each < cloud_.count() ? begin + each : cloud_.count();
-    const wm_pose2 pose = i < count ? compose(places[i].pose, since) : filter_.pose();
-    if (begin < end) cloud_.spread_some(begin, end, pose, covariance);
+// Where else could it be? Sweeps over the map bring places, at leisure while there is no doubt; what the last metres
+// say of each decides.
+void edge_mcl::ponder(bool new_keyframe) {
+  others_.carry(filter_.pose(), filter_.odom());
+  if (search_.keyframes() < (in_doubt_ ? kFewKeyframes : kManyKeyframes)) return;
+  const int poses = in_doubt_ ? params_.search_poses : params_.search_poses / kLeisure;
+  if (search_.step(map_, poses, filter_.odom())) others_.offer(search_);
+  const double own_prior = state_ == WM_STATE_SEARCHING && !on_trial_ ? kNowhere
+                           : state_ == WM_STATE_TRACKING              ? kCarriedOff
+                                                                      : 0.0;
+  // One's own place explains at least what it explains now: it has been corrected all along, the others have not.
+  const double own_least = state_ == WM_STATE_TRACKING ? explained_ : 0.0;
+  others_.weigh(map_, &search_, own_prior, own_least, in_doubt_ ? kWeighedInDoubt : 1);
+  const int best = others_.best();
+  const hypothesis &there = others_[best];
+  const bool sure = there.weighed && there.share >= params_.search_share && there.explained >= params_.search_explained;
+  if (best > 0 && sure && there.explained >= others_[0].explained + (state_ == WM_STATE_SEARCHING ? 0.0 : kBetter)) {
+    take_place(best);
+  } else if (best == 0 && sure && state_ != WM_STATE_TRACKING && !on_trial_) {
+    lost_odds_ = 0.0;
+    on_trial_ = true;
+  } else if (new_keyframe && state_ != WM_STATE_TRACKING && !on_trial_) {
+    seed_cloud();
   }
-  if (first) seeded_m_ = filter_.travelled_m();
 }
 
-void edge_mcl::take_place(const wm_pose2 &pose) {
+// Lost: the particles stand where the robot may be.
+void edge_mcl::seed_cloud() {
   const double covariance[3][3] = {
       {square(kFoundSigma_m), 0, 0}, {0, square(kFoundSigma_m), 0}, {0, 0, square(kFoundSigma_rad)}};
-  seeded_m_ = -1.0;
+  double total = 0.0, sum = 0.0;
+  for (int i = 0; i < others_.count(); i++) total += others_[i].share;
+  if (!(total > 0.0)) return;
+  for (int i = 0, begin = 0; i < others_.count(); i++) {
+    sum += others_[i].share;
+    const int end = (int)(sum / total * cloud_.count() + 0.5);
+    if (begin < end) cloud_.spread_some(begin, end, others_[i].pose, covariance);
+    begin = end;
+  }
+  cloud_.level();
+}
+
+void edge_mcl::take_place(int hypothesis) {
+  const double covariance[3][3] = {
+      {square(kFoundSigma_m), 0, 0}, {0, square(kFoundSigma_m), 0}, {0, 0, square(kFoundSigma_rad)}};
+  const wm_pose2 pose = others_[hypothesis].pose;
+  if (state_ == WM_STATE_TRACKING) {
+    state_ = WM_STATE_LOST;
+    restore_calibration();
+  }
   lost_odds_ = 0.0;
-  on_trial_ = true;
-  const bool same = near(filter_.pose(), pose);
+  in_doubt_ = on_trial_ = true;
+  if (!near(filter_.pose(), pose)) resets_++;
+  others_.adopt(hypothesis);
   filter_.set_pose(pose, covariance);
   cloud_.spread(pose, covariance);
-  if (!same) resets_++;
+}
+
+// The covariance of all that is possible about the pose that is given out: the places with their probabilities; while
+// lost, what is left may be anywhere in the map.
+void edge_mcl::spread_over_hypotheses(wm_estimate *out) const {
+  const int at[3] = {0, 1, 5};
+  const wm_pose2 pose = {out->pose_map_base.p_m[0], out->pose_map_base.p_m[1], out->heading_rad};
+  double rest = 1.0;
+  for (int i = 0; i < others_.count(); i++) {
+    const hypothesis &h = others_[i];
+    rest -= h.share;
+    if (i == 0) continue;
+    const double d[3] = {h.pose.x_m - pose.x_m, h.pose.y_m - pose.y_m, wrap(h.pose.heading_rad - pose.heading_rad)};
+    for (int r = 0; r < 3; r++)
+      for (int c = 0; c < 3; c++) out->covariance[wm_cov_index(at[r], at[c])] += h.share * d[r] * d[c];
+  }
+  if (state_ == WM_STATE_TRACKING) return;
+  if (!on_trial_) rest = 1.0;
+  const wm_raster &map = map_.raster();
+  const double width = map.width_px * map.resolution_m, height = map.height_px * map.resolution_m;
+  const double anywhere = rest * (square(width) + square(height)) / 12.0;
+  out->covariance[wm_cov_index(0, 0)] += anywhere;
+  out->covariance[wm_cov_index(1, 1)] += anywhere;
+  out->covariance[wm_cov_index(5, 5)] += rest * square(kPi) / 3.0;
 }
 
 }  // namespace wm

@@ -90,7 +90,9 @@ void edge_mcl::start_again(bool known) {
   fused_ns_ = WM_TIME_NONE;
   explained_ = params_.lost_explained;
   apart_s_ = 0.0;
-  seeded_m_ = -1.0;
+  others_.clear(filter_.pose(), filter_.odom());
+  watched_m_ = filter_.travelled_m() + filter_.turned_rad();
+  in_doubt_ = !known;
   on_trial_ = false;
   lost_odds_ = known ? -4.0 : 6.0;
   state_ = known ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
@@ -148,11 +150,9 @@ wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
   record.residual = WM_RESIDUAL_PIXEL;
   if (align(points, camera, &record)) fused_ns_ = event.t_ns;
   watch(record.observed, (int)record.gate, dt);
-  search_.see(lined_, filter_.odom());
-  if (state_ == WM_STATE_TRACKING)
-    heed_cloud();
-  else
-    search();
+  const bool new_keyframe = search_.see(lined_, filter_.odom());
+  if (state_ == WM_STATE_TRACKING) heed_cloud();
+  ponder(new_keyframe);
   records.add(record);
   return WM_OK;
 }
@@ -262,6 +262,7 @@ void edge_mcl::estimate(wm_estimate *out) const {
     for (int r = 0; r < 3; r++)
       for (int c = 0; c < 3; c++) out->covariance[wm_cov_index(at[r], at[c])] = m.covariance[r][c];
   }
+  if (state_ != WM_STATE_SEARCHING) spread_over_hypotheses(out);
   if (fused_ns_ == WM_TIME_NONE) return;  // the pose is what was said, as sure as it was said
   out->covariance[wm_cov_index(0, 0)] += square(params_.lasting_xy_m);
   out->covariance[wm_cov_index(1, 1)] += square(params_.lasting_xy_m);

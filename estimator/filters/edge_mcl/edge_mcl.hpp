@@ -7,6 +7,7 @@
 
 #include "filters/edge_mcl/align.hpp"
 #include "filters/edge_mcl/cloud.hpp"
+#include "filters/edge_mcl/hypotheses.hpp"
 #include "filters/edge_mcl/params.h"
 #include "filters/edge_mcl/place_search.hpp"
 #include "filters/planar/planar_filter.hpp"
@@ -64,9 +65,10 @@ class edge_mcl {
   void pull_cloud(const normal_equations &equations);
   void watch(double explained, int seen, double dt_s);
   void heed_cloud();
-  void search();
+  void ponder(bool new_keyframe);
   void seed_cloud();
-  void take_place(const wm_pose2 &pose);
+  void take_place(int hypothesis);
+  void spread_over_hypotheses(wm_estimate *out) const;
   void remember_calibration();
   void restore_calibration();
 
@@ -79,6 +81,7 @@ class edge_mcl {
   score_field field_;
   scan_points scan_, lined_;  // all, and those that lie on a line with their neighbours
   place_search search_;
+  hypotheses others_;
   floor_camera camera_[kCamerasMax];
   int camera_count_;
   int camera_state_[kCamerasMax][kCameraErrors + 1];  // and the time offset
@@ -96,10 +99,11 @@ class edge_mcl {
   double lost_odds_;  // logarithm of
   double explained_;  // share, smoothed
   double usual_;      // the same over a longer time, while the pose is trusted
-  double seeded_m_;   // way when the cloud was last seeded with places
   double apart_s_;    // the cloud's main cluster has been elsewhere, and better
+  double watched_m_;  // way when the last scan was judged
   uint32_t resets_;
   uint8_t state_;
+  bool in_doubt_;  // of the pose: what was seen lately is looked for elsewhere
   bool on_trial_;  // a place was taken, the scans have not confirmed it yet
 };
 

@@ -29,7 +29,7 @@ typedef struct wm_edge_mcl_params {
   double lasting_xy_m, lasting_heading_rad;
 
   double lost_explained, lost_relative, lost_gain, lost_per_s;
-  double search_way_m, search_explained, search_share;
+  double search_explained, search_share;
   int32_t search_poses;
   double dead_reckoning_after_s;
 } wm_edge_mcl_params;

@@ -13,7 +13,8 @@ constexpr double kGrid_m = 0.2;
 constexpr int kHeadings = 72;
 constexpr double kKeyframeWay_m = 0.4, kKeyframeTurn_rad = 0.25;
 constexpr double kSameWay_m = 0.6, kSameTurn_rad = 0.3;  // places nearer than this are one
-constexpr int kRefinedAScan = 4;
+constexpr int kRefinedAScan = 6;
+constexpr double kHopeful = 0.35;  // how much better a point more may be than those before, on average
 
 double way_between(const wm_pose2 &a, const wm_pose2 &b) {
   return std::sqrt(square(a.x_m - b.x_m) + square(a.y_m - b.y_m));
@@ -46,20 +47,23 @@ void place_search::init(const edge_map &map) {
 }
 
 void place_search::clear() {
-  seen_ = 0;
-  way_m_ = 0.0;
+  seen_ = marked_ = from_ = 0;
   running_ = false;
   place_count_ = 0;
 }
 
-void place_search::see(const scan_points &scan, const wm_pose2 &odom) {
-  if (scan.count < 8) return;
+void place_search::begin_at_mark() {
+  from_ = marked_;
+  running_ = false;
+}
+
+bool place_search::see(const scan_points &scan, const wm_pose2 &odom) {
+  if (scan.count < 8) return false;
   if (seen_ > 0) {
     const keyframe &last = keyframes_[(seen_ - 1) % kKeyframes];
     const double way = way_between(last.odom, odom);
-    if (way < kKeyframeWay_m && std::fabs(wrap(last.odom.heading_rad - odom.heading_rad)) < kKeyframeTurn_rad) return;
-    way_m_ += way;
-    if (way_m_ > kKeyframes * kKeyframeWay_m) way_m_ = kKeyframes * kKeyframeWay_m;
+    if (way < kKeyframeWay_m && std::fabs(wrap(last.odom.heading_rad - odom.heading_rad)) < kKeyframeTurn_rad)
+      return false;
   }
   keyframe &k = keyframes_[seen_++ % kKeyframes];
   k.odom = odom;
@@ -69,12 +73,12 @@ void place_search::see(const scan_points &scan, const wm_pose2 &odom) {
     k.x_m[i] = scan.x_m[from];
     k.y_m[i] = scan.y_m[from];
   }
+  return true;
 }
 
 void place_search::gather(const wm_pose2 &odom, scan_points *out) const {
   out->count = 0;
-  const uint64_t oldest = seen_ > kKeyframes ? seen_ - kKeyframes : 0;
-  for (uint64_t n = oldest; n < seen_; n++) {
+  for (uint64_t n = oldest(); n < seen_; n++) {
     const keyframe &k = keyframes_[n % kKeyframes];
     const wm_pose2 from = between(odom, k.odom);
     const sin_cos h = sincos(from.heading_rad);
@@ -100,8 +104,14 @@ void place_search::begin(const wm_pose2 &odom) {
     few_.x_m[i] = all_.x_m[from];
     few_.y_m[i] = all_.y_m[from];
   }
+  fewer_.count = 0;
+  for (int i = 0; i < few_.count; i += kSweepPoints / kFirstPoints) {
+    fewer_.x_m[fewer_.count] = few_.x_m[i];
+    fewer_.y_m[fewer_.count++] = few_.y_m[i];
+  }
   close(all_);
   close(few_);
+  close(fewer_);
   running_ = few_.count > 0;
   next_ = 0;
   refined_ = 0;
@@ -155,6 +165,10 @@ bool place_search::step(const edge_map &map, int poses, const wm_pose2 &odom) {
     for (int k = 0; k < kHeadings; k++) {
       pose.heading_rad = wrap(k * (kTwoPi / kHeadings));
       const sin_cos h = sincos(pose.heading_rad);
+      // A quarter of the points says of most poses that it is not there.
+      const int32_t first = score(map, fewer_, wide_, pose.x_m, pose.y_m, h.cos, h.sin);
+      const double hoped = (double)first / fewer_.count + kHopeful / kScoreUnit;
+      if (place_count_ == kPlaces && hoped * few_.count < places_[kPlaces - 1].score) continue;
       offer(pose, score(map, few_, wide_, pose.x_m, pose.y_m, h.cos, h.sin));
     }
     poses -= kHeadings;
