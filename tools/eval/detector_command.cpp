@@ -2,11 +2,13 @@
 #include "eval/detector_command.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/cameras.h"
 #include "common/edge_points.h"
 #include "common/failure.h"
 #include "eval/detector.h"
+#include "eval/line_contrast.h"
 
 namespace wm::tools {
 namespace {
@@ -62,6 +64,32 @@ Figures evaluate_detector(const DetectorArguments &a) {
                                 floor->y() <= a.view_m[3]);
   };
   return detector_figures(truth, detected, metric);
+}
+
+Figures evaluate_lines(const DetectorArguments &a) {
+  constexpr double kWithin_rad = 0.5 * M_PI / 180;  // half of what separates a line from its sides
+  const fs::path run = a.run, recording = a.recording, calibration = recording / "calibration.yaml",
+                 labels = recording / "labels/lines.csv";
+  if (!fs::exists(labels))
+    throw Failure(labels.string() +
+                  ": is not there; a detector is judged by labelled pictures (waymark simulate writes them for halls)");
+  const std::vector<NamedCamera> cameras = load_cameras(calibration);
+  const NamedCamera &camera = choose_camera(cameras, a.camera, calibration);
+  wm_camera own{};
+  const LineSightings seen = load_line_sightings(run, camera.name, &own);
+  std::map<int64_t, std::vector<LabelledLine>> truth = load_line_labels(labels);
+  std::map<int64_t, int64_t> stamps;
+  for (const auto &[t_ns, frame] : load_frame_stamps(recording, camera.name)) stamps[frame] = t_ns;
+  // A labelled picture that the run passed over is not judged.
+  std::erase_if(truth, [&](const auto &entry) {
+    const auto stamp = stamps.find(entry.first);
+    return stamp == stamps.end() || !seen.contains(stamp->second);
+  });
+  if (truth.empty()) throw Failure(run.string() + ": the run looked at no labelled picture");
+  mark_contrast(recording, own, static_cast<int32_t>(&camera - cameras.data()), stamps, &truth);
+  std::vector<LinePicture> pictures;
+  for (const auto &[frame, lines] : truth) pictures.push_back({lines, seen.at(stamps.at(frame))});
+  return line_figures(pictures, kWithin_rad);
 }
 
 }  // namespace wm::tools

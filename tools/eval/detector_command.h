@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `waymark eval --detector edges`: from folders to figures.
+// `waymark eval --detector edges` and `lines`: from folders to figures.
 #pragma once
 
 #include <string>
@@ -16,5 +16,7 @@ struct DetectorArguments {
 
 // Reads RUN/detections/CAMERA-edges.csv, REC/labels/edges.csv and REC/calibration.yaml. Throws Failure.
 Figures evaluate_detector(const DetectorArguments &arguments);
+// Reads RUN/events.wmlog, REC/labels/lines.csv, REC/video, truth.csv and truth-landmarks.csv. Throws Failure.
+Figures evaluate_lines(const DetectorArguments &arguments);
 
 }  // namespace wm::tools

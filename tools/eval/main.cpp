@@ -10,6 +10,7 @@
 #include "eval/detector.h"
 #include "eval/detector_command.h"
 #include "eval/figures.h"
+#include "eval/lines.h"
 #include "eval/print.h"
 
 namespace {
@@ -39,8 +40,9 @@ void parse(CLI::App *app, Arguments *a) {
       ->capture_default_str();
   app->add_option("--from", a->compare.from_s, "judge from this many seconds after the run's first pose");
   app->add_option("--to", a->compare.to_s, "judge up to this many seconds after the run's first pose");
-  app->add_option("--detector", a->detector, "judge what a detector saw (RUN/detections) by the recording's labels")
-      ->check(CLI::IsMember({"edges"}));
+  app->add_option("--detector", a->detector,
+                  "judge what a detector saw (RUN/detections, RUN/events.wmlog) by the recording's labels")
+      ->check(CLI::IsMember({"edges", "lines"}));
   app->add_option("--camera", a->camera, "--detector: of this camera; needed where there are several");
   app->add_option("--view", a->view_m,
                   "--detector: the floor that it looks at, x from, x to, y from, y to in base_link, m: true edges "
@@ -101,8 +103,10 @@ int main(int argc, char **argv) {
       throw Failure("--from must be before --to", kUsage);
     if (!arguments.detector.empty()) {
       const DetectorArguments detector{arguments.run, arguments.recording, arguments.camera, arguments.view_m};
-      const Figures figures = evaluate_detector(detector);
-      std::fputs((arguments.json ? figures.dump(1) + "\n" : detector_table(figures, arguments.run)).c_str(), stdout);
+      const bool lines = arguments.detector == "lines";
+      const Figures figures = lines ? evaluate_lines(detector) : evaluate_detector(detector);
+      const std::string text = lines ? line_table(figures, arguments.run) : detector_table(figures, arguments.run);
+      std::fputs((arguments.json ? figures.dump(1) + "\n" : text).c_str(), stdout);
       return kDone;
     }
     const Figures figures = evaluate(arguments);

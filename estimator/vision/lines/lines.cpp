@@ -53,23 +53,21 @@ size_t lay_out(lines_state *state, const polar_view &polar) {
   const size_t columns = static_cast<size_t>(polar.columns), rows = static_cast<size_t>(polar.rows);
   uint8_t *row = take(rows * sizeof(polar_row)), *table = take(rows * columns * sizeof(polar_sample)),
           *grey = take(rows * static_cast<size_t>(polar.stride()) * sizeof(int16_t)),
-          *work = take(11 * columns * sizeof(int16_t));
+          *work = take(kVoteArrays * columns * sizeof(int16_t));
   if (!base) return used;
   state->polar = polar;
   state->polar.row = reinterpret_cast<polar_row *>(row);
   state->polar.table = reinterpret_cast<polar_sample *>(table);
   state->polar.grey = reinterpret_cast<int16_t *>(grey);
   auto *next = reinterpret_cast<int16_t *>(work);
-  const auto give = [&](size_t count) {
+  const auto give = [&] {
     int16_t *at = next;
-    next += count;
+    next += columns;
     return at;
   };
-  vote_work &w = state->work;
-  w.slope = give(columns);
-  w.running = give(2 * columns);
-  w.begin = give(2 * columns);
-  for (votes *v : {&w.rise, &w.fall}) *v = {give(columns), give(columns), give(columns)};
+  state->work.slope = give();
+  for (vote_side *side : {&state->work.rise, &state->work.fall})
+    *side = {{give(), give(), give()}, {give(), give(), give()}};
   return used;
 }
 

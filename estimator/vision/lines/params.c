@@ -19,8 +19,8 @@ static const wm_param kParams[] = {
     F64("length_min_rad", length_min_rad, 0.09, 0.01, 2, "rad of elevation. Shortest line."),
     F64("begin_max_rad", begin_max_rad, 0.3, -1.5, 1.5,
         "rad above the horizon. A line must begin below: what begins higher hangs (lamps, beams)."),
-    F64("blur_px", blur_px, 0.9, 0.1, 10, "px. Width (sigma) of the picture's edges: lens, pixel and compression."),
-    F64("sigma_px", sigma_px, 0.06, 0, 10,
+    F64("blur_px", blur_px, 0.75, 0.1, 10, "px. Width (sigma) of the picture's edges: lens, pixel and compression."),
+    F64("sigma_px", sigma_px, 0.12, 0, 10,
         "px. Error of a line that noise doesn't explain: compression, the camera's response, the lens model."),
     F64("tilt_sigma_rad", tilt_sigma_rad, 0.01, 0, 0.1,
         "rad. How far the zenith may be from where calibration.yaml's mounting has it: upright lines lean by that, and "
@@ -30,7 +30,7 @@ static const wm_param kParams[] = {
     F64("appearance_grey", appearance_grey, 20, 1, 255,
         "Grey levels. Change of a side's brightness from picture to picture that is nothing special."),
     I32("confirm_seen", confirm_seen, 3, 1, 100, "Pictures in which a line was seen before it is published."),
-    I32("keep_unseen", keep_unseen, 4, 0, 100, "Pictures in which a line may be missed before its track ends."),
+    I32("keep_unseen", keep_unseen, 10, 0, 100, "Pictures in which a line may be missed before its track ends."),
 };
 
 const wm_param_table wm_lines_params_table = {kParams, sizeof kParams / sizeof kParams[0],

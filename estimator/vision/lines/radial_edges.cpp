@@ -258,8 +258,8 @@ int find_signed(const polar_view &view, const wm_lines_params &params, const zen
 int find_radial_edges(const polar_view &view, const wm_lines_params &params, const zenith &up, vote_work *work,
                       radial_edge *out) {
   count_votes(view, static_cast<int>(0.5 * params.contrast_grey * kVoteScale + 0.5), work);
-  const int rising = find_signed(view, params, up, work->rise, 1, out, kRadialEdgesMax);
-  return rising + find_signed(view, params, up, work->fall, -1, out + rising, kRadialEdgesMax - rising);
+  const int rising = find_signed(view, params, up, work->rise.best, 1, out, kRadialEdgesMax);
+  return rising + find_signed(view, params, up, work->fall.best, -1, out + rising, kRadialEdgesMax - rising);
 }
 
 void correct_zenith(const radial_edge &edge, zenith *up) {

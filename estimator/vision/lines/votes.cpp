@@ -8,6 +8,8 @@ namespace wm {
 
 namespace {
 
+constexpr int kPatience = 5;  // rows in a row that vote against end a stretch
+
 struct eight {
   static constexpr int kLanes = 8;
   typedef int16_t lanes __attribute__((vector_size(16), may_alias));
@@ -47,21 +49,24 @@ void slopes(const int16_t *grey, int columns, int16_t *out) {
 
 // The largest sum of neighbouring rows, row by row (J. Kadane's way, for all columns at once).
 template <class V>
-void add_row(const int16_t *slope, int columns, int row, int sign, int threshold, int16_t *running, int16_t *begin,
+void add_row(const int16_t *slope, int columns, int row, int sign, int threshold, const running_votes &now,
              const votes &best) {
   using lanes = typename V::lanes;
-  const lanes most = V::all(kVoteLimit * threshold), least = V::all(threshold), zero = V::all(0), here = V::all(row),
-              next = V::all(row + 1);
+  const lanes most = V::all(kVoteLimit * threshold), least = V::all(threshold), zero = V::all(0), one = V::all(1),
+              patience = V::all(kPatience), here = V::all(row), next = V::all(row + 1);
   for (int c = 0; c < columns; c += V::kLanes) {
     lanes vote = V::load(slope + c);
     if (sign < 0) vote = static_cast<lanes>(-vote);
     vote = V::choose(vote > most, most, vote);
-    lanes sum = static_cast<lanes>(V::load(running + c) + vote - least), first = V::load(begin + c);
-    const auto lost = sum < zero;
+    lanes sum = static_cast<lanes>(V::load(now.sum + c) + vote - least), first = V::load(now.first + c);
+    lanes against = static_cast<lanes>(V::load(now.against + c) + one);
+    against = V::choose(vote > least, zero, against);
+    V::store(now.against + c, against);
+    const auto lost = (sum < zero) | (against > patience);
     sum = V::choose(lost, zero, sum);
     first = V::choose(lost, next, first);
-    V::store(running + c, sum);
-    V::store(begin + c, first);
+    V::store(now.sum + c, sum);
+    V::store(now.first + c, first);
     const lanes before = V::load(best.sum + c);
     const auto better = sum > before;
     V::store(best.sum + c, V::choose(better, sum, before));
@@ -73,25 +78,18 @@ void add_row(const int16_t *slope, int columns, int row, int sign, int threshold
 template <class V>
 void count(const polar_view &view, int threshold, vote_work *work) {
   const size_t bytes = static_cast<size_t>(view.columns) * sizeof(int16_t);
-  for (const int sign : {1, -1}) {
-    const votes &best = sign > 0 ? work->rise : work->fall;
-    std::memset(best.sum, 0, bytes);
-    std::memset(best.first, 0, bytes);
-    std::memset(best.last, 0, bytes);
-    int16_t *running = work->running + (sign > 0 ? 0 : view.columns),
-            *begin = work->begin + (sign > 0 ? 0 : view.columns);
-    std::memset(running, 0, bytes);
-    std::memset(begin, 0, bytes);
-  }
+  for (vote_side *side : {&work->rise, &work->fall})
+    for (int16_t *numbers :
+         {side->best.sum, side->best.first, side->best.last, side->now.sum, side->now.first, side->now.against})
+      std::memset(numbers, 0, bytes);
   for (int r = 0; r < view.rows; r++) {
     switch (view.row[r].half) {
       case 2: slopes<V, 2>(view.line(r), view.columns, work->slope); break;
       case 4: slopes<V, 4>(view.line(r), view.columns, work->slope); break;
       default: slopes<V, 8>(view.line(r), view.columns, work->slope); break;
     }
-    add_row<V>(work->slope, view.columns, r, 1, threshold, work->running, work->begin, work->rise);
-    add_row<V>(work->slope, view.columns, r, -1, threshold, work->running + view.columns, work->begin + view.columns,
-               work->fall);
+    add_row<V>(work->slope, view.columns, r, 1, threshold, work->rise.now, work->rise.best);
+    add_row<V>(work->slope, view.columns, r, -1, threshold, work->fall.now, work->fall.best);
   }
 }
 

@@ -17,11 +17,22 @@ struct votes {
   int16_t *sum, *first, *last;
 };
 
-struct vote_work {
-  int16_t *slope;  // columns: a row's differences
-  int16_t *running, *begin;
-  votes rise, fall;  // brighter towards larger azimuths (to the left), darker
+// The stretch that goes on in each column: its votes, its first row, the rows since the last one that voted for it.
+struct running_votes {
+  int16_t *sum, *first, *against;
 };
+
+struct vote_side {
+  votes best;
+  running_votes now;
+};
+
+struct vote_work {
+  int16_t *slope;        // columns: a row's differences
+  vote_side rise, fall;  // brighter towards larger azimuths (to the left), darker
+};
+
+inline constexpr int kVoteArrays = 13;  // of `columns` numbers
 
 // `threshold`: half of the least contrast, in 1/kVoteScale of a grey level. On vectors of eight numbers, and by its
 // scalar twin, which gives the same.

@@ -245,15 +245,15 @@ void the_scalar_twin_votes_alike() {
   polar.row = rows.data();
   polar.grey = grey.data();
   struct alignas(16) work_space {
-    int16_t numbers[11][kColumns];
+    int16_t numbers[wm::kVoteArrays][kColumns];
   };
   static work_space a, b;
   const auto use = [](work_space &m) {
-    return wm::vote_work{m.numbers[0],
-                         m.numbers[1],
-                         m.numbers[3],
-                         {m.numbers[5], m.numbers[6], m.numbers[7]},
-                         {m.numbers[8], m.numbers[9], m.numbers[10]}};
+    const auto side = [&m](int at) {
+      return wm::vote_side{{m.numbers[at], m.numbers[at + 1], m.numbers[at + 2]},
+                           {m.numbers[at + 3], m.numbers[at + 4], m.numbers[at + 5]}};
+    };
+    return wm::vote_work{m.numbers[0], side(1), side(7)};
   };
   wm::vote_work first = use(a), second = use(b);
   wm::count_votes(polar, 12, &first);
