@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+// Line SLAM among lies: six of ten sightings are of nothing or of another line than they say. What is published is the
+// pose, the map, and how many were refused.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <initializer_list>
+#include <limits>
+
+#include "events.hpp"
+#include "filters/slam/params.h"
+#include "math/arc.hpp"
+#include "motion/motion_params.h"
+#include "unity.h"
+#include "waymark/estimator.h"
+#include "waymark/random.h"
+
+namespace {
+
+constexpr int kLines = 16, kGhosts = 12;
+constexpr double kSigma = 0.003;
+
+const wm_estimator *slam;
+wm_motion_params motion;
+wm_slam_params params;
+wm_setup setup;
+wm_sensor sensor;
+void *state;
+wm_random noise;
+double place[kLines][2];
+// What moves along with the robot, or a reflection: an azimuth that drifts, for a while.
+struct ghost {
+  int32_t id;
+  double azimuth_rad, rate_radps, until_s;
+} ghosts[kGhosts];
+int32_t next_ghost;
+int fused, refused, waiting, told, lies;
+
+double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
+double uniform(double from, double to) { return from + (to - from) * wm_random_next_uniform(&noise); }
+
+void begin(int method) {
+  slam = wm_estimator_find("slam");
+  wm_params_defaults(&wm_motion_params_table, &motion);
+  wm_params_defaults(&slam->params, &params);
+  params.line_clones = 24;
+  params.line_method = method;
+  params.line_near_m = 1;
+  params.line_parallax_rad = 0.2;
+  params.line_step_m = 0.1;
+  noise = {7, 1, 0};
+  for (int i = 0; i < kLines; i++) {
+    const wm::sin_cos a = wm::sincos(wm::kTwoPi * i / kLines + 0.1);
+    const double radius = i % 2 == 0 ? 5.5 : 3.5;
+    place[i][0] = radius * a.cos;
+    place[i][1] = radius * a.sin;
+  }
+  for (ghost &g : ghosts) g.until_s = -1;
+  next_ghost = 1000;
+  fused = refused = waiting = told = lies = 0;
+  sensor = {};
+  std::strcpy(sensor.name, "omni");
+  sensor.mounting.rpy_rad[1] = -wm::kHalfPi;  // looks up: bearings are azimuths
+  sensor.bearing_sigma_rad = kSigma;
+  sensor.range_sigma_m = std::numeric_limits<double>::quiet_NaN();
+  sensor.max_range_m = INFINITY;
+  setup = {};
+  setup.motion = &motion;
+  setup.wheels = make::no_wheels();
+  setup.sensors = &sensor;
+  setup.sensor_count = 1;
+  setup.start = {WM_TIME_NONE, {2, 0, 0}, {0, 0, 0, 1}, wm::kHalfPi, 0.001, 0.001};
+  const char *why = "";
+  const size_t bytes = slam->state_bytes(&params, &setup, &why);
+  TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
+  std::free(state);
+  state = std::aligned_alloc(16, (bytes + 15) / 16 * 16);
+  TEST_ASSERT_EQUAL(WM_OK, slam->init(state, &params, &setup));
+}
+
+void say(double t_s, int32_t id, double bearing) {
+  const wm_event e = make::sighting(t_s, id, wm::wrap(bearing), std::numeric_limits<double>::quiet_NaN());
+  wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
+  size_t count = 0;
+  TEST_ASSERT_EQUAL(WM_OK, slam->correct(state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
+  told++;
+  if (count == 0) return;
+  fused += out[0].verdict == WM_FUSED;
+  refused += out[0].verdict == WM_REJECTED_GATE;
+  waiting += out[0].verdict == WM_REJECTED_SEARCHING;
+}
+
+void lie(double t_s, int which) {
+  lies++;
+  if (which % 2 == 0) {  // a line's number, another direction
+    say(t_s, 10 + which % kLines, uniform(-wm::kPi, wm::kPi));
+    return;
+  }
+  ghost &g = ghosts[which % kGhosts];
+  if (t_s > g.until_s) g = {next_ghost++, uniform(-wm::kPi, wm::kPi), gauss(0.2), t_s + uniform(0.5, 4)};
+  say(t_s, g.id, g.azimuth_rad + g.rate_radps * (g.until_s - t_s) + gauss(kSigma));
+}
+
+struct outcome {
+  double largest_m, largest_rad, nees;
+  int landmarks, right;
+};
+
+// Circles of 2 m, a look ten times a second; `lies_of_ten` of ten sightings are lies.
+outcome drive(double seconds, int lies_of_ten) {
+  outcome out{};
+  wm_pose2 truth = {2, 0, wm::kHalfPi};
+  double nees = 0;
+  int steps = 0;
+  for (int step = 0; 0.02 * step < seconds; step++) {
+    const double t_s = 0.02 * step, v = 0.5, w = 0.25;
+    const wm_event e = make::twist(t_s, v + gauss(0.01), w + gauss(0.005));
+    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+    for (int i = 0; step % 5 == 0 && i < kLines; i++) {
+      say(t_s, 10 + i, wm::atan2(place[i][1] - truth.y_m, place[i][0] - truth.x_m) - truth.heading_rad + gauss(kSigma));
+      // So many lies that they are their share of all.
+      for (int k = 0; k < 2; k++)
+        if (uniform(0, 2) < lies_of_ten / (10.0 - lies_of_ten)) lie(t_s, static_cast<int>(uniform(0, 1000)));
+    }
+    const wm::arc a = wm::make_arc(0.02 * v, 0.02 * w);
+    truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
+    if (step % 50 != 49) continue;
+    wm_estimate now;
+    slam->estimate(state, &now);
+    const double dx = now.pose_map_base.p_m[0] - truth.x_m, dy = now.pose_map_base.p_m[1] - truth.y_m,
+                 dh = wm::wrap(now.heading_rad - truth.heading_rad);
+    out.largest_m = std::fmax(out.largest_m, std::sqrt(dx * dx + dy * dy));
+    out.largest_rad = std::fmax(out.largest_rad, std::fabs(dh));
+    nees += dh * dh / now.covariance[wm_cov_index(5, 5)];
+    steps++;
+  }
+  out.nees = nees / steps;
+  wm_landmark map[256];
+  const size_t count = slam->landmarks(state, map, nullptr, 256);
+  out.landmarks = static_cast<int>(count);
+  for (size_t l = 0; l < count; l++)
+    for (const auto &p : place)
+      if (std::fabs(map[l].p_m[0] - p[0]) < 0.3 && std::fabs(map[l].p_m[1] - p[1]) < 0.3) {
+        out.right++;
+        break;
+      }
+  std::printf(
+      "%d of 10 lies: %d told, %d lies, %d fused, %d refused, %d waiting; pose within %.3f m, %.2f deg; %d of %d "
+      "landmarks are lines\n",
+      lies_of_ten, told, lies, fused, refused, waiting, out.largest_m, out.largest_rad * 180 / M_PI, out.right,
+      out.landmarks);
+  return out;
+}
+
+void test_honest_sightings(void) {
+  for (int method : {WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_INVERSE_DISTANCE}) {
+    begin(method);
+    const outcome o = drive(50, 0);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.15, o.largest_m);
+    TEST_ASSERT_EQUAL(kLines, o.right);
+    TEST_ASSERT_LESS_THAN(told / 50, refused);
+  }
+}
+
+void test_six_of_ten_are_lies(void) {
+  for (int method : {WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_INVERSE_DISTANCE}) {
+    begin(method);
+    const outcome o = drive(50, 6);
+    TEST_ASSERT_TRUE(lies > 0.55 * told && lies < 0.65 * told);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.25, o.largest_m);
+    TEST_ASSERT_LESS_THAN_DOUBLE(4 * M_PI / 180, o.largest_rad);
+    TEST_ASSERT_GREATER_OR_EQUAL(kLines / 2, o.right);
+    TEST_ASSERT_GREATER_THAN(lies / 50, refused);
+  }
+}
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_honest_sightings);
+  RUN_TEST(test_six_of_ten_are_lies);
+  std::free(state);
+  return UNITY_END();
+}
