@@ -12,3 +12,4 @@ wm_script_test(run_recordings COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/record
 wm_script_test(run_live_minute COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/recordings.py live LABELS slow release-only)
 wm_script_test(run_check_faults COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/check_faults.py)
 wm_script_test(run_frames_of COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/frames_of.py LABELS release-only)
+wm_script_test(run_edges_hardship COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/edges_hardship.py LABELS release-only)
