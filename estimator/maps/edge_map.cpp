@@ -51,8 +51,9 @@ void each_tile_with_edges(const wm_raster &raster, Visit visit) {
     }
 }
 
-// Whether a tile is within reach of one with edges: a neighbour at most, as the reach is less than two tiles.
-constexpr int kNeighbours = (edge_map::kReachPixelsMax + edge_map::kTile - 1) / edge_map::kTile;
+// Tiles between a tile with edges and the farthest one that is within reach of it: two at most.
+constexpr int kNeighboursMax = (edge_map::kReachPixelsMax + edge_map::kTile - 1) / edge_map::kTile;
+int neighbours_of(int reach_px) { return (reach_px + edge_map::kTile - 1) / edge_map::kTile; }
 
 }  // namespace
 
@@ -63,14 +64,16 @@ size_t edge_map::bytes(const wm_raster &raster) {
     return 0;
   const int columns = tiles_along(raster.width_px), rows = tiles_along(raster.height_px);
   static_assert(32768 / kTile <= 512);
+  const int neighbours = neighbours_of(reach_of(raster));
+  static_assert(kNeighboursMax == 2);
   bool marked[5][512 + 4] = {};  // rows of tiles: two above, this, two below
   int newest = -1;
   size_t count = 1;
   const auto close_row = [&](int row) {  // counts what is within reach in `row`
     for (int c = 0; c < columns; c++) {
       bool near = false;
-      for (int dy = -kNeighbours; dy <= kNeighbours; dy++)
-        for (int dx = -kNeighbours; dx <= kNeighbours; dx++) near |= marked[(row + dy + 5) % 5][c + dx + 2];
+      for (int dy = -neighbours; dy <= neighbours; dy++)
+        for (int dx = -neighbours; dx <= neighbours; dx++) near |= marked[(row + dy + 5) % 5][c + dx + 2];
       count += near;
     }
   };
@@ -78,7 +81,7 @@ size_t edge_map::bytes(const wm_raster &raster) {
   const auto advance = [&](int row) {  // rows up to `row` are complete but for `row` itself
     while (newest < row) {
       newest++;
-      if (newest >= kNeighbours + 1) close_row(newest - kNeighbours - 1);
+      if (newest >= neighbours + 1) close_row(newest - neighbours - 1);
       open_row(newest);
     }
   };
@@ -86,7 +89,7 @@ size_t edge_map::bytes(const wm_raster &raster) {
     advance(row);
     marked[row % 5][column + 2] = true;
   });
-  advance(rows + kNeighbours);
+  advance(rows + neighbours);
   if (count > kTilesMax) return 0;
   return aligned(((size_t)(rows + 2) << shift_for(columns + 2)) * sizeof(uint32_t)) +
          count * kTilePixels * (1 + sizeof(offset)) + aligned((size_t)3 * raster.width_px * sizeof(int32_t));
@@ -106,12 +109,13 @@ void edge_map::init(const wm_raster &raster, void *memory) {
   const auto place = [this](const void *there) {
     return (ptrdiff_t)(reinterpret_cast<uintptr_t>(there) - reinterpret_cast<uintptr_t>(this));
   };
+  const int neighbours = neighbours_of(reach_px_);
   uint32_t *tile = static_cast<uint32_t *>(memory);
   tile_at_ = place(tile);
   std::memset(tile, 0, (size_t)directory * sizeof(uint32_t));
   each_tile_with_edges(raster, [&](int column, int row) {
-    for (int y = row - kNeighbours; y <= row + kNeighbours; y++)
-      for (int x = column - kNeighbours; x <= column + kNeighbours; x++)
+    for (int y = row - neighbours; y <= row + neighbours; y++)
+      for (int x = column - neighbours; x <= column + neighbours; x++)
         if (x >= 0 && y >= 0 && x < tile_columns_ && y < tile_rows_) tile[(y + 1) << row_shift_ | (x + 1)] = 1;
   });
   uint32_t count = 1;

@@ -12,6 +12,7 @@
 #include <memory>
 #include <vector>
 
+#include "drawn_map.h"
 #include "filters/edge_mcl/cloud.hpp"
 #include "waymark/estimator.h"
 #include "waymark/map.h"
@@ -19,12 +20,10 @@
 
 namespace {
 
-constexpr int kWidth = 4676, kHeight = 1372;
-constexpr double kPixel_m = 1.0 / 75;
-
+// Of this thread alone: other work on the machine is not counted.
 double now_us() {
   timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
   return (double)t.tv_sec * 1e6 + (double)t.tv_nsec * 1e-3;
 }
 
@@ -42,25 +41,6 @@ double time_us(int runs, Work work) {
     each.push_back(now_us() - begin);
   }
   return median(each);
-}
-
-// Two corridors and what joins them, with recesses, as a building of this size has.
-std::vector<uint8_t> draw() {
-  std::vector<uint8_t> edges((size_t)kWidth * kHeight, 0);
-  const auto line = [&](int x0, int y0, int x1, int y1) {
-    const int steps = std::max(std::abs(x1 - x0), std::abs(y1 - y0));
-    for (int i = 0; i <= steps; i++)
-      edges[(size_t)(y0 + (y1 - y0) * i / steps) * kWidth + (size_t)(x0 + (x1 - x0) * i / steps)] = 255;
-  };
-  for (int y : {150, 330, 1000, 1180})
-    for (int x = 100; x < 4500; x += 200) {
-      line(x, y, x + 130, y);
-      line(x + 130, y, x + 130, y + 15);
-      line(x + 130, y + 15, x + 200, y + 15);
-      line(x + 200, y + 15, x + 200, y);
-    }
-  for (int x : {1000, 1180, 3000, 3180}) line(x, 345, x, 1000);
-  return edges;
 }
 
 struct ready_map {
@@ -96,24 +76,26 @@ void bench_cloud(const wm::edge_map &map, int particles) {
   wm::make_score_table(map, sigma, 0.05, false, &table);
   wm::score_field field;
   std::unique_ptr<void, decltype(&free)> layers(aligned_alloc(64, wm::score_field::bytes(map.raster())), &free);
-  field.init(map, table, layers.get());
+  const double bake = time_us(5, [&] { field.init(map, table, layers.get()); });
   cloud->spread({x, y, 0}, covariance);
   const double update = time_us(2001, [&] { (void)cloud->weigh(map, field, *points, table, 1e-6, false); });
   const double move = time_us(2001, [&] { cloud->move({0.05, 0, 0.001}, {0.005, 0.003, 0.003}); });
   const double resample = time_us(2001, [&] { cloud->resample(); });
   std::printf("%5d particles x 180 points: weights %8.1f us, moving %7.1f us, resampling %7.1f us\n", particles, update,
               move, resample);
+  if (particles == 200)
+    std::printf("scores baked in %.1f ms, %.1f MB\n", bake * 1e-3, (double)wm::score_field::bytes(map.raster()) * 1e-6);
 }
 
 }  // namespace
 
 int main(int argc, char **argv) {
-  const std::vector<uint8_t> edges = draw();
-  const wm_raster raster = {kWidth, kHeight, kPixel_m, 0, 0, 0, edges.data(), nullptr, 0};
+  const std::vector<uint8_t> edges = bench::drawn_edges();
+  const wm_raster raster = {bench::kMapWidth, bench::kMapHeight, bench::kMapPixel_m, 0, 0, 0, edges.data(), nullptr, 0};
   ready_map made;
   const double ready = time_us(11, [&] { made.make(raster); });
-  std::printf("map of %d x %d pixels made ready in %.1f ms, %.1f MB\n", kWidth, kHeight, ready * 1e-3,
-              (double)made.bytes * 1e-6);
+  std::printf("map of %d x %d pixels made ready in %.1f ms, %.1f MB\n", bench::kMapWidth, bench::kMapHeight,
+              ready * 1e-3, (double)made.bytes * 1e-6);
   bench_cloud(made.map, 200);
   bench_cloud(made.map, 2000);
   if (argc > 1) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a cloud of particles costs: for every particle and every point of a scan one look-up. So what a point counts is
-// baked into the map when it is made ready: a layer of bytes for each class of sigma, in tiles of 256 x 256, a row of
-// 16 bits on which a column of 16 bits stands: an address is put together without a multiplication, and one dependent
-// load is left of each point. Integers all the way: the order of summation is nobody's business, and vectors of any
-// width give the same bits.
+// baked into the map when it is made ready: a layer of bytes for each class of sigma, in tiles of 256 x 256, so that
+// the place within a tile and the tile's number are 16 bits each and an address is the one behind the other; within a
+// tile in cells of 8 x 8, a cache line each. One dependent load is left of each point. Integers all the way: the order
+// of summation is nobody's business, and vectors of any width give the same bits.
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_SCORE_FIELD_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_SCORE_FIELD_HPP
 

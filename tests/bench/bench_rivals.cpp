@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// Ours and others' at the same work, one thread, in one run: weights of 200 and 2000 particles by 180 points on a map
+// of 4676 x 1372 pixels (MRPT's likelihood field), and the lines of a window of 50 x 50 (OpenCV's HoughLines). Others
+// are measured where their Debian packages were there at the build.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <memory>
+#include <vector>
+
+#include "drawn_map.h"
+#include "filters/edge_mcl/cloud.hpp"
+#include "vision/edges/hough.hpp"
+#include "waymark/random.h"
+#ifdef WM_HAS_MRPT
+#include <mrpt/maps/COccupancyGridMap2D.h>
+#include <mrpt/obs/CObservation2DRangeScan.h>
+#endif
+#ifdef WM_HAS_OPENCV
+#include <opencv2/imgproc.hpp>
+#endif
+
+namespace {
+
+constexpr int kPoints = 180;
+constexpr double kApertureRad = 2.4;
+
+double thread_us() {
+  timespec now;
+  (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
+}
+
+template <class Work>
+double median_us(int times, Work work) {
+  std::vector<double> each;
+  for (int i = 0; i < times; i++) {
+    const double begin = thread_us();
+    work();
+    each.push_back(thread_us() - begin);
+  }
+  std::nth_element(each.begin(), each.begin() + times / 2, each.end());
+  return each[static_cast<size_t>(times / 2)];
+}
+
+struct freed {
+  void operator()(void *memory) const { std::free(memory); }
+};
+using block = std::unique_ptr<void, freed>;
+block allocate(size_t bytes) { return block(std::aligned_alloc(64, (bytes + 63) / 64 * 64)); }
+
+double range(int i) { return 1 + 5 * wm_random_uniform(1, 1, static_cast<uint64_t>(i)); }
+double bearing(int i) { return kApertureRad * (i / (kPoints - 1.0) - 0.5); }
+
+struct pose {
+  double x, y, heading;
+};
+std::vector<pose> cloud_of(int count) {
+  std::vector<pose> out;
+  for (uint64_t i = 0; i < static_cast<uint64_t>(count); i++) {
+    const auto draw = [i](uint64_t k) { return wm_random_normal(2, k, i); };
+    out.push_back({2000 / 75.0 + 0.05 * draw(1), 15.0 + 0.05 * draw(2), 0.02 * draw(3)});
+  }
+  return out;
+}
+
+void ours(const std::vector<uint8_t> &edges) {
+  const wm_raster raster = {bench::kMapWidth, bench::kMapHeight, bench::kMapPixel_m, 0, 0, 0, edges.data(), nullptr, 0};
+  wm::edge_map map;
+  const block memory = allocate(wm::edge_map::bytes(raster));
+  map.init(raster, memory.get());
+  wm::score_table table;
+  const double sigma[wm::kSigmaClasses] = {0.05, 0.06, 0.08, 0.12};
+  wm::make_score_table(map, sigma, 0.05, false, &table);
+  wm::score_field field;
+  const block layers = allocate(wm::score_field::bytes(raster));
+  field.init(map, table, layers.get());
+  const auto points = std::make_unique<wm::scan_points>();
+  points->count = kPoints;
+  points->reach_m = 6.0f;
+  for (int i = 0; i < kPoints; i++) {
+    points->x_m[i] = static_cast<float>(range(i) * std::cos(bearing(i)));
+    points->y_m[i] = static_cast<float>(range(i) * std::sin(bearing(i)));
+  }
+  for (int k = 0; k < wm::kSigmaClasses; k++) points->class_end[k] = kPoints * (k + 1) / wm::kSigmaClasses;
+  for (int particles : {200, 2000}) {
+    std::vector<double> state(wm::cloud::bytes(particles) / sizeof(double));
+    wm::cloud cloud;
+    cloud.init(particles, 1, state.data());
+    const double covariance[3][3] = {{0.0025, 0, 0}, {0, 0.0025, 0}, {0, 0, 0.0004}};
+    cloud.spread({2000 / 75.0, 15.0, 0}, covariance);
+    const double us = median_us(1001, [&] { (void)cloud.weigh(map, field, *points, table, 1e-6, false); });
+    std::printf("%5d particles x %d points: ours %9.1f us\n", particles, kPoints, us);
+  }
+}
+
+void mrpt_field(const std::vector<uint8_t> &edges) {
+#ifdef WM_HAS_MRPT
+  using namespace mrpt::maps;
+  COccupancyGridMap2D grid(0.0f, static_cast<float>(bench::kMapWidth * bench::kMapPixel_m), 0.0f,
+                           static_cast<float>(bench::kMapHeight * bench::kMapPixel_m),
+                           static_cast<float>(bench::kMapPixel_m));
+  grid.fill(0.9f);
+  for (int y = 0; y < bench::kMapHeight; y++)
+    for (int x = 0; x < bench::kMapWidth; x++)
+      if (edges[static_cast<size_t>(y) * bench::kMapWidth + static_cast<size_t>(x)])
+        grid.setCell(x, bench::kMapHeight - 1 - y, 0.0f);
+  grid.likelihoodOptions.likelihoodMethod = COccupancyGridMap2D::lmLikelihoodField_Thrun;
+  grid.likelihoodOptions.LF_decimation = 1;
+  grid.likelihoodOptions.LF_stdHit = 0.05f;
+  grid.likelihoodOptions.LF_maxCorrsDistance = 0.3f;
+  grid.likelihoodOptions.LF_maxRange = 80.0f;
+  grid.likelihoodOptions.enableLikelihoodCache = true;
+  mrpt::obs::CObservation2DRangeScan scan;
+  scan.aperture = static_cast<float>(kApertureRad);
+  scan.maxRange = 80.0f;
+  scan.resizeScan(kPoints);
+  for (int i = 0; i < kPoints; i++) {
+    scan.setScanRange(static_cast<size_t>(i), static_cast<float>(range(i)));
+    scan.setScanRangeValidity(static_cast<size_t>(i), true);
+  }
+  for (int particles : {200, 2000}) {
+    const std::vector<pose> cloud = cloud_of(particles);
+    volatile double kept = 0;
+    const auto weigh = [&] {
+      for (const pose &p : cloud)
+        kept = kept + grid.computeObservationLikelihood(scan, mrpt::poses::CPose3D(p.x, p.y, 0, p.heading, 0, 0));
+    };
+    for (int i = 0; i < 3; i++) weigh();  // fills its cache
+    std::printf("%5d particles x %d points: MRPT's likelihood field %9.1f us\n", particles, kPoints,
+                median_us(particles > 1000 ? 15 : 51, weigh));
+  }
+#else
+  (void)edges;
+  (void)cloud_of;
+  std::printf("MRPT: not measured, it was not there at the build (Debian: libmrpt-maps-dev libmrpt-obs-dev)\n");
+#endif
+}
+
+void windows() {
+  uint8_t window[50 * 50], turned[50 * 50];
+  for (int i = 0; i < 2500; i++)  // a line in noise, as a gradient's magnitude has it
+    window[i] = static_cast<uint8_t>((std::abs(i % 50 - 10 - i / 100) < 2 ? 180 : 0) +
+                                     40 * wm_random_uniform(1, 2, static_cast<uint64_t>(i)));
+  for (int y = 0; y < 50; y++)
+    for (int x = 0; x < 50; x++) turned[x * 50 + y] = window[y * 50 + x];
+  const auto work = std::make_unique<wm::hough_work>();
+  volatile int kept = 0;
+  const double us = median_us(1001, [&] {
+    for (int q = 0; q < 4; q++) {
+      const uint8_t *from = q & 1 ? turned : window;
+      kept = kept + wm::hough_transform(q & 2 ? from + 49 : from, 50, 50, q & 2 ? -1 : 1, work.get())->sums[60];
+    }
+  });
+  std::printf("window of 50 x 50: ours, all slopes of four quadrants %9.1f us\n", us);
+#ifdef WM_HAS_OPENCV
+  cv::setNumThreads(1);
+  cv::Mat edge(50, 50, CV_8UC1);
+  for (int i = 0; i < 2500; i++) edge.data[i] = window[i] > 30 ? 255 : 0;
+  std::vector<cv::Vec2f> lines;
+  const double theirs = median_us(201, [&] { cv::HoughLines(edge, lines, 1, CV_PI / 200, 25); });
+  std::printf("window of 50 x 50: OpenCV's HoughLines, 200 angles %9.1f us (%zu lines)\n", theirs, lines.size());
+#else
+  std::printf("OpenCV: not measured, it was not there at the build (Debian: libopencv-imgproc-dev)\n");
+#endif
+}
+
+}  // namespace
+
+int main() {
+  const std::vector<uint8_t> edges = bench::drawn_edges();
+  ours(edges);
+  mrpt_field(edges);
+  windows();
+  return 0;
+}
