@@ -43,48 +43,33 @@ double time_us(int runs, Work work) {
   return median(each);
 }
 
+// What the filter makes of a map at its start.
 struct ready_map {
   wm::edge_map map;
-  void *memory = nullptr;
+  wm::score_field field;
+  bench::block memory, layers;
   size_t bytes = 0;
-  ~ready_map() { free(memory); }
   void make(const wm_raster &raster) {
-    bytes = wm::edge_map::bytes(raster);
-    if (!memory) memory = aligned_alloc(64, (bytes + 63) / 64 * 64);
-    map.init(raster, memory);
+    bytes = wm::edge_map::bytes(raster) + wm::score_field::bytes(raster);
+    if (!memory) {
+      memory = bench::allocate(wm::edge_map::bytes(raster));
+      layers = bench::allocate(wm::score_field::bytes(raster) + 1);
+    }
+    map.init(raster, memory.get());
+    wm::score_table table;
+    const double sigma[wm::kSigmaClasses] = {0.05, 0.06, 0.08, 0.12};
+    wm::make_score_table(map, sigma, 0.05, false, &table);
+    field.init(map, table, layers.get());
   }
 };
 
-void bench_cloud(const wm::edge_map &map, int particles) {
-  std::vector<double> memory(wm::cloud::bytes(particles) / sizeof(double));
-  const auto cloud = std::make_unique<wm::cloud>();
-  cloud->init(particles, 1, memory.data());
-  double x, y;
-  map.to_map(2000, 240, &x, &y);
-  const double covariance[3][3] = {{0.0025, 0, 0}, {0, 0.0025, 0}, {0, 0, 0.0004}};
-  const auto points = std::make_unique<wm::scan_points>();
-  points->count = 180;
-  points->reach_m = 6.0f;
-  for (int i = 0; i < 180; i++) {
-    const double range = 1 + 5 * wm_random_uniform(1, 1, (uint64_t)i), side = i % 2 ? 1.2 : -1.2;
-    points->x_m[i] = (float)range;
-    points->y_m[i] = (float)side;
-  }
-  for (int k = 0; k < wm::kSigmaClasses; k++) points->class_end[k] = 45 * (k + 1);
-  const double sigma[wm::kSigmaClasses] = {0.05, 0.06, 0.08, 0.12};
-  wm::score_table table;
-  wm::make_score_table(map, sigma, 0.05, false, &table);
-  wm::score_field field;
-  std::unique_ptr<void, decltype(&free)> layers(aligned_alloc(64, wm::score_field::bytes(map.raster())), &free);
-  const double bake = time_us(5, [&] { field.init(map, table, layers.get()); });
-  cloud->spread({x, y, 0}, covariance);
-  const double update = time_us(2001, [&] { (void)cloud->weigh(map, field, *points, table, 1e-6, false); });
-  const double move = time_us(2001, [&] { cloud->move({0.05, 0, 0.001}, {0.005, 0.003, 0.003}); });
-  const double resample = time_us(2001, [&] { cloud->resample(); });
-  std::printf("%5d particles x 180 points: weights %8.1f us, moving %7.1f us, resampling %7.1f us\n", particles, update,
-              move, resample);
-  if (particles == 200)
-    std::printf("scores baked in %.1f ms, %.1f MB\n", bake * 1e-3, (double)wm::score_field::bytes(map.raster()) * 1e-6);
+void bench_cloud(int particles) {
+  bench::cloud_at_work work(particles);
+  const double weights = time_us(2001, [&] { work.weigh(); });
+  const double move = time_us(2001, [&] { work.move(); });
+  const double resample = time_us(2001, [&] { work.resample(); });
+  std::printf("%5d particles x %d points: weights %8.1f us, moving %7.1f us, resampling %7.1f us\n", particles,
+              bench::kScanPoints, weights, move, resample);
 }
 
 }  // namespace
@@ -96,8 +81,8 @@ int main(int argc, char **argv) {
   const double ready = time_us(11, [&] { made.make(raster); });
   std::printf("map of %d x %d pixels made ready in %.1f ms, %.1f MB\n", bench::kMapWidth, bench::kMapHeight,
               ready * 1e-3, (double)made.bytes * 1e-6);
-  bench_cloud(made.map, 200);
-  bench_cloud(made.map, 2000);
+  bench_cloud(200);
+  bench_cloud(2000);
   if (argc > 1) {
     wm_map *loaded = nullptr;
     wm_error err = {};

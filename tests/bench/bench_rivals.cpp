@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "drawn_map.h"
-#include "filters/edge_mcl/cloud.hpp"
 #include "vision/edges/hough.hpp"
 #include "waymark/random.h"
 #ifdef WM_HAS_MRPT
@@ -23,9 +22,6 @@
 #endif
 
 namespace {
-
-constexpr int kPoints = 180;
-constexpr double kApertureRad = 2.4;
 
 double thread_us() {
   timespec now;
@@ -45,15 +41,6 @@ double median_us(int times, Work work) {
   return each[static_cast<size_t>(times / 2)];
 }
 
-struct freed {
-  void operator()(void *memory) const { std::free(memory); }
-};
-using block = std::unique_ptr<void, freed>;
-block allocate(size_t bytes) { return block(std::aligned_alloc(64, (bytes + 63) / 64 * 64)); }
-
-double range(int i) { return 1 + 5 * wm_random_uniform(1, 1, static_cast<uint64_t>(i)); }
-double bearing(int i) { return kApertureRad * (i / (kPoints - 1.0) - 0.5); }
-
 struct pose {
   double x, y, heading;
 };
@@ -61,43 +48,22 @@ std::vector<pose> cloud_of(int count) {
   std::vector<pose> out;
   for (uint64_t i = 0; i < static_cast<uint64_t>(count); i++) {
     const auto draw = [i](uint64_t k) { return wm_random_normal(2, k, i); };
-    out.push_back({2000 / 75.0 + 0.05 * draw(1), 15.0 + 0.05 * draw(2), 0.02 * draw(3)});
+    out.push_back({bench::kCloudMean.x_m + 0.05 * draw(1), bench::kCloudMean.y_m + 0.05 * draw(2), 0.02 * draw(3)});
   }
   return out;
 }
 
-void ours(const std::vector<uint8_t> &edges) {
-  const wm_raster raster = {bench::kMapWidth, bench::kMapHeight, bench::kMapPixel_m, 0, 0, 0, edges.data(), nullptr, 0};
-  wm::edge_map map;
-  const block memory = allocate(wm::edge_map::bytes(raster));
-  map.init(raster, memory.get());
-  wm::score_table table;
-  const double sigma[wm::kSigmaClasses] = {0.05, 0.06, 0.08, 0.12};
-  wm::make_score_table(map, sigma, 0.05, false, &table);
-  wm::score_field field;
-  const block layers = allocate(wm::score_field::bytes(raster));
-  field.init(map, table, layers.get());
-  const auto points = std::make_unique<wm::scan_points>();
-  points->count = kPoints;
-  points->reach_m = 6.0f;
-  for (int i = 0; i < kPoints; i++) {
-    points->x_m[i] = static_cast<float>(range(i) * std::cos(bearing(i)));
-    points->y_m[i] = static_cast<float>(range(i) * std::sin(bearing(i)));
-  }
-  for (int k = 0; k < wm::kSigmaClasses; k++) points->class_end[k] = kPoints * (k + 1) / wm::kSigmaClasses;
+void ours() {
   for (int particles : {200, 2000}) {
-    std::vector<double> state(wm::cloud::bytes(particles) / sizeof(double));
-    wm::cloud cloud;
-    cloud.init(particles, 1, state.data());
-    const double covariance[3][3] = {{0.0025, 0, 0}, {0, 0.0025, 0}, {0, 0, 0.0004}};
-    cloud.spread({2000 / 75.0, 15.0, 0}, covariance);
-    const double us = median_us(1001, [&] { (void)cloud.weigh(map, field, *points, table, 1e-6, false); });
-    std::printf("%5d particles x %d points: ours %9.1f us\n", particles, kPoints, us);
+    bench::cloud_at_work work(particles);
+    std::printf("%5d particles x %d points: ours %9.1f us\n", particles, bench::kScanPoints,
+                median_us(1001, [&] { work.weigh(); }));
   }
 }
 
-void mrpt_field(const std::vector<uint8_t> &edges) {
+void mrpt_field() {
 #ifdef WM_HAS_MRPT
+  const std::vector<uint8_t> edges = bench::drawn_edges();
   using namespace mrpt::maps;
   COccupancyGridMap2D grid(0.0f, static_cast<float>(bench::kMapWidth * bench::kMapPixel_m), 0.0f,
                            static_cast<float>(bench::kMapHeight * bench::kMapPixel_m),
@@ -114,11 +80,11 @@ void mrpt_field(const std::vector<uint8_t> &edges) {
   grid.likelihoodOptions.LF_maxRange = 80.0f;
   grid.likelihoodOptions.enableLikelihoodCache = true;
   mrpt::obs::CObservation2DRangeScan scan;
-  scan.aperture = static_cast<float>(kApertureRad);
+  scan.aperture = static_cast<float>(bench::kScanAperture_rad);
   scan.maxRange = 80.0f;
-  scan.resizeScan(kPoints);
-  for (int i = 0; i < kPoints; i++) {
-    scan.setScanRange(static_cast<size_t>(i), static_cast<float>(range(i)));
+  scan.resizeScan(bench::kScanPoints);
+  for (int i = 0; i < bench::kScanPoints; i++) {
+    scan.setScanRange(static_cast<size_t>(i), static_cast<float>(bench::scan_range_m(i)));
     scan.setScanRangeValidity(static_cast<size_t>(i), true);
   }
   for (int particles : {200, 2000}) {
@@ -129,11 +95,10 @@ void mrpt_field(const std::vector<uint8_t> &edges) {
         kept = kept + grid.computeObservationLikelihood(scan, mrpt::poses::CPose3D(p.x, p.y, 0, p.heading, 0, 0));
     };
     for (int i = 0; i < 3; i++) weigh();  // fills its cache
-    std::printf("%5d particles x %d points: MRPT's likelihood field %9.1f us\n", particles, kPoints,
+    std::printf("%5d particles x %d points: MRPT's likelihood field %9.1f us\n", particles, bench::kScanPoints,
                 median_us(particles > 1000 ? 15 : 51, weigh));
   }
 #else
-  (void)edges;
   (void)cloud_of;
   std::printf("MRPT: not measured, it was not there at the build (Debian: libmrpt-maps-dev libmrpt-obs-dev)\n");
 #endif
@@ -170,9 +135,8 @@ void windows() {
 }  // namespace
 
 int main() {
-  const std::vector<uint8_t> edges = bench::drawn_edges();
-  ours(edges);
-  mrpt_field(edges);
+  ours();
+  mrpt_field();
   windows();
   return 0;
 }

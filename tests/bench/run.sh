@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # Runs every benchmark, one after the other: run.sh FOLDER. Figures are medians, and ratios within one run, because
-# machines are shared and noisy; instruction counts where valgrind is there (same binary, same count).
+# machines are shared and noisy; then instruction counts (instructions.sh).
 set -euo pipefail
 folder=${1:-build/bench}
 shopt -s nullglob
@@ -11,3 +11,5 @@ for bench in "${benches[@]}"; do
   echo "== $(basename "$bench")"
   "$bench"
 done
+echo "== instructions"
+bash "$(dirname "$0")/instructions.sh" "$folder/../tests/wm_instructions"

@@ -3,14 +3,12 @@
 // of upright lines, a hemispherical picture.
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <ctime>
 #include <memory>
 #include <vector>
 
+#include "drawn_picture.h"
 #include "vision/edges/hough.hpp"
-#include "vision/edges/windows.hpp"
-#include "waymark/detector.h"
 #include "waymark/random.h"
 
 namespace {
@@ -34,53 +32,14 @@ double median_us(int rounds, Work work) {
   return times[50];
 }
 
-// Both ways of the detector on a 1280x720 fisheye picture of a room: floor, board and wall. The view of windows is at
-// least 0.5 to 6 m ahead of the camera and 3 m to each side.
 void whole_pictures() {
-  constexpr uint32_t kWidth = 1280, kHeight = 720;
-  wm_rig rig;
-  wm_rig_init(&rig);
-  rig.camera_count = 1;
-  wm_camera &c = rig.cameras[0];
-  c = wm_camera{};
-  c.width_px = kWidth;
-  c.height_px = kHeight;
-  c.intrinsics_count = 4;
-  const double intrinsics[] = {522, 522, 640, 360};
-  std::copy(intrinsics, intrinsics + 4, c.intrinsics);
-  c.mounting = {{1.06, 0, 0.4}, {0, 22 * 3.14159265 / 180, 0}};
-  wm::mounted_camera camera;
-  wm::mounted_camera_init(&camera, c);
-  std::vector<uint8_t> picture(kWidth * kHeight);
-  for (uint32_t v = 0; v < kHeight; v++)
-    for (uint32_t u = 0; u < kWidth; u++) {
-      double x, y;
-      const bool is_floor = wm::floor_of(camera, {1.0 * u, 1.0 * v}, &x, &y) && x < 5 && y < 1.2 && y > -1.5;
-      picture[v * kWidth + u] =
-          static_cast<uint8_t>((is_floor ? 130 : 60) + 4 * wm_random_uniform(1, 2, v * kWidth + u));
-    }
-  const wm_detector *edges = wm_detector_find("edges");
-  std::vector<char> params(edges->params.bytes);
-  static wm_event events[2];
-  const int32_t front = 0;
-  const wm_view view = {&rig, &front};
-  const wm_frame frame = {0, 0, 0, 0, 0, kWidth, kHeight, kWidth, picture.data()};
   for (int mode = 0; mode < 2; mode++) {
-    wm_params_defaults(&edges->params, params.data());
-    reinterpret_cast<wm_edges_params *>(params.data())->mode = mode;
-    const char *why = "";
-    const size_t bytes = (edges->state_bytes(params.data(), &view, &why) + 63) / 64 * 64;
-    void *state = std::aligned_alloc(64, bytes);
-    if (!state || edges->init(state, params.data(), &view) != WM_OK) return;
-    size_t count = 0;
-    const double us = median_us(1, [&] { (void)edges->detect(state, &frame, nullptr, events, 2, &count); });
-    wm::bird_view bird;
-    wm::bird_view_size(*reinterpret_cast<wm_edges_params *>(params.data()), &bird);
-    std::printf("edges_1280x720_%s_us %.0f (%u points", mode ? "windows" : "rays", us,
-                count ? events[0].as.points.count : 0);
-    if (mode) std::printf(", %d windows", bird.windows);
+    bench::edges_at_work edges(mode);
+    uint32_t points = 0;
+    const double us = median_us(1, [&] { points = edges.look(); });
+    std::printf("edges_1280x720_%s_us %.0f (%u points", mode ? "windows" : "rays", us, points);
+    if (mode) std::printf(", %d windows", edges.windows());
     std::printf(")\n");
-    std::free(state);
   }
 }
 

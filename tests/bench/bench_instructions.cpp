@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Work for tests/bench/instructions.sh to count the instructions of: wm_instructions WORK, once warm, once counted.
+#include <cstdio>
+#include <cstring>
+#include <functional>
+
+#include "drawn_map.h"
+#include "drawn_picture.h"
+#include "vision/edges/hough.hpp"
+
+// Callgrind counts inside of this function alone.
+extern "C" __attribute__((noinline)) void wm_counted(const std::function<void()> *work) {
+  (*work)();
+  __asm__ volatile("");
+}
+
+namespace {
+
+void count(const std::function<void()> &work) {
+  work();
+  wm_counted(&work);
+}
+
+void windows() {
+  uint8_t window[50 * 50], turned[50 * 50];
+  for (size_t i = 0; i < sizeof window; i++) window[i] = static_cast<uint8_t>(256 * wm_random_uniform(1, 1, i));
+  for (int y = 0; y < 50; y++)
+    for (int x = 0; x < 50; x++) turned[x * 50 + y] = window[y * 50 + x];
+  const auto work = std::make_unique<wm::hough_work>();
+  count([&] {
+    for (int q = 0; q < 4; q++) {
+      const uint8_t *from = q & 1 ? turned : window;
+      (void)wm::hough_transform(q & 2 ? from + 49 : from, 50, 50, q & 2 ? -1 : 1, work.get());
+    }
+  });
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  const char *what = argc > 1 ? argv[1] : "";
+  if (!std::strcmp(what, "particles_200") || !std::strcmp(what, "particles_2000")) {
+    bench::cloud_at_work work(std::strlen(what) == 13 ? 200 : 2000);
+    count([&] { work.weigh(); });
+  } else if (!std::strcmp(what, "window_50x50")) {
+    windows();
+  } else if (!std::strcmp(what, "picture_rays") || !std::strcmp(what, "picture_windows")) {
+    bench::edges_at_work work(std::strcmp(what, "picture_rays") != 0);
+    count([&] { (void)work.look(); });
+  } else {
+    std::fprintf(stderr,
+                 "usage: wm_instructions particles_200|particles_2000|window_50x50|picture_rays|picture_windows\n");
+    return 2;
+  }
+  return 0;
+}
