@@ -7,6 +7,7 @@
 
 #include "unity.h"
 #include "vision/camera/lens.hpp"
+#include "vision/edges/params.h"
 #include "waymark/detector.h"
 #include "waymark/random.h"
 
@@ -219,5 +220,13 @@ int main() {
     RUN_TEST(what_does_not_go_together_is_told);
     RUN_TEST(edges_lie_where_the_wall_stands);
   }
+  // The other way of the same detector.
+  detector = wm_detector_find("edges");
+  params.resize(detector->params.bytes + 1);
+  wm_params_defaults(&detector->params, params.data());
+  reinterpret_cast<wm_edges_params *>(params.data())->mode = EDGES_BY_WINDOWS;
+  RUN_TEST(same_picture_same_bytes);
+  RUN_TEST(nothing_to_see_is_nothing_seen);
+  RUN_TEST(another_size_is_refused);
   return UNITY_END();
 }

@@ -8,6 +8,7 @@
 #include "filters/edge_mcl/likelihood.hpp"
 #include "unity.h"
 #include "waymark/random.h"
+#include "waymark/vectors.h"
 
 namespace {
 
@@ -154,6 +155,9 @@ void the_kernel_and_its_scalar_twin_agree_to_the_bit(void) {
     const double angle = 6.28 * wm_random_uniform(4, 3, i);
     const int32_t a = wm::score(d.map, points, table, x, y, std::cos(angle), std::sin(angle));
     TEST_ASSERT_EQUAL_INT32(wm::score_scalar(d.map, points, table, x, y, std::cos(angle), std::sin(angle)), a);
+    wm_vectors_limit(true);
+    TEST_ASSERT_EQUAL_INT32(a, wm::score(d.map, points, table, x, y, std::cos(angle), std::sin(angle)));
+    wm_vectors_limit(false);
     different += a != points.count * table.value[0][255];
   }
   TEST_ASSERT_GREATER_THAN(300, different);
