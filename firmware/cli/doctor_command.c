@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "commands.h"
 #include "doctor.h"
@@ -39,6 +40,7 @@ static int look(const wm_config *config, double seconds, int as_json) {
   doctor_limits(&found);
   doctor_lcm(lcm_way_url(config ? config->lcm_url : ""), &found);
   doctor_can("", config, &found);
+  doctor_interrupts("", config, sysconf(_SC_NPROCESSORS_ONLN), &found);
   doctor_cameras(config, &found);
   doctor_latency(seconds, priority, &wake_ns, &is_realtime);
   doctor_judge_latency(&wake_ns, is_realtime, &found);

@@ -73,7 +73,7 @@ static wm_status read_recorded_motion(wm_recording *recording, const wm_config *
   return status;
 }
 
-// The log's motion, and the stamps of what each source of the assembly said.
+// The log's motion; stamps and arrivals (as `what`) of what each source of the assembly said.
 static wm_status read_log(const char *path, const wm_assembly *assembly, said_list *motion, said_list *stamps,
                           wm_error *err) {
   wm_log_reader *log;
@@ -93,7 +93,7 @@ static wm_status read_log(const char *path, const wm_assembly *assembly, said_li
     if (wm_event_is_motion(&event)) status = append(motion, content(&event), event.t_ns, err);
     said_list *of = place[event.source] < 0 ? NULL : &stamps[place[event.source]];
     if (status == WM_OK && of && (of->count == 0 || of->at[of->count - 1].t_ns != event.t_ns))
-      status = append(of, 0, event.t_ns, err);
+      status = append(of, (uint64_t)event.arrival_ns, event.t_ns, err);
   }
   wm_log_reader_close(log);
   return status == WM_END ? WM_OK : status;
@@ -155,10 +155,11 @@ static wm_status restrict_sources(const char *path, const wm_assembly *assembly,
     if (k == assembly->source_count) continue;  // not used
     if (stamps[k].count == 0)
       return wm_fail(err, WM_BAD_DATA, "%s: has nothing of '%s': its run saw no picture of it", path, source->name);
-    wm_time_ns *t_ns = calloc(stamps[k].count, sizeof *t_ns);
-    if (!t_ns) return wm_fail(err, WM_IO, "no memory for %zu stamps", stamps[k].count);
-    for (size_t n = 0; n < stamps[k].count; n++) t_ns[n] = stamps[k].at[n].t_ns - offset_ns;
-    wm_vision_look_only_at(assembly->vision, i, t_ns, stamps[k].count);
+    wm_seen *seen = calloc(stamps[k].count, sizeof *seen);
+    if (!seen) return wm_fail(err, WM_IO, "no memory for %zu stamps", stamps[k].count);
+    for (size_t n = 0; n < stamps[k].count; n++)
+      seen[n] = (wm_seen){stamps[k].at[n].t_ns - offset_ns, (wm_time_ns)stamps[k].at[n].what - offset_ns};
+    wm_vision_look_only_at(assembly->vision, i, seen, stamps[k].count);
   }
   return WM_OK;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which pictures a run saw. A run on devices loses some, and passes over others because it is busy; a replay of the
-// recording that it was fed from looks at the same ones by its log, and the two can be compared.
+// recording that it was fed from looks at the same ones by its log, as late as they came there, and the two can be
+// compared.
 #ifndef WM_FIRMWARE_FRAMES_OF_H
 #define WM_FIRMWARE_FRAMES_OF_H
 

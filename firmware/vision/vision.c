@@ -56,20 +56,21 @@ static const wm_camera_device_config *device_of(const wm_config *config, const c
   return NULL;
 }
 
-static wm_status open_device(vision_source *self, const wm_config *config, const wm_vision_config *wanted,
-                             const wm_camera *camera, wm_warn_fn warn, void *context, wm_error *err) {
-  const wm_camera_device_config *device = device_of(config, camera->name);
-  if (self->detector->pictures != 1)
-    return wm_fail(err, WM_UNSUPPORTED,
-                   "%s:%d: vision.%s: looks at pairs of pictures; of devices only single cameras "
-                   "are possible",
-                   config->path, wanted->line, self->detector->name);
-  if (!device)
-    return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s.cameras: '%s' is not in devices.cameras", config->path,
-                   wanted->line, self->detector->name, camera->name);
+static wm_status open_devices(vision_source *self, const wm_config *config, const wm_vision_config *wanted,
+                              wm_warn_fn warn, void *context, wm_error *err) {
+  wm_status status = WM_OK;
+  for (uint32_t i = 0; status == WM_OK && i < self->detector->pictures; i++) {
+    const wm_camera *camera = &self->view.rig->cameras[self->cameras[i]];
+    const wm_camera_device_config *device = device_of(config, camera->name);
+    if (!device)
+      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s: the camera '%s' is not in devices.cameras", config->path,
+                     wanted->line, self->detector->name, camera->name);
+    status = wm_camera_device_open(device, camera, self->cameras[i], warn, context, &self->devices.devices[i], err);
+    self->devices.count += status == WM_OK;
+  }
   self->base.is_live = 1;
   self->base.skip_to = NULL;
-  return wm_camera_device_open(device, camera, self->cameras[0], warn, context, &self->device, err);
+  return status;
 }
 
 // A source of this detector on as many of `cameras` as it takes at once.
@@ -100,7 +101,7 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   if (s->state_bytes == 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s: can't work with the camera '%s': %s", config->path,
                    wanted->line, s->detector->name, first->name, why ? why : "it doesn't say why");
-  if (wm_recording_is_robot(recording)) return open_device(s, config, wanted, first, warn, context, err);
+  if (wm_recording_is_robot(recording)) return open_devices(s, config, wanted, warn, context, err);
   for (uint32_t i = 0; i < s->detector->pictures; i++) {
     wm_status status = wm_video_open(wm_recording_dir(recording), &rig->cameras[s->cameras[i]], s->cameras[i], warn,
                                      context, &s->videos[i], err);
@@ -183,8 +184,8 @@ void wm_vision_close(wm_vision *self) {
   for (size_t i = 0; i < self->count; i++) {
     vision_ahead_stop(&self->sources[i]);
     for (size_t k = 0; k < PICTURES_MAX; k++) wm_video_close(self->sources[i].videos[k]);
-    wm_camera_device_close(self->sources[i].device);
-    free(self->sources[i].only_ns);
+    camera_set_close(&self->sources[i].devices);
+    free(self->sources[i].only);
   }
   free(self);
 }
@@ -192,8 +193,8 @@ void wm_vision_close(wm_vision *self) {
 size_t wm_vision_count(const wm_vision *self) { return self ? self->count : 0; }
 wm_source *wm_vision_source(wm_vision *self, size_t i) { return &self->sources[i].base; }
 
-void wm_vision_look_only_at(wm_vision *self, size_t i, wm_time_ns *t_ns, size_t count) {
-  vision_look_only_at(&self->sources[i], t_ns, count);
+void wm_vision_look_only_at(wm_vision *self, size_t i, wm_seen *seen, size_t count) {
+  vision_look_only_at(&self->sources[i], seen, count);
 }
 
 // ── memory, start ───────────────────────────────────────────────────────────────────────────────────────────────────

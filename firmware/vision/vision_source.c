@@ -7,8 +7,6 @@
 
 #include "waymark/clock.h"
 
-#define PAIR_TOLERANCE_NS (2 * WM_NS_PER_MS)  // pictures of a pair are triggered together
-
 // What the videos counted, in the terms of a source.
 static void take_video_counts(vision_source *self) {
   wm_source_counts *out = &self->counts;
@@ -23,23 +21,9 @@ static void take_video_counts(vision_source *self) {
   }
 }
 
-static void take_device_counts(vision_source *self) {
-  wm_source_counts *out = &self->counts;
-  const wm_camera_counts *c = wm_camera_device_counted(self->device);
-  out->lost = c->lost;
-  out->malformed = c->damaged;
-  out->frozen = c->duplicated;
-  out->overflows = c->skipped;
-  out->out_of_order = c->out_of_order;
-  out->not_finite = c->bad_stamps;
-  out->device = c->device;
-  out->stamp_uncertainty_ns = c->stamp_uncertainty_ns;
-  memcpy(out->device_note, c->device_note, sizeof out->device_note);
-}
-
 static void take_counts(vision_source *self) {
-  if (self->device) {
-    take_device_counts(self);
+  if (self->devices.count > 0) {
+    camera_set_counts(&self->devices, &self->counts);
   } else {
     take_video_counts(self);
   }
@@ -47,19 +31,20 @@ static void take_counts(vision_source *self) {
 
 #define ONLY_TOLERANCE_NS (50 * WM_NS_PER_MS)  // of a run's stamp from the recording's; or less than half a period
 
-// Whether no other stamp of the recording is meant: the nearest that is wanted lies within less than half a period.
-static int is_wanted(const vision_source *self, wm_time_ns t_ns) {
+// The nearest of those that are wanted, if it lies within less than half a period: no other picture is meant by it.
+static const wm_seen *wanted(const vision_source *self, wm_time_ns t_ns) {
   size_t low = 0, high = self->only_count;
   while (low < high) {
     size_t middle = low + (high - low) / 2;
-    if (self->only_ns[middle] < t_ns)
+    if (self->only[middle].t_ns < t_ns)
       low = middle + 1;
     else
       high = middle;
   }
-  wm_time_ns after_ns = low < self->only_count ? self->only_ns[low] - t_ns : INT64_MAX;
-  wm_time_ns before_ns = low > 0 ? t_ns - self->only_ns[low - 1] : INT64_MAX;
-  return (after_ns < before_ns ? after_ns : before_ns) <= self->only_tolerance_ns;
+  wm_time_ns after_ns = low < self->only_count ? self->only[low].t_ns - t_ns : INT64_MAX;
+  wm_time_ns before_ns = low > 0 ? t_ns - self->only[low - 1].t_ns : INT64_MAX;
+  if ((after_ns < before_ns ? after_ns : before_ns) > self->only_tolerance_ns) return NULL;
+  return &self->only[after_ns < before_ns ? low : low - 1];
 }
 
 static wm_status skip_all(vision_source *self, wm_error *err) {
@@ -69,12 +54,12 @@ static wm_status skip_all(vision_source *self, wm_error *err) {
   return status;
 }
 
-void vision_look_only_at(vision_source *self, wm_time_ns *t_ns, size_t count) {
+void vision_look_only_at(vision_source *self, wm_seen *seen, size_t count) {
   wm_time_ns nearest_ns = INT64_MAX;
   for (size_t i = 1; i < count; i++)
-    if (t_ns[i] - t_ns[i - 1] < nearest_ns) nearest_ns = t_ns[i] - t_ns[i - 1];
-  free(self->only_ns);
-  self->only_ns = t_ns;
+    if (seen[i].t_ns - seen[i - 1].t_ns < nearest_ns) nearest_ns = seen[i].t_ns - seen[i - 1].t_ns;
+  free(self->only);
+  self->only = seen;
   self->only_count = count;
   self->only_tolerance_ns = nearest_ns / 5 * 2 < ONLY_TOLERANCE_NS ? nearest_ns / 5 * 2 : ONLY_TOLERANCE_NS;
 }
@@ -88,7 +73,7 @@ static wm_status find_together(vision_source *self, wm_frame *heads, wm_error *e
     }
     wm_time_ns apart_ns = self->detector->pictures == 1 ? 0 : heads[1].t_ns - heads[0].t_ns;
     int is_together = apart_ns <= PAIR_TOLERANCE_NS && apart_ns >= -PAIR_TOLERANCE_NS;
-    if (is_together && (!self->only_ns || is_wanted(self, heads[0].t_ns))) return WM_OK;
+    if (is_together && (!self->only || wanted(self, heads[0].t_ns))) return WM_OK;
     wm_status status = is_together ? skip_all(self, err) : wm_video_skip(self->videos[apart_ns < 0], err);
     if (status != WM_OK) return status;
   }
@@ -96,7 +81,7 @@ static wm_status find_together(vision_source *self, wm_frame *heads, wm_error *e
 
 // Decodes what belongs together. WM_AGAIN where one of a pair turned out to be damaged, or a device has nothing yet.
 static wm_status decode(vision_source *self, wm_frame *frames, wm_error *err) {
-  if (self->device) return wm_camera_device_next(self->device, &frames[0], err);
+  if (self->devices.count > 0) return camera_set_next(&self->devices, frames, err);
   wm_frame heads[PICTURES_MAX] = {0};
   wm_status status = find_together(self, heads, err);
   wm_time_ns begin_ns = wm_monotonic_ns();
@@ -114,7 +99,7 @@ static wm_status look(vision_source *self, wm_error *err) {
   wm_frame frames[PICTURES_MAX] = {0};
   self->event_count = self->next_event = 0;
   wm_status status = decode(self, frames, err);
-  if (status == WM_AGAIN) return self->device ? WM_AGAIN : WM_OK;
+  if (status == WM_AGAIN) return self->devices.count > 0 ? WM_AGAIN : WM_OK;
   if (status != WM_OK) return status;
   // A camera's pictures come in their order; who goes back has a broken clock.
   if (self->newest_ns != WM_TIME_NONE && frames[0].t_ns <= self->newest_ns) {
@@ -124,6 +109,8 @@ static wm_status look(vision_source *self, wm_error *err) {
   self->newest_ns = frames[0].t_ns;
   wm_time_ns arrival_ns = frames[0].arrival_ns;
   if (self->detector->pictures == 2 && frames[1].arrival_ns > arrival_ns) arrival_ns = frames[1].arrival_ns;
+  const wm_seen *seen = self->only ? wanted(self, frames[0].t_ns) : NULL;
+  if (seen) arrival_ns = seen->arrival_ns;
 
   wm_time_ns begin_ns = wm_monotonic_ns();
   status = self->detector->detect(self->state, frames, NULL, self->events, self->capacity, &self->event_count);

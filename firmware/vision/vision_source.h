@@ -5,12 +5,12 @@
 
 #include <pthread.h>
 
+#include "camera_set.h"
 #include "waymark/detector.h"
-#include "waymark/devices.h"
 #include "waymark/video.h"
 #include "waymark/vision.h"
 
-#define PICTURES_MAX 2
+#define PICTURES_MAX CAMERA_SET_MAX
 #define AHEAD_EVENTS 8
 
 typedef struct vision_source vision_source;
@@ -35,8 +35,8 @@ struct vision_source {
   wm_view view;
   int32_t cameras[PICTURES_MAX];
   wm_video *videos[PICTURES_MAX];
-  wm_camera_device *device;  // instead of videos: the robot's own camera
-  uint16_t sensor;           // of WM_EVENT_LOOKED
+  camera_set devices;  // instead of videos: the robot's own cameras
+  uint16_t sensor;     // of WM_EVENT_LOOKED
   int gives_looked;
   size_t state_bytes, capacity;
   void *state, *events_memory;
@@ -46,7 +46,7 @@ struct vision_source {
   uint32_t seq;
   wm_source_counts counts;  // the working thread's own
   wm_histogram decode_ns, detect_ns;
-  wm_time_ns *only_ns;  // the only pictures to be looked at, rising; NULL: all
+  wm_seen *only;  // the only pictures to be looked at, rising; NULL: all
   size_t only_count;
   wm_time_ns only_tolerance_ns;
   vision_ahead ahead;
@@ -57,8 +57,8 @@ wm_status vision_next(vision_source *self, wm_event *out, wm_error *err);
 // Passes over pictures that are no longer the newest at `now_ns`.
 void vision_skip_to(vision_source *self, wm_time_ns now_ns);
 
-// Takes `t_ns` (rising, from malloc) over.
-void vision_look_only_at(vision_source *self, wm_time_ns *t_ns, size_t count);
+// Takes `seen` (rising, from malloc) over.
+void vision_look_only_at(vision_source *self, wm_seen *seen, size_t count);
 
 wm_status vision_ahead_start(vision_source *self, wm_error *err);
 void vision_ahead_stop(vision_source *self);

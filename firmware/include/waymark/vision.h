@@ -30,9 +30,14 @@ void wm_vision_close(wm_vision *self);  // NULL is fine; ends its threads
 size_t wm_vision_count(const wm_vision *self);  // 0 for NULL
 wm_source *wm_vision_source(wm_vision *self, size_t i);
 
-// Source i of a recording looks at the pictures nearest to these stamps and at no others; those are counted as skipped.
-// `t_ns` rises and is from malloc; it is taken over. Before wm_vision_run_ahead.
-void wm_vision_look_only_at(wm_vision *self, size_t i, wm_time_ns *t_ns, size_t count);
+// A picture that a run saw, and when its observations came.
+typedef struct wm_seen {
+  wm_time_ns t_ns, arrival_ns;
+} wm_seen;
+
+// Source i of a recording looks at the pictures nearest to these and at no others, which are counted as skipped; what
+// it finds in them arrives then. `seen` rises by t_ns and is from malloc; it is taken over. Before wm_vision_run_ahead.
+void wm_vision_look_only_at(wm_vision *self, size_t i, wm_seen *seen, size_t count);
 
 // The memory that it wants; at most WM_VISION_NEEDS lines. Returns how many.
 size_t wm_vision_needs(wm_vision *self, wm_arena_need *needs);

@@ -100,6 +100,27 @@ static void can_interfaces_are_looked_at(void) {
   expect("can eth0", FINDING_BAD, "is no CAN interface");
 }
 
+static void interrupts_below_the_estimator_are_found(void) {
+  static wm_config config;
+  config.devices.can_count = 1;
+  (void)snprintf(config.devices.can[0].interface, sizeof config.devices.can[0].interface, "can0");
+  put("/proc/1/comm", "init\n");
+  put("/proc/77/comm", "irq/23-can0\n");
+  put("/proc/77/stat",
+      "77 (irq/23-can0) S 2 0 0 0 -1 2129984 0 0 0 0 0 5 0 0 -51 0 1 0 400 0 0 18446744073709551615 0 0 0 0 "
+      "0 0 0 2147483647 0 0 0 0 17 0 50 1 0 0 0 0 0 0 0 0 0 0 0\n");
+  config.runtime.realtime_priority = 80;
+  doctor_interrupts(root, &config, 1, &found);
+  expect("interrupts", FINDING_BAD, "irq/23-can0 at priority 50 is not above the estimator (80)");
+  memset(&found, 0, sizeof found);
+  doctor_interrupts(root, &config, 4, &found);
+  expect("interrupts", FINDING_NOTE, "where both are on one processor");
+  memset(&found, 0, sizeof found);
+  config.runtime.realtime_priority = 40;
+  doctor_interrupts(root, &config, 1, &found);
+  expect("interrupts", FINDING_GOOD, "is above");
+}
+
 static void cameras_are_looked_at(void) {
   static wm_config config;
   config.devices.camera_count = 2;
@@ -140,6 +161,7 @@ int main(void) {
   RUN_TEST(a_good_computer_is_found_good);
   RUN_TEST(what_is_broken_is_found);
   RUN_TEST(can_interfaces_are_looked_at);
+  RUN_TEST(interrupts_below_the_estimator_are_found);
   RUN_TEST(cameras_are_looked_at);
   RUN_TEST(no_way_for_messages_is_found);
   RUN_TEST(latency_is_measured);
