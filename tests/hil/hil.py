@@ -3,7 +3,8 @@
 """Hardware in the loop: the same daemon and configuration as on a robot, in a guest with Debian's PREEMPT_RT kernel and a
 real (emulated) CAN controller, under qemu's instruction clock, fed from a recording at its own times.
 
-usage: hil.py WORK WAYMARK WAYMARK_SIMULATE   (WORK keeps the guest's image from run to run)
+usage: hil.py WORK WAYMARK WAYMARK_SIMULATE [PART ...]   (WORK keeps the guest's image from run to run; parts: can, camera,
+edges; all of them where none is named)
 
 Judged on the host: the guest's own checks; the log of its run gives its poses bit by bit; its poses are those of a replay
 of the same frames."""
@@ -14,17 +15,23 @@ import shutil
 import subprocess
 import sys
 
+import edges
+
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+CAN = ["-object", "can-bus,id=cb0", "-device", "kvaser_pci,canbus=cb0", "-device", "kvaser_pci,canbus=cb0"]
+# Instruction clocks: 250 million a second, idle time is the host's; 500 million, idle time is skipped, so that who sleeps
+# wakes in time whatever else the host does.
+SLOW, FAST = "shift=2,sleep=on", "shift=1,sleep=off"
 POSITION_M, HEADING_DEG = 0.02, 0.2
 PLAYER_M, PLAYER_DEG = 0.1, 0.5
 
 
-def boot(work, script, *devices):
-    """Runs guest/SCRIPT; everything that it prints is shown and kept. Judged by its last word, not by qemu's."""
+def boot(work, script, *devices, clock="shift=2,sleep=on"):
+    """Runs guest/SCRIPT by this clock; everything that it prints is shown and kept. Judged by its last word, not by qemu's."""
     log = work / f"{script}.log"
-    command = ["timeout", "-k", "5", "600", "qemu-system-x86_64", "-accel", "tcg,thread=single", "-smp", "1",
-               "-icount", "shift=2,sleep=on", "-machine", "q35", "-cpu", "max", "-m", "1024", "-no-reboot",
+    command = ["timeout", "-k", "5", "1200", "qemu-system-x86_64", "-accel", "tcg,thread=single", "-smp", "1",
+               "-icount", clock, "-machine", "q35", "-cpu", "max", "-m", "1024", "-no-reboot",
                "-kernel", work / "image/vmlinuz", "-initrd", work / "image/init.cpio.gz",
                "-append", f"console=ttyS0 quiet panic=-1 hil={script}",
                "-drive", f"file={work}/image/root.ext4,if=virtio,format=raw,readonly=on",
@@ -51,26 +58,27 @@ def worst_difference(a, b):
     return worst_m, worst_deg, worst_ms
 
 
-def scenario_can(work, waymark, simulate):
+def scenario_can(work, simulate):
     recording, scenario = work / "recording", work / "share/scenario"
     shutil.rmtree(recording, ignore_errors=True)
     subprocess.run([simulate, ROOT / "config/worlds/crossing.yaml", "--out", recording], check=True)
     scenario.mkdir(parents=True)
-    for name in ("can.log", "vehicle.dbc", "can-signals.yaml", "calibration.yaml"):
+    for name in ("can.log", "vehicle.dbc", "can-signals.yaml", "calibration.yaml", "landmarks.csv"):
         shutil.copy(recording / name, scenario)
     start = next(line for line in (recording / "recording.yaml").read_text().splitlines() if "initial_pose:" in line)
-    # The configuration of the same drive at the desk, and the robot's own files and devices.
+    # The configuration of the same drive at the desk, on CAN alone, and the robot's own files and devices.
+    config = (ROOT / "config/crossing.yaml").read_text().replace("lateness_max_ms: 300}", "use: false}")
+    (work / "can.yaml").write_text(config)
     (scenario / "robot.yaml").write_text(
-        (ROOT / "config/crossing-odometry.yaml").read_text() + f"\n{start.strip()}\n"
-        "calibration: calibration.yaml\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\n"
-        "devices: {can: [{interface: can0}]}\nstart: {saved_pose: /run/pose.yaml}\n")
+        config + f"\n{start.strip()}\n"
+        "calibration: calibration.yaml\nlandmarks: landmarks.csv\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\n"
+        "devices: {can: [{interface: can0}]}\nstart: {saved_pose: /run/pose.yaml}\nblack_box: {folder: /run/box}\n")
     lines = (recording / "can.log").read_text().splitlines()
     seconds = float(lines[-1][1:].split(")")[0]) - float(lines[0][1:].split(")")[0])
     (scenario / "duration").write_text(f"{seconds + 5:.0f}\n")
-    return recording
 
 
-def scenario_camera(work):
+def scenario_camera(work, _):
     scenario = work / "share/camera"
     scenario.mkdir(parents=True)
     (scenario / "calibration.yaml").write_text(
@@ -83,7 +91,7 @@ def scenario_camera(work):
     subprocess.run(["cc", "-O2", "-static", HERE / "feed.c", "-o", scenario / "feed"], check=True)
 
 
-def judge_camera(work):
+def judge_camera(work, _):
     """Stamps of the recording: each later than the one before, no more than their arrival, most a period apart."""
     with open(work / "share/out/camera-faults/video/front.csv", newline="") as f:
         rows = [(int(r["t_ns"]), int(r["arrival_ns"])) for r in csv.DictReader(f)]
@@ -97,19 +105,19 @@ def judge_camera(work):
     return failures
 
 
-def judge_can(work, waymark, recording):
-    out, failures = work / "share/out", []
+def judge_can(work, waymark):
+    out, recording, failures = work / "share/out", work / "recording", []
     subprocess.run([waymark, "replay", out / "drive/events.wmlog", "--out", work / "again"], check=True,
                    stdout=subprocess.DEVNULL)
     if (out / "drive/trajectory.csv").read_bytes() != (work / "again/trajectory.csv").read_bytes():
         failures.append("the guest's log doesn't give its poses bit by bit")
-    subprocess.run([waymark, "replay", recording, "--config", ROOT / "config/crossing-odometry.yaml", "--out", work / "desk"],
+    subprocess.run([waymark, "replay", recording, "--config", work / "can.yaml", "--out", work / "desk"],
                    check=True, stdout=subprocess.DEVNULL)
     heard = work / "heard"
     shutil.rmtree(heard, ignore_errors=True)
     shutil.copytree(recording, heard)
     shutil.copy(out / "heard.log", heard / "can.log")
-    subprocess.run([waymark, "replay", heard, "--config", ROOT / "config/crossing-odometry.yaml", "--out", work / "witness"],
+    subprocess.run([waymark, "replay", heard, "--config", work / "can.yaml", "--out", work / "witness"],
                    check=True, stdout=subprocess.DEVNULL)
     guest = poses(out / "drive/trajectory.csv")
     for name, limit_m, limit_deg, what in (
@@ -124,6 +132,14 @@ def judge_can(work, waymark, recording):
     return failures
 
 
+def scenario_edges(work, simulate):
+    edges.prepare(work, ROOT, HERE, simulate)
+
+
+def judge_edges(work, waymark):
+    return edges.judge(work, waymark, ROOT, work / "edges-recording")
+
+
 def main():
     work, waymark, simulate = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
     if shutil.which("qemu-system-x86_64") is None or shutil.which("mmdebstrap") is None:
@@ -134,12 +150,16 @@ def main():
     (work / "share/out").mkdir(parents=True)
     shutil.copytree(HERE / "guest", work / "share/guest")
     shutil.copy(waymark, work / "share/waymark")
-    recording = scenario_can(work, waymark, simulate)
-    failures = [] if boot(work, "can.sh", "-object", "can-bus,id=cb0", "-device", "kvaser_pci,canbus=cb0",
-                          "-device", "kvaser_pci,canbus=cb0") else ["the guest's own checks failed (can.sh)"]
-    failures += judge_can(work, waymark, recording)
-    scenario_camera(work)
-    failures += judge_camera(work) if boot(work, "camera.sh") else ["the guest's own checks failed (camera.sh)"]
+    only = sys.argv[4:]  # names of parts, for who works on one of them
+    failures = []
+    for name, prepare, judge, devices, clock in (("can", scenario_can, judge_can, CAN, SLOW),
+                                                 ("camera", scenario_camera, judge_camera, [], SLOW),
+                                                 ("edges", scenario_edges, judge_edges, CAN, FAST)):
+        if only and name not in only:
+            continue
+        prepare(work, simulate)
+        good = boot(work, f"{name}.sh", *devices, clock=clock)
+        failures += judge(work, waymark) if good else [f"the guest's own checks failed ({name}.sh)"]
     for failure in failures:
         print("FAIL:", failure)
     print("hil:", "failed" if failures else "good")

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// play TIMELINE PICTURES CAN DEVICE WIDTH HEIGHT DELAY: a recording's CAN frames and pictures, each at its own time, by
+// one clock, which neither canplayer nor a camera's steady rate can do. A line of TIMELINE is
+// "NANOSECONDS c ID HEXDATA" or "NANOSECONDS p OFFSET BYTES" (of PICTURES, an MJPEG picture), rising. The formats are
+// set at once; the first line is due after DELAY seconds. Says at the end how late it was at most.
+#include <fcntl.h>
+#include <linux/can.h>
+#include <linux/can/raw.h>
+#include <linux/videodev2.h>
+#include <net/if.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+typedef struct item {
+  long long t_ns;
+  char kind;
+  struct can_frame frame;
+  size_t offset, bytes;
+} item;
+
+static char *read_file(const char *path, size_t *length) {
+  FILE *f = fopen(path, "rb");
+  if (!f) return NULL;
+  (void)fseek(f, 0, SEEK_END);
+  *length = (size_t)ftell(f);
+  rewind(f);
+  char *data = calloc(*length + 1, 1);
+  if (data && fread(data, 1, *length, f) != *length) data = NULL;
+  (void)fclose(f);
+  return data;
+}
+
+static int parse(const char *line, item *out) {
+  int used = 0;
+  char data[32] = "";
+  unsigned id = 0;
+  memset(out, 0, sizeof *out);
+  if (sscanf(line, "%lld %c%n", &out->t_ns, &out->kind, &used) != 2) return 0;
+  if (out->kind == 'p') return sscanf(line + used, "%zu %zu", &out->offset, &out->bytes) == 2;
+  if (sscanf(line + used, "%x %16s", &id, data) < 1) return 0;
+  out->frame.can_id = id;
+  out->frame.can_dlc = (unsigned char)(strlen(data) / 2);
+  for (int i = 0; i < out->frame.can_dlc; i++) {
+    unsigned byte = 0;
+    (void)sscanf(data + 2 * i, "%2x", &byte);
+    out->frame.data[i] = (unsigned char)byte;
+  }
+  return 1;
+}
+
+static int open_can(const char *interface) {
+  int fd = socket(PF_CAN, SOCK_RAW, CAN_RAW);
+  struct sockaddr_can at = {.can_family = AF_CAN, .can_ifindex = (int)if_nametoindex(interface)};
+  return fd >= 0 && bind(fd, (struct sockaddr *)&at, sizeof at) == 0 ? fd : -1;
+}
+
+static int open_video(const char *device, unsigned width, unsigned height) {
+  int fd = open(device, O_RDWR);
+  struct v4l2_capability can;
+  struct v4l2_format f = {.type = V4L2_BUF_TYPE_VIDEO_OUTPUT};
+  if (fd < 0 || ioctl(fd, VIDIOC_QUERYCAP, &can) != 0) return -1;
+  f.fmt.pix.width = width;
+  f.fmt.pix.height = height;
+  f.fmt.pix.pixelformat = V4L2_PIX_FMT_MJPEG;
+  f.fmt.pix.field = V4L2_FIELD_NONE;
+  f.fmt.pix.sizeimage = width * height * 2;
+  return ioctl(fd, VIDIOC_S_FMT, &f) == 0 ? fd : -1;
+}
+
+static long long now_ns(void) {
+  struct timespec t;
+  clock_gettime(CLOCK_MONOTONIC, &t);
+  return t.tv_sec * 1000000000LL + t.tv_nsec;
+}
+
+int main(int argc, char **argv) {
+  if (argc != 8) return 2;
+  size_t text_length = 0, pictures_length = 0, count = 0;
+  char *text = read_file(argv[1], &text_length), *pictures = read_file(argv[2], &pictures_length);
+  item *items = calloc(text_length / 4 + 1, sizeof *items);
+  int can = open_can(argv[3]), video = open_video(argv[4], (unsigned)atoi(argv[5]), (unsigned)atoi(argv[6]));
+  if (!text || !pictures || !items || can < 0 || video < 0) {
+    perror("play");
+    return 1;
+  }
+  for (char *rest = text, *line; (line = strsep(&rest, "\n"));) count += (size_t)parse(line, &items[count]);
+  long long begin_ns = now_ns() + (long long)(atof(argv[7]) * 1e9), worst_ns = 0, failed = 0;
+  for (size_t i = 0; i < count; i++) {
+    const item *it = &items[i];
+    long long due_ns = begin_ns + it->t_ns - items[0].t_ns;
+    struct timespec due = {due_ns / 1000000000, due_ns % 1000000000};
+    (void)clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, NULL);
+    long long late_ns = now_ns() - due_ns;
+    if (late_ns > worst_ns) worst_ns = late_ns;
+    if (it->kind == 'c') failed += write(can, &it->frame, sizeof it->frame) != sizeof it->frame;
+    if (it->kind == 'p' && it->offset + it->bytes <= pictures_length)
+      failed += write(video, pictures + it->offset, it->bytes) != (ssize_t)it->bytes;
+  }
+  printf("played %zu, %lld not written, %.3f ms late at most\n", count, failed, (double)worst_ns * 1e-6);
+  return failed != 0;
+}
