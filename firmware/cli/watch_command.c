@@ -2,6 +2,7 @@
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdio.h>
+#include <string.h>
 #include <unistd.h>
 
 #include "commands.h"
@@ -9,6 +10,8 @@
 #include "options.h"
 #include "watch.h"
 #include "waymark/clock.h"
+#include "waymark/map.h"
+#include "web.h"
 
 static const char kHelp[] =
     "usage: waymark watch [options]\n"
@@ -19,9 +22,13 @@ static const char kHelp[] =
     "  --url URL      LCM's (default: LCM_DEFAULT_URL, else this computer's)\n"
     "  --prefix TEXT  of the channels (default WAYMARK_)\n"
     "  --duration S   seconds, then stop\n"
+    "  --web PORT     instead a page for a browser: http://localhost:PORT, with the drive on the map\n"
+    "  --map FILE     with --web: the map.yaml to draw\n"
+    "  --bind ADDRESS with --web: 127.0.0.1 is this computer alone (default); 0.0.0.0 is everybody\n"
     "\n"
     "example:\n"
-    "  waymark watch\n";
+    "  waymark watch\n"
+    "  waymark watch --web 8080 --map map/map.yaml\n";
 
 #define SHOW_EVERY_NS (500 * WM_NS_PER_MS)
 
@@ -42,7 +49,34 @@ static void on_health(const lcm_recv_buf_t *message, const char *channel, void *
   watch_health(context, message->data, message->data_size, wm_monotonic_ns());
 }
 
+static void on_innovation(const lcm_recv_buf_t *message, const char *channel, void *context) {
+  (void)channel;
+  watch_innovation(context, message->data, message->data_size);
+}
+
 static watch seen;
+
+// Messages first, then browsers: neither waits long for the other.
+static wm_status serve(lcm_t *lcm, const char *address, uint64_t port, const char *map_path, double duration_s,
+                       wm_error *err) {
+  web page;
+  wm_map *map = NULL;
+  wm_status status = map_path ? wm_map_load(map_path, print_note, NULL, &map, err) : WM_OK;
+  if (status == WM_OK) status = web_open(&page, address, (int)port, map ? wm_map_raster(map) : NULL, err);
+  if (status == WM_OK) {
+    (void)printf("http://%s:%d\n", strcmp(address, "127.0.0.1") == 0 ? "localhost" : address, (int)port);
+    (void)fflush(stdout);
+    wm_time_ns end_ns = duration_s > 0 ? wm_monotonic_ns() + wm_ns_from_seconds(duration_s) : INT64_MAX;
+    while (!atomic_load(&stop) && wm_monotonic_ns() < end_ns) {
+      while (lcm_handle_timeout(lcm, 0) > 0) {
+      }
+      web_serve(&page, &seen, 10);
+    }
+    web_close(&page);
+  }
+  wm_map_free(map);
+  return status;
+}
 
 static void show(lcm_t *lcm, double duration_s) {
   int is_terminal = isatty(STDOUT_FILENO);
@@ -59,14 +93,14 @@ static void show(lcm_t *lcm, double duration_s) {
 }
 
 int command_watch(int argc, char *const *argv) {
-  const char *url = "", *prefix = "WAYMARK_", *why;
+  const char *url = "", *prefix = "WAYMARK_", *map = NULL, *address = "127.0.0.1", *why;
   double duration_s = 0;
+  uint64_t port = 0;
   int help = 0;
-  const option options[] = {{"--url", OPTION_TEXT, &url},
-                            {"--prefix", OPTION_TEXT, &prefix},
-                            {"--duration", OPTION_F64, &duration_s},
-                            {"--help", OPTION_FLAG, &help},
-                            {"-h", OPTION_FLAG, &help}};
+  const option options[] = {
+      {"--url", OPTION_TEXT, &url},   {"--prefix", OPTION_TEXT, &prefix}, {"--duration", OPTION_F64, &duration_s},
+      {"--web", OPTION_U64, &port},   {"--map", OPTION_TEXT, &map},       {"--bind", OPTION_TEXT, &address},
+      {"--help", OPTION_FLAG, &help}, {"-h", OPTION_FLAG, &help}};
   wm_error err = {0};
   size_t words;
   char channel[96];
@@ -75,6 +109,10 @@ int command_watch(int argc, char *const *argv) {
   if (help) {
     (void)fputs(kHelp, stdout);
     return EXIT_DONE;
+  }
+  if (port > 65535) {
+    (void)wm_fail(&err, WM_BAD_USAGE, "--web: a port from 1 to 65535 is needed");
+    return complain(&err);
   }
   lcm_t *lcm = lcm_way_open(lcm_way_url(url), &why);
   if (!lcm) {
@@ -87,10 +125,16 @@ int command_watch(int argc, char *const *argv) {
   (void)lcm_subscribe(lcm, channel, on_pose, &seen);
   (void)snprintf(channel, sizeof channel, "%.80sHEALTH", prefix);
   (void)lcm_subscribe(lcm, channel, on_health, &seen);
+  (void)snprintf(channel, sizeof channel, "%.80sINNOVATION", prefix);
+  (void)lcm_subscribe(lcm, channel, on_innovation, &seen);
   struct sigaction action = {.sa_handler = on_signal};
   (void)sigaction(SIGINT, &action, NULL);
   (void)sigaction(SIGTERM, &action, NULL);
-  show(lcm, duration_s);
+  wm_status status = WM_OK;
+  if (port > 0)
+    status = serve(lcm, address, port, map, duration_s, &err);
+  else
+    show(lcm, duration_s);
   lcm_destroy(lcm);
-  return EXIT_DONE;
+  return status == WM_OK ? EXIT_DONE : complain(&err);
 }

@@ -31,6 +31,28 @@ void watch_health(watch *self, const void *message, size_t length, wm_time_ns no
   self->health_at_ns = now_ns;
 }
 
+void watch_innovation(watch *self, const void *message, size_t length) {
+  wm_innovation i;
+  if (wm_lcm_read_innovation(message, length, &i)) {
+    self->not_understood++;
+    return;
+  }
+  double off = i.observed - i.expected;
+  if (i.verdict != WM_FUSED || !(i.variance > 0) || !isfinite(off)) return;
+  if (i.residual == WM_RESIDUAL_BEARING || i.residual == WM_RESIDUAL_HEADING) off = remainder(off, 2 * M_PI);
+  double weight = self->innovations < 100 ? 1 / (double)(self->innovations + 1) : 0.01;
+  self->nis += weight * (off * off / i.variance - self->nis);
+  self->innovations++;
+}
+
+// Limits: chi-squared of about a hundred, with room for the gate, which cuts the tails off.
+const char *watch_consistency(const watch *self) {
+  if (self->innovations < 50) return "too few observations to tell";
+  if (self->nis > 1.6) return "observations are further off than it believes";
+  if (self->nis < 0.3) return "observations are nearer than it believes: its noises are too large";
+  return "consistent";
+}
+
 static void add(char *why, size_t why_bytes, const char *name, const char *what) {
   size_t used = strlen(why);
   (void)snprintf(why + used, why_bytes - used, "%s%s %s", used ? ", " : "", name, what);
@@ -99,6 +121,9 @@ void watch_print(const watch *self, wm_time_ns now_ns, FILE *to) {
   const char *state = watch_state(self, now_ns, why, sizeof why);
   (void)fprintf(to, "state      %s%s%s\n", state, why[0] ? ": " : "", why);
   if (self->has_pose) print_pose(&self->pose, self->rate_hz, to);
+  if (self->innovations > 0)
+    (void)fprintf(to, "consistency %s (mean squared innovation %.2f of its variance)\n", watch_consistency(self),
+                  self->nis);
   if (self->has_health) {
     print_left(&self->health, to);
     (void)fprintf(to, "deadlines  %" PRIu64 " of %" PRIu64 " missed\nsources\n", self->health.deadlines_missed,

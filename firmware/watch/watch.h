@@ -14,11 +14,16 @@ typedef struct watch {
   int has_pose, has_health;
   wm_time_ns pose_at_ns, health_at_ns;  // when they came, on this computer's clock
   double rate_hz;                       // of poses, smoothed
-  uint64_t not_understood;              // messages of another version
+  double nis;  // mean squared innovation by its own variance, of about the last hundred; 1 is expected
+  uint64_t innovations;
+  uint64_t not_understood;  // messages of another version
 } watch;
 
 void watch_pose(watch *self, const void *message, size_t length, wm_time_ns now_ns);
 void watch_health(watch *self, const void *message, size_t length, wm_time_ns now_ns);
+void watch_innovation(watch *self, const void *message, size_t length);
+// Whether what observations say agrees with what the estimator believes of itself: a verdict in words.
+const char *watch_consistency(const watch *self);
 // One word for how it stands ("tracking", "degraded", "lost" ...), and why, as far as health tells.
 const char *watch_state(const watch *self, wm_time_ns now_ns, char *why, size_t why_bytes);
 // The whole view, some lines.

@@ -4,6 +4,7 @@
 
 #include "waymark/lcm_messages.h"
 #include "waymark_health_t.h"
+#include "waymark_innovation_t.h"
 #include "waymark_pose_t.h"
 
 static int room(size_t length) { return length > INT32_MAX ? INT32_MAX : (int)length; }
@@ -92,5 +93,23 @@ const char *wm_lcm_read_health(const void *message, size_t length, wm_health *ou
     c->value = m.calibration[i].value;
     c->sigma = m.calibration[i].sigma;
   }
+  return NULL;
+}
+
+const char *wm_lcm_read_innovation(const void *message, size_t length, wm_innovation *out) {
+  waymark_innovation_t m;
+  if (waymark_innovation_t_decode(message, 0, room(length), &m) < 0) return "is no innovation_t of this version";
+  *out = (wm_innovation){.t_ns = m.t_ns,
+                         .source = (uint16_t)m.source,
+                         .sensor = (uint16_t)m.sensor,
+                         .landmark_id = m.landmark_id,
+                         .residual = (uint8_t)m.residual,
+                         .verdict = (uint8_t)m.verdict,
+                         .observed = m.observed,
+                         .expected = m.expected,
+                         .variance = m.variance,
+                         .nis = m.nis,
+                         .gate = m.gate,
+                         .gate_dof = (uint8_t)m.gate_dof};
   return NULL;
 }

@@ -6,10 +6,12 @@ without them, or without the right to a network namespace, the test is skipped (
 In a network of its own with nothing but a loopback:
   1. a run is recorded by lcm-logger; the binding reads the log with code that lcm-gen made; poses, health, innovations,
      observations and landmarks decode, and poses agree with published.csv;
-  2. without a route for multicast the run says so once, goes on, and writes the same number of poses; a route that
+  2. the page of `waymark watch --web` has its state, and nothing for another site;
+  3. without a route for multicast the run says so once, goes on, and writes the same number of poses; a route that
      appears later is found.
 """
 import csv
+import json
 import math
 import os
 import pathlib
@@ -19,6 +21,8 @@ import subprocess
 import sys
 import tempfile
 import time
+import urllib.error
+import urllib.request
 
 SKIPPED = 77
 ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
@@ -142,6 +146,30 @@ def check_commands(work):
     print("told to stand at 100, -50: ends at", rows[-1]["x_m"], rows[-1]["y_m"])
 
 
+def check_web(work):
+    """The page of `waymark watch --web` while it drives: it needs nothing from elsewhere, and answers to this computer alone."""
+    watch = subprocess.Popen([WAYMARK, "watch", "--url", URL, "--web", "18080"], stdout=subprocess.PIPE, text=True)
+    assert watch.stdout.readline().startswith("http://localhost:18080")
+    process = run(work / "recording", work / "config.yaml", work / "watched")
+    get = lambda path, host="localhost:18080": urllib.request.urlopen(
+        urllib.request.Request("http://127.0.0.1:18080" + path, headers={"Host": host}), timeout=5).read().decode()
+    time.sleep(2.5)
+    state = json.loads(get("/state.json"))
+    assert state["state"] == "tracking" and abs(state["pose"]["x_m"]) < 5, state
+    assert [s["name"] for s in state["sources"]] == ["motion", "sightings:eye", "commands"], state
+    assert "<canvas" in get("/") and "http:" not in get("/")
+    for path, host in (("/state.json", "evil.example:18080"), ("/nothing", "localhost")):
+        try:
+            get(path, host)
+            assert False, f"{path} for {host} is answered"
+        except urllib.error.HTTPError as e:
+            assert e.code in (403, 404)
+    finish(process)
+    watch.send_signal(signal.SIGTERM)
+    assert watch.wait(timeout=10) == 0
+    print("the page says", state["state"], "and", state["consistency"])
+
+
 def check_no_route(work):
     subprocess.run(["ip", "route", "del", "224.0.0.0/4"], check=True)
     process = run(work / "recording", work / "config.yaml", work / "silent")
@@ -167,6 +195,7 @@ def inside():
             "realtime: {lock_memory: false}\n")
         check_logger(work)
         check_commands(work)
+        check_web(work)
         check_no_route(work)
     finally:
         shutil.rmtree(work)

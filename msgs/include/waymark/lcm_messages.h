@@ -29,6 +29,7 @@ const char *wm_lcm_read_reset(const void *message, size_t length, wm_event *out)
 // Messages of a run, for who watches it: NULL, or what is wrong with it.
 const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *out);
 const char *wm_lcm_read_health(const void *message, size_t length, wm_health *out);
+const char *wm_lcm_read_innovation(const void *message, size_t length, wm_innovation *out);
 // For who sends one (`t_ns` 0: now).
 size_t wm_lcm_set_pose(const wm_set_pose *pose, wm_time_ns t_ns, void *out, size_t capacity);
 

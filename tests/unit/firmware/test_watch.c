@@ -7,6 +7,7 @@
 #include "unity.h"
 #include "watch.h"
 #include "waymark/lcm_messages.h"
+#include "web.h"
 
 static watch seen;
 static wm_health health;
@@ -87,10 +88,54 @@ static void the_view_has_pose_sources_and_what_is_left(void) {
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(shown, parts[i]), shown);
 }
 
+static void innovations_give_a_verdict(void) {
+  wm_innovation i = {.verdict = WM_FUSED, .residual = WM_RESIDUAL_RANGE, .variance = 0.01};
+  TEST_ASSERT_EQUAL_STRING("too few observations to tell", watch_consistency(&seen));
+  for (int n = 0; n < 200; n++) {
+    i.observed = n % 2 ? 0.1 : -0.1;
+    watch_innovation(&seen, bytes, wm_lcm_innovation(&i, bytes, sizeof bytes));
+  }
+  TEST_ASSERT_EQUAL_STRING("consistent", watch_consistency(&seen));
+  i.observed = 0.3;
+  for (int n = 0; n < 200; n++) watch_innovation(&seen, bytes, wm_lcm_innovation(&i, bytes, sizeof bytes));
+  TEST_ASSERT_EQUAL_STRING("observations are further off than it believes", watch_consistency(&seen));
+  i.verdict = WM_REJECTED_GATE;
+  i.observed = 0;
+  for (int n = 0; n < 2000; n++) watch_innovation(&seen, bytes, wm_lcm_innovation(&i, bytes, sizeof bytes));
+  TEST_ASSERT_EQUAL_STRING("observations are further off than it believes", watch_consistency(&seen));
+}
+
+static char answer[32768];
+
+static void the_page_is_told_what_is_seen(void) {
+  const web page = {.listening = -1};
+  (void)snprintf(health.sources[1].name, WM_HEALTH_NAME_MAX, "a\"<b");
+  (void)state_of_health();
+  pose.now.pose_map_base.q_xyzw[3] = 1;
+  pose.now.pose_map_base.p_m[0] = 12.5;
+  watch_pose(&seen, bytes, wm_lcm_pose(&pose, bytes, sizeof bytes), 10 * WM_NS_PER_S);
+  TEST_ASSERT_GREATER_THAN(100, web_answer(&page, &seen, 10 * WM_NS_PER_S, "/state.json", answer, sizeof answer));
+  const char *const said[] = {"\"state\": \"tracking\"", "\"x_m\": 12.5",   "\"left_m\": 41.6",
+                              "\"left_s\": null",        "\"rejected\": 7", "\"name\": \"ab\""};
+  for (size_t i = 0; i < sizeof said / sizeof said[0]; i++)
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, said[i]), answer);
+  TEST_ASSERT_EQUAL(0, web_answer(&page, &seen, 0, "/map.json", answer, sizeof answer));
+  TEST_ASSERT_EQUAL(0, web_answer(&page, &seen, 0, "/etc/passwd", answer, sizeof answer));
+}
+
+static void the_page_needs_nothing_from_elsewhere(void) {
+  TEST_ASSERT_NULL(strstr(kWebPage, "http:"));
+  TEST_ASSERT_NULL(strstr(kWebPage, "https:"));
+  TEST_ASSERT_NULL(strstr(kWebPage, "src="));
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(the_state_says_what_is_wrong);
   RUN_TEST(a_message_is_read_as_it_was_sent);
   RUN_TEST(the_view_has_pose_sources_and_what_is_left);
+  RUN_TEST(innovations_give_a_verdict);
+  RUN_TEST(the_page_is_told_what_is_seen);
+  RUN_TEST(the_page_needs_nothing_from_elsewhere);
   return UNITY_END();
 }
