@@ -92,11 +92,9 @@ static wm_status init(void *state, const void *params, const wm_view *view) {
   memset(self, 0, sizeof *self);
   self->family = family_of(p, view->rig);
   const wm_camera *camera = &view->rig->cameras[view->cameras[0]];
-  const wm_marker_print print = {size_of(p, view->rig),
-                                 4,
-                                 {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}},
-                                 self->family->is_white_inside,
-                                 self->family->other};
+  const wm_marker_print print = {
+      size_of(p, view->rig), 4,  {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}}, self->family->is_white_inside,
+      self->family->other,   0.5};  // of a code's modules half are white
   if (wm_marker_fit_init(fit_of(self), camera, &print) != NULL) return WM_BAD_CONFIG;
   if (made_count == MADE_MAX) return WM_FULL;
   self->library = apriltag_detector_create();

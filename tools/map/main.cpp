@@ -9,6 +9,7 @@
 #include "common/yaml.h"
 #include "map/check.h"
 #include "map/layers.h"
+#include "map/print_markers.h"
 #include "map/survey.h"
 #include "simulate/render/pictures.h"
 
@@ -89,6 +90,45 @@ void parse_check(CLI::App &app, Check &a) {
   app.footer(
       "example: waymark map check map/map.yaml --recording recordings/drive --draw map.png\n"
       "Exit code: 0 good, 1 something is wrong, 2 it can't be read.");
+}
+
+struct PrintMarkers {
+  MarkerSheet sheet;
+  std::string ids, out = "markers.pdf";
+};
+
+void parse_print(CLI::App &app, PrintMarkers &a) {
+  app.description("Writes coded markers as pages to print at true scale (PDF), with cut marks and a ruler.");
+  app.add_option("--family", a.sheet.family, "mr, tag36h11 or tagStandard41h12")->capture_default_str();
+  app.add_option("--ids", a.ids, "identities, as in 1-20,25")->required();
+  app.add_option(
+         "--size", a.sheet.size_m,
+         "m; mr: largest width of the black; tags: edge of the black square (tagStandard41h12: of the white one "
+         "in its ring). It is markers.size_m of calibration.yaml")
+      ->check(CLI::Range(0.005, 2.0))
+      ->capture_default_str();
+  app.add_option("--paper", a.sheet.paper, "a4, a3 or letter")->capture_default_str();
+  app.add_option("--out", a.out, "the file to write")->capture_default_str();
+  app.footer(
+      "examples:\n"
+      "  waymark map print-markers --family mr --ids 1-20 --size 0.18 --out sheet.pdf\n"
+      "  waymark map print-markers --family tag36h11 --ids 0-11 --size 0.08 --out tags.pdf\n"
+      "Print at 100 %, measure the ruler, leave the white rim. docs/markers.md says more.");
+}
+
+int print_markers(PrintMarkers &a) {
+  a.sheet.ids = ids_of(a.ids);
+  int pages = 0;
+  const std::string pdf = marker_pdf(a.sheet, &pages);
+  std::ofstream file(a.out, std::ios::binary);
+  file << pdf;
+  file.close();
+  if (!file) throw Failure(a.out + ": could not be written");
+  std::printf(
+      "%s: %zu markers on %d pages\n  print at 100 %% and measure the ruler; calibration.yaml: markers: {family: %s, "
+      "size_m: %g}\n",
+      a.out.c_str(), a.sheet.ids.size(), pages, a.sheet.family.c_str(), a.sheet.size_m);
+  return kDone;
 }
 
 void write_layer(const fs::path &file, const Layers &layers, const std::vector<uint8_t> &layer) {
@@ -180,7 +220,8 @@ int survey(const SurveyArguments &a) {
 }  // namespace
 
 int main(int argc, char **argv) {
-  CLI::App app("Maps: raster maps made from plans and checked, landmarks surveyed.", "waymark map");
+  CLI::App app("Maps: raster maps made from plans and checked, landmarks surveyed, coded markers printed.",
+               "waymark map");
   app.require_subcommand(1);
   app.footer("example: waymark map make plan.png --resolution 0.02\nwaymark map SUBCOMMAND --help says more.");
   Make make_arguments;
@@ -191,11 +232,15 @@ int main(int argc, char **argv) {
   CLI::App *survey_app =
       app.add_subcommand("survey", "how well the landmarks of a run fit, and what is odd about them");
   parse_survey(*survey_app, survey_arguments);
+  PrintMarkers print_arguments;
+  CLI::App *print_app = app.add_subcommand("print-markers", "sheets of coded markers at true scale");
+  parse_print(*print_app, print_arguments);
   parse_make(*make_app, make_arguments);
   parse_check(*check_app, check_arguments);
   try {
     app.parse(argc, argv);
     if (survey_app->parsed()) return survey(survey_arguments);
+    if (print_app->parsed()) return print_markers(print_arguments);
     return make_app->parsed() ? make(make_arguments) : check(check_arguments);
   } catch (const CLI::ParseError &problem) {
     return app.exit(problem) == 0 ? kDone : kUsage;

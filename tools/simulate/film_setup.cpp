@@ -146,7 +146,7 @@ std::string calibration_of(const Film &film) {
         add(text, "  sigma_px: [%.6g, %.6g, %.6g, %.6g]\n", s.sigma_px, s.sigma_px, s.sigma_px, s.sigma_px);
   }
   if (film.world->marker_size_m > 0)
-    add(text, "markers: {family: tag36h11, size_m: %.6g}\n", film.world->marker_size_m);
+    add(text, "markers: {family: %s, size_m: %.6g}\n", film.world->marker_family.c_str(), film.world->marker_size_m);
   return text;
 }
 
@@ -190,6 +190,7 @@ wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *
   request.name = scenario.world.kind;
   request.hard = scenario.world.hard;
   request.markers_on_walls = scenario.world.markers_on_walls;
+  request.markers = scenario.world.markers;
   request.seed = seed;
   if (!scenario.route.legs.empty()) request.route = scenario.route;
   if (!scenario.world.plan.empty()) {

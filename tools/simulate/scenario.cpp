@@ -13,8 +13,8 @@ namespace wm::sim {
 namespace {
 
 void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
-  static const char *const known[] = {"landmarks", "kind",      "variant", "markers_on_walls", "scatter", "map",
-                                      "plan",      "ceiling_m", nullptr};
+  static const char *const known[] = {"landmarks", "kind", "variant",   "markers_on_walls", "scatter",
+                                      "map",       "plan", "ceiling_m", "markers",          nullptr};
   static const char *const maps[] = {"all", "listed", "none", nullptr};
   static const char *const kinds[] = {"features", "crossing", "corridor", "office", "hall", "seabed", nullptr};
   static const char *const variants[] = {"easy", "hard", nullptr};
@@ -23,6 +23,10 @@ void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
   r.word(world, "kind", kinds, kind);
   r.word(world, "variant", variants, variant);
   r.flag(world, "markers_on_walls", out.world.markers_on_walls);
+  static const char *const markers[] = {"tag36h11", "mr", "both", nullptr};
+  int family = 0;
+  r.word(world, "markers", markers, family);
+  out.world.markers = static_cast<Markers>(family);
   out.world.hard = variant == 1;
   if (kind > 0) out.world.kind = kinds[kind];
   r.text(world, "plan", out.world.plan);

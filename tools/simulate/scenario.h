@@ -62,11 +62,15 @@ struct Rounds {
   double tilt_rad = 0.05;  // standard deviation of roll and pitch
 };
 
+// Coded markers: AprilTags, MR codes, or both by turns.
+enum class Markers { tags, mr, both };
+
 // What is rendered: a maker of worlds, which draws building, landmarks, cameras and route by the seed.
 struct WorldKind {
   std::string kind;  // crossing, corridor, office, hall, seabed; empty: features only
   bool hard = false;
-  bool markers_on_walls = false;  // office
+  bool markers_on_walls = false;    // office
+  Markers markers = Markers::tags;  // office
   std::string plan;        // corridor, office, hall: the file of a building of one's own; empty: drawn by the seed
   double ceiling_m = 2.6;  // of a ROS map
   bool pictured() const { return !kind.empty(); }

@@ -34,6 +34,9 @@ typedef struct wm_marker_print {
   double corner[WM_MARKER_CORNERS_MAX][2];  // clockwise as the reader sees it, x right, y down, about the centre
   int32_t is_white_inside;                  // of the polygon's border; else white is outside of it
   double other;                             // scale of the other border's polygon; its white is on the other side
+  // Share of the first border that has the other one beside it. A narrow stretch between two borders shifts both, so
+  // the other's own shift is the first one's there alone.
+  double beside;
 } wm_marker_print;
 
 typedef struct wm_marker_fit wm_marker_fit;

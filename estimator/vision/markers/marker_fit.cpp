@@ -5,13 +5,19 @@
 
 #include "vision/markers/marker_pose.hpp"
 
+namespace wm {
+constexpr int kWidths = 12;  // steps of kWidthStep_px from kWidthLeast_px on
+}
+
 struct wm_marker_fit {
   wm::lens optics;
   wm_marker_print print;
   wm::mat3 R_level_body;  // level axes about the mounting's yaw, from the camera's body
   wm::vec3 up;            // the vertical in optical axes, the robot being level
-  double shift_px;        // white grows by this
-  double shift_seen;      // measurements of it so far, at most kShiftMemory
+  // White grows by this, by the width of the black between the two borders: where that is narrow, they pull each other.
+  struct {
+    double shift_px, seen;  // `seen`: sides measured, at most kShiftMemory
+  } by_width[wm::kWidths];
 };
 
 namespace wm {
@@ -23,7 +29,8 @@ constexpr double kReachLeast_px = 1.0, kReachShift_px = 1.5;
 constexpr double kStep_px = 0.5;         // of a profile
 constexpr double kLeastContrast = 12.0;  // grey levels over an edge
 constexpr double kLeastSide_px = 8.0;
-constexpr double kShiftMemory = 400.0;  // markers
+constexpr double kShiftMemory = 1600.0;  // sides
+constexpr double kWidthStep_px = 0.5, kWidthLeast_px = 1.0, kWide_px = 6.5;
 constexpr double kMostShift_px = 1.0;
 constexpr double kLeastTurn_rad = 0.003;  // of an upright print: the camera's own tilt, the paper's bend
 
@@ -71,36 +78,57 @@ bool fit_side(const tangent_view &view, const wm_frame &frame, const flat &a, co
   return true;
 }
 
-// The sides' lines moved by `by` towards white, and where they meet.
-bool corners_of(const line *side, int count, double by, flat *out) {
+// The sides' lines, each moved towards white by its own way, and where they meet.
+bool corners_of(const line *side, int count, const double *by, flat *out) {
   line moved[WM_MARKER_CORNERS_MAX];
-  for (int i = 0; i < count; i++) moved[i] = {side[i].n, side[i].d + by};
+  for (int i = 0; i < count; i++) moved[i] = {side[i].n, side[i].d + by[i]};
   for (int i = 0; i < count; i++)
     if (!meet(moved[(i + count - 1) % count], moved[i], &out[i])) return false;
   return true;
 }
 
-// How far an edge of the one border may be looked for without meeting the other's on this side: nearly the ring's width
-// there.
-double reach_of(const wm_marker_print &print, const homography &h, int side) {
+// Between the two borders on this side, px.
+double width_of(const wm_marker_print &print, const homography &h, int side) {
   const double *a = print.corner[side], *b = print.corner[(side + 1) % print.corners];
   const double x = 0.5 * (a[0] + b[0]), y = 0.5 * (a[1] + b[1]);
   const flat along = h(b[0], b[1]) - h(a[0], a[1]), apart = h(x, y) - h(print.other * x, print.other * y);
-  const double apart_px = std::fabs(cross(along, apart)) / length(along);
-  const double reach = std::floor(2.0 * 0.85 * apart_px) * 0.5;
+  return std::fabs(cross(along, apart)) / length(along);
+}
+
+// How far an edge may be looked for without meeting the other border's: nearly to it.
+double reach_of(double width_px) {
+  const double reach = std::floor(2.0 * 0.85 * width_px) * 0.5;
   return reach < kReachLeast_px ? kReachLeast_px : reach > kReach_px ? kReach_px : reach;
 }
 
+double step_of(double width_px) {
+  const double at = (width_px - kWidthLeast_px) / kWidthStep_px;
+  return at < 0.0 ? 0.0 : at > kWidths - 1.0 ? kWidths - 1.0 : at;
+}
+
+// What is known of the shift at a width, from the widths about it.
+double shift_of(const wm_marker_fit &self, double width_px) {
+  const double at = step_of(width_px);
+  double sum = 0.0, weights = 0.0;
+  for (int i = 0; i < kWidths; i++) {
+    const double weight = self.by_width[i].seen / square(1.0 + 4.0 * square(i - at));
+    sum += weight * self.by_width[i].shift_px;
+    weights += weight;
+  }
+  return weights > 0.0 ? sum / weights : 0.0;
+}
+
 // By how much white grows: both borders move away from white, so to opposite sides.
-void measure_shift(wm_marker_fit *self, const tangent_view &view, const wm_frame &frame, const homography &h) {
+void measure_shift(wm_marker_fit *self, const tangent_view &view, const wm_frame &frame, const homography &h,
+                   const double *width_px) {
   const wm_marker_print &print = self->print;
-  const double sign = print.is_white_inside ? 1.0 : -1.0;  // of the other's way to white
-  double sum = 0.0;
-  int count = 0;
+  const double sign = print.is_white_inside ? 1.0 : -1.0;  // of the other border's way to white
   for (int side = 0; side < print.corners; side++) {
     const double *a = print.corner[side], *b = print.corner[(side + 1) % print.corners];
-    const double mx = 0.5 * (a[0] + b[0]), my = 0.5 * (a[1] + b[1]), reach = reach_of(print, h, side);
+    const double mx = 0.5 * (a[0] + b[0]), my = 0.5 * (a[1] + b[1]), reach = reach_of(width_px[side]);
     if (reach < kReachShift_px) continue;
+    double sum = 0.0;
+    int count = 0;
     for (int i = 0; i < kSamples; i++) {
       const double t = 0.1 + 0.8 * (i + 0.5) / kSamples;
       const double x = print.other * (a[0] + t * (b[0] - a[0])), y = print.other * (a[1] + t * (b[1] - a[1]));
@@ -113,13 +141,15 @@ void measure_shift(wm_marker_fit *self, const tangent_view &view, const wm_frame
       sum -= offset;  // away from white
       count++;
     }
+    if (count < kSamples / 4) continue;
+    // The first border is where it was found, so the other seems to be off by its own shift and the first one's,
+    // scaled.
+    const double measured = sum / count / (1.0 + print.other);
+    if (std::fabs(measured) > kMostShift_px) continue;
+    auto &known = self->by_width[static_cast<int>(step_of(width_px[side]) + 0.5)];
+    if (known.seen < kShiftMemory) known.seen += 1.0;
+    known.shift_px += (measured - known.shift_px) / known.seen;
   }
-  if (count < kSamples) return;
-  // The first border is where it was found, so the other seems to be off by its own shift and the first one's, grown.
-  const double measured = sum / count / (1.0 + print.other);
-  if (std::fabs(measured) > kMostShift_px) return;
-  if (self->shift_seen < kShiftMemory) self->shift_seen += 1.0;
-  self->shift_px += (measured - self->shift_px) / self->shift_seen;
 }
 
 // Optical axes (x right, y down, z forward) to the body's (x forward, y left, z up).
@@ -167,18 +197,24 @@ int wm_marker_fit_read(wm_marker_fit *self, const wm_frame *frame, const double 
   homography h;
   if (!homography_init(&h, print.corner, corner, count)) return 0;
   line side[WM_MARKER_CORNERS_MAX];
+  double width_px[WM_MARKER_CORNERS_MAX], shift_px[WM_MARKER_CORNERS_MAX] = {};
   for (int i = 0; i < count; i++) {
     const flat &a = corner[i], &b = corner[(i + 1) % count];
     const double size = length(b - a);
     if (!(size > kLeastSide_px)) return 0;
+    width_px[i] = width_of(print, h, i);
     // Clockwise with y down: outwards is to the left of the way.
     const double outwards = print.is_white_inside ? -1.0 : 1.0;
     const flat to_white = {outwards * (b.y - a.y) / size, -outwards * (b.x - a.x) / size};
-    if (!fit_side(view, *frame, a, b, to_white, reach_of(print, h, i), &side[i])) return 0;
+    if (!fit_side(view, *frame, a, b, to_white, reach_of(width_px[i]), &side[i])) return 0;
   }
-  if (!corners_of(side, count, 0.0, corner) || !homography_init(&h, print.corner, corner, count)) return 0;
-  measure_shift(self, view, *frame, h);
-  if (!corners_of(side, count, self->shift_px, corner)) return 0;
+  if (!corners_of(side, count, shift_px, corner) || !homography_init(&h, print.corner, corner, count)) return 0;
+  measure_shift(self, view, *frame, h, width_px);
+  for (int i = 0; i < count; i++) {
+    const double narrow = shift_of(*self, width_px[i]), wide = shift_of(*self, kWide_px);
+    shift_px[i] = print.beside * narrow + (1.0 - print.beside) * wide;
+  }
+  if (!corners_of(side, count, shift_px, corner)) return 0;
   marker_poses poses;
   if (!pose_of(view, print, corner, self->up, &poses)) return 0;
   const vec3 all = poses.best.centre_m + poses.other.centre_m;
@@ -187,10 +223,10 @@ int wm_marker_fit_read(wm_marker_fit *self, const wm_frame *frame, const double 
   out->along_sigma_m = poses.range_sigma_m;
   out->yaw_sigma_rad =
       poses.turn_sigma_rad > 0 ? std::sqrt(square(poses.turn_sigma_rad) + square(kLeastTurn_rad)) : 0.0;
-  out->edge_shift_px = self->shift_px;
+  out->edge_shift_px = wm_marker_fit_shift_px(self);
   out->poses = poses.has_other ? 2 : 1;
   if (poses.has_other) put(*self, poses.other, out->other_p_m, &out->other_yaw_rad);
   return 1;
 }
 
-double wm_marker_fit_shift_px(const wm_marker_fit *self) { return self->shift_px; }
+double wm_marker_fit_shift_px(const wm_marker_fit *self) { return wm::shift_of(*self, wm::kWide_px); }

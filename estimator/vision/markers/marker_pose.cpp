@@ -5,10 +5,13 @@ namespace wm {
 
 namespace {
 
-constexpr double kLevel = 0.85, kUpright = 0.4;  // cosine of a print's normal to the vertical
-constexpr double kCorner_px = 0.06;              // error of a corner, each coordinate
-constexpr double kUndecided = 12.0;              // chi2 that the worse answer may be worse by
+constexpr double kCorner_px = 0.12;  // error of a corner, each coordinate
+constexpr double kUndecided = 12.0;  // chi2 that the worse answer may be worse by
+constexpr double kPlain = 25.0;      // chi2 above which a print is neither level nor upright
 constexpr int kTurns = 33;
+constexpr double kNever = 1e300;
+constexpr double kTilted = 15.0;  // of a print that hangs freely: its tilt's noise, in corners' errors by its size
+constexpr double kTiltedMax_rad = 0.05;
 constexpr double kTurnMax_rad = 1.36;
 
 struct fit {
@@ -98,18 +101,19 @@ bool refine(const turning &t, double *turn, double step, fit *best, double *curv
   return true;
 }
 
-bool fit_upright(const turning &t, marker_poses *out) {
+// The misfit of the better answer, or infinity.
+double fit_upright(const turning &t, marker_poses *out) {
   double misfit[kTurns];
   const double step = 2 * kTurnMax_rad / (kTurns - 1);
   for (int i = 0; i < kTurns; i++) {
     fit f;
-    misfit[i] = t.at(-kTurnMax_rad + i * step, &f) ? f.misfit : 1e300;
+    misfit[i] = t.at(-kTurnMax_rad + i * step, &f) ? f.misfit : kNever;
   }
   int found = 0;
   fit best[2];
   double turn[2] = {}, curvature[2] = {};
   for (int i = 0; i < kTurns; i++) {
-    if (misfit[i] >= 1e300 || (i > 0 && misfit[i - 1] < misfit[i]) || (i + 1 < kTurns && misfit[i + 1] <= misfit[i]))
+    if (misfit[i] >= kNever || (i > 0 && misfit[i - 1] < misfit[i]) || (i + 1 < kTurns && misfit[i + 1] <= misfit[i]))
       continue;
     fit f;
     double at = -kTurnMax_rad + i * step, bend = 0;
@@ -121,7 +125,7 @@ bool fit_upright(const turning &t, marker_poses *out) {
       best[worse] = f, turn[worse] = at, curvature[worse] = bend;
     }
   }
-  if (found == 0) return false;
+  if (found == 0) return kNever;
   const int first = found == 2 && best[1].misfit < best[0].misfit ? 1 : 0;
   out->best = best[first].pose;
   // chi2 = misfit / sigma^2 grows by 1 where the turn is a sigma off.
@@ -137,28 +141,40 @@ bool fit_upright(const turning &t, marker_poses *out) {
   if (t.at(turn[first] + 0.01, &beside))
     out->range_sigma_m = std::sqrt(square(out->range_sigma_m) +
                                    square((length(beside.pose.centre_m) - distance) / 0.01 * out->turn_sigma_rad));
-  return true;
+  return best[first].misfit;
 }
 
 }  // namespace
 
 bool pose_of(const tangent_view &view, const wm_marker_print &print, const flat *corner, const vec3 &up,
              marker_poses *out) {
-  *out = marker_poses{};
-  vec3 n;
-  if (!rough_normal(view, print, corner, &n)) return false;
-  const double rise = dot(n, up);
+  // A small print's own tilt is mostly noise: whether it hangs level or upright is told by which of them fits.
   const vec3 ahead = {view.R_optical_view.m[0][2], view.R_optical_view.m[1][2], view.R_optical_view.m[2][2]};
   const vec3 level = ahead - dot(ahead, up) * up;
-  if (std::fabs(rise) < kUpright && length(level) > 0.3) {
+  *out = marker_poses{};
+  double upright_misfit = kNever;
+  if (length(level) > 0.3) {
     const vec3 forward = 1.0 / length(level) * level;
-    return fit_upright({view, print, corner, forward, cross(up, forward)}, out);
+    upright_misfit = fit_upright({view, print, corner, forward, cross(up, forward)}, out);
   }
-  if (std::fabs(rise) > kLevel) n = rise > 0.0 ? up : -1.0 * up;
-  fit f;
-  if (!fit_in_plane(view, print, corner, n, &f)) return false;
-  out->best = f.pose;
-  return true;
+  fit flat_fit;
+  const bool is_level = fit_in_plane(view, print, corner, dot(ahead, up) > 0.0 ? up : -1.0 * up, &flat_fit);
+  const double noise = square(kCorner_px), level_misfit = is_level ? flat_fit.misfit : kNever;
+  if (upright_misfit < kPlain * noise && upright_misfit <= level_misfit) return true;
+  *out = marker_poses{};
+  if (level_misfit < kPlain * noise) {
+    out->best = flat_fit.pose;
+    return true;
+  }
+  // Neither: as its corners have it, which noise tilts; of a small one that says nothing.
+  vec3 n;
+  fit tilted;
+  if (!rough_normal(view, print, corner, &n) || !fit_in_plane(view, print, corner, n, &tilted)) return false;
+  out->best = tilted.pose;
+  const double distance = length(tilted.pose.centre_m), size_px = print.size_m / distance * view.focal_px;
+  out->turn_sigma_rad = kTilted * kCorner_px / size_px;
+  out->range_sigma_m = distance * out->turn_sigma_rad;
+  return out->turn_sigma_rad < kTiltedMax_rad;
 }
 
 }  // namespace wm

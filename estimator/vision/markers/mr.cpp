@@ -56,6 +56,7 @@ wm_marker_print print_of(const wm_mr_params &params, const wm_rig &rig) {
   print.corners = 5;
   for (int i = 0; i < 5; i++) wm_mr_vertex(i, print.corner[i]);
   print.other = WM_MR_INNER;
+  print.beside = 1.0;
   return print;
 }
 

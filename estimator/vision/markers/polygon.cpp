@@ -5,7 +5,7 @@ namespace wm {
 
 namespace {
 
-constexpr int kSpare = 2;
+constexpr int kSpare = 3;
 
 int farthest_from(const flat *border, int count, const flat &from) {
   int far = 0;
@@ -78,8 +78,6 @@ bool polygon_of(const flat *border, int count, int vertices, double off_px, flat
   for (int i = 0; i < vertices; i++) {
     const int from = vertex[i], to = vertex[(i + 1) % vertices], points = (to - from + count) % count;
     if (points < 4) return false;
-    int worst;
-    if (farthest_off(border, count, from, to, &worst) > 1.5 * off_px) return false;
     // Without the ends, where the corner is rounded.
     const int skip = points / 8;
     flat first = border[from], sum = {0, 0};
@@ -96,6 +94,10 @@ bool polygon_of(const flat *border, int count, int vertices, double off_px, flat
     const sin_cos s = sincos(0.5 * atan2(2.0 * xy, xx - yy));
     const flat n = {-s.sin, s.cos};
     side[i] = {n, dot(n, first + mean)};
+    int off = 0;
+    for (int k = skip; k <= points - skip; k++)
+      if (std::fabs(dot(n, border[(from + k) % count]) - side[i].d) > off_px) off++;
+    if (10 * off > used) return false;
   }
   // The border goes against the clock, the corners with it.
   for (int i = 0; i < vertices; i++)

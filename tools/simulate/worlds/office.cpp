@@ -9,32 +9,40 @@
 #include "simulate/worlds/makers.h"
 #include "simulate/worlds/rooms.h"
 #include "simulate/worlds/tags.h"
+#include "waymark/mr_code.h"
 
 namespace wm::sim {
 namespace {
 
 using render::Vec3;
 
-constexpr double kMarker_m = 0.198, kDeg = kPi / 180;
+constexpr double kMarker_m = 0.198, kMr_m = 0.27, kDeg = kPi / 180;
 
 // A marker in its place: what one sees and what the map of truth says.
-void put_marker(int id, const Vec3 &middle, const Vec3 &right, const Vec3 &up, World &world) {
+void put_marker(int id, bool mr, const Vec3 &middle, const Vec3 &right, const Vec3 &up, World &world) {
   render::Material m;
   m.albedo = render::Colour(1.f);
-  m.texture = render::Texture::make(tag36h11_picture(id, 16), render::Wrap::clamp);
-  const double whole = kMarker_m * 10 / 8;
+  m.texture = render::Texture::make(mr ? mr_picture(id, 512) : tag36h11_picture(id, 16), render::Wrap::clamp);
+  const double whole = mr ? kMr_m * kMrSheet : kMarker_m * 10 / 8;
   m.texture_size_m = {whole, whole};
   world.scene.add(render::picture(middle, right, up, whole, whole, world.scene.add(m)));
-  const Vec3 r = 0.5 * kMarker_m * right.normalized(), u = 0.5 * kMarker_m * up.normalized();
+  const double left = mr ? kMr_m * WM_MR_CODE_LEFT : -0.5 * kMarker_m, top = mr ? -kMr_m * WM_MR_CODE_TOP : -left,
+               edge = -2 * left;
+  const Vec3 r = right.normalized(), u = up.normalized(), corner = middle + left * r + top * u;
   World::Panel panel;
   panel.id = id;
-  panel.corners[0] = middle - r + u;
-  panel.corners[1] = middle + r + u;
-  panel.corners[2] = middle + r - u;
-  panel.corners[3] = middle - r - u;
+  panel.corners[0] = corner;
+  panel.corners[1] = corner + edge * r;
+  panel.corners[2] = corner + edge * r - edge * u;
+  panel.corners[3] = corner - edge * u;
   panel.normal = right.cross(up).normalized();
   world.panels.push_back(panel);
-  world.truth.push_back({id, middle, wm::atan2(right.y(), right.x()), "marker"});
+  world.truth.push_back({id, middle, wm::atan2(right.y(), right.x()), mr ? "mr" : "marker"});
+}
+
+// Of the next marker.
+bool is_mr(Markers markers, const World &world) {
+  return markers == Markers::mr || (markers == Markers::both && world.panels.size() % 2 == 1);
 }
 
 int fresh_id(Dice &dice, const World &world) {
@@ -45,8 +53,8 @@ int fresh_id(Dice &dice, const World &world) {
   }
 }
 
-void markers_on_ceiling(uint64_t seed, bool hard, const std::vector<CeilingLamp> &lamps, const Rectangle &room,
-                        World &world) {
+void markers_on_ceiling(uint64_t seed, bool hard, Markers markers, const std::vector<CeilingLamp> &lamps,
+                        const Rectangle &room, World &world) {
   Dice dice(seed, Part::markers);
   const size_t wanted = static_cast<size_t>(dice.integer(hard ? 14 : 19, hard ? 18 : 24));
   for (int tries = 0; tries < 2000 && world.panels.size() < wanted; tries++) {
@@ -60,11 +68,11 @@ void markers_on_ceiling(uint64_t seed, bool hard, const std::vector<CeilingLamp>
                         std::fabs(l.p.y_m - middle.y()) > 0.5 * l.length_m + 0.25);
     if (!apart) continue;
     const auto [s, c] = wm::sincos(yaw);
-    put_marker(fresh_id(dice, world), middle, {c, s, 0}, {s, -c, 0}, world);
+    put_marker(fresh_id(dice, world), is_mr(markers, world), middle, {c, s, 0}, {s, -c, 0}, world);
   }
 }
 
-void markers_on_walls(uint64_t seed, bool hard, World &world) {
+void markers_on_walls(uint64_t seed, bool hard, Markers markers, World &world) {
   Dice dice(seed, Part::markers);
   for (const Face &f : world.plan.faces) {
     if (f.surface != Surface::wall || f.bottom_m > 0) continue;
@@ -75,8 +83,8 @@ void markers_on_walls(uint64_t seed, bool hard, World &world) {
       const Vec3 foot = a - right * (s / length);
       // Not behind a shelf: half a metre before the wall it is free.
       if (world.plan.clearance_m({foot.x() + 0.3 * normal.x(), foot.y() + 0.3 * normal.y()}) < 0.15) continue;
-      put_marker(fresh_id(dice, world), foot + Vec3(0, 0, dice.uniform(0.7, 1.5)) + 0.004 * normal, right, {0, 0, 1},
-                 world);
+      put_marker(fresh_id(dice, world), is_mr(markers, world),
+                 foot + Vec3(0, 0, dice.uniform(0.7, 1.5)) + 0.004 * normal, right, {0, 0, 1}, world);
     }
   }
 }
@@ -154,16 +162,17 @@ wm_status make_office(const WorldRequest &request, World &world, wm_error *err) 
   world.scene.ambient.up = render::Colour(request.hard ? 0.10f : 0.2f);
   world.scene.ambient.down = render::Colour(request.hard ? 0.16f : 0.42f);
   if (request.markers_on_walls)
-    markers_on_walls(request.seed, request.hard, world);
+    markers_on_walls(request.seed, request.hard, request.markers, world);
   else
-    markers_on_ceiling(request.seed, request.hard, lamps, world.plan.bounds(), world);
+    markers_on_ceiling(request.seed, request.hard, request.markers, lamps, world.plan.bounds(), world);
   uint64_t person = 0;
   if (request.hard)
     for (const Walk &walk : draw_walks(request.seed, 2, world.plan, world.route, world.footprint, 0.1))
       add_person(request.seed + 1000 * ++person, walk, world.scene);
 
   world.cameras = {office_camera(request.markers_on_walls)};
-  world.marker_size_m = kMarker_m;
+  world.marker_family = request.markers == Markers::mr ? "mr" : "tag36h11";
+  world.marker_size_m = request.markers == Markers::mr ? kMr_m : kMarker_m;
   world.labels = World::Labels::markers;
   world.label_file = "labels/markers.csv";
   world.label_header = "frame,id,u0_px,v0_px,u1_px,v1_px,u2_px,v2_px,u3_px,v3_px";

@@ -8,6 +8,8 @@ extern "C" {
 
 #include <memory>
 
+#include "waymark/mr_code.h"
+
 namespace wm::sim {
 
 int tag36h11_count() {
@@ -33,6 +35,24 @@ render::Picture tag36h11_picture(int id, int module_px) {
     if (code >> (family->nbits - 1 - bit) & 1)
       module(width - 1 - rim - static_cast<int>(family->bit_x[bit]),
              width - 1 - rim - static_cast<int>(family->bit_y[bit]), kWhite);
+  return picture;
+}
+
+render::Picture mr_picture(int id, int size_px) {
+  constexpr float kWhite = 0.85f, kBlack = 0.04f;
+  constexpr int kFine = 4;  // samples along each side of a pixel
+  const uint64_t modules = wm_mr_encode(static_cast<uint32_t>(id));
+  render::Picture picture(size_px, size_px, 1, kWhite);
+  for (int y = 0; y < size_px; y++)
+    for (int x = 0; x < size_px; x++) {
+      int black = 0;
+      for (int k = 0; k < kFine * kFine; k++) {
+        const int column = k % kFine, row = k / kFine;
+        black += wm_mr_ink(modules, kMrSheet * ((x + (column + 0.5) / kFine) / size_px - 0.5),
+                           kMrSheet * ((y + (row + 0.5) / kFine) / size_px - 0.5)) == 1;
+      }
+      picture.at(x, y) = kWhite + (kBlack - kWhite) * static_cast<float>(black) / (kFine * kFine);
+    }
   return picture;
 }
 

@@ -12,5 +12,8 @@ int tag36h11_count();
 // square in the middle 8 x 8. White is 0.85, black 0.04. Upright as ArUco's dictionary
 // DICT_APRILTAG_36h11 has it, which is AprilTag's own picture turned by 180 degrees. id in [0, tag36h11_count()).
 render::Picture tag36h11_picture(int id, int module_px);
+// MR code `id` in the middle of a white square whose edge is kMrSheet times the code's size. `size_px` is the square's.
+inline constexpr double kMrSheet = 1.3;
+render::Picture mr_picture(int id, int size_px);
 
 }  // namespace wm::sim

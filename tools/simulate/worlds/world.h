@@ -23,7 +23,8 @@ struct WorldRequest {
   std::string name;  // crossing, corridor, office, hall, seabed
   bool hard = false;
   uint64_t seed = 1;
-  bool markers_on_walls = false;  // office: markers on walls and a camera that looks ahead
+  bool markers_on_walls = false;    // office: markers on walls and a camera that looks ahead
+  Markers markers = Markers::tags;  // office
   std::optional<Plan> plan;    // corridor, office, hall: this building instead of a drawn one; then give `route`, too
   std::optional<Route> route;  // instead of the drawn one (not for seabed); clutter and people keep out of its way
 };
@@ -61,7 +62,8 @@ struct World {
   std::optional<RasterMap> map;           // corridor
   std::vector<WorldLandmark> truth;       // true places: landmarks, markers, vertical lines, beacons
   bool landmarks_known = false;           // landmarks.csv says where they are; else that is what SLAM has to find
-  double marker_size_m = 0;               // office
+  std::string marker_family;              // office; of `both` the AprilTags'
+  double marker_size_m = 0;               // likewise
   std::string stereo_left, stereo_right;  // seabed: names of the cameras of the rectified pair
   std::string label_file, label_header;   // "labels/edges.csv", "frame,polyline,u_px,v_px"
 
@@ -80,7 +82,8 @@ struct World {
   std::vector<Line> lines;
   struct Panel {  // a marker (its black square) or a sign
     int32_t id;
-    render::Vec3 corners[4];  // upper left, upper right, lower right, lower left as a viewer reads it
+    // Upper left, upper right, lower right, lower left as a viewer reads it; of an MR code its 8 x 8 modules'.
+    render::Vec3 corners[4];
     render::Vec3 normal;
     render::Vec3 middle() const { return 0.25 * (corners[0] + corners[1] + corners[2] + corners[3]); }
   };
