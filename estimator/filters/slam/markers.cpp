@@ -223,7 +223,7 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
     record.verdict = block.nis <= hard ? WM_FUSED : WM_REJECTED_GATE;
     records.add(record);
   }
-  if (block.nis > hard) return misfit(landmark);
+  if (block.nis > hard) return misfit(landmark, true);
   const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
   const double more[3] = {r.noise[0] * weaker, r.noise[1] * weaker, r.noise[2] * weaker};
   joint_.fuse(block, more, params_.map == WM_SLAM_MAP_FROZEN);

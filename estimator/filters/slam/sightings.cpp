@@ -8,7 +8,6 @@ namespace {
 
 constexpr double kFarthest_m = 1e6;
 constexpr double kOneNumber = 6.635 / 9.210;  // 99 % of chi2 with one degree of freedom against two
-constexpr double kOthersFit_s = 3.0;          // a landmark was moved where others were fused so lately
 
 bool is_sigma(double value) { return std::isnan(value) || (value > 0.0 && value < 1e6); }
 double first_number(double a, double b, double c) { return finite(a) ? a : finite(b) ? b : c; }
@@ -222,6 +221,11 @@ void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, cons
   const double scale = v.count == 2 ? 1.0 : kOneNumber;
   const double hard = params_.gate_hard * scale, soft = params_.gate_soft * scale;
   const bool fused = block.nis <= hard;
+  if (fused && s.landmark_id >= 0 && !believable(landmark, block, v.noise[0], scale)) {
+    blank.verdict = WM_REJECTED_SEARCHING;
+    records.add(blank);
+    return;
+  }
   for (int i = 0; i < v.count; i++) {
     wm_innovation record = blank;
     record.residual = (uint8_t)v.kind[i];
@@ -235,54 +239,13 @@ void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, cons
     records.add(record);
   }
   if (!fused) {
-    misfit(landmark);
+    misfit(landmark, r.range);
     return;
   }
   const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
   const double more[2] = {v.noise[0] * weaker, v.count == 2 ? v.noise[1] * weaker : 0.0};
   joint_.fuse(block, more, params_.map == WM_SLAM_MAP_FROZEN);
   note_fused(landmark, s.sensor);
-}
-
-void slam::note_fused(int landmark, int sensor) {
-  landmark_note &note = notes()[landmark];
-  const wm_time_ns now = joint_.now_ns();
-  note.misfits = 0;
-  note.seen++;
-  note.last_ns = now;
-  note.sensor = sensor;
-  fused_ns_ = now;
-  if (other_fused_id_[0] != note.id) {
-    other_fused_id_[1] = other_fused_id_[0];
-    other_fused_ns_[1] = other_fused_ns_[0];
-  }
-  other_fused_id_[0] = note.id;
-  other_fused_ns_[0] = now;
-}
-
-// A landmark that doesn't fit again and again, while others do, was moved: it joins anew where it is. One that was
-// moved and now is elsewhere again is two of one identity; they are left alone.
-void slam::misfit(int landmark) {
-  landmark_note &note = notes()[landmark];
-  note.misfits++;
-  const bool frozen = params_.map == WM_SLAM_MAP_FROZEN;
-  if (note.misfits < params_.moved_after || (frozen && moved_.has(note.id))) return;
-  for (int i = 0; i < 2; i++) {
-    if (other_fused_id_[i] < 0 || other_fused_id_[i] == note.id) continue;
-    if (wm_seconds_between(other_fused_ns_[i], joint_.now_ns()) > kOthersFit_s) continue;
-    counts_.moved++;
-    (moved_.has(note.id) ? doubled_ : moved_).add(note.id);
-    if (!frozen) drop_landmark(landmark);
-    return;
-  }
-}
-
-bool slam::doubled(int32_t id, int landmark, int sensor) {
-  const bool twice =
-      landmark >= 0 && notes()[landmark].last_ns == joint_.now_ns() && notes()[landmark].sensor == sensor;
-  if (!twice && !doubled_.has(id)) return false;
-  counts_.doubled++;
-  return true;
 }
 
 // Paper, system 2, new marker: P_aa = G_x P G_x' + G_z R G_z' with all cross terms. G by the sighting's own

@@ -20,9 +20,10 @@ struct landmark_note {
   uint32_t seen;  // sightings fused
   wm_time_ns first_ns, last_ns;
   double z_m;
-  int32_t misfits;   // in a row
-  int32_t surveyed;  // from the map that was given: it doesn't leave
-  int32_t sensor;    // that saw it last
+  int32_t misfits;        // in a row
+  int32_t surveyed;       // from the map that was given: it doesn't leave
+  int32_t sensor;         // that saw it last
+  wm_time_ns doubted_ns;  // a sighting that would have moved much was kept back
 };
 
 struct slam_counts {
@@ -131,10 +132,11 @@ class slam {
                    record_list records);
   bool find_start(int landmark, const wm_marker &m, const marker_reading &r);
   void note_fused(int landmark, int sensor);
+  bool believable(int landmark, const joint_state::innovation_block &block, double noise, double scale);
   // Is this identity not one landmark's: seen twice in a picture, or at two places in turn?
   bool doubled(int32_t id, int landmark, int sensor);
   bool join_line(int32_t id, const bearing_tracks::track &track);
-  void misfit(int landmark);
+  void misfit(int landmark, bool ranged);
   int clone_state(int clone) const { return first_clone_ + 3 * clone; }
   int keep_clone(int sensor, const past_pose &past, wm_time_ns t_ns);
   int associate(const wm_sighting &s, const reading &r, const past_pose &past, bool *fresh) const;

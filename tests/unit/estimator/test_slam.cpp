@@ -309,14 +309,6 @@ void test_the_same_identity_twice_in_a_frame_at_two_places_keeps_one(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, before);
 }
 
-wm_event copy_of(int i, double x, double y) {  // marker i's code as it hangs at (x, y), seen now
-  const double dx = x - truth.x_m, dy = y - truth.y_m;
-  const wm::sin_cos h = wm::sincos(truth.heading_rad);
-  wm_event e = make::empty(now_s, WM_EVENT_MARKER);
-  e.as.marker = marker(10 + i, h.cos * dx + h.sin * dy - 0.2, h.cos * dy - h.sin * dx, 2.2, 1.0);
-  return e;
-}
-
 wm_state published_state() {
   wm_estimate e;
   slam->estimate(state, &e);
@@ -338,20 +330,6 @@ void test_a_marker_seen_twice_in_a_picture_is_fused_once_and_told(void) {
 }
 
 void test_two_markers_of_one_identity_are_told_and_left_alone(void) {
-  coded = true;
-  params.markers = 1;
-  begin();
-  drive(30);
-  for (int i = 0; i < 400; i++) {  // marker 0's place is out of view for half of the time; its copy is seen instead
-    drive(0.1);
-    if (i / 30 % 2 == 0) see(copy_of(0, 1.0, 1.0));
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
-  }
-  TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, counted("map.moved") + counted("map.doubled"));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
-}
-
-void test_a_marker_of_two_places_in_turn_is_no_landmark_any_more(void) {
   coded = true;
   params.markers = 1;
   begin();
@@ -438,6 +416,31 @@ void test_half_a_minute_without_landmarks_is_said_and_mended(void) {
   hidden = false;
   drive(10);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+}
+
+void test_a_misread_code_after_a_while_without_landmarks_waits_for_a_second_one(void) {
+  begin();
+  drive(30);
+  hidden = true;
+  drive(30);
+  const double before = off();
+  const double dx = place[0][0] - truth.x_m, dy = place[0][1] - truth.y_m;
+  const double bearing = wm::wrap(wm::atan2(dy, dx) - truth.heading_rad), range = std::sqrt(dx * dx + dy * dy) - 0.2;
+  TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, see(make::sighting(now_s, 10, bearing + 0.15, range)));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, before, off());
+  hidden = false;
+  drive(10);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+}
+
+void test_a_misread_code_does_not_keep_its_landmark_away(void) {
+  begin();
+  see(make::sighting(now_s, 10, 2.5, 1.0));  // the first that is seen of it
+  drive(30);
+  size_t found;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&found));
+  TEST_ASSERT_EQUAL(kCount, found);
+  TEST_ASSERT_EQUAL_DOUBLE(0, counted("map.moved"));
 }
 
 void test_landmarks_that_are_never_seen_again_leave(void) {
@@ -561,12 +564,13 @@ int main(void) {
   RUN_TEST(test_the_same_identity_twice_in_a_frame_at_two_places_keeps_one);
   RUN_TEST(test_a_marker_seen_twice_in_a_picture_is_fused_once_and_told);
   RUN_TEST(test_two_markers_of_one_identity_are_told_and_left_alone);
-  RUN_TEST(test_a_marker_of_two_places_in_turn_is_no_landmark_any_more);
   RUN_TEST(test_a_marker_that_moved_is_told_on_a_frozen_map_too);
   RUN_TEST(test_half_a_minute_without_markers_is_said_and_mended);
   RUN_TEST(test_a_landmark_that_moved_leaves_is_counted_and_joins_anew);
   RUN_TEST(test_most_sightings_false_are_survived);
   RUN_TEST(test_half_a_minute_without_landmarks_is_said_and_mended);
+  RUN_TEST(test_a_misread_code_after_a_while_without_landmarks_waits_for_a_second_one);
+  RUN_TEST(test_a_misread_code_does_not_keep_its_landmark_away);
   RUN_TEST(test_landmarks_that_are_never_seen_again_leave);
   RUN_TEST(test_a_full_map_goes_on_with_what_it_has);
   RUN_TEST(test_a_saved_map_frozen_or_extended_needs_no_first_lap);

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which sightings and landmarks are what they say: misread codes, landmarks that moved, identities that stand twice.
+#include "filters/slam/slam.hpp"
+
+namespace wm {
+namespace {
+
+constexpr int kUnconfirmedMisfits = 2;
+constexpr double kSurprising = 4.0;   // of two numbers, normalised innovation squared: one in seven
+constexpr double kUnsure = 25.0;      // times the sighting's own variance is what it is expected with
+constexpr double kOthersFit_s = 3.0;  // a landmark was moved where others were fused so lately
+
+}  // namespace
+
+// After a while without landmarks the gate is as wide as the pose is unsure, and a misread code passes it and carries
+// the robot off. So a sighting that is surprising and would move much waits for a second one of that landmark: codes
+// are misread once.
+bool slam::believable(int landmark, const joint_state::innovation_block &block, double noise, double scale) {
+  landmark_note &note = notes()[landmark];
+  const wm_time_ns now = joint_.now_ns();
+  const auto lately = [now](wm_time_ns then) {
+    return then != WM_TIME_NONE && then != now && wm_seconds_between(then, now) < kOthersFit_s;
+  };
+  if (block.nis < kSurprising * scale || block.s[0][0] < kUnsure * noise) return true;
+  if (lately(note.last_ns) || lately(note.doubted_ns)) return true;
+  note.doubted_ns = now;
+  return false;
+}
+
+void slam::note_fused(int landmark, int sensor) {
+  landmark_note &note = notes()[landmark];
+  const wm_time_ns now = joint_.now_ns();
+  note.misfits = 0;
+  note.seen++;
+  note.last_ns = now;
+  note.sensor = sensor;
+  fused_ns_ = now;
+  if (other_fused_id_[0] != note.id) {
+    other_fused_id_[1] = other_fused_id_[0];
+    other_fused_ns_[1] = other_fused_ns_[0];
+  }
+  other_fused_id_[0] = note.id;
+  other_fused_ns_[0] = now;
+}
+
+// A landmark that doesn't fit again and again, while others do, was moved: it joins anew where it is. One that was
+// moved and now is elsewhere again is two of one identity; they are left alone.
+void slam::misfit(int landmark, bool ranged) {
+  landmark_note &note = notes()[landmark];
+  note.misfits++;
+  // With a range a single sighting makes a landmark: a misread code, too.
+  const bool unconfirmed = ranged && !note.surveyed && note.seen < (uint32_t)params_.confirm_seen;
+  if (unconfirmed && note.misfits >= kUnconfirmedMisfits) return drop_landmark(landmark);
+  const bool frozen = params_.map == WM_SLAM_MAP_FROZEN;
+  if (note.misfits < params_.moved_after || (frozen && moved_.has(note.id))) return;
+  for (int i = 0; i < 2; i++) {
+    if (other_fused_id_[i] < 0 || other_fused_id_[i] == note.id) continue;
+    if (wm_seconds_between(other_fused_ns_[i], joint_.now_ns()) > kOthersFit_s) continue;
+    counts_.moved++;
+    (moved_.has(note.id) ? doubled_ : moved_).add(note.id);
+    if (!frozen) drop_landmark(landmark);
+    return;
+  }
+}
+
+bool slam::doubled(int32_t id, int landmark, int sensor) {
+  const bool twice =
+      landmark >= 0 && notes()[landmark].last_ns == joint_.now_ns() && notes()[landmark].sensor == sensor;
+  if (!twice && !doubled_.has(id)) return false;
+  counts_.doubled++;
+  return true;
+}
+
+}  // namespace wm
