@@ -10,6 +10,8 @@ wm_script_test(run_lcm_tools COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_too
 wm_script_test(run_system_calls COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/system_calls.py LABELS release-only)
 wm_script_test(run_recordings COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/recordings.py LABELS release-only)
 wm_script_test(run_live_minute COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/recordings.py live LABELS slow release-only)
+wm_script_test(edge_drives COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/edge_drives.py ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}
+  LABELS slow release-only TIMEOUT 1200)
 wm_script_test(run_check_faults COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/check_faults.py)
 wm_script_test(run_frames_of COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/frames_of.py LABELS release-only)
 wm_script_test(run_edges_hardship COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/edges_hardship.py LABELS release-only)

@@ -58,8 +58,10 @@ def main():
     p.add_argument("--size", default="640x360")
     p.add_argument("--rate", type=float, default=5, help="pictures a second")
     p.add_argument("--bin", type=pathlib.Path, default=ROOT / "build" / "bin")
-    p.add_argument("rest", nargs="*", help="options of waymark-montecarlo-edges, behind --")
-    a = p.parse_args()
+    own, rest = sys.argv[1:], []
+    if "--" in own:
+        own, rest = own[: own.index("--")], own[own.index("--") + 1 :]
+    a = p.parse_args(own)
     a.cache.mkdir(parents=True, exist_ok=True)
     scenario = a.cache / a.scenario.name
     wanted = cheaper(a.scenario.read_text(), a.size, a.rate)
@@ -73,7 +75,7 @@ def main():
         left = f", {(time.monotonic() - begun) / done * (len(missing) - done) / 60:.0f} min left" if done else ""
         print(f"rendering seed {seed}, {done + 1} of {len(missing)}{left}", file=sys.stderr, flush=True)
         make_drive(a, scenario, seed, a.cache / str(seed))
-    command = [a.bin / "waymark-montecarlo-edges", a.cache, "--config", a.config, *a.rest]
+    command = [a.bin / "waymark-montecarlo-edges", a.cache, "--config", a.config, *rest]
     sys.exit(subprocess.run([str(c) for c in command]).returncode)
 
 
