@@ -214,14 +214,4 @@ std::vector<Landmark> load_landmarks(const fs::path &file) {
   return out;
 }
 
-nlohmann::json load_json(const fs::path &file) {
-  std::ifstream in(file);
-  if (!in) return nullptr;
-  try {
-    return nlohmann::json::parse(in);
-  } catch (const nlohmann::json::parse_error &problem) {
-    throw Failure(file.string() + ": is no JSON (byte " + std::to_string(problem.byte) + ")");
-  }
-}
-
 }  // namespace wm::tools

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
@@ -51,9 +50,5 @@ struct Landmark {
 
 // map-estimate.csv or landmarks.csv, truth-landmarks.csv: id, x_m, y_m, z_m and what else is there.
 std::vector<Landmark> load_landmarks(const std::filesystem::path &file);
-
-// A JSON file of the run folder (health.json, timing.json); null where it is not there. Throws Failure where it is
-// there and is no JSON.
-nlohmann::json load_json(const std::filesystem::path &file);
 
 }  // namespace wm::tools

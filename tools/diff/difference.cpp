@@ -10,6 +10,7 @@
 
 #include "common/csv.h"
 #include "common/failure.h"
+#include "common/json_file.h"
 #include "common/run_folder.h"
 
 namespace wm::tools {

@@ -6,6 +6,7 @@
 
 #include "common/csv.h"
 #include "common/failure.h"
+#include "common/json_file.h"
 #include "common/yaml.h"
 #include "report/edges.h"
 
