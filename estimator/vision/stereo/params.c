@@ -27,8 +27,10 @@ static const wm_param kParams[] = {
     F64("disparity_max_px", disparity_max_px, 160, 4, 2000,
         "px. Farthest that left and right may be: focal length times baseline over the smallest distance."),
     F64("row_px", row_px, 1.0, 0.05, 20, "px. Left and right of a point may be so far off the epipolar line."),
-    F64("agree_px", agree_px, 1.5, 0.1, 50,
-        "px. A point agrees with the motion of the rest when its coordinates are so near to what that says."),
+    F64("agree_px", agree_px, 1.0, 0.1, 50,
+        "px. A point agrees with the motion of the rest, since the picture before and since it began, when its "
+        "coordinates "
+        "are so near to what that says."),
 };
 
 const wm_param_table wm_stereo_params_table = {kParams, sizeof kParams / sizeof kParams[0],

@@ -11,7 +11,7 @@
 
 namespace wm {
 
-inline constexpr int kPatch = 16;  // pixels on a side
+inline constexpr int kPatch = 24;  // pixels on a side
 inline constexpr int kPatchPixels = kPatch * kPatch;
 inline constexpr int kPatchHalf = kPatch / 2;  // the patch reaches from -kPatchHalf to kPatchHalf - 1 about its point
 

@@ -142,6 +142,16 @@ bool are_seen(const stereo_state &self, const track &one) {
   return sees(self.cameras[0], one.left, kMargin_px) && sees(self.cameras[1], one.right, kMargin_px);
 }
 
+// Whether the track has left, a little in each picture, where the motion since its beginning has it: an outline of a
+// rock before what lies behind it, a slow particle.
+bool has_slipped(const stereo_state &self, const track &one) {
+  pair_pixels px;
+  if (!pixels_of(self.pair, inverse(self.world_camera) * (one.world_anchor * one.anchor_place), &px)) return true;
+  const double limit = self.params.agree_px;
+  return std::fabs(px.left_u - one.left.u) > limit || std::fabs(px.left_v - one.left.v) > limit ||
+         std::fabs(px.right_u - one.right.u) > limit;
+}
+
 // Follows all tracks into the newest pictures and leaves out what is gone or moves otherwise than most of them.
 void follow(stereo_state *self, double dt_s) {
   rigid expected = kNoMotion;
@@ -168,14 +178,13 @@ void follow(stereo_state *self, double dt_s) {
     forget(self);
     return;
   }
-  self->track_count = 0;
-  for (int32_t i = 0; i < kept; i++)
-
-    if (agrees[i]) {
-      if (self->track_count != i) self->tracks[self->track_count] = self->tracks[i];
-      self->track_count++;
-    }
   self->world_camera = self->world_camera * inverse(moved);
+  self->track_count = 0;
+  for (int32_t i = 0; i < kept; i++) {
+    if (!agrees[i] || has_slipped(*self, self->tracks[i])) continue;
+    if (self->track_count != i) self->tracks[self->track_count] = self->tracks[i];
+    self->track_count++;
+  }
   self->turn_radps = (1.0 / dt_s) * turn_of(quat_of(moved.R));
   self->move_mps = (1.0 / dt_s) * moved.t;
   self->knows_motion = true;

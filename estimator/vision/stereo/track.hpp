@@ -10,7 +10,7 @@
 
 namespace wm {
 
-inline constexpr int kAnchorSide = 48;  // of the patch that is kept: a template turned and enlarged by 1.6 fits in
+inline constexpr int kAnchorSide = 64;  // of the patch that is kept: a template turned and enlarged by 1.6 fits in
 
 struct track {
   int32_t id;
