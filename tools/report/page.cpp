@@ -6,6 +6,7 @@
 
 #include "report/picture.h"
 #include "report/script.h"
+#include "report/side_views.h"
 #include "report/style.h"
 #include "report/words.h"
 
@@ -92,7 +93,9 @@ std::string map_section(const ReportData &data) {
       "Arrows: start and end, pointing where the robot looked. Point at a chart below to see the place here.";
   std::string notes;
   for (const std::string &note : data.notes) notes += "<p class=\"note\">" + escape(note) + "</p>";
-  return section("Where it drove", how, "<figure>" + picture.svg + legend(marks) + "</figure>" + notes) +
+  return section(
+             "Where it drove", how,
+             "<figure>" + picture.svg + legend(marks) + "</figure>" + side_views(data, picture.ellipse_scale) + notes) +
          "<script>const track=" + track_json(data, picture) + "</script>\n";
 }
 
