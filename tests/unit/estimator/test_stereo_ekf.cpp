@@ -308,7 +308,9 @@ void test_a_wrong_match_is_refused_and_one_picture_is_enough(void) {
 
 void test_ranges_depth_and_heading_are_rows_too(void) {
   scene s;
-  s.map = {{1, {10, 0, -2}, 0.001, kAbsent}, {2, {-3, 9, 1}, 0.001, kAbsent}, {3, {-4, -8, 4}, 0.001, kAbsent}};
+  s.map = {{1, {10, 0, -2}, 0.001, kAbsent, {}, 0},
+           {2, {-3, 9, 1}, 0.001, kAbsent, {}, 0},
+           {3, {-4, -8, 4}, 0.001, kAbsent, {}, 0}};
   s.setup.start.sigma_xy_m = 1;
   s.setup.start.sigma_heading_rad = 0.1;
   s.truth = {{0.6, -0.7, 0.5}, turn_by({0, 0, 0.08})};
