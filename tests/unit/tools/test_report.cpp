@@ -11,6 +11,7 @@
 #include "report/edges.h"
 #include "report/page.h"
 #include "report/picture.h"
+#include "report/side_views.h"
 #include "report/words.h"
 #include "unity.h"
 extern "C" {
@@ -71,6 +72,35 @@ void test_no_peak_is_lost() {
   const std::string html = panel.html({});
   TEST_ASSERT_TRUE(has(html, " 500V50L"));  // from 0 in the middle to (10 - 9) / 20 of the height
   TEST_ASSERT_TRUE(html.size() < 30000);
+}
+
+size_t count(const std::string &text, const std::string &part) {
+  size_t n = 0;
+  for (size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) n++;
+  return n;
+}
+
+void test_a_drive_in_space_has_two_sides() {
+  ReportData data{};
+  for (int i = 0; i <= 50; i++) {
+    Pose pose;
+    pose.t_ns = i * INT64_C(100000000);
+    pose.p_m = {0.1 * i, std::sin(0.1 * i), 2.0};
+    pose.covariance(0, 0) = pose.covariance(1, 1) = 0.01;
+    pose.covariance(2, 2) = 0.04;
+    data.trajectory.poses.push_back(pose);
+  }
+  data.estimated_landmarks.push_back({7, {2, 1, 0.5}, Eigen::Matrix2d::Zero(), NAN});
+  says("", side_views(data, 1));  // it stays in its plane
+  for (size_t i = 0; i < data.trajectory.poses.size(); i++)
+    data.trajectory.poses[i].p_m.z() += 0.02 * static_cast<double>(i);
+  const std::string html = side_views(data, 1);
+  TEST_ASSERT_EQUAL(2, count(html, "<svg"));
+  TEST_ASSERT_EQUAL(2, count(html, "class=\"estimate\""));
+  TEST_ASSERT_EQUAL(2, count(html, "class=\"guess\""));
+  TEST_ASSERT_EQUAL(0, count(html, "class=\"truth\""));
+  TEST_ASSERT_GREATER_THAN(40, count(html, "class=\"ellipse\""));
+  TEST_ASSERT_EQUAL(0, count(html, "nan"));
 }
 
 void test_a_gap_is_a_gap() {
@@ -288,6 +318,7 @@ int main() {
   RUN_TEST(test_numbers_in_words);
   RUN_TEST(test_ticks_are_round);
   RUN_TEST(test_no_peak_is_lost);
+  RUN_TEST(test_a_drive_in_space_has_two_sides);
   RUN_TEST(test_a_gap_is_a_gap);
   RUN_TEST(test_page_says_what_happened);
   RUN_TEST(test_page_without_truth_and_without_recording);
