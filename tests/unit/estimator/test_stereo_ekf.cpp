@@ -47,7 +47,7 @@ struct scene {
       const vec3 direction = {draw(0), draw(1), draw(2)};
       const double far = 2.5 + 2.0 * wm_random_uniform(11, 9, static_cast<uint64_t>(i));
       const vec3 p = (far / length(direction)) * direction;
-      points.push_back({i + 1, {p.x, p.y, p.z}, 0.001, kAbsent});
+      points.push_back({i + 1, {p.x, p.y, p.z}, 0.001, kAbsent, {}, 0});
     }
     map = points;
     wm_rig_init(&rig);
