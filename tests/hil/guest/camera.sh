@@ -23,6 +23,23 @@ finish plain
 said plain "front gives pictures"
 [ "$(pictures plain)" -gt 30 ] || fail "plain: only $(pictures plain) pictures"
 
+echo "== SIGTERM in the middle of a recording"
+record term 60
+sleep 3
+kill -TERM $recording
+finish term
+[ "$(pictures term)" -gt 10 ] || fail "term: only $(pictures term) pictures"
+
+echo "== a disk that is full"
+mkdir /run/small && mount -t tmpfs -o size=1500k tmpfs /run/small
+$waymark record --config robot.yaml --out /run/small/rec --duration 20 --free-mb 0 >full.txt 2>&1
+[ $? = 1 ] || fail "full: the exit code isn't 1"
+cat full.txt
+said full "No space left on device; what stands there is good"
+rows=$(grep -c , /run/small/rec/video/front.csv)
+[ "$rows" -gt 5 ] || fail "full: only $rows rows"
+cp -r /run/small/rec /host/out/camera-full
+
 echo "== dropped buffers, a damaged one, numbers and stamps that wrap"
 record faults 9
 sleep 2
