@@ -122,6 +122,7 @@ ReportData load_report_data(const fs::path &run, const fs::path &recording) {
     out.frames = load_frames(recording, &out, 4);
     mark_sightings(recording, out, &out.frames);
     load_edges(run, recording, &out);
+    mark_lines(run, recording, &out);
   }
   return out;
 }

@@ -81,9 +81,18 @@ std::string dots(const char *css, const std::vector<Eigen::Vector2d> &pixels) {
   return d.empty() ? d : std::string("<path class=\"") + css + "\" d=\"" + d + "\"/>";
 }
 
+std::string traces(const char *css, const std::vector<std::vector<Eigen::Vector2d>> &lines) {
+  std::string d;
+  for (const auto &line : lines)
+    for (size_t i = 0; i < line.size(); i++)
+      d += (i == 0 ? "M" : "L") + fixed(line[i].x(), 1) + " " + fixed(line[i].y(), 1);
+  return d.empty() ? d : std::string("<path class=\"") + css + "\" d=\"" + d + "\"/>";
+}
+
 std::string drawn(const ReportData &data, const ReportFrame &frame) {
   const double unit = frame.width_px / 480.0;  // marks are as large whatever the picture's size
-  std::string svg = dots("edge-seen", frame.edges_seen) + dots("edge-mapped", frame.edges_mapped);
+  std::string svg = dots("edge-seen", frame.edges_seen) + dots("edge-mapped", frame.edges_mapped) +
+                    traces("line-seen", frame.lines_seen) + traces("line-mapped", frame.lines_mapped);
   for (const FrameMark &m : frame.marks) {
     const std::string at = fixed(m.u_px, 1) + "\" cy=\"" + fixed(m.v_px, 1);
     const char *name = m.kind == FrameMark::Kind::seen ? "hit" : m.kind == FrameMark::Kind::rejected ? "miss" : "hope";
@@ -158,11 +167,12 @@ void mark_sightings(const fs::path &recording, const ReportData &data, std::vect
 std::string frames_section(const ReportData &data) {
   if (data.frames.empty()) return "";
   std::string body = "<div class=\"shots\">";
-  bool marks = false, edges = false;
+  bool marks = false, edges = false, lines = false;
   for (const ReportFrame &frame : data.frames) {
     body += drawn(data, frame);
     marks = marks || !frame.marks.empty();
     edges = edges || !frame.edges_seen.empty();
+    lines = lines || !frame.lines_seen.empty();
   }
   body += "</div>";
   if (marks)
@@ -176,6 +186,10 @@ std::string frames_section(const ReportData &data) {
           "edges of the floor that were found in the picture"},
          {"<path class=\"edge-mapped\" d=\"M2 0h0M6 0h0M10 0h0M14 0h0M18 0h0M22 0h0M26 0h0\"/>",
           "the map’s edges, as they look from where the robot said it was: on the found ones, where it was right"}});
+  if (lines)
+    body += legend({{"<path class=\"line-seen\" d=\"M2 0H26\"/>", "upright lines that were found and followed"},
+                    {"<path class=\"line-mapped\" d=\"M2 0H26\"/>",
+                     "lines of the finished map, as they look from where the robot said it was (walls hide some)"}});
   return section("What it saw", "Pictures of its cameras, spread over the drive.", body);
 }
 

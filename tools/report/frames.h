@@ -27,6 +27,8 @@ struct ReportFrame {
   std::string jpeg;         // made smaller
   std::vector<FrameMark> marks;
   std::vector<Eigen::Vector2d> edges_seen{}, edges_mapped{};  // pixels: by the detector, and by map and pose
+  // Upright lines: each from below to above, in pixels; as they were seen, and as map and pose expect them.
+  std::vector<std::vector<Eigen::Vector2d>> lines_seen{}, lines_mapped{};
 };
 
 // `each` pictures of every camera that has a video, spread over the run's time. What can't be read leaves its part
@@ -36,5 +38,9 @@ std::vector<ReportFrame> load_frames(const std::filesystem::path &recording, Rep
 // Marks for a picture of what a bearing sensor of the camera's name saw: where each landmark was expected by the run's
 // own pose, and in which direction it was seen.
 void mark_sightings(const std::filesystem::path &recording, const ReportData &data, std::vector<ReportFrame> *frames);
+
+// The upright lines that the camera's detector followed, from the run's event log, and those of the run's own map as
+// they should look from where it says it was. Does nothing where no camera saw lines.
+void mark_lines(const std::filesystem::path &run, const std::filesystem::path &recording, ReportData *data);
 
 }  // namespace wm::tools
