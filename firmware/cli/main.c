@@ -19,6 +19,7 @@ static const char kHelp[] =
     "  watch     show a run as it goes, in a terminal\n"
     "  check     say what can be known of a configuration and a recording before driving\n"
     "  doctor    say what is wrong with this computer, and how to mend it\n"
+    "  stamps    switch the clocks of CAN adapters on, before a run\n"
     "  help      this text; `waymark COMMAND --help` tells more\n"
     "\n"
     "The desk's commands (waymark eval, report, simulate ...) are programs named waymark-COMMAND beside this one.\n"
@@ -32,7 +33,8 @@ static const struct {
   const char *name;
   int (*run)(int argc, char *const *argv);
 } kCommands[] = {{"run", command_run},       {"replay", command_replay}, {"check", command_check},
-                 {"record", command_record}, {"watch", command_watch},   {"doctor", command_doctor}};
+                 {"record", command_record}, {"watch", command_watch},   {"doctor", command_doctor},
+                 {"stamps", command_stamps}};
 #define COMMANDS (sizeof kCommands / sizeof kCommands[0])
 
 int main(int argc, char **argv) {
@@ -53,9 +55,9 @@ int main(int argc, char **argv) {
     if (strcmp(command, kCommands[i].name) == 0) return kCommands[i].run(argc - 2, argv + 2);
 
   run_desk_command(command, argv + 1);
-  static const char *const kNames[] = {"run",    "replay",    "record", "watch",     "check",
-                                       "doctor", "help",      "eval",   "report",    "simulate",
-                                       "diff",   "calibrate", "map",    "reference", NULL};
+  static const char *const kNames[] = {"run",  "replay",    "record", "watch",    "check", "doctor",
+                                       "help", "eval",      "report", "simulate", "diff",  "calibrate",
+                                       "map",  "reference", "stamps", NULL};
   const char *nearest = wm_word_nearest(command, kNames);
   if (nearest && strcmp(nearest, command) != 0) {
     (void)fprintf(stderr, "waymark: '%s' is no command; did you mean '%s'? (waymark help lists them)\n", command,

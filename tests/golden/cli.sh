@@ -35,7 +35,7 @@ expect 0 "example:" --help
 expect 0 "waymark " --version
 expect 2 "did you mean 'replay'" repaly
 expect 2 "'dance' is no command" dance
-for command in run replay check doctor record watch; do expect 0 "example:" "$command" --help; done
+for command in run replay check doctor record watch stamps; do expect 0 "example:" "$command" --help; done
 
 expect 2 "replay needs a recording" replay
 expect 2 "replay needs --out" replay "$work/rec"
@@ -62,6 +62,9 @@ printf 'BO_ 256 M: 2 X\n SG_ V : 0|16@1+ (0.001,0) [0|65] "m/s" X\n SG_ W : 8|8@
 printf -- '- {quantity: vehicle_speed, message: M, signal: V}\n- {quantity: yaw_rate, message: M, signal: W}\n' >"$work/signals.yaml"
 printf 'format: waymark-config/1\nestimator: odometry\ndevices: {can: [{interface: nocan7, dbc: car.dbc, can_signals: signals.yaml}]}\n' >"$work/robot.yaml"
 expect 0 "can                  a device" check "$work/robot.yaml"
+expect 0 "nocan7: is not there" stamps "$work/robot.yaml"
+sed 's/nocan7/lo/' "$work/robot.yaml" >"$work/lo.yaml"
+[ "$(id -u)" -ne 0 ] || expect 0 "lo: has no clock that can be switched on" stamps "$work/lo.yaml"
 sed -i 's/signal: V/signal: Vee/' "$work/signals.yaml"
 expect 2 "signals.yaml:1" check "$work/robot.yaml"
 expect 2 "check needs a configuration" check

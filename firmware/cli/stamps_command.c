@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// Switches the clocks of CAN adapters on, where they have to be told: before a run, which has no right to it.
+#include <errno.h>
+#include <linux/net_tstamp.h>
+#include <linux/sockios.h>
+#include <net/if.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "commands.h"
+#include "options.h"
+
+static const char kHelp[] =
+    "usage: waymark stamps CONFIG\n"
+    "\n"
+    "Asks each CAN adapter of the configuration's `devices:` to stamp frames by its own clock. Before a run, with the\n"
+    "right to it (CAP_NET_ADMIN): in a systemd unit `ExecStartPre=+/usr/bin/waymark stamps /etc/waymark/robot.yaml`.\n"
+    "An adapter without a clock is no error: the kernel's stamps are taken then. Exit code 1 where the right is "
+    "missing.\n"
+    "\n"
+    "example:\n"
+    "  waymark stamps /etc/waymark/robot.yaml\n";
+
+// 0, or errno. Source: Linux, Documentation/networking/timestamping.rst; CAN drivers take this pair alone.
+static int switch_on(int fd, const char *interface) {
+  struct hwtstamp_config wanted = {.tx_type = HWTSTAMP_TX_ON, .rx_filter = HWTSTAMP_FILTER_ALL};
+  struct ifreq request = {.ifr_data = (char *)&wanted};
+  (void)snprintf(request.ifr_name, sizeof request.ifr_name, "%s", interface);
+  return ioctl(fd, SIOCSHWTSTAMP, &request) == 0 ? 0 : errno;
+}
+
+// 1: to be mended.
+static int say(const char *interface, int reason) {
+  if (reason == 0) {
+    (void)printf("%s: stamps by the adapter's clock\n", interface);
+  } else if (reason == EPERM) {
+    (void)fprintf(stderr, "waymark: %s: no right to switch its clock on; as root, or ExecStartPre=+... in the unit\n",
+                  interface);
+  } else if (reason == ENODEV) {
+    (void)printf("%s: is not there; its stamps are as it comes up\n", interface);
+  } else {
+    (void)printf("%s: has no clock that can be switched on (%s); stamps by the kernel\n", interface, strerror(reason));
+  }
+  return reason == EPERM;
+}
+
+int command_stamps(int argc, char *const *argv) {
+  const char *words[1];
+  int help = 0, failed = 0;
+  const option options[] = {{"--help", OPTION_FLAG, &help}, {"-h", OPTION_FLAG, &help}};
+  wm_error err = {0};
+  size_t count;
+  if (options_parse(argc, argv, options, sizeof options / sizeof options[0], words, 1, &count, &err) != WM_OK)
+    return complain(&err);
+  if (help) {
+    (void)fputs(kHelp, stdout);
+    return EXIT_DONE;
+  }
+  if (count == 0) {
+    (void)fprintf(stderr, "waymark: stamps needs a configuration\n\n%s", kHelp);
+    return EXIT_USAGE;
+  }
+  wm_config config;
+  if (wm_config_load(words[0], &config, &err) != WM_OK) {
+    (void)complain(&err);
+    return EXIT_USAGE;
+  }
+  int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  for (size_t i = 0; i < config.devices.can_count; i++) {
+    const char *interface = config.devices.can[i].interface;
+    failed |= say(interface, fd < 0 ? errno : switch_on(fd, interface));
+  }
+  if (fd >= 0) (void)close(fd);
+  wm_config_free(&config);
+  return failed ? EXIT_WORK_FAILED : EXIT_DONE;
+}
