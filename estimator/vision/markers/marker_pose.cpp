@@ -11,7 +11,7 @@ constexpr double kPlain = 25.0;      // chi2 above which a print is neither leve
 constexpr int kTurns = 33;
 constexpr double kNever = 1e300;
 constexpr double kTilted = 15.0;  // of a print that hangs freely: its tilt's noise, in corners' errors by its size
-constexpr double kTiltedMax_rad = 0.05;
+constexpr double kTiltedMax_rad = 0.08;
 constexpr double kTurnMax_rad = 1.36;
 
 struct fit {

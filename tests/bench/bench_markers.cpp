@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a 640 x 480 picture to markers costs: MR codes by us, AprilTags by their library, edges and pose included. Three
+// rendered views of each (tests/common/marker_views.hpp), and an office's worth of clutter in all of them.
+#include <apriltag/apriltag.h>
+#include <apriltag/tag36h11.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <memory>
+#include <vector>
+
+#include "common/marker_views.hpp"
+#include "vision/markers/dark_regions.hpp"
+#include "waymark/detectors.h"
+#include "waymark/mr_code.h"
+
+namespace {
+
+using namespace wm::views;
+
+// Time of this thread alone: other work on the machine is not counted.
+double thread_us() {
+  timespec now;
+  (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
+}
+
+template <class Work>
+double median_us(int rounds, Work work) {
+  std::vector<double> times;
+  for (int i = 0; i < rounds; i++) {
+    const double begin = thread_us();
+    work();
+    times.push_back(thread_us() - begin);
+  }
+  std::nth_element(times.begin(), times.begin() + rounds / 2, times.end());
+  return times[static_cast<size_t>(rounds / 2)];
+}
+
+Ink tag_ink(const image_u8_t *image) {
+  return [image](double x, double y) {
+    const int i = static_cast<int>(std::floor((0.5 - x) * 8 + 1)), j = static_cast<int>(std::floor((0.5 - y) * 8 + 1));
+    if (i < 0 || j < 0 || i >= image->width || j >= image->height) return -1;
+    return image->buf[j * image->stride + i] ? 0 : 1;
+  };
+}
+
+void whole(const char *name, const wm_detector *detector, const char *family, const Ink &ink) {
+  double sum = 0;
+  size_t found = 0;
+  constexpr int kViews = 3;
+  for (int i = 0; i < kViews; i++) {
+    const View view = draw_view(2 * static_cast<uint64_t>(i), 0.4);
+    const std::vector<uint8_t> grey = take_picture(view, ink);
+    wm_rig rig;
+    wm_rig_init(&rig);
+    rig.camera_count = 1;
+    rig.cameras[0] = view.camera;
+    (void)std::snprintf(rig.marker_family, sizeof rig.marker_family, "%s", family);
+    rig.marker_size_m = view.size_m;
+    std::vector<char> params(detector->params.bytes);
+    wm_params_defaults(&detector->params, params.data());
+    const int32_t camera = 0;
+    const wm_view look = {&rig, &camera};
+    const char *why = "";
+    const size_t bytes = (detector->state_bytes(params.data(), &look, &why) + 63) / 64 * 64;
+    void *state = std::aligned_alloc(64, bytes);
+    if (!state || detector->init(state, params.data(), &look) != WM_OK) return;
+    wm_event events[16];
+    size_t count = 0;
+    const wm_frame frame = frame_of(grey, view.camera);
+    sum += median_us(31, [&] { (void)detector->detect(state, &frame, nullptr, events, 16, &count); });
+    found += count;
+    std::free(state);
+  }
+  std::printf("markers_640x480_%s_us %.0f (%zu markers in %d pictures)\n", name, sum / kViews, found, kViews);
+}
+
+}  // namespace
+
+int main() {
+  size_t count;
+  const wm_detector *const *library = wm_library_detectors(&count);
+  const wm_detector *tags = library[0];
+  for (size_t i = 0; i < count; i++)
+    if (std::strcmp(library[i]->name, "apriltag") == 0) tags = library[i];
+  whole("mr", wm_detector_find("mr"), "mr", mr_ink(7));
+  apriltag_family_t *family = tag36h11_create();
+  image_u8_t *image = apriltag_to_image(family, 7);
+  whole("tag36h11", tags, "tag36h11", tag_ink(image));
+  // Its first part: threshold, mask, regions.
+  const View view = draw_view(0, 0.4);
+  const std::vector<uint8_t> grey = take_picture(view, mr_ink(7));
+  const wm_frame frame = frame_of(grey, view.camera);
+  wm::dark_work work;
+  const size_t bytes = wm::dark_work_lay_out(&work, frame.width_px, frame.height_px, nullptr);
+  auto *memory = static_cast<uint8_t *>(std::aligned_alloc(64, bytes));
+  if (!memory) return 1;
+  wm::dark_work_lay_out(&work, frame.width_px, frame.height_px, memory);
+  std::printf("dark_regions_640x480_us %.0f\n", median_us(31, [&] { wm::find_dark_regions(&work, frame, 20); }));
+  uint32_t id = 0;
+  int wrong = 0;
+  uint64_t modules = wm_mr_encode(77) ^ 0x1001001;
+  std::printf("mr_decode_us %.2f\n", median_us(31, [&] {
+                                       for (int i = 0; i < 100; i++) (void)wm_mr_decode(modules, &id, &wrong);
+                                     }) / 100);
+  std::free(memory);
+  std::free(image->buf);
+  std::free(image);
+  tag36h11_destroy(family);
+}

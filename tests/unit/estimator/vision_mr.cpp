@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+// Detector `mr` on drawn views: place and turn, and pictures that nobody means.
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+
+#include "common/marker_views.hpp"
+#include "unity.h"
+#include "waymark/detector.h"
+#include "waymark/mr_code.h"
+#include "waymark/random.h"
+
+namespace {
+
+using namespace wm::views;
+
+const wm_detector *mr;
+wm_event events[32];
+
+struct Machine {
+  wm_rig rig;
+  int32_t camera = 0;
+  std::unique_ptr<void, decltype(&std::free)> state{nullptr, &std::free};
+  explicit Machine(const wm_camera &c, double size_m = 0.27) {
+    wm_rig_init(&rig);
+    rig.camera_count = 1;
+    rig.cameras[0] = c;
+    std::strcpy(rig.marker_family, "mr");
+    rig.marker_size_m = size_m;
+    std::vector<char> params(mr->params.bytes);
+    wm_params_defaults(&mr->params, params.data());
+    const wm_view view = {&rig, &camera};
+    const char *why = "";
+    const size_t bytes = mr->state_bytes(params.data(), &view, &why);
+    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
+    state.reset(std::aligned_alloc(64, (bytes + 63) / 64 * 64));
+    TEST_ASSERT_EQUAL(WM_OK, mr->init(state.get(), params.data(), &view));
+  }
+  size_t look(const std::vector<uint8_t> &grey) {
+    size_t count = 99;
+    const wm_frame frame = frame_of(grey, rig.cameras[0]);
+    TEST_ASSERT_EQUAL(WM_OK, mr->detect(state.get(), &frame, nullptr, events, 32, &count));
+    return count;
+  }
+};
+
+// The camera looks along its body's x axis, the print stands upright before it.
+void place_and_turn_are_right() {
+  for (const double tilt : {0.0, 0.6, -0.9}) {
+    View view = plain_view(1.5, tilt, 0.27);
+    view.response = 0.6;  // white grows
+    Machine machine(view.camera);
+    for (int i = 0; i < 3; i++) TEST_ASSERT_EQUAL(1, machine.look(take_picture(view, mr_ink(9))));
+    const wm_marker &m = events[0].as.marker;
+    TEST_ASSERT_EQUAL(9, m.id);
+    TEST_ASSERT_DOUBLE_WITHIN(0.004, 1.5, m.p_m[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, -view.centre_m.x, m.p_m[1]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, -view.centre_m.y, m.p_m[2]);
+    const double yaw = std::remainder(m.yaw_rad + M_PI / 2 + tilt, 2 * M_PI);
+    TEST_ASSERT_TRUE(std::fabs(yaw) < 4 * m.yaw_sigma_rad + 0.002);
+    TEST_ASSERT_TRUE(m.yaw_sigma_rad > 0 && m.along_sigma_m > 0 && m.along_sigma_m < 0.02);
+    TEST_ASSERT_TRUE(m.edge_shift_px > 0.02);
+  }
+}
+
+// Two prints of one identity, or one seen twice in a mirror's place: both are given, each where it is.
+void a_marker_twice_in_a_picture_is_given_twice() {
+  View view = plain_view(2.0, 0.0, 0.27);
+  view.centre_m.x = -0.5;
+  std::vector<uint8_t> left = take_picture(view, mr_ink(9));
+  view.centre_m.x = 0.5;
+  const std::vector<uint8_t> right = take_picture(view, mr_ink(9));
+  for (size_t i = 0; i < left.size(); i++)
+    if (i % 640 >= 320) left[i] = right[i];
+  Machine machine(view.camera);
+  TEST_ASSERT_EQUAL(2, machine.look(left));
+  TEST_ASSERT_EQUAL(9, events[0].as.marker.id);
+  TEST_ASSERT_EQUAL(9, events[1].as.marker.id);
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0, std::fabs(events[0].as.marker.p_m[1] - events[1].as.marker.p_m[1]));
+}
+
+void capacity_is_kept() {
+  const View view = plain_view(1.0, 0.0, 0.27);
+  Machine machine(view.camera);
+  const std::vector<uint8_t> grey = take_picture(view, mr_ink(3));
+  const wm_frame frame = frame_of(grey, view.camera);
+  size_t count = 99;
+  TEST_ASSERT_EQUAL(WM_OK, mr->detect(machine.state.get(), &frame, nullptr, events, 0, &count));
+  TEST_ASSERT_EQUAL(0, count);
+}
+
+void blank_and_noisy_pictures_have_none() {
+  const View view = plain_view(1.0, 0.0, 0.27);
+  Machine machine(view.camera);
+  std::vector<uint8_t> grey(640 * 480);
+  for (const int level : {0, 1, 127, 254, 255}) {
+    grey.assign(grey.size(), static_cast<uint8_t>(level));
+    TEST_ASSERT_EQUAL(0, machine.look(grey));
+  }
+  for (uint64_t seed = 0; seed < 6; seed++) {
+    for (size_t i = 0; i < grey.size(); i++) {
+      const double u = wm_random_uniform(seed, 21, i / (1 + seed * seed));  // grains, streaks
+      grey[i] = static_cast<uint8_t>(seed % 2 ? 255 * (u > 0.5) : 256 * u);
+    }
+    TEST_ASSERT_EQUAL(0, machine.look(grey));
+  }
+}
+
+// Prints cut by the picture's edge, and the smallest pictures.
+void parts_of_prints_and_tiny_pictures() {
+  View view = plain_view(0.6, 0.0, 0.27);
+  Machine machine(view.camera);
+  for (const double x : {-0.42, 0.42}) {
+    view.centre_m.x = x;
+    TEST_ASSERT_EQUAL(0, machine.look(take_picture(view, mr_ink(3))));
+  }
+  wm_camera tiny = view.camera;
+  for (const uint32_t size : {16U, 17U, 31U}) {
+    tiny.width_px = tiny.height_px = size;
+    Machine small(tiny);
+    std::vector<uint8_t> grey(static_cast<size_t>(size) * size);
+    for (uint64_t seed = 0; seed < 20; seed++) {
+      for (size_t i = 0; i < grey.size(); i++) grey[i] = static_cast<uint8_t>(256 * wm_random_uniform(seed, 22, i));
+      TEST_ASSERT_EQUAL(0, small.look(grey));
+    }
+  }
+}
+
+// A print with so many modules painted over: up to six are read, more are none.
+void painted_modules_are_corrected_or_refused() {
+  const View view = plain_view(1.0, 0.3, 0.27);
+  for (int painted = 4; painted <= 9; painted++) {
+    const uint64_t code = wm_mr_encode(200);
+    uint64_t modules = code;
+    for (int i = 0; i < painted; i++) modules ^= UINT64_C(1) << (7 * i + 3);
+    Machine machine(view.camera);
+    const size_t count = machine.look(take_picture(view, [=](double x, double y) { return wm_mr_ink(modules, x, y); }));
+    TEST_ASSERT_EQUAL(painted <= WM_MR_CORRECTED, count);
+    if (count) TEST_ASSERT_EQUAL(200, events[0].as.marker.id);
+  }
+}
+
+}  // namespace
+
+void setUp() { mr = wm_detector_find("mr"); }
+void tearDown() {}
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(place_and_turn_are_right);
+  RUN_TEST(a_marker_twice_in_a_picture_is_given_twice);
+  RUN_TEST(capacity_is_kept);
+  RUN_TEST(blank_and_noisy_pictures_have_none);
+  RUN_TEST(parts_of_prints_and_tiny_pictures);
+  RUN_TEST(painted_modules_are_corrected_or_refused);
+  return UNITY_END();
+}
