@@ -63,7 +63,7 @@ scene make_scene(int count) {
     const auto draw = [i](uint64_t k) { return wm_random_uniform(3, k, (uint64_t)i); };
     const double ahead = 2.5 + 2.0 * draw(0);
     out.points.push_back(
-        {i + 1, {ahead, ahead * 0.9 * (draw(1) - 0.5), ahead * 0.7 * (draw(2) - 0.5)}, 0.001, kAbsent});
+        {i + 1, {ahead, ahead * 0.9 * (draw(1) - 0.5), ahead * 0.7 * (draw(2) - 0.5)}, 0.001, kAbsent, {}, 0});
   }
   return out;
 }

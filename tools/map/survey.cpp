@@ -8,6 +8,7 @@
 #include <map>
 
 #include "common/csv.h"
+#include "common/json_file.h"
 #include "common/run_folder.h"
 #include "common/statistics.h"
 
