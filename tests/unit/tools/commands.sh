@@ -56,7 +56,8 @@ expect 0 '"length_precision": 1.0' "$bin/waymark-eval" "$dir/run" "$dir/rec" --d
 expect 0 '"left_out_of_view": 1' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges --json --view 3,6,-3,3
 expect 0 'precision 100.0 %' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges
 expect 2 "no camera 'back'; it has front" "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges --camera back
-expect 2 'lines' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector lines
+expect 2 'colours' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector colours
+expect 1 'labels/lines.csv: is not there' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector lines
 expect 1 'labels/edges.csv: is not there' "$bin/waymark-eval" "$dir/run" "$dir/empty" --detector edges
 printf 't_ns,x_m,y_m,z_m,sigma_xy_m,sigma_z_m\n100000000,0.1,0.4,,2,\n' >"$dir/rec/gnss.csv"
 expect 0 '"nees_mean": null' "$bin/waymark-eval" "$dir/run" "$dir/rec" --against gnss --json
