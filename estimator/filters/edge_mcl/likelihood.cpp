@@ -28,13 +28,6 @@ pixel_pose pose_in_pixels(const edge_map &map, double x_m, double y_m, double he
   return {(float)(u + edge_map::kTile), (float)(v + edge_map::kTile), (float)c, (float)s};
 }
 
-// NaN becomes 0: the ring.
-template <class Number>
-WM_KERNEL void clamp(const Number &zero, const Number &most, Number *value) {
-  *value = *value > zero ? *value : zero;
-  *value = *value < most ? *value : most;
-}
-
 // First where each point falls, then what is there: the second loop is loads and additions only.
 template <int kLanes>
 WM_KERNEL int32_t score_by(const edge_map &map, const scan_points &points, const score_table &table,
@@ -49,8 +42,10 @@ WM_KERNEL int32_t score_by(const edge_map &map, const scan_points &points, const
     const lanes x = *reinterpret_cast<const lanes *>(points.x_m + i);
     const lanes y = *reinterpret_cast<const lanes *>(points.y_m + i);
     lanes u = p.c0 + (p.c * x - p.s * y), v = p.r0 - (p.s * x + p.c * y);
-    clamp(zero, most_column, &u);
-    clamp(zero, most_row, &v);
+    u = u > zero ? u : zero;  // NaN becomes 0: the ring
+    v = v > zero ? v : zero;
+    u = u < most_column ? u : most_column;
+    v = v < most_row ? v : most_row;
     const int_lanes column = __builtin_convertvector(u, int_lanes), row = __builtin_convertvector(v, int_lanes);
     *reinterpret_cast<int_lanes *>(tile + i) =
         (row >> edge_map::kTileShift) << shift | (column >> edge_map::kTileShift);
@@ -99,8 +94,10 @@ int32_t score_scalar(const edge_map &map, const scan_points &points, const score
     for (; i < points.class_end[k]; i++) {
       const float x = points.x_m[i], y = points.y_m[i];
       float u = p.c0 + (p.c * x - p.s * y), v = p.r0 - (p.s * x + p.c * y);
-      clamp(0.0f, most_column, &u);
-      clamp(0.0f, most_row, &v);
+      u = u > 0.0f ? u : 0.0f;
+      v = v > 0.0f ? v : 0.0f;
+      u = u < most_column ? u : most_column;
+      v = v < most_row ? v : most_row;
       const int column = (int)u, row = (int)v;
       const uint32_t tile =
           map.tiles()[(row >> edge_map::kTileShift) << map.row_shift() | (column >> edge_map::kTileShift)];
