@@ -31,7 +31,7 @@ std::vector<EdgePoints> load_edge_points(const std::filesystem::path &run) {
     EdgePoints one{event.t_ns, points.camera, {}, {}};
     for (uint32_t i = 0; i < points.count && i < WM_POINTS_MAX; i++) {
       one.points.emplace_back(points.x_m[i], points.y_m[i]);
-      one.sigma_m.push_back(points.sigma_m[i]);
+      one.sigma_m.push_back(static_cast<double>(points.sigma_m[i]));
     }
     out.push_back(std::move(one));
   }

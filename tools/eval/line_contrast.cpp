@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <memory>
 
 #include "common/failure.h"
@@ -20,6 +21,7 @@ constexpr double kDeg = M_PI / 180;
 constexpr double kNear = 0.5 * kDeg, kFar = 1.5 * kDeg;  // of a side
 constexpr int kAcross = 5, kAlong = 9;                   // samples of a side
 constexpr double kContrast_grey = 8;
+constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
 constexpr double kStep = 0.5 * kDeg, kLowest = -4 * kDeg, kHighest = 70 * kDeg;  // of the search for the upper end
 constexpr int kGap = 4;        // steps without contrast that don't end a line
 constexpr double kUsual = 60;  // percentile of a line's height over its pictures
@@ -49,14 +51,14 @@ struct Picture {
         const double elevation = from + (to - from) * (i + 0.5) / along,
                      away = kNear + (kFar - kNear) * k / (kAcross - 1);
         double left, right;
-        if (!grey_at(azimuth + away, elevation, &left) || !grey_at(azimuth - away, elevation, &right)) return NAN;
+        if (!grey_at(azimuth + away, elevation, &left) || !grey_at(azimuth - away, elevation, &right)) return kAbsent;
         sum += left - right;
       }
     return sum / (along * kAcross);
   }
   // Elevation up to which the sides differ; NaN where they nowhere do.
   [[nodiscard]] double upper_end(double azimuth) const {
-    double end = NAN;
+    double end = kAbsent;
     int missed = 0, sign = 0;
     for (double e = kLowest; e < kHighest && missed <= kGap; e += kStep) {
       const double d = difference(azimuth, e, e + kStep, 1);
