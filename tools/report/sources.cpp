@@ -98,6 +98,15 @@ Meaning meaning_of(const std::string &name) {
   if (what == "track_scale") return {100, -100, "%", "the wheels act as if this much farther apart than stated"};
   if (what == "steering_offset_rad")
     return {degrees, 0, "°", "the wheels point this far to the left when the steering says straight"};
+  if (what == "edge_shift_px") return {1, 0, "px", "white grows by this much in the pictures of " + sensor};
+  if (name == "map.landmarks") return {1, 0, "", "landmarks in the map at the end"};
+  if (name == "map.joined") return {1, 0, "", "landmarks that the map took in"};
+  if (name == "map.left") return {1, 0, "", "landmarks that left it: hardly seen, or moved"};
+  if (name == "map.moved") return {1, 0, "", "times that one was elsewhere than before"};
+  if (name == "map.doubled") return {1, 0, "", "sightings of identities that stand on two landmarks"};
+  if (name == "map.no_room") return {1, 0, "", "landmarks that found no room"};
+  if (name == "edges.explained") return {100, 0, "%", "of the edges seen lie on edges of the map"};
+  if (name == "edges.lost_probability") return {100, 0, "%", "the probability of being lost"};
   if (what.ends_with("_radps")) return {degrees, 0, "°/s", ""};
   if (what.ends_with("_rad")) return {degrees, 0, "°", ""};
   if (what.ends_with("_s")) return {1e3, 0, "ms", ""};
@@ -250,18 +259,19 @@ std::string calibration_section(const ReportData &data) {
   for (const CalibrationState &state : calibration_of(data.health)) {
     const Meaning m = meaning_of(state.name);
     const double value = state.value * m.factor + m.offset;
-    const int decimals = decimals_for(state.sigma * m.factor);
+    const bool known = state.sigma == 0;  // a count, or a figure without a sigma
+    const int decimals = known ? (value == std::round(value) ? 0 : 2) : decimals_for(state.sigma * m.factor);
     const std::string sign = value > 0 && m.offset != 0 ? "+" : "";
-    rows += "<tr><td>" + escape(title_of(state.name)) + "</td><td><b>" + sign + number_text(value, decimals) +
-            "</b> ± " + fixed(state.sigma * m.factor, decimals) + "\u202f" + m.unit + "</td><td class=\"words\">" +
-            m.words + "</td></tr>";
+    rows += "<tr><td>" + escape(title_of(state.name)) + "</td><td><b>" + sign + number_text(value, decimals) + "</b>" +
+            (known ? "" : " ± " + fixed(state.sigma * m.factor, decimals)) + "\u202f" + m.unit +
+            "</td><td class=\"words\">" + m.words + "</td></tr>";
   }
   if (rows.empty()) return "";
   return section(
       "What it learned about itself",
       "These are not constants from a data sheet but states that the robot estimated while driving, each with its "
-      "standard "
-      "deviation at the end. A value within two standard deviations of zero says that the calibration was right.",
+      "standard deviation at the end. A value within two standard deviations of zero says that the calibration was "
+      "right. Counts and shares stand without one.",
       "<div class=\"wide\"><table><tr><th>state</th><th>value ± σ</th><th class=\"words\">what it means</th></tr>" +
           rows + "</table></div>");
 }
