@@ -85,7 +85,8 @@ static int mode_is_usable(wm_camera_device *self, const camera_mode *wanted) {
       (got->rate_hz < wanted->rate_hz * 0.98 || got->rate_hz > wanted->rate_hz * 1.02))
     tell(self, "the driver gives %.4g pictures a second instead of %.4g", got->rate_hz, wanted->rate_hz);
   if (self->format < 0) {
-    set_state(self, WM_DEVICE_DOWN, "gives the format %.4s; GREY, YUYV, UYVY, NV12, Y10, Y16 or MJPG is needed",
+    set_state(self, WM_DEVICE_DOWN,
+              "gives the format %.4s; GREY, YUYV, UYVY, NV12, Y10, Y16, MJPG, RGB3 or BGR3 is needed",
               (const char *)&got->fourcc);
     return 0;
   }
@@ -103,7 +104,8 @@ static void set_controls(wm_camera_device *self) {
     (void)snprintf(control.name, sizeof control.name, "%s", self->config.controls[i].name);
     int failed = self->io->set_control(self->camera, &control);
     if (failed == -EINVAL) {
-      tell(self, "has no control '%s' (`v4l2-ctl -l` lists them)", control.name);
+      tell(self, "has no control '%s' (`%s` lists them)", control.name,
+           self->config.libcamera[0] ? "cam -c 1 --list-controls" : "v4l2-ctl -l");
     } else if (failed == -ERANGE) {
       tell(self, "control '%s': %d is beyond its limits; %d was set", control.name, self->config.controls[i].value,
            control.value);
@@ -355,7 +357,8 @@ wm_status camera_device_make(const wm_camera_device_config *config, const wm_cam
   self->io_context = io_context;
   self->clock.readout_ns = camera->readout_ns;
   self->clock.latency_ns = wm_ns_from_seconds(config->latency_ms * 1e-3);
-  (void)snprintf(self->identity.path, sizeof self->identity.path, "%s", config->device);
+  (void)snprintf(self->identity.path, sizeof self->identity.path, "%s",
+                 config->libcamera[0] ? config->libcamera : config->device);
   (void)snprintf(self->identity.card, sizeof self->identity.card, "%s", config->card);
   (void)snprintf(self->identity.bus, sizeof self->identity.bus, "%s", config->bus);
   self->grey = calloc((size_t)self->width * self->height + 1, 1);
@@ -369,7 +372,18 @@ wm_status camera_device_make(const wm_camera_device_config *config, const wm_cam
   return WM_OK;
 }
 
+#ifdef WM_WITH_LIBCAMERA
+static const camera_io *const kByLibcamera = &kLibcamera;
+#else
+static const camera_io *const kByLibcamera = NULL;
+#endif
+
+int wm_camera_has_libcamera(void) { return kByLibcamera != NULL; }
+
 wm_status wm_camera_device_open(const wm_camera_device_config *config, const wm_camera *camera, int32_t index,
                                 wm_warn_fn warn, void *context, wm_camera_device **out, wm_error *err) {
-  return camera_device_make(config, camera, index, warn, context, &kV4l2, NULL, out, err);
+  *out = NULL;
+  const camera_io *io = config->libcamera[0] ? kByLibcamera : &kV4l2;
+  if (!io) return wm_fail(err, WM_BAD_CONFIG, "camera %s: " WM_WITHOUT_LIBCAMERA, config->name);
+  return camera_device_make(config, camera, index, warn, context, io, NULL, out, err);
 }

@@ -12,7 +12,7 @@
 
 // Who a camera is: it may come back under another number.
 typedef struct camera_identity {
-  char path[128];  // to open: /dev/video0, /dev/v4l/by-id/...
+  char path[128];  // to open: /dev/video0, /dev/v4l/by-id/..., or libcamera's identifier
   char card[48];   // the model's name, "" unknown
   char bus[48];    // where it is plugged in, "" unknown
 } camera_identity;
@@ -56,5 +56,6 @@ typedef struct camera_io {
 } camera_io;
 
 extern const camera_io kV4l2;
+extern const camera_io kLibcamera;  // with WM_WITH_LIBCAMERA only
 
 #endif

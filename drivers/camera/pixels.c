@@ -5,10 +5,10 @@
 
 #include "waymark/devices.h"
 
-static const char *const kNames[] = {"GREY", "YUYV", "UYVY", "NV12", "Y10 ", "Y16 ", "MJPG"};
+static const char *const kNames[] = {"GREY", "YUYV", "UYVY", "NV12", "Y10 ", "Y16 ", "MJPG", "RGB3", "BGR3"};
 _Static_assert(sizeof kNames / sizeof kNames[0] == PIXELS_FORMATS, "a name for each format");
 
-const char *const wm_camera_formats[] = {"GREY", "YUYV", "UYVY", "NV12", "Y10", "Y16", "MJPG", NULL};
+const char *const wm_camera_formats[] = {"GREY", "YUYV", "UYVY", "NV12", "Y10", "Y16", "MJPG", "RGB3", "BGR3", NULL};
 
 int pixels_find(const char *name) {
   char padded[5] = "    ";
@@ -39,6 +39,8 @@ static size_t row_bytes(int format, uint32_t width) {
     case PIXELS_GREY:
     case PIXELS_NV12: return width;
     case PIXELS_MJPEG: return 0;
+    case PIXELS_RGB:
+    case PIXELS_BGR: return (size_t)width * 3;
     default: return (size_t)width * 2;
   }
 }
@@ -51,6 +53,10 @@ size_t pixels_bytes(int format, uint32_t width, uint32_t height, uint32_t stride
 }
 
 int pixels_are_grey(int format) { return format == PIXELS_GREY || format == PIXELS_NV12; }
+
+static uint8_t luma(unsigned red, unsigned green, unsigned blue) {
+  return (uint8_t)((77 * red + 150 * green + 29 * blue + 128) >> 8);
+}
 
 static void row_to_grey(int format, const uint8_t *from, uint32_t width, uint8_t *grey) {
   switch (format) {
@@ -66,6 +72,12 @@ static void row_to_grey(int format, const uint8_t *from, uint32_t width, uint8_t
         unsigned value = from[2 * (size_t)x] | (unsigned)from[2 * (size_t)x + 1] << 8;
         grey[x] = (uint8_t)(value > 1023 ? 255 : value >> 2);
       }
+      break;
+    case PIXELS_RGB:
+      for (uint32_t x = 0; x < width; x++, from += 3) grey[x] = luma(from[0], from[1], from[2]);
+      break;
+    case PIXELS_BGR:
+      for (uint32_t x = 0; x < width; x++, from += 3) grey[x] = luma(from[2], from[1], from[0]);
       break;
     default: memcpy(grey, from, width);
   }

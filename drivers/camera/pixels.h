@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What cameras send, as grey: formats of V4L2 by their four letters. Colour is dropped, the luma is taken as it is.
+// What cameras send, as grey: formats of V4L2 by their four letters. Colour is dropped, the luma is taken as it is;
+// where there is none, it is BT.601's.
 // Pure.
 #ifndef WM_CAMERA_PIXELS_H
 #define WM_CAMERA_PIXELS_H
@@ -15,6 +16,8 @@ typedef enum pixel_format {
   PIXELS_Y10,    // 10 bits in 16, little-endian
   PIXELS_Y16,    // 16 bits, little-endian
   PIXELS_MJPEG,  // a JPEG a picture
+  PIXELS_RGB,    // bytes red, green, blue
+  PIXELS_BGR,    // bytes blue, green, red
   PIXELS_FORMATS
 } pixel_format;
 

@@ -94,6 +94,9 @@ static wm_status camera_is_new(const wm_yaml_node *item, const wm_config *config
     if (strcmp(other->name, camera->name) == 0)
       return wm_yaml_fail(item, err, "the camera '%s' stands there twice (first in line %d)", camera->name,
                           other->line);
+    if (camera->libcamera[0] && strcmp(other->libcamera, camera->libcamera) == 0)
+      return wm_yaml_fail(item, err, "libcamera's '%s' stands there twice (first in line %d)", camera->libcamera,
+                          other->line);
     if (camera->device[0] && strcmp(other->device, camera->device) == 0)
       return wm_yaml_fail(item, err, "the device '%s' stands there twice (first in line %d)", camera->device,
                           other->line);
@@ -101,9 +104,29 @@ static wm_status camera_is_new(const wm_yaml_node *item, const wm_config *config
   return WM_OK;
 }
 
+// Which camera: by libcamera's identifier, or by V4L2's path, card or bus.
+static wm_status read_which(const wm_yaml_node *item, wm_camera_device_config *out, wm_error *err) {
+  wm_status status = text(item, "device", out->device, sizeof out->device, err);
+  if (status == WM_OK) status = text(item, "card", out->card, sizeof out->card, err);
+  if (status == WM_OK) status = text(item, "bus", out->bus, sizeof out->bus, err);
+  if (status == WM_OK) status = text(item, "libcamera", out->libcamera, sizeof out->libcamera, err);
+  if (status != WM_OK) return status;
+  int is_v4l2 = out->device[0] || out->card[0] || out->bus[0];
+  if (!is_v4l2 && !out->libcamera[0])
+    return wm_yaml_fail(
+        item, err,
+        "device: is missing: a path (/dev/v4l/by-id/... stays the same when it is plugged in again), or "
+        "card or bus as `v4l2-ctl -D` says them, or libcamera: an identifier as `cam -l` says it");
+  wm_yaml_node node = wm_yaml_get(item, "libcamera");
+  if (is_v4l2 && out->libcamera[0])
+    return wm_yaml_fail(&node, err, "device, card and bus are V4L2's; name the camera by them or by libcamera:");
+  if (out->libcamera[0] && !wm_camera_has_libcamera()) return wm_yaml_fail(&node, err, WM_WITHOUT_LIBCAMERA);
+  return WM_OK;
+}
+
 static wm_status read_camera(const wm_yaml_node *item, wm_config *config, wm_error *err) {
-  static const char *const kKeys[] = {"name",        "device",     "card",  "bus",      "format", "rate_hz",
-                                      "exposure_ms", "latency_ms", "stamp", "controls", NULL};
+  static const char *const kKeys[] = {"name",    "device",      "card",       "bus",   "libcamera", "format",
+                                      "rate_hz", "exposure_ms", "latency_ms", "stamp", "controls",  NULL};
   static const char *const kStamps[] = {"auto", "start", "end", NULL};  // wm_stamp_point
   wm_camera_device_config *out = &config->devices.cameras[config->devices.camera_count];
   int32_t format = -1;
@@ -113,14 +136,7 @@ static wm_status read_camera(const wm_yaml_node *item, wm_config *config, wm_err
   if (status == WM_OK) status = text(item, "name", out->name, sizeof out->name, err);
   if (status == WM_OK && !out->name[0])
     return wm_yaml_fail(item, err, "name: is missing: the camera's name in calibration.yaml");
-  if (status == WM_OK) status = text(item, "device", out->device, sizeof out->device, err);
-  if (status == WM_OK) status = text(item, "card", out->card, sizeof out->card, err);
-  if (status == WM_OK) status = text(item, "bus", out->bus, sizeof out->bus, err);
-  if (status == WM_OK && !out->device[0] && !out->card[0] && !out->bus[0])
-    return wm_yaml_fail(
-        item, err,
-        "device: is missing: a path (/dev/v4l/by-id/... stays the same when it is plugged in again), or "
-        "card or bus as `v4l2-ctl -D` says them");
+  if (status == WM_OK) status = read_which(item, out, err);
   if (status == WM_OK) status = choice(item, "format", wm_camera_formats, &format, err);
   if (format >= 0) snprintf(out->format, sizeof out->format, "%s", wm_camera_formats[format]);
   if (status == WM_OK) status = number(item, "rate_hz", 1000, &out->rate_hz, err);

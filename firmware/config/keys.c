@@ -67,13 +67,18 @@ const config_key kConfigCameraDeviceKeys[] = {
     {"card", "text", "as first opened",
      "The model, as `v4l2-ctl -D` says it: another camera is not taken for this one."},
     {"bus", "text", "as first opened", "Where it is plugged in, as `v4l2-ctl -D` says it."},
-    {"format", "`GREY`, `YUYV`, `UYVY`, `NV12`, `Y10`, `Y16`, `MJPG`", "the driver's", "What the camera sends."},
+    {"libcamera", "text", "by V4L2",
+     "Instead of device, card and bus: libcamera's identifier, as `cam -l` says it in brackets (live.md)."},
+    {"format", "`GREY`, `YUYV`, `UYVY`, `NV12`, `Y10`, `Y16`, `MJPG`, `RGB3`, `BGR3`", "the driver's",
+     "What the camera sends."},
     {"rate_hz", "number from 0 to 1000", "the driver's", "Pictures a second."},
     {"exposure_ms", "number from 0 to 1000", "the driver's",
      "ms. Exposure, where the driver doesn't tell it: a picture's time is the middle of it."},
     {"latency_ms", "number from 0 to 1000", "0", "ms. From the exposure's start or end to the driver's stamp."},
     {"stamp", "`auto`, `start`, `end`", "auto", "What the driver's stamp is of; auto believes the driver."},
-    {"controls", "map", "none", "V4L2 controls by the names of `v4l2-ctl -l`, e.g. `{auto_exposure: 1, gain: 20}`."},
+    {"controls", "map", "none",
+     "V4L2 controls by the names of `v4l2-ctl -l`, e.g. `{auto_exposure: 1, gain: 20}`; libcamera's by its own, "
+     "whole numbers, e.g. `{AeEnable: 0, ExposureTime: 4000}`."},
     {NULL, NULL, NULL, NULL},
 };
 

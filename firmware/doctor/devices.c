@@ -82,7 +82,7 @@ void doctor_can(const char *root, const wm_config *config, findings *out) {
 static void camera(const wm_camera_device_config *c, findings *out) {
   char about[32];
   (void)snprintf(about, sizeof about, "camera %.20s", c->name);
-  if (!c->device[0]) return;  // known by card and bus: only a run looks for it
+  if (!c->device[0]) return;  // known by card and bus, or to libcamera: only a run looks for it
   int fd = open(c->device, O_RDWR | O_NONBLOCK | O_CLOEXEC);
   if (fd >= 0) {
     struct stat is;

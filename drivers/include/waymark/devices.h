@@ -35,15 +35,16 @@ typedef enum wm_stamp_point { WM_STAMP_AUTO, WM_STAMP_START, WM_STAMP_END } wm_s
 typedef struct wm_camera_device_config {
   char name[WM_NAME_MAX];  // of the camera in calibration.yaml, which has its size
   char device[128];        // /dev/video0, /dev/v4l/by-id/...
+  char libcamera[128];     // instead of it: libcamera's identifier, as `cam -l` says; "": V4L2
   char card[48], bus[48];  // who it is, as `v4l2-ctl -D` says; "": as it is when it is opened first
-  char format[8];          // "GREY", "YUYV", "UYVY", "NV12", "Y10", "Y16", "MJPG"; "": the driver's
+  char format[8];          // one of wm_camera_formats; "": the driver's
   double rate_hz;          // 0: the driver's
   double exposure_ms;      // 0: as the driver says, where it does
   double latency_ms;       // from the exposure's start or end to the driver's stamp
   int32_t stamp;           // wm_stamp_point: what the driver's stamp is of
   uint32_t control_count;
   struct {
-    char name[32];  // as `v4l2-ctl -l` writes it
+    char name[32];  // as `v4l2-ctl -l` writes it, or libcamera ("ExposureTime")
     int32_t value;
   } controls[WM_CAMERA_CONTROLS_MAX];
   int line;
@@ -71,8 +72,13 @@ typedef struct wm_camera_device wm_camera_device;
 // Names of the formats that a camera may have, NULL-terminated.
 extern const char *const wm_camera_formats[];
 
-// A camera by V4L2, as calibration.yaml knows it (`camera`, at `index` of the rig). It needn't be there yet. What the
-// driver changes of the wishes is told to `warn` (may be NULL), once. Allocates; reopening does, too.
+// Whether this build has libcamera's driver; without it a configuration that names such a camera is wrong.
+int wm_camera_has_libcamera(void);
+#define WM_WITHOUT_LIBCAMERA \
+  "this waymark is built without libcamera; build it where libcamera-dev is installed, or name the camera by device:"
+
+// A camera by V4L2 or libcamera, as calibration.yaml knows it (`camera`, at `index` of the rig). It needn't be there
+// yet. What the driver changes of the wishes is told to `warn` (may be NULL), once. Allocates; reopening does, too.
 wm_status wm_camera_device_open(const wm_camera_device_config *config, const wm_camera *camera, int32_t index,
                                 wm_warn_fn warn, void *context, wm_camera_device **out, wm_error *err);
 // The newest picture; what came before it is counted as skipped. Waits for up to WM_DEVICE_WAIT_MS, then WM_AGAIN.

@@ -45,11 +45,23 @@ static void ten_bits_keep_their_upper_eight(void) {
   TEST_ASSERT_EQUAL_UINT8_ARRAY(expected, grey, 4);
 }
 
+static void colours_weigh_as_the_eye_sees_them(void) {
+  const uint8_t from[12] = {255, 0, 0, 0, 255, 0, 0, 0, 255, 255, 255, 255};
+  const uint8_t rgb[4] = {77, 149, 29, 255}, bgr[4] = {29, 149, 77, 255};
+  uint8_t grey[4];
+  pixels_to_grey(pixels_find("RGB3"), from, 4, 1, 12, grey);
+  TEST_ASSERT_EQUAL_UINT8_ARRAY(rgb, grey, 4);
+  pixels_to_grey(pixels_find("BGR3"), from, 4, 1, 12, grey);
+  TEST_ASSERT_EQUAL_UINT8_ARRAY(bgr, grey, 4);
+  TEST_ASSERT_EQUAL(2 * 15 + 12, pixels_bytes(pixels_find("RGB3"), 4, 3, 15));
+  TEST_ASSERT_EQUAL(0, pixels_are_grey(PIXELS_RGB));
+}
+
 static void names_of_formats(void) {
   TEST_ASSERT_EQUAL(PIXELS_MJPEG, pixels_find("MJPEG"));
   TEST_ASSERT_EQUAL(PIXELS_MJPEG, pixels_find("MJPG"));
   TEST_ASSERT_EQUAL_HEX32(0x59455247, pixels_fourcc(PIXELS_GREY));
-  TEST_ASSERT_EQUAL(-1, pixels_find("RGB3"));
+  TEST_ASSERT_EQUAL(-1, pixels_find("RGB4"));
   TEST_ASSERT_EQUAL(-1, pixels_find(""));
   TEST_ASSERT_EQUAL(-1, pixels_of_fourcc(0));
 }
@@ -142,6 +154,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(each_format_has_its_luma_where_it_should_be);
   RUN_TEST(ten_bits_keep_their_upper_eight);
+  RUN_TEST(colours_weigh_as_the_eye_sees_them);
   RUN_TEST(names_of_formats);
   RUN_TEST(a_changed_picture_has_another_fingerprint);
   RUN_TEST(stamps_of_start_and_end_become_the_middle_of_the_middle_row);

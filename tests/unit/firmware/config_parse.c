@@ -116,9 +116,9 @@ static void devices(void) {
   TEST_ASSERT_EQUAL(2, camera->control_count);
   TEST_ASSERT_EQUAL_STRING("gain", camera->controls[1].name);
   TEST_ASSERT_EQUAL_INT32(-3, camera->controls[1].value);
-  refused(HEAD "devices: {cameras: [{name: a, device: b, format: RGB}]}\n",
-          "dir/x.yaml:3: devices.cameras[0].format: 'RGB' is unknown; one of these is needed: GREY, YUYV, UYVY, NV12, "
-          "Y10, Y16, MJPG");
+  refused(HEAD "devices: {cameras: [{name: a, device: b, format: H264}]}\n",
+          "dir/x.yaml:3: devices.cameras[0].format: 'H264' is unknown; one of these is needed: GREY, YUYV, UYVY, NV12, "
+          "Y10, Y16, MJPG, RGB3, BGR3");
   refused(HEAD "devices: {cameras: [{name: a, device: b}, {name: c, device: b}]}\n",
           "dir/x.yaml:3: devices.cameras[1]: the device 'b' stands there twice (first in line 3)");
   refused(HEAD "devices:\n  can:\n    - {interfce: can0}\n",
@@ -131,6 +131,22 @@ static void devices(void) {
           "devices:\n  can:\n    - {interface: can0, dbc: a, can_signals: b}\n"
           "    - {interface: can0, dbc: a, can_signals: b}\n",
           "dir/x.yaml:6: devices.can[1].interface: 'can0' stands there twice (first in line 5)");
+}
+
+static void cameras_of_libcamera(void) {
+  if (wm_camera_has_libcamera()) {
+    parse(HEAD "devices: {cameras: [{name: front, libcamera: platform/vimc.0 Sensor B}]}\n");
+    TEST_ASSERT_EQUAL_STRING("platform/vimc.0 Sensor B", config.devices.cameras[0].libcamera);
+    TEST_ASSERT_EQUAL_STRING("", config.devices.cameras[0].device);
+    refused(HEAD "devices: {cameras: [{name: a, libcamera: b}, {name: c, libcamera: b}]}\n",
+            "dir/x.yaml:3: devices.cameras[1]: libcamera's 'b' stands there twice (first in line 3)");
+  } else {
+    refused(HEAD "devices: {cameras: [{name: front, libcamera: b}]}\n",
+            "dir/x.yaml:3: devices.cameras[0].libcamera: " WM_WITHOUT_LIBCAMERA);
+  }
+  refused(HEAD "devices: {cameras: [{name: a, device: /dev/video0, libcamera: b}]}\n",
+          "dir/x.yaml:3: devices.cameras[0].libcamera: device, card and bus are V4L2's; name the camera by them or by "
+          "libcamera:");
 }
 
 static void misspelt(void) {
@@ -243,6 +259,7 @@ int main(void) {
   RUN_TEST(everything);
   RUN_TEST(source_settings);
   RUN_TEST(devices);
+  RUN_TEST(cameras_of_libcamera);
   RUN_TEST(misspelt);
   RUN_TEST(wrong_values);
   RUN_TEST(wrong_sources);
