@@ -12,6 +12,7 @@ extern "C" {
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
+#include <memory>
 
 #include "common/failure.h"
 #include "map/pdf.h"
@@ -86,7 +87,7 @@ Print mr_print(double size_mm) {
 }
 
 // `turned`: the other way up than in the library's pictures, as ArUco and our recordings have tag36h11.
-Print tag_print(apriltag_family_t *family, double size_mm, bool turned) {
+Print tag_print(std::shared_ptr<apriltag_family_t> family, double size_mm, bool turned) {
   const int across = family->total_width;
   const double module_mm = size_mm / family->width_at_border, half = 0.5 * across * module_mm;
   const double rim = family->reversed_border ? 0 : module_mm;  // the picture has it, where the border is black
@@ -98,7 +99,7 @@ Print tag_print(apriltag_family_t *family, double size_mm, bool turned) {
       family->reversed_border ? "edge of the white square inside the black ring" : "edge of the black square";
   print.count = static_cast<int>(family->ncodes);
   print.draw = [=](Pdf &pdf, Pdf::Point c, int id) {
-    image_u8_t *image = apriltag_to_image(family, static_cast<uint32_t>(id));
+    image_u8_t *image = apriltag_to_image(family.get(), static_cast<uint32_t>(id));
     modules(pdf, {c.x_mm - half, c.y_mm - half}, module_mm, across, [=](int x, int y) {
       const int u = turned ? across - 1 - x : x, v = turned ? across - 1 - y : y;
       return image->buf[v * image->stride + u] < 128;
@@ -112,9 +113,9 @@ Print tag_print(apriltag_family_t *family, double size_mm, bool turned) {
 Print print_of(const MarkerSheet &sheet) {
   const double size_mm = 1000 * sheet.size_m;
   if (sheet.family == "mr") return mr_print(size_mm);
-  // The families live as long as the program.
-  if (sheet.family == "tag36h11") return tag_print(tag36h11_create(), size_mm, true);
-  if (sheet.family == "tagStandard41h12") return tag_print(tagStandard41h12_create(), size_mm, false);
+  if (sheet.family == "tag36h11") return tag_print({tag36h11_create(), tag36h11_destroy}, size_mm, true);
+  if (sheet.family == "tagStandard41h12")
+    return tag_print({tagStandard41h12_create(), tagStandard41h12_destroy}, size_mm, false);
   throw Failure("--family: '" + sheet.family + "' is none of mr, tag36h11, tagStandard41h12", kUsage);
 }
 

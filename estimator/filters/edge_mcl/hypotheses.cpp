@@ -62,7 +62,7 @@ void hypotheses::weigh(const edge_map &map, place_search *search, double own_pri
       h.pose = aligned;
       if (!map.drivable(aligned.x_m, aligned.y_m)) h.explained = 0.0;
     }
-    h.weighed = true;
+    h.weighed = 1;
   }
   double best = nats * kByChance;
   for (int i = 0; i < count_; i++) {

@@ -12,7 +12,7 @@ struct hypothesis {
   wm_pose2 pose;     // base_link in map now
   double explained;  // share of the last metres' points
   double share;      // of the probability
-  bool weighed;
+  int64_t weighed;   // 0: not yet. As wide as the rest: a copy has no bytes that nobody wrote
 };
 
 class hypotheses {

@@ -12,7 +12,7 @@ namespace wm {
 // A known point as it was seen, carried along by motion.
 struct point_clue {
   wm_time_ns t_ns;
-  int32_t id;
+  int64_t id;  // as wide as the rest: a copy has no bytes that nobody wrote
   vec3 seen;   // in the odometry's frame
   vec3 place;  // on the map
   double sigma_m;
