@@ -252,15 +252,8 @@ void edge_mcl::estimate(wm_estimate *out) const {
     const cloud_moments m = cloud_.moments_near(
         {cloud_.x(cloud_.best()), cloud_.y(cloud_.best()), cloud_.heading(cloud_.best())}, kCluster_m, kCluster_rad);
     const wm_pose2 pose = compose(m.mean, between(cloud_odom_, filter_.odom()));
-    out->pose_map_base.p_m[0] = pose.x_m;
-    out->pose_map_base.p_m[1] = pose.y_m;
-    const sin_cos half = sincos(0.5 * pose.heading_rad);
-    out->pose_map_base.q_xyzw[2] = half.sin;
-    out->pose_map_base.q_xyzw[3] = half.cos;
-    out->heading_rad = pose.heading_rad;
-    const int at[3] = {0, 1, 5};
-    for (int r = 0; r < 3; r++)
-      for (int c = 0; c < 3; c++) out->covariance[wm_cov_index(at[r], at[c])] = m.covariance[r][c];
+    put_planar_estimate(
+        pose, [&m](int r, int c) { return m.covariance[r][c]; }, out);
   }
   if (state_ != WM_STATE_SEARCHING) spread_over_hypotheses(out);
   if (fused_ns_ == WM_TIME_NONE) return;  // the pose is what was said, as sure as it was said
