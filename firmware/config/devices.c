@@ -164,7 +164,8 @@ static wm_status read_list(const wm_yaml_node *list, size_t max, const char *wha
 }
 
 wm_status config_read_devices(const wm_yaml_node *root, wm_config *out, wm_error *err) {
-  static const char *const kKeys[] = {"can", "cameras", NULL};
+  static const char *const kKeys[] = {"can", "cameras", "sightings", NULL};
+  static const char *const kSightings[] = {"none", "lcm", NULL};
   wm_yaml_node devices = wm_yaml_get(root, "devices"), can = wm_yaml_get(root, "devices.can"),
                cameras = wm_yaml_get(root, "devices.cameras");
   if (!wm_yaml_there(&devices)) return WM_OK;
@@ -172,5 +173,6 @@ wm_status config_read_devices(const wm_yaml_node *root, wm_config *out, wm_error
   if (status == WM_OK) status = read_list(&can, WM_CAN_DEVICES_MAX, "{interface: NAME, ...}", read_can, out, err);
   if (status == WM_OK)
     status = read_list(&cameras, WM_CAMERA_DEVICES_MAX, "{name: CAMERA, device: PATH, ...}", read_camera, out, err);
+  if (status == WM_OK) status = choice(&devices, "sightings", kSightings, &out->devices.sightings_by_lcm, err);
   return status;
 }

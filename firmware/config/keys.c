@@ -19,7 +19,8 @@ const config_key kConfigKeys[] = {
     {"dbc", "file", "the recording's", "DBC file to take instead of the recording's vehicle.dbc."},
     {"can_signals", "file", "the recording's", "can-signals.yaml to take instead of the recording's."},
     {"devices", "map", "none",
-     "The robot's own devices, for `waymark run` without a recording: `can`, `cameras`. See below."},
+     "The robot's own devices, for `waymark run` without a recording: `can`, `cameras` (see below), and "
+     "`sightings: lcm` where another program sends sightings of landmarks (docs/live.md)."},
     {"map", "file", "the recording's map/map.yaml", "Raster map (a map.yaml) to take instead of the recording's."},
     {"initial_pose", "map", "the recording's",
      "Start pose: `t_ns`, `x_m`, `y_m`, `z_m`, `heading_rad` or `heading_deg`, `qx`, `qy`, `qz`, `qw`, `sigma_xy_m`, "

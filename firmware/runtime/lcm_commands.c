@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lcm_commands.h"
 
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
-#include "lcm_way.h"
+#include "lcm_ear.h"
 #include "waymark/clock.h"
 #include "waymark/lcm_messages.h"
 
@@ -15,21 +15,17 @@
 
 typedef struct lcm_commands {
   wm_source base;
-  lcm_t *lcm, *lent;
-  char url[128], prefix[48];
-  wm_time_ns next_try_ns;
+  lcm_ear ear;
   wm_event waiting[WAITING_MAX];
   size_t waiting_count;
   uint32_t seq;
 } lcm_commands;
 
-static void refuse(lcm_commands *self, const char *channel, const char *why) {
-  self->base.counts.malformed++;
-  char *first = self->base.counts.first_problem;
-  if (!first[0]) (void)snprintf(first, sizeof self->base.counts.first_problem, "%s: %s", channel, why);
-}
-
-static void take(lcm_commands *self, wm_event *event) {
+static void take(lcm_commands *self, const char *channel, const char *why, wm_event *event) {
+  if (why) {
+    lcm_ear_refuse(&self->base.counts, channel, why);
+    return;
+  }
   if (self->waiting_count == WAITING_MAX) {
     self->base.counts.overflows++;
     return;
@@ -41,58 +37,27 @@ static void take(lcm_commands *self, wm_event *event) {
 
 static void on_set_pose(const lcm_recv_buf_t *message, const char *channel, void *context) {
   wm_event event;
-  const char *why = wm_lcm_read_set_pose(message->data, message->data_size, &event);
-  if (why) {
-    refuse(context, channel, why);
-  } else {
-    take(context, &event);
-  }
+  take(context, channel, wm_lcm_read_set_pose(message->data, message->data_size, &event), &event);
 }
 
 static void on_reset(const lcm_recv_buf_t *message, const char *channel, void *context) {
   wm_event event;
-  const char *why = wm_lcm_read_reset(message->data, message->data_size, &event);
-  if (why) {
-    refuse(context, channel, why);
-  } else {
-    take(context, &event);
-  }
+  take(context, channel, wm_lcm_read_reset(message->data, message->data_size, &event), &event);
 }
 
-static void subscribe(lcm_commands *self) {
-  char channel[64];
-  (void)snprintf(channel, sizeof channel, "%sSET_POSE", self->prefix);
-  (void)lcm_subscribe(self->lcm, channel, on_set_pose, self);
-  (void)snprintf(channel, sizeof channel, "%sRESET", self->prefix);
-  (void)lcm_subscribe(self->lcm, channel, on_reset, self);
+static lcm_commands *commands_of(lcm_ear *ear) {
+  return (lcm_commands *)(void *)((char *)ear - offsetof(lcm_commands, ear));
 }
 
-static void sleep_ms(int ms) {
-  struct timespec duration = {.tv_nsec = (long)ms * 1000000};
-  (void)nanosleep(&duration, NULL);
-}
-
-// The sink says where there is no way.
-static void try_open(lcm_commands *self) {
-  const char *why;
-  wm_time_ns now_ns = wm_monotonic_ns();
-  if (now_ns < self->next_try_ns) return;
-  self->next_try_ns = now_ns + LCM_TRY_AGAIN_NS;
-  self->lcm = lcm_way_open(self->url, &why);
-  if (self->lcm) subscribe(self);
+static void subscribe(lcm_ear *ear) {
+  lcm_ear_subscribe(ear, "SET_POSE", on_set_pose, commands_of(ear));
+  lcm_ear_subscribe(ear, "RESET", on_reset, commands_of(ear));
 }
 
 static wm_status next_command(wm_source *base, wm_event *out, wm_error *err) {
   (void)err;
   lcm_commands *self = (lcm_commands *)base;
-  if (self->waiting_count == 0) {
-    if (!self->lcm) try_open(self);
-    base->counts.device = self->lcm ? WM_DEVICE_WORKS : WM_DEVICE_ABSENT;  // the sink says why
-    if (!self->lcm || lcm_handle_timeout(self->lcm, WM_DEVICE_WAIT_MS) < 0) {
-      sleep_ms(WM_DEVICE_WAIT_MS);
-      return WM_AGAIN;
-    }
-  }
+  if (self->waiting_count == 0) lcm_ear_wait(&self->ear, &base->counts);
   if (self->waiting_count == 0) return WM_AGAIN;
   memcpy(out, &self->waiting[0], WM_EVENT_SMALL_BYTES);
   memmove(&self->waiting[0], &self->waiting[1], --self->waiting_count * sizeof self->waiting[0]);
@@ -104,7 +69,7 @@ static wm_status next_command(wm_source *base, wm_event *out, wm_error *err) {
 
 static void close_commands(wm_source *base) {
   lcm_commands *self = (lcm_commands *)base;
-  if (self->lcm && !self->lent) lcm_destroy(self->lcm);
+  lcm_ear_close(&self->ear);
   free(self);
 }
 
@@ -119,10 +84,7 @@ wm_status lcm_commands_open(const char *url, const char *channel_prefix, lcm_t *
   self->base.lateness_max_ms = LATENESS_MS;
   self->base.kinds = WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET);
   (void)snprintf(self->base.name, sizeof self->base.name, "commands");
-  (void)snprintf(self->url, sizeof self->url, "%s", lcm_way_url(url));
-  (void)snprintf(self->prefix, sizeof self->prefix, "%s", channel_prefix);
-  self->lcm = self->lent = lent;
-  if (lent) subscribe(self);
+  lcm_ear_open(&self->ear, url, channel_prefix, lent, subscribe);
   *out = &self->base;
   return WM_OK;
 }

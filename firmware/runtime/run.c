@@ -9,6 +9,7 @@
 #include <time.h>
 
 #include "lcm_commands.h"
+#include "lcm_sightings.h"
 #include "live.h"
 #include "threads.h"
 #include "waymark/saved_pose.h"
@@ -109,8 +110,23 @@ static wm_status add_commands(live *self, wm_recording *recording, wm_error *err
   return status == WM_OK ? wm_recording_add_device(recording, commands, 0, err) : status;
 }
 
+// So are sightings that another program sends.
+static wm_status add_sightings(live *self, wm_recording *recording, wm_error *err) {
+  if (!wm_recording_is_robot(recording) || !self->config->devices.sightings_by_lcm) return WM_OK;
+  size_t count;
+  const wm_sensor *sensors = wm_recording_sensors(recording, &count);
+  if (count == 0)
+    return wm_fail(err, WM_BAD_CONFIG, "%s: devices.sightings: calibration.yaml has no `sensors` that could see them",
+                   self->config->path);
+  wm_source *source;
+  wm_status status =
+      lcm_sightings_open(self->config->lcm_url, self->config->channel_prefix, sensors, count, NULL, &source, err);
+  return status == WM_OK ? wm_recording_add_device(recording, source, 0, err) : status;
+}
+
 static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
-  wm_status status = add_commands(self, recording, err);
+  wm_status status = add_sightings(self, recording, err);
+  if (status == WM_OK) status = add_commands(self, recording, err);
   if (status == WM_OK) status = wm_assemble(self->config, recording, self->options->seed, &self->assembly, err);
   if (status == WM_OK && self->options->start) {
     self->assembly.setup.start = *self->options->start;

@@ -4,7 +4,7 @@
 real (emulated) CAN controller, under qemu's instruction clock, fed from a recording at its own times.
 
 usage: hil.py WORK WAYMARK WAYMARK_SIMULATE [PART ...]   (WORK keeps the guest's image from run to run; parts: can, camera,
-edges; all of them where none is named)
+libcamera, landmarks, edges; all of them where none is named)
 
 Judged on the host: the guest's own checks; the log of its run gives its poses bit by bit; its poses are those of a replay
 of the same frames."""
@@ -16,6 +16,8 @@ import subprocess
 import sys
 
 import edges
+import landmarks
+import vimc
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -140,7 +142,23 @@ def scenario_edges(work, simulate):
 
 
 def judge_edges(work, waymark):
-    return edges.judge(work, waymark, ROOT, work / "edges-recording")
+    return edges.judge(work, waymark, ROOT)
+
+
+def scenario_landmarks(work, simulate):
+    landmarks.prepare(work, ROOT, HERE, simulate)
+
+
+def judge_landmarks(work, waymark):
+    return landmarks.judge(work, waymark, ROOT)
+
+
+def scenario_libcamera(work, _):
+    vimc.prepare(work)
+
+
+def judge_libcamera(work, _):
+    return vimc.judge(work)
 
 
 def main():
@@ -157,8 +175,13 @@ def main():
     failures = []
     for name, prepare, judge, devices, clock in (("can", scenario_can, judge_can, CAN, SLOW),
                                                  ("camera", scenario_camera, judge_camera, [], SLOW),
+                                                 ("libcamera", scenario_libcamera, judge_libcamera, [], SLOW),
+                                                 ("landmarks", scenario_landmarks, judge_landmarks, CAN, FAST),
                                                  ("edges", scenario_edges, judge_edges, CAN, FAST)):
         if only and name not in only:
+            continue
+        if name == "libcamera" and b"libcamera.so" not in waymark.read_bytes():
+            print("libcamera: waymark is built without it: skipped")
             continue
         prepare(work, simulate)
         good = boot(work, f"{name}.sh", *devices, clock=clock)

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// play TIMELINE PICTURES CAN DEVICE WIDTH HEIGHT DELAY: a recording's CAN frames and pictures, each at its own time, by
-// one clock, which neither canplayer nor a camera's steady rate can do. A line of TIMELINE is
-// "NANOSECONDS c ID HEXDATA" or "NANOSECONDS p OFFSET BYTES" (of PICTURES, an MJPEG picture), rising. The formats are
-// set at once; the first line is due after DELAY seconds. Says at the end how late it was at most.
+// play TIMELINE PICTURES CAN DEVICE WIDTH HEIGHT DELAY: a recording's CAN frames, pictures and sightings, each at its
+// own time, by one clock, which neither canplayer nor a camera's steady rate can do. A line of TIMELINE is "NANOSECONDS
+// c ID HEXDATA", "NANOSECONDS p OFFSET BYTES" (of PICTURES, an MJPEG picture) or "NANOSECONDS l STAMP OFFSET BYTES" (of
+// PICTURES, an observations_t for LCM, which is stamped anew), rising. The formats are set at once (DEVICE "-": there
+// are no pictures); the first line is due after DELAY seconds. Says at the end how late it was at most.
+#include <arpa/inet.h>
 #include <fcntl.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>
 #include <linux/videodev2.h>
 #include <net/if.h>
+#include <netinet/in.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -21,6 +24,7 @@ typedef struct item {
   char kind;
   struct can_frame frame;
   size_t offset, bytes;
+  long long stamp_ns;
 } item;
 
 static char *read_file(const char *path, size_t *length) {
@@ -41,6 +45,7 @@ static int parse(const char *line, item *out) {
   unsigned id = 0;
   memset(out, 0, sizeof *out);
   if (sscanf(line, "%lld %c%n", &out->t_ns, &out->kind, &used) != 2) return 0;
+  if (out->kind == 'l') return sscanf(line + used, "%lld %zu %zu", &out->stamp_ns, &out->offset, &out->bytes) == 3;
   if (out->kind == 'p') return sscanf(line + used, "%zu %zu", &out->offset, &out->bytes) == 2;
   if (sscanf(line + used, "%x %16s", &id, data) < 1) return 0;
   out->frame.can_id = id;
@@ -72,6 +77,24 @@ static int open_video(const char *device, unsigned width, unsigned height) {
   return ioctl(fd, VIDIOC_S_FMT, &f) == 0 ? fd : -1;
 }
 
+// One datagram. Source: LCM's protocol, "LC02", sequence number, channel, message; a message is its type's fingerprint
+// and, here, a stamp, in network order.
+static int say_sighting(int fd, char *message, size_t bytes, long long stamp_ns) {
+  static unsigned sequence;
+  static char packet[4096];
+  static const char kChannel[] = "WAYMARK_SIGHTINGS";
+  const struct sockaddr_in to = {
+      .sin_family = AF_INET, .sin_port = htons(7667), .sin_addr.s_addr = inet_addr("239.255.76.67")};
+  unsigned head[2] = {htonl(0x4c433032), htonl(sequence++)};
+  size_t length = sizeof head + sizeof kChannel + bytes;
+  if (bytes < 16 || length > sizeof packet) return 0;
+  for (int i = 0; i < 8; i++) message[8 + i] = (char)(stamp_ns >> (56 - 8 * i));
+  memcpy(packet, head, sizeof head);
+  memcpy(packet + sizeof head, kChannel, sizeof kChannel);
+  memcpy(packet + sizeof head + sizeof kChannel, message, bytes);
+  return sendto(fd, packet, length, 0, (const struct sockaddr *)&to, sizeof to) == (ssize_t)length;
+}
+
 static long long now_ns(void) {
   struct timespec t;
   clock_gettime(CLOCK_MONOTONIC, &t);
@@ -83,8 +106,10 @@ int main(int argc, char **argv) {
   size_t text_length = 0, pictures_length = 0, count = 0;
   char *text = read_file(argv[1], &text_length), *pictures = read_file(argv[2], &pictures_length);
   item *items = calloc(text_length / 4 + 1, sizeof *items);
-  int can = open_can(argv[3]), video = open_video(argv[4], (unsigned)atoi(argv[5]), (unsigned)atoi(argv[6]));
-  if (!text || !pictures || !items || can < 0 || video < 0) {
+  int can = open_can(argv[3]),
+      video = !strcmp(argv[4], "-") ? -2 : open_video(argv[4], (unsigned)atoi(argv[5]), (unsigned)atoi(argv[6])),
+      lcm = socket(AF_INET, SOCK_DGRAM, 0);
+  if (!text || !pictures || !items || can < 0 || video == -1 || lcm < 0) {
     perror("play");
     return 1;
   }
@@ -100,6 +125,8 @@ int main(int argc, char **argv) {
     if (it->kind == 'c') failed += write(can, &it->frame, sizeof it->frame) != sizeof it->frame;
     if (it->kind == 'p' && it->offset + it->bytes <= pictures_length)
       failed += write(video, pictures + it->offset, it->bytes) != (ssize_t)it->bytes;
+    if (it->kind == 'l' && it->offset + it->bytes <= pictures_length)
+      failed += !say_sighting(lcm, pictures + it->offset, it->bytes, begin_ns + it->stamp_ns - items[0].t_ns);
   }
   printf("played %zu, %lld not written, %.3f ms late at most\n", count, failed, (double)worst_ns * 1e-6);
   return failed != 0;

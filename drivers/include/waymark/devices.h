@@ -103,6 +103,7 @@ typedef struct wm_devices_config {
   size_t can_count;
   wm_camera_device_config cameras[WM_CAMERA_DEVICES_MAX];
   size_t camera_count;
+  int32_t sightings_by_lcm;  // another program on the robot sends them
 } wm_devices_config;
 
 // A SocketCAN interface: quantities as its DBC and binding say, filtered by the kernel to the ids that are needed.

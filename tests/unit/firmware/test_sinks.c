@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "lcm_commands.h"
+#include "lcm_sightings.h"
 #include "lcm_sink.h"
 #include "log_fixture.h"
 #include "notify.h"
@@ -272,6 +273,69 @@ static void nonsense_that_is_told_is_refused(void) {
   lcm_destroy(lcm);
 }
 
+static const wm_sensor kEyes[] = {{.name = "left"}, {.name = "right"}};
+
+static void sightings_of_another_program_become_events(void) {
+  wm_source *source;
+  wm_event event;
+  wm_error err;
+  uint8_t bytes[4096];
+  wm_event seen[2] = {{.t_ns = 77}, {.t_ns = 77}};
+  seen[0].as.sighting = (wm_sighting){.landmark_id = 3, .bearing_rad = 3.5, .range_m = NAN};
+  seen[1].as.sighting = (wm_sighting){.landmark_id = -1, .bearing_rad = NAN, .range_m = 4};
+  lcm_t *lcm = lcm_create("memq://");
+  TEST_ASSERT_EQUAL(WM_OK, lcm_sightings_open("memq://", "T_", kEyes, 2, lcm, &source, &err));
+  size_t length = wm_lcm_observations("right", seen, 2, bytes, sizeof bytes);
+  lcm_publish(lcm, "T_SIGHTINGS", bytes, (unsigned)length);
+  for (uint32_t i = 0; i < 2; i++) {
+    TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
+    TEST_ASSERT_EQUAL(WM_EVENT_SIGHTING, event.kind);
+    TEST_ASSERT_EQUAL_INT64(77, event.t_ns);
+    TEST_ASSERT_TRUE(event.arrival_ns > 77 && event.arrival_ns <= wm_monotonic_ns());
+    TEST_ASSERT_EQUAL_UINT32(i, event.seq);
+    TEST_ASSERT_EQUAL_UINT16(1, event.as.sighting.sensor);
+    TEST_ASSERT_EQUAL_INT32(seen[i].as.sighting.landmark_id, event.as.sighting.landmark_id);
+    if (i == 0) TEST_ASSERT_EQUAL_DOUBLE(3.5 - 2 * M_PI, event.as.sighting.bearing_rad);
+    if (i == 1) TEST_ASSERT_EQUAL_DOUBLE(4, event.as.sighting.range_m);
+    TEST_ASSERT_TRUE(isnan(event.as.sighting.bearing_sigma_rad) && isnan(event.as.sighting.range_sigma_m));
+  }
+  TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
+  TEST_ASSERT_EQUAL_UINT64(2, source->counts.received);
+  source->ops->close(source);
+  lcm_destroy(lcm);
+}
+
+static void sightings_that_cannot_be_are_refused(void) {
+  const struct {
+    const char *sensor, *why;
+    wm_event event;
+  } wrong[] = {
+      {"nose", "'nose' is no sensor", {.t_ns = 1, .as.sighting = {.bearing_rad = 1, .range_m = 1}}},
+      {"left", "t_ns is not above 0", {.t_ns = 0, .as.sighting = {.bearing_rad = 1, .range_m = 1}}},
+      {"left", "one of bearing_rad and range_m", {.t_ns = 1, .as.sighting = {.bearing_rad = NAN, .range_m = NAN}}},
+      {"left", "more than a turn", {.t_ns = 1, .as.sighting = {.bearing_rad = INFINITY, .range_m = 1}}},
+      {"left", "range_m has to be", {.t_ns = 1, .as.sighting = {.bearing_rad = 1, .range_m = -1}}},
+      {"left", "below -1", {.t_ns = 1, .as.sighting = {.landmark_id = -2, .bearing_rad = 1, .range_m = 1}}},
+  };
+  for (size_t i = 0; i <= sizeof wrong / sizeof wrong[0]; i++) {
+    wm_source *source;
+    wm_event event;
+    wm_error err;
+    uint8_t bytes[4096] = "rubbish";
+    int is_rubbish = i == sizeof wrong / sizeof wrong[0];
+    lcm_t *lcm = lcm_create("memq://");
+    TEST_ASSERT_EQUAL(WM_OK, lcm_sightings_open("memq://", "T_", kEyes, 2, lcm, &source, &err));
+    size_t length = is_rubbish ? 7 : wm_lcm_observations(wrong[i].sensor, &wrong[i].event, 1, bytes, sizeof bytes);
+    lcm_publish(lcm, "T_SIGHTINGS", bytes, (unsigned)length);
+    TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
+    TEST_ASSERT_EQUAL_UINT64(1, source->counts.malformed);
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source->counts.first_problem, is_rubbish ? "observations_t" : wrong[i].why),
+                                 source->counts.first_problem);
+    source->ops->close(source);
+    lcm_destroy(lcm);
+  }
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(messages_arrive_over_memq);
@@ -282,5 +346,7 @@ int main(void) {
   RUN_TEST(without_a_service_manager_nothing_happens);
   RUN_TEST(poses_and_resets_that_are_told_become_events);
   RUN_TEST(nonsense_that_is_told_is_refused);
+  RUN_TEST(sightings_of_another_program_become_events);
+  RUN_TEST(sightings_that_cannot_be_are_refused);
   return UNITY_END();
 }
