@@ -26,7 +26,8 @@ class Drive {
   static wm_status plan(const Route &route, Drive &out, wm_error *err);
 
   double duration_s() const { return duration_s_; }
-  double length_m() const { return length_m_; }  // driven, forwards and backwards
+  double whole_s() const { return planned_s_ - carry_forward_s_; }  // as planned, whether it was cut or not
+  double length_m() const { return length_m_; }                     // driven, forwards and backwards
   // Ends the drive there, where it is longer.
   void cut(double duration_s);
   // At `at_s` the vehicle is put where it would be `forward_s` later, and drives on from there. WM_BAD_CONFIG when the

@@ -28,8 +28,8 @@ wm_status beside_the_way(const Scenario &sc, const Recording &r, std::vector<wm_
   const Random random(r.seed);
   const bool turned = std::any_of(sc.sensors.begin(), sc.sensors.end(),
                                   [](const Sensor &sensor) { return sensor.kind == Sensor::Kind::markers; });
-  std::vector<State> way;
-  for (double t_s = 0; t_s <= r.duration_s; t_s += 0.25)
+  std::vector<State> way;  // all of it: a recording that ends early is of the same world
+  for (double t_s = 0; t_s <= r.drive.whole_s(); t_s += 0.25)
     if (const State at = r.drive.at(t_s); way.empty() || std::fabs(at.way_m - way.back().way_m) > 0.05)
       way.push_back(at);
   const auto near = [](double x, double y, const auto &q, double distance) {

@@ -285,6 +285,18 @@ void refuse(const char *extra, const char *wanted) {
   TEST_ASSERT_EQUAL_STRING(wanted, err.text);
 }
 
+void test_a_recording_that_ends_early_is_of_the_same_world() {
+  load("loops-markers");
+  make(5);
+  const std::vector<wm_landmark> whole = made.landmarks;
+  scenario.duration_s = 2;
+  make(5);
+  TEST_ASSERT_EQUAL(2, static_cast<int>(std::lround(made.duration_s)));
+  TEST_ASSERT_EQUAL(whole.size(), made.landmarks.size());
+  for (size_t i = 0; i < whole.size(); i++)
+    TEST_ASSERT_EQUAL_MEMORY(whole[i].p_m, made.landmarks[i].p_m, sizeof whole[i].p_m);
+}
+
 void test_mistakes_are_told() {
   refuse("{kind: landmarks}",
          "x.yaml:6: sensors[0]: bearing_sigma_deg, range_sigma_m or both say what this sensor measures");
@@ -313,6 +325,7 @@ int main() {
   RUN_TEST(test_gnss_wanders_and_jumps);
   RUN_TEST(test_perfect_is_perfect);
   RUN_TEST(test_a_landmark_less_changes_nothing_of_the_others);
+  RUN_TEST(test_a_recording_that_ends_early_is_of_the_same_world);
   RUN_TEST(test_mistakes_are_told);
   return UNITY_END();
 }
