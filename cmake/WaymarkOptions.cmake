@@ -2,6 +2,7 @@
 # Rules that hold for all of our code.
 option(WM_TESTS "Build the tests" ON)
 option(WM_FUZZ "Build the fuzz targets (clang)" OFF)
+option(WM_RENDER "Build what renders pictures of worlds (with Embree): waymark-simulate, its tests and benchmarks" ON)
 set(WM_SANITIZE "" CACHE STRING "Sanitizers, as for -fsanitize=")
 
 set(WM_WARNINGS -Wall -Wextra -Wshadow
@@ -49,6 +50,16 @@ endfunction()
 # What runs under the thread sanitizer: the tests with the label "threads".
 add_custom_target(wm_thread_tests)
 
+# Seconds in `variable`: as told, or the usual; ten times that where tests run in an emulator.
+macro(wm_timeout variable usual)
+  if(NOT ${variable})
+    set(${variable} ${usual})
+  endif()
+  if(CMAKE_CROSSCOMPILING)
+    math(EXPR ${variable} "${${variable}} * 10")
+  endif()
+endmacro()
+
 # wm_test(NAME SOURCES x.c USES lib ... [LABELS slow] [TIMEOUT s]): a Unity test program, run by ctest.
 # Label "slow" keeps it out of `./dev test` and in `./dev test --all`. A test gets the repository's root in WM_SOURCE_DIR and the
 # folder of the optional recordings in WM_DATA_DIR.
@@ -58,9 +69,7 @@ function(wm_test name)
   target_link_libraries(${name} PRIVATE ${A_USES} wm_unity wm_rules m)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
   add_test(NAME ${name} COMMAND ${name} ${A_ARGS} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
-  if(NOT A_TIMEOUT)
-    set(A_TIMEOUT 120)
-  endif()
+  wm_timeout(A_TIMEOUT 120)
   if("threads" IN_LIST A_LABELS)
     add_dependencies(wm_thread_tests ${name})
   endif()
@@ -72,9 +81,7 @@ endfunction()
 function(wm_script_test name)
   cmake_parse_arguments(A "" "TIMEOUT" "COMMAND;LABELS" ${ARGN})
   add_test(NAME ${name} COMMAND ${A_COMMAND} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
-  if(NOT A_TIMEOUT)
-    set(A_TIMEOUT 300)
-  endif()
+  wm_timeout(A_TIMEOUT 300)
   set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}" SKIP_RETURN_CODE 77
     ENVIRONMENT "WM_SOURCE_DIR=${CMAKE_SOURCE_DIR};WM_BIN_DIR=${CMAKE_BINARY_DIR}/bin;WM_DATA_DIR=${CMAKE_SOURCE_DIR}/../shared/data")
 endfunction()

@@ -7,6 +7,7 @@
 #include "vision/edges/rays.hpp"
 #include "vision/edges/support.hpp"
 #include "vision/edges/windows.hpp"
+#include "vision/parts.hpp"
 #include "vision/registry.h"
 
 namespace wm {
@@ -31,54 +32,32 @@ struct edges_state {
 
 constexpr int32_t kPiecesMax = 512;  // lines of windows that are joined; those of more windows are not looked for
 
-constexpr size_t kAlign = 64;
-size_t rounded(size_t bytes) { return (bytes + kAlign - 1) / kAlign * kAlign; }
-
-const wm_camera *camera_of(const wm_view *view, const char **why) {
-  *why = nullptr;
-  const int32_t index = view->cameras[0];
-  if (!view->rig || index < 0 || index >= static_cast<int32_t>(view->rig->camera_count)) {
-    *why = "there is no such camera";
-    return nullptr;
-  }
-  return &view->rig->cameras[index];
-}
-
 // Puts the state's parts one behind the other; returns the bytes of all.
 size_t lay_out(edges_state *state, uint32_t rays, uint32_t samples, const bird_view &bird) {
-  size_t used = rounded(sizeof *state);
-  const auto take = [&](size_t bytes) {
-    const size_t at = used;
-    used += rounded(bytes);
-    return at;
-  };
-  auto *base = reinterpret_cast<uint8_t *>(state);
-  const size_t at_rays = take(rays * sizeof(ray)), at_samples = take(samples * sizeof(ray_sample)),
-               at_ranges = take(samples * sizeof(float));
+  parts memory(state, sizeof *state);
+  ray_fan fan{};
+  fan.rays = memory.take<ray>(rays);
+  fan.samples = memory.take<ray_sample>(samples);
+  fan.range_m = memory.take<float>(samples);
   const size_t area = static_cast<size_t>(bird.width) * static_cast<size_t>(bird.height);
-  const size_t at_table = take(area * sizeof(bird_pixel)), at_grey = take(area), at_edge = take(area),
-               at_inner = take(area), at_whole = take(static_cast<size_t>(bird.windows)),
-               at_hough = take(sizeof(hough_work));
+  bird_view view = bird;
+  view.table = memory.take<bird_pixel>(area);
+  view.grey = memory.take<uint8_t>(area);
+  view.edge = memory.take<uint8_t>(area);
+  view.inner = memory.take<uint8_t>(area);
+  view.whole = memory.take<uint8_t>(static_cast<size_t>(bird.windows));
+  view.hough = memory.take<hough_work>(1);
   const int32_t pieces = bird.windows < kPiecesMax ? bird.windows : kPiecesMax;
-  const size_t at_graph = take(piece_graph_bytes(pieces)),
-               at_pieces = take(static_cast<size_t>(pieces) * sizeof(line_piece)),
-               at_vertices = take(2 * static_cast<size_t>(pieces) * sizeof(line_vertex));
-  if (base) {
-    state->bird = bird;
-    state->bird.table = reinterpret_cast<bird_pixel *>(base + at_table);
-    state->bird.grey = base + at_grey;
-    state->bird.edge = base + at_edge;
-    state->bird.inner = base + at_inner;
-    state->bird.whole = base + at_whole;
-    state->bird.hough = reinterpret_cast<hough_work *>(base + at_hough);
-    piece_graph_place(&state->graph, pieces, base + at_graph);
-    state->pieces = reinterpret_cast<line_piece *>(base + at_pieces);
-    state->vertices = reinterpret_cast<line_vertex *>(base + at_vertices);
-    state->fan.rays = reinterpret_cast<ray *>(base + at_rays);
-    state->fan.samples = reinterpret_cast<ray_sample *>(base + at_samples);
-    state->fan.range_m = reinterpret_cast<float *>(base + at_ranges);
-  }
-  return used;
+  uint8_t *graph = memory.take<uint8_t>(piece_graph_bytes(pieces));
+  line_piece *lines = memory.take<line_piece>(static_cast<size_t>(pieces));
+  line_vertex *vertices = memory.take<line_vertex>(2 * static_cast<size_t>(pieces));
+  if (!state) return memory.bytes();
+  state->fan = fan;
+  state->bird = view;
+  piece_graph_place(&state->graph, pieces, graph);
+  state->pieces = lines;
+  state->vertices = vertices;
+  return memory.bytes();
 }
 
 // The bird's-eye view, empty where it isn't used; why it can't be, or NULL.
@@ -92,7 +71,7 @@ const char *view_of(const wm_edges_params &params, bird_view *out) {
 }
 
 size_t state_bytes(const void *params, const wm_view *view, const char **why) {
-  const wm_camera *camera = camera_of(view, why);
+  const wm_camera *camera = first_camera(view, why);
   if (!camera) return 0;
   mounted_camera mounted;
   *why = mounted_camera_init(&mounted, *camera);
@@ -110,7 +89,7 @@ size_t state_bytes(const void *params, const wm_view *view, const char **why) {
 
 wm_status init(void *memory, const void *params, const wm_view *view) {
   const char *why;
-  const wm_camera *camera = camera_of(view, &why);
+  const wm_camera *camera = first_camera(view, &why);
   if (!camera) return WM_BAD_CONFIG;
   auto *state = static_cast<edges_state *>(memory);
   std::memset(static_cast<void *>(state), 0, sizeof *state);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "vision/lines/line_tracks.hpp"
+#include "vision/parts.hpp"
 #include "vision/registry.h"
 
 namespace wm {
@@ -25,41 +26,21 @@ struct lines_state {
   radial_edge edges[kRadialEdgesMax];
 };
 
-constexpr size_t kAlign = 64;
 constexpr double kSteep = 0.7071;         // as in the filters' sensor model
 constexpr double kZenithWalk_rad = 2e-5;  // a picture: a robot on its springs
 constexpr int kLeanSeen = 3;              // only lines that were followed tell of the zenith
-size_t rounded(size_t bytes) { return (bytes + kAlign - 1) / kAlign * kAlign; }
-
-const wm_camera *camera_of(const wm_view *view, const char **why) {
-  *why = nullptr;
-  const int32_t index = view->cameras[0];
-  if (!view->rig || index < 0 || index >= static_cast<int32_t>(view->rig->camera_count)) {
-    *why = "there is no such camera";
-    return nullptr;
-  }
-  return &view->rig->cameras[index];
-}
 
 // Puts the state's parts one behind the other; returns the bytes of all.
 size_t lay_out(lines_state *state, const polar_view &polar) {
-  size_t used = rounded(sizeof(lines_state));
-  auto *base = reinterpret_cast<uint8_t *>(state);
-  const auto take = [&](size_t bytes) {
-    uint8_t *at = base ? base + used : nullptr;
-    used += rounded(bytes);
-    return at;
-  };
+  parts memory(state, sizeof *state);
   const size_t columns = static_cast<size_t>(polar.columns), rows = static_cast<size_t>(polar.rows);
-  uint8_t *row = take(rows * sizeof(polar_row)), *table = take(rows * columns * sizeof(polar_sample)),
-          *grey = take(rows * static_cast<size_t>(polar.stride()) * sizeof(int16_t)),
-          *work = take(kVoteArrays * columns * sizeof(int16_t));
-  if (!base) return used;
-  state->polar = polar;
-  state->polar.row = reinterpret_cast<polar_row *>(row);
-  state->polar.table = reinterpret_cast<polar_sample *>(table);
-  state->polar.grey = reinterpret_cast<int16_t *>(grey);
-  auto *next = reinterpret_cast<int16_t *>(work);
+  polar_view view = polar;
+  view.row = memory.take<polar_row>(rows);
+  view.table = memory.take<polar_sample>(rows * columns);
+  view.grey = memory.take<int16_t>(rows * static_cast<size_t>(polar.stride()));
+  auto *next = memory.take<int16_t>(kVoteArrays * columns);
+  if (!state) return memory.bytes();
+  state->polar = view;
   const auto give = [&] {
     int16_t *at = next;
     next += columns;
@@ -68,11 +49,11 @@ size_t lay_out(lines_state *state, const polar_view &polar) {
   state->work.slope = give();
   for (vote_side *side : {&state->work.rise, &state->work.fall})
     *side = {{give(), give(), give()}, {give(), give(), give()}};
-  return used;
+  return memory.bytes();
 }
 
 size_t state_bytes(const void *params, const wm_view *view, const char **why) {
-  const wm_camera *camera = camera_of(view, why);
+  const wm_camera *camera = first_camera(view, why);
   if (!camera) return 0;
   mounted_camera mounted;
   polar_view polar;
@@ -83,7 +64,7 @@ size_t state_bytes(const void *params, const wm_view *view, const char **why) {
 
 wm_status init(void *memory, const void *params, const wm_view *view) {
   const char *why;
-  const wm_camera *camera = camera_of(view, &why);
+  const wm_camera *camera = first_camera(view, &why);
   if (!camera) return WM_BAD_CONFIG;
   auto *state = static_cast<lines_state *>(memory);
   std::memset(static_cast<void *>(state), 0, sizeof *state);

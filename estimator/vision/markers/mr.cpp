@@ -7,6 +7,7 @@
 #include "vision/markers/mr_read.hpp"
 #include "vision/markers/params.h"
 #include "vision/markers/polygon.hpp"
+#include "vision/parts.hpp"
 #include "vision/registry.h"
 #include "waymark/marker_fit.h"
 
@@ -28,26 +29,18 @@ struct mr_state {
   wm_marker_fit *fit;
 };
 
-size_t rounded(size_t bytes) { return (bytes + 63) / 64 * 64; }
-
 // Puts the state's parts one behind the other; returns the bytes of all.
 size_t lay_out(mr_state *state, uint32_t width, uint32_t height) {
-  size_t used = rounded(sizeof(mr_state));
-  auto *base = reinterpret_cast<uint8_t *>(state);
-  const auto take = [&](size_t bytes) {
-    uint8_t *at = base ? base + used : nullptr;
-    used += rounded(bytes);
-    return at;
-  };
+  parts memory(state, sizeof *state);
   dark_work work;
-  uint8_t *fit = take(wm_marker_fit_bytes());
-  uint8_t *dark = take(dark_work_lay_out(&work, width, height, nullptr));
-  uint8_t *border = take(static_cast<size_t>(work.border_max) * sizeof(flat));
-  if (!base) return used;
+  uint8_t *fit = memory.take<uint8_t>(wm_marker_fit_bytes());
+  uint8_t *dark = memory.take<uint8_t>(dark_work_lay_out(&work, width, height, nullptr));
+  flat *border = memory.take<flat>(static_cast<size_t>(work.border_max));
+  if (!state) return memory.bytes();
   dark_work_lay_out(&state->dark, width, height, dark);
   state->fit = reinterpret_cast<wm_marker_fit *>(fit);
-  state->border = reinterpret_cast<flat *>(border);
-  return used;
+  state->border = border;
+  return memory.bytes();
 }
 
 wm_marker_print print_of(const wm_mr_params &params, const wm_rig &rig) {
@@ -60,16 +53,9 @@ wm_marker_print print_of(const wm_mr_params &params, const wm_rig &rig) {
   return print;
 }
 
-const wm_camera *camera_of(const wm_view *view) {
-  const int32_t index = view->cameras[0];
-  if (!view->rig || index < 0 || index >= static_cast<int32_t>(view->rig->camera_count)) return nullptr;
-  return &view->rig->cameras[index];
-}
-
 size_t state_bytes(const void *params, const wm_view *view, const char **why) {
   const auto *p = static_cast<const wm_mr_params *>(params);
-  const wm_camera *camera = camera_of(view);
-  *why = "there is no such camera";
+  const wm_camera *camera = first_camera(view, why);
   if (!camera) return 0;
   lens optics;
   *why = lens_init(&optics, *camera);
@@ -86,7 +72,8 @@ size_t state_bytes(const void *params, const wm_view *view, const char **why) {
 }
 
 wm_status init(void *memory, const void *params, const wm_view *view) {
-  const wm_camera *camera = camera_of(view);
+  const char *why;
+  const wm_camera *camera = first_camera(view, &why);
   if (!camera) return WM_BAD_CONFIG;
   auto *state = static_cast<mr_state *>(memory);
   std::memset(static_cast<void *>(state), 0, sizeof *state);

@@ -2,6 +2,7 @@
 // Detector `stereo`: points of the world that both cameras of a pair see, followed from picture to picture.
 #include <cstring>
 
+#include "vision/parts.hpp"
 #include "vision/registry.h"
 #include "vision/stereo/corners.hpp"
 #include "vision/stereo/rectify.hpp"
@@ -37,9 +38,6 @@ struct stereo_state {
   bool was_said[STEREO_TRACKS_MAX];
 };
 
-constexpr size_t kAlign = 64;
-size_t rounded(size_t bytes) { return (bytes + kAlign - 1) / kAlign * kAlign; }
-
 const char *cameras_of(const wm_view *view, rectification out[2]) {
   if (!view->rig) return "there is no calibration";
   for (int i = 0; i < 2; i++)
@@ -65,35 +63,30 @@ size_t lay_out(stereo_state *state, const rectification cameras[2], const wm_ste
   const int32_t width = cameras[0].width, height = cameras[0].height, cell = params.cell_px / 2;
   const int32_t cells = cells_across(width / 2, cell) * cells_across(height / 2, cell);
   const size_t area = static_cast<size_t>(width) * static_cast<size_t>(height);
-  size_t used = rounded(sizeof *state);
-  auto *base = reinterpret_cast<uint8_t *>(state);
-  const auto take = [&](size_t bytes) {
-    const size_t at = used;
-    used += rounded(bytes);
-    return at;
-  };
-  size_t at_picture[3], at_table[2];
-  for (size_t &at : at_picture) at = take(pyramid_bytes(width, height));
-  for (int i = 0; i < 2; i++) at_table[i] = take(cameras[i].as_it_is ? 0 : area * sizeof(raw_pixel));
-  const size_t at_row = take(static_cast<size_t>(width) * sizeof(uint16_t)), at_work = take(corners_bytes(width / 2)),
-               at_taken = take(static_cast<size_t>(cells)),
-               at_corners = take(static_cast<size_t>(cells) * sizeof(corner)),
-               at_tracks = take(static_cast<size_t>(params.tracks) * sizeof(track));
-  if (base) {
-    for (int i = 0; i < 3; i++) pyramid_lay(&state->pictures[i], width, height, base + at_picture[i]);
-    for (int i = 0; i < 2; i++) {
-      state->cameras[i] = cameras[i];
-      state->cameras[i].table = reinterpret_cast<raw_pixel *>(base + at_table[i]);
-    }
-    state->row = reinterpret_cast<uint16_t *>(base + at_row);
-    state->corner_work = base + at_work;
-    state->taken = base + at_taken;
-    state->corners = reinterpret_cast<corner *>(base + at_corners);
-    state->tracks = reinterpret_cast<track *>(base + at_tracks);
-    state->cell = cell;
-    state->cell_count = cells;
+  parts memory(state, sizeof *state);
+  uint8_t *pictures[3];
+  for (uint8_t *&picture : pictures) picture = memory.take<uint8_t>(pyramid_bytes(width, height));
+  raw_pixel *tables[2];
+  for (int i = 0; i < 2; i++) tables[i] = memory.take<raw_pixel>(cameras[i].as_it_is ? 0 : area);
+  auto *row = memory.take<uint16_t>(static_cast<size_t>(width));
+  auto *work = memory.take<uint8_t>(corners_bytes(width / 2)),
+       *taken = memory.take<uint8_t>(static_cast<size_t>(cells));
+  auto *corners = memory.take<corner>(static_cast<size_t>(cells));
+  auto *tracks = memory.take<track>(static_cast<size_t>(params.tracks));
+  if (!state) return memory.bytes();
+  for (int i = 0; i < 3; i++) pyramid_lay(&state->pictures[i], width, height, pictures[i]);
+  for (int i = 0; i < 2; i++) {
+    state->cameras[i] = cameras[i];
+    state->cameras[i].table = tables[i];
   }
-  return used;
+  state->row = row;
+  state->corner_work = work;
+  state->taken = taken;
+  state->corners = corners;
+  state->tracks = tracks;
+  state->cell = cell;
+  state->cell_count = cells;
+  return memory.bytes();
 }
 
 size_t state_bytes(const void *params, const wm_view *view, const char **why) {

@@ -1,0 +1,106 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# The headers and libraries of another architecture's Debian, unpacked into .cache/sysroot/ARCH: what the toolchain files
+# compile against and what qemu-user runs with. Packages come from this machine's own Debian sources by an apt with its
+# own state beside the sysroot: the host's package state is neither read nor written, and root is not needed.
+# Run again after a failure: what was fetched stays. A sysroot that is complete and asked for nothing new is left alone.
+set -euo pipefail
+
+arch=${1:-}
+case "$arch" in
+  arm64 | armhf) ;;
+  *) echo "usage: ./dev sysroot arm64|armhf" >&2; exit 2 ;;
+esac
+cd "$(dirname "$(readlink -f "$0")")/.."
+
+# What a board's build includes and links. Embree is the desk's (pictures of the simulator); libcamera is the board's own
+# (its version differs on each vendor's image).
+packages=(libc6-dev libstdc++-12-dev libeigen3-dev liblcm-dev libyaml-dev libturbojpeg0-dev libpng-dev libapriltag-dev
+  nlohmann-json3-dev libcli11-dev)
+
+mkdir -p .cache/sysroot
+root=$(readlink -f .cache/sysroot)/$arch
+work=$root.apt # apt's state and the packages as fetched
+stamp=$root/.complete
+say() { printf '\033[1m== %s\033[0m\n' "$*"; }
+fail() { echo "./dev sysroot $arch: $*" >&2; exit 1; }
+
+exec 9>"$root.lock"
+flock -n 9 || { say "another ./dev sysroot $arch is at work: waiting for it"; flock 9; }
+[ "$(cat "$stamp" 2>/dev/null)" = "${packages[*]}" ] && exit 0
+
+# ── an apt of its own ───────────────────────────────────────────────────────────────────────────────────────────────
+mkdir -p "$work"/{lists,archives}/partial
+: >"$work/status"
+# The machine's settings (proxies, retries), without hooks, with other folders.
+{
+  apt-config dump | grep -vE '^(APT::Architectures?|APT::Update::(Pre|Post)-Invoke|DPkg::(Pre|Post)-|Dir::)'
+  cat <<EOT
+APT::Architecture "$arch";
+APT::Architectures { "$arch"; };
+Dir::State "$work";
+Dir::State::status "$work/status";
+Dir::State::lists "$work/lists";
+Dir::Cache "$work";
+Dir::Cache::archives "$work/archives";
+Dir::Etc "$work";
+Dir::Etc::sourcelist "$work/sources.list";
+Dir::Etc::sourceparts "-";
+Dir::Etc::main "-";
+Dir::Etc::parts "-";
+Dir::Etc::netrc "/etc/apt/auth.conf";
+Dir::Etc::netrcparts "/etc/apt/auth.conf.d";
+Dir::Etc::trustedparts "/etc/apt/trusted.gpg.d";
+EOT
+} >"$work/apt.conf"
+apt() { env APT_CONFIG="$work/apt.conf" apt-get -q "$@"; } # which is read first: no other configuration is
+
+codename=$(. /etc/os-release && echo "${VERSION_CODENAME:-}")
+keyring=/usr/share/keyrings/debian-archive-keyring.gpg
+option=$([ -e "$keyring" ] && echo "[signed-by=$keyring]" || true)
+# Debian's own suites are named after the release; other vendors' are not for other architectures.
+apt-get indextargets --format '$(REPO_URI) $(RELEASE) $(COMPONENT)' 'Created-By: Packages' |
+  awk -v c="$codename" -v o="$option" '$2 == c || index($2, c "-") == 1 {print "deb", o, $1, $2, $3}' | sort -u >"$work/all.list"
+[ -s "$work/all.list" ] || fail "no Debian source of '$codename' among this machine's (apt-get indextargets). Debian 12 is what this was made for."
+
+update() { # its own words, which are many, are shown if it fails
+  apt update --error-on=any >"$work/update.log" 2>&1
+}
+say "sysroot $arch: package lists from $(awk '{print $(NF-2)}' "$work/all.list" | sort -u | tr '\n' ' ')"
+cp "$work/all.list" "$work/sources.list"
+if ! update; then
+  # A mirror's security index is sometimes in the middle of a change. Headers and libraries to compile against may be
+  # a point release older: the board installs its own.
+  grep -v -- '-security ' "$work/all.list" >"$work/sources.list" || true
+  grep -E '^(E|W):' "$work/update.log" >&2 || true
+  echo "trying again without the security suite" >&2
+  update || { cat "$work/update.log" >&2; fail "the package lists of $arch could not be fetched (above). Is the mirror reachable? Run this again: it goes on where it stopped."; }
+fi
+
+# ── fetch, unpack ───────────────────────────────────────────────────────────────────────────────────────────────────
+apt --no-install-recommends -y --print-uris install "${packages[@]}" >"$work/uris" 2>"$work/install.log" ||
+  { cat "$work/install.log" >&2; fail "the packages do not fit together (above)"; }
+total=$(grep -c "^'" "$work/uris")
+say "sysroot $arch: $total packages"
+apt --no-install-recommends -y --download-only install "${packages[@]}" >"$work/install.log" 2>&1 || {
+  grep -E '^(E|W):' "$work/install.log" >&2
+  fail "fetching stopped (above). Run this again: it goes on where it stopped."
+}
+rm -rf "$root.new"
+mkdir -p "$root.new"/var/lib/dpkg/info
+count=0
+for name in $(awk "/^'/{print \$2}" "$work/uris"); do
+  count=$((count + 1))
+  [ -t 1 ] && printf '\r%3d/%d %-60.60s' "$count" "$total" "$name"
+  dpkg-deb -x "$work/archives/$name" "$root.new" || fail "$name cannot be unpacked: remove $work/archives/$name and run this again"
+done
+[ -t 1 ] && printf '\r%70s\r' ''
+# Links to absolute paths point into the host: make them relative.
+find "$root.new" -type l -lname '/*' | while read -r link; do
+  target=$root.new$(readlink "$link")
+  [ -e "$target" ] && ln -sfr "$target" "$link"
+done || true
+echo "${packages[*]}" >"$root.new/.complete"
+rm -rf "$root"
+mv "$root.new" "$root"
+say "sysroot $arch: $(du -sh "$root" | cut -f1) in .cache/sysroot/$arch"
