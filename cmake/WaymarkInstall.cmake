@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+# What `cmake --install` puts where, in the three components that become packages: runtime, tools, dev.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+# Libraries of several architectures side by side, also under /usr/local.
+if(CMAKE_LIBRARY_ARCHITECTURE)
+  set(CMAKE_INSTALL_LIBDIR lib/${CMAKE_LIBRARY_ARCHITECTURE})
+endif()
+set(WM_PACKAGE_DIR ${CMAKE_SOURCE_DIR}/toolchain/package)
+
+# ── the robot's ──────────────────────────────────────────────────────────────────────────────────────────────────────
+install(TARGETS waymark DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
+install(DIRECTORY config/etc/ DESTINATION etc/waymark COMPONENT runtime)
+install(FILES config/waymark.service DESTINATION lib/systemd/system COMPONENT runtime)
+install(FILES ${WM_PACKAGE_DIR}/60-waymark.rules DESTINATION lib/udev/rules.d COMPONENT runtime)
+install(FILES ${WM_PACKAGE_DIR}/completion/waymark.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
+  RENAME waymark COMPONENT runtime)
+install(FILES ${WM_PACKAGE_DIR}/completion/_waymark DESTINATION ${CMAKE_INSTALL_DATADIR}/zsh/vendor-completions
+  COMPONENT runtime)
+file(GLOB examples CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/config/*.yaml)
+install(FILES ${examples} DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark/examples COMPONENT runtime)
+install(FILES docs/config.md docs/live.md docs/errors.md DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark COMPONENT runtime)
+
+# Manual pages are compressed as Debian wants them: without a time, so that the same sources give the same bytes.
+function(wm_install_compressed file name where component)
+  set(made ${CMAKE_BINARY_DIR}/compressed/${where}/${name}.gz)
+  add_custom_command(OUTPUT ${made} COMMAND ${CMAKE_COMMAND} -E make_directory ${CMAKE_BINARY_DIR}/compressed/${where}
+    COMMAND gzip -9nc ${file} > ${made} DEPENDS ${file} VERBATIM)
+  set_property(GLOBAL APPEND PROPERTY WM_COMPRESSED ${made})
+  install(FILES ${made} DESTINATION ${CMAKE_INSTALL_DATADIR}/${where} COMPONENT ${component})
+endfunction()
+wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark.1 waymark.1 man/man1 runtime)
+
+# ── the desk's ───────────────────────────────────────────────────────────────────────────────────────────────────────
+foreach(tool calibrate detect diff eval map reference report simulate)
+  if(TARGET waymark-${tool}) # not everything is there for every architecture
+    install(TARGETS waymark-${tool} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tools)
+    wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-${tool}.1 waymark-${tool}.1 man/man1 tools)
+  endif()
+endforeach()
+install(DIRECTORY config/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark-tools/examples COMPONENT tools)
+
+# ── for who writes programs ──────────────────────────────────────────────────────────────────────────────────────────
+# libwaymark: what is said, read and written over LCM, in C. libwaymark-estimator: the filters and our detectors.
+add_library(wm_public STATIC $<TARGET_OBJECTS:wm_msgs> $<TARGET_OBJECTS:wm_lcm_messages> $<TARGET_OBJECTS:wm_lcm_types>)
+add_library(wm_public_estimator STATIC $<TARGET_OBJECTS:wm_estimator>)
+set_target_properties(wm_public PROPERTIES OUTPUT_NAME waymark LINKER_LANGUAGE C)
+set_target_properties(wm_public_estimator PROPERTIES OUTPUT_NAME waymark-estimator LINKER_LANGUAGE CXX)
+install(TARGETS wm_public wm_public_estimator DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
+install(DIRECTORY msgs/include/waymark estimator/include/waymark DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev)
+install(DIRECTORY ${CMAKE_BINARY_DIR}/msgs/lcm/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/waymark/lcm COMPONENT dev
+  FILES_MATCHING PATTERN "*.h")
+install(DIRECTORY msgs/lcm DESTINATION ${CMAKE_INSTALL_DATADIR}/waymark COMPONENT dev)
+install(DIRECTORY tests/package/downstream/ DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/libwaymark-dev/examples COMPONENT dev)
+configure_package_config_file(cmake/waymarkConfig.cmake.in ${CMAKE_BINARY_DIR}/waymarkConfig.cmake
+  INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/waymark PATH_VARS CMAKE_INSTALL_INCLUDEDIR CMAKE_INSTALL_LIBDIR)
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/waymarkConfigVersion.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/waymarkConfig.cmake ${CMAKE_BINARY_DIR}/waymarkConfigVersion.cmake
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/waymark COMPONENT dev)
+foreach(name waymark waymark-estimator)
+  configure_file(cmake/${name}.pc.in ${CMAKE_BINARY_DIR}/${name}.pc @ONLY)
+  install(FILES ${CMAKE_BINARY_DIR}/${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
+endforeach()
+
+# ── what each package says of itself ─────────────────────────────────────────────────────────────────────────────────
+foreach(pair runtime:waymark tools:waymark-tools dev:libwaymark-dev)
+  string(REPLACE ":" ";" pair ${pair})
+  list(GET pair 0 component)
+  list(GET pair 1 package)
+  wm_install_compressed(${CMAKE_SOURCE_DIR}/CHANGELOG.md changelog doc/${package} ${component})
+  wm_install_compressed(${WM_PACKAGE_DIR}/changelog changelog.Debian doc/${package} ${component})
+  install(FILES ${WM_PACKAGE_DIR}/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/${package} COMPONENT ${component})
+endforeach()
+get_property(compressed GLOBAL PROPERTY WM_COMPRESSED)
+add_custom_target(wm_compressed ALL DEPENDS ${compressed})

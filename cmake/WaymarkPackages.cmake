@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+# Debian packages by CPack: waymark (the robot's), waymark-tools (the desk's), libwaymark-dev. docs/boards.md.
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_NAME waymark)
+set(CPACK_PACKAGE_VENDOR Waymark)
+set(CPACK_PACKAGE_CONTACT "Waymark maintainers <maintainers@waymark.example>" CACHE STRING "Maintainer of the packages")
+# CPack 3.25 puts one summary before each package's own description, unless it is this one.
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_NAME} built using CMake")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_COMPONENTS_ALL runtime tools dev)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ
+  WORLD_EXECUTE)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
+
+# What the programs need, written down: dpkg-shlibdeps looks into the database of this machine, which doesn't know another
+# architecture's libraries. tests/package/depends.py holds it against what is linked, and against dpkg-shlibdeps.
+set(base "libc6 (>= 2.36), libgcc-s1 (>= 12), libstdc++6 (>= 12)")
+set(pictures "libapriltag3 (>= 3.3.0), libpng16-16 (>= 1.6.39), libturbojpeg0 (>= 1:2.1.5), libyaml-0-2 (>= 0.2.5)")
+set(cameras "")
+if(WM_LIBCAMERA AND LIBCAMERA_FOUND)
+  set(cameras ", libcamera0.0.3 (>= 0.0.3)")
+endif()
+set(simulator "")
+if(TARGET waymark-simulate)
+  set(simulator ", libembree3-3 (>= 3.13.5+dfsg)")
+endif()
+
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME waymark)
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION misc)
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "${base}, ${pictures}, liblcm1 (>= 1.3.1)${cameras}")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "waymark-tools, can-utils, v4l-utils, liblcm-bin")
+set(CPACK_DEBIAN_RUNTIME_DESCRIPTION "tells a robot where it is
+ A runtime that localizes a robot from cameras and CAN, on the robot's own
+ computer, and publishes poses over LCM from a real-time thread. The service
+ is installed, not started: its configuration in /etc/waymark has to be the
+ robot's first.")
+set(conffiles "")
+file(GLOB etc RELATIVE ${CMAKE_SOURCE_DIR}/config/etc CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/config/etc/*)
+foreach(name ${etc})
+  string(APPEND conffiles "/etc/waymark/${name}\n")
+endforeach()
+file(WRITE ${CMAKE_BINARY_DIR}/debian/conffiles "${conffiles}")
+set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/conffiles ${WM_PACKAGE_DIR}/postinst
+  ${WM_PACKAGE_DIR}/prerm ${WM_PACKAGE_DIR}/postrm)
+
+set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME waymark-tools)
+set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
+set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${cameras}${simulator}")
+set(CPACK_DEBIAN_TOOLS_DESCRIPTION "desk tools for a robot that knows where it is
+ Simulates drives, judges runs against truth, draws reports, calibrates
+ cameras, makes maps: waymark eval, report, simulate, diff, calibrate, map.")
+
+set(CPACK_DEBIAN_DEV_PACKAGE_NAME libwaymark-dev)
+set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "liblcm-dev (>= 1.3.1)")
+set(CPACK_DEBIAN_DEV_DESCRIPTION "poses of a robot for other programs
+ Headers and static libraries: libwaymark reads and writes the messages that
+ waymark sends over LCM, libwaymark-estimator has its filters and detectors.
+ For find_package(waymark) and pkg-config.")
+
+# /usr is the prefix; what is below /usr/etc for CMake is in /etc for Debian.
+set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_SOURCE_DIR}/cmake/etc_outside_usr.cmake)
+include(CPack)

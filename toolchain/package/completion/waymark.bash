@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+# Made by toolchain/package/help.py from --help.
+_waymark() {
+  local word=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]:-} words= more=
+  COMPREPLY=()
+  if [ "$COMP_CWORD" -eq 1 ]; then
+    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps calibrate detect diff eval map reference report simulate --help --version' -- "$word")
+    return
+  fi
+  case $command in
+    calibrate) [ "$COMP_CWORD" -eq 2 ] && more='import camera mounting' ;;
+    map) [ "$COMP_CWORD" -eq 2 ] && more='make check survey print-markers' ;;
+  esac
+  case "$command ${COMP_WORDS[2]:-}" in
+    "calibrate import") words='--help --name --model --size --lens --out' ;;
+    "calibrate camera") words='--help --camera --chessboard --aprilgrid --tag --gap --model --every --most --name --picture --out' ;;
+    "calibrate mounting") words='--help --config --run --camera --map' ;;
+    "map make") words='--help --resolution --origin --inside --walls-below --negate --fine --speck --clearance --out' ;;
+    "map check") words='--help --recording --draw' ;;
+    "map survey") words='--help --json' ;;
+    "map print-markers") words='--help --family --ids --size --paper --out' ;;
+  esac
+  [ -n "$words" ] || case "$command" in
+    "run") words='--config --recording --out --duration --speed --seed --landmarks --map --calibration' ;;
+    "replay") words='--config --out --seed --landmarks --calibration --map --frames-of --from --until --lost --reference' ;;
+    "record") words='--config --out --duration --max-mb --free-mb' ;;
+    "watch") words='--url --prefix --duration --web --map --bind' ;;
+    "check") words='--landmarks --calibration --map --json' ;;
+    "doctor") words='--json --seconds' ;;
+    "stamps") words='' ;;
+    "calibrate") words='--help --name --model --size --lens --out --camera --chessboard --aprilgrid --tag --gap --every --most --picture --config --run --map' ;;
+    "detect") words='--help --config --out --every' ;;
+    "diff") words='--help' ;;
+    "eval") words='--help --json --published --reference --align --against --from --to --detector --camera --view' ;;
+    "map") words='--help --resolution --origin --inside --walls-below --negate --fine --speck --clearance --out --recording --draw --json --family --ids --size --paper' ;;
+    "reference") words='--help --map --range --particles --passes --seed' ;;
+    "report") words='--help --out --svg' ;;
+    "simulate") words='--help --out --seed --landmarks --laps --duration --no-video --frame --png --camera --contact-sheet --perfect' ;;
+  esac
+  if [[ $word == -* ]]; then
+    mapfile -t COMPREPLY < <(compgen -W "$words --help" -- "$word")
+  elif [ -n "$more" ]; then
+    mapfile -t COMPREPLY < <(compgen -W "$more" -- "$word")
+  else
+    mapfile -t COMPREPLY < <(compgen -f -- "$word")
+  fi
+}
+complete -o filenames -F _waymark waymark
