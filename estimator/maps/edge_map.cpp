@@ -100,6 +100,11 @@ void edge_map::init(const wm_raster &raster, void *memory) {
   const sin_cos yaw = sincos(raster.origin_yaw_rad);
   cos_yaw_ = yaw.cos;
   sin_yaw_ = yaw.sin;
+  for (int i = 0; i < 256; i++) {
+    const sin_cos a = sincos(i * (kPi / 256.0));
+    normal_[i] = {a.cos, a.sin};
+  }
+  pixels_a_metre_ = 1.0 / raster.resolution_m;
   reach_px_ = reach_of(raster);
   unit_m_ = reach_px_ * raster.resolution_m / (kFar - 1);
   tile_columns_ = tiles_along(raster.width_px);
@@ -248,9 +253,8 @@ void edge_map::fit_lines() {
 
 void edge_map::to_pixels(double x_m, double y_m, double *column, double *row) const {
   const double dx = x_m - raster_->origin_x_m, dy = y_m - raster_->origin_y_m;
-  const double inverse = 1.0 / raster_->resolution_m;
-  *column = (cos_yaw_ * dx + sin_yaw_ * dy) * inverse;
-  *row = (double)raster_->height_px - (cos_yaw_ * dy - sin_yaw_ * dx) * inverse;
+  *column = (cos_yaw_ * dx + sin_yaw_ * dy) * pixels_a_metre_;
+  *row = (double)raster_->height_px - (cos_yaw_ * dy - sin_yaw_ * dx) * pixels_a_metre_;
 }
 
 void edge_map::to_map(double column, double row, double *x_m, double *y_m) const {
@@ -281,7 +285,7 @@ edge_line edge_map::nearest(double x_m, double y_m) const {
   const double du = column + 0.5 - u, dv = row + 0.5 - v;
   out.distance_m = std::sqrt(du * du + dv * dv) * raster_->resolution_m;
   if (line.y == kNoLine) return out;
-  const sin_cos a = sincos((uint8_t)line.x * (kPi / 256.0));
+  const unit_vector &a = normal_[(uint8_t)line.x];
   out.offset_m = (a.cos * du + a.sin * dv + line.y * kLineUnit_px) * raster_->resolution_m;
   out.normal_x = cos_yaw_ * a.cos + sin_yaw_ * a.sin;  // rows grow downwards
   out.normal_y = sin_yaw_ * a.cos - cos_yaw_ * a.sin;

@@ -88,7 +88,11 @@ class edge_map {
   void fit_lines();
 
   const wm_raster *raster_;
-  double cos_yaw_, sin_yaw_, unit_m_;
+  struct unit_vector {
+    double cos, sin;
+  };
+  unit_vector normal_[256];  // of a line, by the byte that is kept of it
+  double cos_yaw_, sin_yaw_, unit_m_, pixels_a_metre_;
   int reach_px_, tile_columns_, tile_rows_, row_shift_;
   // Bytes from this object on, so that a copy of the whole state has a map of its own. Of each tile the index of its
   // first pixel, 0 where it is out of reach; then distances, offsets and a row's work space.

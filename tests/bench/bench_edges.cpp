@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "drawn_map.h"
+#include "drawn_search.h"
 #include "filters/edge_mcl/cloud.hpp"
 #include "waymark/estimator.h"
 #include "waymark/map.h"
@@ -72,6 +73,23 @@ void bench_cloud(int particles) {
               bench::kScanPoints, weights, move, resample);
 }
 
+// A minute of scans of a robot that does not know where it is.
+void bench_search() {
+  bench::search_at_work work;
+  std::vector<double> each;
+  for (int i = 0; i < 600; i++) {
+    work.prepare();
+    const double begin = now_us();
+    work.scan();
+    const double end = now_us();
+    if (work.searching()) each.push_back(end - begin);
+  }
+  if (each.empty()) return;
+  std::sort(each.begin(), each.end());
+  std::printf("a scan while searching (%zu of 600 were): median %.2f ms, 99 %% below %.2f, the longest %.2f\n",
+              each.size(), each[each.size() / 2] * 1e-3, each[each.size() * 99 / 100] * 1e-3, each.back() * 1e-3);
+}
+
 }  // namespace
 
 int main(int argc, char **argv) {
@@ -83,6 +101,7 @@ int main(int argc, char **argv) {
               ready * 1e-3, (double)made.bytes * 1e-6);
   bench_cloud(200);
   bench_cloud(2000);
+  bench_search();
   if (argc > 1) {
     wm_map *loaded = nullptr;
     wm_error err = {};

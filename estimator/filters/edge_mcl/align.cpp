@@ -64,32 +64,39 @@ bool on_a_line(const wm_points &points, uint32_t i) {
   return length2 < square(0.6) && square(across) < square(0.03 + 0.005 * (x * x + y * y)) * length2;
 }
 
-double align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, double gate_m, double explained_m,
-                  int iterations, wm_pose2 *pose) {
-  int explained = 0;
-  for (int round = 0; round <= iterations; round++) {
+void align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, int stride, double gate_m,
+                double explained_m, int iterations, wm_pose2 *pose) {
+  for (int round = 0; round < iterations; round++) {
     double a[kAlignStates][kAlignStates] = {}, b[kAlignStates] = {}, step[kAlignStates];
     const sin_cos h = sincos(pose->heading_rad);
-    explained = 0;
-    for (int i = 0; i < count; i++) {
+    for (int i = 0; i < count; i += stride) {
       const double px = (double)x_m[i], py = (double)y_m[i];
       const double rx = h.cos * px - h.sin * py, ry = h.sin * px + h.cos * py;
       const edge_line line = map.nearest(pose->x_m + rx, pose->y_m + ry);
       if (!line.found || line.distance_m > gate_m) continue;
-      explained += line.distance_m <= explained_m;
       const double row[3] = {line.normal_x, line.normal_y, line.normal_y * rx - line.normal_x * ry};
-      const double weight = 1.0 / (1.0 + square(line.offset_m / explained_m));
+      const double weight = square(explained_m) / (square(explained_m) + square(line.offset_m));
       for (int r = 0; r < 3; r++) {
         b[r] += weight * row[r] * line.offset_m;
-        for (int c = 0; c < 3; c++) a[r][c] += weight * row[r] * row[c];
+        for (int c = 0; c <= r; c++) a[r][c] += weight * row[r] * row[c];
       }
     }
-    if (round == iterations) break;
     for (int r = 0; r < 3; r++) a[r][r] += 1.0;  // what the scan doesn't say stays
-    if (!solve_positive(a, b, 3, step)) break;
+    if (!solve_positive(a, b, 3, step)) break;   // reads the lower triangle
     pose->x_m += step[0];
     pose->y_m += step[1];
     pose->heading_rad = wrap(pose->heading_rad + step[2]);
+  }
+}
+
+double explained_share(const edge_map &map, const float *x_m, const float *y_m, int count, double explained_m,
+                       const wm_pose2 &pose) {
+  const sin_cos h = sincos(pose.heading_rad);
+  int explained = 0;
+  for (int i = 0; i < count; i++) {
+    const double px = (double)x_m[i], py = (double)y_m[i];
+    const edge_line line = map.nearest(pose.x_m + h.cos * px - h.sin * py, pose.y_m + h.sin * px + h.cos * py);
+    explained += line.found && line.distance_m <= explained_m;
   }
   return count > 0 ? (double)explained / count : 0.0;
 }

@@ -37,10 +37,13 @@ bool invert_positive(const double a[kAlignStates][kAlignStates], int n, double o
 // unexplained without saying anything about the pose.
 bool on_a_line(const wm_points &points, uint32_t i);
 
-// Aligns points in base_link by the pose alone, from `pose` on; returns the share of points explained there. For
-// candidates of a search. O(iterations * points).
-double align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, double gate_m, double explained_m,
-                  int iterations, wm_pose2 *pose);
+// Aligns every `stride`th of the points in base_link by the pose alone, from `pose` on: for candidates of a search.
+// O(iterations * count / stride).
+void align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, int stride, double gate_m,
+                double explained_m, int iterations, wm_pose2 *pose);
+// Share of the points that lie so near to an edge from `pose`. O(points).
+double explained_share(const edge_map &map, const float *x_m, const float *y_m, int count, double explained_m,
+                       const wm_pose2 &pose);
 
 }  // namespace wm
 

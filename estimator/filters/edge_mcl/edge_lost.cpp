@@ -14,7 +14,9 @@ constexpr double kFresh_s = 0.5, kFresh_m = 0.2;  // scans further apart speak e
 constexpr double kWander_m = 0.1, kLoosened_m2ps = 0.002, kLoosened_rad2ps = 0.0002;
 constexpr double kDoubtOdds = -2.0;
 constexpr int kFewKeyframes = 4, kManyKeyframes = 10;  // 0.4 m each
-constexpr int kLeisure = 8, kWeighedInDoubt = 6;
+constexpr int kLeisure = 8, kWeighedInDoubt = 6, kWeighingShare = 4;
+constexpr int kPosesLeast = place_search::kAligningCost + place_search::kWeighingCost;
+static_assert(kPosesLeast <= EDGE_MCL_SEARCH_POSES_LEAST);
 constexpr double kBetter = 0.15;
 constexpr double kCarriedOff = 7.0;  // odds that nobody has carried it off in the last metres, logarithm of
 constexpr double kNowhere = -1e3;
@@ -120,14 +122,18 @@ void edge_mcl::heed_cloud() {
 void edge_mcl::ponder(bool new_keyframe) {
   others_.carry(filter_.pose(), filter_.odom());
   if (search_.keyframes() < (in_doubt_ ? kFewKeyframes : kManyKeyframes)) return;
-  const int poses = in_doubt_ ? params_.search_poses : params_.search_poses / kLeisure;
-  if (search_.step(map_, poses, filter_.odom())) others_.offer(search_);
+  // A scan's work is bounded: what weighing may need is set aside, the rest is the search's.
+  int poses = params_.search_poses;
+  if (!in_doubt_) poses = poses / kLeisure > kPosesLeast ? poses / kLeisure : kPosesLeast;
+  const int affordable = poses / kWeighingShare / place_search::kWeighingCost;
+  const int weighed = !in_doubt_ || affordable < 1 ? 1 : affordable < kWeighedInDoubt ? affordable : kWeighedInDoubt;
+  if (search_.step(map_, poses - weighed * place_search::kWeighingCost, filter_.odom())) others_.offer(search_);
   const double own_prior = state_ == WM_STATE_SEARCHING && !on_trial_ ? kNowhere
                            : state_ == WM_STATE_TRACKING              ? kCarriedOff
                                                                       : 0.0;
   // One's own place explains at least what it explains now: it has been corrected all along, the others have not.
   const double own_least = state_ == WM_STATE_TRACKING ? explained_ : 0.0;
-  others_.weigh(map_, &search_, own_prior, own_least, in_doubt_ ? kWeighedInDoubt : 1);
+  others_.weigh(map_, &search_, own_prior, own_least, weighed);
   const int best = others_.best();
   const hypothesis &there = others_[best];
   const bool sure = there.weighed && there.share >= params_.search_share && there.explained >= params_.search_explained;

@@ -40,7 +40,7 @@ size_t edge_mcl::bytes(const wm_edge_mcl_params &params, const wm_setup &setup, 
     return 0;
   }
   return aligned(sizeof(edge_mcl)) + aligned(cloud::bytes(params.particles)) + aligned(map) +
-         score_field::bytes(*setup.map) + kAlign;
+         aligned(score_field::bytes(*setup.map)) + place_search::bytes(*setup.map) + kAlign;
 }
 
 void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
@@ -66,8 +66,9 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   double sigma[kSigmaClasses];
   for (int k = 0; k < kSigmaClasses; k++) sigma[k] = std::sqrt(square(params.sigma_m) + square(kClassSigma_m[k]));
   make_score_table(map_, sigma, params.floor, params.weight == EDGE_MCL_SUM, &table_);
-  field_.init(map_, table_, behind + aligned(edge_map::bytes(*setup.map)));
-  search_.init(map_);
+  behind += aligned(edge_map::bytes(*setup.map));
+  field_.init(map_, table_, behind);
+  search_.init(map_, behind + aligned(score_field::bytes(*setup.map)));
   usual_ = params.lost_explained;
   fused_ns_ = watched_ns_ = remembered_ns_ = WM_TIME_NONE;
   remember_calibration();

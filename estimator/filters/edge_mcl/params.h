@@ -12,6 +12,8 @@ extern "C" {
 #endif
 
 enum edge_mcl_weight { EDGE_MCL_PRODUCT, EDGE_MCL_SUM };
+// What a search must be allowed a scan, so that a place can be aligned and another weighed.
+enum { EDGE_MCL_SEARCH_POSES_LEAST = 12000 };
 enum edge_mcl_pose { EDGE_MCL_REFINED, EDGE_MCL_CLOUD };
 
 typedef struct wm_edge_mcl_params {

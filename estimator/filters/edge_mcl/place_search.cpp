@@ -9,11 +9,9 @@
 namespace wm {
 namespace {
 
-constexpr double kGrid_m = 0.2;
-constexpr int kHeadings = 72;
 constexpr double kKeyframeWay_m = 0.4, kKeyframeTurn_rad = 0.25;
 constexpr double kSameWay_m = 0.6, kSameTurn_rad = 0.3;  // places nearer than this are one
-constexpr int kRefinedAScan = 6;
+constexpr int kCellsAGrid = 2;                           // the sweep's grid: 0.2 m, headings every 5 degrees
 constexpr double kHopeful = 0.35;  // how much better a point more may be than those before, on average
 
 double way_between(const wm_pose2 &a, const wm_pose2 &b) {
@@ -24,25 +22,11 @@ bool same_place(const wm_pose2 &a, const wm_pose2 &b) {
   return way_between(a, b) < kSameWay_m && std::fabs(wrap(a.heading_rad - b.heading_rad)) < kSameTurn_rad;
 }
 
-void close(scan_points &scan) {
-  double reach = 0.0;
-  for (int i = 0; i < scan.count; i++) {
-    const double r = std::sqrt(square((double)scan.x_m[i]) + square((double)scan.y_m[i]));
-    if (r > reach) reach = r;
-  }
-  scan.reach_m = (float)reach;
-  for (int i = scan.count; i < scan.count + kScanLanes; i++) {
-    scan.x_m[i] = scan.count > 0 ? scan.x_m[scan.count - 1] : 0.0f;
-    scan.y_m[i] = scan.count > 0 ? scan.y_m[scan.count - 1] : 0.0f;
-  }
-  for (int &end : scan.class_end) end = scan.count;
-}
-
 }  // namespace
 
-void place_search::init(const edge_map &map) {
-  const double wide[kSigmaClasses] = {0.2, 0.2, 0.2, 0.2};
-  make_score_table(map, wide, 0.1, false, &wide_);
+void place_search::init(const edge_map &map, void *memory) {
+  field_.init(map, memory);
+  spent_ = 0;
   clear();
 }
 
@@ -92,30 +76,41 @@ void place_search::gather(const wm_pose2 &odom, scan_points *out) const {
 
 double place_search::explained(const edge_map &map, const wm_pose2 &odom, wm_pose2 *pose) {
   gather(odom, &now_);
-  return align_pose(map, now_.x_m, now_.y_m, now_.count, 0.3, 0.1, 4, pose);
+  align_pose(map, now_.x_m, now_.y_m, now_.count, 2, 0.3, 0.1, 4, pose);
+  spent_ += kWeighingCost;
+  return explained_share(map, now_.x_m, now_.y_m, now_.count, 0.1, *pose);
 }
 
 void place_search::begin(const wm_pose2 &odom) {
   odom_ = odom;
   gather(odom, &all_);
-  few_.count = all_.count < kSweepPoints ? all_.count : kSweepPoints;
-  for (int i = 0; i < few_.count; i++) {
-    const int from = (int)((int64_t)i * all_.count / few_.count);
-    few_.x_m[i] = all_.x_m[from];
-    few_.y_m[i] = all_.y_m[from];
-  }
-  fewer_.count = 0;
-  for (int i = 0; i < few_.count; i += kSweepPoints / kFirstPoints) {
-    fewer_.x_m[fewer_.count] = few_.x_m[i];
-    fewer_.y_m[fewer_.count++] = few_.y_m[i];
-  }
-  close(all_);
-  close(few_);
-  close(fewer_);
-  running_ = few_.count > 0;
+  running_ = all_.count > 0;
   next_ = 0;
   refined_ = 0;
   place_count_ = 0;
+}
+
+// Every fourth of the points comes first. What is too far for the field says nothing, from anywhere.
+void place_search::turn_points(const edge_map &map) {
+  constexpr int kStride = kSweepPoints / kFirstPoints;
+  const int count = all_.count < kSweepPoints ? all_.count : kSweepPoints;
+  int chosen[kSweepPoints];
+  some_ = first_ = 0;
+  for (int phase = 0; phase < kStride; phase++) {
+    for (int i = phase; i < count; i += kStride) {
+      const int from = (int)((int64_t)i * all_.count / count);
+      const double range2 = square((double)all_.x_m[from]) + square((double)all_.y_m[from]);
+      if (range2 < square(field_.reach_m())) chosen[some_++] = from;
+    }
+    if (phase == 0) first_ = some_;
+  }
+  for (int k = 0; k < kHeadings; k++) {
+    const sin_cos h = sincos(k * (kTwoPi / kHeadings) - map.raster().origin_yaw_rad);
+    for (int i = 0; i < some_; i++) {
+      const double x = (double)all_.x_m[chosen[i]], y = (double)all_.y_m[chosen[i]];
+      steps_[k][i] = field_.step(h.cos * x - h.sin * y, -(h.sin * x + h.cos * y));
+    }
+  }
 }
 
 // Keeps the best, one of each place.
@@ -138,12 +133,47 @@ void place_search::offer(const wm_pose2 &pose, int32_t score) {
   places_[at] = {pose, score, 0.0};
 }
 
-void place_search::refine(const edge_map &map) {
-  for (int n = 0; n < kRefinedAScan && refined_ < place_count_; n++, refined_++) {
+// What the first points of a pose must come to for the rest to be looked at.
+double place_search::least_first() const {
+  if (place_count_ < kPlaces) return 0.0;
+  return ((double)places_[kPlaces - 1].score / some_ - kHopeful / field_.unit()) * first_;
+}
+
+// Where the points fit from each drivable cell's middle, in each heading.
+int place_search::sweep(const edge_map &map, int poses, int64_t columns, int64_t cells) {
+  const double grid_px = kCellsAGrid * field_.cell_m() / map.raster().resolution_m;
+  constexpr int kCellCost = 1, kRestCost = kSweepPoints / kFirstPoints - 1;
+  double least = least_first();
+  for (; next_ < cells && poses >= kCellCost + kHeadings * (1 + kRestCost); next_++) {
+    const int64_t column = next_ % columns, row = next_ / columns;
+    wm_pose2 pose;
+    map.to_map(((double)column + 0.5) * grid_px, ((double)row + 0.5) * grid_px, &pose.x_m, &pose.y_m);
+    poses -= kCellCost;
+    if (!map.drivable(pose.x_m, pose.y_m)) continue;
+    poses -= kHeadings;
+    const ptrdiff_t corner = field_.at(kCellsAGrid * column + kCellsAGrid / 2, kCellsAGrid * row + kCellsAGrid / 2);
+    for (int k = 0; k < kHeadings; k++) {
+      // A quarter of the points says of most poses that it is not there.
+      const int32_t first = field_.sum(corner, steps_[k], first_);
+      if (first < least) continue;
+      poses -= kRestCost;
+      pose.heading_rad = wrap(k * (kTwoPi / kHeadings));
+      offer(pose, first + field_.sum(corner, steps_[k] + first_, some_ - first_));
+      least = least_first();
+    }
+  }
+  return poses;
+}
+
+void place_search::refine(const edge_map &map, int poses) {
+  for (; refined_ < place_count_ && poses >= kAligningCost; refined_++, poses -= kAligningCost) {
     place &p = places_[refined_];
-    (void)align_pose(map, all_.x_m, all_.y_m, all_.count, 0.4, 0.2, 5, &p.pose);
-    p.explained = align_pose(map, all_.x_m, all_.y_m, all_.count, 0.2, 0.1, 4, &p.pose);
-    if (!map.drivable(p.pose.x_m, p.pose.y_m)) p.explained = 0.0;
+    align_pose(map, all_.x_m, all_.y_m, all_.count, 4, 0.4, 0.2, 5, &p.pose);
+    align_pose(map, all_.x_m, all_.y_m, all_.count, 2, 0.2, 0.1, 4, &p.pose);
+    p.explained = 0.0;
+    if (map.drivable(p.pose.x_m, p.pose.y_m))
+      p.explained = explained_share(map, all_.x_m, all_.y_m, all_.count, 0.1, p.pose);
+    spent_ += kAligningCost;
   }
 }
 
@@ -151,32 +181,26 @@ bool place_search::step(const edge_map &map, int poses, const wm_pose2 &odom) {
   if (!running_) {
     begin(odom);
     if (!running_) return false;
+    turn_points(map);
   }
   const wm_raster &r = map.raster();
-  const double grid_px = kGrid_m / r.resolution_m;
+  const double grid_px = kCellsAGrid * field_.cell_m() / r.resolution_m;
   const int64_t columns = (int64_t)(r.width_px / grid_px) + 1, rows = (int64_t)(r.height_px / grid_px) + 1;
-  const int64_t cells = columns * rows;
-  int cells_left = 20 * poses;  // a map of little floor is not swept in one go, either
-  for (; next_ < cells && poses > 0 && cells_left > 0; next_++, cells_left--) {
-    const int64_t column = next_ % columns, row = next_ / columns;
-    wm_pose2 pose;
-    map.to_map(((double)column + 0.5) * grid_px, ((double)row + 0.5) * grid_px, &pose.x_m, &pose.y_m);
-    if (!map.drivable(pose.x_m, pose.y_m)) continue;
-    for (int k = 0; k < kHeadings; k++) {
-      pose.heading_rad = wrap(k * (kTwoPi / kHeadings));
-      const sin_cos h = sincos(pose.heading_rad);
-      // A quarter of the points says of most poses that it is not there.
-      const int32_t first = score(map, fewer_, wide_, pose.x_m, pose.y_m, h.cos, h.sin);
-      const double hoped = (double)first / fewer_.count + kHopeful / kScoreUnit;
-      if (place_count_ == kPlaces && hoped * few_.count < places_[kPlaces - 1].score) continue;
-      offer(pose, score(map, few_, wide_, pose.x_m, pose.y_m, h.cos, h.sin));
-    }
-    poses -= kHeadings;
+  if (next_ < columns * rows && first_ > 0) {
+    const int left = sweep(map, poses, columns, columns * rows);
+    spent_ += (uint64_t)(poses - left);
+    poses = left;
+    if (next_ < columns * rows) return false;
   }
-  if (next_ < cells) return false;
-  refine(map);
+  refine(map, poses);
   if (refined_ < place_count_) return false;
-  // By what they explain; aligned places may have come together.
+  sort_places();
+  running_ = false;
+  return true;
+}
+
+// By what they explain; aligned places may have come together.
+void place_search::sort_places() {
   for (int i = 1; i < place_count_; i++)
     for (int k = i; k > 0 && places_[k].explained > places_[k - 1].explained; k--) {
       const place better = places_[k];
@@ -190,8 +214,6 @@ bool place_search::step(const edge_map &map, int poses, const wm_pose2 &odom) {
     if (!again) places_[kept++] = places_[i];
   }
   place_count_ = kept;
-  running_ = false;
-  return true;
 }
 
 }  // namespace wm

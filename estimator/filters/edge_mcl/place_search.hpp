@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where on the map could this be? The points of the last metres, put together by odometry, against every place where
 // the robot may stand: a sweep over a grid, some ten thousand poses a scan, then the best are aligned and compared.
+// What a scan may cost is counted, never timed, so that a replay finds what the robot found. The unit is a pose that
+// the sweep scores by its first 24 points.
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_PLACE_SEARCH_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_PLACE_SEARCH_HPP
 
 #include "filters/edge_mcl/likelihood.hpp"
 #include "filters/edge_mcl/params.h"
+#include "filters/edge_mcl/search_field.hpp"
 #include "waymark/frames.h"
 
 namespace wm {
@@ -19,8 +22,14 @@ struct place {
 class place_search {
  public:
   static constexpr int kPlaces = 24;
+  // What explained() costs, 2 poses a point looked up, and what a place costs that step() aligns, 4 a point (about as
+  // measured: wider gates, colder memory). step() needs the latter to come to an end some day.
+  static constexpr int kWeighingCost = 2 * (4 * WM_POINTS_MAX / 2 + WM_POINTS_MAX);
+  static constexpr int kAligningCost = 4 * (5 * WM_POINTS_MAX / 4 + 4 * WM_POINTS_MAX / 2 + WM_POINTS_MAX);
 
-  void init(const edge_map &map);
+  static size_t bytes(const wm_raster &raster) { return search_field::bytes(raster); }
+  // `memory` keeps its distance from this object when both are copied.
+  void init(const edge_map &map, void *memory);
   // Forgets what was seen.
   void clear();
   // A scan in base_link and where odometry says it was taken; kept if the robot has moved since the last one kept, and
@@ -31,8 +40,10 @@ class place_search {
   void begin_at_mark();
   // All that is kept is looked at again.
   void unmark() { from_ = 0; }
-  // Goes on by about `poses` poses. True when a sweep has ended: places() are then sorted by what they explain.
+  // Goes on by work worth `poses` poses at most. True when a sweep has ended: places() are then sorted by what they
+  // explain.
   bool step(const edge_map &map, int poses, const wm_pose2 &odom);
+  uint64_t spent() const { return spent_; }  // by step() and explained(), in poses, since init()
   const place *places(int *count) const {
     *count = place_count_;
     return places_;
@@ -43,7 +54,7 @@ class place_search {
   int keyframes() const { return (int)(seen_ - oldest()); }  // that are looked at together
 
  private:
-  static constexpr int kKeyframes = 16, kPointsEach = 32, kSweepPoints = 96, kFirstPoints = 24;
+  static constexpr int kKeyframes = 16, kPointsEach = 32, kSweepPoints = 96, kFirstPoints = 24, kHeadings = 72;
 
   uint64_t oldest() const {
     const uint64_t kept = seen_ > kKeyframes ? seen_ - kKeyframes : 0;
@@ -52,8 +63,12 @@ class place_search {
   void begin(const wm_pose2 &odom);
   // Points of all keyframes in base_link at `odom`.
   void gather(const wm_pose2 &odom, scan_points *out) const;
+  void turn_points(const edge_map &map);
+  int sweep(const edge_map &map, int poses, int64_t columns, int64_t cells);  // returns what is left of `poses`
   void offer(const wm_pose2 &pose, int32_t score);
-  void refine(const edge_map &map);
+  void refine(const edge_map &map, int poses);
+  double least_first() const;
+  void sort_places();
 
   struct keyframe {
     wm_pose2 odom;
@@ -62,12 +77,17 @@ class place_search {
   };
   keyframe keyframes_[kKeyframes];
   uint64_t seen_, marked_, from_;
-  score_table wide_;
-  scan_points all_, few_, fewer_;  // in base_link at odom_
-  scan_points now_;                // work space
+  search_field field_;
+  scan_points all_;  // in base_link at odom_
+  scan_points now_;  // work space
+  // Of each heading the steps in the field of some of all_, which are the same from everywhere: first those that are
+  // looked at first.
+  int32_t steps_[kHeadings][kSweepPoints];
+  int first_, some_;
   wm_pose2 odom_;
   bool running_;
-  int64_t next_;  // pose of the sweep
+  int64_t next_;  // cell of the sweep
+  uint64_t spent_;
   int refined_;
   place places_[kPlaces];
   int place_count_;

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
+#include <memory>
 #include <vector>
 
+#include "filters/edge_mcl/hypotheses.hpp"
 #include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
@@ -195,6 +197,68 @@ void it_starts_without_being_told_where(void) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
 }
 
+struct freed {
+  void operator()(void *memory) const { free(memory); }
+};
+using block = std::unique_ptr<void, freed>;
+block allocate(size_t bytes) { return block(aligned_alloc(64, (bytes + 63) / 64 * 64)); }
+
+// Sweeps over the drawn building after sixteen looks along a corridor.
+struct searching {
+  block map_memory = allocate(wm::edge_map::bytes(map)), field = allocate(wm::place_search::bytes(map));
+  wm::edge_map edge_map;
+  wm::place_search search;
+  wm_pose2 odom = {0, 0, 0};
+  drive d;
+  searching() {
+    edge_map.init(map, map_memory.get());
+    search.init(edge_map, field.get());
+    static wm_event e;
+    static wm::scan_points scan;
+    d.truth = {2, 2, 0};
+    for (int k = 0; k < 16; k++, d.truth.x_m += 0.5, odom.x_m += 0.5) {
+      d.scan(&e);
+      scan.count = (int)e.as.points.count;
+      std::memcpy(scan.x_m, e.as.points.x_m, sizeof e.as.points.x_m);
+      std::memcpy(scan.y_m, e.as.points.y_m, sizeof e.as.points.y_m);
+      TEST_ASSERT_TRUE(search.see(scan, odom));
+    }
+  }
+};
+
+void a_step_of_the_search_spends_no_more_than_it_may(void) {
+  const int least = wm::place_search::kAligningCost;
+  for (const int poses : {least, 20000, 80000}) {
+    searching s;
+    int steps = 0;
+    bool ended = false;
+    for (; !ended && steps < 1000; steps++) {
+      const uint64_t before = s.search.spent();
+      ended = s.search.step(s.edge_map, poses, s.odom);
+      TEST_ASSERT_LESS_OR_EQUAL_UINT64((uint64_t)poses, s.search.spent() - before);
+    }
+    TEST_ASSERT_TRUE(ended);
+    TEST_ASSERT_GREATER_THAN_INT(80000 / poses, steps);  // it was too much for one
+    int count;
+    const wm::place *places = s.search.places(&count);
+    TEST_ASSERT_GREATER_THAN_INT(0, count);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, s.odom.x_m + 2, places[0].pose.x_m);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 2, places[0].pose.y_m);
+  }
+}
+
+void weighing_places_spends_what_it_says(void) {
+  searching s;
+  wm::hypotheses others;
+  others.clear({2, 2, 0}, s.odom);
+  while (!s.search.step(s.edge_map, 80000, s.odom)) continue;
+  others.offer(s.search);
+  TEST_ASSERT_GREATER_THAN_INT(3, others.count());
+  const uint64_t before = s.search.spent();
+  others.weigh(s.edge_map, &s.search, 0.0, 0.0, 3);
+  TEST_ASSERT_EQUAL_UINT64(3 * wm::place_search::kWeighingCost, s.search.spent() - before);
+}
+
 void nonsense_makes_it_no_surer_and_never_breaks_it(void) {
   filter f;
   drive d;
@@ -263,6 +327,8 @@ int main(void) {
   RUN_TEST(a_camera_that_looks_lower_than_believed_is_found_out);
   RUN_TEST(carried_away_it_says_so_and_finds_back);
   RUN_TEST(it_starts_without_being_told_where);
+  RUN_TEST(a_step_of_the_search_spends_no_more_than_it_may);
+  RUN_TEST(weighing_places_spends_what_it_says);
   RUN_TEST(nonsense_makes_it_no_surer_and_never_breaks_it);
   RUN_TEST(what_it_can_not_work_with_is_said);
   return UNITY_END();
