@@ -16,6 +16,12 @@ double first_of(double set, double calibrated, double otherwise) {
   return finite(calibrated) && calibrated > 0.0 ? calibrated : otherwise;
 }
 
+// What follows `leader` on a rope of that length.
+double drawn_along(double follower, double leader, double rope) {
+  if (leader > follower + rope) return leader - rope;
+  return leader < follower - rope ? leader + rope : follower;
+}
+
 }  // namespace
 
 void body_motion::init(const wm_setup &setup, const wm_stereo_ekf_params &params) {
@@ -57,6 +63,7 @@ void body_motion::feed(const wm_event &event) {
     before_ = last_;
     has_before_ = true;
   }
+  if (!has_sample_) smooth_ = even_ = steady_[0] = steady_[1] = {now.v, now.w};
   last_ = now;
   has_sample_ = true;
 }
@@ -101,6 +108,10 @@ void body_motion::remember(const body_stretch &s) {
   const double share = s.dt_s / (s.dt_s + kSteady_s);
   smooth_.v = smooth_.v + share * (s.v_mps - smooth_.v);
   smooth_.w = smooth_.w + share * (s.w_radps - smooth_.w);
+  for (int i = 0; i < 3; i++) {
+    even_.v[i] = drawn_along(even_.v[i], smooth_.v[i], sigma_v_[i]);
+    even_.w[i] = drawn_along(even_.w[i], smooth_.w[i], sigma_w_[i]);
+  }
 }
 
 placed body_motion::moved_since(double age_s) const {

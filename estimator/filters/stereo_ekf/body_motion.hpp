@@ -27,12 +27,14 @@ class body_motion {
   // looks ahead with the twist that holds.
   placed moved_since(double age_s) const;
 
-  // The twist smoothed over a third of a second, as it was at the picture before: what a derivative by time needs. The
-  // newest samples' noise moved the pose that the picture corrects; were it in the derivative, too, the two together
-  // would look like pictures that are late.
+  // The twist about now as a derivative by time needs it: smoothed over a third of a second, as it was at the picture
+  // before, and drawn along by that on a rope of one sample's sigma. The newest samples' noise moved the pose that the
+  // picture corrects; were it in the derivative, too, the two together would look like pictures that are late. And a
+  // derivative that shivers on a way that is even would seem to tell when the pictures were taken, which nothing tells
+  // there.
   const vec3 &steady_v_mps() const { return steady_[0].v; }
   const vec3 &steady_w_radps() const { return steady_[0].w; }
-  void begin_picture() { steady_[0] = steady_[1], steady_[1] = smooth_; }
+  void begin_picture() { steady_[0] = steady_[1], steady_[1] = even_; }
   const vec3 &v_mps() const { return last_.v; }
   const vec3 &w_radps() const { return last_.w; }
   // The sample that the vehicle does now what it says of, and by how much it differs from the one before it, per
@@ -67,7 +69,8 @@ class body_motion {
   struct steady_twist {
     vec3 v, w;
   };
-  steady_twist smooth_, steady_[2];  // now; at the picture before the newest, and at the newest
+  steady_twist smooth_, even_;  // now; on the rope
+  steady_twist steady_[2];      // at the picture before the newest, and at the newest
   past ring_[kPast];
   int ring_next_;
 };

@@ -189,10 +189,13 @@ wm_status stereo_ekf::fuse_stereo(const wm_event &event, record_list records) {
     return WM_OK;
   }
   row_verdict verdict;
-  if (!fuse_point(s, filter_.point(slot), 0.0, slot, blank, records, &verdict)) return drop(WM_REJECTED_OUT_OF_RANGE);
-  if (verdict.fused) {
+  const bool possible = fuse_point(s, filter_.point(slot), 0.0, slot, blank, records, &verdict);
+  if (!possible) drop(WM_REJECTED_OUT_OF_RANGE);
+  if (possible && verdict.fused) {
     info()[slot].seen_ns = event.t_ns;
     info()[slot].unseen = 0;
+  } else {
+    contradict_point(slot, s, blank, records);
   }
   return WM_OK;
 }

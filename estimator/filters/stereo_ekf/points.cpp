@@ -38,7 +38,8 @@ void stereo_ekf::end_picture() {
       point_info &point = info()[slot];
       if (point.seen_ns == picture_ns_ || point.unseen == kOfMap) continue;
       const vec3 x = transposed_times(B, transposed_times(past.R, filter_.point(slot) - past.at.p) - eye);
-      if (rig_.in_view(x, kInside_px)) {
+      // One whose own sightings don't fit stands in the wrong place, be that in view or not.
+      if (point.misfit_ns == picture_ns_ || rig_.in_view(x, kInside_px)) {
         if (++point.unseen > params_.keep_unseen_steps) remove_point(slot);
       } else if (wm_seconds_between(point.seen_ns, picture_ns_) > params_.keep_outside_s) {
         remove_point(slot);
@@ -76,7 +77,7 @@ int stereo_ekf::slot_of_known(int landmark) {
   if (filter_.point_count() == filter_.point_capacity() && !make_room()) return -1;
   const int slot = filter_.point_count();
   filter_.add_point(vec_of(known.p_m), sigma);
-  info()[slot] = {now_ns_, known.id, kOfMap};
+  info()[slot] = {now_ns_, now_ns_, WM_TIME_NONE, known.id, kOfMap};
   return slot;
 }
 
@@ -118,9 +119,19 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
   const point_view view = view_point(place, past);
   const int slot = filter_.point_count();
   filter_.add_point(place, view.by, view.A, noise);
-  info()[slot] = {picture_ns_, seen.id, 0};
+  info()[slot] = {picture_ns_, picture_ns_, WM_TIME_NONE, seen.id, 0};
   record.verdict = WM_FUSED;
   records.add(record);
+}
+
+// A sighting that does not fit the point whose number it has. Where one sighting alone stands against it, either may be
+// the wrong match: it begins again with the newer one, and whichever is wrong is contradicted by the next. (Left alone,
+// a point begun by a wrong match would stand far off, out of view, and turn away all that is seen of it.)
+void stereo_ekf::contradict_point(int slot, const wm_stereo &seen, const wm_innovation &blank, record_list records) {
+  info()[slot].misfit_ns = picture_ns_;
+  if (info()[slot].seen_ns != info()[slot].begun_ns) return;
+  remove_point(slot);
+  add_point(seen, blank, records);
 }
 
 size_t stereo_ekf::list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const {

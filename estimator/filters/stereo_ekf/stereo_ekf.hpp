@@ -29,10 +29,10 @@ class stereo_ekf {
   uint32_t motion_health() const { return motion_.health(); }
 
  private:
-  // A point of the state: whose it is and when it was seen last.
+  // A point of the state: whose it is, when it began, was seen last, and did not fit last.
   static constexpr int32_t kOfMap = -1;
   struct point_info {
-    wm_time_ns seen_ns;
+    wm_time_ns begun_ns, seen_ns, misfit_ns;
     int32_t id;
     int32_t unseen;  // kOfMap, or pictures in which it was expected and not seen, or did not fit
   };
@@ -73,6 +73,7 @@ class stereo_ekf {
   void end_picture();
   int find_slot(int32_t id) const;
   void add_point(const wm_stereo &seen, const wm_innovation &blank, record_list records);
+  void contradict_point(int slot, const wm_stereo &seen, const wm_innovation &blank, record_list records);
   bool make_room();
   void remove_point(int slot);
 

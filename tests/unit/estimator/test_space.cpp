@@ -287,6 +287,70 @@ void test_what_cannot_be_seen_is_not_learnt(void) {
   for (int i = 0; i < 3; i++) TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.999e-3, m.filter->variance(kTurn + i));
 }
 
+// Nor how the camera is mounted, or when it looks, from pictures alone: the vehicle's pose makes up for either. With
+// points that move by many corrections and a motion that says next to nothing, their variances must stay what they
+// were.
+void test_pictures_alone_do_not_tell_the_mounting_or_the_time(void) {
+  for (const head_state which : {kCameraRotation, kTimeOffset}) {
+    const double sigma = which == kCameraRotation ? 0.02 : 0.05;
+    head_model models[kHeadStates] = {};
+    models[which] = {sigma, 0, 0};
+    machine m(models, 4);
+    const mat3 axes = {{{0, 0, 1}, {-1, 0, 0}, {0, -1, 0}}};
+    m.filter->set_camera_axes(axes);
+    const vec3 v = {0.3, 0.1, 0}, w = {0.2, -0.1, 0.3};
+    double covariance[6][6] = {};
+    for (int i = 0; i < 6; i++) covariance[i][i] = i < 3 ? 1e-2 : 1e-3;
+    m.filter->set_pose({{5, -3, 2}, turn_by({0.1, 0.2, 0.3})}, covariance);
+    const vec3 truth[4] = {{8, -3, 2}, {7, -1, 2.5}, {8, -4, 1}, {6, -3, 4}};
+    int draw = 9000;
+    for (int step = 0; step < 60; step++) {
+      const double late_s = m.filter->head1(kTimeOffset, 0.0);
+      const mat3 R = m.filter->R() * matrix_of(turn_by(-late_s * w));
+      const vec3 at = m.filter->nominal().p - R * (late_s * v);
+      const mat3 B = axes * matrix_of(turn_by(m.filter->head3(kCameraRotation)));
+      const mat3 A = transposed(B) * transposed(R);
+      m.filter->set_turn_rate(w);
+      for (int k = 0; k < 4; k++) {
+        const bool fresh = step == 0;
+        const vec3 l = fresh ? truth[k] : m.filter->point(k);
+        const vec3 in_body = transposed_times(R, l - at);
+        row_block rows;
+        rows.rows = 3;
+        rows.add_columns(kPlace, 3);
+        rows.add_columns(kTurn, 3);
+        const int own = rows.add_columns(m.filter->at(which), which == kCameraRotation ? 3 : 1);
+        const mat3 turn = A * skew(l - m.filter->nominal().p), by_camera = skew(transposed_times(B, in_body));
+        const vec3 by_time = transposed_times(B, cross(w, in_body) + v);
+        for (int i = 0; i < 3; i++) {
+          for (int j = 0; j < 3; j++) {
+            rows.by[i][j] = -A.m[i][j];
+            rows.by[i][3 + j] = turn.m[i][j];
+            if (which == kCameraRotation) rows.by[i][own + j] = by_camera.m[i][j];
+          }
+          if (which == kTimeOffset) rows.by[i][own] = by_time[i];
+        }
+        if (fresh) {
+          m.filter->add_point(l, rows, A, 1e-4 * kIdentity3);
+          continue;
+        }
+        const int of_point = rows.add_columns(m.filter->point_state(k), 3);
+        for (int i = 0; i < 3; i++) {
+          for (int j = 0; j < 3; j++) rows.by[i][of_point + j] = A.m[i][j];
+          rows.innovation[i] = 0.05 * normal(draw++);
+          rows.noise[i] = 1e-4;
+        }
+        TEST_ASSERT_TRUE(m.filter->fuse(rows, {1e9, 1e9}).fused);
+      }
+      m.filter->settle();
+      m.filter->propagate({0.1, v, w, {1, 1, 1}, {1, 1, 1}});
+    }
+    const int state = m.filter->at(which);
+    for (int i = 0; i < kHeadWidth[which]; i++)
+      TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.98 * sigma, std::sqrt(m.filter->variance(state + i)));
+  }
+}
+
 void test_orientation_is_found_with_a_third_wrong(void) {
   for (int trial = 0; trial < 50; trial++) {
     auto consensus = std::make_unique<pose_consensus>();
@@ -326,6 +390,7 @@ int main(void) {
   RUN_TEST(test_sensor_states_swing_the_way_as_they_should);
   RUN_TEST(test_an_update_is_kalmans);
   RUN_TEST(test_what_cannot_be_seen_is_not_learnt);
+  RUN_TEST(test_pictures_alone_do_not_tell_the_mounting_or_the_time);
   RUN_TEST(test_orientation_is_found_with_a_third_wrong);
   RUN_TEST(test_no_orientation_of_a_line_or_of_contradictions);
   return UNITY_END();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // stereo_ekf through the contract: a made scene, exact truth, every attitude.
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <cstring>
@@ -33,6 +34,7 @@ struct scene {
   placed truth = {{0, 0, 0}, kNoTurn};
   double t_s = 0;
   uint64_t draws = 0;
+  double noise_v = 0.02, noise_w = 0.003;
 
   explicit scene(int count = 400) {
     motion.resize(wm_motion_params_table.bytes);
@@ -106,8 +108,8 @@ struct scene {
   void swim(double dt_s, const vec3 &v, const vec3 &w) {
     wm_event e = make::empty(t_s, WM_EVENT_TWIST6);
     for (int i = 0; i < 3; i++) {
-      e.as.twist6.v_mps[i] = v[i] + 0.02 * noise();
-      e.as.twist6.w_radps[i] = w[i] + 0.003 * noise();
+      e.as.twist6.v_mps[i] = v[i] + noise_v * noise();
+      e.as.twist6.w_radps[i] = w[i] + noise_w * noise();
     }
     TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &e));
     truth.p = truth.p + matrix_of(truth.q) * (dt_s * (mean_turn(dt_s * w) * v));
@@ -150,6 +152,32 @@ struct scene {
   double place_error() const { return length(vec_of(estimate().pose_map_base.p_m) - truth.p); }
   double turn_error() const { return length(turn_of(conjugate(quat_of(estimate().pose_map_base.q_xyzw)) * truth.q)); }
 };
+
+// Where the filter has a point; NaN where it doesn't have it.
+vec3 place_of(const scene &s, int32_t id) {
+  std::vector<wm_landmark> listed(256);
+  listed.resize(s.ekf->landmarks(s.state, listed.data(), nullptr, listed.size()));
+  for (const wm_landmark &l : listed)
+    if (l.id == id) return vec_of(l.p_m);
+  return {kAbsent, kAbsent, kAbsent};
+}
+
+// A point in view, far enough from the right picture's left edge to be matched wrongly there.
+wm_landmark one_to_mistake(const scene &s) {
+  double px[4];
+  for (const wm_landmark &l : s.points)
+    if (s.pixels(l, px) && px[2] > 300 && px[0] < 560) return l;
+  TEST_FAIL_MESSAGE("no such point");
+  return {};
+}
+
+void begin_slam(scene *s) {
+  s->set("slam.points", 100);
+  s->set("slam.keep_unseen_steps", 3);
+  s->set("slam.keep_outside_s", 1000);
+  s->map.clear();
+  s->begin();
+}
 
 void assert_sound(const wm_estimate &e) {
   const double *q = e.pose_map_base.q_xyzw;
@@ -268,6 +296,157 @@ void test_points_leave_when_unseen_and_are_found_again(void) {
   }
   s.swim(0.1, {0, 0, 0}, {0, 0, 0});
   TEST_ASSERT_EQUAL(0, count());
+}
+
+// A point begun by a wrong match stands anywhere, and all that is seen of it does not fit. It must not keep its number
+// only because the wrong place is out of view.
+void test_a_point_begun_by_a_wrong_match_begins_again(void) {
+  scene s;
+  begin_slam(&s);
+  const wm_landmark point = one_to_mistake(s);
+  const auto others = [&](const wm_landmark &l) { return l.id != point.id; };
+  double px[4];
+  s.pixels(point, px);
+  px[0] += 1.0;
+  px[2] -= 250;  // something else's
+  const std::vector<wm_landmark> all = s.points;
+  std::erase_if(s.points, [&](const wm_landmark &l) { return !others(l); });
+  s.look();
+  s.points = all;
+  TEST_ASSERT_EQUAL(WM_OK, s.take(s.seen(point, px)));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, length(place_of(s, point.id) - vec_of(point.p_m)));
+  s.swim(0.1, {0.1, 0, 0}, {0, 0, 0});
+  s.look();
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.2, length(place_of(s, point.id) - vec_of(point.p_m)));
+}
+
+// What several pictures agree about is not given up for one that doesn't; for more than keep_unseen_steps it is, be the
+// place where it was thought in view or not.
+void test_a_point_that_does_not_fit_any_more_leaves(void) {
+  scene s;
+  begin_slam(&s);
+  wm_landmark point = one_to_mistake(s);
+  for (int i = 0; i < 5; i++) {
+    s.look();
+    s.swim(0.1, {0, 0, 0}, {0, 0, 0});
+  }
+  for (int i = 0; i < 10; i++) s.swim(0.1, {0, 0, 0}, {0, 0, 1.5});
+  const vec3 before = place_of(s, point.id);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, length(before - vec_of(point.p_m)));
+  double px[4];
+  TEST_ASSERT_FALSE(s.pixels(point, px));
+  const vec3 there = s.truth.p + matrix_of(s.truth.q) * vec3{3.0, 0.2, 0.1};  // it has been carried into view
+  for (int i = 0; i < 3; i++) point.p_m[i] = there[i];
+  std::erase_if(s.points, [&](const wm_landmark &l) { return l.id == point.id; });
+  s.points.push_back(point);
+  for (int i = 0; i < 6; i++) {
+    const double off = length(place_of(s, point.id) - there);
+    if (i < 4) TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, off);
+    if (i == 5) TEST_ASSERT_LESS_THAN_DOUBLE(0.2, off);
+    s.look();
+    s.swim(0.1, {0, 0, 0}, {0, 0, 0});
+  }
+}
+
+// With everything else known exactly, a row's variance is the square of its derivative by the pictures' time offset:
+// against pixels of the pose a little earlier. Then pictures that are late are found to be.
+void test_pictures_that_are_late(void) {
+  const double sigma_s = 0.02;
+  const vec3 twists[][2] = {{{0.5, 0, 0}, {0, 0, 0}},
+                            {{0, 0.5, 0}, {0, 0, 0}},
+                            {{0, 0, 0.5}, {0, 0, 0}},
+                            {{0, 0, 0}, {0.4, 0, 0}},
+                            {{0, 0, 0}, {0, 0.4, 0}},
+                            {{0, 0, 0}, {0, 0, 0.4}},
+                            {{0.4, 0.1, -0.2}, {0.3, -0.2, 0.4}}};
+  for (const auto &[v, w] : twists) {
+    scene s;
+    s.set("states.time_offset_sigma_s", sigma_s);
+    s.set("noise.pixel_px", 0.001);
+    s.set("noise.v_mps", 1e-7);
+    s.set("noise.w_radps", 1e-7);
+    s.noise_v = s.noise_w = 0;
+    for (wm_landmark &l : s.map) l.sigma_m = 1e-7;
+    s.setup.start.sigma_xy_m = s.setup.start.sigma_heading_rad = 1e-7;
+    s.begin();
+    for (int i = 0; i < 40; i++) {
+      s.swim(0.1, v, w);
+      TEST_ASSERT_EQUAL(WM_OK, s.take(make::empty(s.t_s, WM_EVENT_LOOKED)));
+    }
+    const placed now = s.truth;
+    double here[4], earlier[4];
+    const wm_landmark *shown = nullptr;
+    for (const wm_landmark &l : s.points)
+      if (s.pixels(l, here)) shown = &l;
+    TEST_ASSERT_NOT_NULL(shown);
+    s.pixels(*shown, here);
+    const double step_s = 1e-5;
+    s.truth.p = now.p - matrix_of(now.q) * (step_s * v);
+    s.truth.q = normalized(now.q * turn_by(-step_s * w));
+    s.pixels(*shown, earlier);
+    s.truth = now;
+    for (const int only : {0, 2}) {  // of the left picture, then of the right one: the first row of each
+      const bool left = only == 0;
+      double px[4] = {left ? here[0] : kAbsent, left ? here[1] : kAbsent, left ? kAbsent : here[2],
+                      left ? kAbsent : here[3]};
+      std::vector<char> copy(static_cast<char *>(s.state), static_cast<char *>(s.state) + s.bytes);
+      wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];
+      TEST_ASSERT_EQUAL(WM_OK, s.take(s.seen(*shown, px), records));
+      const double slope = (earlier[only] - here[only]) / step_s;
+      TEST_ASSERT_DOUBLE_WITHIN(0.01 * std::fabs(slope) * sigma_s + 0.01, std::fabs(slope) * sigma_s,
+                                std::sqrt(records[0].variance));
+      std::memcpy(s.state, copy.data(), s.bytes);
+    }
+  }
+}
+
+struct offset_found {
+  double mean_s, mean_error_s, nees;
+};
+
+// Eight drives whose pictures are `late_s` older than their stamps, with gyros of some noise; the twist swings so far.
+offset_found find_offset(double late_s, double swing_radps) {
+  offset_found out = {0, 0, 0};
+  const int drives = 8;
+  for (int drive = 0; drive < drives; drive++) {
+    scene s;
+    s.draws = static_cast<uint64_t>(drive) << 32;
+    s.set("states.time_offset_sigma_s", 0.02);
+    s.set("noise.w_radps", 0.005);
+    s.noise_w = 0.005;
+    s.begin();
+    for (int i = 0; i < 500; i++) {
+      const vec3 v = {0.1, 0, 0};
+      const vec3 w = {0.1 + swing_radps * std::cos(0.014 * i), 0, 0.2 + swing_radps * std::sin(0.02 * i)};
+      s.swim(0.02, v, w);
+      if (i % 5 != 4) continue;
+      const placed now = s.truth;
+      s.truth.p = now.p - matrix_of(now.q) * (late_s * (mean_turn(-late_s * w) * v));
+      s.truth.q = normalized(now.q * turn_by(-late_s * w));
+      s.look();
+      s.truth = now;
+    }
+    wm_calibration_value offset;
+    TEST_ASSERT_EQUAL(1, s.ekf->calibration(s.state, &offset, 1));
+    TEST_ASSERT_EQUAL_STRING("stereo.time_offset_s", offset.name);
+    out.mean_s += offset.value / drives;
+    out.mean_error_s += (offset.value - late_s) / drives;
+    out.nees += square((offset.value - late_s) / offset.sigma) / drives;
+  }
+  return out;
+}
+
+// A twist that swings tells when the pictures were taken, to a millisecond. One that is even does not: a lag is a pose
+// that is off. Then the offset must stay what was known of it.
+void test_the_time_of_pictures_is_told_by_a_twist_that_swings_alone(void) {
+  for (const double late_s : {0.0, 0.02, -0.02}) {
+    const offset_found swinging = find_offset(late_s, 0.3);
+    TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.0, swinging.mean_error_s);
+    TEST_ASSERT_LESS_THAN_DOUBLE(2.0, swinging.nees);
+    const offset_found even = find_offset(late_s, 0.0);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.0, even.mean_s);
+    TEST_ASSERT_LESS_THAN_DOUBLE(2.0, even.nees);
+  }
 }
 
 void test_a_wrong_match_is_refused_and_one_picture_is_enough(void) {
@@ -398,6 +577,10 @@ int main(void) {
   RUN_TEST(test_no_attitude_is_singular);
   RUN_TEST(test_a_day_without_drift_of_norm_or_symmetry);
   RUN_TEST(test_points_leave_when_unseen_and_are_found_again);
+  RUN_TEST(test_a_point_begun_by_a_wrong_match_begins_again);
+  RUN_TEST(test_a_point_that_does_not_fit_any_more_leaves);
+  RUN_TEST(test_pictures_that_are_late);
+  RUN_TEST(test_the_time_of_pictures_is_told_by_a_twist_that_swings_alone);
   RUN_TEST(test_a_wrong_match_is_refused_and_one_picture_is_enough);
   RUN_TEST(test_ranges_depth_and_heading_are_rows_too);
   RUN_TEST(test_nonsense_in_pixels_is_refused);
