@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// Work for tests/bench/instructions.sh to count the instructions of: wm_instructions WORK, once warm, once counted.
+// Work to count the instructions of: wm_instructions WORK [TIMES], once warm, then counted. instructions.sh counts
+// inside of wm_counted; where no tool can (tests/boards/instructions.py), what more TIMES take is what one takes.
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <functional>
+#include <vector>
 
 #include "drawn_map.h"
 #include "drawn_picture.h"
+#include "landmark_drive.h"
 #include "vision/edges/hough.hpp"
 
 // Callgrind counts inside of this function alone.
@@ -16,9 +20,11 @@ extern "C" __attribute__((noinline)) void wm_counted(const std::function<void()>
 
 namespace {
 
+int times = 1;
+
 void count(const std::function<void()> &work) {
   work();
-  wm_counted(&work);
+  for (int i = 0; i < times; i++) wm_counted(&work);
 }
 
 void windows() {
@@ -39,17 +45,37 @@ void windows() {
 
 int main(int argc, char **argv) {
   const char *what = argc > 1 ? argv[1] : "";
+  if (argc > 2) times = std::atoi(argv[2]);
   if (!std::strcmp(what, "particles_200") || !std::strcmp(what, "particles_2000")) {
     bench::cloud_at_work work(std::strlen(what) == 13 ? 200 : 2000);
     count([&] { work.weigh(); });
+  } else if (!std::strcmp(what, "particle_step_200") || !std::strcmp(what, "particle_step_2000")) {
+    bench::cloud_at_work work(std::strlen(what) == 17 ? 200 : 2000);
+    count([&] {
+      work.move();
+      work.weigh();
+      work.resample();
+    });
+  } else if (!std::strcmp(what, "landmark_step")) {
+    bench::landmark_drive drive(bench::kCalibrationStates, false);
+    std::vector<bench::landmark_drive::step> steps;  // as many however often it is counted
+    for (int i = 0; i < 1000; i++) steps.push_back(drive.at(i));
+    size_t i = 0;
+    count([&] {
+      const auto &now = steps[i++ % steps.size()];
+      drive.predict(now);
+      (void)drive.correct(now);
+    });
   } else if (!std::strcmp(what, "window_50x50")) {
     windows();
   } else if (!std::strcmp(what, "picture_rays") || !std::strcmp(what, "picture_windows")) {
     bench::edges_at_work work(std::strcmp(what, "picture_rays") != 0);
     count([&] { (void)work.look(); });
   } else {
-    std::fprintf(stderr,
-                 "usage: wm_instructions particles_200|particles_2000|window_50x50|picture_rays|picture_windows\n");
+    std::fprintf(
+        stderr,
+        "usage: wm_instructions landmark_step|particles_200|particles_2000|particle_step_200|particle_step_2000|"
+        "window_50x50|picture_rays|picture_windows [TIMES]\n");
     return 2;
   }
   return 0;

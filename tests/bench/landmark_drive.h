@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// landmark_ekf on a circle of 3 m about the origin, for benchmarks: one of four landmarks is seen after each twist.
+#ifndef WAYMARK_BENCH_LANDMARK_DRIVE_H
+#define WAYMARK_BENCH_LANDMARK_DRIVE_H
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "waymark/estimator.h"
+
+namespace bench {
+
+struct setting {
+  const char *key;
+  double value;
+};
+
+// What a shipped configuration has beside the pose.
+inline const std::vector<setting> kCalibrationStates = {
+    {"states.speed_scale_sigma", 0.05},         {"states.yaw_rate_scale_sigma", 0.05},
+    {"states.yaw_rate_bias_sigma_radps", 0.01}, {"states.lag_sigma_s", 0.05},
+    {"states.sensor_yaw_sigma_rad", 0.05},      {"states.sensor_time_offset_sigma_s", 0.05},
+};
+
+class landmark_drive {
+ public:
+  landmark_drive(const std::vector<setting> &settings, bool range)
+      : range_(range), motion_(wm_motion_params_table.bytes), params_(ekf_->params.bytes) {
+    wm_params_defaults(&wm_motion_params_table, motion_.data());
+    wm_params_defaults(&ekf_->params, params_.data());
+    for (const setting &s : settings)
+      for (size_t i = 0; i < ekf_->params.count; i++) {
+        const wm_param &p = ekf_->params.params[i];
+        if (std::strcmp(p.key, s.key) != 0) continue;
+        const int32_t whole = (int32_t)s.value;
+        if (p.type == WM_PARAM_F64)
+          std::memcpy(&params_[p.offset], &s.value, sizeof s.value);
+        else
+          std::memcpy(&params_[p.offset], &whole, sizeof whole);
+      }
+    std::strcpy(sensor_.name, "eye");
+    sensor_.bearing_sigma_rad = 0.02;
+    sensor_.range_sigma_m = 0.1;
+    sensor_.max_range_m = 100;
+    for (int i = 0; i < 4; i++)
+      landmarks_[i] = {i, {6 * std::cos(1.57 * i), 6 * std::sin(1.57 * i), 0}, 0.01, kAbsent, {}, 0};
+    setup_.motion = reinterpret_cast<const wm_motion_params *>(motion_.data());
+    setup_.wheels = {kAbsent, kAbsent, kAbsent, kAbsent, kAbsent, kAbsent, 0, {}, {}};
+    setup_.sensors = &sensor_;
+    setup_.sensor_count = 1;
+    setup_.landmarks = landmarks_;
+    setup_.landmark_count = 4;
+    setup_.start = {WM_TIME_NONE, {3, 0, 0}, {0, 0, 0, 1}, 1.5707963, 0.05, 0.05};
+    const char *why = "";
+    const size_t bytes = ekf_->state_bytes(params_.data(), &setup_, &why);
+    if (bytes == 0) {
+      std::printf("landmark_ekf: %s\n", why);
+      std::exit(1);
+    }
+    state_ = std::aligned_alloc(16, (bytes + 15) / 16 * 16);
+    ekf_->init(state_, params_.data(), &setup_);
+  }
+  ~landmark_drive() { std::free(state_); }
+  landmark_drive(const landmark_drive &) = delete;
+  landmark_drive &operator=(const landmark_drive &) = delete;
+
+  // What is measured and seen 20 ms after the step before.
+  struct step {
+    wm_event twist, seen;
+  };
+  step at(int i) const {
+    wm_event twist{}, seen{};
+    const double t = 0.02 * i, turn = 1.5707963 + 0.3 * t;
+    twist.t_ns = seen.t_ns = wm_ns_from_seconds(t);
+    twist.kind = WM_EVENT_TWIST2;
+    twist.as.twist2 = {0.9, 0.3};
+    const double x = 3 * std::sin(turn), y = -3 * std::cos(turn);
+    const wm_landmark &l = landmarks_[i % 4];
+    const double dx = l.p_m[0] - x, dy = l.p_m[1] - y;
+    seen.kind = WM_EVENT_SIGHTING;
+    seen.as.sighting = {0,
+                        l.id,
+                        std::remainder(std::atan2(dy, dx) - turn, 6.283185307179586),
+                        range_ ? std::hypot(dx, dy) : kAbsent,
+                        kAbsent,
+                        kAbsent};
+    return {twist, seen};
+  }
+  void predict(const step &now) { ekf_->predict(state_, &now.twist); }
+  // True if the sighting was fused.
+  bool correct(const step &now) {
+    size_t count = 0;
+    ekf_->correct(state_, &now.seen, records_, 8, &count);
+    return count > 0 && records_[0].verdict == WM_FUSED;
+  }
+
+ private:
+  static constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
+  const wm_estimator *ekf_ = wm_estimator_find("landmark_ekf");
+  bool range_;
+  std::vector<char> motion_, params_;
+  wm_sensor sensor_{};
+  wm_landmark landmarks_[4];
+  wm_setup setup_{};  // the estimator reads it as long as it lives
+  wm_innovation records_[8];
+  void *state_;
+};
+
+}  // namespace bench
+
+#endif

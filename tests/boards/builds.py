@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A build of ours and how its programs are started here: as they are, or under qemu-user with the sysroot's libraries."""
+import pathlib
+import re
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+class Build:
+    def __init__(self, folder):
+        self.folder = pathlib.Path(folder).resolve()
+        cache = self.folder / "CMakeCache.txt"
+        if not cache.exists():
+            raise SystemExit(f"{folder}: not a build (no CMakeCache.txt); ./dev build, ./dev board BOARD build")
+        found = re.search(r"^CMAKE_TOOLCHAIN_FILE:\w+=(.+)$", cache.read_text(), re.M)
+        self.board = pathlib.Path(found[1]).stem if found else "this computer"
+        arch = re.search(r"^set\(WM_ARCH (\w+)\)", pathlib.Path(found[1]).read_text(), re.M)[1] if found else None
+        self.arch = arch or "x86-64"
+        self.sysroot = (ROOT / ".cache/sysroot" / arch).resolve() if arch else None
+        self.qemu = {"arm64": "qemu-aarch64", "armhf": "qemu-arm"}.get(arch)
+
+    def command(self, program, *words, emulator_options=()):
+        """The words to start `program` (a path inside the build) with."""
+        start = [self.qemu, *emulator_options, "-L", self.sysroot] if self.qemu else []
+        return [str(word) for word in (*start, self.folder / program, *words)]
