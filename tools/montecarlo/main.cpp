@@ -94,6 +94,8 @@ void parse(CLI::App *app, Arguments *a) {
   app->add_option("--blind-from", a->six.blind_from_s,
                   "six degrees of freedom: no picture shows anything from here, s");
   app->add_option("--blind-to", a->six.blind_to_s, "... to here");
+  app->add_option("--points-seen", a->six.points_per_picture,
+                  "six degrees of freedom: only so many points of each pair of pictures");
   app->add_option("--csv", a->csv, "writes the figures of each step of 0.1 s here");
   app->footer(
       "example: waymark-montecarlo config/worlds/crossing.yaml --config config/crossing.yaml --seeds 200\n"

@@ -3,6 +3,7 @@
 // and how near does it come to what is possible at all (efficiency)? docs/consistency.md.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -86,6 +87,7 @@ struct Options6 {
   double settled_s = 2;                     // figures of a run count from here ...
   double until_s = 1e9;                     // ... to here
   double blind_from_s = 0, blind_to_s = 0;  // no picture shows anything meanwhile
+  size_t points_per_picture = SIZE_MAX;     // the first ones that are in both pictures; others are left out
 };
 
 // As run(), for a scenario that swims.

@@ -151,10 +151,17 @@ wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const 
   const auto is_judged = [&options](double t_s) { return t_s >= options.settled_s && t_s <= options.until_s; };
   Run6 run{recording.seed, 0, 0, 0};
   uint64_t judged = 0;
-  size_t next = 0;
+  size_t next = 0, in_picture = 0;
+  wm_time_ns picture_ns = WM_TIME_NONE;
   for (const wm_event &e : events_of(recording)) {
     const double event_s = static_cast<double>(e.t_ns - recording.clock_start_ns) * 1e-9;
     if (e.kind == WM_EVENT_STEREO && event_s >= options.blind_from_s && event_s < options.blind_to_s) continue;
+    if (e.kind == WM_EVENT_STEREO && options.points_per_picture != SIZE_MAX) {
+      if (e.t_ns != picture_ns) in_picture = 0;
+      picture_ns = e.t_ns;
+      const bool in_both = !std::isnan(e.as.stereo.left_px[0]) && !std::isnan(e.as.stereo.right_px[0]);
+      if (!in_both || in_picture++ >= options.points_per_picture) continue;
+    }
     if (!wm_event_is_motion(&e)) {
       wm_innovation innovations[WM_INNOVATIONS_PER_EVENT_MAX];
       size_t count = 0;

@@ -67,6 +67,17 @@ void test_known_points_from_a_start_20_m_wrong(void) {
   is_consistent(s);
 }
 
+void test_four_points_a_picture_suffice(void) {
+  Options6 options = {1, points_seeds};
+  options.points_per_picture = 4;
+  const Statistics6 s = drives(world("seabed-points.yaml"), options);
+  for (const auto &run : s.each) TEST_ASSERT_LESS_THAN_DOUBLE(0.01, run.position_rms_m);
+  // Ten pairs of pictures a second for 100 s, and not one point more.
+  TEST_ASSERT_LESS_OR_EQUAL_UINT64(s.runs * 1001 * 4, s.fused + s.rejected);
+  TEST_ASSERT_GREATER_THAN_UINT64(s.runs * 1001 * 3, s.fused);
+  is_consistent(s);
+}
+
 // Paper: about 30 points a step that nobody measured: 5 cm, points 2 cm off, 6.3 % wrong.
 void test_points_found_on_the_way(void) {
   const Statistics6 s = drives(world("seabed-slam.yaml"), {1, slam_seeds});
@@ -75,8 +86,9 @@ void test_points_found_on_the_way(void) {
   const auto points = static_cast<double>(s.points);
   std::printf("%.0f points, mean error %.4f m, %.2f %% wrong\n", points, s.point_error_sum_m / points,
               100 * static_cast<double>(s.wrong_points) / points);
-  // A point's depth by pixels of 0.5 px, and the way's own drift up to it: few drives scatter by a third about 0.010.
-  TEST_ASSERT_LESS_THAN_DOUBLE(slam_seeds >= 200 ? 0.012 : 0.018, s.point_error_sum_m / points);
+  // A point's depth by pixels of 0.5 px, and the way's own drift until the round is closed. One point begun by a wrong
+  // match and left alone is metres off, and would be seen here.
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.01, s.point_error_sum_m / points);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.01, static_cast<double>(s.wrong_points) / points);
 }
 
@@ -100,6 +112,7 @@ int main(int argc, char **argv) {
   if (argc > 2) slam_seeds = std::strtoull(argv[2], nullptr, 10);
   UNITY_BEGIN();
   RUN_TEST(test_known_points_from_a_start_20_m_wrong);
+  RUN_TEST(test_four_points_a_picture_suffice);
   RUN_TEST(test_points_found_on_the_way);
   RUN_TEST(test_pictures_gone_for_20_s);
   return UNITY_END();
