@@ -45,6 +45,9 @@ static const wm_param kParams[] = {
     F64("black_box.keep_s", black_box_keep_s, 60, 1, 3600,
         "s. So much and up to twice as much of what was fused is on the disk at any time, for when the robot gets lost "
         "or the run dies; a quarter more of what follows a loss."),
+    F64("black_box.pictures_hz", black_box_pictures_hz, 0, 0, 100,
+        "Hz. So many pictures a second of each camera that a detector looks through are kept with it; 0: none. One of "
+        "640 x 400 is 256 kB (grey), or some 40 (MJPEG)."),
     I32("realtime.loop_hz", realtime_loop_hz, 200, 1, 10000,
         "Hz. How often the estimator's thread wakes. At 200 a datum waits 5 ms at most."),
     I32("realtime.priority", realtime_priority, 80, 0, 98,

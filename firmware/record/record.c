@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "avi_writer.h"
+#include "copy_map.h"
 #include "waymark/clock.h"
 #include "waymark/text.h"
 
@@ -165,6 +166,8 @@ static wm_status write_about(recorder *self, wm_error *err) {
   if (status == WM_OK) status = write_text(self, "config.yaml", config->text, config->text_length, err);
   if (status == WM_OK) status = copy_file(self, config->overrides.calibration, "calibration.yaml", err);
   if (status == WM_OK) status = copy_file(self, config->overrides.landmarks, "landmarks.csv", err);
+  if (status == WM_OK && config->overrides.map[0])
+    status = copy_map(config->overrides.map, self->options->out_dir, err);
   if (status == WM_OK && config->devices.can_count > 0)
     status = copy_file(self, config->devices.can[0].dbc, "vehicle.dbc", err);
   if (status == WM_OK && config->devices.can_count > 0)

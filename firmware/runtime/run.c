@@ -153,7 +153,9 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
                 &self->assembly, self->options->say ? self->options->say : say_nothing, self->options->say_context,
                 NULL);
   black_box_open(&self->sink.box, wm_recording_is_robot(recording) ? self->config->black_box : "",
-                 params->black_box_keep_s, &self->assembly, self->options->say, self->options->say_context);
+                 params->black_box_keep_s, params->black_box_pictures_hz, &self->assembly, self->options->say,
+                 self->options->say_context);
+  wm_vision_tell_pictures(self->assembly.vision, black_box_picture, &self->sink.box);
   notify_open(&self->sink.notify);
   self->sink.keeps_pose = wm_recording_is_robot(recording) && self->config->saved_pose[0];
   return WM_OK;

@@ -31,11 +31,12 @@ static void path_of(const black_box *self, const char *name, char out[NAME_MAX_B
 
 // ── what is kept ────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// Number of a kept file ("lost-0012-now.wmlog"); 0 where it is none.
+// Number of a kept file ("lost-0012-now.wmlog", "died-0012-front-a.avi"); 0 where it is none.
 static unsigned number_of(const char *name) {
   unsigned number = 0;
-  char what[8], part[16];
-  return sscanf(name, "%4[a-z]-%4u-%6[a-z].wmlog", what, &number, part) == 3 ? number : 0;
+  char what[8];
+  if (sscanf(name, "%4[a-z]-%4u-", what, &number) != 2) return 0;
+  return strcmp(what, "lost") == 0 || strcmp(what, "died") == 0 ? number : 0;
 }
 
 // The largest number there; those that are older than the newest BLACK_BOX_KEPT_MAX are removed.
@@ -66,6 +67,8 @@ static void keep(black_box *self, const char *what) {
     path_of(self, name, to);
     if (rename(from, to) != 0 && errno != ENOENT) unwritable(self, strerror(errno));
   }
+  int failed = box_pictures_keep(self->folder, what, number);
+  if (failed) unwritable(self, strerror(failed));
   say(self, "kept as ", to);
 }
 
@@ -106,8 +109,8 @@ static void begin_log(black_box *self, const wm_estimate *pose, wm_time_ns now_n
   if (!self->is_open) unwritable(self, err.text);
 }
 
-void black_box_open(black_box *self, const char *folder, double keep_s, const wm_assembly *assembly, wm_finding_fn tell,
-                    void *say_context) {
+void black_box_open(black_box *self, const char *folder, double keep_s, double pictures_hz, const wm_assembly *assembly,
+                    wm_finding_fn tell, void *say_context) {
   memset(self, 0, sizeof *self);
   self->say = tell;
   self->say_context = say_context;
@@ -120,6 +123,7 @@ void black_box_open(black_box *self, const char *folder, double keep_s, const wm
   if (mkdir(folder, 0777) != 0 && errno != EEXIST) unwritable(self, strerror(errno));
   path_of(self, "now", now);
   if (has_died(now)) keep(self, "died");
+  box_pictures_open(&self->pictures, folder, keep_s, pictures_hz);
 }
 
 void black_box_event(black_box *self, const wm_event *event) {
@@ -140,7 +144,15 @@ void black_box_pose(black_box *self, const wm_estimate *pose, wm_time_ns now_ns)
   self->kept_from_ns = self->rotate_ns = WM_TIME_NONE;
 }
 
+void black_box_picture(void *context, size_t camera, const char *name, const wm_frame *frame,
+                       const wm_camera_raw *raw) {
+  black_box *self = context;
+  box_pictures_put(&self->pictures, camera, name, frame, raw);
+}
+
 void black_box_flush(black_box *self) {
+  int failed = atomic_exchange(&self->pictures.failed, 0);
+  if (failed) unwritable(self, strerror(failed));
   if (!self->is_open) return;
   wm_log_flush(&self->log);
   if (self->log.failed) unwritable(self, strerror(self->log.failed));
@@ -150,4 +162,5 @@ void black_box_close(black_box *self) {
   if (!self->folder[0]) return;
   close_log(self);
   if (self->kept_from_ns != WM_TIME_NONE) keep(self, "lost");
+  box_pictures_close(&self->pictures);
 }

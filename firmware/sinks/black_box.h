@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The last seconds of what was fused, kept where the robot got lost or the run died: event logs that replay (each from
-// the pose at its beginning). In the folder: now.wmlog and before.wmlog, which take turns and hold between one and two
-// times `keep_s`; and what was kept: lost-0001-before.wmlog, lost-0001-now.wmlog, died-0002-... . Of the sink's thread.
+// The last seconds of what was fused, and of what the cameras saw, kept where the robot got lost or the run died: event
+// logs that replay (each from the pose at its beginning). In the folder: now.wmlog and before.wmlog, which take turns
+// and hold between one and two times `keep_s`; and what was kept: lost-0001-before.wmlog, lost-0001-now.wmlog,
+// died-0002-... . Of the sink's thread.
 #ifndef WM_FIRMWARE_BLACK_BOX_H
 #define WM_FIRMWARE_BLACK_BOX_H
 
+#include "box_pictures.h"
 #include "waymark/assembly.h"
 #include "waymark/eventlog.h"
 #include "waymark/replay.h"
@@ -19,17 +21,20 @@ typedef struct black_box {
   int is_open, was_tracking, said_unwritable;
   wm_time_ns rotate_ns;     // the present log ends then; WM_TIME_NONE: it has not begun
   wm_time_ns kept_from_ns;  // when what happened is to be kept; WM_TIME_NONE: nothing happened
+  box_pictures pictures;
   wm_finding_fn say;
   void *say_context;
 } black_box;
 
 // Keeps what a run that died left behind. With an empty `folder` there is no black box, and nothing below does
 // anything. What can't be written is said once, and localizing goes on. `assembly` outlives it.
-void black_box_open(black_box *self, const char *folder, double keep_s, const wm_assembly *assembly, wm_finding_fn say,
-                    void *say_context);
+void black_box_open(black_box *self, const char *folder, double keep_s, double pictures_hz, const wm_assembly *assembly,
+                    wm_finding_fn say, void *say_context);
 void black_box_event(black_box *self, const wm_event *event);
 // The newest pose: a log begins with one, and a loss is seen by it. `now_ns`: monotonic.
 void black_box_pose(black_box *self, const wm_estimate *pose, wm_time_ns now_ns);
+// For wm_vision_tell_pictures: `context` is the black box. Of the cameras' threads.
+void black_box_picture(void *context, size_t camera, const char *name, const wm_frame *frame, const wm_camera_raw *raw);
 // Hands what is buffered to the system. Once a second.
 void black_box_flush(black_box *self);
 // In order: what is in it is not kept.

@@ -14,6 +14,8 @@
 // A doubtful pose is kept with its doubt: an older one would be as far off, and not say so.
 #define SIGMA_XY_MAX_M 50.0
 #define SIGMA_HEADING_MAX_RAD 1.5
+#define GOES_ON_S 2.0
+#define DRIVES_S 10.0
 
 // ── writing ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
@@ -60,16 +62,20 @@ static int rename_through(const char *from, const char *to) {
   return 0;
 }
 
+static double finite_or_0(double value) { return isfinite(value) ? value : 0; }
+
 wm_status wm_saved_pose_write(const char *path, const wm_estimate *e, double utc_s, wm_error *err) {
   char text[640], beside[WM_PATH_MAX + 8];
   const double *p = e->pose_map_base.p_m, *q = e->pose_map_base.q_xyzw;
-  int length = snprintf(text, sizeof text,
-                        "# Where the robot was last; written and read by waymark run.\n"
-                        "format: waymark-pose/1\nutc_s: %.3f\n"
-                        "pose: {x_m: %.6f, y_m: %.6f, z_m: %.6f, heading_rad: %.9f, qx: %.12f, qy: %.12f, qz: %.12f, "
-                        "qw: %.12f, sigma_xy_m: %.6f, sigma_heading_rad: %.6f}\n",
-                        utc_s, p[0], p[1], p[2], e->heading_rad, q[0], q[1], q[2], q[3],
-                        fmax(sigma_xy(e->covariance), 1e-6), fmax(sigma_heading(e->covariance), 1e-6));
+  int length =
+      snprintf(text, sizeof text,
+               "# Where the robot was last; written and read by waymark run.\n"
+               "format: waymark-pose/1\nutc_s: %.3f\n"
+               "pose: {x_m: %.6f, y_m: %.6f, z_m: %.6f, heading_rad: %.9f, qx: %.12f, qy: %.12f, qz: %.12f, "
+               "qw: %.12f, sigma_xy_m: %.6f, sigma_heading_rad: %.6f}\n"
+               "speed_mps: %.4f\nrate_radps: %.5f\n",
+               utc_s, p[0], p[1], p[2], e->heading_rad, q[0], q[1], q[2], q[3], fmax(sigma_xy(e->covariance), 1e-6),
+               fmax(sigma_heading(e->covariance), 1e-6), finite_or_0(e->v_mps[0]), finite_or_0(e->w_radps[2]));
   (void)snprintf(beside, sizeof beside, "%s.new", path);
   int fd = open(beside, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (fd < 0) return wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(errno));
@@ -86,7 +92,8 @@ wm_status wm_saved_pose_write(const char *path, const wm_estimate *e, double utc
 static wm_status read_root(const wm_yaml_node *root, wm_saved_pose *out, wm_error *err) {
   char format[64];
   wm_yaml_node version = wm_yaml_get(root, "format"), utc = wm_yaml_get(root, "utc_s"),
-               pose = wm_yaml_get(root, "pose");
+               pose = wm_yaml_get(root, "pose"), speed = wm_yaml_get(root, "speed_mps"),
+               rate = wm_yaml_get(root, "rate_radps");
   if (!wm_yaml_is_map(root) || !wm_yaml_there(&version) || !wm_yaml_there(&utc) || !wm_yaml_there(&pose))
     return wm_yaml_fail(root, err, "is no saved pose (format, utc_s, pose)");
   wm_status status = wm_yaml_string(&version, format, sizeof format, err);
@@ -94,6 +101,8 @@ static wm_status read_root(const wm_yaml_node *root, wm_saved_pose *out, wm_erro
     return wm_yaml_fail(&version, err, "'%s' is not a format that this program reads; it reads waymark-pose/1", format);
   if (status == WM_OK) status = wm_yaml_f64(&utc, -1e12, 1e12, &out->utc_s, err);
   if (status == WM_OK) status = wm_start_read(&pose, &out->start, err);
+  if (status == WM_OK && wm_yaml_there(&speed)) status = wm_yaml_f64(&speed, -1000, 1000, &out->speed_mps, err);
+  if (status == WM_OK && wm_yaml_there(&rate)) status = wm_yaml_f64(&rate, -1000, 1000, &out->rate_radps, err);
   out->start.t_ns = WM_TIME_NONE;
   if (status == WM_OK && !isfinite(out->start.p_m[0] + out->start.p_m[1] + out->start.heading_rad))
     return wm_yaml_fail(&pose, err, "x_m, y_m or heading_rad is missing");
@@ -112,13 +121,33 @@ wm_status wm_saved_pose_read(const char *path, wm_saved_pose *out, wm_error *err
   return status;
 }
 
+// On along the arc that it drove.
+static void go_on(wm_start *start, double way_m, double turn_rad) {
+  double middle = start->heading_rad + 0.5 * turn_rad, half = 0.5 * turn_rad;
+  double s = sin(half), c = cos(half), *q = start->q_xyzw, x = q[0], y = q[1], z = q[2], w = q[3];
+  start->p_m[0] += way_m * cos(middle);
+  start->p_m[1] += way_m * sin(middle);
+  start->heading_rad = remainder(start->heading_rad + turn_rad, 2 * M_PI);
+  // Turned about the map's z axis.
+  q[0] = c * x - s * y;
+  q[1] = c * y + s * x;
+  q[2] = c * z + s * w;
+  q[3] = c * w - s * z;
+}
+
+static double together(double a, double b, double c) { return sqrt(a * a + b * b + c * c); }
+
 // A clock that went back (a board without a battery, before its time is set) tells nothing of the age.
 int wm_saved_pose_start(const wm_saved_pose *saved, double utc_s, double max_age_s, double moved_m, double moved_rad,
                         wm_start *out) {
-  if (utc_s - saved->utc_s > max_age_s) return 0;
+  double age_s = utc_s - saved->utc_s;
+  if (age_s > max_age_s) return 0;
   *out = saved->start;
-  out->sigma_xy_m = sqrt(out->sigma_xy_m * out->sigma_xy_m + moved_m * moved_m);
-  out->sigma_heading_rad = sqrt(out->sigma_heading_rad * out->sigma_heading_rad + moved_rad * moved_rad);
+  int drives = age_s >= 0 && age_s <= DRIVES_S;
+  double on_s = drives ? fmin(age_s, GOES_ON_S) : 0, blind_s = drives ? age_s : GOES_ON_S;
+  go_on(out, saved->speed_mps * on_s, saved->rate_radps * on_s);
+  out->sigma_xy_m = together(out->sigma_xy_m, moved_m, saved->speed_mps * blind_s);
+  out->sigma_heading_rad = together(out->sigma_heading_rad, moved_rad, saved->rate_radps * blind_s);
   return 1;
 }
 

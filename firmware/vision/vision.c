@@ -197,6 +197,17 @@ void wm_vision_look_only_at(wm_vision *self, size_t i, wm_seen *seen, size_t cou
   vision_look_only_at(&self->sources[i], seen, count);
 }
 
+void wm_vision_tell_pictures(wm_vision *self, wm_picture_fn tell, void *context) {
+  size_t cameras = 0;
+  for (size_t i = 0; i < wm_vision_count(self); i++) {
+    vision_source *s = &self->sources[i];
+    s->tell_picture = tell;
+    s->tell_context = context;
+    s->first_camera = cameras;
+    cameras += s->devices.count;
+  }
+}
+
 // ── memory, start ───────────────────────────────────────────────────────────────────────────────────────────────────
 
 size_t wm_vision_needs(wm_vision *self, wm_arena_need *needs) {

@@ -94,6 +94,16 @@ static wm_status decode(vision_source *self, wm_frame *frames, wm_error *err) {
   return apart_ns <= PAIR_TOLERANCE_NS && apart_ns >= -PAIR_TOLERANCE_NS ? WM_OK : WM_AGAIN;
 }
 
+static void tell_pictures(const vision_source *self, const wm_frame *frames) {
+  if (!self->tell_picture) return;
+  for (uint32_t i = 0; i < self->devices.count; i++) {
+    wm_camera_raw raw;
+    wm_camera_device_raw(self->devices.devices[i], &raw);
+    self->tell_picture(self->tell_context, self->first_camera + i, self->view.rig->cameras[self->cameras[i]].name,
+                       &frames[i], &raw);
+  }
+}
+
 // Looks at the next picture: self->events, from the first.
 static wm_status look(vision_source *self, wm_error *err) {
   wm_frame frames[PICTURES_MAX] = {0};
@@ -107,6 +117,7 @@ static wm_status look(vision_source *self, wm_error *err) {
     return WM_OK;
   }
   self->newest_ns = frames[0].t_ns;
+  tell_pictures(self, frames);
   wm_time_ns arrival_ns = frames[0].arrival_ns;
   if (self->detector->pictures == 2 && frames[1].arrival_ns > arrival_ns) arrival_ns = frames[1].arrival_ns;
   const wm_seen *seen = self->only ? wanted(self, frames[0].t_ns) : NULL;

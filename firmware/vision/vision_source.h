@@ -49,6 +49,9 @@ struct vision_source {
   wm_seen *only;  // the only pictures to be looked at, rising; NULL: all
   size_t only_count;
   wm_time_ns only_tolerance_ns;
+  wm_picture_fn tell_picture;  // may be NULL
+  void *tell_context;
+  size_t first_camera;  // of those that are told
   vision_ahead ahead;
 };
 

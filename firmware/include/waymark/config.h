@@ -63,7 +63,7 @@ typedef struct wm_runtime_params {
   double start_max_age_s;                 // of the saved pose
   double start_moved_m, start_moved_deg;  // sigmas of what may have happened to the robot while it was off
   double start_save_every_s;
-  double black_box_keep_s;
+  double black_box_keep_s, black_box_pictures_hz;
   int32_t realtime_loop_hz;
   int32_t realtime_priority;  // SCHED_FIFO, 0: normal thread
   int32_t realtime_cpu;       // -1: any

@@ -8,8 +8,9 @@
 #include "waymark/status.h"
 
 typedef struct wm_saved_pose {
-  wm_start start;  // t_ns is WM_TIME_NONE: the first motion
-  double utc_s;    // when it was saved, by this computer's clock then
+  wm_start start;                // t_ns is WM_TIME_NONE: the first motion
+  double utc_s;                  // when it was saved, by this computer's clock then
+  double speed_mps, rate_radps;  // of base_link then, along its x axis and about z
 } wm_saved_pose;
 
 // Writes beside `path` and renames: at every moment there is the old file or the new one, also after a power cut. A few
@@ -22,7 +23,9 @@ int wm_saved_pose_is_worth_it(const wm_estimate *pose);
 // The same as a start at once, in this process: `blind_s` of motion at its speed are added to its sigma.
 void wm_start_from_estimate(const wm_estimate *pose, double blind_s, wm_start *out);
 // As a start: older than max_age_s (by `utc_s` now) it is none: 0. The robot may have been moved since: moved_m and
-// moved_rad are added to its sigmas.
+// moved_rad are added to its sigmas. Where it drove, a run that died may be back within a second: for so long, two
+// seconds at most, it is taken to have gone on, and for ten as having done anything between standing and twice that;
+// later it has come to a stand, within two seconds of driving.
 int wm_saved_pose_start(const wm_saved_pose *saved, double utc_s, double max_age_s, double moved_m, double moved_rad,
                         wm_start *out);
 

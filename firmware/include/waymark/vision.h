@@ -12,6 +12,7 @@
 
 #include "waymark/arena.h"
 #include "waymark/config.h"
+#include "waymark/devices.h"
 #include "waymark/histogram.h"
 #include "waymark/recording.h"
 #include "waymark/source.h"
@@ -38,6 +39,12 @@ typedef struct wm_seen {
 // Source i of a recording looks at the pictures nearest to these and at no others, which are counted as skipped; what
 // it finds in them arrives then. `seen` rises by t_ns and is from malloc; it is taken over. Before wm_vision_run_ahead.
 void wm_vision_look_only_at(wm_vision *self, size_t i, wm_seen *seen, size_t count);
+
+// Who wants to have each picture that a device gives, as the camera sent it: by the thread that looks at it, before it
+// does; gone after the call. `camera` counts from 0 over all sources. NULL for `vision` is fine. Before the threads.
+typedef void (*wm_picture_fn)(void *context, size_t camera, const char *name, const wm_frame *frame,
+                              const wm_camera_raw *raw);
+void wm_vision_tell_pictures(wm_vision *vision, wm_picture_fn tell, void *context);
 
 // The memory that it wants; at most WM_VISION_NEEDS lines. Returns how many.
 size_t wm_vision_needs(wm_vision *self, wm_arena_need *needs);

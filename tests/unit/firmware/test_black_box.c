@@ -47,7 +47,7 @@ void tearDown(void) {
   TEST_ASSERT_EQUAL(0, system(command));
 }
 
-static void open_box(void) { black_box_open(&box, folder, 10, &assembly, hear, NULL); }
+static void open_box(void) { black_box_open(&box, folder, 10, 2, &assembly, hear, NULL); }
 
 // Ten events and a pose a second.
 static void drive(int seconds, wm_state state) {
@@ -153,8 +153,57 @@ static void the_oldest_go(void) {
   TEST_ASSERT_EQUAL(BLACK_BOX_KEPT_MAX, files("lost-*-now.wmlog"));
 }
 
+// Ten pictures a second come, two are kept.
+static void see(int seconds) {
+  static uint8_t grey[16 * 4];
+  for (int i = 0; i < seconds * 10; i++) {
+    wm_time_ns t_ns = now_ns + i * (WM_NS_PER_S / 10);
+    const wm_frame frame = {
+        .t_ns = t_ns, .arrival_ns = t_ns, .width_px = 16, .height_px = 4, .stride_bytes = 16, .grey = grey};
+    const wm_camera_raw raw = {.data = grey, .bytes = sizeof grey};
+    black_box_picture(&box, 0, "front", &frame, &raw);
+  }
+}
+
+static int lines_of(const char *name) {
+  char path[128];
+  int lines = 0;
+  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+  FILE *f = fopen(path, "r");
+  if (!f) return -1;
+  for (int c; (c = fgetc(f)) != EOF;) lines += c == '\n';
+  (void)fclose(f);
+  return lines;
+}
+
+static void pictures_are_kept_with_it(void) {
+  open_box();
+  for (int i = 0; i < 7; i++) {  // of two seconds each: the videos take turns after ten
+    see(2);
+    drive(2, WM_STATE_TRACKING);
+  }
+  see(3);
+  drive(3, WM_STATE_LOST);
+  TEST_ASSERT_EQUAL(21, lines_of("lost-0001-front-b.csv"));  // the first ten seconds, and a head
+  TEST_ASSERT_EQUAL(15, lines_of("lost-0001-front-a.csv"));  // the seven that followed
+  TEST_ASSERT_EQUAL(4, files("lost-0001-front-*"));
+  // What is kept stays as it is when its place is taken again.
+  for (int i = 0; i < 3; i++) {
+    see(10);
+    drive(10, WM_STATE_TRACKING);
+  }
+  TEST_ASSERT_EQUAL(21, lines_of("lost-0001-front-b.csv"));
+  // A run that dies leaves its own, and the next one begins without them.
+  (void)fclose(box.log.file);
+  open_box();
+  TEST_ASSERT_EQUAL(4, files("died-0002-front-*"));
+  TEST_ASSERT_EQUAL(0, files("pictures-*"));
+  drive(1, WM_STATE_TRACKING);
+  black_box_close(&box);
+}
+
 static void a_disk_that_takes_nothing_is_said_once(void) {
-  black_box_open(&box, "/proc/nowhere", 10, &assembly, hear, NULL);
+  black_box_open(&box, "/proc/nowhere", 10, 2, &assembly, hear, NULL);
   drive(25, WM_STATE_TRACKING);
   black_box_close(&box);
   const char *first = strstr(said, "black box: can't be written");
@@ -169,6 +218,7 @@ int main(void) {
   RUN_TEST(an_end_in_order_leaves_nothing_to_keep);
   RUN_TEST(an_end_soon_after_a_loss_keeps_it);
   RUN_TEST(the_oldest_go);
+  RUN_TEST(pictures_are_kept_with_it);
   RUN_TEST(a_disk_that_takes_nothing_is_said_once);
   return UNITY_END();
 }

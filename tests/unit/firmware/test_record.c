@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "avi_writer.h"
+#include "copy_map.h"
 #include "unity.h"
 #include "waymark/can.h"
 #include "waymark/record.h"
@@ -124,6 +125,50 @@ static void without_its_devices_a_recording_is_begun_and_ended(void) {
   wm_config_free(&config);
 }
 
+static void put(const char *name, const char *text) {
+  char path[200];
+  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+  FILE *f = fopen(path, "w");
+  TEST_ASSERT_NOT_NULL_MESSAGE(f, path);
+  (void)fputs(text, f);
+  (void)fclose(f);
+}
+
+static void expect_text(const char *name, const char *text) {
+  char path[200], there[400] = "";
+  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+  FILE *f = fopen(path, "r");
+  TEST_ASSERT_NOT_NULL_MESSAGE(f, path);
+  there[fread(there, 1, sizeof there - 1, f)] = '\0';
+  (void)fclose(f);
+  TEST_ASSERT_EQUAL_STRING(text, there);
+}
+
+// Wherever its pictures lie, in the recording they lie beside it.
+static void a_map_is_copied_with_its_pictures(void) {
+  char yaml[512], out[128], sub[128], from[160];
+  (void)snprintf(sub, sizeof sub, "%s/plans", folder);
+  (void)snprintf(out, sizeof out, "%s/rec", folder);
+  TEST_ASSERT_EQUAL(0, mkdir(sub, 0777));
+  TEST_ASSERT_EQUAL(0, mkdir(out, 0777));
+  put("plans/floor.png", "floor");
+  put("floor.png", "edges");
+  (void)snprintf(yaml, sizeof yaml,
+                 "resolution: 0.05\norigin: [0, 0, 0]  # at the door\nimage: nowhere.png\n"
+                 "layers: {edges: %s/floor.png, drivable: plans/floor.png}\n",
+                 folder);
+  put("map.yaml", yaml);
+  (void)snprintf(from, sizeof from, "%s/map.yaml", folder);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, copy_map(from, out, &err), err.text);
+  expect_text("rec/map/map.yaml",
+              "resolution: 0.05\norigin: [0, 0, 0]  # at the door\nimage: nowhere.png\n"
+              "layers: {edges: floor.png, drivable: 1-floor.png}\n");
+  expect_text("rec/map/floor.png", "edges");
+  expect_text("rec/map/1-floor.png", "floor");
+  (void)snprintf(from, sizeof from, "%s/none.yaml", folder);
+  TEST_ASSERT_EQUAL(WM_NOT_FOUND, copy_map(from, out, &err));
+}
+
 // A disk that is full from the beginning.
 static void a_full_disk_ends_it_and_says_so(void) {
   const char *text =
@@ -147,5 +192,6 @@ int main(void) {
   RUN_TEST(an_empty_configuration_is_refused);
   RUN_TEST(without_its_devices_a_recording_is_begun_and_ended);
   RUN_TEST(a_full_disk_ends_it_and_says_so);
+  RUN_TEST(a_map_is_copied_with_its_pictures);
   return UNITY_END();
 }

@@ -53,6 +53,28 @@ static void a_pose_is_there_again(void) {
   TEST_ASSERT_FALSE(wm_saved_pose_start(&saved, 2700, 600, 0, 0, &start));
 }
 
+// Killed while it drove: it is where it would be by now, as far off as it may have driven. An hour later it stands.
+static void a_pose_that_was_moving_goes_on(void) {
+  wm_estimate e = tracking(10, 0.3);
+  e.v_mps[0] = 2;
+  e.w_radps[2] = M_PI / 4;
+  wm_saved_pose saved;
+  wm_start start;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1000, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_read(path, &saved, &err), err.text);
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 1000.5, 600, 0.4, 0, &start));
+  double half = M_PI / 16;  // of the turn
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 10 + 1 * cos(M_PI / 2 + half), start.p_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, -2 + 1 * sin(M_PI / 2 + half), start.p_m[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, M_PI / 2 + 2 * half, start.heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, sin(M_PI / 4 + half), start.q_xyzw[2]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, cos(M_PI / 4 + half), start.q_xyzw[3]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(0.09 + 0.16 + 1), start.sigma_xy_m);
+  TEST_ASSERT_TRUE(wm_saved_pose_start(&saved, 4600, 6000, 0, 0, &start));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 10, start.p_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, sqrt(0.09 + 16), start.sigma_xy_m);
+}
+
 static void a_pose_that_is_worth_nothing_is_not_kept(void) {
   wm_estimate good = tracking(1, 0.3), e = good;
   TEST_ASSERT_TRUE(wm_saved_pose_is_worth_it(&good));
@@ -156,6 +178,7 @@ static void growth_that_is_seen_while_reckoning_counts(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_pose_is_there_again);
+  RUN_TEST(a_pose_that_was_moving_goes_on);
   RUN_TEST(a_pose_that_is_worth_nothing_is_not_kept);
   RUN_TEST(a_file_that_is_none_is_refused_with_its_line);
   RUN_TEST(where_it_cant_be_written_the_old_one_stays);
