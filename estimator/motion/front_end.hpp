@@ -40,7 +40,10 @@ class motion_front_end {
     const wm_time_ns lag_ns = lag_of(calibration);
     history_.walk(from_ns - lag_ns, to_ns - lag_ns, hold_max_ns_, [&](const motion_stretch &stretch) {
       const motion_twist twist = twist_of(stretch.input, calibration, wheels_);
-      visit(stretch, twist, noise_of(stretch.input, twist, stretch.dt_s, *params_, wheels_, calibration));
+      motion_noise noise = noise_of(stretch.input, twist, stretch.dt_s, *params_, wheels_, calibration);
+      // Counts that have come tell the way of the silence, too.
+      if (!(ticks_drive() && stretch.has_next)) add_silence(stretch, *params_, &noise);
+      visit(stretch, twist, noise);
     });
   }
 

@@ -25,12 +25,17 @@ struct motion_input {
 struct motion_stretch {
   motion_input input;
   double dt_s;
+  double silent_s;   // at its beginning: for how long the next input has been overdue; below 0: it isn't
+  bool has_next;     // a later input has come
   bool first, last;  // of the interval: their length depends on the lag
 };
 
 class motion_history {
  public:
   static constexpr uint32_t kCapacity = 256;  // 1 s of lag at 250 inputs a second; a power of two
+
+  // An input that is older than this, and than three of the periods before it, is overdue.
+  static constexpr double kOverdueS = 0.25, kOverduePeriods = 3.0;
 
   void clear() { count_ = 0; }
   bool empty() const { return count_ == 0; }
@@ -61,9 +66,17 @@ class motion_history {
         const wm_time_ns held_until = piece.input.t_ns + hold_max_ns;
         piece.input.stale = begin >= held_until;
         if (!piece.input.stale && end > held_until) end = held_until;
+        double due_s = kOverdueS;
+        if (next > oldest + 1) {
+          const double usual_s = kOverduePeriods * wm_seconds_between(at(next - 2).t_ns, at(next - 1).t_ns);
+          if (usual_s > due_s) due_s = usual_s;
+        }
+        piece.silent_s = wm_seconds_between(piece.input.t_ns, begin) - due_s;
       } else {
         piece.input = motion_input{};
+        piece.silent_s = -1.0;
       }
+      piece.has_next = next < count_;
       piece.dt_s = wm_seconds_between(begin, end);
       piece.first = begin == from_ns;
       piece.last = end == to_ns;

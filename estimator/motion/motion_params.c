@@ -27,6 +27,10 @@ static const wm_param kParams[] = {
         "Noise of a wheel's way by its ticks: metres per square root of a metre of way (uneven floor, slip)."),
     F64("noise.steering_rad", noise_steering_rad, 0.005, 0, 1,
         "White noise of the road wheel's angle, rad per sqrt(s): play and the table's error between its points."),
+    F64("noise.hold_mps2", noise_hold_mps2, 1.0, 0, 100,
+        "m/s2. A speed whose next one is overdue (by 0.25 s and three periods) holds, but the robot may have braked or "
+        "sped up so much since: sigma grows by half of it by the square of the time."),
+    F64("noise.hold_radps2", noise_hold_radps2, 0.5, 0, 100, "rad/s2. As hold_mps2, for the turn rate."),
     F64("standstill.speed_mps", standstill_speed_mps, 0.02, 0, 1,
         "A speed below this is none. Below the smallest step of common wheel-speed sensors (0.01 to 0.03 m/s)."),
     F64("standstill.yaw_rate_radps", standstill_yaw_rate_radps, 0.002, 0, 1,

@@ -145,4 +145,13 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
   return n;
 }
 
+void add_silence(const motion_stretch &stretch, const wm_motion_params &p, motion_noise *noise) {
+  const double from_s = stretch.silent_s > 0.0 ? stretch.silent_s : 0.0, to_s = stretch.silent_s + stretch.dt_s;
+  if (to_s <= from_s || stretch.input.stale) return;
+  // Variances that add up to the square of the whole, however the time is cut.
+  const double grown_s4 = square(square(to_s)) - square(square(from_s));
+  noise->way_m2 += square(0.5 * p.noise_hold_mps2) * grown_s4;
+  noise->turn_rad2 += square(0.5 * p.noise_hold_radps2) * grown_s4;
+}
+
 }  // namespace wm

@@ -49,6 +49,10 @@ struct motion_noise {
 motion_noise noise_of(const motion_input &input, const motion_twist &twist, double dt_s, const wm_motion_params &params,
                       const wm_wheels &wheels, const wm_motion_calibration &calibration);
 
+// What a held input may be wrong by once the next one is overdue: the robot may have sped up or begun to turn at
+// noise.hold_mps2 and noise.hold_radps2 since, a way of half of that by the square of the time.
+void add_silence(const motion_stretch &stretch, const wm_motion_params &params, motion_noise *noise);
+
 }  // namespace wm
 
 #endif

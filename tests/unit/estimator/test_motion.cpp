@@ -144,6 +144,29 @@ void test_rear_wheels_are_preferred_and_a_silent_source_yields(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, front.twist_at(make::at(10.0), calibration).v);
 }
 
+// A speed that is overdue holds, and its way's variance is that of a robot that may have braked, however often it is
+// asked. A source that is slow by habit is not overdue.
+void test_a_held_speed_is_doubted_more_and_more(void) {
+  double grown[2];
+  for (int steps : {1, 7}) {
+    start(make::car());
+    params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
+    for (int i = 0; i <= 10; i++) feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+    advance(1.29);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, way_var);
+    for (int i = 1; i <= steps; i++) advance(1.29 + (2.3 - 1.29) * i / steps);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2.3, pose.x_m);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.25, way_var);  // a second after 0.3 s: half a metre
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0625, turn_var);
+    grown[steps > 1] = way_var;
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, grown[0], grown[1]);
+  start(make::car());
+  params.noise_speed_mps = params.noise_speed_rel = 0;
+  for (int i = 0; i <= 10; i++) feed(make::quantities(i, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, way_var - 0.25 * 0.75 * 0.75 * 0.75 * 0.75);  // the first one's habit isn't known
+}
+
 void test_ackermann_by_table_ratio_and_road_wheel(void) {
   start(make::car());
   feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 2.0}, {WM_Q_STEERING_WHEEL, 3.0}}));
@@ -295,6 +318,7 @@ int main(void) {
   RUN_TEST(test_an_unsigned_speed_takes_its_sign_from_the_gear);
   RUN_TEST(test_rear_wheels_are_preferred_and_a_silent_source_yields);
   RUN_TEST(test_ackermann_by_table_ratio_and_road_wheel);
+  RUN_TEST(test_a_held_speed_is_doubted_more_and_more);
   RUN_TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading);
   RUN_TEST(test_commands_are_obeyed_late);
   RUN_TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn);
