@@ -20,14 +20,14 @@ def types(work):
 
 
 def logged(path):
-    """(channel, message) of an LCM log, in its order; a last one that was cut off is left out. Source: LCM's log format."""
+    """(when it was heard, UTC in microseconds; channel; message) of an LCM log, in its order; a last one that was cut off is left out. Source: LCM's log format."""
     data, at = pathlib.Path(path).read_bytes(), 0
     while at + 28 <= len(data):
-        sync, _, _, name, length = struct.unpack_from(">IqqII", data, at)
+        sync, _, utc_us, name, length = struct.unpack_from(">IqqII", data, at)
         if sync != 0xEDA1DA01 or at + 28 + name + length > len(data):
             return
         at += 28
-        yield data[at:at + name].decode(), data[at + name:at + name + length]
+        yield utc_us, data[at:at + name].decode(), data[at + name:at + name + length]
         at += name + length
 
 
@@ -35,7 +35,7 @@ def heard(work, path):
     """Poses and healths, decoded."""
     waymark = types(work)
     poses, healths = [], []
-    for channel, message in logged(path):
+    for _, channel, message in logged(path):
         if channel == "WAYMARK_POSE":
             poses.append(waymark.pose_t.decode(message))
         if channel == "WAYMARK_HEALTH":

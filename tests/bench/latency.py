@@ -1,0 +1,151 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""How long it takes from a datum's stamp to the pose on LCM: recordings at real speed through `waymark run` on this computer, as it
+is and under stress-ng, with cyclictest beside it at the estimator's priority. A table a recording, in Markdown.
+
+    latency.py BUILD [SECONDS]    needs cyclictest, stress-ng, lcm-logger, and the rights to real-time priority and a network
+                                  namespace (root)"""
+import csv
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "tests/hil"))
+import messages  # noqa: E402
+
+BUILD = pathlib.Path(sys.argv[1]).resolve()
+SECONDS = float(sys.argv[2]) if len(sys.argv) > 2 and sys.argv[2] != "inside" else 38
+PRIORITY = 80  # realtime.priority, as by default
+URL = "udpm://239.255.76.67:7667?ttl=0"
+CAMERA = "\ncameras: [{name: front, size: [640, 360], rate_hz: 15, colour: false}]\n\npictures:"
+QUANTILES = (0.5, 0.99, 0.999)
+
+
+def make_recordings(work):
+    """name: (recording, configuration, its table of observations)."""
+    world = (ROOT / "config/worlds/corridor-easy.yaml").read_text().replace("\npictures:", CAMERA)
+    (work / "corridor.yaml").write_text(world)
+    made = {}
+    for name, world, config, observed in (
+            ("edge_mcl, 640 x 360 at 15 Hz", work / "corridor.yaml", "corridor.yaml", "video/front.csv"),
+            ("landmark_ekf, two cameras' sightings at 10 Hz", ROOT / "config/worlds/crossing.yaml", "crossing.yaml", "sightings.csv")):
+        recording = work / pathlib.Path(config).stem
+        subprocess.run([BUILD / "bin/waymark-simulate", world, "--out", recording, "--duration", str(SECONDS)], check=True,
+                       stdout=subprocess.DEVNULL)
+        made[name] = (recording, ROOT / "config" / config, recording / observed)
+    return made
+
+
+def cyclictest(out, seconds):
+    return subprocess.Popen(["cyclictest", "-m", "-S", "-q", "-p", str(PRIORITY), "-i", "1000", "-D", f"{seconds:.0f}", "-h", "100000",
+                             f"--json={out}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def stress(seconds):
+    return subprocess.Popen(["stress-ng", "--cpu", str(os.cpu_count()), "--io", "1", "--vm", "1", "--vm-bytes", "256M", "--timeout",
+                             f"{seconds:.0f}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def quantiles(values_ms):
+    values = sorted(values_ms)
+    return [values[min(len(values) - 1, int(q * len(values)))] for q in QUANTILES] + [values[-1]]
+
+
+def of_histogram(counted):
+    """The same of cyclictest's {microseconds: count}."""
+    total, seen, out = sum(counted.values()), 0, []
+    wanted = [int(q * total) for q in QUANTILES]
+    for us in sorted(counted):
+        seen += counted[us]
+        while len(out) < len(wanted) and seen > wanted[len(out)]:
+            out.append(us * 1e-3)
+    return out + [max(counted) * 1e-3]
+
+
+def of_stage(stage):
+    return [stage[key] * 1e-3 for key in ("p50_us", "p99_us", "p999_us", "max_us")]
+
+
+def drive(work, recording, config, observed, loaded):
+    """One drive; {stage: quantiles in ms}, deadlines missed and in all."""
+    out = work / f"{recording.name}-{'loaded' if loaded else 'idle'}"
+    robot = work / "run.yaml"
+    robot.write_text(config.read_text() + f"\npublish: {{lcm_url: '{URL}'}}\n")
+    log = work / f"{out.name}.lcm"
+    logger = subprocess.Popen(["lcm-logger", "-q", "-f", f"--lcm-url={URL}", log], stderr=subprocess.DEVNULL)
+    load = stress(SECONDS + 20) if loaded else None
+    time.sleep(1)
+    judge = cyclictest(work / "cyclictest.json", SECONDS)
+    subprocess.run([BUILD / "bin/waymark", "run", "--config", robot, "--recording", recording, "--out", out], check=True,
+                   capture_output=True)
+    judge.wait()
+    if load:
+        load.send_signal(signal.SIGINT)
+        load.wait()
+    logger.send_signal(signal.SIGINT)
+    logger.wait()
+
+    decode = messages.types(work).pose_t.decode
+    poses = [(utc_us * 1000, decode(m)) for utc_us, channel, m in messages.logged(log) if channel == "WAYMARK_POSE"]
+    with open(observed, newline="") as f:
+        data = sorted({(int(r["t_ns"]), int(r.get("arrival_ns") or r["t_ns"])) for r in csv.DictReader(f)})
+    rows = {"stamp to arrival (the recording's)": [], "arrival to a pose that has it": [], "stamp to that pose on LCM": []}
+    at = 0
+    for t_ns, arrival_ns in data:
+        while at < len(poses) and (poses[at][1].fused_until_ns < t_ns or poses[at][1].sent_ns < arrival_ns):
+            at += 1
+        if at == len(poses):
+            break
+        heard_utc_ns, pose = poses[at]
+        rows["stamp to arrival (the recording's)"].append((arrival_ns - t_ns) * 1e-6)
+        rows["arrival to a pose that has it"].append((pose.sent_ns - arrival_ns) * 1e-6)
+        rows["stamp to that pose on LCM"].append((heard_utc_ns - pose.utc_offset_ns - t_ns) * 1e-6)
+    stages = {name: quantiles(values) for name, values in rows.items()}
+    timing = json.loads((out / "timing.json").read_text())
+    names = {"wake": "estimator's wake-up", "loop": "estimator's cycle", "arrive": "of it: into the merge", "predict": "of it: predict",
+             "correct": "of it: correct", "publish": "of it: pose of now", "decode": "decode a picture", "detect": "detect"}
+    for key, name in names.items():
+        if timing.get(key, {}).get("count"):
+            stages[name] = of_stage(timing[key])
+    stages["pose's time to sending"] = of_stage(timing["age"])
+    stages["sending to another process, over LCM"] = quantiles((utc_ns - p.utc_offset_ns - p.t_ns) * 1e-6 for utc_ns, p in poses)
+    counted = {}
+    for thread in json.loads((work / "cyclictest.json").read_text())["thread"].values():
+        for us, count in thread["histogram"].items():
+            counted[int(us)] = counted.get(int(us), 0) + count
+    stages["cyclictest beside it"] = of_histogram(counted)
+    return stages, timing["deadlines_missed"], timing["deadlines_total"], len(poses)
+
+
+def show(name, idle, loaded):
+    print(f"\n### {name}\n")
+    print("| ms | p50 | p99 | p99.9 | max | under load: p50 | p99 | p99.9 | max |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    for stage in idle[0]:
+        print(f"| {stage} | " + " | ".join(f"{v:.2f}" for v in idle[0][stage] + loaded[0][stage]) + " |")
+    print(f"\nDeadlines missed: {idle[1]} of {idle[2]}, under load {loaded[1]} of {loaded[2]}; poses heard: {idle[3]} and {loaded[3]}.", flush=True)
+
+
+def inside(work):
+    subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
+    subprocess.run(["ip", "route", "add", "224.0.0.0/4", "dev", "lo"], check=True)
+    print(f"{os.cpu_count()} processors, {os.uname().release}, load of the last minute before it began {os.getloadavg()[0]:.1f}")
+    for name, (recording, config, observed) in make_recordings(work).items():
+        show(name, *(drive(work, recording, config, observed, loaded) for loaded in (False, True)))
+
+
+def main():
+    if sys.argv[-1] == "inside":
+        with tempfile.TemporaryDirectory(prefix="waymark-latency-") as work:
+            return inside(pathlib.Path(work))
+    return subprocess.run(["unshare", "-n", sys.executable, __file__, BUILD, str(SECONDS), "inside"]).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,301 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""What is published while things break: `waymark run`, whole, with a simulated drive in the place of the kernel's CAN and V4L2
+drivers (played_world.h), heard by LCM's own logger. Each drive has a network of its own; they drive side by side.
+
+    faults.py BUILD [DRIVE ...]          needs the right to network and mount namespaces, and liblcm-bin; skipped (77) without"""
+import csv
+import json
+import math
+import os
+import pathlib
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(ROOT / "tests/hil"))
+import drives  # noqa: E402
+import edges  # noqa: E402
+import landmarks  # noqa: E402
+from published import ABSENT, BUS_OFF, DOWN, FROZEN, IS_BUSY, MOTION_STALE, STALLED, WORKS, Published  # noqa: E402
+
+BUILD = pathlib.Path(sys.argv[1]).resolve()
+WAYMARK = BUILD / "tests/waymark-played"
+SECONDS, RATE_HZ = 64, 10
+CAMERA, CAN, SIGHTINGS = "edges:front", "can", "sightings"
+ROUTE = ["ip", "route", "add", "224.0.0.0/4", "dev", "lo"]
+
+
+# ── what is driven ──────────────────────────────────────────────────────────────────────────────────────────────────
+
+def prepare(work, worlds):
+    """Two worlds: a corridor that a camera sees, and a crossing whose landmarks another program sees."""
+    world = (ROOT / "config/worlds/corridor-easy.yaml").read_text().replace(
+        "\npictures:", f"\ncameras: [{{name: front, size: [320, 180], rate_hz: {RATE_HZ}, colour: false}}]\n\npictures:")
+    (work / "world.yaml").write_text(world)
+    for name, scenario in (("corridor", work / "world.yaml"), ("crossing", ROOT / "config/worlds/crossing.yaml")):
+        if name not in worlds:
+            continue
+        (work / name).mkdir()
+        recording = work / name / "recording"
+        subprocess.run([BUILD / "bin/waymark-simulate", scenario, "--out", recording, "--duration", str(SECONDS)], check=True)
+        items, blob = list(drives.can_items(recording)), bytearray()
+        if name == "corridor":
+            with open(recording / "video/front.csv", newline="") as f:
+                for row, picture in zip(csv.DictReader(f), edges.pictures(recording / "video/front.avi")):
+                    items.append((int(row["t_ns"]), f"p {len(blob)} {len(picture)}"))
+                    blob += picture
+        (work / name / "timeline").write_text("".join(f"{t} {what}\n" for t, what in sorted(items)))
+        (work / name / "pictures").write_bytes(blob)
+        (work / name / "first").write_text(str(min(items)[0]))
+
+
+class Drive:
+    """A folder with the world and its faults, a configuration, and a logger that hears what is said."""
+
+    def __init__(self, work, world, name, faults):
+        self.world, self.folder = work / world, work / name
+        self.folder.mkdir()
+        recording = self.world / "recording"
+        for file in ("vehicle.dbc", "can-signals.yaml", "calibration.yaml", "map", "landmarks.csv"):
+            if (recording / file).exists():
+                (self.folder / file).symlink_to(recording / file)
+        for file in ("timeline", "pictures"):
+            (self.folder / file).symlink_to(self.world / file)
+        (self.folder / "faults").write_text("".join(" ".join(map(str, fault)) + "\n" for fault in faults))
+        devices = (f"devices: {{can: [{{interface: can0}}], cameras: [{{name: front, device: /dev/video0, format: MJPG, rate_hz: {RATE_HZ}}}]}}\n"
+                   "map: map/map.yaml\n") if world == "corridor" else (
+                   "devices: {can: [{interface: can0}], sightings: lcm}\nlandmarks: landmarks.csv\n")
+        self.config = (
+            (ROOT / f"config/{world}.yaml").read_text() + f"\ninitial_pose: {drives.start_of(recording)}\n"
+            "calibration: calibration.yaml\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\n" + devices +
+            f"publish: {{lcm_url: '{drives.URL}'}}\nrealtime: {{lock_memory: false}}\n"
+            "start: {saved_pose: pose.yaml, save_every_s: 0.5}\n")
+        (self.folder / "robot.yaml").write_text(self.config)
+        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
+        subprocess.run(ROUTE, check=True)
+        self.logger = subprocess.Popen(["lcm-logger", "-q", "-f", f"--lcm-url={drives.URL}", self.folder / "heard.lcm"])
+        self.begin_ns = None
+        self.first_ns = int((self.world / "first").read_text())
+        self.environment = dict(os.environ, WM_PLAYED=str(self.folder))
+        self.eyes = threading.Thread(target=self.send_sightings, daemon=True) if world == "crossing" else None
+
+    def send_sightings(self):
+        """The program that sees landmarks: LCM's datagrams, each when it arrived in the recording."""
+        out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        sent = sorted(landmarks.sightings(self.folder, self.world / "recording"), key=lambda s: s[0])
+        for number, (arrival_ns, t_ns, message) in enumerate(sent):
+            self.sleep_until((arrival_ns - self.first_ns) * 1e-9)
+            stamp = struct.pack(">q", t_ns - self.first_ns + self.begin_ns)
+            packet = struct.pack(">II", 0x4c433032, number) + b"WAYMARK_SIGHTINGS\0" + message[:8] + stamp + message[16:]
+            try:
+                out.sendto(packet, ("239.255.76.67", 7667))
+            except OSError:
+                pass  # no route: that is one of the faults
+
+    def start(self, *words):
+        with open(self.folder / "said.txt", "a") as said:
+            return subprocess.Popen([WAYMARK, *words], cwd=self.folder, env=self.environment, stderr=said, stdout=said)
+
+    def run(self, *words):
+        """`waymark run`; with the first one, once it listens, the world begins."""
+        run = self.start("run", "--config", "robot.yaml", *words)
+        while self.begin_ns is None and run.poll() is None:
+            time.sleep(0.05)
+            if "can0 is up" in self.said():
+                self.begin()
+        return run
+
+    def begin(self):
+        self.begin_ns = time.monotonic_ns() + 10**9
+        (self.folder / "begin.new").write_text(str(self.begin_ns))
+        (self.folder / "begin.new").rename(self.folder / "begin")
+        if self.eyes:
+            self.eyes.start()
+
+    def end(self, run, at_s):
+        self.sleep_until(at_s)
+        run.send_signal(signal.SIGTERM)
+        run.wait(timeout=60)
+
+    def sleep_until(self, at_s):
+        time.sleep(max(0.0, (self.begin_ns - time.monotonic_ns()) * 1e-9 + at_s))
+
+    def now_s(self):
+        return (time.monotonic_ns() - self.begin_ns) * 1e-9
+
+    def said(self):
+        return (self.folder / "said.txt").read_text()
+
+    def hear(self):
+        time.sleep(0.3)
+        self.logger.send_signal(signal.SIGINT)
+        self.logger.wait(timeout=10)
+        truth = [(t - self.first_ns + self.begin_ns, *rest) for t, *rest in drives.table(self.world / "recording/truth.csv")]
+        return Published(self.folder.name, self.folder, self.begin_ns, self.said, truth)
+
+
+def camera(work):
+    """The camera breaks in five ways, one after the other."""
+    drive = Drive(work, "corridor", "camera", [(10, 15, "unplugged"), (22, 26, "frozen"), (32, 38, "stalled"), (45, 53, "dropped", 20), (56, 61, "damaged", 30)])
+    run = drive.run()
+    drive.end(run, 63)
+    heard = drive.hear()
+    heard.check(run.returncode == 0, f"exit code {run.returncode}")
+    for what, from_s, until_s, state, delay_s in (("unplugged", 10, 15, ABSENT, 1.2), ("frozen", 22, 26, FROZEN, 2.3), ("stalled", 32, 36, STALLED, 2.4)):
+        usual_m = 3 * heard.sigma_at(from_s)
+        heard.goes_on(what, from_s, until_s)
+        heard.grows(what, from_s, until_s)
+        heard.device(what, CAMERA, state, from_s + delay_s, until_s)
+        heard.is_back(what, CAMERA, {"stalled": 40}.get(what, until_s + 2.5), usual_m)
+    heard.counted("frozen", CAMERA, "frozen", 22, 27.2, 4 * RATE_HZ - 4, 4 * RATE_HZ + 2)
+    heard.goes_on("20 % dropped", 45, 53)
+    heard.device("20 % dropped", CAMERA, WORKS, 46, 53)
+    heard.counted("20 % dropped", CAMERA, "lost", 44.9, 54.2, 0.08 * 8 * RATE_HZ, 0.35 * 8 * RATE_HZ)
+    heard.goes_on("30 % with error flags", 56, 61)
+    heard.device("30 % with error flags", CAMERA, WORKS, 57, 61)
+    heard.counted("30 % with error flags", CAMERA, "malformed", 55.9, 62.2, 0.12 * 5 * RATE_HZ, 0.48 * 5 * RATE_HZ)
+    heard.is_said("front is gone")
+    heard.is_said("front gives the same picture again and again")
+    heard.is_said("front gives no pictures", 2)  # before the world began, too
+    return heard.failures
+
+
+def clock(work):
+    """A camera whose clock is 29 s ahead all the time."""
+    drive = Drive(work, "corridor", "clock", [(0, 1000, "camera_clock", 29)])
+    run = drive.run()
+    drive.end(run, 13)
+    heard = drive.hear()
+    heard.goes_on("29 s ahead", 5, 12)
+    heard.device("29 s ahead", CAMERA, WORKS, 3, 12)
+    heard.counted("29 s ahead", CAMERA, "fused", 5.1, 11.2, 0.6 * 5 * RATE_HZ, 7 * RATE_HZ)
+    heard.check(heard.error_m(*heard.between(11, 12)[-1]) < 0.2, "29 s ahead: the pose is where the robot is")
+    return heard.failures
+
+
+def can(work):
+    """The bus breaks in four ways."""
+    drive = Drive(work, "crossing", "can", [(8, 11, "can_down"), (15.5, 18.5, "can_removed"), (21, 27, "can_lost", 2), (31, 33, "bus_off")])
+    run = drive.run()
+    drive.end(run, 38)
+    heard = drive.hear()
+    heard.check(run.returncode == 0, f"exit code {run.returncode}")
+    for what, from_s, until_s, state in (("interface down", 8, 11, DOWN), ("adapter removed", 15.5, 18.5, ABSENT), ("bus-off", 31, 33, BUS_OFF)):
+        usual_m = 3 * heard.sigma_at(from_s)
+        poses = heard.goes_on(what, from_s, until_s)
+        heard.check(all(p.status_flags & MOTION_STALE for t, p in poses if t > from_s + 1), f"{what}: poses say that motion is stale")
+        heard.grows(what, from_s, until_s)
+        heard.device(what, CAN, state, from_s + 1.2, until_s)
+        heard.is_back(what, CAN, until_s + 2, usual_m)
+    heard.goes_on("2 % of CAN frames lost", 21, 27)
+    heard.device("2 % of CAN frames lost", CAN, WORKS, 22, 27)
+    heard.is_said("can0 went down")
+    heard.is_said("can0 is gone (No such device)")
+    return heard.failures
+
+
+def process(work):
+    """Killed and started again; a disk that is full; another configuration with an error; a network without a route."""
+    drive = Drive(work, "crossing", "process", [])
+    small = drive.folder / "small"
+    small.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", small], check=True)
+    run = drive.run()
+    drive.sleep_until(10)
+    run.kill()
+    run.wait()
+    again_s, came_up = drive.now_s(), drive.said().count("can0 is up")
+    run = drive.run("--out", "small/run")
+    while drive.said().count("can0 is up") == came_up and run.poll() is None:
+        time.sleep(0.01)
+    up_s = drive.now_s()
+    drive.sleep_until(20)
+    (drive.folder / "robot.yaml").write_text(drive.config.replace("speed_mps: 0.0003", "speed_mpss: 0.0003"))
+    run.send_signal(signal.SIGHUP)
+    drive.sleep_until(26)
+    subprocess.run(["ip", "route", "del", "224.0.0.0/4"], check=True)
+    drive.sleep_until(30)
+    subprocess.run(ROUTE, check=True)
+    drive.end(run, 38)
+    heard = drive.hear()
+    heard.check(run.returncode == 1, f"exit code {run.returncode}: the disk was full")
+
+    tracking = [(t, p) for t, p in heard.poses if t > again_s and p.state == 1]
+    first_s, first = tracking[0] if tracking else (math.inf, None)
+    # A desk that is busy loads programs slowly; a robot's isn't.
+    begun_s = up_s if IS_BUSY else again_s
+    heard.check(first_s < begun_s + 2, f"killed: tracking again {first_s - begun_s:.2f} s after the start, which took {up_s - again_s:.2f} s")
+    heard.check(first is not None and heard.error_m(first_s, first) < 4 * heard.sigma_m(first),
+                f"killed: where it was, {heard.error_m(first_s, first):.2f} m off with a sigma of {heard.sigma_m(first):.2f} m")
+    heard.is_said("start: where it was")
+    heard.is_said("No space left on device. Localizing goes on")
+    heard.goes_on("configuration with an error", 20, 25)
+    heard.is_said("did you mean")
+    heard.is_said("The run goes on as it was")
+    # Nobody hears it without a route; the run itself goes on.
+    silent = heard.between(26.5, 29.5)
+    heard.check(len(silent) < 10, f"no route: {len(silent)} poses are heard")
+    heard.goes_on("no route, over; disk full all the time", 33, 37)
+    heard.check(heard.health_at(35).published > heard.health_at(25.9).published + 7 * 50 * 0.8, "no route: the run went on")
+    heard.is_said("way out again")
+    subprocess.run(["umount", small], check=True)
+    return heard.failures
+
+
+def recorder(work):
+    """A recording that is ended by SIGTERM in its middle, and one that is killed: both replay."""
+    drive = Drive(work, "corridor", "recorder", [])
+    failures = []
+    for name, number in (("term", signal.SIGTERM), ("kill", signal.SIGKILL)):
+        record = drive.start("record", "--config", "robot.yaml", "--out", name, "--free-mb", "0")
+        if drive.begin_ns is None:
+            drive.begin()
+        time.sleep(10)
+        record.send_signal(number)
+        code = record.wait(timeout=20)
+        replay = subprocess.run([BUILD / "bin/waymark", "replay", drive.folder / name, "--config", drive.folder / name / "config.yaml", "--out",
+                                 drive.folder / f"{name}-run"], capture_output=True, text=True)
+        health = json.loads((drive.folder / f"{name}-run/health.json").read_text()) if replay.returncode == 0 else {"sources": {}}
+        fused = {s: v["received"] for s, v in health["sources"].items()}
+        good = code == (0 if name == "term" else -9) and fused.get(CAMERA, 0) > 3 * RATE_HZ and fused.get(CAN, 0) > 500
+        print(f"  {'good' if good else 'BAD '}  recorder: {name}: exit code {code}; its replay has {fused} {replay.stderr[-300:] if not good else ''}")
+        if not good:
+            failures.append(name)
+    drive.logger.kill()
+    drive.logger.wait()
+    return failures
+
+
+DRIVES = {"camera": (camera, "corridor"), "clock": (clock, "corridor"), "can": (can, "crossing"), "process": (process, "crossing"),
+          "recorder": (recorder, "corridor")}
+
+
+def main():
+    if sys.argv[2:3] == ["inside"]:
+        failures = DRIVES[sys.argv[3]][0](pathlib.Path(sys.argv[4]))
+        return 1 if failures else 0
+    if not shutil.which("lcm-logger") or subprocess.run(["unshare", "-n", "-m", "true"], capture_output=True).returncode:
+        print("no lcm-logger, or no right to namespaces: skipped")
+        return 77
+    chosen = sys.argv[2:] or list(DRIVES)
+    with tempfile.TemporaryDirectory(prefix="waymark-faults-") as folder:
+        work = pathlib.Path(folder)
+        prepare(work, {DRIVES[name][1] for name in chosen})
+        running = {name: subprocess.Popen(["unshare", "-n", "-m", sys.executable, __file__, BUILD, "inside", name, work]) for name in chosen}
+        bad = [name for name, process_ in running.items() if process_.wait() != 0]
+        if bad and os.environ.get("WM_KEEP"):
+            shutil.copytree(work, os.environ["WM_KEEP"], symlinks=True, dirs_exist_ok=True)
+    print("failed: " + ", ".join(bad) if bad else "all good")
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
