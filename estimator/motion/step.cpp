@@ -41,7 +41,8 @@ motion_twist from_speed_and_rate(double speed, double rate, const wm_motion_cali
 // faster wheel below a limit, or round to coarse wheel speeds, give less speed the more they turn.
 motion_twist from_twist(double speed, double rate, const wm_motion_calibration &c, double track_m) {
   const double size = std::fabs(speed);
-  const double slower = c.turn_slowdown_m * std::fabs(rate);
+  const double turning = square(rate);
+  const double slower = c.turn_slowdown_mps * turning;
   const double share = size > 0.0 && slower < size ? (size - slower) / size : size > 0.0 ? 0.0 : 1.0;
   const double driven = share * speed;
   motion_twist t = finite(track_m)
@@ -63,7 +64,7 @@ motion_twist from_twist(double speed, double rate, const wm_motion_calibration &
   add(t, kYawRateBias, 0.0, -c.yaw_rate_scale);
   if (share > 0.0 && size > 0.0) {
     // Both wheels lose the same, so with unlike wheels the turn changes a little, too.
-    const double lost = speed > 0.0 ? -std::fabs(rate) : std::fabs(rate);
+    const double lost = speed > 0.0 ? -turning : turning;
     const bool wheels = finite(track_m);
     const double v_by = wheels ? 0.5 * (c.left_scale + c.right_scale) : 1.0;
     const double w_by = wheels ? (c.right_scale - c.left_scale) / (track_m * c.track_scale) : 0.0;

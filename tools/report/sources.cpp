@@ -85,8 +85,8 @@ Meaning meaning_of(const std::string &name) {
   if (what == "bearing_bias_rad") return {degrees, 0, "°", sensor + " measures bearings too large by this"};
   if (what == "time_offset_s" || what == "delay_s")
     return {1e3, 0, "ms", "what " + sensor + " reports is older than its stamp by this"};
-  if (what == "turn_slowdown_m")
-    return {100, 0, "cm", "while it turns, the robot drives slower by this much a radian turned"};
+  if (what == "turn_slowdown_mps")
+    return {1, 0, "m/s", "turning at 1 rad/s the robot drives slower by this much, by the square of the turn rate"};
   if (what == "lag_s") return {1e3, 0, "ms", "the robot follows its motion data this much later"};
   if (what == "range_bias_m") return {100, 0, "cm", sensor + " measures ranges too long by this"};
   if (what == "range_scale") return {100, -100, "%", sensor + " measures ranges too long by this share"};

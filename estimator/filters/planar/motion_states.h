@@ -42,9 +42,9 @@ typedef struct wm_motion_states {
                   "Start sigma of the road wheel's zero, rad, for speed and steering. 0: off."), \
   WM_MOTION_STATE(type, member, 7, "lag", "_s", 0.0, \
                   "Start sigma of what the robot is late by behind its commands, s. 0: off."), \
-  WM_MOTION_STATE(type, member, 8, "turn_slowdown", "_m", 0.0, \
-                  "Start sigma of what a commanded speed loses in turns, m/s per rad/s (drives that limit or round " \
-                  "their wheels' speeds; half a track at most). 0: off."), \
+  WM_MOTION_STATE(type, member, 8, "turn_slowdown", "_mps", 0.0, \
+                  "Start sigma of what a commanded speed loses at a turn rate of 1 rad/s, m/s; it grows with the " \
+                  "square of the turn rate (drives that limit or round their wheels' speeds). 0: off."), \
   {"states.wheel_difference_sigma", WM_PARAM_F64, offsetof(type, member.wheel_difference_sigma), 0, 0, 1, NULL, \
    "With speed by ticks and the heading by a yaw rate: start sigma of the relative difference of the wheels' radii. " \
    "The ticks are then a second opinion of the heading, which keeps the gyro's noise from adding up. 0: off."}, \

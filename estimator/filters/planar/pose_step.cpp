@@ -14,7 +14,7 @@ constexpr double kHighest[kCalibrationCount] = {3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.
 const char *const kMotionStateNames[kCalibrationCount] = {
     "motion.speed_scale",         "motion.yaw_rate_scale", "motion.yaw_rate_bias_radps",
     "motion.left_scale",          "motion.right_scale",    "motion.track_scale",
-    "motion.steering_offset_rad", "motion.lag_s",          "motion.turn_slowdown_m"};
+    "motion.steering_offset_rad", "motion.lag_s",          "motion.turn_slowdown_mps"};
 
 double motion_state_within_limits(int calibration_index, double value) {
   if (value < kLowest[calibration_index]) return kLowest[calibration_index];

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "math/arc.hpp"
+#include "math/elementary.hpp"
 
 namespace wm {
 
@@ -23,19 +24,38 @@ void joint_state::init(const wm_setup &setup, const joint_layout &layout, double
   n_ = layout_.robot_states;
   landmarks_ = 0;
   init_motion(setup);
+  slip_ = {};
 }
 
-int joint_state::count_motion_states(const wm_motion_states &states) {
-  int count = 0;
-  for (double sigma : states.sigma) count += sigma > 0.0;
+namespace {
+
+bool is_wheel(int i) { return i == kLeftScale || i == kRightScale; }
+bool is_on(const wm_motion_states &states, const joint_state::wheel_slip &slip, int i) {
+  return states.sigma[i] > 0.0 || (is_wheel(i) && slip.sigma > 0.0);
+}
+
+}  // namespace
+
+int joint_state::count_motion_states(const wm_motion_states &states, const wheel_slip &slip) {
+  int count = slip.sigma > 0.0 ? 2 : 0;
+  for (int i = 0; i < kCalibrationCount; i++) count += is_on(states, slip, i);
   return count;
 }
 
-void joint_state::set_motion_states(const wm_motion_states &states, int first) {
+void joint_state::set_motion_states(const wm_motion_states &states, const wheel_slip &slip, int first) {
+  slip_ = slip;
   for (int i = 0; i < kCalibrationCount; i++) {
-    const bool on = states.sigma[i] > 0.0;
+    const bool on = is_on(states, slip, i);
     set_motion_state(states, i, on ? first++ : -1);
     if (on) forget(motion_state_[i], calibration_at(kNeutralCalibration, i), start_variance_[i]);
+  }
+  if (!(slip.sigma > 0.0)) return;
+  for (int side = 0; side < 2; side++) {
+    const int wheel = motion_state_[kLeftScale + side], mean = slip_mean_[side] = first++;
+    const double variance = start_variance_[kLeftScale + side];
+    forget(mean, 1.0, variance);
+    p().set(mean, wheel, variance);
+    p().set(wheel, wheel, variance + square(slip.sigma));
   }
 }
 
@@ -56,12 +76,22 @@ void joint_state::move(const wm_event &motion) {
 }
 
 void joint_state::move_to(wm_time_ns t_ns) {
+  const wm_time_ns before_ns = now_ns();
   advance(
       t_ns,
       [this](const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
         propagate(piece, twist, noise);
       },
       [this](int state, double variance) { p().row(state)[state] += variance; });
+  if (slip_.sigma > 0.0 && before_ns != WM_TIME_NONE && now_ns() > before_ns)
+    wander(wm_seconds_between(before_ns, now_ns()));
+}
+
+void joint_state::wander(double dt_s) {
+  const double left = exp(-dt_s / slip_.tau_s);
+  for (int side = 0; side < 2; side++)
+    draw_to(motion_state_[kLeftScale + side], slip_mean_[side], left, square(slip_.sigma) * (1.0 - left * left));
+  take_calibration(x());
 }
 
 // Paper, system 2: time update of P_rr and P_rm alone.
@@ -98,7 +128,12 @@ void joint_state::propagate(const motion_stretch &piece, const motion_twist &twi
   take_step(piece, twist, step);
 }
 
-void joint_state::list_motion_states(calibration_list *list) const { list_motion_states_of(*this, list); }
+void joint_state::list_motion_states(calibration_list *list) const {
+  list_motion_states_of(*this, list);
+  static constexpr const char *kMeans[2] = {"left_scale_mean", "right_scale_mean"};
+  for (int side = 0; side < 2 && slip_.sigma > 0.0; side++)
+    list->add("motion", kMeans[side], value(slip_mean_[side]), std::sqrt(variance(slip_mean_[side])));
+}
 
 void joint_state::estimate(wm_estimate *out) const {
   std::memset(out, 0, sizeof *out);
@@ -126,6 +161,15 @@ void joint_state::fade(int state, double factor, double added_variance) {
     if (j != state) cov.set(state, j, factor * cov.at(state, j));
   cov.set(state, state, own * factor * factor + added_variance);
   x()[state] *= factor;
+}
+
+void joint_state::draw_to(int state, int mean, double factor, double added_variance) {
+  const half_covariance cov = p();
+  const double rest = 1.0 - factor, own = cov.at(state, state), both = cov.at(state, mean), other = cov.at(mean, mean);
+  for (int j = 0; j < n_; j++)
+    if (j != state) cov.set(state, j, factor * cov.at(state, j) + rest * cov.at(mean, j));
+  cov.set(state, state, factor * factor * own + 2.0 * factor * rest * both + rest * rest * other + added_variance);
+  x()[state] = factor * x()[state] + rest * x()[mean];
 }
 
 void joint_state::set_pose(const wm_pose2 &pose, const double covariance[3][3]) {

@@ -56,8 +56,12 @@ class joint_state : public planar_motion {
   static size_t doubles(const joint_layout &layout);
   // `arrays` lies in the same block of memory as *this, at a distance that copies keep.
   void init(const wm_setup &setup, const joint_layout &layout, double *arrays);
-  void set_motion_states(const wm_motion_states &states, int first);  // makes them, from state `first` on
-  static int count_motion_states(const wm_motion_states &states);
+  // A wheel's scale that wanders about its mean, Gauss-Markov; the means are states, too. sigma 0: it doesn't.
+  struct wheel_slip {
+    double sigma, tau_s;
+  };
+  void set_motion_states(const wm_motion_states &states, const wheel_slip &slip, int first);  // from `first` on
+  static int count_motion_states(const wm_motion_states &states, const wheel_slip &slip);
 
   // ---- time and motion ----
   void move(const wm_event &motion);
@@ -76,6 +80,8 @@ class joint_state : public planar_motion {
   void forget(int state, double value, double variance);
   // x := factor x + noise (Gauss-Markov), for a state that no other one's motion depends on.
   void fade(int state, double factor, double added_variance);
+  // x := mean + factor (x - mean) + noise, for such a state that wanders about another one.
+  void draw_to(int state, int mean, double factor, double added_variance);
   // States first..first+count-1 become rows[k] of the state plus noise of covariance `noise`.
   void assign(int first, int count, const joint_row *rows, const double (*noise)[3], const double *values);
   void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
@@ -126,8 +132,12 @@ class joint_state : public planar_motion {
   void move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e);
   void fuse_frozen(int rows, const double *change);
 
+  void wander(double dt_s);
+
   std::ptrdiff_t offset_;
   joint_layout layout_;
+  wheel_slip slip_;
+  int slip_mean_[2];  // states, of the left and the right wheel
   int capacity_, n_, landmarks_;
 };
 

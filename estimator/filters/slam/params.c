@@ -11,6 +11,11 @@ static const char *const kMethods[] = {"unscented", "linear", "inverse_distance"
 
 static const wm_param kParams[] = {
     WM_MOTION_STATE_PARAMS(params, motion),
+    F64("states.wheel_slip_sigma", wheel_slip_sigma, 0, 0, 1,
+        "For ticks: each wheel's scale wanders by so much (one sigma) about a mean that is a state, too: slip that "
+        "lasts "
+        "for seconds, where noise.ticks_per_sqrt_m is fresh with each tick. 0: off."),
+    F64("states.wheel_slip_tau_s", wheel_slip_tau_s, 5, 0.01, 1e6, "And forgets by 1/e in this time, s."),
     F64("states.sensor_yaw_sigma_rad", sensor_yaw_sigma_rad, 0, 0, 3.2,
         "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off."),
     WM_SENSOR_STATE_PARAMS,

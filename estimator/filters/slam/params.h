@@ -17,6 +17,7 @@ enum { WM_SLAM_LINE_UNSCENTED = 0, WM_SLAM_LINE_LINEAR = 1, WM_SLAM_LINE_INVERSE
 
 typedef struct wm_slam_params {
   wm_motion_states motion;
+  double wheel_slip_sigma, wheel_slip_tau_s;  // the wheels' scales wander about their means
   // states, one of each kind a sensor; 0: off
   double sensor_yaw_sigma_rad, sensor_xy_sigma_m, sensor_time_offset_sigma_s;
   double range_bias_sigma_m, range_scale_sigma;

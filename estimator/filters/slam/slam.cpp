@@ -24,11 +24,13 @@ int lasting_states(const wm_slam_params &p) {
          (p.lasting_range_m > 0.0 || p.lasting_range_rel > 0.0);
 }
 
+joint_state::wheel_slip slip_of(const wm_slam_params &p) { return {p.wheel_slip_sigma, p.wheel_slip_tau_s}; }
+
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
   const int each_sensor = (p.sensor_yaw_sigma_rad > 0.0) + 2 * (p.sensor_xy_sigma_m > 0.0) +
                           (p.sensor_time_offset_sigma_s > 0.0) + (p.range_bias_sigma_m > 0.0) +
                           (p.range_scale_sigma > 0.0);
-  return kPoseStates + joint_state::count_motion_states(p.motion) + each_sensor * (int)setup.sensor_count +
+  return kPoseStates + joint_state::count_motion_states(p.motion, slip_of(p)) + each_sensor * (int)setup.sensor_count +
          p.lasting_slots * lasting_states(p);
 }
 
@@ -85,8 +87,8 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   first_clone_ = layout.first_clone;
   first_ray_ = first_clone_ - ray_states(params);
   int next = kPoseStates;
-  joint_.set_motion_states(params.motion, next);
-  next += joint_state::count_motion_states(params.motion);
+  joint_.set_motion_states(params.motion, slip_of(params), next);
+  next += joint_state::count_motion_states(params.motion, slip_of(params));
   const auto add = [&](double value, double sigma) {
     if (!(sigma > 0.0)) return -1;
     joint_.forget(next, value, square(sigma));

@@ -48,8 +48,8 @@ typedef struct wm_motion_calibration {
   double yaw_rate_bias_radps;  // true = scale * (measured - bias)
   double left_scale, right_scale, track_scale;
   double steering_offset_rad;
-  double lag_s;            // the robot does now what its motion source said lag_s ago
-  double turn_slowdown_m;  // of a commanded twist: true speed = scale * (commanded - slowdown * |turn rate|)
+  double lag_s;              // the robot does now what its motion source said lag_s ago
+  double turn_slowdown_mps;  // of a commanded speed, lost at a turn rate of 1 rad/s; grows with the rate's square
 } wm_motion_calibration;
 
 // Dead reckoning in the odom frame, for publishing between what is fused and now. It integrates each motion event as it

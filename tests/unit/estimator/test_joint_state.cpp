@@ -28,12 +28,14 @@ struct made {
   wm_setup setup{};
   joint_state *state;
 
-  explicit made(bool invariant, int width = 2, int landmarks = 8) : motion(wm_motion_params_table.bytes) {
+  explicit made(bool invariant, int width = 2, int landmarks = 8, const joint_state::wheel_slip &slip = {})
+      : motion(wm_motion_params_table.bytes) {
     wm_params_defaults(&wm_motion_params_table, motion.data());
     setup.motion = reinterpret_cast<const wm_motion_params *>(motion.data());
     setup.wheels = make::no_wheels();
     setup.start.t_ns = WM_TIME_NONE;
-    const wm::joint_layout layout = {10, 7, 1, width, landmarks, invariant};
+    const int more = slip.sigma > 0.0 ? 4 : 0;
+    const wm::joint_layout layout = {10 + more, 7 + more, 1, width, landmarks, invariant};
     const size_t head = (sizeof(joint_state) + 15) / 16 * 16;
     memory.resize(head + joint_state::doubles(layout) * sizeof(double) + 16);
     char *at = memory.data() + (16 - reinterpret_cast<uintptr_t>(memory.data()) % 16) % 16;
@@ -44,7 +46,7 @@ struct made {
     states.sigma[wm::kYawRateScale] = 0.05;
     states.sigma[wm::kYawRateBias] = 0.01;
     states.sigma[wm::kLag] = 0.02;
-    state->set_motion_states(states, wm::kPoseStates);
+    state->set_motion_states(states, slip, wm::kPoseStates);
     const double start[3][3] = {{0.01, 0, 0}, {0, 0.01, 0}, {0, 0, 0.01}};
     state->set_pose({1, 2, 0.3}, start);
   }
@@ -274,6 +276,18 @@ void test_the_map_s_heading_is_not_learnt_from_looking(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.099, plain);
 }
 
+// A wheel's scale forgets what it slipped, and never its mean; both stay as unsure as they are.
+void test_a_wheel_that_slips_comes_back_to_its_mean(void) {
+  made m(true, 2, 8, {0.005, 5.0});
+  const int left = m.state->motion_state(wm::kLeftScale), mean = left + 3;  // behind both wheels and the lag
+  m.state->move(make::twist(1.0, 0, 0));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, m.state->variance(mean));
+  m.state->set_value(left, 1.02);
+  for (int i = 1; i <= 50; i++) m.state->move(make::twist(1.0 + 0.1 * i, 0, 0));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0 + 0.02 * wm::exp(-1.0), m.state->value(left));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.005 * 0.005, m.state->variance(left));
+}
+
 }  // namespace
 
 void setUp(void) { dice = {7, 1, 0}; }
@@ -288,5 +302,6 @@ int main(void) {
   RUN_TEST(test_a_landmark_that_leaves_takes_its_part_of_the_matrix_and_nothing_else);
   RUN_TEST(test_frozen_landmarks_stay_and_the_robot_is_corrected);
   RUN_TEST(test_the_map_s_heading_is_not_learnt_from_looking);
+  RUN_TEST(test_a_wheel_that_slips_comes_back_to_its_mean);
   return UNITY_END();
 }

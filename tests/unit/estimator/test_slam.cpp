@@ -33,7 +33,7 @@ wm_pose2 truth;
 double now_s;
 double false_share;  // of sightings that are of nothing
 bool hidden, twice, nameless, coded, two_poses;
-int fused, rejected;
+int fused, rejected, twin;  // twin: 0, or where a second print of the first identity hangs
 
 double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
 
@@ -66,7 +66,7 @@ void make_room() {
   noise = {42, 1, 0};
   now_s = false_share = 0.0;
   hidden = twice = nameless = coded = two_poses = false;
-  fused = rejected = 0;
+  fused = rejected = twin = 0;
 }
 
 void begin() {
@@ -105,8 +105,9 @@ void drive(double seconds, bool range = true) {
     TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
     if (step % 10 == 0 && !hidden) {
       const wm_pose2 eye = wm::compose(truth, {0.2, 0, 0});
-      for (int i = 0; i < kCount; i++) {
-        const double dx = place[i][0] - eye.x_m, dy = place[i][1] - eye.y_m;
+      for (int k = 0; k < kCount + (twin > 0); k++) {
+        const int i = k % kCount, at = k < kCount ? k : twin;
+        const double dx = place[at][0] - eye.x_m, dy = place[at][1] - eye.y_m;
         const double bearing = wm::wrap(wm::atan2(dy, dx) - truth.heading_rad), distance = std::sqrt(dx * dx + dy * dy);
         if (std::fabs(bearing) > 1.2) continue;
         const bool wrong = wm_random_next_uniform(&noise) < false_share;
@@ -339,11 +340,28 @@ void test_two_markers_of_one_identity_are_told_and_left_alone(void) {
     place[0][0] = before[0] + (turn % 2 ? 1.5 : 0.0);
     drive(40);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
   }
   TEST_ASSERT_EQUAL_DOUBLE(2, counted("map.moved"));
   TEST_ASSERT_GREATER_THAN_DOUBLE(10, counted("map.doubled"));
   size_t found;
   worst_landmark(&found);
+  TEST_ASSERT_EQUAL(kCount - 1, found);
+}
+
+void test_two_markers_of_one_identity_on_opposite_sides_spoil_nothing(void) {
+  coded = true;
+  params.markers = 1;
+  twin = 6;  // opposite
+  begin();
+  for (int turn = 0; turn < 8; turn++) {
+    drive(20);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+  }
+  TEST_ASSERT_GREATER_THAN_DOUBLE(10, counted("map.doubled"));
+  size_t found;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_landmark(&found));
   TEST_ASSERT_EQUAL(kCount - 1, found);
 }
 
@@ -564,6 +582,7 @@ int main(void) {
   RUN_TEST(test_the_same_identity_twice_in_a_frame_at_two_places_keeps_one);
   RUN_TEST(test_a_marker_seen_twice_in_a_picture_is_fused_once_and_told);
   RUN_TEST(test_two_markers_of_one_identity_are_told_and_left_alone);
+  RUN_TEST(test_two_markers_of_one_identity_on_opposite_sides_spoil_nothing);
   RUN_TEST(test_a_marker_that_moved_is_told_on_a_frozen_map_too);
   RUN_TEST(test_half_a_minute_without_markers_is_said_and_mended);
   RUN_TEST(test_a_landmark_that_moved_leaves_is_counted_and_joins_anew);
