@@ -56,8 +56,16 @@ static const wm_camera_device_config *device_of(const wm_config *config, const c
   return NULL;
 }
 
-static wm_status open_devices(vision_source *self, const wm_config *config, const wm_vision_config *wanted,
-                              wm_warn_fn warn, void *context, wm_error *err) {
+// Another source that looks through this camera already: a device has one reader.
+static const vision_source *reader_of(const wm_vision *self, int32_t camera) {
+  for (size_t i = 0; i < self->count; i++)
+    for (uint32_t k = 0; k < self->sources[i].devices.count; k++)
+      if (self->sources[i].cameras[k] == camera) return &self->sources[i];
+  return NULL;
+}
+
+static wm_status open_devices(const wm_vision *all, vision_source *self, const wm_config *config,
+                              const wm_vision_config *wanted, wm_warn_fn warn, void *context, wm_error *err) {
   wm_status status = WM_OK;
   for (uint32_t i = 0; status == WM_OK && i < self->detector->pictures; i++) {
     const wm_camera *camera = &self->view.rig->cameras[self->cameras[i]];
@@ -65,6 +73,12 @@ static wm_status open_devices(vision_source *self, const wm_config *config, cons
     if (!device)
       return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s: the camera '%s' is not in devices.cameras", config->path,
                      wanted->line, self->detector->name, camera->name);
+    const vision_source *reader = reader_of(all, self->cameras[i]);
+    if (reader)
+      return wm_fail(err, WM_BAD_CONFIG,
+                     "%s:%d: vision.%s: the camera '%s' is looked through by %s already, and a device has one reader; "
+                     "say which by `cameras`, or take one detector",
+                     config->path, wanted->line, self->detector->name, camera->name, reader->detector->name);
     status = wm_camera_device_open(device, camera, self->cameras[i], warn, context, &self->devices.devices[i], err);
     self->devices.count += status == WM_OK;
   }
@@ -101,7 +115,7 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   if (s->state_bytes == 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s: can't work with the camera '%s': %s", config->path,
                    wanted->line, s->detector->name, first->name, why ? why : "it doesn't say why");
-  if (wm_recording_is_robot(recording)) return open_devices(s, config, wanted, warn, context, err);
+  if (wm_recording_is_robot(recording)) return open_devices(self, s, config, wanted, warn, context, err);
   for (uint32_t i = 0; i < s->detector->pictures; i++) {
     wm_status status = wm_video_open(wm_recording_dir(recording), &rig->cameras[s->cameras[i]], s->cameras[i], warn,
                                      context, &s->videos[i], err);

@@ -23,7 +23,7 @@ BUILD = pathlib.Path(sys.argv[1]).resolve()
 SECONDS = float(sys.argv[2]) if len(sys.argv) > 2 and sys.argv[2] != "inside" else 38
 PRIORITY = 80  # realtime.priority, as by default
 URL = "udpm://239.255.76.67:7667?ttl=0"
-CAMERA = "\ncameras: [{name: front, size: [640, 360], rate_hz: 15, colour: false}]\n\npictures:"
+CAMERA = "\ncameras: [{name: front, size: [640, 360], rate_hz: 5, colour: false}]\n\npictures:"
 QUANTILES = (0.5, 0.99, 0.999)
 
 
@@ -33,7 +33,7 @@ def make_recordings(work):
     (work / "corridor.yaml").write_text(world)
     made = {}
     for name, world, config, observed in (
-            ("edge_mcl, 640 x 360 at 15 Hz", work / "corridor.yaml", "corridor.yaml", "video/front.csv"),
+            ("edge_mcl, 640 x 360 at 5 Hz", work / "corridor.yaml", "corridor.yaml", "video/front.csv"),
             ("landmark_ekf, two cameras' sightings at 10 Hz", ROOT / "config/worlds/crossing.yaml", "crossing.yaml", "sightings.csv")):
         recording = work / pathlib.Path(config).stem
         subprocess.run([BUILD / "bin/waymark-simulate", world, "--out", recording, "--duration", str(SECONDS)], check=True,
