@@ -143,7 +143,7 @@ bool slam::find_start(int landmark, const wm_marker &m, const marker_reading &r)
 
 // Along and across the line of sight, and the heading: expected from `place` (x, y, heading in map). Rows by the state
 // without the landmark; those by the landmark apart.
-void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past, const double place[3],
+void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past, const double place[3], int lasting,
                       marker_view *out) const {
   const sensor_errors errors = errors_of(sensor);
   const wm_pose2 from = sensor_pose(sensor, past);
@@ -182,6 +182,18 @@ void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past
   out->observed[2] = wrap(r.yaw_rad);
   out->expected[2] = wrap(place[2] - from.heading_rad);
   out->innovation[2] = wrap(out->observed[2] - out->expected[2]);
+
+  // What lasts of the errors along and in heading is a state of this sensor and marker.
+  for (int k = 0; k < 3; k++) out->noise[k] = r.noise[k];
+  if (lasting < 0 || !(params_.marker_lasting > 0.0)) return;
+  for (int k = 0; k < 3; k += 2) {
+    const int state = lasting + k / 2;
+    const double size = params_.marker_lasting * std::sqrt(r.noise[k]), error = size * joint_.value(state);
+    out->row[k].add(state, size);
+    out->noise[k] -= square(size);
+    out->expected[k] += error;
+    out->innovation[k] = k == 2 ? wrap(out->innovation[k] - error) : out->innovation[k] - error;
+  }
 }
 
 // How badly a known marker's sighting fits.
@@ -189,11 +201,11 @@ double slam::marker_nis(int landmark, const wm_marker &m, const marker_reading &
   const int state = joint_.landmark_state(landmark);
   const double place[3] = {joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};
   marker_view v;
-  see_marker(m.sensor, r, past, place, &v);
+  see_marker(m.sensor, r, past, place, lend(m.sensor, m.id, joint_.now_ns()), &v);
   for (int i = 0; i < 3; i++)
     for (int k = 0; k < 3; k++) v.row[i].add(state + k, v.by_landmark[i][k]);
   joint_state::innovation_block block;
-  joint_.prepare(v.row, v.innovation, r.noise, 3, &block);
+  joint_.prepare(v.row, v.innovation, v.noise, 3, &block);
   return block.nis;
 }
 
@@ -204,11 +216,11 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
   const double place[3] = {joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};
   const int count = r.turned ? 3 : 2;
   marker_view v;
-  see_marker(m.sensor, r, past, place, &v);
+  see_marker(m.sensor, r, past, place, lend(m.sensor, m.id, joint_.now_ns()), &v);
   for (int i = 0; i < count; i++)
     for (int k = 0; k < 3; k++) v.row[i].add(state + k, v.by_landmark[i][k]);
   joint_state::innovation_block block;
-  joint_.prepare(v.row, v.innovation, r.noise, count, &block);
+  joint_.prepare(v.row, v.innovation, v.noise, count, &block);
   const double scale = r.turned ? kThreeNumbers : 1.0;
   const double hard = params_.gate_hard * scale, soft = params_.gate_soft * scale;
   for (int i = 0; i < count; i++) {
@@ -225,7 +237,7 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
   }
   if (block.nis > hard) return misfit(landmark, true);
   const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
-  const double more[3] = {r.noise[0] * weaker, r.noise[1] * weaker, r.noise[2] * weaker};
+  const double more[3] = {v.noise[0] * weaker, v.noise[1] * weaker, v.noise[2] * weaker};
   joint_.fuse(block, more, params_.map == WM_SLAM_MAP_FROZEN);
   landmark_note &note = notes()[landmark];
   if (!note.surveyed) note.z_m += (r.z_m - note.z_m) / (note.seen + 1.0);
@@ -243,7 +255,7 @@ void slam::join_marker(const wm_marker &m, const marker_reading &r, const past_p
   records.add(blank);
   if (blank.verdict != WM_FUSED) return;
   marker_view v;
-  see_marker(m.sensor, r, past, place, &v);
+  see_marker(m.sensor, r, past, place, lend(m.sensor, m.id, joint_.now_ns()), &v);
   // The block by the landmark is a turn times the scale, and 1.
   const double(*g)[3] = v.by_landmark;
   const double determinant = g[0][0] * g[1][1] - g[0][1] * g[1][0];
@@ -255,7 +267,7 @@ void slam::join_marker(const wm_marker &m, const marker_reading &r, const past_p
   for (int k = 0; k < 3; k++)
     for (int i = 0; i < 3; i++) {
       if (inverse[k][i] != 0.0) rows[k].add(v.row[i], -inverse[k][i]);
-      for (int l = 0; l < 3; l++) noise[k][l] += inverse[k][i] * r.noise[i] * inverse[l][i];
+      for (int l = 0; l < 3; l++) noise[k][l] += inverse[k][i] * v.noise[i] * inverse[l][i];
     }
   if (!r.turned) noise[2][2] += square(kPi);
   const int landmark = note_landmark(m.id, joint_.add_landmark(rows, noise, place), m.sensor, joint_.now_ns());

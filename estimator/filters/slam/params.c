@@ -30,6 +30,12 @@ static const wm_param kParams[] = {
         "Noise of a marker's place, m; the sensor's sigmas, along and across, are added in squares."),
     F64("markers.sigma_rel", marker_sigma_rel, 0, 0, 1, "The same in parts of the distance."),
     F64("markers.heading_sigma_rad", marker_heading_sigma_rad, 0.02, 1e-5, 3, "Noise of a marker's heading, rad."),
+    F64("markers.lasting", marker_lasting, 0, 0, 0.99,
+        "The part of a marker's sigma along the line of sight and in heading that is the same from one sighting of it "
+        "to "
+        "the next (pixels under its corners, light, its bend), fading with lasting.tau_s; needs lasting.slots. 0: all "
+        "of "
+        "it is fresh."),
     WM_LASTING_PARAMS,
     F64("gate.soft", gate_soft, 9, 1, 1e6,
         "Normalised innovation squared for two numbers above which the measurement is believed less, as a "

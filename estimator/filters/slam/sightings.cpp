@@ -66,7 +66,7 @@ int slam::lend(int sensor, int32_t id, wm_time_ns t_ns) {
   bool fresh;
   auto *slot = lasting_.take(id * kSlamSensors + sensor, &fresh);
   if (!slot) return -1;
-  const int width = (lasting_bearing_offset_ >= 0) + (lasting_range_offset_ >= 0);
+  const int width = lasting_width_;
   const double left = fresh ? 0.0 : exp(-wm_seconds_between(slot->used_ns, t_ns) / params_.lasting_tau_s);
   for (int k = 0; k < width; k++) {
     if (fresh)

@@ -20,6 +20,7 @@ const double kAbsent = std::numeric_limits<double>::quiet_NaN();
 
 int lasting_states(const wm_slam_params &p) {
   if (p.lasting_slots == 0) return 0;
+  if (p.markers && p.marker_lasting > 0.0) return 2;
   return (p.lasting_bearing_rad > 0.0 || p.lasting_lateral_m > 0.0) +
          (p.lasting_range_m > 0.0 || p.lasting_range_rel > 0.0);
 }
@@ -106,10 +107,11 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   lasting_bearing_offset_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
   lasting_range_offset_ =
       params.lasting_range_m > 0.0 || params.lasting_range_rel > 0.0 ? (lasting_bearing_offset_ >= 0 ? 1 : 0) : -1;
+  lasting_width_ = lasting_states(params);
   lasting_.clear();
-  for (int i = 0; i < params.lasting_slots && lasting_states(params) > 0; i++) {
+  for (int i = 0; i < params.lasting_slots && lasting_width_ > 0; i++) {
     lasting_.add(next);
-    for (int k = 0; k < lasting_states(params); k++) add(0.0, 1.0);
+    for (int k = 0; k < lasting_width_; k++) add(0.0, 1.0);
   }
   start_again();
 }

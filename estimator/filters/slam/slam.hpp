@@ -93,6 +93,7 @@ class slam {
     joint_row row[3];
     double observed[3], expected[3], innovation[3];
     double by_landmark[3][3];
+    double noise[3];
   };
 
   past_pose look_back(double age_s) const;
@@ -124,7 +125,7 @@ class slam {
   wm_status fuse_marker(const wm_event &event, record_list records);
   marker_reading read_marker(const wm_marker &m, const double p_m[3], double yaw_rad) const;
   double marker_nis(int landmark, const wm_marker &m, const marker_reading &r, const past_pose &past);
-  void see_marker(int sensor, const marker_reading &r, const past_pose &past, const double place[3],
+  void see_marker(int sensor, const marker_reading &r, const past_pose &past, const double place[3], int lasting,
                   marker_view *out) const;
   void fuse_known_marker(int landmark, const wm_marker &m, const marker_reading &r, const past_pose &past,
                          wm_innovation blank, record_list records);
@@ -162,6 +163,7 @@ class slam {
   int sensor_state_[kSlamSensors][kSensorStates];
   state_slots<24> lasting_;
   int lasting_bearing_offset_, lasting_range_offset_;  // within a slot; -1: not carried
+  int lasting_width_;                                  // states of a slot
   bearing_tracks tracks_;
   int first_ray_, first_clone_;
   slam_counts counts_;
