@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Any 32-bit ARM board of Debian's armhf: armv7-a, VFPv3-D16; NEON where the board says it has it (math/vectors.cpp).
+# Any 32-bit ARM board with NEON (a Cortex-A of armv7-a has it but for a few of the first).
 set(WM_ARCH armhf)
-set(WM_CPU_FLAGS "")
+set(WM_CPU_FLAGS "-march=armv7-a -mfpu=neon")
 include(${CMAKE_CURRENT_LIST_DIR}/debian-cross.cmake)
