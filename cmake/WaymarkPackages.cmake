@@ -30,6 +30,11 @@ if(TARGET waymark-simulate)
   set(simulator ", libembree3-3 (>= 3.13.5+dfsg)")
 endif()
 
+set(videos "")
+if(TARGET waymark-import)
+  set(videos ", libavcodec59 (>= 7:5.1), libavformat59 (>= 7:5.1), libavutil57 (>= 7:5.1), libswscale6 (>= 7:5.1)")
+endif()
+
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME waymark)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "${base}, ${pictures}, liblcm1 (>= 1.3.1)${cameras}")
@@ -50,7 +55,7 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/conffi
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME waymark-tools)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
-set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${cameras}${simulator}")
+set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${cameras}${simulator}${videos}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "desk tools for a robot that knows where it is
  Simulates drives, judges runs against truth, draws reports, calibrates
  cameras, makes maps: waymark eval, report, simulate, diff, calibrate, map.")

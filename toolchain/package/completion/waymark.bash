@@ -4,7 +4,7 @@ _waymark() {
   local word=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]:-} words= more=
   COMPREPLY=()
   if [ "$COMP_CWORD" -eq 1 ]; then
-    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps calibrate detect diff eval map reference report simulate --help --version' -- "$word")
+    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps calibrate detect diff eval import map reference report simulate --help --version' -- "$word")
     return
   fi
   case $command in
@@ -32,6 +32,7 @@ _waymark() {
     "detect") words='--help --config --out --every' ;;
     "diff") words='--help' ;;
     "eval") words='--help --json --published --reference --align --against --from --to --detector --camera --view' ;;
+    "import") words='--help --out --camera --stamps --begin-ns --quality' ;;
     "map") words='--help --resolution --origin --inside --walls-below --negate --fine --speck --clearance --out --recording --draw --json --family --ids --size --paper' ;;
     "reference") words='--help --map --range --particles --passes --seed' ;;
     "report") words='--help --out --svg' ;;

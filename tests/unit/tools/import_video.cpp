@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+// `waymark import`: a compressed video in MP4, made here, against what the robot's reader then reads of it.
+#include <unistd.h>
+
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <memory>
+
+extern "C" {
+#include <libavcodec/avcodec.h>
+#include <libavformat/avformat.h>
+}
+
+#include "common/failure.h"
+#include "import/import.h"
+#include "unity.h"
+#include "waymark/video.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+constexpr int kWidth = 160, kHeight = 96, kPictures = 30, kBar = 16;
+fs::path folder;
+
+// A bright bar that goes to the right by 4 px a picture.
+bool is_bright(int x, int picture) { return x / 4 >= picture && x / 4 < picture + kBar / 4; }
+
+// Pictures that refer to later ones are among them, where the encoder can: their order in the file is another.
+void encode(const fs::path &file) {
+  AVFormatContext *format = nullptr;
+  TEST_ASSERT_TRUE(avformat_alloc_output_context2(&format, nullptr, "mp4", file.c_str()) >= 0);
+  const AVCodec *codec = avcodec_find_encoder(AV_CODEC_ID_H264);
+  if (!codec) codec = avcodec_find_encoder(AV_CODEC_ID_MPEG4);
+  AVCodecContext *to = avcodec_alloc_context3(codec);
+  to->width = kWidth;
+  to->height = kHeight;
+  to->pix_fmt = AV_PIX_FMT_YUV420P;
+  to->time_base = {1, 10};
+  to->max_b_frames = 2;
+  to->bit_rate = 400000;
+  to->thread_count = 1;
+  if ((format->oformat->flags & AVFMT_GLOBALHEADER) != 0) to->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+  TEST_ASSERT_EQUAL(0, avcodec_open2(to, codec, nullptr));
+  AVStream *stream = avformat_new_stream(format, nullptr);
+  avcodec_parameters_from_context(stream->codecpar, to);
+  stream->time_base = to->time_base;
+  TEST_ASSERT_TRUE(avio_open(&format->pb, file.c_str(), AVIO_FLAG_WRITE) >= 0);
+  TEST_ASSERT_TRUE(avformat_write_header(format, nullptr) >= 0);
+  AVFrame *frame = av_frame_alloc();
+  frame->format = to->pix_fmt;
+  frame->width = kWidth;
+  frame->height = kHeight;
+  TEST_ASSERT_EQUAL(0, av_frame_get_buffer(frame, 0));
+  AVPacket *packet = av_packet_alloc();
+  for (int picture = 0; picture <= kPictures; picture++) {
+    if (picture < kPictures) {
+      TEST_ASSERT_EQUAL(0, av_frame_make_writable(frame));
+      for (int y = 0; y < kHeight; y++)
+        for (int x = 0; x < kWidth; x++) frame->data[0][y * frame->linesize[0] + x] = is_bright(x, picture) ? 235 : 16;
+      for (int c = 1; c < 3; c++)
+        for (int y = 0; y < kHeight / 2; y++)
+          std::memset(frame->data[c] + static_cast<ptrdiff_t>(y) * frame->linesize[c], 128, kWidth / 2);
+      frame->pts = picture + picture / 10;  // a gap every tenth
+    }
+    TEST_ASSERT_EQUAL(0, avcodec_send_frame(to, picture < kPictures ? frame : nullptr));
+    while (avcodec_receive_packet(to, packet) == 0) {
+      av_packet_rescale_ts(packet, to->time_base, stream->time_base);
+      TEST_ASSERT_TRUE(av_interleaved_write_frame(format, packet) >= 0);
+    }
+  }
+  av_write_trailer(format);
+  avio_closep(&format->pb);
+  av_packet_free(&packet);
+  av_frame_free(&frame);
+  avcodec_free_context(&to);
+  avformat_free_context(format);
+}
+
+void write_stamps(const fs::path &file, int rows) {
+  std::ofstream out(file);
+  out << "frame,t_ns,exposure_ns,arrival_ns\n";
+  for (int i = 0; i < rows; i++)
+    out << i << ',' << 5'000'000'000LL + i * 100'000'007LL << ",4000000," << 5'040'000'000LL + i * 100'000'007LL
+        << '\n';
+}
+
+// Each picture as the robot reads it: the bar where it belongs, black and white of full range.
+void judge(const fs::path &recording, int64_t first_ns, int64_t eleventh_ns, int64_t exposure_ns) {
+  wm_camera camera{};
+  std::strcpy(camera.name, "front");
+  wm_error err{};
+  wm_video *opened = nullptr;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_video_open(recording.c_str(), &camera, 0, nullptr, nullptr, &opened, &err),
+                            err.text);
+  const std::unique_ptr<wm_video, decltype(&wm_video_close)> video(opened, wm_video_close);
+  wm_frame frame{};
+  int count = 0;
+  double off = 0;
+  for (; wm_video_next(video.get(), &frame, &err) == WM_OK; count++) {
+    for (int x = 0; x < kWidth; x++) {
+      const int want = is_bright(x, count) ? 255 : 0;
+      off +=
+          std::fabs(frame.grey[static_cast<size_t>(kHeight / 2) * frame.stride_bytes + static_cast<size_t>(x)] - want);
+    }
+    if (count == 0) TEST_ASSERT_EQUAL_INT64(first_ns, frame.t_ns);
+    if (count == 10) TEST_ASSERT_EQUAL_INT64(eleventh_ns, frame.t_ns);
+    TEST_ASSERT_EQUAL_INT64(exposure_ns, frame.exposure_ns);
+  }
+  TEST_ASSERT_EQUAL(kPictures, count);
+  TEST_ASSERT_EQUAL(0, wm_video_counted(video.get())->without_picture);
+  TEST_ASSERT_TRUE(off / (kPictures * kWidth) < 8);
+}
+
+wm::tools::ImportWish wish_to(const char *out) {
+  wm::tools::ImportWish wish;
+  wish.video = folder / "drive.mp4";
+  wish.out = folder / out;
+  wish.camera = "front";
+  wish.begin_ns = 7'000'000'000;
+  return wish;
+}
+
+void refused(const wm::tools::ImportWish &wish, const char *text) {
+  try {
+    (void)wm::tools::import_video(wish);
+    TEST_FAIL_MESSAGE("was not refused");
+  } catch (const wm::tools::Failure &failure) {
+    TEST_ASSERT_NOT_NULL_MESSAGE(std::strstr(failure.what(), text), failure.what());
+  }
+}
+
+void the_containers_stamps_where_there_are_no_others() {
+  const wm::tools::Imported made = wm::tools::import_video(wish_to("plain"));
+  TEST_ASSERT_EQUAL(kPictures, made.pictures);
+  TEST_ASSERT_EQUAL(0, made.damaged);
+  TEST_ASSERT_FALSE(made.own_stamps);
+  judge(folder / "plain", 7'000'000'000, 8'100'000'000, 0);
+}
+
+void a_csv_of_stamps_is_kept_as_it_is() {
+  wm::tools::ImportWish wish = wish_to("stamped");
+  wish.stamps = folder / "stamps.csv";
+  write_stamps(wish.stamps, kPictures);
+  TEST_ASSERT_TRUE(wm::tools::import_video(wish).own_stamps);
+  judge(folder / "stamped", 5'000'000'000, 6'000'000'070, 4'000'000);
+}
+
+void what_does_not_agree_is_said_and_leaves_nothing() {
+  wm::tools::ImportWish wish = wish_to("refused");
+  wish.stamps = folder / "short.csv";
+  write_stamps(wish.stamps, kPictures - 1);
+  refused(wish, "29 rows, but");
+  std::ofstream(wish.stamps) << "t,x\n";
+  refused(wish, "frame,t_ns,exposure_ns");
+  wish = wish_to("refused");
+  wish.video = folder / "short.csv";
+  refused(wish, "short.csv");
+  wish.video = folder / "none.mp4";
+  refused(wish, "none.mp4");
+  TEST_ASSERT_TRUE(!fs::exists(folder / "refused/video") || fs::is_empty(folder / "refused/video"));
+  (void)wm::tools::import_video(wish_to("twice"));
+  refused(wish_to("twice"), "is there already");
+}
+
+}  // namespace
+
+extern "C" void setUp() {}
+extern "C" void tearDown() {}
+
+int main() {
+  folder = fs::temp_directory_path() / ("import_video_" + std::to_string(getpid()));
+  fs::create_directories(folder);
+  av_log_set_level(AV_LOG_FATAL);
+  UNITY_BEGIN();
+  encode(folder / "drive.mp4");
+  RUN_TEST(the_containers_stamps_where_there_are_no_others);
+  RUN_TEST(a_csv_of_stamps_is_kept_as_it_is);
+  RUN_TEST(what_does_not_agree_is_said_and_leaves_nothing);
+  const int failed = UNITY_END();
+  fs::remove_all(folder);
+  return failed;
+}

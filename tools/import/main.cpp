@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// `waymark import`: a video of any kind becomes one that a recording holds and the robot reads.
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "common/failure.h"
+#include "import/import.h"
+
+namespace {
+
+using wm::tools::Failure;
+
+int run(const wm::tools::ImportWish &wish) {
+  const wm::tools::Imported made = wm::tools::import_video(wish);
+  std::printf("%s: %llu pictures of %d x %d (%s)", made.made.c_str(), static_cast<unsigned long long>(made.pictures),
+              made.width, made.height, made.codec.c_str());
+  if (made.own_stamps)
+    std::printf(", with their stamps\n");
+  else
+    std::printf(", %.2f s by the container's stamps: exposure and arrival are not known\n", made.seconds);
+  if (made.damaged > 0)
+    std::printf("%llu packets were damaged: pictures may be missing or smeared\n",
+                static_cast<unsigned long long>(made.damaged));
+  return wm::tools::kDone;
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  wm::tools::ImportWish wish;
+  CLI::App app(
+      "Makes a video of any kind (H.264 and others, by libav) into what a recording holds: MJPEG in AVI, with its "
+      "stamps.",
+      "waymark import");
+  app.add_option("VIDEO", wish.video, "the video")->required();
+  app.add_option("--out", wish.out, "folder of the recording: video/CAMERA.avi and .csv are written there")->required();
+  app.add_option("--camera", wish.camera, "the camera's name")->default_val("front");
+  app.add_option(
+      "--stamps", wish.stamps,
+      "CSV of stamps, a row each picture, kept as it is; else the one beside the video, else the container's");
+  app.add_option("--begin-ns", wish.begin_ns, "stamp of the first picture, where they are the container's, ns")
+      ->capture_default_str();
+  app.add_option("--quality", wish.quality, "of the JPEGs")->check(CLI::Range(1, 100))->capture_default_str();
+  app.footer(
+      "Pictures become grey, which is what the robot reads.\n"
+      "Exit code: 0 done, 1 the work failed, 2 usage.\n"
+      "Example: waymark import phone.mp4 --camera front --out recordings/drive");
+  try {
+    app.parse(argc, argv);
+    return run(wish);
+  } catch (const CLI::ParseError &problem) {
+    return app.exit(problem) == 0 ? wm::tools::kDone : wm::tools::kUsage;
+  } catch (const std::exception &problem) {
+    std::fprintf(stderr, "waymark import: %s\n", problem.what());
+    const auto *failure = dynamic_cast<const Failure *>(&problem);
+    return failure != nullptr ? failure->exit_code : wm::tools::kFailed;
+  }
+}
