@@ -37,9 +37,10 @@ void edge_mcl::watch(double explained, int seen, double dt_s) {
   double fresh = dt_s / kFresh_s < way / kFresh_m ? dt_s / kFresh_s : way / kFresh_m;
   if (fresh > 1.0) fresh = 1.0;
   explained_ += fresh * (explained - explained_);
-  // Places differ in how much of them a map explains: what is usual here sets the bar.
-  const double relative = params_.lost_relative * usual_;
-  const double bar = relative > params_.lost_explained ? relative : params_.lost_explained;
+  // Places differ in how much of them a map explains: what is usual here sets the bar. And every scan holds some points
+  // that are no edge of the map, wherever it was taken: where few are seen, in the dark, they are most of them.
+  const double relative = params_.lost_relative * usual_, many = seen / (seen + params_.lost_false_points);
+  const double bar = many * (relative > params_.lost_explained ? relative : params_.lost_explained);
   const double said = params_.lost_gain * (bar - explained) * fresh;
   lost_odds_ += said;
   // p := p + (1 - p) rate dt

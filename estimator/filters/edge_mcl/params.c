@@ -63,11 +63,15 @@ static const wm_param kParams[] = {
         "What the pose is unsure of beside the filter's covariance, m: errors that last longer than it remembers."),
     F64("lasting.heading_rad", lasting_heading_rad, 0.0005, 0, 1, "The same of the heading, rad."),
 
-    F64("lost.explained", lost_explained, 0.35, 0.05, 0.95,
-        "Share of the points that the map explains at which a scan speaks neither for nor against being lost."),
-    F64("lost.relative", lost_relative, 0.55, 0, 1,
+    F64("lost.explained", lost_explained, 0.5, 0.05, 0.95,
+        "Share of the points that the map explains at which a scan of many points speaks neither for nor against being "
+        "lost."),
+    F64("lost.relative", lost_relative, 0.75, 0, 1,
         "The same in parts of the share that is usual in this place; the larger of the two counts."),
-    F64("lost.gain", lost_gain, 5.5, 0.1, 100,
+    F64("lost.false_points", lost_false_points, 80, 0, 1000,
+        "Points of a scan with which half of that share is enough: some are no edge of the map wherever it is, and of "
+        "few they are most."),
+    F64("lost.gain", lost_gain, 8, 0.1, 100,
         "How much a scan speaks: the logarithm of the odds changes by this times the share's difference."),
     F64("lost.per_s", lost_per_s, 0.0001, 0, 1, "Probability of being lost out of the blue, per s (someone lifts it)."),
     F64("search.explained", search_explained, 0.6, 0.05, 1,

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "filters/edge_mcl/hypotheses.hpp"
+#include "filters/edge_mcl/params.h"
 #include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
@@ -161,6 +162,35 @@ void forwards_and_backwards_it_stays_on_the_way(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, weight);
   TEST_ASSERT_DOUBLE_WITHIN(0.1, d.truth.x_m, x);
   TEST_ASSERT_DOUBLE_WITHIN(0.1, d.truth.y_m, y);
+}
+
+// `pose: cloud`: what is given out are the particles' own moments, the heading's on the circle.
+void the_clouds_pose_is_its_particles_mean(void) {
+  reinterpret_cast<wm_edge_mcl_params *>(params.data())->pose = EDGE_MCL_CLOUD;
+  filter f;
+  drive d;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.go(f, 8, 1.0, 0.0));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  wm_particle particles[200];
+  TEST_ASSERT_EQUAL(200, f.ops->particles(f.state, particles, 200));
+  double x = 0, y = 0, sine = 0, cosine = 0, xx = 0, yy = 0;
+  for (const wm_particle &p : particles) {
+    x += p.weight * p.x_m;
+    y += p.weight * p.y_m;
+    sine += p.weight * std::sin(p.heading_rad);
+    cosine += p.weight * std::cos(p.heading_rad);
+  }
+  for (const wm_particle &p : particles) {
+    xx += p.weight * (p.x_m - x) * (p.x_m - x);
+    yy += p.weight * (p.y_m - y) * (p.y_m - y);
+  }
+  const wm_estimate e = f.estimate();
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, x, e.pose_map_base.p_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, y, e.pose_map_base.p_m[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, std::atan2(sine, cosine), e.heading_rad);
+  const double lasting = 0.004 * 0.004;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3 * (xx + lasting), xx + lasting, e.covariance[wm_cov_index(0, 0)]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3 * (yy + lasting), yy + lasting, e.covariance[wm_cov_index(1, 1)]);
 }
 
 void a_camera_that_looks_lower_than_believed_is_found_out(void) {
@@ -324,6 +354,7 @@ void tearDown(void) {}
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(forwards_and_backwards_it_stays_on_the_way);
+  RUN_TEST(the_clouds_pose_is_its_particles_mean);
   RUN_TEST(a_camera_that_looks_lower_than_believed_is_found_out);
   RUN_TEST(carried_away_it_says_so_and_finds_back);
   RUN_TEST(it_starts_without_being_told_where);
