@@ -2,6 +2,7 @@
 #include "waymark/steady.h"
 
 #include <alloca.h>
+#include <malloc.h>
 #include <stdio.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -40,4 +41,9 @@ void wm_touch_stack(size_t bytes) {
   for (size_t i = 0; i < bytes; i += 512) stack[i] = 0;
 }
 
-int wm_lock_memory(void) { return mlockall(MCL_CURRENT | MCL_FUTURE) == 0; }
+int wm_lock_memory(void) {
+#ifdef __GLIBC__
+  (void)malloc_trim(0);  // what loading took and gave back needn't be locked
+#endif
+  return mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+}

@@ -39,13 +39,20 @@ static void say_nothing(void *context, const char *line) {
 
 static size_t record_bytes(const live *self) { return OUTPUT_RECORD_HEAD + wm_output_bytes(self->assembly.kinds); }
 
+// Records that may hold a picture's points are large (8 kB), and most sources of such a robot speak seldom: an eighth
+// of the slots holds half a second and more of them, and the sink looks every 2 ms. All of it is locked memory.
+static size_t output_slots(const live *self) {
+  size_t slots = kThreads[THREAD_ESTIMATOR].ring_slots;
+  return record_bytes(self) > 1024 ? slots / 8 : slots;
+}
+
 static size_t list_needs(live *self, wm_arena_need needs[NEEDS_MAX]) {
   live_estimator *e = &self->estimator;
   size_t n = WM_PIPELINE_NEEDS, slots = (size_t)self->config->runtime.realtime_ring_events;
   wm_pipeline_needs(&e->pipeline, &self->assembly, needs);
   needs[n++] = (wm_arena_need){"feeds", self->assembly.source_count * sizeof(wm_feed), (void **)&self->feeds};
-  needs[n++] = (wm_arena_need){"outputs ring", wm_ring_bytes(kThreads[THREAD_ESTIMATOR].ring_slots, record_bytes(self)),
-                               &e->outputs_memory};
+  needs[n++] =
+      (wm_arena_need){"outputs ring", wm_ring_bytes(output_slots(self), record_bytes(self)), &e->outputs_memory};
   needs[n++] = (wm_arena_need){"health ring", wm_ring_bytes(HEALTH_RING_SLOTS, sizeof(wm_health)), &e->healths_memory};
   for (size_t i = 0; i < self->assembly.source_count; i++) {
     size_t slot_bytes = wm_merge_slot_bytes(self->assembly.sources[i].kinds);
@@ -62,7 +69,7 @@ static wm_status take_memory(live *self, wm_error *err) {
   wm_status status = wm_arena_fill(&self->arena, needs, count, self->config->runtime.realtime_lock_memory, err);
   if (status != WM_OK) return status;
   live_estimator *e = &self->estimator;
-  wm_ring_init(&e->outputs, e->outputs_memory, kThreads[THREAD_ESTIMATOR].ring_slots, record_bytes(self));
+  wm_ring_init(&e->outputs, e->outputs_memory, output_slots(self), record_bytes(self));
   wm_ring_init(&e->healths, e->healths_memory, HEALTH_RING_SLOTS, sizeof(wm_health));
   for (size_t i = 0; i < self->assembly.source_count; i++)
     wm_ring_init(&self->sources[i].ring, self->sources[i].ring_memory,
