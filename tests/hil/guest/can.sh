@@ -6,12 +6,14 @@ waymark=/run/waymark
 cp -r /host/scenario /host/waymark /run/
 cd /run/scenario || exit 1
 modprobe -a kvaser_pci can-raw || exit 1
-for tool in "canplayer -h" "cansend -h" "ip -s link" "$waymark help"; do $tool >/dev/null 2>&1; done
+for tool in "lcm-logger --help" "canplayer -h" "cansend -h" "ip -s link" "$waymark help"; do $tool >/dev/null 2>&1; done
 cat can.log >/dev/null
 fails=0
 fail() { echo "FAIL: $*"; fails=$((fails + 1)); }
 play() { canplayer -I can.log can1=can0; }
 play_again_and_again() { while :; do play 2>/dev/null; sleep 0.2; done; }
+# What happens when, on the clock that poses have.
+mark() { echo "$1 $(cut -d' ' -f1 /proc/uptime)" >>/host/out/marks; }
 up() { ip link set "$1" up type can bitrate 500000 restart-ms 100; ip link set "$1" txqueuelen 2000; }
 
 echo "== the doctor on an interface that is down, then up"
@@ -40,25 +42,35 @@ cp -r /run/drive /host/out/
 echo "== the interface goes down and up, the adapter is removed and comes back"
 play_again_and_again &
 player=$!
-$waymark run --config robot.yaml --out /run/faults --duration 22 >faults.txt 2>&1 &
+lcm-logger --lcm-url='udpm://239.255.76.67:7667?ttl=0' -q /run/heard.lcm &
+logger=$!
+sleep 1
+$waymark run --config robot.yaml --out /run/faults --duration 24 >faults.txt 2>&1 &
 run=$!
 sleep 5
+mark down
 ip link set can0 down
 sleep 3
 ip link set can0 up
-sleep 3
+mark up
+sleep 4
 device=$(readlink -f /sys/class/net/can0/device)
+mark removed
 echo 1 >"$device/remove"
 sleep 3
 echo 1 >/sys/bus/pci/rescan
 sleep 1
 up can0
+mark back
 wait $run || fail "waymark run among faults: exit code $?"
 cat faults.txt
 for said in "can0 went down" "can0 speaks again" "can0 is gone (No such device)" "can: is back"; do
   grep -qF "$said" faults.txt || fail "not said: $said"
 done
+kill $logger
+wait $logger
 cp -r /run/faults /host/out/
+cp /run/heard.lcm faults.txt /host/out/faults/
 
 echo "== killed and started again"
 $waymark run --config robot.yaml &
