@@ -152,4 +152,6 @@ const wm_detector wm_apriltag_detector = {
     {kParams, sizeof kParams / sizeof kParams[0], sizeof(apriltag_params)},
     state_bytes,
     init,
-    detect};
+    detect,
+    0,
+    NULL};

@@ -30,6 +30,9 @@ struct wm_recording {
   calibration calibration;
   wm_landmark *landmarks;
   size_t landmark_count;
+  char landmarks_path[WM_PATH_MAX];  // "" where there are none
+  wm_appearance *appearances;        // NULL until they are asked for
+  size_t appearance_count;
   char map_path[WM_PATH_MAX];  // "" where there is none
   wm_map *map;                 // NULL until it is asked for
   sensor_names sighting_sensors, marker_sensors;
@@ -156,6 +159,7 @@ static wm_status read_landmarks(wm_recording *self, wm_error *err) {
   int there;
   wm_status status = choose(self, self->overrides.landmarks, "landmarks.csv", path, &there, err);
   if (status != WM_OK || !there) return status;
+  memcpy(self->landmarks_path, path, sizeof path);
   return landmarks_read(path, &self->warn, &self->landmarks, &self->landmark_count, err);
 }
 
@@ -350,6 +354,7 @@ void wm_recording_close(wm_recording *self) {
   wm_yaml_free(self->about);
   free(self->calibration_text);
   free(self->landmarks);
+  wm_appearances_free(self->appearances, self->appearance_count);
   wm_map_free(self->map);
   free(self);
 }
@@ -371,6 +376,24 @@ wm_status wm_recording_camera_sensor(wm_recording *self, const char *camera, uin
 const wm_landmark *wm_recording_landmarks(const wm_recording *self, size_t *count) {
   *count = self->landmark_count;
   return self->landmarks;
+}
+
+wm_status wm_recording_appearances(wm_recording *self, const wm_appearance **out, size_t *count, wm_error *err) {
+  char path[WM_PATH_MAX];
+  *out = self->appearances;
+  *count = self->appearance_count;
+  if (self->appearances || !self->landmarks_path[0]) return WM_OK;
+  const char *slash = strrchr(self->landmarks_path, '/');
+  const int folder = slash ? (int)(slash - self->landmarks_path) + 1 : 0;
+  if (snprintf(path, sizeof path, "%.*slandmarks/appearance.csv", folder, self->landmarks_path) >= WM_PATH_MAX)
+    return wm_fail(err, WM_BAD_USAGE, "%s: the path of landmarks/appearance.csv beside it is too long",
+                   self->landmarks_path);
+  if (access(path, F_OK) != 0) return WM_OK;
+  wm_status status =
+      wm_appearances_load(path, self->warn.fn, self->warn.context, &self->appearances, &self->appearance_count, err);
+  *out = self->appearances;
+  *count = self->appearance_count;
+  return status;
 }
 
 const char *wm_recording_map_path(const wm_recording *self) { return self->map_path; }

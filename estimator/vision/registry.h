@@ -10,6 +10,7 @@ extern "C" {
 #endif
 
 extern const wm_detector wm_edges_detector;
+extern const wm_detector wm_landmarks_detector;
 extern const wm_detector wm_lines_detector;
 extern const wm_detector wm_mr_detector;
 extern const wm_detector wm_stereo_detector;

@@ -79,6 +79,7 @@ void check_source(const wm_assembly *assembly, const wm_assembled_source *source
   *facts = (source_facts){.first_ns = WM_TIME_NONE, .last_ns = WM_TIME_NONE, .latest_ns = INT64_MIN};
   motion_data_init(&motion, &assembly->setup.wheels);
   while ((status = source->source->ops->next(source->source, &event, &err)) == WM_OK) {
+    if (event.kind == WM_EVENT_NONE) continue;  // a picture's arrival
     take(facts, &assembly->setup, &event);
     motion_data_take(&motion, &event);
   }

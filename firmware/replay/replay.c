@@ -61,6 +61,7 @@ static void publish_until(replay *self, wm_time_ns now_ns) {
     wm_pipeline_advance(&self->pipeline, self->next_tick_ns);
     if (wm_pipeline_publish(&self->pipeline, self->next_tick_ns, &published)) {
       published.sent_ns = self->next_tick_ns;
+      wm_vision_tell(self->assembly.vision, &published.now);
       self->output.put(self->output.context, WM_OUTPUT_PUBLISHED, &published, sizeof published);
     }
     self->next_tick_ns += self->publish_ns;
@@ -88,7 +89,7 @@ static wm_status play(replay *self, const wm_replay_options *options, double dur
     publish_until(self, arrival_ns);
     self->now_ns = arrival_ns;
     wm_pipeline_advance(&self->pipeline, arrival_ns);
-    wm_pipeline_arrive(&self->pipeline, &feed->next);
+    if (feed->next.kind != WM_EVENT_NONE) wm_pipeline_arrive(&self->pipeline, &feed->next);
     wm_status status = wm_feed_advance(feed, err);
     if (status != WM_OK) return status;
     if (options->progress && ++events % 256 == 0 && wm_monotonic_ns() - told_ns > PROGRESS_EVERY_NS) {

@@ -44,7 +44,7 @@ static void play_recording(live_source *self) {
   const run_clock *clock = &self->run->clock;
   while (self->feed->has_next && wait_until(self->run, monotonic_from_run(clock, self->feed->next.arrival_ns))) {
     self->feed->next.arrival_ns = run_now(clock);  // it arrives now, whatever the recording says
-    put(self);
+    if (self->feed->next.kind != WM_EVENT_NONE) put(self);
     wm_source *source = self->feed->source;
     if (source->skip_to) source->skip_to(source, run_now(clock));
     self->status = wm_feed_advance(self->feed, &self->error);

@@ -11,6 +11,7 @@
 struct wm_vision {
   vision_source sources[WM_VISION_SOURCES_MAX];
   size_t count;
+  newest_pose newest;
   char need_names[WM_VISION_NEEDS][40];
 };
 
@@ -99,7 +100,13 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   s->params = wanted->params;
   s->newest_ns = WM_TIME_NONE;
   memcpy(s->cameras, cameras, sizeof s->cameras);
-  s->view = (wm_view){rig, s->cameras};
+  s->view = (wm_view){.rig = rig, .cameras = s->cameras};
+  s->view.landmarks = wm_recording_landmarks(recording, &s->view.landmark_count);
+  if (s->detector->is_guided) {
+    wm_status status = wm_recording_appearances(recording, &s->view.appearances, &s->view.appearance_count, err);
+    if (status != WM_OK) return status;
+    s->newest = &self->newest;
+  }
   s->base = (wm_source){.ops = &kOps, .in_order = 1, .skip_to = skip_to};
   (void)snprintf(s->base.name, sizeof s->base.name, "%s:%s", s->detector->name, first->name);
   s->gives_looked = (config->estimator->takes & WM_EVENT_BIT(WM_EVENT_LOOKED)) != 0;
@@ -253,8 +260,12 @@ wm_status wm_vision_start(wm_vision *self, wm_error *err) {
 wm_status wm_vision_run_ahead(wm_vision *self, wm_error *err) {
   wm_status status = WM_OK;
   for (size_t i = 0; status == WM_OK && i < wm_vision_count(self); i++)
-    status = vision_ahead_start(&self->sources[i], err);
+    if (!self->sources[i].newest) status = vision_ahead_start(&self->sources[i], err);
   return status;
+}
+
+void wm_vision_tell(wm_vision *self, const wm_estimate *newest) {
+  if (self) newest_pose_put(&self->newest, newest);
 }
 
 void wm_vision_times(const wm_vision *self, wm_histogram *decode_ns, wm_histogram *detect_ns) {

@@ -123,8 +123,10 @@ static wm_status look(vision_source *self, wm_error *err) {
   const wm_seen *seen = self->only ? wanted(self, frames[0].t_ns) : NULL;
   if (seen) arrival_ns = seen->arrival_ns;
 
+  wm_estimate newest;
+  const wm_estimate *prediction = self->newest && newest_pose_get(self->newest, &newest) ? &newest : NULL;
   wm_time_ns begin_ns = wm_monotonic_ns();
-  status = self->detector->detect(self->state, frames, NULL, self->events, self->capacity, &self->event_count);
+  status = self->detector->detect(self->state, frames, prediction, self->events, self->capacity, &self->event_count);
   wm_histogram_add(&self->detect_ns, wm_monotonic_ns() - begin_ns);
   if (status != WM_OK) {
     self->counts.malformed++;
@@ -149,8 +151,24 @@ static wm_status look(vision_source *self, wm_error *err) {
   return WM_OK;
 }
 
+// Says when the next picture arrives, without a look at it.
+static wm_status announce(vision_source *self, wm_event *out, wm_error *err) {
+  wm_frame heads[PICTURES_MAX] = {0};
+  wm_status status = find_together(self, heads, err);
+  if (status != WM_OK) return status;
+  const wm_seen *seen = self->only ? wanted(self, heads[0].t_ns) : NULL;
+  memset(out, 0, WM_EVENT_SMALL_BYTES);
+  out->kind = WM_EVENT_NONE;
+  out->t_ns = heads[0].t_ns;
+  out->arrival_ns = seen ? seen->arrival_ns : heads[0].arrival_ns;
+  self->announced = 1;
+  return WM_OK;
+}
+
 wm_status vision_next(vision_source *self, wm_event *out, wm_error *err) {
   while (self->next_event == self->event_count) {
+    if (self->newest && self->devices.count == 0 && !self->announced) return announce(self, out, err);
+    self->announced = 0;
     wm_status status = look(self, err);
     take_counts(self);
     if (status != WM_OK) return status;

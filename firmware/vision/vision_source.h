@@ -6,6 +6,7 @@
 #include <pthread.h>
 
 #include "camera_set.h"
+#include "newest_pose.h"
 #include "waymark/detector.h"
 #include "waymark/video.h"
 #include "waymark/vision.h"
@@ -52,6 +53,8 @@ struct vision_source {
   wm_picture_fn tell_picture;  // may be NULL
   void *tell_context;
   size_t first_camera;  // of those that are told
+  newest_pose *newest;  // NULL: nothing guides the detector
+  int announced;        // guided and recorded: the next picture's arrival was told
   vision_ahead ahead;
 };
 

@@ -40,6 +40,10 @@ std::vector<char> params;
 wm_rig rig;
 int32_t cameras[2] = {0, 1};
 wm_view view;
+wm_estimate pose;  // for guided ones
+std::vector<uint8_t> sign;
+wm_landmark landmark;
+wm_appearance appearance;
 using Picture = std::vector<uint8_t>;
 
 void make_rig() {
@@ -59,7 +63,18 @@ void make_rig() {
   rig.stereo = {0, 1, 0.2, {260, 260, 320, 180}, {1, 1, 1, 1}};
   std::strcpy(rig.marker_family, "mr");
   rig.marker_size_m = 0.2;
-  view = {&rig, cameras};
+  // A sign on the far wall, and a pose that knows where it is.
+  sign.resize(40 * 40);
+  for (int i = 0; i < 1600; i++) sign[static_cast<size_t>(i)] = (i / 40 / 10 + i % 40 / 10) % 3 == 0 ? 200 : 40;
+  landmark = {7, {2.9, 0, 0.4}, 0.02, static_cast<double>(NAN), {0, 0, 0}, 0};
+  appearance = {7, 40, 40, sign.data(), 0.5, 0.5, -M_PI / 2};
+  view = {&rig, cameras, &landmark, 1, &appearance, 1};
+  pose = wm_estimate{};
+  pose.t_ns = 1000;
+  pose.pose_map_base.q_xyzw[3] = 1;
+  pose.state = WM_STATE_TRACKING;
+  pose.dof = 3;
+  for (const int i : {0, 1, 5}) pose.covariance[wm_cov_index(i, i)] = 1e-4;
 }
 
 struct machine {
@@ -85,7 +100,7 @@ size_t look(machine &m, const Picture &picture, wm_status expected = WM_OK, uint
   }
   size_t count = 99;
   trapped = true;
-  const wm_status status = detector->detect(m.state, frames, nullptr, events, kEvents, &count);
+  const wm_status status = detector->detect(m.state, frames, &pose, events, kEvents, &count);
   trapped = false;
   TEST_ASSERT_EQUAL(expected, status);
   TEST_ASSERT_LESS_OR_EQUAL(kEvents, count);

@@ -13,7 +13,7 @@ out=${1:-build/demo}
 world=config/worlds/crossing-demo.yaml
 world_config=config/crossing-cameras.yaml
 scenario=config/worlds/crossing.yaml
-config=config/crossing.yaml
+config=config/crossing-points.yaml
 drives=40
 
 step() { printf '\033[1m== %s\033[0m\n' "$*"; }

@@ -10,6 +10,7 @@
 #include "eval/detector.h"
 #include "eval/detector_command.h"
 #include "eval/figures.h"
+#include "eval/landmark_detector.h"
 #include "eval/lines.h"
 #include "eval/print.h"
 
@@ -21,6 +22,7 @@ namespace fs = std::filesystem;
 struct Arguments {
   std::string run, recording, align = "none", against = "truth", detector, camera;
   std::vector<double> view_m;
+  double size_min_px = 8;
   bool json = false, published = false, reference = false;
   CompareOptions compare;
 };
@@ -42,8 +44,12 @@ void parse(CLI::App *app, Arguments *a) {
   app->add_option("--to", a->compare.to_s, "judge up to this many seconds after the run's first pose");
   app->add_option("--detector", a->detector,
                   "judge what a detector saw (RUN/detections, RUN/events.wmlog) by the recording's labels")
-      ->check(CLI::IsMember({"edges", "lines"}));
-  app->add_option("--camera", a->camera, "--detector: of this camera; needed where there are several");
+      ->check(CLI::IsMember({"edges", "landmarks", "lines"}));
+  app->add_option("--camera", a->camera, "--detector: of this camera; edges and lines need it where there are several");
+  app->add_option("--size-min", a->size_min_px,
+                  "--detector landmarks: recall is of those whose shorter side has so many pixels")
+      ->check(CLI::Range(1.0, 1000.0))
+      ->capture_default_str();
   app->add_option("--view", a->view_m,
                   "--detector: the floor that it looks at, x from, x to, y from, y to in base_link, m: true edges "
                   "outside are left out")
@@ -103,9 +109,13 @@ int main(int argc, char **argv) {
       throw Failure("--from must be before --to", kUsage);
     if (!arguments.detector.empty()) {
       const DetectorArguments detector{arguments.run, arguments.recording, arguments.camera, arguments.view_m};
-      const bool lines = arguments.detector == "lines";
-      const Figures figures = lines ? evaluate_lines(detector) : evaluate_detector(detector);
-      const std::string text = lines ? line_table(figures, arguments.run) : detector_table(figures, arguments.run);
+      const bool lines = arguments.detector == "lines", landmarks = arguments.detector == "landmarks";
+      const Figures figures = landmarks ? evaluate_landmarks(detector, arguments.size_min_px)
+                              : lines   ? evaluate_lines(detector)
+                                        : evaluate_detector(detector);
+      const std::string text = landmarks ? landmark_table(figures, arguments.run)
+                               : lines   ? line_table(figures, arguments.run)
+                                         : detector_table(figures, arguments.run);
       std::fputs((arguments.json ? figures.dump(1) + "\n" : text).c_str(), stdout);
       return kDone;
     }

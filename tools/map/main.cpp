@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // waymark map: raster maps made and checked, maps of landmarks surveyed.
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 
 #include "common/failure.h"
 #include "common/yaml.h"
+#include "map/add_landmark.h"
 #include "map/check.h"
 #include "map/layers.h"
+#include "map/look.h"
 #include "map/print_markers.h"
 #include "map/survey.h"
 #include "simulate/render/pictures.h"
@@ -114,6 +117,74 @@ void parse_print(CLI::App &app, PrintMarkers &a) {
       "  waymark map print-markers --family mr --ids 1-20 --size 0.18 --out sheet.pdf\n"
       "  waymark map print-markers --family tag36h11 --ids 0-11 --size 0.08 --out tags.pdf\n"
       "Print at 100 %, measure the ruler, leave the white rim. docs/markers.md says more.");
+}
+
+void parse_add(CLI::App &app, AddLandmark &a) {
+  app.description("Teaches a map how a landmark (a sign, a house number, a window) looks, from a picture of it.");
+  app.add_option("MAP", a.map, "the folder with landmarks.csv, or that file; made where missing")->required();
+  app.add_option("--id", a.id, "the landmark's")->required()->check(CLI::Range(0, 2147483647));
+  app.add_option("--picture", a.picture, "JPEG, PNG or PGM")->required();
+  app.add_option("--at", a.at_m, "X,Y,Z of its middle in the map, m; needed where landmarks.csv hasn't got it")
+      ->delimiter(',')
+      ->expected(3);
+  app.add_option("--sigma", a.sigma_m, "m: how well that place is known, each axis")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  app.add_option("--size", a.size_m, "WIDTH,HEIGHT, m; by the angles where --from and --calibration are given")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(CLI::Range(0.01, 100.0));
+  app.add_option("--yaw", a.yaw_deg, "degrees in the map, from its left to its right edge as a reader sees it");
+  app.add_option("--from", a.from_m,
+                 "X,Y,Z of who took the picture: the landmark faces that place unless --yaw is given")
+      ->delimiter(',')
+      ->expected(3);
+  app.add_option("--corners", a.corners_px,
+                 "U,V of its upper left, upper right, lower right and lower left corner in the picture; without: all "
+                 "of the picture is the landmark")
+      ->delimiter(',')
+      ->expected(8);
+  app.add_option("--calibration", a.calibration, "calibration.yaml of the camera that took it; without: no distortion");
+  app.add_option("--camera", a.camera, "its name there; needed where there are several");
+  app.footer(
+      "examples:\n"
+      "  waymark map add-landmark map --id 7 --picture sign.png --at 12.3,4.5,2.2 --size 0.6,0.6 --yaw 90\n"
+      "  waymark map add-landmark map --id 8 --picture left.jpg --at 6,2,2 --from 0,0,1.4 --calibration "
+      "calibration.yaml "
+      "--camera left --corners 410,208,470,205,472,262,411,266\n"
+      "The second picture of a landmark is one more way that it may look. docs/landmarks.md says more.");
+}
+
+int add(const AddLandmark &a) {
+  const AddedLandmark made = add_landmark(a);
+  std::printf("%s: %d x %d px of %.3f x %.3f m, contrast %.0f grey levels%s\n  %s and %s know landmark %d\n",
+              made.picture.c_str(), made.width_px, made.height_px, made.width_m, made.height_m, made.spread_grey,
+              made.spread_grey < 12 ? ": LITTLE, it will hardly be told from a wall" : "", made.landmarks.c_str(),
+              made.appearances.c_str(), a.id);
+  return kDone;
+}
+
+void parse_look(CLI::App &app, LookAtPicture &a) {
+  app.description("Looks for a map's landmarks in one picture, as a run would, and says what became of each.");
+  app.add_option("MAP", a.map, "the folder with landmarks.csv and landmarks/, or the landmarks.csv")->required();
+  app.add_option("--picture", a.picture, "JPEG, PNG or PGM")->required();
+  app.add_option("--calibration", a.calibration, "calibration.yaml of the camera that took it")->required();
+  app.add_option("--camera", a.camera, "its name there; needed where there are several");
+  app.add_option("--pose", a.pose, "X,Y,HEADING_DEG of base_link when it was taken")
+      ->delimiter(',')
+      ->expected(3)
+      ->required();
+  app.add_option("--sigma", a.sigma_m, "m: how well that place is known")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  app.add_option("--sigma-deg", a.sigma_deg, "degrees: and that heading")
+      ->check(CLI::Range(0.0, 90.0))
+      ->capture_default_str();
+  app.add_option("--draw", a.draw, "the picture with what was found (PNG or .jpg)");
+  app.footer(
+      "example: waymark map look map --picture left.png --calibration calibration.yaml --camera left --pose 3,0.5,10 "
+      "--draw seen.png\n"
+      "Exit code: 0 something was found, 1 nothing was, 2 usage.");
 }
 
 int print_markers(PrintMarkers &a) {
@@ -232,6 +303,13 @@ int main(int argc, char **argv) {
   CLI::App *survey_app =
       app.add_subcommand("survey", "how well the landmarks of a run fit, and what is odd about them");
   parse_survey(*survey_app, survey_arguments);
+  AddLandmark add_arguments;
+  add_arguments.yaw_deg = std::nan("");
+  CLI::App *add_app = app.add_subcommand("add-landmark", "how a landmark looks, learnt from a picture");
+  parse_add(*add_app, add_arguments);
+  LookAtPicture look_arguments;
+  CLI::App *look_app = app.add_subcommand("look", "where the landmarks are in a picture");
+  parse_look(*look_app, look_arguments);
   PrintMarkers print_arguments;
   CLI::App *print_app = app.add_subcommand("print-markers", "sheets of coded markers at true scale");
   parse_print(*print_app, print_arguments);
@@ -240,6 +318,8 @@ int main(int argc, char **argv) {
   try {
     app.parse(argc, argv);
     if (survey_app->parsed()) return survey(survey_arguments);
+    if (look_app->parsed()) return look_at_picture(look_arguments) > 0 ? kDone : kFailed;
+    if (add_app->parsed()) return add(add_arguments);
     if (print_app->parsed()) return print_markers(print_arguments);
     return make_app->parsed() ? make(make_arguments) : check(check_arguments);
   } catch (const CLI::ParseError &problem) {

@@ -297,6 +297,7 @@ wm_status write_pictures(const Film &film, const std::string &dir, const Progres
   if (const wm_status s = make_folder(dir + "/video", err); s != WM_OK) return s;
   if (const wm_status s = make_folder(dir + "/labels", err); s != WM_OK) return s;
   if (const wm_status s = write_map(film, dir, err); s != WM_OK) return s;
+  if (const wm_status s = write_appearances(film, dir, err); s != WM_OK) return s;
   TextFile labels(dir + "/" + film.world->label_file);
   labels.write(film.world->label_header + "\n");
   std::vector<std::unique_ptr<Reel>> reels;

@@ -61,8 +61,11 @@ wm_status contact_sheet(const Film &film, int count, int columns, int cell_width
 
 // Told after each picture; for people who wait.
 using Progress = std::function<void(size_t done, size_t total)>;
-// Writes video/, labels/ and map/ into the recording's folder, which is there.
+// Writes video/, labels/, map/ and landmarks/ into the recording's folder, which is there.
 wm_status write_pictures(const Film &film, const std::string &dir, const Progress &progress, wm_error *err);
+// landmarks/ alone, in worlds whose landmarks are signs and the like: appearance.csv, and a picture of each as somebody
+// would take it who stands before it.
+wm_status write_appearances(const Film &film, const std::string &dir, wm_error *err);
 // map/ alone, where the world has one.
 wm_status write_map(const Film &film, const std::string &dir, wm_error *err);
 

@@ -223,6 +223,7 @@ wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *
     r.picture_streams.push_back("video/" + c.name + ".csv");
   }
   r.picture_streams.push_back(out.world->label_file);
+  if (out.world->labels == World::Labels::landmarks) r.picture_streams.push_back("landmarks/appearance.csv");
   return WM_OK;
 }
 

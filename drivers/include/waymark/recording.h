@@ -83,6 +83,16 @@ wm_status wm_can_decoder_load(const char *dbc_path, const char *signals_path, wm
 wm_status wm_landmarks_load(const char *path, wm_warn_fn warn, void *context, wm_landmark **out, size_t *count,
                             wm_error *err);
 
+// How landmarks look, from an appearance.csv: `id,picture,width_m,height_m,yaw_rad`, a row a picture (PNG or PGM beside
+// it); a landmark may have several. *out is the caller's to free by wm_appearances_free. WM_BAD_CONFIG, WM_NOT_FOUND,
+// WM_BAD_DATA with file and line.
+wm_status wm_appearances_load(const char *path, wm_warn_fn warn, void *context, wm_appearance **out, size_t *count,
+                              wm_error *err);
+void wm_appearances_free(wm_appearance *list, size_t count);
+// Those of landmarks/appearance.csv beside the landmarks.csv in use, read when first asked for and kept as long as the
+// recording; none where there is no such file.
+wm_status wm_recording_appearances(wm_recording *self, const wm_appearance **out, size_t *count, wm_error *err);
+
 // The recording's sources, in the order of the format's table of files: can, motion, motion6, then a source a sensor
 // for sightings ("sightings:NAME"), markers ("markers:NAME"), then stereo, points, gnss. Indices are 0, 1, 2 ... in
 // this order. Owned by the recording. Each hands out its events in the order of their arrival: a

@@ -24,7 +24,36 @@ extern "C" {
 typedef struct wm_view {
   const wm_rig *rig;
   const int32_t *cameras;  // indices into the rig: `pictures` of them
+  // The map of landmarks and how they look, where these are known; must outlive the detector's state.
+  const wm_landmark *landmarks;
+  size_t landmark_count;
+  const wm_appearance *appearances;
+  size_t appearance_count;
 } wm_view;
+
+// What became of a landmark that a detector of known landmarks had to do with in its last picture.
+typedef enum wm_look {
+  WM_LOOK_FOUND = 0,
+  WM_LOOK_NOT_IN_VIEW,   // outside of the picture, not all in it, or beyond the range
+  WM_LOOK_FACES_AWAY,    // seen from behind, or too slanted
+  WM_LOOK_TOO_SMALL,     // in the picture
+  WM_LOOK_UNCERTAIN,     // where it should be is less sure than a window is large
+  WM_LOOK_LOW_CONTRAST,  // the place is dark, white or fogged
+  WM_LOOK_BLURRED,       // there, but without the edges that it should have
+  WM_LOOK_UNLIKE,        // something else is there: hidden, moved or replaced
+  WM_LOOK_AMBIGUOUS,     // several places look like it
+  WM_LOOK_COUNT
+} wm_look;
+
+const char *wm_look_name(unsigned look);
+
+typedef struct wm_looked_for {
+  int32_t landmark_id;
+  uint8_t look;  // wm_look
+  double expected_px[2];
+  double found_px[2];  // NaN where it wasn't
+  double likeness;     // normalised correlation of the best place; NaN where none was looked at
+} wm_looked_for;
 
 typedef struct wm_detector {
   const char *name;  // the key of its parameters under `vision:` in the config
@@ -43,6 +72,10 @@ typedef struct wm_detector {
   // than the calibration's, nothing done. No allocation.
   wm_status (*detect)(void *state, const wm_frame *frames, const wm_estimate *prediction, wm_event *out,
                       size_t capacity, size_t *count);
+  // Where the prediction is of use: it decides what is found, so a replay gives it at the same place each time.
+  uint32_t is_guided;
+  // What became of each landmark in the last picture; returns how many there are. NULL where that has no meaning.
+  size_t (*looked_for)(const void *state, wm_looked_for *out, size_t capacity);
 } wm_detector;
 
 // Ours; constant.

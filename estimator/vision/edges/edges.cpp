@@ -267,4 +267,6 @@ extern "C" const wm_detector wm_edges_detector = {
     wm::state_bytes,
     wm::init,
     wm::detect,
+    0,
+    nullptr,
 };

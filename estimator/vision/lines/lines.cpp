@@ -143,4 +143,6 @@ extern "C" const wm_detector wm_lines_detector = {
     wm::state_bytes,
     wm::init,
     wm::detect,
+    0,
+    nullptr,
 };

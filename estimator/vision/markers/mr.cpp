@@ -185,4 +185,6 @@ extern "C" const wm_detector wm_mr_detector = {
     wm::state_bytes,
     wm::init,
     wm::detect,
+    0,
+    nullptr,
 };

@@ -271,4 +271,6 @@ extern "C" const wm_detector wm_stereo_detector = {
     wm::state_bytes,
     wm::init,
     wm::detect,
+    0,
+    nullptr,
 };

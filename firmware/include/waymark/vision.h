@@ -4,7 +4,8 @@
 // where the estimator takes that. A detector's state, and the pictures that it looks at, are in the run's memory.
 //
 // In a run the source's own thread decodes and detects, and passes over pictures that have become old meanwhile. In a
-// replay a thread for each source works ahead, a few pictures at most; the order, and the bytes, are the same.
+// replay a thread for each source works ahead, a few pictures at most; the order, and the bytes, are the same. What the
+// newest pose guides (is_guided of the detector) is looked at when it arrives, a recorded picture by who asks.
 #ifndef WAYMARK_VISION_H
 #define WAYMARK_VISION_H
 
@@ -14,6 +15,7 @@
 #include "waymark/config.h"
 #include "waymark/devices.h"
 #include "waymark/histogram.h"
+#include "waymark/pose.h"
 #include "waymark/recording.h"
 #include "waymark/source.h"
 
@@ -48,9 +50,13 @@ void wm_vision_tell_pictures(wm_vision *vision, wm_picture_fn tell, void *contex
 
 // The memory that it wants; at most WM_VISION_NEEDS lines. Returns how many.
 size_t wm_vision_needs(wm_vision *self, wm_arena_need *needs);
+// The newest pose, for detectors that it guides. By one thread, from start on; never waits. `self` may be NULL.
+void wm_vision_tell(wm_vision *self, const wm_estimate *newest);
 // With the memory in place: makes the detectors' tables. Takes a while.
 wm_status wm_vision_start(wm_vision *self, wm_error *err);
-// From here on a thread a source works ahead of who asks for its events. Not for a run.
+// From here on a thread a source works ahead of who asks for its events. Not for a run. A guided detector needs the
+// pose as it is when the picture arrives: its source hands out an event of kind WM_EVENT_NONE at each picture's arrival
+// and looks when it is asked for the next one.
 wm_status wm_vision_run_ahead(wm_vision *self, wm_error *err);
 
 // How long decoding and detecting take, of all sources together (valid when the threads have ended or the run is over).

@@ -102,6 +102,15 @@ typedef struct wm_landmark {
   double yaw_sigma_rad;  // 0 where not given
 } wm_landmark;
 
+// How a landmark looks: an upright flat picture, its middle at the landmark's place. One landmark may have several.
+typedef struct wm_appearance {
+  int32_t landmark_id;
+  uint32_t width_px, height_px;
+  const uint8_t *grey;  // height x width, row 0 at the top, as a reader sees it; somebody else's, outlives this
+  double width_m, height_m;
+  double yaw_rad;  // direction in the map from its left edge to its right one, as a reader sees it
+} wm_appearance;
+
 // Start pose. NaN where unknown.
 typedef struct wm_start {
   wm_time_ns t_ns;  // WM_TIME_NONE: the first motion event

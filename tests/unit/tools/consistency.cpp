@@ -78,27 +78,27 @@ void test_odometry_alone() {
 }
 
 void test_no_landmark_is_odometry() {
-  const Statistics s = drives("crossing.yaml", "crossing.yaml", 0);
+  const Statistics s = drives("crossing.yaml", "crossing-points.yaml", 0);
   const Statistics odometry = drives("crossing.yaml", "crossing-odometry.yaml", 0);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, odometry.position_end_m(), s.position_end_m());
 }
 
 void test_one_landmark() {
-  const Statistics s = drives("crossing.yaml", "crossing.yaml", 1);
+  const Statistics s = drives("crossing.yaml", "crossing-points.yaml", 1);
   is_between(0, 0.15, s.position_end_m(), "position at the end");
   is_consistent(s);
   is_efficient(0.85, s);
 }
 
 void test_two_landmarks() {
-  const Statistics s = drives("crossing.yaml", "crossing.yaml", 2);
+  const Statistics s = drives("crossing.yaml", "crossing-points.yaml", 2);
   is_between(0, 0.1, s.position_end_m(), "position at the end");
   is_consistent(s);
   is_efficient(0.85, s);
 }
 
 void test_three_landmarks() {
-  const Statistics s = drives("crossing.yaml", "crossing.yaml", 3);
+  const Statistics s = drives("crossing.yaml", "crossing-points.yaml", 3);
   is_between(0, 0.05, s.position_end_m(), "position at the end");
   is_between(0, 0.3 * sim::kPi / 180, s.heading_end_rad(), "heading at the end");
   is_consistent(s);
@@ -108,7 +108,7 @@ void test_three_landmarks() {
 // One landmark never tells where north is; what keeps the heading is the wheels. Each lap ends as well as the one
 // before.
 void test_one_landmark_lap_after_lap() {
-  const Statistics s = drives("crossing-laps.yaml", "crossing.yaml", 1);
+  const Statistics s = drives("crossing-laps.yaml", "crossing-points.yaml", 1);
   const double end_s = s.steps.back().t_s, lap_s = end_s / 2;
   is_consistent(s);
   is_efficient(0.9, s);

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vision/landmarks/guess.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kCarry_s = 1;  // a twist says nothing of what is farther away
+constexpr double kStep_m = 0.01, kStep_rad = 1e-3;
+
+}  // namespace
+
+bool guess_camera(const mounted_camera &camera, const wm_estimate *prediction, wm_time_ns t_ns, camera_guess *out) {
+  if (!prediction || (prediction->state != WM_STATE_TRACKING && prediction->state != WM_STATE_DEAD_RECKONING))
+    return false;
+  const double dt_s = wm_seconds_between(prediction->t_ns, t_ns);
+  if (!(std::fabs(dt_s) < kCarry_s)) return false;
+  const vec3 v = vec_of(prediction->v_mps), w = vec_of(prediction->w_radps);
+  const quat q = quat_of(prediction->pose_map_base.q_xyzw);
+  out->R_map_base = matrix_of(q * turn_by(dt_s * w));
+  out->base_m = vec_of(prediction->pose_map_base.p_m) + dt_s * (matrix_of(q * turn_by(0.5 * dt_s * w)) * v);
+  out->R_map_optical = out->R_map_base * camera.R_base_optical;
+  out->eye_m = out->base_m + out->R_map_base * camera.centre_m;
+  constexpr int kOf[3] = {0, 1, 5};
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 3; k++) out->cov[i][k] = prediction->covariance[wm_cov_index(kOf[i], kOf[k])];
+  return finite(out->eye_m) && finite(out->cov[0][0]) && finite(out->cov[1][1]) && finite(out->cov[2][2]);
+}
+
+void expected_spread(const mounted_camera &camera, const camera_guess &guess, const appearance &what,
+                     double mounting_sigma_rad, double *across_px, double *down_px) {
+  *across_px = *down_px = 1e9;
+  const vec3 m = transposed_times(guess.R_map_optical, what.place_m - guess.eye_m);
+  pixel middle;
+  if (!project(camera.optics, m, &middle)) return;
+  double variance[2] = {0, 0};
+  const auto slope = [&](const vec3 &moved, double step, double out[2]) {
+    pixel at;
+    if (!project(camera.optics, moved, &at)) return false;
+    out[0] = (at.u - middle.u) / step;
+    out[1] = (at.v - middle.v) / step;
+    return true;
+  };
+  double by[3][2];
+  for (int i = 0; i < 3; i++) {
+    // Shifts of the landmark along the map's axes: those of the pose, and its own.
+    const vec3 axis = {i == 0 ? kStep_m : 0, i == 1 ? kStep_m : 0, i == 2 ? kStep_m : 0};
+    double shift[2], turn[2];
+    if (!slope(m + transposed_times(guess.R_map_optical, axis), kStep_m, shift)) return;
+    for (int k = 0; k < 2; k++) {
+      variance[k] += square(shift[k] * what.sigma_m);
+      by[i][k] = -shift[k];
+    }
+    // The mounting's angles about the optical axes.
+    const vec3 about = {i == 0 ? kStep_rad : 0, i == 1 ? kStep_rad : 0, i == 2 ? kStep_rad : 0};
+    if (!slope(m + cross(about, m), kStep_rad, turn)) return;
+    for (int k = 0; k < 2; k++) variance[k] += square(turn[k] * mounting_sigma_rad);
+  }
+  const vec3 from_base = transposed_times(guess.R_map_base, what.place_m - guess.base_m);
+  const vec3 turned = {kStep_rad * from_base.y, -kStep_rad * from_base.x, 0};
+  if (!slope(m + transposed_times(camera.R_base_optical, turned), kStep_rad, by[2])) return;
+  for (int k = 0; k < 2; k++) {
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++) variance[k] += by[i][k] * guess.cov[i][j] * by[j][k];
+    variance[k] = larger(variance[k], 0);
+  }
+  *across_px = std::sqrt(variance[0]);
+  *down_px = std::sqrt(variance[1]);
+}
+
+}  // namespace wm

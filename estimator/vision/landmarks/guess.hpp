@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a camera should be when its picture was taken, by the filter's newest state, and how sure that is.
+#ifndef WAYMARK_ESTIMATOR_VISION_GUESS_HPP
+#define WAYMARK_ESTIMATOR_VISION_GUESS_HPP
+
+#include "vision/camera/lens.hpp"
+#include "vision/landmarks/appearance.hpp"
+#include "waymark/pose.h"
+
+namespace wm {
+
+struct camera_guess {
+  vec3 base_m, eye_m;  // in map
+  mat3 R_map_base, R_map_optical;
+  double cov[3][3];  // of x, y (m) and heading (rad)
+};
+
+// Carries the state to t_ns by its own twist. False where nothing is known: no state, searching, lost, or too old.
+bool guess_camera(const mounted_camera &camera, const wm_estimate *prediction, wm_time_ns t_ns, camera_guess *out);
+
+// Sigmas in pixels of a landmark's middle: by the pose, the landmark's place and the mounting's three angles.
+void expected_spread(const mounted_camera &camera, const camera_guess &guess, const appearance &what,
+                     double mounting_sigma_rad, double *across_px, double *down_px);
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#ifndef WAYMARK_ESTIMATOR_VISION_LANDMARKS_PARAMS_H
+#define WAYMARK_ESTIMATOR_VISION_LANDMARKS_PARAMS_H
+
+#include <stdint.h>
+
+#include "waymark/params.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct wm_landmarks_params {
+  double range_max_m, size_min_px, facing_min;
+  double mounting_sigma_rad, window_sigmas, window_max_px;
+  double likeness_min, apart_min, contrast_grey;
+  double blur_px, sigma_px, sigma_size, sigma_factor;
+};
+
+extern const wm_param_table wm_landmarks_params_table;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: Apache-2.0
+// Known landmarks in drawn fisheye pictures: found where they are, with the sigma that they have; not found where they
+// are hidden, changed, dark or elsewhere, and why.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <vector>
+
+#include "unity.h"
+#include "vision/camera/lens.hpp"
+#include "vision/landmarks/params.h"
+#include "waymark/detector.h"
+#include "waymark/random.h"
+
+namespace {
+
+constexpr uint32_t kWidth = 480, kHeight = 300;
+constexpr int kSignSide = 96;
+constexpr double kSize_m = 1.0;
+const int32_t kCamera = 0;
+
+wm_rig rig;
+wm_view view;
+wm_landmark landmark;
+std::vector<uint8_t> sign;
+wm_appearance appearance;
+wm_landmarks_params params;
+const wm_detector *detector;
+wm_event events[64];
+
+// A ring with a bar and a letter's stroke: no symmetry.
+double sign_at(double x, double y) {
+  const double r = std::sqrt(x * x + y * y);
+  if (std::fabs(x) > 0.48 || std::fabs(y) > 0.48) return 30;
+  if (r > 0.3 && r < 0.44) return 60;
+  if (std::fabs(y - 0.1 - 0.3 * x) < 0.07 && r < 0.3) return 40;
+  if (std::fabs(x + 0.12) < 0.05 && y < 0 && r < 0.3) return 70;
+  return 210;
+}
+
+struct Place {
+  double x_m = 0, y_m = 0, heading_rad = 0;
+};
+
+// What the camera sees from there: the sign before a wall of soft stripes.
+struct Scene {
+  bool there = true, other = false, hidden = false;
+  double light = 1, offset = 0, noise = 2;
+  uint64_t seed = 1;
+};
+
+// Rays of the four parts of each pixel, in base_link.
+const std::vector<wm::vec3> &rays_of(const wm::mounted_camera &camera) {
+  static std::vector<wm::vec3> rays;
+  for (uint32_t v = 0; rays.size() < 4 * kWidth * kHeight; v++)
+    for (uint32_t u = 0; u < kWidth; u++)
+      for (int i = 0; i < 4; i++) {
+        wm::vec3 ray = {0, 0, 0};
+        (void)wm::unproject(camera.optics, {u - 0.25 + 0.5 * (i % 2), v - 0.25 + 0.5 * (i / 2)}, &ray);
+        rays.push_back(camera.R_base_optical * ray);
+      }
+  return rays;
+}
+
+std::vector<uint8_t> draw(const Place &at, const Scene &scene) {
+  wm::mounted_camera camera;
+  TEST_ASSERT_NULL(wm::mounted_camera_init(&camera, rig.cameras[0]));
+  const double yaw = appearance.yaw_rad, c = std::cos(at.heading_rad), s = std::sin(at.heading_rad);
+  const double nx = std::sin(yaw), ny = -std::cos(yaw);
+  std::vector<uint8_t> out(kWidth * kHeight);
+  const std::vector<wm::vec3> &rays = rays_of(camera);
+  for (uint32_t v = 0; v < kHeight; v++)
+    for (uint32_t u = 0; u < kWidth; u++) {
+      double sum = 0;
+      for (size_t i = 0; i < 4; i++) {
+        double grey = 90;
+        const wm::vec3 &d = rays[4 * (v * kWidth + u) + i];
+        if (wm::length(d) > 0) {
+          const double dx = c * d.x - s * d.y, dy = s * d.x + c * d.y;
+          const double ex = at.x_m + c * camera.centre_m.x - s * camera.centre_m.y,
+                       ey = at.y_m + s * camera.centre_m.x + c * camera.centre_m.y;
+          const double along = nx * dx + ny * dy,
+                       far = (nx * (landmark.p_m[0] - ex) + ny * (landmark.p_m[1] - ey)) / along;
+          if (std::fabs(along) > 1e-9 && far > 0) {
+            const double px = ex + far * dx - landmark.p_m[0], py = ey + far * dy - landmark.p_m[1],
+                         pz = camera.centre_m.z + far * d.z - landmark.p_m[2];
+            const double a = (px * std::cos(yaw) + py * std::sin(yaw)) / kSize_m, b = pz / kSize_m;
+            grey = 90 + 25 * std::sin(3 * a) + 15 * std::sin(4 * b + a);
+            if (scene.there && std::fabs(a) < 0.5 && std::fabs(b) < 0.5)
+              grey = scene.other ? sign_at(b, a) : sign_at(a, b);
+            if (scene.hidden && std::fabs(a - 0.2) < 0.3 && b < 0.3) grey = 50;
+          }
+        }
+        sum += grey;
+      }
+      const double noise = scene.noise * wm_random_normal(scene.seed, 3, v * kWidth + u);
+      out[v * kWidth + u] = static_cast<uint8_t>(
+          std::fmin(255, std::fmax(0, std::floor(scene.light * sum / 4 + scene.offset + noise + 0.5))));
+    }
+  return out;
+}
+
+wm_estimate pose_of(const Place &at, double sigma_m, double sigma_rad) {
+  wm_estimate e{};
+  e.t_ns = 5000;
+  e.pose_map_base.p_m[0] = at.x_m;
+  e.pose_map_base.p_m[1] = at.y_m;
+  e.pose_map_base.q_xyzw[2] = std::sin(0.5 * at.heading_rad);
+  e.pose_map_base.q_xyzw[3] = std::cos(0.5 * at.heading_rad);
+  e.heading_rad = at.heading_rad;
+  e.state = WM_STATE_TRACKING;
+  e.dof = 3;
+  e.covariance[wm_cov_index(0, 0)] = e.covariance[wm_cov_index(1, 1)] = sigma_m * sigma_m;
+  e.covariance[wm_cov_index(5, 5)] = sigma_rad * sigma_rad;
+  return e;
+}
+
+struct Eyes {
+  void *state;
+  Eyes() {
+    const char *why = "";
+    const size_t bytes = detector->state_bytes(&params, &view, &why);
+    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
+    state = aligned_alloc(64, (bytes + 63) / 64 * 64);
+    std::memset(state, 0xA5, bytes);
+    TEST_ASSERT_EQUAL(WM_OK, detector->init(state, &params, &view));
+  }
+  Eyes(const Eyes &) = delete;
+  Eyes &operator=(const Eyes &) = delete;
+  ~Eyes() { free(state); }
+  size_t look(const std::vector<uint8_t> &picture, const wm_estimate *prediction) const {
+    const wm_frame frame = {5000, 6000, 0, 1, 0, kWidth, kHeight, kWidth, picture.data()};
+    size_t count = 0;
+    TEST_ASSERT_EQUAL(WM_OK, detector->detect(state, &frame, prediction, events, 64, &count));
+    return count;
+  }
+  wm_look why() const {
+    wm_looked_for one{};
+    TEST_ASSERT_EQUAL(1, detector->looked_for(state, &one, 1));
+    return static_cast<wm_look>(one.look);
+  }
+};
+
+// By the calibration's own geometry: the angle to the left of the camera's axis.
+double true_bearing(const Place &at) {
+  wm::mounted_camera camera;
+  TEST_ASSERT_NULL(wm::mounted_camera_init(&camera, rig.cameras[0]));
+  const double c = std::cos(at.heading_rad), s = std::sin(at.heading_rad);
+  const double dx = landmark.p_m[0] - at.x_m, dy = landmark.p_m[1] - at.y_m;
+  const wm::vec3 base = {c * dx + s * dy, c * dy - s * dx, landmark.p_m[2]};
+  const wm::vec3 r = wm::transposed_times(camera.R_base_optical, base - camera.centre_m);
+  return std::atan2(-r.x, r.z);
+}
+
+void found_where_it_is_with_the_sigma_that_it_has() {
+  const Eyes eyes;
+  double squares = 0, largest = 0;
+  int count = 0;
+  for (uint64_t i = 0; i < 24; i++) {
+    const auto random = [i](uint64_t k) { return 2 * wm_random_uniform(9, k, i) - 1; };
+    const Place at = {1.5 + 1.5 * random(1), 1.2 * random(2), 0.5 * random(3)};
+    const Place believed = {at.x_m + 0.08 * random(4), at.y_m + 0.08 * random(5), at.heading_rad + 0.015 * random(6)};
+    Scene scene;
+    scene.seed = i + 1;
+    scene.light = 0.7 + 0.25 * random(7);
+    const wm_estimate guess = pose_of(believed, 0.05, 0.01);
+    if (eyes.look(draw(at, scene), &guess) != 1) continue;
+    const wm_sighting &seen = events[0].as.sighting;
+    TEST_ASSERT_EQUAL(7, seen.landmark_id);
+    TEST_ASSERT_EQUAL_INT64(5000, events[0].t_ns);
+    const double off = std::remainder(seen.bearing_rad - true_bearing(at), 2 * M_PI);
+    squares += off * off / (seen.bearing_sigma_rad * seen.bearing_sigma_rad);
+    largest = std::fmax(largest, std::fabs(off));
+    count++;
+  }
+  std::printf("found %d of 24, off by at most %.4f degrees, %.2f of its sigma\n", count, largest * 180 / M_PI,
+              std::sqrt(squares / count));
+  TEST_ASSERT_GREATER_OR_EQUAL(22, count);
+  TEST_ASSERT_TRUE(largest < 0.001);
+  TEST_ASSERT_TRUE(std::sqrt(squares / count) < 1.3);
+}
+
+void what_is_not_there_is_not_found_and_said_why() {
+  const Eyes eyes;
+  const Place at = {1, 0.3, 0.1};
+  const wm_estimate guess = pose_of(at, 0.03, 0.01);
+  const auto why = [&](const Scene &scene) {
+    TEST_ASSERT_EQUAL(0, eyes.look(draw(at, scene), &guess));
+    return eyes.why();
+  };
+  Scene gone, other, hidden, dark;
+  gone.there = false;
+  other.other = true;
+  hidden.hidden = true;
+  dark.light = 0.01;
+  dark.noise = 0.5;
+  const wm_look without = why(gone);
+  TEST_ASSERT_TRUE(without == WM_LOOK_UNLIKE || without == WM_LOOK_BLURRED);
+  TEST_ASSERT_EQUAL(WM_LOOK_UNLIKE, why(other));
+  TEST_ASSERT_EQUAL(WM_LOOK_UNLIKE, why(hidden));
+  TEST_ASSERT_EQUAL(WM_LOOK_LOW_CONTRAST, why(dark));
+  TEST_ASSERT_EQUAL(1, eyes.look(draw(at, Scene{}), &guess));
+  TEST_ASSERT_EQUAL(WM_LOOK_FOUND, eyes.why());
+}
+
+void a_pose_that_says_nothing_guides_nowhere() {
+  const Eyes eyes;
+  const Place at = {1, 0, 0};
+  const auto picture = draw(at, Scene{});
+  TEST_ASSERT_EQUAL(0, eyes.look(picture, nullptr));
+  TEST_ASSERT_EQUAL(WM_LOOK_UNCERTAIN, eyes.why());
+  wm_estimate guess = pose_of(at, 2, 0.5);
+  TEST_ASSERT_EQUAL(0, eyes.look(picture, &guess));
+  TEST_ASSERT_EQUAL(WM_LOOK_UNCERTAIN, eyes.why());
+  guess = pose_of(at, 0.03, 0.01);
+  guess.state = WM_STATE_LOST;
+  TEST_ASSERT_EQUAL(0, eyes.look(picture, &guess));
+  guess = pose_of({20, 0, 0}, 0.03, 0.01);  // behind the sign
+  TEST_ASSERT_EQUAL(0, eyes.look(picture, &guess));
+  guess = pose_of({1, 0, 3}, 0.03, 0.01);
+  TEST_ASSERT_EQUAL(0, eyes.look(picture, &guess));
+  TEST_ASSERT_EQUAL(WM_LOOK_NOT_IN_VIEW, eyes.why());
+  guess = pose_of({-30, 0, 0}, 0.03, 0.01);
+  TEST_ASSERT_EQUAL(0, eyes.look(picture, &guess));
+  TEST_ASSERT_EQUAL(WM_LOOK_TOO_SMALL, eyes.why());
+}
+
+void a_moving_robot_is_expected_where_it_was() {
+  const Eyes eyes;
+  const Place at = {1, 0, 0};
+  wm_estimate guess = pose_of({1.3, 0, 0.06}, 0.02, 0.005);  // 0.1 s later, at 3 m/s and 0.6 rad/s
+  guess.t_ns += 100000000;
+  guess.v_mps[0] = 3;
+  guess.w_radps[2] = 0.6;
+  TEST_ASSERT_EQUAL(1, eyes.look(draw(at, Scene{}), &guess));
+  TEST_ASSERT_TRUE(std::fabs(events[0].as.sighting.bearing_rad - true_bearing(at)) < 0.001);
+}
+
+void rows_have_their_own_times() {
+  rig.cameras[0].readout_ns = 20000000;
+  const Eyes eyes;
+  const Place at = {1, 0, 0};
+  const wm_estimate guess = pose_of(at, 0.02, 0.005);
+  TEST_ASSERT_EQUAL(1, eyes.look(draw(at, Scene{}), &guess));
+  wm_looked_for one{};
+  detector->looked_for(eyes.state, &one, 1);
+  const double row = one.found_px[1] / (kHeight - 1) - 0.5;
+  TEST_ASSERT_INT64_WITHIN(2, 5000 + std::llround(row * 20e6), events[0].t_ns);
+}
+
+}  // namespace
+
+void setUp() {
+  wm_rig_init(&rig);
+  rig.camera_count = 1;
+  wm_camera &c = rig.cameras[0];
+  c = wm_camera{};
+  c.model = WM_CAMERA_EQUIDISTANT;
+  c.width_px = kWidth;
+  c.height_px = kHeight;
+  const double intrinsics[] = {159, 159, 240, 150}, distortion[] = {-0.011, 0.004, -0.002, 0.0003};
+  c.intrinsics_count = c.distortion_count = 4;
+  std::copy(intrinsics, intrinsics + 4, c.intrinsics);
+  std::copy(distortion, distortion + 4, c.distortion);
+  c.mounting = {{0.5, 0.1, 1.2}, {0.01, -0.07, 0.2}};
+  landmark = {7, {6, 0.5, 2.0}, 0.02, static_cast<double>(NAN), {0, 0, 0}, 0};
+  sign.resize(kSignSide * kSignSide);
+  for (int y = 0; y < kSignSide; y++)
+    for (int x = 0; x < kSignSide; x++)
+      sign[static_cast<size_t>(y * kSignSide + x)] =
+          static_cast<uint8_t>(sign_at((x + 0.5) / kSignSide - 0.5, 0.5 - (y + 0.5) / kSignSide));
+  appearance = {7, kSignSide, kSignSide, sign.data(), kSize_m, kSize_m, -M_PI / 2 + 0.2};
+  view = {&rig, &kCamera, &landmark, 1, &appearance, 1};
+  wm_params_defaults(&wm_landmarks_params_table, &params);
+}
+void tearDown() {}
+
+int main() {
+  detector = wm_detector_find("landmarks");
+  UNITY_BEGIN();
+  RUN_TEST(found_where_it_is_with_the_sigma_that_it_has);
+  RUN_TEST(what_is_not_there_is_not_found_and_said_why);
+  RUN_TEST(a_pose_that_says_nothing_guides_nowhere);
+  RUN_TEST(a_moving_robot_is_expected_where_it_was);
+  RUN_TEST(rows_have_their_own_times);
+  return UNITY_END();
+}
