@@ -103,6 +103,10 @@ static wm_status init(void *state, const void *params, const wm_view *view) {
   apriltag_detector_add_family_bits(self->library, self->family->create(), p->bits_corrected);
   self->library->nthreads = 1;
   self->library->quad_decimate = (float)p->decimate;
+  // A code's black and white differ by twice the margin: where grey differs by less than 0.8 of it, noise and faint
+  // clutter, the library needn't look for squares.
+  const int least = (int)(0.8 * p->margin_min);
+  if (least > self->library->qtp.min_white_black_diff) self->library->qtp.min_white_black_diff = least;
   self->margin_min = p->margin_min;
   self->width_px = camera->width_px;
   self->height_px = camera->height_px;

@@ -83,10 +83,11 @@ static void about_motion(speaker *to, uint32_t bits) {
 static void about_map(speaker *to, const wm_health *health) {
   static const struct {
     const char *name, *what;
-  } kCounts[] = {
-      {"map.moved", "times a landmark was elsewhere than before; `waymark map survey RUN` says which"},
-      {"map.doubled", "sightings of identities that stand on two landmarks; `waymark map survey RUN` says which"},
-      {"map.no_room", "times a new landmark found no room; raise slam.landmarks.capacity"}};
+  } kCounts[] = {{"map.moved", "times a landmark was elsewhere than before; `waymark map survey RUN` says which"},
+                 {"map.doubled",
+                  "sightings whose identity (or, of a line, its track's number) stood for two landmarks; `waymark map "
+                  "survey RUN` says which"},
+                 {"map.no_room", "times a new landmark found no room; raise slam.landmarks.capacity"}};
   for (uint32_t i = 0; i < health->calibration_count; i++)
     for (size_t k = 0; k < sizeof kCounts / sizeof kCounts[0]; k++) {
       const wm_calibration_value *value = &health->calibration[i];

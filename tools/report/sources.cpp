@@ -102,8 +102,10 @@ Meaning meaning_of(const std::string &name) {
   if (name == "map.landmarks") return {1, 0, "", "landmarks in the map at the end"};
   if (name == "map.joined") return {1, 0, "", "landmarks that the map took in"};
   if (name == "map.left") return {1, 0, "", "landmarks that left it: hardly seen, or moved"};
-  if (name == "map.moved") return {1, 0, "", "times that one was elsewhere than before"};
-  if (name == "map.doubled") return {1, 0, "", "sightings of identities that stand on two landmarks"};
+  if (name == "map.moved")
+    return {1, 0, "", "times that an identity (of a line: its track's number) was elsewhere than before"};
+  if (name == "map.doubled")
+    return {1, 0, "", "sightings whose identity (of a line: its track's number) stood for two landmarks"};
   if (name == "map.no_room") return {1, 0, "", "landmarks that found no room"};
   if (name == "edges.explained") return {100, 0, "%", "of the edges seen lie on edges of the map"};
   if (name == "edges.lost_probability") return {100, 0, "%", "the probability of being lost"};
