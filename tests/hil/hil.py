@@ -18,7 +18,7 @@ import sys
 import edges
 import landmarks
 import vimc
-from published import ABSENT, DOWN, MOTION_STALE, WORKS, Published
+from published import ABSENT, DOWN, MOTION_STALE, STALLED, WORKS, Published
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -91,7 +91,7 @@ def scenario_can(work, simulate):
     (scenario / "duration").write_text(f"{seconds + 5:.0f}\n")
 
 
-def scenario_camera(work, _):
+def scenario_camera(work, simulate):
     scenario = work / "share/camera"
     scenario.mkdir(parents=True)
     (scenario / "calibration.yaml").write_text(
@@ -102,6 +102,17 @@ def scenario_camera(work, _):
         "format: waymark-config/1\nestimator: odometry\ncalibration: calibration.yaml\n"
         "devices: {cameras: [{name: front, device: /dev/video0, format: GREY, rate_hz: 15}]}\n")
     subprocess.run(["cc", "-O2", "-static", HERE / "feed.c", "-o", scenario / "feed"], check=True)
+    # Motion over a virtual bus, and a detector that looks at every picture.
+    recording = work / "camera-recording"
+    shutil.rmtree(recording, ignore_errors=True)
+    subprocess.run([simulate, ROOT / "config/worlds/crossing.yaml", "--out", recording], check=True)
+    for name in ("can.log", "vehicle.dbc", "can-signals.yaml"):
+        shutil.copy(recording / name, scenario)
+    (scenario / "wheels.yaml").write_text((recording / "calibration.yaml").read_text() + (scenario / "calibration.yaml").read_text())
+    (scenario / "published.yaml").write_text(
+        "format: waymark-config/1\nestimator: slam\nvision: {apriltag: {family: tag36h11, size_m: 0.2}}\ncalibration: wheels.yaml\n"
+        "dbc: vehicle.dbc\ncan_signals: can-signals.yaml\ninitial_pose: {x_m: 0, y_m: 0, heading_rad: 0}\n"
+        "devices:\n  can: [{interface: vcan0}]\n  cameras: [{name: front, device: /dev/video0, format: GREY, rate_hz: 15}]\n")
 
 
 def marks(path):
@@ -109,8 +120,25 @@ def marks(path):
     return {name: float(t) for name, t in (line.split() for line in path.read_text().splitlines())}
 
 
+def judge_published(out):
+    """What health and poses said while the camera broke."""
+    at, folder, camera = marks(out / "camera-marks"), out / "camera-published", "apriltag:front"
+    heard = Published("camera", folder, 0, (folder / "published.txt").read_text)
+    heard.goes_on("20 % of buffers dropped", at["dropped"], at["damaged"])
+    heard.counted("20 % of buffers dropped", camera, "lost", at["dropped"], at["damaged"] + 1.1, 3, 40)
+    heard.counted("buffers with error flags", camera, "malformed", at["damaged"], at["unplugged"] + 1.1, 5, 5)
+    heard.device("dropped and damaged buffers", camera, WORKS, at["dropped"] + 1, at["unplugged"])
+    heard.goes_on("unplugged", at["unplugged"], at["plugged"])
+    heard.device("unplugged", camera, ABSENT, at["unplugged"] + 1.5, at["plugged"])
+    heard.device("plugged in again", camera, WORKS, at["plugged"] + 2.5, at["stalled"])
+    heard.goes_on("no buffers", at["stalled"], at["works"])
+    heard.device("no buffers", camera, STALLED, at["stalled"] + 2.3, at["works"])
+    heard.device("buffers again", camera, WORKS, at["works"] + 2, at["works"] + 5)
+    return heard.failures
+
+
 def judge_bus(out):
-    """What health and poses said while the bus broke."""
+    """The same while the bus broke."""
     at, folder = marks(out / "marks"), out / "faults"
     heard = Published("can", folder, 0, (folder / "faults.txt").read_text)
     for what, from_s, until_s, state in (("interface down", at["down"], at["up"], DOWN), ("adapter removed", at["removed"], at["back"], ABSENT)):
@@ -137,7 +165,7 @@ def judge_camera(work, _):
     print(f"camera: {len(rows)} pictures, {min(late) / 1e6:.1f} to {max(late) / 1e6:.1f} ms old when they arrive")
     if min(late) < 0 or max(late) > 1e9:
         failures.append("stamps of pictures can't be")
-    return failures
+    return failures + judge_published(work / "share/out")
 
 
 def judge_can(work, waymark):

@@ -6,7 +6,7 @@ cp -r /host/camera /host/waymark /run/
 cd /run/camera || exit 1
 modprobe vivid n_devs=1 node_types=0x1 num_inputs=1 input_types=0 || exit 1
 modprobe v4l2loopback devices=1 video_nr=10 exclusive_caps=0 || exit 1
-for tool in "v4l2-ctl -d /dev/video0 -D" "$waymark help"; do $tool >/dev/null 2>&1; done
+for tool in "lcm-logger --help" "canplayer -h" "v4l2-ctl -d /dev/video0 -D" "$waymark help"; do $tool >/dev/null 2>&1; done
 fails=0
 fail() { echo "FAIL: $*"; fails=$((fails + 1)); }
 control() { v4l2-ctl -d /dev/video0 -c "$1"; }
@@ -64,6 +64,43 @@ echo vivid.0 >/sys/bus/platform/drivers/vivid/bind
 finish unplugged
 said unplugged "looking for it"
 [ "$(grep -c 'front gives pictures' unplugged.txt)" = 2 ] || fail "unplugged: it doesn't come back"
+
+echo "== what is published while the camera breaks"
+mark() { echo "$1 $(cut -d' ' -f1 /proc/uptime)" >>/host/out/camera-marks; }
+modprobe -a vcan can-raw && ip link add dev vcan0 type vcan && ip link set vcan0 up
+while :; do canplayer -I can.log vcan0=can0; done &
+player=$!
+lcm-logger --lcm-url='udpm://239.255.76.67:7667?ttl=0' -q /run/heard.lcm &
+logger=$!
+sleep 1
+$waymark run --config published.yaml --duration 32 >published.txt 2>&1 &
+run=$!
+sleep 5
+mark dropped
+control percentage_of_dropped_buffers=20
+sleep 5
+control percentage_of_dropped_buffers=0
+mark damaged
+for i in 1 2 3 4 5; do
+  control inject_v4l2_buf_flag_error=1
+  sleep 0.4
+done
+mark unplugged
+echo vivid.0 >/sys/bus/platform/drivers/vivid/unbind
+sleep 5
+echo vivid.0 >/sys/bus/platform/drivers/vivid/bind
+mark plugged
+sleep 4
+mark stalled
+control percentage_of_dropped_buffers=100
+sleep 3
+control percentage_of_dropped_buffers=0
+mark works
+wait $run || fail "waymark run: exit code $?"
+kill $player $logger
+cat published.txt
+mkdir /host/out/camera-published
+cp /run/heard.lcm published.txt /host/out/camera-published/
 
 echo "== a producer that dies, and another one"
 sed -i 's#/dev/video0#/dev/video10#' robot.yaml
