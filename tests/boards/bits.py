@@ -128,6 +128,9 @@ def main():
     parser.add_argument("builds", nargs="*", default=[ROOT / "build", ROOT / "build-jetson-tx1", ROOT / "build-odroid-xu4"])
     args = parser.parse_args()
     builds = [Build(folder) for folder in args.builds]
+    for build in builds:
+        if build.is_older_than_its_sources("bin/waymark"):
+            sys.exit(f"{build.folder}/bin/waymark is older than its sources: build it again, so that all are of the same")
     print("| configuration | recording, s | poses | sha256, " + builds[0].arch + " | "
           + " | ".join(f"{b.arch} ({b.board}), raw | event log" for b in builds[1:]) + " |")
     print("|" + " --- |" * (4 + 2 * len(builds[1:])), flush=True)

@@ -19,6 +19,13 @@ class Build:
         self.sysroot = (ROOT / ".cache/sysroot" / arch).resolve() if arch else None
         self.qemu = {"arm64": "qemu-aarch64", "armhf": "qemu-arm"}.get(arch)
 
+    def is_older_than_its_sources(self, program):
+        """True if a source of the runtime was written after `program` was linked: builds of unlike sources say nothing."""
+        made = (self.folder / program).stat().st_mtime
+        rooms = ("msgs", "estimator", "drivers", "firmware")
+        return any(file.stat().st_mtime > made for room in rooms for file in (ROOT / room).rglob("*")
+                   if file.suffix in (".c", ".cpp", ".h", ".hpp"))
+
     def command(self, program, *words, emulator_options=()):
         """The words to start `program` (a path inside the build) with."""
         start = [self.qemu, *emulator_options, "-L", self.sysroot] if self.qemu else []
