@@ -40,10 +40,10 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "${base}, ${pictures}, liblcm1 (>= 1.3.1)${cameras}")
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SUGGESTS "waymark-tools, can-utils, v4l-utils, liblcm-bin")
 set(CPACK_DEBIAN_RUNTIME_DESCRIPTION "tells a robot where it is
- A runtime that localizes a robot from cameras and CAN, on the robot's own
- computer, and publishes poses over LCM from a real-time thread. The service
- is installed, not started: its configuration in /etc/waymark has to be the
- robot's first.")
+A runtime that localizes a robot from cameras and CAN, on the robot's own
+computer, and publishes poses over LCM from a real-time thread. The service
+is installed, not started: its configuration in /etc/waymark has to be the
+robot's first.")
 set(conffiles "")
 file(GLOB etc RELATIVE ${CMAKE_SOURCE_DIR}/config/etc CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/config/etc/*)
 foreach(name ${etc})
@@ -57,16 +57,16 @@ set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME waymark-tools)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${cameras}${simulator}${videos}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "desk tools for a robot that knows where it is
- Simulates drives, judges runs against truth, draws reports, calibrates
- cameras, makes maps: waymark eval, report, simulate, diff, calibrate, map.")
+Simulates drives, judges runs against truth, draws reports, calibrates
+cameras, makes maps: waymark eval, report, simulate, diff, calibrate, map.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libwaymark-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "liblcm-dev (>= 1.3.1)")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "poses of a robot for other programs
- Headers and static libraries: libwaymark reads and writes the messages that
- waymark sends over LCM, libwaymark-estimator has its filters and detectors.
- For find_package(waymark) and pkg-config.")
+Headers and static libraries: libwaymark reads and writes the messages that
+waymark sends over LCM, libwaymark-estimator has its filters and detectors.
+For find_package(waymark) and pkg-config.")
 
 # /usr is the prefix; what is below /usr/etc for CMake is in /etc for Debian.
 set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_SOURCE_DIR}/cmake/etc_outside_usr.cmake)
