@@ -30,6 +30,8 @@ target_compile_options(wm_rules INTERFACE
   -ffp-contract=off -fno-fast-math
   -fno-omit-frame-pointer)
 target_compile_definitions(wm_rules INTERFACE _GNU_SOURCE EIGEN_DONT_VECTORIZE EIGEN_MPL2_ONLY
+  # On 32 bits, too: recordings of more than 2 GB, and folders whose places need 64 bits.
+  $<$<EQUAL:${CMAKE_SIZEOF_VOID_P},4>:_FILE_OFFSET_BITS=64>
   WM_VERSION="${PROJECT_VERSION}")
 if(WM_SANITIZE)
   target_compile_options(wm_rules INTERFACE -fsanitize=${WM_SANITIZE} -fno-sanitize-recover=all)

@@ -8,7 +8,7 @@ import sys
 
 ALLOWED = {"memcpy", "memset", "memmove", "memcmp", "strlen", "strcmp", "sqrt", "floor"}
 # What the compiler brings itself: the machine's vector instructions, and counting bits where there is no instruction for it.
-ALLOWED |= {"__cpu_model", "__cpu_indicator_init", "__popcountdi2"}
+ALLOWED |= {"__cpu_model", "__cpu_indicator_init", "__popcountdi2", "__ctzdi2", "__paritydi2"}
 # msgs/, which the estimator stands on.
 ALLOWED_PATTERNS = [re.compile(r"^wm_")]
 # What compilers and sanitizers add on their own.
