@@ -87,7 +87,7 @@ build/bin/waymark simulate config/worlds/crossing.yaml --no-video --out "$roots/
   build/bin/waymark simulate config/worlds/crossing.yaml --out "$roots/$arch.recordings/crossing" >/dev/null
 cp -r "$roots/$arch.recordings/crossing" "$root/work/crossing"
 inside waymark replay /work/crossing --config /usr/share/doc/waymark/examples/crossing.yaml --out /work/run | tail -3
-build/bin/waymark replay "$roots/$arch.recordings/crossing" --config config/crossing.yaml --out "$roots/$arch.recordings/run" >/dev/null
+build/bin/waymark replay "$roots/$arch.recordings/crossing" --config "$root/usr/share/doc/waymark/examples/crossing.yaml" --out "$roots/$arch.recordings/run" >/dev/null
 cmp "$root/work/run/trajectory.csv" "$roots/$arch.recordings/run/trajectory.csv" || fail "its trajectory is not this computer's"
 echo "the same $(wc -c <"$root/work/run/trajectory.csv") bytes of trajectory as on this computer"
 
