@@ -74,9 +74,9 @@ class Drive:
                    "map: map/map.yaml\n") if world == "corridor" else (
                    "devices: {can: [{interface: can0}], sightings: lcm}\nlandmarks: landmarks.csv\n")
         self.config = (
-            (ROOT / f"config/{world}.yaml").read_text() + f"\ninitial_pose: {drives.start_of(recording)}\n"
+            drives.with_realtime((ROOT / f"config/{world}.yaml").read_text(), "lock_memory: false") + f"\ninitial_pose: {drives.start_of(recording)}\n"
             "calibration: calibration.yaml\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\n" + devices +
-            f"publish: {{lcm_url: '{drives.URL}'}}\nrealtime: {{lock_memory: false}}\n"
+            f"publish: {{lcm_url: '{drives.URL}'}}\n"
             "start: {saved_pose: pose.yaml, save_every_s: 0.5}\n")
         (self.folder / "robot.yaml").write_text(self.config)
         subprocess.run(["ip", "link", "set", "lo", "up"], check=True)

@@ -30,6 +30,13 @@ def start_of(recording):
     return start.group(1) if start else "{" + ", ".join(re.findall(r"((?:x_m|y_m|heading_rad): *[-0-9.e]+)", about)) + "}"
 
 
+def with_realtime(config, keys):
+    """The configuration with these keys of `realtime`, which may stand in it, on a line, or not."""
+    if "\nrealtime: {" in config:
+        return config.replace("\nrealtime: {", f"\nrealtime: {{{keys}, ", 1)
+    return config + f"\nrealtime: {{{keys}}}\n"
+
+
 def write(scenario, here, items, blob, seconds):
     """What guest/drive.sh plays."""
     (scenario / "timeline").write_text("".join(f"{t} {what}\n" for t, what in sorted(items)))

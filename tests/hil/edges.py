@@ -39,11 +39,10 @@ def prepare(work, root, here, simulate):
         shutil.copy(recording / name, scenario)
     shutil.copytree(recording / "map", scenario / "map")
     (scenario / "robot.yaml").write_text(
-        (root / "config/corridor.yaml").read_text() + f"\ninitial_pose: {drives.start_of(recording)}\n"
+        # One processor: above the interrupts' threads (50), an estimator that takes 20 ms would cost CAN frames.
+        drives.with_realtime((root / "config/corridor.yaml").read_text(), "priority: 40") + f"\ninitial_pose: {drives.start_of(recording)}\n"
         "calibration: calibration.yaml\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\nmap: map/map.yaml\n"
         f"publish: {{lcm_url: '{drives.URL}'}}\n"
-        # One processor: above the interrupts' threads (50), an estimator that takes 20 ms would cost CAN frames.
-        "realtime: {priority: 40}\n"
         "devices:\n  can: [{interface: can0}]\n"
         f"  cameras: [{{name: front, device: /dev/video10, format: MJPG, rate_hz: {RATE_HZ}}}]\n")
 
