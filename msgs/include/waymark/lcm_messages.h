@@ -26,9 +26,9 @@ size_t wm_lcm_health(const wm_health *health, void *out, size_t capacity);
 // Messages to the robot: NULL and *out (t_ns 0: now; arrival unset), or what is wrong with it. Cost fixed.
 const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *out);
 const char *wm_lcm_read_reset(const void *message, size_t length, wm_event *out);
-// `sensor` has room for WM_NAME_MAX bytes, `out` for WM_LCM_OBSERVATIONS_MAX; their `sensor` is the caller's to fill in.
-// Bearings come wrapped, sigmas as NaN: the sensor's own. One that is neither bearing nor range, or can't be, refuses the
-// whole message.
+// `sensor` has room for WM_NAME_MAX bytes, `out` for WM_LCM_OBSERVATIONS_MAX; their `sensor` is the caller's to fill
+// in. Bearings come wrapped, sigmas as NaN: the sensor's own. One that is neither bearing nor range, or can't be,
+// refuses the whole message.
 const char *wm_lcm_read_sightings(const void *message, size_t length, char *sensor, wm_time_ns *t_ns, wm_sighting *out,
                                   size_t *count);
 // Messages of a run, for who watches it: NULL, or what is wrong with it.
