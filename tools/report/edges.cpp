@@ -11,6 +11,7 @@
 #include "common/csv.h"
 #include "common/edge_points.h"
 #include "common/failure.h"
+#include "report/bird.h"
 #include "report/data.h"
 #include "report/picture.h"
 #include "report/png.h"
@@ -24,7 +25,9 @@ namespace fs = std::filesystem;
 constexpr double kReach_m = 8;       // edges further away are a pixel or two above the nearer ones
 constexpr int kLayerSide_px = 1600;  // of the layer in the page, at most
 constexpr uint32_t kLayerColour = 0xcc5500;
-constexpr size_t kClouds = 9;             // instants
+constexpr size_t kClouds = 9;   // instants
+constexpr double kGap_px = 40;  // at 1280 of width, as `waymark eval` joins them
+constexpr double kDotsAbove_px = 2;
 constexpr double kDotsApart = 1.5 / 480;  // of a picture's width
 
 using Map = std::unique_ptr<wm_map, decltype(&wm_map_free)>;
@@ -106,9 +109,10 @@ class Edges {
   Eigen::Matrix2d axes_;
 };
 
+// In the picture, and in the view from above.
 void mark_mapped(const Edges &edges, const render::Camera &camera, const Pose &pose, ReportFrame *frame) {
   const Eigen::Vector3d eye = pose.p_m + pose.q * camera.T_base_camera.translation();
-  std::set<std::pair<int, int>> taken;
+  std::set<std::pair<int, int>> taken, taken_above;
   const double apart_px = kDotsApart * frame->width_px;
   for (const Eigen::Vector2d &edge : edges.seen_from(eye.head<2>())) {
     const Eigen::Vector3d base =
@@ -116,6 +120,23 @@ void mark_mapped(const Edges &edges, const render::Camera &camera, const Pose &p
     const auto pixel = floor_pixel(camera, base.head<2>());
     if (pixel && taken.emplace(static_cast<int>(pixel->x() / apart_px), static_cast<int>(pixel->y() / apart_px)).second)
       frame->edges_mapped.push_back(*pixel);
+    const auto above = frame->floor.pixel(base.head<2>());
+    if (above &&
+        taken_above.emplace(static_cast<int>(above->x() / kDotsAbove_px), static_cast<int>(above->y() / kDotsAbove_px))
+            .second)
+      frame->floor.edges_mapped.push_back(*above);
+  }
+}
+
+// A polyline of the picture, from above; what lies outside of the view cuts it.
+void mark_seen(const std::vector<Eigen::Vector2d> &line, const render::Camera &camera, ReportFrame *frame) {
+  bool goes_on = false;
+  for (const Eigen::Vector2d &pixel : line) {
+    const auto base = floor_point(camera, pixel);
+    const auto above = base ? frame->floor.pixel(*base) : std::nullopt;
+    if (above && !goes_on) frame->floor.lines_seen.emplace_back();
+    if (above) frame->floor.lines_seen.back().push_back(*above);
+    goes_on = above.has_value();
   }
 }
 
@@ -128,6 +149,9 @@ void mark_frames(const std::vector<EdgePoints> &seen, const std::vector<NamedCam
     const auto index = static_cast<int32_t>(camera - cameras.begin());
     for (const EdgePoints &points : seen) {
       if (points.t_ns != frame.t_ns || (points.camera != index && points.camera >= 0)) continue;
+      if (!frame.grey.empty() && frame.floor.jpeg.empty()) frame.floor = view_floor(camera->camera, frame.grey);
+      for (const auto &line : picture_polylines(points, camera->camera, kGap_px * frame.width_px / 1280))
+        mark_seen(line, camera->camera, &frame);
       for (const Eigen::Vector2d &point : points.points)
         if (const auto pixel = floor_pixel(camera->camera, point)) frame.edges_seen.push_back(*pixel);
     }

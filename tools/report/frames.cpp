@@ -24,7 +24,7 @@ constexpr int kWidth_px = 480, kQuality = 72;
 using Opened = std::unique_ptr<wm_recording, decltype(&wm_recording_close)>;
 using Video = std::unique_ptr<wm_video, decltype(&wm_video_close)>;
 
-// The mean of each block of `times` x `times` pixels, as a JPEG. Empty where it can't be made.
+// The mean of each block of `times` x `times` pixels, as a JPEG.
 std::string small_jpeg(const wm_frame &frame, uint32_t times) {
   const uint32_t width = frame.width_px / times, height = frame.height_px / times;
   std::vector<uint8_t> grey(static_cast<size_t>(width) * height);
@@ -36,14 +36,16 @@ std::string small_jpeg(const wm_frame &frame, uint32_t times) {
           sum += frame.grey[static_cast<size_t>(y * times + j) * frame.stride_bytes + x * times + i];
       grey[static_cast<size_t>(y) * width + x] = static_cast<uint8_t>(sum / (times * times));
     }
-  const std::unique_ptr<void, decltype(&tjDestroy)> coder(tjInitCompress(), tjDestroy);
-  unsigned char *bytes = nullptr;
-  unsigned long size = 0;
-  std::string out;
-  if (tjCompress2(coder.get(), grey.data(), static_cast<int>(width), 0, static_cast<int>(height), TJPF_GRAY, &bytes,
-                  &size, TJSAMP_GRAY, kQuality, 0) == 0)
-    out.assign(reinterpret_cast<const char *>(bytes), size);
-  tjFree(bytes);
+  return grey_jpeg(grey, static_cast<int>(width), static_cast<int>(height));
+}
+
+std::vector<uint8_t> grey_of(const wm_frame &frame) {
+  std::vector<uint8_t> out;
+  out.reserve(static_cast<size_t>(frame.width_px) * frame.height_px);
+  for (uint32_t row = 0; row < frame.height_px; row++) {
+    const uint8_t *begin = frame.grey + static_cast<size_t>(row) * frame.stride_bytes;
+    out.insert(out.end(), begin, begin + frame.width_px);
+  }
   return out;
 }
 
@@ -71,6 +73,12 @@ void frames_of(const fs::path &recording, const wm_camera &camera, int32_t index
                     static_cast<int>(frame.width_px),
                     static_cast<int>(frame.height_px),
                     small_jpeg(frame, times),
+                    {},
+                    {},
+                    {},
+                    {},
+                    {},
+                    grey_of(frame),
                     {}});
   }
 }
@@ -89,6 +97,25 @@ std::string traces(const char *css, const std::vector<std::vector<Eigen::Vector2
   return d.empty() ? d : std::string("<path class=\"") + css + "\" d=\"" + d + "\"/>";
 }
 
+// A picture with what is drawn over it, in its own pixels, and a line below.
+std::string figure(const std::string &label, const std::string &jpeg, int width, int height, const std::string &over,
+                   const std::string &below) {
+  const std::string w = std::to_string(width), h = std::to_string(height);
+  return "<figure class=\"shot\"><svg viewBox=\"-0.5 -0.5 " + w + " " + h + "\" role=\"img\" aria-label=\"" +
+         escape(label) + "\"><image x=\"-0.5\" y=\"-0.5\" width=\"" + w + "\" height=\"" + h +
+         "\" preserveAspectRatio=\"none\" href=\"data:image/jpeg;base64," + base64(jpeg) + "\"/>" + over +
+         "</svg><figcaption>" + below + "</figcaption></figure>";
+}
+
+// The same from above; nothing where there is no such view.
+std::string drawn_from_above(const ReportFrame &frame) {
+  const FloorView &view = frame.floor;
+  if (view.jpeg.empty()) return "";
+  return figure("The floor that camera " + frame.camera + " sees, from above", view.jpeg, view.width_px, view.height_px,
+                traces("edge-line", view.lines_seen) + dots("edge-mapped", view.edges_mapped),
+                "the same from above: ahead is up");
+}
+
 std::string drawn(const ReportData &data, const ReportFrame &frame) {
   const double unit = frame.width_px / 480.0;  // marks are as large whatever the picture's size
   std::string svg = dots("edge-seen", frame.edges_seen) + dots("edge-mapped", frame.edges_mapped) +
@@ -102,16 +129,22 @@ std::string drawn(const ReportData &data, const ReportFrame &frame) {
       svg += "<text x=\"" + fixed(m.u_px + 11 * unit, 1) + "\" y=\"" + fixed(m.v_px + 4 * unit, 1) + "\" font-size=\"" +
              fixed(12 * unit, 1) + "\">" + escape(m.text) + "</text>";
   }
-  const std::string box = std::to_string(frame.width_px) + " " + std::to_string(frame.height_px);
-  return "<figure class=\"shot\"><svg viewBox=\"-0.5 -0.5 " + box + "\" role=\"img\" aria-label=\"Picture of camera " +
-         escape(frame.camera) + "\"><image x=\"-0.5\" y=\"-0.5\" width=\"" + std::to_string(frame.width_px) +
-         "\" height=\"" + std::to_string(frame.height_px) +
-         "\" preserveAspectRatio=\"none\" href=\"data:image/jpeg;base64," + base64(frame.jpeg) + "\"/>" + svg +
-         "</svg><figcaption>" + escape(frame.camera) + ", " + fixed(data.seconds(frame.t_ns), 1) +
-         " s</figcaption></figure>";
+  return figure("Picture of camera " + frame.camera, frame.jpeg, frame.width_px, frame.height_px, svg,
+                escape(frame.camera) + ", " + fixed(data.seconds(frame.t_ns), 1) + " s");
 }
 
 }  // namespace
+
+std::string grey_jpeg(const std::vector<uint8_t> &grey, int width, int height) {
+  const std::unique_ptr<void, decltype(&tjDestroy)> coder(tjInitCompress(), tjDestroy);
+  unsigned char *bytes = nullptr;
+  unsigned long size = 0;
+  std::string out;
+  if (tjCompress2(coder.get(), grey.data(), width, 0, height, TJPF_GRAY, &bytes, &size, TJSAMP_GRAY, kQuality, 0) == 0)
+    out.assign(reinterpret_cast<const char *>(bytes), size);
+  tjFree(bytes);
+  return out;
+}
 
 std::vector<ReportFrame> load_frames(const fs::path &recording, ReportData *data, size_t each) {
   std::vector<ReportFrame> out;
@@ -169,7 +202,7 @@ std::string frames_section(const ReportData &data) {
   std::string body = "<div class=\"shots\">";
   bool marks = false, edges = false, lines = false;
   for (const ReportFrame &frame : data.frames) {
-    body += drawn(data, frame);
+    body += drawn(data, frame) + drawn_from_above(frame);
     marks = marks || !frame.marks.empty();
     edges = edges || !frame.edges_seen.empty();
     lines = lines || !frame.lines_seen.empty();

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "report/bird.h"
+
 namespace wm::tools {
 
 struct ReportData;
@@ -29,7 +31,12 @@ struct ReportFrame {
   std::vector<Eigen::Vector2d> edges_seen{}, edges_mapped{};  // pixels: by the detector, and by map and pose
   // Upright lines: each from below to above, in pixels; as they were seen, and as map and pose expect them.
   std::vector<std::vector<Eigen::Vector2d>> lines_seen{}, lines_mapped{};
+  std::vector<uint8_t> grey{};  // as the camera took it, row by row
+  FloorView floor{};            // where edges on the floor were fused
 };
+
+// Grey bytes, row by row, as a JPEG. Empty where it can't be made.
+std::string grey_jpeg(const std::vector<uint8_t> &grey, int width, int height);
 
 // `each` pictures of every camera that has a video, spread over the run's time. What can't be read leaves its part
 // empty and a line in the data's notes. Reads each video once; about 3 ms a picture that is passed over.

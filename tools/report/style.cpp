@@ -59,6 +59,7 @@ figure{margin:0}
 .hope{fill:none;stroke:#ffd23d;stroke-width:2;vector-effect:non-scaling-stroke}.hit{fill:#35e0a8;stroke:#063;stroke-width:1;vector-effect:non-scaling-stroke}
 .edge-seen,.edge-mapped{fill:none;stroke-linecap:round;vector-effect:non-scaling-stroke}.edge-seen{stroke:#ffd23d;stroke-width:4.5}
 .edge-mapped{stroke:#1fa2ff;stroke-width:1.8}
+.edge-line{fill:none;stroke:#ffd23d;stroke-width:3;stroke-linecap:round;stroke-linejoin:round;vector-effect:non-scaling-stroke}
 .line-seen,.line-mapped{fill:none;vector-effect:non-scaling-stroke}.line-seen{stroke:#ffd23d;stroke-width:2.2}
 .line-mapped{stroke:#1fa2ff;stroke-width:1.4}
 .miss{fill:#ff5b3a;stroke:#400;stroke-width:1;vector-effect:non-scaling-stroke}

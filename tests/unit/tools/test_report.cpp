@@ -284,6 +284,8 @@ void test_edges_are_drawn_where_they_are_seen() {
 
   ReportData data = load_report_data(run.path(), recording.path());
   data.frames.push_back({"front", 5'000'000'000, 640, 480, "", {}});
+  data.frames.front().grey.assign(640 * 480, 90);  // the floor; bright where the edge ahead is
+  data.frames.front().grey[(240 - 139) * 640 + 320] = 255;
   load_edges(run.path(), recording.path(), &data);
   for (const std::string &note : data.notes) TEST_FAIL_MESSAGE(note.c_str());
   const ReportFrame &frame = data.frames.front();
@@ -295,6 +297,15 @@ void test_edges_are_drawn_where_they_are_seen() {
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 320, frame.edges_mapped[0].x());
   TEST_ASSERT_DOUBLE_WITHIN(0.01, 240 - 300 * std::atan(0.5), frame.edges_mapped[0].y());
   TEST_ASSERT_TRUE(has(frames_section(data), "class=\"edge-seen\" d=\"M451 109h0\""));
+  // From above: half a metre ahead is 25 px above the camera's foot point, in the middle of what it sees.
+  TEST_ASSERT_EQUAL(1, frame.floor.edges_mapped.size());
+  const auto foot = frame.floor.pixel({0, 0});
+  TEST_ASSERT_TRUE(foot.has_value());
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 25, foot->y() - frame.floor.edges_mapped[0].y());
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, foot->x(), frame.floor.edges_mapped[0].x());
+  TEST_ASSERT_DOUBLE_WITHIN(1, 0.5 * frame.floor.width_px, foot->x());
+  TEST_ASSERT_FALSE(frame.floor.pixel({100, 0}).has_value());
+  TEST_ASSERT_TRUE(has(frames_section(data), "from above: ahead is up"));
 
   const Picture picture = draw_picture(data, false);
   TEST_ASSERT_TRUE(has(picture.svg, "<image class=\"edges\" width=\"" + fixed(5 * picture.scale, 2)));
