@@ -118,13 +118,13 @@ void print_summary(const std::string &name, const std::vector<Row> &rows) {
 
 void write_scans(const std::string &file, const std::string &kind, const std::vector<Row> &rows, bool first) {
   std::ofstream out(file, first ? std::ios::trunc : std::ios::app);
-  if (first) out << "kind,drive,t_s,way_m,error_m,error_deg,nees,lost_probability,explained,seen,tracking,covered\n";
+  if (first) out << "kind,drive,t_s,way_m,error_m,error_deg,nees,lost_probability,explained,points,tracking,covered\n";
   for (const Row &r : rows)
     for (const Sample &s : r.outcome.samples) {
       char line[240];
-      std::snprintf(line, sizeof line, "%s,%s,%.2f,%.2f,%.4f,%.3f,%.3f,%.5f,%.3f,%.0f,%d,%d\n", kind.c_str(),
+      std::snprintf(line, sizeof line, "%s,%s,%.2f,%.2f,%.4f,%.3f,%.3f,%.5f,%.3f,%u,%d,%d\n", kind.c_str(),
                     r.drive.c_str(), s.t_s, s.way_m, s.error_m, s.error_rad * 57.29578, s.nees, s.lost_probability,
-                    s.explained, s.seen, static_cast<int>(s.tracking), static_cast<int>(s.covered));
+                    s.explained, s.points, static_cast<int>(s.tracking), static_cast<int>(s.covered));
       out << line;
     }
   if (!out) throw Failure(file + ": could not be written");

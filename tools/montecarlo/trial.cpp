@@ -55,7 +55,7 @@ class Filter {
     wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
     size_t count = 0;
     (void)ops_.correct(memory_.get(), &event, out, WM_INNOVATIONS_PER_EVENT_MAX, &count);
-    if (event.kind == WM_EVENT_POINTS && count > 0) scan_ = out[0];
+    if (event.kind == WM_EVENT_POINTS && count > 0) points_ = event.as.points.count;
   }
   [[nodiscard]] wm_estimate estimate() const {
     wm_estimate e{};
@@ -90,7 +90,7 @@ class Filter {
   const wm_estimator &ops_;
   const wm_log_head &head_;
   wm_setup setup_{};
-  wm_innovation scan_{};
+  uint32_t points_ = 0;
   std::unique_ptr<Block[]> memory_;
 };
 
@@ -107,8 +107,8 @@ Sample Filter::look(const wm_pose2 &truth, const wm_estimate &e) const {
   s.nees = error.dot(covariance.ldlt().solve(error));
   s.tracking = e.state == WM_STATE_TRACKING || e.state == WM_STATE_DEAD_RECKONING;
   s.lost_probability = calibration("edges.lost_probability");
-  s.explained = scan_.observed;
-  s.seen = scan_.gate;
+  s.explained = calibration("edges.explained");
+  s.points = points_;
   // A cluster is a hypothesis from a hundredth of the weight on.
   s.covered = s.nees < tools::chi2_quantile(0.95, 3) || weight_about(truth) > 0.01;
   return s;

@@ -26,9 +26,9 @@ struct Sample {
   double error_m, error_rad;
   double nees;
   double lost_probability, explained;
-  double seen;    // points of the last scan that said something
-  bool tracking;  // or reckoning on from it; else lost or searching
-  bool covered;   // truth within the published covariance's 95 %, or a cluster of particles about it
+  uint32_t points;  // of the last scan
+  bool tracking;    // or reckoning on from it; else lost or searching
+  bool covered;     // truth within the published covariance's 95 %, or a cluster of particles about it
 };
 
 struct Outcome {

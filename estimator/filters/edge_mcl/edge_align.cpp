@@ -166,10 +166,36 @@ void edge_mcl::descend_from_several(const wm_points &points, const alignment &pr
   }
 }
 
+// What the scan says of the place along the axis of the map that it knows better, with what it says of the rest from
+// there: one distance, in a corridor that to its walls.
+void edge_mcl::describe(const normal_equations &scan, const alignment &a, const int *index, int n,
+                        wm_innovation *record) const {
+  const int best = scan.information[kAlignX][kAlignX] > scan.information[kAlignY][kAlignY] ? kAlignX : kAlignY;
+  const double known = scan.information[best][best];
+  if (!(known > 0.0)) return;
+  const double aslant = scan.information[kAlignX][kAlignY] / known, length = std::sqrt(1.0 + aslant * aslant);
+  double innovation = scan.gradient[best] / known;
+  sparse_row row;
+  for (int i = 0; i < n; i++) {
+    const int state = a.state[index[i]];
+    double off = a.value[index[i]] - filter_.value(state);
+    if (index[i] == kAlignHeading) off = wrap(off);
+    const double share = scan.information[best][index[i]] / known;
+    row.add(state, share);
+    innovation += share * off;
+  }
+  projection projected;
+  filter_.project(row, &projected);
+  record->observed = innovation / length;
+  record->variance = (projected.variance + 1.0 / known) / square(length);
+  record->nis = square(record->observed) / record->variance;
+  record->gate_dof = 1;
+}
+
 // Iterated: minimises the prediction's and the scan's misfit together, then takes in what the scan says there as scalar
 // measurements, one for each row of the information's factor. Source: the iterated extended Kalman filter (B. M. Bell,
 // F. W. Cathey, "The iterated Kalman filter update as a Gauss-Newton method", 1993), in information form.
-bool edge_mcl::align(const wm_points &points, int camera, wm_innovation *record) {
+bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan, wm_innovation *record) {
   alignment a = alignment_of(camera);
   const alignment prior = a;
   int index[kAlignStates], n = 0;
@@ -180,14 +206,11 @@ bool edge_mcl::align(const wm_points &points, int camera, wm_innovation *record)
     for (int c = 0; c < n; c++) covariance[r][c] = filter_.covariance(a.state[index[r]], a.state[index[c]]);
   if (!invert_positive(covariance, n, inverse)) return false;
 
-  normal_equations e;
+  normal_equations &e = *scan;
   descend_from_several(points, prior, inverse, index, n, &a, &e);
-  record->observed = e.seen > 0 ? (double)e.explained / e.seen : 0.0;
-  record->expected = explained_;
-  record->gate_dof = 3;
-  record->gate = e.seen;
   record->verdict = e.explained < 5 ? (uint8_t)WM_REJECTED_SINGULAR : (uint8_t)WM_FUSED;
   if (e.explained < 5) return false;
+  describe(e, a, index, n, record);
 
   // information = L D L'; the rows of L' measure what the scan knows, with variances 1/D.
   double lower[kAlignStates][kAlignStates] = {}, d[kAlignStates];
@@ -220,10 +243,6 @@ bool edge_mcl::align(const wm_points &points, int camera, wm_innovation *record)
     }
     projection projected;
     filter_.project(row, &projected);
-    if (i == 0) {
-      record->variance = projected.variance + 1.0 / d[i];
-      record->nis = innovation * innovation / record->variance;
-    }
     // In doubt of the pose a scan teaches nothing of sensors and camera.
     filter_.update(projected, innovation, 1.0 / d[i], kPoseStates,
                    lost_odds_ > kDoubtOdds ? filter_.states() : kPoseStates);

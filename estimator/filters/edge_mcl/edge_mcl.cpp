@@ -148,9 +148,10 @@ wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
   record.t_ns = event.t_ns;
   record.source = event.source;
   record.landmark_id = -1;
-  record.residual = WM_RESIDUAL_PIXEL;
-  if (align(points, camera, &record)) fused_ns_ = event.t_ns;
-  watch(record.observed, (int)record.gate, dt);
+  record.residual = WM_RESIDUAL_RANGE;
+  normal_equations scan{};
+  if (align(points, camera, &scan, &record)) fused_ns_ = event.t_ns;
+  watch(scan.seen > 0 ? (double)scan.explained / scan.seen : 0.0, scan.seen, dt);
   const bool new_keyframe = search_.see(lined_, filter_.odom());
   if (state_ == WM_STATE_TRACKING) heed_cloud();
   ponder(new_keyframe);

@@ -61,7 +61,9 @@ class edge_mcl {
   void descend_from_several(const wm_points &points, const alignment &prior,
                             const double inverse[kAlignStates][kAlignStates], const int *index, int n, alignment *best,
                             normal_equations *e) const;
-  bool align(const wm_points &points, int camera, wm_innovation *record);
+  // Whether the scan was taken in; how many of its points say something and how many of these the map explains.
+  bool align(const wm_points &points, int camera, normal_equations *scan, wm_innovation *record);
+  void describe(const normal_equations &scan, const alignment &a, const int *index, int n, wm_innovation *record) const;
   void pull_cloud(const normal_equations &equations);
   void watch(double explained, int seen, double dt_s);
   void heed_cloud();

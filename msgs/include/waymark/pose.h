@@ -78,7 +78,7 @@ typedef struct wm_innovation {
   double expected;
   double variance;  // of the innovation, HPH' + R
   double nis;       // normalised innovation squared of the gated group
-  double gate;      // threshold that nis was held against
+  double gate;      // threshold that nis was held against; 0: none (points of edges are gated one by one)
   uint8_t gate_dof;
 } wm_innovation;
 
