@@ -5,6 +5,10 @@
 #include <cmath>
 #include <utility>
 
+#include "math/elementary.hpp"
+#include "simulate/angle.h"
+#include "simulate/features.h"
+
 namespace wm::sim {
 namespace {
 
@@ -28,6 +32,47 @@ void fault(const Faults &f, const Random &random, uint64_t list, bool frames, st
   }
   std::stable_sort(kept.begin(), kept.end(), [](const Seen &a, const Seen &b) { return a.arrival_ns < b.arrival_ns; });
   all = std::move(kept);
+}
+
+double field_of_view_of(const Scenario &sc, uint16_t sensor) {
+  if (sensor < sc.cameras.size()) return sc.cameras[sensor].field_of_view_rad;
+  for (size_t i = 0; i < sc.sensors.size(); i++)
+    if (sc.sensors[i].kind == Sensor::Kind::landmarks && sensor_index(sc, i) == sensor)
+      return sc.sensors[i].field_of_view_rad;
+  return 2 * kPi;
+}
+
+// Detectors err: one landmark is taken for another, and what is none at all for one of the map.
+void mistake(const Scenario &sc, const Random &random, Recording &r) {
+  const Faults &f = sc.faults;
+  if (r.map.empty() || (f.sightings_misread <= 0 && f.sightings_false <= 0)) return;
+  const double added = f.sightings_false / (1 - f.sightings_false);  // to each right one, so that of all it is that
+  const auto any_id = [&](double u, int32_t but) {
+    const auto n = static_cast<double>(r.map.size());
+    const auto i = static_cast<size_t>(u * n);
+    return r.map[i].id != but ? r.map[i].id : r.map[(i + 1) % r.map.size()].id;
+  };
+  std::vector<Sighting> all;
+  for (uint64_t i = 0; i < r.sightings.size(); i++) {
+    Sighting s = r.sightings[i];
+    const auto draw = [&](Stream stream, uint64_t sub) { return random.uniform(stream, i, sub); };
+    if (s.id != kNorthId && draw(Stream::sighting_misread, 0) < f.sightings_misread) {
+      s.id = any_id(draw(Stream::sighting_misread, 1), s.id);
+      s.outlier = true;
+    }
+    all.push_back(s);
+    if (std::isnan(s.bearing_rad)) continue;
+    for (double left = added; left > 0; left -= 1) {
+      const auto sub = static_cast<uint64_t>(4 * (added - left) + 0.5);
+      if (draw(Stream::sighting_false, sub) >= left) continue;
+      Sighting nothing = s;
+      nothing.id = any_id(draw(Stream::sighting_false, sub + 1), -1);
+      nothing.bearing_rad = (draw(Stream::sighting_false, sub + 2) - 0.5) * field_of_view_of(sc, s.sensor);
+      nothing.outlier = true;
+      all.push_back(nothing);
+    }
+  }
+  r.sightings = std::move(all);
 }
 
 }  // namespace
@@ -58,10 +103,26 @@ void fault_can(const Faults &f, const Random &random, std::vector<wm_can_frame> 
 void settle(const Scenario &sc, Recording &r) {
   const Random random(r.seed);
   const bool frames = !sc.world.pictured();  // pictures have been late already
+  mistake(sc, random, r);
   fault(sc.faults, random, 0, frames, r.sightings);
   fault(sc.faults, random, 1, frames, r.markers);
   fault(sc.faults, random, 2, frames, r.stereo);
   fault(sc.faults, random, 3, false, r.fixes);
+}
+
+void move_landmarks(const Scenario &sc, Recording &r) {
+  const Random random(r.seed);
+  std::vector<std::pair<double, size_t>> order;
+  for (size_t i = 0; i < r.map.size(); i++) order.emplace_back(random.uniform(Stream::landmark_moved, i, 0), i);
+  std::sort(order.begin(), order.end());
+  const size_t count = std::min(order.size(), static_cast<size_t>(sc.faults.landmarks_moved));
+  for (size_t k = 0; k < count; k++) {
+    const size_t i = order[k].second;
+    const double direction = 2 * kPi * random.uniform(Stream::landmark_moved, i, 1);
+    r.map[i].p_m[0] += sc.faults.landmarks_moved_m * wm::cos(direction);
+    r.map[i].p_m[1] += sc.faults.landmarks_moved_m * wm::sin(direction);
+    r.moved.push_back(r.map[i].id);
+  }
 }
 
 }  // namespace wm::sim

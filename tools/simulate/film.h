@@ -36,6 +36,10 @@ struct Film {
 // when the scenario doesn't fit the world: an unknown camera, a route that can't be driven.
 wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *err);
 
+// Simulates all but the pictures once more, with `film.scenario` as it is now, in the same world with the same cameras:
+// for another seed's errors, or other faults.
+wm_status record(uint64_t seed, Film &film, wm_error *err);
+
 // What the scenario's `sensors` say, with what those that look at pictures would find in them: what the labels show, by
 // the believed calibration, with noise, outliers and misses. Without pictures all of them; beside pictures only those
 // that say so. Some ms a picture. WM_BAD_CONFIG where a sensor doesn't fit the world.

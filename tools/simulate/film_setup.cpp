@@ -206,7 +206,10 @@ wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *
     if (const wm_status s = check_clear(*out.world, err); s != WM_OK) return s;
   if (out.scenario.about.empty()) out.scenario.about = out.world->about;
   if (const wm_status s = set_up_cameras(scenario, seed, out, err); s != WM_OK) return s;
+  return record(seed, out, err);
+}
 
+wm_status record(uint64_t seed, Film &out, wm_error *err) {
   Recording &r = out.recording;
   if (out.world->vehicle == Vehicle::six)
     simulate_six(out.scenario, seed, out.world->path, r);
@@ -215,9 +218,10 @@ wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *
   r.landmarks = landmarks_of(*out.world);
   if (out.world->landmarks_known) r.map = r.landmarks;
   misplace(out.scenario, 3, r);
+  move_landmarks(out.scenario, r);
   r.camera_calibration = calibration_of(out);
   if (out.world->map) r.picture_streams.push_back("map/map.yaml");
-  if (scenario.pictures.none) return WM_OK;
+  if (out.scenario.pictures.none) return WM_OK;
   for (const FilmCamera &c : out.cameras) {
     r.picture_streams.push_back("video/" + c.name + ".avi");
     r.picture_streams.push_back("video/" + c.name + ".csv");

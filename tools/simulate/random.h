@@ -47,6 +47,9 @@ enum class Stream : uint64_t {
   start_place,
   frame_duplicated,
   frame_reordered,
+  sighting_misread,
+  sighting_false,
+  landmark_moved,
 };
 
 class Random {

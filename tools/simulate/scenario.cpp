@@ -323,6 +323,9 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
                                       "can_late_ms",
                                       "sightings_lost_percent",
                                       "sightings_duplicated_percent",
+                                      "sightings_misread_percent",
+                                      "sightings_false_percent",
+                                      "landmarks_moved",
                                       "frames_late_percent",
                                       "frames_late_ms",
                                       "camera_clock_offset_ms",
@@ -350,6 +353,15 @@ void read_faults(Reader &r, const wm_yaml_node &map, Faults &out) {
   r.number(map, "can_late_ms", 0, 1e5, kMilli, out.can_late_s);
   r.number(map, "sightings_lost_percent", 0, 100, kPercent, out.sightings_lost);
   r.number(map, "sightings_duplicated_percent", 0, 100, kPercent, out.sightings_duplicated);
+  r.number(map, "sightings_misread_percent", 0, 100, kPercent, out.sightings_misread);
+  r.number(map, "sightings_false_percent", 0, 90, kPercent, out.sightings_false);
+  static const char *const known_moved[] = {"count", "by_m", nullptr};
+  const wm_yaml_node moved = r.child(map, "landmarks_moved", false);
+  if (r.ok() && wm_yaml_there(&moved)) {
+    r.keys(moved, known_moved);
+    r.integer(moved, "count", 1, 1000, out.landmarks_moved, true);
+    r.number(moved, "by_m", 0.01, 1000, 1, out.landmarks_moved_m, true);
+  }
   r.number(map, "frames_late_percent", 0, 100, kPercent, out.frames_late);
   r.number(map, "frames_late_ms", 0, 1e5, kMilli, out.frames_late_s);
   r.number(map, "camera_clock_offset_ms", -1e4, 1e4, kMilli, out.camera_clock_offset_s);

@@ -184,6 +184,10 @@ struct Faults {
   double can_lost = 0, can_duplicated = 0, can_reordered = 0;  // fractions of the frames
   double can_late = 0, can_late_s = 0;                         // this fraction is received so much later
   double sightings_lost = 0, sightings_duplicated = 0;         // fractions of the sightings
+  double sightings_misread = 0;                                // fraction of the sightings: another landmark's id
+  double sightings_false = 0;                                  // fraction of all: nothing stands there, added
+  int64_t landmarks_moved = 0;                                 // so many of the map stand elsewhere by now ...
+  double landmarks_moved_m = 0;                                // ... so far from where they were measured
   double frames_late = 0, frames_late_s = 0;                   // this fraction of camera frames arrives so much later
   double camera_clock_offset_s = 0;                            // added to the stamps of all sightings
   int dead_encoder = -1;                                       // 0 left, 1 right: its count stands still

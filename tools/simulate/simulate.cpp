@@ -236,6 +236,7 @@ wm_status place_landmarks(const Scenario &sc, size_t landmarks, Recording &out, 
   for (wm_landmark &l : out.landmarks) l.sigma_m = 0;
   out.map.assign(out.landmarks.begin(), out.landmarks.begin() + static_cast<std::ptrdiff_t>(mapped));
   misplace(sc, out.motion6.empty() ? 2 : 3, out);
+  move_landmarks(sc, out);
   return WM_OK;
 }
 

@@ -87,6 +87,7 @@ struct Recording {
   std::vector<wm_sensor> sensors;      // as calibration.yaml says
   std::vector<wm_landmark> map;        // with its errors
   std::vector<wm_landmark> landmarks;  // true
+  std::vector<int32_t> moved;          // those of the map that stand elsewhere by now
   std::vector<Truth> truth;
   double duration_s, length_m;
   Path6 path;  // six degrees of freedom: instead of the drive
@@ -113,6 +114,8 @@ void list_sensors(const Scenario &scenario, Recording &recording);
 // The lists sorted by arrival, after `faults` have lost, doubled and delayed some of them.
 void settle(const Scenario &scenario, Recording &recording);
 
+// Moves `faults.landmarks_moved` of them, drawn by the seed: on the map each stays where it was measured.
+void move_landmarks(const Scenario &scenario, Recording &recording);
 // Makes the recording's map wrong by `errors.landmark_m` on each of the first `axes` axes, and states that in it.
 void misplace(const Scenario &scenario, uint64_t axes, Recording &recording);
 

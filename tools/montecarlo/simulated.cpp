@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "montecarlo/simulated.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "simulate/bus.h"
+
+namespace wm::montecarlo {
+namespace {
+
+struct Dbc_free {
+  void operator()(wm_dbc *dbc) const { wm_dbc_free(dbc); }
+};
+struct Decoder_free {
+  void operator()(wm_can_decoder *decoder) const { wm_can_decoder_free(decoder); }
+};
+
+}  // namespace
+
+wm_status make_events(const sim::Recording &recording, std::vector<SmallEvent> &out, wm_error *err) {
+  const std::string text = sim::dbc_text();
+  wm_dbc *parsed = nullptr;
+  if (const wm_status s = wm_dbc_parse(text.data(), text.size(), "vehicle.dbc", &parsed, err); s != WM_OK) return s;
+  const std::unique_ptr<wm_dbc, Dbc_free> dbc(parsed);
+  const std::vector<wm_can_binding> bindings = sim::bindings();
+  wm_can_decoder *made = nullptr;
+  if (const wm_status s = wm_can_decoder_make(dbc.get(), bindings.data(), bindings.size(), &made, err); s != WM_OK)
+    return s;
+  const std::unique_ptr<wm_can_decoder, Decoder_free> decoder(made);
+  wm_source_counts counts{};
+  out.clear();
+  for (const wm_can_frame &frame : recording.can) {
+    wm_event e{};
+    if (wm_can_decode(decoder.get(), &frame, &e.as.quantities, &counts, err) != WM_OK) continue;
+    e.t_ns = e.arrival_ns = frame.t_ns;
+    e.kind = WM_EVENT_QUANTITIES;
+    out.emplace_back(e);
+  }
+  const auto event = [](const auto &seen, wm_event_kind kind) {
+    wm_event e{};
+    e.t_ns = seen.t_ns;
+    e.arrival_ns = seen.arrival_ns;
+    e.source = static_cast<uint16_t>(1 + seen.sensor);
+    e.kind = static_cast<uint8_t>(kind);
+    return e;
+  };
+  for (const sim::Sighting &s : recording.sightings) {
+    wm_event e = event(s, WM_EVENT_SIGHTING);
+    e.as.sighting = {s.sensor, s.id, s.bearing_rad, s.range_m, NAN, NAN};
+    out.emplace_back(e);
+  }
+  for (const sim::MarkerSeen &m : recording.markers) {
+    wm_event e = event(m, WM_EVENT_MARKER);
+    wm_marker &seen = e.as.marker;
+    seen.sensor = m.sensor;
+    seen.id = m.id;
+    for (int k = 0; k < 3; k++) seen.p_m[k] = m.p_m[k];
+    seen.yaw_rad = m.yaw_rad;
+    out.emplace_back(e);
+  }
+  for (const sim::Fix &f : recording.fixes) {
+    wm_event e = event(f, WM_EVENT_POSITION);
+    e.as.position = {{f.p_m[0], f.p_m[1], f.p_m[2]}, f.sigma_xy_m, f.sigma_z_m};
+    out.emplace_back(e);
+  }
+  std::stable_sort(out.begin(), out.end(), [](const SmallEvent &a, const SmallEvent &b) {
+    return a.t_ns != b.t_ns ? a.t_ns < b.t_ns : a.source < b.source;
+  });
+  return WM_OK;
+}
+
+SimulatedFilter::SimulatedFilter(const wm_config &config, const sim::Recording &recording, const wm_wheels &wheels)
+    : estimator_(config.estimator), config_(config) {
+  setup_.motion = config.motion;
+  setup_.wheels = wheels;
+  setup_.sensors = recording.sensors.data();
+  setup_.sensor_count = recording.sensors.size();
+  setup_.landmarks = recording.map.data();
+  setup_.landmark_count = recording.map.size();
+  setup_.start = recording.start;
+  setup_.seed = recording.seed;
+}
+
+wm_status SimulatedFilter::init(wm_error *err) {
+  const char *why = "";
+  const size_t bytes = estimator_->state_bytes(config_.estimator_params, &setup_, &why);
+  if (bytes == 0) return wm_fail(err, WM_BAD_CONFIG, "%s: %s", estimator_->name, why);
+  memory_ = std::make_unique<Block[]>((bytes + sizeof(Block) - 1) / sizeof(Block));
+  const wm_status status = estimator_->init(state(), config_.estimator_params, &setup_);
+  return status == WM_OK ? status : wm_fail(err, status, "%s: init: %s", estimator_->name, wm_status_text(status));
+}
+
+double SimulatedFilter::calibration(const char *name) const {
+  wm_calibration_value values[64];
+  const size_t count = std::min<size_t>(64, estimator_->calibration(memory_.get(), values, 64));
+  for (size_t i = 0; i < count; i++)
+    if (std::strcmp(values[i].name, name) == 0) return values[i].value;
+  return NAN;
+}
+
+}  // namespace wm::montecarlo
