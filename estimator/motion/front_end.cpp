@@ -16,6 +16,7 @@ constexpr double kMaxAngle = 200.0;    // rad, of a steering wheel
 constexpr double kMaxActuator = 10.0;  // m
 constexpr double kMaxTicks = 1e15;     // doubles still count singly there
 
+constexpr double kPeriodGain = 1.0 / 16.0;  // of the usual time between counts
 constexpr double kSignedBelow = -0.1;       // m/s: more than a sensor's zero error
 constexpr double kYawStuckAlone_s = 30.0;   // the same bits for so long while driving
 constexpr double kYawStuckAgainst_s = 3.0;  // ... while another sensor sees turning
@@ -336,7 +337,8 @@ void motion_front_end::take_count(int side, wm_time_ns t_ns, double count) {
     wheel.restart(t_ns, count);
     return;
   }
-  const double dt = wm_seconds_between(wheel.t_ns, t_ns);
+  const wm_time_ns last_ns = wheel.t_ns;
+  const double dt = wm_seconds_between(last_ns, t_ns);
   if (dt <= 0.0) return;
   const double metres_per_tick = kTwoPi * wheels_.radius_m / wheels_.ticks_per_turn;
   double way = (count - wheel.ticks) * metres_per_tick;
@@ -344,11 +346,22 @@ void motion_front_end::take_count(int side, wm_time_ns t_ns, double count) {
   wheel.t_ns = t_ns;
   if (way < 0.0) wheel.is_signed = true;
   way = by_gear(way, wheel.is_signed);
-  if (!(std::fabs(way) <= kMaxSpeed * dt)) way = wheel.speed_mps * dt;  // the counter began anew: go on as before
+  // A count that was late and the next one right behind it: their stamps tell nothing of the speed between them.
+  const bool hasty = dt < 0.5 * wheel.period_s;
+  const double least_s = hasty ? wheel.period_s : dt;
+  if (!(std::fabs(way) <= kMaxSpeed * least_s)) way = wheel.speed_mps * dt;  // the counter began anew: go on as before
   const uint32_t dead = side == 0 ? WM_MOTION_HEALTH_ENCODER_LEFT_DEAD : WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD;
   if (way != 0.0 && (health_ & dead)) wheel.integrated_m = wheel.position_m;  // what it missed, the other one told
+  const double from_m = wheel.position_m;
   wheel.position_m += way;
-  wheel.speed_mps = way / dt;
+  if (!hasty)
+    wheel.speed_mps = way / dt;
+  else if (wheel.before_ns != WM_TIME_NONE)
+    wheel.speed_mps = (wheel.position_m - wheel.before_m) / wm_seconds_between(wheel.before_ns, t_ns);
+  wheel.before_ns = last_ns;
+  wheel.before_m = from_m;
+  const double counted_s = wheel.period_s > 0.0 && dt > 2.0 * wheel.period_s ? 2.0 * wheel.period_s : dt;
+  wheel.period_s += wheel.period_s > 0.0 ? kPeriodGain * (counted_s - wheel.period_s) : counted_s;
   tick_wheel &other = wheel_[1 - side];
   if (way != 0.0) {
     wheel.still_m = 0.0;

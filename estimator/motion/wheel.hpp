@@ -9,19 +9,23 @@
 namespace wm {
 
 struct tick_wheel {
-  wm_time_ns t_ns;      // of the last count; WM_TIME_NONE before the first
-  double ticks;         // last count
-  double position_m;    // by the counts, signed by the gear where the counter is not
-  double integrated_m;  // what has been handed out as motion
-  double speed_mps;     // between the last two counts
-  double still_m;       // way of the other wheel since this one's count last changed
-  bool is_signed;       // the counter was seen to go down
+  wm_time_ns t_ns;       // of the last count; WM_TIME_NONE before the first
+  double ticks;          // last count
+  double position_m;     // by the counts, signed by the gear where the counter is not
+  double integrated_m;   // what has been handed out as motion
+  double speed_mps;      // between the last two counts
+  double period_s;       // usual time between two counts; 0 before the second
+  wm_time_ns before_ns;  // of the count before the last, and the position there
+  double before_m;
+  double still_m;  // way of the other wheel since this one's count last changed
+  bool is_signed;  // the counter was seen to go down
 
   void restart(wm_time_ns t, double count) {
     t_ns = t;
     ticks = count;
     position_m = integrated_m = 0.0;
-    speed_mps = 0.0;
+    speed_mps = period_s = before_m = 0.0;
+    before_ns = WM_TIME_NONE;
     still_m = 0.0;
   }
 };

@@ -106,6 +106,23 @@ void test_counts_are_positions_whatever_comes_between(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1500 * kTick, pose.x_m);
 }
 
+// GIVEN counts each 20 ms WHEN one is late and the next comes right behind it THEN the speed between their stamps (50
+// m/s, 400 m/s) is not carried on, and no way is lost.
+void test_a_late_count_and_the_next_right_behind_it(void) {
+  for (const double behind_s : {0.0012, 0.00015}) {
+    start(make::two_wheels());
+    const double each = 0.06 / kTick;  // 3 m/s
+    for (int i = 0; i <= 50; i++) ticks(0.02 * i, each * i, each * i);
+    ticks(1.04 - behind_s, 51 * each, 51 * each);
+    ticks(1.04, 52 * each, 52 * each);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 3.12, pose.x_m);
+    advance(1.0599);
+    TEST_ASSERT_DOUBLE_WITHIN(0.005, 3.0 * 1.0599, pose.x_m);
+    ticks(1.06, 53 * each, 53 * each);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 3.18, pose.x_m);
+  }
+}
+
 void test_counts_of_both_wheels_may_come_one_after_the_other(void) {
   start(make::two_wheels());
   for (int i = 0; i <= 100; i++) {
@@ -314,6 +331,7 @@ int main(void) {
   RUN_TEST(test_every_derivative_of_every_model);
   RUN_TEST(test_ticks_make_exact_arcs);
   RUN_TEST(test_counts_are_positions_whatever_comes_between);
+  RUN_TEST(test_a_late_count_and_the_next_right_behind_it);
   RUN_TEST(test_counts_of_both_wheels_may_come_one_after_the_other);
   RUN_TEST(test_an_unsigned_speed_takes_its_sign_from_the_gear);
   RUN_TEST(test_rear_wheels_are_preferred_and_a_silent_source_yields);
