@@ -68,8 +68,10 @@ double landmark_ekf::sensor_value(int sensor, int which, double neutral) const {
 }
 
 sensor_errors landmark_ekf::errors_of(int sensor) const {
-  return {sensor_value(sensor, kYaw, 0.0), sensor_value(sensor, kMountX, 0.0), sensor_value(sensor, kMountY, 0.0),
-          sensor_value(sensor, kRangeScale, 1.0), sensor_value(sensor, kRangeBias, 0.0)};
+  return {sensor_value(sensor, kYaw, 0.0),       sensor_value(sensor, kMountX, 0.0),
+          sensor_value(sensor, kMountY, 0.0),    sensor_value(sensor, kRangeScale, 1.0),
+          sensor_value(sensor, kRangeBias, 0.0), sensor_value(sensor, kRoll, 0.0),
+          sensor_value(sensor, kPitch, 0.0),     sensor_value(sensor, kAngleScale, 0.0)};
 }
 
 // A wrong pose bends what is known of the sensors; a search must not start from that.
@@ -79,13 +81,18 @@ sensor_errors landmark_ekf::remembered_errors_of(int sensor) const {
     const int state = sensor_state_[sensor][which];
     return state < 0 ? neutral : memory.value[state];
   };
-  return {value(kYaw, 0.0), value(kMountX, 0.0), value(kMountY, 0.0), value(kRangeScale, 1.0), value(kRangeBias, 0.0)};
+  return {value(kYaw, 0.0),       value(kMountX, 0.0), value(kMountY, 0.0), value(kRangeScale, 1.0),
+          value(kRangeBias, 0.0), value(kRoll, 0.0),   value(kPitch, 0.0),  value(kAngleScale, 0.0)};
 }
 
-void landmark_ekf::add_mounting(sparse_row &row, int sensor, const double by[6]) const {
-  row.add(sensor_state_[sensor][kYaw], by[3]);
-  row.add(sensor_state_[sensor][kMountX], by[4]);
-  row.add(sensor_state_[sensor][kMountY], by[5]);
+void landmark_ekf::add_mounting(sparse_row &row, int sensor, const double by[kCauses]) const {
+  const int *states = sensor_state_[sensor];
+  row.add(states[kYaw], by[kByYaw]);
+  row.add(states[kMountX], by[kByMountX]);
+  row.add(states[kMountY], by[kByMountY]);
+  row.add(states[kRoll], by[kByRoll]);
+  row.add(states[kPitch], by[kByPitch]);
+  row.add(states[kAngleScale], by[kByAngleScale]);
 }
 
 double landmark_ekf::map_sigma(int landmark) const {
@@ -117,7 +124,7 @@ int landmark_ekf::associate(const wm_event &event, const past_pose &past) {
     const expected_sighting e = expect(sensor, errors, past.pose, setup_->landmarks[i].p_m);
     if (!e.possible || e.distance_m > 1.5 * sensor.max_range_m) continue;
     double chi2 = 0.0;
-    const auto test = [&](double observed, double expected, const double by[6], double sigma, bool angle) {
+    const auto test = [&](double observed, double expected, const double by[kCauses], double sigma, bool angle) {
       if (std::isnan(observed)) return;
       sparse_row row;
       add_pose(row, by, past, sensor_state_[s.sensor][kTimeOffset]);
@@ -239,7 +246,7 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   lend_states(s.sensor, landmark, event.t_ns, &lasting, &map);
   residual residuals[2];
   int count = 0;
-  const auto add = [&](wm_residual kind, double observed, double expected, const double by[6], double variance,
+  const auto add = [&](wm_residual kind, double observed, double expected, const double by[kCauses], double variance,
                        int lasting_offset, double lasting_size) -> residual & {
     residual &r = residuals[count++];
     add_pose(r.row, by, past, sensor_state_[s.sensor][kTimeOffset]);

@@ -11,7 +11,8 @@
 namespace wm {
 namespace {
 
-constexpr const char *kSensorStateNames[] = {"yaw_rad", "x_m", "y_m", "time_offset_s", "range_bias_m", "range_scale"};
+constexpr const char *kSensorStateNames[] = {"yaw_rad",     "x_m",           "y_m",          "roll_rad",   "pitch_rad",
+                                             "angle_scale", "time_offset_s", "range_bias_m", "range_scale"};
 
 int lasting_states(const wm_landmark_ekf_params &p) {
   if (p.lasting_slots == 0) return 0;
@@ -21,6 +22,7 @@ int lasting_states(const wm_landmark_ekf_params &p) {
 
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
   const int each_sensor = (p.sensor_yaw_sigma_rad > 0.0) + 2 * (p.sensor_xy_sigma_m > 0.0) +
+                          2 * (p.sensor_tilt_sigma_rad > 0.0) + (p.sensor_angle_scale_sigma > 0.0) +
                           (p.sensor_time_offset_sigma_s > 0.0) + (p.range_bias_sigma_m > 0.0) +
                           (p.range_scale_sigma > 0.0);
   return kPoseStates + planar_filter::count_motion_states(p.motion) + each_sensor * (int)setup.sensor_count +
@@ -56,6 +58,9 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
     sensor_state_[i][kYaw] = add(0.0, params.sensor_yaw_sigma_rad);
     sensor_state_[i][kMountX] = add(0.0, params.sensor_xy_sigma_m);
     sensor_state_[i][kMountY] = add(0.0, params.sensor_xy_sigma_m);
+    sensor_state_[i][kRoll] = add(0.0, params.sensor_tilt_sigma_rad);
+    sensor_state_[i][kPitch] = add(0.0, params.sensor_tilt_sigma_rad);
+    sensor_state_[i][kAngleScale] = add(0.0, params.sensor_angle_scale_sigma);
     sensor_state_[i][kTimeOffset] = add(0.0, params.sensor_time_offset_sigma_s);
     sensor_state_[i][kRangeBias] = add(0.0, params.range_bias_sigma_m);
     sensor_state_[i][kRangeScale] = add(1.0, params.range_scale_sigma);

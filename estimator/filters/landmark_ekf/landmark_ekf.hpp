@@ -34,7 +34,18 @@ class landmark_ekf {
     double value[kMaxStates], variance[kMaxStates];
   };
 
-  enum sensor_state { kYaw, kMountX, kMountY, kTimeOffset, kRangeBias, kRangeScale, kSensorStates };
+  enum sensor_state {
+    kYaw,
+    kMountX,
+    kMountY,
+    kRoll,
+    kPitch,
+    kAngleScale,
+    kTimeOffset,
+    kRangeBias,
+    kRangeScale,
+    kSensorStates
+  };
 
   // The pose when an observation was true, `age` before its stamp, and what moves it.
   struct past_pose {
@@ -67,7 +78,7 @@ class landmark_ekf {
   sensor_errors errors_of(int sensor) const;
   sensor_errors remembered_errors_of(int sensor) const;
   const calibration_memory &memory_to_trust() const;
-  void add_mounting(sparse_row &row, int sensor, const double by[6]) const;
+  void add_mounting(sparse_row &row, int sensor, const double by[kCauses]) const;
 
   // Recovery.
   void note(wm_time_ns t_ns, int key, double misfit);

@@ -11,6 +11,14 @@ static const wm_param kParams[] = {
         "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off."),
     F64("states.sensor_yaw_walk_rad", sensor_yaw_walk_rad, 0, 0, 1,
         "Random walk of the mounting yaw, rad per sqrt(s). A bolted sensor has none."),
+    F64("states.sensor_tilt_sigma_rad", sensor_tilt_sigma_rad, 0, 0, 1,
+        "Start sigma of each sensor's roll and of its pitch about calibration.yaml's, rad: they move the bearings of "
+        "what "
+        "is higher or lower than the sensor. 0: off."),
+    F64("states.sensor_angle_scale_sigma", sensor_angle_scale_sigma, 0, 0, 1,
+        "Start sigma of what each sensor tells angles from its axis too large by, in parts of them: a camera's focal "
+        "length "
+        "that was calibrated wrongly. 0: off."),
     WM_SENSOR_STATE_PARAMS,
     F64("states.range_scale_sigma", range_scale_sigma, 0, 0, 1,
         "Start sigma of each sensor's range scale about 1. 0: off. Needs ranges of many lengths beside a range bias."),

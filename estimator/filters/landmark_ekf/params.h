@@ -15,6 +15,7 @@ typedef struct wm_landmark_ekf_params {
   wm_motion_states motion;
   // states, one of each kind a sensor; 0: off
   double sensor_yaw_sigma_rad, sensor_yaw_walk_rad, sensor_xy_sigma_m;
+  double sensor_tilt_sigma_rad, sensor_angle_scale_sigma;
   double sensor_time_offset_sigma_s;
   double range_bias_sigma_m;
   double range_scale_sigma, range_scale_walk;

@@ -9,6 +9,14 @@ namespace {
 constexpr double kSteep = 0.7071;  // 45 degrees
 constexpr double kLevel[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
+// What a sensor sees that is turned a little further about its x and y axes than it was thought to be.
+void tilt(const sensor_errors &errors, double v[3]) {
+  const double x = v[0] - errors.pitch_rad * v[2], y = v[1] + errors.roll_rad * v[2];
+  v[2] += errors.pitch_rad * v[0] - errors.roll_rad * v[1];
+  v[0] = x;
+  v[1] = y;
+}
+
 }  // namespace
 
 void mounted_sensor::init(const wm_sensor &sensor) {
@@ -54,26 +62,37 @@ expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &erro
     const double *row = axis[i];
     seen[i] = row[0] * level[0] + row[1] * level[1] + row[2] * level[2];
   }
+  tilt(errors, seen);
   const double q = seen[0] * seen[0] + seen[1] * seen[1];
   const double length = std::sqrt(q + seen[2] * seen[2]);
   out.distance_m = std::sqrt(from_x * from_x + from_y * from_y);
   out.possible = q > 1e-6 && (!sensor.range_is_depth || seen[0] > 0.02);
   if (!(q > 1e-6)) return out;
-  out.bearing_rad = atan2(seen[1], seen[0]);
+  const double over_q = 1.0 / q;
+  // Along the circle that a longer or shorter focal length moves it on: the angle from the axis, and how much of that
+  // is to the side.
+  const double off_axis = std::sqrt(seen[1] * seen[1] + seen[2] * seen[2]);
+  const double stretch =
+      off_axis > 1e-6 * length ? atan2(off_axis, seen[0]) * seen[1] * length * length / off_axis * over_q : 0.0;
+  out.bearing_rad = wrap(atan2(seen[1], seen[0]) + errors.angle_scale * stretch);
   const double plain = sensor.range_is_depth ? seen[0] : length;
   out.range_m = errors.range_scale * plain + errors.range_bias_m;
   out.range_by_scale = plain;
-  const double over_q = 1.0 / q, over_length = 1.0 / length;
+  const double over_length = 1.0 / length;
   for (int k = 0; k < 6; k++) {
     double d[3];
     for (int i = 0; i < 3; i++) {
       const double *row = axis[i];
       d[i] = row[0] * by[k][0] + row[1] * by[k][1];
     }
+    tilt(errors, d);
     out.bearing_by[k] = (seen[0] * d[1] - seen[1] * d[0]) * over_q;
     out.range_by[k] = errors.range_scale *
                       (sensor.range_is_depth ? d[0] : (seen[0] * d[0] + seen[1] * d[1] + seen[2] * d[2]) * over_length);
   }
+  out.bearing_by[kByRoll] = seen[0] * seen[2] * over_q;
+  out.bearing_by[kByPitch] = seen[1] * seen[2] * over_q;
+  out.bearing_by[kByAngleScale] = stretch;
   return out;
 }
 

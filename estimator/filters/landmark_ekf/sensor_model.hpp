@@ -25,14 +25,19 @@ struct mounted_sensor {
 // What differs from calibration.yaml.
 struct sensor_errors {
   double yaw_rad = 0.0, x_m = 0.0, y_m = 0.0, range_scale = 1.0, range_bias_m = 0.0;
+  double roll_rad = 0.0, pitch_rad = 0.0;  // about the sensor's own x and y axes
+  double angle_scale = 0.0;                // angles from the sensor's x axis are told larger by this part of them
 };
+
+// What a sighting depends on: x, y, heading of the pose, then the sensor's errors.
+enum sighting_cause { kByX, kByY, kByHeading, kByYaw, kByMountX, kByMountY, kByRoll, kByPitch, kByAngleScale, kCauses };
 
 struct expected_sighting {
   bool possible;  // false: on the sensor itself, or (for a depth) behind it
   double bearing_rad, range_m;
   double distance_m;  // on the floor
-  // By x, y, heading of the pose, then by yaw, x, y of the mounting. By the landmark's x, y: minus those by the pose's.
-  double bearing_by[6], range_by[6];
+  // By each sighting_cause. By the landmark's x, y: minus those by the pose's.
+  double bearing_by[kCauses], range_by[kCauses];
   double range_by_scale;
 };
 

@@ -181,7 +181,7 @@ void test_expected_sighting_and_its_derivatives(void) {
     wm::mounted_sensor m;
     m.init(s);
     const wm_pose2 pose = {0.5, 0.3, depth ? -2.4 : 0.8};
-    const wm::sensor_errors errors = {0.05, 0.02, -0.03, 1.04, 0.1};
+    const wm::sensor_errors errors = {0.05, 0.02, -0.03, 1.04, 0.1, 0, 0, 0};
     const wm::expected_sighting e = wm::expect(m, errors, pose, landmark);
     TEST_ASSERT_TRUE(e.possible);
     const double h = 1e-6;
@@ -198,6 +198,40 @@ void test_expected_sighting_and_its_derivatives(void) {
     }
     TEST_ASSERT_DOUBLE_WITHIN(1e-12, e.range_m, errors.range_scale * e.range_by_scale + errors.range_bias_m);
   }
+}
+
+// A camera that is rolled, pitched or of another focal length than thought: what the model says of small errors is what
+// a camera that is mounted so sees.
+void test_tilt_and_angle_scale(void) {
+  const double landmark[3] = {3.0, 1.5, 2.9}, h = 1e-5;
+  const wm_pose2 pose = {0.5, 0.3, 0.2};
+  wm_sensor s = sensor;
+  s.mounting = {{0.4, -0.2, 0.7}, {0, 0, 0.3}};
+  wm::mounted_sensor level, rolled, pitched;
+  level.init(s);
+  s.mounting.rpy_rad[0] = h;
+  rolled.init(s);
+  s.mounting.rpy_rad[0] = 0;
+  s.mounting.rpy_rad[1] = h;
+  pitched.init(s);
+  const wm::expected_sighting e = wm::expect(level, {}, pose, landmark);
+  const auto change = [&](const wm::mounted_sensor &other) {
+    return (wm::expect(other, {}, pose, landmark).bearing_rad - e.bearing_rad) / h;
+  };
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, change(rolled), e.bearing_by[wm::kByRoll]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, change(pitched), e.bearing_by[wm::kByPitch]);
+  TEST_ASSERT_TRUE(std::fabs(e.bearing_by[wm::kByRoll]) > 0.1 && std::fabs(e.bearing_by[wm::kByPitch]) > 0.01);
+  for (const wm::sighting_cause cause : {wm::kByRoll, wm::kByPitch, wm::kByAngleScale}) {
+    wm::sensor_errors errors;
+    (cause == wm::kByRoll ? errors.roll_rad : cause == wm::kByPitch ? errors.pitch_rad : errors.angle_scale) = h;
+    const double told = (wm::expect(level, errors, pose, landmark).bearing_rad - e.bearing_rad) / h;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-4, told, e.bearing_by[cause]);
+  }
+  // Level with the sensor a focal length scales the bearing itself; higher up it also lifts, which turns it back.
+  const double beside[3] = {landmark[0], landmark[1], 0.7};
+  const wm::expected_sighting low = wm::expect(level, {}, pose, beside);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, low.bearing_rad, low.bearing_by[wm::kByAngleScale]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, low.bearing_by[wm::kByRoll]);
 }
 
 // The paper's own formula, for a level sensor: alpha = atan2(y_b - y_c, x_b - x_c) - theta - theta_c.
@@ -435,6 +469,7 @@ void tearDown(void) { free(state); }
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_expected_sighting_and_its_derivatives);
+  RUN_TEST(test_tilt_and_angle_scale);
   RUN_TEST(test_expected_bearing_is_the_papers);
   RUN_TEST(test_it_tracks_and_its_covariance_is_honest);
   RUN_TEST(test_it_finds_every_error_of_its_sensors);
