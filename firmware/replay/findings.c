@@ -84,6 +84,7 @@ static void about_map(speaker *to, const wm_health *health) {
   static const struct {
     const char *name, *what;
   } kCounts[] = {{"map.moved", "times a landmark was elsewhere than before; `waymark map survey RUN` says which"},
+                 {"map.moved_id", "is the identity of the last landmark that isn't where the map says"},
                  {"map.doubled",
                   "sightings whose identity (or, of a line, its track's number) stood for two landmarks; `waymark map "
                   "survey RUN` says which"},

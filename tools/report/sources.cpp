@@ -107,6 +107,8 @@ Meaning meaning_of(const std::string &name) {
   if (name == "map.doubled")
     return {1, 0, "", "sightings whose identity (of a line: its track's number) stood for two landmarks"};
   if (name == "map.no_room") return {1, 0, "", "landmarks that found no room"};
+  if (name == "map.moved_id") return {1, 0, "", "the last landmark that isn't where the map says; -1: none"};
+  if (name == "landmarks.lost_probability") return {100, 0, "%", "the probability of being lost"};
   if (name == "edges.explained") return {100, 0, "%", "of the edges seen lie on edges of the map"};
   if (name == "edges.lost_probability") return {100, 0, "%", "the probability of being lost"};
   if (what.ends_with("_radps")) return {degrees, 0, "°/s", ""};

@@ -7,9 +7,11 @@ namespace wm {
 namespace {
 
 constexpr double kFarthest_m = 1e6;
-constexpr double kLoosen = 1.5;               // times the pose's sigmas, while misfits go on ...
-constexpr double kLoosenEvery_s = 1.0;        // ... and not faster than a search may find the pose
-constexpr double kOneNumber = 6.635 / 9.210;  // 99 % of chi2 with one degree of freedom against two
+constexpr double kAnyRange_m = 30.0, kAnyPlace_m = 200.0;  // where a false one may lie
+constexpr double kUnproven = 9.21;                         // 99 % of chi2 with two degrees of freedom
+constexpr double kLoosen = 1.5;                            // times the pose's sigmas, while misfits go on ...
+constexpr double kLoosenEvery_s = 1.0;                     // ... and not faster than a search may find the pose
+constexpr double kOneNumber = 6.635 / 9.210;               // 99 % of chi2 with one degree of freedom against two
 
 wm_innovation record_of(const wm_event &event, wm_residual kind) {
   wm_innovation r{};
@@ -239,7 +241,7 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   if (!e.possible && e.distance_m < 0.05) return drop(WM_REJECTED_SINGULAR);
   if (!e.possible) {
     drop(WM_REJECTED_OUT_OF_RANGE);
-    note(event.t_ns, clue.key, 1.0);
+    note(event.t_ns, landmark, witnesses::against_all());
     return WM_OK;
   }
   int lasting, map;
@@ -288,7 +290,15 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
     r.row.add(sensor_state_[s.sensor][kRangeBias], 1.0);
     r.row.add(sensor_state_[s.sensor][kRangeScale], e.range_by_scale);
   }
-  note(event.t_ns, clue.key, fuse(residuals, count, records));
+  const double room = (use_bearing ? kTwoPi : 1.0) * (use_range ? kAnyRange_m : 1.0);
+  const bool believed = !landmark_records()[landmark].moved && !witnesses_.biased(landmark, event.t_ns);
+  const double against = fuse(residuals, count, room, believed, records);
+  if (!use_bearing) {
+    note(event.t_ns, landmark, against);
+  } else {
+    const residual &bearing = residuals[0];
+    note(event.t_ns, landmark, against, bearing.innovation, bearing.innovation / std::sqrt(bearing.record.variance));
+  }
   return WM_OK;
 }
 
@@ -350,7 +360,7 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
     r.innovation = p.p_m[k] - expected;
     r.noise = square(sigma);
   }
-  note(event.t_ns, clue.key, fuse(residuals, 2, records));
+  note(event.t_ns, kPositionWitness, fuse(residuals, 2, square(kAnyPlace_m), true, records));
   return WM_OK;
 }
 
@@ -388,33 +398,37 @@ wm_status landmark_ekf::fuse_heading(const wm_event &event, record_list records)
   r.record.expected = filter_.pose().heading_rad;
   r.innovation = wrap(h.heading_rad - r.record.expected);
   r.noise = square(h.sigma_rad);
-  note(event.t_ns, clue.key, fuse(&r, 1, records));
+  note(event.t_ns, kHeadingWitness, fuse(&r, 1, kTwoPi, true, records));
   return WM_OK;
 }
 
 // The numbers of one observation are gated together: a wrong one spoils its fellow. Between the two gates the
 // measurement counts less, as a Student distribution would have it; above, not at all. Then one number after the other
 // (paper, system 1), each with the innovation that the ones before left of it: the same as both at once.
-double landmark_ekf::fuse(residual *r, int count, record_list records) {
+double landmark_ekf::fuse(residual *r, int count, double room, bool believed, record_list records) {
   projection first, second;
   filter_.project(r[0].row, &first);
   const double s00 = first.variance + r[0].noise;
   double nis = square(r[0].innovation) / s00;
-  double cross = 0.0;
+  double cross = 0.0, determinant = s00;
   r[0].record.variance = s00;
   if (count == 2) {
     filter_.project(r[1].row, &second);
     cross = filter_.project_onto(r[1].row, first);
     const double s11 = second.variance + r[1].noise;
     r[1].record.variance = s11;
-    const double determinant = s00 * s11 - cross * cross;
+    determinant = s00 * s11 - cross * cross;
     nis = (s11 * square(r[0].innovation) - 2.0 * cross * r[0].innovation * r[1].innovation +
            s00 * square(r[1].innovation)) /
           determinant;
   }
+  const double density = exp(-0.5 * nis) / std::sqrt((count == 2 ? square(kTwoPi) : kTwoPi) * determinant);
+  const double against = witnesses::against(density, room);
   const double scale = count == 2 ? 1.0 : kOneNumber;
   const double hard = params_.gate_hard * scale, soft = params_.gate_soft * scale;
-  const bool fused = nis <= hard;
+  // Until the pose is proven, a start that is surer than it should be must not bend what it sees.
+  const bool unproven = params_.recover && !witnesses_.proven();
+  const bool fused = believed && nis <= (unproven && kUnproven * scale < hard ? kUnproven * scale : hard);
   for (int i = 0; i < count; i++) {
     r[i].record.nis = nis;
     r[i].record.gate = hard;
@@ -423,7 +437,7 @@ double landmark_ekf::fuse(residual *r, int count, record_list records) {
     records.add(r[i].record);
   }
   const wm_time_ns now = filter_.now_ns();
-  if (nis > soft && monitor_.doubtful() &&
+  if (nis > soft && witnesses_.doubtful() &&
       (loosened_ns_ == WM_TIME_NONE || wm_seconds_between(loosened_ns_, now) > kLoosenEvery_s)) {
     loosened_ns_ = now;
     // Several misfits lately: it is the pose that is less sure than it claims, not only this measurement.
@@ -431,10 +445,10 @@ double landmark_ekf::fuse(residual *r, int count, record_list records) {
     filter_.project(r[0].row, &first);
     if (count == 2) cross = filter_.project_onto(r[1].row, first);
   }
-  if (!fused) return 1.0;
+  if (!fused) return believed && nis <= hard ? against : witnesses::against_all();
   const double weaker = nis > soft ? nis / soft : 1.0;
   // While several did not fit, what hardly fits may move the pose, but teaches nothing of the sensors.
-  const int kept = nis > soft && monitor_.doubtful() ? calibration_states_ : kPoseStates;
+  const int kept = nis > soft && witnesses_.doubtful() ? calibration_states_ : kPoseStates;
   filter_.update(first, r[0].innovation, r[0].noise * weaker, kPoseStates, kept);
   if (count == 2) {
     const double left = r[1].innovation - cross / (first.variance + r[0].noise * weaker) * r[0].innovation;
@@ -442,7 +456,7 @@ double landmark_ekf::fuse(residual *r, int count, record_list records) {
     filter_.update(second, left, r[1].noise * weaker, kPoseStates, kept);
   }
   fused_ns_ = filter_.now_ns();
-  return nis > soft ? 0.8 : 0.0;
+  return against;
 }
 
 }  // namespace wm

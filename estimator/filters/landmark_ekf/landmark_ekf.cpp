@@ -14,6 +14,9 @@ namespace {
 constexpr const char *kSensorStateNames[] = {"yaw_rad",     "x_m",           "y_m",          "roll_rad",   "pitch_rad",
                                              "angle_scale", "time_offset_s", "range_bias_m", "range_scale"};
 
+constexpr double kStartWrong = -2.5;  // what somebody says of the pose is wrong in one of twelve cases, as log odds
+constexpr double kAround_m = 5.0;     // a lost robot is among the landmarks or so near to them
+
 int lasting_states(const wm_landmark_ekf_params &p) {
   if (p.lasting_slots == 0) return 0;
   return (p.lasting_bearing_rad > 0.0 || p.lasting_lateral_m > 0.0) +
@@ -44,7 +47,7 @@ size_t landmark_ekf::bytes(const wm_landmark_ekf_params &params, const wm_setup 
         "lasting.gnss_m; lower lasting.slots or states.map_slots";
     return 0;
   }
-  return sizeof(landmark_ekf) + setup.landmark_count * sizeof(int);
+  return sizeof(landmark_ekf) + setup.landmark_count * (sizeof(int) + sizeof(landmark_record));
 }
 
 void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &setup) {
@@ -88,6 +91,16 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
     for (; at > 0 && setup.landmarks[order[at - 1]].id > setup.landmarks[i].id; at--) order[at] = order[at - 1];
     order[at] = i;
   }
+  std::memset(landmark_records(), 0, setup.landmark_count * sizeof(landmark_record));
+  double low[2] = {0, 0}, high[2] = {0, 0};
+  for (size_t i = 0; i < setup.landmark_count; i++)
+    for (int k = 0; k < 2; k++) {
+      const double p = setup.landmarks[i].p_m[k];
+      if (i == 0 || p < low[k]) low[k] = p;
+      if (i == 0 || p > high[k]) high[k] = p;
+    }
+  map_variance_m2_ = square(kAround_m) + (square(high[0] - low[0]) + square(high[1] - low[1])) / 12.0;
+  moved_id_ = -1;
   remembered_ns_ = WM_TIME_NONE;
   remember_calibration(WM_TIME_NONE);
   fused_ns_ = lost_ns_ = searched_ns_ = inflated_ns_ = loosened_ns_ = found_ns_ = WM_TIME_NONE;
@@ -97,7 +110,7 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
 // Known start: track from it. Unknown: what is known of it becomes a clue for the search.
 void landmark_ekf::start_again() {
   const wm_start &start = setup_->start;
-  monitor_.clear();
+  witnesses_.begin(kStartWrong);
   clues_.clear();
   prior_count_ = 0;
   resets_++;
@@ -161,7 +174,7 @@ wm_status landmark_ekf::take_pose(const wm_event &event) {
   }
   const wm_status status = set_pose(filter_, event);
   if (status != WM_OK) return status;
-  monitor_.clear();
+  witnesses_.begin(kStartWrong);
   clues_.clear();
   prior_count_ = 0;
   resets_++;
@@ -175,11 +188,23 @@ void landmark_ekf::estimate(wm_estimate *out) const {
   const bool fresh =
       fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, filter_.now_ns()) <= params_.dead_reckoning_after_s;
   out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
+  if (state_ == WM_STATE_LOST) widen(out);
+}
+
+// Lost, the pose may be anywhere with the probability of being lost.
+void landmark_ekf::widen(wm_estimate *out) const {
+  const double p = witnesses_.probability();
+  out->covariance[wm_cov_index(0, 0)] += p * map_variance_m2_;
+  out->covariance[wm_cov_index(1, 1)] += p * map_variance_m2_;
+  out->covariance[wm_cov_index(5, 5)] += p * square(kPi) / 3.0;
 }
 
 size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
   calibration_list list(out, capacity);
   filter_.list_motion_states(&list);
+  list.add("landmarks", "lost_probability", state_ == WM_STATE_SEARCHING ? 1.0 : witnesses_.probability(), 0.0);
+  list.add("map", "moved", moved_, 0.0);
+  list.add("map", "moved_id", moved_id_, 0.0);
   const auto add = [&](const char *whose, const char *what, int state) {
     if (state >= 0) list.add(whose, what, filter_.value(state), std::sqrt(filter_.variance(state)));
   };

@@ -3,11 +3,13 @@
 #ifndef WAYMARK_ESTIMATOR_LANDMARK_EKF_HPP
 #define WAYMARK_ESTIMATOR_LANDMARK_EKF_HPP
 
-#include "filters/landmark_ekf/fit_monitor.hpp"
+#include <cmath>
+
 #include "filters/landmark_ekf/params.h"
 #include "filters/landmark_ekf/search.hpp"
 #include "filters/landmark_ekf/sensor_model.hpp"
 #include "filters/landmark_ekf/slots.hpp"
+#include "filters/landmark_ekf/witnesses.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "filters/record_list.hpp"
 
@@ -62,13 +64,15 @@ class landmark_ekf {
   wm_status fuse_heading(const wm_event &event, record_list records);
   wm_status take_pose(const wm_event &event);
 
-  // Gates one or two numbers jointly, weakens or rejects, updates, writes the records. Returns the misfit.
+  // Gates one or two numbers jointly, weakens or rejects, updates, writes the records. Returns how much it speaks
+  // against the pose (witnesses::against), `room` being where the numbers could lie.
   struct residual {
     sparse_row row;
     double innovation, noise;
     wm_innovation record;
   };
-  double fuse(residual *residuals, int count, record_list records);
+  // `believed`: false refuses it whatever it says.
+  double fuse(residual *residuals, int count, double room, bool believed, record_list records);
 
   double map_sigma(int landmark) const;
   int find_landmark(int32_t id) const;
@@ -81,15 +85,22 @@ class landmark_ekf {
   void add_mounting(sparse_row &row, int sensor, const double by[kCauses]) const;
 
   // Recovery.
-  void note(wm_time_ns t_ns, int key, double misfit);
+  void note(wm_time_ns t_ns, int witness, double against, double angle_rad = NAN, double normalised = NAN);
   void note_clue(const search_clue &clue);
   void search(wm_time_ns since_ns);
   void remember_calibration(wm_time_ns t_ns);
   void restore_calibration();
   void start_again();
 
+  void tell_moved(int landmark);
+  void widen(wm_estimate *out) const;
+
+  // Behind the object: landmarks by rising id, and what each proved to be.
   int *landmark_order() { return reinterpret_cast<int *>(this + 1); }
   const int *landmark_order() const { return reinterpret_cast<const int *>(this + 1); }
+  landmark_record *landmark_records() {
+    return reinterpret_cast<landmark_record *>(landmark_order() + setup_->landmark_count);
+  }
 
   planar_filter filter_;
   const wm_setup *setup_;
@@ -104,13 +115,15 @@ class landmark_ekf {
   calibration_memory memory_[3];
   wm_time_ns remembered_ns_;
   int calibration_states_;  // pose and calibration; the lent states come behind
-  fit_monitor monitor_;
+  witnesses witnesses_;
   pose_search clues_;
   search_clue prior_[2];
   int prior_count_;
   wm_time_ns fused_ns_, lost_ns_, searched_ns_, inflated_ns_, loosened_ns_, found_ns_;
-  uint32_t resets_;
-  uint8_t state_;  // wm_state, without dead reckoning
+  uint32_t resets_, moved_;
+  int32_t moved_id_;        // of the last one
+  double map_variance_m2_;  // of a place anywhere among the landmarks, each axis
+  uint8_t state_;           // wm_state, without dead reckoning
 };
 
 }  // namespace wm

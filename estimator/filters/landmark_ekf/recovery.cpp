@@ -7,11 +7,12 @@ namespace wm {
 namespace {
 
 constexpr double kSearchEvery_s = 0.25;  // bounds the cost: one search over 64 observations is about half a millisecond
-constexpr double kSayLost_s = 0.1;       // lost is lost for at least so long: whoever listens must hear it
+constexpr double kSayLost_s = 0.2;       // lost is lost for at least so long: whoever listens must hear it
 constexpr double kInflateAfter_s = 3.0;  // lost for so long and not found: open the gates
 constexpr double kInflateEvery_s = 1.0;
 constexpr double kFoundWrongly_s = 60.0;
 constexpr double kRememberEvery_s = 10.0;
+constexpr double kFoundWrong = -2.5;  // a pose found anew is wrong in one of twelve cases, as log odds
 constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;
 constexpr double kInflateUpTo_m = 30.0;
 
@@ -25,27 +26,41 @@ void landmark_ekf::note_clue(const search_clue &clue) {
   clues_.add(kept);
 }
 
-void landmark_ekf::note(wm_time_ns t_ns, int key, double misfit) {
+void landmark_ekf::note(wm_time_ns t_ns, int witness, double against, double angle_rad, double normalised) {
   if (!params_.recover) return;
-  monitor_.note(t_ns, key, misfit);
-  if (state_ == WM_STATE_TRACKING && monitor_.contradicted(t_ns)) {
+  witnesses_.note(t_ns, witness, against, angle_rad, normalised, witness >= 0 ? landmark_records() + witness : nullptr);
+  if (witness >= 0) tell_moved(witness);
+  if (state_ == WM_STATE_TRACKING && witnesses_.contradicted()) {
     state_ = WM_STATE_LOST;
     lost_ns_ = inflated_ns_ = t_ns;
   }
-  if (state_ == WM_STATE_TRACKING && monitor_.fits()) remember_calibration(t_ns);
+  if (state_ == WM_STATE_TRACKING && witnesses_.fits()) remember_calibration(t_ns);
   if (state_ != WM_STATE_LOST) return;
-  if (monitor_.fits()) {
+  if (witnesses_.fits()) {
     state_ = WM_STATE_TRACKING;
     return;
   }
   if (wm_seconds_between(lost_ns_, t_ns) < kSayLost_s) return;
   const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
-  const wm_time_ns bad_since = monitor_.bad_since_ns();
+  const wm_time_ns bad_since = witnesses_.doubted_since_ns();
   search(bad_since > window ? bad_since : window);
   if (state_ != WM_STATE_LOST || wm_seconds_between(lost_ns_, t_ns) < kInflateAfter_s) return;
   if (wm_seconds_between(inflated_ns_, t_ns) >= kInflateEvery_s && filter_.variance(kX) < square(kInflateUpTo_m)) {
     filter_.inflate_pose(square(kInflate_m), square(kInflate_rad));
     inflated_ns_ = t_ns;
+  }
+}
+
+// Counted once, and again only after it fitted in between.
+void landmark_ekf::tell_moved(int landmark) {
+  landmark_record &record = landmark_records()[landmark];
+  if (!record.moved && state_ == WM_STATE_TRACKING && witnesses_.moved(landmark)) {
+    record.moved = 1;
+    record.confirmed = 0;
+    moved_++;
+    moved_id_ = setup_->landmarks[landmark].id;
+  } else if (record.moved && record.confirmed) {
+    record.moved = 0;
   }
 }
 
@@ -83,8 +98,8 @@ void landmark_ekf::search(wm_time_ns since_ns) {
   if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now) < kSearchEvery_s) return;
   searched_ns_ = now;
   const search_limits limits = {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad};
-  search_result result = clues_.find(since_ns, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), prior_,
-                                     state_ == WM_STATE_SEARCHING ? prior_count_ : 0, limits);
+  search_result result =
+      clues_.find(since_ns, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), prior_, prior_count_, limits);
   if (!result.found) return;
   restore_calibration();
   // What the mounting's yaw may still be off by, the heading found is off by, too.
@@ -94,8 +109,7 @@ void landmark_ekf::search(wm_time_ns since_ns) {
   }
   found_ns_ = now;
   filter_.set_pose(result.pose, result.covariance);
-  monitor_.clear();
-  prior_count_ = 0;
+  witnesses_.begin(kFoundWrong);
   resets_++;
   fused_ns_ = now;
   state_ = WM_STATE_TRACKING;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/landmark_ekf/search.hpp"
 
+#include "filters/landmark_ekf/resection.hpp"
 #include "math/arc.hpp"
 
 namespace wm {
@@ -8,12 +9,18 @@ namespace {
 
 constexpr wm_time_ns kSpacing_ns = 300 * WM_NS_PER_MS;
 constexpr int kHeadings = 72;  // every 5 degrees: well inside Gauss-Newton's reach
-constexpr int kCandidates = 4;
+constexpr int kCandidates = 12;
+constexpr int kTriples = 120;                       // with a third of the bearings false, one in three is of right ones
+constexpr double kApart_m = 0.5, kApart_rad = 0.1;  // candidates nearer than that are one
 constexpr int kRefinements = 10;
-constexpr double kOutlierChi2 = 9.0;  // a residual beyond counts this much and no more
-constexpr double kMarginChi2 = 9.0;   // the second best place must be worse by this
-constexpr double kAgreeing = 0.7;     // share of observations that must agree
-constexpr double kWayError = 0.05;    // odometry's error in parts of the way and of the turn, before calibration
+constexpr double kOutlierChi2 = 9.0;     // a residual beyond counts this much and no more
+constexpr double kMarginChi2 = 9.0;      // the second best place must be worse by this
+constexpr double kAgreeing = 0.7;        // share of observations that must agree ...
+constexpr double kAgreeingOfMany = 0.5;  // ... where so many landmarks bear it out:
+constexpr int kMany = 4;
+constexpr int kNumbers = 5;         // two more than a pose has: three bearings fit some pose, whatever they say
+constexpr double kRival = 0.85;     // another place that so many as many observations agree with is as good
+constexpr double kWayError = 0.05;  // odometry's error in parts of the way and of the turn, before calibration
 constexpr double kTurnError = 0.07;
 constexpr double kFirstGuess_m = 4.0;  // distance of a landmark of which only the bearing is known
 
@@ -28,13 +35,24 @@ struct problem {
     const search_clue *clue;
     double weight_angle, weight_length;  // 1 / variance
     double dir_x, dir_y;                 // of the line of sight, in the odometry's frame
+    int landmark;                        // numbered as they come; -1: none
   };
-  item items[pose_search::kCapacity + 4];
-  int count = 0;
+  static constexpr int kMost = pose_search::kCapacity + 4;
+  item items[kMost];
+  int count = 0, landmarks = 0;
+  int stated_from = kMost;  // what was said of the start: items from here on
 
   void add(const search_clue &clue, double travelled_m, double turned_rad) {
     item &it = items[count++];
     it.clue = &clue;
+    it.landmark = -1;
+    if (clue.kind & (kClueBearing | kClueRange)) {
+      for (int i = 0; i < count - 1 && it.landmark < 0; i++)
+        if (items[i].landmark >= 0 && items[i].clue->place_m[0] == clue.place_m[0] &&
+            items[i].clue->place_m[1] == clue.place_m[1])
+          it.landmark = items[i].landmark;
+      if (it.landmark < 0) it.landmark = landmarks++;
+    }
     const double way = kWayError * (travelled_m - clue.travelled_m);
     const double turn = kTurnError * (turned_rad - clue.turned_rad);
     const double lever = (clue.kind & kClueRange) ? clue.range_m : kFirstGuess_m;
@@ -80,23 +98,31 @@ residuals look(const problem::item &it, const placement &p, const sin_cos &turn)
   return out;
 }
 
-double cost_of(const problem &all, const placement &p, int *agreeing) {
+// Who agrees with a place.
+struct support {
+  int observations = 0, numbers = 0;
+  int stated = 0;     // what was said of the start
+  int landmarks = 0;  // of which half of the observations and more agree
+};
+
+double cost_of(const problem &all, const placement &p, support *fit = nullptr) {
   const sin_cos turn = sincos(p.turn);
   double cost = 0.0;
-  *agreeing = 0;
+  int balance[problem::kMost] = {};  // of each landmark: agreeing less contradicting
   for (int i = 0; i < all.count; i++) {
     const residuals r = look(all.items[i], p, turn);
-    bool fits = true;
-    if (r.angle_chi2 >= 0.0) {
-      cost += clipped(r.angle_chi2);
-      fits = fits && r.angle_chi2 < kOutlierChi2;
-    }
-    if (r.length_chi2 >= 0.0) {
-      cost += clipped(r.length_chi2);
-      fits = fits && r.length_chi2 < kOutlierChi2;
-    }
-    *agreeing += fits;
+    cost += clipped(r.angle_chi2 > 0.0 ? r.angle_chi2 : 0.0) + clipped(r.length_chi2 > 0.0 ? r.length_chi2 : 0.0);
+    if (!fit) continue;
+    const bool fits = r.angle_chi2 < kOutlierChi2 && r.length_chi2 < kOutlierChi2;
+    const int landmark = all.items[i].landmark;
+    if (landmark >= 0) balance[landmark] += fits ? 1 : -1;
+    if (!fits) continue;
+    fit->observations++;
+    fit->stated += i >= all.stated_from;
+    fit->numbers +=
+        (r.angle_chi2 >= 0.0) + (r.length_chi2 >= 0.0) * ((all.items[i].clue->kind & kCluePosition) ? 2 : 1);
   }
+  for (int i = 0; fit && i < all.landmarks; i++) fit->landmarks += balance[i] >= 0;
   return cost;
 }
 
@@ -162,8 +188,7 @@ placement place_at(const problem &all, double rotation) {
     p.x = solution[0];
     p.y = solution[1];
   }
-  int agreeing;
-  p.cost = cost_of(all, p, &agreeing);
+  p.cost = cost_of(all, p);
   return p;
 }
 
@@ -212,6 +237,59 @@ void normal_equations(const problem &all, const placement &p, double a[3][3], do
   }
 }
 
+// The best placements that are not neighbours, the best first.
+struct shortlist {
+  placement best[kCandidates];
+  int count = 0;
+
+  void offer(const placement &p) {
+    int at = 0;
+    for (; at < count; at++)
+      if (std::fabs(best[at].x - p.x) + std::fabs(best[at].y - p.y) < kApart_m &&
+          std::fabs(wrap(best[at].turn - p.turn)) < kApart_rad)
+        break;
+    if (at < count && best[at].cost <= p.cost) return;
+    if (at == count && count == kCandidates && best[--at].cost <= p.cost) return;
+    if (at == count) count++;
+    for (; at > 0 && best[at - 1].cost > p.cost; at--) best[at] = best[at - 1];
+    best[at] = p;
+  }
+};
+
+// Poses from three bearings each, drawn with numbers that are always the same.
+void offer_triples(const problem &all, shortlist *list) {
+  int bearings[problem::kMost], count = 0;
+  for (int i = 0; i < all.count; i++)
+    if (all.items[i].clue->kind & kClueBearing) bearings[count++] = i;
+  if (count < 3) return;
+  uint32_t dice = 1;
+  const auto draw = [&dice, count](int but_a, int but_b) {
+    dice = dice * 1664525u + 1013904223u;  // Numerical Recipes' generator; its upper bits
+    int i = (int)((dice >> 8) % (uint32_t)count);
+    while (i == but_a || i == but_b) i = (i + 1) % count;
+    return i;
+  };
+  for (int n = 0; n < kTriples; n++) {
+    int of[3];
+    of[0] = draw(-1, -1);
+    of[1] = draw(of[0], -1);
+    of[2] = draw(of[0], of[1]);
+    line_of_sight line[3];
+    for (int k = 0; k < 3; k++) {
+      const problem::item &it = all.items[bearings[of[k]]];
+      const search_clue &c = *it.clue;
+      line[k] = {{c.sensor.x_m, c.sensor.y_m}, {it.dir_x, it.dir_y}, {c.place_m[0], c.place_m[1]}};
+    }
+    wm_pose2 pose[2];
+    const int found = resect(line, pose);
+    for (int k = 0; k < found; k++) {
+      placement p = {pose[k].x_m, pose[k].y_m, pose[k].heading_rad, 0.0};
+      p.cost = cost_of(all, p);
+      list->offer(p);
+    }
+  }
+}
+
 bool invert(const double a[3][3], double out[3][3]) {
   const double c00 = a[1][1] * a[2][2] - a[1][2] * a[2][1], c01 = a[1][2] * a[2][0] - a[1][0] * a[2][2];
   const double c02 = a[1][0] * a[2][1] - a[1][1] * a[2][0];
@@ -248,28 +326,24 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
   const int oldest = count_ > kCapacity ? count_ - kCapacity : 0;
   for (int i = oldest; i < count_; i++)
     if (clue_[i % kCapacity].t_ns >= since_ns) all.add(clue_[i % kCapacity], travelled_m, turned_rad);
-  out.used = all.count;
+  out.used = all.stated_from = all.count;
   for (int i = 0; i < prior_count; i++) all.add(prior[i], travelled_m, turned_rad);
   if (out.used < 3) return out;
 
-  // Coarse: every heading; the best few that are not neighbours.
-  placement best[kCandidates];
-  int found = 0;
+  // Coarse: every heading, and triples of bearings; the best few that are not neighbours.
+  shortlist list;
   placement grid[kHeadings];
   for (int i = 0; i < kHeadings; i++) grid[i] = place_at(all, wrap(kTwoPi * i / kHeadings));
-  for (int i = 0; i < kHeadings; i++) {
-    if (grid[i].cost > grid[(i + 1) % kHeadings].cost || grid[i].cost >= grid[(i + kHeadings - 1) % kHeadings].cost)
-      continue;
-    int at = found < kCandidates ? found++ : kCandidates;
-    while (at > 0 && best[at - 1].cost > grid[i].cost) {
-      if (at < kCandidates) best[at] = best[at - 1];
-      at--;
-    }
-    if (at < kCandidates) best[at] = grid[i];
-  }
+  for (int i = 0; i < kHeadings; i++)
+    if (grid[i].cost <= grid[(i + 1) % kHeadings].cost && grid[i].cost < grid[(i + kHeadings - 1) % kHeadings].cost)
+      list.offer(grid[i]);
+  offer_triples(all, &list);
+  placement *best = list.best;
+  const int found = list.count;
   // Fine.
   double a[3][3], b[3], inverse[3][3];
-  int winner = -1, agreeing[kCandidates];
+  int winner = -1;
+  support fit[kCandidates];
   for (int k = 0; k < found; k++) {
     placement &p = best[k];
     for (int step = 0; step < kRefinements; step++) {
@@ -283,13 +357,16 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
       p.turn = wrap(p.turn + move[2]);
       if (!finite(p.x) || !finite(p.y) || !finite(p.turn)) break;
     }
-    p.cost = finite(p.x + p.y + p.turn) ? cost_of(all, p, &agreeing[k]) : 1e30;
+    fit[k] = {};
+    p.cost = finite(p.x + p.y + p.turn) ? cost_of(all, p, &fit[k]) : 1e30;
     if (winner < 0 || p.cost < best[winner].cost) winner = k;
   }
   if (winner < 0) return out;
   const placement &w = best[winner];
-  out.agreeing = agreeing[winner];
-  if (out.agreeing < kAgreeing * all.count || out.agreeing < 3) return out;
+  const support &own = fit[winner];
+  out.agreeing = own.observations;
+  const double share = own.landmarks >= kMany ? kAgreeingOfMany : kAgreeing;
+  if (own.observations < share * all.count || own.observations < 3 || own.numbers < kNumbers) return out;
   normal_equations(all, w, a, b);
   if (!invert(a, inverse)) return out;
   const wm_pose2 frame = {w.x, w.y, w.turn};
@@ -312,7 +389,9 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
     const wm_pose2 other = compose({best[k].x, best[k].y, best[k].turn}, odom_now);
     const double away = std::fabs(other.x_m - out.pose.x_m) + std::fabs(other.y_m - out.pose.y_m);
     const bool same = away < near_m && std::fabs(wrap(other.heading_rad - out.pose.heading_rad)) < near_rad;
-    if (!same && best[k].cost < w.cost + kMarginChi2) return out;  // two places explain what was seen
+    const bool as_good = fit[k].landmarks >= own.landmarks && fit[k].observations > kRival * own.observations;
+    if (!same && fit[k].stated >= own.stated && (as_good || best[k].cost < w.cost + kMarginChi2))
+      return out;  // two places explain what was seen
   }
   out.found = out.covariance[0][0] + out.covariance[1][1] < 2.0 * square(limits.sigma_xy_m) &&
               out.covariance[2][2] < square(limits.sigma_heading_rad);

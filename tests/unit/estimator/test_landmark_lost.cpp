@@ -1,0 +1,307 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the landmark filter does with what makes no sense: closed-form resection, witnesses, and whole filters that are
+// shown wrong identities, no numbers, landmarks in a line, on the robot, or too few of them. Never a confident wrong
+// pose, never NaN.
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+
+#include "events.hpp"
+#include "filters/landmark_ekf/params.h"
+#include "filters/landmark_ekf/resection.hpp"
+#include "filters/landmark_ekf/witnesses.hpp"
+#include "math/arc.hpp"
+#include "math/elementary.hpp"
+#include "motion/motion_params.h"
+#include "unity.h"
+#include "waymark/estimator.h"
+#include "waymark/random.h"
+
+namespace {
+
+constexpr int kLandmarks = 5;
+const double kPlaces[kLandmarks][2] = {{12, 3}, {-4, 11}, {-9, -6}, {7, -10}, {2, 14}};
+
+const wm_estimator *ekf;
+wm_motion_params motion;
+wm_landmark_ekf_params params;
+wm_setup setup;
+wm_sensor sensor;
+wm_landmark landmarks[kLandmarks];  // on the map
+double stands_m[kLandmarks][2];     // truly
+void *state;
+wm_random noise;
+wm_pose2 truth;
+double now_s;
+
+void begin() {
+  for (int i = 0; i < kLandmarks; i++)
+    for (int k = 0; k < 2; k++) stands_m[i][k] = landmarks[i].p_m[k];
+  const char *why = nullptr;
+  const size_t bytes = ekf->state_bytes(&params, &setup, &why);
+  TEST_ASSERT_GREATER_THAN(0, bytes);
+  state = aligned_alloc(16, (bytes + 15) / 16 * 16);
+  TEST_ASSERT_EQUAL(WM_OK, ekf->init(state, &params, &setup));
+}
+
+void begin_without_pose() {
+  setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
+  begin();
+}
+
+wm_estimate estimate() {
+  wm_estimate e;
+  ekf->estimate(state, &e);
+  return e;
+}
+
+double calibration(const char *name) {
+  wm_calibration_value values[64];
+  const size_t count = ekf->calibration(state, values, 64);
+  for (size_t i = 0; i < count; i++)
+    if (std::strcmp(values[i].name, name) == 0) return values[i].value;
+  TEST_FAIL_MESSAGE(name);
+  return NAN;
+}
+
+enum class sees { right, wrong_identities, no_numbers };
+
+// Drives an arc at 1 m/s and sees the first `seen` landmarks at 10 Hz. After each step: all numbers are finite, and who
+// tracks is where it says (5 sigma and 0.3 m).
+void drive(double for_s, int seen, sees how = sees::right) {
+  const double dt = 0.1;
+  for (const double until_s = now_s + for_s; now_s < until_s;) {
+    const wm_event twist = make::twist(now_s, 1.0, 0.15);
+    TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &twist));
+    const wm::arc a = wm::make_arc(1.0 * dt, 0.15 * dt);
+    truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
+    now_s += dt;
+    for (int i = 0; i < seen; i++) {
+      const double dx = stands_m[i][0] - truth.x_m, dy = stands_m[i][1] - truth.y_m;
+      const double error = 0.005 * wm_random_next_normal(&noise);
+      const double bearing = wm::wrap(wm::atan2(dy, dx) - truth.heading_rad + error);
+      const int other = (i + 1 + (int)(wm_random_next_uniform(&noise) * (kLandmarks - 1))) % kLandmarks;
+      const wm_event e = make::sighting(now_s, landmarks[how == sees::wrong_identities ? other : i].id,
+                                        how == sees::no_numbers ? static_cast<double>(NAN) : bearing, NAN);
+      wm_innovation records[8];
+      size_t count;
+      ekf->correct(state, &e, records, 8, &count);
+    }
+    const wm_estimate e = estimate();
+    const double off =
+        std::sqrt(wm::square(e.pose_map_base.p_m[0] - truth.x_m) + wm::square(e.pose_map_base.p_m[1] - truth.y_m));
+    for (const double value : e.covariance) TEST_ASSERT_TRUE(wm::finite(value));
+    TEST_ASSERT_TRUE(wm::finite(off) && wm::finite(e.heading_rad));
+    const double p = calibration("landmarks.lost_probability");
+    TEST_ASSERT_TRUE(p >= 0.0 && p <= 1.0);
+    const bool tracks = e.state == WM_STATE_TRACKING || e.state == WM_STATE_DEAD_RECKONING;
+    if (tracks && p < 0.5) TEST_ASSERT_LESS_THAN_DOUBLE(0.3 + 5.0 * std::sqrt(e.covariance[0] + e.covariance[7]), off);
+  }
+}
+
+double off() {
+  const wm_estimate e = estimate();
+  return std::sqrt(wm::square(e.pose_map_base.p_m[0] - truth.x_m) + wm::square(e.pose_map_base.p_m[1] - truth.y_m));
+}
+
+// ---- resection ----
+
+// Lines of sight from three poses of the odometry's frame, which lies in the map as `frame` says.
+void lines_from(const wm_pose2 &frame, const wm_pose2 from[3], wm::line_of_sight line[3]) {
+  for (int i = 0; i < 3; i++) {
+    const wm_pose2 eye = wm::compose(frame, from[i]);
+    const double bearing = wm::atan2(kPlaces[i][1] - eye.y_m, kPlaces[i][0] - eye.x_m) - frame.heading_rad;
+    line[i] = {{from[i].x_m, from[i].y_m}, {wm::cos(bearing), wm::sin(bearing)}, {kPlaces[i][0], kPlaces[i][1]}};
+  }
+}
+
+bool among(const wm_pose2 *poses, int count, const wm_pose2 &wanted) {
+  for (int i = 0; i < count; i++)
+    if (std::fabs(poses[i].x_m - wanted.x_m) + std::fabs(poses[i].y_m - wanted.y_m) < 1e-6 &&
+        std::fabs(wm::wrap(poses[i].heading_rad - wanted.heading_rad)) < 1e-7)
+      return true;
+  return false;
+}
+
+void test_three_bearings_give_the_pose(void) {
+  const wm_pose2 frame = {1.5, -2.0, 2.3};
+  const wm_pose2 still[3] = {{0.4, 0.1, 0}, {0.4, 0.1, 0}, {0.4, 0.1, 0}};
+  const wm_pose2 moving[3] = {{0, 0, 0}, {1.0, 0.2, 0.2}, {2.1, 0.6, 0.4}};
+  wm::line_of_sight line[3];
+  wm_pose2 out[2];
+  lines_from(frame, still, line);
+  TEST_ASSERT_TRUE(among(out, wm::resect(line, out), frame));
+  lines_from(frame, moving, line);
+  TEST_ASSERT_TRUE(among(out, wm::resect(line, out), frame));
+}
+
+void test_bearings_that_say_nothing_give_no_pose(void) {
+  wm::line_of_sight line[3] = {};
+  wm_pose2 out[2];
+  TEST_ASSERT_EQUAL(0, wm::resect(line, out));
+  for (int i = 0; i < 3; i++) line[i] = {{0, 0}, {1, 0}, {5.0 + i, 0}};  // all in one direction
+  TEST_ASSERT_EQUAL(0, wm::resect(line, out));
+  line[0].along[0] = NAN;
+  TEST_ASSERT_EQUAL(0, wm::resect(line, out));
+}
+
+// ---- witnesses ----
+
+void test_one_that_contradicts_has_moved_and_many_mean_lost(void) {
+  wm::landmark_record record[kLandmarks] = {};
+  wm::witnesses w;
+  std::memset(static_cast<void *>(&w), 0, sizeof w);
+  w.begin(-2.5);
+  const double fits = wm::witnesses::against(20.0, wm::kTwoPi), contradicts = wm::witnesses::against_all();
+  int step = 0;
+  const auto look = [&](int wrong, int count) {
+    for (int k = 0; k < 40; k++, step++)
+      for (int i = 0; i < count; i++)
+        w.note(wm_ns_from_seconds(0.1 * step), i, i < wrong ? contradicts : fits, i < wrong ? 1.0 : 0.0,
+               i < wrong ? 50.0 : 0.0, record + i);
+  };
+  look(1, 4);
+  TEST_ASSERT_TRUE(w.moved(0));
+  TEST_ASSERT_FALSE(w.moved(1));
+  TEST_ASSERT_TRUE(w.fits());
+  look(4, 4);
+  TEST_ASSERT_TRUE(w.contradicted());
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.9, w.probability());
+}
+
+// Detections of nothing, 30 degrees apart, of three landmarks out of view, while one in view fits: not lost. The same
+// misfits all in one place: lost, whatever the one that fits says.
+void test_misfits_that_scatter_say_nothing_those_in_one_place_do(void) {
+  const double fits = wm::witnesses::against(20.0, wm::kTwoPi), contradicts = wm::witnesses::against_all();
+  for (const bool scattered : {true, false}) {
+    wm::landmark_record record[4] = {};
+    wm::witnesses w;
+    std::memset(static_cast<void *>(&w), 0, sizeof w);
+    w.begin(-2.5);
+    for (int step = 0; step < 100; step++) {
+      const wm_time_ns t_ns = wm_ns_from_seconds(0.1 * step);
+      w.note(t_ns, 0, fits, 0.0, 0.0, record);
+      const double angle_rad = scattered ? wm::wrap(2.1 * step) : 1.0;
+      for (int i = 1; i < 4; i++)
+        if (step > 30) w.note(t_ns, i, contradicts, angle_rad, 50.0, record + i);
+      if (scattered) TEST_ASSERT_FALSE(w.contradicted());
+    }
+    TEST_ASSERT_EQUAL(!scattered, w.contradicted());
+    TEST_ASSERT_FALSE(w.moved(1));
+  }
+}
+
+// ---- the whole filter ----
+
+void test_started_without_a_pose_three_bearings_are_enough(void) {
+  begin_without_pose();
+  TEST_ASSERT_EQUAL_DOUBLE(1.0, calibration("landmarks.lost_probability"));
+  drive(5, 3);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
+}
+
+void test_two_landmarks_and_driving_are_enough(void) {
+  begin_without_pose();
+  drive(20, 2);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.5, off());
+}
+
+void test_a_known_place_and_an_unknown_heading(void) {
+  setup.start.heading_rad = NAN;
+  begin();
+  drive(3, 1);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
+}
+
+void test_all_identities_wrong(void) {
+  begin_without_pose();
+  drive(20, kLandmarks, sees::wrong_identities);
+}
+
+void test_bearings_that_are_no_numbers(void) {
+  begin_without_pose();
+  drive(5, kLandmarks, sees::no_numbers);
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, estimate().state);
+  drive(5, kLandmarks);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
+}
+
+// In a line, and the robot in it at the start: its mirror image sees the same of them but for the order.
+void test_landmarks_in_a_line(void) {
+  for (int i = 0; i < kLandmarks; i++) landmarks[i].p_m[0] = 4.0 * i - 6.0, landmarks[i].p_m[1] = 0.0;
+  begin_without_pose();
+  drive(15, kLandmarks);
+}
+
+void test_a_landmark_on_top_of_the_robot(void) {
+  landmarks[0].p_m[0] = truth.x_m;
+  landmarks[0].p_m[1] = truth.y_m;
+  begin();
+  drive(10, kLandmarks);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
+}
+
+void test_landmarks_all_in_one_place(void) {
+  for (wm_landmark &l : landmarks) l.p_m[0] = 5.0, l.p_m[1] = 5.0;
+  begin_without_pose();
+  drive(15, kLandmarks);
+}
+
+void test_a_moved_landmark_is_told_and_does_no_harm(void) {
+  begin();
+  drive(3, kLandmarks);
+  stands_m[2][0] += 3.0;
+  stands_m[2][1] -= 2.0;
+  drive(10, kLandmarks);
+  TEST_ASSERT_EQUAL_DOUBLE(1, calibration("map.moved"));
+  TEST_ASSERT_EQUAL_DOUBLE(landmarks[2].id, calibration("map.moved_id"));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.15, off());
+}
+
+}  // namespace
+
+void setUp(void) {
+  ekf = wm_estimator_find("landmark_ekf");
+  wm_params_defaults(&wm_motion_params_table, &motion);
+  wm_params_defaults(&ekf->params, &params);
+  for (int i = 0; i < kLandmarks; i++) landmarks[i] = {10 + i, {kPlaces[i][0], kPlaces[i][1], 0}, 0.0, NAN, {}, 0};
+  sensor = {};
+  std::strcpy(sensor.name, "camera");
+  sensor.bearing_sigma_rad = 0.006;
+  sensor.range_sigma_m = NAN;
+  sensor.max_range_m = INFINITY;
+  setup = {};
+  setup.motion = &motion;
+  setup.wheels = make::no_wheels();
+  setup.sensors = &sensor;
+  setup.sensor_count = 1;
+  setup.landmarks = landmarks;
+  setup.landmark_count = kLandmarks;
+  truth = {-1, 0.5, 0.2};
+  setup.start = {WM_TIME_NONE, {-1, 0.5, 0}, {0, 0, 0, 1}, 0.2, 0.05, 0.02};
+  noise = {7, 1, 0};
+  now_s = 0;
+  state = nullptr;
+}
+void tearDown(void) { free(state); }
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_three_bearings_give_the_pose);
+  RUN_TEST(test_bearings_that_say_nothing_give_no_pose);
+  RUN_TEST(test_one_that_contradicts_has_moved_and_many_mean_lost);
+  RUN_TEST(test_misfits_that_scatter_say_nothing_those_in_one_place_do);
+  RUN_TEST(test_started_without_a_pose_three_bearings_are_enough);
+  RUN_TEST(test_two_landmarks_and_driving_are_enough);
+  RUN_TEST(test_a_known_place_and_an_unknown_heading);
+  RUN_TEST(test_all_identities_wrong);
+  RUN_TEST(test_bearings_that_are_no_numbers);
+  RUN_TEST(test_landmarks_in_a_line);
+  RUN_TEST(test_a_landmark_on_top_of_the_robot);
+  RUN_TEST(test_landmarks_all_in_one_place);
+  RUN_TEST(test_a_moved_landmark_is_told_and_does_no_harm);
+  return UNITY_END();
+}
