@@ -77,8 +77,8 @@ render::Picture8 cut_out(const GreyPicture &picture, const Optics &optics, const
     for (int x = 0; x < width; x++) {
       double sum = 0;
       for (int i = 0; i < kSamples * kSamples; i++) {
-        const Vector3d place((x + (i % kSamples + 0.5) / kSamples) / width,
-                             (y + (i / kSamples + 0.5) / kSamples) / height, 1);
+        const int across = i % kSamples, down = i / kSamples;
+        const Vector3d place((x + (across + 0.5) / kSamples) / width, (y + (down + 0.5) / kSamples) / height, 1);
         Vector2d at;
         if (!optics.pixel(square * place, &at))
           throw Failure("--corners: the landmark reaches behind the lens", kUsage);
