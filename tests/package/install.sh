@@ -67,15 +67,15 @@ root=$(mktemp -d "$roots/$arch.XXXXXX")
 # Never into what is mounted there.
 trap 'umount -R "$root/proc" "$root"/dev/* 2>/dev/null || true; rm -rf --one-file-system "$root"' EXIT
 tar -C "$root" -xf "$roots/$arch.tar" --exclude='./dev/*'
-mkdir -p "$root/dev" "$root/proc" "$root/work"
+mkdir -p "$root/dev" "$root/proc" "$root/trial"
 for device in null zero random urandom; do : >"$root/dev/$device"; mount --bind "/dev/$device" "$root/dev/$device"; done
 mount --rbind /proc "$root/proc"
 inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF-8 "$@"; }
 
 # ── install, run ─────────────────────────────────────────────────────────────────────────────────────────────────────
-cp "$runtime" "$root/work/waymark.deb"
+cp "$runtime" "$root/trial/waymark.deb"
 say "dpkg -i $(basename "$runtime")"
-inside dpkg -i /work/waymark.deb
+inside dpkg -i /trial/waymark.deb
 inside waymark --version
 echo "machine: $(inside uname -m)"
 inside waymark doctor --seconds 1 || [ $? -eq 1 ] || fail "doctor"
@@ -85,17 +85,17 @@ rm -rf "$roots/$arch.recordings"
 mkdir -p "$roots/$arch.recordings"
 build/bin/waymark simulate config/worlds/crossing.yaml --no-video --out "$roots/$arch.recordings/crossing" >/dev/null 2>&1 ||
   build/bin/waymark simulate config/worlds/crossing.yaml --out "$roots/$arch.recordings/crossing" >/dev/null
-cp -r "$roots/$arch.recordings/crossing" "$root/work/crossing"
-inside waymark replay /work/crossing --config /usr/share/doc/waymark/examples/crossing.yaml --out /work/run | tail -3
+cp -r "$roots/$arch.recordings/crossing" "$root/trial/crossing"
+inside waymark replay /trial/crossing --config /usr/share/doc/waymark/examples/crossing.yaml --out /trial/run | tail -3
 build/bin/waymark replay "$roots/$arch.recordings/crossing" --config "$root/usr/share/doc/waymark/examples/crossing.yaml" --out "$roots/$arch.recordings/run" >/dev/null
-cmp "$root/work/run/trajectory.csv" "$roots/$arch.recordings/run/trajectory.csv" || fail "its trajectory is not this computer's"
-echo "the same $(wc -c <"$root/work/run/trajectory.csv") bytes of trajectory as on this computer"
+cmp "$root/trial/run/trajectory.csv" "$roots/$arch.recordings/run/trajectory.csv" || fail "its trajectory is not this computer's"
+echo "the same $(wc -c <"$root/trial/run/trajectory.csv") bytes of trajectory as on this computer"
 
 # ── what is kept, what goes ──────────────────────────────────────────────────────────────────────────────────────────
 say "upgrade, removal, purge"
 echo "# mine" >>"$root/etc/waymark/robot.yaml"
 echo "pose" >"$root/var/lib/waymark/pose.yaml"
-inside dpkg -i /work/waymark.deb >/dev/null
+inside dpkg -i /trial/waymark.deb >/dev/null
 tail -1 "$root/etc/waymark/robot.yaml" | grep -qx '# mine' || fail "the upgrade took the configuration"
 [ -e "$root/var/lib/waymark/pose.yaml" ] || fail "the upgrade took the saved pose"
 inside dpkg -r waymark >/dev/null

@@ -82,6 +82,7 @@ void draw(const GreyPicture &grey, const std::vector<wm_looked_for> &looks, cons
 }  // namespace
 
 int look_at_picture(const LookAtPicture &a) {
+  need_finite("--pose", {a.pose[0], a.pose[1], a.pose[2]});
   const auto map = open(a);
   const wm_rig &rig = *wm_recording_rig(map.get());
   int32_t index = 0;

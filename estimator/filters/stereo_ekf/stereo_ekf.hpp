@@ -4,10 +4,10 @@
 #ifndef WAYMARK_ESTIMATOR_STEREO_EKF_HPP
 #define WAYMARK_ESTIMATOR_STEREO_EKF_HPP
 
-#include "filters/landmark_ekf/fit_monitor.hpp"
 #include "filters/record_list.hpp"
 #include "filters/stereo_ekf/body_motion.hpp"
 #include "filters/stereo_ekf/consensus.hpp"
+#include "filters/stereo_ekf/fit_monitor.hpp"
 #include "filters/stereo_ekf/params.h"
 #include "filters/stereo_ekf/space_filter.hpp"
 #include "filters/stereo_ekf/stereo_rig.hpp"

@@ -90,6 +90,9 @@ size_t state_bytes(const void *, const wm_view *view, const char **why) {
     *why =
         "nothing says how a landmark looks: landmarks/appearance.csv beside landmarks.csv (waymark map "
         "add-landmark makes it)";
+  bool usable = false;
+  for (size_t i = 0; i < view->appearance_count; i++) usable |= is_usable(*view, view->appearances[i]);
+  if (!*why && !usable) *why = "no landmark of landmarks/appearance.csv stands in landmarks.csv: are they of one map?";
   return *why ? 0 : lay_out(nullptr, *view, *camera);
 }
 

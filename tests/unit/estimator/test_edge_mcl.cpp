@@ -164,6 +164,30 @@ void forwards_and_backwards_it_stays_on_the_way(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.1, d.truth.y_m, y);
 }
 
+// GIVEN a corridor, whose walls say nothing of the way along it WHEN the robot stands 4 cm further to the left than it
+// believes THEN the scan's innovation is that distance, with a variance that fits a robot that knows its place to 5 cm.
+void a_scans_innovation_is_a_distance(void) {
+  filter f;
+  drive d;
+  d.truth = {2, 2.04, 0};
+  wm_event e{};
+  e.kind = WM_EVENT_TWIST2;
+  TEST_ASSERT_EQUAL(WM_OK, f.ops->predict(f.state, &e));
+  d.t = 0.1;
+  d.scan(&e);
+  wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
+  size_t count = 0;
+  TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
+  TEST_ASSERT_EQUAL(1, count);
+  TEST_ASSERT_EQUAL(WM_RESIDUAL_RANGE, out[0].residual);
+  TEST_ASSERT_EQUAL(WM_FUSED, out[0].verdict);
+  TEST_ASSERT_DOUBLE_WITHIN(0.015, 0.04, std::fabs(out[0].observed - out[0].expected));
+  const double sigma_m = std::sqrt(out[0].variance);
+  TEST_ASSERT_TRUE(sigma_m > 0.005 && sigma_m < 0.2);
+  const double nis = (out[0].observed - out[0].expected) * (out[0].observed - out[0].expected) / out[0].variance;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9 * nis, nis, out[0].nis);
+}
+
 // `pose: cloud`: what is given out are the particles' own moments, the heading's on the circle.
 void the_clouds_pose_is_its_particles_mean(void) {
   reinterpret_cast<wm_edge_mcl_params *>(params.data())->pose = EDGE_MCL_CLOUD;
@@ -354,6 +378,7 @@ void tearDown(void) {}
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(forwards_and_backwards_it_stays_on_the_way);
+  RUN_TEST(a_scans_innovation_is_a_distance);
   RUN_TEST(the_clouds_pose_is_its_particles_mean);
   RUN_TEST(a_camera_that_looks_lower_than_believed_is_found_out);
   RUN_TEST(carried_away_it_says_so_and_finds_back);

@@ -249,6 +249,13 @@ void rows_have_their_own_times() {
   TEST_ASSERT_INT64_WITHIN(2, 5000 + std::llround(row * 20e6), events[0].t_ns);
 }
 
+void pictures_of_another_maps_landmarks_are_refused() {
+  landmark.id = 8;
+  const char *why = "";
+  TEST_ASSERT_EQUAL(0, detector->state_bytes(&params, &view, &why));
+  TEST_ASSERT_NOT_NULL(std::strstr(why, "are they of one map?"));
+}
+
 }  // namespace
 
 void setUp() {
@@ -284,5 +291,6 @@ int main() {
   RUN_TEST(a_pose_that_says_nothing_guides_nowhere);
   RUN_TEST(a_moving_robot_is_expected_where_it_was);
   RUN_TEST(rows_have_their_own_times);
+  RUN_TEST(pictures_of_another_maps_landmarks_are_refused);
   return UNITY_END();
 }
