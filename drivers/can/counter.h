@@ -17,22 +17,38 @@ typedef struct counter {
   signal_bits bits;
   int has_last;
   uint64_t last;
-  uint32_t proof;   // steps by one in a row, up to COUNTER_PROOF
-  uint32_t frozen;  // frames since it last moved
+  uint32_t proof;    // steps by one in a row, up to COUNTER_PROOF
+  uint32_t frozen;   // frames since it last moved
+  uint64_t missing;  // bit i: of the value i + 1 before `last` nothing came yet
   int seen_zero, seen_top;
 } counter;
 
-// What one more value says. `lost`: frames between this one and the one before; `repeats`: frames in a row in which it
-// stood still, this one included.
+// What one more value says. `lost`: frames between this one and the one before; `late`: it is one of those that were
+// taken for lost; `repeats`: frames in a row in which it stood still, this one included.
 typedef struct counter_step {
   uint64_t lost;
+  int late;
   uint32_t repeats;
 } counter_step;
+
+// Frames overtake each other in gateways and bridges: a value that is missing, at most half a cycle back, has come
+// late. Anything else is a step forward.
+static inline int counter_is_late(counter *self, uint64_t back, uint64_t cycle) {
+  if (back == 0 || back > cycle / 2 || back > 64 || !((self->missing >> (back - 1)) & 1u)) return 0;
+  self->missing &= ~(UINT64_C(1) << (back - 1));
+  return 1;
+}
+
+static inline void counter_go_on(counter *self, uint64_t step) {
+  uint64_t passed = step > 64 ? 64 : step;
+  self->missing = passed == 64 ? 0 : self->missing << passed;
+  if (passed > 1) self->missing |= UINT64_MAX >> (65 - passed);
+}
 
 // Many counters leave out a value (AUTOSAR E2E profile 1 counts 0 to 14, others 1 to 15), and the DBC doesn't say so:
 // a counter's cycle is taken to be without its first or last value until that has been seen.
 static inline counter_step counter_next(counter *self, uint64_t value) {
-  counter_step out = {0, 0};
+  counter_step out = {0};
   uint64_t top = (UINT64_C(1) << self->bits.length) - 1u;
   self->seen_zero |= value == 0;
   self->seen_top |= value == top;
@@ -43,7 +59,11 @@ static inline counter_step counter_next(counter *self, uint64_t value) {
       self->proof = step == 1 ? self->proof + 1 : 0;
     } else if (step == 0) {
       out.repeats = self->frozen < UINT32_MAX ? ++self->frozen : self->frozen;
+    } else if (counter_is_late(self, cycle - step, cycle)) {
+      out.late = 1;
+      return out;
     } else {
+      counter_go_on(self, step);
       out.lost = step - 1;
       self->frozen = 0;
     }

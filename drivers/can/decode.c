@@ -98,13 +98,14 @@ static int quantity_value(const bound_quantity *q, bound_signal *signals, const 
 
 // ── one frame ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// 0 for a frame that repeats the one before it. Counts what the message's counter says was lost.
+// 0 for a frame that repeats the one before it. Counts what the message's counter says was lost, until it comes late.
 static int watch_counter(bound_message *m, const payload *data, unsigned length, wm_quantities *out,
                          wm_source_counts *counts) {
   counter *c = &m->counter;
   if (!c->is_there || signal_bytes(&c->bits) > length) return 1;
   counter_step step = counter_next(c, signal_raw(&c->bits, data));
   counts->lost += step.lost;
+  counts->lost -= (uint64_t)step.late;
   if (step.lost > out->lost_before) out->lost_before = (uint16_t)(step.lost < UINT16_MAX ? step.lost : UINT16_MAX);
   if (step.repeats == 0) return 1;
   counts->frozen++;

@@ -20,13 +20,38 @@ static wm_status read_one(wm_feed *self, wm_error *err) {
 
 static int inside(const wm_feed *self) { return self->next.t_ns >= self->from_ns && self->next.t_ns <= self->until_ns; }
 
+#define COUNTERS 7
+
+static void counters_of(wm_source_counts *counts, uint64_t *out[COUNTERS]) {
+  uint64_t *all[COUNTERS] = {&counts->lost,   &counts->malformed, &counts->not_finite, &counts->out_of_order,
+                             &counts->frozen, &counts->overflows, &counts->bus_errors};
+  memcpy(out, all, sizeof all);
+}
+
+// What is counted on the way to the next one belongs to those that are left out, too.
 static wm_status skip_outside(wm_feed *self, wm_error *err) {
+  uint64_t *now[COUNTERS], *skipped[COUNTERS], before[COUNTERS];
+  counters_of(&self->source->counts, now);
+  counters_of(&self->outside, skipped);
   while (self->has_next && !inside(self)) {
-    self->outside++;
+    self->outside.ignored++;
+    for (size_t i = 0; i < COUNTERS; i++) before[i] = *now[i];
     wm_status status = read_one(self, err);
+    for (size_t i = 0; i < COUNTERS; i++) *skipped[i] += *now[i] - before[i];
     if (status != WM_OK) return status;
   }
   return WM_OK;
+}
+
+void wm_feed_counts(const wm_feed *self, wm_source_counts *out) {
+  uint64_t *counts[COUNTERS], *skipped[COUNTERS];
+  wm_source_counts outside = self->outside;
+  *out = self->source->counts;
+  counters_of(out, counts);
+  counters_of(&outside, skipped);
+  // A frame that was missing outside of the part and came within it is none of either.
+  for (size_t i = 0; i < COUNTERS; i++) *counts[i] = *counts[i] > *skipped[i] ? *counts[i] - *skipped[i] : 0;
+  out->ignored += outside.ignored;
 }
 
 wm_status wm_feed_advance(wm_feed *self, wm_error *err) {
@@ -71,17 +96,18 @@ wm_feed *wm_feeds_earliest(wm_feed *feeds, size_t count) {
 
 void wm_feeds_health(const wm_feed *feeds, size_t count, wm_health *health) {
   for (size_t i = 0; i < count && i < health->source_count; i++) {
-    const wm_source_counts *counts = &feeds[i].source->counts;
+    wm_source_counts counts;
+    wm_feed_counts(&feeds[i], &counts);
     wm_source_health *out = &health->sources[i];
-    out->lost = counts->lost;
-    out->malformed = counts->malformed;
-    out->not_finite = counts->not_finite;
-    out->out_of_order = counts->out_of_order;
-    out->ignored = counts->ignored + feeds[i].outside;
-    out->frozen = counts->frozen;
-    out->overflows = counts->overflows;
-    out->bus_errors = counts->bus_errors;
-    out->device = counts->device;
-    out->stamp_uncertainty_ns = counts->stamp_uncertainty_ns;
+    out->lost = counts.lost;
+    out->malformed = counts.malformed;
+    out->not_finite = counts.not_finite;
+    out->out_of_order = counts.out_of_order;
+    out->ignored = counts.ignored;
+    out->frozen = counts.frozen;
+    out->overflows = counts.overflows;
+    out->bus_errors = counts.bus_errors;
+    out->device = counts.device;
+    out->stamp_uncertainty_ns = counts.stamp_uncertainty_ns;
   }
 }

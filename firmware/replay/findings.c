@@ -21,6 +21,15 @@ static void say(speaker *to, const char *line) {
 static void about_lateness(speaker *to, const wm_source_health *s) {
   if (s->late == 0 && s->lateness_p99_ns <= s->lateness_max_ns) return;
   char line[400];
+  if (s->lateness_p99_ns <= s->lateness_max_ns) {
+    (void)snprintf(line, sizeof line,
+                   "%s: %" PRIu64 " of %" PRIu64
+                   " came when what is younger had been fused (behind younger ones of a source that sends in order, or "
+                   "later than the %.0f ms that are waited for), and were dropped",
+                   s->name, s->late, s->received, (double)s->lateness_max_ns * 1e-6);
+    say(to, line);
+    return;
+  }
   (void)snprintf(line, sizeof line,
                  "%s: its data are late by %.0f ms (99 of 100 at most), allowed are %.0f; %" PRIu64 " of %" PRIu64
                  " came too late and were dropped. `lateness_max_ms: %.0f` for this source would do",
@@ -34,7 +43,7 @@ static void about_losses(speaker *to, const wm_source_health *s) {
     uint64_t count;
     const char *what;
   } kinds[] = {{s->dropped, "dropped because a queue was full (merge.queue_events, realtime.ring_events)"},
-               {s->lost, "missing by the sender's own count"},
+               {s->lost, "missing by the sender's own count (pictures: by their stamps)"},
                {s->malformed, "could not be read"},
                {s->not_finite, "were no finite numbers"},
                {s->out_of_order, "were older than the one before"},

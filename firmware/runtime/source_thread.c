@@ -27,17 +27,18 @@ static void put(live_source *self) {
 }
 
 static void share_counts(live_source *self) {
-  const wm_source_counts *counts = &self->feed->source->counts;
-  atomic_store_explicit(&self->lost, counts->lost, memory_order_relaxed);
-  atomic_store_explicit(&self->malformed, counts->malformed, memory_order_relaxed);
-  atomic_store_explicit(&self->not_finite, counts->not_finite, memory_order_relaxed);
-  atomic_store_explicit(&self->out_of_order, counts->out_of_order, memory_order_relaxed);
-  atomic_store_explicit(&self->ignored, counts->ignored + self->feed->outside, memory_order_relaxed);
-  atomic_store_explicit(&self->frozen, counts->frozen, memory_order_relaxed);
-  atomic_store_explicit(&self->overflows, counts->overflows, memory_order_relaxed);
-  atomic_store_explicit(&self->bus_errors, counts->bus_errors, memory_order_relaxed);
-  atomic_store_explicit(&self->stamp_uncertainty_ns, counts->stamp_uncertainty_ns, memory_order_relaxed);
-  atomic_store_explicit(&self->device, counts->device, memory_order_relaxed);
+  wm_source_counts counts;
+  wm_feed_counts(self->feed, &counts);
+  atomic_store_explicit(&self->lost, counts.lost, memory_order_relaxed);
+  atomic_store_explicit(&self->malformed, counts.malformed, memory_order_relaxed);
+  atomic_store_explicit(&self->not_finite, counts.not_finite, memory_order_relaxed);
+  atomic_store_explicit(&self->out_of_order, counts.out_of_order, memory_order_relaxed);
+  atomic_store_explicit(&self->ignored, counts.ignored, memory_order_relaxed);
+  atomic_store_explicit(&self->frozen, counts.frozen, memory_order_relaxed);
+  atomic_store_explicit(&self->overflows, counts.overflows, memory_order_relaxed);
+  atomic_store_explicit(&self->bus_errors, counts.bus_errors, memory_order_relaxed);
+  atomic_store_explicit(&self->stamp_uncertainty_ns, counts.stamp_uncertainty_ns, memory_order_relaxed);
+  atomic_store_explicit(&self->device, counts.device, memory_order_relaxed);
 }
 
 static void play_recording(live_source *self) {

@@ -189,12 +189,20 @@ static void every_datum_is_accounted_for(void) {
   TEST_ASSERT_GREATER_THAN(0, source("sightings:eye")->late);
 }
 
+// What is wrong outside of the part is not the part's.
 static void from_and_until_take_a_part_of_a_source(void) {
   small_recording_write("rec", &(small_recording){.seconds = 20});
+  FILE *f = fopen(in_folder("rec/sightings.csv"), "a");
+  TEST_ASSERT_NOT_NULL(f);
+  (void)fputs("20000000000,eye,1,nothing,3,20000000000\n", f);
+  (void)fclose(f);
+  replay_into("rec", kConfig, "whole", &report);
+  TEST_ASSERT_EQUAL_UINT64(1, source("sightings:eye")->malformed);
   replay_into("rec",
               "format: waymark-config/1\nestimator: landmark_ekf\nsources:\n"
               "  - {name: sightings, from_s: 2, until_s: 5}\n",
               "run", &report);
+  TEST_ASSERT_EQUAL_UINT64(0, source("sightings:eye")->malformed);
   size_t length;
   char *innovations = read_all(in_folder("run/innovations.csv"), &length);
   TEST_ASSERT_NOT_NULL(strstr(innovations, "\n2000000000,"));

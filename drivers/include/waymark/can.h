@@ -82,7 +82,8 @@ void wm_can_decoder_free(wm_can_decoder *self);  // NULL is fine
 // WM_BAD_DATA: shorter than its bound signals (malformed), or all of its signals say that there is no value
 // (not_finite); the text is in *err.
 // `counts.received` and `counts.first_problem` are for the source, which hands the event out and knows file and line.
-// A message's rolling counter, where the DBC has one and it steps by one in the first frames, gives `lost`.
+// A message's rolling counter, where the DBC has one and it steps by one in the first frames, gives `lost`; a frame
+// that was overtaken is taken off again when it comes.
 // Ticks go on from their last value by the shorter way round: a gap must not last longer than half a cycle.
 // No allocation. Cost: a search among the bound ids, then linear in the bound signals; on a desk computer 6 ns for an
 // unbound id and 55 ns for a frame of four signals. One thread at a time.

@@ -15,7 +15,8 @@ typedef struct wm_feed {
   wm_source *source;
   uint16_t index;  // in the run's table
   wm_time_ns from_ns, until_ns;
-  uint64_t outside;  // events that from_s and until_s left out
+  // Events that from_s and until_s left out (ignored), and what the source counted while it read them.
+  wm_source_counts outside;
   int has_next;
   wm_event next;
 } wm_feed;
@@ -30,6 +31,8 @@ wm_status wm_feeds_open(const wm_assembly *assembly, wm_feed *feeds, wm_time_ns 
 wm_status wm_feed_advance(wm_feed *self, wm_error *err);
 // The feed whose next event arrived first (the first in the table at equal arrivals), or NULL.
 wm_feed *wm_feeds_earliest(wm_feed *feeds, size_t count);
+// What the source counted inside of from_s and until_s; `ignored` has what is outside.
+void wm_feed_counts(const wm_feed *self, wm_source_counts *out);
 // Adds what the sources counted themselves.
 void wm_feeds_health(const wm_feed *feeds, size_t count, wm_health *health);
 
