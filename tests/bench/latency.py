@@ -34,7 +34,7 @@ def make_recordings(work):
     made = {}
     for name, world, config, observed in (
             ("edge_mcl, 640 x 360 at 5 Hz", work / "corridor.yaml", "corridor.yaml", "video/front.csv"),
-            ("landmark_ekf, two cameras' sightings at 10 Hz", ROOT / "config/worlds/crossing.yaml", "crossing.yaml", "sightings.csv")):
+            ("landmark_ekf, two cameras' sightings at 10 Hz", ROOT / "config/worlds/crossing.yaml", "crossing-points.yaml", "sightings.csv")):
         recording = work / pathlib.Path(config).stem
         subprocess.run([BUILD / "bin/waymark-simulate", world, "--out", recording, "--duration", str(SECONDS)], check=True,
                        stdout=subprocess.DEVNULL)

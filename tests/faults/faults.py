@@ -24,13 +24,20 @@ sys.path.insert(0, str(ROOT / "tests/hil"))
 import drives  # noqa: E402
 import edges  # noqa: E402
 import landmarks  # noqa: E402
+import messages  # noqa: E402
 from published import ABSENT, BUS_OFF, DOWN, FROZEN, IS_BUSY, MOTION_STALE, STALLED, WORKS, Published  # noqa: E402
 
 BUILD = pathlib.Path(sys.argv[1]).resolve()
 WAYMARK = BUILD / "tests/waymark-played"
 SECONDS, RATE_HZ = 64, 10
 CAMERA, CAN, SIGHTINGS = "edges:front", "can", "sightings"
+LCM_GROUP = ("239.255.76.67", 7667)
 ROUTE = ["ip", "route", "add", "224.0.0.0/4", "dev", "lo"]
+
+
+def packet(channel, message, number=0):
+    """LCM's datagram of one message."""
+    return struct.pack(">II", 0x4c433032, number) + channel + b"\0" + message
 
 
 # ── what is driven ──────────────────────────────────────────────────────────────────────────────────────────────────
@@ -73,8 +80,9 @@ class Drive:
         devices = (f"devices: {{can: [{{interface: can0}}], cameras: [{{name: front, device: /dev/video0, format: MJPG, rate_hz: {RATE_HZ}}}]}}\n"
                    "map: map/map.yaml\n") if world == "corridor" else (
                    "devices: {can: [{interface: can0}], sightings: lcm}\nlandmarks: landmarks.csv\n")
+        own = {"corridor": "corridor.yaml", "crossing": "crossing-points.yaml"}[world]
         self.config = (
-            drives.with_realtime((ROOT / f"config/{world}.yaml").read_text(), "lock_memory: false") + f"\ninitial_pose: {drives.start_of(recording)}\n"
+            drives.with_realtime((ROOT / "config" / own).read_text(), "lock_memory: false") + f"\ninitial_pose: {drives.start_of(recording)}\n"
             "calibration: calibration.yaml\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\n" + devices +
             f"publish: {{lcm_url: '{drives.URL}'}}\n"
             "start: {saved_pose: pose.yaml, save_every_s: 0.5}\n")
@@ -94,9 +102,8 @@ class Drive:
         for number, (arrival_ns, t_ns, message) in enumerate(sent):
             self.sleep_until((arrival_ns - self.first_ns) * 1e-9)
             stamp = struct.pack(">q", t_ns - self.first_ns + self.begin_ns)
-            packet = struct.pack(">II", 0x4c433032, number) + b"WAYMARK_SIGHTINGS\0" + message[:8] + stamp + message[16:]
             try:
-                out.sendto(packet, ("239.255.76.67", 7667))
+                out.sendto(packet(b"WAYMARK_SIGHTINGS", message[:8] + stamp + message[16:], number), LCM_GROUP)
             except OSError:
                 pass  # no route: that is one of the faults
 
@@ -154,11 +161,12 @@ def camera(work):
         heard.goes_on(what, from_s, until_s)
         heard.grows(what, from_s, until_s)
         heard.device(what, CAMERA, state, from_s + delay_s, until_s)
-        heard.is_back(what, CAMERA, {"stalled": 40}.get(what, until_s + 2.5), usual_m)
+        heard.is_back(what, CAMERA, until_s, {"stalled": 40}.get(what, until_s + 2.5), usual_m)
     heard.counted("frozen", CAMERA, "frozen", 22, 27.2, 4 * RATE_HZ - 4, 4 * RATE_HZ + 2)
     heard.goes_on("20 % dropped", 45, 53)
     heard.device("20 % dropped", CAMERA, WORKS, 46, 53)
     heard.counted("20 % dropped", CAMERA, "lost", 44.9, 54.2, 0.08 * 8 * RATE_HZ, 0.35 * 8 * RATE_HZ)
+    heard.goes_on("20 % dropped, over", 53, 56)
     heard.goes_on("30 % with error flags", 56, 61)
     heard.device("30 % with error flags", CAMERA, WORKS, 57, 61)
     heard.counted("30 % with error flags", CAMERA, "malformed", 55.9, 62.2, 0.12 * 5 * RATE_HZ, 0.48 * 5 * RATE_HZ)
@@ -194,8 +202,9 @@ def can(work):
         heard.check(all(p.status_flags & MOTION_STALE for t, p in poses if t > from_s + 1), f"{what}: poses say that motion is stale")
         heard.grows(what, from_s, until_s)
         heard.device(what, CAN, state, from_s + 1.2, until_s)
-        heard.is_back(what, CAN, until_s + 2, usual_m)
+        heard.is_back(what, CAN, until_s, until_s + 2, usual_m)
     heard.goes_on("2 % of CAN frames lost", 21, 27)
+    heard.goes_on("2 % of CAN frames lost, over", 27, 31)
     heard.device("2 % of CAN frames lost", CAN, WORKS, 22, 27)
     heard.is_said("can0 went down")
     heard.is_said("can0 is gone (No such device)")
@@ -235,6 +244,7 @@ def process(work):
     heard.check(first_s < begun_s + 2, f"killed: tracking again {first_s - begun_s:.2f} s after the start, which took {up_s - again_s:.2f} s")
     heard.check(first is not None and heard.error_m(first_s, first) < 4 * heard.sigma_m(first),
                 f"killed: where it was, {heard.error_m(first_s, first):.2f} m off with a sigma of {heard.sigma_m(first):.2f} m")
+    heard.goes_on("killed, over", first_s, 20)
     heard.is_said("start: where it was")
     heard.is_said("No space left on device. Localizing goes on")
     heard.goes_on("configuration with an error", 20, 25)
@@ -274,8 +284,64 @@ def recorder(work):
     return failures
 
 
+def say_it_is_elsewhere(drive, at_s):
+    """SET_POSE: 3 m ahead of where it is, turned by a quarter, and sure of it."""
+    truth = [(t - drive.first_ns, *rest) for t, *rest in drives.table(drive.world / "recording/truth.csv")]
+    x_m, y_m, heading_rad = drives.at(truth, [row[0] for row in truth], at_s * 1e9)
+    said = messages.types(drive.folder).set_pose_t()
+    turned = heading_rad + math.pi / 2
+    said.position_m = [x_m + 3 * math.cos(heading_rad), y_m + 3 * math.sin(heading_rad), 0]
+    said.orientation_xyzw = [0, 0, math.sin(turned / 2), math.cos(turned / 2)]
+    said.sigma_xy_m, said.sigma_heading_rad = 0.05, 0.02
+    socket.socket(socket.AF_INET, socket.SOCK_DGRAM).sendto(packet(b"WAYMARK_SET_POSE", said.encode()), LCM_GROUP)
+
+
+def box(work):
+    """The black box of a run that is killed, and of one that loses its way: the last seconds with CAN and pictures, which replay."""
+    keep_s, pictures_hz, killed_s, elsewhere_s = 8, 2, 20, 34
+    drive = Drive(work, "corridor", "box", [])
+    (drive.folder / "robot.yaml").write_text(drive.config + f"black_box: {{folder: box, keep_s: {keep_s}, pictures_hz: {pictures_hz}}}\n")
+    run = drive.run()
+    drive.sleep_until(killed_s)
+    run.kill()
+    run.wait()
+    run = drive.run()
+    drive.sleep_until(elsewhere_s)
+    say_it_is_elsewhere(drive, elsewhere_s)
+    drive.end(run, 52)
+    heard = drive.hear()
+    lost_s = next((t for t, p in heard.poses if t > elsewhere_s and p.state == 3), math.inf)
+    heard.check(lost_s < 45, f"lost {lost_s - elsewhere_s:.1f} s after it was told a wrong place")
+    for what, until_s in (("died-0001", killed_s), ("lost-0002", lost_s + keep_s / 4)):
+        times, fused = [], {CAN: 0, CAMERA: 0}
+        for part in ("before", "now"):
+            log, out = drive.folder / f"box/{what}-{part}.wmlog", drive.folder / f"{what}-{part}"
+            replay = subprocess.run([BUILD / "bin/waymark", "replay", log, "--map", drive.world / "recording/map/map.yaml", "--out", out], capture_output=True, text=True)
+            if replay.returncode != 0:
+                heard.check(False, f"{what}-{part} doesn't replay: {replay.stderr[-300:]}")
+                continue
+            times += [(row[0] - drive.begin_ns) * 1e-9 for row in drives.table(out / "trajectory.csv")]
+            for name in fused:
+                fused[name] += json.loads((out / "health.json").read_text())["sources"][name]["fused"]
+        span_s = times[-1] - times[0] if times else 0
+        heard.check(keep_s - 1 < span_s < 2 * keep_s + 1 and until_s - 1.5 < times[-1] < until_s + 1,
+                    f"{what}: poses of {span_s:.1f} s, to {until_s - times[-1]:.1f} s before it")
+        heard.check(fused[CAN] > 200 * span_s and fused[CAMERA] > 0.7 * RATE_HZ * span_s, f"{what}: fused {fused}")
+        stamps, whole = [], 0
+        for part in "ab":
+            video = drive.folder / f"box/{what}-front-{part}.avi"
+            if not video.exists():
+                continue
+            with open(video.with_suffix(".csv"), newline="") as f:
+                stamps += [(int(row["t_ns"]) - drive.begin_ns) * 1e-9 for row in csv.DictReader(f)]
+            whole += sum(p[:2] == b"\xff\xd8" and p[-2:] == b"\xff\xd9" for p in edges.pictures(video))
+        heard.check(whole == len(stamps) > 0.8 * pictures_hz * keep_s and until_s - 1.5 < max(stamps) < until_s + 1,
+                    f"{what}: {whole} whole pictures, {len(stamps)} stamps, to {until_s - max(stamps, default=math.nan):.1f} s before it")
+    return heard.failures
+
+
 DRIVES = {"camera": (camera, "corridor"), "clock": (clock, "corridor"), "can": (can, "crossing"), "process": (process, "crossing"),
-          "recorder": (recorder, "corridor")}
+          "recorder": (recorder, "corridor"), "box": (box, "corridor")}
 
 
 def main():

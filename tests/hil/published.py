@@ -72,7 +72,9 @@ class Published:
         n = [getattr(messages.source(self.health_at(t), name), counter) for t in (from_s, until_s)]
         self.check(least <= n[1] - n[0] <= most, f"{what}: {n[1] - n[0]} {counter} of {name}, {least} to {most} are right")
 
-    def is_back(self, what, name, at_s, sigma_m):
+    def is_back(self, what, name, until_s, at_s, sigma_m):
+        """Broken until until_s, in order from at_s on: then, and on the way there, too, it lies as far from the truth as it says."""
+        self.goes_on(what + ", over", until_s, at_s + 2.5)
         self.device(what + ", over", name, WORKS, at_s, at_s + 2.5)
         poses = self.between(at_s, at_s + 2.5)
         now = min((self.sigma_m(p) for _, p in poses), default=math.inf)
