@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "vision/landmarks/align.hpp"
+#include "vision/landmarks/everywhere.hpp"
 #include "vision/landmarks/guess.hpp"
 #include "vision/landmarks/match.hpp"
 #include "waymark/detector.h"
@@ -104,7 +105,7 @@ struct Street {
   }
 };
 
-void whole(const Street &street) {
+void whole(const Street &street, bool lost) {
   constexpr int kRounds = 60;
   const wm_detector *detector = wm_detector_find("landmarks");
   const int32_t camera = 0;
@@ -124,17 +125,54 @@ void whole(const Street &street) {
     pose.pose_map_base.p_m[1] = 0.03 * std::sin(k);
     size_t count;
     const double begin = thread_us();
-    (void)detector->detect(state, &frame, &pose, events, 64, &count);
+    (void)detector->detect(state, &frame, lost ? nullptr : &pose, events, 64, &count);
     times.push_back(thread_us() - begin);
     found += count;
   }
   const double one_ms = median(times) * 1e-3;
   std::printf(
-      "landmarks_1280x720_ms median %.2f, largest %.2f (%.1f of %d found; %.1f MB); two cameras at 30 Hz take %.0f %% "
+      "landmarks_1280x720%s_ms median %.2f, largest %.2f (%.1f of %d found; %.1f MB); two cameras at 30 Hz take %.0f "
+      "%% "
       "of a core\n",
-      one_ms, times.back() * 1e-3, static_cast<double>(found) / kRounds, kSigns, static_cast<double>(bytes) * 1e-6,
-      one_ms * 60 * 0.1);
+      lost ? "_without_a_pose" : "", one_ms, times.back() * 1e-3, static_cast<double>(found) / kRounds, kSigns,
+      static_cast<double>(bytes) * 1e-6, one_ms * 60 * 0.1);
   std::free(state);
+}
+
+// The same pictures without a pose: searched everywhere.
+void everywhere(const Street &street) {
+  constexpr int kRounds = 40;
+  wm::mounted_camera camera;
+  wm::mounted_camera_init(&camera, street.rig.cameras[0]);
+  std::vector<uint8_t> levels(wm::pyramid_bytes(kWidth, kHeight) + wm::kReadBehind), looks[kSigns];
+  std::vector<uint16_t> row(kWidth);
+  wm::pyramid pyramid{};
+  wm::pyramid_lay(&pyramid, kWidth, kHeight, levels.data());
+  std::copy(street.picture.begin(), street.picture.end(), pyramid.level[0].grey);
+  wm::pyramid_build(&pyramid, row.data());
+  static wm::search_everywhere search;
+  wm::appearance known[kSigns];
+  for (int i = 0; i < kSigns; i++) {
+    looks[i].resize(wm::appearance::bytes(kSide, kSide));
+    known[i].make(street.look[i], street.landmark[i], looks[i].data());
+    search.need(camera, 0.7, 0.7, street.landmark[i].p_m[2]);
+  }
+  search.round.plan(camera, 0.021);
+  std::vector<uint8_t> memory(search.round.bytes());
+  search.round.make(camera, memory.data());
+  std::vector<double> take, compare;
+  int places = 0;
+  for (int k = 0; k < kRounds; k++) {
+    const double begin = thread_us();
+    search.round.take(pyramid);
+    const double taken = thread_us();
+    places = search.search(camera, known, kSigns, 40, 0.17, 0.021, 1 << 30);
+    compare.push_back(thread_us() - taken);
+    take.push_back(taken - begin);
+  }
+  std::printf("landmarks_everywhere_us panorama %.0f a picture (%.1f MB); a landmark %.0f (%d places, %.1f ns each)\n",
+              median(take), static_cast<double>(memory.size()) * 1e-6, median(compare) / kSigns, places / kSigns,
+              median(compare) * 1e3 / places);
 }
 
 // One sign, 5 m away: its stages.
@@ -192,6 +230,8 @@ void stages(const Street &street) {
 
 int main() {
   const Street street;
-  whole(street);
+  whole(street, false);
+  whole(street, true);
+  everywhere(street);
   stages(street);
 }

@@ -162,6 +162,8 @@ bool align_by(int unknowns, const grey_plane &picture, const raster &what, const
     for (int j = 0; j < 2; j++) out->stretch = larger(out->stretch, std::fabs(warp.a[i][j] - (i == j ? 1 : 0)));
   if (!(out->stretch < kStretchMax)) return false;
   const double noise = found.left / (n - columns) / (found.x[0] * found.x[0]);
+  out->wider = warp.a[0][0];
+  out->taller = warp.a[1][1];
   out->middle = {middle.u + warp.t[0], middle.v + warp.t[1]};
   out->uu = noise * inverse[2][2];
   out->uv = noise * inverse[2][3];

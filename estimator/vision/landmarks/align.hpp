@@ -19,10 +19,11 @@ struct align_work {
 };
 
 struct aligned {
-  pixel middle;       // in pixels of the level
-  double uu, uv, vv;  // its covariance by the fit's residuals alone, px2 of the level
-  double likeness;    // normalised correlation there
-  double stretch;     // how far the warp is from none
+  pixel middle;          // in pixels of the level
+  double uu, uv, vv;     // its covariance by the fit's residuals alone, px2 of the level
+  double likeness;       // normalised correlation there
+  double stretch;        // how far the warp is from none
+  double wider, taller;  // how many times the drawn width and height it has
 };
 
 // `middle` is where the landmark's middle was drawn, `right` and `down` whole pixels from there to begin at. False

@@ -54,19 +54,6 @@ bool place_of(const appearance &what, const mat3 &plane, const vec3 &ray, pictur
   return a >= -0.5 && a <= 0.5 && b >= -0.5 && b <= 0.5;
 }
 
-double sample(const appearance &what, int size, const picture_place &at) {
-  const double scale = 1.0 / (1 << size);
-  double x = (at.x + 0.5) * scale - 0.5, y = (at.y + 0.5) * scale - 0.5;
-  const int columns = what.columns[size], rows = what.rows[size];
-  x = x < 0 ? 0 : x > columns - 1 ? columns - 1 : x;
-  y = y < 0 ? 0 : y > rows - 1 ? rows - 1 : y;
-  const int column = static_cast<int>(x), row = static_cast<int>(y);
-  const int right = column + 1 < columns ? 1 : 0, down = row + 1 < rows ? columns : 0;
-  const double fx = x - column, fy = y - row;
-  const uint8_t *p = what.grey[size] + row * columns + column;
-  return (1 - fy) * ((1 - fx) * p[0] + fx * p[right]) + fy * ((1 - fx) * p[down] + fx * p[down + right]);
-}
-
 struct sampling {
   int across, down;  // samples a pixel
   int size;          // of the learnt picture's
@@ -175,6 +162,20 @@ void appearance::make(const wm_appearance &learnt, const wm_landmark &landmark, 
   }
 }
 
+double grey_of(const appearance &what, int size, double x, double y) {
+  const double scale = 1.0 / (1 << size);
+  x = (x + 0.5) * scale - 0.5;
+  y = (y + 0.5) * scale - 0.5;
+  const int columns = what.columns[size], rows = what.rows[size];
+  x = x < 0 ? 0 : x > columns - 1 ? columns - 1 : x;
+  y = y < 0 ? 0 : y > rows - 1 ? rows - 1 : y;
+  const int column = static_cast<int>(x), row = static_cast<int>(y);
+  const int right = column + 1 < columns ? 1 : 0, down = row + 1 < rows ? columns : 0;
+  const double fx = x - column, fy = y - row;
+  const uint8_t *p = what.grey[size] + row * columns + column;
+  return (1 - fy) * ((1 - fx) * p[0] + fx * p[right]) + fy * ((1 - fx) * p[down] + fx * p[down + right]);
+}
+
 bool view_panel(const appearance &what, const mat3 &R_map_optical, const vec3 &eye_m, panel_view *out) {
   const sin_cos yaw = sincos(what.yaw_rad);
   const vec3 right = transposed_times(R_map_optical, {yaw.cos, yaw.sin, 0}),
@@ -224,7 +225,7 @@ bool draw(const appearance &what, const panel_view &view, const ray_table &rays,
           const double u = (out->left + x + (j + 0.5) / by.across - 0.5) * step,
                        v = (out->top + y + (i + 0.5) / by.down - 0.5) * step;
           whole = place_of(what, view.plane, rays.at(u, v), &at);
-          if (whole) sum += sample(what, by.size, at);
+          if (whole) sum += grey_of(what, by.size, at.x, at.y);
         }
       if (!whole) continue;
       const int k = y * raster::kSide + x;

@@ -29,6 +29,10 @@ struct appearance {
   void make(const wm_appearance &learnt, const wm_landmark &landmark, uint8_t *memory);
 };
 
+// Grey level at a place of the kept picture: x and y in pixels of the largest one, `size` the one that is read. Beside
+// the picture the edge goes on.
+double grey_of(const appearance &what, int size, double x, double y);
+
 // From a ray of the camera to the landmark's plane.
 struct panel_view {
   vec3 middle;      // of the landmark, in optical axes

@@ -24,6 +24,16 @@ static const wm_param kParams[] = {
         "By how much the best place in the window must be more like the landmark than any other."),
     F64("contrast_grey", contrast_grey, 4, 1, 255,
         "Grey levels. Standard deviation that a landmark's place in the picture must have."),
+    F64("search_places", search_places, 250000, 0, 1e8,
+        "How many places a picture are compared with landmarks, some 20 ns each, while there is no pose that says "
+        "where "
+        "they are. 0: nothing is searched without a pose."),
+    F64("search_after_s", search_after_s, 0.5, 0, 3600,
+        "s. The pose led to no landmark for so long: they are searched everywhere, too."),
+    F64("likeness_alone", likeness_alone, 0.93, 0.3, 1,
+        "Normalised correlation from which on a landmark is believed that was found without a pose; less alike ones "
+        "must "
+        "agree with two others."),
     F64("blur_px", blur_px, 0.6, 0, 5, "px. Width (sigma) of a point in the picture: lens and compression."),
     F64("sigma_px", sigma_px, 0.05, 0, 10,
         "px. Error of a landmark's middle that the rest of its fit doesn't show: compression, the camera's response."),

@@ -204,7 +204,53 @@ void what_is_not_there_is_not_found_and_said_why() {
   TEST_ASSERT_EQUAL(WM_LOOK_FOUND, eyes.why());
 }
 
+void found_anywhere_without_a_pose() {
+  const Eyes eyes;
+  int found = 0;
+  double largest = 0, squares = 0;
+  for (uint64_t i = 0; i < 24; i++) {
+    const auto random = [i](uint64_t k) { return 2 * wm_random_uniform(11, k, i) - 1; };
+    const Place at = {2 + 1.5 * random(1), 1.5 * random(2), 0.7 * random(3)};
+    Scene scene;
+    scene.seed = i + 1;
+    scene.light = 0.8 + 0.2 * random(4);
+    if (eyes.look(draw(at, scene), nullptr) == 0) continue;
+    const wm_sighting &seen = events[0].as.sighting;
+    TEST_ASSERT_EQUAL(7, seen.landmark_id);
+    const double off = std::remainder(seen.bearing_rad - true_bearing(at), 2 * M_PI);
+    squares += off * off / (seen.bearing_sigma_rad * seen.bearing_sigma_rad);
+    largest = std::fmax(largest, std::fabs(off));
+    found++;
+    scene.there = false;
+    TEST_ASSERT_EQUAL(0, eyes.look(draw(at, scene), nullptr));
+    TEST_ASSERT_EQUAL(WM_LOOK_UNCERTAIN, eyes.why());
+    scene.there = scene.other = true;
+    TEST_ASSERT_EQUAL(0, eyes.look(draw(at, scene), nullptr));
+  }
+  std::printf("without a pose: found %d of 24, off by at most %.4f degrees, %.2f of its sigma\n", found,
+              largest * 180 / M_PI, std::sqrt(squares / found));
+  TEST_ASSERT_GREATER_OR_EQUAL(16, found);
+  TEST_ASSERT_TRUE(std::sqrt(squares / found) < 1.5);
+}
+
+// A pose that leads to nothing is doubted after a while.
+void carried_off_it_is_found_where_it_is() {
+  const Eyes eyes;
+  const auto picture = draw({2, 0.4, 0.2}, Scene{});
+  wm_estimate wrong = pose_of({1, -3, -0.6}, 0.03, 0.01);
+  int looks = 0;
+  for (wm_time_ns t_ns = 0; t_ns <= 600 * WM_NS_PER_MS; t_ns += 200 * WM_NS_PER_MS, looks++) {
+    wrong.t_ns = t_ns;
+    const wm_frame frame = {t_ns, t_ns, 0, 1, 0, kWidth, kHeight, kWidth, picture.data()};
+    size_t count = 0;
+    TEST_ASSERT_EQUAL(WM_OK, detector->detect(eyes.state, &frame, &wrong, events, 64, &count));
+    TEST_ASSERT_EQUAL(t_ns > 500 * WM_NS_PER_MS ? 1 : 0, count);
+  }
+  TEST_ASSERT_EQUAL(4, looks);
+}
+
 void a_pose_that_says_nothing_guides_nowhere() {
+  params.search_places = 0;
   const Eyes eyes;
   const Place at = {1, 0, 0};
   const auto picture = draw(at, Scene{});
@@ -288,6 +334,8 @@ int main() {
   UNITY_BEGIN();
   RUN_TEST(found_where_it_is_with_the_sigma_that_it_has);
   RUN_TEST(what_is_not_there_is_not_found_and_said_why);
+  RUN_TEST(found_anywhere_without_a_pose);
+  RUN_TEST(carried_off_it_is_found_where_it_is);
   RUN_TEST(a_pose_that_says_nothing_guides_nowhere);
   RUN_TEST(a_moving_robot_is_expected_where_it_was);
   RUN_TEST(rows_have_their_own_times);

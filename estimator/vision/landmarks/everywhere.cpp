@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vision/landmarks/everywhere.hpp"
+
+#include <cstring>
+
+#include "math/elementary.hpp"
+
+namespace wm {
+namespace {
+
+constexpr int kLanes = 16, kRowsMax = 16, kRowsMin = 5, kColumnsMin = 4;
+constexpr double kArea = 90;  // pixels of a template that isn't slanted
+// Wider landmarks are shop boards and the like: letters, of which a small template keeps nothing. They are found by the
+// pose that others tell.
+constexpr double kWide = 2.5;
+constexpr double kLikeness = 0.6;   // of a place that is worth a second look
+constexpr double kPromise = 0.2;    // less than that much worse than wanted: its neighbours are looked at
+constexpr double kSpread_grey = 5;  // of what can be compared at all
+constexpr int kOwn = 3;             // places that one landmark keeps
+constexpr double kHalfStep = 0.13;  // half of a cylinder's step in distance
+// Cosines of the slants: from one to the next, a landmark's width changes as much as its size from cylinder to
+// cylinder.
+constexpr double kFacing[] = {0.97, 0.78, 0.62, 0.5, 0.4, 0.32, 0.25};
+
+struct form {
+  int rows;
+  double middle_row;  // over the horizon
+};
+
+form form_of(double width_m, double height_m, double above_m) {
+  const double aspect = width_m / height_m, wide = aspect < kWide ? aspect : kWide;
+  int rows = static_cast<int>(std::sqrt(kArea / wide) + 0.5);
+  rows = rows < kRowsMin ? kRowsMin : rows > kRowsMax ? kRowsMax : rows;
+  return {rows, rows * above_m / height_m};
+}
+
+struct small_picture {
+  int rows, columns;
+  int64_t energy;
+  int16_t level[kRowsMax * kLanes];  // less their mean; 0 beside
+};
+
+// How the landmark looks on a cylinder, its right side farther away by the slant. What perspective adds to that differs
+// from distance to distance, but little: a middle one stands for all.
+bool draw_small(const appearance &what, const form &shape, double height_m, double facing, small_picture *out) {
+  constexpr double kStep_rad = 0.015;
+  out->rows = shape.rows;
+  const double pixel_m = what.height_m / shape.rows, distance_m = pixel_m / kStep_rad,
+               wanted = what.width_m * facing / pixel_m;
+  out->columns = wanted >= kLanes ? kLanes : static_cast<int>(wanted + 0.5);
+  if (out->columns < kColumnsMin) return false;
+  const double across = std::sqrt(1 - facing * facing);
+  const int right = static_cast<int>(2 / facing + 0.5), down = 2;
+  int size = 0;
+  while (size + 1 < what.sizes && what.rows[0] > 3 * (out->rows << size)) size++;
+  std::memset(out->level, 0, sizeof out->level);
+  double grey[kRowsMax * kLanes], sum = 0;
+  for (int x = 0; x < out->columns; x++) {
+    double to_right[16], away[16];
+    for (int j = 0; j < right; j++) {
+      const sin_cos a = sincos(-(x + (j + 0.5) / right - 0.5 * out->columns) * kStep_rad);
+      const double toward = facing * a.cos + across * a.sin;
+      away[j] = toward > 0.05 ? distance_m * facing / toward : distance_m;
+      to_right[j] = (away[j] * a.cos - distance_m) * across - away[j] * a.sin * facing;
+    }
+    for (int y = 0; y < out->rows; y++) {
+      double mean = 0;
+      for (int i = 0; i < down; i++) {
+        const double tangent = (shape.middle_row - (y + (i + 0.5) / down - 0.5 * out->rows)) * kStep_rad;
+        for (int j = 0; j < right; j++)
+          mean += grey_of(what, size, (to_right[j] / what.width_m + 0.5) * what.columns[0] - 0.5,
+                          (0.5 - (away[j] * tangent - height_m) / what.height_m) * what.rows[0] - 0.5);
+      }
+      sum += grey[y * kLanes + x] = mean / (right * down);
+    }
+  }
+  out->energy = 0;
+  sum /= out->rows * out->columns;
+  for (int y = 0; y < out->rows; y++)
+    for (int x = 0; x < out->columns; x++) {
+      int16_t &level = out->level[y * kLanes + x];
+      level = static_cast<int16_t>(std::floor(4 * (grey[y * kLanes + x] - sum) + 0.5));
+      out->energy += level * level;
+    }
+  return out->energy > 16 * kSpread_grey * kSpread_grey * out->rows * out->columns;
+}
+
+int32_t together(const cylinder &on, const small_picture &what, int left, int top) {
+  int32_t sum = 0;
+  for (int y = 0; y < what.rows; y++) {
+    const uint8_t *from = on.row(top + y) + left;
+    const int16_t *level = what.level + y * kLanes;
+    for (int x = 0; x < kLanes; x++) sum += level[x] * static_cast<int16_t>(from[x]);
+  }
+  return sum;
+}
+
+// The best places of one landmark, each at another azimuth.
+struct shortlist {
+  int count;
+  possible_place places[kOwn];
+
+  double least() const { return count < kOwn ? kLikeness : places[count - 1].likeness; }
+  void offer(const possible_place &one, double apart_rad) {
+    int at = 0;
+    while (at < count && std::fabs(places[at].azimuth_rad - one.azimuth_rad) > apart_rad) at++;
+    if (at < count && places[at].likeness >= one.likeness) return;
+    if (at == count) {
+      if (count == kOwn && places[kOwn - 1].likeness >= one.likeness) return;
+      at = count < kOwn ? count++ : kOwn - 1;
+    }
+    places[at] = one;
+    for (; at > 0 && places[at - 1].likeness < places[at].likeness; at--) {
+      const possible_place higher = places[at];
+      places[at] = places[at - 1];
+      places[at - 1] = higher;
+    }
+  }
+};
+
+bool is_all_seen(const cylinder &on, const small_picture &what, int left, int top) {
+  return on.is_seen(left, top) && on.is_seen(left + what.columns - 1, top) && on.is_seen(left, top + what.rows - 1) &&
+         on.is_seen(left + what.columns - 1, top + what.rows - 1);
+}
+
+// The likeness of one place; below -1 where there is nothing to compare.
+double likeness_at(const cylinder &on, const small_picture &what, int left, int top) {
+  const ptrdiff_t stride = on.columns + 1, from = top * stride + left, below = what.rows * stride;
+  const int w = what.columns, n = what.rows * w;
+  const uint32_t *s = on.sums + from, *q = on.squares + from;
+  const int64_t sum = static_cast<uint32_t>(s[below + w] - s[below] - s[w] + s[0]);
+  const int64_t squares = static_cast<uint32_t>(q[below + w] - q[below] - q[w] + q[0]);
+  const int64_t variance = n * squares - sum * sum;  // times n squared
+  if (variance < static_cast<int64_t>(n) * n * static_cast<int64_t>(kSpread_grey * kSpread_grey)) return -2;
+  return together(on, what, left, top) /
+         std::sqrt(static_cast<double>(what.energy) * static_cast<double>(variance) / n);
+}
+
+// Everywhere within `tolerance` rows of where it should be: at every second place, and round those that promise
+// something. Returns how many places were compared.
+int compare(const cylinder &on, const small_picture &what, int top, int tolerance, const possible_place &like,
+            shortlist *best) {
+  int compared = 0;
+  const int last_row = on.rows - what.rows, last_column = on.columns - what.columns;
+  const int from = top - tolerance < 0 ? 0 : top - tolerance,
+            to = top + tolerance > last_row ? last_row : top + tolerance;
+  for (int y = from; y <= to; y += 2)
+    for (int x = 0; x <= last_column; x += 2) {
+      const double here = likeness_at(on, what, x, y);
+      compared++;
+      if (here < best->least() - kPromise) continue;
+      double most = here;
+      int left = x, up = y;
+      for (int i = y > 0 ? y - 1 : 0; i <= y + 1 && i <= last_row; i++)
+        for (int j = x > 0 ? x - 1 : 0; j <= x + 1 && j <= last_column; j++) {
+          const double there = i == y && j == x ? here : likeness_at(on, what, j, i);
+          if (there > most) most = there, left = j, up = i;
+        }
+      compared += 8;
+      if (most <= best->least() || !is_all_seen(on, what, left, up)) continue;
+      possible_place place = like;
+      place.azimuth_rad = on.left_rad - (left + 0.5 * (what.columns - 1)) * on.step_rad;
+      place.likeness = most;
+      best->offer(place, 0.5 * what.columns * on.step_rad);
+    }
+  return compared;
+}
+
+int tolerance_of(const form &shape, const cylinder &on, double tilt_rad) {
+  return static_cast<int>(tilt_rad / on.step_rad + kHalfStep * std::fabs(shape.middle_row)) + 1;
+}
+
+}  // namespace
+
+void search_everywhere::need(const mounted_camera &camera, double width_m, double height_m, double z_m) {
+  const form shape = form_of(width_m, height_m, z_m - camera.centre_m.z);
+  const double reach = 0.5 * shape.rows + kHalfStep * std::fabs(shape.middle_row) + 2;
+  round.need(shape.middle_row + reach, reach - shape.middle_row);
+}
+
+int search_everywhere::search(const mounted_camera &camera, const appearance *known, int known_count,
+                              double range_max_m, double facing_min, double tilt_rad, int compare_max) {
+  constexpr double kNearest_m = 1;
+  int compared = 0;
+  count = 0;
+  for (int turn = 0; turn < known_count && compared < compare_max; turn++) {
+    const appearance &what = known[next];
+    next = next + 1 < known_count ? next + 1 : 0;
+    if (what.width_m > kWide * what.height_m) continue;
+    const double height_m = what.place_m.z - camera.centre_m.z;
+    const form shape = form_of(what.width_m, what.height_m, height_m);
+    shortlist best{};
+    for (const double facing : kFacing) {
+      small_picture drawn;
+      if (facing < facing_min || !draw_small(what, shape, height_m, facing, &drawn)) break;
+      for (const cylinder &on : round.round) {
+        const double distance_m = what.height_m / (shape.rows * on.step_rad);
+        if (distance_m > range_max_m || distance_m < kNearest_m) continue;
+        const int top = on.horizon - static_cast<int>(std::floor(shape.middle_row + 0.5 * shape.rows));
+        const possible_place like = {static_cast<int>(&what - known), 0, distance_m,
+                                     atan2(std::sqrt(1 - facing * facing), facing), 0};
+        compared += compare(on, drawn, top, tolerance_of(shape, on, tilt_rad), like, &best);
+      }
+    }
+    for (int i = 0; i < best.count; i++) {
+      if (count == kPlaces && places[count - 1].likeness >= best.places[i].likeness) continue;
+      int at = count < kPlaces ? count++ : kPlaces - 1;
+      for (; at > 0 && places[at - 1].likeness < best.places[i].likeness; at--) places[at] = places[at - 1];
+      places[at] = best.places[i];
+    }
+  }
+  return compared;
+}
+
+camera_guess guess_from(const mounted_camera &camera, const appearance &what, double azimuth_rad, double distance_m,
+                        double slant_rad, double distance_sigma, double slant_sigma_rad, double azimuth_sigma_rad) {
+  const double sight_rad = what.yaw_rad - slant_rad + kHalfPi;
+  const sin_cos to = sincos(sight_rad), h = sincos(sight_rad - azimuth_rad);
+  camera_guess out;
+  out.R_map_base = {{{h.cos, -h.sin, 0}, {h.sin, h.cos, 0}, {0, 0, 1}}};
+  out.R_map_optical = out.R_map_base * camera.R_base_optical;
+  out.eye_m = {what.place_m.x - distance_m * to.cos, what.place_m.y - distance_m * to.sin, camera.centre_m.z};
+  out.base_m = out.eye_m - out.R_map_base * camera.centre_m;
+  const vec3 arm = out.R_map_base * camera.centre_m;
+  // x, y, heading by distance, slant, azimuth; a turn by the heading moves base_link about the eye.
+  const double by[3][3] = {{-to.cos * distance_m * distance_sigma, -to.sin * distance_m * distance_sigma, 0},
+                           {(-distance_m * to.sin - arm.y) * slant_sigma_rad,
+                            (distance_m * to.cos + arm.x) * slant_sigma_rad, -slant_sigma_rad},
+                           {-arm.y * azimuth_sigma_rad, arm.x * azimuth_sigma_rad, -azimuth_sigma_rad}};
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 3; k++) out.cov[i][k] = by[0][i] * by[0][k] + by[1][i] * by[1][k] + by[2][i] * by[2][k];
+  return out;
+}
+
+}  // namespace wm

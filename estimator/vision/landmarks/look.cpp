@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "vision/landmarks/look.hpp"
+
+#include <limits>
+
+namespace wm {
+namespace {
+
+constexpr double kBlurred = 0.35;  // share of the contrast that a landmark should have
+constexpr double kSmall_px = 30;   // a landmark of n pixels needs a likeness of 1 - (1 - min) n / (n + this)
+constexpr double kEdge_px = 2;     // of the picture
+
+double likeness_needed(const looker &self, int pixels) {
+  return 1 - (1 - self.params.likeness_min) * pixels / (pixels + kSmall_px);
+}
+
+}  // namespace
+
+wm_look expect_landmark(const looker &self, const camera_guess &guess, const appearance &what, double area_max,
+                        candidate *out) {
+  out->what = &what;
+  if (!view_panel(what, guess.R_map_optical, guess.eye_m, &out->view)) return WM_LOOK_FACES_AWAY;
+  if (!(out->view.distance < self.params.range_max_m)) return WM_LOOK_NOT_IN_VIEW;
+  const auto in_picture = [&](const vec3 &point, pixel *at) {
+    return project(self.camera.optics, point, at) && at->u >= kEdge_px && at->v >= kEdge_px &&
+           at->u <= self.camera.width_px - 1 - kEdge_px && at->v <= self.camera.height_px - 1 - kEdge_px;
+  };
+  if (!in_picture(out->view.middle, &out->middle)) return WM_LOOK_NOT_IN_VIEW;
+  if (!(out->view.facing >= self.params.facing_min)) return WM_LOOK_FACES_AWAY;
+  const sin_cos yaw = sincos(what.yaw_rad);
+  const vec3 right =
+                 transposed_times(guess.R_map_optical, {0.5 * what.width_m * yaw.cos, 0.5 * what.width_m * yaw.sin, 0}),
+             up = transposed_times(guess.R_map_optical, {0, 0, 0.5 * what.height_m}), m = out->view.middle;
+  const vec3 corners[4] = {m - right + up, m + right + up, m + right - up, m - right - up};
+  for (int i = 0; i < 4; i++)
+    if (!in_picture(corners[i], &out->corners[i])) return WM_LOOK_NOT_IN_VIEW;
+  const auto side = [&](int a, int b) {
+    return std::sqrt(square(out->corners[a].u - out->corners[b].u) + square(out->corners[a].v - out->corners[b].v));
+  };
+  const double wide = 0.5 * (side(0, 1) + side(2, 3)), high = 0.5 * (side(1, 2) + side(3, 0));
+  out->shorter_px = wide < high ? wide : high;
+  if (!(out->shorter_px >= self.params.size_min_px)) return WM_LOOK_TOO_SMALL;
+  out->level = 0;
+  const double longer = wide < high ? high : wide;
+  while (out->level + 1 < kLevels &&
+         (wide * high > area_max * (1 << (2 * out->level)) || 1.1 * longer + 4 > (raster::kSide << out->level)))
+    out->level++;
+  return WM_LOOK_FOUND;
+}
+
+wm_look look_for(looker *self, const candidate &one, double across_px, double down_px, sight *out) {
+  out->likeness = std::numeric_limits<double>::quiet_NaN();
+  if (!draw(*one.what, one.view, self->rays, one.corners, one.level, self->params.blur_px, &self->drawn))
+    return WM_LOOK_NOT_IN_VIEW;
+  const double step = 1 << one.level;
+  const double across = across_px / step + 1, down = down_px / step + 1;
+  if (!(across < kReachMax) || !(down < kReachMax)) return WM_LOOK_UNCERTAIN;
+  const grey_plane &picture = self->picture.level[one.level];
+  best_place best;
+  if (!search_window(picture, self->drawn, static_cast<int>(across), static_cast<int>(down), self->scores, &best))
+    return WM_LOOK_NOT_IN_VIEW;
+  out->likeness = best.likeness;
+  if (best.spread_grey < self->params.contrast_grey) return WM_LOOK_LOW_CONTRAST;
+  const double needed = likeness_needed(*self, self->drawn.count);
+  if (best.likeness < needed - 0.1)
+    return best.spread_grey < kBlurred * self->drawn.spread_grey ? WM_LOOK_BLURRED : WM_LOOK_UNLIKE;
+  aligned fine;
+  const pixel middle = {one.middle.u / step, one.middle.v / step};
+  if (!align_landmark(picture, self->drawn, middle, best.right, best.down, &self->work, &fine)) return WM_LOOK_UNLIKE;
+  out->likeness = fine.likeness;
+  if (fine.likeness < needed) return WM_LOOK_UNLIKE;
+  if (best.second > larger(fine.likeness, best.likeness) - self->params.apart_min) return WM_LOOK_AMBIGUOUS;
+  const double scale = square(step * self->params.sigma_factor),
+               floor = square(self->params.sigma_px) + square(self->params.sigma_size * step) * self->drawn.count;
+  out->at = {fine.middle.u * step, fine.middle.v * step};
+  out->wider = fine.wider;
+  out->taller = fine.taller;
+  out->uu = scale * fine.uu + floor;
+  out->uv = scale * fine.uv;
+  out->vv = scale * fine.vv + floor;
+  return WM_LOOK_FOUND;
+}
+
+}  // namespace wm

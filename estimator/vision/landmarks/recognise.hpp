@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether a landmark really is where it might be: a look at full resolution, and the pose in the plane that follows.
+#ifndef WAYMARK_ESTIMATOR_VISION_RECOGNISE_HPP
+#define WAYMARK_ESTIMATOR_VISION_RECOGNISE_HPP
+
+#include "vision/landmarks/everywhere.hpp"
+#include "vision/landmarks/look.hpp"
+
+namespace wm {
+
+struct recognised {
+  double likeness;
+  camera_guess guess;
+};
+
+// With the right side farther away (side 1) or the left one (-1). First in a small picture, whose fit says how much
+// nearer and more slanted it is than was tried, then in the one in which it would be measured. False where it isn't.
+bool recognise(looker *self, const appearance &what, const possible_place &where, int side, recognised *out);
+
+}  // namespace wm
+
+#endif
