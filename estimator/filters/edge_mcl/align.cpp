@@ -6,22 +6,6 @@
 namespace wm {
 namespace {
 
-// A = L L'; false where A isn't positive definite.
-bool factor(const double a[kAlignStates][kAlignStates], int n, double lower[kAlignStates][kAlignStates]) {
-  for (int i = 0; i < n; i++)
-    for (int j = 0; j <= i; j++) {
-      double sum = a[i][j];
-      for (int k = 0; k < j; k++) sum -= lower[i][k] * lower[j][k];
-      if (i != j)
-        lower[i][j] = sum / lower[j][j];
-      else if (!(sum > 0.0))
-        return false;
-      else
-        lower[i][i] = std::sqrt(sum);
-    }
-  return true;
-}
-
 void solve(const double lower[kAlignStates][kAlignStates], const double *b, int n, double *x) {
   for (int i = 0; i < n; i++) {
     x[i] = b[i];
@@ -36,16 +20,31 @@ void solve(const double lower[kAlignStates][kAlignStates], const double *b, int 
 
 }  // namespace
 
+bool factor_positive(const double a[kAlignStates][kAlignStates], int n, double lower[kAlignStates][kAlignStates]) {
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j <= i; j++) {
+      double sum = a[i][j];
+      for (int k = 0; k < j; k++) sum -= lower[i][k] * lower[j][k];
+      if (i != j)
+        lower[i][j] = sum / lower[j][j];
+      else if (!(sum > 0.0))
+        return false;
+      else
+        lower[i][i] = std::sqrt(sum);
+    }
+  return true;
+}
+
 bool solve_positive(const double a[kAlignStates][kAlignStates], const double *b, int n, double *x) {
   double lower[kAlignStates][kAlignStates];
-  if (!factor(a, n, lower)) return false;
+  if (!factor_positive(a, n, lower)) return false;
   solve(lower, b, n, x);
   return true;
 }
 
 bool invert_positive(const double a[kAlignStates][kAlignStates], int n, double out[kAlignStates][kAlignStates]) {
   double lower[kAlignStates][kAlignStates];
-  if (!factor(a, n, lower)) return false;
+  if (!factor_positive(a, n, lower)) return false;
   for (int j = 0; j < n; j++) {
     double unit[kAlignStates] = {}, column[kAlignStates];
     unit[j] = 1.0;

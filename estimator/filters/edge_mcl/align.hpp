@@ -32,6 +32,8 @@ struct normal_equations {
 // Solves A x = b for a symmetric positive definite A of n <= kAlignStates rows; false where it isn't.
 bool solve_positive(const double a[kAlignStates][kAlignStates], const double *b, int n, double *x);
 bool invert_positive(const double a[kAlignStates][kAlignStates], int n, double out[kAlignStates][kAlignStates]);
+// A = L L', the lower triangle; false where A isn't positive definite.
+bool factor_positive(const double a[kAlignStates][kAlignStates], int n, double lower[kAlignStates][kAlignStates]);
 
 // Whether a point lies between its neighbours, as an edge's do. What noise and reflections leave is scattered, and
 // unexplained without saying anything about the pose.

@@ -7,10 +7,12 @@
 namespace wm {
 namespace {
 
-constexpr int kRounds = 4;
+constexpr int kRounds = 4, kCoarseRounds = 2;
 constexpr double kStartStep_m = 0.12, kStartSigmas = 2.5;
 constexpr int kStartsMax = 6;  // on each side
 constexpr double kDoubtOdds = -1.5;
+constexpr double kLeastExplained = 0.4;
+constexpr double kOpenSigmas = 2.5;  // that a point is looked for off its place
 
 }  // namespace
 
@@ -39,7 +41,25 @@ edge_mcl::taken_from edge_mcl::look_back(const alignment &a) const {
   return t;
 }
 
-void edge_mcl::accumulate(const wm_points &points, const alignment &a, double gate_m, normal_equations *out) const {
+bool edge_mcl::belief_of(int camera, belief *out) const {
+  out->mean = alignment_of(camera);
+  out->n = 0;
+  for (int k = 0; k < kAlignStates; k++)
+    if (out->mean.state[k] >= 0) out->index[out->n++] = k;
+  double covariance[kAlignStates][kAlignStates], root[kAlignStates][kAlignStates];
+  for (int r = 0; r < out->n; r++)
+    for (int c = 0; c < out->n; c++)
+      covariance[r][c] = filter_.covariance(out->mean.state[out->index[r]], out->mean.state[out->index[c]]);
+  if (!invert_positive(covariance, out->n, out->inverse) || !factor_positive(covariance, out->n, root)) return false;
+  for (int r = 0; r < kAlignStates; r++)
+    for (int c = 0; c < kAlignStates; c++) out->root[r][c] = 0.0;
+  for (int r = 0; r < out->n; r++)
+    for (int c = 0; c <= r; c++) out->root[out->index[r]][c] = root[r][c];
+  return true;
+}
+
+void edge_mcl::accumulate(const wm_points &points, const alignment &a, double gate_m, const belief *prior,
+                          normal_equations *out) const {
   *out = normal_equations{};
   const taken_from then = look_back(a);
   const sin_cos h = sincos(then.pose.heading_rad);
@@ -62,7 +82,7 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
     const double sigma2 = square(point_sigma(points, i, a.camera)) + square(params_.point_sigma_m);
     const double none = 2.5 * log(1.0 + square(params_.gate_m) / (4.0 * sigma2)) / params_.correlated;
     out->cost += none;
-    if (!line.found || line.distance_m > gate_m) continue;
+    if (!line.found || (!prior && line.distance_m > gate_m)) continue;
     // What is seen of an edge is the floor on this side of it: its normal points away.
     if (line.normal_x * (x - eye_x) + line.normal_y * (y - eye_y) < 0.0) {
       line.normal_x = -line.normal_x;
@@ -77,8 +97,10 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
     const double misfit = residual * residual / sigma2;
     const double cost = 2.5 * log(1.0 + 0.25 * misfit) / params_.correlated;
     if (cost < none) out->cost += cost - none;
-    out->explained += line.distance_m < 0.06 || misfit < 9.0;
-    out->seen += out->explained > before && !on_a_line(points, i);
+    if (!prior) {
+      out->explained += line.distance_m < 0.06 || misfit < 9.0;
+      out->seen += out->explained > before && !on_a_line(points, i);
+    }
 
     double row[kAlignStates] = {};
     row[kAlignX] = line.normal_x;
@@ -90,8 +112,16 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
     row[kAlignTime] = -(line.normal_x * (then.v_mps * h.cos - then.w_radps * ry) +
                         line.normal_y * (then.v_mps * h.sin + then.w_radps * rx));
     row[kAlignEdge] = 1.0;
+    double open2 = 0.0;
+    for (int c = 0; prior && c < prior->n; c++) {
+      double sum = 0.0;
+      for (int r = 0; r < kAlignStates; r++) sum += row[r] * prior->root[r][c];
+      open2 += sum * sum;
+    }
+    if (prior && square(line.distance_m) > square(gate_m) + square(kOpenSigmas) * open2) continue;
     // Student's distribution with 4 degrees of freedom: what doesn't fit has little to say.
-    const double weight = 5.0 / (4.0 + misfit) / (sigma2 * params_.correlated);
+    const double weight =
+        5.0 / (4.0 + residual * residual / (sigma2 + open2)) / ((sigma2 + open2) * params_.correlated);
     for (int r = 0; r < kAlignStates; r++) {
       if (a.state[r] < 0) continue;
       out->gradient[r] += weight * row[r] * residual;
@@ -102,24 +132,25 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
 }
 
 // Gauss-Newton from a.value on; the cost of prediction and scan together where it ends, equations there.
-double edge_mcl::descend(const wm_points &points, const alignment &prior,
-                         const double inverse[kAlignStates][kAlignStates], const int *index, int n, double slack_m,
-                         alignment *a, normal_equations *e) const {
+double edge_mcl::descend(const wm_points &points, const belief &prior, double slack_m, alignment *a,
+                         normal_equations *e) const {
+  const int *index = prior.index, n = prior.n;
   const auto off = [&](int k) {
-    const double d = prior.value[index[k]] - a->value[index[k]];
+    const double d = prior.mean.value[index[k]] - a->value[index[k]];
     return index[k] == kAlignHeading ? wrap(d) : d;
   };
   for (int round = 0; round < kRounds; round++) {
-    // From as far as the pose may be off down to the gate.
-    const double gate = params_.gate_m + (round < 2 ? slack_m : 0.0);
-    accumulate(points, *a, gate > 0.5 ? 0.5 : gate, e);
+    // From as far as pose and camera may be off down to the gate.
+    const bool coarse = round < kCoarseRounds;
+    const double gate = params_.gate_m + (coarse ? slack_m : 0.0);
+    accumulate(points, *a, gate > 0.5 ? 0.5 : gate, coarse ? &prior : nullptr, e);
     if (round + 1 == kRounds) break;
     double total[kAlignStates][kAlignStates], right[kAlignStates], step[kAlignStates];
     for (int r = 0; r < n; r++) {
       right[r] = e->gradient[index[r]];
       for (int c = 0; c < n; c++) {
-        total[r][c] = inverse[r][c] + e->information[index[r]][index[c]];
-        right[r] += inverse[r][c] * off(c);
+        total[r][c] = prior.inverse[r][c] + e->information[index[r]][index[c]];
+        right[r] += prior.inverse[r][c] * off(c);
       }
     }
     if (!solve_positive(total, right, n, step)) break;
@@ -128,15 +159,14 @@ double edge_mcl::descend(const wm_points &points, const alignment &prior,
   }
   double cost = e->cost;
   for (int r = 0; r < n; r++)
-    for (int c = 0; c < n; c++) cost += 0.5 * off(r) * inverse[r][c] * off(c);
+    for (int c = 0; c < n; c++) cost += 0.5 * off(r) * prior.inverse[r][c] * off(c);
   return cost;
 }
 
 // A scan has several places where it fits nearly (doors, pillars). Where the prediction is sure it says which; along an
 // axis that it isn't sure of, every step of half a door's depth is a start, and the least cost decides.
-void edge_mcl::descend_from_several(const wm_points &points, const alignment &prior,
-                                    const double inverse[kAlignStates][kAlignStates], const int *index, int n,
-                                    alignment *best, normal_equations *e) const {
+void edge_mcl::descend_from_several(const wm_points &points, const belief &prior, alignment *best,
+                                    normal_equations *e) const {
   const double xx = filter_.variance(kX), yy = filter_.variance(kY), xy = filter_.covariance(kX, kY);
   const double half = 0.5 * (xx + yy), spread = std::sqrt(square(0.5 * (xx - yy)) + square(xy));
   const double sigma = std::sqrt(half + spread), angle = 0.5 * atan2(2.0 * xy, xx - yy);
@@ -151,14 +181,14 @@ void edge_mcl::descend_from_several(const wm_points &points, const alignment &pr
   double least = 0.0;
   for (int k = -sides; k <= sides; k++) {
     // The prediction's mean, given that it is k steps along the axis.
-    alignment a = prior;
-    for (int i = 0; i < n; i++) {
-      const int state = prior.state[index[i]];
+    alignment a = prior.mean;
+    for (int i = 0; i < prior.n; i++) {
+      const int state = a.state[prior.index[i]];
       const double shared = axis.cos * filter_.covariance(state, kX) + axis.sin * filter_.covariance(state, kY);
-      a.value[index[i]] += k * step * shared / square(sigma);
+      a.value[prior.index[i]] += k * step * shared / square(sigma);
     }
     normal_equations found;
-    const double cost = descend(points, prior, inverse, index, n, slack, &a, &found);
+    const double cost = descend(points, prior, slack, &a, &found);
     if (k > -sides && cost >= least) continue;
     least = cost;
     *best = a;
@@ -168,8 +198,9 @@ void edge_mcl::descend_from_several(const wm_points &points, const alignment &pr
 
 // What the scan says of the place along the axis of the map that it knows better, with what it says of the rest from
 // there: one distance, in a corridor that to its walls.
-void edge_mcl::describe(const normal_equations &scan, const alignment &a, const int *index, int n,
+void edge_mcl::describe(const normal_equations &scan, const belief &prior, const alignment &a,
                         wm_innovation *record) const {
+  const int *index = prior.index, n = prior.n;
   const int best = scan.information[kAlignX][kAlignX] > scan.information[kAlignY][kAlignY] ? kAlignX : kAlignY;
   const double known = scan.information[best][best];
   if (!(known > 0.0)) return;
@@ -196,21 +227,21 @@ void edge_mcl::describe(const normal_equations &scan, const alignment &a, const 
 // measurements, one for each row of the information's factor. Source: the iterated extended Kalman filter (B. M. Bell,
 // F. W. Cathey, "The iterated Kalman filter update as a Gauss-Newton method", 1993), in information form.
 bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan, wm_innovation *record) {
-  alignment a = alignment_of(camera);
-  const alignment prior = a;
-  int index[kAlignStates], n = 0;
-  for (int k = 0; k < kAlignStates; k++)
-    if (a.state[k] >= 0) index[n++] = k;
-  double covariance[kAlignStates][kAlignStates], inverse[kAlignStates][kAlignStates];
-  for (int r = 0; r < n; r++)
-    for (int c = 0; c < n; c++) covariance[r][c] = filter_.covariance(a.state[index[r]], a.state[index[c]]);
-  if (!invert_positive(covariance, n, inverse)) return false;
-
+  belief prior;
+  if (!belief_of(camera, &prior)) return false;
+  const int *index = prior.index, n = prior.n;
+  alignment a = prior.mean;
   normal_equations &e = *scan;
-  descend_from_several(points, prior, inverse, index, n, &a, &e);
+  descend_from_several(points, prior, &a, &e);
   record->verdict = e.explained < 5 ? (uint8_t)WM_REJECTED_SINGULAR : (uint8_t)WM_FUSED;
   if (e.explained < 5) return false;
-  describe(e, a, index, n, record);
+  describe(e, prior, a, record);
+  // Lost: of what the map doesn't explain a few points happen to lie near its edges. They would drag the pose there,
+  // which odometry carries on meanwhile as one of the places that are possible.
+  if (state_ != WM_STATE_TRACKING && e.explained < kLeastExplained * e.seen) {
+    record->verdict = (uint8_t)WM_REJECTED_GATE;
+    return false;
+  }
 
   // information = L D L'; the rows of L' measure what the scan knows, with variances 1/D.
   double lower[kAlignStates][kAlignStates] = {}, d[kAlignStates];

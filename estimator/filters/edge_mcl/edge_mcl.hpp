@@ -38,6 +38,13 @@ class edge_mcl {
     int state[kAlignStates];  // of the filter; -1: not one
     double value[kAlignStates];
   };
+  // The alignment before a scan: the states that it has, in order; their covariance's inverse, and its root by number
+  // of align_state.
+  struct belief {
+    alignment mean;
+    int index[kAlignStates], n;
+    double inverse[kAlignStates][kAlignStates], root[kAlignStates][kAlignStates];
+  };
   struct taken_from {
     wm_pose2 pose;      // base_link in map when the picture was taken
     wm_pose2 from_now;  // the same as seen from now's base_link
@@ -55,15 +62,15 @@ class edge_mcl {
   void weigh_cloud(double way_m);
   alignment alignment_of(int camera) const;
   taken_from look_back(const alignment &a) const;
-  void accumulate(const wm_points &points, const alignment &a, double gate_m, normal_equations *out) const;
-  double descend(const wm_points &points, const alignment &prior, const double inverse[kAlignStates][kAlignStates],
-                 const int *index, int n, double slack_m, alignment *a, normal_equations *e) const;
-  void descend_from_several(const wm_points &points, const alignment &prior,
-                            const double inverse[kAlignStates][kAlignStates], const int *index, int n, alignment *best,
-                            normal_equations *e) const;
+  bool belief_of(int camera, belief *out) const;
+  // `prior`: each point may be off by what this leaves open of its place, too. Null: by its own error alone.
+  void accumulate(const wm_points &points, const alignment &a, double gate_m, const belief *prior,
+                  normal_equations *out) const;
+  double descend(const wm_points &points, const belief &prior, double slack_m, alignment *a, normal_equations *e) const;
+  void descend_from_several(const wm_points &points, const belief &prior, alignment *best, normal_equations *e) const;
   // Whether the scan was taken in; how many of its points say something and how many of these the map explains.
   bool align(const wm_points &points, int camera, normal_equations *scan, wm_innovation *record);
-  void describe(const normal_equations &scan, const alignment &a, const int *index, int n, wm_innovation *record) const;
+  void describe(const normal_equations &scan, const belief &prior, const alignment &a, wm_innovation *record) const;
   void pull_cloud(const normal_equations &equations);
   void watch(double explained, int seen, double dt_s);
   void heed_cloud();

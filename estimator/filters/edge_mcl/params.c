@@ -13,8 +13,8 @@ static const wm_param kParams[] = {
     F64("states.pitch_sigma_rad", pitch_sigma_rad, 0.01, 0, 0.5,
         "Start sigma of each camera's pitch about calibration.yaml's, rad. 0.1 degrees are 7 cm of floor at 4 m. 0: "
         "off."),
-    F64("states.roll_sigma_rad", roll_sigma_rad, 0.005, 0, 0.5, "The same of its roll about the view, rad. 0: off."),
-    F64("states.yaw_sigma_rad", yaw_sigma_rad, 0.005, 0, 0.5, "The same of its yaw, rad. 0: off."),
+    F64("states.roll_sigma_rad", roll_sigma_rad, 0.01, 0, 0.5, "The same of its roll about the view, rad. 0: off."),
+    F64("states.yaw_sigma_rad", yaw_sigma_rad, 0.01, 0, 0.5, "The same of its yaw, rad. 0: off."),
     F64("states.height_sigma_m", height_sigma_m, 0.01, 0, 0.5, "The same of its height above the floor, m. 0: off."),
     F64("states.angle_walk_rad", angle_walk_rad, 0.00002, 0, 0.1,
         "Random walk of pitch, roll and yaw, rad per sqrt(s): springs, loads."),
@@ -59,8 +59,9 @@ static const wm_param kParams[] = {
     F64("points.gate_m", gate_m, 0.15, 0.01, 0.6, "A point farther from the map's edge than this is not aligned, m."),
     F64("points.normal_gate_rad", normal_gate_rad, 0.6, 0.05, 1.6,
         "Nor is one whose edge runs otherwise than the map's by more than this, rad."),
-    F64("lasting.xy_m", lasting_xy_m, 0.004, 0, 1,
-        "What the pose is unsure of beside the filter's covariance, m: errors that last longer than it remembers."),
+    F64("lasting.xy_m", lasting_xy_m, 0.01, 0, 1,
+        "What the pose is unsure of beside the filter's covariance, m: errors that last longer than it remembers, as "
+        "where exactly the camera sits."),
     F64("lasting.heading_rad", lasting_heading_rad, 0.0005, 0, 1, "The same of the heading, rad."),
 
     F64("lost.explained", lost_explained, 0.5, 0.05, 0.95,

@@ -16,6 +16,7 @@ namespace {
 
 constexpr int kLinesCrossed = 4;  // of a ray, before it gives up
 constexpr double kBlur_px = 1.0;  // what a line is wider in the picture
+constexpr int kBandSeen_px = 4;   // behind a band, that are compared with the floor before it
 
 struct edges_state {
   wm_edges_params params;
@@ -123,15 +124,38 @@ void slope_at(const wm_frame &frame, const pixel &at, double *gu, double *gv) {
   *gv = down / 128.0;
 }
 
-// Whether the band behind the edge is a line also across, not only along the ray: `width_px` away it is as it was.
-bool is_narrow(const wm_frame &frame, const ray_edge &edge, const pixel &at, double du, double dv, double width_px) {
-  // Towards the side that the ray comes to: down the slope of a fall, up that of a rise.
-  const double sign = edge.is_fall ? -1 : 1, middle = static_cast<double>(edge.middle);
-  for (int k = 2; k < width_px; k++) {
-    const int u = static_cast<int>(at.u + sign * k * du + 0.5), v = static_cast<int>(at.v + sign * k * dv + 0.5);
-    if (u < 0 || v < 0 || u >= static_cast<int>(frame.width_px) || v >= static_cast<int>(frame.height_px)) return false;
-    const double grey = frame.grey[static_cast<size_t>(v) * frame.stride_bytes + static_cast<size_t>(u)];
-    if (edge.is_fall ? grey > middle : grey < middle) return true;
+// What lies behind an edge, across it: pixels from the edge on, towards the side that its ray comes to.
+struct behind {
+  const wm_frame &frame;
+  double u, v, du, dv;
+
+  // -1 outside of the picture.
+  int grey(int k) const {
+    const int column = static_cast<int>(u + k * du + 0.5), row = static_cast<int>(v + k * dv + 0.5);
+    if (column < 0 || row < 0 || column >= static_cast<int>(frame.width_px) || row >= static_cast<int>(frame.height_px))
+      return -1;
+    return frame.grey[static_cast<size_t>(row) * frame.stride_bytes + static_cast<size_t>(column)];
+  }
+};
+
+// Whether the band behind the edge is a line on the floor also across, not only along the ray: before `line_px` it is
+// as it was; or before `band_px`, and what comes then is as bright as the floor was, which a wall above a board hardly
+// is.
+bool is_narrow(const behind &b, const ray_edge &edge, double line_px, double band_px) {
+  const double middle = static_cast<double>(edge.middle), change = static_cast<double>(edge.change);
+  for (int k = 2; k < line_px || k < band_px; k++) {
+    const int grey = b.grey(k);
+    if (grey < 0) return false;
+    if (edge.is_fall ? grey <= middle : grey >= middle) continue;
+    if (k < line_px) return true;
+    double sum = 0;
+    for (int i = 1; i <= kBandSeen_px; i++) {
+      const int further = b.grey(k + i);
+      if (further < 0) return false;
+      sum += further;
+    }
+    const double off = (edge.is_fall ? 1 : -1) * (sum / kBandSeen_px - middle);
+    return off > 0 && off < 1.5 * change;  // half a change is where the floor was
   }
   return false;
 }
@@ -160,7 +184,10 @@ found floor_point(const edges_state &state, const ray_edge &edge, const wm_frame
   const double along = gx * r.cos + gy * r.sin,
                board_px = state.params.rays_line_rel * range * std::fabs(along) / picture,
                line_px = kBlur_px + state.params.rays_line_m * floor / picture;
-  if (is_narrow(frame, edge, at, gu / picture, gv / picture, board_px > line_px ? board_px : line_px))
+  const double sign = edge.is_fall ? -1 : 1;  // down the slope of a fall, up that of a rise
+  const behind across = {frame, at.u, at.v, sign * gu / picture, sign * gv / picture};
+  if (is_narrow(across, edge, board_px > line_px ? board_px : line_px,
+                kBlur_px + state.params.rays_band_m * floor / picture))
     return found::kLine;
   const double noise = state.params.noise_grey / picture / 3;  // the mean of about ten pixels
   const double sigma_px = std::sqrt(square(state.params.sigma_px) + square(noise));

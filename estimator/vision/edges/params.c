@@ -36,6 +36,9 @@ static const wm_param kParams[] = {
     F64("rays.line_m", rays_line_m, 0.035, 0.0, 1,
         "m. A dark band that is narrower across is a line, too: a ray meets the joints that run along the robot's way "
         "at a flat angle. Nearer walls than a few times this, beside the camera, are not seen."),
+    F64("rays.band_m", rays_band_m, 0.1, 0.0, 1,
+        "m. And so is one up to this wide with floor as bright behind it as before: tape that marks ways, a door's "
+        "threshold."),
     F64("rays.mirror_rel", rays_mirror_rel, 0.3, 0.0, 2,
         "In parts of the range. How far behind an edge a stronger one is taken instead: glossy floors mirror a "
         "skirting "

@@ -14,7 +14,7 @@ struct wm_edges_params {
   int32_t mode;  // edges_mode
   double rays_step_rad, rays_range_min_m, rays_range_max_m;
   int32_t rays_sign;  // edges_sign
-  double rays_contrast_grey, rays_contrast_rel, rays_line_rel, rays_line_m, rays_mirror_rel;
+  double rays_contrast_grey, rays_contrast_rel, rays_line_rel, rays_line_m, rays_band_m, rays_mirror_rel;
   int32_t rays_support_min;
   double bird_px_per_m, bird_x_min_m, bird_x_max_m, bird_side_m;
   int32_t windows_px, windows_overlap_px;

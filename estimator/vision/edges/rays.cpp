@@ -238,9 +238,12 @@ bool find_first_edge(const ray_fan &fan, uint32_t index, const wm_frame &frame, 
   // Sub-pixel: the parabola through the three steepest.
   const double left = p.drop(i - 1), here = p.drop(i), right = p.drop(i + 1), bend = left - 2 * here + right;
   const double shift = bend != 0 ? 0.5 * (left - right) / bend : 0;
-  *out = {static_cast<int32_t>(index), first.is_fall, static_cast<float>(i + shift),
+  *out = {static_cast<int32_t>(index),
+          first.is_fall,
+          static_cast<float>(i + shift),
           static_cast<float>((here < 0 ? -here : here) / (6 * 256.0)),
-          static_cast<float>((p.before(i) + p.after(i)) / 512)};
+          static_cast<float>((p.before(i) + p.after(i)) / 512),
+          static_cast<float>(std::fabs(p.before(i) - p.after(i)) / 256)};
   return true;
 }
 

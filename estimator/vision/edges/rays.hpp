@@ -32,6 +32,7 @@ struct ray_edge {
   float sample;     // place on the ray, in samples
   float slope;      // grey levels a pixel
   float middle;     // grey level halfway between both sides
+  float change;     // between both sides, grey levels
 };
 
 struct ray_fan {

@@ -212,7 +212,7 @@ void the_clouds_pose_is_its_particles_mean(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, x, e.pose_map_base.p_m[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, y, e.pose_map_base.p_m[1]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, std::atan2(sine, cosine), e.heading_rad);
-  const double lasting = 0.004 * 0.004;
+  const double own = reinterpret_cast<const wm_edge_mcl_params *>(params.data())->lasting_xy_m, lasting = own * own;
   TEST_ASSERT_DOUBLE_WITHIN(1e-3 * (xx + lasting), xx + lasting, e.covariance[wm_cov_index(0, 0)]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-3 * (yy + lasting), yy + lasting, e.covariance[wm_cov_index(1, 1)]);
 }

@@ -109,6 +109,20 @@ void joints_of_tiles() {
   expect_wall(0.9);
 }
 
+// Tape of 6 cm along the way and a threshold of 8 cm across it: wider than any joint, floor on both sides.
+void bands_on_the_floor() {
+  const auto floor = [](double x, double y) {
+    return std::fabs(y - 0.5) < 0.03 || std::fabs(x - 2.2) < 0.04 ? 60.0 : 130.0;
+  };
+  draw(floor, 0);
+  expect_wall(0.9);
+  set("rays.band_m", 0);
+  const wm_points &p = look();
+  uint32_t before = 0;
+  for (uint32_t i = 0; i < p.count; i++) before += static_cast<double>(p.x_m[i]) < kWall_m - 0.3;
+  TEST_ASSERT_GREATER_THAN(p.count / 2, before);
+}
+
 void a_floor_that_mirrors() {
   draw(plain_floor, 0.35);
   expect_wall(0.9);
@@ -167,6 +181,7 @@ int main() {
   RUN_TEST(a_plain_floor);
   RUN_TEST(lamps_in_the_floor);
   RUN_TEST(joints_of_tiles);
+  RUN_TEST(bands_on_the_floor);
   RUN_TEST(a_floor_that_mirrors);
   RUN_TEST(by_windows);
   RUN_TEST(a_lone_point_is_left_out);
