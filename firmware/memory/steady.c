@@ -45,5 +45,6 @@ int wm_lock_memory(void) {
 #ifdef __GLIBC__
   (void)malloc_trim(0);  // what loading took and gave back needn't be locked
 #endif
-  return mlockall(MCL_CURRENT | MCL_FUTURE) == 0;
+  // What comes later stays from its first touch on: of a thread's stack what the thread touched, not the whole.
+  return mlockall(MCL_CURRENT) == 0 && mlockall(MCL_FUTURE | MCL_ONFAULT) == 0;
 }

@@ -347,6 +347,7 @@ static wm_status first_source_error(const live *self, wm_error *err) {
 }
 
 static wm_status run(live *self, wm_recording *recording, wm_live_report *report, wm_error *err) {
+  threads_of_libraries();
   wm_status status = prepare(self, recording, err);
   if (status != WM_OK) return status;
   tell_memory(self);

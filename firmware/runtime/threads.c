@@ -2,6 +2,7 @@
 #include "threads.h"
 
 #include <errno.h>
+#include <malloc.h>
 #include <sched.h>
 #include <stdio.h>
 #include <string.h>
@@ -16,6 +17,17 @@ const thread_spec kThreads[THREAD_ROLES] = {
   [THREAD_SINK]      = {"wm-sink",     0,      (size_t)2 << 20, 0,          2 * WM_NS_PER_MS }, // holds the estimator up
 };
 // clang-format on
+
+void threads_of_libraries(void) {
+  pthread_attr_t attributes;
+  pthread_attr_init(&attributes);
+  pthread_attr_setstacksize(&attributes, LIBRARY_STACK_BYTES);
+  (void)pthread_setattr_default_np(&attributes);  // of no consequence but for memory
+  pthread_attr_destroy(&attributes);
+#ifdef __GLIBC__
+  (void)mallopt(M_ARENA_MAX, 1);
+#endif
+}
 
 static void want_realtime(pthread_attr_t *attributes, const wm_runtime_params *params) {
   struct sched_param priority = {.sched_priority = params->realtime_priority};

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Instructions of a step in builds for several machines, and an ESTIMATE of its time on a Cortex-A57 and a Cortex-A15, as
-Markdown.
+"""Instructions of a step in builds for several machines, and from them an ESTIMATE of its time on the boards' cores, as two
+tables of Markdown.
 
     instructions.py [BUILD...]      (build build-jetson-tx1 build-odroid-xu4)
 
@@ -25,9 +25,21 @@ WORKS = [
     ("picture_rays", 2, "frame to edge points by rays, 1280x720 fisheye"),
     ("picture_windows", 2, "frame to polylines by windows and Hough transform, 1280x720 fisheye"),
 ]
-# Core, its architecture, clock in GHz, instructions a cycle. Both cores can start three a cycle; what such loops reach on
-# them is about 1 (scalar and NEON work with loads that hit the caches), less on the older one.
-CORES = [("Cortex-A57", "arm64", 1.73, 1.0), ("Cortex-A15", "armhf", 2.0, 0.8)]
+# Board, core, its architecture, clock in GHz, instructions a cycle. The last is a guess on the safe side for such loops
+# (scalar and vector work with loads that hit the caches): the A15 and A57 can start three a cycle and reach about one, the
+# A55 starts two and waits for each, the A78AE starts six.
+BOARDS = [
+    ("Jetson TX1", "Cortex-A57", "arm64", 1.73, 1.0),
+    ("Jetson Nano", "Cortex-A57", "arm64", 1.43, 1.0),
+    ("Jetson TX2", "Cortex-A57", "arm64", 2.04, 1.0),
+    ("Jetson Xavier NX", "Carmel", "arm64", 1.90, 1.2),
+    ("Jetson Orin Nano", "Cortex-A78AE", "arm64", 1.51, 1.8),
+    ("Jetson AGX Orin", "Cortex-A78AE", "arm64", 2.20, 1.8),
+    ("ODROID-N2+", "Cortex-A73", "arm64", 2.40, 1.2),
+    ("ODROID-M1", "Cortex-A55", "arm64", 1.99, 0.7),
+    ("ODROID-XU4", "Cortex-A15", "armhf", 2.00, 0.8),
+]
+PICTURES_HZ = 30
 
 
 def plugin(folder):
@@ -49,21 +61,41 @@ def total(build, counter, work, times):
     return int(re.search(r"Collected : (\d+)", done.stderr)[1])
 
 
+def count_all(builds, counter):
+    """{work: {architecture: instructions}}, printed as they come."""
+    print("| step | " + " | ".join(f"{b.arch} ({b.board})" for b in builds) + " |")
+    print("|" + " --- |" * (1 + len(builds)), flush=True)
+    counts = {}
+    for work, more, what in WORKS:
+        of = counts[work] = {}
+        for build in builds:
+            of[build.arch] = (total(build, counter, work, 1 + more) - total(build, counter, work, 1)) // more
+        print(f"| {what} | " + " | ".join(f"{of[b.arch]:,}" for b in builds) + " |", flush=True)
+    return counts
+
+
+def print_estimates(counts):
+    """Milliseconds on each board's core. Of particles on a large map twice the time: it doesn't fit the caches."""
+    print("\n| board | core, clock, instructions a cycle | landmark update | 2000 particles | picture by rays | picture by windows | "
+          f"rays and particles at {PICTURES_HZ} Hz |")
+    print("|" + " --- |" * 7)
+    for board, core, arch, clock_ghz, a_cycle in BOARDS:
+        if arch not in counts["landmark_step"]:
+            continue
+        landmark, particles, rays, windows = (
+            counts[work][arch] / (clock_ghz * 1e6 * a_cycle)
+            for work in ("landmark_step", "particle_step_2000", "picture_rays", "picture_windows"))
+        particles *= 2
+        share = (rays + particles) * PICTURES_HZ / 1000
+        print(f"| {board} | {core}, {clock_ghz:.2f} GHz, {a_cycle} | {landmark:.3f} ms | {particles:.1f} ms | {rays:.1f} ms | "
+              f"{windows:.1f} ms | {share:.0%} of the core |")
+
+
 def main():
     folders = sys.argv[1:] or [ROOT / "build", ROOT / "build-jetson-tx1", ROOT / "build-odroid-xu4"]
     builds = [Build(folder) for folder in folders]
-    cores = [core for core in CORES if core[1] in [b.arch for b in builds]]
-    print("| step | " + " | ".join(f"{b.arch} ({b.board})" for b in builds) + " | "
-          + " | ".join(f"{name}, {clock} GHz, estimate" for name, _, clock, _ in cores) + " |")
-    print("|" + " --- |" * (1 + len(builds) + len(cores)), flush=True)
     with tempfile.TemporaryDirectory(prefix="waymark-count-") as folder:
-        counter = plugin(pathlib.Path(folder))
-        for work, more, what in WORKS:
-            count = {}
-            for build in builds:
-                count[build.arch] = (total(build, counter, work, 1 + more) - total(build, counter, work, 1)) // more
-            times = [f"{count[arch] / (clock * 1e6 * a_cycle):.3g} ms" for _, arch, clock, a_cycle in cores]
-            print(f"| {what} | " + " | ".join(f"{count[b.arch]:,}" for b in builds) + " | " + " | ".join(times) + " |", flush=True)
+        print_estimates(count_all(builds, plugin(pathlib.Path(folder))))
 
 
 if __name__ == "__main__":

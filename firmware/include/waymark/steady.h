@@ -19,7 +19,8 @@ int64_t wm_page_faults_of_this_thread(void);
 void wm_touch_program(void);
 // Touches `bytes` of this thread's stack below the caller.
 void wm_touch_stack(size_t bytes);
-// Locks all memory, now and future. 0 where it isn't allowed. Start only.
+// Makes all memory of now present and locks it, and what comes later once it is touched. 0 where it isn't allowed.
+// Start only.
 int wm_lock_memory(void);
 
 #endif
