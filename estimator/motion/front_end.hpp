@@ -43,6 +43,7 @@ class motion_front_end {
       motion_noise noise = noise_of(stretch.input, twist, stretch.dt_s, *params_, wheels_, calibration);
       // Counts that have come tell the way of the silence, too.
       if (!(ticks_drive() && stretch.has_next)) add_silence(stretch, *params_, &noise);
+      add_change(stretch, *params_, &noise);
       visit(stretch, twist, noise);
     });
   }

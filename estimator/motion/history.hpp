@@ -25,9 +25,10 @@ struct motion_input {
 struct motion_stretch {
   motion_input input;
   double dt_s;
-  double silent_s;   // at its beginning: for how long the next input has been overdue; below 0: it isn't
-  bool has_next;     // a later input has come
-  bool first, last;  // of the interval: their length depends on the lag
+  double changed[2];  // at its beginning: by how much the input's a and b differ from the one before
+  double silent_s;    // at its beginning: for how long the next input has been overdue; below 0: it isn't
+  bool has_next;      // a later input has come
+  bool first, last;   // of the interval: their length depends on the lag
 };
 
 class motion_history {
@@ -72,8 +73,12 @@ class motion_history {
           if (usual_s > due_s) due_s = usual_s;
         }
         piece.silent_s = wm_seconds_between(piece.input.t_ns, begin) - due_s;
+        const bool begins = next > oldest + 1 && begin == piece.input.t_ns;
+        piece.changed[0] = begins ? piece.input.a - at(next - 2).a : 0.0;
+        piece.changed[1] = begins ? piece.input.b - at(next - 2).b : 0.0;
       } else {
         piece.input = motion_input{};
+        piece.changed[0] = piece.changed[1] = 0.0;
         piece.silent_s = -1.0;
       }
       piece.has_next = next < count_;

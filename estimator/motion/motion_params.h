@@ -21,6 +21,7 @@ struct wm_motion_params {
   double noise_ticks_per_sqrt_m;
   double noise_steering_rad;
   double noise_hold_mps2, noise_hold_radps2;
+  double noise_speed_change, noise_yaw_rate_change;
   double standstill_speed_mps;
   double standstill_yaw_rate_radps;
   double standstill_after_s;

@@ -155,4 +155,10 @@ void add_silence(const motion_stretch &stretch, const wm_motion_params &p, motio
   noise->turn_rad2 += square(0.5 * p.noise_hold_radps2) * grown_s4;
 }
 
+void add_change(const motion_stretch &stretch, const wm_motion_params &p, motion_noise *noise) {
+  if (stretch.input.model != WM_MOTION_TWIST) return;
+  noise->way_m2 += square(p.noise_speed_change) * std::fabs(stretch.changed[0]);
+  noise->turn_rad2 += square(p.noise_yaw_rate_change) * std::fabs(stretch.changed[1]);
+}
+
 }  // namespace wm

@@ -53,6 +53,10 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
 // noise.hold_mps2 and noise.hold_radps2 since, a way of half of that by the square of the time.
 void add_silence(const motion_stretch &stretch, const wm_motion_params &params, motion_noise *noise);
 
+// What a twist that changed leaves behind: when it was obeyed, and how, is unsure anew each time. Variances by how much
+// it changed, not by its square, so that a change in many small steps counts as one in a single step.
+void add_change(const motion_stretch &stretch, const wm_motion_params &params, motion_noise *noise);
+
 }  // namespace wm
 
 #endif

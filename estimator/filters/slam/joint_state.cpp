@@ -25,6 +25,8 @@ void joint_state::init(const wm_setup &setup, const joint_layout &layout, double
   landmarks_ = 0;
   init_motion(setup);
   slip_ = {};
+  scale_state_ = -1;
+  for (double &share : scale_share_) share = 0.0;
 }
 
 namespace {
@@ -313,6 +315,8 @@ void joint_state::fuse(innovation_block &block, const double *more_noise, bool f
   vectors::set_scaled(r, gain(0), y[0], even(n_));
   for (int k = 1; k < rows; k++) vectors::add_scaled(r, gain(k), y[k], even(n_));
   if (frozen) return fuse_frozen(rows, r);
+  double before[kMaxRobot];
+  std::memcpy(before, x(), static_cast<size_t>(layout_.robot_states) * sizeof *before);
   move_mean(r, e);
   half_update update{rows, {gain(0), gain(1), gain(2)}, nullptr, nullptr};
   if (layout_.invariant) {
@@ -326,6 +330,29 @@ void joint_state::fuse(innovation_block &block, const double *more_noise, bool f
     update.r = r;
   }
   vectors::apply(p(), update, n_);
+  if (layout_.invariant && scale_state_ >= 0) carry_scale(before);
+}
+
+// The same for the scale: P <- T P T', T = I + d g', g picks the scale's own relative change, d = by how much each
+// state that goes with the scale has moved. e still holds how the places did.
+void joint_state::carry_scale(const double *before) {
+  const half_covariance cov = p();
+  const double *e = column(1 + kRows), *now = x();
+  double *d = gain(0), *r = gain(1);
+  for (int j = 0; j < even(n_); j++) d[j] = 0.0;
+  const auto place = [&](int state) {
+    d[state] = e[state + 1];
+    d[state + 1] = -e[state];
+  };
+  place(kX);
+  for (int j = kPoseStates; j < layout_.first_clone; j++) d[j] = scale_share_[j] * (now[j] - before[j]);
+  for (int c = 0; c < layout_.clones; c++) place(layout_.first_clone + 3 * c);
+  for (int i = 0; i < landmarks_; i++) place(landmark_state(i));
+  const double inverse = 1.0 / before[scale_state_];
+  for (int j = 0; j < even(n_); j++) r[j] = j < n_ ? inverse * cov.at(scale_state_, j) : 0.0;
+  vectors::add_scaled(r, d, 0.5 * inverse * r[scale_state_], even(n_));
+  const half_update update{0, {}, d, r};
+  vectors::apply(cov, update, n_);
 }
 
 // The correction of the mean: on the group of turns and places for the invariant filter (the map turns as a whole with

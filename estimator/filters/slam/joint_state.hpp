@@ -8,7 +8,8 @@
 // S. Bonnabel, "An EKF-SLAM algorithm with consistency properties", 2015; T. Zhang et al., "Convergence and consistency
 // analysis for a 3-D invariant-EKF SLAM", RA-L 2(2), 2017) written in map coordinates: its error of a place is
 // p_est - Exp(heading error) p, and what the change of coordinates between two estimates does is T. In this form the
-// prediction touches the pose's rows alone.
+// prediction touches the pose's rows alone. Where the map's scale is as unknown as its heading (set_scale), the same is
+// done once more, with d = new - old of all that goes with the scale and g' that picks the scale.
 //
 // Cost: prediction O(n), correction O(n^2) with one pass over the half for up to three rows.
 #ifndef WAYMARK_ESTIMATOR_SLAM_JOINT_STATE_HPP
@@ -62,6 +63,17 @@ class joint_state : public planar_motion {
   };
   void set_motion_states(const wm_motion_states &states, const wheel_slip &slip, int first);  // from `first` on
   static int count_motion_states(const wm_motion_states &states, const wheel_slip &slip);
+
+  // The map's scale, where nothing but the states' own start tells it: `reference` is the motion's state that stands
+  // for it. A state that follows it is as many times as large in a larger map (share 1), or as many times as small
+  // (-1).
+  void set_scale(int reference) {
+    scale_state_ = reference;
+    follow_scale(reference, 1.0);
+  }
+  void follow_scale(int state, double share) {
+    if (state >= 0) scale_share_[state] = share;
+  }
 
   // ---- time and motion ----
   void move(const wm_event &motion);
@@ -131,6 +143,7 @@ class joint_state : public planar_motion {
   void move_mean(const double *change, double *e);
   void move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e);
   void fuse_frozen(int rows, const double *change);
+  void carry_scale(const double *before);
 
   void wander(double dt_s);
 
@@ -138,6 +151,8 @@ class joint_state : public planar_motion {
   joint_layout layout_;
   wheel_slip slip_;
   int slip_mean_[2];  // states, of the left and the right wheel
+  int scale_state_;   // -1: the scale is known
+  double scale_share_[kMaxRobot];
   int capacity_, n_, landmarks_;
 };
 

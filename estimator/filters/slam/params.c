@@ -21,6 +21,9 @@ static const wm_param kParams[] = {
     WM_SENSOR_STATE_PARAMS,
     F64("states.range_scale_sigma", range_scale_sigma, 0, 0, 1,
         "Start sigma of each sensor's range scale about 1. 0: off. It is found against the motion's scale alone."),
+    F64("states.depth_axis_sigma_rad", depth_axis_sigma_rad, 0, 0, 1,
+        "Start sigma of the angle from where a sensor's bearings are 0 to the axis along which its depths are measured "
+        "(range_is: depth): a camera's middle column need not lie on its lens's axis. 0: off."),
     BOOL("use.bearing", use_bearing, 1, "Fuse bearings."),
     BOOL("use.range", use_range, 1, "Fuse ranges. Without them landmarks join once their parallax suffices."),
     WM_SIGHTING_NOISE_PARAMS,

@@ -117,11 +117,17 @@ void slam::see(const wm_sighting &s, const reading &r, const past_pose &past, co
         square(r.bearing_sigma) + square(params_.lateral_sigma_m / distance), lasting_bearing_offset_,
         std::sqrt(square(params_.lasting_bearing_rad) + square(params_.lasting_lateral_m / distance)));
   if (r.range) {
-    add(WM_RESIDUAL_RANGE, s.range_m, e.range_m, e.range_by,
-        square(r.range_sigma) + square(params_.range_sigma_rel * e.range_m), lasting_range_offset_,
-        std::sqrt(square(params_.lasting_range_m) + square(params_.lasting_range_rel * e.range_m)));
-    out->row[out->count - 1].add(states[kRangeBias], 1.0);
-    out->row[out->count - 1].add(states[kRangeScale], e.range_by_scale);
+    // Depth is along an axis of its own: as if the sensor were turned by so much.
+    sensor_errors turned = errors_of(sensor);
+    turned.yaw_rad += sensor_value(sensor, kDepthAxis, 0.0);
+    const expected_sighting depth = states[kDepthAxis] < 0 ? e : expect(sensor_[sensor], turned, past.pose, at);
+    add(WM_RESIDUAL_RANGE, s.range_m, depth.range_m, depth.range_by,
+        square(r.range_sigma) + square(params_.range_sigma_rel * depth.range_m), lasting_range_offset_,
+        std::sqrt(square(params_.lasting_range_m) + square(params_.lasting_range_rel * depth.range_m)));
+    joint_row &row = out->row[out->count - 1];
+    row.add(states[kRangeBias], 1.0);
+    row.add(states[kRangeScale], depth.range_by_scale);
+    row.add(states[kDepthAxis], depth.range_by[kByYaw]);
   }
 }
 

@@ -13,7 +13,8 @@
 namespace wm {
 namespace {
 
-constexpr const char *kSensorStateNames[] = {"yaw_rad", "x_m", "y_m", "time_offset_s", "range_bias_m", "range_scale"};
+constexpr const char *kSensorStateNames[] = {"yaw_rad",      "x_m",         "y_m",           "time_offset_s",
+                                             "range_bias_m", "range_scale", "depth_axis_rad"};
 constexpr double kOwnFrame_m = 1e-3, kOwnFrame_rad = 1e-3;  // the map begins where the robot starts
 constexpr double kSurveyed_m = 1e-4, kSurveyed_rad = 0.01;  // no map is better; headings come without a sigma
 const double kAbsent = std::numeric_limits<double>::quiet_NaN();
@@ -30,7 +31,7 @@ joint_state::wheel_slip slip_of(const wm_slam_params &p) { return {p.wheel_slip_
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
   const int each_sensor = (p.sensor_yaw_sigma_rad > 0.0) + 2 * (p.sensor_xy_sigma_m > 0.0) +
                           (p.sensor_time_offset_sigma_s > 0.0) + (p.range_bias_sigma_m > 0.0) +
-                          (p.range_scale_sigma > 0.0);
+                          (p.range_scale_sigma > 0.0) + (p.depth_axis_sigma_rad > 0.0);
   return kPoseStates + joint_state::count_motion_states(p.motion, slip_of(p)) + each_sensor * (int)setup.sensor_count +
          p.lasting_slots * lasting_states(p);
 }
@@ -103,6 +104,7 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
     sensor_state_[i][kTimeOffset] = add(0.0, params.sensor_time_offset_sigma_s);
     sensor_state_[i][kRangeBias] = add(0.0, params.range_bias_sigma_m);
     sensor_state_[i][kRangeScale] = add(1.0, params.range_scale_sigma);
+    sensor_state_[i][kDepthAxis] = add(0.0, params.depth_axis_sigma_rad);
   }
   lasting_bearing_offset_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
   lasting_range_offset_ =
@@ -113,7 +115,22 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
     lasting_.add(next);
     for (int k = 0; k < lasting_width_; k++) add(0.0, 1.0);
   }
+  follow_scale();
   start_again();
+}
+
+// Nothing measures how large the map is where both the speed's scale and the ranges' are states, or no ranges are used.
+void slam::follow_scale() {
+  const int speed = joint_.motion_state(kSpeedScale);
+  const bool ranges_tell = params_.use_range && !(params_.range_scale_sigma > 0.0);
+  if (speed < 0 || ranges_tell || params_.markers || params_.map != WM_SLAM_MAP_NONE) return;
+  joint_.set_scale(speed);
+  for (size_t i = 0; i < setup_->sensor_count; i++) {
+    joint_.follow_scale(sensor_state_[i][kRangeScale], -1.0);
+    joint_.follow_scale(sensor_state_[i][kMountX], 1.0);
+    joint_.follow_scale(sensor_state_[i][kMountY], 1.0);
+  }
+  for (int k = first_ray_; k < first_clone_; k += 2) joint_.follow_scale(k + 1, -1.0);
 }
 
 // The map begins where the robot starts, unless a start or a map says otherwise.

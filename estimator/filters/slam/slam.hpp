@@ -57,7 +57,7 @@ class slam {
   uint32_t motion_health() const { return joint_.motion_health(); }
 
  private:
-  enum sensor_state { kYaw, kMountX, kMountY, kTimeOffset, kRangeBias, kRangeScale, kSensorStates };
+  enum sensor_state { kYaw, kMountX, kMountY, kTimeOffset, kRangeBias, kRangeScale, kDepthAxis, kSensorStates };
 
   // The pose when a sighting was true, `age` before its stamp, and what moves it.
   struct past_pose {
@@ -150,6 +150,7 @@ class slam {
   void look_after(wm_time_ns t_ns);
   int32_t own_id();
   void start_again();
+  void follow_scale();
   void load_map();
   void forget_tracks();
 

@@ -184,6 +184,27 @@ void test_a_held_speed_is_doubted_more_and_more(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, way_var - 0.25 * 0.75 * 0.75 * 0.75 * 0.75);  // the first one's habit isn't known
 }
 
+// A command that changes is obeyed sooner or later: the way and the turn are unsure by how much it changed, in one step
+// or in many, and however often it is asked.
+void test_a_change_of_command_is_doubted(void) {
+  for (int steps : {1, 8}) {
+    start(make::no_wheels());
+    params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
+    params.noise_speed_change = 0.02;
+    params.noise_yaw_rate_change = 0.03;
+    feed(make::twist(0, 0.1, 0.0));
+    for (int i = 1; i <= steps; i++) {
+      const double share = (double)i / steps;
+      feed(make::twist(0.2 * share, 0.1 + 0.1 * share, -0.4 * share));
+      advance(0.2 * share + 0.01);
+    }
+    advance(0.25);
+    feed(make::twist(0.3, 0.2, -0.4));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02 * 0.1, way_var);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.03 * 0.03 * 0.4, turn_var);
+  }
+}
+
 void test_ackermann_by_table_ratio_and_road_wheel(void) {
   start(make::car());
   feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 2.0}, {WM_Q_STEERING_WHEEL, 3.0}}));
@@ -337,6 +358,7 @@ int main(void) {
   RUN_TEST(test_rear_wheels_are_preferred_and_a_silent_source_yields);
   RUN_TEST(test_ackermann_by_table_ratio_and_road_wheel);
   RUN_TEST(test_a_held_speed_is_doubted_more_and_more);
+  RUN_TEST(test_a_change_of_command_is_doubted);
   RUN_TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading);
   RUN_TEST(test_commands_are_obeyed_late);
   RUN_TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn);
