@@ -18,10 +18,8 @@ constexpr double kMarginChi2 = 9.0;      // the second best place must be worse 
 constexpr double kAgreeing = 0.7;        // share of observations that must agree ...
 constexpr double kAgreeingOfMany = 0.5;  // ... where so many landmarks bear it out:
 constexpr int kMany = 4;
-constexpr int kNumbers = 5;         // two more than a pose has: three bearings fit some pose, whatever they say
-constexpr double kRival = 0.85;     // another place that so many as many observations agree with is as good
-constexpr double kWayError = 0.05;  // odometry's error in parts of the way and of the turn, before calibration
-constexpr double kTurnError = 0.07;
+constexpr int kNumbers = 5;            // two more than a pose has: three bearings fit some pose, whatever they say
+constexpr double kRival = 0.85;        // another place that so many as many observations agree with is as good
 constexpr double kFirstGuess_m = 4.0;  // distance of a landmark of which only the bearing is known
 
 // The frame of odometry in map: position of its origin, rotation.
@@ -365,6 +363,7 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
   const placement &w = best[winner];
   const support &own = fit[winner];
   out.agreeing = own.observations;
+  out.landmarks = own.landmarks;
   const double share = own.landmarks >= kMany ? kAgreeingOfMany : kAgreeing;
   if (own.observations < share * all.count || own.observations < 3 || own.numbers < kNumbers) return out;
   normal_equations(all, w, a, b);
@@ -393,6 +392,7 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
     if (!same && fit[k].stated >= own.stated && (as_good || best[k].cost < w.cost + kMarginChi2))
       return out;  // two places explain what was seen
   }
+  out.clear = true;
   out.found = out.covariance[0][0] + out.covariance[1][1] < 2.0 * square(limits.sigma_xy_m) &&
               out.covariance[2][2] < square(limits.sigma_heading_rad);
   return out;

@@ -24,13 +24,18 @@ struct search_clue {
   double sigma_angle_rad, sigma_length_m;
   double travelled_m, turned_rad;  // so far, at the observation: odometry's own error grows with them
 };
+// Odometry's error in parts of the way and of the turn, before calibration.
+inline constexpr double kWayError = 0.05, kTurnError = 0.07;
+
 enum search_kind : uint32_t { kClueBearing = 1, kClueRange = 2, kCluePosition = 4, kClueHeading = 8 };
 
 struct search_result {
-  bool found;
+  bool clear;     // most agree with one place, and with no other
+  bool found;     // clear, and sure enough
   wm_pose2 pose;  // base_link in map, now
   double covariance[3][3];
   int used, agreeing;
+  int landmarks;  // of which most observations agree
 };
 
 struct search_limits {
