@@ -4,6 +4,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "simulate/angle.h"
 
@@ -11,6 +12,9 @@ namespace wm::montecarlo {
 namespace {
 
 enum { kX, kY, kHeading, kBias, kLeft, kRight, kTrack, kMap };
+enum { kCameraYaw, kCameraX, kCameraY, kEachCamera };  // behind the map, for cameras that are mounted wrongly
+
+constexpr double kSlipMemory_s = 5;  // of the simulator's wheels
 
 // What happens, in the order of time.
 struct Moment {
@@ -21,20 +25,27 @@ struct Moment {
 
 class Recursion {
  public:
-  Recursion(const sim::Scenario &scenario, const sim::Drive &drive, size_t landmarks)
-      : sc_(scenario), drive_(drive), landmarks_(std::min(landmarks, scenario.landmarks.size())) {
-    const auto n = static_cast<Eigen::Index>(kMap + 2 * landmarks_);
+  // `cameras`: how many have errors of their own, and with them one clock that is off.
+  Recursion(const sim::Scenario &scenario, Truth truth, size_t landmarks, size_t cameras)
+      : sc_(scenario), truth_(std::move(truth)), landmarks_(landmarks), cameras_(cameras) {
+    const auto n = static_cast<Eigen::Index>(kMap + 2 * landmarks_ + kEachCamera * cameras_ + (cameras_ > 0));
     const sim::Errors &e = sc_.errors;
     Eigen::VectorXd sigma = Eigen::VectorXd::Constant(n, e.landmark_m);
     sigma.head<kMap>() << e.start_xy_m, e.start_xy_m, e.start_heading_rad, e.yaw_rate_bias_radps, e.wheel_radius,
         e.wheel_radius, e.track;
+    for (size_t i = 0; i < cameras_; i++) {
+      const Eigen::Index at = camera_state(i);
+      sigma[at + kCameraYaw] = e.camera_mounting_rad;
+      sigma[at + kCameraX] = sigma[at + kCameraY] = e.camera_mounting_m;
+    }
+    if (cameras_ > 0) sigma[n - 1] = sc_.faults.camera_clock_offset_s;
     cov_ = sigma.cwiseAbs2().asDiagonal();
   }
 
   // Along the truth: what the wheels counted, times their radii, moves the robot.
   void move_to(double t_s) {
     if (t_s <= t_s_) return;
-    const sim::State from = drive_.at(t_s_), to = drive_.at(t_s);
+    const sim::State from = truth_(t_s_), to = truth_(t_s);
     const double track = sc_.robot.wheels.track_m;
     const double ds = to.way_m - from.way_m, dh = to.heading_rad - from.heading_rad;
     const double left = ds - 0.5 * track * dh, right = ds + 0.5 * track * dh;
@@ -51,12 +62,20 @@ class Recursion {
     cov_ = f * cov_ * f.transpose();
     const double walk = sc_.errors.yaw_rate_bias_walk;
     cov_(kBias, kBias) += walk * walk * (t_s - t_s_);
+    // Both wheels slip on their own; what lasts, as noise of the same effect over many such times. What it does to the
+    // wheels' opinion of the heading is left out: the gyro is better.
+    const double slip = sc_.errors.slip * ds;
+    const double way_m2 = kSlipMemory_s * slip * slip / (t_s - t_s_);
+    cov_(kX, kX) += way_m2 * c * c;
+    cov_(kX, kY) += way_m2 * c * s;
+    cov_(kY, kX) += way_m2 * c * s;
+    cov_(kY, kY) += way_m2 * s * s;
     t_s_ = t_s;
   }
 
   // One sample of the yaw-rate sensor over [t - step, t]: a second opinion of how the robot turned.
   void gyro(double step_s) {
-    const sim::State from = drive_.at(t_s_ - step_s), to = drive_.at(t_s_);
+    const sim::State from = truth_(t_s_ - step_s), to = truth_(t_s_);
     const double track = sc_.robot.wheels.track_m;
     const double ds = to.way_m - from.way_m, dh = to.heading_rad - from.heading_rad;
     Eigen::VectorXd h = Eigen::VectorXd::Zero(cov_.rows());
@@ -70,7 +89,7 @@ class Recursion {
   }
 
   void frame(const sim::Camera &camera) {
-    const sim::State s = drive_.at(t_s_);
+    const sim::State s = truth_(t_s_);
     const double c = std::cos(s.heading_rad), n = std::sin(s.heading_rad);
     const double arm_x = c * camera.xyz_m[0] - n * camera.xyz_m[1], arm_y = n * camera.xyz_m[0] + c * camera.xyz_m[1];
     for (size_t i = 0; i < landmarks_; i++) {
@@ -89,9 +108,37 @@ class Recursion {
     }
   }
 
+  // One bearing, by a camera that is mounted wrongly.
+  void bearing(const SeenBearing &seen) {
+    const sim::State s = truth_(t_s_);
+    const double c = std::cos(s.heading_rad), n = std::sin(s.heading_rad);
+    const double arm_x = c * seen.camera_m[0] - n * seen.camera_m[1],
+                 arm_y = n * seen.camera_m[0] + c * seen.camera_m[1];
+    const double dx = seen.landmark_m[0] - s.x_m - arm_x, dy = seen.landmark_m[1] - s.y_m - arm_y,
+                 q = dx * dx + dy * dy;
+    Eigen::VectorXd h = Eigen::VectorXd::Zero(cov_.rows());
+    h[kX] = dy / q;
+    h[kY] = -dx / q;
+    h[kHeading] = -(dx * arm_x + dy * arm_y) / q - 1;
+    const auto map = static_cast<Eigen::Index>(kMap + 2 * seen.landmark);
+    h[map] = -dy / q;
+    h[map + 1] = dx / q;
+    const Eigen::Index at = camera_state(seen.camera);
+    h[at + kCameraYaw] = -1;
+    h[at + kCameraX] = (c * dy - n * dx) / q;
+    h[at + kCameraY] = -(n * dy + c * dx) / q;
+    // Taken a little later than stamped: by what the robot moves in that time.
+    h[cov_.rows() - 1] = s.speed_mps * (c * h[kX] + n * h[kY]) + s.yaw_rate_radps * h[kHeading];
+    inform(h, seen.sigma_rad * seen.sigma_rad);
+  }
+
   Bound now() const { return {cov_(kX, kX), cov_(kY, kY), cov_(kHeading, kHeading)}; }
 
  private:
+  Eigen::Index camera_state(size_t camera) const {
+    return static_cast<Eigen::Index>(kMap + 2 * landmarks_ + kEachCamera * camera);
+  }
+
   // Adds the information h h' / variance, in covariance form.
   void inform(const Eigen::VectorXd &h, double variance) {
     const Eigen::VectorXd ph = cov_ * h;
@@ -99,8 +146,8 @@ class Recursion {
   }
 
   const sim::Scenario &sc_;
-  const sim::Drive &drive_;
-  size_t landmarks_;
+  Truth truth_;
+  size_t landmarks_, cameras_;
   double t_s_ = 0;
   Eigen::MatrixXd cov_;
 };
@@ -119,11 +166,31 @@ std::vector<Bound> bound(const sim::Scenario &sc, const sim::Drive &drive, size_
   std::stable_sort(moments.begin(), moments.end(), [](const Moment &a, const Moment &b) { return a.t_s < b.t_s; });
 
   std::vector<Bound> out(times_s.size());
-  Recursion recursion(sc, drive, landmarks);
+  Recursion recursion(
+      sc, [&drive](double t_s) { return drive.at(t_s); }, std::min(landmarks, sc.landmarks.size()), 0);
   for (const Moment &m : moments) {
     recursion.move_to(m.t_s);
     if (m.kind == Moment::gyro) recursion.gyro(step_s);
     if (m.kind == Moment::frame) recursion.frame(sc.cameras[m.index]);
+    if (m.kind == Moment::wanted) out[m.index] = recursion.now();
+  }
+  return out;
+}
+
+std::vector<Bound> bound(const sim::Scenario &sc, const Truth &truth, const std::vector<SeenBearing> &seen,
+                         size_t landmarks, size_t cameras, const std::vector<double> &times_s) {
+  std::vector<Moment> moments;
+  const double end_s = times_s.empty() ? 0 : times_s.back(), step_s = 1 / sc.bus.yaw_rate_hz;
+  for (double t = step_s; t <= end_s; t += step_s) moments.push_back({t, Moment::gyro, 0});
+  for (size_t i = 0; i < seen.size(); i++) moments.push_back({seen[i].t_s, Moment::frame, i});
+  for (size_t i = 0; i < times_s.size(); i++) moments.push_back({times_s[i], Moment::wanted, i});
+  std::stable_sort(moments.begin(), moments.end(), [](const Moment &a, const Moment &b) { return a.t_s < b.t_s; });
+  std::vector<Bound> out(times_s.size());
+  Recursion recursion(sc, truth, landmarks, cameras);
+  for (const Moment &m : moments) {
+    recursion.move_to(m.t_s);
+    if (m.kind == Moment::gyro) recursion.gyro(step_s);
+    if (m.kind == Moment::frame) recursion.bearing(seen[m.index]);
     if (m.kind == Moment::wanted) out[m.index] = recursion.now();
   }
   return out;

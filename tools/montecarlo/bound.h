@@ -3,6 +3,7 @@
 // say and how large the scenario says their errors are. docs/consistency.md derives it.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "simulate/route.h"
@@ -21,5 +22,22 @@ struct Bound {
 // Outliers carry no information: a sighting counts by the share of the inliers.
 std::vector<Bound> bound(const sim::Scenario &scenario, const sim::Drive &drive, size_t landmarks,
                          const std::vector<double> &times_s);
+
+// The robot as it was at a time, seconds from the start.
+using Truth = std::function<sim::State(double t_s)>;
+
+// A bearing that was measured: by which camera (mounted in base_link), of which landmark (true place).
+struct SeenBearing {
+  double t_s;
+  size_t camera, landmark;  // from 0
+  double camera_m[2], landmark_m[2];
+  double sigma_rad;
+};
+
+// The same for bearings that a detector found in rendered pictures, each with its own sigma. Beside those above the
+// cameras' mounting (yaw, x, y) and their clock are unknown, as the scenario says; roll, pitch and intrinsics are taken
+// as known, which lowers the bound a little.
+std::vector<Bound> bound(const sim::Scenario &scenario, const Truth &truth, const std::vector<SeenBearing> &seen,
+                         size_t landmarks, size_t cameras, const std::vector<double> &times_s);
 
 }  // namespace wm::montecarlo

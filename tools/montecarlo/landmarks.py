@@ -3,11 +3,15 @@
 """Known landmarks from pixels over many rendered drives: each seed is another crossing, way, light and set of errors.
 Renders what the cache lacks, runs the filter from the pictures (and by dead reckoning alone), and judges pose and detector.
 
-    landmarks.py SCENARIO --config FILE --cache FOLDER [--seeds FIRST-LAST] [--duration S] [--rate HZ] [--size WxH]
+    landmarks.py SCENARIO --config FILE --cache FOLDER [--seeds FIRST-LAST] [--duration S] [--rate HZ] [--size WxH] [--one]
+
+Beside each figure stands the Cramer-Rao bound of these drives, with the bearings and sigmas that the detector found.
 
 example: tools/montecarlo/landmarks.py config/worlds/crossing-easy.yaml --config config/crossing.yaml --cache out/easy --seeds 1-10
 24 s at 5 Hz are 240 pictures: some 30 s of processor to render, 8 MB to keep. What is there already is taken as it is."""
 import argparse
+import collections
+import csv
 import json
 import math
 import pathlib
@@ -43,45 +47,118 @@ def render(a, scenario, seed, folder):
     part.rename(folder)
 
 
-def judge(a, drive, seed):
+def replay(a, drive, config, out, *more):
+    call(a.bin / "waymark", "replay", drive, "--config", config, "--out", out, *more)
+
+
+def pose_of(a, run, drive):
+    return json.loads(call(a.bin / "waymark-eval", run, drive, "--json"))
+
+
+def bound_of(a, scenario, run, drive):
+    return json.loads(call(a.bin / "waymark-montecarlo-bound", scenario, run, drive))
+
+
+def seen_most(run):
+    with open(run / "innovations.csv", newline="") as file:
+        counts = collections.Counter(row["landmark"] for row in csv.DictReader(file) if row["verdict"] == "fused")
+    return counts.most_common(1)[0][0] if counts else None
+
+
+def only_one(drive, landmark, folder):
+    """The same drive with a map of one landmark; pictures and the bus are linked to."""
+    folder.mkdir()
+    for file in drive.iterdir():
+        if file.name not in ("landmarks.csv", "landmarks"):
+            (folder / file.name).symlink_to(file.resolve())
+    (folder / "landmarks").mkdir()
+    for name in ("landmarks.csv", "landmarks/appearance.csv"):
+        rows = (drive / name).read_text().splitlines()
+        kept = [row for row in rows[1:] if row.split(",")[0] == landmark]
+        (folder / name).write_text("\n".join(rows[:1] + kept) + "\n")
+        if "/" in name:
+            for row in kept:
+                picture = row.split(",")[1]
+                (folder / "landmarks" / picture).symlink_to((drive / "landmarks" / picture).resolve())
+
+
+def judge(a, scenario, drive, seed):
     with tempfile.TemporaryDirectory() as scratch:
-        run, reckoned = pathlib.Path(scratch, "run"), pathlib.Path(scratch, "reckoned")
-        call(a.bin / "waymark", "replay", drive, "--config", a.config, "--out", run, "--seed", seed)
-        call(a.bin / "waymark", "replay", drive, "--config", a.baseline, "--out", reckoned)
-        pose = json.loads(call(a.bin / "waymark-eval", run, drive, "--json"))
-        seen = json.loads(call(a.bin / "waymark-eval", run, drive, "--detector", "landmarks", "--json"))
-        alone = json.loads(call(a.bin / "waymark-eval", reckoned, drive, "--json"))
-    return pose, seen, alone
+        run, reckoned, alone = (pathlib.Path(scratch, name) for name in ("run", "reckoned", "alone"))
+        replay(a, drive, a.config, run, "--seed", seed)
+        replay(a, drive, a.baseline, reckoned)
+        row = {
+            "seed": seed,
+            "pose": pose_of(a, run, drive),
+            "seen": json.loads(call(a.bin / "waymark-eval", run, drive, "--detector", "landmarks", "--json")),
+            "reckoned": pose_of(a, reckoned, drive),
+            "bound": bound_of(a, scenario, run, drive),
+        }
+        landmark = seen_most(run)
+        if a.one and landmark:
+            single = pathlib.Path(scratch, "single")
+            only_one(drive, landmark, single)
+            replay(a, single, a.config, alone, "--seed", seed)
+            row["one"] = pose_of(a, alone, single)
+            row["one_bound"] = bound_of(a, scenario, alone, single)
+        return row
 
 
-def total(rows, key):
-    return sum(seen[key] for _, seen, _ in rows)
+def rms(values):
+    return math.sqrt(sum(v * v for v in values) / len(values))
+
+
+def spread(values):
+    ordered = sorted(values)
+    at = lambda share: ordered[min(len(ordered) - 1, int(share * len(ordered)))]
+    return f"median {at(0.5):.4f}, 90 of 100 below {at(0.9):.4f}, worst {ordered[-1]:.4f}"
+
+
+def against_bound(poses, bounds):
+    lines = []
+    for name, ours, least, unit in (
+        ("position", "position_rmse_m", "position_rms_m", "m"),
+        ("position at the end", "position_end_m", "position_end_m", "m"),
+        ("heading", "heading_rmse_deg", "heading_rms_deg", "degrees"),
+    ):
+        is_, can = rms([p[ours] for p in poses]), rms([b[least] for b in bounds])
+        lines.append(
+            f"  {name}: RMS {is_:.4f} {unit}, bound {can:.4f}, efficiency {can / is_:.2f}; of a drive: "
+            f"{spread([p[ours] for p in poses])}"
+        )
+    return "\n".join(lines)
 
 
 def summary(rows):
-    poses = [pose for pose, _, _ in rows]
-    rms = lambda values: math.sqrt(sum(v * v for v in values) / len(values))
-    end_good = sum(p["position_end_m"] <= 0.10 for p in poses)
-    rmse_good = sum(p["position_rmse_m"] <= 0.05 for p in poses)
-    heading_good = sum(p["heading_rmse_deg"] <= 0.5 for p in poses)
-    weights = [seen["right"] for _, seen, _ in rows]
-    pooled = lambda key: math.sqrt(sum(w * s[key] ** 2 for w, (_, s, _) in zip(weights, rows)) / sum(weights))
-    mean = sum(w * s["bearing_mean_deg"] for w, (_, s, _) in zip(weights, rows)) / sum(weights)
-    right, wrong = total(rows, "right"), total(rows, "false")
-    large = total(rows, "labelled_large")
-    found = sum(s["recall"] * s["labelled_large"] for _, s, _ in rows if s["labelled_large"])
-    return (
-        f"{len(rows)} drives: RMSE at most 0.05 m in {rmse_good}, end at most 0.10 m in {end_good}, heading at most 0.5 "
-        f"degrees in {heading_good}, lost {sum(p['lost_count'] > 0 for p in poses)}\n"
-        f"  position RMS {rms([p['position_rmse_m'] for p in poses]):.4f} m, end {rms([p['position_end_m'] for p in poses]):.4f}"
-        f" m, heading {rms([p['heading_rmse_deg'] for p in poses]):.3f} degrees, NEES inside 95 %: "
-        f"{sum(p['nees_inside_95'] for p in poses) / len(poses):.2f}\n"
-        f"  dead reckoning alone: {rms([b['position_rmse_m'] for _, _, b in rows]):.3f} m, end "
-        f"{rms([b['position_end_m'] for _, _, b in rows]):.3f} m, heading {rms([b['heading_rmse_deg'] for _, _, b in rows]):.2f} degrees\n"
+    poses, seen = [r["pose"] for r in rows], [r["seen"] for r in rows]
+    total = lambda key: sum(s[key] for s in seen)
+    good = lambda key, most: sum(p[key] <= most for p in poses)
+    weights = [s["right"] for s in seen]
+    pooled = lambda key: math.sqrt(sum(w * s[key] ** 2 for w, s in zip(weights, seen)) / max(1, sum(weights)))
+    mean = sum(w * s["bearing_mean_deg"] for w, s in zip(weights, seen)) / max(1, sum(weights))
+    right, wrong, large = total("right"), total("false"), total("labelled_large")
+    found = sum(s["recall"] * s["labelled_large"] for s in seen if s["labelled_large"])
+    reckoned = [r["reckoned"] for r in rows]
+    text = (
+        f"{len(rows)} drives: RMSE at most 0.05 m in {good('position_rmse_m', 0.05)}, end at most 0.10 m in "
+        f"{good('position_end_m', 0.10)}, heading at most 0.5 degrees in {good('heading_rmse_deg', 0.5)}, lost "
+        f"{sum(p['lost_count'] > 0 for p in poses)}\n"
+        f"{against_bound(poses, [r['bound'] for r in rows])}\n"
+        f"  NEES inside 95 %: {sum(p['nees_inside_95'] for p in poses) / len(poses):.2f}\n"
+        f"  dead reckoning alone: {rms([b['position_rmse_m'] for b in reckoned]):.3f} m, end "
+        f"{rms([b['position_end_m'] for b in reckoned]):.3f} m, heading {rms([b['heading_rmse_deg'] for b in reckoned]):.2f} degrees\n"
         f"  detector: precision {right / max(1, right + wrong):.4f} ({right} right, {wrong} false), recall "
         f"{found / max(1, large):.3f} of {large}; bearing RMS {pooled('bearing_rms_deg'):.4f}, mean {mean:.4f} degrees, "
         f"against its sigma {pooled('normalised_rms'):.3f}"
     )
+    ones = [r for r in rows if "one" in r]
+    if ones:
+        lost = sum(r["one"]["lost_count"] > 0 for r in ones)
+        text += (
+            f"\nwith one landmark only (the one that is seen most), {len(ones)} drives: lost {lost}\n"
+            + against_bound([r["one"] for r in ones], [r["one_bound"] for r in ones])
+        )
+    return text
 
 
 def seeds_of(text):
@@ -100,6 +177,7 @@ def main():
     p.add_argument("--size", default="", help="WxH of the pictures; else as the world has them")
     p.add_argument("--rate", type=float, default=5, help="pictures a second")
     p.add_argument("--bin", type=pathlib.Path, default=ROOT / "build" / "bin")
+    p.add_argument("--one", action="store_true", help="also with the one landmark alone that is seen most")
     p.add_argument("--rendered-only", action="store_true", help="those of the seeds that are in the cache")
     a = p.parse_args()
     a.cache.mkdir(parents=True, exist_ok=True)
@@ -109,18 +187,20 @@ def main():
         sys.exit(f"{a.cache}: holds drives of another scenario, size or rate; name another --cache")
     scenario.write_text(wanted)
     rows = []
-    print("seed | RMSE m   end m | heading | NEES | lost | reckoned m | precision recall | bearing  / sigma", flush=True)
+    print("seed | RMSE m   end m | heading | NEES | lost | bound m | reckoned m | precision recall | bearing  / sigma", flush=True)
     for seed in a.seeds:
         drive = a.cache / str(seed)
         if not drive.exists():
             if a.rendered_only:
                 continue
             render(a, scenario, seed, drive)
-        pose, seen, alone = judge(a, drive, seed)
-        rows.append((pose, seen, alone))
+        row = judge(a, scenario, drive, seed)
+        pose, seen = row["pose"], row["seen"]
+        rows.append(row)
         print(
             f"{seed:4} | {pose['position_rmse_m']:.4f} {pose['position_end_m']:.4f} | {pose['heading_rmse_deg']:7.3f} | "
-            f"{pose['nees_inside_95']:.2f} | {pose['lost_count']:4} | {alone['position_end_m']:10.3f} | "
+            f"{pose['nees_inside_95']:.2f} | {pose['lost_count']:4} | {row['bound']['position_rms_m']:7.4f} | "
+            f"{row['reckoned']['position_end_m']:10.3f} | "
             f"{seen['precision']:9.4f} {seen['recall']:6.3f} | {seen['bearing_rms_deg']:.4f} {seen['normalised_rms']:7.3f}",
             flush=True,
         )

@@ -227,7 +227,10 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   clue.bearing_rad = s.bearing_rad;
   const double along = use_range && sensor.range_is_depth && has_bearing ? cos(s.bearing_rad) : 1.0;
   clue.range_m = (s.range_m - sure.range_bias_m) / sure.range_scale / (along > 0.1 ? along : 0.1);
-  clue.sigma_angle_rad = std::sqrt(square(bearing_sigma) + square(params_.lasting_bearing_rad));
+  clue.sigma_angle_rad = std::sqrt(square(bearing_sigma) + square(params_.lasting_bearing_rad) +
+                                   square(params_.sensor_angle_scale_sigma * kHalfPi));
+  clue.sigma_place_m = std::sqrt(square(map_sigma(landmark)) + square(params_.sensor_xy_sigma_m) +
+                                 square(params_.sensor_tilt_sigma_rad * (target.p_m[2] - sensor.z_m)));
   clue.sigma_length_m = std::sqrt(square(range_sigma) + square(params_.lasting_range_m) + square(map_sigma(landmark)) +
                                   square((params_.range_sigma_rel + params_.lasting_range_rel) * clue.range_m));
   note_clue(clue);

@@ -193,7 +193,6 @@ void landmark_ekf::estimate(wm_estimate *out) const {
   const bool fresh =
       fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, filter_.now_ns()) <= params_.dead_reckoning_after_s;
   out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
-  start_trial_.widen(out);
   if (state_ == WM_STATE_LOST) widen(out);
 }
 

@@ -32,24 +32,28 @@ struct problem {
   struct item {
     const search_clue *clue;
     double weight_angle, weight_length;  // 1 / variance
+    double place_m2;                     // sigma_place_m squared
     double dir_x, dir_y;                 // of the line of sight, in the odometry's frame
     int landmark;                        // numbered as they come; -1: none
   };
   static constexpr int kMost = pose_search::kCapacity + 4;
   item items[kMost];
   int count = 0, landmarks = 0;
+  int seen[kMost];          // how often each landmark was
   int stated_from = kMost;  // what was said of the start: items from here on
 
   void add(const search_clue &clue, double travelled_m, double turned_rad) {
     item &it = items[count++];
     it.clue = &clue;
     it.landmark = -1;
+    it.place_m2 = (clue.kind & kClueBearing) ? square(clue.sigma_place_m) : 0.0;
     if (clue.kind & (kClueBearing | kClueRange)) {
       for (int i = 0; i < count - 1 && it.landmark < 0; i++)
         if (items[i].landmark >= 0 && items[i].clue->place_m[0] == clue.place_m[0] &&
             items[i].clue->place_m[1] == clue.place_m[1])
           it.landmark = items[i].landmark;
-      if (it.landmark < 0) it.landmark = landmarks++;
+      if (it.landmark < 0) seen[it.landmark = landmarks++] = 0;
+      seen[it.landmark]++;
     }
     const double way = kWayError * (travelled_m - clue.travelled_m);
     const double turn = kTurnError * (turned_rad - clue.turned_rad);
@@ -61,6 +65,13 @@ struct problem {
     it.dir_y = d.sin;
   }
 };
+
+// Of one bearing at that distance (squared), with the part of what lasts that an observation has which is one of
+// several of the same landmark: together they know it no better than once.
+double weight_at(const problem &all, const problem::item &it, double distance_m2) {
+  const double lasting = it.place_m2 > 0.0 ? all.seen[it.landmark] * it.place_m2 : 0.0;
+  return it.weight_angle / (1.0 + lasting * it.weight_angle / distance_m2);
+}
 
 double clipped(double chi2) { return chi2 < kOutlierChi2 ? chi2 : kOutlierChi2; }
 
@@ -90,7 +101,9 @@ residuals look(const problem::item &it, const placement &p, const sin_cos &turn)
   if (c.kind & kClueBearing) {
     const double ux = turn.cos * it.dir_x - turn.sin * it.dir_y, uy = turn.sin * it.dir_x + turn.cos * it.dir_y;
     const double ahead = ux * dx + uy * dy, across = ux * dy - uy * dx;
-    out.angle_chi2 = ahead > 0.0 && distance > 1e-6 ? square(across / distance) * it.weight_angle : 1e3;
+    out.angle_chi2 = ahead > 0.0 && distance > 1e-6
+                         ? square(across) * it.weight_angle / (square(distance) + it.place_m2 * it.weight_angle)
+                         : 1e3;
   }
   if (c.kind & kClueRange) out.length_chi2 = square(distance - c.range_m) * it.weight_length;
   return out;
@@ -160,7 +173,8 @@ placement place_at(const problem &all, double rotation) {
       if (c.kind & kClueBearing) {
         double distance = (c.kind & kClueRange) ? c.range_m : kFirstGuess_m;
         if (round > 0 && !(c.kind & kClueRange)) distance = std::sqrt(square(tx - p.x) + square(ty - p.y)) + 0.1;
-        add_row(-uy, ux, 0, ux * ty - uy * tx, it.weight_angle / square(distance > 0.2 ? distance : 0.2) * trust_angle);
+        const double q = square(distance > 0.2 ? distance : 0.2);
+        add_row(-uy, ux, 0, ux * ty - uy * tx, weight_at(all, it, q) / q * trust_angle);
         if (c.kind & kClueRange) add_row(ux, uy, 0, ux * tx + uy * ty - c.range_m, it.weight_length * trust_length);
       } else if ((c.kind & kClueRange) && circles) {
         const double weight = it.weight_length / (4.0 * square(c.range_m > 0.2 ? c.range_m : 0.2));
@@ -225,7 +239,7 @@ void normal_equations(const problem &all, const placement &p, double a[3][3], do
     if (!(q > 1e-6)) continue;
     if (c.kind & kClueBearing) {
       const double row[3] = {dy / q, -dx / q, -(rx * dx + ry * dy) / q - 1.0};
-      add_row(row, wrap(c.sensor.heading_rad + c.bearing_rad + p.turn - atan2(dy, dx)), it.weight_angle);
+      add_row(row, wrap(c.sensor.heading_rad + c.bearing_rad + p.turn - atan2(dy, dx)), weight_at(all, it, q));
     }
     if (c.kind & kClueRange) {
       const double d = std::sqrt(q);

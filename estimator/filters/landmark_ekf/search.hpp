@@ -22,6 +22,7 @@ struct search_clue {
   double bearing_rad;  // or the heading in map
   double range_m;      // on the floor
   double sigma_angle_rad, sigma_length_m;
+  double sigma_place_m;  // of a bearing: what of the landmark and the mounting is wrong each time alike, across it
   double travelled_m, turned_rad;  // so far, at the observation: odometry's own error grows with them
 };
 // Odometry's error in parts of the way and of the turn, before calibration.

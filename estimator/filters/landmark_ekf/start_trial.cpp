@@ -11,6 +11,7 @@ constexpr double kWrong_m = 2.0, kWrong_rad = 0.3;  // who is farther off is fou
 constexpr double kWay_m = 15.0;                     // then odometry has forgotten where it began
 constexpr int kLandmarks = 3;                       // fewer fit many places
 constexpr int kSightings = 8;                       // one false one among few makes a pose of its own
+constexpr double kNeither = 16.3;                   // 99.9 %: another place looks like this one, by chance
 constexpr double kAgreeing = 0.7, kLasts_s = 0.25;  // and false ones come and go
 constexpr double kRight = -5.0, kSure_m = 0.2;      // proven: also by how well it would have been seen to be wrong
 
@@ -47,11 +48,15 @@ void solve_lower(const factor3 &f, const double d[3], double out[3]) {
   }
 }
 
-// Of N(d; 0, m), without the constant.
-double log_density(const factor3 &f, const double d[3]) {
+double squared_distance(const factor3 &f, const double d[3]) {
   double w[3];
   solve_lower(f, d, w);
-  return -0.5 * (square(w[0]) + square(w[1]) + square(w[2])) - log(f.l[0][0] * f.l[1][1] * f.l[2][2]);
+  return square(w[0]) + square(w[1]) + square(w[2]);
+}
+
+// Of N(d; 0, m), without the constant.
+double log_density(const factor3 &f, const double d[3]) {
+  return -0.5 * squared_distance(f, d) - log(f.l[0][0] * f.l[1][1] * f.l[2][2]);
 }
 
 }  // namespace
@@ -94,6 +99,7 @@ void start_trial::weigh(const search_result &seen, const wm_pose2 &odom, double 
   const double d[3] = {seen.pose.x_m - now.x_m, seen.pose.y_m - now.y_m, wrap(seen.pose.heading_rad - now.heading_rad)};
   const factor3 of_right = factor(right), of_wrong = factor(wrong);
   if (!of_right.good || !of_wrong.good) return;
+  if (squared_distance(of_wrong, d) > kNeither) return;
   log_odds_ = kPrior + log_density(of_wrong, d) - log_density(of_right, d);
   if (log_odds_ < kRight && seen.covariance[0][0] + seen.covariance[1][1] < 2.0 * square(kSure_m)) open_ = false;
   if (log_odds_ < kWrong) wrong_since_ns_ = WM_TIME_NONE;
@@ -113,13 +119,5 @@ void start_trial::weigh(const search_result &seen, const wm_pose2 &odom, double 
 }
 
 double start_trial::probability() const { return open_ ? 1.0 / (1.0 + exp(-log_odds_)) : 0.0; }
-
-void start_trial::widen(wm_estimate *out) const {
-  const double p = probability() - 1.0 / (1.0 + exp(-kPrior));
-  if (!(p > 0.0)) return;
-  out->covariance[wm_cov_index(0, 0)] += p * square(kWrong_m);
-  out->covariance[wm_cov_index(1, 1)] += p * square(kWrong_m);
-  out->covariance[wm_cov_index(5, 5)] += p * square(kWrong_rad);
-}
 
 }  // namespace wm

@@ -10,7 +10,6 @@
 #define WAYMARK_ESTIMATOR_START_TRIAL_HPP
 
 #include "filters/landmark_ekf/search.hpp"
-#include "waymark/estimator.h"
 
 namespace wm {
 
@@ -27,8 +26,6 @@ class start_trial {
 
   bool wrong() const { return open_ && wrong_; }
   double probability() const;  // of having been wrong; 0 where it isn't open
-  // Adds what a wrong one may be off by, as far as the observations made it likelier than it was from the start.
-  void widen(wm_estimate *out) const;
   // Where it is now if the stated pose was wrong, by the last weighing.
   const wm_pose2 &pose() const { return pose_; }
   const double (*covariance() const)[3] { return covariance_; }

@@ -106,6 +106,29 @@ void test_one_landmark_ahead() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, ph, bound(s, drive, 0, {4.95})[0].heading_var_rad2);
 }
 
+// The same landmark by a camera that is turned by an unknown angle, with bearings as a detector handed them on;
+// standing, the clock's error says nothing.
+void test_bearings_of_a_camera_that_is_turned() {
+  Scenario s = simple();
+  s.errors.landmark_m = 0.02;
+  s.errors.camera_mounting_rad = 0.004;
+  s.errors.camera_mounting_m = 0.01;
+  s.faults.camera_clock_offset_s = 0.01;
+  Leg leg;
+  leg.stand_s = 5;
+  s.route.legs = {leg};
+  const Drive drive = planned(s);
+  std::vector<montecarlo::SeenBearing> seen;
+  for (int i = 0; i < 50; i++) seen.push_back({0.05 + 0.09 * i, 0, 0, {0, 0}, {10, 0}, 0.005});
+  const Bound end = bound(s, [&drive](double t_s) { return drive.at(t_s); }, seen, 1, 1, {4.95})[0];
+  // z = (map_y - y - mounting_y)/10 - heading - mounting_yaw + noise
+  const double py = 0.0009, ph = 1e-4;
+  const double innovation = (py + 4e-4 + 1e-4) / 100 + ph + 1.6e-5 + 0.005 * 0.005 / 50;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-10, py - py * py / 100 / innovation, end.y_var_m2);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-10, ph - ph * ph / innovation, end.heading_var_rad2);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-10, 0.0009, end.x_var_m2);
+}
+
 void test_statistics_by_hand() {
   montecarlo::Statistics s;
   s.runs = 4;
@@ -140,6 +163,7 @@ int main() {
   RUN_TEST(test_a_straight_by_the_wheels_alone);
   RUN_TEST(test_standing_still_loses_nothing);
   RUN_TEST(test_one_landmark_ahead);
+  RUN_TEST(test_bearings_of_a_camera_that_is_turned);
   RUN_TEST(test_statistics_by_hand);
   return UNITY_END();
 }

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+// waymark-montecarlo-bound SCENARIO RUN RECORDING: the Cramér-Rao bound of a rendered drive past known landmarks, with
+// the bearings that the run's detector found in its pictures.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "common/csv.h"
+#include "common/failure.h"
+#include "common/recording_folder.h"
+#include "montecarlo/bound.h"
+extern "C" {
+#include "waymark/eventlog.h"
+}
+
+namespace {
+
+using namespace wm::montecarlo;
+using wm::tools::Failure;
+using wm::tools::Pose;
+
+struct Found {
+  std::vector<SeenBearing> bearings;
+  size_t landmarks = 0, cameras = 0;
+};
+
+// Truth.csv as states: rows each 20 ms, between them at constant speed.
+class Path {
+ public:
+  explicit Path(const std::vector<Pose> &poses) {
+    for (const Pose &p : poses) {
+      wm::sim::State s{};
+      s.x_m = p.p_m.x(), s.y_m = p.p_m.y();
+      s.heading_rad = wm::tools::heading_rad(p.q);
+      if (!states_.empty()) {
+        const wm::sim::State &before = states_.back();
+        s.heading_rad = before.heading_rad + wm::tools::wrap(s.heading_rad - before.heading_rad);
+        const double along =
+            std::cos(s.heading_rad) * (s.x_m - before.x_m) + std::sin(s.heading_rad) * (s.y_m - before.y_m);
+        s.way_m = before.way_m + std::copysign(std::hypot(s.x_m - before.x_m, s.y_m - before.y_m), along);
+      }
+      times_s_.push_back(1e-9 * static_cast<double>(p.t_ns - poses.front().t_ns));
+      states_.push_back(s);
+    }
+    if (states_.size() < 2) throw Failure("truth.csv has no way in it");
+  }
+  double end_s() const { return times_s_.back(); }
+
+  wm::sim::State at(double t_s) const {
+    const auto after = std::upper_bound(times_s_.begin(), times_s_.end(), t_s) - times_s_.begin();
+    const auto b =
+        static_cast<size_t>(std::clamp<std::ptrdiff_t>(after, 1, static_cast<std::ptrdiff_t>(times_s_.size()) - 1));
+    const size_t a = b - 1;
+    const double dt = times_s_[b] - times_s_[a], part = std::clamp((t_s - times_s_[a]) / dt, 0.0, 1.0);
+    const wm::sim::State &from = states_[a], &to = states_[b];
+    wm::sim::State s{};
+    s.x_m = from.x_m + part * (to.x_m - from.x_m);
+    s.y_m = from.y_m + part * (to.y_m - from.y_m);
+    s.heading_rad = from.heading_rad + part * (to.heading_rad - from.heading_rad);
+    s.way_m = from.way_m + part * (to.way_m - from.way_m);
+    s.speed_mps = (to.way_m - from.way_m) / dt;
+    s.yaw_rate_radps = (to.heading_rad - from.heading_rad) / dt;
+    return s;
+  }
+
+ private:
+  std::vector<double> times_s_;
+  std::vector<wm::sim::State> states_;
+};
+
+std::map<int64_t, Eigen::Vector2d> load_places(const std::filesystem::path &file) {
+  const wm::tools::Csv csv = wm::tools::Csv::load(file);
+  const size_t id = csv.need("id"), x = csv.need("x_m"), y = csv.need("y_m");
+  std::map<int64_t, Eigen::Vector2d> out;
+  for (size_t row = 0; row < csv.rows(); row++) out[csv.integer(row, id)] = {csv.number(row, x), csv.number(row, y)};
+  return out;
+}
+
+Found load_found(const std::filesystem::path &run, const std::filesystem::path &recording, int64_t begin_ns) {
+  const std::map<int64_t, Eigen::Vector2d> places = load_places(recording / "truth-landmarks.csv");
+  wm_error error{};
+  wm_log_reader *opened = nullptr;
+  if (wm_log_open((run / "events.wmlog").c_str(), &opened, &error) != WM_OK) throw Failure(error.text);
+  const std::unique_ptr<wm_log_reader, void (*)(wm_log_reader *)> log(opened, wm_log_reader_close);
+  const wm_log_head &head = *wm_log_reader_head(log.get());
+  std::map<int64_t, size_t> numbers;
+  Found out;
+  out.cameras = head.sensor_count;
+  wm_event event{};
+  uint64_t missing = 0;
+  int cut = 0;
+  for (;;) {
+    const wm_status next = wm_log_next(log.get(), &event, &missing, &cut, &error);
+    if (next == WM_END) break;
+    if (next != WM_OK) throw Failure(error.text);
+    const wm_sighting &seen = event.as.sighting;
+    if (event.kind != WM_EVENT_SIGHTING || !std::isfinite(seen.bearing_sigma_rad) || seen.sensor >= head.sensor_count)
+      continue;
+    const auto place = places.find(seen.landmark_id);
+    if (place == places.end()) continue;
+    const auto number = numbers.emplace(seen.landmark_id, numbers.size()).first;
+    const wm_mounting &mounting = head.sensors[seen.sensor].mounting;
+    out.bearings.push_back({1e-9 * static_cast<double>(event.t_ns - begin_ns),
+                            seen.sensor,
+                            number->second,
+                            {mounting.xyz_m[0], mounting.xyz_m[1]},
+                            {place->second.x(), place->second.y()},
+                            seen.bearing_sigma_rad});
+  }
+  out.landmarks = numbers.size();
+  return out;
+}
+
+int run(const std::string &scenario_file, const std::string &run_folder, const std::string &recording) {
+  wm::sim::Scenario scenario;
+  wm_error error{};
+  if (wm::sim::load_scenario(scenario_file, scenario, &error) != WM_OK) throw Failure(error.text, wm::tools::kUsage);
+  const std::vector<Pose> poses = wm::tools::load_truth(recording);
+  const Path path(poses);
+  const Found found = load_found(run_folder, recording, poses.front().t_ns);
+  std::vector<double> times_s;
+  for (double t_s = 0.1; t_s <= path.end_s(); t_s += 0.1) times_s.push_back(t_s);
+  const std::vector<Bound> bounds = bound(
+      scenario, [&path](double t_s) { return path.at(t_s); }, found.bearings, found.landmarks, found.cameras, times_s);
+  double position_m2 = 0, heading_rad2 = 0;
+  for (const Bound &b : bounds) position_m2 += b.x_var_m2 + b.y_var_m2, heading_rad2 += b.heading_var_rad2;
+  const auto n = static_cast<double>(bounds.size());
+  const Bound &end = bounds.back();
+  const nlohmann::ordered_json out = {{"position_rms_m", std::sqrt(position_m2 / n)},
+                                      {"position_end_m", std::sqrt(end.x_var_m2 + end.y_var_m2)},
+                                      {"heading_rms_deg", std::sqrt(heading_rad2 / n) * 180 / M_PI},
+                                      {"bearings", found.bearings.size()},
+                                      {"landmarks", found.landmarks}};
+  std::printf("%s\n", out.dump(2).c_str());
+  return wm::tools::kDone;
+}
+
+}  // namespace
+
+int main(int argc, char **argv) {
+  std::string scenario, run_folder, recording;
+  CLI::App app(
+      "The error that no estimator can go below on a rendered drive past known landmarks, with the bearings (and their "
+      "sigmas) that a run's detector found in its pictures, and errors as large as the scenario says.",
+      "waymark-montecarlo-bound");
+  app.add_option("SCENARIO", scenario, "scenario file (YAML) of the recording")->required();
+  app.add_option("RUN", run_folder, "folder that `waymark replay` wrote")->required();
+  app.add_option("RECORDING", recording, "the recording, with its truth")->required();
+  app.footer(
+      "example: waymark-montecarlo-bound config/worlds/crossing-easy.yaml out/run out/drive\n"
+      "docs/consistency.md derives it. Exit code: 0 done, 1 failed, 2 usage.");
+  try {
+    app.parse(argc, argv);
+    return run(scenario, run_folder, recording);
+  } catch (const CLI::ParseError &problem) {
+    return app.exit(problem) == 0 ? wm::tools::kDone : wm::tools::kUsage;
+  } catch (const std::exception &problem) {
+    std::fprintf(stderr, "waymark-montecarlo-bound: %s\n", problem.what());
+    const auto *failure = dynamic_cast<const Failure *>(&problem);
+    return failure != nullptr ? failure->exit_code : wm::tools::kFailed;
+  }
+}
