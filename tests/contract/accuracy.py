@@ -289,6 +289,7 @@ def hall():
     bar("hall: position RMSE", plain["position_rmse_m"], most=0.085)
     bar("hall: heading RMSE", plain["heading_rmse_deg"], most=0.25)
     bar("hall: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
+    bar("hall: lines of the map for each one labelled: lost ones are joined", plain["landmarks_estimated"] / plain["landmarks_total"], most=1.3)
     scaled_ = run(recording, "hall", "--align", "sim2")
     bar("hall: position RMSE, aligned with scale", scaled_["position_rmse_m"], most=0.012)
     bar("hall: heading RMSE, aligned with scale", scaled_["heading_rmse_deg"], most=0.25)

@@ -43,7 +43,7 @@ class bearing_tracks {
   struct track {
     int32_t id;  // -1: free
     int sensor, count, misfits;
-    wm_time_ns last_ns;
+    wm_time_ns first_ns, last_ns;
     int clone[kLinePoses];
     double azimuth_rad[kLinePoses], sigma_rad[kLinePoses];
   };

@@ -125,15 +125,18 @@ struct distribution {
 // measured inputs. Not about the points' mean, as printed: what is measured scatters about the truth, so the place of
 // the measured inputs has that bend in it already, and the points' mean would add it once more (a quarter more error at
 // two degrees of parallax).
-bool transform(const problem &p, const double *input, double (*l)[kInputs], int n, distribution *out) {
+// `l` is the root of the covariance; azimuths, behind the `poses` numbers, are independent of all others.
+bool transform(const problem &p, const double *input, double (*l)[kInputs], int poses, int n, distribution *out) {
   const double spread = kAlpha * std::sqrt(n), weight = 0.5 / square(spread);
   double point[kInputs], at[2 * kInputs][2];
   if (!solve(p, input, out->mean)) return false;
+  std::memcpy(point, input, sizeof point);
   for (int i = 0; i < 2 * n; i++) {
-    const int j = i / 2;
+    const int j = i / 2, end = j < poses ? poses : j + 1;
     const double way = i % 2 == 0 ? spread : -spread;
-    for (int k = 0; k < n; k++) point[k] = input[k] + way * l[k][j];
+    for (int k = j; k < end; k++) point[k] = input[k] + way * l[k][j];
     if (!solve(p, point, at[i])) return false;
+    for (int k = j; k < end; k++) point[k] = input[k];
   }
   for (int r = 0; r < 2; r++)
     for (int c = 0; c < 2; c++) {
@@ -145,7 +148,7 @@ bool transform(const problem &p, const double *input, double (*l)[kInputs], int 
   for (int r = 0; r < 2; r++)
     for (int j = n - 1; j >= 0; j--) {
       double sum = 0.5 / spread * (at[2 * j][r] - at[2 * j + 1][r]);
-      for (int k = j + 1; k < n; k++) sum -= out->by[r][k] * l[k][j];
+      for (int k = j + 1; k < poses; k++) sum -= out->by[r][k] * l[k][j];
       out->by[r][j] = l[j][j] > 0.0 ? sum / l[j][j] : 0.0;
     }
   return true;
@@ -245,8 +248,9 @@ line_landmark find_line(const line_bundle &b, bool unscented) {
   distribution d{};
   double l[kInputs][kInputs];
   std::memcpy(l, covariance, sizeof l);
-  if (unscented) root(l, n);
-  if (!(unscented ? transform(p, input, l, n, &d) : linearise(p, input, covariance, n, &d))) return out;
+  if (unscented) root(l, poses);
+  for (int i = poses; i < n; i++) l[i][i] = b.sigma_rad[i - poses];
+  if (!(unscented ? transform(p, input, l, poses, n, &d) : linearise(p, input, covariance, n, &d))) return out;
 
   // What the poses don't explain: azimuths' noise and the transform's remainder.
   double rest[2][2];

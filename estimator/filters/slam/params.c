@@ -88,6 +88,10 @@ static const wm_param kParams[] = {
     F64("lines.step_m", line_step_m, 0.15, 0.001, 100, "A pose is kept after so much way, m."),
     F64("lines.sigma_rel", line_sigma_rel, 0.25, 0.001, 1,
         "And when its place is known to this part of its distance (one sigma)."),
+    BOOL("lines.rejoin", line_rejoin, 0,
+         "A line's number is its tracker's own: one that was lost comes back under another. Two landmarks, one lost "
+         "before "
+         "the other was first seen, that lie at one place as far as is known, are one line."),
     ENUM("consistency", consistency, WM_SLAM_INVARIANT, WM_SLAM_PLAIN, kConsistency,
          "invariant: the right-invariant filter, which knows what it can't know (the map's heading and place); plain: "
          "the textbook's, which becomes too sure of its heading (for comparison)."),

@@ -42,6 +42,7 @@ typedef struct wm_slam_params {
   double associate_gate, new_gate, associate_near_m, associate_max_range_m;
   // landmarks that are seen by bearings alone
   int32_t line_clones, line_poses, line_method;
+  int32_t line_rejoin;
   double line_near_m, line_patience_s, line_parallax_rad, line_step_m, line_sigma_rel;
   int32_t consistency;
   double dead_reckoning_after_s;

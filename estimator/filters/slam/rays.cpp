@@ -18,7 +18,7 @@ constexpr int kMisfits = 6;                   // in a row: the ray was not that 
 
 void slam::begin_ray(int32_t id, const wm_sighting &s, const reading &r, const past_pose &past) {
   bearing_tracks::track *track = tracks_.begin(id, s.sensor);
-  track->last_ns = joint_.now_ns();
+  track->first_ns = track->last_ns = joint_.now_ns();
   const int clone = keep_clone(s.sensor, past, joint_.now_ns());
   tracks_.add(track, clone, s.bearing_rad, r.bearing_sigma, 1);
   const int state = ray_state(*track), lasting = lend(s.sensor, id, joint_.now_ns());
@@ -110,12 +110,12 @@ void slam::follow_ray(int32_t id, const wm_sighting &s, const reading &r, const 
   if (joint_.value(state + 1) < kLeast) joint_.set_value(state + 1, kLeast);
   track->misfits = 0;
   track->last_ns = fused_ns_ = now;
-  settle_ray(id, track, from);
+  settle_ray(track, from);
 }
 
 // A ray whose end is known becomes a place: where the distance's error is small against how much it bends the bearing
 // (Civera's index of linearity, with the sine of the parallax required besides).
-void slam::settle_ray(int32_t id, bearing_tracks::track *track, const wm_pose2 &from) {
+void slam::settle_ray(bearing_tracks::track *track, const wm_pose2 &from) {
   const int state = ray_state(*track), anchor = clone_state(track->clone[0]);
   const double distance = 1.0 / joint_.value(state + 1);
   const sin_cos ray = sincos(joint_.value(anchor + 2) + joint_.value(state));
@@ -136,7 +136,7 @@ void slam::settle_ray(int32_t id, bearing_tracks::track *track, const wm_pose2 &
     rows[k].add(state + 1, -square(distance) * (k == 0 ? ray.cos : ray.sin));
   }
   const double none[3][3] = {{0, 0, 0}, {0, 0, 0}, {0, 0, square(kPi)}};
-  note_landmark(id, joint_.add_landmark(rows, none, place), track->sensor, joint_.now_ns());
+  note_line(*track, joint_.add_landmark(rows, none, place));
   end_ray(track);
 }
 

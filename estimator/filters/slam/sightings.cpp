@@ -330,7 +330,10 @@ void slam::track_bearing(int32_t id, const wm_sighting &s, const reading &r, con
   const wm_time_ns now = joint_.now_ns();
   blank.verdict = WM_REJECTED_SEARCHING;  // kept until the parallax suffices
   bearing_tracks::track *track = tracks_.find(id, s.sensor);
-  if (!track) track = tracks_.begin(id, s.sensor);
+  if (!track) {
+    track = tracks_.begin(id, s.sensor);
+    track->first_ns = now;
+  }
   track->last_ns = now;
   // All lines of a picture share a clone, and pictures that are too near to the last one have none.
   const wm_pose2 here = sensor_pose(s.sensor, past);
@@ -346,7 +349,7 @@ void slam::track_bearing(int32_t id, const wm_sighting &s, const reading &r, con
   const double sigma = std::sqrt(square(r.bearing_sigma) + square(params_.lasting_bearing_rad));
   const int clone = keep_clone(s.sensor, past, now);
   tracks_.add(track, clone, s.bearing_rad, sigma, params_.line_poses);
-  if (track->count >= 3 && join_line(id, *track)) {
+  if (track->count >= 3 && join_line(*track)) {
     bearing_tracks::end(track);
     fused_ns_ = now;
     blank.verdict = WM_FUSED;
@@ -355,7 +358,7 @@ void slam::track_bearing(int32_t id, const wm_sighting &s, const reading &r, con
   records.add(blank);
 }
 
-bool slam::join_line(int32_t id, const bearing_tracks::track &track) {
+bool slam::join_line(const bearing_tracks::track &track) {
   line_bundle bundle;
   bundle.count = track.count;
   for (int i = 0; i < track.count; i++) {
@@ -384,7 +387,7 @@ bool slam::join_line(int32_t id, const bearing_tracks::track &track) {
   if (variance > square(params_.line_sigma_rel * line.distance_m) || !make_room()) return false;
   noise[2][2] = square(kPi);
   const double place[3] = {line.place_m[0], line.place_m[1], 0.0};
-  note_landmark(id, joint_.add_landmark(rows, noise, place), track.sensor, joint_.now_ns());
+  note_line(track, joint_.add_landmark(rows, noise, place));
   return true;
 }
 

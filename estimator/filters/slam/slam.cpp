@@ -271,6 +271,7 @@ size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const 
   list.add("map", "left", (double)counts_.left, 0.0);
   list.add("map", "moved", (double)counts_.moved, 0.0);
   list.add("map", "doubled", (double)counts_.doubled, 0.0);
+  if (params_.line_rejoin) list.add("map", "rejoined", (double)counts_.rejoined, 0.0);
   list.add("map", "no_room", (double)counts_.no_room, 0.0);
   return list.count();
 }
@@ -340,12 +341,21 @@ void slam::look_after(wm_time_ns t_ns) {
   cursor_ = (cursor_ + 1) % joint_.landmarks();
   const landmark_note &note = notes()[cursor_];
   const bool unconfirmed = !note.surveyed && note.seen < (uint32_t)params_.confirm_seen;
-  if (unconfirmed && wm_seconds_between(note.last_ns, t_ns) > params_.leave_after_s) drop_landmark(cursor_);
+  if (unconfirmed && wm_seconds_between(note.last_ns, t_ns) > params_.leave_after_s)
+    drop_landmark(cursor_);
+  else if (params_.line_rejoin)
+    rejoin(cursor_);
 }
 
 int slam::note_landmark(int32_t id, int landmark, int sensor, wm_time_ns t_ns) {
   notes()[landmark] = {id, 1, t_ns, t_ns, 0.0, 0, 0, sensor, WM_TIME_NONE};
   counts_.joined++;
+  return landmark;
+}
+
+int slam::note_line(const bearing_tracks::track &track, int landmark) {
+  note_landmark(track.id, landmark, track.sensor, joint_.now_ns());
+  notes()[landmark].first_ns = track.first_ns;
   return landmark;
 }
 

@@ -17,8 +17,8 @@ inline constexpr int kSlamSensors = 8;
 // What is known of a landmark beside its place.
 struct landmark_note {
   int32_t id;
-  uint32_t seen;  // sightings fused
-  wm_time_ns first_ns, last_ns;
+  uint32_t seen;                 // sightings fused
+  wm_time_ns first_ns, last_ns;  // seen; with bearings alone, also before it joined
   double z_m;
   int32_t misfits;        // in a row
   int32_t surveyed;       // from the map that was given: it doesn't leave
@@ -27,7 +27,7 @@ struct landmark_note {
 };
 
 struct slam_counts {
-  uint64_t joined, left, moved, doubled, no_room;
+  uint64_t joined, left, moved, doubled, no_room, rejoined;
 };
 
 // The last identities of which something is to be remembered.
@@ -96,6 +96,12 @@ class slam {
     double noise[3];
   };
 
+  // Two landmarks that may be one line: their states, how far apart they are, and the covariance of that.
+  struct pair {
+    int fresh, lost;
+    double apart[2], s[2][2];
+  };
+
   past_pose look_back(double age_s) const;
   void add_pose(joint_row &row, const double by[3], const past_pose &past, int time_state) const;
   double sensor_value(int sensor, int which, double neutral) const;
@@ -119,7 +125,7 @@ class slam {
   void begin_ray(int32_t id, const wm_sighting &s, const reading &r, const past_pose &past);
   void follow_ray(int32_t id, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
                   record_list records);
-  void settle_ray(int32_t id, bearing_tracks::track *track, const wm_pose2 &from);
+  void settle_ray(bearing_tracks::track *track, const wm_pose2 &from);
   void end_ray(bearing_tracks::track *track);
   int ray_state(const bearing_tracks::track &track) const { return first_ray_ + 2 * tracks_.index(track); }
   wm_status fuse_marker(const wm_event &event, record_list records);
@@ -136,7 +142,7 @@ class slam {
   bool believable(int landmark, const joint_state::innovation_block &block, double noise, double scale);
   // Is this identity not one landmark's: seen twice in a picture, or at two places in turn?
   bool doubled(int32_t id, int landmark, int sensor);
-  bool join_line(int32_t id, const bearing_tracks::track &track);
+  bool join_line(const bearing_tracks::track &track);
   void misfit(int landmark, bool ranged);
   int clone_state(int clone) const { return first_clone_ + 3 * clone; }
   int keep_clone(int sensor, const past_pose &past, wm_time_ns t_ns);
@@ -145,9 +151,15 @@ class slam {
   int lend(int sensor, int32_t id, wm_time_ns t_ns);
   int find_landmark(int32_t id) const;
   int note_landmark(int32_t id, int landmark, int sensor, wm_time_ns t_ns);
+  int note_line(const bearing_tracks::track &track, int landmark);
   void drop_landmark(int landmark);
   bool make_room();
   void look_after(wm_time_ns t_ns);
+  void rejoin(int fresh);
+  bool may_be_one(int fresh, int lost) const;
+  pair make_pair(int fresh, int lost) const;
+  void covariance_of_pairs(const pair &p, const pair &q, double out[2][2]) const;
+  bool borne_out(const pair &p) const;
   int32_t own_id();
   void start_again();
   void follow_scale();

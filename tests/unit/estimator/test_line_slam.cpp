@@ -36,11 +36,13 @@ struct ghost {
 } ghosts[kGhosts];
 int32_t next_ghost;
 int fused, refused, waiting, told, lies;
+double renumbered_s;  // all lines are lost for 2 s and come back under other numbers so often; 0: never
+double moved_m;       // then each second one is another, so far beside it
 
 double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
 double uniform(double from, double to) { return from + (to - from) * wm_random_next_uniform(&noise); }
 
-void begin(int method) {
+void begin(int method, bool rejoin = false) {
   slam = wm_estimator_find("slam");
   wm_params_defaults(&wm_motion_params_table, &motion);
   wm_params_defaults(&slam->params, &params);
@@ -49,6 +51,8 @@ void begin(int method) {
   params.line_near_m = 1;
   params.line_parallax_rad = 0.2;
   params.line_step_m = 0.1;
+  params.line_rejoin = rejoin;
+  renumbered_s = moved_m = 0.0;
   noise = {7, 1, 0};
   for (int i = 0; i < kLines; i++) {
     const wm::sin_cos a = wm::sincos(wm::kTwoPi * i / kLines + 0.1);
@@ -117,8 +121,12 @@ outcome drive(double seconds, int lies_of_ten) {
     const double t_s = 0.02 * step, v = 0.5, w = 0.25;
     const wm_event e = make::twist(t_s, v + gauss(0.01), w + gauss(0.005));
     TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
-    for (int i = 0; step % 5 == 0 && i < kLines; i++) {
-      say(t_s, 10 + i, wm::atan2(place[i][1] - truth.y_m, place[i][0] - truth.x_m) - truth.heading_rad + gauss(kSigma));
+    const int epoch = renumbered_s > 0.0 ? static_cast<int>(t_s / renumbered_s) : 0;
+    const bool dark = epoch > 0 && t_s - epoch * renumbered_s < 2.0;
+    for (int i = 0; step % 5 == 0 && !dark && i < kLines; i++) {
+      const double beside = epoch > 0 && i % 2 == 0 ? moved_m : 0.0;
+      say(t_s, 10 + i + 100 * epoch,
+          wm::atan2(place[i][1] - truth.y_m, place[i][0] + beside - truth.x_m) - truth.heading_rad + gauss(kSigma));
       // So many lies that they are their share of all.
       for (int k = 0; k < 2; k++)
         if (uniform(0, 2) < lies_of_ten / (10.0 - lies_of_ten)) lie(t_s, static_cast<int>(uniform(0, 1000)));
@@ -175,6 +183,28 @@ void test_six_of_ten_are_lies(void) {
   }
 }
 
+// GIVEN lines that are all lost at times and come back under other numbers THEN the map does not double; but lines that
+// stand beside the lost ones are others.
+void test_lost_lines_are_found_again(void) {
+  for (int method : {WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_INVERSE_DISTANCE}) {
+    for (bool rejoin : {false, true}) {
+      begin(method, rejoin);
+      renumbered_s = 25;
+      const outcome o = drive(75, 0);
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.2, o.largest_m);
+      TEST_ASSERT_EQUAL(o.landmarks, o.right);
+      if (rejoin)
+        TEST_ASSERT_LESS_OR_EQUAL(kLines + 2, o.landmarks);
+      else
+        TEST_ASSERT_GREATER_OR_EQUAL(2 * kLines, o.landmarks);
+    }
+    begin(method, true);
+    renumbered_s = 40;
+    moved_m = 0.25;
+    TEST_ASSERT_INT_WITHIN(1, kLines + kLines / 2, drive(75, 0).landmarks);
+  }
+}
+
 }  // namespace
 
 void setUp(void) {}
@@ -184,6 +214,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_honest_sightings);
   RUN_TEST(test_six_of_ten_are_lies);
+  RUN_TEST(test_lost_lines_are_found_again);
   std::free(state);
   return UNITY_END();
 }

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lines that were lost and come back under another number: two landmarks that are one line become one again.
+#include "filters/slam/slam.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kSame_m = 0.02;     // of one line, seen from elsewhere
+constexpr double kTied_m = 0.1;      // so loosely they are tied: one pair in many is wrong for all that
+constexpr double kNear_m = 2.0;      // farther apart no two are compared
+constexpr double kGate = 9.21;       // 99 % of chi2 with two degrees of freedom
+constexpr double kSure_m2 = 0.01;    // so well is known where the two lie to each other that no other pair is asked
+constexpr double kUnsure_m2 = 0.25;  // so badly that nothing is said
+constexpr uint32_t kSeen = 10;       // sightings of each
+
+double nis_of(const double d[2], const double s[2][2]) {
+  return (s[1][1] * d[0] * d[0] - 2.0 * s[0][1] * d[0] * d[1] + s[0][0] * d[1] * d[1]) /
+         (s[0][0] * s[1][1] - s[0][1] * s[1][0]);
+}
+
+}  // namespace
+
+bool slam::may_be_one(int fresh, int lost) const {
+  const landmark_note &f = notes()[fresh], &l = notes()[lost];
+  if (fresh == lost || f.seen < kSeen || l.seen < kSeen || l.last_ns >= f.first_ns) return false;
+  const int a = joint_.landmark_state(fresh), b = joint_.landmark_state(lost);
+  return std::fabs(joint_.value(a) - joint_.value(b)) < kNear_m &&
+         std::fabs(joint_.value(a + 1) - joint_.value(b + 1)) < kNear_m;
+}
+
+// Covariance of one pair's difference with another's.
+void slam::covariance_of_pairs(const pair &p, const pair &q, double out[2][2]) const {
+  for (int k = 0; k < 2; k++)
+    for (int l = 0; l < 2; l++)
+      out[k][l] = joint_.covariance(p.fresh + k, q.fresh + l) - joint_.covariance(p.fresh + k, q.lost + l) -
+                  joint_.covariance(p.lost + k, q.fresh + l) + joint_.covariance(p.lost + k, q.lost + l);
+}
+
+slam::pair slam::make_pair(int fresh, int lost) const {
+  pair out{joint_.landmark_state(fresh), joint_.landmark_state(lost), {}, {}};
+  for (int k = 0; k < 2; k++) out.apart[k] = joint_.value(out.fresh + k) - joint_.value(out.lost + k);
+  covariance_of_pairs(out, out, out.s);
+  for (int k = 0; k < 2; k++) out.s[k][k] += square(kSame_m);
+  return out;
+}
+
+// Is there another pair that agrees with this one, far better than where the two could have been by chance? (J. Neira,
+// J. D. Tardos, "Data association in stochastic mapping using the joint compatibility test", T-RA 17(6), 2001.)
+bool slam::borne_out(const pair &p) const {
+  const double determinant = p.s[0][0] * p.s[1][1] - p.s[0][1] * p.s[1][0];
+  const double inverse[2][2] = {{p.s[1][1] / determinant, -p.s[0][1] / determinant},
+                                {-p.s[1][0] / determinant, p.s[0][0] / determinant}};
+  for (int f = 0; f < joint_.landmarks(); f++)
+    for (int l = 0; l < joint_.landmarks(); l++) {
+      if (joint_.landmark_state(f) == p.fresh || joint_.landmark_state(l) == p.lost || !may_be_one(f, l)) continue;
+      const pair q = make_pair(f, l);
+      double cross[2][2], gain[2][2], d[2], s[2][2];
+      covariance_of_pairs(q, p, cross);
+      for (int i = 0; i < 2; i++)
+        for (int j = 0; j < 2; j++) gain[i][j] = cross[i][0] * inverse[0][j] + cross[i][1] * inverse[1][j];
+      for (int i = 0; i < 2; i++) {
+        d[i] = q.apart[i] - gain[i][0] * p.apart[0] - gain[i][1] * p.apart[1];
+        for (int j = 0; j < 2; j++) s[i][j] = q.s[i][j] - gain[i][0] * cross[j][0] - gain[i][1] * cross[j][1];
+      }
+      if (s[0][0] + s[1][1] < kSure_m2 && nis_of(d, s) < kGate) return true;
+    }
+  return false;
+}
+
+// Two landmarks of which one was lost before the other was first seen, at one place as far as is known, and no third
+// one near: their difference is measured to be nothing, and the old one goes on under the new one's number.
+void slam::rejoin(int fresh) {
+  int best = -1;
+  double least = 1e300, second = 1e300;
+  for (int l = 0; l < joint_.landmarks(); l++) {
+    if (!may_be_one(fresh, l)) continue;
+    const pair p = make_pair(fresh, l);
+    const double nis = nis_of(p.apart, p.s);
+    if (nis < least) {
+      second = least;
+      least = nis;
+      best = l;
+    } else if (nis < second) {
+      second = nis;
+    }
+  }
+  if (best < 0 || !(least < kGate) || !(second > least + kGate)) return;
+  const pair p = make_pair(fresh, best);
+  const double unsure = p.s[0][0] + p.s[1][1];
+  if (unsure > kUnsure_m2 || (unsure > kSure_m2 && !borne_out(p))) return;
+  joint_row rows[2];
+  double noise[2], difference[2];
+  const double none[2] = {0.0, 0.0};
+  for (int k = 0; k < 2; k++) {
+    rows[k].add(p.fresh + k, 1.0);
+    rows[k].add(p.lost + k, -1.0);
+    noise[k] = square(kTied_m);
+    difference[k] = -p.apart[k];
+  }
+  joint_state::innovation_block block;
+  joint_.prepare(rows, difference, noise, 2, &block);
+  joint_.fuse(block, none, false);
+  landmark_note &kept = notes()[best];
+  const landmark_note gone = notes()[fresh];
+  kept.id = gone.id;
+  kept.seen += gone.seen;
+  kept.last_ns = gone.last_ns;
+  kept.sensor = gone.sensor;
+  kept.misfits = gone.misfits;
+  joint_.remove_landmark(fresh);
+  notes()[fresh] = notes()[joint_.landmarks()];
+  counts_.rejoined++;
+}
+
+}  // namespace wm
