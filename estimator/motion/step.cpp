@@ -140,8 +140,10 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
   if (unknown) {
     // The robot may go on as it did, or not: as unsure as the motion that was last believed is large.
     const double speed = std::fabs(input.a), rate = input.model == WM_MOTION_ACKERMANN ? 0.1 : std::fabs(input.b);
+    // That it went straight when it was last heard of doesn't say that it hasn't begun to turn.
+    const bool silent = input.stale && input.model == WM_MOTION_SPEED_YAW_RATE && rate < 0.3;
     n.way_m2 += square(speed) * dt_s;
-    n.turn_rad2 += square(input.model == WM_MOTION_TICKS ? 0.3 : rate) * dt_s;
+    n.turn_rad2 += square(input.model == WM_MOTION_TICKS || silent ? 0.3 : rate) * dt_s;
   }
   return n;
 }

@@ -12,6 +12,8 @@ constexpr double kStartStep_m = 0.12, kStartSigmas = 2.5;
 constexpr int kStartsMax = 6;  // on each side
 constexpr double kDoubtOdds = -1.5;
 constexpr double kLeastExplained = 0.4;
+constexpr double kSureHeading_rad = 0.08;
+constexpr double kSameEnd_m = 0.1, kSameEnd_rad = 0.05, kLeastChance = 0.01;
 constexpr double kOpenSigmas = 2.5;  // that a point is looked for off its place
 
 }  // namespace
@@ -163,10 +165,30 @@ double edge_mcl::descend(const wm_points &points, const belief &prior, double sl
   return cost;
 }
 
+// Ends that lie together are one.
+void edge_mcl::ends::take(const alignment &a, double its_cost, const normal_equations &e) {
+  const auto same = [&a](const alignment &b) {
+    return square(a.value[kAlignX] - b.value[kAlignX]) + square(a.value[kAlignY] - b.value[kAlignY]) <
+               square(kSameEnd_m) &&
+           std::fabs(wrap(a.value[kAlignHeading] - b.value[kAlignHeading])) < kSameEnd_rad;
+  };
+  int i = 0;
+  while (i < count && !same(at[i])) i++;
+  if (i == kMost || (i < count && its_cost >= cost[i])) return;
+  if (i == count) count++;
+  if (its_cost < cost[0] || i == 0) {
+    at[i] = at[0];
+    cost[i] = cost[0];
+    i = 0;
+    best = e;
+  }
+  at[i] = a;
+  cost[i] = its_cost;
+}
+
 // A scan has several places where it fits nearly (doors, pillars). Where the prediction is sure it says which; along an
-// axis that it isn't sure of, every step of half a door's depth is a start, and the least cost decides.
-void edge_mcl::descend_from_several(const wm_points &points, const belief &prior, alignment *best,
-                                    normal_equations *e) const {
+// axis that it isn't sure of, every step of half a door's depth is a start, and the least cost leads.
+void edge_mcl::descend_from_several(const wm_points &points, const belief &prior, ends *out) const {
   const double xx = filter_.variance(kX), yy = filter_.variance(kY), xy = filter_.covariance(kX, kY);
   const double half = 0.5 * (xx + yy), spread = std::sqrt(square(0.5 * (xx - yy)) + square(xy));
   const double sigma = std::sqrt(half + spread), angle = 0.5 * atan2(2.0 * xy, xx - yy);
@@ -178,21 +200,46 @@ void edge_mcl::descend_from_several(const wm_points &points, const belief &prior
     step = kStartSigmas * sigma / sides;
   }
   const double slack = sides > 0 ? step : 3.0 * std::sqrt(half + spread + 9.0 * filter_.variance(kHeading));
-  double least = 0.0;
-  for (int k = -sides; k <= sides; k++) {
-    // The prediction's mean, given that it is k steps along the axis.
-    alignment a = prior.mean;
-    for (int i = 0; i < prior.n; i++) {
-      const int state = a.state[prior.index[i]];
-      const double shared = axis.cos * filter_.covariance(state, kX) + axis.sin * filter_.covariance(state, kY);
-      a.value[prior.index[i]] += k * step * shared / square(sigma);
+  // Nor is a heading found that is off by more than a few degrees.
+  const double turn = std::sqrt(filter_.variance(kHeading));
+  const int turns = turn > kSureHeading_rad ? 1 : 0;
+  out->count = 0;
+  for (int k = -sides; k <= sides; k++)
+    for (int m = -turns; m <= turns; m++) {
+      // The prediction's mean, given that it is k steps along the axis, and turned.
+      alignment a = prior.mean;
+      for (int i = 0; i < prior.n; i++) {
+        const int state = a.state[prior.index[i]];
+        const double shared = axis.cos * filter_.covariance(state, kX) + axis.sin * filter_.covariance(state, kY);
+        a.value[prior.index[i]] += k * step * shared / square(sigma);
+      }
+      a.value[kAlignHeading] = wrap(a.value[kAlignHeading] + m * turn);
+      normal_equations e;
+      const double cost = descend(points, prior, slack, &a, &e);
+      out->take(a, cost, e);
     }
-    normal_equations found;
-    const double cost = descend(points, prior, slack, &a, &found);
-    if (k > -sides && cost >= least) continue;
-    least = cost;
-    *best = a;
-    *e = found;
+}
+
+// How far every state is off, and with what probability, if the robot isn't where the scan fits best but at another
+// end.
+void edge_mcl::allow_for(const ends &found, const belief &prior, double off[ends::kMost][kMaxStates],
+                         double *chance) const {
+  double total = 0.0;
+  for (int k = 0; k < found.count; k++) total += chance[k] = exp(found.cost[0] - found.cost[k]);
+  for (int k = 0; k < found.count; k++) {
+    chance[k] /= total;
+    double scaled[kAlignStates] = {};  // P^-1 (end - best)
+    for (int c = 0; c < prior.n; c++) {
+      const int which = prior.index[c];
+      double way = found.at[k].value[which] - found.at[0].value[which];
+      if (which == kAlignHeading) way = wrap(way);
+      for (int r = 0; r < prior.n; r++) scaled[r] += prior.inverse[r][c] * way;
+    }
+    for (int i = 0; i < filter_.states(); i++) {
+      off[k][i] = 0.0;
+      for (int r = 0; r < prior.n; r++)
+        off[k][i] += filter_.covariance(i, prior.mean.state[prior.index[r]]) * scaled[r];
+    }
   }
 }
 
@@ -230,9 +277,10 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
   belief prior;
   if (!belief_of(camera, &prior)) return false;
   const int *index = prior.index, n = prior.n;
-  alignment a = prior.mean;
-  normal_equations &e = *scan;
-  descend_from_several(points, prior, &a, &e);
+  ends found;
+  descend_from_several(points, prior, &found);
+  const alignment &a = found.at[0];
+  const normal_equations &e = *scan = found.best;
   record->verdict = e.explained < 5 ? (uint8_t)WM_REJECTED_SINGULAR : (uint8_t)WM_FUSED;
   if (e.explained < 5) return false;
   describe(e, prior, a, record);
@@ -243,6 +291,8 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
     return false;
   }
 
+  double elsewhere[ends::kMost][kMaxStates], chance[ends::kMost];
+  allow_for(found, prior, elsewhere, chance);
   // information = L D L'; the rows of L' measure what the scan knows, with variances 1/D.
   double lower[kAlignStates][kAlignStates] = {}, d[kAlignStates];
   for (int i = 0; i < n; i++) {
@@ -278,6 +328,8 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
     filter_.update(projected, innovation, 1.0 / d[i], kPoseStates,
                    lost_odds_ > kDoubtOdds ? filter_.states() : kPoseStates);
   }
+  for (int k = 1; k < found.count; k++)
+    if (chance[k] > kLeastChance) filter_.add_chance(chance[k], elsewhere[k]);
   pull_cloud(e);
   return true;
 }

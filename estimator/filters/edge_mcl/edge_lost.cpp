@@ -75,6 +75,20 @@ void edge_mcl::watch(double explained, int seen, double dt_s) {
     filter_.inflate_pose(kLoosened_m2ps * dt_s, kLoosened_rad2ps * dt_s);
 }
 
+// Motion sensors were silent. The particles go to where the robot may have come; what was seen before can't be put
+// together with what is seen now, and whether the next scans fit must show soon.
+void edge_mcl::doubt_motion() {
+  double covariance[3][3];
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 3; c++) covariance[r][c] = filter_.covariance(r, c);
+  cloud_.spread(filter_.pose(), covariance);
+  search_.clear();
+  others_.clear(filter_.pose(), filter_.odom());
+  in_doubt_ = on_trial_ = true;
+  if (state_ == WM_STATE_TRACKING) state_ = WM_STATE_LOST;
+  if (lost_odds_ < 0.0) lost_odds_ = 0.0;
+}
+
 void edge_mcl::remember_calibration() {
   const wm_time_ns now = filter_.now_ns();
   if (remembered_ns_ != WM_TIME_NONE && wm_seconds_between(remembered_ns_, now) < kMemory_s) return;

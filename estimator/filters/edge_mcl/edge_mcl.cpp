@@ -14,6 +14,7 @@ namespace {
 constexpr double kClassSigma_m[kSigmaClasses] = {0.01, 0.03, 0.06, 0.12};  // of a point; the last: and above
 constexpr double kNewView_m = 0.4;
 constexpr double kFarthest_m = 1000.0;
+constexpr double kSilent_s = 1.0;  // between two messages of the motion sensors, after which the way is unknown
 constexpr double kCluster_m = 0.5, kCluster_rad = 0.35;
 constexpr size_t kAlign = 64;
 
@@ -70,7 +71,7 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   field_.init(map_, table_, behind);
   search_.init(map_, behind + aligned(score_field::bytes(*setup.map)));
   usual_ = params.lost_explained;
-  fused_ns_ = watched_ns_ = remembered_ns_ = WM_TIME_NONE;
+  fused_ns_ = watched_ns_ = remembered_ns_ = driven_ns_ = WM_TIME_NONE;
   remember_calibration();
   remembered_ns_ = WM_TIME_NONE;
   remember_calibration();
@@ -102,7 +103,11 @@ void edge_mcl::start_again(bool known) {
 
 wm_status edge_mcl::predict(const wm_event &motion) {
   const wm_status status = filter_.check_motion(motion);
-  if (status == WM_OK) filter_.move(motion);
+  if (status != WM_OK) return status;
+  const double silent_s = driven_ns_ == WM_TIME_NONE ? 0.0 : wm_seconds_between(driven_ns_, motion.t_ns);
+  driven_ns_ = motion.t_ns;
+  filter_.move(motion);
+  if (silent_s > kSilent_s) doubt_motion();
   return status;
 }
 

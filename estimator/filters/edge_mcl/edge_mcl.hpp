@@ -45,6 +45,15 @@ class edge_mcl {
     int index[kAlignStates], n;
     double inverse[kAlignStates][kAlignStates], root[kAlignStates][kAlignStates];
   };
+  // Where a scan fits, and how well: the best comes first.
+  struct ends {
+    static constexpr int kMost = 16;
+    int count;
+    alignment at[kMost];
+    double cost[kMost];
+    normal_equations best;
+    void take(const alignment &a, double its_cost, const normal_equations &e);
+  };
   struct taken_from {
     wm_pose2 pose;      // base_link in map when the picture was taken
     wm_pose2 from_now;  // the same as seen from now's base_link
@@ -67,12 +76,14 @@ class edge_mcl {
   void accumulate(const wm_points &points, const alignment &a, double gate_m, const belief *prior,
                   normal_equations *out) const;
   double descend(const wm_points &points, const belief &prior, double slack_m, alignment *a, normal_equations *e) const;
-  void descend_from_several(const wm_points &points, const belief &prior, alignment *best, normal_equations *e) const;
+  void descend_from_several(const wm_points &points, const belief &prior, ends *out) const;
+  void allow_for(const ends &found, const belief &prior, double off[ends::kMost][kMaxStates], double *chance) const;
   // Whether the scan was taken in; how many of its points say something and how many of these the map explains.
   bool align(const wm_points &points, int camera, normal_equations *scan, wm_innovation *record);
   void describe(const normal_equations &scan, const belief &prior, const alignment &a, wm_innovation *record) const;
   void pull_cloud(const normal_equations &equations);
   void watch(double explained, int seen, double dt_s);
+  void doubt_motion();
   void heed_cloud();
   void ponder(bool new_keyframe);
   void seed_cloud();
@@ -104,7 +115,7 @@ class edge_mcl {
   wm_time_ns remembered_ns_;
   wm_pose2 cloud_odom_;
   double cloud_travelled_m_, cloud_turned_rad_;
-  wm_time_ns cloud_ns_, fused_ns_, watched_ns_;
+  wm_time_ns cloud_ns_, fused_ns_, watched_ns_, driven_ns_;
   double lost_odds_;  // logarithm of
   double explained_;  // share, smoothed
   double usual_;      // the same over a longer time, while the pose is trusted

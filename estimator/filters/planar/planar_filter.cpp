@@ -178,6 +178,12 @@ void planar_filter::inflate_pose(double variance_m2, double variance_rad2) {
   wheels_.restart();
 }
 
+void planar_filter::add_chance(double probability, const double off[kMaxStates]) {
+  for (int i = 0; i < n_; i++)
+    for (int j = 0; j < n_; j++) p_[i * stride_ + j] += off[i] * off[j] * probability;
+  wheels_.restart();
+}
+
 void planar_filter::loosen_pose(double factor) {
   for (int i = 0; i < n_; i++)
     for (int j = 0; j < n_; j++)

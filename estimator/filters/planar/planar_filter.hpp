@@ -58,6 +58,8 @@ class planar_filter : public planar_motion {
 
   void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
   void inflate_pose(double variance_m2, double variance_rad2);
+  // It may as well be elsewhere: by `off`, of every state, with this probability.
+  void add_chance(double probability, const double off[kMaxStates]);
   // Scales the pose's sigmas; what it shares with other states keeps its correlation.
   void loosen_pose(double factor);
   // Fills mean, covariance and twist.

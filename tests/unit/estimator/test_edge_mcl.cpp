@@ -74,6 +74,7 @@ struct drive {
   double t = 0;
   uint64_t draws = 0;
   double pitch_rad = 0;  // of the camera, more than is believed
+  bool silent = false;   // motion sensors say nothing
   double noise() { return wm_random_normal(7, 1, draws++); }
 
   void scan(wm_event *e) {
@@ -104,7 +105,7 @@ struct drive {
       e.kind = WM_EVENT_TWIST2;
       e.t_ns = wm_ns_from_seconds(t);
       e.as.twist2 = {v, w};
-      TEST_ASSERT_EQUAL(WM_OK, f.ops->predict(f.state, &e));
+      if (!silent) TEST_ASSERT_EQUAL(WM_OK, f.ops->predict(f.state, &e));
       for (int k = 0; k < 10; k++) {
         truth.heading_rad += 0.005 * w * 1.01;
         truth.x_m += 0.01 * v * 0.99 * std::cos(truth.heading_rad);
@@ -215,6 +216,26 @@ void the_clouds_pose_is_its_particles_mean(void) {
   const double own = reinterpret_cast<const wm_edge_mcl_params *>(params.data())->lasting_xy_m, lasting = own * own;
   TEST_ASSERT_DOUBLE_WITHIN(1e-3 * (xx + lasting), xx + lasting, e.covariance[wm_cov_index(0, 0)]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-3 * (yy + lasting), yy + lasting, e.covariance[wm_cov_index(1, 1)]);
+}
+
+// The robot is told to go on at 1 m/s, nobody hears for 3 s that it has stopped after one: it says that it doesn't know
+// where it is, and finds itself again.
+void motion_sensors_that_fall_silent_are_not_believed(void) {
+  filter f;
+  drive d;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.go(f, 4, 1.0, 0.0));
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  d.silent = true;
+  d.go(f, 1, 1.0, 0.0);
+  d.go(f, 2, 0.0, 0.0);
+  d.silent = false;
+  d.go(f, 0.1, 0.5, 0.0);
+  const wm_estimate e = f.estimate();
+  TEST_ASSERT_EQUAL(WM_STATE_LOST, e.state);
+  TEST_ASSERT_TRUE(e.covariance[wm_cov_index(0, 0)] > d.error_of(f) * d.error_of(f));
+  d.go(f, 6, 0.5, 0.0);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
 }
 
 void a_camera_that_looks_lower_than_believed_is_found_out(void) {
@@ -380,6 +401,7 @@ int main(void) {
   RUN_TEST(forwards_and_backwards_it_stays_on_the_way);
   RUN_TEST(a_scans_innovation_is_a_distance);
   RUN_TEST(the_clouds_pose_is_its_particles_mean);
+  RUN_TEST(motion_sensors_that_fall_silent_are_not_believed);
   RUN_TEST(a_camera_that_looks_lower_than_believed_is_found_out);
   RUN_TEST(carried_away_it_says_so_and_finds_back);
   RUN_TEST(it_starts_without_being_told_where);
