@@ -50,7 +50,7 @@ void motion_front_end::init(const wm_motion_params *params, const wm_wheels *whe
   params_ = params;
   wheels_ = *wheels;
   hold_max_ns_ = wm_ns_from_seconds(params->hold_max_s);
-  now_ns_ = newest_ns_ = still_since_ns_ = yaw_same_since_ns_ = WM_TIME_NONE;
+  now_ns_ = newest_ns_ = fed_ns_ = still_since_ns_ = yaw_same_since_ns_ = WM_TIME_NONE;
   for (wm_time_ns &stamp : stamp_ns_) stamp = WM_TIME_NONE;
   for (tick_wheel &wheel : wheel_) wheel.t_ns = WM_TIME_NONE;
 }
@@ -85,6 +85,8 @@ wm_status motion_front_end::check(const wm_event &event) const {
 void motion_front_end::feed(const wm_event &event) {
   if (now_ns_ == WM_TIME_NONE) now_ns_ = event.t_ns;
   yaw_fresh_ = 0;
+  if (now_ns_ > fed_ns_ && history_.is_overdue(now_ns_)) went_on_without_ = 3;
+  fed_ns_ = event.t_ns;
   if (event.kind == WM_EVENT_QUANTITIES) {
     take_quantities(event);
     return;
@@ -240,15 +242,18 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   if (ticks_drive()) {
     // The stretch that ends here gets what the counts say, before the last speed carries on.
     const double dt = wm_seconds_between(now_ns_, t_ns);
+    const bool counted = wheel_[0].t_ns == t_ns || wheel_[1].t_ns == t_ns;
+    forget_silent_way(t_ns, dt);
     if (dt > 0.0 && !doubtful) {
       motion_input done = input;
       done.t_ns = now_ns_;
       done.a =
           mean_of_wheels(wheel_[0].position_m - wheel_[0].integrated_m, wheel_[1].position_m - wheel_[1].integrated_m) /
           dt;
-      if (wheel_[0].t_ns == t_ns || wheel_[1].t_ns == t_ns) {
+      if (counted) {
         done.b = history_.empty() ? b : history_.newest().b;
         done.standing = !history_.empty() && history_.newest().standing;
+        done.counted = 1;
         history_.push(done);
       }
     }
@@ -360,12 +365,13 @@ void motion_front_end::take_count(int side, wm_time_ns t_ns, double count) {
     wheel.speed_mps = (wheel.position_m - wheel.before_m) / wm_seconds_between(wheel.before_ns, t_ns);
   wheel.before_ns = last_ns;
   wheel.before_m = from_m;
-  const double counted_s = wheel.period_s > 0.0 && dt > 2.0 * wheel.period_s ? 2.0 * wheel.period_s : dt;
+  const bool was_silent = wheel.period_s > 0.0 && dt > 2.0 * wheel.period_s;
+  const double counted_s = was_silent ? 2.0 * wheel.period_s : dt;
   wheel.period_s += wheel.period_s > 0.0 ? kPeriodGain * (counted_s - wheel.period_s) : counted_s;
   tick_wheel &other = wheel_[1 - side];
   if (way != 0.0) {
     wheel.still_m = 0.0;
-    other.still_m += std::fabs(way);
+    if (!was_silent) other.still_m += std::fabs(way);  // the way of a silence, which both may have driven
   }
 }
 
@@ -384,6 +390,7 @@ void motion_front_end::watch_encoders() {
 // taken to go with the other one, and the turn is not to be believed.
 void motion_front_end::push_ticks(wm_time_ns t_ns, bool doubtful) {
   const double dt = wm_seconds_between(now_ns_, t_ns);
+  forget_silent_way(t_ns, dt);
   const bool dead[2] = {(health_ & WM_MOTION_HEALTH_ENCODER_LEFT_DEAD) != 0,
                         (health_ & WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD) != 0};
   motion_input done{}, next{};
@@ -408,9 +415,22 @@ void motion_front_end::push_ticks(wm_time_ns t_ns, bool doubtful) {
   done.t_ns = now_ns_;
   done.a = done_mps[0];
   done.b = done_mps[1];
+  done.counted = wheel_[0].t_ns == t_ns && wheel_[1].t_ns == t_ns && !doubtful;
   if (dt > 0.0) history_.push(done);
   history_.push(next);
   newest_ns_ = t_ns;
+}
+
+// What the counts say of a silence that the pose went through without them: it has been corrected since by what was
+// seen, and as unsure as the robot may have moved. The way once more, at the end, would move it twice. What is left is
+// the way of the stretch that ends here, at the mean speed since the last count.
+void motion_front_end::forget_silent_way(wm_time_ns t_ns, double dt_s) {
+  for (int side = 0; side < 2; side++) {
+    tick_wheel &wheel = wheel_[side];
+    if (wheel.t_ns != t_ns || !(went_on_without_ >> side & 1)) continue;
+    wheel.integrated_m = wheel.position_m - wheel.speed_mps * dt_s;
+    went_on_without_ &= (uint8_t) ~(1 << side);
+  }
 }
 
 void motion_front_end::hand_out_ticks(const motion_stretch &piece) {

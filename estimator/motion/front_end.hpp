@@ -41,8 +41,7 @@ class motion_front_end {
     history_.walk(from_ns - lag_ns, to_ns - lag_ns, hold_max_ns_, [&](const motion_stretch &stretch) {
       const motion_twist twist = twist_of(stretch.input, calibration, wheels_);
       motion_noise noise = noise_of(stretch.input, twist, stretch.dt_s, *params_, wheels_, calibration);
-      // Counts that have come tell the way of the silence, too.
-      if (!(ticks_drive() && stretch.has_next)) add_silence(stretch, *params_, &noise);
+      add_silence(stretch, *params_, ticks_drive() && stretch.has_next, &noise);
       add_change(stretch, *params_, &noise);
       visit(stretch, twist, noise);
     });
@@ -65,6 +64,10 @@ class motion_front_end {
     return true;
   }
   int model() const { return model_; }
+  // The input that should have come by then hasn't.
+  bool is_overdue(wm_time_ns t_ns) const { return history_.is_overdue(t_ns); }
+  // The last event counted a wheel, and that is where the way comes from.
+  bool counted() const { return ticks_drive() && (wheel_[0].t_ns == fed_ns_ || wheel_[1].t_ns == fed_ns_); }
   // True once after the speed came to be taken from another sensor, whose scale is another.
   bool speed_source_changed();
   // The last event brought a yaw rate while the robot stands: that is the gyro's bias.
@@ -85,6 +88,7 @@ class motion_front_end {
   void push_input(wm_time_ns t_ns, double a, double b, bool doubtful);
   void push_ticks(wm_time_ns t_ns, bool doubtful);
   void hand_out_ticks(const motion_stretch &piece);
+  void forget_silent_way(wm_time_ns t_ns, double dt_s);
   bool counts_ticks() const;                               // both wheels, and what a tick is worth
   bool ticks_drive() const;                                // the way comes from ticks
   double mean_of_wheels(double left, double right) const;  // a dead encoder's wheel goes with the other one
@@ -98,6 +102,7 @@ class motion_front_end {
   wm_time_ns hold_max_ns_;
   wm_time_ns now_ns_;     // integrated until here; WM_TIME_NONE before the start
   wm_time_ns newest_ns_;  // newest event that drives
+  wm_time_ns fed_ns_;     // newest event of motion
   motion_history history_;
   double value_[WM_Q_COUNT];
   wm_time_ns stamp_ns_[WM_Q_COUNT];
@@ -111,6 +116,7 @@ class motion_front_end {
   uint8_t speed_source_;
   uint8_t speed_source_changed_;
   uint8_t yaw_fresh_;        // the last event brought a yaw rate
+  uint8_t went_on_without_;  // a bit a wheel: others than motion moved the pose on while it was overdue; no count since
   uint8_t speed_is_signed_;  // a negative speed was seen: the sign is the sensor's, not the gear's
 };
 

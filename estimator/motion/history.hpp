@@ -6,6 +6,7 @@
 
 #include <cstdint>
 
+#include "waymark/motion.h"
 #include "waymark/time.h"
 
 namespace wm {
@@ -19,6 +20,7 @@ struct motion_input {
   uint8_t standing;  // the robot is known to stand
   uint8_t doubtful;  // not to be believed: frozen counter, dead encoder
   uint8_t stale;     // set by the walk over the history: held for longer than hold_max
+  uint8_t counted;   // counts that came at its end say what it was: true until then, however long
 };
 
 // One piece of an interval of time over which one input holds.
@@ -51,6 +53,12 @@ class motion_history {
     count_++;
   }
 
+  // The input after the newest one should have come by now.
+  bool is_overdue(wm_time_ns t_ns) const {
+    const uint64_t oldest = count_ > kCapacity ? count_ - kCapacity : 0;
+    return count_ > 0 && wm_seconds_between(newest().t_ns, t_ns) > due_s(count_, oldest);
+  }
+
   // Calls visit(stretch) for the pieces of [from_ns, to_ns] in order of time. Before the oldest input nothing is known.
   template <class Visit>
   void walk(wm_time_ns from_ns, wm_time_ns to_ns, wm_time_ns hold_max_ns, Visit visit) const {
@@ -67,12 +75,11 @@ class motion_history {
         const wm_time_ns held_until = piece.input.t_ns + hold_max_ns;
         piece.input.stale = begin >= held_until;
         if (!piece.input.stale && end > held_until) end = held_until;
-        double due_s = kOverdueS;
-        if (next > oldest + 1) {
-          const double usual_s = kOverduePeriods * wm_seconds_between(at(next - 2).t_ns, at(next - 1).t_ns);
-          if (usual_s > due_s) due_s = usual_s;
+        if (piece.input.stale && piece.input.counted) {  // the way is known, however long it took; a gyro's turn isn't
+          piece.input.stale = 0;
+          if (piece.input.model != WM_MOTION_TICKS) piece.input.b = 0.0;
         }
-        piece.silent_s = wm_seconds_between(piece.input.t_ns, begin) - due_s;
+        piece.silent_s = wm_seconds_between(piece.input.t_ns, begin) - due_s(next, oldest);
         const bool begins = next > oldest + 1 && begin == piece.input.t_ns;
         piece.changed[0] = begins ? piece.input.a - at(next - 2).a : 0.0;
         piece.changed[1] = begins ? piece.input.b - at(next - 2).b : 0.0;
@@ -92,6 +99,12 @@ class motion_history {
   }
 
  private:
+  // How old the input before `next` may become before `next` is overdue.
+  double due_s(uint64_t next, uint64_t oldest) const {
+    if (next <= oldest + 1) return kOverdueS;
+    const double usual_s = kOverduePeriods * wm_seconds_between(at(next - 2).t_ns, at(next - 1).t_ns);
+    return usual_s > kOverdueS ? usual_s : kOverdueS;
+  }
   const motion_input &at(uint64_t index) const { return ring_[index & (kCapacity - 1)]; }
 
   motion_input ring_[kCapacity];

@@ -28,7 +28,7 @@ static const wm_param kParams[] = {
     F64("noise.steering_rad", noise_steering_rad, 0.005, 0, 1,
         "White noise of the road wheel's angle, rad per sqrt(s): play and the table's error between its points."),
     F64("noise.hold_mps2", noise_hold_mps2, 1.0, 0, 100,
-        "m/s2. A speed whose next one is overdue (by 0.25 s and three periods) holds, but the robot may have braked or "
+        "m/s2. A speed that is older than 0.25 s and than three of its periods holds on, but the robot may have braked or "
         "sped up so much since: sigma grows by half of it by the square of the time."),
     F64("noise.hold_radps2", noise_hold_radps2, 0.5, 0, 100, "rad/s2. As hold_mps2, for the turn rate."),
     F64("noise.speed_change", noise_speed_change, 0, 0, 10,

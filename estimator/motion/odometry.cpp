@@ -27,6 +27,7 @@ struct wm_odometry {
   wm_odom_point head;  // at the last event
   wm_odom_point ring[kPoints];
   uint64_t count;
+  uint64_t before_silence;     // points when the inputs fell silent, until a count tells the way since; 0: they didn't
   space_point space[kPoints];  // only where twists in space come
   uint64_t space_count;
 };
@@ -151,6 +152,7 @@ void wm_odometry_calibrate(wm_odometry *self, const wm_motion_calibration *calib
 wm_status wm_odometry_feed(wm_odometry *self, const wm_event *event) {
   const wm_status status = self->front.check(*event);
   if (status != WM_OK) return status;
+  if (self->front.is_overdue(event->t_ns) && self->before_silence == 0) self->before_silence = self->count;
   self->front.feed(*event);
   if (event->kind == WM_EVENT_TWIST6) feed_space(self, *event);
   wm_odom_point &head = self->head;
@@ -158,6 +160,11 @@ wm_status wm_odometry_feed(wm_odometry *self, const wm_event *event) {
                       [&head](const wm::motion_stretch &piece, const wm::motion_twist &twist,
                               const wm::motion_noise &noise) { carry_point(head, piece.dt_s, twist, noise); });
   head.t_ns = event->t_ns;
+  if (self->before_silence > 0 && self->front.counted()) {
+    // The way of the silence is spread over it: a pose that was fused within it is carried on by what is left.
+    if (self->count - self->before_silence < wm_odometry::kPoints) self->count = self->before_silence;
+    self->before_silence = 0;
+  }
   const uint64_t n = self->count;
   if (n == 0 || head.t_ns - self->ring[(n - 1) % wm_odometry::kPoints].t_ns >= wm_odometry::kSpacing_ns) {
     self->ring[n % wm_odometry::kPoints] = head;

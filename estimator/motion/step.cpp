@@ -6,6 +6,8 @@
 namespace wm {
 namespace {
 
+constexpr double kUnknownRate_radps = 0.3;  // per square root of a second
+
 void add(motion_twist &t, int index, double v_by, double w_by) {
   t.index[t.count] = index;
   t.v_by[t.count] = v_by;
@@ -139,22 +141,25 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
   n.side_m2 = square(p.noise_side_rel * twist.v) * dt_s;
   if (unknown) {
     // The robot may go on as it did, or not: as unsure as the motion that was last believed is large.
-    const double speed = std::fabs(input.a), rate = input.model == WM_MOTION_ACKERMANN ? 0.1 : std::fabs(input.b);
     // That it went straight when it was last heard of doesn't say that it hasn't begun to turn.
-    const bool silent = input.stale && input.model == WM_MOTION_SPEED_YAW_RATE && rate < 0.3;
+    const double speed = std::fabs(input.a), rate = input.model == WM_MOTION_ACKERMANN ? 0.1 : std::fabs(input.b);
+    const bool any = input.model == WM_MOTION_TICKS || (input.stale && rate < kUnknownRate_radps);
     n.way_m2 += square(speed) * dt_s;
-    n.turn_rad2 += square(input.model == WM_MOTION_TICKS || silent ? 0.3 : rate) * dt_s;
+    n.turn_rad2 += square(any ? kUnknownRate_radps : rate) * dt_s;
   }
   return n;
 }
 
-void add_silence(const motion_stretch &stretch, const wm_motion_params &p, motion_noise *noise) {
+void add_silence(const motion_stretch &stretch, const wm_motion_params &p, bool is_counted, motion_noise *noise) {
   const double from_s = stretch.silent_s > 0.0 ? stretch.silent_s : 0.0, to_s = stretch.silent_s + stretch.dt_s;
   if (to_s <= from_s || stretch.input.stale) return;
   // Variances that add up to the square of the whole, however the time is cut.
-  const double grown_s4 = square(square(to_s)) - square(square(from_s));
-  noise->way_m2 += square(0.5 * p.noise_hold_mps2) * grown_s4;
-  noise->turn_rad2 += square(0.5 * p.noise_hold_radps2) * grown_s4;
+  const double held_from_s = std::fmin(from_s, p.hold_max_s), held_to_s = std::fmin(to_s, p.hold_max_s);
+  const double grown_s4 = square(square(held_to_s)) - square(square(held_from_s));
+  if (!is_counted) noise->way_m2 += square(0.5 * p.noise_hold_mps2) * grown_s4;
+  if (is_counted && stretch.input.model == WM_MOTION_TICKS) return;
+  noise->turn_rad2 += square(0.5 * p.noise_hold_radps2) * grown_s4 +
+                      square(kUnknownRate_radps) * (to_s - from_s - (held_to_s - held_from_s));
 }
 
 void add_change(const motion_stretch &stretch, const wm_motion_params &p, motion_noise *noise) {

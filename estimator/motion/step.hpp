@@ -50,8 +50,9 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
                       const wm_wheels &wheels, const wm_motion_calibration &calibration);
 
 // What a held input may be wrong by once the next one is overdue: the robot may have sped up or begun to turn at
-// noise.hold_mps2 and noise.hold_radps2 since, a way of half of that by the square of the time.
-void add_silence(const motion_stretch &stretch, const wm_motion_params &params, motion_noise *noise);
+// noise.hold_mps2 and noise.hold_radps2 since, a way of half of that by the square of the time; after hold_max_s the
+// turn is unknown. `is_counted`: the wheels' counts have come since: they tell the way, of both wheels the turn, too.
+void add_silence(const motion_stretch &stretch, const wm_motion_params &params, bool is_counted, motion_noise *noise);
 
 // What a twist that changed leaves behind: when it was obeyed, and how, is unsure anew each time. Variances by how much
 // it changed, not by its square, so that a change in many small steps counts as one in a single step.

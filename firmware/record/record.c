@@ -154,6 +154,44 @@ static wm_status copy_file(recorder *self, const char *from, const char *name, w
   return status;
 }
 
+// The name that a file of the robot has in the recording, where this line of the configuration names one.
+static const char *own_name(const char *line) {
+  static const char *const kNames[][2] = {{"calibration:", "calibration.yaml"},
+                                          {"landmarks:", "landmarks.csv"},
+                                          {"map:", "map/map.yaml"},
+                                          {"dbc:", "vehicle.dbc"},
+                                          {"can_signals:", "can-signals.yaml"}};
+  for (size_t i = 0; i < sizeof kNames / sizeof kNames[0]; i++)
+    if (strncmp(line, kNames[i][0], strlen(kNames[i][0])) == 0) return kNames[i][1];
+  return NULL;
+}
+
+// The configuration, with the recording's own files: it replays wherever it is taken to.
+static wm_status write_config(recorder *self, wm_error *err) {
+  const char *line = self->config->text;
+  char *text = NULL;
+  size_t length = 0;
+  FILE *f = open_memstream(&text, &length);
+  if (!f) return wm_fail(err, WM_IO, "%s: no memory for the configuration", self->options->out_dir);
+  for (size_t left = self->config->text_length; left > 0;) {
+    const char *end = memchr(line, '\n', left);
+    size_t bytes = end ? (size_t)(end - line) + 1 : left;
+    const char *name = own_name(line);
+    if (name) {
+      (void)fprintf(f, "%.*s %s\n", (int)strcspn(line, ":") + 1, line, name);
+    } else {
+      (void)fwrite(line, 1, bytes, f);
+    }
+    line += bytes;
+    left -= bytes;
+  }
+  wm_status status = fclose(f) == 0
+                         ? write_text(self, "config.yaml", text, length, err)
+                         : wm_fail(err, WM_IO, "%s: no memory for the configuration", self->options->out_dir);
+  free(text);
+  return status;
+}
+
 // recording.yaml first: from then on the folder is a recording, whatever happens.
 static wm_status write_about(recorder *self, wm_error *err) {
   char text[2048];
@@ -163,7 +201,7 @@ static wm_status write_about(recorder *self, wm_error *err) {
       "format: waymark-recording/1\nname: recorded\nsource: waymark record %s\nvehicle: {kind: robot}\n", WM_VERSION);
   // No list of streams: what is there is read, also after a cut.
   wm_status status = write_text(self, "recording.yaml", text, (size_t)used, err);
-  if (status == WM_OK) status = write_text(self, "config.yaml", config->text, config->text_length, err);
+  if (status == WM_OK) status = write_config(self, err);
   if (status == WM_OK) status = copy_file(self, config->overrides.calibration, "calibration.yaml", err);
   if (status == WM_OK) status = copy_file(self, config->overrides.landmarks, "landmarks.csv", err);
   if (status == WM_OK && config->overrides.map[0])

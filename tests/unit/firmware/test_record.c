@@ -105,26 +105,6 @@ static void an_empty_configuration_is_refused(void) {
   TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_record(&config, &options, &report, &err));
 }
 
-// A camera that isn't there: the folder is a recording all the same, from its beginning on.
-static void without_its_devices_a_recording_is_begun_and_ended(void) {
-  const char *text =
-      "format: waymark-config/1\nestimator: odometry\n"
-      "devices: {can: [{interface: nocan7, dbc: /dev/null, can_signals: /dev/null}]}\n";
-  char out[128], path[160];
-  wm_config config;
-  wm_record_report report;
-  (void)snprintf(out, sizeof out, "%s/rec", folder);
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, strlen(text), "x.yaml", &config, &err), err.text);
-  const wm_record_options options = {.out_dir = out, .duration_s = 0.3};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_record(&config, &options, &report, &err), err.text);
-  const char *const files[] = {"recording.yaml", "config.yaml", "can.log"};
-  for (size_t i = 0; i < 3; i++) {
-    (void)snprintf(path, sizeof path, "%s/%s", out, files[i]);
-    TEST_ASSERT_EQUAL_MESSAGE(0, access(path, R_OK), path);
-  }
-  wm_config_free(&config);
-}
-
 static void put(const char *name, const char *text) {
   char path[200];
   (void)snprintf(path, sizeof path, "%s/%s", folder, name);
@@ -142,6 +122,30 @@ static void expect_text(const char *name, const char *text) {
   there[fread(there, 1, sizeof there - 1, f)] = '\0';
   (void)fclose(f);
   TEST_ASSERT_EQUAL_STRING(text, there);
+}
+
+// A bus that isn't there: the folder is a recording all the same, from its beginning on; its configuration names its
+// own files.
+static void without_its_devices_a_recording_is_begun_and_ended(void) {
+  const char *text =
+      "format: waymark-config/1\nestimator: odometry\n"
+      "dbc: /dev/null\ndevices: {can: [{interface: nocan7}]}\ncan_signals: /dev/null  # which is none";
+  char out[128], path[160];
+  wm_config config;
+  wm_record_report report;
+  (void)snprintf(out, sizeof out, "%s/rec", folder);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, strlen(text), "x.yaml", &config, &err), err.text);
+  const wm_record_options options = {.out_dir = out, .duration_s = 0.3};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_record(&config, &options, &report, &err), err.text);
+  const char *const files[] = {"recording.yaml", "config.yaml", "can.log"};
+  for (size_t i = 0; i < 3; i++) {
+    (void)snprintf(path, sizeof path, "%s/%s", out, files[i]);
+    TEST_ASSERT_EQUAL_MESSAGE(0, access(path, R_OK), path);
+  }
+  expect_text("rec/config.yaml",
+              "format: waymark-config/1\nestimator: odometry\ndbc: vehicle.dbc\ndevices: {can: [{interface: nocan7}]}\n"
+              "can_signals: can-signals.yaml\n");
+  wm_config_free(&config);
 }
 
 // Wherever its pictures lie, in the recording they lie beside it.
@@ -173,7 +177,7 @@ static void a_map_is_copied_with_its_pictures(void) {
 static void a_full_disk_ends_it_and_says_so(void) {
   const char *text =
       "format: waymark-config/1\nestimator: odometry\n"
-      "devices: {can: [{interface: nocan7, dbc: /dev/null, can_signals: /dev/null}]}\n";
+      "dbc: /dev/null\ndevices: {can: [{interface: nocan7}]}\ncan_signals: /dev/null  # which is none";
   char out[128];
   wm_config config;
   wm_record_report report;
