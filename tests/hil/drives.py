@@ -12,6 +12,7 @@ import messages
 
 POSITION_M, HEADING_DEG, TRUTH_RATIO = 0.02, 0.2, 1.5
 BEGIN_NS = 200_000_000  # of the first pose: sent before or after the first observation was fused, as it happens
+COMPILER = "cc"  # of what runs in the guest
 URL = "udpm://239.255.76.67:7667?ttl=0"
 
 
@@ -37,12 +38,16 @@ def with_realtime(config, keys):
     return config + f"\nrealtime: {{{keys}}}\n"
 
 
+def compile_helper(source, program):
+    subprocess.run([COMPILER, "-O2", "-static", source, "-o", program], check=True)
+
+
 def write(scenario, here, items, blob, seconds):
     """What guest/drive.sh plays."""
     (scenario / "timeline").write_text("".join(f"{t} {what}\n" for t, what in sorted(items)))
     (scenario / "pictures").write_bytes(blob)
     (scenario / "duration").write_text(f"{seconds:.0f}\n")
-    subprocess.run(["cc", "-O2", "-static", here / "play.c", "-o", scenario / "play"], check=True)
+    compile_helper(here / "play.c", scenario / "play")
 
 
 def table(path):
@@ -64,12 +69,12 @@ def at(rows, times, t_ns):
 
 
 def around(rows, times, t_ns):
-    """Between the rows around t_ns, and on from the two before and the two after: a correction may fall between two messages of the
-    one run, and between the next two of the other."""
+    """Between the rows around t_ns, and on from pairs of rows up to two before and after: a correction that takes the processor a while
+    falls between two messages of the one run, and one or two later or earlier in the other."""
     i = bisect.bisect_right(times, t_ns)
-    if i < 2 or i + 1 >= len(rows):
+    if i < 3 or i + 2 >= len(rows):
         return []
-    return [between(rows[i - 1], rows[i], t_ns), between(rows[i - 2], rows[i - 1], t_ns), between(rows[i], rows[i + 1], t_ns)]
+    return [between(rows[k - 1], rows[k], t_ns) for k in (i, i - 1, i + 1, i - 2, i + 2)]
 
 
 def away(pose, other):

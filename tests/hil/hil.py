@@ -3,11 +3,15 @@
 """Hardware in the loop: the same daemon and configuration as on a robot, in a guest with Debian's PREEMPT_RT kernel and a
 real (emulated) CAN controller, under qemu's instruction clock, fed from a recording at its own times.
 
-usage: hil.py WORK WAYMARK WAYMARK_SIMULATE [PART ...]   (WORK keeps the guest's image from run to run; parts: can, camera,
-libcamera, landmarks, edges; all of them where none is named)
+usage: hil.py [--arch arm64|armhf --package DEB] WORK WAYMARK WAYMARK_SIMULATE [PART ...]
+
+WORK keeps the guest's image from run to run; WAYMARK is this computer's; parts: can, camera, libcamera, landmarks, edges; all of
+them where none is named. Without --arch the guest runs WAYMARK itself; else the package, which it installs. armhf is arm64's
+kernel with armhf's programs.
 
 Judged on the host: the guest's own checks; the log of its run gives its poses bit by bit; its poses are those of a replay
 of the same frames."""
+import argparse
 import csv
 import math
 import pathlib
@@ -15,6 +19,7 @@ import shutil
 import subprocess
 import sys
 
+import drives
 import edges
 import landmarks
 import vimc
@@ -30,22 +35,21 @@ POSITION_M, HEADING_DEG = 0.02, 0.2
 PLAYER_M, PLAYER_DEG, PLAYER_MS = 0.1, 0.5, 100
 
 
-# What a guest is made of, by Debian's name of its architecture; its image is WORK/image, of others WORK/image-ARCH.
+# What a guest is made of, by Debian's name of its architecture; `cc` makes its helpers.
+ARM = {"qemu": ["qemu-system-aarch64", "-machine", "virt", "-cpu", "cortex-a57"], "console": "ttyAMA0"}
 MACHINES = {
-    "amd64": {"qemu": ["qemu-system-x86_64", "-machine", "q35", "-cpu", "max"], "kernel": "vmlinuz", "console": "ttyS0"},
+    "amd64": {"qemu": ["qemu-system-x86_64", "-machine", "q35", "-cpu", "max"], "console": "ttyS0", "cc": "cc"},
+    "arm64": {**ARM, "cc": "aarch64-linux-gnu-gcc"},
+    "armhf": {**ARM, "cc": "arm-linux-gnueabihf-gcc"},
 }
 
 
-def image_of(work, arch):
-    return work / ("image" if arch == "amd64" else f"image-{arch}")
-
-
-def boot(work, script, *devices, clock="shift=2,sleep=on", arch="amd64"):
+def boot(work, machine, script, *devices, clock="shift=2,sleep=on"):
     """Runs guest/SCRIPT by this clock; everything that it prints is shown and kept. Judged by its last word, not by qemu's."""
-    log, machine, image = work / f"{script}.log", MACHINES[arch], image_of(work, arch)
+    log, image = work / f"{script}.log", work / "image"
     command = ["timeout", "-k", "5", "1200", *machine["qemu"], "-accel", "tcg,thread=single", "-smp", "1",
                "-icount", clock, "-m", "1024", "-no-reboot",
-               "-kernel", image / machine["kernel"], "-initrd", image / "init.cpio.gz",
+               "-kernel", image / "vmlinuz", "-initrd", image / "init.cpio.gz",
                "-append", f"console={machine['console']} quiet panic=-1 hil={script}",
                "-drive", f"file={image}/root.ext4,if=virtio,format=raw,readonly=on",
                "-virtfs", f"local,path={work}/share,mount_tag=host,security_model=none,id=host",
@@ -92,6 +96,7 @@ def scenario_can(work, simulate):
 
 
 def scenario_camera(work, simulate):
+    subprocess.run(["mke2fs", "-q", "-F", "-t", "ext4", work / "power.ext4", "200M"], check=True)
     scenario = work / "share/camera"
     scenario.mkdir(parents=True)
     (scenario / "calibration.yaml").write_text(
@@ -101,7 +106,7 @@ def scenario_camera(work, simulate):
     (scenario / "robot.yaml").write_text(
         "format: waymark-config/1\nestimator: odometry\ncalibration: calibration.yaml\n"
         "devices: {cameras: [{name: front, device: /dev/video0, format: GREY, rate_hz: 15}]}\n")
-    subprocess.run(["cc", "-O2", "-static", HERE / "feed.c", "-o", scenario / "feed"], check=True)
+    drives.compile_helper(HERE / "feed.c", scenario / "feed")
     # Motion over a virtual bus, and a detector that looks at every picture.
     recording = work / "camera-recording"
     shutil.rmtree(recording, ignore_errors=True)
@@ -151,7 +156,30 @@ def judge_bus(out):
     return heard.failures
 
 
-def judge_camera(work, _):
+def judge_power(work, waymark):
+    """The recording on the disk of a computer whose power failed: it replays, to within the last seconds."""
+    disk, folder = work / "power.ext4", work / "power"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    subprocess.run(["e2fsck", "-f", "-y", disk], stdout=subprocess.DEVNULL)
+    subprocess.run(["debugfs", "-R", f"rdump /rec {folder}", disk], check=True, capture_output=True)
+    replay = subprocess.run([waymark, "replay", folder / "rec", "--config", folder / "rec/config.yaml", "--out", folder / "run"], capture_output=True, text=True)
+    if replay.returncode:
+        return [f"power cut: the recording doesn't replay: {replay.stderr[-300:]}"]
+    cut_s = marks(work / "share/out/camera-marks")["power"]
+    with open(folder / "rec/video/front.csv", newline="") as f:
+        pictures_s = [int(row["t_ns"]) * 1e-9 for row in csv.DictReader(f)]
+    whole = sum(len(p) == 320 * 180 for p in edges.pictures(folder / "rec/video/front.avi"))
+    frames_s = [float(line[1:].split(")")[0]) for line in (folder / "rec/can.log").read_text().splitlines() if line.endswith(tuple("0123456789ABCDEF"))]
+    if not pictures_s or not frames_s:
+        return [f"power cut: {len(pictures_s)} pictures and {len(frames_s)} CAN frames are left"]
+    print(f"power cut: {whole} whole pictures of {len(pictures_s)}, the last {cut_s - pictures_s[-1]:.1f} s before it; {len(frames_s)} CAN frames, "
+          f"the last {cut_s - frames_s[-1]:.1f} s before it; it replays")
+    good = len(pictures_s) - 2 <= whole and whole > 60 and max(cut_s - pictures_s[-1], cut_s - frames_s[-1]) < 2.5
+    return [] if good else ["power cut: too much of the recording is gone"]
+
+
+def judge_camera(work, waymark):
     """Stamps of the recording: each later than the one before, no more than their arrival, most a period apart. What is
     left of a recording when the disk was full is read."""
     whole = sum(len(p) == 320 * 180 for p in edges.pictures(work / "share/out/camera-full/video/front.avi"))
@@ -165,7 +193,7 @@ def judge_camera(work, _):
     print(f"camera: {len(rows)} pictures, {min(late) / 1e6:.1f} to {max(late) / 1e6:.1f} ms old when they arrive")
     if min(late) < 0 or max(late) > 1e9:
         failures.append("stamps of pictures can't be")
-    return failures + judge_published(work / "share/out")
+    return failures + judge_published(work / "share/out") + judge_power(work, waymark)
 
 
 def judge_can(work, waymark):
@@ -222,30 +250,45 @@ def judge_libcamera(work, _):
     return vimc.judge(work)
 
 
+def arguments():
+    parser = argparse.ArgumentParser(add_help=False)
+    parser.add_argument("--arch", choices=MACHINES, default="amd64")
+    parser.add_argument("--package", type=pathlib.Path)
+    parser.add_argument("paths", nargs=3, type=pathlib.Path)
+    parser.add_argument("parts", nargs="*")
+    return parser.parse_args()
+
+
 def main():
-    work, waymark, simulate = (pathlib.Path(a).resolve() for a in sys.argv[1:4])
-    if shutil.which("qemu-system-x86_64") is None or shutil.which("mmdebstrap") is None:
-        print("qemu-system-x86_64 or mmdebstrap is not there: skipped")
-        return 77
-    subprocess.run(["bash", HERE / "prepare.sh", work / "image"], check=True)
+    args = arguments()
+    work, waymark, simulate = (path.resolve() for path in args.paths)
+    machine = MACHINES[args.arch]
+    if args.arch != "amd64":
+        work = work / args.arch
+    for program in (machine["qemu"][0], "mmdebstrap", machine["cc"]):
+        if shutil.which(program) is None:
+            print(f"{program} is not there: skipped")
+            return 77
+    subprocess.run(["bash", HERE / "prepare.sh", work / "image", args.arch], check=True)
     shutil.rmtree(work / "share", ignore_errors=True)
     (work / "share/out").mkdir(parents=True)
     shutil.copytree(HERE / "guest", work / "share/guest")
-    shutil.copy(waymark, work / "share/waymark")
-    only = sys.argv[4:]  # names of parts, for who works on one of them
+    shutil.copy(*((args.package, work / "share/waymark.deb") if args.package else (waymark, work / "share/waymark")))
+    drives.COMPILER = machine["cc"]
+    disk = ["-drive", f"file={work}/power.ext4,if=virtio,format=raw"]
     failures = []
     for name, prepare, judge, devices, clock in (("can", scenario_can, judge_can, CAN, SLOW),
-                                                 ("camera", scenario_camera, judge_camera, [], SLOW),
+                                                 ("camera", scenario_camera, judge_camera, disk, SLOW),
                                                  ("libcamera", scenario_libcamera, judge_libcamera, [], SLOW),
                                                  ("landmarks", scenario_landmarks, judge_landmarks, CAN, FAST),
                                                  ("edges", scenario_edges, judge_edges, CAN, FAST)):
-        if only and name not in only:
+        if args.parts and name not in args.parts:
             continue
-        if name == "libcamera" and b"libcamera.so" not in waymark.read_bytes():
+        if name == "libcamera" and (args.package or b"libcamera.so" not in waymark.read_bytes()):
             print("libcamera: waymark is built without it: skipped")
             continue
         prepare(work, simulate)
-        good = boot(work, f"{name}.sh", *devices, clock=clock)
+        good = boot(work, machine, f"{name}.sh", *devices, clock=clock)
         failures += judge(work, waymark) if good else [f"the guest's own checks failed ({name}.sh)"]
     for failure in failures:
         print("FAIL:", failure)

@@ -1,43 +1,77 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
 # Makes what a guest needs, once for a kernel version, in the folder that is named: Debian's PREEMPT_RT kernel with its
-# modules, v4l2loopback and vimc built for it, a small root file system, an initramfs. Packages come from Debian alone.
-# usage: prepare.sh FOLDER        (4 minutes, 3 GB; needs the packages that docs/dependencies.md lists for hil)
+# modules, v4l2loopback (and for amd64 vimc) built for it, a small root file system, an initramfs. Packages come from Debian
+# alone. An armhf guest has arm64's kernel, which runs its programs.
+# usage: prepare.sh FOLDER [amd64|arm64|armhf]   (4 minutes, 3 GB; needs the packages that docs/dependencies.md lists for hil)
 set -euo pipefail
-folder=$1
-here=$(cd "$(dirname "$0")" && pwd)
-kernel=$(apt-cache depends linux-image-rt-amd64 | awk '/Depends: linux-image-/{sub("linux-image-", "", $2); print $2; exit}')
-[ -n "$kernel" ] || { echo "apt knows no linux-image-rt-amd64 (apt-get update?)"; exit 1; }
-mkdir -p "$folder"
+arch=${2:-amd64}
+here=$(dirname "$(readlink -f "$0")")
+mkdir -p "$1"
+folder=$(readlink -f "$1")
+top=$here/../..
+case "$arch" in
+  amd64) machine=amd64 build=() ;;
+  arm64 | armhf) machine=arm64 build=(ARCH=arm64 CROSS_COMPILE=aarch64-linux-gnu-) ;;
+  *) echo "prepare.sh: '$arch': amd64, arm64 and armhf are known" >&2; exit 2 ;;
+esac
+
+# The kernel's packages, by an apt with its own state where they are another architecture's (toolchain/sysroot.sh made it).
+cd "$top"
+[ "$machine" = amd64 ] || bash toolchain/sysroot.sh "$machine"
+apt_conf=$(readlink -f .cache)/sysroot/$machine.apt/apt.conf
+its_apt() { if [ "$machine" = amd64 ]; then "$@"; else env APT_CONFIG="$apt_conf" "$@"; fi; }
+
+kernel=$(its_apt apt-cache depends "linux-image-rt-$machine" | awk '/Depends: linux-image-/{sub("linux-image-", "", $2); print $2; exit}')
+[ -n "$kernel" ] || { echo "apt knows no linux-image-rt-$machine (apt-get update?)"; exit 1; }
 cd "$folder"
 if [ "$(cat kernel 2>/dev/null)" = "$kernel" ] && [ -f init.cpio.gz ]; then exit 0; fi
 echo "preparing a guest with $kernel in $folder"
 rm -rf debs files root v4l2loopback vimc kernel root.ext4 init.cpio.gz
 
+version=$(echo "$kernel" | cut -d. -f1,2)
 mkdir debs files
-(cd debs && apt-get download -q "linux-image-$kernel" "linux-headers-$kernel" "linux-headers-${kernel/-rt-amd64/-common-rt}" \
-  "linux-kbuild-$(echo "$kernel" | cut -d. -f1,2)" v4l2loopback-dkms "linux-source-$(echo "$kernel" | cut -d. -f1,2)")
+(
+  cd debs
+  its_apt apt-get download -q "linux-image-$kernel" "linux-headers-$kernel"
+  # Headers that are every architecture's, and the programs that build, which are this computer's.
+  apt-get download -q "linux-headers-${kernel/-rt-$machine/-common-rt}" "linux-kbuild-$version" v4l2loopback-dkms
+  [ "$arch" != amd64 ] || apt-get download -q "linux-source-$version"
+)
 for deb in debs/*.deb; do dpkg -x "$deb" files; done
 cp "files/boot/vmlinuz-$kernel" vmlinuz
 
-mmdebstrap --quiet --variant=minbase \
-  --include=iproute2,kmod,can-utils,v4l-utils,liblcm1,procps,udev,liblcm-bin,libyaml-0-2,libturbojpeg0,libpng16-16,libapriltag3,libcamera0.0.3,libcamera-ipa \
-  bookworm root
+include=iproute2,kmod,can-utils,v4l-utils,liblcm1,procps,udev,liblcm-bin,libyaml-0-2,libturbojpeg0,libpng16-16,libapriltag3,busybox-static
+if [ "$arch" = amd64 ]; then
+  mmdebstrap --quiet --variant=minbase --include="$include,libcamera0.0.3,libcamera-ipa" bookworm root
+else
+  # A mirror's security index of another architecture is sometimes in the middle of a change: the guest does without.
+  mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' | grep -v security | head -1)
+  bash "$top/toolchain/foreign.sh" "$arch" mmdebstrap --quiet --mode=root --variant=minbase --architectures="$arch" --include="$include" \
+    bookworm root.tar "deb $mirror bookworm main" "deb $mirror bookworm-updates main"
+  mkdir root
+  tar -C root -xf root.tar --exclude='./dev/*'
+  rm root.tar
+fi
 
 # The headers name an absolute path once; patched, modules are built without installing anything here.
-sed -i "s#^include /usr/src/#include $PWD/files/usr/src/#" "files/usr/src/linux-headers-$kernel/Makefile"
-cp -r files/usr/src/v4l2loopback-*/ v4l2loopback
-make -s -C "files/usr/src/linux-headers-$kernel" M="$PWD/v4l2loopback" modules
-# Debian's kernel has no vimc; its sources do.
-tar -xf files/usr/src/linux-source-*.tar.xz --wildcards --strip-components=4 '*/drivers/media/test-drivers/vimc'
-make -s -C "files/usr/src/linux-headers-$kernel" M="$PWD/vimc" CONFIG_VIDEO_VIMC=m modules
+headers=files/usr/src/linux-headers-$kernel
+sed -i "s#^include /usr/src/#include $PWD/files/usr/src/#" "$headers/Makefile"
+modules() { make -s -C "$headers" M="$PWD/$1" "${build[@]}" "${@:2}" modules; }
 mkdir -p root/usr/lib/modules
 cp -a "files/lib/modules/$kernel" root/usr/lib/modules/
+cp -r files/usr/src/v4l2loopback-*/ v4l2loopback
+modules v4l2loopback
 install -D v4l2loopback/v4l2loopback.ko "root/usr/lib/modules/$kernel/extra/v4l2loopback.ko"
-install -D vimc/vimc.ko "root/usr/lib/modules/$kernel/extra/vimc.ko"
-depmod -b root "$kernel"
+if [ "$arch" = amd64 ]; then
+  # Debian's kernel has no vimc; its sources do.
+  tar -xf files/usr/src/linux-source-*.tar.xz --wildcards --strip-components=4 '*/drivers/media/test-drivers/vimc'
+  modules vimc CONFIG_VIDEO_VIMC=m
+  install -D vimc/vimc.ko "root/usr/lib/modules/$kernel/extra/vimc.ko"
+fi
+/sbin/depmod -b root "$kernel"
 
 mke2fs -q -F -t ext4 -d root -O ^has_journal root.ext4 1500M
-bash "$here/initramfs.sh" root "$kernel" /bin/busybox "$PWD/init.cpio.gz"
+bash "$here/initramfs.sh" root "$kernel" root/bin/busybox "$PWD/init.cpio.gz"
 rm -rf root debs files v4l2loopback vimc
 echo "$kernel" >kernel

@@ -1,18 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 # In the guest: cameras by V4L2, recorded by waymark; vivid gives the faults, v4l2loopback a producer that dies.
 set -u
-waymark=/run/waymark
-cp -r /host/camera /host/waymark /run/
+cp -r /host/camera /run/
 cd /run/camera || exit 1
 modprobe vivid n_devs=1 node_types=0x1 num_inputs=1 input_types=0 || exit 1
 modprobe v4l2loopback devices=1 video_nr=10 exclusive_caps=0 || exit 1
-for tool in "lcm-logger --help" "canplayer -h" "v4l2-ctl -d /dev/video0 -D" "$waymark help"; do $tool >/dev/null 2>&1; done
+for tool in "lcm-logger --help" "canplayer -h" "v4l2-ctl -d /dev/video0 -D" "waymark help"; do $tool >/dev/null 2>&1; done
 fails=0
 fail() { echo "FAIL: $*"; fails=$((fails + 1)); }
 control() { v4l2-ctl -d /dev/video0 -c "$1"; }
 
 # record NAME SECONDS: in the background; what it says is in NAME.txt.
-record() { $waymark record --config robot.yaml --out "/run/$1" --duration "$2" --free-mb 50 >"$1.txt" 2>&1 & recording=$!; }
+record() { waymark record --config robot.yaml --out "/run/$1" --duration "$2" --free-mb 50 >"$1.txt" 2>&1 & recording=$!; }
 finish() { wait $recording || fail "waymark record ($1): exit code $?"; cat "$1.txt"; }
 said() { grep -qF "$2" "$1.txt" || fail "$1: not said: $2"; }
 pictures() { grep -c , "/run/$1/video/front.csv"; }
@@ -32,7 +31,7 @@ finish term
 
 echo "== a disk that is full"
 mkdir /run/small && mount -t tmpfs -o size=1500k tmpfs /run/small
-$waymark record --config robot.yaml --out /run/small/rec --duration 20 --free-mb 0 >full.txt 2>&1
+waymark record --config robot.yaml --out /run/small/rec --duration 20 --free-mb 0 >full.txt 2>&1
 [ $? = 1 ] || fail "full: the exit code isn't 1"
 cat full.txt
 said full "No space left on device; what stands there is good"
@@ -73,7 +72,7 @@ player=$!
 lcm-logger --lcm-url='udpm://239.255.76.67:7667?ttl=0' -q /run/heard.lcm &
 logger=$!
 sleep 1
-$waymark run --config published.yaml --duration 32 >published.txt 2>&1 &
+waymark run --config published.yaml --duration 32 >published.txt 2>&1 &
 run=$!
 sleep 5
 mark dropped
@@ -115,4 +114,15 @@ finish dies
 kill $feeder
 said dies "gives no pictures"
 [ "$(grep -c 'front gives pictures' dies.txt)" -ge 2 ] || fail "dies: it doesn't come back"
-exit $((fails > 0))
+
+echo "== the power fails in the middle of a recording"
+modprobe -a virtio_blk ext4
+mount -t ext4 /dev/vdb /mnt || fail "no second disk"
+while :; do canplayer -I can.log vcan0=can0; done &
+waymark record --config published.yaml --out /mnt/rec --free-mb 20 &
+sleep 10
+mark power
+[ $fails = 0 ] || exit 1
+echo "GUEST-RC 0"
+sleep 0.5
+echo b >/proc/sysrq-trigger # no sync, no unmount: what the disk has not got is gone

@@ -2,11 +2,10 @@
 # In the guest: waymark on a real CAN controller's driver, fed by another one on the same bus. Everything is copied into
 # memory and run once before it counts: under the instruction clock, waiting for the disk takes the guest's time.
 set -u
-waymark=/run/waymark
-cp -r /host/scenario /host/waymark /run/
+cp -r /host/scenario /run/
 cd /run/scenario || exit 1
 modprobe -a kvaser_pci can-raw || exit 1
-for tool in "lcm-logger --help" "canplayer -h" "cansend -h" "ip -s link" "$waymark help"; do $tool >/dev/null 2>&1; done
+for tool in "lcm-logger --help" "canplayer -h" "cansend -h" "ip -s link" "waymark help"; do $tool >/dev/null 2>&1; done
 cat can.log >/dev/null
 fails=0
 fail() { echo "FAIL: $*"; fails=$((fails + 1)); }
@@ -16,19 +15,26 @@ play_again_and_again() { while :; do play 2>/dev/null; sleep 0.2; done; }
 mark() { echo "$1 $(cut -d' ' -f1 /proc/uptime)" >>/host/out/marks; }
 up() { ip link set "$1" up type can bitrate 500000 restart-ms 100; ip link set "$1" txqueuelen 2000; }
 
-echo "== the doctor on an interface that is down, then up"
-$waymark doctor robot.yaml --seconds 0.5 >doctor.txt
-grep -q "can can0 *is down" doctor.txt || fail "the doctor doesn't see that can0 is down"
-grep -q "PREEMPT_RT" doctor.txt || fail "the doctor doesn't see the kernel"
+echo "== the doctor on what is broken on purpose, and on what is in order"
+says() { grep -q "^$1 *$2  *.*$3" doctor.txt || { fail "the doctor doesn't say: $1 $2 $3"; cat doctor.txt; }; }
+echo -1 >/proc/sys/kernel/sched_rt_runtime_us
+ip route del 224.0.0.0/4 dev lo
+(ulimit -r 0 -l 64; setpriv --reuid=65534 --clear-groups --inh-caps=-all waymark doctor robot.yaml --seconds 0.5) >doctor.txt
+for broken in "note throttling" "bad lcm" "bad priority" "bad memory.lock"; do says $broken ""; done
+says bad can.can0 "is down"
+echo 950000 >/proc/sys/kernel/sched_rt_runtime_us
+ip route add 224.0.0.0/4 dev lo
 up can0
 up can1
-$waymark doctor robot.yaml --seconds 0.5 >doctor.txt
-grep -q "can can0 *is up" doctor.txt || fail "the doctor doesn't see that can0 is up"
+waymark doctor robot.yaml --seconds 0.5 >doctor.txt
+for whole in throttling lcm priority memory.lock; do says good $whole ""; done
+says good kernel PREEMPT_RT
+says good can.can0 "is up"
 
 echo "== drive, with candump as a witness"
 candump -L -T 6000 can0 >heard.log &
 witness=$!
-$waymark run --config robot.yaml --out /run/drive --duration "$(cat duration)" &
+waymark run --config robot.yaml --out /run/drive --duration "$(cat duration)" &
 run=$!
 sleep 2
 play
@@ -45,7 +51,7 @@ player=$!
 lcm-logger --lcm-url='udpm://239.255.76.67:7667?ttl=0' -q /run/heard.lcm &
 logger=$!
 sleep 1
-$waymark run --config robot.yaml --out /run/faults --duration 24 >faults.txt 2>&1 &
+waymark run --config robot.yaml --out /run/faults --duration 24 >faults.txt 2>&1 &
 run=$!
 sleep 5
 mark down
@@ -73,12 +79,12 @@ cp -r /run/faults /host/out/
 cp /run/heard.lcm faults.txt /host/out/faults/
 
 echo "== killed and started again"
-$waymark run --config robot.yaml &
+waymark run --config robot.yaml &
 run=$!
 sleep 5
 kill -9 $run
 wait $run
-$waymark run --config robot.yaml --duration 3 --out /run/restart >restart.txt 2>&1
+waymark run --config robot.yaml --duration 3 --out /run/restart >restart.txt 2>&1
 cat restart.txt
 grep -q "start: where it was" restart.txt || fail "a killed run doesn't begin where it was"
 cp -r /run/restart /host/out/
@@ -89,7 +95,7 @@ kill $player
 echo "== bus-off, error-passive and restart, as error frames"
 modprobe vcan && ip link add dev vcan0 type vcan && ip link set vcan0 up
 sed 's/interface: can0/interface: vcan0/' robot.yaml >virtual.yaml
-$waymark run --config virtual.yaml --duration 5 >errors.txt 2>&1 &
+waymark run --config virtual.yaml --duration 5 >errors.txt 2>&1 &
 run=$!
 sleep 2
 cansend vcan0 20000004#0010000000000000

@@ -2,15 +2,14 @@
 # In the guest, by other scripts: a recording's data through the kernel's drivers, each datum at its own time, into waymark; what
 # LCM's own logger hears is what is judged. Needs: name (of the folder), device (v4l2loopback's, or "-"), width, height.
 set -u
-waymark=/run/waymark
-cp -r "/host/$name" /host/waymark /run/
+cp -r "/host/$name" /run/
 cd "/run/$name" || exit 1
 modprobe -a kvaser_pci can-raw || exit 1
 for can in can0 can1; do
   ip link set $can up type can bitrate 500000 restart-ms 100
   ip link set $can txqueuelen 2000
 done
-for tool in "$waymark check robot.yaml" "lcm-logger --help" "chrt -h" "./play"; do $tool >/dev/null 2>&1; done
+for tool in "waymark check robot.yaml" "lcm-logger --help" "chrt -h" "./play"; do $tool >/dev/null 2>&1; done
 cat timeline pictures >/dev/null
 seconds=$(cat duration)
 fails=0
@@ -21,7 +20,7 @@ logger=$!
 chrt -f 45 ./play timeline pictures can1 "$device" "$width" "$height" 8 >played.txt &
 player=$!
 sleep 1
-$waymark run --config robot.yaml --out /run/drive --duration $((seconds + 10)) || fail "waymark run: exit code $?"
+waymark run --config robot.yaml --out /run/drive --duration $((seconds + 10)) || fail "waymark run: exit code $?"
 wait $player || fail "the player: exit code $?"
 cat played.txt
 kill $logger

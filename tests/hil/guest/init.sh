@@ -8,7 +8,9 @@ mount -t devpts devpts /dev/pts
 ip link set lo up
 ip route add 224.0.0.0/4 dev lo
 /lib/systemd/systemd-udevd --daemon 2>/dev/null
-echo "GUEST-UP $(uname -r)"
+# The package as on a robot, or the program alone; into memory, as all that is written here.
+if [ -e /host/waymark.deb ]; then dpkg -i /host/waymark.deb; else cp /host/waymark /usr/bin/; fi
+echo "GUEST-UP $(uname -rm), $(dpkg --print-architecture), $(waymark --version)"
 script=$(sed -n 's/.*hil=\([^ ]*\).*/\1/p' /proc/cmdline)
 bash /host/guest/"$script" 2>&1 </dev/null
 echo "GUEST-RC $?"

@@ -2,15 +2,14 @@
 # In the guest: a camera by libcamera, recorded by waymark. vimc is the camera: a picture that is drawn by the kernel,
 # through a debayer and a scaler, as a sensor's on a board.
 set -u
-waymark=/run/waymark
-cp -r /host/libcamera /host/waymark /run/
+cp -r /host/libcamera /run/
 cd /run/libcamera || exit 1
 modprobe vimc || exit 1
 udevadm settle
-$waymark help >/dev/null 2>&1
+waymark help >/dev/null 2>&1
 fails=0
 fail() { echo "FAIL: $*"; fails=$((fails + 1)); }
-record() { $waymark record --config "$2" --out "/run/$1" --duration "$3" --free-mb 50 >"$1.txt" 2>&1 & recording=$!; }
+record() { waymark record --config "$2" --out "/run/$1" --duration "$3" --free-mb 50 >"$1.txt" 2>&1 & recording=$!; }
 finish() { wait $recording || fail "waymark record ($1): exit code $?"; cat "$1.txt"; }
 said() { grep -qF "$2" "$1.txt" || fail "$1: not said: $2"; }
 pictures() { grep -c , "/run/$1/video/front.csv"; }
@@ -42,7 +41,7 @@ said size "gives 342x246 pixels, but is calibrated for 344x246"
 echo "== in use by another program"
 record first robot.yaml 6
 sleep 3
-$waymark record --config robot.yaml --out /run/second --duration 2 --free-mb 50 >second.txt 2>&1
+waymark record --config robot.yaml --out /run/second --duration 2 --free-mb 50 >second.txt 2>&1
 cat second.txt
 said second "is not there"
 finish first
