@@ -155,7 +155,7 @@ int run(const Arguments &a) {
       }
     }
     for (const Row &r : rows)
-      if (kind == TrialKind::kNormal || kind == TrialKind::kKidnap) reliability.take(r.outcome);
+      if (kind != TrialKind::kAlike) reliability.take(r.outcome);
     if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r%40s\r", "");
     print_summary(name, rows);
     if (!a.scans.empty()) write_scans(a.scans, name, rows, first);

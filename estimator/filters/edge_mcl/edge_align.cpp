@@ -202,7 +202,9 @@ void edge_mcl::descend_from_several(const wm_points &points, const belief &prior
   const double slack = sides > 0 ? step : 3.0 * std::sqrt(half + spread + 9.0 * filter_.variance(kHeading));
   // Nor is a heading found that is off by more than a few degrees.
   const double turn = std::sqrt(filter_.variance(kHeading));
-  const int turns = turn > kSureHeading_rad ? 1 : 0;
+  const bool placed = state_ == WM_STATE_TRACKING || on_trial_;
+  const int turns = placed && turn > kSureHeading_rad ? 1 : 0;
+  if (state_ == WM_STATE_SEARCHING && !placed) sides = 0;  // about a place that is none there is nothing to be found
   out->count = 0;
   for (int k = -sides; k <= sides; k++)
     for (int m = -turns; m <= turns; m++) {
