@@ -181,6 +181,11 @@ void joint_state::set_pose(const wm_pose2 &pose, const double covariance[3][3]) 
     for (int j = i; j < 3; j++) p().set(i, j, covariance[i][j]);
 }
 
+void joint_state::loosen(double xy_m2, double heading_rad2) {
+  for (int i = kX; i <= kY; i++) p().set(i, i, variance(i) + xy_m2);
+  p().set(kHeading, kHeading, variance(kHeading) + heading_rad2);
+}
+
 void joint_state::assign(int first, int count, const joint_row *rows, const double (*noise)[3], const double *values) {
   const half_covariance cov = p();
   double own[3][3];

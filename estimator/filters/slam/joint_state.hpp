@@ -97,6 +97,9 @@ class joint_state : public planar_motion {
   // States first..first+count-1 become rows[k] of the state plus noise of covariance `noise`.
   void assign(int first, int count, const joint_row *rows, const double (*noise)[3], const double *values);
   void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
+  // The robot may have been moved and turned just now, as noise of its motion: variances of x and y, and of the
+  // heading.
+  void loosen(double xy_m2, double heading_rad2);
 
   // ---- landmarks ----
   int landmarks() const { return landmarks_; }

@@ -163,6 +163,7 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   status = joint_.check_time(event.t_ns);
   if (status != WM_OK) return status;
   joint_.move_to(event.t_ns);
+  begin_look(event.t_ns);
   look_after(event.t_ns);
 
   const mounted_sensor &sensor = sensor_[s.sensor];
@@ -244,6 +245,7 @@ void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, cons
     record.verdict = fused ? WM_FUSED : WM_REJECTED_GATE;
     records.add(record);
   }
+  if (r.bearing) note_bearing(fused, v.innovation[0]);
   if (!fused) {
     misfit(landmark, r.range);
     return;

@@ -156,6 +156,8 @@ void slam::start_again() {
     other_fused_id_[i] = -1;
   }
   moved_.count = doubled_.count = 0;
+  look_.t_ns = WM_TIME_NONE;
+  look_.fused = look_.refused = 0;
   resets_++;
   searching_ = params_.map != WM_SLAM_MAP_NONE && params_.markers && !(place && heading);
   candidate_id_ = -1;
@@ -271,6 +273,7 @@ size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const 
   list.add("map", "left", (double)counts_.left, 0.0);
   list.add("map", "moved", (double)counts_.moved, 0.0);
   list.add("map", "doubled", (double)counts_.doubled, 0.0);
+  list.add("motion", "jolts", (double)counts_.jolts, 0.0);
   if (params_.line_rejoin) list.add("map", "rejoined", (double)counts_.rejoined, 0.0);
   list.add("map", "no_room", (double)counts_.no_room, 0.0);
   return list.count();

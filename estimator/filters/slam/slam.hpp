@@ -27,7 +27,15 @@ struct landmark_note {
 };
 
 struct slam_counts {
-  uint64_t joined, left, moved, doubled, no_room, rejoined;
+  uint64_t joined, left, moved, doubled, no_room, rejoined, jolts;
+};
+
+// What one look's bearings, of landmarks that are known, differed by where they were refused.
+struct look_record {
+  static constexpr int kMost = 32;
+  wm_time_ns t_ns;
+  int fused, refused;
+  double by_rad[kMost];
 };
 
 // The last identities of which something is to be remembered.
@@ -155,6 +163,8 @@ class slam {
   void drop_landmark(int landmark);
   bool make_room();
   void look_after(wm_time_ns t_ns);
+  void begin_look(wm_time_ns t_ns);
+  void note_bearing(bool fused, double innovation_rad);
   void rejoin(int fresh);
   bool may_be_one(int fresh, int lost) const;
   pair make_pair(int fresh, int lost) const;
@@ -187,6 +197,7 @@ class slam {
   wm_time_ns other_fused_ns_[2];  // when the last two different landmarks were fused
   int32_t other_fused_id_[2];
   identity_list moved_, doubled_;
+  look_record look_;
   uint32_t resets_;
   // Started somewhere on a map that was given: no pose until two of its markers say the same.
   bool searching_;

@@ -38,6 +38,7 @@ int32_t next_ghost;
 int fused, refused, waiting, told, lies;
 double renumbered_s;  // all lines are lost for 2 s and come back under other numbers so often; 0: never
 double moved_m;       // then each second one is another, so far beside it
+double jolt_rad;      // after 30 s the robot is turned by so much, and no wheel tells
 
 double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
 double uniform(double from, double to) { return from + (to - from) * wm_random_next_uniform(&noise); }
@@ -52,7 +53,7 @@ void begin(int method, bool rejoin = false) {
   params.line_parallax_rad = 0.2;
   params.line_step_m = 0.1;
   params.line_rejoin = rejoin;
-  renumbered_s = moved_m = 0.0;
+  renumbered_s = moved_m = jolt_rad = 0.0;
   noise = {7, 1, 0};
   for (int i = 0; i < kLines; i++) {
     const wm::sin_cos a = wm::sincos(wm::kTwoPi * i / kLines + 0.1);
@@ -133,6 +134,7 @@ outcome drive(double seconds, int lies_of_ten) {
     }
     const wm::arc a = wm::make_arc(0.02 * v, 0.02 * w);
     truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
+    if (step == 1500) truth.heading_rad = wm::wrap(truth.heading_rad + jolt_rad);
     if (step % 50 != 49) continue;
     wm_estimate now;
     slam->estimate(state, &now);
@@ -205,6 +207,30 @@ void test_lost_lines_are_found_again(void) {
   }
 }
 
+double counted(const char *name) {
+  wm_calibration_value values[64];
+  const size_t n = slam->calibration(state, values, 64);
+  for (size_t i = 0; i < n; i++)
+    if (std::strcmp(values[i].name, name) == 0) return values[i].value;
+  return -1.0;
+}
+
+// GIVEN lines that are well known WHEN the robot is turned, and no wheel tells THEN a second later it knows, and the
+// lines stay where they are.
+void test_a_robot_that_is_turned_by_hand_keeps_its_map(void) {
+  for (int method : {WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_INVERSE_DISTANCE}) {
+    begin(method);
+    jolt_rad = 0.12;
+    const outcome o = drive(60, 0);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.2, o.largest_m);
+    TEST_ASSERT_LESS_THAN_DOUBLE(1.5 * M_PI / 180, o.largest_rad);
+    TEST_ASSERT_EQUAL(kLines, o.landmarks);
+    TEST_ASSERT_EQUAL(kLines, o.right);
+    TEST_ASSERT_EQUAL_DOUBLE(0, counted("map.moved"));
+    TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(1, counted("motion.jolts"));
+  }
+}
+
 }  // namespace
 
 void setUp(void) {}
@@ -215,6 +241,7 @@ int main(void) {
   RUN_TEST(test_honest_sightings);
   RUN_TEST(test_six_of_ten_are_lies);
   RUN_TEST(test_lost_lines_are_found_again);
+  RUN_TEST(test_a_robot_that_is_turned_by_hand_keeps_its_map);
   std::free(state);
   return UNITY_END();
 }
