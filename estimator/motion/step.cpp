@@ -154,7 +154,8 @@ void add_silence(const motion_stretch &stretch, const wm_motion_params &p, bool 
   const double from_s = stretch.silent_s > 0.0 ? stretch.silent_s : 0.0, to_s = stretch.silent_s + stretch.dt_s;
   if (to_s <= from_s || stretch.input.stale) return;
   // Variances that add up to the square of the whole, however the time is cut.
-  const double held_from_s = std::fmin(from_s, p.hold_max_s), held_to_s = std::fmin(to_s, p.hold_max_s);
+  const double held_from_s = from_s < p.hold_max_s ? from_s : p.hold_max_s;
+  const double held_to_s = to_s < p.hold_max_s ? to_s : p.hold_max_s;
   const double grown_s4 = square(square(held_to_s)) - square(square(held_from_s));
   if (!is_counted) noise->way_m2 += square(0.5 * p.noise_hold_mps2) * grown_s4;
   if (is_counted && stretch.input.model == WM_MOTION_TICKS) return;
