@@ -14,6 +14,7 @@
 #include "map/look.h"
 #include "map/print_markers.h"
 #include "map/survey.h"
+#include "map/survey_bearings.h"
 #include "simulate/render/pictures.h"
 
 namespace {
@@ -36,16 +37,23 @@ struct Check {
 };
 
 struct SurveyArguments {
-  std::string run;
+  std::string run, poses, out;
   bool json = false;
 };
 
 void parse_survey(CLI::App &app, SurveyArguments &a) {
   app.description("How well each landmark of a run's map fits, and which ones moved, stand twice or are misread.");
   app.add_option("RUN", a.run, "the folder that `waymark replay` or `waymark run` wrote")->required();
+  app.add_option(
+      "--poses", a.poses,
+      "makes the map: a recording (its truth.csv) or another run (its trajectory.csv) that says where the robot "
+      "was; landmarks are where the run's bearings meet");
+  app.add_option("--out", a.out, "with --poses: folder for landmarks.csv and, where the recording has it, landmarks/");
   app.add_flag("--json", a.json, "one object instead of a table");
   app.footer(
-      "example: waymark map survey out/run\n"
+      "examples:\n"
+      "  waymark map survey out/run\n"
+      "  waymark map survey out/run --poses recordings/drive --out map\n"
       "Residuals are observed less expected: bearing (rad) and range (m), or along and across the line of sight (x, y, "
       "m) and\nheading (rad) of coded markers. docs/estimators.md says what is fused when.\n"
       "Exit code: 0 good, 1 something was found or can't be read.");
@@ -280,7 +288,9 @@ int check(const Check &a) {
 }
 
 int survey(const SurveyArguments &a) {
-  const Survey found = survey_run(a.run);
+  if (a.poses.empty() && !a.out.empty())
+    throw Failure("--out needs --poses: from where the landmarks were seen", kUsage);
+  const Survey found = a.poses.empty() ? survey_run(a.run) : survey_drive({a.run, a.poses, a.out, {}});
   if (a.json)
     std::printf("%s\n", survey_json(found).dump(2).c_str());
   else
