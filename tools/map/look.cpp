@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <memory>
 
 #include "common/failure.h"
@@ -31,6 +32,12 @@ std::unique_ptr<wm_recording, decltype(&wm_recording_close)> open(const LookAtPi
   wm_error err{};
   if (wm_recording_open_robot("map", &files, nullptr, nullptr, &opened, &err) != WM_OK) throw Failure(err.text, kUsage);
   return {opened, wm_recording_close};
+}
+
+void set(const wm_param_table &table, const std::string &key, double value, void *params) {
+  for (size_t i = 0; i < table.count; i++)
+    if (table.params[i].key == key)
+      std::memcpy(static_cast<uint8_t *>(params) + table.params[i].offset, &value, sizeof value);
 }
 
 wm_estimate pose_of(const LookAtPicture &a) {
@@ -82,7 +89,7 @@ void draw(const GreyPicture &grey, const std::vector<wm_looked_for> &looks, cons
 }  // namespace
 
 int look_at_picture(const LookAtPicture &a) {
-  need_finite("--pose", {a.pose[0], a.pose[1], a.pose[2]});
+  need_finite("--pose", a.pose);
   const auto map = open(a);
   const wm_rig &rig = *wm_recording_rig(map.get());
   int32_t index = 0;
@@ -99,6 +106,11 @@ int look_at_picture(const LookAtPicture &a) {
   const wm_detector *detector = wm_detector_find("landmarks");
   std::vector<double> params(detector->params.bytes / sizeof(double) + 1);
   wm_params_defaults(&detector->params, params.data());
+  if (a.pose.empty()) {
+    set(detector->params, "search_places", 1e8, params.data());  // all have their turn in one picture
+    set(detector->params, "likeness_far", 0.7, params.data());   // a person looks at what is found
+  }
+  if (a.mounting_deg > 0) set(detector->params, "mounting_sigma_rad", a.mounting_deg * M_PI / 180, params.data());
   const char *why = nullptr;
   const size_t bytes = detector->state_bytes(params.data(), &view, &why);
   if (bytes == 0) throw Failure(a.map.string() + ": " + why, kUsage);
@@ -111,10 +123,11 @@ int look_at_picture(const LookAtPicture &a) {
   frame.width_px = frame.stride_bytes = static_cast<uint32_t>(picture.width);
   frame.height_px = static_cast<uint32_t>(picture.height);
   frame.grey = picture.pixels.data();
-  const wm_estimate pose = pose_of(a);
+  const wm_estimate pose = a.pose.empty() ? wm_estimate{} : pose_of(a);
   std::vector<wm_event> events(256);
   size_t count = 0;
-  if (detector->detect(state.get(), &frame, &pose, events.data(), events.size(), &count) != WM_OK)
+  if (detector->detect(state.get(), &frame, a.pose.empty() ? nullptr : &pose, events.data(), events.size(), &count) !=
+      WM_OK)
     throw Failure(a.picture + ": has another size than the camera of " + a.calibration, kUsage);
   std::vector<wm_looked_for> looks(view.appearance_count);
   looks.resize(std::min(looks.size(), detector->looked_for(state.get(), looks.data(), looks.size())));

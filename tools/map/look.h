@@ -11,7 +11,9 @@ namespace wm::tools {
 struct LookAtPicture {
   std::filesystem::path map;  // the folder with landmarks.csv and landmarks/, or the landmarks.csv
   std::string picture, calibration, camera;
-  std::vector<double> pose;  // x, y (m), heading (degrees) of base_link in the map when the picture was taken
+  // x, y (m), heading (degrees) of base_link in the map when the picture was taken; empty: searched everywhere.
+  std::vector<double> pose;
+  double mounting_deg = 0;  // how far the camera may be turned against its calibration; 0: as a run does
   double sigma_m = 0.05, sigma_deg = 1;
   std::string draw;  // a PNG to write; empty: none
 };

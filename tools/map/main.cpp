@@ -178,16 +178,19 @@ void parse_look(CLI::App &app, LookAtPicture &a) {
   app.add_option("--picture", a.picture, "JPEG, PNG or PGM")->required();
   app.add_option("--calibration", a.calibration, "calibration.yaml of the camera that took it")->required();
   app.add_option("--camera", a.camera, "its name there; needed where there are several");
-  app.add_option("--pose", a.pose, "X,Y,HEADING_DEG of base_link when it was taken")
+  app.add_option("--pose", a.pose,
+                 "X,Y,HEADING_DEG of base_link when it was taken; without it everything is searched everywhere")
       ->delimiter(',')
-      ->expected(3)
-      ->required();
+      ->expected(3);
   app.add_option("--sigma", a.sigma_m, "m: how well that place is known")
       ->check(CLI::Range(0.0, 100.0))
       ->capture_default_str();
   app.add_option("--sigma-deg", a.sigma_deg, "degrees: and that heading")
       ->check(CLI::Range(0.0, 90.0))
       ->capture_default_str();
+  app.add_option("--mounting-deg", a.mounting_deg,
+                 "degrees: how far the camera may be turned against its calibration (else as a run has it)")
+      ->check(CLI::Range(0.0, 5.0));
   app.add_option("--draw", a.draw, "the picture with what was found (PNG or .jpg)");
   app.footer(
       "example: waymark map look map --picture left.png --calibration calibration.yaml --camera left --pose 3,0.5,10 "

@@ -16,6 +16,7 @@ constexpr double kWide = 2.5;
 constexpr double kLikeness = 0.6;   // of a place that is worth a second look
 constexpr double kPromise = 0.2;    // less than that much worse than wanted: its neighbours are looked at
 constexpr double kSpread_grey = 5;  // of what can be compared at all
+constexpr double kRank = 0.05;      // by so much each further place of one landmark comes after others
 constexpr int kOwn = 3;             // places that one landmark keeps
 constexpr double kHalfStep = 0.13;  // half of a cylinder's step in distance
 // Cosines of the slants: from one to the next, a landmark's width changes as much as its size from cylinder to
@@ -100,6 +101,7 @@ struct shortlist {
   int count;
   possible_place places[kOwn];
 
+  // Likeness that a place needs.
   double least() const { return count < kOwn ? kLikeness : places[count - 1].likeness; }
   void offer(const possible_place &one, double apart_rad) {
     int at = 0;
@@ -202,6 +204,7 @@ int search_everywhere::search(const mounted_camera &camera, const appearance *kn
         compared += compare(on, drawn, top, tolerance_of(shape, on, tilt_rad), like, &best);
       }
     }
+    for (int i = 0; i < best.count; i++) best.places[i].likeness -= kRank * i;
     for (int i = 0; i < best.count; i++) {
       if (count == kPlaces && places[count - 1].likeness >= best.places[i].likeness) continue;
       int at = count < kPlaces ? count++ : kPlaces - 1;

@@ -16,7 +16,7 @@ struct possible_place {
   double azimuth_rad;  // in base_link's axes
   double distance_m;   // on the floor
   double slant_rad;    // between its normal and the line of sight; on which side isn't known, so at least 0
-  double likeness;
+  double likeness;     // normalised correlation; less for the second and third of one landmark
 };
 
 struct search_everywhere {

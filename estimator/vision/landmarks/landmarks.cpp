@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kSteep = 0.7071;  // as in the filters' sensor model
 constexpr size_t kFoundMax = 128;
-constexpr int kTries = 6;  // looks at full resolution in a picture that is searched
+constexpr int kTries = 8;  // looks at full resolution in a picture that is searched
 constexpr size_t kAgreeing =
     3;  // landmarks that one pose must explain where it was guessed from one that looks less alike
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -200,7 +200,7 @@ double middle_of(double *values, size_t count) {
 size_t drop_strays(landmarks_state *self, camera_guess guess, const int *which, wm_event *events, double *likeness,
                    size_t count) {
   constexpr size_t kOpinions = 4;
-  constexpr double kSigmas = 4, kLens_px = 2.5;  // a lens and a roll that aren't as calibrated move them unlike
+  constexpr double kSigmas = 4, kLens_px = 2.5;  // a lens that isn't as calibrated moves them unlike
   if (count < kOpinions) return count;
   double common[2], values[kFoundMax];
   const auto moved = [&](size_t i, int axis) {
@@ -217,14 +217,19 @@ size_t drop_strays(landmarks_state *self, camera_guess guess, const int *which, 
   for (size_t i = 0; i < count; i++) {
     double allowed[2];
     expected_spread(self->eye.camera, guess, self->known[which[i]], 0, &allowed[0], &allowed[1]);
-    if (std::fabs(moved(i, 0) - common[0]) < kSigmas * allowed[0] + kLens_px &&
-        std::fabs(moved(i, 1) - common[1]) < kSigmas * allowed[1] + kLens_px) {
+    // A camera that is rolled moves them against each other, by how far they are from the middle.
+    const wm_looked_for &look = self->looks[which[i]];
+    const double u = look.expected_px[0] - self->eye.camera.optics.cx,
+                 v = look.expected_px[1] - self->eye.camera.optics.cy;
+    const double unlike = larger(kLens_px, 2 * self->eye.params.mounting_sigma_rad * std::sqrt(u * u + v * v));
+    if (std::fabs(moved(i, 0) - common[0]) < kSigmas * allowed[0] + unlike &&
+        std::fabs(moved(i, 1) - common[1]) < kSigmas * allowed[1] + unlike) {
       events[kept] = events[i];
       likeness[kept++] = likeness[i];
     } else {
-      wm_looked_for &look = self->looks[which[i]];
-      look.look = WM_LOOK_UNLIKE;
-      look.found_px[0] = look.found_px[1] = kNan;
+      wm_looked_for &stray = self->looks[which[i]];
+      stray.look = WM_LOOK_UNLIKE;
+      stray.found_px[0] = stray.found_px[1] = kNan;
     }
   }
   return kept;
@@ -244,7 +249,7 @@ void forget_looks(landmarks_state *self) {
 }
 
 // Looks where a pose says that the landmarks are.
-void look_by(landmarks_state *self, const wm_frame &frame, const camera_guess &guess, found_list *out) {
+void look_by(landmarks_state *self, const wm_frame &frame, const camera_guess &guess, bool believed, found_list *out) {
   const wm_landmarks_params &params = self->eye.params;
   out->count = 0;
   for (int i = 0; i < self->count; i++) {
@@ -260,9 +265,10 @@ void look_by(landmarks_state *self, const wm_frame &frame, const camera_guess &g
     expected_spread(self->eye.camera, guess, what, params.mounting_sigma_rad, &across_px, &down_px);
     const double sigmas = params.window_sigmas;
     sight seen;
-    look.look = static_cast<uint8_t>(larger(across_px, down_px) * sigmas > params.window_max_px
-                                         ? WM_LOOK_UNCERTAIN
-                                         : look_for(&self->eye, one, sigmas * across_px, sigmas * down_px, &seen));
+    look.look =
+        static_cast<uint8_t>(larger(across_px, down_px) * sigmas > params.window_max_px
+                                 ? WM_LOOK_UNCERTAIN
+                                 : look_for(&self->eye, one, sigmas * across_px, sigmas * down_px, believed, &seen));
     if (look.look != WM_LOOK_UNCERTAIN) look.likeness = seen.likeness;
     if (look.look != WM_LOOK_FOUND || out->count == out->capacity || out->count == kFoundMax) continue;
     if (!put(*self, frame, guess, one, seen, &out->events[out->count])) continue;
@@ -283,17 +289,21 @@ void look_everywhere(landmarks_state *self, const wm_frame &frame, found_list *o
                 static_cast<int>(params.search_places));
   for (int i = 0; i < search.count && i < kTries; i++) {
     const possible_place &where = search.places[i];
-    recognised best, other;
-    best.likeness = -1;
-    for (const int side : {1, -1})
-      if (recognise(&self->eye, self->known[where.landmark], where, side, &other) && other.likeness > best.likeness)
-        best = other;
-    if (best.likeness < 0) continue;
-    look_by(self, frame, best.guess, out);
-    if (out->count >= kAgreeing || (out->count > 0 && best.likeness >= params.likeness_alone)) {
-      search.next = where.landmark;  // it will be there in the next picture, too
-      return;
+    recognised seen;
+    camera_guess best;
+    size_t most = 0;
+    for (const int side : {1, -1}) {
+      if (!recognise(&self->eye, self->known[where.landmark], where, side, &seen)) continue;
+      look_by(self, frame, seen.guess, false, out);
+      if (out->count < (seen.likeness >= params.likeness_alone ? 1 : kAgreeing) || out->count <= most) continue;
+      most = out->count;
+      best = seen.guess;
+      correct_guess(self->eye, self->known, self->looks, self->count, &best);
     }
+    if (most == 0) continue;
+    look_by(self, frame, best, true, out);
+    search.next = where.landmark;  // it will be there in the next picture, too
+    return;
   }
   out->count = 0;
   forget_looks(self);
@@ -313,7 +323,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *predic
   found.capacity = capacity;
   found.count = 0;
   forget_looks(self);
-  if (guessed) look_by(self, frame, guess, &found);
+  if (guessed) look_by(self, frame, guess, true, &found);
   if (found.count > 0 || self->found_ns == WM_TIME_NONE) self->found_ns = frame.t_ns;
   const bool blind = wm_seconds_between(self->found_ns, frame.t_ns) > self->eye.params.search_after_s;
   if (found.count == 0 && (!guessed || blind) && self->eye.params.search_places > 0)

@@ -10,8 +10,11 @@ constexpr double kBlurred = 0.35;  // share of the contrast that a landmark shou
 constexpr double kSmall_px = 30;   // a landmark of n pixels needs a likeness of 1 - (1 - min) n / (n + this)
 constexpr double kEdge_px = 2;     // of the picture
 
-double likeness_needed(const looker &self, int pixels) {
-  return 1 - (1 - self.params.likeness_min) * pixels / (pixels + kSmall_px);
+double likeness_needed(const looker &self, int pixels, double reach_px) {
+  constexpr double kNear_px = 8, kFar_px = 32;
+  const double near = 1 - (1 - self.params.likeness_min) * pixels / (pixels + kSmall_px);
+  const double far = (reach_px - kNear_px) / (kFar_px - kNear_px);
+  return near + (far < 0 ? 0 : far > 1 ? 1 : far) * (larger(near, self.params.likeness_far) - near);
 }
 
 }  // namespace
@@ -48,7 +51,7 @@ wm_look expect_landmark(const looker &self, const camera_guess &guess, const app
   return WM_LOOK_FOUND;
 }
 
-wm_look look_for(looker *self, const candidate &one, double across_px, double down_px, sight *out) {
+wm_look look_for(looker *self, const candidate &one, double across_px, double down_px, bool believed, sight *out) {
   out->likeness = std::numeric_limits<double>::quiet_NaN();
   if (!draw(*one.what, one.view, self->rays, one.corners, one.level, self->params.blur_px, &self->drawn))
     return WM_LOOK_NOT_IN_VIEW;
@@ -61,7 +64,7 @@ wm_look look_for(looker *self, const candidate &one, double across_px, double do
     return WM_LOOK_NOT_IN_VIEW;
   out->likeness = best.likeness;
   if (best.spread_grey < self->params.contrast_grey) return WM_LOOK_LOW_CONTRAST;
-  const double needed = likeness_needed(*self, self->drawn.count);
+  const double needed = likeness_needed(*self, self->drawn.count, believed ? larger(across_px, down_px) : 0);
   if (best.likeness < needed - 0.1)
     return best.spread_grey < kBlurred * self->drawn.spread_grey ? WM_LOOK_BLURRED : WM_LOOK_UNLIKE;
   aligned fine;

@@ -43,8 +43,9 @@ struct sight {
 wm_look expect_landmark(const looker &self, const camera_guess &guess, const appearance &what, double area_max,
                         candidate *out);
 
-// Looks for it about where it is expected.
-wm_look look_for(looker *self, const candidate &one, double across_px, double down_px, sight *out);
+// Looks for it about where it is expected. `believed`: nobody asks afterwards whether it agrees with others, so it must
+// be the more alike, the larger the window is.
+wm_look look_for(looker *self, const candidate &one, double across_px, double down_px, bool believed, sight *out);
 
 }  // namespace wm
 

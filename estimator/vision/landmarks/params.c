@@ -34,6 +34,10 @@ static const wm_param kParams[] = {
         "Normalised correlation from which on a landmark is believed that was found without a pose; less alike ones "
         "must "
         "agree with two others."),
+    F64("likeness_far", likeness_far, 0.88, 0.3, 1,
+        "Normalised correlation that a landmark needs where the window reaches 32 px and more from where it is "
+        "expected; "
+        "likeness_min is for 8 px and less."),
     F64("blur_px", blur_px, 0.6, 0, 5, "px. Width (sigma) of a point in the picture: lens and compression."),
     F64("sigma_px", sigma_px, 0.05, 0, 10,
         "px. Error of a landmark's middle that the rest of its fit doesn't show: compression, the camera's response."),

@@ -34,7 +34,7 @@ bool recognise(looker *self, const appearance &what, const possible_place &where
     sight seen;
     if (expect_landmark(*self, guess_there(), what, area, &one) != WM_LOOK_FOUND) return false;
     const double reach = kReach_px << one.level;
-    if (look_for(self, one, reach, reach, &seen) != WM_LOOK_FOUND) return false;
+    if (look_for(self, one, reach, reach, false, &seen) != WM_LOOK_FOUND) return false;
     azimuth = azimuth_of(*self, seen.at);
     distance /= seen.taller;
     facing *= seen.wider / seen.taller;
@@ -43,6 +43,53 @@ bool recognise(looker *self, const appearance &what, const possible_place &where
   }
   out->guess = guess_there();
   return facing >= self->params.facing_min && finite(out->guess.base_m);
+}
+
+void correct_guess(const looker &self, const appearance *known, const wm_looked_for *looks, int count,
+                   camera_guess *guess) {
+  constexpr double kFound_px = 3, kStep[3] = {0.01, 0.01, 0.001};
+  const mat3 first = guess->R_map_base;
+  double pose[3] = {guess->base_m.x, guess->base_m.y, atan2(first.m[1][0], first.m[0][0])};
+  const auto place = [&](const double at[3]) {
+    camera_guess out = *guess;
+    const sin_cos h = sincos(at[2]);
+    out.base_m = {at[0], at[1], guess->base_m.z};
+    out.R_map_base = {{{h.cos, -h.sin, 0}, {h.sin, h.cos, 0}, {0, 0, 1}}};
+    out.R_map_optical = out.R_map_base * self.camera.R_base_optical;
+    out.eye_m = out.base_m + out.R_map_base * self.camera.centre_m;
+    return out;
+  };
+  const auto column_of = [&](const appearance &what, const double at[3], double *u) {
+    const camera_guess from = place(at);
+    pixel there;
+    if (!project(self.camera.optics, transposed_times(from.R_map_optical, what.place_m - from.eye_m), &there))
+      return false;
+    *u = there.u;
+    return true;
+  };
+  for (int i = 0; i < count; i++) {
+    double u = 0, moved_u = 0, by[3], gain[3];
+    if (looks[i].look != WM_LOOK_FOUND || !column_of(known[i], pose, &u)) continue;
+    bool possible = true;
+    for (int k = 0; k < 3; k++) {
+      double moved[3] = {pose[0], pose[1], pose[2]};
+      moved[k] += kStep[k];
+      possible = possible && column_of(known[i], moved, &moved_u);
+      by[k] = (moved_u - u) / kStep[k];
+    }
+    if (!possible) continue;
+    double variance = kFound_px * kFound_px;
+    for (int k = 0; k < 3; k++) {
+      gain[k] = 0;
+      for (int j = 0; j < 3; j++) gain[k] += guess->cov[k][j] * by[j];
+      variance += by[k] * gain[k];
+    }
+    for (int k = 0; k < 3; k++) {
+      pose[k] += gain[k] * (looks[i].found_px[0] - u) / variance;
+      for (int j = 0; j < 3; j++) guess->cov[k][j] -= gain[k] * gain[j] / variance;
+    }
+  }
+  *guess = place(pose);
 }
 
 }  // namespace wm

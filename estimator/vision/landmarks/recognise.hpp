@@ -17,6 +17,10 @@ struct recognised {
 // nearer and more slanted it is than was tried, then in the one in which it would be measured. False where it isn't.
 bool recognise(looker *self, const appearance &what, const possible_place &where, int side, recognised *out);
 
+// Corrects a guess by where landmarks were found in the picture (`looks`, one of each of `known`), a bearing each.
+void correct_guess(const looker &self, const appearance *known, const wm_looked_for *looks, int count,
+                   camera_guess *guess);
+
 }  // namespace wm
 
 #endif

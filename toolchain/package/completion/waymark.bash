@@ -19,7 +19,7 @@ _waymark() {
     "map check") words='--help --recording --draw' ;;
     "map survey") words='--help --poses --out --json' ;;
     "map add-landmark") words='--help --id --picture --at --sigma --size --yaw --from --corners --calibration --camera' ;;
-    "map look") words='--help --picture --calibration --camera --pose --sigma --sigma-deg --draw' ;;
+    "map look") words='--help --picture --calibration --camera --pose --sigma --sigma-deg --mounting-deg --draw' ;;
     "map print-markers") words='--help --family --ids --size --paper --out' ;;
   esac
   [ -n "$words" ] || case "$command" in
@@ -35,7 +35,7 @@ _waymark() {
     "diff") words='--help' ;;
     "eval") words='--help --json --published --reference --align --against --from --to --detector --camera --size-min --view' ;;
     "import") words='--help --out --camera --stamps --begin-ns --quality' ;;
-    "map") words='--help --resolution --origin --inside --walls-below --negate --fine --speck --clearance --out --recording --draw --poses --json --id --picture --at --sigma --size --yaw --from --corners --calibration --camera --pose --sigma-deg --family --ids --paper' ;;
+    "map") words='--help --resolution --origin --inside --walls-below --negate --fine --speck --clearance --out --recording --draw --poses --json --id --picture --at --sigma --size --yaw --from --corners --calibration --camera --pose --sigma-deg --mounting-deg --family --ids --paper' ;;
     "reference") words='--help --map --range --particles --passes --seed' ;;
     "report") words='--help --out --svg' ;;
     "simulate") words='--help --out --seed --landmarks --laps --duration --no-video --frame --png --camera --contact-sheet --perfect' ;;
