@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Our own elementary functions and random numbers, held against the C library and the paper's own vectors.
+#include <cfloat>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -15,12 +16,14 @@ void tearDown(void) {}
 namespace {
 
 constexpr int kSamples = 200000;
+// Where a long double is a double (32-bit ARM), the truth is itself rounded.
+constexpr double kTruthOff_ulp = LDBL_MANT_DIG > DBL_MANT_DIG ? 0.0 : 0.55;
 
 // Distance in units of the last place of the (long double) truth rounded to double.
 double ulps(double got, long double truth) {
   const double near = (double)truth;
   const double spacing = std::nextafter(std::fabs(near), INFINITY) - std::fabs(near);
-  return (double)(fabsl((long double)got - truth) / spacing);
+  return (double)(fabsl((long double)got - truth) / spacing) - kTruthOff_ulp;
 }
 
 double uniform(uint64_t index, double low, double high) { return low + (high - low) * wm_random_uniform(7, 1, index); }
