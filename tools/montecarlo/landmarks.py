@@ -3,13 +3,14 @@
 """Known landmarks from pixels over many rendered drives: each seed is another crossing, way, light and set of errors.
 Renders what the cache lacks, runs the filter from the pictures (and by dead reckoning alone), and judges pose and detector.
 
-    landmarks.py SCENARIO --config FILE --cache FOLDER [--seeds FIRST-LAST] [--duration S] [--rate HZ] [--size WxH] [--one]
+    landmarks.py SCENARIO --config FILE --cache FOLDER [--seeds FIRST-LAST] [--duration S] [--rate HZ] [--size WxH] [--start] [--one]
 
 Beside each figure stands the Cramer-Rao bound of these drives, with the bearings and sigmas that the detector found.
 
 example: tools/montecarlo/landmarks.py config/worlds/crossing-easy.yaml --config config/crossing.yaml --cache out/easy --seeds 1-10
 24 s at 5 Hz are 240 pictures: some 30 s of processor to render, 8 MB to keep. What is there already is taken as it is."""
 import argparse
+import bisect
 import collections
 import csv
 import json
@@ -82,6 +83,45 @@ def only_one(drive, landmark, folder):
                 (folder / "landmarks" / picture).symlink_to((drive / "landmarks" / picture).resolve())
 
 
+def without_pose(drive, folder):
+    """The same drive, whose recording doesn't say where it starts."""
+    folder.mkdir()
+    for file in drive.iterdir():
+        if file.name != "recording.yaml":
+            (folder / file.name).symlink_to(file.resolve())
+    lines = (drive / "recording.yaml").read_text().splitlines(keepends=True)
+    (folder / "recording.yaml").write_text("".join(line for line in lines if "initial_pose" not in line))
+
+
+def load(file):
+    with open(file, newline="") as rows:
+        return list(csv.DictReader(rows))
+
+
+def found_itself(run, drive):
+    """Seconds of driving until it tracks within 0.3 m and stays so (none: never), and for how long at a stretch it tracked while
+    off by more than 0.3 m and four sigma."""
+    truth = load(drive / "truth.csv")
+    times = [int(row["t_ns"]) for row in truth]
+    places = [(float(row["x_m"]), float(row["y_m"])) for row in truth]
+    driven, at = [0.0], 0
+    for before, after, dt in zip(places, places[1:], (b - a for a, b in zip(times, times[1:]))):
+        driven.append(driven[-1] + (1e-9 * dt if math.dist(before, after) > 0.3e-9 * dt else 0))
+    right, wrong_since, wrong_s = None, None, 0.0
+    for row in load(run / "trajectory.csv"):
+        if row["x_m"] == "" or row["state"] not in ("tracking", "dead_reckoning"):
+            right = wrong_since = None
+            continue
+        t_ns = int(row["t_ns"])
+        at = min(bisect.bisect_left(times, t_ns), len(times) - 1)
+        off = math.dist((float(row["x_m"]), float(row["y_m"])), places[at])
+        right = (driven[at] if right is None else right) if off < 0.3 else None
+        sure = off > 0.3 and off > 4 * math.sqrt(max(0.0, float(row["cov_xx"]) + float(row["cov_yy"])))
+        wrong_since = (t_ns if wrong_since is None else wrong_since) if sure else None
+        wrong_s = max(wrong_s, 1e-9 * (t_ns - wrong_since) if sure else 0.0)
+    return right, wrong_s
+
+
 def judge(a, scenario, drive, seed):
     with tempfile.TemporaryDirectory() as scratch:
         run, reckoned, alone = (pathlib.Path(scratch, name) for name in ("run", "reckoned", "alone"))
@@ -94,6 +134,11 @@ def judge(a, scenario, drive, seed):
             "reckoned": pose_of(a, reckoned, drive),
             "bound": bound_of(a, scenario, run, drive),
         }
+        if a.start:
+            nowhere, search = pathlib.Path(scratch, "nowhere"), pathlib.Path(scratch, "search")
+            without_pose(drive, nowhere)
+            replay(a, nowhere, a.config, search, "--seed", seed)
+            row["start"] = found_itself(search, drive)
         landmark = seen_most(run)
         if a.one and landmark:
             single = pathlib.Path(scratch, "single")
@@ -151,6 +196,14 @@ def summary(rows):
         f"{found / max(1, large):.3f} of {large}; bearing RMS {pooled('bearing_rms_deg'):.4f}, mean {mean:.4f} degrees, "
         f"against its sigma {pooled('normalised_rms'):.3f}"
     )
+    starts = [r["start"] for r in rows if "start" in r]
+    if starts:
+        times = [s if s is not None else math.inf for s, _ in starts]
+        text += (
+            f"\nstarted without a pose, {len(starts)} drives: right within 5 s of driving {sum(s <= 5 for s in times)}, at all "
+            f"{sum(s < math.inf for s in times)}; {spread(times)} s; sure of a wrong place for more than 0.5 s: "
+            f"{sum(wrong_s > 0.5 for _, wrong_s in starts)}"
+        )
     ones = [r for r in rows if "one" in r]
     if ones:
         lost = sum(r["one"]["lost_count"] > 0 for r in ones)
@@ -177,6 +230,7 @@ def main():
     p.add_argument("--size", default="", help="WxH of the pictures; else as the world has them")
     p.add_argument("--rate", type=float, default=5, help="pictures a second")
     p.add_argument("--bin", type=pathlib.Path, default=ROOT / "build" / "bin")
+    p.add_argument("--start", action="store_true", help="also started without a pose")
     p.add_argument("--one", action="store_true", help="also with the one landmark alone that is seen most")
     p.add_argument("--rendered-only", action="store_true", help="those of the seeds that are in the cache")
     a = p.parse_args()

@@ -150,7 +150,7 @@ int run(const Arguments &a) {
     for (const Ordeal &o : wanted) {
       all[o.name].push_back(run_ordeal(world, config, o));
       const std::string name = o.name;
-      if (name == "as-driven" || name == "kidnap") reliability.take(all[name].back().outcome);
+      if (name == "as-driven" || name == "kidnap" || name == "start") reliability.take(all[name].back().outcome);
     }
     if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r%" PRIu64 " of %" PRIu64 " drives ", i + 1, a.drives);
   }

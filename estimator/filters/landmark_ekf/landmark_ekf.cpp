@@ -115,11 +115,7 @@ void landmark_ekf::start_again() {
   prior_count_ = 0;
   resets_++;
   state_ = start_is_known(start) ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
-  start_trial_.close();
-  if (state_ == WM_STATE_TRACKING) {
-    try_start();
-    return;
-  }
+  if (state_ == WM_STATE_TRACKING) return;
   search_clue clue{};
   clue.t_ns = filter_.now_ns();
   clue.key = -1;
@@ -183,7 +179,6 @@ wm_status landmark_ekf::take_pose(const wm_event &event) {
   prior_count_ = 0;
   resets_++;
   state_ = WM_STATE_TRACKING;
-  try_start();
   return WM_OK;
 }
 
@@ -198,7 +193,7 @@ void landmark_ekf::estimate(wm_estimate *out) const {
 
 // Lost, the pose may be anywhere with the probability of being lost.
 void landmark_ekf::widen(wm_estimate *out) const {
-  const double p = lost_probability();
+  const double p = witnesses_.probability();
   out->covariance[wm_cov_index(0, 0)] += p * map_variance_m2_;
   out->covariance[wm_cov_index(1, 1)] += p * map_variance_m2_;
   out->covariance[wm_cov_index(5, 5)] += p * square(kPi) / 3.0;
@@ -207,7 +202,7 @@ void landmark_ekf::widen(wm_estimate *out) const {
 size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
   calibration_list list(out, capacity);
   filter_.list_motion_states(&list);
-  list.add("landmarks", "lost_probability", lost_probability(), 0.0);
+  list.add("landmarks", "lost_probability", state_ == WM_STATE_SEARCHING ? 1.0 : witnesses_.probability(), 0.0);
   list.add("map", "moved", moved_, 0.0);
   list.add("map", "moved_id", moved_id_, 0.0);
   const auto add = [&](const char *whose, const char *what, int state) {

@@ -9,7 +9,6 @@
 #include "filters/landmark_ekf/search.hpp"
 #include "filters/landmark_ekf/sensor_model.hpp"
 #include "filters/landmark_ekf/slots.hpp"
-#include "filters/landmark_ekf/start_trial.hpp"
 #include "filters/landmark_ekf/witnesses.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "filters/record_list.hpp"
@@ -88,11 +87,7 @@ class landmark_ekf {
   // Recovery.
   void note(wm_time_ns t_ns, int witness, double against, double angle_rad = NAN, double normalised = NAN);
   void note_clue(const search_clue &clue);
-  search_result look_around(wm_time_ns since_ns, const search_clue *prior, int prior_count) const;
   void search(wm_time_ns since_ns);
-  void try_start();
-  void weigh_start(wm_time_ns t_ns);
-  double lost_probability() const;
   void remember_calibration(wm_time_ns t_ns);
   void restore_calibration();
   void start_again();
@@ -122,7 +117,6 @@ class landmark_ekf {
   int calibration_states_;  // pose and calibration; the lent states come behind
   witnesses witnesses_;
   pose_search clues_;
-  start_trial start_trial_;
   search_clue prior_[2];
   int prior_count_;
   wm_time_ns fused_ns_, lost_ns_, searched_ns_, inflated_ns_, loosened_ns_, found_ns_;

@@ -7,14 +7,12 @@ namespace wm {
 namespace {
 
 constexpr double kSearchEvery_s = 0.25;  // bounds the cost: one search over 64 observations is about half a millisecond
-constexpr double kWeighEvery_s = 0.1;    // for the first seconds after a start
 constexpr double kSayLost_s = 0.2;       // lost is lost for at least so long: whoever listens must hear it
 constexpr double kInflateAfter_s = 3.0;  // lost for so long and not found: open the gates
 constexpr double kInflateEvery_s = 1.0;
 constexpr double kFoundWrongly_s = 60.0;
 constexpr double kRememberEvery_s = 10.0;
 constexpr double kFoundWrong = -2.5;  // a pose found anew is wrong in one of twelve cases, as log odds
-constexpr int kEnoughClues = 5;
 constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;
 constexpr double kInflateUpTo_m = 30.0;
 
@@ -36,14 +34,13 @@ void landmark_ekf::note(wm_time_ns t_ns, int witness, double against, double ang
     state_ = WM_STATE_LOST;
     lost_ns_ = inflated_ns_ = t_ns;
   }
-  weigh_start(t_ns);
   if (state_ == WM_STATE_TRACKING && witnesses_.fits()) remember_calibration(t_ns);
   if (state_ != WM_STATE_LOST) return;
-  if (wm_seconds_between(lost_ns_, t_ns) < kSayLost_s) return;
   if (witnesses_.fits()) {
     state_ = WM_STATE_TRACKING;
     return;
   }
+  if (wm_seconds_between(lost_ns_, t_ns) < kSayLost_s) return;
   const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
   const wm_time_ns bad_since = witnesses_.doubted_since_ns();
   search(bad_since > window ? bad_since : window);
@@ -65,36 +62,6 @@ void landmark_ekf::tell_moved(int landmark) {
   } else if (record.moved && record.confirmed) {
     record.moved = 0;
   }
-}
-
-void landmark_ekf::try_start() {
-  double covariance[3][3];
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) covariance[i][j] = filter_.covariance(i, j);
-  start_trial_.begin(filter_.pose(), covariance, filter_.odom(), filter_.travelled_m(), filter_.turned_rad());
-}
-
-// Is the stated pose borne out by what is seen? If not, it is forgotten.
-void landmark_ekf::weigh_start(wm_time_ns t_ns) {
-  if (!start_trial_.open() || state_ != WM_STATE_TRACKING || clues_.count() < kEnoughClues) return;
-  if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, t_ns) < kWeighEvery_s) return;
-  searched_ns_ = t_ns;
-  search_result seen = look_around(t_ns - wm_ns_from_seconds(params_.recover_window_s), nullptr, 0);
-  start_trial_.weigh(seen, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), t_ns);
-  if (!start_trial_.wrong()) return;
-  restore_calibration();
-  filter_.set_pose(start_trial_.pose(), start_trial_.covariance());
-  start_trial_.close();
-  witnesses_.begin(kFoundWrong);
-  resets_++;
-  state_ = WM_STATE_LOST;
-  lost_ns_ = inflated_ns_ = t_ns;
-}
-
-double landmark_ekf::lost_probability() const {
-  if (state_ == WM_STATE_SEARCHING) return 1.0;
-  const double now = witnesses_.probability(), start = start_trial_.probability();
-  return now > start ? now : start;
 }
 
 void landmark_ekf::remember_calibration(wm_time_ns t_ns) {
@@ -124,29 +91,23 @@ void landmark_ekf::restore_calibration() {
   map_.release_all();
 }
 
-search_result landmark_ekf::look_around(wm_time_ns since_ns, const search_clue *prior, int prior_count) const {
-  const search_limits limits = {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad};
-  search_result out =
-      clues_.find(since_ns, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), prior, prior_count, limits);
-  // What the mounting's yaw may still be off by, the heading found is off by, too.
-  for (size_t i = 0; i < setup_->sensor_count; i++) {
-    const int yaw = sensor_state_[i][kYaw];
-    if (yaw >= 0) out.covariance[2][2] += memory_[1].variance[yaw];
-  }
-  return out;
-}
-
 // Looks for the pose among the clues since `since_ns`; takes it where it is sure.
 void landmark_ekf::search(wm_time_ns since_ns) {
   const wm_time_ns now = filter_.now_ns();
   if (!params_.recover) return;
   if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now) < kSearchEvery_s) return;
   searched_ns_ = now;
-  const search_result result = look_around(since_ns, prior_, prior_count_);
+  const search_limits limits = {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad};
+  search_result result =
+      clues_.find(since_ns, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), prior_, prior_count_, limits);
   if (!result.found) return;
   restore_calibration();
+  // What the mounting's yaw may still be off by, the heading found is off by, too.
+  for (size_t i = 0; i < setup_->sensor_count; i++) {
+    const int yaw = sensor_state_[i][kYaw];
+    if (yaw >= 0) result.covariance[2][2] += filter_.variance(yaw);
+  }
   found_ns_ = now;
-  start_trial_.close();
   filter_.set_pose(result.pose, result.covariance);
   witnesses_.begin(kFoundWrong);
   resets_++;
