@@ -377,7 +377,6 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
   const placement &w = best[winner];
   const support &own = fit[winner];
   out.agreeing = own.observations;
-  out.landmarks = own.landmarks;
   const double share = own.landmarks >= kMany ? kAgreeingOfMany : kAgreeing;
   if (own.observations < share * all.count || own.observations < 3 || own.numbers < kNumbers) return out;
   normal_equations(all, w, a, b);
@@ -406,7 +405,6 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
     if (!same && fit[k].stated >= own.stated && (as_good || best[k].cost < w.cost + kMarginChi2))
       return out;  // two places explain what was seen
   }
-  out.clear = true;
   out.found = out.covariance[0][0] + out.covariance[1][1] < 2.0 * square(limits.sigma_xy_m) &&
               out.covariance[2][2] < square(limits.sigma_heading_rad);
   return out;

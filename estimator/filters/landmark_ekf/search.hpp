@@ -31,12 +31,10 @@ inline constexpr double kWayError = 0.05, kTurnError = 0.07;
 enum search_kind : uint32_t { kClueBearing = 1, kClueRange = 2, kCluePosition = 4, kClueHeading = 8 };
 
 struct search_result {
-  bool clear;     // most agree with one place, and with no other
-  bool found;     // clear, and sure enough
+  bool found;
   wm_pose2 pose;  // base_link in map, now
   double covariance[3][3];
   int used, agreeing;
-  int landmarks;  // of which most observations agree
 };
 
 struct search_limits {
