@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Real pictures: landmarks of a hall learnt from one picture of one robot's fisheye are found in one of another robot, seventeen months
-later, without a pose. The cameras' calibration isn't known: it and the wall's place were fitted to straight lines of the first picture."""
+"""Real pictures: landmarks of a hall learnt from one picture of one robot's fisheye are found in one of another robot, sixteen months
+later, without a pose. The cameras' calibration isn't known: it and the wall's place were fitted to straight lines of the first picture.
+
+usage: landmarks_real.py [SEEN.png], where the picture is drawn to."""
 import math
 import os
 import pathlib
