@@ -28,13 +28,12 @@ static const wm_param kParams[] = {
     F64("noise.steering_rad", noise_steering_rad, 0.005, 0, 1,
         "White noise of the road wheel's angle, rad per sqrt(s): play and the table's error between its points."),
     F64("noise.hold_mps2", noise_hold_mps2, 1.0, 0, 100,
-        "m/s2. A speed that is older than 0.25 s and than three of its periods holds on, but the robot may have braked or "
-        "sped up so much since: sigma grows by half of it by the square of the time."),
+        "m/s2. A speed that is older than 0.25 s and than three of its periods holds on, but the robot may have braked "
+        "or sped up so much since: sigma grows by half of it by the square of the time."),
     F64("noise.hold_radps2", noise_hold_radps2, 0.5, 0, 100, "rad/s2. As hold_mps2, for the turn rate."),
     F64("noise.speed_change", noise_speed_change, 0, 0, 10,
         "For twists: noise of the way, in m per square root of a m/s by which the speed changed. Commands are obeyed "
-        "at "
-        "times that differ, and small robots drive evenly in between."),
+        "at times that differ, and small robots drive evenly in between."),
     F64("noise.yaw_rate_change", noise_yaw_rate_change, 0, 0, 10,
         "As speed_change, for the turn: rad per square root of a rad/s. 0.04 is 0.06 s for a change of 0.4 rad/s."),
     F64("standstill.speed_mps", standstill_speed_mps, 0.02, 0, 1,
