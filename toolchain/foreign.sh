@@ -2,13 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 # Runs a command in a user namespace of its own, with all users of a whole Debian, where the kernel runs programs of another
 # architecture by qemu-user (Linux 6.7); this machine's own table of such programs is not touched. Root.
-# usage: foreign.sh arm64|armhf COMMAND...
+# usage: foreign.sh amd64|arm64|armhf COMMAND...
 set -euo pipefail
 arch=$1
 case "$arch" in
+  amd64) qemu= ;;
   arm64) qemu=qemu-aarch64-static class='\x02' machine='\xb7' ;;
   armhf) qemu=qemu-arm-static class='\x01' machine='\x28' ;;
-  *) echo "foreign.sh: '$arch': arm64 and armhf are known" >&2; exit 2 ;;
+  *) echo "foreign.sh: '$arch': amd64, arm64 and armhf are known" >&2; exit 2 ;;
 esac
 
 if [ "${WM_OWN_USERS:-}" != 1 ]; then
@@ -26,10 +27,12 @@ if [ "${WM_OWN_USERS:-}" != 1 ]; then
   exit
 fi
 
-zeros='\x00\x00\x00\x00\x00\x00\x00\x00'
-mount -t binfmt_misc binfmt_misc /proc/sys/fs/binfmt_misc
-# F: opened now, so that it is found from inside of a root; C: credentials of the program, O: opened for it.
-printf '%s' ":waymark-$arch:M::\\x7fELF${class}\\x01\\x01\\x00${zeros}\\x02\\x00${machine}\\x00:\\xff\\xff\\xff\\xff\\xff\\xff\\xff\\x00\\xff\\xff\\xff\\xff\\xff\\xff\\xff\\xff\\xfe\\xff\\xff\\xff:/usr/bin/$qemu:OCF" \
-  >/proc/sys/fs/binfmt_misc/register
+if [ -n "$qemu" ]; then
+  zeros='\x00\x00\x00\x00\x00\x00\x00\x00'
+  mount -t binfmt_misc binfmt_misc /proc/sys/fs/binfmt_misc
+  # F: opened now, so that it is found from inside of a root; C: credentials of the program, O: opened for it.
+  printf '%s' ":waymark-$arch:M::\\x7fELF${class}\\x01\\x01\\x00${zeros}\\x02\\x00${machine}\\x00:\\xff\\xff\\xff\\xff\\xff\\xff\\xff\\x00\\xff\\xff\\xff\\xff\\xff\\xff\\xff\\xff\\xfe\\xff\\xff\\xff:/usr/bin/$qemu:OCF" \
+    >/proc/sys/fs/binfmt_misc/register
+fi
 shift
 exec "$@"

@@ -14,35 +14,8 @@ roots=$(readlink -f .cache/roots)
 say() { printf '\033[1m== %s\033[0m\n' "$*"; }
 fail() { echo "install.sh $arch: $*" >&2; exit 1; }
 
-if [ "${WM_OWN_USERS:-}" != 1 ]; then
-  [ "$(id -u)" -eq 0 ] || exec sudo bash "$0" "$arch" "$packages"
-  # The users of a whole Debian, not root alone: who is outside writes the map.
-  pipe=$(mktemp -u)
-  mkfifo "$pipe"
-  WM_OWN_USERS=1 unshare --user --mount --uts bash -c 'read -r _ <"$0"; rm "$0"; exec bash "$@"' "$pipe" "$0" "$arch" "$packages" &
-  child=$!
-  until [ "$(readlink "/proc/$child/ns/user")" != "$(readlink /proc/self/ns/user)" ]; do sleep 0.05; done
-  echo "0 0 65536" >"/proc/$child/uid_map"
-  echo "0 0 65536" >"/proc/$child/gid_map"
-  echo >"$pipe"
-  wait "$child"
-  exit
-fi
-
-# ── programs of that architecture ────────────────────────────────────────────────────────────────────────────────────
-case "$arch" in
-  amd64) ;;
-  arm64) qemu=qemu-aarch64-static class='\x02' machine='\xb7' ;;
-  armhf) qemu=qemu-arm-static class='\x01' machine='\x28' ;;
-  *) fail "amd64, arm64 and armhf are known" ;;
-esac
-if [ "$arch" != amd64 ]; then
-  zeros='\x00\x00\x00\x00\x00\x00\x00\x00'
-  mount -t binfmt_misc binfmt_misc /proc/sys/fs/binfmt_misc
-  # F: opened now, so that it is found from inside of the root; C: credentials of the program, O: opened for it.
-  printf '%s' ":waymark-$arch:M::\\x7fELF${class}\\x01\\x01\\x00${zeros}\\x02\\x00${machine}\\x00:\\xff\\xff\\xff\\xff\\xff\\xff\\xff\\x00\\xff\\xff\\xff\\xff\\xff\\xff\\xff\\xff\\xfe\\xff\\xff\\xff:/usr/bin/$qemu:OCF" \
-    >/proc/sys/fs/binfmt_misc/register
-fi
+# In a user namespace of its own, where this architecture's programs run.
+[ "${WM_OWN_USERS:-}" = 1 ] || exec bash toolchain/foreign.sh "$arch" bash "$here/install.sh" "$arch" "$packages"
 
 # ── a fresh root, with what the packages depend on and nothing else ──────────────────────────────────────────────────
 runtime=$(ls "$packages"/waymark_*_"$arch".deb)
