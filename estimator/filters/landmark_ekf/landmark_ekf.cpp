@@ -14,8 +14,9 @@ namespace {
 constexpr const char *kSensorStateNames[] = {"yaw_rad",     "x_m",           "y_m",          "roll_rad",   "pitch_rad",
                                              "angle_scale", "time_offset_s", "range_bias_m", "range_scale"};
 
-constexpr double kStartWrong = -2.5;  // what somebody says of the pose is wrong in one of twelve cases, as log odds
-constexpr double kAround_m = 5.0;     // a lost robot is among the landmarks or so near to them
+constexpr double kStartWrong = -2.5;   // what somebody says of the pose is wrong in one of twelve cases, as log odds
+constexpr double kDoubtedStart = 0.1;  // below, a stated start is published as it was stated
+constexpr double kAround_m = 5.0;      // a lost robot is among the landmarks or so near to them
 
 int lasting_states(const wm_landmark_ekf_params &p) {
   if (p.lasting_slots == 0) return 0;
@@ -103,7 +104,7 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   moved_id_ = -1;
   remembered_ns_ = WM_TIME_NONE;
   remember_calibration(WM_TIME_NONE);
-  fused_ns_ = lost_ns_ = searched_ns_ = inflated_ns_ = loosened_ns_ = found_ns_ = WM_TIME_NONE;
+  fused_ns_ = lost_ns_ = searched_ns_ = weighed_ns_ = inflated_ns_ = loosened_ns_ = found_ns_ = WM_TIME_NONE;
   start_again();
 }
 
@@ -115,7 +116,11 @@ void landmark_ekf::start_again() {
   prior_count_ = 0;
   resets_++;
   state_ = start_is_known(start) ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
-  if (state_ == WM_STATE_TRACKING) return;
+  start_trial_.close();
+  if (state_ == WM_STATE_TRACKING) {
+    try_start();
+    return;
+  }
   search_clue clue{};
   clue.t_ns = filter_.now_ns();
   clue.key = -1;
@@ -179,6 +184,7 @@ wm_status landmark_ekf::take_pose(const wm_event &event) {
   prior_count_ = 0;
   resets_++;
   state_ = WM_STATE_TRACKING;
+  try_start();
   return WM_OK;
 }
 
@@ -189,6 +195,7 @@ void landmark_ekf::estimate(wm_estimate *out) const {
       fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, filter_.now_ns()) <= params_.dead_reckoning_after_s;
   out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
   if (state_ == WM_STATE_LOST) widen(out);
+  if (state_ == WM_STATE_TRACKING) mix_start(out);
 }
 
 // Lost, the pose may be anywhere with the probability of being lost.
@@ -199,10 +206,27 @@ void landmark_ekf::widen(wm_estimate *out) const {
   out->covariance[wm_cov_index(5, 5)] += p * square(kPi) / 3.0;
 }
 
+// Not sure of the start, it is here or there: the covariance of both together about what is published. Gates keep the
+// filter's own.
+void landmark_ekf::mix_start(wm_estimate *out) const {
+  const double p = start_trial_.off();
+  if (p < kDoubtedStart) return;
+  const wm_pose2 &there = start_trial_.pose();
+  const wm_pose2 here = filter_.pose();
+  const double off[3] = {there.x_m - here.x_m, there.y_m - here.y_m, wrap(there.heading_rad - here.heading_rad)};
+  constexpr int kOf[3] = {0, 1, 5};
+  for (int r = 0; r < 3; r++)
+    for (int c = r; c < 3; c++) {
+      double &both = out->covariance[wm_cov_index(kOf[r], kOf[c])];
+      both = (1.0 - p) * both + p * (start_trial_.covariance()[r][c] + off[r] * off[c]);
+      out->covariance[wm_cov_index(kOf[c], kOf[r])] = both;
+    }
+}
+
 size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
   calibration_list list(out, capacity);
   filter_.list_motion_states(&list);
-  list.add("landmarks", "lost_probability", state_ == WM_STATE_SEARCHING ? 1.0 : witnesses_.probability(), 0.0);
+  list.add("landmarks", "lost_probability", lost_probability(), 0.0);
   list.add("map", "moved", moved_, 0.0);
   list.add("map", "moved_id", moved_id_, 0.0);
   const auto add = [&](const char *whose, const char *what, int state) {

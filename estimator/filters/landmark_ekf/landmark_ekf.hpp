@@ -9,13 +9,12 @@
 #include "filters/landmark_ekf/search.hpp"
 #include "filters/landmark_ekf/sensor_model.hpp"
 #include "filters/landmark_ekf/slots.hpp"
+#include "filters/landmark_ekf/start_trial.hpp"
 #include "filters/landmark_ekf/witnesses.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "filters/record_list.hpp"
 
 namespace wm {
-
-inline constexpr int kMaxSensors = 16;
 
 class landmark_ekf {
  public:
@@ -88,12 +87,16 @@ class landmark_ekf {
   void note(wm_time_ns t_ns, int witness, double against, double angle_rad = NAN, double normalised = NAN);
   void note_clue(const search_clue &clue);
   void search(wm_time_ns since_ns);
+  void try_start();
+  void weigh_start(wm_time_ns t_ns);
+  double lost_probability() const;
   void remember_calibration(wm_time_ns t_ns);
   void restore_calibration();
   void start_again();
 
   void tell_moved(int landmark);
   void widen(wm_estimate *out) const;
+  void mix_start(wm_estimate *out) const;
 
   // Behind the object: landmarks by rising id, and what each proved to be.
   int *landmark_order() { return reinterpret_cast<int *>(this + 1); }
@@ -117,9 +120,10 @@ class landmark_ekf {
   int calibration_states_;  // pose and calibration; the lent states come behind
   witnesses witnesses_;
   pose_search clues_;
+  start_trial start_trial_;
   search_clue prior_[2];
   int prior_count_;
-  wm_time_ns fused_ns_, lost_ns_, searched_ns_, inflated_ns_, loosened_ns_, found_ns_;
+  wm_time_ns fused_ns_, lost_ns_, searched_ns_, weighed_ns_, inflated_ns_, loosened_ns_, found_ns_;
   uint32_t resets_, moved_;
   int32_t moved_id_;        // of the last one
   double map_variance_m2_;  // of a place anywhere among the landmarks, each axis

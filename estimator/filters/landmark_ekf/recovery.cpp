@@ -7,6 +7,7 @@ namespace wm {
 namespace {
 
 constexpr double kSearchEvery_s = 0.25;  // bounds the cost: one search over 64 observations is about half a millisecond
+constexpr double kWeighEvery_s = 0.1;    // for the first metres after a start
 constexpr double kSayLost_s = 0.2;       // lost is lost for at least so long: whoever listens must hear it
 constexpr double kInflateAfter_s = 3.0;  // lost for so long and not found: open the gates
 constexpr double kInflateEvery_s = 1.0;
@@ -34,6 +35,7 @@ void landmark_ekf::note(wm_time_ns t_ns, int witness, double against, double ang
     state_ = WM_STATE_LOST;
     lost_ns_ = inflated_ns_ = t_ns;
   }
+  weigh_start(t_ns);
   if (state_ == WM_STATE_TRACKING && witnesses_.fits()) remember_calibration(t_ns);
   if (state_ != WM_STATE_LOST) return;
   if (witnesses_.fits()) {
@@ -62,6 +64,36 @@ void landmark_ekf::tell_moved(int landmark) {
   } else if (record.moved && record.confirmed) {
     record.moved = 0;
   }
+}
+
+void landmark_ekf::try_start() {
+  double covariance[3][3];
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) covariance[i][j] = filter_.covariance(i, j);
+  start_trial_.begin(filter_.pose(), covariance, filter_.odom(), filter_.travelled_m(), filter_.turned_rad());
+}
+
+// Is the stated pose borne out by what is seen? If not, it is forgotten.
+void landmark_ekf::weigh_start(wm_time_ns t_ns) {
+  if (!start_trial_.open() || state_ != WM_STATE_TRACKING) return;
+  if (weighed_ns_ != WM_TIME_NONE && wm_seconds_between(weighed_ns_, t_ns) < kWeighEvery_s) return;
+  weighed_ns_ = t_ns;
+  const start_trial::lasting sigma = {params_.sensor_yaw_sigma_rad, params_.lasting_bearing_rad,
+                                      params_.lasting_lateral_m};
+  start_trial_.weigh(clues_, sigma, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), t_ns);
+  if (!start_trial_.surely_off()) return;
+  restore_calibration();
+  filter_.set_pose(start_trial_.pose(), start_trial_.covariance());
+  start_trial_.close();
+  witnesses_.begin(kFoundWrong);
+  resets_++;
+  fused_ns_ = t_ns;
+}
+
+double landmark_ekf::lost_probability() const {
+  if (state_ == WM_STATE_SEARCHING) return 1.0;
+  const double now = witnesses_.probability(), start = start_trial_.off();
+  return now > start ? now : start;
 }
 
 void landmark_ekf::remember_calibration(wm_time_ns t_ns) {
@@ -108,6 +140,7 @@ void landmark_ekf::search(wm_time_ns since_ns) {
     if (yaw >= 0) result.covariance[2][2] += filter_.variance(yaw);
   }
   found_ns_ = now;
+  start_trial_.close();
   filter_.set_pose(result.pose, result.covariance);
   witnesses_.begin(kFoundWrong);
   resets_++;

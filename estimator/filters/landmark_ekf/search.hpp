@@ -16,7 +16,7 @@ namespace wm {
 struct search_clue {
   wm_time_ns t_ns;
   uint32_t kind;       // bits of search_kind
-  int32_t key;         // what was seen: index of the landmark; negative: a position, a heading
+  int32_t key;         // what was seen: index of the landmark * kMaxSensors + sensor; negative: a position, a heading
   wm_pose2 sensor;     // the sensor (base_link for a position or a heading) in the odometry's frame, at the observation
   double place_m[2];   // of the landmark, or the position itself, in map
   double bearing_rad;  // or the heading in map
@@ -27,6 +27,8 @@ struct search_clue {
 };
 // Odometry's error in parts of the way and of the turn, before calibration.
 inline constexpr double kWayError = 0.05, kTurnError = 0.07;
+
+inline constexpr int kMaxSensors = 16;
 
 enum search_kind : uint32_t { kClueBearing = 1, kClueRange = 2, kCluePosition = 4, kClueHeading = 8 };
 
@@ -50,6 +52,9 @@ class pose_search {
   void add(const search_clue &clue);
   int count() const { return count_; }
   const search_clue &newest() const { return clue_[(count_ - 1) % kCapacity]; }
+  // Those still there, the oldest first.
+  int kept() const { return count_ < kCapacity ? count_ : kCapacity; }
+  const search_clue &at(int i) const { return clue_[(count_ - kept() + i) % kCapacity]; }
   // The pose now, from clues not older than `since_ns`. `prior` (may be null) is a clue that does not age.
   search_result find(wm_time_ns since_ns, const wm_pose2 &odom_now, double travelled_m, double turned_rad,
                      const search_clue *prior, int prior_count, const search_limits &limits) const;

@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/landmark_ekf/start_trial.hpp"
+
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kOff = 0.08;                      // what somebody states is wrong in one of twelve cases ...
+constexpr double kOff_m = 2.0, kOff_rad = 0.3;     // ... by this; who is farther off is found out all the same
+constexpr double kMoved = 0.02, kMovedBy_m = 2.0;  // a landmark is not where the map says, but near
+constexpr double kFalse = 0.2;                     // share of detections that are anything, as far as anybody knows
+constexpr double kSure = 0.999, kLasts_s = 0.25;   // false ones come and go
+constexpr double kWay_m = 10.0, kTime_s = 10.0;    // then odometry has forgotten where it began
+constexpr double kMatters_m = 0.3, kMatters_rad = 0.1;  // less mends itself
+constexpr int kLandmarks = 3;                           // fewer fit many places
+constexpr int kSightings = 6;
+constexpr double kAgreeing = 0.6;
+constexpr double kLoose[] = {1.0, 0.3, 0.1, 0.03, 0.0, 0.0, 0.0};  // metres, while the way is still to be found
+
+constexpr int kMostLandmarks = 12, kMostSensors = 4;
+constexpr int kMost = 3 + 2 * kMostLandmarks + kMostSensors;
+
+// The lower triangle L of a = L L', in its place.
+bool factorize(int n, double *a, int stride) {
+  for (int i = 0; i < n; i++)
+    for (int j = 0; j <= i; j++) {
+      double sum = a[i * stride + j];
+      for (int k = 0; k < j; k++) sum -= a[i * stride + k] * a[j * stride + k];
+      if (i != j) {
+        a[i * stride + j] = sum / a[j * stride + j];
+      } else if (sum > 0.0 && finite(sum)) {
+        a[i * stride + i] = std::sqrt(sum);
+      } else {
+        return false;
+      }
+    }
+  return true;
+}
+
+struct bearing {
+  wm_pose2 sensor;  // in the start's base_link
+  double place_m[2], angle_rad;
+  double angle_variance, way_variance_m2;  // the second across the line of sight
+  int landmark, sensor_number;             // numbered as they come
+};
+
+struct problem {
+  bearing bearings[pose_search::kCapacity];
+  int count, landmarks, sensors;
+  int id[kMostLandmarks], sensor_id[kMostSensors];
+  double sigma_m[kMostLandmarks];
+  double yaw_sigma_rad;
+
+  int unknowns() const { return 3 + 2 * landmarks + sensors; }
+};
+
+int number_of(int id, int *known, int *count, int most) {
+  for (int i = 0; i < *count; i++)
+    if (known[i] == id) return i;
+  if (*count == most) return -1;
+  known[*count] = id;
+  return (*count)++;
+}
+
+// One hypothesis: its prior's factor of the pose, the landmark that may be anywhere near by (-1: none).
+struct hypothesis {
+  const double (*pose_factor)[3];  // its lower triangle counts
+  int moved;
+};
+
+struct explanation {
+  double log_likelihood;  // over that of "all of it is anything"
+  wm_pose2 start;
+  double start_covariance[3][3];
+  int agreeing;
+  bool good;
+};
+
+explanation explain(const problem &all, const wm_pose2 &stated, const hypothesis &h) {
+  explanation out{};
+  const int n = all.unknowns();
+  double z[kMost] = {};               // the unknowns, each over its sigma
+  double a[kMost * kMost], g[kMost];  // normal equations, then their factor
+  const auto sigma_of = [&](int landmark) { return landmark == h.moved ? kMovedBy_m : all.sigma_m[landmark]; };
+  constexpr int kRounds = sizeof kLoose / sizeof kLoose[0];
+  for (int round = 0; round <= kRounds; round++) {
+    const bool last = round == kRounds;
+    const double loose_m = last ? 0.0 : kLoose[round];
+    double off[3];
+    for (int i = 0; i < 3; i++) {
+      off[i] = 0.0;
+      for (int k = 0; k <= i; k++) off[i] += h.pose_factor[i][k] * z[k];
+    }
+    out.start = {stated.x_m + off[0], stated.y_m + off[1], wrap(stated.heading_rad + off[2])};
+    const sin_cos turn = sincos(out.start.heading_rad);
+    out.log_likelihood = 0.0;
+    out.agreeing = 0;
+    for (int i = 0; i < n; i++) {
+      g[i] = -z[i];
+      out.log_likelihood -= 0.5 * square(z[i]);
+      for (int j = 0; j < n; j++) a[i * kMost + j] = i == j;
+    }
+    for (int m = 0; m < all.count; m++) {
+      const bearing &b = all.bearings[m];
+      const double sigma_m = sigma_of(b.landmark);
+      const int at_landmark = 3 + 2 * b.landmark, at_yaw = 3 + 2 * all.landmarks + b.sensor_number;
+      const double rx = turn.cos * b.sensor.x_m - turn.sin * b.sensor.y_m;
+      const double ry = turn.sin * b.sensor.x_m + turn.cos * b.sensor.y_m;
+      const double dx = b.place_m[0] + sigma_m * z[at_landmark] - out.start.x_m - rx;
+      const double dy = b.place_m[1] + sigma_m * z[at_landmark + 1] - out.start.y_m - ry;
+      const double q = dx * dx + dy * dy;
+      if (!(q > 0.01)) continue;
+      const double residual = wrap(out.start.heading_rad + b.sensor.heading_rad + all.yaw_sigma_rad * z[at_yaw] +
+                                   b.angle_rad - atan2(dy, dx));
+      const double variance = b.angle_variance + (b.way_variance_m2 + square(loose_m)) / q;
+      const double right =
+          (1.0 - kFalse) * kTwoPi * exp(-0.5 * square(residual) / variance) / std::sqrt(kTwoPi * variance);
+      const double trust = right / (right + kFalse);
+      out.log_likelihood += log(right + kFalse);
+      out.agreeing += trust > 0.5;
+      const double by[3] = {-dy / q, dx / q, 1.0 + (rx * dx + ry * dy) / q};
+      int index[6] = {0, 1, 2, at_landmark, at_landmark + 1, at_yaw};
+      double row[6] = {0, 0, 0, -by[0] * sigma_m, -by[1] * sigma_m, all.yaw_sigma_rad};
+      for (int k = 0; k < 3; k++)
+        for (int i = k; i < 3; i++) row[k] += by[i] * h.pose_factor[i][k];
+      const double weight = trust / variance;
+      for (int i = 0; i < 6; i++) {
+        g[index[i]] -= weight * row[i] * residual;
+        for (int j = 0; j < 6; j++) a[index[i] * kMost + index[j]] += weight * row[i] * row[j];
+      }
+    }
+    if (!factorize(n, a, kMost)) return out;
+    if (last) break;
+    for (int i = 0; i < n; i++) {
+      for (int k = 0; k < i; k++) g[i] -= a[i * kMost + k] * g[k];
+      g[i] /= a[i * kMost + i];
+    }
+    for (int i = n - 1; i >= 0; i--) {
+      for (int k = i + 1; k < n; k++) g[i] -= a[k * kMost + i] * g[k];
+      g[i] /= a[i * kMost + i];
+    }
+    for (int i = 0; i < n; i++) z[i] += g[i];
+  }
+  for (int i = 0; i < n; i++) out.log_likelihood -= log(a[i * kMost + i]);
+  // The pose's covariance: factor (a^-1 of the pose) factor'. a^-1 = (L^-1)' L^-1, column by column.
+  double column[3][kMost];
+  for (int c = 0; c < 3; c++)
+    for (int i = 0; i < n; i++) {
+      double sum = i == c;
+      for (int k = 0; k < i; k++) sum -= a[i * kMost + k] * column[c][k];
+      column[c][i] = sum / a[i * kMost + i];
+    }
+  double inverse[3][3];
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 3; c++) {
+      inverse[r][c] = 0.0;
+      for (int i = 0; i < n; i++) inverse[r][c] += column[r][i] * column[c][i];
+    }
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 3; c++)
+      for (int i = 0; i <= r; i++)
+        for (int j = 0; j <= c; j++)
+          out.start_covariance[r][c] += h.pose_factor[r][i] * inverse[i][j] * h.pose_factor[c][j];
+  out.good = finite(out.log_likelihood);
+  return out;
+}
+
+}  // namespace
+
+void start_trial::begin(const wm_pose2 &pose, const double covariance[3][3], const wm_pose2 &odom, double travelled_m,
+                        double turned_rad) {
+  stated_ = pose_ = pose;
+  odom_ = odom;
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) {
+      stated_covariance_[i][j] = covariance_[i][j] = factor_[i][j] = covariance[i][j];
+    }
+  travelled_m_ = travelled_m;
+  turned_rad_ = turned_rad;
+  begun_ns_ = WM_TIME_NONE;
+  off_ = 0.0;
+  off_since_ns_ = WM_TIME_NONE;
+  surely_off_ = false;
+  open_ = factorize(3, factor_[0], 3);
+}
+
+void start_trial::weigh(const pose_search &clues, const lasting &sigma, const wm_pose2 &odom, double travelled_m,
+                        double turned_rad, wm_time_ns t_ns) {
+  if (begun_ns_ == WM_TIME_NONE) begun_ns_ = t_ns;
+  if (travelled_m - travelled_m_ > kWay_m || wm_seconds_between(begun_ns_, t_ns) > kTime_s) open_ = false;
+  if (!open_) return;
+  problem all{};
+  all.yaw_sigma_rad = sigma.yaw_rad;
+  for (int i = 0; i < clues.kept(); i++) {
+    const search_clue &c = clues.at(i);
+    if (!(c.kind & kClueBearing) || c.key < 0) continue;
+    bearing &b = all.bearings[all.count];
+    b.landmark = number_of(c.key / kMaxSensors, all.id, &all.landmarks, kMostLandmarks);
+    b.sensor_number = number_of(c.key % kMaxSensors, all.sensor_id, &all.sensors, kMostSensors);
+    if (b.landmark < 0 || b.sensor_number < 0) continue;
+    b.sensor = between(odom_, c.sensor);
+    const wm_pose2 from = compose(stated_, b.sensor);
+    const double distance_m2 = square(c.place_m[0] - from.x_m) + square(c.place_m[1] - from.y_m);
+    all.sigma_m[b.landmark] =
+        std::sqrt(square(c.sigma_place_m) + square(sigma.lateral_m) + square(sigma.bearing_rad) * distance_m2);
+    b.place_m[0] = c.place_m[0];
+    b.place_m[1] = c.place_m[1];
+    b.angle_rad = c.bearing_rad;
+    b.angle_variance = square(c.sigma_angle_rad) + square(kTurnError * (c.turned_rad - turned_rad_));
+    b.way_variance_m2 = square(kWayError * (c.travelled_m - travelled_m_));
+    all.count++;
+  }
+  if (all.count == 0) return;
+  double wide_factor[3][3];
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 3; c++)
+      wide_factor[r][c] = stated_covariance_[r][c] + (r != c ? 0.0 : r < 2 ? square(kOff_m) : square(kOff_rad));
+  if (!factorize(3, wide_factor[0], 3)) return;
+
+  const explanation right = explain(all, stated_, {factor_, -1});
+  const explanation off = explain(all, stated_, {wide_factor, -1});
+  if (!right.good || !off.good) return;
+  double of[2 + kMostLandmarks];
+  of[0] = right.log_likelihood;
+  of[1] = off.log_likelihood + log(kOff);
+  for (int k = 0; k < all.landmarks; k++) {
+    const explanation moved = explain(all, stated_, {factor_, k});
+    of[2 + k] = moved.good ? moved.log_likelihood + log(kMoved) : of[0] + log(kMoved);
+  }
+  double most = of[0], sum = 0.0;
+  for (int k = 1; k < 2 + all.landmarks; k++) most = of[k] > most ? of[k] : most;
+  for (int k = 0; k < 2 + all.landmarks; k++) sum += of[k] = exp(of[k] - most);
+  off_ = of[1] / sum;
+  const bool enough = all.landmarks >= kLandmarks && all.count >= kSightings;
+  const double far_m2 = square(off.start.x_m - stated_.x_m) + square(off.start.y_m - stated_.y_m);
+  const bool matters =
+      far_m2 > square(kMatters_m) || std::fabs(wrap(off.start.heading_rad - stated_.heading_rad)) > kMatters_rad;
+  // "Off", but at the same place.
+  if (!matters && off.start_covariance[0][0] + off.start_covariance[1][1] < square(kMatters_m)) off_ = 0.0;
+  const bool sure =
+      enough && matters && off_ > kSure && off.agreeing >= kAgreeing * all.count && off.log_likelihood > 0.0;
+  if (!sure) off_since_ns_ = WM_TIME_NONE;
+  if (sure && off_since_ns_ == WM_TIME_NONE) off_since_ns_ = t_ns;
+  surely_off_ = sure && wm_seconds_between(off_since_ns_, t_ns) > kLasts_s;
+
+  pose_ = compose(off.start, between(odom_, odom));
+  const double lever_x = pose_.x_m - off.start.x_m, lever_y = pose_.y_m - off.start.y_m;
+  const double j[3][3] = {{1, 0, -lever_y}, {0, 1, lever_x}, {0, 0, 1}};
+  const double way_m2 = square(kWayError * (travelled_m - travelled_m_));
+  const double turn_rad2 = square(kTurnError * (turned_rad - turned_rad_));
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 3; c++) {
+      covariance_[r][c] = r != c ? 0.0 : r < 2 ? way_m2 : turn_rad2;
+      for (int m = 0; m < 3; m++)
+        for (int n = 0; n < 3; n++) covariance_[r][c] += j[r][m] * off.start_covariance[m][n] * j[c][n];
+    }
+}
+
+}  // namespace wm
