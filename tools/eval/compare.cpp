@@ -17,7 +17,8 @@ double normalised_square(const Eigen::Matrix<double, N, 1> &error, const Eigen::
   if (!covariance.allFinite()) return kNan;
   const Eigen::LLT<Eigen::Matrix<double, N, N>> factor(covariance);
   if (factor.info() != Eigen::Success) return kNan;
-  Eigen::Matrix<double, N, 1> whitened = error;
+  Eigen::Matrix<double, N, 1> whitened;
+  whitened = error;
   factor.matrixL().solveInPlace(whitened);  // in one expression gcc 12 warns on 32-bit ARM of what isn't so
   return whitened.squaredNorm();
 }
