@@ -25,10 +25,11 @@ typedef struct thread_spec {
 
 extern const thread_spec kThreads[THREAD_ROLES];
 
-// Before the first thread of a library (LCM's): where memory is locked its stack is present as a whole, and 8 MB, the
-// system's, is more than it uses by far. All threads share one heap: each further one would reserve 64 MB of addresses,
-// which count as locked; the estimator's thread doesn't allocate.
-#define LIBRARY_STACK_BYTES ((size_t)512 << 10)
+// Before the first thread of a library (LCM's): its stack's addresses count as locked, touched or not, and of 8 MB, the
+// system's, it uses a small part. Less than 2 MB leaves no room beside what sanitizers keep there. All threads share
+// one heap: each further one would reserve 64 MB of addresses, which count, too; the estimator's thread doesn't
+// allocate.
+#define LIBRARY_STACK_BYTES ((size_t)2 << 20)
 void threads_of_libraries(void);
 
 // Health records wait in a ring of their own: they are large and rare.
