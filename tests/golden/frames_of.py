@@ -5,31 +5,15 @@ drive by this log looks at the same pictures and gives the same poses. A log of 
 import csv
 import json
 import math
-import os
 import pathlib
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
-BIN = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin"))
+from judged import ROOT, check, failures, run
+
 CONFIG = ROOT / "config/corridor.yaml"
-failures = []
-
-
-def check(good, text):
-    print(("  good  " if good else "  BAD   ") + text)
-    if not good:
-        failures.append(text)
-
-
-def run(program, *words, expect=0):
-    done = subprocess.run([BIN / program, *map(str, words)], capture_output=True, text=True)
-    if done.returncode != expect:
-        sys.exit(f"{program} {words}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout + done.stderr
 
 
 def simulate(folder, seed, seconds):
@@ -85,6 +69,6 @@ with tempfile.TemporaryDirectory() as temporary:
     check(worst < 1e-6, f"at most {worst:.9f} m apart")
     check(max(math.dist(p, all_of_them[t]) for t, p in a.items()) > 1e-4, "with all pictures they would be others")
     other = simulate(work, 2, 1)
-    said = run("waymark", "replay", other, "--config", CONFIG, "--frames-of", work / "lossy/events.wmlog", "--out", work / "x", expect=1)
+    said = run("waymark", "replay", other, "--config", CONFIG, "--frames-of", work / "lossy/events.wmlog", "--out", work / "x", expect=(1,))
     check("no motion in common" in said, "the log of another drive is refused")
 sys.exit(bool(failures))

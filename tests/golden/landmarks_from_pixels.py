@@ -5,30 +5,14 @@ truth, the judge finds few false ones; a landmark taught from one picture (`map 
 import csv
 import json
 import math
-import os
 import pathlib
-import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
-BIN = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin"))
+from judged import ROOT, check, failures, run
+
 CONFIG = ROOT / "config/crossing.yaml"
 RATE_HZ = 4
-failures = []
-
-
-def check(good, text):
-    print(("  good  " if good else "  BAD   ") + text)
-    if not good:
-        failures.append(text)
-
-
-def run(program, *words, expect=(0,)):
-    done = subprocess.run([BIN / program, *map(str, words)], capture_output=True, text=True)
-    if done.returncode not in expect:
-        sys.exit(f"{program} {words}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout + done.stderr
 
 
 def trajectory(folder):

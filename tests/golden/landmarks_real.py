@@ -7,11 +7,11 @@ usage: landmarks_real.py [SEEN.png], where the picture is drawn to."""
 import math
 import os
 import pathlib
-import subprocess
 import sys
 import tempfile
 
-BIN = pathlib.Path(os.environ.get("WM_BIN_DIR", "build/bin"))
+from judged import run
+
 PICTURES = pathlib.Path(os.environ.get("WM_DATA_DIR", "")) / "pictures/robocup-msl-fisheye"
 LEARNT, SEEN = "000014.jpg", "000027.jpg"
 CALIBRATION = """cameras:
@@ -35,13 +35,6 @@ LANDMARKS = {
 }
 
 
-def run(program, *words):
-    done = subprocess.run([BIN / program, *map(str, words)], capture_output=True, text=True)
-    if done.returncode not in (0, 1):
-        sys.exit(f"{program} {words}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout
-
-
 def main():
     if not (PICTURES / SEEN).exists():
         print(f"skipped: {PICTURES / SEEN} is not there (WM_DATA_DIR)")
@@ -55,7 +48,7 @@ def main():
                 "--camera", "front", "--corners", corners, "--at", at, "--size", size, "--yaw", yaw)
         drawn = sys.argv[1] if len(sys.argv) > 1 else folder / "seen.png"
         said = run("waymark-map", "look", folder / "map", "--picture", PICTURES / SEEN, "--calibration", calibration, "--camera", "front",
-                   "--mounting-deg", 1.5, "--draw", drawn)
+                   "--mounting-deg", 1.5, "--draw", drawn, expect=(0, 1))
     print(said)
     right = wrong = 0
     for line in said.splitlines():

@@ -5,31 +5,15 @@ its covariances; the filter is as good with that map as with the measured one; w
 says is named."""
 import csv
 import json
-import os
 import pathlib
 import shutil
-import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(os.environ.get("WM_SOURCE_DIR", ".")).resolve()
-BIN = pathlib.Path(os.environ.get("WM_BIN_DIR", ROOT / "build/bin"))
+from judged import ROOT, check, failures, run
+
 CONFIG = ROOT / "config/crossing-cameras.yaml"
 WORLD = ROOT / "config/worlds/crossing-drawn.yaml"
-failures = []
-
-
-def check(good, text):
-    print(("  good  " if good else "  BAD   ") + text)
-    if not good:
-        failures.append(text)
-
-
-def run(program, *words, expect=(0,)):
-    done = subprocess.run([BIN / program, *map(str, words)], capture_output=True, text=True)
-    if done.returncode not in expect:
-        sys.exit(f"{program} {words}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
-    return done.stdout
 
 
 def places(file):

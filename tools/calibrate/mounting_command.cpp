@@ -14,13 +14,13 @@
 
 #include "calibrate/commands.h"
 #include "calibrate/mounting.h"
+#include "common/event_log.h"
 #include "common/failure.h"
 #include "common/run_folder.h"
 #include "waymark/map.h"
 #include "waymark/motion.h"
 extern "C" {
 #include "waymark/config.h"
-#include "waymark/eventlog.h"
 }
 
 namespace wm::calibrate {
@@ -50,10 +50,6 @@ constexpr Kind kKinds[kMountingErrors] = {
     {"edge offset", "m", "walls on both sides", 1, 0.01, false},
     {"speed scale", "%", "a longer way", 100, 0.5, false},
     {"yaw rate bias", "mrad/s", "a longer drive", 1e3, 1, false}};
-
-struct Log_close {
-  void operator()(wm_log_reader *log) const { wm_log_reader_close(log); }
-};
 
 // `waymark replay` of the recording into a folder of its own, which is removed with this.
 class Replayed {
@@ -103,8 +99,8 @@ int choose_camera(const Arguments &a, const wm_rig &rig) {
 }
 
 // The run's scans with the poses that it gave them, and what the sensors alone said.
-std::vector<MountingScan> scans_of(wm_log_reader *log, int camera, const tools::Trajectory &trajectory) {
-  const wm_log_head &head = *wm_log_reader_head(log);
+std::vector<MountingScan> scans_of(tools::EventLog &log, int camera, const tools::Trajectory &trajectory) {
+  const wm_log_head &head = log.head();
   wm_error error{};
   wm_config config{};
   if (wm_config_parse_logged(head.config_text, head.config_length, head.config_path, &config, &error) != WM_OK)
@@ -114,11 +110,8 @@ std::vector<MountingScan> scans_of(wm_log_reader *log, int camera, const tools::
   auto *odometry = static_cast<wm_odometry *>(memory.get());
   if (wm_odometry_init(odometry, config.motion, &head.wheels) != WM_OK) throw Failure("no odometry from these sensors");
   std::vector<MountingScan> out;
-  wm_event event{};
-  uint64_t missing = 0;
-  int cut = 0;
-  for (wm_status s; (s = wm_log_next(log, &event, &missing, &cut, &error)) != WM_END;) {
-    if (s != WM_OK) throw Failure(error.text);
+  while (const wm_event *next = log.next()) {
+    const wm_event &event = *next;
     if (wm_event_is_motion(&event)) (void)wm_odometry_feed(odometry, &event);
     if (event.kind != WM_EVENT_POINTS || event.as.points.count < 8) continue;
     if (event.as.points.camera >= 0 && event.as.points.camera != camera) continue;
@@ -212,17 +205,15 @@ int run(const Arguments &a) {
   }
   const fs::path folder = replayed ? replayed->folder() : fs::path(a.run);
   wm_error error{};
-  wm_log_reader *opened = nullptr;
-  if (wm_log_open((folder / "events.wmlog").c_str(), &opened, &error) != WM_OK) throw Failure(error.text);
-  const std::unique_ptr<wm_log_reader, Log_close> log(opened);
+  tools::EventLog log(folder);
   const fs::path map_file = a.map.empty() ? fs::path(a.recording) / "map/map.yaml" : fs::path(a.map);
   wm_map *loaded = nullptr;
   if (wm_map_load(map_file.c_str(), nullptr, nullptr, &loaded, &error) != WM_OK)
     throw Failure(error.text, tools::kUsage);
   const std::unique_ptr<wm_map, void (*)(wm_map *)> map(loaded, wm_map_free);
-  const wm_rig &rig = wm_log_reader_head(log.get())->rig;
+  const wm_rig &rig = log.head().rig;
   const int camera = choose_camera(a, rig);
-  const std::vector<MountingScan> scans = scans_of(log.get(), camera, tools::load_trajectory(folder));
+  const std::vector<MountingScan> scans = scans_of(log, camera, tools::load_trajectory(folder));
   return report(find_mounting(scans, *wm_map_raster(map.get()), rig.cameras[camera]), rig.cameras[camera]);
 }
 

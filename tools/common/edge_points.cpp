@@ -2,30 +2,17 @@
 #include "common/edge_points.h"
 
 #include <algorithm>
-#include <memory>
 
 #include "common/csv.h"
-#include "common/failure.h"
-extern "C" {
-#include "waymark/eventlog.h"
-}
+#include "common/event_log.h"
 
 namespace wm::tools {
 
 std::vector<EdgePoints> load_edge_points(const std::filesystem::path &run) {
-  wm_error error{};
-  wm_log_reader *opened = nullptr;
-  const wm_status status = wm_log_open((run / "events.wmlog").c_str(), &opened, &error);
-  const std::unique_ptr<wm_log_reader, void (*)(wm_log_reader *)> log(opened, wm_log_reader_close);
-  if (status != WM_OK) throw Failure(error.text);
+  EventLog log(run);
   std::vector<EdgePoints> out;
-  wm_event event{};
-  uint64_t missing = 0;
-  int cut = 0;
-  for (;;) {
-    const wm_status next = wm_log_next(log.get(), &event, &missing, &cut, &error);
-    if (next == WM_END) return out;
-    if (next != WM_OK) throw Failure(error.text);
+  while (const wm_event *next = log.next()) {
+    const wm_event &event = *next;
     if (event.kind != WM_EVENT_POINTS) continue;
     const wm_points &points = event.as.points;
     EdgePoints one{event.t_ns, points.camera, {}, {}};
@@ -35,6 +22,7 @@ std::vector<EdgePoints> load_edge_points(const std::filesystem::path &run) {
     }
     out.push_back(std::move(one));
   }
+  return out;
 }
 
 std::vector<std::vector<Eigen::Vector2d>> picture_polylines(const EdgePoints &points, const render::Camera &camera,

@@ -5,10 +5,8 @@
 #include <cmath>
 #include <memory>
 
+#include "common/event_log.h"
 #include "common/failure.h"
-extern "C" {
-#include "waymark/eventlog.h"
-}
 
 namespace wm::tools {
 namespace {
@@ -34,11 +32,8 @@ double azimuth_of(double bearing_rad, const wm_mounting &mounting) {
 
 LineSightings load_line_sightings(const std::filesystem::path &run, const std::string &name, wm_camera *camera) {
   const std::filesystem::path file = run / "events.wmlog";
-  wm_error error{};
-  wm_log_reader *opened = nullptr;
-  if (wm_log_open(file.c_str(), &opened, &error) != WM_OK) throw Failure(error.text);
-  const std::unique_ptr<wm_log_reader, void (*)(wm_log_reader *)> log(opened, wm_log_reader_close);
-  const wm_log_head &head = *wm_log_reader_head(log.get());
+  EventLog log(run);
+  const wm_log_head &head = log.head();
   const int index = wm_rig_find_camera(&head.rig, name.c_str());
   size_t sensor = 0;
   while (sensor < head.sensor_count && name != head.sensors[sensor].name) sensor++;
@@ -46,13 +41,8 @@ LineSightings load_line_sightings(const std::filesystem::path &run, const std::s
     throw Failure(file.string() + ": the camera '" + name + "' saw no upright lines (`vision: {lines: {}}`)");
   *camera = head.rig.cameras[index];
   LineSightings out;
-  wm_event event{};
-  uint64_t missing = 0;
-  int cut = 0;
-  for (;;) {
-    const wm_status next = wm_log_next(log.get(), &event, &missing, &cut, &error);
-    if (next == WM_END) return out;
-    if (next != WM_OK) throw Failure(error.text);
+  while (const wm_event *next = log.next()) {
+    const wm_event &event = *next;
     if (event.kind == WM_EVENT_LOOKED && event.as.looked.sensor == sensor) (void)out[event.t_ns];
     if (event.kind != WM_EVENT_SIGHTING || event.as.sighting.sensor != sensor ||
         !std::isfinite(event.as.sighting.bearing_rad) || std::isfinite(event.as.sighting.range_m))
@@ -61,6 +51,7 @@ LineSightings load_line_sightings(const std::filesystem::path &run, const std::s
     out[event.t_ns].push_back(
         {s.landmark_id, azimuth_of(s.bearing_rad, head.sensors[sensor].mounting), s.bearing_sigma_rad});
   }
+  return out;
 }
 
 }  // namespace wm::tools

@@ -10,12 +10,10 @@
 #include "common/cameras.h"
 #include "common/csv.h"
 #include "common/edge_points.h"
+#include "common/event_log.h"
 #include "common/failure.h"
 #include "common/recording_folder.h"
 #include "common/statistics.h"
-extern "C" {
-#include "waymark/eventlog.h"
-}
 
 namespace wm::tools {
 namespace {
@@ -51,27 +49,20 @@ double bearing_of(const Vector3d &optical) { return std::atan2(-optical.x(), opt
 // What the sensor of the camera's name said, by stamp.
 std::map<int64_t, std::vector<Seen>> load_seen(const fs::path &run, const std::string &camera) {
   const fs::path file = run / "events.wmlog";
-  wm_error error{};
-  wm_log_reader *opened = nullptr;
-  if (wm_log_open(file.c_str(), &opened, &error) != WM_OK) throw Failure(error.text);
-  const std::unique_ptr<wm_log_reader, void (*)(wm_log_reader *)> log(opened, wm_log_reader_close);
-  const wm_log_head &head = *wm_log_reader_head(log.get());
+  EventLog log(run);
+  const wm_log_head &head = log.head();
   size_t sensor = 0;
   while (sensor < head.sensor_count && camera != head.sensors[sensor].name) sensor++;
   if (sensor == head.sensor_count) throw Failure(file.string() + ": the camera '" + camera + "' saw no landmarks");
   std::map<int64_t, std::vector<Seen>> out;
-  wm_event event{};
-  uint64_t missing = 0;
-  int cut = 0;
-  for (;;) {
-    const wm_status next = wm_log_next(log.get(), &event, &missing, &cut, &error);
-    if (next == WM_END) return out;
-    if (next != WM_OK) throw Failure(error.text);
+  while (const wm_event *next = log.next()) {
+    const wm_event &event = *next;
     if (event.kind == WM_EVENT_SIGHTING && event.as.sighting.sensor == sensor &&
         std::isfinite(event.as.sighting.bearing_rad))
       out[event.t_ns].push_back(
           {event.as.sighting.landmark_id, event.as.sighting.bearing_rad, event.as.sighting.bearing_sigma_rad});
   }
+  return out;
 }
 
 std::map<int64_t, Panel> load_panels(const fs::path &recording) {

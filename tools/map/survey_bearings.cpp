@@ -9,12 +9,10 @@
 #include <memory>
 
 #include "common/csv.h"
+#include "common/event_log.h"
 #include "common/failure.h"
 #include "common/recording_folder.h"
 #include "common/statistics.h"
-extern "C" {
-#include "waymark/eventlog.h"
-}
 
 namespace wm::tools {
 namespace {
@@ -49,11 +47,8 @@ std::vector<Pose> load_poses(const fs::path &folder) {
 }
 
 Drive load_drive(const fs::path &run, const std::vector<Pose> &poses) {
-  wm_error error{};
-  wm_log_reader *opened = nullptr;
-  if (wm_log_open((run / "events.wmlog").c_str(), &opened, &error) != WM_OK) throw Failure(error.text);
-  const std::unique_ptr<wm_log_reader, void (*)(wm_log_reader *)> log(opened, wm_log_reader_close);
-  const wm_log_head &head = *wm_log_reader_head(log.get());
+  EventLog log(run);
+  const wm_log_head &head = log.head();
   Drive out;
   for (size_t i = 0; i < head.sensor_count; i++) {
     const wm_mounting &m = head.sensors[i].mounting;
@@ -61,13 +56,8 @@ Drive load_drive(const fs::path &run, const std::vector<Pose> &poses) {
   }
   for (size_t i = 0; i < head.landmark_count; i++) out.map[head.landmarks[i].id] = head.landmarks[i];
   std::map<int64_t, size_t> numbers;
-  wm_event event{};
-  uint64_t missing = 0;
-  int cut = 0;
-  for (;;) {
-    const wm_status next = wm_log_next(log.get(), &event, &missing, &cut, &error);
-    if (next == WM_END) break;
-    if (next != WM_OK) throw Failure(error.text);
+  while (const wm_event *next = log.next()) {
+    const wm_event &event = *next;
     const wm_sighting &s = event.as.sighting;
     if (event.kind != WM_EVENT_SIGHTING || s.landmark_id < 0 || !std::isfinite(s.bearing_rad) ||
         s.sensor >= out.sensors.size())

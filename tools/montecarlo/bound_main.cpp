@@ -10,12 +10,10 @@
 #include <nlohmann/json.hpp>
 
 #include "common/csv.h"
+#include "common/event_log.h"
 #include "common/failure.h"
 #include "common/recording_folder.h"
 #include "montecarlo/bound.h"
-extern "C" {
-#include "waymark/eventlog.h"
-}
 
 namespace {
 
@@ -82,21 +80,13 @@ std::map<int64_t, Eigen::Vector2d> load_places(const std::filesystem::path &file
 
 Found load_found(const std::filesystem::path &run, const std::filesystem::path &recording, int64_t begin_ns) {
   const std::map<int64_t, Eigen::Vector2d> places = load_places(recording / "truth-landmarks.csv");
-  wm_error error{};
-  wm_log_reader *opened = nullptr;
-  if (wm_log_open((run / "events.wmlog").c_str(), &opened, &error) != WM_OK) throw Failure(error.text);
-  const std::unique_ptr<wm_log_reader, void (*)(wm_log_reader *)> log(opened, wm_log_reader_close);
-  const wm_log_head &head = *wm_log_reader_head(log.get());
+  wm::tools::EventLog log(run);
+  const wm_log_head &head = log.head();
   std::map<int64_t, size_t> numbers;
   Found out;
   out.cameras = head.sensor_count;
-  wm_event event{};
-  uint64_t missing = 0;
-  int cut = 0;
-  for (;;) {
-    const wm_status next = wm_log_next(log.get(), &event, &missing, &cut, &error);
-    if (next == WM_END) break;
-    if (next != WM_OK) throw Failure(error.text);
+  while (const wm_event *next = log.next()) {
+    const wm_event &event = *next;
     const wm_sighting &seen = event.as.sighting;
     if (event.kind != WM_EVENT_SIGHTING || !std::isfinite(seen.bearing_sigma_rad) || seen.sensor >= head.sensor_count)
       continue;

@@ -22,22 +22,16 @@ wm_pose2 composed(const wm_pose2 &a, const wm_pose2 &way) {
 }
 
 EdgeDrive::EdgeDrive(const std::filesystem::path &folder)
-    : name_(folder.filename()), log_(nullptr, wm_log_reader_close), map_(nullptr, wm_map_free) {
+    : name_(folder.filename()), log_(folder), map_(nullptr, wm_map_free) {
   wm_error error{};
-  wm_log_reader *log = nullptr;
-  if (wm_log_open((folder / "events.wmlog").c_str(), &log, &error) != WM_OK) throw tools::Failure(error.text);
-  log_.reset(log);
   wm_map *map = nullptr;
   if (wm_map_load((folder / "map/map.yaml").c_str(), nullptr, nullptr, &map, &error) != WM_OK)
     throw tools::Failure(error.text);
   map_.reset(map);
   if (map_ && wm_map_raster(map)->edges == nullptr) throw tools::Failure(folder.string() + ": map has no edges");
 
-  wm_event event{};
-  uint64_t missing = 0;
-  int cut = 0;
-  for (wm_status s; (s = wm_log_next(log, &event, &missing, &cut, &error)) != WM_END;) {
-    if (s != WM_OK) throw tools::Failure(error.text);
+  while (const wm_event *next = log_.next()) {
+    const wm_event &event = *next;
     offsets_.push_back(bytes_.size());
     const auto *from = reinterpret_cast<const unsigned char *>(&event);
     bytes_.insert(bytes_.end(), from, from + wm_event_bytes(&event));
@@ -45,7 +39,7 @@ EdgeDrive::EdgeDrive(const std::filesystem::path &folder)
     end_ns_ = event.t_ns;
     if (event.kind == WM_EVENT_POINTS && event.as.points.count >= 8) scans_ns_.push_back(event.t_ns);
   }
-  if (missing > 0 || cut != 0 || scans_ns_.empty())
+  if (!log_.is_whole() || scans_ns_.empty())
     throw tools::Failure(folder.string() + "/events.wmlog: cut short, or without edge points; render the drive again");
 
   truth_ = tools::load_truth(folder);

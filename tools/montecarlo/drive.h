@@ -8,13 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "common/event_log.h"
 #include "common/pose.h"
 #include "waymark/event.h"
 #include "waymark/frames.h"
 #include "waymark/map.h"
-extern "C" {
-#include "waymark/eventlog.h"
-}
 
 namespace wm::montecarlo {
 
@@ -24,7 +22,7 @@ class EdgeDrive {
   explicit EdgeDrive(const std::filesystem::path &folder);
 
   [[nodiscard]] const std::string &name() const { return name_; }
-  [[nodiscard]] const wm_log_head &head() const { return *wm_log_reader_head(log_.get()); }
+  [[nodiscard]] const wm_log_head &head() const { return log_.head(); }
   [[nodiscard]] const wm_raster &map() const { return *wm_map_raster(map_.get()); }
   // Stamps of the first and the last event.
   [[nodiscard]] int64_t begin_ns() const { return begin_ns_; }
@@ -42,7 +40,7 @@ class EdgeDrive {
 
  private:
   std::string name_;
-  std::unique_ptr<wm_log_reader, void (*)(wm_log_reader *)> log_;
+  tools::EventLog log_;
   std::unique_ptr<wm_map, void (*)(wm_map *)> map_;
   int64_t begin_ns_ = 0, end_ns_ = 0;
   std::vector<unsigned char> bytes_;  // of the events, as many of each as carry something
