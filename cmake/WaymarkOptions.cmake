@@ -62,6 +62,12 @@ macro(wm_timeout variable usual)
   endif()
 endmacro()
 
+# What each test finds in its environment. In an emulator, tests of many random trials take an eighth of them (tests/common/trials.h).
+set(WM_TEST_ENVIRONMENT "WM_SOURCE_DIR=${CMAKE_SOURCE_DIR};WM_BIN_DIR=${CMAKE_BINARY_DIR}/bin;WM_DATA_DIR=${CMAKE_SOURCE_DIR}/../shared/data")
+if(CMAKE_CROSSCOMPILING)
+  list(APPEND WM_TEST_ENVIRONMENT WM_FEWER=8)
+endif()
+
 # wm_test(NAME SOURCES x.c USES lib ... [LABELS slow] [TIMEOUT s]): a Unity test program, run by ctest.
 # Label "slow" keeps it out of `./dev test` and in `./dev test --all`. A test gets the repository's root in WM_SOURCE_DIR and the
 # folder of the optional recordings in WM_DATA_DIR.
@@ -76,7 +82,7 @@ function(wm_test name)
     add_dependencies(wm_thread_tests ${name})
   endif()
   set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}" SKIP_RETURN_CODE 77
-    ENVIRONMENT "WM_SOURCE_DIR=${CMAKE_SOURCE_DIR};WM_BIN_DIR=${CMAKE_BINARY_DIR}/bin;WM_DATA_DIR=${CMAKE_SOURCE_DIR}/../shared/data")
+    ENVIRONMENT "${WM_TEST_ENVIRONMENT}")
 endfunction()
 
 # wm_script_test(NAME COMMAND ... [LABELS slow] [TIMEOUT s]): a test that is a script; exit code 77 means skipped.
@@ -85,7 +91,7 @@ function(wm_script_test name)
   add_test(NAME ${name} COMMAND ${A_COMMAND} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
   wm_timeout(A_TIMEOUT 300)
   set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}" SKIP_RETURN_CODE 77
-    ENVIRONMENT "WM_SOURCE_DIR=${CMAKE_SOURCE_DIR};WM_BIN_DIR=${CMAKE_BINARY_DIR}/bin;WM_DATA_DIR=${CMAKE_SOURCE_DIR}/../shared/data")
+    ENVIRONMENT "${WM_TEST_ENVIRONMENT}")
 endfunction()
 
 # wm_fuzz(NAME SOURCES x.c USES lib ... [CORPUS dir]): a libFuzzer target; with WM_FUZZ only.

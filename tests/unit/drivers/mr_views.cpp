@@ -12,6 +12,7 @@
 #include <memory>
 
 #include "common/marker_views.hpp"
+#include "common/trials.h"
 #include "unity.h"
 #include "waymark/detectors.h"
 #include "waymark/mr_code.h"
@@ -173,6 +174,7 @@ void tearDown() {}
 
 int main(int argc, char **argv) {
   if (argc > 1) views = std::strtoull(argv[1], nullptr, 10);
+  views = wm_trials(views, 6);
   UNITY_BEGIN();
   RUN_TEST(codes_are_found_and_none_is_false);
   return UNITY_END();

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <string>
 
+#include "common/trials.h"
 #include "montecarlo/montecarlo.h"
 #include "simulate/angle.h"
 
@@ -135,6 +136,7 @@ void test_loops_among_markers() {
 
 int main(int argc, char **argv) {
   if (argc > 1) seeds = std::strtoull(argv[1], nullptr, 10);
+  seeds = wm_trials(seeds, 6);
   UNITY_BEGIN();
   RUN_TEST(test_odometry_alone);
   RUN_TEST(test_no_landmark_is_odometry);

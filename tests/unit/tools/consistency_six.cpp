@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <string>
 
+#include "common/trials.h"
 #include "montecarlo/montecarlo.h"
 
 extern "C" {
@@ -110,6 +111,7 @@ void test_pictures_gone_for_20_s(void) {
 int main(int argc, char **argv) {
   if (argc > 1) points_seeds = std::strtoull(argv[1], nullptr, 10);
   if (argc > 2) slam_seeds = std::strtoull(argv[2], nullptr, 10);
+  points_seeds = wm_trials(points_seeds, 1);
   UNITY_BEGIN();
   RUN_TEST(test_known_points_from_a_start_20_m_wrong);
   RUN_TEST(test_four_points_a_picture_suffice);

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 
+#include "common/trials.h"
 #include "simulate/route.h"
 #include "simulate/worlds/corridor.h"
 #include "simulate/worlds/path6.h"
@@ -38,7 +39,8 @@ Drive drive_of(const CorridorDrawing &drawn) {
 
 void corridor_ways_keep_clear_of_walls() {
   double least = 1e9, shortest = 1e9, longest = 0;
-  for (uint64_t seed = 1; seed <= 50; seed++) {
+  const uint64_t seeds = wm_trials(50, 4);
+  for (uint64_t seed = 1; seed <= seeds; seed++) {
     const CorridorDrawing drawn = draw_corridor(seed, seed % 2 == 0);
     const Drive drive = drive_of(drawn);
     double backwards_m = 0, backwards_longest_m = 0, stretch_m = 0;
@@ -58,13 +60,15 @@ void corridor_ways_keep_clear_of_walls() {
     shortest = std::min(shortest, drive.length_m());
     longest = std::max(longest, drive.length_m());
   }
-  std::printf("50 corridors: least gap %.3f m, ways of %.0f to %.0f m\n", least, shortest, longest);
+  std::printf("%d corridors: least gap %.3f m, ways of %.0f to %.0f m\n", static_cast<int>(seeds), least, shortest,
+              longest);
 }
 
 void room_ways_keep_clear_of_furniture() {
   constexpr Footprint round{0.28, -0.28, 0.25};
   double least[2] = {1e9, 1e9};
-  for (uint64_t seed = 1; seed <= 50; seed++)
+  const uint64_t seeds = wm_trials(50, 4);
+  for (uint64_t seed = 1; seed <= seeds; seed++)
     for (int hall = 0; hall < 2; hall++) {
       RoomDrawing drawn;
       Drive drive;
@@ -81,11 +85,12 @@ void room_ways_keep_clear_of_furniture() {
       TEST_ASSERT_DOUBLE_WITHIN(1e-6, begin.x_m, end.x_m);  // loops close
       TEST_ASSERT_DOUBLE_WITHIN(1e-6, begin.y_m, end.y_m);
     }
-  std::printf("50 offices: least gap %.3f m; 50 halls: %.3f m\n", least[0], least[1]);
+  std::printf("%d offices: least gap %.3f m; as many halls: %.3f m\n", static_cast<int>(seeds), least[0], least[1]);
 }
 
 void corridors_are_connected() {
-  for (uint64_t seed = 1; seed <= 20; seed++) {
+  const uint64_t seeds = wm_trials(20, 4);
+  for (uint64_t seed = 1; seed <= seeds; seed++) {
     const CorridorDrawing drawn = draw_corridor(seed, false);
     // Flood the free floor on a grid of 0.25 m from the start.
     const Rectangle b = drawn.plan.bounds();
