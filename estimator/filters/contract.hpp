@@ -5,7 +5,7 @@
 //   &); wm_status predict(const wm_event &);   wm_status correct(const wm_event &, record_list); void
 //   estimate(wm_estimate *) const;   wm_motion_calibration motion_calibration() const; uint32_t motion_health() const;
 //   size_t list_calibration(wm_calibration_value *, size_t) const;
-// and, if it has a map or particles of its own, list_landmarks() or list_particles().
+// and, if it has a map or particles of its own, list_landmarks(), list_particles() or list_hypotheses().
 #ifndef WAYMARK_ESTIMATOR_CONTRACT_HPP
 #define WAYMARK_ESTIMATOR_CONTRACT_HPP
 
@@ -51,6 +51,10 @@ wm_estimator estimator_of(const char *name, const char *about, uint32_t takes, w
   if constexpr (requires(const filter &f) { f.list_particles(nullptr, 0); })
     e.particles = [](const void *state, wm_particle *out, size_t capacity) {
       return static_cast<const filter *>(state)->list_particles(out, capacity);
+    };
+  if constexpr (requires(const filter &f) { f.list_hypotheses(nullptr, 0); })
+    e.hypotheses = [](const void *state, wm_hypothesis *out, size_t capacity) {
+      return static_cast<const filter *>(state)->list_hypotheses(out, capacity);
     };
   return e;
 }

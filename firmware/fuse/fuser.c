@@ -96,9 +96,20 @@ static wm_status correct(wm_fuser *self, const wm_event *event) {
   return WM_OK;
 }
 
+static void write_hypotheses(wm_fuser *self, wm_time_ns t_ns) {
+  const wm_estimator *e = self->estimator;
+  if (!e->hypotheses) return;
+  wm_hypothesis_set *set = &self->hypotheses;
+  set->t_ns = t_ns;
+  set->total = (uint32_t)e->hypotheses(self->state, set->places, WM_HYPOTHESES_MAX);
+  set->count = set->total < WM_HYPOTHESES_MAX ? set->total : WM_HYPOTHESES_MAX;
+  self->output.put(self->output.context, WM_OUTPUT_HYPOTHESES, set, sizeof *set);
+}
+
 // Records have the size of the largest event, so who takes no points has no room for them.
 static void write_particles(wm_fuser *self, const wm_event *event) {
-  _Static_assert(sizeof(wm_particle_set) <= sizeof(wm_event), "a set fits where an event of points does");
+  _Static_assert(sizeof(wm_particle_set) <= sizeof(wm_event) && sizeof(wm_hypothesis_set) <= sizeof(wm_event),
+                 "a set fits where an event of points does");
   const wm_estimator *e = self->estimator;
   if (!e->particles || event->kind != WM_EVENT_POINTS) return;
   if (self->particles_ns != WM_TIME_NONE && event->t_ns - self->particles_ns < PARTICLES_EVERY_NS) return;
@@ -108,6 +119,7 @@ static void write_particles(wm_fuser *self, const wm_event *event) {
   set->total = (uint32_t)e->particles(self->state, set->particles, WM_PARTICLES_MAX);
   set->count = set->total < WM_PARTICLES_MAX ? set->total : WM_PARTICLES_MAX;
   self->output.put(self->output.context, WM_OUTPUT_PARTICLES, set, sizeof *set);
+  write_hypotheses(self, event->t_ns);
 }
 
 void wm_fuser_feed(wm_fuser *self, const wm_event *event) {

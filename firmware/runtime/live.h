@@ -90,6 +90,7 @@ typedef struct output_record {
     wm_innovation innovation;
     wm_published published;
     wm_particle_set particles;
+    wm_hypothesis_set hypotheses;
     uint64_t gap;
   } as;
 } output_record;

@@ -17,9 +17,9 @@ typedef struct table {
   char buffer[1 << 16];
 } table;
 
-enum { TRAJECTORY_TUM, TRAJECTORY, PUBLISHED, INNOVATIONS, PARTICLES, TABLE_COUNT };
-static const char *const kTables[TABLE_COUNT] = {"trajectory.tum", "trajectory.csv", "published.csv", "innovations.csv",
-                                                 "particles.csv"};
+enum { TRAJECTORY_TUM, TRAJECTORY, PUBLISHED, INNOVATIONS, PARTICLES, HYPOTHESES, TABLE_COUNT };
+static const char *const kTables[TABLE_COUNT] = {"trajectory.tum",  "trajectory.csv", "published.csv",
+                                                 "innovations.csv", "particles.csv",  "hypotheses.csv"};
 
 struct wm_run_folder {
   char dir[WM_PATH_MAX];
@@ -191,6 +191,21 @@ static void particles(wm_run_folder *self, const wm_particle_set *set) {
   }
 }
 
+static void hypotheses(wm_run_folder *self, const wm_hypothesis_set *set) {
+  for (uint32_t i = 0; i < set->count; i++) {
+    const wm_hypothesis *h = &set->places[i];
+    const double *c = h->covariance;
+    const double numbers[10] = {h->x_m, h->y_m, h->heading_rad, c[0], c[1], c[2], c[3], c[4], c[5], h->weight};
+    wm_row *line = begin(self);
+    wm_row_int(line, set->t_ns);
+    for (int k = 0; k < 10; k++) {
+      wm_row_char(line, ',');
+      wm_row_short(line, numbers[k]);
+    }
+    end(self, HYPOTHESES);
+  }
+}
+
 static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
   (void)bytes;
   wm_run_folder *self = context;
@@ -200,6 +215,7 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
     case WM_OUTPUT_INNOVATION: innovation(self, record); break;
     case WM_OUTPUT_PUBLISHED: published(self, record); break;
     case WM_OUTPUT_PARTICLES: particles(self, record); break;
+    case WM_OUTPUT_HYPOTHESES: hypotheses(self, record); break;
     case WM_OUTPUT_HEALTH: break;  // written once, at the end
   }
 }
@@ -232,6 +248,7 @@ static wm_status make_dir(const char *dir, wm_error *err) {
 static wm_status open_table(wm_run_folder *self, int which, wm_error *err) {
   table *t = &self->tables[which];
   if (which == PARTICLES && !self->assembly->config->estimator->particles) return WM_OK;
+  if (which == HYPOTHESES && !self->assembly->config->estimator->hypotheses) return WM_OK;
   (void)snprintf(t->path, sizeof t->path, "%s/%s", self->dir, kTables[which]);
   t->file = fopen(t->path, "we");
   if (!t->file) return wm_fail(err, WM_IO, "%s: can't be written: %s", t->path, strerror(errno));
@@ -262,6 +279,10 @@ wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_ru
   if (self->tables[PARTICLES].file) {
     wm_row_text(begin(self), "t_ns,x_m,y_m,heading_rad,weight");
     end(self, PARTICLES);
+  }
+  if (self->tables[HYPOTHESES].file) {
+    wm_row_text(begin(self), "t_ns,x_m,y_m,heading_rad,cov_xx,cov_xy,cov_yy,cov_xt,cov_yt,cov_tt,weight");
+    end(self, HYPOTHESES);
   }
   *out = self;
   return WM_OK;

@@ -116,6 +116,13 @@ static void print_left(const wm_health *h, FILE *to) {
                                     : fprintf(to, ", %.0f s at this speed\n", h->reckoning_left_s));
 }
 
+// Places that look the same are no trouble, but who has just set the robot down wants to know.
+static void print_places(const wm_health *h, FILE *to) {
+  for (uint32_t i = 0; i < h->calibration_count; i++)
+    if (strcmp(h->calibration[i].name, "edges.alike") == 0 && h->calibration[i].value > 0)
+      (void)fprintf(to, "alike      %.0f other places look the same\n", h->calibration[i].value);
+}
+
 void watch_print(const watch *self, wm_time_ns now_ns, FILE *to) {
   char why[240];
   const char *state = watch_state(self, now_ns, why, sizeof why);
@@ -125,6 +132,7 @@ void watch_print(const watch *self, wm_time_ns now_ns, FILE *to) {
     (void)fprintf(to, "consistency %s (mean squared innovation %.2f of its variance)\n", watch_consistency(self),
                   self->nis);
   if (self->has_health) {
+    print_places(&self->health, to);
     print_left(&self->health, to);
     (void)fprintf(to, "deadlines  %" PRIu64 " of %" PRIu64 " missed\nsources\n", self->health.deadlines_missed,
                   self->health.loops + self->health.deadlines_missed);

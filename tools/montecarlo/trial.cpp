@@ -84,6 +84,20 @@ class Filter {
     return sum;
   }
 
+  // Whether a place that is listed beside the estimate holds the truth within its own covariance's 95 %.
+  [[nodiscard]] bool listed(const wm_pose2 &truth) const {
+    if (ops_.hypotheses == nullptr) return false;
+    std::vector<wm_hypothesis> all(ops_.hypotheses(memory_.get(), nullptr, 0));
+    ops_.hypotheses(memory_.get(), all.data(), all.size());
+    return std::any_of(all.begin(), all.end(), [&truth](const wm_hypothesis &h) {
+      const Eigen::Vector3d off(truth.x_m - h.x_m, truth.y_m - h.y_m, tools::wrap(truth.heading_rad - h.heading_rad));
+      const double *c = h.covariance;
+      Eigen::Matrix3d covariance;
+      covariance << c[0], c[1], c[3], c[1], c[2], c[4], c[3], c[4], c[5];
+      return off.dot(covariance.ldlt().solve(off)) < tools::chi2_quantile(0.95, 3);
+    });
+  }
+
   struct alignas(64) Block {
     char bytes[64];
   };
@@ -110,7 +124,7 @@ Sample Filter::look(const wm_pose2 &truth, const wm_estimate &e) const {
   s.explained = calibration("edges.explained");
   s.points = points_;
   // A cluster is a hypothesis from a hundredth of the weight on.
-  s.covered = s.nees < tools::chi2_quantile(0.95, 3) || weight_about(truth) > 0.01;
+  s.covered = s.nees < tools::chi2_quantile(0.95, 3) || weight_about(truth) > 0.01 || listed(truth);
   return s;
 }
 

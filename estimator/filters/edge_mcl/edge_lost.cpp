@@ -132,6 +132,17 @@ void edge_mcl::heed_cloud() {
   resets_++;
 }
 
+// Which places look as the one that is tracked? Without doubt the search leaves most of a scan's work: half of it is
+// theirs. In doubt they are only carried on.
+void edge_mcl::look_for_lookalikes(double dt_s) {
+  const double way = filter_.travelled_m() - alike_m_;
+  alike_m_ += way;
+  alike_.carry(filter_.odom());
+  const bool sure = state_ == WM_STATE_TRACKING && !in_doubt_;
+  alike_.look(map_, search_.field(), lined_, filter_.pose(), way, sure ? params_.lost_per_s * dt_s : 0.0,
+              sure ? params_.search_poses / 2 : 0);
+}
+
 // Where else could it be? Sweeps over the map bring places, at leisure while there is no doubt; what the last metres
 // say of each decides.
 void edge_mcl::ponder(bool new_keyframe) {

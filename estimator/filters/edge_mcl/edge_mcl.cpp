@@ -16,6 +16,7 @@ constexpr double kNewView_m = 0.4;
 constexpr double kFarthest_m = 1000.0;
 constexpr double kSilent_s = 1.0;  // between two messages of the motion sensors, after which the way is unknown
 constexpr double kCluster_m = 0.5, kCluster_rad = 0.35;
+constexpr double kFoundCovariance[6] = {0.02, 0.0, 0.02, 0.0, 0.0, 0.0018};  // of a place that the search found
 constexpr size_t kAlign = 64;
 
 constexpr size_t aligned(size_t bytes) { return (bytes + kAlign - 1) & ~(kAlign - 1); }
@@ -70,6 +71,7 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   behind += aligned(edge_map::bytes(*setup.map));
   field_.init(map_, table_, behind);
   search_.init(map_, behind + aligned(score_field::bytes(*setup.map)));
+  alike_.init(map_);
   usual_ = params.lost_explained;
   fused_ns_ = watched_ns_ = remembered_ns_ = driven_ns_ = WM_TIME_NONE;
   remember_calibration();
@@ -93,6 +95,8 @@ void edge_mcl::start_again(bool known) {
   explained_ = params_.lost_explained;
   apart_s_ = 0.0;
   others_.clear(filter_.pose(), filter_.odom());
+  alike_.clear(filter_.odom());
+  alike_m_ = filter_.travelled_m();
   watched_m_ = filter_.travelled_m() + filter_.turned_rad();
   in_doubt_ = !known;
   on_trial_ = false;
@@ -160,6 +164,7 @@ wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
   const bool new_keyframe = search_.see(lined_, filter_.odom());
   if (state_ == WM_STATE_TRACKING) heed_cloud();
   ponder(new_keyframe);
+  look_for_lookalikes(dt);
   records.add(record);
   return WM_OK;
 }
@@ -284,6 +289,7 @@ size_t edge_mcl::list_calibration(wm_calibration_value *out, size_t capacity) co
     list.add("edges", "offset_m", filter_.value(edge_state_), std::sqrt(filter_.variance(edge_state_)));
   list.add("edges", "explained", explained_, 0.0);
   list.add("edges", "lost_probability", 1.0 / (1.0 + exp(-lost_odds_)), 0.0);
+  list.add("edges", "alike", (double)alike_.count(), 0.0);
   return list.count();
 }
 
@@ -291,6 +297,23 @@ size_t edge_mcl::list_particles(wm_particle *out, size_t capacity) const {
   const size_t count = (size_t)cloud_.count();
   for (size_t i = 0; i < count && i < capacity; i++)
     out[i] = {cloud_.x((int)i), cloud_.y((int)i), cloud_.heading((int)i), cloud_.weight((int)i)};
+  return count;
+}
+
+// Of what speaks for the filter's own place, those that look the same have their part.
+size_t edge_mcl::list_hypotheses(wm_hypothesis *out, size_t capacity) const {
+  const wm_pose2 since = between(cloud_odom_, filter_.odom());
+  size_t count = 0;
+  const auto list = [&](const wm_pose2 &at, const double(&covariance)[6], double weight) {
+    if (count++ >= capacity) return;
+    const wm_pose2 pose = compose(at, since);
+    out[count - 1] = {pose.x_m, pose.y_m, pose.heading_rad, {}, weight};
+    for (int k = 0; k < 6; k++) out[count - 1].covariance[k] = covariance[k];
+  };
+  for (int i = 1; i < others_.count(); i++)
+    if (others_[i].weighed) list(others_[i].pose, kFoundCovariance, others_[i].share);
+  const double each = others_[0].share / (1.0 + alike_.odds());
+  for (int i = 0; i < alike_.count(); i++) list(alike_[i].pose, alike_[i].covariance, each * alike_[i].weight);
   return count;
 }
 

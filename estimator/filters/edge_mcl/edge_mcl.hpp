@@ -8,6 +8,7 @@
 #include "filters/edge_mcl/align.hpp"
 #include "filters/edge_mcl/cloud.hpp"
 #include "filters/edge_mcl/hypotheses.hpp"
+#include "filters/edge_mcl/lookalikes.hpp"
 #include "filters/edge_mcl/params.h"
 #include "filters/edge_mcl/place_search.hpp"
 #include "filters/planar/planar_filter.hpp"
@@ -28,6 +29,7 @@ class edge_mcl {
   void estimate(wm_estimate *out) const;
   size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
   size_t list_particles(wm_particle *out, size_t capacity) const;
+  size_t list_hypotheses(wm_hypothesis *out, size_t capacity) const;
   const wm_motion_calibration &motion_calibration() const { return filter_.calibration(); }
   uint32_t motion_health() const { return filter_.motion_health(); }
 
@@ -86,6 +88,7 @@ class edge_mcl {
   void doubt_motion();
   void heed_cloud();
   void ponder(bool new_keyframe);
+  void look_for_lookalikes(double dt_s);
   void seed_cloud();
   void take_place(int hypothesis);
   void spread_over_hypotheses(wm_estimate *out) const;
@@ -102,6 +105,7 @@ class edge_mcl {
   scan_points scan_, lined_;  // all, and those that lie on a line with their neighbours
   place_search search_;
   hypotheses others_;
+  lookalikes alike_;
   floor_camera camera_[kCamerasMax];
   int camera_count_;
   int camera_state_[kCamerasMax][kCameraErrors + 1];  // and the time offset
@@ -120,6 +124,7 @@ class edge_mcl {
   double explained_;  // share, smoothed
   double usual_;      // the same over a longer time, while the pose is trusted
   double apart_s_;    // the cloud's main cluster has been elsewhere, and better
+  double alike_m_;    // way when look-alikes were last weighed
   double watched_m_;  // way when the last scan was judged
   uint32_t resets_;
   uint8_t state_;

@@ -74,14 +74,17 @@ static const wm_param kParams[] = {
         "few they are most."),
     F64("lost.gain", lost_gain, 8, 0.1, 100,
         "How much a scan speaks: the logarithm of the odds changes by this times the share's difference."),
-    F64("lost.per_s", lost_per_s, 0.0001, 0, 1, "Probability of being lost out of the blue, per s (someone lifts it)."),
+    F64("lost.per_s", lost_per_s, 0.0001, 0, 1,
+        "Probability of being lost out of the blue, per s: someone lifts it, once in some hours. The prior of places "
+        "that look the same, too."),
     F64("search.explained", search_explained, 0.6, 0.05, 1,
         "Share of the last metres' points that a place must explain."),
     F64("search.share", search_share, 0.95, 0.1, 1,
         "Probability, among all places that are possible, from which on a place is taken."),
     I32("search.poses", search_poses, 80000, EDGE_MCL_SEARCH_POSES_LEAST, 10000000,
         "Work of a scan at most while in doubt, in poses that a sweep over the map scores by 24 points; an eighth "
-        "of it otherwise. Aligning places (8704 each) and weighing them (3072) come out of it. 80000: 1 ms on a PC."),
+        "of it otherwise, and half of it for places that look as the tracked one. Aligning places (8704 each) and "
+        "weighing them (3072) come out of it. 80000: 1 ms on a PC."),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 1.0, 0.05, 3600,
         "Nothing fused for so long: the state says dead reckoning."),
 };

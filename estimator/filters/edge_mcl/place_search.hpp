@@ -51,6 +51,7 @@ class place_search {
   // Share of what was seen lately that the map explains about `pose` (base_link in map now, which is aligned).
   double explained(const edge_map &map, const wm_pose2 &odom, wm_pose2 *pose);
   wm_pose2 odom_of_places() const { return odom_; }
+  const search_field &field() const { return field_; }
   int keyframes() const { return (int)(seen_ - oldest()); }  // that are looked at together
 
  private:

@@ -40,6 +40,13 @@ typedef struct wm_particle {
   double weight;                 // of all of them: 1
 } wm_particle;
 
+// A place where the robot may be besides where it is said to be.
+typedef struct wm_hypothesis {
+  double x_m, y_m, heading_rad;  // base_link in map at the last observation
+  double covariance[6];          // xx, xy, yy, x heading, y heading, heading heading, if it is there: m2, m rad, rad2
+  double weight;                 // its probability
+} wm_hypothesis;
+
 typedef struct wm_estimator {
   const char *name;  // `estimator:` in the config, and the key of its parameters there
   const char *about;
@@ -68,6 +75,9 @@ typedef struct wm_estimator {
   size_t (*landmarks)(const void *state, wm_landmark *out, double (*covariance)[4], size_t capacity);
   // Particles, for who draws them; returns how many there are. NULL where the estimator has none.
   size_t (*particles)(const void *state, wm_particle *out, size_t capacity);
+  // Other places that explain what is seen about as well as the pose that is given out; returns how many there are.
+  // NULL where the estimator has none.
+  size_t (*hypotheses)(const void *state, wm_hypothesis *out, size_t capacity);
 } wm_estimator;
 
 #define WM_INNOVATIONS_PER_EVENT_MAX 8

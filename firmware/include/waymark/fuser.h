@@ -44,6 +44,7 @@ typedef struct wm_fuser {
   wm_histogram predict_ns, correct_ns;
   wm_time_ns particles_ns;  // when they were written last
   wm_particle_set particles;
+  wm_hypothesis_set hypotheses;
 } wm_fuser;
 
 // `state` is made by estimator->init already.

@@ -17,7 +17,8 @@ typedef enum wm_output_kind {
   WM_OUTPUT_INNOVATION,  // wm_innovation
   WM_OUTPUT_PUBLISHED,   // wm_published
   WM_OUTPUT_HEALTH,      // wm_health
-  WM_OUTPUT_PARTICLES    // wm_particle_set, once a second
+  WM_OUTPUT_PARTICLES,   // wm_particle_set, once a second
+  WM_OUTPUT_HYPOTHESES   // wm_hypothesis_set, with them
 } wm_output_kind;
 
 // A cloud of particles, or as much of it as a record of points has room for.
@@ -27,6 +28,14 @@ typedef struct wm_particle_set {
   uint32_t count, total;
   wm_particle particles[WM_PARTICLES_MAX];
 } wm_particle_set;
+
+// Places where the robot may be besides, or as many of them as a record of points has room for.
+#define WM_HYPOTHESES_MAX 100
+typedef struct wm_hypothesis_set {
+  wm_time_ns t_ns;
+  uint32_t count, total;
+  wm_hypothesis places[WM_HYPOTHESES_MAX];
+} wm_hypothesis_set;
 
 typedef struct wm_output {
   void (*put)(void *context, wm_output_kind kind, const void *record, size_t bytes);

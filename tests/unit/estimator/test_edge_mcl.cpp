@@ -9,6 +9,7 @@
 
 #include "filters/edge_mcl/hypotheses.hpp"
 #include "filters/edge_mcl/params.h"
+#include "math/arc.hpp"
 #include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
@@ -187,6 +188,29 @@ void a_scans_innovation_is_a_distance(void) {
   TEST_ASSERT_TRUE(sigma_m > 0.005 && sigma_m < 0.2);
   const double nis = (out[0].observed - out[0].expected) * (out[0].observed - out[0].expected) / out[0].variance;
   TEST_ASSERT_DOUBLE_WITHIN(1e-9 * nis, nis, out[0].nis);
+}
+
+// GIVEN a way whose places look alike in part WHEN the robot has driven some metres THEN the others are listed, each
+// apart from its own, hardly likely, and the pose is what it was.
+void places_that_look_the_same_are_listed_beside_the_pose(void) {
+  filter f;
+  drive d;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(f, 6, 1.0, 0.0));
+  wm_hypothesis all[128];
+  const size_t count = f.ops->hypotheses(f.state, all, 128);
+  TEST_ASSERT_TRUE(count > 0 && count <= 128);
+  TEST_ASSERT_EQUAL(count, f.ops->hypotheses(f.state, nullptr, 0));
+  double sum = 0;
+  for (size_t i = 0; i < count; i++) {
+    const wm_hypothesis &h = all[i];
+    const double dx = h.x_m - d.truth.x_m, dy = h.y_m - d.truth.y_m;
+    TEST_ASSERT_TRUE(std::sqrt(dx * dx + dy * dy) > 0.5 ||
+                     std::fabs(wm::wrap(h.heading_rad - d.truth.heading_rad)) > 0.25);
+    TEST_ASSERT_TRUE(h.covariance[0] > 0 && h.covariance[2] > 0 && h.covariance[5] > 0);
+    TEST_ASSERT_TRUE(h.weight >= 0);
+    sum += h.weight;
+  }
+  TEST_ASSERT_TRUE(sum > 0 && sum < 0.01);
 }
 
 // `pose: cloud`: what is given out are the particles' own moments, the heading's on the circle.
@@ -400,6 +424,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(forwards_and_backwards_it_stays_on_the_way);
   RUN_TEST(a_scans_innovation_is_a_distance);
+  RUN_TEST(places_that_look_the_same_are_listed_beside_the_pose);
   RUN_TEST(the_clouds_pose_is_its_particles_mean);
   RUN_TEST(motion_sensors_that_fall_silent_are_not_believed);
   RUN_TEST(a_camera_that_looks_lower_than_believed_is_found_out);

@@ -1,0 +1,253 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "filters/edge_mcl/lookalikes.hpp"
+
+#include "filters/edge_mcl/align.hpp"
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kBin_rad = kPi / 72.0;  // of walls' directions, which have no sign
+constexpr int kBins = 72, kApartBins = 2;
+constexpr double kLikeItself = 0.25;  // share of the walls that must run alike
+constexpr double kLookedUpMost = 1e5;
+constexpr int kCellsAGrid = 2;  // the sweep's grid: 0.2 m
+constexpr double kSame_m = 0.6, kSame_rad = 0.3;
+constexpr double kWorse = 0.15;  // share of the points that a place may explain less than the tracked one
+constexpr double kExplained_m = 0.1, kTogether = 5.0;  // so many of its points err together
+constexpr double kOpen_m = 0.3, kOpen_rad = 0.1;       // where the scan says nothing: half of what parts two places
+constexpr double kFound_m = 0.1, kFound_rad = 0.03;
+constexpr double kNats = 3.0, kKeyframe_m = 0.4;  // as hypotheses has them
+constexpr double kNewest = 0.5;                   // what the newest scan counts of `explained`
+constexpr int kCellCost = 1, kPointsAPose = 24;
+constexpr int kTakingCost = 4 * (7 * lookalikes::kPoints / 2 + lookalikes::kPoints);  // as place_search's
+constexpr int64_t kSwept = INT64_MAX;
+
+double way2(const wm_pose2 &a, const wm_pose2 &b) { return square(a.x_m - b.x_m) + square(a.y_m - b.y_m); }
+
+bool same(const wm_pose2 &a, const wm_pose2 &b) {
+  return way2(a, b) < square(kSame_m) && std::fabs(wrap(a.heading_rad - b.heading_rad)) < kSame_rad;
+}
+
+}  // namespace
+
+void lookalikes::init(const edge_map &map) {
+  const wm_raster &r = map.raster();
+  double share[kBins] = {}, alike[kBins] = {};
+  double grid_px = 0.1 / r.resolution_m;
+  const double area = (double)r.width_px * r.height_px;
+  if (area / square(grid_px) > kLookedUpMost) grid_px = std::sqrt(area / kLookedUpMost);
+  for (double row = 0.5 * grid_px; row < r.height_px; row += grid_px)
+    for (double column = 0.5 * grid_px; column < r.width_px; column += grid_px) {
+      double x, y;
+      map.to_map(column, row, &x, &y);
+      const edge_line line = map.nearest(x, y);
+      if (!line.found || line.distance_m > 0.3) continue;
+      const double angle = atan2(line.normal_y, line.normal_x);
+      const int bin = (int)((angle < 0.0 ? angle + kPi : angle) / kBin_rad);
+      for (int k = -1; k <= 1; k++) share[(bin + k + kBins) % kBins] += k == 0 ? 2.0 : 1.0;
+    }
+  for (int turn = 0; turn < kBins; turn++)
+    for (int i = 0; i < kBins; i++) alike[turn] += share[i] * share[(i + turn) % kBins];
+  relative_count_ = 0;
+  const double least = kLikeItself * alike[0];
+  for (int n = 0; n < kHeadings / 2; n++) {
+    int best = 0;
+    for (int i = 1; i < kBins; i++)
+      if (alike[i] > alike[best]) best = i;
+    if (!(alike[best] > 0.0) || alike[best] < least) break;
+    relative_[relative_count_++] = best * kBin_rad;
+    relative_[relative_count_++] = best * kBin_rad + kPi;
+    for (int k = -kApartBins; k <= kApartBins; k++) alike[(best + k + kBins) % kBins] = 0.0;
+  }
+  clear({});
+}
+
+void lookalikes::clear(const wm_pose2 &odom) {
+  count_ = found_count_ = points_ = 0;
+  running_ = false;
+  odom_ = odom;
+}
+
+void lookalikes::carry(const wm_pose2 &odom) {
+  const wm_pose2 way = between(odom_, odom);
+  odom_ = odom;
+  for (int i = 0; i < count_; i++) of_[i].pose = compose(of_[i].pose, way);
+}
+
+void lookalikes::choose_points(const scan_points &scan) {
+  points_ = scan.count < kPoints ? scan.count : kPoints;
+  for (int i = 0; i < points_; i++) {
+    const int from = (int)((int64_t)i * scan.count / points_);
+    x_m_[i] = scan.x_m[from];
+    y_m_[i] = scan.y_m[from];
+  }
+}
+
+double lookalikes::odds() const {
+  double sum = 0.0;
+  for (int i = 0; i < count_; i++) sum += of_[i].weight;
+  return sum;
+}
+
+lookalikes::fit lookalikes::fit_at(const edge_map &map, const wm_pose2 &pose) const {
+  fit f{};
+  const sin_cos h = sincos(pose.heading_rad);
+  for (int i = 0; i < points_; i++) {
+    const double px = (double)x_m_[i], py = (double)y_m_[i];
+    const double rx = h.cos * px - h.sin * py, ry = h.sin * px + h.cos * py;
+    const edge_line line = map.nearest(pose.x_m + rx, pose.y_m + ry);
+    if (!line.found || line.distance_m > kExplained_m) continue;
+    f.explained += 1.0 / points_;
+    const double row[3] = {line.normal_x, line.normal_y, line.normal_y * rx - line.normal_x * ry};
+    for (int r = 0; r < 3; r++)
+      for (int c = 0; c < 3; c++) f.information[r][c] += row[r] * row[c];
+  }
+  return f;
+}
+
+// What its scan leaves open of a place, and the errors that all its points share.
+void lookalikes::describe(const fit &f, lookalike *out) const {
+  const double open[3] = {1.0 / square(kOpen_m), 1.0 / square(kOpen_m), 1.0 / square(kOpen_rad)};
+  const double lasting[3] = {square(kFound_m), square(kFound_m), square(kFound_rad)};
+  double a[kAlignStates][kAlignStates] = {}, inverse[kAlignStates][kAlignStates] = {};
+  for (int r = 0; r < 3; r++)
+    for (int c = 0; c < 3; c++)
+      a[r][c] = f.information[r][c] / (kTogether * square(kExplained_m)) + (r == c ? open[r] : 0.0);
+  (void)invert_positive(a, 3, inverse);
+  for (int c = 0, k = 0; c < 3; c++)
+    for (int r = 0; r <= c; r++) out->covariance[k++] = inverse[r][c] + (r == c ? lasting[r] : 0.0);
+}
+
+void lookalikes::look(const edge_map &map, const search_field &field, const scan_points &scan, const wm_pose2 &own,
+                      double new_m, double hazard, int poses) {
+  if (scan.count < 8) return;
+  choose_points(scan);
+  weigh(map, own, new_m, hazard);
+  poses -= kWeighingCost;
+  if (poses <= 0) {
+    running_ = false;
+    return;
+  }
+  if (!running_) begin(field, map, own);
+  poses = sweep(map, field, poses);
+  if (next_ < kSwept) return;
+  for (; taken_ < found_count_ && poses > 0; taken_++) {
+    const wm_pose2 pose = compose(found_[taken_].pose, between(swept_odom_, odom_));
+    if (known(pose)) continue;
+    poses -= kTakingCost;
+    if (poses >= 0) take(map, own, pose);
+  }
+  running_ = taken_ < found_count_;
+}
+
+void lookalikes::weigh(const edge_map &map, const wm_pose2 &own, double new_m, double hazard) {
+  own_explained_ = fit_at(map, own).explained;
+  const double nats = kNats * (new_m < kKeyframe_m ? new_m / kKeyframe_m : 1.0);
+  int kept = 0;
+  for (int i = 0; i < count_; i++) {
+    lookalike l = of_[i];
+    align_pose(map, x_m_, y_m_, points_, 2, 0.3, kExplained_m, 2, &l.pose);
+    const fit f = fit_at(map, l.pose);
+    l.explained += kNewest * (f.explained - own_explained_ - l.explained);
+    l.weight = l.weight * exp(nats * (f.explained - own_explained_)) + hazard / kMost;
+    if (!(l.weight < 1.0)) l.weight = 1.0;  // from there on it is for the search to say which it is
+    describe(f, &l);
+    bool again = same(l.pose, own) || !map.drivable(l.pose.x_m, l.pose.y_m);
+    for (int k = 0; k < kept; k++) again |= same(of_[k].pose, l.pose);
+    if (!again && l.explained > -2.0 * kWorse) of_[kept++] = l;
+  }
+  count_ = kept;
+}
+
+void lookalikes::begin(const search_field &field, const edge_map &map, const wm_pose2 &own) {
+  running_ = true;
+  next_ = 0;
+  found_count_ = taken_ = 0;
+  swept_from_ = own;
+  swept_odom_ = odom_;
+  swept_points_ = 0;
+  for (int i = 0; i < points_; i++) {
+    const double x = (double)x_m_[i], y = (double)y_m_[i];
+    if (square(x) + square(y) >= square(field.reach_m())) continue;
+    for (int k = 0; k < relative_count_; k++) {
+      const sin_cos h = sincos(own.heading_rad + relative_[k] - map.raster().origin_yaw_rad);
+      steps_[k][swept_points_] = field.step(h.cos * x - h.sin * y, -(h.sin * x + h.cos * y));
+    }
+    swept_points_++;
+  }
+}
+
+// Returns what is left of `poses`.
+int lookalikes::sweep(const edge_map &map, const search_field &field, int poses) {
+  if (next_ == kSwept) return poses;
+  const wm_raster &r = map.raster();
+  const double grid_px = kCellsAGrid * field.cell_m() / r.resolution_m;
+  const int64_t columns = (int64_t)(r.width_px / grid_px) + 1, rows = (int64_t)(r.height_px / grid_px) + 1;
+  const int headings_cost = (relative_count_ * swept_points_ + kPointsAPose - 1) / kPointsAPose;
+  for (; next_ < columns * rows && poses >= kCellCost + headings_cost; next_++) {
+    const int64_t column = next_ % columns, row = next_ / columns;
+    wm_pose2 pose;
+    map.to_map(((double)column + 0.5) * grid_px, ((double)row + 0.5) * grid_px, &pose.x_m, &pose.y_m);
+    poses -= kCellCost;
+    if (!map.drivable(pose.x_m, pose.y_m)) continue;
+    poses -= headings_cost;
+    const ptrdiff_t corner = field.at(kCellsAGrid * column + kCellsAGrid / 2, kCellsAGrid * row + kCellsAGrid / 2);
+    for (int k = 0; k < relative_count_; k++) {
+      pose.heading_rad = wrap(swept_from_.heading_rad + relative_[k]);
+      offer(pose, field.sum(corner, steps_[k], swept_points_));
+    }
+  }
+  if (next_ >= columns * rows) next_ = kSwept;
+  return poses;
+}
+
+// Keeps the best, one of each place.
+void lookalikes::offer(const wm_pose2 &pose, int64_t score) {
+  if (found_count_ == kMost && score <= found_[kMost - 1].score) return;
+  if (same(pose, swept_from_)) return;
+  int at = found_count_;
+  for (int i = 0; i < found_count_; i++)
+    if (same(found_[i].pose, pose)) {
+      if (found_[i].score >= score) return;
+      at = i;
+      break;
+    }
+  if (at == found_count_) {
+    if (found_count_ < kMost)
+      found_count_++;
+    else
+      at = kMost - 1;
+  }
+  for (; at > 0 && found_[at - 1].score < score; at--) found_[at] = found_[at - 1];
+  found_[at] = {pose, score};
+}
+
+bool lookalikes::known(const wm_pose2 &pose) const {
+  for (int i = 0; i < count_; i++)
+    if (same(of_[i].pose, pose)) return true;
+  return false;
+}
+
+// If the newest scan fits there as well, it is a place that is possible.
+void lookalikes::take(const edge_map &map, const wm_pose2 &own, const wm_pose2 &pose) {
+  lookalike l{};
+  l.pose = pose;
+  align_pose(map, x_m_, y_m_, points_, 2, 0.4, 2.0 * kExplained_m, 4, &l.pose);
+  align_pose(map, x_m_, y_m_, points_, 2, 0.2, kExplained_m, 3, &l.pose);
+  const fit f = fit_at(map, l.pose);
+  l.explained = f.explained - own_explained_;
+  if (l.explained < -kWorse || !map.drivable(l.pose.x_m, l.pose.y_m) || same(l.pose, own) || known(l.pose)) return;
+  describe(f, &l);
+  int at = count_;
+  if (count_ < kMost) {
+    count_++;
+  } else {
+    for (int i = at = 0; i < count_; i++)
+      if (of_[i].explained < of_[at].explained) at = i;
+    if (of_[at].explained >= l.explained) return;
+  }
+  of_[at] = l;
+}
+
+}  // namespace wm

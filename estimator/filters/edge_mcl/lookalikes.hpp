@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// Places of the map that look as the one where the robot is being tracked. If somebody has just set it down at one of
+// them, nothing that it sees says so: they are what else is possible, with the odds that it was carried off. Each sweep
+// looks with one scan for where it fits as well as at the tracked place; what it finds is carried on by odometry,
+// aligned and weighed with every scan. What a scan may cost is counted, in poses as place_search has them.
+#ifndef WAYMARK_ESTIMATOR_EDGE_MCL_LOOKALIKES_HPP
+#define WAYMARK_ESTIMATOR_EDGE_MCL_LOOKALIKES_HPP
+
+#include "filters/edge_mcl/likelihood.hpp"
+#include "filters/edge_mcl/search_field.hpp"
+#include "waymark/frames.h"
+
+namespace wm {
+
+struct lookalike {
+  wm_pose2 pose;         // base_link in map now
+  double covariance[6];  // xx, xy, yy, x heading, y heading, heading heading
+  double weight;         // odds against the tracked place, 1 at most
+  double explained;      // share of the points, more than at the tracked place; smoothed
+};
+
+class lookalikes {
+ public:
+  static constexpr int kMost = 76;
+
+  // Headings at which the map's walls run as they do at 0: these are swept. At most 100000 places are looked up.
+  void init(const edge_map &map);
+  void clear(const wm_pose2 &odom);
+  void carry(const wm_pose2 &odom);
+  // A scan in base_link, which the robot took at `own` if it is where it believes; `new_m`: way since the last one.
+  // `hazard`: probability of having been carried off since. Goes on looking by work worth `poses` at most; none: what
+  // is known is weighed alone, at most kWeighingCost.
+  void look(const edge_map &map, const search_field &field, const scan_points &scan, const wm_pose2 &own, double new_m,
+            double hazard, int poses);
+
+  static constexpr int kPoints = 32, kLookUpCost = 2;
+  static constexpr int kWeighingCost = (2 * kMost + 1) * kPoints * kLookUpCost;
+
+  int count() const { return count_; }
+  double odds() const;  // of all of them together against the tracked place
+  const lookalike &operator[](int i) const { return of_[i]; }
+
+ private:
+  static constexpr int kHeadings = 72;
+
+  struct candidate {
+    wm_pose2 pose;  // base_link in map when the sweep began
+    int64_t score;  // as wide as the rest: a copy has no bytes that nobody wrote
+  };
+  struct fit {
+    double explained, information[3][3];  // the latter in 1/m2, of points of 1 m
+  };
+  fit fit_at(const edge_map &map, const wm_pose2 &pose) const;
+  void choose_points(const scan_points &scan);
+  void weigh(const edge_map &map, const wm_pose2 &own, double new_m, double hazard);
+  void begin(const search_field &field, const edge_map &map, const wm_pose2 &own);
+  int sweep(const edge_map &map, const search_field &field, int poses);
+  void offer(const wm_pose2 &pose, int64_t score);
+  bool known(const wm_pose2 &pose) const;
+  void take(const edge_map &map, const wm_pose2 &own, const wm_pose2 &pose);
+  void describe(const fit &f, lookalike *out) const;
+
+  double relative_[kHeadings];  // headings at which the map looks like itself
+  int relative_count_;
+  lookalike of_[kMost];
+  int count_;
+  wm_pose2 odom_;
+  float x_m_[kPoints], y_m_[kPoints];  // of the newest scan
+  int points_;
+  double own_explained_;
+
+  int32_t steps_[kHeadings][kPoints];
+  int swept_points_;
+  wm_pose2 swept_from_, swept_odom_;
+  int64_t next_;  // cell of the sweep
+  bool running_;
+  candidate found_[kMost];
+  int found_count_, taken_;  // of them: looked at already
+};
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+// Places that look as the tracked one: a building of two rooms of the same shape, the second turned by half.
+#include <cmath>
+#include <cstdlib>
+#include <vector>
+
+#include "filters/edge_mcl/lookalikes.hpp"
+#include "math/arc.hpp"
+#include "unity.h"
+
+namespace {
+
+constexpr double kPixel_m = 0.02;
+constexpr int kWidth = 900, kHeight = 400;  // 18 x 8 m
+
+struct segment {
+  double ax, ay, bx, by;
+};
+const segment kRoom[] = {{1, 1, 7, 1}, {7, 1, 7, 4}, {7, 4, 5, 4}, {5, 4, 5, 6}, {5, 6, 1, 6}, {1, 6, 1, 1}};
+
+std::vector<uint8_t> edges, drivable;
+wm_raster raster;
+char *map_memory, *field_memory;
+wm::edge_map map;
+wm::search_field field;
+wm::lookalikes alike;
+wm::scan_points scan;
+
+// Of a pose in the first room that in the second.
+wm_pose2 twin(const wm_pose2 &p) { return {17 - p.x_m, 7 - p.y_m, wm::wrap(p.heading_rad + wm::kPi)}; }
+
+bool inside(double x, double y) { return x > 1 && y > 1 && ((x < 7 && y < 4) || (x < 5 && y < 6)); }
+
+void draw(double x, double y) {
+  edges[(size_t)(kHeight - 1 - (int)(y / kPixel_m)) * kWidth + (size_t)(x / kPixel_m)] = 1;
+}
+
+// What is seen of the first room's walls, and of a box in it that the second has not.
+void see(const wm_pose2 &pose, bool box) {
+  scan.count = 0;
+  const double c = std::cos(pose.heading_rad), s = std::sin(pose.heading_rad);
+  const auto add = [&](double x, double y) {
+    const double dx = x - pose.x_m, dy = y - pose.y_m;
+    scan.x_m[scan.count] = (float)(c * dx + s * dy);
+    scan.y_m[scan.count++] = (float)(c * dy - s * dx);
+  };
+  for (const segment &w : kRoom)
+    for (int i = 0; i < 20; i++) add(w.ax + (w.bx - w.ax) * i / 20, w.ay + (w.by - w.ay) * i / 20);
+  for (int i = 0; box && i < 120; i++) add(2.5 + 0.5 * (i % 12) / 12, 2.5);
+}
+
+const wm::lookalike *listed(const wm_pose2 &pose) {
+  for (int i = 0; i < alike.count(); i++) {
+    const wm_pose2 off = wm::between(pose, alike[i].pose);
+    if (std::sqrt(off.x_m * off.x_m + off.y_m * off.y_m) < 0.1 && std::fabs(off.heading_rad) < 0.03) return &alike[i];
+  }
+  return nullptr;
+}
+
+const wm_pose2 kHere = {2.0, 3.0, 0.3};
+
+void look(int scans, const wm_pose2 &pose, double new_m) {
+  for (int i = 0; i < scans; i++) alike.look(map, field, scan, pose, new_m, 1e-5, 40000);
+}
+
+// GIVEN a robot in the first room WHEN it has seen all of it a few times THEN the same place of the second room is
+// listed, turned by half, with a small weight, and nothing else is.
+void the_same_place_of_a_room_that_looks_the_same_is_listed(void) {
+  see(kHere, false);
+  look(6, kHere, 0.0);
+  const wm::lookalike *there = listed(twin(kHere));
+  TEST_ASSERT_NOT_NULL(there);
+  TEST_ASSERT_EQUAL(1, alike.count());
+  TEST_ASSERT_TRUE(there->weight > 0 && there->weight < 1e-3);
+  TEST_ASSERT_TRUE(there->covariance[0] > 0 && there->covariance[0] < 0.05);
+}
+
+// GIVEN that WHEN the robot drives on THEN odometry carries the place along.
+void odometry_carries_it_along(void) {
+  see(kHere, false);
+  look(6, kHere, 0.0);
+  const wm_pose2 way = {0.7, 0.1, 0.4};
+  alike.carry(way);
+  TEST_ASSERT_NOT_NULL(listed(twin(wm::compose(kHere, way))));
+}
+
+// GIVEN that WHEN a box comes into view that stands in the first room only THEN the second is dropped.
+void a_view_that_tells_them_apart_drops_it(void) {
+  see(kHere, false);
+  look(6, kHere, 0.0);
+  TEST_ASSERT_NOT_NULL(listed(twin(kHere)));
+  see(kHere, true);
+  look(6, kHere, 0.2);
+  TEST_ASSERT_NULL(listed(twin(kHere)));
+}
+
+// GIVEN that WHEN what is seen fits there, but no longer where the robot is believed to be THEN the odds turn with the
+// way, and stop at even.
+void the_odds_turn_with_what_is_seen(void) {
+  see(kHere, false);
+  look(6, kHere, 0.0);
+  const double before = listed(twin(kHere))->weight;
+  const wm_pose2 believed = wm::compose(kHere, {0.3, 0.3, 0.0});
+  look(10, believed, 0.4);
+  TEST_ASSERT_NOT_NULL(listed(twin(kHere)));
+  TEST_ASSERT_TRUE(listed(twin(kHere))->weight > 100 * before);
+  look(20, believed, 0.4);
+  TEST_ASSERT_TRUE(listed(twin(kHere))->weight <= 1.0);
+}
+
+}  // namespace
+
+void setUp(void) {
+  alike.init(map);
+  alike.clear({});
+}
+void tearDown(void) {}
+
+int main(void) {
+  edges.assign((size_t)kWidth * kHeight, 0);
+  drivable.assign(edges.size(), 0);
+  for (const segment &w : kRoom)
+    for (double u = 0; u <= 1; u += 0.001) {
+      const wm_pose2 p = {w.ax + (w.bx - w.ax) * u, w.ay + (w.by - w.ay) * u, 0};
+      draw(p.x_m, p.y_m);
+      draw(twin(p).x_m, twin(p).y_m);
+    }
+  for (double u = 0; u < 0.5; u += 0.01) draw(2.5 + u, 2.5);
+  for (int r = 0; r < kHeight; r++)
+    for (int c = 0; c < kWidth; c++) {
+      const double x = (c + 0.5) * kPixel_m, y = (kHeight - r - 0.5) * kPixel_m;
+      drivable[(size_t)r * kWidth + (size_t)c] = inside(x, y) || inside(17 - x, 7 - y);
+    }
+  raster = {kWidth, kHeight, kPixel_m, 0, 0, 0, edges.data(), drivable.data(), 0};
+  map_memory = (char *)aligned_alloc(64, (wm::edge_map::bytes(raster) + 63) / 64 * 64);
+  map.init(raster, map_memory);
+  field_memory = (char *)aligned_alloc(64, (wm::search_field::bytes(raster) + 63) / 64 * 64);
+  field.init(map, field_memory);
+  UNITY_BEGIN();
+  RUN_TEST(the_same_place_of_a_room_that_looks_the_same_is_listed);
+  RUN_TEST(odometry_carries_it_along);
+  RUN_TEST(a_view_that_tells_them_apart_drops_it);
+  RUN_TEST(the_odds_turn_with_what_is_seen);
+  const int failed = UNITY_END();
+  free(map_memory);
+  free(field_memory);
+  return failed;
+}
