@@ -56,11 +56,16 @@ int main(int argc, char **argv) {
       work.weigh();
       work.resample();
     });
-  } else if (!std::strcmp(what, "landmark_step")) {
+  } else if (!std::strcmp(what, "landmark_step") || !std::strcmp(what, "landmark_start")) {
     bench::landmark_drive drive(bench::kCalibrationStates, false);
     std::vector<bench::landmark_drive::step> steps;  // as many however often it is counted
     for (int i = 0; i < 1000; i++) steps.push_back(drive.at(i));
     size_t i = 0;
+    // For 10 s a stated start is weighed; the rest of the drive is as these steps are.
+    while (!std::strcmp(what, "landmark_step") && i < 600) {
+      drive.predict(steps[i]);
+      (void)drive.correct(steps[i++]);
+    }
     count([&] {
       const auto &now = steps[i++ % steps.size()];
       drive.predict(now);
@@ -72,10 +77,10 @@ int main(int argc, char **argv) {
     bench::edges_at_work work(std::strcmp(what, "picture_rays") != 0);
     count([&] { (void)work.look(); });
   } else {
-    std::fprintf(
-        stderr,
-        "usage: wm_instructions landmark_step|particles_200|particles_2000|particle_step_200|particle_step_2000|"
-        "window_50x50|picture_rays|picture_windows [TIMES]\n");
+    std::fprintf(stderr,
+                 "usage: wm_instructions "
+                 "landmark_step|landmark_start|particles_200|particles_2000|particle_step_200|particle_step_2000|"
+                 "window_50x50|picture_rays|picture_windows [TIMES]\n");
     return 2;
   }
   return 0;

@@ -20,6 +20,7 @@ from builds import ROOT, Build
 # What, how often more, what it is.
 WORKS = [
     ("landmark_step", 200, "landmark update: a twist and a bearing, pose and 6 calibration states"),
+    ("landmark_start", 400, "the same in the first 8 s, while a stated start is weighed"),
     ("particle_step_200", 10, "particle update: move, weigh 180 points, resample; 200 particles"),
     ("particle_step_2000", 2, "the same, 2000 particles"),
     ("picture_rays", 2, "frame to edge points by rays, 1280x720 fisheye"),

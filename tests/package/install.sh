@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # install.sh ARCH PACKAGES: installs the packages of a folder with dpkg into a fresh Debian of that architecture and tries them there:
-# --version, doctor, a replay that gives the same bits as this computer's, upgrade, removal, purge. Says what they add to a
+# --version, doctor, a replay that gives the same bits as this computer's, its judgement by the tools, upgrade, removal, purge. Says what they add to a
 # minimal Debian. Root (a user namespace of its own with all users; other architectures' programs are told to the kernel in it
 # alone, Linux 6.7). The root is kept as .cache/roots/ARCH.tar and not made anew.
 set -euo pipefail
@@ -63,6 +63,17 @@ inside waymark replay /trial/crossing --config /usr/share/doc/waymark/examples/c
 build/bin/waymark replay "$roots/$arch.recordings/crossing" --config "$root/usr/share/doc/waymark/examples/crossing-points.yaml" --out "$roots/$arch.recordings/run" >/dev/null
 cmp "$root/trial/run/trajectory.csv" "$roots/$arch.recordings/run/trajectory.csv" || fail "its trajectory is not this computer's"
 echo "the same $(wc -c <"$root/trial/run/trajectory.csv") bytes of trajectory as on this computer"
+
+say "the tools"
+cp "$packages"/waymark-tools_*_"$arch".deb "$root/trial/waymark-tools.deb"
+inside dpkg -i /trial/waymark-tools.deb >/dev/null
+inside waymark eval /trial/run /trial/crossing --json >"$roots/$arch.recordings/judged.json"
+build/bin/waymark eval "$roots/$arch.recordings/run" "$roots/$arch.recordings/crossing" --json >"$roots/$arch.recordings/judged-here.json"
+cmp "$roots/$arch.recordings/judged.json" "$roots/$arch.recordings/judged-here.json" || fail "its judge says something else than this computer's"
+inside waymark report /trial/run /trial/crossing --out /trial/report.html >/dev/null
+inside waymark diff /trial/run /trial/run >/dev/null
+inside dpkg -P waymark-tools >/dev/null
+echo "eval says the same as on this computer, report and diff run; removed again"
 
 # ── what is kept, what goes ──────────────────────────────────────────────────────────────────────────────────────────
 say "upgrade, removal, purge"
