@@ -98,7 +98,7 @@ void motion_front_end::feed(const wm_event &event) {
   if (model_ != WM_MOTION_TWIST) return;
   watch_standstill(event.t_ns,
                    std::fabs(v) < params_->standstill_speed_mps && std::fabs(w) < params_->standstill_yaw_rate_radps);
-  push_input(event.t_ns, v, w, false);
+  push_input(event.t_ns, v, w, false, false);
 }
 
 void motion_front_end::take_quantities(const wm_event &event) {
@@ -133,10 +133,10 @@ void motion_front_end::take_quantities(const wm_event &event) {
     watch_yaw_rate(event.t_ns, v, rate && !doubt);
     yaw_fresh_ = rate && !doubt && still;
     const bool unsure = doubt || silent(WM_Q_YAW_RATE, event.t_ns) || (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK);
-    push_input(event.t_ns, v, value_[WM_Q_YAW_RATE], unsure);
+    push_input(event.t_ns, v, value_[WM_Q_YAW_RATE], unsure, doubt);
   } else if (model_ == WM_MOTION_ACKERMANN && (speed || steering)) {
     double angle = 0.0;
-    if (read_road_wheel(&angle)) push_input(event.t_ns, v, angle, doubt);
+    if (read_road_wheel(&angle)) push_input(event.t_ns, v, angle, doubt, doubt);
   }
 }
 
@@ -230,7 +230,8 @@ bool motion_front_end::watch_standstill(wm_time_ns t_ns, bool still) {
   return wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
 }
 
-void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doubtful) {
+// `doubtful`: what holds from here on; `miscounted`: the counts of the stretch that ends here.
+void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted) {
   motion_input input{};
   input.t_ns = t_ns;
   input.a = a;
@@ -244,7 +245,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
     const double dt = wm_seconds_between(now_ns_, t_ns);
     const bool counted = wheel_[0].t_ns == t_ns || wheel_[1].t_ns == t_ns;
     forget_silent_way(t_ns, dt);
-    if (dt > 0.0 && !doubtful) {
+    if (dt > 0.0 && !miscounted) {
       motion_input done = input;
       done.t_ns = now_ns_;
       done.a =
@@ -252,7 +253,8 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
           dt;
       if (counted) {
         done.b = history_.empty() ? b : history_.newest().b;
-        done.standing = !history_.empty() && history_.newest().standing;
+        if (history_.is_overdue(t_ns)) done.b = counted_turn_rate();  // a gyro's rate of long ago says less
+        done.standing = input.standing && !history_.empty() && history_.newest().standing;
         done.counted = 1;
         history_.push(done);
       }
@@ -260,6 +262,17 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   }
   history_.push(input);
   newest_ns_ = t_ns;
+}
+
+// How fast the robot turned between the last two counts by the wheels' difference; 0 if that can't be told.
+double motion_front_end::counted_turn_rate() const {
+  const uint32_t dead = WM_MOTION_HEALTH_ENCODER_LEFT_DEAD | WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD;
+  const tick_wheel &left = wheel_[0], &right = wheel_[1];
+  if (!finite(wheels_.track_m) || (health_ & dead) || left.t_ns != right.t_ns || left.before_ns == WM_TIME_NONE ||
+      left.before_ns != right.before_ns)
+    return 0.0;
+  const double more_m = right.position_m - right.before_m - (left.position_m - left.before_m);
+  return more_m / wheels_.track_m / wm_seconds_between(left.before_ns, left.t_ns);
 }
 
 bool motion_front_end::standstill_yaw_rate(double *yaw_rate_radps) const {

@@ -85,7 +85,8 @@ class motion_front_end {
   bool read_speed(double *speed_mps);
   bool read_road_wheel(double *angle_rad) const;
   bool read_other_turn_rate(double speed_mps, double *rate_radps) const;
-  void push_input(wm_time_ns t_ns, double a, double b, bool doubtful);
+  double counted_turn_rate() const;
+  void push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted);
   void push_ticks(wm_time_ns t_ns, bool doubtful);
   void hand_out_ticks(const motion_stretch &piece);
   void forget_silent_way(wm_time_ns t_ns, double dt_s);

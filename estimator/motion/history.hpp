@@ -75,10 +75,7 @@ class motion_history {
         const wm_time_ns held_until = piece.input.t_ns + hold_max_ns;
         piece.input.stale = begin >= held_until;
         if (!piece.input.stale && end > held_until) end = held_until;
-        if (piece.input.stale && piece.input.counted) {  // the way is known, however long it took; a gyro's turn isn't
-          piece.input.stale = 0;
-          if (piece.input.model != WM_MOTION_TICKS) piece.input.b = 0.0;
-        }
+        if (piece.input.counted) piece.input.stale = 0;  // the way is known, however long it took
         piece.silent_s = wm_seconds_between(piece.input.t_ns, begin) - due_s(next, oldest);
         const bool begins = next > oldest + 1 && begin == piece.input.t_ns;
         piece.changed[0] = begins ? piece.input.a - at(next - 2).a : 0.0;

@@ -45,8 +45,9 @@ static const wm_param kParams[] = {
     F64("standstill.bias_sigma_radps", standstill_bias_sigma_radps, 0.01, 1e-6, 1,
         "Sigma of one reading of the yaw rate as a measurement of its bias while standing (steps and vibration)."),
     F64("hold_max_s", hold_max_s, 2.0, 0.01, 3600,
-        "A speed, rate or twist holds to the next of its kind, but no longer than this; then the motion is unknown. "
-        "Gaps of 1 s are seen on working robots."),
+        "A speed, rate or twist holds to the next of its kind, but no longer than this; then the motion is unknown, "
+        "and sigma grows with the last speed, or with half of noise.hold_mps2 for so long, if that is more. Gaps of 1 "
+        "s are seen on working robots."),
 };
 
 const wm_param_table wm_motion_params_table = {kParams, sizeof kParams / sizeof kParams[0],

@@ -144,23 +144,46 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
     // That it went straight when it was last heard of doesn't say that it hasn't begun to turn.
     const double speed = std::fabs(input.a), rate = input.model == WM_MOTION_ACKERMANN ? 0.1 : std::fabs(input.b);
     const bool any = input.model == WM_MOTION_TICKS || (input.stale && rate < kUnknownRate_radps);
-    n.way_m2 += square(speed) * dt_s;
+    // Counted, the way is known, whatever the turn was. Stale: add_silence() has it.
+    if (!input.stale && !input.counted) n.way_m2 += square(speed) * dt_s;
     n.turn_rad2 += square(any ? kUnknownRate_radps : rate) * dt_s;
   }
   return n;
 }
 
+double least(double a, double b) { return a < b ? a : b; }
+
 void add_silence(const motion_stretch &stretch, const wm_motion_params &p, bool is_counted, motion_noise *noise) {
   const double from_s = stretch.silent_s > 0.0 ? stretch.silent_s : 0.0, to_s = stretch.silent_s + stretch.dt_s;
-  if (to_s <= from_s || stretch.input.stale) return;
+  if (to_s <= from_s) return;
+  if (stretch.input.stale) {
+    // It may have gone on all the while, in whatever direction: as it last did, or as it may have begun to while the
+    // last input was held.
+    const double left = std::fabs(stretch.input.a), right = std::fabs(stretch.input.b);
+    const double last_mps = stretch.input.model == WM_MOTION_TICKS && right > left ? right : left;
+    const double begun_mps = 0.5 * p.noise_hold_mps2 * p.hold_max_s;
+    const double speed_mps = last_mps > begun_mps ? last_mps : begun_mps;
+    const double unknown_from_s = from_s > p.hold_max_s ? from_s - p.hold_max_s : 0.0;
+    const double unknown_to_s = to_s > p.hold_max_s ? to_s - p.hold_max_s : 0.0;
+    const double gone_m2 = square(speed_mps) * (square(unknown_to_s) - square(unknown_from_s));
+    noise->way_m2 += gone_m2;
+    noise->side_m2 += gone_m2;
+    return;
+  }
   // Variances that add up to the square of the whole, however the time is cut.
   const double held_from_s = from_s < p.hold_max_s ? from_s : p.hold_max_s;
   const double held_to_s = to_s < p.hold_max_s ? to_s : p.hold_max_s;
   const double grown_s4 = square(square(held_to_s)) - square(square(held_from_s));
   if (!is_counted) noise->way_m2 += square(0.5 * p.noise_hold_mps2) * grown_s4;
   if (is_counted && stretch.input.model == WM_MOTION_TICKS) return;
-  noise->turn_rad2 += square(0.5 * p.noise_hold_radps2) * grown_s4 +
-                      square(kUnknownRate_radps) * (to_s - from_s - (held_to_s - held_from_s));
+  const double turn_rad2 = square(0.5 * p.noise_hold_radps2) * grown_s4 +
+                           square(kUnknownRate_radps) * (to_s - from_s - (held_to_s - held_from_s));
+  noise->turn_rad2 += turn_rad2;
+  if (!is_counted) return;
+  // How far is known, not by which way: a heading that walks at random to that variance, at most any heading at all.
+  const double way_m2 = square(stretch.input.a * stretch.dt_s);
+  noise->side_m2 += way_m2 * least(turn_rad2 / 3.0, 0.5);
+  noise->way_m2 += way_m2 * least(square(turn_rad2) / 8.0, 0.5);
 }
 
 void add_change(const motion_stretch &stretch, const wm_motion_params &p, motion_noise *noise) {

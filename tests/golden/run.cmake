@@ -19,4 +19,5 @@ wm_script_test(run_survey_landmarks COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/
 wm_script_test(run_landmarks_from_pixels COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/landmarks_from_pixels.py LABELS release-only)
 wm_script_test(run_landmarks_real COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/landmarks_real.py LABELS release-only)
 wm_script_test(run_edges_hardship COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/edges_hardship.py LABELS release-only)
+wm_script_test(run_silence COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/silence.py LABELS release-only)
 wm_script_test(run_disk_full COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/disk_full.py LABELS release-only)

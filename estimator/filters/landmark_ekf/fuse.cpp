@@ -28,6 +28,22 @@ wm_status refuse(record_list records, wm_innovation record, wm_status status) {
   return status;
 }
 
+// What the bend of a sighting makes of the sensor's uncertain place: the second order of its expectation and of its
+// variance (Athans, Wishner, Bertolini 1968). Next to nothing as a rule; a robot that stood blind for seconds and is
+// metres off would else believe straight lines that are circles.
+struct bend {
+  double bearing_rad, bearing_variance, range_m, range_variance;
+};
+
+bend bend_of(const expected_sighting &e, double xx, double xy, double yy) {
+  const double bx = e.bearing_by[kByX], by = e.bearing_by[kByY];
+  // Covariance of the place across and along the line of sight, over the distance squared.
+  const double across = bx * bx * xx + 2.0 * bx * by * xy + by * by * yy;
+  const double along = by * by * xx - 2.0 * bx * by * xy + bx * bx * yy;
+  const double both = bx * by * (xx - yy) + (by * by - bx * bx) * xy;
+  return {-both, along * across + square(both), 0.5 * e.distance_m * across, 0.5 * square(e.distance_m * across)};
+}
+
 bool is_sigma(double value) { return std::isnan(value) || (value > 0.0 && value < 1e6); }
 
 }  // namespace
@@ -234,10 +250,9 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   clue.sigma_length_m = std::sqrt(square(range_sigma) + square(params_.lasting_range_m) + square(map_sigma(landmark)) +
                                   square((params_.range_sigma_rel + params_.lasting_range_rel) * clue.range_m));
   note_clue(clue);
-  if (state_ == WM_STATE_SEARCHING) {
-    drop(WM_REJECTED_SEARCHING);
-    search(event.t_ns - wm_ns_from_seconds(params_.recover_window_s));
-    return WM_OK;
+  if (is_sought(event.t_ns)) {
+    seek(event.t_ns);
+    return drop(WM_REJECTED_SEARCHING);
   }
 
   const expected_sighting e = expect(sensor, errors, past.pose, target.p_m);
@@ -280,16 +295,18 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
     return r;
   };
   const double distance = e.distance_m > 0.1 ? e.distance_m : 0.1;
+  const bend bent = bend_of(e, filter_.variance(kX), filter_.covariance(kX, kY), filter_.variance(kY));
   if (use_bearing)
-    add(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad, e.bearing_by,
-        square(bearing_sigma) + square(params_.lateral_sigma_m / distance), lasting_bearing_offset_,
+    add(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad + bent.bearing_rad, e.bearing_by,
+        square(bearing_sigma) + square(params_.lateral_sigma_m / distance) + bent.bearing_variance,
+        lasting_bearing_offset_,
         std::sqrt(square(params_.lasting_bearing_rad) + square(params_.lasting_lateral_m / distance)));
   if (use_range) {
     const double lasting_size =
         std::sqrt(square(params_.lasting_range_m) + square(params_.lasting_range_rel * e.range_m));
-    residual &r =
-        add(WM_RESIDUAL_RANGE, s.range_m, e.range_m, e.range_by,
-            square(range_sigma) + square(params_.range_sigma_rel * e.range_m), lasting_range_offset_, lasting_size);
+    residual &r = add(WM_RESIDUAL_RANGE, s.range_m, e.range_m + bent.range_m, e.range_by,
+                      square(range_sigma) + square(params_.range_sigma_rel * e.range_m) + bent.range_variance,
+                      lasting_range_offset_, lasting_size);
     r.row.add(sensor_state_[s.sensor][kRangeBias], 1.0);
     r.row.add(sensor_state_[s.sensor][kRangeScale], e.range_by_scale);
   }
@@ -341,10 +358,10 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   clue.place_m[1] = p.p_m[1];
   clue.sigma_length_m = std::sqrt(square(sigma) + square(params_.gnss_lasting_m));
   note_clue(clue);
-  if (state_ == WM_STATE_SEARCHING) {
+  if (is_sought(event.t_ns)) {
     blank.verdict = WM_REJECTED_SEARCHING;
     records.add(blank);
-    search(event.t_ns - wm_ns_from_seconds(params_.recover_window_s));
+    seek(event.t_ns);
     return WM_OK;
   }
   residual residuals[2];
@@ -391,10 +408,10 @@ wm_status landmark_ekf::fuse_heading(const wm_event &event, record_list records)
   clue.bearing_rad = h.heading_rad;
   clue.sigma_angle_rad = h.sigma_rad;
   note_clue(clue);
-  if (state_ == WM_STATE_SEARCHING) {
+  if (is_sought(event.t_ns)) {
     r.record.verdict = WM_REJECTED_SEARCHING;
     records.add(r.record);
-    search(event.t_ns - wm_ns_from_seconds(params_.recover_window_s));
+    seek(event.t_ns);
     return WM_OK;
   }
   r.row.add(kHeading, 1.0);

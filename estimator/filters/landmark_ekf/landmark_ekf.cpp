@@ -104,7 +104,8 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   moved_id_ = -1;
   remembered_ns_ = WM_TIME_NONE;
   remember_calibration(WM_TIME_NONE);
-  fused_ns_ = lost_ns_ = searched_ns_ = weighed_ns_ = inflated_ns_ = loosened_ns_ = found_ns_ = WM_TIME_NONE;
+  fused_ns_ = lost_ns_ = searched_ns_ = weighed_ns_ = inflated_ns_ = loosened_ns_ = found_ns_ = vague_ns_ =
+      WM_TIME_NONE;
   start_again();
 }
 

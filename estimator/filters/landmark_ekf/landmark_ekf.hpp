@@ -86,7 +86,9 @@ class landmark_ekf {
   // Recovery.
   void note(wm_time_ns t_ns, int witness, double against, double angle_rad = NAN, double normalised = NAN);
   void note_clue(const search_clue &clue);
-  void search(wm_time_ns since_ns);
+  bool is_sought(wm_time_ns t_ns);
+  void seek(wm_time_ns t_ns);
+  void search(wm_time_ns since_ns, const search_clue *prior, int prior_count);
   void try_start();
   void weigh_start(wm_time_ns t_ns);
   double lost_probability() const;
@@ -123,7 +125,8 @@ class landmark_ekf {
   start_trial start_trial_;
   search_clue prior_[2];
   int prior_count_;
-  wm_time_ns fused_ns_, lost_ns_, searched_ns_, weighed_ns_, inflated_ns_, loosened_ns_, found_ns_;
+  search_clue vague_[2];  // the pose when it had become too vague to be corrected
+  wm_time_ns fused_ns_, lost_ns_, searched_ns_, weighed_ns_, inflated_ns_, loosened_ns_, found_ns_, vague_ns_;
   uint32_t resets_, moved_;
   int32_t moved_id_;        // of the last one
   double map_variance_m2_;  // of a place anywhere among the landmarks, each axis

@@ -16,6 +16,11 @@ constexpr double kRememberEvery_s = 10.0;
 constexpr double kFoundWrong = -2.5;  // a pose found anew is wrong in one of twelve cases, as log odds
 constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;
 constexpr double kInflateUpTo_m = 30.0;
+constexpr int kNumbers = 5;          // two more than a pose has: three bearings fit some pose, whatever they say
+constexpr int kPoseNumbers = 3;      // of a pose that says next to nothing
+constexpr double kVague_rad = 0.5;   // sigma of a heading about which a Kalman update is no longer nearly straight
+constexpr double kVaguePlace = 0.5;  // sigma of a place, in those of one anywhere among the landmarks: the same
+constexpr double kVagueFor_s = 5.0;  // of looking for it; then it is corrected as well as can be
 
 }  // namespace
 
@@ -45,7 +50,7 @@ void landmark_ekf::note(wm_time_ns t_ns, int witness, double against, double ang
   if (wm_seconds_between(lost_ns_, t_ns) < kSayLost_s) return;
   const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
   const wm_time_ns bad_since = witnesses_.doubted_since_ns();
-  search(bad_since > window ? bad_since : window);
+  search(bad_since > window ? bad_since : window, prior_, prior_count_);
   if (state_ != WM_STATE_LOST || wm_seconds_between(lost_ns_, t_ns) < kInflateAfter_s) return;
   if (wm_seconds_between(inflated_ns_, t_ns) >= kInflateEvery_s && filter_.variance(kX) < square(kInflateUpTo_m)) {
     filter_.inflate_pose(square(kInflate_m), square(kInflate_rad));
@@ -123,15 +128,52 @@ void landmark_ekf::restore_calibration() {
   map_.release_all();
 }
 
+// Is the pose unknown, or so vague (a robot that stood blind for seconds while it turned) that what is seen should find
+// it rather than correct it?
+bool landmark_ekf::is_sought(wm_time_ns t_ns) {
+  if (state_ == WM_STATE_SEARCHING) return true;
+  const double heading = filter_.variance(kHeading), spread = 0.5 * (filter_.variance(kX) + filter_.variance(kY));
+  const bool vague = heading > square(kVague_rad) || spread > square(kVaguePlace) * map_variance_m2_;
+  if (!params_.recover || state_ != WM_STATE_TRACKING || !vague) {
+    vague_ns_ = WM_TIME_NONE;
+    return false;
+  }
+  if (vague_ns_ == WM_TIME_NONE || filter_.is_overdue()) {
+    vague_ns_ = t_ns;
+    search_clue &place = vague_[0] = {};
+    place.t_ns = t_ns;
+    place.key = -1;
+    place.sensor = filter_.odom();
+    place.travelled_m = filter_.travelled_m();
+    place.turned_rad = filter_.turned_rad();
+    search_clue &toward = vague_[1] = place;
+    place.kind = kCluePosition;
+    place.place_m[0] = filter_.value(kX);
+    place.place_m[1] = filter_.value(kY);
+    place.sigma_length_m = std::sqrt(spread);
+    toward.kind = kClueHeading;
+    toward.bearing_rad = filter_.value(kHeading);
+    toward.sigma_angle_rad = std::sqrt(heading);
+  }
+  return wm_seconds_between(vague_ns_, t_ns) < kVagueFor_s;
+}
+
+void landmark_ekf::seek(wm_time_ns t_ns) {
+  const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
+  if (state_ == WM_STATE_SEARCHING) return search(window, prior_, prior_count_);
+  search(vague_ns_ > window ? vague_ns_ : window, vague_, 2);
+}
+
 // Looks for the pose among the clues since `since_ns`; takes it where it is sure.
-void landmark_ekf::search(wm_time_ns since_ns) {
+void landmark_ekf::search(wm_time_ns since_ns, const search_clue *prior, int prior_count) {
   const wm_time_ns now = filter_.now_ns();
   if (!params_.recover) return;
   if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now) < kSearchEvery_s) return;
   searched_ns_ = now;
-  const search_limits limits = {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad};
+  const search_limits limits = {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad,
+                                kNumbers + (state_ == WM_STATE_TRACKING ? kPoseNumbers : 0)};
   search_result result =
-      clues_.find(since_ns, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), prior_, prior_count_, limits);
+      clues_.find(since_ns, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), prior, prior_count, limits);
   if (!result.found) return;
   restore_calibration();
   // What the mounting's yaw may still be off by, the heading found is off by, too.

@@ -18,7 +18,6 @@ constexpr double kMarginChi2 = 9.0;      // the second best place must be worse 
 constexpr double kAgreeing = 0.7;        // share of observations that must agree ...
 constexpr double kAgreeingOfMany = 0.5;  // ... where so many landmarks bear it out:
 constexpr int kMany = 4;
-constexpr int kNumbers = 5;            // two more than a pose has: three bearings fit some pose, whatever they say
 constexpr double kRival = 0.85;        // another place that so many as many observations agree with is as good
 constexpr double kFirstGuess_m = 4.0;  // distance of a landmark of which only the bearing is known
 
@@ -378,7 +377,7 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
   const support &own = fit[winner];
   out.agreeing = own.observations;
   const double share = own.landmarks >= kMany ? kAgreeingOfMany : kAgreeing;
-  if (own.observations < share * all.count || own.observations < 3 || own.numbers < kNumbers) return out;
+  if (own.observations < share * all.count || own.observations < 3 || own.numbers < limits.numbers) return out;
   normal_equations(all, w, a, b);
   if (!invert(a, inverse)) return out;
   const wm_pose2 frame = {w.x, w.y, w.turn};

@@ -41,6 +41,7 @@ struct search_result {
 
 struct search_limits {
   double sigma_xy_m, sigma_heading_rad;  // a pose less sure is not taken
+  int numbers;                           // that must agree, of the prior's too
 };
 
 class pose_search {

@@ -30,6 +30,8 @@ class planar_motion {
 
   const wm_motion_calibration &calibration() const { return calibration_; }
   uint32_t motion_health() const { return front_.health(); }
+  // The next input is: how the robot moves is a guess.
+  bool is_overdue() const { return front_.is_overdue(now_ns()); }
   wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time
   double travelled_m() const { return travelled_m_; }
   double turned_rad() const { return turned_rad_; }

@@ -92,7 +92,7 @@ mark plugged
 sleep 4
 mark stalled
 control percentage_of_dropped_buffers=100
-sleep 3
+sleep 3.8 # long enough for a message that says so, too short for the stream to be switched off and on
 control percentage_of_dropped_buffers=0
 mark works
 wait $run || fail "waymark run: exit code $?"

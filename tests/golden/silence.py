@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bus falls silent for seconds while the robot drives, turns or sets off, with and without landmarks in view: until
+and after it is back the pose is no further from the truth than its sigma says, and soon it is right again."""
+import bisect
+import csv
+import math
+import pathlib
+import shutil
+import sys
+import tempfile
+
+from judged import ROOT, check, failures, run
+
+CONFIG = ROOT / "config/crossing-points.yaml"
+WORLD = ROOT / "config/worlds/crossing-laps.yaml"
+SILENCES_S = (3, 6, 20)
+BEGINS_S = (12, 25, 38, 50, 62, 75)  # turns, straights and a stop
+SIGMAS = 5.0
+RIGHT_M, RIGHT_RAD, RIGHT_AFTER_S = 0.3, 0.1, 5.0
+
+
+def yaw(row):
+    return 2.0 * math.atan2(float(row["qz"]), float(row["qw"]))
+
+
+class Truth:
+    def __init__(self, folder):
+        with open(folder / "truth.csv") as file:
+            self.rows = list(csv.DictReader(file))
+        self.t_ns = [int(row["t_ns"]) for row in self.rows]
+
+    def at(self, t_ns):
+        i = min(max(bisect.bisect_left(self.t_ns, t_ns), 1), len(self.rows) - 1)
+        a, b = self.rows[i - 1], self.rows[i]
+        share = (t_ns - self.t_ns[i - 1]) / (self.t_ns[i] - self.t_ns[i - 1])
+        turn = math.remainder(yaw(b) - yaw(a), math.tau)
+        return [float(a[k]) + share * (float(b[k]) - float(a[k])) for k in ("x_m", "y_m")] + [yaw(a) + share * turn]
+
+
+def silence(recording, to, begin_ns, end_ns, blind):
+    """A copy in which the bus says nothing meanwhile, and blind: the cameras neither."""
+    shutil.rmtree(to, ignore_errors=True)
+    shutil.copytree(recording, to)
+    with open(recording / "can.log") as log, open(to / "can.log", "w") as out:
+        out.writelines(line for line in log if not begin_ns <= float(line[1:line.index(")")]) * 1e9 < end_ns)
+    if not blind:
+        return
+    with open(recording / "sightings.csv") as seen, open(to / "sightings.csv", "w") as out:
+        out.write(seen.readline())
+        out.writelines(line for line in seen if not begin_ns <= int(line.split(",")[0]) < end_ns)
+
+
+def judge(trajectory, truth, begin_ns, end_ns):
+    """(the largest error in sigmas from the silence on, s after its end when the pose was last not right)"""
+    worst = late_s = 0.0
+    with open(trajectory) as file:
+        for row in csv.DictReader(file):
+            t_ns = int(row["t_ns"])
+            if not begin_ns <= t_ns <= end_ns + 30_000_000_000:
+                continue
+            x, y, heading = truth.at(t_ns)
+            dx, dy = float(row["x_m"]) - x, float(row["y_m"]) - y
+            turned = abs(math.remainder(yaw(row) - heading, math.tau))
+            xx, xy, yy = (float(row[k]) for k in ("cov_xx", "cov_xy", "cov_yy"))
+            place = math.sqrt((yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
+            worst = max(worst, place, turned / math.sqrt(float(row["cov_tt"])))
+            if t_ns >= end_ns and (math.hypot(dx, dy) > RIGHT_M or turned > RIGHT_RAD):
+                late_s = (t_ns - end_ns) * 1e-9
+    return worst, late_s
+
+
+with tempfile.TemporaryDirectory() as temporary:
+    work = pathlib.Path(temporary)
+    recording = work / "recording"
+    run("waymark", "simulate", WORLD, "--out", recording, "--seed", 3)
+    truth = Truth(recording)
+    for seconds in SILENCES_S:
+        for blind in (False, True):
+            sigmas, late = [], []
+            for begin_s in BEGINS_S:
+                begin_ns = truth.t_ns[0] + begin_s * 1_000_000_000
+                end_ns = begin_ns + seconds * 1_000_000_000
+                silence(recording, work / "silent", begin_ns, end_ns, blind)
+                run("waymark", "replay", work / "silent", "--config", CONFIG, "--out", work / "run", "--until", begin_s + seconds + 31)
+                worst, late_s = judge(work / "run/trajectory.csv", truth, begin_ns, end_ns)
+                sigmas.append(worst)
+                late.append(late_s)
+            what = f"{seconds} s without the bus{' and the cameras' if blind else ''}"
+            check(max(sigmas) < SIGMAS, f"{what}: at most {max(sigmas):.1f} sigma off")
+            check(max(late) < RIGHT_AFTER_S, f"{what}: right again after {max(late):.1f} s at most")
+sys.exit(bool(failures))
