@@ -250,7 +250,7 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   clue.sigma_length_m = std::sqrt(square(range_sigma) + square(params_.lasting_range_m) + square(map_sigma(landmark)) +
                                   square((params_.range_sigma_rel + params_.lasting_range_rel) * clue.range_m));
   note_clue(clue);
-  if (is_sought(event.t_ns)) {
+  if (is_sought(event.t_ns, use_bearing)) {
     seek(event.t_ns);
     return drop(WM_REJECTED_SEARCHING);
   }
@@ -358,7 +358,7 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   clue.place_m[1] = p.p_m[1];
   clue.sigma_length_m = std::sqrt(square(sigma) + square(params_.gnss_lasting_m));
   note_clue(clue);
-  if (is_sought(event.t_ns)) {
+  if (state_ == WM_STATE_SEARCHING) {
     blank.verdict = WM_REJECTED_SEARCHING;
     records.add(blank);
     seek(event.t_ns);
@@ -408,7 +408,7 @@ wm_status landmark_ekf::fuse_heading(const wm_event &event, record_list records)
   clue.bearing_rad = h.heading_rad;
   clue.sigma_angle_rad = h.sigma_rad;
   note_clue(clue);
-  if (is_sought(event.t_ns)) {
+  if (state_ == WM_STATE_SEARCHING) {
     r.record.verdict = WM_REJECTED_SEARCHING;
     records.add(r.record);
     seek(event.t_ns);

@@ -86,7 +86,7 @@ class landmark_ekf {
   // Recovery.
   void note(wm_time_ns t_ns, int witness, double against, double angle_rad = NAN, double normalised = NAN);
   void note_clue(const search_clue &clue);
-  bool is_sought(wm_time_ns t_ns);
+  bool is_sought(wm_time_ns t_ns, bool by_bearing);
   void seek(wm_time_ns t_ns);
   void search(wm_time_ns since_ns, const search_clue *prior, int prior_count);
   void try_start();

@@ -129,11 +129,11 @@ void landmark_ekf::restore_calibration() {
 }
 
 // Is the pose unknown, or so vague (a robot that stood blind for seconds while it turned) that what is seen should find
-// it rather than correct it?
-bool landmark_ekf::is_sought(wm_time_ns t_ns) {
+// it rather than correct it? A range says nothing of the heading, which its motion shows in time.
+bool landmark_ekf::is_sought(wm_time_ns t_ns, bool by_bearing) {
   if (state_ == WM_STATE_SEARCHING) return true;
   const double heading = filter_.variance(kHeading), spread = 0.5 * (filter_.variance(kX) + filter_.variance(kY));
-  const bool vague = heading > square(kVague_rad) || spread > square(kVaguePlace) * map_variance_m2_;
+  const bool vague = (by_bearing && heading > square(kVague_rad)) || spread > square(kVaguePlace) * map_variance_m2_;
   if (!params_.recover || state_ != WM_STATE_TRACKING || !vague) {
     vague_ns_ = WM_TIME_NONE;
     return false;
