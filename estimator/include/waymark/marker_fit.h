@@ -35,7 +35,8 @@ typedef struct wm_marker_print {
   int32_t is_white_inside;                  // of the polygon's border; else white is outside of it
   double other;                             // scale of the other border's polygon; its white is on the other side
   // Share of the first border that has the other one beside it. A narrow stretch between two borders shifts both, so
-  // the other's own shift is the first one's there alone.
+  // the other's own shift is the first one's there alone. 1: everywhere; less: where, each picture tells (the modules
+  // of a code that lie along its border, white or black).
   double beside;
 } wm_marker_print;
 

@@ -55,19 +55,42 @@ bool find_edge(const tangent_view &view, const wm_frame &frame, const flat &at, 
   return true;
 }
 
-// The line through the edge between two corners; `to_white` is the direction in which grey rises.
-bool fit_side(const tangent_view &view, const wm_frame &frame, const flat &a, const flat &b, const flat &to_white,
-              double reach, line *out) {
-  flat found[kSamples];
-  int count = 0;
+// The edge between two corners, point by point.
+struct side_points {
+  int count;
+  flat at[kSamples], to_white;
+  int sample[kSamples];
+  double beside[kSamples];  // of each sample: how much of the other border is beside it there, 0 to 1
+  double share;             // their mean over the points
+};
+
+// How far along a side a sample is, 0 to 1.
+double along_side(int sample) { return 0.08 + 0.84 * (sample + 0.5) / kSamples; }
+
+// `to_white` is the direction in which grey rises.
+bool find_side(const tangent_view &view, const wm_frame &frame, const flat &a, const flat &b, const flat &to_white,
+               double reach, side_points *out) {
+  out->count = 0;
+  out->to_white = to_white;
+  for (double &beside : out->beside) beside = 0.0;
   for (int i = 0; i < kSamples; i++) {
-    const flat at = mix(a, b, 0.08 + 0.84 * (i + 0.5) / kSamples);
+    const flat at = mix(a, b, along_side(i));
     double offset;
-    if (find_edge(view, frame, at, to_white, reach, &offset)) found[count++] = at + offset * to_white;
+    if (!find_edge(view, frame, at, to_white, reach, &offset)) continue;
+    out->at[out->count] = at + offset * to_white;
+    out->sample[out->count++] = i;
   }
-  if (count < kSamples / 2) return false;
+  return out->count >= kSamples / 2;
+}
+
+// The line through them, each moved towards white by its own way.
+bool fit_side(const side_points &side, double by_beside, double by_alone, line *out) {
+  flat found[kSamples];
+  int count = side.count;
+  for (int i = 0; i < count; i++)
+    found[i] = side.at[i] + (by_alone + side.beside[side.sample[i]] * (by_beside - by_alone)) * side.to_white;
   for (int round = 0; round < 2; round++) {
-    *out = line_through(found, count, to_white);
+    *out = line_through(found, count, side.to_white);
     int kept = 0;  // without what lies off
     for (int i = 0; i < count; i++)
       if (std::fabs(dot(out->n, found[i]) - out->d) < 0.6) found[kept++] = found[i];
@@ -78,12 +101,38 @@ bool fit_side(const tangent_view &view, const wm_frame &frame, const flat &a, co
   return true;
 }
 
-// The sides' lines, each moved towards white by its own way, and where they meet.
-bool corners_of(const line *side, int count, const double *by, flat *out) {
-  line moved[WM_MARKER_CORNERS_MAX];
-  for (int i = 0; i < count; i++) moved[i] = {side[i].n, side[i].d + by[i]};
+bool corners_of(const line *side, int count, flat *out) {
   for (int i = 0; i < count; i++)
-    if (!meet(moved[(i + count - 1) % count], moved[i], &out[i])) return false;
+    if (!meet(side[(i + count - 1) % count], side[i], &out[i])) return false;
+  return true;
+}
+
+// Where on side `from` the other border is: how white it is on that one's far side.
+void find_beside(const tangent_view &view, const wm_frame &frame, const wm_marker_print &print, const homography &h,
+                 int from, side_points *side) {
+  const double *a = print.corner[from], *b = print.corner[(from + 1) % print.corners];
+  for (int i = 0; i < kSamples; i++) {
+    const double t = along_side(i), x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]);
+    const auto at = [&](double widths, double *grey) {
+      const double scale = 1.0 + widths * (print.other - 1.0);
+      return grey_at(view, frame, h(scale * x, scale * y), grey);
+    };
+    double white, black, far;
+    side->beside[i] = print.beside;
+    if (print.beside >= 1.0 || !at(-0.5, &white) || !at(0.5, &black) || !at(1.5, &far)) continue;
+    if (white - black < kLeastContrast) continue;
+    const double beside = (far - black) / (white - black);
+    side->beside[i] = beside < 0.0 ? 0.0 : beside > 1.0 ? 1.0 : beside;
+  }
+  double sum = 0.0;
+  for (int i = 0; i < side->count; i++) sum += side->beside[side->sample[i]];
+  side->share = sum / side->count;
+}
+
+// Not where the other border begins or ends, whose corner is round.
+bool is_whole(const side_points &side, int sample) {
+  for (int i = sample - 1; i <= sample + 1; i++)
+    if (i >= 0 && i < kSamples && side.beside[i] < 0.5) return false;
   return true;
 }
 
@@ -120,7 +169,7 @@ double shift_of(const wm_marker_fit &self, double width_px) {
 
 // By how much white grows: both borders move away from white, so to opposite sides.
 void measure_shift(wm_marker_fit *self, const tangent_view &view, const wm_frame &frame, const homography &h,
-                   const double *width_px) {
+                   const side_points *points, const double *width_px) {
   const wm_marker_print &print = self->print;
   const double sign = print.is_white_inside ? 1.0 : -1.0;  // of the other border's way to white
   for (int side = 0; side < print.corners; side++) {
@@ -130,7 +179,8 @@ void measure_shift(wm_marker_fit *self, const tangent_view &view, const wm_frame
     double sum = 0.0;
     int count = 0;
     for (int i = 0; i < kSamples; i++) {
-      const double t = 0.1 + 0.8 * (i + 0.5) / kSamples;
+      if (!is_whole(points[side], i)) continue;
+      const double t = along_side(i);
       const double x = print.other * (a[0] + t * (b[0] - a[0])), y = print.other * (a[1] + t * (b[1] - a[1]));
       const flat at = h(x, y);
       const flat way = sign * (h(x + 0.1 * mx, y + 0.1 * my) - at);
@@ -141,12 +191,14 @@ void measure_shift(wm_marker_fit *self, const tangent_view &view, const wm_frame
       sum -= offset;  // away from white
       count++;
     }
-    if (count < kSamples / 4) continue;
+    if (count < kSamples / 8) continue;
     // The first border is where it was found, so the other seems to be off by its own shift and the first one's,
-    // scaled.
-    const double measured = sum / count / (1.0 + print.other);
-    if (std::fabs(measured) > kMostShift_px) continue;
+    // scaled: as large where they are side by side, else that of a border alone.
     auto &known = self->by_width[static_cast<int>(step_of(width_px[side]) + 0.5)];
+    const double alone =
+        print.other * (1.0 - points[side].share) * (shift_of(*self, kWide_px) - shift_of(*self, width_px[side]));
+    const double measured = (sum / count - alone) / (1.0 + print.other);
+    if (std::fabs(measured) > kMostShift_px) continue;
     if (known.seen < kShiftMemory) known.seen += 1.0;
     known.shift_px += (measured - known.shift_px) / known.seen;
   }
@@ -196,8 +248,9 @@ int wm_marker_fit_read(wm_marker_fit *self, const wm_frame *frame, const double 
     if (!flat_of_ray(view, ray[i], &corner[i])) return 0;
   homography h;
   if (!homography_init(&h, print.corner, corner, count)) return 0;
+  side_points points[WM_MARKER_CORNERS_MAX];
   line side[WM_MARKER_CORNERS_MAX];
-  double width_px[WM_MARKER_CORNERS_MAX], shift_px[WM_MARKER_CORNERS_MAX] = {};
+  double width_px[WM_MARKER_CORNERS_MAX];
   for (int i = 0; i < count; i++) {
     const flat &a = corner[i], &b = corner[(i + 1) % count];
     const double size = length(b - a);
@@ -206,15 +259,16 @@ int wm_marker_fit_read(wm_marker_fit *self, const wm_frame *frame, const double 
     // Clockwise with y down: outwards is to the left of the way.
     const double outwards = print.is_white_inside ? -1.0 : 1.0;
     const flat to_white = {outwards * (b.y - a.y) / size, -outwards * (b.x - a.x) / size};
-    if (!fit_side(view, *frame, a, b, to_white, reach_of(width_px[i]), &side[i])) return 0;
+    if (!find_side(view, *frame, a, b, to_white, reach_of(width_px[i]), &points[i]) ||
+        !fit_side(points[i], 0.0, 0.0, &side[i]))
+      return 0;
   }
-  if (!corners_of(side, count, shift_px, corner) || !homography_init(&h, print.corner, corner, count)) return 0;
-  measure_shift(self, view, *frame, h, width_px);
-  for (int i = 0; i < count; i++) {
-    const double narrow = shift_of(*self, width_px[i]), wide = shift_of(*self, kWide_px);
-    shift_px[i] = print.beside * narrow + (1.0 - print.beside) * wide;
-  }
-  if (!corners_of(side, count, shift_px, corner)) return 0;
+  if (!corners_of(side, count, corner) || !homography_init(&h, print.corner, corner, count)) return 0;
+  for (int i = 0; i < count; i++) find_beside(view, *frame, print, h, i, &points[i]);
+  measure_shift(self, view, *frame, h, points, width_px);
+  for (int i = 0; i < count; i++)
+    if (!fit_side(points[i], shift_of(*self, width_px[i]), shift_of(*self, kWide_px), &side[i])) return 0;
+  if (!corners_of(side, count, corner)) return 0;
   marker_poses poses;
   if (!pose_of(view, print, corner, self->up, &poses)) return 0;
   const vec3 all = poses.best.centre_m + poses.other.centre_m;

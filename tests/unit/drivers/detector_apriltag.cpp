@@ -40,9 +40,9 @@ double print_at(image_u8_t *tag, double u, double v) {
 }
 
 // Light by 5 x 5 samples a pixel and a blur; `gamma` bends it into grey levels, which makes white grow.
-void draw(const pose &p, double gamma) {
+void draw(const pose &p, double gamma, int id = kTag, int blurred = 2) {
   apriltag_family_t *family = tag36h11_create();
-  image_u8_t *tag = apriltag_to_image(family, kTag);
+  image_u8_t *tag = apriltag_to_image(family, (uint32_t)id);
   const wm_camera &c = rig.cameras[0];
   light.assign(kWidth * kHeight, 0.0);
   for (int row = 0; row < kHeight; row++)
@@ -60,7 +60,7 @@ void draw(const pose &p, double gamma) {
         const double v = (-std::sin(p.yaw) * lx + std::cos(p.yaw) * ly) / (0.5 * kSize_m);
         light[static_cast<size_t>(row) * kWidth + static_cast<size_t>(column)] += print_at(tag, u, v) / 25.0;
       }
-  for (int pass = 0; pass < 2; pass++) {  // [1 2 1] twice, both ways
+  for (int pass = 0; pass < blurred; pass++) {  // [1 2 1], both ways
     std::vector<double> from = light;
     for (int i = kWidth + 1; i < kWidth * kHeight - kWidth - 1; i++) {
       double sum = 0.0;
@@ -136,6 +136,19 @@ void test_place_direction_and_distance_are_right_whatever_the_response(void) {
     }
 }
 
+// Along its border a code's modules are white here, black there, and white grows less over a stretch that is narrow. A
+// mean of both would make each code another size: where which is, each picture tells.
+void test_codes_are_as_far_as_they_are_whatever_lies_along_their_borders(void) {
+  begin();
+  wm_event seen[4];
+  for (int id : {77, 103, 175})
+    for (double x : {1.3, 1.6, 2.0, 2.4}) {  // near ones teach how much white grows
+      draw({x, 0.2, -0.1, 0.3}, 0.5, id, 1);
+      TEST_ASSERT_EQUAL(1, look(seen));
+      if (x == 2.4) TEST_ASSERT_DOUBLE_WITHIN(0.0012 * x, x, seen[0].as.marker.p_m[0]);  // with a mean: 0.002
+    }
+}
+
 void test_an_empty_picture_and_one_of_another_size(void) {
   begin();
   grey.assign(kWidth * kHeight, 128);
@@ -172,6 +185,7 @@ void tearDown(void) {}
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_place_direction_and_distance_are_right_whatever_the_response);
+  RUN_TEST(test_codes_are_as_far_as_they_are_whatever_lies_along_their_borders);
   RUN_TEST(test_an_empty_picture_and_one_of_another_size);
   RUN_TEST(test_what_it_lacks_is_said);
   std::free(state);
