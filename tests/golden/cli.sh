@@ -62,7 +62,8 @@ printf 'BO_ 256 M: 2 X\n SG_ V : 0|16@1+ (0.001,0) [0|65] "m/s" X\n SG_ W : 8|8@
 printf -- '- {quantity: vehicle_speed, message: M, signal: V}\n- {quantity: yaw_rate, message: M, signal: W}\n' >"$work/signals.yaml"
 printf 'format: waymark-config/1\nestimator: odometry\ndevices: {can: [{interface: nocan7, dbc: car.dbc, can_signals: signals.yaml}]}\n' >"$work/robot.yaml"
 expect 0 "can                  a device" check "$work/robot.yaml"
-expect 0 "nocan7: is not there" stamps "$work/robot.yaml"
+# (qemu-user doesn't know that request of the kernel.)
+[ -n "${WM_FEWER:-}" ] || expect 0 "nocan7: is not there" stamps "$work/robot.yaml"
 sed 's/nocan7/lo/' "$work/robot.yaml" >"$work/lo.yaml"
 [ "$(id -u)" -ne 0 ] || expect 0 "lo: has no clock that can be switched on" stamps "$work/lo.yaml"
 sed -i 's/signal: V/signal: Vee/' "$work/signals.yaml"

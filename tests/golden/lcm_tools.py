@@ -105,7 +105,8 @@ def check_logger(work):
 
     rows = published(work / "heard")
     poses = heard["WAYMARK_POSE"]
-    assert len(poses) == len(rows) and len(rows) > 100, f"{len(poses)} poses heard, {len(rows)} written"
+    least = 20 if "WM_FEWER" in os.environ else 100  # an emulator is slow
+    assert len(poses) == len(rows) and len(rows) > least, f"{len(poses)} poses heard, {len(rows)} written"
     assert all(a.t_ns < b.t_ns for a, b in zip(poses, poses[1:])), "stamps don't rise"
     for pose in poses:
         row = rows[pose.t_ns]
