@@ -9,6 +9,7 @@
 extern "C" {
 #endif
 
+extern const wm_detector wm_cascade_detector;
 extern const wm_detector wm_edges_detector;
 extern const wm_detector wm_landmarks_detector;
 extern const wm_detector wm_lines_detector;

@@ -10,6 +10,7 @@
 #include "keys.h"
 #include "sources.h"
 #include "vision.h"
+#include "waymark/cascade_file.h"
 #include "waymark/text.h"
 #include "waymark/yaml.h"
 
@@ -157,7 +158,7 @@ static wm_status read_all(const wm_yaml_node *root, int files_must_be_there, wm_
   if (status == WM_OK) status = allocate(out, err);
   if (status == WM_OK) status = read_sections(root, out, err);
   if (status == WM_OK) status = config_read_sources(root, out, err);
-  if (status == WM_OK) status = config_read_vision(root, out, err);
+  if (status == WM_OK) status = config_read_vision(root, files_must_be_there, out, err);
   if (status == WM_OK) status = read_files(root, files_must_be_there, out, err);
   if (status == WM_OK) status = config_read_devices(root, out, err);
   if (status == WM_OK) status = read_texts(root, out, err);
@@ -210,7 +211,10 @@ void wm_config_free(wm_config *config) {
   free(config->text);
   free(config->estimator_params);
   free(config->motion);
-  for (size_t i = 0; i < config->vision_count; i++) free(config->vision[i].params);
+  for (size_t i = 0; i < config->vision_count; i++) {
+    free(config->vision[i].params);
+    for (size_t k = 0; k < config->vision[i].cascade_count; k++) wm_cascade_free(&config->vision[i].cascades[k]);
+  }
   config->text = NULL;
   config->estimator_params = NULL;
   config->motion = NULL;

@@ -29,6 +29,10 @@ const config_key kConfigKeys[] = {
      "Detectors that look at pictures, each with its parameters: `{edges: {}}`. See below. Beside them `cameras: "
      "[NAME]` "
      "says at whose; without it at those of all cameras that have any."},
+    {"vision.cascade.classes", "list", "needed for `vision.cascade`",
+     "What it looks for, at most 8: `{file: FILE, height_m: H}`, a cascade in OpenCV's format and the height in m of "
+     "what "
+     "its window shows (docs/landmarks.md)."},
     {"start.saved_pose", "path", "none",
      "File that keeps the robot's last pose, on devices: a run begins there, if it isn't older than start.max_age_s, "
      "whatever `initial_pose` says."},

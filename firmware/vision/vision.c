@@ -102,6 +102,8 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   memcpy(s->cameras, cameras, sizeof s->cameras);
   s->view = (wm_view){.rig = rig, .cameras = s->cameras};
   s->view.landmarks = wm_recording_landmarks(recording, &s->view.landmark_count);
+  s->view.cascades = wanted->cascades;
+  s->view.cascade_count = wanted->cascade_count;
   if (s->detector->is_guided) {
     wm_status status = wm_recording_appearances(recording, &s->view.appearances, &s->view.appearance_count, err);
     if (status != WM_OK) return status;

@@ -109,7 +109,7 @@ void whole(const Street &street, bool lost) {
   constexpr int kRounds = 60;
   const wm_detector *detector = wm_detector_find("landmarks");
   const int32_t camera = 0;
-  const wm_view view = {&street.rig, &camera, street.landmark, kSigns, street.look, kSigns};
+  const wm_view view = {&street.rig, &camera, street.landmark, kSigns, street.look, kSigns, nullptr, 0};
   std::vector<double> params(detector->params.bytes / sizeof(double) + 1);
   wm_params_defaults(&detector->params, params.data());
   const char *why = "";

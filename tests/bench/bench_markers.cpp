@@ -65,7 +65,7 @@ void whole(const char *name, const wm_detector *detector, const char *family, co
     std::vector<char> params(detector->params.bytes);
     wm_params_defaults(&detector->params, params.data());
     const int32_t camera = 0;
-    const wm_view look = {&rig, &camera, nullptr, 0, nullptr, 0};
+    const wm_view look = {&rig, &camera, nullptr, 0, nullptr, 0, nullptr, 0};
     const char *why = "";
     const size_t bytes = (detector->state_bytes(params.data(), &look, &why) + 63) / 64 * 64;
     void *state = std::aligned_alloc(64, bytes);

@@ -24,7 +24,7 @@ void bench(const char *what, bool fisheye, int32_t tracks) {
   wm_rig rig;
   sea::make_rig(&rig, fisheye);
   const int32_t cameras[2] = {0, 1};
-  const wm_view view = {&rig, cameras, nullptr, 0, nullptr, 0};
+  const wm_view view = {&rig, cameras, nullptr, 0, nullptr, 0, nullptr, 0};
   std::vector<double> params(detector->params.bytes / sizeof(double) + 1);
   wm_params_defaults(&detector->params, params.data());
   reinterpret_cast<wm_stereo_params *>(params.data())->tracks = tracks;

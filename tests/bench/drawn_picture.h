@@ -44,7 +44,7 @@ class edges_at_work {
     auto *params = reinterpret_cast<wm_edges_params *>(params_.data());
     params->mode = mode;
     wm::bird_view_size(*params, &bird_);
-    const wm_view view = {&rig_, &front_, nullptr, 0, nullptr, 0};
+    const wm_view view = {&rig_, &front_, nullptr, 0, nullptr, 0, nullptr, 0};
     const char *why = "";
     state_ = std::aligned_alloc(64, (edges_->state_bytes(params_.data(), &view, &why) + 63) / 64 * 64);
     if (!state_ || edges_->init(state_, params_.data(), &view) != WM_OK) std::abort();

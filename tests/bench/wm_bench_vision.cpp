@@ -74,7 +74,7 @@ void hemispherical_picture() {
   wm_params_defaults(&lines->params, params.data());
   static wm_event events[256];
   const int32_t up = 0;
-  const wm_view view = {&rig, &up, nullptr, 0, nullptr, 0};
+  const wm_view view = {&rig, &up, nullptr, 0, nullptr, 0, nullptr, 0};
   const char *why = "";
   const size_t bytes = (lines->state_bytes(params.data(), &view, &why) + 63) / 64 * 64;
   void *state = std::aligned_alloc(64, bytes);

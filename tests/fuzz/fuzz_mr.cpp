@@ -31,7 +31,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   std::memcpy(rig.marker_family, "mr", 3);
   rig.marker_size_m = 0.2;
   const int32_t camera = 0;
-  const wm_view view = {&rig, &camera, nullptr, 0, nullptr, 0};
+  const wm_view view = {&rig, &camera, nullptr, 0, nullptr, 0, nullptr, 0};
   std::vector<char> params(mr->params.bytes);
   wm_params_defaults(&mr->params, params.data());
   const char *why;

@@ -30,7 +30,7 @@ struct Freer {
 
 void detect_camera(const Arguments &a, const wm_vision_config &vision, const wm_rig &rig, int32_t index) {
   const wm_camera &camera = rig.cameras[index];
-  const wm_view view = {&rig, &index, nullptr, 0, nullptr, 0};
+  const wm_view view = {&rig, &index, nullptr, 0, nullptr, 0, nullptr, 0};
   wm_error err;
   const char *why = nullptr;
   wm::mounted_camera mounted;

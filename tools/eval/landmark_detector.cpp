@@ -44,6 +44,14 @@ struct Counts {
   std::vector<double> off_deg, normalised;
 };
 
+// Whether recall is of landmarks of this panel's size.
+bool is_wanted(const Panel &panel, const std::vector<double> &sizes_m) {
+  const double width = 2 * panel.right.norm(), height = 2 * panel.up.norm();
+  for (size_t i = 0; i + 1 < sizes_m.size(); i += 2)
+    if (std::fabs(width - sizes_m[i]) < 0.05 * width && std::fabs(height - sizes_m[i + 1]) < 0.05 * height) return true;
+  return sizes_m.empty();
+}
+
 double bearing_of(const Vector3d &optical) { return std::atan2(-optical.x(), optical.z()); }
 
 // What the sensor of the camera's name said, by stamp.
@@ -139,8 +147,21 @@ std::map<int64_t, std::vector<Label>> load_labels(const fs::path &recording, siz
   return out;
 }
 
+// One of a class, that the detector doesn't name: the label nearest to it that nothing else was taken for, within the
+// angle that is right.
+std::vector<Label>::const_iterator nearest(const std::vector<Label> &wanted, const std::map<int64_t, bool> &found,
+                                           const Seen &seen) {
+  auto best = wanted.end();
+  double least = kWithin_rad;
+  for (auto at = wanted.begin(); at != wanted.end(); ++at) {
+    const double off = std::fabs(std::remainder(seen.bearing_rad - at->bearing_rad, 2 * M_PI));
+    if (off < least && !found.contains(at->id)) least = off, best = at;
+  }
+  return best;
+}
+
 void judge_camera(const fs::path &run, const fs::path &recording, size_t index, const NamedCamera &named,
-                  double size_min_px, Counts *n) {
+                  double size_min_px, const std::vector<double> &sizes_m, Counts *n) {
   const auto seen = load_seen(run, named.name);
   if (seen.empty()) return;
   std::map<int64_t, int64_t> stamps;
@@ -160,13 +181,17 @@ void judge_camera(const fs::path &run, const fs::path &recording, size_t index, 
     for (auto at = seen.lower_bound(t_ns - half_ns); at != seen.end() && at->first <= t_ns + half_ns; ++at)
       for (const Seen &s : at->second) {
         n->seen++;
-        const auto label = std::find_if(wanted.begin(), wanted.end(), [&](const Label &l) { return l.id == s.id; });
+        const auto label =
+            s.id >= 0 ? std::find_if(wanted.begin(), wanted.end(), [&](const Label &l) { return l.id == s.id; })
+                      : nearest(wanted, found, s);
         if (label == wanted.end()) {
-          const auto panel = panels.find(s.id);
-          double size = 0, bearing = 0;
-          const bool stands_there = panel != panels.end() &&
-                                    by_truth(named.camera, pose_at(truth, t_ns), panel->second, &size, &bearing) &&
-                                    std::fabs(std::remainder(s.bearing_rad - bearing, 2 * M_PI)) < kHidden_rad;
+          const render::Pose robot = pose_at(truth, t_ns);
+          const bool stands_there = std::any_of(panels.begin(), panels.end(), [&](const auto &panel) {
+            double size = 0, bearing = 0;
+            return (s.id < 0 || panel.first == s.id) && by_truth(named.camera, robot, panel.second, &size, &bearing) &&
+                   std::fabs(std::remainder(s.bearing_rad - bearing, 2 * M_PI)) <
+                       (s.id < 0 ? kWithin_rad : kHidden_rad);
+          });
           (stands_there ? n->hidden : n->wrong)++;
           continue;
         }
@@ -176,11 +201,12 @@ void judge_camera(const fs::path &run, const fs::path &recording, size_t index, 
           continue;
         }
         n->right++;
-        found[s.id] = true;
+        found[label->id] = true;
         n->off_deg.push_back(off * 180 / M_PI);
         if (s.sigma_rad > 0) n->normalised.push_back(off / s.sigma_rad);
       }
     for (const Label &l : wanted) {
+      if (!is_wanted(panels.at(l.id), sizes_m)) continue;
       const bool is_found = found.contains(l.id), is_large = l.shorter_px >= size_min_px;
       n->labelled++;
       n->found += is_found;
@@ -197,7 +223,7 @@ nlohmann::ordered_json share(int64_t part, int64_t whole) {
 
 }  // namespace
 
-Figures evaluate_landmarks(const DetectorArguments &a, double size_min_px) {
+Figures evaluate_landmarks(const DetectorArguments &a, double size_min_px, const std::vector<double> &sizes_m) {
   const fs::path run = a.run, recording = a.recording, calibration = recording / "calibration.yaml";
   for (const char *file : {"labels/landmarks.csv", "truth-landmarks.csv", "landmarks/appearance.csv"})
     if (!fs::exists(recording / file))
@@ -208,7 +234,8 @@ Figures evaluate_landmarks(const DetectorArguments &a, double size_min_px) {
   if (!a.camera.empty()) (void)choose_camera(cameras, a.camera, calibration);
   Counts n;
   for (size_t i = 0; i < cameras.size(); i++)
-    if (a.camera.empty() || a.camera == cameras[i].name) judge_camera(run, recording, i, cameras[i], size_min_px, &n);
+    if (a.camera.empty() || a.camera == cameras[i].name)
+      judge_camera(run, recording, i, cameras[i], size_min_px, sizes_m, &n);
   if (n.pictures == 0) throw Failure(run.string() + ": the run saw no landmark in a labelled picture");
   Figures f;
   f["within_deg"] = kWithin_rad * 180 / M_PI;

@@ -23,6 +23,7 @@ struct Arguments {
   std::string run, recording, align = "none", against = "truth", detector, camera;
   std::vector<double> view_m;
   double size_min_px = 8;
+  std::vector<double> sizes_m;
   bool json = false, published = false, reference = false;
   CompareOptions compare;
 };
@@ -46,6 +47,9 @@ void parse(CLI::App *app, Arguments *a) {
                   "judge what a detector saw (RUN/detections, RUN/events.wmlog) by the recording's labels")
       ->check(CLI::IsMember({"edges", "landmarks", "lines"}));
   app->add_option("--camera", a->camera, "--detector: of this camera; edges and lines need it where there are several");
+  app->add_option("--sizes", a->sizes_m,
+                  "--detector landmarks: recall is of those of these sizes, WIDTH,HEIGHT[,WIDTH,HEIGHT ...], m")
+      ->delimiter(',');
   app->add_option("--size-min", a->size_min_px,
                   "--detector landmarks: recall is of those whose shorter side has so many pixels")
       ->check(CLI::Range(1.0, 1000.0))
@@ -110,7 +114,7 @@ int main(int argc, char **argv) {
     if (!arguments.detector.empty()) {
       const DetectorArguments detector{arguments.run, arguments.recording, arguments.camera, arguments.view_m};
       const bool lines = arguments.detector == "lines", landmarks = arguments.detector == "landmarks";
-      const Figures figures = landmarks ? evaluate_landmarks(detector, arguments.size_min_px)
+      const Figures figures = landmarks ? evaluate_landmarks(detector, arguments.size_min_px, arguments.sizes_m)
                               : lines   ? evaluate_lines(detector)
                                         : evaluate_detector(detector);
       const std::string text = landmarks ? landmark_table(figures, arguments.run)

@@ -15,6 +15,7 @@
 #include "map/print_markers.h"
 #include "map/survey.h"
 #include "map/survey_bearings.h"
+#include "map/train_cascade.h"
 #include "simulate/render/pictures.h"
 
 namespace {
@@ -198,6 +199,32 @@ void parse_look(CLI::App &app, LookAtPicture &a) {
       "Exit code: 0 something was found, 1 nothing was, 2 usage.");
 }
 
+void parse_train(CLI::App &app, TrainCascade &a) {
+  app.description("Trains a cascade (LBP, OpenCV's format) for the detector `cascade` from labelled recordings.");
+  app.add_option("RECORDING", a.recordings, "recordings with video, truth.csv and labels/landmarks.csv")->required();
+  app.add_option("--size", a.size_m, "WIDTH,HEIGHT, m: the class is the landmarks of this size")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(CLI::Range(0.01, 100.0))
+      ->required();
+  app.add_option("--out", a.out, "the file to write (.xml)")->required();
+  app.add_option("--rows", a.rows_px, "px: height of a window")->check(CLI::Range(12, 60))->capture_default_str();
+  app.add_option("--margin", a.margin, "share of the landmark's size that a window shows on each side of it")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  app.add_option("--size-min", a.size_min_px, "px: the smallest window, as size_min_px of the detector")
+      ->check(CLI::Range(4.0, 200.0))
+      ->capture_default_str();
+  app.add_option("--stages", a.stages, "at most")->check(CLI::Range(1, 60))->capture_default_str();
+  app.add_option("--pictures", a.pictures, "about so many of all that there are")
+      ->check(CLI::Range(10, 20000))
+      ->capture_default_str();
+  app.add_option("--seed", a.seed, "of the choice of windows")->capture_default_str();
+  app.footer(
+      "example: waymark map train-cascade drives/* --size 0.7,0.7 --out sign.xml\n"
+      "Labelled recordings are what `waymark simulate` writes for crossings. docs/landmarks.md says more.");
+}
+
 int print_markers(PrintMarkers &a) {
   a.sheet.ids = ids_of(a.ids);
   int pages = 0;
@@ -326,6 +353,10 @@ int main(int argc, char **argv) {
   PrintMarkers print_arguments;
   CLI::App *print_app = app.add_subcommand("print-markers", "sheets of coded markers at true scale");
   parse_print(*print_app, print_arguments);
+  TrainCascade train_arguments;
+  CLI::App *train_app =
+      app.add_subcommand("train-cascade", "a cascade for a class of landmarks, from labelled pictures");
+  parse_train(*train_app, train_arguments);
   parse_make(*make_app, make_arguments);
   parse_check(*check_app, check_arguments);
   try {
@@ -333,6 +364,10 @@ int main(int argc, char **argv) {
     if (survey_app->parsed()) return survey(survey_arguments);
     if (look_app->parsed()) return look_at_picture(look_arguments) > 0 ? kDone : kFailed;
     if (add_app->parsed()) return add(add_arguments);
+    if (train_app->parsed()) {
+      train_cascade(train_arguments);
+      return kDone;
+    }
     if (print_app->parsed()) return print_markers(print_arguments);
     return make_app->parsed() ? make(make_arguments) : check(check_arguments);
   } catch (const CLI::ParseError &problem) {

@@ -132,7 +132,7 @@ int landmark_ekf::find_landmark(int32_t id) const {
 }
 
 // The one landmark that a sighting without an id fits: within half the gate, and no other within all of it.
-int landmark_ekf::associate(const wm_event &event, const past_pose &past) {
+int landmark_ekf::associate(const wm_event &event, const sighting_sigmas &sigmas, const past_pose &past) {
   const wm_sighting &s = event.as.sighting;
   const mounted_sensor &sensor = sensor_[s.sensor];
   const sensor_errors errors = errors_of(s.sensor);
@@ -142,18 +142,21 @@ int landmark_ekf::associate(const wm_event &event, const past_pose &past) {
     const expected_sighting e = expect(sensor, errors, past.pose, setup_->landmarks[i].p_m);
     if (!e.possible || e.distance_m > 1.5 * sensor.max_range_m) continue;
     double chi2 = 0.0;
-    const auto test = [&](double observed, double expected, const double by[kCauses], double sigma, bool angle) {
+    const auto test = [&](double observed, double expected, const double by[kCauses], double variance, bool angle) {
       if (std::isnan(observed)) return;
       sparse_row row;
       add_pose(row, by, past, sensor_state_[s.sensor][kTimeOffset]);
       add_mounting(row, s.sensor, by);
       projection p;
       filter_.project(row, &p);
+      const double on_map = square(map_sigma(i)) * (square(by[kByX]) + square(by[kByY]));
       const double difference = angle ? wrap(observed - expected) : observed - expected;
-      chi2 += square(difference) / (p.variance + square(sigma));
+      chi2 += square(difference) / (p.variance + variance + on_map);
     };
-    test(s.bearing_rad, e.bearing_rad, e.bearing_by, params_.bearing_sigma_default_rad, true);
-    test(s.range_m, e.range_m, e.range_by, params_.range_sigma_default_m, false);
+    const double distance = e.distance_m > 0.1 ? e.distance_m : 0.1;
+    test(s.bearing_rad, e.bearing_rad, e.bearing_by,
+         square(sigmas.bearing_rad) + square(params_.lateral_sigma_m / distance), true);
+    test(s.range_m, e.range_m, e.range_by, square(sigmas.range_m) + square(params_.range_sigma_rel * e.range_m), false);
     fitting += chi2 < params_.gate_soft;
     if (chi2 < 0.5 * least) {
       least = 2.0 * chi2;
@@ -218,18 +221,20 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   if (!use_bearing && !use_range) return drop(WM_REJECTED_BY_CONFIG);
   if (has_range && s.range_m > sensor.max_range_m) return drop(WM_REJECTED_OUT_OF_RANGE);
   const past_pose past = look_back(sensor_value(s.sensor, kTimeOffset, 0.0));
-  int landmark = s.landmark_id >= 0 ? find_landmark(s.landmark_id) : -1;
-  if (s.landmark_id >= 0 && landmark < 0) return drop(WM_REJECTED_UNKNOWN_ID);
-  if (landmark < 0 && params_.associate_unknown && state_ == WM_STATE_TRACKING) landmark = associate(event, past);
-  if (landmark < 0) return drop(WM_REJECTED_NO_ASSOCIATION);
-  const wm_landmark &target = setup_->landmarks[landmark];
-
   const auto first_number = [](double a, double b, double c) { return finite(a) ? a : finite(b) ? b : c; };
   const double bearing_sigma =
       params_.bearing_sigma_factor *
       first_number(s.bearing_sigma_rad, sensor.bearing_sigma_rad, params_.bearing_sigma_default_rad);
   const double range_sigma =
       params_.range_sigma_factor * first_number(s.range_sigma_m, sensor.range_sigma_m, params_.range_sigma_default_m);
+  int landmark = s.landmark_id >= 0 ? find_landmark(s.landmark_id) : -1;
+  if (s.landmark_id >= 0 && landmark < 0) return drop(WM_REJECTED_UNKNOWN_ID);
+  if (landmark < 0 && params_.associate_unknown && (state_ == WM_STATE_TRACKING || state_ == WM_STATE_DEAD_RECKONING))
+    landmark = associate(event, {bearing_sigma, range_sigma}, past);
+  if (landmark < 0) return drop(WM_REJECTED_NO_ASSOCIATION);
+  const wm_landmark &target = setup_->landmarks[landmark];
+  blank.landmark_id = target.id;
+
   const sensor_errors errors = errors_of(s.sensor);
 
   const sensor_errors sure = remembered_errors_of(s.sensor);

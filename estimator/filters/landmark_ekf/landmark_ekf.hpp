@@ -75,7 +75,10 @@ class landmark_ekf {
 
   double map_sigma(int landmark) const;
   int find_landmark(int32_t id) const;
-  int associate(const wm_event &event, const past_pose &past);
+  struct sighting_sigmas {
+    double bearing_rad, range_m;
+  };
+  int associate(const wm_event &event, const sighting_sigmas &sigmas, const past_pose &past);
   void lend_states(int sensor, int landmark, wm_time_ns t_ns, int *lasting, int *map);
   double sensor_value(int sensor, int which, double neutral) const;
   sensor_errors errors_of(int sensor) const;

@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "waymark/cascade.h"
 #include "waymark/event.h"
 #include "waymark/frame.h"
 #include "waymark/params.h"
@@ -29,6 +30,8 @@ typedef struct wm_view {
   size_t landmark_count;
   const wm_appearance *appearances;
   size_t appearance_count;
+  const wm_cascade *cascades;  // of this detector's configuration; must outlive the detector's state, too
+  size_t cascade_count;
 } wm_view;
 
 // What became of a landmark that a detector of known landmarks had to do with in its last picture.

@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <limits>
 
+#include "vision/camera/bearing.hpp"
 #include "vision/landmarks/recognise.hpp"
 #include "vision/parts.hpp"
 #include "vision/registry.h"
@@ -13,7 +14,6 @@ namespace wm {
 
 namespace {
 
-constexpr double kSteep = 0.7071;  // as in the filters' sensor model
 constexpr size_t kFoundMax = 128;
 constexpr int kTries = 8;  // looks at full resolution in a picture that is searched
 constexpr size_t kAgreeing =
@@ -112,22 +112,15 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   std::memset(static_cast<void *>(state), 0, sizeof *state);
   state->eye.params = *static_cast<const wm_landmarks_params *>(params);
   if (mounted_camera_init(&state->eye.camera, *camera)) return WM_BAD_CONFIG;
-  state->steep = std::fabs(matrix_of_rpy(camera->mounting.rpy_rad).m[2][0]) > kSteep;
+  state->steep = is_steep(*camera);
   state->readout_ns = camera->readout_ns;
   state->found_ns = WM_TIME_NONE;
   lay_out(state, state->eye.params, *view, state->eye.camera);
   return WM_OK;
 }
 
-// A pixel as the filters' sensor model has it: the angle from the camera's axis to the left, in the camera's own axes;
-// of a camera that looks up or down the azimuth about its mounting's yaw.
 double bearing_of(const landmarks_state &self, const vec3 &ray) {
-  if (!self.steep) return atan2(-ray.x, ray.z);
-  const vec3 r = self.eye.camera.R_base_optical * ray;
-  // The body's x and y axes in base_link are the optical z and minus x axes.
-  const auto &m = self.eye.camera.R_base_optical.m;
-  const double yaw = atan2(m[0][1] * m[2][2] < 0 ? m[1][1] : m[1][2], m[0][1] * m[2][2] < 0 ? m[0][1] : m[0][2]);
-  return wrap(atan2(r.y, r.x) - yaw);
+  return sensor_bearing(self.eye.camera, self.steep, ray);
 }
 
 bool put(const landmarks_state &self, const wm_frame &frame, const camera_guess &guess, const candidate &one,
@@ -148,19 +141,10 @@ bool put(const landmarks_state &self, const wm_frame &frame, const camera_guess 
       by_u * by_u * seen.uu + 2 * by_u * by_v * seen.uv + by_v * by_v * seen.vv + bent * bent * guess.cov[2][2];
   if (!(variance > 0)) return false;
   std::memset(static_cast<void *>(out), 0, WM_EVENT_SMALL_BYTES);
-  const double row = (seen.at.v - 0.5 * (frame.height_px - 1)) / (frame.height_px - 1);
-  out->t_ns = frame.t_ns + static_cast<wm_time_ns>(std::floor(row * static_cast<double>(self.readout_ns) + 0.5));
+  out->t_ns = time_of_row(frame.t_ns, seen.at.v, frame.height_px, self.readout_ns);
   out->kind = WM_EVENT_SIGHTING;
   out->as.sighting = {0, one.what->id, bearing_of(self, ray), kNan, std::sqrt(variance), kNan};
   return true;
-}
-
-void take_picture(landmarks_state *self, const wm_frame &frame) {
-  const grey_plane &whole = self->eye.picture.level[0];
-  for (int32_t y = 0; y < whole.height; y++)
-    std::memcpy(whole.grey + static_cast<size_t>(y) * static_cast<size_t>(whole.width),
-                frame.grey + static_cast<size_t>(y) * frame.stride_bytes, frame.width_px);
-  pyramid_build(&self->eye.picture, self->row);
 }
 
 // In the order of their rows' times, one for each landmark: the one that is most like it.
@@ -317,7 +301,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *predic
   if (frame.width_px != self->eye.camera.width_px || frame.height_px != self->eye.camera.height_px) return WM_BAD_DATA;
   camera_guess guess;
   const bool guessed = guess_camera(self->eye.camera, prediction, frame.t_ns, &guess);
-  take_picture(self, frame);
+  pyramid_take(&self->eye.picture, frame, self->row);
   found_list found;
   found.events = out;
   found.capacity = capacity;

@@ -10,7 +10,6 @@ namespace wm {
 namespace {
 
 constexpr int kRowsMax = 400;
-constexpr double kFinest_px = 2;     // of the picture's middle in a column of the finest cylinder
 constexpr double kTangentMax = 1.5;  // what is higher is no picture on a cylinder any more
 
 size_t lined(size_t bytes) { return (bytes + 63) / 64 * 64; }
@@ -56,10 +55,10 @@ void azimuths_of(const mounted_camera &camera, double *left_rad, double *right_r
 
 }  // namespace
 
-void panorama::plan(const mounted_camera &camera, double tilt_rad) {
+void panorama::plan(const mounted_camera &camera, double tilt_rad, double finest_px) {
   azimuths_of(camera, &left_rad, &right_rad);
   const double pixel_rad = angle_of_pixel(camera);
-  double step = kFinest_px * pixel_rad;
+  double step = finest_px * pixel_rad;
   for (cylinder &c : round) {
     c.step_rad = step;
     c.left_rad = left_rad;

@@ -43,8 +43,9 @@ struct panorama {
     above = static_cast<int>(larger(above, rows_above));
     below = static_cast<int>(larger(below, rows_below));
   }
-  // How fine, and how many rows: those needed, and more by `tilt_rad`.
-  void plan(const mounted_camera &camera, double tilt_rad);
+  // How fine, and how many rows: those needed, and more by `tilt_rad`. The finest cylinder's column is `finest_px` of
+  // the picture's middle wide.
+  void plan(const mounted_camera &camera, double tilt_rad, double finest_px = 2);
   size_t bytes() const;
   // Lays out and makes the tables. `memory` is bytes() long.
   void make(const mounted_camera &camera, uint8_t *memory);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "vision/stereo/pyramid.hpp"
 
+#include <cstring>
+
 namespace wm {
 namespace {
 
@@ -41,6 +43,14 @@ void pyramid_lay(pyramid *out, int32_t width, int32_t height, uint8_t *memory) {
 
 void pyramid_build(pyramid *self, uint16_t *row) {
   for (int i = 1; i < kLevels; i++) halve(self->level[i - 1], self->level[i], row);
+}
+
+void pyramid_take(pyramid *self, const wm_frame &frame, uint16_t *row) {
+  const grey_plane &whole = self->level[0];
+  for (int32_t y = 0; y < whole.height; y++)
+    std::memcpy(whole.grey + static_cast<size_t>(y) * static_cast<size_t>(whole.width),
+                frame.grey + static_cast<size_t>(y) * frame.stride_bytes, static_cast<size_t>(whole.width));
+  pyramid_build(self, row);
 }
 
 }  // namespace wm

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "waymark/frame.h"
+
 namespace wm {
 
 inline constexpr int kLevels = 4;
@@ -26,6 +28,8 @@ size_t pyramid_bytes(int32_t width, int32_t height);
 void pyramid_lay(pyramid *out, int32_t width, int32_t height, uint8_t *memory);
 // Makes all levels above the first, smoothed by 1-2-1. `row` has room for 16 bits a pixel of a row. Integers.
 void pyramid_build(pyramid *self, uint16_t *row);
+// The same, of a frame of the first level's size, which is copied.
+void pyramid_take(pyramid *self, const wm_frame &frame, uint16_t *row);
 
 }  // namespace wm
 

@@ -22,6 +22,7 @@
 //   black_box: {folder: FOLDER, ...}
 //   motion: {...}                  # wm_motion_params_table
 //   vision: {edges: {cameras: [front], ...}}   # detectors on pictures, with their tables
+//   vision: {cascade: {classes: [{file: FILE, height_m: 0.9}]}}
 //   landmark_ekf: {...}            # the estimator's own table
 #ifndef WAYMARK_CONFIG_H
 #define WAYMARK_CONFIG_H
@@ -73,6 +74,7 @@ typedef struct wm_runtime_params {
 extern const wm_param_table wm_runtime_params_table;
 
 #define WM_VISION_MAX 8
+#define WM_CONFIG_CASCADES_MAX 8
 
 // A detector under `vision:`.
 typedef struct wm_vision_config {
@@ -80,6 +82,8 @@ typedef struct wm_vision_config {
   void *params;  // detector->params.bytes bytes
   char cameras[WM_CAMERAS_MAX][WM_NAME_MAX];
   uint32_t camera_count;  // 0: all that have pictures
+  wm_cascade cascades[WM_CONFIG_CASCADES_MAX];
+  uint32_t cascade_count;
   int line;
 } wm_vision_config;
 

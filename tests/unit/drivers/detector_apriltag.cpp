@@ -96,7 +96,7 @@ void begin() {
   rig.marker_size_m = kSize_m;
   static const int32_t cameras[1] = {0};
   static wm_view view;
-  view = {&rig, cameras, nullptr, 0, nullptr, 0};
+  view = {&rig, cameras, nullptr, 0, nullptr, 0, nullptr, 0};
   const char *why = "";
   const size_t bytes = detector->state_bytes(params.data(), &view, &why);
   TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
@@ -167,7 +167,7 @@ void test_an_empty_picture_and_one_of_another_size(void) {
 void test_what_it_lacks_is_said(void) {
   begin();
   static const int32_t cameras[1] = {0};
-  const wm_view view = {&rig, cameras, nullptr, 0, nullptr, 0};
+  const wm_view view = {&rig, cameras, nullptr, 0, nullptr, 0, nullptr, 0};
   const char *why = "";
   rig.marker_size_m = std::nan("");
   TEST_ASSERT_EQUAL(0, detector->state_bytes(params.data(), &view, &why));

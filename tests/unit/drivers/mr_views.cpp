@@ -35,7 +35,7 @@ class Machine {
     rig_.marker_size_m = size_m;
     std::vector<char> params(detector->params.bytes);
     wm_params_defaults(&detector->params, params.data());
-    const wm_view view = {&rig_, &index_, nullptr, 0, nullptr, 0};
+    const wm_view view = {&rig_, &index_, nullptr, 0, nullptr, 0, nullptr, 0};
     const char *why = "";
     const size_t bytes = detector->state_bytes(params.data(), &view, &why);
     TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);

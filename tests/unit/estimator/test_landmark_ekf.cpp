@@ -33,6 +33,7 @@ double now_s;
 struct faults {
   double speed_scale = 1, yaw_scale = 1, yaw_bias = 0, lag_s = 0, sensor_yaw = 0, delay_s = 0, range_bias = 0;
   double misread = 0, gnss_delay_s = 0;
+  bool nameless = false;
 } fault;
 struct past {
   double t_s;
@@ -161,10 +162,14 @@ int drive(double for_s, unsigned sight, int seen = 3, bool carried_blind = false
       const bool wrong = wm_random_next_uniform(&noise) < fault.misread;
       const double bearing = wm::wrap(atan2(dy, dx) - eye.heading_rad + gauss(0.01));
       const double range = std::sqrt(dx * dx + dy * dy) + fault.range_bias + gauss(0.05);
-      const wm_event e = make::sighting(now_s, wrong ? landmarks[(step / 10 + 3 * k + 1) % 8].id : target.id,
-                                        sight & kBearings ? bearing : kAbsent, sight & kRanges ? range : kAbsent);
+      const int32_t read = wrong ? landmarks[(step / 10 + 3 * k + 1) % 8].id : target.id;
+      const wm_event e = make::sighting(now_s, fault.nameless ? -1 : read, sight & kBearings ? bearing : kAbsent,
+                                        sight & kRanges ? range : kAbsent);
       TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &e, records, 8, &count));
-      for (size_t r = 0; r < count; r++) fused += records[r].verdict == WM_FUSED;
+      for (size_t r = 0; r < count; r++) {
+        fused += records[r].verdict == WM_FUSED;
+        if (records[r].verdict == WM_FUSED && !wrong) TEST_ASSERT_EQUAL(target.id, records[r].landmark_id);
+      }
     }
   }
   return fused;
@@ -314,6 +319,27 @@ void test_misread_codes_are_rejected_and_do_no_harm(void) {
   drive(60, kBearings | kRanges);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.06, off());
   TEST_ASSERT_EQUAL_UINT32(1, estimate().resets);
+}
+
+// GIVEN sightings without an identity WHEN one landmark fits THEN it is that one; WHEN two fit THEN none is.
+void test_nameless_sightings_are_of_the_one_that_fits(void) {
+  fault.nameless = true;
+  params.associate_unknown = 1;
+  begin();
+  TEST_ASSERT_GREATER_THAN_INT(1400, drive(60, kBearings | kRanges));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.06, off());
+  free(state);
+  make_room();
+  fault.nameless = true;
+  params.associate_unknown = 1;
+  for (int i = 0; i < 4; i++) {  // each of them twice, a hand apart
+    landmarks[i + 4] = landmarks[i];
+    landmarks[i + 4].id += 1;
+    landmarks[i + 4].p_m[0] += 0.1;
+  }
+  begin();
+  TEST_ASSERT_LESS_THAN_INT(50, drive(20, kBearings | kRanges));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.5, off());
 }
 
 // GIVEN one landmark whose place on the map is wrong WHEN it is seen again and again THEN the filter does not get surer
@@ -475,6 +501,7 @@ int main(void) {
   RUN_TEST(test_it_finds_every_error_of_its_sensors);
   RUN_TEST(test_gnss_and_its_delay);
   RUN_TEST(test_misread_codes_are_rejected_and_do_no_harm);
+  RUN_TEST(test_nameless_sightings_are_of_the_one_that_fits);
   RUN_TEST(test_a_maps_error_is_not_averaged_away);
   RUN_TEST(test_given_a_wrong_start_when_landmarks_contradict_it_then_it_is_said_and_mended);
   RUN_TEST(test_given_a_kidnapped_robot_when_it_sees_bearings_only_then_it_finds_itself);

@@ -65,7 +65,7 @@ void draw(const Floor &floor, double mirror) {
 const wm_points &look() {
   const wm_detector *edges = wm_detector_find("edges");
   const int32_t front = 0;
-  const wm_view view = {&rig, &front, nullptr, 0, nullptr, 0};
+  const wm_view view = {&rig, &front, nullptr, 0, nullptr, 0, nullptr, 0};
   const char *why = "";
   state_memory.resize(edges->state_bytes(params.data(), &view, &why) + 64);
   void *state = state_memory.data() + (64 - reinterpret_cast<uintptr_t>(state_memory.data()) % 64);

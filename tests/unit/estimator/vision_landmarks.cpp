@@ -324,7 +324,7 @@ void setUp() {
       sign[static_cast<size_t>(y * kSignSide + x)] =
           static_cast<uint8_t>(sign_at((x + 0.5) / kSignSide - 0.5, 0.5 - (y + 0.5) / kSignSide));
   appearance = {7, kSignSide, kSignSide, sign.data(), kSize_m, kSize_m, -M_PI / 2 + 0.2};
-  view = {&rig, &kCamera, &landmark, 1, &appearance, 1};
+  view = {&rig, &kCamera, &landmark, 1, &appearance, 1, nullptr, 0};
   wm_params_defaults(&wm_landmarks_params_table, &params);
 }
 void tearDown() {}

@@ -310,7 +310,7 @@ void setUp() {
   wm_rig_init(&rig);
   rig.camera_count = 1;
   rig.cameras[0] = up_camera(0);
-  view = {&rig, &kCamera, nullptr, 0, nullptr, 0};
+  view = {&rig, &kCamera, nullptr, 0, nullptr, 0, nullptr, 0};
 }
 void tearDown() {}
 

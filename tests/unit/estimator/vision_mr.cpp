@@ -30,7 +30,7 @@ struct Machine {
     rig.marker_size_m = size_m;
     std::vector<char> params(mr->params.bytes);
     wm_params_defaults(&mr->params, params.data());
-    const wm_view view = {&rig, &camera, nullptr, 0, nullptr, 0};
+    const wm_view view = {&rig, &camera, nullptr, 0, nullptr, 0, nullptr, 0};
     const char *why = "";
     const size_t bytes = mr->state_bytes(params.data(), &view, &why);
     TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);

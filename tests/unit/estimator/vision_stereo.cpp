@@ -145,7 +145,7 @@ struct machine {
 
   explicit machine(bool fisheye = false) {
     sea::make_rig(&rig, fisheye);
-    view = {&rig, cameras, nullptr, 0, nullptr, 0};
+    view = {&rig, cameras, nullptr, 0, nullptr, 0, nullptr, 0};
     wm_params_defaults(&detector->params, &params);
     const char *why = "";
     const size_t bytes = detector->state_bytes(&params, &view, &why);

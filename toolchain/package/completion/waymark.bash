@@ -9,7 +9,7 @@ _waymark() {
   fi
   case $command in
     calibrate) [ "$COMP_CWORD" -eq 2 ] && more='import camera mounting' ;;
-    map) [ "$COMP_CWORD" -eq 2 ] && more='make check survey add-landmark look print-markers' ;;
+    map) [ "$COMP_CWORD" -eq 2 ] && more='make check survey add-landmark look print-markers train-cascade' ;;
   esac
   case "$command ${COMP_WORDS[2]:-}" in
     "calibrate import") words='--help --name --model --size --lens --out' ;;
@@ -21,6 +21,7 @@ _waymark() {
     "map add-landmark") words='--help --id --picture --at --sigma --size --yaw --from --corners --calibration --camera' ;;
     "map look") words='--help --picture --calibration --camera --pose --sigma --sigma-deg --mounting-deg --draw' ;;
     "map print-markers") words='--help --family --ids --size --paper --out' ;;
+    "map train-cascade") words='--help --size --out --rows --margin --size-min --stages --pictures --seed' ;;
   esac
   [ -n "$words" ] || case "$command" in
     "run") words='--config --recording --out --duration --speed --seed --landmarks --map --calibration' ;;
@@ -33,9 +34,9 @@ _waymark() {
     "calibrate") words='--help --name --model --size --lens --out --camera --chessboard --aprilgrid --tag --gap --every --most --picture --config --run --map' ;;
     "detect") words='--help --config --out --every' ;;
     "diff") words='--help' ;;
-    "eval") words='--help --json --published --reference --align --against --from --to --detector --camera --size-min --view' ;;
+    "eval") words='--help --json --published --reference --align --against --from --to --detector --camera --sizes --size-min --view' ;;
     "import") words='--help --out --camera --stamps --begin-ns --quality' ;;
-    "map") words='--help --resolution --origin --inside --walls-below --negate --fine --speck --clearance --out --recording --draw --poses --json --id --picture --at --sigma --size --yaw --from --corners --calibration --camera --pose --sigma-deg --mounting-deg --family --ids --paper' ;;
+    "map") words='--help --resolution --origin --inside --walls-below --negate --fine --speck --clearance --out --recording --draw --poses --json --id --picture --at --sigma --size --yaw --from --corners --calibration --camera --pose --sigma-deg --mounting-deg --family --ids --paper --rows --margin --size-min --stages --pictures --seed' ;;
     "reference") words='--help --map --range --particles --passes --seed' ;;
     "report") words='--help --out --svg' ;;
     "simulate") words='--help --out --seed --landmarks --laps --duration --no-video --frame --png --camera --contact-sheet --perfect' ;;

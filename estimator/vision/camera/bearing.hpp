@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// A ray of a camera as the filters' sensor model has it.
+#ifndef WAYMARK_ESTIMATOR_VISION_BEARING_HPP
+#define WAYMARK_ESTIMATOR_VISION_BEARING_HPP
+
+#include "math/elementary.hpp"
+#include "vision/camera/lens.hpp"
+
+namespace wm {
+
+// Whether the mounting's x axis points up or down rather than ahead, as in the filters' sensor model.
+inline bool is_steep(const wm_camera &camera) {
+  constexpr double kSteep = 0.7071;
+  return std::fabs(matrix_of_rpy(camera.mounting.rpy_rad).m[2][0]) > kSteep;
+}
+
+// The angle from the camera's axis to the left, in the camera's own axes; of a camera that looks up or down the azimuth
+// about its mounting's yaw. `ray` in optical axes, of any length.
+inline double sensor_bearing(const mounted_camera &camera, bool steep, const vec3 &ray) {
+  if (!steep) return atan2(-ray.x, ray.z);
+  const vec3 r = camera.R_base_optical * ray;
+  // The body's x and y axes in base_link are the optical z and minus x axes.
+  const auto &m = camera.R_base_optical.m;
+  const double yaw = atan2(m[0][1] * m[2][2] < 0 ? m[1][1] : m[1][2], m[0][1] * m[2][2] < 0 ? m[0][1] : m[0][2]);
+  return wrap(atan2(r.y, r.x) - yaw);
+}
+
+// When the row of a pixel was exposed; a frame's stamp is that of its middle row.
+inline wm_time_ns time_of_row(wm_time_ns middle_ns, double v_px, uint32_t height_px, wm_time_ns readout_ns) {
+  const double row = (v_px - 0.5 * (height_px - 1)) / (height_px - 1);
+  return middle_ns + static_cast<wm_time_ns>(std::floor(row * static_cast<double>(readout_ns) + 0.5));
+}
+
+}  // namespace wm
+
+#endif

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+// Detector `cascade`: things of a class (signs, posters) that boosted cascades were trained for, in OpenCV's format, on
+// the camera's panorama. It says where one is and how far away by its size, not which one: that is the filter's to
+// find.
+#include <cstring>
+#include <limits>
+
+#include "math/arc.hpp"
+#include "vision/camera/bearing.hpp"
+#include "vision/cascade/bands.hpp"
+#include "vision/cascade/evaluate.hpp"
+#include "vision/cascade/groups.hpp"
+#include "vision/cascade/params.h"
+#include "vision/parts.hpp"
+#include "vision/registry.h"
+
+namespace wm {
+namespace {
+
+constexpr size_t kCascadesMax = 8;
+
+struct cascade_state {
+  wm_cascade_params params;
+  mounted_camera camera;
+  panorama round;
+  pyramid picture;
+  window_groups groups;
+  const wm_cascade *cascades;
+  window_band bands[kCascadesMax];
+  size_t count;
+  double pixel_rad;
+  bool steep;
+  wm_time_ns readout_ns;
+  uint16_t *row;
+};
+
+double tilt_of(const wm_cascade_params &params) { return 3 * params.mounting_sigma_rad; }
+
+// Heights of the map's landmarks above the camera.
+bool heights_of(const wm_view &view, const mounted_camera &camera, double *low_m, double *high_m) {
+  *low_m = std::numeric_limits<double>::infinity();
+  *high_m = -*low_m;
+  for (size_t i = 0; i < view.landmark_count; i++) {
+    const double up = view.landmarks[i].p_m[2] - camera.centre_m.z;
+    if (!finite(up)) continue;
+    *low_m = up < *low_m ? up : *low_m;
+    *high_m = larger(*high_m, up);
+  }
+  return *low_m <= *high_m;
+}
+
+const char *why_not(const wm_view &view, const mounted_camera &camera) {
+  double low_m, high_m;
+  if (view.cascade_count == 0)
+    return "nothing says what is looked for: classes: [{file: sign.xml, height_m: 0.8}], cascades in OpenCV's format";
+  if (view.cascade_count > kCascadesMax) return "more than 8 classes";
+  if (!heights_of(view, camera, &low_m, &high_m)) return "there is no map of landmarks: landmarks.csv";
+  return nullptr;
+}
+
+// Puts the state's parts one behind the other; returns the bytes of all.
+size_t lay_out(cascade_state *state, const wm_cascade_params &params, const wm_view &view,
+               const mounted_camera &camera) {
+  parts memory(state, sizeof(cascade_state));
+  const auto width = static_cast<int32_t>(camera.width_px), height = static_cast<int32_t>(camera.height_px);
+  auto *levels = memory.take<uint8_t>(pyramid_bytes(width, height));
+  auto *row = memory.take<uint16_t>(camera.width_px);
+  double low_m, high_m;
+  heights_of(view, camera, &low_m, &high_m);
+  panorama round{};
+  double most_rows = 0;
+  for (size_t i = 0; i < view.cascade_count; i++) {
+    const wm_cascade &c = view.cascades[i];
+    const window_band band = band_of(c, low_m, high_m);
+    round.need(band.above + c.height_px, c.height_px - band.below);
+    most_rows = larger(most_rows, c.height_px);
+    if (state) state->bands[i] = band;
+  }
+  round.plan(camera, tilt_of(params), params.size_min_px / most_rows);
+  auto *around = memory.take<uint8_t>(round.bytes());
+  if (state) {
+    pyramid_lay(&state->picture, width, height, levels);
+    state->row = row;
+    round.make(camera, around);
+    state->round = round;
+  }
+  return memory.bytes();
+}
+
+size_t state_bytes(const void *params, const wm_view *view, const char **why) {
+  const wm_camera *camera = first_camera(view, why);
+  if (!camera) return 0;
+  mounted_camera mounted;
+  *why = mounted_camera_init(&mounted, *camera);
+  if (!*why) *why = why_not(*view, mounted);
+  return *why ? 0 : lay_out(nullptr, *static_cast<const wm_cascade_params *>(params), *view, mounted);
+}
+
+wm_status init(void *memory, const void *params, const wm_view *view) {
+  const char *why;
+  const wm_camera *camera = first_camera(view, &why);
+  if (!camera) return WM_BAD_CONFIG;
+  auto *state = static_cast<cascade_state *>(memory);
+  std::memset(static_cast<void *>(state), 0, sizeof *state);
+  state->params = *static_cast<const wm_cascade_params *>(params);
+  if (mounted_camera_init(&state->camera, *camera) || why_not(*view, state->camera)) return WM_BAD_CONFIG;
+  state->steep = is_steep(*camera);
+  state->readout_ns = camera->readout_ns;
+  state->cascades = view->cascades;
+  state->count = view->cascade_count;
+  lay_out(state, state->params, *view, state->camera);
+  double most_rows = 0;
+  for (size_t i = 0; i < state->count; i++) most_rows = larger(most_rows, state->cascades[i].height_px);
+  state->pixel_rad = state->round.round[0].step_rad * most_rows / state->params.size_min_px;
+  return WM_OK;
+}
+
+// All windows of a cascade in one cylinder.
+void look_at(cascade_state *self, size_t which, const cylinder &c) {
+  const wm_cascade &cascade = self->cascades[which];
+  const int width = static_cast<int>(cascade.width_px), height = static_cast<int>(cascade.height_px);
+  const integral sums = {c.sums, c.squares, c.columns + 1};
+  const int stages = static_cast<int>(cascade.stage_count);
+  int first, last;
+  rows_of(cascade, self->bands[which], c, tilt_of(self->params), &first, &last);
+  for (int y = first; y <= last; y++)
+    for (int x = 0; x + width <= c.columns; x++) {
+      double surplus;
+      const int passed = stages_passed(cascade, sums, x, y, &surplus);
+      if (passed <= 0) x++;  // where not even the first stage sees anything its neighbour won't either, as OpenCV has it
+      if (passed < stages) continue;
+      if (!c.is_seen(x, y) || !c.is_seen(x + width - 1, y) || !c.is_seen(x, y + height - 1) ||
+          !c.is_seen(x + width - 1, y + height - 1))
+        continue;
+      self->groups.add({c.left_rad - (x + 0.5 * (width - 1)) * c.step_rad,
+                        (c.horizon - y - 0.5 * (height - 1)) * c.step_rad, width * c.step_rad, height * c.step_rad,
+                        static_cast<int>(which)});
+    }
+}
+
+bool put(const cascade_state &self, const wm_frame &frame, const window_hit &seen, wm_event *out) {
+  const sin_cos a = sincos(seen.azimuth_rad);
+  const vec3 ray = transposed_times(self.camera.R_base_optical, {a.cos, a.sin, seen.tangent});
+  pixel at;
+  if (!project(self.camera.optics, ray, &at)) return false;
+  const double flat_m = self.cascades[seen.which].height_m / seen.height;
+  const double range_m = flat_m * std::sqrt(1 + square(seen.tangent));
+  const wm_cascade_params &p = self.params;
+  std::memset(static_cast<void *>(out), 0, WM_EVENT_SMALL_BYTES);
+  out->t_ns = time_of_row(frame.t_ns, at.v, frame.height_px, self.readout_ns);
+  out->kind = WM_EVENT_SIGHTING;
+  out->as.sighting = {0,
+                      -1,
+                      sensor_bearing(self.camera, self.steep, ray),
+                      range_m,
+                      std::sqrt(square(p.sigma_px * self.pixel_rad) + square(p.sigma_size * seen.width)),
+                      p.sigma_range * range_m};
+  return true;
+}
+
+// In the order of their rows' times.
+void in_order(wm_event *events, size_t count) {
+  alignas(wm_event) uint8_t moved[WM_EVENT_SMALL_BYTES];
+  for (size_t i = 1; i < count; i++) {
+    const wm_time_ns t_ns = events[i].t_ns;
+    std::memcpy(moved, &events[i], sizeof moved);
+    size_t at = i;
+    for (; at > 0 && events[at - 1].t_ns > t_ns; at--) std::memcpy(&events[at], &events[at - 1], sizeof moved);
+    std::memcpy(&events[at], moved, sizeof moved);
+  }
+}
+
+wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_event *out, size_t capacity,
+                 size_t *count) {
+  auto *self = static_cast<cascade_state *>(memory);
+  const wm_frame &frame = frames[0];
+  *count = 0;
+  if (frame.width_px != self->camera.width_px || frame.height_px != self->camera.height_px) return WM_BAD_DATA;
+  pyramid_take(&self->picture, frame, self->row);
+  self->round.take(self->picture);
+  self->groups.count = 0;
+  for (size_t i = 0; i < self->count; i++)
+    for (const cylinder &c : self->round.round) look_at(self, i, c);
+  self->groups.finish(self->params.neighbours_min);
+  for (size_t i = 0; i < self->groups.count && *count < capacity; i++)
+    *count += put(*self, frame, self->groups.list[i].mean, &out[*count]);
+  in_order(out, *count);
+  return WM_OK;
+}
+
+}  // namespace
+}  // namespace wm
+
+extern "C" const wm_detector wm_cascade_detector = {
+    "cascade",
+    "things of a class (signs, posters) by OpenCV's cascades, LBP or HAAR: bearings and distances without identities",
+    WM_EVENT_BIT(WM_EVENT_SIGHTING),
+    1,
+    wm_cascade_params_table,
+    wm::state_bytes,
+    wm::init,
+    wm::detect,
+    0,
+    nullptr,
+};
