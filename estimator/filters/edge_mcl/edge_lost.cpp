@@ -53,7 +53,7 @@ void edge_mcl::watch(double explained, int seen, double dt_s) {
   if (state_ == WM_STATE_TRACKING && lost_odds_ > kLostOdds) {
     state_ = WM_STATE_LOST;
     restore_calibration();
-  } else if (state_ != WM_STATE_TRACKING && lost_odds_ < kFoundOdds && has_no_rival()) {
+  } else if (state_ != WM_STATE_TRACKING && lost_odds_ < kFoundOdds) {
     state_ = WM_STATE_TRACKING;
     on_trial_ = false;
     apart_s_ = 0.0;
@@ -73,11 +73,6 @@ void edge_mcl::watch(double explained, int seen, double dt_s) {
   // Its own place stays one of those that are possible, so it is not left to wander to what happens to fit.
   if (state_ != WM_STATE_TRACKING && filter_.variance(kX) < square(kWander_m))
     filter_.inflate_pose(kLoosened_m2ps * dt_s, kLoosened_rad2ps * dt_s);
-}
-
-// A place that the search took must not only fit but fit better than the others that are possible.
-bool edge_mcl::has_no_rival() const {
-  return (state_ == WM_STATE_LOST && !on_trial_) || others_[0].share >= params_.search_share;
 }
 
 // Motion sensors were silent. The particles go to where the robot may have come; what was seen before can't be put
@@ -159,14 +154,11 @@ void edge_mcl::ponder(bool new_keyframe) {
   const int affordable = poses / kWeighingShare / place_search::kWeighingCost;
   const int weighed = !in_doubt_ || affordable < 1 ? 1 : affordable < kWeighedInDoubt ? affordable : kWeighedInDoubt;
   if (search_.step(map_, poses - weighed * place_search::kWeighingCost, filter_.odom())) others_.offer(search_);
-  // A place that was taken has spoken for itself by the keyframes alone, which are forgotten with the way; that nobody
-  // has carried it off since takes their place.
-  const double since = (filter_.travelled_m() - taken_m_) / place_search::kReach_m, proven = since < 1.0 ? since : 1.0;
   const double own_prior = state_ == WM_STATE_SEARCHING && !on_trial_ ? kNowhere
-                           : state_ == WM_STATE_TRACKING              ? kCarriedOff * proven
+                           : state_ == WM_STATE_TRACKING              ? kCarriedOff
                                                                       : 0.0;
   // One's own place explains at least what it explains now: it has been corrected all along, the others have not.
-  const double own_least = state_ == WM_STATE_TRACKING && proven >= 1.0 ? explained_ : 0.0;
+  const double own_least = state_ == WM_STATE_TRACKING ? explained_ : 0.0;
   others_.weigh(map_, &search_, own_prior, own_least, weighed);
   const int best = others_.best();
   const hypothesis &there = others_[best];
@@ -207,7 +199,6 @@ void edge_mcl::take_place(int hypothesis) {
   }
   lost_odds_ = 0.0;
   in_doubt_ = on_trial_ = true;
-  taken_m_ = filter_.travelled_m();
   if (!near(filter_.pose(), pose)) resets_++;
   others_.adopt(hypothesis);
   filter_.set_pose(pose, covariance);

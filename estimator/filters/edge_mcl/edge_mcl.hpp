@@ -85,7 +85,6 @@ class edge_mcl {
   void describe(const normal_equations &scan, const belief &prior, const alignment &a, wm_innovation *record) const;
   void pull_cloud(const normal_equations &equations);
   void watch(double explained, int seen, double dt_s);
-  bool has_no_rival() const;
   void doubt_motion();
   void heed_cloud();
   void ponder(bool new_keyframe);
@@ -126,7 +125,6 @@ class edge_mcl {
   double usual_;      // the same over a longer time, while the pose is trusted
   double apart_s_;    // the cloud's main cluster has been elsewhere, and better
   double alike_m_;    // way when look-alikes were last weighed
-  double taken_m_;    // way when a place that the search found was taken; further back: the pose was given
   double watched_m_;  // way when the last scan was judged
   uint32_t resets_;
   uint8_t state_;

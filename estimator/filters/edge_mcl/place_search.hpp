@@ -22,7 +22,6 @@ struct place {
 class place_search {
  public:
   static constexpr int kPlaces = 24;
-  static constexpr double kReach_m = 6.4;  // way that the keyframes hold
   // What explained() costs, 2 poses a point looked up, and what a place costs that step() aligns, 4 a point (about as
   // measured: wider gates, colder memory). step() needs the latter to come to an end some day.
   static constexpr int kWeighingCost = 2 * (4 * WM_POINTS_MAX / 2 + WM_POINTS_MAX);
