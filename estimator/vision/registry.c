@@ -3,8 +3,8 @@
 
 #include <string.h>
 
-static const wm_detector *const kDetectors[] = {&wm_cascade_detector, &wm_edges_detector, &wm_landmarks_detector, &wm_lines_detector,
-                                                &wm_mr_detector, &wm_stereo_detector};
+static const wm_detector *const kDetectors[] = {&wm_cascade_detector, &wm_edges_detector, &wm_landmarks_detector,
+                                                &wm_lines_detector,   &wm_mr_detector,    &wm_stereo_detector};
 static const size_t kCount = sizeof kDetectors / sizeof kDetectors[0];
 
 const wm_detector *const *wm_detectors(size_t *count) {

@@ -127,7 +127,8 @@ void look_at(cascade_state *self, size_t which, const cylinder &c) {
     for (int x = 0; x + width <= c.columns; x++) {
       double surplus;
       const int passed = stages_passed(cascade, sums, x, y, &surplus);
-      if (passed <= 0) x++;  // where not even the first stage sees anything its neighbour won't either, as OpenCV has it
+      if (passed <= 0)
+        x++;  // where not even the first stage sees anything its neighbour won't either, as OpenCV has it
       if (passed < stages) continue;
       if (!c.is_seen(x, y) || !c.is_seen(x + width - 1, y) || !c.is_seen(x, y + height - 1) ||
           !c.is_seen(x + width - 1, y + height - 1))
