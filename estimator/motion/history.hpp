@@ -29,6 +29,7 @@ struct motion_stretch {
   double dt_s;
   double changed[2];  // at its beginning: by how much the input's a and b differ from the one before
   double silent_s;    // at its beginning: for how long the next input has been overdue; below 0: it isn't
+  double unknown_s;   // at its beginning: for how long the input has been held for too long; 0: it isn't
   bool has_next;      // a later input has come
   bool first, last;   // of the interval: their length depends on the lag
 };
@@ -77,6 +78,7 @@ class motion_history {
         if (!piece.input.stale && end > held_until) end = held_until;
         if (piece.input.counted) piece.input.stale = 0;  // the way is known, however long it took
         piece.silent_s = wm_seconds_between(piece.input.t_ns, begin) - due_s(next, oldest);
+        piece.unknown_s = begin > held_until ? wm_seconds_between(held_until, begin) : 0.0;
         const bool begins = next > oldest + 1 && begin == piece.input.t_ns;
         piece.changed[0] = begins ? piece.input.a - at(next - 2).a : 0.0;
         piece.changed[1] = begins ? piece.input.b - at(next - 2).b : 0.0;
@@ -84,6 +86,7 @@ class motion_history {
         piece.input = motion_input{};
         piece.changed[0] = piece.changed[1] = 0.0;
         piece.silent_s = -1.0;
+        piece.unknown_s = 0.0;
       }
       piece.has_next = next < count_;
       piece.dt_s = wm_seconds_between(begin, end);

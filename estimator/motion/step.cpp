@@ -154,8 +154,6 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
 double least(double a, double b) { return a < b ? a : b; }
 
 void add_silence(const motion_stretch &stretch, const wm_motion_params &p, bool is_counted, motion_noise *noise) {
-  const double from_s = stretch.silent_s > 0.0 ? stretch.silent_s : 0.0, to_s = stretch.silent_s + stretch.dt_s;
-  if (to_s <= from_s) return;
   if (stretch.input.stale) {
     // It may have gone on all the while, in whatever direction: as it last did, or as it may have begun to while the
     // last input was held.
@@ -163,13 +161,14 @@ void add_silence(const motion_stretch &stretch, const wm_motion_params &p, bool 
     const double last_mps = stretch.input.model == WM_MOTION_TICKS && right > left ? right : left;
     const double begun_mps = 0.5 * p.noise_hold_mps2 * p.hold_max_s;
     const double speed_mps = last_mps > begun_mps ? last_mps : begun_mps;
-    const double unknown_from_s = from_s > p.hold_max_s ? from_s - p.hold_max_s : 0.0;
-    const double unknown_to_s = to_s > p.hold_max_s ? to_s - p.hold_max_s : 0.0;
-    const double gone_m2 = square(speed_mps) * (square(unknown_to_s) - square(unknown_from_s));
+    const double unknown_to_s = stretch.unknown_s + stretch.dt_s;
+    const double gone_m2 = square(speed_mps) * (square(unknown_to_s) - square(stretch.unknown_s));
     noise->way_m2 += gone_m2;
     noise->side_m2 += gone_m2;
     return;
   }
+  const double from_s = stretch.silent_s > 0.0 ? stretch.silent_s : 0.0, to_s = stretch.silent_s + stretch.dt_s;
+  if (to_s <= from_s) return;
   // Variances that add up to the square of the whole, however the time is cut.
   const double held_from_s = from_s < p.hold_max_s ? from_s : p.hold_max_s;
   const double held_to_s = to_s < p.hold_max_s ? to_s : p.hold_max_s;

@@ -313,7 +313,7 @@ def box(work):
     lost_s = next((t for t, p in heard.poses if t > elsewhere_s and p.state == 3), math.inf)
     heard.check(lost_s < 45, f"lost {lost_s - elsewhere_s:.1f} s after it was told a wrong place")
     for what, until_s in (("died-0001", killed_s), ("lost-0002", lost_s + keep_s / 4)):
-        times, fused = [], {CAN: 0, CAMERA: 0}
+        times, received = [], {CAN: 0, CAMERA: 0}
         for part in ("before", "now"):
             log, out = drive.folder / f"box/{what}-{part}.wmlog", drive.folder / f"{what}-{part}"
             replay = subprocess.run([BUILD / "bin/waymark", "replay", log, "--map", drive.world / "recording/map/map.yaml", "--out", out], capture_output=True, text=True)
@@ -321,12 +321,12 @@ def box(work):
                 heard.check(False, f"{what}-{part} doesn't replay: {replay.stderr[-300:]}")
                 continue
             times += [(row[0] - drive.begin_ns) * 1e-9 for row in drives.table(out / "trajectory.csv")]
-            for name in fused:
-                fused[name] += json.loads((out / "health.json").read_text())["sources"][name]["fused"]
+            for name in received:
+                received[name] += json.loads((out / "health.json").read_text())["sources"][name]["received"]
         span_s = times[-1] - times[0] if times else 0
         heard.check(keep_s - 1 < span_s < 2 * keep_s + 1 and until_s - 1.5 < times[-1] < until_s + 1,
                     f"{what}: poses of {span_s:.1f} s, to {until_s - times[-1]:.1f} s before it")
-        heard.check(fused[CAN] > 200 * span_s and fused[CAMERA] > 0.7 * RATE_HZ * span_s, f"{what}: fused {fused}")
+        heard.check(received[CAN] > 200 * span_s and received[CAMERA] > 0.7 * RATE_HZ * span_s, f"{what}: has {received}")
         stamps, whole = [], 0
         for part in "ab":
             video = drive.folder / f"box/{what}-front-{part}.avi"

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The bus falls silent for seconds while the robot drives, turns or sets off, with and without landmarks in view: until
-and after it is back the pose is no further from the truth than its sigma says, and soon it is right again."""
+and after it is back the pose is no further from the truth than its sigma says, and soon it is right again. One bearing
+in a hundred is false: where the pose is vague, one of them may fit."""
 import bisect
 import csv
 import math
@@ -15,7 +16,7 @@ CONFIG = ROOT / "config/crossing-points.yaml"
 WORLD = ROOT / "config/worlds/crossing-laps.yaml"
 SILENCES_S = (3, 6, 20)
 BEGINS_S = (12, 25, 38, 50, 62, 75)  # turns, straights and a stop
-SIGMAS = 5.0
+SIGMAS, BEYOND = 5.0, 0.01
 RIGHT_M, RIGHT_RAD, RIGHT_AFTER_S = 0.3, 0.1, 5.0
 
 
@@ -51,8 +52,8 @@ def silence(recording, to, begin_ns, end_ns, blind):
 
 
 def judge(trajectory, truth, begin_ns, end_ns):
-    """(the largest error in sigmas from the silence on, s after its end when the pose was last not right)"""
-    worst = late_s = 0.0
+    """(errors in sigmas from the silence on, s after its end when the pose was last not right)"""
+    sigmas, late_s = [], 0.0
     with open(trajectory) as file:
         for row in csv.DictReader(file):
             t_ns = int(row["t_ns"])
@@ -63,10 +64,10 @@ def judge(trajectory, truth, begin_ns, end_ns):
             turned = abs(math.remainder(yaw(row) - heading, math.tau))
             xx, xy, yy = (float(row[k]) for k in ("cov_xx", "cov_xy", "cov_yy"))
             place = math.sqrt((yy * dx * dx - 2 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
-            worst = max(worst, place, turned / math.sqrt(float(row["cov_tt"])))
+            sigmas.append(max(place, turned / math.sqrt(float(row["cov_tt"]))))
             if t_ns >= end_ns and (math.hypot(dx, dy) > RIGHT_M or turned > RIGHT_RAD):
                 late_s = (t_ns - end_ns) * 1e-9
-    return worst, late_s
+    return sigmas, late_s
 
 
 with tempfile.TemporaryDirectory() as temporary:
@@ -82,10 +83,11 @@ with tempfile.TemporaryDirectory() as temporary:
                 end_ns = begin_ns + seconds * 1_000_000_000
                 silence(recording, work / "silent", begin_ns, end_ns, blind)
                 run("waymark", "replay", work / "silent", "--config", CONFIG, "--out", work / "run", "--until", begin_s + seconds + 31)
-                worst, late_s = judge(work / "run/trajectory.csv", truth, begin_ns, end_ns)
-                sigmas.append(worst)
+                errors, late_s = judge(work / "run/trajectory.csv", truth, begin_ns, end_ns)
+                sigmas += errors
                 late.append(late_s)
             what = f"{seconds} s without the bus{' and the cameras' if blind else ''}"
-            check(max(sigmas) < SIGMAS, f"{what}: at most {max(sigmas):.1f} sigma off")
+            beyond = sum(e > SIGMAS for e in sigmas) / len(sigmas)
+            check(beyond < BEYOND, f"{what}: {100 * beyond:.2f} % of the poses beyond {SIGMAS:.0f} sigma, at most {max(sigmas):.1f}")
             check(max(late) < RIGHT_AFTER_S, f"{what}: right again after {max(late):.1f} s at most")
 sys.exit(bool(failures))
