@@ -191,12 +191,12 @@ def clock(work):
 
 def can(work):
     """The bus breaks in four ways."""
-    drive = Drive(work, "crossing", "can", [(8, 11, "can_down"), (15.5, 18.5, "can_removed"), (21, 27, "can_lost", 2), (31, 33.5, "bus_off")])
+    drive = Drive(work, "crossing", "can", [(8, 11, "can_down"), (15.5, 18.5, "can_removed"), (21, 27, "can_lost", 2), (31, 33.8, "bus_off")])
     run = drive.run()
     drive.end(run, 38)
     heard = drive.hear()
     heard.check(run.returncode == 0, f"exit code {run.returncode}")
-    for what, from_s, until_s, state in (("interface down", 8, 11, DOWN), ("adapter removed", 15.5, 18.5, ABSENT), ("bus-off", 31, 33.5, BUS_OFF)):
+    for what, from_s, until_s, state in (("interface down", 8, 11, DOWN), ("adapter removed", 15.5, 18.5, ABSENT), ("bus-off", 31, 33.8, BUS_OFF)):
         usual_m = 3 * heard.sigma_at(from_s)
         poses = heard.goes_on(what, from_s, until_s)
         heard.check(all(p.status_flags & MOTION_STALE for t, p in poses if t > from_s + 1), f"{what}: poses say that motion is stale")
