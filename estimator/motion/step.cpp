@@ -92,6 +92,8 @@ motion_twist from_steering(double speed, double road_wheel, const wm_motion_cali
   return t;
 }
 
+double least(double a, double b) { return a < b ? a : b; }
+
 }  // namespace
 
 motion_twist twist_of(const motion_input &input, const wm_motion_calibration &c, const wm_wheels &wheels) {
@@ -150,8 +152,6 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
   }
   return n;
 }
-
-double least(double a, double b) { return a < b ? a : b; }
 
 void add_silence(const motion_stretch &stretch, const wm_motion_params &p, bool is_counted, motion_noise *noise) {
   if (stretch.input.stale) {

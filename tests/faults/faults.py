@@ -206,7 +206,7 @@ def can(work):
     heard.goes_on("2 % of CAN frames lost", 21, 27)
     heard.goes_on("2 % of CAN frames lost, over", 27, 31)
     heard.device("2 % of CAN frames lost", CAN, WORKS, 22, 27)
-    heard.is_said("can0 went down")
+    heard.is_said("can0 went down", or_else="can0 is down (")  # who notices first: who reads, or who looks after it
     heard.is_said("can0 is gone (No such device)")
     return heard.failures
 

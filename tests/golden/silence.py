@@ -90,4 +90,12 @@ with tempfile.TemporaryDirectory() as temporary:
             beyond = sum(e > SIGMAS for e in sigmas) / len(sigmas)
             check(beyond < BEYOND, f"{what}: {100 * beyond:.2f} % of the poses beyond {SIGMAS:.0f} sigma, at most {max(sigmas):.1f}")
             check(max(late) < RIGHT_AFTER_S, f"{what}: right again after {max(late):.1f} s at most")
+    # The bus stays silent for ever, the cameras are back after 12 s: what they see is used.
+    begin_ns, back_ns = truth.t_ns[0] + 38_000_000_000, truth.t_ns[0] + 50_000_000_000
+    silence(recording, work / "silent", begin_ns, back_ns, True)
+    silence(work / "silent", work / "dead", begin_ns, 1 << 62, False)
+    run("waymark", "replay", work / "dead", "--config", CONFIG, "--out", work / "run", "--until", 75)
+    with open(work / "run/innovations.csv") as file:
+        verdicts = [row["verdict"] for row in csv.DictReader(file) if int(row["t_ns"]) >= back_ns]
+    check(verdicts.count("fused") > 0.8 * len(verdicts), f"no bus any more: {verdicts.count('fused')} of {len(verdicts)} sightings are fused")
 sys.exit(bool(failures))

@@ -81,8 +81,8 @@ class Published:
         self.check(now < sigma_m, f"{what}, over: sigma {now:.3f} m again, {sigma_m:.3f} before")
         self.check(any(p.state == 1 for _, p in poses), f"{what}, over: tracking again")
 
-    def is_said(self, text, times=1):
-        n = self.said().count(text)
+    def is_said(self, text, times=1, or_else=None):
+        n = self.said().count(text) + (self.said().count(or_else) if or_else else 0)
         self.check(n == times, f"'{text}' is said {n} times, {times} is right")
 
     def sigma_at(self, at_s):

@@ -229,7 +229,7 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
       params_.range_sigma_factor * first_number(s.range_sigma_m, sensor.range_sigma_m, params_.range_sigma_default_m);
   int landmark = s.landmark_id >= 0 ? find_landmark(s.landmark_id) : -1;
   if (s.landmark_id >= 0 && landmark < 0) return drop(WM_REJECTED_UNKNOWN_ID);
-  if (landmark < 0 && params_.associate_unknown && (state_ == WM_STATE_TRACKING || state_ == WM_STATE_DEAD_RECKONING))
+  if (landmark < 0 && params_.associate_unknown && state_ == WM_STATE_TRACKING)
     landmark = associate(event, {bearing_sigma, range_sigma}, past);
   if (landmark < 0) return drop(WM_REJECTED_NO_ASSOCIATION);
   const wm_landmark &target = setup_->landmarks[landmark];

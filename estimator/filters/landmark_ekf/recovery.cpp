@@ -129,16 +129,17 @@ void landmark_ekf::restore_calibration() {
 }
 
 // Is the pose unknown, or so vague (a robot that stood blind for seconds while it turned) that what is seen should find
-// it rather than correct it? A range says nothing of the heading, which its motion shows in time.
+// it rather than correct it? A range says nothing of the heading, which its motion shows in time. While nobody knows
+// how the robot moves, what is seen can't be carried together, and corrects as well as it can.
 bool landmark_ekf::is_sought(wm_time_ns t_ns, bool by_bearing) {
   if (state_ == WM_STATE_SEARCHING) return true;
   const double heading = filter_.variance(kHeading), spread = 0.5 * (filter_.variance(kX) + filter_.variance(kY));
   const bool vague = (by_bearing && heading > square(kVague_rad)) || spread > square(kVaguePlace) * map_variance_m2_;
-  if (!params_.recover || state_ != WM_STATE_TRACKING || !vague) {
+  if (!params_.recover || state_ != WM_STATE_TRACKING || !vague || filter_.is_overdue()) {
     vague_ns_ = WM_TIME_NONE;
     return false;
   }
-  if (vague_ns_ == WM_TIME_NONE || filter_.is_overdue()) {
+  if (vague_ns_ == WM_TIME_NONE) {
     vague_ns_ = t_ns;
     search_clue &place = vague_[0] = {};
     place.t_ns = t_ns;
@@ -171,7 +172,7 @@ void landmark_ekf::search(wm_time_ns since_ns, const search_clue *prior, int pri
   if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now) < kSearchEvery_s) return;
   searched_ns_ = now;
   const search_limits limits = {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad,
-                                kNumbers + (state_ == WM_STATE_TRACKING ? kPoseNumbers : 0)};
+                                kNumbers + (prior == vague_ ? kPoseNumbers : 0)};
   search_result result =
       clues_.find(since_ns, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), prior, prior_count, limits);
   if (!result.found) return;
