@@ -2,6 +2,7 @@
 #include "filters/edge_mcl/lookalikes.hpp"
 
 #include "filters/edge_mcl/align.hpp"
+#include "filters/edge_mcl/keep_best.hpp"
 #include "math/arc.hpp"
 
 namespace wm {
@@ -202,25 +203,8 @@ int lookalikes::sweep(const edge_map &map, const search_field &field, int poses)
   return poses;
 }
 
-// Keeps the best, one of each place.
 void lookalikes::offer(const wm_pose2 &pose, int64_t score) {
-  if (found_count_ == kMost && score <= found_[kMost - 1].score) return;
-  if (same(pose, swept_from_)) return;
-  int at = found_count_;
-  for (int i = 0; i < found_count_; i++)
-    if (same(found_[i].pose, pose)) {
-      if (found_[i].score >= score) return;
-      at = i;
-      break;
-    }
-  if (at == found_count_) {
-    if (found_count_ < kMost)
-      found_count_++;
-    else
-      at = kMost - 1;
-  }
-  for (; at > 0 && found_[at - 1].score < score; at--) found_[at] = found_[at - 1];
-  found_[at] = {pose, score};
+  if (!same(pose, swept_from_)) keep_best(found_, &found_count_, {pose, score}, same);
 }
 
 bool lookalikes::known(const wm_pose2 &pose) const {

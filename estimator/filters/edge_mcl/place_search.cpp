@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "filters/edge_mcl/align.hpp"
+#include "filters/edge_mcl/keep_best.hpp"
 #include "math/arc.hpp"
 
 namespace wm {
@@ -113,24 +114,8 @@ void place_search::turn_points(const edge_map &map) {
   }
 }
 
-// Keeps the best, one of each place.
 void place_search::offer(const wm_pose2 &pose, int32_t score) {
-  if (place_count_ == kPlaces && score <= places_[kPlaces - 1].score) return;
-  int at = place_count_;
-  for (int i = 0; i < place_count_; i++)
-    if (same_place(places_[i].pose, pose)) {
-      if (places_[i].score >= score) return;
-      at = i;
-      break;
-    }
-  if (at == place_count_) {
-    if (place_count_ < kPlaces)
-      place_count_++;
-    else
-      at = kPlaces - 1;
-  }
-  for (; at > 0 && places_[at - 1].score < score; at--) places_[at] = places_[at - 1];
-  places_[at] = {pose, score, 0.0};
+  keep_best(places_, &place_count_, {pose, score, 0.0}, same_place);
 }
 
 // What the first points of a pose must come to for the rest to be looked at.
