@@ -7,6 +7,7 @@
 #include <ctime>
 #include <vector>
 
+#include "common/fisheye_rig.hpp"
 #include "vision/landmarks/align.hpp"
 #include "vision/landmarks/everywhere.hpp"
 #include "vision/landmarks/guess.hpp"
@@ -39,18 +40,9 @@ struct Street {
   std::vector<uint8_t> sign[kSigns], picture;
   wm_estimate pose{};
 
-  Street() : picture(kWidth * kHeight) {
-    wm_rig_init(&rig);
-    rig.camera_count = 1;
-    wm_camera &c = rig.cameras[0];
-    c = wm_camera{};
-    c.model = WM_CAMERA_EQUIDISTANT;
-    c.width_px = kWidth;
-    c.height_px = kHeight;
-    const double intrinsics[] = {424, 424, 640, 360};
-    std::copy(intrinsics, intrinsics + 4, c.intrinsics);
-    c.intrinsics_count = 4;
-    c.mounting = {{0, 0, 1.4}, {0, 0, 0}};
+  Street()
+      : rig(wm::drawn::rig_of({wm::drawn::fisheye(kWidth, kHeight, 424, {{0, 0, 1.4}, {0, 0, 0}})})),
+        picture(kWidth * kHeight) {
     pose.state = WM_STATE_TRACKING;
     pose.dof = 3;
     pose.pose_map_base.q_xyzw[3] = 1;

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <vector>
 
+#include "common/fisheye_rig.hpp"
 #include "unity.h"
 #include "vision/camera/lens.hpp"
 #include "vision/edges/params.h"
@@ -54,19 +55,9 @@ wm_cascade cascade = {1, 12, 12, 0.5, 1, 1, 2, 1, 1, &kBlock, &kBrighter, kLeave
 using Picture = std::vector<uint8_t>;
 
 void make_rig() {
-  wm_rig_init(&rig);
-  rig.camera_count = 2;
-  for (int i = 0; i < 2; i++) {
-    wm_camera &c = rig.cameras[i];
-    c = wm_camera{};
-    c.model = WM_CAMERA_EQUIDISTANT;
-    c.width_px = kWidth;
-    c.height_px = kHeight;
-    const double intrinsics[] = {260, 260, 320, 180};
-    c.intrinsics_count = 4;
-    std::copy(intrinsics, intrinsics + 4, c.intrinsics);
-    c.mounting = {{0.5, 0.1 - 0.2 * i, 0.4}, {0, 22 * M_PI / 180, 0}};
-  }
+  const double down_rad = 22 * M_PI / 180;
+  rig = wm::drawn::rig_of({wm::drawn::fisheye(kWidth, kHeight, 260, {{0.5, 0.1, 0.4}, {0, down_rad, 0}}),
+                           wm::drawn::fisheye(kWidth, kHeight, 260, {{0.5, -0.1, 0.4}, {0, down_rad, 0}})});
   rig.stereo = {0, 1, 0.2, {260, 260, 320, 180}, {1, 1, 1, 1}};
   std::strcpy(rig.marker_family, "mr");
   rig.marker_size_m = 0.2;

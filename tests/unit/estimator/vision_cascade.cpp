@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "common/fisheye_rig.hpp"
 #include "unity.h"
 #include "vision/camera/bearing.hpp"
 #include "vision/cascade/evaluate.hpp"
@@ -262,18 +263,8 @@ void files_of_opencv() {
 }  // namespace
 
 void setUp() {
-  wm_rig_init(&rig);
-  rig.camera_count = 1;
-  wm_camera &c = rig.cameras[0];
-  c = wm_camera{};
-  c.model = WM_CAMERA_EQUIDISTANT;
-  c.width_px = kWidth;
-  c.height_px = kHeight;
-  const double intrinsics[] = {160, 160, 240, 150};
-  c.intrinsics_count = 4;
-  std::copy(intrinsics, intrinsics + 4, c.intrinsics);
-  c.mounting = {{0, 0, 1.4}, {0.02, -0.07, 0.8}};
-  c.readout_ns = 30'000'000;
+  rig = wm::drawn::rig_of({wm::drawn::fisheye(kWidth, kHeight, 160, {{0, 0, 1.4}, {0.02, -0.07, 0.8}})});
+  rig.cameras[0].readout_ns = 30'000'000;
   landmark = {7, {4, 0, 2.4}, 0.02, static_cast<double>(NAN), {0, 0, 0}, 0};
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_cascade_parse(kBright, sizeof kBright - 1, "bright.xml", &cascade, &err),
                             err.text);

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/fisheye_rig.hpp"
 #include "unity.h"
 #include "vision/camera/lens.hpp"
 #include "waymark/detector.h"
@@ -158,18 +159,8 @@ void a_lone_point_is_left_out() {
 }  // namespace
 
 void setUp() {
-  wm_rig_init(&rig);
-  rig.camera_count = 1;
-  wm_camera &c = rig.cameras[0];
-  c = wm_camera{};
-  c.model = WM_CAMERA_EQUIDISTANT;
-  c.width_px = kWidth;
-  c.height_px = kHeight;
-  c.intrinsics_count = 4;
-  const double intrinsics[] = {522, 522, 640, 360};
-  std::copy(intrinsics, intrinsics + 4, c.intrinsics);
-  c.mounting = {{0.5, 0, 0.4}, {0, 22 * M_PI / 180, 0}};
-  TEST_ASSERT_NULL(wm::mounted_camera_init(&camera, c));
+  rig = wm::drawn::rig_of({wm::drawn::fisheye(kWidth, kHeight, 522, {{0.5, 0, 0.4}, {0, 22 * M_PI / 180, 0}})});
+  TEST_ASSERT_NULL(wm::mounted_camera_init(&camera, rig.cameras[0]));
   const wm_param_table &table = wm_detector_find("edges")->params;
   params.assign(table.bytes + 1, 0);
   wm_params_defaults(&table, params.data());

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <vector>
 
+#include "common/fisheye_rig.hpp"
 #include "unity.h"
 #include "vision/camera/lens.hpp"
 #include "vision/landmarks/params.h"
@@ -305,18 +306,8 @@ void pictures_of_another_maps_landmarks_are_refused() {
 }  // namespace
 
 void setUp() {
-  wm_rig_init(&rig);
-  rig.camera_count = 1;
-  wm_camera &c = rig.cameras[0];
-  c = wm_camera{};
-  c.model = WM_CAMERA_EQUIDISTANT;
-  c.width_px = kWidth;
-  c.height_px = kHeight;
-  const double intrinsics[] = {159, 159, 240, 150}, distortion[] = {-0.011, 0.004, -0.002, 0.0003};
-  c.intrinsics_count = c.distortion_count = 4;
-  std::copy(intrinsics, intrinsics + 4, c.intrinsics);
-  std::copy(distortion, distortion + 4, c.distortion);
-  c.mounting = {{0.5, 0.1, 1.2}, {0.01, -0.07, 0.2}};
+  rig = wm::drawn::rig_of({wm::drawn::fisheye(kWidth, kHeight, 159, {{0.5, 0.1, 1.2}, {0.01, -0.07, 0.2}},
+                                              {-0.011, 0.004, -0.002, 0.0003})});
   landmark = {7, {6, 0.5, 2.0}, 0.02, static_cast<double>(NAN), {0, 0, 0}, 0};
   sign.resize(kSignSide * kSignSide);
   for (int y = 0; y < kSignSide; y++)
