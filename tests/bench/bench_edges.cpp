@@ -2,8 +2,6 @@
 // What edge_mcl's parts cost on a map of 4676 x 1372 pixels at 75 a metre: making the map ready, the update of a
 // cloud's weights by 180 points, one whole scan. Medians of single calls, one thread. With a map.yaml as its argument,
 // that file's loading and making ready.
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -15,34 +13,12 @@
 #include "drawn_map.h"
 #include "drawn_search.h"
 #include "filters/edge_mcl/cloud.hpp"
+#include "timing.h"
 #include "waymark/estimator.h"
 #include "waymark/map.h"
 #include "waymark/random.h"
 
 namespace {
-
-// Of this thread alone: other work on the machine is not counted.
-double now_us() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return (double)t.tv_sec * 1e6 + (double)t.tv_nsec * 1e-3;
-}
-
-double median(std::vector<double> v) {
-  std::nth_element(v.begin(), v.begin() + (std::ptrdiff_t)v.size() / 2, v.end());
-  return v[v.size() / 2];
-}
-
-template <class Work>
-double time_us(int runs, Work work) {
-  std::vector<double> each;
-  for (int i = 0; i < runs; i++) {
-    const double begin = now_us();
-    work();
-    each.push_back(now_us() - begin);
-  }
-  return median(each);
-}
 
 // What the filter makes of a map at its start.
 struct ready_map {
@@ -66,9 +42,9 @@ struct ready_map {
 
 void bench_cloud(int particles) {
   bench::cloud_at_work work(particles);
-  const double weights = time_us(2001, [&] { work.weigh(); });
-  const double move = time_us(2001, [&] { work.move(); });
-  const double resample = time_us(2001, [&] { work.resample(); });
+  const double weights = bench::median_us(2001, [&] { work.weigh(); });
+  const double move = bench::median_us(2001, [&] { work.move(); });
+  const double resample = bench::median_us(2001, [&] { work.resample(); });
   std::printf("%5d particles x %d points: weights %8.1f us, moving %7.1f us, resampling %7.1f us\n", particles,
               bench::kScanPoints, weights, move, resample);
 }
@@ -79,9 +55,9 @@ void bench_search() {
   std::vector<double> each;
   for (int i = 0; i < 600; i++) {
     work.prepare();
-    const double begin = now_us();
+    const double begin = bench::thread_us();
     work.scan();
-    const double end = now_us();
+    const double end = bench::thread_us();
     if (work.searching()) each.push_back(end - begin);
   }
   if (each.empty()) return;
@@ -96,7 +72,7 @@ int main(int argc, char **argv) {
   const std::vector<uint8_t> edges = bench::drawn_edges();
   const wm_raster raster = {bench::kMapWidth, bench::kMapHeight, bench::kMapPixel_m, 0, 0, 0, edges.data(), nullptr, 0};
   ready_map made;
-  const double ready = time_us(11, [&] { made.make(raster); });
+  const double ready = bench::median_us(11, [&] { made.make(raster); });
   std::printf("map of %d x %d pixels made ready in %.1f ms, %.1f MB\n", bench::kMapWidth, bench::kMapHeight,
               ready * 1e-3, (double)made.bytes * 1e-6);
   bench_cloud(200);
@@ -105,13 +81,13 @@ int main(int argc, char **argv) {
   if (argc > 1) {
     wm_map *loaded = nullptr;
     wm_error err = {};
-    const double load = time_us(5, [&] {
+    const double load = bench::median_us(5, [&] {
       wm_map_free(loaded);
       if (wm_map_load(argv[1], nullptr, nullptr, &loaded, &err) != WM_OK) std::fprintf(stderr, "%s\n", err.text);
     });
     if (!loaded) return 1;
     ready_map real;
-    const double build = time_us(5, [&] { real.make(*wm_map_raster(loaded)); });
+    const double build = bench::median_us(5, [&] { real.make(*wm_map_raster(loaded)); });
     std::printf("%s: %u x %u pixels loaded in %.1f ms, made ready in %.1f ms, %.1f MB\n", argv[1],
                 wm_map_raster(loaded)->width_px, wm_map_raster(loaded)->height_px, load * 1e-3, build * 1e-3,
                 (double)real.bytes * 1e-6);

@@ -1,37 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the landmark filter costs: medians in nanoseconds of predict, of one bearing, of both, for filters of several
 // sizes. Each figure is the median of single calls, the clock's own cost taken away.
-#include <time.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <vector>
 
 #include "landmark_drive.h"
+#include "timing.h"
 
 namespace {
 
 constexpr int kRuns = 20000;
 
-int64_t now_ns() {
-  timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return t.tv_sec * INT64_C(1000000000) + t.tv_nsec;
-}
-
-double median(std::vector<double> &v) {
-  std::nth_element(v.begin(), v.begin() + (std::ptrdiff_t)v.size() / 2, v.end());
-  return v[v.size() / 2];
-}
-
 double clock_cost() {
   std::vector<double> cost;
   for (int i = 0; i < kRuns; i++) {
-    const int64_t a = now_ns(), b = now_ns();
+    const int64_t a = bench::now_ns(), b = bench::now_ns();
     cost.push_back((double)(b - a));
   }
-  return median(cost);
+  return bench::median(cost);
 }
 
 void measure(const char *title, const std::vector<bench::setting> &settings, bool range) {
@@ -41,11 +29,11 @@ void measure(const char *title, const std::vector<bench::setting> &settings, boo
   int fused = 0, rejected = 0;
   for (int i = 0; i < kRuns; i++) {
     const bench::landmark_drive::step now = drive.at(i);
-    const int64_t a = now_ns();
+    const int64_t a = bench::now_ns();
     drive.predict(now);
-    const int64_t b = now_ns();
+    const int64_t b = bench::now_ns();
     const bool is_fused = drive.correct(now);
-    const int64_t c = now_ns();
+    const int64_t c = bench::now_ns();
     (is_fused ? fused : rejected)++;
     predict.push_back((double)(b - a) - overhead);
     correct.push_back((double)(c - b) - overhead);
@@ -55,7 +43,7 @@ void measure(const char *title, const std::vector<bench::setting> &settings, boo
     std::printf("%s: %d of %d rejected: not what was meant to be measured\n", title, rejected, kRuns);
     std::exit(1);
   }
-  const double p = median(predict), c = median(correct), s = median(both);
+  const double p = bench::median(predict), c = bench::median(correct), s = bench::median(both);
   std::printf("%-58s predict %5.0f ns, correct %5.0f ns, both %5.0f ns\n", title, p, c, s);
 }
 

@@ -9,11 +9,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <memory>
 #include <vector>
 
 #include "common/marker_views.hpp"
+#include "timing.h"
 #include "vision/markers/dark_regions.hpp"
 #include "waymark/detectors.h"
 #include "waymark/mr_code.h"
@@ -21,25 +21,6 @@
 namespace {
 
 using namespace wm::views;
-
-// Time of this thread alone: other work on the machine is not counted.
-double thread_us() {
-  timespec now;
-  (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
-}
-
-template <class Work>
-double median_us(int rounds, Work work) {
-  std::vector<double> times;
-  for (int i = 0; i < rounds; i++) {
-    const double begin = thread_us();
-    work();
-    times.push_back(thread_us() - begin);
-  }
-  std::nth_element(times.begin(), times.begin() + rounds / 2, times.end());
-  return times[static_cast<size_t>(rounds / 2)];
-}
 
 Ink tag_ink(const image_u8_t *image) {
   return [image](double x, double y) {
@@ -73,7 +54,7 @@ void whole(const char *name, const wm_detector *detector, const char *family, co
     wm_event events[16];
     size_t count = 0;
     const wm_frame frame = frame_of(grey, view.camera);
-    sum += median_us(31, [&] { (void)detector->detect(state, &frame, nullptr, events, 16, &count); });
+    sum += bench::median_us(31, [&] { (void)detector->detect(state, &frame, nullptr, events, 16, &count); });
     found += count;
     std::free(state);
   }
@@ -101,11 +82,11 @@ int main() {
   auto *memory = static_cast<uint8_t *>(std::aligned_alloc(64, bytes));
   if (!memory) return 1;
   wm::dark_work_lay_out(&work, frame.width_px, frame.height_px, memory);
-  std::printf("dark_regions_640x480_us %.0f\n", median_us(31, [&] { wm::find_dark_regions(&work, frame, 20); }));
+  std::printf("dark_regions_640x480_us %.0f\n", bench::median_us(31, [&] { wm::find_dark_regions(&work, frame, 20); }));
   uint32_t id = 0;
   int wrong = 0;
   uint64_t modules = wm_mr_encode(77) ^ 0x1001001;
-  std::printf("mr_decode_us %.2f\n", median_us(31, [&] {
+  std::printf("mr_decode_us %.2f\n", bench::median_us(31, [&] {
                                        for (int i = 0; i < 100; i++) (void)wm_mr_decode(modules, &id, &wrong);
                                      }) / 100);
   std::free(memory);

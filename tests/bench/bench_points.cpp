@@ -3,22 +3,15 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <vector>
 
 #include "../unit/estimator/sea_floor.hpp"
+#include "timing.h"
 #include "waymark/detector.h"
 
 namespace {
 
-// Time of this thread alone: other work on the machine is not counted.
-double thread_us() {
-  timespec now;
-  (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
-}
-
-void bench(const char *what, bool fisheye, int32_t tracks) {
+void measure(const char *what, bool fisheye, int32_t tracks) {
   constexpr int kPictures = 40, kRounds = 3;
   const wm_detector *detector = wm_detector_find("stereo");
   wm_rig rig;
@@ -60,9 +53,9 @@ void bench(const char *what, bool fisheye, int32_t tracks) {
                      640,
                      pictures[static_cast<size_t>(2 * k + i)].data()};
       size_t count;
-      const double begin = thread_us();
+      const double begin = bench::thread_us();
       (void)detector->detect(state, frames, nullptr, events, 256, &count);
-      (k == 0 ? first : times).push_back(thread_us() - begin);
+      (k == 0 ? first : times).push_back(bench::thread_us() - begin);
       told += count;
     }
   }
@@ -78,7 +71,7 @@ void bench(const char *what, bool fisheye, int32_t tracks) {
 }  // namespace
 
 int main() {
-  bench("rectified", false, 100);
-  bench("rectified_200_points", false, 200);
-  bench("fisheye", true, 100);
+  measure("rectified", false, 100);
+  measure("rectified_200_points", false, 200);
+  measure("fisheye", true, 100);
 }

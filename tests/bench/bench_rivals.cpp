@@ -6,11 +6,11 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <memory>
 #include <vector>
 
 #include "drawn_map.h"
+#include "timing.h"
 #include "vision/edges/hough.hpp"
 #include "waymark/random.h"
 #ifdef WM_HAS_MRPT
@@ -22,24 +22,6 @@
 #endif
 
 namespace {
-
-double thread_us() {
-  timespec now;
-  (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
-}
-
-template <class Work>
-double median_us(int times, Work work) {
-  std::vector<double> each;
-  for (int i = 0; i < times; i++) {
-    const double begin = thread_us();
-    work();
-    each.push_back(thread_us() - begin);
-  }
-  std::nth_element(each.begin(), each.begin() + times / 2, each.end());
-  return each[static_cast<size_t>(times / 2)];
-}
 
 struct pose {
   double x, y, heading;
@@ -57,7 +39,7 @@ void ours() {
   for (int particles : {200, 2000}) {
     bench::cloud_at_work work(particles);
     std::printf("%5d particles x %d points: ours %9.1f us\n", particles, bench::kScanPoints,
-                median_us(1001, [&] { work.weigh(); }));
+                bench::median_us(1001, [&] { work.weigh(); }));
   }
 }
 
@@ -96,7 +78,7 @@ void mrpt_field() {
     };
     for (int i = 0; i < 3; i++) weigh();  // fills its cache
     std::printf("%5d particles x %d points: MRPT's likelihood field %9.1f us\n", particles, bench::kScanPoints,
-                median_us(particles > 1000 ? 15 : 51, weigh));
+                bench::median_us(particles > 1000 ? 15 : 51, weigh));
   }
 #else
   (void)cloud_of;
@@ -113,7 +95,7 @@ void windows() {
     for (int x = 0; x < 50; x++) turned[x * 50 + y] = window[y * 50 + x];
   const auto work = std::make_unique<wm::hough_work>();
   volatile int kept = 0;
-  const double us = median_us(1001, [&] {
+  const double us = bench::median_us(1001, [&] {
     for (int q = 0; q < 4; q++) {
       const uint8_t *from = q & 1 ? turned : window;
       kept = kept + wm::hough_transform(q & 2 ? from + 49 : from, 50, 50, q & 2 ? -1 : 1, work.get())->sums[60];
@@ -125,7 +107,7 @@ void windows() {
   cv::Mat edge(50, 50, CV_8UC1);
   for (int i = 0; i < 2500; i++) edge.data[i] = window[i] > 30 ? 255 : 0;
   std::vector<cv::Vec2f> lines;
-  const double theirs = median_us(201, [&] { cv::HoughLines(edge, lines, 1, CV_PI / 200, 25); });
+  const double theirs = bench::median_us(201, [&] { cv::HoughLines(edge, lines, 1, CV_PI / 200, 25); });
   std::printf("window of 50 x 50: OpenCV's HoughLines, 200 angles %9.1f us (%zu lines)\n", theirs, lines.size());
 #else
   std::printf("OpenCV: not measured, it was not there at the build (Debian: libopencv-imgproc-dev)\n");

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a SLAM step costs: prediction and one marker with three rows (x, y, heading), at several numbers of landmarks.
 // Medians of single steps, the clock's own cost taken away; beside them the scalar twin of the covariance's kernel.
-#include <time.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -10,23 +8,13 @@
 #include <vector>
 
 #include "filters/slam/joint_state.hpp"
+#include "timing.h"
 #include "waymark/random.h"
 
 namespace {
 
 using wm::joint_state;
 constexpr int kRuns = 2000;
-
-int64_t now_ns() {
-  timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return t.tv_sec * INT64_C(1000000000) + t.tv_nsec;
-}
-
-double median(std::vector<double> v) {
-  std::nth_element(v.begin(), v.begin() + (std::ptrdiff_t)v.size() / 2, v.end());
-  return v[v.size() / 2];
-}
 
 struct filter {
   std::vector<char> motion, memory;
@@ -84,22 +72,22 @@ struct filter {
   }
 };
 
-void bench(int landmarks) {
+void measure(int landmarks) {
   filter f(landmarks);
   std::vector<double> predict, both, overhead;
   for (int i = 0; i < kRuns; i++) {
-    const int64_t a = now_ns();
+    const int64_t a = bench::now_ns();
     f.predict(i);
-    const int64_t b = now_ns();
+    const int64_t b = bench::now_ns();
     f.correct(i);
-    const int64_t c = now_ns();
-    overhead.push_back((double)(now_ns() - c));
+    const int64_t c = bench::now_ns();
+    overhead.push_back((double)(bench::now_ns() - c));
     predict.push_back((double)(b - a));
     both.push_back((double)(c - a));
   }
-  const double clock = median(overhead);
+  const double clock = bench::median(overhead);
   std::printf("marker step, %3d landmarks (%3d states): predict %6.2f us, both %7.2f us\n", landmarks,
-              f.state->states(), 1e-3 * (median(predict) - clock), 1e-3 * (median(both) - 2 * clock));
+              f.state->states(), 1e-3 * (bench::median(predict) - clock), 1e-3 * (bench::median(both) - 2 * clock));
 }
 
 void bench_kernel(int n) {
@@ -114,21 +102,21 @@ void bench_kernel(int n) {
   const wm::half_update u = {3, {v, v + capacity, v + 2 * capacity}, v + 3 * capacity, v + 4 * capacity};
   std::vector<double> fast, slow;
   for (int i = 0; i < 300; i++) {
-    const int64_t a = now_ns();
+    const int64_t a = bench::now_ns();
     wm::vectors::apply(p, u, n);
-    const int64_t b = now_ns();
+    const int64_t b = bench::now_ns();
     wm::scalar::apply(p, u, n);
     fast.push_back((double)(b - a));
-    slow.push_back((double)(now_ns() - b));
+    slow.push_back((double)(bench::now_ns() - b));
   }
-  std::printf("covariance kernel, %3d states: vectors %7.2f us, scalar twin %7.2f us\n", n, 1e-3 * median(fast),
-              1e-3 * median(slow));
+  std::printf("covariance kernel, %3d states: vectors %7.2f us, scalar twin %7.2f us\n", n, 1e-3 * bench::median(fast),
+              1e-3 * bench::median(slow));
 }
 
 }  // namespace
 
 int main() {
-  for (int landmarks : {30, 100, 250}) bench(landmarks);
+  for (int landmarks : {30, 100, 250}) measure(landmarks);
   for (int n : {100, 310, 760}) bench_kernel(n);
   return 0;
 }

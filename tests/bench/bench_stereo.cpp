@@ -2,8 +2,6 @@
 // What a step of stereo_ekf costs: the prediction and all rows of one stereo pair, medians in microseconds, and the
 // arithmetic in it as a share of what this machine can do with two lanes. Paper: 1.2 ms with known points, 15 ms with
 // 30 found ones, on an Athlon 64 3200+.
-#include <time.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -12,6 +10,7 @@
 #include <limits>
 #include <vector>
 
+#include "timing.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
 
@@ -19,17 +18,6 @@ namespace {
 
 const double kAbsent = std::numeric_limits<double>::quiet_NaN();
 constexpr double kFocal = 420, kBaseline_m = 0.3, kCentre[2] = {321, 238.5};
-
-int64_t now_ns() {
-  timespec t;
-  clock_gettime(CLOCK_MONOTONIC, &t);
-  return t.tv_sec * INT64_C(1000000000) + t.tv_nsec;
-}
-
-double median(std::vector<double> &v) {
-  std::nth_element(v.begin(), v.begin() + (std::ptrdiff_t)v.size() / 2, v.end());
-  return v[v.size() / 2];
-}
 
 // Multiplications and additions a second, two lanes, independent sums in registers.
 double peak_flops() {
@@ -39,12 +27,12 @@ double peak_flops() {
     pair a = {1, 2}, b = {3, 4}, c = {5, 6}, d = {7, 8}, e = {9, 10}, f = {11, 12}, g = {13, 14}, h = {15, 16};
     const pair factor = {1.0 - 1e-9, 1.0 - 2e-9}, step = {1e-9, 2e-9};
     constexpr int kLoops = 2000000;
-    const int64_t begin = now_ns();
+    const int64_t begin = bench::now_ns();
     for (int i = 0; i < kLoops; i++) {
       a = a * factor + step, b = b * factor + step, c = c * factor + step, d = d * factor + step;
       e = e * factor + step, f = f * factor + step, g = g * factor + step, h = h * factor + step;
     }
-    const int64_t end = now_ns();
+    const int64_t end = bench::now_ns();
     const pair all = a + b + c + d + e + f + g + h;
     volatile double keep = all[0] + all[1];
     (void)keep;
@@ -69,7 +57,7 @@ scene make_scene(int count) {
 }
 
 // The vehicle sways by centimetres; `seen` of the points at a time, all of them in turn.
-void bench(const char *title, int count, int seen, bool known, double limit_us, double peak) {
+void measure(const char *title, int count, int seen, bool known, double limit_us, double peak) {
   const wm_estimator *ekf = wm_estimator_find("stereo_ekf");
   std::vector<char> motion(wm_motion_params_table.bytes), params(ekf->params.bytes);
   wm_params_defaults(&wm_motion_params_table, motion.data());
@@ -140,13 +128,13 @@ void bench(const char *title, int count, int seen, bool known, double limit_us, 
     }
     wm_innovation records[8];
     size_t n;
-    const int64_t begin = now_ns();
+    const int64_t begin = bench::now_ns();
     ekf->predict(state, &twist);
     for (const wm_event &e : picture) {
       ekf->correct(state, &e, records, 8, &n);
       (records[0].verdict == WM_FUSED ? fused : rejected)++;
     }
-    const int64_t end = now_ns();
+    const int64_t end = bench::now_ns();
     if (i >= 20) cost.push_back((double)(end - begin) * 1e-3);
   }
   if (rejected > fused / 50) {
@@ -157,7 +145,7 @@ void bench(const char *title, int count, int seen, bool known, double limit_us, 
   // once a picture 12 an entry of the triangle.
   const double states = 6 + (known ? 0 : 3.0 * count);
   const double work = seen * (4 * states * states + 72 * states) + (known ? 0 : 6 * states * states);
-  const double us = median(cost);
+  const double us = bench::median(cost);
   std::printf("%-58s %8.2f us (at most %.0f), %4.1f MFLOP, %2.0f %% of peak\n", title, us, limit_us, work * 1e-6,
               100 * work / (us * 1e-6) / peak);
   std::free(state);
@@ -168,8 +156,8 @@ void bench(const char *title, int count, int seen, bool known, double limit_us, 
 int main() {
   const double peak = peak_flops();
   std::printf("two lanes of multiply and add: %.1f GFLOP/s\n", peak * 1e-9);
-  bench("4 known points", 4, 4, true, 5, peak);
-  bench("30 points in the state, all seen (120 rows)", 30, 30, false, 500, peak);
-  bench("100 points in the state, 30 seen", 100, 30, false, 4000, peak);
+  measure("4 known points", 4, 4, true, 5, peak);
+  measure("30 points in the state, all seen (120 rows)", 30, 30, false, 500, peak);
+  measure("100 points in the state, 30 seen", 100, 30, false, 4000, peak);
   return 0;
 }

@@ -10,6 +10,7 @@
 #include "render_corridor.h"
 #include "simulate/render/sensor.h"
 #include "simulate/render/video.h"
+#include "timing.h"
 
 using namespace wm::render;
 
@@ -19,11 +20,6 @@ double seconds() { return std::chrono::duration<double>(std::chrono::steady_cloc
 
 // Of all threads: what a shared machine doesn't stretch.
 double cpu_seconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
-
-double median(std::vector<double> v) {
-  std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
-  return v[v.size() / 2];
-}
 
 Shot shot_of(uint64_t frame, int64_t exposure_ns) {
   Shot shot;
@@ -48,8 +44,9 @@ double measure(const char *name, const Scene &scene, const Camera &camera, const
     renderer->render(shot_of(static_cast<uint64_t>(i), exposure_ns), image);
     times.push_back(seconds() - begin), cpu.push_back(cpu_seconds() - cpu_begin);
   }
-  const double t = median(times);
-  std::printf("%-44s %7.1f ms  %6.1f frames/s  %7.1f ms of processor\n", name, 1e3 * t, 1 / t, 1e3 * median(cpu));
+  const double t = bench::median(times);
+  std::printf("%-44s %7.1f ms  %6.1f frames/s  %7.1f ms of processor\n", name, 1e3 * t, 1 / t,
+              1e3 * bench::median(cpu));
   std::fflush(stdout);
   return t;
 }
@@ -97,8 +94,8 @@ int main(int argc, char **argv) {
     jpeg.compress(picture, 75, error);
     develop.push_back(middle - start), compress.push_back(seconds() - middle);
   }
-  std::printf("%-44s %7.1f ms\n", "sensor: exposure, noise, curve", 1e3 * median(develop));
-  std::printf("%-44s %7.1f ms  (%zu kB)\n", "JPEG of quality 75", 1e3 * median(compress), jpeg.size() / 1000);
+  std::printf("%-44s %7.1f ms\n", "sensor: exposure, noise, curve", 1e3 * bench::median(develop));
+  std::printf("%-44s %7.1f ms  (%zu kB)\n", "JPEG of quality 75", 1e3 * bench::median(compress), jpeg.size() / 1000);
   if (argc > 1) {
     auto coloured = Renderer::make(peopled, camera, four, 1, true, error);
     coloured->render(shot_of(20, 5000000), image);

@@ -3,40 +3,31 @@
 // of upright lines, a hemispherical picture.
 #include <algorithm>
 #include <cstdio>
-#include <ctime>
 #include <memory>
 #include <vector>
 
 #include "drawn_picture.h"
+#include "timing.h"
 #include "vision/edges/hough.hpp"
 #include "waymark/random.h"
 
 namespace {
 
-// Time of this thread alone: other work on the machine is not counted.
-double thread_us() {
-  timespec now;
-  (void)clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e6 + static_cast<double>(now.tv_nsec) * 1e-3;
-}
-
+// Of work so short that the clock would be seen: fifty at a time.
 template <class Work>
-double median_us(int rounds, Work work) {
-  std::vector<double> times;
-  for (int i = 0; i < 101; i++) {
-    const double begin = thread_us();
-    for (int k = 0; k < rounds; k++) work();
-    times.push_back((thread_us() - begin) / rounds);
-  }
-  std::nth_element(times.begin(), times.begin() + 50, times.end());
-  return times[50];
+double fifty_us(Work work) {
+  return bench::median_us(101,
+                          [&] {
+                            for (int i = 0; i < 50; i++) work();
+                          }) /
+         50;
 }
 
 void whole_pictures() {
   for (int mode = 0; mode < 2; mode++) {
     bench::edges_at_work edges(mode);
     uint32_t points = 0;
-    const double us = median_us(1, [&] { points = edges.look(); });
+    const double us = bench::median_us(101, [&] { points = edges.look(); });
     std::printf("edges_1280x720_%s_us %.0f (%u points", mode ? "windows" : "rays", us, points);
     if (mode) std::printf(", %d windows", edges.windows());
     std::printf(")\n");
@@ -81,7 +72,7 @@ void hemispherical_picture() {
   if (!state || lines->init(state, params.data(), &view) != WM_OK) return;
   wm_frame frame = {0, 0, 0, 0, 0, kSide, kSide, kSide, picture.data()};
   size_t count = 0;
-  const double us = median_us(1, [&] {
+  const double us = bench::median_us(101, [&] {
     frame.t_ns += 100'000'000;
     (void)lines->detect(state, &frame, nullptr, events, 256, &count);
   });
@@ -106,9 +97,9 @@ int main() {
       kept = kept + plane->sums[60];
     }
   };
-  std::printf("hough_50x50_us %.2f\n", median_us(50, [&] { all(wm::hough_transform); }));
-  std::printf("hough_50x50_scalar_us %.2f\n", median_us(50, [&] { all(wm::hough_transform_scalar); }));
-  std::printf("hough_50x50_find_us %.2f\n", median_us(50, [&] {
+  std::printf("hough_50x50_us %.2f\n", fifty_us([&] { all(wm::hough_transform); }));
+  std::printf("hough_50x50_scalar_us %.2f\n", fifty_us([&] { all(wm::hough_transform_scalar); }));
+  std::printf("hough_50x50_find_us %.2f\n", fifty_us([&] {
                 for (int q = 0; q < 4; q++) kept = kept + wm::hough_find(work->a, 50).t;
               }));
   whole_pictures();
