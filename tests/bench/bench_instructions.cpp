@@ -9,6 +9,7 @@
 
 #include "drawn_map.h"
 #include "drawn_picture.h"
+#include "drawn_street.h"
 #include "landmark_drive.h"
 #include "vision/edges/hough.hpp"
 
@@ -76,11 +77,20 @@ int main(int argc, char **argv) {
   } else if (!std::strcmp(what, "picture_rays") || !std::strcmp(what, "picture_windows")) {
     bench::edges_at_work work(std::strcmp(what, "picture_rays") != 0);
     count([&] { (void)work.look(); });
+  } else if (!std::strcmp(what, "picture_lines")) {
+    bench::lines_at_work work;
+    count([&] { (void)work.look(); });
+  } else if (!std::strcmp(what, "picture_landmarks") || !std::strcmp(what, "picture_landmarks_lost")) {
+    const bench::drawn_street street;
+    bench::street_at_work work(street);
+    const bool lost = std::strcmp(what, "picture_landmarks") != 0;
+    count([&] { (void)work.look(lost); });
   } else {
-    std::fprintf(stderr,
-                 "usage: wm_instructions "
-                 "landmark_step|landmark_start|particles_200|particles_2000|particle_step_200|particle_step_2000|"
-                 "window_50x50|picture_rays|picture_windows [TIMES]\n");
+    std::fprintf(
+        stderr,
+        "usage: wm_instructions "
+        "landmark_step|landmark_start|particles_200|particles_2000|particle_step_200|particle_step_2000|"
+        "window_50x50|picture_rays|picture_windows|picture_lines|picture_landmarks|picture_landmarks_lost [TIMES]\n");
     return 2;
   }
   return 0;

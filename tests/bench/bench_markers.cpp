@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "common/marker_views.hpp"
+#include "detector_at_work.h"
 #include "timing.h"
 #include "vision/markers/dark_regions.hpp"
 #include "waymark/detectors.h"
@@ -43,20 +44,12 @@ void whole(const char *name, const wm_detector *detector, const char *family, co
     rig.cameras[0] = view.camera;
     (void)std::snprintf(rig.marker_family, sizeof rig.marker_family, "%s", family);
     rig.marker_size_m = view.size_m;
-    std::vector<char> params(detector->params.bytes);
-    wm_params_defaults(&detector->params, params.data());
     const int32_t camera = 0;
-    const wm_view look = {&rig, &camera, nullptr, 0, nullptr, 0, nullptr, 0};
-    const char *why = "";
-    const size_t bytes = (detector->state_bytes(params.data(), &look, &why) + 63) / 64 * 64;
-    void *state = std::aligned_alloc(64, bytes);
-    if (!state || detector->init(state, params.data(), &look) != WM_OK) return;
-    wm_event events[16];
+    bench::detector_at_work work(detector, {&rig, &camera, nullptr, 0, nullptr, 0, nullptr, 0});
     size_t count = 0;
     const wm_frame frame = frame_of(grey, view.camera);
-    sum += bench::median_us(31, [&] { (void)detector->detect(state, &frame, nullptr, events, 16, &count); });
+    sum += bench::median_us(31, [&] { count = work.look(&frame); });
     found += count;
-    std::free(state);
   }
   std::printf("markers_640x480_%s_us %.0f (%zu markers in %d pictures)\n", name, sum / kViews, found, kViews);
 }

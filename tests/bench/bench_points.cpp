@@ -2,29 +2,22 @@
 // What detector `stereo` costs: a pair of 640x480 pictures to followed points, while a vehicle swims over a sea floor.
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <vector>
 
 #include "../unit/estimator/sea_floor.hpp"
+#include "detector_at_work.h"
 #include "timing.h"
-#include "waymark/detector.h"
 
 namespace {
 
 void measure(const char *what, bool fisheye, int32_t tracks) {
   constexpr int kPictures = 40, kRounds = 3;
-  const wm_detector *detector = wm_detector_find("stereo");
   wm_rig rig;
   sea::make_rig(&rig, fisheye);
   const int32_t cameras[2] = {0, 1};
   const wm_view view = {&rig, cameras, nullptr, 0, nullptr, 0, nullptr, 0};
-  std::vector<double> params(detector->params.bytes / sizeof(double) + 1);
-  wm_params_defaults(&detector->params, params.data());
-  reinterpret_cast<wm_stereo_params *>(params.data())->tracks = tracks;
-  const char *why = "";
-  const size_t bytes = (detector->state_bytes(params.data(), &view, &why) + 63) / 64 * 64;
-  void *state = std::aligned_alloc(64, bytes);
-  if (!state) return;
+  bench::detector_at_work stereo(wm_detector_find("stereo"), view,
+                                 [=](void *params) { static_cast<wm_stereo_params *>(params)->tracks = tracks; });
   const sea::floor_grain grain(1);
   wm::mounted_camera eyes[2];
   for (int i = 0; i < 2; i++) wm::mounted_camera_init(&eyes[i], rig.cameras[i]);
@@ -37,26 +30,15 @@ void measure(const char *what, bool fisheye, int32_t tracks) {
   }
   std::vector<double> times, first;
   size_t told = 0;
-  static wm_event events[256];
   for (int round = 0; round < kRounds; round++) {
-    if (detector->init(state, params.data(), &view) != WM_OK) return;
+    stereo.again();
     for (int k = 0; k < kPictures; k++) {
       wm_frame frames[2];
       for (int i = 0; i < 2; i++)
-        frames[i] = {INT64_C(125000000) * k,
-                     INT64_C(125000000) * k,
-                     0,
-                     static_cast<uint64_t>(k),
-                     i,
-                     640,
-                     480,
-                     640,
-                     pictures[static_cast<size_t>(2 * k + i)].data()};
-      size_t count;
+        frames[i] = bench::frame_of(pictures[static_cast<size_t>(2 * k + i)], 640, 480, i, INT64_C(125000000) * k);
       const double begin = bench::thread_us();
-      (void)detector->detect(state, frames, nullptr, events, 256, &count);
+      told += stereo.look(frames);
       (k == 0 ? first : times).push_back(bench::thread_us() - begin);
-      told += count;
     }
   }
   std::sort(times.begin(), times.end());
@@ -64,8 +46,7 @@ void measure(const char *what, bool fisheye, int32_t tracks) {
   std::printf("stereo_640x480_%s_ms median %.2f, 99 of 100 %.2f, first picture %.2f (%.0f points a picture; %.1f MB)\n",
               what, times[times.size() / 2] * 1e-3, times[times.size() * 99 / 100] * 1e-3,
               first[first.size() / 2] * 1e-3, static_cast<double>(told) / static_cast<double>(times.size()),
-              static_cast<double>(bytes) * 1e-6);
-  std::free(state);
+              static_cast<double>(stereo.bytes()) * 1e-6);
 }
 
 }  // namespace

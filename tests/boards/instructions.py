@@ -20,11 +20,14 @@ from builds import ROOT, Build
 # What, how often more, what it is.
 WORKS = [
     ("landmark_step", 200, "landmark update: a twist and a bearing, pose and 6 calibration states"),
-    ("landmark_start", 400, "the same in the first 8 s, while a stated start is weighed"),
+    ("landmark_start", 400, "the same in the first 10 s, while a stated start is weighed"),
     ("particle_step_200", 10, "particle update: move, weigh 180 points, resample; 200 particles"),
     ("particle_step_2000", 2, "the same, 2000 particles"),
     ("picture_rays", 2, "frame to edge points by rays, 1280x720 fisheye"),
     ("picture_windows", 2, "frame to polylines by windows and Hough transform, 1280x720 fisheye"),
+    ("picture_lines", 2, "frame to tracked upright lines, 640x640 hemispherical"),
+    ("picture_landmarks", 4, "frame to bearings of six known landmarks near where they should be, 1280x720 fisheye"),
+    ("picture_landmarks_lost", 4, "the same without a pose: searched everywhere"),
 ]
 # Board, core, its architecture, clock in GHz, instructions a cycle. The last is a guess on the safe side for such loops
 # (scalar and vector work with loads that hit the caches): the A15 and A57 can start three a cycle and reach about one, the
@@ -78,18 +81,18 @@ def count_all(builds, counter):
 def print_estimates(counts):
     """Milliseconds on each board's core. Of particles on a large map twice the time: it doesn't fit the caches."""
     print("\n| board | core, clock, instructions a cycle | landmark update | 2000 particles | picture by rays | picture by windows | "
-          f"rays and particles at {PICTURES_HZ} Hz |")
-    print("|" + " --- |" * 7)
+          f"picture to lines | to landmarks | rays and particles at {PICTURES_HZ} Hz | landmarks of two cameras at {PICTURES_HZ} Hz |")
+    print("|" + " --- |" * 10)
     for board, core, arch, clock_ghz, a_cycle in BOARDS:
         if arch not in counts["landmark_step"]:
             continue
-        landmark, particles, rays, windows = (
+        landmark, particles, rays, windows, lines, signs = (
             counts[work][arch] / (clock_ghz * 1e6 * a_cycle)
-            for work in ("landmark_step", "particle_step_2000", "picture_rays", "picture_windows"))
+            for work in ("landmark_step", "particle_step_2000", "picture_rays", "picture_windows", "picture_lines", "picture_landmarks"))
         particles *= 2
         share = (rays + particles) * PICTURES_HZ / 1000
         print(f"| {board} | {core}, {clock_ghz:.2f} GHz, {a_cycle} | {landmark:.3f} ms | {particles:.1f} ms | {rays:.1f} ms | "
-              f"{windows:.1f} ms | {share:.0%} of the core |")
+              f"{windows:.1f} ms | {lines:.1f} ms | {signs:.1f} ms | {share:.0%} of the core | {2 * signs * PICTURES_HZ / 1000:.0%} of the core |")
 
 
 def main():
