@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Signs from pixels to a pose: a rendered crossing replayed twice and from its event log gives the same bytes, the pose is near the
-truth, the judge finds few false ones; a landmark taught from one picture (`map add-landmark`) is found in another (`map look`)."""
+truth, the judge finds few false ones; a landmark taught from one picture (`map add-landmark`) is found in another (`map look`). The
+drive cut and put together elsewhere (tools/montecarlo/carried_off.py) has counters without a gap, and wheels that didn't turn meanwhile."""
 import csv
 import json
 import math
@@ -10,6 +11,9 @@ import sys
 import tempfile
 
 from judged import ROOT, check, failures, run
+
+sys.path.insert(0, str(ROOT / "tools/montecarlo"))
+import carried_off
 
 CONFIG = ROOT / "config/crossing.yaml"
 RATE_HZ = 4
@@ -32,7 +36,7 @@ def pose_at(rec, t_s):
 
 def drives(folder, world):
     rec = folder / "rec"
-    run("waymark-simulate", world, "--duration", 5, "--out", rec)
+    run("waymark-simulate", world, "--duration", 7, "--out", rec)
     for name in ("a", "b"):
         run("waymark", "replay", rec, "--config", CONFIG, "--out", folder / name)
     run("waymark", "replay", folder / "a/events.wmlog", "--out", folder / "c")
@@ -43,6 +47,23 @@ def drives(folder, world):
     seen = json.loads(run("waymark-eval", folder / "a", rec, "--detector", "landmarks", "--json"))
     check(seen["right"] >= 40 and seen["precision"] > 0.95,
           f"{seen['right']} landmarks found rightly, precision {seen['precision']:.3f}, recall {seen['recall']:.3f}")
+
+
+def carried(folder):
+    """Carried off after 3 s, to where it would have been 3 s later, and driven on from there."""
+    truth = carried_off.Truth(folder / "rec")
+    at_ns, to_ns = truth.begin_ns + int(3e9), truth.begin_ns + int(6e9)
+    cut, out = folder / "cut", folder / "d"
+    carried_off.carry_off(folder / "rec", cut, at_ns, to_ns)
+    jump = math.dist(truth.at(at_ns), truth.at(to_ns))
+    run("waymark", "replay", cut, "--config", CONFIG, "--out", out)
+    bus = json.loads((out / "health.json").read_text())["sources"]["can"]
+    check(bus["lost"] == 0 and bus["malformed"] == 0, "no counter on the bus shows the seam")
+    with open(out / "trajectory.csv") as file:
+        rows = [r for r in csv.DictReader(file) if int(r["t_ns"]) > at_ns - int(2e8)]
+    steps = [math.dist((float(a["x_m"]), float(a["y_m"])), (float(b["x_m"]), float(b["y_m"]))) for a, b in zip(rows, rows[1:])
+             if int(b["t_ns"]) < at_ns + int(2e8)]
+    check(max(steps) < 0.5 < jump, f"no wheel turned while it was carried {jump:.1f} m: {max(steps):.2f} m between two poses at most")
 
 
 def labelled(rec, camera):
@@ -94,6 +115,7 @@ def main():
             "\npictures:", f"\ncameras: [{{name: left, rate_hz: {RATE_HZ}}}, {{name: right, rate_hz: {RATE_HZ}}}]\n\npictures:").replace(
             "samples: 2", "samples: 1"))
         drives(folder, world)
+        carried(folder)
         teach(folder, world)
     sys.exit(1 if failures else 0)
 

@@ -3,14 +3,15 @@
 """Known landmarks from pixels over many rendered drives: each seed is another crossing, way, light and set of errors.
 Renders what the cache lacks, runs the filter from the pictures (and by dead reckoning alone), and judges pose and detector.
 
-    landmarks.py SCENARIO --config FILE --cache FOLDER [--seeds FIRST-LAST] [--duration S] [--rate HZ] [--size WxH] [--start] [--one]
+    landmarks.py SCENARIO --config FILE --cache FOLDER [--seeds FIRST-LAST] [--duration S] [--rate HZ] [--size WxH]
+                 [--start] [--one] [--kidnap] [--rows FILE]
 
 Beside each figure stands the Cramer-Rao bound of these drives, with the bearings and sigmas that the detector found.
 
 example: tools/montecarlo/landmarks.py config/worlds/crossing-easy.yaml --config config/crossing.yaml --cache out/easy --seeds 1-10
-24 s at 5 Hz are 240 pictures: some 30 s of processor to render, 8 MB to keep. What is there already is taken as it is."""
+24 s at 5 Hz are 240 pictures: some 30 s of processor to render, 8 MB to keep. What is there already is taken as it is. With --rows
+what each drive gave is kept, too: stopped, it goes on where it was."""
 import argparse
-import bisect
 import collections
 import csv
 import json
@@ -21,6 +22,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+
+import carried_off
+from carried_off import load
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 
@@ -93,33 +97,60 @@ def without_pose(drive, folder):
     (folder / "recording.yaml").write_text("".join(line for line in lines if "initial_pose" not in line))
 
 
-def load(file):
-    with open(file, newline="") as rows:
-        return list(csv.DictReader(rows))
+def looks(run, drive, from_ns=0):
+    """Of each pose from from_ns on: t_ns, seconds driven since, state, metres off (inf: none), sigma in metres."""
+    truth = carried_off.Truth(drive)
+    driven, last_ns = 0.0, None
+    for row in load(run / "trajectory.csv"):
+        t_ns = int(row["t_ns"])
+        if t_ns < from_ns:
+            continue
+        if last_ns is not None and truth.speed_mps(t_ns) > carried_off.DRIVING_MPS:
+            driven += 1e-9 * (t_ns - last_ns)
+        last_ns = t_ns
+        if row["x_m"] == "":
+            yield t_ns, driven, row["state"], math.inf, math.inf
+        else:
+            off = math.dist((float(row["x_m"]), float(row["y_m"])), truth.at(t_ns))
+            yield t_ns, driven, row["state"], off, math.sqrt(max(0.0, float(row["cov_xx"]) + float(row["cov_yy"])))
 
 
-def found_itself(run, drive):
+def tracks(state):
+    return state in ("tracking", "dead_reckoning")
+
+
+def found_itself(run, drive, from_ns=0):
     """Seconds of driving until it tracks within 0.3 m and stays so (none: never), and for how long at a stretch it tracked while
     off by more than 0.3 m and four sigma."""
-    truth = load(drive / "truth.csv")
-    times = [int(row["t_ns"]) for row in truth]
-    places = [(float(row["x_m"]), float(row["y_m"])) for row in truth]
-    driven, at = [0.0], 0
-    for before, after, dt in zip(places, places[1:], (b - a for a, b in zip(times, times[1:]))):
-        driven.append(driven[-1] + (1e-9 * dt if math.dist(before, after) > 0.3e-9 * dt else 0))
     right, wrong_since, wrong_s = None, None, 0.0
-    for row in load(run / "trajectory.csv"):
-        if row["x_m"] == "" or row["state"] not in ("tracking", "dead_reckoning"):
-            right = wrong_since = None
-            continue
-        t_ns = int(row["t_ns"])
-        at = min(bisect.bisect_left(times, t_ns), len(times) - 1)
-        off = math.dist((float(row["x_m"]), float(row["y_m"])), places[at])
-        right = (driven[at] if right is None else right) if off < 0.3 else None
-        sure = off > 0.3 and off > 4 * math.sqrt(max(0.0, float(row["cov_xx"]) + float(row["cov_yy"])))
+    for t_ns, driven, state, off, sigma in looks(run, drive, from_ns):
+        right = (driven if right is None else right) if tracks(state) and off < 0.3 else None
+        sure = tracks(state) and off > 0.3 and off > 4 * sigma
         wrong_since = (t_ns if wrong_since is None else wrong_since) if sure else None
         wrong_s = max(wrong_s, 1e-9 * (t_ns - wrong_since) if sure else 0.0)
     return right, wrong_s
+
+
+def false_alarm(run, drive):
+    """Whether it ever said that it is lost, or searched, while its pose was within 0.3 m."""
+    return any(not tracks(state) and off < 0.3 for _, _, state, off, _ in looks(run, drive))
+
+
+def carried(a, drive, seed, scratch):
+    """Set down elsewhere: seconds from the first view there until it says so (none: never; not asked if no landmark is seen there),
+    seconds of driving until it is right again, and for how long, from when it said so, it was sure of a wrong place."""
+    cut = carried_off.seam(drive, seed)
+    view_s = cut and carried_off.first_view(drive, *cut)
+    if view_s is None:
+        return None
+    folder, run = scratch / "carried", scratch / "carried-run"
+    carried_off.carry_off(drive, folder, *cut)
+    replay(a, folder, a.config, run, "--seed", seed)
+    view_ns = cut[0] + int(1e9 * view_s)
+    said_ns = next((t_ns for t_ns, _, state, _, _ in looks(run, folder, cut[0]) if not tracks(state) and t_ns >= view_ns), None)
+    right, _ = found_itself(run, folder, cut[0])
+    _, wrong_s = found_itself(run, folder, cut[0] if said_ns is None else said_ns)
+    return {"said_s": None if said_ns is None else 1e-9 * (said_ns - view_ns), "right_s": right, "wrong_s": wrong_s}
 
 
 def judge(a, scenario, drive, seed):
@@ -130,6 +161,7 @@ def judge(a, scenario, drive, seed):
         row = {
             "seed": seed,
             "pose": pose_of(a, run, drive),
+            "false_alarm": false_alarm(run, drive),
             "seen": json.loads(call(a.bin / "waymark-eval", run, drive, "--detector", "landmarks", "--json")),
             "reckoned": pose_of(a, reckoned, drive),
             "bound": bound_of(a, scenario, run, drive),
@@ -139,6 +171,8 @@ def judge(a, scenario, drive, seed):
             without_pose(drive, nowhere)
             replay(a, nowhere, a.config, search, "--seed", seed)
             row["start"] = found_itself(search, drive)
+        if a.kidnap:
+            row["kidnap"] = carried(a, drive, seed, pathlib.Path(scratch))
         landmark = seen_most(run)
         if a.one and landmark:
             single = pathlib.Path(scratch, "single")
@@ -157,6 +191,12 @@ def spread(values):
     ordered = sorted(values)
     at = lambda share: ordered[min(len(ordered) - 1, int(share * len(ordered)))]
     return f"median {at(0.5):.4f}, 90 of 100 below {at(0.9):.4f}, worst {ordered[-1]:.4f}"
+
+
+def until(times):
+    """How many of these, None for never, are within 5 s, are there at all, and how they spread."""
+    known = [math.inf if t is None else t for t in times]
+    return f"within 5 s {sum(t <= 5 for t in known)}, at all {sum(t < math.inf for t in known)} of {len(known)}; {spread(known)} s"
 
 
 def against_bound(poses, bounds):
@@ -187,7 +227,7 @@ def summary(rows):
     text = (
         f"{len(rows)} drives: RMSE at most 0.05 m in {good('position_rmse_m', 0.05)}, end at most 0.10 m in "
         f"{good('position_end_m', 0.10)}, heading at most 0.5 degrees in {good('heading_rmse_deg', 0.5)}, lost "
-        f"{sum(p['lost_count'] > 0 for p in poses)}\n"
+        f"{sum(p['lost_count'] > 0 for p in poses)}, with a false alarm {sum(r['false_alarm'] for r in rows)}\n"
         f"{against_bound(poses, [r['bound'] for r in rows])}\n"
         f"  NEES inside 95 %: {sum(p['nees_inside_95'] for p in poses) / len(poses):.2f}\n"
         f"  dead reckoning alone: {rms([b['position_rmse_m'] for b in reckoned]):.3f} m, end "
@@ -198,11 +238,16 @@ def summary(rows):
     )
     starts = [r["start"] for r in rows if "start" in r]
     if starts:
-        times = [s if s is not None else math.inf for s, _ in starts]
         text += (
-            f"\nstarted without a pose, {len(starts)} drives: right within 5 s of driving {sum(s <= 5 for s in times)}, at all "
-            f"{sum(s < math.inf for s in times)}; {spread(times)} s; sure of a wrong place for more than 0.5 s: "
-            f"{sum(wrong_s > 0.5 for _, wrong_s in starts)}"
+            f"\nstarted without a pose, seconds of driving until right: {until([s for s, _ in starts])}; sure of a wrong place for "
+            f"more than 0.5 s: {sum(wrong_s > 0.5 for _, wrong_s in starts)}"
+        )
+    kidnaps = [r["kidnap"] for r in rows if r.get("kidnap")]
+    if kidnaps:
+        text += (
+            f"\nset down elsewhere, seconds from the first view until it says so: {until([k['said_s'] for k in kidnaps])}"
+            f"\n  seconds of driving until right again: {until([k['right_s'] for k in kidnaps])}; sure of a wrong place for more than "
+            f"0.5 s after it said so: {sum(k['wrong_s'] > 0.5 for k in kidnaps)}"
         )
     ones = [r for r in rows if "one" in r]
     if ones:
@@ -231,6 +276,8 @@ def main():
     p.add_argument("--rate", type=float, default=5, help="pictures a second")
     p.add_argument("--bin", type=pathlib.Path, default=ROOT / "build" / "bin")
     p.add_argument("--start", action="store_true", help="also started without a pose")
+    p.add_argument("--kidnap", action="store_true", help="also set down elsewhere while driving")
+    p.add_argument("--rows", type=pathlib.Path, help="keeps a line of JSON a drive; drives that are in it are not run again")
     p.add_argument("--one", action="store_true", help="also with the one landmark alone that is seen most")
     p.add_argument("--rendered-only", action="store_true", help="those of the seeds that are in the cache")
     a = p.parse_args()
@@ -241,14 +288,22 @@ def main():
         sys.exit(f"{a.cache}: holds drives of another scenario, size or rate; name another --cache")
     scenario.write_text(wanted)
     rows = []
+    done = {}
+    if a.rows and a.rows.exists():
+        done = {row["seed"]: row for row in map(json.loads, a.rows.read_text().splitlines())}
     print("seed | RMSE m   end m | heading | NEES | lost | bound m | reckoned m | precision recall | bearing  / sigma", flush=True)
     for seed in a.seeds:
-        drive = a.cache / str(seed)
-        if not drive.exists():
-            if a.rendered_only:
-                continue
-            render(a, scenario, seed, drive)
-        row = judge(a, scenario, drive, seed)
+        row = done.get(seed)
+        if row is None:
+            drive = a.cache / str(seed)
+            if not drive.exists():
+                if a.rendered_only:
+                    continue
+                render(a, scenario, seed, drive)
+            row = judge(a, scenario, drive, seed)
+            if a.rows:
+                with open(a.rows, "a") as file:
+                    file.write(json.dumps(row) + "\n")
         pose, seen = row["pose"], row["seen"]
         rows.append(row)
         print(
