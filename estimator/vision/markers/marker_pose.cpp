@@ -13,6 +13,7 @@ constexpr double kNever = 1e300;
 constexpr double kTilted = 15.0;  // of a print that hangs freely: its tilt's noise, in corners' errors by its size
 constexpr double kTiltedMax_rad = 0.08;
 constexpr double kTurnMax_rad = 1.36;
+constexpr double kLeastStep_rad = 0.005, kMostStep_rad = 0.05;  // when the turn's sigma is looked for
 
 struct fit {
   marker_pose pose;
@@ -101,6 +102,18 @@ bool refine(const turning &t, double *turn, double step, fit *best, double *curv
   return true;
 }
 
+// How far the turn may go from the best one towards `step` until chi2 has grown by 4, which is two sigmas.
+double two_sigmas(const turning &t, double turn, double least, double step) {
+  const double most = least + 4.0 * square(kCorner_px);
+  double before = least;
+  for (double way = step;; way += step) {
+    fit f;
+    if (std::fabs(turn + way) > kTurnMax_rad || !t.at(turn + way, &f)) return std::fabs(way);
+    if (f.misfit > most) return std::fabs(way - step * (f.misfit - most) / (f.misfit - before));
+    before = f.misfit;
+  }
+}
+
 // The misfit of the better answer, or infinity.
 double fit_upright(const turning &t, marker_poses *out) {
   double misfit[kTurns];
@@ -127,18 +140,29 @@ double fit_upright(const turning &t, marker_poses *out) {
   }
   if (found == 0) return kNever;
   const int first = found == 2 && best[1].misfit < best[0].misfit ? 1 : 0;
-  out->best = best[first].pose;
-  // chi2 = misfit / sigma^2 grows by 1 where the turn is a sigma off.
+  // A print looks narrower by the cosine of its turn, which noise reaches only from below: seen nearly face on, the
+  // best turn is too large to either side, and the truth anywhere between. So its sigma is by how far the misfit stays
+  // low.
   const double noise = square(kCorner_px);
-  out->turn_sigma_rad = std::sqrt(2 * noise / larger(curvature[first], 2 * noise / square(0.5)));
-  out->has_other = found == 2 && best[1 - first].misfit - best[first].misfit < kUndecided * noise &&
-                   std::fabs(turn[0] - turn[1]) > out->turn_sigma_rad;
-  if (found == 2) out->other = best[1 - first].pose;
-  fit beside;
+  const double bend_sigma = std::sqrt(2 * noise / larger(curvature[first], 2 * noise / square(0.5)));
+  const double step_rad = bend_sigma > kMostStep_rad ? kMostStep_rad : larger(bend_sigma, kLeastStep_rad);
+  const double left = two_sigmas(t, turn[first], best[first].misfit, -step_rad);
+  const double right = two_sigmas(t, turn[first], best[first].misfit, step_rad);
+  const double middle = turn[first] + 0.5 * (right - left);
+  fit at_middle, beside;
+  if (!t.at(middle, &at_middle)) return kNever;
+  out->best = at_middle.pose;
+  out->turn_sigma_rad = 0.25 * (left + right);
+  if (found == 2) {
+    const double apart = turn[1 - first] - turn[first];
+    out->has_other =
+        best[1 - first].misfit - best[first].misfit < kUndecided * noise && (apart < -left || apart > right);
+    out->other = best[1 - first].pose;
+  }
   const double distance = length(out->best.centre_m);
   const double size_px = t.print.size_m / distance * t.view.focal_px;
   out->range_sigma_m = distance * kCorner_px / (0.5 * size_px);
-  if (t.at(turn[first] + 0.01, &beside))
+  if (t.at(middle + 0.01, &beside))
     out->range_sigma_m = std::sqrt(square(out->range_sigma_m) +
                                    square((length(beside.pose.centre_m) - distance) / 0.01 * out->turn_sigma_rad));
   return best[first].misfit;

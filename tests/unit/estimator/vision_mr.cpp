@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Detector `mr` on drawn views: place and turn, and pictures that nobody means.
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
@@ -62,6 +64,31 @@ void place_and_turn_are_right() {
     TEST_ASSERT_TRUE(m.yaw_sigma_rad > 0 && m.along_sigma_m > 0 && m.along_sigma_m < 0.02);
     TEST_ASSERT_TRUE(m.edge_shift_px > 0.02);
   }
+}
+
+// How narrow it looks says little of the turn of an upright print seen nearly face on from afar: its sigma says so.
+void nearly_face_on_the_turn_is_as_unsure_as_it_says() {
+  double nees = 0, sigma = 0;
+  int seen = 0;
+  for (const double tilt : {0.0, 0.04, 0.08, 0.12})
+    for (uint64_t seed = 1; seed <= 12; seed++) {
+      View view = plain_view(4.0, tilt, 0.2);
+      view.seed = seed;
+      view.noise_grey = 4;
+      view.centre_m.x = 0.02 + 0.004 * static_cast<double>(seed);
+      Machine machine(view.camera, 0.2);
+      if (machine.look(take_picture(view, mr_ink(9))) == 0) continue;
+      const wm_marker &m = events[0].as.marker;
+      const auto off = [&](double yaw) { return std::fabs(std::remainder(yaw + M_PI / 2 + tilt, 2 * M_PI)); };
+      const double error = m.poses == 2 ? std::min(off(m.yaw_rad), off(m.other_yaw_rad)) : off(m.yaw_rad);
+      nees += error * error / (m.yaw_sigma_rad * m.yaw_sigma_rad);
+      sigma += m.yaw_sigma_rad;
+      seen++;
+    }
+  printf("nearly face on: NEES of the turn %.2f, sigma %.3f rad, %d seen\n", nees / seen, sigma / seen, seen);
+  TEST_ASSERT_GREATER_OR_EQUAL(40, seen);
+  TEST_ASSERT_TRUE(nees / seen < 1.3);
+  TEST_ASSERT_TRUE(sigma / seen < 0.15);
 }
 
 // Two prints of one identity, or one seen twice in a mirror's place: both are given, each where it is.
@@ -149,6 +176,7 @@ void tearDown() {}
 int main() {
   UNITY_BEGIN();
   RUN_TEST(place_and_turn_are_right);
+  RUN_TEST(nearly_face_on_the_turn_is_as_unsure_as_it_says);
   RUN_TEST(a_marker_twice_in_a_picture_is_given_twice);
   RUN_TEST(capacity_is_kept);
   RUN_TEST(blank_and_noisy_pictures_have_none);
