@@ -46,6 +46,7 @@ CASES = [
     ("crossing-points", "world:crossing --no-video", (0, 60)),
     ("crossing-odometry", "world:crossing --no-video", (0, 60)),
     ("crossing", "world:crossing-easy", (0, 1)),
+    ("crossing-cascade", "world:crossing-easy", (0, 1)),
     ("crossing-cameras", "world:crossing-easy --no-video", (0, 60)),
     ("seabed-points", "world:seabed-points", (0, 60)),
     ("loops-lines", "world:loops-lines", (0, 60)),
