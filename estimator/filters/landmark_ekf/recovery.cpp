@@ -16,7 +16,11 @@ constexpr double kRememberEvery_s = 10.0;
 constexpr double kFoundWrong = -2.5;  // a pose found anew is wrong in one of twelve cases, as log odds
 constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;
 constexpr double kInflateUpTo_m = 30.0;
-constexpr int kNumbers = 5;          // two more than a pose has: three bearings fit some pose, whatever they say
+constexpr int kNumbers = 5;           // two more than a pose has: three bearings fit some pose, whatever they say
+constexpr int kNumbersElsewhere = 6;  // of a pose that contradicts the one that is tracked
+constexpr double kLately_s = 2.0;
+constexpr int kFewOf = 3;  // a pose that explains less than one in so many of them is not where they are seen
+constexpr double kElsewhere_m = 0.5, kElsewhere_rad = 0.2;
 constexpr int kPoseNumbers = 3;      // of a pose that says next to nothing
 constexpr double kVague_rad = 0.5;   // sigma of a heading about which a Kalman update is no longer nearly straight
 constexpr double kVaguePlace = 0.5;  // sigma of a place, in those of one anywhere among the landmarks: the same
@@ -36,6 +40,10 @@ void landmark_ekf::note(wm_time_ns t_ns, int witness, double against, double ang
   if (!params_.recover) return;
   witnesses_.note(t_ns, witness, against, angle_rad, normalised, witness >= 0 ? landmark_records() + witness : nullptr);
   if (witness >= 0) tell_moved(witness);
+  if (state_ == WM_STATE_TRACKING) {
+    const wm_time_ns since = elsewhere_since(t_ns);
+    if (since != WM_TIME_NONE) witnesses_.contradict(since);
+  }
   if (state_ == WM_STATE_TRACKING && witnesses_.contradicted()) {
     state_ = WM_STATE_LOST;
     lost_ns_ = inflated_ns_ = t_ns;
@@ -56,6 +64,33 @@ void landmark_ekf::note(wm_time_ns t_ns, int witness, double against, double ang
     filter_.inflate_pose(square(kInflate_m), square(kInflate_rad));
     inflated_ns_ = t_ns;
   }
+}
+
+// Does another pose explain what was seen lately, and this one next to nothing of it? Then it was carried off, however
+// well all fitted before; false detections and moved landmarks don't agree on a pose. Lately is since the last fit, or
+// kLately_s: some fit by chance, the more so where a detector looks where the pose says. None: WM_TIME_NONE.
+wm_time_ns landmark_ekf::elsewhere_since(wm_time_ns t_ns) {
+  if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, t_ns) < kSearchEvery_s) return WM_TIME_NONE;
+  const wm_time_ns lately = t_ns - wm_ns_from_seconds(kLately_s);
+  const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
+  wm_time_ns since = fused_ns_ != WM_TIME_NONE && fused_ns_ > window ? fused_ns_ + 1 : window;
+  if (since > lately && clues_.count_since(since) < kNumbersElsewhere) since = lately;
+  if (clues_.count_since(since) < kNumbersElsewhere) return WM_TIME_NONE;
+  searched_ns_ = t_ns;
+  const wm_pose2 pose = filter_.pose(), odom = filter_.odom();
+  const int fitting = clues_.agreeing(since, pose, odom, filter_.travelled_m(), filter_.turned_rad());
+  if (kFewOf * fitting > clues_.count_since(since)) return WM_TIME_NONE;
+  const search_result other =
+      clues_.find(since, odom, filter_.travelled_m(), filter_.turned_rad(), nullptr, 0,
+                  {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad, kNumbersElsewhere});
+  if (!other.found || kFewOf * fitting > other.agreeing) return WM_TIME_NONE;
+  const double place = filter_.variance(kX) + filter_.variance(kY) + other.covariance[0][0] + other.covariance[1][1];
+  const double away_m2 = square(other.pose.x_m - pose.x_m) + square(other.pose.y_m - pose.y_m);
+  const double turned_rad = wrap(other.pose.heading_rad - pose.heading_rad);
+  const bool elsewhere =
+      away_m2 > square(kElsewhere_m) + 9.0 * place ||
+      square(turned_rad) > square(kElsewhere_rad) + 9.0 * (filter_.variance(kHeading) + other.covariance[2][2]);
+  return elsewhere ? since : WM_TIME_NONE;
 }
 
 // Counted once, and again only after it fitted in between.

@@ -330,6 +330,25 @@ void pose_search::add(const search_clue &clue) {
   if (count_ == 4 * kCapacity) count_ -= 2 * kCapacity;  // the index stays small; its place in the ring is the same
 }
 
+int pose_search::count_since(wm_time_ns since_ns) const {
+  int count = 0;
+  while (count < kept() && at(kept() - 1 - count).t_ns >= since_ns) count++;
+  return count;
+}
+
+int pose_search::agreeing(wm_time_ns since_ns, const wm_pose2 &pose_now, const wm_pose2 &odom_now, double travelled_m,
+                          double turned_rad) const {
+  problem all;
+  for (int i = kept() - count_since(since_ns); i < kept(); i++) all.add(at(i), travelled_m, turned_rad);
+  const double turn = wrap(pose_now.heading_rad - odom_now.heading_rad);
+  const sin_cos by = sincos(turn);
+  const placement frame = {pose_now.x_m - by.cos * odom_now.x_m + by.sin * odom_now.y_m,
+                           pose_now.y_m - by.sin * odom_now.x_m - by.cos * odom_now.y_m, turn, 0.0};
+  support fit;
+  cost_of(all, frame, &fit);
+  return fit.observations;
+}
+
 search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, double travelled_m, double turned_rad,
                                 const search_clue *prior, int prior_count, const search_limits &limits) const {
   search_result out{};

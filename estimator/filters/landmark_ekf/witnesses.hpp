@@ -35,6 +35,12 @@ class witnesses {
     proven_ = contradicted_once_ = false;
   }
 
+  // Another pose explains what was seen since then, and this one none of it: what fitted before says nothing any more.
+  void contradict(wm_time_ns since_ns) {
+    begin(kElsewhere);
+    doubted_since_ns_ = since_ns;
+  }
+
   // The logarithm of how much better "anything" explains an innovation than "right": its density if right (the joint
   // one of all its numbers), `room` the volume in which anything may lie. Bounded above by the share of false ones.
   static double against(double density, double room);
@@ -73,7 +79,7 @@ class witnesses {
     wm_time_ns t_ns, bad_since_ns;
   };
   static constexpr int kWitnesses = 24;
-  static constexpr double kLost = 1.0, kFound = -2.0, kDoubt = -2.5, kTrusted = -4.0;
+  static constexpr double kLost = 1.0, kElsewhere = 3.0, kFound = -2.0, kDoubt = -2.5, kTrusted = -4.0;
 
   static double says(double against, double moved);
   void sum(wm_time_ns t_ns);

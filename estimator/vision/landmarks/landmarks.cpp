@@ -18,6 +18,7 @@ constexpr size_t kFoundMax = 128;
 constexpr int kTries = 8;  // looks at full resolution in a picture that is searched
 constexpr size_t kAgreeing =
     3;  // landmarks that one pose must explain where it was guessed from one that looks less alike
+constexpr double kRate_hz = 30.0, kPeriodsMost = 8.0;  // of pictures, for which search_places is meant; at fewer: more
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 struct landmarks_state {
@@ -25,7 +26,8 @@ struct landmarks_state {
   search_everywhere search;
   bool steep;
   wm_time_ns readout_ns;
-  wm_time_ns found_ns;  // when the pose last led to a landmark
+  wm_time_ns found_ns;   // when the pose last led to a landmark
+  wm_time_ns before_ns;  // the picture before
   uint16_t *row;
   int count;
   appearance *known;
@@ -114,7 +116,7 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   if (mounted_camera_init(&state->eye.camera, *camera)) return WM_BAD_CONFIG;
   state->steep = is_steep(*camera);
   state->readout_ns = camera->readout_ns;
-  state->found_ns = WM_TIME_NONE;
+  state->found_ns = state->before_ns = WM_TIME_NONE;
   lay_out(state, state->eye.params, *view, state->eye.camera);
   return WM_OK;
 }
@@ -264,13 +266,21 @@ void look_by(landmarks_state *self, const wm_frame &frame, const camera_guess &g
   out->count = drop_strays(self, guess, out->which, out->events, out->likeness, out->count);
 }
 
+// How many places the time since the picture before allows to compare: who sees few pictures has time for each.
+int places_of(const landmarks_state &self, wm_time_ns t_ns) {
+  double periods = 1.0;
+  if (self.before_ns != WM_TIME_NONE) periods = kRate_hz * wm_seconds_between(self.before_ns, t_ns);
+  periods = periods > kPeriodsMost ? kPeriodsMost : larger(periods, 1.0);
+  return static_cast<int>(periods * self.eye.params.search_places);
+}
+
 // Looks everywhere for the landmarks whose turn it is; one that is recognised says where the others are.
 void look_everywhere(landmarks_state *self, const wm_frame &frame, found_list *out) {
   search_everywhere &search = self->search;
   const wm_landmarks_params &params = self->eye.params;
   search.round.take(self->eye.picture);
   search.search(self->eye.camera, self->known, self->count, params.range_max_m, params.facing_min, tilt_of(params),
-                static_cast<int>(params.search_places));
+                places_of(*self, frame.t_ns));
   for (int i = 0; i < search.count && i < kTries; i++) {
     const possible_place &where = search.places[i];
     recognised seen;
@@ -312,6 +322,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *predic
   const bool blind = wm_seconds_between(self->found_ns, frame.t_ns) > self->eye.params.search_after_s;
   if (found.count == 0 && (!guessed || blind) && self->eye.params.search_places > 0)
     look_everywhere(self, frame, &found);
+  self->before_ns = frame.t_ns;
   *count = in_order(out, found.likeness, found.count);
   return WM_OK;
 }
