@@ -17,11 +17,3 @@ const wm_detector *wm_detector_find(const char *name) {
     if (strcmp(kDetectors[i]->name, name) == 0) return kDetectors[i];
   return NULL;
 }
-
-const char *wm_look_name(unsigned look) {
-  static const char *const kNames[] = {
-      [WM_LOOK_FOUND] = "found",         [WM_LOOK_NOT_IN_VIEW] = "not in view", [WM_LOOK_FACES_AWAY] = "faces away",
-      [WM_LOOK_TOO_SMALL] = "too small", [WM_LOOK_UNCERTAIN] = "uncertain",     [WM_LOOK_LOW_CONTRAST] = "low contrast",
-      [WM_LOOK_BLURRED] = "blurred",     [WM_LOOK_UNLIKE] = "unlike",           [WM_LOOK_AMBIGUOUS] = "ambiguous"};
-  return look < WM_LOOK_COUNT ? kNames[look] : "?";
-}

@@ -54,6 +54,8 @@ static void print_source(const wm_source_health *s) {
   if (s->late) (void)printf("  %" PRIu64 " late", s->late);
   if (s->dropped) (void)printf("  %" PRIu64 " dropped", s->dropped);
   (void)putchar('\n');
+  char looks[300];
+  if (wm_looks_text(s->looks, looks, sizeof looks)) (void)printf("    %s\n", looks);
 }
 
 void print_report(const wm_run_report *r, const char *name, const char *out_dir, double took_s) {

@@ -68,6 +68,8 @@ wm_status wm_feeds_open(const wm_assembly *assembly, wm_feed *feeds, wm_time_ns 
     memset(feed, 0, sizeof *feed);
     feed->source = assembly->sources[i].source;
     feed->index = (uint16_t)i;
+    feed->source->from_ns = INT64_MIN;
+    feed->source->until_ns = INT64_MAX;
     if (feed->source->is_live) continue;
     recorded = 1;
     wm_status status = read_one(feed, err);
@@ -81,6 +83,8 @@ wm_status wm_feeds_open(const wm_assembly *assembly, wm_feed *feeds, wm_time_ns 
   for (size_t i = 0; i < assembly->source_count; i++) {
     feeds[i].from_ns = limit(*first_ns, assembly->sources[i].from_s, INT64_MIN);
     feeds[i].until_ns = limit(*first_ns, assembly->sources[i].until_s, INT64_MAX);
+    feeds[i].source->from_ns = feeds[i].from_ns;
+    feeds[i].source->until_ns = feeds[i].until_ns;
     wm_status status = skip_outside(&feeds[i], err);
     if (status != WM_OK) return status;
   }
@@ -109,5 +113,6 @@ void wm_feeds_health(const wm_feed *feeds, size_t count, wm_health *health) {
     out->bus_errors = counts.bus_errors;
     out->device = counts.device;
     out->stamp_uncertainty_ns = counts.stamp_uncertainty_ns;
+    memcpy(out->looks, counts.looks, sizeof out->looks);
   }
 }

@@ -30,6 +30,7 @@ typedef struct live_source {
   wm_error error;
   // What the source counted, for the health message.
   _Atomic uint64_t lost, malformed, not_finite, out_of_order, ignored, frozen, overflows, bus_errors;
+  _Atomic uint64_t looks[WM_LOOK_COUNT];
   _Atomic int64_t stamp_uncertainty_ns;
   atomic_uint device;   // wm_device_state
   uint8_t said_device;  // the thread's own

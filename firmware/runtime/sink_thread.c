@@ -81,6 +81,7 @@ static void add_source_counts(live *run, wm_health *health) {
     to->overflows = atomic_load_explicit(&from->overflows, memory_order_relaxed);
     to->bus_errors = atomic_load_explicit(&from->bus_errors, memory_order_relaxed);
     to->stamp_uncertainty_ns = atomic_load_explicit(&from->stamp_uncertainty_ns, memory_order_relaxed);
+    for (int k = 0; k < WM_LOOK_COUNT; k++) to->looks[k] = atomic_load_explicit(&from->looks[k], memory_order_relaxed);
     to->device = (uint8_t)atomic_load_explicit(&from->device, memory_order_relaxed);
   }
 }

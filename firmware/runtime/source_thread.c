@@ -39,6 +39,7 @@ static void share_counts(live_source *self) {
   atomic_store_explicit(&self->bus_errors, counts.bus_errors, memory_order_relaxed);
   atomic_store_explicit(&self->stamp_uncertainty_ns, counts.stamp_uncertainty_ns, memory_order_relaxed);
   atomic_store_explicit(&self->device, counts.device, memory_order_relaxed);
+  for (int i = 0; i < WM_LOOK_COUNT; i++) atomic_store_explicit(&self->looks[i], counts.looks[i], memory_order_relaxed);
 }
 
 static void play_recording(live_source *self) {

@@ -73,6 +73,17 @@ static void put_rejected(FILE *f, const wm_source_health *s) {
   (void)fputs("}", f);
 }
 
+// What became of each landmark in each picture, where the source is a detector of known ones.
+static void put_looks(FILE *f, const wm_source_health *s) {
+  const char *before = ", \"looks\": {";
+  for (unsigned i = 0; i < WM_LOOK_COUNT; i++) {
+    if (s->looks[i] == 0) continue;
+    (void)fprintf(f, "%s\"%s\": %" PRIu64, before, wm_look_name(i), s->looks[i]);
+    before = ", ";
+  }
+  if (before[2] == '\0') (void)fputs("}", f);
+}
+
 static void put_source(FILE *f, const wm_source_health *s) {
   (void)fputs("    ", f);
   string(f, s->name);
@@ -84,6 +95,7 @@ static void put_source(FILE *f, const wm_source_health *s) {
                 ", \"out_of_order\": %" PRIu64 ", \"ignored\": %" PRIu64 ", \"frozen\": %" PRIu64,
                 s->late, s->dropped, s->lost, s->duplicates, s->future, s->malformed, s->not_finite, s->out_of_order,
                 s->ignored, s->frozen);
+  put_looks(f, s);
   if (s->device != WM_DEVICE_NONE)
     (void)fprintf(f,
                   ", \"device\": \"%s\", \"overflows\": %" PRIu64 ", \"bus_errors\": %" PRIu64

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include "json_files.h"
+#include "looked_for.h"
 #include "row.h"
 #include "waymark/eventlog.h"
 
@@ -302,7 +303,8 @@ wm_status wm_run_folder_flush(wm_run_folder *self, wm_error *err) {
 }
 
 wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_error *err) {
-  return wm_write_health_json(self->dir, self->assembly, health, err);
+  wm_status status = wm_write_looked_for(self->dir, self->assembly->vision, err);
+  return status == WM_OK ? wm_write_health_json(self->dir, self->assembly, health, err) : status;
 }
 
 wm_status wm_run_folder_timing(wm_run_folder *self, const wm_timing *timing, wm_error *err) {

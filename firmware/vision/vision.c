@@ -109,6 +109,7 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
     if (status != WM_OK) return status;
     s->newest = &self->newest;
   }
+  if (!looks_open(&s->looks, s->view.appearance_count)) return wm_fail(err, WM_IO, "no memory for detectors");
   s->base = (wm_source){.ops = &kOps, .in_order = 1, .skip_to = skip_to};
   (void)snprintf(s->base.name, sizeof s->base.name, "%s:%s", s->detector->name, first->name);
   s->gives_looked = (config->estimator->takes & WM_EVENT_BIT(WM_EVENT_LOOKED)) != 0;
@@ -208,6 +209,7 @@ void wm_vision_close(wm_vision *self) {
     vision_ahead_stop(&self->sources[i]);
     for (size_t k = 0; k < PICTURES_MAX; k++) wm_video_close(self->sources[i].videos[k]);
     camera_set_close(&self->sources[i].devices);
+    looks_close(&self->sources[i].looks);
     free(self->sources[i].only);
   }
   free(self);
@@ -268,6 +270,11 @@ wm_status wm_vision_run_ahead(wm_vision *self, wm_error *err) {
 
 void wm_vision_tell(wm_vision *self, const wm_estimate *newest) {
   if (self) newest_pose_put(&self->newest, newest);
+}
+
+size_t wm_vision_looks(const wm_vision *self, size_t i, const wm_landmark_looks **rows) {
+  *rows = self->sources[i].looks.rows;
+  return self->sources[i].looks.count;
 }
 
 void wm_vision_times(const wm_vision *self, wm_histogram *decode_ns, wm_histogram *detect_ns) {

@@ -6,6 +6,7 @@
 #include <pthread.h>
 
 #include "camera_set.h"
+#include "looks.h"
 #include "newest_pose.h"
 #include "waymark/detector.h"
 #include "waymark/video.h"
@@ -47,6 +48,7 @@ struct vision_source {
   uint32_t seq;
   wm_source_counts counts;  // the working thread's own
   wm_histogram decode_ns, detect_ns;
+  looks looks;
   wm_seen *only;  // the only pictures to be looked at, rising; NULL: all
   size_t only_count;
   wm_time_ns only_tolerance_ns;

@@ -106,6 +106,8 @@ static void print_source(const wm_source_health *s, FILE *to) {
                 : s->stale ? "silent"
                            : "",
                 (double)s->silent_ns * 1e-9, s->fused, rejected, s->late, s->lost + s->overflows + s->dropped);
+  char looks[300];
+  if (wm_looks_text(s->looks, looks, sizeof looks)) (void)fprintf(to, "    %s\n", looks);
 }
 
 static void print_left(const wm_health *h, FILE *to) {

@@ -78,6 +78,10 @@ static void put_health(text *self, const watch *seen) {
     put(self, ", \"device\": ");
     put_string(self, s->device ? wm_device_state_name(s->device) : s->stale ? "silent" : "");
     put_number(self, "age_s", (double)s->silent_ns * 1e-9);
+    char looks[300];
+    (void)wm_looks_text(s->looks, looks, sizeof looks);
+    put(self, ", \"looks\": ");
+    put_string(self, looks);
     put(self, ", \"fused\": %llu, \"rejected\": %llu, \"late\": %llu, \"lost\": %llu}", (unsigned long long)s->fused,
         (unsigned long long)rejected, (unsigned long long)s->late, (unsigned long long)lost);
   }

@@ -12,6 +12,7 @@
 _Static_assert(sizeof(((waymark_source_health_t *)0)->rejected) / sizeof(int64_t) == WM_VERDICT_COUNT,
                "a verdict each");
 _Static_assert(sizeof(((waymark_source_health_t *)0)->refused) / sizeof(int64_t) == WM_STATUS_COUNT, "a status each");
+_Static_assert(sizeof(((waymark_source_health_t *)0)->looks) / sizeof(int64_t) == WM_LOOK_COUNT, "a look each");
 _Static_assert(sizeof(((waymark_health_t *)0)->sources) / sizeof(waymark_source_health_t) == WM_HEALTH_SOURCES_MAX,
                "a place each");
 _Static_assert(sizeof(((waymark_health_t *)0)->calibration) / sizeof(waymark_calibration_t) ==
@@ -84,6 +85,7 @@ static void put_source(waymark_source_health_t *out, const wm_source_health *s) 
   out->bus_errors = (int64_t)s->bus_errors;
   out->stamp_uncertainty_ns = s->stamp_uncertainty_ns;
   out->device = (int8_t)s->device;
+  for (int i = 0; i < WM_LOOK_COUNT; i++) out->looks[i] = (int64_t)s->looks[i];
 }
 
 size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {

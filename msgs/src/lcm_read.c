@@ -67,6 +67,7 @@ static void take_source(wm_source_health *out, const waymark_source_health_t *s)
   out->stamp_uncertainty_ns = s->stamp_uncertainty_ns;
   out->stale = (uint8_t)s->stale;
   out->device = (uint8_t)s->device;
+  for (int i = 0; i < WM_LOOK_COUNT; i++) out->looks[i] = (uint64_t)s->looks[i];
 }
 
 const char *wm_lcm_read_health(const void *message, size_t length, wm_health *out) {

@@ -34,6 +34,22 @@ def pose_at(rec, t_s):
     return float(row["x_m"]), float(row["y_m"]), math.degrees(heading)
 
 
+def reasons(out, landmarks):
+    """looked-for.csv: each landmark once a picture; health.json has the sums, `found` are the sightings."""
+    sources = json.loads((out / "health.json").read_text())["sources"]
+    with open(out / "looked-for.csv") as file:
+        rows = list(csv.DictReader(file))
+    for name in ("landmarks:left", "landmarks:right"):
+        mine = [{k: int(v) for k, v in r.items() if k not in ("source", "landmark")} for r in rows if r["source"] == name]
+        pictures = {sum(r.values()) for r in mine}
+        sums = {k: sum(r[k] for r in mine) for k in mine[0]}
+        check(len(mine) == landmarks and len(pictures) == 1, f"{name}: each of {len(mine)} landmarks has a fate in {pictures} pictures")
+        check({k: v for k, v in sums.items() if v} == sources[name]["looks"], f"{name}: {sources[name]['looks']}")
+        blind = sources[name]["received"] - sums["found"]
+        check(0 <= blind <= max(pictures), f"{name}: found are the sightings; {blind} pictures showed none")
+        check(sums["not_in_view"] > 0 and sums["unlike"] > 0, f"{name}: of those that weren't found it says why")
+
+
 def drives(folder, world):
     rec = folder / "rec"
     run("waymark-simulate", world, "--duration", 7, "--out", rec)
@@ -42,6 +58,7 @@ def drives(folder, world):
     run("waymark", "replay", folder / "a/events.wmlog", "--out", folder / "c")
     check(trajectory(folder / "a") == trajectory(folder / "b"), "two replays give the same bytes")
     check(trajectory(folder / "a") == trajectory(folder / "c"), "and so does the event log")
+    reasons(folder / "a", len(list(csv.DictReader(open(rec / "landmarks/appearance.csv")))))
     judged = json.loads(run("waymark-eval", folder / "a", rec, "--json"))
     check(judged["position_rmse_m"] < 0.1, f"position {judged['position_rmse_m']:.4f} m RMS")
     seen = json.loads(run("waymark-eval", folder / "a", rec, "--detector", "landmarks", "--json"))

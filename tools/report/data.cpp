@@ -114,6 +114,7 @@ ReportData load_report_data(const fs::path &run, const fs::path &recording) {
   out.start_ns = out.trajectory.poses.front().t_ns;
   out.name = fs::weakly_canonical(run).filename().string();
   out.innovations = load_innovations(run / "innovations.csv");
+  out.looked_for = load_looked_for(run / "looked-for.csv");
   out.health = load_json(run / "health.json");
   out.timing = load_json(run / "timing.json");
   if (fs::exists(run / "map-estimate.csv")) out.estimated_landmarks = load_landmarks(run / "map-estimate.csv");

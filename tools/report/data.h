@@ -2,6 +2,7 @@
 // Everything that a report is made of, read from a run's folder and, where it is given, its recording's.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -13,6 +14,7 @@
 #include "eval/compare.h"
 #include "eval/figures.h"
 #include "report/frames.h"
+#include "waymark/look.h"
 
 namespace wm::tools {
 
@@ -28,6 +30,13 @@ struct Innovation {
   [[nodiscard]] bool fused() const { return verdict == "fused"; }
   // Observed minus expected; angles wrapped.
   [[nodiscard]] double value() const;
+};
+
+// A row of looked-for.csv.
+struct LandmarkLooks {
+  std::string source;
+  int64_t landmark;
+  std::array<int64_t, WM_LOOK_COUNT> counts;  // pictures, by wm_look
 };
 
 // The map as a picture: an image file and where it lies.
@@ -46,6 +55,7 @@ struct ReportData {
   std::optional<Comparison> truth;
   Figures figures;  // null without truth
   std::vector<Innovation> innovations;
+  std::vector<LandmarkLooks> looked_for;
   nlohmann::json health, timing;  // null where not there
   std::vector<Landmark> landmarks, estimated_landmarks;
   std::vector<Pose> gnss;
@@ -63,6 +73,9 @@ struct ReportData {
 
 // Absent files leave their part empty; a file that is there and broken throws Failure. `recording` may be empty.
 ReportData load_report_data(const std::filesystem::path &run, const std::filesystem::path &recording);
+
+// looked-for.csv of a run; nothing where it isn't there.
+std::vector<LandmarkLooks> load_looked_for(const std::filesystem::path &file);
 
 // map/map.yaml of a recording and its image (PNG as it is, PGM made into one); nothing where there is no map, or where
 // its image is too large, which `notes` then says.

@@ -117,8 +117,8 @@ std::string report_page(const ReportData &data) {
          "</style></head>\n<body data-from=\"0\" data-to=\"" + fixed(data.end_s(), 3) + "\"><main>\n" +
          headline_section(data) + map_section(data) + frames_section(data) +
          (data.truth ? error_section(data) : uncertainty_section(data)) + consistency_section(data) +
-         state_section(data) + innovation_section(data) + source_section(data) + calibration_section(data) +
-         timing_section(data) + figures_section(data) +
+         state_section(data) + innovation_section(data) + looked_for_section(data) + source_section(data) +
+         calibration_section(data) + timing_section(data) + figures_section(data) +
          "<footer>Made by <code>waymark report</code> " WM_VERSION
          ". Everything on this page comes from the run’s own files" +
          std::string(data.truth ? " and the recording’s truth, which the robot never saw" : "") +

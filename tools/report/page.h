@@ -20,6 +20,7 @@ std::string error_section(const ReportData &data);        // with truth
 std::string uncertainty_section(const ReportData &data);  // without
 std::string consistency_section(const ReportData &data);
 std::string innovation_section(const ReportData &data);
+std::string looked_for_section(const ReportData &data);
 std::string source_section(const ReportData &data);
 std::string state_section(const ReportData &data);
 std::string calibration_section(const ReportData &data);

@@ -7,6 +7,7 @@
 
 #include "waymark/event.h"
 #include "waymark/health.h"
+#include "waymark/look.h"
 #include "waymark/status.h"
 
 #ifdef __cplusplus
@@ -32,6 +33,7 @@ typedef struct wm_source_counts {
   uint8_t device;
   char device_note[160];
   wm_time_ns stamp_uncertainty_ns;
+  uint64_t looks[WM_LOOK_COUNT];  // of a detector of known landmarks: what became of each in each picture
 } wm_source_counts;
 
 // A device's `next` gives up waiting after this, so that a stop is noticed.
@@ -58,6 +60,7 @@ struct wm_source {
   double lateness_max_ms;         // where the configuration doesn't name the source; 0: merge.lateness_max_ms
   uint32_t kinds;                 // WM_EVENT_BIT of what it hands out
   wm_source_counts counts;
+  wm_time_ns from_ns, until_ns;  // of the part that a run takes: looks outside of it aren't counted
   // NULL where everything is to be told. Pictures are large and take long: those that aren't the newest any more at
   // `now_ns`, on the clock of the arrivals, are passed over and counted (overflows).
   void (*skip_to)(wm_source *self, wm_time_ns now_ns);

@@ -12,6 +12,7 @@
 #include "waymark/cascade.h"
 #include "waymark/event.h"
 #include "waymark/frame.h"
+#include "waymark/look.h"
 #include "waymark/params.h"
 #include "waymark/pose.h"
 #include "waymark/setup.h"
@@ -34,22 +35,7 @@ typedef struct wm_view {
   size_t cascade_count;
 } wm_view;
 
-// What became of a landmark that a detector of known landmarks had to do with in its last picture.
-typedef enum wm_look {
-  WM_LOOK_FOUND = 0,
-  WM_LOOK_NOT_IN_VIEW,   // outside of the picture, not all in it, or beyond the range
-  WM_LOOK_FACES_AWAY,    // seen from behind, or too slanted
-  WM_LOOK_TOO_SMALL,     // in the picture
-  WM_LOOK_UNCERTAIN,     // where it should be is less sure than a window is large
-  WM_LOOK_LOW_CONTRAST,  // the place is dark, white or fogged
-  WM_LOOK_BLURRED,       // there, but without the edges that it should have
-  WM_LOOK_UNLIKE,        // something else is there: hidden, moved or replaced
-  WM_LOOK_AMBIGUOUS,     // several places look like it
-  WM_LOOK_COUNT
-} wm_look;
-
-const char *wm_look_name(unsigned look);
-
+// What became of a landmark in the last picture of a detector of known landmarks.
 typedef struct wm_looked_for {
   int32_t landmark_id;
   uint8_t look;  // wm_look

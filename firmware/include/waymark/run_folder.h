@@ -39,6 +39,7 @@ typedef struct wm_timing {
   size_t memory_bytes;
 } wm_timing;
 
+// health.json; looked-for.csv where a detector looked for known landmarks.
 wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_error *err);
 wm_status wm_run_folder_timing(wm_run_folder *self, const wm_timing *timing, wm_error *err);
 // map-estimate.csv: the landmarks that the estimator found; nothing where it has none.

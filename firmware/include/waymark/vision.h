@@ -15,6 +15,7 @@
 #include "waymark/config.h"
 #include "waymark/devices.h"
 #include "waymark/histogram.h"
+#include "waymark/look.h"
 #include "waymark/pose.h"
 #include "waymark/recording.h"
 #include "waymark/source.h"
@@ -58,6 +59,16 @@ wm_status wm_vision_start(wm_vision *self, wm_error *err);
 // pose as it is when the picture arrives: its source hands out an event of kind WM_EVENT_NONE at each picture's arrival
 // and looks when it is asked for the next one.
 wm_status wm_vision_run_ahead(wm_vision *self, wm_error *err);
+
+// What became of a landmark in the pictures that a source looked at: how often each wm_look.
+typedef struct wm_landmark_looks {
+  int32_t landmark_id;
+  uint64_t looks[WM_LOOK_COUNT];
+} wm_landmark_looks;
+
+// Of source i, a row for each landmark that its detector knows; 0 where that has no meaning. Valid when the threads
+// have ended or the run is over.
+size_t wm_vision_looks(const wm_vision *self, size_t i, const wm_landmark_looks **rows);
 
 // How long decoding and detecting take, of all sources together (valid when the threads have ended or the run is over).
 void wm_vision_times(const wm_vision *self, wm_histogram *decode_ns, wm_histogram *detect_ns);

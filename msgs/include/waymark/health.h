@@ -7,6 +7,7 @@
 
 #include <stdint.h>
 
+#include "waymark/look.h"
 #include "waymark/pose.h"
 #include "waymark/status.h"
 #include "waymark/time.h"
@@ -51,6 +52,7 @@ typedef struct wm_source_health {
   wm_time_ns stamp_uncertainty_ns;                                      // of a device; 0 for a recording
   uint8_t stale;                                                        // silent for far longer than it used to be
   uint8_t device;                                                       // wm_device_state
+  uint64_t looks[WM_LOOK_COUNT];  // of a detector of known landmarks: one for each landmark and picture, by wm_look
 } wm_source_health;
 
 typedef struct wm_health {

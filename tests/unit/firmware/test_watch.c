@@ -58,6 +58,7 @@ static void a_message_is_read_as_it_was_sent(void) {
   wm_published read_pose;
   health.sources[1].overflows = 5;
   health.sources[1].stamp_uncertainty_ns = 77;
+  for (int i = 0; i < WM_LOOK_COUNT; i++) health.sources[1].looks[i] = (uint64_t)(100 + i);
   health.calibration_count = 1;
   (void)snprintf(health.calibration[0].name, sizeof health.calibration[0].name, "laser.yaw_rad");
   health.calibration[0].value = 0.25;
@@ -86,6 +87,33 @@ static void the_view_has_pose_sources_and_what_is_left(void) {
                                "as long as it stands", "edges:front",  "7 rejected"};
   for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(shown, parts[i]), shown);
+}
+
+static void landmarks_that_are_not_found_have_a_reason(void) {
+  uint64_t looks[WM_LOOK_COUNT] = {0};
+  char text[200];
+  TEST_ASSERT_EQUAL(0, wm_looks_text(looks, text, sizeof text));
+  TEST_ASSERT_EQUAL_STRING("", text);
+  looks[WM_LOOK_FOUND] = 40;
+  TEST_ASSERT_EQUAL(strlen("expected 40: 40 found"), wm_looks_text(looks, text, sizeof text));
+  looks[WM_LOOK_LOW_CONTRAST] = 2;
+  looks[WM_LOOK_UNLIKE] = 7;
+  looks[WM_LOOK_NOT_IN_VIEW] = 900;
+  looks[WM_LOOK_UNCERTAIN] = 3;
+  (void)wm_looks_text(looks, text, sizeof text);
+  TEST_ASSERT_EQUAL_STRING("expected 49: 40 found, 2 low contrast, 7 unlike; else 900 not in view, 3 uncertain", text);
+  for (size_t capacity = 1; capacity < 60; capacity++) {
+    char small[60];
+    memset(small, 'x', sizeof small);
+    TEST_ASSERT_LESS_THAN(capacity, wm_looks_text(looks, small, capacity));
+    TEST_ASSERT_EQUAL(0, strncmp(small, text, strlen(small)));
+  }
+  memcpy(health.sources[1].looks, looks, sizeof looks);
+  (void)state_of_health();
+  FILE *f = fmemopen(shown, sizeof shown, "w");
+  watch_print(&seen, 10 * WM_NS_PER_S, f);
+  (void)fclose(f);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(shown, text), shown);
 }
 
 static void innovations_give_a_verdict(void) {
@@ -134,6 +162,7 @@ int main(void) {
   RUN_TEST(the_state_says_what_is_wrong);
   RUN_TEST(a_message_is_read_as_it_was_sent);
   RUN_TEST(the_view_has_pose_sources_and_what_is_left);
+  RUN_TEST(landmarks_that_are_not_found_have_a_reason);
   RUN_TEST(innovations_give_a_verdict);
   RUN_TEST(the_page_is_told_what_is_seen);
   RUN_TEST(the_page_needs_nothing_from_elsewhere);
