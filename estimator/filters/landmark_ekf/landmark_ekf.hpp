@@ -100,6 +100,7 @@ class landmark_ekf {
   void start_again();
 
   wm_time_ns elsewhere_since(wm_time_ns t_ns);
+  bool is_elsewhere(wm_time_ns since_ns, wm_time_ns t_ns);
   void tell_moved(int landmark);
   void widen(wm_estimate *out) const;
   void mix_start(wm_estimate *out) const;

@@ -73,24 +73,27 @@ wm_time_ns landmark_ekf::elsewhere_since(wm_time_ns t_ns) {
   if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, t_ns) < kSearchEvery_s) return WM_TIME_NONE;
   const wm_time_ns lately = t_ns - wm_ns_from_seconds(kLately_s);
   const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
-  wm_time_ns since = fused_ns_ != WM_TIME_NONE && fused_ns_ > window ? fused_ns_ + 1 : window;
-  if (since > lately && clues_.count_since(since) < kNumbersElsewhere) since = lately;
-  if (clues_.count_since(since) < kNumbersElsewhere) return WM_TIME_NONE;
+  const wm_time_ns unfit = fused_ns_ != WM_TIME_NONE && fused_ns_ > window ? fused_ns_ + 1 : window;
+  if (is_elsewhere(unfit, t_ns)) return unfit;
+  return is_elsewhere(lately, t_ns) ? lately : WM_TIME_NONE;
+}
+
+bool landmark_ekf::is_elsewhere(wm_time_ns since_ns, wm_time_ns t_ns) {
+  const int clues = clues_.count_since(since_ns);
+  if (clues < kNumbersElsewhere) return false;
   searched_ns_ = t_ns;
   const wm_pose2 pose = filter_.pose(), odom = filter_.odom();
-  const int fitting = clues_.agreeing(since, pose, odom, filter_.travelled_m(), filter_.turned_rad());
-  if (kFewOf * fitting > clues_.count_since(since)) return WM_TIME_NONE;
+  const int fitting = clues_.agreeing(since_ns, pose, odom, filter_.travelled_m(), filter_.turned_rad());
+  if (kFewOf * fitting > clues) return false;
   const search_result other =
-      clues_.find(since, odom, filter_.travelled_m(), filter_.turned_rad(), nullptr, 0,
+      clues_.find(since_ns, odom, filter_.travelled_m(), filter_.turned_rad(), nullptr, 0,
                   {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad, kNumbersElsewhere});
-  if (!other.found || kFewOf * fitting > other.agreeing) return WM_TIME_NONE;
+  if (!other.found || kFewOf * fitting > other.agreeing) return false;
   const double place = filter_.variance(kX) + filter_.variance(kY) + other.covariance[0][0] + other.covariance[1][1];
+  const double heading = filter_.variance(kHeading) + other.covariance[2][2];
   const double away_m2 = square(other.pose.x_m - pose.x_m) + square(other.pose.y_m - pose.y_m);
   const double turned_rad = wrap(other.pose.heading_rad - pose.heading_rad);
-  const bool elsewhere =
-      away_m2 > square(kElsewhere_m) + 9.0 * place ||
-      square(turned_rad) > square(kElsewhere_rad) + 9.0 * (filter_.variance(kHeading) + other.covariance[2][2]);
-  return elsewhere ? since : WM_TIME_NONE;
+  return away_m2 > square(kElsewhere_m) + 9.0 * place || square(turned_rad) > square(kElsewhere_rad) + 9.0 * heading;
 }
 
 // Counted once, and again only after it fitted in between.

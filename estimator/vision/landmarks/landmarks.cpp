@@ -19,6 +19,7 @@ constexpr int kTries = 8;  // looks at full resolution in a picture that is sear
 constexpr size_t kAgreeing =
     3;  // landmarks that one pose must explain where it was guessed from one that looks less alike
 constexpr double kRate_hz = 30.0, kPeriodsMost = 8.0;  // of pictures, for which search_places is meant; at fewer: more
+constexpr size_t kFewOf = 5;  // a pose that finds less than one in so many of those that it expects is hardly right
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 struct landmarks_state {
@@ -303,6 +304,13 @@ void look_everywhere(landmarks_state *self, const wm_frame &frame, found_list *o
   forget_looks(self);
 }
 
+// Whether what was found bears the pose out: a wrong pose finds one thing or another that looks like what it expects.
+bool is_led(const landmarks_state &self, const found_list &found) {
+  size_t expected = 0;
+  for (int i = 0; i < self.count; i++) expected += wm_look_is_expected(self.looks[i].look) != 0;
+  return found.count > 0 && kFewOf * found.count >= expected;
+}
+
 wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *prediction, wm_event *out, size_t capacity,
                  size_t *count) {
   auto *self = static_cast<landmarks_state *>(memory);
@@ -318,10 +326,13 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *predic
   found.count = 0;
   forget_looks(self);
   if (guessed) look_by(self, frame, guess, true, &found);
-  if (found.count > 0 || self->found_ns == WM_TIME_NONE) self->found_ns = frame.t_ns;
+  if (is_led(*self, found) || self->found_ns == WM_TIME_NONE) self->found_ns = frame.t_ns;
   const bool blind = wm_seconds_between(self->found_ns, frame.t_ns) > self->eye.params.search_after_s;
-  if (found.count == 0 && (!guessed || blind) && self->eye.params.search_places > 0)
+  if ((!guessed || blind) && self->eye.params.search_places > 0) {
+    const size_t by_pose = found.count;
     look_everywhere(self, frame, &found);
+    if (guessed && by_pose > 0 && found.count <= by_pose) look_by(self, frame, guess, true, &found);
+  }
   self->before_ns = frame.t_ns;
   *count = in_order(out, found.likeness, found.count);
   return WM_OK;
