@@ -8,9 +8,12 @@ namespace wm {
 namespace {
 
 constexpr double kFarthest_m = 1e4;
-constexpr double kAgree_m = 0.2, kAgree_rad = 0.1;  // of two markers on where the robot is
-constexpr double kThreeNumbers = 11.345 / 9.210;    // 99 % of chi2 with three degrees of freedom against two
-constexpr double kPlain = 9.0;                      // of two poses one is 90 times as likely
+constexpr double kAgree_m = 0.2;                          // of two markers on how far they are apart
+constexpr double kKnown_rad = 0.03;                       // sigma of a heading to begin with
+constexpr double kCarried_m = 0.03, kCarried_rad = 0.02;  // what odometry and map add to a sighting of a while ago
+constexpr double kNoTurn = 1e6, kThreeSigmas = 9.0;
+constexpr double kThreeNumbers = 11.345 / 9.210;  // 99 % of chi2 with three degrees of freedom against two
+constexpr double kPlain = 9.0;                    // of two poses one is 90 times as likely
 
 double first_number(double a, double b) { return finite(a) ? a : b; }
 
@@ -97,7 +100,8 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   const int landmark = find_landmark(m.id);
   if (doubled(m.id, landmark, m.sensor)) return drop(WM_REJECTED_NO_ASSOCIATION);
   const bool two = m.poses == 2;
-  if (searching_ && (two || landmark < 0 || !find_start(landmark, m, r))) return drop(WM_REJECTED_SEARCHING);
+  r.turned = !two;
+  if (searching_ && (landmark < 0 || !find_start(landmark, m, r))) return drop(WM_REJECTED_SEARCHING);
   const past_pose past = look_back(sensor_value(m.sensor, kTimeOffset, 0.0));
   if (two) {
     // Seen nearly face on a print has two poses, which differ in its heading. The filter tells them apart where it
@@ -117,24 +121,46 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   return WM_OK;
 }
 
-// Lost on a map: each marker of it says where the robot is. Two different ones that agree are believed.
+// Lost on a map: two different markers of it that are as far apart as the map says tell where the robot is. Its heading
+// is the weighted mean of what their places say and what each one's turn says, if these agree. The other marker was
+// seen a while ago, and is carried on by the odometry.
 bool slam::find_start(int landmark, const wm_marker &m, const marker_reading &r) {
-  const int state = joint_.landmark_state(landmark);
   const mounted_sensor &sensor = sensor_[m.sensor];
-  const wm_pose2 marker = {joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};
-  const wm_pose2 seen = compose({sensor.x_m, sensor.y_m, sensor.yaw_rad}, {r.level[0], r.level[1], r.yaw_rad});
-  const wm_pose2 here = compose(marker, between(seen, wm_pose2{}));
-  const wm_pose2 other = compose(candidate_, between(candidate_odom_, joint_.odom()));
-  const bool agree = candidate_id_ >= 0 && candidate_id_ != m.id &&
-                     square(here.x_m - other.x_m) + square(here.y_m - other.y_m) < square(kAgree_m) &&
-                     std::fabs(wrap(here.heading_rad - other.heading_rad)) < kAgree_rad;
-  if (candidate_id_ != m.id) {
-    candidate_id_ = m.id;
-    candidate_ = here;
-    candidate_odom_ = joint_.odom();
-  }
-  if (!agree) return false;
-  const double xy = square(kAgree_m), covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(kAgree_rad)}};
+  const double turn_variance = r.turned ? r.noise[2] + square(kCarried_rad) : kNoTurn;
+  const seen_marker now = {m.id, r.noise[0] + square(kCarried_m), turn_variance,
+                           compose({sensor.x_m, sensor.y_m, sensor.yaw_rad}, {r.level[0], r.level[1], r.yaw_rad}),
+                           joint_.odom()};
+  const seen_marker before = candidate_;
+  if (before.id != m.id) candidate_ = now;
+  const int earlier = before.id < 0 || before.id == m.id ? -1 : find_landmark((int32_t)before.id);
+  if (earlier < 0) return false;
+  const wm_pose2 other = compose(between(now.odom, before.odom), before.seen);
+  const auto on_map = [this](int which) {
+    const int state = joint_.landmark_state(which);
+    return wm_pose2{joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};
+  };
+  const wm_pose2 marker = on_map(landmark), other_marker = on_map(earlier);
+  const double seen[2] = {other.x_m - now.seen.x_m, other.y_m - now.seen.y_m};
+  const double mapped[2] = {other_marker.x_m - marker.x_m, other_marker.y_m - marker.y_m};
+  const double apart = std::sqrt(square(mapped[0]) + square(mapped[1]));
+  if (std::fabs(apart - std::sqrt(square(seen[0]) + square(seen[1]))) > kAgree_m) return false;
+
+  const double says[3] = {atan2(mapped[1], mapped[0]) - atan2(seen[1], seen[0]),
+                          marker.heading_rad - now.seen.heading_rad, other_marker.heading_rad - other.heading_rad};
+  const double weight[3] = {square(apart) / (now.variance_m2 + before.variance_m2), 1.0 / now.turn_variance,
+                            1.0 / before.turn_variance};
+  const double all = weight[0] + weight[1] + weight[2];
+  const double first = weight[0] > weight[1] ? says[0] : says[1];
+  double heading = first;
+  for (int i = 0; i < 3; i++) heading += weight[i] / all * wrap(says[i] - first);
+  if (all * square(kKnown_rad) < 1.0 || weight[1] + weight[2] < 1.0) return false;
+  for (int i = 0; i < 3; i++)
+    if (square(wrap(says[i] - heading)) * weight[i] > kThreeSigmas) return false;
+
+  const sin_cos h = sincos(heading);
+  const wm_pose2 here = {marker.x_m - h.cos * now.seen.x_m + h.sin * now.seen.y_m,
+                         marker.y_m - h.sin * now.seen.x_m - h.cos * now.seen.y_m, wrap(heading)};
+  const double xy = square(kAgree_m), covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(kKnown_rad)}};
   joint_.set_pose(here, covariance);
   searching_ = false;
   resets_++;

@@ -160,7 +160,7 @@ void slam::start_again() {
   look_.fused = look_.refused = 0;
   resets_++;
   searching_ = params_.map != WM_SLAM_MAP_NONE && params_.markers && !(place && heading);
-  candidate_id_ = -1;
+  candidate_.id = -1;
   if (params_.map != WM_SLAM_MAP_NONE) load_map();
 }
 

@@ -97,6 +97,12 @@ class slam {
     double length_m;
     bool turned;  // its heading is one, not one of two
   };
+  // On a map, from a robot that doesn't know where it is.
+  struct seen_marker {
+    int64_t id;
+    double variance_m2, turn_variance;  // of its distance and of its heading
+    wm_pose2 seen, odom;                // in base_link; where that was
+  };
   struct marker_view {
     joint_row row[3];
     double observed[3], expected[3], innovation[3];
@@ -201,8 +207,7 @@ class slam {
   uint32_t resets_;
   // Started somewhere on a map that was given: no pose until two of its markers say the same.
   bool searching_;
-  int32_t candidate_id_;  // the marker that said it first; -1: none
-  wm_pose2 candidate_, candidate_odom_;
+  seen_marker candidate_;  // the one that was seen first; its id is -1: none
 };
 
 }  // namespace wm
