@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+// A simulated room whose landmarks nobody measured, and a robot that drives a circle in it: what tests of SLAM share.
+// All noise is drawn from fixed seeds.
+#pragma once
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <limits>
+
+#include "events.hpp"
+#include "filters/slam/params.h"
+#include "math/arc.hpp"
+#include "motion/motion_params.h"
+#include "unity.h"
+#include "waymark/estimator.h"
+#include "waymark/random.h"
+
+namespace room {
+
+inline constexpr int kCount = 12;
+inline const double kAbsent = std::numeric_limits<double>::quiet_NaN();
+
+inline const wm_estimator *slam;
+inline wm_motion_params motion;
+inline wm_slam_params params;
+inline wm_setup setup;
+inline wm_sensor sensor;
+inline wm_landmark known[kCount];
+inline double place[kCount][2];
+inline void *state;
+inline wm_random noise;
+inline wm_pose2 truth;
+inline double now_s;
+inline double false_share;  // of sightings that are of nothing
+inline bool hidden, twice, nameless, coded, two_poses;
+inline int fused, rejected, twin;  // twin: 0, or where a second print of the first identity hangs
+
+inline double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
+
+inline void make_room() {
+  slam = wm_estimator_find("slam");
+  wm_params_defaults(&wm_motion_params_table, &motion);
+  wm_params_defaults(&slam->params, &params);
+  for (int i = 0; i < kCount; i++) {
+    const wm::sin_cos a = wm::sincos(wm::kTwoPi * i / kCount + 0.1);
+    const double radius = i % 2 == 0 ? 5.0 : 3.5;
+    place[i][0] = radius * a.cos;
+    place[i][1] = radius * a.sin;
+    known[i] = {10 + i, {place[i][0], place[i][1], 0}, 0.01, kAbsent, {}, 0};
+  }
+  sensor = {};
+  std::strcpy(sensor.name, "camera");
+  sensor.mounting.xyz_m[0] = 0.2;
+  sensor.bearing_sigma_rad = 0.01;
+  sensor.range_sigma_m = 0.03;
+  sensor.max_range_m = INFINITY;
+  setup = {};
+  setup.motion = &motion;
+  setup.wheels = make::no_wheels();
+  setup.sensors = &sensor;
+  setup.sensor_count = 1;
+  setup.landmarks = known;
+  setup.landmark_count = kCount;
+  setup.start = {WM_TIME_NONE, {2, 0, 0}, {0, 0, 0, 1}, wm::kHalfPi, 0.001, 0.001};
+  truth = {2, 0, wm::kHalfPi};
+  noise = {42, 1, 0};
+  now_s = false_share = 0.0;
+  hidden = twice = nameless = coded = two_poses = false;
+  fused = rejected = twin = 0;
+}
+
+inline void begin() {
+  const char *why = "";
+  std::free(state);
+  const size_t bytes = slam->state_bytes(&params, &setup, &why);
+  TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
+  state = aligned_alloc(16, (bytes + 15) / 16 * 16);
+  TEST_ASSERT_EQUAL(WM_OK, slam->init(state, &params, &setup));
+}
+
+inline wm_verdict see(const wm_event &e) {
+  wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
+  size_t count = 0;
+  TEST_ASSERT_EQUAL(WM_OK, slam->correct(state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
+  TEST_ASSERT_GREATER_THAN(0, count);
+  (out[0].verdict == WM_FUSED ? fused : rejected)++;
+  return (wm_verdict)out[0].verdict;
+}
+
+inline wm_marker marker(int32_t id, double x, double y, double z, double yaw_rad) {
+  wm_marker m{};
+  m.id = id;
+  m.p_m[0] = x;
+  m.p_m[1] = y;
+  m.p_m[2] = z;
+  m.yaw_rad = yaw_rad;
+  return m;
+}
+
+// Drives a circle of 2 m and looks around five times a second.
+inline void drive(double seconds, bool range = true) {
+  const double v = 0.5, w = 0.25, until = now_s + seconds;
+  for (int step = 0; now_s < until; step++) {
+    const wm_event e = make::twist(now_s, v + gauss(0.02), w + gauss(0.01));
+    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+    if (step % 10 == 0 && !hidden) {
+      const wm_pose2 eye = wm::compose(truth, {0.2, 0, 0});
+      for (int k = 0; k < kCount + (twin > 0); k++) {
+        const int i = k % kCount, at = k < kCount ? k : twin;
+        const double dx = place[at][0] - eye.x_m, dy = place[at][1] - eye.y_m;
+        const double bearing = wm::wrap(wm::atan2(dy, dx) - truth.heading_rad), distance = std::sqrt(dx * dx + dy * dy);
+        if (std::fabs(bearing) > 1.2) continue;
+        const bool wrong = wm_random_next_uniform(&noise) < false_share;
+        const double b = wrong ? gauss(0.7) : bearing + gauss(0.01);
+        const double r = wrong ? 1.0 + 5.0 * wm_random_next_uniform(&noise) : distance + gauss(0.03);
+        if (coded) {
+          wm_event seen = make::empty(now_s, WM_EVENT_MARKER);
+          seen.as.marker =
+              marker(10 + i, r * wm::cos(b), r * wm::sin(b), 2.2, wm::wrap(0.5 * i - truth.heading_rad + gauss(0.01)));
+          if (two_poses) {  // the wrong one first, turned to the other side of the line of sight
+            wm_marker &m = seen.as.marker;
+            m.poses = 2;
+            std::memcpy(m.other_p_m, m.p_m, sizeof m.p_m);
+            m.other_yaw_rad = m.yaw_rad;
+            m.yaw_rad = wm::wrap(m.yaw_rad + (bearing > 0 ? 0.4 : -0.4));
+          }
+          see(seen);
+          if (twice) see(seen);
+          continue;
+        }
+        see(make::sighting(now_s, nameless ? -1 : 10 + i, b, range ? r : kAbsent));
+        if (twice) see(make::sighting(now_s, nameless ? -1 : 10 + i, b, range ? r : kAbsent));
+      }
+    }
+    const double dt = 0.02;
+    const wm::arc a = wm::make_arc(v * dt, w * dt);
+    truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
+    now_s += dt;
+  }
+  const wm_event e = make::twist(now_s, v, w);
+  TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+}
+
+inline double off() {
+  wm_estimate e;
+  slam->estimate(state, &e);
+  const double dx = e.pose_map_base.p_m[0] - truth.x_m, dy = e.pose_map_base.p_m[1] - truth.y_m;
+  return std::sqrt(dx * dx + dy * dy);
+}
+
+inline double sigma() {
+  wm_estimate e;
+  slam->estimate(state, &e);
+  return std::sqrt(e.covariance[0] + e.covariance[wm_cov_index(1, 1)]);
+}
+
+inline double counted(const char *name) {
+  wm_calibration_value values[64];
+  const size_t n = slam->calibration(state, values, 64);
+  for (size_t i = 0; i < n; i++)
+    if (std::strcmp(values[i].name, name) == 0) return values[i].value;
+  return -1.0;
+}
+
+// Largest distance between a landmark found and the true place that its id (or, without ids, its neighbourhood) names.
+inline double worst_landmark(size_t *found) {
+  wm_landmark l[64];
+  double covariance[64][4], worst = 0.0;
+  *found = slam->landmarks(state, l, covariance, 64);
+  for (size_t i = 0; i < *found; i++) {
+    double least = 1e300;
+    for (int k = 0; k < kCount; k++) {
+      if (!nameless && l[i].id != 10 + k) continue;
+      const double dx = l[i].p_m[0] - place[k][0], dy = l[i].p_m[1] - place[k][1];
+      least = std::fmin(least, std::sqrt(dx * dx + dy * dy));
+    }
+    TEST_ASSERT_TRUE(covariance[i][0] > 0.0 && covariance[i][2] > 0.0);
+    worst = std::fmax(worst, least);
+  }
+  return worst;
+}
+
+inline wm_state published_state() {
+  wm_estimate e;
+  slam->estimate(state, &e);
+  return (wm_state)e.state;
+}
+
+inline void leave_room() {
+  std::free(state);
+  state = nullptr;
+}
+
+}  // namespace room
