@@ -147,8 +147,11 @@ bool slam::find_start(int landmark, const wm_marker &m, const marker_reading &r)
 
   const double says[3] = {atan2(mapped[1], mapped[0]) - atan2(seen[1], seen[0]),
                           marker.heading_rad - now.seen.heading_rad, other_marker.heading_rad - other.heading_rad};
-  const double weight[3] = {square(apart) / (now.variance_m2 + before.variance_m2), 1.0 / now.turn_variance,
-                            1.0 / before.turn_variance};
+  const auto turn_weight = [this](const seen_marker &sighting, int which) {
+    return joint_.variance(joint_.landmark_state(which) + 2) < 1.0 ? 1.0 / sighting.turn_variance : 0.0;
+  };
+  const double weight[3] = {square(apart) / (now.variance_m2 + before.variance_m2), turn_weight(now, landmark),
+                            turn_weight(before, earlier)};
   const double all = weight[0] + weight[1] + weight[2];
   const double first = weight[0] > weight[1] ? says[0] : says[1];
   double heading = first;

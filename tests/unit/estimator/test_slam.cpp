@@ -219,6 +219,37 @@ void test_a_landmark_that_moved_leaves_is_counted_and_joins_anew(void) {
   TEST_ASSERT_EQUAL(kCount, found);
 }
 
+void test_a_marker_that_moved_is_told_and_pulls_nothing(void) {
+  coded = true;
+  params.markers = 1;
+  begin();
+  drive(30);
+  place[2][0] += 0.6;
+  for (int i = 0; i < 30; i++) {
+    drive(1);
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+    TEST_ASSERT_LESS_THAN_DOUBLE(4.0 * sigma(), off());
+  }
+  TEST_ASSERT_EQUAL_DOUBLE(1, counted("map.moved"));
+  size_t found;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&found));
+  TEST_ASSERT_EQUAL(kCount, found);
+}
+
+void test_most_markers_seen_where_none_are_is_survived(void) {
+  coded = true;
+  params.markers = 1;
+  begin();
+  drive(30);
+  false_share = 0.6;
+  for (int i = 0; i < 30; i++) {
+    drive(1);
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+  }
+  TEST_ASSERT_GREATER_THAN(100, rejected);
+}
+
 void test_most_sightings_false_are_survived(void) {
   begin();
   drive(30);
@@ -340,6 +371,8 @@ int main(void) {
   RUN_TEST(test_two_markers_of_one_identity_on_opposite_sides_spoil_nothing);
   RUN_TEST(test_half_a_minute_without_markers_is_said_and_mended);
   RUN_TEST(test_a_landmark_that_moved_leaves_is_counted_and_joins_anew);
+  RUN_TEST(test_a_marker_that_moved_is_told_and_pulls_nothing);
+  RUN_TEST(test_most_markers_seen_where_none_are_is_survived);
   RUN_TEST(test_most_sightings_false_are_survived);
   RUN_TEST(test_half_a_minute_without_landmarks_is_said_and_mended);
   RUN_TEST(test_a_misread_code_after_a_while_without_landmarks_waits_for_a_second_one);

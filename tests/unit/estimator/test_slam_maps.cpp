@@ -111,6 +111,24 @@ void test_a_map_with_nan_loses_those_landmarks_alone(void) {
   TEST_ASSERT_EQUAL_DOUBLE(kCount, counted("map.landmarks"));
 }
 
+// A map of markers with NaN for a place, for a heading and for a sigma.
+void test_a_frozen_map_of_markers_with_nan_locates_by_the_others(void) {
+  coded = true;
+  params.markers = 1;
+  params.map = WM_SLAM_MAP_FROZEN;
+  for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
+  known[3].p_m[1] = kAbsent;
+  known[5].yaw_rad = kAbsent;
+  known[7].sigma_m = kAbsent;
+  begin();
+  for (int i = 0; i < 20; i++) {
+    drive(1);
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+  }
+  TEST_ASSERT_TRUE(std::isfinite(sigma()));
+}
+
 }  // namespace
 
 void setUp(void) { make_room(); }
@@ -124,5 +142,6 @@ int main(void) {
   RUN_TEST(test_started_lost_it_finds_itself_by_the_places_of_two_markers_whose_turns_disagree);
   RUN_TEST(test_started_lost_two_markers_are_not_believed_that_are_not_as_far_apart_as_on_the_map);
   RUN_TEST(test_a_map_with_nan_loses_those_landmarks_alone);
+  RUN_TEST(test_a_frozen_map_of_markers_with_nan_locates_by_the_others);
   return UNITY_END();
 }
