@@ -123,7 +123,7 @@ void landmark_ekf::weigh_start(wm_time_ns t_ns) {
   weighed_ns_ = t_ns;
   const start_trial::lasting sigma = {params_.sensor_yaw_sigma_rad, params_.lasting_bearing_rad,
                                       params_.lasting_lateral_m};
-  start_trial_.weigh(clues_, sigma, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), t_ns);
+  start_trial_.weigh(clues_, sigma, filter_.pose(), filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), t_ns);
   if (!start_trial_.surely_off()) return;
   restore_calibration();
   filter_.set_pose(start_trial_.pose(), start_trial_.covariance());
@@ -221,8 +221,9 @@ void landmark_ekf::search(wm_time_ns since_ns, const search_clue *prior, int pri
     if (yaw >= 0) result.covariance[2][2] += filter_.variance(yaw);
   }
   found_ns_ = now;
-  start_trial_.close();
   filter_.set_pose(result.pose, result.covariance);
+  start_trial_.begin_found(result.pose, result.covariance, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(),
+                           since_ns);
   witnesses_.begin(kFoundWrong);
   resets_++;
   fused_ns_ = now;

@@ -11,11 +11,13 @@ constexpr double kOff_m = 2.0, kOff_rad = 0.3;     // ... by this; who is farthe
 constexpr double kMoved = 0.02, kMovedBy_m = 2.0;  // a landmark is not where the map says, but near
 constexpr double kFalse = 0.2;                     // share of detections that are anything, as far as anybody knows
 constexpr double kSure = 0.999, kLasts_s = 0.25;   // false ones come and go
+constexpr double kSureFound = 0.9;                 // nobody stated what was found
 constexpr double kWay_m = 10.0, kTime_s = 10.0;    // then odometry has forgotten where it began
 constexpr double kMatters_m = 0.3, kMatters_rad = 0.1;  // less mends itself
 constexpr int kLandmarks = 3;                           // fewer fit many places
 constexpr int kSightings = 6;
 constexpr double kAgreeing = 0.6;
+constexpr double kNever = -1e9;                                    // as logarithm of a probability
 constexpr double kLoose[] = {1.0, 0.3, 0.1, 0.03, 0.0, 0.0, 0.0};  // metres, while the way is still to be found
 
 constexpr int kMostLandmarks = 12, kMostSensors = 4;
@@ -166,6 +168,11 @@ explanation explain(const problem &all, const wm_pose2 &stated, const hypothesis
   return out;
 }
 
+bool is_far(const wm_pose2 &a, const wm_pose2 &b) {
+  return square(a.x_m - b.x_m) + square(a.y_m - b.y_m) > square(kMatters_m) ||
+         std::fabs(wrap(a.heading_rad - b.heading_rad)) > kMatters_rad;
+}
+
 }  // namespace
 
 void start_trial::begin(const wm_pose2 &pose, const double covariance[3][3], const wm_pose2 &odom, double travelled_m,
@@ -181,12 +188,24 @@ void start_trial::begin(const wm_pose2 &pose, const double covariance[3][3], con
   begun_ns_ = WM_TIME_NONE;
   off_ = 0.0;
   off_since_ns_ = WM_TIME_NONE;
-  surely_off_ = false;
+  surely_off_ = found_ = false;
+  since_ns_ = INT64_MIN;
   open_ = factorize(3, factor_[0], 3);
 }
 
-void start_trial::weigh(const pose_search &clues, const lasting &sigma, const wm_pose2 &odom, double travelled_m,
-                        double turned_rad, wm_time_ns t_ns) {
+void start_trial::begin_found(const wm_pose2 &pose, const double covariance[3][3], const wm_pose2 &odom,
+                              double travelled_m, double turned_rad, wm_time_ns since_ns) {
+  double wide[3][3];
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++)
+      wide[i][j] = covariance[i][j] + (i != j ? 0.0 : i < 2 ? square(kOff_m) : square(kOff_rad));
+  begin(pose, wide, odom, travelled_m, turned_rad);
+  found_ = true;
+  since_ns_ = since_ns;
+}
+
+void start_trial::weigh(const pose_search &clues, const lasting &sigma, const wm_pose2 &pose, const wm_pose2 &odom,
+                        double travelled_m, double turned_rad, wm_time_ns t_ns) {
   if (begun_ns_ == WM_TIME_NONE) begun_ns_ = t_ns;
   if (travelled_m - travelled_m_ > kWay_m || wm_seconds_between(begun_ns_, t_ns) > kTime_s) open_ = false;
   if (!open_) return;
@@ -194,7 +213,7 @@ void start_trial::weigh(const pose_search &clues, const lasting &sigma, const wm
   all.yaw_sigma_rad = sigma.yaw_rad;
   for (int i = 0; i < clues.kept(); i++) {
     const search_clue &c = clues.at(i);
-    if (!(c.kind & kClueBearing) || c.key < 0) continue;
+    if (!(c.kind & kClueBearing) || c.key < 0 || c.t_ns < since_ns_) continue;
     bearing &b = all.bearings[all.count];
     b.landmark = number_of(c.key / kMaxSensors, all.id, &all.landmarks, kMostLandmarks);
     b.sensor_number = number_of(c.key % kMaxSensors, all.sensor_id, &all.sensors, kMostSensors);
@@ -218,28 +237,36 @@ void start_trial::weigh(const pose_search &clues, const lasting &sigma, const wm
       wide_factor[r][c] = stated_covariance_[r][c] + (r != c ? 0.0 : r < 2 ? square(kOff_m) : square(kOff_rad));
   if (!factorize(3, wide_factor[0], 3)) return;
 
+  // Right, off, moved k; of what was found the best "moved" stands for "off".
   const explanation right = explain(all, stated_, {factor_, -1});
-  const explanation off = explain(all, stated_, {wide_factor, -1});
+  explanation off = found_ ? right : explain(all, stated_, {wide_factor, -1});
   if (!right.good || !off.good) return;
   double of[2 + kMostLandmarks];
+  bool elsewhere[2 + kMostLandmarks] = {false, !found_};
   of[0] = right.log_likelihood;
-  of[1] = off.log_likelihood + log(kOff);
+  of[1] = found_ ? kNever : off.log_likelihood + log(kOff);
+  int best = 0;
+  const wm_pose2 here = compose(pose, between(odom, odom_));  // the filter's, carried back
   for (int k = 0; k < all.landmarks; k++) {
     const explanation moved = explain(all, stated_, {factor_, k});
     of[2 + k] = moved.good ? moved.log_likelihood + log(kMoved) : of[0] + log(kMoved);
+    if (!found_ || !moved.good) continue;
+    elsewhere[2 + k] = is_far(moved.start, here);
+    if (!elsewhere[2 + k] || (best > 0 && of[2 + k] <= of[best])) continue;
+    best = 2 + k;
+    off = moved;
   }
   double most = of[0], sum = 0.0;
   for (int k = 1; k < 2 + all.landmarks; k++) most = of[k] > most ? of[k] : most;
   for (int k = 0; k < 2 + all.landmarks; k++) sum += of[k] = exp(of[k] - most);
-  off_ = of[1] / sum;
-  const bool enough = all.landmarks >= kLandmarks && all.count >= kSightings;
-  const double far_m2 = square(off.start.x_m - stated_.x_m) + square(off.start.y_m - stated_.y_m);
-  const bool matters =
-      far_m2 > square(kMatters_m) || std::fabs(wrap(off.start.heading_rad - stated_.heading_rad)) > kMatters_rad;
+  off_ = 0.0;
+  for (int k = 0; k < 2 + all.landmarks; k++) off_ += elsewhere[k] ? of[k] / sum : 0.0;
+  const bool enough = all.landmarks >= kLandmarks + found_ && all.count >= kSightings;
+  const bool matters = found_ ? best > 0 && of[best] > kSureFound * sum : is_far(off.start, stated_);
   // "Off", but at the same place.
-  if (!matters && off.start_covariance[0][0] + off.start_covariance[1][1] < square(kMatters_m)) off_ = 0.0;
-  const bool sure =
-      enough && matters && off_ > kSure && off.agreeing >= kAgreeing * all.count && off.log_likelihood > 0.0;
+  if (!found_ && !matters && off.start_covariance[0][0] + off.start_covariance[1][1] < square(kMatters_m)) off_ = 0.0;
+  const bool sure = enough && matters && off_ > (found_ ? kSureFound : kSure) &&
+                    off.agreeing >= kAgreeing * all.count && off.log_likelihood > 0.0;
   if (!sure) off_since_ns_ = WM_TIME_NONE;
   if (sure && off_since_ns_ == WM_TIME_NONE) off_since_ns_ = t_ns;
   surely_off_ = sure && wm_seconds_between(off_since_ns_, t_ns) > kLasts_s;

@@ -204,6 +204,23 @@ void test_started_without_a_pose_three_bearings_are_enough(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
 }
 
+// The three landmarks that are seen at first make a pose, and one of them has moved: the next ones tell which.
+void test_a_pose_found_by_a_moved_landmark_is_mended(void) {
+  begin_without_pose();
+  stands_m[2][0] += 1.5;
+  stands_m[2][1] -= 1.5;
+  judged_from_s = 5;
+  drive(2, 3);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.3, off());
+  drive(2, kLandmarks);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+  drive(6, kLandmarks);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+  TEST_ASSERT_EQUAL_DOUBLE(landmarks[2].id, calibration("map.moved_id"));
+}
+
 void test_two_landmarks_and_driving_are_enough(void) {
   begin_without_pose();
   drive(20, 2);
@@ -345,6 +362,7 @@ int main(void) {
   RUN_TEST(test_one_that_contradicts_has_moved_and_many_mean_lost);
   RUN_TEST(test_misfits_that_scatter_say_nothing_those_in_one_place_do);
   RUN_TEST(test_started_without_a_pose_three_bearings_are_enough);
+  RUN_TEST(test_a_pose_found_by_a_moved_landmark_is_mended);
   RUN_TEST(test_two_landmarks_and_driving_are_enough);
   RUN_TEST(test_a_known_place_and_an_unknown_heading);
   RUN_TEST(test_a_start_that_is_surer_than_right_is_told_and_mended);
