@@ -99,11 +99,16 @@ static wm_status correct(wm_fuser *self, const wm_event *event) {
 static void write_hypotheses(wm_fuser *self, wm_time_ns t_ns) {
   const wm_estimator *e = self->estimator;
   if (!e->hypotheses) return;
+  const size_t most = sizeof self->listed / sizeof self->listed[0];
+  size_t count = e->hypotheses(self->state, self->listed, most);
+  if (count > most) count = most;
   wm_hypothesis_set *set = &self->hypotheses;
   set->t_ns = t_ns;
-  set->total = (uint32_t)e->hypotheses(self->state, set->places, WM_HYPOTHESES_MAX);
-  set->count = set->total < WM_HYPOTHESES_MAX ? set->total : WM_HYPOTHESES_MAX;
-  self->output.put(self->output.context, WM_OUTPUT_HYPOTHESES, set, sizeof *set);
+  for (size_t from = 0; from < count; from += set->count) {
+    set->count = count - from < WM_HYPOTHESES_MAX ? count - from : WM_HYPOTHESES_MAX;
+    memcpy(set->places, self->listed + from, set->count * sizeof set->places[0]);
+    self->output.put(self->output.context, WM_OUTPUT_HYPOTHESES, set, sizeof *set);
+  }
 }
 
 // Records have the size of the largest event, so who takes no points has no room for them.

@@ -193,7 +193,7 @@ static void particles(wm_run_folder *self, const wm_particle_set *set) {
 }
 
 static void hypotheses(wm_run_folder *self, const wm_hypothesis_set *set) {
-  for (uint32_t i = 0; i < set->count; i++) {
+  for (uint64_t i = 0; i < set->count; i++) {
     const wm_hypothesis *h = &set->places[i];
     const double *c = h->covariance;
     const double numbers[10] = {h->x_m, h->y_m, h->heading_rad, c[0], c[1], c[2], c[3], c[4], c[5], h->weight};

@@ -9,6 +9,7 @@
 
 #include "drawn_map.h"
 #include "drawn_picture.h"
+#include "drawn_search.h"
 #include "drawn_street.h"
 #include "landmark_drive.h"
 #include "vision/edges/hough.hpp"
@@ -85,12 +86,25 @@ int main(int argc, char **argv) {
     bench::street_at_work work(street);
     const bool lost = std::strcmp(what, "picture_landmarks") != 0;
     count([&] { (void)work.look(lost); });
+  } else if (!std::strcmp(what, "edge_scans_tracking") || !std::strcmp(what, "edge_scans_searching")) {
+    bench::search_at_work work(!std::strcmp(what, "edge_scans_tracking"));
+    for (int i = 0; i < 100; i++) {
+      work.prepare();
+      work.scan();
+    }
+    // A hundred of them: a sweep over the map takes some.
+    count([&] {
+      for (int i = 0; i < 100; i++) {
+        work.prepare();
+        work.scan();
+      }
+    });
   } else {
-    std::fprintf(
-        stderr,
-        "usage: wm_instructions "
-        "landmark_step|landmark_start|particles_200|particles_2000|particle_step_200|particle_step_2000|"
-        "window_50x50|picture_rays|picture_windows|picture_lines|picture_landmarks|picture_landmarks_lost [TIMES]\n");
+    std::fprintf(stderr,
+                 "usage: wm_instructions "
+                 "landmark_step|landmark_start|particles_200|particles_2000|particle_step_200|particle_step_2000|"
+                 "window_50x50|picture_rays|picture_windows|picture_lines|picture_landmarks|picture_landmarks_lost|"
+                 "edge_scans_tracking|edge_scans_searching [TIMES]\n");
     return 2;
   }
   return 0;

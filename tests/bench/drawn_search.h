@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot that was not told where it is, on the map of drawn_map.h, whose corridors repeat themselves: it searches, and
-// keeps searching, because many places look alike.
+// A robot on the map of drawn_map.h, whose corridors repeat themselves. Not told where it is, it searches, and keeps
+// searching, because many places look alike; told, it keeps a list of them.
 #ifndef WAYMARK_BENCH_DRAWN_SEARCH_H
 #define WAYMARK_BENCH_DRAWN_SEARCH_H
 
@@ -14,7 +14,8 @@ namespace bench {
 
 class search_at_work {
  public:
-  search_at_work() : ops_(wm_estimator_find("edge_mcl")), edges_(drawn_edges()), drivable_(edges_.size(), 0) {
+  explicit search_at_work(bool told = false)
+      : ops_(wm_estimator_find("edge_mcl")), edges_(drawn_edges()), drivable_(edges_.size(), 0) {
     const auto floor = [&](int x0, int x1, int y0, int y1) {
       for (int y = y0; y < y1; y++) std::memset(&drivable_[(size_t)y * kMapWidth + (size_t)x0], 255, (size_t)(x1 - x0));
     };
@@ -31,6 +32,7 @@ class search_at_work {
     setup_.wheels = {NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}};
     setup_.map = &map_;
     setup_.start = {WM_TIME_NONE, {NAN, NAN, NAN}, {0, 0, 0, 1}, NAN, 0.05, 0.05};
+    if (told) setup_.start = {WM_TIME_NONE, {x_m_, y_m_, 0}, {0, 0, 0, 1}, 0, 0.05, 0.05};
     setup_.seed = 1;
     const char *why = "";
     state_ = allocate(ops_->state_bytes(params_.data(), &setup_, &why));

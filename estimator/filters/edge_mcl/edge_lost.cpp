@@ -7,7 +7,8 @@ namespace wm {
 namespace {
 
 constexpr double kOddsMax = 6.0;
-constexpr double kLostOdds = 1.0, kFoundOdds = -2.0, kTrustedOdds = -3.0, kMemory_s = 2.0, kUsual_s = 10.0;
+constexpr double kLostOdds = 1.0, kFoundOdds = -2.0, kTrustedOdds = -3.0, kEasyOdds = -5.5, kMemory_s = 2.0,
+                 kUsual_s = 10.0;
 constexpr double kApart_m = 0.3, kApart_rad = 0.15, kApart_s = 1.0;
 constexpr double kFoundSigma_m = 0.1, kFoundSigma_rad = 0.03;
 constexpr double kFresh_s = 0.5, kFresh_m = 0.2;  // scans further apart speak each for itself
@@ -16,7 +17,7 @@ constexpr double kDoubtOdds = -2.0;
 constexpr int kFewKeyframes = 4, kManyKeyframes = 10;  // 0.4 m each
 constexpr int kLeisure = 8, kWeighedInDoubt = 6, kWeighingShare = 4;
 constexpr int kPosesLeast = place_search::kAligningCost + place_search::kWeighingCost;
-static_assert(kPosesLeast <= EDGE_MCL_SEARCH_POSES_LEAST);
+static_assert(kPosesLeast <= EDGE_MCL_SEARCH_POSES_LEAST && lookalikes::kPosesLeast <= EDGE_MCL_SEARCH_POSES_LEAST);
 constexpr double kBetter = 0.15;
 constexpr double kCarriedOff = 7.0;  // odds that nobody has carried it off in the last metres, logarithm of
 constexpr double kNowhere = -1e3;
@@ -132,15 +133,20 @@ void edge_mcl::heed_cloud() {
   resets_++;
 }
 
-// Which places look as the one that is tracked? Without doubt the search leaves most of a scan's work: half of it is
-// theirs. In doubt they are only carried on.
+// Which places look as the one that is tracked? They are looked for at leisure while what is seen is what was to be
+// expected; with half of a scan's work, and with a sweep of that scan's own, as soon as it isn't: if somebody has just
+// set the robot down elsewhere, it is now that it shows. In doubt the search needs the work: they are carried on.
 void edge_mcl::look_for_lookalikes(double dt_s) {
   const double way = filter_.travelled_m() - alike_m_;
   alike_m_ += way;
   alike_.carry(filter_.odom());
-  const bool sure = state_ == WM_STATE_TRACKING && !in_doubt_;
+  const bool sure = state_ == WM_STATE_TRACKING && !in_doubt_, at_ease = lost_odds_ < kEasyOdds;
+  if (at_ease_ && !at_ease) alike_.begin_again();
+  at_ease_ = at_ease;
+  const int share = at_ease ? params_.search_poses / kLeisure : params_.search_poses / 2;
+  const int poses = share > lookalikes::kPosesLeast ? share : lookalikes::kPosesLeast;
   alike_.look(map_, search_.field(), lined_, filter_.pose(), way, sure ? params_.lost_per_s * dt_s : 0.0,
-              sure ? params_.search_poses / 2 : 0);
+              sure ? poses : 0);
 }
 
 // Where else could it be? Sweeps over the map bring places, at leisure while there is no doubt; what the last metres

@@ -98,6 +98,7 @@ void edge_mcl::start_again(bool known) {
   alike_.clear(filter_.odom());
   alike_m_ = filter_.travelled_m();
   watched_m_ = filter_.travelled_m() + filter_.turned_rad();
+  at_ease_ = false;
   in_doubt_ = !known;
   on_trial_ = false;
   lost_odds_ = known ? -4.0 : 6.0;

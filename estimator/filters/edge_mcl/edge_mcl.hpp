@@ -128,6 +128,7 @@ class edge_mcl {
   double watched_m_;  // way when the last scan was judged
   uint32_t resets_;
   uint8_t state_;
+  bool at_ease_;   // what is seen is what was to be expected
   bool in_doubt_;  // of the pose: what was seen lately is looked for elsewhere
   bool on_trial_;  // a place was taken, the scans have not confirmed it yet
 };

@@ -12,7 +12,6 @@ constexpr double kBin_rad = kPi / 72.0;  // of walls' directions, which have no 
 constexpr int kBins = 72, kApartBins = 2;
 constexpr double kLikeItself = 0.25;  // share of the walls that must run alike
 constexpr double kLookedUpMost = 1e5;
-constexpr int kCellsAGrid = 2;  // the sweep's grid: 0.2 m
 constexpr double kSame_m = 0.6, kSame_rad = 0.3;
 constexpr double kWorse = 0.15;  // share of the points that a place may explain less than the tracked one
 constexpr double kExplained_m = 0.1, kTogether = 5.0;  // so many of its points err together
@@ -20,8 +19,10 @@ constexpr double kOpen_m = 0.3, kOpen_rad = 0.1;       // where the scan says no
 constexpr double kFound_m = 0.1, kFound_rad = 0.03;
 constexpr double kNats = 3.0, kKeyframe_m = 0.4;  // as hypotheses has them
 constexpr double kNewest = 0.5;                   // what the newest scan counts of `explained`
-constexpr int kCellCost = 1, kPointsAPose = 24;
-constexpr int kTakingCost = 4 * (7 * lookalikes::kPoints / 2 + lookalikes::kPoints);  // as place_search's
+// What a place may fall short of the tracked one by on the grid, in parts of what a point counts: half a step of it
+// places and of headings, beside what it may explain less.
+constexpr double kGridLoss = 0.15;
+constexpr int kTakingCost = lookalikes::kLookUpCost * (7 * lookalikes::kPoints / 2 + lookalikes::kPoints);
 constexpr int64_t kSwept = INT64_MAX;
 
 double way2(const wm_pose2 &a, const wm_pose2 &b) { return square(a.x_m - b.x_m) + square(a.y_m - b.y_m); }
@@ -52,7 +53,7 @@ void lookalikes::init(const edge_map &map) {
     for (int i = 0; i < kBins; i++) alike[turn] += share[i] * share[(i + turn) % kBins];
   relative_count_ = 0;
   const double least = kLikeItself * alike[0];
-  for (int n = 0; n < kHeadings / 2; n++) {
+  for (int n = 0; n < kHeadingsMost / 2; n++) {
     int best = 0;
     for (int i = 1; i < kBins; i++)
       if (alike[i] > alike[best]) best = i;
@@ -65,7 +66,8 @@ void lookalikes::init(const edge_map &map) {
 }
 
 void lookalikes::clear(const wm_pose2 &odom) {
-  count_ = found_count_ = points_ = 0;
+  count_ = found_count_ = points_ = next_weighed_ = 0;
+  way_m_ = hazard_ = 0.0;
   running_ = false;
   odom_ = odom;
 }
@@ -124,7 +126,9 @@ void lookalikes::look(const edge_map &map, const search_field &field, const scan
                       double new_m, double hazard, int poses) {
   if (scan.count < 8) return;
   choose_points(scan);
-  weigh(map, own, new_m, hazard);
+  way_m_ += new_m;
+  hazard_ += hazard;
+  weigh(map, own);
   poses -= kWeighingCost;
   if (poses <= 0) {
     running_ = false;
@@ -135,30 +139,44 @@ void lookalikes::look(const edge_map &map, const search_field &field, const scan
   if (next_ < kSwept) return;
   for (; taken_ < found_count_ && poses > 0; taken_++) {
     const wm_pose2 pose = compose(found_[taken_].pose, between(swept_odom_, odom_));
-    if (known(pose)) continue;
+    if (listed_before(count_, pose)) continue;
     poses -= kTakingCost;
     if (poses >= 0) take(map, own, pose);
   }
   running_ = taken_ < found_count_;
 }
 
-void lookalikes::weigh(const edge_map &map, const wm_pose2 &own, double new_m, double hazard) {
+// Some of them, in turn.
+void lookalikes::weigh(const edge_map &map, const wm_pose2 &own) {
   own_explained_ = fit_at(map, own).explained;
-  const double nats = kNats * (new_m < kKeyframe_m ? new_m / kKeyframe_m : 1.0);
-  int kept = 0;
-  for (int i = 0; i < count_; i++) {
-    lookalike l = of_[i];
-    align_pose(map, x_m_, y_m_, points_, 2, 0.3, kExplained_m, 2, &l.pose);
-    const fit f = fit_at(map, l.pose);
-    l.explained += kNewest * (f.explained - own_explained_ - l.explained);
-    l.weight = l.weight * exp(nats * (f.explained - own_explained_)) + hazard / kMost;
-    if (!(l.weight < 1.0)) l.weight = 1.0;  // from there on it is for the search to say which it is
-    describe(f, &l);
-    bool again = same(l.pose, own) || !map.drivable(l.pose.x_m, l.pose.y_m);
-    for (int k = 0; k < kept; k++) again |= same(of_[k].pose, l.pose);
-    if (!again && l.explained > -2.0 * kWorse) of_[kept++] = l;
+  for (int n = count_ < kWeighed ? count_ : kWeighed; n > 0; n--) {
+    if (next_weighed_ >= count_) next_weighed_ = 0;
+    lookalike &l = of_[next_weighed_];
+    if (weigh(map, own, &l) && !listed_before(next_weighed_, l.pose))
+      next_weighed_++;
+    else
+      l = of_[--count_];
   }
-  count_ = kept;
+}
+
+bool lookalikes::weigh(const edge_map &map, const wm_pose2 &own, lookalike *l) const {
+  align_pose(map, x_m_, y_m_, points_, 2, 0.3, kExplained_m, 2, &l->pose);
+  const fit f = fit_at(map, l->pose);
+  const double new_m = way_m_ - l->weighed_m;
+  const double nats = kNats * (new_m < kKeyframe_m ? new_m / kKeyframe_m : 1.0);
+  l->explained += kNewest * (f.explained - own_explained_ - l->explained);
+  l->weight = l->weight * exp(nats * (f.explained - own_explained_)) + (hazard_ - l->hazard) / kMost;
+  if (!(l->weight < 1.0)) l->weight = 1.0;  // from there on it is for the search to say which it is
+  l->weighed_m = way_m_;
+  l->hazard = hazard_;
+  describe(f, l);
+  return l->explained > -2.0 * kWorse && !same(l->pose, own) && map.drivable(l->pose.x_m, l->pose.y_m);
+}
+
+bool lookalikes::listed_before(int end, const wm_pose2 &pose) const {
+  for (int i = 0; i < end; i++)
+    if (same(of_[i].pose, pose)) return true;
+  return false;
 }
 
 void lookalikes::begin(const search_field &field, const edge_map &map, const wm_pose2 &own) {
@@ -177,40 +195,47 @@ void lookalikes::begin(const search_field &field, const edge_map &map, const wm_
     }
     swept_points_++;
   }
+  const int own_sum = field.sum(field.nearest(map, own.x_m, own.y_m), steps_[0], swept_points_);
+  least_ = own_sum - (int)((kWorse + kGridLoss) * 255.0 * swept_points_);
+  if (least_ < 0) least_ = 0;
 }
 
 // Returns what is left of `poses`.
 int lookalikes::sweep(const edge_map &map, const search_field &field, int poses) {
   if (next_ == kSwept) return poses;
-  const wm_raster &r = map.raster();
-  const double grid_px = kCellsAGrid * field.cell_m() / r.resolution_m;
-  const int64_t columns = (int64_t)(r.width_px / grid_px) + 1, rows = (int64_t)(r.height_px / grid_px) + 1;
-  const int headings_cost = (relative_count_ * swept_points_ + kPointsAPose - 1) / kPointsAPose;
-  for (; next_ < columns * rows && poses >= kCellCost + headings_cost; next_++) {
-    const int64_t column = next_ % columns, row = next_ / columns;
-    wm_pose2 pose;
-    map.to_map(((double)column + 0.5) * grid_px, ((double)row + 0.5) * grid_px, &pose.x_m, &pose.y_m);
-    poses -= kCellCost;
-    if (!map.drivable(pose.x_m, pose.y_m)) continue;
-    poses -= headings_cost;
-    const ptrdiff_t corner = field.at(kCellsAGrid * column + kCellsAGrid / 2, kCellsAGrid * row + kCellsAGrid / 2);
-    for (int k = 0; k < relative_count_; k++) {
-      pose.heading_rad = wrap(swept_from_.heading_rad + relative_[k]);
-      offer(pose, field.sum(corner, steps_[k], swept_points_));
-    }
-  }
-  if (next_ >= columns * rows) next_ = kSwept;
+  const int64_t all = field.runs() * field.rows();
+  for (; next_ < all && poses >= kRunCostMost; next_++)
+    poses -= look_from(map, field, next_ % field.runs(), next_ / field.runs());
+  if (next_ >= all) next_ = kSwept;
   return poses;
 }
 
-void lookalikes::offer(const wm_pose2 &pose, int64_t score) {
-  if (!same(pose, swept_from_)) keep_best(found_, &found_count_, {pose, score}, same);
-}
-
-bool lookalikes::known(const wm_pose2 &pose) const {
-  for (int i = 0; i < count_; i++)
-    if (same(of_[i].pose, pose)) return true;
-  return false;
+// Where the points fit from the places of a run, in each heading: of neighbours the best. Returns what it cost.
+int lookalikes::look_from(const edge_map &map, const search_field &field, int64_t run, int64_t row) {
+  const uint32_t standing = field.standing(run, row);
+  if (standing == 0) return kRunCost;
+  uint16_t sums[kHeadingsMost][search_field::kRun];
+  bool reached[kHeadingsMost];
+  const auto least = [this] {
+    const bool full = found_count_ == kMost;
+    return full && found_[kMost - 1].score > least_ ? (int)found_[kMost - 1].score : least_;
+  };
+  field.sum_run(field.corner_of(run, row), steps_[0], kPoints, relative_count_, swept_points_, least(), sums, reached);
+  int cost = kRunCost + relative_count_ * kHeadingCost;
+  for (int k = 0; k < relative_count_; k++) {
+    if (!reached[k]) continue;
+    const uint16_t *of = sums[k];
+    for (int i = 0; i < search_field::kRun; i++) {
+      if (!(standing >> i & 1) || of[i] <= least()) continue;
+      if ((i > 0 && of[i - 1] > of[i]) || (i + 1 < search_field::kRun && of[i + 1] > of[i])) continue;
+      wm_pose2 pose;
+      field.place_of(map, run, row, i, &pose.x_m, &pose.y_m);
+      pose.heading_rad = wrap(swept_from_.heading_rad + relative_[k]);
+      if (!same(pose, swept_from_)) keep_best(found_, &found_count_, {pose, of[i]}, same);
+      cost += kOfferCost;
+    }
+  }
+  return cost;
 }
 
 // If the newest scan fits there as well, it is a place that is possible.
@@ -221,7 +246,11 @@ void lookalikes::take(const edge_map &map, const wm_pose2 &own, const wm_pose2 &
   align_pose(map, x_m_, y_m_, points_, 2, 0.2, kExplained_m, 3, &l.pose);
   const fit f = fit_at(map, l.pose);
   l.explained = f.explained - own_explained_;
-  if (l.explained < -kWorse || !map.drivable(l.pose.x_m, l.pose.y_m) || same(l.pose, own) || known(l.pose)) return;
+  l.weighed_m = way_m_;
+  l.hazard = hazard_;
+  if (l.explained < -kWorse || !map.drivable(l.pose.x_m, l.pose.y_m) || same(l.pose, own) ||
+      listed_before(count_, l.pose))
+    return;
   describe(f, &l);
   int at = count_;
   if (count_ < kMost) {

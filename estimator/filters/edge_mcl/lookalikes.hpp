@@ -2,7 +2,8 @@
 // Places of the map that look as the one where the robot is being tracked. If somebody has just set it down at one of
 // them, nothing that it sees says so: they are what else is possible, with the odds that it was carried off. Each sweep
 // looks with one scan for where it fits as well as at the tracked place; what it finds is carried on by odometry,
-// aligned and weighed with every scan. What a scan may cost is counted, in poses as place_search has them.
+// aligned and weighed, some of them with each scan in turn. What a scan may cost is counted, in poses as place_search
+// has them.
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_LOOKALIKES_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_LOOKALIKES_HPP
 
@@ -17,11 +18,13 @@ struct lookalike {
   double covariance[6];  // xx, xy, yy, x heading, y heading, heading heading
   double weight;         // odds against the tracked place, 1 at most
   double explained;      // share of the points, more than at the tracked place; smoothed
+  double weighed_m;      // way when it was weighed last
+  double hazard;         // sum of all until then
 };
 
 class lookalikes {
  public:
-  static constexpr int kMost = 76;
+  static constexpr int kMost = 128, kWeighed = 24;  // of them with each scan
 
   // Headings at which the map's walls run as they do at 0: these are swept. At most 100000 places are looked up.
   void init(const edge_map &map);
@@ -33,16 +36,22 @@ class lookalikes {
   void look(const edge_map &map, const search_field &field, const scan_points &scan, const wm_pose2 &own, double new_m,
             double hazard, int poses);
 
+  // The sweep begins anew, by the next scan.
+  void begin_again() { running_ = false; }
+
   static constexpr int kPoints = 32, kLookUpCost = 2;
-  static constexpr int kWeighingCost = (2 * kMost + 1) * kPoints * kLookUpCost;
+  static constexpr int kWeighingCost = (2 * kWeighed + 1) * kPoints * kLookUpCost;
+  // Of a sweep, in poses: a run of places where none can stand; of 16 places in one heading all points; a place that is
+  // held against those kept. look() needs so much to come to an end some day.
+  static constexpr int kRunCost = 1, kHeadingCost = 4, kOfferCost = 6, kHeadingsMost = 30;
+  static constexpr int kRunCostMost = kRunCost + kHeadingsMost * (kHeadingCost + search_field::kRun * kOfferCost);
+  static constexpr int kPosesLeast = kWeighingCost + kRunCostMost;
 
   int count() const { return count_; }
   double odds() const;  // of all of them together against the tracked place
   const lookalike &operator[](int i) const { return of_[i]; }
 
  private:
-  static constexpr int kHeadings = 72;
-
   struct candidate {
     wm_pose2 pose;  // base_link in map when the sweep began
     int64_t score;  // as wide as the rest: a copy has no bytes that nobody wrote
@@ -52,27 +61,30 @@ class lookalikes {
   };
   fit fit_at(const edge_map &map, const wm_pose2 &pose) const;
   void choose_points(const scan_points &scan);
-  void weigh(const edge_map &map, const wm_pose2 &own, double new_m, double hazard);
+  void weigh(const edge_map &map, const wm_pose2 &own);
+  // Whether it stays.
+  bool weigh(const edge_map &map, const wm_pose2 &own, lookalike *l) const;
+  bool listed_before(int end, const wm_pose2 &pose) const;
   void begin(const search_field &field, const edge_map &map, const wm_pose2 &own);
   int sweep(const edge_map &map, const search_field &field, int poses);
-  void offer(const wm_pose2 &pose, int64_t score);
-  bool known(const wm_pose2 &pose) const;
+  int look_from(const edge_map &map, const search_field &field, int64_t run, int64_t row);
   void take(const edge_map &map, const wm_pose2 &own, const wm_pose2 &pose);
   void describe(const fit &f, lookalike *out) const;
 
-  double relative_[kHeadings];  // headings at which the map looks like itself
+  double relative_[kHeadingsMost];  // headings at which the map looks like itself
   int relative_count_;
   lookalike of_[kMost];
   int count_;
   wm_pose2 odom_;
   float x_m_[kPoints], y_m_[kPoints];  // of the newest scan
   int points_;
-  double own_explained_;
+  double own_explained_, way_m_, hazard_;
+  int next_weighed_;
 
-  int32_t steps_[kHeadings][kPoints];
-  int swept_points_;
+  int32_t steps_[kHeadingsMost][kPoints];
+  int swept_points_, least_;
   wm_pose2 swept_from_, swept_odom_;
-  int64_t next_;  // cell of the sweep
+  int64_t next_;  // run of the sweep
   bool running_;
   candidate found_[kMost];
   int found_count_, taken_;  // of them: looked at already

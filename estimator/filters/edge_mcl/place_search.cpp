@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/edge_mcl/place_search.hpp"
 
+#include <bit>
 #include <cstring>
 
 #include "filters/edge_mcl/align.hpp"
@@ -12,7 +13,9 @@ namespace {
 
 constexpr double kKeyframeWay_m = 0.4, kKeyframeTurn_rad = 0.25;
 constexpr double kSameWay_m = 0.6, kSameTurn_rad = 0.3;  // places nearer than this are one
-constexpr int kCellsAGrid = 2;                           // the sweep's grid: 0.2 m, headings every 5 degrees
+// Of 16 places of the grid as many poses as headings at each where a robot may stand, three more where all points were
+// looked at. So many a sweep takes however it is computed, and with them the scans between two sweeps.
+constexpr int kRestCost = 3;
 constexpr double kHopeful = 0.35;  // how much better a point more may be than those before, on average
 
 double way_between(const wm_pose2 &a, const wm_pose2 &b) {
@@ -124,29 +127,39 @@ double place_search::least_first() const {
   return ((double)places_[kPlaces - 1].score / some_ - kHopeful / field_.unit()) * first_;
 }
 
-// Where the points fit from each drivable cell's middle, in each heading.
-int place_search::sweep(const edge_map &map, int poses, int64_t columns, int64_t cells) {
-  const double grid_px = kCellsAGrid * field_.cell_m() / map.raster().resolution_m;
-  constexpr int kCellCost = 1, kRestCost = kSweepPoints / kFirstPoints - 1;
+// Where the points fit from the places of a run, in each heading. A quarter of the points says of most poses that it is
+// not there.
+int place_search::look_from(const edge_map &map, int64_t run, int64_t row) {
+  const uint32_t standing = field_.standing(run, row);
+  if (standing == 0) return search_field::kRun;
+  const ptrdiff_t corner = field_.corner_of(run, row);
+  uint16_t first[kHeadings][search_field::kRun], rest[1][search_field::kRun];
+  bool reached[kHeadings], more[1];
   double least = least_first();
-  for (; next_ < cells && poses >= kCellCost + kHeadings * (1 + kRestCost); next_++) {
-    const int64_t column = next_ % columns, row = next_ / columns;
-    wm_pose2 pose;
-    map.to_map(((double)column + 0.5) * grid_px, ((double)row + 0.5) * grid_px, &pose.x_m, &pose.y_m);
-    poses -= kCellCost;
-    if (!map.drivable(pose.x_m, pose.y_m)) continue;
-    poses -= kHeadings;
-    const ptrdiff_t corner = field_.at(kCellsAGrid * column + kCellsAGrid / 2, kCellsAGrid * row + kCellsAGrid / 2);
-    for (int k = 0; k < kHeadings; k++) {
-      // A quarter of the points says of most poses that it is not there.
-      const int32_t first = field_.sum(corner, steps_[k], first_);
-      if (first < least) continue;
-      poses -= kRestCost;
+  const int bar = least > 0.0 ? (int)least : 0;
+  field_.sum_run(corner, steps_[0], kSweepPoints, kHeadings, first_, bar, first, reached);
+  int cost = search_field::kRun + kHeadings * std::popcount(standing);
+  for (int k = 0; k < kHeadings; k++) {
+    if (!reached[k]) continue;
+    field_.sum_run(corner, steps_[k] + first_, kSweepPoints, 1, some_ - first_, 0, rest, more);
+    for (int i = 0; i < search_field::kRun; i++) {
+      if (!(standing >> i & 1) || first[k][i] < least) continue;
+      wm_pose2 pose;
+      field_.place_of(map, run, row, i, &pose.x_m, &pose.y_m);
       pose.heading_rad = wrap(k * (kTwoPi / kHeadings));
-      offer(pose, first + field_.sum(corner, steps_[k] + first_, some_ - first_));
+      offer(pose, first[k][i] + rest[0][i]);
+      cost += kRestCost;
       least = least_first();
     }
   }
+  return cost;
+}
+
+int place_search::sweep(const edge_map &map, int poses) {
+  constexpr int kMost = search_field::kRun * (1 + kHeadings * (1 + kRestCost));
+  static_assert(kMost <= kAligningCost);
+  for (; next_ < field_.runs() * field_.rows() && poses >= kMost; next_++)
+    poses -= look_from(map, next_ % field_.runs(), next_ / field_.runs());
   return poses;
 }
 
@@ -168,14 +181,11 @@ bool place_search::step(const edge_map &map, int poses, const wm_pose2 &odom) {
     if (!running_) return false;
     turn_points(map);
   }
-  const wm_raster &r = map.raster();
-  const double grid_px = kCellsAGrid * field_.cell_m() / r.resolution_m;
-  const int64_t columns = (int64_t)(r.width_px / grid_px) + 1, rows = (int64_t)(r.height_px / grid_px) + 1;
-  if (next_ < columns * rows && first_ > 0) {
-    const int left = sweep(map, poses, columns, columns * rows);
+  if (next_ < field_.runs() * field_.rows() && first_ > 0) {
+    const int left = sweep(map, poses);
     spent_ += (uint64_t)(poses - left);
     poses = left;
-    if (next_ < columns * rows) return false;
+    if (next_ < field_.runs() * field_.rows()) return false;
   }
   refine(map, poses);
   if (refined_ < place_count_) return false;

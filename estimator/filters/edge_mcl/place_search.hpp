@@ -65,7 +65,8 @@ class place_search {
   // Points of all keyframes in base_link at `odom`.
   void gather(const wm_pose2 &odom, scan_points *out) const;
   void turn_points(const edge_map &map);
-  int sweep(const edge_map &map, int poses, int64_t columns, int64_t cells);  // returns what is left of `poses`
+  int sweep(const edge_map &map, int poses);                     // returns what is left of `poses`
+  int look_from(const edge_map &map, int64_t run, int64_t row);  // returns what it cost
   void offer(const wm_pose2 &pose, int32_t score);
   void refine(const edge_map &map, int poses);
   double least_first() const;
@@ -87,7 +88,7 @@ class place_search {
   int first_, some_;
   wm_pose2 odom_;
   bool running_;
-  int64_t next_;  // cell of the sweep
+  int64_t next_;  // run of the sweep
   uint64_t spent_;
   int refined_;
   place places_[kPlaces];

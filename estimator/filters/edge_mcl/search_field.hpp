@@ -2,7 +2,8 @@
 // The map as a sweep over all of it sees it: cells of 0.1 m, a byte each for how well a point fits that falls there. So
 // coarse, a building fits into the second level cache, and a point turned once for a heading is a fixed step in memory
 // from every place: a look-up costs two loads and an addition (E. Olson, "Real-time correlative scan matching", 2009).
-// Integers: the same bits everywhere.
+// A sweep looks from a grid, every second cell, at 16 places of a row at a time: of all of them a point's cells lie
+// side by side, so that a vector is loaded where 16 bytes would be. Integers: the same bits everywhere.
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_SEARCH_FIELD_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_SEARCH_FIELD_HPP
 
@@ -18,6 +19,8 @@ class search_field {
   static constexpr double kSigma_m = 0.2, kFloor = 0.1;  // of a point's likelihood: half a grid step is no miss
   static constexpr int kReachCells = 160;                // around the map, where nothing fits
   static constexpr size_t kBytesMax = (size_t)1 << 26;   // a larger map gets larger cells
+
+  static constexpr int kGridCells = 2, kRun = 16;  // of the sweep's grid; places that are looked from at a time
 
   // Bytes that init() needs for this raster.
   static size_t bytes(const wm_raster &raster);
@@ -35,6 +38,8 @@ class search_field {
     return (int32_t)((ptrdiff_t)std::floor(down_m / cell_m_) * stride_ + (ptrdiff_t)std::floor(right_m / cell_m_));
   }
   double reach_m() const { return (kReachCells - 1) * cell_m_; }
+  // The corner nearest to a place, which may lie outside of the map.
+  ptrdiff_t nearest(const edge_map &map, double x_m, double y_m) const;
   // Sum over the steps from that corner. O(count).
   int32_t sum(ptrdiff_t corner, const int32_t *steps, int count) const {
     const uint8_t *from = cells() + corner;
@@ -43,13 +48,29 @@ class search_field {
     return out;
   }
 
+  // The sweep's grid: run `run` of a row is its places from kRun * run on.
+  int64_t runs() const { return runs_; }
+  int64_t rows() const { return rows_; }
+  // Bit i: a robot may stand at place i of the run.
+  uint32_t standing(int64_t run, int64_t row) const { return standing_at()[row * runs_ + run]; }
+  ptrdiff_t corner_of(int64_t run, int64_t row) const {
+    return at(kGridCells * kRun * run + kGridCells / 2, kGridCells * row + kGridCells / 2);
+  }
+  void place_of(const edge_map &map, int64_t run, int64_t row, int i, double *x_m, double *y_m) const;
+  // sums[h][i]: over `count` steps (at most 257) from place i of the run, those of heading h being steps[h * stride]
+  // and on. reached[h]: one of them comes to more than `least`. O(headings * count).
+  void sum_run(ptrdiff_t corner, const int32_t *steps, int stride, int headings, int count, int least,
+               uint16_t (*sums)[kRun], bool *reached) const;
+
  private:
   const uint8_t *cells() const {
     return reinterpret_cast<const uint8_t *>(reinterpret_cast<uintptr_t>(this) + (uintptr_t)cells_at_);
   }
+  const uint16_t *standing_at() const { return reinterpret_cast<const uint16_t *>(cells() - standing_before_); }
 
   double cell_m_, unit_;
-  ptrdiff_t stride_, cells_at_;  // from this object on
+  int64_t runs_, rows_;
+  ptrdiff_t stride_, cells_at_, standing_before_;  // from this object on; from the cells back
 };
 
 }  // namespace wm

@@ -44,6 +44,7 @@ typedef struct wm_fuser {
   wm_histogram predict_ns, correct_ns;
   wm_time_ns particles_ns;  // when they were written last
   wm_particle_set particles;
+  wm_hypothesis listed[2 * WM_HYPOTHESES_MAX];
   wm_hypothesis_set hypotheses;
 } wm_fuser;
 

@@ -18,7 +18,7 @@ typedef enum wm_output_kind {
   WM_OUTPUT_PUBLISHED,   // wm_published
   WM_OUTPUT_HEALTH,      // wm_health
   WM_OUTPUT_PARTICLES,   // wm_particle_set, once a second
-  WM_OUTPUT_HYPOTHESES   // wm_hypothesis_set, with them
+  WM_OUTPUT_HYPOTHESES   // wm_hypothesis_set, with them, as many as it takes
 } wm_output_kind;
 
 // A cloud of particles, or as much of it as a record of points has room for.
@@ -29,11 +29,11 @@ typedef struct wm_particle_set {
   wm_particle particles[WM_PARTICLES_MAX];
 } wm_particle_set;
 
-// Places where the robot may be besides, or as many of them as a record of points has room for.
+// Places where the robot may be besides, as many of them as a record of points has room for.
 #define WM_HYPOTHESES_MAX 100
 typedef struct wm_hypothesis_set {
   wm_time_ns t_ns;
-  uint32_t count, total;
+  uint64_t count;
   wm_hypothesis places[WM_HYPOTHESES_MAX];
 } wm_hypothesis_set;
 

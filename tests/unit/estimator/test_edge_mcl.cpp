@@ -196,9 +196,9 @@ void places_that_look_the_same_are_listed_beside_the_pose(void) {
   filter f;
   drive d;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(f, 6, 1.0, 0.0));
-  wm_hypothesis all[128];
-  const size_t count = f.ops->hypotheses(f.state, all, 128);
-  TEST_ASSERT_TRUE(count > 0 && count <= 128);
+  wm_hypothesis all[200];
+  const size_t count = f.ops->hypotheses(f.state, all, 200);
+  TEST_ASSERT_TRUE(count > 0 && count <= 200);
   TEST_ASSERT_EQUAL(count, f.ops->hypotheses(f.state, nullptr, 0));
   double sum = 0;
   for (size_t i = 0; i < count; i++) {
