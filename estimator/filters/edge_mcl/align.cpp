@@ -88,16 +88,85 @@ void align_pose(const edge_map &map, const float *x_m, const float *y_m, int cou
   }
 }
 
-double explained_share(const edge_map &map, const float *x_m, const float *y_m, int count, double explained_m,
-                       const wm_pose2 &pose) {
+namespace {
+
+constexpr double kTogether =
+    15.0;  // so many points err together, where they are held against what is known of a camera
+
+// Where a point is by these errors.
+inline void moved(const slack_points &points, int i, const double error[kSlackMost], double *x, double *y) {
+  *x = (double)points.x_m[i];
+  *y = (double)points.y_m[i];
+  for (int k = 0; k < kSlackErrors; k++) {
+    const double e = error[kSlackErrors * points.camera[i] + k];
+    *x += e * (double)points.x_by[k][i];
+    *y += e * (double)points.y_by[k][i];
+  }
+}
+
+}  // namespace
+
+void align_place(const edge_map &map, const slack_points &points, int stride, double gate_m, double explained_m,
+                 int iterations, wm_pose2 *pose, double error[kSlackMost]) {
+  constexpr int kOf = 3 + kSlackErrors;  // states that a point speaks of: the pose, its camera's errors
+  for (int round = 0; round < iterations; round++) {
+    double part[kSlackCameras][kOf][kOf] = {}, right[kSlackCameras][kOf] = {};
+    int cameras = 1;
+    const sin_cos h = sincos(pose->heading_rad);
+    for (int i = 0; i < points.count; i += stride) {
+      double px, py;
+      moved(points, i, error, &px, &py);
+      const double rx = h.cos * px - h.sin * py, ry = h.sin * px + h.cos * py;
+      const edge_line line = map.nearest(pose->x_m + rx, pose->y_m + ry);
+      if (!line.found || line.distance_m > gate_m) continue;
+      double row[kOf] = {line.normal_x, line.normal_y, line.normal_y * rx - line.normal_x * ry, 0.0, 0.0, 0.0};
+      // The normal as base_link sees it.
+      const double ahead = h.cos * line.normal_x + h.sin * line.normal_y;
+      const double left = h.cos * line.normal_y - h.sin * line.normal_x;
+      for (int k = 0; k < kSlackErrors; k++)
+        row[3 + k] = ahead * (double)points.x_by[k][i] + left * (double)points.y_by[k][i];
+      const double weight = square(explained_m) / (square(explained_m) + square(line.offset_m));
+      const int camera = points.camera[i];
+      if (camera >= cameras) cameras = camera + 1;
+      for (int r = 0; r < kOf; r++) {
+        const double weighted = weight * row[r];
+        right[camera][r] += weighted * line.offset_m;
+        for (int c = 0; c <= r; c++) part[camera][r][c] += weighted * row[c];
+      }
+    }
+    double a[kAlignStates][kAlignStates] = {}, b[kAlignStates] = {}, step[kAlignStates];
+    for (int k = 0; k < cameras; k++)
+      for (int r = 0; r < kOf; r++) {
+        const int of = kSlackErrors * k, to = r < 3 ? r : of + r;
+        b[to] += right[k][r];
+        for (int c = 0; c <= r; c++) a[to][c < 3 ? c : of + c] += part[k][r][c];
+      }
+    for (int r = 0; r < 3; r++) a[r][r] += 1.0;  // what the points don't say stays
+    const int n = 3 + kSlackErrors * cameras;
+    const double known = kTogether * square(explained_m);
+    for (int r = 3; r < n; r++) {
+      a[r][r] += known;
+      b[r] -= known * error[r - 3];
+    }
+    if (!solve_positive(a, b, n, step)) break;
+    pose->x_m += step[0];
+    pose->y_m += step[1];
+    pose->heading_rad = wrap(pose->heading_rad + step[2]);
+    for (int r = 3; r < n; r++) error[r - 3] += step[r];
+  }
+}
+
+double explained_share(const edge_map &map, const slack_points &points, double explained_m, const wm_pose2 &pose,
+                       const double error[kSlackMost]) {
   const sin_cos h = sincos(pose.heading_rad);
   int explained = 0;
-  for (int i = 0; i < count; i++) {
-    const double px = (double)x_m[i], py = (double)y_m[i];
+  for (int i = 0; i < points.count; i++) {
+    double px, py;
+    moved(points, i, error, &px, &py);
     const edge_line line = map.nearest(pose.x_m + h.cos * px - h.sin * py, pose.y_m + h.sin * px + h.cos * py);
     explained += line.found && line.distance_m <= explained_m;
   }
-  return count > 0 ? (double)explained / count : 0.0;
+  return points.count > 0 ? (double)explained / points.count : 0.0;
 }
 
 }  // namespace wm

@@ -29,6 +29,19 @@ struct normal_equations {
   int explained;                  // of them: as near to an edge as they may be
 };
 
+// How a camera sits is known to some sigma. Of its errors these move the points of places that are compared: pitch,
+// roll, height. (Its yaw turns them as the heading does.) In sigmas, so that what is known well moves nothing.
+inline constexpr int kSlackErrors = 3, kSlackCameras = 2, kSlackMost = kSlackErrors * kSlackCameras;
+inline constexpr int kSlackError[kSlackErrors] = {kPitch, kRoll, kHeight};
+
+// Points in base_link, and by how much each moves with a sigma of an error of the camera that saw it.
+struct slack_points {
+  int count;
+  int camera[WM_POINTS_MAX];
+  float x_m[WM_POINTS_MAX], y_m[WM_POINTS_MAX];
+  float x_by[kSlackErrors][WM_POINTS_MAX], y_by[kSlackErrors][WM_POINTS_MAX];
+};
+
 // Solves A x = b for a symmetric positive definite A of n <= kAlignStates rows; false where it isn't.
 bool solve_positive(const double a[kAlignStates][kAlignStates], const double *b, int n, double *x);
 bool invert_positive(const double a[kAlignStates][kAlignStates], int n, double out[kAlignStates][kAlignStates]);
@@ -43,9 +56,12 @@ bool on_a_line(const wm_points &points, uint32_t i);
 // O(iterations * count / stride).
 void align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, int stride, double gate_m,
                 double explained_m, int iterations, wm_pose2 *pose);
+// The same of points that may move: with the pose their cameras' `error`, in sigmas, from where it is on.
+void align_place(const edge_map &map, const slack_points &points, int stride, double gate_m, double explained_m,
+                 int iterations, wm_pose2 *pose, double error[kSlackMost]);
 // Share of the points that lie so near to an edge from `pose`. O(points).
-double explained_share(const edge_map &map, const float *x_m, const float *y_m, int count, double explained_m,
-                       const wm_pose2 &pose);
+double explained_share(const edge_map &map, const slack_points &points, double explained_m, const wm_pose2 &pose,
+                       const double error[kSlackMost]);
 
 }  // namespace wm
 

@@ -18,7 +18,7 @@ constexpr int kFewKeyframes = 4, kManyKeyframes = 10;  // 0.4 m each
 constexpr int kLeisure = 8, kWeighedInDoubt = 6, kWeighingShare = 4;
 constexpr int kPosesLeast = place_search::kAligningCost + place_search::kWeighingCost;
 static_assert(kPosesLeast <= EDGE_MCL_SEARCH_POSES_LEAST && lookalikes::kPosesLeast <= EDGE_MCL_SEARCH_POSES_LEAST);
-constexpr double kBetter = 0.15;
+constexpr double kBetter = 0.15, kRival = 0.01;
 constexpr double kCarriedOff = 7.0;  // odds that nobody has carried it off in the last metres, logarithm of
 constexpr double kNowhere = -1e3;
 
@@ -147,6 +147,11 @@ void edge_mcl::look_for_lookalikes(double dt_s) {
   const int poses = share > lookalikes::kPosesLeast ? share : lookalikes::kPosesLeast;
   alike_.look(map_, search_.field(), lined_, filter_.pose(), way, sure ? params_.lost_per_s * dt_s : 0.0,
               sure ? poses : 0);
+  // A sweep at leisure over what the last metres looked like takes a while. What has become likely among those that
+  // look the same is weighed by it at once.
+  constexpr double kNoError[kSlackMost] = {};
+  for (int i = 0; sure && i < alike_.count(); i++)
+    if (alike_[i].weight > kRival) others_.offer(alike_[i].pose, alike_[i].explained, kNoError);
 }
 
 // Where else could it be? Sweeps over the map bring places, at leisure while there is no doubt; what the last metres

@@ -223,8 +223,16 @@ void edge_mcl::prepare(const wm_points &points, int camera) {
     if (camera >= 0 && (camera_[camera].range(p.x, p.y) > params_.range_max_m ||
                         !camera_[camera].correct(p.x, p.y, a.value + kAlignCamera, &p)))
       continue;
-    lined_.x_m[lined_.count] = (float)(then.from_now.x_m + h.cos * p.x - h.sin * p.y);
-    lined_.y_m[lined_.count++] = (float)(then.from_now.y_m + h.sin * p.x + h.cos * p.y);
+    const int to = lined_.count++;
+    lined_.x_m[to] = (float)(then.from_now.x_m + h.cos * p.x - h.sin * p.y);
+    lined_.y_m[to] = (float)(then.from_now.y_m + h.sin * p.x + h.cos * p.y);
+    lined_.camera[to] = camera > 0 ? camera : 0;
+    for (int k = 0; k < kSlackErrors; k++) {
+      const int state = camera >= 0 ? camera_state_[camera][kSlackError[k]] : -1;
+      const double sigma = state >= 0 ? std::sqrt(filter_.variance(state)) : 0.0;
+      lined_.x_by[k][to] = (float)(sigma * (h.cos * p.x_by[kSlackError[k]] - h.sin * p.y_by[kSlackError[k]]));
+      lined_.y_by[k][to] = (float)(sigma * (h.sin * p.x_by[kSlackError[k]] + h.cos * p.y_by[kSlackError[k]]));
+    }
   }
 }
 

@@ -102,7 +102,8 @@ class edge_mcl {
   cloud cloud_;
   score_table table_;
   score_field field_;
-  scan_points scan_, lined_;  // all, and those that lie on a line with their neighbours
+  scan_points scan_;
+  slack_points lined_;  // those that lie on a line with their neighbours
   place_search search_;
   hypotheses others_;
   lookalikes alike_;

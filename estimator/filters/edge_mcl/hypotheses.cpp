@@ -23,7 +23,7 @@ bool same(const wm_pose2 &a, const wm_pose2 &b) {
 void hypotheses::clear(const wm_pose2 &own, const wm_pose2 &odom) {
   count_ = 1;
   next_ = 0;
-  of_[0] = {own, 0.0, 1.0, false};
+  of_[0] = {own, 0.0, 1.0, false, {}};
   log_weight_[0] = 0.0;
   odom_ = odom;
 }
@@ -39,14 +39,16 @@ void hypotheses::offer(const place_search &search) {
   int found;
   const place *places = search.places(&found);
   const wm_pose2 since = between(search.odom_of_places(), odom_);
-  for (int k = 0; k < found && count_ < kMost; k++) {
-    const wm_pose2 pose = compose(places[k].pose, since);
-    bool known = false;
-    for (int i = 0; i < count_; i++) known |= same(of_[i].pose, pose);
-    if (known) continue;
-    log_weight_[count_] = 0.0;
-    of_[count_++] = {pose, places[k].explained, 0.0, false};
-  }
+  for (int k = 0; k < found; k++) offer(compose(places[k].pose, since), places[k].explained, places[k].error);
+}
+
+void hypotheses::offer(const wm_pose2 &pose, double explained, const double error[kSlackMost]) {
+  if (count_ == kMost) return;
+  for (int i = 0; i < count_; i++)
+    if (same(of_[i].pose, pose)) return;
+  log_weight_[count_] = 0.0;
+  hypothesis &h = of_[count_++] = {pose, explained, 0.0, false, {}};
+  for (int e = 0; e < kSlackMost; e++) h.error[e] = error[e];
 }
 
 void hypotheses::weigh(const edge_map &map, place_search *search, double own_prior, double own_least, int some) {
@@ -55,7 +57,7 @@ void hypotheses::weigh(const edge_map &map, place_search *search, double own_pri
     if (next_ >= count_) next_ = 0;
     hypothesis &h = of_[next_];
     wm_pose2 aligned = h.pose;
-    h.explained = search->explained(map, odom_, &aligned);
+    h.explained = search->explained(map, odom_, &aligned, h.error);
     if (next_ == 0) {
       if (h.explained < own_least) h.explained = own_least;
     } else {
@@ -67,6 +69,7 @@ void hypotheses::weigh(const edge_map &map, place_search *search, double own_pri
   double best = nats * kByChance;
   for (int i = 0; i < count_; i++) {
     log_weight_[i] = of_[i].weighed ? nats * of_[i].explained + (i == 0 ? own_prior : 0.0) : -1e3;
+    for (const double e : of_[i].error) log_weight_[i] -= 0.5 * e * e;
     if (log_weight_[i] > best) best = log_weight_[i];
   }
   double total = exp(nats * kByChance - best);

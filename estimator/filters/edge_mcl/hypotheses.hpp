@@ -9,10 +9,11 @@
 namespace wm {
 
 struct hypothesis {
-  wm_pose2 pose;     // base_link in map now
-  double explained;  // share of the last metres' points
-  double share;      // of the probability
-  int64_t weighed;   // 0: not yet. As wide as the rest: a copy has no bytes that nobody wrote
+  wm_pose2 pose;             // base_link in map now
+  double explained;          // share of the last metres' points
+  double share;              // of the probability
+  int64_t weighed;           // 0: not yet. As wide as the rest: a copy has no bytes that nobody wrote
+  double error[kSlackMost];  // of the cameras if it is there, in sigmas of what is known of them
 };
 
 class hypotheses {
@@ -23,6 +24,8 @@ class hypotheses {
   void clear(const wm_pose2 &own, const wm_pose2 &odom);
   void carry(const wm_pose2 &own, const wm_pose2 &odom);
   void offer(const place_search &search);
+  // Base_link in map now, of the share of the points that it is said to explain.
+  void offer(const wm_pose2 &pose, double explained, const double error[kSlackMost]);
   // Aligns and weighs `some` of them, in turn. `own_prior`: logarithm of how much likelier one's own place is than
   // another before anything is seen; `own_least`: what it explains at least.
   void weigh(const edge_map &map, place_search *search, double own_prior, double own_least, int some);

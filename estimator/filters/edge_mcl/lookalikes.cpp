@@ -78,7 +78,7 @@ void lookalikes::carry(const wm_pose2 &odom) {
   for (int i = 0; i < count_; i++) of_[i].pose = compose(of_[i].pose, way);
 }
 
-void lookalikes::choose_points(const scan_points &scan) {
+void lookalikes::choose_points(const slack_points &scan) {
   points_ = scan.count < kPoints ? scan.count : kPoints;
   for (int i = 0; i < points_; i++) {
     const int from = (int)((int64_t)i * scan.count / points_);
@@ -122,7 +122,7 @@ void lookalikes::describe(const fit &f, lookalike *out) const {
     for (int r = 0; r <= c; r++) out->covariance[k++] = inverse[r][c] + (r == c ? lasting[r] : 0.0);
 }
 
-void lookalikes::look(const edge_map &map, const search_field &field, const scan_points &scan, const wm_pose2 &own,
+void lookalikes::look(const edge_map &map, const search_field &field, const slack_points &scan, const wm_pose2 &own,
                       double new_m, double hazard, int poses) {
   if (scan.count < 8) return;
   choose_points(scan);

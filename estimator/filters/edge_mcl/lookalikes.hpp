@@ -7,7 +7,7 @@
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_LOOKALIKES_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_LOOKALIKES_HPP
 
-#include "filters/edge_mcl/likelihood.hpp"
+#include "filters/edge_mcl/align.hpp"
 #include "filters/edge_mcl/search_field.hpp"
 #include "waymark/frames.h"
 
@@ -33,7 +33,7 @@ class lookalikes {
   // A scan in base_link, which the robot took at `own` if it is where it believes; `new_m`: way since the last one.
   // `hazard`: probability of having been carried off since. Goes on looking by work worth `poses` at most; none: what
   // is known is weighed alone, at most kWeighingCost.
-  void look(const edge_map &map, const search_field &field, const scan_points &scan, const wm_pose2 &own, double new_m,
+  void look(const edge_map &map, const search_field &field, const slack_points &scan, const wm_pose2 &own, double new_m,
             double hazard, int poses);
 
   // The sweep begins anew, by the next scan.
@@ -60,7 +60,7 @@ class lookalikes {
     double explained, information[3][3];  // the latter in 1/m2, of points of 1 m
   };
   fit fit_at(const edge_map &map, const wm_pose2 &pose) const;
-  void choose_points(const scan_points &scan);
+  void choose_points(const slack_points &scan);
   void weigh(const edge_map &map, const wm_pose2 &own);
   // Whether it stays.
   bool weigh(const edge_map &map, const wm_pose2 &own, lookalike *l) const;

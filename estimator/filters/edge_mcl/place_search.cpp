@@ -16,6 +16,7 @@ constexpr double kSameWay_m = 0.6, kSameTurn_rad = 0.3;  // places nearer than t
 // Of 16 places of the grid as many poses as headings at each where a robot may stand, three more where all points were
 // looked at. So many a sweep takes however it is computed, and with them the scans between two sweeps.
 constexpr int kRestCost = 3;
+constexpr double kOpen_m = 0.1, kOpenMost_m = 2.0;
 constexpr double kHopeful = 0.35;  // how much better a point more may be than those before, on average
 
 double way_between(const wm_pose2 &a, const wm_pose2 &b) {
@@ -45,7 +46,7 @@ void place_search::begin_at_mark() {
   running_ = false;
 }
 
-bool place_search::see(const scan_points &scan, const wm_pose2 &odom) {
+bool place_search::see(const slack_points &scan, const wm_pose2 &odom) {
   if (scan.count < 8) return false;
   if (seen_ > 0) {
     const keyframe &last = keyframes_[(seen_ - 1) % kKeyframes];
@@ -58,13 +59,18 @@ bool place_search::see(const scan_points &scan, const wm_pose2 &odom) {
   k.count = scan.count < kPointsEach ? scan.count : kPointsEach;
   for (int i = 0; i < k.count; i++) {
     const int from = (int)((int64_t)i * scan.count / k.count);
+    k.camera[i] = scan.camera[from];
     k.x_m[i] = scan.x_m[from];
     k.y_m[i] = scan.y_m[from];
+    for (int e = 0; e < kSlackErrors; e++) {
+      k.x_by[e][i] = scan.x_by[e][from];
+      k.y_by[e][i] = scan.y_by[e][from];
+    }
   }
   return true;
 }
 
-void place_search::gather(const wm_pose2 &odom, scan_points *out) const {
+void place_search::gather(const wm_pose2 &odom, slack_points *out) const {
   out->count = 0;
   for (uint64_t n = oldest(); n < seen_; n++) {
     const keyframe &k = keyframes_[n % kKeyframes];
@@ -72,17 +78,24 @@ void place_search::gather(const wm_pose2 &odom, scan_points *out) const {
     const sin_cos h = sincos(from.heading_rad);
     for (int i = 0; i < k.count && out->count < WM_POINTS_MAX; i++) {
       const double x = (double)k.x_m[i], y = (double)k.y_m[i];
+      out->camera[out->count] = k.camera[i];
       out->x_m[out->count] = (float)(from.x_m + h.cos * x - h.sin * y);
-      out->y_m[out->count++] = (float)(from.y_m + h.sin * x + h.cos * y);
+      out->y_m[out->count] = (float)(from.y_m + h.sin * x + h.cos * y);
+      for (int e = 0; e < kSlackErrors; e++) {
+        const double by_x = (double)k.x_by[e][i], by_y = (double)k.y_by[e][i];
+        out->x_by[e][out->count] = (float)(h.cos * by_x - h.sin * by_y);
+        out->y_by[e][out->count] = (float)(h.sin * by_x + h.cos * by_y);
+      }
+      out->count++;
     }
   }
 }
 
-double place_search::explained(const edge_map &map, const wm_pose2 &odom, wm_pose2 *pose) {
+double place_search::explained(const edge_map &map, const wm_pose2 &odom, wm_pose2 *pose, double error[kSlackMost]) {
   gather(odom, &now_);
-  align_pose(map, now_.x_m, now_.y_m, now_.count, 2, 0.3, 0.1, 4, pose);
+  align_place(map, now_, 2, 0.3, 0.1, 4, pose, error);
   spent_ += kWeighingCost;
-  return explained_share(map, now_.x_m, now_.y_m, now_.count, 0.1, *pose);
+  return explained_share(map, now_, 0.1, *pose, error);
 }
 
 void place_search::begin(const wm_pose2 &odom) {
@@ -94,18 +107,32 @@ void place_search::begin(const wm_pose2 &odom) {
   place_count_ = 0;
 }
 
-// Every fourth of the points comes first. What is too far for the field says nothing, from anywhere.
+// What is too far for the field says nothing, from anywhere; and a sweep can't move points: as long as it is not known
+// how a camera sits, those that it leaves open by more than the grid does would hide where the others fit. Where too
+// few are left, others are better than none. Returns how many.
+int place_search::list_near(int *out) const {
+  int count = 0;
+  for (double open_m = kOpen_m; open_m < kOpenMost_m && count < kSweepPoints; open_m *= 2.0) {
+    count = 0;
+    for (int i = 0; i < all_.count; i++) {
+      double open2 = 0.0;
+      for (int e = 0; e < kSlackErrors; e++) open2 += square((double)all_.x_by[e][i]) + square((double)all_.y_by[e][i]);
+      const double range2 = square((double)all_.x_m[i]) + square((double)all_.y_m[i]);
+      if (range2 < square(field_.reach_m()) && open2 < square(open_m)) out[count++] = i;
+    }
+  }
+  return count;
+}
+
+// Every fourth of the points comes first.
 void place_search::turn_points(const edge_map &map) {
   constexpr int kStride = kSweepPoints / kFirstPoints;
-  const int count = all_.count < kSweepPoints ? all_.count : kSweepPoints;
+  int near[WM_POINTS_MAX];
+  const int all = list_near(near), count = all < kSweepPoints ? all : kSweepPoints;
   int chosen[kSweepPoints];
   some_ = first_ = 0;
   for (int phase = 0; phase < kStride; phase++) {
-    for (int i = phase; i < count; i += kStride) {
-      const int from = (int)((int64_t)i * all_.count / count);
-      const double range2 = square((double)all_.x_m[from]) + square((double)all_.y_m[from]);
-      if (range2 < square(field_.reach_m())) chosen[some_++] = from;
-    }
+    for (int i = phase; i < count; i += kStride) chosen[some_++] = near[(int64_t)i * all / count];
     if (phase == 0) first_ = some_;
   }
   for (int k = 0; k < kHeadings; k++) {
@@ -118,7 +145,7 @@ void place_search::turn_points(const edge_map &map) {
 }
 
 void place_search::offer(const wm_pose2 &pose, int32_t score) {
-  keep_best(places_, &place_count_, {pose, score, 0.0}, same_place);
+  keep_best(places_, &place_count_, {pose, score, 0.0, {}}, same_place);
 }
 
 // What the first points of a pose must come to for the rest to be looked at.
@@ -166,11 +193,10 @@ int place_search::sweep(const edge_map &map, int poses) {
 void place_search::refine(const edge_map &map, int poses) {
   for (; refined_ < place_count_ && poses >= kAligningCost; refined_++, poses -= kAligningCost) {
     place &p = places_[refined_];
-    align_pose(map, all_.x_m, all_.y_m, all_.count, 4, 0.4, 0.2, 5, &p.pose);
-    align_pose(map, all_.x_m, all_.y_m, all_.count, 2, 0.2, 0.1, 4, &p.pose);
+    align_place(map, all_, 4, 0.4, 0.2, 5, &p.pose, p.error);
+    align_place(map, all_, 2, 0.2, 0.1, 4, &p.pose, p.error);
     p.explained = 0.0;
-    if (map.drivable(p.pose.x_m, p.pose.y_m))
-      p.explained = explained_share(map, all_.x_m, all_.y_m, all_.count, 0.1, p.pose);
+    if (map.drivable(p.pose.x_m, p.pose.y_m)) p.explained = explained_share(map, all_, 0.1, p.pose, p.error);
     spent_ += kAligningCost;
   }
 }

@@ -6,6 +6,7 @@
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_PLACE_SEARCH_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_PLACE_SEARCH_HPP
 
+#include "filters/edge_mcl/align.hpp"
 #include "filters/edge_mcl/likelihood.hpp"
 #include "filters/edge_mcl/params.h"
 #include "filters/edge_mcl/search_field.hpp"
@@ -14,9 +15,10 @@
 namespace wm {
 
 struct place {
-  wm_pose2 pose;     // base_link in map when the sweep began
-  int32_t score;     // on the grid
-  double explained;  // share of the points, aligned
+  wm_pose2 pose;             // base_link in map when the sweep began
+  int64_t score;             // on the grid. As wide as the rest: a copy has no bytes that nobody wrote
+  double explained;          // share of the points, aligned
+  double error[kSlackMost];  // of the cameras, aligned with it
 };
 
 class place_search {
@@ -34,7 +36,7 @@ class place_search {
   void clear();
   // A scan in base_link and where odometry says it was taken; kept if the robot has moved since the last one kept, and
   // then true.
-  bool see(const scan_points &scan, const wm_pose2 &odom);
+  bool see(const slack_points &scan, const wm_pose2 &odom);
   // From here on is looked at: what was kept before belongs elsewhere. A sweep that runs begins anew.
   void mark() { marked_ = seen_; }
   void begin_at_mark();
@@ -48,8 +50,9 @@ class place_search {
     *count = place_count_;
     return places_;
   }
-  // Share of what was seen lately that the map explains about `pose` (base_link in map now, which is aligned).
-  double explained(const edge_map &map, const wm_pose2 &odom, wm_pose2 *pose);
+  // Share of what was seen lately that the map explains about `pose` (base_link in map now) and by the cameras'
+  // `error`, which are aligned.
+  double explained(const edge_map &map, const wm_pose2 &odom, wm_pose2 *pose, double error[kSlackMost]);
   wm_pose2 odom_of_places() const { return odom_; }
   const search_field &field() const { return field_; }
   int keyframes() const { return (int)(seen_ - oldest()); }  // that are looked at together
@@ -63,7 +66,8 @@ class place_search {
   }
   void begin(const wm_pose2 &odom);
   // Points of all keyframes in base_link at `odom`.
-  void gather(const wm_pose2 &odom, scan_points *out) const;
+  void gather(const wm_pose2 &odom, slack_points *out) const;
+  int list_near(int *out) const;
   void turn_points(const edge_map &map);
   int sweep(const edge_map &map, int poses);                     // returns what is left of `poses`
   int look_from(const edge_map &map, int64_t run, int64_t row);  // returns what it cost
@@ -74,14 +78,15 @@ class place_search {
 
   struct keyframe {
     wm_pose2 odom;
-    int count;
+    int count, camera[kPointsEach];
     float x_m[kPointsEach], y_m[kPointsEach];
+    float x_by[kSlackErrors][kPointsEach], y_by[kSlackErrors][kPointsEach];
   };
   keyframe keyframes_[kKeyframes];
   uint64_t seen_, marked_, from_;
   search_field field_;
-  scan_points all_;  // in base_link at odom_
-  scan_points now_;  // work space
+  slack_points all_;  // in base_link at odom_
+  slack_points now_;  // work space
   // Of each heading the steps in the field of some of all_, which are the same from everywhere: first those that are
   // looked at first.
   int32_t steps_[kHeadings][kSweepPoints];

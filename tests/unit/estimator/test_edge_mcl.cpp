@@ -309,17 +309,25 @@ struct searching {
   wm::place_search search;
   wm_pose2 odom = {0, 0, 0};
   drive d;
-  searching() {
+  // `off`: the camera's error, in sigmas, of which each moves a point away by 2 % of its range squared.
+  explicit searching(double off = 0.0) {
     edge_map.init(map, map_memory.get());
     search.init(edge_map, field.get());
     static wm_event e;
-    static wm::scan_points scan;
+    static wm::slack_points scan;
     d.truth = {2, 2, 0};
     for (int k = 0; k < 16; k++, d.truth.x_m += 0.5, odom.x_m += 0.5) {
       d.scan(&e);
       scan.count = (int)e.as.points.count;
       std::memcpy(scan.x_m, e.as.points.x_m, sizeof e.as.points.x_m);
       std::memcpy(scan.y_m, e.as.points.y_m, sizeof e.as.points.y_m);
+      for (int i = 0; i < scan.count; i++) {
+        const double x = (double)scan.x_m[i], y = (double)scan.y_m[i], by = 0.02 * std::sqrt(x * x + y * y);
+        scan.x_by[0][i] = (float)(by * x);
+        scan.y_by[0][i] = (float)(by * y);
+        scan.x_m[i] = (float)(x - off * by * x);
+        scan.y_m[i] = (float)(y - off * by * y);
+      }
       TEST_ASSERT_TRUE(search.see(scan, odom));
     }
   }
@@ -343,6 +351,22 @@ void a_step_of_the_search_spends_no_more_than_it_may(void) {
     TEST_ASSERT_GREATER_THAN_INT(0, count);
     TEST_ASSERT_DOUBLE_WITHIN(0.1, s.odom.x_m + 2, places[0].pose.x_m);
     TEST_ASSERT_DOUBLE_WITHIN(0.1, 2, places[0].pose.y_m);
+  }
+}
+
+// GIVEN a camera that is off by two of its sigmas WHEN the search looks THEN the place that it finds is the true one,
+// and its error is found with it.
+void a_place_is_found_with_what_the_camera_is_off_by(void) {
+  for (const double off : {-2.0, 0.0, 2.0}) {
+    searching s(off);
+    while (!s.search.step(s.edge_map, 80000, s.odom)) continue;
+    int count;
+    const wm::place *places = s.search.places(&count);
+    TEST_ASSERT_GREATER_THAN_INT(0, count);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, s.odom.x_m + 2, places[0].pose.x_m);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, 2, places[0].pose.y_m);
+    TEST_ASSERT_DOUBLE_WITHIN(0.5, off, places[0].error[0]);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.9, places[0].explained);
   }
 }
 
@@ -431,6 +455,7 @@ int main(void) {
   RUN_TEST(carried_away_it_says_so_and_finds_back);
   RUN_TEST(it_starts_without_being_told_where);
   RUN_TEST(a_step_of_the_search_spends_no_more_than_it_may);
+  RUN_TEST(a_place_is_found_with_what_the_camera_is_off_by);
   RUN_TEST(weighing_places_spends_what_it_says);
   RUN_TEST(nonsense_makes_it_no_surer_and_never_breaks_it);
   RUN_TEST(what_it_can_not_work_with_is_said);

@@ -24,7 +24,7 @@ char *map_memory, *field_memory;
 wm::edge_map map;
 wm::search_field field;
 wm::lookalikes alike;
-wm::scan_points scan;
+wm::slack_points scan;
 
 // Of a pose in the first room that in the second.
 wm_pose2 twin(const wm_pose2 &p) { return {17 - p.x_m, 7 - p.y_m, wm::wrap(p.heading_rad + wm::kPi)}; }
