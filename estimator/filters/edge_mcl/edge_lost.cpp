@@ -15,6 +15,7 @@ constexpr double kFresh_s = 0.5, kFresh_m = 0.2;  // scans further apart speak e
 constexpr double kWander_m = 0.1, kLoosened_m2ps = 0.002, kLoosened_rad2ps = 0.0002;
 constexpr double kDoubtOdds = -2.0;
 constexpr int kFewKeyframes = 4, kManyKeyframes = 10;  // 0.4 m each
+constexpr int kAtEase = 4, kNotAtEase = 2;             // a scan's work through it is what a sweep for look-alikes has
 constexpr int kLeisure = 8, kWeighedInDoubt = 6, kWeighingShare = 4;
 constexpr int kPosesLeast = place_search::kAligningCost + place_search::kWeighingCost;
 static_assert(kPosesLeast <= EDGE_MCL_SEARCH_POSES_LEAST && lookalikes::kPosesLeast <= EDGE_MCL_SEARCH_POSES_LEAST);
@@ -143,7 +144,7 @@ void edge_mcl::look_for_lookalikes(double dt_s) {
   const bool sure = state_ == WM_STATE_TRACKING && !in_doubt_, at_ease = lost_odds_ < kEasyOdds;
   if (at_ease_ && !at_ease) alike_.begin_again();
   at_ease_ = at_ease;
-  const int share = at_ease ? params_.search_poses / kLeisure : params_.search_poses / 2;
+  const int share = params_.search_poses / (at_ease ? kAtEase : kNotAtEase);
   const int poses = share > lookalikes::kPosesLeast ? share : lookalikes::kPosesLeast;
   alike_.look(map_, search_.field(), lined_, filter_.pose(), way, sure ? params_.lost_per_s * dt_s : 0.0,
               sure ? poses : 0);

@@ -82,9 +82,9 @@ static const wm_param kParams[] = {
     F64("search.share", search_share, 0.95, 0.1, 1,
         "Probability, among all places that are possible, from which on a place is taken."),
     I32("search.poses", search_poses, 80000, EDGE_MCL_SEARCH_POSES_LEAST, 10000000,
-        "Work of a scan at most while in doubt, in poses that a sweep over the map scores by 24 points; an eighth "
-        "of it otherwise, and half of it for places that look as the tracked one. Aligning places (8704 each) and "
-        "weighing them (3072) come out of it. 80000: 1 ms on a PC."),
+        "Work of a scan at most while in doubt, in poses that a sweep over the map scores by 24 points one by one; an "
+        "eighth of it otherwise, and a quarter, at most half of it for places that look as the tracked one. Aligning "
+        "places (8704 each) and weighing them (3072) come out of it. 80000: 1 ms on a PC."),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 1.0, 0.05, 3600,
         "Nothing fused for so long: the state says dead reckoning."),
 };
