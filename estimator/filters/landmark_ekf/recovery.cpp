@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lost and found: notices that observations keep contradicting the pose, says so, and mends it.
 #include "filters/landmark_ekf/landmark_ekf.hpp"
+#include "math/arc.hpp"
 #include "math/elementary.hpp"
 
 namespace wm {
@@ -83,7 +84,12 @@ bool landmark_ekf::is_elsewhere(wm_time_ns since_ns, wm_time_ns t_ns) {
   if (clues < kNumbersElsewhere) return false;
   searched_ns_ = t_ns;
   const wm_pose2 pose = filter_.pose(), odom = filter_.odom();
-  const int fitting = clues_.agreeing(since_ns, pose, odom, filter_.travelled_m(), filter_.turned_rad());
+  wm_pose2 mounting[kMaxSensors] = {};
+  for (size_t i = 0; i < setup_->sensor_count && i < kMaxSensors; i++) {
+    const sensor_errors told = remembered_errors_of((int)i), known = errors_of((int)i);
+    mounting[i] = between({told.x_m, told.y_m, told.yaw_rad}, {known.x_m, known.y_m, known.yaw_rad});
+  }
+  const int fitting = clues_.agreeing(since_ns, pose, odom, filter_.travelled_m(), filter_.turned_rad(), mounting);
   if (kFewOf * fitting > clues) return false;
   const search_result other =
       clues_.find(since_ns, odom, filter_.travelled_m(), filter_.turned_rad(), nullptr, 0,

@@ -18,7 +18,9 @@ constexpr double kMarginChi2 = 9.0;      // the second best place must be worse 
 constexpr double kAgreeing = 0.7;        // share of observations that must agree ...
 constexpr double kAgreeingOfMany = 0.5;  // ... where so many landmarks bear it out:
 constexpr int kMany = 4;
+constexpr int kFew = 3;  // of fewer bearings' landmarks each must be seen from two places: one may be another thing
 constexpr double kRival = 0.85;        // another place that so many as many observations agree with is as good
+constexpr double kAnew_m = 0.3;        // seen again from less far away, a landmark says nothing new
 constexpr double kFirstGuess_m = 4.0;  // distance of a landmark of which only the bearing is known
 
 // The frame of odometry in map: position of its origin, rotation.
@@ -34,6 +36,7 @@ struct problem {
     double place_m2;                     // sigma_place_m squared
     double dir_x, dir_y;                 // of the line of sight, in the odometry's frame
     int landmark;                        // numbered as they come; -1: none
+    int view;                            // the first item that saw the same from the same place; itself if none did
   };
   static constexpr int kMost = pose_search::kCapacity + 4;
   item items[kMost];
@@ -42,9 +45,10 @@ struct problem {
   int stated_from = kMost;  // what was said of the start: items from here on
 
   void add(const search_clue &clue, double travelled_m, double turned_rad) {
-    item &it = items[count++];
+    item &it = items[count];
     it.clue = &clue;
     it.landmark = -1;
+    it.view = count++;
     it.place_m2 = (clue.kind & kClueBearing) ? square(clue.sigma_place_m) : 0.0;
     if (clue.kind & (kClueBearing | kClueRange)) {
       for (int i = 0; i < count - 1 && it.landmark < 0; i++)
@@ -53,6 +57,11 @@ struct problem {
           it.landmark = items[i].landmark;
       if (it.landmark < 0) seen[it.landmark = landmarks++] = 0;
       seen[it.landmark]++;
+      for (int i = 0; i < count - 1 && it.view == count - 1; i++)
+        if (items[i].view == i && items[i].landmark == it.landmark && items[i].clue->kind == clue.kind &&
+            square(items[i].clue->sensor.x_m - clue.sensor.x_m) + square(items[i].clue->sensor.y_m - clue.sensor.y_m) <
+                square(kAnew_m))
+          it.view = i;
     }
     const double way = kWayError * (travelled_m - clue.travelled_m);
     const double turn = kTurnError * (turned_rad - clue.turned_rad);
@@ -113,12 +122,21 @@ struct support {
   int observations = 0, numbers = 0;
   int stated = 0;     // what was said of the start
   int landmarks = 0;  // of which half of the observations and more agree
+  int well_seen = 0;  // of these, from two places or more
 };
+
+bool only_bearings(const problem &all) {
+  for (int i = 0; i < all.count; i++)
+    if (all.items[i].clue->kind != kClueBearing) return false;
+  return true;
+}
 
 double cost_of(const problem &all, const placement &p, support *fit = nullptr) {
   const sin_cos turn = sincos(p.turn);
   double cost = 0.0;
   int balance[problem::kMost] = {};  // of each landmark: agreeing less contradicting
+  int views[problem::kMost] = {};    // of each landmark that agree
+  bool told[problem::kMost] = {};
   for (int i = 0; i < all.count; i++) {
     const residuals r = look(all.items[i], p, turn);
     cost += clipped(r.angle_chi2 > 0.0 ? r.angle_chi2 : 0.0) + clipped(r.length_chi2 > 0.0 ? r.length_chi2 : 0.0);
@@ -131,8 +149,13 @@ double cost_of(const problem &all, const placement &p, support *fit = nullptr) {
     fit->stated += i >= all.stated_from;
     fit->numbers +=
         (r.angle_chi2 >= 0.0) + (r.length_chi2 >= 0.0) * ((all.items[i].clue->kind & kCluePosition) ? 2 : 1);
+    if (landmark >= 0 && !told[all.items[i].view]) views[landmark]++;
+    told[all.items[i].view] = true;
   }
-  for (int i = 0; fit && i < all.landmarks; i++) fit->landmarks += balance[i] >= 0;
+  for (int i = 0; fit && i < all.landmarks; i++) {
+    fit->landmarks += balance[i] >= 0;
+    fit->well_seen += balance[i] >= 0 && views[i] >= 2;
+  }
   return cost;
 }
 
@@ -337,9 +360,14 @@ int pose_search::count_since(wm_time_ns since_ns) const {
 }
 
 int pose_search::agreeing(wm_time_ns since_ns, const wm_pose2 &pose_now, const wm_pose2 &odom_now, double travelled_m,
-                          double turned_rad) const {
+                          double turned_rad, const wm_pose2 mounting[kMaxSensors]) const {
   problem all;
-  for (int i = kept() - count_since(since_ns); i < kept(); i++) all.add(at(i), travelled_m, turned_rad);
+  search_clue clue[kCapacity];
+  for (int i = kept() - count_since(since_ns), n = 0; i < kept(); i++, n++) {
+    clue[n] = at(i);
+    if (clue[n].key >= 0) clue[n].sensor = compose(clue[n].sensor, mounting[clue[n].key % kMaxSensors]);
+    all.add(clue[n], travelled_m, turned_rad);
+  }
   const double turn = wrap(pose_now.heading_rad - odom_now.heading_rad);
   const sin_cos by = sincos(turn);
   const placement frame = {pose_now.x_m - by.cos * odom_now.x_m + by.sin * odom_now.y_m,
@@ -397,6 +425,7 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
   out.agreeing = own.observations;
   const double share = own.landmarks >= kMany ? kAgreeingOfMany : kAgreeing;
   if (own.observations < share * all.count || own.observations < 3 || own.numbers < limits.numbers) return out;
+  if (own.landmarks < kFew && own.well_seen < own.landmarks && only_bearings(all)) return out;
   normal_equations(all, w, a, b);
   if (!invert(a, inverse)) return out;
   const wm_pose2 frame = {w.x, w.y, w.turn};

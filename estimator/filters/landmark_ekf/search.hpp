@@ -57,9 +57,10 @@ class pose_search {
   int kept() const { return count_ < kCapacity ? count_ : kCapacity; }
   const search_clue &at(int i) const { return clue_[(count_ - kept() + i) % kCapacity]; }
   int count_since(wm_time_ns since_ns) const;
-  // How many clues not older than `since_ns` agree with a pose now.
+  // How many clues not older than `since_ns` agree with a pose now. `mounting`: of each sensor, where it is known to be
+  // now from where the clues were told that it is.
   int agreeing(wm_time_ns since_ns, const wm_pose2 &pose_now, const wm_pose2 &odom_now, double travelled_m,
-               double turned_rad) const;
+               double turned_rad, const wm_pose2 mounting[kMaxSensors]) const;
   // The pose now, from clues not older than `since_ns`. `prior` (may be null) is a clue that does not age.
   search_result find(wm_time_ns since_ns, const wm_pose2 &odom_now, double travelled_m, double turned_rad,
                      const search_clue *prior, int prior_count, const search_limits &limits) const;

@@ -9,6 +9,7 @@
 #include "events.hpp"
 #include "filters/landmark_ekf/params.h"
 #include "filters/landmark_ekf/resection.hpp"
+#include "filters/landmark_ekf/search.hpp"
 #include "filters/landmark_ekf/witnesses.hpp"
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
@@ -221,6 +222,36 @@ void test_a_pose_found_by_a_moved_landmark_is_mended(void) {
   TEST_ASSERT_EQUAL_DOUBLE(landmarks[2].id, calibration("map.moved_id"));
 }
 
+// Driving by one landmark something is taken for another one once: a pose that fits both is found, and not believed.
+// Seen from two places it is.
+void test_a_second_landmark_seen_from_one_place_alone_is_not_enough(void) {
+  static wm::pose_search search;
+  search.clear();
+  const double place_m[2][2] = {{5.0, 3.0}, {7.0, -4.0}};
+  const auto see = [&](int landmark, double x_m, int64_t t_ms) {
+    wm::search_clue clue{};
+    clue.t_ns = t_ms * WM_NS_PER_MS;
+    clue.kind = wm::kClueBearing;
+    clue.key = landmark * wm::kMaxSensors;
+    clue.sensor.x_m = clue.travelled_m = x_m;
+    for (int k = 0; k < 2; k++) clue.place_m[k] = place_m[landmark][k];
+    clue.bearing_rad = wm::atan2(place_m[landmark][1], place_m[landmark][0] - x_m);
+    clue.sigma_angle_rad = 0.005;
+    clue.sigma_place_m = 0.02;
+    search.add(clue);
+  };
+  const auto is_found = [] {
+    return search.find(0, wm_pose2{3.0, 0.0, 0.0}, 3.0, 0.0, nullptr, 0, {5.0, 1.0, 5}).found;
+  };
+  for (int i = 0; i < 7; i++) see(0, 0.5 * i, 400 * i);
+  see(1, 3.0, 2400);
+  TEST_ASSERT_FALSE(is_found());
+  see(1, 3.1, 2800);  // as good as the same place
+  TEST_ASSERT_FALSE(is_found());
+  see(1, 2.0, 3200);
+  TEST_ASSERT_TRUE(is_found());
+}
+
 void test_two_landmarks_and_driving_are_enough(void) {
   begin_without_pose();
   drive(20, 2);
@@ -363,6 +394,7 @@ int main(void) {
   RUN_TEST(test_misfits_that_scatter_say_nothing_those_in_one_place_do);
   RUN_TEST(test_started_without_a_pose_three_bearings_are_enough);
   RUN_TEST(test_a_pose_found_by_a_moved_landmark_is_mended);
+  RUN_TEST(test_a_second_landmark_seen_from_one_place_alone_is_not_enough);
   RUN_TEST(test_two_landmarks_and_driving_are_enough);
   RUN_TEST(test_a_known_place_and_an_unknown_heading);
   RUN_TEST(test_a_start_that_is_surer_than_right_is_told_and_mended);
