@@ -4,9 +4,11 @@
 #define WAYMARK_TESTS_ESTIMATOR_EVENTS_HPP
 
 #include <cmath>
+#include <cstring>
 #include <initializer_list>
 #include <utility>
 
+#include "waymark/estimator.h"
 #include "waymark/event.h"
 #include "waymark/setup.h"
 
@@ -74,6 +76,26 @@ inline wm_wheels car() {
   const double x[3] = {0.0, 0.05, 0.1}, y[3] = {-0.5, 0.02, 0.5};
   for (int i = 0; i < 3; i++) w.actuator_m[i] = x[i], w.road_wheel_rad[i] = y[i];
   return w;
+}
+
+// A sensor in base_link's place that sees without end; NaN: its sigma is not known.
+inline wm_sensor sensor(const char *name, double bearing_sigma_rad, double range_sigma_m) {
+  wm_sensor s{};
+  std::strncpy(s.name, name, sizeof s.name - 1);
+  s.bearing_sigma_rad = bearing_sigma_rad;
+  s.range_sigma_m = range_sigma_m;
+  s.max_range_m = INFINITY;
+  return s;
+}
+
+// A robot of which only its motion and one sensor are known; both must outlive what is started with it.
+inline wm_setup setup(const wm_motion_params &motion, const wm_sensor &sensor) {
+  wm_setup s{};
+  s.motion = &motion;
+  s.wheels = no_wheels();
+  s.sensors = &sensor;
+  s.sensor_count = 1;
+  return s;
 }
 
 }  // namespace make

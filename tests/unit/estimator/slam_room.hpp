@@ -49,17 +49,9 @@ inline void make_room() {
     place[i][1] = radius * a.sin;
     known[i] = {10 + i, {place[i][0], place[i][1], 0}, 0.01, kAbsent, {}, 0};
   }
-  sensor = {};
-  std::strcpy(sensor.name, "camera");
+  sensor = make::sensor("camera", 0.01, 0.03);
   sensor.mounting.xyz_m[0] = 0.2;
-  sensor.bearing_sigma_rad = 0.01;
-  sensor.range_sigma_m = 0.03;
-  sensor.max_range_m = INFINITY;
-  setup = {};
-  setup.motion = &motion;
-  setup.wheels = make::no_wheels();
-  setup.sensors = &sensor;
-  setup.sensor_count = 1;
+  setup = make::setup(motion, sensor);
   setup.landmarks = known;
   setup.landmark_count = kCount;
   setup.start = {WM_TIME_NONE, {2, 0, 0}, {0, 0, 0, 1}, wm::kHalfPi, 0.001, 0.001};

@@ -365,16 +365,8 @@ void setUp(void) {
   wm_params_defaults(&wm_motion_params_table, &motion);
   wm_params_defaults(&ekf->params, &params);
   for (int i = 0; i < kLandmarks; i++) landmarks[i] = {10 + i, {kPlaces[i][0], kPlaces[i][1], 0}, 0.0, NAN, {}, 0};
-  sensor = {};
-  std::strcpy(sensor.name, "camera");
-  sensor.bearing_sigma_rad = 0.006;
-  sensor.range_sigma_m = NAN;
-  sensor.max_range_m = INFINITY;
-  setup = {};
-  setup.motion = &motion;
-  setup.wheels = make::no_wheels();
-  setup.sensors = &sensor;
-  setup.sensor_count = 1;
+  sensor = make::sensor("camera", 0.006, NAN);
+  setup = make::setup(motion, sensor);
   setup.landmarks = landmarks;
   setup.landmark_count = kLandmarks;
   truth = {-1, 0.5, 0.2};

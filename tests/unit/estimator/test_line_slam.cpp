@@ -64,17 +64,9 @@ void begin(int method, bool rejoin = false) {
   for (ghost &g : ghosts) g.until_s = -1;
   next_ghost = 1000;
   fused = refused = waiting = told = lies = 0;
-  sensor = {};
-  std::strcpy(sensor.name, "omni");
+  sensor = make::sensor("omni", kSigma, NAN);
   sensor.mounting.rpy_rad[1] = -wm::kHalfPi;  // looks up: bearings are azimuths
-  sensor.bearing_sigma_rad = kSigma;
-  sensor.range_sigma_m = std::numeric_limits<double>::quiet_NaN();
-  sensor.max_range_m = INFINITY;
-  setup = {};
-  setup.motion = &motion;
-  setup.wheels = make::no_wheels();
-  setup.sensors = &sensor;
-  setup.sensor_count = 1;
+  setup = make::setup(motion, sensor);
   setup.start = {WM_TIME_NONE, {2, 0, 0}, {0, 0, 0, 1}, wm::kHalfPi, 0.001, 0.001};
   const char *why = "";
   const size_t bytes = slam->state_bytes(&params, &setup, &why);

@@ -3,7 +3,6 @@
 // errors as fresh believes the mean of many and is far too sure; one that is told so is not.
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
 
 #include "events.hpp"
 #include "filters/slam/params.h"
@@ -103,14 +102,8 @@ void setUp(void) {
   params.marker_sigma_m = kPlace_m;
   motion.noise_yaw_rate_radps = kGyro_radps * std::sqrt(0.02);
   motion.noise_yaw_rate_rel = 0;
-  sensor = {};
-  std::strcpy(sensor.name, "camera");
-  sensor.max_range_m = INFINITY;
-  setup = {};
-  setup.motion = &motion;
-  setup.wheels = make::no_wheels();
-  setup.sensors = &sensor;
-  setup.sensor_count = 1;
+  sensor = make::sensor("camera", NAN, NAN);
+  setup = make::setup(motion, sensor);
   setup.start = {WM_TIME_NONE, {2, 0, 0}, {0, 0, 0, 1}, wm::kHalfPi, 0.001, 0.001};
 }
 

@@ -38,17 +38,9 @@ void make_room() {
   params.range_scale_sigma = kPrior;
   params.sensor_yaw_sigma_rad = 0.05;
   motion.noise_yaw_rate_radps = 0.03;
-  sensor = {};
-  std::strcpy(sensor.name, "camera");
-  sensor.bearing_sigma_rad = 0.005;
-  sensor.range_sigma_m = 0.02;
-  sensor.max_range_m = INFINITY;
+  sensor = make::sensor("camera", 0.005, 0.02);
   sensor.range_is_depth = 1;
-  setup = {};
-  setup.motion = &motion;
-  setup.wheels = make::no_wheels();
-  setup.sensors = &sensor;
-  setup.sensor_count = 1;
+  setup = make::setup(motion, sensor);
   setup.start = {WM_TIME_NONE, {3, 0, 0}, {0, 0, 0, 1}, wm::kHalfPi, 0.05, 0.05};
 }
 
