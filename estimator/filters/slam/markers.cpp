@@ -44,26 +44,31 @@ wm_status check_marker(const wm_marker &m, size_t sensors) {
 // Levelled: along the sensor's yaw, on the floor. axis is (Ry(pitch) Rx(roll))', its columns are the sensor's axes.
 slam::marker_reading slam::read_marker(const wm_marker &m, const double p_m[3], double yaw_rad) const {
   const mounted_sensor &sensor = sensor_[m.sensor];
-  double level[3];
-  for (int i = 0; i < 3; i++)
-    level[i] = sensor.axis[0][i] * p_m[0] + sensor.axis[1][i] * p_m[1] + sensor.axis[2][i] * p_m[2];
   marker_reading r;
+  double *level = r.level, *told = r.told;
+  for (int i = 0; i < 3; i++)
+    told[i] = sensor.axis[0][i] * p_m[0] + sensor.axis[1][i] * p_m[1] + sensor.axis[2][i] * p_m[2];
+  // What is left of the camera's tilt, small turns about the levelled axes ahead and to the left.
+  const double roll = sensor_value(m.sensor, kRoll, 0.0), pitch = sensor_value(m.sensor, kPitch, 0.0);
+  level[0] = told[0] + pitch * told[2];
+  level[1] = told[1] - roll * told[2];
+  level[2] = told[2] + roll * told[1] - pitch * told[0];
   const double floor_m = std::sqrt(level[0] * level[0] + level[1] * level[1]);
   r.length_m = std::sqrt(level[0] * level[0] + level[1] * level[1] + level[2] * level[2]);
   r.along[0] = floor_m > 1e-6 ? level[0] / floor_m : 1.0;
   r.along[1] = floor_m > 1e-6 ? level[1] / floor_m : 0.0;
-  r.level[0] = level[0];
-  r.level[1] = level[1];
   r.yaw_rad = yaw_rad;
   const double across = params_.bearing_sigma_factor *
                         first_number(sensor.bearing_sigma_rad, params_.bearing_sigma_default_rad) * floor_m;
   const double range = params_.range_sigma_factor * first_number(sensor.range_sigma_m, params_.range_sigma_default_m);
   const double least = square(params_.marker_sigma_m) + square(params_.marker_sigma_rel * r.length_m);
   // The line of sight's share that lies on the floor.
-  const double along = r.length_m > 1e-6 ? m.along_sigma_m * floor_m / r.length_m : 0.0;
+  const double along = r.length_m > 1e-6 ? params_.range_sigma_factor * m.along_sigma_m * floor_m / r.length_m : 0.0;
   r.noise[0] = least + square(range) + square(along);
   r.noise[1] = least + square(across);
   r.noise[2] = square(m.yaw_sigma_rad > 0.0 ? m.yaw_sigma_rad : params_.marker_heading_sigma_rad);
+  const double up = r.length_m > 1e-6 ? params_.range_sigma_factor * m.along_sigma_m * level[2] / r.length_m : 0.0;
+  r.z_noise = least + square(across) + square(up);
   r.z_m = sensor.z_m + level[2];
   r.turned = true;
   return r;
@@ -181,6 +186,7 @@ void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past
   const double u[2] = {h.cos * dx + h.sin * dy, h.cos * dy - h.sin * dx};
   const double lever_x = from.x_m - past.pose.x_m, lever_y = from.y_m - past.pose.y_m;
   const int *states = sensor_state_[sensor];
+  double by_age[3];  // per s that the picture is older than its stamp says
   for (int k = 0; k < 2; k++) {
     const double a[2] = {k == 0 ? r.along[0] : -r.along[1], k == 0 ? r.along[1] : r.along[0]};
     const double scale = k == 0 ? errors.range_scale : 1.0;
@@ -191,10 +197,13 @@ void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past
     const double plain = a[0] * u[0] + a[1] * u[1];
     out->row[k].count = 0;
     add_pose(out->row[k], by, past, states[kTimeOffset]);
+    by_age[k] = by[0] * past.age_by[0] + by[1] * past.age_by[1] + by[2] * past.age_by[2];
     out->row[k].add(states[kYaw], turn);
     out->row[k].add(states[kMountX], -g[0] * base.cos - g[1] * base.sin);
     out->row[k].add(states[kMountY], g[0] * base.sin - g[1] * base.cos);
     if (k == 0) out->row[k].add(states[kRangeScale], plain);
+    out->row[k].add(states[kRoll], a[1] * r.told[2]);
+    out->row[k].add(states[kPitch], -a[0] * r.told[2]);
     out->by_landmark[k][0] = g[0];
     out->by_landmark[k][1] = g[1];
     out->by_landmark[k][2] = 0.0;
@@ -205,6 +214,7 @@ void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past
   const double by[3] = {0.0, 0.0, -1.0};
   out->row[2].count = 0;
   add_pose(out->row[2], by, past, states[kTimeOffset]);
+  by_age[2] = by[2] * past.age_by[2];
   out->row[2].add(states[kYaw], -1.0);
   out->by_landmark[2][0] = out->by_landmark[2][1] = 0.0;
   out->by_landmark[2][2] = 1.0;
@@ -212,8 +222,11 @@ void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past
   out->expected[2] = wrap(place[2] - from.heading_rad);
   out->innovation[2] = wrap(out->observed[2] - out->expected[2]);
 
+  for (int k = 0; k < 3; k++) {
+    const double moved = by_age[k] * params_.marker_stamp_sigma_s;
+    out->noise[k] = r.noise[k] + square(moved);
+  }
   // What lasts of the errors along and in heading is a state of this sensor and marker.
-  for (int k = 0; k < 3; k++) out->noise[k] = r.noise[k];
   if (lasting < 0 || !(params_.marker_lasting > 0.0)) return;
   for (int k = 0; k < 3; k += 2) {
     const int state = lasting + k / 2;
@@ -271,6 +284,7 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
   landmark_note &note = notes()[landmark];
   if (!note.surveyed) note.z_m += (r.z_m - note.z_m) / (note.seen + 1.0);
   note_fused(landmark, m.sensor);
+  level_camera(landmark, m.sensor, r);
 }
 
 // Paper, system 2, new marker: P_aa = G_x P G_x' + G_z R G_z' with all cross terms.
@@ -301,6 +315,7 @@ void slam::join_marker(const wm_marker &m, const marker_reading &r, const past_p
   if (!r.turned) noise[2][2] += square(kPi);
   const int landmark = note_landmark(m.id, joint_.add_landmark(rows, noise, place), m.sensor, joint_.now_ns());
   notes()[landmark].z_m = r.z_m;
+  level_camera(landmark, m.sensor, r);
   fused_ns_ = joint_.now_ns();
 }
 

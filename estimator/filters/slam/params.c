@@ -24,6 +24,9 @@ static const wm_param kParams[] = {
     F64("states.depth_axis_sigma_rad", depth_axis_sigma_rad, 0, 0, 1,
         "Start sigma of the angle from where a sensor's bearings are 0 to the axis along which its depths are measured "
         "(range_is: depth): a camera's middle column need not lie on its lens's axis. 0: off."),
+    F64("states.sensor_tilt_sigma_rad", sensor_tilt_sigma_rad, 0, 0, 1,
+        "For coded markers: start sigma of each camera's roll and of its pitch about calibration.yaml's, rad. Found by "
+        "how high a marker seems to hang from here and from there. 0: off."),
     BOOL("use.bearing", use_bearing, 1, "Fuse bearings."),
     BOOL("use.range", use_range, 1, "Fuse ranges. Without them landmarks join once their parallax suffices."),
     WM_SIGHTING_NOISE_PARAMS,
@@ -33,6 +36,8 @@ static const wm_param kParams[] = {
         "Noise of a marker's place, m; the sensor's sigmas, along and across, are added in squares."),
     F64("markers.sigma_rel", marker_sigma_rel, 0, 0, 1, "The same in parts of the distance."),
     F64("markers.heading_sigma_rad", marker_heading_sigma_rad, 0.02, 1e-5, 3, "Noise of a marker's heading, rad."),
+    F64("markers.stamp_sigma_s", marker_stamp_sigma_s, 0, 0, 1,
+        "How far a picture's stamp scatters, s: a robot that turns at 1 rad/s sees a marker that much rad beside."),
     F64("markers.lasting", marker_lasting, 0, 0, 0.99,
         "The part of a marker's sigma along the line of sight and in heading that is the same from one sighting of it "
         "to "

@@ -20,7 +20,7 @@ typedef struct wm_slam_params {
   double wheel_slip_sigma, wheel_slip_tau_s;  // the wheels' scales wander about their means
   // states, one of each kind a sensor; 0: off
   double sensor_yaw_sigma_rad, sensor_xy_sigma_m, sensor_time_offset_sigma_s;
-  double range_bias_sigma_m, range_scale_sigma, depth_axis_sigma_rad;
+  double range_bias_sigma_m, range_scale_sigma, depth_axis_sigma_rad, sensor_tilt_sigma_rad;
   // noise of one sighting
   int32_t use_bearing, use_range;
   double bearing_sigma_default_rad, range_sigma_default_m;
@@ -31,7 +31,7 @@ typedef struct wm_slam_params {
   double gate_soft, gate_hard;
   // coded markers
   int32_t markers;
-  double marker_sigma_m, marker_sigma_rel, marker_heading_sigma_rad, marker_lasting;
+  double marker_sigma_m, marker_sigma_rel, marker_heading_sigma_rad, marker_stamp_sigma_s, marker_lasting;
   // landmarks
   int32_t map, landmark_capacity;
   int32_t confirm_seen;

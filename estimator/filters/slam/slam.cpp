@@ -13,8 +13,8 @@
 namespace wm {
 namespace {
 
-constexpr const char *kSensorStateNames[] = {"yaw_rad",      "x_m",         "y_m",           "time_offset_s",
-                                             "range_bias_m", "range_scale", "depth_axis_rad"};
+constexpr const char *kSensorStateNames[] = {
+    "yaw_rad", "x_m", "y_m", "time_offset_s", "range_bias_m", "range_scale", "depth_axis_rad", "roll_rad", "pitch_rad"};
 constexpr double kOwnFrame_m = 1e-3, kOwnFrame_rad = 1e-3;  // the map begins where the robot starts
 constexpr double kSurveyed_m = 1e-4, kSurveyed_rad = 0.01;  // no map is better; headings come without a sigma
 const double kAbsent = std::numeric_limits<double>::quiet_NaN();
@@ -31,7 +31,8 @@ joint_state::wheel_slip slip_of(const wm_slam_params &p) { return {p.wheel_slip_
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
   const int each_sensor = (p.sensor_yaw_sigma_rad > 0.0) + 2 * (p.sensor_xy_sigma_m > 0.0) +
                           (p.sensor_time_offset_sigma_s > 0.0) + (p.range_bias_sigma_m > 0.0) +
-                          (p.range_scale_sigma > 0.0) + (p.depth_axis_sigma_rad > 0.0);
+                          (p.range_scale_sigma > 0.0) + (p.depth_axis_sigma_rad > 0.0) +
+                          2 * (p.sensor_tilt_sigma_rad > 0.0);
   return kPoseStates + joint_state::count_motion_states(p.motion, slip_of(p)) + each_sensor * (int)setup.sensor_count +
          p.lasting_slots * lasting_states(p);
 }
@@ -105,6 +106,8 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
     sensor_state_[i][kRangeBias] = add(0.0, params.range_bias_sigma_m);
     sensor_state_[i][kRangeScale] = add(1.0, params.range_scale_sigma);
     sensor_state_[i][kDepthAxis] = add(0.0, params.depth_axis_sigma_rad);
+    sensor_state_[i][kRoll] = add(0.0, params.sensor_tilt_sigma_rad);
+    sensor_state_[i][kPitch] = add(0.0, params.sensor_tilt_sigma_rad);
   }
   lasting_bearing_offset_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
   lasting_range_offset_ =
@@ -202,7 +205,7 @@ void slam::load_map() {
     const double place[3] = {l.p_m[0], l.p_m[1], turned ? wrap(l.yaw_rad) : 0.0};
     const joint_row rows[3] = {};
     const int landmark = joint_.add_landmark(rows, noise, place);
-    notes()[landmark] = {l.id, 0, WM_TIME_NONE, WM_TIME_NONE, l.p_m[2], 0, 1, -1, WM_TIME_NONE};
+    notes()[landmark] = {l.id, 0, WM_TIME_NONE, WM_TIME_NONE, l.p_m[2], 0, 1, -1, WM_TIME_NONE, {}, 0.0};
   }
 }
 
@@ -351,7 +354,7 @@ void slam::look_after(wm_time_ns t_ns) {
 }
 
 int slam::note_landmark(int32_t id, int landmark, int sensor, wm_time_ns t_ns) {
-  notes()[landmark] = {id, 1, t_ns, t_ns, 0.0, 0, 0, sensor, WM_TIME_NONE};
+  notes()[landmark] = {id, 1, t_ns, t_ns, 0.0, 0, 0, sensor, WM_TIME_NONE, {}, 0.0};
   counts_.joined++;
   return landmark;
 }

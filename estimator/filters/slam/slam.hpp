@@ -24,6 +24,8 @@ struct landmark_note {
   int32_t surveyed;       // from the map that was given: it doesn't leave
   int32_t sensor;         // that saw it last
   wm_time_ns doubted_ns;  // a sighting that would have moved much was kept back
+  // Of a coded marker, with states for tilt: where it was in the camera's levelled axes, the mean of so many sightings.
+  double levelled_m[3], levelled;
 };
 
 struct slam_counts {
@@ -65,7 +67,18 @@ class slam {
   uint32_t motion_health() const { return joint_.motion_health(); }
 
  private:
-  enum sensor_state { kYaw, kMountX, kMountY, kTimeOffset, kRangeBias, kRangeScale, kDepthAxis, kSensorStates };
+  enum sensor_state {
+    kYaw,
+    kMountX,
+    kMountY,
+    kTimeOffset,
+    kRangeBias,
+    kRangeScale,
+    kDepthAxis,
+    kRoll,
+    kPitch,
+    kSensorStates
+  };
 
   // The pose when a sighting was true, `age` before its stamp, and what moves it.
   struct past_pose {
@@ -91,9 +104,11 @@ class slam {
 
   // A marker, levelled: along the sensor's yaw, on the floor.
   struct marker_reading {
-    double level[2], along[2];  // place; unit vector towards it
+    double level[3], along[2];  // place; unit vector towards it on the floor
+    double told[3];             // the place as calibration.yaml has the camera's roll and pitch
     double yaw_rad, z_m;
     double noise[3];  // along, across, heading
+    double z_noise;   // of its height
     double length_m;
     bool turned;  // its heading is one, not one of two
   };
@@ -151,6 +166,7 @@ class slam {
                          wm_innovation blank, record_list records);
   void join_marker(const wm_marker &m, const marker_reading &r, const past_pose &past, wm_innovation blank,
                    record_list records);
+  void level_camera(int landmark, int sensor, const marker_reading &r);
   bool find_start(int landmark, const wm_marker &m, const marker_reading &r);
   void note_fused(int landmark, int sensor);
   bool believable(int landmark, const joint_state::innovation_block &block, double noise, double scale);

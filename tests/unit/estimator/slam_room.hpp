@@ -33,7 +33,9 @@ inline wm_random noise;
 inline wm_pose2 truth;
 inline double now_s;
 inline double false_share;  // of sightings that are of nothing
-inline bool hidden, twice, nameless, coded, two_poses;
+inline bool hidden, twice, nameless, coded, two_poses, two_heights;
+inline double leans[2];            // coded: the camera's roll and pitch beyond what calibration.yaml says
+inline wm_innovation last;         // what became of the last sighting, its last number
 inline int fused, rejected, twin;  // twin: 0, or where a second print of the first identity hangs
 
 inline double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
@@ -58,7 +60,8 @@ inline void make_room() {
   truth = {2, 0, wm::kHalfPi};
   noise = {42, 1, 0};
   now_s = false_share = 0.0;
-  hidden = twice = nameless = coded = two_poses = false;
+  hidden = twice = nameless = coded = two_poses = two_heights = false;
+  leans[0] = leans[1] = 0.0;
   fused = rejected = twin = 0;
 }
 
@@ -76,6 +79,7 @@ inline wm_verdict see(const wm_event &e) {
   size_t count = 0;
   TEST_ASSERT_EQUAL(WM_OK, slam->correct(state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
   TEST_ASSERT_GREATER_THAN(0, count);
+  last = out[count - 1];
   (out[0].verdict == WM_FUSED ? fused : rejected)++;
   return (wm_verdict)out[0].verdict;
 }
@@ -108,8 +112,9 @@ inline void drive(double seconds, bool range = true) {
         const double r = wrong ? 1.0 + 5.0 * wm_random_next_uniform(&noise) : distance + gauss(0.03);
         if (coded) {
           wm_event seen = make::empty(now_s, WM_EVENT_MARKER);
-          seen.as.marker =
-              marker(10 + i, r * wm::cos(b), r * wm::sin(b), 2.2, wm::wrap(0.5 * i - truth.heading_rad + gauss(0.01)));
+          const double x = r * wm::cos(b), y = r * wm::sin(b), z = two_heights && i % 3 == 0 ? 0.6 : 2.2;
+          seen.as.marker = marker(10 + i, x - leans[1] * z, y + leans[0] * z, z - leans[0] * y + leans[1] * x,
+                                  wm::wrap(0.5 * i - truth.heading_rad + gauss(0.01)));
           if (two_poses) {  // the wrong one first, turned to the other side of the line of sight
             wm_marker &m = seen.as.marker;
             m.poses = 2;

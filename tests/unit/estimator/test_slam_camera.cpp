@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// A camera that sees coded markers and is not quite what calibration.yaml says.
+#include "slam_room.hpp"
+
+using namespace room;
+
+namespace {
+
+// Markers hang at two heights, and the camera leans by two degrees.
+double worst_of_leaning(double sigma_rad) {
+  coded = two_heights = true;
+  leans[0] = 0.03;
+  leans[1] = -0.04;
+  params.markers = 1;
+  params.sensor_tilt_sigma_rad = sigma_rad;
+  begin();
+  drive(60);
+  size_t found = 0;
+  const double worst = worst_landmark(&found);
+  TEST_ASSERT_EQUAL(kCount, found);
+  return worst;
+}
+
+void test_a_camera_that_leans_is_found_by_how_high_markers_seem_to_hang(void) {
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_of_leaning(0.05));
+  TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[0], counted("camera.roll_rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[1], counted("camera.pitch_rad"));
+}
+
+void test_taken_for_level_it_bends_the_map(void) { TEST_ASSERT_GREATER_THAN_DOUBLE(0.06, worst_of_leaning(0)); }
+
+// A turn of 0.25 rad/s and a stamp that is off by 0.2 s: 0.05 rad.
+void test_stamps_that_scatter_matter_where_it_turns(void) {
+  double variance[2];
+  for (int i = 0; i < 2; i++) {
+    make_room();
+    coded = true;
+    params.markers = 1;
+    params.marker_stamp_sigma_s = 0.2 * i;
+    begin();
+    drive(0.5);
+    TEST_ASSERT_EQUAL(WM_RESIDUAL_HEADING, last.residual);
+    variance[i] = last.variance;
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(0.3 * 0.05 * 0.05, 0.05 * 0.05, variance[1] - variance[0]);
+}
+
+}  // namespace
+
+void setUp(void) { make_room(); }
+void tearDown(void) { leave_room(); }
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_a_camera_that_leans_is_found_by_how_high_markers_seem_to_hang);
+  RUN_TEST(test_taken_for_level_it_bends_the_map);
+  RUN_TEST(test_stamps_that_scatter_matter_where_it_turns);
+  return UNITY_END();
+}
