@@ -80,7 +80,9 @@ static const char *fill_sighting(const csv_row *row, uint16_t sensor, wm_event *
                                    .bearing_rad = wrapped(bearing_rad),
                                    .range_m = range_m,
                                    .bearing_sigma_rad = (double)NAN,
-                                   .range_sigma_m = (double)NAN};
+                                   .range_sigma_m = (double)NAN,
+                                   .elevation_rad = (double)NAN,
+                                   .elevation_sigma_rad = (double)NAN};
   return NULL;
 }
 

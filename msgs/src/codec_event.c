@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <math.h>
+
 #include "waymark/bytes.h"
 #include "waymark/codec.h"
 
-#define EVENT_VERSION 3
+#define EVENT_VERSION 4
+#define WITHOUT_ELEVATION 3  // the version before, which is read, too
 
 static void put_payload(wm_writer *w, const wm_event *e) {
   switch ((wm_event_kind)e->kind) {
@@ -33,6 +36,8 @@ static void put_payload(wm_writer *w, const wm_event *e) {
       wm_put_f64(w, e->as.sighting.range_m);
       wm_put_f64(w, e->as.sighting.bearing_sigma_rad);
       wm_put_f64(w, e->as.sighting.range_sigma_m);
+      wm_put_f64(w, e->as.sighting.elevation_rad);
+      wm_put_f64(w, e->as.sighting.elevation_sigma_rad);
       break;
     case WM_EVENT_POSITION:
       wm_put_f64s(w, e->as.position.p_m, 3);
@@ -124,7 +129,7 @@ static void get_points(wm_reader *r, wm_points *p) {
   }
 }
 
-static void get_payload(wm_reader *r, wm_event *e) {
+static void get_payload(wm_reader *r, unsigned version, wm_event *e) {
   switch ((wm_event_kind)e->kind) {
     case WM_EVENT_QUANTITIES: get_quantities(r, &e->as.quantities); break;
     case WM_EVENT_TWIST2:
@@ -142,6 +147,8 @@ static void get_payload(wm_reader *r, wm_event *e) {
       e->as.sighting.range_m = wm_get_f64(r);
       e->as.sighting.bearing_sigma_rad = wm_get_f64(r);
       e->as.sighting.range_sigma_m = wm_get_f64(r);
+      e->as.sighting.elevation_rad = version == WITHOUT_ELEVATION ? (double)NAN : wm_get_f64(r);
+      e->as.sighting.elevation_sigma_rad = version == WITHOUT_ELEVATION ? (double)NAN : wm_get_f64(r);
       break;
     case WM_EVENT_POSITION:
       wm_get_f64s(r, e->as.position.p_m, 3);
@@ -186,14 +193,15 @@ static void get_payload(wm_reader *r, wm_event *e) {
 wm_status wm_event_decode(const void *data, size_t size, wm_event *out, size_t *used) {
   memset(out, 0, WM_EVENT_SMALL_BYTES);
   wm_reader r = wm_reader_of(data, size);
-  if (wm_get_u8(&r) != EVENT_VERSION) r.bad = 1;
+  const unsigned version = wm_get_u8(&r);
+  if (version != EVENT_VERSION && version != WITHOUT_ELEVATION) r.bad = 1;
   out->kind = wm_get_u8(&r);
   if (out->kind == WM_EVENT_NONE || out->kind >= WM_EVENT_KIND_COUNT) r.bad = 1;
   out->source = wm_get_u16(&r);
   out->seq = wm_get_u32(&r);
   out->t_ns = wm_get_i64(&r);
   out->arrival_ns = wm_get_i64(&r);
-  if (!r.bad) get_payload(&r, out);
+  if (!r.bad) get_payload(&r, version, out);
   *used = r.used;
   return r.bad ? WM_BAD_DATA : WM_OK;
 }

@@ -145,6 +145,8 @@ size_t wm_lcm_observations(const char *sensor_name, const wm_event *sightings, s
     m.landmark_id[i] = s->landmark_id;
     m.bearing_rad[i] = s->bearing_rad;
     m.range_m[i] = s->range_m;
+    m.elevation_rad[i] = s->elevation_rad;
+    m.elevation_sigma_rad[i] = s->elevation_sigma_rad;
   }
   return written(waymark_observations_t_encode(out, 0, room(capacity), &m));
 }

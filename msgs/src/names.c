@@ -17,7 +17,8 @@ static const char *const kQuantities[] = {"wheel_ticks_left",       "wheel_ticks
                                           "steering_wheel",         "road_wheel",
                                           "steering_actuator",      "gear"};
 static const char *const kStates[] = {"searching", "tracking", "dead_reckoning", "lost"};
-static const char *const kResiduals[] = {"bearing", "range", "x", "y", "z", "heading", "standstill", "pixel"};
+static const char *const kResiduals[] = {"bearing", "range",      "x",     "y",        "z",
+                                         "heading", "standstill", "pixel", "elevation"};
 static const char *const kVerdicts[] = {"fused",      "gate",     "unknown_id", "no_association", "out_of_range",
                                         "not_finite", "singular", "searching",  "by_config"};
 static const char *const kDeviceStates[] = {"",        "works",   "absent", "down", "error-passive",

@@ -87,6 +87,8 @@ class landmark_drive {
                         std::remainder(std::atan2(dy, dx) - turn, 6.283185307179586),
                         range_ ? std::hypot(dx, dy) : kAbsent,
                         kAbsent,
+                        kAbsent,
+                        kAbsent,
                         kAbsent};
     return {twist, seen};
   }

@@ -104,7 +104,7 @@ wm_event event_at(uint64_t i, double t_s) {
   } else if (u < 0.85) {
     e.kind = WM_EVENT_SIGHTING;
     const wm_landmark &l = landmarks[i % 4];
-    e.as.sighting = {0, l.id, 0.3 * a, u < 0.7 ? 4 + std::fabs(b) : kAbsent, kAbsent, kAbsent};
+    e.as.sighting = {0, l.id, 0.3 * a, u < 0.7 ? 4 + std::fabs(b) : kAbsent, kAbsent, kAbsent, kAbsent, kAbsent};
   } else if (u < 0.93) {
     e.kind = WM_EVENT_POSITION;
     e.as.position = {{2 * a, 2 * b, NAN}, 3.0, NAN};
@@ -240,21 +240,21 @@ void test_nonsense_is_refused_with_a_status_and_changes_nothing(void) {
     assert_refused(a, e, want);
     if (std::isnan(x)) continue;
     e.kind = WM_EVENT_SIGHTING;
-    e.as.sighting = {0, landmarks[0].id, x, 1, NAN, NAN};
+    e.as.sighting = {0, landmarks[0].id, x, 1, NAN, NAN, NAN, NAN};
     assert_refused(a, e, want);
-    e.as.sighting = {0, landmarks[0].id, 0, x, NAN, NAN};
+    e.as.sighting = {0, landmarks[0].id, 0, x, NAN, NAN, NAN, NAN};
     assert_refused(a, e, want);
   }
   wm_event e{};
   e.t_ns = t;
   e.kind = WM_EVENT_SIGHTING;
-  e.as.sighting = {0, landmarks[0].id, NAN, NAN, NAN, NAN};
+  e.as.sighting = {0, landmarks[0].id, NAN, NAN, NAN, NAN, NAN, NAN};
   assert_refused(a, e, WM_NOT_FINITE);
-  e.as.sighting = {77, landmarks[0].id, 0, 1, NAN, NAN};
+  e.as.sighting = {77, landmarks[0].id, 0, 1, NAN, NAN, NAN, NAN};
   assert_refused(a, e, WM_OUT_OF_RANGE);
-  e.as.sighting = {0, landmarks[0].id, 0, -1, NAN, NAN};
+  e.as.sighting = {0, landmarks[0].id, 0, -1, NAN, NAN, NAN, NAN};
   assert_refused(a, e, WM_OUT_OF_RANGE);
-  e.as.sighting = {0, landmarks[0].id, 0, 1, -0.1, NAN};
+  e.as.sighting = {0, landmarks[0].id, 0, 1, -0.1, NAN, NAN, NAN};
   assert_refused(a, e, WM_OUT_OF_RANGE);
   e.kind = WM_EVENT_SET_POSE;
   e.as.set_pose = {{{0, 0, 0}, {0, 0, 0, 0}}, 1, 1};

@@ -28,11 +28,12 @@ constexpr double kHidden_rad = 1.5 * M_PI / 180;  // the mounting's error is in 
 struct Seen {
   int64_t id;
   double bearing_rad, sigma_rad;
+  double elevation_rad, elevation_sigma_rad;  // NaN where not told
 };
 
 struct Label {
   int64_t id;
-  double bearing_rad, shorter_px;
+  double bearing_rad, elevation_rad, shorter_px;
 };
 
 struct Panel {
@@ -42,6 +43,7 @@ struct Panel {
 struct Counts {
   int64_t pictures = 0, labelled = 0, large = 0, found = 0, found_large = 0, seen = 0, right = 0, wrong = 0, hidden = 0;
   std::vector<double> off_deg, normalised;
+  std::vector<double> up_off_deg, up_normalised;  // the elevations'
 };
 
 // Whether recall is of landmarks of this panel's size.
@@ -53,6 +55,8 @@ bool is_wanted(const Panel &panel, const std::vector<double> &sizes_m) {
 }
 
 double bearing_of(const Vector3d &optical) { return std::atan2(-optical.x(), optical.z()); }
+
+double elevation_of(const Vector3d &optical) { return std::atan2(-optical.y(), std::hypot(optical.x(), optical.z())); }
 
 // What the sensor of the camera's name said, by stamp.
 std::map<int64_t, std::vector<Seen>> load_seen(const fs::path &run, const std::string &camera) {
@@ -66,9 +70,11 @@ std::map<int64_t, std::vector<Seen>> load_seen(const fs::path &run, const std::s
   while (const wm_event *next = log.next()) {
     const wm_event &event = *next;
     if (event.kind == WM_EVENT_SIGHTING && event.as.sighting.sensor == sensor &&
-        std::isfinite(event.as.sighting.bearing_rad))
-      out[event.t_ns].push_back(
-          {event.as.sighting.landmark_id, event.as.sighting.bearing_rad, event.as.sighting.bearing_sigma_rad});
+        std::isfinite(event.as.sighting.bearing_rad)) {
+      const wm_sighting &s = event.as.sighting;
+      const double up_rad = wm_sighting_has_elevation(&s) ? s.elevation_rad : std::nan("");
+      out[event.t_ns].push_back({s.landmark_id, s.bearing_rad, s.bearing_sigma_rad, up_rad, s.elevation_sigma_rad});
+    }
   }
   return out;
 }
@@ -139,7 +145,7 @@ std::map<int64_t, std::vector<Label>> load_labels(const fs::path &recording, siz
     if (stamp == stamps.end() || panel == panels.end() || !is_within(truth, stamp->second) ||
         !render::unproject(camera, {csv.number(row, u), csv.number(row, v)}, ray))
       continue;
-    Label label{csv.integer(row, id), bearing_of(ray), 0};
+    Label label{csv.integer(row, id), bearing_of(ray), elevation_of(ray), 0};
     double bearing = 0;
     (void)by_truth(camera, pose_at(truth, stamp->second), panel->second, &label.shorter_px, &bearing);
     out[stamp->first].push_back(label);
@@ -204,6 +210,10 @@ void judge_camera(const fs::path &run, const fs::path &recording, size_t index, 
         found[label->id] = true;
         n->off_deg.push_back(off * 180 / M_PI);
         if (s.sigma_rad > 0) n->normalised.push_back(off / s.sigma_rad);
+        if (!std::isfinite(s.elevation_rad)) continue;
+        const double up_off = s.elevation_rad - label->elevation_rad;
+        n->up_off_deg.push_back(up_off * 180 / M_PI);
+        if (s.elevation_sigma_rad > 0) n->up_normalised.push_back(up_off / s.elevation_sigma_rad);
       }
     for (const Label &l : wanted) {
       if (!is_wanted(panels.at(l.id), sizes_m)) continue;
@@ -219,6 +229,22 @@ void judge_camera(const fs::path &run, const fs::path &recording, size_t index, 
 nlohmann::ordered_json share(int64_t part, int64_t whole) {
   if (whole == 0) return nullptr;
   return static_cast<double>(part) / static_cast<double>(whole);
+}
+
+// Mean, RMS and 95 % of one angle's errors, and of these over their sigmas; null where there are none.
+void add_angle(const std::vector<double> &off_deg, const std::vector<double> &normalised, const std::string &name,
+               const std::string &over_sigma, Figures *f) {
+  std::vector<double> sizes;
+  for (const double off : off_deg) sizes.push_back(std::fabs(off));
+  const auto put = [f](const std::string &key, bool there, const auto &value) {
+    (*f)[key] = nullptr;
+    if (there) (*f)[key] = value();
+  };
+  put(name + "_mean_deg", !off_deg.empty(), [&] { return mean(off_deg); });
+  put(name + "_rms_deg", !off_deg.empty(), [&] { return rms(off_deg); });
+  put(name + "_p95_deg", !off_deg.empty(), [&] { return percentile(sizes, 95); });
+  put(over_sigma + "_mean", !normalised.empty(), [&] { return mean(normalised); });
+  put(over_sigma + "_rms", !normalised.empty(), [&] { return rms(normalised); });
 }
 
 }  // namespace
@@ -250,19 +276,8 @@ Figures evaluate_landmarks(const DetectorArguments &a, double size_min_px, const
   f["precision"] = share(n.right, n.right + n.wrong);
   f["recall"] = share(n.found_large, n.large);
   f["recall_of_all"] = share(n.found, n.labelled);
-  for (const char *key :
-       {"bearing_mean_deg", "bearing_rms_deg", "bearing_p95_deg", "normalised_mean", "normalised_rms"})
-    f[key] = nullptr;
-  if (n.off_deg.empty()) return f;
-  std::vector<double> sizes;
-  for (const double off : n.off_deg) sizes.push_back(std::fabs(off));
-  f["bearing_mean_deg"] = mean(n.off_deg);
-  f["bearing_rms_deg"] = rms(n.off_deg);
-  f["bearing_p95_deg"] = percentile(sizes, 95);
-  if (!n.normalised.empty()) {
-    f["normalised_mean"] = mean(n.normalised);
-    f["normalised_rms"] = rms(n.normalised);
-  }
+  add_angle(n.off_deg, n.normalised, "bearing", "normalised", &f);
+  add_angle(n.up_off_deg, n.up_normalised, "elevation", "elevation_normalised", &f);
   return f;
 }
 
@@ -273,15 +288,21 @@ std::string landmark_table(const Figures &f, const std::string &title) {
     std::snprintf(text, sizeof text, format, f[key].get<double>());
     return std::string(text);
   };
+  const auto angle = [&](const char *title_of, const std::string &name, const std::string &over_sigma) {
+    return "  " + std::string(title_of) + " RMS " + number((name + "_rms_deg").c_str(), "%.4f") + ", mean " +
+           number((name + "_mean_deg").c_str(), "%.4f") + ", 95 % below " +
+           number((name + "_p95_deg").c_str(), "%.4f") + " degrees; against its own sigma: RMS " +
+           number((over_sigma + "_rms").c_str(), "%.3f") + ", mean " + number((over_sigma + "_mean").c_str(), "%.3f") +
+           "\n";
+  };
   const auto count = [&](const char *key) { return std::to_string(f[key].get<int64_t>()); };
   return title + ": known landmarks in " + count("pictures") + " labelled pictures\n\n  seen      " + count("seen") +
          ": " + count("right") + " right, " + count("false") + " false, " + count("on_hidden") +
          " partly hidden; precision " + number("precision", "%.3f") + "\n  labelled  " + count("labelled_large") +
          " with " + number("size_min_px", "%.0f") + " px and more: recall " + number("recall", "%.3f") + "; of all " +
-         count("labelled") + " " + number("recall_of_all", "%.3f") + "\n  bearing   RMS " +
-         number("bearing_rms_deg", "%.4f") + ", mean " + number("bearing_mean_deg", "%.4f") + ", 95 % below " +
-         number("bearing_p95_deg", "%.4f") + " degrees; against its own sigma: RMS " +
-         number("normalised_rms", "%.3f") + ", mean " + number("normalised_mean", "%.3f") + "\n";
+         count("labelled") + " " + number("recall_of_all", "%.3f") + "\n" +
+         angle("bearing  ", "bearing", "normalised") +
+         (f["elevation_rms_deg"].is_number() ? angle("elevation", "elevation", "elevation_normalised") : "");
 }
 
 }  // namespace wm::tools

@@ -46,7 +46,7 @@ struct Unit {
 };
 
 Unit unit_of(const std::string &residual, double largest) {
-  if (residual == "bearing" || residual == "heading") return {180 / M_PI, "°"};
+  if (residual == "bearing" || residual == "elevation" || residual == "heading") return {180 / M_PI, "°"};
   if (residual == "pixel") return {1, "px"};
   if (residual == "standstill") return {1, ""};
   if (largest < 2) return {100, "cm"};

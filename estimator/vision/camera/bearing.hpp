@@ -25,6 +25,13 @@ inline double sensor_bearing(const mounted_camera &camera, bool steep, const vec
   return wrap(atan2(r.y, r.x) - yaw);
 }
 
+// The angle of that ray above the plane in which its bearing is measured.
+inline double sensor_elevation(const mounted_camera &camera, bool steep, const vec3 &ray) {
+  if (!steep) return atan2(-ray.y, std::sqrt(ray.x * ray.x + ray.z * ray.z));
+  const vec3 r = camera.R_base_optical * ray;
+  return atan2(r.z, std::sqrt(r.x * r.x + r.y * r.y));
+}
+
 // When the row of a pixel was exposed; a frame's stamp is that of its middle row.
 inline wm_time_ns time_of_row(wm_time_ns middle_ns, double v_px, uint32_t height_px, wm_time_ns readout_ns) {
   const double row = (v_px - 0.5 * (height_px - 1)) / (height_px - 1);

@@ -155,7 +155,9 @@ bool put(const cascade_state &self, const wm_frame &frame, const window_hit &see
                       sensor_bearing(self.camera, self.steep, ray),
                       range_m,
                       std::sqrt(square(p.sigma_px * self.pixel_rad) + square(p.sigma_size * seen.width)),
-                      p.sigma_range * range_m};
+                      p.sigma_range * range_m,
+                      sensor_elevation(self.camera, self.steep, ray),
+                      std::sqrt(square(p.sigma_px * self.pixel_rad) + square(p.sigma_size * seen.height))};
   return true;
 }
 

@@ -126,6 +126,10 @@ double bearing_of(const landmarks_state &self, const vec3 &ray) {
   return sensor_bearing(self.eye.camera, self.steep, ray);
 }
 
+double elevation_of(const landmarks_state &self, const vec3 &ray) {
+  return sensor_elevation(self.eye.camera, self.steep, ray);
+}
+
 bool put(const landmarks_state &self, const wm_frame &frame, const camera_guess &guess, const candidate &one,
          const sight &seen, wm_event *out) {
   constexpr double kStep_px = 0.5;
@@ -138,15 +142,27 @@ bool put(const landmarks_state &self, const wm_frame &frame, const camera_guess 
     return false;
   const double by_u = wrap(bearing_of(self, right) - bearing_of(self, left)) / (2 * kStep_px),
                by_v = wrap(bearing_of(self, below) - bearing_of(self, above)) / (2 * kStep_px);
+  const double up_by_u = (elevation_of(self, right) - elevation_of(self, left)) / (2 * kStep_px),
+               up_by_v = (elevation_of(self, below) - elevation_of(self, above)) / (2 * kStep_px);
   // Drawn from a heading that is off, its nearer half is too wide or too narrow, and its middle elsewhere.
   const double bent = square(0.5 * one.what->width_m / one.view.distance);
-  const double variance =
-      by_u * by_u * seen.uu + 2 * by_u * by_v * seen.uv + by_v * by_v * seen.vv + bent * bent * guess.cov[2][2];
-  if (!(variance > 0)) return false;
+  const auto variance_by = [&seen](double u, double v) {
+    return u * u * seen.uu + 2 * u * v * seen.uv + v * v * seen.vv;
+  };
+  const double variance = variance_by(by_u, by_v) + bent * bent * guess.cov[2][2],
+               up_variance = variance_by(up_by_u, up_by_v);
+  if (!(variance > 0) || !(up_variance > 0)) return false;
   std::memset(static_cast<void *>(out), 0, WM_EVENT_SMALL_BYTES);
   out->t_ns = time_of_row(frame.t_ns, seen.at.v, frame.height_px, self.readout_ns);
   out->kind = WM_EVENT_SIGHTING;
-  out->as.sighting = {0, one.what->id, bearing_of(self, ray), kNan, std::sqrt(variance), kNan};
+  out->as.sighting = {0,
+                      one.what->id,
+                      bearing_of(self, ray),
+                      kNan,
+                      std::sqrt(variance),
+                      kNan,
+                      elevation_of(self, ray),
+                      std::sqrt(up_variance)};
   return true;
 }
 

@@ -104,6 +104,8 @@ void put(const lines_state &self, const line_track &track, wm_time_ns t_ns, wm_e
                       bearing_of(self, edge.azimuth_rad),
                       std::numeric_limits<double>::quiet_NaN(),
                       edge.sigma_rad,
+                      std::numeric_limits<double>::quiet_NaN(),
+                      std::numeric_limits<double>::quiet_NaN(),
                       std::numeric_limits<double>::quiet_NaN()};
 }
 

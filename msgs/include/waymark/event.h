@@ -75,7 +75,9 @@ typedef struct wm_twist6 {
   double v_mps[3], w_radps[3];
 } wm_twist6;
 
-// Bearing positive to the left of the sensor's x axis. NaN where absent; not both absent.
+// Bearing positive to the left of the sensor's x axis; NaN where absent, as the range is; not both absent. Elevation
+// above the sensor's xy plane (of a sensor that looks up or down: above the level, as its bearing is the azimuth), with
+// the same ray as the bearing. There is one where it isn't NaN and its sigma is above 0: an event of zeros has none.
 typedef struct wm_sighting {
   uint16_t sensor;      // index into wm_setup.sensors
   int32_t landmark_id;  // the map's id, or -1 where unknown
@@ -83,6 +85,8 @@ typedef struct wm_sighting {
   double range_m;
   double bearing_sigma_rad;  // NaN: the sensor's own
   double range_sigma_m;      // NaN: the sensor's own
+  double elevation_rad;
+  double elevation_sigma_rad;  // of the elevation in the sensor, without the mounting's tilt; 0 or NaN: there is none
 } wm_sighting;
 
 typedef struct wm_position {
@@ -164,6 +168,12 @@ typedef struct wm_event {
 
 // Bytes of `event` that carry something: copy this many, from a ring or to one. Constant cost. Any thread.
 size_t wm_event_bytes(const wm_event *event);
+
+// Whether a sighting tells an elevation; it may be absurd.
+static inline int wm_sighting_has_elevation(const wm_sighting *s) {
+  return s->elevation_rad == s->elevation_rad && s->elevation_sigma_rad == s->elevation_sigma_rad &&
+         s->elevation_sigma_rad != 0.0;
+}
 
 static inline int wm_event_is_motion(const wm_event *event) {
   return event->kind < 32 && ((WM_MOTION_EVENTS >> event->kind) & 1u);

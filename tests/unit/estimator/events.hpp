@@ -40,7 +40,7 @@ inline wm_event quantities(double t_s, std::initializer_list<std::pair<wm_quanti
 
 inline wm_event sighting(double t_s, int32_t id, double bearing, double range, uint16_t sensor = 0) {
   wm_event e = empty(t_s, WM_EVENT_SIGHTING);
-  e.as.sighting = {sensor, id, bearing, range, NAN, NAN};
+  e.as.sighting = {sensor, id, bearing, range, NAN, NAN, NAN, NAN};
   return e;
 }
 

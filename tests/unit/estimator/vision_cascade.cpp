@@ -116,6 +116,7 @@ void squares_are_found() {
       const double off = s.bearing_rad - wm::sensor_bearing(camera, false, ray);
       if (std::fabs(off) > 3 * s.bearing_sigma_rad) continue;
       same++;
+      TEST_ASSERT_DOUBLE_WITHIN(3 * s.elevation_sigma_rad, wm::sensor_elevation(camera, false, ray), s.elevation_rad);
       TEST_ASSERT_DOUBLE_WITHIN(3 * s.range_sigma_m, std::hypot(q.distance_m, q.up_m), s.range_m);
       const double t_s = 1 + 0.03 * (at.v - 149.5) / 299;
       TEST_ASSERT_INT64_WITHIN(1'000'000, static_cast<int64_t>(1e9 * t_s), events[i].t_ns);

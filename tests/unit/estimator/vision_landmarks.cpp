@@ -143,20 +143,30 @@ struct Eyes {
   }
 };
 
-// By the calibration's own geometry: the angle to the left of the camera's axis.
-double true_bearing(const Place &at) {
+// By the calibration's own geometry: the landmark in the camera's optical axes.
+wm::vec3 true_ray(const Place &at) {
   wm::mounted_camera camera;
   TEST_ASSERT_NULL(wm::mounted_camera_init(&camera, rig.cameras[0]));
   const double c = std::cos(at.heading_rad), s = std::sin(at.heading_rad);
   const double dx = landmark.p_m[0] - at.x_m, dy = landmark.p_m[1] - at.y_m;
   const wm::vec3 base = {c * dx + s * dy, c * dy - s * dx, landmark.p_m[2]};
-  const wm::vec3 r = wm::transposed_times(camera.R_base_optical, base - camera.centre_m);
+  return wm::transposed_times(camera.R_base_optical, base - camera.centre_m);
+}
+
+// The angle to the left of the camera's axis, and above its xy plane.
+double true_bearing(const Place &at) {
+  const wm::vec3 r = true_ray(at);
   return std::atan2(-r.x, r.z);
+}
+
+double true_elevation(const Place &at) {
+  const wm::vec3 r = true_ray(at);
+  return std::atan2(-r.y, std::hypot(r.x, r.z));
 }
 
 void found_where_it_is_with_the_sigma_that_it_has() {
   const Eyes eyes;
-  double squares = 0, largest = 0;
+  double squares = 0, up_squares = 0, largest = 0;
   int count = 0;
   for (uint64_t i = 0; i < 24; i++) {
     const auto random = [i](uint64_t k) { return 2 * wm_random_uniform(9, k, i) - 1; };
@@ -172,14 +182,17 @@ void found_where_it_is_with_the_sigma_that_it_has() {
     TEST_ASSERT_EQUAL_INT64(5000, events[0].t_ns);
     const double off = std::remainder(seen.bearing_rad - true_bearing(at), 2 * M_PI);
     squares += off * off / (seen.bearing_sigma_rad * seen.bearing_sigma_rad);
-    largest = std::fmax(largest, std::fabs(off));
+    const double up_off = seen.elevation_rad - true_elevation(at);
+    up_squares += up_off * up_off / (seen.elevation_sigma_rad * seen.elevation_sigma_rad);
+    largest = std::fmax(largest, std::fmax(std::fabs(off), std::fabs(up_off)));
     count++;
   }
-  std::printf("found %d of 24, off by at most %.4f degrees, %.2f of its sigma\n", count, largest * 180 / M_PI,
-              std::sqrt(squares / count));
+  std::printf("found %d of 24, off by at most %.4f degrees, %.2f of its sigma, elevations %.2f\n", count,
+              largest * 180 / M_PI, std::sqrt(squares / count), std::sqrt(up_squares / count));
   TEST_ASSERT_GREATER_OR_EQUAL(22, count);
   TEST_ASSERT_TRUE(largest < 0.001);
   TEST_ASSERT_TRUE(std::sqrt(squares / count) < 1.3);
+  TEST_ASSERT_TRUE(std::sqrt(up_squares / count) < 1.3);
 }
 
 void what_is_not_there_is_not_found_and_said_why() {

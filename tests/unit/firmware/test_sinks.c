@@ -281,7 +281,8 @@ static void sightings_of_another_program_become_events(void) {
   wm_error err;
   uint8_t bytes[4096];
   wm_event seen[2] = {{.t_ns = 77}, {.t_ns = 77}};
-  seen[0].as.sighting = (wm_sighting){.landmark_id = 3, .bearing_rad = 3.5, .range_m = NAN};
+  seen[0].as.sighting = (wm_sighting){
+      .landmark_id = 3, .bearing_rad = 3.5, .range_m = NAN, .elevation_rad = -0.125, .elevation_sigma_rad = 0.01};
   seen[1].as.sighting = (wm_sighting){.landmark_id = -1, .bearing_rad = NAN, .range_m = 4};
   lcm_t *lcm = lcm_create("memq://");
   TEST_ASSERT_EQUAL(WM_OK, lcm_sightings_open("memq://", "T_", kEyes, 2, lcm, &source, &err));
@@ -297,6 +298,8 @@ static void sightings_of_another_program_become_events(void) {
     TEST_ASSERT_EQUAL_INT32(seen[i].as.sighting.landmark_id, event.as.sighting.landmark_id);
     if (i == 0) TEST_ASSERT_EQUAL_DOUBLE(3.5 - 2 * M_PI, event.as.sighting.bearing_rad);
     if (i == 1) TEST_ASSERT_EQUAL_DOUBLE(4, event.as.sighting.range_m);
+    if (i == 0) TEST_ASSERT_EQUAL_DOUBLE(-0.125, event.as.sighting.elevation_rad);
+    TEST_ASSERT_EQUAL(i == 0, wm_sighting_has_elevation(&event.as.sighting));
     TEST_ASSERT_TRUE(isnan(event.as.sighting.bearing_sigma_rad) && isnan(event.as.sighting.range_sigma_m));
   }
   TEST_ASSERT_EQUAL(WM_AGAIN, source->ops->next(source, &event, &err));
@@ -315,6 +318,12 @@ static void sightings_that_cannot_be_are_refused(void) {
       {"left", "one of bearing_rad and range_m", {.t_ns = 1, .as.sighting = {.bearing_rad = NAN, .range_m = NAN}}},
       {"left", "more than a turn", {.t_ns = 1, .as.sighting = {.bearing_rad = INFINITY, .range_m = 1}}},
       {"left", "range_m has to be", {.t_ns = 1, .as.sighting = {.bearing_rad = 1, .range_m = -1}}},
+      {"left",
+       "beyond the vertical",
+       {.t_ns = 1, .as.sighting = {.bearing_rad = 1, .range_m = 1, .elevation_rad = 2, .elevation_sigma_rad = 1}}},
+      {"left",
+       "elevation_sigma_rad",
+       {.t_ns = 1, .as.sighting = {.bearing_rad = 1, .range_m = 1, .elevation_rad = 1, .elevation_sigma_rad = -1}}},
       {"left", "below -1", {.t_ns = 1, .as.sighting = {.landmark_id = -2, .bearing_rad = 1, .range_m = 1}}},
   };
   for (size_t i = 0; i <= sizeof wrong / sizeof wrong[0]; i++) {

@@ -44,7 +44,9 @@ static void fill(wm_event *e, unsigned kind) {
         e->as.twist6.w_radps[i] = random_f64();
       }
       break;
-    case WM_EVENT_SIGHTING: e->as.sighting = (wm_sighting){65535, -1, random_f64(), NAN, NAN, random_f64()}; break;
+    case WM_EVENT_SIGHTING:
+      e->as.sighting = (wm_sighting){65535, -1, random_f64(), NAN, NAN, random_f64(), random_f64(), 0.25};
+      break;
     case WM_EVENT_POSITION: e->as.position = (wm_position){{random_f64(), random_f64(), NAN}, 1e-300, INFINITY}; break;
     case WM_EVENT_HEADING: e->as.heading = (wm_heading){random_f64(), random_f64()}; break;
     case WM_EVENT_MARKER:
@@ -118,7 +120,7 @@ static void noise_never_gives_an_event_with_indices_out_of_bounds(void) {
   for (int round = 0; round < 20000; round++) {
     uint8_t bytes[128];
     for (size_t i = 0; i < sizeof bytes; i++) bytes[i] = (uint8_t)random_bits();
-    bytes[0] = 3;
+    bytes[0] = (uint8_t)(3 + random_bits() % 2);
     bytes[1] = (uint8_t)(random_bits() % (WM_EVENT_KIND_COUNT + 2));
     if (round % 2) bytes[24] = (uint8_t)(random_bits() % 10);  // a count that may be good
     wm_event out;
@@ -144,12 +146,27 @@ static void another_version_is_refused(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_event_decode(bytes, length, &out, &used));
 }
 
+// Event logs from before sightings had elevations.
+static void the_version_before_is_read_and_has_no_elevation(void) {
+  wm_event in, out;
+  fill(&in, WM_EVENT_SIGHTING);
+  uint8_t bytes[WM_EVENT_ENCODED_MAX];
+  size_t length = wm_event_encode(&in, bytes, sizeof bytes), used;
+  bytes[0] = 3;
+  TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length - 16, &out, &used));
+  TEST_ASSERT_EQUAL(length - 16, used);
+  TEST_ASSERT_EQUAL_DOUBLE(in.as.sighting.bearing_rad, out.as.sighting.bearing_rad);
+  TEST_ASSERT_FALSE(wm_sighting_has_elevation(&out.as.sighting));
+  bytes[0] = 2;
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_event_decode(bytes, length, &out, &used));
+}
+
 static void bytes_are_little_endian_on_every_machine(void) {
   wm_event e = {
       .t_ns = 0x0102030405060708, .arrival_ns = -1, .seq = 0x11223344, .source = 0x5566, .kind = WM_EVENT_LOOKED};
   e.as.looked.sensor = 0x7788;
   uint8_t bytes[64];
-  static const uint8_t kWanted[] = {3,    WM_EVENT_LOOKED,
+  static const uint8_t kWanted[] = {4,    WM_EVENT_LOOKED,
                                     0x66, 0x55,
                                     0x44, 0x33,
                                     0x22, 0x11,
@@ -278,6 +295,7 @@ int main(void) {
   RUN_TEST(a_cut_event_is_refused_at_every_length);
   RUN_TEST(noise_never_gives_an_event_with_indices_out_of_bounds);
   RUN_TEST(another_version_is_refused);
+  RUN_TEST(the_version_before_is_read_and_has_no_elevation);
   RUN_TEST(bytes_are_little_endian_on_every_machine);
   RUN_TEST(a_published_pose_comes_back);
   RUN_TEST(an_innovation_comes_back_and_unknown_verdicts_do_not);
