@@ -9,9 +9,12 @@ namespace {
 
 constexpr double kFarthest_m = 1e4;
 constexpr double kAgree_m = 0.2;                          // of two markers on how far they are apart
-constexpr double kKnown_rad = 0.03;                       // sigma of a heading to begin with
-constexpr double kCarried_m = 0.03, kCarried_rad = 0.02;  // what odometry and map add to a sighting of a while ago
+constexpr double kKnown_rad = 0.05;                       // sigma of a heading to begin with
+constexpr double kMapped_m = 0.01, kMapped_rad = 0.005;   // what the map adds to a sighting
+constexpr double kCarried_m = 0.03, kCarried_rad = 0.02;  // and odometry, to one that was seen from elsewhere
+constexpr double kStood_m = 0.02;
 constexpr double kNoTurn = 1e6, kThreeSigmas = 9.0;
+constexpr double kRough = 2.5;  // a turn that is not to be believed may be off by so many of its sigmas
 constexpr double kThreeNumbers = 11.345 / 9.210;  // 99 % of chi2 with three degrees of freedom against two
 constexpr double kPlain = 9.0;                    // of two poses one is 90 times as likely
 
@@ -105,8 +108,9 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   const int landmark = find_landmark(m.id);
   if (doubled(m.id, landmark, m.sensor)) return drop(WM_REJECTED_NO_ASSOCIATION);
   const bool two = m.poses == 2;
-  r.turned = !two;
-  if (searching_ && (landmark < 0 || !find_start(landmark, m, r))) return drop(WM_REJECTED_SEARCHING);
+  const bool sure = m.yaw_sigma_rad <= params_.marker_heading_most_rad;
+  r.turned = !two && sure;
+  if (searching_ && (landmark < 0 || !find_start(landmark, m, r, two))) return drop(WM_REJECTED_SEARCHING);
   const past_pose past = look_back(sensor_value(m.sensor, kTimeOffset, 0.0));
   if (two) {
     // Seen nearly face on a print has two poses, which differ in its heading. The filter tells them apart where it
@@ -115,7 +119,7 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
     const double nis = landmark < 0 ? 0.0 : marker_nis(landmark, m, r, past);
     const double other_nis = landmark < 0 ? 0.0 : marker_nis(landmark, m, other, past);
     if (other_nis < nis) r = other;
-    r.turned = std::fabs(other_nis - nis) > kPlain;
+    r.turned = sure && std::fabs(other_nis - nis) > kPlain;
   }
   if (landmark >= 0)
     fuse_known_marker(landmark, m, r, past, blank, records);
@@ -129,17 +133,22 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
 // Lost on a map: two different markers of it that are as far apart as the map says tell where the robot is. Its heading
 // is the weighted mean of what their places say and what each one's turn says, if these agree. The other marker was
 // seen a while ago, and is carried on by the odometry.
-bool slam::find_start(int landmark, const wm_marker &m, const marker_reading &r) {
+bool slam::find_start(int landmark, const wm_marker &m, const marker_reading &r, bool two) {
   const mounted_sensor &sensor = sensor_[m.sensor];
-  const double turn_variance = r.turned ? r.noise[2] + square(kCarried_rad) : kNoTurn;
-  const seen_marker now = {m.id, r.noise[0] + square(kCarried_m), turn_variance,
+  const double turn_variance = two ? kNoTurn : (r.turned ? 1.0 : square(kRough)) * r.noise[2] + square(kMapped_rad);
+  const seen_marker now = {m.id, r.noise[0] + square(kMapped_m), turn_variance,
                            compose({sensor.x_m, sensor.y_m, sensor.yaw_rad}, {r.level[0], r.level[1], r.yaw_rad}),
                            joint_.odom()};
-  const seen_marker before = candidate_;
-  if (before.id != m.id) candidate_ = now;
+  seen_marker before = candidate_;
+  candidate_ = now;
   const int earlier = before.id < 0 || before.id == m.id ? -1 : find_landmark((int32_t)before.id);
   if (earlier < 0) return false;
-  const wm_pose2 other = compose(between(now.odom, before.odom), before.seen);
+  const wm_pose2 way = between(now.odom, before.odom);
+  if (square(way.x_m) + square(way.y_m) > square(kStood_m)) {
+    before.variance_m2 += square(kCarried_m);
+    before.turn_variance += square(kCarried_rad);
+  }
+  const wm_pose2 other = compose(way, before.seen);
   const auto on_map = [this](int which) {
     const int state = joint_.landmark_state(which);
     return wm_pose2{joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};

@@ -167,7 +167,7 @@ class slam {
   void join_marker(const wm_marker &m, const marker_reading &r, const past_pose &past, wm_innovation blank,
                    record_list records);
   void level_camera(int landmark, int sensor, const marker_reading &r);
-  bool find_start(int landmark, const wm_marker &m, const marker_reading &r);
+  bool find_start(int landmark, const wm_marker &m, const marker_reading &r, bool two);
   void note_fused(int landmark, int sensor);
   bool believable(int landmark, const joint_state::innovation_block &block, double noise, double scale);
   // Is this identity not one landmark's: seen twice in a picture, or at two places in turn?
