@@ -42,11 +42,10 @@ static const wm_param kParams[] = {
         "The part of a marker's sigma along the line of sight and in heading that is the same from one sighting of it "
         "to "
         "the next (pixels under its corners, light, its bend), fading with lasting.tau_s; needs lasting.slots. 0: all "
-        "of "
-        "it is fresh."),
+        "of it is fresh."),
     F64("markers.heading_most_rad", marker_heading_most_rad, 10, 1e-5, 10,
-        "A marker's heading is taken where the detector is surer of it than this, rad: seen small and nearly face on, a "
-        "print seems turned by several degrees to one side for as long as it is seen so."),
+        "A marker's heading is taken where the detector is surer of it than this, rad: seen small and nearly face on, "
+        "a print seems turned by several degrees to one side for as long as it is seen so."),
     WM_LASTING_PARAMS,
     F64("gate.soft", gate_soft, 9, 1, 1e6,
         "Normalised innovation squared for two numbers above which the measurement is believed less, as a "

@@ -31,7 +31,8 @@ typedef struct wm_slam_params {
   double gate_soft, gate_hard;
   // coded markers
   int32_t markers;
-  double marker_sigma_m, marker_sigma_rel, marker_heading_sigma_rad, marker_stamp_sigma_s, marker_lasting, marker_heading_most_rad;
+  double marker_sigma_m, marker_sigma_rel, marker_heading_sigma_rad, marker_stamp_sigma_s, marker_lasting,
+      marker_heading_most_rad;
   // landmarks
   int32_t map, landmark_capacity;
   int32_t confirm_seen;
