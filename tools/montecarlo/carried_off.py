@@ -42,6 +42,12 @@ class Truth:
         i = self.index(t_ns)
         return math.dist(self.xy_m[i], self.xy_m[i - 1]) / (1e-9 * (self.t_ns[i] - self.t_ns[i - 1]))
 
+    def driven_s(self, t_ns):
+        """Seconds of driving from the beginning until then."""
+        until = self.index(t_ns) if t_ns > self.begin_ns else 0
+        steps = (1e-9 * (self.t_ns[i] - self.t_ns[i - 1]) for i in range(1, until + 1) if self.speed_mps(self.t_ns[i]) > DRIVING_MPS)
+        return sum(steps)
+
 
 def seam(drive, seed):
     """(at, to) in ns: when it is carried off and where the drive goes on, CARRIED_M away or more, driving, with AHEAD_S of it left.

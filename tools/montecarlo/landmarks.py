@@ -66,7 +66,7 @@ def bound_of(a, scenario, run, drive):
 
 def seen_most(run):
     with open(run / "innovations.csv", newline="") as file:
-        counts = collections.Counter(row["landmark"] for row in csv.DictReader(file) if row["verdict"] == "fused")
+        counts = collections.Counter(row["landmark"] for row in csv.DictReader(file) if row["verdict"] == "fused" and row["residual"] == "bearing")
     return counts.most_common(1)[0][0] if counts else None
 
 
@@ -98,13 +98,16 @@ def without_pose(drive, folder):
 
 
 def looks(run, drive, from_ns=0):
-    """Of each pose from from_ns on: t_ns, seconds driven since, state, metres off (inf: none), sigma in metres."""
+    """Of each pose from from_ns on: t_ns, seconds driven since (from the drive's beginning: a trajectory begins with its first pose),
+    state, metres off (inf: none), sigma in metres."""
     truth = carried_off.Truth(drive)
     driven, last_ns = 0.0, None
     for row in load(run / "trajectory.csv"):
         t_ns = int(row["t_ns"])
         if t_ns < from_ns:
             continue
+        if last_ns is None and from_ns == 0:
+            driven = truth.driven_s(t_ns)
         if last_ns is not None and truth.speed_mps(t_ns) > carried_off.DRIVING_MPS:
             driven += 1e-9 * (t_ns - last_ns)
         last_ns = t_ns

@@ -48,7 +48,7 @@ wm_status make_events(const sim::Recording &recording, std::vector<SmallEvent> &
   };
   for (const sim::Sighting &s : recording.sightings) {
     wm_event e = event(s, WM_EVENT_SIGHTING);
-    e.as.sighting = {s.sensor, s.id, s.bearing_rad, s.range_m, NAN, NAN, NAN, NAN};
+    e.as.sighting = {s.sensor, s.id, s.bearing_rad, s.range_m, NAN, NAN, s.elevation_rad, s.elevation_sigma_rad};
     out.emplace_back(e);
   }
   for (const sim::MarkerSeen &m : recording.markers) {

@@ -68,6 +68,7 @@ void mistake(const Scenario &sc, const Random &random, Recording &r) {
       Sighting nothing = s;
       nothing.id = any_id(draw(Stream::sighting_false, sub + 1), -1);
       nothing.bearing_rad = (draw(Stream::sighting_false, sub + 2) - 0.5) * field_of_view_of(sc, s.sensor);
+      nothing.elevation_rad = (draw(Stream::sighting_false, sub + 3) - 0.5) * 0.3;
       nothing.outlier = true;
       all.push_back(nothing);
     }

@@ -21,9 +21,34 @@ using Kind = Sensor::Kind;
 
 wm_time_ns to_ns(double s) { return static_cast<wm_time_ns>(std::llround(s * 1e9)); }
 
+constexpr double kTiltStep_s = 0.1, kTiltLasts_s = 2;
+constexpr double kAnyElevation_rad = 0.3;  // of an outlier: so far round the horizon
+
+// The robot's roll and pitch on its springs: a Gauss-Markov process.
+class Sway {
+ public:
+  Sway(const Random &random, double sigma_rad) : random_(random), sigma_rad_(sigma_rad) {
+    for (uint64_t i = 0; i < 2; i++) tilt_rad_[i] = sigma_rad_ * random_.normal(Stream::tilt, 0, i);
+  }
+  // At rising times: the elevation that it adds to what is seen in that direction.
+  double lifts(double t_s, double azimuth_rad) {
+    const double keep = wm::exp(-kTiltStep_s / kTiltLasts_s), fresh = std::sqrt(1 - keep * keep);
+    for (; kTiltStep_s * static_cast<double>(step_ + 1) <= t_s; step_++)
+      for (uint64_t i = 0; i < 2; i++)
+        tilt_rad_[i] = keep * tilt_rad_[i] + fresh * sigma_rad_ * random_.normal(Stream::tilt, step_ + 1, i);
+    return tilt_rad_[1] * wm::cos(azimuth_rad) - tilt_rad_[0] * wm::sin(azimuth_rad);
+  }
+
+ private:
+  const Random &random_;
+  double sigma_rad_, tilt_rad_[2];
+  uint64_t step_ = 0;
+};
+
 // One camera's sightings: true bearings from the camera's true place to the true landmarks, with noise and outliers.
 void look(const Scenario &sc, const Random &random, uint16_t sensor, Recording &out) {
   const Camera &c = sc.cameras[sensor];
+  Sway sway(random, sc.errors.tilt_rad);
   for (uint64_t k = 0;; k++) {
     const double t_s = c.phase_s + static_cast<double>(k) / c.rate_hz;
     if (t_s > out.drive.duration_s()) return;
@@ -49,6 +74,11 @@ void look(const Scenario &sc, const Random &random, uint16_t sensor, Recording &
       seen.bearing_rad = seen.outlier
                              ? (random.uniform(Stream::bearing_outlier_value, k, sub) - 0.5) * c.field_of_view_rad
                              : wrap(bearing + c.bearing_sigma_rad * random.normal(Stream::bearing_noise, k, sub));
+      const double up = wm::atan2(out.landmarks[i].p_m[2] - c.xyz_m[2], std::sqrt(dx * dx + dy * dy)) +
+                        sway.lifts(t_s, bearing + c.yaw_rad);
+      seen.elevation_sigma_rad = c.bearing_sigma_rad;
+      seen.elevation_rad = seen.outlier ? (random.uniform(Stream::elevation_outlier, k, sub) - 0.5) * kAnyElevation_rad
+                                        : up + c.bearing_sigma_rad * random.normal(Stream::elevation_noise, k, sub);
       out.sightings.push_back(seen);
     }
   }
@@ -110,7 +140,7 @@ void look_north(const Scenario &sc, size_t number, Recording &r) {
   const double deviation = sc.errors.compass_rad * random.normal(Stream::compass, number);
   at_its_rate(sc, number, r, [&](uint64_t k, double t_s, wm_time_ns t_ns, wm_time_ns arrival_ns) {
     const Vector3d p = (true_pose(r, t_s) * T_base_sensor).inverse() * Vector3d(0, kNorth_m, 0);
-    Sighting seen{t_ns, arrival_ns, sensor_index(sc, number), kNorthId, 0, NAN, false};
+    Sighting seen{t_ns, arrival_ns, sensor_index(sc, number), kNorthId, 0, NAN, false, NAN, 0};
     const FeatureDice dice(r.seed, number, k, 0);
     seen.outlier = dice.outlier() < s.outlier_fraction;
     seen.bearing_rad = seen.outlier ? wrap(2 * kPi * dice.anything(0))

@@ -50,6 +50,9 @@ enum class Stream : uint64_t {
   sighting_misread,
   sighting_false,
   landmark_moved,
+  elevation_noise,
+  elevation_outlier,
+  tilt,
 };
 
 class Random {

@@ -280,6 +280,7 @@ void read_errors(Reader &r, const wm_yaml_node &map, Errors &out) {
                                       "speed_noise_mps",
                                       "start_within_m",
                                       "compass_deg",
+                                      "tilt_deg",
                                       nullptr};
   if (!r.ok() || !wm_yaml_there(&map)) return;
   r.keys(map, known);
@@ -291,6 +292,7 @@ void read_errors(Reader &r, const wm_yaml_node &map, Errors &out) {
   r.number(map, "steering_offset_deg", 0, 20, kDeg, out.steering_offset_rad);
   r.number(map, "landmark_m", 0, 10, 1, out.landmark_m);
   r.number(map, "camera_yaw_deg", 0, 45, kDeg, out.camera_yaw_rad);
+  r.number(map, "tilt_deg", 0, 20, kDeg, out.tilt_rad);
   r.number(map, "start_xy_m", 0, 10, 1, out.start_xy_m);
   r.number(map, "start_heading_deg", 0, 180, kDeg, out.start_heading_rad);
   r.number(map, "start_within_m", 0, 1000, 1, out.start_within_m);

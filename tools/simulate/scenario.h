@@ -161,6 +161,7 @@ struct Errors {
   double steering_offset_rad = 0;   // of the table's angles
   double landmark_m = 0;            // each coordinate of the map, x and y
   double camera_yaw_rad = 0;        // each camera's mounting
+  double tilt_rad = 0;              // robot's roll and pitch, wandering; in features' elevations alone
   double start_xy_m = 0, start_heading_rad = 0;
   double start_within_m = 0;        // start place: anywhere so near, each place as likely
   double compass_rad = 0;           // each compass' deviation

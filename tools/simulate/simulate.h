@@ -2,6 +2,7 @@
 // A scenario and a seed become what the robot's sensors said, and the truth. All in memory; write.h makes a recording.
 #pragma once
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,8 @@ struct Sighting {
   int32_t id;
   double bearing_rad, range_m;  // NaN where it has none
   bool outlier;
+  double elevation_rad = std::numeric_limits<double>::quiet_NaN();  // above the sensor's xy plane; not written
+  double elevation_sigma_rad = 0;                                   // 0: none
 };
 
 struct MarkerSeen {

@@ -32,7 +32,7 @@ wm_status refuse(record_list records, wm_innovation record, wm_status status) {
 // variance (Athans, Wishner, Bertolini 1968). Next to nothing as a rule; a robot that stood blind for seconds and is
 // metres off would else believe straight lines that are circles.
 struct bend {
-  double bearing_rad, bearing_variance, range_m, range_variance;
+  double bearing_rad, bearing_variance, range_m, range_variance, elevation_rad, elevation_variance;
 };
 
 bend bend_of(const expected_sighting &e, double xx, double xy, double yy) {
@@ -41,7 +41,21 @@ bend bend_of(const expected_sighting &e, double xx, double xy, double yy) {
   const double across = bx * bx * xx + 2.0 * bx * by * xy + by * by * yy;
   const double along = by * by * xx - 2.0 * bx * by * xy + bx * bx * yy;
   const double both = bx * by * (xx - yy) + (by * by - bx * bx) * xy;
-  return {-both, along * across + square(both), 0.5 * e.distance_m * across, 0.5 * square(e.distance_m * across)};
+  // The elevation's tangent is height over distance.
+  const double tangent = finite(e.elevation_rad) ? tan(e.elevation_rad) : 0.0, over = 1.0 / (1.0 + square(tangent));
+  const double by_along = 2.0 * tangent * square(over) * along, by_across = -tangent * over * across;
+  return {-both,
+          along * across + square(both),
+          0.5 * e.distance_m * across,
+          0.5 * square(e.distance_m * across),
+          0.5 * (by_along + by_across),
+          0.5 * (square(by_along) + square(by_across))};
+}
+
+// Absent, or what an angle above a plane and its sigma can be.
+bool is_elevation(const wm_sighting &s) {
+  return !wm_sighting_has_elevation(&s) ||
+         (std::fabs(s.elevation_rad) <= kHalfPi && s.elevation_sigma_rad > 0.0 && s.elevation_sigma_rad < 1e6);
 }
 
 bool is_sigma(double value) { return std::isnan(value) || (value > 0.0 && value < 1e6); }
@@ -189,9 +203,20 @@ void landmark_ekf::lend_states(int sensor, int landmark, wm_time_ns t_ns, int *l
     if (fresh) {
       filter_.forget(slot->state, 0.0, square(sigma));
       filter_.forget(slot->state + 1, 0.0, square(sigma));
+      if (params_.use_elevation) filter_.forget(slot->state + 2, 0.0, square(sigma));
     }
     slot->used_ns = t_ns;
   }
+}
+
+// The robot's tilt as it was when last seen of says less and less of what it is (Gauss-Markov).
+void landmark_ekf::sway(wm_time_ns t_ns) {
+  if (tilt_state_ < 0) return;
+  const double left = tilt_ns_ == WM_TIME_NONE ? 1.0 : exp(-wm_seconds_between(tilt_ns_, t_ns) / params_.tilt_tau_s);
+  if (left < 1.0)
+    for (int k = 0; k < 2; k++)
+      filter_.fade(tilt_state_ + k, left, (1.0 - left * left) * square(params_.tilt_sigma_rad));
+  tilt_ns_ = t_ns;
 }
 
 wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records) {
@@ -201,11 +226,11 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   blank.sensor = s.sensor;
   blank.landmark_id = s.landmark_id;
   blank.observed = has_bearing ? s.bearing_rad : s.range_m;
-  if ((!has_bearing && !has_range) || std::isinf(s.bearing_rad) || std::isinf(s.range_m))
+  if ((!has_bearing && !has_range) || std::isinf(s.bearing_rad) || std::isinf(s.range_m) || std::isinf(s.elevation_rad))
     return refuse(records, blank, WM_NOT_FINITE);
   if (s.sensor >= setup_->sensor_count || (has_bearing && std::fabs(s.bearing_rad) > 100.0) ||
       (has_range && !(s.range_m >= 0.0 && s.range_m < kFarthest_m)) || !is_sigma(s.bearing_sigma_rad) ||
-      !is_sigma(s.range_sigma_m))
+      !is_sigma(s.range_sigma_m) || !is_elevation(s))
     return refuse(records, blank, WM_OUT_OF_RANGE);
   const wm_status status = filter_.check_time(event.t_ns);
   if (status != WM_OK) return status;
@@ -246,6 +271,19 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   clue.place_m[0] = target.p_m[0];
   clue.place_m[1] = target.p_m[1];
   clue.bearing_rad = s.bearing_rad;
+  const bool use_elevation = wm_sighting_has_elevation(&s) && params_.use_elevation && use_bearing && !use_range &&
+                             finite(target.p_m[2]) && finite(sensor.z_m);
+  if (use_elevation) {
+    const level_ray ray = levelled(sensor, sure, s.bearing_rad, s.elevation_rad);
+    clue.kind |= kClueElevation;
+    clue.bearing_rad = ray.azimuth_rad;
+    clue.tangent = ray.tangent;
+    clue.height_m = target.p_m[2] - sensor.z_m;
+    clue.sigma_tangent = (1.0 + square(ray.tangent)) *
+                         std::sqrt(square(s.elevation_sigma_rad) + square(params_.tilt_sigma_rad) +
+                                   square(params_.sensor_tilt_sigma_rad) + square(params_.sensor_angle_scale_sigma));
+    clue.sigma_height_m = map_sigma(landmark);
+  }
   const double along = use_range && sensor.range_is_depth && has_bearing ? cos(s.bearing_rad) : 1.0;
   clue.range_m = (s.range_m - sure.range_bias_m) / sure.range_scale / (along > 0.1 ? along : 0.1);
   clue.sigma_angle_rad = std::sqrt(square(bearing_sigma) + square(params_.lasting_bearing_rad) +
@@ -269,6 +307,7 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   }
   int lasting, map;
   lend_states(s.sensor, landmark, event.t_ns, &lasting, &map);
+  if (use_elevation) sway(event.t_ns);
   residual residuals[2];
   int count = 0;
   const auto add = [&](wm_residual kind, double observed, double expected, const double by[kCauses], double variance,
@@ -289,6 +328,19 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
       unit -= by[0] * filter_.value(map) + by[1] * filter_.value(map + 1);
     } else {
       variance += square(map_sigma(landmark)) * (square(by[0]) + square(by[1]));
+    }
+    if (use_elevation) {  // they move the bearing, too
+      if (map >= 0) {
+        r.row.add(map + 2, by[kByUp]);
+        unit += by[kByUp] * filter_.value(map + 2);
+      } else {
+        variance += square(map_sigma(landmark) * by[kByUp]);
+      }
+      if (tilt_state_ >= 0) {
+        r.row.add(tilt_state_, by[kByLean]);
+        r.row.add(tilt_state_ + 1, by[kByNod]);
+        unit += by[kByLean] * filter_.value(tilt_state_) + by[kByNod] * filter_.value(tilt_state_ + 1);
+      }
     }
     r.record = blank;
     r.record.residual = (uint8_t)kind;
@@ -315,9 +367,16 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
     r.row.add(sensor_state_[s.sensor][kRangeBias], 1.0);
     r.row.add(sensor_state_[s.sensor][kRangeScale], e.range_by_scale);
   }
+  if (use_elevation)
+    add(WM_RESIDUAL_ELEVATION, s.elevation_rad, e.elevation_rad + bent.elevation_rad, e.elevation_by,
+        square(s.elevation_sigma_rad) + bent.elevation_variance, -1, 0.0);
   const double room = (use_bearing ? kTwoPi : 1.0) * (use_range ? kAnyRange_m : 1.0);
   const bool believed = !landmark_records()[landmark].moved && !witnesses_.biased(landmark, event.t_ns);
-  const double against = fuse(residuals, count, room, believed, records);
+  double before[sparse_row::kMax];
+  for (int k = 0; use_elevation && k < residuals[1].row.count; k++)
+    before[k] = filter_.value(residuals[1].row.index[k]);
+  const double against = fuse(residuals, use_elevation ? 1 : count, room, believed, records);
+  if (use_elevation) fuse_elevation(residuals, before, records);
   if (!use_bearing) {
     note(event.t_ns, landmark, against);
   } else {
@@ -482,6 +541,31 @@ double landmark_ekf::fuse(residual *r, int count, double room, bool believed, re
   }
   fused_ns_ = filter_.now_ns();
   return against;
+}
+
+// After its bearing, with the innovation that this left of it (`before`: the row's states before). It has a gate of its
+// own, and no say in whether the pose is right: a camera that is tilted by more than stated must not make the robot
+// lost.
+void landmark_ekf::fuse_elevation(residual bearing_then_own[2], const double *before, record_list records) {
+  residual &r = bearing_then_own[1];
+  for (int k = 0; k < r.row.count; k++) {
+    const double moved = filter_.value(r.row.index[k]) - before[k];
+    r.innovation -= r.row.by[k] * (r.row.index[k] == kHeading ? wrap(moved) : moved);
+  }
+  projection own;
+  filter_.project(r.row, &own);
+  const double hard = params_.gate_hard * kOneNumber;
+  const bool unproven = params_.recover && !witnesses_.proven();
+  r.record.variance = own.variance + r.noise;
+  r.record.expected = r.record.observed - r.innovation;
+  r.record.nis = square(r.innovation) / r.record.variance;
+  r.record.gate = hard;
+  r.record.gate_dof = 1;
+  const bool fits = r.record.nis <= (unproven && kUnproven * kOneNumber < hard ? kUnproven * kOneNumber : hard);
+  const bool fused = fits && bearing_then_own[0].record.verdict == WM_FUSED;
+  r.record.verdict = fused ? WM_FUSED : WM_REJECTED_GATE;
+  records.add(r.record);
+  if (fused) filter_.update(own, r.innovation, r.noise);
 }
 
 }  // namespace wm

@@ -24,6 +24,8 @@ int lasting_states(const wm_landmark_ekf_params &p) {
          (p.lasting_range_m > 0.0 || p.lasting_range_rel > 0.0);
 }
 
+int map_states(const wm_landmark_ekf_params &p) { return p.use_elevation ? 3 : 2; }
+
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
   const int each_sensor = (p.sensor_yaw_sigma_rad > 0.0) + 2 * (p.sensor_xy_sigma_m > 0.0) +
                           2 * (p.sensor_tilt_sigma_rad > 0.0) + (p.sensor_angle_scale_sigma > 0.0) +
@@ -31,7 +33,7 @@ int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
                           (p.range_scale_sigma > 0.0);
   return kPoseStates + planar_filter::count_motion_states(p.motion) + each_sensor * (int)setup.sensor_count +
          (p.gnss_time_offset_sigma_s > 0.0) + 2 * (p.gnss_lasting_m > 0.0) + p.lasting_slots * lasting_states(p) +
-         2 * p.map_slots;
+         map_states(p) * p.map_slots + 2 * (p.use_elevation && p.tilt_sigma_rad > 0.0);
 }
 
 }  // namespace
@@ -44,8 +46,8 @@ size_t landmark_ekf::bytes(const wm_landmark_ekf_params &params, const wm_setup 
   if (count_states(params, setup) > kMaxStates) {
     *why =
         "landmark_ekf holds at most 64 states: pose 3, one for each states.*_sigma that is not 0 (those of sensors "
-        "once for each sensor), one or two for each of lasting.slots, two for each of states.map_slots, two for "
-        "lasting.gnss_m; lower lasting.slots or states.map_slots";
+        "once for each sensor), one or two for each of lasting.slots, two for each of states.map_slots (three with "
+        "use.elevation, and two for the tilt), two for lasting.gnss_m; lower lasting.slots or states.map_slots";
     return 0;
   }
   return sizeof(landmark_ekf) + setup.landmark_count * (sizeof(int) + sizeof(landmark_record));
@@ -83,8 +85,11 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   }
   for (int i = 0; i < params.map_slots; i++) {
     map_.add(filter_.states());
-    for (int k = 0; k < 2; k++) filter_.add_state(0.0, 0.0);
+    for (int k = 0; k < map_states(params); k++) filter_.add_state(0.0, 0.0);
   }
+  tilt_state_ = params.use_elevation ? add(0.0, params.tilt_sigma_rad) : -1;
+  if (tilt_state_ >= 0) add(0.0, params.tilt_sigma_rad);
+  tilt_ns_ = WM_TIME_NONE;
   // Landmarks by rising id, for the search by halves. Insertion: once, at the start.
   int *order = landmark_order();
   for (int i = 0; i < (int)setup.landmark_count; i++) {

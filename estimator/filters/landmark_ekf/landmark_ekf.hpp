@@ -73,6 +73,8 @@ class landmark_ekf {
   // `believed`: false refuses it whatever it says.
   double fuse(residual *residuals, int count, double room, bool believed, record_list records);
 
+  void fuse_elevation(residual bearing_then_own[2], const double *before, record_list records);
+
   double map_sigma(int landmark) const;
   int find_landmark(int32_t id) const;
   struct sighting_sigmas {
@@ -82,6 +84,7 @@ class landmark_ekf {
   void lend_states(int sensor, int landmark, wm_time_ns t_ns, int *lasting, int *map);
   double sensor_value(int sensor, int which, double neutral) const;
   sensor_errors errors_of(int sensor) const;
+  void sway(wm_time_ns t_ns);
   sensor_errors remembered_errors_of(int sensor) const;
   const calibration_memory &memory_to_trust() const;
   void add_mounting(sparse_row &row, int sensor, const double by[kCauses]) const;
@@ -122,6 +125,8 @@ class landmark_ekf {
   state_slots<24> lasting_;
   int lasting_bearing_offset_, lasting_range_offset_;  // within a slot; -1: not carried
   state_slots<16> map_;
+  int tilt_state_;  // lean, nod; -1: not carried
+  wm_time_ns tilt_ns_;
   calibration_memory memory_[3];
   wm_time_ns remembered_ns_;
   int calibration_states_;  // pose and calibration; the lent states come behind

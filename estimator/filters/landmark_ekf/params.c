@@ -19,6 +19,11 @@ static const wm_param kParams[] = {
         "Start sigma of what each sensor tells angles from its axis too large by, in parts of them: a camera's focal "
         "length "
         "that was calibrated wrongly. 0: off."),
+    F64("states.tilt_sigma_rad", tilt_sigma_rad, 0.007, 0, 1,
+        "The robot's roll and pitch on its springs and on the ground, rad: 0.4 degrees, as a car has that brakes, "
+        "bends or "
+        "is loaded on one side. States with use.elevation, which tells them from a distance; else unused."),
+    F64("states.tilt_tau_s", tilt_tau_s, 2, 0.01, 1e6, "Time after which such a tilt has fallen to 1/e, s."),
     WM_SENSOR_STATE_PARAMS,
     F64("states.range_scale_sigma", range_scale_sigma, 0, 0, 1,
         "Start sigma of each sensor's range scale about 1. 0: off. Needs ranges of many lengths beside a range bias."),
@@ -31,6 +36,9 @@ static const wm_param kParams[] = {
         "often."),
     BOOL("use.bearing", use_bearing, 1, "Fuse bearings."),
     BOOL("use.range", use_range, 1, "Fuse ranges."),
+    BOOL("use.elevation", use_elevation, 0,
+         "Fuse elevations, of sightings without a range, where the map has the landmark's height: what it is above the "
+         "sensor tells how far away it is. Carries the robot's tilt and the heights of the map's slots as states."),
     BOOL("use.position", use_position, 1, "Fuse positions (GNSS)."),
     BOOL("use.heading", use_heading, 1, "Fuse headings."),
     WM_SIGHTING_NOISE_PARAMS,

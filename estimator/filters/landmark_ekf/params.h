@@ -17,12 +17,13 @@ typedef struct wm_landmark_ekf_params {
   double sensor_yaw_sigma_rad, sensor_yaw_walk_rad, sensor_xy_sigma_m;
   double sensor_tilt_sigma_rad, sensor_angle_scale_sigma;
   double sensor_time_offset_sigma_s;
+  double tilt_sigma_rad, tilt_tau_s;  // with elevations only
   double range_bias_sigma_m;
   double range_scale_sigma, range_scale_walk;
   double gnss_time_offset_sigma_s;
   int32_t map_slots;
   // noise of one sighting
-  int32_t use_bearing, use_range, use_position, use_heading;
+  int32_t use_bearing, use_range, use_elevation, use_position, use_heading;
   double bearing_sigma_default_rad, range_sigma_default_m;
   double bearing_sigma_factor, range_sigma_factor;
   double range_sigma_rel, lateral_sigma_m, map_sigma_min_m;

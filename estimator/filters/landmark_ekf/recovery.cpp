@@ -170,6 +170,8 @@ void landmark_ekf::restore_calibration() {
     filter_.forget(i, memory_[1].value[i], memory_[1].variance[i]);
   lasting_.release_all();
   map_.release_all();
+  if (tilt_state_ >= 0)
+    for (int k = 0; k < 2; k++) filter_.forget(tilt_state_ + k, 0.0, square(params_.tilt_sigma_rad));
 }
 
 // Is the pose unknown, or so vague (a robot that stood blind for seconds while it turned) that what is seen should find

@@ -13,6 +13,8 @@ constexpr int kCandidates = 12;
 constexpr int kTriples = 120;                       // with a third of the bearings false, one in three is of right ones
 constexpr double kApart_m = 0.5, kApart_rad = 0.1;  // candidates nearer than that are one
 constexpr int kRefinements = 10;
+constexpr double kHeightChi2 = 4.0;      // what a tilt and a height are wrong by lasts: it is there each time
+constexpr double kHeightOfFew = 2.0;     // where few landmarks bear a pose out
 constexpr double kOutlierChi2 = 9.0;     // a residual beyond counts this much and no more
 constexpr double kMarginChi2 = 9.0;      // the second best place must be worse by this
 constexpr double kAgreeing = 0.7;        // share of observations that must agree ...
@@ -34,6 +36,7 @@ struct problem {
     const search_clue *clue;
     double weight_angle, weight_length;  // 1 / variance
     double place_m2;                     // sigma_place_m squared
+    double way_m2;                       // what odometry has lost since, squared
     double dir_x, dir_y;                 // of the line of sight, in the odometry's frame
     int landmark;                        // numbered as they come; -1: none
     int view;                            // the first item that saw the same from the same place; itself if none did
@@ -65,6 +68,7 @@ struct problem {
     }
     const double way = kWayError * (travelled_m - clue.travelled_m);
     const double turn = kTurnError * (turned_rad - clue.turned_rad);
+    it.way_m2 = square(way);
     const double lever = (clue.kind & kClueRange) ? clue.range_m : kFirstGuess_m;
     it.weight_angle = 1.0 / (square(clue.sigma_angle_rad) + square(turn) + square(way / (lever > 0.5 ? lever : 0.5)));
     it.weight_length = 1.0 / (square(clue.sigma_length_m) + square(way));
@@ -88,12 +92,19 @@ double bounded_weight(double chi2) { return square(kOutlierChi2 / (kOutlierChi2 
 
 struct residuals {
   double angle_chi2, length_chi2;  // negative: not observed
+  double height_chi2 = -1.0;
 };
+
+// Of how high a landmark is above the sensor at that distance (squared) by its elevation: 1 / variance.
+double height_weight(const problem::item &it, double distance_m2) {
+  const search_clue &c = *it.clue;
+  return 1.0 / (distance_m2 * square(c.sigma_tangent) + square(c.sigma_height_m) + square(c.tangent) * it.way_m2);
+}
 
 // Residuals of one clue without an arctangent: sin(error) = cross / distance; behind counts as an outlier.
 residuals look(const problem::item &it, const placement &p, const sin_cos &turn) {
   const search_clue &c = *it.clue;
-  residuals out = {-1.0, -1.0};
+  residuals out = {-1.0, -1.0, -1.0};
   if (c.kind & kClueHeading) {
     out.angle_chi2 = square(wrap(c.bearing_rad - c.sensor.heading_rad - p.turn)) * it.weight_angle;
     return out;
@@ -114,6 +125,8 @@ residuals look(const problem::item &it, const placement &p, const sin_cos &turn)
                          : 1e3;
   }
   if (c.kind & kClueRange) out.length_chi2 = square(distance - c.range_m) * it.weight_length;
+  if (c.kind & kClueElevation)
+    out.height_chi2 = square(c.tangent * distance - c.height_m) * height_weight(it, distance * distance);
   return out;
 }
 
@@ -123,25 +136,31 @@ struct support {
   int stated = 0;     // what was said of the start
   int landmarks = 0;  // of which half of the observations and more agree
   int well_seen = 0;  // of these, from two places or more
+  int askew = 0;      // of these, too high or too low to speak for it
 };
 
 bool only_bearings(const problem &all) {
   for (int i = 0; i < all.count; i++)
-    if (all.items[i].clue->kind != kClueBearing) return false;
+    if ((all.items[i].clue->kind & ~kClueElevation) != kClueBearing) return false;
   return true;
 }
 
-double cost_of(const problem &all, const placement &p, support *fit = nullptr) {
+// By all that was seen, or by all but the heights.
+double cost_of(const problem &all, const placement &p, support *fit = nullptr, bool by_heights = true) {
   const sin_cos turn = sincos(p.turn);
   double cost = 0.0;
   int balance[problem::kMost] = {};  // of each landmark: agreeing less contradicting
   int views[problem::kMost] = {};    // of each landmark that agree
   bool told[problem::kMost] = {};
+  double height_chi2[problem::kMost] = {};  // of each landmark, over those that agree
+  int fitting[problem::kMost] = {};
   for (int i = 0; i < all.count; i++) {
     const residuals r = look(all.items[i], p, turn);
-    cost += clipped(r.angle_chi2 > 0.0 ? r.angle_chi2 : 0.0) + clipped(r.length_chi2 > 0.0 ? r.length_chi2 : 0.0);
+    cost += clipped(r.angle_chi2 > 0.0 ? r.angle_chi2 : 0.0) + clipped(r.length_chi2 > 0.0 ? r.length_chi2 : 0.0) +
+            (by_heights && r.height_chi2 > 0.0 ? clipped(r.height_chi2) / all.seen[all.items[i].landmark] : 0.0);
     if (!fit) continue;
-    const bool fits = r.angle_chi2 < kOutlierChi2 && r.length_chi2 < kOutlierChi2;
+    const bool fits =
+        r.angle_chi2 < kOutlierChi2 && r.length_chi2 < kOutlierChi2 && (!by_heights || r.height_chi2 < kHeightChi2);
     const int landmark = all.items[i].landmark;
     if (landmark >= 0) balance[landmark] += fits ? 1 : -1;
     if (!fits) continue;
@@ -149,12 +168,17 @@ double cost_of(const problem &all, const placement &p, support *fit = nullptr) {
     fit->stated += i >= all.stated_from;
     fit->numbers +=
         (r.angle_chi2 >= 0.0) + (r.length_chi2 >= 0.0) * ((all.items[i].clue->kind & kCluePosition) ? 2 : 1);
-    if (landmark >= 0 && !told[all.items[i].view]) views[landmark]++;
+    if (landmark >= 0) {
+      fitting[landmark]++;
+      height_chi2[landmark] += r.height_chi2 > 0.0 ? r.height_chi2 : 0.0;
+      views[landmark] += !told[all.items[i].view];
+    }
     told[all.items[i].view] = true;
   }
   for (int i = 0; fit && i < all.landmarks; i++) {
     fit->landmarks += balance[i] >= 0;
     fit->well_seen += balance[i] >= 0 && views[i] >= 2;
+    fit->askew += balance[i] >= 0 && height_chi2[i] > kHeightOfFew * fitting[i];
   }
   return cost;
 }
@@ -226,8 +250,9 @@ placement place_at(const problem &all, double rotation) {
   return p;
 }
 
-// Normal equations of Gauss-Newton about p, over (x, y, turn); residuals bounded in influence.
-void normal_equations(const problem &all, const placement &p, double a[3][3], double b[3]) {
+// Normal equations of Gauss-Newton about p, over (x, y, turn); residuals bounded in influence. Without heights: of
+// those that heights don't contradict, by the rest.
+void normal_equations(const problem &all, const placement &p, bool by_heights, double a[3][3], double b[3]) {
   const sin_cos turn = sincos(p.turn);
   for (int i = 0; i < 3; i++) {
     b[i] = 0.0;
@@ -259,9 +284,16 @@ void normal_equations(const problem &all, const placement &p, double a[3][3], do
     }
     const double q = dx * dx + dy * dy;
     if (!(q > 1e-6)) continue;
+    if (!by_heights && look(it, p, turn).height_chi2 > kHeightChi2) continue;
     if (c.kind & kClueBearing) {
       const double row[3] = {dy / q, -dx / q, -(rx * dx + ry * dy) / q - 1.0};
       add_row(row, wrap(c.sensor.heading_rad + c.bearing_rad + p.turn - atan2(dy, dx)), weight_at(all, it, q));
+    }
+    if (by_heights && (c.kind & kClueElevation)) {
+      // The same again tells no more: tilt and heights last.
+      const double d = std::sqrt(q), by = c.tangent / d;
+      const double row[3] = {-by * dx, -by * dy, by * (ry * dx - rx * dy)};
+      add_row(row, c.height_m - c.tangent * d, height_weight(it, q) / all.seen[it.landmark]);
     }
     if (c.kind & kClueRange) {
       const double d = std::sqrt(q);
@@ -405,7 +437,7 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
   for (int k = 0; k < found; k++) {
     placement &p = best[k];
     for (int step = 0; step < kRefinements; step++) {
-      normal_equations(all, p, a, b);
+      normal_equations(all, p, true, a, b);
       for (int i = 0; i < 3; i++) a[i][i] += 1e-6 * (1.0 + a[i][i]);
       if (!invert(a, inverse)) break;
       double move[3];
@@ -426,7 +458,10 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
   const double share = own.landmarks >= kMany ? kAgreeingOfMany : kAgreeing;
   if (own.observations < share * all.count || own.observations < 3 || own.numbers < limits.numbers) return out;
   if (own.landmarks < kFew && own.well_seen < own.landmarks && only_bearings(all)) return out;
-  normal_equations(all, w, a, b);
+  if (own.landmarks < kFew && own.askew > 0) return out;
+  // Heights may contradict a pose, but it is sure by the rest alone: by its heights one landmark would do, and it may
+  // be another thing that looks like it.
+  normal_equations(all, w, false, a, b);
   if (!invert(a, inverse)) return out;
   const wm_pose2 frame = {w.x, w.y, w.turn};
   out.pose = compose(frame, odom_now);
@@ -444,12 +479,17 @@ search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, d
     }
   const double near_m = 0.3 + 3.0 * std::sqrt(out.covariance[0][0] + out.covariance[1][1]);
   const double near_rad = 0.2 + 3.0 * std::sqrt(out.covariance[2][2]);
+  support plain;
+  const double plain_cost = cost_of(all, w, &plain, false);
   for (int k = 0; k < found; k++) {
     const wm_pose2 other = compose({best[k].x, best[k].y, best[k].turn}, odom_now);
     const double away = std::fabs(other.x_m - out.pose.x_m) + std::fabs(other.y_m - out.pose.y_m);
     const bool same = away < near_m && std::fabs(wrap(other.heading_rad - out.pose.heading_rad)) < near_rad;
-    const bool as_good = fit[k].landmarks >= own.landmarks && fit[k].observations > kRival * own.observations;
-    if (!same && fit[k].stated >= own.stated && (as_good || best[k].cost < w.cost + kMarginChi2))
+    if (same) continue;
+    support rival;
+    const double cost = cost_of(all, best[k], &rival, false);
+    const bool as_good = rival.landmarks >= plain.landmarks && rival.observations > kRival * plain.observations;
+    if (rival.stated >= plain.stated && (as_good || cost < plain_cost + kMarginChi2))
       return out;  // two places explain what was seen
   }
   out.found = out.covariance[0][0] + out.covariance[1][1] < 2.0 * square(limits.sigma_xy_m) &&

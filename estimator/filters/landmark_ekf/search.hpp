@@ -21,6 +21,9 @@ struct search_clue {
   double place_m[2];   // of the landmark, or the position itself, in map
   double bearing_rad;  // or the heading in map
   double range_m;      // on the floor
+  double tangent,
+      height_m;  // with kClueElevation: of the elevation above the level, and of the landmark above the sensor
+  double sigma_tangent, sigma_height_m;
   double sigma_angle_rad, sigma_length_m;
   double sigma_place_m;  // of a bearing: what of the landmark and the mounting is wrong each time alike, across it
   double travelled_m, turned_rad;  // so far, at the observation: odometry's own error grows with them
@@ -30,7 +33,13 @@ inline constexpr double kWayError = 0.05, kTurnError = 0.07;
 
 inline constexpr int kMaxSensors = 16;
 
-enum search_kind : uint32_t { kClueBearing = 1, kClueRange = 2, kCluePosition = 4, kClueHeading = 8 };
+enum search_kind : uint32_t {
+  kClueBearing = 1,
+  kClueRange = 2,
+  kCluePosition = 4,
+  kClueHeading = 8,
+  kClueElevation = 16
+};
 
 struct search_result {
   bool found;

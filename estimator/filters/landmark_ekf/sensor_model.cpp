@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/landmark_ekf/sensor_model.hpp"
 
+#include <limits>
+
 #include "math/elementary.hpp"
 
 namespace wm {
@@ -35,6 +37,17 @@ void mounted_sensor::init(const wm_sensor &sensor) {
   range_sigma_m = sensor.range_sigma_m;
   max_range_m = sensor.max_range_m;
   range_is_depth = sensor.range_is_depth != 0;
+}
+
+level_ray levelled(const mounted_sensor &sensor, const sensor_errors &errors, double bearing_rad,
+                   double elevation_rad) {
+  const sin_cos b = sincos(bearing_rad), e = sincos(elevation_rad);
+  double seen[3] = {e.cos * b.cos, e.cos * b.sin, e.sin}, level[3];
+  tilt({.roll_rad = -errors.roll_rad, .pitch_rad = -errors.pitch_rad}, seen);
+  const double(*axis)[3] = sensor.is_steep ? kLevel : sensor.axis;
+  for (int i = 0; i < 3; i++) level[i] = axis[0][i] * seen[0] + axis[1][i] * seen[1] + axis[2][i] * seen[2];
+  const double flat = std::sqrt(level[0] * level[0] + level[1] * level[1]);
+  return {atan2(level[1], level[0]), level[2] / (flat > 1e-3 ? flat : 1e-3)};
 }
 
 expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &errors, const wm_pose2 &pose,
@@ -78,7 +91,15 @@ expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &erro
   const double plain = sensor.range_is_depth ? seen[0] : length;
   out.range_m = errors.range_scale * plain + errors.range_bias_m;
   out.range_by_scale = plain;
-  const double over_length = 1.0 / length;
+  const double over_length = 1.0 / length, flat = std::sqrt(q), over_length2 = over_length * over_length;
+  const double up_stretch =
+      off_axis > 1e-6 * length ? atan2(off_axis, seen[0]) * seen[0] * seen[2] / (off_axis * flat) : 0.0;
+  const bool has_height = finite(landmark_m[2]) && finite(sensor.z_m);
+  out.elevation_rad =
+      has_height ? atan2(seen[2], flat) + errors.angle_scale * up_stretch : std::numeric_limits<double>::quiet_NaN();
+  const auto raises = [&](const double d[3]) {
+    return (flat * d[2] - seen[2] * (seen[0] * d[0] + seen[1] * d[1]) / flat) * over_length2;
+  };
   for (int k = 0; k < 6; k++) {
     double d[3];
     for (int i = 0; i < 3; i++) {
@@ -87,12 +108,28 @@ expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &erro
     }
     tilt(errors, d);
     out.bearing_by[k] = (seen[0] * d[1] - seen[1] * d[0]) * over_q;
+    out.elevation_by[k] = raises(d);
     out.range_by[k] = errors.range_scale *
                       (sensor.range_is_depth ? d[0] : (seen[0] * d[0] + seen[1] * d[1] + seen[2] * d[2]) * over_length);
   }
   out.bearing_by[kByRoll] = seen[0] * seen[2] * over_q;
   out.bearing_by[kByPitch] = seen[1] * seen[2] * over_q;
   out.bearing_by[kByAngleScale] = stretch;
+  out.elevation_by[kByRoll] = -seen[1] / flat;
+  out.elevation_by[kByPitch] = seen[0] / flat;
+  out.elevation_by[kByAngleScale] = up_stretch;
+  // The robot leans (about its x axis) and nods (about y), as a sensor's roll and pitch would turn; the landmark rises.
+  const double turned[3][3] = {{m.sin * up, m.cos * up, -m.sin * level[0] - m.cos * level[1]},
+                               {-m.cos * up, m.sin * up, m.cos * level[0] - m.sin * level[1]},
+                               {0.0, 0.0, 1.0}};
+  for (int k = 0; k < 3; k++) {
+    double d[3];
+    for (int i = 0; i < 3; i++)
+      d[i] = axis[i][0] * turned[k][0] + axis[i][1] * turned[k][1] + axis[i][2] * turned[k][2];
+    tilt(errors, d);
+    out.bearing_by[kByLean + k] = (seen[0] * d[1] - seen[1] * d[0]) * over_q;
+    out.elevation_by[kByLean + k] = raises(d);
+  }
   return out;
 }
 

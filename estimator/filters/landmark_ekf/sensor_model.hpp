@@ -29,17 +29,40 @@ struct sensor_errors {
   double angle_scale = 0.0;                // angles from the sensor's x axis are told larger by this part of them
 };
 
-// What a sighting depends on: x, y, heading of the pose, then the sensor's errors.
-enum sighting_cause { kByX, kByY, kByHeading, kByYaw, kByMountX, kByMountY, kByRoll, kByPitch, kByAngleScale, kCauses };
+// What a sighting depends on: x, y, heading of the pose, then the sensor's errors; the robot's own roll and pitch on
+// its springs (lean, nod), and the landmark's height.
+enum sighting_cause {
+  kByX,
+  kByY,
+  kByHeading,
+  kByYaw,
+  kByMountX,
+  kByMountY,
+  kByRoll,
+  kByPitch,
+  kByAngleScale,
+  kByLean,
+  kByNod,
+  kByUp,
+  kCauses
+};
 
 struct expected_sighting {
   bool possible;  // false: on the sensor itself, or (for a depth) behind it
   double bearing_rad, range_m;
-  double distance_m;  // on the floor
+  double elevation_rad;  // NaN where the landmark's or the sensor's height isn't known
+  double distance_m;     // on the floor
   // By each sighting_cause. By the landmark's x, y: minus those by the pose's.
-  double bearing_by[kCauses], range_by[kCauses];
+  double bearing_by[kCauses], range_by[kCauses], elevation_by[kCauses];
   double range_by_scale;
 };
+
+// A ray as a sensor told it, turned into levelled axes along the mounting's yaw: its azimuth, and the tangent of its
+// elevation.
+struct level_ray {
+  double azimuth_rad, tangent;
+};
+level_ray levelled(const mounted_sensor &sensor, const sensor_errors &errors, double bearing_rad, double elevation_rad);
 
 expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &errors, const wm_pose2 &pose_map_base,
                          const double landmark_m[3]);

@@ -45,6 +45,9 @@ struct bearing {
   double place_m[2], angle_rad;
   double angle_variance, way_variance_m2;  // the second across the line of sight
   int landmark, sensor_number;             // numbered as they come
+  bool has_height;
+  double height_m, tangent;  // of the landmark above the sensor, and of its elevation
+  double tangent_variance, height_variance_m2;
 };
 
 struct problem {
@@ -52,6 +55,7 @@ struct problem {
   int count, landmarks, sensors;
   int id[kMostLandmarks], sensor_id[kMostSensors];
   double sigma_m[kMostLandmarks];
+  int heights[kMostLandmarks];  // how often each was told
   double yaw_sigma_rad;
 
   int unknowns() const { return 3 + 2 * landmarks + sensors; }
@@ -116,20 +120,35 @@ explanation explain(const problem &all, const wm_pose2 &stated, const hypothesis
       const double residual = wrap(out.start.heading_rad + b.sensor.heading_rad + all.yaw_sigma_rad * z[at_yaw] +
                                    b.angle_rad - atan2(dy, dx));
       const double variance = b.angle_variance + (b.way_variance_m2 + square(loose_m)) / q;
-      const double right =
-          (1.0 - kFalse) * kTwoPi * exp(-0.5 * square(residual) / variance) / std::sqrt(kTwoPi * variance);
+      // A height speaks against, not for: signs hang at much the same one. Often told, it is no more than one: tilts
+      // last.
+      const double distance = std::sqrt(q), height = b.has_height ? b.tangent * distance - b.height_m : 0.0;
+      const double height_weight =
+          b.has_height ? 1.0 / (all.heights[b.landmark] * (q * b.tangent_variance + b.height_variance_m2 +
+                                                           square(b.tangent) * (b.way_variance_m2 + square(loose_m))))
+                       : 0.0;
+      const double right = (1.0 - kFalse) * kTwoPi *
+                           exp(-0.5 * (square(residual) / variance + square(height) * height_weight)) /
+                           std::sqrt(kTwoPi * variance);
       const double trust = right / (right + kFalse);
       out.log_likelihood += log(right + kFalse);
       out.agreeing += trust > 0.5;
       const double by[3] = {-dy / q, dx / q, 1.0 + (rx * dx + ry * dy) / q};
-      int index[6] = {0, 1, 2, at_landmark, at_landmark + 1, at_yaw};
-      double row[6] = {0, 0, 0, -by[0] * sigma_m, -by[1] * sigma_m, all.yaw_sigma_rad};
-      for (int k = 0; k < 3; k++)
-        for (int i = k; i < 3; i++) row[k] += by[i] * h.pose_factor[i][k];
-      const double weight = trust / variance;
-      for (int i = 0; i < 6; i++) {
-        g[index[i]] -= weight * row[i] * residual;
-        for (int j = 0; j < 6; j++) a[index[i] * kMost + index[j]] += weight * row[i] * row[j];
+      const int index[6] = {0, 1, 2, at_landmark, at_landmark + 1, at_yaw};
+      const auto add_row = [&](const double of[3], double by_yaw, double off_by, double weight) {
+        double row[6] = {0, 0, 0, -of[0] * sigma_m, -of[1] * sigma_m, by_yaw};
+        for (int k = 0; k < 3; k++)
+          for (int i = k; i < 3; i++) row[k] += of[i] * h.pose_factor[i][k];
+        for (int i = 0; i < 6; i++) {
+          g[index[i]] -= weight * row[i] * off_by;
+          for (int j = 0; j < 6; j++) a[index[i] * kMost + index[j]] += weight * row[i] * row[j];
+        }
+      };
+      add_row(by, all.yaw_sigma_rad, residual, trust / variance);
+      if (b.has_height) {
+        const double farther = b.tangent / distance;
+        const double raised[3] = {-farther * dx, -farther * dy, farther * (dx * ry - dy * rx)};
+        add_row(raised, 0.0, height, trust * height_weight);
       }
     }
     if (!factorize(n, a, kMost)) return out;
@@ -228,6 +247,12 @@ void start_trial::weigh(const pose_search &clues, const lasting &sigma, const wm
     b.angle_rad = c.bearing_rad;
     b.angle_variance = square(c.sigma_angle_rad) + square(kTurnError * (c.turned_rad - turned_rad_));
     b.way_variance_m2 = square(kWayError * (c.travelled_m - travelled_m_));
+    b.has_height = (c.kind & kClueElevation) != 0;
+    all.heights[b.landmark] += b.has_height;
+    b.height_m = c.height_m;
+    b.tangent = c.tangent;
+    b.tangent_variance = square(c.sigma_tangent);
+    b.height_variance_m2 = square(c.sigma_height_m);
     all.count++;
   }
   if (all.count == 0) return;

@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: Apache-2.0
+// Elevations of landmarks in the landmark filter: what is expected and how it changes, what an absent or absurd one
+// does, how far it is believed, and that a pose isn't taken which heights contradict.
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+
+#include "events.hpp"
+#include "filters/landmark_ekf/params.h"
+#include "filters/landmark_ekf/search.hpp"
+#include "filters/landmark_ekf/sensor_model.hpp"
+#include "filters/landmark_ekf/start_trial.hpp"
+#include "math/elementary.hpp"
+#include "motion/motion_params.h"
+#include "unity.h"
+#include "waymark/estimator.h"
+#include "waymark/random.h"
+
+namespace {
+
+const wm_estimator *ekf;
+wm_motion_params motion;
+wm_landmark_ekf_params params;
+wm_setup setup;
+wm_sensor sensor;
+wm_landmark landmarks[3];
+void *state;
+
+void begin() {
+  std::free(state);
+  const char *why = nullptr;
+  const size_t bytes = ekf->state_bytes(&params, &setup, &why);
+  TEST_ASSERT_GREATER_THAN(0, bytes);
+  state = aligned_alloc(16, (bytes + 15) / 16 * 16);
+  TEST_ASSERT_EQUAL(WM_OK, ekf->init(state, &params, &setup));
+}
+
+wm_estimate estimate() {
+  wm_estimate e;
+  std::memset(&e, 0, sizeof e);
+  ekf->estimate(state, &e);
+  return e;
+}
+
+// Landmark `i` as it is seen from the start, with its elevation.
+wm_event seen(double t_s, int i, double sigma_rad) {
+  wm::mounted_sensor m;
+  m.init(sensor);
+  const wm::expected_sighting e = wm::expect(m, {}, {0, 0, 0}, landmarks[i].p_m);
+  wm_event out = make::sighting(t_s, landmarks[i].id, e.bearing_rad, NAN);
+  out.as.sighting.elevation_rad = e.elevation_rad;
+  out.as.sighting.elevation_sigma_rad = sigma_rad;
+  return out;
+}
+
+int verdict_of(const wm_event &e, wm_status wanted = WM_OK, size_t *count = nullptr) {
+  wm_innovation records[4];
+  size_t n;
+  TEST_ASSERT_EQUAL(wanted, ekf->correct(state, &e, records, 4, &n));
+  TEST_ASSERT_GREATER_THAN(0, n);
+  if (count) *count = n;
+  return records[0].verdict;
+}
+
+void stand(double from_s, double to_s) {
+  for (double t = from_s; t < to_s; t += 0.02) {
+    const wm_event twist = make::twist(t, 0, 0);
+    TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &twist));
+  }
+}
+
+void test_expected_elevation_and_its_derivatives(void) {
+  wm_sensor s = sensor;
+  s.mounting = {{0.4, -0.2, 0.7}, {0.1, 0.35, 2.2}};
+  wm::mounted_sensor m;
+  m.init(s);
+  const wm_pose2 pose = {0.5, 0.3, 0.8};
+  const double place[3] = {3.0, -1.5, 1.9}, h = 1e-6;
+  for (int cause = 0; cause < wm::kCauses; cause++) {
+    double told[2];
+    for (int side = 0; side < 2; side++) {
+      const double by = side ? h : -h;
+      wm_pose2 p = pose;
+      wm::sensor_errors errors;
+      wm::mounted_sensor turned = m;
+      double at[3] = {place[0], place[1], place[2]};
+      switch (cause) {
+        case wm::kByX: p.x_m += by; break;
+        case wm::kByY: p.y_m += by; break;
+        case wm::kByHeading: p.heading_rad += by; break;
+        case wm::kByYaw: errors.yaw_rad = by; break;
+        case wm::kByMountX: errors.x_m = by; break;
+        case wm::kByMountY: errors.y_m = by; break;
+        case wm::kByRoll: errors.roll_rad = by; break;
+        case wm::kByPitch: errors.pitch_rad = by; break;
+        case wm::kByAngleScale: errors.angle_scale = by; break;
+        case wm::kByUp: at[2] += by; break;
+        default: {
+          // The robot leans or nods about its x or y axis through the sensor: what it sees turns the other way.
+          const double c = std::cos(p.heading_rad), sn = std::sin(p.heading_rad);
+          const double dx = at[0] - p.x_m, dy = at[1] - p.y_m;
+          double v[3] = {c * dx + sn * dy - m.x_m, c * dy - sn * dx - m.y_m, at[2] - m.z_m};
+          const double w[2] = {cause == wm::kByLean ? by : 0.0, cause == wm::kByNod ? by : 0.0};
+          const double turn[3] = {-w[1] * v[2], w[0] * v[2], w[1] * v[0] - w[0] * v[1]};
+          for (int i = 0; i < 3; i++) v[i] += turn[i];
+          const double bx = v[0] + m.x_m, yb = v[1] + m.y_m;
+          at[0] = p.x_m + c * bx - sn * yb;
+          at[1] = p.y_m + sn * bx + c * yb;
+          at[2] = v[2] + m.z_m;
+        }
+      }
+      told[side] = wm::expect(turned, errors, p, at).elevation_rad;
+    }
+    const double by = wm::expect(m, {}, pose, place).elevation_by[cause];
+    TEST_ASSERT_DOUBLE_WITHIN(2e-6, (told[1] - told[0]) / (2 * h), by);
+    TEST_ASSERT_TRUE(std::fabs(by) > 1e-3);
+  }
+}
+
+// A ray as told and the same ray levelled; the way there and back.
+void test_a_ray_is_levelled(void) {
+  wm_sensor s = sensor;
+  s.mounting = {{0.4, -0.2, 0.7}, {0.1, -0.2, 1.2}};
+  wm::mounted_sensor m;
+  m.init(s);
+  const double place[3] = {3.0, 2.5, 1.9};
+  const wm::expected_sighting e = wm::expect(m, {}, {0, 0, 0}, place);
+  const wm::level_ray ray = wm::levelled(m, {}, e.bearing_rad, e.elevation_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, std::atan2(2.5 + 0.2, 3.0 - 0.4), ray.azimuth_rad + 1.2);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, (1.9 - 0.7) / std::hypot(2.5 + 0.2, 3.0 - 0.4), ray.tangent);
+}
+
+void run_without(int use, bool told, wm_estimate *out) {
+  params.use_elevation = use;
+  begin();
+  wm_random noise = {5, 1, 0};
+  for (int i = 0; i < 100; i++) {
+    const double t = 0.1 * i;
+    stand(t, t + 0.09);
+    wm_event e = seen(t + 0.1, i % 3, told ? 0.01 : 0.0);
+    if (!told) e.as.sighting.elevation_rad = NAN;
+    e.as.sighting.bearing_rad += 0.01 * wm_random_next_normal(&noise);
+    wm_innovation records[4];
+    size_t count;
+    TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &e, records, 4, &count));
+    TEST_ASSERT_EQUAL(use && told ? 2 : 1, count);
+  }
+  *out = estimate();
+}
+
+void test_without_elevations_all_bits_are_as_without_the_parameter(void) {
+  wm_estimate off, on, not_used, used;
+  run_without(0, false, &off);
+  run_without(1, false, &on);
+  TEST_ASSERT_EQUAL_MEMORY(&off, &on, sizeof off);
+  run_without(0, true, &not_used);
+  TEST_ASSERT_EQUAL_MEMORY(&off, &not_used, sizeof off);
+  run_without(1, true, &used);
+  TEST_ASSERT_TRUE(std::memcmp(&off, &used, sizeof off) != 0);
+}
+
+void test_absurd_elevations_are_refused_and_told(void) {
+  begin();
+  stand(0, 1);
+  const auto refused = [](double elevation_rad, double sigma_rad, wm_status status) {
+    wm_event e = seen(1, 0, sigma_rad);
+    e.as.sighting.elevation_rad = elevation_rad;
+    return verdict_of(e, status);
+  };
+  TEST_ASSERT_EQUAL(WM_REJECTED_NOT_FINITE, refused(INFINITY, 0.01, WM_NOT_FINITE));
+  TEST_ASSERT_EQUAL(WM_REJECTED_OUT_OF_RANGE, refused(2, 0.01, WM_OUT_OF_RANGE));
+  TEST_ASSERT_EQUAL(WM_REJECTED_OUT_OF_RANGE, refused(0.1, -0.01, WM_OUT_OF_RANGE));
+  TEST_ASSERT_EQUAL(WM_REJECTED_OUT_OF_RANGE, refused(0.1, INFINITY, WM_OUT_OF_RANGE));
+  TEST_ASSERT_EQUAL(WM_FUSED, refused(NAN, 0.01, WM_OK));  // absent
+  // A thing at another height where the landmark should be: the bearing stays.
+  wm_event e = seen(1, 0, 0.001);
+  e.as.sighting.elevation_rad += 0.2;
+  wm_innovation records[4];
+  size_t count;
+  TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &e, records, 4, &count));
+  TEST_ASSERT_EQUAL(2, count);
+  TEST_ASSERT_EQUAL(WM_FUSED, records[0].verdict);
+  TEST_ASSERT_EQUAL(WM_RESIDUAL_ELEVATION, records[1].residual);
+  TEST_ASSERT_EQUAL(WM_REJECTED_GATE, records[1].verdict);
+}
+
+void test_where_a_height_is_not_known_there_is_no_elevation(void) {
+  begin();
+  stand(0, 1);
+  const wm_event e = seen(1, 0, 0.01);
+  landmarks[0].p_m[2] = NAN;
+  size_t count;
+  TEST_ASSERT_EQUAL(WM_FUSED, verdict_of(e, WM_OK, &count));
+  TEST_ASSERT_EQUAL(1, count);
+}
+
+// Straight ahead, 8 m away and 1.5 m up: it tells the distance, as well as the tilt allows, and no better for being
+// looked at a hundred times in two seconds: a robot that stands on a slope stands on it all the time.
+void test_it_tells_the_distance_and_not_more_than_the_tilt_allows(void) {
+  setup.start.sigma_xy_m = 2.0;
+  setup.start.p_m[0] = -1.0;
+  begin();
+  for (int i = 0; i < 100; i++) {
+    const double t = 0.02 * i;
+    stand(t, t + 0.01);
+    TEST_ASSERT_EQUAL(WM_FUSED, verdict_of(seen(t + 0.02, 0, 0.0005)));
+  }
+  const wm_estimate e = estimate();
+  std::printf("known to %.3f m\n", std::sqrt(e.covariance[0]));
+  const double lasting_m = 0.007 * (8.0 * 8.0 + 1.5 * 1.5) / 1.5;
+  TEST_ASSERT_TRUE(std::fabs(e.pose_map_base.p_m[0]) < 0.1);
+  TEST_ASSERT_TRUE(std::sqrt(e.covariance[0]) < 1.1 * lasting_m);
+  TEST_ASSERT_TRUE(std::sqrt(e.covariance[0]) > 0.8 * lasting_m);
+}
+
+// Bearings of three things that fit some pose, as three always do, and of two while driving: taken with heights that
+// bear it out, and with none, but not where one hangs at another height than it would there.
+void test_a_start_that_bearings_alone_cannot_tell_from_a_wrong_one(void) {
+  static wm::pose_search search;
+  const double place_m[3][2] = {{5.0, 3.0}, {7.0, -4.0}, {1.0, 6.0}};
+  const auto found = [&](int count, double heights, double wrong_m) {
+    search.clear();
+    for (int n = 0; n < 12; n++) {
+      const int i = n % count;
+      const double x_m = 0.3 * n;
+      wm::search_clue clue{};
+      clue.t_ns = 400 * n * WM_NS_PER_MS;
+      clue.kind = wm::kClueBearing | (heights > 0 ? wm::kClueElevation : 0u);
+      clue.key = i * wm::kMaxSensors;
+      clue.sensor.x_m = clue.travelled_m = x_m;
+      for (int k = 0; k < 2; k++) clue.place_m[k] = place_m[i][k];
+      const double dx = place_m[i][0] - x_m, dy = place_m[i][1];
+      clue.bearing_rad = wm::atan2(dy, dx);
+      clue.height_m = heights;
+      clue.tangent = (heights + (i == 1 ? wrong_m : 0.0)) / std::hypot(dx, dy);
+      clue.sigma_angle_rad = 0.005;
+      clue.sigma_place_m = clue.sigma_height_m = 0.02;
+      clue.sigma_tangent = 0.008;
+      search.add(clue);
+    }
+    return search.find(0, wm_pose2{3.3, 0.0, 0.0}, 3.3, 0.0, nullptr, 0, {5.0, 1.0, 5}).found;
+  };
+  for (const int count : {2, 3}) {
+    TEST_ASSERT_TRUE(found(count, 0.0, 0.0));
+    TEST_ASSERT_TRUE(found(count, 0.8, 0.0));
+    TEST_ASSERT_TRUE(found(count, 0.8, 0.03));
+    TEST_ASSERT_FALSE(found(count, 0.8, 0.5));
+  }
+}
+
+// Three landmarks ahead while the robot stands: a start that is half a metre short is explained by a heading and three
+// places that are a little off as well, but then all three hang too low.
+void test_a_start_that_is_off_is_told_by_heights(void) {
+  static wm::pose_search clues;
+  static wm::start_trial trial;
+  const double place_m[3][2] = {{4.0, 1.0}, {5.0, -1.2}, {4.5, 0.2}};
+  const auto off = [&](bool heights, double short_m) {
+    clues.clear();
+    for (int n = 0; n < 30; n++) {
+      const int i = n % 3;
+      wm::search_clue clue{};
+      clue.t_ns = 150 * n * WM_NS_PER_MS;
+      clue.kind = wm::kClueBearing | (heights ? wm::kClueElevation : 0u);
+      clue.key = i * wm::kMaxSensors;
+      for (int k = 0; k < 2; k++) clue.place_m[k] = place_m[i][k];
+      clue.bearing_rad = wm::atan2(place_m[i][1], place_m[i][0]);
+      clue.height_m = 1.5;
+      clue.tangent = 1.5 / std::hypot(place_m[i][0], place_m[i][1]);
+      clue.sigma_angle_rad = 0.005;
+      clue.sigma_place_m = clue.sigma_height_m = 0.02;
+      clue.sigma_tangent = 0.008;
+      clues.add(clue);
+    }
+    const double covariance[3][3] = {{0.0025, 0, 0}, {0, 0.0025, 0}, {0, 0, 0.0001}};
+    const wm_pose2 stated = {-short_m, 0, 0};
+    trial.begin(stated, covariance, {}, 0, 0);
+    trial.weigh(clues, {0.0035, 0, 0.1}, stated, {}, 0, 0, 0);
+    return trial.off();
+  };
+  std::printf("off: %.3f by bearings, %.3f by heights, too; right: %.3f and %.3f\n", off(false, 0.5), off(true, 0.5),
+              off(false, 0.0), off(true, 0.0));
+  TEST_ASSERT_TRUE(off(true, 0.5) > 0.5);
+  TEST_ASSERT_TRUE(off(false, 0.5) < 0.1);
+  TEST_ASSERT_TRUE(off(true, 0.0) < 0.05);
+}
+
+}  // namespace
+
+void setUp(void) {
+  ekf = wm_estimator_find("landmark_ekf");
+  wm_params_defaults(&wm_motion_params_table, &motion);
+  wm_params_defaults(&ekf->params, &params);
+  params.use_elevation = 1;
+  params.sensor_tilt_sigma_rad = 0.0035;
+  params.map_slots = 3;
+  const double places[3][3] = {{8, 0, 2.5}, {3, 5, 1.8}, {2, -6, 3}};
+  for (int i = 0; i < 3; i++) landmarks[i] = {10 + i, {places[i][0], places[i][1], places[i][2]}, 0.02, NAN, {}, 0};
+  sensor = make::sensor("camera", 0.01, 0.05);
+  sensor.mounting.xyz_m[2] = 1.0;
+  setup = make::setup(motion, sensor);
+  setup.landmarks = landmarks;
+  setup.landmark_count = 3;
+  setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0, 0.05, 0.05};
+}
+
+void tearDown(void) {
+  std::free(state);
+  state = nullptr;
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_expected_elevation_and_its_derivatives);
+  RUN_TEST(test_a_ray_is_levelled);
+  RUN_TEST(test_without_elevations_all_bits_are_as_without_the_parameter);
+  RUN_TEST(test_absurd_elevations_are_refused_and_told);
+  RUN_TEST(test_where_a_height_is_not_known_there_is_no_elevation);
+  RUN_TEST(test_it_tells_the_distance_and_not_more_than_the_tilt_allows);
+  RUN_TEST(test_a_start_that_bearings_alone_cannot_tell_from_a_wrong_one);
+  RUN_TEST(test_a_start_that_is_off_is_told_by_heights);
+  return UNITY_END();
+}
