@@ -63,6 +63,19 @@ bool on_a_line(const wm_points &points, uint32_t i) {
   return length2 < square(0.6) && square(across) < square(0.03 + 0.005 * (x * x + y * y)) * length2;
 }
 
+bool before_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m, double ray_y_m) {
+  constexpr double kGrazing_m = 0.1, kMost = 0.5;
+  constexpr double kLooks[] = {0.0, 0.3};  // the map knows what is within 0.6 m alone
+  for (const double on : kLooks) {
+    const edge_line line = map.nearest(x_m + on * ray_x_m, y_m + on * ray_y_m);
+    const double towards_m = line.normal_x * ray_x_m + line.normal_y * ray_y_m;
+    if (!line.found || std::fabs(towards_m) < kGrazing_m) continue;
+    const double beyond = on + line.offset_m / towards_m;
+    if (beyond > 0.0 && beyond < kMost) return true;
+  }
+  return false;
+}
+
 void align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, int stride, double gate_m,
                 double explained_m, int iterations, wm_pose2 *pose) {
   for (int round = 0; round < iterations; round++) {
@@ -157,16 +170,23 @@ void align_place(const edge_map &map, const slack_points &points, int stride, do
 }
 
 double explained_share(const edge_map &map, const slack_points &points, double explained_m, const wm_pose2 &pose,
-                       const double error[kSlackMost]) {
+                       const double error[kSlackMost], bool images) {
   const sin_cos h = sincos(pose.heading_rad);
-  int explained = 0;
+  double explained = 0.0;
   for (int i = 0; i < points.count; i++) {
     double px, py;
     moved(points, i, error, &px, &py);
-    const edge_line line = map.nearest(pose.x_m + h.cos * px - h.sin * py, pose.y_m + h.sin * px + h.cos * py);
-    explained += line.found && line.distance_m <= explained_m;
+    const double x = pose.x_m + h.cos * px - h.sin * py, y = pose.y_m + h.sin * px + h.cos * py;
+    const edge_line line = map.nearest(x, y);
+    if (line.found && line.distance_m <= explained_m) {
+      explained += 1.0;
+    } else if (images) {
+      const double rx = (double)points.ray_x_m[i], ry = (double)points.ray_y_m[i];
+      if (before_an_edge(map, x, y, h.cos * rx - h.sin * ry, h.sin * rx + h.cos * ry))
+        explained += (double)points.image[i];
+    }
   }
-  return points.count > 0 ? (double)explained / points.count : 0.0;
+  return points.count > 0 ? explained / points.count : 0.0;
 }
 
 }  // namespace wm

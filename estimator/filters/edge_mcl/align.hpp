@@ -27,6 +27,7 @@ struct normal_equations {
   double cost;                    // half of the weighted squares, as Student has them; what finds no edge pays the gate
   int seen;                       // points that are explained or lie on a line
   int explained;                  // of them: as near to an edge as they may be
+  int before;                     // of the rest: before one, as its image in a shiny floor is
 };
 
 // How a camera sits is known to some sigma. Of its errors these move the points of places that are compared: pitch,
@@ -40,7 +41,17 @@ struct slack_points {
   int camera[WM_POINTS_MAX];
   float x_m[WM_POINTS_MAX], y_m[WM_POINTS_MAX];
   float x_by[kSlackErrors][WM_POINTS_MAX], y_by[kSlackErrors][WM_POINTS_MAX];
+  float ray_x_m[WM_POINTS_MAX], ray_y_m[WM_POINTS_MAX];  // from under the camera to the point
+  float image[WM_POINTS_MAX];                            // what it counts if it lies before an edge
 };
+
+// What a scan of so many points says, in parts of what one of 180 does: few points fit in many a place.
+inline double telling_of(int count) { return 260.0 / 180.0 * count / (count + 80.0); }
+
+// A shiny floor holds a wall's image and its skirting's shadow. What is seen of these lies before the wall, on the same
+// ray. Whether the ray from under the camera to a place (both in the map's axes) meets an edge beyond it, by half of
+// its length at most.
+bool before_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m, double ray_y_m);
 
 // Solves A x = b for a symmetric positive definite A of n <= kAlignStates rows; false where it isn't.
 bool solve_positive(const double a[kAlignStates][kAlignStates], const double *b, int n, double *x);
@@ -59,9 +70,10 @@ void align_pose(const edge_map &map, const float *x_m, const float *y_m, int cou
 // The same of points that may move: with the pose their cameras' `error`, in sigmas, from where it is on.
 void align_place(const edge_map &map, const slack_points &points, int stride, double gate_m, double explained_m,
                  int iterations, wm_pose2 *pose, double error[kSlackMost]);
-// Share of the points that lie so near to an edge from `pose`. O(points).
+// Share of the points that lie so near to an edge from `pose`; with `images`, those before an edge count for what they
+// may. O(points).
 double explained_share(const edge_map &map, const slack_points &points, double explained_m, const wm_pose2 &pose,
-                       const double error[kSlackMost]);
+                       const double error[kSlackMost], bool images);
 
 }  // namespace wm
 

@@ -78,13 +78,19 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
     }
     const double rx = h.cos * p.x - h.sin * p.y, ry = h.sin * p.x + h.cos * p.y;  // from base_link then, in map axes
     const double x = then.pose.x_m + rx, y = then.pose.y_m + ry;
-    const int before = out->explained;
-    out->seen += on_a_line(points, i);
+    const bool lined = on_a_line(points, i);
+    out->seen += lined;
     edge_line line = map_.nearest(x, y);
     const double sigma2 = square(point_sigma(points, i, a.camera)) + square(params_.point_sigma_m);
     const double none = 2.5 * log(1.0 + square(params_.gate_m) / (4.0 * sigma2)) / params_.correlated;
     out->cost += none;
-    if (!line.found || (!prior && line.distance_m > gate_m)) continue;
+    const auto take_unexplained = [&] {
+      if (!prior && lined) out->before += before_an_edge(map_, x, y, x - eye_x, y - eye_y);
+    };
+    if (!line.found || (!prior && line.distance_m > gate_m)) {
+      take_unexplained();
+      continue;
+    }
     // What is seen of an edge is the floor on this side of it: its normal points away.
     if (line.normal_x * (x - eye_x) + line.normal_y * (y - eye_y) < 0.0) {
       line.normal_x = -line.normal_x;
@@ -93,15 +99,20 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
     }
     if (finite((double)points.normal_rad[i])) {
       const sin_cos n = sincos((double)points.normal_rad[i] + then.pose.heading_rad);
-      if (n.cos * line.normal_x + n.sin * line.normal_y < cos_gate) continue;
+      if (n.cos * line.normal_x + n.sin * line.normal_y < cos_gate) {
+        take_unexplained();
+        continue;
+      }
     }
     const double residual = line.offset_m - (edge_state_ >= 0 ? a.value[kAlignEdge] : 0.0);
     const double misfit = residual * residual / sigma2;
     const double cost = 2.5 * log(1.0 + 0.25 * misfit) / params_.correlated;
     if (cost < none) out->cost += cost - none;
-    if (!prior) {
-      out->explained += line.distance_m < 0.06 || misfit < 9.0;
-      out->seen += out->explained > before && !on_a_line(points, i);
+    if (line.distance_m >= 0.06 && misfit >= 9.0) {
+      take_unexplained();
+    } else if (!prior) {
+      out->explained++;
+      out->seen += !lined;
     }
 
     double row[kAlignStates] = {};
@@ -313,6 +324,8 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
     forward[i] = e.gradient[index[i]];
     for (int k = 0; k < i; k++) forward[i] -= lower[i][k] * forward[k];
   }
+  // In doubt of the pose a scan teaches nothing of sensors and camera.
+  const int kept_to = odds_lost() > kDoubtOdds ? filter_.states() : kPoseStates;
   for (int i = 0; i < n; i++) {
     if (!(d[i] > 0.0)) continue;
     sparse_row row;
@@ -326,9 +339,7 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
     }
     projection projected;
     filter_.project(row, &projected);
-    // In doubt of the pose a scan teaches nothing of sensors and camera.
-    filter_.update(projected, innovation, 1.0 / d[i], kPoseStates,
-                   lost_odds_ > kDoubtOdds ? filter_.states() : kPoseStates);
+    filter_.update(projected, innovation, 1.0 / d[i], kPoseStates, kept_to);
   }
   for (int k = 1; k < found.count; k++)
     if (chance[k] > kLeastChance) filter_.add_chance(chance[k], elsewhere[k]);

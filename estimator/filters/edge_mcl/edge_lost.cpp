@@ -7,8 +7,8 @@ namespace wm {
 namespace {
 
 constexpr double kOddsMax = 6.0;
-constexpr double kLostOdds = 1.0, kFoundOdds = -2.0, kTrustedOdds = -3.0, kEasyOdds = -5.5, kMemory_s = 2.0,
-                 kUsual_s = 10.0;
+constexpr double kLostOdds = 1.0, kFoundOdds = -3.0, kTrustedOdds = -4.5, kEasyOdds = -5.5, kMemory_s = 2.0,
+                 kUsual_s = 10.0, kExpected_s = 60.0;
 constexpr double kApart_m = 0.3, kApart_rad = 0.15, kApart_s = 1.0;
 constexpr double kFoundSigma_m = 0.1, kFoundSigma_rad = 0.03;
 constexpr double kFresh_s = 0.5, kFresh_m = 0.2;  // scans further apart speak each for itself
@@ -19,7 +19,7 @@ constexpr int kAtEase = 4, kNotAtEase = 2;             // a scan's work through 
 constexpr int kLeisure = 8, kWeighedInDoubt = 6, kWeighingShare = 4;
 constexpr int kPosesLeast = place_search::kAligningCost + place_search::kWeighingCost;
 static_assert(kPosesLeast <= EDGE_MCL_SEARCH_POSES_LEAST && lookalikes::kPosesLeast <= EDGE_MCL_SEARCH_POSES_LEAST);
-constexpr double kBetter = 0.15, kRival = 0.01;
+constexpr double kBetter = 0.15, kMuchBetter = 0.4, kRival = 0.01;
 constexpr double kCarriedOff = 7.0;  // odds that nobody has carried it off in the last metres, logarithm of
 constexpr double kNowhere = -1e3;
 
@@ -51,31 +51,40 @@ void edge_mcl::watch(double explained, int seen, double dt_s) {
   if (!(lost_odds_ < kOddsMax)) lost_odds_ = kOddsMax;
   if (!(lost_odds_ > -kOddsMax)) lost_odds_ = -kOddsMax;
 
-  if (state_ == WM_STATE_TRACKING && said < 0.0 && lost_odds_ < kTrustedOdds) search_.mark();
-  if (state_ == WM_STATE_TRACKING && lost_odds_ > kLostOdds) {
+  const double odds = odds_lost();
+  if (state_ == WM_STATE_TRACKING && said < 0.0 && odds < kTrustedOdds) search_.mark();
+  if (state_ == WM_STATE_TRACKING && odds > kLostOdds) {
     state_ = WM_STATE_LOST;
     restore_calibration();
-  } else if (state_ != WM_STATE_TRACKING && lost_odds_ < kFoundOdds) {
+  } else if (state_ != WM_STATE_TRACKING && odds < kFoundOdds) {
     state_ = WM_STATE_TRACKING;
     on_trial_ = false;
     apart_s_ = 0.0;
-  } else if (on_trial_ && lost_odds_ > kLostOdds) {
+  } else if (on_trial_ && odds > kLostOdds) {
     on_trial_ = false;
   }
-  if (!in_doubt_ && lost_odds_ > kDoubtOdds) {
+  if (!in_doubt_ && odds > kDoubtOdds) {
     in_doubt_ = true;
-    search_.begin_at_mark();
-  } else if (in_doubt_ && lost_odds_ < kTrustedOdds) {
+    swept_ = false;
+    if (lost_odds_ > kDoubtOdds)
+      search_.begin_at_mark();
+    else
+      search_.begin_ago(alike_.likelier_for_m());
+  } else if (in_doubt_ && odds < kTrustedOdds) {
     in_doubt_ = false;
   }
-  if (state_ == WM_STATE_TRACKING && lost_odds_ < kTrustedOdds) {
+  if (state_ == WM_STATE_TRACKING && odds < kTrustedOdds) {
     remember_calibration();
     usual_ += dt_s / kUsual_s * (explained - usual_);
+    expected_s_ = expected_s_ + dt_s < kExpected_s ? expected_s_ + dt_s : kExpected_s;
+    if (expected_s_ > 0.0) expected_ += dt_s / expected_s_ * (explained - expected_);
   }
   // Its own place stays one of those that are possible, so it is not left to wander to what happens to fit.
   if (state_ != WM_STATE_TRACKING && filter_.variance(kX) < square(kWander_m))
     filter_.inflate_pose(kLoosened_m2ps * dt_s, kLoosened_rad2ps * dt_s);
 }
+
+double edge_mcl::odds_lost() const { return log(exp(lost_odds_) + alike_.odds()); }
 
 // Motion sensors were silent. The particles go to where the robot may have come; what was seen before can't be put
 // together with what is seen now, and whether the next scans fit must show soon.
@@ -87,6 +96,7 @@ void edge_mcl::doubt_motion() {
   search_.clear();
   others_.clear(filter_.pose(), filter_.odom());
   in_doubt_ = on_trial_ = true;
+  swept_ = false;
   if (state_ == WM_STATE_TRACKING) state_ = WM_STATE_LOST;
   if (lost_odds_ < 0.0) lost_odds_ = 0.0;
 }
@@ -146,13 +156,17 @@ void edge_mcl::look_for_lookalikes(double dt_s) {
   at_ease_ = at_ease;
   const int share = params_.search_poses / (at_ease ? kAtEase : kNotAtEase);
   const int poses = share > lookalikes::kPosesLeast ? share : lookalikes::kPosesLeast;
-  alike_.look(map_, search_.field(), lined_, filter_.pose(), way, sure ? params_.lost_per_s * dt_s : 0.0,
+  alike_.look(map_, search_.field(), lined_, filter_.pose(), way, expected_, sure ? params_.lost_per_s * dt_s : 0.0,
               sure ? poses : 0);
   // A sweep at leisure over what the last metres looked like takes a while. What has become likely among those that
-  // look the same is weighed by it at once.
+  // look the same is weighed by it at once; in doubt also what explains much more.
   constexpr double kNoError[kSlackMost] = {};
-  for (int i = 0; sure && i < alike_.count(); i++)
+  for (int i = 0; state_ != WM_STATE_SEARCHING && i < alike_.count(); i++)
     if (alike_[i].weight > kRival) others_.offer(alike_[i].pose, alike_[i].explained, kNoError);
+  const int best = alike_.best();
+  if (in_doubt_ && state_ != WM_STATE_SEARCHING && best >= 0 && alike_[best].explained > kMuchBetter &&
+      others_.count() < hypotheses::kMost / 2)
+    others_.offer(alike_[best].pose, alike_[best].explained, kNoError);
 }
 
 // Where else could it be? Sweeps over the map bring places, at leisure while there is no doubt; what the last metres
@@ -165,20 +179,28 @@ void edge_mcl::ponder(bool new_keyframe) {
   if (!in_doubt_) poses = poses / kLeisure > kPosesLeast ? poses / kLeisure : kPosesLeast;
   const int affordable = poses / kWeighingShare / place_search::kWeighingCost;
   const int weighed = !in_doubt_ || affordable < 1 ? 1 : affordable < kWeighedInDoubt ? affordable : kWeighedInDoubt;
-  if (search_.step(map_, poses - weighed * place_search::kWeighingCost, filter_.odom())) others_.offer(search_);
+  if (search_.step(map_, poses - weighed * place_search::kWeighingCost, filter_.odom())) {
+    others_.offer(search_);
+    swept_ = true;
+  }
   const double own_prior = state_ == WM_STATE_SEARCHING && !on_trial_ ? kNowhere
                            : state_ == WM_STATE_TRACKING              ? kCarriedOff
                                                                       : 0.0;
   // One's own place explains at least what it explains now: it has been corrected all along, the others have not.
   const double own_least = state_ == WM_STATE_TRACKING ? explained_ : 0.0;
-  others_.weigh(map_, &search_, own_prior, own_least, weighed);
+  const double telling = state_ == WM_STATE_TRACKING ? search_.telling() : (double)search_.keyframes();
+  others_.weigh(map_, &search_, own_prior, own_least, telling, weighed);
   const int best = others_.best();
   const hypothesis &there = others_[best];
   const bool sure = there.weighed && there.share >= params_.search_share && there.explained >= params_.search_explained;
-  if (best > 0 && sure && there.explained >= others_[0].explained + (state_ == WM_STATE_SEARCHING ? 0.0 : kBetter)) {
+  // Lost: until all of the map has been looked at, the true place may be none of those that are known.
+  const bool known = state_ == WM_STATE_TRACKING || swept_;
+  if (best > 0 && sure && known &&
+      there.explained >= others_[0].explained + (state_ == WM_STATE_SEARCHING ? 0.0 : kBetter)) {
     take_place(best);
   } else if (best == 0 && sure && state_ != WM_STATE_TRACKING && !on_trial_) {
     lost_odds_ = 0.0;
+    alike_.forget_odds();
     on_trial_ = true;
   } else if (new_keyframe && state_ != WM_STATE_TRACKING && !on_trial_) {
     seed_cloud();
@@ -213,6 +235,7 @@ void edge_mcl::take_place(int hypothesis) {
   in_doubt_ = on_trial_ = true;
   if (!near(filter_.pose(), pose)) resets_++;
   others_.adopt(hypothesis);
+  alike_.forget_odds();
   filter_.set_pose(pose, covariance);
   cloud_.spread(pose, covariance);
 }

@@ -17,6 +17,8 @@ constexpr double kFarthest_m = 1000.0;
 constexpr double kSilent_s = 1.0;  // between two messages of the motion sensors, after which the way is unknown
 constexpr double kCluster_m = 0.5, kCluster_rad = 0.35;
 constexpr double kFoundCovariance[6] = {0.02, 0.0, 0.02, 0.0, 0.0, 0.0018};  // of a place that the search found
+// Held against other places an image speaks for one's own as an edge does; of itself it says less.
+constexpr double kImageSpeaks = 0.5;
 constexpr size_t kAlign = 64;
 
 constexpr size_t aligned(size_t bytes) { return (bytes + kAlign - 1) & ~(kAlign - 1); }
@@ -72,7 +74,8 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   field_.init(map_, table_, behind);
   search_.init(map_, behind + aligned(score_field::bytes(*setup.map)));
   alike_.init(map_);
-  usual_ = params.lost_explained;
+  usual_ = expected_ = params.lost_explained;
+  expected_s_ = 0.0;
   fused_ns_ = watched_ns_ = remembered_ns_ = driven_ns_ = WM_TIME_NONE;
   remember_calibration();
   remembered_ns_ = WM_TIME_NONE;
@@ -100,6 +103,7 @@ void edge_mcl::start_again(bool known) {
   watched_m_ = filter_.travelled_m() + filter_.turned_rad();
   at_ease_ = false;
   in_doubt_ = !known;
+  swept_ = false;
   on_trial_ = false;
   lost_odds_ = known ? -4.0 : 6.0;
   state_ = known ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
@@ -161,7 +165,8 @@ wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
   record.residual = WM_RESIDUAL_RANGE;
   normal_equations scan{};
   if (align(points, camera, &scan, &record)) fused_ns_ = event.t_ns;
-  watch(scan.seen > 0 ? (double)scan.explained / scan.seen : 0.0, scan.seen, dt);
+  const double known = scan.explained + kImageSpeaks * image_counts(scan.seen) * scan.before;
+  watch(scan.seen > 0 ? known / scan.seen : 0.0, scan.seen, dt);
   const bool new_keyframe = search_.see(lined_, filter_.odom());
   if (state_ == WM_STATE_TRACKING) heed_cloud();
   ponder(new_keyframe);
@@ -217,6 +222,7 @@ void edge_mcl::prepare(const wm_points &points, int camera) {
   for (int i = next; i < next + kScanLanes; i++) scan_.x_m[i] = scan_.y_m[i] = 0.0f;
 
   lined_.count = 0;
+  const float image = (float)image_counts((int)points.count);
   for (uint32_t i = 0; i < points.count; i++) {
     floor_point p{(double)points.x_m[i], (double)points.y_m[i], {}, {}};
     if (!on_a_line(points, i)) continue;
@@ -227,6 +233,11 @@ void edge_mcl::prepare(const wm_points &points, int camera) {
     lined_.x_m[to] = (float)(then.from_now.x_m + h.cos * p.x - h.sin * p.y);
     lined_.y_m[to] = (float)(then.from_now.y_m + h.sin * p.x + h.cos * p.y);
     lined_.camera[to] = camera > 0 ? camera : 0;
+    lined_.image[to] = image;
+    const double ray_x = p.x - (camera >= 0 ? camera_[camera].x_m : 0.0);
+    const double ray_y = p.y - (camera >= 0 ? camera_[camera].y_m : 0.0);
+    lined_.ray_x_m[to] = (float)(h.cos * ray_x - h.sin * ray_y);
+    lined_.ray_y_m[to] = (float)(h.sin * ray_x + h.cos * ray_y);
     for (int k = 0; k < kSlackErrors; k++) {
       const int state = camera >= 0 ? camera_state_[camera][kSlackError[k]] : -1;
       const double sigma = state >= 0 ? std::sqrt(filter_.variance(state)) : 0.0;
@@ -234,6 +245,10 @@ void edge_mcl::prepare(const wm_points &points, int camera) {
       lined_.y_by[k][to] = (float)(sigma * (h.sin * p.x_by[kSlackError[k]] + h.cos * p.y_by[kSlackError[k]]));
     }
   }
+}
+
+double edge_mcl::image_counts(int seen) const {
+  return seen > 0 ? params_.lost_false_points / (seen + params_.lost_false_points) : 0.0;
 }
 
 double edge_mcl::move_cloud() {
@@ -297,7 +312,7 @@ size_t edge_mcl::list_calibration(wm_calibration_value *out, size_t capacity) co
   if (edge_state_ >= 0)
     list.add("edges", "offset_m", filter_.value(edge_state_), std::sqrt(filter_.variance(edge_state_)));
   list.add("edges", "explained", explained_, 0.0);
-  list.add("edges", "lost_probability", 1.0 / (1.0 + exp(-lost_odds_)), 0.0);
+  list.add("edges", "lost_probability", 1.0 / (1.0 + exp(-odds_lost())), 0.0);
   list.add("edges", "alike", (double)alike_.count(), 0.0);
   return list.count();
 }

@@ -69,6 +69,8 @@ class edge_mcl {
   int camera_of(const wm_points &points) const;
   double point_sigma(const wm_points &points, uint32_t i, int camera) const;
   void prepare(const wm_points &points, int camera);
+  // What of a scan of so many points one counts that lies before an edge: of few most may be images, of many few.
+  double image_counts(int seen) const;
   double move_cloud();  // returns the way
   void weigh_cloud(double way_m);
   alignment alignment_of(int camera) const;
@@ -85,6 +87,8 @@ class edge_mcl {
   void describe(const normal_equations &scan, const belief &prior, const alignment &a, wm_innovation *record) const;
   void pull_cloud(const normal_equations &equations);
   void watch(double explained, int seen, double dt_s);
+  // Logarithm of the odds of being lost: what is seen is not explained here, or better elsewhere.
+  double odds_lost() const;
   void doubt_motion();
   void heed_cloud();
   void ponder(bool new_keyframe);
@@ -121,16 +125,18 @@ class edge_mcl {
   wm_pose2 cloud_odom_;
   double cloud_travelled_m_, cloud_turned_rad_;
   wm_time_ns cloud_ns_, fused_ns_, watched_ns_, driven_ns_;
-  double lost_odds_;  // logarithm of
-  double explained_;  // share, smoothed
-  double usual_;      // the same over a longer time, while the pose is trusted
-  double apart_s_;    // the cloud's main cluster has been elsewhere, and better
-  double alike_m_;    // way when look-alikes were last weighed
-  double watched_m_;  // way when the last scan was judged
+  double lost_odds_;              // logarithm of
+  double explained_;              // share, smoothed
+  double usual_;                  // the same over a longer time, while the pose is trusted
+  double expected_, expected_s_;  // the same over a drive's last minute, and over how long
+  double apart_s_;                // the cloud's main cluster has been elsewhere, and better
+  double alike_m_;                // way when look-alikes were last weighed
+  double watched_m_;              // way when the last scan was judged
   uint32_t resets_;
   uint8_t state_;
   bool at_ease_;   // what is seen is what was to be expected
   bool in_doubt_;  // of the pose: what was seen lately is looked for elsewhere
+  bool swept_;     // the whole map has been looked at for what was seen since then
   bool on_trial_;  // a place was taken, the scans have not confirmed it yet
 };
 

@@ -51,13 +51,14 @@ void hypotheses::offer(const wm_pose2 &pose, double explained, const double erro
   for (int e = 0; e < kSlackMost; e++) h.error[e] = error[e];
 }
 
-void hypotheses::weigh(const edge_map &map, place_search *search, double own_prior, double own_least, int some) {
-  const double nats = kNats * search->keyframes();
+void hypotheses::weigh(const edge_map &map, place_search *search, double own_prior, double own_least, double telling,
+                       int some) {
+  const double nats = kNats * telling;
   for (int n = 0; n < some && n < count_; n++, next_++) {
     if (next_ >= count_) next_ = 0;
     hypothesis &h = of_[next_];
     wm_pose2 aligned = h.pose;
-    h.explained = search->explained(map, odom_, &aligned, h.error);
+    h.explained = search->explained(map, odom_, &aligned, h.error, next_ == 0);
     if (next_ == 0) {
       if (h.explained < own_least) h.explained = own_least;
     } else {

@@ -28,7 +28,7 @@ class hypotheses {
   void offer(const wm_pose2 &pose, double explained, const double error[kSlackMost]);
   // Aligns and weighs `some` of them, in turn. `own_prior`: logarithm of how much likelier one's own place is than
   // another before anything is seen; `own_least`: what it explains at least.
-  void weigh(const edge_map &map, place_search *search, double own_prior, double own_least, int some);
+  void weigh(const edge_map &map, place_search *search, double own_prior, double own_least, double telling, int some);
   // Number `i` is the filter's own from now on, and what was is one of the others.
   void adopt(int i);
 

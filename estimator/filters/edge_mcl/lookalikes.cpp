@@ -17,8 +17,13 @@ constexpr double kWorse = 0.15;  // share of the points that a place may explain
 constexpr double kExplained_m = 0.1, kTogether = 5.0;  // so many of its points err together
 constexpr double kOpen_m = 0.3, kOpen_rad = 0.1;       // where the scan says nothing: half of what parts two places
 constexpr double kFound_m = 0.1, kFound_rad = 0.03;
-constexpr double kNats = 3.0, kKeyframe_m = 0.4;  // as hypotheses has them
-constexpr double kNewest = 0.5;                   // what the newest scan counts of `explained`
+// What a usual scan that is explained as a whole says against one that isn't at all; by chance or by a detector's bias
+// a place may look better for metres, by kDrift of the points at least.
+constexpr double kNats = 10.0, kDrift = 0.05, kKeyframe_m = 0.4;
+constexpr double kOddsMost = 50.0, kNone = 1e-4;
+constexpr int kFavoured = 6;  // of those weighed: the likeliest, with each scan
+constexpr double kBetter = 0.2;
+constexpr double kNewest = 0.5;  // what the newest scan counts of `explained`
 // What a place may fall short of the tracked one by on the grid, in parts of what a point counts: half a step of it
 // places and of headings, beside what it may explain less.
 constexpr double kGridLoss = 0.15;
@@ -80,10 +85,15 @@ void lookalikes::carry(const wm_pose2 &odom) {
 
 void lookalikes::choose_points(const slack_points &scan) {
   points_ = scan.count < kPoints ? scan.count : kPoints;
+  image_ = (double)scan.image[0];
+  const double telling = telling_of(scan.count);
+  nats_ = kNats * telling * telling;  // fewer points, and of simpler shapes
   for (int i = 0; i < points_; i++) {
     const int from = (int)((int64_t)i * scan.count / points_);
     x_m_[i] = scan.x_m[from];
     y_m_[i] = scan.y_m[from];
+    ray_x_m_[i] = scan.ray_x_m[from];
+    ray_y_m_[i] = scan.ray_y_m[from];
   }
 }
 
@@ -93,6 +103,24 @@ double lookalikes::odds() const {
   return sum;
 }
 
+int lookalikes::best() const {
+  int best = count_ - 1;
+  for (int i = 0; i < count_; i++)
+    if (of_[i].explained > of_[best].explained) best = i;
+  return best;
+}
+
+double lookalikes::likelier_for_m() const {
+  int best = 0;
+  for (int i = 1; i < count_; i++)
+    if (of_[i].weight > of_[best].weight) best = i;
+  return count_ > 0 ? way_m_ - of_[best].began_m : 0.0;
+}
+
+void lookalikes::forget_odds() {
+  for (int i = 0; i < count_; i++) of_[i].weight = 0.0;
+}
+
 lookalikes::fit lookalikes::fit_at(const edge_map &map, const wm_pose2 &pose) const {
   fit f{};
   const sin_cos h = sincos(pose.heading_rad);
@@ -100,8 +128,15 @@ lookalikes::fit lookalikes::fit_at(const edge_map &map, const wm_pose2 &pose) co
     const double px = (double)x_m_[i], py = (double)y_m_[i];
     const double rx = h.cos * px - h.sin * py, ry = h.sin * px + h.cos * py;
     const edge_line line = map.nearest(pose.x_m + rx, pose.y_m + ry);
-    if (!line.found || line.distance_m > kExplained_m) continue;
+    if (!line.found || line.distance_m > kExplained_m) {
+      const double ray_x = (double)ray_x_m_[i], ray_y = (double)ray_y_m_[i];
+      if (before_an_edge(map, pose.x_m + rx, pose.y_m + ry, h.cos * ray_x - h.sin * ray_y,
+                         h.sin * ray_x + h.cos * ray_y))
+        f.known += image_ / points_;
+      continue;
+    }
     f.explained += 1.0 / points_;
+    f.known += 1.0 / points_;
     const double row[3] = {line.normal_x, line.normal_y, line.normal_y * rx - line.normal_x * ry};
     for (int r = 0; r < 3; r++)
       for (int c = 0; c < 3; c++) f.information[r][c] += row[r] * row[c];
@@ -123,7 +158,8 @@ void lookalikes::describe(const fit &f, lookalike *out) const {
 }
 
 void lookalikes::look(const edge_map &map, const search_field &field, const slack_points &scan, const wm_pose2 &own,
-                      double new_m, double hazard, int poses) {
+                      double new_m, double expected, double hazard, int poses) {
+  expected_ = expected;
   if (scan.count < 8) return;
   choose_points(scan);
   way_m_ += new_m;
@@ -146,10 +182,29 @@ void lookalikes::look(const edge_map &map, const search_field &field, const slac
   running_ = taken_ < found_count_;
 }
 
-// Some of them, in turn.
+// Of those that explain more than the tracked place the one that does by most and wasn't weighed since the robot moved.
+int lookalikes::likeliest_unweighed() const {
+  int best = -1;
+  for (int i = 0; i < count_; i++) {
+    const lookalike &l = of_[i];
+    if (l.weighed_m < way_m_ && l.explained > kBetter && (best < 0 || l.explained > of_[best].explained)) best = i;
+  }
+  return best;
+}
+
+// Some of them: the likeliest, and others in turn.
 void lookalikes::weigh(const edge_map &map, const wm_pose2 &own) {
-  own_explained_ = fit_at(map, own).explained;
-  for (int n = count_ < kWeighed ? count_ : kWeighed; n > 0; n--) {
+  const fit own_fit = fit_at(map, own);
+  own_explained_ = own_fit.explained;
+  own_known_ = own_fit.known;
+  int left = kWeighed;
+  for (int n = 0; n < kFavoured; n++, left--) {
+    const int i = likeliest_unweighed();
+    if (i < 0) break;
+    if (!weigh(map, own, &of_[i]) || listed_before(i, of_[i].pose)) of_[i] = of_[--count_];
+  }
+  if (left > count_) left = count_;
+  for (; left > 0 && count_ > 0; left--) {
     if (next_weighed_ >= count_) next_weighed_ = 0;
     lookalike &l = of_[next_weighed_];
     if (weigh(map, own, &l) && !listed_before(next_weighed_, l.pose))
@@ -163,10 +218,13 @@ bool lookalikes::weigh(const edge_map &map, const wm_pose2 &own, lookalike *l) c
   align_pose(map, x_m_, y_m_, points_, 2, 0.3, kExplained_m, 2, &l->pose);
   const fit f = fit_at(map, l->pose);
   const double new_m = way_m_ - l->weighed_m;
-  const double nats = kNats * (new_m < kKeyframe_m ? new_m / kKeyframe_m : 1.0);
+  const double nats = nats_ * (new_m < kKeyframe_m ? new_m / kKeyframe_m : 1.0);
   l->explained += kNewest * (f.explained - own_explained_ - l->explained);
-  l->weight = l->weight * exp(nats * (f.explained - own_explained_)) + (hazard_ - l->hazard) / kMost;
-  if (!(l->weight < 1.0)) l->weight = 1.0;  // from there on it is for the search to say which it is
+  // What is explained beyond the usual speaks for no place: the tracked one explains no more where it is the right one.
+  const double known = f.known < expected_ ? f.known : expected_;
+  l->weight = l->weight * exp(nats * (known - own_known_ - kDrift)) + (hazard_ - l->hazard) / kMost;
+  if (!(l->weight < kOddsMost)) l->weight = kOddsMost;  // from there on it is for the search to say which it is
+  if (l->weight < kNone) l->began_m = way_m_;
   l->weighed_m = way_m_;
   l->hazard = hazard_;
   describe(f, l);
@@ -246,7 +304,7 @@ void lookalikes::take(const edge_map &map, const wm_pose2 &own, const wm_pose2 &
   align_pose(map, x_m_, y_m_, points_, 2, 0.2, kExplained_m, 3, &l.pose);
   const fit f = fit_at(map, l.pose);
   l.explained = f.explained - own_explained_;
-  l.weighed_m = way_m_;
+  l.weighed_m = l.began_m = way_m_;
   l.hazard = hazard_;
   if (l.explained < -kWorse || !map.drivable(l.pose.x_m, l.pose.y_m) || same(l.pose, own) ||
       listed_before(count_, l.pose))

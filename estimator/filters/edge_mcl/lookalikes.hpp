@@ -16,10 +16,11 @@ namespace wm {
 struct lookalike {
   wm_pose2 pose;         // base_link in map now
   double covariance[6];  // xx, xy, yy, x heading, y heading, heading heading
-  double weight;         // odds against the tracked place, 1 at most
+  double weight;         // odds against the tracked place, 50 at most
   double explained;      // share of the points, more than at the tracked place; smoothed
   double weighed_m;      // way when it was weighed last
   double hazard;         // sum of all until then
+  double began_m;        // way when its odds last were none
 };
 
 class lookalikes {
@@ -31,10 +32,11 @@ class lookalikes {
   void clear(const wm_pose2 &odom);
   void carry(const wm_pose2 &odom);
   // A scan in base_link, which the robot took at `own` if it is where it believes; `new_m`: way since the last one.
-  // `hazard`: probability of having been carried off since. Goes on looking by work worth `poses` at most; none: what
+  // `expected`: share of the points that the map usually explains; `hazard`: probability of having been carried off
+  // since. Goes on looking by work worth `poses` at most; none: what
   // is known is weighed alone, at most kWeighingCost.
   void look(const edge_map &map, const search_field &field, const slack_points &scan, const wm_pose2 &own, double new_m,
-            double hazard, int poses);
+            double expected, double hazard, int poses);
 
   // The sweep begins anew, by the next scan.
   void begin_again() { running_ = false; }
@@ -49,6 +51,12 @@ class lookalikes {
 
   int count() const { return count_; }
   double odds() const;  // of all of them together against the tracked place
+  // The one that explains the most; -1: there is none.
+  int best() const;
+  // Way since the likeliest began to be likelier.
+  double likelier_for_m() const;
+  // What was seen until now has been judged otherwise.
+  void forget_odds();
   const lookalike &operator[](int i) const { return of_[i]; }
 
  private:
@@ -57,11 +65,13 @@ class lookalikes {
     int64_t score;  // as wide as the rest: a copy has no bytes that nobody wrote
   };
   struct fit {
-    double explained, information[3][3];  // the latter in 1/m2, of points of 1 m
+    double explained, known;   // share of the points; the same and what lies before an edge
+    double information[3][3];  // in 1/m2, of points of 1 m
   };
   fit fit_at(const edge_map &map, const wm_pose2 &pose) const;
   void choose_points(const slack_points &scan);
   void weigh(const edge_map &map, const wm_pose2 &own);
+  int likeliest_unweighed() const;
   // Whether it stays.
   bool weigh(const edge_map &map, const wm_pose2 &own, lookalike *l) const;
   bool listed_before(int end, const wm_pose2 &pose) const;
@@ -76,9 +86,12 @@ class lookalikes {
   lookalike of_[kMost];
   int count_;
   wm_pose2 odom_;
-  float x_m_[kPoints], y_m_[kPoints];  // of the newest scan
+  float x_m_[kPoints], y_m_[kPoints], ray_x_m_[kPoints], ray_y_m_[kPoints];  // of the newest scan
   int points_;
-  double own_explained_, way_m_, hazard_;
+  double image_;     // what one of them counts if it lies before an edge
+  double nats_;      // what this scan says where it is explained as a whole
+  double expected_;  // share of the points that is usually explained
+  double own_explained_, own_known_, way_m_, hazard_;
   int next_weighed_;
 
   int32_t steps_[kHeadingsMost][kPoints];

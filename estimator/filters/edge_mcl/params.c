@@ -69,9 +69,9 @@ static const wm_param kParams[] = {
         "lost."),
     F64("lost.relative", lost_relative, 0.75, 0, 1,
         "The same in parts of the share that is usual in this place; the larger of the two counts."),
-    F64("lost.false_points", lost_false_points, 80, 0, 1000,
+    F64("lost.false_points", lost_false_points, 60, 0, 1000,
         "Points of a scan with which half of that share is enough: some are no edge of the map wherever it is, and of "
-        "few they are most."),
+        "few they are most. What lies before an edge, as its image in a shiny floor does, counts by it, too."),
     F64("lost.gain", lost_gain, 8, 0.1, 100,
         "How much a scan speaks: the logarithm of the odds changes by this times the share's difference."),
     F64("lost.per_s", lost_per_s, 0.0001, 0, 1,

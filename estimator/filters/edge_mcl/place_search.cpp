@@ -11,6 +11,7 @@
 namespace wm {
 namespace {
 
+constexpr uint64_t kKeyframesLeast = 4;
 constexpr double kKeyframeWay_m = 0.4, kKeyframeTurn_rad = 0.25;
 constexpr double kSameWay_m = 0.6, kSameTurn_rad = 0.3;  // places nearer than this are one
 // Of 16 places of the grid as many poses as headings at each where a robot may stand, three more where all points were
@@ -46,6 +47,18 @@ void place_search::begin_at_mark() {
   running_ = false;
 }
 
+void place_search::begin_ago(double way_m) {
+  const uint64_t keyframes = (uint64_t)(way_m / kKeyframeWay_m) + kKeyframesLeast;
+  if (seen_ > keyframes && seen_ - keyframes > from_) from_ = seen_ - keyframes;
+  running_ = false;
+}
+
+double place_search::telling() const {
+  double sum = 0.0;
+  for (uint64_t n = oldest(); n < seen_; n++) sum += keyframes_[n % kKeyframes].telling;
+  return sum;
+}
+
 bool place_search::see(const slack_points &scan, const wm_pose2 &odom) {
   if (scan.count < 8) return false;
   if (seen_ > 0) {
@@ -56,12 +69,16 @@ bool place_search::see(const slack_points &scan, const wm_pose2 &odom) {
   }
   keyframe &k = keyframes_[seen_++ % kKeyframes];
   k.odom = odom;
+  k.telling = telling_of(scan.count);
   k.count = scan.count < kPointsEach ? scan.count : kPointsEach;
   for (int i = 0; i < k.count; i++) {
     const int from = (int)((int64_t)i * scan.count / k.count);
     k.camera[i] = scan.camera[from];
     k.x_m[i] = scan.x_m[from];
     k.y_m[i] = scan.y_m[from];
+    k.ray_x_m[i] = scan.ray_x_m[from];
+    k.image[i] = scan.image[from];
+    k.ray_y_m[i] = scan.ray_y_m[from];
     for (int e = 0; e < kSlackErrors; e++) {
       k.x_by[e][i] = scan.x_by[e][from];
       k.y_by[e][i] = scan.y_by[e][from];
@@ -81,6 +98,10 @@ void place_search::gather(const wm_pose2 &odom, slack_points *out) const {
       out->camera[out->count] = k.camera[i];
       out->x_m[out->count] = (float)(from.x_m + h.cos * x - h.sin * y);
       out->y_m[out->count] = (float)(from.y_m + h.sin * x + h.cos * y);
+      out->image[out->count] = k.image[i];
+      const double ray_x = (double)k.ray_x_m[i], ray_y = (double)k.ray_y_m[i];
+      out->ray_x_m[out->count] = (float)(h.cos * ray_x - h.sin * ray_y);
+      out->ray_y_m[out->count] = (float)(h.sin * ray_x + h.cos * ray_y);
       for (int e = 0; e < kSlackErrors; e++) {
         const double by_x = (double)k.x_by[e][i], by_y = (double)k.y_by[e][i];
         out->x_by[e][out->count] = (float)(h.cos * by_x - h.sin * by_y);
@@ -91,11 +112,12 @@ void place_search::gather(const wm_pose2 &odom, slack_points *out) const {
   }
 }
 
-double place_search::explained(const edge_map &map, const wm_pose2 &odom, wm_pose2 *pose, double error[kSlackMost]) {
+double place_search::explained(const edge_map &map, const wm_pose2 &odom, wm_pose2 *pose, double error[kSlackMost],
+                               bool images) {
   gather(odom, &now_);
   align_place(map, now_, 2, 0.3, 0.1, 4, pose, error);
   spent_ += kWeighingCost;
-  return explained_share(map, now_, 0.1, *pose, error);
+  return explained_share(map, now_, 0.1, *pose, error, images);
 }
 
 void place_search::begin(const wm_pose2 &odom) {
@@ -196,7 +218,7 @@ void place_search::refine(const edge_map &map, int poses) {
     align_place(map, all_, 4, 0.4, 0.2, 5, &p.pose, p.error);
     align_place(map, all_, 2, 0.2, 0.1, 4, &p.pose, p.error);
     p.explained = 0.0;
-    if (map.drivable(p.pose.x_m, p.pose.y_m)) p.explained = explained_share(map, all_, 0.1, p.pose, p.error);
+    if (map.drivable(p.pose.x_m, p.pose.y_m)) p.explained = explained_share(map, all_, 0.1, p.pose, p.error, false);
     spent_ += kAligningCost;
   }
 }

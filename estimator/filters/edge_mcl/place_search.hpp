@@ -40,6 +40,8 @@ class place_search {
   // From here on is looked at: what was kept before belongs elsewhere. A sweep that runs begins anew.
   void mark() { marked_ = seen_; }
   void begin_at_mark();
+  // The same from so long a way ago on, about.
+  void begin_ago(double way_m);
   // All that is kept is looked at again.
   void unmark() { from_ = 0; }
   // Goes on by work worth `poses` poses at most. True when a sweep has ended: places() are then sorted by what they
@@ -51,10 +53,12 @@ class place_search {
     return places_;
   }
   // Share of what was seen lately that the map explains about `pose` (base_link in map now) and by the cameras'
-  // `error`, which are aligned.
-  double explained(const edge_map &map, const wm_pose2 &odom, wm_pose2 *pose, double error[kSlackMost]);
+  // `error`, which are aligned. With `images`, what lies before an edge counts for what it may.
+  double explained(const edge_map &map, const wm_pose2 &odom, wm_pose2 *pose, double error[kSlackMost], bool images);
   wm_pose2 odom_of_places() const { return odom_; }
   const search_field &field() const { return field_; }
+  // What these say, in scans of usual points.
+  double telling() const;
   int keyframes() const { return (int)(seen_ - oldest()); }  // that are looked at together
 
  private:
@@ -78,9 +82,11 @@ class place_search {
 
   struct keyframe {
     wm_pose2 odom;
+    double telling;
     int count, camera[kPointsEach];
     float x_m[kPointsEach], y_m[kPointsEach];
     float x_by[kSlackErrors][kPointsEach], y_by[kSlackErrors][kPointsEach];
+    float ray_x_m[kPointsEach], ray_y_m[kPointsEach], image[kPointsEach];
   };
   keyframe keyframes_[kKeyframes];
   uint64_t seen_, marked_, from_;

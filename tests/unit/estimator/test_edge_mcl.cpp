@@ -378,7 +378,7 @@ void weighing_places_spends_what_it_says(void) {
   others.offer(s.search);
   TEST_ASSERT_GREATER_THAN_INT(3, others.count());
   const uint64_t before = s.search.spent();
-  others.weigh(s.edge_map, &s.search, 0.0, 0.0, 3);
+  others.weigh(s.edge_map, &s.search, 0.0, 0.0, s.search.telling(), 3);
   TEST_ASSERT_EQUAL_UINT64(3 * wm::place_search::kWeighingCost, s.search.spent() - before);
 }
 
