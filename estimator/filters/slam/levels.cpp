@@ -18,7 +18,10 @@ constexpr double kGate = 9.0;
 void slam::level_camera(int landmark, int sensor, const marker_reading &r) {
   const int roll = sensor_state_[sensor][kRoll], pitch = sensor_state_[sensor][kPitch];
   landmark_note &note = notes()[landmark];
-  if (roll < 0 || note.sensor != sensor) return;
+  if (roll < 0) return;
+  // Another camera sees it elsewhere in its own axes; a print that two see in turn levels the one that saw it first.
+  if (note.levelled_by < 0) note.levelled_by = sensor;
+  if (note.levelled_by != sensor) return;
   const double *mean = note.levelled_m;
   if (note.levelled > 0.0) {
     const double by_pitch = r.told[0] - mean[0], by_roll = mean[1] - r.told[1];

@@ -205,7 +205,7 @@ void slam::load_map() {
     const double place[3] = {l.p_m[0], l.p_m[1], turned ? wrap(l.yaw_rad) : 0.0};
     const joint_row rows[3] = {};
     const int landmark = joint_.add_landmark(rows, noise, place);
-    notes()[landmark] = {l.id, 0, WM_TIME_NONE, WM_TIME_NONE, l.p_m[2], 0, 1, -1, WM_TIME_NONE, {}, 0.0};
+    notes()[landmark] = {l.id, 0, WM_TIME_NONE, WM_TIME_NONE, l.p_m[2], 0, 1, -1, -1, WM_TIME_NONE, {}, 0.0};
   }
 }
 
@@ -354,7 +354,7 @@ void slam::look_after(wm_time_ns t_ns) {
 }
 
 int slam::note_landmark(int32_t id, int landmark, int sensor, wm_time_ns t_ns) {
-  notes()[landmark] = {id, 1, t_ns, t_ns, 0.0, 0, 0, sensor, WM_TIME_NONE, {}, 0.0};
+  notes()[landmark] = {id, 1, t_ns, t_ns, 0.0, 0, 0, sensor, -1, WM_TIME_NONE, {}, 0.0};
   counts_.joined++;
   return landmark;
 }

@@ -23,8 +23,9 @@ struct landmark_note {
   int32_t misfits;        // in a row
   int32_t surveyed;       // from the map that was given: it doesn't leave
   int32_t sensor;         // that saw it last
+  int32_t levelled_by;    // the sensor whose sightings `levelled_m` is of
   wm_time_ns doubted_ns;  // a sighting that would have moved much was kept back
-  // Of a coded marker, with states for tilt: where it was in the camera's levelled axes, the mean of so many sightings.
+  // Of a coded marker, with states for tilt: where it was in one camera's levelled axes, the mean of so many sightings.
   double levelled_m[3], levelled;
 };
 

@@ -35,6 +35,7 @@ inline double now_s;
 inline double false_share;  // of sightings that are of nothing
 inline bool hidden, twice, nameless, coded, two_poses, two_heights;
 inline double leans[2];            // coded: the camera's roll and pitch beyond what calibration.yaml says
+inline bool in_turn;               // coded: with a second camera, 1 m higher, which doesn't lean
 inline wm_innovation last;         // what became of the last sighting, its last number
 inline int fused, rejected, twin;  // twin: 0, or where a second print of the first identity hangs
 
@@ -62,6 +63,7 @@ inline void make_room() {
   now_s = false_share = 0.0;
   hidden = twice = nameless = coded = two_poses = two_heights = false;
   leans[0] = leans[1] = 0.0;
+  in_turn = false;
   fused = rejected = twin = 0;
 }
 
@@ -113,8 +115,11 @@ inline void drive(double seconds, bool range = true) {
         if (coded) {
           wm_event seen = make::empty(now_s, WM_EVENT_MARKER);
           const double x = r * wm::cos(b), y = r * wm::sin(b), z = two_heights && i % 3 == 0 ? 0.6 : 2.2;
-          seen.as.marker = marker(10 + i, x - leans[1] * z, y + leans[0] * z, z - leans[0] * y + leans[1] * x,
+          const bool other = in_turn && step % 20 == 10;
+          const double roll = other ? 0.0 : leans[0], pitch = other ? 0.0 : leans[1], up = other ? z - 1.0 : z;
+          seen.as.marker = marker(10 + i, x - pitch * up, y + roll * up, up - roll * y + pitch * x,
                                   wm::wrap(0.5 * i - truth.heading_rad + gauss(0.01)));
+          seen.as.marker.sensor = other;
           if (two_poses) {  // the wrong one first, turned to the other side of the line of sight
             wm_marker &m = seen.as.marker;
             m.poses = 2;

@@ -27,6 +27,18 @@ void test_a_camera_that_leans_is_found_by_how_high_markers_seem_to_hang(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[1], counted("camera.pitch_rad"));
 }
 
+void test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt(void) {
+  wm_sensor both[2] = {sensor, sensor};
+  std::strcpy(both[1].name, "other");
+  both[1].mounting.xyz_m[2] += 1.0;
+  setup.sensors = both;
+  setup.sensor_count = 2;
+  in_turn = true;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_of_leaning(0.05));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, leans[0], counted("camera.roll_rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, leans[1], counted("camera.pitch_rad"));
+}
+
 void test_taken_for_level_it_bends_the_map(void) { TEST_ASSERT_GREATER_THAN_DOUBLE(0.06, worst_of_leaning(0)); }
 
 // A turn of 0.25 rad/s and a stamp that is off by 0.2 s: 0.05 rad.
@@ -53,6 +65,7 @@ void tearDown(void) { leave_room(); }
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_a_camera_that_leans_is_found_by_how_high_markers_seem_to_hang);
+  RUN_TEST(test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt);
   RUN_TEST(test_taken_for_level_it_bends_the_map);
   RUN_TEST(test_stamps_that_scatter_matter_where_it_turns);
   return UNITY_END();
