@@ -4,6 +4,7 @@
 #define WAYMARK_TESTS_ESTIMATOR_EVENTS_HPP
 
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <initializer_list>
 #include <utility>
@@ -96,6 +97,17 @@ inline wm_setup setup(const wm_motion_params &motion, const wm_sensor &sensor) {
   s.sensors = &sensor;
   s.sensor_count = 1;
   return s;
+}
+
+// What an estimator that begins so remembers, for std::free; nullptr: it can't begin.
+inline void *begun(const wm_estimator &estimator, const void *params, const wm_setup &setup) {
+  const char *why = nullptr;
+  const size_t bytes = estimator.state_bytes(params, &setup, &why);
+  if (bytes == 0) return nullptr;
+  void *state = aligned_alloc(16, (bytes + 15) / 16 * 16);
+  if (estimator.init(state, params, &setup) == WM_OK) return state;
+  std::free(state);
+  return nullptr;
 }
 
 }  // namespace make

@@ -68,12 +68,9 @@ inline void make_room() {
 }
 
 inline void begin() {
-  const char *why = "";
   std::free(state);
-  const size_t bytes = slam->state_bytes(&params, &setup, &why);
-  TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-  state = aligned_alloc(16, (bytes + 15) / 16 * 16);
-  TEST_ASSERT_EQUAL(WM_OK, slam->init(state, &params, &setup));
+  state = make::begun(*slam, &params, setup);
+  TEST_ASSERT_NOT_NULL(state);
 }
 
 inline wm_verdict see(const wm_event &e) {

@@ -67,11 +67,8 @@ void make_room() {
 }
 
 void begin() {
-  const char *why = nullptr;
-  const size_t bytes = ekf->state_bytes(&params, &setup, &why);
-  TEST_ASSERT_GREATER_THAN(0, bytes);
-  state = aligned_alloc(16, (bytes + 15) / 16 * 16);
-  TEST_ASSERT_EQUAL(WM_OK, ekf->init(state, &params, &setup));
+  state = make::begun(*ekf, &params, setup);
+  TEST_ASSERT_NOT_NULL(state);
 }
 
 wm_estimate estimate() {

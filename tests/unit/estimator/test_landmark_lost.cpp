@@ -39,11 +39,8 @@ int in_turn;  // 1: all are seen at each step; n: of n steps each has one
 void begin() {
   for (int i = 0; i < kLandmarks; i++)
     for (int k = 0; k < 2; k++) stands_m[i][k] = landmarks[i].p_m[k];
-  const char *why = nullptr;
-  const size_t bytes = ekf->state_bytes(&params, &setup, &why);
-  TEST_ASSERT_GREATER_THAN(0, bytes);
-  state = aligned_alloc(16, (bytes + 15) / 16 * 16);
-  TEST_ASSERT_EQUAL(WM_OK, ekf->init(state, &params, &setup));
+  state = make::begun(*ekf, &params, setup);
+  TEST_ASSERT_NOT_NULL(state);
 }
 
 void begin_without_pose() {
