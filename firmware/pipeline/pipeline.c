@@ -91,6 +91,10 @@ int wm_pipeline_publish(wm_pipeline *self, wm_time_ns now_ns, wm_published *out)
   return there_is_one;
 }
 
+int wm_pipeline_expect(const wm_pipeline *self, wm_time_ns now_ns, wm_estimate *out) {
+  return wm_predictor_expect(&self->predictor, now_ns, out);
+}
+
 void wm_pipeline_finish(wm_pipeline *self) {
   wm_merge_flush(self->merge);
   fuse_final(self);

@@ -76,3 +76,15 @@ int wm_predictor_publish(wm_predictor *self, wm_time_ns now_ns, wm_published *ou
   self->last_t_ns = now_ns;
   return 1;
 }
+
+int wm_predictor_expect(const wm_predictor *self, wm_time_ns now_ns, wm_estimate *out) {
+  wm_odom_point odom;
+  if (self->has_fused) return wm_odometry_carry(self->odometry, &self->fused, now_ns, out, &odom) == WM_OK;
+  if (wm_odometry_at(self->odometry, now_ns, &odom) != WM_OK) return 0;
+  memset(out, 0, sizeof *out);
+  out->t_ns = now_ns;
+  out->state = WM_STATE_SEARCHING;
+  out->v_mps[0] = odom.v_mps;
+  out->w_radps[2] = odom.w_radps;
+  return 1;
+}

@@ -58,12 +58,14 @@ static void end_steady(replay *self) {
 static void publish_until(replay *self, wm_time_ns now_ns) {
   while (self->next_tick_ns < now_ns) {
     wm_published published;
+    wm_estimate expected;
     wm_pipeline_advance(&self->pipeline, self->next_tick_ns);
     if (wm_pipeline_publish(&self->pipeline, self->next_tick_ns, &published)) {
       published.sent_ns = self->next_tick_ns;
-      wm_vision_tell(self->assembly.vision, &published.now);
       self->output.put(self->output.context, WM_OUTPUT_PUBLISHED, &published, sizeof published);
     }
+    if (wm_pipeline_expect(&self->pipeline, self->next_tick_ns, &expected))
+      wm_vision_tell(self->assembly.vision, &expected);
     self->next_tick_ns += self->publish_ns;
   }
 }

@@ -63,10 +63,11 @@ static void publish(live *run, wm_time_ns now_ns) {
   if (now_ns < self->next_publish_ns) return;
   while (self->next_publish_ns <= now_ns) self->next_publish_ns += self->publish_ns;
   wm_published published;
+  wm_estimate expected;
+  if (wm_pipeline_expect(&self->pipeline, now_ns, &expected)) wm_vision_tell(run->assembly.vision, &expected);
   if (!wm_pipeline_publish(&self->pipeline, now_ns, &published)) return;
   published.deadlines_missed = (uint32_t)self->deadlines_missed;
   published.sent_ns = run_now(&run->clock);
-  wm_vision_tell(run->assembly.vision, &published.now);
   wm_histogram_add(&self->age_ns, published.sent_ns - published.now.t_ns);
   put(self, WM_OUTPUT_PUBLISHED, &published, sizeof published);
 }

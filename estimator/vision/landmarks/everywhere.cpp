@@ -8,11 +8,9 @@
 namespace wm {
 namespace {
 
-constexpr int kLanes = 16, kRowsMax = 16, kRowsMin = 5, kColumnsMin = 4;
-constexpr double kArea = 90;  // pixels of a template that isn't slanted
-// Wider landmarks are shop boards and the like: letters, of which a small template keeps nothing. They are found by the
-// pose that others tell.
-constexpr double kWide = 2.5;
+constexpr int kLanes = 16, kColumnsMax = 2 * kLanes, kRowsMax = 16, kRowsMin = 5, kColumnsMin = 4;
+constexpr double kArea = 90;   // pixels of a template that isn't slanted, nor wider than this many times its height:
+constexpr double kWide = 2.5;  // shop boards and the like keep their rows, so that their letters aren't all lost
 constexpr double kLikeness = 0.6;   // of a place that is worth a second look
 constexpr double kPromise = 0.2;    // less than that much worse than wanted: its neighbours are looked at
 constexpr double kSpread_grey = 5;  // of what can be compared at all
@@ -38,7 +36,7 @@ form form_of(double width_m, double height_m, double above_m) {
 struct small_picture {
   int rows, columns;
   int64_t energy;
-  int16_t level[kRowsMax * kLanes];  // less their mean; 0 beside
+  int16_t level[kRowsMax * kColumnsMax];  // less their mean; 0 beside
 };
 
 // How the landmark looks on a cylinder, its right side farther away by the slant. What perspective adds to that differs
@@ -48,14 +46,14 @@ bool draw_small(const appearance &what, const form &shape, double height_m, doub
   out->rows = shape.rows;
   const double pixel_m = what.height_m / shape.rows, distance_m = pixel_m / kStep_rad,
                wanted = what.width_m * facing / pixel_m;
-  out->columns = wanted >= kLanes ? kLanes : static_cast<int>(wanted + 0.5);
+  out->columns = wanted >= kColumnsMax ? kColumnsMax : static_cast<int>(wanted + 0.5);  // of a wider one, its middle
   if (out->columns < kColumnsMin) return false;
   const double across = std::sqrt(1 - facing * facing);
   const int right = static_cast<int>(2 / facing + 0.5), down = 2;
   int size = 0;
   while (size + 1 < what.sizes && what.rows[0] > 3 * (out->rows << size)) size++;
   std::memset(out->level, 0, sizeof out->level);
-  double grey[kRowsMax * kLanes], sum = 0;
+  double grey[kRowsMax * kColumnsMax], sum = 0;
   for (int x = 0; x < out->columns; x++) {
     double to_right[16], away[16];
     for (int j = 0; j < right; j++) {
@@ -72,15 +70,15 @@ bool draw_small(const appearance &what, const form &shape, double height_m, doub
           mean += grey_of(what, size, (to_right[j] / what.width_m + 0.5) * what.columns[0] - 0.5,
                           (0.5 - (away[j] * tangent - height_m) / what.height_m) * what.rows[0] - 0.5);
       }
-      sum += grey[y * kLanes + x] = mean / (right * down);
+      sum += grey[y * kColumnsMax + x] = mean / (right * down);
     }
   }
   out->energy = 0;
   sum /= out->rows * out->columns;
   for (int y = 0; y < out->rows; y++)
     for (int x = 0; x < out->columns; x++) {
-      int16_t &level = out->level[y * kLanes + x];
-      level = static_cast<int16_t>(std::floor(4 * (grey[y * kLanes + x] - sum) + 0.5));
+      int16_t &level = out->level[y * kColumnsMax + x];
+      level = static_cast<int16_t>(std::floor(4 * (grey[y * kColumnsMax + x] - sum) + 0.5));
       out->energy += level * level;
     }
   return out->energy > 16 * kSpread_grey * kSpread_grey * out->rows * out->columns;
@@ -90,8 +88,9 @@ int32_t together(const cylinder &on, const small_picture &what, int left, int to
   int32_t sum = 0;
   for (int y = 0; y < what.rows; y++) {
     const uint8_t *from = on.row(top + y) + left;
-    const int16_t *level = what.level + y * kLanes;
-    for (int x = 0; x < kLanes; x++) sum += level[x] * static_cast<int16_t>(from[x]);
+    const int16_t *level = what.level + y * kColumnsMax;
+    for (int lane = 0; lane < what.columns; lane += kLanes)
+      for (int x = lane; x < lane + kLanes; x++) sum += level[x] * static_cast<int16_t>(from[x]);
   }
   return sum;
 }
@@ -188,7 +187,6 @@ int search_everywhere::search(const mounted_camera &camera, const appearance *kn
   for (int turn = 0; turn < known_count && compared < compare_max; turn++) {
     const appearance &what = known[next];
     next = next + 1 < known_count ? next + 1 : 0;
-    if (what.width_m > kWide * what.height_m) continue;
     const double height_m = what.place_m.z - camera.centre_m.z;
     const form shape = form_of(what.width_m, what.height_m, height_m);
     shortlist best{};

@@ -4,8 +4,12 @@
 namespace wm {
 namespace {
 
-constexpr double kCarry_s = 1;  // a twist says nothing of what is farther away
 constexpr double kStep_m = 0.01, kStep_rad = 1e-3;
+
+void place_camera(const mounted_camera &camera, camera_guess *guess) {
+  guess->R_map_optical = guess->R_map_base * camera.R_base_optical;
+  guess->eye_m = guess->base_m + guess->R_map_base * camera.centre_m;
+}
 
 }  // namespace
 
@@ -18,12 +22,33 @@ bool guess_camera(const mounted_camera &camera, const wm_estimate *prediction, w
   const quat q = quat_of(prediction->pose_map_base.q_xyzw);
   out->R_map_base = matrix_of(q * turn_by(dt_s * w));
   out->base_m = vec_of(prediction->pose_map_base.p_m) + dt_s * (matrix_of(q * turn_by(0.5 * dt_s * w)) * v);
-  out->R_map_optical = out->R_map_base * camera.R_base_optical;
-  out->eye_m = out->base_m + out->R_map_base * camera.centre_m;
+  place_camera(camera, out);
   constexpr int kOf[3] = {0, 1, 5};
   for (int i = 0; i < 3; i++)
     for (int k = 0; k < 3; k++) out->cov[i][k] = prediction->covariance[wm_cov_index(kOf[i], kOf[k])];
   return finite(out->eye_m) && finite(out->cov[0][0]) && finite(out->cov[1][1]) && finite(out->cov[2][2]);
+}
+
+void carry_guess(const mounted_camera &camera, const vec3 &v_mps, const vec3 &w_radps, double dt_s,
+                 camera_guess *guess) {
+  constexpr double kOff_m = 0.03, kOffOfWay = 0.05, kOff_rad = 0.01, kOffOfTurn = 0.05;
+  const vec3 way = dt_s * (guess->R_map_base * (matrix_of(turn_by(0.5 * dt_s * w_radps)) * v_mps)),
+             turn = dt_s * w_radps;
+  guess->base_m = guess->base_m + way;
+  guess->R_map_base = guess->R_map_base * matrix_of(turn_by(turn));
+  place_camera(camera, guess);
+  // A heading that is off swings the way: x by -way.y, y by way.x.
+  const double swing[2] = {-way.y, way.x};
+  double(*cov)[3] = guess->cov;
+  const double by_heading[2] = {cov[0][2], cov[1][2]};
+  for (int i = 0; i < 2; i++)
+    for (int k = 0; k < 2; k++)
+      cov[i][k] += swing[i] * by_heading[k] + by_heading[i] * swing[k] + swing[i] * cov[2][2] * swing[k];
+  for (int i = 0; i < 2; i++) cov[i][2] = cov[2][i] = by_heading[i] + swing[i] * cov[2][2];
+  const double off_m2 = square(kOff_m) + square(kOffOfWay) * (square(way.x) + square(way.y));
+  cov[0][0] += off_m2;
+  cov[1][1] += off_m2;
+  cov[2][2] += square(kOff_rad) + square(kOffOfTurn * turn.z);
 }
 
 void expected_spread(const mounted_camera &camera, const camera_guess &guess, const appearance &what,

@@ -9,6 +9,8 @@
 
 namespace wm {
 
+inline constexpr double kCarry_s = 1;  // a twist says nothing of what is farther away
+
 struct camera_guess {
   vec3 base_m, eye_m;  // in map
   mat3 R_map_base, R_map_optical;
@@ -17,6 +19,11 @@ struct camera_guess {
 
 // Carries the state to t_ns by its own twist. False where nothing is known: no state, searching, lost, or too old.
 bool guess_camera(const mounted_camera &camera, const wm_estimate *prediction, wm_time_ns t_ns, camera_guess *out);
+
+// Moves the guess by a twist (base_link's axes, m/s and rad/s) that was held for dt_s, and makes it less sure by what
+// such a twist may be off.
+void carry_guess(const mounted_camera &camera, const vec3 &v_mps, const vec3 &w_radps, double dt_s,
+                 camera_guess *guess);
 
 // Sigmas in pixels of a landmark's middle: by the pose, the landmark's place and the mounting's three angles.
 void expected_spread(const mounted_camera &camera, const camera_guess &guess, const appearance &what,

@@ -15,12 +15,19 @@ namespace wm {
 namespace {
 
 constexpr size_t kFoundMax = 128;
-constexpr int kTries = 8;  // looks at full resolution in a picture that is searched
+constexpr int kTries = 8;  // looks at full resolution in a picture that is searched, at kRate_hz
 constexpr size_t kAgreeing =
     3;  // landmarks that one pose must explain where it was guessed from one that looks less alike
 constexpr double kRate_hz = 30.0, kPeriodsMost = 8.0;  // of pictures, for which search_places is meant; at fewer: more
 constexpr size_t kFewOf = 5;  // a pose that finds less than one in so many of those that it expects is hardly right
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+// Where the camera was by what was recognised in a picture, and how the robot moved then.
+struct remembered {
+  wm_time_ns t_ns;  // WM_TIME_NONE: nothing was
+  camera_guess guess;
+  vec3 v_mps, w_radps;
+};
 
 struct landmarks_state {
   looker eye;
@@ -29,6 +36,7 @@ struct landmarks_state {
   wm_time_ns readout_ns;
   wm_time_ns found_ns;   // when the pose last led to a landmark
   wm_time_ns before_ns;  // the picture before
+  remembered place;
   uint16_t *row;
   int count;
   appearance *known;
@@ -117,7 +125,7 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   if (mounted_camera_init(&state->eye.camera, *camera)) return WM_BAD_CONFIG;
   state->steep = is_steep(*camera);
   state->readout_ns = camera->readout_ns;
-  state->found_ns = state->before_ns = WM_TIME_NONE;
+  state->found_ns = state->before_ns = state->place.t_ns = WM_TIME_NONE;
   lay_out(state, state->eye.params, *view, state->eye.camera);
   return WM_OK;
 }
@@ -283,26 +291,61 @@ void look_by(landmarks_state *self, const wm_frame &frame, const camera_guess &g
   out->count = drop_strays(self, guess, out->which, out->events, out->likeness, out->count);
 }
 
-// How many places the time since the picture before allows to compare: who sees few pictures has time for each.
-int places_of(const landmarks_state &self, wm_time_ns t_ns) {
-  double periods = 1.0;
-  if (self.before_ns != WM_TIME_NONE) periods = kRate_hz * wm_seconds_between(self.before_ns, t_ns);
-  periods = periods > kPeriodsMost ? kPeriodsMost : larger(periods, 1.0);
-  return static_cast<int>(periods * self.eye.params.search_places);
+// Whether what was found bears the pose out: a wrong pose finds one thing or another that looks like what it expects.
+bool is_led(const landmarks_state &self, const found_list &found) {
+  size_t expected = 0;
+  for (int i = 0; i < self.count; i++) expected += wm_look_is_expected(self.looks[i].look) != 0;
+  return found.count > 0 && kFewOf * found.count >= expected;
 }
 
-// Looks everywhere for the landmarks whose turn it is; one that is recognised says where the others are.
-void look_everywhere(landmarks_state *self, const wm_frame &frame, found_list *out) {
+// How much more time there is for a picture than at kRate_hz: who sees few has time for each.
+double time_of(const landmarks_state &self, wm_time_ns t_ns) {
+  if (self.before_ns == WM_TIME_NONE) return 1.0;
+  const double periods = kRate_hz * wm_seconds_between(self.before_ns, t_ns);
+  return periods > kPeriodsMost ? kPeriodsMost : larger(periods, 1.0);
+}
+
+// Where the camera is by what was recognised in a picture before, carried on as the robot moves.
+bool carry_place(const landmarks_state &self, const wm_estimate *prediction, wm_time_ns t_ns, camera_guess *out) {
+  const remembered &before = self.place;
+  if (!prediction || before.t_ns == WM_TIME_NONE) return false;
+  const double dt_s = wm_seconds_between(before.t_ns, t_ns);
+  if (!(std::fabs(dt_s) < kCarry_s)) return false;
+  *out = before.guess;
+  carry_guess(self.eye.camera, 0.5 * (before.v_mps + vec_of(prediction->v_mps)),
+              0.5 * (before.w_radps + vec_of(prediction->w_radps)), dt_s, out);
+  return finite(out->eye_m) && finite(out->cov[0][0]) && finite(out->cov[2][2]);
+}
+
+void remember_place(landmarks_state *self, const wm_estimate *prediction, wm_time_ns t_ns, const camera_guess &guess) {
+  self->place.t_ns = prediction ? t_ns : WM_TIME_NONE;
+  if (!prediction) return;
+  self->place.guess = guess;
+  self->place.v_mps = vec_of(prediction->v_mps);
+  self->place.w_radps = vec_of(prediction->w_radps);
+}
+
+// Looks everywhere for the landmarks whose turn it is; one that is recognised says where the others are, in this
+// picture and in the next one.
+void look_everywhere(landmarks_state *self, const wm_frame &frame, const wm_estimate *prediction, found_list *out) {
   search_everywhere &search = self->search;
   const wm_landmarks_params &params = self->eye.params;
+  camera_guess best, carried;
+  size_t most = 0;
+  if (carry_place(*self, prediction, frame.t_ns, &carried)) {
+    look_by(self, frame, carried, true, out);
+    best = carried;
+    most = is_led(*self, *out) ? out->count : 0;
+    if (most > 0) correct_guess(self->eye, self->known, self->looks, self->count, &best);
+  }
+  const double time = time_of(*self, frame.t_ns);
   search.round.take(self->eye.picture);
   search.search(self->eye.camera, self->known, self->count, params.range_max_m, params.facing_min, tilt_of(params),
-                places_of(*self, frame.t_ns));
-  for (int i = 0; i < search.count && i < kTries; i++) {
+                static_cast<int>(time * params.search_places));
+  for (int i = 0; i < search.count && i < static_cast<int>(time * kTries); i++) {
     const possible_place &where = search.places[i];
     recognised seen;
-    camera_guess best;
-    size_t most = 0;
+    const size_t before = most;
     for (const int side : {1, -1}) {
       if (!recognise(&self->eye, self->known[where.landmark], where, side, &seen)) continue;
       look_by(self, frame, seen.guess, false, out);
@@ -311,20 +354,16 @@ void look_everywhere(landmarks_state *self, const wm_frame &frame, found_list *o
       best = seen.guess;
       correct_guess(self->eye, self->known, self->looks, self->count, &best);
     }
-    if (most == 0) continue;
+    if (most > before) break;
+  }
+  if (most > 0) {
     look_by(self, frame, best, true, out);
-    search.next = where.landmark;  // it will be there in the next picture, too
+    if (out->count > 0) correct_guess(self->eye, self->known, self->looks, self->count, &best);
+    if (out->count > 0) remember_place(self, prediction, frame.t_ns, best);
     return;
   }
   out->count = 0;
   forget_looks(self);
-}
-
-// Whether what was found bears the pose out: a wrong pose finds one thing or another that looks like what it expects.
-bool is_led(const landmarks_state &self, const found_list &found) {
-  size_t expected = 0;
-  for (int i = 0; i < self.count; i++) expected += wm_look_is_expected(self.looks[i].look) != 0;
-  return found.count > 0 && kFewOf * found.count >= expected;
 }
 
 wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *prediction, wm_event *out, size_t capacity,
@@ -346,7 +385,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *predic
   const bool blind = wm_seconds_between(self->found_ns, frame.t_ns) > self->eye.params.search_after_s;
   if ((!guessed || blind) && self->eye.params.search_places > 0) {
     const size_t by_pose = found.count;
-    look_everywhere(self, frame, &found);
+    look_everywhere(self, frame, prediction, &found);
     if (guessed && by_pose > 0 && found.count <= by_pose) look_by(self, frame, guess, true, &found);
   }
   self->before_ns = frame.t_ns;

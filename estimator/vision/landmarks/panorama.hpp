@@ -33,7 +33,7 @@ struct cylinder {
 };
 
 struct panorama {
-  static constexpr int kCylinders = 10;
+  static constexpr int kCylinders = 12;
   static constexpr double kCoarser = 1.26;  // from one cylinder to the next
   double left_rad, right_rad;               // azimuths that the camera sees
   int above, below;                         // rows over and under the horizon that every cylinder needs
@@ -45,7 +45,7 @@ struct panorama {
   }
   // How fine, and how many rows: those needed, and more by `tilt_rad`. The finest cylinder's column is `finest_px` of
   // the picture's middle wide.
-  void plan(const mounted_camera &camera, double tilt_rad, double finest_px = 2);
+  void plan(const mounted_camera &camera, double tilt_rad, double finest_px = 1.26);
   size_t bytes() const;
   // Lays out and makes the tables. `memory` is bytes() long.
   void make(const mounted_camera &camera, uint8_t *memory);

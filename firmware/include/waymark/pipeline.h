@@ -43,6 +43,8 @@ void wm_pipeline_arrive(wm_pipeline *self, const wm_event *event);
 void wm_pipeline_advance(wm_pipeline *self, wm_time_ns now_ns);
 // The pose of `now_ns` into *out, not yet sent. 0 where there is none to tell.
 int wm_pipeline_publish(wm_pipeline *self, wm_time_ns now_ns, wm_published *out);
+// What the pictures of `now_ns` are looked at with (wm_predictor_expect). 0 where nothing is known.
+int wm_pipeline_expect(const wm_pipeline *self, wm_time_ns now_ns, wm_estimate *out);
 void wm_pipeline_finish(wm_pipeline *self);
 
 // Fills all but what sources and loop count themselves. Not cheap (tens of us): once a second.

@@ -34,5 +34,8 @@ void wm_predictor_motion(wm_predictor *self, const wm_event *event);
 void wm_predictor_fused(wm_predictor *self, const wm_estimate *fused, const wm_motion_calibration *calibration);
 // The pose at `now_ns`. 0 where there is none to tell: searching, no motion yet, or now_ns not after the last one.
 int wm_predictor_publish(wm_predictor *self, wm_time_ns now_ns, wm_published *out);
+// What the pictures of `now_ns` are looked at with: the pose, or while there is none (searching) how the robot moves.
+// 0 where nothing is known: no motion yet.
+int wm_predictor_expect(const wm_predictor *self, wm_time_ns now_ns, wm_estimate *out);
 
 #endif

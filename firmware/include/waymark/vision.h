@@ -51,7 +51,8 @@ void wm_vision_tell_pictures(wm_vision *vision, wm_picture_fn tell, void *contex
 
 // The memory that it wants; at most WM_VISION_NEEDS lines. Returns how many.
 size_t wm_vision_needs(wm_vision *self, wm_arena_need *needs);
-// The newest pose, for detectors that it guides. By one thread, from start on; never waits. `self` may be NULL.
+// The newest pose (searching: how the robot moves), for detectors that it guides. By one thread, from start on; never
+// waits. `self` may be NULL.
 void wm_vision_tell(wm_vision *self, const wm_estimate *newest);
 // With the memory in place: makes the detectors' tables. Takes a while.
 wm_status wm_vision_start(wm_vision *self, wm_error *err);

@@ -18,7 +18,7 @@ namespace {
 
 constexpr uint32_t kWidth = 480, kHeight = 300;
 constexpr int kSignSide = 96;
-constexpr double kSize_m = 1.0;
+constexpr double kSize_m = 1.0, kBoard = 4.5;
 const int32_t kCamera = 0;
 
 wm_rig rig;
@@ -39,6 +39,15 @@ double sign_at(double x, double y) {
   if (std::fabs(x + 0.12) < 0.05 && y < 0 && r < 0.3) return 70;
   return 210;
 }
+
+// A shop's board: strokes of letters, no two alike. x in its heights, from the middle.
+double board_at(double x, double y) {
+  if (std::fabs(x) > 0.5 * kBoard - 0.1 || std::fabs(y) > 0.4) return 60;
+  const auto letter = static_cast<uint64_t>((x + kBoard) * 2.5), part = static_cast<uint64_t>((y + 1) * 3);
+  return wm_random_uniform(21, letter, part) < 0.5 ? 40 : 220;
+}
+
+bool is_board;
 
 struct Place {
   double x_m = 0, y_m = 0, heading_rad = 0;
@@ -88,8 +97,8 @@ std::vector<uint8_t> draw(const Place &at, const Scene &scene) {
                          pz = camera.centre_m.z + far * d.z - landmark.p_m[2];
             const double a = (px * std::cos(yaw) + py * std::sin(yaw)) / kSize_m, b = pz / kSize_m;
             grey = 90 + 25 * std::sin(3 * a) + 15 * std::sin(4 * b + a);
-            if (scene.there && std::fabs(a) < 0.5 && std::fabs(b) < 0.5)
-              grey = scene.other ? sign_at(b, a) : sign_at(a, b);
+            if (scene.there && std::fabs(a) < (is_board ? 0.5 * kBoard : 0.5) && std::fabs(b) < 0.5)
+              grey = is_board ? board_at(a, b) : scene.other ? sign_at(b, a) : sign_at(a, b);
             if (scene.hidden && std::fabs(a - 0.2) < 0.3 && b < 0.3) grey = 50;
           }
         }
@@ -130,8 +139,8 @@ struct Eyes {
   Eyes(const Eyes &) = delete;
   Eyes &operator=(const Eyes &) = delete;
   ~Eyes() { free(state); }
-  size_t look(const std::vector<uint8_t> &picture, const wm_estimate *prediction) const {
-    const wm_frame frame = {5000, 6000, 0, 1, 0, kWidth, kHeight, kWidth, picture.data()};
+  size_t look(const std::vector<uint8_t> &picture, const wm_estimate *prediction, wm_time_ns t_ns = 5000) const {
+    const wm_frame frame = {t_ns, t_ns + 1000, 0, 1, 0, kWidth, kHeight, kWidth, picture.data()};
     size_t count = 0;
     TEST_ASSERT_EQUAL(WM_OK, detector->detect(state, &frame, prediction, events, 64, &count));
     return count;
@@ -247,6 +256,89 @@ void found_anywhere_without_a_pose() {
   TEST_ASSERT_TRUE(std::sqrt(squares / found) < 1.5);
 }
 
+// How many of 12 pictures from about 12 m away it is found in without a pose, each time where it is.
+int found_from_afar() {
+  int found = 0;
+  const Eyes eyes;
+  for (uint64_t i = 0; i < 12; i++) {
+    const auto random = [i](uint64_t k) { return 2 * wm_random_uniform(13, k, i) - 1; };
+    const Place at = {-6 + 0.5 * random(1), 2 * random(2), 0.5 * random(3)};
+    Scene scene;
+    scene.seed = i + 1;
+    if (eyes.look(draw(at, scene), nullptr) == 0) continue;
+    found++;
+    const wm_sighting &seen = events[0].as.sighting;
+    TEST_ASSERT_TRUE(std::fabs(std::remainder(seen.bearing_rad - true_bearing(at), 2 * M_PI)) <
+                     4 * seen.bearing_sigma_rad);
+    scene.there = false;
+    TEST_ASSERT_EQUAL(0, eyes.look(draw(at, scene), nullptr));
+  }
+  return found;
+}
+
+void found_without_a_pose_where_it_has_thirteen_pixels() {
+  params.likeness_alone = 0.85;  // so few are never very much alike, and no others are there to agree
+  const int found = found_from_afar();
+  std::printf("without a pose, 12 m away: found %d of 12\n", found);
+  TEST_ASSERT_GREATER_OR_EQUAL(6, found);
+}
+
+void a_wide_board_is_found_without_a_pose() {
+  is_board = true;
+  std::vector<uint8_t> board(kSignSide * 432);
+  for (int y = 0; y < kSignSide; y++)
+    for (int x = 0; x < 432; x++)
+      board[static_cast<size_t>(y * 432 + x)] =
+          static_cast<uint8_t>(board_at((x + 0.5) / kSignSide - 0.5 * kBoard, 0.5 - (y + 0.5) / kSignSide));
+  appearance = {7, 432, kSignSide, board.data(), kBoard * kSize_m, kSize_m, appearance.yaw_rad};
+  const int found = found_from_afar();
+  std::printf("a board without a pose, 12 m away: found %d of 12\n", found);
+  TEST_ASSERT_GREATER_OR_EQUAL(9, found);
+}
+
+// Recognised once, it is found from picture to picture by how the robot moves, although nobody knows where that is.
+void what_was_recognised_is_followed() {
+  params.search_places = 1;  // the landmarks have their turn one by one, a picture each
+  const wm_landmark first = landmark;
+  std::vector<uint8_t> other(sign.rbegin(), sign.rend());
+  wm_landmark all[12];
+  wm_appearance looks[12];
+  for (int i = 0; i < 12; i++) {
+    all[i] = first;
+    looks[i] = appearance;
+    if (i == 0) continue;
+    all[i].id = looks[i].landmark_id = 20 + i;
+    all[i].p_m[0] = -30;  // nowhere near
+    looks[i].yaw_rad += M_PI;
+    looks[i].grey = other.data();
+  }
+  view.landmarks = all;
+  view.appearances = looks;
+  view.landmark_count = view.appearance_count = 12;
+  const Eyes eyes;
+  int followed = 0;
+  wm_estimate moving = pose_of({0, 0, 0}, 1, 1);
+  moving.state = WM_STATE_SEARCHING;
+  moving.v_mps[0] = 2;
+  moving.w_radps[2] = 0.5;
+  for (int i = 0; i < 10; i++) {
+    const double t_s = 0.1 * i, a = 0.5 * t_s;  // an arc of 4 m
+    const Place at = {1 + 4 * std::sin(a), 4 - 4 * std::cos(a), a};
+    Scene scene;
+    scene.seed = static_cast<uint64_t>(i + 1);
+    const wm_time_ns t_ns = 5000 + i * 100 * WM_NS_PER_MS;
+    moving.t_ns = t_ns;
+    const size_t count = eyes.look(draw(at, scene), &moving, t_ns);
+    for (size_t k = 0; k < count; k++) {
+      if (events[k].as.sighting.landmark_id != 7) continue;
+      TEST_ASSERT_TRUE(std::fabs(std::remainder(events[k].as.sighting.bearing_rad - true_bearing(at), 2 * M_PI)) <
+                       0.002);
+      followed++;
+    }
+  }
+  TEST_ASSERT_EQUAL(10, followed);
+}
+
 // A pose that leads to nothing is doubted after a while.
 void carried_off_it_is_found_where_it_is() {
   const Eyes eyes;
@@ -327,6 +419,7 @@ void setUp() {
     for (int x = 0; x < kSignSide; x++)
       sign[static_cast<size_t>(y * kSignSide + x)] =
           static_cast<uint8_t>(sign_at((x + 0.5) / kSignSide - 0.5, 0.5 - (y + 0.5) / kSignSide));
+  is_board = false;
   appearance = {7, kSignSide, kSignSide, sign.data(), kSize_m, kSize_m, -M_PI / 2 + 0.2};
   view = {&rig, &kCamera, &landmark, 1, &appearance, 1, nullptr, 0};
   wm_params_defaults(&wm_landmarks_params_table, &params);
@@ -339,6 +432,9 @@ int main() {
   RUN_TEST(found_where_it_is_with_the_sigma_that_it_has);
   RUN_TEST(what_is_not_there_is_not_found_and_said_why);
   RUN_TEST(found_anywhere_without_a_pose);
+  RUN_TEST(found_without_a_pose_where_it_has_thirteen_pixels);
+  RUN_TEST(a_wide_board_is_found_without_a_pose);
+  RUN_TEST(what_was_recognised_is_followed);
   RUN_TEST(carried_off_it_is_found_where_it_is);
   RUN_TEST(a_pose_that_says_nothing_guides_nowhere);
   RUN_TEST(a_moving_robot_is_expected_where_it_was);

@@ -106,6 +106,23 @@ static void a_pose_set_anew_is_announced_however_small_the_move(void) {
   TEST_ASSERT_EQUAL_UINT32(1, p.jumps);
 }
 
+static void pictures_are_told_the_pose_or_the_motion_alone(void) {
+  wm_published p;
+  wm_estimate e;
+  TEST_ASSERT_EQUAL(0, wm_predictor_expect(&predictor, 0, &e));
+  for (int ms = 0; ms <= 100; ms += 10) move(ms, 1, 0.5);
+  TEST_ASSERT_EQUAL(0, wm_predictor_publish(&predictor, 110 * MS, &p));
+  TEST_ASSERT_EQUAL(1, wm_predictor_expect(&predictor, 110 * MS, &e));
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, e.state);
+  TEST_ASSERT_EQUAL_INT64(110 * MS, e.t_ns);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1, e.v_mps[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5, e.w_radps[2]);
+  fuse(50, 3, 4, 0.3, 0);
+  TEST_ASSERT_EQUAL(1, wm_predictor_expect(&predictor, 120 * MS, &e));
+  TEST_ASSERT_EQUAL(1, wm_predictor_publish(&predictor, 120 * MS, &p));
+  TEST_ASSERT_EQUAL_MEMORY(&p.now, &e, sizeof e);
+}
+
 static void old_motion_and_old_fusion_are_said(void) {
   wm_published p;
   move(0, 0, 0);
@@ -134,6 +151,7 @@ int main(void) {
   RUN_TEST(stamps_rise_strictly);
   RUN_TEST(a_move_of_map_against_odom_is_announced_once);
   RUN_TEST(a_pose_set_anew_is_announced_however_small_the_move);
+  RUN_TEST(pictures_are_told_the_pose_or_the_motion_alone);
   RUN_TEST(old_motion_and_old_fusion_are_said);
   RUN_TEST(without_a_pose_nothing_is_said);
   return UNITY_END();
