@@ -8,13 +8,6 @@ namespace wm {
 namespace {
 
 constexpr double kFarthest_m = 1e4;
-constexpr double kAgree_m = 0.2;                          // of two markers on how far they are apart
-constexpr double kKnown_rad = 0.05;                       // sigma of a heading to begin with
-constexpr double kMapped_m = 0.01, kMapped_rad = 0.005;   // what the map adds to a sighting
-constexpr double kCarried_m = 0.03, kCarried_rad = 0.02;  // and odometry, to one that was seen from elsewhere
-constexpr double kStood_m = 0.02;
-constexpr double kNoTurn = 1e6, kThreeSigmas = 9.0;
-constexpr double kRough = 2.5;  // a turn that is not to be believed may be off by so many of its sigmas
 constexpr double kThreeNumbers = 11.345 / 9.210;  // 99 % of chi2 with three degrees of freedom against two
 constexpr double kPlain = 9.0;                    // of two poses one is 90 times as likely
 
@@ -128,60 +121,6 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   else
     join_marker(m, r, past, blank, records);
   return WM_OK;
-}
-
-// Lost on a map: two different markers of it that are as far apart as the map says tell where the robot is. Its heading
-// is the weighted mean of what their places say and what each one's turn says, if these agree. The other marker was
-// seen a while ago, and is carried on by the odometry.
-bool slam::find_start(int landmark, const wm_marker &m, const marker_reading &r, bool two) {
-  const mounted_sensor &sensor = sensor_[m.sensor];
-  const double turn_variance = two ? kNoTurn : (r.turned ? 1.0 : square(kRough)) * r.noise[2] + square(kMapped_rad);
-  const seen_marker now = {m.id, r.noise[0] + square(kMapped_m), turn_variance,
-                           compose({sensor.x_m, sensor.y_m, sensor.yaw_rad}, {r.level[0], r.level[1], r.yaw_rad}),
-                           joint_.odom()};
-  seen_marker before = candidate_;
-  candidate_ = now;
-  const int earlier = before.id < 0 || before.id == m.id ? -1 : find_landmark((int32_t)before.id);
-  if (earlier < 0) return false;
-  const wm_pose2 way = between(now.odom, before.odom);
-  if (square(way.x_m) + square(way.y_m) > square(kStood_m)) {
-    before.variance_m2 += square(kCarried_m);
-    before.turn_variance += square(kCarried_rad);
-  }
-  const wm_pose2 other = compose(way, before.seen);
-  const auto on_map = [this](int which) {
-    const int state = joint_.landmark_state(which);
-    return wm_pose2{joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};
-  };
-  const wm_pose2 marker = on_map(landmark), other_marker = on_map(earlier);
-  const double seen[2] = {other.x_m - now.seen.x_m, other.y_m - now.seen.y_m};
-  const double mapped[2] = {other_marker.x_m - marker.x_m, other_marker.y_m - marker.y_m};
-  const double apart = std::sqrt(square(mapped[0]) + square(mapped[1]));
-  if (std::fabs(apart - std::sqrt(square(seen[0]) + square(seen[1]))) > kAgree_m) return false;
-
-  const double says[3] = {atan2(mapped[1], mapped[0]) - atan2(seen[1], seen[0]),
-                          marker.heading_rad - now.seen.heading_rad, other_marker.heading_rad - other.heading_rad};
-  const auto turn_weight = [this](const seen_marker &sighting, int which) {
-    return joint_.variance(joint_.landmark_state(which) + 2) < 1.0 ? 1.0 / sighting.turn_variance : 0.0;
-  };
-  const double weight[3] = {square(apart) / (now.variance_m2 + before.variance_m2), turn_weight(now, landmark),
-                            turn_weight(before, earlier)};
-  const double all = weight[0] + weight[1] + weight[2];
-  const double first = weight[0] > weight[1] ? says[0] : says[1];
-  double heading = first;
-  for (int i = 0; i < 3; i++) heading += weight[i] / all * wrap(says[i] - first);
-  if (all * square(kKnown_rad) < 1.0 || weight[1] + weight[2] < 1.0) return false;
-  for (int i = 0; i < 3; i++)
-    if (square(wrap(says[i] - heading)) * weight[i] > kThreeSigmas) return false;
-
-  const sin_cos h = sincos(heading);
-  const wm_pose2 here = {marker.x_m - h.cos * now.seen.x_m + h.sin * now.seen.y_m,
-                         marker.y_m - h.sin * now.seen.x_m - h.cos * now.seen.y_m, wrap(heading)};
-  const double xy = square(kAgree_m), covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(kKnown_rad)}};
-  joint_.set_pose(here, covariance);
-  searching_ = false;
-  resets_++;
-  return true;
 }
 
 // Along and across the line of sight, and the heading: expected from `place` (x, y, heading in map). Rows by the state

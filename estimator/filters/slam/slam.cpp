@@ -163,7 +163,8 @@ void slam::start_again() {
   look_.fused = look_.refused = 0;
   resets_++;
   searching_ = params_.map != WM_SLAM_MAP_NONE && params_.markers && !(place && heading);
-  candidate_.id = -1;
+  candidate_.id = lone_.id = rests_on_ = -1;
+  one_refuted_ = false;
   if (params_.map != WM_SLAM_MAP_NONE) load_map();
 }
 
@@ -249,6 +250,7 @@ wm_status slam::take_pose(const wm_event &event) {
   joint_.set_pose(given.pose, covariance);
   forget_tracks();
   searching_ = false;
+  rests_on_ = -1;
   resets_++;
   return WM_OK;
 }

@@ -119,6 +119,14 @@ class slam {
     double variance_m2, turn_variance;  // of its distance and of its heading
     wm_pose2 seen, odom;                // in base_link; where that was
   };
+  // One marker by whose turn alone the robot may find itself, as its first sighting of those that agree had it.
+  struct lone_marker {
+    int32_t id;
+    int seen;          // sightings that agree
+    wm_pose2 odom;     // the marker in odom
+    double sight_rad;  // there, from the sensor to it
+    double variance_m2, turn_variance;
+  };
   struct marker_view {
     joint_row row[3];
     double observed[3], expected[3], innovation[3];
@@ -169,6 +177,11 @@ class slam {
                    record_list records);
   void level_camera(int landmark, int sensor, const marker_reading &r);
   bool find_start(int landmark, const wm_marker &m, const marker_reading &r, bool two);
+  wm_pose2 on_map(int landmark) const;
+  void start_at(const wm_pose2 &marker, const wm_pose2 &seen, double heading_rad);
+  bool start_by_two(int landmark, const seen_marker &now);
+  bool start_by_one(int landmark, const wm_marker &m, const marker_reading &r, const seen_marker &now);
+  void doubt_start(int misfits);
   void note_fused(int landmark, int sensor);
   bool believable(int landmark, const joint_state::innovation_block &block, double noise, double scale);
   // Is this identity not one landmark's: seen twice in a picture, or at two places in turn?
@@ -222,9 +235,12 @@ class slam {
   identity_list moved_, doubled_;
   look_record look_;
   uint32_t resets_;
-  // Started somewhere on a map that was given: no pose until two of its markers say the same.
+  // Started somewhere on a map that was given: no pose until two of its markers, or sightings of one, say the same.
   bool searching_;
   seen_marker candidate_;  // the one that was seen first; its id is -1: none
+  lone_marker lone_;       // its id is -1: none
+  int32_t rests_on_;       // the one marker by which the pose was found, until another is fused; else -1
+  bool one_refuted_;       // by the others: it takes two
 };
 
 }  // namespace wm

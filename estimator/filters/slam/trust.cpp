@@ -72,6 +72,7 @@ void slam::note_fused(int landmark, int sensor) {
   note.last_ns = now;
   note.sensor = sensor;
   fused_ns_ = now;
+  if (note.id != rests_on_) rests_on_ = -1;
   if (other_fused_id_[0] != note.id) {
     other_fused_id_[1] = other_fused_id_[0];
     other_fused_ns_[1] = other_fused_ns_[0];
@@ -85,6 +86,7 @@ void slam::note_fused(int landmark, int sensor) {
 void slam::misfit(int landmark, bool ranged) {
   landmark_note &note = notes()[landmark];
   note.misfits++;
+  doubt_start(note.misfits);
   // With a range a single sighting makes a landmark: a misread code, too.
   const bool unconfirmed = ranged && !note.surveyed && note.seen < (uint32_t)params_.confirm_seen;
   if (unconfirmed && note.misfits >= kUnconfirmedMisfits) return drop_landmark(landmark);

@@ -70,9 +70,9 @@ wm_verdict see_from_start(int i, double far_m, double turned_rad) {
   return see(seen);
 }
 
-void start_lost_before_markers() {
+void start_lost_before_markers(int map = WM_SLAM_MAP_FROZEN) {
   params.markers = 1;
-  params.map = WM_SLAM_MAP_FROZEN;
+  params.map = map;
   for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
   setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = kAbsent;
   begin();
@@ -98,6 +98,89 @@ void test_started_lost_two_markers_are_not_believed_that_are_not_as_far_apart_as
   wm_estimate e;
   slam->estimate(state, &e);
   TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, e.state);
+}
+
+// Drives as fast and sees marker number `i` alone, ten times a second: what is upright so surely turned, or its mirror
+// image about the line of sight; what is level (no sigma of its own) has none.
+void pass_by(int i, double speed_mps, double seconds, double yaw_sigma_rad, bool mirrored) {
+  const double dt = 0.02, until = now_s + seconds;
+  for (int step = 0; now_s < until; step++) {
+    const wm_event e = make::twist(now_s, speed_mps, 0);
+    TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+    if (step % 5 == 0) {
+      const wm_pose2 at = wm::between(wm::compose(truth, {0.2, 0, 0}), {place[i][0], place[i][1], 0.5 * i});
+      const double yaw = mirrored ? 2.0 * wm::atan2(at.y_m, at.x_m) + wm::kPi - at.heading_rad : at.heading_rad;
+      wm_event seen = make::empty(now_s, WM_EVENT_MARKER);
+      seen.as.marker = marker(10 + i, at.x_m, at.y_m, 0, wm::wrap(yaw));
+      seen.as.marker.yaw_sigma_rad = yaw_sigma_rad;
+      see(seen);
+    }
+    const wm::arc a = wm::make_arc(speed_mps * dt, 0);
+    truth = wm::compose(truth, {a.x_m, a.y_m, a.turn_rad});
+    now_s += dt;
+  }
+  const wm_event e = make::twist(now_s, speed_mps, 0);
+  TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+}
+
+void test_started_lost_it_finds_itself_by_one_marker_that_it_drives_past(void) {
+  start_lost_before_markers();
+  pass_by(1, 0.5, 0.05, 0.01, false);
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
+  pass_by(1, 0.5, 0.95, 0.01, false);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.03, off());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, sigma());
+}
+
+void test_started_lost_a_mirror_image_of_one_marker_is_not_believed(void) {
+  start_lost_before_markers();
+  for (int i = 0; i < 20; i++) {
+    pass_by(1, 0.5, 0.1, 0.01, true);
+    TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
+  }
+}
+
+void test_started_lost_one_marker_whose_turn_is_hardly_seen_does_not_do(void) {
+  start_lost_before_markers();
+  pass_by(1, 0.5, 2, 0.15, false);
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
+}
+
+// A marker that was moved would spoil the map.
+void test_started_lost_on_a_map_that_grows_it_takes_two_markers(void) {
+  start_lost_before_markers(WM_SLAM_MAP_EXTEND);
+  pass_by(1, 0.5, 2, 0.01, false);
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
+  pass_by(3, 0.5, 0.1, 0.01, false);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+}
+
+// An upright marker that is seen from one place may be the mirror image of what it seems. A level one is not.
+void test_started_lost_and_standing_it_finds_itself_by_one_marker_that_is_level(void) {
+  for (double yaw_sigma_rad : {0.01, 0.0}) {
+    make_room();
+    start_lost_before_markers();
+    pass_by(1, 0, 1, yaw_sigma_rad, false);
+    TEST_ASSERT_EQUAL(yaw_sigma_rad > 0.0 ? WM_STATE_SEARCHING : WM_STATE_TRACKING, published_state());
+  }
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.03, off());
+}
+
+void test_a_start_by_one_marker_that_was_moved_is_taken_back_when_others_are_seen(void) {
+  start_lost_before_markers();
+  place[1][0] += 0.5;
+  place[1][1] -= 1.5;
+  pass_by(1, 0.5, 0.5, 0.01, false);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+  pass_by(3, 0.5, 0.2, 0.01, false);
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
+  pass_by(1, 0.5, 1, 0.01, false);  // not again
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
+  pass_by(3, 0.5, 0.1, 0.01, false);
+  pass_by(2, 0.5, 0.5, 0.01, false);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
 }
 
 void test_a_map_with_nan_loses_those_landmarks_alone(void) {
@@ -141,6 +224,12 @@ int main(void) {
   RUN_TEST(test_started_lost_on_a_map_of_markers_it_finds_itself);
   RUN_TEST(test_started_lost_it_finds_itself_by_the_places_of_two_markers_whose_turns_disagree);
   RUN_TEST(test_started_lost_two_markers_are_not_believed_that_are_not_as_far_apart_as_on_the_map);
+  RUN_TEST(test_started_lost_it_finds_itself_by_one_marker_that_it_drives_past);
+  RUN_TEST(test_started_lost_a_mirror_image_of_one_marker_is_not_believed);
+  RUN_TEST(test_started_lost_one_marker_whose_turn_is_hardly_seen_does_not_do);
+  RUN_TEST(test_started_lost_on_a_map_that_grows_it_takes_two_markers);
+  RUN_TEST(test_started_lost_and_standing_it_finds_itself_by_one_marker_that_is_level);
+  RUN_TEST(test_a_start_by_one_marker_that_was_moved_is_taken_back_when_others_are_seen);
   RUN_TEST(test_a_map_with_nan_loses_those_landmarks_alone);
   RUN_TEST(test_a_frozen_map_of_markers_with_nan_locates_by_the_others);
   return UNITY_END();
