@@ -12,7 +12,8 @@ constexpr double kFalse = 0.2;                // share of detections that are an
 constexpr double kLeast = -4.0, kMost = 8.0;  // of a witness: so that a change is noticed
 constexpr double kApart_s = 0.3;              // observations nearer in time share their errors, and count in part
 constexpr double kMemory_s = 3.0;
-constexpr double kMoved = 0.02, kConfirmedMoved = 0.002, kKnownMoved = 0.9;
+// That a landmark has moved, or that something by it looks like it: from the same place it does so each time.
+constexpr double kMoved = 0.035, kConfirmedMoved = 0.002, kKnownMoved = 0.9;
 constexpr double kMeanOf = 0.1, kAnyway = 10.0;  // sigma of the mean of white ones: 0.23
 constexpr double kBiased = 1.2, kLately_s = 1.0;
 constexpr int kProof = 12;  // observations

@@ -259,8 +259,9 @@ void forget_looks(landmarks_state *self) {
     self->looks[i] = {self->known[i].id, WM_LOOK_UNCERTAIN, {kNan, kNan}, {kNan, kNan}, kNan};
 }
 
-// Looks where a pose says that the landmarks are.
-void look_by(landmarks_state *self, const wm_frame &frame, const camera_guess &guess, bool believed, found_list *out) {
+// Looks where a pose says that the landmarks are, at those that have so many pixels. `believed` as of look_for.
+void look_by(landmarks_state *self, const wm_frame &frame, const camera_guess &guess, bool believed, double area_px2,
+             found_list *out) {
   const wm_landmarks_params &params = self->eye.params;
   out->count = 0;
   for (int i = 0; i < self->count; i++) {
@@ -269,6 +270,7 @@ void look_by(landmarks_state *self, const wm_frame &frame, const camera_guess &g
     look = {what.id, WM_LOOK_UNCERTAIN, {kNan, kNan}, {kNan, kNan}, kNan};
     candidate one;
     look.look = static_cast<uint8_t>(expect_landmark(self->eye, guess, what, kAreaMax, &one));
+    if (look.look == WM_LOOK_FOUND && one.area_px2 < area_px2) look.look = WM_LOOK_TOO_SMALL;
     if (look.look != WM_LOOK_FOUND) continue;
     look.expected_px[0] = one.middle.u;
     look.expected_px[1] = one.middle.v;
@@ -333,7 +335,7 @@ void look_everywhere(landmarks_state *self, const wm_frame &frame, const wm_esti
   camera_guess best, carried;
   size_t most = 0;
   if (carry_place(*self, prediction, frame.t_ns, &carried)) {
-    look_by(self, frame, carried, true, out);
+    look_by(self, frame, carried, true, params.search_area_px2, out);
     best = carried;
     most = is_led(*self, *out) ? out->count : 0;
     if (most > 0) correct_guess(self->eye, self->known, self->looks, self->count, &best);
@@ -348,7 +350,7 @@ void look_everywhere(landmarks_state *self, const wm_frame &frame, const wm_esti
     const size_t before = most;
     for (const int side : {1, -1}) {
       if (!recognise(&self->eye, self->known[where.landmark], where, side, &seen)) continue;
-      look_by(self, frame, seen.guess, false, out);
+      look_by(self, frame, seen.guess, false, params.search_area_px2, out);
       if (out->count < (seen.likeness >= params.likeness_alone ? 1 : kAgreeing) || out->count <= most) continue;
       most = out->count;
       best = seen.guess;
@@ -357,7 +359,7 @@ void look_everywhere(landmarks_state *self, const wm_frame &frame, const wm_esti
     if (most > before) break;
   }
   if (most > 0) {
-    look_by(self, frame, best, true, out);
+    look_by(self, frame, best, true, params.search_area_px2, out);
     if (out->count > 0) correct_guess(self->eye, self->known, self->looks, self->count, &best);
     if (out->count > 0) remember_place(self, prediction, frame.t_ns, best);
     return;
@@ -380,13 +382,13 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *predic
   found.capacity = capacity;
   found.count = 0;
   forget_looks(self);
-  if (guessed) look_by(self, frame, guess, true, &found);
+  if (guessed) look_by(self, frame, guess, true, 0, &found);
   if (is_led(*self, found) || self->found_ns == WM_TIME_NONE) self->found_ns = frame.t_ns;
   const bool blind = wm_seconds_between(self->found_ns, frame.t_ns) > self->eye.params.search_after_s;
   if ((!guessed || blind) && self->eye.params.search_places > 0) {
     const size_t by_pose = found.count;
     look_everywhere(self, frame, prediction, &found);
-    if (guessed && by_pose > 0 && found.count <= by_pose) look_by(self, frame, guess, true, &found);
+    if (guessed && by_pose > 0 && found.count <= by_pose) look_by(self, frame, guess, true, 0, &found);
   }
   self->before_ns = frame.t_ns;
   *count = in_order(out, found.likeness, found.count);

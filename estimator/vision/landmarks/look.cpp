@@ -42,6 +42,7 @@ wm_look expect_landmark(const looker &self, const camera_guess &guess, const app
   };
   const double wide = 0.5 * (side(0, 1) + side(2, 3)), high = 0.5 * (side(1, 2) + side(3, 0));
   out->shorter_px = wide < high ? wide : high;
+  out->area_px2 = wide * high;
   if (!(out->shorter_px >= self.params.size_min_px)) return WM_LOOK_TOO_SMALL;
   out->level = 0;
   const double longer = wide < high ? high : wide;

@@ -29,7 +29,7 @@ struct candidate {
   const appearance *what;
   panel_view view;
   pixel middle, corners[4];
-  double shorter_px;
+  double shorter_px, area_px2;
   int level;
 };
 

@@ -28,6 +28,9 @@ static const wm_param kParams[] = {
         "How many places a picture are compared with landmarks, some 20 ns each, while there is no pose that says "
         "where they are, at 30 pictures a second; at fewer, up to 8 times as many. 0: nothing is searched without a "
         "pose."),
+    F64("search_area_px2", search_area_px2, 140, 0, 1e6,
+        "px^2. Area that a landmark must have in the picture while there is no pose: of a smaller one there is another "
+        "thing near by that looks as much like it."),
     F64("search_after_s", search_after_s, 0.5, 0, 3600,
         "s. The pose led to no landmark for so long: they are searched everywhere, too."),
     F64("likeness_alone", likeness_alone, 0.93, 0.3, 1,

@@ -33,6 +33,7 @@ bool recognise(looker *self, const appearance &what, const possible_place &where
     candidate one;
     sight seen;
     if (expect_landmark(*self, guess_there(), what, area, &one) != WM_LOOK_FOUND) return false;
+    if (one.area_px2 < self->params.search_area_px2) return false;
     const double reach = kReach_px << one.level;
     if (look_for(self, one, reach, reach, false, &seen) != WM_LOOK_FOUND) return false;
     azimuth = azimuth_of(*self, seen.at);

@@ -170,6 +170,24 @@ void test_one_that_contradicts_has_moved_and_many_mean_lost(void) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.9, w.probability());
 }
 
+// Of two landmarks one fits and one doesn't, again and again: whoever stated the pose is as likely to be right as the
+// map and the picture. Two that don't fit are enough.
+void test_one_against_one_is_doubt_not_lost(void) {
+  const double fits = wm::witnesses::against(20.0, wm::kTwoPi), contradicts = wm::witnesses::against_all();
+  for (const int wrong : {1, 2}) {
+    wm::landmark_record record[3] = {};
+    wm::witnesses w;
+    std::memset(static_cast<void *>(&w), 0, sizeof w);
+    w.begin(-2.5);
+    for (int step = 0; step < 30; step++)
+      for (int i = 0; i <= wrong; i++)
+        w.note(wm_ns_from_seconds(0.1 * step), i, i == 0 ? fits : contradicts, i == 0 ? 0.0 : 1.0, i == 0 ? 0.0 : 50.0,
+               record + i);
+    TEST_ASSERT_EQUAL(wrong == 2, w.contradicted());
+    TEST_ASSERT_TRUE(w.doubtful());
+  }
+}
+
 // Detections of nothing, 30 degrees apart, of three landmarks out of view, while one in view fits: not lost. The same
 // misfits all in one place: lost, whatever the one that fits says.
 void test_misfits_that_scatter_say_nothing_those_in_one_place_do(void) {
@@ -380,6 +398,7 @@ int main(void) {
   RUN_TEST(test_three_bearings_give_the_pose);
   RUN_TEST(test_bearings_that_say_nothing_give_no_pose);
   RUN_TEST(test_one_that_contradicts_has_moved_and_many_mean_lost);
+  RUN_TEST(test_one_against_one_is_doubt_not_lost);
   RUN_TEST(test_misfits_that_scatter_say_nothing_those_in_one_place_do);
   RUN_TEST(test_started_without_a_pose_three_bearings_are_enough);
   RUN_TEST(test_a_pose_found_by_a_moved_landmark_is_mended);

@@ -256,11 +256,11 @@ void found_anywhere_without_a_pose() {
   TEST_ASSERT_TRUE(std::sqrt(squares / found) < 1.5);
 }
 
-// How many of 12 pictures from about 12 m away it is found in without a pose, each time where it is.
+// How many of 8 pictures from there (12 m away) it is found in without a pose, each time where it is.
 int found_from_afar() {
   int found = 0;
   const Eyes eyes;
-  for (uint64_t i = 0; i < 12; i++) {
+  for (uint64_t i = 0; i < 8; i++) {
     const auto random = [i](uint64_t k) { return 2 * wm_random_uniform(13, k, i) - 1; };
     const Place at = {-6 + 0.5 * random(1), 2 * random(2), 0.5 * random(3)};
     Scene scene;
@@ -270,6 +270,7 @@ int found_from_afar() {
     const wm_sighting &seen = events[0].as.sighting;
     TEST_ASSERT_TRUE(std::fabs(std::remainder(seen.bearing_rad - true_bearing(at), 2 * M_PI)) <
                      4 * seen.bearing_sigma_rad);
+    if (i % 4 != 0) continue;
     scene.there = false;
     TEST_ASSERT_EQUAL(0, eyes.look(draw(at, scene), nullptr));
   }
@@ -279,8 +280,14 @@ int found_from_afar() {
 void found_without_a_pose_where_it_has_thirteen_pixels() {
   params.likeness_alone = 0.85;  // so few are never very much alike, and no others are there to agree
   const int found = found_from_afar();
-  std::printf("without a pose, 12 m away: found %d of 12\n", found);
-  TEST_ASSERT_GREATER_OR_EQUAL(6, found);
+  std::printf("without a pose, 12 m away: found %d of 8\n", found);
+  TEST_ASSERT_GREATER_OR_EQUAL(3, found);
+}
+
+void what_is_too_small_is_not_recognised() {
+  params.likeness_alone = 0.85;
+  params.search_area_px2 = 300;
+  TEST_ASSERT_EQUAL(0, found_from_afar());
 }
 
 void a_wide_board_is_found_without_a_pose() {
@@ -292,8 +299,8 @@ void a_wide_board_is_found_without_a_pose() {
           static_cast<uint8_t>(board_at((x + 0.5) / kSignSide - 0.5 * kBoard, 0.5 - (y + 0.5) / kSignSide));
   appearance = {7, 432, kSignSide, board.data(), kBoard * kSize_m, kSize_m, appearance.yaw_rad};
   const int found = found_from_afar();
-  std::printf("a board without a pose, 12 m away: found %d of 12\n", found);
-  TEST_ASSERT_GREATER_OR_EQUAL(9, found);
+  std::printf("a board without a pose, 12 m away: found %d of 8\n", found);
+  TEST_ASSERT_GREATER_OR_EQUAL(6, found);
 }
 
 // Recognised once, it is found from picture to picture by how the robot moves, although nobody knows where that is.
@@ -433,6 +440,7 @@ int main() {
   RUN_TEST(what_is_not_there_is_not_found_and_said_why);
   RUN_TEST(found_anywhere_without_a_pose);
   RUN_TEST(found_without_a_pose_where_it_has_thirteen_pixels);
+  RUN_TEST(what_is_too_small_is_not_recognised);
   RUN_TEST(a_wide_board_is_found_without_a_pose);
   RUN_TEST(what_was_recognised_is_followed);
   RUN_TEST(carried_off_it_is_found_where_it_is);
