@@ -62,6 +62,7 @@ struct side_points {
   int sample[kSamples];
   double beside[kSamples];  // of each sample: how much of the other border is beside it there, 0 to 1
   double share;             // their mean over the points
+  bool deep[kSamples];      // of the other border: it is there, with white as far behind it as behind the first
 };
 
 // How far along a side a sample is, 0 to 1.
@@ -107,24 +108,45 @@ bool corners_of(const line *side, int count, flat *out) {
   return true;
 }
 
-// Where on side `from` the other border is: how white it is on that one's far side.
+// How white it is behind each sample of side `from`: so many widths of the stretch between the two borders from where
+// `scale` times the side is, straight inwards; 1 and more as white as beside the first border, 0 and less as black.
+struct behind {
+  const tangent_view &view;
+  const wm_frame &frame;
+  const wm_marker_print &print;
+  const homography &h;
+  const double *a, *b;
+
+  bool grey(int sample, double scale, double widths, double *out) const {
+    const double t = along_side(sample), in = 0.5 * widths * (1.0 - print.other);
+    const double x = scale * (a[0] + t * (b[0] - a[0])) - in * (a[0] + b[0]);
+    const double y = scale * (a[1] + t * (b[1] - a[1])) - in * (a[1] + b[1]);
+    return grey_at(view, frame, h(x, y), out);
+  }
+  bool white(int sample, double scale, double widths, double *out) const {
+    double white, black, there;
+    if (!grey(sample, 1.0, -0.5, &white) || !grey(sample, 1.0, 0.5, &black) || !grey(sample, scale, widths, &there) ||
+        white - black < kLeastContrast)
+      return false;
+    *out = (there - black) / (white - black);
+    return true;
+  }
+};
+
+// Where on side `from` the other border is: how white it is on that one's far side. And where the other border has as
+// much white behind it as the first one has.
 void find_beside(const tangent_view &view, const wm_frame &frame, const wm_marker_print &print, const homography &h,
                  int from, side_points *side) {
-  const double *a = print.corner[from], *b = print.corner[(from + 1) % print.corners];
-  for (int i = 0; i < kSamples; i++) {
-    const double t = along_side(i), x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]);
-    const auto at = [&](double widths, double *grey) {
-      const double scale = 1.0 + widths * (print.other - 1.0);
-      return grey_at(view, frame, h(scale * x, scale * y), grey);
-    };
-    double white, black, far;
-    side->beside[i] = print.beside;
-    if (print.beside >= 1.0 || !at(-0.5, &white) || !at(0.5, &black) || !at(1.5, &far)) continue;
-    if (white - black < kLeastContrast) continue;
-    const double beside = (far - black) / (white - black);
-    side->beside[i] = beside < 0.0 ? 0.0 : beside > 1.0 ? 1.0 : beside;
-  }
+  const behind look = {view, frame, print, h, print.corner[from], print.corner[(from + 1) % print.corners]};
   double sum = 0.0;
+  for (int i = 0; i < kSamples; i++) {
+    double beside, near, far;
+    side->beside[i] = print.beside;
+    if (print.beside < 1.0 && look.white(i, 1.0, 1.5, &beside))
+      side->beside[i] = beside < 0.0 ? 0.0 : beside > 1.0 ? 1.0 : beside;
+    side->deep[i] =
+        look.white(i, print.other, 0.5, &near) && look.white(i, print.other, 1.5, &far) && near > 0.5 && far > 0.5;
+  }
   for (int i = 0; i < side->count; i++) sum += side->beside[side->sample[i]];
   side->share = sum / side->count;
 }
@@ -132,7 +154,7 @@ void find_beside(const tangent_view &view, const wm_frame &frame, const wm_marke
 // Not where the other border begins or ends, whose corner is round.
 bool is_whole(const side_points &side, int sample) {
   for (int i = sample - 1; i <= sample + 1; i++)
-    if (i >= 0 && i < kSamples && side.beside[i] < 0.5) return false;
+    if (i >= 0 && i < kSamples && !side.deep[i]) return false;
   return true;
 }
 
@@ -155,16 +177,26 @@ double step_of(double width_px) {
   return at < 0.0 ? 0.0 : at > kWidths - 1.0 ? kWidths - 1.0 : at;
 }
 
-// What is known of the shift at a width, from the widths about it.
+// Towards white, by the width of the stretch: what its other edge takes from an edge's tail, where both are seen
+// through a blur of 1 px (lens, pixel, and grey between pixels) as find_edge sees them.
+double pull_of(double width_px) {
+  static constexpr double kPull_px[kWidths] = {0.38, 0.29, 0.30, 0.30, 0.21, 0.15, 0.08, 0.05, 0.01, 0.0, 0.0, 0.0};
+  const double at = step_of(width_px);
+  const int i = static_cast<int>(at);
+  return i + 1 < kWidths ? kPull_px[i] + (at - i) * (kPull_px[i + 1] - kPull_px[i]) : kPull_px[i];
+}
+
+// What is known of the shift at a width: from the widths about it, and where these weren't seen from others, less the
+// pull there and here.
 double shift_of(const wm_marker_fit &self, double width_px) {
   const double at = step_of(width_px);
   double sum = 0.0, weights = 0.0;
   for (int i = 0; i < kWidths; i++) {
     const double weight = self.by_width[i].seen / square(1.0 + 4.0 * square(i - at));
-    sum += weight * self.by_width[i].shift_px;
+    sum += weight * (self.by_width[i].shift_px + pull_of(kWidthLeast_px + i * kWidthStep_px));
     weights += weight;
   }
-  return weights > 0.0 ? sum / weights : 0.0;
+  return weights > 0.0 ? sum / weights - pull_of(width_px) : 0.0;
 }
 
 // By how much white grows: both borders move away from white, so to opposite sides.
