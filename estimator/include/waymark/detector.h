@@ -56,7 +56,8 @@ typedef struct wm_detector {
   // Makes the state (64-byte aligned, state_bytes long): tables and work space. May take long; the only such function.
   wm_status (*init)(void *state, const void *params, const wm_view *view);
   // Looks at `pictures` frames of the same instant. `prediction` is the newest fused state at their arrival, or NULL;
-  // it may narrow a search, never change a measured value. Writes at most `capacity` events: kind, t_ns and content are
+  // while nobody knows the pose (WM_STATE_SEARCHING) only its time and twist mean something. It may narrow a search,
+  // never change a measured value. Writes at most `capacity` events: kind, t_ns and content are
   // set, the rest is the caller's. WM_OK with *count 0: looked, saw nothing. WM_BAD_DATA: a picture of another size
   // than the calibration's, nothing done. No allocation.
   wm_status (*detect)(void *state, const wm_frame *frames, const wm_estimate *prediction, wm_event *out,

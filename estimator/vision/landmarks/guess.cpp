@@ -31,7 +31,8 @@ bool guess_camera(const mounted_camera &camera, const wm_estimate *prediction, w
 
 void carry_guess(const mounted_camera &camera, const vec3 &v_mps, const vec3 &w_radps, double dt_s,
                  camera_guess *guess) {
-  constexpr double kOff_m = 0.03, kOffOfWay = 0.05, kOff_rad = 0.01, kOffOfTurn = 0.05;
+  constexpr double kOff_m = 0.03, kOff_rad = 0.01;       // in any case: stamps, a floor that isn't flat
+  constexpr double kOffOfWay = 0.05, kOffOfTurn = 0.05;  // wheels not calibrated yet, and speeds that change
   const vec3 way = dt_s * (guess->R_map_base * (matrix_of(turn_by(0.5 * dt_s * w_radps)) * v_mps)),
              turn = dt_s * w_radps;
   guess->base_m = guess->base_m + way;

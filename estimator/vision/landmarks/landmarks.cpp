@@ -360,8 +360,9 @@ void look_everywhere(landmarks_state *self, const wm_frame &frame, const wm_esti
   }
   if (most > 0) {
     look_by(self, frame, best, true, params.search_area_px2, out);
-    if (out->count > 0) correct_guess(self->eye, self->known, self->looks, self->count, &best);
-    if (out->count > 0) remember_place(self, prediction, frame.t_ns, best);
+    if (out->count == 0) return;
+    correct_guess(self->eye, self->known, self->looks, self->count, &best);
+    remember_place(self, prediction, frame.t_ns, best);
     return;
   }
   out->count = 0;

@@ -346,6 +346,22 @@ void what_was_recognised_is_followed() {
   TEST_ASSERT_EQUAL(10, followed);
 }
 
+// Nobody knows where the robot is, and its twist or stamp is nonsense: it is looked for from scratch.
+void a_motion_that_is_no_number_misleads_nothing() {
+  const Eyes eyes;
+  const Place at = {2, 0.4, 0.2};
+  const auto picture = draw(at, Scene{});
+  const double nonsense[] = {0, NAN, INFINITY, 1e300, 0};
+  wm_estimate moving = pose_of({0, 0, 0}, 1, 1);
+  moving.state = WM_STATE_SEARCHING;
+  for (int i = 0; i < 5; i++) {
+    moving.v_mps[0] = moving.w_radps[2] = nonsense[i];
+    moving.t_ns = i == 4 ? WM_TIME_NONE : 5000;
+    TEST_ASSERT_EQUAL(1, eyes.look(picture, &moving, 5000 + i * 100 * WM_NS_PER_MS));
+    TEST_ASSERT_TRUE(std::fabs(events[0].as.sighting.bearing_rad - true_bearing(at)) < 0.002);
+  }
+}
+
 // A pose that leads to nothing is doubted after a while.
 void carried_off_it_is_found_where_it_is() {
   const Eyes eyes;
@@ -443,6 +459,7 @@ int main() {
   RUN_TEST(what_is_too_small_is_not_recognised);
   RUN_TEST(a_wide_board_is_found_without_a_pose);
   RUN_TEST(what_was_recognised_is_followed);
+  RUN_TEST(a_motion_that_is_no_number_misleads_nothing);
   RUN_TEST(carried_off_it_is_found_where_it_is);
   RUN_TEST(a_pose_that_says_nothing_guides_nowhere);
   RUN_TEST(a_moving_robot_is_expected_where_it_was);
