@@ -93,12 +93,22 @@ void motion_front_end::feed(const wm_event &event) {
   }
   const bool planar = event.kind == WM_EVENT_TWIST2;
   const double v = planar ? event.as.twist2.v_mps : event.as.twist6.v_mps[0];
-  const double w = planar ? event.as.twist2.w_radps : event.as.twist6.w_radps[2];
+  const double w = driven_rate(v, planar ? event.as.twist2.w_radps : event.as.twist6.w_radps[2]);
   choose_model(true);
   if (model_ != WM_MOTION_TWIST) return;
   watch_standstill(event.t_ns,
                    std::fabs(v) < params_->standstill_speed_mps && std::fabs(w) < params_->standstill_yaw_rate_radps);
   push_input(event.t_ns, v, w, false, false);
+}
+
+// What a drive makes of a commanded turn rate that takes speed and radius, and radii up to a largest one.
+double motion_front_end::driven_rate(double v_mps, double w_radps) const {
+  const double radius_max = params_->commands_radius_max_m, overflow = params_->commands_radius_overflow_m;
+  if (!(radius_max > 0.0) || v_mps == 0.0 || std::fabs(v_mps) <= std::fabs(w_radps) * radius_max || w_radps == 0.0)
+    return w_radps;
+  const double radius = v_mps / w_radps;
+  const bool left = radius > 0.0 && !(overflow > 0.0 && radius > overflow);
+  return v_mps / (left ? radius_max : -radius_max);
 }
 
 void motion_front_end::take_quantities(const wm_event &event) {

@@ -96,6 +96,7 @@ class motion_front_end {
   bool seen(int quantity) const { return stamp_ns_[quantity] != WM_TIME_NONE; }
   bool silent(int quantity, wm_time_ns t_ns) const { return t_ns - stamp_ns_[quantity] > hold_max_ns_; }
   double by_gear(double value, bool is_signed) const;
+  double driven_rate(double v_mps, double w_radps) const;
   wm_time_ns lag_of(const wm_motion_calibration &calibration) const;
 
   const wm_motion_params *params_;

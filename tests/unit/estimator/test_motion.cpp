@@ -273,6 +273,31 @@ void test_commands_are_obeyed_late(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, pose.x_m);
 }
 
+// GIVEN a drive that takes speed and radius WHEN a wider turn is commanded THEN it drives the widest that it knows.
+void test_a_drive_knows_no_wider_radius(void) {
+  start(make::no_wheels());
+  const auto driven = [](double v, double w) {
+    static double t_s = 0;
+    feed(make::twist(t_s += 0.1, v, w));
+    return front.twist_at(make::at(t_s), calibration).w;
+  };
+  TEST_ASSERT_EQUAL_DOUBLE(0.001, driven(0.1, 0.001));  // unless it is told, any turn is driven as asked
+  params.commands_radius_max_m = 2.0;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, driven(0.1, 0.001));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, -0.001));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, driven(-0.1, 0.001));  // backwards
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(-0.1, -0.001));
+  TEST_ASSERT_EQUAL_DOUBLE(0.06, driven(0.1, 0.06));
+  TEST_ASSERT_EQUAL_DOUBLE(-0.4, driven(-0.1, -0.4));
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, driven(0.1, 0.0));
+  TEST_ASSERT_EQUAL_DOUBLE(0.3, driven(0.0, 0.3));  // on the spot
+  params.commands_radius_overflow_m = 12.0;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, driven(0.1, 0.01));    // 10 m
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, 0.005));  // 20 m
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, -0.005));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, 1e-300));
+}
+
 void test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn(void) {
   start(make::car());
   const double metre = 1000 / (2 * M_PI * 0.3);
@@ -389,6 +414,7 @@ int main(void) {
   RUN_TEST(test_counts_after_a_silence);
   RUN_TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading);
   RUN_TEST(test_commands_are_obeyed_late);
+  RUN_TEST(test_a_drive_knows_no_wider_radius);
   RUN_TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn);
   RUN_TEST(test_a_frozen_counter_is_doubt_not_standstill);
   RUN_TEST(test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns);
