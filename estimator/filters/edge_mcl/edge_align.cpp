@@ -14,7 +14,8 @@ constexpr double kDoubtOdds = -1.5;
 constexpr double kLeastExplained = 0.4;
 constexpr double kSureHeading_rad = 0.08;
 constexpr double kSameEnd_m = 0.1, kSameEnd_rad = 0.05, kLeastChance = 0.01;
-constexpr double kOpenSigmas = 2.5;  // that a point is looked for off its place
+constexpr double kOpenSigmas = 2.5;               // that a point is looked for off its place
+constexpr double kFresh_m = 0.1, kFresh_s = 5.0;  // from one scan to the next that errs by itself
 
 }  // namespace
 
@@ -70,6 +71,7 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
   const double eye_x = then.pose.x_m + h.cos * seen_from[0] - h.sin * seen_from[1];
   const double eye_y = then.pose.y_m + h.sin * seen_from[0] + h.cos * seen_from[1];
   const double cos_gate = cos(params_.normal_gate_rad);
+  const double together = params_.correlated / fresh_;
   for (uint32_t i = 0; i < points.count; i++) {
     floor_point p{(double)points.x_m[i], (double)points.y_m[i], {}, {}};
     if (a.camera >= 0) {
@@ -81,8 +83,9 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
     const bool lined = on_a_line(points, i);
     out->seen += lined;
     edge_line line = map_.nearest(x, y);
-    const double sigma2 = square(point_sigma(points, i, a.camera)) + square(params_.point_sigma_m);
-    const double none = 2.5 * log(1.0 + square(params_.gate_m) / (4.0 * sigma2)) / params_.correlated;
+    double sigma2 = square(point_sigma(points, i, a.camera)) + square(params_.point_sigma_m);
+    if (a.camera >= 0) sigma2 += square(camera_[a.camera].sigma(camera_[a.camera].range(p.x, p.y), params_.common_px));
+    const double none = 2.5 * log(1.0 + square(params_.gate_m) / (4.0 * sigma2)) / together;
     out->cost += none;
     const auto take_unexplained = [&] {
       if (!prior && lined) out->before += before_an_edge(map_, x, y, x - eye_x, y - eye_y);
@@ -106,7 +109,7 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
     }
     const double residual = line.offset_m - (edge_state_ >= 0 ? a.value[kAlignEdge] : 0.0);
     const double misfit = residual * residual / sigma2;
-    const double cost = 2.5 * log(1.0 + 0.25 * misfit) / params_.correlated;
+    const double cost = 2.5 * log(1.0 + 0.25 * misfit) / together;
     if (cost < none) out->cost += cost - none;
     if (line.distance_m >= 0.06 && misfit >= 9.0) {
       take_unexplained();
@@ -133,8 +136,7 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
     }
     if (prior && square(line.distance_m) > square(gate_m) + square(kOpenSigmas) * open2) continue;
     // Student's distribution with 4 degrees of freedom: what doesn't fit has little to say.
-    const double weight =
-        5.0 / (4.0 + residual * residual / (sigma2 + open2)) / ((sigma2 + open2) * params_.correlated);
+    const double weight = 5.0 / (4.0 + residual * residual / (sigma2 + open2)) / ((sigma2 + open2) * together);
     for (int r = 0; r < kAlignStates; r++) {
       if (a.state[r] < 0) continue;
       out->gradient[r] += weight * row[r] * residual;
@@ -287,6 +289,13 @@ void edge_mcl::describe(const normal_equations &scan, const belief &prior, const
 // measurements, one for each row of the information's factor. Source: the iterated extended Kalman filter (B. M. Bell,
 // F. W. Cathey, "The iterated Kalman filter update as a Gauss-Newton method", 1993), in information form.
 bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan, wm_innovation *record) {
+  // What looks like an edge and is none, and by what each edge is seen off, are the same from the same place.
+  const int by = camera >= 0 ? camera : kCamerasMax;
+  const double way = filter_.travelled_m() + filter_.turned_rad();
+  fresh_ = aligned_ns_[by] == WM_TIME_NONE
+               ? 1.0
+               : (way - aligned_m_[by]) / kFresh_m + wm_seconds_between(aligned_ns_[by], filter_.now_ns()) / kFresh_s;
+  if (fresh_ > 1.0) fresh_ = 1.0;
   belief prior;
   if (!belief_of(camera, &prior)) return false;
   const int *index = prior.index, n = prior.n;
@@ -303,6 +312,9 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
     record->verdict = (uint8_t)WM_REJECTED_GATE;
     return false;
   }
+
+  aligned_m_[by] = way;
+  aligned_ns_[by] = filter_.now_ns();
 
   double elsewhere[ends::kMost][kMaxStates], chance[ends::kMost];
   allow_for(found, prior, elsewhere, chance);

@@ -95,12 +95,13 @@ void edge_mcl::start_again(bool known) {
   cloud_ns_ = filter_.now_ns();
   search_.clear();
   fused_ns_ = WM_TIME_NONE;
+  for (wm_time_ns &t_ns : aligned_ns_) t_ns = WM_TIME_NONE;
+  watched_m_ = filter_.travelled_m() + filter_.turned_rad();
   explained_ = params_.lost_explained;
   apart_s_ = 0.0;
   others_.clear(filter_.pose(), filter_.odom());
   alike_.clear(filter_.odom());
   alike_m_ = filter_.travelled_m();
-  watched_m_ = filter_.travelled_m() + filter_.turned_rad();
   at_ease_ = false;
   in_doubt_ = !known;
   swept_ = false;

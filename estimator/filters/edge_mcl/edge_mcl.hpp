@@ -125,6 +125,10 @@ class edge_mcl {
   wm_pose2 cloud_odom_;
   double cloud_travelled_m_, cloud_turned_rad_;
   wm_time_ns cloud_ns_, fused_ns_, watched_ns_, driven_ns_;
+  // Of each camera, and of points that are none's: when a scan was taken in last, and the way till then.
+  wm_time_ns aligned_ns_[kCamerasMax + 1];
+  double aligned_m_[kCamerasMax + 1];
+  double fresh_;                  // how much of a scan isn't what the last one said
   double lost_odds_;              // logarithm of
   double explained_;              // share, smoothed
   double usual_;                  // the same over a longer time, while the pose is trusted

@@ -53,6 +53,10 @@ static const wm_param kParams[] = {
     F64("points.pixel_px", pixel_px, 0.5, 0.01, 10,
         "Sigma of an edge in the picture, pixels, where the detector doesn't give it in metres."),
     F64("points.sigma_m", point_sigma_m, 0.012, 0.001, 1, "Sigma of a point besides: map and edge, m."),
+    F64("points.common_px", common_px, 0.6, 0, 10,
+        "Sigma of what the edges of one wall are seen off by together, pixels: blur, and the wall's image in a shiny "
+        "floor. "
+        "Far off it is more than points that agree with each other say."),
     F64("points.correlated", correlated, 30, 1, 1000,
         "As many points of successive scans err together: the alignment counts each as so many times less."),
     F64("points.range_max_m", range_max_m, 6.0, 0.5, 50, "Points farther from the camera are not used, m."),

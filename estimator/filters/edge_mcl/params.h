@@ -26,7 +26,7 @@ typedef struct wm_edge_mcl_params {
   double noise_way, noise_side, noise_turn, noise_turn_rest, noise_turn_rel;
   double pull;
 
-  double pixel_px, point_sigma_m, correlated, range_max_m;
+  double pixel_px, point_sigma_m, common_px, correlated, range_max_m;
   double gate_m, normal_gate_rad;
   double lasting_xy_m, lasting_heading_rad;
 

@@ -190,6 +190,21 @@ void a_scans_innovation_is_a_distance(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9 * nis, nis, out[0].nis);
 }
 
+// GIVEN a robot that stands WHEN it sees the same for 5 s THEN it is hardly surer than at first, and surer once it
+// drives.
+void seeing_the_same_again_makes_it_no_surer(void) {
+  filter f;
+  drive d;
+  const auto variance = [&f] { return f.estimate().covariance[wm_cov_index(5, 5)]; };  // of the heading
+  d.go(f, 0.1, 0.0, 0.0);
+  const double at_first = variance();
+  d.go(f, 5, 0.0, 0.0);
+  const double stood = variance();
+  TEST_ASSERT_TRUE(stood > 0.6 * at_first && stood <= at_first);
+  d.go(f, 5, 0.5, 0.0);
+  TEST_ASSERT_TRUE(variance() < 0.4 * stood);
+}
+
 // GIVEN a way whose places look alike in part WHEN the robot has driven some metres THEN the others are listed, each
 // apart from its own, hardly likely, and the pose is what it was.
 void places_that_look_the_same_are_listed_beside_the_pose(void) {
@@ -448,6 +463,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(forwards_and_backwards_it_stays_on_the_way);
   RUN_TEST(a_scans_innovation_is_a_distance);
+  RUN_TEST(seeing_the_same_again_makes_it_no_surer);
   RUN_TEST(places_that_look_the_same_are_listed_beside_the_pose);
   RUN_TEST(the_clouds_pose_is_its_particles_mean);
   RUN_TEST(motion_sensors_that_fall_silent_are_not_believed);
