@@ -83,7 +83,8 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
     const bool lined = on_a_line(points, i);
     out->seen += lined;
     edge_line line = map_.nearest(x, y);
-    double sigma2 = square(point_sigma(points, i, a.camera)) + square(params_.point_sigma_m);
+    const double own2 = square(point_sigma(points, i, a.camera)) + square(params_.point_sigma_m);
+    double sigma2 = own2;
     if (a.camera >= 0) sigma2 += square(camera_[a.camera].sigma(camera_[a.camera].range(p.x, p.y), params_.common_px));
     const double none = 2.5 * log(1.0 + square(params_.gate_m) / (4.0 * sigma2)) / together;
     out->cost += none;
@@ -111,7 +112,7 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
     const double misfit = residual * residual / sigma2;
     const double cost = 2.5 * log(1.0 + 0.25 * misfit) / together;
     if (cost < none) out->cost += cost - none;
-    if (line.distance_m >= 0.06 && misfit >= 9.0) {
+    if (line.distance_m >= 0.06 && residual * residual >= 9.0 * own2) {
       take_unexplained();
     } else if (!prior) {
       out->explained++;

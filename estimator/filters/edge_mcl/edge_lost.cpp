@@ -39,10 +39,12 @@ void edge_mcl::watch(double explained, int seen, double dt_s) {
   double fresh = dt_s / kFresh_s < way / kFresh_m ? dt_s / kFresh_s : way / kFresh_m;
   if (fresh > 1.0) fresh = 1.0;
   explained_ += fresh * (explained - explained_);
-  // Places differ in how much of them a map explains: what is usual here sets the bar. And every scan holds some points
-  // that are no edge of the map, wherever it was taken: where few are seen, in the dark, they are most of them.
-  const double relative = params_.lost_relative * usual_, many = seen / (seen + params_.lost_false_points);
-  const double bar = many * (relative > params_.lost_explained ? relative : params_.lost_explained);
+  // Every scan holds some points that are no edge of the map, wherever it was taken: where few are seen, in the dark,
+  // they are most of them. And places differ in how much of them a map explains, and drives in how often it is less:
+  // what is usual here, and by what scans fall short of it, set the bar.
+  const double many = seen / (seen + params_.lost_false_points);
+  const double own_bar = usual_ - params_.lost_below - params_.lost_spread * shortfall_;
+  const double bar = many * (own_bar > params_.lost_explained ? own_bar : params_.lost_explained);
   const double said = params_.lost_gain * (bar - explained) * fresh;
   lost_odds_ += said;
   // p := p + (1 - p) rate dt
@@ -75,16 +77,23 @@ void edge_mcl::watch(double explained, int seen, double dt_s) {
   }
   if (state_ == WM_STATE_TRACKING && odds < kTrustedOdds) {
     remember_calibration();
-    usual_ += dt_s / kUsual_s * (explained - usual_);
+    usual_ += dt_s / kUsual_s * (explained - many * usual_);
     expected_s_ = expected_s_ + dt_s < kExpected_s ? expected_s_ + dt_s : kExpected_s;
-    if (expected_s_ > 0.0) expected_ += dt_s / expected_s_ * (explained - expected_);
+    if (expected_s_ > 0.0) {
+      const double lack = usual_ - explained / many;
+      expected_ += dt_s / expected_s_ * (explained - expected_);
+      shortfall_ += dt_s / expected_s_ * ((lack > 0.0 ? lack : 0.0) - shortfall_);
+    }
   }
   // Its own place stays one of those that are possible, so it is not left to wander to what happens to fit.
   if (state_ != WM_STATE_TRACKING && filter_.variance(kX) < square(kWander_m))
     filter_.inflate_pose(kLoosened_m2ps * dt_s, kLoosened_rad2ps * dt_s);
 }
 
-double edge_mcl::odds_lost() const { return log(exp(lost_odds_) + alike_.odds()); }
+double edge_mcl::odds_lost() const {
+  const double elsewhere = state_ == WM_STATE_TRACKING ? others_.odds_elsewhere() : 0.0;
+  return log(exp(lost_odds_) + alike_.odds() + elsewhere);
+}
 
 // Motion sensors were silent. The particles go to where the robot may have come; what was seen before can't be put
 // together with what is seen now, and whether the next scans fit must show soon.

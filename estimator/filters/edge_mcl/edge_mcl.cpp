@@ -14,7 +14,8 @@ namespace {
 constexpr double kClassSigma_m[kSigmaClasses] = {0.01, 0.03, 0.06, 0.12};  // of a point; the last: and above
 constexpr double kNewView_m = 0.4;
 constexpr double kFarthest_m = 1000.0;
-constexpr double kSilent_s = 1.0;  // between two messages of the motion sensors, after which the way is unknown
+constexpr double kShortfall = 0.1;  // where nothing is known of it yet
+constexpr double kSilent_s = 1.0;   // between two messages of the motion sensors, after which the way is unknown
 constexpr double kCluster_m = 0.5, kCluster_rad = 0.35;
 constexpr double kFoundCovariance[6] = {0.02, 0.0, 0.02, 0.0, 0.0, 0.0018};  // of a place that the search found
 // Held against other places an image speaks for one's own as an edge does; of itself it says less.
@@ -76,6 +77,7 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   alike_.init(map_);
   usual_ = expected_ = params.lost_explained;
   expected_s_ = 0.0;
+  shortfall_ = kShortfall;
   fused_ns_ = watched_ns_ = remembered_ns_ = driven_ns_ = WM_TIME_NONE;
   remember_calibration();
   remembered_ns_ = WM_TIME_NONE;

@@ -131,8 +131,9 @@ class edge_mcl {
   double fresh_;                  // how much of a scan isn't what the last one said
   double lost_odds_;              // logarithm of
   double explained_;              // share, smoothed
-  double usual_;                  // the same over a longer time, while the pose is trusted
+  double usual_;                  // the same of what can be edges, over a longer time, while the pose is trusted
   double expected_, expected_s_;  // the same over a drive's last minute, and over how long
+  double shortfall_;              // what scans were short of what is usual, in that time, on average
   double apart_s_;                // the cloud's main cluster has been elsewhere, and better
   double alike_m_;                // way when look-alikes were last weighed
   double watched_m_;              // way when the last scan was judged

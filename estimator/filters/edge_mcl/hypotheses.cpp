@@ -97,6 +97,14 @@ void hypotheses::adopt(int i) {
   of_[i] = own;
 }
 
+double hypotheses::odds_elsewhere() const {
+  constexpr double kLeast = 1e-6;
+  double sum = 0.0;
+  for (int i = 1; i < count_; i++)
+    if (of_[i].weighed) sum += of_[i].share;
+  return sum / (of_[0].share > kLeast ? of_[0].share : kLeast);
+}
+
 int hypotheses::best() const {
   int best = 0;
   for (int i = 1; i < count_; i++)

@@ -35,6 +35,8 @@ class hypotheses {
   int count() const { return count_; }
   const hypothesis &operator[](int i) const { return of_[i]; }
   int best() const;
+  // Odds of being at one of the others that were weighed.
+  double odds_elsewhere() const;
 
  private:
   void drop_the_hopeless(double best);
