@@ -49,15 +49,12 @@ static const wm_param kParams[] = {
         "and sigma grows with the last speed, or with half of noise.hold_mps2 for so long, if that is more. Gaps of 1 "
         "s are seen on working robots."),
     F64("commands.radius_max_m", commands_radius_max_m, 0.0, 0, 1000,
-        "m. For twists that are commands: the drive takes a speed and a radius, and this is the largest that it knows; "
-        "a "
-        "wider turn that is asked for is driven with it, so that the gentlest is speed / radius. iRobot Create: 2. 0: "
-        "any "
-        "turn is driven as asked."),
+        "m. For twists that are commands: the drive takes a speed and a radius, and this is the largest that it "
+        "knows; a wider turn that is asked for is driven with it, so that the gentlest is speed / radius. iRobot "
+        "Create: 2. 0: any turn is driven as asked."),
     F64("commands.radius_overflow_m", commands_radius_overflow_m, 0.0, 0, 1000,
         "m. With commands.radius_max_m: a left turn that is asked for with a radius beyond this is driven as the "
-        "gentlest "
-        "one to the right, because the number of the radius overflows on its way to the drive. 0: never."),
+        "gentlest one to the right, because the number of the radius overflows on its way to the drive. 0: never."),
 };
 
 const wm_param_table wm_motion_params_table = {kParams, sizeof kParams / sizeof kParams[0],

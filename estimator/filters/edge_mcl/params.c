@@ -55,8 +55,7 @@ static const wm_param kParams[] = {
     F64("points.sigma_m", point_sigma_m, 0.012, 0.001, 1, "Sigma of a point besides: map and edge, m."),
     F64("points.common_px", common_px, 0.6, 0, 10,
         "Sigma of what the edges of one wall are seen off by together, pixels: blur, and the wall's image in a shiny "
-        "floor. "
-        "Far off it is more than points that agree with each other say."),
+        "floor. Far off it is more than points that agree with each other say."),
     F64("points.correlated", correlated, 30, 1, 1000,
         "As many points of successive scans err together: the alignment counts each as so many times less."),
     F64("points.range_max_m", range_max_m, 6.0, 0.5, 50, "Points farther from the camera are not used, m."),
@@ -73,12 +72,10 @@ static const wm_param kParams[] = {
         "lost."),
     F64("lost.below", lost_below, 0.25, 0, 1,
         "So is what is less than usual in this place by this and by lost.spread, both taken of as many points as can "
-        "be "
-        "edges (lost.false_points); the larger of the two shares counts."),
+        "be edges (lost.false_points); the larger of the two shares counts."),
     F64("lost.spread", lost_spread, 4, 0, 100,
         "Times what the scans of the last minute were short of what was usual, on average: where a floor shines or "
-        "tape "
-        "lies about, a scan that explains little says less."),
+        "tape lies about, a scan that explains little says less."),
     F64("lost.false_points", lost_false_points, 60, 0, 1000,
         "Points of a scan with which half of that share is enough: some are no edge of the map wherever it is, and of "
         "few they are most. What lies before an edge, as its image in a shiny floor does, counts by it, too."),
