@@ -14,8 +14,8 @@ constexpr double kDoubtOdds = -1.5;
 constexpr double kLeastExplained = 0.4;
 constexpr double kSureHeading_rad = 0.08;
 constexpr double kSameEnd_m = 0.1, kSameEnd_rad = 0.05, kLeastChance = 0.01;
-constexpr double kOpenSigmas = 2.5;               // that a point is looked for off its place
-constexpr double kFresh_m = 0.1, kFresh_s = 5.0;  // from one scan to the next that errs by itself
+constexpr double kOpenSigmas = 2.5;                     // that a point is looked for off its place
+constexpr double kErrsAnew_m = 0.1, kErrsAnew_s = 5.0;  // from one scan to the next that errs by itself
 
 }  // namespace
 
@@ -293,9 +293,9 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
   // What looks like an edge and is none, and by what each edge is seen off, are the same from the same place.
   const int by = camera >= 0 ? camera : kCamerasMax;
   const double way = filter_.travelled_m() + filter_.turned_rad();
-  fresh_ = aligned_ns_[by] == WM_TIME_NONE
-               ? 1.0
-               : (way - aligned_m_[by]) / kFresh_m + wm_seconds_between(aligned_ns_[by], filter_.now_ns()) / kFresh_s;
+  fresh_ = aligned_ns_[by] == WM_TIME_NONE ? 1.0
+                                           : (way - aligned_m_[by]) / kErrsAnew_m +
+                                                 wm_seconds_between(aligned_ns_[by], filter_.now_ns()) / kErrsAnew_s;
   if (fresh_ > 1.0) fresh_ = 1.0;
   belief prior;
   if (!belief_of(camera, &prior)) return false;

@@ -205,6 +205,23 @@ void seeing_the_same_again_makes_it_no_surer(void) {
   TEST_ASSERT_TRUE(variance() < 0.4 * stood);
 }
 
+// GIVEN a scan WHEN it comes a second time, of the same moment THEN it says nothing more.
+void the_same_scan_twice_says_no_more(void) {
+  filter f;
+  drive d;
+  d.go(f, 1, 0.5, 0.0);
+  wm_event e{};
+  d.scan(&e);
+  wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
+  size_t count = 0;
+  const wm_estimate once = f.estimate();
+  TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
+  const wm_estimate twice = f.estimate();
+  for (int i = 0; i < 3; i++) TEST_ASSERT_DOUBLE_WITHIN(1e-9, once.pose_map_base.p_m[i], twice.pose_map_base.p_m[i]);
+  const int own[] = {wm_cov_index(0, 0), wm_cov_index(1, 1), wm_cov_index(5, 5)};
+  for (const int i : own) TEST_ASSERT_DOUBLE_WITHIN(1e-3 * once.covariance[i], once.covariance[i], twice.covariance[i]);
+}
+
 // GIVEN a way whose places look alike in part WHEN the robot has driven some metres THEN the others are listed, each
 // apart from its own, hardly likely, and the pose is what it was.
 void places_that_look_the_same_are_listed_beside_the_pose(void) {
@@ -464,6 +481,7 @@ int main(void) {
   RUN_TEST(forwards_and_backwards_it_stays_on_the_way);
   RUN_TEST(a_scans_innovation_is_a_distance);
   RUN_TEST(seeing_the_same_again_makes_it_no_surer);
+  RUN_TEST(the_same_scan_twice_says_no_more);
   RUN_TEST(places_that_look_the_same_are_listed_beside_the_pose);
   RUN_TEST(the_clouds_pose_is_its_particles_mean);
   RUN_TEST(motion_sensors_that_fall_silent_are_not_believed);
