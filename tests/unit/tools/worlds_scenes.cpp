@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -32,8 +33,10 @@ using wm::render::Vec3;
 
 namespace {
 
-std::unique_ptr<World> made(const char *name, bool hard, uint64_t seed, bool on_walls = false) {
+std::unique_ptr<World> made(const char *name, bool hard, uint64_t seed, bool on_walls = false,
+                            Markers markers = Markers::tags) {
   WorldRequest request;
+  request.markers = markers;
   request.name = name;
   request.hard = hard;
   request.seed = seed;
@@ -238,6 +241,32 @@ void office_labels_are_what_apriltag_finds() {
   }
 }
 
+// Nobody hangs a print where the robot's camera never sees it whole.
+void office_prints_come_whole_into_view() {
+  struct Room {
+    bool hard, on_walls;
+    Markers markers;
+  };
+  for (const Room room :
+       {Room{false, true, Markers::both}, Room{false, false, Markers::mr}, Room{true, true, Markers::mr}}) {
+    const auto world = made("office", room.hard, 1, room.on_walls, room.markers);
+    const Motion motion(*world);
+    std::map<int, int> whole;
+    const int pictures = static_cast<int>(motion.duration_s() * world->cameras[0].rate_hz);
+    for (int i = 0; i < pictures; i++) {
+      std::string text;
+      world->label(0, world->cameras[0].camera, motion.shot(static_cast<double>(i) / pictures, 0), text);
+      for (const auto &row : numbers(text)) whole[static_cast<int>(row[1])]++;
+    }
+    TEST_ASSERT_TRUE(world->truth.size() >= 9);
+    int least = pictures;
+    for (const auto &t : world->truth) least = std::min(least, whole[t.id]);
+    std::printf("office%s, %zu markers on the %s: each is whole in %d and more of %d pictures\n",
+                room.hard ? ", hard" : "", world->truth.size(), room.on_walls ? "walls" : "ceiling", least, pictures);
+    TEST_ASSERT_TRUE(least >= 10);  // persons that walk past may hide one for a while
+  }
+}
+
 void hall_labels_point_at_upright_edges() {
   const auto world = made("hall", false, 3);
   const Motion motion(*world);
@@ -356,6 +385,7 @@ int main() {
   UNITY_BEGIN();
   RUN_TEST(corridor_labels_lie_on_edges_of_the_picture);
   RUN_TEST(office_labels_are_what_apriltag_finds);
+  RUN_TEST(office_prints_come_whole_into_view);
   RUN_TEST(hall_labels_point_at_upright_edges);
   RUN_TEST(labels_of_signs_and_beacons_show_them);
   RUN_TEST(requests_repeat_and_differ);

@@ -164,6 +164,11 @@ void label_beacons(const View &view, size_t camera_index, std::string &rows) {
 
 }  // namespace
 
+bool panel_in_view(const World &world, const render::Camera &camera, const render::Shot &shot,
+                   const World::Panel &panel, render::Vec2 pixels[4]) {
+  return panel_seen({world, camera, shot}, panel, pixels);
+}
+
 void World::label(size_t camera_index, const render::Camera &camera, const render::Shot &shot,
                   std::string &rows) const {
   const View view{*this, camera, shot};

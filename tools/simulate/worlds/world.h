@@ -92,6 +92,10 @@ struct World {
   double beacon_radius_m = 0.14;  // the largest one
 };
 
+// Whether a panel is whole in a picture with nothing before it, and where its corners are there.
+bool panel_in_view(const World &world, const render::Camera &camera, const render::Shot &shot,
+                   const World::Panel &panel, render::Vec2 pixels[4]);
+
 // nullptr and a text in `err` for an unknown name or a plan without a route. 1 to 5 s (light). The same request gives
 // the same bytes.
 std::unique_ptr<World> make_world(const WorldRequest &request, wm_error *err);
