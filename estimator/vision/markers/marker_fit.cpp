@@ -283,19 +283,22 @@ int wm_marker_fit_read(wm_marker_fit *self, const wm_frame *frame, const double 
   side_points points[WM_MARKER_CORNERS_MAX];
   line side[WM_MARKER_CORNERS_MAX];
   double width_px[WM_MARKER_CORNERS_MAX];
-  for (int i = 0; i < count; i++) {
-    const flat &a = corner[i], &b = corner[(i + 1) % count];
-    const double size = length(b - a);
-    if (!(size > kLeastSide_px)) return 0;
-    width_px[i] = width_of(print, h, i);
-    // Clockwise with y down: outwards is to the left of the way.
-    const double outwards = print.is_white_inside ? -1.0 : 1.0;
-    const flat to_white = {outwards * (b.y - a.y) / size, -outwards * (b.x - a.x) / size};
-    if (!find_side(view, *frame, a, b, to_white, reach_of(width_px[i]), &points[i]) ||
-        !fit_side(points[i], 0.0, 0.0, &side[i]))
-      return 0;
+  // Twice: a profile that isn't centred on its edge misses more of the one tail than of the other.
+  for (int pass = 0; pass < 2; pass++) {
+    for (int i = 0; i < count; i++) {
+      const flat &a = corner[i], &b = corner[(i + 1) % count];
+      const double size = length(b - a);
+      if (!(size > kLeastSide_px)) return 0;
+      width_px[i] = width_of(print, h, i);
+      // Clockwise with y down: outwards is to the left of the way.
+      const double outwards = print.is_white_inside ? -1.0 : 1.0;
+      const flat to_white = {outwards * (b.y - a.y) / size, -outwards * (b.x - a.x) / size};
+      if (!find_side(view, *frame, a, b, to_white, reach_of(width_px[i]), &points[i]) ||
+          !fit_side(points[i], 0.0, 0.0, &side[i]))
+        return 0;
+    }
+    if (!corners_of(side, count, corner) || !homography_init(&h, print.corner, corner, count)) return 0;
   }
-  if (!corners_of(side, count, corner) || !homography_init(&h, print.corner, corner, count)) return 0;
   for (int i = 0; i < count; i++) find_beside(view, *frame, print, h, i, &points[i]);
   measure_shift(self, view, *frame, h, points, width_px);
   for (int i = 0; i < count; i++)
