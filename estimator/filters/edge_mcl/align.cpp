@@ -76,6 +76,26 @@ bool before_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m,
   return false;
 }
 
+// From pixel to pixel by the distance to the nearest edge, which none can be within.
+bool through_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m, double ray_y_m) {
+  constexpr double kBegin_m = 0.1, kFarthest_m = 20.0;
+  constexpr double kMargin_m = 0.2, kMargin = 0.05;  // what a pose and a camera may be off by
+  const double range = std::sqrt(square(ray_x_m) + square(ray_y_m));
+  double end = range - (kMargin_m + kMargin * range);
+  if (end > kFarthest_m) end = kFarthest_m;
+  for (double at = kBegin_m; at < end;) {
+    const double back = (range - at) / range;
+    double column, row;
+    map.to_pixels(x_m - back * ray_x_m, y_m - back * ray_y_m, &column, &row);
+    if (!map.inside_map(column, row)) return false;
+    const int distance = map.distance_of((int)column, (int)row);
+    const double free_m = distance == edge_map::kFar ? edge_map::kReach_m : distance * map.unit_m();
+    if (free_m < 1.1 * map.pixel_m()) return true;
+    at += free_m;
+  }
+  return false;
+}
+
 void align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, int stride, double gate_m,
                 double explained_m, int iterations, wm_pose2 *pose) {
   for (int round = 0; round < iterations; round++) {

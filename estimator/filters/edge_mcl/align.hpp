@@ -27,7 +27,8 @@ struct normal_equations {
   double cost;                    // half of the weighted squares, as Student has them; what finds no edge pays the gate
   int seen;                       // points that are explained or lie on a line
   int explained;                  // of them: as near to an edge as they may be
-  int before;                     // of the rest: before one, as its image in a shiny floor is
+  int through;                    // of the rest: behind an edge, where a camera can't see
+  int before;                     // and of these: before one, as its image in a shiny floor is
 };
 
 // How a camera sits is known to some sigma. Of its errors these move the points of places that are compared: pitch,
@@ -52,6 +53,9 @@ inline double telling_of(int count) { return 260.0 / 180.0 * count / (count + 80
 // ray. Whether the ray from under the camera to a place (both in the map's axes) meets an edge beyond it, by half of
 // its length at most.
 bool before_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m, double ray_y_m);
+// Whether that ray meets an edge well before the place: nobody sees through a wall, so the robot isn't where the ray
+// was drawn from. Of its first 20 m; what lies outside of the map is behind nothing. O(ray).
+bool through_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m, double ray_y_m);
 
 // Solves A x = b for a symmetric positive definite A of n <= kAlignStates rows; false where it isn't.
 bool solve_positive(const double a[kAlignStates][kAlignStates], const double *b, int n, double *x);

@@ -89,7 +89,11 @@ void edge_mcl::accumulate(const wm_points &points, const alignment &a, double ga
     const double none = 2.5 * log(1.0 + square(params_.gate_m) / (4.0 * sigma2)) / together;
     out->cost += none;
     const auto take_unexplained = [&] {
-      if (!prior && lined) out->before += before_an_edge(map_, x, y, x - eye_x, y - eye_y);
+      if (prior || !lined) return;
+      if (through_an_edge(map_, x, y, x - eye_x, y - eye_y))
+        out->through++;
+      else
+        out->before += before_an_edge(map_, x, y, x - eye_x, y - eye_y);
     };
     if (!line.found || (!prior && line.distance_m > gate_m)) {
       take_unexplained();

@@ -14,6 +14,8 @@ constexpr double kFoundSigma_m = 0.1, kFoundSigma_rad = 0.03;
 constexpr double kFresh_s = 0.5, kFresh_m = 0.2;  // scans further apart speak each for itself
 constexpr double kWander_m = 0.1, kLoosened_m2ps = 0.002, kLoosened_rad2ps = 0.0002;
 constexpr double kDoubtOdds = -2.0;
+// Held against other places an image speaks for one's own as an edge does; of itself it says less.
+constexpr double kImageSpeaks = 0.5;
 constexpr int kFewKeyframes = 4, kManyKeyframes = 10;  // 0.4 m each
 constexpr int kAtEase = 4, kNotAtEase = 2;             // a scan's work through it is what a sweep for look-alikes has
 constexpr int kLeisure = 8, kWeighedInDoubt = 6, kWeighingShare = 4;
@@ -30,22 +32,37 @@ bool near(const wm_pose2 &a, const wm_pose2 &b) {
 
 }  // namespace
 
-// The odds of being lost: each scan speaks by the share of its points that the map explains from the pose, scans of one
-// moment or of one place together no more than once; and out of the blue somebody lifts the robot.
-void edge_mcl::watch(double explained, int seen, double dt_s) {
+// What a scan says of being lost, as the logarithm of the odds: by the share of its points that the map explains from
+// the pose, and by where the others are.
+double edge_mcl::speaks_for_lost(const normal_equations &scan, double explained) const {
+  // Every scan holds some points that are no edge of the map, wherever it was taken: where few are seen, in the dark,
+  // they are most of them. And places differ in how much of them a map explains, and drives in how often it is less:
+  // what is usual here, and by what scans fall short of it, set the bar.
+  const double many = scan.seen / (scan.seen + params_.lost_false_points);
+  const double own_bar = usual_ - params_.lost_below - params_.lost_spread * shortfall_;
+  const double bar = many * (own_bar > params_.lost_explained ? own_bar : params_.lost_explained);
+  // On this side of the map's edges may stand what the map doesn't have, or the floor may change; one such thing hides
+  // all behind it, so that all of the points together say little. But nobody sees through a wall.
+  const double through = (double)scan.through / scan.seen, rest = 1.0 - explained - through;
+  const double misfit = through + params_.lost_hidden * (rest > 0.0 ? rest : 0.0);
+  const double said = params_.lost_gain * (bar - 1.0 + misfit);
+  const double unusual = through - params_.lost_spread * usual_through_;
+  return (said < params_.lost_most ? said : params_.lost_most) +
+         (unusual > 0.0 ? params_.lost_gain * (params_.lost_through - 1.0) * unusual : 0.0);
+}
+
+// The odds of being lost: each scan speaks, scans of one moment or of one place together no more than once; and out of
+// the blue somebody lifts the robot.
+void edge_mcl::watch(const normal_equations &scan, double dt_s) {
+  const int seen = scan.seen;
   if (seen < 8) return;
+  const double explained = (scan.explained + kImageSpeaks * image_counts(seen) * scan.before) / seen;
   const double way = filter_.travelled_m() + filter_.turned_rad() - watched_m_;
   watched_m_ += way;
   double fresh = dt_s / kFresh_s < way / kFresh_m ? dt_s / kFresh_s : way / kFresh_m;
   if (fresh > 1.0) fresh = 1.0;
   explained_ += fresh * (explained - explained_);
-  // Every scan holds some points that are no edge of the map, wherever it was taken: where few are seen, in the dark,
-  // they are most of them. And places differ in how much of them a map explains, and drives in how often it is less:
-  // what is usual here, and by what scans fall short of it, set the bar.
-  const double many = seen / (seen + params_.lost_false_points);
-  const double own_bar = usual_ - params_.lost_below - params_.lost_spread * shortfall_;
-  const double bar = many * (own_bar > params_.lost_explained ? own_bar : params_.lost_explained);
-  const double said = params_.lost_gain * (bar - explained) * fresh;
+  const double said = fresh * speaks_for_lost(scan, explained);
   lost_odds_ += said;
   // p := p + (1 - p) rate dt
   const double p = 1.0 / (1.0 + exp(-lost_odds_)), blue = p + (1.0 - p) * params_.lost_per_s * dt_s;
@@ -77,11 +94,13 @@ void edge_mcl::watch(double explained, int seen, double dt_s) {
   }
   if (state_ == WM_STATE_TRACKING && odds < kTrustedOdds) {
     remember_calibration();
+    const double many = seen / (seen + params_.lost_false_points);
     usual_ += dt_s / kUsual_s * (explained - many * usual_);
     expected_s_ = expected_s_ + dt_s < kExpected_s ? expected_s_ + dt_s : kExpected_s;
     if (expected_s_ > 0.0) {
       const double lack = usual_ - explained / many;
       expected_ += dt_s / expected_s_ * (explained - expected_);
+      usual_through_ += dt_s / expected_s_ * ((double)scan.through / seen - usual_through_);
       shortfall_ += dt_s / expected_s_ * ((lack > 0.0 ? lack : 0.0) - shortfall_);
     }
   }

@@ -14,12 +14,10 @@ namespace {
 constexpr double kClassSigma_m[kSigmaClasses] = {0.01, 0.03, 0.06, 0.12};  // of a point; the last: and above
 constexpr double kNewView_m = 0.4;
 constexpr double kFarthest_m = 1000.0;
-constexpr double kShortfall = 0.1;  // where nothing is known of it yet
-constexpr double kSilent_s = 1.0;   // between two messages of the motion sensors, after which the way is unknown
+constexpr double kShortfall = 0.1, kThrough = 0.05;  // where nothing is known of them yet
+constexpr double kSilent_s = 1.0;  // between two messages of the motion sensors, after which the way is unknown
 constexpr double kCluster_m = 0.5, kCluster_rad = 0.35;
 constexpr double kFoundCovariance[6] = {0.02, 0.0, 0.02, 0.0, 0.0, 0.0018};  // of a place that the search found
-// Held against other places an image speaks for one's own as an edge does; of itself it says less.
-constexpr double kImageSpeaks = 0.5;
 constexpr size_t kAlign = 64;
 
 constexpr size_t aligned(size_t bytes) { return (bytes + kAlign - 1) & ~(kAlign - 1); }
@@ -78,6 +76,7 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   usual_ = expected_ = params.lost_explained;
   expected_s_ = 0.0;
   shortfall_ = kShortfall;
+  usual_through_ = kThrough;
   fused_ns_ = watched_ns_ = remembered_ns_ = driven_ns_ = WM_TIME_NONE;
   remember_calibration();
   remembered_ns_ = WM_TIME_NONE;
@@ -168,8 +167,7 @@ wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
   record.residual = WM_RESIDUAL_RANGE;
   normal_equations scan{};
   if (align(points, camera, &scan, &record)) fused_ns_ = event.t_ns;
-  const double known = scan.explained + kImageSpeaks * image_counts(scan.seen) * scan.before;
-  watch(scan.seen > 0 ? known / scan.seen : 0.0, scan.seen, dt);
+  watch(scan, dt);
   const bool new_keyframe = search_.see(lined_, filter_.odom());
   if (state_ == WM_STATE_TRACKING) heed_cloud();
   ponder(new_keyframe);

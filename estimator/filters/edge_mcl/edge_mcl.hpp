@@ -86,7 +86,8 @@ class edge_mcl {
   bool align(const wm_points &points, int camera, normal_equations *scan, wm_innovation *record);
   void describe(const normal_equations &scan, const belief &prior, const alignment &a, wm_innovation *record) const;
   void pull_cloud(const normal_equations &equations);
-  void watch(double explained, int seen, double dt_s);
+  double speaks_for_lost(const normal_equations &scan, double explained) const;
+  void watch(const normal_equations &scan, double dt_s);
   // Logarithm of the odds of being lost: what is seen is not explained here, or better elsewhere.
   double odds_lost() const;
   void doubt_motion();
@@ -133,6 +134,7 @@ class edge_mcl {
   double explained_;              // share, smoothed
   double usual_;                  // the same of what can be edges, over a longer time, while the pose is trusted
   double expected_, expected_s_;  // the same over a drive's last minute, and over how long
+  double usual_through_;          // share of the points that seemed to be seen through edges, in that time
   double shortfall_;              // what scans were short of what is usual, in that time, on average
   double apart_s_;                // the cloud's main cluster has been elsewhere, and better
   double alike_m_;                // way when look-alikes were last weighed

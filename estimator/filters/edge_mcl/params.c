@@ -70,12 +70,21 @@ static const wm_param kParams[] = {
     F64("lost.explained", lost_explained, 0.5, 0.05, 0.95,
         "Share of the points that the map explains at which a scan of many points speaks neither for nor against being "
         "lost."),
-    F64("lost.below", lost_below, 0.25, 0, 1,
+    F64("lost.below", lost_below, 0.2, 0, 1,
         "So is what is less than usual in this place by this and by lost.spread, both taken of as many points as can "
         "be edges (lost.false_points); the larger of the two shares counts."),
     F64("lost.spread", lost_spread, 4, 0, 100,
         "Times what the scans of the last minute were short of what was usual, on average: where a floor shines or "
         "tape lies about, a scan that explains little says less."),
+    F64("lost.hidden", lost_hidden, 0.9, 0, 1,
+        "What a point counts as unexplained that lies on this side of the map's edges: something stands there, or the "
+        "floor changes, that the map doesn't have."),
+    F64("lost.most", lost_most, 1, 0.01, 100,
+        "What a scan says at most, logarithm of the odds, besides what is seen through edges: one thing in the way "
+        "hides all behind it."),
+    F64("lost.through", lost_through, 3, 1, 100,
+        "What a point counts as unexplained that lies behind an edge of the map, where the robot can't see if it is "
+        "where it believes; less what is usual of them in the drive (lost.spread times)."),
     F64("lost.false_points", lost_false_points, 60, 0, 1000,
         "Points of a scan with which half of that share is enough: some are no edge of the map wherever it is, and of "
         "few they are most. What lies before an edge, as its image in a shiny floor does, counts by it, too."),

@@ -30,7 +30,8 @@ typedef struct wm_edge_mcl_params {
   double gate_m, normal_gate_rad;
   double lasting_xy_m, lasting_heading_rad;
 
-  double lost_explained, lost_below, lost_spread, lost_false_points, lost_gain, lost_per_s;
+  double lost_explained, lost_below, lost_spread, lost_hidden, lost_through, lost_most, lost_false_points, lost_gain,
+      lost_per_s;
   double search_explained, search_share;
   int32_t search_poses;
   double dead_reckoning_after_s;

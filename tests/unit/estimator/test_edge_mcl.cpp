@@ -74,8 +74,10 @@ struct drive {
   wm_pose2 truth{2, 2, 0};
   double t = 0;
   uint64_t draws = 0;
-  double pitch_rad = 0;  // of the camera, more than is believed
-  bool silent = false;   // motion sensors say nothing
+  double pitch_rad = 0;         // of the camera, more than is believed
+  bool silent = false;          // motion sensors say nothing
+  double blocked_m = INFINITY;  // something stands across the way, so far before the camera
+  int glass = 0;                // so many rays, from the right on, go on through the wall
   double noise() { return wm_random_normal(7, 1, draws++); }
 
   void scan(wm_event *e) {
@@ -86,7 +88,8 @@ struct drive {
     p.camera = 0;
     const double eye_x = truth.x_m + std::cos(truth.heading_rad), eye_y = truth.y_m + std::sin(truth.heading_rad);
     for (int i = 0; i < 140; i++) {
-      const double angle = -1.2 + 2.4 * i / 139, range = cast(eye_x, eye_y, truth.heading_rad + angle);
+      const double angle = -1.2 + 2.4 * i / 139, wall = cast(eye_x, eye_y, truth.heading_rad + angle);
+      const double range = std::fmin(i < glass ? 1.5 * wall : wall, blocked_m / std::cos(angle));
       if (range < 0.3 || range > 5) continue;
       // Seen at an angle below the horizon of atan(h/r); believed to be pitched less, it seems farther.
       const double seen = std::atan2(0.4, range) - pitch_rad * std::cos(angle) + 0.001 * noise();
@@ -318,6 +321,40 @@ void carried_away_it_says_so_and_finds_back(void) {
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
 }
 
+// GIVEN a robot on its way WHEN something that the map doesn't have hides nearly all for 1.5 s THEN it is not taken for
+// lost; WHEN as much of what it sees is behind walls THEN it is, in as much time.
+void something_in_the_way_is_not_being_lost_but_sight_through_walls_is(void) {
+  filter f;
+  drive d;
+  d.go(f, 8, 1.0, 0.0);
+  d.go(f, 8, -1.0, 0.0);
+  d.go(f, 4, 1.0, 0.0);
+  d.blocked_m = 0.5;
+  for (int i = 0; i < 15; i++) {
+    d.go(f, 0.1, 1.0, 0.0);
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  }
+  d.blocked_m = INFINITY;
+  d.go(f, 3, 1.0, 0.0);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  d.glass = 110;
+  d.go(f, 1.5, 1.0, 0.0);
+  TEST_ASSERT_EQUAL(WM_STATE_LOST, f.estimate().state);
+}
+
+// GIVEN a building where it sees through some of the walls all along THEN that says nothing.
+void glass_walls_are_usual(void) {
+  filter f;
+  drive d;
+  d.glass = 30;
+  for (int i = 0; i < 3; i++) {
+    d.go(f, 8, 1.0, 0.0);
+    d.go(f, 8, -1.0, 0.0);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.01, calibration_of(f, "edges.lost_probability"));
+  }
+}
+
 void it_starts_without_being_told_where(void) {
   setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
   filter f;
@@ -487,6 +524,8 @@ int main(void) {
   RUN_TEST(motion_sensors_that_fall_silent_are_not_believed);
   RUN_TEST(a_camera_that_looks_lower_than_believed_is_found_out);
   RUN_TEST(carried_away_it_says_so_and_finds_back);
+  RUN_TEST(something_in_the_way_is_not_being_lost_but_sight_through_walls_is);
+  RUN_TEST(glass_walls_are_usual);
   RUN_TEST(it_starts_without_being_told_where);
   RUN_TEST(a_step_of_the_search_spends_no_more_than_it_may);
   RUN_TEST(a_place_is_found_with_what_the_camera_is_off_by);

@@ -132,6 +132,22 @@ void an_image_lies_before_an_edge(void) {
   TEST_ASSERT_FALSE(before(0.8));
 }
 
+// GIVEN the same camera THEN only what is behind the wall by more than its place may be off is seen through it; nothing
+// is that lies along a wall, at the camera's own place or outside of the map.
+void nothing_is_seen_through_a_wall(void) {
+  const auto through = [](double x, double y, double eye_x, double eye_y) {
+    return wm::through_an_edge(map, x, y, x - eye_x, y - eye_y);
+  };
+  TEST_ASSERT_TRUE(through(0.5, 2.0, 3.0, 2.0));
+  TEST_ASSERT_TRUE(through(-40.0, 2.0, 3.0, 2.0));
+  TEST_ASSERT_FALSE(through(0.8, 2.0, 3.0, 2.0));
+  TEST_ASSERT_FALSE(through(1.5, 2.0, 3.0, 2.0));
+  TEST_ASSERT_FALSE(through(6.0, 1.1, 3.0, 1.1));
+  TEST_ASSERT_FALSE(through(3.0, 2.0, 3.0, 2.0));
+  TEST_ASSERT_FALSE(through(-3.0, -5.0, -1.0, -5.0));
+  TEST_ASSERT_FALSE(through(NAN, 2.0, 3.0, 2.0));
+}
+
 }  // namespace
 
 void setUp(void) {
@@ -167,6 +183,7 @@ int main(void) {
   RUN_TEST(the_odds_turn_with_what_is_seen);
   RUN_TEST(what_is_explained_beyond_the_usual_says_nothing);
   RUN_TEST(an_image_lies_before_an_edge);
+  RUN_TEST(nothing_is_seen_through_a_wall);
   const int failed = UNITY_END();
   free(map_memory);
   free(field_memory);
