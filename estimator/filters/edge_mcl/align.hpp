@@ -27,8 +27,8 @@ struct normal_equations {
   double cost;                    // half of the weighted squares, as Student has them; what finds no edge pays the gate
   int seen;                       // points that are explained or lie on a line
   int explained;                  // of them: as near to an edge as they may be
-  int through;                    // of the rest: behind an edge, where a camera can't see
-  int before;                     // and of these: before one, as its image in a shiny floor is
+  int through;                    // not explained: behind an edge, where a camera can't see
+  int before;                     // not explained: before one, as its image in a shiny floor is
 };
 
 // How a camera sits is known to some sigma. Of its errors these move the points of places that are compared: pitch,

@@ -38,9 +38,8 @@ double edge_mcl::speaks_for_lost(const normal_equations &scan, double explained)
   // Every scan holds some points that are no edge of the map, wherever it was taken: where few are seen, in the dark,
   // they are most of them. And places differ in how much of them a map explains, and drives in how often it is less:
   // what is usual here, and by what scans fall short of it, set the bar.
-  const double many = scan.seen / (scan.seen + params_.lost_false_points);
   const double own_bar = usual_ - params_.lost_below - params_.lost_spread * shortfall_;
-  const double bar = many * (own_bar > params_.lost_explained ? own_bar : params_.lost_explained);
+  const double bar = can_be_edges(scan.seen) * (own_bar > params_.lost_explained ? own_bar : params_.lost_explained);
   // On this side of the map's edges may stand what the map doesn't have, or the floor may change; one such thing hides
   // all behind it, so that all of the points together say little. But nobody sees through a wall.
   const double through = (double)scan.through / scan.seen, rest = 1.0 - explained - through;
@@ -94,7 +93,7 @@ void edge_mcl::watch(const normal_equations &scan, double dt_s) {
   }
   if (state_ == WM_STATE_TRACKING && odds < kTrustedOdds) {
     remember_calibration();
-    const double many = seen / (seen + params_.lost_false_points);
+    const double many = can_be_edges(seen);
     usual_ += dt_s / kUsual_s * (explained - many * usual_);
     expected_s_ = expected_s_ + dt_s < kExpected_s ? expected_s_ + dt_s : kExpected_s;
     if (expected_s_ > 0.0) {

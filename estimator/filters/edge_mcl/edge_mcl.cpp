@@ -252,6 +252,8 @@ double edge_mcl::image_counts(int seen) const {
   return seen > 0 ? params_.lost_false_points / (seen + params_.lost_false_points) : 0.0;
 }
 
+double edge_mcl::can_be_edges(int seen) const { return seen > 0 ? seen / (seen + params_.lost_false_points) : 0.0; }
+
 double edge_mcl::move_cloud() {
   const wm_pose2 increment = between(cloud_odom_, filter_.odom());
   const double way = filter_.travelled_m() - cloud_travelled_m_, turn = filter_.turned_rad() - cloud_turned_rad_;

@@ -71,6 +71,8 @@ class edge_mcl {
   void prepare(const wm_points &points, int camera);
   // What of a scan of so many points one counts that lies before an edge: of few most may be images, of many few.
   double image_counts(int seen) const;
+  // Share of a scan of so many points that can be edges of the map.
+  double can_be_edges(int seen) const;
   double move_cloud();  // returns the way
   void weigh_cloud(double way_m);
   alignment alignment_of(int camera) const;
