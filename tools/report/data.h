@@ -62,10 +62,11 @@ struct ReportData {
   std::vector<Sighting> sightings;
   std::map<std::string, Pose> mountings;  // sensor in base_link
   std::optional<Raster> raster;
-  std::optional<Raster> edge_layer;    // the map's edges, see-through between them
-  std::vector<Eigen::Vector2d> cloud;  // particles at some instants, in map
-  std::vector<ReportFrame> frames;     // by time
-  std::vector<std::string> notes;      // what a reader should know of the page itself
+  std::optional<Raster> edge_layer;     // the map's edges, see-through between them
+  std::vector<Eigen::Vector2d> cloud;   // particles at some instants, in map
+  std::vector<ReportFrame> frames;      // by time
+  std::vector<std::string> film_notes;  // what a reader should know of the cameras' pictures
+  std::vector<std::string> notes;       // what a reader should know of the page itself
 
   [[nodiscard]] double seconds(int64_t t_ns) const { return static_cast<double>(t_ns - start_ns) * 1e-9; }
   [[nodiscard]] double end_s() const { return seconds(trajectory.poses.back().t_ns); }

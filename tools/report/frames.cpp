@@ -9,6 +9,7 @@
 
 #include "common/cameras.h"
 #include "report/data.h"
+#include "report/film.h"
 #include "report/page.h"
 #include "report/png.h"
 #include "report/words.h"
@@ -49,38 +50,70 @@ std::vector<uint8_t> grey_of(const wm_frame &frame) {
   return out;
 }
 
-// The pictures nearest to `each` times spread over the run.
-void frames_of(const fs::path &recording, const wm_camera &camera, int32_t index, size_t each, ReportData *data,
-               std::vector<ReportFrame> *out) {
-  wm_error err{};
+// Null where it can't be opened.
+Video open_video(const fs::path &recording, const wm_camera &camera, int32_t index, wm_error *err) {
   wm_video *made = nullptr;
-  if (wm_video_open(recording.c_str(), &camera, index, nullptr, nullptr, &made, &err) != WM_OK) {
-    data->notes.push_back(std::string("No pictures of ") + camera.name + ": " + err.text);
-    return;
+  (void)wm_video_open(recording.c_str(), &camera, index, nullptr, nullptr, &made, err);
+  return {made, wm_video_close};
+}
+
+// All pictures that a video has, none decoded. WM_OK or WM_IO.
+wm_status read_film(wm_video *video, std::vector<Taken> *out, wm_error *err) {
+  wm_frame frame{};
+  wm_status status = WM_OK;
+  while (status == WM_OK && (status = wm_video_peek(video, &frame, err)) == WM_OK) {
+    out->push_back({frame.number, frame.t_ns});
+    status = wm_video_skip(video, err);
   }
-  const Video video(made, wm_video_close);
-  const int64_t from = data->start_ns, to = data->trajectory.poses.back().t_ns;
-  for (size_t i = 0; i < each; i++) {
-    const int64_t wanted = from + static_cast<int64_t>(static_cast<double>(to - from) * (static_cast<double>(i) + 0.5) /
-                                                       static_cast<double>(each));
-    wm_frame frame{};
-    while (wm_video_peek(video.get(), &frame, &err) == WM_OK && frame.t_ns < wanted)
-      if (wm_video_skip(video.get(), &err) != WM_OK) return;
-    if (wm_video_next(video.get(), &frame, &err) != WM_OK) return;
-    const uint32_t times = std::max<uint32_t>(1, (frame.width_px + kWidth_px / 2) / kWidth_px);
-    out->push_back({camera.name,
-                    frame.t_ns,
-                    static_cast<int>(frame.width_px),
-                    static_cast<int>(frame.height_px),
-                    small_jpeg(frame, times),
-                    {},
-                    {},
-                    {},
-                    {},
-                    {},
-                    grey_of(frame),
-                    {}});
+  return status == WM_END ? WM_OK : status;
+}
+
+ReportFrame frame_of(const wm_camera &camera, const wm_frame &frame) {
+  const uint32_t times = std::max<uint32_t>(1, (frame.width_px + kWidth_px / 2) / kWidth_px);
+  return {camera.name,
+          frame.t_ns,
+          static_cast<int>(frame.width_px),
+          static_cast<int>(frame.height_px),
+          small_jpeg(frame, times),
+          {},
+          {},
+          {},
+          {},
+          {},
+          grey_of(frame),
+          {}};
+}
+
+// `each` pictures spread over what the camera filmed of the drive. Why there is none; "" where there is one, or the
+// notes say already when it filmed.
+std::string frames_of(const fs::path &recording, const wm_camera &camera, int32_t index, size_t each, ReportData *data,
+                      std::vector<ReportFrame> *out) {
+  wm_error err{};
+  Video video = open_video(recording, camera, index, &err);
+  if (!video) return err.text;
+  std::vector<Taken> film;
+  if (read_film(video.get(), &film, &err) != WM_OK) return err.text;
+  if (!film.empty()) {
+    const std::string when = when_filmed(*data, camera.name, film);
+    if (!when.empty()) data->film_notes.push_back(when);
+    film = during(*data, film);
+    if (film.empty()) return "";
+    video = open_video(recording, camera, index, &err);  // from its beginning again
+    if (!video) return err.text;
   }
+  const size_t before = out->size();
+  wm_frame frame{};
+  for (const Taken &wanted : spread_over(film, each)) {
+    while (wm_video_peek(video.get(), &frame, &err) == WM_OK && frame.number < wanted.number)
+      if (wm_video_skip(video.get(), &err) != WM_OK) break;
+    const wm_status status = wm_video_next(video.get(), &frame, &err);
+    if (status == WM_IO && out->size() == before) return err.text;
+    if (status != WM_OK) break;
+    out->push_back(frame_of(camera, frame));
+  }
+  if (out->size() > before) return "";
+  const char *problem = wm_video_counted(video.get())->first_problem;
+  return *problem ? problem : "its video is empty";
 }
 
 std::string dots(const char *css, const std::vector<Eigen::Vector2d> &pixels) {
@@ -152,14 +185,17 @@ std::vector<ReportFrame> load_frames(const fs::path &recording, ReportData *data
   wm_error err{};
   if (!fs::exists(recording / "video")) return out;
   if (wm_recording_open(recording.c_str(), nullptr, nullptr, nullptr, &made, &err) != WM_OK) {
-    data->notes.push_back(std::string("No pictures: ") + err.text);
+    data->film_notes.push_back(std::string("No pictures: ") + err.text);
     return out;
   }
   const Opened opened(made, wm_recording_close);
   const wm_rig *rig = wm_recording_rig(opened.get());
-  for (uint32_t i = 0; i < rig->camera_count; i++)
-    if (wm_video_there(recording.c_str(), rig->cameras[i].name))
-      frames_of(recording, rig->cameras[i], static_cast<int32_t>(i), each, data, &out);
+  for (uint32_t i = 0; i < rig->camera_count; i++) {
+    const wm_camera &camera = rig->cameras[i];
+    if (!wm_video_there(recording.c_str(), camera.name)) continue;
+    const std::string why = frames_of(recording, camera, static_cast<int32_t>(i), each, data, &out);
+    if (!why.empty()) data->film_notes.push_back(std::string("No pictures of ") + camera.name + ": " + why);
+  }
   std::stable_sort(out.begin(), out.end(), [](const ReportFrame &a, const ReportFrame &b) { return a.t_ns < b.t_ns; });
   return out;
 }
@@ -198,8 +234,10 @@ void mark_sightings(const fs::path &recording, const ReportData &data, std::vect
 }
 
 std::string frames_section(const ReportData &data) {
-  if (data.frames.empty()) return "";
-  std::string body = "<div class=\"shots\">";
+  if (data.frames.empty() && data.film_notes.empty()) return "";
+  std::string body;
+  for (const std::string &note : data.film_notes) body += "<p class=\"note\">" + escape(note) + "</p>";
+  body += "<div class=\"shots\">";
   bool marks = false, edges = false, lines = false;
   for (const ReportFrame &frame : data.frames) {
     body += drawn(data, frame) + drawn_from_above(frame);
@@ -223,7 +261,7 @@ std::string frames_section(const ReportData &data) {
     body += legend({{"<path class=\"line-seen\" d=\"M2 0H26\"/>", "upright lines that were found and followed"},
                     {"<path class=\"line-mapped\" d=\"M2 0H26\"/>",
                      "lines of the finished map, as they look from where the robot said it was (walls hide some)"}});
-  return section("What it saw", "Pictures of its cameras, spread over the drive.", body);
+  return section("What it saw", "Pictures of its cameras, spread over what each filmed of the drive.", body);
 }
 
 }  // namespace wm::tools

@@ -38,8 +38,9 @@ struct ReportFrame {
 // Grey bytes, row by row, as a JPEG. Empty where it can't be made.
 std::string grey_jpeg(const std::vector<uint8_t> &grey, int width, int height);
 
-// `each` pictures of every camera that has a video, spread over the run's time. What can't be read leaves its part
-// empty and a line in the data's notes. Reads each video once; about 3 ms a picture that is passed over.
+// `each` pictures of every camera that has a video, spread over what it filmed of the run's time; the data's film_notes
+// say when that was where it isn't all of it. What can't be read leaves its part empty and a line there, too. Passes
+// over each video twice.
 std::vector<ReportFrame> load_frames(const std::filesystem::path &recording, ReportData *data, size_t each);
 
 // Marks for a picture of what a bearing sensor of the camera's name saw: where each landmark was expected by the run's

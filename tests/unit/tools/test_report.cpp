@@ -322,6 +322,79 @@ void test_edges_are_drawn_where_they_are_seen() {
   TEST_ASSERT_TRUE(has(report_page(load_report_data(run.path(), recording.path())), "Edges are not shown: "));
 }
 
+// Adds a camera with a picture at each of these times of the drive.
+void film(const made::Folder &recording, const std::vector<double> &times_s) {
+  std::filesystem::create_directories(recording.path() / "video/front");
+  recording.write("motion.csv", "t_ns,v_mps,w_radps\n0,1,0\n");
+  recording.write("calibration.yaml",
+                  "cameras: {front: {model: equidistant, size: [32, 16], intrinsics: [20, 20, 16, 8]}}\n");
+  std::string rows = "frame,t_ns,exposure_ns\n";
+  for (size_t i = 0; i < times_s.size(); i++) {
+    const auto grey = static_cast<uint8_t>(20 + i);  // the same twice would be a camera that is stuck
+    recording.write(format("video/front/%06zu.jpg", i), grey_jpeg(std::vector<uint8_t>(32 * 16, grey), 32, 16));
+    rows += format("%zu,", i) + stamp(times_s[i]) + "5000000\n";
+  }
+  recording.write("video/front.csv", rows);
+}
+
+std::vector<double> every(double period_s, double from_s, double to_s) {
+  std::vector<double> out;
+  for (int i = 0; from_s + i * period_s < to_s + 1e-6; i++) out.push_back(from_s + i * period_s);
+  return out;
+}
+
+// "0.1 0.4 ..." of the pictures that the report shows of the drive of 10 s, and what it says of them.
+void shows(const std::vector<double> &film_s, const std::string &times, const std::string &note) {
+  made::Folder run;
+  made::Folder recording;
+  make(run, recording);
+  film(recording, film_s);
+  const ReportData data = load_report_data(run.path(), recording.path());
+  std::string shown;
+  for (const ReportFrame &frame : data.frames) shown += (shown.empty() ? "" : " ") + fixed(data.seconds(frame.t_ns), 1);
+  says(times, shown);
+  TEST_ASSERT_EQUAL(note.empty() ? 0 : 1, data.film_notes.size());
+  if (!note.empty()) says(note, data.film_notes[0]);
+  const std::string section = frames_section(data);
+  TEST_ASSERT_EQUAL(data.frames.size(), count(section, "<figure"));
+  TEST_ASSERT_TRUE(has(section, note.empty() ? "What it saw" : "<p class=\"note\">" + note + "</p>"));
+}
+
+void test_pictures_are_of_what_the_camera_filmed() {
+  shows(every(0.1, 0, 10), "1.2 3.7 6.2 8.7", "");
+  // Silent before an eighth of the drive, silent until late in it, or both.
+  shows(every(0.1, 0, 1), "0.1 0.4 0.6 0.9",
+        "Camera front has pictures only from 0.0 s to 1.0 s; the drive lasted 10.0 s.");
+  shows(every(0.1, 6, 10), "6.5 7.5 8.5 9.5",
+        "Camera front has pictures only from 6.0 s to 10.0 s; the drive lasted 10.0 s.");
+  shows(every(0.1, 3, 5), "3.2 3.7 4.2 4.7",
+        "Camera front has pictures only from 3.0 s to 5.0 s; the drive lasted 10.0 s.");
+  // Each picture once, also where there are few, or none for a while.
+  shows({4}, "4.0", "Camera front has one picture only, at 4.0 s; the drive lasted 10.0 s.");
+  shows({0, 0.1, 0.2, 9.8, 9.9}, "0.2 9.8", "");
+  // A little apart is usual, and a slow camera is no silent one.
+  shows(every(0.1, 0.4, 9.7), "1.6 3.9 6.2 8.5", "");
+  shows(every(1.5, 1.5, 9), "3.0 4.5 6.0 7.5", "");
+}
+
+void test_why_there_are_no_pictures_is_said() {
+  shows(every(0.1, 12, 13), "",
+        "Camera front has no pictures of the drive: its own are from 12.0 s to 13.0 s; the drive lasted 10.0 s.");
+  shows({}, "", "No pictures of front: its video is empty");
+  // What else was filmed is left out: a replay of a part of a recording.
+  shows(every(0.4, -4.8, 15), "1.2 3.6 6.4 8.8", "");
+
+  made::Folder run;
+  made::Folder recording;
+  make(run, recording);
+  film(recording, every(0.1, 0, 10));
+  for (int i = 0; i <= 100; i++) recording.write(format("video/front/%06d.jpg", i), format("no JPEG %d", i));
+  const std::string page = report_page(load_report_data(run.path(), recording.path()));
+  TEST_ASSERT_TRUE(has(page, "No pictures of front: " + (recording.path() / "video/front: frame ").string()));
+  std::filesystem::remove(recording.path() / "video/front.csv");
+  TEST_ASSERT_TRUE(has(report_page(load_report_data(run.path(), recording.path())), "front.csv: is not there"));
+}
+
 }  // namespace
 
 int main() {
@@ -337,5 +410,7 @@ int main() {
   RUN_TEST(test_lines_of_sight_start_at_the_sensor);
   RUN_TEST(test_a_small_pgm_becomes_a_png);
   RUN_TEST(test_edges_are_drawn_where_they_are_seen);
+  RUN_TEST(test_pictures_are_of_what_the_camera_filmed);
+  RUN_TEST(test_why_there_are_no_pictures_is_said);
   return UNITY_END();
 }
