@@ -53,9 +53,19 @@ static const wm_param kParams[] = {
         "knows; a wider turn that is asked for is driven with it, so that the gentlest is speed / radius. iRobot "
         "Create: 2. 0: any turn is driven as asked."),
     F64("commands.radius_overflow_m", commands_radius_overflow_m, 0.0, 0, 1000,
-        "m. With commands.radius_max_m: a left turn that is asked for with a radius beyond this is driven as the "
-        "gentlest one to the right, because the number of the radius overflows on its way to the drive. 0: never."),
+        "m. With commands.radius_max_m, and not below it: a left turn that is asked for with a radius beyond this is "
+        "driven as the gentlest one to the right, because the number of the radius overflows on its way to the drive. "
+        "0: never."),
 };
 
 const wm_param_table wm_motion_params_table = {kParams, sizeof kParams / sizeof kParams[0],
                                                sizeof(struct wm_motion_params)};
+
+const char *wm_motion_params_clash(const wm_motion_params *params, const char **key) {
+  // 0 is off for either; where they are equal, every left turn overflows that is wider than the drive's widest.
+  const double overflow_m = params->commands_radius_overflow_m;
+  if (!(overflow_m > 0.0 && overflow_m < params->commands_radius_max_m)) return NULL;
+  *key = "commands.radius_overflow_m";
+  return "is below motion.commands.radius_max_m, which the drive still obeys: nothing overflows there; set it to at "
+         "least that, or to 0 if no radius overflows";
+}

@@ -48,6 +48,17 @@ static wm_status check_other_estimator(const wm_yaml_node *section, const wm_par
   return status;
 }
 
+// What each parameter allows by itself may make no sense beside another.
+static wm_status read_motion(const wm_yaml_node *section, wm_motion_params *out, wm_error *err) {
+  const char *key;
+  wm_status status = config_fill(section, &wm_motion_params_table, "", out, err);
+  const char *clash = status == WM_OK ? wm_motion_params_clash(out, &key) : NULL;
+  if (!clash) return status;
+  wm_yaml_node node = wm_yaml_get(section, key);
+  if (!wm_yaml_there(&node)) node.id = section->id;  // its key is written with dots: the section's line will do
+  return wm_yaml_fail(&node, err, "%s", clash);
+}
+
 static wm_status read_sections(const wm_yaml_node *root, wm_config *out, wm_error *err) {
   for (size_t i = 0; i < wm_yaml_count(root); i++) {
     const char *key;
@@ -60,7 +71,7 @@ static wm_status read_sections(const wm_yaml_node *root, wm_config *out, wm_erro
     else if (estimator)
       status = check_other_estimator(&value, &estimator->params, err);
     else if (strcmp(key, "motion") == 0)
-      status = config_fill(&value, &wm_motion_params_table, "", out->motion, err);
+      status = read_motion(&value, out->motion, err);
     if (status != WM_OK) return status;
   }
   return WM_OK;

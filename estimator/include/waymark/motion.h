@@ -29,6 +29,10 @@ typedef enum wm_motion_model {
 typedef struct wm_motion_params wm_motion_params;
 extern const wm_param_table wm_motion_params_table;
 
+// Why two of the parameters, each allowed by itself, don't go together, and what would mend it, as a text; *key is the
+// one that is wrong. NULL, *key untouched, where they do.
+const char *wm_motion_params_clash(const wm_motion_params *params, const char **key);
+
 // What the wanted model lacks of what the sources can give (`kinds`: WM_EVENT_BIT; `quantities`: a bit per wm_quantity)
 // and of the wheels' calibration, as a text ("yaw_rate over CAN"); NULL where nothing is missing. `auto` lacks
 // something only where no model is possible. Constant cost.

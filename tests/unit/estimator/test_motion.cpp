@@ -298,6 +298,26 @@ void test_a_drive_knows_no_wider_radius(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, 1e-300));
 }
 
+// A drive can't overflow at a radius that it obeys; 0 is off for either.
+void test_an_overflow_lies_beyond_what_is_obeyed(void) {
+  const auto wrong = [](double radius_max_m, double overflow_m) {
+    wm_params_defaults(&wm_motion_params_table, &params);
+    params.commands_radius_max_m = radius_max_m;
+    params.commands_radius_overflow_m = overflow_m;
+    const char *key = "none";
+    const bool clash = wm_motion_params_clash(&params, &key) != nullptr;
+    TEST_ASSERT_EQUAL_STRING(clash ? "commands.radius_overflow_m" : "none", key);
+    return clash;
+  };
+  TEST_ASSERT_FALSE(wrong(0, 0));
+  TEST_ASSERT_FALSE(wrong(2, 0));
+  TEST_ASSERT_FALSE(wrong(0, 1));
+  TEST_ASSERT_FALSE(wrong(2, 12));
+  TEST_ASSERT_FALSE(wrong(2, 2));
+  TEST_ASSERT_TRUE(wrong(2, 1.999));
+  TEST_ASSERT_TRUE(wrong(2, 1e-6));
+}
+
 void test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn(void) {
   start(make::car());
   const double metre = 1000 / (2 * M_PI * 0.3);
@@ -415,6 +435,7 @@ int main(void) {
   RUN_TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading);
   RUN_TEST(test_commands_are_obeyed_late);
   RUN_TEST(test_a_drive_knows_no_wider_radius);
+  RUN_TEST(test_an_overflow_lies_beyond_what_is_obeyed);
   RUN_TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn);
   RUN_TEST(test_a_frozen_counter_is_doubt_not_standstill);
   RUN_TEST(test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns);

@@ -194,6 +194,15 @@ static void wrong_values(void) {
   refused("", "dir/x.yaml:1: a map that begins with 'format: waymark-config/1' is needed");
 }
 
+static void parameters_that_do_not_go_together(void) {
+  parse(HEAD "motion:\n  noise:\n    speed_mps: 6.6\n");
+  refused(HEAD "motion:\n  noise:\n    speed_mps: 6.5\n",
+          "dir/x.yaml:5: motion.noise.speed_mps: doesn't go with another");
+  refused(HEAD "motion:\n  noise.speed_mps: 6.5\n", "dir/x.yaml:4: motion.noise.speed_mps: doesn't go with another");
+  refused(HEAD "motion: {noise: {speed_mps: 6.5, sped_mps: 1}}\n",
+          "dir/x.yaml:3: motion.noise.sped_mps: unknown key; did you mean 'motion.noise.speed_mps'?");
+}
+
 static void wrong_sources(void) {
   refused(HEAD "sources: [{name: gnss, lateness_max_ms: 500}]\n",
           "dir/x.yaml:3: sources[0].lateness_max_ms: 500 is above merge.horizon_ms (300); at most 300 is possible, or "
@@ -262,6 +271,7 @@ int main(void) {
   RUN_TEST(cameras_of_libcamera);
   RUN_TEST(misspelt);
   RUN_TEST(wrong_values);
+  RUN_TEST(parameters_that_do_not_go_together);
   RUN_TEST(wrong_sources);
   RUN_TEST(files);
   RUN_TEST(reference_names_all);

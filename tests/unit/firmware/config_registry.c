@@ -24,6 +24,14 @@ static const wm_param kMotionParams[] = {
 };
 
 const wm_param_table wm_motion_params_table = {kMotionParams, 1, sizeof(double)};
+const char *wm_motion_params_clash(const wm_motion_params *params, const char **key) {
+  double noise;
+  memcpy(&noise, params, sizeof noise);
+  if (noise != REGISTRY_CLASH) return NULL;
+  *key = "noise.speed_mps";
+  return "doesn't go with another";
+}
+
 static const wm_estimator kPole = {
     .name = "pole_filter", .about = "Of the test.", .params = {kParams, 5, sizeof(registry_params)}};
 static const wm_estimator kCloud = {

@@ -57,6 +57,10 @@ const error_case kErrorCases[] = {
     {CONFIG, "Horizon below the default lateness", FILE_, "merge: {horizon_ms: 100}\n",
      "config/robot.yaml:3: merge.horizon_ms: merge.lateness_max_ms (150) is above merge.horizon_ms (100); set "
      "lateness_max_ms to at most 100, or horizon_ms to 150"},
+    {CONFIG, "Overflow at a radius that is obeyed", FILE_,
+     "motion:\n  commands:\n    radius_overflow_m: 1.5\n    radius_max_m: 2\n",
+     "config/robot.yaml:5: motion.commands.radius_overflow_m: is below motion.commands.radius_max_m, which the drive "
+     "still obeys: nothing overflows there; set it to at least that, or to 0 if no radius overflows"},
     {CONFIG, "Unknown source", FILE_, "sources: [{name: gpss}]\n",
      "config/robot.yaml:3: sources[0].name: 'gpss' is unknown; did you mean 'gnss'? (one of: can, motion, motion6, "
      "sightings, markers, stereo, points, gnss)"},
