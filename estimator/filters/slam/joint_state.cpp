@@ -26,7 +26,8 @@ void joint_state::init(const wm_setup &setup, const joint_layout &layout, double
   init_motion(setup);
   slip_ = {};
   scale_state_ = -1;
-  for (double &share : scale_share_) share = 0.0;
+  carries_scale_ = false;
+  for (int j = 0; j < kMaxRobot; j++) scale_share_[j] = scale_start_[j] = scale_variance_[j] = 0.0;
 }
 
 namespace {
@@ -64,7 +65,10 @@ void joint_state::set_motion_states(const wm_motion_states &states, const wheel_
 // ---- time and motion ----
 
 void joint_state::move(const wm_event &motion) {
-  if (const int state = feed(motion); state >= 0) forget(state, 1.0, start_variance_[kSpeedScale]);
+  if (const int state = feed(motion); state >= 0) {
+    forget(state, 1.0, start_variance_[kSpeedScale]);
+    tell_scale_anew();
+  }
   move_to(motion.t_ns);
   double innovation, variance;
   if (standstill_bias(&innovation, &variance)) {
@@ -84,7 +88,10 @@ void joint_state::move_to(wm_time_ns t_ns) {
       [this](const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
         propagate(piece, twist, noise);
       },
-      [this](int state, double variance) { p().row(state)[state] += variance; });
+      [this](int state, double variance) {
+        p().row(state)[state] += variance;
+        if (scale_variance_[state] > 0.0) scale_variance_[state] += variance;
+      });
   if (slip_.sigma > 0.0 && before_ns != WM_TIME_NONE && now_ns() > before_ns)
     wander(wm_seconds_between(before_ns, now_ns()));
 }
@@ -177,6 +184,8 @@ void joint_state::draw_to(int state, int mean, double factor, double added_varia
 void joint_state::set_pose(const wm_pose2 &pose, const double covariance[3][3]) {
   const double value[3] = {pose.x_m, pose.y_m, wrap(pose.heading_rad)};
   for (int i = 0; i < 3; i++) forget(i, value[i], 0.0);
+  scale_origin_m_[0] = value[0];
+  scale_origin_m_[1] = value[1];
   for (int i = 0; i < 3; i++)
     for (int j = i; j < 3; j++) p().set(i, j, covariance[i][j]);
 }
@@ -323,6 +332,7 @@ void joint_state::fuse(innovation_block &block, const double *more_noise, bool f
   double before[kMaxRobot];
   std::memcpy(before, x(), static_cast<size_t>(layout_.robot_states) * sizeof *before);
   move_mean(r, e);
+  if (layout_.invariant && scale_state_ >= 0) hold_scale(e);
   half_update update{rows, {gain(0), gain(1), gain(2)}, nullptr, nullptr};
   if (layout_.invariant) {
     // T P T' = P + e r' + r e' with r = P h + (h' P h) e / 2, of P as the correction leaves it.
@@ -335,29 +345,7 @@ void joint_state::fuse(innovation_block &block, const double *more_noise, bool f
     update.r = r;
   }
   vectors::apply(p(), update, n_);
-  if (layout_.invariant && scale_state_ >= 0) carry_scale(before);
-}
-
-// The same for the scale: P <- T P T', T = I + d g', g picks the scale's own relative change, d = by how much each
-// state that goes with the scale has moved. e still holds how the places did.
-void joint_state::carry_scale(const double *before) {
-  const half_covariance cov = p();
-  const double *e = column(1 + kRows), *now = x();
-  double *d = gain(0), *r = gain(1);
-  for (int j = 0; j < even(n_); j++) d[j] = 0.0;
-  const auto place = [&](int state) {
-    d[state] = e[state + 1];
-    d[state + 1] = -e[state];
-  };
-  place(kX);
-  for (int j = kPoseStates; j < layout_.first_clone; j++) d[j] = scale_share_[j] * (now[j] - before[j]);
-  for (int c = 0; c < layout_.clones; c++) place(layout_.first_clone + 3 * c);
-  for (int i = 0; i < landmarks_; i++) place(landmark_state(i));
-  const double inverse = 1.0 / before[scale_state_];
-  for (int j = 0; j < even(n_); j++) r[j] = j < n_ ? inverse * cov.at(scale_state_, j) : 0.0;
-  vectors::add_scaled(r, d, 0.5 * inverse * r[scale_state_], even(n_));
-  const half_update update{0, {}, d, r};
-  vectors::apply(cov, update, n_);
+  if (layout_.invariant && carries_scale_) carry_scale(before);
 }
 
 // The correction of the mean: on the group of turns and places for the invariant filter (the map turns as a whole with

@@ -8,8 +8,8 @@
 // S. Bonnabel, "An EKF-SLAM algorithm with consistency properties", 2015; T. Zhang et al., "Convergence and consistency
 // analysis for a 3-D invariant-EKF SLAM", RA-L 2(2), 2017) written in map coordinates: its error of a place is
 // p_est - Exp(heading error) p, and what the change of coordinates between two estimates does is T. In this form the
-// prediction touches the pose's rows alone. Where the map's scale is as unknown as its heading (set_scale), the same is
-// done once more, with d = new - old of all that goes with the scale and g' that picks the scale.
+// prediction touches the pose's rows alone. Where the map's scale is as unknown as its heading (find_scale), the same
+// is done once more, with d = new - old of all that goes with the scale and g' that picks the scale: scale.cpp.
 //
 // Cost: prediction O(n), correction O(n^2) with one pass over the half for up to three rows.
 #ifndef WAYMARK_ESTIMATOR_SLAM_JOINT_STATE_HPP
@@ -64,16 +64,13 @@ class joint_state : public planar_motion {
   void set_motion_states(const wm_motion_states &states, const wheel_slip &slip, int first);  // from `first` on
   static int count_motion_states(const wm_motion_states &states, const wheel_slip &slip);
 
-  // The map's scale, where nothing but the states' own start tells it: `reference` is the motion's state that stands
-  // for it. A state that follows it is as many times as large in a larger map (share 1), or as many times as small
-  // (-1).
-  void set_scale(int reference) {
-    scale_state_ = reference;
-    follow_scale(reference, 1.0);
-  }
-  void follow_scale(int state, double share) {
-    if (state >= 0) scale_share_[state] = share;
-  }
+  // Whether the way's scale is a state. If so, what of the way goes with the map's scale follows it; call
+  // follow_scale() for each other state that does. `carries`: the covariance is carried along, too, for a second pass
+  // over the half.
+  bool find_scale(bool carries);
+  // `share` 1: as many times as large in a larger map; -1: as many times as small. `told`: what it starts with says how
+  // large the map is, as well as its sigma allows.
+  void follow_scale(int state, double share, bool told);
 
   // ---- time and motion ----
   void move(const wm_event &motion);
@@ -146,6 +143,8 @@ class joint_state : public planar_motion {
   void move_mean(const double *change, double *e);
   void move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e);
   void fuse_frozen(int rows, const double *change);
+  void tell_scale_anew();
+  void hold_scale(double *e);
   void carry_scale(const double *before);
 
   void wander(double dt_s);
@@ -154,8 +153,12 @@ class joint_state : public planar_motion {
   joint_layout layout_;
   wheel_slip slip_;
   int slip_mean_[2];  // states, of the left and the right wheel
-  int scale_state_;   // -1: the scale is known
-  double scale_share_[kMaxRobot];
+  // scale.cpp: the state that stands for the map's scale (-1: something tells it), by how much each state follows, and
+  // what those that are told start with (variance 0: it isn't told). Places are as large as they are from `origin`.
+  int scale_state_;
+  double scale_share_[kMaxRobot], scale_start_[kMaxRobot], scale_variance_[kMaxRobot];
+  double scale_origin_m_[2];
+  bool carries_scale_;
   int capacity_, n_, landmarks_;
 };
 

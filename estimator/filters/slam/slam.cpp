@@ -122,18 +122,17 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   start_again();
 }
 
-// Nothing measures how large the map is where both the speed's scale and the ranges' are states, or no ranges are used.
+// Nothing measures how large the map is where the way's scale and the ranges' are both states, or no ranges are used.
+// Prints are known so much better than wheels that a filter learns next to nothing where it should learn nothing.
 void slam::follow_scale() {
-  const int speed = joint_.motion_state(kSpeedScale);
   const bool ranges_tell = params_.use_range && !(params_.range_scale_sigma > 0.0);
-  if (speed < 0 || ranges_tell || params_.markers || params_.map != WM_SLAM_MAP_NONE) return;
-  joint_.set_scale(speed);
+  if (ranges_tell || params_.map != WM_SLAM_MAP_NONE || !joint_.find_scale(!params_.markers)) return;
   for (size_t i = 0; i < setup_->sensor_count; i++) {
-    joint_.follow_scale(sensor_state_[i][kRangeScale], -1.0);
-    joint_.follow_scale(sensor_state_[i][kMountX], 1.0);
-    joint_.follow_scale(sensor_state_[i][kMountY], 1.0);
+    joint_.follow_scale(sensor_state_[i][kRangeScale], -1.0, true);
+    joint_.follow_scale(sensor_state_[i][kMountX], 1.0, false);
+    joint_.follow_scale(sensor_state_[i][kMountY], 1.0, false);
   }
-  for (int k = first_ray_; k < first_clone_; k += 2) joint_.follow_scale(k + 1, -1.0);
+  for (int k = first_ray_; k < first_clone_; k += 2) joint_.follow_scale(k + 1, -1.0, false);
 }
 
 // The map begins where the robot starts, unless a start or a map says otherwise.

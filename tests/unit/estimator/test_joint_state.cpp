@@ -159,10 +159,16 @@ void test_prediction_is_that_of_the_whole_matrix(void) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(want[0][0], after[0][0]);
 }
 
-// The plain form is the textbook's P - K S K'; the invariant one carries it over by T besides.
+// The plain form is the textbook's P - K S K'; the invariant one carries it over by T besides, and by another T with
+// the scale. The scale itself lies where the speed's start says, which alone tells it.
 void test_correction_is_that_of_the_whole_matrix(void) {
-  for (bool invariant : {false, true}) {
+  enum { kPlain, kInvariant, kScaled };
+  std::vector<double> unscaled;  // the invariant form's mean
+  for (int form : {kPlain, kInvariant, kScaled}) {
+    dice = {7, 1, 0};
+    const bool invariant = form != kPlain;
     made a(invariant, 3);
+    if (form == kScaled) TEST_ASSERT_TRUE(a.state->find_scale(true));
     a.add(4, 3);
     a.add(-2, 5);
     a.state->move(make::twist(0.0, 0.8, 0.4));
@@ -171,7 +177,7 @@ void test_correction_is_that_of_the_whole_matrix(void) {
     joint_row rows[3];
     matrix h(3, std::vector<double>((size_t)a.state->states()));
     for (int k = 0; k < 3; k++)
-      for (int state : {0, 1, 2, 5, s, s + 1, s + 2}) {
+      for (int state : {0, 1, 2, 3, 5, s, s + 1, s + 2}) {
         const double by = gauss();
         rows[k].add(state, by);
         h[(size_t)k][(size_t)state] += by;
@@ -210,9 +216,29 @@ void test_correction_is_that_of_the_whole_matrix(void) {
     for (size_t place : {size_t{0}, (size_t)a.state->landmark_state(0), (size_t)s}) {
       t[place][2] -= a.state->value((int)place + 1) - x[place + 1];
       t[place + 1][2] += a.state->value((int)place) - x[place];
-      TEST_ASSERT_DOUBLE_WITHIN(2e-3, mean[place], a.state->value((int)place));  // apart by the turn's square
+      if (form == kInvariant)
+        TEST_ASSERT_DOUBLE_WITHIN(2e-3, mean[place], a.state->value((int)place));  // apart by the turn's square
     }
-    assert_near(times(times(t, want, false), t, true), a.covariance());
+    want = times(times(t, want, false), t, true);
+    if (form == kInvariant)
+      for (size_t i = 0; i < n; i++) unscaled.push_back(a.state->value((int)i));
+    if (form == kScaled) {
+      const size_t speed = (size_t)a.state->motion_state(wm::kSpeedScale);
+      TEST_ASSERT_TRUE(std::fabs(mean[speed] - 1.0) > 1e-4);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, a.state->value((int)speed));
+      const double larger = a.state->value((int)speed) / mean[speed];
+      for (size_t i : {size_t{0}, (size_t)s}) {  // seen from the start, 1, 2
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0 + larger * (unscaled[i] - 1.0), a.state->value((int)i));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0 + larger * (unscaled[i + 1] - 2.0), a.state->value((int)i + 1));
+      }
+      matrix grown(n, std::vector<double>(n));
+      for (size_t i = 0; i < n; i++) grown[i][i] = 1.0;
+      for (size_t i : {size_t{0}, size_t{1}, speed, (size_t)s, (size_t)s + 1, (size_t)a.state->landmark_state(0),
+                       (size_t)a.state->landmark_state(0) + 1})
+        grown[i][speed] += (a.state->value((int)i) - x[i]) / x[speed];
+      want = times(times(grown, want, false), grown, true);
+    }
+    assert_near(want, a.covariance());
   }
 }
 

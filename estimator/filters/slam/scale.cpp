@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+// The map's scale, where nothing measures it. Make the map, the way and the wheels as many times as large and the
+// ranges' scale as many times as small: every sighting stays as it is. An EKF becomes sure of such a scale all the
+// same, and wrong, by what its derivatives make of estimates that move. So its covariance is carried along with it, as
+// it is with the heading (joint_state.hpp); and its mean stays where what the states start with puts it, the only thing
+// that tells.
+#include "filters/slam/joint_state.hpp"
+
+namespace wm {
+
+bool joint_state::find_scale(bool carries) {
+  const int speed = motion_state_[kSpeedScale], left = motion_state_[kLeftScale], right = motion_state_[kRightScale];
+  if (speed < 0 && (left < 0 || right < 0)) return false;  // the way tells the scale
+  carries_scale_ = carries;
+  if (speed >= 0) {
+    scale_state_ = speed;
+    follow_scale(speed, 1.0, true);
+    follow_scale(motion_state_[kTurnSlowdown], 1.0, false);
+    return true;
+  }
+  scale_state_ = left;
+  const bool wander = slip_.sigma > 0.0;
+  for (int side = 0; side < 2; side++) {
+    follow_scale(motion_state_[kLeftScale + side], 1.0, !wander);
+    if (wander) follow_scale(slip_mean_[side], 1.0, true);
+  }
+  follow_scale(motion_state_[kTrackScale], 1.0, true);
+  return true;
+}
+
+void joint_state::follow_scale(int state, double share, bool told) {
+  if (state < 0) return;
+  scale_share_[state] = share;
+  scale_start_[state] = value(state);
+  scale_variance_[state] = told ? variance(state) : 0.0;
+}
+
+// The speed comes from another sensor: what the map has come to is what the others have to say of the scale from now
+// on.
+void joint_state::tell_scale_anew() {
+  for (int j = 0; j < layout_.first_clone; j++)
+    if (scale_variance_[j] > 0.0) follow_scale(j, scale_share_[j], true);
+}
+
+// All of it becomes 1 + s times as large, s by one step of Newton's on what the states start with:
+// sum of ((value (1 + share s) - start) / sigma)^2. `e` holds how places have moved, as move_mean() leaves it.
+void joint_state::hold_scale(double *e) {
+  double *mean = x();
+  double slope = 0.0, curve = 0.0;
+  for (int j = kPoseStates; j < layout_.first_clone; j++) {
+    if (!(scale_variance_[j] > 0.0)) continue;
+    const double moves = scale_share_[j] * mean[j];
+    slope += moves * (mean[j] - scale_start_[j]) / scale_variance_[j];
+    curve += square(moves) / scale_variance_[j];
+  }
+  if (!(curve > 0.0)) return;
+  const double s = -slope / curve;
+  const auto grow = [&](int state) {
+    for (int k = 0; k < 2; k++) {
+      const double by = s * (mean[state + k] - scale_origin_m_[k]);
+      mean[state + k] += by;
+      e[state + 1 - k] += k == 0 ? by : -by;
+    }
+  };
+  grow(kX);
+  for (int j = kPoseStates; j < layout_.first_clone; j++) mean[j] *= 1.0 + scale_share_[j] * s;
+  for (int c = 0; c < layout_.clones; c++)
+    if (const int state = layout_.first_clone + 3 * c; variance(state) > 0.0) grow(state);  // one in use
+  for (int i = 0; i < landmarks_; i++) grow(landmark_state(i));
+  take_calibration(mean);
+}
+
+// P <- T P T', T = I + d g', g picks the scale's own relative change, d = by how much each state that goes with the
+// scale has moved. e still holds how the places did.
+void joint_state::carry_scale(const double *before) {
+  const half_covariance cov = p();
+  const double *e = column(1 + kRows), *now = x();
+  double *d = gain(0), *r = gain(1);
+  for (int j = 0; j < even(n_); j++) d[j] = 0.0;
+  const auto place = [&](int state) {
+    d[state] = e[state + 1];
+    d[state + 1] = -e[state];
+  };
+  place(kX);
+  for (int j = kPoseStates; j < layout_.first_clone; j++) d[j] = scale_share_[j] * (now[j] - before[j]);
+  for (int c = 0; c < layout_.clones; c++) place(layout_.first_clone + 3 * c);
+  for (int i = 0; i < landmarks_; i++) place(landmark_state(i));
+  const double inverse = 1.0 / before[scale_state_];
+  for (int j = 0; j < even(n_); j++) r[j] = j < n_ ? inverse * cov.at(scale_state_, j) : 0.0;
+  vectors::add_scaled(r, d, 0.5 * inverse * r[scale_state_], even(n_));
+  const half_update update{0, {}, d, r};
+  vectors::apply(cov, update, n_);
+}
+
+}  // namespace wm
