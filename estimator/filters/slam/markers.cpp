@@ -91,6 +91,7 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   status = joint_.check_time(event.t_ns);
   if (status != WM_OK) return status;
   joint_.move_to(event.t_ns);
+  begin_look(event.t_ns);
   look_after(event.t_ns);
   if (!params_.markers) return drop(WM_REJECTED_BY_CONFIG);
   if (m.id < 0) return drop(WM_REJECTED_NO_ASSOCIATION);
@@ -225,6 +226,7 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
     record.verdict = block.nis <= hard ? WM_FUSED : WM_REJECTED_GATE;
     records.add(record);
   }
+  if (r.turned) note_turn(block.nis <= hard, v.innovation[2], true);
   if (block.nis > hard) return misfit(landmark, true);
   const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
   const double more[3] = {v.noise[0] * weaker, v.noise[1] * weaker, v.noise[2] * weaker};

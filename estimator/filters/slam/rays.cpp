@@ -101,7 +101,7 @@ void slam::follow_ray(int32_t id, const wm_sighting &s, const reading &r, const 
   blank.gate_dof = 1;
   blank.verdict = block.nis <= blank.gate ? WM_FUSED : WM_REJECTED_GATE;
   records.add(blank);
-  note_bearing(blank.verdict == WM_FUSED, innovation);
+  note_turn(blank.verdict == WM_FUSED, innovation, false);
   if (blank.verdict != WM_FUSED) {
     if (++track->misfits >= kMisfits) end_ray(track);
     return;

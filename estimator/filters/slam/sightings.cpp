@@ -245,7 +245,7 @@ void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, cons
     record.verdict = fused ? WM_FUSED : WM_REJECTED_GATE;
     records.add(record);
   }
-  if (r.bearing) note_bearing(fused, v.innovation[0]);
+  if (r.bearing) note_turn(fused, v.innovation[0], false);
   if (!fused) {
     misfit(landmark, r.range);
     return;

@@ -38,6 +38,7 @@ struct look_record {
   static constexpr int kMost = 32;
   wm_time_ns t_ns;
   int fused, refused;
+  bool of_prints;
   double by_rad[kMost];
 };
 
@@ -200,7 +201,7 @@ class slam {
   bool make_room();
   void look_after(wm_time_ns t_ns);
   void begin_look(wm_time_ns t_ns);
-  void note_bearing(bool fused, double innovation_rad);
+  void note_turn(bool fused, double innovation_rad, bool of_print);
   void rejoin(int fresh);
   bool may_be_one(int fresh, int lost) const;
   pair make_pair(int fresh, int lost) const;

@@ -6,12 +6,14 @@ namespace wm {
 namespace {
 
 constexpr int kUnconfirmedMisfits = 2;
-constexpr double kSurprising = 4.0;   // of two numbers, normalised innovation squared: one in seven
-constexpr double kUnsure = 25.0;      // times the sighting's own variance is what it is expected with
-constexpr double kOthersFit_s = 3.0;  // a landmark was moved where others were fused so lately
-constexpr int kJolted = 5;            // bearings that were refused by the same amount, at least
-constexpr double kAlike = 0.25;       // within this part of it
-constexpr double kLever_m = 0.3;      // a jolt that turns the robot by so many rad moves it by that times this
+constexpr double kSurprising = 4.0;      // of two numbers, normalised innovation squared: one in seven
+constexpr double kUnsure = 25.0;         // times the sighting's own variance is what it is expected with
+constexpr double kOthersFit_s = 3.0;     // a landmark was moved where others were fused so lately
+constexpr int kJolted = 5;               // bearings that were refused by the same amount, at least
+constexpr int kJoltedPrints = 2;         // or prints by the same turn: each tells the robot's pose by itself
+constexpr double kAlike = 0.25;          // within this part of it
+constexpr double kPrintTurn_rad = 0.01;  // and this: what a print's turn is off by
+constexpr double kLever_m = 0.3;         // a jolt that turns the robot by so many rad moves it by that times this
 
 }  // namespace
 
@@ -30,24 +32,28 @@ bool slam::believable(int landmark, const joint_state::innovation_block &block, 
   return false;
 }
 
-void slam::note_bearing(bool fused, double innovation_rad) {
+void slam::note_turn(bool fused, double innovation_rad, bool of_print) {
+  look_.of_prints = of_print;
   if (fused)
     look_.fused++;
   else if (look_.refused < look_record::kMost)
     look_.by_rad[look_.refused++] = innovation_rad;
 }
 
-// A look of which most bearings were refused, all by the same amount: the landmarks stand where they stood, the robot
-// was turned, by a wheel that slipped or by hand. Its pose is as unsure as that; false bearings are not alike.
+// A look of which most bearings or prints were refused, all by the same turn: the landmarks stand where they stood, the
+// robot was turned, by a wheel that slipped or by hand. Its pose is as unsure as that; what is false is not alike.
 void slam::begin_look(wm_time_ns t_ns) {
   if (t_ns == look_.t_ns) return;
+  const double least = look_.of_prints ? kPrintTurn_rad : 0.0;
   int most = 0;
   double turn = 0.0;
   for (int i = 0; i < look_.refused; i++) {
+    const double by = look_.by_rad[i];
+    if (std::fabs(by) < least) continue;
     int alike = 0;
     double sum = 0.0;
     for (int j = 0; j < look_.refused; j++)
-      if (std::fabs(look_.by_rad[j] - look_.by_rad[i]) < kAlike * std::fabs(look_.by_rad[i])) {
+      if (std::fabs(look_.by_rad[j] - by) < kAlike * std::fabs(by) + least) {
         alike++;
         sum += look_.by_rad[j];
       }
@@ -56,7 +62,7 @@ void slam::begin_look(wm_time_ns t_ns) {
       turn = sum / alike;
     }
   }
-  if (most >= kJolted && 2 * most > look_.fused + look_.refused) {
+  if (most >= (look_.of_prints ? kJoltedPrints : kJolted) && 2 * most > look_.fused + look_.refused) {
     joint_.loosen(square(kLever_m * turn), square(turn));
     counts_.jolts++;
   }

@@ -34,6 +34,7 @@ inline wm_pose2 truth;
 inline double now_s;
 inline double false_share;  // of sightings that are of nothing
 inline bool hidden, twice, nameless, coded, two_poses, two_heights;
+inline double turned[kCount];      // coded: by how much a print hangs otherwise than it did
 inline double leans[2];            // coded: the camera's roll and pitch beyond what calibration.yaml says
 inline bool in_turn;               // coded: with a second camera, 1 m higher, which doesn't lean
 inline wm_innovation last;         // what became of the last sighting, its last number
@@ -62,6 +63,7 @@ inline void make_room() {
   noise = {42, 1, 0};
   now_s = false_share = 0.0;
   hidden = twice = nameless = coded = two_poses = two_heights = false;
+  for (double &by : turned) by = 0.0;
   leans[0] = leans[1] = 0.0;
   in_turn = false;
   fused = rejected = twin = 0;
@@ -115,7 +117,7 @@ inline void drive(double seconds, bool range = true) {
           const bool other = in_turn && step % 20 == 10;
           const double roll = other ? 0.0 : leans[0], pitch = other ? 0.0 : leans[1], up = other ? z - 1.0 : z;
           seen.as.marker = marker(10 + i, x - pitch * up, y + roll * up, up - roll * y + pitch * x,
-                                  wm::wrap(0.5 * i - truth.heading_rad + gauss(0.01)));
+                                  wm::wrap(0.5 * i + turned[i] - truth.heading_rad + gauss(0.01)));
           seen.as.marker.sensor = other;
           if (two_poses) {  // the wrong one first, turned to the other side of the line of sight
             wm_marker &m = seen.as.marker;

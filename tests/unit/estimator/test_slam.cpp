@@ -233,6 +233,43 @@ void test_a_marker_that_moved_is_told_and_pulls_nothing(void) {
   TEST_ASSERT_EQUAL(kCount, found);
 }
 
+// A robot that is turned while it drives, by a wheel that slips or by hand, sees all its markers elsewhere: they hang
+// where they hung, and it finds back to them. No wheel and no gyro tells.
+void test_a_robot_that_was_turned_does_not_turn_its_map(void) {
+  for (double turn_rad : {0.1, -0.4}) {
+    leave_room();
+    make_room();
+    coded = true;
+    params.markers = 1;
+    params.marker_heading_sigma_rad = 0.01;
+    begin();
+    drive(30.0);
+    truth.heading_rad = wm::wrap(truth.heading_rad + turn_rad);
+    drive(1.0);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+    drive(20.0);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+    size_t found = 0;
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.06, worst_landmark(&found));
+    TEST_ASSERT_EQUAL(kCount, found);
+    TEST_ASSERT_EQUAL_DOUBLE(1, counted("motion.jolts"));
+    TEST_ASSERT_EQUAL_DOUBLE(0, counted("map.moved"));
+  }
+}
+
+// Two markers of five or six in view are turned by somebody, alike: the others say that it wasn't the robot.
+void test_markers_that_were_turned_do_not_turn_the_robot(void) {
+  coded = true;
+  params.markers = 1;
+  params.marker_heading_sigma_rad = 0.01;
+  begin();
+  drive(30.0);
+  turned[4] = turned[5] = 0.3;
+  drive(2.0);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
+  TEST_ASSERT_EQUAL_DOUBLE(0, counted("motion.jolts"));
+}
+
 void test_most_markers_seen_where_none_are_is_survived(void) {
   coded = true;
   params.markers = 1;
@@ -369,6 +406,8 @@ int main(void) {
   RUN_TEST(test_half_a_minute_without_markers_is_said_and_mended);
   RUN_TEST(test_a_landmark_that_moved_leaves_is_counted_and_joins_anew);
   RUN_TEST(test_a_marker_that_moved_is_told_and_pulls_nothing);
+  RUN_TEST(test_a_robot_that_was_turned_does_not_turn_its_map);
+  RUN_TEST(test_markers_that_were_turned_do_not_turn_the_robot);
   RUN_TEST(test_most_markers_seen_where_none_are_is_survived);
   RUN_TEST(test_most_sightings_false_are_survived);
   RUN_TEST(test_half_a_minute_without_landmarks_is_said_and_mended);
