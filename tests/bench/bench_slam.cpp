@@ -49,6 +49,7 @@ struct filter {
     state->set_motion_states(states, {}, wm::kPoseStates);
     const double start[3][3] = {{1e-4, 0, 0}, {0, 1e-4, 0}, {0, 0, 1e-4}};
     state->set_pose({0, 0, 0}, start);
+    if (width == 3) state->find_scale(false);  // as under coded markers
     for (int i = 0; i < landmarks; i++) {
       wm::joint_row rows[3];
       for (int k = 0; k < width; k++) rows[k].add(k, 1.0);
