@@ -268,7 +268,8 @@ def office():
     bar("office: marker RMSE", plain["landmark_rmse_m"], most=0.015)
     scaled_ = run(recording, "office", "--align", "sim2")
     bar("office: position RMSE, aligned with scale", scaled_["position_rmse_m"], most=0.01)
-    bar("office: worst marker, aligned with scale", scaled_["landmark_max_m"], most=0.01)
+    # 0.0047 m where the scale of the map wanders with the rounds.
+    bar("office: worst marker, aligned with scale", scaled_["landmark_max_m"], most=0.004)
 
 
 def detected(recording, config, detector):
