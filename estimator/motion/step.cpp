@@ -7,6 +7,7 @@ namespace wm {
 namespace {
 
 constexpr double kUnknownRate_radps = 0.3;  // per square root of a second
+constexpr double kCatchUp_mps = 30.0;       // faster is no robot that counts, but what remains of a count
 
 void add(motion_twist &t, int index, double v_by, double w_by) {
   t.index[t.count] = index;
@@ -140,7 +141,10 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
       n.way_turn = curvature * n.way_m2;
     }
   }
-  n.side_m2 = square(p.noise_side_rel * twist.v) * dt_s;
+  // By the way where a count's stamp lies nanoseconds behind another event's, and brings millimetres at 1e6 m/s.
+  const double driven_mps = std::fabs(twist.v);
+  n.side_m2 = driven_mps > kCatchUp_mps ? square(p.noise_side_rel) * kCatchUp_mps * driven_mps * dt_s
+                                        : square(p.noise_side_rel * twist.v) * dt_s;
   if (unknown) {
     // The robot may go on as it did, or not: as unsure as the motion that was last believed is large.
     // That it went straight when it was last heard of doesn't say that it hasn't begun to turn.
