@@ -242,6 +242,29 @@ void test_correction_is_that_of_the_whole_matrix(void) {
   }
 }
 
+// Another sensor tells the speed, whose scale is another: what the rest of the map's scale has come to counts from then
+// on, not what it began with. (The turn's scale stands in for a range's here.)
+void test_a_new_sensor_of_the_speed_does_not_take_the_map_s_scale_back(void) {
+  made a(true);
+  const int s = a.state->landmark_state(a.add(4, 3)), range = a.state->motion_state(wm::kYawRateScale);
+  TEST_ASSERT_TRUE(a.state->find_scale(false));
+  a.state->follow_scale(range, -1.0, true);
+  for (double t : {0.0, 0.1})
+    a.state->move(make::quantities(
+        t, {{WM_Q_WHEEL_SPEED_REAR_LEFT, 1.0}, {WM_Q_WHEEL_SPEED_REAR_RIGHT, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+  a.state->set_value(range, 1.04);
+  for (double t : {0.2, 1.2, 2.2, 3.2})
+    a.state->move(make::quantities(t, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+  joint_row row;
+  row.add(s, 1.0);
+  const double nothing = 0.0, noise = 1.0;
+  joint_state::innovation_block block;
+  a.state->prepare(&row, &nothing, &noise, 1, &block);
+  a.state->fuse(block, &nothing, false);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.04, a.state->value(range));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 4.0, a.state->value(s));
+}
+
 void test_a_landmark_that_leaves_takes_its_part_of_the_matrix_and_nothing_else(void) {
   made a(true), b(true);
   a.add(4, 3);
@@ -325,6 +348,7 @@ int main(void) {
   RUN_TEST(test_the_kernel_and_its_scalar_twin_give_the_same_bits);
   RUN_TEST(test_prediction_is_that_of_the_whole_matrix);
   RUN_TEST(test_correction_is_that_of_the_whole_matrix);
+  RUN_TEST(test_a_new_sensor_of_the_speed_does_not_take_the_map_s_scale_back);
   RUN_TEST(test_a_landmark_that_leaves_takes_its_part_of_the_matrix_and_nothing_else);
   RUN_TEST(test_frozen_landmarks_stay_and_the_robot_is_corrected);
   RUN_TEST(test_the_map_s_heading_is_not_learnt_from_looking);

@@ -129,12 +129,8 @@ worn drive_under_prints() {
   double turns[2] = {0.0, 0.0};
   for (int step = 0; step < 6000; step++) {
     const double ticks = 100000 / (wm::kTwoPi * 0.1);
-    wm_event e = make::empty(step * dt, WM_EVENT_QUANTITIES);
-    e.as.quantities.count = 2;
-    for (int side = 0; side < 2; side++) {
-      e.as.quantities.id[side] = (uint8_t)(side == 0 ? WM_Q_WHEEL_TICKS_LEFT : WM_Q_WHEEL_TICKS_RIGHT);
-      e.as.quantities.value[side] = std::floor(turns[side] * ticks);
-    }
+    const wm_event e = make::quantities(step * dt, {{WM_Q_WHEEL_TICKS_LEFT, std::floor(turns[0] * ticks)},
+                                                    {WM_Q_WHEEL_TICKS_RIGHT, std::floor(turns[1] * ticks)}});
     TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
     for (int i = 0; step % 5 == 0 && i < kCount; i++) {
       const wm::sin_cos at = wm::sincos(wm::kTwoPi * i / kCount), h = wm::sincos(truth.heading_rad);
