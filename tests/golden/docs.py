@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """Makes docs/config.md and docs/errors.md from the programs that know: the tables of parameters, and the tests of the
-messages. docs.py check|write BUILD. `check` prints what differs and fails; `write` brings the files up to date."""
+messages. docs.py check|write BUILD. `check` prints what differs and fails; `write` brings the files up to date. Both check
+that each reference cited as [Author2015] stands once in docs/references.md; docs.py references checks that alone."""
+import collections
 import difflib
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -68,11 +71,34 @@ def errors_md(tests):
     return text.rstrip("\n") + "\n"
 
 
+CITED = re.compile(r"\[([A-Z][A-Za-z]*[a-z](?:(?:19|20)\d\d|ND)[a-z]?)(?:, [^\]\n]+)?\](?!\()")
+LISTED = re.compile(r"^\d+\. \*\*\[(\w+)\]\*\*", re.MULTILINE)
+CITING = ["estimator", "msgs", "drivers", "firmware", "tools", "tests", "docs"]
+
+
+def references():
+    """Prints citations without a reference and references that stand twice; returns how many."""
+    listed = collections.Counter(LISTED.findall((ROOT / "docs/references.md").read_text()))
+    faults = [f"docs/references.md: [{key}] stands {n} times" for key, n in listed.items() if n > 1]
+    for room in CITING:
+        for path in sorted((ROOT / room).rglob("*")):
+            if path.suffix not in (".h", ".hpp", ".c", ".cpp", ".py", ".md") or not path.is_file():
+                continue
+            for number, line in enumerate(path.read_text(errors="replace").splitlines(), 1):
+                for key in CITED.findall(line):
+                    if key not in listed and key != "Author2015":
+                        faults.append(f"{path.relative_to(ROOT)}:{number}: [{key}] is not in docs/references.md")
+    print("".join(fault + "\n" for fault in faults), end="")
+    return len(faults)
+
+
 def main():
+    if sys.argv[1:] == ["references"]:
+        return 1 if references() else 0
     if len(sys.argv) != 3 or sys.argv[1] not in ("check", "write"):
         sys.exit(__doc__)
     tests = pathlib.Path(sys.argv[2]) / "tests"
-    stale = 0
+    stale = 1 if references() else 0
     for name, make in (("config.md", config_md), ("errors.md", errors_md)):
         path = ROOT / "docs" / name
         fresh = make(tests)
