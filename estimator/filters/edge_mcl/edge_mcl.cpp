@@ -117,6 +117,7 @@ wm_status edge_mcl::predict(const wm_event &motion) {
   if (status != WM_OK) return status;
   const double silent_s = driven_ns_ == WM_TIME_NONE ? 0.0 : wm_seconds_between(driven_ns_, motion.t_ns);
   driven_ns_ = motion.t_ns;
+  if (watched_ns_ == WM_TIME_NONE) watched_ns_ = motion.t_ns;
   filter_.move(motion);
   if (silent_s > kSilent_s) doubt_motion();
   return status;
@@ -154,7 +155,8 @@ wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
     if (std::fabs((double)points.x_m[i]) > kFarthest_m || std::fabs((double)points.y_m[i]) > kFarthest_m)
       return WM_OUT_OF_RANGE;
   filter_.move_to(event.t_ns);
-  const double dt = watched_ns_ == WM_TIME_NONE ? 0.1 : wm_seconds_between(watched_ns_, event.t_ns);
+  // Of the first scan: since the motion began; 0 where nothing came before it.
+  const double dt = watched_ns_ == WM_TIME_NONE ? 0.0 : wm_seconds_between(watched_ns_, event.t_ns);
   watched_ns_ = event.t_ns;
 
   const int camera = camera_of(points);

@@ -86,7 +86,7 @@ void lookalikes::carry(const wm_pose2 &odom) {
 void lookalikes::choose_points(const slack_points &scan) {
   points_ = scan.count < kPoints ? scan.count : kPoints;
   image_ = (double)scan.image[0];
-  const double telling = telling_of(scan.count);
+  const double telling = information_weight(scan.count);
   nats_ = kNats * telling * telling;  // fewer points, and of simpler shapes
   for (int i = 0; i < points_; i++) {
     const int from = (int)((int64_t)i * scan.count / points_);
@@ -144,17 +144,17 @@ lookalikes::fit lookalikes::fit_at(const edge_map &map, const wm_pose2 &pose) co
   return f;
 }
 
-// What its scan leaves open of a place, and the errors that all its points share.
-void lookalikes::describe(const fit &f, lookalike *out) const {
+bool place_covariance(const double information[3][3], double out[6]) {
   const double open[3] = {1.0 / square(kOpen_m), 1.0 / square(kOpen_m), 1.0 / square(kOpen_rad)};
   const double lasting[3] = {square(kFound_m), square(kFound_m), square(kFound_rad)};
-  double a[kAlignStates][kAlignStates] = {}, inverse[kAlignStates][kAlignStates] = {};
+  double a[kAlignStates][kAlignStates] = {}, inverse[kAlignStates][kAlignStates];
   for (int r = 0; r < 3; r++)
     for (int c = 0; c < 3; c++)
-      a[r][c] = f.information[r][c] / (kTogether * square(kExplained_m)) + (r == c ? open[r] : 0.0);
-  (void)invert_positive(a, 3, inverse);
+      a[r][c] = information[r][c] / (kTogether * square(kExplained_m)) + (r == c ? open[r] : 0.0);
+  if (!invert_positive(a, 3, inverse)) return false;
   for (int c = 0, k = 0; c < 3; c++)
-    for (int r = 0; r <= c; r++) out->covariance[k++] = inverse[r][c] + (r == c ? lasting[r] : 0.0);
+    for (int r = 0; r <= c; r++) out[k++] = inverse[r][c] + (r == c ? lasting[r] : 0.0);
+  return true;
 }
 
 void lookalikes::look(const edge_map &map, const search_field &field, const slack_points &scan, const wm_pose2 &own,
@@ -227,8 +227,8 @@ bool lookalikes::weigh(const edge_map &map, const wm_pose2 &own, lookalike *l) c
   if (l->weight < kNone) l->began_m = way_m_;
   l->weighed_m = way_m_;
   l->hazard = hazard_;
-  describe(f, l);
-  return l->explained > -2.0 * kWorse && !same(l->pose, own) && map.drivable(l->pose.x_m, l->pose.y_m);
+  return place_covariance(f.information, l->covariance) && l->explained > -2.0 * kWorse && !same(l->pose, own) &&
+         map.drivable(l->pose.x_m, l->pose.y_m);
 }
 
 bool lookalikes::listed_before(int end, const wm_pose2 &pose) const {
@@ -307,9 +307,8 @@ void lookalikes::take(const edge_map &map, const wm_pose2 &own, const wm_pose2 &
   l.weighed_m = l.began_m = way_m_;
   l.hazard = hazard_;
   if (l.explained < -kWorse || !map.drivable(l.pose.x_m, l.pose.y_m) || same(l.pose, own) ||
-      listed_before(count_, l.pose))
+      listed_before(count_, l.pose) || !place_covariance(f.information, l.covariance))
     return;
-  describe(f, &l);
   int at = count_;
   if (count_ < kMost) {
     count_++;

@@ -23,6 +23,11 @@ struct lookalike {
   double began_m;        // way when its odds last were none
 };
 
+// Covariance (xx, xy, yy, x heading, y heading, heading heading) of a place of which a scan's points leave
+// `information` (1/m2, of points of 1 m): its inverse beside a weak prior, and the error that all its points share.
+// False, and `out` stays, where it can't be inverted.
+[[nodiscard]] bool place_covariance(const double information[3][3], double out[6]);
+
 class lookalikes {
  public:
   static constexpr int kMost = 128, kWeighed = 24;  // of them with each scan
@@ -79,7 +84,6 @@ class lookalikes {
   int sweep(const edge_map &map, const search_field &field, int poses);
   int look_from(const edge_map &map, const search_field &field, int64_t run, int64_t row);
   void take(const edge_map &map, const wm_pose2 &own, const wm_pose2 &pose);
-  void describe(const fit &f, lookalike *out) const;
 
   double relative_[kHeadingsMost];  // headings at which the map looks like itself
   int relative_count_;

@@ -16,8 +16,6 @@ static const wm_param kParams[] = {
     F64("states.roll_sigma_rad", roll_sigma_rad, 0.01, 0, 0.5, "The same of its roll about the view, rad. 0: off."),
     F64("states.yaw_sigma_rad", yaw_sigma_rad, 0.01, 0, 0.5, "The same of its yaw, rad. 0: off."),
     F64("states.height_sigma_m", height_sigma_m, 0.01, 0, 0.5, "The same of its height above the floor, m. 0: off."),
-    F64("states.angle_walk_rad", angle_walk_rad, 0.00002, 0, 0.1,
-        "Random walk of pitch, roll and yaw, rad per sqrt(s): springs, loads."),
     F64("states.time_offset_sigma_s", time_offset_sigma_s, 0.03, 0, 0.3,
         "Start sigma of each camera's time offset, s: its pictures are that much older than their stamps. 0: off."),
     F64("states.edge_offset_sigma_m", edge_offset_sigma_m, 0.01, 0, 0.3,

@@ -19,7 +19,6 @@ enum edge_mcl_pose { EDGE_MCL_REFINED, EDGE_MCL_CLOUD };
 typedef struct wm_edge_mcl_params {
   wm_motion_states motion;
   double pitch_sigma_rad, roll_sigma_rad, yaw_sigma_rad, height_sigma_m, time_offset_sigma_s, edge_offset_sigma_m;
-  double angle_walk_rad;
 
   int32_t particles, weight, pose;
   double exponent, sigma_m, floor, resample_below;

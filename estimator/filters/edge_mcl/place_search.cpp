@@ -69,7 +69,7 @@ bool place_search::see(const slack_points &scan, const wm_pose2 &odom) {
   }
   keyframe &k = keyframes_[seen_++ % kKeyframes];
   k.odom = odom;
-  k.telling = telling_of(scan.count);
+  k.telling = information_weight(scan.count);
   k.count = scan.count < kPointsEach ? scan.count : kPointsEach;
   for (int i = 0; i < k.count; i++) {
     const int from = (int)((int64_t)i * scan.count / k.count);

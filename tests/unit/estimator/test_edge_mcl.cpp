@@ -208,6 +208,34 @@ void seeing_the_same_again_makes_it_no_surer(void) {
   TEST_ASSERT_TRUE(variance() < 0.4 * stood);
 }
 
+// GIVEN 1 s of motion without a scan WHEN the first scan comes THEN it counts for that second, not for a scan's usual
+// interval; WHEN the first scan is the first event THEN there is no interval that it could count for.
+void the_first_scan_counts_for_the_time_since_the_motion_began(void) {
+  const double start = 0.5;  // lost.explained: what is explained before anything is seen
+  for (const bool moved : {true, false}) {
+    filter f;
+    drive d;
+    if (moved) {
+      wm_event e{};
+      e.kind = WM_EVENT_TWIST2;
+      e.as.twist2 = {1.0, 0.0};
+      TEST_ASSERT_EQUAL(WM_OK, f.ops->predict(f.state, &e));
+      d.truth.x_m += 1.0;
+      d.t = 1.0;
+    }
+    wm_event e{};
+    d.scan(&e);
+    wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
+    size_t count = 0;
+    TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
+    const double explained = calibration_of(f, "edges.explained");
+    if (moved)
+      TEST_ASSERT_GREATER_THAN_DOUBLE(0.8, explained);
+    else
+      TEST_ASSERT_EQUAL_DOUBLE(start, explained);
+  }
+}
+
 // GIVEN a scan WHEN it comes a second time, of the same moment THEN it says nothing more.
 void the_same_scan_twice_says_no_more(void) {
   filter f;
@@ -518,6 +546,7 @@ int main(void) {
   RUN_TEST(forwards_and_backwards_it_stays_on_the_way);
   RUN_TEST(a_scans_innovation_is_a_distance);
   RUN_TEST(seeing_the_same_again_makes_it_no_surer);
+  RUN_TEST(the_first_scan_counts_for_the_time_since_the_motion_began);
   RUN_TEST(the_same_scan_twice_says_no_more);
   RUN_TEST(places_that_look_the_same_are_listed_beside_the_pose);
   RUN_TEST(the_clouds_pose_is_its_particles_mean);

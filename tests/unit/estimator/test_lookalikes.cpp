@@ -122,6 +122,18 @@ void what_is_explained_beyond_the_usual_says_nothing(void) {
   TEST_ASSERT_TRUE(alike.odds() < 1e-3);
 }
 
+// GIVEN a fit whose information can't be inverted WHEN its covariance is asked for THEN there is none, and what the
+// caller had stays.
+void a_failed_inverse_gives_no_covariance(void) {
+  double information[3][3] = {{100, 0, 0}, {0, 100, 0}, {0, 0, 100}}, out[6] = {-1, -1, -1, -1, -1, -1};
+  TEST_ASSERT_TRUE(wm::place_covariance(information, out));
+  TEST_ASSERT_TRUE(out[0] > 0 && out[2] > 0 && out[5] > 0);
+  for (double &v : out) v = -1;
+  information[1][1] = NAN;
+  TEST_ASSERT_FALSE(wm::place_covariance(information, out));
+  for (const double v : out) TEST_ASSERT_EQUAL_DOUBLE(-1.0, v);
+}
+
 // GIVEN a wall at x = 1 and a camera at (3, 2) THEN what is seen on this side of it, by at most half of the way, may be
 // its image in the floor; what is seen behind it, or nearer, is none.
 void an_image_lies_before_an_edge(void) {
@@ -182,6 +194,7 @@ int main(void) {
   RUN_TEST(a_view_that_tells_them_apart_drops_it);
   RUN_TEST(the_odds_turn_with_what_is_seen);
   RUN_TEST(what_is_explained_beyond_the_usual_says_nothing);
+  RUN_TEST(a_failed_inverse_gives_no_covariance);
   RUN_TEST(an_image_lies_before_an_edge);
   RUN_TEST(nothing_is_seen_through_a_wall);
   const int failed = UNITY_END();
