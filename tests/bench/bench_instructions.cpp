@@ -12,7 +12,7 @@
 #include "drawn_search.h"
 #include "drawn_street.h"
 #include "landmark_drive.h"
-#include "vision/edges/hough.hpp"
+#include "vision/edges_hough/hough.hpp"
 
 // Callgrind counts inside of this function alone.
 extern "C" __attribute__((noinline)) void wm_counted(const std::function<void()> *work) {

@@ -11,7 +11,7 @@
 
 #include "drawn_map.h"
 #include "timing.h"
-#include "vision/edges/hough.hpp"
+#include "vision/edges_hough/hough.hpp"
 #include "waymark/random.h"
 #ifdef WM_HAS_MRPT
 #include <mrpt/maps/COccupancyGridMap2D.h>

@@ -9,8 +9,8 @@
 
 #include "common/fisheye_rig.hpp"
 #include "detector_at_work.h"
-#include "vision/camera/lens.hpp"
-#include "vision/edges/windows.hpp"
+#include "sensors/lens.hpp"
+#include "vision/edges_hough/windows.hpp"
 #include "waymark/random.h"
 
 namespace bench {

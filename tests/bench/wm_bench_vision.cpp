@@ -8,7 +8,7 @@
 
 #include "drawn_picture.h"
 #include "timing.h"
-#include "vision/edges/hough.hpp"
+#include "vision/edges_hough/hough.hpp"
 #include "waymark/random.h"
 
 namespace {

@@ -7,7 +7,7 @@
 #include <functional>
 #include <vector>
 
-#include "vision/camera/lens.hpp"
+#include "sensors/lens.hpp"
 #include "waymark/frame.h"
 #include "waymark/setup.h"
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "vision/camera/lens.hpp"
+#include "sensors/lens.hpp"
 #include "waymark/event.h"
 
 namespace wm::tools {

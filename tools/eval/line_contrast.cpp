@@ -11,7 +11,7 @@
 #include "common/recording_folder.h"
 #include "common/run_folder.h"
 #include "common/statistics.h"
-#include "vision/camera/lens.hpp"
+#include "sensors/lens.hpp"
 #include "waymark/video.h"
 
 namespace wm::tools {

@@ -8,10 +8,10 @@
 #include <random>
 
 #include "common/failure.h"
+#include "image/pyramid.hpp"
 #include "map/train_samples.h"
 #include "math/arc.hpp"
 #include "vision/cascade/evaluate.hpp"
-#include "vision/stereo/pyramid.hpp"
 
 namespace wm::tools {
 namespace {

@@ -4,11 +4,11 @@
 #include <limits>
 
 #include "math/elementary.hpp"
+#include "sensors/mounting.hpp"
 
 namespace wm {
 namespace {
 
-constexpr double kSteep = 0.7071;  // 45 degrees
 constexpr double kLevel[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
 // What a sensor sees that is turned a little further about its x and y axes than it was thought to be.
@@ -32,7 +32,7 @@ void mounted_sensor::init(const wm_sensor &sensor) {
       {p.cos, 0.0, -p.sin}, {p.sin * r.sin, r.cos, p.cos * r.sin}, {p.sin * r.cos, -r.sin, p.cos * r.cos}};
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) axis[i][j] = rows[i][j];
-  is_steep = std::fabs(axis[0][2]) > kSteep;
+  is_steep = is_steep_axis(axis[0][2]);
   bearing_sigma_rad = sensor.bearing_sigma_rad;
   range_sigma_m = sensor.range_sigma_m;
   max_range_m = sensor.max_range_m;

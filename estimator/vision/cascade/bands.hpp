@@ -4,7 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_BANDS_HPP
 #define WAYMARK_ESTIMATOR_VISION_BANDS_HPP
 
-#include "vision/landmarks/panorama.hpp"
+#include "image/panorama.hpp"
 #include "waymark/cascade.h"
 
 namespace wm {

@@ -6,12 +6,13 @@
 #include <limits>
 
 #include "math/arc.hpp"
-#include "vision/camera/bearing.hpp"
+#include "memory/layout.hpp"
+#include "sensors/bearing.hpp"
 #include "vision/cascade/bands.hpp"
 #include "vision/cascade/evaluate.hpp"
 #include "vision/cascade/groups.hpp"
 #include "vision/cascade/params.h"
-#include "vision/parts.hpp"
+#include "vision/detector.hpp"
 #include "vision/registry.h"
 
 namespace wm {
@@ -61,7 +62,7 @@ const char *why_not(const wm_view &view, const mounted_camera &camera) {
 // Puts the state's parts one behind the other; returns the bytes of all.
 size_t lay_out(cascade_state *state, const wm_cascade_params &params, const wm_view &view,
                const mounted_camera &camera) {
-  parts memory(state, sizeof(cascade_state));
+  memory_layout memory(state, sizeof(cascade_state));
   const auto width = static_cast<int32_t>(camera.width_px), height = static_cast<int32_t>(camera.height_px);
   auto *levels = memory.take<uint8_t>(pyramid_bytes(width, height));
   auto *row = memory.take<uint16_t>(camera.width_px);
@@ -161,18 +162,6 @@ bool put(const cascade_state &self, const wm_frame &frame, const window_hit &see
   return true;
 }
 
-// In the order of their rows' times.
-void in_order(wm_event *events, size_t count) {
-  alignas(wm_event) uint8_t moved[WM_EVENT_SMALL_BYTES];
-  for (size_t i = 1; i < count; i++) {
-    const wm_time_ns t_ns = events[i].t_ns;
-    std::memcpy(moved, &events[i], sizeof moved);
-    size_t at = i;
-    for (; at > 0 && events[at - 1].t_ns > t_ns; at--) std::memcpy(&events[at], &events[at - 1], sizeof moved);
-    std::memcpy(&events[at], moved, sizeof moved);
-  }
-}
-
 wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_event *out, size_t capacity,
                  size_t *count) {
   auto *self = static_cast<cascade_state *>(memory);
@@ -187,7 +176,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
   self->groups.finish(self->params.neighbours_min);
   for (size_t i = 0; i < self->groups.count && *count < capacity; i++)
     *count += put(*self, frame, self->groups.list[i].mean, &out[*count]);
-  in_order(out, *count);
+  sort_events(out, *count);
   return WM_OK;
 }
 

@@ -3,11 +3,12 @@
 #include <cmath>
 #include <cstring>
 
+#include "memory/layout.hpp"
+#include "vision/detector.hpp"
 #include "vision/edges/params.h"
 #include "vision/edges/rays.hpp"
 #include "vision/edges/support.hpp"
-#include "vision/edges/windows.hpp"
-#include "vision/parts.hpp"
+#include "vision/edges_hough/windows.hpp"
 #include "vision/registry.h"
 
 namespace wm {
@@ -35,7 +36,7 @@ constexpr int32_t kPiecesMax = 512;  // lines of windows that are joined; those 
 
 // Puts the state's parts one behind the other; returns the bytes of all.
 size_t lay_out(edges_state *state, uint32_t rays, uint32_t samples, const bird_view &bird) {
-  parts memory(state, sizeof *state);
+  memory_layout memory(state, sizeof *state);
   ray_fan fan{};
   fan.rays = memory.take<ray>(rays);
   fan.samples = memory.take<ray_sample>(samples);

@@ -4,7 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_RAYS_HPP
 #define WAYMARK_ESTIMATOR_VISION_RAYS_HPP
 
-#include "vision/camera/lens.hpp"
+#include "sensors/lens.hpp"
 #include "vision/edges/params.h"
 #include "waymark/frame.h"
 

@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "vision/camera/lens.hpp"
-#include "vision/landmarks/ray_table.hpp"
+#include "image/ray_table.hpp"
+#include "sensors/lens.hpp"
 #include "waymark/setup.h"
 
 namespace wm {

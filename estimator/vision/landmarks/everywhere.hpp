@@ -5,8 +5,8 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_EVERYWHERE_HPP
 #define WAYMARK_ESTIMATOR_VISION_EVERYWHERE_HPP
 
+#include "image/panorama.hpp"
 #include "vision/landmarks/guess.hpp"
-#include "vision/landmarks/panorama.hpp"
 
 namespace wm {
 

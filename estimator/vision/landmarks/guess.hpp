@@ -3,7 +3,7 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_GUESS_HPP
 #define WAYMARK_ESTIMATOR_VISION_GUESS_HPP
 
-#include "vision/camera/lens.hpp"
+#include "sensors/lens.hpp"
 #include "vision/landmarks/appearance.hpp"
 #include "waymark/pose.h"
 

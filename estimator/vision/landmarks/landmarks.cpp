@@ -5,9 +5,10 @@
 #include <initializer_list>
 #include <limits>
 
-#include "vision/camera/bearing.hpp"
+#include "memory/layout.hpp"
+#include "sensors/bearing.hpp"
+#include "vision/detector.hpp"
 #include "vision/landmarks/recognise.hpp"
-#include "vision/parts.hpp"
 #include "vision/registry.h"
 
 namespace wm {
@@ -60,7 +61,7 @@ bool is_usable(const wm_view &view, const wm_appearance &a) {
 // Puts the state's parts one behind the other; returns the bytes of all.
 size_t lay_out(landmarks_state *state, const wm_landmarks_params &params, const wm_view &view,
                const mounted_camera &camera) {
-  parts memory(state, sizeof(landmarks_state));
+  memory_layout memory(state, sizeof(landmarks_state));
   const auto width = static_cast<int32_t>(camera.width_px), height = static_cast<int32_t>(camera.height_px);
   auto *rays = memory.take<uint8_t>(ray_table::bytes(camera.width_px, camera.height_px));
   const size_t level_bytes = pyramid_bytes(width, height) + kReadBehind;
@@ -174,25 +175,21 @@ bool put(const landmarks_state &self, const wm_frame &frame, const camera_guess 
   return true;
 }
 
-// In the order of their rows' times, one for each landmark: the one that is most like it.
-size_t in_order(wm_event *events, double *likeness, size_t count) {
+// Keeps one event per landmark, the one of the largest likeness, and sorts them by the times of their rows.
+size_t best_in_order(wm_event *events, double *likeness, size_t count) {
+  const auto is_same = [&](size_t a, size_t b) {
+    return events[a].as.sighting.landmark_id == events[b].as.sighting.landmark_id;
+  };
   size_t kept = 0;
   for (size_t i = 0; i < count; i++) {
-    const wm_event event = events[i];
-    const double like = likeness[i];
-    size_t same = 0;
-    while (same < kept && events[same].as.sighting.landmark_id != event.as.sighting.landmark_id) same++;
-    if (same < kept) {
-      if (likeness[same] >= like) continue;
-      for (size_t k = same + 1; k < kept; k++) events[k - 1] = events[k], likeness[k - 1] = likeness[k];
-      kept--;
-    }
-    size_t at = kept++;
-    for (; at > 0 && events[at - 1].t_ns > event.t_ns; at--)
-      events[at] = events[at - 1], likeness[at] = likeness[at - 1];
-    events[at] = event;
-    likeness[at] = like;
+    bool is_best = true;
+    for (size_t k = 0; k < kept && is_best; k++) is_best = !(is_same(k, i) && likeness[k] >= likeness[i]);
+    for (size_t k = i + 1; k < count && is_best; k++) is_best = !(is_same(k, i) && likeness[k] > likeness[i]);
+    if (!is_best) continue;
+    if (kept != i) std::memcpy(static_cast<void *>(&events[kept]), &events[i], WM_EVENT_SMALL_BYTES);
+    likeness[kept++] = likeness[i];
   }
+  sort_events(events, kept);
   return kept;
 }
 
@@ -392,7 +389,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *predic
     if (guessed && by_pose > 0 && found.count <= by_pose) look_by(self, frame, guess, true, 0, &found);
   }
   self->before_ns = frame.t_ns;
-  *count = in_order(out, found.likeness, found.count);
+  *count = best_in_order(out, found.likeness, found.count);
   return WM_OK;
 }
 

@@ -5,8 +5,10 @@
 #include <initializer_list>
 #include <limits>
 
+#include "memory/layout.hpp"
+#include "sensors/mounting.hpp"
+#include "vision/detector.hpp"
 #include "vision/lines/line_tracks.hpp"
-#include "vision/parts.hpp"
 #include "vision/registry.h"
 
 namespace wm {
@@ -26,13 +28,12 @@ struct lines_state {
   radial_edge edges[kRadialEdgesMax];
 };
 
-constexpr double kSteep = 0.7071;         // as in the filters' sensor model
 constexpr double kZenithWalk_rad = 2e-5;  // a picture: a robot on its springs
 constexpr int kLeanSeen = 3;              // only lines that were followed tell of the zenith
 
 // Puts the state's parts one behind the other; returns the bytes of all.
 size_t lay_out(lines_state *state, const polar_view &polar) {
-  parts memory(state, sizeof *state);
+  memory_layout memory(state, sizeof *state);
   const size_t columns = static_cast<size_t>(polar.columns), rows = static_cast<size_t>(polar.rows);
   polar_view view = polar;
   view.row = memory.take<polar_row>(rows);
@@ -75,7 +76,7 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   lay_out(state, polar);
   polar_make(state->camera, state->params, &state->polar);
   const mat3 body = matrix_of_rpy(camera->mounting.rpy_rad);
-  state->levelled = std::fabs(body.m[2][0]) > kSteep;
+  state->levelled = is_steep_axis(body.m[2][0]);
   state->yaw = sincos(camera->mounting.rpy_rad[2]);
   for (int i = 0; i < 2; i++)
     for (int k = 0; k < 3; k++) state->tilt[i][k] = body.m[k][i];

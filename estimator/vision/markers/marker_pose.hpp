@@ -3,7 +3,7 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_MARKER_POSE_HPP
 #define WAYMARK_ESTIMATOR_VISION_MARKER_POSE_HPP
 
-#include "vision/markers/homography.hpp"
+#include "image/homography.hpp"
 #include "waymark/marker_fit.h"
 
 namespace wm {

@@ -3,11 +3,12 @@
 // pentagon; their modules; their edges measured and their pose found by wm_marker_fit.
 #include <cstring>
 
+#include "memory/layout.hpp"
+#include "vision/detector.hpp"
 #include "vision/markers/dark_regions.hpp"
 #include "vision/markers/mr_read.hpp"
 #include "vision/markers/params.h"
 #include "vision/markers/polygon.hpp"
-#include "vision/parts.hpp"
 #include "vision/registry.h"
 #include "waymark/marker_fit.h"
 
@@ -31,7 +32,7 @@ struct mr_state {
 
 // Puts the state's parts one behind the other; returns the bytes of all.
 size_t lay_out(mr_state *state, uint32_t width, uint32_t height) {
-  parts memory(state, sizeof *state);
+  memory_layout memory(state, sizeof *state);
   dark_work work;
   uint8_t *fit = memory.take<uint8_t>(wm_marker_fit_bytes());
   uint8_t *dark = memory.take<uint8_t>(dark_work_lay_out(&work, width, height, nullptr));

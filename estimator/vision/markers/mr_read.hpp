@@ -3,7 +3,7 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_MR_READ_HPP
 #define WAYMARK_ESTIMATOR_VISION_MR_READ_HPP
 
-#include "vision/markers/homography.hpp"
+#include "image/homography.hpp"
 #include "waymark/mr_code.h"
 
 namespace wm {

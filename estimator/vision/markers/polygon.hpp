@@ -3,7 +3,7 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_POLYGON_HPP
 #define WAYMARK_ESTIMATOR_VISION_POLYGON_HPP
 
-#include "vision/markers/tangent.hpp"
+#include "image/tangent.hpp"
 
 namespace wm {
 

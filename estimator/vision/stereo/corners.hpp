@@ -4,7 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_CORNERS_HPP
 #define WAYMARK_ESTIMATOR_VISION_CORNERS_HPP
 
-#include "vision/stereo/pyramid.hpp"
+#include "image/pyramid.hpp"
 
 namespace wm {
 

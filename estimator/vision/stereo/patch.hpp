@@ -6,8 +6,8 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_PATCH_HPP
 #define WAYMARK_ESTIMATOR_VISION_PATCH_HPP
 
-#include "vision/camera/lens.hpp"
-#include "vision/stereo/pyramid.hpp"
+#include "image/pyramid.hpp"
+#include "sensors/lens.hpp"
 
 namespace wm {
 

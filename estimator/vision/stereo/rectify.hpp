@@ -4,8 +4,8 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_RECTIFY_HPP
 #define WAYMARK_ESTIMATOR_VISION_RECTIFY_HPP
 
-#include "vision/camera/lens.hpp"
-#include "vision/stereo/pyramid.hpp"
+#include "image/pyramid.hpp"
+#include "sensors/lens.hpp"
 #include "waymark/frame.h"
 
 namespace wm {

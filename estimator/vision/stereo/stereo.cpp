@@ -2,7 +2,8 @@
 // Detector `stereo`: points of the world that both cameras of a pair see, followed from picture to picture.
 #include <cstring>
 
-#include "vision/parts.hpp"
+#include "memory/layout.hpp"
+#include "vision/detector.hpp"
 #include "vision/registry.h"
 #include "vision/stereo/corners.hpp"
 #include "vision/stereo/rectify.hpp"
@@ -63,7 +64,7 @@ size_t lay_out(stereo_state *state, const rectification cameras[2], const wm_ste
   const int32_t width = cameras[0].width, height = cameras[0].height, cell = params.cell_px / 2;
   const int32_t cells = cells_across(width / 2, cell) * cells_across(height / 2, cell);
   const size_t area = static_cast<size_t>(width) * static_cast<size_t>(height);
-  parts memory(state, sizeof *state);
+  memory_layout memory(state, sizeof *state);
   uint8_t *pictures[3];
   for (uint8_t *&picture : pictures) picture = memory.take<uint8_t>(pyramid_bytes(width, height));
   raw_pixel *tables[2];

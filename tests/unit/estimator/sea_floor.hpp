@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "vision/camera/lens.hpp"
+#include "sensors/lens.hpp"
 #include "vision/stereo/motion.hpp"
 #include "waymark/frame.h"
 #include "waymark/random.h"

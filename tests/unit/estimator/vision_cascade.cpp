@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "common/fisheye_rig.hpp"
+#include "sensors/bearing.hpp"
 #include "unity.h"
-#include "vision/camera/bearing.hpp"
 #include "vision/cascade/evaluate.hpp"
 #include "vision/cascade/params.h"
 #include "waymark/cascade_file.h"

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "common/fisheye_rig.hpp"
+#include "sensors/lens.hpp"
 #include "unity.h"
-#include "vision/camera/lens.hpp"
 #include "waymark/detector.h"
 #include "waymark/random.h"
 

@@ -5,7 +5,7 @@
 #include <memory>
 
 #include "unity.h"
-#include "vision/edges/hough.hpp"
+#include "vision/edges_hough/hough.hpp"
 #include "waymark/random.h"
 #include "waymark/vectors.h"
 

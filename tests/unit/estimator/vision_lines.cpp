@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "sensors/lens.hpp"
 #include "unity.h"
-#include "vision/camera/lens.hpp"
 #include "vision/lines/votes.hpp"
 #include "waymark/detector.h"
 #include "waymark/random.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pieces joined to polylines as the paper does: straight ones, bends, corners, branches, gaps; and a drawn arc of a
 // wall.
-#include "vision/edges/polylines.hpp"
+#include "vision/edges_hough/polylines.hpp"
 
 #include <cmath>
 #include <cstdlib>

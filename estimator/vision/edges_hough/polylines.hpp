@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Line pieces of the windows joined to polylines, as M. P. Abramov et al. 2019 do: pieces are the vertices of a graph,
 // an edge is where two continue each other, and of every connected part one polyline is made.
-#ifndef WAYMARK_ESTIMATOR_VISION_POLYLINES_HPP
-#define WAYMARK_ESTIMATOR_VISION_POLYLINES_HPP
+#ifndef WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_POLYLINES_HPP
+#define WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_POLYLINES_HPP
 
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/edges/polylines.hpp"
+#include "vision/edges_hough/polylines.hpp"
 
 #include "math/elementary.hpp"
 

@@ -4,8 +4,8 @@
 // projecting costs a tenth of a microsecond, unprojecting up to a few.
 // Sources: J. Kannala, S. Brandt 2006 (equidistant); D. C. Brown 1966 (radtan); C. Mei, P. Rives 2007 (omni);
 // V. Usenko et al. 2018 (double sphere).
-#ifndef WAYMARK_ESTIMATOR_VISION_LENS_HPP
-#define WAYMARK_ESTIMATOR_VISION_LENS_HPP
+#ifndef WAYMARK_ESTIMATOR_SENSORS_LENS_HPP
+#define WAYMARK_ESTIMATOR_SENSORS_LENS_HPP
 
 #include "math/rotation.hpp"
 #include "waymark/setup.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/markers/homography.hpp"
+#include "image/homography.hpp"
 
 namespace wm {
 

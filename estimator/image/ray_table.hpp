@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rays of a camera's pixels by a look-up: unprojected once on a grid, between its nodes linearly. Four pixels of a
 // fisheye of 318 px focal length are off by at most 1e-5 rad. Any camera model.
-#ifndef WAYMARK_ESTIMATOR_VISION_RAY_TABLE_HPP
-#define WAYMARK_ESTIMATOR_VISION_RAY_TABLE_HPP
+#ifndef WAYMARK_ESTIMATOR_IMAGE_RAY_TABLE_HPP
+#define WAYMARK_ESTIMATOR_IMAGE_RAY_TABLE_HPP
 
 #include <cstddef>
 
-#include "vision/camera/lens.hpp"
+#include "sensors/lens.hpp"
 
 namespace wm {
 

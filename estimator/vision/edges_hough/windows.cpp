@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/edges/windows.hpp"
+#include "vision/edges_hough/windows.hpp"
 
 #include <cstring>
 

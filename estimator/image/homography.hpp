@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // From a plane to flat coordinates.
-#ifndef WAYMARK_ESTIMATOR_VISION_HOMOGRAPHY_HPP
-#define WAYMARK_ESTIMATOR_VISION_HOMOGRAPHY_HPP
+#ifndef WAYMARK_ESTIMATOR_IMAGE_HOMOGRAPHY_HPP
+#define WAYMARK_ESTIMATOR_IMAGE_HOMOGRAPHY_HPP
 
-#include "vision/markers/tangent.hpp"
+#include "image/tangent.hpp"
 
 namespace wm {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The picture about one direction as a camera without distortion would show it that looks there: straight edges are
 // straight, and a unit is about a pixel, however bent the lens is. "Flat" coordinates: origin on the direction.
-#ifndef WAYMARK_ESTIMATOR_VISION_TANGENT_HPP
-#define WAYMARK_ESTIMATOR_VISION_TANGENT_HPP
+#ifndef WAYMARK_ESTIMATOR_IMAGE_TANGENT_HPP
+#define WAYMARK_ESTIMATOR_IMAGE_TANGENT_HPP
 
-#include "vision/camera/lens.hpp"
+#include "sensors/lens.hpp"
 #include "waymark/frame.h"
 
 namespace wm {

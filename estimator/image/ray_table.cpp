@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/landmarks/ray_table.hpp"
+#include "image/ray_table.hpp"
 
 #include <limits>
 

@@ -1,18 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // A ray of a camera as the filters' sensor model has it.
-#ifndef WAYMARK_ESTIMATOR_VISION_BEARING_HPP
-#define WAYMARK_ESTIMATOR_VISION_BEARING_HPP
+#ifndef WAYMARK_ESTIMATOR_SENSORS_BEARING_HPP
+#define WAYMARK_ESTIMATOR_SENSORS_BEARING_HPP
 
 #include "math/elementary.hpp"
-#include "vision/camera/lens.hpp"
+#include "sensors/lens.hpp"
+#include "sensors/mounting.hpp"
 
 namespace wm {
 
-// Whether the mounting's x axis points up or down rather than ahead, as in the filters' sensor model.
-inline bool is_steep(const wm_camera &camera) {
-  constexpr double kSteep = 0.7071;
-  return std::fabs(matrix_of_rpy(camera.mounting.rpy_rad).m[2][0]) > kSteep;
-}
+// Whether the camera looks up or down rather than ahead (sensors/mounting.hpp).
+inline bool is_steep(const wm_camera &camera) { return is_steep_axis(matrix_of_rpy(camera.mounting.rpy_rad).m[2][0]); }
 
 // The angle from the camera's axis to the left, in the camera's own axes; of a camera that looks up or down the azimuth
 // about its mounting's yaw. `ray` in optical axes, of any length.

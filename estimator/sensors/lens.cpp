@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/camera/lens.hpp"
+#include "sensors/lens.hpp"
 
 namespace wm {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A picture in several sizes, each half of the one before: pixel (x, y) of a level is at (2x, 2y) of the one below.
-#ifndef WAYMARK_ESTIMATOR_VISION_PYRAMID_HPP
-#define WAYMARK_ESTIMATOR_VISION_PYRAMID_HPP
+#ifndef WAYMARK_ESTIMATOR_IMAGE_PYRAMID_HPP
+#define WAYMARK_ESTIMATOR_IMAGE_PYRAMID_HPP
 
 #include <cstddef>
 #include <cstdint>

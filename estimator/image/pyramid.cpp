@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/stereo/pyramid.hpp"
+#include "image/pyramid.hpp"
 
 #include <cstring>
 

@@ -4,8 +4,8 @@
 // fast discrete approximation algorithm for the Radon transform", SIAM J. Computing 27(1), 1998; E. I. Ershov et al.,
 // "Fast Hough transform and approximation properties of dyadic patterns", 2017; windows whose side is no power of two
 // are halved as they come.
-#ifndef WAYMARK_ESTIMATOR_VISION_HOUGH_HPP
-#define WAYMARK_ESTIMATOR_VISION_HOUGH_HPP
+#ifndef WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_HPP
+#define WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_HPP
 
 #include <cstdint>
 

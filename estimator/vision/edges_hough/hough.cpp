@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/edges/hough.hpp"
+#include "vision/edges_hough/hough.hpp"
 
 #include <cstring>
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/landmarks/panorama.hpp"
+#include "image/panorama.hpp"
 
 #include <cstring>
 
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
+#include "sensors/mounting.hpp"
 
 namespace wm {
 namespace {
@@ -36,7 +37,7 @@ double angle_of_pixel(const mounted_camera &camera) {
 void azimuths_of(const mounted_camera &camera, double *left_rad, double *right_rad) {
   constexpr double kStep_px = 8;
   const vec3 axis = camera.R_base_optical * vec3{0, 0, 1};
-  const bool steep = std::fabs(axis.z) > 0.7071;
+  const bool steep = is_steep_axis(axis.z);
   const double middle = steep ? 0 : atan2(axis.y, axis.x);
   double most = steep ? 3.14159265358979 : 0, least = -most;
   for (double v = 0; v < camera.height_px && !steep; v += kStep_px)

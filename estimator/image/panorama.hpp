@@ -3,14 +3,14 @@
 // as wide as it is high. On it an upright landmark at a distance is its picture, only smaller: it is found at any
 // distance by one size of template in cylinders of different fineness, and always about the same row, since its height
 // above the camera and its own size shrink alike. Any camera model, by tables made at the start.
-#ifndef WAYMARK_ESTIMATOR_VISION_PANORAMA_HPP
-#define WAYMARK_ESTIMATOR_VISION_PANORAMA_HPP
+#ifndef WAYMARK_ESTIMATOR_IMAGE_PANORAMA_HPP
+#define WAYMARK_ESTIMATOR_IMAGE_PANORAMA_HPP
 
 #include <cstddef>
 #include <cstdint>
 
-#include "vision/camera/lens.hpp"
-#include "vision/stereo/pyramid.hpp"
+#include "image/pyramid.hpp"
+#include "sensors/lens.hpp"
 
 namespace wm {
 

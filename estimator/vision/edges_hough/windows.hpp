@@ -2,13 +2,13 @@
 // The paper's way: the floor as a bird sees it, by a table made once; magnitude of its gradient; in overlapping windows
 // the strongest line by the fast Hough transform. Source: M. P. Abramov et al. 2019, "Edge detection based mobile robot
 // indoor localization", section on the detector.
-#ifndef WAYMARK_ESTIMATOR_VISION_WINDOWS_HPP
-#define WAYMARK_ESTIMATOR_VISION_WINDOWS_HPP
+#ifndef WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_WINDOWS_HPP
+#define WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_WINDOWS_HPP
 
-#include "vision/camera/lens.hpp"
-#include "vision/edges/hough.hpp"
+#include "sensors/lens.hpp"
 #include "vision/edges/params.h"
-#include "vision/edges/polylines.hpp"
+#include "vision/edges_hough/hough.hpp"
+#include "vision/edges_hough/polylines.hpp"
 #include "waymark/frame.h"
 
 namespace wm {
