@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "filters/contract.hpp"
+#include "filters/core/contract.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
 #include "math/arc.hpp"

@@ -12,7 +12,7 @@
 #include "filters/edge_mcl/params.h"
 #include "filters/edge_mcl/place_search.hpp"
 #include "filters/planar/planar_filter.hpp"
-#include "filters/record_list.hpp"
+#include "filters/core/record_list.hpp"
 #include "waymark/estimator.h"
 
 namespace wm {

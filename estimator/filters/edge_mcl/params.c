@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/edge_mcl/params.h"
 
-#include "filters/param_rows.h"
+#include "filters/core/param_rows.h"
 
 typedef struct wm_edge_mcl_params params;
 

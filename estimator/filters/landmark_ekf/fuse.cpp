@@ -263,36 +263,36 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   const sensor_errors errors = errors_of(s.sensor);
 
   const sensor_errors sure = remembered_errors_of(s.sensor);
-  search_clue clue{};
-  clue.t_ns = event.t_ns;
-  clue.kind = (use_bearing ? kClueBearing : 0u) | (use_range ? kClueRange : 0u);
-  clue.key = landmark * kMaxSensors + s.sensor;
-  clue.sensor = compose(past.odom, {sensor.x_m + sure.x_m, sensor.y_m + sure.y_m, sensor.yaw_rad + sure.yaw_rad});
-  clue.place_m[0] = target.p_m[0];
-  clue.place_m[1] = target.p_m[1];
-  clue.bearing_rad = s.bearing_rad;
+  observation seen{};
+  seen.t_ns = event.t_ns;
+  seen.kind = (use_bearing ? kObservedBearing : 0u) | (use_range ? kObservedRange : 0u);
+  seen.key = landmark * kMaxSensors + s.sensor;
+  seen.sensor = compose(past.odom, {sensor.x_m + sure.x_m, sensor.y_m + sure.y_m, sensor.yaw_rad + sure.yaw_rad});
+  seen.place_m[0] = target.p_m[0];
+  seen.place_m[1] = target.p_m[1];
+  seen.bearing_rad = s.bearing_rad;
   const bool use_elevation = wm_sighting_has_elevation(&s) && params_.use_elevation && use_bearing && !use_range &&
                              finite(target.p_m[2]) && finite(sensor.z_m);
   if (use_elevation) {
     const level_ray ray = levelled(sensor, sure, s.bearing_rad, s.elevation_rad);
-    clue.kind |= kClueElevation;
-    clue.bearing_rad = ray.azimuth_rad;
-    clue.tangent = ray.tangent;
-    clue.height_m = target.p_m[2] - sensor.z_m;
-    clue.sigma_tangent = (1.0 + square(ray.tangent)) *
+    seen.kind |= kObservedElevation;
+    seen.bearing_rad = ray.azimuth_rad;
+    seen.tangent = ray.tangent;
+    seen.height_m = target.p_m[2] - sensor.z_m;
+    seen.sigma_tangent = (1.0 + square(ray.tangent)) *
                          std::sqrt(square(s.elevation_sigma_rad) + square(params_.tilt_sigma_rad) +
                                    square(params_.sensor_tilt_sigma_rad) + square(params_.sensor_angle_scale_sigma));
-    clue.sigma_height_m = map_sigma(landmark);
+    seen.sigma_height_m = map_sigma(landmark);
   }
   const double along = use_range && sensor.range_is_depth && has_bearing ? cos(s.bearing_rad) : 1.0;
-  clue.range_m = (s.range_m - sure.range_bias_m) / sure.range_scale / (along > 0.1 ? along : 0.1);
-  clue.sigma_angle_rad = std::sqrt(square(bearing_sigma) + square(params_.lasting_bearing_rad) +
+  seen.range_m = (s.range_m - sure.range_bias_m) / sure.range_scale / (along > 0.1 ? along : 0.1);
+  seen.sigma_angle_rad = std::sqrt(square(bearing_sigma) + square(params_.lasting_bearing_rad) +
                                    square(params_.sensor_angle_scale_sigma * kHalfPi));
-  clue.sigma_place_m = std::sqrt(square(map_sigma(landmark)) + square(params_.sensor_xy_sigma_m) +
+  seen.sigma_place_m = std::sqrt(square(map_sigma(landmark)) + square(params_.sensor_xy_sigma_m) +
                                  square(params_.sensor_tilt_sigma_rad * (target.p_m[2] - sensor.z_m)));
-  clue.sigma_length_m = std::sqrt(square(range_sigma) + square(params_.lasting_range_m) + square(map_sigma(landmark)) +
-                                  square((params_.range_sigma_rel + params_.lasting_range_rel) * clue.range_m));
-  note_clue(clue);
+  seen.sigma_length_m = std::sqrt(square(range_sigma) + square(params_.lasting_range_m) + square(map_sigma(landmark)) +
+                                  square((params_.range_sigma_rel + params_.lasting_range_rel) * seen.range_m));
+  buffer_observation(seen);
   if (is_sought(event.t_ns, use_bearing)) {
     seek(event.t_ns);
     return drop(WM_REJECTED_SEARCHING);
@@ -302,7 +302,7 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   if (!e.possible && e.distance_m < 0.05) return drop(WM_REJECTED_SINGULAR);
   if (!e.possible) {
     drop(WM_REJECTED_OUT_OF_RANGE);
-    note(event.t_ns, landmark, witnesses::against_all());
+    note(event.t_ns, landmark, landmark_evidence::max_log_bayes_factor());
     return WM_OK;
   }
   int lasting, map;
@@ -371,7 +371,7 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
     add(WM_RESIDUAL_ELEVATION, s.elevation_rad, e.elevation_rad + bent.elevation_rad, e.elevation_by,
         square(s.elevation_sigma_rad) + bent.elevation_variance, -1, 0.0);
   const double room = (use_bearing ? kTwoPi : 1.0) * (use_range ? kAnyRange_m : 1.0);
-  const bool believed = !landmark_records()[landmark].moved && !witnesses_.biased(landmark, event.t_ns);
+  const bool believed = !landmark_records()[landmark].moved && !evidence_.biased(landmark, event.t_ns);
   double before[sparse_row::kMax];
   for (int k = 0; use_elevation && k < residuals[1].row.count; k++)
     before[k] = filter_.value(residuals[1].row.index[k]);
@@ -413,15 +413,15 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
     gnss_lasting_ns_ = event.t_ns;
   }
   const past_pose past = look_back(gnss_time_state_ < 0 ? 0.0 : filter_.value(gnss_time_state_));
-  search_clue clue{};
-  clue.t_ns = event.t_ns;
-  clue.kind = kCluePosition;
-  clue.key = -2;
-  clue.sensor = past.odom;
-  clue.place_m[0] = p.p_m[0];
-  clue.place_m[1] = p.p_m[1];
-  clue.sigma_length_m = std::sqrt(square(sigma) + square(params_.gnss_lasting_m));
-  note_clue(clue);
+  observation seen{};
+  seen.t_ns = event.t_ns;
+  seen.kind = kObservedPosition;
+  seen.key = -2;
+  seen.sensor = past.odom;
+  seen.place_m[0] = p.p_m[0];
+  seen.place_m[1] = p.p_m[1];
+  seen.sigma_length_m = std::sqrt(square(sigma) + square(params_.gnss_lasting_m));
+  buffer_observation(seen);
   if (state_ == WM_STATE_SEARCHING) {
     blank.verdict = WM_REJECTED_SEARCHING;
     records.add(blank);
@@ -444,7 +444,7 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
     r.innovation = p.p_m[k] - expected;
     r.noise = square(sigma);
   }
-  note(event.t_ns, kPositionWitness, fuse(residuals, 2, square(kAnyPlace_m), true, records));
+  note(event.t_ns, kPositionKey, fuse(residuals, 2, square(kAnyPlace_m), true, records));
   return WM_OK;
 }
 
@@ -464,14 +464,14 @@ wm_status landmark_ekf::fuse_heading(const wm_event &event, record_list records)
     records.add(r.record);
     return WM_OK;
   }
-  search_clue clue{};
-  clue.t_ns = event.t_ns;
-  clue.kind = kClueHeading;
-  clue.key = -3;
-  clue.sensor = filter_.odom();
-  clue.bearing_rad = h.heading_rad;
-  clue.sigma_angle_rad = h.sigma_rad;
-  note_clue(clue);
+  observation seen{};
+  seen.t_ns = event.t_ns;
+  seen.kind = kObservedHeading;
+  seen.key = -3;
+  seen.sensor = filter_.odom();
+  seen.bearing_rad = h.heading_rad;
+  seen.sigma_angle_rad = h.sigma_rad;
+  buffer_observation(seen);
   if (state_ == WM_STATE_SEARCHING) {
     r.record.verdict = WM_REJECTED_SEARCHING;
     records.add(r.record);
@@ -482,7 +482,7 @@ wm_status landmark_ekf::fuse_heading(const wm_event &event, record_list records)
   r.record.expected = filter_.pose().heading_rad;
   r.innovation = wrap(h.heading_rad - r.record.expected);
   r.noise = square(h.sigma_rad);
-  note(event.t_ns, kHeadingWitness, fuse(&r, 1, kTwoPi, true, records));
+  note(event.t_ns, kHeadingKey, fuse(&r, 1, kTwoPi, true, records));
   return WM_OK;
 }
 
@@ -507,11 +507,11 @@ double landmark_ekf::fuse(residual *r, int count, double room, bool believed, re
           determinant;
   }
   const double density = exp(-0.5 * nis) / std::sqrt((count == 2 ? square(kTwoPi) : kTwoPi) * determinant);
-  const double against = witnesses::against(density, room);
+  const double against = landmark_evidence::log_bayes_factor(density, room);
   const double scale = count == 2 ? 1.0 : kOneNumber;
   const double hard = params_.gate_hard * scale, soft = params_.gate_soft * scale;
   // Until the pose is proven, a start that is surer than it should be must not bend what it sees.
-  const bool unproven = params_.recover && !witnesses_.proven();
+  const bool unproven = params_.recover && !evidence_.proven();
   const bool fused = believed && nis <= (unproven && kUnproven * scale < hard ? kUnproven * scale : hard);
   for (int i = 0; i < count; i++) {
     r[i].record.nis = nis;
@@ -521,7 +521,7 @@ double landmark_ekf::fuse(residual *r, int count, double room, bool believed, re
     records.add(r[i].record);
   }
   const wm_time_ns now = filter_.now_ns();
-  if (nis > soft && witnesses_.doubtful() &&
+  if (nis > soft && evidence_.doubtful() &&
       (loosened_ns_ == WM_TIME_NONE || wm_seconds_between(loosened_ns_, now) > kLoosenEvery_s)) {
     loosened_ns_ = now;
     // Several misfits lately: it is the pose that is less sure than it claims, not only this measurement.
@@ -529,10 +529,10 @@ double landmark_ekf::fuse(residual *r, int count, double room, bool believed, re
     filter_.project(r[0].row, &first);
     if (count == 2) cross = filter_.project_onto(r[1].row, first);
   }
-  if (!fused) return believed && nis <= hard ? against : witnesses::against_all();
+  if (!fused) return believed && nis <= hard ? against : landmark_evidence::max_log_bayes_factor();
   const double weaker = nis > soft ? nis / soft : 1.0;
   // While several did not fit, what hardly fits may move the pose, but teaches nothing of the sensors.
-  const int kept = nis > soft && witnesses_.doubtful() ? calibration_states_ : kPoseStates;
+  const int kept = nis > soft && evidence_.doubtful() ? calibration_states_ : kPoseStates;
   filter_.update(first, r[0].innovation, r[0].noise * weaker, kPoseStates, kept);
   if (count == 2) {
     const double left = r[1].innovation - cross / (first.variance + r[0].noise * weaker) * r[0].innovation;
@@ -555,7 +555,7 @@ void landmark_ekf::fuse_elevation(residual bearing_then_own[2], const double *be
   projection own;
   filter_.project(r.row, &own);
   const double hard = params_.gate_hard * kOneNumber;
-  const bool unproven = params_.recover && !witnesses_.proven();
+  const bool unproven = params_.recover && !evidence_.proven();
   r.record.variance = own.variance + r.noise;
   r.record.expected = r.record.observed - r.innovation;
   r.record.nis = square(r.innovation) / r.record.variance;

@@ -3,7 +3,7 @@
 
 #include <cstring>
 
-#include "filters/contract.hpp"
+#include "filters/core/contract.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
 #include "math/arc.hpp"
@@ -114,11 +114,11 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   start_again();
 }
 
-// Known start: track from it. Unknown: what is known of it becomes a clue for the search.
+// Known start: track from it. Unknown: what is known of it becomes a seen for the search.
 void landmark_ekf::start_again() {
   const wm_start &start = setup_->start;
-  witnesses_.begin(kStartWrong);
-  clues_.clear();
+  evidence_.begin(kStartWrong);
+  observations_.clear();
   prior_count_ = 0;
   resets_++;
   state_ = start_is_known(start) ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
@@ -127,27 +127,27 @@ void landmark_ekf::start_again() {
     try_start();
     return;
   }
-  search_clue clue{};
-  clue.t_ns = filter_.now_ns();
-  clue.key = -1;
-  clue.sensor = filter_.odom();
-  clue.travelled_m = filter_.travelled_m();
-  clue.turned_rad = filter_.turned_rad();
+  observation seen{};
+  seen.t_ns = filter_.now_ns();
+  seen.key = -1;
+  seen.sensor = filter_.odom();
+  seen.travelled_m = filter_.travelled_m();
+  seen.turned_rad = filter_.turned_rad();
   const bool place = finite(start.p_m[0]) && finite(start.p_m[1]), heading = finite(start.heading_rad);
   const double sigma_xy = finite(start.sigma_xy_m) ? start.sigma_xy_m : 0.05;
   const double sigma_heading = finite(start.sigma_heading_rad) ? start.sigma_heading_rad : 0.05;
   if (place) {
-    clue.kind = kCluePosition;
-    clue.place_m[0] = start.p_m[0];
-    clue.place_m[1] = start.p_m[1];
-    clue.sigma_length_m = sigma_xy;
-    prior_[prior_count_++] = clue;
+    seen.kind = kObservedPosition;
+    seen.place_m[0] = start.p_m[0];
+    seen.place_m[1] = start.p_m[1];
+    seen.sigma_length_m = sigma_xy;
+    prior_[prior_count_++] = seen;
   }
   if (heading) {
-    clue.kind = kClueHeading;
-    clue.bearing_rad = start.heading_rad;
-    clue.sigma_angle_rad = sigma_heading;
-    prior_[prior_count_++] = clue;
+    seen.kind = kObservedHeading;
+    seen.bearing_rad = start.heading_rad;
+    seen.sigma_angle_rad = sigma_heading;
+    prior_[prior_count_++] = seen;
   }
   const double xy = square(place ? sigma_xy : kUnknownPosition_m);
   const double covariance[3][3] = {
@@ -185,8 +185,8 @@ wm_status landmark_ekf::take_pose(const wm_event &event) {
   }
   const wm_status status = set_pose(filter_, event);
   if (status != WM_OK) return status;
-  witnesses_.begin(kStartWrong);
-  clues_.clear();
+  evidence_.begin(kStartWrong);
+  observations_.clear();
   prior_count_ = 0;
   resets_++;
   state_ = WM_STATE_TRACKING;
@@ -206,7 +206,7 @@ void landmark_ekf::estimate(wm_estimate *out) const {
 
 // Lost, the pose may be anywhere with the probability of being lost.
 void landmark_ekf::widen(wm_estimate *out) const {
-  const double p = witnesses_.probability();
+  const double p = evidence_.probability();
   out->covariance[wm_cov_index(0, 0)] += p * map_variance_m2_;
   out->covariance[wm_cov_index(1, 1)] += p * map_variance_m2_;
   out->covariance[wm_cov_index(5, 5)] += p * square(kPi) / 3.0;

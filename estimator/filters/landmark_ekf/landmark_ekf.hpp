@@ -5,14 +5,14 @@
 
 #include <cmath>
 
+#include "filters/core/landmark_evidence.hpp"
+#include "filters/core/record_list.hpp"
+#include "filters/core/state_pool.hpp"
 #include "filters/landmark_ekf/params.h"
-#include "filters/landmark_ekf/search.hpp"
-#include "filters/landmark_ekf/sensor_model.hpp"
-#include "filters/landmark_ekf/slots.hpp"
 #include "filters/landmark_ekf/start_trial.hpp"
-#include "filters/landmark_ekf/witnesses.hpp"
 #include "filters/planar/planar_filter.hpp"
-#include "filters/record_list.hpp"
+#include "filters/relocalize/pose_search.hpp"
+#include "sensors/sensor_model.hpp"
 
 namespace wm {
 
@@ -64,7 +64,7 @@ class landmark_ekf {
   wm_status take_pose(const wm_event &event);
 
   // Gates one or two numbers jointly, weakens or rejects, updates, writes the records. Returns how much it speaks
-  // against the pose (witnesses::against), `room` being where the numbers could lie.
+  // against the pose (landmark_evidence::log_bayes_factor), `room` being where the numbers could lie.
   struct residual {
     sparse_row row;
     double innovation, noise;
@@ -91,10 +91,10 @@ class landmark_ekf {
 
   // Recovery.
   void note(wm_time_ns t_ns, int witness, double against, double angle_rad = NAN, double normalised = NAN);
-  void note_clue(const search_clue &clue);
+  void buffer_observation(const observation &seen);
   bool is_sought(wm_time_ns t_ns, bool by_bearing);
   void seek(wm_time_ns t_ns);
-  void search(wm_time_ns since_ns, const search_clue *prior, int prior_count);
+  void search(wm_time_ns since_ns, const observation *prior, int prior_count);
   void try_start();
   void weigh_start(wm_time_ns t_ns);
   double lost_probability() const;
@@ -122,20 +122,20 @@ class landmark_ekf {
   int sensor_state_[kMaxSensors][kSensorStates];
   int gnss_time_state_, gnss_lasting_state_;
   wm_time_ns gnss_lasting_ns_;
-  state_slots<24> lasting_;
+  state_pool<24> lasting_;
   int lasting_bearing_offset_, lasting_range_offset_;  // within a slot; -1: not carried
-  state_slots<16> map_;
+  state_pool<16> map_;
   int tilt_state_;  // lean, nod; -1: not carried
   wm_time_ns tilt_ns_;
   calibration_memory memory_[3];
   wm_time_ns remembered_ns_;
   int calibration_states_;  // pose and calibration; the lent states come behind
-  witnesses witnesses_;
-  pose_search clues_;
+  landmark_evidence evidence_;
+  pose_search observations_;
   start_trial start_trial_;
-  search_clue prior_[2];
+  observation prior_[2];
   int prior_count_;
-  search_clue vague_[2];  // the pose when it had become too vague to be corrected
+  observation vague_[2];  // the pose when it had become too vague to be corrected
   wm_time_ns fused_ns_, lost_ns_, searched_ns_, weighed_ns_, inflated_ns_, loosened_ns_, found_ns_, vague_ns_;
   uint32_t resets_, moved_;
   int32_t moved_id_;        // of the last one

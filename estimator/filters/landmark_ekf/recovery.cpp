@@ -29,36 +29,36 @@ constexpr double kVagueFor_s = 5.0;  // of looking for it; then it is corrected 
 
 }  // namespace
 
-void landmark_ekf::note_clue(const search_clue &clue) {
+void landmark_ekf::buffer_observation(const observation &seen) {
   if (!params_.recover) return;
-  search_clue kept = clue;
+  observation kept = seen;
   kept.travelled_m = filter_.travelled_m();
   kept.turned_rad = filter_.turned_rad();
-  clues_.add(kept);
+  observations_.add(kept);
 }
 
 void landmark_ekf::note(wm_time_ns t_ns, int witness, double against, double angle_rad, double normalised) {
   if (!params_.recover) return;
-  witnesses_.note(t_ns, witness, against, angle_rad, normalised, witness >= 0 ? landmark_records() + witness : nullptr);
+  evidence_.note(t_ns, witness, against, angle_rad, normalised, witness >= 0 ? landmark_records() + witness : nullptr);
   if (witness >= 0) tell_moved(witness);
   if (state_ == WM_STATE_TRACKING) {
     const wm_time_ns since = elsewhere_since(t_ns);
-    if (since != WM_TIME_NONE) witnesses_.contradict(since);
+    if (since != WM_TIME_NONE) evidence_.contradict(since);
   }
-  if (state_ == WM_STATE_TRACKING && witnesses_.contradicted()) {
+  if (state_ == WM_STATE_TRACKING && evidence_.contradicted()) {
     state_ = WM_STATE_LOST;
     lost_ns_ = inflated_ns_ = t_ns;
   }
   weigh_start(t_ns);
-  if (state_ == WM_STATE_TRACKING && witnesses_.fits()) remember_calibration(t_ns);
+  if (state_ == WM_STATE_TRACKING && evidence_.fits()) remember_calibration(t_ns);
   if (state_ != WM_STATE_LOST) return;
-  if (witnesses_.fits()) {
+  if (evidence_.fits()) {
     state_ = WM_STATE_TRACKING;
     return;
   }
   if (wm_seconds_between(lost_ns_, t_ns) < kSayLost_s) return;
   const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
-  const wm_time_ns bad_since = witnesses_.doubted_since_ns();
+  const wm_time_ns bad_since = evidence_.doubted_since_ns();
   search(bad_since > window ? bad_since : window, prior_, prior_count_);
   if (state_ != WM_STATE_LOST || wm_seconds_between(lost_ns_, t_ns) < kInflateAfter_s) return;
   if (wm_seconds_between(inflated_ns_, t_ns) >= kInflateEvery_s && filter_.variance(kX) < square(kInflateUpTo_m)) {
@@ -80,7 +80,7 @@ wm_time_ns landmark_ekf::elsewhere_since(wm_time_ns t_ns) {
 }
 
 bool landmark_ekf::is_elsewhere(wm_time_ns since_ns, wm_time_ns t_ns) {
-  const int clues = clues_.count_since(since_ns);
+  const int clues = observations_.count_since(since_ns);
   if (clues < kNumbersElsewhere) return false;
   searched_ns_ = t_ns;
   const wm_pose2 pose = filter_.pose(), odom = filter_.odom();
@@ -89,11 +89,12 @@ bool landmark_ekf::is_elsewhere(wm_time_ns since_ns, wm_time_ns t_ns) {
     const sensor_errors told = remembered_errors_of((int)i), known = errors_of((int)i);
     mounting[i] = between({told.x_m, told.y_m, told.yaw_rad}, {known.x_m, known.y_m, known.yaw_rad});
   }
-  const int fitting = clues_.agreeing(since_ns, pose, odom, filter_.travelled_m(), filter_.turned_rad(), mounting);
+  const int fitting =
+      observations_.agreeing(since_ns, pose, odom, filter_.travelled_m(), filter_.turned_rad(), mounting);
   if (kFewOf * fitting > clues) return false;
   const search_result other =
-      clues_.find(since_ns, odom, filter_.travelled_m(), filter_.turned_rad(), nullptr, 0,
-                  {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad, kNumbersElsewhere});
+      observations_.find(since_ns, odom, filter_.travelled_m(), filter_.turned_rad(), nullptr, 0,
+                         {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad, kNumbersElsewhere});
   if (!other.found || kFewOf * fitting > other.agreeing) return false;
   const double place = filter_.variance(kX) + filter_.variance(kY) + other.covariance[0][0] + other.covariance[1][1];
   const double heading = filter_.variance(kHeading) + other.covariance[2][2];
@@ -105,7 +106,7 @@ bool landmark_ekf::is_elsewhere(wm_time_ns since_ns, wm_time_ns t_ns) {
 // Counted once, and again only after it fitted in between.
 void landmark_ekf::tell_moved(int landmark) {
   landmark_record &record = landmark_records()[landmark];
-  if (!record.moved && state_ == WM_STATE_TRACKING && witnesses_.moved(landmark)) {
+  if (!record.moved && state_ == WM_STATE_TRACKING && evidence_.moved(landmark)) {
     record.moved = 1;
     record.confirmed = 0;
     moved_++;
@@ -129,19 +130,20 @@ void landmark_ekf::weigh_start(wm_time_ns t_ns) {
   weighed_ns_ = t_ns;
   const start_trial::lasting sigma = {params_.sensor_yaw_sigma_rad, params_.lasting_bearing_rad,
                                       params_.lasting_lateral_m};
-  start_trial_.weigh(clues_, sigma, filter_.pose(), filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), t_ns);
+  start_trial_.weigh(observations_, sigma, filter_.pose(), filter_.odom(), filter_.travelled_m(), filter_.turned_rad(),
+                     t_ns);
   if (!start_trial_.surely_off()) return;
   restore_calibration();
   filter_.set_pose(start_trial_.pose(), start_trial_.covariance());
   start_trial_.close();
-  witnesses_.begin(kFoundWrong);
+  evidence_.begin(kFoundWrong);
   resets_++;
   fused_ns_ = t_ns;
 }
 
 double landmark_ekf::lost_probability() const {
   if (state_ == WM_STATE_SEARCHING) return 1.0;
-  const double now = witnesses_.probability(), start = start_trial_.off();
+  const double now = evidence_.probability(), start = start_trial_.off();
   return now > start ? now : start;
 }
 
@@ -187,18 +189,18 @@ bool landmark_ekf::is_sought(wm_time_ns t_ns, bool by_bearing) {
   }
   if (vague_ns_ == WM_TIME_NONE) {
     vague_ns_ = t_ns;
-    search_clue &place = vague_[0] = {};
+    observation &place = vague_[0] = {};
     place.t_ns = t_ns;
     place.key = -1;
     place.sensor = filter_.odom();
     place.travelled_m = filter_.travelled_m();
     place.turned_rad = filter_.turned_rad();
-    search_clue &toward = vague_[1] = place;
-    place.kind = kCluePosition;
+    observation &toward = vague_[1] = place;
+    place.kind = kObservedPosition;
     place.place_m[0] = filter_.value(kX);
     place.place_m[1] = filter_.value(kY);
     place.sigma_length_m = std::sqrt(spread);
-    toward.kind = kClueHeading;
+    toward.kind = kObservedHeading;
     toward.bearing_rad = filter_.value(kHeading);
     toward.sigma_angle_rad = std::sqrt(heading);
   }
@@ -212,15 +214,15 @@ void landmark_ekf::seek(wm_time_ns t_ns) {
 }
 
 // Looks for the pose among the clues since `since_ns`; takes it where it is sure.
-void landmark_ekf::search(wm_time_ns since_ns, const search_clue *prior, int prior_count) {
+void landmark_ekf::search(wm_time_ns since_ns, const observation *prior, int prior_count) {
   const wm_time_ns now = filter_.now_ns();
   if (!params_.recover) return;
   if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now) < kSearchEvery_s) return;
   searched_ns_ = now;
   const search_limits limits = {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad,
                                 kNumbers + (prior == vague_ ? kPoseNumbers : 0)};
-  search_result result =
-      clues_.find(since_ns, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(), prior, prior_count, limits);
+  search_result result = observations_.find(since_ns, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(),
+                                            prior, prior_count, limits);
   if (!result.found) return;
   restore_calibration();
   // What the mounting's yaw may still be off by, the heading found is off by, too.
@@ -232,7 +234,7 @@ void landmark_ekf::search(wm_time_ns since_ns, const search_clue *prior, int pri
   filter_.set_pose(result.pose, result.covariance);
   start_trial_.begin_found(result.pose, result.covariance, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(),
                            since_ns);
-  witnesses_.begin(kFoundWrong);
+  evidence_.begin(kFoundWrong);
   resets_++;
   fused_ns_ = now;
   state_ = WM_STATE_TRACKING;

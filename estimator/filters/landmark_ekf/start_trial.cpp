@@ -231,8 +231,8 @@ void start_trial::weigh(const pose_search &clues, const lasting &sigma, const wm
   problem all{};
   all.yaw_sigma_rad = sigma.yaw_rad;
   for (int i = 0; i < clues.kept(); i++) {
-    const search_clue &c = clues.at(i);
-    if (!(c.kind & kClueBearing) || c.key < 0 || c.t_ns < since_ns_) continue;
+    const observation &c = clues.at(i);
+    if (!(c.kind & kObservedBearing) || c.key < 0 || c.t_ns < since_ns_) continue;
     bearing &b = all.bearings[all.count];
     b.landmark = number_of(c.key / kMaxSensors, all.id, &all.landmarks, kMostLandmarks);
     b.sensor_number = number_of(c.key % kMaxSensors, all.sensor_id, &all.sensors, kMostSensors);
@@ -247,7 +247,7 @@ void start_trial::weigh(const pose_search &clues, const lasting &sigma, const wm
     b.angle_rad = c.bearing_rad;
     b.angle_variance = square(c.sigma_angle_rad) + square(kTurnError * (c.turned_rad - turned_rad_));
     b.way_variance_m2 = square(kWayError * (c.travelled_m - travelled_m_));
-    b.has_height = (c.kind & kClueElevation) != 0;
+    b.has_height = (c.kind & kObservedElevation) != 0;
     all.heights[b.landmark] += b.has_height;
     b.height_m = c.height_m;
     b.tangent = c.tangent;

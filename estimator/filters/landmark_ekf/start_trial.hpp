@@ -16,7 +16,7 @@
 #ifndef WAYMARK_ESTIMATOR_START_TRIAL_HPP
 #define WAYMARK_ESTIMATOR_START_TRIAL_HPP
 
-#include "filters/landmark_ekf/search.hpp"
+#include "filters/relocalize/pose_search.hpp"
 
 namespace wm {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Dead reckoning as an estimator: motion alone, with an honest covariance. The baseline that every other is set
 // against.
-#include "filters/contract.hpp"
+#include "filters/core/contract.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "filters/calibration_list.hpp"
+#include "filters/core/calibration_list.hpp"
 #include "filters/planar/motion_states.h"
 #include "filters/planar/pose_step.hpp"
 #include "math/elementary.hpp"

@@ -4,7 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_PLANAR_SIGHTING_PARAMS_H
 #define WAYMARK_ESTIMATOR_PLANAR_SIGHTING_PARAMS_H
 
-#include "filters/param_rows.h"
+#include "filters/core/param_rows.h"
 
 // clang-format off
 #define WM_SENSOR_STATE_PARAMS \

@@ -3,9 +3,9 @@
 #ifndef WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 #define WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 
-#include "filters/landmark_ekf/sensor_model.hpp"
-#include "filters/landmark_ekf/slots.hpp"
-#include "filters/record_list.hpp"
+#include "sensors/sensor_model.hpp"
+#include "filters/core/state_pool.hpp"
+#include "filters/core/record_list.hpp"
 #include "filters/slam/bearing_tracks.hpp"
 #include "filters/slam/joint_state.hpp"
 #include "filters/slam/params.h"
@@ -221,7 +221,7 @@ class slam {
   wm_slam_params params_;
   mounted_sensor sensor_[kSlamSensors];
   int sensor_state_[kSlamSensors][kSensorStates];
-  state_slots<24> lasting_;
+  state_pool<24> lasting_;
   int lasting_bearing_offset_, lasting_range_offset_;  // within a slot; -1: not carried
   int lasting_width_;                                  // states of a slot
   bearing_tracks tracks_;

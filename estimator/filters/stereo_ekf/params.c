@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/stereo_ekf/params.h"
 
-#include "filters/param_rows.h"
+#include "filters/core/param_rows.h"
 
 typedef struct wm_stereo_ekf_params params;
 

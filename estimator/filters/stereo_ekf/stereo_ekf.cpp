@@ -3,8 +3,8 @@
 
 #include <cstring>
 
-#include "filters/calibration_list.hpp"
-#include "filters/contract.hpp"
+#include "filters/core/calibration_list.hpp"
+#include "filters/core/contract.hpp"
 #include "filters/registry.h"
 #include "motion/event_time.hpp"
 

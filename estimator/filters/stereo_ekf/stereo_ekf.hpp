@@ -4,7 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_STEREO_EKF_HPP
 #define WAYMARK_ESTIMATOR_STEREO_EKF_HPP
 
-#include "filters/record_list.hpp"
+#include "filters/core/record_list.hpp"
 #include "filters/stereo_ekf/body_motion.hpp"
 #include "filters/stereo_ekf/consensus.hpp"
 #include "filters/stereo_ekf/fit_monitor.hpp"

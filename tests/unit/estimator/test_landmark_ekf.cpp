@@ -8,7 +8,7 @@
 
 #include "events.hpp"
 #include "filters/landmark_ekf/params.h"
-#include "filters/landmark_ekf/sensor_model.hpp"
+#include "sensors/sensor_model.hpp"
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"

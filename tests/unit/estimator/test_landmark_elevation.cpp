@@ -8,8 +8,8 @@
 
 #include "events.hpp"
 #include "filters/landmark_ekf/params.h"
-#include "filters/landmark_ekf/search.hpp"
-#include "filters/landmark_ekf/sensor_model.hpp"
+#include "filters/relocalize/pose_search.hpp"
+#include "sensors/sensor_model.hpp"
 #include "filters/landmark_ekf/start_trial.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
@@ -221,20 +221,20 @@ void test_a_start_that_bearings_alone_cannot_tell_from_a_wrong_one(void) {
     for (int n = 0; n < 12; n++) {
       const int i = n % count;
       const double x_m = 0.3 * n;
-      wm::search_clue clue{};
-      clue.t_ns = 400 * n * WM_NS_PER_MS;
-      clue.kind = wm::kClueBearing | (heights > 0 ? wm::kClueElevation : 0u);
-      clue.key = i * wm::kMaxSensors;
-      clue.sensor.x_m = clue.travelled_m = x_m;
-      for (int k = 0; k < 2; k++) clue.place_m[k] = place_m[i][k];
+      wm::observation seen{};
+      seen.t_ns = 400 * n * WM_NS_PER_MS;
+      seen.kind = wm::kObservedBearing | (heights > 0 ? wm::kObservedElevation : 0u);
+      seen.key = i * wm::kMaxSensors;
+      seen.sensor.x_m = seen.travelled_m = x_m;
+      for (int k = 0; k < 2; k++) seen.place_m[k] = place_m[i][k];
       const double dx = place_m[i][0] - x_m, dy = place_m[i][1];
-      clue.bearing_rad = wm::atan2(dy, dx);
-      clue.height_m = heights;
-      clue.tangent = (heights + (i == 1 ? wrong_m : 0.0)) / std::hypot(dx, dy);
-      clue.sigma_angle_rad = 0.005;
-      clue.sigma_place_m = clue.sigma_height_m = 0.02;
-      clue.sigma_tangent = 0.008;
-      search.add(clue);
+      seen.bearing_rad = wm::atan2(dy, dx);
+      seen.height_m = heights;
+      seen.tangent = (heights + (i == 1 ? wrong_m : 0.0)) / std::hypot(dx, dy);
+      seen.sigma_angle_rad = 0.005;
+      seen.sigma_place_m = seen.sigma_height_m = 0.02;
+      seen.sigma_tangent = 0.008;
+      search.add(seen);
     }
     return search.find(0, wm_pose2{3.3, 0.0, 0.0}, 3.3, 0.0, nullptr, 0, {5.0, 1.0, 5}).found;
   };
@@ -256,18 +256,18 @@ void test_a_start_that_is_off_is_told_by_heights(void) {
     clues.clear();
     for (int n = 0; n < 30; n++) {
       const int i = n % 3;
-      wm::search_clue clue{};
-      clue.t_ns = 150 * n * WM_NS_PER_MS;
-      clue.kind = wm::kClueBearing | (heights ? wm::kClueElevation : 0u);
-      clue.key = i * wm::kMaxSensors;
-      for (int k = 0; k < 2; k++) clue.place_m[k] = place_m[i][k];
-      clue.bearing_rad = wm::atan2(place_m[i][1], place_m[i][0]);
-      clue.height_m = 1.5;
-      clue.tangent = 1.5 / std::hypot(place_m[i][0], place_m[i][1]);
-      clue.sigma_angle_rad = 0.005;
-      clue.sigma_place_m = clue.sigma_height_m = 0.02;
-      clue.sigma_tangent = 0.008;
-      clues.add(clue);
+      wm::observation seen{};
+      seen.t_ns = 150 * n * WM_NS_PER_MS;
+      seen.kind = wm::kObservedBearing | (heights ? wm::kObservedElevation : 0u);
+      seen.key = i * wm::kMaxSensors;
+      for (int k = 0; k < 2; k++) seen.place_m[k] = place_m[i][k];
+      seen.bearing_rad = wm::atan2(place_m[i][1], place_m[i][0]);
+      seen.height_m = 1.5;
+      seen.tangent = 1.5 / std::hypot(place_m[i][0], place_m[i][1]);
+      seen.sigma_angle_rad = 0.005;
+      seen.sigma_place_m = seen.sigma_height_m = 0.02;
+      seen.sigma_tangent = 0.008;
+      clues.add(seen);
     }
     const double covariance[3][3] = {{0.0025, 0, 0}, {0, 0.0025, 0}, {0, 0, 0.0001}};
     const wm_pose2 stated = {-short_m, 0, 0};

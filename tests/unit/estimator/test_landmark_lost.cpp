@@ -7,10 +7,10 @@
 #include <cstring>
 
 #include "events.hpp"
+#include "filters/core/landmark_evidence.hpp"
 #include "filters/landmark_ekf/params.h"
-#include "filters/landmark_ekf/resection.hpp"
-#include "filters/landmark_ekf/search.hpp"
-#include "filters/landmark_ekf/witnesses.hpp"
+#include "filters/relocalize/pose_search.hpp"
+#include "filters/relocalize/resection.hpp"
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
@@ -150,10 +150,11 @@ void test_bearings_that_say_nothing_give_no_pose(void) {
 
 void test_one_that_contradicts_has_moved_and_many_mean_lost(void) {
   wm::landmark_record record[kLandmarks] = {};
-  wm::witnesses w;
+  wm::landmark_evidence w;
   std::memset(static_cast<void *>(&w), 0, sizeof w);
   w.begin(-2.5);
-  const double fits = wm::witnesses::against(20.0, wm::kTwoPi), contradicts = wm::witnesses::against_all();
+  const double fits = wm::landmark_evidence::log_bayes_factor(20.0, wm::kTwoPi),
+               contradicts = wm::landmark_evidence::max_log_bayes_factor();
   int step = 0;
   const auto look = [&](int wrong, int count) {
     for (int k = 0; k < 40; k++, step++)
@@ -173,10 +174,11 @@ void test_one_that_contradicts_has_moved_and_many_mean_lost(void) {
 // Of two landmarks one fits and one doesn't, again and again: whoever stated the pose is as likely to be right as the
 // map and the picture. Two that don't fit are enough.
 void test_one_against_one_is_doubt_not_lost(void) {
-  const double fits = wm::witnesses::against(20.0, wm::kTwoPi), contradicts = wm::witnesses::against_all();
+  const double fits = wm::landmark_evidence::log_bayes_factor(20.0, wm::kTwoPi),
+               contradicts = wm::landmark_evidence::max_log_bayes_factor();
   for (const int wrong : {1, 2}) {
     wm::landmark_record record[3] = {};
-    wm::witnesses w;
+    wm::landmark_evidence w;
     std::memset(static_cast<void *>(&w), 0, sizeof w);
     w.begin(-2.5);
     for (int step = 0; step < 30; step++)
@@ -191,10 +193,11 @@ void test_one_against_one_is_doubt_not_lost(void) {
 // Detections of nothing, 30 degrees apart, of three landmarks out of view, while one in view fits: not lost. The same
 // misfits all in one place: lost, whatever the one that fits says.
 void test_misfits_that_scatter_say_nothing_those_in_one_place_do(void) {
-  const double fits = wm::witnesses::against(20.0, wm::kTwoPi), contradicts = wm::witnesses::against_all();
+  const double fits = wm::landmark_evidence::log_bayes_factor(20.0, wm::kTwoPi),
+               contradicts = wm::landmark_evidence::max_log_bayes_factor();
   for (const bool scattered : {true, false}) {
     wm::landmark_record record[4] = {};
-    wm::witnesses w;
+    wm::landmark_evidence w;
     std::memset(static_cast<void *>(&w), 0, sizeof w);
     w.begin(-2.5);
     for (int step = 0; step < 100; step++) {
@@ -244,16 +247,16 @@ void test_a_second_landmark_seen_from_one_place_alone_is_not_enough(void) {
   search.clear();
   const double place_m[2][2] = {{5.0, 3.0}, {7.0, -4.0}};
   const auto see = [&](int landmark, double x_m, int64_t t_ms) {
-    wm::search_clue clue{};
-    clue.t_ns = t_ms * WM_NS_PER_MS;
-    clue.kind = wm::kClueBearing;
-    clue.key = landmark * wm::kMaxSensors;
-    clue.sensor.x_m = clue.travelled_m = x_m;
-    for (int k = 0; k < 2; k++) clue.place_m[k] = place_m[landmark][k];
-    clue.bearing_rad = wm::atan2(place_m[landmark][1], place_m[landmark][0] - x_m);
-    clue.sigma_angle_rad = 0.005;
-    clue.sigma_place_m = 0.02;
-    search.add(clue);
+    wm::observation seen{};
+    seen.t_ns = t_ms * WM_NS_PER_MS;
+    seen.kind = wm::kObservedBearing;
+    seen.key = landmark * wm::kMaxSensors;
+    seen.sensor.x_m = seen.travelled_m = x_m;
+    for (int k = 0; k < 2; k++) seen.place_m[k] = place_m[landmark][k];
+    seen.bearing_rad = wm::atan2(place_m[landmark][1], place_m[landmark][0] - x_m);
+    seen.sigma_angle_rad = 0.005;
+    seen.sigma_place_m = 0.02;
+    search.add(seen);
   };
   const auto is_found = [] {
     return search.find(0, wm_pose2{3.0, 0.0, 0.0}, 3.0, 0.0, nullptr, 0, {5.0, 1.0, 5}).found;

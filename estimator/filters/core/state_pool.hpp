@@ -9,7 +9,7 @@
 namespace wm {
 
 template <int kCapacity>
-class state_slots {
+class state_pool {
  public:
   struct slot {
     int key;    // -1: free

@@ -11,7 +11,7 @@
 
 #include <type_traits>
 
-#include "filters/record_list.hpp"
+#include "filters/core/record_list.hpp"
 #include "waymark/estimator.h"
 
 namespace wm {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filters/landmark_ekf/sensor_model.hpp"
+#include "sensors/sensor_model.hpp"
 
 #include <limits>
 

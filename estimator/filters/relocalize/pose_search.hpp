@@ -13,7 +13,7 @@
 namespace wm {
 
 // One observation, in the odometry's frame.
-struct search_clue {
+struct observation {
   wm_time_ns t_ns;
   uint32_t kind;       // bits of search_kind
   int32_t key;         // what was seen: index of the landmark * kMaxSensors + sensor; negative: a position, a heading
@@ -22,7 +22,7 @@ struct search_clue {
   double bearing_rad;  // or the heading in map
   double range_m;      // on the floor
   double tangent,
-      height_m;  // with kClueElevation: of the elevation above the level, and of the landmark above the sensor
+      height_m;  // with kObservedElevation: of the elevation above the level, and of the landmark above the sensor
   double sigma_tangent, sigma_height_m;
   double sigma_angle_rad, sigma_length_m;
   double sigma_place_m;  // of a bearing: what of the landmark and the mounting is wrong each time alike, across it
@@ -34,11 +34,11 @@ inline constexpr double kWayError = 0.05, kTurnError = 0.07;
 inline constexpr int kMaxSensors = 16;
 
 enum search_kind : uint32_t {
-  kClueBearing = 1,
-  kClueRange = 2,
-  kCluePosition = 4,
-  kClueHeading = 8,
-  kClueElevation = 16
+  kObservedBearing = 1,
+  kObservedRange = 2,
+  kObservedPosition = 4,
+  kObservedHeading = 8,
+  kObservedElevation = 16
 };
 
 struct search_result {
@@ -58,24 +58,24 @@ class pose_search {
   static constexpr int kCapacity = 64;
 
   void clear() { count_ = 0; }
-  // Keeps the clue; of one key at most one in 0.3 s, so that a fast sensor does not crowd out time.
-  void add(const search_clue &clue);
+  // Keeps the seen; of one key at most one in 0.3 s, so that a fast sensor does not crowd out time.
+  void add(const observation &seen);
   int count() const { return count_; }
-  const search_clue &newest() const { return clue_[(count_ - 1) % kCapacity]; }
+  const observation &newest() const { return ring_[(count_ - 1) % kCapacity]; }
   // Those still there, the oldest first.
   int kept() const { return count_ < kCapacity ? count_ : kCapacity; }
-  const search_clue &at(int i) const { return clue_[(count_ - kept() + i) % kCapacity]; }
+  const observation &at(int i) const { return ring_[(count_ - kept() + i) % kCapacity]; }
   int count_since(wm_time_ns since_ns) const;
   // How many clues not older than `since_ns` agree with a pose now. `mounting`: of each sensor, where it is known to be
   // now from where the clues were told that it is.
   int agreeing(wm_time_ns since_ns, const wm_pose2 &pose_now, const wm_pose2 &odom_now, double travelled_m,
                double turned_rad, const wm_pose2 mounting[kMaxSensors]) const;
-  // The pose now, from clues not older than `since_ns`. `prior` (may be null) is a clue that does not age.
+  // The pose now, from clues not older than `since_ns`. `prior` (may be null) is a seen that does not age.
   search_result find(wm_time_ns since_ns, const wm_pose2 &odom_now, double travelled_m, double turned_rad,
-                     const search_clue *prior, int prior_count, const search_limits &limits) const;
+                     const observation *prior, int prior_count, const search_limits &limits) const;
 
  private:
-  search_clue clue_[kCapacity];
+  observation ring_[kCapacity];
   int count_;
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filters/landmark_ekf/search.hpp"
+#include "filters/relocalize/pose_search.hpp"
 
-#include "filters/landmark_ekf/resection.hpp"
+#include "filters/relocalize/resection.hpp"
 #include "math/arc.hpp"
 
 namespace wm {
@@ -33,7 +33,7 @@ struct placement {
 
 struct problem {
   struct item {
-    const search_clue *clue;
+    const observation *seen;
     double weight_angle, weight_length;  // 1 / variance
     double place_m2;                     // sigma_place_m squared
     double way_m2;                       // what odometry has lost since, squared
@@ -44,35 +44,35 @@ struct problem {
   static constexpr int kMost = pose_search::kCapacity + 4;
   item items[kMost];
   int count = 0, landmarks = 0;
-  int seen[kMost];          // how often each landmark was
+  int times_seen[kMost];    // observations of each landmark
   int stated_from = kMost;  // what was said of the start: items from here on
 
-  void add(const search_clue &clue, double travelled_m, double turned_rad) {
+  void add(const observation &seen, double travelled_m, double turned_rad) {
     item &it = items[count];
-    it.clue = &clue;
+    it.seen = &seen;
     it.landmark = -1;
     it.view = count++;
-    it.place_m2 = (clue.kind & kClueBearing) ? square(clue.sigma_place_m) : 0.0;
-    if (clue.kind & (kClueBearing | kClueRange)) {
+    it.place_m2 = (seen.kind & kObservedBearing) ? square(seen.sigma_place_m) : 0.0;
+    if (seen.kind & (kObservedBearing | kObservedRange)) {
       for (int i = 0; i < count - 1 && it.landmark < 0; i++)
-        if (items[i].landmark >= 0 && items[i].clue->place_m[0] == clue.place_m[0] &&
-            items[i].clue->place_m[1] == clue.place_m[1])
+        if (items[i].landmark >= 0 && items[i].seen->place_m[0] == seen.place_m[0] &&
+            items[i].seen->place_m[1] == seen.place_m[1])
           it.landmark = items[i].landmark;
-      if (it.landmark < 0) seen[it.landmark = landmarks++] = 0;
-      seen[it.landmark]++;
+      if (it.landmark < 0) times_seen[it.landmark = landmarks++] = 0;
+      times_seen[it.landmark]++;
       for (int i = 0; i < count - 1 && it.view == count - 1; i++)
-        if (items[i].view == i && items[i].landmark == it.landmark && items[i].clue->kind == clue.kind &&
-            square(items[i].clue->sensor.x_m - clue.sensor.x_m) + square(items[i].clue->sensor.y_m - clue.sensor.y_m) <
+        if (items[i].view == i && items[i].landmark == it.landmark && items[i].seen->kind == seen.kind &&
+            square(items[i].seen->sensor.x_m - seen.sensor.x_m) + square(items[i].seen->sensor.y_m - seen.sensor.y_m) <
                 square(kAnew_m))
           it.view = i;
     }
-    const double way = kWayError * (travelled_m - clue.travelled_m);
-    const double turn = kTurnError * (turned_rad - clue.turned_rad);
+    const double way = kWayError * (travelled_m - seen.travelled_m);
+    const double turn = kTurnError * (turned_rad - seen.turned_rad);
     it.way_m2 = square(way);
-    const double lever = (clue.kind & kClueRange) ? clue.range_m : kFirstGuess_m;
-    it.weight_angle = 1.0 / (square(clue.sigma_angle_rad) + square(turn) + square(way / (lever > 0.5 ? lever : 0.5)));
-    it.weight_length = 1.0 / (square(clue.sigma_length_m) + square(way));
-    const sin_cos d = sincos(clue.sensor.heading_rad + clue.bearing_rad);
+    const double lever = (seen.kind & kObservedRange) ? seen.range_m : kFirstGuess_m;
+    it.weight_angle = 1.0 / (square(seen.sigma_angle_rad) + square(turn) + square(way / (lever > 0.5 ? lever : 0.5)));
+    it.weight_length = 1.0 / (square(seen.sigma_length_m) + square(way));
+    const sin_cos d = sincos(seen.sensor.heading_rad + seen.bearing_rad);
     it.dir_x = d.cos;
     it.dir_y = d.sin;
   }
@@ -81,7 +81,7 @@ struct problem {
 // Of one bearing at that distance (squared), with the part of what lasts that an observation has which is one of
 // several of the same landmark: together they know it no better than once.
 double weight_at(const problem &all, const problem::item &it, double distance_m2) {
-  const double lasting = it.place_m2 > 0.0 ? all.seen[it.landmark] * it.place_m2 : 0.0;
+  const double lasting = it.place_m2 > 0.0 ? all.times_seen[it.landmark] * it.place_m2 : 0.0;
   return it.weight_angle / (1.0 + lasting * it.weight_angle / distance_m2);
 }
 
@@ -97,35 +97,35 @@ struct residuals {
 
 // Of how high a landmark is above the sensor at that distance (squared) by its elevation: 1 / variance.
 double height_weight(const problem::item &it, double distance_m2) {
-  const search_clue &c = *it.clue;
+  const observation &c = *it.seen;
   return 1.0 / (distance_m2 * square(c.sigma_tangent) + square(c.sigma_height_m) + square(c.tangent) * it.way_m2);
 }
 
-// Residuals of one clue without an arctangent: sin(error) = cross / distance; behind counts as an outlier.
+// Residuals of one seen without an arctangent: sin(error) = cross / distance; behind counts as an outlier.
 residuals look(const problem::item &it, const placement &p, const sin_cos &turn) {
-  const search_clue &c = *it.clue;
+  const observation &c = *it.seen;
   residuals out = {-1.0, -1.0, -1.0};
-  if (c.kind & kClueHeading) {
+  if (c.kind & kObservedHeading) {
     out.angle_chi2 = square(wrap(c.bearing_rad - c.sensor.heading_rad - p.turn)) * it.weight_angle;
     return out;
   }
   const double sx = p.x + turn.cos * c.sensor.x_m - turn.sin * c.sensor.y_m;
   const double sy = p.y + turn.sin * c.sensor.x_m + turn.cos * c.sensor.y_m;
   const double dx = c.place_m[0] - sx, dy = c.place_m[1] - sy;
-  if (c.kind & kCluePosition) {
+  if (c.kind & kObservedPosition) {
     out.length_chi2 = 0.5 * (dx * dx + dy * dy) * it.weight_length;
     return out;
   }
   const double distance = std::sqrt(dx * dx + dy * dy);
-  if (c.kind & kClueBearing) {
+  if (c.kind & kObservedBearing) {
     const double ux = turn.cos * it.dir_x - turn.sin * it.dir_y, uy = turn.sin * it.dir_x + turn.cos * it.dir_y;
     const double ahead = ux * dx + uy * dy, across = ux * dy - uy * dx;
     out.angle_chi2 = ahead > 0.0 && distance > 1e-6
                          ? square(across) * it.weight_angle / (square(distance) + it.place_m2 * it.weight_angle)
                          : 1e3;
   }
-  if (c.kind & kClueRange) out.length_chi2 = square(distance - c.range_m) * it.weight_length;
-  if (c.kind & kClueElevation)
+  if (c.kind & kObservedRange) out.length_chi2 = square(distance - c.range_m) * it.weight_length;
+  if (c.kind & kObservedElevation)
     out.height_chi2 = square(c.tangent * distance - c.height_m) * height_weight(it, distance * distance);
   return out;
 }
@@ -141,7 +141,7 @@ struct support {
 
 bool only_bearings(const problem &all) {
   for (int i = 0; i < all.count; i++)
-    if ((all.items[i].clue->kind & ~kClueElevation) != kClueBearing) return false;
+    if ((all.items[i].seen->kind & ~kObservedElevation) != kObservedBearing) return false;
   return true;
 }
 
@@ -157,7 +157,7 @@ double cost_of(const problem &all, const placement &p, support *fit = nullptr, b
   for (int i = 0; i < all.count; i++) {
     const residuals r = look(all.items[i], p, turn);
     cost += clipped(r.angle_chi2 > 0.0 ? r.angle_chi2 : 0.0) + clipped(r.length_chi2 > 0.0 ? r.length_chi2 : 0.0) +
-            (by_heights && r.height_chi2 > 0.0 ? clipped(r.height_chi2) / all.seen[all.items[i].landmark] : 0.0);
+            (by_heights && r.height_chi2 > 0.0 ? clipped(r.height_chi2) / all.times_seen[all.items[i].landmark] : 0.0);
     if (!fit) continue;
     const bool fits =
         r.angle_chi2 < kOutlierChi2 && r.length_chi2 < kOutlierChi2 && (!by_heights || r.height_chi2 < kHeightChi2);
@@ -167,7 +167,7 @@ double cost_of(const problem &all, const placement &p, support *fit = nullptr, b
     fit->observations++;
     fit->stated += i >= all.stated_from;
     fit->numbers +=
-        (r.angle_chi2 >= 0.0) + (r.length_chi2 >= 0.0) * ((all.items[i].clue->kind & kCluePosition) ? 2 : 1);
+        (r.angle_chi2 >= 0.0) + (r.length_chi2 >= 0.0) * ((all.items[i].seen->kind & kObservedPosition) ? 2 : 1);
     if (landmark >= 0) {
       fitting[landmark]++;
       height_chi2[landmark] += r.height_chi2 > 0.0 ? r.height_chi2 : 0.0;
@@ -199,30 +199,30 @@ placement place_at(const problem &all, double rotation) {
     };
     bool circles = true;
     for (int i = 0; i < all.count; i++)
-      circles = circles && (all.items[i].clue->kind & (kClueBearing | kCluePosition)) == 0;
+      circles = circles && (all.items[i].seen->kind & (kObservedBearing | kObservedPosition)) == 0;
     for (int i = 0; i < all.count; i++) {
       const problem::item &it = all.items[i];
-      const search_clue &c = *it.clue;
-      if (c.kind & kClueHeading) continue;
+      const observation &c = *it.seen;
+      if (c.kind & kObservedHeading) continue;
       const residuals r = round > 0 ? look(it, p, turn) : residuals{0.0, 0.0};
       const double sx = turn.cos * c.sensor.x_m - turn.sin * c.sensor.y_m;
       const double sy = turn.sin * c.sensor.x_m + turn.cos * c.sensor.y_m;
       const double tx = c.place_m[0] - sx, ty = c.place_m[1] - sy;
       const double trust_angle = bounded_weight(r.angle_chi2 > 0 ? r.angle_chi2 : 0.0);
       const double trust_length = bounded_weight(r.length_chi2 > 0 ? r.length_chi2 : 0.0);
-      if (c.kind & kCluePosition) {
+      if (c.kind & kObservedPosition) {
         add_row(1, 0, 0, tx, it.weight_length * trust_length);
         add_row(0, 1, 0, ty, it.weight_length * trust_length);
         continue;
       }
       const double ux = turn.cos * it.dir_x - turn.sin * it.dir_y, uy = turn.sin * it.dir_x + turn.cos * it.dir_y;
-      if (c.kind & kClueBearing) {
-        double distance = (c.kind & kClueRange) ? c.range_m : kFirstGuess_m;
-        if (round > 0 && !(c.kind & kClueRange)) distance = std::sqrt(square(tx - p.x) + square(ty - p.y)) + 0.1;
+      if (c.kind & kObservedBearing) {
+        double distance = (c.kind & kObservedRange) ? c.range_m : kFirstGuess_m;
+        if (round > 0 && !(c.kind & kObservedRange)) distance = std::sqrt(square(tx - p.x) + square(ty - p.y)) + 0.1;
         const double q = square(distance > 0.2 ? distance : 0.2);
         add_row(-uy, ux, 0, ux * ty - uy * tx, weight_at(all, it, q) / q * trust_angle);
-        if (c.kind & kClueRange) add_row(ux, uy, 0, ux * tx + uy * ty - c.range_m, it.weight_length * trust_length);
-      } else if ((c.kind & kClueRange) && circles) {
+        if (c.kind & kObservedRange) add_row(ux, uy, 0, ux * tx + uy * ty - c.range_m, it.weight_length * trust_length);
+      } else if ((c.kind & kObservedRange) && circles) {
         const double weight = it.weight_length / (4.0 * square(c.range_m > 0.2 ? c.range_m : 0.2));
         add_row(2 * tx, 2 * ty, -1.0, tx * tx + ty * ty - square(c.range_m), weight * trust_length);
       }
@@ -267,8 +267,8 @@ void normal_equations(const problem &all, const placement &p, bool by_heights, d
   };
   for (int i = 0; i < all.count; i++) {
     const problem::item &it = all.items[i];
-    const search_clue &c = *it.clue;
-    if (c.kind & kClueHeading) {
+    const observation &c = *it.seen;
+    if (c.kind & kObservedHeading) {
       const double row[3] = {0, 0, 1};
       add_row(row, wrap(c.bearing_rad - c.sensor.heading_rad - p.turn), it.weight_angle);
       continue;
@@ -276,7 +276,7 @@ void normal_equations(const problem &all, const placement &p, bool by_heights, d
     const double rx = turn.cos * c.sensor.x_m - turn.sin * c.sensor.y_m;
     const double ry = turn.sin * c.sensor.x_m + turn.cos * c.sensor.y_m;
     const double dx = c.place_m[0] - p.x - rx, dy = c.place_m[1] - p.y - ry;
-    if (c.kind & kCluePosition) {
+    if (c.kind & kObservedPosition) {
       const double row_x[3] = {1, 0, -ry}, row_y[3] = {0, 1, rx};
       add_row(row_x, dx, it.weight_length);
       add_row(row_y, dy, it.weight_length);
@@ -285,17 +285,17 @@ void normal_equations(const problem &all, const placement &p, bool by_heights, d
     const double q = dx * dx + dy * dy;
     if (!(q > 1e-6)) continue;
     if (!by_heights && look(it, p, turn).height_chi2 > kHeightChi2) continue;
-    if (c.kind & kClueBearing) {
+    if (c.kind & kObservedBearing) {
       const double row[3] = {dy / q, -dx / q, -(rx * dx + ry * dy) / q - 1.0};
       add_row(row, wrap(c.sensor.heading_rad + c.bearing_rad + p.turn - atan2(dy, dx)), weight_at(all, it, q));
     }
-    if (by_heights && (c.kind & kClueElevation)) {
+    if (by_heights && (c.kind & kObservedElevation)) {
       // The same again tells no more: tilt and heights last.
       const double d = std::sqrt(q), by = c.tangent / d;
       const double row[3] = {-by * dx, -by * dy, by * (ry * dx - rx * dy)};
-      add_row(row, c.height_m - c.tangent * d, height_weight(it, q) / all.seen[it.landmark]);
+      add_row(row, c.height_m - c.tangent * d, height_weight(it, q) / all.times_seen[it.landmark]);
     }
-    if (c.kind & kClueRange) {
+    if (c.kind & kObservedRange) {
       const double d = std::sqrt(q);
       const double row[3] = {-dx / d, -dy / d, (ry * dx - rx * dy) / d};
       add_row(row, c.range_m - d, it.weight_length);
@@ -326,7 +326,7 @@ struct shortlist {
 void offer_triples(const problem &all, shortlist *list) {
   int bearings[problem::kMost], count = 0;
   for (int i = 0; i < all.count; i++)
-    if (all.items[i].clue->kind & kClueBearing) bearings[count++] = i;
+    if (all.items[i].seen->kind & kObservedBearing) bearings[count++] = i;
   if (count < 3) return;
   uint32_t dice = 1;
   const auto draw = [&dice, count](int but_a, int but_b) {
@@ -343,7 +343,7 @@ void offer_triples(const problem &all, shortlist *list) {
     line_of_sight line[3];
     for (int k = 0; k < 3; k++) {
       const problem::item &it = all.items[bearings[of[k]]];
-      const search_clue &c = *it.clue;
+      const observation &c = *it.seen;
       line[k] = {{c.sensor.x_m, c.sensor.y_m}, {it.dir_x, it.dir_y}, {c.place_m[0], c.place_m[1]}};
     }
     wm_pose2 pose[2];
@@ -373,14 +373,14 @@ bool invert(const double a[3][3], double out[3][3]) {
 
 }  // namespace
 
-void pose_search::add(const search_clue &clue) {
+void pose_search::add(const observation &seen) {
   const int oldest = count_ > kCapacity ? count_ - kCapacity : 0;
   for (int i = count_ - 1; i >= oldest; i--) {
-    const search_clue &c = clue_[i % kCapacity];
-    if (clue.t_ns - c.t_ns >= kSpacing_ns) break;
-    if (c.key == clue.key) return;
+    const observation &c = ring_[i % kCapacity];
+    if (seen.t_ns - c.t_ns >= kSpacing_ns) break;
+    if (c.key == seen.key) return;
   }
-  clue_[count_ % kCapacity] = clue;
+  ring_[count_ % kCapacity] = seen;
   count_++;
   if (count_ == 4 * kCapacity) count_ -= 2 * kCapacity;  // the index stays small; its place in the ring is the same
 }
@@ -394,11 +394,11 @@ int pose_search::count_since(wm_time_ns since_ns) const {
 int pose_search::agreeing(wm_time_ns since_ns, const wm_pose2 &pose_now, const wm_pose2 &odom_now, double travelled_m,
                           double turned_rad, const wm_pose2 mounting[kMaxSensors]) const {
   problem all;
-  search_clue clue[kCapacity];
+  observation seen[kCapacity];
   for (int i = kept() - count_since(since_ns), n = 0; i < kept(); i++, n++) {
-    clue[n] = at(i);
-    if (clue[n].key >= 0) clue[n].sensor = compose(clue[n].sensor, mounting[clue[n].key % kMaxSensors]);
-    all.add(clue[n], travelled_m, turned_rad);
+    seen[n] = at(i);
+    if (seen[n].key >= 0) seen[n].sensor = compose(seen[n].sensor, mounting[seen[n].key % kMaxSensors]);
+    all.add(seen[n], travelled_m, turned_rad);
   }
   const double turn = wrap(pose_now.heading_rad - odom_now.heading_rad);
   const sin_cos by = sincos(turn);
@@ -410,12 +410,12 @@ int pose_search::agreeing(wm_time_ns since_ns, const wm_pose2 &pose_now, const w
 }
 
 search_result pose_search::find(wm_time_ns since_ns, const wm_pose2 &odom_now, double travelled_m, double turned_rad,
-                                const search_clue *prior, int prior_count, const search_limits &limits) const {
+                                const observation *prior, int prior_count, const search_limits &limits) const {
   search_result out{};
   problem all;
   const int oldest = count_ > kCapacity ? count_ - kCapacity : 0;
   for (int i = oldest; i < count_; i++)
-    if (clue_[i % kCapacity].t_ns >= since_ns) all.add(clue_[i % kCapacity], travelled_m, turned_rad);
+    if (ring_[i % kCapacity].t_ns >= since_ns) all.add(ring_[i % kCapacity], travelled_m, turned_rad);
   out.used = all.stated_from = all.count;
   for (int i = 0; i < prior_count; i++) all.add(prior[i], travelled_m, turned_rad);
   if (out.used < 3) return out;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filters/landmark_ekf/resection.hpp"
+#include "filters/relocalize/resection.hpp"
 
 #include "math/elementary.hpp"
 
