@@ -50,12 +50,19 @@ template <int kN>
   return llt.info() == Eigen::Success && finite(out->sum());
 }
 
-// X with A X = B, for a symmetric positive definite A. False: A is not, or X is not finite.
+// X with A X = B, for a symmetric positive definite A. False: A is not, or X is not finite. Column by column: Eigen's
+// solver of a whole matrix is blocked and takes memory from the heap.
 template <int kN, int kCols>
 [[nodiscard]] bool solve_positive(const matrix<kN> &a, const matrix<kN, kCols> &b, matrix<kN, kCols> *out) {
+  static_assert(kN <= 8, "Eigen unrolls substitution up to 8 rows; beyond, it wants a heap");
   const Eigen::LLT<matrix<kN>> llt(a);
   if (llt.info() != Eigen::Success) return false;
-  *out = llt.solve(b);
+  for (int c = 0; c < kCols; c++) {
+    vector<kN> x = b.col(c);
+    llt.matrixL().solveInPlace(x);
+    llt.matrixU().solveInPlace(x);
+    out->col(c) = x;
+  }
   return finite(out->sum());
 }
 

@@ -5,6 +5,7 @@
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 
+#include "filters/core/record_list.hpp"
 #include "filters/edge_mcl/align.hpp"
 #include "filters/edge_mcl/cloud.hpp"
 #include "filters/edge_mcl/hypotheses.hpp"
@@ -12,7 +13,6 @@
 #include "filters/edge_mcl/params.h"
 #include "filters/edge_mcl/place_search.hpp"
 #include "filters/planar/planar_filter.hpp"
-#include "filters/core/record_list.hpp"
 #include "waymark/estimator.h"
 
 namespace wm {

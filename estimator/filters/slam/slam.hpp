@@ -3,12 +3,12 @@
 #ifndef WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 #define WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 
-#include "sensors/sensor_model.hpp"
-#include "filters/core/state_pool.hpp"
 #include "filters/core/record_list.hpp"
+#include "filters/core/state_pool.hpp"
 #include "filters/slam/bearing_tracks.hpp"
 #include "filters/slam/joint_state.hpp"
 #include "filters/slam/params.h"
+#include "sensors/sensor_model.hpp"
 
 namespace wm {
 

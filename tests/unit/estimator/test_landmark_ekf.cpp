@@ -8,10 +8,10 @@
 
 #include "events.hpp"
 #include "filters/landmark_ekf/params.h"
-#include "sensors/sensor_model.hpp"
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
+#include "sensors/sensor_model.hpp"
 #include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"

@@ -8,11 +8,11 @@
 
 #include "events.hpp"
 #include "filters/landmark_ekf/params.h"
-#include "filters/relocalize/pose_search.hpp"
-#include "sensors/sensor_model.hpp"
 #include "filters/landmark_ekf/start_trial.hpp"
+#include "filters/relocalize/pose_search.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
+#include "sensors/sensor_model.hpp"
 #include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
