@@ -10,6 +10,7 @@
 #include "common/fisheye_rig.hpp"
 #include "detector_at_work.h"
 #include "sensors/lens.hpp"
+#include "vision/edges/params.h"
 #include "vision/edges_hough/windows.hpp"
 #include "waymark/random.h"
 
@@ -22,7 +23,7 @@ class edges_at_work {
       : picture_(drawn()), edges_(wm_detector_find("edges"), view_, [&](void *params) {
           auto *of_edges = static_cast<wm_edges_params *>(params);
           of_edges->mode = mode;
-          wm::bird_view_size(*of_edges, &bird_);
+          wm::bird_view_size(of_edges->hough, &bird_);
         }) {}
 
   // One picture; returns the number of points.

@@ -66,7 +66,7 @@ size_t lay_out(edges_state *state, uint32_t rays, uint32_t samples, const bird_v
 const char *view_of(const wm_edges_params &params, bird_view *out) {
   *out = bird_view{};
   if (params.mode != EDGES_BY_WINDOWS) return nullptr;
-  bird_view_size(params, out);
+  bird_view_size(params.hough, out);
   if (out->windows < 1) return "the bird's-eye view has no room for a window (bird.*, windows.*)";
   return static_cast<double>(out->width) * out->height > 4e7 ? "the bird's-eye view is above 40 million pixels"
                                                              : nullptr;
@@ -103,7 +103,7 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   bird_view bird;
   if (view_of(state->params, &bird)) return WM_BAD_CONFIG;
   lay_out(state, rays, samples, bird);
-  if (bird.windows > 0) bird_view_make(state->camera, state->params, &state->bird);
+  if (bird.windows > 0) bird_view_make(state->camera, state->params.hough, &state->bird);
   ray_fan_make(state->camera, state->params, &state->fan);
   return WM_OK;
 }
@@ -227,7 +227,7 @@ void points_of_link(const edges_state &state, const line_vertex &from, const lin
   const bird_view &bird = state.bird;
   const double dx = static_cast<double>(to.x - from.x), dy = static_cast<double>(to.y - from.y);
   const double size = std::sqrt(dx * dx + dy * dy);
-  const int steps = 1 + static_cast<int>(size / (state.params.windows_spacing_m * bird.px_per_m));
+  const int steps = 1 + static_cast<int>(size / (state.params.hough.windows_spacing_m * bird.px_per_m));
   const double normal = size > 0 ? atan2(dx, -dy) : 0;
   const sin_cos n = sincos(normal);
   for (int k = 0; k < steps; k++) {
@@ -246,13 +246,13 @@ void points_of_link(const edges_state &state, const line_vertex &from, const lin
     points->x_m[i] = static_cast<float>(bird.x_min_m + x / bird.px_per_m);
     points->y_m[i] = static_cast<float>(bird.y_min_m + y / bird.px_per_m);
     points->normal_rad[i] = static_cast<float>(grey_at(-2) >= grey_at(2) ? wrap(normal) : wrap(normal + kPi));
-    points->sigma_m[i] = static_cast<float>(state.params.windows_sigma_m);
+    points->sigma_m[i] = static_cast<float>(state.params.hough.windows_sigma_m);
   }
 }
 
 void points_of_windows(edges_state *state, const wm_frame &frame, wm_points *points) {
-  const int pieces = find_pieces(state->bird, frame, state->params, state->pieces, state->graph.capacity);
-  const int vertices = make_polylines(state->pieces, pieces, state->params, &state->graph, state->vertices);
+  const int pieces = find_pieces(state->bird, frame, state->params.hough, state->pieces, state->graph.capacity);
+  const int vertices = make_polylines(state->pieces, pieces, state->params.hough, &state->graph, state->vertices);
   for (int i = 1; i < vertices; i++) {
     const line_vertex &from = state->vertices[i - 1], &to = state->vertices[i];
     if (from.line == to.line) points_of_link(*state, from, to, points);

@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "vision/edges_hough/params.h"
 #include "waymark/params.h"
 
 #ifdef __cplusplus
@@ -16,10 +17,7 @@ struct wm_edges_params {
   int32_t rays_sign;  // edges_sign
   double rays_contrast_grey, rays_contrast_rel, rays_line_rel, rays_line_m, rays_band_m, rays_mirror_rel;
   int32_t rays_support_min;
-  double bird_px_per_m, bird_x_min_m, bird_x_max_m, bird_side_m;
-  int32_t windows_px, windows_overlap_px;
-  double windows_variance_min, windows_join_px, windows_join_angle_rad, windows_straight_px, windows_straight_share;
-  double windows_spacing_m, windows_sigma_m;
+  struct wm_edges_hough_params hough;
   double sigma_px, noise_grey;
 };
 

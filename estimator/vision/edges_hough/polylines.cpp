@@ -36,7 +36,8 @@ end_pair pair_of_ends(const line_piece &p, const line_piece &q, bool nearest) {
   return best;
 }
 
-bool continue_each_other(const line_piece &p, const line_piece &q, const wm_edges_params &params, double angle_cos) {
+bool continue_each_other(const line_piece &p, const line_piece &q, const wm_edges_hough_params &params,
+                         double angle_cos) {
   const end_pair near = pair_of_ends(p, q, true);
   if (!(near.square_px < square(params.windows_join_px))) return false;
   const point a = end_of(p, near.a), b = end_of(q, near.b), far_a = end_of(p, 1 - near.a),
@@ -64,7 +65,7 @@ point joint_of(const line_piece &p, const line_piece &q, double join_px) {
 struct builder {
   const line_piece *pieces;
   int count;
-  const wm_edges_params &params;
+  const wm_edges_hough_params &params;
   piece_graph &graph;
   line_vertex *out;
   int vertices, lines;
@@ -198,7 +199,7 @@ void piece_graph_place(piece_graph *graph, int32_t capacity, void *memory) {
   graph->member = static_cast<int32_t *>(take(n * sizeof(int32_t)));
 }
 
-int make_polylines(const line_piece *pieces, int count, const wm_edges_params &params, piece_graph *graph,
+int make_polylines(const line_piece *pieces, int count, const wm_edges_hough_params &params, piece_graph *graph,
                    line_vertex *out) {
   builder b = {pieces, count, params, *graph, out, 0, 0};
   b.connect();

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "vision/edges/params.h"
+#include "vision/edges_hough/params.h"
 
 namespace wm {
 
@@ -39,7 +39,7 @@ void piece_graph_place(piece_graph *graph, int32_t capacity, void *memory);
 // windows.straight_px of the line through its two ends farthest from each other is that line; else it is the longest of
 // the shortest paths between its pieces (R. W. Floyd 1962), of equals the one with the fewest, through the pieces'
 // intersections. O(count^3) in the worst case, of a part that is not straight.
-int make_polylines(const line_piece *pieces, int count, const wm_edges_params &params, piece_graph *graph,
+int make_polylines(const line_piece *pieces, int count, const wm_edges_hough_params &params, piece_graph *graph,
                    line_vertex *out);
 
 }  // namespace wm

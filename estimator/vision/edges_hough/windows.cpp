@@ -7,7 +7,7 @@ namespace wm {
 
 namespace {
 
-int windows_along(int32_t size, const wm_edges_params &p) {
+int windows_along(int32_t size, const wm_edges_hough_params &p) {
   const int32_t step = p.windows_px - p.windows_overlap_px;
   return size < p.windows_px || step < 1 ? 0 : (size - p.windows_px) / step + 1;
 }
@@ -65,7 +65,8 @@ line_piece piece_of(const candidate &c, int side) {
   return {across[0], along[0], across[1], along[1]};
 }
 
-bool find_in_window(const bird_view &view, int32_t x0, int32_t y0, const wm_edges_params &params, line_piece *out) {
+bool find_in_window(const bird_view &view, int32_t x0, int32_t y0, const wm_edges_hough_params &params,
+                    line_piece *out) {
   const int side = params.windows_px;
   candidate best = {{0, 0, 0, -1.0F}, 0};
   const uint8_t *window = view.edge + static_cast<ptrdiff_t>(y0) * view.width + x0;
@@ -92,7 +93,7 @@ bool find_in_window(const bird_view &view, int32_t x0, int32_t y0, const wm_edge
 
 }  // namespace
 
-void bird_view_size(const wm_edges_params &params, bird_view *out) {
+void bird_view_size(const wm_edges_hough_params &params, bird_view *out) {
   *out = bird_view{};
   out->px_per_m = params.bird_px_per_m;
   out->x_min_m = params.bird_x_min_m;
@@ -102,7 +103,7 @@ void bird_view_size(const wm_edges_params &params, bird_view *out) {
   out->windows = windows_along(out->width, params) * windows_along(out->height, params);
 }
 
-void bird_view_make(const mounted_camera &camera, const wm_edges_params &params, bird_view *out) {
+void bird_view_make(const mounted_camera &camera, const wm_edges_hough_params &params, bird_view *out) {
   for (int32_t y = 0; y < out->height; y++)
     for (int32_t x = 0; x < out->width; x++) {
       pixel at;
@@ -137,7 +138,7 @@ void bird_view_make(const mounted_camera &camera, const wm_edges_params &params,
   }
 }
 
-int find_pieces(const bird_view &view, const wm_frame &frame, const wm_edges_params &params, line_piece *out,
+int find_pieces(const bird_view &view, const wm_frame &frame, const wm_edges_hough_params &params, line_piece *out,
                 int capacity) {
   look_from_above(view, frame);
   find_gradient(view);

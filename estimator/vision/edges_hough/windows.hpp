@@ -6,8 +6,8 @@
 #define WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_WINDOWS_HPP
 
 #include "sensors/lens.hpp"
-#include "vision/edges/params.h"
 #include "vision/edges_hough/hough.hpp"
+#include "vision/edges_hough/params.h"
 #include "vision/edges_hough/polylines.hpp"
 #include "waymark/frame.h"
 
@@ -32,11 +32,11 @@ struct bird_view {
 };
 
 // Sizes of the view by the parameters; counts its windows.
-void bird_view_size(const wm_edges_params &params, bird_view *out);
+void bird_view_size(const wm_edges_hough_params &params, bird_view *out);
 // Fills the table; its arrays are width x height, `hough` is zero.
-void bird_view_make(const mounted_camera &camera, const wm_edges_params &params, bird_view *out);
+void bird_view_make(const mounted_camera &camera, const wm_edges_hough_params &params, bird_view *out);
 // The strongest line of each window that has one. Returns how many there are, at most `capacity`.
-int find_pieces(const bird_view &view, const wm_frame &frame, const wm_edges_params &params, line_piece *out,
+int find_pieces(const bird_view &view, const wm_frame &frame, const wm_edges_hough_params &params, line_piece *out,
                 int capacity);
 
 }  // namespace wm

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pieces joined to polylines as the paper does: straight ones, bends, corners, branches, gaps; and a drawn arc of a
 // wall.
+#include "vision/edges/params.h"
 #include "vision/edges_hough/polylines.hpp"
 
 #include <cmath>
@@ -27,7 +28,7 @@ void join() {
   wm::piece_graph graph;
   wm::piece_graph_place(&graph, count, memory.get());
   vertices.resize(2 * pieces.size());
-  const int used = wm::make_polylines(pieces.data(), count, params, &graph, vertices.data());
+  const int used = wm::make_polylines(pieces.data(), count, params.hough, &graph, vertices.data());
   TEST_ASSERT_LESS_OR_EQUAL(static_cast<int>(vertices.size()), used);
   vertices.resize(static_cast<size_t>(used));
   lines = used > 0 ? vertices.back().line + 1 : 0;
@@ -86,7 +87,7 @@ void a_corner_is_no_continuation() {
   join();
   TEST_ASSERT_EQUAL(2, lines);
   TEST_ASSERT_EQUAL(4, vertices.size());
-  params.windows_join_angle_rad = 1.5;  // but for one who says so
+  params.hough.windows_join_angle_rad = 1.5;  // but for one who says so
   join();
   TEST_ASSERT_EQUAL(1, lines);
 }
@@ -125,8 +126,8 @@ void nothing_and_nonsense() {
     const auto n = [i](uint64_t k) { return 60 * wm_random_uniform(1, k, i); };
     piece(n(1), n(2), i % 7 ? n(3) : n(1), i % 7 ? n(4) : n(2));
   }
-  params.windows_join_angle_rad = 0;
-  params.windows_straight_share = 1;
+  params.hough.windows_join_angle_rad = 0;
+  params.hough.windows_straight_share = 1;
   join();
   TEST_ASSERT_GREATER_THAN(0, lines);
   for (const wm::line_vertex &v : vertices) TEST_ASSERT_TRUE(std::isfinite(v.x) && std::isfinite(v.y));

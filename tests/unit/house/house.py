@@ -22,6 +22,41 @@ ESTIMATOR_NEVER = re.compile(
     r"<(time\.h|stdio\.h|stdlib\.h|pthread\.h|unistd\.h|errno\.h|sys/.*|linux/.*|chrono|thread|mutex|atomic|iostream|fstream"
     r"|cstdio|cstdlib|string|vector|map|unordered_map|memory|functional|random|sstream|lcm/.*|opencv2/.*)>")
 
+# Inside estimator/: folder -> folders whose headers it may include (its own always). A detector includes no other detector
+# and no filter, a filter no other filter.
+SENSING = ["math", "memory", "sensors", "image", "vision"]
+FILTER = ["math", "memory", "motion", "maps", "sensors", "filters", "filters/core", "filters/planar", "filters/relocalize"]
+FOLDER_MAY_USE = {
+    "": [],
+    "math": [],
+    "memory": [],
+    "motion": ["math", "memory"],
+    "maps": ["math", "memory"],
+    "sensors": ["math", "memory"],
+    "image": ["math", "memory", "sensors"],
+    "vision": [],
+    "vision/cascade": SENSING,
+    "vision/edges": [*SENSING, "vision/edges_hough"],
+    "vision/edges_hough": SENSING,
+    "vision/landmarks": SENSING,
+    "vision/lines": SENSING,
+    "vision/markers": SENSING,
+    "vision/stereo": SENSING,
+    "filters": [],
+    "filters/core": ["math", "memory", "motion", "sensors"],
+    "filters/planar": ["math", "memory", "motion", "sensors", "filters/core"],
+    "filters/relocalize": ["math", "memory", "maps", "sensors", "filters/core"],
+    "filters/edge_mcl": FILTER,
+    "filters/landmark_ekf": FILTER,
+    "filters/odometry": FILTER,
+    "filters/slam": FILTER,
+    "filters/stereo_ekf": FILTER,
+}
+# (file, header): arrows that still point the wrong way. Only ever shorter.
+FOLDER_EXCEPTIONS = {
+    ("vision/stereo/motion.cpp", "filters/stereo_ekf/consensus.hpp"),
+}
+
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')
 
 
@@ -50,6 +85,33 @@ def check_includes():
                     yield f"{where}: the estimator is pure: {header} is not for it"
 
 
+def check_folders():
+    room = ROOT / "estimator"
+    seen = set()
+    for path in sources("estimator"):
+        inside = path.relative_to(room)
+        folder = str(inside.parent) if str(inside.parent) != "." else ""
+        if inside.parts[0] == "include":
+            folder = None  # the public headers: they include msgs and each other
+        elif folder not in FOLDER_MAY_USE:
+            yield f"estimator/{inside}:1: {folder}/ is not in house.py's table of folders: add what it may include"
+            continue
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            match = INCLUDE.match(line)
+            if not match or match.group(1) != '"' or match.group(2).startswith("waymark/"):
+                continue
+            header = match.group(2)
+            target = header.rpartition("/")[0]
+            if folder is not None and (target == folder or target in FOLDER_MAY_USE[folder]):
+                continue
+            if (str(inside), header) in FOLDER_EXCEPTIONS:
+                seen.add((str(inside), header))
+                continue
+            yield f"estimator/{inside}:{number}: {folder or inside.parts[0]}/ may not include {header}"
+    for file, header in sorted(FOLDER_EXCEPTIONS - seen):
+        yield f"estimator/{file} does not include {header} any more: take it off FOLDER_EXCEPTIONS"
+
+
 def check_sources():
     for room in [*MAY_USE, "tests"]:
         for path in sources(room):
@@ -66,7 +128,7 @@ def sources(room):
 
 
 def main():
-    offences = [*check_includes(), *check_sources()]
+    offences = [*check_includes(), *check_folders(), *check_sources()]
     count = sum(len(sources(room)) for room in MAY_USE)
     if count == 0:
         print(f"no sources under {ROOT}: wrong folder?")
