@@ -26,7 +26,7 @@ wm_innovation record_of(const wm_event &event, wm_residual residual) {
 
 wm_status refuse(record_list records, wm_innovation record, wm_status status) {
   record.verdict = status == WM_NOT_FINITE ? WM_REJECTED_NOT_FINITE : WM_REJECTED_OUT_OF_RANGE;
-  if (status == WM_NOT_FINITE) records.add(record);
+  records.add(record);
   return status;
 }
 

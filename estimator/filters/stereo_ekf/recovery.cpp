@@ -14,7 +14,6 @@ constexpr double kInflateUpTo_m = 30.0;
 constexpr double kDefaultSigma = 0.05;
 // A start less sure than this is no point to take derivatives about, where the map can tell better.
 constexpr double kVague_m = 1.0, kVague_rad = 0.4;
-constexpr double kUnknown_m = 1000.0, kUnknown_rad = 1.8;
 
 double given(double sigma) { return finite(sigma) ? sigma : kDefaultSigma; }
 
@@ -45,7 +44,7 @@ void stereo_ekf::start_pose() {
   const double sigma_m = given(start.sigma_xy_m), sigma_rad = given(start.sigma_heading_rad);
   const bool findable = params_.recover && rig_.there && setup_->landmark_count >= 3;
   const bool vague = findable && (sigma_m > kVague_m || sigma_rad > kVague_rad);
-  set_pose(pose, place ? sigma_m : kUnknown_m, turn ? sigma_rad : kUnknown_rad);
+  set_pose(pose, place ? sigma_m : kUnknownPlace_m, turn ? sigma_rad : kUnknownTurn_rad);
   monitor_.clear();
   clues_.clear();
   resets_++;

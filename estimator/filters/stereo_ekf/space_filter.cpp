@@ -13,13 +13,6 @@ int head_size(const head_model models[kHeadStates]) {
   return n;
 }
 
-constexpr double kNeutral[kHeadStates] = {0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0};
-
-void add_block(double out[kPose6][3], int row, const mat3 &m) {
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) out[row + i][j] += m.m[i][j];
-}
-
 }  // namespace
 
 size_t space_filter::tail_bytes(const head_model models[kHeadStates], int points_max) {
@@ -68,153 +61,6 @@ void space_filter::forget(int state, int width, double variance) {
   }
 }
 
-// dp' = dp - D x dr + ..., dr' = dr + ..., D the way moved in map axes: the invariant error stays as it is under
-// motion, but for its noise and for what the sensors' states add. Rates that are wrong by b while turning evenly turn
-// the end by b dt and swing the way by half of that.
-void space_filter::propagate(const body_stretch &s) {
-  settle();
-  const double dt = s.dt_s;
-  if (!(dt > 0.0)) return;
-  const bool has_rates = at_[kRates] >= 0;
-  const double scale = head1(kVelocityScale, 1.0);
-  const vec3 v = has_rates ? head3(kVelocity) : scale * s.v_mps;
-  const vec3 w = has_rates ? head3(kRates) : s.w_radps - head3(kRateBias);
-  const mat3 mean = r_ * mean_turn(dt * w);
-  const vec3 way = dt * (mean * v);
-  const mat3 swing = skew(way);
-
-  // F's rows of the pose: their columns beside the identity.
-  struct column_block {
-    int state, width;
-    double by[kPose6][3];
-  };
-  column_block blocks[4];
-  int count = 0;
-  const auto add = [&](int state, int width) -> column_block & {
-    column_block &b = blocks[count++];
-    std::memset(&b, 0, sizeof b);
-    b.state = state;
-    b.width = width;
-    return b;
-  };
-  add_block(add(kTurn, 3).by, kPlace, -1.0 * swing);
-  const auto add_turning = [&](int state, double sign) {
-    const mat3 turn = (sign * dt) * mean;
-    column_block &b = add(state, 3);
-    add_block(b.by, kTurn, turn);
-    add_block(b.by, kPlace, -0.5 * (swing * turn));
-  };
-  if (has_rates) {
-    add_block(add(at_[kVelocity], 3).by, kPlace, dt * mean);
-    add_turning(at_[kRates], 1.0);
-  } else {
-    if (at_[kRateBias] >= 0) add_turning(at_[kRateBias], -1.0);
-    if (at_[kVelocityScale] >= 0) {
-      const vec3 by = dt * (mean * s.v_mps);
-      column_block &b = add(at_[kVelocityScale], 1);
-      for (int i = 0; i < 3; i++) b.by[kPlace + i][0] = by[i];
-    }
-  }
-
-  // P' = F P F'. Below, `head` is what F moves and what it moves by; columns of all other states follow F's rows.
-  double *P = p();
-  const int head = first_point_;
-  double old_rows[kPose6][kHeadMax], new_rows[kPose6][kHeadMax];
-  for (int i = 0; i < kPose6; i++)
-    for (int j = 0; j < head; j++) old_rows[i][j] = entry(P, i, j, stride_);
-  for (int i = 0; i < kPose6; i++)
-    for (int j = 0; j < head; j++) {
-      double sum = old_rows[i][j];
-      for (int b = 0; b < count; b++)
-        for (int k = 0; k < blocks[b].width; k++) {
-          const int from = blocks[b].state + k;
-          sum += blocks[b].by[i][k] * (from < kPose6 ? old_rows[from][j] : entry(P, from, j, stride_));
-        }
-      new_rows[i][j] = sum;
-    }
-  for (int i = 0; i < kPose6; i++)
-    for (int j = i; j < kPose6; j++) {
-      double sum = new_rows[i][j];
-      for (int b = 0; b < count; b++)
-        for (int k = 0; k < blocks[b].width; k++) sum += blocks[b].by[j][k] * new_rows[i][blocks[b].state + k];
-      P[i * stride_ + j] = sum;
-    }
-  for (int i = 0; i < kPose6; i++)
-    for (int j = kPose6; j < head; j++) P[i * stride_ + j] = new_rows[i][j];
-  // Points: rows of the place first, as those of the rotation are still the old ones then.
-  if (n_ > head) {
-    const int from = head & ~1, width = even(n_) - from;
-    double keep[kPose6] = {};  // where the head's size is odd its last column comes along; it is done already
-    for (int i = 0; i < kPose6; i++) keep[i] = P[i * stride_ + from];
-    for (int i = 0; i < kPose6; i++)
-      for (int b = 0; b < count; b++)
-        for (int k = 0; k < blocks[b].width; k++)
-          if (blocks[b].by[i][k] != 0.0)
-            vectors::add_scaled(P + i * stride_ + from, P + (blocks[b].state + k) * stride_ + from, blocks[b].by[i][k],
-                                width);
-    if (from < head)
-      for (int i = 0; i < kPose6; i++) P[i * stride_ + from] = keep[i];
-  }
-
-  // Noise: white along the stretch, so that a turn made evenly on the way swings what is left of it.
-  mat3 place_noise, turn_noise;
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) {
-      place_noise.m[i][j] = turn_noise.m[i][j] = 0.0;
-      for (int k = 0; k < 3; k++) {
-        place_noise.m[i][j] += mean.m[i][k] * mean.m[j][k] * s.place_m2[k];
-        turn_noise.m[i][j] += mean.m[i][k] * mean.m[j][k] * s.turn_rad2[k];
-      }
-    }
-  const mat3 cross_noise = -0.5 * (swing * turn_noise);
-  const mat3 lever_noise = (1.0 / 3) * (swing * (turn_noise * transposed(swing)));
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) {
-      if (i <= j) P[i * stride_ + j] += place_noise.m[i][j] + lever_noise.m[i][j];
-      if (i <= j) P[(kTurn + i) * stride_ + kTurn + j] += turn_noise.m[i][j];
-      P[i * stride_ + kTurn + j] += cross_noise.m[i][j];
-    }
-  walk(dt);
-  if (has_rates) {
-    walk_through(kVelocity, kPlace, dt, mean);
-    walk_through(kRates, kTurn, dt, mean);
-  }
-
-  pose_.p = pose_.p + way;
-  pose_.q = normalized(pose_.q * turn_by(dt * w));
-  r_ = matrix_of(pose_.q);
-}
-
-// What a rate walks by on the way is in the pose, too: q dt^2/2 with the rate, q dt^3/3 on its own.
-void space_filter::walk_through(int which, int into, double dt_s, const mat3 &mean) {
-  const head_model &m = models_[which];
-  const double q = m.tau_s > 0.0 ? 2.0 * square(m.sigma) / m.tau_s : square(m.walk);
-  double *P = p();
-  for (int i = 0; i < 3; i++) {
-    P[(into + i) * stride_ + into + i] += q * dt_s * dt_s * dt_s / 3.0;
-    for (int j = 0; j < 3; j++) P[(into + i) * stride_ + at_[which] + j] += 0.5 * q * dt_s * dt_s * mean.m[i][j];
-  }
-}
-
-void space_filter::walk(double dt_s) {
-  double *P = p();
-  for (int k = 0; k < kHeadStates; k++) {
-    if (at_[k] < 0) continue;
-    const bool fades = models_[k].tau_s > 0.0;
-    const double left = fades ? exp(-dt_s / models_[k].tau_s) : 1.0;
-    const double added = fades ? (1.0 - left * left) * square(models_[k].sigma) : square(models_[k].walk) * dt_s;
-    for (int i = at_[k]; i < at_[k] + kHeadWidth[k]; i++) {
-      if (fades) {
-        for (int j = 0; j < i; j++) P[j * stride_ + i] *= left;
-        P[i * stride_ + i] *= left * left;
-        for (int j = i + 1; j < n_; j++) P[i * stride_ + j] *= left;
-        head_[i] = kNeutral[k] + left * (head_[i] - kNeutral[k]);
-      }
-      P[i * stride_ + i] += added;
-    }
-  }
-}
-
 // gains = P H'. Rows that are not there are zero.
 void space_filter::project(const row_block &block) {
   const int width = even(n_);
@@ -230,6 +76,7 @@ void space_filter::project(const row_block &block) {
 
 row_verdict space_filter::fuse(const row_block &block, const gates &limits) {
   row_verdict out{};
+  if (block.without_room > 0) return out;
   project(block);
   const int rows = block.rows;
   double factor[kRank][kRank] = {}, left[kRank], d[kRank];

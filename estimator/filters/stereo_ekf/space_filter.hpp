@@ -40,27 +40,39 @@ enum head_state {
 };
 inline constexpr int kHeadWidth[kHeadStates] = {3, 3, 3, 1, 3, 3, 1, 1, 1, 1, 1};
 inline constexpr int kHeadMax = kPose6 + 21;
+inline constexpr double kNeutral[kHeadStates] = {0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0};
+
+// Sigmas of an unknown pose on each axis; prediction never makes a pose less certain. 1.8 rad is that of a rotation
+// angle uniform in (-pi, pi]; 1000 m is beyond any map that is searched. Neither was swept.
+inline constexpr double kUnknownPlace_m = 1000.0, kUnknownTurn_rad = 1.8;
 
 // How a state begins and what it does on its own: a random walk, or (tau_s > 0) a Gauss-Markov process of that sigma.
 struct head_model {
   double sigma, walk, tau_s;
 };
 
-// Up to four rows of one observation and the states that they are about.
+// Up to kRank rows of one observation: their derivatives by the states of its columns, column after column.
+// The widest block, a stereo point's, has 16 columns: place 3, rotation 3, camera 6, time offset 1, point 3.
 struct row_block {
-  static constexpr int kColumns = 24;
+  static constexpr int kColumns = 24, kWidest = 3;
   int rows = 0, columns = 0;
+  int without_room = 0;  // columns beyond kColumns: fuse() refuses the block
   int index[kColumns];
-  double by[kRank][kColumns];
+  double by[kRank][kColumns + kWidest];     // what has no room is written behind the last column, and never read
   double observed[kRank], expected[kRank];  // expected: at the point of linearisation
   double innovation[kRank];                 // observed - expected, wrapped where it is an angle
   double noise[kRank];                      // variances
 
+  // `width` (at most kWidest) columns for the states from `state` on; returns the first column.
   int add_columns(int state, int width) {
+    if (columns + width > kColumns) {
+      without_room += width;
+      return kColumns;
+    }
     const int first = columns;
     for (int i = 0; i < width; i++, columns++) {
       index[columns] = state + i;
-      for (double(&row)[kColumns] : by) row[columns] = 0.0;
+      for (auto &row : by) row[columns] = 0.0;
     }
     return first;
   }
@@ -157,8 +169,20 @@ class space_filter {
   static constexpr int kRowsBefore = 1 + kRank + 2 * kTurns;
 
   void project(const row_block &block);
+
+  // space_propagate.cpp
+  struct step;
+  struct transition;
+  step step_of(const body_stretch &s) const;
+  void transition_of(const step &s, const body_stretch &twist, transition *f) const;
+  void transform_head(const transition &f);
+  void transform_points(const transition &f);
+  void add_motion_noise(const step &s, const body_stretch &twist);
+  void add_integrated_noise(int which, int into, const step &s);
   void walk(double dt_s);
-  void walk_through(int which, int into, double dt_s, const mat3 &mean);
+  double pose_variance(int state) const;  // sum of three
+  void bound_pose(int state, double limit, double before);
+
   void forget(int state, int width, double variance);
 
   size_t tail_;

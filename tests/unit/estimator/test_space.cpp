@@ -184,7 +184,8 @@ void test_an_update_is_kalmans(void) {
   m.filter->set_pose({{1, 2, 3}, turn_by({0.1, 0.2, 0.3})}, covariance);
   row_block see;
   see.rows = 3;
-  see.add_columns(0, 6);
+  see.add_columns(kPlace, 3);
+  see.add_columns(kTurn, 3);
   const mat3 A = transposed(m.filter->R());
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 6; j++) see.by[i][j] = j < 3 ? -A.m[i][j] : normal(100 + 6 * i + j);
@@ -194,7 +195,8 @@ void test_an_update_is_kalmans(void) {
   TEST_ASSERT_EQUAL(15, n);
   row_block rows;
   rows.rows = 4;
-  rows.add_columns(0, 6);
+  rows.add_columns(kPlace, 3);
+  rows.add_columns(kTurn, 3);
   rows.add_columns(m.filter->point_state(1), 3);
   double P[15][15], H[4][15] = {}, x[15] = {};
   for (int i = 0; i < n; i++)
@@ -241,6 +243,26 @@ void test_an_update_is_kalmans(void) {
     TEST_ASSERT_EQUAL_DOUBLE(shared[i], m.filter->covariance(1, m.filter->point_state(0) + i));
     TEST_ASSERT_EQUAL_DOUBLE(between[i], m.filter->covariance(m.filter->point_state(1), m.filter->point_state(0) + i));
   }
+}
+
+// A block has room for kColumns columns: more are counted and the block is refused, and nothing beyond is written.
+void test_a_block_with_too_many_columns_is_refused(void) {
+  machine m(kNone, 8);
+  double covariance[6][6] = {};
+  for (int i = 0; i < 6; i++) covariance[i][i] = 0.01;
+  m.filter->set_pose({{1, 2, 3}, kNoTurn}, covariance);
+  row_block block;
+  block.rows = 1;
+  block.innovation[0] = 0.01;
+  block.noise[0] = 0.01;
+  for (int k = 0; k < 40; k++) {
+    const int column = block.add_columns(0, 3);
+    for (int i = 0; i < 3; i++) block.by[0][column + i] = 1.0;
+  }
+  TEST_ASSERT_LESS_OR_EQUAL(row_block::kColumns, block.columns);
+  TEST_ASSERT_EQUAL_DOUBLE(0.01, block.innovation[0]);
+  TEST_ASSERT_FALSE(m.filter->fuse(block, {7, 20}).fused);
+  TEST_ASSERT_EQUAL_DOUBLE(0.01, m.filter->variance(0));
 }
 
 // A scene turned and moved as a whole looks the same: no update may make the filter surer of such a motion. With points
@@ -389,6 +411,7 @@ int main(void) {
   RUN_TEST(test_propagation_carries_errors_as_the_motion_does);
   RUN_TEST(test_sensor_states_swing_the_way_as_they_should);
   RUN_TEST(test_an_update_is_kalmans);
+  RUN_TEST(test_a_block_with_too_many_columns_is_refused);
   RUN_TEST(test_what_cannot_be_seen_is_not_learnt);
   RUN_TEST(test_pictures_alone_do_not_tell_the_mounting_or_the_time);
   RUN_TEST(test_orientation_is_found_with_a_third_wrong);

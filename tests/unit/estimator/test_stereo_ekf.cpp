@@ -6,152 +6,11 @@
 #include <cstring>
 #include <vector>
 
-#include "events.hpp"
-#include "filters/stereo_ekf/consensus.hpp"
-#include "math/rotation.hpp"
-#include "unity.h"
-#include "waymark/estimator.h"
-#include "waymark/random.h"
+#include "stereo_scene.hpp"
 
 using namespace wm;
 
 namespace {
-
-constexpr double kFocal = 420, kBaseline_m = 0.3, kCu = 320, kCv = 240;
-const double kAbsent = std::nan("");
-
-// A vehicle among points on all sides; its camera looks ahead.
-struct scene {
-  std::vector<char> motion, params;
-  std::vector<wm_landmark> points;
-  std::vector<wm_landmark> map;
-  wm_rig rig;
-  wm_sensor sensor;
-  wm_setup setup;
-  void *state = nullptr;
-  size_t bytes = 0;
-  const wm_estimator *ekf = wm_estimator_find("stereo_ekf");
-  placed truth = {{0, 0, 0}, kNoTurn};
-  double t_s = 0;
-  uint64_t draws = 0;
-  double noise_v = 0.02, noise_w = 0.003;
-
-  explicit scene(int count = 400) {
-    motion.resize(wm_motion_params_table.bytes);
-    wm_params_defaults(&wm_motion_params_table, motion.data());
-    params.resize(ekf->params.bytes);
-    wm_params_defaults(&ekf->params, params.data());
-    set("noise.pixel_px", 0.5);
-    set("noise.v_mps", 0.02);
-    set("noise.w_radps", 0.003);
-    for (int i = 0; i < count; i++) {
-      const auto draw = [i](uint64_t k) { return wm_random_normal(11, k, static_cast<uint64_t>(i)); };
-      const vec3 direction = {draw(0), draw(1), draw(2)};
-      const double far = 2.5 + 2.0 * wm_random_uniform(11, 9, static_cast<uint64_t>(i));
-      const vec3 p = (far / length(direction)) * direction;
-      points.push_back({i + 1, {p.x, p.y, p.z}, 0.001, kAbsent, {}, 0});
-    }
-    map = points;
-    wm_rig_init(&rig);
-    rig.camera_count = 2;
-    rig.cameras[0].width_px = rig.cameras[1].width_px = 640;
-    rig.cameras[0].height_px = rig.cameras[1].height_px = 480;
-    rig.stereo = {0, 1, kBaseline_m, {kFocal, kFocal, kCu, kCv}, {0.5, 0.5, 0.5, 0.5}};
-    sensor = {};
-    std::strcpy(sensor.name, "acoustic");
-    sensor.bearing_sigma_rad = kAbsent;
-    sensor.range_sigma_m = 0.05;
-    sensor.max_range_m = 1000;
-    setup = {};
-    setup.wheels = {kAbsent, kAbsent, kAbsent, kAbsent, kAbsent, kAbsent, 0, {}, {}};
-    setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0, 0.01, 0.01};
-    setup.seed = 1;
-  }
-  ~scene() { free(state); }
-  scene(const scene &) = delete;
-  scene &operator=(const scene &) = delete;
-
-  void set(const char *key, double value) {
-    for (size_t i = 0; i < ekf->params.count; i++) {
-      const wm_param &p = ekf->params.params[i];
-      if (std::strcmp(p.key, key) != 0) continue;
-      const auto whole = static_cast<int32_t>(value);
-      if (p.type == WM_PARAM_F64)
-        std::memcpy(&params[p.offset], &value, sizeof value);
-      else
-        std::memcpy(&params[p.offset], &whole, sizeof whole);
-      return;
-    }
-    TEST_FAIL_MESSAGE(key);
-  }
-  void begin() {
-    setup.motion = reinterpret_cast<const wm_motion_params *>(motion.data());
-    setup.sensors = &sensor;
-    setup.sensor_count = 1;
-    setup.landmarks = map.data();
-    setup.landmark_count = map.size();
-    setup.rig = &rig;
-    const char *why = "";
-    bytes = ekf->state_bytes(params.data(), &setup, &why);
-    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-    state = aligned_alloc(16, (bytes + 15) / 16 * 16);
-    TEST_ASSERT_EQUAL(WM_OK, ekf->init(state, params.data(), &setup));
-  }
-
-  double noise() { return wm_random_normal(12, 1, draws++); }
-  wm_status take(const wm_event &e, wm_innovation *records = nullptr) {
-    wm_innovation own[WM_INNOVATIONS_PER_EVENT_MAX];
-    size_t count = 0;
-    return ekf->correct(state, &e, records ? records : own, WM_INNOVATIONS_PER_EVENT_MAX, &count);
-  }
-  // Truth and filter go on by dt with a twist that holds.
-  void swim(double dt_s, const vec3 &v, const vec3 &w) {
-    wm_event e = make::empty(t_s, WM_EVENT_TWIST6);
-    for (int i = 0; i < 3; i++) {
-      e.as.twist6.v_mps[i] = v[i] + noise_v * noise();
-      e.as.twist6.w_radps[i] = w[i] + noise_w * noise();
-    }
-    TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &e));
-    truth.p = truth.p + matrix_of(truth.q) * (dt_s * (mean_turn(dt_s * w) * v));
-    truth.q = normalized(truth.q * turn_by(dt_s * w));
-    t_s += dt_s;
-  }
-  bool pixels(const wm_landmark &l, double px[4]) const {
-    const vec3 b = transposed_times(matrix_of(truth.q), vec_of(l.p_m) - truth.p);
-    const vec3 x = {-b.y, -b.z, b.x};
-    if (x.z < 0.5) return false;
-    for (int side = 0; side < 2; side++) {
-      px[2 * side] = kCu + kFocal * (x.x - side * kBaseline_m) / x.z;
-      px[2 * side + 1] = kCv + kFocal * x.y / x.z;
-      if (px[2 * side] < 0 || px[2 * side] > 639 || px[2 * side + 1] < 0 || px[2 * side + 1] > 479) return false;
-    }
-    return true;
-  }
-  wm_event seen(const wm_landmark &l, const double px[4]) const {
-    wm_event e = make::empty(t_s, WM_EVENT_STEREO);
-    e.as.stereo = {l.id, {px[0], px[1]}, {px[2], px[3]}};
-    return e;
-  }
-  // What the pair sees now; returns how many points.
-  int look() {
-    int count = 0;
-    for (const wm_landmark &l : points) {
-      double px[4];
-      if (!pixels(l, px)) continue;
-      for (double &value : px) value += 0.5 * noise();
-      TEST_ASSERT_EQUAL(WM_OK, take(seen(l, px)));
-      count++;
-    }
-    return count;
-  }
-  wm_estimate estimate() const {
-    wm_estimate e;
-    ekf->estimate(state, &e);
-    return e;
-  }
-  double place_error() const { return length(vec_of(estimate().pose_map_base.p_m) - truth.p); }
-  double turn_error() const { return length(turn_of(conjugate(quat_of(estimate().pose_map_base.q_xyzw)) * truth.q)); }
-};
 
 // Where the filter has a point; NaN where it doesn't have it.
 vec3 place_of(const scene &s, int32_t id) {
@@ -177,19 +36,6 @@ void begin_slam(scene *s) {
   s->set("slam.keep_outside_s", 1000);
   s->map.clear();
   s->begin();
-}
-
-void assert_sound(const wm_estimate &e) {
-  const double *q = e.pose_map_base.q_xyzw;
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  double p[6][6], inverse[6][6];
-  for (int i = 0; i < 6; i++)
-    for (int j = 0; j < 6; j++) {
-      p[i][j] = e.covariance[wm_cov_index(i, j)];
-      const double mirrored = e.covariance[wm_cov_index(j, i)];
-      TEST_ASSERT_EQUAL_MEMORY(&mirrored, &p[i][j], sizeof mirrored);
-    }
-  TEST_ASSERT_TRUE_MESSAGE(invert6(p, inverse), "the covariance is not positive");
 }
 
 }  // namespace
@@ -449,42 +295,6 @@ void test_the_time_of_pictures_is_told_by_a_twist_that_swings_alone(void) {
   }
 }
 
-void test_a_wrong_match_is_refused_and_one_picture_is_enough(void) {
-  scene s;
-  s.begin();
-  for (int i = 0; i < 5; i++) {
-    s.look();
-    s.swim(0.1, {0.1, 0, 0}, {0, 0, 0.1});
-  }
-  s.look();
-  double px[4];
-  const wm_landmark *shown = nullptr;
-  for (const wm_landmark &l : s.points)
-    if (s.pixels(l, px)) shown = &l;
-  TEST_ASSERT_NOT_NULL(shown);
-  s.pixels(*shown, px);
-  const wm_estimate before = s.estimate();
-  wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];
-  px[3] += 15;  // the rows disagree
-  wm_event e = s.seen(*shown, px);
-  s.take(e, records);
-  for (int k = 0; k < 4; k++) TEST_ASSERT_EQUAL(WM_REJECTED_GATE, records[k].verdict);
-  TEST_ASSERT_EQUAL_MEMORY(
-      &before,
-      [&] {
-        static wm_estimate after;
-        after = s.estimate();
-        return &after;
-      }(),
-      sizeof before);
-  s.pixels(*shown, px);
-  e = s.seen(*shown, px);
-  e.as.stereo.right_px[0] = e.as.stereo.right_px[1] = kAbsent;
-  TEST_ASSERT_EQUAL(WM_OK, s.take(e, records));
-  TEST_ASSERT_EQUAL(WM_FUSED, records[1].verdict);
-  TEST_ASSERT_LESS_THAN_DOUBLE(before.covariance[7], s.estimate().covariance[7]);
-}
-
 void test_ranges_depth_and_heading_are_rows_too(void) {
   scene s;
   s.map = {{1, {10, 0, -2}, 0.001, kAbsent, {}, 0},
@@ -519,30 +329,6 @@ void test_ranges_depth_and_heading_are_rows_too(void) {
   wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];
   TEST_ASSERT_EQUAL(WM_OK, s.take(make::heading(s.t_s, 1.0, 0.02), records));
   TEST_ASSERT_EQUAL(WM_REJECTED_SINGULAR, records[0].verdict);
-}
-
-void test_nonsense_in_pixels_is_refused(void) {
-  scene s;
-  s.set("slam.points", 10);
-  s.begin();
-  s.look();
-  s.swim(0.1, {0, 0, 0}, {0, 0, 0});
-  std::vector<char> before(static_cast<char *>(s.state), static_cast<char *>(s.state) + s.bytes);
-  const double bad[][4] = {{kAbsent, kAbsent, kAbsent, kAbsent},
-                           {kAbsent, 1, 2, 3},
-                           {1, 2, 3, kAbsent},
-                           {HUGE_VAL, 1, 2, 3},
-                           {1, 2, 1e9, 3}};
-  for (const auto &px : bad) {
-    const wm_event e = s.seen(s.points[0], px);
-    TEST_ASSERT_EQUAL(px[2] == 1e9 ? WM_OUT_OF_RANGE : WM_NOT_FINITE, s.take(e));
-    TEST_ASSERT_EQUAL_MEMORY(before.data(), s.state, s.bytes);
-  }
-  wm_event e = s.seen(s.points[0], bad[4]);
-  e.as.stereo.right_px[0] = 2;
-  e.as.stereo.id = -1;
-  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, s.take(e));
-  TEST_ASSERT_EQUAL_MEMORY(before.data(), s.state, s.bytes);
 }
 
 void test_a_copy_with_points_goes_on_alike(void) {
@@ -582,9 +368,7 @@ int main(void) {
   RUN_TEST(test_a_point_that_does_not_fit_any_more_leaves);
   RUN_TEST(test_pictures_that_are_late);
   RUN_TEST(test_the_time_of_pictures_is_told_by_a_twist_that_swings_alone);
-  RUN_TEST(test_a_wrong_match_is_refused_and_one_picture_is_enough);
   RUN_TEST(test_ranges_depth_and_heading_are_rows_too);
-  RUN_TEST(test_nonsense_in_pixels_is_refused);
   RUN_TEST(test_a_copy_with_points_goes_on_alike);
   return UNITY_END();
 }

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+// Prediction in space: the pose moved by a twist, and its covariance.
+#include <cstring>
+
+#include "filters/stereo_ekf/space_filter.hpp"
+
+namespace wm {
+namespace {
+
+void add_block(double out[kPose6][3], int row, const mat3 &m) {
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) out[row + i][j] += m.m[i][j];
+}
+
+// R diag(v) R'.
+mat3 turned_diagonal(const mat3 &R, const double v[3]) {
+  mat3 out;
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) {
+      out.m[i][j] = 0.0;
+      for (int k = 0; k < 3; k++) out.m[i][j] += R.m[i][k] * R.m[j][k] * v[k];
+    }
+  return out;
+}
+
+// Integral of exp(-t / tau) over dt: what a rate of 1 moves until then. tau 0: the rate stays.
+double reach_of(double tau_s, double dt_s) { return tau_s > 0.0 ? tau_s * (1.0 - exp(-dt_s / tau_s)) : dt_s; }
+
+// Variance of the integral of a rate's process noise, and its covariance with the rate at the end.
+// Random walk of density q: q dt^3/3 and q dt^2/2. Gauss-Markov process of sigma s, with e = exp(-dt / tau):
+// 2 s^2 tau (dt - 2 tau (1 - e) + tau (1 - e^2) / 2) and s^2 tau (1 - e)^2. Both pairs are positive for every dt.
+struct integrated_noise {
+  double variance, with_rate;
+};
+integrated_noise integrated_noise_of(const head_model &m, double dt_s) {
+  if (!(m.tau_s > 0.0)) return {square(m.walk) * dt_s * dt_s * dt_s / 3.0, 0.5 * square(m.walk) * dt_s * dt_s};
+  const double s2 = square(m.sigma), a = dt_s / m.tau_s, gone = 1.0 - exp(-a);
+  // Below a = 0.01 the closed form loses more digits than the series' left out terms are (a^2 / 10 of it).
+  const double sum = a < 0.01 ? a * a * a * (1.0 / 3 - 0.25 * a) : a - 2.0 * gone + 0.5 * gone * (2.0 - gone);
+  return {2.0 * s2 * square(m.tau_s) * sum, s2 * m.tau_s * square(gone)};
+}
+
+}  // namespace
+
+// The twist of a step in map axes; the states of velocity and rates fade on the way where they are Gauss-Markov.
+struct space_filter::step {
+  double dt_s;
+  vec3 turn;   // rotation vector of the step, body axes
+  mat3 mean;   // mean rotation on the way, body to map
+  vec3 way;    // in map axes
+  mat3 swing;  // skew(way)
+};
+
+// F's rows of the pose beside the identity, block by block: the derivative of the moved pose by `width` states.
+struct space_filter::transition {
+  static constexpr int kBlocks = 4;
+  struct block {
+    int state, width;
+    double by[kPose6][3];
+  } blocks[kBlocks];
+  int count = 0;
+
+  block &add(int state, int width) {
+    block &b = blocks[count++];
+    std::memset(&b, 0, sizeof b);
+    b.state = state;
+    b.width = width;
+    return b;
+  }
+  // Row i of F times the columns that `column` gives, without the identity's.
+  template <class Column>
+  double row_sum(int i, Column column) const {
+    double sum = column(i);
+    for (int b = 0; b < count; b++)
+      for (int k = 0; k < blocks[b].width; k++) sum += blocks[b].by[i][k] * column(blocks[b].state + k);
+    return sum;
+  }
+};
+
+space_filter::step space_filter::step_of(const body_stretch &s) const {
+  const bool has_rates = at_[kRates] >= 0;
+  const double reach_s = has_rates ? reach_of(models_[kRates].tau_s, s.dt_s) : s.dt_s;
+  const vec3 v = has_rates ? head3(kVelocity) : head1(kVelocityScale, 1.0) * s.v_mps;
+  const vec3 w = has_rates ? head3(kRates) : s.w_radps - head3(kRateBias);
+  step out;
+  out.dt_s = s.dt_s;
+  out.turn = reach_s * w;
+  out.mean = r_ * mean_turn(out.turn);
+  out.way = (has_rates ? reach_of(models_[kVelocity].tau_s, s.dt_s) : s.dt_s) * (out.mean * v);
+  out.swing = skew(out.way);
+  return out;
+}
+
+// dp' = dp - D x dr + ..., dr' = dr + ..., D the way in map axes: motion leaves the invariant error as it is, but for
+// noise and the sensors' states. Rates that are wrong by b in an even turn rotate the end by b dt, and displace it by
+// half of that times the way.
+void space_filter::transition_of(const step &s, const body_stretch &twist, transition *f) const {
+  add_block(f->add(kTurn, 3).by, kPlace, -1.0 * s.swing);
+  const auto add_turning = [&](int state, double reach_s) {
+    const mat3 turn = reach_s * s.mean;
+    transition::block &b = f->add(state, 3);
+    add_block(b.by, kTurn, turn);
+    add_block(b.by, kPlace, -0.5 * (s.swing * turn));
+  };
+  if (at_[kRates] >= 0) {
+    add_block(f->add(at_[kVelocity], 3).by, kPlace, reach_of(models_[kVelocity].tau_s, s.dt_s) * s.mean);
+    add_turning(at_[kRates], reach_of(models_[kRates].tau_s, s.dt_s));
+    return;
+  }
+  if (at_[kRateBias] >= 0) add_turning(at_[kRateBias], -s.dt_s);
+  if (at_[kVelocityScale] >= 0) {
+    const vec3 by = s.dt_s * (s.mean * twist.v_mps);
+    transition::block &b = f->add(at_[kVelocityScale], 1);
+    for (int i = 0; i < 3; i++) b.by[kPlace + i][0] = by[i];
+  }
+}
+
+// P' = F P F' of the head: the pose and the states that move it.
+void space_filter::transform_head(const transition &f) {
+  double *P = p();
+  const int head = first_point_;
+  double old_rows[kPose6][kHeadMax], new_rows[kPose6][kHeadMax];
+  for (int i = 0; i < kPose6; i++)
+    for (int j = 0; j < head; j++) old_rows[i][j] = entry(P, i, j, stride_);
+  for (int i = 0; i < kPose6; i++)
+    for (int j = 0; j < head; j++)
+      new_rows[i][j] = f.row_sum(i, [&](int k) { return k < kPose6 ? old_rows[k][j] : entry(P, k, j, stride_); });
+  for (int i = 0; i < kPose6; i++) {
+    for (int j = i; j < kPose6; j++) P[i * stride_ + j] = f.row_sum(j, [&](int k) { return new_rows[i][k]; });
+    for (int j = kPose6; j < head; j++) P[i * stride_ + j] = new_rows[i][j];
+  }
+}
+
+// The same of the pose with the points. Rows of the place come first: those of the rotation are still the old ones.
+void space_filter::transform_points(const transition &f) {
+  const int head = first_point_;
+  if (n_ <= head) return;
+  double *P = p();
+  const int from = head & ~1, width = even(n_) - from;
+  double keep[kPose6] = {};  // of an odd head the last column comes along, which is done already
+  for (int i = 0; i < kPose6; i++) keep[i] = P[i * stride_ + from];
+  for (int i = 0; i < kPose6; i++)
+    for (int b = 0; b < f.count; b++)
+      for (int k = 0; k < f.blocks[b].width; k++)
+        if (const double by = f.blocks[b].by[i][k]; by != 0.0)
+          vectors::add_scaled(P + i * stride_ + from, P + (f.blocks[b].state + k) * stride_ + from, by, width);
+  if (from < head)
+    for (int i = 0; i < kPose6; i++) P[i * stride_ + from] = keep[i];
+}
+
+// White noise along the step: a rotation error made evenly on the way displaces the end by half the way on average,
+// with a third of its square.
+void space_filter::add_motion_noise(const step &s, const body_stretch &twist) {
+  double *P = p();
+  const mat3 place = turned_diagonal(s.mean, twist.place_m2), turn = turned_diagonal(s.mean, twist.turn_rad2);
+  const mat3 cross_noise = -0.5 * (s.swing * turn);
+  const mat3 lever_noise = (1.0 / 3) * (s.swing * (turn * transposed(s.swing)));
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) {
+      if (i <= j) P[i * stride_ + j] += place.m[i][j] + lever_noise.m[i][j];
+      if (i <= j) P[(kTurn + i) * stride_ + kTurn + j] += turn.m[i][j];
+      P[i * stride_ + kTurn + j] += cross_noise.m[i][j];
+    }
+}
+
+void space_filter::propagate(const body_stretch &twist) {
+  settle();
+  if (!(twist.dt_s > 0.0)) return;
+  const double place_before = pose_variance(kPlace), turn_before = pose_variance(kTurn);
+  const step s = step_of(twist);
+  transition f;
+  transition_of(s, twist, &f);
+  transform_head(f);
+  transform_points(f);
+  add_motion_noise(s, twist);
+  walk(s.dt_s);
+  if (at_[kRates] >= 0) {
+    add_integrated_noise(kVelocity, kPlace, s);
+    add_integrated_noise(kRates, kTurn, s);
+  }
+  bound_pose(kPlace, 3.0 * square(kUnknownPlace_m), place_before);
+  bound_pose(kTurn, 3.0 * square(kUnknownTurn_rad), turn_before);
+  pose_.p = pose_.p + s.way;
+  pose_.q = normalized(pose_.q * turn_by(s.turn));
+  r_ = matrix_of(pose_.q);
+}
+
+double space_filter::pose_variance(int state) const {
+  return variance(state) + variance(state + 1) + variance(state + 2);
+}
+
+// The sum of three variances grows to `limit` at most, that of an unknown pose; a start less certain keeps its own.
+// P' = D P D scales the three rows and columns alike, and so stays positive.
+void space_filter::bound_pose(int state, double limit, double before) {
+  if (before > limit) limit = before;
+  const double now = pose_variance(state);
+  if (!(now > limit)) return;
+  const double scale = std::sqrt(limit / now);
+  for (int i = state; i < state + 3; i++) {
+    for (int j = 0; j <= i; j++) p()[j * stride_ + i] *= scale;
+    for (int j = i; j < n_; j++) p()[i * stride_ + j] *= scale;
+  }
+}
+
+void space_filter::add_integrated_noise(int which, int into, const step &s) {
+  const integrated_noise noise = integrated_noise_of(models_[which], s.dt_s);
+  double *P = p();
+  for (int i = 0; i < 3; i++) {
+    P[(into + i) * stride_ + into + i] += noise.variance;
+    for (int j = 0; j < 3; j++) P[(into + i) * stride_ + at_[which] + j] += noise.with_rate * s.mean.m[i][j];
+  }
+}
+
+void space_filter::walk(double dt_s) {
+  double *P = p();
+  for (int k = 0; k < kHeadStates; k++) {
+    if (at_[k] < 0) continue;
+    const bool fades = models_[k].tau_s > 0.0;
+    const double left = fades ? exp(-dt_s / models_[k].tau_s) : 1.0;
+    const double added = fades ? (1.0 - left * left) * square(models_[k].sigma) : square(models_[k].walk) * dt_s;
+    for (int i = at_[k]; i < at_[k] + kHeadWidth[k]; i++) {
+      if (fades) {
+        for (int j = 0; j < i; j++) P[j * stride_ + i] *= left;
+        P[i * stride_ + i] *= left * left;
+        for (int j = i + 1; j < n_; j++) P[i * stride_ + j] *= left;
+        head_[i] = kNeutral[k] + left * (head_[i] - kNeutral[k]);
+      }
+      P[i * stride_ + i] += added;
+    }
+  }
+}
+
+}  // namespace wm

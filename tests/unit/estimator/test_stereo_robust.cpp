@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+// stereo_ekf under bad inputs: pauses, wrong matches, data that no sensor can mean.
+#include "filters/stereo_ekf/params.h"
+#include "stereo_scene.hpp"
+
+void setUp(void) {}
+void tearDown(void) {}
+
+// Sensors off for minutes to weeks: the covariance stays positive and bounded, and known points find the pose again.
+void test_long_pauses_leave_a_sound_covariance(void) {
+  struct {
+    int prediction;
+    double tau_s;
+  } const kinds[] = {{WM_PREDICT_TWIST, 0.0}, {WM_PREDICT_CONSTANT_VELOCITY, 0.0}, {WM_PREDICT_CONSTANT_VELOCITY, 0.5}};
+  for (const auto &kind : kinds)
+    for (const double pause_s : {60.0, 1800.0, 2400.0, 1e6}) {
+      scene s;
+      s.set("prediction", kind.prediction);
+      s.set("constant_velocity.tau_s", kind.tau_s);
+      s.set("slam.points", 30);
+      s.set("states.velocity_scale_sigma", 0.02);
+      s.set("states.rate_bias_sigma_radps", 0.005);
+      s.set("states.time_offset_sigma_s", 0.02);
+      s.begin();
+      for (int i = 0; i < 20; i++) {
+        s.swim(0.1, {0.3, 0, 0}, {0, 0, 0.3});
+        s.look();
+      }
+      s.t_s += pause_s;
+      s.truth = {{0.2, 0.1, 0}, turn_by({0, 0, 1.0})};
+      for (int i = 0; i < 40; i++) {
+        s.swim(0.1, {0.3, 0, 0}, {0, 0, 0.3});
+        assert_sound(s.estimate());
+        // At most an unknown pose: 1000 m and 1.8 rad on each axis.
+        TEST_ASSERT_LESS_THAN_DOUBLE(3.001e6, s.estimate().covariance[wm_cov_index(0, 0)]);
+        TEST_ASSERT_LESS_THAN_DOUBLE(9.8, s.estimate().covariance[wm_cov_index(5, 5)]);
+        s.look();
+        assert_sound(s.estimate());
+      }
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.05, s.place_error());
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.02, s.turn_error());
+    }
+}
+
+void test_a_wrong_match_is_refused_and_one_picture_is_enough(void) {
+  scene s;
+  s.begin();
+  for (int i = 0; i < 5; i++) {
+    s.look();
+    s.swim(0.1, {0.1, 0, 0}, {0, 0, 0.1});
+  }
+  s.look();
+  double px[4];
+  const wm_landmark *shown = nullptr;
+  for (const wm_landmark &l : s.points)
+    if (s.pixels(l, px)) shown = &l;
+  TEST_ASSERT_NOT_NULL(shown);
+  s.pixels(*shown, px);
+  const wm_estimate before = s.estimate();
+  wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];
+  px[3] += 15;  // the rows disagree
+  wm_event e = s.seen(*shown, px);
+  s.take(e, records);
+  for (int k = 0; k < 4; k++) TEST_ASSERT_EQUAL(WM_REJECTED_GATE, records[k].verdict);
+  TEST_ASSERT_EQUAL_MEMORY(
+      &before,
+      [&] {
+        static wm_estimate after;
+        after = s.estimate();
+        return &after;
+      }(),
+      sizeof before);
+  s.pixels(*shown, px);
+  e = s.seen(*shown, px);
+  e.as.stereo.right_px[0] = e.as.stereo.right_px[1] = kAbsent;
+  TEST_ASSERT_EQUAL(WM_OK, s.take(e, records));
+  TEST_ASSERT_EQUAL(WM_FUSED, records[1].verdict);
+  TEST_ASSERT_LESS_THAN_DOUBLE(before.covariance[7], s.estimate().covariance[7]);
+}
+
+// Whatever is refused leaves one record with the reason; nothing else changes.
+void test_each_refused_datum_leaves_a_record(void) {
+  scene s;
+  s.begin();
+  s.swim(0.1, {0, 0, 0}, {0, 0, 0});
+  std::vector<wm_event> bad;
+  const auto stereo = [&](int32_t id, double u) {
+    wm_event e = make::empty(s.t_s, WM_EVENT_STEREO);
+    e.as.stereo = {id, {u, 200}, {280, 200}};
+    bad.push_back(e);
+  };
+  stereo(-1, 300);
+  stereo(1, 1e7);
+  stereo(1, HUGE_VAL);
+  stereo(1, kAbsent);
+  const auto sighting = [&](double bearing, double range, double sigma) {
+    wm_event e = make::empty(s.t_s, WM_EVENT_SIGHTING);
+    e.as.sighting = {0, 1, bearing, range, sigma, sigma, kAbsent, kAbsent};
+    bad.push_back(e);
+  };
+  sighting(200, kAbsent, 0.1);
+  sighting(kAbsent, -1, 0.1);
+  sighting(kAbsent, 1e7, 0.1);
+  sighting(kAbsent, 3, -1);
+  sighting(kAbsent, HUGE_VAL, 0.1);
+  sighting(kAbsent, kAbsent, 0.1);
+  wm_event sensor = make::empty(s.t_s, WM_EVENT_SIGHTING);
+  sensor.as.sighting = {9, 1, 0.1, 3, kAbsent, kAbsent, kAbsent, kAbsent};
+  bad.push_back(sensor);
+  const auto position = [&](double x, double sigma) {
+    wm_event e = make::empty(s.t_s, WM_EVENT_POSITION);
+    e.as.position = {{x, 0, 0}, sigma, 1};
+    bad.push_back(e);
+  };
+  position(2e7, 1);
+  position(1, 0);
+  position(kAbsent, 1);
+  bad.push_back(make::heading(s.t_s, 200, 0.1));
+  bad.push_back(make::heading(s.t_s, 1, -1));
+  bad.push_back(make::heading(s.t_s, kAbsent, 0.1));
+  const wm_estimate before = s.estimate();
+  for (const wm_event &e : bad) {
+    wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX] = {};
+    size_t count = 0;
+    const wm_status status = s.ekf->correct(s.state, &e, records, WM_INNOVATIONS_PER_EVENT_MAX, &count);
+    TEST_ASSERT_TRUE(status == WM_NOT_FINITE || status == WM_OUT_OF_RANGE);
+    TEST_ASSERT_EQUAL(1, count);
+    TEST_ASSERT_EQUAL(status == WM_NOT_FINITE ? WM_REJECTED_NOT_FINITE : WM_REJECTED_OUT_OF_RANGE, records[0].verdict);
+    TEST_ASSERT_EQUAL(e.t_ns, records[0].t_ns);
+  }
+  const wm_estimate after = s.estimate();
+  TEST_ASSERT_EQUAL_MEMORY(&before, &after, sizeof before);
+}
+
+void test_nonsense_in_pixels_is_refused(void) {
+  scene s;
+  s.set("slam.points", 10);
+  s.begin();
+  s.look();
+  s.swim(0.1, {0, 0, 0}, {0, 0, 0});
+  std::vector<char> before(static_cast<char *>(s.state), static_cast<char *>(s.state) + s.bytes);
+  const double bad[][4] = {{kAbsent, kAbsent, kAbsent, kAbsent},
+                           {kAbsent, 1, 2, 3},
+                           {1, 2, 3, kAbsent},
+                           {HUGE_VAL, 1, 2, 3},
+                           {1, 2, 1e9, 3}};
+  for (const auto &px : bad) {
+    const wm_event e = s.seen(s.points[0], px);
+    TEST_ASSERT_EQUAL(px[2] == 1e9 ? WM_OUT_OF_RANGE : WM_NOT_FINITE, s.take(e));
+    TEST_ASSERT_EQUAL_MEMORY(before.data(), s.state, s.bytes);
+  }
+  wm_event e = s.seen(s.points[0], bad[4]);
+  e.as.stereo.right_px[0] = 2;
+  e.as.stereo.id = -1;
+  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, s.take(e));
+  TEST_ASSERT_EQUAL_MEMORY(before.data(), s.state, s.bytes);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_long_pauses_leave_a_sound_covariance);
+  RUN_TEST(test_a_wrong_match_is_refused_and_one_picture_is_enough);
+  RUN_TEST(test_each_refused_datum_leaves_a_record);
+  RUN_TEST(test_nonsense_in_pixels_is_refused);
+  return UNITY_END();
+}
