@@ -9,9 +9,7 @@
 namespace wm {
 namespace {
 
-// No land robot does these; what exceeds them is a decoding fault, and refused.
-constexpr double kMaxSpeed = 150.0;    // m/s
-constexpr double kMaxRate = 50.0;      // rad/s
+// Beyond these, as beyond kSpeedMost_mps and kRateMost_radps, a value is a decoding fault.
 constexpr double kMaxAngle = 200.0;    // rad, of a steering wheel
 constexpr double kMaxActuator = 10.0;  // m
 constexpr double kMaxTicks = 1e15;     // doubles still count singly there
@@ -24,17 +22,26 @@ constexpr double kYawStuckRate = 0.1;       // rad/s, that turning
 constexpr double kDrivingSpeed = 0.5;       // m/s, for these rules
 constexpr double kDeadEncoderCar_m = 1.0;   // a car's inner wheel never rests while the outer drives so far
 constexpr double kDeadEncoderTurns = 1.0;   // a differential robot may pivot about one wheel, but not on and on
+// A message whose counter skips n frames comes after n + 1 periods. Earlier than this fraction of them, its counter is
+// wrong, and so may be the rest of it. Halfway between the stamps of one lost frame and of none.
+constexpr double kSkipFraction = 0.75;
+constexpr double kShowRefusal_s = 5.0;  // longer than the health message's period
+
+constexpr uint32_t bit(int slot) { return UINT32_C(1) << slot; }
+constexpr uint32_t kCountSlots = bit(WM_Q_WHEEL_TICKS_LEFT) | bit(WM_Q_WHEEL_TICKS_RIGHT);
+
+bool is_speed(int id) { return id >= WM_Q_WHEEL_SPEED_FRONT_LEFT && id <= WM_Q_VEHICLE_SPEED; }
 
 double limit_of(int quantity) {
   switch (quantity) {
     case WM_Q_WHEEL_TICKS_LEFT:
     case WM_Q_WHEEL_TICKS_RIGHT: return kMaxTicks;
-    case WM_Q_YAW_RATE: return kMaxRate;
+    case WM_Q_YAW_RATE: return kRateMost_radps;
     case WM_Q_STEERING_WHEEL:
     case WM_Q_ROAD_WHEEL: return kMaxAngle;
     case WM_Q_STEERING_ACTUATOR: return kMaxActuator;
     case WM_Q_GEAR: return 1.0;
-    default: return kMaxSpeed;
+    default: return kSpeedMost_mps;
   }
 }
 
@@ -51,7 +58,9 @@ void motion_front_end::init(const wm_motion_params *params, const wm_wheels *whe
   wheels_ = *wheels;
   hold_max_ns_ = wm_ns_from_seconds(params->hold_max_s);
   now_ns_ = newest_ns_ = fed_ns_ = still_since_ns_ = yaw_same_since_ns_ = WM_TIME_NONE;
+  refused_since_ns_ = last_refusal_ns_ = WM_TIME_NONE;
   for (wm_time_ns &stamp : stamp_ns_) stamp = WM_TIME_NONE;
+  for (wm_time_ns &stamp : message_ns_) stamp = WM_TIME_NONE;
   for (tick_wheel &wheel : wheel_) wheel.t_ns = WM_TIME_NONE;
 }
 
@@ -67,13 +76,13 @@ wm_status motion_front_end::check(const wm_event &event) const {
       break;
     }
     case WM_EVENT_TWIST2:
-      status = check_value(event.as.twist2.v_mps, kMaxSpeed);
-      if (status == WM_OK) status = check_value(event.as.twist2.w_radps, kMaxRate);
+      status = check_value(event.as.twist2.v_mps, kSpeedMost_mps);
+      if (status == WM_OK) status = check_value(event.as.twist2.w_radps, kRateMost_radps);
       break;
     case WM_EVENT_TWIST6:
       for (int i = 0; i < 3 && status == WM_OK; i++) {
-        status = check_value(event.as.twist6.v_mps[i], kMaxSpeed);
-        if (status == WM_OK) status = check_value(event.as.twist6.w_radps[i], kMaxRate);
+        status = check_value(event.as.twist6.v_mps[i], kSpeedMost_mps);
+        if (status == WM_OK) status = check_value(event.as.twist6.w_radps[i], kRateMost_radps);
       }
       break;
     default: return WM_UNSUPPORTED;
@@ -96,9 +105,17 @@ void motion_front_end::feed(const wm_event &event) {
   const double w = driven_rate(v, planar ? event.as.twist2.w_radps : event.as.twist6.w_radps[2]);
   choose_model(true);
   if (model_ != WM_MOTION_TWIST) return;
-  watch_standstill(event.t_ns,
-                   std::fabs(v) < params_->standstill_speed_mps && std::fabs(w) < params_->standstill_yaw_rate_radps);
-  push_input(event.t_ns, v, w, false, false);
+  const bool speed = is_plausible_level(kTwistSpeed, event.t_ns, v),
+             rate = is_plausible_level(kTwistRate, event.t_ns, w);
+  note_plausibility(event.t_ns, bit(kTwistSpeed), speed);
+  note_plausibility(event.t_ns, bit(kTwistRate), rate);
+  watch_standstill(event.t_ns, speed && rate && std::fabs(v) < params_->standstill_speed_mps &&
+                                   std::fabs(w) < params_->standstill_yaw_rate_radps);
+  const motion_input held = history_.empty() ? motion_input{} : history_.newest();
+  if (speed && rate)
+    push_input(event.t_ns, v, w, false, false);
+  else
+    push_input(event.t_ns, held.a, held.b, true, false);
 }
 
 // What a drive makes of a commanded turn rate that takes speed and radius, and radii up to a largest one.
@@ -113,8 +130,9 @@ double motion_front_end::driven_rate(double v_mps, double w_radps) const {
 
 void motion_front_end::take_quantities(const wm_event &event) {
   const wm_quantities &q = event.as.quantities;
-  const bool doubt = (q.doubt & WM_DOUBT_FROZEN_COUNTER) != 0;
-  health_ = doubt ? health_ | WM_MOTION_HEALTH_COUNTER_FROZEN : health_ & ~WM_MOTION_HEALTH_COUNTER_FROZEN;
+  const bool frozen = (q.doubt & WM_DOUBT_FROZEN_COUNTER) != 0;
+  health_ = frozen ? health_ | WM_MOTION_HEALTH_COUNTER_FROZEN : health_ & ~WM_MOTION_HEALTH_COUNTER_FROZEN;
+  const bool doubt = frozen || !is_plausible(q, event.t_ns);
   uint32_t fresh = 0;
   for (int i = 0; i < q.count; i++) {
     const int id = q.id[i];
@@ -133,7 +151,7 @@ void motion_front_end::take_quantities(const wm_event &event) {
   if (ticks && !doubt) watch_encoders();
 
   if (model_ == WM_MOTION_TICKS) {
-    if (ticks) push_ticks(event.t_ns, doubt);
+    if (ticks) push_ticks(event.t_ns, frozen, doubt);
     return;
   }
   double v = 0.0;
@@ -142,12 +160,90 @@ void motion_front_end::take_quantities(const wm_event &event) {
   if (model_ == WM_MOTION_SPEED_YAW_RATE && (speed || rate)) {
     watch_yaw_rate(event.t_ns, v, rate && !doubt);
     yaw_fresh_ = rate && !doubt && still;
-    const bool unsure = doubt || silent(WM_Q_YAW_RATE, event.t_ns) || (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK);
+    const bool unsure = frozen || silent(WM_Q_YAW_RATE, event.t_ns) || (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK);
     push_input(event.t_ns, v, value_[WM_Q_YAW_RATE], unsure, doubt);
   } else if (model_ == WM_MOTION_ACKERMANN && (speed || steering)) {
     double angle = 0.0;
-    if (read_road_wheel(&angle)) push_input(event.t_ns, v, angle, doubt, doubt);
+    if (read_road_wheel(&angle)) push_input(event.t_ns, v, angle, frozen, doubt);
   }
+}
+
+// Whether a message's values are plausible after those before them, and its counter against its stamp.
+bool motion_front_end::is_plausible(const wm_quantities &q, wm_time_ns t_ns) {
+  const bool wrong_counter = counter_is_wrong(q, t_ns);
+  bool plausible = !wrong_counter;
+  uint32_t slots = 0;
+  for (int i = 0; i < q.count; i++) {
+    const int id = q.id[i];
+    const bool count = id == WM_Q_WHEEL_TICKS_LEFT || id == WM_Q_WHEEL_TICKS_RIGHT;
+    note_period(id, t_ns, q.lost_before + 1);
+    if (!count && !is_speed(id) && id != WM_Q_YAW_RATE) continue;
+    slots |= bit(id);
+    if (wrong_counter) continue;
+    plausible &= count ? is_plausible_count(id, t_ns, q.value[i]) : is_plausible_level(id, t_ns, q.value[i]);
+  }
+  note_plausibility(t_ns, slots, plausible);
+  return plausible;
+}
+
+bool motion_front_end::counter_is_wrong(const wm_quantities &q, wm_time_ns t_ns) const {
+  if (q.lost_before == 0) return false;
+  for (int i = 0; i < q.count; i++) {
+    const int id = q.id[i];
+    if (message_ns_[id] == WM_TIME_NONE || !(period_s_[id] > 0.0)) continue;
+    const double due_s = kSkipFraction * (q.lost_before + 1) * period_s_[id];
+    if (wm_seconds_between(message_ns_[id], t_ns) < due_s) return true;
+  }
+  return false;
+}
+
+void motion_front_end::note_period(int id, wm_time_ns t_ns, int frames) {
+  const wm_time_ns last_ns = message_ns_[id];
+  message_ns_[id] = t_ns;
+  if (last_ns == WM_TIME_NONE) return;
+  double &period_s = period_s_[id];
+  const double each_s = wm_seconds_between(last_ns, t_ns) / frames;
+  const double counted_s = period_s > 0.0 && each_s > 2.0 * period_s ? 2.0 * period_s : each_s;
+  period_s += period_s > 0.0 ? kPeriodGain * (counted_s - period_s) : counted_s;
+}
+
+bool motion_front_end::is_plausible_count(int side, wm_time_ns t_ns, double count) {
+  const double tick_m = kTwoPi * wheels_.radius_m / wheels_.ticks_per_turn;
+  if (!(params_->limits_mps2 > 0.0) || !finite(tick_m)) return true;
+  const plausibility verdict =
+      check_[side].check_position(t_ns, count * tick_m, params_->limits_mps2, wheel_[side].period_s, tick_m);
+  if (verdict == plausibility::new_run) wheel_[side].is_new_run = true;
+  return verdict != plausibility::refused;
+}
+
+bool motion_front_end::is_plausible_level(int slot, wm_time_ns t_ns, double value) {
+  const bool turn = slot == WM_Q_YAW_RATE || slot == kTwistRate;
+  const double per_s = turn ? params_->limits_radps2 : params_->limits_mps2;
+  if (!(per_s > 0.0)) return true;
+  return check_[slot].check_level(t_ns, value, turn ? kRateStep_radps : kSpeedStep_mps, per_s) != plausibility::refused;
+}
+
+void motion_front_end::note_plausibility(wm_time_ns t_ns, uint32_t slots, bool plausible) {
+  // A sensor that fell silent after a refusal is no longer refused, but silent.
+  if (last_refusal_ns_ != WM_TIME_NONE && t_ns - last_refusal_ns_ > hold_max_ns_) refused_slots_ = 0;
+  if (!plausible) {
+    if (refused_slots_ == 0) refused_since_ns_ = newest_ns_ == WM_TIME_NONE ? t_ns : newest_ns_;
+    refused_slots_ |= slots;
+    last_refusal_ns_ = t_ns;
+    health_ |= WM_MOTION_HEALTH_IMPLAUSIBLE;
+    return;
+  }
+  refused_slots_ &= ~slots;
+  if ((health_ & WM_MOTION_HEALTH_IMPLAUSIBLE) && wm_seconds_between(last_refusal_ns_, t_ns) > kShowRefusal_s)
+    health_ &= ~WM_MOTION_HEALTH_IMPLAUSIBLE;
+}
+
+void motion_front_end::mark_refused(motion_input *input) const {
+  if (refused_slots_ == 0) return;
+  const uint32_t turn = bit(WM_Q_YAW_RATE) | bit(kTwistRate) | (model_ == WM_MOTION_TICKS ? kCountSlots : 0);
+  const uint32_t speed = ~(bit(WM_Q_YAW_RATE) | bit(kTwistRate));
+  input->refused = (uint8_t)((refused_slots_ & speed ? kRefusedSpeed : 0) | (refused_slots_ & turn ? kRefusedTurn : 0));
+  input->refused_s = wm_seconds_between(refused_since_ns_, input->t_ns);
 }
 
 // The best model that the quantities seen so far allow, or the one that the config names.
@@ -248,7 +344,8 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.b = b;
   input.model = model_;
   input.doubtful = doubtful;
-  input.standing = still_since_ns_ != WM_TIME_NONE && !doubtful &&
+  mark_refused(&input);
+  input.standing = still_since_ns_ != WM_TIME_NONE && !doubtful && !input.refused &&
                    wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
   if (ticks_drive()) {
     // The stretch that ends here gets what the counts say, before the last speed carries on.
@@ -372,12 +469,14 @@ void motion_front_end::take_count(int side, wm_time_ns t_ns, double count) {
   double way = (count - wheel.ticks) * metres_per_tick;
   wheel.ticks = count;
   wheel.t_ns = t_ns;
-  if (way < 0.0) wheel.is_signed = true;
+  if (way < 0.0 && !wheel.is_new_run) wheel.is_signed = true;
   way = by_gear(way, wheel.is_signed);
   // A count that was late and the next one right behind it: their stamps tell nothing of the speed between them.
   const bool hasty = dt < 0.5 * wheel.period_s;
   const double least_s = hasty ? wheel.period_s : dt;
-  if (!(std::fabs(way) <= kMaxSpeed * least_s)) way = wheel.speed_mps * dt;  // the counter began anew: go on as before
+  // The counter began anew: go on as before.
+  if (wheel.is_new_run || !(std::fabs(way) <= kSpeedMost_mps * least_s)) way = wheel.speed_mps * dt;
+  wheel.is_new_run = false;
   const uint32_t dead = side == 0 ? WM_MOTION_HEALTH_ENCODER_LEFT_DEAD : WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD;
   if (way != 0.0 && (health_ & dead)) wheel.integrated_m = wheel.position_m;  // what it missed, the other one told
   const double from_m = wheel.position_m;
@@ -411,7 +510,7 @@ void motion_front_end::watch_encoders() {
 
 // The stretch that ends here gets what the counts say; from here on the last speeds carry on. A dead encoder's wheel is
 // taken to go with the other one, and the turn is not to be believed.
-void motion_front_end::push_ticks(wm_time_ns t_ns, bool doubtful) {
+void motion_front_end::push_ticks(wm_time_ns t_ns, bool doubtful, bool miscounted) {
   const double dt = wm_seconds_between(now_ns_, t_ns);
   forget_silent_way(t_ns, dt);
   const bool dead[2] = {(health_ & WM_MOTION_HEALTH_ENCODER_LEFT_DEAD) != 0,
@@ -420,7 +519,7 @@ void motion_front_end::push_ticks(wm_time_ns t_ns, bool doubtful) {
   double done_mps[2], next_mps[2];
   for (int side = 0; side < 2; side++) {
     const tick_wheel &wheel = wheel_[side];
-    const bool counted = wheel.t_ns == t_ns && dt > 0.0 && !doubtful;
+    const bool counted = wheel.t_ns == t_ns && dt > 0.0 && !miscounted;
     done_mps[side] = counted ? (wheel.position_m - wheel.integrated_m) / dt : wheel.speed_mps;
     next_mps[side] = wheel.speed_mps;
   }
@@ -434,11 +533,12 @@ void motion_front_end::push_ticks(wm_time_ns t_ns, bool doubtful) {
   next.b = next_mps[1];
   next.model = model_;
   next.doubtful = doubtful || dead[0] || dead[1];
+  mark_refused(&next);
   done = next;
   done.t_ns = now_ns_;
   done.a = done_mps[0];
   done.b = done_mps[1];
-  done.counted = wheel_[0].t_ns == t_ns && wheel_[1].t_ns == t_ns && !doubtful;
+  done.counted = wheel_[0].t_ns == t_ns && wheel_[1].t_ns == t_ns && !miscounted;
   if (dt > 0.0) history_.push(done);
   history_.push(next);
   newest_ns_ = t_ns;

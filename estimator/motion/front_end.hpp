@@ -5,6 +5,7 @@
 #define WAYMARK_ESTIMATOR_MOTION_FRONT_END_HPP
 
 #include "motion/history.hpp"
+#include "motion/plausibility.hpp"
 #include "motion/step.hpp"
 #include "motion/wheel.hpp"
 #include "waymark/status.h"
@@ -42,6 +43,7 @@ class motion_front_end {
       const motion_twist twist = twist_of(stretch.input, calibration, wheels_);
       motion_noise noise = noise_of(stretch.input, twist, stretch.dt_s, *params_, wheels_, calibration);
       add_silence(stretch, *params_, ticks_drive() && stretch.has_next, &noise);
+      add_refused(stretch, *params_, &noise);
       add_change(stretch, *params_, &noise);
       visit(stretch, twist, noise);
     });
@@ -74,9 +76,17 @@ class motion_front_end {
   bool standstill_yaw_rate(double *yaw_rate_radps) const;
 
  private:
+  enum { kTwistSpeed = WM_Q_COUNT, kTwistRate, kSlots };  // of check_: a slot for each quantity and these
   enum speed_source : uint8_t { kNone, kFrontWheels, kVehicleSpeed, kTicksMean, kRearWheels };
 
   void take_quantities(const wm_event &event);
+  bool is_plausible(const wm_quantities &q, wm_time_ns t_ns);
+  bool counter_is_wrong(const wm_quantities &q, wm_time_ns t_ns) const;
+  bool is_plausible_count(int side, wm_time_ns t_ns, double count);
+  bool is_plausible_level(int slot, wm_time_ns t_ns, double value);
+  void note_period(int id, wm_time_ns t_ns, int frames);
+  void note_plausibility(wm_time_ns t_ns, uint32_t slots, bool plausible);
+  void mark_refused(motion_input *input) const;
   void take_count(int side, wm_time_ns t_ns, double count);
   void choose_model(bool twist);
   void watch_encoders();
@@ -87,7 +97,7 @@ class motion_front_end {
   bool read_other_turn_rate(double speed_mps, double *rate_radps) const;
   double counted_turn_rate() const;
   void push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted);
-  void push_ticks(wm_time_ns t_ns, bool doubtful);
+  void push_ticks(wm_time_ns t_ns, bool doubtful, bool miscounted);
   void hand_out_ticks(const motion_stretch &piece);
   void forget_silent_way(wm_time_ns t_ns, double dt_s);
   bool counts_ticks() const;                               // both wheels, and what a tick is worth
@@ -107,7 +117,11 @@ class motion_front_end {
   wm_time_ns fed_ns_;     // newest event of motion
   motion_history history_;
   double value_[WM_Q_COUNT];
-  wm_time_ns stamp_ns_[WM_Q_COUNT];
+  wm_time_ns stamp_ns_[WM_Q_COUNT], message_ns_[WM_Q_COUNT];  // newest accepted value; newest message
+  double period_s_[WM_Q_COUNT];  // usual time between two messages with that quantity; 0: unknown
+  sample_check check_[kSlots];
+  uint32_t refused_slots_;  // of check_: the last sample was refused
+  wm_time_ns refused_since_ns_, last_refusal_ns_;
   tick_wheel wheel_[2];
   wm_time_ns still_since_ns_;  // speed below the threshold since; WM_TIME_NONE while moving
   wm_time_ns yaw_same_since_ns_;

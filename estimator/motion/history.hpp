@@ -11,6 +11,8 @@
 
 namespace wm {
 
+enum refused_bits : uint8_t { kRefusedSpeed = 1, kRefusedTurn = 2 };
+
 // A raw input; a and b mean, by model: ticks: speed of the left and the right wheel (m/s); speed_yaw_rate and twist:
 // speed (m/s) and turn rate (rad/s); ackermann: speed (m/s) and road wheel angle (rad).
 struct motion_input {
@@ -21,6 +23,8 @@ struct motion_input {
   uint8_t doubtful;  // not to be believed: frozen counter, dead encoder
   uint8_t stale;     // set by the walk over the history: held for longer than hold_max
   uint8_t counted;   // counts that came at its end say what it was: true until then, however long
+  uint8_t refused;   // kRefusedSpeed, kRefusedTurn: samples of it are refused, and this is the last plausible one
+  double refused_s;  // at t_ns: for how long
 };
 
 // One piece of an interval of time over which one input holds.
@@ -30,6 +34,7 @@ struct motion_stretch {
   double changed[2];  // at its beginning: by how much the input's a and b differ from the one before
   double silent_s;    // at its beginning: for how long the next input has been overdue; below 0: it isn't
   double unknown_s;   // at its beginning: for how long the input has been held for too long; 0: it isn't
+  double refused_s;   // at its beginning: for how long samples have been refused; only where input.refused
   bool has_next;      // a later input has come
   bool first, last;   // of the interval: their length depends on the lag
 };
@@ -78,6 +83,7 @@ class motion_history {
         if (!piece.input.stale && end > held_until) end = held_until;
         if (piece.input.counted) piece.input.stale = 0;  // the way is known, however long it took
         piece.silent_s = wm_seconds_between(piece.input.t_ns, begin) - due_s(next, oldest);
+        piece.refused_s = piece.input.refused_s + wm_seconds_between(piece.input.t_ns, begin);
         piece.unknown_s = begin > held_until ? wm_seconds_between(held_until, begin) : 0.0;
         const bool begins = next > oldest + 1 && begin == piece.input.t_ns;
         piece.changed[0] = begins ? piece.input.a - at(next - 2).a : 0.0;
@@ -86,7 +92,7 @@ class motion_history {
         piece.input = motion_input{};
         piece.changed[0] = piece.changed[1] = 0.0;
         piece.silent_s = -1.0;
-        piece.unknown_s = 0.0;
+        piece.unknown_s = piece.refused_s = 0.0;
       }
       piece.has_next = next < count_;
       piece.dt_s = wm_seconds_between(begin, end);

@@ -48,6 +48,13 @@ static const wm_param kParams[] = {
         "A speed, rate or twist holds to the next of its kind, but no longer than this; then the motion is unknown, "
         "and sigma grows with the last speed, or with half of noise.hold_mps2 for so long, if that is more. Gaps of 1 "
         "s are seen on working robots."),
+    F64("limits.mps2", limits_mps2, 15.0, 0, 1000,
+        "m/s2. Largest plausible acceleration. A speed that changes by more than this allows and by 3 m/s besides, or "
+        "a "
+        "wheel's count that implies such a speed, is refused like a frozen counter's: the last plausible motion holds "
+        "and the noise grows. Tyres reach 10. 0: no limit."),
+    F64("limits.radps2", limits_radps2, 30.0, 0, 10000,
+        "rad/s2. As limits.mps2, for a turn rate, with a step of 6 rad/s. 0: no limit."),
     F64("commands.radius_max_m", commands_radius_max_m, 0.0, 0, 1000,
         "m. For twists that are commands: the drive takes a speed and a radius, and this is the largest that it "
         "knows; a wider turn that is asked for is driven with it, so that the gentlest is speed / radius. iRobot "

@@ -27,6 +27,7 @@ struct wm_motion_params {
   double standstill_after_s;
   double standstill_bias_sigma_radps;
   double hold_max_s;
+  double limits_mps2, limits_radps2;
   double commands_radius_max_m, commands_radius_overflow_m;
 };
 

@@ -111,7 +111,8 @@ motion_twist twist_of(const motion_input &input, const wm_motion_calibration &c,
 motion_noise noise_of(const motion_input &input, const motion_twist &twist, double dt_s, const wm_motion_params &p,
                       const wm_wheels &wheels, const wm_motion_calibration &c) {
   motion_noise n{};
-  const bool unknown = input.stale || input.doubtful || input.model == WM_MOTION_AUTO;
+  const bool doubtful = input.stale || input.doubtful || input.model == WM_MOTION_AUTO;
+  const bool unknown = doubtful || input.refused;
   if (input.model == WM_MOTION_TICKS && !unknown) {
     // Paper, system 2: by way, not by time. k^2 |d| instead of (k d)^2, so that it does not depend on the step's
     // length.
@@ -149,10 +150,11 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
     // The robot may go on as it did, or not: as unsure as the motion that was last believed is large.
     // That it went straight when it was last heard of doesn't say that it hasn't begun to turn.
     const double speed = std::fabs(input.a), rate = input.model == WM_MOTION_ACKERMANN ? 0.1 : std::fabs(input.b);
-    const bool any = input.model == WM_MOTION_TICKS || (input.stale && rate < kUnknownRate_radps);
+    const bool any = input.model == WM_MOTION_TICKS || input.refused || (input.stale && rate < kUnknownRate_radps);
     // Counted, the way is known, whatever the turn was. Stale: add_silence() has it.
-    if (!input.stale && !input.counted) n.way_m2 += square(speed) * dt_s;
-    n.turn_rad2 += square(any ? kUnknownRate_radps : rate) * dt_s;
+    if (!input.stale && !input.counted && (doubtful || (input.refused & kRefusedSpeed)))
+      n.way_m2 += square(speed) * dt_s;
+    if (doubtful || (input.refused & kRefusedTurn)) n.turn_rad2 += square(any ? kUnknownRate_radps : rate) * dt_s;
   }
   return n;
 }
@@ -187,6 +189,15 @@ void add_silence(const motion_stretch &stretch, const wm_motion_params &p, bool 
   const double way_m2 = square(stretch.input.a * stretch.dt_s);
   noise->side_m2 += way_m2 * least(turn_rad2 / 3.0, 0.5);
   noise->way_m2 += way_m2 * least(square(turn_rad2) / 8.0, 0.5);
+}
+
+void add_refused(const motion_stretch &stretch, const wm_motion_params &p, motion_noise *noise) {
+  if (!stretch.input.refused) return;
+  const double from_s = least(stretch.refused_s, p.hold_max_s);
+  const double to_s = least(stretch.refused_s + stretch.dt_s, p.hold_max_s);
+  const double grown_s4 = (square(square(to_s)) - square(square(from_s))) / 12.0;
+  if (stretch.input.refused & kRefusedSpeed) noise->way_m2 += square(p.limits_mps2) * grown_s4;
+  if (stretch.input.refused & kRefusedTurn) noise->turn_rad2 += square(p.limits_radps2) * grown_s4;
 }
 
 void add_change(const motion_stretch &stretch, const wm_motion_params &p, motion_noise *noise) {

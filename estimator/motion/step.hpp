@@ -54,6 +54,10 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
 // turn is unknown. `is_counted`: the wheels' counts have come since: they tell the way, of both wheels the turn, too.
 void add_silence(const motion_stretch &stretch, const wm_motion_params &params, bool is_counted, motion_noise *noise);
 
+// Noise while samples are refused as implausible: the robot may have accelerated at up to the limits, evenly
+// distributed, since the last plausible one: sigma = a t^2 / (2 sqrt 3), up to hold_max_s.
+void add_refused(const motion_stretch &stretch, const wm_motion_params &params, motion_noise *noise);
+
 // What a twist that changed leaves behind: when it was obeyed, and how, is unsure anew each time. Variances by how much
 // it changed, not by its square, so that a change in many small steps counts as one in a single step.
 void add_change(const motion_stretch &stretch, const wm_motion_params &params, motion_noise *noise);

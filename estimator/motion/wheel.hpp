@@ -17,8 +17,9 @@ struct tick_wheel {
   double period_s;       // usual time between two counts; 0 before the second
   wm_time_ns before_ns;  // of the count before the last, and the position there
   double before_m;
-  double still_m;  // way of the other wheel since this one's count last changed
-  bool is_signed;  // the counter was seen to go down
+  double still_m;   // way of the other wheel since this one's count last changed
+  bool is_signed;   // the counter was seen to go down
+  bool is_new_run;  // the next count goes on from elsewhere: the counter began anew
 
   void restart(wm_time_ns t, double count) {
     t_ns = t;

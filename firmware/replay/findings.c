@@ -83,7 +83,8 @@ static void about_motion(speaker *to, uint32_t bits) {
       "motion: the left encoder stood still while the robot moved (dead?)",
       "motion: the right encoder stood still while the robot moved (dead?)",
       "motion: a message's counter stood still: its sender is stuck; its values were not taken for standing still",
-      "motion: the yaw rate never changed (stuck sensor?)"};
+      "motion: the yaw rate never changed (stuck sensor?)",
+      "motion: samples were refused in the last seconds, since no robot accelerates so (motion.limits)"};
   for (unsigned i = 0; i < sizeof kLines / sizeof kLines[0]; i++)
     if ((bits >> i) & 1u) say(to, kLines[i]);
 }

@@ -44,6 +44,7 @@ const char *wm_motion_lacks(const wm_motion_params *params, const wm_wheels *whe
 #define WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD (1u << 1)
 #define WM_MOTION_HEALTH_COUNTER_FROZEN (1u << 2)
 #define WM_MOTION_HEALTH_YAW_RATE_STUCK (1u << 3)
+#define WM_MOTION_HEALTH_IMPLAUSIBLE (1u << 4)  // a sample was refused within the last 5 s (motion.limits)
 
 // What an estimator has learnt of the motion sensors; neutral is scales of 1, all else 0.
 typedef struct wm_motion_calibration {

@@ -57,7 +57,10 @@ void test_every_derivative_of_every_model(void) {
   for (int model : models) {
     wm_wheels w = make::car();
     w.encoder_offset_m = 0.4;
-    const wm::motion_input input = {0, 1.3, model == WM_MOTION_TICKS ? 1.1 : 0.2, (uint8_t)model, 0, 0, 0, 0};
+    wm::motion_input input{};
+    input.a = 1.3;
+    input.b = model == WM_MOTION_TICKS ? 1.1 : 0.2;
+    input.model = (uint8_t)model;
     const wm_motion_calibration c = {1.05, 0.93, 0.02, 1.02, 0.97, 1.04, 0.03, 0.1, 0.07};
     const wm::motion_twist t = wm::twist_of(input, c, w);
     TEST_ASSERT_GREATER_THAN(1, t.count);
@@ -374,6 +377,100 @@ void test_a_frozen_counter_is_doubt_not_standstill(void) {
   TEST_ASSERT_EQUAL_UINT32(0, front.health());
 }
 
+// GIVEN a car at 3 m/s WHEN 138 m/s come for 0.2 s THEN its speed holds, with noise of what it may have done meanwhile.
+void test_a_speed_that_no_robot_reaches_is_refused(void) {
+  start(make::no_wheels());
+  for (int i = 0; i <= 40; i++) feed(make::twist(0.025 * i, 3.0, 0.1));
+  TEST_ASSERT_EQUAL_UINT32(0, front.health());
+  const double before = way_var;
+  for (int i = 41; i <= 48; i++) feed(make::twist(0.025 * i, 138.0, 0.1));
+  TEST_ASSERT_EQUAL_UINT32(WM_MOTION_HEALTH_IMPLAUSIBLE, front.health());
+  for (int i = 49; i <= 80; i++) feed(make::twist(0.025 * i, 3.0, 0.1));
+  const wm::arc a = wm::make_arc(6.0, 0.2);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, a.x_m, pose.x_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.2, pose.heading_rad);
+  const double physical_m = 0.5 * 15.0 * 0.2 * 0.2 / std::sqrt(3.0);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(physical_m * physical_m, way_var - before);
+  TEST_ASSERT_LESS_THAN_DOUBLE(4.0, way_var - before);
+  for (int i = 81; i <= 300; i++) feed(make::twist(0.025 * i, 3.0, 0.1));
+  TEST_ASSERT_EQUAL_UINT32(0, front.health());
+}
+
+// GIVEN a first sample that is wrong, or a sensor that stays at another level WHEN more samples agree THEN they are
+// taken; with the limit off, at once.
+void test_samples_that_agree_replace_the_trusted_ones(void) {
+  start(make::no_wheels());
+  feed(make::twist(0.0, 138.0, 0.0));
+  for (int i = 1; i <= 3; i++) feed(make::twist(0.025 * i, 3.0, 0.0));
+  TEST_ASSERT_EQUAL_DOUBLE(3.0, front.twist_at(make::at(0.08), calibration).v);
+  for (int i = 4; i <= 80; i++) feed(make::twist(0.025 * i, 3.0, 0.0));
+  for (int i = 81; i <= 100; i++) feed(make::twist(0.025 * i, 30.0, 0.0));
+  TEST_ASSERT_EQUAL_DOUBLE(3.0, front.twist_at(make::at(2.5), calibration).v);
+  for (int i = 101; i <= 122; i++) feed(make::twist(0.025 * i, 30.0, 0.0));
+  TEST_ASSERT_EQUAL_DOUBLE(30.0, front.twist_at(make::at(3.06), calibration).v);
+  start(make::no_wheels());
+  params.limits_mps2 = 0.0;
+  feed(make::twist(0.0, 3.0, 0.0));
+  feed(make::twist(0.1, 30.0, 0.0));
+  TEST_ASSERT_EQUAL_DOUBLE(30.0, front.twist_at(make::at(0.1), calibration).v);
+}
+
+// GIVEN counts each 20 ms WHEN one message's are 0.7 m off THEN they are refused with noise, and nothing of the way is
+// lost; so, too, with a gyro. A jump of one wheel refuses the message's other one.
+void test_a_wrong_count_is_refused(void) {
+  for (bool gyro : {false, true}) {
+    start(make::two_wheels());
+    const double each = 0.02 / kTick;  // 1 m/s
+    double before = 0.0;
+    for (int i = 0; i <= 50; i++) {
+      const double wrong = i == 40 ? 0.7 / kTick : 0.0;
+      if (gyro) feed(make::quantities(0.02 * i - 1e-3, {{WM_Q_YAW_RATE, 0.0}}));
+      if (i == 40) before = way_var;
+      ticks(0.02 * i, each * i, each * i + wrong);
+      if (i == 40) TEST_ASSERT_EQUAL_UINT32(WM_MOTION_HEALTH_IMPLAUSIBLE, front.health());
+      if (i > 30) TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.02 * i, pose.x_m);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, pose.heading_rad);
+    }
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.05 * 0.05, way_var - before);
+  }
+}
+
+// GIVEN a controller that restarts WHEN its counts go on from elsewhere THEN these are taken after a tenth of a second,
+// and the robot drove on meanwhile.
+void test_counts_that_go_on_from_elsewhere_are_a_new_start(void) {
+  start(make::two_wheels());
+  const double each = 0.02 / kTick;  // 1 m/s
+  for (int i = 0; i <= 100; i++) ticks(0.02 * i, each * (i - (i >= 50 ? 50 : 0)), each * (i - (i >= 50 ? 50 : 0)));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2.0, pose.x_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, front.twist_at(make::at(2.0), calibration).v);
+}
+
+// GIVEN counts each 20 ms WHEN a message's counter claims that frames were lost THEN its small jump is refused where it
+// comes too early for that, and taken where frames were lost. A bus that hands on every other frame is no doubt.
+void test_a_counter_that_contradicts_the_stamp_is_doubt(void) {
+  for (int lost : {0, 1, 99}) {
+    start(make::two_wheels());
+    const double each = 0.02 / kTick;
+    for (int i = 0; i <= 50; i++) {
+      const double count = each * i + (i == 40 ? 0.03 / kTick : 0.0);
+      wm_event e = make::quantities(0.02 * i, {{WM_Q_WHEEL_TICKS_LEFT, count}, {WM_Q_WHEEL_TICKS_RIGHT, count}});
+      if (i == 40) e.as.quantities.lost_before = (uint16_t)lost;
+      feed(e);
+      if (i == 40) TEST_ASSERT_DOUBLE_WITHIN(1e-6, lost ? 0.8 : 0.83, pose.x_m);
+      if (i == 40) TEST_ASSERT_EQUAL_UINT32(lost ? WM_MOTION_HEALTH_IMPLAUSIBLE : 0u, front.health());
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, pose.x_m);
+  }
+  start(make::two_wheels());
+  for (int i = 0; i <= 50; i++) {
+    const double count = 0.04 / kTick * i;
+    wm_event e = make::quantities(0.04 * i, {{WM_Q_WHEEL_TICKS_LEFT, count}, {WM_Q_WHEEL_TICKS_RIGHT, count}});
+    e.as.quantities.lost_before = i > 0;
+    feed(e);
+    TEST_ASSERT_EQUAL_UINT32(0, front.health());
+  }
+}
+
 void test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns(void) {
   start(make::car());
   for (int i = 0; i <= 60; i++)
@@ -460,6 +557,11 @@ int main(void) {
   RUN_TEST(test_an_overflow_lies_beyond_what_is_obeyed);
   RUN_TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn);
   RUN_TEST(test_a_frozen_counter_is_doubt_not_standstill);
+  RUN_TEST(test_a_speed_that_no_robot_reaches_is_refused);
+  RUN_TEST(test_samples_that_agree_replace_the_trusted_ones);
+  RUN_TEST(test_a_wrong_count_is_refused);
+  RUN_TEST(test_counts_that_go_on_from_elsewhere_are_a_new_start);
+  RUN_TEST(test_a_counter_that_contradicts_the_stamp_is_doubt);
   RUN_TEST(test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns);
   RUN_TEST(test_what_can_not_be_is_refused);
   RUN_TEST(test_what_a_model_lacks);
