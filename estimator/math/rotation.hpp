@@ -107,6 +107,12 @@ inline quat quat_of(const mat3 &r) {
   return normalized({m[1][0] - m[0][1], {m[0][2] + m[2][0], m[1][2] + m[2][1], 1 + 2 * m[2][2] - trace}});
 }
 
+// A pose in space: the rotation and the place of a frame in another one.
+struct pose3 {
+  vec3 p;
+  quat q;
+};
+
 // Exp: the rotation by the vector's length about its direction.
 inline quat turn_by(const vec3 &r) {
   const double q = dot(r, r);

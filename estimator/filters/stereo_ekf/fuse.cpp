@@ -54,8 +54,8 @@ stereo_ekf::past_pose stereo_ekf::look_back(double age_s) const {
   out.at = filter_.nominal();
   out.R = filter_.R();
   if (age_s != 0.0) {
-    placed since = rates ? placed{age_s * (mean_turn(age_s * out.w_radps) * out.v_mps), turn_by(age_s * out.w_radps)}
-                         : motion_.moved_since(age_s);
+    pose3 since = rates ? pose3{age_s * (mean_turn(age_s * out.w_radps) * out.v_mps), turn_by(age_s * out.w_radps)}
+                        : motion_.moved_since(age_s);
     out.at.q = normalized(out.at.q * conjugate(since.q));
     out.R = matrix_of(out.at.q);
     out.at.p = out.at.p - out.R * since.p;

@@ -19,7 +19,7 @@ double given(double sigma) { return finite(sigma) ? sigma : kDefaultSigma; }
 
 }  // namespace
 
-void stereo_ekf::set_pose(const placed &pose, double sigma_m, double sigma_rad) {
+void stereo_ekf::set_pose(const pose3 &pose, double sigma_m, double sigma_rad) {
   double covariance[6][6] = {};
   for (int i = 0; i < 3; i++) {
     covariance[i][i] = square(sigma_m);
@@ -35,7 +35,7 @@ void stereo_ekf::start_pose() {
   const bool quaternion =
       finite(start.q_xyzw[0]) && finite(start.q_xyzw[1]) && finite(start.q_xyzw[2]) && finite(start.q_xyzw[3]);
   const bool turn = quaternion || finite(start.heading_rad);
-  placed pose = {{0, 0, 0}, kNoTurn};
+  pose3 pose = {{0, 0, 0}, kNoTurn};
   if (place) pose.p = {start.p_m[0], start.p_m[1], finite(start.p_m[2]) ? start.p_m[2] : 0.0};
   if (quaternion)
     pose.q = quat_of(start.q_xyzw);

@@ -125,7 +125,7 @@ row_verdict space_filter::fuse(const row_block &block, const gates &limits) {
   return out;
 }
 
-placed space_filter::pose() const {
+pose3 space_filter::pose() const {
   if (!pending_) return pose_;
   const vec3 turn = pending(kTurn);
   return {pose_.p + mean_turn(turn) * pending(kPlace), normalized(turn_by(turn) * pose_.q)};
@@ -255,7 +255,7 @@ void space_filter::remove_point(int slot) {
   n_ -= 3;
 }
 
-void space_filter::set_pose(const placed &pose, const double covariance[6][6]) {
+void space_filter::set_pose(const pose3 &pose, const double covariance[6][6]) {
   settle();
   remove_points();
   forget(kPlace, kPose6, 0.0);
@@ -273,7 +273,7 @@ void space_filter::inflate_pose(double place_m2, double turn_rad2) {
 }
 
 void space_filter::estimate(wm_estimate *out) const {
-  const placed at = pose();
+  const pose3 at = pose();
   const mat3 r = matrix_of(at.q), swing = -1.0 * skew(at.p - pose_.p), turn = transposed(r);
   // Rows: position in map axes (moved by what is pending), rotation in the body's.
   double m[kPose6][kPose6] = {};

@@ -95,10 +95,7 @@ struct body_stretch {
   double place_m2[3], turn_rad2[3];
 };
 
-struct placed {
-  vec3 p;
-  quat q;
-};
+using placed = pose3;  // body_motion's name
 
 class space_filter {
  public:
@@ -119,11 +116,11 @@ class space_filter {
   void settle();
 
   // The estimate with what is pending.
-  placed pose() const;
+  pose3 pose() const;
   void estimate(wm_estimate *out) const;
 
   // The point of linearisation: without what is pending.
-  const placed &nominal() const { return pose_; }
+  const pose3 &nominal() const { return pose_; }
   const mat3 &R() const { return r_; }
   double head(int state) const { return head_[state]; }
   vec3 head3(int which) const;  // zero where it is off
@@ -144,7 +141,7 @@ class space_filter {
   void remove_point(int slot);
   void remove_points() { n_ = first_point_; }
 
-  void set_pose(const placed &pose, const double covariance[6][6]);
+  void set_pose(const pose3 &pose, const double covariance[6][6]);
   // Back to the start's value and variance, uncorrelated.
   void restart_head();
   void inflate_pose(double place_m2, double turn_rad2);
@@ -190,7 +187,7 @@ class space_filter {
   int at_[kHeadStates];
   head_model models_[kHeadStates];
   bool pending_;
-  placed pose_;
+  pose3 pose_;
   mat3 r_, camera_axes_;
   vec3 turn_rate_;
   double head_[kHeadMax];  // by state; the pose's own are not used

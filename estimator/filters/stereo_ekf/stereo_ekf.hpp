@@ -5,12 +5,12 @@
 #define WAYMARK_ESTIMATOR_STEREO_EKF_HPP
 
 #include "filters/core/record_list.hpp"
+#include "filters/relocalize/pose_consensus.hpp"
 #include "filters/stereo_ekf/body_motion.hpp"
-#include "filters/stereo_ekf/consensus.hpp"
 #include "filters/stereo_ekf/fit_monitor.hpp"
 #include "filters/stereo_ekf/params.h"
 #include "filters/stereo_ekf/space_filter.hpp"
-#include "filters/stereo_ekf/stereo_rig.hpp"
+#include "sensors/stereo_rig.hpp"
 #include "waymark/estimator.h"
 
 namespace wm {
@@ -38,7 +38,7 @@ class stereo_ekf {
   };
   // The pose when an observation was true, and the twist about then, in body axes.
   struct past_pose {
-    placed at;
+    pose3 at;
     mat3 R;
     vec3 v_mps, w_radps;
   };
@@ -80,7 +80,7 @@ class stereo_ekf {
   // recovery.cpp
   wm_status take_pose(const wm_event &event);
   void start_pose();
-  void set_pose(const placed &pose, double sigma_m, double sigma_rad);
+  void set_pose(const pose3 &pose, double sigma_m, double sigma_rad);
   void keep_clue(const wm_stereo &seen, const wm_landmark &landmark, wm_time_ns t_ns);
   void note(wm_time_ns t_ns, int key, double misfit);
   void search(wm_time_ns since_ns);
@@ -106,7 +106,7 @@ class stereo_ekf {
   double sigma_px_[4];
   wm_time_ns now_ns_, start_ns_;
   wm_time_ns picture_ns_;  // the picture that points are being taken of; NONE between pictures
-  placed odom_;            // motion alone
+  pose3 odom_;             // motion alone
   double way_m_, turn_rad_;
   fit_monitor monitor_;
   pose_consensus clues_;

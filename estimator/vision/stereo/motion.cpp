@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "vision/stereo/motion.hpp"
 
-#include "filters/stereo_ekf/consensus.hpp"
+#include "math/absolute_orientation.hpp"
 #include "waymark/random.h"
 
 namespace wm {
@@ -107,7 +107,7 @@ bool find_motion(const pair_geometry &rig, const seen_twice *points, int count, 
       to[k] = place_of(rig, points[chosen[k]].now);
     }
     if (chosen[0] == chosen[1] || chosen[1] == chosen[2] || chosen[0] == chosen[2]) continue;
-    placed at;
+    pose3 at;
     if (!absolute_orientation(from, to, weight, 3, &at)) continue;
     rigid motion = {matrix_of(at.q), at.p};
     int number;

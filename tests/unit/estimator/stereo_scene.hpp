@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "events.hpp"
-#include "filters/stereo_ekf/consensus.hpp"
+#include "math/absolute_orientation.hpp"
 #include "math/rotation.hpp"
 #include "unity.h"
 #include "waymark/estimator.h"
@@ -33,7 +33,7 @@ struct scene {
   void *state = nullptr;
   size_t bytes = 0;
   const wm_estimator *ekf = wm_estimator_find("stereo_ekf");
-  placed truth = {{0, 0, 0}, kNoTurn};
+  pose3 truth = {{0, 0, 0}, kNoTurn};
   double t_s = 0;
   uint64_t draws = 0;
   double noise_v = 0.02, noise_w = 0.003;

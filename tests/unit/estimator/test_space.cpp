@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "filters/stereo_ekf/consensus.hpp"
+#include "filters/relocalize/pose_consensus.hpp"
 #include "filters/stereo_ekf/space_filter.hpp"
 #include "unity.h"
 #include "waymark/random.h"
@@ -101,8 +101,8 @@ void test_propagation_carries_errors_as_the_motion_does(void) {
   const body_stretch s = {0.3, {0.8, -0.2, 0.4}, {0.3, 1.1, -0.7}, {}, {}};
   for (int wrong = 0; wrong < 6; wrong++) {
     const double epsilon = 1e-5;
-    const placed start = {{3, -2, 5}, turn_by({0.4, -1.0, 2.0})};
-    placed off = start;
+    const pose3 start = {{3, -2, 5}, turn_by({0.4, -1.0, 2.0})};
+    pose3 off = start;
     vec3 e = {0, 0, 0};
     e[wrong % 3] = epsilon;
     if (wrong < 3)
@@ -377,7 +377,7 @@ void test_orientation_is_found_with_a_third_wrong(void) {
   for (int trial = 0; trial < 50; trial++) {
     auto consensus = std::make_unique<pose_consensus>();
     consensus->clear();
-    const placed map_odom = {10.0 * random_vec(10 + trial), turn_by(random_vec(900 + trial))};
+    const pose3 map_odom = {10.0 * random_vec(10 + trial), turn_by(random_vec(900 + trial))};
     const mat3 R = matrix_of(map_odom.q);
     for (int i = 0; i < 12; i++) {
       const vec3 seen = 3.0 * random_vec(2000 + 50 * trial + i);
@@ -385,7 +385,7 @@ void test_orientation_is_found_with_a_third_wrong(void) {
       if (i % 3 == 0) place = place + 5.0 * random_vec(70000 + 50 * trial + i);
       consensus->add({i, i, seen, place, 0.02, 0, 0});
     }
-    const placed odom = {{1, 2, 3}, turn_by({0.3, 0.2, 0.1})};
+    const pose3 odom = {{1, 2, 3}, turn_by({0.3, 0.2, 0.1})};
     const pose_found found = consensus->find(0, odom, 0, 0, 0.5, 0.25, static_cast<uint64_t>(trial));
     TEST_ASSERT_TRUE(found.found);
     assert_near(map_odom.p + R * odom.p, found.pose.p, 0.05);

@@ -219,7 +219,7 @@ void test_pictures_that_are_late(void) {
       s.swim(0.1, v, w);
       TEST_ASSERT_EQUAL(WM_OK, s.take(make::empty(s.t_s, WM_EVENT_LOOKED)));
     }
-    const placed now = s.truth;
+    const pose3 now = s.truth;
     double here[4], earlier[4];
     const wm_landmark *shown = nullptr;
     for (const wm_landmark &l : s.points)
@@ -266,7 +266,7 @@ offset_found find_offset(double late_s, double swing_radps) {
       const vec3 w = {0.1 + swing_radps * std::cos(0.014 * i), 0, 0.2 + swing_radps * std::sin(0.02 * i)};
       s.swim(0.02, v, w);
       if (i % 5 != 4) continue;
-      const placed now = s.truth;
+      const pose3 now = s.truth;
       s.truth.p = now.p - matrix_of(now.q) * (late_s * (mean_turn(-late_s * w) * v));
       s.truth.q = normalized(now.q * turn_by(-late_s * w));
       s.look();

@@ -53,9 +53,7 @@ FOLDER_MAY_USE = {
     "filters/stereo_ekf": FILTER,
 }
 # (file, header): arrows that still point the wrong way. Only ever shorter.
-FOLDER_EXCEPTIONS = {
-    ("vision/stereo/motion.cpp", "filters/stereo_ekf/consensus.hpp"),
-}
+FOLDER_EXCEPTIONS = set()
 
 INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')
 

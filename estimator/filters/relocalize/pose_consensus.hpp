@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where is the vehicle, nothing being known but places of points on the map and where stereo saw them: closed-form
 // absolute orientation with a robust consensus.
-#ifndef WAYMARK_ESTIMATOR_CONSENSUS_HPP
-#define WAYMARK_ESTIMATOR_CONSENSUS_HPP
+#ifndef WAYMARK_ESTIMATOR_POSE_CONSENSUS_HPP
+#define WAYMARK_ESTIMATOR_POSE_CONSENSUS_HPP
 
-#include "filters/stereo_ekf/space_filter.hpp"
+#include "math/rotation.hpp"
 #include "waymark/time.h"
 
 namespace wm {
@@ -21,7 +21,7 @@ struct point_clue {
 
 struct pose_found {
   bool found;
-  placed pose;  // of base_link on the map, now
+  pose3 pose;  // of base_link on the map, now
   double covariance[6][6];
 };
 
@@ -35,18 +35,13 @@ class pose_consensus {
   // it less sure than the two sigmas. `odom`, `way_m`, `turn_rad`: motion until now. Random choices come from `seed`.
   // Source: closed form by B. K. P. Horn, "Closed-form solution of absolute orientation using unit quaternions", 1987;
   // consensus by M. A. Fischler, R. C. Bolles, 1981. Cost: 100 hypotheses over at most 64 clues, about 50 us.
-  pose_found find(wm_time_ns since_ns, const placed &odom, double way_m, double turn_rad, double sigma_m,
+  pose_found find(wm_time_ns since_ns, const pose3 &odom, double way_m, double turn_rad, double sigma_m,
                   double sigma_rad, uint64_t seed) const;
 
  private:
   point_clue clue_[kCapacity];
   int count_;  // ever added; the newest kCapacity are kept
 };
-
-// Rotation and place that take `from` to `to` with the least weighted sum of squares; false where they lie in a line.
-bool absolute_orientation(const vec3 *from, const vec3 *to, const double *weight, int count, placed *out);
-// Inverse of a symmetric positive matrix by Cholesky; false where it isn't positive.
-bool invert6(const double a[6][6], double out[6][6]);
 
 }  // namespace wm
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filters/stereo_ekf/consensus.hpp"
+#include "filters/relocalize/pose_consensus.hpp"
 
-#include <cstring>
-
+#include "math/absolute_orientation.hpp"
 #include "waymark/random.h"
 
 namespace wm {
@@ -24,13 +23,13 @@ struct problem {
   int count;
 };
 
-double misfit(const problem &all, int i, const placed &at, const mat3 &r) {
+double misfit(const problem &all, int i, const pose3 &at, const mat3 &r) {
   const vec3 off = at.p + r * all.from[i] - all.to[i];
   return all.weight[i] * dot(off, off);
 }
 
 // Clipped sum of squares; fewer is better.
-double cost_of(const problem &all, const placed &at, int *agreeing) {
+double cost_of(const problem &all, const pose3 &at, int *agreeing) {
   const mat3 r = matrix_of(at.q);
   double cost = 0.0;
   *agreeing = 0;
@@ -42,41 +41,7 @@ double cost_of(const problem &all, const placed &at, int *agreeing) {
   return cost;
 }
 
-// Largest eigenvalue's vector of a symmetric 4 x 4 matrix by Jacobi's rotations.
-quat largest_vector(double a[4][4]) {
-  double v[4][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}};
-  for (int sweep = 0; sweep < 12; sweep++)
-    for (int i = 0; i < 3; i++)
-      for (int j = i + 1; j < 4; j++) {
-        if (a[i][j] == 0.0) continue;
-        const double theta = (a[j][j] - a[i][i]) / (2 * a[i][j]);
-        const double size = theta < 0 ? -theta : theta;
-        double t = 1 / (size + std::sqrt(theta * theta + 1));
-        if (theta < 0) t = -t;
-        const double c = 1 / std::sqrt(t * t + 1), s = t * c;
-        for (int k = 0; k < 4; k++) {
-          const double x = a[k][i], y = a[k][j];
-          a[k][i] = c * x - s * y;
-          a[k][j] = s * x + c * y;
-        }
-        for (int k = 0; k < 4; k++) {
-          const double x = a[i][k], y = a[j][k];
-          a[i][k] = c * x - s * y;
-          a[j][k] = s * x + c * y;
-        }
-        for (auto &row : v) {
-          const double x = row[i], y = row[j];
-          row[i] = c * x - s * y;
-          row[j] = s * x + c * y;
-        }
-      }
-  int best = 0;
-  for (int i = 1; i < 4; i++)
-    if (a[i][i] > a[best][best]) best = i;
-  return normalized({v[0][best], {v[1][best], v[2][best], v[3][best]}});
-}
-
-int differing_ids(const problem &all, const placed &at) {
+int differing_ids(const problem &all, const pose3 &at) {
   const mat3 r = matrix_of(at.q);
   int32_t ids[pose_consensus::kCapacity];
   int count = 0;
@@ -90,7 +55,7 @@ int differing_ids(const problem &all, const placed &at) {
 }
 
 // Information of the pose (place, turn, in map axes) at `base`, from what agrees.
-bool covariance_of(const problem &all, const placed &at, const vec3 &base, double out[6][6]) {
+bool covariance_of(const problem &all, const pose3 &at, const vec3 &base, double out[6][6]) {
   const mat3 r = matrix_of(at.q);
   double information[6][6] = {};
   for (int i = 0; i < all.count; i++) {
@@ -109,76 +74,13 @@ bool covariance_of(const problem &all, const placed &at, const vec3 &base, doubl
 
 }  // namespace
 
-bool invert6(const double a[6][6], double out[6][6]) {
-  double l[6][6] = {}, inverse[6][6] = {};
-  for (int j = 0; j < 6; j++)
-    for (int i = j; i < 6; i++) {
-      double sum = a[i][j];
-      for (int k = 0; k < j; k++) sum -= l[i][k] * l[j][k];
-      if (i == j) {
-        if (!(sum > 1e-12 * a[j][j])) return false;
-        l[j][j] = std::sqrt(sum);
-      } else {
-        l[i][j] = sum / l[j][j];
-      }
-    }
-  for (int j = 0; j < 6; j++)
-    for (int i = j; i < 6; i++) {
-      double sum = i == j ? 1.0 : 0.0;
-      for (int k = j; k < i; k++) sum -= l[i][k] * inverse[k][j];
-      inverse[i][j] = sum / l[i][i];
-    }
-  for (int i = 0; i < 6; i++)
-    for (int j = 0; j < 6; j++) {
-      out[i][j] = 0.0;
-      for (int k = i > j ? i : j; k < 6; k++) out[i][j] += inverse[k][i] * inverse[k][j];
-    }
-  return true;
-}
-
-bool absolute_orientation(const vec3 *from, const vec3 *to, const double *weight, int count, placed *out) {
-  vec3 a = {0, 0, 0}, b = {0, 0, 0};
-  double sum = 0.0;
-  for (int i = 0; i < count; i++) {
-    a = a + weight[i] * from[i];
-    b = b + weight[i] * to[i];
-    sum += weight[i];
-  }
-  if (!(sum > 0.0)) return false;
-  a = (1 / sum) * a;
-  b = (1 / sum) * b;
-  double s[3][3] = {};
-  // Spread of the points: what is left across the line through the two farthest apart must not vanish.
-  vec3 line = {0, 0, 0};
-  for (int i = 0; i < count; i++) {
-    const vec3 x = from[i] - a, y = to[i] - b;
-    if (dot(x, x) > dot(line, line)) line = x;
-    for (int j = 0; j < 3; j++)
-      for (int k = 0; k < 3; k++) s[j][k] += weight[i] * x[j] * y[k];
-  }
-  double across = 0.0;
-  for (int i = 0; i < count; i++) {
-    const vec3 off = cross(line, from[i] - a);
-    if (dot(off, off) > across) across = dot(off, off);
-  }
-  const double length2 = dot(line, line);
-  if (!(across > square(0.05 * length2)) || !(length2 > 0.0)) return false;
-  double n[4][4] = {{s[0][0] + s[1][1] + s[2][2], s[1][2] - s[2][1], s[2][0] - s[0][2], s[0][1] - s[1][0]},
-                    {s[1][2] - s[2][1], s[0][0] - s[1][1] - s[2][2], s[0][1] + s[1][0], s[2][0] + s[0][2]},
-                    {s[2][0] - s[0][2], s[0][1] + s[1][0], s[1][1] - s[0][0] - s[2][2], s[1][2] + s[2][1]},
-                    {s[0][1] - s[1][0], s[2][0] + s[0][2], s[1][2] + s[2][1], s[2][2] - s[0][0] - s[1][1]}};
-  out->q = largest_vector(n);
-  out->p = b - matrix_of(out->q) * a;
-  return true;
-}
-
 void pose_consensus::add(const point_clue &clue) {
   clue_[count_ % kCapacity] = clue;
   count_++;
   if (count_ == 4 * kCapacity) count_ -= 2 * kCapacity;  // the index stays small; its place in the ring is the same
 }
 
-pose_found pose_consensus::find(wm_time_ns since_ns, const placed &odom, double way_m, double turn_rad, double sigma_m,
+pose_found pose_consensus::find(wm_time_ns since_ns, const pose3 &odom, double way_m, double turn_rad, double sigma_m,
                                 double sigma_rad, uint64_t seed) const {
   pose_found out{};
   problem all;
@@ -195,7 +97,7 @@ pose_found pose_consensus::find(wm_time_ns since_ns, const placed &odom, double 
   }
   if (all.count < kFewest) return out;
 
-  placed best{};
+  pose3 best{};
   double least = 1e300;
   int agreeing = 0;
   uint64_t draw = 0;
@@ -211,7 +113,7 @@ pose_found pose_consensus::find(wm_time_ns since_ns, const placed &odom, double 
     }
     const int32_t a = all.id[chosen[0]], b = all.id[chosen[1]], c = all.id[chosen[2]];
     if (a == b || b == c || a == c) continue;
-    placed at;
+    pose3 at;
     int count;
     if (!absolute_orientation(from, to, weight, 3, &at)) continue;
     const double cost = cost_of(all, at, &count);
@@ -224,7 +126,7 @@ pose_found pose_consensus::find(wm_time_ns since_ns, const placed &odom, double 
     const mat3 r = matrix_of(best.q);
     double weight[kCapacity];
     for (int i = 0; i < all.count; i++) weight[i] = misfit(all, i, best, r) < kAgrees ? all.weight[i] : 0.0;
-    placed at;
+    pose3 at;
     int count;
     if (!absolute_orientation(all.from, all.to, weight, all.count, &at)) break;
     if (cost_of(all, at, &count) >= least) break;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filters/stereo_ekf/stereo_rig.hpp"
+#include "sensors/stereo_rig.hpp"
 
 #include <cstring>
 
