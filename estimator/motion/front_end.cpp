@@ -394,7 +394,7 @@ bool motion_front_end::speed_source_changed() {
 }
 
 wm_time_ns motion_front_end::lag_of(const wm_motion_calibration &calibration) const {
-  return ticks_drive() ? 0 : wm_ns_from_seconds(calibration.lag_s);
+  return ticks_drive() ? 0 : wm_ns_from_seconds(calibration.value[kLag]);
 }
 
 motion_twist motion_front_end::twist_at(wm_time_ns t_ns, const wm_motion_calibration &calibration) const {

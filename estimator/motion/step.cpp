@@ -19,24 +19,24 @@ void add(motion_twist &t, int index, double v_by, double w_by) {
 // v = (l + r)/2, w = (r - l)/b, with l and r each by its own scale and b by the track's.
 motion_twist from_wheels(double left, double right, const wm_motion_calibration &c, double track_m) {
   motion_twist t{};
-  const double inverse_track = 1.0 / (track_m * c.track_scale);
-  const double l = left * c.left_scale;
-  const double r = right * c.right_scale;
+  const double inverse_track = 1.0 / (track_m * c.value[kTrackScale]);
+  const double l = left * c.value[kLeftScale];
+  const double r = right * c.value[kRightScale];
   t.v = 0.5 * (l + r);
   t.w = (r - l) * inverse_track;
   add(t, kLeftScale, 0.5 * left, -left * inverse_track);
   add(t, kRightScale, 0.5 * right, right * inverse_track);
-  add(t, kTrackScale, 0.0, -t.w / c.track_scale);
+  add(t, kTrackScale, 0.0, -t.w / c.value[kTrackScale]);
   return t;
 }
 
 motion_twist from_speed_and_rate(double speed, double rate, const wm_motion_calibration &c) {
   motion_twist t{};
-  t.v = c.speed_scale * speed;
-  t.w = c.yaw_rate_scale * (rate - c.yaw_rate_bias_radps);
+  t.v = c.value[kSpeedScale] * speed;
+  t.w = c.value[kYawRateScale] * (rate - c.value[kYawRateBias]);
   add(t, kSpeedScale, speed, 0.0);
-  add(t, kYawRateScale, 0.0, rate - c.yaw_rate_bias_radps);
-  add(t, kYawRateBias, 0.0, -c.yaw_rate_scale);
+  add(t, kYawRateScale, 0.0, rate - c.value[kYawRateBias]);
+  add(t, kYawRateBias, 0.0, -c.value[kYawRateScale]);
   return t;
 }
 
@@ -45,7 +45,7 @@ motion_twist from_speed_and_rate(double speed, double rate, const wm_motion_cali
 motion_twist from_twist(double speed, double rate, const wm_motion_calibration &c, double track_m) {
   const double size = std::fabs(speed);
   const double turning = square(rate);
-  const double slower = c.turn_slowdown_mps * turning;
+  const double slower = c.value[kTurnSlowdown] * turning;
   const double share = size > 0.0 && slower < size ? (size - slower) / size : size > 0.0 ? 0.0 : 1.0;
   const double driven = share * speed;
   motion_twist t = finite(track_m)
@@ -57,21 +57,21 @@ motion_twist from_twist(double speed, double rate, const wm_motion_calibration &
   }
   const double v = t.v, w = t.w;
   for (int i = 0; i < t.count; i++) {
-    t.v_by[i] *= c.speed_scale;
-    t.w_by[i] *= c.yaw_rate_scale;
+    t.v_by[i] *= c.value[kSpeedScale];
+    t.w_by[i] *= c.value[kYawRateScale];
   }
-  t.v = c.speed_scale * v;
-  t.w = c.yaw_rate_scale * (w - c.yaw_rate_bias_radps);
+  t.v = c.value[kSpeedScale] * v;
+  t.w = c.value[kYawRateScale] * (w - c.value[kYawRateBias]);
   add(t, kSpeedScale, v, 0.0);
-  add(t, kYawRateScale, 0.0, w - c.yaw_rate_bias_radps);
-  add(t, kYawRateBias, 0.0, -c.yaw_rate_scale);
+  add(t, kYawRateScale, 0.0, w - c.value[kYawRateBias]);
+  add(t, kYawRateBias, 0.0, -c.value[kYawRateScale]);
   if (share > 0.0 && size > 0.0) {
     // Both wheels lose the same, so with unlike wheels the turn changes a little, too.
     const double lost = speed > 0.0 ? -turning : turning;
     const bool wheels = finite(track_m);
-    const double v_by = wheels ? 0.5 * (c.left_scale + c.right_scale) : 1.0;
-    const double w_by = wheels ? (c.right_scale - c.left_scale) / (track_m * c.track_scale) : 0.0;
-    add(t, kTurnSlowdown, c.speed_scale * v_by * lost, c.yaw_rate_scale * w_by * lost);
+    const double v_by = wheels ? 0.5 * (c.value[kLeftScale] + c.value[kRightScale]) : 1.0;
+    const double w_by = wheels ? (c.value[kRightScale] - c.value[kLeftScale]) / (track_m * c.value[kTrackScale]) : 0.0;
+    add(t, kTurnSlowdown, c.value[kSpeedScale] * v_by * lost, c.value[kYawRateScale] * w_by * lost);
   }
   return t;
 }
@@ -79,12 +79,12 @@ motion_twist from_twist(double speed, double rate, const wm_motion_calibration &
 // w = v tan(phi)/L (paper, system 1). An encoder on one side, `offset` to the left of the middle, sees v - w offset.
 motion_twist from_steering(double speed, double road_wheel, const wm_motion_calibration &c, const wm_wheels &wheels) {
   motion_twist t{};
-  const double tangent = tan(road_wheel + c.steering_offset_rad);
+  const double tangent = tan(road_wheel + c.value[kSteeringOffset]);
   const double curvature = tangent / wheels.wheelbase_m;
   const double offset = finite(wheels.encoder_offset_m) ? wheels.encoder_offset_m : 0.0;
   const double share = 1.0 - curvature * offset;
   const double middle = share > 0.2 ? speed / share : speed;
-  t.v = c.speed_scale * middle;
+  t.v = c.value[kSpeedScale] * middle;
   t.w = t.v * curvature;
   add(t, kSpeedScale, middle, middle * curvature);
   const double curvature_by = (1.0 + tangent * tangent) / wheels.wheelbase_m;
@@ -117,9 +117,9 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
     // Paper, system 2: by way, not by time. k^2 |d| instead of (k d)^2, so that it does not depend on the step's
     // length.
     const double k2 = square(p.noise_ticks_per_sqrt_m) * dt_s;
-    const double left = k2 * std::fabs(input.a * c.left_scale);
-    const double right = k2 * std::fabs(input.b * c.right_scale);
-    const double track = wheels.track_m * c.track_scale;
+    const double left = k2 * std::fabs(input.a * c.value[kLeftScale]);
+    const double right = k2 * std::fabs(input.b * c.value[kRightScale]);
+    const double track = wheels.track_m * c.value[kTrackScale];
     n.way_m2 = 0.25 * (left + right);
     n.turn_rad2 = (left + right) / (track * track);
     n.way_turn = 0.5 * (right - left) / track;

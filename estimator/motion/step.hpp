@@ -9,25 +9,21 @@
 
 namespace wm {
 
-// The fields of wm_motion_calibration by number, in its order.
+// Terms of wm_motion_calibration.
 enum calibration_index {
-  kSpeedScale = 0,
-  kYawRateScale,
-  kYawRateBias,
-  kLeftScale,
-  kRightScale,
-  kTrackScale,
-  kSteeringOffset,
-  kLag,
-  kTurnSlowdown,
-  kCalibrationCount
+  kSpeedScale = WM_SPEED_SCALE,
+  kYawRateScale = WM_YAW_RATE_SCALE,
+  kYawRateBias = WM_YAW_RATE_BIAS,
+  kLeftScale = WM_LEFT_SCALE,
+  kRightScale = WM_RIGHT_SCALE,
+  kTrackScale = WM_TRACK_SCALE,
+  kSteeringOffset = WM_STEERING_OFFSET,
+  kLag = WM_LAG,
+  kTurnSlowdown = WM_TURN_SLOWDOWN,
+  kCalibrationCount = WM_MOTION_TERMS
 };
-static_assert(sizeof(wm_motion_calibration) == kCalibrationCount * sizeof(double));
 
-inline constexpr wm_motion_calibration kNeutralCalibration = {1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0};
-
-inline double &calibration_at(wm_motion_calibration &c, int index) { return (&c.speed_scale)[index]; }
-inline double calibration_at(const wm_motion_calibration &c, int index) { return (&c.speed_scale)[index]; }
+inline constexpr wm_motion_calibration kNeutralCalibration = {{1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0}};
 
 // Twist (speed in m/s, turn rate in rad/s) of base_link and its derivatives by the calibration; only the first `count`
 // entries of `index`, `v_by`, `w_by` are set. The lag is not among them: it moves the ends of the interval.

@@ -336,7 +336,7 @@ void test_what_is_learnt_is_listed_and_given_to_the_predictor(void) {
   TEST_ASSERT_EQUAL(count, estimator->calibration(a.state, values, 1));
   wm_motion_calibration c;
   estimator->motion(a.state, &c);
-  TEST_ASSERT_TRUE(std::isfinite(c.speed_scale) && c.speed_scale > 0);
+  TEST_ASSERT_TRUE(std::isfinite(c.value[WM_SPEED_SCALE]) && c.value[WM_SPEED_SCALE] > 0);
   for (size_t i = 0; i < count && i < 1; i++) {
     TEST_ASSERT_TRUE(std::isfinite(values[i].value) && values[i].sigma > 0);
     TEST_ASSERT_GREATER_THAN(0, strlen(values[i].name));

@@ -24,7 +24,7 @@ void planar_filter::init(const wm_setup &setup, const wm_motion_states &states) 
   add_state(finite(setup.start.heading_rad) ? wrap(setup.start.heading_rad) : 0.0, sigma_heading);
   for (int i = 0; i < kCalibrationCount; i++) {
     const bool on = states.sigma[i] > 0.0;
-    set_motion_state(states, i, on ? add_state(calibration_at(calibration_, i), states.sigma[i]) : -1);
+    set_motion_state(states, i, on ? add_state(calibration_.value[i], states.sigma[i]) : -1);
   }
   wheels_.init(*this, states);
 }

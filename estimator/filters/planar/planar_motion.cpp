@@ -45,7 +45,7 @@ void planar_motion::take_step(const motion_stretch &piece, const motion_twist &t
 void planar_motion::take_calibration(double *states) {
   for (int i = 0; i < kCalibrationCount; i++) {
     const int state = motion_state_[i];
-    if (state >= 0) calibration_at(calibration_, i) = states[state] = motion_state_within_limits(i, states[state]);
+    if (state >= 0) calibration_.value[i] = states[state] = motion_state_within_limits(i, states[state]);
   }
 }
 

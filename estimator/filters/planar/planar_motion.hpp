@@ -53,7 +53,7 @@ class planar_motion {
   bool standstill_bias(double *innovation, double *variance) const {
     double rate;
     if (motion_state_[kYawRateBias] < 0 || !front_.standstill_yaw_rate(&rate)) return false;
-    *innovation = rate - calibration_.yaw_rate_bias_radps;
+    *innovation = rate - calibration_.value[kYawRateBias];
     *variance = square(front_.params().standstill_bias_sigma_radps);
     return true;
   }

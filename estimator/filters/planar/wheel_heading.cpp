@@ -18,7 +18,7 @@ constexpr uint32_t kNotBelieved =
     WM_MOTION_HEALTH_ENCODER_LEFT_DEAD | WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD | WM_MOTION_HEALTH_COUNTER_FROZEN;
 
 double track_m(const planar_filter &filter, const motion_front_end &front) {
-  return front.wheels().track_m * filter.calibration().track_scale;
+  return front.wheels().track_m * filter.calibration().value[kTrackScale];
 }
 
 // Each of the two counts is rounded to a tick, evenly: a twelfth of its square.
@@ -66,13 +66,13 @@ void wheel_heading::listen(planar_filter &filter, const motion_front_end &front)
 void wheel_heading::carry(planar_filter &filter, const motion_front_end &front, double left_m, double right_m) {
   const wm_motion_calibration &c = filter.calibration();
   const double track = track_m(filter, front), middle_m = 0.5 * (left_m + right_m);
-  const double turn = c.speed_scale * (right_m - left_m + filter.value(difference_) * middle_m) / track;
+  const double turn = c.value[kSpeedScale] * (right_m - left_m + filter.value(difference_) * middle_m) / track;
   sparse_row by;
   if (square(turn) > kTurn_nis * rounding_rad2(filter, front)) {
-    by.add(filter.motion_state(kSpeedScale), turn / c.speed_scale);
-    by.add(filter.motion_state(kTrackScale), -turn / c.track_scale);
+    by.add(filter.motion_state(kSpeedScale), turn / c.value[kSpeedScale]);
+    by.add(filter.motion_state(kTrackScale), -turn / c.value[kTrackScale]);
   }
-  by.add(difference_, c.speed_scale * middle_m / track);
+  by.add(difference_, c.value[kSpeedScale] * middle_m / track);
   const double driven_m = std::fabs(left_m) + std::fabs(right_m);
   filter.carry_state(heading_, by, turn, square(front.params().noise_ticks_per_sqrt_m / track) * driven_m);
   filter.carry_state(difference_, {}, 0.0, square(walk_) * 0.5 * driven_m);

@@ -50,7 +50,7 @@ void joint_state::set_motion_states(const wm_motion_states &states, const wheel_
   for (int i = 0; i < kCalibrationCount; i++) {
     const bool on = is_on(states, slip, i);
     set_motion_state(states, i, on ? first++ : -1);
-    if (on) forget(motion_state_[i], calibration_at(kNeutralCalibration, i), start_variance_[i]);
+    if (on) forget(motion_state_[i], kNeutralCalibration.value[i], start_variance_[i]);
   }
   if (!(slip.sigma > 0.0)) return;
   for (int side = 0; side < 2; side++) {

@@ -46,15 +46,22 @@ const char *wm_motion_lacks(const wm_motion_params *params, const wm_wheels *whe
 #define WM_MOTION_HEALTH_YAW_RATE_STUCK (1u << 3)
 #define WM_MOTION_HEALTH_IMPLAUSIBLE (1u << 4)  // a sample was refused within the last 5 s (motion.limits)
 
-// What an estimator has learnt of the motion sensors; neutral is scales of 1, all else 0.
+// Calibration of the motion sensors, as an estimator has learnt it. Neutral: scales 1, the rest 0.
+typedef enum wm_motion_term {
+  WM_SPEED_SCALE = 0,
+  WM_YAW_RATE_SCALE,
+  WM_YAW_RATE_BIAS,  // rad/s; true = scale * (measured - bias)
+  WM_LEFT_SCALE,
+  WM_RIGHT_SCALE,
+  WM_TRACK_SCALE,
+  WM_STEERING_OFFSET,  // rad
+  WM_LAG,              // s by which the motion follows its samples
+  WM_TURN_SLOWDOWN,    // m/s that a commanded speed loses at a turn rate of 1 rad/s; grows with the rate's square
+  WM_MOTION_TERMS
+} wm_motion_term;
+
 typedef struct wm_motion_calibration {
-  double speed_scale;
-  double yaw_rate_scale;
-  double yaw_rate_bias_radps;  // true = scale * (measured - bias)
-  double left_scale, right_scale, track_scale;
-  double steering_offset_rad;
-  double lag_s;              // the robot does now what its motion source said lag_s ago
-  double turn_slowdown_mps;  // of a commanded speed, lost at a turn rate of 1 rad/s; grows with the rate's square
+  double value[WM_MOTION_TERMS];
 } wm_motion_calibration;
 
 // Dead reckoning in the odom frame, for publishing between what is fused and now. It integrates each motion event as it

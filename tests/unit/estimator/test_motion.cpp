@@ -61,15 +61,15 @@ void test_every_derivative_of_every_model(void) {
     input.a = 1.3;
     input.b = model == WM_MOTION_TICKS ? 1.1 : 0.2;
     input.model = (uint8_t)model;
-    const wm_motion_calibration c = {1.05, 0.93, 0.02, 1.02, 0.97, 1.04, 0.03, 0.1, 0.07};
+    const wm_motion_calibration c = {{1.05, 0.93, 0.02, 1.02, 0.97, 1.04, 0.03, 0.1, 0.07}};
     const wm::motion_twist t = wm::twist_of(input, c, w);
     TEST_ASSERT_GREATER_THAN(1, t.count);
     for (int state = 0; state < wm::kCalibrationCount; state++) {
       if (state == wm::kLag) continue;  // moves the ends of the interval, not the twist
       const double h = 1e-6;
       wm_motion_calibration up = c, down = c;
-      wm::calibration_at(up, state) += h;
-      wm::calibration_at(down, state) -= h;
+      up.value[state] += h;
+      down.value[state] -= h;
       const wm::motion_twist a = wm::twist_of(input, up, w), b = wm::twist_of(input, down, w);
       double v_by = 0, w_by = 0;
       for (int i = 0; i < t.count; i++)
@@ -285,7 +285,7 @@ void test_standing_still_shows_the_gyros_bias_and_holds_the_heading(void) {
 // GIVEN a lag WHEN a command comes THEN the robot obeys it that much later, between events, too.
 void test_commands_are_obeyed_late(void) {
   start(make::no_wheels());
-  calibration.lag_s = 0.25;
+  calibration.value[wm::kLag] = 0.25;
   feed(make::twist(0, 0, 0));
   feed(make::twist(1, 1, 0));
   advance(1.25);

@@ -109,8 +109,8 @@ void test_prediction_carries_the_right_derivatives(void) {
     wm_motion_calibration cu = wm::kNeutralCalibration, cd = wm::kNeutralCalibration;
     // The lag's derivative is one-sided at 0: commands that are still to come are not obeyed early.
     const double h = k == wm::kLag ? 1e-4 : 1e-5, below = k == wm::kLag ? 0.0 : h;
-    wm::calibration_at(cu, k) += h;
-    wm::calibration_at(cd, k) -= below;
+    cu.value[k] += h;
+    cd.value[k] -= below;
     const wm_pose2 a = drive(start, cu, wheels), b = drive(start, cd, wheels);
     const double variance = sigma[k] * sigma[k];
     const double scale = variance / (h + below);
@@ -212,7 +212,7 @@ void test_standing_still_teaches_the_gyros_bias(void) {
   filter->init(setup, states);
   for (int i = 0; i < 300; i++)
     filter->move(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.015 + 0.002 * (i % 2)}}));
-  TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.016, filter->calibration().yaw_rate_bias_radps);
+  TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.016, filter->calibration().value[wm::kYawRateBias]);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.002, sqrt(filter->variance(3)));
   TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.4, filter->pose().heading_rad);
 }

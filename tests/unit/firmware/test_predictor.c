@@ -10,8 +10,7 @@
 
 static const wm_predictor_params kParams = {
     .jump_m = 0.1, .jump_rad = 0.05, .motion_stale_ns = 200 * MS, .fusion_stale_ns = 300 * MS};
-static const wm_motion_calibration kNeutral = {
-    .speed_scale = 1, .yaw_rate_scale = 1, .left_scale = 1, .right_scale = 1, .track_scale = 1};
+static const wm_motion_calibration kNeutral = {{1, 1, 0, 1, 1, 1, 0, 0, 0}};
 static wm_predictor predictor;
 static wm_odometry *odometry;
 static wm_motion_params *motion;

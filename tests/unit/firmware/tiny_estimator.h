@@ -77,8 +77,7 @@ static void tiny_estimate(const void *state, wm_estimate *out) {
 
 static void tiny_motion(const void *state, wm_motion_calibration *out) {
   (void)state;
-  *out = (wm_motion_calibration){
-      .speed_scale = 1, .yaw_rate_scale = 1, .left_scale = 1, .right_scale = 1, .track_scale = 1};
+  *out = (wm_motion_calibration){{1, 1, 0, 1, 1, 1, 0, 0, 0}};
 }
 
 static const wm_estimator kTiny = {.name = "tiny",
