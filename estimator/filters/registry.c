@@ -4,7 +4,8 @@
 #include <string.h>
 
 static const wm_estimator *const kEstimators[] = {&wm_odometry_estimator, &wm_landmark_ekf_estimator,
-                                                  &wm_edge_mcl_estimator, &wm_slam_estimator, &wm_stereo_ekf_estimator};
+                                                  &wm_edge_mcl_estimator, &wm_pf_edges_estimator,
+                                                  &wm_slam_estimator,     &wm_stereo_ekf_estimator};
 static const size_t kCount = sizeof kEstimators / sizeof kEstimators[0];
 
 const wm_estimator *const *wm_estimators(size_t *count) {

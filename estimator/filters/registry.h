@@ -12,6 +12,7 @@ extern "C" {
 extern const wm_estimator wm_odometry_estimator;
 extern const wm_estimator wm_landmark_ekf_estimator;
 extern const wm_estimator wm_edge_mcl_estimator;
+extern const wm_estimator wm_pf_edges_estimator;
 extern const wm_estimator wm_stereo_ekf_estimator;
 extern const wm_estimator wm_slam_estimator;
 

@@ -95,6 +95,17 @@ size_t edge_map::bytes(const wm_raster &raster) {
          count * kTilePixels * (1 + sizeof(offset)) + aligned((size_t)3 * raster.width_px * sizeof(int32_t));
 }
 
+size_t edge_map::bytes_or_reason(const wm_raster *raster, const char **why) {
+  const size_t needed = raster && raster->edges ? bytes(*raster) : 0;
+  if (!raster)
+    *why = "there is no map: put map/map.yaml into the recording's folder, or name one by `map:`";
+  else if (!raster->edges)
+    *why = "the map has no layer `edges`; `waymark map make` makes one of a floor plan";
+  else if (needed == 0)
+    *why = "the map is too large: at most 32768 pixels along an edge, and 2 gigapixels within 0.6 m of edges";
+  return needed;
+}
+
 void edge_map::init(const wm_raster &raster, void *memory) {
   raster_ = &raster;
   const sin_cos yaw = sincos(raster.origin_yaw_rad);

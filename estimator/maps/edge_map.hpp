@@ -32,6 +32,8 @@ class edge_map {
 
   // Bytes that init() needs for this raster, 0 where it has no edges layer. Linear in the pixels.
   static size_t bytes(const wm_raster &raster);
+  // The same of a map that may be missing; where 0, *why is the reason.
+  static size_t bytes_or_reason(const wm_raster *raster, const char **why);
   // Builds it in `memory` (64-byte aligned), which keeps its distance from this object when both are copied. The raster
   // outlives it. Linear in the pixels near edges. Exact Euclidean distances: P. Felzenszwalb, D. Huttenlocher,
   // "Distance transforms of sampled functions", 2012.

@@ -10,7 +10,7 @@
 #include <memory>
 #include <vector>
 
-#include "filters/edge_mcl/cloud.hpp"
+#include "filters/pf_edges/particles.hpp"
 #include "waymark/random.h"
 
 namespace bench {
@@ -69,15 +69,15 @@ class cloud_at_work {
       points_.y_m[i] = static_cast<float>(scan_range_m(i) * std::sin(scan_bearing_rad(i)));
     }
     for (int k = 0; k < wm::kSigmaClasses; k++) points_.class_end[k] = kScanPoints * (k + 1) / wm::kSigmaClasses;
-    state_.resize(wm::cloud::bytes(particles) / sizeof(double));
-    cloud_.init(particles, 1, state_.data());
+    state_.resize(wm::particles::bytes(particles) / sizeof(double));
+    particles_.init(particles, 1, state_.data());
     const double covariance[3][3] = {{0.0025, 0, 0}, {0, 0.0025, 0}, {0, 0, 0.0004}};
-    cloud_.spread(kCloudMean, covariance);
+    particles_.spread(kCloudMean, covariance);
   }
 
-  void weigh() { (void)cloud_.weigh(map_, field_, points_, table_, 1e-6, false); }
-  void move() { cloud_.move({0.05, 0, 0.001}, {0.005, 0.003, 0.003}); }
-  void resample() { cloud_.resample(); }
+  void weigh() { (void)particles_.weigh(map_, field_, points_, table_, 1e-6, false); }
+  void move() { particles_.propagate({0.05, 0, 0.001}, {0.005, 0.003, 0.003}); }
+  void resample() { particles_.resample(); }
 
  private:
   std::vector<uint8_t> edges_;
@@ -88,7 +88,7 @@ class cloud_at_work {
   wm::score_field field_;
   wm::scan_points points_;
   std::vector<double> state_;
-  wm::cloud cloud_;
+  wm::particles particles_;
 };
 
 }  // namespace bench

@@ -360,25 +360,7 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
   }
   for (int k = 1; k < found.count; k++)
     if (chance[k] > kLeastChance) filter_.add_chance(chance[k], elsewhere[k]);
-  pull_cloud(e);
   return true;
-}
-
-// The optimal proposal's mean, as far as a Gauss approximation about the aligned pose goes: gain (Q^-1 + A)^-1 A.
-void edge_mcl::pull_cloud(const normal_equations &e) {
-  if (params_.pull <= 0.0) return;
-  double total[kAlignStates][kAlignStates] = {}, inverse[kAlignStates][kAlignStates], gain[3][3];
-  const double step = params_.noise_way * std::sqrt(0.1), turn = params_.noise_turn * std::sqrt(0.1);
-  const double own[3] = {1.0 / square(step + 1e-4), 1.0 / square(step + 1e-4), 1.0 / square(turn + 1e-4)};
-  for (int r = 0; r < 3; r++)
-    for (int c = 0; c < 3; c++) total[r][c] = e.information[r][c] + (r == c ? own[r] : 0.0);
-  if (!invert_positive(total, 3, inverse)) return;
-  for (int r = 0; r < 3; r++)
-    for (int c = 0; c < 3; c++) {
-      gain[r][c] = 0.0;
-      for (int k = 0; k < 3; k++) gain[r][c] += params_.pull * inverse[r][k] * e.information[k][c];
-    }
-  cloud_.pull(filter_.pose(), gain, 0.3, 0.1);
 }
 
 }  // namespace wm

@@ -9,7 +9,7 @@ namespace {
 constexpr double kOddsMax = 6.0;
 constexpr double kLostOdds = 1.0, kFoundOdds = -3.0, kTrustedOdds = -4.5, kEasyOdds = -5.5, kMemory_s = 2.0,
                  kUsual_s = 10.0, kExpected_s = 60.0;
-constexpr double kApart_m = 0.3, kApart_rad = 0.15, kApart_s = 1.0;
+constexpr double kApart_m = 0.3, kApart_rad = 0.15;
 constexpr double kFoundSigma_m = 0.1, kFoundSigma_rad = 0.03;
 constexpr double kFresh_s = 0.5, kFresh_m = 0.2;  // scans further apart speak each for itself
 constexpr double kWander_m = 0.1, kLoosened_m2ps = 0.002, kLoosened_rad2ps = 0.0002;
@@ -77,7 +77,6 @@ void edge_mcl::watch(const normal_equations &scan, double dt_s) {
   } else if (state_ != WM_STATE_TRACKING && odds < kFoundOdds) {
     state_ = WM_STATE_TRACKING;
     on_trial_ = false;
-    apart_s_ = 0.0;
   } else if (on_trial_ && odds > kLostOdds) {
     on_trial_ = false;
   }
@@ -113,13 +112,9 @@ double edge_mcl::odds_lost() const {
   return log(exp(lost_odds_) + alike_.odds() + elsewhere);
 }
 
-// Motion sensors were silent. The particles go to where the robot may have come; what was seen before can't be put
-// together with what is seen now, and whether the next scans fit must show soon.
+// Motion sensors were silent. Scans from before can't be put together with those from now on, and whether the next
+// scans fit must show soon.
 void edge_mcl::doubt_motion() {
-  double covariance[3][3];
-  for (int r = 0; r < 3; r++)
-    for (int c = 0; c < 3; c++) covariance[r][c] = filter_.covariance(r, c);
-  cloud_.spread(filter_.pose(), covariance);
   search_.clear();
   others_.clear(filter_.pose(), filter_.odom());
   in_doubt_ = on_trial_ = true;
@@ -141,34 +136,6 @@ void edge_mcl::remember_calibration() {
 
 void edge_mcl::restore_calibration() {
   for (int i = kPoseStates; i < filter_.states(); i++) filter_.forget(i, memory_[0].value[i], memory_[0].variance[i]);
-}
-
-// The cloud's main cluster is elsewhere, and has been for a while: it has the better reasons.
-void edge_mcl::heed_cloud() {
-  const int best = cloud_.best();
-  const wm_pose2 centre = {cloud_.x(best), cloud_.y(best), cloud_.heading(best)};
-  const cloud_moments m = cloud_.moments_near(centre, kApart_m, kApart_rad);
-  const wm_pose2 pose = filter_.pose(), way = between(pose, m.mean);
-  const bool apart = square(way.x_m) + square(way.y_m) > square(kApart_m) || std::fabs(way.heading_rad) > kApart_rad;
-  const sin_cos h = sincos(pose.heading_rad), hm = sincos(m.mean.heading_rad);
-  if (!apart || m.share < 0.7 ||
-      score(map_, scan_, table_, m.mean.x_m, m.mean.y_m, hm.cos, hm.sin) <=
-          score(map_, scan_, table_, pose.x_m, pose.y_m, h.cos, h.sin)) {
-    apart_s_ = 0.0;
-    if (apart && cloud_.effective() < cloud_.count()) {
-      // It went astray and the filter explains the scan better: a tenth of it comes back each time.
-      double covariance[3][3];
-      for (int r = 0; r < 3; r++)
-        for (int c = 0; c < 3; c++) covariance[r][c] = filter_.covariance(r, c);
-      cloud_.spread_some(0, cloud_.count() / 10, pose, covariance);
-    }
-    return;
-  }
-  apart_s_ += 0.1;
-  if (apart_s_ < kApart_s) return;
-  filter_.set_pose(m.mean, m.covariance);
-  apart_s_ = 0.0;
-  resets_++;
 }
 
 // Which places look as the one that is tracked? They are looked for at leisure while what is seen is what was to be
@@ -198,7 +165,7 @@ void edge_mcl::look_for_lookalikes(double dt_s) {
 
 // Where else could it be? Sweeps over the map bring places, at leisure while there is no doubt; what the last metres
 // say of each decides.
-void edge_mcl::ponder(bool new_keyframe) {
+void edge_mcl::ponder() {
   others_.carry(filter_.pose(), filter_.odom());
   if (search_.keyframes() < (in_doubt_ ? kFewKeyframes : kManyKeyframes)) return;
   // A scan's work is bounded: what weighing may need is set aside, the rest is the search's.
@@ -229,25 +196,7 @@ void edge_mcl::ponder(bool new_keyframe) {
     lost_odds_ = 0.0;
     alike_.forget_odds();
     on_trial_ = true;
-  } else if (new_keyframe && state_ != WM_STATE_TRACKING && !on_trial_) {
-    seed_cloud();
   }
-}
-
-// Lost: the particles stand where the robot may be.
-void edge_mcl::seed_cloud() {
-  const double covariance[3][3] = {
-      {square(kFoundSigma_m), 0, 0}, {0, square(kFoundSigma_m), 0}, {0, 0, square(kFoundSigma_rad)}};
-  double total = 0.0, sum = 0.0;
-  for (int i = 0; i < others_.count(); i++) total += others_[i].share;
-  if (!(total > 0.0)) return;
-  for (int i = 0, begin = 0; i < others_.count(); i++) {
-    sum += others_[i].share;
-    const int end = (int)(sum / total * cloud_.count() + 0.5);
-    if (begin < end) cloud_.spread_some(begin, end, others_[i].pose, covariance);
-    begin = end;
-  }
-  cloud_.level();
 }
 
 void edge_mcl::take_place(int hypothesis) {
@@ -264,7 +213,6 @@ void edge_mcl::take_place(int hypothesis) {
   others_.adopt(hypothesis);
   alike_.forget_odds();
   filter_.set_pose(pose, covariance);
-  cloud_.spread(pose, covariance);
 }
 
 // The covariance of all that is possible about the pose that is given out: the places with their probabilities; while

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Localization by edges on the floor against a raster map (system 4): a cloud of particles for where the robot could
-// be, and about its main cluster a Kalman filter that aligns each scan with the map's lines and learns what is wrong
-// with motion sensors and camera. docs/estimators.md has the model.
+// Localization by edges on the floor against a raster map: an iterated Kalman filter that aligns each scan with the
+// map's lines and calibrates motion sensors and cameras, beside hypotheses of other poses. docs/estimators.md has the
+// model. pf_edges is the particle filter of the paper.
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 
 #include "filters/core/record_list.hpp"
 #include "filters/edge_mcl/align.hpp"
-#include "filters/edge_mcl/cloud.hpp"
 #include "filters/edge_mcl/hypotheses.hpp"
 #include "filters/edge_mcl/lookalikes.hpp"
 #include "filters/edge_mcl/params.h"
@@ -28,7 +27,6 @@ class edge_mcl {
   wm_status correct(const wm_event &event, record_list records);
   void estimate(wm_estimate *out) const;
   size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
-  size_t list_particles(wm_particle *out, size_t capacity) const;
   size_t list_hypotheses(wm_hypothesis *out, size_t capacity) const;
   const wm_motion_calibration &motion_calibration() const { return filter_.calibration(); }
   uint32_t motion_health() const { return filter_.motion_health(); }
@@ -73,8 +71,6 @@ class edge_mcl {
   double image_counts(int seen) const;
   // Share of a scan of so many points that can be edges of the map.
   double can_be_edges(int seen) const;
-  double move_cloud();  // returns the way
-  void weigh_cloud(double way_m);
   alignment alignment_of(int camera) const;
   taken_from look_back(const alignment &a) const;
   bool belief_of(int camera, belief *out) const;
@@ -87,16 +83,13 @@ class edge_mcl {
   // Whether the scan was taken in; how many of its points say something and how many of these the map explains.
   bool align(const wm_points &points, int camera, normal_equations *scan, wm_innovation *record);
   void describe(const normal_equations &scan, const belief &prior, const alignment &a, wm_innovation *record) const;
-  void pull_cloud(const normal_equations &equations);
   double speaks_for_lost(const normal_equations &scan, double explained) const;
   void watch(const normal_equations &scan, double dt_s);
   // Logarithm of the odds of being lost: what is seen is not explained here, or better elsewhere.
   double odds_lost() const;
   void doubt_motion();
-  void heed_cloud();
-  void ponder(bool new_keyframe);
+  void ponder();
   void look_for_lookalikes(double dt_s);
-  void seed_cloud();
   void take_place(int hypothesis);
   void spread_over_hypotheses(wm_estimate *out) const;
   void remember_calibration();
@@ -106,10 +99,6 @@ class edge_mcl {
   wm_edge_mcl_params params_;
   planar_filter filter_;
   edge_map map_;
-  cloud cloud_;
-  score_table table_;
-  score_field field_;
-  scan_points scan_;
   slack_points lined_;  // those that lie on a line with their neighbours
   place_search search_;
   hypotheses others_;
@@ -125,9 +114,8 @@ class edge_mcl {
   };
   calibration_memory memory_[2];
   wm_time_ns remembered_ns_;
-  wm_pose2 cloud_odom_;
-  double cloud_travelled_m_, cloud_turned_rad_;
-  wm_time_ns cloud_ns_, fused_ns_, watched_ns_, driven_ns_;
+  wm_pose2 scan_odom_;  // odometry at the last scan
+  wm_time_ns fused_ns_, watched_ns_, driven_ns_;
   // Of each camera, and of points that are none's: when a scan was taken in last, and the way till then.
   wm_time_ns aligned_ns_[kCamerasMax + 1];
   double aligned_m_[kCamerasMax + 1];
@@ -138,7 +126,6 @@ class edge_mcl {
   double expected_, expected_s_;  // the same over a drive's last minute, and over how long
   double usual_through_;          // share of the points that seemed to be seen through edges, in that time
   double shortfall_;              // what scans were short of what is usual, in that time, on average
-  double apart_s_;                // the cloud's main cluster has been elsewhere, and better
   double alike_m_;                // way when look-alikes were last weighed
   double watched_m_;              // way when the last scan was judged
   uint32_t resets_;

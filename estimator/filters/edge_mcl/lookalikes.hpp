@@ -8,7 +8,7 @@
 #define WAYMARK_ESTIMATOR_EDGE_MCL_LOOKALIKES_HPP
 
 #include "filters/edge_mcl/align.hpp"
-#include "filters/edge_mcl/search_field.hpp"
+#include "maps/search_field.hpp"
 #include "waymark/frames.h"
 
 namespace wm {

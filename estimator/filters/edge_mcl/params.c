@@ -5,9 +5,6 @@
 
 typedef struct wm_edge_mcl_params params;
 
-static const char *const kWeights[] = {"product", "sum", NULL};
-static const char *const kPoses[] = {"refined", "cloud", NULL};
-
 static const wm_param kParams[] = {
     WM_MOTION_STATE_PARAMS(params, motion),
     F64("states.pitch_sigma_rad", pitch_sigma_rad, 0.01, 0, 0.5,
@@ -21,32 +18,6 @@ static const wm_param kParams[] = {
     F64("states.edge_offset_sigma_m", edge_offset_sigma_m, 0.01, 0, 0.3,
         "Start sigma of what lies between the edge that the detector sees and the map's, m: skirting, contact shadow. "
         "0: off."),
-
-    I32("particles", particles, 200, 10, 20000, "How many particles."),
-    ENUM("weight", weight, EDGE_MCL_PRODUCT, 1, kWeights,
-         "A particle's weight: `product` of its points' likelihoods, tempered; or their `sum`, as the paper has it."),
-    ENUM("pose", pose, EDGE_MCL_REFINED, 1, kPoses,
-         "What is given out while the cloud is one cluster: `refined`, by aligning the scan with the map's lines from "
-         "the filter's prediction; or the `cloud`'s weighted mean on the circle and covariance."),
-    F64("exponent", exponent, 0.08, 0.001, 1,
-        "What the product of the points' likelihoods is raised to: neighbouring points err together, so that 180 of "
-        "them say as much as about 15."),
-    F64("sigma_m", sigma_m, 0.05, 0.005, 0.5,
-        "Sigma of the likelihood field besides the point's own, m: map, mounting and the coarseness of a small cloud."),
-    F64("floor", floor, 0.05, 0.0001, 0.9,
-        "Share of points that are no edge of the map: what any point counts at least."),
-    F64("resample_below", resample_below, 0.5, 0, 1,
-        "Resampling when the effective number of particles falls below this share of them."),
-    F64("noise.way", noise_way, 0.02, 0, 1, "Of the cloud: noise along the way, m per sqrt(m)."),
-    F64("noise.side", noise_side, 0.01, 0, 1,
-        "Of the cloud: noise across the way, m per sqrt(m). A robot does not go exactly where it points; without it a "
-        "cloud that drives backwards is lost."),
-    F64("noise.turn", noise_turn, 0.01, 0, 1, "Of the cloud: noise of the heading, rad per sqrt(m)."),
-    F64("noise.turn_rest", noise_turn_rest, 0.003, 0, 1, "Of the cloud: noise of the heading, rad per sqrt(s)."),
-    F64("noise.turn_rel", noise_turn_rel, 0.02, 0, 1, "Of the cloud: noise of the heading, rad per sqrt(rad) of turn."),
-    F64("pull", pull, 0.5, 0, 1,
-        "Share of the way to the aligned scan's maximum that the particles near it are moved: towards the optimal "
-        "proposal. 0: the motion alone proposes."),
 
     F64("points.pixel_px", pixel_px, 0.5, 0.01, 10,
         "Sigma of an edge in the picture, pixels, where the detector doesn't give it in metres."),

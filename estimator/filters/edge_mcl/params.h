@@ -11,19 +11,12 @@
 extern "C" {
 #endif
 
-enum edge_mcl_weight { EDGE_MCL_PRODUCT, EDGE_MCL_SUM };
 // What a search must be allowed a scan, so that a place can be aligned and another weighed.
 enum { EDGE_MCL_SEARCH_POSES_LEAST = 12000 };
-enum edge_mcl_pose { EDGE_MCL_REFINED, EDGE_MCL_CLOUD };
 
 typedef struct wm_edge_mcl_params {
   wm_motion_states motion;
   double pitch_sigma_rad, roll_sigma_rad, yaw_sigma_rad, height_sigma_m, time_offset_sigma_s, edge_offset_sigma_m;
-
-  int32_t particles, weight, pose;
-  double exponent, sigma_m, floor, resample_below;
-  double noise_way, noise_side, noise_turn, noise_turn_rest, noise_turn_rel;
-  double pull;
 
   double pixel_px, point_sigma_m, common_px, correlated, range_max_m;
   double gate_m, normal_gate_rad;

@@ -7,9 +7,8 @@
 #define WAYMARK_ESTIMATOR_EDGE_MCL_PLACE_SEARCH_HPP
 
 #include "filters/edge_mcl/align.hpp"
-#include "filters/edge_mcl/likelihood.hpp"
 #include "filters/edge_mcl/params.h"
-#include "filters/edge_mcl/search_field.hpp"
+#include "maps/search_field.hpp"
 #include "waymark/frames.h"
 
 namespace wm {

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <vector>
 
-#include "filters/edge_mcl/likelihood.hpp"
+#include "maps/likelihood.hpp"
 #include "unity.h"
 #include "waymark/random.h"
 #include "waymark/vectors.h"

@@ -1,154 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // edge_mcl in a small drawn building: tracking forwards and backwards, mending a camera's errors, being carried away,
 // starting anywhere, seeing nonsense.
-#include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <memory>
-#include <vector>
-
+#include "edge_building.hpp"
 #include "filters/edge_mcl/hypotheses.hpp"
 #include "filters/edge_mcl/params.h"
-#include "math/arc.hpp"
-#include "unity.h"
-#include "waymark/estimator.h"
-#include "waymark/random.h"
 
 namespace {
 
-constexpr double kPixel_m = 0.02;
-constexpr int kWidth = 900, kHeight = 600;  // 18 x 12 m
-
-struct segment {
-  double ax, ay, bx, by;
-};
-// An L of corridors with recesses of different lengths, and a pillar.
-const segment kWalls[] = {{1, 1, 16, 1},        {16, 1, 16, 3},        {16, 3, 9, 3},  {9, 3, 9, 3.4},
-                          {9, 3.4, 7.8, 3.4},   {7.8, 3.4, 7.8, 3},    {7.8, 3, 6, 3}, {6, 3, 6, 5},
-                          {6, 5, 6.5, 5},       {6.5, 5, 6.5, 7},      {6.5, 7, 6, 7}, {6, 7, 6, 11},
-                          {6, 11, 3.5, 11},     {3.5, 11, 3.5, 3},     {3.5, 3, 1, 3}, {1, 3, 1, 1},
-                          {12, 1.6, 12.4, 1.6}, {12.4, 1.6, 12.4, 1.3}};
-
-std::vector<uint8_t> edges, drivable;
-wm_raster map;
-wm_rig rig;
-std::vector<char> motion_params, params;
-wm_setup setup;
-
-bool inside(double x, double y) { return (x > 1 && x < 16 && y > 1 && y < 3) || (x > 3.5 && x < 6 && y > 1 && y < 11); }
-
-struct filter {
-  const wm_estimator *ops = wm_estimator_find("edge_mcl");
-  void *state;
-  size_t bytes;
-  filter() {
-    const char *why = "";
-    bytes = ops->state_bytes(params.data(), &setup, &why);
-    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
-    state = aligned_alloc(64, (bytes + 63) / 64 * 64);
-    TEST_ASSERT_EQUAL(WM_OK, ops->init(state, params.data(), &setup));
-  }
-  ~filter() { free(state); }
-  filter(const filter &) = delete;
-  wm_estimate estimate() const {
-    wm_estimate e;
-    ops->estimate(state, &e);
-    return e;
-  }
-};
-
-// First wall along a ray, or a negative distance.
-double cast(double x, double y, double angle) {
-  double best = -1;
-  const double c = std::cos(angle), s = std::sin(angle);
-  for (const segment &w : kWalls) {
-    const double ex = w.bx - w.ax, ey = w.by - w.ay, det = ex * s - ey * c;
-    if (std::fabs(det) < 1e-9) continue;
-    const double t = (ex * (w.ay - y) - ey * (w.ax - x)) / det, u = (c * (w.ay - y) - s * (w.ax - x)) / det;
-    if (t > 0.05 && u >= 0 && u <= 1 && (best < 0 || t < best)) best = t;
-  }
-  return best;
-}
-
-struct drive {
-  wm_pose2 truth{2, 2, 0};
-  double t = 0;
-  uint64_t draws = 0;
-  double pitch_rad = 0;         // of the camera, more than is believed
-  bool silent = false;          // motion sensors say nothing
-  double blocked_m = INFINITY;  // something stands across the way, so far before the camera
-  int glass = 0;                // so many rays, from the right on, go on through the wall
-  double noise() { return wm_random_normal(7, 1, draws++); }
-
-  void scan(wm_event *e) {
-    *e = wm_event{};
-    e->kind = WM_EVENT_POINTS;
-    e->t_ns = wm_ns_from_seconds(t);
-    wm_points &p = e->as.points;
-    p.camera = 0;
-    const double eye_x = truth.x_m + std::cos(truth.heading_rad), eye_y = truth.y_m + std::sin(truth.heading_rad);
-    for (int i = 0; i < 140; i++) {
-      const double angle = -1.2 + 2.4 * i / 139, wall = cast(eye_x, eye_y, truth.heading_rad + angle);
-      const double range = std::fmin(i < glass ? 1.5 * wall : wall, blocked_m / std::cos(angle));
-      if (range < 0.3 || range > 5) continue;
-      // Seen at an angle below the horizon of atan(h/r); believed to be pitched less, it seems farther.
-      const double seen = std::atan2(0.4, range) - pitch_rad * std::cos(angle) + 0.001 * noise();
-      if (seen < 0.05) continue;
-      const double r = 0.4 / std::tan(seen);
-      p.x_m[p.count] = (float)(1 + r * std::cos(angle));
-      p.y_m[p.count] = (float)(r * std::sin(angle));
-      p.normal_rad[p.count] = p.sigma_m[p.count] = NAN;
-      p.count++;
-    }
-  }
-  // Seconds with this twist; the scan may be spoilt. Returns the largest error.
-  double go(filter &f, double seconds, double v, double w, bool nonsense = false) {
-    double worst = 0;
-    for (int i = 0; i < (int)(seconds * 10 + 0.5); i++) {
-      wm_event e{};
-      e.kind = WM_EVENT_TWIST2;
-      e.t_ns = wm_ns_from_seconds(t);
-      e.as.twist2 = {v, w};
-      if (!silent) TEST_ASSERT_EQUAL(WM_OK, f.ops->predict(f.state, &e));
-      for (int k = 0; k < 10; k++) {
-        truth.heading_rad += 0.005 * w * 1.01;
-        truth.x_m += 0.01 * v * 0.99 * std::cos(truth.heading_rad);
-        truth.y_m += 0.01 * v * 0.99 * std::sin(truth.heading_rad);
-        truth.heading_rad += 0.005 * w * 1.01;
-      }
-      t += 0.1;
-      scan(&e);
-      if (nonsense)
-        for (uint32_t k = 0; k < e.as.points.count; k++) {
-          e.as.points.x_m[k] = (float)(3 + 2 * noise());
-          e.as.points.y_m[k] = (float)(2 * noise());
-        }
-      wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
-      size_t count = 0;
-      TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
-      const wm_estimate now = f.estimate();
-      TEST_ASSERT_TRUE(std::isfinite(now.pose_map_base.p_m[0]) && std::isfinite(now.covariance[0]));
-      TEST_ASSERT_TRUE(now.covariance[0] > 0 && now.covariance[35] > 0);
-      const double error = error_of(f);
-      worst = std::fmax(worst, error);
-    }
-    return worst;
-  }
-  double error_of(const filter &f) const {
-    const wm_estimate now = f.estimate();
-    const double dx = now.pose_map_base.p_m[0] - truth.x_m, dy = now.pose_map_base.p_m[1] - truth.y_m;
-    return std::sqrt(dx * dx + dy * dy);
-  }
-};
-
-double calibration_of(const filter &f, const char *name) {
-  wm_calibration_value values[64];
-  const size_t count = f.ops->calibration(f.state, values, 64);
-  for (size_t i = 0; i < count; i++)
-    if (std::strcmp(values[i].name, name) == 0) return values[i].value;
-  TEST_FAIL_MESSAGE(name);
-  return 0;
-}
+using namespace edge_building;
 
 void forwards_and_backwards_it_stays_on_the_way(void) {
   filter f;
@@ -156,17 +15,6 @@ void forwards_and_backwards_it_stays_on_the_way(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(f, 10, 1.0, 0.0));
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, d.go(f, 9, -1.0, 0.0));
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
-  wm_particle particles[200];
-  TEST_ASSERT_EQUAL(200, f.ops->particles(f.state, particles, 200));
-  double weight = 0, x = 0, y = 0;
-  for (const wm_particle &p : particles) {
-    weight += p.weight;
-    x += p.weight * p.x_m;
-    y += p.weight * p.y_m;
-  }
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, weight);
-  TEST_ASSERT_DOUBLE_WITHIN(0.1, d.truth.x_m, x);
-  TEST_ASSERT_DOUBLE_WITHIN(0.1, d.truth.y_m, y);
 }
 
 // GIVEN a corridor, whose walls say nothing of the way along it WHEN the robot stands 4 cm further to the left than it
@@ -274,35 +122,6 @@ void places_that_look_the_same_are_listed_beside_the_pose(void) {
     sum += h.weight;
   }
   TEST_ASSERT_TRUE(sum > 0 && sum < 0.01);
-}
-
-// `pose: cloud`: what is given out are the particles' own moments, the heading's on the circle.
-void the_clouds_pose_is_its_particles_mean(void) {
-  reinterpret_cast<wm_edge_mcl_params *>(params.data())->pose = EDGE_MCL_CLOUD;
-  filter f;
-  drive d;
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.go(f, 8, 1.0, 0.0));
-  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
-  wm_particle particles[200];
-  TEST_ASSERT_EQUAL(200, f.ops->particles(f.state, particles, 200));
-  double x = 0, y = 0, sine = 0, cosine = 0, xx = 0, yy = 0;
-  for (const wm_particle &p : particles) {
-    x += p.weight * p.x_m;
-    y += p.weight * p.y_m;
-    sine += p.weight * std::sin(p.heading_rad);
-    cosine += p.weight * std::cos(p.heading_rad);
-  }
-  for (const wm_particle &p : particles) {
-    xx += p.weight * (p.x_m - x) * (p.x_m - x);
-    yy += p.weight * (p.y_m - y) * (p.y_m - y);
-  }
-  const wm_estimate e = f.estimate();
-  TEST_ASSERT_DOUBLE_WITHIN(1e-6, x, e.pose_map_base.p_m[0]);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-6, y, e.pose_map_base.p_m[1]);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-6, std::atan2(sine, cosine), e.heading_rad);
-  const double own = reinterpret_cast<const wm_edge_mcl_params *>(params.data())->lasting_xy_m, lasting = own * own;
-  TEST_ASSERT_DOUBLE_WITHIN(1e-3 * (xx + lasting), xx + lasting, e.covariance[wm_cov_index(0, 0)]);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-3 * (yy + lasting), yy + lasting, e.covariance[wm_cov_index(1, 1)]);
 }
 
 // The robot is told to go on at 1 m/s, nobody hears for 3 s that it has stopped after one: it says that it doesn't know
@@ -504,41 +323,7 @@ void what_it_can_not_work_with_is_said(void) {
 
 }  // namespace
 
-void setUp(void) {
-  const wm_estimator *ops = wm_estimator_find("edge_mcl");
-  edges.assign((size_t)kWidth * kHeight, 0);
-  drivable.assign((size_t)kWidth * kHeight, 0);
-  for (const segment &w : kWalls)
-    for (int i = 0; i <= 4000; i++) {
-      const int column = (int)((w.ax + (w.bx - w.ax) * i / 4000) / kPixel_m);
-      const int row = kHeight - 1 - (int)((w.ay + (w.by - w.ay) * i / 4000) / kPixel_m);
-      edges[(size_t)row * kWidth + (size_t)column] = 255;
-    }
-  for (int row = 0; row < kHeight; row++)
-    for (int column = 0; column < kWidth; column++)
-      drivable[(size_t)row * kWidth + (size_t)column] =
-          inside((column + 0.5) * kPixel_m, (kHeight - 0.5 - row) * kPixel_m) ? 255 : 0;
-  map = {kWidth, kHeight, kPixel_m, 0, 0, 0, edges.data(), drivable.data(), 1};
-  wm_rig_init(&rig);
-  rig.camera_count = 1;
-  std::strcpy(rig.cameras[0].name, "front");
-  rig.cameras[0].model = WM_CAMERA_EQUIDISTANT;
-  rig.cameras[0].width_px = 1280;
-  rig.cameras[0].intrinsics_count = 4;
-  rig.cameras[0].intrinsics[0] = rig.cameras[0].intrinsics[1] = 520;
-  rig.cameras[0].mounting = {{1.0, 0, 0.4}, {0, 0.38, 0}};
-  motion_params.resize(wm_motion_params_table.bytes);
-  wm_params_defaults(&wm_motion_params_table, motion_params.data());
-  params.resize(ops->params.bytes);
-  wm_params_defaults(&ops->params, params.data());
-  setup = {};
-  setup.motion = reinterpret_cast<const wm_motion_params *>(motion_params.data());
-  setup.wheels = {NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}};
-  setup.rig = &rig;
-  setup.map = &map;
-  setup.start = {WM_TIME_NONE, {2, 2, 0}, {0, 0, 0, 1}, 0, 0.05, 0.05};
-  setup.seed = 1;
-}
+void setUp(void) { draw("edge_mcl"); }
 void tearDown(void) {}
 
 int main(void) {
@@ -549,7 +334,6 @@ int main(void) {
   RUN_TEST(the_first_scan_counts_for_the_time_since_the_motion_began);
   RUN_TEST(the_same_scan_twice_says_no_more);
   RUN_TEST(places_that_look_the_same_are_listed_beside_the_pose);
-  RUN_TEST(the_clouds_pose_is_its_particles_mean);
   RUN_TEST(motion_sensors_that_fall_silent_are_not_believed);
   RUN_TEST(a_camera_that_looks_lower_than_believed_is_found_out);
   RUN_TEST(carried_away_it_says_so_and_finds_back);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Wide vectors and plain ones give the same bits: elementary functions of four at once, the particles' look-ups, and
-// edge_mcl whole, state by state.
+// edge_mcl and pf_edges whole, state by state.
 #include "waymark/vectors.h"
 
 #include <cmath>
@@ -9,7 +9,7 @@
 #include <memory>
 #include <vector>
 
-#include "filters/edge_mcl/cloud.hpp"
+#include "filters/pf_edges/particles.hpp"
 #include "math/lanes.hpp"
 #include "unity.h"
 #include "waymark/estimator.h"
@@ -175,8 +175,8 @@ void what_lies_beyond_the_map_or_far_away_counts_nothing(void) {
 }
 
 // The whole filter over a drive of scans, tracking and searching: every byte of its state.
-void edge_mcl_has_the_same_particles(void) {
-  const wm_estimator *ops = wm_estimator_find("edge_mcl");
+void same_state(const char *estimator) {
+  const wm_estimator *ops = wm_estimator_find(estimator);
   std::vector<char> params(ops->params.bytes), motion(wm_motion_params_table.bytes);
   wm_params_defaults(&ops->params, params.data());
   wm_params_defaults(&wm_motion_params_table, motion.data());
@@ -225,6 +225,9 @@ void edge_mcl_has_the_same_particles(void) {
   TEST_ASSERT_EQUAL_MEMORY(states[0].get(), states[1].get(), bytes);
 }
 
+void edge_mcl_has_the_same_state(void) { same_state("edge_mcl"); }
+void pf_edges_has_the_same_particles(void) { same_state("pf_edges"); }
+
 }  // namespace
 
 void setUp(void) {}
@@ -239,6 +242,7 @@ int main(void) {
   RUN_TEST(elementary_functions_of_four);
   RUN_TEST(the_field_says_what_the_table_says);
   RUN_TEST(what_lies_beyond_the_map_or_far_away_counts_nothing);
-  RUN_TEST(edge_mcl_has_the_same_particles);
+  RUN_TEST(edge_mcl_has_the_same_state);
+  RUN_TEST(pf_edges_has_the_same_particles);
   return UNITY_END();
 }

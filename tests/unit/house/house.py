@@ -49,6 +49,7 @@ FOLDER_MAY_USE = {
     "filters/edge_mcl": FILTER,
     "filters/landmark_ekf": FILTER,
     "filters/odometry": FILTER,
+    "filters/pf_edges": FILTER,
     "filters/slam": FILTER,
     "filters/stereo_ekf": FILTER,
 }

@@ -19,7 +19,7 @@ const error_case kErrorCases[] = {
     {CONFIG, "Key that nobody knows", FILE_, "colour: red\n",
      "config/robot.yaml:3: colour: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
      "can_signals, devices, map, initial_pose, vision, start, black_box, publish, merge, realtime, motion, odometry, "
-     "landmark_ekf, edge_mcl, slam, "
+     "landmark_ekf, edge_mcl, pf_edges, slam, "
      "stereo_ekf"},
     {CONFIG, "CAN interface without its name", FILE_, "devices: {can: [{dbc: car.dbc, can_signals: s.yaml}]}\n",
      "config/robot.yaml:3: devices.can[0]: interface: is missing; `ip link` lists them"},
@@ -44,9 +44,10 @@ const error_case kErrorCases[] = {
      "config/robot.yaml:3: merge: a map of parameters (KEY: VALUE) is needed"},
     {CONFIG, "Unknown estimator", FILE_, "format: waymark-config/1\nestimator: landmark_ukf\n",
      "config/robot.yaml:2: estimator: 'landmark_ukf' is unknown; did you mean 'landmark_ekf'? (one of: odometry, "
-     "landmark_ekf, edge_mcl, slam, stereo_ekf)"},
+     "landmark_ekf, edge_mcl, pf_edges, slam, stereo_ekf)"},
     {CONFIG, "No estimator", FILE_, "format: waymark-config/1\n",
-     "config/robot.yaml:1: estimator: is missing; one of these is needed: odometry, landmark_ekf, edge_mcl, slam, "
+     "config/robot.yaml:1: estimator: is missing; one of these is needed: odometry, landmark_ekf, edge_mcl, pf_edges, "
+     "slam, "
      "stereo_ekf"},
     {CONFIG, "Another format", FILE_, "format: waymark-config/9\n",
      "config/robot.yaml:1: format: 'waymark-config/9' is not a format that this program reads; it reads "

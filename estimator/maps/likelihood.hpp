@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // How well a scan of edge points fits the map from a pose: the kernel that a particle costs. Integers from the look-up
 // on, so that the order of summation is nobody's business; the vector form and its scalar twin give the same bits.
-#ifndef WAYMARK_ESTIMATOR_EDGE_MCL_LIKELIHOOD_HPP
-#define WAYMARK_ESTIMATOR_EDGE_MCL_LIKELIHOOD_HPP
+#ifndef WAYMARK_ESTIMATOR_MAPS_LIKELIHOOD_HPP
+#define WAYMARK_ESTIMATOR_MAPS_LIKELIHOOD_HPP
 
 #include "maps/edge_map.hpp"
 #include "waymark/event.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filters/edge_mcl/likelihood.hpp"
+#include "maps/likelihood.hpp"
 
 #include "math/elementary.hpp"
 #include "math/wide.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filters/edge_mcl/search_field.hpp"
+#include "maps/search_field.hpp"
 
 #include <bit>
 #include <cstring>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filters/edge_mcl/score_field.hpp"
+#include "maps/score_field.hpp"
 
 #include <cstring>
 

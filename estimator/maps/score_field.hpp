@@ -4,10 +4,10 @@
 // the place within a tile and the tile's number are 16 bits each and an address is the one behind the other; within a
 // tile in cells of 8 x 8, a cache line each. One dependent load is left of each point. Integers all the way: the order
 // of summation is nobody's business, and vectors of any width give the same bits.
-#ifndef WAYMARK_ESTIMATOR_EDGE_MCL_SCORE_FIELD_HPP
-#define WAYMARK_ESTIMATOR_EDGE_MCL_SCORE_FIELD_HPP
+#ifndef WAYMARK_ESTIMATOR_MAPS_SCORE_FIELD_HPP
+#define WAYMARK_ESTIMATOR_MAPS_SCORE_FIELD_HPP
 
-#include "filters/edge_mcl/likelihood.hpp"
+#include "maps/likelihood.hpp"
 
 namespace wm {
 

@@ -4,8 +4,8 @@
 // from every place: a look-up costs two loads and an addition (E. Olson, "Real-time correlative scan matching", 2009).
 // A sweep looks from a grid, every second cell, at 16 places of a row at a time: of all of them a point's cells lie
 // side by side, so that a vector is loaded where 16 bytes would be. Integers: the same bits everywhere.
-#ifndef WAYMARK_ESTIMATOR_EDGE_MCL_SEARCH_FIELD_HPP
-#define WAYMARK_ESTIMATOR_EDGE_MCL_SEARCH_FIELD_HPP
+#ifndef WAYMARK_ESTIMATOR_MAPS_SEARCH_FIELD_HPP
+#define WAYMARK_ESTIMATOR_MAPS_SEARCH_FIELD_HPP
 
 #include <cstddef>
 

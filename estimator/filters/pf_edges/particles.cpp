@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "filters/edge_mcl/cloud.hpp"
+#include "filters/pf_edges/particles.hpp"
 
 #include <cstring>
 
@@ -7,7 +7,11 @@
 #include "waymark/random.h"
 
 namespace wm {
+namespace {
 
+constexpr int kDrawsMost = 200;  // of a place before an undrivable one is taken: 0.5 % drivable is found by 63 %
+
+// Lower triangle of a covariance. A pivot that is not positive becomes 0: no spread along that axis.
 void cholesky3(const double covariance[3][3], double lower[3][3]) {
   for (int i = 0; i < 3; i++)
     for (int j = 0; j <= i; j++) {
@@ -20,7 +24,9 @@ void cholesky3(const double covariance[3][3], double lower[3][3]) {
     }
 }
 
-void cloud::init(int count, uint64_t seed, void *memory) {
+}  // namespace
+
+void particles::init(int count, uint64_t seed, void *memory) {
   count_ = count;
   seed_ = seed;
   step_ = 0;
@@ -30,7 +36,7 @@ void cloud::init(int count, uint64_t seed, void *memory) {
 
 // Four numbers of variance 1 from one block of random bits: each the sum of three uniform ones of 10 bits. A step's
 // noise need not have the normal's tails; it must be cheap.
-void cloud::normals(int particle, double out[4]) const {
+void particles::normals(int particle, double out[4]) const {
   uint32_t block[4];
   wm_random_block(seed_, step_, (uint64_t)particle, block);
   for (int k = 0; k < 4; k++) {
@@ -39,29 +45,39 @@ void cloud::normals(int particle, double out[4]) const {
   }
 }
 
-void cloud::spread(const wm_pose2 &pose, const double covariance[3][3]) {
-  spread_some(0, count_, pose, covariance);
-  level();
-}
-
-void cloud::level() {
+void particles::level() {
   for (int i = 0; i < count_; i++) array(3)[i] = 1.0 / count_;
 }
 
-void cloud::spread_some(int from, int to, const wm_pose2 &pose, const double covariance[3][3]) {
+void particles::spread(const wm_pose2 &pose, const double covariance[3][3]) {
   double lower[3][3] = {};
   cholesky3(covariance, lower);
   step_++;
-  for (int i = from; i < to; i++) {
+  for (int i = 0; i < count_; i++) {
     double n[4];
     normals(i, n);
     array(0)[i] = pose.x_m + lower[0][0] * n[0];
     array(1)[i] = pose.y_m + lower[1][0] * n[0] + lower[1][1] * n[1];
     array(2)[i] = wrap(pose.heading_rad + lower[2][0] * n[0] + lower[2][1] * n[1] + lower[2][2] * n[2]);
   }
+  level();
 }
 
-void cloud::move(const wm_pose2 &increment, const step_noise &noise) {
+void particles::spread_over(const edge_map &map) {
+  const wm_raster &raster = map.raster();
+  for (int i = 0; i < count_; i++) {
+    for (int draw = 0; draw < kDrawsMost; draw++) {
+      step_++;
+      map.to_map(raster.width_px * wm_random_uniform(seed_, step_, 0),
+                 raster.height_px * wm_random_uniform(seed_, step_, 1), &array(0)[i], &array(1)[i]);
+      if (map.drivable(array(0)[i], array(1)[i])) break;
+    }
+    array(2)[i] = wrap(kTwoPi * wm_random_uniform(seed_, step_, 2));
+  }
+  level();
+}
+
+void particles::propagate(const wm_pose2 &increment, const step_noise &noise) {
   double *x = array(0), *y = array(1), *heading = array(2);
   step_++;
   for (int i = 0; i < count_; i++) {
@@ -78,7 +94,8 @@ void cloud::move(const wm_pose2 &increment, const step_noise &noise) {
 }
 
 // All particles against a block of points, block after block.
-void cloud::score_by_field(const edge_map &map, const score_field &field, const scan_points &points, double *scored) {
+void particles::score_by_field(const edge_map &map, const score_field &field, const scan_points &points,
+                               double *scored) {
   packed_scan packed;
   field.pack(map, points, &packed);
   auto *words = reinterpret_cast<int16_t *>(array(5));
@@ -95,8 +112,8 @@ void cloud::score_by_field(const edge_map &map, const score_field &field, const 
   for (int i = 0; i < count_; i++) scored[i] = least + field.unit() * sums[i];
 }
 
-bool cloud::weigh(const edge_map &map, const score_field &field, const scan_points &points, const score_table &table,
-                  double exponent, bool sum) {
+bool particles::weigh(const edge_map &map, const score_field &field, const scan_points &points,
+                      const score_table &table, double exponent, bool sum) {
   const double *x = array(0), *y = array(1), *heading = array(2);
   double *weight = array(3), *scored = array(4);
   if (field.ready()) score_by_field(map, field, points, scored);
@@ -126,15 +143,14 @@ bool cloud::weigh(const edge_map &map, const score_field &field, const scan_poin
   return true;
 }
 
-double cloud::effective() const {
+double particles::effective() const {
   const double *weight = array(3);
   double squares = 0.0;
   for (int i = 0; i < count_; i++) squares += weight[i] * weight[i];
   return squares > 0.0 ? 1.0 / squares : 0.0;
 }
 
-// Low variance: one random number, then equal steps through the sum of the weights.
-void cloud::resample() {
+void particles::resample() {
   step_++;
   const double step = 1.0 / count_;
   double at = step * wm_random_uniform(seed_, step_, 0), sum = array(3)[0];
@@ -147,31 +163,16 @@ void cloud::resample() {
   for (int i = 0; i < count_; i++) array(3)[i] = step;
 }
 
-void cloud::pull(const wm_pose2 &target, const double gain[3][3], double gate_m, double gate_rad) {
-  double *at[3] = {array(0), array(1), array(2)};
-  for (int i = 0; i < count_; i++) {
-    const double d[3] = {target.x_m - at[0][i], target.y_m - at[1][i], wrap(target.heading_rad - at[2][i])};
-    if (d[0] * d[0] + d[1] * d[1] > gate_m * gate_m || std::fabs(d[2]) > gate_rad) continue;
-    for (int r = 0; r < 3; r++) at[r][i] += gain[r][0] * d[0] + gain[r][1] * d[1] + gain[r][2] * d[2];
-    at[2][i] = wrap(at[2][i]);
-  }
-}
-
-int cloud::best() const {
+particle_moments particles::main_cluster(double radius_m, double radius_rad) const {
   int best = 0;
   for (int i = 1; i < count_; i++)
     if (weight(i) > weight(best)) best = i;
-  return best;
-}
-
-cloud_moments cloud::moments() const { return moments_near({x(best()), y(best()), heading(best())}, 1e9, 10.0); }
-
-cloud_moments cloud::moments_near(const wm_pose2 &centre, double radius_m, double radius_rad) const {
-  cloud_moments out{};
+  const wm_pose2 centre = {x(best), y(best), heading(best)};
   const auto near = [&](int i) {
-    return square(x(i) - centre.x_m) + square(y(i) - centre.y_m) <= radius_m * radius_m &&
+    return square(x(i) - centre.x_m) + square(y(i) - centre.y_m) <= square(radius_m) &&
            std::fabs(wrap(heading(i) - centre.heading_rad)) <= radius_rad;
   };
+  particle_moments out{};
   double sum[2] = {}, circle[2] = {};
   for (int i = 0; i < count_; i++) {
     if (!near(i)) continue;
@@ -183,19 +184,13 @@ cloud_moments cloud::moments_near(const wm_pose2 &centre, double radius_m, doubl
     circle[0] += w * h.cos;
     circle[1] += w * h.sin;
   }
-  if (!(out.share > 0.0)) {
-    out.mean = centre;
-    return out;
-  }
   out.mean = {centre.x_m + sum[0] / out.share, centre.y_m + sum[1] / out.share, atan2(circle[1], circle[0])};
   for (int i = 0; i < count_; i++) {
     if (!near(i)) continue;
     const double d[3] = {x(i) - out.mean.x_m, y(i) - out.mean.y_m, wrap(heading(i) - out.mean.heading_rad)};
     for (int r = 0; r < 3; r++)
-      for (int c = 0; c < 3; c++) out.covariance[r][c] += weight(i) * d[r] * d[c];
+      for (int c = 0; c < 3; c++) out.covariance[r][c] += weight(i) / out.share * d[r] * d[c];
   }
-  for (auto &row : out.covariance)
-    for (double &value : row) value /= out.share;
   return out;
 }
 

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: Apache-2.0
+// A small drawn building, and a drive through it whose camera sees the joints of wall and floor: for tests of the
+// estimators that localize by edges.
+#ifndef WAYMARK_TESTS_EDGE_BUILDING_HPP
+#define WAYMARK_TESTS_EDGE_BUILDING_HPP
+
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "math/arc.hpp"
+#include "unity.h"
+#include "waymark/estimator.h"
+#include "waymark/random.h"
+
+namespace edge_building {
+
+constexpr double kPixel_m = 0.02;
+constexpr int kWidth = 900, kHeight = 600;  // 18 x 12 m
+
+struct segment {
+  double ax, ay, bx, by;
+};
+// An L of corridors with recesses of different lengths, and a pillar.
+inline const segment kWalls[] = {{1, 1, 16, 1},        {16, 1, 16, 3},        {16, 3, 9, 3},  {9, 3, 9, 3.4},
+                                 {9, 3.4, 7.8, 3.4},   {7.8, 3.4, 7.8, 3},    {7.8, 3, 6, 3}, {6, 3, 6, 5},
+                                 {6, 5, 6.5, 5},       {6.5, 5, 6.5, 7},      {6.5, 7, 6, 7}, {6, 7, 6, 11},
+                                 {6, 11, 3.5, 11},     {3.5, 11, 3.5, 3},     {3.5, 3, 1, 3}, {1, 3, 1, 1},
+                                 {12, 1.6, 12.4, 1.6}, {12.4, 1.6, 12.4, 1.3}};
+
+inline const wm_estimator *ops;
+inline std::vector<uint8_t> edges, drivable;
+inline wm_raster map;
+inline wm_rig rig;
+inline std::vector<char> motion_params, params;
+inline wm_setup setup;
+
+inline bool inside(double x, double y) {
+  return (x > 1 && x < 16 && y > 1 && y < 3) || (x > 3.5 && x < 6 && y > 1 && y < 11);
+}
+
+struct filter {
+  const wm_estimator *ops = edge_building::ops;
+  void *state;
+  size_t bytes;
+  filter() {
+    const char *why = "";
+    bytes = ops->state_bytes(params.data(), &setup, &why);
+    TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
+    state = aligned_alloc(64, (bytes + 63) / 64 * 64);
+    TEST_ASSERT_EQUAL(WM_OK, ops->init(state, params.data(), &setup));
+  }
+  ~filter() { free(state); }
+  filter(const filter &) = delete;
+  wm_estimate estimate() const {
+    wm_estimate e;
+    ops->estimate(state, &e);
+    return e;
+  }
+};
+
+// First wall along a ray, or a negative distance.
+inline double cast(double x, double y, double angle) {
+  double best = -1;
+  const double c = std::cos(angle), s = std::sin(angle);
+  for (const segment &w : kWalls) {
+    const double ex = w.bx - w.ax, ey = w.by - w.ay, det = ex * s - ey * c;
+    if (std::fabs(det) < 1e-9) continue;
+    const double t = (ex * (w.ay - y) - ey * (w.ax - x)) / det, u = (c * (w.ay - y) - s * (w.ax - x)) / det;
+    if (t > 0.05 && u >= 0 && u <= 1 && (best < 0 || t < best)) best = t;
+  }
+  return best;
+}
+
+struct drive {
+  wm_pose2 truth{2, 2, 0};
+  double t = 0;
+  uint64_t draws = 0;
+  double pitch_rad = 0;         // of the camera, more than is believed
+  bool silent = false;          // motion sensors say nothing
+  double blocked_m = INFINITY;  // something stands across the way, so far before the camera
+  int glass = 0;                // so many rays, from the right on, go on through the wall
+  double noise() { return wm_random_normal(7, 1, draws++); }
+
+  void scan(wm_event *e) {
+    *e = wm_event{};
+    e->kind = WM_EVENT_POINTS;
+    e->t_ns = wm_ns_from_seconds(t);
+    wm_points &p = e->as.points;
+    p.camera = 0;
+    const double eye_x = truth.x_m + std::cos(truth.heading_rad), eye_y = truth.y_m + std::sin(truth.heading_rad);
+    for (int i = 0; i < 140; i++) {
+      const double angle = -1.2 + 2.4 * i / 139, wall = cast(eye_x, eye_y, truth.heading_rad + angle);
+      const double range = std::fmin(i < glass ? 1.5 * wall : wall, blocked_m / std::cos(angle));
+      if (range < 0.3 || range > 5) continue;
+      // Seen at an angle below the horizon of atan(h/r); believed to be pitched less, it seems farther.
+      const double seen = std::atan2(0.4, range) - pitch_rad * std::cos(angle) + 0.001 * noise();
+      if (seen < 0.05) continue;
+      const double r = 0.4 / std::tan(seen);
+      p.x_m[p.count] = (float)(1 + r * std::cos(angle));
+      p.y_m[p.count] = (float)(r * std::sin(angle));
+      p.normal_rad[p.count] = p.sigma_m[p.count] = NAN;
+      p.count++;
+    }
+  }
+  // Seconds with this twist; the scan may be spoilt. Returns the largest error.
+  double go(filter &f, double seconds, double v, double w, bool nonsense = false) {
+    double worst = 0;
+    for (int i = 0; i < (int)(seconds * 10 + 0.5); i++) {
+      wm_event e{};
+      e.kind = WM_EVENT_TWIST2;
+      e.t_ns = wm_ns_from_seconds(t);
+      e.as.twist2 = {v, w};
+      if (!silent) TEST_ASSERT_EQUAL(WM_OK, f.ops->predict(f.state, &e));
+      for (int k = 0; k < 10; k++) {
+        truth.heading_rad += 0.005 * w * 1.01;
+        truth.x_m += 0.01 * v * 0.99 * std::cos(truth.heading_rad);
+        truth.y_m += 0.01 * v * 0.99 * std::sin(truth.heading_rad);
+        truth.heading_rad += 0.005 * w * 1.01;
+      }
+      t += 0.1;
+      scan(&e);
+      if (nonsense)
+        for (uint32_t k = 0; k < e.as.points.count; k++) {
+          e.as.points.x_m[k] = (float)(3 + 2 * noise());
+          e.as.points.y_m[k] = (float)(2 * noise());
+        }
+      wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
+      size_t count = 0;
+      TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
+      const wm_estimate now = f.estimate();
+      TEST_ASSERT_TRUE(std::isfinite(now.pose_map_base.p_m[0]) && std::isfinite(now.covariance[0]));
+      TEST_ASSERT_TRUE(now.covariance[0] > 0 && now.covariance[35] > 0);
+      const double error = error_of(f);
+      worst = std::fmax(worst, error);
+    }
+    return worst;
+  }
+  double error_of(const filter &f) const {
+    const wm_estimate now = f.estimate();
+    const double dx = now.pose_map_base.p_m[0] - truth.x_m, dy = now.pose_map_base.p_m[1] - truth.y_m;
+    return std::sqrt(dx * dx + dy * dy);
+  }
+};
+
+inline double calibration_of(const filter &f, const char *name) {
+  wm_calibration_value values[64];
+  const size_t count = f.ops->calibration(f.state, values, 64);
+  for (size_t i = 0; i < count; i++)
+    if (std::strcmp(values[i].name, name) == 0) return values[i].value;
+  TEST_FAIL_MESSAGE(name);
+  return 0;
+}
+
+// Draws the building, for this estimator with the defaults of its parameters.
+inline void draw(const char *estimator) {
+  ops = wm_estimator_find(estimator);
+  edges.assign((size_t)kWidth * kHeight, 0);
+  drivable.assign((size_t)kWidth * kHeight, 0);
+  for (const segment &w : kWalls)
+    for (int i = 0; i <= 4000; i++) {
+      const int column = (int)((w.ax + (w.bx - w.ax) * i / 4000) / kPixel_m);
+      const int row = kHeight - 1 - (int)((w.ay + (w.by - w.ay) * i / 4000) / kPixel_m);
+      edges[(size_t)row * kWidth + (size_t)column] = 255;
+    }
+  for (int row = 0; row < kHeight; row++)
+    for (int column = 0; column < kWidth; column++)
+      drivable[(size_t)row * kWidth + (size_t)column] =
+          inside((column + 0.5) * kPixel_m, (kHeight - 0.5 - row) * kPixel_m) ? 255 : 0;
+  map = {kWidth, kHeight, kPixel_m, 0, 0, 0, edges.data(), drivable.data(), 1};
+  wm_rig_init(&rig);
+  rig.camera_count = 1;
+  std::strcpy(rig.cameras[0].name, "front");
+  rig.cameras[0].model = WM_CAMERA_EQUIDISTANT;
+  rig.cameras[0].width_px = 1280;
+  rig.cameras[0].intrinsics_count = 4;
+  rig.cameras[0].intrinsics[0] = rig.cameras[0].intrinsics[1] = 520;
+  rig.cameras[0].mounting = {{1.0, 0, 0.4}, {0, 0.38, 0}};
+  motion_params.resize(wm_motion_params_table.bytes);
+  wm_params_defaults(&wm_motion_params_table, motion_params.data());
+  params.resize(ops->params.bytes);
+  wm_params_defaults(&ops->params, params.data());
+  setup = {};
+  setup.motion = reinterpret_cast<const wm_motion_params *>(motion_params.data());
+  setup.wheels = {NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}};
+  setup.rig = &rig;
+  setup.map = &map;
+  setup.start = {WM_TIME_NONE, {2, 2, 0}, {0, 0, 0, 1}, 0, 0.05, 0.05};
+  setup.seed = 1;
+}
+
+}  // namespace edge_building
+
+#endif

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// pf_edges in a small drawn building: the particle filter's step, its published moments, a start that is not known.
+#include "edge_building.hpp"
+#include "filters/pf_edges/params.h"
+
+namespace {
+
+using namespace edge_building;
+
+constexpr int kCount = 200;
+
+wm_pf_edges_params &own() { return *reinterpret_cast<wm_pf_edges_params *>(params.data()); }
+
+void forwards_and_backwards_it_stays_on_the_way(void) {
+  for (const int weight : {PF_EDGES_PRODUCT, PF_EDGES_SUM}) {
+    own().weight = weight;
+    filter f;
+    drive d;
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.2, d.go(f, 10, 1.0, 0.0));
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.2, d.go(f, 9, -1.0, 0.0));
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+  }
+}
+
+// GIVEN a drive THEN the published pose and covariance are the particles' moments, the heading's on the circle, and the
+// weights sum up to 1.
+void its_pose_is_its_particles_mean(void) {
+  filter f;
+  drive d;
+  d.go(f, 8, 1.0, 0.0);
+  wm_particle all[kCount];
+  TEST_ASSERT_EQUAL(kCount, f.ops->particles(f.state, all, kCount));
+  double weight = 0, x = 0, y = 0, sine = 0, cosine = 0, xx = 0, yy = 0;
+  for (const wm_particle &p : all) {
+    weight += p.weight;
+    x += p.weight * p.x_m;
+    y += p.weight * p.y_m;
+    sine += p.weight * std::sin(p.heading_rad);
+    cosine += p.weight * std::cos(p.heading_rad);
+  }
+  for (const wm_particle &p : all) {
+    xx += p.weight * (p.x_m - x) * (p.x_m - x);
+    yy += p.weight * (p.y_m - y) * (p.y_m - y);
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, weight);
+  const wm_estimate e = f.estimate();
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, x, e.pose_map_base.p_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, y, e.pose_map_base.p_m[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, std::atan2(sine, cosine), e.heading_rad);
+  const double least = 1.6e-5;  // a pixel's rounding
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3 * (xx + least), xx + least, e.covariance[wm_cov_index(0, 0)]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3 * (yy + least), yy + least, e.covariance[wm_cov_index(1, 1)]);
+}
+
+// GIVEN a start that is not known THEN the particles stand all over the drivable floor, and the state is searching;
+// GIVEN 5000 of them WHEN the robot drives THEN they come together.
+void without_a_start_the_particles_stand_everywhere(void) {
+  setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
+  own().particles = 5000;
+  filter f;
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, f.estimate().state);
+  std::vector<wm_particle> all(5000);
+  f.ops->particles(f.state, all.data(), all.size());
+  int south = 0;
+  for (const wm_particle &p : all) {
+    TEST_ASSERT_TRUE(inside(p.x_m, p.y_m));
+    south += p.y_m < 3;
+  }
+  // 30 m2 of the 30 + 2.5 * 8 m2 of floor lie below y = 3.
+  TEST_ASSERT_DOUBLE_WITHIN(0.03, 30.0 / 50.0, south / 5000.0);
+  drive d;
+  d.go(f, 12, 0.8, 0.0);
+  d.go(f, 12, -0.8, 0.0);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, f.estimate().state);
+}
+
+// GIVEN a robot that stands THEN no motion noise moves its particles apart.
+void at_rest_it_gets_no_less_sure(void) {
+  filter f;
+  drive d;
+  d.go(f, 3, 0.5, 0.0);
+  const double before = f.estimate().covariance[0];
+  d.go(f, 3, 0.0, 0.0);
+  TEST_ASSERT_TRUE(f.estimate().covariance[0] <= 1.01 * before);
+}
+
+void a_missing_map_is_said(void) {
+  const char *why = nullptr;
+  setup.map = nullptr;
+  TEST_ASSERT_EQUAL(0, ops->state_bytes(params.data(), &setup, &why));
+  TEST_ASSERT_NOT_NULL(std::strstr(why, "no map"));
+}
+
+}  // namespace
+
+void setUp(void) { draw("pf_edges"); }
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(forwards_and_backwards_it_stays_on_the_way);
+  RUN_TEST(its_pose_is_its_particles_mean);
+  RUN_TEST(without_a_start_the_particles_stand_everywhere);
+  RUN_TEST(at_rest_it_gets_no_less_sure);
+  RUN_TEST(a_missing_map_is_said);
+  return UNITY_END();
+}
