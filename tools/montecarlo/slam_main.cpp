@@ -32,7 +32,8 @@ double percentile_of(const std::vector<SlamOutcome> &all, double percent, double
 }
 
 void print_each(const char *name, const SlamOutcome &o) {
-  std::printf("%-12s %3" PRIu64 ": cut %5.1f s by %4.1f m %4.0f deg, told %5.1f, right %5.1f, alarms %d, wrong %4.1f s, end %6.3f m, "
+  std::printf("%-12s %3" PRIu64
+              ": cut %5.1f s by %4.1f m %4.0f deg, told %5.1f, right %5.1f, alarms %d, wrong %4.1f s, end %6.3f m, "
               "map %.3f -> %.3f m\n",
               name, o.seed, o.cut_s, o.moved_m, o.turned_rad * 57.3, o.told_after_s.value_or(NAN),
               o.right_after_s.value_or(NAN), o.alarms, o.wrong_s, o.end_m, o.map_before_m, o.map_after_m);
@@ -56,10 +57,11 @@ void print_row(const char *name, const std::vector<SlamOutcome> &all) {
   const bool undisturbed = std::strcmp(name, "as-driven") == 0;
   char found[60] = "   -      -   ";
   if (!undisturbed) std::snprintf(found, sizeof found, "%3zu    %3zu  ", told, right);
-  std::printf("%-12s | %3zu    | %s| %s | %3zu (%5.1f s)  | %.3f  %.3f  | %.3f -> %.3f  %.3f | %.3f\n", name, all.size(), found,
-              undisturbed ? std::to_string(alarms).c_str() : "-", wrong, longest, percentile_of(all, 50, end_m),
-              percentile_of(all, 100, end_m), percentile_of(all, 50, before_m), percentile_of(all, 50, after_m),
-              percentile_of(all, 100, after_m), looks > 0 ? static_cast<double>(inside) / static_cast<double>(looks) : 0);
+  std::printf("%-12s | %3zu    | %s| %s | %3zu (%5.1f s)  | %.3f  %.3f  | %.3f -> %.3f  %.3f | %.3f\n", name,
+              all.size(), found, undisturbed ? std::to_string(alarms).c_str() : "-", wrong, longest,
+              percentile_of(all, 50, end_m), percentile_of(all, 100, end_m), percentile_of(all, 50, before_m),
+              percentile_of(all, 50, after_m), percentile_of(all, 100, after_m),
+              looks > 0 ? static_cast<double>(inside) / static_cast<double>(looks) : 0);
   std::fflush(stdout);
 }
 
@@ -72,9 +74,11 @@ int run(const Arguments &a) {
   if (std::strcmp(config.estimator->name, "slam") != 0)
     throw Failure(a.config + ": estimator: is not slam", wm::tools::kUsage);
   std::printf(
-      "%s, %s, seeds %" PRIu64 " to %" PRIu64 "\n\n"
+      "%s, %s, seeds %" PRIu64 " to %" PRIu64
+      "\n\n"
       "             |        | told   right | with   | wrong for     | error at the  | map error, median, m  | NEES\n"
-      "             | drives | in 5 s in 20 | alarms | > 10 s (most) | end, m (most) | before -> after, most | in 95 %%\n",
+      "             | drives | in 5 s in 20 | alarms | > 10 s (most) | end, m (most) | before -> after, most | in 95 "
+      "%%\n",
       scenario.name.c_str(), a.config.c_str(), a.first, a.first + a.drives - 1);
   for (const SlamTrial &trial : slam_trials()) {
     if (!a.kinds.empty() && std::find(a.kinds.begin(), a.kinds.end(), trial.name) == a.kinds.end()) continue;
@@ -93,8 +97,9 @@ int run(const Arguments &a) {
 
 int main(int argc, char **argv) {
   Arguments a;
-  CLI::App app("SLAM over many simulated drives, features only: undisturbed, kidnapped, pushed, started without a pose.",
-               "waymark-montecarlo-slam");
+  CLI::App app(
+      "SLAM over many simulated drives, features only: undisturbed, kidnapped, pushed, started without a pose.",
+      "waymark-montecarlo-slam");
   std::vector<std::string> names;
   for (const SlamTrial &t : slam_trials()) names.emplace_back(t.name);
   app.add_option("SCENARIO", a.scenario, "scenario file (YAML)")->required();

@@ -19,12 +19,12 @@ namespace wm::montecarlo {
 namespace {
 
 constexpr double kDegree = sim::kPi / 180, kLook_s = 0.1;
-constexpr double kAhead_s = 25;          // of the drive behind the cut
-constexpr double kForgotten_s = 1;       // a tracker gives a new number after this time
-constexpr double kMapSigma_m = 0.02;     // of a finished map
-constexpr double kMapTurn_rad = 0.005;   // and of its markers' headings
-constexpr uint64_t kDraws = 0x51a3;      // stream of random numbers
-constexpr double kNear_m = 0.5;          // renumbered: a landmark is the nearest true one's, up to this
+constexpr double kAhead_s = 25;         // of the drive behind the cut
+constexpr double kForgotten_s = 1;      // a tracker gives a new number after this time
+constexpr double kMapSigma_m = 0.02;    // of a finished map
+constexpr double kMapTurn_rad = 0.005;  // and of its markers' headings
+constexpr uint64_t kDraws = 0x51a3;     // stream of random numbers
+constexpr double kNear_m = 0.5;         // renumbered: a landmark is the nearest true one's, up to this
 
 void check(wm_status status, const wm_error &error, const char *what) {
   if (status != WM_OK)
@@ -88,8 +88,7 @@ std::vector<std::max_align_t> with_map(const wm_config &config, const char *use)
     const wm_param &p = table.params[i];
     if (std::strcmp(p.key, "landmarks.map") != 0) continue;
     for (int32_t k = 0; p.names[k] != nullptr; k++)
-      if (std::strcmp(p.names[k], use) == 0)
-        std::memcpy(reinterpret_cast<char *>(out.data()) + p.offset, &k, sizeof k);
+      if (std::strcmp(p.names[k], use) == 0) std::memcpy(reinterpret_cast<char *>(out.data()) + p.offset, &k, sizeof k);
   }
   return out;
 }
@@ -151,8 +150,7 @@ double map_error(const sim::Recording &r, SimulatedFilter &filter, bool by_ident
   for (const wm_landmark &l : found) {
     double least = by_identity ? 1e9 : kNear_m;
     for (const wm_landmark &t : r.landmarks)
-      if (!by_identity || t.id == l.id)
-        least = std::min(least, std::hypot(t.p_m[0] - l.p_m[0], t.p_m[1] - l.p_m[1]));
+      if (!by_identity || t.id == l.id) least = std::min(least, std::hypot(t.p_m[0] - l.p_m[0], t.p_m[1] - l.p_m[1]));
     if (least < 1e8) sum += least * least, count++;
   }
   return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : tools::kNan;
@@ -183,7 +181,14 @@ std::optional<double> right_after(const std::vector<Look> &looks, double cut_s) 
 class Enough {
  public:
   explicit Enough(bool by_identity) : by_identity_(by_identity) {}
+  // Of the map as it is now.
+  void begin(SimulatedFilter &filter) {
+    std::vector<wm_landmark> known(filter.ops().landmarks(filter.state(), nullptr, nullptr, 0));
+    filter.ops().landmarks(filter.state(), known.data(), nullptr, known.size());
+    for (const wm_landmark &l : known) known_.insert(l.id);
+  }
   void see(int32_t id, double t_s) {
+    if (by_identity_ && known_.count(id) == 0) return;
     sightings_++;
     ids_.insert(id);
     if (std::isnan(at_s_) && sightings_ >= (by_identity_ ? 4 : 8) && ids_.size() >= 2) at_s_ = t_s;
@@ -193,12 +198,14 @@ class Enough {
  private:
   bool by_identity_;
   int sightings_ = 0;
-  std::set<int32_t> ids_;
+  std::set<int32_t> known_, ids_;
   double at_s_ = NAN;
 };
 
 int32_t *identity_of(wm_event &e) {
-  return e.kind == WM_EVENT_MARKER ? &e.as.marker.id : e.kind == WM_EVENT_SIGHTING ? &e.as.sighting.landmark_id : nullptr;
+  return e.kind == WM_EVENT_MARKER     ? &e.as.marker.id
+         : e.kind == WM_EVENT_SIGHTING ? &e.as.sighting.landmark_id
+                                       : nullptr;
 }
 
 void judge(const std::vector<Look> &looks, double enough_s, SlamOutcome &out) {
@@ -271,6 +278,7 @@ SlamOutcome run_slam_trial(const sim::Scenario &scenario, const wm_config &confi
       cut = true;
       out.map_before_m = map_error(recording, filter, by_identity);
       numbers.begin_anew();
+      enough.begin(filter);
     }
     if (wm_event_is_motion(&e)) {
       filter.ops().predict(filter.state(), &e);

@@ -39,10 +39,10 @@ struct SlamOutcome {
   // From when enough was seen since the cut (two landmarks of the map, four sightings; renumbered: eight sightings)
   // until the state is LOST or SEARCHING; 0: the pose was right by then. None: never.
   std::optional<double> told_after_s;
-  std::optional<double> right_after_s;  // from the cut until right (tracking, 0.3 m, 5 degrees) for 2 s
-  int alarms = 0;                       // changes to LOST or SEARCHING without a disturbance
-  double wrong_s = 0;                   // longest time of TRACKING off by more than 0.5 m and 3.5 sigma
-  double end_m = 0;                     // error of the position at the end
+  std::optional<double> right_after_s;       // from the cut until right (tracking, 0.3 m, 5 degrees) for 2 s
+  int alarms = 0;                            // changes to LOST or SEARCHING without a disturbance
+  double wrong_s = 0;                        // longest time of TRACKING off by more than 0.5 m and 3.5 sigma
+  double end_m = 0;                          // error of the position at the end
   double map_before_m = 0, map_after_m = 0;  // RMS error of the landmarks, before the cut and at the end
   size_t looks = 0, inside = 0;              // looks while tracking, those within 95 % of the covariance
 };

@@ -12,8 +12,8 @@ template <int kCapacity>
 class state_pool {
  public:
   struct slot {
-    int key;    // -1: free
-    int state;  // first of its states
+    int64_t key;  // -1: free
+    int state;    // first of its states
     wm_time_ns used_ns;
   };
 
@@ -25,7 +25,7 @@ class state_pool {
   }
 
   // The slot of `key`; *fresh says that it was another's. Null where there are no slots.
-  slot *take(int key, bool *fresh) {
+  slot *take(int64_t key, bool *fresh) {
     slot *oldest = nullptr;
     for (int i = 0; i < count_; i++) {
       if (slot_[i].key == key) {

@@ -77,7 +77,7 @@ void joint_state::move(const wm_event &motion) {
     const double none = 0.0;
     innovation_block block;
     prepare(&row, &innovation, &variance, 1, &block);
-    fuse(block, &none, false);
+    (void)fuse(block, &none, scope::all);  // one row with noise of its own: it can't fail
   }
 }
 
@@ -298,22 +298,32 @@ void joint_state::prepare(const joint_row *rows, const double *innovations, cons
   double l[kRows][kRows], y[kRows];
   std::memcpy(l, out->s, sizeof l);
   out->nis = 1e300;
+  out->determinant = 0.0;
   if (!factor(l, count)) return;
   out->nis = 0.0;
+  out->determinant = 1.0;
   for (int k = 0; k < count; k++) {
     y[k] = innovations[k];
     for (int i = 0; i < k; i++) y[k] -= l[k][i] * y[i];
     y[k] /= l[k][k];
     out->nis += square(y[k]);
+    out->determinant *= square(l[k][k]);
   }
 }
 
-void joint_state::fuse(innovation_block &block, const double *more_noise, bool frozen) {
+double joint_state::innovation_block::density() const {
+  if (!(determinant > 0.0)) return 0.0;
+  double scale = determinant;
+  for (int k = 0; k < rows; k++) scale *= kTwoPi;
+  return exp(-0.5 * nis) / std::sqrt(scale);
+}
+
+bool joint_state::fuse(innovation_block &block, const double *more_noise, scope which) {
   const int rows = block.rows;
   for (int k = 0; k < rows; k++) block.s[k][k] += more_noise[k];
   double l[kRows][kRows], y[kRows] = {};
   std::memcpy(l, block.s, sizeof l);
-  if (!factor(l, rows)) return;
+  if (!factor(l, rows)) return false;
   // W = G L'^-1 in place of the gains; K innovation = W y, y = L^-1 innovation; P - G S^-1 G' = P - W W'.
   for (int k = 0; k < rows; k++) {
     y[k] = block.innovation[k];
@@ -328,7 +338,10 @@ void joint_state::fuse(innovation_block &block, const double *more_noise, bool f
   double *e = column(1 + kRows), *r = column(2 + kRows);
   vectors::set_scaled(r, gain(0), y[0], even(n_));
   for (int k = 1; k < rows; k++) vectors::add_scaled(r, gain(k), y[k], even(n_));
-  if (frozen) return fuse_frozen(rows, r);
+  if (which != scope::all) {
+    fuse_part(which == scope::pose ? (int)kPoseStates : layout_.robot_states, rows, r);
+    return true;
+  }
   double before[kMaxRobot];
   std::memcpy(before, x(), static_cast<size_t>(layout_.robot_states) * sizeof *before);
   move_mean(r, e);
@@ -346,6 +359,7 @@ void joint_state::fuse(innovation_block &block, const double *more_noise, bool f
   }
   vectors::apply(p(), update, n_);
   if (layout_.invariant && carries_scale_) carry_scale(before);
+  return true;
 }
 
 // The correction of the mean: on the group of turns and places for the invariant filter (the map turns as a whole with
@@ -389,19 +403,20 @@ void joint_state::move_place(int state, const double *change, const sin_cos &tur
   e[state + 1] = place[0] - px;
 }
 
-// Landmarks are considered, not corrected: of the optimal gain only the robot's rows are applied, and Joseph's form for
-// that gain is P_rr - W_r W_r', P_rm - W_r W_m', P_mm as it is.
-void joint_state::fuse_frozen(int rows, const double *change) {
+// The first `states` are corrected, the others considered: of the optimal gain only the first rows r are applied, and
+// Joseph's form for that gain is P_rr - W_r W_r', P_rm - W_r W_m', P_mm as it is.
+void joint_state::fuse_part(int states, int rows, const double *change) {
   const half_covariance cov = p();
-  const int robot = layout_.robot_states;
-  for (int i = 0; i < robot; i++)
+  for (int i = 0; i < states; i++)
     for (int j = half_covariance::first(i); j < n_; j++) {
       double sum = 0.0;
       for (int k = 0; k < rows; k++) sum += gain(k)[i] * gain(k)[j];
       cov.row(i)[j] -= sum;
     }
+  // The storage holds the element beside the diagonal of each pair of rows twice.
+  if (states % 2 == 1) cov.row(states)[states - 1] = cov.row(states - 1)[states];
   double *mean = x();
-  for (int j = 0; j < robot; j++) mean[j] += change[j];
+  for (int j = 0; j < states; j++) mean[j] += change[j];
   mean[kHeading] = wrap(mean[kHeading]);
   take_calibration(x());
 }

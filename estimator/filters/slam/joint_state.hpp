@@ -112,14 +112,18 @@ class joint_state : public planar_motion {
   // by the calls after it, until the state changes.
   struct innovation_block {
     int rows;
-    double s[kRows][kRows];
+    double s[kRows][kRows];  // lower triangle
     double innovation[kRows];
     double nis;
+    double determinant;      // of S; 0: S is no covariance, the nis infinite
+    double density() const;  // of the innovation, normal with covariance S
   };
+  // Which states a correction may change. Others are considered: their covariance counts, they stay as they are (S. F.
+  // Schmidt, 1966).
+  enum class scope { all, robot, pose };
   void prepare(const joint_row *rows, const double *innovations, const double *noise, int count, innovation_block *out);
-  // Fuses what `prepare` made, with `more_noise[k]` added to each row's. `frozen`: landmarks keep their values and
-  // covariance (S. F. Schmidt, 1966).
-  void fuse(innovation_block &block, const double *more_noise, bool frozen);
+  // Fuses what `prepare` made, with `more_noise[k]` added to each row's. False: S is no covariance, nothing changed.
+  [[nodiscard]] bool fuse(innovation_block &block, const double *more_noise, scope which);
 
   // P H' of a single row, without changing what `prepare` made; n doubles.
   void project(const joint_row &row, double *gain) const;
@@ -142,7 +146,7 @@ class joint_state : public planar_motion {
   void propagate(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise);
   void move_mean(const double *change, double *e);
   void move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e);
-  void fuse_frozen(int rows, const double *change);
+  void fuse_part(int states, int rows, const double *change);
   void tell_scale_anew();
   void hold_scale(double *e);
   void carry_scale(const double *before);

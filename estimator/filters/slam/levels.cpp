@@ -34,7 +34,7 @@ void slam::level_camera(int landmark, int sensor, const marker_reading &r) {
     if (joint_.variance_of(row) > kSaysMuch * noise) {
       joint_state::innovation_block block;
       joint_.prepare(&row, &innovation, &noise, 1, &block);
-      if (block.nis < kGate) joint_.fuse(block, &none, params_.map == WM_SLAM_MAP_FROZEN);
+      if (block.nis < kGate) (void)joint_.fuse(block, &none, scope_now());
     }
   }
   note.levelled += 1.0;

@@ -29,8 +29,7 @@ bool slam::find_start(int landmark, const wm_marker &m, const marker_reading &r,
                            compose({sensor.x_m, sensor.y_m, sensor.yaw_rad}, {r.level[0], r.level[1], r.yaw_rad}),
                            joint_.odom()};
   if (!start_by_two(landmark, now) && !start_by_one(landmark, m, r, now)) return false;
-  searching_ = false;
-  resets_++;
+  take_found();
   return true;
 }
 
@@ -122,7 +121,8 @@ bool slam::start_by_one(int landmark, const wm_marker &m, const marker_reading &
 void slam::doubt_start(int misfits) {
   if (rests_on_ < 0 || misfits < kRefuted) return;
   rests_on_ = candidate_.id = -1;
-  searching_ = one_refuted_ = true;
+  one_refuted_ = true;
+  state_ = WM_STATE_SEARCHING;
 }
 
 }  // namespace wm

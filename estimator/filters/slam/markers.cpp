@@ -9,6 +9,8 @@ namespace {
 
 constexpr double kFarthest_m = 1e4;
 constexpr double kThreeNumbers = 11.345 / 9.210;  // 99 % of chi2 with three degrees of freedom against two
+constexpr double kClutter_m = 10.0;               // a misread code lies anywhere on a square of this side
+constexpr double kUnder_m = 0.05;                 // a marker nearer to the camera's axis than this has no direction
 constexpr double kPlain = 9.0;                    // of two poses one is 90 times as likely
 
 double first_number(double a, double b) { return finite(a) ? a : b; }
@@ -104,8 +106,13 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   const bool two = m.poses == 2;
   const bool sure = m.yaw_sigma_rad <= params_.marker_heading_most_rad;
   r.turned = !two && sure;
-  if (searching_ && (landmark < 0 || !find_start(landmark, m, r, two))) return drop(WM_REJECTED_SEARCHING);
+  if (state_ == WM_STATE_SEARCHING && (landmark < 0 || !find_start(landmark, m, r, two)))
+    return drop(WM_REJECTED_SEARCHING);
   const past_pose past = look_back(sensor_value(m.sensor, kTimeOffset, 0.0));
+  if (landmark >= 0 && map_is_held()) {
+    keep_observation(landmark, m.sensor, past, sighted_of(m, r));
+    if (relocalize()) return drop(WM_REJECTED_SEARCHING);
+  }
   if (two) {
     // Seen nearly face on a print has two poses, which differ in its heading. The filter tells them apart where it
     // knows better; where not, the place alone is taken: the same side would be the wrong one sighting after sighting.
@@ -119,6 +126,8 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
     fuse_known_marker(landmark, m, r, past, blank, records);
   else if (params_.map == WM_SLAM_MAP_FROZEN)
     drop(WM_REJECTED_UNKNOWN_ID);
+  else if (map_is_held())
+    drop(WM_REJECTED_SEARCHING);
   else
     join_marker(m, r, past, blank, records);
   return WM_OK;
@@ -214,27 +223,46 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
   joint_.prepare(v.row, v.innovation, v.noise, count, &block);
   const double scale = r.turned ? kThreeNumbers : 1.0;
   const double hard = params_.gate_hard * scale, soft = params_.gate_soft * scale;
+  if (!weigh(landmark, block, block.nis <= hard, square(kClutter_m) * (r.turned ? kTwoPi : 1.0), std::nan(""))) {
+    blank.verdict = WM_REJECTED_SEARCHING;
+    records.add(blank);
+    return;
+  }
+  const bool fits = block.nis <= hard;
+  double variance[3];
+  for (int i = 0; i < count; i++) variance[i] = block.s[i][i];
+  const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
+  const double more[3] = {v.noise[0] * weaker, v.noise[1] * weaker, v.noise[2] * weaker};
+  const bool failed = fits && !joint_.fuse(block, more, scope_now());
   for (int i = 0; i < count; i++) {
     wm_innovation record = blank;
     record.residual = (uint8_t)kKinds[i];
     record.observed = v.observed[i];
     record.expected = v.expected[i];
-    record.variance = block.s[i][i];
+    record.variance = variance[i];
     record.nis = block.nis;
     record.gate = hard;
     record.gate_dof = (uint8_t)count;
-    record.verdict = block.nis <= hard ? WM_FUSED : WM_REJECTED_GATE;
+    record.verdict = failed ? WM_REJECTED_SINGULAR : fits ? WM_FUSED : WM_REJECTED_GATE;
     records.add(record);
   }
-  if (r.turned) note_turn(block.nis <= hard, v.innovation[2], true);
-  if (block.nis > hard) return misfit(landmark, true);
-  const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
-  const double more[3] = {v.noise[0] * weaker, v.noise[1] * weaker, v.noise[2] * weaker};
-  joint_.fuse(block, more, params_.map == WM_SLAM_MAP_FROZEN);
+  if (r.turned) note_turn(fits, v.innovation[2], true);
+  if (!fits) return misfit(landmark, true);
+  if (failed) return;
   landmark_note &note = notes()[landmark];
-  if (!note.surveyed) note.z_m += (r.z_m - note.z_m) / (note.seen + 1.0);
+  if (!note.surveyed && !map_is_held()) note.z_m += (r.z_m - note.z_m) / (note.seen + 1.0);
   note_fused(landmark, m.sensor);
-  level_camera(landmark, m.sensor, r);
+  if (!map_is_held()) level_camera(landmark, m.sensor, r);
+}
+
+slam::sighted slam::sighted_of(const wm_marker &m, const marker_reading &r) const {
+  const double floor_m = std::sqrt(square(r.level[0]) + square(r.level[1]));
+  return {floor_m > kUnder_m ? atan2(r.along[1], r.along[0]) : std::nan(""),
+          floor_m / sensor_value(m.sensor, kRangeScale, 1.0),
+          r.turned ? wrap(sensor_[m.sensor].yaw_rad + r.yaw_rad) : std::nan(""),
+          std::sqrt(r.noise[1]) / larger(floor_m, kUnder_m),
+          std::sqrt(r.noise[0]),
+          std::sqrt(r.noise[2])};
 }
 
 // Paper, system 2, new marker: P_aa = G_x P G_x' + G_z R G_z' with all cross terms.

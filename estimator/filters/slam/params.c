@@ -102,6 +102,10 @@ static const wm_param kParams[] = {
     ENUM("consistency", consistency, WM_SLAM_INVARIANT, WM_SLAM_PLAIN, kConsistency,
          "invariant: the right-invariant filter, which knows what it can't know (the map's heading and place); plain: "
          "the textbook's, which becomes too sure of its heading (for comparison)."),
+    BOOL(
+        "recover.on", recover, 1,
+        "Detect that observations contradict the pose (the robot was carried off or pushed): hold the map, state LOST, "
+        "and search the pose on the map."),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
         "Nothing fused for so long: the state says dead reckoning."),
 };

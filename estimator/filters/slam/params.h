@@ -46,6 +46,7 @@ typedef struct wm_slam_params {
   int32_t line_rejoin;
   double line_near_m, line_patience_s, line_parallax_rad, line_step_m, line_sigma_rel;
   int32_t consistency;
+  int32_t recover;
   double dead_reckoning_after_s;
 } wm_slam_params;
 

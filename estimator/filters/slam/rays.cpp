@@ -99,15 +99,16 @@ void slam::follow_ray(int32_t id, const wm_sighting &s, const reading &r, const 
   blank.nis = block.nis;
   blank.gate = params_.gate_hard * kOneNumber;
   blank.gate_dof = 1;
-  blank.verdict = block.nis <= blank.gate ? WM_FUSED : WM_REJECTED_GATE;
+  const bool fits = block.nis <= blank.gate;
+  const double more = block.nis > soft ? noise * (block.nis / soft - 1.0) : 0.0;
+  const bool fused = fits && joint_.fuse(block, &more, joint_state::scope::all);
+  blank.verdict = fused ? WM_FUSED : fits ? WM_REJECTED_SINGULAR : WM_REJECTED_GATE;
   records.add(blank);
-  note_turn(blank.verdict == WM_FUSED, innovation, false);
-  if (blank.verdict != WM_FUSED) {
+  note_turn(fits, innovation, false);
+  if (!fused) {
     if (++track->misfits >= kMisfits) end_ray(track);
     return;
   }
-  const double more = block.nis > soft ? noise * (block.nis / soft - 1.0) : 0.0;
-  joint_.fuse(block, &more, false);
   if (joint_.value(state + 1) < kLeast) joint_.set_value(state + 1, kLeast);
   track->misfits = 0;
   track->last_ns = fused_ns_ = now;

@@ -99,7 +99,7 @@ void slam::rejoin(int fresh) {
   }
   joint_state::innovation_block block;
   joint_.prepare(rows, difference, noise, 2, &block);
-  joint_.fuse(block, none, false);
+  if (!joint_.fuse(block, none, joint_state::scope::all)) return;
   landmark_note &kept = notes()[best];
   const landmark_note gone = notes()[fresh];
   kept.id = gone.id;

@@ -64,7 +64,7 @@ wm_pose2 slam::sensor_pose(int sensor, const past_pose &past) const {
 // The error of this sensor on this landmark that lasts: a slot of states, faded to now. -1 where none is carried.
 int slam::lend(int sensor, int32_t id, wm_time_ns t_ns) {
   bool fresh;
-  auto *slot = lasting_.take(id * kSlamSensors + sensor, &fresh);
+  auto *slot = lasting_.take((int64_t)id * kSlamSensors + sensor, &fresh);
   if (!slot) return -1;
   const int width = lasting_width_;
   const double left = fresh ? 0.0 : exp(-wm_seconds_between(slot->used_ns, t_ns) / params_.lasting_tau_s);
@@ -190,9 +190,16 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   } else if (doubled(id, landmark, s.sensor)) {
     return drop(WM_REJECTED_NO_ASSOCIATION);
   }
+  if (landmark >= 0 && s.landmark_id >= 0 && map_is_held()) {
+    keep_observation(landmark, s.sensor, past, sighted_of(s, r));
+    if (relocalize()) return drop(WM_REJECTED_SEARCHING);
+  }
+  if (state_ == WM_STATE_SEARCHING) return drop(WM_REJECTED_SEARCHING);
   const bool may_join = params_.map != WM_SLAM_MAP_FROZEN && r.bearing && (r.range || params_.line_clones > 0);
   if (landmark >= 0)
     fuse_known(landmark, s, r, past, blank, records);
+  else if (may_join && map_is_held())
+    drop(WM_REJECTED_SEARCHING);
   else if (!may_join)
     drop(WM_REJECTED_UNKNOWN_ID);
   else if (r.range)
@@ -202,6 +209,21 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   else
     track_bearing(id, s, r, past, blank, records);
   return WM_OK;
+}
+
+// What is stated of its sigmas here needs no cross terms: the search allows for odometry's errors besides.
+slam::sighted slam::sighted_of(const wm_sighting &s, const reading &r) const {
+  const sensor_errors errors = errors_of(s.sensor);
+  const bool depth = sensor_[s.sensor].range_is_depth && r.bearing;
+  const double range =
+      (s.range_m - errors.range_bias_m) / errors.range_scale / (depth ? larger(cos(s.bearing_rad), 0.1) : 1.0);
+  return {r.bearing ? s.bearing_rad : std::nan(""),
+          r.range ? range : std::nan(""),
+          std::nan(""),
+          std::sqrt(square(r.bearing_sigma) + square(params_.lasting_bearing_rad)),
+          std::sqrt(square(r.range_sigma) + square(params_.lasting_range_m) +
+                    square((params_.range_sigma_rel + params_.lasting_range_rel) * range)),
+          0.0};
 }
 
 // Bearing and range are gated together: a wrong one spoils its fellow. Between the two gates a sighting counts less, as
@@ -228,32 +250,39 @@ void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, cons
   const double scale = v.count == 2 ? 1.0 : kOneNumber;
   const double hard = params_.gate_hard * scale, soft = params_.gate_soft * scale;
   const bool fused = block.nis <= hard;
+  if (s.landmark_id >= 0 &&
+      !weigh(landmark, block, fused, clutter_volume(r.bearing, r.range), r.bearing ? v.innovation[0] : std::nan(""))) {
+    blank.verdict = WM_REJECTED_SEARCHING;
+    records.add(blank);
+    return;
+  }
   if (fused && s.landmark_id >= 0 && !believable(landmark, block, v.noise[0], scale)) {
     blank.verdict = WM_REJECTED_SEARCHING;
     records.add(blank);
     return;
   }
+  double variance[2];
+  for (int i = 0; i < v.count; i++) variance[i] = block.s[i][i];
+  const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
+  const double more[2] = {v.noise[0] * weaker, v.count == 2 ? v.noise[1] * weaker : 0.0};
+  const bool failed = fused && !joint_.fuse(block, more, scope_now());
   for (int i = 0; i < v.count; i++) {
     wm_innovation record = blank;
     record.residual = (uint8_t)v.kind[i];
     record.observed = v.observed[i];
     record.expected = v.expected[i];
-    record.variance = block.s[i][i];
+    record.variance = variance[i];
     record.nis = block.nis;
     record.gate = hard;
     record.gate_dof = (uint8_t)v.count;
-    record.verdict = fused ? WM_FUSED : WM_REJECTED_GATE;
+    record.verdict = failed ? WM_REJECTED_SINGULAR : fused ? WM_FUSED : WM_REJECTED_GATE;
     records.add(record);
   }
   if (r.bearing) note_turn(fused, v.innovation[0], false);
-  if (!fused) {
+  if (!fused)
     misfit(landmark, r.range);
-    return;
-  }
-  const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
-  const double more[2] = {v.noise[0] * weaker, v.count == 2 ? v.noise[1] * weaker : 0.0};
-  joint_.fuse(block, more, params_.map == WM_SLAM_MAP_FROZEN);
-  note_fused(landmark, s.sensor);
+  else if (!failed)
+    note_fused(landmark, s.sensor);
 }
 
 // Paper, system 2, new marker: P_aa = G_x P G_x' + G_z R G_z' with all cross terms. G by the sighting's own

@@ -19,6 +19,16 @@ constexpr double kOwnFrame_m = 1e-3, kOwnFrame_rad = 1e-3;  // the map begins wh
 constexpr double kSurveyed_m = 1e-4, kSurveyed_rad = 0.01;  // no map is better; headings come without a sigma
 const double kAbsent = std::numeric_limits<double>::quiet_NaN();
 
+landmark_note note_of(int32_t id, int sensor, wm_time_ns t_ns) {
+  landmark_note out{};
+  out.id = id;
+  out.first_ns = out.last_ns = t_ns;
+  out.sensor = sensor;
+  out.levelled_by = -1;
+  out.doubted_ns = WM_TIME_NONE;
+  return out;
+}
+
 int lasting_states(const wm_slam_params &p) {
   if (p.lasting_slots == 0) return 0;
   if (p.markers && p.marker_lasting > 0.0) return 2;
@@ -147,9 +157,8 @@ void slam::start_again() {
   const double covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(sigma_heading)}};
   joint_.set_pose({place ? start.p_m[0] : 0.0, place ? start.p_m[1] : 0.0, heading ? start.heading_rad : 0.0},
                   covariance);
-  for (int state = first_ray_; state < first_clone_ + 3 * params_.line_clones; state++) joint_.forget(state, 0.0, 0.0);
+  forget_lines();
   lasting_.release_all();
-  forget_tracks();
   fused_ns_ = WM_TIME_NONE;
   next_id_ = 0;
   cursor_ = 0;
@@ -161,10 +170,18 @@ void slam::start_again() {
   look_.t_ns = WM_TIME_NONE;
   look_.fused = look_.refused = 0;
   resets_++;
-  searching_ = params_.map != WM_SLAM_MAP_NONE && params_.markers && !(place && heading);
+  const bool given = params_.map != WM_SLAM_MAP_NONE;
+  state_ = given && params_.recover && !(place && heading) ? WM_STATE_SEARCHING : WM_STATE_TRACKING;
+  begin_evidence(!given);
+  searched_ns_ = WM_TIME_NONE;
   candidate_.id = lone_.id = rests_on_ = -1;
   one_refuted_ = false;
-  if (params_.map != WM_SLAM_MAP_NONE) load_map();
+  if (given) load_map();
+}
+
+void slam::forget_lines() {
+  for (int state = first_ray_; state < first_clone_ + 3 * params_.line_clones; state++) joint_.forget(state, 0.0, 0.0);
+  forget_tracks();
 }
 
 void slam::forget_tracks() {
@@ -205,7 +222,9 @@ void slam::load_map() {
     const double place[3] = {l.p_m[0], l.p_m[1], turned ? wrap(l.yaw_rad) : 0.0};
     const joint_row rows[3] = {};
     const int landmark = joint_.add_landmark(rows, noise, place);
-    notes()[landmark] = {l.id, 0, WM_TIME_NONE, WM_TIME_NONE, l.p_m[2], 0, 1, -1, -1, WM_TIME_NONE, {}, 0.0};
+    notes()[landmark] = note_of(l.id, -1, WM_TIME_NONE);
+    notes()[landmark].z_m = l.p_m[2];
+    notes()[landmark].surveyed = 1;
   }
 }
 
@@ -248,7 +267,8 @@ wm_status slam::take_pose(const wm_event &event) {
   const double covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(given.sigma_heading_rad)}};
   joint_.set_pose(given.pose, covariance);
   forget_tracks();
-  searching_ = false;
+  state_ = WM_STATE_TRACKING;
+  begin_evidence(false);
   rests_on_ = -1;
   resets_++;
   return WM_OK;
@@ -259,8 +279,8 @@ void slam::estimate(wm_estimate *out) const {
   out->resets = resets_;
   const bool fresh =
       fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, joint_.now_ns()) <= params_.dead_reckoning_after_s;
-  out->state =
-      searching_ ? (uint8_t)WM_STATE_SEARCHING : (uint8_t)(fresh ? WM_STATE_TRACKING : WM_STATE_DEAD_RECKONING);
+  out->state = (uint8_t)(state_ != WM_STATE_TRACKING ? state_ : fresh ? WM_STATE_TRACKING : WM_STATE_DEAD_RECKONING);
+  if (state_ != WM_STATE_TRACKING) widen(out);
 }
 
 size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const {
@@ -344,7 +364,7 @@ bool slam::make_room() {
 
 // One landmark at a time, so that the cost stays bounded.
 void slam::look_after(wm_time_ns t_ns) {
-  if (joint_.landmarks() == 0 || params_.map == WM_SLAM_MAP_FROZEN) return;
+  if (joint_.landmarks() == 0 || params_.map == WM_SLAM_MAP_FROZEN || map_is_held()) return;
   cursor_ = (cursor_ + 1) % joint_.landmarks();
   const landmark_note &note = notes()[cursor_];
   const bool unconfirmed = !note.surveyed && note.seen < (uint32_t)params_.confirm_seen;
@@ -355,7 +375,8 @@ void slam::look_after(wm_time_ns t_ns) {
 }
 
 int slam::note_landmark(int32_t id, int landmark, int sensor, wm_time_ns t_ns) {
-  notes()[landmark] = {id, 1, t_ns, t_ns, 0.0, 0, 0, sensor, -1, WM_TIME_NONE, {}, 0.0};
+  notes()[landmark] = note_of(id, sensor, t_ns);
+  notes()[landmark].seen = 1;
   counts_.joined++;
   return landmark;
 }

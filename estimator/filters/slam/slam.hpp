@@ -3,8 +3,10 @@
 #ifndef WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 #define WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 
+#include "filters/core/landmark_evidence.hpp"
 #include "filters/core/record_list.hpp"
 #include "filters/core/state_pool.hpp"
+#include "filters/relocalize/pose_search.hpp"
 #include "filters/slam/bearing_tracks.hpp"
 #include "filters/slam/joint_state.hpp"
 #include "filters/slam/params.h"
@@ -27,6 +29,8 @@ struct landmark_note {
   wm_time_ns doubted_ns;  // a sighting that would have moved much was kept back
   // Of a coded marker, with states for tilt: where it was in one camera's levelled axes, the mean of so many sightings.
   double levelled_m[3], levelled;
+  bool revisited;  // seen again where it was, after it was out of sight
+  landmark_record record;
 };
 
 struct slam_counts {
@@ -98,6 +102,12 @@ class slam {
     bool possible;
     double distance_m;
   };
+  // An observation of a landmark in the sensor's frame, for the search of the pose; NaN where it has none. The heading
+  // is the landmark's own in base_link.
+  struct sighted {
+    double bearing_rad, range_m, heading_rad;
+    double sigma_rad, sigma_m, heading_sigma_rad;
+  };
   // What a sighting is compared with: sigmas and which numbers count.
   struct reading {
     bool bearing, range;
@@ -149,6 +159,7 @@ class slam {
 
   wm_status fuse_sighting(const wm_event &event, record_list records);
   wm_status check_sighting(const wm_sighting &s) const;
+  sighted sighted_of(const wm_sighting &s, const reading &r) const;
   wm_status take_pose(const wm_event &event);
   void see(const wm_sighting &s, const reading &r, const past_pose &past, const double place[2], int lasting,
            view *out) const;
@@ -169,6 +180,7 @@ class slam {
   int ray_state(const bearing_tracks::track &track) const { return first_ray_ + 2 * tracks_.index(track); }
   wm_status fuse_marker(const wm_event &event, record_list records);
   marker_reading read_marker(const wm_marker &m, const double p_m[3], double yaw_rad) const;
+  sighted sighted_of(const wm_marker &m, const marker_reading &r) const;
   double marker_nis(int landmark, const wm_marker &m, const marker_reading &r, const past_pose &past);
   void see_marker(int sensor, const marker_reading &r, const past_pose &past, const double place[3], int lasting,
                   marker_view *out) const;
@@ -209,9 +221,25 @@ class slam {
   bool borne_out(const pair &p) const;
   int32_t own_id();
   void start_again();
+  // recovery.cpp
+  void begin_evidence(bool own_frame);
+  bool map_is_held() const;
+  joint_state::scope scope_now() const;
+  bool is_witness(const landmark_note &note) const;
+  bool weigh(int landmark, const joint_state::innovation_block &block, bool passed, double clutter_volume,
+             double angle_rad);
+  static double clutter_volume(bool bearing, bool range);
+  void lose();
+  void keep_observation(int landmark, int sensor, const past_pose &past, const sighted &seen);
+  int landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns) const;
+  bool relocalize();
+  void take_found();
+  void open_gates();
+  void widen(wm_estimate *out) const;
   void follow_scale();
   void load_map();
   void forget_tracks();
+  void forget_lines();
 
   landmark_note *notes() { return reinterpret_cast<landmark_note *>(this + 1); }
   const landmark_note *notes() const { return reinterpret_cast<const landmark_note *>(this + 1); }
@@ -236,8 +264,11 @@ class slam {
   identity_list moved_, doubled_;
   look_record look_;
   uint32_t resets_;
-  // Started somewhere on a map that was given: no pose until two of its markers, or sightings of one, say the same.
-  bool searching_;
+  wm_state state_;  // SEARCHING: started on a given map without a pose; TRACKING; LOST
+  landmark_evidence evidence_;
+  pose_search observations_;  // since the map is held
+  wm_time_ns fit_ns_;         // when a witness fitted last
+  wm_time_ns lost_ns_, searched_ns_, inflated_ns_;
   seen_marker candidate_;  // the one that was seen first; its id is -1: none
   lone_marker lone_;       // its id is -1: none
   int32_t rests_on_;       // the one marker by which the pose was found, until another is fused; else -1

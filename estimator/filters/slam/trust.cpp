@@ -74,7 +74,7 @@ void slam::note_fused(int landmark, int sensor) {
   landmark_note &note = notes()[landmark];
   const wm_time_ns now = joint_.now_ns();
   note.misfits = 0;
-  note.seen++;
+  if (!map_is_held()) note.seen++;
   note.last_ns = now;
   note.sensor = sensor;
   fused_ns_ = now;
@@ -93,6 +93,7 @@ void slam::misfit(int landmark, bool ranged) {
   landmark_note &note = notes()[landmark];
   note.misfits++;
   doubt_start(note.misfits);
+  if (map_is_held()) return;
   // With a range a single sighting makes a landmark: a misread code, too.
   const bool unconfirmed = ranged && !note.surveyed && note.seen < (uint32_t)params_.confirm_seen;
   if (unconfirmed && note.misfits >= kUnconfirmedMisfits) return drop_landmark(landmark);

@@ -188,7 +188,7 @@ void test_correction_is_that_of_the_whole_matrix(void) {
     for (int i = 0; i < a.state->states(); i++) x.push_back(a.state->value(i));
     joint_state::innovation_block block;
     a.state->prepare(rows, innovation, noise, 3, &block);
-    a.state->fuse(block, none, false);
+    TEST_ASSERT_TRUE(a.state->fuse(block, none, wm::joint_state::scope::all));
 
     const size_t n = p.size();
     matrix want = p;
@@ -260,7 +260,7 @@ void test_a_new_sensor_of_the_speed_does_not_take_the_map_s_scale_back(void) {
   const double nothing = 0.0, noise = 1.0;
   joint_state::innovation_block block;
   a.state->prepare(&row, &nothing, &noise, 1, &block);
-  a.state->fuse(block, &nothing, false);
+  TEST_ASSERT_TRUE(a.state->fuse(block, &nothing, wm::joint_state::scope::all));
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.04, a.state->value(range));
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 4.0, a.state->value(s));
 }
@@ -288,7 +288,7 @@ void test_frozen_landmarks_stay_and_the_robot_is_corrected(void) {
   const double innovation = 0.1, noise = 0.01, none = 0.0;
   joint_state::innovation_block block;
   a.state->prepare(&row, &innovation, &noise, 1, &block);
-  a.state->fuse(block, &none, true);
+  TEST_ASSERT_TRUE(a.state->fuse(block, &none, wm::joint_state::scope::robot));
   TEST_ASSERT_EQUAL_DOUBLE(4.0, a.state->value(s));
   TEST_ASSERT_EQUAL_DOUBLE(before[(size_t)s][(size_t)s], a.state->variance(s));
   TEST_ASSERT_TRUE(a.state->variance(wm::kX) < before[0][0]);
@@ -312,7 +312,7 @@ double heading_sigma_after_many_views(bool invariant) {
     const double innovation[2] = {0.3 * gauss(), 0.3 * gauss()}, noise[2] = {0.09, 0.09}, none[2] = {};
     joint_state::innovation_block block;
     a.state->prepare(rows, innovation, noise, 2, &block);
-    a.state->fuse(block, none, false);
+    TEST_ASSERT_TRUE(a.state->fuse(block, none, wm::joint_state::scope::all));
   }
   return std::sqrt(a.state->variance(wm::kHeading));
 }

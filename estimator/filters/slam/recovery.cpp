@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+// The kidnapped robot: observations of landmarks that are known well are evidence for or against the pose
+// (core/landmark_evidence.hpp). In doubt the map and the calibration are held: updates move the pose alone. A pose that
+// is contradicted is LOST; recent observations are then matched with the map (relocalize/pose_search.hpp).
+#include "filters/slam/slam.hpp"
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+// Log odds above which the map is held. A proven pose rests at -5 (kidnapped) and below; one misread identity adds 1.6
+// at most, two hold the map. Not swept.
+constexpr double kHoldMap = -3.0;
+constexpr double kOwnFrame = -5.0;          // log prior of a pose that defines the map's frame: as of a proven one
+constexpr double kStated = -2.5;            // of a pose that was stated or found: 8 % are wrong, as in landmark_ekf
+constexpr double kClutterRange_m = 30;      // a false detection lies anywhere up to this distance, as in landmark_ekf
+constexpr double kSearchInterval_s = 0.25;  // bounds the cost: one search over 64 observations takes 0.5 ms
+constexpr double kLostAtLeast_s = 0.2;      // so that a consumer of 10 Hz sees the state
+constexpr double kWindow_s = 20.0;          // observations older than this are not searched, as in landmark_ekf
+constexpr double kFound_m = 0.5, kFound_rad = 0.15;  // a pose with larger sigmas is not taken
+constexpr int kNumbers = 5;                          // must agree; two more than a pose has
+constexpr double kFits_m = 0.5, kFits_rad = 0.2;     // of a landmark from the pose found
+constexpr double kRevisited_s = 5.0;                 // out of sight for so long and seen again where it was: a witness
+constexpr uint32_t kEstablished = 20;                // sightings: hardly any of these was another landmark's
+constexpr double kOld_s = 60.0;                      // or known for so long
+constexpr double kInflateAfter_s = 3.0, kInflateInterval_s = 1.0;  // lost and not found: the gates are opened
+constexpr double kInflate_m = 0.5, kInflate_rad = 0.2, kInflateUpTo_m = 30.0;
+
+}  // namespace
+
+void slam::begin_evidence(bool own_frame) {
+  evidence_.begin(own_frame ? kOwnFrame : kStated);
+  observations_.clear();
+  fit_ns_ = WM_TIME_NONE;
+}
+
+bool slam::map_is_held() const { return state_ != WM_STATE_TRACKING || evidence_.log_odds() > kHoldMap; }
+
+// Which states a correction may change now.
+joint_state::scope slam::scope_now() const {
+  if (map_is_held()) return joint_state::scope::pose;
+  return params_.map == WM_SLAM_MAP_FROZEN ? joint_state::scope::robot : joint_state::scope::all;
+}
+
+// A landmark that was found after a kidnapping fits the wrong pose, so only one that proved to stand where the map has
+// it is evidence for a pose: of a given map, seen again after it was out of sight, or known for long. Against a pose an
+// established one is enough: seen often, or looked for again.
+bool slam::is_witness(const landmark_note &note) const {
+  if (note.surveyed) return true;
+  return note.seen >= (uint32_t)params_.confirm_seen &&
+         (note.revisited || wm_seconds_between(note.first_ns, joint_.now_ns()) > kOld_s);
+}
+
+// The evidence of one observation of a known landmark, before it is fused. A tracker's number (lines.rejoin) is no
+// identity: it contradicts nothing when the tracker changes to another edge. False: the pose is lost from now on, and
+// the landmark's index may be another.
+bool slam::weigh(int landmark, const joint_state::innovation_block &block, bool passed, double clutter_volume,
+                 double angle_rad) {
+  landmark_note &note = notes()[landmark];
+  if (!params_.recover || params_.line_rejoin) return true;
+  const wm_time_ns now = joint_.now_ns();
+  if (passed && note.last_ns != WM_TIME_NONE && wm_seconds_between(note.last_ns, now) > kRevisited_s && !map_is_held())
+    note.revisited = true;
+  const bool witness = is_witness(note);
+  const double log_bayes = passed ? landmark_evidence::log_bayes_factor(block.density(), clutter_volume)
+                                  : landmark_evidence::max_log_bayes_factor();
+  const bool established = note.seen >= kEstablished || (note.seen >= (uint32_t)params_.confirm_seen &&
+                                                         wm_seconds_between(note.last_ns, now) > kRevisited_s);
+  if (!witness && (!established || log_bayes < 0.0)) return true;
+  evidence_.note(now, note.id, log_bayes, angle_rad, angle_rad / std::sqrt(block.s[0][0]), &note.record);
+  if (state_ == WM_STATE_TRACKING && evidence_.contradicted()) {
+    lose();
+    return false;
+  }
+  if (state_ == WM_STATE_LOST && evidence_.fits() && wm_seconds_between(lost_ns_, now) > kLostAtLeast_s)
+    state_ = WM_STATE_TRACKING;
+  if (map_is_held()) return true;
+  if (passed && witness) fit_ns_ = now;
+  observations_.clear();
+  return true;
+}
+
+double slam::clutter_volume(bool bearing, bool range) {
+  return (bearing ? kTwoPi : 1.0) * (range ? kClutterRange_m : 1.0);
+}
+
+// The landmarks that joined since the pose last fitted stand where the wrong pose put them.
+void slam::lose() {
+  state_ = WM_STATE_LOST;
+  lost_ns_ = inflated_ns_ = joint_.now_ns();
+  for (int i = joint_.landmarks() - 1; i >= 0 && fit_ns_ != WM_TIME_NONE; i--)
+    if (const landmark_note &note = notes()[i]; !is_witness(note) && note.first_ns > fit_ns_) drop_landmark(i);
+  forget_lines();
+}
+
+// Keeps an observation for the search, while the map is held: a place that moves would be another landmark's.
+void slam::keep_observation(int landmark, int sensor, const past_pose &past, const sighted &seen) {
+  const landmark_note &note = notes()[landmark];
+  if (!params_.recover || !map_is_held() || !(note.surveyed || note.seen >= (uint32_t)params_.confirm_seen)) return;
+  const int state = joint_.landmark_state(landmark);
+  const mounted_sensor &mounting = sensor_[sensor];
+  observation o{};
+  o.t_ns = joint_.now_ns();
+  o.kind = (finite(seen.bearing_rad) ? kObservedBearing : 0u) | (finite(seen.range_m) ? kObservedRange : 0u);
+  o.key = note.id;
+  const wm_pose2 base = compose(joint_.odom(), between(joint_.pose(), past.pose));
+  o.sensor = compose(base, {mounting.x_m, mounting.y_m, mounting.yaw_rad});
+  o.place_m[0] = joint_.value(state);
+  o.place_m[1] = joint_.value(state + 1);
+  o.bearing_rad = seen.bearing_rad;
+  o.range_m = seen.range_m;
+  o.sigma_angle_rad = seen.sigma_rad;
+  o.sigma_length_m = seen.sigma_m;
+  o.sigma_place_m = std::sqrt(0.5 * (joint_.variance(state) + joint_.variance(state + 1)));
+  o.travelled_m = joint_.travelled_m();
+  o.turned_rad = joint_.turned_rad();
+  observations_.add(o);
+  if (!finite(seen.heading_rad) || joint_.variance(state + 2) > square(kFound_rad)) return;
+  o.kind = kObservedHeading;
+  o.key = -1 - note.id;
+  o.sensor = base;
+  o.bearing_rad = wrap(joint_.value(state + 2) - seen.heading_rad);  // of the robot, in map
+  o.sigma_angle_rad = std::sqrt(square(seen.heading_sigma_rad) + joint_.variance(state + 2));
+  observations_.add(o);
+}
+
+// How many different landmarks of those observed since then a pose explains: two, where one may have been moved.
+int slam::landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns) const {
+  const wm_pose2 frame = compose(pose, between(joint_.odom(), wm_pose2{}));
+  int32_t fitting[pose_search::kCapacity];
+  int count = 0;
+  for (int i = 0; i < observations_.kept(); i++) {
+    const observation &o = observations_.at(i);
+    if (o.t_ns < since_ns || o.key < 0) continue;
+    const wm_pose2 from = compose(frame, o.sensor);
+    const double dx = o.place_m[0] - from.x_m, dy = o.place_m[1] - from.y_m, distance = std::sqrt(dx * dx + dy * dy);
+    const bool bearing_fits = !(o.kind & kObservedBearing) ||
+                              std::fabs(wrap(atan2(dy, dx) - from.heading_rad - o.bearing_rad)) < kFits_rad ||
+                              distance < kFits_m;
+    if (!bearing_fits || ((o.kind & kObservedRange) && std::fabs(distance - o.range_m) > kFits_m)) continue;
+    int k = 0;
+    while (k < count && fitting[k] != o.key) k++;
+    if (k == count) fitting[count++] = o.key;
+  }
+  return count;
+}
+
+// LOST, or SEARCHING from the start: the pose by the observations of late. True: found.
+bool slam::relocalize() {
+  const wm_time_ns now = joint_.now_ns();
+  if (!params_.recover || state_ == WM_STATE_TRACKING) return false;
+  if (state_ == WM_STATE_LOST && wm_seconds_between(lost_ns_, now) < kLostAtLeast_s) return false;
+  if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now) < kSearchInterval_s) return false;
+  searched_ns_ = now;
+  const wm_time_ns since = now - wm_ns_from_seconds(kWindow_s);
+  search_result found = observations_.find(since, joint_.odom(), joint_.travelled_m(), joint_.turned_rad(), nullptr, 0,
+                                           {kFound_m, kFound_rad, kNumbers});
+  if (!found.found || landmarks_fitting(found.pose, since) < 2) {
+    open_gates();
+    return false;
+  }
+  for (size_t i = 0; i < setup_->sensor_count; i++)  // the heading found is off by the mounting's yaw
+    if (const int yaw = sensor_state_[i][kYaw]; yaw >= 0) found.covariance[2][2] += joint_.variance(yaw);
+  joint_.set_pose(found.pose, found.covariance);
+  take_found();
+  return true;
+}
+
+// The pose was found: a new life of the evidence, the map held until it is proven.
+void slam::take_found() {
+  state_ = WM_STATE_TRACKING;
+  forget_lines();
+  begin_evidence(false);
+  fused_ns_ = joint_.now_ns();
+  resets_++;
+}
+
+void slam::open_gates() {
+  const wm_time_ns now = joint_.now_ns();
+  if (state_ != WM_STATE_LOST || wm_seconds_between(lost_ns_, now) < kInflateAfter_s) return;
+  if (wm_seconds_between(inflated_ns_, now) < kInflateInterval_s || joint_.variance(kX) > square(kInflateUpTo_m))
+    return;
+  joint_.loosen(square(kInflate_m), square(kInflate_rad));
+  inflated_ns_ = now;
+}
+
+// Lost, the robot is anywhere on the map, and heads anywhere.
+void slam::widen(wm_estimate *out) const {
+  double sum[2] = {}, squares[2] = {};
+  const int count = joint_.landmarks();
+  for (int i = 0; i < count; i++)
+    for (int k = 0; k < 2; k++) {
+      const double at = joint_.value(joint_.landmark_state(i) + k) - joint_.value(k);
+      sum[k] += at;
+      squares[k] += square(at);
+    }
+  for (int k = 0; k < 2 && count > 0; k++) out->covariance[wm_cov_index(k, k)] += squares[k] / count;
+  out->covariance[wm_cov_index(5, 5)] += square(kPi) / 3.0;  // uniform
+}
+
+}  // namespace wm

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+// SLAM and the kidnapped robot: the state LOST, the map held meanwhile, the pose found on it.
+#include "slam_room.hpp"
+
+using namespace room;
+
+void setUp(void) { make_room(); }
+void tearDown(void) { leave_room(); }
+
+namespace {
+
+// The robot is elsewhere; odometry does not show it.
+void carry(double x_m, double y_m, double turn_rad) {
+  truth.x_m += x_m;
+  truth.y_m += y_m;
+  truth.heading_rad = wm::wrap(truth.heading_rad + turn_rad);
+}
+
+struct found {
+  double lost_s = -1.0, right_s = -1.0, sigma_m = 0.0;  // after how long; the largest sigma while lost
+};
+
+// Drives on and watches.
+found watch(double seconds) {
+  found out;
+  for (double t = 0.0; t < seconds; t += 0.2) {
+    drive(0.2);
+    const bool lost = published_state() == WM_STATE_LOST;
+    if (lost && out.lost_s < 0.0) out.lost_s = t;
+    if (lost) out.sigma_m = std::fmax(out.sigma_m, sigma());
+    if (!lost && out.lost_s >= 0.0 && out.right_s < 0.0 && off() < 0.3) out.right_s = t;
+  }
+  return out;
+}
+
+void check_found(bool of_markers) {
+  coded = of_markers;
+  params.markers = of_markers;
+  begin();
+  drive(60);
+  size_t count;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.15, worst_landmark(&count));
+  carry(-1.0, 1.0, 2.4);
+  const found f = watch(15);
+  TEST_ASSERT_TRUE(f.lost_s >= 0.0);
+  TEST_ASSERT_LESS_THAN_DOUBLE(5.0, f.lost_s);
+  TEST_ASSERT_TRUE(f.right_s >= 0.0);
+  TEST_ASSERT_LESS_THAN_DOUBLE(10.0, f.right_s);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(2.0, f.sigma_m);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.15, worst_landmark(&count));
+  TEST_ASSERT_EQUAL(kCount, count);
+}
+
+}  // namespace
+
+void test_kidnapped_among_landmarks(void) { check_found(false); }
+void test_kidnapped_among_markers(void) { check_found(true); }
+
+void test_undisturbed_is_never_lost(void) {
+  for (const double share : {0.0, 0.1}) {
+    make_room();
+    false_share = share;
+    begin();
+    TEST_ASSERT_EQUAL_DOUBLE(-1.0, watch(60).lost_s);
+  }
+}
+
+// GIVEN one landmark that was moved THEN it is the landmark that is wrong.
+void test_a_moved_landmark_is_not_a_lost_robot(void) {
+  begin();
+  drive(60);
+  place[3][0] += 1.0;
+  TEST_ASSERT_EQUAL_DOUBLE(-1.0, watch(40).lost_s);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
+}
+
+void test_starts_without_a_pose_on_a_given_map(void) {
+  for (const int32_t map : {WM_SLAM_MAP_EXTEND, WM_SLAM_MAP_FROZEN}) {
+    make_room();
+    params.map = map;
+    setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = kAbsent;
+    begin();
+    TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
+    drive(5);
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.2, off());
+  }
+}
+
+// GIVEN recovery switched off THEN the state is never LOST.
+void test_recovery_can_be_switched_off(void) {
+  params.recover = 0;
+  begin();
+  drive(60);
+  carry(-1.0, 1.0, 2.4);
+  TEST_ASSERT_EQUAL_DOUBLE(-1.0, watch(5).lost_s);
+}
+
+// Identities up to 2^31 - 1 have lasting errors of their own.
+void test_large_identities_keep_their_slots(void) {
+  params.lasting_slots = 4;
+  params.lasting_bearing_rad = 0.02;
+  for (int i = 0; i < kCount; i++) known[i].id = INT32_MAX - i;
+  params.map = WM_SLAM_MAP_EXTEND;
+  begin();
+  for (int i = 0; i < 20; i++) see(make::sighting(now_s += 0.01, INT32_MAX - 1, 0.0, 3.0));
+  TEST_ASSERT_TRUE(std::isfinite(sigma()));
+}
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_kidnapped_among_landmarks);
+  RUN_TEST(test_kidnapped_among_markers);
+  RUN_TEST(test_undisturbed_is_never_lost);
+  RUN_TEST(test_a_moved_landmark_is_not_a_lost_robot);
+  RUN_TEST(test_starts_without_a_pose_on_a_given_map);
+  RUN_TEST(test_recovery_can_be_switched_off);
+  RUN_TEST(test_large_identities_keep_their_slots);
+  return UNITY_END();
+}
