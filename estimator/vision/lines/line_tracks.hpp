@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines from picture to picture: which one is which. All azimuths move by the robot's turn, each besides by its own
-// parallax; the turn is found by vote, the line by prediction and by the brightness of its two sides.
+// Tracks of lines from picture to picture. All azimuths move by the robot's rotation, each also by its own parallax.
+// The rotation is found by a vote over all pairs; a line is associated by prediction and the brightness of its sides.
 #ifndef WAYMARK_ESTIMATOR_VISION_LINE_TRACKS_HPP
 #define WAYMARK_ESTIMATOR_VISION_LINE_TRACKS_HPP
 
@@ -14,21 +14,24 @@ inline constexpr int kLineTracksMax = 192;
 struct line_track {
   int32_t id;  // 0: free; never used twice
   int32_t seen, unseen;
-  double azimuth_rad, rate_radps;  // as seen last; its own motion, without the turn
+  double azimuth_rad, rate_radps;  // of the last picture that showed it; by parallax, without the rotation
   double left_grey, right_grey;
-  int edge;  // index in the newest picture, -1: not seen
+  int edge;  // index in the newest picture; -1: missed
 };
 
 struct line_tracks {
   line_track track[kLineTracksMax];
   int32_t next_id;
   wm_time_ns last_ns;
-  double turn_radps;  // of the robot, as the lines had it last
-  uint64_t no_room;
+  double turn_radps;  // rotation rate of the robot between the last two pictures
+  uint64_t dropped;   // lines that had no free track
 
   void clear();
-  // Takes in the picture's lines: tracks are continued, begun and ended.
+  // Continues, begins and ends tracks by the lines of a picture.
   void follow(const radial_edge *edges, int count, wm_time_ns t_ns, const wm_lines_params &params);
+
+ private:
+  void begin(const radial_edge *edges, int count, const bool *taken);
 };
 
 }  // namespace wm

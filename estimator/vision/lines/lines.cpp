@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Detector `lines`: upright lines by their azimuths, each with a number that it keeps while it is followed.
+// Detector `lines`: azimuths of upright lines, each with an identity that it keeps while it is tracked.
 #include <cmath>
 #include <cstring>
 #include <initializer_list>
@@ -18,8 +18,8 @@ namespace {
 struct lines_state {
   wm_lines_params params;
   mounted_camera camera;
-  sin_cos yaw;        // of the bearings' axis against base_link's
-  bool levelled;      // bearings are azimuths about that axis; else directions in the camera's own axes
+  sin_cos yaw;        // of the mounting
+  bool is_steep;      // bearings are azimuths about the mounting's yaw; else directions in the camera's own axes
   double tilt[2][3];  // rows of the body's x and y axes in base_link
   polar_view polar;
   vote_work work;
@@ -28,10 +28,11 @@ struct lines_state {
   radial_edge edges[kRadialEdgesMax];
 };
 
-constexpr double kZenithWalk_rad = 2e-5;  // a picture: a robot on its springs
-constexpr int kLeanSeen = 3;              // only lines that were followed tell of the zenith
+constexpr double kZenithWalk_rad = 2e-5;  // random walk a picture: springs and load. Not swept
+constexpr int kLeanSeen = 3;              // pictures that must show a line before it corrects the zenith: no false ones
+constexpr double kTiltMin_rad = 1e-6;     // floor of tilt_sigma_rad, so that its variance is positive
 
-// Puts the state's parts one behind the other; returns the bytes of all.
+// Lays out the state; returns its bytes.
 size_t lay_out(lines_state *state, const polar_view &polar) {
   memory_layout memory(state, sizeof *state);
   const size_t columns = static_cast<size_t>(polar.columns), rows = static_cast<size_t>(polar.rows);
@@ -42,14 +43,14 @@ size_t lay_out(lines_state *state, const polar_view &polar) {
   auto *next = memory.take<int16_t>(kVoteArrays * columns);
   if (!state) return memory.bytes();
   state->polar = view;
-  const auto give = [&] {
+  const auto take = [&] {
     int16_t *at = next;
     next += columns;
     return at;
   };
-  state->work.slope = give();
+  state->work.slope = take();
   for (vote_side *side : {&state->work.rise, &state->work.fall})
-    *side = {{give(), give(), give()}, {give(), give(), give()}};
+    *side = {{take(), take(), take()}, {take(), take(), take()}};
   return memory.bytes();
 }
 
@@ -76,38 +77,39 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   lay_out(state, polar);
   polar_make(state->camera, state->params, &state->polar);
   const mat3 body = matrix_of_rpy(camera->mounting.rpy_rad);
-  state->levelled = is_steep_axis(body.m[2][0]);
+  state->is_steep = is_steep_axis(body.m[2][0]);
   state->yaw = sincos(camera->mounting.rpy_rad[2]);
   for (int i = 0; i < 2; i++)
     for (int k = 0; k < 3; k++) state->tilt[i][k] = body.m[k][i];
-  const double variance = square(larger(state->params.tilt_sigma_rad, 1e-6));
+  const double variance = square(larger(state->params.tilt_sigma_rad, kTiltMin_rad));
   state->up = {0, 0, variance, 0, variance};
   state->tracks.clear();
   return WM_OK;
 }
 
-// The azimuth as a sighting of the camera's sensor says it (recording format: bearing positive to the left of the
-// sensor's x axis). A camera that looks up or down has no such axis on the floor: then about its mounting's yaw.
+// Bearing of an azimuth, positive to the left of the sensor's x axis (sensors/mounting.hpp: of a steep camera about its
+// mounting's yaw).
 double bearing_of(const lines_state &self, double azimuth_rad) {
   const sin_cos a = sincos(azimuth_rad);
-  if (self.levelled)
+  if (self.is_steep)
     return atan2(self.yaw.cos * a.sin - self.yaw.sin * a.cos, self.yaw.cos * a.cos + self.yaw.sin * a.sin);
   return atan2(self.tilt[1][0] * a.cos + self.tilt[1][1] * a.sin, self.tilt[0][0] * a.cos + self.tilt[0][1] * a.sin);
 }
 
-void put(const lines_state &self, const line_track &track, wm_time_ns t_ns, wm_event *out) {
+void emit(const lines_state &self, const line_track &track, wm_time_ns t_ns, wm_event *out) {
   const radial_edge &edge = self.edges[track.edge];
   std::memset(static_cast<void *>(out), 0, WM_EVENT_SMALL_BYTES);
   out->t_ns = t_ns;
   out->kind = WM_EVENT_SIGHTING;
-  out->as.sighting = {0,
-                      track.id,
-                      bearing_of(self, edge.azimuth_rad),
-                      std::numeric_limits<double>::quiet_NaN(),
-                      edge.sigma_rad,
-                      std::numeric_limits<double>::quiet_NaN(),
-                      std::numeric_limits<double>::quiet_NaN(),
-                      std::numeric_limits<double>::quiet_NaN()};
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  out->as.sighting = {.sensor = 0,
+                      .landmark_id = track.id,
+                      .bearing_rad = bearing_of(self, edge.azimuth_rad),
+                      .range_m = kNan,
+                      .bearing_sigma_rad = edge.sigma_rad,
+                      .range_sigma_m = kNan,
+                      .elevation_rad = kNan,
+                      .elevation_sigma_rad = kNan};
 }
 
 wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_event *out, size_t capacity,
@@ -128,7 +130,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
     if (state->params.tilt_sigma_rad > 0 && track.seen >= kLeanSeen)
       correct_zenith(state->edges[track.edge], &state->up);
     if (*count == capacity) return WM_FULL;
-    put(*state, track, frame.t_ns, &out[(*count)++]);
+    emit(*state, track, frame.t_ns, &out[(*count)++]);
   }
   return WM_OK;
 }

@@ -7,17 +7,17 @@ namespace wm {
 
 namespace {
 
-constexpr double kMargin_px = 1.0;
-constexpr int kProbes = 64;  // azimuths at which a row's scale is measured
-constexpr double kProbe_rad = 1e-3;
+constexpr double kMargin_px = 1.0;                    // for the four pixels of the bilinear interpolation
+constexpr int kProbes = 64;                           // azimuths at which a row's scale is measured
+constexpr double kProbe_rad = 1e-3;                   // step of the numerical derivative: below a pixel
+constexpr double kFine_px = 0.65, kMiddle_px = 0.33;  // px a column from which 2 or 4 columns are averaged, else 8
 
 bool pixel_at(const mounted_camera &camera, double azimuth, double elevation, double margin_px, pixel *out) {
   const sin_cos a = sincos(azimuth), e = sincos(elevation);
   return pixel_of(camera, camera.centre_m + vec3{e.cos * a.cos, e.cos * a.sin, e.sin}, margin_px, out);
 }
 
-// Way in the picture by an angle of azimuth (or of elevation), px/rad, the mean where the row is in the picture; 0: it
-// is nowhere.
+// Scale of the picture along azimuth (or elevation), px/rad: the mean over the visible part of a row. 0: not visible.
 double px_per_rad(const mounted_camera &camera, double elevation, bool along_row) {
   double sum = 0;
   int count = 0;
@@ -34,7 +34,7 @@ double px_per_rad(const mounted_camera &camera, double elevation, bool along_row
   return count > 0 ? sum / count : 0;
 }
 
-// Calls take(elevation, px/rad of azimuth) for each row that is in the picture.
+// Calls take(elevation, px/rad of azimuth) for each row that is visible.
 template <class Take>
 void each_row(const mounted_camera &camera, const wm_lines_params &params, Take take) {
   int count = 0;
@@ -72,9 +72,9 @@ void polar_make(const mounted_camera &camera, const wm_lines_params &params, pol
     row.elevation_rad = elevation;
     row.tan = tan(elevation);
     row.px_per_column = scale * out->step_rad;
-    row.half = row.px_per_column > 0.65 ? 2 : row.px_per_column > 0.33 ? 4 : 8;
+    row.half = row.px_per_column > kFine_px ? 2 : row.px_per_column > kMiddle_px ? 4 : 8;
     polar_sample *samples = out->table + static_cast<size_t>(r) * static_cast<size_t>(out->columns);
-    // A place outside of the picture takes over what is beside it: where the view ends is no edge.
+    // A place outside of the picture repeats the last one inside: the end of the view is no edge.
     int last = -1;
     for (int pass = 0; pass < 2; pass++)
       for (int c = 0; c < out->columns; c++) {

@@ -5,32 +5,36 @@ namespace wm {
 
 namespace {
 
-constexpr int kApart = 3;      // columns between two lines of one sign
-constexpr int kPieceRows = 6;  // rows that are measured together
-constexpr int kPiecesMax = (kPolarRowsMax + kPieceRows - 1) / kPieceRows;
-constexpr int kReachMax = 20;        // columns on each side that are looked at
-constexpr double kReach = 5;         // the same in widths of the edge's blur
-constexpr double kRamp = 0.5;        // grey levels a pixel: usual slopes of walls
-constexpr int kSteps = 4;            // of Gauss-Newton
-constexpr double kNoiseLeast = 0.4;  // grey levels: a picture has at least its rounding
-// White noise of pixels, interpolated between four: a sample has 4/9 of its variance, what neighbours share makes it
-// count as 2/3, and a part of it is taken for the edge's own shape.
-constexpr double kInterpolated = 1.9;
-constexpr double kBent_px = 0.6;     // a straight line's pieces miss it by less
-constexpr double kUnsure_px = 0.35;  // what noise alone makes is less sure
-constexpr double kLeanSpare = 0.01;  // how far a line's lean may be off for other reasons
+constexpr int kApart = 3;        // columns between two lines of one sign; less is one line's own flank. Not swept
+constexpr int kSegmentRows = 6;  // rows that are averaged before the edge is placed: noise against curvature. Not swept
+constexpr int kSegmentsMax = (kPolarRowsMax + kSegmentRows - 1) / kSegmentRows;
+constexpr int kReachMax_columns = 20;      // on each side of the edge that is fitted: bounds the cost
+constexpr double kReach_blurs = 5;         // the same in sigmas of the edge's blur: the tails below 1e-6 are left out
+constexpr double kRamp_grey_per_px = 0.5;  // prior sigma of the shading along a wall, from rendered halls
+constexpr int kGaussNewtonSteps = 4;       // converged to 1e-3 px from half a column off
+constexpr double kNoiseMin_grey = 0.4;     // rounding to whole grey levels has 0.29, compression adds to it
+// Variance inflation of a fit to interpolated pixels: a sample has 4/9 of a pixel's white noise, correlation of
+// neighbours makes it count as 2/3, and part of the noise is absorbed by the edge's own shape.
+constexpr double kInterpolationFactor = 1.9;
+constexpr double kStraightRms_px = 0.6;  // largest RMS of a straight line's segments about it. Not swept
+constexpr double kSigmaMax_px = 0.35;    // a false edge made of noise is less certain than this. Not swept
+constexpr double kLeanTolerance = 0.01;  // azimuth per tangent of elevation: an upright line's own inclination
+constexpr double kLeanSigmaMin = 1e-4;   // the same: numerical floor of the expected lean's sigma
+constexpr double kSigmas = 3;            // gate of segments, of the lean and of the zenith
 
-// A step of width 1, half way up at 0, and its slope: the integral of a bump of the same width as a normal density's.
+// A blurred step of sigma 1 at 0, and its derivative: the logistic function 1 / (1 + exp(-1.702 x)), which is within
+// 0.01 of the normal distribution's (D. C. Haley 1952).
 double step_up(double x, double *slope) {
   const double e = exp(-1.702 * std::fabs(x)), s = 1 / (1 + e);
   *slope = 1.702 * s * (1 - s);
   return x >= 0 ? s : 1 - s;
 }
 
-struct piece {
-  double column, variance;    // of the edge between two sides, in columns
+// Rows that are averaged and fitted together.
+struct edge_segment {
+  double column, variance;    // of the edge, in columns
   double tan, px_per_column;  // of its middle row
-  double low, high;           // grey of the sides, before and after
+  double low, high;           // grey levels of the sides, before and after
   double rows;
 };
 
@@ -58,7 +62,7 @@ bool solve(double (*a)[4], double *b, int n) {
 
 // Sums over rows of the columns around `column`; sample k of them lies at `begin` + k. Returns how many.
 int profile_of(const polar_view &view, int first, int last, int begin, int count, double *out) {
-  int32_t sums[2 * kReachMax] = {};
+  int32_t sums[2 * kReachMax_columns] = {};
   const int columns = view.columns;
   begin = begin < -kPolarPad ? begin + columns : begin + count > columns + kPolarPad ? begin - columns : begin;
   for (int r = first; r <= last; r++) {
@@ -70,185 +74,255 @@ int profile_of(const polar_view &view, int first, int last, int begin, int count
   return count;
 }
 
-// The edge within rows first .. last near `column`: the levels of both sides, a slope that both share and the step's
-// place, by least squares.
-bool measure(const polar_view &view, int first, int last, double column, double blur_px, piece *out) {
-  const double per_column = view.row[(first + last) / 2].px_per_column, width = blur_px / per_column;
-  int reach = static_cast<int>(kReach * width + 0.5);
-  reach = reach > kReachMax ? kReachMax : reach < 4 ? 4 : reach;
-  const int begin = static_cast<int>(std::floor(column + 0.5)) - reach, n = 2 * reach;
-  double profile[2 * kReachMax];
-  profile_of(view, first, last, begin, n, profile);
-  const double ramp_information = 1 / square(kRamp * per_column);
-  double place = column - begin, x[3] = {}, information = 0, rest = 0;  // x: low, high, ramp
-  for (int step = 0; step <= kSteps; step++) {
-    const int unknowns = step == 0 ? 3 : 4;
+// Model of a segment's profile: two grey levels, a ramp that both sides share, and the blurred step's place.
+struct step_model {
+  double place;                 // in samples
+  double low, high, ramp;       // grey levels, per sample
+  double information, squares;  // of the place when all else is unknown; sum of squared residuals
+
+  // One step of Gauss-Newton on the profile of `n` samples. At first the place is held. False: singular.
+  bool improve(const double *profile, int n, double width, double ramp_information, bool holds_place) {
+    const int unknowns = holds_place ? 3 : 4;
     double a[4][4] = {}, b[4] = {};
     a[2][2] = ramp_information;
-    b[2] = -x[2] * ramp_information;
-    rest = 0;
+    b[2] = -ramp * ramp_information;
+    squares = 0;
     for (int k = 0; k < n; k++) {
       double slope;
       const double s = step_up((k - place) / width, &slope);
-      const double row[4] = {1 - s, s, k - place, -(x[1] - x[0]) * slope / width - x[2]};
-      const double misses = profile[k] - x[0] * row[0] - x[1] * row[1] - x[2] * row[2];
+      const double row[4] = {1 - s, s, k - place, -(high - low) * slope / width - ramp};
+      const double residual = profile[k] - low * row[0] - high * row[1] - ramp * row[2];
       for (int i = 0; i < unknowns; i++) {
-        b[i] += row[i] * misses;
+        b[i] += row[i] * residual;
         for (int j = 0; j <= i; j++) a[i][j] += row[i] * row[j];
       }
-      rest += misses * misses;
+      squares += residual * residual;
     }
     if (!solve(a, b, unknowns)) return false;
-    // The last pivot's square is what is known of the place when all else is unknown.
+    // The last pivot of Cholesky's factor, squared, is the information on the place.
     information = square(a[3][3]);
-    if (step == kSteps) break;
-    const double move = step == 0 ? 0 : b[3] > width ? width : b[3] < -width ? -width : b[3];
-    place += move;
-    for (int i = 0; i < 3; i++) x[i] += b[i];
-    if (!(place > 1 && place < n - 2)) return false;
+    for (int i = 0; i < 4; i++) correction[i] = b[i];
+    return true;
   }
-  const double noise = larger(rest / (n - 4), square(kNoiseLeast) / (last - first + 1));
-  out->column = begin + place;
-  out->variance = noise * kInterpolated / (per_column < 1 ? per_column : 1) / information;
+  // Applies the correction; the place moves by at most a width.
+  void apply(double width, bool holds_place) {
+    place += holds_place ? 0 : correction[3] > width ? width : correction[3] < -width ? -width : correction[3];
+    low += correction[0];
+    high += correction[1];
+    ramp += correction[2];
+  }
+  double correction[4];
+};
+
+// Places the edge within rows first .. last near `column` by least squares.
+bool measure_segment(const polar_view &view, int first, int last, double column, double blur_px, edge_segment *out) {
+  const double per_column = view.row[(first + last) / 2].px_per_column, width = blur_px / per_column;
+  int reach = static_cast<int>(kReach_blurs * width + 0.5);
+  reach = reach > kReachMax_columns ? kReachMax_columns : reach < 4 ? 4 : reach;
+  const int begin = static_cast<int>(std::floor(column + 0.5)) - reach, n = 2 * reach;
+  double profile[2 * kReachMax_columns];
+  profile_of(view, first, last, begin, n, profile);
+  const double ramp_information = 1 / square(kRamp_grey_per_px * per_column);
+  step_model model{};
+  model.place = column - begin;
+  for (int step = 0; step <= kGaussNewtonSteps; step++) {
+    if (!model.improve(profile, n, width, ramp_information, step == 0)) return false;
+    if (step == kGaussNewtonSteps) break;
+    model.apply(width, step == 0);
+    if (!(model.place > 1 && model.place < n - 2)) return false;
+  }
+  const double noise = larger(model.squares / (n - 4), square(kNoiseMin_grey) / (last - first + 1));
+  out->column = begin + model.place;
+  out->variance = noise * kInterpolationFactor / (per_column < 1 ? per_column : 1) / model.information;
   out->tan = view.row[(first + last) / 2].tan;
   out->px_per_column = per_column;
-  out->low = x[0];
-  out->high = x[1];
+  out->low = model.low;
+  out->high = model.high;
   out->rows = last - first + 1;
   return true;
 }
 
-// Azimuth at the horizon and lean from the pieces; `lean` with its variance is what is expected.
-struct upright {
-  double column, column_variance, lean, lean_variance, fit;
+// Segments of a candidate line; those not `used` are outliers.
+struct segment_list {
+  edge_segment item[kSegmentsMax];
+  bool used[kSegmentsMax];
+  int count, tried;
+
+  template <class Each>
+  void each_used(Each each) const {
+    for (int i = 0; i < count; i++)
+      if (used[i]) each(item[i]);
+  }
 };
-bool fit_upright(const piece *pieces, const bool *used, int count, double lean, double lean_variance, upright *out) {
+
+// Column at the horizon and lean (columns per tangent of elevation), with variances; `chi2` of the segments about it.
+struct upright_fit {
+  double column, column_variance, lean, lean_variance, chi2;
+  double residual(const edge_segment &s) const { return s.column - column - lean * s.tan; }
+};
+
+// Weighted least squares over the used segments; `lean` with its variance is the prior.
+bool fit_upright(const segment_list &segments, double lean, double lean_variance, upright_fit *out) {
   double a00 = 0, a01 = 0, a11 = 1 / lean_variance, b0 = 0, b1 = lean / lean_variance;
-  for (int i = 0; i < count; i++) {
-    if (!used[i]) continue;
-    const double w = 1 / pieces[i].variance, t = pieces[i].tan;
+  segments.each_used([&](const edge_segment &s) {
+    const double w = 1 / s.variance, t = s.tan;
     a00 += w;
     a01 += w * t;
     a11 += w * t * t;
-    b0 += w * pieces[i].column;
-    b1 += w * t * pieces[i].column;
-  }
+    b0 += w * s.column;
+    b1 += w * t * s.column;
+  });
   const double determinant = a00 * a11 - a01 * a01;
   if (!(determinant > 0)) return false;
   out->column = (a11 * b0 - a01 * b1) / determinant;
   out->lean = (a00 * b1 - a01 * b0) / determinant;
   out->column_variance = a11 / determinant;
   out->lean_variance = a00 / determinant;
-  out->fit = 0;
-  for (int i = 0; i < count; i++)
-    if (used[i]) out->fit += square(pieces[i].column - out->column - out->lean * pieces[i].tan) / pieces[i].variance;
+  out->chi2 = 0;
+  segments.each_used([&](const edge_segment &s) { out->chi2 += square(out->residual(s)) / s.variance; });
   return true;
 }
 
-// Measures the candidate at `column` over its rows. False: it isn't one upright edge.
-bool measure_line(const polar_view &view, const wm_lines_params &params, const zenith &up, int column, int first,
-                  int last, int sign, radial_edge *out) {
-  piece pieces[kPiecesMax];
-  bool used[kPiecesMax];
-  int count = 0, tried = 0;
-  const sin_cos at = sincos(view.azimuth_of(column - 0.5));
-  const double lean = up.lean(at) / view.step_rad,
-               lean_variance = (up.variance(at) + square(1e-4)) / square(view.step_rad);
-  // The votes say where the line is, rather than where it meets the horizon.
-  const double middle_tan = view.row[(first + last) / 2].tan;
-  const int parts = (last - first + kPieceRows) / kPieceRows;
-  for (int i = 0; i < parts; i++) {
-    const int from = first + (last - first + 1) * i / parts, to = first + (last - first + 1) * (i + 1) / parts - 1;
-    const double guess = column - 0.5 + lean * (view.row[(from + to) / 2].tan - middle_tan);
-    tried++;
-    piece &p = pieces[count];
-    if (!measure(view, from, to, guess, params.blur_px, &p)) continue;
-    if (sign * (p.high - p.low) < 0.5 * params.contrast_grey) continue;
-    p.variance += square(params.sigma_px / view.row[(from + to) / 2].px_per_column);
-    used[count++] = true;
+// A candidate line: rows first .. last about a column, where grey rises (sign 1) or falls (-1) with the azimuth.
+struct line_candidate {
+  int column, first, last, sign;
+};
+
+// The candidate in segments; at least two thirds of them must show its edge.
+bool measure_segments(const polar_view &view, const wm_lines_params &params, const line_candidate &line, double lean,
+                      segment_list *out) {
+  // The votes place the line in its middle row, not at the horizon.
+  const double middle_tan = view.row[(line.first + line.last) / 2].tan;
+  const int rows = line.last - line.first + 1, tried = (rows - 1 + kSegmentRows) / kSegmentRows;
+  out->count = 0;
+  out->tried = tried;
+  for (int i = 0; i < tried; i++) {
+    const int from = line.first + rows * i / tried, to = line.first + rows * (i + 1) / tried - 1;
+    const double guess = line.column - 0.5 + lean * (view.row[(from + to) / 2].tan - middle_tan);
+    edge_segment &s = out->item[out->count];
+    if (!measure_segment(view, from, to, guess, params.blur_px, &s)) continue;
+    if (line.sign * (s.high - s.low) < 0.5 * params.contrast_grey) continue;
+    s.variance += square(params.sigma_px / view.row[(from + to) / 2].px_per_column);
+    out->used[out->count++] = true;
   }
-  if (count == 0 || 3 * count < 2 * tried) return false;
-  upright fitted;
-  if (!fit_upright(pieces, used, count, lean, lean_variance, &fitted)) return false;
-  // Pieces that are off are left out, once.
+  return out->count > 0 && 3 * out->count >= 2 * tried;
+}
+
+// Marks segments beyond 3 sigmas of the first fit as outliers, once. Returns how many are left.
+int reject_outliers(const upright_fit &fitted, segment_list *segments) {
   int left = 0;
-  const double inflation = 1 + fitted.fit / count;
-  for (int i = 0; i < count; i++) {
-    const double off = pieces[i].column - fitted.column - fitted.lean * pieces[i].tan;
-    used[i] = square(off) < 9 * inflation * pieces[i].variance;
-    left += used[i];
+  const double inflation = 1 + fitted.chi2 / segments->count;
+  for (int i = 0; i < segments->count; i++) {
+    const edge_segment &s = segments->item[i];
+    segments->used[i] = square(fitted.residual(s)) < square(kSigmas) * inflation * s.variance;
+    left += segments->used[i];
   }
-  if (left == 0 || 3 * left < 2 * tried || !fit_upright(pieces, used, count, lean, lean_variance, &fitted))
-    return false;
-  double bent = 0;
-  for (int i = 0; i < count; i++)
-    if (used[i])
-      bent += square((pieces[i].column - fitted.column - fitted.lean * pieces[i].tan) * pieces[i].px_per_column) / left;
-  if (bent > square(kBent_px)) return false;
-  // Does it stand upright? Its own lean, without what was expected.
-  const double own_information = 1 / fitted.lean_variance - 1 / lean_variance;
-  const double scatter = (fitted.fit + 3) / (left + 3);
-  double own = 0, own_variance = 0;
-  if (own_information * lean_variance > 1e-6) {
-    own = (fitted.lean / fitted.lean_variance - lean / lean_variance) / own_information;
-    own_variance = larger(scatter, 1) / own_information;
-    const double allowed = 9 * (1 / own_information + lean_variance) + square(kLeanSpare / view.step_rad);
-    if (square(own - lean) > allowed) return false;
-  }
+  return left;
+}
+
+// The line's own lean, without the prior, where the segments determine it; else 0 with variance 0. False: it does not
+// stand upright.
+bool own_lean(const upright_fit &fitted, const upright_fit &prior, double scatter, double step_rad, double *lean,
+              double *variance) {
+  const double information = 1 / fitted.lean_variance - 1 / prior.lean_variance;
+  *lean = *variance = 0;
+  if (!(information * prior.lean_variance > 1e-6)) return true;
+  *lean = (fitted.lean / fitted.lean_variance - prior.lean / prior.lean_variance) / information;
+  *variance = larger(scatter, 1) / information;
+  const double allowed = square(kSigmas) * (1 / information + prior.lean_variance) + square(kLeanTolerance / step_rad);
+  return !(square(*lean - prior.lean) > allowed);
+}
+
+// Mean grey levels of the two sides, weighted by rows. False: less contrast than wanted.
+bool side_means(const segment_list &segments, int sign, double contrast_grey, radial_edge *out) {
   double weight = 0, low = 0, high = 0;
-  for (int i = 0; i < count; i++) {
-    if (!used[i]) continue;
-    weight += pieces[i].rows;
-    low += pieces[i].rows * pieces[i].low;
-    high += pieces[i].rows * pieces[i].high;
-  }
-  if (sign * (high - low) < params.contrast_grey * weight) return false;
-  // sigma_px is one error of the whole line, not one of each piece: at least that of its middle is left.
-  const double floor = params.sigma_px / view.row[first].px_per_column;
-  const double variance = larger(scatter, 1) * fitted.column_variance;
-  if (variance > square(kUnsure_px / view.row[first].px_per_column)) return false;
-  out->azimuth_rad = view.azimuth_of(fitted.column);
-  out->sigma_rad = std::sqrt(variance + square(floor)) * view.step_rad;
-  out->lean = own * view.step_rad;
-  out->lean_sigma = own_variance > 0 ? std::sqrt(own_variance) * view.step_rad : 1.0;
+  segments.each_used([&](const edge_segment &s) {
+    weight += s.rows;
+    low += s.rows * s.low;
+    high += s.rows * s.high;
+  });
+  if (sign * (high - low) < contrast_grey * weight) return false;
   out->right_grey = low / weight;
   out->left_grey = high / weight;
-  out->rows_first = first;
-  out->rows_last = last;
   return true;
 }
 
-int find_signed(const polar_view &view, const wm_lines_params &params, const zenith &up, const votes &v, int sign,
-                radial_edge *out, int room) {
-  const int rows_least = static_cast<int>(params.length_min_rad / params.row_step_rad + 0.5);
+// Measures the candidate over its rows. False: it is not one upright edge.
+bool measure_line(const polar_view &view, const wm_lines_params &params, const zenith &up, const line_candidate &line,
+                  radial_edge *out) {
+  segment_list segments;
+  const sin_cos at = sincos(view.azimuth_of(line.column - 0.5));
+  upright_fit fitted, prior{};
+  prior.lean = up.lean(at) / view.step_rad;
+  prior.lean_variance = (up.variance(at) + square(kLeanSigmaMin)) / square(view.step_rad);
+  if (!measure_segments(view, params, line, prior.lean, &segments) ||
+      !fit_upright(segments, prior.lean, prior.lean_variance, &fitted))
+    return false;
+  const int left = reject_outliers(fitted, &segments);
+  if (left == 0 || 3 * left < 2 * segments.tried || !fit_upright(segments, prior.lean, prior.lean_variance, &fitted))
+    return false;
+  double mean_square_px2 = 0;
+  segments.each_used(
+      [&](const edge_segment &s) { mean_square_px2 += square(fitted.residual(s) * s.px_per_column) / left; });
+  if (mean_square_px2 > square(kStraightRms_px)) return false;
+  const double scatter = (fitted.chi2 + 3) / (left + 3);
+  double lean, lean_variance;
+  if (!own_lean(fitted, prior, scatter, view.step_rad, &lean, &lean_variance) ||
+      !side_means(segments, line.sign, params.contrast_grey, out))
+    return false;
+  // sigma_px is one error of the whole line, not one of each segment: that of its first row is left.
+  const double px_per_column = view.row[line.first].px_per_column;
+  const double variance = larger(scatter, 1) * fitted.column_variance;
+  if (variance > square(kSigmaMax_px / px_per_column)) return false;
+  out->azimuth_rad = view.azimuth_of(fitted.column);
+  out->sigma_rad = std::sqrt(variance + square(params.sigma_px / px_per_column)) * view.step_rad;
+  out->lean = lean * view.step_rad;
+  out->lean_sigma = lean_variance > 0 ? std::sqrt(lean_variance) * view.step_rad : 1.0;
+  out->rows_first = line.first;
+  out->rows_last = line.last;
+  return true;
+}
+
+// Whether the votes of a column exceed those of its neighbours, the picture being a circle.
+bool is_peak(const votes &v, int column, int columns) {
+  for (int k = 1; k <= kApart; k++) {
+    const int right = v.sum[column >= k ? column - k : column - k + columns],
+              left = v.sum[column + k < columns ? column + k : column + k - columns];
+    if (right >= v.sum[column] || left > v.sum[column]) return false;
+  }
+  return true;
+}
+
+// Adds an edge, or replaces the same edge that was found from a neighbouring candidate if this one has the better
+// score.
+void add_edge(const radial_edge &edge, double step_rad, radial_edge *list, int *count) {
+  bool is_known = false;
+  for (int i = 0; i < *count && !is_known; i++) {
+    is_known = std::fabs(wrap(list[i].azimuth_rad - edge.azimuth_rad)) < kApart * step_rad;
+    if (is_known && edge.score > list[i].score) list[i] = edge;
+  }
+  if (!is_known) list[(*count)++] = edge;
+}
+
+// Measures the peaks among the votes of one sign. Returns how many edges were found.
+int find_edges(const polar_view &view, const wm_lines_params &params, const zenith &up, const votes &v, int sign,
+               radial_edge *out, int capacity) {
+  const int rows_min = static_cast<int>(params.length_min_rad / params.row_step_rad + 0.5);
   const double threshold = 0.5 * params.contrast_grey;
-  const int least = static_cast<int>(threshold * kVoteScale * rows_least);
-  const int columns = view.columns;
+  const int score_min = static_cast<int>(threshold * kVoteScale * rows_min);
   int count = 0;
-  for (int c = 0; c < columns && count < room; c++) {
-    const int score = v.sum[c];
-    if (score < least || v.last[c] - v.first[c] + 1 < rows_least) continue;
-    if (view.row[v.first[c]].elevation_rad > params.begin_max_rad) continue;
-    bool peak = true;
-    for (int k = 1; k <= kApart && peak; k++) {
-      const int right = v.sum[c >= k ? c - k : c - k + columns],
-                left = v.sum[c + k < columns ? c + k : c + k - columns];
-      peak = right < score && left <= score;
-    }
+  for (int c = 0; c < view.columns && count < capacity; c++) {
+    const int score = v.sum[c], first = v.first[c], last = v.last[c];
+    if (score < score_min || last - first + 1 < rows_min) continue;
+    if (view.row[first].elevation_rad > params.begin_max_rad) continue;
     radial_edge edge;
-    if (!peak || !measure_line(view, params, up, c, v.first[c], v.last[c], sign, &edge)) continue;
-    // What was measured must be what was voted for, not a neighbour's flank.
-    const double voted = score / static_cast<double>(v.last[c] - v.first[c] + 1) / kVoteScale + threshold;
+    if (!is_peak(v, c, view.columns) || !measure_line(view, params, up, {c, first, last, sign}, &edge)) continue;
+    // The measured edge must be the one that was voted for, not a neighbour's flank: compare their contrasts.
+    const double voted = score / static_cast<double>(last - first + 1) / kVoteScale + threshold;
     const double contrast = std::fabs(edge.left_grey - edge.right_grey), most = kVoteLimit * threshold;
     if (voted < 0.5 * (contrast < most ? contrast : most)) continue;
     edge.score = score;
-    // The same edge again, from a candidate beside it: the better one stays.
-    bool again = false;
-    for (int i = 0; i < count && !again; i++) {
-      again = std::fabs(wrap(out[i].azimuth_rad - edge.azimuth_rad)) < kApart * view.step_rad;
-      if (again && edge.score > out[i].score) out[i] = edge;
-    }
-    if (!again) out[count++] = edge;
+    add_edge(edge, view.step_rad, out, &count);
   }
   return count;
 }
@@ -258,8 +332,8 @@ int find_signed(const polar_view &view, const wm_lines_params &params, const zen
 int find_radial_edges(const polar_view &view, const wm_lines_params &params, const zenith &up, vote_work *work,
                       radial_edge *out) {
   count_votes(view, static_cast<int>(0.5 * params.contrast_grey * kVoteScale + 0.5), work);
-  const int rising = find_signed(view, params, up, work->rise.best, 1, out, kRadialEdgesMax);
-  return rising + find_signed(view, params, up, work->fall.best, -1, out + rising, kRadialEdgesMax - rising);
+  const int rising = find_edges(view, params, up, work->rise.best, 1, out, kRadialEdgesMax);
+  return rising + find_edges(view, params, up, work->fall.best, -1, out + rising, kRadialEdgesMax - rising);
 }
 
 void correct_zenith(const radial_edge &edge, zenith *up) {
@@ -267,7 +341,7 @@ void correct_zenith(const radial_edge &edge, zenith *up) {
   const double innovation = edge.lean - up->lean(a);
   const double hx = -a.cos, hy = -a.sin, gx = up->xx * hx + up->xy * hy, gy = up->xy * hx + up->yy * hy;
   const double s = hx * gx + hy * gy + square(edge.lean_sigma);
-  if (square(innovation) > 9 * s) return;
+  if (square(innovation) > square(kSigmas) * s) return;
   const double kx = gx / s, ky = gy / s;
   up->x_rad += kx * innovation;
   up->y_rad += ky * innovation;

@@ -8,7 +8,7 @@ namespace wm {
 
 namespace {
 
-constexpr int kPatience = 5;  // rows in a row that vote against end a stretch
+constexpr int kGapMax_rows = 5;  // consecutive rows without a vote that end a run: a handle, a sign. Not swept
 
 struct eight {
   static constexpr int kLanes = 8;
@@ -31,8 +31,8 @@ struct one {
   static lanes choose(bool condition, lanes a, lanes b) { return condition ? a : b; }
 };
 
-// Sums of `Half` columns after and before each column, their difference as a mean in 1/kVoteScale of a grey level.
-// Column c stands for the edge between c - 1 and c.
+// Mean of `Half` columns from each column on minus that of those before it, in 1/kVoteScale of a grey level. Column c
+// is the edge between c - 1 and c.
 template <class V, int Half>
 void slopes(const int16_t *grey, int columns, int16_t *out) {
   constexpr int kShift = (Half == 2 ? 1 : Half == 4 ? 2 : 3) + 2;  // kPolarScale / kVoteScale = 4
@@ -47,13 +47,13 @@ void slopes(const int16_t *grey, int columns, int16_t *out) {
   }
 }
 
-// The largest sum of neighbouring rows, row by row (J. Kadane's way, for all columns at once).
+// The largest sum of consecutive rows, row by row (J. Kadane's algorithm, for all columns at once).
 template <class V>
 void add_row(const int16_t *slope, int columns, int row, int sign, int threshold, const running_votes &now,
              const votes &best) {
   using lanes = typename V::lanes;
   const lanes most = V::all(kVoteLimit * threshold), least = V::all(threshold), zero = V::all(0), one = V::all(1),
-              patience = V::all(kPatience), here = V::all(row), next = V::all(row + 1);
+              gap_max = V::all(kGapMax_rows), here = V::all(row), next = V::all(row + 1);
   for (int c = 0; c < columns; c += V::kLanes) {
     lanes vote = V::load(slope + c);
     if (sign < 0) vote = static_cast<lanes>(-vote);
@@ -62,7 +62,7 @@ void add_row(const int16_t *slope, int columns, int row, int sign, int threshold
     lanes against = static_cast<lanes>(V::load(now.against + c) + one);
     against = V::choose(vote > least, zero, against);
     V::store(now.against + c, against);
-    const auto lost = (sum < zero) | (against > patience);
+    const auto lost = (sum < zero) | (against > gap_max);
     sum = V::choose(lost, zero, sum);
     first = V::choose(lost, next, first);
     V::store(now.sum + c, sum);

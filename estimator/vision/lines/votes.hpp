@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where all radii vote for one azimuth: for each column of the polar picture and each sign of an edge the stretch of
-// rows with the largest sum of votes. A row's vote is how much brighter the column's one side is than the other,
-// limited, less what noise may be.
+// Votes for upright lines: for each column of the polar picture and each sign of an edge, the run of rows with the
+// largest sum of votes. A row's vote is its brightness difference over the column, limited, minus a noise threshold.
 #ifndef WAYMARK_ESTIMATOR_VISION_VOTES_HPP
 #define WAYMARK_ESTIMATOR_VISION_VOTES_HPP
 
@@ -9,15 +8,15 @@
 
 namespace wm {
 
-inline constexpr int kVoteScale = 4;  // of votes, a grey level
-inline constexpr int kVoteLimit = 5;  // of a vote, in thresholds: one strong row doesn't make a line
+inline constexpr int kVoteScale = 4;  // units of a vote per grey level
+inline constexpr int kVoteLimit = 5;  // largest vote, in thresholds: one strong row is no line. Not swept
 
-// The best stretch of each column, rows first .. last; 0 votes: none. Arrays of `columns`, 16-byte aligned.
+// The best run of each column, rows first .. last; sum 0: none. Arrays of `columns`, 16-byte aligned.
 struct votes {
   int16_t *sum, *first, *last;
 };
 
-// The stretch that goes on in each column: its votes, its first row, the rows since the last one that voted for it.
+// The current run of each column: its votes, its first row, the rows since the last vote for it.
 struct running_votes {
   int16_t *sum, *first, *against;
 };
@@ -28,14 +27,14 @@ struct vote_side {
 };
 
 struct vote_work {
-  int16_t *slope;        // columns: a row's differences
-  vote_side rise, fall;  // brighter towards larger azimuths (to the left), darker
+  int16_t *slope;        // `columns` differences of a row
+  vote_side rise, fall;  // brighter towards larger azimuths (to the left); darker
 };
 
-inline constexpr int kVoteArrays = 13;  // of `columns` numbers
+inline constexpr int kVoteArrays = 13;  // arrays of `columns` numbers in vote_work
 
-// `threshold`: half of the least contrast, in 1/kVoteScale of a grey level. On vectors of eight numbers, and by its
-// scalar twin, which gives the same.
+// `threshold`: half of the least contrast, in 1/kVoteScale of a grey level. In vectors of eight numbers; the scalar
+// twin gives the same bits.
 void count_votes(const polar_view &view, int threshold, vote_work *work);
 void count_votes_scalar(const polar_view &view, int threshold, vote_work *work);
 
