@@ -29,8 +29,8 @@ bool solve(double a[8][9]) {
 
 }  // namespace
 
-bool homography_init(homography *out, const double (*from)[2], const flat *to, int count) {
-  flat middle = {0, 0};
+bool homography_init(homography *out, const double (*from)[2], const tangent_point *to, int count) {
+  tangent_point middle = {0, 0};
   double scale = 0;
   for (int i = 0; i < count; i++) middle = middle + (1.0 / count) * to[i];
   for (int i = 0; i < count; i++) scale += length(to[i] - middle) / count;

@@ -35,8 +35,8 @@ constexpr double kMostShift_px = 1.0;
 constexpr double kLeastTurn_rad = 0.003;  // of an upright print: the camera's own tilt, the paper's bend
 
 // Where along `normal` from `at` grey rises, as the centroid of the rise; false where there is no single clear edge.
-bool find_edge(const tangent_view &view, const wm_frame &frame, const flat &at, const flat &normal, double reach,
-               double *offset) {
+bool find_edge(const tangent_view &view, const wm_frame &frame, const tangent_point &at, const tangent_point &normal,
+               double reach, double *offset) {
   constexpr int kMost = 16;
   double grey[kMost + 1] = {};
   const int steps = static_cast<int>(2.0 * reach / kStep_px + 0.5);
@@ -58,7 +58,7 @@ bool find_edge(const tangent_view &view, const wm_frame &frame, const flat &at, 
 // The edge between two corners, point by point.
 struct side_points {
   int count;
-  flat at[kSamples], to_white;
+  tangent_point at[kSamples], to_white;
   int sample[kSamples];
   double beside[kSamples];  // of each sample: how much of the other border is beside it there, 0 to 1
   double share;             // their mean over the points
@@ -69,13 +69,13 @@ struct side_points {
 double along_side(int sample) { return 0.08 + 0.84 * (sample + 0.5) / kSamples; }
 
 // `to_white` is the direction in which grey rises.
-bool find_side(const tangent_view &view, const wm_frame &frame, const flat &a, const flat &b, const flat &to_white,
-               double reach, side_points *out) {
+bool find_side(const tangent_view &view, const wm_frame &frame, const tangent_point &a, const tangent_point &b,
+               const tangent_point &to_white, double reach, side_points *out) {
   out->count = 0;
   out->to_white = to_white;
   for (double &beside : out->beside) beside = 0.0;
   for (int i = 0; i < kSamples; i++) {
-    const flat at = mix(a, b, along_side(i));
+    const tangent_point at = mix(a, b, along_side(i));
     double offset;
     if (!find_edge(view, frame, at, to_white, reach, &offset)) continue;
     out->at[out->count] = at + offset * to_white;
@@ -85,8 +85,8 @@ bool find_side(const tangent_view &view, const wm_frame &frame, const flat &a, c
 }
 
 // The line through them, each moved towards white by its own way.
-bool fit_side(const side_points &side, double by_beside, double by_alone, line *out) {
-  flat found[kSamples];
+bool fit_side(const side_points &side, double by_beside, double by_alone, tangent_line *out) {
+  tangent_point found[kSamples];
   int count = side.count;
   for (int i = 0; i < count; i++)
     found[i] = side.at[i] + (by_alone + side.beside[side.sample[i]] * (by_beside - by_alone)) * side.to_white;
@@ -102,7 +102,7 @@ bool fit_side(const side_points &side, double by_beside, double by_alone, line *
   return true;
 }
 
-bool corners_of(const line *side, int count, flat *out) {
+bool corners_of(const tangent_line *side, int count, tangent_point *out) {
   for (int i = 0; i < count; i++)
     if (!meet(side[(i + count - 1) % count], side[i], &out[i])) return false;
   return true;
@@ -162,7 +162,7 @@ bool is_whole(const side_points &side, int sample) {
 double width_of(const wm_marker_print &print, const homography &h, int side) {
   const double *a = print.corner[side], *b = print.corner[(side + 1) % print.corners];
   const double x = 0.5 * (a[0] + b[0]), y = 0.5 * (a[1] + b[1]);
-  const flat along = h(b[0], b[1]) - h(a[0], a[1]), apart = h(x, y) - h(print.other * x, print.other * y);
+  const tangent_point along = h(b[0], b[1]) - h(a[0], a[1]), apart = h(x, y) - h(print.other * x, print.other * y);
   return std::fabs(cross(along, apart)) / length(along);
 }
 
@@ -214,8 +214,8 @@ void measure_shift(wm_marker_fit *self, const tangent_view &view, const wm_frame
       if (!is_whole(points[side], i)) continue;
       const double t = along_side(i);
       const double x = print.other * (a[0] + t * (b[0] - a[0])), y = print.other * (a[1] + t * (b[1] - a[1]));
-      const flat at = h(x, y);
-      const flat way = sign * (h(x + 0.1 * mx, y + 0.1 * my) - at);
+      const tangent_point at = h(x, y);
+      const tangent_point way = sign * (h(x + 0.1 * mx, y + 0.1 * my) - at);
       const double size = length(way);
       if (!(size > 1e-9)) continue;
       double offset;
@@ -274,25 +274,25 @@ int wm_marker_fit_read(wm_marker_fit *self, const wm_frame *frame, const double 
     middle = middle + ray[i];
   }
   tangent_view view;
-  flat corner[WM_MARKER_CORNERS_MAX];
+  tangent_point corner[WM_MARKER_CORNERS_MAX];
   if (!(length(middle) > 0.1) || !tangent_init(&view, self->optics, middle)) return 0;
   for (int i = 0; i < count; i++)
-    if (!flat_of_ray(view, ray[i], &corner[i])) return 0;
+    if (!point_of_ray(view, ray[i], &corner[i])) return 0;
   homography h;
   if (!homography_init(&h, print.corner, corner, count)) return 0;
   side_points points[WM_MARKER_CORNERS_MAX];
-  line side[WM_MARKER_CORNERS_MAX];
+  tangent_line side[WM_MARKER_CORNERS_MAX];
   double width_px[WM_MARKER_CORNERS_MAX];
   // Twice: a profile that isn't centred on its edge misses more of the one tail than of the other.
   for (int pass = 0; pass < 2; pass++) {
     for (int i = 0; i < count; i++) {
-      const flat &a = corner[i], &b = corner[(i + 1) % count];
+      const tangent_point &a = corner[i], &b = corner[(i + 1) % count];
       const double size = length(b - a);
       if (!(size > kLeastSide_px)) return 0;
       width_px[i] = width_of(print, h, i);
       // Clockwise with y down: outwards is to the left of the way.
       const double outwards = print.is_white_inside ? -1.0 : 1.0;
-      const flat to_white = {outwards * (b.y - a.y) / size, -outwards * (b.x - a.x) / size};
+      const tangent_point to_white = {outwards * (b.y - a.y) / size, -outwards * (b.x - a.x) / size};
       if (!find_side(view, *frame, a, b, to_white, reach_of(width_px[i]), &points[i]) ||
           !fit_side(points[i], 0.0, 0.0, &side[i]))
         return 0;

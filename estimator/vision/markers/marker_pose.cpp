@@ -22,13 +22,14 @@ struct fit {
 
 // In its plane the print is known but for its place, direction and size: four numbers from the corners, by least
 // squares. `n` points away from the camera.
-bool fit_in_plane(const tangent_view &view, const wm_marker_print &print, const flat *corner, const vec3 &n, fit *out) {
+bool fit_in_plane(const tangent_view &view, const wm_marker_print &print, const tangent_point *corner, const vec3 &n,
+                  fit *out) {
   const vec3 across = {view.R_optical_view.m[0][0], view.R_optical_view.m[1][0], view.R_optical_view.m[2][0]};
   vec3 e1 = across - dot(across, n) * n;
   if (!(length(e1) > 1e-6)) return false;
   e1 = 1.0 / length(e1) * e1;
   const vec3 e2 = cross(n, e1);
-  flat on_plane[WM_MARKER_CORNERS_MAX], middle = {0, 0};
+  tangent_point on_plane[WM_MARKER_CORNERS_MAX], middle = {0, 0};
   for (int i = 0; i < print.corners; i++) {
     const vec3 ray = ray_of(view, corner[i]);
     const double depth = dot(ray, n);
@@ -38,7 +39,7 @@ bool fit_in_plane(const tangent_view &view, const wm_marker_print &print, const 
   }
   double re = 0.0, im = 0.0, size = 0.0;
   for (int i = 0; i < print.corners; i++) {
-    const flat c = {print.corner[i][0], print.corner[i][1]};
+    const tangent_point c = {print.corner[i][0], print.corner[i][1]};
     re += dot(on_plane[i], c), im += cross(c, on_plane[i]), size += dot(c, c);
   }
   re /= size, im /= size;
@@ -48,8 +49,8 @@ bool fit_in_plane(const tangent_view &view, const wm_marker_print &print, const 
   for (int i = 0; i < print.corners; i++) {
     const double *c = print.corner[i];
     const double x = middle.x + re * c[0] - im * c[1], y = middle.y + im * c[0] + re * c[1];
-    flat expected;
-    if (!flat_of_ray(view, x * e1 + y * e2 + n, &expected)) return false;
+    tangent_point expected;
+    if (!point_of_ray(view, x * e1 + y * e2 + n, &expected)) return false;
     out->misfit += dot(corner[i] - expected, corner[i] - expected);
   }
   const double distance = print.size_m / scale;  // of the plane
@@ -60,7 +61,7 @@ bool fit_in_plane(const tangent_view &view, const wm_marker_print &print, const 
 
 // The print's normal as the homography has it (Z. Zhang 2000: the columns of K^-1 H are its axes), away from the
 // camera.
-bool rough_normal(const tangent_view &view, const wm_marker_print &print, const flat *corner, vec3 *out) {
+bool rough_normal(const tangent_view &view, const wm_marker_print &print, const tangent_point *corner, vec3 *out) {
   homography h;
   if (!homography_init(&h, print.corner, corner, print.corners)) return false;
   const double f = view.focal_px;
@@ -75,7 +76,7 @@ bool rough_normal(const tangent_view &view, const wm_marker_print &print, const 
 struct turning {
   const tangent_view &view;
   const wm_marker_print &print;
-  const flat *corner;
+  const tangent_point *corner;
   vec3 ahead, aside;  // level; ahead is towards the print
 
   bool at(double turn, fit *out) const {
@@ -170,7 +171,7 @@ double fit_upright(const turning &t, marker_poses *out) {
 
 }  // namespace
 
-bool pose_of(const tangent_view &view, const wm_marker_print &print, const flat *corner, const vec3 &up,
+bool pose_of(const tangent_view &view, const wm_marker_print &print, const tangent_point *corner, const vec3 &up,
              marker_poses *out) {
   // A small print's own tilt is mostly noise: whether it hangs level or upright is told by which of them fits.
   const vec3 ahead = {view.R_optical_view.m[0][2], view.R_optical_view.m[1][2], view.R_optical_view.m[2][2]};

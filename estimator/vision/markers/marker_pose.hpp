@@ -20,7 +20,7 @@ struct marker_poses {
 };
 
 // `corner`: the print's corners in the view. `up`: the vertical in optical axes. False where no pose fits.
-bool pose_of(const tangent_view &view, const wm_marker_print &print, const flat *corner, const vec3 &up,
+bool pose_of(const tangent_view &view, const wm_marker_print &print, const tangent_point *corner, const vec3 &up,
              marker_poses *out);
 
 }  // namespace wm

@@ -26,7 +26,7 @@ struct mr_state {
   uint32_t width_px, height_px;
   lens optics;
   dark_work dark;
-  flat *border;  // the one looked at, without distortion
+  tangent_point *border;  // the one looked at, without distortion
   wm_marker_fit *fit;
 };
 
@@ -36,7 +36,7 @@ size_t lay_out(mr_state *state, uint32_t width, uint32_t height) {
   dark_work work;
   uint8_t *fit = memory.take<uint8_t>(wm_marker_fit_bytes());
   uint8_t *dark = memory.take<uint8_t>(dark_work_lay_out(&work, width, height, nullptr));
-  flat *border = memory.take<flat>(static_cast<size_t>(work.border_max));
+  tangent_point *border = memory.take<tangent_point>(static_cast<size_t>(work.border_max));
   if (!state) return memory.bytes();
   dark_work_lay_out(&state->dark, width, height, dark);
   state->fit = reinterpret_cast<wm_marker_fit *>(fit);
@@ -107,18 +107,18 @@ bool unbend_border(mr_state *state, const dark_run &box, int32_t count, tangent_
   for (int32_t i = 0; i < count; i++) {
     const border_point &p = state->dark.border[i];
     vec3 ray;
-    if (!unproject(state->optics, {1.0 * p.u, 1.0 * p.v}, &ray) || !flat_of_ray(*view, ray, &state->border[i]))
+    if (!unproject(state->optics, {1.0 * p.u, 1.0 * p.v}, &ray) || !point_of_ray(*view, ray, &state->border[i]))
       return false;
   }
   return true;
 }
 
 // The pixels of a border are dark ones: its edge lies half a pixel farther out.
-bool move_out(const flat from[5], double by, flat to[5]) {
-  line side[5];
+bool move_out(const tangent_point from[5], double by, tangent_point to[5]) {
+  tangent_line side[5];
   for (int i = 0; i < 5; i++) {
-    const flat along = from[(i + 1) % 5] - from[i];
-    const flat n = {along.y / length(along), -along.x / length(along)};
+    const tangent_point along = from[(i + 1) % 5] - from[i];
+    const tangent_point n = {along.y / length(along), -along.x / length(along)};
     side[i] = {n, dot(n, from[i]) + by};
   }
   for (int i = 0; i < 5; i++)
@@ -135,7 +135,7 @@ bool look_at_region(mr_state *state, const wm_frame &frame, uint32_t region, wm_
   if (count < 40 || !is_round(state->dark.border, count)) return false;
   tangent_view view;
   if (!unbend_border(state, box, count, &view)) return false;
-  flat dark[5], corner[5];
+  tangent_point dark[5], corner[5];
   const double size = std::sqrt(std::fabs(doubled_area(state->border, count)));
   if (!polygon_of(state->border, count, 5, larger(kOff_px, kOffShare * size), dark)) return false;
   if (!move_out(dark, 0.5, corner)) return false;

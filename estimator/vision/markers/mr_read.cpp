@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "vision/markers/mr_read.hpp"
 
+#include <initializer_list>
+
 namespace wm {
 
 namespace {
 
-constexpr double kShapeMisfit = 0.03;  // of the outline's radius: a pentagon that is no regular one seen askew
-constexpr double kSharpen = 0.25;      // a module's blur from its neighbours, as AprilTag's decoder undoes it
+constexpr double kShapeMisfit = 0.03;    // RMS of the homography over the radius: the regular pentagon in perspective
+constexpr double kSharpen = 0.25;        // deconvolution of a module from its neighbours, as AprilTag's decoder does
+constexpr int kSamples = 12;             // along a side of the ring, for black and for white. Not swept
+constexpr double kContrastMin_grey = 1;  // between the interpolated white and black at a module
 
-// Brightness over the print as a + b x + c y, by least squares.
+// Shading model of one colour over the print: grey = a + b x + c y, by least squares.
 struct shade {
   double normal[3][3], right[3], a, b, c;
 
@@ -51,15 +55,15 @@ struct reader {
   }
 };
 
-// White from the rim and from the gaps inside the ring, black from the ring.
+// White from the rim, black from the ring.
 bool measure_shades(const reader &r, shade *white, shade *black) {
   *white = *black = shade{};
   for (int side = 0; side < 5; side++) {
     double a[2], b[2];
     wm_mr_vertex(side, a);
     wm_mr_vertex(side + 1, b);
-    for (int i = 0; i < 12; i++) {
-      const double t = (i + 0.5) / 12, x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]);
+    for (int i = 0; i < kSamples; i++) {
+      const double t = (i + 0.5) / kSamples, x = a[0] + t * (b[0] - a[0]), y = a[1] + t * (b[1] - a[1]);
       constexpr double kRing = 0.5 * (1 + WM_MR_INNER), kRim = 1 + 0.9 * (1 - kRing);
       double grey;
       if (!r.grey(kRing * x, kRing * y, &grey)) return false;
@@ -71,7 +75,7 @@ bool measure_shades(const reader &r, shade *white, shade *black) {
   return white->solve() && black->solve();
 }
 
-// Whether the tip alone has its black module; the places below the two nearest vertices are free of modules.
+// Whether the tip has its black module, and the two nearest vertices have none.
 bool points_up(const reader &r, const shade &white, const shade &black, double turn_sin, double turn_cos) {
   for (int k = -1; k <= 1; k++) {
     const double s = k * turn_sin, c = k == 0 ? 1 : turn_cos, x = -s * WM_MR_TIP_Y, y = c * WM_MR_TIP_Y;
@@ -83,7 +87,7 @@ bool points_up(const reader &r, const shade &white, const shade &black, double t
   return true;
 }
 
-// How far each module is on white's side, from -0.5 (black) to 0.5.
+// Level of each module between black (-0.5) and white (0.5).
 bool read_modules(const reader &r, const shade &white, const shade &black, double level[64]) {
   for (int i = 0; i < 64; i++) {
     const int column = i % 8, row = i / 8;
@@ -91,7 +95,7 @@ bool read_modules(const reader &r, const shade &white, const shade &black, doubl
     double grey;
     if (!r.module(x, y, &grey)) return false;
     const double low = black.at(x, y), high = white.at(x, y);
-    if (!(high - low > 1)) return false;
+    if (!(high - low > kContrastMin_grey)) return false;
     level[i] = (grey - 0.5 * (low + high)) / (high - low);
   }
   return true;
@@ -115,40 +119,53 @@ uint64_t decide(const double level[64], double sharpen) {
   return modules;
 }
 
+// Whether five points fit the regular pentagon's homography, which has eight unknowns for ten numbers.
+bool is_regular(const homography &h, const double outline[5][2], const tangent_point corner[5]) {
+  const tangent_point middle = h(0, 0);
+  double off = 0, size = 0;
+  for (int i = 0; i < 5; i++) {
+    off += length(h(outline[i][0], outline[i][1]) - corner[i]);
+    size += length(corner[i] - middle);
+  }
+  return off < kShapeMisfit * size;
+}
+
+// Decodes the modules, sharpened and as they are.
+bool decode(const double level[64], uint32_t id_max, mr_reading *out) {
+  for (const double sharpen : {kSharpen, 0.0})
+    if (wm_mr_decode(decide(level, sharpen), &out->id, &out->wrong) && out->id <= id_max) return true;
+  return false;
+}
+
+enum class verdict { kRead, kNextVertex, kNoMarker };
+
+// Reads the print with vertex `tip` as its tip.
+verdict read_at(reader *r, const double outline[5][2], const tangent_point corner[5], int tip, uint32_t id_max,
+                int contrast, mr_reading *out) {
+  tangent_point rotated[5];
+  for (int i = 0; i < 5; i++) rotated[i] = corner[(tip + i) % 5];
+  if (!homography_init(&r->h, outline, rotated, 5)) return verdict::kNoMarker;
+  if (tip == 0 && !is_regular(r->h, outline, rotated)) return verdict::kNoMarker;  // the same for each vertex
+  shade white, black;
+  if (!measure_shades(*r, &white, &black) || white.at(0, 0) - black.at(0, 0) < contrast) return verdict::kNoMarker;
+  const double turn_sin = outline[1][0] / WM_MR_CIRCUMRADIUS, turn_cos = -outline[1][1] / WM_MR_CIRCUMRADIUS;
+  if (!points_up(*r, white, black, turn_sin, turn_cos)) return verdict::kNextVertex;
+  double level[64];
+  if (!read_modules(*r, white, black, level)) return verdict::kNoMarker;
+  out->tip = tip;
+  return decode(level, id_max, out) ? verdict::kRead : verdict::kNextVertex;
+}
+
 }  // namespace
 
-bool mr_read(const tangent_view &view, const wm_frame &frame, const flat corner[5], uint32_t id_max, int contrast,
-             mr_reading *out) {
+bool mr_read(const tangent_view &view, const wm_frame &frame, const tangent_point corner[5], uint32_t id_max,
+             int contrast, mr_reading *out) {
   double outline[5][2];
   for (int i = 0; i < 5; i++) wm_mr_vertex(i, outline[i]);
-  double turn[2];  // from a vertex to the next
-  wm_mr_vertex(1, turn);
-  const double turn_sin = turn[0] / WM_MR_CIRCUMRADIUS, turn_cos = -turn[1] / WM_MR_CIRCUMRADIUS;
+  reader r = {view, frame, {}};
   for (int tip = 0; tip < 5; tip++) {
-    flat turned[5];
-    for (int i = 0; i < 5; i++) turned[i] = corner[(tip + i) % 5];
-    reader r = {view, frame, {}};
-    if (!homography_init(&r.h, outline, turned, 5)) return false;
-    if (tip == 0) {  // five points say more than a homography has numbers; the same in each direction
-      const flat middle = r.h(0, 0);
-      double off = 0, size = 0;
-      for (int i = 0; i < 5; i++) {
-        off += length(r.h(outline[i][0], outline[i][1]) - turned[i]);
-        size += length(turned[i] - middle);
-      }
-      if (!(off < kShapeMisfit * size)) return false;
-    }
-    shade white, black;
-    if (!measure_shades(r, &white, &black) || white.at(0, 0) - black.at(0, 0) < contrast) return false;
-    if (!points_up(r, white, black, turn_sin, turn_cos)) continue;
-    double level[64];
-    if (!read_modules(r, white, black, level)) return false;
-    constexpr double kTries[2] = {kSharpen, 0.0};
-    for (const double sharpen : kTries) {
-      if (!wm_mr_decode(decide(level, sharpen), &out->id, &out->wrong) || out->id > id_max) continue;
-      out->tip = tip;
-      return true;
-    }
+    const verdict result = read_at(&r, outline, corner, tip, id_max, contrast, out);
+    if (result != verdict::kNextVertex) return result == verdict::kRead;
   }
   return false;
 }

@@ -14,10 +14,10 @@ struct mr_reading {
   int wrong;  // modules that were corrected
 };
 
-// The outer corners of a black pentagon in the view, clockwise from any of them. False where it isn't a print's shape,
-// or none of its five directions has a black module below the tip alone and an identity of at most `id_max`.
-bool mr_read(const tangent_view &view, const wm_frame &frame, const flat corner[5], uint32_t id_max, int contrast,
-             mr_reading *out);
+// `corner`: the outer corners of a black pentagon in the view, clockwise from any of them. False where the shape is not
+// a print's, or no vertex has the tip's black module and an identity of at most `id_max`.
+bool mr_read(const tangent_view &view, const wm_frame &frame, const tangent_point corner[5], uint32_t id_max,
+             int contrast, mr_reading *out);
 
 }  // namespace wm
 

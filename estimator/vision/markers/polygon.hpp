@@ -9,13 +9,13 @@ namespace wm {
 
 inline constexpr int kPolygonMax = 8;
 
-// Fits straight sides to `count` points of a closed border that goes round once, against the clock with y down.
-// `corner`: `vertices` of them (at most kPolygonMax), clockwise, on the points' own line. False where the border is no
-// such polygon: not convex, or a tenth of a side's points farther off it than `off_px`.
-bool polygon_of(const flat *border, int count, int vertices, double off_px, flat *corner);
+// Fits straight sides to `count` points of a simple closed border, counterclockwise with y down. `corner`: `vertices`
+// of them (at most kPolygonMax), clockwise, on the line of the points. False where the border is no such polygon: not
+// convex, or a tenth of a side's points are farther off it than `off_px`.
+bool polygon_of(const tangent_point *border, int count, int vertices, double off_px, tangent_point *corner);
 
-// Twice the area within; positive when it goes with the clock, y down.
-double doubled_area(const flat *points, int count);
+// Twice the enclosed area; positive when clockwise, y down.
+double doubled_area(const tangent_point *points, int count);
 
 }  // namespace wm
 
