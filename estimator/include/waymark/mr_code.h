@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The MR code: a coded marker after W. Feng et al. (system 2 of the papers): a black pentagon ring in a white rim, 8 x
-// 8 modules inside, and one black module below the tip that says which vertex it is. The print's layout and its code
-// are lost in our copy of the paper; these are ours (docs/markers.md has a picture).
+// 8 modules inside, and one black module below the tip that marks this vertex. The paper's layout and code are not
+// legible in the copy at hand; these are our own (docs/markers.md has a picture).
 //
-// Code: the identity's 16 bits in a binary BCH code of 63 bits with 11 errors' distance (d = 23; R. Bose,
+// Code: the identity's 16 bits in a binary BCH code of 63 bits that corrects 11 errors (d = 23; R. Bose,
 // D. Ray-Chaudhuri 1960, A. Hocquenghem 1959), and one module that makes the number of set bits even (d = 24). Up to
 // WM_MR_CORRECTED flipped modules are corrected, from there to d - WM_MR_CORRECTED - 1 = 17 refused: 3e-7 of all
 // patterns are within reach of any identity at all.
@@ -20,8 +20,8 @@ extern "C" {
 #define WM_MR_CORRECTED 6
 #define WM_MR_DISTANCE 24
 
-// The print in parts of its size, which is the pentagon's largest width (from its left to its right vertex, outer edge
-// of the black). Origin at the pentagon's centre, x to the right, y DOWN as a reader sees it.
+// The print in units of its size, which is the pentagon's largest width (from its left to its right vertex, outer edge
+// of the black). Origin at the pentagon's centre, x to the right, y DOWN for a reader.
 #define WM_MR_CIRCUMRADIUS 0.52573111211913361  // outer edge of the ring, to a vertex
 #define WM_MR_MODULE 0.068                      // side of a module, width of the ring and of the white rim around it
 #define WM_MR_INNER 0.8401224113764473          // inner edge of the ring: the outer one shrunk about the centre
@@ -29,17 +29,17 @@ extern "C" {
 #define WM_MR_CODE_TOP (0.0337 - 4 * WM_MR_MODULE)
 #define WM_MR_TIP_Y (-0.337)  // centre of the black module below the tip; its x is 0
 
-// Vertex 0 to 4 of the ring's outer edge, clockwise from the tip as a reader sees it. Constant cost. Any thread.
+// Vertex 0 to 4 of the ring's outer edge, clockwise from the tip for a reader. Constant cost. Any thread.
 void wm_mr_vertex(int vertex, double xy[2]);
 
-// The 64 modules of an identity: bit 8 * row + column, from the upper left; set is black. 0 for an identity that there
-// isn't. About 0.1 us.
+// The 64 modules of an identity: bit 8 * row + column, from the upper left; set is black. 0 for an identity that does
+// not exist. About 0.1 us.
 uint64_t wm_mr_encode(uint32_t id);
 
-// What the print has at a place: 1 black, 0 white, -1 beyond its white rim. For those who draw it.
+// Colour of the print at a place: 1 black, 0 white, -1 beyond its white rim. For drawing it.
 int wm_mr_ink(uint64_t modules, double x, double y);
 
-// The identity of 64 modules as they were read, and how many of them were wrong; 0 where none is within reach. About
+// Decodes 64 modules: the identity, and the number of wrong modules. Returns 0 where no identity is near enough. About
 // 1 us. Any thread.
 int wm_mr_decode(uint64_t modules, uint32_t *id, int *wrong);
 

@@ -54,8 +54,8 @@ constexpr uint64_t make_generator() {
 constexpr uint64_t kGenerator = make_generator();
 static_assert(std::bit_width(kGenerator) == kBchLength - kBchData + 1);
 
-// Berlekamp and Massey's shortest recurrence of the syndromes: the polynomial whose roots are the errors' inverses.
-// Returns its degree.
+// Error locator by Berlekamp and Massey: the shortest linear recurrence of the syndromes, whose roots are the inverses
+// of the error places. Returns its degree.
 int locate(const uint8_t syndrome[kSyndromes], uint8_t locator[kSyndromes + 1]) {
   uint8_t before[kSyndromes + 1] = {1}, last = 1;
   locator[0] = 1;

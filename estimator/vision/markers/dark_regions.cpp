@@ -22,7 +22,7 @@ bytes16 more_of(const bytes16 &a, const bytes16 &b) { return a > b ? a : b; }
 int32_t tiles_of(int32_t px) { return (px + kTile - 1) / kTile; }
 int32_t rounded(int32_t px) { return (px + kLanes - 1) / kLanes * kLanes; }
 
-// Least and most of each column over `rows` rows, `count` columns.
+// Minimum and maximum of each column over `rows` rows, `count` columns.
 void of_columns(const uint8_t *grey, size_t stride, int32_t rows, int32_t count, uint8_t *least, uint8_t *most) {
   int32_t u = 0;
   for (; u + kLanes <= count; u += kLanes) {
@@ -45,7 +45,7 @@ void of_columns(const uint8_t *grey, size_t stride, int32_t rows, int32_t count,
   }
 }
 
-// Tiles' least and most; the tile at (x, y) is at (y + 1) * across + x + 1, and the rim counts for nothing.
+// Minimum and maximum of each tile; the tile at (x, y) is at (y + 1) * across + x + 1. The rim is neutral.
 void make_tiles(dark_work *work, const wm_frame &frame) {
   const int32_t columns = tiles_of(work->width), rows = tiles_of(work->height), across = columns + 2;
   const size_t all = static_cast<size_t>(across) * static_cast<size_t>(rows + 2);
@@ -110,7 +110,7 @@ uint32_t root_of(dark_run *runs, uint32_t i) {
   return i;
 }
 
-// The earlier region takes the later one in.
+// Merges the later region into the earlier one.
 void join(dark_run *runs, uint32_t a, uint32_t b) {
   a = root_of(runs, a);
   b = root_of(runs, b);
@@ -126,7 +126,7 @@ void join(dark_run *runs, uint32_t a, uint32_t b) {
   if (runs[b].bottom > runs[a].bottom) runs[a].bottom = runs[b].bottom;
 }
 
-// Stretches of a row: eight pixels at once where all are alike.
+// Runs of a row: eight pixels at once where all are equal.
 uint32_t runs_of_row(const uint8_t *mask, int32_t width, uint16_t row, uint32_t next, dark_run *runs) {
   int32_t u = 0;
   const auto skip = [&](uint8_t value) {
@@ -152,7 +152,7 @@ uint32_t runs_of_row(const uint8_t *mask, int32_t width, uint16_t row, uint32_t 
   }
 }
 
-// Runs of a row and the one above that touch, also over a corner.
+// Joins runs of a row and the one above that touch, also over a corner.
 void join_rows(dark_run *runs, uint32_t above, uint32_t here, uint32_t end) {
   for (uint32_t a = above, b = here; a < here && b < end;) {
     if (runs[a].begin <= runs[b].end && runs[b].begin <= runs[a].end) join(runs, a, b);
@@ -206,7 +206,7 @@ void find_dark_regions(dark_work *work, const wm_frame &frame, int contrast) {
 }
 
 int32_t trace_border(dark_work *work, uint32_t region) {
-  // To the right, and on with the clock, v being down.
+  // Eight neighbours: to the right, then clockwise, v pointing down.
   static constexpr int32_t kDu[8] = {1, 1, 0, -1, -1, -1, 0, 1}, kDv[8] = {0, 1, 1, 1, 0, -1, -1, -1};
   const dark_run &run = work->runs[region];
   const border_point start = {run.begin, run.row};
@@ -216,22 +216,23 @@ int32_t trace_border(dark_work *work, uint32_t region) {
   const uint8_t *const begin = at;
   border_point p = start;
   int32_t count = 0;
-  // Above it and to the left is nothing: the first neighbour is looked for from the lower left on, against the clock.
-  int back = 4, first_way = -1;
+  // There is nothing above and to the left: the search for the first neighbour begins at the lower left,
+  // counterclockwise.
+  int back = 4, first_direction = -1;
   do {
-    int way = -1;
-    for (int i = 1; i <= 8 && way < 0; i++) {
+    int direction = -1;
+    for (int i = 1; i <= 8 && direction < 0; i++) {
       const int next = (back - i + 8) & 7;
-      if (at[step[next]]) way = next;
+      if (at[step[next]]) direction = next;
     }
-    if (way < 0) return 0;  // a lone pixel
-    if (at == begin && way == first_way) break;
-    if (first_way < 0) first_way = way;
+    if (direction < 0) return 0;  // a single pixel
+    if (at == begin && direction == first_direction) break;
+    if (first_direction < 0) first_direction = direction;
     if (count == work->border_max) return 0;
     work->border[count++] = p;
-    at += step[way];
-    p = {p.u + kDu[way], p.v + kDv[way]};
-    back = (way + 4) & 7;
+    at += step[direction];
+    p = {p.u + kDu[direction], p.v + kDv[direction]};
+    back = (direction + 4) & 7;
   } while (true);
   return count;
 }

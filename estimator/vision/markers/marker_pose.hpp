@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a print's corners to its place in space.
+// Pose of a print from its corners.
 #ifndef WAYMARK_ESTIMATOR_VISION_MARKER_POSE_HPP
 #define WAYMARK_ESTIMATOR_VISION_MARKER_POSE_HPP
 
@@ -16,7 +16,7 @@ struct marker_pose {
 struct marker_poses {
   marker_pose best, other;
   bool has_other;
-  double range_sigma_m, turn_sigma_rad;  // of a print that is upright; else 0
+  double range_sigma_m, turn_sigma_rad;  // of an upright or free print; else 0
 };
 
 // `corner`: the print's corners in the view. `up`: the vertical in optical axes. False where no pose fits.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Detector `mr`: MR codes in the raw picture. Dark regions whose outer border, seen without distortion, is a regular
-// pentagon; their modules; their edges measured and their pose found by wm_marker_fit.
+// Detector `mr`: MR codes in the raw picture. Dark regions whose undistorted outer border is a pentagon; decoding of
+// their modules; edges and pose by wm_marker_fit.
 #include <cstring>
 
 #include "memory/layout.hpp"
@@ -16,21 +16,23 @@ namespace wm {
 
 namespace {
 
-constexpr int kLeastBox_px = 10;     // of a region's box, its smaller side
-constexpr double kLeastRound = 0.3;  // 4 pi area / border^2: a pentagon has 0.86, at 75 degrees 0.45
-constexpr double kOff_px = 1.2;      // a border's point from its side; and a share of the outline's size
-constexpr double kOffShare = 0.02;
+constexpr int kBoxMin_px = 10;       // smaller side of a region's box: a module has less than a pixel then
+constexpr int kBorderMin_px = 40;    // length of a border: of the smallest box
+constexpr double kRoundMin = 0.3;    // 4 pi area / border^2: a pentagon has 0.86, seen at 75 degrees 0.45
+constexpr double kOff_px = 1.2;      // largest distance of a border's point from its side: pixel steps. Not swept
+constexpr double kOffOfSize = 0.02;  // the same, as a fraction of the root of the doubled area: lens residuals
+constexpr double kHalfPixel = 0.5;   // from a border pixel's centre to the edge
 
 struct mr_state {
   wm_mr_params params;
   uint32_t width_px, height_px;
   lens optics;
   dark_work dark;
-  tangent_point *border;  // the one looked at, without distortion
+  tangent_point *border;  // undistorted border of the current region
   wm_marker_fit *fit;
 };
 
-// Puts the state's parts one behind the other; returns the bytes of all.
+// Lays out the state; returns its bytes.
 size_t lay_out(mr_state *state, uint32_t width, uint32_t height) {
   memory_layout memory(state, sizeof *state);
   dark_work work;
@@ -50,7 +52,7 @@ wm_marker_print print_of(const wm_mr_params &params, const wm_rig &rig) {
   print.corners = 5;
   for (int i = 0; i < 5; i++) wm_mr_vertex(i, print.corner[i]);
   print.other = WM_MR_INNER;
-  print.beside = 1.0;
+  print.overlap = 1.0;
   return print;
 }
 
@@ -87,20 +89,20 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   return wm_marker_fit_init(state->fit, camera, &print) ? WM_BAD_CONFIG : WM_OK;
 }
 
-// Whether a border may be a pentagon's, by its area and length alone.
+// Whether a border can be a pentagon's, by its area and length.
 bool is_round(const border_point *border, int32_t count) {
   int64_t area = 0;
-  double way = 0;
+  double length_px = 0;
   for (int32_t i = 0; i < count; i++) {
     const border_point &a = border[i], &b = border[i + 1 < count ? i + 1 : 0];
     area += static_cast<int64_t>(b.u) * a.v - static_cast<int64_t>(a.u) * b.v;
-    way += a.u != b.u && a.v != b.v ? 1.41421356 : 1.0;
+    length_px += a.u != b.u && a.v != b.v ? 1.41421356 : 1.0;
   }
-  return 2 * kPi * static_cast<double>(area) > kLeastRound * way * way;
+  return 2 * kPi * static_cast<double>(area) > kRoundMin * length_px * length_px;
 }
 
-// The border as it would be without distortion, about its own middle.
-bool unbend_border(mr_state *state, const dark_run &box, int32_t count, tangent_view *view) {
+// The undistorted border in the tangent plane of its middle.
+bool undistort_border(mr_state *state, const dark_run &box, int32_t count, tangent_view *view) {
   vec3 middle;
   const pixel centre = {0.5 * (box.left + box.right), 0.5 * (box.row + box.bottom)};
   if (!unproject(state->optics, centre, &middle) || !tangent_init(view, state->optics, middle)) return false;
@@ -113,7 +115,7 @@ bool unbend_border(mr_state *state, const dark_run &box, int32_t count, tangent_
   return true;
 }
 
-// The pixels of a border are dark ones: its edge lies half a pixel farther out.
+// Moves the sides of a pentagon outwards.
 bool move_out(const tangent_point from[5], double by, tangent_point to[5]) {
   tangent_line side[5];
   for (int i = 0; i < 5; i++) {
@@ -126,19 +128,19 @@ bool move_out(const tangent_point from[5], double by, tangent_point to[5]) {
   return true;
 }
 
-bool look_at_region(mr_state *state, const wm_frame &frame, uint32_t region, wm_marker *out) {
+bool read_region(mr_state *state, const wm_frame &frame, uint32_t region, wm_marker *out) {
   const dark_run &box = state->dark.runs[region];
-  if (box.right - box.left < kLeastBox_px || box.bottom - box.row < kLeastBox_px) return false;
+  if (box.right - box.left < kBoxMin_px || box.bottom - box.row < kBoxMin_px) return false;
   if (box.left == 0 || box.row == 0 || box.right + 1U >= state->width_px || box.bottom + 1U >= state->height_px)
     return false;
   const int32_t count = trace_border(&state->dark, region);
-  if (count < 40 || !is_round(state->dark.border, count)) return false;
+  if (count < kBorderMin_px || !is_round(state->dark.border, count)) return false;
   tangent_view view;
-  if (!unbend_border(state, box, count, &view)) return false;
+  if (!undistort_border(state, box, count, &view)) return false;
   tangent_point dark[5], corner[5];
   const double size = std::sqrt(std::fabs(doubled_area(state->border, count)));
-  if (!polygon_of(state->border, count, 5, larger(kOff_px, kOffShare * size), dark)) return false;
-  if (!move_out(dark, 0.5, corner)) return false;
+  if (!polygon_of(state->border, count, 5, larger(kOff_px, kOffOfSize * size), dark)) return false;
+  if (!move_out(dark, kHalfPixel, corner)) return false;
   mr_reading reading;
   if (!mr_read(view, frame, corner, static_cast<uint32_t>(state->params.id_max), state->params.contrast_min, &reading))
     return false;
@@ -165,7 +167,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
     if (!is_region(state->dark, i)) continue;
     wm_event *event = &out[*count];
     std::memset(static_cast<void *>(event), 0, WM_EVENT_SMALL_BYTES);
-    if (!look_at_region(state, frame, i, &event->as.marker)) continue;
+    if (!read_region(state, frame, i, &event->as.marker)) continue;
     event->t_ns = frame.t_ns;
     event->kind = WM_EVENT_MARKER;
     ++*count;

@@ -7,8 +7,8 @@
 
 namespace {
 
-// The code is linear: without this an all white print would be identity 0, and stripes might be others. The test
-// mr_code checks that regular patterns are far from all identities.
+// Added to each word, because the code is linear: without it an all-white print would be identity 0. The test mr_code
+// checks that regular patterns are far from all identities.
 constexpr uint64_t kMask = UINT64_C(0x9A3C5D0E71B6482F);
 constexpr uint64_t kParity = UINT64_C(1) << 63;
 
@@ -25,7 +25,7 @@ void wm_mr_vertex(int vertex, double xy[2]) {
 
 int wm_mr_ink(uint64_t modules, double x, double y) {
   constexpr double kApothem = WM_MR_CIRCUMRADIUS * 0.80901699437494745;
-  double out = 0;  // how far along the normal of the nearest side, in parts of the apothem
+  double out = 0;  // distance along the normal of the nearest side, in apothems
   for (int i = 0; i < 5; i++) {
     double a[2], b[2];
     wm_mr_vertex(i, a);
