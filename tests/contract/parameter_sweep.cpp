@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "parameter_sweep.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <memory>
+
+namespace parameters {
+namespace {
+
+char *field(std::vector<double> &memory, const wm_param &param) {
+  return reinterpret_cast<char *>(memory.data()) + param.offset;
+}
+
+// Other values to try, the nearest first: extremes may cost much memory or time.
+std::vector<double> moved(const wm_param &param, double from) {
+  std::vector<double> out;
+  const auto offer = [&](double value) {
+    if (param.type != WM_PARAM_F64) value = std::floor(value + 0.5);
+    value = std::clamp(value, param.min, param.max);
+    if (value != from && std::find(out.begin(), out.end(), value) == out.end()) out.push_back(value);
+  };
+  if (param.type == WM_PARAM_BOOL || param.type == WM_PARAM_ENUM) {
+    for (double value = param.min; value <= param.max; value++) offer(value);
+    return out;
+  }
+  if (param.type == WM_PARAM_I32) {
+    offer(from + 1);
+    offer(from - 1);
+  }
+  if (from != 0.0) {
+    for (const double factor : {1.5, 0.67, 4.0, 0.25}) offer(from * factor);
+  } else {
+    for (const double value : {0.01, 0.1, 1.0, 3.0}) offer(value);
+  }
+  offer(param.min);
+  offer(param.max);
+  return out;
+}
+
+struct recorded_stage {
+  const stage *of;
+  trace output;
+  bool ran;
+};
+
+bool made_for(const stage &s, const wm_param &param) {
+  for (const char *beginning : s.first_for)
+    if (std::strncmp(param.key, beginning, std::strlen(beginning)) == 0) return true;
+  return false;
+}
+
+// Where the parameter changes something: "stage: key = value"; empty: nowhere.
+std::string effect(const wm_param_table &table, const wm_param &param, const std::vector<recorded_stage> &stages) {
+  std::vector<const recorded_stage *> order;
+  for (const bool first : {true, false})
+    for (const recorded_stage &s : stages)
+      if (s.ran && made_for(*s.of, param) == first) order.push_back(&s);
+  for (const recorded_stage *at : order) {
+    const recorded_stage &s = *at;
+    values set(table, s.of->settings);
+    const double from = set.get(param);
+    for (const double value : moved(param, from)) {
+      set.set(param, value);
+      trace output(&s.output);
+      const bool ran = s.of->run(set, &output);
+      if (!ran || output.differs()) return s.of->name + ": " + std::to_string(value) + (ran ? "" : " is refused");
+    }
+  }
+  return "";
+}
+
+}  // namespace
+
+values::values(const wm_param_table &table, const std::vector<setting> &settings)
+    : memory_(table.bytes / sizeof(double) + 1) {
+  wm_params_defaults(&table, memory_.data());
+  for (const setting &s : settings)
+    for (size_t i = 0; i < table.count; i++)
+      if (std::strcmp(table.params[i].key, s.key) == 0) set(table.params[i], s.value);
+}
+
+double values::get(const wm_param &param) const {
+  const char *at = reinterpret_cast<const char *>(memory_.data()) + param.offset;
+  double number;
+  int32_t whole;
+  if (param.type == WM_PARAM_F64) return std::memcpy(&number, at, sizeof number), number;
+  return std::memcpy(&whole, at, sizeof whole), whole;
+}
+
+void values::set(const wm_param &param, double value) {
+  const auto whole = static_cast<int32_t>(value);
+  if (param.type == WM_PARAM_F64)
+    std::memcpy(field(memory_, param), &value, sizeof value);
+  else
+    std::memcpy(field(memory_, param), &whole, sizeof whole);
+}
+
+void trace::add(double number) {
+  uint64_t bits;
+  std::memcpy(&bits, &number, sizeof bits);
+  if (std::isnan(number)) bits = 1;  // whichever it is
+  hash_ = (hash_ ^ bits) * UINT64_C(1099511628211);
+  hash_ ^= hash_ >> 29;
+}
+
+bool trace::step() {
+  const size_t at = steps_.size();
+  steps_.push_back(hash_);
+  if (recorded_ && (at >= recorded_->steps_.size() || recorded_->steps_[at] != hash_)) differs_ = true;
+  return !differs_;
+}
+
+std::vector<std::string> sweep(const char *owner, const wm_param_table &table, const std::vector<stage> &stages,
+                               const std::vector<std::string> &known) {
+  std::vector<recorded_stage> recorded;
+  for (const stage &s : stages) {
+    recorded.push_back({&s, trace(), false});
+    recorded.back().ran = s.run(values(table, s.settings), &recorded.back().output);
+    if (!recorded.back().ran) std::printf("%s: stage \"%s\" is refused\n", owner, s.name.c_str());
+  }
+  std::vector<std::string> dead;
+  const bool tells = std::getenv("WM_PARAMETERS_TELL") != nullptr;
+  for (size_t i = 0; i < table.count; i++) {
+    const std::string name = std::string(owner) + "." + table.params[i].key;
+    const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
+    if (is_known && !tells) continue;
+    const std::string where = effect(table, table.params[i], recorded);
+    if (tells)
+      std::printf("%6.2f %-50s %s\n", 1.0 * clock() / CLOCKS_PER_SEC, name.c_str(),
+                  where.empty() ? "NOTHING" : where.c_str());
+    if (where.empty() && is_known) std::printf("%s changes nothing, as is known\n", name.c_str());
+    if (where.empty() && !is_known) dead.push_back(name);
+    if (!where.empty() && is_known)
+      std::printf("%s has an effect now: take it off the list of exceptions\n", name.c_str());
+  }
+  return dead;
+}
+
+int report(const std::vector<owner> &owners, const std::vector<std::string> &known, const char *only) {
+  std::vector<std::string> dead;
+  size_t count = 0;
+  for (const owner &o : owners) {
+    if (only && std::strcmp(only, o.name) != 0) continue;
+    for (std::string &name : sweep(o.name, o.table, o.stages, known)) dead.push_back(std::move(name));
+    count += o.table.count;
+  }
+  for (const std::string &name : dead)
+    std::printf("%s: no scenario's output changes when it is moved, and no value is refused\n", name.c_str());
+  std::printf("%zu parameters, %zu without effect\n", count, dead.size());
+  return dead.empty() && count > 0 ? 0 : 1;
+}
+
+}  // namespace parameters
