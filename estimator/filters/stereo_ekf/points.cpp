@@ -31,13 +31,11 @@ void stereo_ekf::end_picture() {
   if (picture_ns_ == WM_TIME_NONE) return;
   filter_.settle();
   if (filter_.point_count() > 0) {
-    const past_pose past = look_back(filter_.head1(kTimeOffset, 0.0));
-    const mat3 B = rig_.R_base_optical * matrix_of(turn_by(filter_.head3(kCameraRotation)));
-    const vec3 eye = rig_.place + filter_.head3(kCameraPlace);
+    const past_pose past = state_at_picture();
     for (int slot = filter_.point_count() - 1; slot >= 0; slot--) {
       point_info &point = info()[slot];
       if (point.seen_ns == picture_ns_ || point.unseen == kOfMap) continue;
-      const vec3 x = transposed_times(B, transposed_times(past.R, filter_.point(slot) - past.at.p) - eye);
+      const vec3 x = in_camera(filter_.point(slot), past);
       // One whose own sightings don't fit stands in the wrong place, be that in view or not.
       if (point.misfit_ns == picture_ns_ || rig_.in_view(x, kInside_px)) {
         if (++point.unseen > params_.keep_unseen_steps) remove_point(slot);
@@ -113,9 +111,8 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
       noise.m[i][j] = 0.0;
       for (int k = 0; k < 4; k++) noise.m[i][j] += by[i][k] * by[j][k] * square(sigma_px_[k]);
     }
-  const past_pose past = look_back(filter_.head1(kTimeOffset, 0.0));
-  const mat3 B = rig_.R_base_optical * matrix_of(turn_by(filter_.head3(kCameraRotation)));
-  const vec3 place = past.at.p + past.R * (rig_.place + filter_.head3(kCameraPlace) + B * x);
+  const past_pose past = state_at_picture();
+  const vec3 place = past.at.p + past.R * (rig_.place + filter_.head3(kCameraPlace) + camera_axes() * x);
   const point_view view = view_point(place, past);
   const int slot = filter_.point_count();
   filter_.add_point(place, view.by, view.A, noise);

@@ -94,8 +94,9 @@ void stereo_ekf::keep_clue(const wm_stereo &seen, const wm_landmark &landmark, w
               way_m_, turn_rad_});
 }
 
-void stereo_ekf::note(wm_time_ns t_ns, int key, double misfit) {
+void stereo_ekf::note(wm_time_ns t_ns, int key, const row_verdict &result) {
   if (!params_.recover) return;
+  const double misfit = !result.fused ? 1.0 : result.doubtful ? 0.8 : 0.0;
   monitor_.note(t_ns, key, misfit);
   if (state_ == WM_STATE_TRACKING && monitor_.contradicted(t_ns)) {
     state_ = WM_STATE_LOST;

@@ -74,54 +74,71 @@ void space_filter::project(const row_block &block) {
   }
 }
 
-row_verdict space_filter::fuse(const row_block &block, const gates &limits) {
-  row_verdict out{};
-  if (block.without_room > 0) return out;
-  project(block);
-  const int rows = block.rows;
-  double factor[kRank][kRank] = {}, left[kRank], d[kRank];
-  for (int k = 0; k < rows; k++) {
+// The innovations with the pending correction taken off, and the lower triangle of H P H'.
+void space_filter::innovations_of(const row_block &block, factors *f, row_verdict *out) const {
+  for (int k = 0; k < block.rows; k++) {
     const double *gain = gains() + k * stride_;
     double expected_change = 0.0;
     for (int c = 0; c < block.columns; c++) expected_change += block.by[k][c] * correction()[block.index[c]];
-    out.innovation[k] = block.innovation[k] - expected_change;
-    for (int l = k; l < rows; l++) {
+    out->innovation[k] = block.innovation[k] - expected_change;
+    for (int l = k; l < block.rows; l++) {
       double sum = 0.0;
       for (int c = 0; c < block.columns; c++) sum += block.by[l][c] * gain[block.index[c]];
-      factor[l][k] = sum;  // the innovations' covariance without noise; its factor below
+      f->l[l][k] = sum;
     }
   }
-  for (int k = 0; k < rows; k++) {
-    left[k] = out.innovation[k];
-    d[k] = factor[k][k] + block.noise[k];
+}
+
+// Factorises the innovations' covariance row after row, L D L', and gates each row with its remaining innovation.
+bool space_filter::factorize_and_gate(const row_block &block, const gates &limits, factors *f, row_verdict *out) {
+  for (int k = 0; k < block.rows; k++) {
+    double left = out->innovation[k], d = f->l[k][k] + block.noise[k];
     for (int m = 0; m < k; m++) {
-      left[k] -= factor[k][m] * left[m];
-      d[k] -= square(factor[k][m]) * d[m];
+      left -= f->l[k][m] * f->left[m];
+      d -= square(f->l[k][m]) * f->d[m];
     }
-    const double nis = square(left[k]) / d[k];
-    out.variance[k] = d[k];
-    out.nis[k] = nis;
-    if (!(d[k] > 0.0) || !(nis <= limits.hard)) return out;
+    const double nis = square(left) / d;
+    out->variance[k] = d;
+    out->nis[k] = nis;
+    if (!(d > 0.0) || !finite(nis)) return false;
+    if (nis > limits.hard) {
+      out->verdict = WM_REJECTED_GATE;
+      return false;
+    }
     if (nis > limits.soft) {
-      out.doubtful = true;
-      d[k] += block.noise[k] * (nis / limits.soft - 1.0);
+      out->doubtful = true;
+      d += block.noise[k] * (nis / limits.soft - 1.0);
     }
-    for (int l = k + 1; l < rows; l++) {
-      for (int m = 0; m < k; m++) factor[l][k] -= factor[l][m] * factor[k][m] * d[m];
-      factor[l][k] /= d[k];
+    f->left[k] = left;
+    f->d[k] = d;
+    for (int l = k + 1; l < block.rows; l++) {
+      for (int m = 0; m < k; m++) f->l[l][k] -= f->l[l][m] * f->l[k][m] * f->d[m];
+      f->l[l][k] /= d;
     }
   }
+  return true;
+}
+
+row_verdict space_filter::fuse(const row_block &block, const gates &limits) {
+  row_verdict out{};
+  out.verdict = WM_REJECTED_SINGULAR;
+  if (block.without_room > 0) return out;
+  project(block);
+  factors f;
+  innovations_of(block, &f, &out);
+  if (!factorize_and_gate(block, limits, &f, &out)) return out;
   const int width = even(n_);
-  for (int k = 0; k < rows; k++) {
+  for (int k = 0; k < block.rows; k++) {
     double *gain = gains() + k * stride_;
     for (int m = 0; m < k; m++)  // the earlier ones are scaled by 1 / sqrt(d) already
-      vectors::add_scaled(gain, gains() + m * stride_, -factor[k][m] * std::sqrt(d[m]), width);
-    vectors::add_scaled(correction(), gain, left[k] / d[k], width);
-    vectors::set_scaled(gain, gain, 1.0 / std::sqrt(d[k]), width);
+      vectors::add_scaled(gain, gains() + m * stride_, -f.l[k][m] * std::sqrt(f.d[m]), width);
+    vectors::add_scaled(correction(), gain, f.left[k] / f.d[k], width);
+    vectors::set_scaled(gain, gain, 1.0 / std::sqrt(f.d[k]), width);
   }
   vectors::subtract_gram(p(), gains(), n_, stride_);
   pending_ = true;
   out.fused = true;
+  out.verdict = WM_FUSED;
   return out;
 }
 
@@ -131,20 +148,12 @@ pose3 space_filter::pose() const {
   return {pose_.p + mean_turn(turn) * pending(kPlace), normalized(turn_by(turn) * pose_.q)};
 }
 
-// The invariant error stays while the estimate moves; in plain coordinates dp' = dp - D x dc for the pose and each
-// point, D what it was moved by and dc the camera's turn in map axes: the vehicle's and, where those are states, the
-// camera's own against the vehicle and what the vehicle turns in the pictures' time offset. (With the vehicle's alone,
-// points that move would tell how the camera is mounted and when it looks, which pictures alone can't.) P' = M P M'
-// with M = 1 + a e', e choosing dc: P + a b' + b a', b = P e + e'P e a / 2.
-void space_filter::settle() {
-  if (!pending_) return;
-  pending_ = false;
-  double *x = correction();
+// Moves the estimate by the pending correction. `a` (kTurns rows) gets, for each component of a camera's turn dc, its
+// derivative of the displaced errors: -D x dc.
+void space_filter::apply_correction(double *a) {
+  const double *x = correction();
   const vec3 turn = vec_of(x + kTurn);
   const mat3 spread = mean_turn(turn);
-  double *a = gains(), *column = gains() + (ptrdiff_t)kTurns * stride_, *b = scratch();
-  const int width = even(n_);
-  std::memset(a, 0, (size_t)kTurns * (size_t)stride_ * sizeof(double));
   const auto moved = [&](int state, const vec3 &by) {
     const mat3 m = -1.0 * skew(by);
     for (int i = 0; i < 3; i++)
@@ -162,29 +171,47 @@ void space_filter::settle() {
     for (int i = 0; i < 3; i++) points()[3 * slot + i] += by[i];
     moved(state, by);
   }
-  // e's columns beside dr itself.
-  struct {
-    int state;
-    vec3 by;
-  } others[4];
+}
+
+// The states beside the vehicle's rotation that rotate the camera, and their derivative of its turn in map axes: its
+// own rotation, and the time offset, in which the vehicle turns.
+int space_filter::camera_turn_states(turning_state out[kTurningStates]) const {
   int count = 0;
   if (at_[kCameraRotation] >= 0) {
     const mat3 camera = r_ * (camera_axes_ * matrix_of(turn_by(head3(kCameraRotation))));
     for (int j = 0; j < 3; j++)
-      others[count++] = {at_[kCameraRotation] + j, {camera.m[0][j], camera.m[1][j], camera.m[2][j]}};
+      out[count++] = {at_[kCameraRotation] + j, {camera.m[0][j], camera.m[1][j], camera.m[2][j]}};
   }
-  if (at_[kTimeOffset] >= 0) others[count++] = {at_[kTimeOffset], -1.0 * (r_ * turn_rate_)};
+  if (at_[kTimeOffset] >= 0) out[count++] = {at_[kTimeOffset], -1.0 * (r_ * turn_rate_)};
+  return count;
+}
+
+// The invariant error stays while the estimate moves. In plain coordinates dp' = dp - D x dc for the pose and each
+// point: D the displacement, dc the camera's turn in map axes. With the vehicle's turn alone, moved points would make
+// the camera's mounting and time offset observable, which they are not from pictures alone.
+// P' = M P M' with M = 1 + a e', dc = e' x: P + a b' + b a', b = P e + a e' P e / 2.
+void space_filter::settle() {
+  if (!pending_) return;
+  pending_ = false;
+  double *a = gains(), *column = gains() + (ptrdiff_t)kTurns * stride_, *b = scratch();
+  const int width = even(n_);
+  std::memset(a, 0, (size_t)kTurns * (size_t)stride_ * sizeof(double));
+  apply_correction(a);
+  turning_state others[kTurningStates];
+  const int count = camera_turn_states(others);
+  const auto copy = [&](int state, double *out) {
+    copy_column(p(), state, out, n_, stride_);
+    if (width > n_) out[n_] = 0.0;
+  };
   for (int k = 0; k < kTurns; k++) {
     double *turned = b + k * stride_;
-    copy_column(p(), kTurn + k, turned, n_, stride_);
-    if (width > n_) turned[n_] = 0.0;
+    copy(kTurn + k, turned);
     for (int j = 0; j < count; j++) {
-      copy_column(p(), others[j].state, column, n_, stride_);
-      if (width > n_) column[n_] = 0.0;
+      copy(others[j].state, column);
       vectors::add_scaled(turned, column, others[j].by[k], width);
     }
   }
-  double turn_block[3][3];
+  double turn_block[kTurns][kTurns];  // e' P e
   for (int k = 0; k < kTurns; k++)
     for (int l = 0; l < kTurns; l++) {
       turn_block[k][l] = b[k * stride_ + kTurn + l];
@@ -194,7 +221,7 @@ void space_filter::settle() {
     for (int l = 0; l < kTurns; l++)
       vectors::add_scaled(b + k * stride_, a + l * stride_, 0.5 * turn_block[k][l], width);
   vectors::add_mixed(p(), a, b, n_, stride_);
-  std::memset(x, 0, (size_t)stride_ * sizeof(double));
+  std::memset(correction(), 0, (size_t)stride_ * sizeof(double));
 }
 
 void space_filter::add_point(const vec3 &place, const row_block &block, const mat3 &A, const mat3 &noise) {

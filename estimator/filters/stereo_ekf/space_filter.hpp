@@ -17,6 +17,7 @@
 
 #include "math/rotation.hpp"
 #include "math/symmetric.hpp"
+#include "waymark/event.h"
 #include "waymark/pose.h"
 
 namespace wm {
@@ -58,10 +59,11 @@ struct row_block {
   int rows = 0, columns = 0;
   int without_room = 0;  // columns beyond kColumns: fuse() refuses the block
   int index[kColumns];
-  double by[kRank][kColumns + kWidest];     // what has no room is written behind the last column, and never read
-  double observed[kRank], expected[kRank];  // expected: at the point of linearisation
-  double innovation[kRank];                 // observed - expected, wrapped where it is an angle
-  double noise[kRank];                      // variances
+  double by[kRank][kColumns + kWidest];  // what has no room is written behind the last column, and never read
+  wm_residual kind[kRank];               // for the record, as is `observed`
+  double observed[kRank];
+  double innovation[kRank];  // observed - expected at the point of linearisation; angles wrapped
+  double noise[kRank];       // variances
 
   // `width` (at most kWidest) columns for the states from `state` on; returns the first column.
   int add_columns(int state, int width) {
@@ -76,6 +78,14 @@ struct row_block {
     }
     return first;
   }
+  // Returns the row; its derivatives are 0 but where the caller writes them.
+  int add_row(wm_residual residual, double measured, double innovation_, double variance) {
+    kind[rows] = residual;
+    observed[rows] = measured;
+    innovation[rows] = innovation_;
+    noise[rows] = variance;
+    return rows++;
+  }
 };
 
 struct gates {
@@ -83,8 +93,9 @@ struct gates {
 };
 
 struct row_verdict {
+  wm_verdict verdict;
   bool fused;
-  bool doubtful;  // beyond the soft gate
+  bool doubtful;  // a row above the soft gate
   double variance[kRank], nis[kRank], innovation[kRank];
 };
 
@@ -158,6 +169,7 @@ class space_filter {
   double *correction() { return tail(); }
   const double *correction() const { return tail(); }
   double *gains() { return tail() + stride_; }
+  const double *gains() const { return tail() + stride_; }
   double *scratch() { return tail() + (1 + kRank) * stride_; }
   double *points() { return tail() + kRowsBefore * stride_; }
   const double *points() const { return tail() + kRowsBefore * stride_; }
@@ -166,6 +178,18 @@ class space_filter {
   static constexpr int kRowsBefore = 1 + kRank + 2 * kTurns;
 
   void project(const row_block &block);
+  struct factors {
+    double l[kRank][kRank], d[kRank], left[kRank];  // left: the innovation that the rows before leave
+  };
+  void innovations_of(const row_block &block, factors *f, row_verdict *out) const;
+  static bool factorize_and_gate(const row_block &block, const gates &limits, factors *f, row_verdict *out);
+  static constexpr int kTurningStates = 4;
+  struct turning_state {
+    int state;
+    vec3 by;
+  };
+  void apply_correction(double *a);
+  int camera_turn_states(turning_state out[kTurningStates]) const;
 
   // space_propagate.cpp
   struct step;

@@ -159,35 +159,6 @@ wm_status stereo_ekf::predict(const wm_event &motion) {
   return WM_OK;
 }
 
-// With velocity and rates as states a measured twist is six rows like any other. Where it runs ahead of the vehicle by
-// a lag (or, below 0, behind it), what it said a lag ago is what the vehicle does now.
-void stereo_ekf::fuse_twist(const wm_event &motion) {
-  vec3 v, w, v_var, w_var, v_slope, w_slope;
-  motion_.sample_noise(&v_var, &w_var);
-  if (!motion_.sample_now(&v, &w, &v_slope, &w_slope)) return;
-  const bool planar = motion.kind == WM_EVENT_TWIST2;
-  for (int which = kVelocity; which <= kRates; which++) {
-    const bool linear = which == kVelocity;
-    const int lag_state = linear ? kVelocityLag : kRateLag;
-    const double lag_s = filter_.head1(lag_state, 0.0);
-    const vec3 slope = linear ? v_slope : w_slope;
-    const vec3 measured = (linear ? v : w) - lag_s * slope;
-    const vec3 state = filter_.head3(which);
-    row_block block;
-    const int first = block.add_columns(filter_.at(which), 3);
-    const int lag = filter_.at(lag_state) >= 0 ? block.add_columns(filter_.at(lag_state), 1) : -1;
-    for (int i = 0; i < 3; i++) {
-      if (planar && i != (linear ? 0 : 2)) continue;
-      const int row = block.rows++;
-      block.by[row][first + i] = 1.0;
-      if (lag >= 0) block.by[row][lag] = slope[i];
-      block.innovation[row] = measured[i] - state[i];
-      block.noise[row] = linear ? v_var[i] : w_var[i];
-    }
-    (void)filter_.fuse(block, limits());
-  }
-}
-
 wm_status stereo_ekf::correct(const wm_event &event, record_list records) {
   switch (event.kind) {
     case WM_EVENT_STEREO: return fuse_stereo(event, records);

@@ -31,6 +31,8 @@ class stereo_ekf {
  private:
   // A point of the state: whose it is, when it began, was seen last, and did not fit last.
   static constexpr int32_t kOfMap = -1;
+  // Keys of evidence that is not of a landmark.
+  static constexpr int kPositionKey = -2, kDepthKey = -3, kHeadingKey = -4;
   struct point_info {
     wm_time_ns begun_ns, seen_ns, misfit_ns;
     int32_t id;
@@ -52,20 +54,34 @@ class stereo_ekf {
   bool constant_velocity() const { return params_.prediction == WM_PREDICT_CONSTANT_VELOCITY; }
   wm_status check_time(wm_time_ns t_ns) const;
   void move_to(wm_time_ns t_ns);
-  void fuse_twist(const wm_event &motion);
 
   // fuse.cpp
   wm_status fuse_stereo(const wm_event &event, record_list records);
+  wm_status fuse_known_point(const wm_event &event, int known, const wm_innovation &blank, record_list records);
   wm_status fuse_sighting(const wm_event &event, record_list records);
   wm_status fuse_position(const wm_event &event, record_list records);
   wm_status fuse_heading(const wm_event &event, record_list records);
-  past_pose look_back(double age_s) const;
-  void add_place(row_block *block, const past_pose &past, const vec3 &arm, const double (*by)[3], int rows) const;
+  void fuse_twist(const wm_event &motion);
+  row_verdict fuse_point(const wm_stereo &seen, const vec3 &place, double place_sigma_m, int slot,
+                         const wm_innovation &blank, record_list records);
+  row_verdict fuse_rows(const row_block &block, const wm_innovation &blank, record_list records);
+
+  // rows.cpp
+  past_pose state_before(double age_s) const;
+  past_pose state_at_picture() const;
+  mat3 camera_axes() const;  // of the left camera in base_link, with the state of its rotation
+  vec3 in_camera(const vec3 &place, const past_pose &past) const;
   point_view view_point(const vec3 &place, const past_pose &past) const;
-  bool fuse_point(const wm_stereo &seen, const vec3 &place, double place_sigma_m, int slot, const wm_innovation &blank,
-                  record_list records, row_verdict *verdict);
-  row_verdict fuse_rows(const row_block &block, const wm_residual *kinds, const wm_innovation &blank,
-                        record_list records);
+  bool point_rows(const wm_stereo &seen, const vec3 &place, double place_sigma_m, int slot, const past_pose &past,
+                  row_block *out) const;
+  bool sighting_rows(const wm_sighting &s, int landmark, int slot, row_block *out) const;
+  void position_rows(const wm_position &p, int first, int last, row_block *out) const;
+  bool heading_rows(const wm_heading &h, row_block *out) const;
+  row_block twist_rows(head_state which, const vec3 &measured, const vec3 &slope_per_s, const vec3 &variance,
+                       bool planar) const;
+  void add_pose_columns(row_block *block, const past_pose &past, const vec3 &arm, const double (*by_end)[3],
+                        const double (*by_turn)[3]) const;
+  void add_bias_column(row_block *block, int row, head_state which) const;
 
   // points.cpp
   int slot_of_known(int landmark);
@@ -82,7 +98,7 @@ class stereo_ekf {
   void start_pose();
   void set_pose(const pose3 &pose, double sigma_m, double sigma_rad);
   void keep_clue(const wm_stereo &seen, const wm_landmark &landmark, wm_time_ns t_ns);
-  void note(wm_time_ns t_ns, int key, double misfit);
+  void note(wm_time_ns t_ns, int key, const row_verdict &result);
   void search(wm_time_ns since_ns);
 
   int find_landmark(int32_t id) const;
