@@ -153,7 +153,7 @@ const wm_detector wm_apriltag_detector = {
     "again, with the camera's growing of white taken out.",
     WM_EVENT_BIT(WM_EVENT_MARKER),
     1,
-    {kParams, sizeof kParams / sizeof kParams[0], sizeof(apriltag_params)},
+    {kParams, sizeof kParams / sizeof kParams[0], sizeof(apriltag_params), NULL},
     state_bytes,
     init,
     detect,

@@ -88,8 +88,13 @@ static const char *fill_sighting(const csv_row *row, uint16_t sensor, wm_event *
 
 static const char *fill_marker(const csv_row *row, uint16_t sensor, wm_event *out) {
   const double *p = &row->number[FIRST + 2];
-  out->as.marker = (wm_marker){
-      .sensor = sensor, .id = (int32_t)row->whole[FIRST + 1], .p_m = {p[0], p[1], p[2]}, .yaw_rad = wrapped(p[3])};
+  out->as.marker = (wm_marker){.sensor = sensor,
+                               .id = (int32_t)row->whole[FIRST + 1],
+                               .p_m = {p[0], p[1], p[2]},
+                               .yaw_rad = wrapped(p[3]),
+                               .along_sigma_m = (double)NAN,
+                               .yaw_sigma_rad = (double)NAN,
+                               .edge_shift_px = (double)NAN};
   return NULL;
 }
 

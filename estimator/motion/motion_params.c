@@ -66,7 +66,7 @@ static const wm_param kParams[] = {
 };
 
 const wm_param_table wm_motion_params_table = {kParams, sizeof kParams / sizeof kParams[0],
-                                               sizeof(struct wm_motion_params)};
+                                               sizeof(struct wm_motion_params), NULL};
 
 const char *wm_motion_params_clash(const wm_motion_params *params, const char **key) {
   // 0 is off for either; where they are equal, every left turn overflows that is wider than the drive's widest.

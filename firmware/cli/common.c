@@ -65,9 +65,17 @@ void print_report(const wm_run_report *r, const char *name, const char *out_dir,
   for (uint32_t i = 0; i < r->health.calibration_count; i++) {
     const wm_calibration_value *v = &r->health.calibration[i];
     (void)printf("  %-32s %10.5g", v->name, v->value);
-    if (v->sigma > 0.0) (void)printf("  +- %.2g", v->sigma);  // counts have none
+    if (v->sigma > 0.0) (void)printf("  +- %.2g", v->sigma);
     (void)putchar('\n');
   }
+  for (uint32_t i = 0; i < r->health.counter_count; i++) {
+    const wm_counter *c = &r->health.counters[i];
+    (void)printf("  %-32s %10" PRIu64, wm_counter_name(c->kind), c->count);
+    if (c->landmark_id >= 0) (void)printf("  (landmark %" PRId32 ")", c->landmark_id);
+    (void)putchar('\n');
+  }
+  if (!isnan(r->health.lost_probability))
+    (void)printf("  %-32s %10.3g\n", "lost_probability", r->health.lost_probability);
   (void)printf("  %s at the end; written to %s\n", wm_state_name(r->health.state), out_dir);
   (void)fflush(stdout);
   if (r->poses == 0)

@@ -60,4 +60,5 @@ static const wm_param kParams[] = {
         "Slots of the ring between a source's thread and the estimator's. 1024 is half a second of a busy CAN bus."),
 };
 
-const wm_param_table wm_runtime_params_table = {kParams, sizeof kParams / sizeof *kParams, sizeof(wm_runtime_params)};
+const wm_param_table wm_runtime_params_table = {kParams, sizeof kParams / sizeof *kParams, sizeof(wm_runtime_params),
+                                                NULL};

@@ -49,6 +49,26 @@ void wm_fuser_init(wm_fuser *self, const wm_estimator *estimator, void *state, w
   self->particles_ns = WM_TIME_NONE;
 }
 
+static uint32_t at_most(size_t count, uint32_t most) { return count < most ? (uint32_t)count : most; }
+
+void wm_fuser_health(const wm_fuser *self, wm_health *out) {
+  const wm_estimator *e = self->estimator;
+  wm_estimate estimate;
+  e->estimate(self->state, &estimate);
+  out->fused_until_ns = self->until_ns;
+  out->state = estimate.state;
+  out->lost_probability = estimate.lost_probability;
+  out->resets = estimate.resets;
+  if (e->motion_health) out->motion_health = e->motion_health(self->state);
+  // Both return how many there are, which may be more than were written.
+  if (e->calibration)
+    out->calibration_count =
+        at_most(e->calibration(self->state, out->calibration, WM_HEALTH_CALIBRATION_MAX), WM_HEALTH_CALIBRATION_MAX);
+  if (e->counters)
+    out->counter_count =
+        at_most(e->counters(self->state, out->counters, WM_HEALTH_COUNTERS_MAX), WM_HEALTH_COUNTERS_MAX);
+}
+
 int wm_estimate_has_pose(const wm_estimate *e) {
   const double *p = e->pose_map_base.p_m;
   return e->state != WM_STATE_SEARCHING && isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]) &&

@@ -136,17 +136,10 @@ void wm_pipeline_health(wm_pipeline *self, wm_time_ns now_ns, wm_health *out) {
   wm_estimate estimate;
   self->fuser.estimator->estimate(self->fuser.state, &estimate);
   out->t_ns = now_ns;
-  out->fused_until_ns = self->fuser.until_ns;
-  out->state = estimate.state;
-  out->resets = estimate.resets;
+  wm_fuser_health(&self->fuser, out);
   out->jumps = self->predictor.jumps;
   out->published = self->published;
-  if (self->fuser.estimator->motion_health)
-    out->motion_health = self->fuser.estimator->motion_health(self->fuser.state);
   reckoning_left(self, &estimate, out);
   out->source_count = (uint32_t)self->assembly->source_count;
   for (size_t i = 0; i < self->assembly->source_count; i++) source_health(self, i, now_ns, &out->sources[i]);
-  if (self->fuser.estimator->calibration)
-    out->calibration_count =
-        (uint32_t)self->fuser.estimator->calibration(self->fuser.state, out->calibration, WM_HEALTH_CALIBRATION_MAX);
 }

@@ -84,6 +84,7 @@ int wm_predictor_expect(const wm_predictor *self, wm_time_ns now_ns, wm_estimate
   memset(out, 0, sizeof *out);
   out->t_ns = now_ns;
   out->state = WM_STATE_SEARCHING;
+  out->lost_probability = 1.0;
   out->v_mps[0] = odom.v_mps;
   out->w_radps[2] = odom.w_radps;
   return 1;

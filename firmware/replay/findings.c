@@ -89,24 +89,26 @@ static void about_motion(speaker *to, uint32_t bits) {
     if ((bits >> i) & 1u) say(to, kLines[i]);
 }
 
-// What SLAM counts of landmarks that are not what they seem.
+// Landmarks that are not where the map has them, or for which there is no capacity.
 static void about_map(speaker *to, const wm_health *health) {
   static const struct {
-    const char *name, *what;
-  } kCounts[] = {{"map.moved", "times a landmark was elsewhere than before; `waymark map survey RUN` says which"},
-                 {"map.moved_id", "is the identity of the last landmark that isn't where the map says"},
-                 {"map.doubled",
-                  "sightings whose identity (or, of a line, its track's number) stood for two landmarks; `waymark map "
-                  "survey RUN` says which"},
-                 {"map.no_room", "times a new landmark found no room; raise slam.landmarks.capacity"}};
-  for (uint32_t i = 0; i < health->calibration_count; i++)
-    for (size_t k = 0; k < sizeof kCounts / sizeof kCounts[0]; k++) {
-      const wm_calibration_value *value = &health->calibration[i];
-      if (!(value->value > 0.0) || strcmp(value->name, kCounts[k].name) != 0) continue;
-      char line[200];
-      (void)snprintf(line, sizeof line, "map: %.0f %s", value->value, kCounts[k].what);
-      say(to, line);
-    }
+    wm_counter_kind kind;
+    const char *what;
+  } kCounts[] = {
+      {WM_COUNTER_LANDMARKS_MOVED, "times a landmark was elsewhere than before; `waymark map survey RUN` says which"},
+      {WM_COUNTER_IDENTITIES_AMBIGUOUS,
+       "sightings whose identity (or, of a line, its track's number) stood for two landmarks; `waymark map "
+       "survey RUN` says which"},
+      {WM_COUNTER_MAP_FULL, "times a new landmark found no room; raise slam.landmarks.capacity"}};
+  for (size_t k = 0; k < sizeof kCounts / sizeof kCounts[0]; k++) {
+    const wm_counter *counter = wm_health_counter(health, kCounts[k].kind);
+    if (!counter || counter->count == 0) continue;
+    char line[240];
+    int n = snprintf(line, sizeof line, "map: %" PRIu64 " %s", counter->count, kCounts[k].what);
+    if (counter->landmark_id >= 0 && n > 0 && (size_t)n < sizeof line)
+      (void)snprintf(line + n, sizeof line - (size_t)n, "; the last one is %" PRId32, counter->landmark_id);
+    say(to, line);
+  }
 }
 
 size_t wm_findings(const wm_health *health, wm_finding_fn function, void *context) {

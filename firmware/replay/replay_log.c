@@ -91,16 +91,8 @@ static wm_status play(log_replay *self, wm_log_reader *log, wm_run_report *repor
 }
 
 static void fill_health(const log_replay *self, wm_health *out) {
-  const wm_estimator *estimator = self->assembly.config->estimator;
-  wm_estimate estimate;
-  estimator->estimate(self->state, &estimate);
+  wm_fuser_health(&self->fuser, out);
   out->t_ns = self->last_ns;
-  out->fused_until_ns = self->fuser.until_ns;
-  out->state = estimate.state;
-  out->resets = estimate.resets;
-  if (estimator->motion_health) out->motion_health = estimator->motion_health(self->state);
-  if (estimator->calibration)
-    out->calibration_count = (uint32_t)estimator->calibration(self->state, out->calibration, WM_HEALTH_CALIBRATION_MAX);
   out->source_count = (uint32_t)self->assembly.source_count;
   for (uint32_t i = 0; i < out->source_count; i++) {
     wm_source_health *s = &out->sources[i];

@@ -153,6 +153,17 @@ static void put_calibration(FILE *f, const wm_health *h) {
   (void)fputs(h->calibration_count ? "\n  },\n" : "},\n", f);
 }
 
+static void put_counters(FILE *f, const wm_health *h) {
+  (void)fputs("  \"counters\": {", f);
+  for (uint32_t i = 0; i < h->counter_count; i++) {
+    const wm_counter *c = &h->counters[i];
+    (void)fprintf(f, "%s\n    \"%s\": {\"count\": %" PRIu64, i ? "," : "", wm_counter_name(c->kind), c->count);
+    if (c->landmark_id >= 0) (void)fprintf(f, ", \"landmark_id\": %" PRId32, c->landmark_id);
+    (void)fputs("}", f);
+  }
+  (void)fputs(h->counter_count ? "\n  },\n" : "},\n", f);
+}
+
 wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, const wm_health *h, wm_error *err) {
   char path[WM_PATH_MAX + 32];
   FILE *f = open_json(dir, "health.json", path, sizeof path, err);
@@ -163,6 +174,8 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
   string(f, assembly->config->estimator->name);
   (void)fputs(",\n  \"state\": ", f);
   string(f, wm_state_name(h->state));
+  (void)fputs(",\n  \"lost_probability\": ", f);
+  number(f, h->lost_probability);
   (void)fputs(",\n  \"t_ns\": ", f);
   time_or_null(f, h->t_ns);
   (void)fputs(",\n  \"reckoning_left_m\": ", f);
@@ -178,6 +191,7 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
   put_motion_health(f, h->motion_health);
   put_stale(f, h);
   put_calibration(f, h);
+  put_counters(f, h);
   (void)fputs("  \"unused\": [", f);
   for (size_t i = 0; i < assembly->unused_count; i++) {
     (void)fputs(i ? ", " : "", f);

@@ -118,23 +118,26 @@ static void print_left(const wm_health *h, FILE *to) {
                                     : fprintf(to, ", %.0f s at this speed\n", h->reckoning_left_s));
 }
 
-// Places that look the same are no trouble, but who has just set the robot down wants to know.
-static void print_places(const wm_health *h, FILE *to) {
-  for (uint32_t i = 0; i < h->calibration_count; i++)
-    if (strcmp(h->calibration[i].name, "edges.alike") == 0 && h->calibration[i].value > 0)
-      (void)fprintf(to, "alike      %.0f other places look the same\n", h->calibration[i].value);
+// Aliased poses are no fault, but matter to a person who has just set the robot down.
+static void print_aliased(const wm_health *h, FILE *to) {
+  const wm_counter *aliased = wm_health_counter(h, WM_COUNTER_ALIASED_POSES);
+  if (aliased && aliased->count > 0)
+    (void)fprintf(to, "aliased    %" PRIu64 " other places look the same\n", aliased->count);
 }
 
 void watch_print(const watch *self, wm_time_ns now_ns, FILE *to) {
   char why[240];
   const char *state = watch_state(self, now_ns, why, sizeof why);
-  (void)fprintf(to, "state      %s%s%s\n", state, why[0] ? ": " : "", why);
+  (void)fprintf(to, "state      %s%s%s", state, why[0] ? ": " : "", why);
+  if (self->has_health && !isnan(self->health.lost_probability))
+    (void)fprintf(to, "   (lost with probability %.3g)", self->health.lost_probability);
+  (void)fputc('\n', to);
   if (self->has_pose) print_pose(&self->pose, self->rate_hz, to);
   if (self->innovations > 0)
     (void)fprintf(to, "consistency %s (mean squared innovation %.2f of its variance)\n", watch_consistency(self),
                   self->nis);
   if (self->has_health) {
-    print_places(&self->health, to);
+    print_aliased(&self->health, to);
     print_left(&self->health, to);
     (void)fprintf(to, "deadlines  %" PRIu64 " of %" PRIu64 " missed\nsources\n", self->health.deadlines_missed,
                   self->health.loops + self->health.deadlines_missed);

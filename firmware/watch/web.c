@@ -66,6 +66,7 @@ static void put_pose(text *self, const watch *seen) {
 
 static void put_health(text *self, const watch *seen) {
   const wm_health *h = &seen->health;
+  put_number(self, "lost_probability", h->lost_probability);
   put_number(self, "left_m", h->reckoning_left_m);
   put_number(self, "left_s", h->reckoning_left_s);
   put(self, ", \"deadlines_missed\": %llu, \"sources\": [", (unsigned long long)h->deadlines_missed);

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <math.h>
+
 #include "waymark/bytes.h"
 #include "waymark/codec.h"
 
-#define PUBLISHED_VERSION 1
+#define PUBLISHED_VERSION 2
+#define WITHOUT_LOST_PROBABILITY 1  // the version before, which is read, too
 #define INNOVATION_VERSION 1
 
 static void put_estimate(wm_writer *w, const wm_estimate *e) {
@@ -16,9 +19,10 @@ static void put_estimate(wm_writer *w, const wm_estimate *e) {
   wm_put_u32(w, e->resets);
   wm_put_u8(w, e->dof);
   wm_put_u8(w, e->state);
+  wm_put_f64(w, e->lost_probability);
 }
 
-static void get_estimate(wm_reader *r, wm_estimate *e) {
+static void get_estimate(wm_reader *r, unsigned version, wm_estimate *e) {
   e->t_ns = wm_get_i64(r);
   wm_get_f64s(r, e->pose_map_base.p_m, 3);
   wm_get_f64s(r, e->pose_map_base.q_xyzw, 4);
@@ -29,6 +33,7 @@ static void get_estimate(wm_reader *r, wm_estimate *e) {
   e->resets = wm_get_u32(r);
   e->dof = wm_get_u8(r);
   e->state = wm_get_u8(r);
+  e->lost_probability = version > WITHOUT_LOST_PROBABILITY ? wm_get_f64(r) : (double)NAN;
 }
 
 size_t wm_published_encode(const wm_published *p, void *out, size_t capacity) {
@@ -53,8 +58,9 @@ size_t wm_published_encode(const wm_published *p, void *out, size_t capacity) {
 wm_status wm_published_decode(const void *data, size_t size, wm_published *out, size_t *used) {
   memset(out, 0, sizeof *out);
   wm_reader r = wm_reader_of(data, size);
-  if (wm_get_u8(&r) != PUBLISHED_VERSION) r.bad = 1;
-  get_estimate(&r, &out->now);
+  const unsigned version = wm_get_u8(&r);
+  if (version < WITHOUT_LOST_PROBABILITY || version > PUBLISHED_VERSION) r.bad = 1;
+  get_estimate(&r, version, &out->now);
   out->sent_ns = wm_get_i64(&r);
   out->fused_until_ns = wm_get_i64(&r);
   out->pose_odom_base.x_m = wm_get_f64(&r);

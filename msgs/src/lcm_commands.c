@@ -58,14 +58,14 @@ static const char *read_sighting(const waymark_observations_t *m, int i, wm_sigh
   double elevation_rad = m->elevation_rad[i], elevation_sigma_rad = m->elevation_sigma_rad[i];
   if (!isnan(elevation_rad) && !(fabs(elevation_rad) <= 0.5 * M_PI)) return "elevation_rad is beyond the vertical";
   if (!isnan(elevation_sigma_rad) && !(elevation_sigma_rad >= 0 && elevation_sigma_rad < 10))
-    return "elevation_sigma_rad is below 0 or not below 10";
+    return "elevation_sigma_rad is below 0 or not below 10";  // 0: senders before NaN meant absent
   *out = (wm_sighting){.landmark_id = m->landmark_id[i],
                        .bearing_rad = isnan(bearing_rad) ? bearing_rad : remainder(bearing_rad, 2 * M_PI),
                        .range_m = range_m,
                        .bearing_sigma_rad = (double)NAN,
                        .range_sigma_m = (double)NAN,
                        .elevation_rad = elevation_rad,
-                       .elevation_sigma_rad = elevation_sigma_rad};
+                       .elevation_sigma_rad = elevation_sigma_rad != 0 ? elevation_sigma_rad : (double)NAN};
   return NULL;
 }
 

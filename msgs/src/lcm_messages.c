@@ -18,9 +18,9 @@ _Static_assert(sizeof(((waymark_health_t *)0)->sources) / sizeof(waymark_source_
 _Static_assert(sizeof(((waymark_health_t *)0)->calibration) / sizeof(waymark_calibration_t) ==
                    WM_HEALTH_CALIBRATION_MAX,
                "a place each");
-_Static_assert(WAYMARK_POSE_T_STATUS_JUMPED == WM_PUB_JUMPED && WAYMARK_POSE_T_STATE_LOST == WM_STATE_LOST &&
-                   WAYMARK_INNOVATION_T_REJECTED_BY_CONFIG == WM_REJECTED_BY_CONFIG,
-               "the messages' numbers are the structs' numbers");
+_Static_assert(sizeof(((waymark_health_t *)0)->counters) / sizeof(waymark_counter_t) == WM_HEALTH_COUNTERS_MAX,
+               "a place each");
+_Static_assert(WAYMARK_POSE_T_STATUS_JUMPED == WM_PUB_JUMPED, "the messages' numbers are the structs' numbers");
 
 static size_t written(int bytes) { return bytes > 0 ? (size_t)bytes : 0; }
 static int room(size_t capacity) { return capacity > INT32_MAX ? INT32_MAX : (int)capacity; }
@@ -43,6 +43,7 @@ size_t wm_lcm_pose(const wm_published *p, void *out, size_t capacity) {
       .child_frame = WM_FRAME_BASE,
       .state = (int8_t)e->state,
       .dof = (int8_t)e->dof,
+      .lost_probability = e->lost_probability,
       .status_flags = (int32_t)p->status_flags,
       .resets = (int32_t)e->resets,
       .deadlines_missed = (int32_t)p->deadlines_missed,
@@ -93,6 +94,7 @@ size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {
       .t_ns = h->t_ns,
       .fused_until_ns = h->fused_until_ns,
       .state = (int8_t)h->state,
+      .lost_probability = h->lost_probability,
       .resets = (int32_t)h->resets,
       .jumps = (int32_t)h->jumps,
       .motion_health = (int32_t)h->motion_health,
@@ -111,6 +113,12 @@ size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {
     put_name(m.calibration[i].name, sizeof m.calibration[i].name, h->calibration[i].name);
     m.calibration[i].value = h->calibration[i].value;
     m.calibration[i].sigma = h->calibration[i].sigma;
+  }
+  m.counter_count = (int32_t)(h->counter_count < WM_HEALTH_COUNTERS_MAX ? h->counter_count : WM_HEALTH_COUNTERS_MAX);
+  for (int32_t i = 0; i < m.counter_count; i++) {
+    m.counters[i].kind = (int32_t)h->counters[i].kind;
+    m.counters[i].landmark_id = h->counters[i].landmark_id;
+    m.counters[i].count = (int64_t)h->counters[i].count;
   }
   return written(waymark_health_t_encode(out, 0, room(capacity), &m));
 }

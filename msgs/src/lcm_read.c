@@ -38,6 +38,7 @@ const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *o
   e->resets = (uint32_t)m.resets;
   e->dof = (uint8_t)m.dof;
   e->state = (uint8_t)m.state;
+  e->lost_probability = m.lost_probability;
   return NULL;
 }
 
@@ -77,6 +78,7 @@ const char *wm_lcm_read_health(const void *message, size_t length, wm_health *ou
   out->t_ns = m.t_ns;
   out->fused_until_ns = m.fused_until_ns;
   out->state = (uint8_t)m.state;
+  out->lost_probability = m.lost_probability;
   out->resets = (uint32_t)m.resets;
   out->jumps = (uint32_t)m.jumps;
   out->motion_health = (uint32_t)m.motion_health;
@@ -94,6 +96,9 @@ const char *wm_lcm_read_health(const void *message, size_t length, wm_health *ou
     c->value = m.calibration[i].value;
     c->sigma = m.calibration[i].sigma;
   }
+  for (int32_t i = 0; i < m.counter_count && i < WM_HEALTH_COUNTERS_MAX; i++)
+    out->counters[out->counter_count++] =
+        (wm_counter){(uint32_t)m.counters[i].kind, m.counters[i].landmark_id, (uint64_t)m.counters[i].count};
   return NULL;
 }
 

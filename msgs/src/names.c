@@ -20,7 +20,11 @@ static const char *const kStates[] = {"searching", "tracking", "dead_reckoning",
 static const char *const kResiduals[] = {"bearing", "range",      "x",     "y",        "z",
                                          "heading", "standstill", "pixel", "elevation"};
 static const char *const kVerdicts[] = {"fused",      "gate",     "unknown_id", "no_association", "out_of_range",
-                                        "not_finite", "singular", "searching",  "by_config"};
+                                        "not_finite", "singular", "searching",  "by_config",      "numeric"};
+static const char *const kCounters[] = {"landmarks",       "landmarks_added",   "landmarks_removed",
+                                        "landmarks_moved", "landmarks_merged",  "identities_ambiguous",
+                                        "map_full",        "rotation_outliers", "motion_outliers",
+                                        "relocalizations", "aliased_poses",     "explained_permille"};
 static const char *const kDeviceStates[] = {"",        "works",   "absent", "down", "error-passive",
                                             "bus-off", "stalled", "frozen"};
 
@@ -32,6 +36,7 @@ _Static_assert(COUNT(kKinds) == WM_EVENT_KIND_COUNT, "a name for each kind");
 _Static_assert(COUNT(kQuantities) == WM_Q_COUNT, "a name for each quantity");
 _Static_assert(COUNT(kResiduals) == WM_RESIDUAL_COUNT, "a name for each residual");
 _Static_assert(COUNT(kVerdicts) == WM_VERDICT_COUNT, "a name for each verdict");
+_Static_assert(COUNT(kCounters) == WM_COUNTER_KIND_COUNT, "a name for each counter");
 _Static_assert(COUNT(kDeviceStates) == WM_DEVICE_STATE_COUNT, "a name for each device state");
 _Static_assert(COUNT(kLooks) == WM_LOOK_COUNT, "a name for each look");
 
@@ -40,6 +45,7 @@ const char *wm_quantity_name(unsigned q) { return q < COUNT(kQuantities) ? kQuan
 const char *wm_state_name(unsigned state) { return state < COUNT(kStates) ? kStates[state] : "?"; }
 const char *wm_residual_name(unsigned r) { return r < COUNT(kResiduals) ? kResiduals[r] : "?"; }
 const char *wm_verdict_name(unsigned v) { return v < COUNT(kVerdicts) ? kVerdicts[v] : "?"; }
+const char *wm_counter_name(unsigned kind) { return kind < COUNT(kCounters) ? kCounters[kind] : "?"; }
 const char *wm_device_state_name(unsigned s) { return s < COUNT(kDeviceStates) ? kDeviceStates[s] : "?"; }
 
 const char *wm_look_name(unsigned look) { return look < COUNT(kLooks) ? kLooks[look] : "?"; }

@@ -10,6 +10,7 @@
 #include "common/trials.h"
 #include "unity.h"
 #include "waymark/estimator.h"
+#include "waymark/health.h"
 #include "waymark/random.h"
 
 // Any allocation while the trap is set fails the test: estimators have no heap.
@@ -168,6 +169,8 @@ void test_it_never_allocates(void) {
   estimator->estimate(a.state, &out);
   wm_calibration_value values[64];
   estimator->calibration(a.state, values, 64);
+  wm_counter counters[16];
+  if (estimator->counters) estimator->counters(a.state, counters, 16);
   wm_motion_calibration calibration;
   estimator->motion(a.state, &calibration);
   estimator->motion_health(a.state);
@@ -327,6 +330,50 @@ void test_a_day_without_drift_of_symmetry(void) {
   }
 }
 
+// A probability at every event, or NaN at every event with a pose; certainly lost while there is none.
+void test_the_lost_probability_is_a_probability_or_absent(void) {
+  machine a;
+  int absent = 0, given = 0;
+  for (uint64_t i = 0; i < 2000; i++) {
+    a.take(event_at(i, 0.02 * (double)i));
+    const wm_estimate e = a.estimate();
+    if (e.state == WM_STATE_SEARCHING) {
+      TEST_ASSERT_EQUAL_DOUBLE(1, e.lost_probability);
+    } else if (std::isnan(e.lost_probability)) {
+      absent++;
+    } else {
+      TEST_ASSERT_TRUE(e.lost_probability >= 0 && e.lost_probability <= 1);
+      given++;
+    }
+  }
+  TEST_ASSERT_TRUE(absent == 0 || given == 0);
+}
+
+// A counter of each kind once, never counting backwards unless it is a number of now; none is a calibration value.
+void test_counters_are_typed(void) {
+  if (!estimator->counters) return;
+  machine a;
+  uint64_t before[WM_COUNTER_KIND_COUNT] = {};
+  for (uint64_t i = 0; i < 2000; i++) {
+    a.take(event_at(i, 0.02 * (double)i));
+    wm_counter counters[WM_HEALTH_COUNTERS_MAX];
+    const size_t count = estimator->counters(a.state, counters, WM_HEALTH_COUNTERS_MAX);
+    TEST_ASSERT_TRUE(count > 0 && count <= WM_HEALTH_COUNTERS_MAX);
+    TEST_ASSERT_EQUAL(count, estimator->counters(a.state, counters, 0));
+    bool seen[WM_COUNTER_KIND_COUNT] = {};
+    for (size_t k = 0; k < count; k++) {
+      const wm_counter &c = counters[k];
+      TEST_ASSERT_LESS_THAN(WM_COUNTER_KIND_COUNT, c.kind);
+      TEST_ASSERT_FALSE(seen[c.kind]);
+      seen[c.kind] = true;
+      const bool now = c.kind == WM_COUNTER_LANDMARKS || c.kind == WM_COUNTER_ALIASED_POSES ||
+                       c.kind == WM_COUNTER_EXPLAINED_PERMILLE;
+      TEST_ASSERT_TRUE(now || c.count >= before[c.kind]);
+      before[c.kind] = c.count;
+    }
+  }
+}
+
 void test_what_is_learnt_is_listed_and_given_to_the_predictor(void) {
   machine a;
   for (uint64_t i = 0; i < 500; i++) a.take(event_at(i, 0.02 * (double)i));
@@ -406,6 +453,8 @@ int main(void) {
     RUN_TEST(test_time_never_runs_back);
     RUN_TEST(test_set_pose_works_at_any_time);
     RUN_TEST(test_a_day_without_drift_of_symmetry);
+    RUN_TEST(test_the_lost_probability_is_a_probability_or_absent);
+    RUN_TEST(test_counters_are_typed);
     RUN_TEST(test_what_is_learnt_is_listed_and_given_to_the_predictor);
   }
   if (wm_estimator_find("no such") || count < 2) return 1;

@@ -121,11 +121,13 @@ static void keep_any(void *context, const char *line) {
 }
 
 static void landmarks_that_moved_are_told(void) {
-  static const wm_health health = {.calibration_count = 2,
-                                   .calibration = {{.name = "map.moved", .value = 2}, {.name = "map.doubled"}}};
+  static const wm_health health = {.counter_count = 2,
+                                   .counters = {{.kind = WM_COUNTER_LANDMARKS_MOVED, .landmark_id = 7, .count = 2},
+                                                {.kind = WM_COUNTER_IDENTITIES_AMBIGUOUS, .landmark_id = -1}}};
   TEST_ASSERT_EQUAL(1, wm_findings(&health, keep_any, NULL));
-  TEST_ASSERT_EQUAL_STRING("map: 2 times a landmark was elsewhere than before; `waymark map survey RUN` says which",
-                           finding);
+  TEST_ASSERT_EQUAL_STRING(
+      "map: 2 times a landmark was elsewhere than before; `waymark map survey RUN` says which; the last one is 7",
+      finding);
 }
 
 // ── silence ─────────────────────────────────────────────────────────────────────────────────────────────────────────

@@ -55,7 +55,7 @@ struct Judge {
   const sim::Recording &recording;
   double from_s;
 
-  Sample look(const SimulatedFilter &filter, const wm_estimate &e) const {
+  Sample look(const wm_estimate &e) const {
     const double t_s = seconds(recording, e.t_ns);
     const sim::State truth = recording.drive.at(t_s);
     const Eigen::Vector3d error(truth.x_m - e.pose_map_base.p_m[0], truth.y_m - e.pose_map_base.p_m[1],
@@ -70,7 +70,7 @@ struct Judge {
     s.error_rad = std::fabs(error[2]);
     s.nees = error.dot(covariance.ldlt().solve(error));
     s.tracking = e.state == WM_STATE_TRACKING || e.state == WM_STATE_DEAD_RECKONING;
-    s.lost_probability = filter.calibration("landmarks.lost_probability");
+    s.lost_probability = e.lost_probability;
     return s;
   }
 };
@@ -234,7 +234,7 @@ LandmarkOutcome run_ordeal(LandmarkWorld &world, const wm_config &config, const 
     if (ordeal.kidnap && astray && !out.said_after_s && t_s >= first_view_s) out.said_after_s = t_s - first_view_s;
     if (t_s < look_s || estimate.t_ns == WM_TIME_NONE) continue;
     look_s = t_s + kLook_s;
-    const Sample s = judge.look(filter, estimate);
+    const Sample s = judge.look(estimate);
     squares_m += s.error_m * s.error_m;
     squares_deg += s.error_rad * s.error_rad / (kDegree * kDegree);
     out.outcome.samples.push_back(s);
@@ -247,8 +247,9 @@ LandmarkOutcome run_ordeal(LandmarkWorld &world, const wm_config &config, const 
     std::erase_if(told, [&](const Sample &s) { return from_s + s.t_s < first_view_s + *out.said_after_s; });
   out.wrong_s = longest(told, confidently_wrong);
   if (ordeal.start || ordeal.kidnap) out.right_after_s = driven_until_right(recording, from_s, out.outcome.samples);
-  out.told_moved = filter.calibration("map.moved");
-  const double last = filter.calibration("map.moved_id");
+  const wm_counter moved = filter.counter(WM_COUNTER_LANDMARKS_MOVED);
+  out.told_moved = static_cast<double>(moved.count);
+  const int32_t last = moved.landmark_id;
   out.right_moved =
       std::any_of(recording.moved.begin(), recording.moved.end(), [last](int32_t id) { return last == id; });
   return out;

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <iterator>
 
 #include "simulate/bus.h"
+#include "waymark/health.h"
 
 namespace wm::montecarlo {
 namespace {
@@ -58,6 +60,7 @@ wm_status make_events(const sim::Recording &recording, std::vector<SmallEvent> &
     seen.id = m.id;
     for (int k = 0; k < 3; k++) seen.p_m[k] = m.p_m[k];
     seen.yaw_rad = m.yaw_rad;
+    seen.along_sigma_m = seen.yaw_sigma_rad = seen.edge_shift_px = NAN;
     out.emplace_back(e);
   }
   for (const sim::Fix &f : recording.fixes) {
@@ -92,12 +95,14 @@ wm_status SimulatedFilter::init(wm_error *err) {
   return status == WM_OK ? status : wm_fail(err, status, "%s: init: %s", estimator_->name, wm_status_text(status));
 }
 
-double SimulatedFilter::calibration(const char *name) const {
-  wm_calibration_value values[64];
-  const size_t count = std::min<size_t>(64, estimator_->calibration(memory_.get(), values, 64));
+wm_counter SimulatedFilter::counter(wm_counter_kind kind) const {
+  wm_counter all[WM_HEALTH_COUNTERS_MAX];
+  const size_t count = estimator_->counters
+                           ? std::min<size_t>(std::size(all), estimator_->counters(memory_.get(), all, std::size(all)))
+                           : 0;
   for (size_t i = 0; i < count; i++)
-    if (std::strcmp(values[i].name, name) == 0) return values[i].value;
-  return NAN;
+    if (all[i].kind == static_cast<uint32_t>(kind)) return all[i];
+  return {static_cast<uint32_t>(kind), -1, 0};
 }
 
 }  // namespace wm::montecarlo

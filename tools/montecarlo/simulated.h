@@ -38,8 +38,8 @@ class SimulatedFilter {
   void *state() { return memory_.get(); }
   const wm_estimator &ops() const { return *estimator_; }
   wm_start &start() { return setup_.start; }  // before init()
-  // A value of the calibration list; NaN where it has none of this name.
-  double calibration(const char *name) const;
+  // The counter of this kind; of count 0 where the estimator has none.
+  wm_counter counter(wm_counter_kind kind) const;
 
  private:
   struct alignas(64) Block {

@@ -4,7 +4,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <iterator>
 #include <memory>
 #include <numbers>
 
@@ -12,6 +12,7 @@
 #include "common/statistics.h"
 #include "montecarlo/views.h"
 #include "waymark/estimator.h"
+#include "waymark/health.h"
 #include "waymark/random.h"
 
 namespace wm::montecarlo {
@@ -65,11 +66,12 @@ class Filter {
   [[nodiscard]] Sample look(const wm_pose2 &truth, const wm_estimate &e) const;
 
  private:
-  [[nodiscard]] double calibration(const char *name) const {
-    wm_calibration_value values[64];
-    const size_t count = std::min<size_t>(64, ops_.calibration(memory_.get(), values, 64));
-    for (size_t i = 0; i < count; i++)
-      if (std::strcmp(values[i].name, name) == 0) return values[i].value;
+  // Share of the edge points that lie on edges of the map, smoothed.
+  [[nodiscard]] double explained() const {
+    wm_counter all[WM_HEALTH_COUNTERS_MAX];
+    const size_t count = ops_.counters ? ops_.counters(memory_.get(), all, std::size(all)) : 0;
+    for (size_t i = 0; i < std::min(count, std::size(all)); i++)
+      if (all[i].kind == WM_COUNTER_EXPLAINED_PERMILLE) return 1e-3 * static_cast<double>(all[i].count);
     return tools::kNan;
   }
   [[nodiscard]] double weight_about(const wm_pose2 &truth) const {
@@ -120,8 +122,8 @@ Sample Filter::look(const wm_pose2 &truth, const wm_estimate &e) const {
   s.error_rad = std::fabs(error[2]);
   s.nees = error.dot(covariance.ldlt().solve(error));
   s.tracking = e.state == WM_STATE_TRACKING || e.state == WM_STATE_DEAD_RECKONING;
-  s.lost_probability = calibration("edges.lost_probability");
-  s.explained = calibration("edges.explained");
+  s.lost_probability = e.lost_probability;
+  s.explained = explained();
   s.points = points_;
   // A cluster is a hypothesis from a hundredth of the weight on.
   s.covered = s.nees < tools::chi2_quantile(0.95, 3) || weight_about(truth) > 0.01 || listed(truth);

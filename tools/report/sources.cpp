@@ -98,19 +98,7 @@ Meaning meaning_of(const std::string &name) {
   if (what == "track_scale") return {100, -100, "%", "the wheels act as if this much farther apart than stated"};
   if (what == "steering_offset_rad")
     return {degrees, 0, "°", "the wheels point this far to the left when the steering says straight"};
-  if (what == "edge_shift_px") return {1, 0, "px", "white grows by this much in the pictures of " + sensor};
-  if (name == "map.landmarks") return {1, 0, "", "landmarks in the map at the end"};
-  if (name == "map.joined") return {1, 0, "", "landmarks that the map took in"};
-  if (name == "map.left") return {1, 0, "", "landmarks that left it: hardly seen, or moved"};
-  if (name == "map.moved")
-    return {1, 0, "", "times that an identity (of a line: its track's number) was elsewhere than before"};
-  if (name == "map.doubled")
-    return {1, 0, "", "sightings whose identity (of a line: its track's number) stood for two landmarks"};
-  if (name == "map.no_room") return {1, 0, "", "landmarks that found no room"};
-  if (name == "map.moved_id") return {1, 0, "", "the last landmark that isn't where the map says; -1: none"};
-  if (name == "landmarks.lost_probability") return {100, 0, "%", "the probability of being lost"};
-  if (name == "edges.explained") return {100, 0, "%", "of the edges seen lie on edges of the map"};
-  if (name == "edges.lost_probability") return {100, 0, "%", "the probability of being lost"};
+  if (what == "edge_shift_px") return {1, 0, "px", "bright areas are wider by this in the pictures of " + sensor};
   if (what.ends_with("_radps")) return {degrees, 0, "°/s", ""};
   if (what.ends_with("_rad")) return {degrees, 0, "°", ""};
   if (what.ends_with("_s")) return {1e3, 0, "ms", ""};
@@ -175,6 +163,45 @@ std::string complaints(const Json &health) {
   each("unused", [&out](const std::string &name) {
     out += "<p class=\"note\">" + escape(plain(name)) + " was there, but this estimator doesn’t take it.</p>";
   });
+  return out;
+}
+
+// The rows of health.json's `counters` and `lost_probability`.
+std::string counter_rows(const Json &health) {
+  static constexpr std::array<std::pair<wm_counter_kind, const char *>, WM_COUNTER_KIND_COUNT> kWords{{
+      {WM_COUNTER_LANDMARKS, "landmarks in the map at the end"},
+      {WM_COUNTER_LANDMARKS_ADDED, "landmarks that entered the map"},
+      {WM_COUNTER_LANDMARKS_REMOVED, "landmarks that left it: hardly seen, or moved"},
+      {WM_COUNTER_LANDMARKS_MOVED, "times that an identity (of a line: its track's number) was elsewhere than before"},
+      {WM_COUNTER_LANDMARKS_MERGED, "pairs of landmarks that were found to be one"},
+      {WM_COUNTER_IDENTITIES_AMBIGUOUS,
+       "sightings whose identity (of a line: its track's number) stood for two landmarks"},
+      {WM_COUNTER_MAP_FULL, "new landmarks for which there was no room"},
+      {WM_COUNTER_ROTATION_OUTLIERS, "turns that the motion data lack: slip, or turned by hand"},
+      {WM_COUNTER_MOTION_OUTLIERS, "motion data that no robot can do"},
+      {WM_COUNTER_RELOCALIZATIONS, "times that the lost robot was found again"},
+      {WM_COUNTER_ALIASED_POSES, "other places that look the same, at the end"},
+      {WM_COUNTER_EXPLAINED_PERMILLE, "of 1000 edge points, those that lie on edges of the map, at the end"},
+  }};
+  std::string out;
+  const auto row = [&out](const std::string &name, const std::string &value, const std::string &words) {
+    out += "<tr><td>" + escape(plain(name)) + "</td><td><b>" + value + "</b></td><td class=\"words\">" + words +
+           "</td></tr>";
+  };
+  if (!health.is_object()) return out;
+  if (health.contains("lost_probability") && health["lost_probability"].is_number())
+    row("lost probability", number_text(100 * health["lost_probability"].get<double>(), 2) + "\u202f%",
+        "that the robot was not where its last pose is");
+  if (!health.contains("counters") || !health["counters"].is_object()) return out;
+  for (const auto &[name, counter] : health["counters"].items()) {
+    if (!counter.is_object() || !counter.contains("count") || !counter["count"].is_number()) continue;
+    std::string words;
+    for (const auto &[kind, meaning] : kWords)
+      if (name == wm_counter_name(kind)) words = meaning;
+    if (counter.contains("landmark_id") && counter["landmark_id"].is_number_integer())
+      words += "; the last one: " + std::to_string(counter["landmark_id"].get<int64_t>());
+    row(name, std::to_string(counter["count"].get<int64_t>()), words);
+  }
   return out;
 }
 
@@ -264,13 +291,14 @@ std::string calibration_section(const ReportData &data) {
   for (const CalibrationState &state : calibration_of(data.health)) {
     const Meaning m = meaning_of(state.name);
     const double value = state.value * m.factor + m.offset;
-    const bool known = state.sigma == 0;  // a count, or a figure without a sigma
+    const bool known = !(state.sigma > 0);  // without a sigma
     const int decimals = known ? (value == std::round(value) ? 0 : 2) : decimals_for(state.sigma * m.factor);
     const std::string sign = value > 0 && m.offset != 0 ? "+" : "";
     rows += "<tr><td>" + escape(title_of(state.name)) + "</td><td><b>" + sign + number_text(value, decimals) + "</b>" +
             (known ? "" : " ± " + fixed(state.sigma * m.factor, decimals)) + "\u202f" + m.unit +
             "</td><td class=\"words\">" + m.words + "</td></tr>";
   }
+  rows += counter_rows(data.health);
   if (rows.empty()) return "";
   return section(
       "What it learned about itself",

@@ -21,8 +21,8 @@ struct Sighting {
   int32_t id;
   double bearing_rad, range_m;  // NaN where it has none
   bool outlier;
-  double elevation_rad = std::numeric_limits<double>::quiet_NaN();  // above the sensor's xy plane; not written
-  double elevation_sigma_rad = 0;                                   // 0: none
+  double elevation_rad = std::numeric_limits<double>::quiet_NaN();        // above the sensor's xy plane; not written
+  double elevation_sigma_rad = std::numeric_limits<double>::quiet_NaN();  // NaN: no elevation
 };
 
 struct MarkerSeen {

@@ -5,12 +5,13 @@
 //   &); wm_status predict(const wm_event &);   wm_status correct(const wm_event &, record_list); void
 //   estimate(wm_estimate *) const;   wm_motion_calibration motion_calibration() const; uint32_t motion_health() const;
 //   size_t list_calibration(wm_calibration_value *, size_t) const;
-// and, if it has a map or particles of its own, list_landmarks(), list_particles() or list_hypotheses().
+// and, where it has any, list_counters(wm_counter *, size_t), list_landmarks(), list_particles(), list_hypotheses().
 #ifndef WAYMARK_ESTIMATOR_CONTRACT_HPP
 #define WAYMARK_ESTIMATOR_CONTRACT_HPP
 
 #include <type_traits>
 
+#include "filters/core/counter_list.hpp"
 #include "filters/core/record_list.hpp"
 #include "waymark/estimator.h"
 
@@ -44,6 +45,10 @@ wm_estimator estimator_of(const char *name, const char *about, uint32_t takes, w
     return static_cast<const filter *>(state)->list_calibration(out, capacity);
   };
   e.motion_health = [](const void *state) { return static_cast<const filter *>(state)->motion_health(); };
+  if constexpr (requires(const filter &f) { f.list_counters(nullptr, 0); })
+    e.counters = [](const void *state, wm_counter *out, size_t capacity) {
+      return static_cast<const filter *>(state)->list_counters(out, capacity);
+    };
   if constexpr (requires(const filter &f) { f.list_landmarks(nullptr, nullptr, 0); })
     e.landmarks = [](const void *state, wm_landmark *out, double(*covariance)[4], size_t capacity) {
       return static_cast<const filter *>(state)->list_landmarks(out, covariance, capacity);

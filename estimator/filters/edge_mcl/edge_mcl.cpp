@@ -200,6 +200,7 @@ void edge_mcl::estimate(wm_estimate *out) const {
   const bool fresh =
       fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, filter_.now_ns()) <= params_.dead_reckoning_after_s;
   out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
+  out->lost_probability = state_ == WM_STATE_SEARCHING ? 1.0 : 1.0 / (1.0 + exp(-odds_lost()));
   if (state_ != WM_STATE_SEARCHING) spread_over_hypotheses(out);
   if (fused_ns_ == WM_TIME_NONE) return;  // the pose is what was said, as sure as it was said
   out->covariance[wm_cov_index(0, 0)] += square(params_.lasting_xy_m);
@@ -220,9 +221,13 @@ size_t edge_mcl::list_calibration(wm_calibration_value *out, size_t capacity) co
     }
   if (edge_state_ >= 0)
     list.add("edges", "offset_m", filter_.value(edge_state_), std::sqrt(filter_.variance(edge_state_)));
-  list.add("edges", "explained", explained_, 0.0);
-  list.add("edges", "lost_probability", 1.0 / (1.0 + exp(-odds_lost())), 0.0);
-  list.add("edges", "alike", (double)alike_.count(), 0.0);
+  return list.count();
+}
+
+size_t edge_mcl::list_counters(wm_counter *out, size_t capacity) const {
+  counter_list list(out, capacity);
+  list.add(WM_COUNTER_ALIASED_POSES, (uint64_t)alike_.count());
+  list.add(WM_COUNTER_EXPLAINED_PERMILLE, (uint64_t)(1000.0 * explained_ + 0.5));
   return list.count();
 }
 

@@ -74,4 +74,4 @@ static const wm_param kParams[] = {
         "Nothing fused for so long: the state says dead reckoning."),
 };
 
-const wm_param_table wm_edge_mcl_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params)};
+const wm_param_table wm_edge_mcl_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), NULL};

@@ -200,6 +200,7 @@ void landmark_ekf::estimate(wm_estimate *out) const {
   const bool fresh =
       fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, filter_.now_ns()) <= params_.dead_reckoning_after_s;
   out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
+  out->lost_probability = lost_probability();
   if (state_ == WM_STATE_LOST) widen(out);
   if (state_ == WM_STATE_TRACKING) mix_start(out);
 }
@@ -232,15 +233,18 @@ void landmark_ekf::mix_start(wm_estimate *out) const {
 size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
   calibration_list list(out, capacity);
   filter_.list_motion_states(&list);
-  list.add("landmarks", "lost_probability", lost_probability(), 0.0);
-  list.add("map", "moved", moved_, 0.0);
-  list.add("map", "moved_id", moved_id_, 0.0);
   const auto add = [&](const char *whose, const char *what, int state) {
     if (state >= 0) list.add(whose, what, filter_.value(state), std::sqrt(filter_.variance(state)));
   };
   for (size_t i = 0; i < setup_->sensor_count; i++)
     for (int k = 0; k < kSensorStates; k++) add(setup_->sensors[i].name, kSensorStateNames[k], sensor_state_[i][k]);
   add("gnss", "time_offset_s", gnss_time_state_);
+  return list.count();
+}
+
+size_t landmark_ekf::list_counters(wm_counter *out, size_t capacity) const {
+  counter_list list(out, capacity);
+  list.add(WM_COUNTER_LANDMARKS_MOVED, (uint64_t)moved_, moved_id_);
   return list.count();
 }
 

@@ -66,4 +66,4 @@ static const wm_param kParams[] = {
     F64("recover.sigma_heading_rad", recover_sigma_heading_rad, 0.25, 0.001, 3, "The same for the heading, rad."),
 };
 
-const wm_param_table wm_landmark_ekf_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params)};
+const wm_param_table wm_landmark_ekf_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), NULL};

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Dead reckoning as an estimator: motion alone, with an honest covariance. The baseline that every other is set
 // against.
+#include <limits>
+
 #include "filters/core/contract.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "filters/planar/set_pose.hpp"
@@ -49,6 +51,8 @@ class odometry {
     filter_.estimate(out);
     out->resets = resets_;
     out->state = searching_ ? WM_STATE_SEARCHING : WM_STATE_DEAD_RECKONING;
+    // Without observations nothing contradicts the pose.
+    out->lost_probability = searching_ ? 1.0 : std::numeric_limits<double>::quiet_NaN();
   }
   const wm_motion_calibration &motion_calibration() const { return filter_.calibration(); }
   uint32_t motion_health() const { return filter_.motion_health(); }
@@ -71,4 +75,4 @@ class odometry {
 const wm_estimator wm_odometry_estimator = wm::estimator_of<wm::odometry, wm::odometry_params>(
     "odometry", "Dead reckoning from the motion sensors alone, with its growing covariance. Takes no observation.",
     WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
-    {wm::kParams, sizeof wm::kParams / sizeof wm::kParams[0], sizeof(wm::odometry_params)});
+    {wm::kParams, sizeof wm::kParams / sizeof wm::kParams[0], sizeof(wm::odometry_params), nullptr});

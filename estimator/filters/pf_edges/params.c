@@ -30,4 +30,4 @@ static const wm_param kParams[] = {
         "The state is dead reckoning when no scan was fused for this time, s."),
 };
 
-const wm_param_table wm_pf_edges_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params)};
+const wm_param_table wm_pf_edges_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), NULL};

@@ -2,6 +2,7 @@
 #include "filters/pf_edges/pf_edges.hpp"
 
 #include <cstring>
+#include <limits>
 
 #include "filters/core/contract.hpp"
 #include "filters/planar/set_pose.hpp"
@@ -179,6 +180,8 @@ void pf_edges::estimate(wm_estimate *out) const {
   const bool fresh =
       fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, odometry_.now_ns()) <= params_.dead_reckoning_after_s;
   out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
+  // Normalised weights rank the particles; none of them measures how well the best one fits.
+  out->lost_probability = state_ == WM_STATE_SEARCHING ? 1.0 : std::numeric_limits<double>::quiet_NaN();
   const particle_moments m = particles_.main_cluster(kCluster_m, kCluster_rad);
   // The particles stand at the last scan.
   const wm_pose2 pose = compose(m.mean, between(odom_, odometry_.odom()));

@@ -108,7 +108,7 @@ bool slam::start_by_one(int landmark, const wm_marker &m, const marker_reading &
     lone_ = one;
     return false;
   }
-  const bool mirrored = m.yaw_sigma_rad > 0.0;  // an upright one; a level one has no other pose
+  const bool mirrored = finite(m.yaw_sigma_rad);  // an upright marker; a level one has no second pose
   if (++lone_.seen < kAloneSeen || (mirrored && square(2.0 * wrap(one.sight_rad - lone_.sight_rad)) < turn2))
     return false;
   const wm_pose2 marker = on_map(landmark);

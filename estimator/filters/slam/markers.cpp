@@ -14,6 +14,7 @@ constexpr double kUnder_m = 0.05;                 // a marker nearer to the came
 constexpr double kPlain = 9.0;                    // of two poses one is 90 times as likely
 
 double first_number(double a, double b) { return finite(a) ? a : b; }
+double zero_if_absent(double a) { return std::isnan(a) ? 0.0 : a; }
 
 wm_status check_marker(const wm_marker &m, size_t sensors) {
   const bool two = m.poses == 2;
@@ -23,13 +24,14 @@ wm_status check_marker(const wm_marker &m, size_t sensors) {
                             two ? m.other_p_m[0] : 0.0,
                             two ? m.other_p_m[1] : 0.0,
                             two ? m.other_p_m[2] : 0.0,
-                            m.along_sigma_m};
-  const double angles[] = {m.yaw_rad, two ? m.other_yaw_rad : 0.0, m.yaw_sigma_rad, m.edge_shift_px};
+                            zero_if_absent(m.along_sigma_m)};
+  const double angles[] = {m.yaw_rad, two ? m.other_yaw_rad : 0.0, zero_if_absent(m.yaw_sigma_rad),
+                           zero_if_absent(m.edge_shift_px)};
   for (double n : numbers)
     if (!finite(n)) return WM_NOT_FINITE;
   for (double a : angles)
     if (!finite(a)) return WM_NOT_FINITE;
-  if (m.sensor >= sensors || m.along_sigma_m < 0.0 || m.yaw_sigma_rad < 0.0) return WM_OUT_OF_RANGE;
+  if (m.sensor >= sensors || m.along_sigma_m <= 0.0 || m.yaw_sigma_rad <= 0.0) return WM_OUT_OF_RANGE;
   for (double n : numbers)
     if (std::fabs(n) > kFarthest_m) return WM_OUT_OF_RANGE;
   for (double a : angles)
@@ -61,11 +63,12 @@ slam::marker_reading slam::read_marker(const wm_marker &m, const double p_m[3], 
   const double range = params_.range_sigma_factor * first_number(sensor.range_sigma_m, params_.range_sigma_default_m);
   const double least = square(params_.marker_sigma_m) + square(params_.marker_sigma_rel * r.length_m);
   // The line of sight's share that lies on the floor.
-  const double along = r.length_m > 1e-6 ? params_.range_sigma_factor * m.along_sigma_m * floor_m / r.length_m : 0.0;
+  const double along_sigma_m = zero_if_absent(m.along_sigma_m);
+  const double along = r.length_m > 1e-6 ? params_.range_sigma_factor * along_sigma_m * floor_m / r.length_m : 0.0;
   r.noise[0] = least + square(range) + square(along);
   r.noise[1] = least + square(across);
-  r.noise[2] = square(m.yaw_sigma_rad > 0.0 ? m.yaw_sigma_rad : params_.marker_heading_sigma_rad);
-  const double up = r.length_m > 1e-6 ? params_.range_sigma_factor * m.along_sigma_m * level[2] / r.length_m : 0.0;
+  r.noise[2] = square(first_number(m.yaw_sigma_rad, params_.marker_heading_sigma_rad));
+  const double up = r.length_m > 1e-6 ? params_.range_sigma_factor * along_sigma_m * level[2] / r.length_m : 0.0;
   r.z_noise = least + square(across) + square(up);
   r.z_m = sensor.z_m + level[2];
   r.turned = true;
@@ -97,14 +100,14 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   look_after(event.t_ns);
   if (!params_.markers) return drop(WM_REJECTED_BY_CONFIG);
   if (m.id < 0) return drop(WM_REJECTED_NO_ASSOCIATION);
-  if (m.edge_shift_px != 0.0) edge_shift_px_[m.sensor] = m.edge_shift_px;
+  if (finite(m.edge_shift_px)) edge_shift_px_[m.sensor] = m.edge_shift_px;
 
   marker_reading r = read_marker(m, m.p_m, m.yaw_rad);
   if (r.length_m > sensor_[m.sensor].max_range_m) return drop(WM_REJECTED_OUT_OF_RANGE);
   const int landmark = find_landmark(m.id);
   if (doubled(m.id, landmark, m.sensor)) return drop(WM_REJECTED_NO_ASSOCIATION);
   const bool two = m.poses == 2;
-  const bool sure = m.yaw_sigma_rad <= params_.marker_heading_most_rad;
+  const bool sure = !(m.yaw_sigma_rad > params_.marker_heading_most_rad);
   r.turned = !two && sure;
   if (state_ == WM_STATE_SEARCHING && (landmark < 0 || !find_start(landmark, m, r, two)))
     return drop(WM_REJECTED_SEARCHING);

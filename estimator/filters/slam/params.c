@@ -110,4 +110,4 @@ static const wm_param kParams[] = {
         "Nothing fused for so long: the state says dead reckoning."),
 };
 
-const wm_param_table wm_slam_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params)};
+const wm_param_table wm_slam_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), NULL};

@@ -93,6 +93,7 @@ size_t slam::bytes(const wm_slam_params &params, const wm_setup &setup, const ch
 
 void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   std::memset(static_cast<void *>(this), 0, arrays_at(params));
+  for (double &shift_px : edge_shift_px_) shift_px = kAbsent;
   setup_ = &setup;
   params_ = params;
   const joint_layout layout = layout_of(params, setup);
@@ -280,6 +281,7 @@ void slam::estimate(wm_estimate *out) const {
   const bool fresh =
       fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, joint_.now_ns()) <= params_.dead_reckoning_after_s;
   out->state = (uint8_t)(state_ != WM_STATE_TRACKING ? state_ : fresh ? WM_STATE_TRACKING : WM_STATE_DEAD_RECKONING);
+  out->lost_probability = state_ == WM_STATE_SEARCHING ? 1.0 : evidence_.probability();
   if (state_ != WM_STATE_TRACKING) widen(out);
 }
 
@@ -291,15 +293,20 @@ size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const 
       if (const int state = sensor_state_[i][k]; state >= 0)
         list.add(setup_->sensors[i].name, kSensorStateNames[k], joint_.value(state), std::sqrt(joint_.variance(state)));
   for (size_t i = 0; i < setup_->sensor_count; i++)
-    if (edge_shift_px_[i] != 0.0) list.add(setup_->sensors[i].name, "edge_shift_px", edge_shift_px_[i], 0.0);
-  list.add("map", "landmarks", joint_.landmarks(), 0.0);
-  list.add("map", "joined", (double)counts_.joined, 0.0);
-  list.add("map", "left", (double)counts_.left, 0.0);
-  list.add("map", "moved", (double)counts_.moved, 0.0);
-  list.add("map", "doubled", (double)counts_.doubled, 0.0);
-  list.add("motion", "jolts", (double)counts_.jolts, 0.0);
-  if (params_.line_rejoin) list.add("map", "rejoined", (double)counts_.rejoined, 0.0);
-  list.add("map", "no_room", (double)counts_.no_room, 0.0);
+    if (finite(edge_shift_px_[i])) list.add(setup_->sensors[i].name, "edge_shift_px", edge_shift_px_[i], kAbsent);
+  return list.count();
+}
+
+size_t slam::list_counters(wm_counter *out, size_t capacity) const {
+  counter_list list(out, capacity);
+  list.add(WM_COUNTER_LANDMARKS, (uint64_t)joint_.landmarks());
+  list.add(WM_COUNTER_LANDMARKS_ADDED, counts_.joined);
+  list.add(WM_COUNTER_LANDMARKS_REMOVED, counts_.left);
+  list.add(WM_COUNTER_LANDMARKS_MOVED, counts_.moved);
+  list.add(WM_COUNTER_IDENTITIES_AMBIGUOUS, counts_.doubled);
+  list.add(WM_COUNTER_ROTATION_OUTLIERS, counts_.jolts);
+  if (params_.line_rejoin) list.add(WM_COUNTER_LANDMARKS_MERGED, counts_.rejoined);
+  list.add(WM_COUNTER_MAP_FULL, counts_.no_room);
   return list.count();
 }
 

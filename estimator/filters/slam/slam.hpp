@@ -68,6 +68,7 @@ class slam {
   wm_status correct(const wm_event &event, record_list records);
   void estimate(wm_estimate *out) const;
   size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
+  size_t list_counters(wm_counter *out, size_t capacity) const;
   size_t list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const;
   const wm_motion_calibration &motion_calibration() const { return joint_.calibration(); }
   uint32_t motion_health() const { return joint_.motion_health(); }
@@ -255,7 +256,7 @@ class slam {
   bearing_tracks tracks_;
   int first_ray_, first_clone_;
   slam_counts counts_;
-  double edge_shift_px_[kSlamSensors];  // by the last marker that says it; 0: none did
+  double edge_shift_px_[kSlamSensors];  // of the last marker that has one; NaN: none has
   wm_time_ns fused_ns_;
   int32_t next_id_;
   int cursor_;                    // of look_after

@@ -90,4 +90,4 @@ static const wm_param kParams[] = {
     F64("recover.sigma_rad", recover_sigma_rad, 0.25, 0.001, 3, "The same for its rotation, rad."),
 };
 
-const wm_param_table wm_stereo_ekf_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params)};
+const wm_param_table wm_stereo_ekf_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), NULL};

@@ -193,6 +193,7 @@ void stereo_ekf::estimate(wm_estimate *out) const {
   const bool fresh =
       fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, now_ns_) <= params_.dead_reckoning_after_s;
   out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
+  out->lost_probability = state_ == WM_STATE_SEARCHING || state_ == WM_STATE_LOST ? 1.0 : 0.0;
 }
 
 wm_motion_calibration stereo_ekf::motion_calibration() const { return kNeutralCalibration; }

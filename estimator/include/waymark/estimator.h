@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The estimator contract. An estimator is a struct of functions and a size. It gets events in the order of their t_ns
-// and says where the robot is. It has no clock, no file, no thread, no lock, no heap and no printf; its state is plain
+// and gives the robot's pose. It has no clock, no file, no thread, no lock, no heap and no printf; its state is plain
 // memory that a copy of continues identically (it may point into the setup, never into itself); the same events give
 // the same bits on every machine. All functions are for one thread at a time.
 #ifndef WAYMARK_ESTIMATOR_H
@@ -34,13 +34,13 @@ typedef struct wm_setup {
   uint64_t seed;
 } wm_setup;
 
-// One of the poses that a cloud of particles thinks possible.
+// A particle: one possible pose.
 typedef struct wm_particle {
   double x_m, y_m, heading_rad;  // base_link in map
   double weight;                 // of all of them: 1
 } wm_particle;
 
-// A place where the robot may be besides where it is said to be.
+// A pose that may be the robot's besides the estimate.
 typedef struct wm_hypothesis {
   double x_m, y_m, heading_rad;  // base_link in map at the last observation
   double covariance[6];          // xx, xy, yy, x heading, y heading, heading heading, if it is there: m2, m rad, rad2
@@ -66,16 +66,18 @@ typedef struct wm_estimator {
   void (*estimate)(const void *state, wm_estimate *out);
   // What is known of the motion sensors, for the predictor.
   void (*motion)(const void *state, wm_motion_calibration *out);
-  // Calibration states with their sigmas; returns how many there are.
+  // Calibration states with their sigmas; returns how many there are, of which at most `capacity` are written.
   size_t (*calibration)(const void *state, wm_calibration_value *out, size_t capacity);
   // Health flags of the motion sensors: bits of WM_MOTION_HEALTH_*.
   uint32_t (*motion_health)(const void *state);
+  // Counters; returns how many there are, of which at most `capacity` are written. NULL where the estimator has none.
+  size_t (*counters)(const void *state, wm_counter *out, size_t capacity);
   // SLAM: landmarks estimated, with their covariances (xx, xy, yy in m2, heading in rad2; NaN where there is none);
   // returns how many there are. NULL where the estimator has none.
   size_t (*landmarks)(const void *state, wm_landmark *out, double (*covariance)[4], size_t capacity);
   // Particles, for who draws them; returns how many there are. NULL where the estimator has none.
   size_t (*particles)(const void *state, wm_particle *out, size_t capacity);
-  // Other places that explain what is seen about as well as the pose that is given out; returns how many there are.
+  // Other poses that explain the observations about as well as the estimate; returns how many there are.
   // NULL where the estimator has none.
   size_t (*hypotheses)(const void *state, wm_hypothesis *out, size_t capacity);
 } wm_estimator;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Parameters that describe themselves: the config reader fills the struct from YAML by this table, checks the range,
+// Parameters with their descriptions: the config reader fills the struct from YAML by this table, checks the range,
 // and the documentation is printed from it. A new parameter is one line here and nowhere else.
 #ifndef WAYMARK_PARAMS_H
 #define WAYMARK_PARAMS_H
@@ -27,10 +27,19 @@ typedef struct wm_param {
   const char *about;         // meaning, unit, reason of the default; one sentence or two
 } wm_param;
 
+// A key that the table had before. The config reader takes a renamed key for the new one, with a warning; of a removed
+// key it warns with the sentence and goes on. Old and new key together are an error.
+typedef struct wm_param_old {
+  const char *key;      // the old key; NULL ends the list
+  const char *new_key;  // a key of the table, with the same unit and meaning; NULL: removed
+  const char *about;    // removed: why, and what to use; renamed: NULL, or what else changed
+} wm_param_old;
+
 typedef struct wm_param_table {
   const wm_param *params;
   size_t count;
-  size_t bytes;  // sizeof the struct
+  size_t bytes;             // sizeof the struct
+  const wm_param_old *old;  // ends with a NULL key; NULL: none
 } wm_param_table;
 
 // Writes every parameter's default. `out` has table->bytes bytes.

@@ -23,4 +23,4 @@ static const wm_param kParams[] = {
 };
 
 const wm_param_table wm_cascade_params_table = {kParams, sizeof kParams / sizeof kParams[0],
-                                                sizeof(struct wm_cascade_params)};
+                                                sizeof(struct wm_cascade_params), NULL};

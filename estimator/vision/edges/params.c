@@ -74,4 +74,4 @@ static const wm_param kParams[] = {
 };
 
 const wm_param_table wm_edges_params_table = {kParams, sizeof kParams / sizeof kParams[0],
-                                              sizeof(struct wm_edges_params)};
+                                              sizeof(struct wm_edges_params), NULL};

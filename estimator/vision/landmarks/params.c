@@ -52,4 +52,4 @@ static const wm_param kParams[] = {
 };
 
 const wm_param_table wm_landmarks_params_table = {kParams, sizeof kParams / sizeof kParams[0],
-                                                  sizeof(struct wm_landmarks_params)};
+                                                  sizeof(struct wm_landmarks_params), NULL};

@@ -2,6 +2,7 @@
 #include "waymark/marker_fit.h"
 
 #include <cstring>
+#include <limits>
 
 #include "vision/markers/marker_pose.hpp"
 
@@ -23,6 +24,7 @@ struct wm_marker_fit {
 namespace wm {
 namespace {
 
+constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
 constexpr int kSamples = 24;                         // along a side; more cost time and share the same pixels
 constexpr double kFirstSample = 0.08, kSpan = 0.84;  // of a side: its corners are rounded by blur
 constexpr double kReach_px = 2.5;                    // of a profile to either side: the corners' error and the blur
@@ -332,12 +334,18 @@ int wm_marker_fit_read(wm_marker_fit *self, const wm_frame *frame, const double 
   const vec3 all = poses.best.centre_m + poses.other.centre_m;
   if (!wm::finite(all) || !(length(poses.best.centre_m) > 0.0)) return 0;
   write_pose(*self, poses.best, out->p_m, &out->yaw_rad);
-  out->along_sigma_m = poses.range_sigma_m;
+  out->along_sigma_m = poses.range_sigma_m > 0.0 ? poses.range_sigma_m : kAbsent;
   out->yaw_sigma_rad =
-      poses.turn_sigma_rad > 0 ? std::sqrt(square(poses.turn_sigma_rad) + square(kTurnSigmaMin_rad)) : 0.0;
-  out->edge_shift_px = wm_marker_fit_bloom_px(self);
+      poses.turn_sigma_rad > 0 ? std::sqrt(square(poses.turn_sigma_rad) + square(kTurnSigmaMin_rad)) : kAbsent;
+  const double bloom_px = wm_marker_fit_bloom_px(self);
+  out->edge_shift_px = bloom_px != 0.0 ? bloom_px : kAbsent;  // 0: not measured yet
   out->poses = poses.has_other ? 2 : 1;
-  if (poses.has_other) write_pose(*self, poses.other, out->other_p_m, &out->other_yaw_rad);
+  if (poses.has_other) {
+    write_pose(*self, poses.other, out->other_p_m, &out->other_yaw_rad);
+  } else {
+    for (double &p : out->other_p_m) p = kAbsent;
+    out->other_yaw_rad = kAbsent;
+  }
   return 1;
 }
 

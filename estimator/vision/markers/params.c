@@ -14,4 +14,5 @@ static const wm_param kParams[] = {
      "Added to each identity, so that markers of different families have different ids."},
 };
 
-const wm_param_table wm_mr_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(struct wm_mr_params)};
+const wm_param_table wm_mr_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(struct wm_mr_params),
+                                           NULL};

@@ -34,4 +34,4 @@ static const wm_param kParams[] = {
 };
 
 const wm_param_table wm_stereo_params_table = {kParams, sizeof kParams / sizeof kParams[0],
-                                               sizeof(struct wm_stereo_params)};
+                                               sizeof(struct wm_stereo_params), NULL};

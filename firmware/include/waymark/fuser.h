@@ -54,6 +54,9 @@ void wm_fuser_init(wm_fuser *self, const wm_estimator *estimator, void *state, w
 void wm_fuser_feed(wm_fuser *self, const wm_event *event);
 // After the last event: writes the pose that waits.
 void wm_fuser_finish(wm_fuser *self);
+// What the estimator reports of itself: state, lost probability, resets, motion health, calibration states and
+// counters; at most as many as `out` has room for. The rest of `out` is left alone.
+void wm_fuser_health(const wm_fuser *self, wm_health *out);
 // Whether an estimate holds a pose at all (finite, not searching).
 int wm_estimate_has_pose(const wm_estimate *estimate);
 

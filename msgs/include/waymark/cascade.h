@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A cascade of boosted classifiers as OpenCV's XML files have it (stage type BOOST, features LBP or HAAR): the numbers
 // of such a file, checked, so that whoever evaluates it needn't check anything. P. Viola, M. Jones 2001 (cascade, Haar
-// features); S. Liao et al. 2007 (multi-block LBP).
+// features); S. Liao et al. 2007 (multi-block LBP). Part of the setup of one process: its arrays belong to whoever read
+// the file, and it is never logged or sent.
 #ifndef WAYMARK_CASCADE_H
 #define WAYMARK_CASCADE_H
 

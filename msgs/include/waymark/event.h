@@ -2,6 +2,9 @@
 // An event: one datum with the time at which it was true and the time at which it arrived. Everything that an
 // estimator ever sees is an event; what is in the rings, in the merge and in the event log is this struct.
 // Fixed size, no pointers. A ring that carries only small events has slots of WM_EVENT_SMALL_BYTES.
+//
+// An absent number of type double or float is NaN, in every event, log and message. Zero is a value. (Events of logs
+// before codec version 5 have zeros for some absent numbers; the decoder turns them into NaN.)
 #ifndef WAYMARK_EVENT_H
 #define WAYMARK_EVENT_H
 
@@ -27,7 +30,7 @@ typedef enum wm_event_kind {
   WM_EVENT_STEREO,      // a point in both pictures of a rectified pair
   WM_EVENT_POINTS,      // edge points on the floor in base_link
   WM_EVENT_LOOKED,      // a sensor looked and saw nothing
-  WM_EVENT_SET_POSE,    // a person or a program says where the robot is
+  WM_EVENT_SET_POSE,    // the robot's pose, given by a person or a program
   WM_EVENT_RESET,       // start again from the start pose of the setup
   WM_EVENT_KIND_COUNT
 } wm_event_kind;
@@ -56,13 +59,13 @@ typedef enum wm_quantity {
 #define WM_QUANTITIES_MAX 8
 #define WM_POINTS_MAX 512
 
-// Bits of wm_quantities.doubt: a value that should not be believed, and must not be taken for standing still.
+// Bits of wm_quantities.doubt: the values are not reliable and are no evidence that the robot stands still.
 #define WM_DOUBT_FROZEN_COUNTER (1u << 0)  // the message's counter stands still: the sender is stuck
 
 typedef struct wm_quantities {
   uint8_t count;
   uint8_t doubt;
-  uint16_t lost_before;           // frames of this message that its counter says were lost just before
+  uint16_t lost_before;           // frames missing just before, by the message's own counter
   uint8_t id[WM_QUANTITIES_MAX];  // wm_quantity
   double value[WM_QUANTITIES_MAX];
 } wm_quantities;
@@ -75,9 +78,9 @@ typedef struct wm_twist6 {
   double v_mps[3], w_radps[3];
 } wm_twist6;
 
-// Bearing positive to the left of the sensor's x axis; NaN where absent, as the range is; not both absent. Elevation
-// above the sensor's xy plane (of a sensor that looks up or down: above the level, as its bearing is the azimuth), with
-// the same ray as the bearing. There is one where it isn't NaN and its sigma is above 0: an event of zeros has none.
+// Bearing is positive to the left of the sensor's x axis. Bearing or range may be absent, not both. Elevation is above
+// the sensor's xy plane (of a sensor that looks up or down: above the level, as its bearing is the azimuth), and of the
+// same ray as the bearing.
 typedef struct wm_sighting {
   uint16_t sensor;      // index into wm_setup.sensors
   int32_t landmark_id;  // the map's id, or -1 where unknown
@@ -86,7 +89,7 @@ typedef struct wm_sighting {
   double bearing_sigma_rad;  // NaN: the sensor's own
   double range_sigma_m;      // NaN: the sensor's own
   double elevation_rad;
-  double elevation_sigma_rad;  // of the elevation in the sensor, without the mounting's tilt; 0 or NaN: there is none
+  double elevation_sigma_rad;  // of the elevation in the sensor, without the mounting's tilt; NaN: no elevation
 } wm_sighting;
 
 typedef struct wm_position {
@@ -100,18 +103,17 @@ typedef struct wm_heading {
   double sigma_rad;
 } wm_heading;
 
-// A coded marker. What is 0 behind `yaw_rad` is not known.
+// A coded marker.
 typedef struct wm_marker {
   uint16_t sensor;
-  uint16_t poses;  // 2: the corners allow a second pose as well, other_*; else there is one
+  uint16_t poses;  // 2: the corners allow a second pose as well, other_*; else there is one and other_* are not read
   int32_t id;
   double p_m[3];  // in the sensor's frame
   double yaw_rad;
   double other_p_m[3], other_yaw_rad;
-  double along_sigma_m;  // of its distance along the line of sight; 0: the configuration's
-  double yaw_sigma_rad;  // 0: the configuration's
-  double
-      edge_shift_px;  // how far white grows over an edge in this camera, as far as it is known by now; 0: not measured
+  double along_sigma_m;  // of its distance along the line of sight; NaN: the configuration's
+  double yaw_sigma_rad;  // NaN: the configuration's
+  double edge_shift_px;  // blooming: bright areas of this camera's pictures are wider by this on each edge
 } wm_marker;
 
 typedef struct wm_stereo {
@@ -169,10 +171,9 @@ typedef struct wm_event {
 // Bytes of `event` that carry something: copy this many, from a ring or to one. Constant cost. Any thread.
 size_t wm_event_bytes(const wm_event *event);
 
-// Whether a sighting tells an elevation; it may be absurd.
+// Whether a sighting has an elevation and its sigma; neither is checked for its size.
 static inline int wm_sighting_has_elevation(const wm_sighting *s) {
-  return s->elevation_rad == s->elevation_rad && s->elevation_sigma_rad == s->elevation_sigma_rad &&
-         s->elevation_sigma_rad != 0.0;
+  return s->elevation_rad == s->elevation_rad && s->elevation_sigma_rad == s->elevation_sigma_rad;
 }
 
 static inline int wm_event_is_motion(const wm_event *event) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A picture: grey pixels and when they were taken. The pixels are the giver's and stay until it is asked for the next.
+// A picture: grey pixels and when they were taken. The pixels are borrowed: they belong to the source of the pictures
+// and stay until its next one. For one process: a wm_frame is never logged or sent.
 #ifndef WAYMARK_FRAME_H
 #define WAYMARK_FRAME_H
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a run is doing: counts a source, calibration states, deadlines. Fixed size, no pointers. Every datum that a
-// source handed out is in exactly one of: fused, rejected, refused, late, dropped, duplicates, future, or still waiting
-// in the merge.
+// How a run is doing: counts a source, calibration states, counters, deadlines. Fixed size, no pointers. Every datum
+// that a source handed out is in exactly one of: fused, rejected, refused, late, dropped, duplicates, future, or still
+// waiting in the merge.
 #ifndef WAYMARK_HEALTH_H
 #define WAYMARK_HEALTH_H
 
@@ -13,7 +13,8 @@
 #include "waymark/time.h"
 
 #define WM_HEALTH_SOURCES_MAX 32
-#define WM_HEALTH_CALIBRATION_MAX 32
+#define WM_HEALTH_CALIBRATION_MAX 128  // 8 sensors with all their states and the motion's
+#define WM_HEALTH_COUNTERS_MAX 16
 #define WM_HEALTH_NAME_MAX 48
 #define WM_STATUS_COUNT (WM_INTERNAL + 1)
 
@@ -59,17 +60,27 @@ typedef struct wm_health {
   wm_time_ns t_ns;            // on the run's clock
   wm_time_ns fused_until_ns;  // WM_TIME_NONE before the first
   uint8_t state;              // wm_state
+  double lost_probability;    // wm_estimate's
   uint32_t resets, jumps;
   uint32_t motion_health;  // bits of WM_MOTION_HEALTH_*
   uint32_t source_count;
   wm_source_health sources[WM_HEALTH_SOURCES_MAX];
   uint32_t calibration_count;
   wm_calibration_value calibration[WM_HEALTH_CALIBRATION_MAX];
+  uint32_t counter_count;
+  wm_counter counters[WM_HEALTH_COUNTERS_MAX];
   uint64_t loops, deadlines_missed;
   uint64_t outputs_lost;  // records that the sinks didn't take in time
   uint64_t published;
   // What is left of dead reckoning until the pose is of no use: infinite while the robot stands, NaN without a pose.
   double reckoning_left_m, reckoning_left_s;
 } wm_health;
+
+// The counter of this kind, or a null pointer where the estimator has none.
+static inline const wm_counter *wm_health_counter(const wm_health *health, wm_counter_kind kind) {
+  for (uint32_t i = 0; i < health->counter_count; i++)
+    if (health->counters[i].kind == (uint32_t)kind) return &health->counters[i];
+  return 0;
+}
 
 #endif

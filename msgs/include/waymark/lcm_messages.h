@@ -17,7 +17,7 @@ extern "C" {
 #endif
 
 // Enough for any of them: one datagram.
-#define WM_LCM_MESSAGE_MAX 20000
+#define WM_LCM_MESSAGE_MAX 32000
 #define WM_LCM_OBSERVATIONS_MAX 64
 #define WM_LCM_LANDMARKS_MAX 256
 

@@ -15,7 +15,7 @@ extern "C" {
 typedef enum wm_state {
   WM_STATE_SEARCHING = 0,       // no pose known yet
   WM_STATE_TRACKING = 1,        // observations are being fused and fit
-  WM_STATE_DEAD_RECKONING = 2,  // no observation fused for a while; the covariance says how far it may be off
+  WM_STATE_DEAD_RECKONING = 2,  // no observation fused for a while; the covariance grows
   WM_STATE_LOST = 3             // observations contradict the pose; being mended
 } wm_state;
 
@@ -33,6 +33,8 @@ typedef struct wm_estimate {
   uint32_t resets;    // times that the pose was set anew: start, set_pose, recovery
   uint8_t dof;        // 3 or 6
   uint8_t state;      // wm_state
+  // Probability that the robot is not where this pose is: 1 while searching, NaN where an estimator cannot tell.
+  double lost_probability;
 } wm_estimate;
 
 static inline int wm_cov_index(int row, int column) { return 6 * row + column; }
@@ -60,7 +62,8 @@ typedef enum wm_verdict {
   WM_REJECTED_NOT_FINITE,
   WM_REJECTED_SINGULAR,   // the geometry gives no information (robot on the landmark)
   WM_REJECTED_SEARCHING,  // kept for the search, not fused
-  WM_REJECTED_BY_CONFIG,  // the config says not to use it
+  WM_REJECTED_BY_CONFIG,  // switched off by the configuration
+  WM_REJECTED_NUMERIC,    // the update failed numerically (the innovation's covariance is not positive definite)
   WM_VERDICT_COUNT
 } wm_verdict;
 
@@ -105,8 +108,34 @@ typedef struct wm_published {
 typedef struct wm_calibration_value {
   char name[40];  // e.g. "laser.yaw_rad"
   double value;
-  double sigma;
+  double sigma;  // NaN where it is not estimated
 } wm_calibration_value;
+
+// What an estimator counts, for health and report. Counts are since the start, unless "now" is stated.
+typedef enum wm_counter_kind {
+  WM_COUNTER_LANDMARKS = 0,         // landmarks in the map now
+  WM_COUNTER_LANDMARKS_ADDED,       // landmarks that entered the map
+  WM_COUNTER_LANDMARKS_REMOVED,     // landmarks that left it
+  WM_COUNTER_LANDMARKS_MOVED,       // landmarks found at another place than before; landmark_id is the last one's
+  WM_COUNTER_LANDMARKS_MERGED,      // pairs of landmarks that were found to be one
+  WM_COUNTER_IDENTITIES_AMBIGUOUS,  // sightings whose identity stood for two landmarks
+  WM_COUNTER_MAP_FULL,              // new landmarks for which there was no capacity
+  WM_COUNTER_ROTATION_OUTLIERS,     // turns that the motion data lack: slip, or turned by hand
+  WM_COUNTER_MOTION_OUTLIERS,       // motion data that no robot can do
+  WM_COUNTER_RELOCALIZATIONS,       // times that a lost robot was found again
+  WM_COUNTER_ALIASED_POSES,         // other poses that explain the observations as well, now
+  WM_COUNTER_EXPLAINED_PERMILLE,    // of 1000 edge points, those that lie on edges of the map, now (smoothed)
+  WM_COUNTER_KIND_COUNT
+} wm_counter_kind;
+
+typedef struct wm_counter {
+  uint32_t kind;        // wm_counter_kind
+  int32_t landmark_id;  // the landmark that was counted last; -1 where there is none
+  uint64_t count;
+} wm_counter;
+
+// "landmarks", "landmarks_added" ...; "?" beyond.
+const char *wm_counter_name(unsigned kind);
 
 #ifdef __cplusplus
 }

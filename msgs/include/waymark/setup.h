@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is known beforehand of a robot and a place: wheels, sensors, landmarks, start. Drivers read it, estimators use
-// it.
+// it. These structs are for one process: wm_raster and wm_appearance (and wm_frame, wm_cascade in headers of their own)
+// borrow memory by pointers, so that they are never copied to a ring, a log or a message.
 #ifndef WAYMARK_SETUP_H
 #define WAYMARK_SETUP_H
 

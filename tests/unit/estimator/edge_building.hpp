@@ -145,6 +145,15 @@ struct drive {
   }
 };
 
+// Share of the edge points that lie on edges of the map.
+inline double explained_of(const filter &f) {
+  wm_counter counters[16];
+  const size_t count = f.ops->counters(f.state, counters, 16);
+  for (size_t i = 0; i < count; i++)
+    if (counters[i].kind == WM_COUNTER_EXPLAINED_PERMILLE) return 1e-3 * (double)counters[i].count;
+  return NAN;
+}
+
 inline double calibration_of(const filter &f, const char *name) {
   wm_calibration_value values[64];
   const size_t count = f.ops->calibration(f.state, values, 64);

@@ -92,6 +92,7 @@ inline wm_marker marker(int32_t id, double x, double y, double z, double yaw_rad
   m.p_m[1] = y;
   m.p_m[2] = z;
   m.yaw_rad = yaw_rad;
+  m.along_sigma_m = m.yaw_sigma_rad = m.edge_shift_px = NAN;
   return m;
 }
 
@@ -156,11 +157,19 @@ inline double sigma() {
   return std::sqrt(e.covariance[0] + e.covariance[wm_cov_index(1, 1)]);
 }
 
-inline double counted(const char *name) {
+inline double calibrated(const char *name) {
   wm_calibration_value values[64];
   const size_t n = slam->calibration(state, values, 64);
   for (size_t i = 0; i < n; i++)
     if (std::strcmp(values[i].name, name) == 0) return values[i].value;
+  return NAN;
+}
+
+inline double counted(wm_counter_kind kind) {
+  wm_counter counters[16];
+  const size_t n = slam->counters(state, counters, 16);
+  for (size_t i = 0; i < n; i++)
+    if (counters[i].kind == (uint32_t)kind) return (double)counters[i].count;
   return -1.0;
 }
 

@@ -76,7 +76,7 @@ void the_first_scan_counts_for_the_time_since_the_motion_began(void) {
     wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
     size_t count = 0;
     TEST_ASSERT_EQUAL(WM_OK, f.ops->correct(f.state, &e, out, WM_INNOVATIONS_PER_EVENT_MAX, &count));
-    const double explained = calibration_of(f, "edges.explained");
+    const double explained = explained_of(f);
     if (moved)
       TEST_ASSERT_GREATER_THAN_DOUBLE(0.8, explained);
     else
@@ -198,7 +198,7 @@ void glass_walls_are_usual(void) {
     d.go(f, 8, 1.0, 0.0);
     d.go(f, 8, -1.0, 0.0);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.1, d.error_of(f));
-    TEST_ASSERT_LESS_THAN_DOUBLE(0.01, calibration_of(f, "edges.lost_probability"));
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.01, f.estimate().lost_probability);
   }
 }
 

@@ -54,13 +54,12 @@ wm_estimate estimate() {
   return e;
 }
 
-double calibration(const char *name) {
-  wm_calibration_value values[64];
-  const size_t count = ekf->calibration(state, values, 64);
-  for (size_t i = 0; i < count; i++)
-    if (std::strcmp(values[i].name, name) == 0) return values[i].value;
-  TEST_FAIL_MESSAGE(name);
-  return NAN;
+// How many landmarks were found moved, and the last one's identity.
+wm_counter moved() {
+  wm_counter counter;
+  TEST_ASSERT_EQUAL(1, ekf->counters(state, &counter, 1));
+  TEST_ASSERT_EQUAL(WM_COUNTER_LANDMARKS_MOVED, counter.kind);
+  return counter;
 }
 
 enum class sees { right, wrong_identities, no_numbers };
@@ -92,7 +91,7 @@ void drive(double for_s, int seen, sees how = sees::right) {
         std::sqrt(wm::square(e.pose_map_base.p_m[0] - truth.x_m) + wm::square(e.pose_map_base.p_m[1] - truth.y_m));
     for (const double value : e.covariance) TEST_ASSERT_TRUE(wm::finite(value));
     TEST_ASSERT_TRUE(wm::finite(off) && wm::finite(e.heading_rad));
-    const double p = calibration("landmarks.lost_probability");
+    const double p = e.lost_probability;
     TEST_ASSERT_TRUE(p >= 0.0 && p <= 1.0);
     const bool tracks = e.state == WM_STATE_TRACKING || e.state == WM_STATE_DEAD_RECKONING;
     if (tracks && p < 0.5 && now_s > judged_from_s)
@@ -217,7 +216,7 @@ void test_misfits_that_scatter_say_nothing_those_in_one_place_do(void) {
 
 void test_started_without_a_pose_three_bearings_are_enough(void) {
   begin_without_pose();
-  TEST_ASSERT_EQUAL_DOUBLE(1.0, calibration("landmarks.lost_probability"));
+  TEST_ASSERT_EQUAL_DOUBLE(1.0, estimate().lost_probability);
   drive(5, 3);
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, estimate().state);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
@@ -237,7 +236,7 @@ void test_a_pose_found_by_a_moved_landmark_is_mended(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
   drive(6, kLandmarks);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
-  TEST_ASSERT_EQUAL_DOUBLE(landmarks[2].id, calibration("map.moved_id"));
+  TEST_ASSERT_EQUAL(landmarks[2].id, moved().landmark_id);
 }
 
 // Driving by one landmark something is taken for another one once: a pose that fits both is found, and not believed.
@@ -371,8 +370,8 @@ void test_a_moved_landmark_is_told_and_does_no_harm(void) {
   stands_m[2][0] += 3.0;
   stands_m[2][1] -= 2.0;
   drive(10, kLandmarks);
-  TEST_ASSERT_EQUAL_DOUBLE(1, calibration("map.moved"));
-  TEST_ASSERT_EQUAL_DOUBLE(landmarks[2].id, calibration("map.moved_id"));
+  TEST_ASSERT_EQUAL(1, moved().count);
+  TEST_ASSERT_EQUAL(landmarks[2].id, moved().landmark_id);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.15, off());
 }
 

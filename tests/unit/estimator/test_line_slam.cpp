@@ -199,11 +199,11 @@ void test_lost_lines_are_found_again(void) {
   }
 }
 
-double counted(const char *name) {
-  wm_calibration_value values[64];
-  const size_t n = slam->calibration(state, values, 64);
+double counted(wm_counter_kind kind) {
+  wm_counter counters[16];
+  const size_t n = slam->counters(state, counters, 16);
   for (size_t i = 0; i < n; i++)
-    if (std::strcmp(values[i].name, name) == 0) return values[i].value;
+    if (counters[i].kind == (uint32_t)kind) return (double)counters[i].count;
   return -1.0;
 }
 
@@ -218,8 +218,8 @@ void test_a_robot_that_is_turned_by_hand_keeps_its_map(void) {
     TEST_ASSERT_LESS_THAN_DOUBLE(1.5 * M_PI / 180, o.largest_rad);
     TEST_ASSERT_EQUAL(kLines, o.landmarks);
     TEST_ASSERT_EQUAL(kLines, o.right);
-    TEST_ASSERT_EQUAL_DOUBLE(0, counted("map.moved"));
-    TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(1, counted("motion.jolts"));
+    TEST_ASSERT_EQUAL_DOUBLE(0, counted(WM_COUNTER_LANDMARKS_MOVED));
+    TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(1, counted(WM_COUNTER_ROTATION_OUTLIERS));
   }
 }
 

@@ -144,7 +144,7 @@ void test_a_marker_seen_twice_in_a_picture_is_fused_once_and_told(void) {
   begin();
   drive(40);
   TEST_ASSERT_EQUAL(fused, rejected);
-  TEST_ASSERT_EQUAL_DOUBLE(rejected, counted("map.doubled"));
+  TEST_ASSERT_EQUAL_DOUBLE(rejected, counted(WM_COUNTER_IDENTITIES_AMBIGUOUS));
   size_t found;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_landmark(&found));
   TEST_ASSERT_EQUAL(kCount, found);
@@ -164,8 +164,8 @@ void test_two_markers_of_one_identity_are_told_and_left_alone(void) {
     TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
     TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
   }
-  TEST_ASSERT_EQUAL_DOUBLE(2, counted("map.moved"));
-  TEST_ASSERT_GREATER_THAN_DOUBLE(10, counted("map.doubled"));
+  TEST_ASSERT_EQUAL_DOUBLE(2, counted(WM_COUNTER_LANDMARKS_MOVED));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(10, counted(WM_COUNTER_IDENTITIES_AMBIGUOUS));
   size_t found;
   worst_landmark(&found);
   TEST_ASSERT_EQUAL(kCount - 1, found);
@@ -181,7 +181,7 @@ void test_two_markers_of_one_identity_on_opposite_sides_spoil_nothing(void) {
     TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
     TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
   }
-  TEST_ASSERT_GREATER_THAN_DOUBLE(10, counted("map.doubled"));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(10, counted(WM_COUNTER_IDENTITIES_AMBIGUOUS));
   size_t found;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_landmark(&found));
   TEST_ASSERT_EQUAL(kCount - 1, found);
@@ -207,10 +207,10 @@ void test_half_a_minute_without_markers_is_said_and_mended(void) {
 void test_a_landmark_that_moved_leaves_is_counted_and_joins_anew(void) {
   begin();
   drive(30);
-  TEST_ASSERT_EQUAL_DOUBLE(0, counted("map.moved"));
+  TEST_ASSERT_EQUAL_DOUBLE(0, counted(WM_COUNTER_LANDMARKS_MOVED));
   place[0][0] += 1.5;
   drive(40);
-  TEST_ASSERT_EQUAL_DOUBLE(1, counted("map.moved"));
+  TEST_ASSERT_EQUAL_DOUBLE(1, counted(WM_COUNTER_LANDMARKS_MOVED));
   size_t found;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.15, worst_landmark(&found));
   TEST_ASSERT_EQUAL(kCount, found);
@@ -227,7 +227,7 @@ void test_a_marker_that_moved_is_told_and_pulls_nothing(void) {
     TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
     TEST_ASSERT_LESS_THAN_DOUBLE(4.0 * sigma(), off());
   }
-  TEST_ASSERT_EQUAL_DOUBLE(1, counted("map.moved"));
+  TEST_ASSERT_EQUAL_DOUBLE(1, counted(WM_COUNTER_LANDMARKS_MOVED));
   size_t found;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&found));
   TEST_ASSERT_EQUAL(kCount, found);
@@ -252,8 +252,8 @@ void test_a_robot_that_was_turned_does_not_turn_its_map(void) {
     size_t found = 0;
     TEST_ASSERT_LESS_THAN_DOUBLE(0.06, worst_landmark(&found));
     TEST_ASSERT_EQUAL(kCount, found);
-    TEST_ASSERT_EQUAL_DOUBLE(1, counted("motion.jolts"));
-    TEST_ASSERT_EQUAL_DOUBLE(0, counted("map.moved"));
+    TEST_ASSERT_EQUAL_DOUBLE(1, counted(WM_COUNTER_ROTATION_OUTLIERS));
+    TEST_ASSERT_EQUAL_DOUBLE(0, counted(WM_COUNTER_LANDMARKS_MOVED));
   }
 }
 
@@ -267,7 +267,7 @@ void test_markers_that_were_turned_do_not_turn_the_robot(void) {
   turned[4] = turned[5] = 0.3;
   drive(2.0);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
-  TEST_ASSERT_EQUAL_DOUBLE(0, counted("motion.jolts"));
+  TEST_ASSERT_EQUAL_DOUBLE(0, counted(WM_COUNTER_ROTATION_OUTLIERS));
 }
 
 void test_most_markers_seen_where_none_are_is_survived(void) {
@@ -331,7 +331,7 @@ void test_a_misread_code_does_not_keep_its_landmark_away(void) {
   size_t found;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&found));
   TEST_ASSERT_EQUAL(kCount, found);
-  TEST_ASSERT_EQUAL_DOUBLE(0, counted("map.moved"));
+  TEST_ASSERT_EQUAL_DOUBLE(0, counted(WM_COUNTER_LANDMARKS_MOVED));
 }
 
 void test_landmarks_that_are_never_seen_again_leave(void) {
@@ -341,18 +341,18 @@ void test_landmarks_that_are_never_seen_again_leave(void) {
   size_t found;
   worst_landmark(&found);
   TEST_ASSERT_LESS_OR_EQUAL(kCount, found);  // seen once is not a landmark yet
-  const double joined = counted("map.landmarks");
+  const double joined = counted(WM_COUNTER_LANDMARKS);
   drive(20);
-  TEST_ASSERT_EQUAL_DOUBLE(joined - 30, counted("map.landmarks"));
-  TEST_ASSERT_GREATER_OR_EQUAL(30, counted("map.left"));
+  TEST_ASSERT_EQUAL_DOUBLE(joined - 30, counted(WM_COUNTER_LANDMARKS));
+  TEST_ASSERT_GREATER_OR_EQUAL(30, counted(WM_COUNTER_LANDMARKS_REMOVED));
 }
 
 void test_a_full_map_goes_on_with_what_it_has(void) {
   params.landmark_capacity = 6;
   begin();
   drive(40);
-  TEST_ASSERT_LESS_OR_EQUAL(6, counted("map.landmarks"));
-  TEST_ASSERT_GREATER_THAN(0, counted("map.no_room"));
+  TEST_ASSERT_LESS_OR_EQUAL(6, counted(WM_COUNTER_LANDMARKS));
+  TEST_ASSERT_GREATER_THAN(0, counted(WM_COUNTER_MAP_FULL));
   TEST_ASSERT_LESS_THAN_DOUBLE(0.2, off());
 }
 

@@ -23,8 +23,8 @@ double worst_of_leaning(double sigma_rad) {
 
 void test_a_camera_that_leans_is_found_by_how_high_markers_seem_to_hang(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_of_leaning(0.05));
-  TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[0], counted("camera.roll_rad"));
-  TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[1], counted("camera.pitch_rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[0], calibrated("camera.roll_rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(0.004, leans[1], calibrated("camera.pitch_rad"));
 }
 
 void test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt(void) {
@@ -35,8 +35,8 @@ void test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt(void) {
   setup.sensor_count = 2;
   in_turn = true;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, worst_of_leaning(0.05));
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, leans[0], counted("camera.roll_rad"));
-  TEST_ASSERT_DOUBLE_WITHIN(0.01, leans[1], counted("camera.pitch_rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, leans[0], calibrated("camera.roll_rad"));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, leans[1], calibrated("camera.pitch_rad"));
 }
 
 void test_taken_for_level_it_bends_the_map(void) { TEST_ASSERT_GREATER_THAN_DOUBLE(0.06, worst_of_leaning(0)); }

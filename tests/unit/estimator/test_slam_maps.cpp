@@ -14,8 +14,8 @@ void test_a_marker_that_moved_is_told_on_a_frozen_map_too(void) {
   place[0][0] += 1.5;
   begin();
   drive(60);
-  TEST_ASSERT_EQUAL_DOUBLE(1, counted("map.moved"));
-  TEST_ASSERT_EQUAL_DOUBLE(kCount, counted("map.landmarks"));
+  TEST_ASSERT_EQUAL_DOUBLE(1, counted(WM_COUNTER_LANDMARKS_MOVED));
+  TEST_ASSERT_EQUAL_DOUBLE(kCount, counted(WM_COUNTER_LANDMARKS));
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, off());
   TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
 }
@@ -32,7 +32,7 @@ void test_a_saved_map_frozen_or_extended_needs_no_first_lap(void) {
     begin();
     drive(30);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
-    TEST_ASSERT_EQUAL_DOUBLE(map == WM_SLAM_MAP_FROZEN ? kCount / 2 : kCount, counted("map.landmarks"));
+    TEST_ASSERT_EQUAL_DOUBLE(map == WM_SLAM_MAP_FROZEN ? kCount / 2 : kCount, counted(WM_COUNTER_LANDMARKS));
     wm_landmark l[64];
     double covariance[64][4];
     slam->landmarks(state, l, covariance, 64);
@@ -158,7 +158,7 @@ void test_started_lost_on_a_map_that_grows_it_takes_two_markers(void) {
 
 // An upright marker that is seen from one place may be the mirror image of what it seems. A level one is not.
 void test_started_lost_and_standing_it_finds_itself_by_one_marker_that_is_level(void) {
-  for (double yaw_sigma_rad : {0.01, 0.0}) {
+  for (double yaw_sigma_rad : {0.01, static_cast<double>(NAN)}) {
     make_room();
     start_lost_before_markers();
     pass_by(1, 0, 1, yaw_sigma_rad, false);
@@ -188,10 +188,10 @@ void test_a_map_with_nan_loses_those_landmarks_alone(void) {
   known[3].p_m[1] = kAbsent;
   known[5].sigma_m = kAbsent;
   begin();
-  TEST_ASSERT_EQUAL_DOUBLE(kCount - 1, counted("map.landmarks"));
+  TEST_ASSERT_EQUAL_DOUBLE(kCount - 1, counted(WM_COUNTER_LANDMARKS));
   drive(30);
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
-  TEST_ASSERT_EQUAL_DOUBLE(kCount, counted("map.landmarks"));
+  TEST_ASSERT_EQUAL_DOUBLE(kCount, counted(WM_COUNTER_LANDMARKS));
 }
 
 // A map of markers with NaN for a place, for a heading and for a sigma.

@@ -23,7 +23,7 @@ static const wm_param kMotionParams[] = {
     {"noise.speed_mps", WM_PARAM_F64, 0, 0.02, 0.0, 10.0, NULL, "Noise, m/s."},
 };
 
-const wm_param_table wm_motion_params_table = {kMotionParams, 1, sizeof(double)};
+const wm_param_table wm_motion_params_table = {kMotionParams, 1, sizeof(double), NULL};
 const char *wm_motion_params_clash(const wm_motion_params *params, const char **key) {
   double noise;
   memcpy(&noise, params, sizeof noise);
@@ -33,7 +33,7 @@ const char *wm_motion_params_clash(const wm_motion_params *params, const char **
 }
 
 static const wm_estimator kPole = {
-    .name = "pole_filter", .about = "Of the test.", .params = {kParams, 5, sizeof(registry_params)}};
+    .name = "pole_filter", .about = "Of the test.", .params = {kParams, 5, sizeof(registry_params), NULL}};
 static const wm_estimator kCloud = {
     .name = "cloud_filter", .about = "Of the test.", .params = {kOtherParams, 1, sizeof(double)}};
 static const wm_estimator *const kAll[] = {&kPole, &kCloud};

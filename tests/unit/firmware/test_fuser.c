@@ -104,12 +104,42 @@ static void ticks_drive_before_yaw_rate_before_speed_before_twists(void) {
   TEST_ASSERT_TRUE(wm_driving_is(&driving, &e));
 }
 
+// Like snprintf: how many there would be, of which those that fit are written.
+static size_t many_values(const void *self, wm_calibration_value *out, size_t capacity) {
+  (void)self;
+  for (size_t i = 0; i < capacity && i < 1000; i++) out[i] = (wm_calibration_value){.name = "laser.x_m"};
+  return 1000;
+}
+
+static size_t many_counters(const void *self, wm_counter *out, size_t capacity) {
+  (void)self;
+  for (size_t i = 0; i < capacity && i < 1000; i++) out[i] = (wm_counter){.kind = WM_COUNTER_MAP_FULL};
+  return 1000;
+}
+
+static void health_holds_no_more_values_than_it_has_room_for(void) {
+  static wm_health health;
+  wm_estimator generous = kTiny;
+  generous.calibration = many_values;
+  generous.counters = many_counters;
+  wm_fuser_init(&fuser, &generous, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){put, NULL});
+  twist(10, 1);
+  wm_fuser_health(&fuser, &health);
+  TEST_ASSERT_EQUAL(WM_HEALTH_CALIBRATION_MAX, health.calibration_count);
+  TEST_ASSERT_EQUAL(WM_HEALTH_COUNTERS_MAX, health.counter_count);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, health.state);
+  TEST_ASSERT_EQUAL_INT64(10 * MS, health.fused_until_ns);
+  TEST_ASSERT_NULL(wm_health_counter(&health, WM_COUNTER_LANDMARKS));
+  TEST_ASSERT_NOT_NULL(wm_health_counter(&health, WM_COUNTER_MAP_FULL));
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_row_holds_the_state_after_all_events_up_to_its_stamp);
   RUN_TEST(refused_motion_makes_no_row);
   RUN_TEST(observations_are_counted_by_their_verdict);
   RUN_TEST(without_a_pose_there_is_no_row);
+  RUN_TEST(health_holds_no_more_values_than_it_has_room_for);
   RUN_TEST(ticks_drive_before_yaw_rate_before_speed_before_twists);
   return UNITY_END();
 }

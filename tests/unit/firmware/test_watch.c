@@ -62,10 +62,14 @@ static void a_message_is_read_as_it_was_sent(void) {
   health.calibration_count = 1;
   (void)snprintf(health.calibration[0].name, sizeof health.calibration[0].name, "laser.yaw_rad");
   health.calibration[0].value = 0.25;
+  health.lost_probability = 0.125;
+  health.counter_count = 1;
+  health.counters[0] = (wm_counter){WM_COUNTER_LANDMARKS_MOVED, 7, 3};
   size_t length = wm_lcm_health(&health, bytes, sizeof bytes);
   TEST_ASSERT_NULL(wm_lcm_read_health(bytes, length, &read));
   TEST_ASSERT_EQUAL_MEMORY(&health, &read, sizeof read);
   pose.now.t_ns = 5;
+  pose.now.lost_probability = 0.5;
   pose.now.covariance[7] = 0.5;
   pose.now.v_mps[0] = 1.5;
   pose.status_flags = WM_PUB_JUMPED;
@@ -79,12 +83,22 @@ static void a_message_is_read_as_it_was_sent(void) {
 static void the_view_has_pose_sources_and_what_is_left(void) {
   pose.now.pose_map_base = (wm_pose3){{12.5, -3, 0}, {0, 0, sqrt(0.5), sqrt(0.5)}};
   watch_pose(&seen, bytes, wm_lcm_pose(&pose, bytes, sizeof bytes), 10 * WM_NS_PER_S);
+  health.lost_probability = 0.25;
+  health.counter_count = 1;
+  health.counters[0] = (wm_counter){WM_COUNTER_ALIASED_POSES, -1, 3};
   (void)state_of_health();
   FILE *f = fmemopen(shown, sizeof shown, "w");
   watch_print(&seen, 10 * WM_NS_PER_S, f);
   (void)fclose(f);
-  const char *const parts[] = {"state      tracking",  "x    12.50 m", "heading    90.0 deg", "useful for 42 m",
-                               "as long as it stands", "edges:front",  "7 rejected"};
+  const char *const parts[] = {"(lost with probability 0.25)",
+                               "aliased    3 other places",
+                               "state      tracking",
+                               "x    12.50 m",
+                               "heading    90.0 deg",
+                               "useful for 42 m",
+                               "as long as it stands",
+                               "edges:front",
+                               "7 rejected"};
   for (size_t i = 0; i < sizeof parts / sizeof parts[0]; i++)
     TEST_ASSERT_NOT_NULL_MESSAGE(strstr(shown, parts[i]), shown);
 }

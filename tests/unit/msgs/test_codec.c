@@ -120,7 +120,7 @@ static void noise_never_gives_an_event_with_indices_out_of_bounds(void) {
   for (int round = 0; round < 20000; round++) {
     uint8_t bytes[128];
     for (size_t i = 0; i < sizeof bytes; i++) bytes[i] = (uint8_t)random_bits();
-    bytes[0] = (uint8_t)(3 + random_bits() % 2);
+    bytes[0] = (uint8_t)(3 + random_bits() % 3);
     bytes[1] = (uint8_t)(random_bits() % (WM_EVENT_KIND_COUNT + 2));
     if (round % 2) bytes[24] = (uint8_t)(random_bits() % 10);  // a count that may be good
     wm_event out;
@@ -147,7 +147,7 @@ static void another_version_is_refused(void) {
 }
 
 // Event logs from before sightings had elevations.
-static void the_version_before_is_read_and_has_no_elevation(void) {
+static void a_version_without_elevation_is_read(void) {
   wm_event in, out;
   fill(&in, WM_EVENT_SIGHTING);
   uint8_t bytes[WM_EVENT_ENCODED_MAX];
@@ -161,12 +161,34 @@ static void the_version_before_is_read_and_has_no_elevation(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_event_decode(bytes, length, &out, &used));
 }
 
+// Event logs from before NaN stood for every absent number.
+static void zeros_that_stood_for_absent_numbers_become_nan(void) {
+  wm_event in = {.kind = WM_EVENT_SIGHTING}, out;
+  uint8_t bytes[WM_EVENT_ENCODED_MAX];
+  size_t length = wm_event_encode(&in, bytes, sizeof bytes), used;
+  TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length, &out, &used));
+  TEST_ASSERT_EQUAL_DOUBLE(0, out.as.sighting.elevation_sigma_rad);  // today a zero is a zero
+  bytes[0] = 4;
+  TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length, &out, &used));
+  TEST_ASSERT_TRUE(isnan(out.as.sighting.elevation_sigma_rad));
+  TEST_ASSERT_FALSE(wm_sighting_has_elevation(&out.as.sighting));
+  TEST_ASSERT_EQUAL_DOUBLE(0, out.as.sighting.bearing_rad);
+
+  in = (wm_event){.kind = WM_EVENT_MARKER, .as.marker = {.yaw_sigma_rad = 0.25}};
+  length = wm_event_encode(&in, bytes, sizeof bytes);
+  bytes[0] = 4;
+  TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length, &out, &used));
+  TEST_ASSERT_TRUE(isnan(out.as.marker.along_sigma_m) && isnan(out.as.marker.edge_shift_px));
+  TEST_ASSERT_EQUAL_DOUBLE(0.25, out.as.marker.yaw_sigma_rad);
+  TEST_ASSERT_EQUAL_DOUBLE(0, out.as.marker.yaw_rad);
+}
+
 static void bytes_are_little_endian_on_every_machine(void) {
   wm_event e = {
       .t_ns = 0x0102030405060708, .arrival_ns = -1, .seq = 0x11223344, .source = 0x5566, .kind = WM_EVENT_LOOKED};
   e.as.looked.sensor = 0x7788;
   uint8_t bytes[64];
-  static const uint8_t kWanted[] = {4,    WM_EVENT_LOOKED,
+  static const uint8_t kWanted[] = {5,    WM_EVENT_LOOKED,
                                     0x66, 0x55,
                                     0x44, 0x33,
                                     0x22, 0x11,
@@ -189,6 +211,7 @@ static void a_published_pose_comes_back(void) {
   in.now.pose_map_base.q_xyzw[3] = 1;
   in.now.dof = 3;
   in.last_jump_m = random_f64();
+  in.now.lost_probability = 0.25;
   uint8_t bytes[WM_PUBLISHED_ENCODED_MAX], again[WM_PUBLISHED_ENCODED_MAX];
   size_t length = wm_published_encode(&in, bytes, sizeof bytes), used;
   TEST_ASSERT_GREATER_THAN(400, length);
@@ -197,6 +220,24 @@ static void a_published_pose_comes_back(void) {
   TEST_ASSERT_EQUAL_MEMORY(bytes, again, length);
   TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_published_decode(bytes, length - 1, &out, &used));
   TEST_ASSERT_EQUAL(0, wm_published_encode(&in, bytes, length - 1));
+}
+
+// The version before had no probability behind the estimate's state.
+static void a_published_pose_of_the_version_before_is_read(void) {
+  wm_published in = {.sent_ns = 5, .jumps = 2}, out;
+  in.now.state = WM_STATE_LOST;
+  in.now.lost_probability = 0.25;
+  uint8_t bytes[WM_PUBLISHED_ENCODED_MAX];
+  size_t length = wm_published_encode(&in, bytes, sizeof bytes), used;
+  const size_t estimate = 1 + 8 + 8 * (3 + 4 + 1 + 36 + 3 + 3) + 4 + 1 + 1;
+  memmove(bytes + estimate, bytes + estimate + 8, length - estimate - 8);
+  bytes[0] = 1;
+  TEST_ASSERT_EQUAL(WM_OK, wm_published_decode(bytes, length - 8, &out, &used));
+  TEST_ASSERT_EQUAL(length - 8, used);
+  TEST_ASSERT_TRUE(isnan(out.now.lost_probability));
+  TEST_ASSERT_EQUAL(WM_STATE_LOST, out.now.state);
+  TEST_ASSERT_EQUAL_INT64(5, out.sent_ns);
+  TEST_ASSERT_EQUAL(2, out.jumps);
 }
 
 static void an_innovation_comes_back_and_unknown_verdicts_do_not(void) {
@@ -295,9 +336,11 @@ int main(void) {
   RUN_TEST(a_cut_event_is_refused_at_every_length);
   RUN_TEST(noise_never_gives_an_event_with_indices_out_of_bounds);
   RUN_TEST(another_version_is_refused);
-  RUN_TEST(the_version_before_is_read_and_has_no_elevation);
+  RUN_TEST(a_version_without_elevation_is_read);
+  RUN_TEST(zeros_that_stood_for_absent_numbers_become_nan);
   RUN_TEST(bytes_are_little_endian_on_every_machine);
   RUN_TEST(a_published_pose_comes_back);
+  RUN_TEST(a_published_pose_of_the_version_before_is_read);
   RUN_TEST(an_innovation_comes_back_and_unknown_verdicts_do_not);
   RUN_TEST(a_setup_comes_back);
   RUN_TEST(a_rig_comes_back_and_a_cut_one_is_refused);

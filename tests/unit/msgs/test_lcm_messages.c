@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What our encoder writes, the decoders that lcm-gen makes read back.
+#include <ctype.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "unity.h"
@@ -29,6 +31,7 @@ static void a_pose_arrives_whole(void) {
   p.now.t_ns = INT64_C(1234567890123456789);
   p.now.state = WM_STATE_DEAD_RECKONING;
   p.now.dof = 3;
+  p.now.lost_probability = 0.25;
   for (int i = 0; i < 36; i++) p.now.covariance[i] = i;
   p.now.pose_map_base.q_xyzw[3] = 1;
   size_t length = wm_lcm_pose(&p, bytes, sizeof bytes);
@@ -39,6 +42,7 @@ static void a_pose_arrives_whole(void) {
   TEST_ASSERT_EQUAL(WAYMARK_POSE_T_STATE_DEAD_RECKONING, m.state);
   TEST_ASSERT_EQUAL(WAYMARK_POSE_T_STATUS_JUMPED, m.status_flags);
   TEST_ASSERT_EQUAL(3, m.jumps);
+  TEST_ASSERT_EQUAL_DOUBLE(0.25, m.lost_probability);
   TEST_ASSERT_EQUAL_DOUBLE(3, m.odom_heading_rad);
   TEST_ASSERT_EQUAL_INT64(-1, m.utc_uncertainty_ns);
   TEST_ASSERT_EQUAL(0, wm_lcm_pose(&p, bytes, length - 1));
@@ -52,6 +56,9 @@ static void health_arrives_with_its_sources(void) {
   h.sources[1].stale = 1;
   strcpy(h.calibration[0].name, "laser.yaw_rad");
   h.calibration[0].value = 0.08;
+  h.lost_probability = 0.5;
+  h.counter_count = 1;
+  h.counters[0] = (wm_counter){WM_COUNTER_LANDMARKS_MOVED, 7, 3};
   size_t length = wm_lcm_health(&h, bytes, sizeof bytes);
   TEST_ASSERT_GREATER_THAN(0, length);
   static waymark_health_t m;
@@ -61,6 +68,66 @@ static void health_arrives_with_its_sources(void) {
   TEST_ASSERT_EQUAL_INT64(5, m.sources[1].rejected[WAYMARK_INNOVATION_T_REJECTED_GATE]);
   TEST_ASSERT_EQUAL_DOUBLE(0.08, m.calibration[0].value);
   TEST_ASSERT_EQUAL_INT64(77, m.loops);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, m.lost_probability);
+  TEST_ASSERT_EQUAL(1, m.counter_count);
+  TEST_ASSERT_EQUAL(WAYMARK_COUNTER_T_LANDMARKS_MOVED, m.counters[0].kind);
+  TEST_ASSERT_EQUAL(7, m.counters[0].landmark_id);
+  TEST_ASSERT_EQUAL_INT64(3, m.counters[0].count);
+}
+
+static void the_largest_health_fits(void) {
+  static wm_health h;
+  h = (wm_health){.source_count = WM_HEALTH_SOURCES_MAX,
+                  .calibration_count = WM_HEALTH_CALIBRATION_MAX,
+                  .counter_count = WM_HEALTH_COUNTERS_MAX};
+  size_t length = wm_lcm_health(&h, bytes, sizeof bytes);
+  static wm_health read;
+  TEST_ASSERT_GREATER_THAN(0, length);
+  TEST_ASSERT_NULL(wm_lcm_read_health(bytes, length, &read));
+  TEST_ASSERT_EQUAL(WM_HEALTH_COUNTERS_MAX, read.counter_count);
+}
+
+// Senders from before NaN stood for every absent number have elevations with a sigma of 0.
+static void a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation(void) {
+  waymark_observations_t m = {.t_ns = 1, .count = 2, .elevation_sigma_rad = {0, 0.5}};
+  strcpy((char *)m.sensor, "front");
+  const int length = waymark_observations_t_encode(bytes, 0, sizeof bytes, &m);
+  char sensor[WM_NAME_MAX];
+  wm_time_ns t_ns;
+  static wm_sighting read[WM_LCM_OBSERVATIONS_MAX];
+  size_t count;
+  m.range_m[0] = m.range_m[1] = 1;
+  TEST_ASSERT_EQUAL(length, waymark_observations_t_encode(bytes, 0, sizeof bytes, &m));
+  TEST_ASSERT_NULL(wm_lcm_read_sightings(bytes, (size_t)length, sensor, &t_ns, read, &count));
+  TEST_ASSERT_EQUAL(2, count);
+  TEST_ASSERT_TRUE(isnan(read[0].elevation_sigma_rad) && !wm_sighting_has_elevation(&read[0]));
+  TEST_ASSERT_TRUE(wm_sighting_has_elevation(&read[1]));
+}
+
+// ── constants ───────────────────────────────────────────────────────────────────────────────────────────────────────
+
+// Whether a constant of this value stands in msgs/lcm/FILE: PREFIX and the name in upper case.
+static void has_constant(const char *file, const char *prefix, const char *name, unsigned value) {
+  char path[512], text[8192], wanted[100];
+  snprintf(path, sizeof path, "%s/%s", WM_LCM_DIR, file);
+  FILE *f = fopen(path, "r");
+  TEST_ASSERT_NOT_NULL_MESSAGE(f, path);
+  text[fread(text, 1, sizeof text - 1, f)] = '\0';
+  fclose(f);
+  snprintf(wanted, sizeof wanted, " %s%s = %u", prefix, name, value);
+  for (char *c = wanted; *c; c++) *c = (char)toupper((unsigned char)*c);
+  const char *at = strstr(text, wanted);
+  TEST_ASSERT_TRUE_MESSAGE(at && !isdigit((unsigned char)at[strlen(wanted)]), wanted);
+}
+
+static void every_value_of_an_enum_has_its_constant(void) {
+  for (unsigned i = 0; i < WM_RESIDUAL_COUNT; i++)
+    has_constant("innovation_t.lcm", "RESIDUAL_", wm_residual_name(i), i);
+  for (unsigned i = 0; i < WM_VERDICT_COUNT; i++)
+    has_constant("innovation_t.lcm", i == WM_FUSED ? "" : "REJECTED_", wm_verdict_name(i), i);
+  for (unsigned i = 0; i <= WM_STATE_LOST; i++) has_constant("pose_t.lcm", "STATE_", wm_state_name(i), i);
+  for (unsigned i = 0; i < WM_COUNTER_KIND_COUNT; i++) has_constant("counter_t.lcm", "", wm_counter_name(i), i);
+  TEST_ASSERT_EQUAL_STRING("?", wm_state_name(WM_STATE_LOST + 1));
 }
 
 static void an_innovation_arrives(void) {
@@ -113,6 +180,9 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_pose_arrives_whole);
   RUN_TEST(health_arrives_with_its_sources);
+  RUN_TEST(the_largest_health_fits);
+  RUN_TEST(a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation);
+  RUN_TEST(every_value_of_an_enum_has_its_constant);
   RUN_TEST(an_innovation_arrives);
   RUN_TEST(more_sightings_than_fit_are_counted);
   RUN_TEST(a_large_map_goes_in_pieces);
