@@ -25,7 +25,6 @@ constexpr double kDeadEncoderTurns = 1.0;   // a differential robot may pivot ab
 // A message whose counter skips n frames comes after n + 1 periods. Earlier than this fraction of them, its counter is
 // wrong, and so may be the rest of it. Halfway between the stamps of one lost frame and of none.
 constexpr double kSkipFraction = 0.75;
-constexpr double kShowRefusal_s = 5.0;  // longer than the health message's period
 
 constexpr uint32_t bit(int slot) { return UINT32_C(1) << slot; }
 constexpr uint32_t kCountSlots = bit(WM_Q_WHEEL_TICKS_LEFT) | bit(WM_Q_WHEEL_TICKS_RIGHT);

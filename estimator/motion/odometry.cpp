@@ -2,21 +2,10 @@
 // Dead reckoning in odom, with a short memory, for publishing between what is fused and now.
 #include <cstring>
 
-#include "math/arc.hpp"
-#include "math/rotation.hpp"
+#include "math/se2.hpp"
+#include "math/se3.hpp"
 #include "motion/front_end.hpp"
-
-namespace {
-
-// Where a twist in space began to hold, in an odometry's frame of its own.
-struct space_point {
-  wm_time_ns t_ns;
-  wm::vec3 p;
-  wm::quat q;
-  wm::vec3 v_mps, w_radps;
-};
-
-}  // namespace
+#include "motion/spatial.hpp"
 
 struct wm_odometry {
   static constexpr uint32_t kPoints = 256;                     // a power of two
@@ -27,9 +16,11 @@ struct wm_odometry {
   wm_odom_point head;  // at the last event
   wm_odom_point ring[kPoints];
   uint64_t count;
-  uint64_t before_silence;     // points when the inputs fell silent, until a count tells the way since; 0: they didn't
-  space_point space[kPoints];  // only where twists in space come
-  uint64_t space_count;
+  uint64_t before_silence;  // points when the inputs fell silent, until a count tells the way since; 0: they didn't
+  // Only where twists in space come: their history, and the pose that they add up to since the first one.
+  wm::spatial_history spatial;
+  wm_time_ns spatial_ns;  // of that pose; WM_TIME_NONE: none came
+  wm::pose3 pose_odom_base;
 };
 
 namespace {
@@ -56,82 +47,112 @@ wm_odom_point interpolate(const wm_odom_point &a, const wm_odom_point &b, wm_tim
   return out;
 }
 
-space_point carried(const space_point &from, wm_time_ns t_ns) {
-  const double dt_s = wm_seconds_between(from.t_ns, t_ns);
-  space_point out = from;
-  out.t_ns = t_ns;
-  out.p = from.p + wm::matrix_of(from.q) * (dt_s * (wm::mean_turn(dt_s * from.w_radps) * from.v_mps));
-  out.q = wm::normalized(from.q * wm::turn_by(dt_s * from.w_radps));
-  return out;
+double growth(double from, double to) { return to > from ? to - from : 0.0; }
+
+// Heading of the body's x axis seen from above.
+double heading_of(const wm::quat &q) {
+  const wm::mat3 R = wm::matrix_of(q);
+  return wm::atan2(R.m[1][0], R.m[0][0]);
 }
 
-void feed_space(wm_odometry *self, const wm_event &event) {
-  const uint64_t n = self->space_count;
-  space_point now = {event.t_ns, {0, 0, 0}, wm::kNoTurn, {}, {}};
-  if (n > 0) now = carried(self->space[(n - 1) % wm_odometry::kPoints], event.t_ns);
-  now.v_mps = wm::vec_of(event.as.twist6.v_mps);
-  now.w_radps = wm::vec_of(event.as.twist6.w_radps);
-  self->space[n % wm_odometry::kPoints] = now;
-  self->space_count = n + 1;
+// The body at a time, as seen from where it stands at the newest twist in space.
+struct spatial_point {
+  wm::pose3 pose;
+  wm::spatial_twist twist;
+  double walk_s3;  // spatial_piece, since the newest twist
+};
+
+void feed_spatial(wm_odometry *self, const wm_event &event) {
+  const wm::spatial_twist twist = {wm::vec_of(event.as.twist6.v_mps), wm::vec_of(event.as.twist6.w_radps)};
+  if (!self->spatial.feed(event.t_ns, twist)) return;
+  if (self->spatial_ns != WM_TIME_NONE)
+    self->spatial.advance(self->spatial_ns, event.t_ns, [self](const wm::spatial_piece &piece, wm_time_ns) {
+      const wm::pose3 step = wm::motion_of(piece.twist.v, piece.twist.w, piece.dt_s);
+      self->pose_odom_base = wm::compose(self->pose_odom_base, step);
+    });
+  self->spatial_ns = event.t_ns;
 }
 
-bool space_at(const wm_odometry *self, wm_time_ns t_ns, space_point *out) {
-  const uint64_t n = self->space_count, oldest = n > wm_odometry::kPoints ? n - wm_odometry::kPoints : 0;
-  for (uint64_t i = n; i > oldest; i--) {
-    const space_point &point = self->space[(i - 1) % wm_odometry::kPoints];
-    if (point.t_ns > t_ns) continue;
-    *out = carried(point, t_ns);
+// False: no twists in space, or older than they are remembered.
+bool spatial_at(const wm_odometry *self, wm_time_ns t_ns, spatial_point *out) {
+  if (self->spatial_ns == WM_TIME_NONE) return false;
+  *out = {wm::kNoMotion, self->spatial.sample(0).twist, 0.0};
+  if (t_ns > self->spatial_ns) {
+    self->spatial.walk(self->spatial_ns, t_ns, [out](const wm::spatial_piece &piece, wm_time_ns) {
+      out->pose = wm::compose(out->pose, wm::motion_of(piece.twist.v, piece.twist.w, piece.dt_s));
+      out->twist = piece.twist;
+      out->walk_s3 += piece.walk_s3;
+    });
     return true;
   }
-  return false;
+  wm::pose3 since;
+  if (!self->spatial.moved_since(wm_seconds_between(t_ns, self->spatial_ns), &since, &out->twist)) return false;
+  out->pose = wm::between(since, wm::kNoMotion);
+  return true;
 }
 
-// p' = p + R D, R' = R T: dp' = dp - R (D x r), r' = T' r, with r in the body's axes; and noise on the way.
-void carry_space(const wm_odometry *self, const space_point &from, const space_point &to, wm_estimate *out) {
-  const wm::quat start = wm::quat_of(out->pose_map_base.q_xyzw);
-  const wm::mat3 R = wm::matrix_of(start);
-  const wm::vec3 moved = wm::transposed_times(wm::matrix_of(from.q), to.p - from.p);
-  const wm::quat turned = wm::normalized(wm::conjugate(from.q) * to.q);
-  const wm::vec3 place = wm::vec_of(out->pose_map_base.p_m) + R * moved;
-  const wm::quat q = wm::normalized(start * turned);
-  const wm::mat3 lever = -1.0 * (R * wm::skew(moved)), turn = wm::transposed(wm::matrix_of(turned));
-  double f[6][6] = {}, half[6][6], carried_cov[6][6];
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) {
-      f[i][j] = i == j;
-      f[i][3 + j] = lever.m[i][j];
-      f[3 + i][3 + j] = turn.m[i][j];
-    }
+// Mean, covariance and twist of an estimate in space, carried on by the motion between two points `dt_s` apart.
+void carry_spatial(const wm_motion_params &params, const spatial_point &from, const spatial_point &to, double dt_s,
+                   wm_estimate *out) {
+  const wm::pose3 start = {wm::vec_of(out->pose_map_base.p_m), wm::quat_of(out->pose_map_base.q_xyzw)};
+  wm::matrix<6> by_start, covariance;
+  const wm::pose3 end = wm::compose(start, wm::between(from.pose, to.pose), &by_start, nullptr);
   for (int i = 0; i < 6; i++)
-    for (int j = 0; j < 6; j++) {
-      half[i][j] = 0.0;
-      for (int k = 0; k < 6; k++) half[i][j] += f[i][k] * out->covariance[wm_cov_index(k, j)];
-    }
-  for (int i = 0; i < 6; i++)
-    for (int j = i; j < 6; j++) {
-      carried_cov[i][j] = 0.0;
-      for (int k = 0; k < 6; k++) carried_cov[i][j] += half[i][k] * f[j][k];
-    }
-  const double dt_s = wm_seconds_between(from.t_ns, to.t_ns);
-  const wm_motion_params &params = self->front.params();
-  const double grown[2] = {wm::square(params.noise_speed_mps) * dt_s, wm::square(params.noise_yaw_rate_radps) * dt_s};
-  for (int i = 0; i < 6; i++)
-    for (int j = i; j < 6; j++) {
-      if (i == j && dt_s > 0.0) carried_cov[i][i] += grown[i / 3];
-      out->covariance[wm_cov_index(i, j)] = out->covariance[wm_cov_index(j, i)] = carried_cov[i][j];
-    }
-  for (int i = 0; i < 3; i++) {
-    out->pose_map_base.p_m[i] = place[i];
-    out->pose_map_base.q_xyzw[i] = q.v[i];
-    out->v_mps[i] = to.v_mps[i];
-    out->w_radps[i] = to.w_radps[i];
+    for (int j = 0; j < 6; j++) covariance(i, j) = out->covariance[wm_cov_index(i, j)];
+  covariance = wm::transformed(by_start, covariance);
+  const double walk_s3 = growth(from.walk_s3, to.walk_s3), white_s = growth(0.0, dt_s);
+  const double place_m2 = wm::square(params.noise_speed_mps) * white_s + wm::square(params.noise_hold_mps2) * walk_s3;
+  const double turn_rad2 =
+      wm::square(params.noise_yaw_rate_radps) * white_s + wm::square(params.noise_hold_radps2) * walk_s3;
+  for (int i = 0; i < 6; i++) {
+    covariance(i, i) += i < 3 ? place_m2 : turn_rad2;
+    for (int j = 0; j <= i; j++)
+      out->covariance[wm_cov_index(i, j)] = out->covariance[wm_cov_index(j, i)] = covariance(i, j);
   }
-  out->pose_map_base.q_xyzw[3] = q.w;
-  const wm::mat3 end = wm::matrix_of(q);
-  out->heading_rad = wm::atan2(end.m[1][0], end.m[0][0]);
+  for (int i = 0; i < 3; i++) {
+    out->pose_map_base.p_m[i] = end.p[i];
+    out->pose_map_base.q_xyzw[i] = end.q.v[i];
+    out->v_mps[i] = to.twist.v[i];
+    out->w_radps[i] = to.twist.w[i];
+  }
+  out->pose_map_base.q_xyzw[3] = end.q.w;
+  out->heading_rad = heading_of(end.q);
 }
 
-double growth(double from, double to) { return to > from ? to - from : 0.0; }
+// The same of an estimate in the plane.
+void carry_planar(const wm_odom_point &from, const wm_odom_point &to, wm_estimate *out) {
+  const wm_pose2 step = wm::between(from.pose_odom_base, to.pose_odom_base);
+  const wm_pose2 start = {out->pose_map_base.p_m[0], out->pose_map_base.p_m[1], out->heading_rad};
+  wm::matrix<3> by_start, covariance, noise;
+  const wm_pose2 end = wm::compose(start, step, &by_start, nullptr);
+  const int index[3] = {0, 1, 5};
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) covariance(i, j) = out->covariance[wm_cov_index(index[i], index[j])];
+  // Along and across the chord; a turn that is spread evenly over the way moves its end by half of it in the mean.
+  const double along = growth(from.along_var_m2, to.along_var_m2);
+  const double turn = growth(from.heading_var_rad2, to.heading_var_rad2);
+  const double across = growth(from.across_var_m2, to.across_var_m2);
+  const double dx = end.x_m - start.x_m, dy = end.y_m - start.y_m;
+  const wm::sin_cos h = wm::sincos(start.heading_rad + 0.5 * step.heading_rad);
+  const double xx = along * h.cos * h.cos + across * h.sin * h.sin + turn * dy * dy / 3.0;
+  const double xy = (along - across) * h.cos * h.sin - turn * dx * dy / 3.0;
+  const double yy = along * h.sin * h.sin + across * h.cos * h.cos + turn * dx * dx / 3.0;
+  const double xt = -0.5 * dy * turn, yt = 0.5 * dx * turn;
+  noise << xx, xy, xt, xy, yy, yt, xt, yt, turn;
+  covariance = wm::transformed(by_start, covariance) + noise;
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) out->covariance[wm_cov_index(index[i], index[j])] = covariance(i, j);
+
+  out->pose_map_base.p_m[0] = end.x_m;
+  out->pose_map_base.p_m[1] = end.y_m;
+  out->heading_rad = end.heading_rad;
+  const wm::sin_cos half = wm::sincos(0.5 * end.heading_rad);
+  out->pose_map_base.q_xyzw[0] = out->pose_map_base.q_xyzw[1] = 0.0;
+  out->pose_map_base.q_xyzw[2] = half.sin;
+  out->pose_map_base.q_xyzw[3] = half.cos;
+  out->v_mps[0] = to.v_mps;
+  out->w_radps[2] = to.w_radps;
+}
 
 }  // namespace
 
@@ -141,7 +162,11 @@ wm_status wm_odometry_init(wm_odometry *self, const wm_motion_params *params, co
   std::memset(static_cast<void *>(self), 0, sizeof *self);
   self->front.init(params, wheels);
   self->calibration = wm::kNeutralCalibration;
-  self->head.t_ns = WM_TIME_NONE;
+  self->head.t_ns = self->spatial_ns = WM_TIME_NONE;
+  // A twist in space holds as long as a planar one.
+  const double after_s = wm::motion_history::kOverdueS;
+  self->spatial.init({after_s, params->hold_max_s, false, params->limits_mps2, params->limits_radps2});
+  self->pose_odom_base = wm::kNoMotion;
   return WM_OK;
 }
 
@@ -154,7 +179,7 @@ wm_status wm_odometry_feed(wm_odometry *self, const wm_event *event) {
   if (status != WM_OK) return status;
   if (self->front.is_overdue(event->t_ns) && self->before_silence == 0) self->before_silence = self->count;
   self->front.feed(*event);
-  if (event->kind == WM_EVENT_TWIST6) feed_space(self, *event);
+  if (event->kind == WM_EVENT_TWIST6) feed_spatial(self, *event);
   wm_odom_point &head = self->head;
   self->front.advance(event->t_ns, self->calibration,
                       [&head](const wm::motion_stretch &piece, const wm::motion_twist &twist,
@@ -208,60 +233,18 @@ wm_status wm_odometry_carry(const wm_odometry *self, const wm_estimate *fused, w
   wm_status status = wm_odometry_at(self, fused->t_ns, &from);
   if (status == WM_OK) status = wm_odometry_at(self, t_ns, &to);
   if (status != WM_OK) return status;
-  space_point space_from, space_to;
-  if (fused->dof == 6 && space_at(self, fused->t_ns, &space_from) && space_at(self, t_ns, &space_to)) {
-    *out = *fused;
-    out->t_ns = t_ns;
-    carry_space(self, space_from, space_to, out);
-    if (odom) {
-      // Seen from above: so that map and odom move alike for a vehicle that swims sideways or noses up.
-      const wm::mat3 R = wm::matrix_of(space_to.q);
-      *odom = to;
-      odom->pose_odom_base = {space_to.p.x, space_to.p.y, wm::atan2(R.m[1][0], R.m[0][0])};
-    }
-    return WM_OK;
-  }
-  const wm_pose2 step = wm::between(from.pose_odom_base, to.pose_odom_base);
-  const wm_pose2 start = {fused->pose_map_base.p_m[0], fused->pose_map_base.p_m[1], fused->heading_rad};
-  const wm_pose2 end = wm::compose(start, step);
-  const double dx = end.x_m - start.x_m, dy = end.y_m - start.y_m;
-
   *out = *fused;
   out->t_ns = t_ns;
-  out->pose_map_base.p_m[0] = end.x_m;
-  out->pose_map_base.p_m[1] = end.y_m;
-  out->heading_rad = end.heading_rad;
-  const wm::sin_cos half = wm::sincos(0.5 * end.heading_rad);
-  out->pose_map_base.q_xyzw[0] = out->pose_map_base.q_xyzw[1] = 0.0;
-  out->pose_map_base.q_xyzw[2] = half.sin;
-  out->pose_map_base.q_xyzw[3] = half.cos;
-  out->v_mps[0] = to.v_mps;
-  out->w_radps[2] = to.w_radps;
-
-  // F = [1 0 -dy; 0 1 dx; 0 0 1]: a heading error at the start swings the way (paper, system 1, F).
-  const double *p = fused->covariance;
-  double xx = p[wm_cov_index(0, 0)], xy = p[wm_cov_index(0, 1)], yy = p[wm_cov_index(1, 1)];
-  double xt = p[wm_cov_index(0, 5)], yt = p[wm_cov_index(1, 5)], tt = p[wm_cov_index(5, 5)];
-  xx += -2.0 * dy * xt + dy * dy * tt;
-  xy += dx * xt - dy * yt - dx * dy * tt;
-  yy += 2.0 * dx * yt + dx * dx * tt;
-  xt += -dy * tt;
-  yt += dx * tt;
-  // Noise on the way: along and across the chord; a turn made evenly on the way swings what is left of it.
-  const double along = growth(from.along_var_m2, to.along_var_m2);
-  const double turn = growth(from.heading_var_rad2, to.heading_var_rad2);
-  const double across = growth(from.across_var_m2, to.across_var_m2);
-  const wm::sin_cos h = wm::sincos(start.heading_rad + 0.5 * step.heading_rad);
-  xx += along * h.cos * h.cos + across * h.sin * h.sin + turn * dy * dy / 3.0;
-  xy += (along - across) * h.cos * h.sin - turn * dx * dy / 3.0;
-  yy += along * h.sin * h.sin + across * h.cos * h.cos + turn * dx * dx / 3.0;
-  xt += -0.5 * dy * turn;
-  yt += 0.5 * dx * turn;
-  tt += turn;
-  const int index[3] = {0, 1, 5};
-  const double planar[3][3] = {{xx, xy, xt}, {xy, yy, yt}, {xt, yt, tt}};
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) out->covariance[wm_cov_index(index[i], index[j])] = planar[i][j];
   if (odom) *odom = to;
+  spatial_point spatial_from, spatial_to;
+  if (fused->dof != 6 || !spatial_at(self, fused->t_ns, &spatial_from) || !spatial_at(self, t_ns, &spatial_to)) {
+    carry_planar(from, to, out);
+    return WM_OK;
+  }
+  carry_spatial(self->front.params(), spatial_from, spatial_to, wm_seconds_between(fused->t_ns, t_ns), out);
+  if (odom) {  // seen from above, so that map and odom move alike for a vehicle that swims sideways or noses up
+    const wm::pose3 pose = wm::compose(self->pose_odom_base, spatial_to.pose);
+    odom->pose_odom_base = {pose.p.x, pose.p.y, heading_of(pose.q)};
+  }
   return WM_OK;
 }

@@ -18,6 +18,7 @@ inline constexpr double kRateMost_radps = 50.0;
 // rad/s2 allow, the largest in 35 recordings are 1.9 m/s (a late count) and 3.9 rad/s (a differentiated heading).
 inline constexpr double kSpeedStep_mps = 3.0;
 inline constexpr double kRateStep_radps = 6.0;
+inline constexpr double kShowRefusal_s = 5.0;  // in the health, whose messages come each second
 
 enum class plausibility : uint8_t { plausible, new_run, refused };
 

@@ -194,12 +194,13 @@ wm_status stereo_ekf::fuse_heading(const wm_event &event, record_list records) {
 
 // With velocity and rates as states a measured twist is six rows like any other.
 void stereo_ekf::fuse_twist(const wm_event &motion) {
-  vec3 v, w, v_var, w_var, v_slope, w_slope;
+  vec3 v_var, w_var;
+  spatial_twist now, per_s;
   motion_.sample_noise(&v_var, &w_var);
-  if (!motion_.sample_now(&v, &w, &v_slope, &w_slope)) return;
+  if (!motion_.sample_now(params_.cv_sample_at == WM_SAMPLE_AT_END, &now, &per_s)) return;
   const bool planar = motion.kind == WM_EVENT_TWIST2;
-  (void)filter_.fuse(twist_rows(kVelocity, v, v_slope, v_var, planar), limits());
-  (void)filter_.fuse(twist_rows(kRates, w, w_slope, w_var, planar), limits());
+  (void)filter_.fuse(twist_rows(kVelocity, now.v, per_s.v, v_var, planar), limits());
+  (void)filter_.fuse(twist_rows(kRates, now.w, per_s.w, w_var, planar), limits());
 }
 
 }  // namespace wm

@@ -17,6 +17,7 @@
 
 #include "math/rotation.hpp"
 #include "math/symmetric.hpp"
+#include "motion/spatial.hpp"
 #include "waymark/event.h"
 #include "waymark/pose.h"
 
@@ -99,14 +100,7 @@ struct row_verdict {
   double variance[kRank], nis[kRank], innovation[kRank];
 };
 
-// A stretch of constant twist in body axes, and the variances of what it integrates to on each axis.
-struct body_stretch {
-  double dt_s;
-  vec3 v_mps, w_radps;
-  double place_m2[3], turn_rad2[3];
-};
-
-using placed = pose3;  // body_motion's name
+using body_stretch = spatial_step;
 
 class space_filter {
  public:

@@ -32,6 +32,23 @@ void models_of(const wm_stereo_ekf_params &p, head_model out[kHeadStates]) {
   out[kVelocityLag] = out[kRateLag] = {rates ? p.twist_lag_sigma : 0.0, 0, 0};
 }
 
+// Of a measured twist, where neither the parameters nor the calibration give them.
+constexpr double kTwistSigma_mps = 0.03, kTwistSigma_radps = 0.01;
+
+double first_of(double set, double calibrated, double otherwise) {
+  if (set > 0.0) return set;
+  return finite(calibrated) && calibrated > 0.0 ? calibrated : otherwise;
+}
+
+spatial_noise twist_noise_of(const wm_stereo_ekf_params &p, const wm_rig *rig) {
+  spatial_noise out = {{}, {}, p.v_rel, p.w_rel, p.gap_v_walk, p.gap_w_walk};
+  for (int i = 0; i < 3; i++) {
+    out.v_mps[i] = first_of(p.v_mps, rig ? rig->twist6_sigma_v_mps[i] : 0.0, kTwistSigma_mps);
+    out.w_radps[i] = first_of(p.w_radps, rig ? rig->twist6_sigma_w_radps[i] : 0.0, kTwistSigma_radps);
+  }
+  return out;
+}
+
 const char *const kStateNames[kHeadStates][3] = {
     {"motion.vx_mps", "motion.vy_mps", "motion.vz_mps"},
     {"motion.wx_radps", "motion.wy_radps", "motion.wz_radps"},
@@ -75,7 +92,7 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   setup_ = &setup;
   (void)rig_.init(setup.rig, &why);
   for (int i = 0; i < 4; i++) sigma_px_[i] = params.pixel_px > 0.0 ? params.pixel_px : rig_.sigma_px[i];
-  motion_.init(setup, params);
+  motion_.init(setup.motion, &setup.wheels, twist_noise_of(params, setup.rig), params.gap_after_s);
   info_offset_ = rounded(sizeof(stereo_ekf)) + rounded(setup.landmark_count * sizeof(int));
   const size_t tail = info_offset_ + rounded((size_t)params.points_max * sizeof(point_info));
   head_model models[kHeadStates];

@@ -6,7 +6,6 @@
 
 #include "filters/core/record_list.hpp"
 #include "filters/relocalize/pose_consensus.hpp"
-#include "filters/stereo_ekf/body_motion.hpp"
 #include "filters/stereo_ekf/fit_monitor.hpp"
 #include "filters/stereo_ekf/params.h"
 #include "filters/stereo_ekf/space_filter.hpp"
@@ -114,7 +113,7 @@ class stereo_ekf {
   gates limits() const { return {params_.gate_soft, params_.gate_hard}; }
 
   space_filter filter_;
-  body_motion motion_;
+  spatial_motion motion_;
   stereo_rig rig_;
   wm_stereo_ekf_params params_;
   const wm_setup *setup_;

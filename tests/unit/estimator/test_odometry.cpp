@@ -4,6 +4,8 @@
 #include <cstring>
 
 #include "events.hpp"
+#include "math/se2.hpp"
+#include "math/se3.hpp"
 #include "motion/motion_params.h"
 #include "unity.h"
 #include "waymark/motion.h"
@@ -175,6 +177,84 @@ void test_a_pose_in_space_is_carried_in_space(void) {
   TEST_ASSERT_EQUAL_DOUBLE(out.covariance[wm_cov_index(0, 4)], out.covariance[wm_cov_index(4, 0)]);
 }
 
+void feed_six(double t_s, double v, double w) {
+  wm_event e = make::empty(t_s, WM_EVENT_TWIST6);
+  e.as.twist6 = {{v, 0, 0}, {0, 0, w}};
+  feed(e);
+}
+
+wm_estimate carried_in_space(double from_s, double to_s) {
+  wm_estimate fused{}, out{};
+  fused.t_ns = make::at(from_s);
+  fused.dof = 6;
+  fused.pose_map_base.q_xyzw[3] = 1;
+  TEST_ASSERT_EQUAL(WM_OK, wm_odometry_carry(odom, &fused, make::at(to_s), &out, nullptr));
+  return out;
+}
+
+// GIVEN twists in space WHEN they stop THEN the last one holds for hold_max_s, more and more unsure, and no longer.
+void test_a_twist_in_space_does_not_hold_for_ever(void) {
+  start(make::no_wheels());
+  for (int i = 0; i <= 10; i++) feed_six(0.1 * i, 1.0, 0.0);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.7, carried_in_space(0.5, 1.2).pose_map_base.p_m[0]);
+  const wm_estimate out = carried_in_space(0.5, 60.0);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 + params.hold_max_s, out.pose_map_base.p_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, out.v_mps[0]);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, out.covariance[wm_cov_index(1, 1)]);
+}
+
+// GIVEN 1 m/s in space WHEN 138 m/s come for 0.2 s THEN the speed holds.
+void test_a_twist_in_space_that_nothing_reaches_is_refused(void) {
+  start(make::no_wheels());
+  for (int i = 0; i <= 100; i++) feed_six(0.02 * i, i > 50 && i <= 60 ? 138.0 : 1.0, 0.0);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.5, carried_in_space(0.5, 2.0).pose_map_base.p_m[0]);
+}
+
+void test_derivatives_of_compositions(void) {
+  const wm_pose2 a = {1.0, -2.0, 0.7}, b = {0.4, 0.3, -1.1};
+  const double h = 1e-6;
+  for (bool inverse : {false, true}) {
+    const auto f = [&](const wm_pose2 &x, const wm_pose2 &y) {
+      return inverse ? wm::between(x, y) : wm::compose(x, y);
+    };
+    wm::matrix<3> by_a, by_b;
+    if (inverse)
+      wm::between(a, b, &by_a, &by_b);
+    else
+      wm::compose(a, b, &by_a, &by_b);
+    for (int k = 0; k < 6; k++) {
+      wm_pose2 up[2] = {a, b}, down[2] = {a, b};
+      const auto number = [k](wm_pose2 *p) -> double & {
+        return k % 3 == 0 ? p[k / 3].x_m : k % 3 == 1 ? p[k / 3].y_m : p[k / 3].heading_rad;
+      };
+      number(up) += h;
+      number(down) -= h;
+      const wm_pose2 u = f(up[0], up[1]), d = f(down[0], down[1]);
+      const double by[3] = {(u.x_m - d.x_m) / (2 * h), (u.y_m - d.y_m) / (2 * h),
+                            (u.heading_rad - d.heading_rad) / (2 * h)};
+      for (int i = 0; i < 3; i++) TEST_ASSERT_DOUBLE_WITHIN(1e-8, by[i], (k < 3 ? by_a : by_b)(i, k % 3));
+    }
+  }
+  const wm::pose3 p = {{1, 2, 3}, wm::turn_by({0.3, -0.4, 0.5})}, q = {{0.5, -0.2, 0.1}, wm::turn_by({-0.6, 0.2, 0.9})};
+  wm::matrix<6> by_p, by_q;
+  const wm::pose3 c = wm::compose(p, q, &by_p, &by_q);
+  for (int k = 0; k < 12; k++) {
+    const auto moved = [k](const wm::pose3 &x, double e) {
+      wm::vec3 dp = {0, 0, 0}, dr = {0, 0, 0};
+      (k % 6 < 3 ? dp : dr)[k % 3] = e;
+      return wm::pose3{x.p + dp, x.q * wm::turn_by(dr)};
+    };
+    const wm::pose3 u = k < 6 ? wm::compose(moved(p, h), q) : wm::compose(p, moved(q, h));
+    const wm::pose3 d = k < 6 ? wm::compose(moved(p, -h), q) : wm::compose(p, moved(q, -h));
+    const wm::vec3 place = (1 / (2 * h)) * (u.p - d.p), turn = (1 / (2 * h)) * wm::turn_of(wm::conjugate(d.q) * u.q);
+    for (int i = 0; i < 3; i++) {
+      TEST_ASSERT_DOUBLE_WITHIN(1e-8, place[i], (k < 6 ? by_p : by_q)(i, k % 6));
+      TEST_ASSERT_DOUBLE_WITHIN(1e-8, turn[i], (k < 6 ? by_p : by_q)(3 + i, k % 6));
+    }
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, wm::length(wm::between(p, c).p - q.p));
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_half_a_circle_by_twists);
@@ -184,5 +264,8 @@ int main(void) {
   RUN_TEST(test_carry_moves_mean_and_covariance);
   RUN_TEST(test_a_copy_continues_identically);
   RUN_TEST(test_a_pose_in_space_is_carried_in_space);
+  RUN_TEST(test_a_twist_in_space_does_not_hold_for_ever);
+  RUN_TEST(test_a_twist_in_space_that_nothing_reaches_is_refused);
+  RUN_TEST(test_derivatives_of_compositions);
   return UNITY_END();
 }

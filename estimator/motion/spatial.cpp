@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "motion/spatial.hpp"
+
+#include <cstring>
+
+namespace wm {
+namespace {
+
+constexpr double kFirstPeriod_s = 0.02;  // of a sensor that has given one sample; 50 a second
+// Of the low-pass behind a time offset's derivative. Chosen on seabed-a (offset 15 ms); not swept.
+constexpr double kSmoothing_s = 0.3;
+
+double variance_of(double sigma, double rel, double size) { return square(sigma) + square(rel * size); }
+
+// The output of a dead band of that half width: it follows its input only beyond.
+double dead_band(double output, double input, double half_width) {
+  if (input > output + half_width) return input - half_width;
+  return input < output - half_width ? input + half_width : output;
+}
+
+}  // namespace
+
+void spatial_history::init(const spatial_rules &rules) {
+  std::memset(static_cast<void *>(this), 0, sizeof *this);
+  rules_ = rules;
+  if (rules_.hold_max_s < rules_.gap_after_s) rules_.hold_max_s = rules_.gap_after_s;
+  period_s_ = kFirstPeriod_s;
+  refused_since_ns_ = last_refusal_ns_ = WM_TIME_NONE;
+}
+
+bool spatial_history::refused_lately() const {
+  return last_refusal_ns_ != WM_TIME_NONE &&
+         (samples_ == 0 || wm_seconds_between(last_refusal_ns_, sample_[0].t_ns) < kShowRefusal_s);
+}
+
+bool spatial_history::is_plausible(wm_time_ns t_ns, const spatial_twist &twist) {
+  bool plausible = true;
+  for (int i = 0; i < 3; i++) {
+    if (rules_.mps2 > 0.0)
+      plausible &= check_[i].check_level(t_ns, twist.v[i], kSpeedStep_mps, rules_.mps2) != plausibility::refused;
+    if (rules_.radps2 > 0.0)
+      plausible &= check_[3 + i].check_level(t_ns, twist.w[i], kRateStep_radps, rules_.radps2) != plausibility::refused;
+  }
+  return plausible;
+}
+
+bool spatial_history::feed(wm_time_ns t_ns, const spatial_twist &twist) {
+  if (!is_plausible(t_ns, twist)) {
+    last_refusal_ns_ = t_ns;
+    if (refused_since_ns_ == WM_TIME_NONE) refused_since_ns_ = samples_ > 0 ? sample_[0].t_ns : t_ns;
+    return false;
+  }
+  refused_since_ns_ = WM_TIME_NONE;
+  if (samples_ > 0 && t_ns > sample_[0].t_ns) {
+    const double apart_s = wm_seconds_between(sample_[0].t_ns, t_ns);
+    if (apart_s <= rules_.gap_after_s) period_s_ = apart_s;
+    sample_[2] = sample_[1];
+    sample_[1] = sample_[0];
+    if (samples_ < 3) samples_++;
+  }
+  if (samples_ == 0) samples_ = 1;
+  sample_[0] = {t_ns, twist};
+  return true;
+}
+
+double spatial_history::refused_s4(wm_time_ns from_ns, wm_time_ns to_ns) const {
+  if (refused_since_ns_ == WM_TIME_NONE) return 0.0;
+  const auto since = [this](wm_time_ns t_ns) {
+    const double s = wm_seconds_between(refused_since_ns_, t_ns);
+    return s < 0.0 ? 0.0 : s < rules_.hold_max_s ? s : rules_.hold_max_s;
+  };
+  return 0.25 * (square(square(since(to_ns))) - square(square(since(from_ns))));
+}
+
+void spatial_history::remember(const spatial_piece &piece) { piece_[pieces_++ % kPieces] = piece; }
+
+bool spatial_history::moved_since(double age_s, pose3 *out, spatial_twist *twist) const {
+  pose3 since = kNoMotion;
+  const auto prepend = [&](const spatial_twist &t, double dt) {
+    const quat turn = turn_by(dt * t.w);
+    since.p = dt * (mean_turn(dt * t.w) * t.v) + matrix_of(turn) * since.p;
+    since.q = turn * since.q;
+    if (twist) *twist = t;
+  };
+  if (twist) *twist = sample_[0].twist;
+  if (age_s < 0.0) prepend(sample_[0].twist, age_s);
+  for (uint64_t k = 0; k < kPieces && k < pieces_ && age_s > 0.0; k++) {
+    const spatial_piece &piece = piece_[(pieces_ - 1 - k) % kPieces];
+    const double dt = piece.dt_s < age_s ? piece.dt_s : age_s;
+    prepend(piece.twist, dt);
+    age_s -= dt;
+  }
+  *out = since;
+  return age_s <= 0.0;
+}
+
+void spatial_motion::init(const wm_motion_params *params, const wm_wheels *wheels, const spatial_noise &noise,
+                          double gap_after_s) {
+  std::memset(static_cast<void *>(this), 0, sizeof *this);
+  front_.init(params, wheels);
+  const wm_motion_params &p = front_.params();
+  history_.init({gap_after_s, p.hold_max_s, true, p.limits_mps2, p.limits_radps2});
+  noise_ = noise;
+}
+
+void spatial_motion::feed(const wm_event &event) {
+  spatial_twist now = {};
+  if (event.kind == WM_EVENT_TWIST6) {
+    now = {vec_of(event.as.twist6.v_mps), vec_of(event.as.twist6.w_radps)};
+  } else if (event.kind == WM_EVENT_TWIST2) {
+    now.v.x = event.as.twist2.v_mps;
+    now.w.z = event.as.twist2.w_radps;
+  } else {
+    front_.feed(event);
+    front_.advance(event.t_ns, kNeutralCalibration,
+                   [](const motion_stretch &, const motion_twist &, const motion_noise &) {});
+    const motion_twist twist = front_.twist_at(event.t_ns, kNeutralCalibration);
+    now.v.x = twist.v;
+    now.w.z = twist.w;
+  }
+  const bool first = history_.samples() == 0;
+  if (history_.feed(event.t_ns, now) && first) smooth_ = banded_ = steady_[0] = steady_[1] = now;
+}
+
+void spatial_motion::sample_noise(vec3 *v_var, vec3 *w_var) const {
+  const double speed = length(v_mps()), rate = length(w_radps());
+  for (int i = 0; i < 3; i++) {
+    (*v_var)[i] = variance_of(noise_.v_mps[i], noise_.v_rel, speed);
+    (*w_var)[i] = variance_of(noise_.w_radps[i], noise_.w_rel, rate);
+  }
+}
+
+bool spatial_motion::sample_now(bool at_end, spatial_twist *now, spatial_twist *slope) const {
+  *slope = {};
+  const int back = at_end ? 1 : 0, samples = history_.samples();
+  if (samples <= back || history_.refuses()) return false;
+  *now = history_.sample(back).twist;
+  if (samples <= back + 1) return true;
+  const spatial_twist &then = history_.sample(back + 1).twist;
+  const double per_s = 1.0 / wm_seconds_between(history_.sample(1).t_ns, history_.sample(0).t_ns);
+  *slope = {per_s * (now->v - then.v), per_s * (now->w - then.w)};
+  return true;
+}
+
+// A sample's error is the same while it holds, T, and new in the next: a white density of variance times T.
+spatial_step spatial_motion::step_of(const spatial_piece &piece) const {
+  spatial_step s = {piece.dt_s, piece.twist.v, piece.twist.w, {}, {}};
+  const double speed = length(s.v_mps), rate = length(s.w_radps);
+  const double held_s2 = s.dt_s * (s.dt_s > history_.period_s() ? s.dt_s : history_.period_s());
+  const wm_motion_params &p = front_.params();
+  for (int i = 0; i < 3; i++) {
+    s.place_m2[i] = variance_of(noise_.v_mps[i], noise_.v_rel, speed) * held_s2 +
+                    square(noise_.gap_v_walk) * piece.walk_s3 + square(p.limits_mps2) * piece.refused_s4 / 3.0;
+    s.turn_rad2[i] = variance_of(noise_.w_radps[i], noise_.w_rel, rate) * held_s2 +
+                     square(noise_.gap_w_walk) * piece.walk_s3 + square(p.limits_radps2) * piece.refused_s4 / 3.0;
+  }
+  return s;
+}
+
+void spatial_motion::smooth(const spatial_piece &piece) {
+  const double share = piece.dt_s / (piece.dt_s + kSmoothing_s);
+  smooth_.v = smooth_.v + share * (piece.twist.v - smooth_.v);
+  smooth_.w = smooth_.w + share * (piece.twist.w - smooth_.w);
+  for (int i = 0; i < 3; i++) {
+    banded_.v[i] = dead_band(banded_.v[i], smooth_.v[i], noise_.v_mps[i]);
+    banded_.w[i] = dead_band(banded_.w[i], smooth_.w[i], noise_.w_radps[i]);
+  }
+}
+
+}  // namespace wm
