@@ -161,10 +161,10 @@ void scene::drive(unsigned happens, double seconds) {
   }
 }
 
-void scene::add_motion(motion by, double t_s) {
+void scene::add_motion(motion by, double t_s, bool glitch) {
   constexpr double kRadius_m = 0.1, kTicksPerTurn = 2000;
   const truth &now = at(t_s);
-  const double v = 1.02 * now.v_mps, w = 1.01 * now.w_radps + 0.004;
+  const double v = 1.02 * now.v_mps + (glitch ? 6 : 0), w = 1.01 * now.w_radps + 0.004 + (glitch ? 20 : 0);
   if (by == motion::twist) {
     const truth &later = at(t_s + 0.05);
     wm_twist2 &twist = add(WM_EVENT_TWIST2, t_s)->as.twist2;
@@ -283,7 +283,7 @@ scene::scene(motion by, unsigned sees, unsigned happens, double seconds) {
   for (int i = 1; i * 0.05 < seconds; i++) {
     const double t = i * 0.05;
     const bool silent = (happens & kSilence) && ((t > 4 && t < 4.6) || (t > 0.6 * seconds && t < 0.6 * seconds + 3));
-    if (!silent) add_motion(by, t);
+    if (!silent) add_motion(by, t, (happens & kGlitches) && i % 60 == 50);
     const double seen_s = t + 0.001;
     if (i % 4 == 0 && (sees & (kBearings | kRanges | kMarkers))) add_sightings(sees, happens, seen_s, seconds);
     if (i % 2 == 0 && (sees & kPoints)) add_scan(happens, seen_s + 0.001);

@@ -37,6 +37,7 @@ enum happens : unsigned {
   kReflections = 1u << 8,  // edges before the walls, an obstacle
   kFewBeacons = 1u << 9,   // only two landmarks are seen
   kWrongStart = 1u << 10,  // the start pose is metres off
+  kGlitches = 1u << 11,    // single samples of the motion that no robot can follow
 };
 
 // A robot, its place and what its sensors gave. Not to be copied: the setup points into it.
@@ -61,7 +62,7 @@ class scene {
   const truth &at(double t_s) const;
   double normal() { return noise(++draws_); }
   static double noise(uint64_t number);
-  void add_motion(motion by, double t_s);
+  void add_motion(motion by, double t_s, bool glitch);
   void add_sightings(unsigned sees, unsigned happens, double t_s, double seconds);
   void add_sighting(unsigned sees, int sensor, int landmark, double t_s, bool wrong);
   void add_marker(int landmark, const double level_m[3], double yaw_rad, double t_s, bool wrong);

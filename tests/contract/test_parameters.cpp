@@ -135,7 +135,7 @@ std::vector<setting> all(std::initializer_list<std::vector<setting>> lists) {
 using drives::kBearings, drives::kRanges, drives::kElevations, drives::kNameless, drives::kPositions, drives::kHeadings,
     drives::kMarkers, drives::kPoints, drives::kRenamed;
 using drives::kCarriedOff, drives::kNoStart, drives::kSilence, drives::kOutliers, drives::kOneMoved, drives::kDepth,
-    drives::kNoMap, drives::kBlind, drives::kReflections, drives::kFewBeacons, drives::kWrongStart;
+    drives::kNoMap, drives::kBlind, drives::kReflections, drives::kFewBeacons, drives::kWrongStart, drives::kGlitches;
 
 std::vector<scenario> scenarios() {
   const unsigned kAll = kBearings | kRanges | kPositions | kHeadings;
@@ -154,6 +154,7 @@ std::vector<scenario> scenarios() {
        {{"model", 2}},
        {"states.wheel_difference"}},
       {"", "steering", motion::steering, 0, kSilence, 14, kMotionStates, {}, {"states.steering"}},
+      {"motion", "samples that no robot can follow", motion::speed_and_gyro, 0, kGlitches, 10, {}, {}},
       {"motion",
        "commands of a drive with a largest radius",
        motion::twist,
@@ -351,7 +352,7 @@ std::vector<stage> stages_of(const wm_estimator &of, std::vector<std::unique_ptr
     if (general && (takes & WM_EVENT_BIT(WM_EVENT_POINTS))) sees |= kPoints;
     add(s.name, s.params, s.moving, s.first_for, std::make_unique<drives::scene>(s.by, sees, s.happens, s.seconds));
   }
-  if (!in_space && has_own) return out;
+  if (!in_space && (has_own || !(of.takes & WM_EVENT_BIT(WM_EVENT_STEREO)))) return out;
   for (const dive_scenario &s : dive_scenarios())
     add(s.name, s.params, {}, {}, std::make_unique<drives::dive>(s.happens, s.seconds));
   return out;
