@@ -10,8 +10,6 @@ namespace wm {
 // The pose that takes `from` to `to` with the least weighted sum of squares. False: the points lie in a line, or no
 // weight is positive. Source: [Horn1987].
 bool absolute_orientation(const vec3 *from, const vec3 *to, const double *weight, int count, pose3 *out);
-// Inverse of a symmetric positive matrix by Cholesky; false where it isn't positive.
-bool invert6(const double a[6][6], double out[6][6]);
 
 }  // namespace wm
 

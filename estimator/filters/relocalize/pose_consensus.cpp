@@ -2,51 +2,58 @@
 #include "filters/relocalize/pose_consensus.hpp"
 
 #include "math/absolute_orientation.hpp"
+#include "math/eigen.hpp"
 #include "waymark/random.h"
 
 namespace wm {
 namespace {
 
+// With 40 % outliers one triple in five is clean: 100 triples miss all clean ones with a probability of 3e-11.
 constexpr int kHypotheses = 100;
-constexpr double kAgrees = 11.3;   // 99 % of three normal numbers
-constexpr double kAgreeing = 0.6;  // share of the clues that must agree
-constexpr int kFewest = 4;         // three fit always
-constexpr int kRounds = 4;
-constexpr double kWayError = 0.05;  // motion's error in parts of the way and the turn
-constexpr double kTurnError = 0.05;
+constexpr double kInlierChi2 = 11.345;  // 99 % quantile of chi2, 3 degrees of freedom
+constexpr double kInlierShare = 0.6;    // of the observations, at least, for a pose to be taken; not swept
+constexpr int kFewestInliers = 4;       // three points agree on some pose always
+constexpr int kFewestPoints = 3;        // that differ, among the inliers
+constexpr int kRounds = 4;              // of the refinement; it stops earlier where the cost no longer falls
+// Sigma of the odometry per metre travelled and per radian turned: a bad velocity log. Not swept.
+constexpr double kTravelSigma_mpm = 0.05, kTurnSigma_radprad = 0.05;
 constexpr uint64_t kStream = 0x636f6e73;
 
-struct problem {
+struct matches {
   vec3 from[pose_consensus::kCapacity], to[pose_consensus::kCapacity];
   double weight[pose_consensus::kCapacity];  // 1 / variance
-  int32_t id[pose_consensus::kCapacity];
-  int count;
+  int64_t id[pose_consensus::kCapacity];
+  int count = 0;
 };
 
-double misfit(const problem &all, int i, const pose3 &at, const mat3 &r) {
+struct hypothesis {
+  pose3 map_odom;
+  double cost = 1e300;  // sum of chi2, each clipped at kInlierChi2
+  int inliers = 0;
+};
+
+double chi2_of(const matches &all, int i, const pose3 &at, const mat3 &r) {
   const vec3 off = at.p + r * all.from[i] - all.to[i];
   return all.weight[i] * dot(off, off);
 }
 
-// Clipped sum of squares; fewer is better.
-double cost_of(const problem &all, const pose3 &at, int *agreeing) {
+hypothesis judged(const matches &all, const pose3 &at) {
   const mat3 r = matrix_of(at.q);
-  double cost = 0.0;
-  *agreeing = 0;
+  hypothesis out = {at, 0.0, 0};
   for (int i = 0; i < all.count; i++) {
-    const double chi2 = misfit(all, i, at, r);
-    cost += chi2 < kAgrees ? chi2 : kAgrees;
-    *agreeing += chi2 < kAgrees;
+    const double chi2 = chi2_of(all, i, at, r);
+    out.cost += chi2 < kInlierChi2 ? chi2 : kInlierChi2;
+    out.inliers += chi2 < kInlierChi2;
   }
-  return cost;
+  return out;
 }
 
-int differing_ids(const problem &all, const pose3 &at) {
+int differing_points(const matches &all, const pose3 &at) {
   const mat3 r = matrix_of(at.q);
-  int32_t ids[pose_consensus::kCapacity];
+  int64_t ids[pose_consensus::kCapacity];
   int count = 0;
   for (int i = 0; i < all.count; i++) {
-    if (!(misfit(all, i, at, r) < kAgrees)) continue;
+    if (!(chi2_of(all, i, at, r) < kInlierChi2)) continue;
     bool known = false;
     for (int k = 0; k < count; k++) known = known || ids[k] == all.id[i];
     if (!known) ids[count++] = all.id[i];
@@ -54,89 +61,93 @@ int differing_ids(const problem &all, const pose3 &at) {
   return count;
 }
 
-// Information of the pose (place, turn, in map axes) at `base`, from what agrees.
-bool covariance_of(const problem &all, const pose3 &at, const vec3 &base, double out[6][6]) {
-  const mat3 r = matrix_of(at.q);
-  double information[6][6] = {};
-  for (int i = 0; i < all.count; i++) {
-    if (!(misfit(all, i, at, r) < kAgrees)) continue;
-    const mat3 lever = -1.0 * skew(at.p + r * all.from[i] - base);
-    for (int a = 0; a < 6; a++)
-      for (int b = 0; b < 6; b++)
-        for (int k = 0; k < 3; k++) {
-          const double x = a < 3 ? (a == k ? 1.0 : 0.0) : lever.m[k][a - 3];
-          const double y = b < 3 ? (b == k ? 1.0 : 0.0) : lever.m[k][b - 3];
-          information[a][b] += all.weight[i] * x * y;
-        }
-  }
-  return invert6(information, out);
-}
-
-}  // namespace
-
-void pose_consensus::add(const point_clue &clue) {
-  clue_[count_ % kCapacity] = clue;
-  count_++;
-  if (count_ == 4 * kCapacity) count_ -= 2 * kCapacity;  // the index stays small; its place in the ring is the same
-}
-
-pose_found pose_consensus::find(wm_time_ns since_ns, const pose3 &odom, double way_m, double turn_rad, double sigma_m,
-                                double sigma_rad, uint64_t seed) const {
-  pose_found out{};
-  problem all;
-  all.count = 0;
-  for (int i = count_ > kCapacity ? count_ - kCapacity : 0; i < count_; i++) {
-    const point_clue &c = clue_[i % kCapacity];
-    if (c.t_ns < since_ns) continue;
-    const double far = length(c.seen - odom.p);
-    all.from[all.count] = c.seen;
-    all.to[all.count] = c.place;
-    all.id[all.count] = c.id;
-    all.weight[all.count++] = 1 / (square(c.sigma_m) + square(kWayError * (way_m - c.way_m)) +
-                                   square(kTurnError * (turn_rad - c.turn_rad) * far));
-  }
-  if (all.count < kFewest) return out;
-
-  pose3 best{};
-  double least = 1e300;
-  int agreeing = 0;
+// The best of random triples.
+hypothesis best_of_triples(const matches &all, uint64_t seed) {
+  hypothesis best;
   uint64_t draw = 0;
   for (int h = 0; h < kHypotheses; h++) {
     vec3 from[3], to[3];
     const double weight[3] = {1, 1, 1};
-    int chosen[3];
+    int64_t id[3];
     for (int k = 0; k < 3; k++) {
-      const double u = wm_random_uniform(seed, kStream, draw++);
-      chosen[k] = (int)(u * all.count);
-      from[k] = all.from[chosen[k]];
-      to[k] = all.to[chosen[k]];
+      const int chosen = (int)(wm_random_uniform(seed, kStream, draw++) * all.count);
+      from[k] = all.from[chosen];
+      to[k] = all.to[chosen];
+      id[k] = all.id[chosen];
     }
-    const int32_t a = all.id[chosen[0]], b = all.id[chosen[1]], c = all.id[chosen[2]];
-    if (a == b || b == c || a == c) continue;
     pose3 at;
-    int count;
+    if (id[0] == id[1] || id[1] == id[2] || id[0] == id[2]) continue;
     if (!absolute_orientation(from, to, weight, 3, &at)) continue;
-    const double cost = cost_of(all, at, &count);
-    if (cost >= least) continue;
-    least = cost;
-    best = at;
-    agreeing = count;
+    if (const hypothesis next = judged(all, at); next.cost < best.cost) best = next;
   }
-  for (int round = 0; round < kRounds && agreeing >= 3; round++) {
-    const mat3 r = matrix_of(best.q);
-    double weight[kCapacity];
-    for (int i = 0; i < all.count; i++) weight[i] = misfit(all, i, best, r) < kAgrees ? all.weight[i] : 0.0;
+  return best;
+}
+
+// Least squares over the inliers, again and again while the cost falls.
+void refine(const matches &all, hypothesis *best) {
+  for (int round = 0; round < kRounds && best->inliers >= 3; round++) {
+    const mat3 r = matrix_of(best->map_odom.q);
+    double weight[pose_consensus::kCapacity];
+    for (int i = 0; i < all.count; i++)
+      weight[i] = chi2_of(all, i, best->map_odom, r) < kInlierChi2 ? all.weight[i] : 0.0;
     pose3 at;
-    int count;
-    if (!absolute_orientation(all.from, all.to, weight, all.count, &at)) break;
-    if (cost_of(all, at, &count) >= least) break;
-    least = cost_of(all, at, &agreeing);
-    best = at;
+    if (!absolute_orientation(all.from, all.to, weight, all.count, &at)) return;
+    const hypothesis next = judged(all, at);
+    if (next.cost >= best->cost) return;
+    *best = next;
   }
-  if (agreeing < kFewest || agreeing < kAgreeing * all.count || differing_ids(all, best) < 3) return out;
-  const mat3 r = matrix_of(best.q);
-  out.pose = {best.p + r * odom.p, normalized(best.q * odom.q)};
-  if (!covariance_of(all, best, out.pose.p, out.covariance)) return out;
+}
+
+// Of the pose (place and rotation, map axes) at `base`, by the information of the inliers: the derivative of a point's
+// displacement is [I, -skew(lever)].
+bool covariance_of(const matches &all, const pose3 &at, const vec3 &base, double out[6][6]) {
+  const mat3 r = matrix_of(at.q);
+  matrix<6> information = matrix<6>::Zero(), covariance;
+  for (int i = 0; i < all.count; i++) {
+    if (!(chi2_of(all, i, at, r) < kInlierChi2)) continue;
+    const mat3 lever = -1.0 * skew(at.p + r * all.from[i] - base);
+    matrix<3, 6> by;
+    by.leftCols<3>().setIdentity();
+    by.rightCols<3>() = map(lever.m);
+    information += all.weight[i] * (by.transpose() * by);
+  }
+  if (!invert_positive<6>(information, &covariance)) return false;
+  for (int i = 0; i < 6; i++)
+    for (int j = 0; j < 6; j++) out[i][j] = covariance(i, j);
+  return true;
+}
+
+}  // namespace
+
+void pose_consensus::add(const point_observation &observation) {
+  observation_[count_ % kCapacity] = observation;
+  count_++;
+  if (count_ == 4 * kCapacity) count_ -= 2 * kCapacity;  // bounds the counter; the place in the ring stays
+}
+
+pose_found pose_consensus::find(wm_time_ns since_ns, const travelled_pose &now, double sigma_m, double sigma_rad,
+                                uint64_t seed) const {
+  pose_found out{};
+  matches all;
+  for (int i = count_ > kCapacity ? count_ - kCapacity : 0; i < count_; i++) {
+    const point_observation &o = observation_[i % kCapacity];
+    if (o.t_ns < since_ns) continue;
+    const double lever_m = length(o.seen - now.pose.p);
+    all.from[all.count] = o.seen;
+    all.to[all.count] = o.place;
+    all.id[all.count] = o.id;
+    all.weight[all.count++] = 1 / (square(o.sigma_m) + square(kTravelSigma_mpm * (now.travelled_m - o.travelled_m)) +
+                                   square(kTurnSigma_radprad * (now.turned_rad - o.turned_rad) * lever_m));
+  }
+  if (all.count < kFewestInliers) return out;
+  hypothesis best = best_of_triples(all, seed);
+  refine(all, &best);
+  if (best.inliers < kFewestInliers || best.inliers < kInlierShare * all.count ||
+      differing_points(all, best.map_odom) < kFewestPoints)
+    return out;
+  const pose3 &at = best.map_odom;
+  out.pose = {at.p + matrix_of(at.q) * now.pose.p, normalized(at.q * now.pose.q)};
+  if (!covariance_of(all, at, out.pose.p, out.covariance)) return out;
   double place = 0.0, turn = 0.0;
   for (int i = 0; i < 3; i++) {
     place += out.covariance[i][i];

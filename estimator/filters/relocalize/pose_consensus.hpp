@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where is the vehicle, nothing being known but places of points on the map and where stereo saw them: closed-form
-// absolute orientation with a robust consensus.
+// Relocalization in space: the pose on which most observations of known points agree, from their places on the map and
+// their measured positions alone. Absolute orientation of three points each, counted by RANSAC.
 #ifndef WAYMARK_ESTIMATOR_POSE_CONSENSUS_HPP
 #define WAYMARK_ESTIMATOR_POSE_CONSENSUS_HPP
 
@@ -9,14 +9,20 @@
 
 namespace wm {
 
-// A known point as it was seen, carried along by motion.
-struct point_clue {
+// Odometry: the pose in its own frame, and the distance and the angle travelled so far.
+struct travelled_pose {
+  pose3 pose;
+  double travelled_m, turned_rad;
+};
+
+// A buffered observation of a known point. Odometry relates it to later ones; what it travelled since adds variance.
+struct point_observation {
   wm_time_ns t_ns;
-  int64_t id;  // as wide as the rest: a copy has no bytes that nobody wrote
+  int64_t id;  // 64 bits, so that the struct has no padding and copies of a state are equal byte for byte
   vec3 seen;   // in the odometry's frame
   vec3 place;  // on the map
   double sigma_m;
-  double way_m, turn_rad;  // how far motion had come then: what came since adds to the error
+  double travelled_m, turned_rad;
 };
 
 struct pose_found {
@@ -30,16 +36,15 @@ class pose_consensus {
   static constexpr int kCapacity = 64;
 
   void clear() { count_ = 0; }
-  void add(const point_clue &clue);
-  // The pose that most of the clues since `since_ns` agree about; none where they are too few, lie in a line, or leave
-  // it less sure than the two sigmas. `odom`, `way_m`, `turn_rad`: motion until now. Random choices come from `seed`.
-  // Source: closed form by B. K. P. Horn, "Closed-form solution of absolute orientation using unit quaternions", 1987;
-  // consensus by M. A. Fischler, R. C. Bolles, 1981. Cost: 100 hypotheses over at most 64 clues, about 50 us.
-  pose_found find(wm_time_ns since_ns, const pose3 &odom, double way_m, double turn_rad, double sigma_m,
-                  double sigma_rad, uint64_t seed) const;
+  void add(const point_observation &observation);
+  // The pose that most observations since `since_ns` agree on. Not found: they are too few, lie in a line, or leave it
+  // less certain than the two sigmas. Random choices follow from `seed`. Sources: [Horn1987] [Fischler1981].
+  // Cost: 100 hypotheses over at most 64 observations, about 50 us.
+  pose_found find(wm_time_ns since_ns, const travelled_pose &now, double sigma_m, double sigma_rad,
+                  uint64_t seed) const;
 
  private:
-  point_clue clue_[kCapacity];
+  point_observation observation_[kCapacity];
   int count_;  // ever added; the newest kCapacity are kept
 };
 

@@ -127,7 +127,7 @@ wm_status stereo_ekf::fuse_known_point(const wm_event &event, int known, const w
                                        record_list records) {
   const wm_stereo &s = event.as.stereo;
   const wm_landmark &landmark = setup_->landmarks[known];
-  keep_clue(s, landmark, event.t_ns);
+  buffer_observation(s, landmark, event.t_ns);
   if (state_ == WM_STATE_SEARCHING) {
     reject(records, blank, WM_REJECTED_SEARCHING);
     search(event.t_ns - wm_ns_from_seconds(params_.recover_window_s));

@@ -46,7 +46,7 @@ void stereo_ekf::start_pose() {
   const bool vague = findable && (sigma_m > kVague_m || sigma_rad > kVague_rad);
   set_pose(pose, place ? sigma_m : kUnknownPlace_m, turn ? sigma_rad : kUnknownTurn_rad);
   monitor_.clear();
-  clues_.clear();
+  observations_.clear();
   resets_++;
   state_ = place && turn && !vague ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
 }
@@ -73,13 +73,13 @@ wm_status stereo_ekf::take_pose(const wm_event &event) {
   }
   set_pose({vec_of(p), quat_of(q)}, s.sigma_xy_m, s.sigma_heading_rad);
   monitor_.clear();
-  clues_.clear();
+  observations_.clear();
   resets_++;
   state_ = WM_STATE_TRACKING;
   return WM_OK;
 }
 
-void stereo_ekf::keep_clue(const wm_stereo &seen, const wm_landmark &landmark, wm_time_ns t_ns) {
+void stereo_ekf::buffer_observation(const wm_stereo &seen, const wm_landmark &landmark, wm_time_ns t_ns) {
   const double px[4] = {seen.left_px[0], seen.left_px[1], seen.right_px[0], seen.right_px[1]};
   vec3 x;
   double by[3][4];
@@ -90,8 +90,9 @@ void stereo_ekf::keep_clue(const wm_stereo &seen, const wm_landmark &landmark, w
   for (const auto &row : by)
     for (int k = 0; k < 4; k++) variance += square(row[k] * sigma_px_[k]);
   const vec3 in_body = rig_.place + rig_.R_base_optical * x;
-  clues_.add({t_ns, landmark.id, odom_.p + matrix_of(odom_.q) * in_body, vec_of(landmark.p_m), std::sqrt(variance),
-              way_m_, turn_rad_});
+  const pose3 &odom = odometry_.pose;
+  observations_.add({t_ns, landmark.id, odom.p + matrix_of(odom.q) * in_body, vec_of(landmark.p_m), std::sqrt(variance),
+                     odometry_.travelled_m, odometry_.turned_rad});
 }
 
 void stereo_ekf::note(wm_time_ns t_ns, int key, const row_verdict &result) {
@@ -124,7 +125,7 @@ void stereo_ekf::search(wm_time_ns since_ns) {
   if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now_ns_) < kSearchEvery_s) return;
   searched_ns_ = now_ns_;
   const pose_found found =
-      clues_.find(since_ns, odom_, way_m_, turn_rad_, params_.recover_sigma_m, params_.recover_sigma_rad, setup_->seed);
+      observations_.find(since_ns, odometry_, params_.recover_sigma_m, params_.recover_sigma_rad, setup_->seed);
   if (!found.found) return;
   filter_.restart_head();
   filter_.set_pose(found.pose, found.covariance);

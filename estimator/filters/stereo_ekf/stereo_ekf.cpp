@@ -116,7 +116,7 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   }
   now_ns_ = picture_ns_ = fused_ns_ = lost_ns_ = searched_ns_ = inflated_ns_ = WM_TIME_NONE;
   start_ns_ = setup.start.t_ns;
-  odom_ = {{0, 0, 0}, kNoTurn};
+  odometry_ = {{{0, 0, 0}, kNoTurn}, 0.0, 0.0};
   start_pose();
 }
 
@@ -145,10 +145,11 @@ void stereo_ekf::move_to(wm_time_ns t_ns) {
     const vec3 v = rates ? filter_.head3(kVelocity) : s.v_mps;
     const vec3 w = rates ? filter_.head3(kRates) : s.w_radps;
     const vec3 way = s.dt_s * (mean_turn(s.dt_s * w) * v);
-    odom_.p = odom_.p + matrix_of(odom_.q) * way;
-    odom_.q = normalized(odom_.q * turn_by(s.dt_s * w));
-    way_m_ += length(way);
-    turn_rad_ += s.dt_s * length(w);
+    pose3 &odom = odometry_.pose;
+    odom.p = odom.p + matrix_of(odom.q) * way;
+    odom.q = normalized(odom.q * turn_by(s.dt_s * w));
+    odometry_.travelled_m += length(way);
+    odometry_.turned_rad += s.dt_s * length(w);
   };
   if (constant_velocity()) {
     const double dt_s = wm_seconds_between(now_ns_, t_ns);

@@ -96,7 +96,7 @@ class stereo_ekf {
   wm_status take_pose(const wm_event &event);
   void start_pose();
   void set_pose(const pose3 &pose, double sigma_m, double sigma_rad);
-  void keep_clue(const wm_stereo &seen, const wm_landmark &landmark, wm_time_ns t_ns);
+  void buffer_observation(const wm_stereo &seen, const wm_landmark &landmark, wm_time_ns t_ns);
   void note(wm_time_ns t_ns, int key, const row_verdict &result);
   void search(wm_time_ns since_ns);
 
@@ -120,11 +120,10 @@ class stereo_ekf {
   size_t info_offset_;
   double sigma_px_[4];
   wm_time_ns now_ns_, start_ns_;
-  wm_time_ns picture_ns_;  // the picture that points are being taken of; NONE between pictures
-  pose3 odom_;             // motion alone
-  double way_m_, turn_rad_;
+  wm_time_ns picture_ns_;    // the picture that points are being taken of; NONE between pictures
+  travelled_pose odometry_;  // motion alone
   fit_monitor monitor_;
-  pose_consensus clues_;
+  pose_consensus observations_;
   wm_time_ns fused_ns_, lost_ns_, searched_ns_, inflated_ns_;
   uint32_t resets_;
   uint8_t state_;  // wm_state, without dead reckoning

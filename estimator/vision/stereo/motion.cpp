@@ -2,6 +2,7 @@
 #include "vision/stereo/motion.hpp"
 
 #include "math/absolute_orientation.hpp"
+#include "math/eigen.hpp"
 #include "waymark/random.h"
 
 namespace wm {
@@ -36,7 +37,8 @@ double cost_of(const pair_geometry &rig, const seen_twice *points, int count, co
 
 // One step of Gauss-Newton over those that agree, the residual's weight falling with its size.
 bool refine(const pair_geometry &rig, const seen_twice *points, int count, double limit, rigid *motion) {
-  double sums[6][6] = {}, right[6] = {};
+  matrix<6> sums = matrix<6>::Zero();
+  vector<6> right = vector<6>::Zero(), step;
   for (int i = 0; i < count; i++) {
     const vec3 x = *motion * points[i].before;
     pair_pixels px;
@@ -52,25 +54,17 @@ bool refine(const pair_geometry &rig, const seen_twice *points, int count, doubl
     const double weight = 1.0 / (1.0 + 9.0 * size / limit);
     for (int k = 0; k < 3; k++) {
       // x moves by the step's first three, and by the turn's cross product with x.
-      const double row[6] = {by[k][0],
-                             by[k][1],
-                             by[k][2],
-                             by[k][2] * x.y - by[k][1] * x.z,
-                             by[k][0] * x.z - by[k][2] * x.x,
-                             by[k][1] * x.x - by[k][0] * x.y};
-      for (int a = 0; a < 6; a++) {
-        right[a] += weight * row[a] * off[k];
-        for (int b = 0; b < 6; b++) sums[a][b] += weight * row[a] * row[b];
-      }
+      vector<6> row;
+      row << by[k][0], by[k][1], by[k][2], by[k][2] * x.y - by[k][1] * x.z, by[k][0] * x.z - by[k][2] * x.x,
+          by[k][1] * x.x - by[k][0] * x.y;
+      right += weight * off[k] * row;
+      sums += weight * row * row.transpose();
     }
   }
-  double inverse[6][6], step[6] = {};
-  if (!invert6(sums, inverse)) return false;
-  for (int a = 0; a < 6; a++)
-    for (int b = 0; b < 6; b++) step[a] += inverse[a][b] * right[b];
-  const mat3 turn = matrix_of(turn_by({step[3], step[4], step[5]}));
+  if (!solve_positive<6, 1>(sums, right, &step)) return false;
+  const mat3 turn = matrix_of(turn_by({step(3), step(4), step(5)}));
   motion->R = turn * motion->R;
-  motion->t = turn * motion->t + vec3{step[0], step[1], step[2]};
+  motion->t = turn * motion->t + vec3{step(0), step(1), step(2)};
   return finite(motion->t);
 }
 

@@ -3,6 +3,8 @@
 
 #include <initializer_list>
 
+#include "math/eigen.hpp"
+
 namespace wm {
 namespace {
 
@@ -57,31 +59,44 @@ int32_t sum_of(const int16_t *a, const int16_t *b) {
   return sum;
 }
 
-// Inverse of a symmetric positive matrix by Cholesky's factors; false where a direction is all but empty.
-template <int n>
-bool invert(const double a[n][n], double out[n][n]) {
-  double l[n][n] = {}, inverse[n][n] = {};
-  for (int j = 0; j < n; j++)
-    for (int i = j; i < n; i++) {
-      double sum = a[i][j];
-      for (int k = 0; k < j; k++) sum -= l[i][k] * l[j][k];
-      if (i == j) {
-        if (!(sum > kFlat * a[j][j])) return false;
-        l[j][j] = std::sqrt(sum);
-      } else {
-        l[i][j] = sum / l[j][j];
-      }
+// Inverse of a symmetric positive matrix. False: a direction has next to no contrast.
+template <int kN>
+bool invert(const double (&a)[kN][kN], double (&out)[kN][kN]) {
+  const matrix<kN> sums = map(a);
+  matrix<kN> root, inverse;
+  if (!cholesky<kN>(sums, &root)) return false;
+  for (int j = 0; j < kN; j++)
+    if (!(square(root(j, j)) > kFlat * sums(j, j))) return false;
+  if (!invert_positive<kN>(sums, &inverse)) return false;
+  map(out) = inverse;
+  return true;
+}
+
+// Grey levels of the warped patch and a border of one pixel, in eighths, by whole numbers: bilinear, places in 1/65536
+// of a pixel. False where it leaves the picture.
+bool sample_warped(const grey_plane &picture, const pixel &at, const warp2 &warp,
+                   int16_t (&source)[kSourceSide][kSourceSide]) {
+  constexpr double kOne = 65536.0;
+  constexpr int kHalf = kSourceSide / 2;
+  const auto fixed = [](double x) { return static_cast<int32_t>(std::floor(x * kOne + 0.5)); };
+  const int32_t uu = fixed(warp.uu), uv = fixed(warp.uv), vu = fixed(warp.vu), vv = fixed(warp.vv);
+  const auto whole_u = static_cast<int32_t>(std::floor(at.u)), whole_v = static_cast<int32_t>(std::floor(at.v));
+  const int32_t u0 = fixed(at.u - whole_u), v0 = fixed(at.v - whole_v);
+  for (const int i : {-kHalf, kHalf - 1})
+    for (const int j : {-kHalf, kHalf - 1}) {
+      const int32_t u = whole_u + ((u0 + uu * j + uv * i) >> 16), v = whole_v + ((v0 + vu * j + vv * i) >> 16);
+      if (u < 0 || v < 0 || u + 1 >= picture.width || v + 1 >= picture.height) return false;
     }
-  for (int j = 0; j < n; j++)
-    for (int i = j; i < n; i++) {
-      double sum = i == j ? 1.0 : 0.0;
-      for (int k = j; k < i; k++) sum -= l[i][k] * inverse[k][j];
-      inverse[i][j] = sum / l[i][i];
-    }
-  for (int i = 0; i < n; i++)
-    for (int j = 0; j < n; j++) {
-      out[i][j] = 0.0;
-      for (int k = i > j ? i : j; k < n; k++) out[i][j] += inverse[k][i] * inverse[k][j];
+  for (int i = 0; i < kSourceSide; i++)
+    for (int j = 0; j < kSourceSide; j++) {
+      const int32_t u = u0 + uu * (j - kHalf) + uv * (i - kHalf), v = v0 + vu * (j - kHalf) + vv * (i - kHalf);
+      const uint8_t *from = picture.grey +
+                            static_cast<ptrdiff_t>(whole_v + (v >> 16)) * static_cast<ptrdiff_t>(picture.width) +
+                            whole_u + (u >> 16);
+      const int32_t fx = (u >> 8) & 255, fy = (v >> 8) & 255;
+      const int32_t above = from[0] * (256 - fx) + from[1] * fx;
+      const int32_t below = from[picture.width] * (256 - fx) + from[picture.width + 1] * fx;
+      source[i][j] = static_cast<int16_t>(((above * (256 - fy) + below * fy) >> 13) - kMiddle);
     }
   return true;
 }
@@ -111,33 +126,11 @@ bool compare(const patch_template &what, const int16_t *patch, likeness *out) {
 }  // namespace
 
 bool make_template(const grey_plane &picture, const pixel &at, const warp2 &warp, patch_template *out) {
-  constexpr double kOne = 65536.0;
-  constexpr int kHalf = kSourceSide / 2;
   if (!is_near(at)) return false;
   for (const double w : {warp.uu, warp.uv, warp.vu, warp.vv})
     if (!(w > -4.0 && w < 4.0)) return false;
-  const auto fixed = [](double x) { return static_cast<int32_t>(std::floor(x * kOne + 0.5)); };
-  // Grey levels of the patch and a border of one pixel, in eighths.
   int16_t source[kSourceSide][kSourceSide];
-  const int32_t uu = fixed(warp.uu), uv = fixed(warp.uv), vu = fixed(warp.vu), vv = fixed(warp.vv);
-  const auto whole_u = static_cast<int32_t>(std::floor(at.u)), whole_v = static_cast<int32_t>(std::floor(at.v));
-  const int32_t u0 = fixed(at.u - whole_u), v0 = fixed(at.v - whole_v);
-  for (const int i : {-kHalf, kHalf - 1})
-    for (const int j : {-kHalf, kHalf - 1}) {
-      const int32_t u = whole_u + ((u0 + uu * j + uv * i) >> 16), v = whole_v + ((v0 + vu * j + vv * i) >> 16);
-      if (u < 0 || v < 0 || u + 1 >= picture.width || v + 1 >= picture.height) return false;
-    }
-  for (int i = 0; i < kSourceSide; i++)
-    for (int j = 0; j < kSourceSide; j++) {
-      const int32_t u = u0 + uu * (j - kHalf) + uv * (i - kHalf), v = v0 + vu * (j - kHalf) + vv * (i - kHalf);
-      const uint8_t *from = picture.grey +
-                            static_cast<ptrdiff_t>(whole_v + (v >> 16)) * static_cast<ptrdiff_t>(picture.width) +
-                            whole_u + (u >> 16);
-      const int32_t fx = (u >> 8) & 255, fy = (v >> 8) & 255;
-      const int32_t above = from[0] * (256 - fx) + from[1] * fx;
-      const int32_t below = from[picture.width] * (256 - fx) + from[picture.width + 1] * fx;
-      source[i][j] = static_cast<int16_t>(((above * (256 - fy) + below * fy) >> 13) - kMiddle);
-    }
+  if (!sample_warped(picture, at, warp, source)) return false;
   for (int i = 0; i < kPatch; i++)
     for (int j = 0; j < kPatch; j++) {
       const int at_pixel = i * kPatch + j;

@@ -85,13 +85,11 @@ bool anchor_by_now(const pair_geometry &rig, const track &self, const rigid &cam
   return true;
 }
 
-}  // namespace
-
-bool begin_track(const pair_geometry &rig, const pair_pictures &pictures, const wm_stereo_params &params,
-                 const pixel &at, const rigid &world_camera, track *out) {
-  // Where in the row, by pictures of half the size; then twice as fine, then with the surface's slope.
+// The first match of a corner: along the row in pictures of half the size, then aligned there. `slope`: of the
+// disparity, 0 where the patch cannot give it.
+bool first_match(const pair_pictures &pictures, const wm_stereo_params &params, const pixel &half, alignment *match,
+                 double slope[2]) {
   patch_template what;
-  const pixel half = at_level(at, 1);
   if (!make_template(pictures.left->level[1], half, kNoWarp, &what)) return false;
   const auto u = static_cast<int32_t>(std::floor(half.u + 0.5)), v = static_cast<int32_t>(std::floor(half.v + 0.5));
   const auto first = u - static_cast<int32_t>(params.disparity_max_px / 2),
@@ -100,15 +98,36 @@ bool begin_track(const pair_geometry &rig, const pair_pictures &pictures, const 
   double best, second;
   if (!search_row(what, pictures.right->level[1], first > 0 ? first : 0, last, v, &found, &best, &second)) return false;
   if (best < kPeak || second > kAlone * best) return false;
-  alignment match;
-  if (!align(what, pictures.right->level[1], {half.u + (found - u), half.v + 0.0}, kFineReach_px, kRounds, &match))
+  if (!align(what, pictures.right->level[1], {half.u + (found - u), half.v + 0.0}, kFineReach_px, kRounds, match))
     return false;
-  double slope[2] = {0, 0};
-  if (fit_slopes(what, pictures.right->level[1], match.at, slope)) {
+  slope[0] = slope[1] = 0;
+  if (fit_slopes(what, pictures.right->level[1], match->at, slope)) {
     slope[0] = -slope[0];  // right.u = left.u - disparity
     slope[1] = -slope[1];
   }
   if (!is_flat(slope)) slope[0] = slope[1] = 0;
+  return true;
+}
+
+// The picture about the corner, for later templates; pixels beyond the picture repeat its edge.
+void keep_patch(const grey_plane &picture, const pixel &at, uint8_t *patch) {
+  const auto corner_u = static_cast<int32_t>(at.u), corner_v = static_cast<int32_t>(at.v);
+  for (int i = 0; i < kAnchorSide; i++)
+    for (int j = 0; j < kAnchorSide; j++) {
+      int32_t x = corner_u + j - kAnchorSide / 2, y = corner_v + i - kAnchorSide / 2;
+      x = x < 0 ? 0 : x >= picture.width ? picture.width - 1 : x;
+      y = y < 0 ? 0 : y >= picture.height ? picture.height - 1 : y;
+      patch[i * kAnchorSide + j] = picture.grey[static_cast<ptrdiff_t>(y) * picture.width + x];
+    }
+}
+
+}  // namespace
+
+bool begin_track(const pair_geometry &rig, const pair_pictures &pictures, const wm_stereo_params &params,
+                 const pixel &at, const rigid &world_camera, track *out) {
+  alignment match;
+  double slope[2];
+  if (!first_match(pictures, params, at_level(at, 1), &match, slope)) return false;
   if (!match_right(pictures, at, slope, {2 * match.at.u, 2 * match.at.v}, &match) || !is_good(match, params))
     return false;
   if (!take_pair(rig, params, at, match.at, out)) return false;
@@ -118,15 +137,7 @@ bool begin_track(const pair_geometry &rig, const pair_pictures &pictures, const 
   out->anchor_place = out->place;
   out->anchor_surface = surface_of(rig, out->place, slope);
   out->world_anchor = world_camera;
-  const grey_plane &picture = pictures.left->level[0];
-  const auto corner_u = static_cast<int32_t>(at.u), corner_v = static_cast<int32_t>(at.v);
-  for (int i = 0; i < kAnchorSide; i++)
-    for (int j = 0; j < kAnchorSide; j++) {
-      int32_t x = corner_u + j - kAnchorSide / 2, y = corner_v + i - kAnchorSide / 2;
-      x = x < 0 ? 0 : x >= picture.width ? picture.width - 1 : x;
-      y = y < 0 ? 0 : y >= picture.height ? picture.height - 1 : y;
-      out->patch[i * kAnchorSide + j] = picture.grey[static_cast<ptrdiff_t>(y) * picture.width + x];
-    }
+  keep_patch(pictures.left->level[0], at, out->patch);
   return true;
 }
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "events.hpp"
-#include "math/absolute_orientation.hpp"
+#include "math/eigen.hpp"
 #include "math/rotation.hpp"
 #include "unity.h"
 #include "waymark/estimator.h"
@@ -158,14 +158,15 @@ struct scene {
 inline void assert_sound(const wm_estimate &e) {
   const double *q = e.pose_map_base.q_xyzw;
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  double p[6][6], inverse[6][6];
+  double p[6][6];
   for (int i = 0; i < 6; i++)
     for (int j = 0; j < 6; j++) {
       p[i][j] = e.covariance[wm_cov_index(i, j)];
       const double mirrored = e.covariance[wm_cov_index(j, i)];
       TEST_ASSERT_EQUAL_MEMORY(&mirrored, &p[i][j], sizeof mirrored);
     }
-  TEST_ASSERT_TRUE_MESSAGE(invert6(p, inverse), "the covariance is not positive");
+  matrix<6> root;
+  TEST_ASSERT_TRUE_MESSAGE(cholesky<6>(map(p), &root), "the covariance is not positive");
 }
 
 }  // namespace

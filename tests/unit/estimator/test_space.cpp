@@ -386,7 +386,7 @@ void test_orientation_is_found_with_a_third_wrong(void) {
       consensus->add({i, i, seen, place, 0.02, 0, 0});
     }
     const pose3 odom = {{1, 2, 3}, turn_by({0.3, 0.2, 0.1})};
-    const pose_found found = consensus->find(0, odom, 0, 0, 0.5, 0.25, static_cast<uint64_t>(trial));
+    const pose_found found = consensus->find(0, {odom, 0, 0}, 0.5, 0.25, static_cast<uint64_t>(trial));
     TEST_ASSERT_TRUE(found.found);
     assert_near(map_odom.p + R * odom.p, found.pose.p, 0.05);
     TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, length(turn_of(found.pose.q * conjugate(map_odom.q * odom.q))));
@@ -397,10 +397,10 @@ void test_no_orientation_of_a_line_or_of_contradictions(void) {
   auto consensus = std::make_unique<pose_consensus>();
   consensus->clear();
   for (int i = 0; i < 12; i++) consensus->add({i, i, {1.0 * i, 0, 0}, {0, 1.0 * i, 0}, 0.02, 0, 0});
-  TEST_ASSERT_FALSE(consensus->find(0, {{0, 0, 0}, kNoTurn}, 0, 0, 0.5, 0.25, 1).found);
+  TEST_ASSERT_FALSE(consensus->find(0, {{{0, 0, 0}, kNoTurn}, 0, 0}, 0.5, 0.25, 1).found);
   consensus->clear();
   for (int i = 0; i < 12; i++) consensus->add({i, i, random_vec(i), 5.0 * random_vec(100 + i), 0.02, 0, 0});
-  TEST_ASSERT_FALSE(consensus->find(0, {{0, 0, 0}, kNoTurn}, 0, 0, 0.5, 0.25, 1).found);
+  TEST_ASSERT_FALSE(consensus->find(0, {{{0, 0, 0}, kNoTurn}, 0, 0}, 0.5, 0.25, 1).found);
 }
 
 int main(void) {
