@@ -196,7 +196,10 @@ void scene::add_marker(int landmark, const double level_m[3], double yaw_rad, do
   m.p_m[0] += 0.02 * level_m[2];  // the camera leans
   m.p_m[2] -= 0.02 * level_m[0];
   m.yaw_rad = wrapped(yaw_rad + 0.01 * normal() + (wrong ? 0.8 : 0.0));
-  if (seen_ % 3 == 0) m.yaw_sigma_rad = 0.015, m.along_sigma_m = 0.01 * level_m[0];
+  const bool knows = seen_ % 3 == 0;
+  m.yaw_sigma_rad = knows ? 0.015 : static_cast<double>(NAN);
+  m.along_sigma_m = knows ? 0.01 * std::fabs(level_m[0]) : static_cast<double>(NAN);
+  m.edge_shift_px = static_cast<double>(NAN);
   if (seen_ % 4 != 1) return;
   m.poses = 2;
   std::memcpy(m.other_p_m, m.p_m, sizeof m.p_m);

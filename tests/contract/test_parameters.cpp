@@ -42,6 +42,7 @@ void add_estimate(const wm_estimate &e, trace *out) {
   out->add(e.w_radps, 3);
   out->add(e.resets);
   out->add(e.state);
+  out->add(e.lost_probability);
 }
 
 void add_record(const wm_innovation &r, trace *out) {
