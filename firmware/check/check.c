@@ -40,7 +40,10 @@ static void folder_of(const char *key, const char *path, const char *what, findi
          "%s: this user may not write into %s: %s", key, folder, what);
 }
 
+static void note_warning(void *context, const char *line) { find(context, FINDING_NOTE, "config", "", "%s", line); }
+
 void check_config(const wm_config *config, findings *out) {
+  wm_config_each_warning(config, note_warning, out);
   messages(config, out);
   folder_of("start.saved_pose", config->saved_pose, "no pose would be kept", out);
   folder_of("black_box.folder", config->black_box, "nothing would be kept", out);

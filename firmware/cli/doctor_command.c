@@ -78,6 +78,7 @@ int command_doctor(int argc, char *const *argv) {
     (void)complain(&err);
     return EXIT_USAGE;
   }
+  wm_config_each_warning(&config, print_note, NULL);
   int result = look(&config, seconds, as_json);
   wm_config_free(&config);
   return result;

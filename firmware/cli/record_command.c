@@ -72,6 +72,7 @@ int command_record(int argc, char *const *argv) {
     (void)complain(&err);
     return EXIT_USAGE;
   }
+  wm_config_each_warning(&config, print_note, NULL);
   wm_record_report report;
   wm_status status = wm_record(&config, &record, &report, &err);
   wm_config_free(&config);

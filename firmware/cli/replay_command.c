@@ -52,6 +52,7 @@ static int replay_recording(const arguments *args) {
     (void)complain(&err);
     return EXIT_USAGE;
   }
+  wm_config_each_warning(&config, print_note, NULL);
   if (args->lost) {
     config.has_initial_pose = 1;
     wm_start_init(&config.initial_pose);
@@ -129,6 +130,7 @@ static int replay_log(const arguments *args) {
                  ? wm_config_load(args->config, &config, &err)
                  : wm_config_parse_logged(head->config_text, head->config_length, head->config_path, &config, &err);
   if (status == WM_OK) {
+    wm_config_each_warning(&config, print_note, NULL);
     if (strcmp(head->program, WM_VERSION) != 0)
       (void)fprintf(stderr, "note: %s was written by waymark %s; this is %s: the last bits may differ\n", args->what,
                     head->program, WM_VERSION);

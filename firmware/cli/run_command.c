@@ -90,6 +90,7 @@ static wm_status open_all(const arguments *args, opened *out, wm_error *err) {
   memset(out, 0, sizeof *out);
   wm_status status = wm_config_load(args->config, config, err);
   if (status != WM_OK) return err->status = WM_BAD_CONFIG;  // also where it isn't there
+  wm_config_each_warning(config, print_note, NULL);
   status = override_path(config->overrides.landmarks, args->landmarks, err);
   if (status == WM_OK) status = override_path(config->overrides.calibration, args->calibration, err);
   if (status == WM_OK) status = override_path(config->overrides.map, args->map, err);

@@ -68,6 +68,7 @@ int command_stamps(int argc, char *const *argv) {
     (void)complain(&err);
     return EXIT_USAGE;
   }
+  wm_config_each_warning(&config, print_note, NULL);
   int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   for (size_t i = 0; i < config.devices.can_count; i++) {
     const char *interface = config.devices.can[i].interface;

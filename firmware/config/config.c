@@ -39,20 +39,21 @@ static wm_status read_estimator(const wm_yaml_node *root, wm_config *out, wm_err
 }
 
 // A section of an estimator that isn't chosen is checked, too: it will be chosen one day.
-static wm_status check_other_estimator(const wm_yaml_node *section, const wm_param_table *table, wm_error *err) {
+static wm_status check_other_estimator(const wm_yaml_node *section, const wm_param_table *table, wm_config *out,
+                                       wm_error *err) {
   void *scratch = malloc(table->bytes + 1);
   if (!scratch) return wm_fail(err, WM_IO, "%s: no memory to read it", wm_yaml_file(section));
   wm_params_defaults(table, scratch);
-  wm_status status = config_fill(section, table, "", scratch, err);
+  wm_status status = config_fill(section, table, "", scratch, out->warnings, err);
   free(scratch);
   return status;
 }
 
 // What each parameter allows by itself may make no sense beside another.
-static wm_status read_motion(const wm_yaml_node *section, wm_motion_params *out, wm_error *err) {
+static wm_status read_motion(const wm_yaml_node *section, wm_config *out, wm_error *err) {
   const char *key;
-  wm_status status = config_fill(section, &wm_motion_params_table, "", out, err);
-  const char *clash = status == WM_OK ? wm_motion_params_clash(out, &key) : NULL;
+  wm_status status = config_fill(section, &wm_motion_params_table, "", out->motion, out->warnings, err);
+  const char *clash = status == WM_OK ? wm_motion_params_clash(out->motion, &key) : NULL;
   if (!clash) return status;
   wm_yaml_node node = wm_yaml_get(section, key);
   if (!wm_yaml_there(&node)) node.id = section->id;  // its key is written with dots: the section's line will do
@@ -67,11 +68,11 @@ static wm_status read_sections(const wm_yaml_node *root, wm_config *out, wm_erro
     const wm_estimator *estimator = wm_estimator_find(key);
     wm_status status = WM_OK;
     if (estimator == out->estimator && estimator)
-      status = config_fill(&value, &estimator->params, "", out->estimator_params, err);
+      status = config_fill(&value, &estimator->params, "", out->estimator_params, out->warnings, err);
     else if (estimator)
-      status = check_other_estimator(&value, &estimator->params, err);
+      status = check_other_estimator(&value, &estimator->params, out, err);
     else if (strcmp(key, "motion") == 0)
-      status = read_motion(&value, out->motion, err);
+      status = read_motion(&value, out, err);
     if (status != WM_OK) return status;
   }
   return WM_OK;
@@ -90,7 +91,7 @@ static wm_status check_top(const wm_yaml_node *root, wm_config *out, wm_error *e
       if (strcmp(kGroups[g], key) != 0) continue;
       char prefix[16];
       snprintf(prefix, sizeof prefix, "%s.", key);
-      wm_status status = config_fill(&value, &wm_runtime_params_table, prefix, &out->runtime, err);
+      wm_status status = config_fill(&value, &wm_runtime_params_table, prefix, &out->runtime, out->warnings, err);
       if (status != WM_OK) return status;
       known = 1;
     }
@@ -230,4 +231,15 @@ void wm_config_free(wm_config *config) {
   config->estimator_params = NULL;
   config->motion = NULL;
   config->vision_count = 0;
+}
+
+void wm_config_each_warning(const wm_config *config, void (*say)(void *context, const char *line), void *context) {
+  char line[WM_CONFIG_WARNINGS_MAX];
+  for (const char *at = config->warnings; *at;) {
+    size_t length = strcspn(at, "\n");
+    memcpy(line, at, length);
+    line[length] = '\0';
+    say(context, line);
+    at += length + (at[length] == '\n');
+  }
 }

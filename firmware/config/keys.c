@@ -3,6 +3,7 @@
 #include "detectors.h"
 
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "waymark/text.h"
@@ -193,16 +194,30 @@ wm_status config_unknown(const wm_yaml_node *value, int line, wm_error *err) {
                  here.names);
 }
 
-static const wm_param *find(const wm_param_table *table, const char *key) {
+// Index of the parameter, or -1.
+static int find(const wm_param_table *table, const char *key) {
   for (size_t i = 0; i < table->count; i++)
-    if (strcmp(table->params[i].key, key) == 0) return &table->params[i];
+    if (strcmp(table->params[i].key, key) == 0) return (int)i;
+  return -1;
+}
+
+static const wm_param_old *find_old(const wm_param_table *table, const char *key) {
+  for (const wm_param_old *old = table->old; old && old->key; old++)
+    if (strcmp(old->key, key) == 0) return old;
   return NULL;
 }
 
+static int stands_in(const char *key, const char *group, size_t length) {
+  return strncmp(key, group, length) == 0 && key[length] == '.';
+}
+
+// Whether a key of the table, or one that it had before, stands in this group.
 static int is_group(const wm_param_table *table, const char *key) {
   size_t n = strlen(key);
   for (size_t i = 0; i < table->count; i++)
-    if (strncmp(table->params[i].key, key, n) == 0 && table->params[i].key[n] == '.') return 1;
+    if (stands_in(table->params[i].key, key, n)) return 1;
+  for (const wm_param_old *old = table->old; old && old->key; old++)
+    if (stands_in(old->key, key, n)) return 1;
   return 0;
 }
 
@@ -244,8 +259,46 @@ static wm_status read_param(const wm_yaml_node *node, const wm_param *param, voi
   return status;
 }
 
-wm_status config_fill(const wm_yaml_node *map, const wm_param_table *table, const char *prefix, void *out,
-                      wm_error *err) {
+// A section as it is read. `given` has the key by which each parameter was given: none, its own, or an old one.
+typedef struct filling {
+  const wm_param_table *table;
+  void *out;
+  char *warnings;  // WM_CONFIG_WARNINGS_MAX bytes
+  enum { NOT_GIVEN = 0, BY_ITS_KEY, BY_AN_OLD_KEY } * given;
+} filling;
+
+static void warn(char *to, const wm_yaml_node *value, int line, const char *text) {
+  size_t used = strlen(to);
+  (void)snprintf(to + used, WM_CONFIG_WARNINGS_MAX - used, "%s:%d: %s: %s\n", wm_yaml_file(value), line, value->path,
+                 text);
+}
+
+static wm_status take_param(filling *self, const wm_yaml_node *value, int index, int by, wm_error *err) {
+  const wm_param *param = &self->table->params[index];
+  if (self->given[index] != NOT_GIVEN && (by == BY_AN_OLD_KEY || self->given[index] == BY_AN_OLD_KEY))
+    return wm_yaml_fail(value, err, "'%s' is given by its old name, too; keep one of them", param->key);
+  self->given[index] = by;
+  return read_param(value, param, self->out, err);
+}
+
+// A key that the table had before.
+static wm_status take_old(filling *self, const wm_yaml_node *value, int line, const wm_param_old *old, wm_error *err) {
+  char text[400];
+  if (!old->new_key) {
+    (void)snprintf(text, sizeof text, "is no parameter any more and is ignored: %s", old->about ? old->about : "");
+    warn(self->warnings, value, line, text);
+    return WM_OK;
+  }
+  int index = find(self->table, old->new_key);
+  if (index < 0) return wm_yaml_fail(value, err, "was renamed to '%s', which is no parameter", old->new_key);
+  (void)snprintf(text, sizeof text, "is now '%.*s%s', and read as that%s%s",
+                 (int)(strlen(value->path) - strlen(old->key)), value->path, old->new_key, old->about ? "; " : "",
+                 old->about ? old->about : "");
+  warn(self->warnings, value, line, text);
+  return take_param(self, value, index, BY_AN_OLD_KEY, err);
+}
+
+static wm_status fill(filling *self, const wm_yaml_node *map, const char *prefix, wm_error *err) {
   if (wm_yaml_is_list(map) || wm_yaml_is_scalar(map))  // nothing behind the colon is an empty section
     return wm_yaml_fail(map, err, "a map of parameters (KEY: VALUE) is needed");
   for (size_t i = 0; i < wm_yaml_count(map); i++) {
@@ -254,17 +307,29 @@ wm_status config_fill(const wm_yaml_node *map, const wm_param_table *table, cons
     char key[128];
     wm_yaml_node value = wm_yaml_value(map, i, &name, &line);
     snprintf(key, sizeof key, "%s%s", prefix, name);
-    const wm_param *param = find(table, key);
+    const int index = find(self->table, key);
+    const wm_param_old *old = find_old(self->table, key);
     wm_status status = WM_OK;
-    if (param) {
-      status = read_param(&value, param, out, err);
-    } else if (is_group(table, key)) {
+    if (index >= 0) {
+      status = take_param(self, &value, index, BY_ITS_KEY, err);
+    } else if (old) {
+      status = take_old(self, &value, line, old, err);
+    } else if (is_group(self->table, key)) {
       snprintf(key, sizeof key, "%s%s.", prefix, name);
-      status = config_fill(&value, table, key, out, err);
+      status = fill(self, &value, key, err);
     } else if (!is_other_key(value.path)) {
       status = config_unknown(&value, line, err);
     }
     if (status != WM_OK) return status;
   }
   return WM_OK;
+}
+
+wm_status config_fill(const wm_yaml_node *map, const wm_param_table *table, const char *prefix, void *out,
+                      char warnings[WM_CONFIG_WARNINGS_MAX], wm_error *err) {
+  filling self = {table, out, warnings, calloc(table->count + 1, sizeof *self.given)};
+  if (!self.given) return wm_fail(err, WM_IO, "%s: no memory to read it", wm_yaml_file(map));
+  wm_status status = fill(&self, map, prefix, err);
+  free(self.given);
+  return status;
 }

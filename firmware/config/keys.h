@@ -35,9 +35,9 @@ size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]);
 // "FILE:LINE: KEY: unknown key" with the known key that was most likely meant. WM_BAD_CONFIG.
 wm_status config_unknown(const wm_yaml_node *value, int line, wm_error *err);
 
-// Reads `map`, which stands at `prefix` of the table, into `out` (which has its defaults). Every key must be the
-// table's or one of kConfigKeys, which are left alone.
+// Reads `map`, which stands at `prefix` of the table, into `out` (which has its defaults). Every key must be one of the
+// table's, one that the table had before (a warning), or one of kConfigKeys, which are left alone.
 wm_status config_fill(const wm_yaml_node *map, const wm_param_table *table, const char *prefix, void *out,
-                      wm_error *err);
+                      char warnings[WM_CONFIG_WARNINGS_MAX], wm_error *err);
 
 #endif

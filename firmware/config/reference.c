@@ -47,6 +47,16 @@ static void print_table(FILE *to, const config_section *section) {
     print_initial(to, p);
     fprintf(to, " %s |\n", p->about);
   }
+  if (!section->table->old || !section->table->old->key) return;
+  fprintf(to, "\nKeys of before, which are read with a warning:\n\n| key | now |\n| --- | --- |\n");
+  for (const wm_param_old *old = section->table->old; old->key; old++) {
+    fprintf(to, "| `%s%s` | ", section->prefix, old->key);
+    if (old->new_key)
+      fprintf(to, "`%s%s`%s%s |\n", section->prefix, old->new_key, old->about ? "; " : "",
+              old->about ? old->about : "");
+    else
+      fprintf(to, "removed: %s |\n", old->about);
+  }
 }
 
 void wm_config_reference(FILE *to) {

@@ -75,7 +75,7 @@ static wm_status read_detector(const wm_yaml_node *section, const wm_detector *d
   if (!v->params) return wm_fail(err, WM_IO, "%s: no memory to read it", wm_yaml_file(section));
   out->vision_count++;
   wm_params_defaults(&detector->params, v->params);
-  wm_status status = config_fill(section, &detector->params, "", v->params, err);
+  wm_status status = config_fill(section, &detector->params, "", v->params, out->warnings, err);
   if (status == WM_OK) status = read_classes(section, must_be_there, out, v, err);
   return status == WM_OK ? read_cameras(section, v, err) : status;
 }

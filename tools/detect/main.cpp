@@ -76,6 +76,7 @@ void detect(const Arguments &a) {
   wm_error err;
   wm_config config;
   if (wm_config_load(a.config.c_str(), &config, &err) != WM_OK) throw Failure(err.text);
+  std::fputs(config.warnings, stderr);
   const std::unique_ptr<wm_config, decltype(&wm_config_free)> config_closer(&config, wm_config_free);
   wm_recording *opened = nullptr;
   if (wm_recording_open(a.recording.c_str(), &config.overrides, nullptr, nullptr, &opened, &err) != WM_OK)

@@ -138,6 +138,7 @@ int run(const Arguments &a) {
   wm_config config{};
   wm_error error{};
   if (wm_config_load(a.config.c_str(), &config, &error) != WM_OK) throw Failure(error.text, wm::tools::kUsage);
+  std::fputs(config.warnings, stderr);
   Reliability reliability;
   bool first = true;
   for (const std::string &name : a.kinds) {

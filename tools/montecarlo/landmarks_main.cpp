@@ -140,6 +140,7 @@ int run(const Arguments &a) {
   wm_error error{};
   if (wm::sim::load_scenario(a.scenario, scenario, &error) != WM_OK) throw Failure(error.text, wm::tools::kUsage);
   if (wm_config_load(a.config.c_str(), &config, &error) != WM_OK) throw Failure(error.text, wm::tools::kUsage);
+  std::fputs(config.warnings, stderr);
   std::vector<Ordeal> wanted;
   for (const Ordeal &o : ordeals())
     if (a.kinds.empty() || std::find(a.kinds.begin(), a.kinds.end(), o.name) != a.kinds.end()) wanted.push_back(o);

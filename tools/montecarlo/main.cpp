@@ -175,6 +175,7 @@ wm_status load_and_run(const Arguments &a, wm_error *err) {
   if (a.laps) scenario.route.laps = *a.laps;
   wm_config config{};
   wm_status status = wm_config_load(a.config.c_str(), &config, err);
+  std::fputs(config.warnings, stderr);
   if (status == WM_OK)
     status = scenario.swims() ? run_and_print_six(a, scenario, config, err) : run_all(a, scenario, config, err);
   wm_config_free(&config);

@@ -71,6 +71,7 @@ int run(const Arguments &a) {
   wm_error error{};
   if (wm::sim::load_scenario(a.scenario, scenario, &error) != WM_OK) throw Failure(error.text, wm::tools::kUsage);
   if (wm_config_load(a.config.c_str(), &config, &error) != WM_OK) throw Failure(error.text, wm::tools::kUsage);
+  std::fputs(config.warnings, stderr);
   if (std::strcmp(config.estimator->name, "slam") != 0)
     throw Failure(a.config + ": estimator: is not slam", wm::tools::kUsage);
   std::printf(

@@ -73,6 +73,7 @@ typedef struct wm_runtime_params {
 } wm_runtime_params;
 extern const wm_param_table wm_runtime_params_table;
 
+#define WM_CONFIG_WARNINGS_MAX 4096
 #define WM_VISION_MAX 8
 #define WM_CONFIG_CASCADES_MAX 8
 
@@ -107,6 +108,8 @@ typedef struct wm_config {
   char saved_pose[WM_PATH_MAX];  // start.saved_pose; "": none
   char black_box[WM_PATH_MAX];   // black_box.folder; "": none
   char channel_prefix[48];       // publish.channel_prefix, "WAYMARK_"
+  // Keys that were renamed or removed: a line each, "FILE:LINE: KEY: what to do", with a line feed; "": none.
+  char warnings[WM_CONFIG_WARNINGS_MAX];
 } wm_config;
 
 // Every mistake stops with file, line, key, what is there and what is allowed ("did you mean"). Allocates.
@@ -115,6 +118,8 @@ wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_
 // As wm_config_parse, for the text in an event log: the files that it names needn't be on this computer.
 wm_status wm_config_parse_logged(const char *text, size_t length, const char *path, wm_config *out, wm_error *err);
 void wm_config_free(wm_config *config);
+// Hands each line of config->warnings, without its line feed, to `say`.
+void wm_config_each_warning(const wm_config *config, void (*say)(void *context, const char *line), void *context);
 // The settings of the source `name` ("sightings:laser" takes those of "sightings"), and its rank in the config's order.
 void wm_config_source(const wm_config *config, const char *name, wm_source_config *out, int *rank);
 // Every key with its range, default, unit and meaning as markdown, from the tables that read them.

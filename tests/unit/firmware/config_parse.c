@@ -54,6 +54,62 @@ static void defaults(void) {
   TEST_ASSERT_EQUAL(strlen(HEAD), config.text_length);
 }
 
+static void a_renamed_key_is_read_with_a_warning(void) {
+  parse(HEAD "pole_filter: {gate_sigmas: 4, states: {places: 3}, walls.weight: robust}\n");
+  TEST_ASSERT_TRUE(params()->gate == 4 && params()->slots == 3 && params()->model == 1);
+  TEST_ASSERT_EQUAL_STRING(
+      "dir/x.yaml:3: pole_filter.gate_sigmas: is now 'pole_filter.gate', and read as that\n"
+      "dir/x.yaml:3: pole_filter.states.places: is now 'pole_filter.states.slots', and read as that; at most 16 by "
+      "now\n"
+      "dir/x.yaml:3: pole_filter.walls.weight: is now 'pole_filter.model', and read as that\n",
+      config.warnings);
+  parse(HEAD "pole_filter: {gate: 4}\n");
+  TEST_ASSERT_EQUAL_STRING("", config.warnings);
+  refused(HEAD "pole_filter:\n  gate_sigmas: -4\n", "dir/x.yaml:4: pole_filter.gate_sigmas: -4 is not from 0 to 1000");
+}
+
+static void a_removed_key_is_ignored_with_a_warning(void) {
+  parse(HEAD "pole_filter:\n  walls: {image_share: any}\n");
+  TEST_ASSERT_EQUAL_STRING(
+      "dir/x.yaml:4: pole_filter.walls.image_share: is no parameter any more and is ignored: images are found by their "
+      "number.\n",
+      config.warnings);
+}
+
+static void a_key_by_old_and_new_name_is_refused(void) {
+  refused(HEAD "pole_filter:\n  gate: 4\n  gate_sigmas: 4\n",
+          "dir/x.yaml:5: pole_filter.gate_sigmas: 'gate' is given by its old name, too; keep one of them");
+  refused(HEAD "pole_filter:\n  states.places: 3\n  states: {slots: 3}\n",
+          "dir/x.yaml:5: pole_filter.states.slots: 'states.slots' is given by its old name, too; keep one of them");
+}
+
+static void keep_line(void *context, const char *line) { (void)snprintf(context, 100, "%s", line); }
+
+static void warnings_come_line_by_line(void) {
+  char last[100] = "";
+  (void)snprintf(config.warnings, sizeof config.warnings, "one\ntwo\n");
+  wm_config_each_warning(&config, keep_line, last);
+  TEST_ASSERT_EQUAL_STRING("two", last);
+}
+
+// Thousands of them: what does not fit is cut, nothing else is written.
+static void many_warnings_are_cut(void) {
+  static char text[40000] = HEAD "pole_filter:\n";
+  for (size_t used = strlen(text); used + 60 < sizeof text; used = strlen(text))
+    (void)snprintf(text + used, sizeof text - used, "  walls.image_share: %d\n", (int)used);
+  start_anew();
+  (void)wm_config_parse(text, strlen(text), "dir/x.yaml", &config, &err);
+  TEST_ASSERT_LESS_THAN(sizeof config.warnings, strlen(config.warnings));
+}
+
+// The text in an event log is read the same way.
+static void an_old_logs_configuration_is_read(void) {
+  static const char kText[] = HEAD "map: gone.yaml\npole_filter: {gate_sigmas: 4}\n";
+  start_anew();
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse_logged(kText, sizeof kText - 1, "x.yaml", &config, &err), err.text);
+  TEST_ASSERT_EQUAL_DOUBLE(4, params()->gate);
+}
+
 static void everything(void) {
   parse(HEAD
         "sources:\n  - {name: gnss, until_s: 25, from_s: -1}\n  - {name: sightings, lateness_max_ms: 300}\n"
@@ -265,6 +321,12 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(empty_sections);
   RUN_TEST(defaults);
+  RUN_TEST(a_renamed_key_is_read_with_a_warning);
+  RUN_TEST(a_removed_key_is_ignored_with_a_warning);
+  RUN_TEST(a_key_by_old_and_new_name_is_refused);
+  RUN_TEST(warnings_come_line_by_line);
+  RUN_TEST(many_warnings_are_cut);
+  RUN_TEST(an_old_logs_configuration_is_read);
   RUN_TEST(everything);
   RUN_TEST(source_settings);
   RUN_TEST(devices);

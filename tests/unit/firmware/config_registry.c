@@ -16,6 +16,13 @@ static const wm_param kParams[] = {
     {"states.deep.on", WM_PARAM_BOOL, FIELD(on), 1, 0, 1, NULL, "On."},
     {"model", WM_PARAM_ENUM, FIELD(model), 0, 0, 1, kModels, "Model."},
 };
+static const wm_param_old kOld[] = {
+    {"gate_sigmas", "gate", NULL},
+    {"states.places", "states.slots", "at most 16 by now"},
+    {"walls.weight", "model", NULL},
+    {"walls.image_share", NULL, "images are found by their number."},
+    {NULL, NULL, NULL},
+};
 static const wm_param kOtherParams[] = {
     {"window_s", WM_PARAM_F64, 0, 5.0, 0.1, 60.0, NULL, "Window, s."},
 };
@@ -33,9 +40,9 @@ const char *wm_motion_params_clash(const wm_motion_params *params, const char **
 }
 
 static const wm_estimator kPole = {
-    .name = "pole_filter", .about = "Of the test.", .params = {kParams, 5, sizeof(registry_params), NULL}};
+    .name = "pole_filter", .about = "Of the test.", .params = {kParams, 5, sizeof(registry_params), kOld}};
 static const wm_estimator kCloud = {
-    .name = "cloud_filter", .about = "Of the test.", .params = {kOtherParams, 1, sizeof(double)}};
+    .name = "cloud_filter", .about = "Of the test.", .params = {kOtherParams, 1, sizeof(double), NULL}};
 static const wm_estimator *const kAll[] = {&kPole, &kCloud};
 
 const wm_estimator *const *wm_estimators(size_t *count) {

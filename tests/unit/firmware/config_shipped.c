@@ -29,8 +29,36 @@ static void each_is_read(void) {
   TEST_ASSERT_GREATER_THAN(0, read);
 }
 
+static int is_param(const wm_param_table *table, const char *key) {
+  for (size_t i = 0; i < table->count; i++)
+    if (strcmp(table->params[i].key, key) == 0) return 1;
+  return 0;
+}
+
+static void check_old(const wm_param_table *table) {
+  for (const wm_param_old *old = table->old; old && old->key; old++) {
+    TEST_ASSERT_FALSE_MESSAGE(is_param(table, old->key), old->key);
+    TEST_ASSERT_TRUE_MESSAGE(!old->new_key || is_param(table, old->new_key), old->key);
+    TEST_ASSERT_TRUE_MESSAGE(old->new_key || old->about, old->key);
+    for (const wm_param_old *other = table->old; other < old; other++)
+      TEST_ASSERT_TRUE_MESSAGE(strcmp(other->key, old->key) != 0, old->key);
+  }
+}
+
+// An old key is no parameter; the new one is; what was removed has a reason.
+static void old_keys_lead_to_parameters(void) {
+  size_t count;
+  const wm_estimator *const *estimators = wm_estimators(&count);
+  for (size_t i = 0; i < count; i++) check_old(&estimators[i]->params);
+  const wm_detector *const *detectors = wm_detectors(&count);
+  for (size_t i = 0; i < count; i++) check_old(&detectors[i]->params);
+  check_old(&wm_motion_params_table);
+  check_old(&wm_runtime_params_table);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(each_is_read);
+  RUN_TEST(old_keys_lead_to_parameters);
   return UNITY_END();
 }
