@@ -65,7 +65,8 @@ static void a_renamed_key_is_read_with_a_warning(void) {
       config.warnings);
   parse(HEAD "pole_filter: {gate: 4}\n");
   TEST_ASSERT_EQUAL_STRING("", config.warnings);
-  refused(HEAD "pole_filter:\n  gate_sigmas: -4\n", "dir/x.yaml:4: pole_filter.gate_sigmas: -4 is not from 0 to 1000");
+  refused(HEAD "pole_filter:\n  gate_sigmas: -4\n",
+          "dir/x.yaml:4: pole_filter.gate_sigmas: '-4' is out of range; a number from 0 to 1000 is needed");
 }
 
 static void a_removed_key_is_ignored_with_a_warning(void) {
