@@ -8,7 +8,7 @@
 #include "drawn_street.h"
 #include "timing.h"
 #include "vision/landmarks/align.hpp"
-#include "vision/landmarks/everywhere.hpp"
+#include "vision/landmarks/global_search.hpp"
 
 namespace {
 
@@ -43,7 +43,7 @@ void everywhere(const drawn_street &street) {
   wm::pyramid_lay(&pyramid, kStreetWidth, kStreetHeight, levels.data());
   std::copy(street.picture.begin(), street.picture.end(), pyramid.level[0].grey);
   wm::pyramid_build(&pyramid, row.data());
-  static wm::search_everywhere search;
+  static wm::global_search search;
   wm::appearance known[kSigns];
   for (int i = 0; i < kSigns; i++) {
     looks[i].resize(wm::appearance::bytes(kSignSide, kSignSide));
@@ -96,7 +96,7 @@ void stages(const drawn_street &street) {
     const wm::vec3 point = what.place_m + wm::vec3{a * std::cos(yaw), a * std::sin(yaw), b};
     wm::project(camera.optics, wm::transposed_times(guess.R_map_optical, point - guess.eye_m), &corners[i]);
   }
-  static wm::raster drawn;
+  static wm::drawn_view drawn;
   static wm::align_work work;
   std::vector<double> times[4];
   for (int k = 0; k < kRounds; k++) {

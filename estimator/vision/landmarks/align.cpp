@@ -4,27 +4,33 @@
 namespace wm {
 namespace {
 
-constexpr int kRounds = 12;
-constexpr double kSettled_px = 0.005, kAway_px = 2.5, kStretchMax = 0.3;
-constexpr int kScaleFrom = 60, kAffineFrom = 400;  // px: fewer pixels bear fewer unknowns
+constexpr int kRounds = 12;            // Gauss-Newton steps; most landmarks settle in 4
+constexpr double kSettled_px = 0.005;  // of the last step: a tenth of sigma_px
+constexpr double kReach_px = 2.5;      // from the whole-pixel match; farther is another minimum. Not swept
+constexpr double kStretchMax = 0.3;    // of the affine warp: the prediction is better than that. Not swept
+constexpr double kScaleStepMax = 0.5;  // a step that halves the size diverges
+constexpr double kGainMin = 0.02;      // contrast of the picture over the drawn one
+constexpr double kPivotMin = 1e-5;     // of Cholesky, relative: an unknown without contrast
+constexpr int kScaleFrom_px = 60, kAffineFrom_px = 400;  // drawn pixels that determine 3 or 6 unknowns. Not swept
+constexpr int kRedundancy = 6;                           // pixels beyond the unknowns
 
-// x to a x + t, about the drawn middle.
+// x -> a x + t, about the drawn middle.
 struct affine {
   double a[2][2], t[2];
 };
 
-// Columns: landmark, 1, then by each unknown of the warp. Returns how many pixels.
-int fill(const raster &what, const pixel &middle, int unknowns, align_work *work) {
+// Design matrix: grey level, 1, and the derivatives by the warp. Returns the number of pixels.
+int fill_columns(const drawn_view &what, const pixel &middle, int unknowns, align_work *work) {
   int n = 0;
   for (int y = 1; y + 1 < what.height; y++)
     for (int x = 1; x + 1 < what.width && n < kAlignPixels; x++) {
-      const int k = y * raster::kSide + x;
-      if (!what.inside[k] || !what.inside[k - 1] || !what.inside[k + 1] || !what.inside[k - raster::kSide] ||
-          !what.inside[k + raster::kSide])
+      const int k = y * drawn_view::kSide + x;
+      if (!what.inside[k] || !what.inside[k - 1] || !what.inside[k + 1] || !what.inside[k - drawn_view::kSide] ||
+          !what.inside[k + drawn_view::kSide])
         continue;
       const float *g = what.grey + k;
       const double gu = 0.5 * static_cast<double>(g[1] - g[-1]),
-                   gv = 0.5 * static_cast<double>(g[raster::kSide] - g[-raster::kSide]);
+                   gv = 0.5 * static_cast<double>(g[drawn_view::kSide] - g[-drawn_view::kSide]);
       const double u = what.left + x - middle.u, v = what.top + y - middle.v;
       double *c = work->column[n];
       c[0] = static_cast<double>(*g);
@@ -84,14 +90,14 @@ bool grey_at(const grey_plane &picture, double u, double v, double *out) {
   return true;
 }
 
-// What of the picture the columns explain.
-struct fit {
+// Least squares fit of the columns to the picture.
+struct gain_fit {
   double x[kAlignColumns];
-  double left, variance, likeness;  // sums of squares
+  double residual, variance, likeness;  // sums of squares; normalised correlation
 };
 
-bool solve(const grey_plane &picture, const align_work &work, int n, int columns, const pixel &middle,
-           const affine &warp, const double inverse[kAlignColumns][kAlignColumns], fit *out) {
+bool fit_gain(const grey_plane &picture, const align_work &work, int n, int columns, const pixel &middle,
+              const affine &warp, const double inverse[kAlignColumns][kAlignColumns], gain_fit *out) {
   double right[kAlignColumns] = {}, sum = 0, squares = 0, own = 0, own_squares = 0;
   for (int p = 0; p < n; p++) {
     const double u = work.x[p] - middle.u, v = work.y[p] - middle.v;
@@ -113,14 +119,14 @@ bool solve(const grey_plane &picture, const align_work &work, int n, int columns
     explained += out->x[i] * right[i];
   }
   out->variance = squares - sum * sum / n;
-  out->left = larger(squares - explained, 0);
+  out->residual = larger(squares - explained, 0);
   const double own_variance = own_squares - own * own / n, together = right[0] - own * sum / n;
   if (!(out->variance > 0) || !(own_variance > 0)) return false;
   out->likeness = together / std::sqrt(out->variance * own_variance);
-  return out->x[0] > 0.02;
+  return out->x[0] > kGainMin;
 }
 
-// The warp, then back by the step that the landmark would have to go.
+// Inverse composition: the warp after the inverse of the step.
 affine composed(const affine &warp, const double *step, int unknowns) {
   double d[2][2] = {{1, 0}, {0, 1}};
   if (unknowns == 3) d[0][0] += step[2], d[1][1] += step[2];
@@ -136,32 +142,45 @@ affine composed(const affine &warp, const double *step, int unknowns) {
   return out;
 }
 
-bool align_by(int unknowns, const grey_plane &picture, const raster &what, const pixel &middle, int right, int down,
+// One round: the step by the fit at the warp, at most a pixel long. False where it diverges.
+bool improve(const grey_plane &picture, const align_work &work, int n, int unknowns, const pixel &middle,
+             const double inverse[kAlignColumns][kAlignColumns], affine *warp, gain_fit *found, double *step_px) {
+  if (!fit_gain(picture, work, n, unknowns + 2, middle, *warp, inverse, found)) return false;
+  double step[6] = {};
+  for (int i = 0; i < unknowns; i++) step[i] = found->x[2 + i] / found->x[0];
+  *step_px = std::sqrt(step[0] * step[0] + step[1] * step[1]);
+  const double shorter = *step_px > 1 ? 1 / *step_px : 1;
+  for (double &s : step) s *= shorter;
+  if (unknowns > 2 && !(std::fabs(step[2]) < kScaleStepMax)) return false;
+  *warp = composed(*warp, step, unknowns);
+  return true;
+}
+
+double stretch_of(const affine &warp) {
+  double out = 0;
+  for (int i = 0; i < 2; i++)
+    for (int j = 0; j < 2; j++) out = larger(out, std::fabs(warp.a[i][j] - (i == j ? 1 : 0)));
+  return out;
+}
+
+bool align_by(int unknowns, const grey_plane &picture, const drawn_view &what, const pixel &middle, int right, int down,
               align_work *work, aligned *out) {
   const int columns = unknowns + 2;
-  const int n = fill(what, middle, unknowns, work);
+  const int n = fill_columns(what, middle, unknowns, work);
   double inverse[kAlignColumns][kAlignColumns];
-  if (n < columns + 6 || !invert(*work, n, columns, inverse)) return false;
+  if (n < columns + kRedundancy || !invert(*work, n, columns, inverse)) return false;
   affine warp = {{{1, 0}, {0, 1}}, {static_cast<double>(right), static_cast<double>(down)}};
-  fit found{};
+  gain_fit found{};
   bool settled = false;
   for (int round = 0; round < kRounds && !settled; round++) {
-    if (!solve(picture, *work, n, columns, middle, warp, inverse, &found)) return false;
-    double step[6] = {};
-    for (int i = 0; i < unknowns; i++) step[i] = found.x[2 + i] / found.x[0];
-    const double size = std::sqrt(step[0] * step[0] + step[1] * step[1]), shorter = size > 1 ? 1 / size : 1;
-    for (double &s : step) s *= shorter;
-    if (unknowns > 2 && !(std::fabs(step[2]) < 0.5)) return false;
-    warp = composed(warp, step, unknowns);
-    settled = size < kSettled_px;
-    if (!(std::fabs(warp.t[0] - right) < kAway_px) || !(std::fabs(warp.t[1] - down) < kAway_px)) return false;
+    double step_px;
+    if (!improve(picture, *work, n, unknowns, middle, inverse, &warp, &found, &step_px)) return false;
+    settled = step_px < kSettled_px;
+    if (!(std::fabs(warp.t[0] - right) < kReach_px) || !(std::fabs(warp.t[1] - down) < kReach_px)) return false;
   }
-  if (!settled) return false;
-  out->stretch = 0;
-  for (int i = 0; i < 2; i++)
-    for (int j = 0; j < 2; j++) out->stretch = larger(out->stretch, std::fabs(warp.a[i][j] - (i == j ? 1 : 0)));
-  if (!(out->stretch < kStretchMax)) return false;
-  const double noise = found.left / (n - columns) / (found.x[0] * found.x[0]);
+  out->stretch = stretch_of(warp);
+  if (!settled || !(out->stretch < kStretchMax)) return false;
+  const double noise = found.residual / (n - columns) / (found.x[0] * found.x[0]);
   out->wider = warp.a[0][0];
   out->taller = warp.a[1][1];
   out->middle = {middle.u + warp.t[0], middle.v + warp.t[1]};
@@ -174,10 +193,10 @@ bool align_by(int unknowns, const grey_plane &picture, const raster &what, const
 
 }  // namespace
 
-bool align_landmark(const grey_plane &picture, const raster &what, const pixel &middle, int right, int down,
+bool align_landmark(const grey_plane &picture, const drawn_view &what, const pixel &middle, int right, int down,
                     align_work *work, aligned *out) {
   const auto by = [&](int unknowns) { return align_by(unknowns, picture, what, middle, right, down, work, out); };
-  return (what.count >= kAffineFrom && by(6)) || (what.count >= kScaleFrom && by(3)) || by(2);
+  return (what.count >= kAffineFrom_px && by(6)) || (what.count >= kScaleFrom_px && by(3)) || by(2);
 }
 
 }  // namespace wm

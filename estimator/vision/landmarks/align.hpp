@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A drawn landmark's place in the picture to a part of a pixel: inverse compositional alignment (S. Baker, I. Matthews
-// 2004) of shift, scale or all of an affine warp, with brightness and contrast free.
+// Sub-pixel place of a drawn landmark in the picture: inverse compositional alignment (S. Baker, I. Matthews 2004) of a
+// shift, a shift with scale, or an affine warp; brightness and contrast are free.
 #ifndef WAYMARK_ESTIMATOR_VISION_ALIGN_HPP
 #define WAYMARK_ESTIMATOR_VISION_ALIGN_HPP
 
@@ -9,9 +9,8 @@
 
 namespace wm {
 
-inline constexpr int kAlignColumns = 8;  // contrast, brightness, and up to six of the warp
-
-inline constexpr int kAlignPixels = 4096;
+inline constexpr int kAlignColumns = 8;    // contrast, brightness, and up to six of the warp
+inline constexpr int kAlignPixels = 4096;  // twice the pixels a landmark is drawn with (kAreaMax_px2)
 
 struct align_work {
   double column[kAlignPixels][kAlignColumns];
@@ -20,15 +19,15 @@ struct align_work {
 
 struct aligned {
   pixel middle;          // in pixels of the level
-  double uu, uv, vv;     // its covariance by the fit's residuals alone, px2 of the level
+  double uu, uv, vv;     // its covariance by the fit's residuals, px^2 of the level
   double likeness;       // normalised correlation there
-  double stretch;        // how far the warp is from none
-  double wider, taller;  // how many times the drawn width and height it has
+  double stretch;        // largest element of the warp's matrix minus identity
+  double wider, taller;  // scale of width and height against the drawn ones
 };
 
-// `middle` is where the landmark's middle was drawn, `right` and `down` whole pixels from there to begin at. False
-// where it doesn't settle, or leaves the picture or the neighbourhood.
-bool align_landmark(const grey_plane &picture, const raster &what, const pixel &middle, int right, int down,
+// `middle` is the drawn middle of the landmark, `right` and `down` the initial shift in whole pixels. False where the
+// iteration does not settle, or leaves the picture or the neighbourhood.
+bool align_landmark(const grey_plane &picture, const drawn_view &what, const pixel &middle, int right, int down,
                     align_work *work, aligned *out);
 
 }  // namespace wm

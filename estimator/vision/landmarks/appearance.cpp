@@ -6,13 +6,14 @@
 namespace wm {
 namespace {
 
-constexpr int kSamplesMin = 3, kSamplesMax = 8;  // a pixel, along each axis
+constexpr int kSamplesMin = 3, kSamplesMax = 8;  // per pixel and axis: against aliasing of a slanted picture
+constexpr double kFootprintMax = 1.4;            // learnt pixels per sample, above which a smaller size is read
 
 struct picture_size {
   int columns, rows;
 };
 
-// Sizes of the halved pictures that are kept, the first one with sides of at most kSideMax.
+// Sizes of the pyramid, the first one with sides of at most kSideMax.
 int kept_sizes(uint32_t width_px, uint32_t height_px, int *skipped, picture_size out[appearance::kSizes]) {
   int columns = static_cast<int>(width_px), rows = static_cast<int>(height_px);
   *skipped = 0;
@@ -42,7 +43,7 @@ void shrink(const uint8_t *from, int stride, const picture_size &from_size, int 
     }
 }
 
-// A ray's place in the learnt picture at full kept size; false beside it.
+// A ray's place in the learnt picture at its largest size. False beside it.
 struct picture_place {
   double x, y;
 };
@@ -55,11 +56,11 @@ bool place_of(const appearance &what, const mat3 &plane, const vec3 &ray, pictur
 }
 
 struct sampling {
-  int across, down;  // samples a pixel
-  int size;          // of the learnt picture's
+  int across, down;  // samples per pixel
+  int size;          // of the learnt pyramid
 };
 
-// As many samples that the learnt picture is neither read too coarsely nor blurred along the axis that isn't slanted.
+// Number of samples and size of the pyramid: neither aliased along the slanted axis nor blurred along the other one.
 sampling sampling_at(const appearance &what, const mat3 &plane, const ray_table &rays, const pixel &at,
                      double step_px) {
   picture_place here{}, right{}, below{};
@@ -75,12 +76,12 @@ sampling sampling_at(const appearance &what, const mat3 &plane, const ray_table 
   };
   sampling out = {samples(u), samples(v), 0};
   double footprint = larger(u / out.across, v / out.down);
-  for (; footprint > 1.4 && out.size + 1 < what.sizes; footprint *= 0.5) out.size++;
+  for (; footprint > kFootprintMax && out.size + 1 < what.sizes; footprint *= 0.5) out.size++;
   return out;
 }
 
-// By 1-2-1 of the pyramid below this level, and the lens; the samples are spread over a pixel already. In pixels of the
-// level, squared.
+// Variance of the blur by the pyramid's 1-2-1 filters below this level and by the lens, px^2 of the level. The box
+// average over a pixel (1/12) is in the samples already.
 double blur_variance(int level, double blur_px) {
   double halving = 0, shrunk = 1;
   for (int i = 0; i < level; i++) halving = 0.25 * (halving + 0.5), shrunk *= 0.25;
@@ -88,9 +89,9 @@ double blur_variance(int level, double blur_px) {
   return larger(missing, 0);
 }
 
-// Smooths rows, then columns, by (a, 1 - 2a, a) over what is inside.
-void smooth(double a, raster *r) {
-  const auto at = [](int x, int y) { return y * raster::kSide + x; };
+// Smooths rows, then columns, by (a, 1 - 2a, a) over the pixels inside.
+void smooth(double a, drawn_view *r) {
+  const auto at = [](int x, int y) { return y * drawn_view::kSide + x; };
   const auto one = [&](const float *from, float *to, int x, int y, int step, bool before, bool after) {
     const int k = at(x, y);
     if (!r->inside[k]) return;
@@ -102,15 +103,15 @@ void smooth(double a, raster *r) {
   for (int y = 0; y < r->height; y++)
     for (int x = 0; x < r->width; x++) one(r->grey, r->work, x, y, 1, x > 0, x + 1 < r->width);
   for (int y = 0; y < r->height; y++)
-    for (int x = 0; x < r->width; x++) one(r->work, r->grey, x, y, raster::kSide, y > 0, y + 1 < r->height);
+    for (int x = 0; x < r->width; x++) one(r->work, r->grey, x, y, drawn_view::kSide, y > 0, y + 1 < r->height);
 }
 
-// Mean and spread of the grey levels, and the integers that the search works with.
-void finish(raster *r) {
+// Standard deviation of the grey levels, and their integers for the search.
+void finish(drawn_view *r) {
   double sum = 0, squares = 0;
   for (int y = 0; y < r->height; y++)
     for (int x = 0; x < r->width; x++) {
-      const int k = y * raster::kSide + x;
+      const int k = y * drawn_view::kSide + x;
       if (!r->inside[k]) continue;
       sum += static_cast<double>(r->grey[k]);
       squares += square(static_cast<double>(r->grey[k]));
@@ -120,7 +121,7 @@ void finish(raster *r) {
   r->energy = 0;
   for (int y = 0; y < r->height; y++)
     for (int x = 0; x < r->width; x++) {
-      const int k = y * raster::kSide + x;
+      const int k = y * drawn_view::kSide + x;
       if (!r->inside[k]) continue;
       r->level[k] = static_cast<int16_t>(std::floor(4 * (static_cast<double>(r->grey[k]) - mean) + 0.5));
       r->energy += r->level[k] * r->level[k];
@@ -195,9 +196,10 @@ bool view_panel(const appearance &what, const mat3 &R_map_optical, const vec3 &e
   return true;
 }
 
-bool draw(const appearance &what, const panel_view &view, const ray_table &rays, const pixel corners[4], int level,
-          double blur_px, raster *out) {
-  const double step = 1 << level;
+namespace {
+
+// Bounding box of the corners in pixels of the level; its middle in pixels of the picture. False: larger than kSide.
+bool frame_view(const pixel corners[4], double step, drawn_view *out, pixel *middle) {
   double u0 = corners[0].u, u1 = u0, v0 = corners[0].v, v1 = v0;
   for (int i = 1; i < 4; i++) {
     u0 = corners[i].u < u0 ? corners[i].u : u0;
@@ -209,27 +211,40 @@ bool draw(const appearance &what, const panel_view &view, const ray_table &rays,
   out->top = static_cast<int>(std::floor(v0 / step));
   out->width = static_cast<int>(std::floor(u1 / step)) + 2 - out->left;
   out->height = static_cast<int>(std::floor(v1 / step)) + 2 - out->top;
-  if (out->width > raster::kSide || out->height > raster::kSide) return false;
+  *middle = {0.5 * (u0 + u1), 0.5 * (v0 + v1)};
+  return out->width <= drawn_view::kSide && out->height <= drawn_view::kSide;
+}
+
+// Mean over the samples of pixel (x, y) of the level. False where one of them is beside the landmark.
+bool sample_pixel(const appearance &what, const mat3 &plane, const ray_table &rays, const sampling &by, int x, int y,
+                  double step, float *out) {
+  double sum = 0;
+  for (int i = 0; i < by.down; i++)
+    for (int j = 0; j < by.across; j++) {
+      picture_place at;
+      const double u = (x + (j + 0.5) / by.across - 0.5) * step, v = (y + (i + 0.5) / by.down - 0.5) * step;
+      if (!place_of(what, plane, rays.at(u, v), &at)) return false;
+      sum += grey_of(what, by.size, at.x, at.y);
+    }
+  *out = static_cast<float>(sum / (by.across * by.down));
+  return true;
+}
+
+}  // namespace
+
+bool draw(const appearance &what, const panel_view &view, const ray_table &rays, const pixel corners[4], int level,
+          double blur_px, drawn_view *out) {
+  const double step = 1 << level;
+  pixel middle;
+  if (!frame_view(corners, step, out, &middle)) return false;
   std::memset(out->level, 0, sizeof out->level);
   std::memset(out->inside, 0, sizeof out->inside);
-  const pixel middle = {0.5 * (u0 + u1), 0.5 * (v0 + v1)};
   const sampling by = sampling_at(what, view.plane, rays, middle, step);
   out->count = 0;
   for (int y = 0; y < out->height; y++)
     for (int x = 0; x < out->width; x++) {
-      double sum = 0;
-      bool whole = true;
-      for (int i = 0; i < by.down && whole; i++)
-        for (int j = 0; j < by.across && whole; j++) {
-          picture_place at;
-          const double u = (out->left + x + (j + 0.5) / by.across - 0.5) * step,
-                       v = (out->top + y + (i + 0.5) / by.down - 0.5) * step;
-          whole = place_of(what, view.plane, rays.at(u, v), &at);
-          if (whole) sum += grey_of(what, by.size, at.x, at.y);
-        }
-      if (!whole) continue;
-      const int k = y * raster::kSide + x;
-      out->grey[k] = static_cast<float>(sum / (by.across * by.down));
+      const int k = y * drawn_view::kSide + x;
+      if (!sample_pixel(what, view.plane, rays, by, out->left + x, out->top + y, step, &out->grey[k])) continue;
       out->inside[k] = -1;
       out->count++;
     }

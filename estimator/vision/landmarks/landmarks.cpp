@@ -31,8 +31,8 @@ struct remembered {
 };
 
 struct landmarks_state {
-  looker eye;
-  search_everywhere search;
+  matcher eye;
+  global_search search;
   bool steep;
   wm_time_ns readout_ns;
   wm_time_ns found_ns;   // when the pose last led to a landmark
@@ -69,7 +69,7 @@ size_t lay_out(landmarks_state *state, const wm_landmarks_params &params, const 
   auto *row = memory.take<uint16_t>(camera.width_px);
   auto *scores = memory.take<float>(static_cast<size_t>(kReachSide) * kReachSide);
   size_t count = 0;
-  search_everywhere search{};
+  global_search search{};
   for (size_t i = 0; i < view.appearance_count; i++) {
     const wm_appearance &a = view.appearances[i];
     if (!is_usable(view, a)) continue;
@@ -139,8 +139,8 @@ double elevation_of(const landmarks_state &self, const vec3 &ray) {
   return sensor_elevation(self.eye.camera, self.steep, ray);
 }
 
-bool put(const landmarks_state &self, const wm_frame &frame, const camera_guess &guess, const candidate &one,
-         const sight &seen, wm_event *out) {
+bool put(const landmarks_state &self, const wm_frame &frame, const camera_guess &guess, const expected_view &one,
+         const landmark_match &seen, wm_event *out) {
   constexpr double kStep_px = 0.5;
   vec3 ray, right, left, below, above;
   if (!unproject(self.eye.camera.optics, seen.at, &ray) ||
@@ -193,7 +193,7 @@ size_t best_in_order(wm_event *events, double *likeness, size_t count) {
   return kept;
 }
 
-double middle_of(double *values, size_t count) {
+double median_of(double *values, size_t count) {
   for (size_t i = 1; i < count; i++)
     for (size_t k = i; k > 0 && values[k - 1] > values[k]; k--) {
       const double swapped = values[k];
@@ -205,8 +205,8 @@ double middle_of(double *values, size_t count) {
 
 // A turned camera moves all landmarks of a picture alike, a wrong place each by its distance: who is elsewhere than the
 // others say was taken for something else. Returns how many stay.
-size_t drop_strays(landmarks_state *self, camera_guess guess, const int *which, wm_event *events, double *likeness,
-                   size_t count) {
+size_t reject_outliers(landmarks_state *self, camera_guess guess, const int *which, wm_event *events, double *likeness,
+                       size_t count) {
   constexpr size_t kOpinions = 4;
   constexpr double kSigmas = 4, kLens_px = 2.5;  // a lens that isn't as calibrated moves them unlike
   if (count < kOpinions) return count;
@@ -217,7 +217,7 @@ size_t drop_strays(landmarks_state *self, camera_guess guess, const int *which, 
   };
   for (int axis = 0; axis < 2; axis++) {
     for (size_t i = 0; i < count; i++) values[i] = moved(i, axis);
-    common[axis] = middle_of(values, count);
+    common[axis] = median_of(values, count);
   }
   for (double *row : {guess.cov[0], guess.cov[1], guess.cov[2]}) row[2] = 0;
   guess.cov[2][0] = guess.cov[2][1] = 0;
@@ -251,21 +251,21 @@ struct found_list {
   int which[kFoundMax];
 };
 
-void forget_looks(landmarks_state *self) {
+void clear_looks(landmarks_state *self) {
   for (int i = 0; i < self->count; i++)
     self->looks[i] = {self->known[i].id, WM_LOOK_UNCERTAIN, {kNan, kNan}, {kNan, kNan}, kNan};
 }
 
-// Looks where a pose says that the landmarks are, at those that have so many pixels. `believed` as of look_for.
-void look_by(landmarks_state *self, const wm_frame &frame, const camera_guess &guess, bool believed, double area_px2,
-             found_list *out) {
+// Looks where a pose says that the landmarks are, at those that have so many pixels. `believed` as of match_landmark.
+void match_by(landmarks_state *self, const wm_frame &frame, const camera_guess &guess, bool believed, double area_px2,
+              found_list *out) {
   const wm_landmarks_params &params = self->eye.params;
   out->count = 0;
   for (int i = 0; i < self->count; i++) {
     const appearance &what = self->known[i];
     wm_looked_for &look = self->looks[i];
     look = {what.id, WM_LOOK_UNCERTAIN, {kNan, kNan}, {kNan, kNan}, kNan};
-    candidate one;
+    expected_view one;
     look.look = static_cast<uint8_t>(expect_landmark(self->eye, guess, what, kAreaMax, &one));
     if (look.look == WM_LOOK_FOUND && one.area_px2 < area_px2) look.look = WM_LOOK_TOO_SMALL;
     if (look.look != WM_LOOK_FOUND) continue;
@@ -274,11 +274,11 @@ void look_by(landmarks_state *self, const wm_frame &frame, const camera_guess &g
     double across_px, down_px;
     expected_spread(self->eye.camera, guess, what, params.mounting_sigma_rad, &across_px, &down_px);
     const double sigmas = params.window_sigmas;
-    sight seen;
-    look.look =
-        static_cast<uint8_t>(larger(across_px, down_px) * sigmas > params.window_max_px
-                                 ? WM_LOOK_UNCERTAIN
-                                 : look_for(&self->eye, one, sigmas * across_px, sigmas * down_px, believed, &seen));
+    landmark_match seen;
+    look.look = static_cast<uint8_t>(
+        larger(across_px, down_px) * sigmas > params.window_max_px
+            ? WM_LOOK_UNCERTAIN
+            : match_landmark(&self->eye, one, sigmas * across_px, sigmas * down_px, believed, &seen));
     if (look.look != WM_LOOK_UNCERTAIN) look.likeness = seen.likeness;
     if (look.look != WM_LOOK_FOUND || out->count == out->capacity || out->count == kFoundMax) continue;
     if (!put(*self, frame, guess, one, seen, &out->events[out->count])) continue;
@@ -287,11 +287,11 @@ void look_by(landmarks_state *self, const wm_frame &frame, const camera_guess &g
     out->which[out->count] = i;
     out->likeness[out->count++] = seen.likeness;
   }
-  out->count = drop_strays(self, guess, out->which, out->events, out->likeness, out->count);
+  out->count = reject_outliers(self, guess, out->which, out->events, out->likeness, out->count);
 }
 
 // Whether what was found bears the pose out: a wrong pose finds one thing or another that looks like what it expects.
-bool is_led(const landmarks_state &self, const found_list &found) {
+bool bears_out(const landmarks_state &self, const found_list &found) {
   size_t expected = 0;
   for (int i = 0; i < self.count; i++) expected += wm_look_is_expected(self.looks[i].look) != 0;
   return found.count > 0 && kFewOf * found.count >= expected;
@@ -305,7 +305,7 @@ double time_of(const landmarks_state &self, wm_time_ns t_ns) {
 }
 
 // Where the camera is by what was recognised in a picture before, carried on as the robot moves.
-bool carry_place(const landmarks_state &self, const wm_estimate *prediction, wm_time_ns t_ns, camera_guess *out) {
+bool carry_recognised(const landmarks_state &self, const wm_estimate *prediction, wm_time_ns t_ns, camera_guess *out) {
   const remembered &before = self.place;
   if (!prediction || before.t_ns == WM_TIME_NONE) return false;
   const double dt_s = wm_seconds_between(before.t_ns, t_ns);
@@ -316,7 +316,8 @@ bool carry_place(const landmarks_state &self, const wm_estimate *prediction, wm_
   return finite(out->eye_m) && finite(out->cov[0][0]) && finite(out->cov[2][2]);
 }
 
-void remember_place(landmarks_state *self, const wm_estimate *prediction, wm_time_ns t_ns, const camera_guess &guess) {
+void store_recognised(landmarks_state *self, const wm_estimate *prediction, wm_time_ns t_ns,
+                      const camera_guess &guess) {
   self->place.t_ns = prediction ? t_ns : WM_TIME_NONE;
   if (!prediction) return;
   self->place.guess = guess;
@@ -326,15 +327,15 @@ void remember_place(landmarks_state *self, const wm_estimate *prediction, wm_tim
 
 // Looks everywhere for the landmarks whose turn it is; one that is recognised says where the others are, in this
 // picture and in the next one.
-void look_everywhere(landmarks_state *self, const wm_frame &frame, const wm_estimate *prediction, found_list *out) {
-  search_everywhere &search = self->search;
+void search_all(landmarks_state *self, const wm_frame &frame, const wm_estimate *prediction, found_list *out) {
+  global_search &search = self->search;
   const wm_landmarks_params &params = self->eye.params;
   camera_guess best, carried;
   size_t most = 0;
-  if (carry_place(*self, prediction, frame.t_ns, &carried)) {
-    look_by(self, frame, carried, true, params.search_area_px2, out);
+  if (carry_recognised(*self, prediction, frame.t_ns, &carried)) {
+    match_by(self, frame, carried, true, params.search_area_px2, out);
     best = carried;
-    most = is_led(*self, *out) ? out->count : 0;
+    most = bears_out(*self, *out) ? out->count : 0;
     if (most > 0) correct_guess(self->eye, self->known, self->looks, self->count, &best);
   }
   const double time = time_of(*self, frame.t_ns);
@@ -342,12 +343,12 @@ void look_everywhere(landmarks_state *self, const wm_frame &frame, const wm_esti
   search.search(self->eye.camera, self->known, self->count, params.range_max_m, params.facing_min, tilt_of(params),
                 static_cast<int>(time * params.search_places));
   for (int i = 0; i < search.count && i < static_cast<int>(time * kTries); i++) {
-    const possible_place &where = search.places[i];
+    const place_hypothesis &where = search.places[i];
     recognised seen;
     const size_t before = most;
     for (const int side : {1, -1}) {
       if (!recognise(&self->eye, self->known[where.landmark], where, side, &seen)) continue;
-      look_by(self, frame, seen.guess, false, params.search_area_px2, out);
+      match_by(self, frame, seen.guess, false, params.search_area_px2, out);
       if (out->count < (seen.likeness >= params.likeness_alone ? 1 : kAgreeing) || out->count <= most) continue;
       most = out->count;
       best = seen.guess;
@@ -356,14 +357,14 @@ void look_everywhere(landmarks_state *self, const wm_frame &frame, const wm_esti
     if (most > before) break;
   }
   if (most > 0) {
-    look_by(self, frame, best, true, params.search_area_px2, out);
+    match_by(self, frame, best, true, params.search_area_px2, out);
     if (out->count == 0) return;
     correct_guess(self->eye, self->known, self->looks, self->count, &best);
-    remember_place(self, prediction, frame.t_ns, best);
+    store_recognised(self, prediction, frame.t_ns, best);
     return;
   }
   out->count = 0;
-  forget_looks(self);
+  clear_looks(self);
 }
 
 wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *prediction, wm_event *out, size_t capacity,
@@ -379,14 +380,14 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *predic
   found.events = out;
   found.capacity = capacity;
   found.count = 0;
-  forget_looks(self);
-  if (guessed) look_by(self, frame, guess, true, 0, &found);
-  if (is_led(*self, found) || self->found_ns == WM_TIME_NONE) self->found_ns = frame.t_ns;
+  clear_looks(self);
+  if (guessed) match_by(self, frame, guess, true, 0, &found);
+  if (bears_out(*self, found) || self->found_ns == WM_TIME_NONE) self->found_ns = frame.t_ns;
   const bool blind = wm_seconds_between(self->found_ns, frame.t_ns) > self->eye.params.search_after_s;
   if ((!guessed || blind) && self->eye.params.search_places > 0) {
     const size_t by_pose = found.count;
-    look_everywhere(self, frame, prediction, &found);
-    if (guessed && by_pose > 0 && found.count <= by_pose) look_by(self, frame, guess, true, 0, &found);
+    search_all(self, frame, prediction, &found);
+    if (guessed && by_pose > 0 && found.count <= by_pose) match_by(self, frame, guess, true, 0, &found);
   }
   self->before_ns = frame.t_ns;
   *count = best_in_order(out, found.likeness, found.count);

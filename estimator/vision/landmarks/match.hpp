@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where in a window a drawn landmark is most like the picture, to whole pixels: normalised correlation over the pixels
-// inside of the landmark, in integers.
+// Search of a window for a drawn landmark, to whole pixels: normalised cross-correlation over the pixels inside of the
+// landmark, in integers.
 #ifndef WAYMARK_ESTIMATOR_VISION_MATCH_HPP
 #define WAYMARK_ESTIMATOR_VISION_MATCH_HPP
 
@@ -11,19 +11,20 @@ namespace wm {
 
 inline constexpr int kReachMax = 40;  // px of a level, to each side
 inline constexpr int kReachSide = 2 * kReachMax + 1;
-// The search reads up to so many bytes behind the last pixel of a level.
+// Bytes behind the last pixel of a level that the search may read.
 inline constexpr size_t kReadBehind = 128;
 
 struct best_place {
-  int right, down;     // from where it was drawn
+  int right, down;     // shift from the drawn place
   double likeness;     // normalised correlation, -1 to 1
-  double second;       // the best one elsewhere
+  double second;       // the largest one outside of the best place's peak
   double spread_grey;  // standard deviation of the picture there
 };
 
-// Within `across` and `down` pixels to each side, at most kReachMax. False where no place of the window is wholly in
-// the picture. `scores` has room for kReachSide squared.
-bool search_window(const grey_plane &picture, const raster &what, int across, int down, float *scores, best_place *out);
+// Searches `across` and `down` pixels to each side, at most kReachMax. False where no place of the window lies wholly
+// in the picture. `scores` has room for kReachSide squared.
+bool search_window(const grey_plane &picture, const drawn_view &what, int across, int down, float *scores,
+                   best_place *out);
 
 }  // namespace wm
 

@@ -13,14 +13,14 @@ constexpr int kReach_px = 4;        // of a level
 // What is known of distance (in parts of it), facing and azimuth by one landmark's shape.
 constexpr double kDistanceSigma = 0.03, kFacingSigma = 0.03, kAzimuthSigma_rad = 0.005;
 
-double azimuth_of(const looker &self, const pixel &at) {
+double azimuth_of(const matcher &self, const pixel &at) {
   const vec3 ray = self.camera.R_base_optical * self.rays.at(at.u, at.v);
   return atan2(ray.y, ray.x);
 }
 
 }  // namespace
 
-bool recognise(looker *self, const appearance &what, const possible_place &where, int side, recognised *out) {
+bool recognise(matcher *self, const appearance &what, const place_hypothesis &where, int side, recognised *out) {
   double distance = where.distance_m, azimuth = where.azimuth_rad, facing = sincos(where.slant_rad).cos;
   const auto guess_there = [&] {
     // Seen from the front, its width hardly says how slanted it is.
@@ -30,12 +30,12 @@ bool recognise(looker *self, const appearance &what, const possible_place &where
                       kAzimuthSigma_rad);
   };
   for (const double area : {kAreaFirst, kAreaMax}) {
-    candidate one;
-    sight seen;
+    expected_view one;
+    landmark_match seen;
     if (expect_landmark(*self, guess_there(), what, area, &one) != WM_LOOK_FOUND) return false;
     if (one.area_px2 < self->params.search_area_px2) return false;
     const double reach = kReach_px << one.level;
-    if (look_for(self, one, reach, reach, false, &seen) != WM_LOOK_FOUND) return false;
+    if (match_landmark(self, one, reach, reach, false, &seen) != WM_LOOK_FOUND) return false;
     azimuth = azimuth_of(*self, seen.at);
     distance /= seen.taller;
     facing *= seen.wider / seen.taller;
@@ -46,7 +46,7 @@ bool recognise(looker *self, const appearance &what, const possible_place &where
   return facing >= self->params.facing_min && finite(out->guess.base_m);
 }
 
-void correct_guess(const looker &self, const appearance *known, const wm_looked_for *looks, int count,
+void correct_guess(const matcher &self, const appearance *known, const wm_looked_for *looks, int count,
                    camera_guess *guess) {
   constexpr double kFound_px = 3, kStep[3] = {0.01, 0.01, 0.001};
   const mat3 first = guess->R_map_base;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/landmarks/look.hpp"
+#include "vision/landmarks/matcher.hpp"
 
 #include <limits>
 
@@ -10,7 +10,7 @@ constexpr double kBlurred = 0.35;  // share of the contrast that a landmark shou
 constexpr double kSmall_px = 30;   // a landmark of n pixels needs a likeness of 1 - (1 - min) n / (n + this)
 constexpr double kEdge_px = 2;     // of the picture
 
-double likeness_needed(const looker &self, int pixels, double reach_px) {
+double likeness_needed(const matcher &self, int pixels, double reach_px) {
   constexpr double kNear_px = 8, kFar_px = 32;
   const double near = 1 - (1 - self.params.likeness_min) * pixels / (pixels + kSmall_px);
   const double far = (reach_px - kNear_px) / (kFar_px - kNear_px);
@@ -19,8 +19,8 @@ double likeness_needed(const looker &self, int pixels, double reach_px) {
 
 }  // namespace
 
-wm_look expect_landmark(const looker &self, const camera_guess &guess, const appearance &what, double area_max,
-                        candidate *out) {
+wm_look expect_landmark(const matcher &self, const camera_guess &guess, const appearance &what, double area_max,
+                        expected_view *out) {
   out->what = &what;
   if (!view_panel(what, guess.R_map_optical, guess.eye_m, &out->view)) return WM_LOOK_FACES_AWAY;
   if (!(out->view.distance < self.params.range_max_m)) return WM_LOOK_NOT_IN_VIEW;
@@ -47,12 +47,13 @@ wm_look expect_landmark(const looker &self, const camera_guess &guess, const app
   out->level = 0;
   const double longer = wide < high ? high : wide;
   while (out->level + 1 < kLevels &&
-         (wide * high > area_max * (1 << (2 * out->level)) || 1.1 * longer + 4 > (raster::kSide << out->level)))
+         (wide * high > area_max * (1 << (2 * out->level)) || 1.1 * longer + 4 > (drawn_view::kSide << out->level)))
     out->level++;
   return WM_LOOK_FOUND;
 }
 
-wm_look look_for(looker *self, const candidate &one, double across_px, double down_px, bool believed, sight *out) {
+wm_look match_landmark(matcher *self, const expected_view &one, double across_px, double down_px, bool believed,
+                       landmark_match *out) {
   out->likeness = std::numeric_limits<double>::quiet_NaN();
   if (!draw(*one.what, one.view, self->rays, one.corners, one.level, self->params.blur_px, &self->drawn))
     return WM_LOOK_NOT_IN_VIEW;

@@ -2,8 +2,8 @@
 // Where in all of a picture known landmarks might be, without a pose: some landmarks a picture in turn, each at every
 // azimuth, distance and slant, by the correlation of small templates on the panorama. A place of one landmark is a pose
 // of the robot in the plane; whether it is right, a look at full resolution has to say.
-#ifndef WAYMARK_ESTIMATOR_VISION_EVERYWHERE_HPP
-#define WAYMARK_ESTIMATOR_VISION_EVERYWHERE_HPP
+#ifndef WAYMARK_ESTIMATOR_VISION_GLOBAL_SEARCH_HPP
+#define WAYMARK_ESTIMATOR_VISION_GLOBAL_SEARCH_HPP
 
 #include "image/panorama.hpp"
 #include "vision/landmarks/guess.hpp"
@@ -11,7 +11,7 @@
 namespace wm {
 
 // Where a landmark might be, seen from the camera.
-struct possible_place {
+struct place_hypothesis {
   int landmark;        // which appearance
   double azimuth_rad;  // in base_link's axes
   double distance_m;   // on the floor
@@ -19,12 +19,12 @@ struct possible_place {
   double likeness;     // normalised correlation; less for the second and third of one landmark
 };
 
-struct search_everywhere {
+struct global_search {
   static constexpr int kPlaces = 16;
   panorama round;
   int next;   // landmark whose turn it is
   int count;  // of places, the most alike first
-  possible_place places[kPlaces];
+  place_hypothesis places[kPlaces];
 
   // That a landmark of this size and height will be searched for; before the panorama is planned.
   void need(const mounted_camera &camera, double width_m, double height_m, double z_m);

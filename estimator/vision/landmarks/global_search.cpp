@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "vision/landmarks/everywhere.hpp"
+#include "vision/landmarks/global_search.hpp"
 
 #include <cstring>
 
@@ -98,11 +98,11 @@ int32_t together(const cylinder &on, const small_picture &what, int left, int to
 // The best places of one landmark, each at another azimuth.
 struct shortlist {
   int count;
-  possible_place places[kOwn];
+  place_hypothesis places[kOwn];
 
   // Likeness that a place needs.
   double least() const { return count < kOwn ? kLikeness : places[count - 1].likeness; }
-  void offer(const possible_place &one, double apart_rad) {
+  void offer(const place_hypothesis &one, double apart_rad) {
     int at = 0;
     while (at < count && std::fabs(places[at].azimuth_rad - one.azimuth_rad) > apart_rad) at++;
     if (at < count && places[at].likeness >= one.likeness) return;
@@ -112,7 +112,7 @@ struct shortlist {
     }
     places[at] = one;
     for (; at > 0 && places[at - 1].likeness < places[at].likeness; at--) {
-      const possible_place higher = places[at];
+      const place_hypothesis higher = places[at];
       places[at] = places[at - 1];
       places[at - 1] = higher;
     }
@@ -139,7 +139,7 @@ double likeness_at(const cylinder &on, const small_picture &what, int left, int 
 
 // Everywhere within `tolerance` rows of where it should be: at every second place, and round those that promise
 // something. Returns how many places were compared.
-int compare(const cylinder &on, const small_picture &what, int top, int tolerance, const possible_place &like,
+int compare(const cylinder &on, const small_picture &what, int top, int tolerance, const place_hypothesis &like,
             shortlist *best) {
   int compared = 0;
   const int last_row = on.rows - what.rows, last_column = on.columns - what.columns;
@@ -159,7 +159,7 @@ int compare(const cylinder &on, const small_picture &what, int top, int toleranc
         }
       compared += 8;
       if (most <= best->least() || !is_all_seen(on, what, left, up)) continue;
-      possible_place place = like;
+      place_hypothesis place = like;
       place.azimuth_rad = on.left_rad - (left + 0.5 * (what.columns - 1)) * on.step_rad;
       place.likeness = most;
       best->offer(place, 0.5 * what.columns * on.step_rad);
@@ -173,14 +173,14 @@ int tolerance_of(const form &shape, const cylinder &on, double tilt_rad) {
 
 }  // namespace
 
-void search_everywhere::need(const mounted_camera &camera, double width_m, double height_m, double z_m) {
+void global_search::need(const mounted_camera &camera, double width_m, double height_m, double z_m) {
   const form shape = form_of(width_m, height_m, z_m - camera.centre_m.z);
   const double reach = 0.5 * shape.rows + kHalfStep * std::fabs(shape.middle_row) + 2;
   round.need(shape.middle_row + reach, reach - shape.middle_row);
 }
 
-int search_everywhere::search(const mounted_camera &camera, const appearance *known, int known_count,
-                              double range_max_m, double facing_min, double tilt_rad, int compare_max) {
+int global_search::search(const mounted_camera &camera, const appearance *known, int known_count, double range_max_m,
+                          double facing_min, double tilt_rad, int compare_max) {
   constexpr double kNearest_m = 1;
   int compared = 0;
   count = 0;
@@ -197,8 +197,8 @@ int search_everywhere::search(const mounted_camera &camera, const appearance *kn
         const double distance_m = what.height_m / (shape.rows * on.step_rad);
         if (distance_m > range_max_m || distance_m < kNearest_m) continue;
         const int top = on.horizon - static_cast<int>(std::floor(shape.middle_row + 0.5 * shape.rows));
-        const possible_place like = {static_cast<int>(&what - known), 0, distance_m,
-                                     atan2(std::sqrt(1 - facing * facing), facing), 0};
+        const place_hypothesis like = {static_cast<int>(&what - known), 0, distance_m,
+                                       atan2(std::sqrt(1 - facing * facing), facing), 0};
         compared += compare(on, drawn, top, tolerance_of(shape, on, tilt_rad), like, &best);
       }
     }

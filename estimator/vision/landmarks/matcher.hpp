@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // One known landmark in one picture: what should be seen of it from a pose, and where it is found.
-#ifndef WAYMARK_ESTIMATOR_VISION_LOOK_HPP
-#define WAYMARK_ESTIMATOR_VISION_LOOK_HPP
+#ifndef WAYMARK_ESTIMATOR_VISION_MATCHER_HPP
+#define WAYMARK_ESTIMATOR_VISION_MATCHER_HPP
 
 #include "vision/landmarks/align.hpp"
 #include "vision/landmarks/guess.hpp"
@@ -15,17 +15,17 @@ namespace wm {
 inline constexpr double kAreaMax = 2000;
 
 // A camera's picture and the work space for looking at it.
-struct looker {
+struct matcher {
   wm_landmarks_params params;
   mounted_camera camera;
   ray_table rays;
   pyramid picture;
   float *scores;
-  raster drawn;
+  drawn_view drawn;
   align_work work;
 };
 
-struct candidate {
+struct expected_view {
   const appearance *what;
   panel_view view;
   pixel middle, corners[4];
@@ -33,19 +33,20 @@ struct candidate {
   int level;
 };
 
-struct sight {
+struct landmark_match {
   pixel at;
   double uu, uv, vv, likeness;
   double wider, taller;  // than it was expected, by the fit
 };
 
 // Whether the landmark should be in this picture, and how, at the level at which it has at most `area_max` pixels.
-wm_look expect_landmark(const looker &self, const camera_guess &guess, const appearance &what, double area_max,
-                        candidate *out);
+wm_look expect_landmark(const matcher &self, const camera_guess &guess, const appearance &what, double area_max,
+                        expected_view *out);
 
 // Looks for it about where it is expected. `believed`: nobody asks afterwards whether it agrees with others, so it must
 // be the more alike, the larger the window is.
-wm_look look_for(looker *self, const candidate &one, double across_px, double down_px, bool believed, sight *out);
+wm_look match_landmark(matcher *self, const expected_view &one, double across_px, double down_px, bool believed,
+                       landmark_match *out);
 
 }  // namespace wm
 
