@@ -10,8 +10,12 @@
 namespace wm {
 namespace {
 
-constexpr int kRowsMax = 400;
-constexpr double kTangentMax = 1.5;  // what is higher is no picture on a cylinder any more
+constexpr int kRowsMax = 400;                // to each side of the horizon: bounds the memory
+constexpr double kTangentMax = 1.5;          // of elevation: beyond, a cylinder's pixels are too stretched
+constexpr int kSideMax_px = 4000;            // of a pyramid's level that is read: u, v in 1/kParts px fit 16 bits
+constexpr double kPixelDefault_rad = 0.003;  // where the middle of the picture has no ray
+constexpr double kLevelSpare = 1.1;          // a level may be this much coarser than the cylinder
+constexpr double kMargin_px = 1.1;           // for the four pixels of the bilinear interpolation
 
 size_t lined(size_t bytes) { return (bytes + 63) / 64 * 64; }
 
@@ -24,22 +28,22 @@ size_t sum_bytes(const cylinder &c) {
   return lined(static_cast<size_t>(c.columns + 1) * static_cast<size_t>(c.rows + 1) * sizeof(uint32_t));
 }
 
-// An angle between neighbouring pixels, in the middle of the picture.
+// Angle between neighbouring pixels in the middle of the picture.
 double angle_of_pixel(const mounted_camera &camera) {
   const pixel middle = {0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1)};
   vec3 here, beside;
   if (!unproject(camera.optics, middle, &here) || !unproject(camera.optics, {middle.u + 1, middle.v}, &beside))
-    return 0.003;
+    return kPixelDefault_rad;
   return length(cross(here, beside));
 }
 
-// Azimuths that the picture's pixels have, about that of its middle. A camera that looks up sees all round.
+// Range of the pixels' azimuths about that of the middle. A steep camera sees all azimuths.
 void azimuths_of(const mounted_camera &camera, double *left_rad, double *right_rad) {
   constexpr double kStep_px = 8;
   const vec3 axis = camera.R_base_optical * vec3{0, 0, 1};
   const bool steep = is_steep_axis(axis.z);
   const double middle = steep ? 0 : atan2(axis.y, axis.x);
-  double most = steep ? 3.14159265358979 : 0, least = -most;
+  double most = steep ? kPi : 0, least = -most;
   for (double v = 0; v < camera.height_px && !steep; v += kStep_px)
     for (double u = 0; u < camera.width_px; u += kStep_px) {
       vec3 ray;
@@ -60,7 +64,7 @@ void panorama::plan(const mounted_camera &camera, double tilt_rad, double finest
   azimuths_of(camera, &left_rad, &right_rad);
   const double pixel_rad = angle_of_pixel(camera);
   double step = finest_px * pixel_rad;
-  for (cylinder &c : round) {
+  for (cylinder &c : cylinders) {
     c.step_rad = step;
     c.left_rad = left_rad;
     c.columns = static_cast<int>((left_rad - right_rad) / step) + 1;
@@ -68,20 +72,21 @@ void panorama::plan(const mounted_camera &camera, double tilt_rad, double finest
     const int up = above + more < most ? above + more : most, down = below + more < most ? below + more : most;
     c.horizon = up < kRowsMax ? up : kRowsMax;
     c.rows = c.horizon + (down < kRowsMax ? down : kRowsMax) + 1;
-    for (c.level = 0; c.level + 1 < kLevels && pixel_rad * (2 << c.level) < 1.1 * step;) c.level++;
-    while (c.level + 1 < kLevels && (larger(camera.width_px, camera.height_px) / (1 << c.level)) > 4000) c.level++;
+    for (c.level = 0; c.level + 1 < kLevels && pixel_rad * (2 << c.level) < kLevelSpare * step;) c.level++;
+    while (c.level + 1 < kLevels && (larger(camera.width_px, camera.height_px) / (1 << c.level)) > kSideMax_px)
+      c.level++;
     step *= kCoarser;
   }
 }
 
 size_t panorama::bytes() const {
   size_t sum = 0;
-  for (const cylinder &c : round) sum += table_bytes(c) + grey_bytes(c) + 2 * sum_bytes(c);
+  for (const cylinder &c : cylinders) sum += table_bytes(c) + grey_bytes(c) + 2 * sum_bytes(c);
   return sum;
 }
 
 void panorama::make(const mounted_camera &camera, uint8_t *memory) {
-  for (cylinder &c : round) {
+  for (cylinder &c : cylinders) {
     c.from = reinterpret_cast<uint16_t *>(memory);
     memory += table_bytes(c);
     c.sums = reinterpret_cast<uint32_t *>(memory);
@@ -106,7 +111,7 @@ void panorama::make(const mounted_camera &camera, uint8_t *memory) {
                      transposed_times(camera.R_base_optical, {a.cos, a.sin, (c.horizon - y) * c.step_rad}), &at))
           continue;
         const double u = at.u * scale, v = at.v * scale;
-        if (!(u >= 0) || !(v >= 0) || !(u < width - 1.1) || !(v < height - 1.1)) continue;
+        if (!(u >= 0) || !(v >= 0) || !(u < width - kMargin_px) || !(v < height - kMargin_px)) continue;
         out[0] = static_cast<uint16_t>(u * cylinder::kParts);
         out[1] = static_cast<uint16_t>(v * cylinder::kParts);
       }
@@ -115,7 +120,7 @@ void panorama::make(const mounted_camera &camera, uint8_t *memory) {
 
 void panorama::take(const pyramid &picture) {
   constexpr int kParts = cylinder::kParts;
-  for (const cylinder &c : round) {
+  for (const cylinder &c : cylinders) {
     const grey_plane &plane = picture.level[c.level];
     const uint16_t *from = c.from;
     for (int y = 0; y < c.rows; y++) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is round the camera as a cylinder about the vertical: columns are azimuths, rows tangents of elevation, a pixel
-// as wide as it is high. On it an upright landmark at a distance is its picture, only smaller: it is found at any
-// distance by one size of template in cylinders of different fineness, and always about the same row, since its height
-// above the camera and its own size shrink alike. Any camera model, by tables made at the start.
+// The camera's surroundings on a cylinder about the vertical: columns are azimuths, rows tangents of elevation, pixels
+// are square. An upright landmark appears undistorted: one size of template finds it at any distance in cylinders of
+// different resolutions, always about the same row, since its height above the camera and its own size shrink alike.
+// Any camera model, by tables that are computed at the start.
 #ifndef WAYMARK_ESTIMATOR_IMAGE_PANORAMA_HPP
 #define WAYMARK_ESTIMATOR_IMAGE_PANORAMA_HPP
 
@@ -14,16 +14,16 @@
 
 namespace wm {
 
-// One fineness: a band about the horizon.
+// One resolution: a band about the horizon.
 struct cylinder {
   double step_rad;  // of a column, and of a row as a tangent
   double left_rad;  // azimuth of column 0 in base_link; columns go to the right, azimuths fall
   int columns, rows;
   int horizon;               // row of tangent 0; rows go down, tangents fall
   int level;                 // of the picture's pyramid that is read
-  uint16_t *from;            // u, v in parts of kParts of that level's pixel; kNowhere where the camera sees nothing
-  uint8_t *grey;             // rows are `columns + kBeside` apart
-  uint32_t *sums, *squares;  // of all pixels above and to the left, modulo 2^32; rows are columns + 1 apart
+  uint16_t *from;            // u, v in 1/kParts px of that level; kNowhere outside of the camera's view
+  uint8_t *grey;             // rows are `columns + kBeside` apart: vectors may read beyond the last column
+  uint32_t *sums, *squares;  // integral images, modulo 2^32; rows are columns + 1 apart
 
   static constexpr int kBeside = 16, kParts = 16;
   static constexpr uint16_t kNowhere = 0xffff;
@@ -33,23 +33,23 @@ struct cylinder {
 };
 
 struct panorama {
-  static constexpr int kCylinders = 12;
-  static constexpr double kCoarser = 1.26;  // from one cylinder to the next
-  double left_rad, right_rad;               // azimuths that the camera sees
+  static constexpr int kCylinders = 12;     // 1.26^11: distances from 1 to 13
+  static constexpr double kCoarser = 1.26;  // step in resolution: the third root of 2
+  double left_rad, right_rad;               // visible azimuths
   int above, below;                         // rows over and under the horizon that every cylinder needs
-  cylinder round[kCylinders];
+  cylinder cylinders[kCylinders];
 
   void need(double rows_above, double rows_below) {
     above = static_cast<int>(larger(above, rows_above));
     below = static_cast<int>(larger(below, rows_below));
   }
-  // How fine, and how many rows: those needed, and more by `tilt_rad`. The finest cylinder's column is `finest_px` of
-  // the picture's middle wide.
+  // Chooses resolutions and rows: those needed, and more by `tilt_rad`. A column of the finest cylinder is `finest_px`
+  // wide in the picture's middle.
   void plan(const mounted_camera &camera, double tilt_rad, double finest_px = 1.26);
   size_t bytes() const;
-  // Lays out and makes the tables. `memory` is bytes() long.
+  // Lays out and computes the tables. `memory` is bytes() long.
   void make(const mounted_camera &camera, uint8_t *memory);
-  // Reads all cylinders. About four nanoseconds a pixel.
+  // Reads all cylinders. About 4 ns a pixel.
   void take(const pyramid &picture);
 };
 

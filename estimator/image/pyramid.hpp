@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A picture in several sizes, each half of the one before: pixel (x, y) of a level is at (2x, 2y) of the one below.
+// Image pyramid: pixel (x, y) of a level is at (2x, 2y) of the level below.
 #ifndef WAYMARK_ESTIMATOR_IMAGE_PYRAMID_HPP
 #define WAYMARK_ESTIMATOR_IMAGE_PYRAMID_HPP
 
@@ -24,11 +24,11 @@ struct pyramid {
 
 // Bytes of all levels; a multiple of 64.
 size_t pyramid_bytes(int32_t width, int32_t height);
-// Lays the levels into `memory`, which is pyramid_bytes long.
+// Places the levels in `memory`, which is pyramid_bytes long.
 void pyramid_lay(pyramid *out, int32_t width, int32_t height, uint8_t *memory);
-// Makes all levels above the first, smoothed by 1-2-1. `row` has room for 16 bits a pixel of a row. Integers.
+// Computes all levels above the first, smoothed by 1-2-1, in integers. `row`: work space, one number a pixel of a row.
 void pyramid_build(pyramid *self, uint16_t *row);
-// The same, of a frame of the first level's size, which is copied.
+// The same, of a frame of the first level's size, which is copied first.
 void pyramid_take(pyramid *self, const wm_frame &frame, uint16_t *row);
 
 }  // namespace wm

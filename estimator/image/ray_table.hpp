@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays of a camera's pixels by a look-up: unprojected once on a grid, between its nodes linearly. Four pixels of a
-// fisheye of 318 px focal length are off by at most 1e-5 rad. Any camera model.
+// Rays of a camera's pixels by a look-up table: unprojected once on a grid, interpolated linearly between its nodes. On
+// a grid of 4 px a fisheye of 318 px focal length is off by at most 1e-5 rad. Any camera model.
 #ifndef WAYMARK_ESTIMATOR_IMAGE_RAY_TABLE_HPP
 #define WAYMARK_ESTIMATOR_IMAGE_RAY_TABLE_HPP
 
@@ -16,10 +16,10 @@ struct ray_table {
   float *xyz;  // three a node; NaN where the lens has no ray
 
   static size_t bytes(uint32_t width_px, uint32_t height_px);
-  // `memory` is bytes() long. Some microseconds a node.
+  // `memory` is bytes() long. Some us a node.
   void make(const lens &optics, uint32_t width_px, uint32_t height_px, void *memory);
 
-  // About length 1, in optical axes. The pixel is inside of the picture; NaN where there is no ray.
+  // Ray of about length 1 in optical axes; NaN where there is none. The pixel is inside of the picture.
   vec3 at(double u, double v) const {
     const double x = (u + kStep_px) * (1.0 / kStep_px), y = (v + kStep_px) * (1.0 / kStep_px);
     int column = static_cast<int>(x), row = static_cast<int>(y);

@@ -50,14 +50,14 @@ void everywhere(const drawn_street &street) {
     known[i].make(street.look[i], street.landmark[i], looks[i].data());
     search.need(camera, 0.7, 0.7, street.landmark[i].p_m[2]);
   }
-  search.round.plan(camera, 0.021);
-  std::vector<uint8_t> memory(search.round.bytes());
-  search.round.make(camera, memory.data());
+  search.around.plan(camera, 0.021);
+  std::vector<uint8_t> memory(search.around.bytes());
+  search.around.make(camera, memory.data());
   std::vector<double> take, compare;
   int places = 0;
   for (int k = 0; k < kRounds; k++) {
     const double begin = thread_us();
-    search.round.take(pyramid);
+    search.around.take(pyramid);
     const double taken = thread_us();
     places = search.search(camera, known, kSigns, 40, 0.17, 0.021, 1 << 30);
     compare.push_back(thread_us() - taken);

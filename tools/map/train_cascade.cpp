@@ -57,7 +57,7 @@ class Eye {
   void look_around() { round_.take(picture_); }
   const panorama &round() const { return round_; }
   const window_band &band() const { return band_; }
-  double finest_rad() const { return round_.round[0].step_rad; }
+  double finest_rad() const { return round_.cylinders[0].step_rad; }
 
   // A window about a direction, as the panorama would have it at this fineness. False where the picture ends.
   bool window(double azimuth_rad, double tangent, double step_rad, int width, int height, WindowSums *out) const {
@@ -214,7 +214,7 @@ class Trainer {
       eye.look_around();
       std::vector<WindowSums> found;
       size_t seen = 0;
-      for (const cylinder &c : eye.round().round) find_in(p, c, eye.band(), &found, &seen, kOfPicture);
+      for (const cylinder &c : eye.round().cylinders) find_in(p, c, eye.band(), &found, &seen, kOfPicture);
       std::move(found.begin(), found.end(), std::back_inserter(others_));
     }
   }

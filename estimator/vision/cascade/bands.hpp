@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where on the panorama a thing of known height may be that hangs between two heights: its window, in the cylinder in
-// which it fits, is the same number of rows above the horizon at any distance.
+// Rows of the panorama in which an object of known size can be that hangs between two heights. In the cylinder in which
+// it fits the window, it is the same number of rows above the horizon at any distance.
 #ifndef WAYMARK_ESTIMATOR_VISION_BANDS_HPP
 #define WAYMARK_ESTIMATOR_VISION_BANDS_HPP
 
@@ -13,11 +13,12 @@ struct window_band {
   double above, below;  // rows of the window's middle over the horizon, from `below` to `above`
 };
 
-// `low_m`, `high_m`: of middles above the camera. Cylinders are 1.26 apart: the window's rows are that unsure.
+// `low_m`, `high_m`: of the objects' middles above the camera. The cylinders' step of 1.26 makes the rows uncertain by
+// half of it, and the cascade's window by as much.
 inline window_band band_of(const wm_cascade &cascade, double low_m, double high_m) {
-  constexpr double kUnsure = 1.2;
+  constexpr double kMargin = 1.2;
   const double rows = cascade.height_px / cascade.height_m;
-  return {high_m * rows * (high_m > 0 ? kUnsure : 1 / kUnsure), low_m * rows * (low_m < 0 ? kUnsure : 1 / kUnsure)};
+  return {high_m * rows * (high_m > 0 ? kMargin : 1 / kMargin), low_m * rows * (low_m < 0 ? kMargin : 1 / kMargin)};
 }
 
 // The rows of windows' upper left pixels in a cylinder, from `first` to `last`.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Detector `cascade`: things of a class (signs, posters) that boosted cascades were trained for, in OpenCV's format, on
-// the camera's panorama. It says where one is and how far away by its size, not which one: that is the filter's to
-// find.
+// Detector `cascade`: objects of a class (signs, posters) by boosted cascades in OpenCV's format, on the camera's
+// panorama. Bearing, and range by size, without identity: the filter associates.
 #include <cstring>
 #include <limits>
 
@@ -18,19 +17,19 @@
 namespace wm {
 namespace {
 
-constexpr size_t kCascadesMax = 8;
+constexpr size_t kCascadesMax = 8;  // each costs a pass over the panorama
 
 struct cascade_state {
   wm_cascade_params params;
   mounted_camera camera;
-  panorama round;
+  panorama around;
   pyramid picture;
   window_groups groups;
   const wm_cascade *cascades;
   window_band bands[kCascadesMax];
   size_t count;
   double pixel_rad;
-  bool steep;
+  bool is_steep;
   wm_time_ns readout_ns;
   uint16_t *row;
 };
@@ -53,13 +52,13 @@ bool heights_of(const wm_view &view, const mounted_camera &camera, double *low_m
 const char *why_not(const wm_view &view, const mounted_camera &camera) {
   double low_m, high_m;
   if (view.cascade_count == 0)
-    return "nothing says what is looked for: classes: [{file: sign.xml, height_m: 0.8}], cascades in OpenCV's format";
+    return "no class is given: classes: [{file: sign.xml, height_m: 0.8}], cascades in OpenCV's format";
   if (view.cascade_count > kCascadesMax) return "more than 8 classes";
   if (!heights_of(view, camera, &low_m, &high_m)) return "there is no map of landmarks: landmarks.csv";
   return nullptr;
 }
 
-// Puts the state's parts one behind the other; returns the bytes of all.
+// Lays out the state; returns its bytes.
 size_t lay_out(cascade_state *state, const wm_cascade_params &params, const wm_view &view,
                const mounted_camera &camera) {
   memory_layout memory(state, sizeof(cascade_state));
@@ -68,22 +67,22 @@ size_t lay_out(cascade_state *state, const wm_cascade_params &params, const wm_v
   auto *row = memory.take<uint16_t>(camera.width_px);
   double low_m, high_m;
   heights_of(view, camera, &low_m, &high_m);
-  panorama round{};
+  panorama around{};
   double most_rows = 0;
   for (size_t i = 0; i < view.cascade_count; i++) {
     const wm_cascade &c = view.cascades[i];
     const window_band band = band_of(c, low_m, high_m);
-    round.need(band.above + c.height_px, c.height_px - band.below);
+    around.need(band.above + c.height_px, c.height_px - band.below);
     most_rows = larger(most_rows, c.height_px);
     if (state) state->bands[i] = band;
   }
-  round.plan(camera, tilt_of(params), params.size_min_px / most_rows);
-  auto *around = memory.take<uint8_t>(round.bytes());
+  around.plan(camera, tilt_of(params), params.size_min_px / most_rows);
+  auto *cylinders = memory.take<uint8_t>(around.bytes());
   if (state) {
     pyramid_lay(&state->picture, width, height, levels);
     state->row = row;
-    round.make(camera, around);
-    state->round = round;
+    around.make(camera, cylinders);
+    state->around = around;
   }
   return memory.bytes();
 }
@@ -105,19 +104,19 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   std::memset(static_cast<void *>(state), 0, sizeof *state);
   state->params = *static_cast<const wm_cascade_params *>(params);
   if (mounted_camera_init(&state->camera, *camera) || why_not(*view, state->camera)) return WM_BAD_CONFIG;
-  state->steep = is_steep(*camera);
+  state->is_steep = is_steep(*camera);
   state->readout_ns = camera->readout_ns;
   state->cascades = view->cascades;
   state->count = view->cascade_count;
   lay_out(state, state->params, *view, state->camera);
   double most_rows = 0;
   for (size_t i = 0; i < state->count; i++) most_rows = larger(most_rows, state->cascades[i].height_px);
-  state->pixel_rad = state->round.round[0].step_rad * most_rows / state->params.size_min_px;
+  state->pixel_rad = state->around.cylinders[0].step_rad * most_rows / state->params.size_min_px;
   return WM_OK;
 }
 
 // All windows of a cascade in one cylinder.
-void look_at(cascade_state *self, size_t which, const cylinder &c) {
+void scan(cascade_state *self, size_t which, const cylinder &c) {
   const wm_cascade &cascade = self->cascades[which];
   const int width = static_cast<int>(cascade.width_px), height = static_cast<int>(cascade.height_px);
   const integral sums = {c.sums, c.squares, c.columns + 1};
@@ -128,8 +127,7 @@ void look_at(cascade_state *self, size_t which, const cylinder &c) {
     for (int x = 0; x + width <= c.columns; x++) {
       double surplus;
       const int passed = stages_passed(cascade, sums, x, y, &surplus);
-      if (passed <= 0)
-        x++;  // where not even the first stage sees anything its neighbour won't either, as OpenCV has it
+      if (passed <= 0) x++;  // where the first stage fails, the neighbour is skipped, as in OpenCV
       if (passed < stages) continue;
       if (!c.is_seen(x, y) || !c.is_seen(x + width - 1, y) || !c.is_seen(x, y + height - 1) ||
           !c.is_seen(x + width - 1, y + height - 1))
@@ -140,7 +138,7 @@ void look_at(cascade_state *self, size_t which, const cylinder &c) {
     }
 }
 
-bool put(const cascade_state &self, const wm_frame &frame, const window_hit &seen, wm_event *out) {
+bool emit(const cascade_state &self, const wm_frame &frame, const window_hit &seen, wm_event *out) {
   const sin_cos a = sincos(seen.azimuth_rad);
   const vec3 ray = transposed_times(self.camera.R_base_optical, {a.cos, a.sin, seen.tangent});
   pixel at;
@@ -151,14 +149,17 @@ bool put(const cascade_state &self, const wm_frame &frame, const window_hit &see
   std::memset(static_cast<void *>(out), 0, WM_EVENT_SMALL_BYTES);
   out->t_ns = time_of_row(frame.t_ns, at.v, frame.height_px, self.readout_ns);
   out->kind = WM_EVENT_SIGHTING;
-  out->as.sighting = {0,
-                      -1,
-                      sensor_bearing(self.camera, self.steep, ray),
-                      range_m,
-                      std::sqrt(square(p.sigma_px * self.pixel_rad) + square(p.sigma_size * seen.width)),
-                      p.sigma_range * range_m,
-                      sensor_elevation(self.camera, self.steep, ray),
-                      std::sqrt(square(p.sigma_px * self.pixel_rad) + square(p.sigma_size * seen.height))};
+  const auto sigma = [&](double size) {
+    return std::sqrt(square(p.sigma_px * self.pixel_rad) + square(p.sigma_size * size));
+  };
+  out->as.sighting = {.sensor = 0,
+                      .landmark_id = -1,
+                      .bearing_rad = sensor_bearing(self.camera, self.is_steep, ray),
+                      .range_m = range_m,
+                      .bearing_sigma_rad = sigma(seen.width),
+                      .range_sigma_m = p.sigma_range * range_m,
+                      .elevation_rad = sensor_elevation(self.camera, self.is_steep, ray),
+                      .elevation_sigma_rad = sigma(seen.height)};
   return true;
 }
 
@@ -169,13 +170,13 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
   *count = 0;
   if (frame.width_px != self->camera.width_px || frame.height_px != self->camera.height_px) return WM_BAD_DATA;
   pyramid_take(&self->picture, frame, self->row);
-  self->round.take(self->picture);
+  self->around.take(self->picture);
   self->groups.count = 0;
   for (size_t i = 0; i < self->count; i++)
-    for (const cylinder &c : self->round.round) look_at(self, i, c);
+    for (const cylinder &c : self->around.cylinders) scan(self, i, c);
   self->groups.finish(self->params.neighbours_min);
   for (size_t i = 0; i < self->groups.count && *count < capacity; i++)
-    *count += put(*self, frame, self->groups.list[i].mean, &out[*count]);
+    *count += emit(*self, frame, self->groups.list[i].mean, &out[*count]);
   sort_events(out, *count);
   return WM_OK;
 }
@@ -185,7 +186,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
 
 extern "C" const wm_detector wm_cascade_detector = {
     "cascade",
-    "things of a class (signs, posters) by OpenCV's cascades, LBP or HAAR: bearings and distances without identities",
+    "objects of a class (signs, posters) by OpenCV's cascades, LBP or HAAR: bearings and distances without identities",
     WM_EVENT_BIT(WM_EVENT_SIGHTING),
     1,
     wm_cascade_params_table,

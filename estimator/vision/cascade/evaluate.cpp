@@ -11,7 +11,7 @@ uint32_t sum_of(const uint32_t *sums, ptrdiff_t stride, int x, int y, int width,
   return top[0] - top[width] - bottom[0] + bottom[width];
 }
 
-// 1 / (sigma times pixels) of the window but its rim, in single precision as OpenCV has it; 0: too flat.
+// 1 / (sigma times pixels) of the window without its rim, in single precision as OpenCV; 0: no contrast.
 float contrast_of(const wm_cascade &self, const integral &picture, int x, int y) {
   const int width = static_cast<int>(self.width_px) - 2, height = static_cast<int>(self.height_px) - 2;
   const double area = static_cast<double>(width) * height;
@@ -19,8 +19,9 @@ float contrast_of(const wm_cascade &self, const integral &picture, int x, int y)
   const double square = sum_of(picture.squares, picture.stride, x + 1, y + 1, width, height);
   const double spread = area * square - sum * sum;
   if (!(spread > 0)) return 0;
+  constexpr double kContrastMin = 0.1;  // OpenCV's: sigma above 10 grey levels
   const auto over = static_cast<float>(1.0 / std::sqrt(spread));
-  return area * static_cast<double>(over) < 0.1 ? over : 0;
+  return area * static_cast<double>(over) < kContrastMin ? over : 0;
 }
 
 float haar_value(const wm_cascade_feature &f, const integral &picture, int x, int y) {

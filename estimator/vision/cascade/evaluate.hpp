@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// One window of a picture through a cascade, as OpenCV's CascadeClassifier judges it: tests/unit holds them side by
-// side.
+// Evaluates a cascade on one window of a picture with the results of OpenCV's CascadeClassifier: tests/unit compares
+// them.
 #ifndef WAYMARK_ESTIMATOR_VISION_EVALUATE_HPP
 #define WAYMARK_ESTIMATOR_VISION_EVALUATE_HPP
 
@@ -11,15 +11,15 @@
 
 namespace wm {
 
-// A picture's integral images: at row y, column x the sum of all pixels above and to the left, modulo 2^32.
+// Integral images: at row y, column x the sum of all pixels above and to the left, modulo 2^32.
 struct integral {
   const uint32_t *sums, *squares;
   ptrdiff_t stride;
 };
 
-// How many stages the window with its upper left pixel at (x, y) passes; all of them: it shows what the cascade was
-// trained for. -1: a HAAR cascade does not judge so flat a window. *surplus is by how much the last stage's sum is
-// above its threshold. The window lies inside of the picture. Most windows end after a few features, some 5 ns each.
+// Number of stages passed by the window with its upper left pixel at (x, y); all of them: a detection. -1: a HAAR
+// cascade rejects a window without contrast. *surplus: the last stage's sum minus its threshold. The window lies inside
+// of the picture. Most windows end after a few features, some 5 ns each.
 int stages_passed(const wm_cascade &self, const integral &picture, int x, int y, double *surplus);
 
 // The code of a window's LBP feature; a bit for each neighbour block that is at least as bright as the middle one,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A cascade says yes to several windows about one thing: they become one, and the mean is finer than a window's steps.
+// Groups the overlapping detections of one object. Their mean is finer than the windows' steps.
 #ifndef WAYMARK_ESTIMATOR_VISION_GROUPS_HPP
 #define WAYMARK_ESTIMATOR_VISION_GROUPS_HPP
 
@@ -7,7 +7,7 @@
 
 namespace wm {
 
-// A window's middle: azimuth and tangent of elevation in base_link, and its size in the same measure.
+// A window's middle: azimuth (rad) and tangent of elevation in base_link; its size in the same units.
 struct window_hit {
   double azimuth_rad, tangent, width, height;
   int which;  // the cascade
@@ -23,9 +23,9 @@ struct window_groups {
   window_group list[kMax];
   size_t count;
 
-  // Joins the hit to a group that it is near to, or begins one; one more than kMax is left out.
+  // Adds the hit to a near group, or begins one. Groups beyond kMax are dropped.
   void add(const window_hit &hit);
-  // Leaves groups of at least `least` hits, and of those that overlap the largest one.
+  // Keeps groups of at least `least` hits, and the largest one of those that overlap.
   void finish(int least);
 };
 

@@ -8,43 +8,45 @@
 namespace wm {
 namespace {
 
-constexpr int kLanes = 16, kColumnsMax = 2 * kLanes, kRowsMax = 16, kRowsMin = 5, kColumnsMin = 4;
-constexpr double kArea = 90;   // pixels of a template that isn't slanted, nor wider than this many times its height:
-constexpr double kWide = 2.5;  // shop boards and the like keep their rows, so that their letters aren't all lost
-constexpr double kLikeness = 0.6;   // of a place that is worth a second look
-constexpr double kPromise = 0.2;    // less than that much worse than wanted: its neighbours are looked at
-constexpr double kSpread_grey = 5;  // of what can be compared at all
-constexpr double kRank = 0.05;      // by so much each further place of one landmark comes after others
-constexpr int kOwn = 3;             // places that one landmark keeps
-constexpr double kHalfStep = 0.13;  // half of a cylinder's step in distance
-// Cosines of the slants: from one to the next, a landmark's width changes as much as its size from cylinder to
-// cylinder.
+constexpr int kLanes = 16, kColumnsMax = 2 * kLanes, kRowsMax = 16, kRowsMin = 5, kColumnsMin = 4;  // of a template, px
+constexpr double kArea_px2 = 90;      // of a template that is not slanted: fewer pixels are ambiguous. Not swept
+constexpr double kAspectMax = 2.5;    // of such a template: wide boards keep enough rows for their letters
+constexpr double kLikenessMin = 0.6;  // normalised correlation of a hypothesis. Not swept
+constexpr double kMargin = 0.2;       // correlation of every second place below that wanted, whose neighbours are tried
+constexpr double kSpread_grey = 5;    // smallest standard deviation: below it there is noise alone
+constexpr double kRankPenalty = 0.05;  // likeness lost by each further place of one landmark, so that others get a turn
+constexpr int kPerLandmark = 3;        // places kept of one landmark
+constexpr double kHalfStep = 0.13;     // half of a cylinder's step in distance (panorama::kCoarser)
+constexpr double kNearest_m = 1;       // of a hypothesis: nearer landmarks fill the picture
+constexpr double kTemplateStep_rad = 0.015;  // of the template's pixels: perspective of a middle distance
+// Cosines of the slants that are searched: in geometric steps as the cylinders.
 constexpr double kFacing[] = {0.97, 0.78, 0.62, 0.5, 0.4, 0.32, 0.25};
 
-struct form {
+// Size of a landmark's template on a cylinder.
+struct template_size {
   int rows;
-  double middle_row;  // over the horizon
+  double middle_row;  // of its middle above the horizon
 };
 
-form form_of(double width_m, double height_m, double above_m) {
-  const double aspect = width_m / height_m, wide = aspect < kWide ? aspect : kWide;
-  int rows = static_cast<int>(std::sqrt(kArea / wide) + 0.5);
+template_size size_of(double width_m, double height_m, double above_m) {
+  const double aspect = width_m / height_m, limited = aspect < kAspectMax ? aspect : kAspectMax;
+  int rows = static_cast<int>(std::sqrt(kArea_px2 / limited) + 0.5);
   rows = rows < kRowsMin ? kRowsMin : rows > kRowsMax ? kRowsMax : rows;
   return {rows, rows * above_m / height_m};
 }
 
-struct small_picture {
+struct cylinder_template {
   int rows, columns;
-  int64_t energy;
-  int16_t level[kRowsMax * kColumnsMax];  // less their mean; 0 beside
+  int64_t energy;                         // sum of squares of `level`
+  int16_t level[kRowsMax * kColumnsMax];  // 1/4 grey levels about the mean; 0 beside
 };
 
-// How the landmark looks on a cylinder, its right side farther away by the slant. What perspective adds to that differs
-// from distance to distance, but little: a middle one stands for all.
-bool draw_small(const appearance &what, const form &shape, double height_m, double facing, small_picture *out) {
-  constexpr double kStep_rad = 0.015;
+// Draws the landmark on a cylinder, its right side farther away by the slant. Perspective depends on the distance only
+// weakly: a middle one is used for all.
+bool draw_template(const appearance &what, const template_size &shape, double height_m, double facing,
+                   cylinder_template *out) {
   out->rows = shape.rows;
-  const double pixel_m = what.height_m / shape.rows, distance_m = pixel_m / kStep_rad,
+  const double pixel_m = what.height_m / shape.rows, distance_m = pixel_m / kTemplateStep_rad,
                wanted = what.width_m * facing / pixel_m;
   out->columns = wanted >= kColumnsMax ? kColumnsMax : static_cast<int>(wanted + 0.5);  // of a wider one, its middle
   if (out->columns < kColumnsMin) return false;
@@ -57,7 +59,7 @@ bool draw_small(const appearance &what, const form &shape, double height_m, doub
   for (int x = 0; x < out->columns; x++) {
     double to_right[16], away[16];
     for (int j = 0; j < right; j++) {
-      const sin_cos a = sincos(-(x + (j + 0.5) / right - 0.5 * out->columns) * kStep_rad);
+      const sin_cos a = sincos(-(x + (j + 0.5) / right - 0.5 * out->columns) * kTemplateStep_rad);
       const double toward = facing * a.cos + across * a.sin;
       away[j] = toward > 0.05 ? distance_m * facing / toward : distance_m;
       to_right[j] = (away[j] * a.cos - distance_m) * across - away[j] * a.sin * facing;
@@ -65,7 +67,7 @@ bool draw_small(const appearance &what, const form &shape, double height_m, doub
     for (int y = 0; y < out->rows; y++) {
       double mean = 0;
       for (int i = 0; i < down; i++) {
-        const double tangent = (shape.middle_row - (y + (i + 0.5) / down - 0.5 * out->rows)) * kStep_rad;
+        const double tangent = (shape.middle_row - (y + (i + 0.5) / down - 0.5 * out->rows)) * kTemplateStep_rad;
         for (int j = 0; j < right; j++)
           mean += grey_of(what, size, (to_right[j] / what.width_m + 0.5) * what.columns[0] - 0.5,
                           (0.5 - (away[j] * tangent - height_m) / what.height_m) * what.rows[0] - 0.5);
@@ -84,7 +86,7 @@ bool draw_small(const appearance &what, const form &shape, double height_m, doub
   return out->energy > 16 * kSpread_grey * kSpread_grey * out->rows * out->columns;
 }
 
-int32_t together(const cylinder &on, const small_picture &what, int left, int top) {
+int32_t product_sum(const cylinder &on, const cylinder_template &what, int left, int top) {
   int32_t sum = 0;
   for (int y = 0; y < what.rows; y++) {
     const uint8_t *from = on.row(top + y) + left;
@@ -95,20 +97,20 @@ int32_t together(const cylinder &on, const small_picture &what, int left, int to
   return sum;
 }
 
-// The best places of one landmark, each at another azimuth.
+// The best places of one landmark, at different azimuths, the best first.
 struct shortlist {
   int count;
-  place_hypothesis places[kOwn];
+  place_hypothesis places[kPerLandmark];
 
-  // Likeness that a place needs.
-  double least() const { return count < kOwn ? kLikeness : places[count - 1].likeness; }
+  // Likeness that a further place needs.
+  double least() const { return count < kPerLandmark ? kLikenessMin : places[count - 1].likeness; }
   void offer(const place_hypothesis &one, double apart_rad) {
     int at = 0;
     while (at < count && std::fabs(places[at].azimuth_rad - one.azimuth_rad) > apart_rad) at++;
     if (at < count && places[at].likeness >= one.likeness) return;
     if (at == count) {
-      if (count == kOwn && places[kOwn - 1].likeness >= one.likeness) return;
-      at = count < kOwn ? count++ : kOwn - 1;
+      if (count == kPerLandmark && places[kPerLandmark - 1].likeness >= one.likeness) return;
+      at = count < kPerLandmark ? count++ : kPerLandmark - 1;
     }
     places[at] = one;
     for (; at > 0 && places[at - 1].likeness < places[at].likeness; at--) {
@@ -119,13 +121,13 @@ struct shortlist {
   }
 };
 
-bool is_all_seen(const cylinder &on, const small_picture &what, int left, int top) {
+bool is_all_seen(const cylinder &on, const cylinder_template &what, int left, int top) {
   return on.is_seen(left, top) && on.is_seen(left + what.columns - 1, top) && on.is_seen(left, top + what.rows - 1) &&
          on.is_seen(left + what.columns - 1, top + what.rows - 1);
 }
 
-// The likeness of one place; below -1 where there is nothing to compare.
-double likeness_at(const cylinder &on, const small_picture &what, int left, int top) {
+// Normalised correlation at one place; -2 where the picture has no contrast.
+double likeness_at(const cylinder &on, const cylinder_template &what, int left, int top) {
   const ptrdiff_t stride = on.columns + 1, from = top * stride + left, below = what.rows * stride;
   const int w = what.columns, n = what.rows * w;
   const uint32_t *s = on.sums + from, *q = on.squares + from;
@@ -133,13 +135,29 @@ double likeness_at(const cylinder &on, const small_picture &what, int left, int 
   const int64_t squares = static_cast<uint32_t>(q[below + w] - q[below] - q[w] + q[0]);
   const int64_t variance = n * squares - sum * sum;  // times n squared
   if (variance < static_cast<int64_t>(n) * n * static_cast<int64_t>(kSpread_grey * kSpread_grey)) return -2;
-  return together(on, what, left, top) /
+  return product_sum(on, what, left, top) /
          std::sqrt(static_cast<double>(what.energy) * static_cast<double>(variance) / n);
 }
 
-// Everywhere within `tolerance` rows of where it should be: at every second place, and round those that promise
-// something. Returns how many places were compared.
-int compare(const cylinder &on, const small_picture &what, int top, int tolerance, const place_hypothesis &like,
+// The best of a place and its eight neighbours.
+struct peak {
+  double likeness;
+  int left, top;
+};
+peak climb(const cylinder &on, const cylinder_template &what, int x, int y, double here, int last_column,
+           int last_row) {
+  peak out = {here, x, y};
+  for (int i = y > 0 ? y - 1 : 0; i <= y + 1 && i <= last_row; i++)
+    for (int j = x > 0 ? x - 1 : 0; j <= x + 1 && j <= last_column; j++) {
+      const double there = i == y && j == x ? here : likeness_at(on, what, j, i);
+      if (there > out.likeness) out = {there, j, i};
+    }
+  return out;
+}
+
+// Compares every second place within `tolerance` rows of the expected one, and the neighbours of promising ones.
+// Returns the number of comparisons.
+int compare(const cylinder &on, const cylinder_template &what, int top, int tolerance, const place_hypothesis &like,
             shortlist *best) {
   int compared = 0;
   const int last_row = on.rows - what.rows, last_column = on.columns - what.columns;
@@ -149,66 +167,69 @@ int compare(const cylinder &on, const small_picture &what, int top, int toleranc
     for (int x = 0; x <= last_column; x += 2) {
       const double here = likeness_at(on, what, x, y);
       compared++;
-      if (here < best->least() - kPromise) continue;
-      double most = here;
-      int left = x, up = y;
-      for (int i = y > 0 ? y - 1 : 0; i <= y + 1 && i <= last_row; i++)
-        for (int j = x > 0 ? x - 1 : 0; j <= x + 1 && j <= last_column; j++) {
-          const double there = i == y && j == x ? here : likeness_at(on, what, j, i);
-          if (there > most) most = there, left = j, up = i;
-        }
+      if (here < best->least() - kMargin) continue;
+      const peak at = climb(on, what, x, y, here, last_column, last_row);
       compared += 8;
-      if (most <= best->least() || !is_all_seen(on, what, left, up)) continue;
+      if (at.likeness <= best->least() || !is_all_seen(on, what, at.left, at.top)) continue;
       place_hypothesis place = like;
-      place.azimuth_rad = on.left_rad - (left + 0.5 * (what.columns - 1)) * on.step_rad;
-      place.likeness = most;
+      place.azimuth_rad = on.left_rad - (at.left + 0.5 * (what.columns - 1)) * on.step_rad;
+      place.likeness = at.likeness;
       best->offer(place, 0.5 * what.columns * on.step_rad);
     }
   return compared;
 }
 
-int tolerance_of(const form &shape, const cylinder &on, double tilt_rad) {
+// Rows by which a landmark may be off: tilt of the camera and half of the cylinders' step.
+int tolerance_of(const template_size &shape, const cylinder &on, double tilt_rad) {
   return static_cast<int>(tilt_rad / on.step_rad + kHalfStep * std::fabs(shape.middle_row)) + 1;
 }
 
 }  // namespace
 
 void global_search::need(const mounted_camera &camera, double width_m, double height_m, double z_m) {
-  const form shape = form_of(width_m, height_m, z_m - camera.centre_m.z);
+  const template_size shape = size_of(width_m, height_m, z_m - camera.centre_m.z);
   const double reach = 0.5 * shape.rows + kHalfStep * std::fabs(shape.middle_row) + 2;
-  round.need(shape.middle_row + reach, reach - shape.middle_row);
+  around.need(shape.middle_row + reach, reach - shape.middle_row);
+}
+
+int global_search::search_one(const mounted_camera &camera, const appearance *known, int which, double range_max_m,
+                              double facing_min, double tilt_rad) {
+  const appearance &what = known[which];
+  const double height_m = what.place_m.z - camera.centre_m.z;
+  const template_size shape = size_of(what.width_m, what.height_m, height_m);
+  shortlist best{};
+  int compared = 0;
+  for (const double facing : kFacing) {
+    cylinder_template drawn;
+    if (facing < facing_min || !draw_template(what, shape, height_m, facing, &drawn)) break;
+    for (const cylinder &on : around.cylinders) {
+      const double distance_m = what.height_m / (shape.rows * on.step_rad);
+      if (distance_m > range_max_m || distance_m < kNearest_m) continue;
+      const int top = on.horizon - static_cast<int>(std::floor(shape.middle_row + 0.5 * shape.rows));
+      const place_hypothesis like = {which, 0, distance_m, atan2(std::sqrt(1 - facing * facing), facing), 0};
+      compared += compare(on, drawn, top, tolerance_of(shape, on, tilt_rad), like, &best);
+    }
+  }
+  for (int i = 0; i < best.count; i++) best.places[i].likeness -= kRankPenalty * i;
+  for (int i = 0; i < best.count; i++) insert(best.places[i]);
+  return compared;
+}
+
+void global_search::insert(const place_hypothesis &place) {
+  if (count == kPlaces && places[count - 1].likeness >= place.likeness) return;
+  int at = count < kPlaces ? count++ : kPlaces - 1;
+  for (; at > 0 && places[at - 1].likeness < place.likeness; at--) places[at] = places[at - 1];
+  places[at] = place;
 }
 
 int global_search::search(const mounted_camera &camera, const appearance *known, int known_count, double range_max_m,
                           double facing_min, double tilt_rad, int compare_max) {
-  constexpr double kNearest_m = 1;
   int compared = 0;
   count = 0;
-  for (int turn = 0; turn < known_count && compared < compare_max; turn++) {
-    const appearance &what = known[next];
+  for (int i = 0; i < known_count && compared < compare_max; i++) {
+    const int which = next;
     next = next + 1 < known_count ? next + 1 : 0;
-    const double height_m = what.place_m.z - camera.centre_m.z;
-    const form shape = form_of(what.width_m, what.height_m, height_m);
-    shortlist best{};
-    for (const double facing : kFacing) {
-      small_picture drawn;
-      if (facing < facing_min || !draw_small(what, shape, height_m, facing, &drawn)) break;
-      for (const cylinder &on : round.round) {
-        const double distance_m = what.height_m / (shape.rows * on.step_rad);
-        if (distance_m > range_max_m || distance_m < kNearest_m) continue;
-        const int top = on.horizon - static_cast<int>(std::floor(shape.middle_row + 0.5 * shape.rows));
-        const place_hypothesis like = {static_cast<int>(&what - known), 0, distance_m,
-                                       atan2(std::sqrt(1 - facing * facing), facing), 0};
-        compared += compare(on, drawn, top, tolerance_of(shape, on, tilt_rad), like, &best);
-      }
-    }
-    for (int i = 0; i < best.count; i++) best.places[i].likeness -= kRank * i;
-    for (int i = 0; i < best.count; i++) {
-      if (count == kPlaces && places[count - 1].likeness >= best.places[i].likeness) continue;
-      int at = count < kPlaces ? count++ : kPlaces - 1;
-      for (; at > 0 && places[at - 1].likeness < best.places[i].likeness; at--) places[at] = places[at - 1];
-      places[at] = best.places[i];
-    }
+    compared += search_one(camera, known, which, range_max_m, facing_min, tilt_rad);
   }
   return compared;
 }
@@ -223,7 +244,7 @@ camera_guess guess_from(const mounted_camera &camera, const appearance &what, do
   out.eye_m = {what.place_m.x - distance_m * to.cos, what.place_m.y - distance_m * to.sin, camera.centre_m.z};
   out.base_m = out.eye_m - out.R_map_base * camera.centre_m;
   const vec3 arm = out.R_map_base * camera.centre_m;
-  // x, y, heading by distance, slant, azimuth; a turn by the heading moves base_link about the eye.
+  // Derivatives of x, y, heading by distance, slant, azimuth, times their sigmas; the heading rotates about the eye.
   const double by[3][3] = {{-to.cos * distance_m * distance_sigma, -to.sin * distance_m * distance_sigma, 0},
                            {(-distance_m * to.sin - arm.y) * slant_sigma_rad,
                             (distance_m * to.cos + arm.x) * slant_sigma_rad, -slant_sigma_rad},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a camera should be when its picture was taken, by the filter's newest state, and how sure that is.
+// Predicted pose of the camera at the time of a picture, by the filter's newest state, with covariance.
 #ifndef WAYMARK_ESTIMATOR_VISION_GUESS_HPP
 #define WAYMARK_ESTIMATOR_VISION_GUESS_HPP
 
@@ -9,7 +9,7 @@
 
 namespace wm {
 
-inline constexpr double kCarry_s = 1;  // a twist says nothing of what is farther away
+inline constexpr double kCarry_s = 1;  // longest prediction by a constant twist
 
 struct camera_guess {
   vec3 base_m, eye_m;  // in map
@@ -17,11 +17,11 @@ struct camera_guess {
   double cov[3][3];  // of x, y (m) and heading (rad)
 };
 
-// Carries the state to t_ns by its own twist. False where nothing is known: no state, searching, lost, or too old.
+// Predicts the state to t_ns by its own twist. False without a usable state: none, searching, lost, or too old.
 bool guess_camera(const mounted_camera &camera, const wm_estimate *prediction, wm_time_ns t_ns, camera_guess *out);
 
-// Moves the guess by a twist (base_link's axes, m/s and rad/s) that was held for dt_s, and makes it less sure by what
-// such a twist may be off.
+// Moves the guess by a constant twist (base_link's axes, m/s and rad/s) over dt_s and inflates its covariance by the
+// twist's errors.
 void carry_guess(const mounted_camera &camera, const vec3 &v_mps, const vec3 &w_radps, double dt_s,
                  camera_guess *guess);
 

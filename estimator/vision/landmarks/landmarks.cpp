@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Detector `landmarks`: known signs, house numbers, windows, found by how they look: where the pose says they should
-// be, and everywhere while there is no pose that says it.
+// Detector `landmarks`: known signs, house numbers and windows, found by their appearance: around their expected
+// places, and in the whole picture while there is no pose or the pose leads to none.
 #include <cstring>
 #include <initializer_list>
 #include <limits>
@@ -16,16 +16,19 @@ namespace wm {
 namespace {
 
 constexpr size_t kFoundMax = 128;
-constexpr int kTries = 8;  // looks at full resolution in a picture that is searched, at kRate_hz
-constexpr size_t kAgreeing =
-    3;  // landmarks that one pose must explain where it was guessed from one that looks less alike
-constexpr double kRate_hz = 30.0, kPeriodsMost = 8.0;  // of pictures, for which search_places is meant; at fewer: more
-constexpr size_t kFewOf = 5;  // a pose that finds less than one in so many of those that it expects is hardly right
+constexpr int kTries = 8;          // hypotheses verified at full resolution per picture at kRate_hz: bounds the cost
+constexpr size_t kAgreeing = 3;    // landmarks that one pose must explain where the first one is not alike enough alone
+constexpr double kRate_hz = 30.0;  // of pictures, for which search_places is given
+constexpr double kBudgetMax = 8.0;       // times that budget at lower rates
+constexpr size_t kExpectedPerFound = 5;  // a pose that finds less than 1 in 5 expected landmarks is doubtful. Not swept
+constexpr double kStep_px = 0.5;         // of the numerical derivative of a bearing
+constexpr size_t kOutlierMin = 4;        // landmarks from which the median shift can expose an outlier
+constexpr double kSigmas = 4, kLens_px = 2.5;  // gate about the median shift; residuals of the lens model
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// Where the camera was by what was recognised in a picture, and how the robot moved then.
-struct remembered {
-  wm_time_ns t_ns;  // WM_TIME_NONE: nothing was
+// The camera's pose by landmarks recognised in a picture, and the robot's twist then.
+struct recognised_pose {
+  wm_time_ns t_ns;  // WM_TIME_NONE: none
   camera_guess guess;
   vec3 v_mps, w_radps;
 };
@@ -33,18 +36,18 @@ struct remembered {
 struct landmarks_state {
   matcher eye;
   global_search search;
-  bool steep;
+  bool is_steep;
   wm_time_ns readout_ns;
   wm_time_ns found_ns;   // when the pose last led to a landmark
-  wm_time_ns before_ns;  // the picture before
-  remembered place;
+  wm_time_ns before_ns;  // of the previous picture
+  recognised_pose place;
   uint16_t *row;
   int count;
   appearance *known;
   wm_looked_for *looks;
 };
 
-// Roll and pitch of the camera against the vertical that a search allows for.
+// Roll and pitch of the camera against its mounting that a search allows for.
 double tilt_of(const wm_landmarks_params &params) { return 3 * params.mounting_sigma_rad; }
 
 const wm_landmark *landmark_of(const wm_view &view, int32_t id) {
@@ -58,7 +61,7 @@ bool is_usable(const wm_view &view, const wm_appearance &a) {
          a.height_m > 0 && finite(a.yaw_rad);
 }
 
-// Puts the state's parts one behind the other; returns the bytes of all.
+// Lays out the state; returns its bytes.
 size_t lay_out(landmarks_state *state, const wm_landmarks_params &params, const wm_view &view,
                const mounted_camera &camera) {
   memory_layout memory(state, sizeof(landmarks_state));
@@ -78,8 +81,8 @@ size_t lay_out(landmarks_state *state, const wm_landmarks_params &params, const 
   }
   auto *known = memory.take<appearance>(count);
   auto *looks = memory.take<wm_looked_for>(count);
-  search.round.plan(camera, tilt_of(params));
-  auto *around = memory.take<uint8_t>(search.round.bytes());
+  search.around.plan(camera, tilt_of(params));
+  auto *around = memory.take<uint8_t>(search.around.bytes());
   if (state) {
     state->eye.rays.make(camera.optics, camera.width_px, camera.height_px, rays);
     std::memset(levels, 0, level_bytes);
@@ -89,7 +92,7 @@ size_t lay_out(landmarks_state *state, const wm_landmarks_params &params, const 
     state->known = known;
     state->looks = looks;
     state->count = 0;
-    search.round.make(camera, around);
+    search.around.make(camera, around);
     state->search = search;
   }
   for (size_t i = 0; i < view.appearance_count; i++) {
@@ -108,7 +111,7 @@ size_t state_bytes(const void *params, const wm_view *view, const char **why) {
   *why = mounted_camera_init(&mounted, *camera);
   if (!*why && view->appearance_count == 0)
     *why =
-        "nothing says how a landmark looks: landmarks/appearance.csv beside landmarks.csv (waymark map "
+        "no landmark has an appearance: landmarks/appearance.csv beside landmarks.csv is needed (waymark map "
         "add-landmark makes it)";
   bool usable = false;
   for (size_t i = 0; i < view->appearance_count; i++) usable |= is_usable(*view, view->appearances[i]);
@@ -124,7 +127,7 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   std::memset(static_cast<void *>(state), 0, sizeof *state);
   state->eye.params = *static_cast<const wm_landmarks_params *>(params);
   if (mounted_camera_init(&state->eye.camera, *camera)) return WM_BAD_CONFIG;
-  state->steep = is_steep(*camera);
+  state->is_steep = is_steep(*camera);
   state->readout_ns = camera->readout_ns;
   state->found_ns = state->before_ns = state->place.t_ns = WM_TIME_NONE;
   lay_out(state, state->eye.params, *view, state->eye.camera);
@@ -132,16 +135,15 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
 }
 
 double bearing_of(const landmarks_state &self, const vec3 &ray) {
-  return sensor_bearing(self.eye.camera, self.steep, ray);
+  return sensor_bearing(self.eye.camera, self.is_steep, ray);
 }
 
 double elevation_of(const landmarks_state &self, const vec3 &ray) {
-  return sensor_elevation(self.eye.camera, self.steep, ray);
+  return sensor_elevation(self.eye.camera, self.is_steep, ray);
 }
 
-bool put(const landmarks_state &self, const wm_frame &frame, const camera_guess &guess, const expected_view &one,
-         const landmark_match &seen, wm_event *out) {
-  constexpr double kStep_px = 0.5;
+bool emit(const landmarks_state &self, const wm_frame &frame, const camera_guess &guess, const expected_view &one,
+          const landmark_match &seen, wm_event *out) {
   vec3 ray, right, left, below, above;
   if (!unproject(self.eye.camera.optics, seen.at, &ray) ||
       !unproject(self.eye.camera.optics, {seen.at.u + kStep_px, seen.at.v}, &right) ||
@@ -153,7 +155,7 @@ bool put(const landmarks_state &self, const wm_frame &frame, const camera_guess 
                by_v = wrap(bearing_of(self, below) - bearing_of(self, above)) / (2 * kStep_px);
   const double up_by_u = (elevation_of(self, right) - elevation_of(self, left)) / (2 * kStep_px),
                up_by_v = (elevation_of(self, below) - elevation_of(self, above)) / (2 * kStep_px);
-  // Drawn from a heading that is off, its nearer half is too wide or too narrow, and its middle elsewhere.
+  // A wrong heading distorts the drawn perspective, which moves the fitted middle.
   const double bent = square(0.5 * one.what->width_m / one.view.distance);
   const auto variance_by = [&seen](double u, double v) {
     return u * u * seen.uu + 2 * u * v * seen.uv + v * v * seen.vv;
@@ -164,14 +166,14 @@ bool put(const landmarks_state &self, const wm_frame &frame, const camera_guess 
   std::memset(static_cast<void *>(out), 0, WM_EVENT_SMALL_BYTES);
   out->t_ns = time_of_row(frame.t_ns, seen.at.v, frame.height_px, self.readout_ns);
   out->kind = WM_EVENT_SIGHTING;
-  out->as.sighting = {0,
-                      one.what->id,
-                      bearing_of(self, ray),
-                      kNan,
-                      std::sqrt(variance),
-                      kNan,
-                      elevation_of(self, ray),
-                      std::sqrt(up_variance)};
+  out->as.sighting = {.sensor = 0,
+                      .landmark_id = one.what->id,
+                      .bearing_rad = bearing_of(self, ray),
+                      .range_m = kNan,
+                      .bearing_sigma_rad = std::sqrt(variance),
+                      .range_sigma_m = kNan,
+                      .elevation_rad = elevation_of(self, ray),
+                      .elevation_sigma_rad = std::sqrt(up_variance)};
   return true;
 }
 
@@ -203,13 +205,11 @@ double median_of(double *values, size_t count) {
   return values[count / 2];
 }
 
-// A turned camera moves all landmarks of a picture alike, a wrong place each by its distance: who is elsewhere than the
-// others say was taken for something else. Returns how many stay.
+// A rotated camera shifts all landmarks of a picture alike, a wrong position each by its distance. A landmark whose
+// shift is far from the median is a false match. Returns the number kept.
 size_t reject_outliers(landmarks_state *self, camera_guess guess, const int *which, wm_event *events, double *likeness,
                        size_t count) {
-  constexpr size_t kOpinions = 4;
-  constexpr double kSigmas = 4, kLens_px = 2.5;  // a lens that isn't as calibrated moves them unlike
-  if (count < kOpinions) return count;
+  if (count < kOutlierMin) return count;
   double common[2], values[kFoundMax];
   const auto moved = [&](size_t i, int axis) {
     const wm_looked_for &look = self->looks[which[i]];
@@ -225,25 +225,25 @@ size_t reject_outliers(landmarks_state *self, camera_guess guess, const int *whi
   for (size_t i = 0; i < count; i++) {
     double allowed[2];
     expected_spread(self->eye.camera, guess, self->known[which[i]], 0, &allowed[0], &allowed[1]);
-    // A camera that is rolled moves them against each other, by how far they are from the middle.
+    // A rolled camera shifts them differently, in proportion to their distance from the principal point.
     const wm_looked_for &look = self->looks[which[i]];
     const double u = look.expected_px[0] - self->eye.camera.optics.cx,
                  v = look.expected_px[1] - self->eye.camera.optics.cy;
-    const double unlike = larger(kLens_px, 2 * self->eye.params.mounting_sigma_rad * std::sqrt(u * u + v * v));
-    if (std::fabs(moved(i, 0) - common[0]) < kSigmas * allowed[0] + unlike &&
-        std::fabs(moved(i, 1) - common[1]) < kSigmas * allowed[1] + unlike) {
-      events[kept] = events[i];
+    const double tolerance = larger(kLens_px, 2 * self->eye.params.mounting_sigma_rad * std::sqrt(u * u + v * v));
+    if (std::fabs(moved(i, 0) - common[0]) < kSigmas * allowed[0] + tolerance &&
+        std::fabs(moved(i, 1) - common[1]) < kSigmas * allowed[1] + tolerance) {
+      if (kept != i) std::memcpy(static_cast<void *>(&events[kept]), &events[i], WM_EVENT_SMALL_BYTES);
       likeness[kept++] = likeness[i];
     } else {
-      wm_looked_for &stray = self->looks[which[i]];
-      stray.look = WM_LOOK_UNLIKE;
-      stray.found_px[0] = stray.found_px[1] = kNan;
+      wm_looked_for &outlier = self->looks[which[i]];
+      outlier.look = WM_LOOK_UNLIKE;
+      outlier.found_px[0] = outlier.found_px[1] = kNan;
     }
   }
   return kept;
 }
 
-// Events of one picture, with the landmarks that they are of.
+// Events of one picture with their landmarks.
 struct found_list {
   wm_event *events;
   size_t capacity, count;
@@ -256,8 +256,8 @@ void clear_looks(landmarks_state *self) {
     self->looks[i] = {self->known[i].id, WM_LOOK_UNCERTAIN, {kNan, kNan}, {kNan, kNan}, kNan};
 }
 
-// Looks where a pose says that the landmarks are, at those that have so many pixels. `believed` as of match_landmark.
-void match_by(landmarks_state *self, const wm_frame &frame, const camera_guess &guess, bool believed, double area_px2,
+// Matches all landmarks of at least `area_px2` that are visible from a pose. `is_final` as of match_landmark.
+void match_by(landmarks_state *self, const wm_frame &frame, const camera_guess &guess, bool is_final, double area_px2,
               found_list *out) {
   const wm_landmarks_params &params = self->eye.params;
   out->count = 0;
@@ -266,7 +266,7 @@ void match_by(landmarks_state *self, const wm_frame &frame, const camera_guess &
     wm_looked_for &look = self->looks[i];
     look = {what.id, WM_LOOK_UNCERTAIN, {kNan, kNan}, {kNan, kNan}, kNan};
     expected_view one;
-    look.look = static_cast<uint8_t>(expect_landmark(self->eye, guess, what, kAreaMax, &one));
+    look.look = static_cast<uint8_t>(expect_landmark(self->eye, guess, what, kAreaMax_px2, &one));
     if (look.look == WM_LOOK_FOUND && one.area_px2 < area_px2) look.look = WM_LOOK_TOO_SMALL;
     if (look.look != WM_LOOK_FOUND) continue;
     look.expected_px[0] = one.middle.u;
@@ -278,10 +278,10 @@ void match_by(landmarks_state *self, const wm_frame &frame, const camera_guess &
     look.look = static_cast<uint8_t>(
         larger(across_px, down_px) * sigmas > params.window_max_px
             ? WM_LOOK_UNCERTAIN
-            : match_landmark(&self->eye, one, sigmas * across_px, sigmas * down_px, believed, &seen));
+            : match_landmark(&self->eye, one, sigmas * across_px, sigmas * down_px, is_final, &seen));
     if (look.look != WM_LOOK_UNCERTAIN) look.likeness = seen.likeness;
     if (look.look != WM_LOOK_FOUND || out->count == out->capacity || out->count == kFoundMax) continue;
-    if (!put(*self, frame, guess, one, seen, &out->events[out->count])) continue;
+    if (!emit(*self, frame, guess, one, seen, &out->events[out->count])) continue;
     look.found_px[0] = seen.at.u;
     look.found_px[1] = seen.at.v;
     out->which[out->count] = i;
@@ -290,23 +290,23 @@ void match_by(landmarks_state *self, const wm_frame &frame, const camera_guess &
   out->count = reject_outliers(self, guess, out->which, out->events, out->likeness, out->count);
 }
 
-// Whether what was found bears the pose out: a wrong pose finds one thing or another that looks like what it expects.
-bool bears_out(const landmarks_state &self, const found_list &found) {
+// Whether the matches confirm the pose: a wrong pose matches a few landmarks by chance.
+bool confirms(const landmarks_state &self, const found_list &found) {
   size_t expected = 0;
   for (int i = 0; i < self.count; i++) expected += wm_look_is_expected(self.looks[i].look) != 0;
-  return found.count > 0 && kFewOf * found.count >= expected;
+  return found.count > 0 && kExpectedPerFound * found.count >= expected;
 }
 
-// How much more time there is for a picture than at kRate_hz: who sees few has time for each.
-double time_of(const landmarks_state &self, wm_time_ns t_ns) {
+// Budget of a search relative to that at kRate_hz: longer periods allow more.
+double budget_of(const landmarks_state &self, wm_time_ns t_ns) {
   if (self.before_ns == WM_TIME_NONE) return 1.0;
   const double periods = kRate_hz * wm_seconds_between(self.before_ns, t_ns);
-  return periods > kPeriodsMost ? kPeriodsMost : larger(periods, 1.0);
+  return periods > kBudgetMax ? kBudgetMax : larger(periods, 1.0);
 }
 
-// Where the camera is by what was recognised in a picture before, carried on as the robot moves.
+// The camera's pose by landmarks recognised in a previous picture, predicted by the robot's twist.
 bool carry_recognised(const landmarks_state &self, const wm_estimate *prediction, wm_time_ns t_ns, camera_guess *out) {
-  const remembered &before = self.place;
+  const recognised_pose &before = self.place;
   if (!prediction || before.t_ns == WM_TIME_NONE) return false;
   const double dt_s = wm_seconds_between(before.t_ns, t_ns);
   if (!(std::fabs(dt_s) < kCarry_s)) return false;
@@ -325,8 +325,23 @@ void store_recognised(landmarks_state *self, const wm_estimate *prediction, wm_t
   self->place.w_radps = vec_of(prediction->w_radps);
 }
 
-// Looks everywhere for the landmarks whose turn it is; one that is recognised says where the others are, in this
-// picture and in the next one.
+// Verifies a hypothesis of the search from both sides. Keeps the pose that explains the most landmarks.
+void verify(landmarks_state *self, const wm_frame &frame, const place_hypothesis &where, found_list *out, size_t *most,
+            camera_guess *best) {
+  const wm_landmarks_params &params = self->eye.params;
+  recognised seen;
+  for (const int side : {1, -1}) {
+    if (!recognise(&self->eye, self->known[where.landmark], where, side, &seen)) continue;
+    match_by(self, frame, seen.guess, false, params.search_area_px2, out);
+    if (out->count < (seen.likeness >= params.likeness_alone ? 1 : kAgreeing) || out->count <= *most) continue;
+    *most = out->count;
+    *best = seen.guess;
+    correct_guess(self->eye, self->known, self->looks, self->count, best);
+  }
+}
+
+// Searches the picture for the next landmarks in turn. A recognised one predicts the others, in this picture and the
+// next.
 void search_all(landmarks_state *self, const wm_frame &frame, const wm_estimate *prediction, found_list *out) {
   global_search &search = self->search;
   const wm_landmarks_params &params = self->eye.params;
@@ -335,25 +350,16 @@ void search_all(landmarks_state *self, const wm_frame &frame, const wm_estimate 
   if (carry_recognised(*self, prediction, frame.t_ns, &carried)) {
     match_by(self, frame, carried, true, params.search_area_px2, out);
     best = carried;
-    most = bears_out(*self, *out) ? out->count : 0;
+    most = confirms(*self, *out) ? out->count : 0;
     if (most > 0) correct_guess(self->eye, self->known, self->looks, self->count, &best);
   }
-  const double time = time_of(*self, frame.t_ns);
-  search.round.take(self->eye.picture);
+  const double budget = budget_of(*self, frame.t_ns);
+  search.around.take(self->eye.picture);
   search.search(self->eye.camera, self->known, self->count, params.range_max_m, params.facing_min, tilt_of(params),
-                static_cast<int>(time * params.search_places));
-  for (int i = 0; i < search.count && i < static_cast<int>(time * kTries); i++) {
-    const place_hypothesis &where = search.places[i];
-    recognised seen;
+                static_cast<int>(budget * params.search_places));
+  for (int i = 0; i < search.count && i < static_cast<int>(budget * kTries); i++) {
     const size_t before = most;
-    for (const int side : {1, -1}) {
-      if (!recognise(&self->eye, self->known[where.landmark], where, side, &seen)) continue;
-      match_by(self, frame, seen.guess, false, params.search_area_px2, out);
-      if (out->count < (seen.likeness >= params.likeness_alone ? 1 : kAgreeing) || out->count <= most) continue;
-      most = out->count;
-      best = seen.guess;
-      correct_guess(self->eye, self->known, self->looks, self->count, &best);
-    }
+    verify(self, frame, search.places[i], out, &most, &best);
     if (most > before) break;
   }
   if (most > 0) {
@@ -382,7 +388,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *predic
   found.count = 0;
   clear_looks(self);
   if (guessed) match_by(self, frame, guess, true, 0, &found);
-  if (bears_out(*self, found) || self->found_ns == WM_TIME_NONE) self->found_ns = frame.t_ns;
+  if (confirms(*self, found) || self->found_ns == WM_TIME_NONE) self->found_ns = frame.t_ns;
   const bool blind = wm_seconds_between(self->found_ns, frame.t_ns) > self->eye.params.search_after_s;
   if ((!guessed || blind) && self->eye.params.search_places > 0) {
     const size_t by_pose = found.count;

@@ -6,13 +6,15 @@
 namespace wm {
 namespace {
 
-constexpr double kBlurred = 0.35;  // share of the contrast that a landmark should have
-constexpr double kSmall_px = 30;   // a landmark of n pixels needs a likeness of 1 - (1 - min) n / (n + this)
-constexpr double kEdge_px = 2;     // of the picture
+constexpr double kBlurred = 0.35;  // fraction of the drawn contrast, below which an unlike place counts as blurred
+constexpr double kSmall_px2 = 30;  // a landmark of n px^2 needs a likeness of 1 - (1 - min) n / (n + this). Not swept
+constexpr double kMargin_px = 2;   // from the edge of the picture
+constexpr double kFits = 1.1;      // of the longer side, beside 4 px: room in the drawn view for a tilted landmark
+constexpr double kBeforeAlign = 0.1;          // likeness on whole pixels may be this much below the needed one
+constexpr double kNear_px = 8, kFar_px = 32;  // window, from likeness_min to likeness_far
 
 double likeness_needed(const matcher &self, int pixels, double reach_px) {
-  constexpr double kNear_px = 8, kFar_px = 32;
-  const double near = 1 - (1 - self.params.likeness_min) * pixels / (pixels + kSmall_px);
+  const double near = 1 - (1 - self.params.likeness_min) * pixels / (pixels + kSmall_px2);
   const double far = (reach_px - kNear_px) / (kFar_px - kNear_px);
   return near + (far < 0 ? 0 : far > 1 ? 1 : far) * (larger(near, self.params.likeness_far) - near);
 }
@@ -25,8 +27,8 @@ wm_look expect_landmark(const matcher &self, const camera_guess &guess, const ap
   if (!view_panel(what, guess.R_map_optical, guess.eye_m, &out->view)) return WM_LOOK_FACES_AWAY;
   if (!(out->view.distance < self.params.range_max_m)) return WM_LOOK_NOT_IN_VIEW;
   const auto in_picture = [&](const vec3 &point, pixel *at) {
-    return project(self.camera.optics, point, at) && at->u >= kEdge_px && at->v >= kEdge_px &&
-           at->u <= self.camera.width_px - 1 - kEdge_px && at->v <= self.camera.height_px - 1 - kEdge_px;
+    return project(self.camera.optics, point, at) && at->u >= kMargin_px && at->v >= kMargin_px &&
+           at->u <= self.camera.width_px - 1 - kMargin_px && at->v <= self.camera.height_px - 1 - kMargin_px;
   };
   if (!in_picture(out->view.middle, &out->middle)) return WM_LOOK_NOT_IN_VIEW;
   if (!(out->view.facing >= self.params.facing_min)) return WM_LOOK_FACES_AWAY;
@@ -47,12 +49,12 @@ wm_look expect_landmark(const matcher &self, const camera_guess &guess, const ap
   out->level = 0;
   const double longer = wide < high ? high : wide;
   while (out->level + 1 < kLevels &&
-         (wide * high > area_max * (1 << (2 * out->level)) || 1.1 * longer + 4 > (drawn_view::kSide << out->level)))
+         (wide * high > area_max * (1 << (2 * out->level)) || kFits * longer + 4 > (drawn_view::kSide << out->level)))
     out->level++;
   return WM_LOOK_FOUND;
 }
 
-wm_look match_landmark(matcher *self, const expected_view &one, double across_px, double down_px, bool believed,
+wm_look match_landmark(matcher *self, const expected_view &one, double across_px, double down_px, bool is_final,
                        landmark_match *out) {
   out->likeness = std::numeric_limits<double>::quiet_NaN();
   if (!draw(*one.what, one.view, self->rays, one.corners, one.level, self->params.blur_px, &self->drawn))
@@ -66,8 +68,8 @@ wm_look match_landmark(matcher *self, const expected_view &one, double across_px
     return WM_LOOK_NOT_IN_VIEW;
   out->likeness = best.likeness;
   if (best.spread_grey < self->params.contrast_grey) return WM_LOOK_LOW_CONTRAST;
-  const double needed = likeness_needed(*self, self->drawn.count, believed ? larger(across_px, down_px) : 0);
-  if (best.likeness < needed - 0.1)
+  const double needed = likeness_needed(*self, self->drawn.count, is_final ? larger(across_px, down_px) : 0);
+  if (best.likeness < needed - kBeforeAlign)
     return best.spread_grey < kBlurred * self->drawn.spread_grey ? WM_LOOK_BLURRED : WM_LOOK_UNLIKE;
   aligned fine;
   const pixel middle = {one.middle.u / step, one.middle.v / step};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One known landmark in one picture: what should be seen of it from a pose, and where it is found.
+// Matching of one known landmark in one picture: its expected view from a pose, and its place.
 #ifndef WAYMARK_ESTIMATOR_VISION_MATCHER_HPP
 #define WAYMARK_ESTIMATOR_VISION_MATCHER_HPP
 
@@ -11,10 +11,10 @@
 
 namespace wm {
 
-// Landmarks are measured in pictures in which they have at most so many pixels.
-inline constexpr double kAreaMax = 2000;
+// Landmarks are measured at the pyramid's level at which they have at most this area: cost, and no gain beyond.
+inline constexpr double kAreaMax_px2 = 2000;
 
-// A camera's picture and the work space for looking at it.
+// A camera's picture and the work space of the matching.
 struct matcher {
   wm_landmarks_params params;
   mounted_camera camera;
@@ -36,16 +36,16 @@ struct expected_view {
 struct landmark_match {
   pixel at;
   double uu, uv, vv, likeness;
-  double wider, taller;  // than it was expected, by the fit
+  double wider, taller;  // scale of width and height against the expected view
 };
 
-// Whether the landmark should be in this picture, and how, at the level at which it has at most `area_max` pixels.
+// Whether the landmark should be visible, and its expected view at the level at which it has at most `area_max` px^2.
 wm_look expect_landmark(const matcher &self, const camera_guess &guess, const appearance &what, double area_max,
                         expected_view *out);
 
-// Looks for it about where it is expected. `believed`: nobody asks afterwards whether it agrees with others, so it must
-// be the more alike, the larger the window is.
-wm_look match_landmark(matcher *self, const expected_view &one, double across_px, double down_px, bool believed,
+// Searches for the landmark around its expected place. `is_final`: no agreement with other landmarks is required
+// afterwards, so the needed likeness grows with the window.
+wm_look match_landmark(matcher *self, const expected_view &one, double across_px, double down_px, bool is_final,
                        landmark_match *out);
 
 }  // namespace wm

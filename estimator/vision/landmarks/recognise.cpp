@@ -8,10 +8,13 @@
 namespace wm {
 namespace {
 
-constexpr double kAreaFirst = 400;  // px of the picture in which a place that is roughly right is found
-constexpr int kReach_px = 4;        // of a level
-// What is known of distance (in parts of it), facing and azimuth by one landmark's shape.
+constexpr double kFirstArea_px2 = 400;  // of the drawn landmark: tolerates the search's coarse steps
+constexpr int kReach_px = 4;            // of a level: half a step of the search
+// Sigmas of distance (relative), cosine of the slant and azimuth by one landmark's shape. Not swept.
 constexpr double kDistanceSigma = 0.03, kFacingSigma = 0.03, kAzimuthSigma_rad = 0.005;
+constexpr double kFacingMax = 0.999;  // cosine: the slant's direction must stay defined
+constexpr double kFound_px = 3;       // sigma of a matched landmark when the guess is corrected: mounting and lens
+constexpr double kStep[3] = {0.01, 0.01, 0.001};  // of numerical derivatives: m, m, rad
 
 double azimuth_of(const matcher &self, const pixel &at) {
   const vec3 ray = self.camera.R_base_optical * self.rays.at(at.u, at.v);
@@ -23,13 +26,13 @@ double azimuth_of(const matcher &self, const pixel &at) {
 bool recognise(matcher *self, const appearance &what, const place_hypothesis &where, int side, recognised *out) {
   double distance = where.distance_m, azimuth = where.azimuth_rad, facing = sincos(where.slant_rad).cos;
   const auto guess_there = [&] {
-    // Seen from the front, its width hardly says how slanted it is.
+    // Seen from the front, the width hardly depends on the slant.
     const double across = std::sqrt(1 - facing * facing),
                  slant_sigma = kFacingSigma / std::sqrt(square(across) + kFacingSigma);
     return guess_from(self->camera, what, azimuth, distance, side * atan2(across, facing), kDistanceSigma, slant_sigma,
                       kAzimuthSigma_rad);
   };
-  for (const double area : {kAreaFirst, kAreaMax}) {
+  for (const double area : {kFirstArea_px2, kAreaMax_px2}) {
     expected_view one;
     landmark_match seen;
     if (expect_landmark(*self, guess_there(), what, area, &one) != WM_LOOK_FOUND) return false;
@@ -39,7 +42,7 @@ bool recognise(matcher *self, const appearance &what, const place_hypothesis &wh
     azimuth = azimuth_of(*self, seen.at);
     distance /= seen.taller;
     facing *= seen.wider / seen.taller;
-    facing = facing < 0.999 ? facing : 0.999;
+    facing = facing < kFacingMax ? facing : kFacingMax;
     out->likeness = seen.likeness;
   }
   out->guess = guess_there();
@@ -48,7 +51,6 @@ bool recognise(matcher *self, const appearance &what, const place_hypothesis &wh
 
 void correct_guess(const matcher &self, const appearance *known, const wm_looked_for *looks, int count,
                    camera_guess *guess) {
-  constexpr double kFound_px = 3, kStep[3] = {0.01, 0.01, 0.001};
   const mat3 first = guess->R_map_base;
   double pose[3] = {guess->base_m.x, guess->base_m.y, atan2(first.m[1][0], first.m[0][0])};
   const auto place = [&](const double at[3]) {
