@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Detector `edges`: where the floor ends, as points on the floor.
+// Detector `edges`: the borders of the floor, as points on the floor.
 #include <cmath>
 #include <cstring>
 
@@ -15,9 +15,14 @@ namespace wm {
 
 namespace {
 
-constexpr int kLinesCrossed = 4;  // of a ray, before it gives up
-constexpr double kBlur_px = 1.0;  // what a line is wider in the picture
-constexpr int kBandSeen_px = 4;   // behind a band, that are compared with the floor before it
+constexpr int kLinesCrossed = 4;     // joints and cables that a ray crosses before its search ends: bounds the cost
+constexpr double kBlur_px = 1.0;     // added to the width of a line in the picture
+constexpr int kBehindBand_px = 4;    // averaged behind a band, to compare with the floor before it
+constexpr double kFloorAgain = 1.5;  // off the middle, in changes, that is still the floor before (which is at 0.5)
+constexpr double kSlopeMin_grey_per_px = 0.2;  // below, an edge has no direction: noise
+constexpr double kAveragedPixels = 9;          // of the 5 x 5 gradient, for its noise
+constexpr double kMargin_px = 2.5;             // from the edge of the picture: half of the gradient's mask
+constexpr double kStepOfRange = 1e-3;          // of the numerical derivative on the floor: below a pixel
 
 struct edges_state {
   wm_edges_params params;
@@ -25,16 +30,16 @@ struct edges_state {
   mounted_camera camera;
   ray_fan fan;
   ray_work work;
-  // Where lines are found by windows.
+  // For mode `windows`.
   bird_view bird;
   piece_graph graph;
   line_piece *pieces;
   line_vertex *vertices;
 };
 
-constexpr int32_t kPiecesMax = 512;  // lines of windows that are joined; those of more windows are not looked for
+constexpr int32_t kPiecesMax = 512;  // lines of windows that are joined (O(n^3)); windows beyond are not searched
 
-// Puts the state's parts one behind the other; returns the bytes of all.
+// Lays out the state; returns its bytes.
 size_t lay_out(edges_state *state, uint32_t rays, uint32_t samples, const bird_view &bird) {
   memory_layout memory(state, sizeof *state);
   ray_fan fan{};
@@ -62,7 +67,7 @@ size_t lay_out(edges_state *state, uint32_t rays, uint32_t samples, const bird_v
   return memory.bytes();
 }
 
-// The bird's-eye view, empty where it isn't used; why it can't be, or NULL.
+// Size of the bird's-eye view, empty in mode `rays`. NULL, or the reason why it is impossible.
 const char *view_of(const wm_edges_params &params, bird_view *out) {
   *out = bird_view{};
   if (params.mode != EDGES_BY_WINDOWS) return nullptr;
@@ -108,8 +113,7 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   return WM_OK;
 }
 
-// Brightness' slope in the picture about the pixel, grey levels a pixel, by Sobel's operator of five rows and columns,
-// which is nearly the same in all directions.
+// Gradient about the pixel, grey levels per pixel, by the 5 x 5 Sobel operator, which is nearly isotropic.
 void slope_at(const wm_frame &frame, const pixel &at, double *gu, double *gv) {
   constexpr int32_t kSmooth[5] = {1, 4, 6, 4, 1}, kDifference[5] = {-1, -2, 0, 2, 1};
   const int u = static_cast<int>(at.u + 0.5) - 2, v = static_cast<int>(at.v + 0.5) - 2;
@@ -125,8 +129,8 @@ void slope_at(const wm_frame &frame, const pixel &at, double *gu, double *gv) {
   *gv = down / 128.0;
 }
 
-// What lies behind an edge, across it: pixels from the edge on, towards the side that its ray comes to.
-struct behind {
+// Pixels behind an edge, across it, on the far side seen along the ray.
+struct pixels_behind {
   const wm_frame &frame;
   double u, v, du, dv;
 
@@ -139,10 +143,9 @@ struct behind {
   }
 };
 
-// Whether the band behind the edge is a line on the floor also across, not only along the ray: before `line_px` it is
-// as it was; or before `band_px`, and what comes then is as bright as the floor was, which a wall above a board hardly
-// is.
-bool is_narrow(const behind &b, const ray_edge &edge, double line_px, double band_px) {
+// Whether the band behind the edge is a line on the floor: it ends within `line_px` across it, or within `band_px` and
+// the brightness behind it is the floor's, which that of a wall above a board hardly is.
+bool is_narrow(const pixels_behind &b, const ray_edge &edge, double line_px, double band_px) {
   const double middle = static_cast<double>(edge.middle), change = static_cast<double>(edge.change);
   for (int k = 2; k < line_px || k < band_px; k++) {
     const int grey = b.grey(k);
@@ -150,29 +153,29 @@ bool is_narrow(const behind &b, const ray_edge &edge, double line_px, double ban
     if (edge.is_fall ? grey <= middle : grey >= middle) continue;
     if (k < line_px) return true;
     double sum = 0;
-    for (int i = 1; i <= kBandSeen_px; i++) {
+    for (int i = 1; i <= kBehindBand_px; i++) {
       const int further = b.grey(k + i);
       if (further < 0) return false;
       sum += further;
     }
-    const double off = (edge.is_fall ? 1 : -1) * (sum / kBandSeen_px - middle);
-    return off > 0 && off < 1.5 * change;  // half a change is where the floor was
+    const double off = (edge.is_fall ? 1 : -1) * (sum / kBehindBand_px - middle);
+    return off > 0 && off < kFloorAgain * change;
   }
   return false;
 }
 
 enum class found { kPoint, kLine, kNothing };
 
-// The edge as a point on the floor with its normal and sigma. kLine: the band behind it is narrow across, such as that
-// of a joint between tiles that the ray meets at a flat angle. kNothing: the picture doesn't tell.
+// The edge as a point on the floor with its normal and sigma. kLine: the band behind it is narrow, as a joint between
+// tiles that the ray meets at a flat angle. kNothing: the edge has no direction.
 found floor_point(const edges_state &state, const ray_edge &edge, const wm_frame &frame, wm_points *out) {
   const ray &r = state.fan.rays[edge.ray];
   const double range = range_at(state.fan, r, static_cast<double>(edge.sample));
   const vec3 centre = state.camera.centre_m;
   const double x = centre.x + range * r.cos, y = centre.y + range * r.sin;
-  const double step = 1e-3 * range;
+  const double step = kStepOfRange * range;
   pixel at, at_x, at_y;
-  if (!pixel_of(state.camera, {x, y, 0}, 2.5, &at) || !pixel_of(state.camera, {x + step, y, 0}, 0, &at_x) ||
+  if (!pixel_of(state.camera, {x, y, 0}, kMargin_px, &at) || !pixel_of(state.camera, {x + step, y, 0}, 0, &at_x) ||
       !pixel_of(state.camera, {x, y + step, 0}, 0, &at_y))
     return found::kNothing;
   double gu, gv;
@@ -180,17 +183,17 @@ found floor_point(const edges_state &state, const ray_edge &edge, const wm_frame
   const double gx = (gu * (at_x.u - at.u) + gv * (at_x.v - at.v)) / step,
                gy = (gu * (at_y.u - at.u) + gv * (at_y.v - at.v)) / step;
   const double picture = std::sqrt(gu * gu + gv * gv), floor = std::sqrt(gx * gx + gy * gy);
-  if (!(picture > 0.2) || !(floor > 0)) return found::kNothing;
-  // An upright board that is just no line lies along the ray in the picture, too.
+  if (!(picture > kSlopeMin_grey_per_px) || !(floor > 0)) return found::kNothing;
+  // rays.line_rel is a length along the ray; its width across the edge.
   const double along = gx * r.cos + gy * r.sin,
                board_px = state.params.rays_line_rel * range * std::fabs(along) / picture,
                line_px = kBlur_px + state.params.rays_line_m * floor / picture;
   const double sign = edge.is_fall ? -1 : 1;  // down the slope of a fall, up that of a rise
-  const behind across = {frame, at.u, at.v, sign * gu / picture, sign * gv / picture};
+  const pixels_behind across = {frame, at.u, at.v, sign * gu / picture, sign * gv / picture};
   if (is_narrow(across, edge, board_px > line_px ? board_px : line_px,
                 kBlur_px + state.params.rays_band_m * floor / picture))
     return found::kLine;
-  const double noise = state.params.noise_grey / picture / 3;  // the mean of about ten pixels
+  const double noise = state.params.noise_grey / picture / std::sqrt(kAveragedPixels);
   const double sigma_px = std::sqrt(square(state.params.sigma_px) + square(noise));
   const uint32_t i = out->count++;
   out->x_m[i] = static_cast<float>(x);
@@ -222,8 +225,8 @@ void points_of_rays(edges_state *state, const wm_frame &frame, wm_points *points
   keep_supported(points, rays, state->camera.centre_m.x, state->camera.centre_m.y, state->params.rays_support_min);
 }
 
-// Points along a link of a polyline, with the side that is bright.
-void points_of_link(const edges_state &state, const line_vertex &from, const line_vertex &to, wm_points *points) {
+// Points along a segment of a polyline; the normals point from the bright side to the dark one.
+void points_of_segment(const edges_state &state, const line_vertex &from, const line_vertex &to, wm_points *points) {
   const bird_view &bird = state.bird;
   const double dx = static_cast<double>(to.x - from.x), dy = static_cast<double>(to.y - from.y);
   const double size = std::sqrt(dx * dx + dy * dy);
@@ -255,7 +258,7 @@ void points_of_windows(edges_state *state, const wm_frame &frame, wm_points *poi
   const int vertices = make_polylines(state->pieces, pieces, state->params.hough, &state->graph, state->vertices);
   for (int i = 1; i < vertices; i++) {
     const line_vertex &from = state->vertices[i - 1], &to = state->vertices[i];
-    if (from.line == to.line) points_of_link(*state, from, to, points);
+    if (from.line == to.line) points_of_segment(*state, from, to, points);
   }
 }
 
@@ -288,7 +291,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
 
 extern "C" const wm_detector wm_edges_detector = {
     "edges",
-    "where the floor ends: edges of walls, doors and pillars on the floor",
+    "borders of the floor: feet of walls, doors and pillars",
     WM_EVENT_BIT(WM_EVENT_POINTS),
     1,
     wm_edges_params_table,

@@ -5,10 +5,11 @@ namespace wm {
 
 namespace {
 
-constexpr double kMargin_px = 2;  // for the neighbours that interpolation and gradients read
-constexpr double kFirstStep_m = 0.002;
+constexpr double kMargin_px = 2;       // for the pixels that interpolation and gradients read
+constexpr double kProbe = 0.002;       // of the numerical derivative, per metre of range plus height
+constexpr double kMovedMin_px = 1e-9;  // of a probe: a ray that stands still in the picture
 
-// Walks a ray in steps of a pixel and hands each place to `take(pixel, range)`, while it is in the picture.
+// Samples a ray in steps of a pixel and calls `take(pixel, range, index)` for each, while it is in the picture.
 template <class Take>
 int walk(const mounted_camera &camera, const wm_edges_params &params, double cosine, double sine, Take take) {
   const double height = camera.centre_m.z;
@@ -21,16 +22,16 @@ int walk(const mounted_camera &camera, const wm_edges_params &params, double cos
   if (!(height > 0)) return 0;
   for (double range = params.rays_range_min_m; range <= params.rays_range_max_m && count < kRaySamplesMax;) {
     pixel ahead;
-    const double probe = kFirstStep_m * (range + height);
+    const double probe = kProbe * (range + height);
     const bool is_inside = pixel_at(range, &at), has_ahead = pixel_at(range + probe, &ahead);
     if (!is_inside || !has_ahead) {
-      if (count > 0) break;  // one piece of floor: what comes behind a gap is not looked at
+      if (count > 0) break;  // one piece of floor: nothing behind a gap is searched
       range += probe;
       continue;
     }
     take(at, range, count++);
     const double du = ahead.u - at.u, dv = ahead.v - at.v, moved = std::sqrt(du * du + dv * dv);
-    if (!(moved > 1e-9)) break;
+    if (!(moved > kMovedMin_px)) break;
     range += probe / moved;
   }
   return count;
@@ -38,7 +39,7 @@ int walk(const mounted_camera &camera, const wm_edges_params &params, double cos
 
 template <class Each>
 void each_direction(const wm_edges_params &params, Each each) {
-  // From behind over the right, the front and the left: one of them straight ahead.
+  // From -pi to pi; one of them straight ahead.
   const int half = static_cast<int>(kPi / params.rays_step_rad);
   for (int i = -half; i <= half && i < kRaysMax - half; i++) {
     const double direction = i * params.rays_step_rad;
@@ -46,7 +47,7 @@ void each_direction(const wm_edges_params &params, Each each) {
   }
 }
 
-constexpr int kShortest = 12;  // samples: less is no ray
+constexpr int kSamplesMin = 12;  // of a ray: both sides of an edge with neighbours
 
 uint8_t part_of_256(double x) { return static_cast<uint8_t>(x * 256 < 255 ? x * 256 : 255); }
 
@@ -65,7 +66,7 @@ int read_profile(const ray_fan &fan, const ray &r, const wm_frame &frame, int32_
   return count;
 }
 
-constexpr int kSide = 4;  // samples that are averaged on each side of an edge
+constexpr int kSide = 4;  // samples averaged on each side of an edge
 
 // Grey levels along a ray, in 1/256, with their ranges.
 struct profile {
@@ -73,7 +74,7 @@ struct profile {
   const float *range_m;
   int count;
 
-  // How much darker it gets here, over two pixels on each side.
+  // Decrease of grey here, two samples on each side.
   int32_t drop(int i) const { return grey[i - 2] + grey[i - 1] - grey[i + 1] - grey[i + 2]; }
   bool is_fall(int i) const { return drop(i) > drop(i - 1) && drop(i) >= drop(i + 1); }
   bool is_rise(int i) const { return drop(i) < drop(i - 1) && drop(i) <= drop(i + 1); }
@@ -88,41 +89,41 @@ struct profile {
   int end() const { return count - kSide - 1; }
 };
 
-// What the floor's brightness has been along the ray: follows it down faster than up, by steps that don't depend on how
-// far off it is, so that neither a lamp's reflection nor a dark line counts for much.
+// Brightness of the floor along the ray: an asymmetric median filter. It follows downwards faster than upwards, in
+// steps of fixed size, so a lamp's reflection or a dark line has little influence.
 struct floor_level {
-  static constexpr double kUp = 0.25 * 256, kDown = 1.0 * 256;  // a sample
+  static constexpr double kUp = 0.25 * 256, kDown = 1.0 * 256;  // 1/256 grey levels per sample. Not swept
   double grey;
-  void see(int32_t sample) {
+  void update(int32_t sample) {
     const double off = sample - grey;
     grey += off > kUp ? kUp : off < -kDown ? -kDown : off;
   }
 };
 
-// A place where it gets darker (or brighter) for good.
-struct step {
+// A lasting fall (or rise) of brightness along the ray.
+struct profile_step {
   int at;
-  double level, after;  // of the floor before, of what comes behind
+  double level, after;  // of the floor before it, behind it
   bool is_fall;
 };
 
-// Whether the band behind the step is so narrow that it is no wall's: soon it is as it was.
-bool is_line(const profile &p, const step &s, double narrow_rel) {
+// Whether the band behind the step is a line on the floor: the brightness returns within `narrow_rel` of the range.
+bool is_line(const profile &p, const profile_step &s, double narrow_rel) {
   const double middle = 0.5 * (s.level + s.after), until = p.range(s.at) * (1 + narrow_rel);
   for (int k = s.at + 2; k < p.count && p.range(k) < until; k++)
     if (s.is_fall ? p.grey[k] > middle : p.grey[k] < middle) return true;
   return false;
 }
 
-bool find_first_step(const profile &p, double usual_grey, const wm_edges_params &params, int from, step *out) {
-  constexpr double kBrighter = 1.3;  // towards a window, but not a lamp itself
+bool find_first_step(const profile &p, double usual_grey, const wm_edges_params &params, int from, profile_step *out) {
+  constexpr double kBrighterMax = 1.3;  // of a ray's beginning over the usual floor: a window, not a lamp's image
   const double begin = p.mean(0);
-  floor_level floor = {begin < kBrighter * usual_grey ? begin : kBrighter * usual_grey};
+  floor_level floor = {begin < kBrighterMax * usual_grey ? begin : kBrighterMax * usual_grey};
   for (int i = p.first(), seen = 0; i < p.end(); i++) {
-    for (; seen < i - kSide; seen++) floor.see(p.grey[seen]);
+    for (; seen < i - kSide; seen++) floor.update(p.grey[seen]);
     const bool is_fall = p.is_fall(i);
     if (i < from || (!is_fall && !(params.rays_sign == EDGES_ANY_SIGN && p.is_rise(i)))) continue;
-    // A lamp's reflection ends with a fall to what the floor was all the time: only what falls below that counts.
+    // A lamp's reflection ends with a fall to the floor's level: only a fall below that level counts.
     const double before = p.before(i), level = is_fall && floor.grey < before ? floor.grey : before;
     *out = {i, level, p.after(i), is_fall};
     const double change = is_fall ? out->level - out->after : out->after - out->level;
@@ -133,8 +134,8 @@ bool find_first_step(const profile &p, double usual_grey, const wm_edges_params 
   return false;
 }
 
-// Where it is bright again behind the step: the upper edge of a skirting board. 0 where it is not within reach.
-int find_upper_edge(const profile &p, const step &s, double reach_rel) {
+// The rise behind the step: the upper edge of a skirting board. 0 if none is within reach.
+int find_upper_edge(const profile &p, const profile_step &s, double reach_rel) {
   const double until = p.range(s.at) * (1 + reach_rel) / (1 - reach_rel);
   double darkest = s.after;
   for (int k = s.at + 1; k < p.end() && p.range(k) < until; k++) {
@@ -150,12 +151,13 @@ int find_upper_edge(const profile &p, const step &s, double reach_rel) {
 
 // A glossy floor mirrors the skirting board: the first step may be the mirror image of its upper edge. By the law of
 // reflection the joint then lies at the harmonic mean of both ranges: image, joint and edge are at h/(h+s), 1 and
-// h/(h-s) of it for a camera at h and a board of height s. Or a weak edge on the floor came just before the joint.
-int joint_behind(const profile &p, const step &first, const wm_edges_params &params) {
-  constexpr double kWeak = 0.25;     // of the first step, where the place is foretold
-  constexpr double kStronger = 1.2;  // where it isn't
+// h/(h-s) of its range for a camera at height h and a board of height s. A weak edge on the floor may also precede the
+// joint. Returns the sample of the joint.
+int joint_behind(const profile &p, const profile_step &first, const wm_edges_params &params) {
+  constexpr double kWeak = 0.25;     // of the first step's change, near the predicted place. Not swept
+  constexpr double kStronger = 1.2;  // the same, elsewhere. Not swept
   const int upper = find_upper_edge(p, first, params.rays_mirror_rel);
-  const double foretold = upper > 0 ? 2 / (1 / p.range(first.at) + 1 / p.range(upper)) : 0;
+  const double predicted = upper > 0 ? 2 / (1 / p.range(first.at) + 1 / p.range(upper)) : 0;
   const double until = p.range(first.at) * (1 + params.rays_mirror_rel);
   const int end = upper > 0 ? upper - 1 : p.end();
   const double first_change = p.before(first.at) - p.after(first.at);
@@ -164,7 +166,7 @@ int joint_behind(const profile &p, const step &first, const wm_edges_params &par
   for (int i = first.at + 2; i < end && p.range(i) < until; i++) {
     if (!p.is_fall(i)) continue;
     const double before = p.before(i), change = before - p.after(i);
-    const bool is_near = upper > 0 && p.range(i - 2) < foretold && p.range(i + 2) > foretold;
+    const bool is_near = upper > 0 && p.range(i - 2) < predicted && p.range(i + 2) > predicted;
     if (is_near && change > kWeak * first_change && change > 0.5 * params.rays_contrast_grey * 256) return i;
     if (change > kStronger * strongest) {
       strongest = change;
@@ -180,7 +182,7 @@ void ray_fan_count(const mounted_camera &camera, const wm_edges_params &params, 
   *rays = *samples = 0;
   each_direction(params, [&](double, const sin_cos &d) {
     const int count = walk(camera, params, d.cos, d.sin, [](const pixel &, double, int) {});
-    if (count < kShortest) return;
+    if (count < kSamplesMin) return;
     *rays += 1;
     *samples += static_cast<uint32_t>(count);
   });
@@ -189,7 +191,7 @@ void ray_fan_count(const mounted_camera &camera, const wm_edges_params &params, 
 void ray_fan_make(const mounted_camera &camera, const wm_edges_params &params, ray_fan *out) {
   out->ray_count = out->sample_count = 0;
   each_direction(params, [&](double direction, const sin_cos &d) {
-    if (walk(camera, params, d.cos, d.sin, [](const pixel &, double, int) {}) < kShortest) return;
+    if (walk(camera, params, d.cos, d.sin, [](const pixel &, double, int) {}) < kSamplesMin) return;
     const uint32_t first = out->sample_count;
     const int count = walk(camera, params, d.cos, d.sin, [&](const pixel &at, double range, int i) {
       const double column = std::floor(at.u), row = std::floor(at.v);
@@ -232,12 +234,12 @@ bool find_first_edge(const ray_fan &fan, uint32_t index, const wm_frame &frame, 
   p.range_m = fan.range_m + r.first;
   p.grey = work->grey;
   p.count = read_profile(fan, r, frame, work->grey);
-  step first;
+  profile_step first;
   if (!find_first_step(p, usual_grey, params, from, &first)) return false;
   const int i = first.is_fall ? joint_behind(p, first, params) : first.at;
-  // Sub-pixel: the parabola through the three steepest.
-  const double left = p.drop(i - 1), here = p.drop(i), right = p.drop(i + 1), bend = left - 2 * here + right;
-  const double shift = bend != 0 ? 0.5 * (left - right) / bend : 0;
+  // Sub-pixel: parabola through the three largest slopes.
+  const double left = p.drop(i - 1), here = p.drop(i), right = p.drop(i + 1), curvature = left - 2 * here + right;
+  const double shift = curvature != 0 ? 0.5 * (left - right) / curvature : 0;
   *out = {static_cast<int32_t>(index),
           first.is_fall,
           static_cast<float>(i + shift),

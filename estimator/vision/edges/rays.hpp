@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays over the floor from the camera's foot point, as their ways through the picture: made once, walked in each
-// picture. A step is a pixel. The first edge from bright to dark on such a ray is where the floor ends.
+// Edges by rays: rays over the floor from the camera's foot point, sampled in the picture at steps of a pixel by a
+// table. The first edge from bright to dark on a ray is the border of the floor.
 #ifndef WAYMARK_ESTIMATOR_VISION_RAYS_HPP
 #define WAYMARK_ESTIMATOR_VISION_RAYS_HPP
 
@@ -13,7 +13,7 @@ namespace wm {
 inline constexpr int kRaySamplesMax = 2048;
 inline constexpr int kRaysMax = 6400;
 
-// A place in the picture, in 1/256 px: column and row of the upper left of four pixels, and the way between them.
+// A place in the picture, in 1/256 px: column and row of the upper left of four pixels, and the offset within them.
 struct ray_sample {
   uint16_t column, row;
   uint8_t right, down;
@@ -42,21 +42,21 @@ struct ray_fan {
   float *range_m;  // of each sample
 };
 
-// How much memory the fan of this camera needs: counts rays and samples (rays and samples are not written).
+// Counts the rays and samples of this camera's fan.
 void ray_fan_count(const mounted_camera &camera, const wm_edges_params &params, uint32_t *rays, uint32_t *samples);
-// Fills the fan, whose arrays are as large as counted.
+// Fills the fan, whose arrays have the sizes counted.
 void ray_fan_make(const mounted_camera &camera, const wm_edges_params &params, ray_fan *out);
 
-// What floors look like just before the robot: the middle of all rays' beginnings, in 1/256 grey levels. Lamps mirrored
-// there are not the floor.
+// Median brightness of the floor before the robot (the first sample of each ray), in 1/256 grey levels: robust against
+// mirrored lamps.
 double usual_floor(const ray_fan &fan, const wm_frame &frame);
 
-// Work space for one ray at a time: its grey levels, in 1/256.
+// Work space for one ray: its grey levels, in 1/256.
 struct ray_work {
   int32_t grey[kRaySamplesMax];
 };
 
-// First edge on the ray that is one of a wall, from sample `from` on. False where there is none.
+// First edge of a wall on the ray, from sample `from`. False where there is none.
 bool find_first_edge(const ray_fan &fan, uint32_t index, const wm_frame &frame, double usual_grey,
                      const wm_edges_params &params, int from, ray_work *work, ray_edge *out);
 

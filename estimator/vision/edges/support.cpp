@@ -7,15 +7,16 @@ namespace wm {
 
 namespace {
 
-constexpr double kSigmas = 3;
-constexpr double kAlong = 0.08;  // sine of the smallest angle between a wall and the way from the eye
+constexpr double kSigmas = 3;    // gate of a neighbour about the line
+constexpr double kAlong = 0.08;  // sine of the smallest angle between a wall and the line of sight. Not swept
+constexpr int kFitMin = 4;       // points on the line from which it gives a better normal than the gradient
 constexpr int kWindow = 2 * kNeighbours + 1;
 
 struct neighbour {
-  double x, y, sigma;  // against the point itself
+  double x, y, sigma;  // relative to the point
 };
 
-// How many lie on the line through the point in the direction (dx, dy), of any length; `out` gets a bit each.
+// Number of neighbours on the line through the point in the direction (dx, dy); `out`: a bit each.
 int count_on_line(const neighbour *all, int count, double dx, double dy, double sigma, uint32_t *out) {
   const double size2 = dx * dx + dy * dy;
   int found = 0;
@@ -30,7 +31,7 @@ int count_on_line(const neighbour *all, int count, double dx, double dy, double 
   return found;
 }
 
-// Direction of the line through the point and those of `bits`, by their moments, weighted.
+// Direction of the line through the point and those of `bits`: weighted total least squares.
 double direction_of(const neighbour *all, int count, uint32_t bits, double sigma) {
   const double w0 = 1 / square(sigma);
   double w = w0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
@@ -50,40 +51,57 @@ double direction_of(const neighbour *all, int count, uint32_t bits, double sigma
 
 }  // namespace
 
+namespace {
+
+// The other points within kNeighbours rays of point i.
+int neighbours_of(const wm_points &p, const int32_t *ray, int i, neighbour *out) {
+  const int count = static_cast<int>(p.count);
+  int found = 0;
+  for (int k = i > kNeighbours ? i - kNeighbours : 0; k < count && k <= i + kNeighbours; k++) {
+    const int32_t apart = ray[k] - ray[i];
+    if (k == i || apart > kNeighbours || apart < -kNeighbours) continue;
+    out[found++] = {static_cast<double>(p.x_m[k]) - static_cast<double>(p.x_m[i]),
+                    static_cast<double>(p.y_m[k]) - static_cast<double>(p.y_m[i]), static_cast<double>(p.sigma_m[k])};
+  }
+  return found;
+}
+
+// The line through the point and one neighbour that most neighbours lie on. Returns their number.
+int best_line(const neighbour *near, int count, double look_x, double look_y, double sigma, uint32_t *best_bits) {
+  const double look2 = square(look_x) + square(look_y);
+  int best = 0;
+  *best_bits = 0;
+  for (int k = 0; k < count; k++) {
+    // A line along the line of sight would contain all neighbours.
+    const double aside = look_x * near[k].y - look_y * near[k].x;
+    if (square(aside) < square(kAlong) * look2 * (square(near[k].x) + square(near[k].y))) continue;
+    uint32_t bits;
+    const int on_line = count_on_line(near, count, near[k].x, near[k].y, sigma, &bits);
+    if (on_line <= best) continue;
+    best = on_line;
+    *best_bits = bits;
+  }
+  return best;
+}
+
+}  // namespace
+
 void keep_supported(wm_points *points, const int32_t *ray, double eye_x_m, double eye_y_m, int32_t support_min) {
   wm_points &p = *points;
   float normal[WM_POINTS_MAX];
   bool kept[WM_POINTS_MAX];
   const int count = static_cast<int>(p.count);
   for (int i = 0; i < count; i++) {
-    const double x = static_cast<double>(p.x_m[i]), y = static_cast<double>(p.y_m[i]);
     const double sigma = static_cast<double>(p.sigma_m[i]);
     neighbour near[kWindow];
-    int near_count = 0;
-    for (int k = i > kNeighbours ? i - kNeighbours : 0; k < count && k <= i + kNeighbours; k++) {
-      const int32_t apart = ray[k] - ray[i];
-      if (k == i || apart > kNeighbours || apart < -kNeighbours) continue;
-      near[near_count++] = {static_cast<double>(p.x_m[k]) - x, static_cast<double>(p.y_m[k]) - y,
-                            static_cast<double>(p.sigma_m[k])};
-    }
-    int best = 0;
-    uint32_t best_bits = 0;
-    const double look_x = x - eye_x_m, look_y = y - eye_y_m, look2 = square(look_x) + square(look_y);
-    for (int k = 0; k < near_count; k++) {
-      // All neighbours lie about a line that leads away from the eye.
-      const double aside = look_x * near[k].y - look_y * near[k].x;
-      if (square(aside) < square(kAlong) * look2 * (square(near[k].x) + square(near[k].y))) continue;
-      uint32_t bits;
-      const int on_line = count_on_line(near, near_count, near[k].x, near[k].y, sigma, &bits);
-      if (on_line > best) {
-        best = on_line;
-        best_bits = bits;
-      }
-    }
+    const int near_count = neighbours_of(p, ray, i, near);
+    uint32_t bits;
+    const int best = best_line(near, near_count, static_cast<double>(p.x_m[i]) - eye_x_m,
+                               static_cast<double>(p.y_m[i]) - eye_y_m, sigma, &bits);
     kept[i] = best >= support_min;
     normal[i] = p.normal_rad[i];
-    if (best < 4) continue;
-    const double across = direction_of(near, near_count, best_bits, sigma) + kHalfPi;
+    if (best < kFitMin) continue;
+    const double across = direction_of(near, near_count, bits, sigma) + kHalfPi;
     const double off = wrap(across - static_cast<double>(p.normal_rad[i]));
     normal[i] = static_cast<float>(off > kHalfPi || off < -kHalfPi ? wrap(across + kPi) : wrap(across));
   }

@@ -10,9 +10,9 @@ namespace wm {
 
 inline constexpr int kNeighbours = 4;  // rays to each side
 
-// Leaves out points that fewer than `support_min` others within kNeighbours rays lie on a line with; where four or more
-// do, the normal is that of the line through them, on the side where the gradient's is.
-// `ray` has the ray of each point, rising; the eye is where they come from.
+// Removes points that lie on a line with fewer than `support_min` others within kNeighbours rays. With four or more the
+// normal becomes that of the line through them, on the gradient's side. `ray`: index of each point's ray, ascending;
+// the rays begin at the eye.
 void keep_supported(wm_points *points, const int32_t *ray, double eye_x_m, double eye_y_m, int32_t support_min);
 
 }  // namespace wm

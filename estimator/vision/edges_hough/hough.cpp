@@ -16,7 +16,7 @@ typedef int16_t lanes_anywhere __attribute__((vector_size(32), aligned(2), may_a
 typedef uint32_t squares __attribute__((vector_size(32)));
 typedef int16_t half_lanes __attribute__((vector_size(16)));
 
-// The way of a part of `part` rows on a line that goes over t columns in `whole` rows, to the nearest.
+// Shift over `part` rows of a line that shifts by t columns over `whole` rows, rounded.
 int part_of(int t, int part, int whole) { return whole > 1 ? (2 * t * (part - 1) + whole - 1) / (2 * (whole - 1)) : 0; }
 
 // Plans the sums of rows first .. first + count - 1, slopes 0 .. count - 1, into the same rows of plane `to` (0 or 1);
@@ -157,7 +157,7 @@ const hough_plane *hough_transform_scalar(const uint8_t *in, int side, int row, 
 
 int hough_line(int side, int t, int y) { return line_column(t, side, y); }
 
-// Every slope's sums add up to the whole window, so that the squares alone say which vary most.
+// The sums of every slope add up to the whole window, so the squares alone order the variances.
 hough_peak hough_find(const hough_plane &plane, int side) {
   uint64_t squares_sum;
 #if WM_HAS_WIDE

@@ -2,13 +2,11 @@
 #include "vision/edges_hough/polylines.hpp"
 
 #include "math/elementary.hpp"
+#include "memory/layout.hpp"
 
 namespace wm {
 
 namespace {
-
-constexpr size_t kAlign = 64;
-constexpr size_t rounded(size_t bytes) { return (bytes + kAlign - 1) / kAlign * kAlign; }
 
 struct point {
   double x, y;
@@ -21,7 +19,7 @@ point end_of(const line_piece &p, int which) {
 
 double square_between(const point &a, const point &b) { return square(a.x - b.x) + square(a.y - b.y); }
 
-// The ends of two pieces that are nearest to each other, or farthest from each other.
+// The nearest or the farthest ends of two pieces.
 struct end_pair {
   int a, b;
   double square_px;
@@ -47,7 +45,8 @@ bool continue_each_other(const line_piece &p, const line_piece &q, const wm_edge
   return lengths > 0 && ax * bx + ay * by <= angle_cos * lengths;
 }
 
-// Where two pieces that follow each other meet: where their lines cross, if that is at their ends, or between those.
+// Joint of two consecutive pieces: the intersection of their lines if it is near their ends, else the middle of the
+// ends.
 point joint_of(const line_piece &p, const line_piece &q, double join_px) {
   const end_pair near = pair_of_ends(p, q, true);
   const point a = end_of(p, near.a), b = end_of(q, near.b), far_a = end_of(p, 1 - near.a),
@@ -76,13 +75,13 @@ struct builder {
   void connect() {
     const double angle_cos = cos(params.windows_join_angle_rad);
     for (int a = 0; a < count; a++) {
-      graph.way[at(a, a)] = 0;
+      graph.length[at(a, a)] = 0;
       graph.hops[at(a, a)] = 0;
       for (int b = a + 1; b < count; b++) {
-        float way = -1;
+        float length = -1;
         if (continue_each_other(pieces[a], pieces[b], params, angle_cos))
-          way = static_cast<float>(std::sqrt(pair_of_ends(pieces[a], pieces[b], false).square_px));
-        graph.way[at(a, b)] = graph.way[at(b, a)] = way;
+          length = static_cast<float>(std::sqrt(pair_of_ends(pieces[a], pieces[b], false).square_px));
+        graph.length[at(a, b)] = graph.length[at(b, a)] = length;
         graph.hops[at(a, b)] = graph.hops[at(b, a)] = 1;
         graph.next[at(a, b)] = static_cast<uint16_t>(b);
         graph.next[at(b, a)] = static_cast<uint16_t>(a);
@@ -90,21 +89,21 @@ struct builder {
     }
   }
 
-  // The pieces connected with `first`, into graph.member; they get its number as their part's.
+  // Collects the pieces connected with `first` in graph.member and labels their part with its index.
   int gather(int first) {
     int size = 0;
     graph.member[size++] = first;
     graph.part[first] = first;
     for (int next = 0; next < size; next++)
       for (int b = 0; b < count; b++) {
-        if (graph.part[b] >= 0 || graph.way[at(graph.member[next], b)] < 0) continue;
+        if (graph.part[b] >= 0 || graph.length[at(graph.member[next], b)] < 0) continue;
         graph.part[b] = first;
         graph.member[size++] = b;
       }
     return size;
   }
 
-  // The whole part as one line from end to end, if it is straight enough.
+  // Adds the whole part as one line from end to end, if it is straight enough.
   bool add_straight(int size) {
     point u = end_of(pieces[graph.member[0]], 0), v = end_of(pieces[graph.member[0]], 1);
     for (int i = 0; i < size; i++)
@@ -128,23 +127,23 @@ struct builder {
     return true;
   }
 
-  // Floyd's shortest paths between all pieces of the part; of equal ones the one with fewer edges.
-  void find_ways(int size) {
+  // Shortest paths between all pieces of the part (R. W. Floyd 1962); ties by the number of edges.
+  void find_shortest_paths(int size) {
     for (int m = 0; m < size; m++) {
       const int k = graph.member[m];
       for (int i = 0; i < size; i++) {
         const int a = graph.member[i];
         const size_t a_k = at(a, k);
-        if (graph.way[a_k] < 0 || a == k) continue;
+        if (graph.length[a_k] < 0 || a == k) continue;
         for (int j = 0; j < size; j++) {
           const int b = graph.member[j];
           const size_t a_b = at(a, b), k_b = at(k, b);
-          if (graph.way[k_b] < 0) continue;
-          const float way = graph.way[a_k] + graph.way[k_b];
+          if (graph.length[k_b] < 0) continue;
+          const float length = graph.length[a_k] + graph.length[k_b];
           const auto hops = static_cast<uint16_t>(graph.hops[a_k] + graph.hops[k_b]);
-          const float known = graph.way[a_b];
-          if (known >= 0 && (known < way || (!(way < known) && graph.hops[a_b] <= hops))) continue;
-          graph.way[a_b] = way;
+          const float known = graph.length[a_b];
+          if (known >= 0 && (known < length || (!(length < known) && graph.hops[a_b] <= hops))) continue;
+          graph.length[a_b] = length;
           graph.hops[a_b] = hops;
           graph.next[a_b] = graph.next[a_k];
         }
@@ -152,14 +151,14 @@ struct builder {
     }
   }
 
-  void add_longest_way(int size) {
-    find_ways(size);
+  void add_longest_path(int size) {
+    find_shortest_paths(size);
     int from = graph.member[0], to = from;
     for (int i = 0; i < size; i++)
       for (int j = i + 1; j < size; j++) {
         const size_t here = at(graph.member[i], graph.member[j]), best = at(from, to);
-        if (graph.way[here] < graph.way[best] ||
-            (!(graph.way[best] < graph.way[here]) && graph.hops[here] >= graph.hops[best]))
+        if (graph.length[here] < graph.length[best] ||
+            (!(graph.length[best] < graph.length[here]) && graph.hops[here] >= graph.hops[best]))
           continue;
         from = graph.member[i];
         to = graph.member[j];
@@ -178,25 +177,21 @@ struct builder {
 
 }  // namespace
 
-size_t piece_graph_bytes(int32_t capacity) {
+size_t piece_graph_place(piece_graph *graph, int32_t capacity, void *memory) {
   const auto n = static_cast<size_t>(capacity);
-  return rounded(n * n * sizeof(float)) + 2 * rounded(n * n * sizeof(uint16_t)) + 2 * rounded(n * sizeof(int32_t));
+  memory_layout layout(memory, 0);
+  graph->capacity = capacity;
+  graph->length = layout.take<float>(n * n);
+  graph->hops = layout.take<uint16_t>(n * n);
+  graph->next = layout.take<uint16_t>(n * n);
+  graph->part = layout.take<int32_t>(n);
+  graph->member = layout.take<int32_t>(n);
+  return layout.bytes();
 }
 
-void piece_graph_place(piece_graph *graph, int32_t capacity, void *memory) {
-  const auto n = static_cast<size_t>(capacity);
-  auto *next = static_cast<uint8_t *>(memory);
-  const auto take = [&next](size_t bytes) {
-    uint8_t *here = next;
-    next += rounded(bytes);
-    return static_cast<void *>(here);
-  };
-  graph->capacity = capacity;
-  graph->way = static_cast<float *>(take(n * n * sizeof(float)));
-  graph->hops = static_cast<uint16_t *>(take(n * n * sizeof(uint16_t)));
-  graph->next = static_cast<uint16_t *>(take(n * n * sizeof(uint16_t)));
-  graph->part = static_cast<int32_t *>(take(n * sizeof(int32_t)));
-  graph->member = static_cast<int32_t *>(take(n * sizeof(int32_t)));
+size_t piece_graph_bytes(int32_t capacity) {
+  piece_graph counted;
+  return piece_graph_place(&counted, capacity, nullptr);
 }
 
 int make_polylines(const line_piece *pieces, int count, const wm_edges_hough_params &params, piece_graph *graph,
@@ -207,7 +202,7 @@ int make_polylines(const line_piece *pieces, int count, const wm_edges_hough_par
   for (int i = 0; i < count; i++) {
     if (graph->part[i] >= 0) continue;
     const int size = b.gather(i);
-    if (!b.add_straight(size)) b.add_longest_way(size);
+    if (!b.add_straight(size)) b.add_longest_path(size);
     b.lines++;
   }
   return b.vertices;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Line pieces of the windows joined to polylines, as M. P. Abramov et al. 2019 do: pieces are the vertices of a graph,
-// an edge is where two continue each other, and of every connected part one polyline is made.
+// Joins the windows' line pieces to polylines (M. P. Abramov et al. 2019): pieces are the vertices of a graph, its
+// edges connect pieces that continue each other, and each connected part becomes one polyline.
 #ifndef WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_POLYLINES_HPP
 #define WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_POLYLINES_HPP
 
@@ -18,23 +18,23 @@ struct line_piece {
 
 struct line_vertex {
   float x, y;
-  int32_t line;  // number of the polyline that it belongs to; those of one follow each other
+  int32_t line;  // index of its polyline, whose vertices are consecutive
 };
 
 // Work space for up to `capacity` pieces.
 struct piece_graph {
   int32_t capacity;
-  float *way;              // capacity^2: of the shortest path between two pieces; below 0 where there is none
-  uint16_t *hops, *next;   // capacity^2: its edges; the piece after the first
-  int32_t *part, *member;  // capacity: each piece's connected part; the pieces of the part at work
+  float *length;           // capacity^2: of the shortest path between two pieces; below 0: none
+  uint16_t *hops, *next;   // capacity^2: its number of edges; the piece after the first
+  int32_t *part, *member;  // capacity: each piece's connected part; the pieces of the current part
 };
 
-// Bytes of the arrays, and where they lie in `memory` (64-byte aligned).
+// Places the arrays in `memory` (64-byte aligned, or NULL to count). Returns their bytes.
 size_t piece_graph_bytes(int32_t capacity);
-void piece_graph_place(piece_graph *graph, int32_t capacity, void *memory);
+size_t piece_graph_place(piece_graph *graph, int32_t capacity, void *memory);
 
-// Polylines of `count` (at most the graph's capacity) pieces; returns how many vertices there are, at most twice the
-// pieces. Two pieces are joined where their nearest ends are less than windows.join_px apart and they make an angle of
+// Polylines of `count` (at most the graph's capacity) pieces. Returns the number of vertices, at most twice the pieces.
+// Two pieces are joined where their nearest ends are less than windows.join_px apart and they make an angle of
 // at least windows.join_angle_rad there. A part of which more than windows.straight_share of the ends lie within
 // windows.straight_px of the line through its two ends farthest from each other is that line; else it is the longest of
 // the shortest paths between its pieces (R. W. Floyd 1962), of equals the one with the fewest, through the pieces'

@@ -12,7 +12,8 @@ int windows_along(int32_t size, const wm_edges_hough_params &p) {
   return size < p.windows_px || step < 1 ? 0 : (size - p.windows_px) / step + 1;
 }
 
-void look_from_above(const bird_view &view, const wm_frame &frame) {
+// Samples the bird's-eye view from the frame, bilinear.
+void sample_view(const bird_view &view, const wm_frame &frame) {
   const int32_t count = view.width * view.height;
   for (int32_t i = 0; i < count; i++) {
     const bird_pixel b = view.table[i];
@@ -24,7 +25,7 @@ void look_from_above(const bird_view &view, const wm_frame &frame) {
   }
 }
 
-// Magnitude of the gradient by differences over two pixels, as the larger part and half of the smaller (within 12 %).
+// Magnitude of the gradient by differences over two pixels: larger component plus half of the smaller (within 12 %).
 void find_gradient(const bird_view &view) {
   for (int32_t y = 1; y + 1 < view.height; y++) {
     const uint8_t *grey = view.grey + y * view.width, *inner = view.inner + y * view.width;
@@ -39,13 +40,13 @@ void find_gradient(const bird_view &view) {
   }
 }
 
-struct candidate {
+struct window_peak {
   hough_peak peak;
   int quadrant;
 };
 
-// The line as a piece of its window, cut at the window's sides.
-line_piece piece_of(const candidate &c, int side) {
+// The line of a peak as a piece, clipped to the window.
+line_piece piece_of(const window_peak &c, int side) {
   const int start = c.peak.offset - (side - 1);
   int first = side, last = -1;
   for (int k = 0; k < side; k++) {
@@ -60,7 +61,7 @@ line_piece piece_of(const candidate &c, int side) {
     const int at = start + hough_line(side, c.peak.t, i == 0 ? first : last);
     across[i] = static_cast<float>(c.quadrant & 2 ? side - 1 - at : at);
   }
-  // Quadrants 0 and 2: along the rows' order; 1 and 3: along the columns'.
+  // Quadrants 0 and 2 run along the rows, 1 and 3 along the columns.
   if (c.quadrant & 1) return {along[0], across[0], along[1], across[1]};
   return {across[0], along[0], across[1], along[1]};
 }
@@ -68,7 +69,7 @@ line_piece piece_of(const candidate &c, int side) {
 bool find_in_window(const bird_view &view, int32_t x0, int32_t y0, const wm_edges_hough_params &params,
                     line_piece *out) {
   const int side = params.windows_px;
-  candidate best = {{0, 0, 0, -1.0F}, 0};
+  window_peak best = {{0, 0, 0, -1.0F}, 0};
   const uint8_t *window = view.edge + static_cast<ptrdiff_t>(y0) * view.width + x0;
   uint8_t turned[kHoughSideMax * kHoughSideMax];
   for (int y = 0; y < side; y++)
@@ -140,7 +141,7 @@ void bird_view_make(const mounted_camera &camera, const wm_edges_hough_params &p
 
 int find_pieces(const bird_view &view, const wm_frame &frame, const wm_edges_hough_params &params, line_piece *out,
                 int capacity) {
-  look_from_above(view, frame);
+  sample_view(view, frame);
   find_gradient(view);
   const int32_t step = params.windows_px - params.windows_overlap_px, across = windows_along(view.width, params);
   int count = 0;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The paper's way: the floor as a bird sees it, by a table made once; magnitude of its gradient; in overlapping windows
-// the strongest line by the fast Hough transform. Source: M. P. Abramov et al. 2019, "Edge detection based mobile robot
-// indoor localization", section on the detector.
+// Edges by windows, the paper's method: bird's-eye view of the floor by a table, gradient magnitude, and in overlapping
+// windows the strongest line by the fast Hough transform. Source: M. P. Abramov et al. 2019, "Edge detection based
+// mobile robot indoor localization", section on the detector.
 #ifndef WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_WINDOWS_HPP
 #define WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_WINDOWS_HPP
 
@@ -13,29 +13,29 @@
 
 namespace wm {
 
-// A pixel of the bird's-eye view: the upper left of four pixels of the picture, and the way between them in 1/256.
+// A pixel of the bird's-eye view: the upper left of four pixels of the picture, and the offset within them in 1/256 px.
 struct bird_pixel {
-  uint16_t column, row;  // column kNoFloor: not in the picture
+  uint16_t column, row;  // column kNoFloor: outside of the picture
   uint8_t right, down;
 };
 inline constexpr uint16_t kNoFloor = 0xFFFF;
 
-// Rows go to the robot's left (y), columns ahead (x), from (x_min, y_min) on.
+// Rows along the robot's y axis (left), columns along x (ahead), from (x_min, y_min).
 struct bird_view {
   int32_t width, height, windows;
   double x_min_m, y_min_m, px_per_m;
   bird_pixel *table;
   uint8_t *grey, *edge;  // brightness; gradient's magnitude
   uint8_t *inner;        // 255 where the pixel and its four neighbours are in the picture, else 0
-  uint8_t *whole;        // a byte a window: it shows floor enough to be looked at
+  uint8_t *whole;        // one per window: more than half of it is visible
   hough_work *hough;
 };
 
 // Sizes of the view by the parameters; counts its windows.
 void bird_view_size(const wm_edges_hough_params &params, bird_view *out);
-// Fills the table; its arrays are width x height, `hough` is zero.
+// Fills the table. The arrays are width x height, `hough` is zero.
 void bird_view_make(const mounted_camera &camera, const wm_edges_hough_params &params, bird_view *out);
-// The strongest line of each window that has one. Returns how many there are, at most `capacity`.
+// The strongest line of each window that has one. Returns their number, at most `capacity`.
 int find_pieces(const bird_view &view, const wm_frame &frame, const wm_edges_hough_params &params, line_piece *out,
                 int capacity);
 

@@ -3,6 +3,8 @@
 
 #include <cstring>
 
+#include "memory/layout.hpp"
+
 namespace wm {
 
 namespace {
@@ -167,12 +169,7 @@ void join_rows(dark_run *runs, uint32_t above, uint32_t here, uint32_t end) {
 }  // namespace
 
 size_t dark_work_lay_out(dark_work *out, uint32_t width, uint32_t height, uint8_t *memory) {
-  size_t used = 0;
-  const auto take = [&](size_t bytes) {
-    uint8_t *at = memory ? memory + used : nullptr;
-    used += (bytes + 63) / 64 * 64;
-    return at;
-  };
+  memory_layout layout(memory, 0);
   *out = dark_work{};
   out->width = static_cast<int32_t>(width);
   out->height = static_cast<int32_t>(height);
@@ -180,16 +177,17 @@ size_t dark_work_lay_out(dark_work *out, uint32_t width, uint32_t height, uint8_
   out->border_max = 4 * (out->width + out->height);
   const size_t tiles = static_cast<size_t>(tiles_of(out->width) + 2) * static_cast<size_t>(tiles_of(out->height) + 2);
   const size_t row = static_cast<size_t>(rounded(out->width)) + kLanes;
-  out->mask = take(static_cast<size_t>(out->stride) * (height + 2));
-  out->least = take(tiles);
-  out->most = take(tiles);
-  out->columns = take(2 * row);
-  out->threshold = take(row);
-  out->runs = reinterpret_cast<dark_run *>(take((static_cast<size_t>(width) / 2 + 1) * height * sizeof(dark_run)));
-  out->first = reinterpret_cast<uint32_t *>(take((static_cast<size_t>(height) + 1) * sizeof(uint32_t)));
-  out->border = reinterpret_cast<border_point *>(take(static_cast<size_t>(out->border_max) * sizeof(border_point)));
-  if (out->mask) std::memset(out->mask, 0, static_cast<size_t>(out->stride) * (height + 2));
-  return used;
+  const size_t mask_bytes = static_cast<size_t>(out->stride) * (height + 2);
+  out->mask = layout.take<uint8_t>(mask_bytes);
+  out->least = layout.take<uint8_t>(tiles);
+  out->most = layout.take<uint8_t>(tiles);
+  out->columns = layout.take<uint8_t>(2 * row);
+  out->threshold = layout.take<uint8_t>(row);
+  out->runs = layout.take<dark_run>((static_cast<size_t>(width) / 2 + 1) * height);
+  out->first = layout.take<uint32_t>(static_cast<size_t>(height) + 1);
+  out->border = layout.take<border_point>(static_cast<size_t>(out->border_max));
+  if (memory) std::memset(out->mask, 0, mask_bytes);
+  return layout.bytes();
 }
 
 void find_dark_regions(dark_work *work, const wm_frame &frame, int contrast) {
