@@ -66,13 +66,24 @@ template <int kN, int kCols>
   return finite(out->sum());
 }
 
-// Inverse of a symmetric positive definite A, symmetric to the last bit. False: A is not, or its inverse is not finite.
+// Inverse of a symmetric positive definite A, symmetric to the last bit. False: A is not, a pivot is at most
+// `pivot_min` of its diagonal element (a direction is hardly determined), or the inverse is not finite.
 template <int kN>
-[[nodiscard]] bool invert_positive(const matrix<kN> &a, matrix<kN> *out) {
+[[nodiscard]] bool invert_positive(const matrix<kN> &a, matrix<kN> *out, double pivot_min = 0.0) {
+  static_assert(kN <= 8, "Eigen unrolls substitution up to 8 rows; beyond, it wants a heap");
+  const Eigen::LLT<matrix<kN>> llt(a);
+  if (llt.info() != Eigen::Success) return false;
+  for (int i = 0; i < kN; i++)
+    if (square(llt.matrixLLT()(i, i)) <= pivot_min * a(i, i)) return false;
   matrix<kN> inverse;
-  if (!solve_positive<kN, kN>(a, matrix<kN>::Identity(), &inverse)) return false;
+  for (int c = 0; c < kN; c++) {
+    vector<kN> x = vector<kN>::Unit(c);
+    llt.matrixL().solveInPlace(x);
+    llt.matrixU().solveInPlace(x);
+    inverse.col(c) = x;
+  }
   *out = 0.5 * (inverse + inverse.transpose());
-  return true;
+  return finite(out->sum());
 }
 
 // J P J', symmetric to the last bit.

@@ -7,7 +7,7 @@
 namespace wm {
 namespace {
 
-constexpr int kWindow = 8;  // pixels on a side
+constexpr int kWindow = 8;  // pixels on a side, in the picture of half the size: that of a patch, less its border
 
 // Products of the slopes (in half grey levels a pixel) of a row, and their sums over the window's rows.
 struct row_sums {
@@ -60,7 +60,7 @@ void find_corners(const grey_plane &picture, int32_t cell, int32_t margin, const
   // The window of pixel (x, y) reaches from -kWindow / 2 to kWindow / 2 - 1.
   for (int32_t y = 1; y < picture.height - 1; y++) {
     const row_sums newest = row_at(memory, width, y % kWindow);
-    add(sum, newest, width, -1);  // what was there eight rows ago
+    add(sum, newest, width, -1);  // the row of eight rows ago
     products_of(picture, y, newest);
     add(sum, newest, width, 1);
     const int32_t v = y - (kWindow / 2 - 1);

@@ -8,11 +8,14 @@
 namespace wm {
 namespace {
 
-constexpr int kMiddle = 1020;  // of 0 to 2040
+constexpr int kMiddle = 1020;  // of 0 to 2040, eighths of a grey level
 constexpr int kSourceSide = kPatch + 2;
-constexpr double kFlat = 1e-4;  // of the largest sum: below it a direction has no contrast
+constexpr double kPivotMin = 1e-4;                 // of Cholesky, relative: below, a direction has no contrast
+constexpr double kGainMin = 0.1, kGainMax = 10.0;  // contrast against the template's
+constexpr double kFarthest_px = 1e6;               // coordinates that fit the integers
+constexpr double kWarpMax = 4.0;                   // element of a warp: its fixed-point numbers fit 32 bits
 
-// In sixteenths of a pixel: columns and rows right of and below of the point that is asked for.
+// A place in 1/16 px: whole column and row, and the remainders to the right and down.
 struct place16 {
   int32_t column, row, right, down;
 };
@@ -23,9 +26,11 @@ place16 place_of(const pixel &at) {
   return {u >> 4, v >> 4, u & 15, v & 15};
 }
 
-bool is_near(const pixel &at) { return at.u > -1e6 && at.u < 1e6 && at.v > -1e6 && at.v < 1e6; }
+bool is_near(const pixel &at) {
+  return at.u > -kFarthest_px && at.u < kFarthest_px && at.v > -kFarthest_px && at.v < kFarthest_px;
+}
 
-// The patch about a place, between pixels by halves of halves of halves of halves. False where it leaves the picture.
+// Samples the patch about a place, bilinear in steps of 1/16 px. False where it leaves the picture.
 bool sample(const grey_plane &picture, const place16 &at, int16_t *out) {
   const int32_t left = at.column - kPatchHalf, top = at.row - kPatchHalf;
   if (left < 0 || top < 0 || left + kPatch >= picture.width || top + kPatch >= picture.height) return false;
@@ -59,23 +64,35 @@ int32_t sum_of(const int16_t *a, const int16_t *b) {
   return sum;
 }
 
-// Inverse of a symmetric positive matrix. False: a direction has next to no contrast.
-template <int kN>
-bool invert(const double (&a)[kN][kN], double (&out)[kN][kN]) {
-  const matrix<kN> sums = map(a);
-  matrix<kN> root, inverse;
-  if (!cholesky<kN>(sums, &root)) return false;
-  for (int j = 0; j < kN; j++)
-    if (!(square(root(j, j)) > kFlat * sums(j, j))) return false;
-  if (!invert_positive<kN>(sums, &inverse)) return false;
-  map(out) = inverse;
+// Fit of the template to a picture's patch.
+struct template_fit {
+  double gain, step_u, step_v;  // contrast; Gauss-Newton step of the place, px
+  double fit, residual;         // explained fraction of the variance; the rest, squared eighths of a grey level
+};
+
+bool compare(const patch_template &what, const int16_t *patch, template_fit *out) {
+  constexpr double n = kPatchPixels;
+  const double mean = sum_of(patch) / n;
+  const double variance = sum_of(patch, patch) - n * mean * mean;
+  const double right[3] = {sum_of(what.grey, patch) - n * what.mean[0] * mean,
+                           sum_of(what.across, patch) - n * what.mean[1] * mean,
+                           sum_of(what.down, patch) - n * what.mean[2] * mean};
+  double x[3];
+  for (int i = 0; i < 3; i++)
+    x[i] = what.inverse[i][0] * right[0] + what.inverse[i][1] * right[1] + what.inverse[i][2] * right[2];
+  if (!(x[0] > kGainMin) || !(x[0] < kGainMax) || !(variance > 0.0)) return false;
+  const double explained = x[0] * right[0] + x[1] * right[1] + x[2] * right[2];
+  *out = {x[0], -x[1] / x[0], -x[2] / x[0], explained / variance, variance - explained};
   return true;
 }
 
-// Grey levels of the warped patch and a border of one pixel, in eighths, by whole numbers: bilinear, places in 1/65536
-// of a pixel. False where it leaves the picture.
+}  // namespace
+
+namespace {
+
+// Grey levels of the warped patch and a border of one pixel, in eighths. False where it leaves the picture.
 bool sample_warped(const grey_plane &picture, const pixel &at, const warp2 &warp,
-                   int16_t (&source)[kSourceSide][kSourceSide]) {
+                   int16_t source[kSourceSide][kSourceSide]) {
   constexpr double kOne = 65536.0;
   constexpr int kHalf = kSourceSide / 2;
   const auto fixed = [](double x) { return static_cast<int32_t>(std::floor(x * kOne + 0.5)); };
@@ -101,34 +118,12 @@ bool sample_warped(const grey_plane &picture, const pixel &at, const warp2 &warp
   return true;
 }
 
-// What a picture's patch has in common with the template.
-struct likeness {
-  double gain, step_u, step_v;  // the template's contrast there; from the patch's place to the template's
-  double fit, left;             // share of the variance explained, and the rest, squared eighths of a grey level
-};
-
-bool compare(const patch_template &what, const int16_t *patch, likeness *out) {
-  constexpr double n = kPatchPixels;
-  const double mean = sum_of(patch) / n;
-  const double variance = sum_of(patch, patch) - n * mean * mean;
-  const double right[3] = {sum_of(what.grey, patch) - n * what.mean[0] * mean,
-                           sum_of(what.across, patch) - n * what.mean[1] * mean,
-                           sum_of(what.down, patch) - n * what.mean[2] * mean};
-  double x[3];
-  for (int i = 0; i < 3; i++)
-    x[i] = what.inverse[i][0] * right[0] + what.inverse[i][1] * right[1] + what.inverse[i][2] * right[2];
-  if (!(x[0] > 0.1) || !(x[0] < 10.0) || !(variance > 0.0)) return false;
-  const double explained = x[0] * right[0] + x[1] * right[1] + x[2] * right[2];
-  *out = {x[0], -x[1] / x[0], -x[2] / x[0], explained / variance, variance - explained};
-  return true;
-}
-
 }  // namespace
 
 bool make_template(const grey_plane &picture, const pixel &at, const warp2 &warp, patch_template *out) {
   if (!is_near(at)) return false;
   for (const double w : {warp.uu, warp.uv, warp.vu, warp.vv})
-    if (!(w > -4.0 && w < 4.0)) return false;
+    if (!(w > -kWarpMax && w < kWarpMax)) return false;
   int16_t source[kSourceSide][kSourceSide];
   if (!sample_warped(picture, at, warp, source)) return false;
   for (int i = 0; i < kPatch; i++)
@@ -139,13 +134,17 @@ bool make_template(const grey_plane &picture, const pixel &at, const warp2 &warp
       out->down[at_pixel] = static_cast<int16_t>((source[i + 2][j + 1] - source[i][j + 1]) / 2);
     }
   constexpr double n = kPatchPixels;
-  const int16_t *parts[3] = {out->grey, out->across, out->down};
+  const int16_t *column[3] = {out->grey, out->across, out->down};
   double sums[3][3];
-  for (int i = 0; i < 3; i++) out->mean[i] = sum_of(parts[i]) / n;
+  for (int i = 0; i < 3; i++) out->mean[i] = sum_of(column[i]) / n;
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++)
-      sums[i][j] = j < i ? sums[j][i] : sum_of(parts[i], parts[j]) - n * out->mean[i] * out->mean[j];
-  return sums[0][0] > n && sums[1][1] > n && sums[2][2] > n && invert<3>(sums, out->inverse);
+      sums[i][j] = j < i ? sums[j][i] : sum_of(column[i], column[j]) - n * out->mean[i] * out->mean[j];
+  matrix<3> inverse;
+  if (!(sums[0][0] > n && sums[1][1] > n && sums[2][2] > n) || !invert_positive<3>(map(sums), &inverse, kPivotMin))
+    return false;
+  map(out->inverse) = inverse;
+  return true;
 }
 
 bool align(const patch_template &what, const grey_plane &picture, const pixel &start, double reach_px, int rounds,
@@ -154,10 +153,10 @@ bool align(const patch_template &what, const grey_plane &picture, const pixel &s
   if (!is_near(start)) return false;
   pixel at = start;
   place16 place = place_of(at);
-  likeness like;
+  template_fit like;
   for (int round = 0;; round++) {
     if (!sample(picture, place, patch) || !compare(what, patch, &like)) return false;
-    // A step goes no farther than what the slopes know of.
+    // A step is at most as long as the linearisation holds.
     const double size = std::sqrt(like.step_u * like.step_u + like.step_v * like.step_v);
     const double scale = size > 2.0 ? 2.0 / size : 1.0;
     at = {place.column + place.right / 16.0 + scale * like.step_u, place.row + place.down / 16.0 + scale * like.step_v};
@@ -168,8 +167,8 @@ bool align(const patch_template &what, const grey_plane &picture, const pixel &s
     if (stays || round + 1 >= rounds) break;
     place = next;
   }
-  if (!(std::fabs(like.step_u) < 0.5) || !(std::fabs(like.step_v) < 0.5)) return false;  // it doesn't settle
-  const double left = like.left > 0.0 ? like.left : 0.0;
+  if (!(std::fabs(like.step_u) < 0.5) || !(std::fabs(like.step_v) < 0.5)) return false;  // not settled
+  const double left = like.residual > 0.0 ? like.residual : 0.0;
   const double worse = what.inverse[1][1] > what.inverse[2][2] ? what.inverse[1][1] : what.inverse[2][2];
   *out = {at, like.fit, std::sqrt(left / (kPatchPixels - 4) * worse) / like.gain};
   return true;
@@ -198,11 +197,10 @@ bool fit_slopes(const patch_template &what, const grey_plane &picture, const pix
     right[a] -= n * mean[a] * mean_patch;
     for (int b = 0; b <= a; b++) sums[a][b] = sums[b][a] = sums[a][b] - n * mean[a] * mean[b];
   }
-  double inverse[kColumns][kColumns], x[kColumns] = {};
-  if (!invert<kColumns>(sums, inverse)) return false;
-  for (int a = 0; a < kColumns; a++)
-    for (int b = 0; b < kColumns; b++) x[a] += inverse[a][b] * right[b];
-  if (!(x[0] > 0.1)) return false;
+  matrix<kColumns> inverse;
+  if (!invert_positive<kColumns>(map(sums), &inverse, kPivotMin)) return false;
+  const vector<kColumns> x = inverse * map(right);
+  if (!(x[0] > kGainMin)) return false;
   slope[0] = -x[3] / x[0];
   slope[1] = -x[4] / x[0];
   return true;
@@ -211,8 +209,8 @@ bool fit_slopes(const patch_template &what, const grey_plane &picture, const pix
 bool search_row(const patch_template &what, const grey_plane &picture, int32_t first, int32_t last, int32_t v,
                 int32_t *u, double *best, double *second) {
   constexpr double n = kPatchPixels;
-  constexpr int kApart = 2;
-  constexpr int32_t kPlacesMax = 1024;
+  constexpr int kApart_px = 2;          // half width of a correlation's peak
+  constexpr int32_t kPlacesMax = 1024;  // of a search: more than any disparity
   float score[kPlacesMax];
   alignas(16) int16_t patch[kPatchPixels];
   const double own = sum_of(what.grey, what.grey) - n * what.mean[0] * what.mean[0];
@@ -223,8 +221,8 @@ bool search_row(const patch_template &what, const grey_plane &picture, int32_t f
     if (!sample(picture, {first + i, v, 0, 0}, patch)) continue;
     const double mean = sum_of(patch) / n;
     const double variance = sum_of(patch, patch) - n * mean * mean;
-    const double together = sum_of(what.grey, patch) - n * what.mean[0] * mean;
-    if (variance > n && together > 0.0) score[i] = static_cast<float>(together * together / (variance * own));
+    const double product = sum_of(what.grey, patch) - n * what.mean[0] * mean;
+    if (variance > n && product > 0.0) score[i] = static_cast<float>(product * product / (variance * own));
     if (at < 0 || score[i] > score[at]) at = i;
   }
   if (at < 0 || !(score[at] > 0.0F)) return false;
@@ -232,7 +230,7 @@ bool search_row(const patch_template &what, const grey_plane &picture, int32_t f
   *best = static_cast<double>(score[at]);
   *second = 0.0;
   for (int32_t i = 0; i <= last - first; i++)
-    if ((i < at - kApart || i > at + kApart) && static_cast<double>(score[i]) > *second)
+    if ((i < at - kApart_px || i > at + kApart_px) && static_cast<double>(score[i]) > *second)
       *second = static_cast<double>(score[i]);
   return true;
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A small piece of a picture, found again in another one to a small part of a pixel, whatever brightness and contrast
-// are there. Pixels and their sums are integers, the few numbers made of the sums doubles: the same bits everywhere.
-// Sources: B. D. Lucas, T. Kanade 1981; S. Baker, I. Matthews, "Lucas-Kanade 20 years on", 2004 (the inverse way:
-// derivatives are the template's, made once).
+// Sub-pixel matching of a patch in another picture, with brightness and contrast free. Pixels and their sums are
+// integers, the few numbers computed of the sums doubles: the same bits everywhere. Sources: B. D. Lucas, T. Kanade
+// 1981; S. Baker, I. Matthews, "Lucas-Kanade 20 years on", 2004 (inverse compositional: derivatives of the template,
+// computed once).
 #ifndef WAYMARK_ESTIMATOR_VISION_PATCH_HPP
 #define WAYMARK_ESTIMATOR_VISION_PATCH_HPP
 
@@ -11,7 +11,7 @@
 
 namespace wm {
 
-inline constexpr int kPatch = 24;  // pixels on a side
+inline constexpr int kPatch = 24;  // pixels on a side: contrast against the depth differences of a sea floor. Not swept
 inline constexpr int kPatchPixels = kPatch * kPatch;
 inline constexpr int kPatchHalf = kPatch / 2;  // the patch reaches from -kPatchHalf to kPatchHalf - 1 about its point
 
@@ -28,22 +28,22 @@ struct warp2 {
 };
 inline constexpr warp2 kNoWarp = {1, 0, 0, 1};
 
-// The piece about `at`, bent by the warp. False where it leaves the picture or has no contrast in some direction.
+// Template about `at`, warped. False where it leaves the picture or has no contrast in some direction.
 bool make_template(const grey_plane &picture, const pixel &at, const warp2 &warp, patch_template *out);
 
 struct alignment {
   pixel at;
-  double fit;       // share of the variance that the template explains
-  double sigma_px;  // of `at` on its worse axis, by what is left unexplained
+  double fit;       // fraction of the variance that the template explains
+  double sigma_px;  // of `at` on its worse axis, by the residuals
 };
 
-// Finds the template near `start`. False where it leaves the picture, wanders farther than `reach_px` or finds nothing
-// that is like it. Cost: about 0.2 us a round.
+// Aligns the template near `start`. False where it leaves the picture, moves farther than `reach_px` or does not fit.
+// About 0.2 us a round.
 bool align(const patch_template &what, const grey_plane &picture, const pixel &start, double reach_px, int rounds,
            alignment *out);
 
-// After an alignment: how the place of the pixels about it changes across the patch, du = slope[0] u + slope[1] v. One
-// step, from none. False where the patch doesn't tell.
+// After an alignment: shear of the patch, du = slope[0] u + slope[1] v, by one Gauss-Newton step from none. False where
+// the patch does not determine it.
 bool fit_slopes(const patch_template &what, const grey_plane &picture, const pixel &at, double slope[2]);
 
 // Best place of the template on whole pixels (u, v), first <= u <= last, by normalised correlation; `second` is the

@@ -6,7 +6,7 @@
 namespace wm {
 namespace {
 
-bool is_as_it_is(const rectification &self) {
+bool is_already_rectified(const rectification &self) {
   const lens &optics = self.camera.optics;
   if (optics.model != WM_CAMERA_PINHOLE_RADTAN || optics.fx != self.fu || optics.fy != self.fv ||
       optics.cx != self.cu || optics.cy != self.cv)
@@ -38,12 +38,13 @@ const char *rectification_init(rectification *out, const wm_camera &camera, cons
   if (!(out->fu > 0) || !(out->fv > 0) || !finite(out->fu) || !finite(out->fv) || !finite(out->cu) || !finite(out->cv))
     return "calibration.yaml: stereo needs rectified: [fu, fv, cu, cv]";
   out->R_base_rectified = axes.R_base_optical;
-  out->as_it_is = is_as_it_is(*out) && camera.width_px == left.width_px && camera.height_px == left.height_px;
+  out->is_rectified =
+      is_already_rectified(*out) && camera.width_px == left.width_px && camera.height_px == left.height_px;
   return nullptr;
 }
 
 void rectification_table(rectification *self) {
-  if (self->as_it_is) return;
+  if (self->is_rectified) return;
   const double right = self->camera.width_px - 1.0, bottom = self->camera.height_px - 1.0;
   raw_pixel *to = self->table;
   for (int32_t v = 0; v < self->height; v++)
@@ -61,7 +62,7 @@ void rectification_table(rectification *self) {
 
 void rectify(const rectification &self, const wm_frame &frame, const grey_plane &out) {
   const auto width = static_cast<size_t>(self.width), height = static_cast<size_t>(self.height);
-  if (self.as_it_is) {
+  if (self.is_rectified) {
     for (size_t v = 0; v < height; v++) std::memcpy(out.grey + v * width, frame.grey + v * frame.stride_bytes, width);
     return;
   }
@@ -85,7 +86,7 @@ bool sees(const rectification &self, const pixel &at, int32_t half) {
     for (int32_t j = -1; j <= 1; j++) {
       const int32_t x = u + j * half, y = v + i * half;
       if (x < 0 || y < 0 || x >= self.width || y >= self.height) return false;
-      if (!self.as_it_is && self.table[static_cast<ptrdiff_t>(y) * self.width + x].column == kNoPixel) return false;
+      if (!self.is_rectified && self.table[static_cast<ptrdiff_t>(y) * self.width + x].column == kNoPixel) return false;
     }
   return true;
 }

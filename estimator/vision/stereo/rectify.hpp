@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera's picture as a rectified pinhole camera beside its twin would have it: a point's epipolar line is its row.
-// The way from each rectified pixel to the camera's own is a table made once, by the camera's real model.
+// Rectification of a camera's picture: epipolar lines become rows. A table, computed once by the camera's model, maps
+// each rectified pixel to the raw picture.
 #ifndef WAYMARK_ESTIMATOR_VISION_RECTIFY_HPP
 #define WAYMARK_ESTIMATOR_VISION_RECTIFY_HPP
 
@@ -10,9 +10,9 @@
 
 namespace wm {
 
-// The upper left of four pixels, and the way between them in 1/256.
+// The upper left of four raw pixels, and the offset within them in 1/256 px.
 struct raw_pixel {
-  uint16_t column, row;  // column kNoPixel: the camera doesn't see it
+  uint16_t column, row;  // column kNoPixel: outside of the raw picture
   uint8_t right, down;
 };
 inline constexpr uint16_t kNoPixel = 0xFFFF;
@@ -22,17 +22,17 @@ struct rectification {
   int32_t width, height;
   double fu, fv, cu, cv;
   mat3 R_base_rectified;
-  bool as_it_is;     // the camera's pictures are rectified already
-  raw_pixel *table;  // width x height; not used then
+  bool is_rectified;  // the camera's pictures are rectified already
+  raw_pixel *table;   // width x height; unused then
 };
 
-// `out->table` is set by whom it is asked; everything else is made here. NULL, or why it can't be (a constant string).
+// Sets everything but `out->table`. NULL, or the reason why it is impossible (a constant string).
 const char *rectification_init(rectification *out, const wm_camera &camera, const wm_camera &left,
                                const double rectified_px[4]);
 void rectification_table(rectification *self);
-// The frame has the camera's size. What the camera doesn't see is black.
+// The frame has the camera's size. Pixels outside of the camera's view become black.
 void rectify(const rectification &self, const wm_frame &frame, const grey_plane &out);
-// Whether the camera sees all of the square about the rectified pixel.
+// Whether the square about the rectified pixel is in the camera's view.
 bool sees(const rectification &self, const pixel &at, int32_t half);
 
 }  // namespace wm

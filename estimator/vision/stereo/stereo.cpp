@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Detector `stereo`: points of the world that both cameras of a pair see, followed from picture to picture.
+// Detector `stereo`: world points in both pictures of a stereo pair, tracked from picture to picture.
 #include <cstring>
 
 #include "memory/layout.hpp"
@@ -13,10 +13,13 @@ namespace wm {
 
 namespace {
 
-constexpr int32_t kFirstId = 1 << 30;  // maps' landmarks have smaller numbers
-constexpr double kMemory_s = 1.0;      // after a longer gap nothing is where it was
-constexpr int32_t kMargin_px = 12;     // of the full picture
-constexpr int kLevelsKnown = 1, kLevelsUnknown = kLevels - 1;
+constexpr int32_t kFirstId = 1 << 30;   // landmarks of maps have smaller ids
+constexpr double kMemory_s = 1.0;       // after a longer gap all tracks end
+constexpr int32_t kMargin_px = 12;      // of the full picture: half a patch
+constexpr double kCrowded_cells = 0.6;  // smallest distance of two tracks, in cells
+constexpr double kMountingError = 0.1;  // largest difference of the mountings from the baseline, in baselines
+constexpr int32_t kSideMin_px = 64;     // of a picture: two patches
+constexpr int kLevelsKnown = 1, kLevelsUnknown = kLevels - 1;  // of the pyramid, with and without predicted motion
 
 struct stereo_state {
   wm_stereo_params params;
@@ -31,12 +34,11 @@ struct stereo_state {
   int32_t cell, cell_count;  // of the picture of half the size
 
   int32_t track_count, next_id;
-  wm_time_ns before_ns;  // WM_TIME_NONE: nothing was seen before
+  wm_time_ns before_ns;  // of the previous pictures; WM_TIME_NONE: none
   bool knows_motion;
-  vec3 turn_radps, move_mps;  // of the newest step: camera before to camera now
+  vec3 turn_radps, move_mps;  // of the newest motion: previous camera to current camera
   rigid world_camera;
-  uint64_t number;
-  bool was_said[STEREO_TRACKS_MAX];
+  uint64_t number;  // of pictures: seed of the random choices
 };
 
 const char *cameras_of(const wm_view *view, rectification out[2]) {
@@ -50,16 +52,16 @@ const char *cameras_of(const wm_view *view, rectification out[2]) {
     const char *why = rectification_init(&out[i], i == 0 ? left : right, left, pair.rectified_px);
     if (why) return why;
   }
-  if (out[0].width < 64 || out[0].height < 64) return "the pictures are smaller than 64 pixels";
+  if (out[0].width < kSideMin_px || out[0].height < kSideMin_px) return "the pictures are smaller than 64 pixels";
   if (!(pair.baseline_m > 0.0) || !finite(pair.baseline_m)) return "calibration.yaml: stereo needs baseline_m";
   const vec3 beside = transposed_times(out[0].R_base_rectified, out[1].camera.centre_m - out[0].camera.centre_m);
   const vec3 off = beside - vec3{pair.baseline_m, 0, 0};
-  if (!(length(off) < 0.1 * pair.baseline_m))
+  if (!(length(off) < kMountingError * pair.baseline_m))
     return "the right camera isn't baseline_m to the right of the left one, by their mountings: are they swapped?";
   return nullptr;
 }
 
-// Puts the state's parts one behind the other; returns the bytes of all.
+// Lays out the state; returns its bytes.
 size_t lay_out(stereo_state *state, const rectification cameras[2], const wm_stereo_params &params) {
   const int32_t width = cameras[0].width, height = cameras[0].height, cell = params.cell_px / 2;
   const int32_t cells = cells_across(width / 2, cell) * cells_across(height / 2, cell);
@@ -68,7 +70,7 @@ size_t lay_out(stereo_state *state, const rectification cameras[2], const wm_ste
   uint8_t *pictures[3];
   for (uint8_t *&picture : pictures) picture = memory.take<uint8_t>(pyramid_bytes(width, height));
   raw_pixel *tables[2];
-  for (int i = 0; i < 2; i++) tables[i] = memory.take<raw_pixel>(cameras[i].as_it_is ? 0 : area);
+  for (int i = 0; i < 2; i++) tables[i] = memory.take<raw_pixel>(cameras[i].is_rectified ? 0 : area);
   auto *row = memory.take<uint16_t>(static_cast<size_t>(width));
   auto *work = memory.take<uint8_t>(corners_bytes(width / 2)),
        *taken = memory.take<uint8_t>(static_cast<size_t>(cells));
@@ -113,8 +115,8 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   return WM_OK;
 }
 
-// Both pictures, and the left one before, as rectified pyramids. False where they are the very same as before: a camera
-// that is stuck.
+// Rectified pyramids of both pictures and of the previous left one. False where the picture is identical to the
+// previous one: a stuck camera.
 bool take_pictures(stereo_state *self, const wm_frame *frames) {
   const pyramid before = self->pictures[2];
   self->pictures[2] = self->pictures[0];
@@ -127,17 +129,17 @@ bool take_pictures(stereo_state *self, const wm_frame *frames) {
   return std::memcmp(now.grey, then.grey, static_cast<size_t>(now.width) * static_cast<size_t>(now.height)) != 0;
 }
 
-void forget(stereo_state *self) {
+void end_tracks(stereo_state *self) {
   self->track_count = 0;
   self->knows_motion = false;
 }
 
-bool are_seen(const stereo_state &self, const track &one) {
+bool is_visible(const stereo_state &self, const track &one) {
   return sees(self.cameras[0], one.left, kMargin_px) && sees(self.cameras[1], one.right, kMargin_px);
 }
 
-// Whether the track has left, a little in each picture, where the motion since its beginning has it: an outline of a
-// rock before what lies behind it, a slow particle.
+// Whether the track has drifted from its prediction by the motion since its beginning: an occluding contour, a slow
+// particle.
 bool has_slipped(const stereo_state &self, const track &one) {
   pair_pixels px;
   if (!pixels_of(self.pair, inverse(self.world_camera) * (one.world_anchor * one.anchor_place), &px)) return true;
@@ -146,7 +148,7 @@ bool has_slipped(const stereo_state &self, const track &one) {
          std::fabs(px.right_u - one.right.u) > limit;
 }
 
-// Follows all tracks into the newest pictures and leaves out what is gone or moves otherwise than most of them.
+// Follows all tracks into the newest pictures. Ends those that are lost or disagree with the common motion.
 void follow(stereo_state *self, double dt_s) {
   rigid expected = kNoMotion;
   if (self->knows_motion) expected = {matrix_of(turn_by(dt_s * self->turn_radps)), dt_s * self->move_mps};
@@ -159,7 +161,7 @@ void follow(stereo_state *self, double dt_s) {
     track &one = self->tracks[i];
     const vec3 before = one.place;
     if (!follow_track(self->pair, pictures, self->params, expected, camera_world, levels, &one)) continue;
-    if (!are_seen(*self, one)) continue;
+    if (!is_visible(*self, one)) continue;
     points[kept] = {before, {one.left.u, one.left.v, one.right.u}};
     if (kept != i) self->tracks[kept] = one;
     kept++;
@@ -169,7 +171,7 @@ void follow(stereo_state *self, double dt_s) {
   rigid moved;
   if (!find_motion(self->pair, points, kept, self->knows_motion ? &expected : nullptr, self->params.agree_px,
                    self->number, &moved, agrees)) {
-    forget(self);
+    end_tracks(self);
     return;
   }
   self->world_camera = self->world_camera * inverse(moved);
@@ -185,13 +187,13 @@ void follow(stereo_state *self, double dt_s) {
 }
 
 bool is_crowded(const stereo_state &self, const pixel &at) {
-  const double apart = 0.6 * self.params.cell_px;
+  const double apart = kCrowded_cells * self.params.cell_px;
   for (int32_t i = 0; i < self.track_count; i++)
     if (std::fabs(self.tracks[i].left.u - at.u) < apart && std::fabs(self.tracks[i].left.v - at.v) < apart) return true;
   return false;
 }
 
-// New tracks where there are none, the best corners first.
+// Begins tracks where there are none, the strongest corners first.
 void begin(stereo_state *self) {
   const int32_t wanted = self->params.tracks;
   if (self->track_count == wanted) return;
@@ -216,7 +218,7 @@ void begin(stereo_state *self) {
     const pixel at = {2.0 * best->u, 2.0 * best->v};
     track &one = self->tracks[self->track_count];
     if (is_crowded(*self, at)) continue;
-    if (!begin_track(self->pair, pictures, self->params, at, self->world_camera, &one) || !are_seen(*self, one))
+    if (!begin_track(self->pair, pictures, self->params, at, self->world_camera, &one) || !is_visible(*self, one))
       continue;
     one.id = self->next_id;
     self->next_id = self->next_id == INT32_MAX ? kFirstId : self->next_id + 1;
@@ -224,7 +226,7 @@ void begin(stereo_state *self) {
   }
 }
 
-size_t tell(const stereo_state &self, wm_time_ns t_ns, wm_event *out, size_t capacity) {
+size_t emit(const stereo_state &self, wm_time_ns t_ns, wm_event *out, size_t capacity) {
   size_t count = 0;
   for (int32_t i = 0; i < self.track_count && count < capacity; i++) {
     const track &one = self.tracks[i];
@@ -250,12 +252,12 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
   const double dt_s = self->before_ns == WM_TIME_NONE ? -1.0 : wm_seconds_between(self->before_ns, t_ns);
   self->number++;
   const bool is_new = take_pictures(self, frames);
-  if (!(dt_s > 0.0) || dt_s > kMemory_s) forget(self);
+  if (!(dt_s > 0.0) || dt_s > kMemory_s) end_tracks(self);
   if (!is_new && dt_s > 0.0) return WM_OK;
   self->before_ns = t_ns;
   if (self->track_count > 0) follow(self, dt_s);
   begin(self);
-  *count = tell(*self, t_ns, out, capacity);
+  *count = emit(*self, t_ns, out, capacity);
   return WM_OK;
 }
 
@@ -265,7 +267,7 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
 
 extern "C" const wm_detector wm_stereo_detector = {
     "stereo",
-    "Points of the world that both cameras of a pair see, followed from picture to picture: for stereo_ekf",
+    "World points in both pictures of a stereo pair, tracked from picture to picture: for stereo_ekf",
     WM_EVENT_BIT(WM_EVENT_STEREO),
     2,
     wm_stereo_params_table,

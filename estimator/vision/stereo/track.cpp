@@ -6,13 +6,14 @@
 namespace wm {
 namespace {
 
-constexpr int kRounds = 8;
-constexpr double kCoarseReach_px = 10.0;  // of its level
-constexpr double kFineReach_px = 4.0;
-constexpr double kSteepest = 0.6;  // slope of a disparity, px a px: a surface seen so sharply is none to follow
-constexpr double kPeak = 0.4;      // squared correlation that the first match must have
-constexpr double kAlone = 0.85;    // of the best one, above which a second place makes it ambiguous
-constexpr double kCoarseFit = 0.3;
+constexpr int kRounds = 8;                // of an alignment; most settle in 4
+constexpr double kCoarseReach_px = 10.0;  // of its level: half a patch
+constexpr double kFineReach_px = 4.0;     // at full resolution: two pixels of the level above, and the prediction
+constexpr double kSlopeMax = 0.6;         // of a disparity, px per px: steeper surfaces are seen too obliquely
+constexpr double kPeakMin = 0.4;          // squared correlation of the first match. Not swept
+constexpr double kRatioMax = 0.85;        // second best over best: above, the match is ambiguous. Not swept
+constexpr double kCoarseFitMin = 0.3;     // of an alignment in a smaller picture. Not swept
+constexpr double kDetMin = 0.1, kDetMax = 10.0;  // change of a patch's area since its first picture
 
 pixel at_level(const pixel &at, int level) {
   const double s = 1.0 / (1 << level);
@@ -31,7 +32,7 @@ void slope_of(const pair_geometry &rig, const vec3 &surface, double slope[2]) {
   slope[1] = surface.y * rig.baseline_m * rig.fu / rig.fv;
 }
 
-bool is_flat(const double slope[2]) { return std::fabs(slope[0]) < kSteepest && std::fabs(slope[1]) < kSteepest; }
+bool is_flat(const double slope[2]) { return std::fabs(slope[0]) < kSlopeMax && std::fabs(slope[1]) < kSlopeMax; }
 
 // From offsets in the right picture to those in the left one.
 warp2 left_by_right(const double slope[2]) {
@@ -39,7 +40,7 @@ warp2 left_by_right(const double slope[2]) {
   return {s, s * slope[1], 0.0, 1.0};
 }
 
-// Finds the left picture's place in the right one, about `start`, by the bent patch.
+// Matches the left place in the right picture, about `start`, by the sheared patch.
 bool match_right(const pair_pictures &pictures, const pixel &left, const double slope[2], const pixel &start,
                  alignment *out) {
   patch_template what;
@@ -51,7 +52,7 @@ bool is_good(const alignment &match, const wm_stereo_params &params) {
   return match.fit >= params.fit_min && match.sigma_px <= params.sigma_max_px;
 }
 
-// Takes both pictures' places; false where they are no point in front of the rig.
+// Stores both places. False where they are no point in front of the rig.
 bool take_pair(const pair_geometry &rig, const wm_stereo_params &params, const pixel &left, const pixel &right,
                track *self) {
   const double disparity = left.u - right.u;
@@ -63,8 +64,8 @@ bool take_pair(const pair_geometry &rig, const wm_stereo_params &params, const p
   return true;
 }
 
-// How the patch's pixels move from the picture of its beginning to now: derivatives of the way over the surface, by
-// differences over the patch, and turned round.
+// Warp from offsets now to offsets in the first picture: inverse of the derivatives of the map over the surface, by
+// differences over the patch.
 bool anchor_by_now(const pair_geometry &rig, const track &self, const rigid &camera_anchor, warp2 *out) {
   constexpr double kStep_px = 4.0;
   const auto seen_now = [&](double du, double dv, pair_pixels *px) {
@@ -80,7 +81,7 @@ bool anchor_by_now(const pair_geometry &rig, const track &self, const rigid &cam
   const double uu = s * (right.left_u - left.left_u), vu = s * (right.left_v - left.left_v);
   const double uv = s * (below.left_u - above.left_u), vv = s * (below.left_v - above.left_v);
   const double det = uu * vv - uv * vu;
-  if (!(det > 0.1) || !(det < 10.0)) return false;
+  if (!(det > kDetMin) || !(det < kDetMax)) return false;
   *out = {vv / det, -uv / det, -vu / det, uu / det};
   return true;
 }
@@ -97,7 +98,7 @@ bool first_match(const pair_pictures &pictures, const wm_stereo_params &params, 
   int32_t found;
   double best, second;
   if (!search_row(what, pictures.right->level[1], first > 0 ? first : 0, last, v, &found, &best, &second)) return false;
-  if (best < kPeak || second > kAlone * best) return false;
+  if (best < kPeakMin || second > kRatioMax * best) return false;
   if (!align(what, pictures.right->level[1], {half.u + (found - u), half.v + 0.0}, kFineReach_px, kRounds, match))
     return false;
   slope[0] = slope[1] = 0;
@@ -153,10 +154,10 @@ bool follow_track(const pair_geometry &rig, const pair_pictures &pictures, const
   for (int level = levels; level > 0; level--) {
     if (!make_template(pictures.before->level[level], at_level(self->left, level), kNoWarp, &what)) continue;
     if (!align(what, pictures.left->level[level], at_level(at, level), kCoarseReach_px, kRounds, &match)) continue;
-    if (match.fit < kCoarseFit) continue;
+    if (match.fit < kCoarseFitMin) continue;
     at = {match.at.u * (1 << level), match.at.v * (1 << level)};
   }
-  // Then against what it looked like first.
+  // Then against its first patch.
   const rigid camera_anchor = camera_world * self->world_anchor;
   warp2 warp;
   if (!anchor_by_now(rig, *self, camera_anchor, &warp)) return false;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A point of the world in a stereo pair: begun at a corner, matched left to right, followed from picture to picture.
-// Its patch is kept as it was first seen and bent as the motion since and the surface's slope say it must look now: so
-// its place doesn't creep from picture to picture.
+// Track of a world point in a stereo pair: begun at a corner, matched left to right, followed from picture to picture.
+// Its first patch is kept and warped by the motion since and the surface's slope, so the place does not drift.
 #ifndef WAYMARK_ESTIMATOR_VISION_TRACK_HPP
 #define WAYMARK_ESTIMATOR_VISION_TRACK_HPP
 
@@ -10,32 +9,33 @@
 
 namespace wm {
 
-inline constexpr int kAnchorSide = 64;  // of the patch that is kept: a template turned and enlarged by 1.6 fits in
+inline constexpr int kAnchorSide = 64;  // of the kept patch: holds a template rotated and enlarged by 1.6
 
 struct track {
   int32_t id;
   int32_t seen;  // pictures, the first one included
   pixel left, right;
   vec3 place;           // in the left camera's axes
-  double slope[2];      // of the disparity in the left picture, px a px
-  pixel anchor;         // where it was first seen
-  vec3 anchor_place;    // and in the camera's axes then
-  vec3 anchor_surface;  // n of the plane n x = 1 that it lies on there
-  rigid world_anchor;   // from the camera's axes then to the tracker's own world
+  double slope[2];      // of the disparity in the left picture, px per px
+  pixel anchor;         // place in the first picture
+  vec3 anchor_place;    // the same in the camera's axes then
+  vec3 anchor_surface;  // n of its plane n x = 1 there
+  rigid world_anchor;   // from the camera's axes then to the tracker's world
   uint8_t patch[kAnchorSide * kAnchorSide];
 };
 
-// The rectified pictures of now and the left one of before.
+// The current rectified pictures and the previous left one.
 struct pair_pictures {
   const pyramid *before, *left, *right;
 };
 
-// Finds a corner of the left picture in the right one. False where it is ambiguous, too near, too far or not there.
+// Begins a track: matches a corner of the left picture in the right one. False: ambiguous, too near, too far or no
+// match.
 bool begin_track(const pair_geometry &rig, const pair_pictures &pictures, const wm_stereo_params &params,
                  const pixel &at, const rigid &world_camera, track *out);
 
-// Finds the track in the newest pictures. `camera_world`: as the motion so far lets expect it; `levels`: how far up the
-// pyramid it must be looked for. Writes left, right, place and slope. False where it is gone.
+// Finds the track in the newest pictures. `camera_world`: predicted pose; `levels`: of the pyramid to begin at. Writes
+// left, right, place and slope. False where it is lost.
 bool follow_track(const pair_geometry &rig, const pair_pictures &pictures, const wm_stereo_params &params,
                   const rigid &camera_before, const rigid &camera_world, int levels, track *self);
 
