@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "vision/landmarks/align.hpp"
 
+#include "math/eigen.hpp"
+
 namespace wm {
 namespace {
 
@@ -46,37 +48,19 @@ int fill_columns(const drawn_view &what, const pixel &middle, int unknowns, alig
   return n;
 }
 
-// Inverse of the columns' products by Cholesky's factors; false where some unknown has no contrast.
-bool invert(const align_work &work, int n, int columns, double out[kAlignColumns][kAlignColumns]) {
-  double a[kAlignColumns][kAlignColumns] = {}, l[kAlignColumns][kAlignColumns] = {},
-         inverse[kAlignColumns][kAlignColumns] = {};
+// Inverse of the normal equations' matrix of the first kN columns. False where some unknown has no contrast.
+template <int kN>
+bool invert_products(const align_work &work, int n, double out[kAlignColumns][kAlignColumns]) {
+  double a[kN][kN] = {};
   for (int p = 0; p < n; p++) {
     const double *c = work.column[p];
-    for (int i = 0; i < columns; i++)
+    for (int i = 0; i < kN; i++)
       for (int j = 0; j <= i; j++) a[i][j] += c[i] * c[j];
   }
-  for (int j = 0; j < columns; j++)
-    for (int i = j; i < columns; i++) {
-      double sum = a[i][j];
-      for (int k = 0; k < j; k++) sum -= l[i][k] * l[j][k];
-      if (i == j) {
-        if (!(sum > 1e-5 * a[j][j])) return false;
-        l[j][j] = std::sqrt(sum);
-      } else {
-        l[i][j] = sum / l[j][j];
-      }
-    }
-  for (int j = 0; j < columns; j++)
-    for (int i = j; i < columns; i++) {
-      double sum = i == j ? 1.0 : 0.0;
-      for (int k = j; k < i; k++) sum -= l[i][k] * inverse[k][j];
-      inverse[i][j] = sum / l[i][i];
-    }
-  for (int i = 0; i < columns; i++)
-    for (int j = 0; j < columns; j++) {
-      out[i][j] = 0;
-      for (int k = i > j ? i : j; k < columns; k++) out[i][j] += inverse[k][i] * inverse[k][j];
-    }
+  matrix<kN> inverse;
+  if (!invert_positive<kN>(map(a), &inverse, kPivotMin)) return false;
+  for (int i = 0; i < kN; i++)
+    for (int j = 0; j < kN; j++) out[i][j] = inverse(i, j);
   return true;
 }
 
@@ -163,18 +147,19 @@ double stretch_of(const affine &warp) {
   return out;
 }
 
-bool align_by(int unknowns, const grey_plane &picture, const drawn_view &what, const pixel &middle, int right, int down,
+template <int kUnknowns>
+bool align_by(const grey_plane &picture, const drawn_view &what, const pixel &middle, int right, int down,
               align_work *work, aligned *out) {
-  const int columns = unknowns + 2;
-  const int n = fill_columns(what, middle, unknowns, work);
+  constexpr int columns = kUnknowns + 2;
+  const int n = fill_columns(what, middle, kUnknowns, work);
   double inverse[kAlignColumns][kAlignColumns];
-  if (n < columns + kRedundancy || !invert(*work, n, columns, inverse)) return false;
+  if (n < columns + kRedundancy || !invert_products<columns>(*work, n, inverse)) return false;
   affine warp = {{{1, 0}, {0, 1}}, {static_cast<double>(right), static_cast<double>(down)}};
   gain_fit found{};
   bool settled = false;
   for (int round = 0; round < kRounds && !settled; round++) {
     double step_px;
-    if (!improve(picture, *work, n, unknowns, middle, inverse, &warp, &found, &step_px)) return false;
+    if (!improve(picture, *work, n, kUnknowns, middle, inverse, &warp, &found, &step_px)) return false;
     settled = step_px < kSettled_px;
     if (!(std::fabs(warp.t[0] - right) < kReach_px) || !(std::fabs(warp.t[1] - down) < kReach_px)) return false;
   }
@@ -195,8 +180,9 @@ bool align_by(int unknowns, const grey_plane &picture, const drawn_view &what, c
 
 bool align_landmark(const grey_plane &picture, const drawn_view &what, const pixel &middle, int right, int down,
                     align_work *work, aligned *out) {
-  const auto by = [&](int unknowns) { return align_by(unknowns, picture, what, middle, right, down, work, out); };
-  return (what.count >= kAffineFrom_px && by(6)) || (what.count >= kScaleFrom_px && by(3)) || by(2);
+  if (what.count >= kAffineFrom_px && align_by<6>(picture, what, middle, right, down, work, out)) return true;
+  if (what.count >= kScaleFrom_px && align_by<3>(picture, what, middle, right, down, work, out)) return true;
+  return align_by<2>(picture, what, middle, right, down, work, out);
 }
 
 }  // namespace wm

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "vision/lines/radial_edges.hpp"
 
+#include "math/eigen.hpp"
+
 namespace wm {
 
 namespace {
@@ -20,6 +22,7 @@ constexpr double kStraightRms_px = 0.6;  // largest RMS of a straight line's seg
 constexpr double kSigmaMax_px = 0.35;    // a false edge made of noise is less certain than this. Not swept
 constexpr double kLeanTolerance = 0.01;  // azimuth per tangent of elevation: an upright line's own inclination
 constexpr double kLeanSigmaMin = 1e-4;   // the same: numerical floor of the expected lean's sigma
+constexpr double kPivotMin = 1e-12;      // of the normal equations: an edge without contrast
 constexpr double kSigmas = 3;            // gate of segments, of the lean and of the zenith
 
 // A blurred step of sigma 1 at 0, and its derivative: the logistic function 1 / (1 + exp(-1.702 x)), which is within
@@ -37,28 +40,6 @@ struct edge_segment {
   double low, high;           // grey levels of the sides, before and after
   double rows;
 };
-
-// Solves a x = b, symmetric and positive, n <= 4, by Cholesky; a is overwritten. False: singular.
-bool solve(double (*a)[4], double *b, int n) {
-  for (int j = 0; j < n; j++) {
-    for (int k = 0; k < j; k++) a[j][j] -= a[j][k] * a[j][k];
-    if (!(a[j][j] > 1e-12)) return false;
-    a[j][j] = std::sqrt(a[j][j]);
-    for (int i = j + 1; i < n; i++) {
-      for (int k = 0; k < j; k++) a[i][j] -= a[i][k] * a[j][k];
-      a[i][j] /= a[j][j];
-    }
-  }
-  for (int i = 0; i < n; i++) {
-    for (int k = 0; k < i; k++) b[i] -= a[i][k] * b[k];
-    b[i] /= a[i][i];
-  }
-  for (int i = n - 1; i >= 0; i--) {
-    for (int k = i + 1; k < n; k++) b[i] -= a[k][i] * b[k];
-    b[i] /= a[i][i];
-  }
-  return true;
-}
 
 // Sums over rows of the columns around `column`; sample k of them lies at `begin` + k. Returns how many.
 int profile_of(const polar_view &view, int first, int last, int begin, int count, double *out) {
@@ -82,7 +63,6 @@ struct step_model {
 
   // One step of Gauss-Newton on the profile of `n` samples. At first the place is held. False: singular.
   bool improve(const double *profile, int n, double width, double ramp_information, bool holds_place) {
-    const int unknowns = holds_place ? 3 : 4;
     double a[4][4] = {}, b[4] = {};
     a[2][2] = ramp_information;
     b[2] = -ramp * ramp_information;
@@ -90,18 +70,25 @@ struct step_model {
     for (int k = 0; k < n; k++) {
       double slope;
       const double s = step_up((k - place) / width, &slope);
-      const double row[4] = {1 - s, s, k - place, -(high - low) * slope / width - ramp};
+      const double by_place = holds_place ? 0.0 : -(high - low) * slope / width - ramp;
+      const double row[4] = {1 - s, s, k - place, by_place};
       const double residual = profile[k] - low * row[0] - high * row[1] - ramp * row[2];
-      for (int i = 0; i < unknowns; i++) {
+      for (int i = 0; i < 4; i++) {
         b[i] += row[i] * residual;
         for (int j = 0; j <= i; j++) a[i][j] += row[i] * row[j];
       }
       squares += residual * residual;
     }
-    if (!solve(a, b, unknowns)) return false;
+    if (holds_place) a[3][3] = 1;
+    const Eigen::LLT<matrix<4>> factor(map(a));
+    if (factor.info() != Eigen::Success) return false;
     // The last pivot of Cholesky's factor, squared, is the information on the place.
-    information = square(a[3][3]);
-    for (int i = 0; i < 4; i++) correction[i] = b[i];
+    information = square(factor.matrixLLT()(3, 3));
+    if (!(information > kPivotMin)) return false;
+    vector<4> x = map(b);
+    factor.matrixL().solveInPlace(x);
+    factor.matrixU().solveInPlace(x);
+    map(correction) = x;
     return true;
   }
   // Applies the correction; the place moves by at most a width.
@@ -163,22 +150,16 @@ struct upright_fit {
 
 // Weighted least squares over the used segments; `lean` with its variance is the prior.
 bool fit_upright(const segment_list &segments, double lean, double lean_variance, upright_fit *out) {
-  double a00 = 0, a01 = 0, a11 = 1 / lean_variance, b0 = 0, b1 = lean / lean_variance;
+  matrix<2> information{{0, 0}, {0, 1 / lean_variance}}, covariance;
+  vector<2> right{0, lean / lean_variance};
   segments.each_used([&](const edge_segment &s) {
-    const double w = 1 / s.variance, t = s.tan;
-    a00 += w;
-    a01 += w * t;
-    a11 += w * t * t;
-    b0 += w * s.column;
-    b1 += w * t * s.column;
+    const vector<2> row{1, s.tan};
+    information += (1 / s.variance) * row * row.transpose();
+    right += (s.column / s.variance) * row;
   });
-  const double determinant = a00 * a11 - a01 * a01;
-  if (!(determinant > 0)) return false;
-  out->column = (a11 * b0 - a01 * b1) / determinant;
-  out->lean = (a00 * b1 - a01 * b0) / determinant;
-  out->column_variance = a11 / determinant;
-  out->lean_variance = a00 / determinant;
-  out->chi2 = 0;
+  if (!invert_positive<2>(information, &covariance)) return false;
+  const vector<2> x = covariance * right;
+  *out = {x(0), covariance(0, 0), x(1), covariance(1, 1), 0};
   segments.each_used([&](const edge_segment &s) { out->chi2 += square(out->residual(s)) / s.variance; });
   return true;
 }

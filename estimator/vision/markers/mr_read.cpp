@@ -3,6 +3,8 @@
 
 #include <initializer_list>
 
+#include "math/eigen.hpp"
+
 namespace wm {
 
 namespace {
@@ -24,12 +26,9 @@ struct shade {
     }
   }
   bool solve() {
-    const double(*n)[3] = normal;
-    const vec3 r0 = {n[0][0], n[0][1], n[0][2]}, r1 = {n[1][0], n[1][1], n[1][2]}, r2 = {n[2][0], n[2][1], n[2][2]};
-    const double det = dot(r0, cross(r1, r2));
-    if (!(std::fabs(det) > 1e-12)) return false;
-    const vec3 x = (1 / det) * (right[0] * cross(r1, r2) + right[1] * cross(r2, r0) + right[2] * cross(r0, r1));
-    a = x.x, b = x.y, c = x.z;
+    vector<3> x;
+    if (!solve_positive<3, 1>(map(normal), map(right), &x)) return false;
+    a = x(0), b = x(1), c = x(2);
     return true;
   }
   double at(double x, double y) const { return a + b * x + c * y; }
