@@ -237,6 +237,7 @@ std::vector<scenario> scenarios() {
        all({kMotionStates,
             {{"states.wheel_slip_sigma", 0.02},
              {"states.depth_axis_sigma_rad", 0.02},
+             {"states.sensor_stamp_sigma_s", 0.01},
              {"states.sensor_yaw_sigma_rad", 0.02}}}),
        {}},
       {"slam", "ranges, wheels and gyro", motion::ticks_and_gyro, kBearings | kRanges, kNoMap, 20, kMotionStates, {}},

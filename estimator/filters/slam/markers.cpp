@@ -111,7 +111,8 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   r.turned = !two && sure;
   if (state_ == WM_STATE_SEARCHING && (landmark < 0 || !find_start(landmark, m, r, two)))
     return drop(WM_REJECTED_SEARCHING);
-  const past_pose past = look_back(sensor_value(m.sensor, kTimeOffset, 0.0));
+  begin_picture(m.sensor, event.t_ns);
+  const past_pose past = look_back(m.sensor);
   if (landmark >= 0 && map_is_held()) {
     keep_observation(landmark, m.sensor, past, sighted_of(m, r));
     if (relocalize()) return drop(WM_REJECTED_SEARCHING);
@@ -249,7 +250,7 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
     record.verdict = failed ? WM_REJECTED_SINGULAR : fits ? WM_FUSED : WM_REJECTED_GATE;
     records.add(record);
   }
-  if (r.turned) note_turn(fits, v.innovation[2], true);
+  if (r.turned) note_turn(fits, v.innovation[2], true, notes()[landmark].last_ns);
   if (!fits) return misfit(landmark, true);
   if (failed) return;
   landmark_note &note = notes()[landmark];

@@ -27,6 +27,10 @@ static const wm_param kParams[] = {
     F64("states.sensor_tilt_sigma_rad", sensor_tilt_sigma_rad, 0, 0, 1,
         "For coded markers: start sigma of each camera's roll and of its pitch about calibration.yaml's, rad. Found by "
         "how high a marker seems to hang from here and from there. 0: off."),
+    F64("states.sensor_stamp_sigma_s", sensor_stamp_sigma_s, 0, 0, 1,
+        "Sigma of the error of each picture's stamp, s: alike for all that is seen in it, another in the next one. A "
+        "robot "
+        "that turns at 1 rad/s sees all of it that much rad beside. 0: off."),
     BOOL("use.bearing", use_bearing, 1, "Fuse bearings."),
     BOOL("use.range", use_range, 1, "Fuse ranges. Without them landmarks join once their parallax suffices."),
     WM_SIGHTING_NOISE_PARAMS,

@@ -20,7 +20,7 @@ typedef struct wm_slam_params {
   double wheel_slip_sigma, wheel_slip_tau_s;  // the wheels' scales wander about their means
   // states, one of each kind a sensor; 0: off
   double sensor_yaw_sigma_rad, sensor_xy_sigma_m, sensor_time_offset_sigma_s;
-  double range_bias_sigma_m, range_scale_sigma, depth_axis_sigma_rad, sensor_tilt_sigma_rad;
+  double range_bias_sigma_m, range_scale_sigma, depth_axis_sigma_rad, sensor_tilt_sigma_rad, sensor_stamp_sigma_s;
   // noise of one sighting
   int32_t use_bearing, use_range;
   double bearing_sigma_default_rad, range_sigma_default_m;

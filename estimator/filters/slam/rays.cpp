@@ -104,7 +104,7 @@ void slam::follow_ray(int32_t id, const wm_sighting &s, const reading &r, const 
   const bool fused = fits && joint_.fuse(block, &more, joint_state::scope::all);
   blank.verdict = fused ? WM_FUSED : fits ? WM_REJECTED_SINGULAR : WM_REJECTED_GATE;
   records.add(blank);
-  note_turn(fits, innovation, false);
+  note_turn(fits, innovation, false, track->last_ns);
   if (!fused) {
     if (++track->misfits >= kMisfits) end_ray(track);
     return;

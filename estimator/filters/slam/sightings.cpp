@@ -14,8 +14,18 @@ double first_number(double a, double b, double c) { return finite(a) ? a : finit
 
 }  // namespace
 
-slam::past_pose slam::look_back(double age_s) const {
+// Each picture's stamp has an error of its own, alike for all that is seen in it.
+void slam::begin_picture(int sensor, wm_time_ns t_ns) {
+  if (stamp_state_[sensor] < 0 || picture_ns_[sensor] == t_ns) return;
+  picture_ns_[sensor] = t_ns;
+  joint_.forget(stamp_state_[sensor], 0.0, square(params_.sensor_stamp_sigma_s));
+}
+
+slam::past_pose slam::look_back(int sensor) const {
   past_pose out;
+  out.stamp_state = stamp_state_[sensor];
+  const double age_s =
+      sensor_value(sensor, kTimeOffset, 0.0) + (out.stamp_state < 0 ? 0.0 : joint_.value(out.stamp_state));
   const wm_time_ns now = joint_.now_ns();
   const wm_time_ns then = now - wm_ns_from_seconds(age_s);
   motion_twist twist{};
@@ -42,7 +52,9 @@ void slam::add_pose(joint_row &row, const double by[3], const past_pose &past, i
   row.add(kX, by[0]);
   row.add(kY, by[1]);
   row.add(kHeading, by[2] - by[0] * past.lever_y + by[1] * past.lever_x);
-  row.add(time_state, by[0] * past.age_by[0] + by[1] * past.age_by[1] + by[2] * past.age_by[2]);
+  const double by_age = by[0] * past.age_by[0] + by[1] * past.age_by[1] + by[2] * past.age_by[2];
+  row.add(time_state, by_age);
+  row.add(past.stamp_state, by_age);
 }
 
 double slam::sensor_value(int sensor, int which, double neutral) const {
@@ -177,7 +189,8 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   if (!r.bearing && !r.range) return drop(WM_REJECTED_BY_CONFIG);
   if (!std::isnan(s.range_m) && s.range_m > sensor.max_range_m) return drop(WM_REJECTED_OUT_OF_RANGE);
 
-  const past_pose past = look_back(sensor_value(s.sensor, kTimeOffset, 0.0));
+  begin_picture(s.sensor, event.t_ns);
+  const past_pose past = look_back(s.sensor);
   int32_t id = s.landmark_id;
   int landmark = id >= 0 ? find_landmark(id) : -1;
   if (id < 0) {
@@ -278,7 +291,7 @@ void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, cons
     record.verdict = failed ? WM_REJECTED_SINGULAR : fused ? WM_FUSED : WM_REJECTED_GATE;
     records.add(record);
   }
-  if (r.bearing) note_turn(fused, v.innovation[0], false);
+  if (r.bearing) note_turn(fused, v.innovation[0], false, note.last_ns);
   if (!fused)
     misfit(landmark, r.range);
   else if (!failed)

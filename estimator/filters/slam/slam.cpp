@@ -42,7 +42,7 @@ int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
   const int each_sensor = (p.sensor_yaw_sigma_rad > 0.0) + 2 * (p.sensor_xy_sigma_m > 0.0) +
                           (p.sensor_time_offset_sigma_s > 0.0) + (p.range_bias_sigma_m > 0.0) +
                           (p.range_scale_sigma > 0.0) + (p.depth_axis_sigma_rad > 0.0) +
-                          2 * (p.sensor_tilt_sigma_rad > 0.0);
+                          2 * (p.sensor_tilt_sigma_rad > 0.0) + (p.sensor_stamp_sigma_s > 0.0);
   return kPoseStates + joint_state::count_motion_states(p.motion, slip_of(p)) + each_sensor * (int)setup.sensor_count +
          p.lasting_slots * lasting_states(p);
 }
@@ -119,6 +119,8 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
     sensor_state_[i][kDepthAxis] = add(0.0, params.depth_axis_sigma_rad);
     sensor_state_[i][kRoll] = add(0.0, params.sensor_tilt_sigma_rad);
     sensor_state_[i][kPitch] = add(0.0, params.sensor_tilt_sigma_rad);
+    stamp_state_[i] = add(0.0, params.sensor_stamp_sigma_s);
+    picture_ns_[i] = WM_TIME_NONE;
   }
   lasting_bearing_offset_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
   lasting_range_offset_ =
@@ -169,7 +171,7 @@ void slam::start_again() {
   }
   moved_.count = doubled_.count = 0;
   look_.t_ns = WM_TIME_NONE;
-  look_.fused = look_.refused = 0;
+  look_.fused = look_.refused = look_.before = 0;
   resets_++;
   const bool given = params_.map != WM_SLAM_MAP_NONE;
   state_ = given && params_.recover && !(place && heading) ? WM_STATE_SEARCHING : WM_STATE_TRACKING;

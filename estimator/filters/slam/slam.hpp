@@ -41,7 +41,7 @@ struct slam_counts {
 struct look_record {
   static constexpr int kMost = 32;
   wm_time_ns t_ns;
-  int fused, refused;
+  int fused, refused, before;  // before: of both, in the look before
   bool of_prints;
   double by_rad[kMost];
 };
@@ -92,6 +92,7 @@ class slam {
     wm_pose2 pose;
     double lever_x, lever_y;  // from now's position to it: what a heading error now makes of it
     double age_by[3];         // of x, y, heading by the time offset
+    int stamp_state;          // of the picture's own stamp error; -1: off
   };
   // A sighting as rows: what is expected, derivatives by the state (the landmark's apart), noise.
   struct view {
@@ -152,7 +153,8 @@ class slam {
     double apart[2], s[2][2];
   };
 
-  past_pose look_back(double age_s) const;
+  past_pose look_back(int sensor) const;
+  void begin_picture(int sensor, wm_time_ns t_ns);
   void add_pose(joint_row &row, const double by[3], const past_pose &past, int time_state) const;
   double sensor_value(int sensor, int which, double neutral) const;
   sensor_errors errors_of(int sensor) const;
@@ -214,7 +216,7 @@ class slam {
   bool make_room();
   void look_after(wm_time_ns t_ns);
   void begin_look(wm_time_ns t_ns);
-  void note_turn(bool fused, double innovation_rad, bool of_print);
+  void note_turn(bool fused, double innovation_rad, bool of_print, wm_time_ns last_ns);
   void rejoin(int fresh);
   bool may_be_one(int fresh, int lost) const;
   pair make_pair(int fresh, int lost) const;
@@ -250,6 +252,8 @@ class slam {
   wm_slam_params params_;
   mounted_sensor sensor_[kSlamSensors];
   int sensor_state_[kSlamSensors][kSensorStates];
+  int stamp_state_[kSlamSensors];        // error of the newest picture's stamp; -1: off
+  wm_time_ns picture_ns_[kSlamSensors];  // that stamp
   state_pool<24> lasting_;
   int lasting_bearing_offset_, lasting_range_offset_;  // within a slot; -1: not carried
   int lasting_width_;                                  // states of a slot

@@ -11,6 +11,7 @@ constexpr double kUnsure = 25.0;         // times the sighting's own variance is
 constexpr double kOthersFit_s = 3.0;     // a landmark was moved where others were fused so lately
 constexpr int kJolted = 5;               // bearings that were refused by the same amount, at least
 constexpr int kJoltedPrints = 2;         // or prints by the same turn: each tells the robot's pose by itself
+constexpr double kContinuous_s = 0.35;   // a line seen at 10 Hz, two pictures lost; hall-hard 1 to 5, not swept
 constexpr double kAlike = 0.25;          // within this part of it
 constexpr double kPrintTurn_rad = 0.01;  // and this: what a print's turn is off by
 constexpr double kLever_m = 0.3;         // a jolt that turns the robot by so many rad moves it by that times this
@@ -32,8 +33,11 @@ bool slam::believable(int landmark, const joint_state::innovation_block &block, 
   return false;
 }
 
-void slam::note_turn(bool fused, double innovation_rad, bool of_print) {
+// `last_ns`: when this landmark fitted last. A tracker that lost its lines for some pictures finds them again under
+// each other's numbers, all shifted alike: that is no turn of the robot.
+void slam::note_turn(bool fused, double innovation_rad, bool of_print, wm_time_ns last_ns) {
   look_.of_prints = of_print;
+  if (!fused && params_.line_rejoin && wm_seconds_between(last_ns, joint_.now_ns()) > kContinuous_s) return;
   if (fused)
     look_.fused++;
   else if (look_.refused < look_record::kMost)
@@ -62,10 +66,14 @@ void slam::begin_look(wm_time_ns t_ns) {
       turn = sum / alike;
     }
   }
-  if (most >= (look_.of_prints ? kJoltedPrints : kJolted) && 2 * most > look_.fused + look_.refused) {
+  const int seen = look_.fused + look_.refused;
+  const bool enough = most >= (look_.of_prints ? kJoltedPrints : kJolted) && 2 * most > seen;
+  // In the dark a tracker finds a few of its lines where others are, all shifted alike.
+  if (enough && (look_.of_prints || 2 * seen > look_.before)) {
     joint_.loosen(square(kLever_m * turn), square(turn));
     counts_.jolts++;
   }
+  look_.before = seen;
   look_.t_ns = t_ns;
   look_.fused = look_.refused = 0;
 }

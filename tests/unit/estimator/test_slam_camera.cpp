@@ -57,6 +57,30 @@ void test_stamps_that_scatter_matter_where_it_turns(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.3 * 0.05 * 0.05, 0.05 * 0.05, variance[1] - variance[0]);
 }
 
+// GIVEN a look whose stamp is 0.1 s late in a turn of 0.25 rad/s THEN with its stamp error as a state the heading
+// stays.
+void test_a_late_stamp_turns_all_bearings_alike(void) {
+  double turned_rad[2];
+  for (int i = 0; i < 2; i++) {
+    make_room();
+    params.sensor_stamp_sigma_s = 0.1 * i;
+    begin();
+    drive(20);
+    wm_estimate before, after;
+    slam->estimate(state, &before);
+    const wm::arc way = wm::make_arc(-0.05, -0.025);  // 0.1 s ago
+    const wm_pose2 eye = wm::compose(wm::compose(truth, {way.x_m, way.y_m, way.turn_rad}), {0.2, 0, 0});
+    for (int k = 0; k < kCount; k++) {
+      const double dx = place[k][0] - eye.x_m, dy = place[k][1] - eye.y_m;
+      const double bearing = wm::wrap(wm::atan2(dy, dx) - eye.heading_rad);
+      if (std::fabs(bearing) < 1.2) see(make::sighting(now_s, 10 + k, bearing, std::sqrt(dx * dx + dy * dy)));
+    }
+    slam->estimate(state, &after);
+    turned_rad[i] = std::fabs(wm::wrap(after.heading_rad - before.heading_rad));
+  }
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.6 * turned_rad[0], turned_rad[1]);
+}
+
 }  // namespace
 
 void setUp(void) { make_room(); }
@@ -68,5 +92,6 @@ int main(void) {
   RUN_TEST(test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt);
   RUN_TEST(test_taken_for_level_it_bends_the_map);
   RUN_TEST(test_stamps_that_scatter_matter_where_it_turns);
+  RUN_TEST(test_a_late_stamp_turns_all_bearings_alike);
   return UNITY_END();
 }
