@@ -266,13 +266,13 @@ std::unique_ptr<film> street_film(bool lost, int signs) {
     }
     return grey + (picture > 2 ? 5 : 0);
   };
-  for (int i = 0; i < 5; i++) {
+  for (int i = 0; i < (lost ? 8 : 5); i++) {
     shoot(*out, {{0.1 * i, 0.05, 0}, {0.004, 0.003, 0.02}}, street, 2);
     wm_estimate &e = out->predictions.back();
     if (lost && i < 2) e.state = WM_STATE_SEARCHING;
     if (lost && i >= 2) {  // sure of a wrong pose, and late
       e.pose_map_base.p_m[1] += 1.5;
-      out->frames.back().t_ns += 1'000'000'000 * i;
+      out->frames.back().t_ns += INT64_C(400'000'000) * i;
     }
     e.covariance[wm_cov_index(1, 1)] = i == 3 ? 0.04 : 0.03 * 0.03;
   }
