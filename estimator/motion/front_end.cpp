@@ -55,6 +55,7 @@ void motion_front_end::init(const wm_motion_params *params, const wm_wheels *whe
   std::memset(static_cast<void *>(this), 0, sizeof *this);
   params_ = params;
   wheels_ = *wheels;
+  commands_ = are_commands(*params);
   hold_max_ns_ = wm_ns_from_seconds(params->hold_max_s);
   now_ns_ = newest_ns_ = fed_ns_ = still_since_ns_ = yaw_same_since_ns_ = WM_TIME_NONE;
   refused_since_ns_ = last_refusal_ns_ = WM_TIME_NONE;
@@ -101,30 +102,22 @@ void motion_front_end::feed(const wm_event &event) {
   }
   const bool planar = event.kind == WM_EVENT_TWIST2;
   const double v = planar ? event.as.twist2.v_mps : event.as.twist6.v_mps[0];
-  const double w = driven_rate(v, planar ? event.as.twist2.w_radps : event.as.twist6.w_radps[2]);
+  const double rate = planar ? event.as.twist2.w_radps : event.as.twist6.w_radps[2];
+  const double w = commands_ ? driven_rate(*params_, v, rate) : rate;
   choose_model(true);
   if (model_ != WM_MOTION_TWIST) return;
-  const bool speed = is_plausible_level(kTwistSpeed, event.t_ns, v),
-             rate = is_plausible_level(kTwistRate, event.t_ns, w);
-  note_plausibility(event.t_ns, bit(kTwistSpeed), speed);
-  note_plausibility(event.t_ns, bit(kTwistRate), rate);
-  watch_standstill(event.t_ns, speed && rate && std::fabs(v) < params_->standstill_speed_mps &&
+  const bool v_plausible = is_plausible_level(kTwistSpeed, event.t_ns, v);
+  const bool w_plausible = is_plausible_level(kTwistRate, event.t_ns, w);
+  const bool plausible = v_plausible && w_plausible;
+  note_plausibility(event.t_ns, bit(kTwistSpeed), v_plausible);
+  note_plausibility(event.t_ns, bit(kTwistRate), w_plausible);
+  watch_standstill(event.t_ns, plausible && std::fabs(v) < params_->standstill_speed_mps &&
                                    std::fabs(w) < params_->standstill_yaw_rate_radps);
   const motion_input held = history_.empty() ? motion_input{} : history_.newest();
-  if (speed && rate)
+  if (plausible)
     push_input(event.t_ns, v, w, false, false);
   else
     push_input(event.t_ns, held.a, held.b, true, false);
-}
-
-// What a drive makes of a commanded turn rate that takes speed and radius, and radii up to a largest one.
-double motion_front_end::driven_rate(double v_mps, double w_radps) const {
-  const double radius_max = params_->commands_radius_max_m, overflow = params_->commands_radius_overflow_m;
-  if (!(radius_max > 0.0) || v_mps == 0.0 || std::fabs(v_mps) <= std::fabs(w_radps) * radius_max || w_radps == 0.0)
-    return w_radps;
-  const double radius = v_mps / w_radps;
-  const bool left = radius > 0.0 && !(overflow > 0.0 && radius > overflow);
-  return v_mps / (left ? radius_max : -radius_max);
 }
 
 void motion_front_end::take_quantities(const wm_event &event) {
@@ -342,6 +335,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.a = a;
   input.b = b;
   input.model = model_;
+  input.command = model_ == WM_MOTION_TWIST && commands_;
   input.doubtful = doubtful;
   mark_refused(&input);
   input.standing = still_since_ns_ != WM_TIME_NONE && !doubtful && !input.refused &&

@@ -4,6 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_MOTION_FRONT_END_HPP
 #define WAYMARK_ESTIMATOR_MOTION_FRONT_END_HPP
 
+#include "motion/commands.hpp"
 #include "motion/history.hpp"
 #include "motion/plausibility.hpp"
 #include "motion/step.hpp"
@@ -44,13 +45,16 @@ class motion_front_end {
       motion_noise noise = noise_of(stretch.input, twist, stretch.dt_s, *params_, wheels_, calibration);
       add_silence(stretch, *params_, ticks_drive() && stretch.has_next, &noise);
       add_refused(stretch, *params_, &noise);
-      add_change(stretch, *params_, &noise);
+      if (stretch.input.command) add_change(stretch, *params_, &noise);
       visit(stretch, twist, noise);
     });
   }
 
   // Twist of base_link at a time, by what is known now.
   motion_twist twist_at(wm_time_ns t_ns, const wm_motion_calibration &calibration) const;
+
+  // Twists are commands, although no parameter shows it: an estimator learns how much speed they lose in turns.
+  void take_commands() { commands_ = 1; }
 
   void set_now(wm_time_ns t_ns) { now_ns_ = t_ns; }
   wm_time_ns now_ns() const { return now_ns_; }
@@ -106,7 +110,6 @@ class motion_front_end {
   bool seen(int quantity) const { return stamp_ns_[quantity] != WM_TIME_NONE; }
   bool silent(int quantity, wm_time_ns t_ns) const { return t_ns - stamp_ns_[quantity] > hold_max_ns_; }
   double by_gear(double value, bool is_signed) const;
-  double driven_rate(double v_mps, double w_radps) const;
   wm_time_ns lag_of(const wm_motion_calibration &calibration) const;
 
   const wm_motion_params *params_;
@@ -131,6 +134,7 @@ class motion_front_end {
   uint8_t model_;
   uint8_t speed_source_;
   uint8_t speed_source_changed_;
+  uint8_t commands_;         // twists are commands
   uint8_t yaw_fresh_;        // the last event brought a yaw rate
   uint8_t went_on_without_;  // a bit a wheel: others than motion moved the pose on while it was overdue; no count since
   uint8_t speed_is_signed_;  // a negative speed was seen: the sign is the sensor's, not the gear's

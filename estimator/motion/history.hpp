@@ -23,6 +23,7 @@ struct motion_input {
   uint8_t doubtful;  // not to be believed: frozen counter, dead encoder
   uint8_t stale;     // set by the walk over the history: held for longer than hold_max
   uint8_t counted;   // counts that came at its end say what it was: true until then, however long
+  uint8_t command;   // a twist that is a command
   uint8_t refused;   // kRefusedSpeed, kRefusedTurn: samples of it are refused, and this is the last plausible one
   double refused_s;  // at t_ns: for how long
 };

@@ -31,11 +31,6 @@ static const wm_param kParams[] = {
         "m/s2. A speed that is older than 0.25 s and than three of its periods holds on, but the robot may have braked "
         "or sped up so much since: sigma grows by half of it by the square of the time."),
     F64("noise.hold_radps2", noise_hold_radps2, 0.5, 0, 100, "rad/s2. As hold_mps2, for the turn rate."),
-    F64("noise.speed_change", noise_speed_change, 0, 0, 10,
-        "For twists: noise of the way, in m per square root of a m/s by which the speed changed. Commands are obeyed "
-        "at times that differ, and small robots drive evenly in between."),
-    F64("noise.yaw_rate_change", noise_yaw_rate_change, 0, 0, 10,
-        "As speed_change, for the turn: rad per square root of a rad/s. 0.04 is 0.06 s for a change of 0.4 rad/s."),
     F64("standstill.speed_mps", standstill_speed_mps, 0.02, 0, 1,
         "A speed below this is none. Below the smallest step of common wheel-speed sensors (0.01 to 0.03 m/s)."),
     F64("standstill.yaw_rate_radps", standstill_yaw_rate_radps, 0.002, 0, 1,
@@ -56,17 +51,24 @@ static const wm_param kParams[] = {
     F64("limits.radps2", limits_radps2, 30.0, 0, 10000,
         "rad/s2. As limits.mps2, for a turn rate, with a step of 6 rad/s. 0: no limit."),
     F64("commands.radius_max_m", commands_radius_max_m, 0.0, 0, 1000,
-        "m. For twists that are commands: the drive takes a speed and a radius, and this is the largest that it "
-        "knows; a wider turn that is asked for is driven with it, so that the gentlest is speed / radius. iRobot "
-        "Create: 2. 0: any turn is driven as asked."),
+        "m. Twists are commands to a drive that takes speed and radius, of which this is the largest (iRobot Create: "
+        "2): a wider turn is driven with it. 0: any turn is driven as asked."),
     F64("commands.radius_overflow_m", commands_radius_overflow_m, 0.0, 0, 1000,
-        "m. With commands.radius_max_m, and not below it: a left turn that is asked for with a radius beyond this is "
-        "driven as the gentlest one to the right, because the number of the radius overflows on its way to the drive. "
-        "0: never."),
+        "m. With radius_max_m and not below it: a left turn with a radius beyond this is driven as the widest one to "
+        "the right, since the radius overflows on its way to the drive. 0: never."),
+    F64("commands.speed_change", commands_speed_change, 0, 0, 10,
+        "Twists are commands, which are obeyed sooner or later: noise of the distance in m per square root of a m/s by "
+        "which the speed changes."),
+    F64("commands.yaw_rate_change", commands_yaw_rate_change, 0, 0, 10,
+        "As speed_change, for the rotation: rad per square root of a rad/s. 0.04 is 0.06 s for a change of 0.4 rad/s."),
 };
 
+static const wm_param_old kOld[] = {{"noise.speed_change", "commands.speed_change", NULL},
+                                    {"noise.yaw_rate_change", "commands.yaw_rate_change", NULL},
+                                    {NULL, NULL, NULL}};
+
 const wm_param_table wm_motion_params_table = {kParams, sizeof kParams / sizeof kParams[0],
-                                               sizeof(struct wm_motion_params), NULL};
+                                               sizeof(struct wm_motion_params), kOld};
 
 const char *wm_motion_params_clash(const wm_motion_params *params, const char **key) {
   // 0 is off for either; where they are equal, every left turn overflows that is wider than the drive's widest.

@@ -21,7 +21,6 @@ struct wm_motion_params {
   double noise_ticks_per_sqrt_m;
   double noise_steering_rad;
   double noise_hold_mps2, noise_hold_radps2;
-  double noise_speed_change, noise_yaw_rate_change;
   double standstill_speed_mps;
   double standstill_yaw_rate_radps;
   double standstill_after_s;
@@ -29,6 +28,7 @@ struct wm_motion_params {
   double hold_max_s;
   double limits_mps2, limits_radps2;
   double commands_radius_max_m, commands_radius_overflow_m;
+  double commands_speed_change, commands_yaw_rate_change;
 };
 
 #ifdef __cplusplus

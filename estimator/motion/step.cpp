@@ -2,19 +2,13 @@
 #include "motion/step.hpp"
 
 #include "math/elementary.hpp"
+#include "motion/commands.hpp"
 
 namespace wm {
 namespace {
 
 constexpr double kUnknownRate_radps = 0.3;  // per square root of a second
 constexpr double kCatchUp_mps = 30.0;       // faster is no robot that counts, but what remains of a count
-
-void add(motion_twist &t, int index, double v_by, double w_by) {
-  t.index[t.count] = index;
-  t.v_by[t.count] = v_by;
-  t.w_by[t.count] = w_by;
-  t.count++;
-}
 
 // v = (l + r)/2, w = (r - l)/b, with l and r each by its own scale and b by the track's.
 motion_twist from_wheels(double left, double right, const wm_motion_calibration &c, double track_m) {
@@ -24,9 +18,9 @@ motion_twist from_wheels(double left, double right, const wm_motion_calibration 
   const double r = right * c.value[kRightScale];
   t.v = 0.5 * (l + r);
   t.w = (r - l) * inverse_track;
-  add(t, kLeftScale, 0.5 * left, -left * inverse_track);
-  add(t, kRightScale, 0.5 * right, right * inverse_track);
-  add(t, kTrackScale, 0.0, -t.w / c.value[kTrackScale]);
+  t.add(kLeftScale, 0.5 * left, -left * inverse_track);
+  t.add(kRightScale, 0.5 * right, right * inverse_track);
+  t.add(kTrackScale, 0.0, -t.w / c.value[kTrackScale]);
   return t;
 }
 
@@ -34,45 +28,9 @@ motion_twist from_speed_and_rate(double speed, double rate, const wm_motion_cali
   motion_twist t{};
   t.v = c.value[kSpeedScale] * speed;
   t.w = c.value[kYawRateScale] * (rate - c.value[kYawRateBias]);
-  add(t, kSpeedScale, speed, 0.0);
-  add(t, kYawRateScale, 0.0, rate - c.value[kYawRateBias]);
-  add(t, kYawRateBias, 0.0, -c.value[kYawRateScale]);
-  return t;
-}
-
-// A commanded twist. Where the track is known, it is what a controller makes of two wheels. Drives that must keep their
-// faster wheel below a limit, or round to coarse wheel speeds, give less speed the more they turn.
-motion_twist from_twist(double speed, double rate, const wm_motion_calibration &c, double track_m) {
-  const double size = std::fabs(speed);
-  const double turning = square(rate);
-  const double slower = c.value[kTurnSlowdown] * turning;
-  const double share = size > 0.0 && slower < size ? (size - slower) / size : size > 0.0 ? 0.0 : 1.0;
-  const double driven = share * speed;
-  motion_twist t = finite(track_m)
-                       ? from_wheels(driven - 0.5 * track_m * rate, driven + 0.5 * track_m * rate, c, track_m)
-                       : motion_twist{};
-  if (!finite(track_m)) {
-    t.v = driven;
-    t.w = rate;
-  }
-  const double v = t.v, w = t.w;
-  for (int i = 0; i < t.count; i++) {
-    t.v_by[i] *= c.value[kSpeedScale];
-    t.w_by[i] *= c.value[kYawRateScale];
-  }
-  t.v = c.value[kSpeedScale] * v;
-  t.w = c.value[kYawRateScale] * (w - c.value[kYawRateBias]);
-  add(t, kSpeedScale, v, 0.0);
-  add(t, kYawRateScale, 0.0, w - c.value[kYawRateBias]);
-  add(t, kYawRateBias, 0.0, -c.value[kYawRateScale]);
-  if (share > 0.0 && size > 0.0) {
-    // Both wheels lose the same, so with unlike wheels the turn changes a little, too.
-    const double lost = speed > 0.0 ? -turning : turning;
-    const bool wheels = finite(track_m);
-    const double v_by = wheels ? 0.5 * (c.value[kLeftScale] + c.value[kRightScale]) : 1.0;
-    const double w_by = wheels ? (c.value[kRightScale] - c.value[kLeftScale]) / (track_m * c.value[kTrackScale]) : 0.0;
-    add(t, kTurnSlowdown, c.value[kSpeedScale] * v_by * lost, c.value[kYawRateScale] * w_by * lost);
-  }
+  t.add(kSpeedScale, speed, 0.0);
+  t.add(kYawRateScale, 0.0, rate - c.value[kYawRateBias]);
+  t.add(kYawRateBias, 0.0, -c.value[kYawRateScale]);
   return t;
 }
 
@@ -86,10 +44,10 @@ motion_twist from_steering(double speed, double road_wheel, const wm_motion_cali
   const double middle = share > 0.2 ? speed / share : speed;
   t.v = c.value[kSpeedScale] * middle;
   t.w = t.v * curvature;
-  add(t, kSpeedScale, middle, middle * curvature);
+  t.add(kSpeedScale, middle, middle * curvature);
   const double curvature_by = (1.0 + tangent * tangent) / wheels.wheelbase_m;
   const double v_by = share > 0.2 ? t.v * offset / share * curvature_by : 0.0;
-  add(t, kSteeringOffset, v_by, v_by * curvature + t.v * curvature_by);
+  t.add(kSteeringOffset, v_by, v_by * curvature + t.v * curvature_by);
   return t;
 }
 
@@ -97,13 +55,35 @@ double least(double a, double b) { return a < b ? a : b; }
 
 }  // namespace
 
+motion_twist twist_of_sample(double speed, double rate, const wm_motion_calibration &c, double track_m) {
+  motion_twist t = finite(track_m) ? from_wheels(speed - 0.5 * track_m * rate, speed + 0.5 * track_m * rate, c, track_m)
+                                   : motion_twist{};
+  if (!finite(track_m)) {
+    t.v = speed;
+    t.w = rate;
+  }
+  const double v = t.v, w = t.w;
+  for (int i = 0; i < t.count; i++) {
+    t.v_by[i] *= c.value[kSpeedScale];
+    t.w_by[i] *= c.value[kYawRateScale];
+  }
+  t.v = c.value[kSpeedScale] * v;
+  t.w = c.value[kYawRateScale] * (w - c.value[kYawRateBias]);
+  t.add(kSpeedScale, v, 0.0);
+  t.add(kYawRateScale, 0.0, w - c.value[kYawRateBias]);
+  t.add(kYawRateBias, 0.0, -c.value[kYawRateScale]);
+  return t;
+}
+
 motion_twist twist_of(const motion_input &input, const wm_motion_calibration &c, const wm_wheels &wheels) {
   if (input.standing || input.stale) return motion_twist{};
   switch (input.model) {
     case WM_MOTION_TICKS: return from_wheels(input.a, input.b, c, wheels.track_m);
     case WM_MOTION_SPEED_YAW_RATE: return from_speed_and_rate(input.a, input.b, c);
     case WM_MOTION_ACKERMANN: return from_steering(input.a, input.b, c, wheels);
-    case WM_MOTION_TWIST: return from_twist(input.a, input.b, c, wheels.track_m);
+    case WM_MOTION_TWIST:
+      return input.command ? twist_of_command(input.a, input.b, c, wheels.track_m)
+                           : twist_of_sample(input.a, input.b, c, wheels.track_m);
     default: return motion_twist{};
   }
 }
@@ -198,12 +178,6 @@ void add_refused(const motion_stretch &stretch, const wm_motion_params &p, motio
   const double grown_s4 = (square(square(to_s)) - square(square(from_s))) / 12.0;
   if (stretch.input.refused & kRefusedSpeed) noise->way_m2 += square(p.limits_mps2) * grown_s4;
   if (stretch.input.refused & kRefusedTurn) noise->turn_rad2 += square(p.limits_radps2) * grown_s4;
-}
-
-void add_change(const motion_stretch &stretch, const wm_motion_params &p, motion_noise *noise) {
-  if (stretch.input.model != WM_MOTION_TWIST) return;
-  noise->way_m2 += square(p.noise_speed_change) * std::fabs(stretch.changed[0]);
-  noise->turn_rad2 += square(p.noise_yaw_rate_change) * std::fabs(stretch.changed[1]);
 }
 
 }  // namespace wm

@@ -28,14 +28,25 @@ inline constexpr wm_motion_calibration kNeutralCalibration = {{1.0, 1.0, 0.0, 1.
 // Twist (speed in m/s, turn rate in rad/s) of base_link and its derivatives by the calibration; only the first `count`
 // entries of `index`, `v_by`, `w_by` are set. The lag is not among them: it moves the ends of the interval.
 struct motion_twist {
+  static constexpr int kMax = 8;
   double v, w;
   int count;
-  int index[8];
-  double v_by[8], w_by[8];
+  int index[kMax];
+  double v_by[kMax], w_by[kMax];
+
+  void add(int term, double v_by_term, double w_by_term) {
+    if (count == kMax) return;
+    index[count] = term;
+    v_by[count] = v_by_term;
+    w_by[count++] = w_by_term;
+  }
 };
 
 // Paper, system 1: V and Phi of the car (motion); system 2: differential from ticks.
 motion_twist twist_of(const motion_input &input, const wm_motion_calibration &calibration, const wm_wheels &wheels);
+
+// A measured twist; where the track is known, as a controller makes it by two wheels with their own scales.
+motion_twist twist_of_sample(double speed, double rate, const wm_motion_calibration &c, double track_m);
 
 // Variances of a stretch: way (along), turn, their covariance, and sideways.
 struct motion_noise {
@@ -53,10 +64,6 @@ void add_silence(const motion_stretch &stretch, const wm_motion_params &params, 
 // Noise while samples are refused as implausible: the robot may have accelerated at up to the limits, evenly
 // distributed, since the last plausible one: sigma = a t^2 / (2 sqrt 3), up to hold_max_s.
 void add_refused(const motion_stretch &stretch, const wm_motion_params &params, motion_noise *noise);
-
-// What a twist that changed leaves behind: when it was obeyed, and how, is unsure anew each time. Variances by how much
-// it changed, not by its square, so that a change in many small steps counts as one in a single step.
-void add_change(const motion_stretch &stretch, const wm_motion_params &params, motion_noise *noise);
 
 }  // namespace wm
 

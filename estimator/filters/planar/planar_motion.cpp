@@ -18,6 +18,7 @@ void planar_motion::set_motion_state(const wm_motion_states &states, int i, int 
   walk_[i] = square(states.walk[i]);
   start_variance_[i] = square(states.sigma[i]);
   motion_state_[i] = state;
+  if (i == kTurnSlowdown && state >= 0) front_.take_commands();
 }
 
 wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const {

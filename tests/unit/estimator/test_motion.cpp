@@ -52,7 +52,8 @@ constexpr double kTick = 2 * M_PI * 0.1 / 1000;  // of make::two_wheels()
 
 // Each model, each calibration state: derivative by central differences, and scales' meaning at a turn.
 void test_every_derivative_of_every_model(void) {
-  const int models[] = {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_ACKERMANN, WM_MOTION_TWIST};
+  const int kCommand = -1;
+  const int models[] = {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_ACKERMANN, WM_MOTION_TWIST, kCommand};
   int checked = 0;
   for (int model : models) {
     wm_wheels w = make::car();
@@ -60,7 +61,8 @@ void test_every_derivative_of_every_model(void) {
     wm::motion_input input{};
     input.a = 1.3;
     input.b = model == WM_MOTION_TICKS ? 1.1 : 0.2;
-    input.model = (uint8_t)model;
+    input.model = (uint8_t)(model == kCommand ? (int)WM_MOTION_TWIST : model);
+    input.command = model == kCommand;
     const wm_motion_calibration c = {{1.05, 0.93, 0.02, 1.02, 0.97, 1.04, 0.03, 0.1, 0.07}};
     const wm::motion_twist t = wm::twist_of(input, c, w);
     TEST_ASSERT_GREATER_THAN(1, t.count);
@@ -79,7 +81,7 @@ void test_every_derivative_of_every_model(void) {
       checked += v_by != 0 || w_by != 0;
     }
   }
-  TEST_ASSERT_EQUAL(3 + 3 + 2 + 7, checked);
+  TEST_ASSERT_EQUAL(3 + 3 + 2 + 6 + 7, checked);
 }
 
 void test_ticks_make_exact_arcs(void) {
@@ -214,8 +216,9 @@ void test_a_change_of_command_is_doubted(void) {
   for (int steps : {1, 8}) {
     start(make::no_wheels());
     params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
-    params.noise_speed_change = 0.02;
-    params.noise_yaw_rate_change = 0.03;
+    params.commands_speed_change = 0.02;
+    params.commands_yaw_rate_change = 0.03;
+    front.init(&params, &wheels);
     feed(make::twist(0, 0.1, 0.0));
     for (int i = 1; i <= steps; i++) {
       const double share = (double)i / steps;
@@ -307,6 +310,7 @@ void test_a_drive_knows_no_wider_radius(void) {
   };
   TEST_ASSERT_EQUAL_DOUBLE(0.001, driven(0.1, 0.001));  // unless it is told, any turn is driven as asked
   params.commands_radius_max_m = 2.0;
+  front.init(&params, &wheels);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, driven(0.1, 0.001));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, -0.001));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, driven(-0.1, 0.001));  // backwards
