@@ -173,6 +173,28 @@ void test_an_unsigned_speed_takes_its_sign_from_the_gear(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, -1.0, pose.x_m);
 }
 
+// A sensor's zero error, of either sign, is no sign of its own: the gear still gives it. Beyond it, it is.
+void test_a_zero_error_is_no_sign(void) {
+  for (const double zero_mps : {0.05, -0.05, -0.2}) {
+    start(make::car());
+    feed(make::quantities(0, {{WM_Q_GEAR, 1}, {WM_Q_VEHICLE_SPEED, zero_mps}, {WM_Q_YAW_RATE, 0.0}}));
+    feed(make::quantities(1, {{WM_Q_GEAR, -1}, {WM_Q_VEHICLE_SPEED, 1.0}}));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, zero_mps < -0.1 ? 1.0 : -1.0, front.twist_at(make::at(1), calibration).v);
+  }
+}
+
+// Noise of the steering angle alone: the variance of the turn is that of the derivative by the angle.
+void test_steering_noise_by_the_angles_derivative(void) {
+  start(make::car());
+  params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
+  const double angle = 0.6, h = 1e-6;
+  feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 2.0}, {WM_Q_ROAD_WHEEL, angle}}));
+  feed(make::quantities(0.2, {{WM_Q_VEHICLE_SPEED, 2.0}, {WM_Q_ROAD_WHEEL, angle}}));
+  const double by_angle = 2.0 * (std::tan(angle + h) - std::tan(angle - h)) / (2 * h) / wheels.wheelbase_m;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, by_angle * by_angle * params.noise_steering_rad * params.noise_steering_rad * 0.2,
+                            turn_var);
+}
+
 void test_rear_wheels_are_preferred_and_a_silent_source_yields(void) {
   start(make::car());
   feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
@@ -550,6 +572,8 @@ int main(void) {
   RUN_TEST(test_a_late_count_and_the_next_right_behind_it);
   RUN_TEST(test_counts_of_both_wheels_may_come_one_after_the_other);
   RUN_TEST(test_an_unsigned_speed_takes_its_sign_from_the_gear);
+  RUN_TEST(test_a_zero_error_is_no_sign);
+  RUN_TEST(test_steering_noise_by_the_angles_derivative);
   RUN_TEST(test_rear_wheels_are_preferred_and_a_silent_source_yields);
   RUN_TEST(test_ackermann_by_table_ratio_and_road_wheel);
   RUN_TEST(test_a_held_speed_is_doubted_more_and_more);

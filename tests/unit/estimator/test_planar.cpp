@@ -231,6 +231,19 @@ void test_fading_and_forgetting_keep_the_rest(void) {
   TEST_ASSERT_EQUAL_DOUBLE(other, filter->covariance(0, 1));
 }
 
+void test_the_estimate_of_a_drive_has_its_twist(void) {
+  make_setup(make::no_wheels());
+  filter->init(setup, states);
+  for (int i = 0; i <= 10; i++) filter->move(make::twist(0.1 * i, 1.5, i < 5 ? 0.0 : 0.2));
+  filter->move_to(make::at(1.1));
+  wm_estimate out;
+  filter->estimate(&out);
+  for (int i = 0; i < 3; i++) {
+    TEST_ASSERT_EQUAL_DOUBLE(i == 0 ? 1.5 : 0.0, out.v_mps[i]);
+    TEST_ASSERT_EQUAL_DOUBLE(i == 2 ? 0.2 : 0.0, out.w_radps[i]);
+  }
+}
+
 }  // namespace
 
 void setUp(void) {
@@ -245,6 +258,7 @@ int main(void) {
   RUN_TEST(test_josephs_form_is_the_plain_one_at_the_best_gain);
   RUN_TEST(test_one_number_after_the_other_is_all_at_once);
   RUN_TEST(test_standing_still_teaches_the_gyros_bias);
+  RUN_TEST(test_the_estimate_of_a_drive_has_its_twist);
   RUN_TEST(test_fading_and_forgetting_keep_the_rest);
   return UNITY_END();
 }
