@@ -34,9 +34,9 @@ motion_twist twist_of_command(double speed, double rate, const wm_motion_calibra
   return t;
 }
 
-void add_change(const motion_stretch &stretch, const wm_motion_params &p, motion_noise *noise) {
-  noise->way_m2 += square(p.commands_speed_change) * std::fabs(stretch.changed[0]);
-  noise->turn_rad2 += square(p.commands_yaw_rate_change) * std::fabs(stretch.changed[1]);
+void add_change_noise(const motion_segment &segment, const wm_motion_params &p, motion_noise *noise) {
+  noise->distance_m2 += square(p.commands_speed_change) * std::fabs(segment.changed[0]);
+  noise->rotation_rad2 += square(p.commands_yaw_rate_change) * std::fabs(segment.changed[1]);
 }
 
 }  // namespace wm

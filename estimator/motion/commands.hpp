@@ -19,7 +19,7 @@ motion_twist twist_of_command(double speed, double rate, const wm_motion_calibra
 
 // Noise of a change of command: its time and shape differ each time. Variances are proportional to the change, not to
 // its square, so that a change in many small steps counts as one in a single step.
-void add_change(const motion_stretch &stretch, const wm_motion_params &params, motion_noise *noise);
+void add_change_noise(const motion_segment &segment, const wm_motion_params &params, motion_noise *noise);
 
 }  // namespace wm
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The motion front end: takes motion events, keeps what holds (speeds, rates, wheel positions, gear), notices standing
-// still and sensors that died, and hands out the motion between two times piece by piece.
+// The motion front end: takes motion events, keeps the values that hold (speeds, rates, wheel positions, gear), detects
+// standstill and faulty sensors, and gives the motion between two times in segments of constant twist.
 #ifndef WAYMARK_ESTIMATOR_MOTION_FRONT_END_HPP
 #define WAYMARK_ESTIMATOR_MOTION_FRONT_END_HPP
 
@@ -13,6 +13,15 @@
 
 namespace wm {
 
+// Bits of quantities.
+constexpr uint32_t quantity_bit(int id) { return UINT32_C(1) << id; }
+constexpr uint32_t quantity_bits(int first, int last) { return quantity_bit(last + 1) - quantity_bit(first); }
+inline constexpr uint32_t kCounts = quantity_bits(WM_Q_WHEEL_TICKS_LEFT, WM_Q_WHEEL_TICKS_RIGHT);
+inline constexpr uint32_t kSpeeds = quantity_bits(WM_Q_WHEEL_SPEED_FRONT_LEFT, WM_Q_VEHICLE_SPEED);
+inline constexpr uint32_t kSteering = quantity_bits(WM_Q_STEERING_WHEEL, WM_Q_STEERING_ACTUATOR);
+constexpr bool is_count(int id) { return (kCounts & quantity_bit(id)) != 0; }
+inline constexpr double kPeriodGain = 1.0 / 16.0;  // of the average of a message's period
+
 // Plain memory, no pointers but to the parameters, which outlive it.
 class motion_front_end {
  public:
@@ -23,34 +32,34 @@ class motion_front_end {
   // Takes an event that check() lets pass. Call advance() to its t_ns next.
   void feed(const wm_event &event);
 
-  // Moves to `to_ns` (not earlier than now) and calls visit(stretch, twist, noise) for each piece on the way. The
-  // calibration's lag is what the robot is late by behind its motion source; ticks are positions and have none.
+  // Moves to `to_ns` (not earlier than now) and calls visit(segment, twist, noise) for each segment until then. The
+  // calibration's lag is the delay of the motion behind its samples; ticks are positions and have none.
   template <class Visit>
   void advance(wm_time_ns to_ns, const wm_motion_calibration &calibration, Visit visit) {
     if (to_ns <= now_ns_) return;
     walk(now_ns_, to_ns, calibration,
-         [&](const motion_stretch &piece, const motion_twist &twist, const motion_noise &n) {
-           if (ticks_drive() && !piece.input.stale) hand_out_ticks(piece);
-           visit(piece, twist, n);
+         [&](const motion_segment &segment, const motion_twist &twist, const motion_noise &n) {
+           if (ticks_drive() && !segment.input.stale) note_integrated(segment);
+           visit(segment, twist, n);
          });
     now_ns_ = to_ns;
   }
 
-  // The same, for a look back or ahead: nothing moves.
+  // The same for any interval, past or future; the state stays.
   template <class Visit>
   void walk(wm_time_ns from_ns, wm_time_ns to_ns, const wm_motion_calibration &calibration, Visit visit) const {
     const wm_time_ns lag_ns = lag_of(calibration);
-    history_.walk(from_ns - lag_ns, to_ns - lag_ns, hold_max_ns_, [&](const motion_stretch &stretch) {
-      const motion_twist twist = twist_of(stretch.input, calibration, wheels_);
-      motion_noise noise = noise_of(stretch.input, twist, stretch.dt_s, *params_, wheels_, calibration);
-      add_silence(stretch, *params_, ticks_drive() && stretch.has_next, &noise);
-      add_refused(stretch, *params_, &noise);
-      if (stretch.input.command) add_change(stretch, *params_, &noise);
-      visit(stretch, twist, noise);
+    history_.walk(from_ns - lag_ns, to_ns - lag_ns, hold_max_ns_, [&](const motion_segment &segment) {
+      const motion_twist twist = twist_of(segment.input, calibration, wheels_);
+      motion_noise noise = noise_of(segment.input, twist, segment.dt_s, *params_, wheels_, calibration);
+      add_overdue_noise(segment, *params_, ticks_drive() && segment.has_next, &noise);
+      add_refused_noise(segment, *params_, &noise);
+      if (segment.input.command) add_change_noise(segment, *params_, &noise);
+      visit(segment, twist, noise);
     });
   }
 
-  // Twist of base_link at a time, by what is known now.
+  // Twist of base_link at a time, by the inputs until now.
   motion_twist twist_at(wm_time_ns t_ns, const wm_motion_calibration &calibration) const;
 
   // Twists are commands, although no parameter shows it: an estimator learns how much speed they lose in turns.
@@ -58,25 +67,26 @@ class motion_front_end {
 
   void set_now(wm_time_ns t_ns) { now_ns_ = t_ns; }
   wm_time_ns now_ns() const { return now_ns_; }
-  wm_time_ns newest_ns() const { return newest_ns_; }  // newest event that drives
+  wm_time_ns newest_ns() const { return newest_ns_; }  // newest event that the model uses
   uint32_t health() const { return health_; }
+  uint64_t outliers() const { return outliers_; }  // messages refused as implausible
   const wm_motion_params &params() const { return *params_; }
   const wm_wheels &wheels() const { return wheels_; }
-  // How far the left and the right wheel have rolled by their counts, when the last event counted both and they are
-  // what the speed comes from.
-  bool counted_ways(double way_m[2]) const {
+  // Distance of the left and the right wheel since the start by their counts. False: the last event did not count both,
+  // or the speed is not theirs.
+  bool wheel_distances(double distance_m[2]) const {
     if (!ticks_drive() || wheel_[0].t_ns != newest_ns_ || wheel_[1].t_ns != newest_ns_) return false;
-    for (int side = 0; side < 2; side++) way_m[side] = wheel_[side].position_m;
+    for (int side = 0; side < 2; side++) distance_m[side] = wheel_[side].position_m;
     return true;
   }
   int model() const { return model_; }
-  // The input that should have come by then hasn't.
+  // The next input is overdue at that time.
   bool is_overdue(wm_time_ns t_ns) const { return history_.is_overdue(t_ns); }
-  // The last event counted a wheel, and that is where the way comes from.
+  // The last event counted a wheel, and the distance is the counted one.
   bool counted() const { return ticks_drive() && (wheel_[0].t_ns == fed_ns_ || wheel_[1].t_ns == fed_ns_); }
-  // True once after the speed came to be taken from another sensor, whose scale is another.
+  // True once after the speed's source changed to another sensor, with another scale.
   bool speed_source_changed();
-  // The last event brought a yaw rate while the robot stands: that is the gyro's bias.
+  // The yaw rate of the last event at standstill, which is the gyro's bias. False: none.
   bool standstill_yaw_rate(double *yaw_rate_radps) const;
 
  private:
@@ -84,6 +94,7 @@ class motion_front_end {
   enum speed_source : uint8_t { kNone, kFrontWheels, kVehicleSpeed, kTicksMean, kRearWheels };
 
   void take_quantities(const wm_event &event);
+  void push_quantities(wm_time_ns t_ns, uint32_t fresh, bool frozen, bool refused);
   bool is_plausible(const wm_quantities &q, wm_time_ns t_ns);
   bool counter_is_wrong(const wm_quantities &q, wm_time_ns t_ns) const;
   bool is_plausible_count(int side, wm_time_ns t_ns, double count);
@@ -102,11 +113,11 @@ class motion_front_end {
   double counted_turn_rate() const;
   void push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted);
   void push_ticks(wm_time_ns t_ns, bool doubtful, bool miscounted);
-  void hand_out_ticks(const motion_stretch &piece);
-  void forget_silent_way(wm_time_ns t_ns, double dt_s);
-  bool counts_ticks() const;                               // both wheels, and what a tick is worth
-  bool ticks_drive() const;                                // the way comes from ticks
-  double mean_of_wheels(double left, double right) const;  // a dead encoder's wheel goes with the other one
+  void note_integrated(const motion_segment &segment);
+  void drop_silent_distance(wm_time_ns t_ns, double dt_s);
+  bool counts_ticks() const;                               // both wheels, and a tick's length is known
+  bool ticks_drive() const;                                // the distance comes from ticks
+  double mean_of_wheels(double left, double right) const;  // a dead encoder's wheel rolls like the other one
   bool seen(int quantity) const { return stamp_ns_[quantity] != WM_TIME_NONE; }
   bool silent(int quantity, wm_time_ns t_ns) const { return t_ns - stamp_ns_[quantity] > hold_max_ns_; }
   double by_gear(double value, bool is_signed) const;
@@ -116,7 +127,7 @@ class motion_front_end {
   wm_wheels wheels_;
   wm_time_ns hold_max_ns_;
   wm_time_ns now_ns_;     // integrated until here; WM_TIME_NONE before the start
-  wm_time_ns newest_ns_;  // newest event that drives
+  wm_time_ns newest_ns_;  // newest event that the model uses
   wm_time_ns fed_ns_;     // newest event of motion
   motion_history history_;
   double value_[WM_Q_COUNT];
@@ -129,15 +140,16 @@ class motion_front_end {
   wm_time_ns still_since_ns_;  // speed below the threshold since; WM_TIME_NONE while moving
   wm_time_ns yaw_same_since_ns_;
   double yaw_last_;
-  double yaw_other_min_, yaw_other_max_;  // what the other sensors made of the turn rate meanwhile
+  double yaw_other_min_, yaw_other_max_;  // range of the turn rate by other sensors meanwhile
+  uint64_t outliers_;
   uint32_t health_;
   uint8_t model_;
   uint8_t speed_source_;
   uint8_t speed_source_changed_;
-  uint8_t commands_;         // twists are commands
-  uint8_t yaw_fresh_;        // the last event brought a yaw rate
-  uint8_t went_on_without_;  // a bit a wheel: others than motion moved the pose on while it was overdue; no count since
-  uint8_t speed_is_signed_;  // a negative speed was seen: the sign is the sensor's, not the gear's
+  uint8_t commands_;          // twists are commands
+  uint8_t yaw_fresh_;         // the last event brought a yaw rate
+  uint8_t observed_without_;  // per wheel: observations corrected the pose while counts were missing; no count since
+  uint8_t speed_is_signed_;   // a negative speed came: the sign is the sensor's, not the gear's
 };
 
 }  // namespace wm

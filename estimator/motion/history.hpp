@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the motion sensors said, each from when on, over the last seconds. Commands that are obeyed late and sightings
-// that are older than their stamp both look back into it.
+// Inputs of the motion model over the last seconds, each with the time from which it holds. A lag and delayed
+// observations need the past ones.
 #ifndef WAYMARK_ESTIMATOR_MOTION_HISTORY_HPP
 #define WAYMARK_ESTIMATOR_MOTION_HISTORY_HPP
 
@@ -16,24 +16,24 @@ enum refused_bits : uint8_t { kRefusedSpeed = 1, kRefusedTurn = 2 };
 // A raw input; a and b mean, by model: ticks: speed of the left and the right wheel (m/s); speed_yaw_rate and twist:
 // speed (m/s) and turn rate (rad/s); ackermann: speed (m/s) and road wheel angle (rad).
 struct motion_input {
-  wm_time_ns t_ns;  // holds from here to the next one's
+  wm_time_ns t_ns;  // holds until the next one's
   double a, b;
   uint8_t model;     // wm_motion_model; AUTO: nothing known yet
   uint8_t standing;  // the robot is known to stand
-  uint8_t doubtful;  // not to be believed: frozen counter, dead encoder
-  uint8_t stale;     // set by the walk over the history: held for longer than hold_max
-  uint8_t counted;   // counts that came at its end say what it was: true until then, however long
+  uint8_t doubtful;  // of a frozen counter, a dead encoder
+  uint8_t stale;     // set by walk(): held for longer than hold_max
+  uint8_t counted;   // by the counts at its end: true until then, however long
   uint8_t command;   // a twist that is a command
   uint8_t refused;   // kRefusedSpeed, kRefusedTurn: samples of it are refused, and this is the last plausible one
   double refused_s;  // at t_ns: for how long
 };
 
-// One piece of an interval of time over which one input holds.
-struct motion_stretch {
+// Part of an interval over which one input holds.
+struct motion_segment {
   motion_input input;
   double dt_s;
   double changed[2];  // at its beginning: by how much the input's a and b differ from the one before
-  double silent_s;    // at its beginning: for how long the next input has been overdue; below 0: it isn't
+  double overdue_s;   // at its beginning: for how long the next input has been overdue; below 0: it isn't
   double unknown_s;   // at its beginning: for how long the input has been held for too long; 0: it isn't
   double refused_s;   // at its beginning: for how long samples have been refused; only where input.refused
   bool has_next;      // a later input has come
@@ -44,7 +44,7 @@ class motion_history {
  public:
   static constexpr uint32_t kCapacity = 256;  // 1 s of lag at 250 inputs a second; a power of two
 
-  // An input that is older than this, and than three of the periods before it, is overdue.
+  // An input is overdue after this time and so many of the periods before it. Sources of 4 Hz and more keep within.
   static constexpr double kOverdueS = 0.25, kOverduePeriods = 3.0;
 
   void clear() { count_ = 0; }
@@ -66,7 +66,8 @@ class motion_history {
     return count_ > 0 && wm_seconds_between(newest().t_ns, t_ns) > due_s(count_, oldest);
   }
 
-  // Calls visit(stretch) for the pieces of [from_ns, to_ns] in order of time. Before the oldest input nothing is known.
+  // Calls visit(segment) for the segments of [from_ns, to_ns] in order of time. Before the oldest input the motion is
+  // unknown.
   template <class Visit>
   void walk(wm_time_ns from_ns, wm_time_ns to_ns, wm_time_ns hold_max_ns, Visit visit) const {
     if (to_ns <= from_ns) return;
@@ -75,31 +76,31 @@ class motion_history {
     while (next > oldest && at(next - 1).t_ns > from_ns) next--;
     wm_time_ns begin = from_ns;
     while (begin < to_ns) {
-      motion_stretch piece;
+      motion_segment segment;
       wm_time_ns end = next < count_ && at(next).t_ns < to_ns ? at(next).t_ns : to_ns;
       if (next > oldest) {
-        piece.input = at(next - 1);
-        const wm_time_ns held_until = piece.input.t_ns + hold_max_ns;
-        piece.input.stale = begin >= held_until;
-        if (!piece.input.stale && end > held_until) end = held_until;
-        if (piece.input.counted) piece.input.stale = 0;  // the way is known, however long it took
-        piece.silent_s = wm_seconds_between(piece.input.t_ns, begin) - due_s(next, oldest);
-        piece.refused_s = piece.input.refused_s + wm_seconds_between(piece.input.t_ns, begin);
-        piece.unknown_s = begin > held_until ? wm_seconds_between(held_until, begin) : 0.0;
-        const bool begins = next > oldest + 1 && begin == piece.input.t_ns;
-        piece.changed[0] = begins ? piece.input.a - at(next - 2).a : 0.0;
-        piece.changed[1] = begins ? piece.input.b - at(next - 2).b : 0.0;
+        segment.input = at(next - 1);
+        const wm_time_ns held_until = segment.input.t_ns + hold_max_ns;
+        segment.input.stale = begin >= held_until;
+        if (!segment.input.stale && end > held_until) end = held_until;
+        if (segment.input.counted) segment.input.stale = 0;  // the distance is known, however long it took
+        segment.overdue_s = wm_seconds_between(segment.input.t_ns, begin) - due_s(next, oldest);
+        segment.refused_s = segment.input.refused_s + wm_seconds_between(segment.input.t_ns, begin);
+        segment.unknown_s = begin > held_until ? wm_seconds_between(held_until, begin) : 0.0;
+        const bool begins = next > oldest + 1 && begin == segment.input.t_ns;
+        segment.changed[0] = begins ? segment.input.a - at(next - 2).a : 0.0;
+        segment.changed[1] = begins ? segment.input.b - at(next - 2).b : 0.0;
       } else {
-        piece.input = motion_input{};
-        piece.changed[0] = piece.changed[1] = 0.0;
-        piece.silent_s = -1.0;
-        piece.unknown_s = piece.refused_s = 0.0;
+        segment.input = motion_input{};
+        segment.changed[0] = segment.changed[1] = 0.0;
+        segment.overdue_s = -1.0;
+        segment.unknown_s = segment.refused_s = 0.0;
       }
-      piece.has_next = next < count_;
-      piece.dt_s = wm_seconds_between(begin, end);
-      piece.first = begin == from_ns;
-      piece.last = end == to_ns;
-      visit(piece);
+      segment.has_next = next < count_;
+      segment.dt_s = wm_seconds_between(begin, end);
+      segment.first = begin == from_ns;
+      segment.last = end == to_ns;
+      visit(segment);
       begin = end;
       while (next < count_ && at(next).t_ns <= begin) next++;
     }

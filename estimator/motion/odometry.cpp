@@ -16,7 +16,7 @@ struct wm_odometry {
   wm_odom_point head;  // at the last event
   wm_odom_point ring[kPoints];
   uint64_t count;
-  uint64_t before_silence;  // points when the inputs fell silent, until a count tells the way since; 0: they didn't
+  uint64_t points_before_gap;  // points when the inputs fell silent, until a count tells the way since; 0: they didn't
   // Only where twists in space come: their history, and the pose that they add up to since the first one.
   wm::spatial_history spatial;
   wm_time_ns spatial_ns;  // of that pose; WM_TIME_NONE: none came
@@ -30,9 +30,9 @@ void carry_point(wm_odom_point &point, double dt_s, const wm::motion_twist &twis
   point.pose_odom_base = wm::compose(point.pose_odom_base, {a.x_m, a.y_m, a.turn_rad});
   point.v_mps = twist.v;
   point.w_radps = twist.w;
-  point.along_var_m2 += noise.way_m2;
-  point.across_var_m2 += noise.side_m2;
-  point.heading_var_rad2 += noise.turn_rad2;
+  point.along_var_m2 += noise.distance_m2;
+  point.across_var_m2 += noise.lateral_m2;
+  point.heading_var_rad2 += noise.rotation_rad2;
 }
 
 wm_odom_point interpolate(const wm_odom_point &a, const wm_odom_point &b, wm_time_ns t_ns) {
@@ -102,10 +102,10 @@ void carry_spatial(const wm_motion_params &params, const spatial_point &from, co
   covariance = wm::transformed(by_start, covariance);
   const double walk_s3 = growth(from.walk_s3, to.walk_s3), white_s = growth(0.0, dt_s);
   const double place_m2 = wm::square(params.noise_speed_mps) * white_s + wm::square(params.noise_hold_mps2) * walk_s3;
-  const double turn_rad2 =
+  const double rotation_rad2 =
       wm::square(params.noise_yaw_rate_radps) * white_s + wm::square(params.noise_hold_radps2) * walk_s3;
   for (int i = 0; i < 6; i++) {
-    covariance(i, i) += i < 3 ? place_m2 : turn_rad2;
+    covariance(i, i) += i < 3 ? place_m2 : rotation_rad2;
     for (int j = 0; j <= i; j++)
       out->covariance[wm_cov_index(i, j)] = out->covariance[wm_cov_index(j, i)] = covariance(i, j);
   }
@@ -178,18 +178,18 @@ void wm_odometry_calibrate(wm_odometry *self, const wm_motion_calibration *calib
 wm_status wm_odometry_feed(wm_odometry *self, const wm_event *event) {
   const wm_status status = self->front.check(*event);
   if (status != WM_OK) return status;
-  if (self->front.is_overdue(event->t_ns) && self->before_silence == 0) self->before_silence = self->count;
+  if (self->front.is_overdue(event->t_ns) && self->points_before_gap == 0) self->points_before_gap = self->count;
   self->front.feed(*event);
   if (event->kind == WM_EVENT_TWIST6) feed_spatial(self, *event);
   wm_odom_point &head = self->head;
   self->front.advance(event->t_ns, self->calibration,
-                      [&head](const wm::motion_stretch &piece, const wm::motion_twist &twist,
+                      [&head](const wm::motion_segment &piece, const wm::motion_twist &twist,
                               const wm::motion_noise &noise) { carry_point(head, piece.dt_s, twist, noise); });
   head.t_ns = event->t_ns;
-  if (self->before_silence > 0 && self->front.counted()) {
+  if (self->points_before_gap > 0 && self->front.counted()) {
     // The way of the silence is spread over it: a pose that was fused within it is carried on by what is left.
-    if (self->count - self->before_silence < wm_odometry::kPoints) self->count = self->before_silence;
-    self->before_silence = 0;
+    if (self->count - self->points_before_gap < wm_odometry::kPoints) self->count = self->points_before_gap;
+    self->points_before_gap = 0;
   }
   const uint64_t n = self->count;
   if (n == 0 || head.t_ns - self->ring[(n - 1) % wm_odometry::kPoints].t_ns >= wm_odometry::kSpacing_ns) {
@@ -206,7 +206,7 @@ wm_status wm_odometry_at(const wm_odometry *self, wm_time_ns t_ns, wm_odom_point
   if (t_ns >= self->head.t_ns) {
     *out = self->head;
     self->front.walk(self->head.t_ns, t_ns, self->calibration,
-                     [out](const wm::motion_stretch &piece, const wm::motion_twist &twist,
+                     [out](const wm::motion_segment &piece, const wm::motion_twist &twist,
                            const wm::motion_noise &noise) { carry_point(*out, piece.dt_s, twist, noise); });
     out->t_ns = t_ns;
     return WM_OK;

@@ -113,7 +113,7 @@ void spatial_motion::feed(const wm_event &event) {
   } else {
     front_.feed(event);
     front_.advance(event.t_ns, kNeutralCalibration,
-                   [](const motion_stretch &, const motion_twist &, const motion_noise &) {});
+                   [](const motion_segment &, const motion_twist &, const motion_noise &) {});
     const motion_twist twist = front_.twist_at(event.t_ns, kNeutralCalibration);
     now.v.x = twist.v;
     now.w.z = twist.w;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The motion models: what a stretch of raw input moves the robot by, with the derivatives by every calibration state
-// and the noise.
+// The motion models: twist of a raw input with its derivatives by every calibration state, and its noise.
 #ifndef WAYMARK_ESTIMATOR_MOTION_STEP_HPP
 #define WAYMARK_ESTIMATOR_MOTION_STEP_HPP
 
@@ -42,28 +41,29 @@ struct motion_twist {
   }
 };
 
-// Paper, system 1: V and Phi of the car (motion); system 2: differential from ticks.
+// Car: [Stepanov2017], V and Phi; differential drive by ticks: [FengND].
 motion_twist twist_of(const motion_input &input, const wm_motion_calibration &calibration, const wm_wheels &wheels);
 
 // A measured twist; where the track is known, as a controller makes it by two wheels with their own scales.
 motion_twist twist_of_sample(double speed, double rate, const wm_motion_calibration &c, double track_m);
 
-// Variances of a stretch: way (along), turn, their covariance, and sideways.
+// Variances of a segment: distance, rotation, their covariance, and sideways.
 struct motion_noise {
-  double way_m2, turn_rad2, way_turn, side_m2;
+  double distance_m2, rotation_rad2, distance_rotation, lateral_m2;
 };
 
 motion_noise noise_of(const motion_input &input, const motion_twist &twist, double dt_s, const wm_motion_params &params,
                       const wm_wheels &wheels, const wm_motion_calibration &calibration);
 
-// What a held input may be wrong by once the next one is overdue: the robot may have sped up or begun to turn at
-// noise.hold_mps2 and noise.hold_radps2 since, a way of half of that by the square of the time; after hold_max_s the
-// turn is unknown. `is_counted`: the wheels' counts have come since: they tell the way, of both wheels the turn, too.
-void add_silence(const motion_stretch &stretch, const wm_motion_params &params, bool is_counted, motion_noise *noise);
+// Noise of a held input once the next one is overdue: the robot may have accelerated at noise.hold_mps2 and
+// noise.hold_radps2 since, sigma = a t^2 / 2; after hold_max_s the turn is unknown. `is_counted`: counts have come
+// since, which give the distance, those of both wheels the rotation, too.
+void add_overdue_noise(const motion_segment &segment, const wm_motion_params &params, bool is_counted,
+                       motion_noise *noise);
 
 // Noise while samples are refused as implausible: the robot may have accelerated at up to the limits, evenly
 // distributed, since the last plausible one: sigma = a t^2 / (2 sqrt 3), up to hold_max_s.
-void add_refused(const motion_stretch &stretch, const wm_motion_params &params, motion_noise *noise);
+void add_refused_noise(const motion_segment &segment, const wm_motion_params &params, motion_noise *noise);
 
 }  // namespace wm
 

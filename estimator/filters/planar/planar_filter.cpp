@@ -57,19 +57,19 @@ void planar_filter::move(const wm_event &motion) {
     project(row, &projected);
     update(projected, innovation, variance);
   }
-  wheels_.listen(*this, front_);
+  wheels_.update(*this, front_);
 }
 
 void planar_filter::move_to(wm_time_ns t_ns) {
   advance(
       t_ns,
-      [this](const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
+      [this](const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
         propagate(piece, twist, noise);
       },
       [this](int state, double variance) { p_[state * stride_ + state] += variance; });
 }
 
-void planar_filter::propagate(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
+void planar_filter::propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
   const pose_step step = make_pose_step(piece, twist, noise, x_[kHeading], twist_, motion_state_);
   // Rows: T = F P, in place. Rows 0 and 1 need the old row 2, so it comes last.
   double *rows[3] = {p_, p_ + stride_, p_ + 2 * stride_};

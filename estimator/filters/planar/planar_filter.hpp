@@ -82,7 +82,7 @@ class planar_filter : public planar_motion {
   void copy_state(int state, int from, double added_variance);
 
  private:
-  void propagate(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise);
+  void propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise);
 
   int n_, stride_;
   wheel_heading wheels_;

@@ -25,7 +25,7 @@ wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist 
   wm_pose2 sum{};
   bool first = true;
   front_.walk(from_ns, to_ns, calibration_,
-              [&](const motion_stretch &piece, const motion_twist &t, const motion_noise &) {
+              [&](const motion_segment &piece, const motion_twist &t, const motion_noise &) {
                 if (first) *twist = t;
                 first = false;
                 const arc a = make_arc(t.v * piece.dt_s, t.w * piece.dt_s);
@@ -35,7 +35,7 @@ wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist 
   return sum;
 }
 
-void planar_motion::take_step(const motion_stretch &piece, const motion_twist &twist, const pose_step &step) {
+void planar_motion::take_step(const motion_segment &piece, const motion_twist &twist, const pose_step &step) {
   odom_ = compose(odom_, step.body);
   travelled_m_ += std::fabs(twist.v) * piece.dt_s;
   turned_rad_ += std::fabs(step.turn_rad);

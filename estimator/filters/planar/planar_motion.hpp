@@ -65,7 +65,7 @@ class planar_motion {
     if (now_ns() == WM_TIME_NONE) front_.set_now(t_ns);
     if (now_ns() < start_ns_) {  // the pose is known later on: until then only what holds is kept
       front_.advance(t_ns < start_ns_ ? t_ns : start_ns_, calibration_,
-                     [](const motion_stretch &, const motion_twist &, const motion_noise &) {});
+                     [](const motion_segment &, const motion_twist &, const motion_noise &) {});
     }
     if (t_ns <= now_ns()) return;
     const double dt = wm_seconds_between(now_ns(), t_ns);
@@ -74,7 +74,7 @@ class planar_motion {
       if (motion_state_[i] >= 0) walk(motion_state_[i], walk_[i] * dt);
   }
   // Odometry over one such piece.
-  void take_step(const motion_stretch &piece, const motion_twist &twist, const pose_step &step);
+  void take_step(const motion_segment &piece, const motion_twist &twist, const pose_step &step);
   // The calibration becomes what the states say, and they what a calibration can be.
   void take_calibration(double *states);
 

@@ -21,7 +21,7 @@ double motion_state_within_limits(int calibration_index, double value) {
   return value > kHighest[calibration_index] ? kHighest[calibration_index] : value;
 }
 
-pose_step make_pose_step(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise,
+pose_step make_pose_step(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise,
                          double heading_rad, const double before[2], const int motion_state[kCalibrationCount]) {
   pose_step out;
   const double dt = piece.dt_s;
@@ -68,7 +68,8 @@ pose_step make_pose_step(const motion_stretch &piece, const motion_twist &twist,
   // Noise: along the way, in the turn, sideways.
   const double way_x = h.cos * a.x_by_way - h.sin * a.y_by_way, way_y = h.sin * a.x_by_way + h.cos * a.y_by_way;
   const double turn_x = h.cos * a.x_by_turn - h.sin * a.y_by_turn, turn_y = h.sin * a.x_by_turn + h.cos * a.y_by_turn;
-  const double qww = noise.way_m2, qtt = noise.turn_rad2, qwt = noise.way_turn, qss = noise.side_m2;
+  const double qww = noise.distance_m2, qtt = noise.rotation_rad2, qwt = noise.distance_rotation,
+               qss = noise.lateral_m2;
   out.noise[0][0] = way_x * way_x * qww + 2.0 * way_x * turn_x * qwt + turn_x * turn_x * qtt + way_y * way_y * qss;
   out.noise[0][1] =
       way_x * way_y * qww + (way_x * turn_y + turn_x * way_y) * qwt + turn_x * turn_y * qtt - way_x * way_y * qss;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One piece of the prediction, whatever the covariance's storage: how the pose moves over a stretch of constant twist,
+// One piece of the prediction, whatever the covariance's storage: how the pose moves over a segment of constant twist,
 // its derivatives by the state, and the noise. Shared by the planar filters, so that the same motion means the same.
 #ifndef WAYMARK_ESTIMATOR_PLANAR_POSE_STEP_HPP
 #define WAYMARK_ESTIMATOR_PLANAR_POSE_STEP_HPP
@@ -15,7 +15,7 @@ enum pose_state { kX = 0, kY = 1, kHeading = 2, kPoseStates = 3 };
 struct pose_step {
   static constexpr int kMaxColumns = 10;
   double x_m, y_m, turn_rad;  // what the pose moves by, in map
-  wm_pose2 body;              // the same in base_link at the stretch's beginning
+  wm_pose2 body;              // the same in base_link at the segment's beginning
   // F is the identity but for the pose's rows, which have by[k][row] besides in column[k].
   int columns;
   int column[kMaxColumns];
@@ -23,9 +23,9 @@ struct pose_step {
   double noise[kPoseStates][kPoseStates];  // upper triangle
 };
 
-// `before`: the twist that held until the stretch began. `motion_state`: index of each calibration state, -1 where off.
-// Paper, system 1: F and W, with exact arcs in place of the first-order step, and a column for each calibration state.
-pose_step make_pose_step(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise,
+// `before`: the twist that held until the segment began. `motion_state`: index of each calibration state, -1 where off.
+// F and W of [Stepanov2017], with exact arcs in place of the first-order step, and a column for each calibration state.
+pose_step make_pose_step(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise,
                          double heading_rad, const double before[2], const int motion_state[kCalibrationCount]);
 
 // Names of the motion's calibration states, by calibration_index.

@@ -9,10 +9,10 @@ namespace {
 
 // Often enough that the gyro's noise in between is small, and many counts apart, so that their rounding is new each
 // time.
-constexpr double kTieEvery_m = 0.5;
+constexpr double kFuseEvery_m = 0.5;
 // A slipping wheel is worth more than four sigma within half a metre; less is within the noise of the ticks.
 constexpr double kSlip_nis = 16.0;
-// Of two roundings, one at each end of a stretch.
+// Of two roundings, one at each end of a segment.
 constexpr double kTurn_nis = 2.0 * 9.0;
 constexpr uint32_t kNotBelieved =
     WM_MOTION_HEALTH_ENCODER_LEFT_DEAD | WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD | WM_MOTION_HEALTH_COUNTER_FROZEN;
@@ -38,7 +38,7 @@ void wheel_heading::init(planar_filter &filter, const wm_motion_states &states) 
   heading_ = filter.add_state(0.0, 0.0);
 }
 
-void wheel_heading::listen(planar_filter &filter, const motion_front_end &front) {
+void wheel_heading::update(planar_filter &filter, const motion_front_end &front) {
   if (heading_ < 0 || !(front.wheels().track_m > 0.0)) return;
   if (front.model() != WM_MOTION_SPEED_YAW_RATE || (front.health() & kNotBelieved) ||
       filter.before_start(filter.now_ns())) {
@@ -46,12 +46,12 @@ void wheel_heading::listen(planar_filter &filter, const motion_front_end &front)
     return;
   }
   double way_m[2];
-  if (!front.counted_ways(way_m)) return;
+  if (!front.wheel_distances(way_m)) return;
   if (running_) {
     const double left = way_m[0] - way_m_[0], right = way_m[1] - way_m_[1];
-    if (std::fabs(left) + std::fabs(right) < 2.0 * kTieEvery_m) return;
-    carry(filter, front, left, right);
-    running_ = tie(filter, front);
+    if (std::fabs(left) + std::fabs(right) < 2.0 * kFuseEvery_m) return;
+    propagate(filter, front, left, right);
+    running_ = fuse_gyro_heading(filter, front);
   }
   if (!running_) filter.copy_state(heading_, kHeading, rounding_rad2(filter, front));
   running_ = true;
@@ -63,7 +63,7 @@ void wheel_heading::listen(planar_filter &filter, const motion_front_end &front)
 // track act on the turn alone and d on the way alone. A turn that rounding alone could make has no derivative by scale
 // and track: it is the noise that the tie will measure, and a derivative that shares its measurement's noise finds a
 // scale in it.
-void wheel_heading::carry(planar_filter &filter, const motion_front_end &front, double left_m, double right_m) {
+void wheel_heading::propagate(planar_filter &filter, const motion_front_end &front, double left_m, double right_m) {
   const wm_motion_calibration &c = filter.calibration();
   const double track = track_m(filter, front), middle_m = 0.5 * (left_m + right_m);
   const double turn = c.value[kSpeedScale] * (right_m - left_m + filter.value(difference_) * middle_m) / track;
@@ -78,7 +78,7 @@ void wheel_heading::carry(planar_filter &filter, const motion_front_end &front, 
   filter.carry_state(difference_, {}, 0.0, square(walk_) * 0.5 * driven_m);
 }
 
-bool wheel_heading::tie(planar_filter &filter, const motion_front_end &front) {
+bool wheel_heading::fuse_gyro_heading(planar_filter &filter, const motion_front_end &front) {
   sparse_row row;
   row.add(kHeading, 1.0);
   row.add(heading_, -1.0);

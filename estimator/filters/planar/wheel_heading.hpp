@@ -20,15 +20,15 @@ class wheel_heading {
 
   void init(planar_filter &filter, const wm_motion_states &states);
   // After each motion event, when the filter stands at its time.
-  void listen(planar_filter &filter, const motion_front_end &front);
+  void update(planar_filter &filter, const motion_front_end &front);
   // The heading was set or doubted: what the wheels say of the past no longer bears on it.
   void restart() { running_ = false; }
 
   int difference_state() const { return difference_; }  // -1: off
 
  private:
-  void carry(planar_filter &filter, const motion_front_end &front, double left_m, double right_m);
-  bool tie(planar_filter &filter, const motion_front_end &front);
+  void propagate(planar_filter &filter, const motion_front_end &front, double left_m, double right_m);
+  bool fuse_gyro_heading(planar_filter &filter, const motion_front_end &front);
 
   int heading_, difference_;  // states; -1: off
   double walk_;               // of the difference, per sqrt(m)

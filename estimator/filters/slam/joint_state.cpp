@@ -85,7 +85,7 @@ void joint_state::move_to(wm_time_ns t_ns) {
   const wm_time_ns before_ns = now_ns();
   advance(
       t_ns,
-      [this](const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
+      [this](const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
         propagate(piece, twist, noise);
       },
       [this](int state, double variance) {
@@ -104,7 +104,7 @@ void joint_state::wander(double dt_s) {
 }
 
 // Paper, system 2: time update of P_rr and P_rm alone.
-void joint_state::propagate(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise) {
+void joint_state::propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
   const pose_step step = make_pose_step(piece, twist, noise, value(kHeading), twist_, motion_state_);
   const half_covariance cov = p();
   const int robot = layout_.robot_states;

@@ -143,7 +143,7 @@ class joint_state : public planar_motion {
   const double *x() const { return const_cast<joint_state *>(this)->column(0); }
   double *gain(int k) { return column(1 + k); }
 
-  void propagate(const motion_stretch &piece, const motion_twist &twist, const motion_noise &noise);
+  void propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise);
   void move_mean(const double *change, double *e);
   void move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e);
   void fuse_part(int states, int rows, const double *change);

@@ -29,12 +29,12 @@ void start(const wm_wheels &w, int model = WM_MOTION_AUTO) {
 
 void advance(double t_s) {
   front.advance(make::at(t_s), calibration,
-                [](const wm::motion_stretch &s, const wm::motion_twist &t, const wm::motion_noise &n) {
+                [](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &n) {
                   const wm::arc a = wm::make_arc(t.v * s.dt_s, t.w * s.dt_s);
                   pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
-                  way_var += n.way_m2;
-                  turn_var += n.turn_rad2;
-                  side_var += n.side_m2;
+                  way_var += n.distance_m2;
+                  turn_var += n.rotation_rad2;
+                  side_var += n.lateral_m2;
                 });
 }
 

@@ -83,7 +83,7 @@ wm_pose2 drive(const double x0[3], const wm_motion_calibration &c, const wm_whee
   for (int i = 0; i <= 20; i++) {
     const wm_event e = make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i));
     front.feed(e);
-    front.advance(e.t_ns, c, [&](const wm::motion_stretch &s, const wm::motion_twist &t, const wm::motion_noise &) {
+    front.advance(e.t_ns, c, [&](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &) {
       const wm::arc a = wm::make_arc(t.v * s.dt_s, t.w * s.dt_s);
       pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
     });

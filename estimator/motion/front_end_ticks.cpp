@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: Apache-2.0
+// The motion front end's wheel counters: counts as positions, dead encoders, counts after a gap.
+#include "math/elementary.hpp"
+#include "motion/front_end.hpp"
+
+namespace wm {
+namespace {
+
+// A differential robot may pivot about one wheel, but not for more than a turn; a car's inner wheel never rests while
+// the outer one rolls so far. Not swept.
+constexpr double kDeadEncoderCar_m = 1.0;
+constexpr double kDeadEncoderTurns = 1.0;
+// A count that comes earlier than this fraction of the usual time is one of a burst.
+constexpr double kBurstFraction = 0.5;
+// Later than so many periods it ends a gap.
+constexpr double kGapPeriods = 2.0;
+
+}  // namespace
+
+bool motion_front_end::counts_ticks() const {
+  return wheel_[0].t_ns != WM_TIME_NONE && wheel_[1].t_ns != WM_TIME_NONE && finite(wheels_.radius_m) &&
+         finite(wheels_.ticks_per_turn) && wheels_.ticks_per_turn > 0.0;
+}
+
+double motion_front_end::mean_of_wheels(double left, double right) const {
+  const bool left_dead = health_ & WM_MOTION_HEALTH_ENCODER_LEFT_DEAD;
+  const bool right_dead = health_ & WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD;
+  if (left_dead != right_dead) return left_dead ? right : left;
+  return 0.5 * (left + right);
+}
+
+bool motion_front_end::ticks_drive() const {
+  return model_ == WM_MOTION_TICKS ||
+         (speed_source_ == kTicksMean && (model_ == WM_MOTION_SPEED_YAW_RATE || model_ == WM_MOTION_ACKERMANN));
+}
+
+void motion_front_end::take_count(int side, wm_time_ns t_ns, double count) {
+  tick_wheel &wheel = wheel_[side];
+  if (wheel.t_ns == WM_TIME_NONE) {
+    wheel.restart(t_ns, count);
+    return;
+  }
+  const wm_time_ns last_ns = wheel.t_ns;
+  const double dt = wm_seconds_between(last_ns, t_ns);
+  if (dt <= 0.0) return;
+  const double metres_per_tick = kTwoPi * wheels_.radius_m / wheels_.ticks_per_turn;
+  double moved_m = (count - wheel.ticks) * metres_per_tick;
+  wheel.ticks = count;
+  wheel.t_ns = t_ns;
+  if (moved_m < 0.0 && !wheel.is_new_run) wheel.is_signed = true;
+  moved_m = by_gear(moved_m, wheel.is_signed);
+  // A late count and the next one right behind it: the interval between their stamps gives no speed.
+  const bool burst = dt < kBurstFraction * wheel.period_s;
+  const double least_s = burst ? wheel.period_s : dt;
+  // The counter began anew: the last speed holds.
+  if (wheel.is_new_run || !(std::fabs(moved_m) <= kSpeedMost_mps * least_s)) moved_m = wheel.speed_mps * dt;
+  wheel.is_new_run = false;
+  const uint32_t dead = side == 0 ? WM_MOTION_HEALTH_ENCODER_LEFT_DEAD : WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD;
+  if (moved_m != 0.0 && (health_ & dead)) wheel.integrated_m = wheel.position_m;  // the other one has filled in
+  const double from_m = wheel.position_m;
+  wheel.position_m += moved_m;
+  if (!burst)
+    wheel.speed_mps = moved_m / dt;
+  else if (wheel.before_ns != WM_TIME_NONE)
+    wheel.speed_mps = (wheel.position_m - wheel.before_m) / wm_seconds_between(wheel.before_ns, t_ns);
+  wheel.before_ns = last_ns;
+  wheel.before_m = from_m;
+  const bool gap = wheel.period_s > 0.0 && dt > kGapPeriods * wheel.period_s;
+  const double counted_s = gap ? kGapPeriods * wheel.period_s : dt;
+  wheel.period_s += wheel.period_s > 0.0 ? kPeriodGain * (counted_s - wheel.period_s) : counted_s;
+  tick_wheel &other = wheel_[1 - side];
+  if (moved_m != 0.0) {
+    wheel.still_m = 0.0;
+    if (!gap) other.still_m += std::fabs(moved_m);  // both may have rolled in a gap
+  }
+}
+
+void motion_front_end::watch_encoders() {
+  const bool car = finite(wheels_.wheelbase_m);
+  const double pivot = kTwoPi * (finite(wheels_.track_m) ? wheels_.track_m : 1.0);
+  const double limit = car ? kDeadEncoderCar_m : kDeadEncoderTurns * pivot;
+  const uint32_t flags[2] = {WM_MOTION_HEALTH_ENCODER_LEFT_DEAD, WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD};
+  for (int side = 0; side < 2; side++) {
+    const bool dead = wheel_[side].still_m > limit;
+    health_ = dead ? health_ | flags[side] : health_ & ~flags[side];
+  }
+}
+
+// The segment that ends here gets the counted distances; from here on the last speeds hold. A dead encoder's wheel is
+// taken to roll like the other one, and the turn is doubtful.
+void motion_front_end::push_ticks(wm_time_ns t_ns, bool doubtful, bool miscounted) {
+  const double dt = wm_seconds_between(now_ns_, t_ns);
+  drop_silent_distance(t_ns, dt);
+  const bool dead[2] = {(health_ & WM_MOTION_HEALTH_ENCODER_LEFT_DEAD) != 0,
+                        (health_ & WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD) != 0};
+  motion_input done{}, next{};
+  double done_mps[2], next_mps[2];
+  for (int side = 0; side < 2; side++) {
+    const tick_wheel &wheel = wheel_[side];
+    const bool counted = wheel.t_ns == t_ns && dt > 0.0 && !miscounted;
+    done_mps[side] = counted ? (wheel.position_m - wheel.integrated_m) / dt : wheel.speed_mps;
+    next_mps[side] = wheel.speed_mps;
+  }
+  for (int side = 0; side < 2; side++) {
+    if (!dead[side] || dead[1 - side]) continue;
+    done_mps[side] = done_mps[1 - side];
+    next_mps[side] = next_mps[1 - side];
+  }
+  next.t_ns = t_ns;
+  next.a = next_mps[0];
+  next.b = next_mps[1];
+  next.model = model_;
+  next.doubtful = doubtful || dead[0] || dead[1];
+  mark_refused(&next);
+  done = next;
+  done.t_ns = now_ns_;
+  done.a = done_mps[0];
+  done.b = done_mps[1];
+  done.counted = wheel_[0].t_ns == t_ns && wheel_[1].t_ns == t_ns && !miscounted;
+  if (dt > 0.0) history_.push(done);
+  history_.push(next);
+  newest_ns_ = t_ns;
+}
+
+// Drops the distance counted over a gap in which the pose was carried on without counts: observations have corrected it
+// since, and its covariance has grown by the possible motion. What is left is the distance of the segment that ends
+// here, at the mean speed since the last count.
+void motion_front_end::drop_silent_distance(wm_time_ns t_ns, double dt_s) {
+  for (int side = 0; side < 2; side++) {
+    tick_wheel &wheel = wheel_[side];
+    if (wheel.t_ns != t_ns || !(observed_without_ >> side & 1)) continue;
+    wheel.integrated_m = wheel.position_m - wheel.speed_mps * dt_s;
+    observed_without_ &= (uint8_t) ~(1 << side);
+  }
+}
+
+void motion_front_end::note_integrated(const motion_segment &segment) {
+  const bool both = segment.input.model == WM_MOTION_TICKS;
+  wheel_[0].integrated_m += segment.input.a * segment.dt_s;
+  wheel_[1].integrated_m += (both ? segment.input.b : segment.input.a) * segment.dt_s;
+}
+
+// Turn rate between the last two counts by the wheels' difference; 0 where it is not known.
+double motion_front_end::counted_turn_rate() const {
+  const uint32_t dead = WM_MOTION_HEALTH_ENCODER_LEFT_DEAD | WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD;
+  const tick_wheel &left = wheel_[0], &right = wheel_[1];
+  if (!finite(wheels_.track_m) || (health_ & dead) || left.t_ns != right.t_ns || left.before_ns == WM_TIME_NONE ||
+      left.before_ns != right.before_ns)
+    return 0.0;
+  const double more_m = right.position_m - right.before_m - (left.position_m - left.before_m);
+  return more_m / wheels_.track_m / wm_seconds_between(left.before_ns, left.t_ns);
+}
+
+}  // namespace wm
