@@ -45,8 +45,10 @@ typedef struct stream {
   arrival_order order;
   uint32_t seq;
   csv_row row, ahead;
-  int has_ahead;  // `ahead` was read, but not yet handed on
-  int row_waits;  // points: `row` belongs to the next stamp
+  int has_ahead;   // `ahead` was read, but not yet handed on
+  int row_waits;   // points: `row` belongs to the next stamp
+  csv_row before;  // base.sample_at_next: the row whose values wait for the next stamp
+  int has_before;
 } stream;
 
 static const char *fill_motion(const csv_row *row, uint16_t sensor, wm_event *out) {
@@ -309,18 +311,31 @@ static void hand_out(stream *self, wm_time_ns arrival_ns, wm_event *out) {
   self->base.counts.received++;
 }
 
+// The row with the values of an event that has self->row's stamp; NULL: of the first row the stamp is not known yet.
+static const csv_row *values_row(stream *self, csv_row *values) {
+  if (!self->base.sample_at_next) return &self->row;
+  int had = self->has_before;
+  *values = self->before;
+  self->before = self->row;
+  self->has_before = 1;
+  return had ? values : NULL;
+}
+
 static wm_status next_single(wm_source *base, wm_event *out, wm_error *err) {
   stream *self = (stream *)base;
   for (;;) {
     wm_status status = next_row(self, err);
     if (status != WM_OK) return status;
+    csv_row before;
+    const csv_row *values = values_row(self, &before);
+    if (!values) continue;
     begin_event(self, out);
-    const char *problem = self->kind->fill(&self->row, self->sensor_index, out);
+    const char *problem = self->kind->fill(values, self->sensor_index, out);
     if (!problem) {
       hand_out(self, arrival_of(&self->row), out);
       return WM_OK;
     }
-    count_bad_row(self, WM_BAD_DATA, &self->row, problem);
+    count_bad_row(self, WM_BAD_DATA, values, problem);
   }
 }
 

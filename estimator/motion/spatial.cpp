@@ -130,15 +130,15 @@ void spatial_motion::sample_noise(vec3 *v_var, vec3 *w_var) const {
   }
 }
 
-bool spatial_motion::sample_now(bool at_end, spatial_twist *now, spatial_twist *slope) const {
+bool spatial_motion::sample_now(spatial_twist *now, spatial_twist *slope) const {
   *slope = {};
-  const int back = at_end ? 1 : 0, samples = history_.samples();
-  if (samples <= back || history_.refuses()) return false;
-  *now = history_.sample(back).twist;
-  if (samples <= back + 1) return true;
-  const spatial_twist &then = history_.sample(back + 1).twist;
-  const double per_s = 1.0 / wm_seconds_between(history_.sample(1).t_ns, history_.sample(0).t_ns);
-  *slope = {per_s * (now->v - then.v), per_s * (now->w - then.w)};
+  const int samples = history_.samples();
+  if (samples == 0 || history_.refuses()) return false;
+  const spatial_sample &last = history_.sample(0), &before = history_.sample(1);
+  *now = last.twist;
+  if (samples == 1) return true;
+  const double per_s = 1.0 / wm_seconds_between(before.t_ns, last.t_ns);
+  *slope = {per_s * (now->v - before.twist.v), per_s * (now->w - before.twist.w)};
   return true;
 }
 

@@ -125,9 +125,8 @@ class spatial_motion {
   void begin_picture() { steady_[0] = steady_[1], steady_[1] = banded_; }
   const vec3 &v_mps() const { return history_.sample(0).twist.v; }
   const vec3 &w_radps() const { return history_.sample(0).twist.w; }
-  // The sample that holds now and its slope per second by the one before it. `at_end`: samples are stamped at the end
-  // of the interval in which they hold. False: none yet.
-  bool sample_now(bool at_end, spatial_twist *now, spatial_twist *slope) const;
+  // The sample that holds now and its slope per second by the one before it. False: none yet, or it was refused.
+  bool sample_now(spatial_twist *now, spatial_twist *slope) const;
   // Variances of one sample's components.
   void sample_noise(vec3 *v_var, vec3 *w_var) const;
   uint32_t health() const { return front_.health() | (history_.refused_lately() ? WM_MOTION_HEALTH_IMPLAUSIBLE : 0u); }

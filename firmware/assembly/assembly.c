@@ -37,6 +37,7 @@ static void add_source(wm_assembly *self, wm_source *source) {
   wm_assembled_source *s = &self->sources[self->source_count++];
   (void)snprintf(s->name, sizeof s->name, "%s", source->name);
   s->source = source;
+  source->sample_at_next = (uint8_t)wanted.sample_at_next;
   s->kinds = source->kinds;
   s->from_s = wanted.from_s;
   s->until_s = wanted.until_s;

@@ -54,6 +54,10 @@ const config_key kConfigSourceKeys[] = {
      "ms. A datum that arrives later than this after its stamp is late, and dropped."},
     {"period_ms", "number from 0 to 60000", "0",
      "ms. Above 0: after a datum the source promises silence for so long, and the merge need not wait for it."},
+    {"sample_at", "`stamp`, `next_stamp`", "stamp",
+     "`motion` and `motion6` of a recording. next_stamp: a row is stamped with the beginning of the interval over "
+     "which "
+     "it was measured; its values get the stamp of the next row."},
     {"from_s", "number", "the beginning", "s from the run's first stamp. Earlier data are not taken."},
     {"until_s", "number", "the end", "s from the run's first stamp. Later data are not taken."},
     {NULL, NULL, NULL, NULL},

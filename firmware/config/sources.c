@@ -53,8 +53,19 @@ static wm_status check_lateness(const wm_yaml_node *node, double lateness_ms, do
       lateness_ms, horizon_ms, horizon_ms, lateness_ms);
 }
 
+// A file's convention for the stamps of its rows; other sources stamp what they measure.
+static wm_status read_sample_at(const wm_yaml_node *item, wm_source_config *out, wm_error *err) {
+  static const char *const kChoices[] = {"stamp", "next_stamp", NULL};
+  wm_yaml_node node = wm_yaml_get(item, "sample_at");
+  if (!wm_yaml_there(&node)) return WM_OK;
+  if (strcmp(out->name, "motion") != 0 && strcmp(out->name, "motion6") != 0)
+    return wm_yaml_fail(&node, err, "only `motion` and `motion6` have rows whose values can get the next row's stamp");
+  return wm_yaml_choice(&node, kChoices, &out->sample_at_next, err);
+}
+
 static wm_status read_source(const wm_yaml_node *item, const wm_config *config, wm_source_config *out, wm_error *err) {
-  static const char *const kKeys[] = {"name", "use", "lateness_max_ms", "period_ms", "from_s", "until_s", NULL};
+  static const char *const kKeys[] = {"name",      "use",    "lateness_max_ms", "period_ms",
+                                      "sample_at", "from_s", "until_s",         NULL};
   *out = defaults(config);
   out->line = wm_yaml_line(item);
   if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {name: NAME, ...} is needed");
@@ -69,6 +80,7 @@ static wm_status read_source(const wm_yaml_node *item, const wm_config *config, 
   if (status == WM_OK && wm_yaml_there(&lateness))
     status = check_lateness(&lateness, out->lateness_max_ms, config->runtime.merge_horizon_ms, err);
   if (status == WM_OK) status = number(item, "period_ms", 0, 60000, &out->period_ms, err);
+  if (status == WM_OK) status = read_sample_at(item, out, err);
   if (status == WM_OK) status = number(item, "from_s", -HUGE_VAL, 1e9, &out->from_s, err);
   if (status == WM_OK) status = number(item, "until_s", -1e9, HUGE_VAL, &out->until_s, err);
   if (status == WM_OK && out->until_s <= out->from_s)

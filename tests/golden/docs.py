@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes docs/config.md and docs/errors.md from the programs that know: the tables of parameters, and the tests of the
 messages. docs.py check|write BUILD. `check` prints what differs and fails; `write` brings the files up to date. Both check
-that each reference cited as [Author2015] stands once in docs/references.md; docs.py references checks that alone."""
+that each reference cited as [Author2015] stands once in docs/references.md, and that what docs/glossary.md names in code
+is there; docs.py references checks that alone."""
 import collections
 import difflib
 import pathlib
@@ -92,13 +93,33 @@ def references():
     return len(faults)
 
 
+CODE = [ROOT / room for room in ("estimator", "msgs")]
+BELOW = [ROOT, ROOT / "estimator", ROOT / "estimator/filters"]
+
+
+def glossary():
+    """Prints files and identifiers in the last column of docs/glossary.md that are not in the code; returns how many."""
+    text = "".join(path.read_text() for room in CODE for path in room.rglob("*") if path.suffix in (".h", ".hpp", ".c", ".cpp"))
+    faults = 0
+    for number, line in enumerate((ROOT / "docs/glossary.md").read_text().splitlines(), 1):
+        for token in re.findall(r"`([^`]+)`", line.rsplit("|", 2)[-2] if line.startswith("|") else ""):
+            if "/" in token or re.search(r"\.(h|c|cpp|hpp)$", token):
+                found = any((base / token).exists() for base in BELOW)
+            else:
+                found = all(part in text for part in re.split(r"::|(?<=\w)\.(?=\w)", token.strip("*")))
+            if not found:
+                faults += 1
+                print(f"docs/glossary.md:{number}: {token} is not in the code")
+    return faults
+
+
 def main():
     if sys.argv[1:] == ["references"]:
-        return 1 if references() else 0
+        return 1 if references() + glossary() else 0
     if len(sys.argv) != 3 or sys.argv[1] not in ("check", "write"):
         sys.exit(__doc__)
     tests = pathlib.Path(sys.argv[2]) / "tests"
-    stale = 1 if references() else 0
+    stale = 1 if references() + glossary() else 0
     for name, make in (("config.md", config_md), ("errors.md", errors_md)):
         path = ROOT / "docs" / name
         fresh = make(tests)

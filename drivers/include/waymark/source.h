@@ -57,6 +57,7 @@ struct wm_source {
   uint8_t is_live;                // a device: its data come when they come
   uint8_t is_rare;                // speaks when someone asks for it: its silence means nothing
   uint8_t in_order;               // promises that its stamps never go back (a file without arrival_ns, a CAN bus)
+  uint8_t sample_at_next;         // of a CSV of motion: each row's values get the stamp of the row after it
   double lateness_max_ms;         // where the configuration doesn't name the source; 0: merge.lateness_max_ms
   uint32_t kinds;                 // WM_EVENT_BIT of what it hands out
   wm_source_counts counts;

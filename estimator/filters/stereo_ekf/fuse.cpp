@@ -130,7 +130,7 @@ wm_status stereo_ekf::fuse_known_point(const wm_event &event, int known, const w
   buffer_observation(s, landmark, event.t_ns);
   if (state_ == WM_STATE_SEARCHING) {
     reject(records, blank, WM_REJECTED_SEARCHING);
-    search(event.t_ns - wm_ns_from_seconds(params_.recover_window_s));
+    search(event.t_ns - wm_ns_from_seconds(kWindow_s));
     return WM_OK;
   }
   const int slot = slot_of_known(known);
@@ -197,7 +197,7 @@ void stereo_ekf::fuse_twist(const wm_event &motion) {
   vec3 v_var, w_var;
   spatial_twist now, per_s;
   motion_.sample_noise(&v_var, &w_var);
-  if (!motion_.sample_now(params_.cv_sample_at == WM_SAMPLE_AT_END, &now, &per_s)) return;
+  if (!motion_.sample_now(&now, &per_s)) return;
   const bool planar = motion.kind == WM_EVENT_TWIST2;
   (void)filter_.fuse(twist_rows(kVelocity, now.v, per_s.v, v_var, planar), limits());
   (void)filter_.fuse(twist_rows(kRates, now.w, per_s.w, w_var, planar), limits());

@@ -6,7 +6,6 @@
 typedef struct wm_stereo_ekf_params params;
 
 static const char *const kPredictions[] = {"twist", "constant_velocity", NULL};
-static const char *const kSampleAt[] = {"beginning", "end", NULL};
 
 static const wm_param kParams[] = {
     {"prediction", WM_PARAM_ENUM, offsetof(params, prediction), WM_PREDICT_TWIST, 0, WM_PREDICT_CONSTANT_VELOCITY,
@@ -33,10 +32,6 @@ static const wm_param kParams[] = {
     F64("constant_velocity.tau_s", cv_tau_s, 0, 0, 1e6,
         "Above 0, velocity and rates do not walk but are a Gauss-Markov process of these sigmas: they come back to 0 "
         "after so long, s (a head that is swung, a vehicle in still water)."),
-    {"constant_velocity.sample_at", WM_PARAM_ENUM, offsetof(params, cv_sample_at), WM_SAMPLE_AT_BEGINNING, 0,
-     WM_SAMPLE_AT_END, kSampleAt,
-     "When a measured twist was true: at its stamp, or (a sample that is written down with the beginning of the "
-     "interval that it was taken for) at the stamp of the next."},
     F64("states.rate_bias_sigma_radps", rate_bias_sigma, 0, 0, 1,
         "Start sigma of the turn rates' bias on each axis, rad/s. 0: off."),
     F64("states.rate_bias_walk", rate_bias_walk, 0.0001, 0, 1, "Random walk of that bias, rad/s per sqrt(s)."),
@@ -83,11 +78,14 @@ static const wm_param kParams[] = {
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
         "Nothing fused for so long: the state says dead reckoning."),
     BOOL("recover.on", recover, 1, "Search the pose anew when known points keep contradicting it."),
-    F64("recover.window_s", recover_window_s, 3, 0.1, 600,
-        "Known points that are used to find the pose were seen at most so long ago; motion carries them together."),
-    F64("recover.sigma_m", recover_sigma_m, 0.5, 0.001, 100,
-        "A pose found anew is taken when its place is known at least so well, m."),
-    F64("recover.sigma_rad", recover_sigma_rad, 0.25, 0.001, 3, "The same for its rotation, rad."),
 };
 
-const wm_param_table wm_stereo_ekf_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), NULL};
+static const wm_param_old kOld[] = {
+    {"constant_velocity.sample_at", NULL,
+     "stamps are the reader's: `end` is now sources: [{name: motion6, sample_at: next_stamp}]"},
+    {"recover.window_s", NULL, "observations of the last 3 s are used to find the pose"},
+    {"recover.sigma_m", NULL, "a pose that is found needs a sigma of 0.5 m"},
+    {"recover.sigma_rad", NULL, "a pose that is found needs a sigma of 0.25 rad"},
+    {NULL, NULL, NULL}};
+
+const wm_param_table wm_stereo_ekf_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), kOld};

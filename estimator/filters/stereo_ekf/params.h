@@ -13,15 +13,12 @@ extern "C" {
 
 enum wm_stereo_prediction { WM_PREDICT_TWIST = 0, WM_PREDICT_CONSTANT_VELOCITY = 1 };
 
-enum wm_sample_at { WM_SAMPLE_AT_BEGINNING = 0, WM_SAMPLE_AT_END = 1 };
-
 typedef struct wm_stereo_ekf_params {
   int32_t prediction;  // wm_stereo_prediction
   // noise of motion
   double v_mps, w_radps, v_rel, w_rel;
   double gap_after_s, gap_v_walk, gap_w_walk;
   double cv_v_sigma, cv_w_sigma, cv_v_walk, cv_w_walk, cv_tau_s;
-  int32_t cv_sample_at;  // wm_sample_at
   // states; 0: off
   double rate_bias_sigma, rate_bias_walk;
   double velocity_scale_sigma;
@@ -39,7 +36,6 @@ typedef struct wm_stereo_ekf_params {
   // finding the pose
   double dead_reckoning_after_s;
   int32_t recover;
-  double recover_window_s, recover_sigma_m, recover_sigma_rad;
 } wm_stereo_ekf_params;
 
 extern const wm_param_table wm_stereo_ekf_params_table;

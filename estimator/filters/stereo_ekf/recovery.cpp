@@ -12,6 +12,8 @@ constexpr double kInflateEvery_s = 1.0;
 constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;
 constexpr double kInflateUpTo_m = 30.0;
 constexpr double kDefaultSigma = 0.05;
+// A found pose is taken when the consensus is at least so certain. Not swept.
+constexpr double kFoundSigma_m = 0.5, kFoundSigma_rad = 0.25;
 // A start less sure than this is no point to take derivatives about, where the map can tell better.
 constexpr double kVague_m = 1.0, kVague_rad = 0.4;
 
@@ -109,7 +111,7 @@ void stereo_ekf::note(wm_time_ns t_ns, int key, const row_verdict &result) {
     return;
   }
   if (wm_seconds_between(lost_ns_, t_ns) < kSayLost_s) return;
-  const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
+  const wm_time_ns window = t_ns - wm_ns_from_seconds(kWindow_s);
   const wm_time_ns bad_since = monitor_.bad_since_ns();
   search(bad_since > window ? bad_since : window);
   if (state_ != WM_STATE_LOST || wm_seconds_between(lost_ns_, t_ns) < kInflateAfter_s) return;
@@ -124,8 +126,7 @@ void stereo_ekf::search(wm_time_ns since_ns) {
   if (!params_.recover) return;
   if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now_ns_) < kSearchEvery_s) return;
   searched_ns_ = now_ns_;
-  const pose_found found =
-      observations_.find(since_ns, odometry_, params_.recover_sigma_m, params_.recover_sigma_rad, setup_->seed);
+  const pose_found found = observations_.find(since_ns, odometry_, kFoundSigma_m, kFoundSigma_rad, setup_->seed);
   if (!found.found) return;
   filter_.restart_head();
   filter_.set_pose(found.pose, found.covariance);

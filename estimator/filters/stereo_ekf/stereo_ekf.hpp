@@ -30,6 +30,8 @@ class stereo_ekf {
  private:
   // A point of the state: whose it is, when it began, was seen last, and did not fit last.
   static constexpr int32_t kOfMap = -1;
+  // Observations of the last seconds are used to find the pose; odometry relates them. Not swept.
+  static constexpr double kWindow_s = 3.0;
   // Keys of evidence that is not of a landmark.
   static constexpr int kPositionKey = -2, kDepthKey = -3, kHeadingKey = -4;
   struct point_info {

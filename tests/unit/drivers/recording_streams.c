@@ -169,6 +169,21 @@ static void order_of_arrival(void) {
   TEST_ASSERT_EQUAL(1, gnss->counts.out_of_order);
 }
 
+// Rows stamped with the beginning of their interval: each row's values get the stamp of the next good row.
+static void values_of_the_row_before(void) {
+  folder_write("motion.csv", "t_ns,v_mps,w_radps\n10,1,0\n20,2,0\n9000000000000000,9,0\n35,3,0\n50,4,0\n");
+  wm_source *motion = source("motion");
+  motion->sample_at_next = 1;
+  static const int kStamps[] = {20, 35, 50};
+  for (int i = 0; i < 3; i++) {
+    wm_event event = next(motion);
+    TEST_ASSERT_EQUAL(kStamps[i], event.t_ns);
+    TEST_ASSERT_EQUAL(kStamps[i], event.arrival_ns);
+    TEST_ASSERT_EQUAL_DOUBLE(i + 1, event.as.twist2.v_mps);
+  }
+  at_end(motion);
+}
+
 // One stamp far ahead must not make the rest of the drive late.
 static void leaping_stamps(void) {
   folder_write(
@@ -283,6 +298,7 @@ int main(void) {
   RUN_TEST(zero_bytes);
   RUN_TEST(long_file);
   RUN_TEST(order_of_arrival);
+  RUN_TEST(values_of_the_row_before);
   RUN_TEST(leaping_stamps);
   RUN_TEST(sightings_by_sensor);
   RUN_TEST(points_by_stamp);

@@ -275,6 +275,10 @@ static void wrong_sources(void) {
           "sightings, markers, stereo, points, gnss)");
   refused(HEAD "sources:\n- {name: gnss}\n- {name: gnss}\n",
           "dir/x.yaml:5: sources[1].name: 'gnss' stands there twice (first in line 4)");
+  refused(
+      HEAD "sources: [{name: gnss, sample_at: next_stamp}]\n",
+      "dir/x.yaml:3: sources[0].sample_at: only `motion` and `motion6` have rows whose values can get the next row's "
+      "stamp");
   refused(HEAD "sources: [{name: gnss, from_s: 5, until_s: 2}]\n",
           "dir/x.yaml:3: sources[0].until_s: 2 is not after from_s (5): nothing would be taken");
   refused(HEAD "sources: [{name: 'gnss:top'}]\n",
