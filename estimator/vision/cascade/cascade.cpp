@@ -17,7 +17,9 @@
 namespace wm {
 namespace {
 
-constexpr size_t kCascadesMax = 8;  // each costs a pass over the panorama
+constexpr double kSigma_px = 0.3;      // of a detection's middle: the mean of its windows
+constexpr double kSigmaOfSize = 0.05;  // the same, in sizes: windows are coarse. From rendered streets; not swept
+constexpr size_t kCascadesMax = 8;     // each costs a pass over the panorama
 
 struct cascade_state {
   wm_cascade_params params;
@@ -145,19 +147,18 @@ bool emit(const cascade_state &self, const wm_frame &frame, const window_hit &se
   if (!project(self.camera.optics, ray, &at)) return false;
   const double flat_m = self.cascades[seen.which].height_m / seen.height;
   const double range_m = flat_m * std::sqrt(1 + square(seen.tangent));
-  const wm_cascade_params &p = self.params;
   std::memset(static_cast<void *>(out), 0, WM_EVENT_SMALL_BYTES);
   out->t_ns = time_of_row(frame.t_ns, at.v, frame.height_px, self.readout_ns);
   out->kind = WM_EVENT_SIGHTING;
   const auto sigma = [&](double size) {
-    return std::sqrt(square(p.sigma_px * self.pixel_rad) + square(p.sigma_size * size));
+    return std::sqrt(square(kSigma_px * self.pixel_rad) + square(kSigmaOfSize * size));
   };
   out->as.sighting = {.sensor = 0,
                       .landmark_id = -1,
                       .bearing_rad = sensor_bearing(self.camera, self.is_steep, ray),
                       .range_m = range_m,
                       .bearing_sigma_rad = sigma(seen.width),
-                      .range_sigma_m = p.sigma_range * range_m,
+                      .range_sigma_m = self.params.sigma_range * range_m,
                       .elevation_rad = sensor_elevation(self.camera, self.is_steep, ray),
                       .elevation_sigma_rad = sigma(seen.height)};
   return true;

@@ -12,7 +12,7 @@ extern "C" {
 
 struct wm_cascade_params {
   double size_min_px, mounting_sigma_rad;
-  double sigma_px, sigma_size, sigma_range;
+  double sigma_range;
   int32_t neighbours_min;
 };
 

@@ -15,6 +15,8 @@ namespace wm {
 
 namespace {
 
+constexpr int32_t kSupportMin = 3;   // of the 8 neighbouring rays, with points on a line through this one. Not swept
+constexpr double kSpacing_m = 0.1;   // of points on a window's line: about that of rays
 constexpr int kLinesCrossed = 4;     // joints and cables that a ray crosses before its search ends: bounds the cost
 constexpr double kBlur_px = 1.0;     // added to the width of a line in the picture
 constexpr int kBehindBand_px = 4;    // averaged behind a band, to compare with the floor before it
@@ -72,7 +74,7 @@ const char *view_of(const wm_edges_params &params, bird_view *out) {
   *out = bird_view{};
   if (params.mode != EDGES_BY_WINDOWS) return nullptr;
   bird_view_size(params.hough, out);
-  if (out->windows < 1) return "the bird's-eye view has no room for a window (bird.*, windows.*)";
+  if (out->windows < 1) return "the bird's-eye view is smaller than a window of 50 px (bird.*)";
   return static_cast<double>(out->width) * out->height > 4e7 ? "the bird's-eye view is above 40 million pixels"
                                                              : nullptr;
 }
@@ -108,7 +110,7 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   bird_view bird;
   if (view_of(state->params, &bird)) return WM_BAD_CONFIG;
   lay_out(state, rays, samples, bird);
-  if (bird.windows > 0) bird_view_make(state->camera, state->params.hough, &state->bird);
+  if (bird.windows > 0) bird_view_make(state->camera, &state->bird);
   ray_fan_make(state->camera, state->params, &state->fan);
   return WM_OK;
 }
@@ -222,7 +224,7 @@ void points_of_rays(edges_state *state, const wm_frame &frame, wm_points *points
       break;
     }
   }
-  keep_supported(points, rays, state->camera.centre_m.x, state->camera.centre_m.y, state->params.rays_support_min);
+  keep_supported(points, rays, state->camera.centre_m.x, state->camera.centre_m.y, kSupportMin);
 }
 
 // Points along a segment of a polyline; the normals point from the bright side to the dark one.
@@ -230,7 +232,7 @@ void points_of_segment(const edges_state &state, const line_vertex &from, const 
   const bird_view &bird = state.bird;
   const double dx = static_cast<double>(to.x - from.x), dy = static_cast<double>(to.y - from.y);
   const double size = std::sqrt(dx * dx + dy * dy);
-  const int steps = 1 + static_cast<int>(size / (state.params.hough.windows_spacing_m * bird.px_per_m));
+  const int steps = 1 + static_cast<int>(size / (kSpacing_m * bird.px_per_m));
   const double normal = size > 0 ? atan2(dx, -dy) : 0;
   const sin_cos n = sincos(normal);
   for (int k = 0; k < steps; k++) {
@@ -255,7 +257,7 @@ void points_of_segment(const edges_state &state, const line_vertex &from, const 
 
 void points_of_windows(edges_state *state, const wm_frame &frame, wm_points *points) {
   const int pieces = find_pieces(state->bird, frame, state->params.hough, state->pieces, state->graph.capacity);
-  const int vertices = make_polylines(state->pieces, pieces, state->params.hough, &state->graph, state->vertices);
+  const int vertices = make_polylines(state->pieces, pieces, {}, &state->graph, state->vertices);
   for (int i = 1; i < vertices; i++) {
     const line_vertex &from = state->vertices[i - 1], &to = state->vertices[i];
     if (from.line == to.line) points_of_segment(*state, from, to, points);

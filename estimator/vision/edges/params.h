@@ -13,10 +13,9 @@ extern "C" {
 
 struct wm_edges_params {
   int32_t mode;  // edges_mode
-  double rays_step_rad, rays_range_min_m, rays_range_max_m;
+  double rays_range_min_m, rays_range_max_m;
   int32_t rays_sign;  // edges_sign
   double rays_contrast_grey, rays_contrast_rel, rays_line_rel, rays_line_m, rays_band_m, rays_mirror_rel;
-  int32_t rays_support_min;
   struct wm_edges_hough_params hough;
   double sigma_px, noise_grey;
 };

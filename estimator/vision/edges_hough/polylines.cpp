@@ -34,10 +34,9 @@ end_pair pair_of_ends(const line_piece &p, const line_piece &q, bool nearest) {
   return best;
 }
 
-bool continue_each_other(const line_piece &p, const line_piece &q, const wm_edges_hough_params &params,
-                         double angle_cos) {
+bool continue_each_other(const line_piece &p, const line_piece &q, const polyline_limits &limits, double angle_cos) {
   const end_pair near = pair_of_ends(p, q, true);
-  if (!(near.square_px < square(params.windows_join_px))) return false;
+  if (!(near.square_px < square(limits.join_px))) return false;
   const point a = end_of(p, near.a), b = end_of(q, near.b), far_a = end_of(p, 1 - near.a),
               far_b = end_of(q, 1 - near.b);
   const double ax = far_a.x - a.x, ay = far_a.y - a.y, bx = far_b.x - b.x, by = far_b.y - b.y;
@@ -64,7 +63,7 @@ point joint_of(const line_piece &p, const line_piece &q, double join_px) {
 struct builder {
   const line_piece *pieces;
   int count;
-  const wm_edges_hough_params &params;
+  const polyline_limits &limits;
   piece_graph &graph;
   line_vertex *out;
   int vertices, lines;
@@ -73,13 +72,13 @@ struct builder {
   void add(const point &p) { out[vertices++] = {static_cast<float>(p.x), static_cast<float>(p.y), lines}; }
 
   void connect() {
-    const double angle_cos = cos(params.windows_join_angle_rad);
+    const double angle_cos = cos(limits.join_angle_rad);
     for (int a = 0; a < count; a++) {
       graph.length[at(a, a)] = 0;
       graph.hops[at(a, a)] = 0;
       for (int b = a + 1; b < count; b++) {
         float length = -1;
-        if (continue_each_other(pieces[a], pieces[b], params, angle_cos))
+        if (continue_each_other(pieces[a], pieces[b], limits, angle_cos))
           length = static_cast<float>(std::sqrt(pair_of_ends(pieces[a], pieces[b], false).square_px));
         graph.length[at(a, b)] = graph.length[at(b, a)] = length;
         graph.hops[at(a, b)] = graph.hops[at(b, a)] = 1;
@@ -119,9 +118,9 @@ struct builder {
     for (int i = 0; i < size; i++)
       for (int end = 0; end < 2; end++) {
         const point p = end_of(pieces[graph.member[i]], end);
-        near += std::fabs(dx * (p.y - u.y) - dy * (p.x - u.x)) <= params.windows_straight_px * length;
+        near += std::fabs(dx * (p.y - u.y) - dy * (p.x - u.x)) <= limits.straight_px * length;
       }
-    if (size > 1 && !(near > params.windows_straight_share * 2 * size)) return false;
+    if (size > 1 && !(near > limits.straight_share * 2 * size)) return false;
     add(u);
     add(v);
     return true;
@@ -167,7 +166,7 @@ struct builder {
     add(end_of(pieces[from], 1 - pair_of_ends(pieces[from], pieces[second], true).a));
     int a = from;
     for (int b = second;; a = b, b = graph.next[at(b, to)]) {
-      add(joint_of(pieces[a], pieces[b], params.windows_join_px));
+      add(joint_of(pieces[a], pieces[b], limits.join_px));
       if (b != to) continue;
       add(end_of(pieces[b], 1 - pair_of_ends(pieces[a], pieces[b], true).b));
       return;
@@ -194,9 +193,9 @@ size_t piece_graph_bytes(int32_t capacity) {
   return piece_graph_place(&counted, capacity, nullptr);
 }
 
-int make_polylines(const line_piece *pieces, int count, const wm_edges_hough_params &params, piece_graph *graph,
+int make_polylines(const line_piece *pieces, int count, const polyline_limits &limits, piece_graph *graph,
                    line_vertex *out) {
-  builder b = {pieces, count, params, *graph, out, 0, 0};
+  builder b = {pieces, count, limits, *graph, out, 0, 0};
   b.connect();
   for (int i = 0; i < count; i++) graph->part[i] = -1;
   for (int i = 0; i < count; i++) {

@@ -7,8 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "vision/edges_hough/params.h"
-
 namespace wm {
 
 // A line piece in the bird's-eye view, px.
@@ -19,6 +17,14 @@ struct line_piece {
 struct line_vertex {
   float x, y;
   int32_t line;  // index of its polyline, whose vertices are consecutive
+};
+
+// The paper's limits.
+struct polyline_limits {
+  double join_px = 10;                        // between the nearest ends of two pieces that continue each other
+  double join_angle_rad = 2.792526803190927;  // between them, pi for one line: 160 degrees
+  double straight_px = 3;                     // from the line through the two farthest ends, of an end that is on it
+  double straight_share = 1.0 / 3;            // of the ends on that line, above which it replaces the part
 };
 
 // Work space for up to `capacity` pieces.
@@ -34,12 +40,12 @@ size_t piece_graph_bytes(int32_t capacity);
 size_t piece_graph_place(piece_graph *graph, int32_t capacity, void *memory);
 
 // Polylines of `count` (at most the graph's capacity) pieces. Returns the number of vertices, at most twice the pieces.
-// Two pieces are joined where their nearest ends are less than windows.join_px apart and they make an angle of
-// at least windows.join_angle_rad there. A part of which more than windows.straight_share of the ends lie within
-// windows.straight_px of the line through its two ends farthest from each other is that line; else it is the longest of
+// Two pieces are joined where their nearest ends are less than join_px apart and they make an angle of
+// at least join_angle_rad there. A part of which more than straight_share of the ends lie within
+// straight_px of the line through its two ends farthest from each other is that line; else it is the longest of
 // the shortest paths between its pieces (R. W. Floyd 1962), of equals the one with the fewest, through the pieces'
 // intersections. O(count^3) in the worst case, of a part that is not straight.
-int make_polylines(const line_piece *pieces, int count, const wm_edges_hough_params &params, piece_graph *graph,
+int make_polylines(const line_piece *pieces, int count, const polyline_limits &limits, piece_graph *graph,
                    line_vertex *out);
 
 }  // namespace wm

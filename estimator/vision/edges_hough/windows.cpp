@@ -7,10 +7,10 @@ namespace wm {
 
 namespace {
 
-int windows_along(int32_t size, const wm_edges_hough_params &p) {
-  const int32_t step = p.windows_px - p.windows_overlap_px;
-  return size < p.windows_px || step < 1 ? 0 : (size - p.windows_px) / step + 1;
-}
+constexpr int32_t kWindow_px = 50, kOverlap_px = 10, kStep_px = kWindow_px - kOverlap_px;  // the paper's
+static_assert(kWindow_px <= kHoughSideMax);
+
+int windows_along(int32_t size) { return size < kWindow_px ? 0 : (size - kWindow_px) / kStep_px + 1; }
 
 // Samples the bird's-eye view from the frame, bilinear.
 void sample_view(const bird_view &view, const wm_frame &frame) {
@@ -68,7 +68,7 @@ line_piece piece_of(const window_peak &c, int side) {
 
 bool find_in_window(const bird_view &view, int32_t x0, int32_t y0, const wm_edges_hough_params &params,
                     line_piece *out) {
-  const int side = params.windows_px;
+  constexpr int side = kWindow_px;
   window_peak best = {{0, 0, 0, -1.0F}, 0};
   const uint8_t *window = view.edge + static_cast<ptrdiff_t>(y0) * view.width + x0;
   uint8_t turned[kHoughSideMax * kHoughSideMax];
@@ -101,10 +101,10 @@ void bird_view_size(const wm_edges_hough_params &params, bird_view *out) {
   out->y_min_m = -params.bird_side_m;
   out->width = static_cast<int32_t>((params.bird_x_max_m - params.bird_x_min_m) * params.bird_px_per_m);
   out->height = static_cast<int32_t>(2 * params.bird_side_m * params.bird_px_per_m);
-  out->windows = windows_along(out->width, params) * windows_along(out->height, params);
+  out->windows = windows_along(out->width) * windows_along(out->height);
 }
 
-void bird_view_make(const mounted_camera &camera, const wm_edges_hough_params &params, bird_view *out) {
+void bird_view_make(const mounted_camera &camera, bird_view *out) {
   for (int32_t y = 0; y < out->height; y++)
     for (int32_t x = 0; x < out->width; x++) {
       pixel at;
@@ -128,8 +128,8 @@ void bird_view_make(const mounted_camera &camera, const wm_edges_hough_params &p
         out->inner[i] = 255;
     }
   std::memset(out->hough, 0, sizeof *out->hough);
-  const int32_t side = params.windows_px, step = side - params.windows_overlap_px;
-  const int32_t across = windows_along(out->width, params);
+  constexpr int32_t side = kWindow_px, step = kStep_px;
+  const int32_t across = windows_along(out->width);
   for (int32_t i = 0; across > 0 && i < out->windows; i++) {
     const int32_t x0 = i % across * step, y0 = i / across * step;
     int32_t seen = 0;
@@ -143,7 +143,8 @@ int find_pieces(const bird_view &view, const wm_frame &frame, const wm_edges_hou
                 int capacity) {
   sample_view(view, frame);
   find_gradient(view);
-  const int32_t step = params.windows_px - params.windows_overlap_px, across = windows_along(view.width, params);
+  constexpr int32_t step = kStep_px;
+  const int32_t across = windows_along(view.width);
   int count = 0;
   for (int32_t i = 0; across > 0 && i < view.windows && count < capacity; i++)
     if (view.whole[i] && find_in_window(view, i % across * step, i / across * step, params, &out[count])) count++;

@@ -34,7 +34,7 @@ struct bird_view {
 // Sizes of the view by the parameters; counts its windows.
 void bird_view_size(const wm_edges_hough_params &params, bird_view *out);
 // Fills the table. The arrays are width x height, `hough` is zero.
-void bird_view_make(const mounted_camera &camera, const wm_edges_hough_params &params, bird_view *out);
+void bird_view_make(const mounted_camera &camera, bird_view *out);
 // The strongest line of each window that has one. Returns their number, at most `capacity`.
 int find_pieces(const bird_view &view, const wm_frame &frame, const wm_edges_hough_params &params, line_piece *out,
                 int capacity);

@@ -16,6 +16,8 @@ namespace wm {
 namespace {
 
 constexpr size_t kFoundMax = 128;
+constexpr double kWindowSigmas = 3.5;  // half width of the search window: 1 in 2000 landmarks outside
+constexpr double kWindowMax_px = 64;   // a landmark with a larger window is not searched: cost, look-alikes
 constexpr int kTries = 8;          // hypotheses verified at full resolution per picture at kRate_hz: bounds the cost
 constexpr size_t kAgreeing = 3;    // landmarks that one pose must explain where the first one is not alike enough alone
 constexpr double kRate_hz = 30.0;  // of pictures, for which search_places is given
@@ -273,12 +275,11 @@ void match_by(landmarks_state *self, const wm_frame &frame, const camera_guess &
     look.expected_px[1] = one.middle.v;
     double across_px, down_px;
     expected_spread(self->eye.camera, guess, what, params.mounting_sigma_rad, &across_px, &down_px);
-    const double sigmas = params.window_sigmas;
     landmark_match seen;
     look.look = static_cast<uint8_t>(
-        larger(across_px, down_px) * sigmas > params.window_max_px
+        larger(across_px, down_px) * kWindowSigmas > kWindowMax_px
             ? WM_LOOK_UNCERTAIN
-            : match_landmark(&self->eye, one, sigmas * across_px, sigmas * down_px, is_final, &seen));
+            : match_landmark(&self->eye, one, kWindowSigmas * across_px, kWindowSigmas * down_px, is_final, &seen));
     if (look.look != WM_LOOK_UNCERTAIN) look.likeness = seen.likeness;
     if (look.look != WM_LOOK_FOUND || out->count == out->capacity || out->count == kFoundMax) continue;
     if (!emit(*self, frame, guess, one, seen, &out->events[out->count])) continue;

@@ -6,11 +6,14 @@
 namespace wm {
 namespace {
 
-constexpr double kBlurred = 0.35;  // fraction of the drawn contrast, below which an unlike place counts as blurred
-constexpr double kSmall_px2 = 30;  // a landmark of n px^2 needs a likeness of 1 - (1 - min) n / (n + this). Not swept
-constexpr double kMargin_px = 2;   // from the edge of the picture
-constexpr double kFits = 1.1;      // of the longer side, beside 4 px: room in the drawn view for a tilted landmark
-constexpr double kBeforeAlign = 0.1;          // likeness on whole pixels may be this much below the needed one
+constexpr double kBlurred = 0.35;   // fraction of the drawn contrast, below which an unlike place counts as blurred
+constexpr double kSmall_px2 = 30;   // a landmark of n px^2 needs a likeness of 1 - (1 - min) n / (n + this). Not swept
+constexpr double kApartMin = 0.06;  // likeness of the best place above the second one. Not swept
+constexpr double kSigmaFactor = 1.3;    // of the fit's sigma: errors of neighbouring pixels are correlated
+constexpr double kSigmaOfSize = 0.002;  // of the middle, in sizes: errors of the learnt picture, other light
+constexpr double kMargin_px = 2;        // from the edge of the picture
+constexpr double kFits = 1.1;           // of the longer side, beside 4 px: room in the drawn view for a tilted landmark
+constexpr double kBeforeAlign = 0.1;    // likeness on whole pixels may be this much below the needed one
 constexpr double kNear_px = 8, kFar_px = 32;  // window, from likeness_min to likeness_far
 
 double likeness_needed(const matcher &self, int pixels, double reach_px) {
@@ -76,9 +79,9 @@ wm_look match_landmark(matcher *self, const expected_view &one, double across_px
   if (!align_landmark(picture, self->drawn, middle, best.right, best.down, &self->work, &fine)) return WM_LOOK_UNLIKE;
   out->likeness = fine.likeness;
   if (fine.likeness < needed) return WM_LOOK_UNLIKE;
-  if (best.second > larger(fine.likeness, best.likeness) - self->params.apart_min) return WM_LOOK_AMBIGUOUS;
-  const double scale = square(step * self->params.sigma_factor),
-               floor = square(self->params.sigma_px) + square(self->params.sigma_size * step) * self->drawn.count;
+  if (best.second > larger(fine.likeness, best.likeness) - kApartMin) return WM_LOOK_AMBIGUOUS;
+  const double scale = square(step * kSigmaFactor),
+               floor = square(self->params.sigma_px) + square(kSigmaOfSize * step) * self->drawn.count;
   out->at = {fine.middle.u * step, fine.middle.v * step};
   out->wider = fine.wider;
   out->taller = fine.taller;

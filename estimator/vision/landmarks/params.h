@@ -12,10 +12,10 @@ extern "C" {
 
 struct wm_landmarks_params {
   double range_max_m, size_min_px, facing_min;
-  double mounting_sigma_rad, window_sigmas, window_max_px;
-  double likeness_min, apart_min, contrast_grey;
+  double mounting_sigma_rad;
+  double likeness_min, contrast_grey;
   double search_places, search_area_px2, search_after_s, likeness_alone, likeness_far;
-  double blur_px, sigma_px, sigma_size, sigma_factor;
+  double blur_px, sigma_px;
 };
 
 extern const wm_param_table wm_landmarks_params_table;

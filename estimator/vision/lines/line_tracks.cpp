@@ -9,40 +9,41 @@ namespace {
 
 constexpr double kBin_rad = 0.004;  // of the histogram of rotations: about a pixel of a 160 degree fisheye
 constexpr int kBinsMax = 1024;
-constexpr int kSmoothing_bins = 3;     // half width of the triangular kernel: parallax spreads the votes. Not swept
-constexpr double kStale_s = 1.0;       // after a longer gap no azimuth can be predicted
-constexpr double kRateGain = 0.4;      // of the filter of a line's own rate (alpha-beta). Not swept
-constexpr double kGreyGain = 0.5;      // of the filter of the sides' brightness. Not swept
-constexpr double kFirstGate = 3;       // gate scale of a track seen once, whose rate is unknown
-constexpr double kFirstVote = 0.3;     // weight of such a track in the vote
-constexpr double kGatePerMiss = 0.5;   // the gate grows by this share for each picture in which the line was missed
-constexpr double kRatioMin = 2.0;      // second best cost over the best: below, the association is ambiguous
-constexpr double kInertia = 0.3;       // penalty in the vote of the largest change of the rotation rate
-constexpr double kLooksMax = 4;        // squared sigmas of brightness beyond which a line is another one
-constexpr double kLooksWeight = 0.25;  // of that in the cost, beside the squared gate fraction
-constexpr double kCostFloor = 0.01;    // keeps the ratio test meaningful where both costs vanish
-constexpr double kNever = 1e9;         // cost
+constexpr int kSmoothing_bins = 3;       // half width of the triangular kernel: parallax spreads the votes. Not swept
+constexpr double kGate_rad = 0.02;       // of the azimuth about its prediction: parallax of a picture. Not swept
+constexpr double kAppearance_grey = 20;  // sigma of a side's brightness from picture to picture: exposure, backgrounds
+constexpr int32_t kKeepUnseen = 10;      // pictures without the line after which its track ends: a person in front
+constexpr double kStale_s = 1.0;         // after a longer gap no azimuth can be predicted
+constexpr double kRateGain = 0.4;        // of the filter of a line's own rate (alpha-beta). Not swept
+constexpr double kGreyGain = 0.5;        // of the filter of the sides' brightness. Not swept
+constexpr double kFirstGate = 3;         // gate scale of a track seen once, whose rate is unknown
+constexpr double kFirstVote = 0.3;       // weight of such a track in the vote
+constexpr double kGatePerMiss = 0.5;     // the gate grows by this share for each picture in which the line was missed
+constexpr double kRatioMin = 2.0;        // second best cost over the best: below, the association is ambiguous
+constexpr double kInertia = 0.3;         // penalty in the vote of the largest change of the rotation rate
+constexpr double kLooksMax = 4;          // squared sigmas of brightness beyond which a line is another one
+constexpr double kLooksWeight = 0.25;    // of that in the cost, beside the squared gate fraction
+constexpr double kCostFloor = 0.01;      // keeps the ratio test meaningful where both costs vanish
+constexpr double kNever = 1e9;           // cost
 
 bool same_sign(const line_track &t, const radial_edge &e) {
   return (t.left_grey > t.right_grey) == (e.left_grey > e.right_grey);
 }
 
 // Squared difference of the sides' brightness in sigmas, mean of both.
-double appearance(const line_track &t, const radial_edge &e, const wm_lines_params &params) {
-  return (square(t.left_grey - e.left_grey) + square(t.right_grey - e.right_grey)) /
-         (2 * square(params.appearance_grey));
+double appearance(const line_track &t, const radial_edge &e) {
+  return (square(t.left_grey - e.left_grey) + square(t.right_grey - e.right_grey)) / (2 * square(kAppearance_grey));
 }
 
 // Rotation (about the expected one) of every pair of track and line of one sign, with its weight.
 template <class Take>
-void each_pair(const line_tracks &self, const radial_edge *edges, int count, double dt_s, double expected,
-               const wm_lines_params &params, Take take) {
+void each_pair(const line_tracks &self, const radial_edge *edges, int count, double dt_s, double expected, Take take) {
   for (const line_track &t : self.track) {
     if (t.id == 0) continue;
     for (int i = 0; i < count; i++) {
       if (!same_sign(t, edges[i])) continue;
       const double moved = wrap(edges[i].azimuth_rad - t.azimuth_rad - t.rate_radps * dt_s * (t.unseen + 1)) - expected;
-      const double weight = 1 / (1 + 4 * appearance(t, edges[i], params));
+      const double weight = 1 / (1 + 4 * appearance(t, edges[i]));
       take(wrap(moved), t.seen > 1 ? weight : kFirstVote * weight);
     }
   }
@@ -73,13 +74,13 @@ double find_turn(const line_tracks &self, const radial_edge *edges, int count, d
   constexpr int kHalfMax = kBinsMax / 2 - kSmoothing_bins - 1;
   const int wanted = static_cast<int>(params.turn_max_rad / kBin_rad), half = wanted < kHalfMax ? wanted : kHalfMax;
   const double expected = -self.turn_radps * dt_s;
-  each_pair(self, edges, count, dt_s, expected, params, [&](double moved, double weight) {
+  each_pair(self, edges, count, dt_s, expected, [&](double moved, double weight) {
     const int bin = static_cast<int>(std::floor(moved / kBin_rad + 0.5));
     if (bin >= -half && bin <= half) votes[bin + kBinsMax / 2] += weight;
   });
   const int at = best_bin(votes, half);
   double sum = 0, weights = 0;
-  each_pair(self, edges, count, dt_s, expected, params, [&](double moved, double weight) {
+  each_pair(self, edges, count, dt_s, expected, [&](double moved, double weight) {
     if (std::fabs(moved - at * kBin_rad) > (kSmoothing_bins + 0.5) * kBin_rad) return;
     sum += weight * moved;
     weights += weight;
@@ -88,11 +89,11 @@ double find_turn(const line_tracks &self, const radial_edge *edges, int count, d
 }
 
 // Cost of associating an edge with a track; negative: outside of the gate.
-double cost_of(const line_track &t, const radial_edge &e, double predicted, const wm_lines_params &params) {
+double cost_of(const line_track &t, const radial_edge &e, double predicted) {
   if (!same_sign(t, e)) return -1;
-  const double gate = params.gate_rad * (t.seen < 2 ? kFirstGate : 1) * (1 + kGatePerMiss * t.unseen);
+  const double gate = kGate_rad * (t.seen < 2 ? kFirstGate : 1) * (1 + kGatePerMiss * t.unseen);
   const double off = wrap(e.azimuth_rad - predicted) / gate;
-  const double looks = appearance(t, e, params);
+  const double looks = appearance(t, e);
   return off > 1 || off < -1 || looks > kLooksMax ? -1 : square(off) + kLooksWeight * looks + kCostFloor;
 }
 
@@ -102,12 +103,11 @@ struct association {
   const radial_edge *edges;
   int count;
   const double *predicted;  // azimuth of each track
-  const wm_lines_params &params;
   bool taken[kRadialEdgesMax];
   int best_of_edge[kRadialEdgesMax];  // track; -1: none
 
   bool is_open(int k) const { return track[k].id != 0 && track[k].edge < 0; }
-  double cost(int k, int i) const { return cost_of(track[k], edges[i], predicted[k], params); }
+  double cost(int k, int i) const { return cost_of(track[k], edges[i], predicted[k]); }
 
   void find_best_tracks() {
     for (int i = 0; i < count; i++) {
@@ -155,10 +155,10 @@ struct association {
 };
 
 // Carries a track on by its associated edge, or by prediction; too many misses end it.
-void update(line_track *t, const radial_edge *edges, double turn, double dt_s, const wm_lines_params &params) {
+void update(line_track *t, const radial_edge *edges, double turn, double dt_s) {
   if (t->edge < 0) {
     t->azimuth_rad = wrap(t->azimuth_rad + turn + t->rate_radps * dt_s);
-    if (++t->unseen > params.keep_unseen) t->id = 0;
+    if (++t->unseen > kKeepUnseen) t->id = 0;
     return;
   }
   const radial_edge &e = edges[t->edge];
@@ -194,10 +194,10 @@ void line_tracks::follow(const radial_edge *edges, int count, wm_time_ns t_ns, c
     t.edge = -1;
     predicted[k] = wrap(t.azimuth_rad + turn + t.rate_radps * dt_s);
   }
-  association matched{track, edges, count, predicted, params, {}, {}};
+  association matched{track, edges, count, predicted, {}, {}};
   matched.run();
   for (line_track &t : track)
-    if (t.id != 0) update(&t, edges, turn, dt_s, params);
+    if (t.id != 0) update(&t, edges, turn, dt_s);
   begin(edges, count, matched.taken);
 }
 

@@ -39,8 +39,8 @@ template <class Take>
 void each_row(const mounted_camera &camera, const wm_lines_params &params, Take take) {
   int count = 0;
   for (int r = 0; count < kPolarRowsMax; r++) {
-    const double elevation = params.elevation_min_rad + r * params.row_step_rad;
-    if (elevation > params.elevation_max_rad || elevation > kHalfPi - params.row_step_rad) break;
+    const double elevation = params.elevation_min_rad + r * kRowStep_rad;
+    if (elevation > params.elevation_max_rad || elevation > kHalfPi - kRowStep_rad) break;
     const double scale = px_per_rad(camera, elevation, true);
     if (!(scale > 0)) continue;
     take(elevation, scale);
@@ -57,7 +57,7 @@ const char *polar_size(const mounted_camera &camera, const wm_lines_params &para
     out->rows++;
     if (scale > largest) largest = scale;
   });
-  if (out->rows * params.row_step_rad < params.length_min_rad)
+  if (out->rows * kRowStep_rad < params.length_min_rad)
     return "the camera sees too little between elevation_min_rad and elevation_max_rad: is its mounting right?";
   const int wanted = static_cast<int>(kTwoPi * largest) / 16 * 16;
   out->columns = wanted < 256 ? 256 : wanted > kPolarColumnsMax ? kPolarColumnsMax : wanted;
@@ -90,7 +90,7 @@ void polar_make(const mounted_camera &camera, const wm_lines_params &params, pol
       }
     r++;
   });
-  out->row_px = px_per_rad(camera, out->row[out->rows / 2].elevation_rad, false) * params.row_step_rad;
+  out->row_px = px_per_rad(camera, out->row[out->rows / 2].elevation_rad, false) * kRowStep_rad;
 }
 
 void polar_fill(polar_view *view, const wm_frame &frame) {

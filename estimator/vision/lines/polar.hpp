@@ -13,6 +13,7 @@ namespace wm {
 inline constexpr int kPolarPad = 32;           // columns repeated from the other end: more than any window reaches
 inline constexpr int kPolarRowsMax = 320;      // at most 0.01 rad a row from horizon to zenith and below
 inline constexpr int kPolarColumnsMax = 4096;  // 1.5 mrad: finer than the lenses of the fisheyes known
+inline constexpr double kRowStep_rad = 0.01;   // elevation from row to row: finer than segments of six rows need
 inline constexpr int kPolarScale = 16;         // levels of the polar picture per grey level
 
 // A place in the picture, in 1/256 px: column and row of the upper left of four pixels, and the offset within them.

@@ -288,7 +288,7 @@ void add_edge(const radial_edge &edge, double step_rad, radial_edge *list, int *
 // Measures the peaks among the votes of one sign. Returns how many edges were found.
 int find_edges(const polar_view &view, const wm_lines_params &params, const zenith &up, const votes &v, int sign,
                radial_edge *out, int capacity) {
-  const int rows_min = static_cast<int>(params.length_min_rad / params.row_step_rad + 0.5);
+  const int rows_min = static_cast<int>(params.length_min_rad / kRowStep_rad + 0.5);
   const double threshold = 0.5 * params.contrast_grey;
   const int score_min = static_cast<int>(threshold * kVoteScale * rows_min);
   int count = 0;

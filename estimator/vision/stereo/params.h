@@ -13,9 +13,9 @@ extern "C" {
 #define STEREO_TRACKS_MAX 240
 
 struct wm_stereo_params {
-  int32_t tracks, cell_px, confirm_seen;
-  double noise_grey, sigma_max_px, fit_min;
-  double disparity_min_px, disparity_max_px, row_px, agree_px;
+  int32_t tracks, confirm_seen;
+  double noise_grey;
+  double disparity_min_px, disparity_max_px, row_px;
 };
 
 extern const wm_param_table wm_stereo_params_table;

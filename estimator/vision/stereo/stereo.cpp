@@ -14,6 +14,8 @@ namespace wm {
 namespace {
 
 constexpr int32_t kFirstId = 1 << 30;   // landmarks of maps have smaller ids
+constexpr int32_t kCell_px = 40;        // side of a cell, each with a track: points are spread over the picture
+constexpr double kAgree_px = 1.0;       // from the common motion, each coordinate. Not swept
 constexpr double kMemory_s = 1.0;       // after a longer gap all tracks end
 constexpr int32_t kMargin_px = 12;      // of the full picture: half a patch
 constexpr double kCrowded_cells = 0.6;  // smallest distance of two tracks, in cells
@@ -63,7 +65,7 @@ const char *cameras_of(const wm_view *view, rectification out[2]) {
 
 // Lays out the state; returns its bytes.
 size_t lay_out(stereo_state *state, const rectification cameras[2], const wm_stereo_params &params) {
-  const int32_t width = cameras[0].width, height = cameras[0].height, cell = params.cell_px / 2;
+  const int32_t width = cameras[0].width, height = cameras[0].height, cell = kCell_px / 2;
   const int32_t cells = cells_across(width / 2, cell) * cells_across(height / 2, cell);
   const size_t area = static_cast<size_t>(width) * static_cast<size_t>(height);
   memory_layout memory(state, sizeof *state);
@@ -143,7 +145,7 @@ bool is_visible(const stereo_state &self, const track &one) {
 bool has_slipped(const stereo_state &self, const track &one) {
   pair_pixels px;
   if (!pixels_of(self.pair, inverse(self.world_camera) * (one.world_anchor * one.anchor_place), &px)) return true;
-  const double limit = self.params.agree_px;
+  const double limit = kAgree_px;
   return std::fabs(px.left_u - one.left.u) > limit || std::fabs(px.left_v - one.left.v) > limit ||
          std::fabs(px.right_u - one.right.u) > limit;
 }
@@ -169,8 +171,8 @@ void follow(stereo_state *self, double dt_s) {
   self->track_count = kept;
   uint8_t agrees[STEREO_TRACKS_MAX];
   rigid moved;
-  if (!find_motion(self->pair, points, kept, self->knows_motion ? &expected : nullptr, self->params.agree_px,
-                   self->number, &moved, agrees)) {
+  if (!find_motion(self->pair, points, kept, self->knows_motion ? &expected : nullptr, kAgree_px, self->number, &moved,
+                   agrees)) {
     end_tracks(self);
     return;
   }
@@ -187,7 +189,7 @@ void follow(stereo_state *self, double dt_s) {
 }
 
 bool is_crowded(const stereo_state &self, const pixel &at) {
-  const double apart = kCrowded_cells * self.params.cell_px;
+  const double apart = kCrowded_cells * kCell_px;
   for (int32_t i = 0; i < self.track_count; i++)
     if (std::fabs(self.tracks[i].left.u - at.u) < apart && std::fabs(self.tracks[i].left.v - at.v) < apart) return true;
   return false;
@@ -208,7 +210,7 @@ void begin(stereo_state *self) {
   }
   find_corners(half, self->cell, kMargin_px / 2, self->taken, self->corner_work, self->corners);
   const pair_pictures pictures = {&self->pictures[2], &self->pictures[0], &self->pictures[1]};
-  const double weakest = square(self->params.noise_grey / self->params.sigma_max_px);
+  const double weakest = square(self->params.noise_grey / kSigmaMax_px);
   while (self->track_count < wanted) {
     corner *best = nullptr;
     for (int32_t i = 0; i < self->cell_count; i++)

@@ -12,6 +12,7 @@ constexpr double kFineReach_px = 4.0;     // at full resolution: two pixels of t
 constexpr double kSlopeMax = 0.6;         // of a disparity, px per px: steeper surfaces are seen too obliquely
 constexpr double kPeakMin = 0.4;          // squared correlation of the first match. Not swept
 constexpr double kRatioMax = 0.85;        // second best over best: above, the match is ambiguous. Not swept
+constexpr double kFitMin = 0.5;           // fraction of a patch's variance that its template explains. Not swept
 constexpr double kCoarseFitMin = 0.3;     // of an alignment in a smaller picture. Not swept
 constexpr double kDetMin = 0.1, kDetMax = 10.0;  // change of a patch's area since its first picture
 
@@ -48,9 +49,7 @@ bool match_right(const pair_pictures &pictures, const pixel &left, const double 
          align(what, pictures.right->level[0], start, kFineReach_px, kRounds, out);
 }
 
-bool is_good(const alignment &match, const wm_stereo_params &params) {
-  return match.fit >= params.fit_min && match.sigma_px <= params.sigma_max_px;
-}
+bool is_good(const alignment &match) { return match.fit >= kFitMin && match.sigma_px <= kSigmaMax_px; }
 
 // Stores both places. False where they are no point in front of the rig.
 bool take_pair(const pair_geometry &rig, const wm_stereo_params &params, const pixel &left, const pixel &right,
@@ -129,8 +128,7 @@ bool begin_track(const pair_geometry &rig, const pair_pictures &pictures, const 
   alignment match;
   double slope[2];
   if (!first_match(pictures, params, at_level(at, 1), &match, slope)) return false;
-  if (!match_right(pictures, at, slope, {2 * match.at.u, 2 * match.at.v}, &match) || !is_good(match, params))
-    return false;
+  if (!match_right(pictures, at, slope, {2 * match.at.u, 2 * match.at.v}, &match) || !is_good(match)) return false;
   if (!take_pair(rig, params, at, match.at, out)) return false;
   std::memcpy(out->slope, slope, sizeof slope);
   out->seen = 1;
@@ -166,8 +164,7 @@ bool follow_track(const pair_geometry &rig, const pair_pictures &pictures, const
   const pixel middle = {kCentre + (self->anchor.u - std::floor(self->anchor.u)),
                         kCentre + (self->anchor.v - std::floor(self->anchor.v))};
   if (!make_template(anchor, middle, warp, &what)) return false;
-  if (!align(what, pictures.left->level[0], at, kFineReach_px, kRounds, &match) || !is_good(match, params))
-    return false;
+  if (!align(what, pictures.left->level[0], at, kFineReach_px, kRounds, &match) || !is_good(match)) return false;
   const pixel left = match.at;
   // Left to right, by the surface as it lies now: n' = R n / (1 + (R n) t).
   const vec3 turned = camera_anchor.R * self->anchor_surface;
@@ -175,8 +172,7 @@ bool follow_track(const pair_geometry &rig, const pair_pictures &pictures, const
   slope_of(rig, (1.0 / (1.0 + dot(turned, camera_anchor.t))) * turned, slope);
   if (!is_flat(slope)) return false;
   const double disparity = px.left_u - px.right_u;
-  if (!match_right(pictures, left, slope, {left.u - disparity, left.v}, &match) || !is_good(match, params))
-    return false;
+  if (!match_right(pictures, left, slope, {left.u - disparity, left.v}, &match) || !is_good(match)) return false;
   if (!take_pair(rig, params, left, match.at, self)) return false;
   std::memcpy(self->slope, slope, sizeof slope);
   self->seen++;

@@ -11,6 +11,8 @@ namespace wm {
 
 inline constexpr int kAnchorSide = 64;  // of the kept patch: holds a template rotated and enlarged by 1.6
 
+inline constexpr double kSigmaMax_px = 0.25;  // of a corner or match that is used: of a track's point. Not swept
+
 struct track {
   int32_t id;
   int32_t seen;  // pictures, the first one included

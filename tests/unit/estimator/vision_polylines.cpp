@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Pieces joined to polylines as the paper does: straight ones, bends, corners, branches, gaps; and a drawn arc of a
 // wall.
-#include "vision/edges/params.h"
 #include "vision/edges_hough/polylines.hpp"
 
 #include <cmath>
@@ -17,7 +16,7 @@ namespace {
 struct freed {
   void operator()(void *memory) const { std::free(memory); }
 };
-wm_edges_params params;
+wm::polyline_limits limits;
 std::vector<wm::line_piece> pieces;
 std::vector<wm::line_vertex> vertices;
 int lines;
@@ -28,7 +27,7 @@ void join() {
   wm::piece_graph graph;
   wm::piece_graph_place(&graph, count, memory.get());
   vertices.resize(2 * pieces.size());
-  const int used = wm::make_polylines(pieces.data(), count, params.hough, &graph, vertices.data());
+  const int used = wm::make_polylines(pieces.data(), count, limits, &graph, vertices.data());
   TEST_ASSERT_LESS_OR_EQUAL(static_cast<int>(vertices.size()), used);
   vertices.resize(static_cast<size_t>(used));
   lines = used > 0 ? vertices.back().line + 1 : 0;
@@ -87,7 +86,7 @@ void a_corner_is_no_continuation() {
   join();
   TEST_ASSERT_EQUAL(2, lines);
   TEST_ASSERT_EQUAL(4, vertices.size());
-  params.hough.windows_join_angle_rad = 1.5;  // but for one who says so
+  limits.join_angle_rad = 1.5;  // but for one who says so
   join();
   TEST_ASSERT_EQUAL(1, lines);
 }
@@ -126,8 +125,8 @@ void nothing_and_nonsense() {
     const auto n = [i](uint64_t k) { return 60 * wm_random_uniform(1, k, i); };
     piece(n(1), n(2), i % 7 ? n(3) : n(1), i % 7 ? n(4) : n(2));
   }
-  params.hough.windows_join_angle_rad = 0;
-  params.hough.windows_straight_share = 1;
+  limits.join_angle_rad = 0;
+  limits.straight_share = 1;
   join();
   TEST_ASSERT_GREATER_THAN(0, lines);
   for (const wm::line_vertex &v : vertices) TEST_ASSERT_TRUE(std::isfinite(v.x) && std::isfinite(v.y));
@@ -138,7 +137,7 @@ void nothing_and_nonsense() {
 void setUp() {
   pieces.clear();
   vertices.clear();
-  wm_params_defaults(&wm_edges_params_table, &params);
+  limits = {};
 }
 void tearDown() {}
 
