@@ -15,7 +15,7 @@ struct homography {
   }
 };
 
-// Least squares from 4 to 8 points (R. Hartley, A. Zisserman 2004, section 4.1, with h33 = 1). False where they do not
+// Least squares from 4 to 8 points ([Hartley2004, section 4.1], with h33 = 1). False where they do not
 // determine it.
 bool homography_init(homography *out, const double (*from)[2], const tangent_point *to, int count);
 

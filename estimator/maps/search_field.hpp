@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The map as a sweep over all of it sees it: cells of 0.1 m, a byte each for how well a point fits that falls there. So
 // coarse, a building fits into the second level cache, and a point turned once for a heading is a fixed step in memory
-// from every place: a look-up costs two loads and an addition (E. Olson, "Real-time correlative scan matching", 2009).
+// from every place: a look-up costs two loads and an addition [Olson2009].
 // A sweep looks from a grid, every second cell, at 16 places of a row at a time: of all of them a point's cells lie
 // side by side, so that a vector is loaded where 16 bytes would be. Integers: the same bits everywhere.
 #ifndef WAYMARK_ESTIMATOR_MAPS_SEARCH_FIELD_HPP

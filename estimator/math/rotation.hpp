@@ -133,7 +133,7 @@ inline vec3 turn_of(const quat &a) {
 }
 
 // Left Jacobian of SO(3): the mean rotation while turning by r evenly; J v is where a constant body speed leads.
-// Source: T. D. Barfoot, "State Estimation for Robotics", 2017, section 7.1.5.
+// Source: [Barfoot2017, section 7.1.5].
 inline mat3 mean_turn(const vec3 &r) {
   const double q = dot(r, r);
   double a, b;  // (1 - cos)/angle^2, (angle - sin)/angle^3

@@ -2,8 +2,8 @@
 // Camera models: where a ray meets the picture, and back. Our own arithmetic, the same bits on every machine. Optical
 // axes: z forward, x right, y down; whole pixel coordinates are the centres of pixels. For tables made at the start:
 // projecting costs a tenth of a microsecond, unprojecting up to a few.
-// Sources: J. Kannala, S. Brandt 2006 (equidistant); D. C. Brown 1966 (radtan); C. Mei, P. Rives 2007 (omni);
-// V. Usenko et al. 2018 (double sphere).
+// Sources: [Kannala2006] (equidistant), [Brown1966] (radtan), [Mei2007] (omni), [Usenko2018] (double sphere),
+// [Scaramuzza2006] (ocam).
 #ifndef WAYMARK_ESTIMATOR_SENSORS_LENS_HPP
 #define WAYMARK_ESTIMATOR_SENSORS_LENS_HPP
 

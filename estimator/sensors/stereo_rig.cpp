@@ -38,7 +38,7 @@ bool stereo_rig::init(const wm_rig *rig, const char **why) {
   return true;
 }
 
-// Paper, system 3: u = u_0 + f x / z, v = v_0 + f y / z, with axes right, down, ahead (the print's signs are those of
+// [BorisovND]: u = u_0 + f x / z, v = v_0 + f y / z, with axes right, down, ahead (the print's signs are those of
 // axes left and up).
 void stereo_rig::see(const vec3 &x, double px[4], double by[4][3]) const {
   const double inverse = 1.0 / x.z;

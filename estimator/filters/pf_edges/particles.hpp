@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Particles of a planar pose, structure of arrays: propagate, weigh, normalise, resample. Random numbers by (seed,
-// step, particle). Source: M. P. Abramov et al., "Edge detection based mobile robot indoor localization", 2019.
+// step, particle). Source: [Abramov2019].
 #ifndef WAYMARK_ESTIMATOR_PF_EDGES_PARTICLES_HPP
 #define WAYMARK_ESTIMATOR_PF_EDGES_PARTICLES_HPP
 

@@ -121,9 +121,9 @@ struct distribution {
   double by[2][kInputs];
 };
 
-// Covariance and regression on the inputs, by sigma points (S. J. Julier, J. K. Uhlmann, 1997), about the place of the
-// measured inputs. Not about the points' mean, as printed: what is measured scatters about the truth, so the place of
-// the measured inputs has that bend in it already, and the points' mean would add it once more (a quarter more error at
+// Covariance and regression on the inputs, by sigma points [Julier1997], about the place of the
+// measured inputs. Not about the points' mean, as printed: measurements scatter about the truth, so the place of the
+// measured inputs contains that curvature, and the points' mean would add it once more (a quarter more error at
 // two degrees of parallax).
 // `l` is the root of the covariance; azimuths, behind the `poses` numbers, are independent of all others.
 bool transform(const problem &p, const double *input, double (*l)[kInputs], int poses, int n, distribution *out) {

@@ -103,7 +103,7 @@ void joint_state::wander(double dt_s) {
   take_calibration(x());
 }
 
-// Paper, system 2: time update of P_rr and P_rm alone.
+// Time update of P_rr and P_rm alone [FengND].
 void joint_state::propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
   const pose_step step = make_pose_step(piece, twist, noise, value(kHeading), twist_, motion_state_);
   const half_covariance cov = p();

@@ -44,8 +44,8 @@ slam::pair slam::make_pair(int fresh, int lost) const {
   return out;
 }
 
-// Is there another pair that agrees with this one, far better than where the two could have been by chance? (J. Neira,
-// J. D. Tardos, "Data association in stochastic mapping using the joint compatibility test", T-RA 17(6), 2001.)
+// Is there another pair that agrees with this one, far better than where the two could have been by chance? Joint
+// compatibility of two pairs [Neira2001].
 bool slam::borne_out(const pair &p) const {
   const double determinant = p.s[0][0] * p.s[1][1] - p.s[0][1] * p.s[1][0];
   const double inverse[2][2] = {{p.s[1][1] / determinant, -p.s[0][1] / determinant},

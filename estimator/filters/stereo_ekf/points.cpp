@@ -25,7 +25,7 @@ void stereo_ekf::begin_picture(wm_time_ns t_ns) {
   motion_.begin_picture();
 }
 
-// Paper, system 3: a point that is out of view goes, one that is expected and not seen is kept unused for some steps.
+// [BorisovND]: a point that is out of view goes, one that is expected and not seen is kept unused for some steps.
 // Here one that is out of view is kept for a while, too: the vehicle may come back.
 void stereo_ekf::end_picture() {
   if (picture_ns_ == WM_TIME_NONE) return;

@@ -76,7 +76,7 @@ stereo_ekf::point_view stereo_ekf::view_point(const vec3 &place, const past_pose
   return out;
 }
 
-// Up to four rows, two a picture that shows the point. Paper, system 3.
+// Up to four rows, two a picture that shows the point. [BorisovND].
 bool stereo_ekf::point_rows(const wm_stereo &seen, const vec3 &place, double place_sigma_m, int slot,
                             const past_pose &past, row_block *out) const {
   point_view view = view_point(place, past);

@@ -8,7 +8,7 @@
 //
 // The tilt of a small print is poorly observable, and noise in it foreshortens the print, which biases the range.
 // Prints are assumed level (ceiling) or upright (wall) where that fits. An upright print has one free angle, about the
-// vertical, with up to two solutions (G. Schweighofer, A. Pinz 2006); both are returned.
+// vertical, with up to two solutions [Schweighofer2006]; both are returned.
 #ifndef WAYMARK_MARKER_FIT_H
 #define WAYMARK_MARKER_FIT_H
 

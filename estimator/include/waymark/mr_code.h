@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// The MR code: a coded marker after W. Feng et al. (system 2 of the papers): a black pentagon ring in a white rim, 8 x
+// The MR code: a coded marker after [FengND]: a black pentagon ring in a white rim, 8 x
 // 8 modules inside, and one black module below the tip that marks this vertex. The paper's layout and code are not
 // legible in the copy at hand; these are our own (docs/markers.md has a picture).
 //
-// Code: the identity's 16 bits in a binary BCH code of 63 bits that corrects 11 errors (d = 23; R. Bose,
-// D. Ray-Chaudhuri 1960, A. Hocquenghem 1959), and one module that makes the number of set bits even (d = 24). Up to
+// Code: the identity's 16 bits in a binary BCH code of 63 bits that corrects 11 errors (d = 23;
+// [Bose1960]), and one module that makes the number of set bits even (d = 24). Up to
 // WM_MR_CORRECTED flipped modules are corrected, from there to d - WM_MR_CORRECTED - 1 = 17 refused: 3e-7 of all
 // patterns are within reach of any identity at all.
 #ifndef WAYMARK_MR_CODE_H

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Random numbers by counting: each number is a function of (seed, stream, index) alone, so neither order nor threads
-// matter and any of them can be had again. Philox4x32-10 (J. K. Salmon et al., "Parallel random numbers: as easy as
-// 1, 2, 3", SC 2011). The same bits on every machine. Any thread, constant cost, no errors.
+// matter and any of them can be had again. Philox4x32-10
+// [Salmon2011]. The same bits on every machine. Any thread, constant cost, no errors.
 #ifndef WAYMARK_RANDOM_H
 #define WAYMARK_RANDOM_H
 

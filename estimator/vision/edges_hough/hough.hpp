@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Fast Hough transform of a square window: sums along all dyadic lines by recursive halving, so that each partial sum
-// is computed once. Integers; rows are added in vectors, and a scalar twin gives the same bits. Sources: M. L. Brady,
-// "A fast discrete approximation algorithm for the Radon transform", SIAM J. Computing 27(1), 1998; E. I. Ershov et
-// al., "Fast Hough transform and approximation properties of dyadic patterns", 2017; windows whose side is no power of
-// two are halved unequally.
+// is computed once. Integers; rows are added in vectors, and a scalar twin gives the same bits. Sources: [Brady1998]
+// [Ershov2017]. Windows whose side is no power of two are halved unequally.
 #ifndef WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_HPP
 #define WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_HPP
 

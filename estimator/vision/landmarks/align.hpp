@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sub-pixel place of a drawn landmark in the picture: inverse compositional alignment (S. Baker, I. Matthews 2004) of a
+// Sub-pixel place of a drawn landmark in the picture: inverse compositional alignment [Baker2004] of a
 // shift, a shift with scale, or an affine warp; brightness and contrast are free.
 #ifndef WAYMARK_ESTIMATOR_VISION_ALIGN_HPP
 #define WAYMARK_ESTIMATOR_VISION_ALIGN_HPP

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The binary BCH code (63, 16) over GF(64): corrects 11 errors, d = 23. Words are bits of a uint64_t, bit i the
-// coefficient of x^i. Source: S. Lin, D. Costello, "Error Control Coding", 2004, chapter 6 (J. Massey 1969 for the
-// decoder).
+// coefficient of x^i. Source: [Lin2004, chapter 6]; the decoder
+// [Massey1969].
 #ifndef WAYMARK_ESTIMATOR_VISION_BCH_HPP
 #define WAYMARK_ESTIMATOR_VISION_BCH_HPP
 

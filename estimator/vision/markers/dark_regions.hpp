@@ -38,7 +38,7 @@ struct dark_work {
 size_t dark_work_lay_out(dark_work *out, uint32_t width, uint32_t height, uint8_t *memory);
 
 // Adaptive threshold and connected regions. A pixel is dark if it is below the middle between minimum and maximum of
-// its tile's neighbourhood, where these differ by at least `contrast` grey levels (E. Olson 2011, with tiles of 4 x 4
+// its tile's neighbourhood, where these differ by at least `contrast` grey levels ([Olson2011], with tiles of 4 x 4
 // px). About 0.5 ms for 640 x 480.
 void find_dark_regions(dark_work *work, const wm_frame &frame, int contrast);
 

@@ -63,7 +63,7 @@ bool fit_in_plane(const tangent_view &view, const wm_marker_print &print, const 
   return true;
 }
 
-// The print's normal as the homography has it (Z. Zhang 2000: the columns of K^-1 H are its axes), away from the
+// The print's normal as the homography has it ([Zhang2000]: the columns of K^-1 H are its axes), away from the
 // camera.
 bool rough_normal(const tangent_view &view, const wm_marker_print &print, const tangent_point *corner, vec3 *out) {
   homography h;

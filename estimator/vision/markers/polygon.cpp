@@ -49,7 +49,7 @@ int flattest_of(const tangent_point *border, const int *vertex, int have) {
 }
 
 // Indices of the border's points that are vertices. Two first, then where the border is farthest from the polygon so
-// far (D. Douglas, T. Peucker 1973). A side parallel to its chord yields a vertex in its middle, so `kSpare` too many
+// far [Douglas1973]. A side parallel to its chord yields a vertex in its middle, so `kSpare` too many
 // are found, and the flattest are removed again.
 bool find_vertices(const tangent_point *border, int count, int vertices, double off_px, int *vertex) {
   tangent_point middle = {0, 0};

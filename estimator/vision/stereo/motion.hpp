@@ -43,7 +43,7 @@ struct seen_twice {
 // The motion that takes `before` to what is seen now, for the largest part of at most STEREO_TRACKS_MAX points; the
 // prior, where there is one, is one of the guesses. `agrees` gets a byte a point. False where fewer than kAgreeing of
 // them, or than kFewest, agree. Random choices by `seed`. Cost: about 50 hypotheses over all points, 0.2 ms for 100.
-// Sources: M. A. Fischler, R. C. Bolles 1981; B. K. P. Horn 1987 for three points; Gauss-Newton on pixels.
+// Sources: [Fischler1981]; [Horn1987] for three points; Gauss-Newton on pixels.
 inline constexpr int kFewest = 6;
 inline constexpr double kAgreeing = 0.4;
 bool find_motion(const pair_geometry &rig, const seen_twice *points, int count, const rigid *prior, double agree_px,

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sub-pixel matching of a patch in another picture, with brightness and contrast free. Pixels and their sums are
-// integers, the few numbers computed of the sums doubles: the same bits everywhere. Sources: B. D. Lucas, T. Kanade
-// 1981; S. Baker, I. Matthews, "Lucas-Kanade 20 years on", 2004 (inverse compositional: derivatives of the template,
-// computed once).
+// integers, the few numbers computed of the sums doubles: the same bits everywhere. Sources: [Lucas1981]; [Baker2004]
+// (inverse compositional: derivatives of the template, computed once).
 #ifndef WAYMARK_ESTIMATOR_VISION_PATCH_HPP
 #define WAYMARK_ESTIMATOR_VISION_PATCH_HPP
 
