@@ -9,7 +9,7 @@ namespace {
 int head_size(const head_model models[kHeadStates]) {
   int n = kPose6;
   for (int k = 0; k < kHeadStates; k++)
-    if (models[k].sigma > 0.0) n += kHeadWidth[k];
+    if (models[k].sigma > 0.0) n += kHeadSpecs[k].width;
   return n;
 }
 
@@ -30,7 +30,7 @@ void space_filter::init(size_t tail, const head_model models[kHeadStates], int p
   int state = kPose6;
   for (int k = 0; k < kHeadStates; k++) {
     at_[k] = models[k].sigma > 0.0 ? state : -1;
-    if (at_[k] >= 0) state += kHeadWidth[k];
+    if (at_[k] >= 0) state += kHeadSpecs[k].width;
   }
   pose_ = {{0, 0, 0}, kNoTurn};
   r_ = camera_axes_ = kIdentity3;
@@ -40,19 +40,31 @@ void space_filter::init(size_t tail, const head_model models[kHeadStates], int p
   restart_head();
 }
 
+void space_filter::restart(int which) {
+  if (at_[which] < 0) return;
+  decorrelate(at_[which], kHeadSpecs[which].width, square(models_[which].sigma));
+  for (int i = 0; i < kHeadSpecs[which].width; i++) head_[at_[which] + i] = kHeadSpecs[which].neutral;
+}
+
 void space_filter::restart_head() {
-  for (int k = 0; k < kHeadStates; k++) {
-    if (at_[k] < 0) continue;
-    forget(at_[k], kHeadWidth[k], square(models_[k].sigma));
-    for (int i = 0; i < kHeadWidth[k]; i++) head_[at_[k] + i] = kNeutral[k];
-  }
+  for (int k = 0; k < kHeadStates; k++) restart(k);
+}
+
+void space_filter::restart_transient() {
+  for (int k = 0; k < kHeadStates; k++)
+    if (k == kVelocity || k == kRates || models_[k].tau_s > 0.0) restart(k);
+}
+
+void space_filter::forget(int state, double value, double variance) {
+  decorrelate(state, 1, variance);
+  head_[state] = value;
 }
 
 vec3 space_filter::head3(int which) const { return at_[which] < 0 ? vec3{0, 0, 0} : vec_of(head_ + at_[which]); }
 
 double space_filter::head1(int which, double off) const { return at_[which] < 0 ? off : head_[at_[which]]; }
 
-void space_filter::forget(int state, int width, double variance) {
+void space_filter::decorrelate(int state, int width, double variance) {
   for (int i = state; i < state + width; i++) {
     for (int j = 0; j < i; j++) p()[j * stride_ + i] = 0.0;
     for (int j = i; j < stride_; j++) p()[i * stride_ + j] = 0.0;
@@ -258,7 +270,7 @@ void space_filter::add_point(const vec3 &place, double sigma_m) {
   n_ += 3;
   if (even(n_) > n_) correction()[n_] = 0.0;
   for (int i = 0; i < 3; i++) points()[state - first_point_ + i] = place[i];
-  forget(state, 3, square(sigma_m));
+  decorrelate(state, 3, square(sigma_m));
 }
 
 void space_filter::remove_point(int slot) {
@@ -285,7 +297,7 @@ void space_filter::remove_point(int slot) {
 void space_filter::set_pose(const pose3 &pose, const double covariance[6][6]) {
   settle();
   remove_points();
-  forget(kPlace, kPose6, 0.0);
+  decorrelate(kPlace, kPose6, 0.0);
   pose_ = {pose.p, normalized(pose.q)};
   r_ = matrix_of(pose_.q);
   for (int i = 0; i < kPose6; i++)

@@ -15,6 +15,7 @@
 
 #include <cstddef>
 
+#include "filters/stereo_ekf/states.hpp"
 #include "math/rotation.hpp"
 #include "math/symmetric.hpp"
 #include "motion/spatial.hpp"
@@ -23,35 +24,9 @@
 
 namespace wm {
 
-enum space_state { kPlace = 0, kTurn = 3, kPose6 = 6 };
-
-// What a filter may carry behind the pose, in this order; -1 where it is off.
-enum head_state {
-  kVelocity,  // m/s in body axes
-  kRates,     // rad/s
-  kRateBias,
-  kVelocityScale,
-  kCameraRotation,
-  kCameraPlace,
-  kTimeOffset,
-  kRangeBias,
-  kBearingBias,
-  kVelocityLag,  // s: velocity and rates as states are so much behind what is measured of them
-  kRateLag,
-  kHeadStates
-};
-inline constexpr int kHeadWidth[kHeadStates] = {3, 3, 3, 1, 3, 3, 1, 1, 1, 1, 1};
-inline constexpr int kHeadMax = kPose6 + 21;
-inline constexpr double kNeutral[kHeadStates] = {0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0};
-
 // Sigmas of an unknown pose on each axis; prediction never makes a pose less certain. 1.8 rad is that of a rotation
 // angle uniform in (-pi, pi]; 1000 m is beyond any map that is searched. Neither was swept.
 inline constexpr double kUnknownPlace_m = 1000.0, kUnknownTurn_rad = 1.8;
-
-// How a state begins and what it does on its own: a random walk, or (tau_s > 0) a Gauss-Markov process of that sigma.
-struct head_model {
-  double sigma, walk, tau_s;
-};
 
 // Up to kRank rows of one observation: their derivatives by the states of its columns, column after column.
 // The widest block, a stereo point's, has 16 columns: place 3, rotation 3, camera 6, time offset 1, point 3.
@@ -147,8 +122,15 @@ class space_filter {
   void remove_points() { n_ = first_point_; }
 
   void set_pose(const pose3 &pose, const double covariance[6][6]);
-  // Back to the start's value and variance, uncorrelated.
+  // Back to the start's value and variance, uncorrelated: all states behind the pose, or those alone of which a stored
+  // value would be old: velocity, rates, and what is Gauss-Markov.
   void restart_head();
+  void restart_transient();
+  // States of one number, for the roll-back of calibration.
+  double value(int state) const { return head_[state]; }
+  void forget(int state, double value, double variance);
+  int calibration_begin() const { return kPose6 + (at_[kRates] >= 0 ? 6 : 0); }
+  int calibration_end() const { return first_point_; }
   void inflate_pose(double place_m2, double turn_rad2);
   double covariance(int i, int j) const { return entry(p(), i, j, stride_); }
   double variance(int i) const { return p()[i * stride_ + i]; }
@@ -198,7 +180,8 @@ class space_filter {
   double pose_variance(int state) const;  // sum of three
   void bound_pose(int state, double limit, double before);
 
-  void forget(int state, int width, double variance);
+  void decorrelate(int state, int width, double variance);
+  void restart(int which);
 
   size_t tail_;
   int n_, stride_, first_point_, points_max_;

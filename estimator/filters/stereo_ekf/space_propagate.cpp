@@ -218,12 +218,12 @@ void space_filter::walk(double dt_s) {
     const bool fades = models_[k].tau_s > 0.0;
     const double left = fades ? exp(-dt_s / models_[k].tau_s) : 1.0;
     const double added = fades ? (1.0 - left * left) * square(models_[k].sigma) : square(models_[k].walk) * dt_s;
-    for (int i = at_[k]; i < at_[k] + kHeadWidth[k]; i++) {
+    for (int i = at_[k]; i < at_[k] + kHeadSpecs[k].width; i++) {
       if (fades) {
         for (int j = 0; j < i; j++) P[j * stride_ + i] *= left;
         P[i * stride_ + i] *= left * left;
         for (int j = i + 1; j < n_; j++) P[i * stride_ + j] *= left;
-        head_[i] = kNeutral[k] + left * (head_[i] - kNeutral[k]);
+        head_[i] = kHeadSpecs[k].neutral + left * (head_[i] - kHeadSpecs[k].neutral);
       }
       P[i * stride_ + i] += added;
     }

@@ -18,20 +18,6 @@ constexpr size_t kLandmarksMax = 1u << 20;
 
 constexpr size_t rounded(size_t bytes) { return (bytes + 15) / 16 * 16; }
 
-void models_of(const wm_stereo_ekf_params &p, head_model out[kHeadStates]) {
-  const bool rates = p.prediction == WM_PREDICT_CONSTANT_VELOCITY;
-  out[kVelocity] = {rates ? p.cv_v_sigma : 0.0, p.cv_v_walk, p.cv_tau_s};
-  out[kRates] = {rates ? p.cv_w_sigma : 0.0, p.cv_w_walk, p.cv_tau_s};
-  out[kRateBias] = {p.rate_bias_sigma, p.rate_bias_walk, 0};
-  out[kVelocityScale] = {p.velocity_scale_sigma, 0, 0};
-  out[kCameraRotation] = {p.camera_rotation_sigma, 0, p.camera_rotation_tau_s};
-  out[kCameraPlace] = {p.camera_place_sigma, 0, p.camera_place_tau_s};
-  out[kTimeOffset] = {p.time_offset_sigma, 0, 0};
-  out[kRangeBias] = {p.range_bias_sigma, 0, 0};
-  out[kBearingBias] = {p.bearing_bias_sigma, 0, 0};
-  out[kVelocityLag] = out[kRateLag] = {rates ? p.twist_lag_sigma : 0.0, 0, 0};
-}
-
 // Of a measured twist, where neither the parameters nor the calibration give them.
 constexpr double kTwistSigma_mps = 0.03, kTwistSigma_radps = 0.01;
 
@@ -48,19 +34,6 @@ spatial_noise twist_noise_of(const wm_stereo_ekf_params &p, const wm_rig *rig) {
   }
   return out;
 }
-
-const char *const kStateNames[kHeadStates][3] = {
-    {"motion.vx_mps", "motion.vy_mps", "motion.vz_mps"},
-    {"motion.wx_radps", "motion.wy_radps", "motion.wz_radps"},
-    {"motion.rate_bias_x_radps", "motion.rate_bias_y_radps", "motion.rate_bias_z_radps"},
-    {"motion.velocity_scale", nullptr, nullptr},
-    {"stereo.turn_right_rad", "stereo.turn_down_rad", "stereo.turn_ahead_rad"},
-    {"stereo.x_m", "stereo.y_m", "stereo.z_m"},
-    {"stereo.time_offset_s", nullptr, nullptr},
-    {"range.bias_m", nullptr, nullptr},
-    {"bearing.bias_rad", nullptr, nullptr},
-    {"motion.velocity_lag_s", nullptr, nullptr},
-    {"motion.rate_lag_s", nullptr, nullptr}};
 
 }  // namespace
 
@@ -220,8 +193,8 @@ size_t stereo_ekf::list_calibration(wm_calibration_value *out, size_t capacity) 
   calibration_list list(out, capacity);
   for (int k = 0; k < kHeadStates; k++) {
     const int first = filter_.at(k);
-    for (int i = first; first >= 0 && i < first + kHeadWidth[k]; i++)
-      list.add(kStateNames[k][i - first], filter_.head(i) + filter_.pending1(i), std::sqrt(filter_.variance(i)));
+    for (int i = first; first >= 0 && i < first + kHeadSpecs[k].width; i++)
+      list.add(kHeadSpecs[k].name[i - first], filter_.head(i) + filter_.pending1(i), std::sqrt(filter_.variance(i)));
   }
   return list.count();
 }

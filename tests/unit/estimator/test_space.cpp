@@ -368,7 +368,7 @@ void test_pictures_alone_do_not_tell_the_mounting_or_the_time(void) {
       m.filter->propagate({0.1, v, w, {1, 1, 1}, {1, 1, 1}});
     }
     const int state = m.filter->at(which);
-    for (int i = 0; i < kHeadWidth[which]; i++)
+    for (int i = 0; i < kHeadSpecs[which].width; i++)
       TEST_ASSERT_GREATER_OR_EQUAL_DOUBLE(0.98 * sigma, std::sqrt(m.filter->variance(state + i)));
   }
 }

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+// The table of the states that stereo_ekf may carry behind the pose. A row gives everything of a state but its
+// derivatives, which rows.cpp has: width, neutral value, names in calibration(), and the parameters of its noise.
+#ifndef WAYMARK_ESTIMATOR_STEREO_EKF_STATES_HPP
+#define WAYMARK_ESTIMATOR_STEREO_EKF_STATES_HPP
+
+#include "filters/stereo_ekf/params.h"
+
+namespace wm {
+
+enum space_state { kPlace = 0, kTurn = 3, kPose6 = 6 };
+
+// In the order of the state vector; a state whose sigma is 0 is left out.
+enum head_state {
+  kVelocity,  // m/s in body axes
+  kRates,     // rad/s
+  kRateBias,
+  kVelocityScale,
+  kCameraRotation,
+  kCameraPlace,
+  kTimeOffset,
+  kRangeBias,
+  kBearingBias,
+  kVelocityLag,  // s: the measured velocity is ahead of the state of velocity by this
+  kRateLag,
+  kHeadStates
+};
+
+struct head_spec {
+  int width;
+  double neutral;
+  const char *name[3];
+  // Start sigma; random walk per sqrt(s); above 0: time constant of a Gauss-Markov process of that sigma. NULL: 0.
+  double wm_stereo_ekf_params::*sigma, wm_stereo_ekf_params::*walk, wm_stereo_ekf_params::*tau_s;
+  bool of_rates;  // exists with velocity and rates as states only
+};
+
+using stereo_params = wm_stereo_ekf_params;
+inline constexpr head_spec kHeadSpecs[kHeadStates] = {
+    {3,
+     0,
+     {"motion.vx_mps", "motion.vy_mps", "motion.vz_mps"},
+     &stereo_params::cv_v_sigma,
+     &stereo_params::cv_v_walk,
+     &stereo_params::cv_tau_s,
+     true},
+    {3,
+     0,
+     {"motion.wx_radps", "motion.wy_radps", "motion.wz_radps"},
+     &stereo_params::cv_w_sigma,
+     &stereo_params::cv_w_walk,
+     &stereo_params::cv_tau_s,
+     true},
+    {3,
+     0,
+     {"motion.rate_bias_x_radps", "motion.rate_bias_y_radps", "motion.rate_bias_z_radps"},
+     &stereo_params::rate_bias_sigma,
+     &stereo_params::rate_bias_walk,
+     nullptr,
+     false},
+    {1, 1, {"motion.velocity_scale"}, &stereo_params::velocity_scale_sigma, nullptr, nullptr, false},
+    {3,
+     0,
+     {"stereo.turn_right_rad", "stereo.turn_down_rad", "stereo.turn_ahead_rad"},
+     &stereo_params::camera_rotation_sigma,
+     nullptr,
+     &stereo_params::camera_rotation_tau_s,
+     false},
+    {3,
+     0,
+     {"stereo.x_m", "stereo.y_m", "stereo.z_m"},
+     &stereo_params::camera_place_sigma,
+     nullptr,
+     &stereo_params::camera_place_tau_s,
+     false},
+    {1, 0, {"stereo.time_offset_s"}, &stereo_params::time_offset_sigma, nullptr, nullptr, false},
+    {1, 0, {"range.bias_m"}, &stereo_params::range_bias_sigma, nullptr, nullptr, false},
+    {1, 0, {"bearing.bias_rad"}, &stereo_params::bearing_bias_sigma, nullptr, nullptr, false},
+    {1, 0, {"motion.velocity_lag_s"}, &stereo_params::twist_lag_sigma, nullptr, nullptr, true},
+    {1, 0, {"motion.rate_lag_s"}, &stereo_params::twist_lag_sigma, nullptr, nullptr, true},
+};
+
+constexpr int head_width_max() {
+  int n = kPose6;
+  for (const head_spec &s : kHeadSpecs) n += s.width;
+  return n;
+}
+inline constexpr int kHeadMax = head_width_max();
+
+// How a state begins and changes on its own: a random walk, or (tau_s > 0) a Gauss-Markov process of that sigma.
+struct head_model {
+  double sigma, walk, tau_s;
+};
+
+inline void models_of(const wm_stereo_ekf_params &params, head_model out[kHeadStates]) {
+  const bool rates = params.prediction == WM_PREDICT_CONSTANT_VELOCITY;
+  for (int k = 0; k < kHeadStates; k++) {
+    const head_spec &s = kHeadSpecs[k];
+    out[k] = {s.of_rates && !rates ? 0.0 : params.*s.sigma, s.walk ? params.*s.walk : 0.0,
+              s.tau_s ? params.*s.tau_s : 0.0};
+  }
+}
+
+}  // namespace wm
+
+#endif
