@@ -140,6 +140,7 @@ pose_found pose_consensus::find(wm_time_ns since_ns, const travelled_pose &now, 
                                    square(kTurnSigma_radprad * (now.turned_rad - o.turned_rad) * lever_m));
   }
   if (all.count < kFewestInliers) return out;
+  out.searched = true;
   hypothesis best = best_of_triples(all, seed);
   refine(all, &best);
   if (best.inliers < kFewestInliers || best.inliers < kInlierShare * all.count ||

@@ -26,6 +26,7 @@ struct point_observation {
 };
 
 struct pose_found {
+  bool searched;  // false: too few observations, which cost nothing
   bool found;
   pose3 pose;  // of base_link on the map, now
   double covariance[6][6];

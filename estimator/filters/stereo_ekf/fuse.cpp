@@ -14,6 +14,11 @@ constexpr double kNoHorizontal_m = 1e5;
 // Estimate moved by pending corrections beyond which they are applied at once, rad: second-order terms are 5e-5 rad.
 constexpr double kApplyBeyond_rad = 0.01;
 
+// Where an observation lies that is not of this pose: distances spread over kClutter_m, a disparity over a quarter of
+// the picture's width, the rows of both pictures over kClutterRows_px. Orders of magnitude, not swept: a factor of 10
+// is 2.3 nats.
+constexpr double kClutter_m = 100.0, kClutterDisparity = 0.25, kClutterRows_px = 10.0;
+
 bool is_sigma(double sigma) { return sigma > 0.0 && sigma < kLargestSigma; }
 bool is_absent_or_sigma(double sigma) { return std::isnan(sigma) || is_sigma(sigma); }
 
@@ -78,7 +83,7 @@ row_verdict stereo_ekf::fuse_rows(const row_block &block, const wm_innovation &b
              result.verdict, &r);
     records.add(r);
   }
-  if (result.fused) fused_ns_ = now_ns_;
+  if (result.fused) life_.fused(now_ns_);
   // Without points in the state a correction costs little to apply, and later rows are linearised about the better
   // estimate.
   const vec3 turned = filter_.pending(kTurn);
@@ -98,6 +103,16 @@ row_verdict stereo_ekf::fuse_point(const wm_stereo &seen, const vec3 &place, dou
   return out;
 }
 
+double stereo_ekf::clutter_volume_of(const wm_stereo &seen) const {
+  const double picture = rig_.width_px * rig_.height_px;
+  const bool both = !std::isnan(seen.left_px[0]) && !std::isnan(seen.right_px[0]);
+  return both ? picture * kClutterDisparity * rig_.width_px * kClutterRows_px : picture;
+}
+
+double stereo_ekf::clutter_volume_of(const wm_sighting &seen) const {
+  return (std::isnan(seen.range_m) ? 1.0 : kClutter_m) * (std::isnan(seen.bearing_rad) ? 1.0 : kTwoPi);
+}
+
 wm_status stereo_ekf::fuse_stereo(const wm_event &event, record_list records) {
   if (!rig_.there) return WM_UNSUPPORTED;
   const wm_stereo &s = event.as.stereo;
@@ -110,7 +125,7 @@ wm_status stereo_ekf::fuse_stereo(const wm_event &event, record_list records) {
   const int known = find_landmark(s.id);
   if (known >= 0) return fuse_known_point(event, known, blank, records);
   if (params_.points_max == 0) return reject(records, blank, WM_REJECTED_UNKNOWN_ID);
-  if (state_ == WM_STATE_SEARCHING) return reject(records, blank, WM_REJECTED_SEARCHING);
+  if (life_.searching()) return reject(records, blank, WM_REJECTED_SEARCHING);
   const int slot = find_slot(s.id);
   if (slot < 0) {
     add_point(s, blank, records);
@@ -128,7 +143,7 @@ wm_status stereo_ekf::fuse_known_point(const wm_event &event, int known, const w
   const wm_stereo &s = event.as.stereo;
   const wm_landmark &landmark = setup_->landmarks[known];
   buffer_observation(s, landmark, event.t_ns);
-  if (state_ == WM_STATE_SEARCHING) {
+  if (life_.searching()) {
     reject(records, blank, WM_REJECTED_SEARCHING);
     search(event.t_ns - wm_ns_from_seconds(kWindow_s));
     return WM_OK;
@@ -136,7 +151,7 @@ wm_status stereo_ekf::fuse_known_point(const wm_event &event, int known, const w
   const int slot = slot_of_known(known);
   const vec3 place = slot >= 0 ? filter_.point(slot) : vec_of(landmark.p_m);
   const row_verdict result = fuse_point(s, place, slot >= 0 ? 0.0 : map_sigma(landmark), slot, blank, records);
-  note(event.t_ns, s.id, result);
+  note(event.t_ns, s.id, result, clutter_volume_of(s), landmark_records() + known);
   return WM_OK;
 }
 
@@ -152,13 +167,13 @@ wm_status stereo_ekf::fuse_sighting(const wm_event &event, record_list records) 
   if (s.landmark_id < 0) return reject(records, blank, WM_REJECTED_NO_ASSOCIATION);
   const int known = find_landmark(s.landmark_id);
   if (known < 0) return reject(records, blank, WM_REJECTED_UNKNOWN_ID);
-  if (state_ == WM_STATE_SEARCHING) return reject(records, blank, WM_REJECTED_SEARCHING);
+  if (life_.searching()) return reject(records, blank, WM_REJECTED_SEARCHING);
   if (has_range && s.range_m > setup_->sensors[s.sensor].max_range_m)
     return reject(records, blank, WM_REJECTED_OUT_OF_RANGE);
   const int slot = has_range ? slot_of_known(known) : -1;
   row_block rows;
   if (!sighting_rows(s, known, slot, &rows)) return reject(records, blank, WM_REJECTED_SINGULAR);
-  note(event.t_ns, s.landmark_id, fuse_rows(rows, blank, records));
+  note(event.t_ns, s.landmark_id, fuse_rows(rows, blank, records), clutter_volume_of(s), landmark_records() + known);
   return WM_OK;
 }
 
@@ -171,10 +186,12 @@ wm_status stereo_ekf::fuse_position(const wm_event &event, record_list records) 
   if (const wm_status bad = check_position(p, there); bad != WM_OK) return refuse(records, blank, bad);
   if (const wm_status bad = check_time(event.t_ns); bad != WM_OK) return bad;
   move_to(event.t_ns);
-  if (state_ == WM_STATE_SEARCHING) return reject(records, blank, WM_REJECTED_SEARCHING);
+  if (life_.searching()) return reject(records, blank, WM_REJECTED_SEARCHING);
   row_block rows;
   position_rows(p, there.first, there.last, &rows);
-  note(event.t_ns, depth ? kDepthKey : kPositionKey, fuse_rows(rows, blank, records));
+  double clutter_volume = 1.0;
+  for (int i = there.first; i < there.last; i++) clutter_volume *= kClutter_m;
+  note(event.t_ns, depth ? kDepthKey : kPositionKey, fuse_rows(rows, blank, records), clutter_volume, nullptr);
   return WM_OK;
 }
 
@@ -185,10 +202,10 @@ wm_status stereo_ekf::fuse_heading(const wm_event &event, record_list records) {
   if (const wm_status bad = check_heading(h); bad != WM_OK) return refuse(records, blank, bad);
   if (const wm_status bad = check_time(event.t_ns); bad != WM_OK) return bad;
   move_to(event.t_ns);
-  if (state_ == WM_STATE_SEARCHING) return reject(records, blank, WM_REJECTED_SEARCHING);
+  if (life_.searching()) return reject(records, blank, WM_REJECTED_SEARCHING);
   row_block rows;
   if (!heading_rows(h, &rows)) return reject(records, blank, WM_REJECTED_SINGULAR);
-  note(event.t_ns, kHeadingKey, fuse_rows(rows, blank, records));
+  note(event.t_ns, kHeadingKey, fuse_rows(rows, blank, records), kTwoPi, nullptr);
   return WM_OK;
 }
 

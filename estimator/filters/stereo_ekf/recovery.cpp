@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// Start, set_pose, lost and found.
+// Start, set_pose, evidence about the pose, and relocalization.
+#include <limits>
+
 #include "filters/stereo_ekf/stereo_ekf.hpp"
 
 namespace wm {
 namespace {
 
-constexpr double kSearchEvery_s = 0.1;
-constexpr double kSayLost_s = 0.1;  // lost is lost for at least so long: whoever listens must hear it
-constexpr double kInflateAfter_s = 3.0;
-constexpr double kInflateEvery_s = 1.0;
-constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;
-constexpr double kInflateUpTo_m = 30.0;
-constexpr double kDefaultSigma = 0.05;
+// Log odds that a stated start and a found pose are wrong: one in twelve. As landmark_ekf's; not swept here.
+constexpr double kStartWrong = -2.5, kFoundWrong = -2.5;
+// Inflation while lost, each second, as in landmark_ekf: a second's worth of an unmeasured motion.
+constexpr double kInflate_m = 0.5, kInflate_rad = 0.2, kInflateUpTo_m = 30.0;
+constexpr double kDefaultSigma = 0.05;  // m and rad, of a start without sigmas
 // A found pose is taken when the consensus is at least so certain. Not swept.
 constexpr double kFoundSigma_m = 0.5, kFoundSigma_rad = 0.25;
-// A start less sure than this is no point to take derivatives about, where the map can tell better.
+// A start less certain than this is no point of linearisation; it is found by the map. Not swept.
 constexpr double kVague_m = 1.0, kVague_rad = 0.4;
 
 double given(double sigma) { return finite(sigma) ? sigma : kDefaultSigma; }
@@ -30,7 +30,15 @@ void stereo_ekf::set_pose(const pose3 &pose, double sigma_m, double sigma_rad) {
   filter_.set_pose(pose, covariance);
 }
 
-// What isn't given of the height is 0, of roll and pitch level.
+// Start, reset, or a pose from outside.
+void stereo_ekf::begin_pose(bool known, double log_odds_wrong) {
+  life_.begin(known);
+  evidence_.begin(log_odds_wrong);
+  observations_.clear();
+  remembered_.begin(filter_, filter_.calibration_begin(), filter_.calibration_end());
+}
+
+// An unknown height is 0; unknown roll and pitch are level.
 void stereo_ekf::start_pose() {
   const wm_start &start = setup_->start;
   const bool place = finite(start.p_m[0]) && finite(start.p_m[1]);
@@ -47,10 +55,7 @@ void stereo_ekf::start_pose() {
   const bool findable = params_.recover && rig_.there && setup_->landmark_count >= 3;
   const bool vague = findable && (sigma_m > kVague_m || sigma_rad > kVague_rad);
   set_pose(pose, place ? sigma_m : kUnknownPlace_m, turn ? sigma_rad : kUnknownTurn_rad);
-  monitor_.clear();
-  observations_.clear();
-  resets_++;
-  state_ = place && turn && !vague ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
+  begin_pose(place && turn && !vague, kStartWrong);
 }
 
 wm_status stereo_ekf::take_pose(const wm_event &event) {
@@ -74,10 +79,7 @@ wm_status stereo_ekf::take_pose(const wm_event &event) {
     return WM_OK;
   }
   set_pose({vec_of(p), quat_of(q)}, s.sigma_xy_m, s.sigma_heading_rad);
-  monitor_.clear();
-  observations_.clear();
-  resets_++;
-  state_ = WM_STATE_TRACKING;
+  begin_pose(true, kStartWrong);
   return WM_OK;
 }
 
@@ -97,43 +99,42 @@ void stereo_ekf::buffer_observation(const wm_stereo &seen, const wm_landmark &la
                      odometry_.travelled_m, odometry_.turned_rad});
 }
 
-void stereo_ekf::note(wm_time_ns t_ns, int key, const row_verdict &result) {
-  if (!params_.recover) return;
-  const double misfit = !result.fused ? 1.0 : result.doubtful ? 0.8 : 0.0;
-  monitor_.note(t_ns, key, misfit);
-  if (state_ == WM_STATE_TRACKING && monitor_.contradicted(t_ns)) {
-    state_ = WM_STATE_LOST;
-    lost_ns_ = inflated_ns_ = t_ns;
-  }
-  if (state_ != WM_STATE_LOST) return;
-  if (monitor_.fits()) {
-    state_ = WM_STATE_TRACKING;
+// Evidence about the pose from one observation: its joint density, by the rows' innovations one after the other.
+void stereo_ekf::note(wm_time_ns t_ns, int key, const row_verdict &result, double clutter_volume,
+                      landmark_record *record) {
+  if (!params_.recover || result.verdict == WM_REJECTED_NUMERIC) return;
+  double log_density = 0.0;
+  for (int k = 0; k < result.rows; k++) log_density -= 0.5 * (result.nis[k] + log(kTwoPi * result.variance[k]));
+  const double log_bayes = result.fused ? landmark_evidence::log_bayes_factor(exp(log_density), clutter_volume)
+                                        : landmark_evidence::max_log_bayes_factor();
+  const double no_angle = std::numeric_limits<double>::quiet_NaN();
+  evidence_.note(t_ns, key, log_bayes, no_angle, 0.0, record);
+  if (life_.tracking() && evidence_.contradicted()) life_.lose(t_ns);
+  if (life_.tracking() && evidence_.fits()) remembered_.remember(filter_, t_ns);
+  if (!life_.lost()) return;
+  if (evidence_.fits()) {
+    life_.fits_again();
     return;
   }
-  if (wm_seconds_between(lost_ns_, t_ns) < kSayLost_s) return;
-  const wm_time_ns window = t_ns - wm_ns_from_seconds(kWindow_s);
-  const wm_time_ns bad_since = monitor_.bad_since_ns();
-  search(bad_since > window ? bad_since : window);
-  if (state_ != WM_STATE_LOST || wm_seconds_between(lost_ns_, t_ns) < kInflateAfter_s) return;
-  // Nothing found: the gates open step by step, so that nothing is refused for ever.
-  if (wm_seconds_between(inflated_ns_, t_ns) >= kInflateEvery_s && filter_.variance(kPlace) < square(kInflateUpTo_m)) {
+  if (!life_.announced(t_ns)) return;
+  const wm_time_ns window = t_ns - wm_ns_from_seconds(kWindow_s), doubted = evidence_.doubted_since_ns();
+  search(doubted > window ? doubted : window);
+  if (life_.inflation_due(t_ns) && filter_.variance(kPlace) < square(kInflateUpTo_m)) {
     filter_.inflate_pose(square(kInflate_m), square(kInflate_rad));
-    inflated_ns_ = t_ns;
+    life_.inflated(t_ns);
   }
 }
 
 void stereo_ekf::search(wm_time_ns since_ns) {
-  if (!params_.recover) return;
-  if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now_ns_) < kSearchEvery_s) return;
-  searched_ns_ = now_ns_;
+  if (!params_.recover || !life_.search_due(now_ns_)) return;
   const pose_found found = observations_.find(since_ns, odometry_, kFoundSigma_m, kFoundSigma_rad, setup_->seed);
+  if (found.searched) life_.searched(now_ns_);
   if (!found.found) return;
-  filter_.restart_head();
   filter_.set_pose(found.pose, found.covariance);
-  monitor_.clear();
-  resets_++;
-  fused_ns_ = now_ns_;
-  state_ = WM_STATE_TRACKING;
+  remembered_.restore(&filter_);
+  filter_.restart_transient();
+  evidence_.begin(kFoundWrong);
+  life_.relocalized(now_ns_);
 }
 
 }  // namespace wm

@@ -133,7 +133,8 @@ bool space_filter::factorize_and_gate(const row_block &block, const gates &limit
 
 row_verdict space_filter::fuse(const row_block &block, const gates &limits) {
   row_verdict out{};
-  out.verdict = WM_REJECTED_SINGULAR;
+  out.verdict = WM_REJECTED_NUMERIC;
+  out.rows = block.rows;
   if (block.without_room > 0) return out;
   project(block);
   factors f;

@@ -3,13 +3,12 @@
 //
 // Errors are in map axes: R_true = Exp(dr) R, p_true = p + dp, l_true = l + dl. The covariance is that of the
 // right-invariant error (A. Barrau, S. Bonnabel, "An EKF-SLAM algorithm with consistency properties", 2015):
-// e_p = dp + p x dr, e_l = dl + l x dr. That one neither changes when the whole scene is turned and moved nor learns
-// from points where it can't. It is carried in plain coordinates; when the estimate moves by D, dp becomes dp - D x dr.
-// Where the camera's own rotation or its time offset are states, dr in this is the camera's turn: the vehicle's and
-// theirs.
+// e_p = dp + p x dr, e_l = dl + l x dr: a rotation or a displacement of the whole scene stays unobservable, as it is.
+// The covariance is stored in plain coordinates; when the estimate moves by D, dp becomes dp - D x dr. With the
+// camera's rotation or time offset as states, dr in this is the camera's rotation: the vehicle's and theirs.
 //
-// Corrections gather (`correction`) while one instant is observed and are applied when time goes on: all rows of one
-// instant are taken about one point, so that a picture is one update however many events it comes in.
+// Corrections accumulate (`correction`) during one instant and are applied when time advances: all rows of an instant
+// have one point of linearisation, so that a picture is one update however many events it consists of.
 #ifndef WAYMARK_ESTIMATOR_SPACE_FILTER_HPP
 #define WAYMARK_ESTIMATOR_SPACE_FILTER_HPP
 
@@ -70,6 +69,7 @@ struct gates {
 
 struct row_verdict {
   wm_verdict verdict;
+  int rows;
   bool fused;
   bool doubtful;  // a row above the soft gate
   double variance[kRank], nis[kRank], innovation[kRank];
@@ -84,15 +84,15 @@ class space_filter {
   void init(size_t tail, const head_model models[kHeadStates], int points_max);
   // Axes of the camera in the body, as they are without the state of its rotation.
   void set_camera_axes(const mat3 &R_base_camera) { camera_axes_ = R_base_camera; }
-  // How the vehicle turned when the newest picture was taken, rad/s in body axes.
+  // The vehicle's turn rate at the newest picture, rad/s in body axes.
   void set_turn_rate(const vec3 &w_radps) { turn_rate_ = w_radps; }
 
   void propagate(const body_stretch &s);
-  // Gates row after row, each with the innovation that those before left of it; one beyond the hard gate refuses all.
-  // Between the gates its noise is raised in proportion. Source: the sequential update of a Kalman filter by the LDL'
-  // factors of the innovations' covariance; P - G S^-1 G' is exact for this gain and symmetric by storage.
+  // Gates row after row, each with the innovation that the rows before leave; a row above the hard gate rejects all.
+  // Between the gates its noise is inflated in proportion. Sequential update of a Kalman filter by the LDL' factors of
+  // the innovations' covariance; P - G S^-1 G' is exact for this gain and symmetric by storage.
   row_verdict fuse(const row_block &block, const gates &limits);
-  // Applies what was gathered. After this, nothing is pending.
+  // Applies the accumulated corrections.
   void settle();
 
   // The estimate with what is pending.
@@ -111,11 +111,10 @@ class space_filter {
   int point_count() const { return (n_ - first_point_) / 3; }
   int point_capacity() const { return points_max_; }
 
-  // A point behind the others. `block`: three rows, how its place in the sensor's frame depends on the states, with
-  // the observation's covariance; `A` turns the map into that frame. Paper, system 3, with J_x P J_x' in place of
-  // nothing: P_ll = A'(D P D' + N)A, P_lx = -A' D P.
+  // Appends a point. `block`: three rows, D, the derivatives of its place in the sensor's frame; `A` rotates the map
+  // into that frame; N: the measurement's covariance. P_ll = A'(D P D' + N)A, P_lx = -A' D P (the paper has N alone).
   void add_point(const vec3 &place, const row_block &block, const mat3 &A, const mat3 &noise);
-  // A point that nothing has to do with yet: its place on a map, with the map's sigma.
+  // Appends a point of the map with the map's sigma, uncorrelated.
   void add_point(const vec3 &place, double sigma_m);
   // The last point takes the removed one's slot.
   void remove_point(int slot);

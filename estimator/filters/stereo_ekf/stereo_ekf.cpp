@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/stereo_ekf/stereo_ekf.hpp"
 
+#include <algorithm>
 #include <cstring>
+#include <limits>
 
 #include "filters/core/calibration_list.hpp"
 #include "filters/core/contract.hpp"
 #include "filters/registry.h"
+#include "memory/layout.hpp"
 #include "motion/event_time.hpp"
 
 namespace wm {
@@ -14,9 +17,8 @@ namespace {
 // Velocity and rates as states are carried in steps so long.
 constexpr double kStep_s = 0.05;
 constexpr int kStepsMax = 40;
+constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
 constexpr size_t kLandmarksMax = 1u << 20;
-
-constexpr size_t rounded(size_t bytes) { return (bytes + 15) / 16 * 16; }
 
 // Of a measured twist, where neither the parameters nor the calibration give them.
 constexpr double kTwistSigma_mps = 0.03, kTwistSigma_radps = 0.01;
@@ -52,42 +54,45 @@ size_t stereo_ekf::bytes(const wm_stereo_ekf_params &params, const wm_setup &set
     *why = "noise.pixel_px is 0, and calibration.yaml's stereo has no sigma_px; give one of them";
     return 0;
   }
+  return lay_out(nullptr, params, setup.landmark_count, nullptr);
+}
+
+size_t stereo_ekf::lay_out(void *state, const wm_stereo_ekf_params &params, size_t landmarks, arrays *out) {
   head_model models[kHeadStates];
   models_of(params, models);
-  return rounded(sizeof(stereo_ekf)) + rounded(setup.landmark_count * sizeof(int)) +
-         rounded((size_t)params.points_max * sizeof(point_info)) + space_filter::tail_bytes(models, params.points_max);
+  memory_layout layout(state, sizeof(stereo_ekf));
+  const auto take = [&]<class item>(size_t count, item *) {
+    return (size_t)(reinterpret_cast<char *>(layout.take<item>(count)) - static_cast<char *>(state));
+  };
+  const arrays at = {take(landmarks, (int *)nullptr), take(landmarks, (landmark_record *)nullptr),
+                     take((size_t)params.points_max, (point_info *)nullptr),
+                     take(space_filter::tail_bytes(models, params.points_max), (char *)nullptr)};
+  if (out) *out = at;
+  return layout.bytes();
 }
 
 void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup) {
   const char *why = "";
   std::memset(static_cast<void *>(this), 0, bytes(params, setup, &why));
+  lay_out(this, params, setup.landmark_count, &arrays_);
   params_ = params;
   setup_ = &setup;
   (void)rig_.init(setup.rig, &why);
   for (int i = 0; i < 4; i++) sigma_px_[i] = params.pixel_px > 0.0 ? params.pixel_px : rig_.sigma_px[i];
   motion_.init(setup.motion, &setup.wheels, twist_noise_of(params, setup.rig), params.gap_after_s);
-  info_offset_ = rounded(sizeof(stereo_ekf)) + rounded(setup.landmark_count * sizeof(int));
-  const size_t tail = info_offset_ + rounded((size_t)params.points_max * sizeof(point_info));
   head_model models[kHeadStates];
   models_of(params, models);
   const auto before = (size_t)(reinterpret_cast<char *>(&filter_) - reinterpret_cast<char *>(this));
-  filter_.init(tail - before, models, params.points_max);
+  filter_.init(arrays_.filter - before, models, params.points_max);
   if (rig_.there) filter_.set_camera_axes(rig_.R_base_optical);
-  // Landmarks by rising id: found by halving. Insertion by binary search; start may take its time.
   int *order = landmark_order();
-  for (size_t i = 0; i < setup.landmark_count; i++) {
-    size_t low = 0, high = i;
-    while (low < high) {
-      const size_t middle = (low + high) / 2;
-      if (setup.landmarks[order[middle]].id <= setup.landmarks[i].id)
-        low = middle + 1;
-      else
-        high = middle;
-    }
-    std::memmove(order + low + 1, order + low, (i - low) * sizeof(int));
-    order[low] = (int)i;
-  }
-  now_ns_ = picture_ns_ = fused_ns_ = lost_ns_ = searched_ns_ = inflated_ns_ = WM_TIME_NONE;
+  for (size_t i = 0; i < setup.landmark_count; i++) order[i] = (int)i;
+  std::sort(order, order + setup.landmark_count, [&setup](int a, int b) {
+    const int32_t id_a = setup.landmarks[a].id, id_b = setup.landmarks[b].id;
+    return id_a != id_b ? id_a < id_b : a < b;
+  });
+  now_ns_ = picture_ns_ = WM_TIME_NONE;
+  life_ = lifecycle();
   start_ns_ = setup.start.t_ns;
   odometry_ = {{{0, 0, 0}, kNoTurn}, 0.0, 0.0};
   start_pose();
@@ -180,11 +185,9 @@ void stereo_ekf::estimate(wm_estimate *out) const {
     out->v_mps[i] = v[i];
     out->w_radps[i] = w[i];
   }
-  out->resets = resets_;
-  const bool fresh =
-      fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, now_ns_) <= params_.dead_reckoning_after_s;
-  out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
-  out->lost_probability = state_ == WM_STATE_SEARCHING || state_ == WM_STATE_LOST ? 1.0 : 0.0;
+  out->resets = life_.resets();
+  out->state = life_.state(now_ns_, params_.dead_reckoning_after_s);
+  out->lost_probability = life_.searching() ? 1.0 : params_.recover ? evidence_.probability() : kAbsent;
 }
 
 wm_motion_calibration stereo_ekf::motion_calibration() const { return kNeutralCalibration; }

@@ -4,9 +4,11 @@
 #ifndef WAYMARK_ESTIMATOR_STEREO_EKF_HPP
 #define WAYMARK_ESTIMATOR_STEREO_EKF_HPP
 
+#include "filters/core/landmark_evidence.hpp"
+#include "filters/core/lifecycle.hpp"
 #include "filters/core/record_list.hpp"
+#include "filters/core/rollback.hpp"
 #include "filters/relocalize/pose_consensus.hpp"
-#include "filters/stereo_ekf/fit_monitor.hpp"
 #include "filters/stereo_ekf/params.h"
 #include "filters/stereo_ekf/space_filter.hpp"
 #include "sensors/stereo_rig.hpp"
@@ -32,8 +34,7 @@ class stereo_ekf {
   static constexpr int32_t kOfMap = -1;
   // Observations of the last seconds are used to find the pose; odometry relates them. Not swept.
   static constexpr double kWindow_s = 3.0;
-  // Keys of evidence that is not of a landmark.
-  static constexpr int kPositionKey = -2, kDepthKey = -3, kHeadingKey = -4;
+  static constexpr int kDepthKey = -4;  // beside core/landmark_evidence.hpp's keys
   struct point_info {
     wm_time_ns begun_ns, seen_ns, misfit_ns;
     int32_t id;
@@ -99,19 +100,34 @@ class stereo_ekf {
   void start_pose();
   void set_pose(const pose3 &pose, double sigma_m, double sigma_rad);
   void buffer_observation(const wm_stereo &seen, const wm_landmark &landmark, wm_time_ns t_ns);
-  void note(wm_time_ns t_ns, int key, const row_verdict &result);
+  void note(wm_time_ns t_ns, int key, const row_verdict &result, double clutter_volume, landmark_record *record);
+  double clutter_volume_of(const wm_stereo &seen) const;
+  double clutter_volume_of(const wm_sighting &seen) const;
+  void begin_pose(bool known, double log_odds_wrong);
   void search(wm_time_ns since_ns);
 
   int find_landmark(int32_t id) const;
   double map_sigma(const wm_landmark &landmark) const {
     return landmark.sigma_m > params_.map_min_m ? landmark.sigma_m : params_.map_min_m;
   }
-  int *landmark_order() { return reinterpret_cast<int *>(this + 1); }
-  const int *landmark_order() const { return reinterpret_cast<const int *>(this + 1); }
-  point_info *info() { return reinterpret_cast<point_info *>(reinterpret_cast<char *>(this) + info_offset_); }
-  const point_info *info() const {
-    return reinterpret_cast<const point_info *>(reinterpret_cast<const char *>(this) + info_offset_);
+  // Arrays behind the struct, by their distance from it in bytes: a copy of the state has them at the same place.
+  struct arrays {
+    size_t order, records, info, filter;
+  };
+  static size_t lay_out(void *state, const wm_stereo_ekf_params &params, size_t landmarks, arrays *out);
+  template <class item>
+  item *array(size_t at) {
+    return reinterpret_cast<item *>(reinterpret_cast<char *>(this) + at);
   }
+  template <class item>
+  const item *array(size_t at) const {
+    return reinterpret_cast<const item *>(reinterpret_cast<const char *>(this) + at);
+  }
+  int *landmark_order() { return array<int>(arrays_.order); }  // by rising id
+  const int *landmark_order() const { return array<int>(arrays_.order); }
+  landmark_record *landmark_records() { return array<landmark_record>(arrays_.records); }
+  point_info *info() { return array<point_info>(arrays_.info); }
+  const point_info *info() const { return array<point_info>(arrays_.info); }
   gates limits() const { return {params_.gate_soft, params_.gate_hard}; }
 
   space_filter filter_;
@@ -119,16 +135,15 @@ class stereo_ekf {
   stereo_rig rig_;
   wm_stereo_ekf_params params_;
   const wm_setup *setup_;
-  size_t info_offset_;
+  arrays arrays_;
   double sigma_px_[4];
   wm_time_ns now_ns_, start_ns_;
   wm_time_ns picture_ns_;    // the picture that points are being taken of; NONE between pictures
   travelled_pose odometry_;  // motion alone
-  fit_monitor monitor_;
+  landmark_evidence evidence_;
   pose_consensus observations_;
-  wm_time_ns fused_ns_, lost_ns_, searched_ns_, inflated_ns_;
-  uint32_t resets_;
-  uint8_t state_;  // wm_state, without dead reckoning
+  lifecycle life_;
+  rollback<kHeadMax> remembered_;  // calibration states from before a fault
 };
 
 }  // namespace wm

@@ -34,6 +34,7 @@ struct scene {
   size_t bytes = 0;
   const wm_estimator *ekf = wm_estimator_find("stereo_ekf");
   pose3 truth = {{0, 0, 0}, kNoTurn};
+  vec3 start_of_step = {0, 0, 0};  // of the last swim()
   double t_s = 0;
   uint64_t draws = 0;
   double noise_v = 0.02, noise_w = 0.003;
@@ -114,6 +115,7 @@ struct scene {
       e.as.twist6.w_radps[i] = w[i] + noise_w * noise();
     }
     TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &e));
+    start_of_step = truth.p;
     truth.p = truth.p + matrix_of(truth.q) * (dt_s * (mean_turn(dt_s * w) * v));
     truth.q = normalized(truth.q * turn_by(dt_s * w));
     t_s += dt_s;

@@ -156,11 +156,52 @@ void test_nonsense_in_pixels_is_refused(void) {
   TEST_ASSERT_EQUAL_MEMORY(before.data(), s.state, s.bytes);
 }
 
+// Carried off while its velocity log reads 10 % too much: the filter notices within 1 s, finds itself, and keeps the
+// scale that it had learnt before. Undisturbed it stays sure.
+void test_a_kidnapped_vehicle_is_found_and_keeps_its_calibration(void) {
+  for (const bool kidnapped : {false, true}) {
+    scene s;
+    s.set("states.velocity_scale_sigma", 0.2);
+    s.begin();
+    const auto drive = [&s](int steps) {
+      bool lost = false;
+      for (int i = 0; i < steps; i++) {
+        const double side = i / 20 % 2 ? -1.0 : 1.0;
+        s.swim(0.1, {0.55 * side, 0, 0}, {0, 0, 0.3});
+        s.truth.p = s.truth.p - 0.1 / 1.1 * (s.truth.p - s.start_of_step);
+        s.look();
+        lost = lost || s.estimate().state == WM_STATE_LOST;
+      }
+      return lost;
+    };
+    TEST_ASSERT_FALSE(drive(400));
+    const auto scale = [&s] {
+      wm_calibration_value value;
+      TEST_ASSERT_EQUAL(1, s.ekf->calibration(s.state, &value, 1));
+      return value;
+    };
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.0 / 1.1, scale().value);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.01, s.estimate().lost_probability);
+    const uint32_t resets = s.estimate().resets;
+    if (kidnapped) s.truth = {{0.8, -0.9, 0.4}, turn_by({0.2, -0.3, 2.5})};
+    TEST_ASSERT_EQUAL(kidnapped, drive(10));
+    TEST_ASSERT_FALSE(kidnapped && s.estimate().resets == resets && s.estimate().state != WM_STATE_LOST);
+    drive(20);
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, s.estimate().state);
+    TEST_ASSERT_EQUAL(resets + (kidnapped ? 1 : 0), s.estimate().resets);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.03, s.place_error());
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 1.0 / 1.1, scale().value);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.02, scale().sigma);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.2, s.estimate().lost_probability);
+  }
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_long_pauses_leave_a_sound_covariance);
   RUN_TEST(test_a_wrong_match_is_refused_and_one_picture_is_enough);
   RUN_TEST(test_each_refused_datum_leaves_a_record);
   RUN_TEST(test_nonsense_in_pixels_is_refused);
+  RUN_TEST(test_a_kidnapped_vehicle_is_found_and_keeps_its_calibration);
   return UNITY_END();
 }
