@@ -8,41 +8,41 @@ static const char *const kModels[] = {"auto", "ticks", "speed_yaw_rate", "ackerm
 
 static const wm_param kParams[] = {
     {"model", WM_PARAM_ENUM, offsetof(struct wm_motion_params, model), WM_MOTION_AUTO, 0, WM_MOTION_TWIST, kModels,
-     "How motion is made of the recording's quantities. auto takes the first of ticks, speed and yaw rate, speed and "
-     "steering, twist that is there; the quantities decide, as they come."},
+     "Motion model. auto: the first of ticks, speed and yaw rate, speed and steering, twist whose data come."},
     F64("noise.speed_mps", noise_speed_mps, 0.02, 0, 10,
-        "White noise of the speed, m/s per sqrt(s), at any speed. A wheel's slip and a gearbox' play at walking pace."),
+        "White noise of the speed, m/s per sqrt(s): slip and play at walking pace."),
     F64("noise.speed_rel", noise_speed_rel, 0.03, 0, 2,
-        "White noise of the speed in parts of the speed, per sqrt(s); squares are added."),
+        "White noise of the speed relative to the speed, per sqrt(s); variances are added."),
     F64("noise.yaw_rate_radps", noise_yaw_rate_radps, 0.01, 0, 10, "White noise of the turn rate, rad/s per sqrt(s)."),
     F64("noise.yaw_rate_rel", noise_yaw_rate_rel, 0.03, 0, 2,
-        "White noise of the turn rate in parts of the turn rate, per sqrt(s)."),
+        "White noise of the turn rate relative to the turn rate, per sqrt(s)."),
     F64("noise.yaw_rate_per_mps", noise_yaw_rate_per_mps, 0.0, 0, 10,
         "White noise of the turn rate in rad/s per m/s of speed, per sqrt(s): castors, ruts, a wheel that slips."),
     F64("noise.side_rel", noise_side_rel, 0.01, 0, 2,
-        "White noise of the sideways speed in parts of the speed, per sqrt(s). Wheels slip sideways a little."),
+        "White noise of the sideways speed relative to the speed, per sqrt(s): lateral slip."),
     F64("noise.rest_factor", noise_rest_factor, 0.22, 0, 1,
-        "What is left of the constant noises while speed and turn rate say zero: a robot at rest stays where it is."),
+        "Factor of the constant noises while speed and turn rate are zero: a robot at rest stays."),
     F64("noise.ticks_per_sqrt_m", noise_ticks_per_sqrt_m, 0.005, 0, 1,
-        "Noise of a wheel's way by its ticks: metres per square root of a metre of way (uneven floor, slip)."),
+        "Noise of a wheel's distance by its ticks, m per sqrt(m) (uneven floor, slip)."),
     F64("noise.steering_rad", noise_steering_rad, 0.005, 0, 1,
         "White noise of the road wheel's angle, rad per sqrt(s): play and the table's error between its points."),
     F64("noise.hold_mps2", noise_hold_mps2, 1.0, 0, 100,
-        "m/s2. A speed that is older than 0.25 s and than three of its periods holds on, but the robot may have braked "
-        "or sped up so much since: sigma grows by half of it by the square of the time."),
+        "m/s2. Assumed acceleration while a speed is overdue (older than 0.25 s and than three of its periods): the "
+        "distance's sigma grows by a t^2 / 2."),
     F64("noise.hold_radps2", noise_hold_radps2, 0.5, 0, 100, "rad/s2. As hold_mps2, for the turn rate."),
     F64("standstill.speed_mps", standstill_speed_mps, 0.02, 0, 1,
-        "A speed below this is none. Below the smallest step of common wheel-speed sensors (0.01 to 0.03 m/s)."),
+        "A speed below this is zero. The smallest step of common wheel-speed sensors is 0.01 to 0.03 m/s."),
     F64("standstill.yaw_rate_radps", standstill_yaw_rate_radps, 0.002, 0, 1,
-        "A twist's turn rate below this is none. Only for twists: a gyro never says zero."),
+        "A twist's turn rate below this is zero. For twists only: a gyro has noise."),
     F64("standstill.after_s", standstill_after_s, 0.5, 0, 60,
-        "No speed for so long is standing still: position and heading hold, the gyro shows its bias."),
+        "Zero speed for so long is standstill: position and heading hold, the gyro measures its bias."),
     F64("standstill.bias_sigma_radps", standstill_bias_sigma_radps, 0.01, 1e-6, 1,
         "Sigma of one reading of the yaw rate as a measurement of its bias while standing (steps and vibration)."),
     F64("hold_max_s", hold_max_s, 2.0, 0.01, 3600,
-        "A speed, rate or twist holds to the next of its kind, but no longer than this; then the motion is unknown, "
-        "and sigma grows with the last speed, or with half of noise.hold_mps2 for so long, if that is more. Gaps of 1 "
-        "s are seen on working robots."),
+        "A speed, rate or twist holds until the next of its kind, at most this long; then the motion is unknown, and "
+        "sigma grows with the last speed, or with noise.hold_mps2 times half of this where that is more. Working "
+        "robots "
+        "have gaps of 1 s."),
     F64("limits.mps2", limits_mps2, 15.0, 0, 1000,
         "m/s2. Largest plausible acceleration. A speed that changes by more than this allows and by 3 m/s besides, or "
         "a "

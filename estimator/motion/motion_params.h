@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fields of `motion:`; their meaning is told once, in motion_params.c.
+// The fields of `motion:`; motion_params.c has their meaning.
 #ifndef WAYMARK_ESTIMATOR_MOTION_PARAMS_H
 #define WAYMARK_ESTIMATOR_MOTION_PARAMS_H
 

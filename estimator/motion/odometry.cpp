@@ -16,7 +16,7 @@ struct wm_odometry {
   wm_odom_point head;  // at the last event
   wm_odom_point ring[kPoints];
   uint64_t count;
-  uint64_t points_before_gap;  // points when the inputs fell silent, until a count tells the way since; 0: they didn't
+  uint64_t points_before_gap;  // points at the beginning of a gap, until a count gives its distance; 0: no gap
   // Only where twists in space come: their history, and the pose that they add up to since the first one.
   wm::spatial_history spatial;
   wm_time_ns spatial_ns;  // of that pose; WM_TIME_NONE: none came
@@ -91,7 +91,7 @@ bool spatial_at(const wm_odometry *self, wm_time_ns t_ns, spatial_point *out) {
   return true;
 }
 
-// Mean, covariance and twist of an estimate in space, carried on by the motion between two points `dt_s` apart.
+// Moves mean, covariance and twist of an estimate in space by the motion between two points `dt_s` apart.
 void carry_spatial(const wm_motion_params &params, const spatial_point &from, const spatial_point &to, double dt_s,
                    wm_estimate *out) {
   const wm::pose3 start = {wm::vec_of(out->pose_map_base.p_m), wm::quat_of(out->pose_map_base.q_xyzw)};
@@ -128,7 +128,7 @@ void carry_planar(const wm_odom_point &from, const wm_odom_point &to, wm_estimat
   const int index[3] = {0, 1, 5};
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) covariance(i, j) = out->covariance[wm_cov_index(index[i], index[j])];
-  // Along and across the chord; a turn that is spread evenly over the way moves its end by half of it in the mean.
+  // Along and across the chord; a rotation spread evenly over the path moves its end by half of it in the mean.
   const double along = growth(from.along_var_m2, to.along_var_m2);
   const double turn = growth(from.heading_var_rad2, to.heading_var_rad2);
   const double across = growth(from.across_var_m2, to.across_var_m2);
@@ -187,7 +187,7 @@ wm_status wm_odometry_feed(wm_odometry *self, const wm_event *event) {
                               const wm::motion_noise &noise) { carry_point(head, piece.dt_s, twist, noise); });
   head.t_ns = event->t_ns;
   if (self->points_before_gap > 0 && self->front.counted()) {
-    // The way of the silence is spread over it: a pose that was fused within it is carried on by what is left.
+    // The counted distance is spread over the gap: a pose fused within it moves by the rest.
     if (self->count - self->points_before_gap < wm_odometry::kPoints) self->count = self->points_before_gap;
     self->points_before_gap = 0;
   }
@@ -243,7 +243,7 @@ wm_status wm_odometry_carry(const wm_odometry *self, const wm_estimate *fused, w
     return WM_OK;
   }
   carry_spatial(self->front.params(), spatial_from, spatial_to, wm_seconds_between(fused->t_ns, t_ns), out);
-  if (odom) {  // seen from above, so that map and odom move alike for a vehicle that swims sideways or noses up
+  if (odom) {  // projected to the plane, so that map and odom move alike for a vehicle that swims sideways or pitches
     const wm::pose3 pose = wm::compose(self->pose_odom_base, spatial_to.pose);
     odom->pose_odom_base = {pose.p.x, pose.p.y, heading_of(pose.q)};
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What each motion model needs, told before the drive: without it the pose would stand still and nobody would say why.
+// The data that each motion model needs, checked before the drive: without them the pose would stand still silently.
 #include <math.h>
 #include <stddef.h>
 

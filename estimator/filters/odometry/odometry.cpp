@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Dead reckoning as an estimator: motion alone, with an honest covariance. The baseline that every other is set
-// against.
+// Dead reckoning as an estimator: motion alone, with its covariance. The baseline for all others.
 #include <limits>
 
 #include "filters/core/contract.hpp"
+#include "filters/core/counter_list.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
@@ -56,6 +56,11 @@ class odometry {
   }
   const wm_motion_calibration &motion_calibration() const { return filter_.calibration(); }
   uint32_t motion_health() const { return filter_.motion_health(); }
+  size_t list_counters(wm_counter *out, size_t capacity) const {
+    counter_list list(out, capacity);
+    list.add(WM_COUNTER_MOTION_OUTLIERS, filter_.motion_outliers());
+    return list.count();
+  }
   size_t list_calibration(wm_calibration_value *out, size_t capacity) const {
     calibration_list list(out, capacity);
     filter_.list_motion_states(&list);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which calibration states of the motion sensors a planar filter carries, and how sure it is of them at the start.
-// Shared by the filters, so that the same keys mean the same everywhere.
+// Calibration states of the motion sensors in planar filters: start sigmas and random walks. Shared by the filters.
 #ifndef WAYMARK_ESTIMATOR_PLANAR_MOTION_STATES_H
 #define WAYMARK_ESTIMATOR_PLANAR_MOTION_STATES_H
 
@@ -20,7 +19,7 @@ typedef struct wm_motion_states {
 #define WM_MOTION_STATE(type, member, i, key, unit, walk_default, about)                                \
   {"states." key "_sigma" unit, WM_PARAM_F64, offsetof(type, member.sigma[i]), 0, 0, 1, NULL, about}, { \
     "states." key "_walk" unit, WM_PARAM_F64, offsetof(type, member.walk[i]), walk_default, 0, 1, NULL, \
-        "Random walk of that state per sqrt(s): what it changes by on its own."                         \
+        "Random walk of that state per sqrt(s)."                                                        \
   }
 
 // clang-format off
@@ -41,13 +40,13 @@ typedef struct wm_motion_states {
   WM_MOTION_STATE(type, member, 6, "steering_offset", "_rad", 0.0, \
                   "Start sigma of the road wheel's zero, rad, for speed and steering. 0: off."), \
   WM_MOTION_STATE(type, member, 7, "lag", "_s", 0.0, \
-                  "Start sigma of what the robot is late by behind its commands, s. 0: off."), \
+                  "Start sigma of the motion's delay behind its samples, s. 0: off."), \
   WM_MOTION_STATE(type, member, 8, "turn_slowdown", "_mps", 0.0, \
-                  "Start sigma of what a commanded speed loses at a turn rate of 1 rad/s, m/s; it grows with the " \
+                  "Start sigma of the loss of a commanded speed at a turn rate of 1 rad/s, m/s; it grows with the " \
                   "square of the turn rate (drives that limit or round their wheels' speeds). 0: off."), \
   {"states.wheel_difference_sigma", WM_PARAM_F64, offsetof(type, member.wheel_difference_sigma), 0, 0, 1, NULL, \
    "With speed by ticks and the heading by a yaw rate: start sigma of the relative difference of the wheels' radii. " \
-   "The ticks are then a second opinion of the heading, which keeps the gyro's noise from adding up. 0: off."}, \
+   "The ticks then measure the heading, too, which bounds the random walk of the gyro's noise. 0: off."}, \
   {"states.wheel_difference_walk", WM_PARAM_F64, offsetof(type, member.wheel_difference_walk), 0.00001, 0, 1, NULL, \
    "Random walk of that state per sqrt(m): tyres warm up, loads move."}
 // clang-format on

@@ -25,19 +25,19 @@ wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist 
   wm_pose2 sum{};
   bool first = true;
   front_.walk(from_ns, to_ns, calibration_,
-              [&](const motion_segment &piece, const motion_twist &t, const motion_noise &) {
+              [&](const motion_segment &segment, const motion_twist &t, const motion_noise &) {
                 if (first) *twist = t;
                 first = false;
-                const arc a = make_arc(t.v * piece.dt_s, t.w * piece.dt_s);
+                const arc a = make_arc(t.v * segment.dt_s, t.w * segment.dt_s);
                 sum = compose(sum, {a.x_m, a.y_m, a.turn_rad});
               });
   if (first) *twist = front_.twist_at(from_ns, calibration_);
   return sum;
 }
 
-void planar_motion::take_step(const motion_segment &piece, const motion_twist &twist, const pose_step &step) {
+void planar_motion::take_step(const motion_segment &segment, const motion_twist &twist, const pose_step &step) {
   odom_ = compose(odom_, step.body);
-  travelled_m_ += std::fabs(twist.v) * piece.dt_s;
+  travelled_m_ += std::fabs(twist.v) * segment.dt_s;
   turned_rad_ += std::fabs(step.turn_rad);
   twist_[0] = twist.v;
   twist_[1] = twist.w;

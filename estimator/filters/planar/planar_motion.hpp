@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What planar filters share, whatever their covariance's storage: the motion front end, the motion's calibration and
-// which of it is a state, odometry, and when an event may be taken.
+// Common part of planar filters, for any storage of the covariance: motion front end, calibration of the motion and its
+// states, odometry, and the check of an event's time.
 #ifndef WAYMARK_ESTIMATOR_PLANAR_MOTION_HPP
 #define WAYMARK_ESTIMATOR_PLANAR_MOTION_HPP
 
@@ -18,7 +18,7 @@ namespace wm {
 
 class planar_motion {
  public:
-  // Time that the state stands at; WM_TIME_NONE before the first event.
+  // Time of the state; WM_TIME_NONE before the first event.
   wm_time_ns now_ns() const { return front_.now_ns(); }
   bool before_start(wm_time_ns t_ns) const { return t_ns < start_ns_; }
   wm_status check_motion(const wm_event &event) const { return front_.check(event); }
@@ -30,7 +30,8 @@ class planar_motion {
 
   const wm_motion_calibration &calibration() const { return calibration_; }
   uint32_t motion_health() const { return front_.health(); }
-  // The next input is: how the robot moves is a guess.
+  uint64_t motion_outliers() const { return front_.outliers(); }
+  // The next motion input is overdue.
   bool is_overdue() const { return front_.is_overdue(now_ns()); }
   wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time
   double travelled_m() const { return travelled_m_; }
@@ -40,16 +41,16 @@ class planar_motion {
  protected:
   // All calibration neutral, none of it a state.
   void init_motion(const wm_setup &setup);
-  // What a calibration state starts with and walks by; its index comes from the filter.
+  // Start variance and random walk of a calibration term; `state` is its index in the filter, -1: not a state.
   void set_motion_state(const wm_motion_states &states, int i, int state);
 
-  // Takes a motion event that check_motion() lets pass; move the state to its t_ns next. The state that it makes
-  // unknown again, or -1: the speed comes from another sensor now, whose scale is another.
+  // Takes a motion event that check_motion() accepts; move the state to its t_ns next. Returns the state to reset where
+  // the speed's source changed to a sensor with another scale; -1: none.
   int feed(const wm_event &motion) {
     front_.feed(motion);
     return front_.speed_source_changed() ? motion_state_[kSpeedScale] : -1;
   }
-  // Standing still, what the gyro shows is its bias: true with the innovation of that state and its variance.
+  // At standstill the gyro measures its bias: innovation of that state and its variance. False: no measurement.
   bool standstill_bias(double *innovation, double *variance) const {
     double rate;
     if (motion_state_[kYawRateBias] < 0 || !front_.standstill_yaw_rate(&rate)) return false;
@@ -58,12 +59,12 @@ class planar_motion {
     return true;
   }
 
-  // propagate(piece, twist, noise) for each piece of motion until `t_ns`, then walk(state, variance) for each
-  // calibration state.
+  // propagate(segment, twist, noise) for each segment until `t_ns`, then walk(state, variance) for each calibration
+  // state.
   template <class Propagate, class Walk>
   void advance(wm_time_ns t_ns, Propagate propagate, Walk walk) {
     if (now_ns() == WM_TIME_NONE) front_.set_now(t_ns);
-    if (now_ns() < start_ns_) {  // the pose is known later on: until then only what holds is kept
+    if (now_ns() < start_ns_) {  // the start pose is later: until then only the inputs that hold are kept
       front_.advance(t_ns < start_ns_ ? t_ns : start_ns_, calibration_,
                      [](const motion_segment &, const motion_twist &, const motion_noise &) {});
     }
@@ -73,9 +74,9 @@ class planar_motion {
     for (int i = 0; i < kCalibrationCount; i++)
       if (motion_state_[i] >= 0) walk(motion_state_[i], walk_[i] * dt);
   }
-  // Odometry over one such piece.
-  void take_step(const motion_segment &piece, const motion_twist &twist, const pose_step &step);
-  // The calibration becomes what the states say, and they what a calibration can be.
+  // Odometry over one such segment.
+  void take_step(const motion_segment &segment, const motion_twist &twist, const pose_step &step);
+  // The calibration takes the states' values, which are cut to their limits.
   void take_calibration(double *states);
 
   template <class Filter>
@@ -92,7 +93,7 @@ class planar_motion {
   wm_time_ns start_ns_;
   wm_pose2 odom_;
   double travelled_m_, turned_rad_;
-  double twist_[2];  // m/s and rad/s, of the last piece
+  double twist_[2];  // m/s and rad/s, of the last segment
 };
 
 // A planar pose's estimate; covariance(i, j) is that of x, y and heading.

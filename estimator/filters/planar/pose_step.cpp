@@ -6,6 +6,7 @@
 namespace wm {
 namespace {
 
+// Limits of the calibration's terms: beyond, the model is wrong, or the lag exceeds the history.
 constexpr double kLowest[kCalibrationCount] = {0.3, 0.3, -1.0, 0.3, 0.3, 0.3, -0.5, 0.0, -1.0};
 constexpr double kHighest[kCalibrationCount] = {3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0};
 
@@ -21,10 +22,10 @@ double motion_state_within_limits(int calibration_index, double value) {
   return value > kHighest[calibration_index] ? kHighest[calibration_index] : value;
 }
 
-pose_step make_pose_step(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise,
+pose_step make_pose_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
                          double heading_rad, const double before[2], const int motion_state[kCalibrationCount]) {
   pose_step out;
-  const double dt = piece.dt_s;
+  const double dt = segment.dt_s;
   const arc a = make_arc(twist.v * dt, twist.w * dt);
   const sin_cos h = sincos(heading_rad);
   const double dx = h.cos * a.x_m - h.sin * a.y_m;
@@ -39,9 +40,9 @@ pose_step make_pose_step(const motion_segment &piece, const motion_twist &twist,
   out.by[0][1] = dx;
   out.by[0][2] = 0.0;
   out.columns = 1;
-  const auto add_column = [&](int state, double way_by, double turn_by) {
-    const double bx = a.x_by_way * way_by + a.x_by_turn * turn_by;
-    const double by_body = a.y_by_way * way_by + a.y_by_turn * turn_by;
+  const auto add_column = [&](int state, double distance_by, double turn_by) {
+    const double bx = a.x_by_way * distance_by + a.x_by_turn * turn_by;
+    const double by_body = a.y_by_way * distance_by + a.y_by_turn * turn_by;
     double *by = out.by[out.columns];
     out.column[out.columns++] = state;
     by[0] = h.cos * bx - h.sin * by_body;
@@ -52,12 +53,12 @@ pose_step make_pose_step(const motion_segment &piece, const motion_twist &twist,
     const int state = motion_state[twist.index[i]];
     if (state >= 0) add_column(state, twist.v_by[i] * dt, twist.w_by[i] * dt);
   }
-  // More lag: the interval takes in more of what was said before it (at its beginning, and all that follows is turned
-  // by that), and less of what was said last.
+  // More lag: the interval contains more of the inputs before it, at its beginning, which rotates all that follows, and
+  // less of the last ones.
   const int lag = motion_state[kLag];
-  if (lag >= 0 && (piece.first || piece.last)) {
-    add_column(lag, piece.last ? -twist.v : 0.0, piece.last ? -twist.w : 0.0);
-    if (piece.first) {
+  if (lag >= 0 && (segment.first || segment.last)) {
+    add_column(lag, segment.last ? -twist.v : 0.0, segment.last ? -twist.w : 0.0);
+    if (segment.first) {
       double *by = out.by[out.columns - 1];
       by[0] += h.cos * before[0] - dy * before[1];
       by[1] += h.sin * before[0] + dx * before[1];
@@ -65,18 +66,20 @@ pose_step make_pose_step(const motion_segment &piece, const motion_twist &twist,
     }
   }
 
-  // Noise: along the way, in the turn, sideways.
+  // Noise along the path, of the rotation, and sideways.
   const double way_x = h.cos * a.x_by_way - h.sin * a.y_by_way, way_y = h.sin * a.x_by_way + h.cos * a.y_by_way;
   const double turn_x = h.cos * a.x_by_turn - h.sin * a.y_by_turn, turn_y = h.sin * a.x_by_turn + h.cos * a.y_by_turn;
-  const double qww = noise.distance_m2, qtt = noise.rotation_rad2, qwt = noise.distance_rotation,
-               qss = noise.lateral_m2;
-  out.noise[0][0] = way_x * way_x * qww + 2.0 * way_x * turn_x * qwt + turn_x * turn_x * qtt + way_y * way_y * qss;
-  out.noise[0][1] =
-      way_x * way_y * qww + (way_x * turn_y + turn_x * way_y) * qwt + turn_x * turn_y * qtt - way_x * way_y * qss;
-  out.noise[1][1] = way_y * way_y * qww + 2.0 * way_y * turn_y * qwt + turn_y * turn_y * qtt + way_x * way_x * qss;
-  out.noise[0][2] = way_x * qwt + turn_x * qtt;
-  out.noise[1][2] = way_y * qwt + turn_y * qtt;
-  out.noise[2][2] = qtt;
+  const double q_distance = noise.distance_m2, q_rotation = noise.rotation_rad2, q_both = noise.distance_rotation,
+               q_lateral = noise.lateral_m2;
+  out.noise[0][0] = way_x * way_x * q_distance + 2.0 * way_x * turn_x * q_both + turn_x * turn_x * q_rotation +
+                    way_y * way_y * q_lateral;
+  out.noise[0][1] = way_x * way_y * q_distance + (way_x * turn_y + turn_x * way_y) * q_both +
+                    turn_x * turn_y * q_rotation - way_x * way_y * q_lateral;
+  out.noise[1][1] = way_y * way_y * q_distance + 2.0 * way_y * turn_y * q_both + turn_y * turn_y * q_rotation +
+                    way_x * way_x * q_lateral;
+  out.noise[0][2] = way_x * q_both + turn_x * q_rotation;
+  out.noise[1][2] = way_y * q_both + turn_y * q_rotation;
+  out.noise[2][2] = q_rotation;
   return out;
 }
 

@@ -12,11 +12,11 @@ inline bool start_is_known(const wm_start &start) {
   return finite(start.p_m[0]) && finite(start.p_m[1]) && finite(start.heading_rad);
 }
 
-// As unsure as one can be of a place that may be anywhere.
+// Sigmas of a pose of which nothing is known.
 inline constexpr double kUnknownPosition_m = 1000.0;
 inline constexpr double kUnknownHeading_rad = kPi;
 
-// What SET_POSE says. WM_NOT_FINITE, WM_OUT_OF_RANGE: it can't be.
+// The pose of SET_POSE. WM_NOT_FINITE, WM_OUT_OF_RANGE: it is impossible.
 struct given_pose {
   wm_pose2 pose;
   double sigma_xy_m, sigma_heading_rad;
@@ -25,7 +25,7 @@ wm_status read_set_pose(const wm_event &event, given_pose *out);
 
 // Sets the pose that the event names, at its time. WM_NOT_FINITE, WM_OUT_OF_RANGE, WM_TIME_RAN_BACK: nothing changed.
 wm_status set_pose(planar_filter &filter, const wm_event &event);
-// Back to the start pose, at t_ns; what is unknown of it gets a covariance that says so. Calibration stays.
+// Back to the start pose, at t_ns; its unknown parts get the sigmas above. Calibration stays.
 wm_status reset_pose(planar_filter &filter, const wm_start &start, wm_time_ns t_ns);
 
 }  // namespace wm

@@ -7,14 +7,14 @@
 namespace wm {
 namespace {
 
-// Often enough that the gyro's noise in between is small, and many counts apart, so that their rounding is new each
-// time.
+// Distance between two such measurements: short, so that the gyro's noise in between is small, and many counts long, so
+// that their rounding is independent. Not swept.
 constexpr double kFuseEvery_m = 0.5;
-// A slipping wheel is worth more than four sigma within half a metre; less is within the noise of the ticks.
+// A slip is a difference above four sigma; less is within the noise of the ticks.
 constexpr double kSlip_nis = 16.0;
-// Of two roundings, one at each end of a segment.
+// Three sigma of two roundings, one at each end.
 constexpr double kTurn_nis = 2.0 * 9.0;
-constexpr uint32_t kNotBelieved =
+constexpr uint32_t kNotTrusted =
     WM_MOTION_HEALTH_ENCODER_LEFT_DEAD | WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD | WM_MOTION_HEALTH_COUNTER_FROZEN;
 
 double track_m(const planar_filter &filter, const motion_front_end &front) {
@@ -40,29 +40,28 @@ void wheel_heading::init(planar_filter &filter, const wm_motion_states &states) 
 
 void wheel_heading::update(planar_filter &filter, const motion_front_end &front) {
   if (heading_ < 0 || !(front.wheels().track_m > 0.0)) return;
-  if (front.model() != WM_MOTION_SPEED_YAW_RATE || (front.health() & kNotBelieved) ||
+  if (front.model() != WM_MOTION_SPEED_YAW_RATE || (front.health() & kNotTrusted) ||
       filter.before_start(filter.now_ns())) {
     running_ = false;
     return;
   }
-  double way_m[2];
-  if (!front.wheel_distances(way_m)) return;
+  double distance_m[2];
+  if (!front.wheel_distances(distance_m)) return;
   if (running_) {
-    const double left = way_m[0] - way_m_[0], right = way_m[1] - way_m_[1];
+    const double left = distance_m[0] - distance_m_[0], right = distance_m[1] - distance_m_[1];
     if (std::fabs(left) + std::fabs(right) < 2.0 * kFuseEvery_m) return;
     propagate(filter, front, left, right);
     running_ = fuse_gyro_heading(filter, front);
   }
   if (!running_) filter.copy_state(heading_, kHeading, rounding_rad2(filter, front));
   running_ = true;
-  way_m_[0] = way_m[0];
-  way_m_[1] = way_m[1];
+  distance_m_[0] = distance_m[0];
+  distance_m_[1] = distance_m[1];
 }
 
-// turn = ((1 + e_r) r - (1 + e_l) l) / b = k (r - l + d (r + l)/2) / b, k the speed's scale: written so, scale and
-// track act on the turn alone and d on the way alone. A turn that rounding alone could make has no derivative by scale
-// and track: it is the noise that the tie will measure, and a derivative that shares its measurement's noise finds a
-// scale in it.
+// turn = ((1 + e_r) r - (1 + e_l) l) / b = k (r - l + d (r + l)/2) / b, k the speed's scale: scale and track act on the
+// turn alone, d on the distance alone. A turn within the rounding has no derivative by scale and track: it is the noise
+// that the next measurement contains, and a derivative correlated with it would find a scale in it.
 void wheel_heading::propagate(planar_filter &filter, const motion_front_end &front, double left_m, double right_m) {
   const wm_motion_calibration &c = filter.calibration();
   const double track = track_m(filter, front), middle_m = 0.5 * (left_m + right_m);

@@ -309,6 +309,7 @@ size_t slam::list_counters(wm_counter *out, size_t capacity) const {
   list.add(WM_COUNTER_ROTATION_OUTLIERS, counts_.jolts);
   if (params_.line_rejoin) list.add(WM_COUNTER_LANDMARKS_MERGED, counts_.rejoined);
   list.add(WM_COUNTER_MAP_FULL, counts_.no_room);
+  list.add(WM_COUNTER_MOTION_OUTLIERS, joint_.motion_outliers());
   return list.count();
 }
 

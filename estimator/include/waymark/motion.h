@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The motion front end: one for all estimators. It takes motion events (ticks, wheel speeds, yaw rate, steering, gear,
-// twists) and says how base_link moved, with the noise of that. Pure: no clock, no heap, no file.
+// twists) and gives the motion of base_link with its noise. Pure: no clock, no heap, no file.
 #ifndef WAYMARK_MOTION_H
 #define WAYMARK_MOTION_H
 
@@ -29,17 +29,17 @@ typedef enum wm_motion_model {
 typedef struct wm_motion_params wm_motion_params;
 extern const wm_param_table wm_motion_params_table;
 
-// Why two of the parameters, each allowed by itself, don't go together, and what would mend it, as a text; *key is the
-// one that is wrong. NULL, *key untouched, where they do.
+// Why two of the parameters, each allowed by itself, are wrong together, and how to correct it, as a text; *key is the
+// wrong one. NULL, *key untouched: none is.
 const char *wm_motion_params_clash(const wm_motion_params *params, const char **key);
 
-// What the wanted model lacks of what the sources can give (`kinds`: WM_EVENT_BIT; `quantities`: a bit per wm_quantity)
-// and of the wheels' calibration, as a text ("yaw_rate over CAN"); NULL where nothing is missing. `auto` lacks
-// something only where no model is possible. Constant cost.
+// Data that the chosen model needs and the sources (`kinds`: WM_EVENT_BIT; `quantities`: a bit per wm_quantity) or the
+// wheels' calibration do not have, as a text ("yaw_rate over CAN"); NULL: none. `auto` needs data only where no model
+// is possible. Constant cost.
 const char *wm_motion_lacks(const wm_motion_params *params, const wm_wheels *wheels, uint32_t kinds,
                             uint32_t quantities);
 
-// Health of the motion sensors, bits of motion_health: what must not be taken for standing still or going straight.
+// Health of the motion sensors, bits of motion_health. None of these is standstill or a straight drive.
 #define WM_MOTION_HEALTH_ENCODER_LEFT_DEAD (1u << 0)
 #define WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD (1u << 1)
 #define WM_MOTION_HEALTH_COUNTER_FROZEN (1u << 2)
@@ -68,7 +68,7 @@ typedef struct wm_motion_calibration {
 // arrives and never jumps. Plain memory: a copy continues identically.
 typedef struct wm_odometry wm_odometry;
 
-// Where odom is at a time, and how uncertain a stretch is: the difference of two `noise` accumulations.
+// Pose in odom at a time. The noise between two points is the difference of their accumulated variances.
 typedef struct wm_odom_point {
   wm_time_ns t_ns;
   wm_pose2 pose_odom_base;
@@ -80,18 +80,18 @@ typedef struct wm_odom_point {
 
 size_t wm_odometry_bytes(void);
 wm_status wm_odometry_init(wm_odometry *self, const wm_motion_params *params, const wm_wheels *wheels);
-// What was learnt holds from now on; what was integrated stays.
+// A calibration holds from now on; past integration stays.
 void wm_odometry_calibrate(wm_odometry *self, const wm_motion_calibration *calibration);
 // Takes a motion event (others are refused with WM_UNSUPPORTED). WM_TIME_RAN_BACK where it is older than the last one.
 wm_status wm_odometry_feed(wm_odometry *self, const wm_event *event);
 // The point at t_ns: extrapolated with the held twist if t_ns is past the last event, else (up to about a second back)
 // interpolated from what was integrated. WM_NOT_FOUND where it is older than that, or no motion has come.
 wm_status wm_odometry_at(const wm_odometry *self, wm_time_ns t_ns, wm_odom_point *out);
-// Stamp of the newest motion event that drives, WM_TIME_NONE before the first.
+// Stamp of the newest motion event that the model uses, WM_TIME_NONE before the first.
 wm_time_ns wm_odometry_newest_ns(const wm_odometry *self);
 // The pose `fused` carried on by odometry from its own time to `t_ns`: mean, covariance, twist. Source: composition of
-// pose_map_base(t_f) with pose_odom_base(t_f)^-1 pose_odom_base(t). An estimate of six degrees of freedom is carried on
-// in space by the twists that came (WM_EVENT_TWIST6); `odom` is that way seen from above.
+// pose_map_base(t_f) with pose_odom_base(t_f)^-1 pose_odom_base(t). An estimate of six degrees of freedom moves by the
+// twists in space (WM_EVENT_TWIST6); `odom` is their sum, projected to the plane.
 wm_status wm_odometry_carry(const wm_odometry *self, const wm_estimate *fused, wm_time_ns t_ns, wm_estimate *out,
                             wm_odom_point *odom);
 
