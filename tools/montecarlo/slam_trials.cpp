@@ -79,19 +79,24 @@ void survey(sim::Recording &r) {
   }
 }
 
-// The configuration's parameters, but for what the map is for.
-std::vector<std::max_align_t> with_map(const wm_config &config, const char *use) {
-  const wm_param_table &table = config.estimator->params;
-  std::vector<std::max_align_t> out(table.bytes / sizeof(std::max_align_t) + 1);
-  std::memcpy(out.data(), config.estimator_params, table.bytes);
-  for (size_t i = 0; i < table.count; i++) {
-    const wm_param &p = table.params[i];
-    if (std::strcmp(p.key, "landmarks.map") != 0) continue;
-    for (int32_t k = 0; p.names[k] != nullptr; k++)
-      if (std::strcmp(p.names[k], use) == 0) std::memcpy(reinterpret_cast<char *>(out.data()) + p.offset, &k, sizeof k);
+// A copy of a configuration's parameters, of which some are changed.
+class Parameters {
+ public:
+  explicit Parameters(const wm_config &config)
+      : table_(config.estimator->params), bytes_(table_.bytes / sizeof(std::max_align_t) + 1) {
+    std::memcpy(bytes_.data(), config.estimator_params, table_.bytes);
   }
-  return out;
-}
+  void set(const char *key, int32_t value) {
+    for (size_t i = 0; i < table_.count; i++)
+      if (std::strcmp(table_.params[i].key, key) == 0)
+        std::memcpy(reinterpret_cast<char *>(bytes_.data()) + table_.params[i].offset, &value, sizeof value);
+  }
+  void *data() { return bytes_.data(); }
+
+ private:
+  const wm_param_table &table_;
+  std::vector<std::max_align_t> bytes_;
+};
 
 // A tracker's numbers in place of identities.
 class Renumbering {
@@ -250,11 +255,12 @@ SlamOutcome run_slam_trial(const sim::Scenario &scenario, const wm_config &confi
   draw_cut(scenario, trial, seed, recording, out);
   const bool begun = trial.disturbance != Disturbance::kStart;
   wm_config changed = config;
-  std::vector<std::max_align_t> params;
+  Parameters params(config);
+  changed.estimator_params = params.data();
+  if (options.renumber) params.set("lines.rejoin", 1);
   if (!begun) {
     survey(recording);
-    params = with_map(config, trial.frozen ? "frozen" : "extend");
-    changed.estimator_params = params.data();
+    params.set("landmarks.map", trial.frozen ? 2 : 1);
   }
   std::vector<SmallEvent> events;
   check(make_events(recording, events, &error), error, "events");

@@ -16,6 +16,7 @@
 #define WAYMARK_ESTIMATOR_SLAM_JOINT_STATE_HPP
 
 #include "filters/planar/planar_motion.hpp"
+#include "filters/relocalize/line_search.hpp"
 #include "math/elementary.hpp"
 #include "math/half_covariance.hpp"
 
@@ -100,6 +101,7 @@ class joint_state : public planar_motion {
 
   // ---- landmarks ----
   int landmarks() const { return landmarks_; }
+  landmark_places places() const { return {x() + layout_.robot_states, landmarks_, layout_.landmark_width}; }
   int landmark_capacity() const { return layout_.landmarks; }
   int landmark_state(int landmark) const { return layout_.robot_states + landmark * layout_.landmark_width; }
   // Joins a landmark behind the others; there must be room.

@@ -32,6 +32,9 @@ void slam::begin_evidence(bool own_frame) {
   evidence_.begin(own_frame ? kOwnFrame : kStated);
   observations_.clear();
   fit_ns_ = WM_TIME_NONE;
+  pattern_odds_.reset(kOwnFrame);
+  pattern_ns_ = WM_TIME_NONE;
+  line_search_.clear();
 }
 
 bool slam::map_is_held() const { return state_ != WM_STATE_TRACKING || evidence_.log_odds() > kHoldMap; }
@@ -88,6 +91,7 @@ double slam::clutter_volume(bool bearing, bool range) {
 void slam::lose() {
   state_ = WM_STATE_LOST;
   lost_ns_ = inflated_ns_ = joint_.now_ns();
+  line_search_.clear();
   for (int i = joint_.landmarks() - 1; i >= 0 && fit_ns_ != WM_TIME_NONE; i--)
     if (const landmark_note &note = notes()[i]; !is_witness(note) && note.first_ns > fit_ns_) drop_landmark(i);
   forget_lines();
@@ -170,7 +174,7 @@ bool slam::relocalize() {
 void slam::take_found() {
   state_ = WM_STATE_TRACKING;
   forget_lines();
-  begin_evidence(false);
+  begin_evidence(params_.line_rejoin);  // no identity proves a pose found by a pattern
   fused_ns_ = joint_.now_ns();
   resets_++;
 }

@@ -207,7 +207,9 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
     keep_observation(landmark, s.sensor, past, sighted_of(s, r));
     if (relocalize()) return drop(WM_REJECTED_SEARCHING);
   }
-  if (state_ == WM_STATE_SEARCHING) return drop(WM_REJECTED_SEARCHING);
+  if (params_.line_rejoin && r.bearing && !r.range) collect_bearing(s, past);
+  if (state_ == WM_STATE_SEARCHING || (state_ == WM_STATE_LOST && params_.line_rejoin))
+    return drop(WM_REJECTED_SEARCHING);
   const bool may_join = params_.map != WM_SLAM_MAP_FROZEN && r.bearing && (r.range || params_.line_clones > 0);
   if (landmark >= 0)
     fuse_known(landmark, s, r, past, blank, records);

@@ -176,6 +176,8 @@ void slam::start_again() {
   const bool given = params_.map != WM_SLAM_MAP_NONE;
   state_ = given && params_.recover && !(place && heading) ? WM_STATE_SEARCHING : WM_STATE_TRACKING;
   begin_evidence(!given);
+  bearings_.count = 0;
+  usual_share_ = 0.0;
   searched_ns_ = WM_TIME_NONE;
   candidate_.id = lone_.id = rests_on_ = -1;
   one_refuted_ = false;
@@ -283,7 +285,9 @@ void slam::estimate(wm_estimate *out) const {
   const bool fresh =
       fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, joint_.now_ns()) <= params_.dead_reckoning_after_s;
   out->state = (uint8_t)(state_ != WM_STATE_TRACKING ? state_ : fresh ? WM_STATE_TRACKING : WM_STATE_DEAD_RECKONING);
-  out->lost_probability = state_ == WM_STATE_SEARCHING ? 1.0 : evidence_.probability();
+  out->lost_probability = state_ == WM_STATE_SEARCHING ? 1.0
+                          : params_.line_rejoin        ? pattern_odds_.probability()
+                                                       : evidence_.probability();
   if (state_ != WM_STATE_TRACKING) widen(out);
 }
 

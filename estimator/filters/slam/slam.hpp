@@ -6,6 +6,7 @@
 #include "filters/core/landmark_evidence.hpp"
 #include "filters/core/record_list.hpp"
 #include "filters/core/state_pool.hpp"
+#include "filters/relocalize/line_search.hpp"
 #include "filters/relocalize/pose_search.hpp"
 #include "filters/slam/bearing_tracks.hpp"
 #include "filters/slam/joint_state.hpp"
@@ -239,6 +240,12 @@ class slam {
   void take_found();
   void open_gates();
   void widen(wm_estimate *out) const;
+  // pattern.cpp
+  landmark_places places() const;
+  void collect_bearing(const wm_sighting &s, const past_pose &past);
+  void end_bearings(wm_time_ns t_ns);
+  void weigh_pattern(wm_time_ns t_ns);
+  void search_pattern();
   void follow_scale();
   void load_map();
   void forget_tracks();
@@ -274,6 +281,13 @@ class slam {
   pose_search observations_;  // since the map is held
   wm_time_ns fit_ns_;         // when a witness fitted last
   wm_time_ns lost_ns_, searched_ns_, inflated_ns_;
+  bearing_look bearings_;  // of the newest look, where lines have no identity
+  wm_pose2 bearings_odom_;
+  int bearings_sensor_;
+  line_search line_search_;
+  evidence pattern_odds_;
+  double usual_share_;  // of a look's bearings that the map explains
+  wm_time_ns pattern_ns_;
   seen_marker candidate_;  // the one that was seen first; its id is -1: none
   lone_marker lone_;       // its id is -1: none
   int32_t rests_on_;       // the one marker by which the pose was found, until another is fused; else -1

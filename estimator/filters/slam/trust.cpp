@@ -48,6 +48,7 @@ void slam::note_turn(bool fused, double innovation_rad, bool of_print, wm_time_n
 // robot was turned, by a wheel that slipped or by hand. Its pose is as unsure as that; what is false is not alike.
 void slam::begin_look(wm_time_ns t_ns) {
   if (t_ns == look_.t_ns) return;
+  end_bearings(t_ns);
   const double least = look_.of_prints ? kPrintTurn_rad : 0.0;
   int most = 0;
   double turn = 0.0;

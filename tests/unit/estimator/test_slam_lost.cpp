@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // SLAM and the kidnapped robot: the state LOST, the map held meanwhile, the pose found on it.
+#include "filters/relocalize/line_search.hpp"
 #include "slam_room.hpp"
 
 using namespace room;
@@ -108,6 +109,34 @@ void test_large_identities_keep_their_slots(void) {
   TEST_ASSERT_TRUE(std::isfinite(sigma()));
 }
 
+// GIVEN twenty lines of which nobody knows which is which THEN one look's pattern gives the pose; bearings of nothing
+// give none.
+void test_a_pattern_of_lines_gives_the_pose(void) {
+  double line[20][2];
+  for (auto &l : line)
+    for (double &at : l) at = 10.0 * wm_random_next_uniform(&noise) - 5.0;
+  const wm::landmark_places map = {line[0], 20, 2};
+  for (int false_of_20 : {0, 5, 20}) {
+    const wm_pose2 pose = {1.0, -0.7, 2.0}, odom = {4.0, 3.0, -1.0};
+    wm::bearing_look look = {20, {}, {0.1, 0, 0.3}};
+    const wm_pose2 eye = wm::compose(pose, look.sensor);
+    for (int i = 0; i < 20; i++)
+      look.bearing_rad[i] =
+          i < false_of_20 ? gauss(2.0)
+                          : wm::atan2(line[i][1] - eye.y_m, line[i][0] - eye.x_m) - eye.heading_rad + gauss(0.003);
+    wm::line_search search;
+    search.clear();
+    wm::line_search_result found{};
+    for (int i = 0; i < 40 && !found.found; i++) found = search.step(look, odom, map);
+    TEST_ASSERT_EQUAL(false_of_20 < 20, found.found);
+    if (!found.found) continue;
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, pose.x_m, found.pose.x_m);
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, pose.y_m, found.pose.y_m);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, pose.heading_rad, found.pose.heading_rad);
+    TEST_ASSERT_TRUE(found.covariance[0][0] > 0.0 && found.covariance[0][0] < 0.01);
+  }
+}
+
 int main() {
   UNITY_BEGIN();
   RUN_TEST(test_kidnapped_among_landmarks);
@@ -116,6 +145,7 @@ int main() {
   RUN_TEST(test_a_moved_landmark_is_not_a_lost_robot);
   RUN_TEST(test_starts_without_a_pose_on_a_given_map);
   RUN_TEST(test_recovery_can_be_switched_off);
+  RUN_TEST(test_a_pattern_of_lines_gives_the_pose);
   RUN_TEST(test_large_identities_keep_their_slots);
   return UNITY_END();
 }
