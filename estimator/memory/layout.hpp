@@ -32,6 +32,21 @@ class memory_layout {
   size_t used_ = 0;
 };
 
+// A pointer into the block of memory that holds it, kept as a distance from itself: a copy of the whole block is
+// complete, wherever it lies.
+template <typename item>
+class relative_array {
+ public:
+  void set(item *at) { offset_ = reinterpret_cast<char *>(at) - reinterpret_cast<char *>(this); }
+  item *get() { return reinterpret_cast<item *>(reinterpret_cast<char *>(this) + offset_); }
+  const item *get() const { return reinterpret_cast<const item *>(reinterpret_cast<const char *>(this) + offset_); }
+  item &operator[](size_t i) { return get()[i]; }
+  const item &operator[](size_t i) const { return get()[i]; }
+
+ private:
+  std::ptrdiff_t offset_;
+};
+
 }  // namespace wm
 
 #endif

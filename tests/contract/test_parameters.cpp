@@ -20,13 +20,8 @@ using parameters::stage;
 using parameters::trace;
 using parameters::values;
 
-// Dead today; whoever gives them an effect, or removes them, takes them off.
-const std::vector<std::string> kKnown = {
-    "landmark_ekf.states.sensor_yaw_walk_rad",
-    "landmark_ekf.states.range_scale_walk",
-    "slam.states.wheel_difference_sigma",
-    "slam.states.wheel_difference_walk",
-};
+// No parameter may be without effect.
+const std::vector<std::string> kKnown = {};
 
 struct freed {
   void operator()(void *memory) const { std::free(memory); }
@@ -120,7 +115,7 @@ const std::vector<setting> kMotionStates = {
 const std::vector<setting> kSensorStates = {
     {"states.sensor_yaw_sigma_rad", 0.05},       {"states.sensor_xy_sigma_m", 0.05},
     {"states.sensor_time_offset_sigma_s", 0.05}, {"states.range_bias_sigma_m", 0.1},
-    {"states.range_scale_sigma", 0.05},
+    {"states.range_scale_sigma", 0.05},          {"states.sensor_angle_scale_sigma", 0.02},
 };
 const std::vector<setting> kLasting = {
     {"lasting.slots", 6},      {"lasting.bearing_rad", 0.01}, {"lasting.lateral_m", 0.03},
@@ -186,6 +181,15 @@ std::vector<scenario> scenarios() {
        {{"gate.associate_unknown", 1}, {"noise.lateral_m", 0.03}, {"noise.range_rel", 0.02}},
        {},
        {"gate."}},
+      {"landmark_ekf",
+       "depths",
+       motion::twist,
+       kBearings | kRanges,
+       kDepth,
+       15,
+       {{"states.depth_axis_sigma_rad", 0.02}, {"states.sensor_yaw_sigma_rad", 0.02}},
+       {},
+       {"states.depth_axis"}},
       {"landmark_ekf",
        "elevations",
        motion::twist,

@@ -1,12 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-// States that are lent to what was seen last: a fixed number of slots, each with a key; the one not used for longest is
-// given to a new key.
-#ifndef WAYMARK_ESTIMATOR_SLOTS_HPP
-#define WAYMARK_ESTIMATOR_SLOTS_HPP
+// A pool of states that are lent to what was seen last: a fixed number of slots, each with a key. A new key takes the
+// slot that was not used for longest.
+#ifndef WAYMARK_ESTIMATOR_CORE_STATE_POOL_HPP
+#define WAYMARK_ESTIMATOR_CORE_STATE_POOL_HPP
 
+#include <cstdint>
+
+#include "math/elementary.hpp"
 #include "waymark/time.h"
 
 namespace wm {
+
+// Factor by which a Gauss-Markov process decays over an interval; 1 where that lies behind.
+inline double decay_over(wm_time_ns from_ns, wm_time_ns to_ns, double tau_s) {
+  const double left = exp(-wm_seconds_between(from_ns, to_ns) / tau_s);
+  return left < 1.0 ? left : 1.0;
+}
+
+// Carries a state of a filter with fade() on as a Gauss-Markov process about 0 with this stationary variance.
+template <class Filter>
+void decay_state(Filter *filter, int state, double left, double variance) {
+  if (left < 1.0) filter->fade(state, left, (1.0 - left * left) * variance);
+}
 
 template <int kCapacity>
 class state_pool {
@@ -24,7 +39,7 @@ class state_pool {
     for (int i = 0; i < count_; i++) slot_[i].key = -1, slot_[i].used_ns = WM_TIME_NONE;
   }
 
-  // The slot of `key`; *fresh says that it was another's. Null where there are no slots.
+  // The slot of `key`; *fresh: it was free or another key's. Null where there are no slots.
   slot *take(int64_t key, bool *fresh) {
     slot *oldest = nullptr;
     for (int i = 0; i < count_; i++) {
@@ -39,6 +54,24 @@ class state_pool {
       *fresh = true;
     }
     return oldest;
+  }
+
+  // Lends `width` states of unit variance to `key`: time-correlated errors (Gauss-Markov, time constant tau_s), carried
+  // on to t_ns. Returns the first state; -1 where there are no slots.
+  template <class Filter>
+  int lend(Filter *filter, int64_t key, int width, double tau_s, wm_time_ns t_ns) {
+    bool fresh;
+    slot *lent = take(key, &fresh);
+    if (!lent) return -1;
+    const double left = fresh ? 0.0 : decay_over(lent->used_ns, t_ns, tau_s);
+    for (int k = 0; k < width; k++) {
+      if (fresh)
+        filter->forget(lent->state + k, 0.0, 1.0);
+      else
+        decay_state(filter, lent->state + k, left, 1.0);
+    }
+    lent->used_ns = t_ns;
+    return lent->state;
   }
 
  private:

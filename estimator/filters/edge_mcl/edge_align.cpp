@@ -273,7 +273,7 @@ void edge_mcl::describe(const normal_equations &scan, const belief &prior, const
   if (!(known > 0.0)) return;
   const double aslant = scan.information[kAlignX][kAlignY] / known, length = std::sqrt(1.0 + aslant * aslant);
   double innovation = scan.gradient[best] / known;
-  sparse_row row;
+  planar_row row;
   for (int i = 0; i < n; i++) {
     const int state = a.state[index[i]];
     double off = a.value[index[i]] - filter_.value(state);
@@ -345,7 +345,7 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
   const int kept_to = odds_lost() > kDoubtOdds ? filter_.states() : kPoseStates;
   for (int i = 0; i < n; i++) {
     if (!(d[i] > 0.0)) continue;
-    sparse_row row;
+    planar_row row;
     double innovation = forward[i] / d[i];
     for (int j = i; j < n; j++) {
       const int state = a.state[index[j]];
@@ -356,7 +356,7 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
     }
     projection projected;
     filter_.project(row, &projected);
-    filter_.update(projected, innovation, 1.0 / d[i], kPoseStates, kept_to);
+    (void)filter_.update(projected, innovation, 1.0 / d[i], kPoseStates, kept_to);
   }
   for (int k = 1; k < found.count; k++)
     if (chance[k] > kLeastChance) filter_.add_chance(chance[k], elsewhere[k]);

@@ -35,7 +35,13 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   std::memset(static_cast<void *>(this), 0, sizeof *this);
   setup_ = &setup;
   params_ = params;
-  filter_.init(setup, params.motion);
+  const int cameras = setup.rig ? static_cast<int>(setup.rig->camera_count) : 0;
+  const int each_camera = (params.pitch_sigma_rad > 0.0) + (params.roll_sigma_rad > 0.0) +
+                          (params.yaw_sigma_rad > 0.0) + (params.height_sigma_m > 0.0) +
+                          (params.time_offset_sigma_s > 0.0);
+  filter_.init(setup, params.motion,
+               kPoseStates + planar_filter::count_motion_states(params.motion) + (params.edge_offset_sigma_m > 0.0) +
+                   each_camera * cameras);
   const auto add = [this](double sigma) { return sigma > 0.0 ? filter_.add_state(0.0, sigma) : -1; };
   edge_state_ = add(params.edge_offset_sigma_m);
   camera_count_ = setup.rig ? (int)setup.rig->camera_count : 0;

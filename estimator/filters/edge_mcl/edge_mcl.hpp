@@ -16,6 +16,9 @@
 
 namespace wm {
 
+// Pose, motion, the edges' common offset, and five errors of each of two cameras.
+inline constexpr int kMaxEdgeStates = kPoseStates + kCalibrationCount + 2 + 1 + 2 * 5;
+
 class edge_mcl {
  public:
   static constexpr int kCamerasMax = 2;
@@ -98,7 +101,7 @@ class edge_mcl {
 
   const wm_setup *setup_;
   wm_edge_mcl_params params_;
-  planar_filter filter_;
+  planar_filter_of<kMaxEdgeStates> filter_;
   edge_map map_;
   slack_points lined_;  // those that lie on a line with their neighbours
   place_search search_;

@@ -7,6 +7,7 @@ typedef struct wm_edge_mcl_params params;
 
 static const wm_param kParams[] = {
     WM_MOTION_STATE_PARAMS(params, motion),
+    WM_WHEEL_HEADING_PARAMS(params, motion),
     F64("states.pitch_sigma_rad", pitch_sigma_rad, 0.01, 0, 0.5,
         "Start sigma of each camera's pitch about calibration.yaml's, rad. 0.1 degrees are 7 cm of floor at 4 m. 0: "
         "off."),

@@ -11,14 +11,12 @@
 namespace wm {
 namespace {
 
-constexpr const char *kSensorStateNames[] = {"yaw_rad",     "x_m",           "y_m",          "roll_rad",   "pitch_rad",
-                                             "angle_scale", "time_offset_s", "range_bias_m", "range_scale"};
+constexpr double kStartWrong = -2.5;   // log odds that a stated pose is wrong: one in twelve
+constexpr double kDoubtedStart = 0.1;  // below this probability a stated start is published as it was stated
+constexpr double kAround_m = 5.0;      // a lost robot is among the landmarks, or within this of them
 
-constexpr double kStartWrong = -2.5;   // what somebody says of the pose is wrong in one of twelve cases, as log odds
-constexpr double kDoubtedStart = 0.1;  // below, a stated start is published as it was stated
-constexpr double kAround_m = 5.0;      // a lost robot is among the landmarks or so near to them
-
-int lasting_states(const wm_landmark_ekf_params &p) {
+// States of one slot of a time-correlated error.
+int error_states(const wm_landmark_ekf_params &p) {
   if (p.lasting_slots == 0) return 0;
   return (p.lasting_bearing_rad > 0.0 || p.lasting_lateral_m > 0.0) +
          (p.lasting_range_m > 0.0 || p.lasting_range_rel > 0.0);
@@ -27,77 +25,14 @@ int lasting_states(const wm_landmark_ekf_params &p) {
 int map_states(const wm_landmark_ekf_params &p) { return p.use_elevation ? 3 : 2; }
 
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
-  const int each_sensor = (p.sensor_yaw_sigma_rad > 0.0) + 2 * (p.sensor_xy_sigma_m > 0.0) +
-                          2 * (p.sensor_tilt_sigma_rad > 0.0) + (p.sensor_angle_scale_sigma > 0.0) +
-                          (p.sensor_time_offset_sigma_s > 0.0) + (p.range_bias_sigma_m > 0.0) +
-                          (p.range_scale_sigma > 0.0);
-  return kPoseStates + planar_filter::count_motion_states(p.motion) + each_sensor * (int)setup.sensor_count +
-         (p.gnss_time_offset_sigma_s > 0.0) + 2 * (p.gnss_lasting_m > 0.0) + p.lasting_slots * lasting_states(p) +
-         map_states(p) * p.map_slots + 2 * (p.use_elevation && p.tilt_sigma_rad > 0.0);
+  return kPoseStates + planar_filter::count_motion_states(p.motion) +
+         sensor_slots::count(p.sensor_states, setup.sensor_count) + (p.gnss_time_offset_sigma_s > 0.0) +
+         2 * (p.gnss_lasting_m > 0.0) + p.lasting_slots * error_states(p) + map_states(p) * p.map_slots +
+         2 * (p.use_elevation && p.tilt_sigma_rad > 0.0);
 }
 
-}  // namespace
-
-size_t landmark_ekf::bytes(const wm_landmark_ekf_params &params, const wm_setup &setup, const char **why) {
-  if (setup.sensor_count > kMaxSensors) {
-    *why = "landmark_ekf takes at most 16 sensors";
-    return 0;
-  }
-  if (count_states(params, setup) > kMaxStates) {
-    *why =
-        "landmark_ekf holds at most 64 states: pose 3, one for each states.*_sigma that is not 0 (those of sensors "
-        "once for each sensor), one or two for each of lasting.slots, two for each of states.map_slots (three with "
-        "use.elevation, and two for the tilt), two for lasting.gnss_m; lower lasting.slots or states.map_slots";
-    return 0;
-  }
-  return sizeof(landmark_ekf) + setup.landmark_count * (sizeof(int) + sizeof(landmark_record));
-}
-
-void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &setup) {
-  std::memset(static_cast<void *>(this), 0, sizeof *this);
-  setup_ = &setup;
-  params_ = params;
-  filter_.init(setup, params.motion);
-  const auto add = [this](double value, double sigma) { return sigma > 0.0 ? filter_.add_state(value, sigma) : -1; };
-  for (size_t i = 0; i < setup.sensor_count; i++) {
-    sensor_[i].init(setup.sensors[i]);
-    sensor_state_[i][kYaw] = add(0.0, params.sensor_yaw_sigma_rad);
-    sensor_state_[i][kMountX] = add(0.0, params.sensor_xy_sigma_m);
-    sensor_state_[i][kMountY] = add(0.0, params.sensor_xy_sigma_m);
-    sensor_state_[i][kRoll] = add(0.0, params.sensor_tilt_sigma_rad);
-    sensor_state_[i][kPitch] = add(0.0, params.sensor_tilt_sigma_rad);
-    sensor_state_[i][kAngleScale] = add(0.0, params.sensor_angle_scale_sigma);
-    sensor_state_[i][kTimeOffset] = add(0.0, params.sensor_time_offset_sigma_s);
-    sensor_state_[i][kRangeBias] = add(0.0, params.range_bias_sigma_m);
-    sensor_state_[i][kRangeScale] = add(1.0, params.range_scale_sigma);
-  }
-  gnss_time_state_ = add(0.0, params.gnss_time_offset_sigma_s);
-  gnss_lasting_state_ = add(0.0, params.gnss_lasting_m);
-  if (gnss_lasting_state_ >= 0) add(0.0, params.gnss_lasting_m);
-  gnss_lasting_ns_ = WM_TIME_NONE;
-  calibration_states_ = filter_.states();
-  lasting_bearing_offset_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
-  lasting_range_offset_ =
-      params.lasting_range_m > 0.0 || params.lasting_range_rel > 0.0 ? (lasting_bearing_offset_ >= 0 ? 1 : 0) : -1;
-  for (int i = 0; i < params.lasting_slots && lasting_states(params) > 0; i++) {
-    lasting_.add(filter_.states());
-    for (int k = 0; k < lasting_states(params); k++) filter_.add_state(0.0, 1.0);
-  }
-  for (int i = 0; i < params.map_slots; i++) {
-    map_.add(filter_.states());
-    for (int k = 0; k < map_states(params); k++) filter_.add_state(0.0, 0.0);
-  }
-  tilt_state_ = params.use_elevation ? add(0.0, params.tilt_sigma_rad) : -1;
-  if (tilt_state_ >= 0) add(0.0, params.tilt_sigma_rad);
-  tilt_ns_ = WM_TIME_NONE;
-  // Landmarks by rising id, for the search by halves. Insertion: once, at the start.
-  int *order = landmark_order();
-  for (int i = 0; i < (int)setup.landmark_count; i++) {
-    int at = i;
-    for (; at > 0 && setup.landmarks[order[at - 1]].id > setup.landmarks[i].id; at--) order[at] = order[at - 1];
-    order[at] = i;
-  }
-  std::memset(landmark_records(), 0, setup.landmark_count * sizeof(landmark_record));
+// Variance of a place anywhere among the landmarks, each axis, m2.
+double spread_of(const wm_setup &setup) {
   double low[2] = {0, 0}, high[2] = {0, 0};
   for (size_t i = 0; i < setup.landmark_count; i++)
     for (int k = 0; k < 2; k++) {
@@ -105,32 +40,86 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
       if (i == 0 || p < low[k]) low[k] = p;
       if (i == 0 || p > high[k]) high[k] = p;
     }
-  map_variance_m2_ = square(kAround_m) + (square(high[0] - low[0]) + square(high[1] - low[1])) / 12.0;
+  return square(kAround_m) + (square(high[0] - low[0]) + square(high[1] - low[1])) / 12.0;
+}
+
+}  // namespace
+
+landmark_ekf::arrays landmark_ekf::place(memory_layout *layout, const wm_landmark_ekf_params &params,
+                                         const wm_setup &setup) {
+  return {layout->take<double>(planar_filter::doubles(count_states(params, setup))),
+          layout->take<int>(setup.landmark_count), layout->take<landmark_record>(setup.landmark_count)};
+}
+
+size_t landmark_ekf::bytes(const wm_landmark_ekf_params &params, const wm_setup &setup, const char **why) {
+  if (setup.sensor_count > kMaxSensors) {
+    *why = "landmark_ekf takes at most 16 sensors";
+    return 0;
+  }
+  memory_layout layout(nullptr, sizeof(landmark_ekf));
+  place(&layout, params, setup);
+  return layout.bytes();
+}
+
+void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &setup) {
+  std::memset(static_cast<void *>(this), 0, sizeof *this);
+  setup_ = &setup;
+  params_ = params;
+  memory_layout layout(this, sizeof *this);
+  const arrays behind = place(&layout, params, setup);
+  filter_.init(setup, params.motion, count_states(params, setup), behind.filter);
+  const auto add = [this](double value, double sigma) { return sigma > 0.0 ? filter_.add_state(value, sigma) : -1; };
+  for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
+  slots_.init(params.sensor_states, setup.sensor_count,
+              [this](double value, double sigma, double walk, double low, double high) {
+                return filter_.add_sensor_state(value, sigma, walk, low, high);
+              });
+  components_ = params.sensor_states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
+  gnss_time_state_ = add(0.0, params.gnss_time_offset_sigma_s);
+  gnss_error_state_ = add(0.0, params.gnss_lasting_m);
+  if (gnss_error_state_ >= 0) add(0.0, params.gnss_lasting_m);
+  gnss_error_ns_ = tilt_ns_ = WM_TIME_NONE;
+  calibration_states_ = filter_.states();
+  bearing_error_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
+  range_error_ = params.lasting_range_m > 0.0 || params.lasting_range_rel > 0.0 ? (bearing_error_ >= 0 ? 1 : 0) : -1;
+  error_width_ = error_states(params);
+  for (int i = 0; i < params.lasting_slots && error_width_ > 0; i++) {
+    errors_.add(filter_.states());
+    for (int k = 0; k < error_width_; k++) filter_.add_state(0.0, 1.0);
+  }
+  for (int i = 0; i < params.map_slots; i++) {
+    map_.add(filter_.states());
+    for (int k = 0; k < map_states(params); k++) filter_.add_state(0.0, 0.0);
+  }
+  tilt_state_ = params.use_elevation ? add(0.0, params.tilt_sigma_rad) : -1;
+  if (tilt_state_ >= 0) add(0.0, params.tilt_sigma_rad);
+  index_.init(setup.landmarks, setup.landmark_count, behind.order);
+  records_.set(behind.records);
+  std::memset(behind.records, 0, setup.landmark_count * sizeof(landmark_record));
+  map_variance_m2_ = spread_of(setup);
   moved_id_ = -1;
-  remembered_ns_ = WM_TIME_NONE;
-  remember_calibration(WM_TIME_NONE);
-  fused_ns_ = lost_ns_ = searched_ns_ = weighed_ns_ = inflated_ns_ = loosened_ns_ = found_ns_ = vague_ns_ =
-      WM_TIME_NONE;
+  rollback_.begin(filter_, kPoseStates, calibration_states_);
+  weighed_ns_ = loosened_ns_ = vague_ns_ = WM_TIME_NONE;
+  life_ = {};
   start_again();
 }
 
-// Known start: track from it. Unknown: what is known of it becomes a seen for the search.
-void landmark_ekf::start_again() {
-  const wm_start &start = setup_->start;
+// A pose that was stated, or none: what was observed before no longer counts.
+void landmark_ekf::begin_life(bool pose_known) {
+  life_.begin(pose_known);
   evidence_.begin(kStartWrong);
   observations_.clear();
   prior_count_ = 0;
-  resets_++;
-  state_ = start_is_known(start) ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
   start_trial_.close();
-  if (state_ == WM_STATE_TRACKING) {
-    try_start();
-    return;
-  }
-  observation seen{};
-  seen.t_ns = filter_.now_ns();
-  seen.key = -1;
-  seen.sensor = filter_.odom();
+  if (pose_known) try_start();
+}
+
+// Known start: track from it. Unknown: the known part of it becomes an observation for the search.
+void landmark_ekf::start_again() {
+  const wm_start &start = setup_->start;
+  begin_life(start_is_known(start));
+  if (life_.tracking()) return;
+  observation seen = observation_at(filter_.now_ns(), -1, filter_.odom());
   seen.travelled_m = filter_.travelled_m();
   seen.turned_rad = filter_.turned_rad();
   const bool place = finite(start.p_m[0]) && finite(start.p_m[1]), heading = finite(start.heading_rad);
@@ -184,25 +173,17 @@ wm_status landmark_ekf::take_pose(const wm_event &event) {
     return status;
   }
   const wm_status status = set_pose(filter_, event);
-  if (status != WM_OK) return status;
-  evidence_.begin(kStartWrong);
-  observations_.clear();
-  prior_count_ = 0;
-  resets_++;
-  state_ = WM_STATE_TRACKING;
-  try_start();
-  return WM_OK;
+  if (status == WM_OK) begin_life(true);
+  return status;
 }
 
 void landmark_ekf::estimate(wm_estimate *out) const {
   filter_.estimate(out);
-  out->resets = resets_;
-  const bool fresh =
-      fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, filter_.now_ns()) <= params_.dead_reckoning_after_s;
-  out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
+  out->resets = life_.resets();
+  out->state = life_.state(filter_.now_ns(), params_.dead_reckoning_after_s);
   out->lost_probability = lost_probability();
-  if (state_ == WM_STATE_LOST) widen(out);
-  if (state_ == WM_STATE_TRACKING) mix_start(out);
+  if (life_.lost()) widen(out);
+  if (life_.tracking()) mix_start(out);
 }
 
 // Lost, the pose may be anywhere with the probability of being lost.
@@ -213,8 +194,8 @@ void landmark_ekf::widen(wm_estimate *out) const {
   out->covariance[wm_cov_index(5, 5)] += p * square(kPi) / 3.0;
 }
 
-// Not sure of the start, it is here or there: the covariance of both together about what is published. Gates keep the
-// filter's own.
+// While a stated start is in doubt, the covariance of the mixture of both hypotheses about the published pose. Gates
+// keep the filter's own.
 void landmark_ekf::mix_start(wm_estimate *out) const {
   const double p = start_trial_.off();
   if (p < kDoubtedStart) return;
@@ -233,12 +214,9 @@ void landmark_ekf::mix_start(wm_estimate *out) const {
 size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
   calibration_list list(out, capacity);
   filter_.list_motion_states(&list);
-  const auto add = [&](const char *whose, const char *what, int state) {
-    if (state >= 0) list.add(whose, what, filter_.value(state), std::sqrt(filter_.variance(state)));
-  };
-  for (size_t i = 0; i < setup_->sensor_count; i++)
-    for (int k = 0; k < kSensorStates; k++) add(setup_->sensors[i].name, kSensorStateNames[k], sensor_state_[i][k]);
-  add("gnss", "time_offset_s", gnss_time_state_);
+  slots_.list(*setup_, filter_, &list);
+  if (gnss_time_state_ >= 0)
+    list.add("gnss", "time_offset_s", filter_.value(gnss_time_state_), std::sqrt(filter_.variance(gnss_time_state_)));
   return list.count();
 }
 

@@ -1,18 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-// The landmark filter of system 1 with self-calibration, lasting errors and recovery. docs/estimators.md has the model.
+// The landmark filter of system 1 [Stepanov2017] with self-calibration, time-correlated errors and relocalization.
+// docs/estimators.md has the model. One observation's way: correct() -> fuse_sighting() -> associate() -> expect() ->
+// sighting_rows() -> fuse() -> planar_filter::update() -> note().
 #ifndef WAYMARK_ESTIMATOR_LANDMARK_EKF_HPP
 #define WAYMARK_ESTIMATOR_LANDMARK_EKF_HPP
 
 #include <cmath>
 
+#include "filters/core/gate.hpp"
 #include "filters/core/landmark_evidence.hpp"
-#include "filters/core/record_list.hpp"
+#include "filters/core/lifecycle.hpp"
+#include "filters/core/rollback.hpp"
+#include "filters/core/sensor_slots.hpp"
 #include "filters/core/state_pool.hpp"
 #include "filters/landmark_ekf/params.h"
 #include "filters/landmark_ekf/start_trial.hpp"
+#include "filters/planar/past_pose.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "filters/relocalize/pose_search.hpp"
-#include "sensors/sensor_model.hpp"
+#include "maps/landmark_index.hpp"
+#include "memory/layout.hpp"
+#include "sensors/sighting.hpp"
 
 namespace wm {
 
@@ -30,118 +38,123 @@ class landmark_ekf {
   uint32_t motion_health() const { return filter_.motion_health(); }
 
  private:
-  // What was known of the sensors while the observations still fitted: two generations, of which the older one is safe,
-  // and the start's.
-  struct calibration_memory {
-    double value[kMaxStates], variance[kMaxStates];
-  };
+  static constexpr int kErrorSlots = 24, kMapSlots = 16;  // most of lasting.slots and states.map_slots
+  static constexpr int kGnssStates = 3;                   // time offset, time-correlated error on each axis
+  static constexpr int kMaxCalibration =
+      kCalibrationCount + 2 + kMaxSensors * kSensorStates + kGnssStates;  // 2: the wheels' heading
+  static_assert(kPoseStates + kMaxCalibration + 2 * kErrorSlots + 3 * kMapSlots + 2 <= kMaxStates);
 
-  enum sensor_state {
-    kYaw,
-    kMountX,
-    kMountY,
-    kRoll,
-    kPitch,
-    kAngleScale,
-    kTimeOffset,
-    kRangeBias,
-    kRangeScale,
-    kSensorStates
-  };
+  static_assert(kMaxSensors * kSensorStates <= kMaxSensorStates);
+  // Pose, sensor, time-correlated error, landmark, tilt.
+  static_assert(kPoseStates + kSensorStates + 1 + 3 + 2 <= planar_row::kMax);
 
-  // The pose when an observation was true, `age` before its stamp, and what moves it.
-  struct past_pose {
-    wm_pose2 pose;            // base_link in map
-    wm_pose2 odom;            // the same in the odometry's frame
-    double lever_x, lever_y;  // from now's position to it: what a heading error now makes of it
-    double age_by[3];         // of x, y, heading by the time offset
+  // A sighting on its way to the update: what is fused of it, of which landmark, and the pose at its time.
+  struct sighting_context {
+    const wm_sighting *s;
+    sighting_reading reading;
+    bool elevation;  // fused
+    int landmark;    // index in the map
+    past_pose past;
   };
-  past_pose look_back(double age_s) const;
-  static void add_pose(sparse_row &row, const double by[3], const past_pose &past, int time_state);
+  // One component of an observation.
+  struct residual {
+    planar_row row;
+    double innovation, noise;
+    wm_innovation record;
+  };
+  // The slots of the time-correlated error of this sensor on this landmark, and of the landmark's error on the map;
+  // -1: none.
+  struct lent_slots {
+    int error, map;
+  };
 
   wm_status fuse_sighting(const wm_event &event, record_list records);
   wm_status fuse_position(const wm_event &event, record_list records);
   wm_status fuse_heading(const wm_event &event, record_list records);
   wm_status take_pose(const wm_event &event);
 
-  // Gates one or two numbers jointly, weakens or rejects, updates, writes the records. Returns how much it speaks
-  // against the pose (landmark_evidence::log_bayes_factor), `room` being where the numbers could lie.
-  struct residual {
-    sparse_row row;
-    double innovation, noise;
-    wm_innovation record;
-  };
-  // `believed`: false refuses it whatever it says.
-  double fuse(residual *residuals, int count, double room, bool believed, record_list records);
+  // Whether a sighting is to be fused (WM_FUSED), and with which landmark.
+  wm_verdict associate(const wm_event &event, sighting_context *out);
+  int associate_nearest(const sighting_context &at);
+  lent_slots lend_states(int sensor, int landmark, wm_time_ns t_ns);
+  // The rows of a sighting: bearing, then range or elevation. Returns how many.
+  int sighting_rows(const sighting_context &at, const expected_sighting &e, const wm_innovation &record,
+                    residual rows[2]);
+  void add_errors(const sighting_context &at, const lent_slots &lent, const double by[kCauses], int error_offset,
+                  double error_size, residual *r) const;
+  void finish_row(wm_residual kind, double observed, double expected, const wm_innovation &record, residual *r) const;
+  void decay_tilt(wm_time_ns t_ns);
+  void decay_gnss_error(wm_time_ns t_ns);
 
+  // Gates one or two components jointly, weakens or rejects, updates, writes the records. Returns the log Bayes factor
+  // of "anywhere in clutter_volume" against "as expected". `usable` false: the source is known to be wrong.
+  double fuse(residual *rows, int count, double clutter_volume, bool usable, record_list records);
+  wm_verdict update(residual *rows, int count, const gate_result &g, projection *first, double cross);
+  bool passes(const gate_result &g, int dof) const;
   void fuse_elevation(residual bearing_then_own[2], const double *before, record_list records);
 
   double map_sigma(int landmark) const;
-  int find_landmark(int32_t id) const;
-  struct sighting_sigmas {
-    double bearing_rad, range_m;
-  };
-  int associate(const wm_event &event, const sighting_sigmas &sigmas, const past_pose &past);
-  void lend_states(int sensor, int landmark, wm_time_ns t_ns, int *lasting, int *map);
-  double sensor_value(int sensor, int which, double neutral) const;
-  sensor_errors errors_of(int sensor) const;
-  void sway(wm_time_ns t_ns);
-  sensor_errors remembered_errors_of(int sensor) const;
-  const calibration_memory &memory_to_trust() const;
-  void add_mounting(sparse_row &row, int sensor, const double by[kCauses]) const;
+  const sensor_errors errors_of(int sensor) const;
+  const sensor_errors remembered_errors_of(int sensor) const;
+  double time_offset(int sensor) const;
 
-  // Recovery.
-  void note(wm_time_ns t_ns, int witness, double against, double angle_rad = NAN, double normalised = NAN);
+  // Relocalization (recovery.cpp).
+  observation observation_of(const sighting_context &at, wm_time_ns t_ns) const;
+  observation observation_at(wm_time_ns t_ns, int key, const wm_pose2 &sensor_in_odom) const;
   void buffer_observation(const observation &seen);
+  void note(wm_time_ns t_ns, int key, double log_bayes, double angle_rad = NAN, double normalised = NAN);
+  void mend(wm_time_ns t_ns);
   bool is_sought(wm_time_ns t_ns, bool by_bearing);
   void seek(wm_time_ns t_ns);
   void search(wm_time_ns since_ns, const observation *prior, int prior_count);
+  void begin_life(bool pose_known);
+  void start_again();
   void try_start();
   void weigh_start(wm_time_ns t_ns);
   double lost_probability() const;
-  void remember_calibration(wm_time_ns t_ns);
+  rollback<kMaxCalibration>::generation trusted_generation() const;
   void restore_calibration();
-  void start_again();
-
   wm_time_ns elsewhere_since(wm_time_ns t_ns);
   bool is_elsewhere(wm_time_ns since_ns, wm_time_ns t_ns);
-  void tell_moved(int landmark);
+  void update_moved(int landmark);
   void widen(wm_estimate *out) const;
   void mix_start(wm_estimate *out) const;
 
-  // Behind the object: landmarks by rising id, and what each proved to be.
-  int *landmark_order() { return reinterpret_cast<int *>(this + 1); }
-  const int *landmark_order() const { return reinterpret_cast<const int *>(this + 1); }
-  landmark_record *landmark_records() {
-    return reinterpret_cast<landmark_record *>(landmark_order() + setup_->landmark_count);
-  }
+  struct arrays {
+    double *filter;
+    int *order;
+    landmark_record *records;
+  };
+  static arrays place(memory_layout *layout, const wm_landmark_ekf_params &params, const wm_setup &setup);
 
   planar_filter filter_;
+  landmark_index index_;
+  relative_array<landmark_record> records_;
   const wm_setup *setup_;
   wm_landmark_ekf_params params_;
   mounted_sensor sensor_[kMaxSensors];
-  int sensor_state_[kMaxSensors][kSensorStates];
-  int gnss_time_state_, gnss_lasting_state_;
-  wm_time_ns gnss_lasting_ns_;
-  state_pool<24> lasting_;
-  int lasting_bearing_offset_, lasting_range_offset_;  // within a slot; -1: not carried
-  state_pool<16> map_;
-  int tilt_state_;  // lean, nod; -1: not carried
+  sensor_slots slots_;
+  unsigned components_;  // of expect(): whether the angle scale is a state
+  int gnss_time_state_, gnss_error_state_;
+  wm_time_ns gnss_error_ns_;
+  state_pool<kErrorSlots> errors_;
+  int bearing_error_, range_error_, error_width_;  // offsets within a slot (-1: not carried), and its states
+  state_pool<kMapSlots> map_;
+  int tilt_state_;  // the body's roll and pitch; -1: not carried
   wm_time_ns tilt_ns_;
-  calibration_memory memory_[3];
-  wm_time_ns remembered_ns_;
+  rollback<kMaxCalibration> rollback_;
   int calibration_states_;  // pose and calibration; the lent states come behind
+  lifecycle life_;
   landmark_evidence evidence_;
   pose_search observations_;
   start_trial start_trial_;
   observation prior_[2];
   int prior_count_;
   observation vague_[2];  // the pose when it had become too vague to be corrected
-  wm_time_ns fused_ns_, lost_ns_, searched_ns_, weighed_ns_, inflated_ns_, loosened_ns_, found_ns_, vague_ns_;
-  uint32_t resets_, moved_;
+  wm_time_ns weighed_ns_, loosened_ns_, vague_ns_;
+  uint32_t moved_;
   int32_t moved_id_;        // of the last one
   double map_variance_m2_;  // of a place anywhere among the landmarks, each axis
-  uint8_t state_;           // wm_state, without dead reckoning
 };
 
 }  // namespace wm

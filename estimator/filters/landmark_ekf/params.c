@@ -7,27 +7,15 @@ typedef struct wm_landmark_ekf_params params;
 
 static const wm_param kParams[] = {
     WM_MOTION_STATE_PARAMS(params, motion),
-    F64("states.sensor_yaw_sigma_rad", sensor_yaw_sigma_rad, 0, 0, 3.2,
-        "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off."),
-    F64("states.sensor_yaw_walk_rad", sensor_yaw_walk_rad, 0, 0, 1,
-        "Random walk of the mounting yaw, rad per sqrt(s). A bolted sensor has none."),
-    F64("states.sensor_tilt_sigma_rad", sensor_tilt_sigma_rad, 0, 0, 1,
-        "Start sigma of each sensor's roll and of its pitch about calibration.yaml's, rad: they move the bearings of "
-        "what "
-        "is higher or lower than the sensor. 0: off."),
-    F64("states.sensor_angle_scale_sigma", sensor_angle_scale_sigma, 0, 0, 1,
-        "Start sigma of what each sensor tells angles from its axis too large by, in parts of them: a camera's focal "
-        "length "
-        "that was calibrated wrongly. 0: off."),
-    F64("states.tilt_sigma_rad", tilt_sigma_rad, 0.007, 0, 1,
-        "The robot's roll and pitch on its springs and on the ground, rad: 0.4 degrees, as a car has that brakes, "
-        "bends or "
-        "is loaded on one side. States with use.elevation, which tells them from a distance; else unused."),
+    WM_WHEEL_HEADING_PARAMS(params, motion),
+    // clang-format off
+    WM_SENSOR_STATE_PARAMS
+        // clang-format on
+        F64("states.tilt_sigma_rad", tilt_sigma_rad, 0.007, 0, 1,
+            "The robot's roll and pitch on its springs and on the ground, rad: 0.4 degrees, as a car has that brakes, "
+            "bends or "
+            "is loaded on one side. States with use.elevation, which tells them from a distance; else unused."),
     F64("states.tilt_tau_s", tilt_tau_s, 2, 0.01, 1e6, "Time after which such a tilt has fallen to 1/e, s."),
-    WM_SENSOR_STATE_PARAMS,
-    F64("states.range_scale_sigma", range_scale_sigma, 0, 0, 1,
-        "Start sigma of each sensor's range scale about 1. 0: off. Needs ranges of many lengths beside a range bias."),
-    F64("states.range_scale_walk", range_scale_walk, 0, 0, 1, "Random walk of the range scale per sqrt(s)."),
     F64("states.gnss_time_offset_sigma_s", gnss_time_offset_sigma_s, 0, 0, 1,
         "Start sigma of the receiver's time offset, s: its positions are that much older than their stamps. 0: off."),
     I32("states.map_slots", map_slots, 0, 0, 16,

@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "filters/planar/motion_states.h"
+#include "sensors/sensor_states.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -13,13 +14,8 @@ extern "C" {
 
 typedef struct wm_landmark_ekf_params {
   wm_motion_states motion;
-  // states, one of each kind a sensor; 0: off
-  double sensor_yaw_sigma_rad, sensor_yaw_walk_rad, sensor_xy_sigma_m;
-  double sensor_tilt_sigma_rad, sensor_angle_scale_sigma;
-  double sensor_time_offset_sigma_s;
+  wm_sensor_states sensor_states;
   double tilt_sigma_rad, tilt_tau_s;  // with elevations only
-  double range_bias_sigma_m;
-  double range_scale_sigma, range_scale_walk;
   double gnss_time_offset_sigma_s;
   int32_t map_slots;
   // noise of one sighting

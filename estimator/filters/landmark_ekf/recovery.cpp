@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lost and found: notices that observations keep contradicting the pose, says so, and mends it.
+// Evidence and relocalization: detects that observations contradict the pose, and finds the pose again.
 #include "filters/landmark_ekf/landmark_ekf.hpp"
 #include "math/arc.hpp"
 #include "math/elementary.hpp"
@@ -7,27 +7,76 @@
 namespace wm {
 namespace {
 
-constexpr double kSearchEvery_s = 0.25;  // bounds the cost: one search over 64 observations is about half a millisecond
-constexpr double kWeighEvery_s = 0.1;    // for the first metres after a start
-constexpr double kSayLost_s = 0.2;       // lost is lost for at least so long: whoever listens must hear it
-constexpr double kInflateAfter_s = 3.0;  // lost for so long and not found: open the gates
-constexpr double kInflateEvery_s = 1.0;
-constexpr double kFoundWrongly_s = 60.0;
-constexpr double kRememberEvery_s = 10.0;
-constexpr double kFoundWrong = -2.5;  // a pose found anew is wrong in one of twelve cases, as log odds
-constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;
-constexpr double kInflateUpTo_m = 30.0;
-constexpr int kNumbers = 5;           // two more than a pose has: three bearings fit some pose, whatever they say
-constexpr int kNumbersElsewhere = 6;  // of a pose that contradicts the one that is tracked
-constexpr double kLately_s = 2.0;
-constexpr int kFewOf = 3;  // a pose that explains less than one in so many of them is not where they are seen
+constexpr double kWeighEvery_s = 0.1;     // the start trial, for the first metres after a start
+constexpr double kFoundWrongly_s = 60.0;  // lost again within this: the calibration of before was wrong, too
+constexpr double kFoundWrong = -2.5;      // log odds that a relocalized pose is wrong: one in twelve
+constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;  // sigmas that are added while lost ...
+constexpr double kInflateUpTo_m = 30.0;                 // ... up to this
+constexpr int kNumbers = 5;                             // two more than a pose has: three bearings always fit some pose
+constexpr int kNumbersElsewhere = 6;                    // of a pose that contradicts the tracked one
+constexpr double kRecent_s = 2.0;
+constexpr int kFewOf = 3;  // the tracked pose must explain at least one in so many of the observations
 constexpr double kElsewhere_m = 0.5, kElsewhere_rad = 0.2;
-constexpr int kPoseNumbers = 3;      // of a pose that says next to nothing
-constexpr double kVague_rad = 0.5;   // sigma of a heading about which a Kalman update is no longer nearly straight
-constexpr double kVaguePlace = 0.5;  // sigma of a place, in those of one anywhere among the landmarks: the same
-constexpr double kVagueFor_s = 5.0;  // of looking for it; then it is corrected as well as can be
+constexpr int kPoseNumbers = 3;      // of a prior that is nearly uninformative
+constexpr double kVague_rad = 0.5;   // sigma of a heading above which a Kalman update is far from linear
+constexpr double kVaguePlace = 0.5;  // sigma of a place, over that of one anywhere among the landmarks: the same
+constexpr double kVagueFor_s = 5.0;  // of searching for a vague pose; then it is updated for want of better
+constexpr double kLeastDepth = 0.1;  // floor of the cosine between a depth's axis and the bearing
 
 }  // namespace
+
+// A wrong pose bends the calibration; a search must not start from that.
+const sensor_errors landmark_ekf::remembered_errors_of(int sensor) const {
+  const auto generation = trusted_generation();
+  return slots_.errors(sensor, [&](int slot) { return rollback_.value(generation, slot); });
+}
+
+observation landmark_ekf::observation_at(wm_time_ns t_ns, int key, const wm_pose2 &sensor_in_odom) const {
+  observation seen{};
+  seen.t_ns = t_ns;
+  seen.key = key;
+  seen.sensor = sensor_in_odom;
+  return seen;
+}
+
+// A sighting as the relocalizer takes it: with the calibration of before, and all that is wrong as sigmas.
+observation landmark_ekf::observation_of(const sighting_context &at, wm_time_ns t_ns) const {
+  const wm_sighting &s = *at.s;
+  const mounted_sensor &sensor = sensor_[s.sensor];
+  const wm_landmark &target = setup_->landmarks[at.landmark];
+  const sensor_errors errors = remembered_errors_of(s.sensor);
+  const double *sigma = params_.sensor_states.sigma;
+  const double tilt_sigma = sigma[WM_SENSOR_ROW_kRoll], scale_sigma = sigma[WM_SENSOR_ROW_kAngleScale];
+  const wm_pose2 mounting = {sensor.x_m + errors[kMountX], sensor.y_m + errors[kMountY], sensor.yaw_rad + errors[kYaw]};
+  observation seen = observation_at(t_ns, at.landmark * kMaxSensors + s.sensor,
+                                    compose(compose(filter_.odom(), at.past.step), mounting));
+  seen.kind = (at.reading.bearing ? kObservedBearing : 0u) | (at.reading.range ? kObservedRange : 0u);
+  seen.place_m[0] = target.p_m[0];
+  seen.place_m[1] = target.p_m[1];
+  seen.bearing_rad = s.bearing_rad;
+  if (at.elevation) {
+    const level_ray ray = levelled(sensor, errors, s.bearing_rad, s.elevation_rad);
+    seen.kind |= kObservedElevation;
+    seen.bearing_rad = ray.azimuth_rad;
+    seen.tangent = ray.tangent;
+    seen.height_m = target.p_m[2] - sensor.z_m;
+    seen.sigma_tangent =
+        (1.0 + square(ray.tangent)) * std::sqrt(square(s.elevation_sigma_rad) + square(params_.tilt_sigma_rad) +
+                                                square(tilt_sigma) + square(scale_sigma));
+    seen.sigma_height_m = map_sigma(at.landmark);
+  }
+  const double along =
+      at.reading.range && sensor.range_is_depth && !std::isnan(s.bearing_rad) ? cos(s.bearing_rad) : 1.0;
+  seen.range_m = (s.range_m - errors[kRangeBias]) / errors[kRangeScale] / (along > kLeastDepth ? along : kLeastDepth);
+  seen.sigma_angle_rad = std::sqrt(square(at.reading.bearing_sigma_rad) + square(params_.lasting_bearing_rad) +
+                                   square(scale_sigma * kHalfPi));
+  seen.sigma_place_m = std::sqrt(square(map_sigma(at.landmark)) + square(sigma[WM_SENSOR_ROW_kMountX]) +
+                                 square(tilt_sigma * (target.p_m[2] - sensor.z_m)));
+  seen.sigma_length_m =
+      std::sqrt(square(at.reading.range_sigma_m) + square(params_.lasting_range_m) + square(map_sigma(at.landmark)) +
+                square((params_.range_sigma_rel + params_.lasting_range_rel) * seen.range_m));
+  return seen;
+}
 
 void landmark_ekf::buffer_observation(const observation &seen) {
   if (!params_.recover) return;
@@ -37,61 +86,59 @@ void landmark_ekf::buffer_observation(const observation &seen) {
   observations_.add(kept);
 }
 
-void landmark_ekf::note(wm_time_ns t_ns, int witness, double against, double angle_rad, double normalised) {
+void landmark_ekf::note(wm_time_ns t_ns, int key, double log_bayes, double angle_rad, double normalised) {
   if (!params_.recover) return;
-  evidence_.note(t_ns, witness, against, angle_rad, normalised, witness >= 0 ? landmark_records() + witness : nullptr);
-  if (witness >= 0) tell_moved(witness);
-  if (state_ == WM_STATE_TRACKING) {
+  evidence_.note(t_ns, key, log_bayes, angle_rad, normalised, key >= 0 ? &records_[static_cast<size_t>(key)] : nullptr);
+  if (key >= 0) update_moved(key);
+  if (life_.tracking()) {
     const wm_time_ns since = elsewhere_since(t_ns);
     if (since != WM_TIME_NONE) evidence_.contradict(since);
   }
-  if (state_ == WM_STATE_TRACKING && evidence_.contradicted()) {
-    state_ = WM_STATE_LOST;
-    lost_ns_ = inflated_ns_ = t_ns;
-  }
+  if (life_.tracking() && evidence_.contradicted()) life_.lose(t_ns);
   weigh_start(t_ns);
-  if (state_ == WM_STATE_TRACKING && evidence_.fits()) remember_calibration(t_ns);
-  if (state_ != WM_STATE_LOST) return;
-  if (evidence_.fits()) {
-    state_ = WM_STATE_TRACKING;
-    return;
-  }
-  if (wm_seconds_between(lost_ns_, t_ns) < kSayLost_s) return;
+  if (life_.tracking() && evidence_.fits()) rollback_.remember(filter_, t_ns);
+  if (life_.lost()) mend(t_ns);
+}
+
+// Lost: the observations fit again, or the relocalizer finds the pose, or the covariance is inflated in the end.
+void landmark_ekf::mend(wm_time_ns t_ns) {
+  if (evidence_.fits()) return life_.fits_again();
+  if (!life_.announced(t_ns)) return;
   const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
   const wm_time_ns bad_since = evidence_.doubted_since_ns();
   search(bad_since > window ? bad_since : window, prior_, prior_count_);
-  if (state_ != WM_STATE_LOST || wm_seconds_between(lost_ns_, t_ns) < kInflateAfter_s) return;
-  if (wm_seconds_between(inflated_ns_, t_ns) >= kInflateEvery_s && filter_.variance(kX) < square(kInflateUpTo_m)) {
-    filter_.inflate_pose(square(kInflate_m), square(kInflate_rad));
-    inflated_ns_ = t_ns;
-  }
+  if (!life_.inflation_due(t_ns) || !(filter_.variance(kX) < square(kInflateUpTo_m))) return;
+  filter_.inflate_pose(square(kInflate_m), square(kInflate_rad));
+  life_.inflated(t_ns);
 }
 
-// Does another pose explain what was seen lately, and this one next to nothing of it? Then it was carried off, however
-// well all fitted before; false detections and moved landmarks don't agree on a pose. Lately is since the last fit, or
-// kLately_s: some fit by chance, the more so where a detector looks where the pose says. None: WM_TIME_NONE.
+// Test for a kidnapped robot: a different pose explains the recent observations and the tracked one explains less than
+// a third. False detections and moved landmarks do not agree on a pose. "Recent" is since the last accepted update, or
+// kRecent_s, since some observations fit by chance. Returns since when; WM_TIME_NONE: not kidnapped.
 wm_time_ns landmark_ekf::elsewhere_since(wm_time_ns t_ns) {
-  if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, t_ns) < kSearchEvery_s) return WM_TIME_NONE;
-  const wm_time_ns lately = t_ns - wm_ns_from_seconds(kLately_s);
+  if (!life_.search_due(t_ns)) return WM_TIME_NONE;
+  const wm_time_ns recently = t_ns - wm_ns_from_seconds(kRecent_s);
   const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
-  const wm_time_ns unfit = fused_ns_ != WM_TIME_NONE && fused_ns_ > window ? fused_ns_ + 1 : window;
+  const wm_time_ns fused = life_.fused_ns();
+  const wm_time_ns unfit = fused != WM_TIME_NONE && fused > window ? fused + 1 : window;
   if (is_elsewhere(unfit, t_ns)) return unfit;
-  return is_elsewhere(lately, t_ns) ? lately : WM_TIME_NONE;
+  return is_elsewhere(recently, t_ns) ? recently : WM_TIME_NONE;
 }
 
 bool landmark_ekf::is_elsewhere(wm_time_ns since_ns, wm_time_ns t_ns) {
-  const int clues = observations_.count_since(since_ns);
-  if (clues < kNumbersElsewhere) return false;
-  searched_ns_ = t_ns;
+  const int recent = observations_.count_since(since_ns);
+  if (recent < kNumbersElsewhere) return false;
+  life_.searched(t_ns);
   const wm_pose2 pose = filter_.pose(), odom = filter_.odom();
   wm_pose2 mounting[kMaxSensors] = {};
-  for (size_t i = 0; i < setup_->sensor_count && i < kMaxSensors; i++) {
-    const sensor_errors told = remembered_errors_of((int)i), known = errors_of((int)i);
-    mounting[i] = between({told.x_m, told.y_m, told.yaw_rad}, {known.x_m, known.y_m, known.yaw_rad});
+  for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++) {
+    const sensor_errors buffered = remembered_errors_of(i), now = errors_of(i);
+    mounting[i] =
+        between({buffered[kMountX], buffered[kMountY], buffered[kYaw]}, {now[kMountX], now[kMountY], now[kYaw]});
   }
   const int fitting =
       observations_.agreeing(since_ns, pose, odom, filter_.travelled_m(), filter_.turned_rad(), mounting);
-  if (kFewOf * fitting > clues) return false;
+  if (kFewOf * fitting > recent) return false;
   const search_result other =
       observations_.find(since_ns, odom, filter_.travelled_m(), filter_.turned_rad(), nullptr, 0,
                          {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad, kNumbersElsewhere});
@@ -103,10 +150,10 @@ bool landmark_ekf::is_elsewhere(wm_time_ns since_ns, wm_time_ns t_ns) {
   return away_m2 > square(kElsewhere_m) + 9.0 * place || square(turned_rad) > square(kElsewhere_rad) + 9.0 * heading;
 }
 
-// Counted once, and again only after it fitted in between.
-void landmark_ekf::tell_moved(int landmark) {
-  landmark_record &record = landmark_records()[landmark];
-  if (!record.moved && state_ == WM_STATE_TRACKING && evidence_.moved(landmark)) {
+// A landmark that moved is counted once, and again only after it fitted in between.
+void landmark_ekf::update_moved(int landmark) {
+  landmark_record &record = records_[static_cast<size_t>(landmark)];
+  if (!record.moved && life_.tracking() && evidence_.moved(landmark)) {
     record.moved = 1;
     record.confirmed = 0;
     moved_++;
@@ -123,12 +170,12 @@ void landmark_ekf::try_start() {
   start_trial_.begin(filter_.pose(), covariance, filter_.odom(), filter_.travelled_m(), filter_.turned_rad());
 }
 
-// Is the stated pose borne out by what is seen? If not, it is forgotten.
+// Tests the stated pose against the first observations; where another one is surely right, it is taken.
 void landmark_ekf::weigh_start(wm_time_ns t_ns) {
-  if (!start_trial_.open() || state_ != WM_STATE_TRACKING) return;
+  if (!start_trial_.open() || !life_.tracking()) return;
   if (weighed_ns_ != WM_TIME_NONE && wm_seconds_between(weighed_ns_, t_ns) < kWeighEvery_s) return;
   weighed_ns_ = t_ns;
-  const start_trial::lasting sigma = {params_.sensor_yaw_sigma_rad, params_.lasting_bearing_rad,
+  const start_trial::lasting sigma = {params_.sensor_states.sigma[WM_SENSOR_ROW_kYaw], params_.lasting_bearing_rad,
                                       params_.lasting_lateral_m};
   start_trial_.weigh(observations_, sigma, filter_.pose(), filter_.odom(), filter_.travelled_m(), filter_.turned_rad(),
                      t_ns);
@@ -137,62 +184,44 @@ void landmark_ekf::weigh_start(wm_time_ns t_ns) {
   filter_.set_pose(start_trial_.pose(), start_trial_.covariance());
   start_trial_.close();
   evidence_.begin(kFoundWrong);
-  resets_++;
-  fused_ns_ = t_ns;
+  life_.corrected(t_ns);
 }
 
 double landmark_ekf::lost_probability() const {
-  if (state_ == WM_STATE_SEARCHING) return 1.0;
+  if (life_.searching()) return 1.0;
   const double now = evidence_.probability(), start = start_trial_.off();
   return now > start ? now : start;
 }
 
-void landmark_ekf::remember_calibration(wm_time_ns t_ns) {
-  const bool first = remembered_ns_ == WM_TIME_NONE;
-  if (t_ns != WM_TIME_NONE && !first && wm_seconds_between(remembered_ns_, t_ns) < kRememberEvery_s) return;
-  remembered_ns_ = t_ns;
-  memory_[1] = memory_[0];
-  for (int i = kPoseStates; i < calibration_states_; i++) {
-    memory_[0].value[i] = filter_.value(i);
-    memory_[0].variance[i] = filter_.variance(i);
-  }
-  if (t_ns == WM_TIME_NONE) memory_[1] = memory_[2] = memory_[0];
-}
-
-// Lost again soon after being found: then what was remembered is wrong, too (a mounting's yaw and a heading that are
+// Lost again soon after being found: the remembered calibration is wrong, too (a mounting's yaw and a heading that are
 // off by the same angle look alike until the robot has driven a while). Begin from calibration.yaml.
-const landmark_ekf::calibration_memory &landmark_ekf::memory_to_trust() const {
-  const bool again = found_ns_ != WM_TIME_NONE && wm_seconds_between(found_ns_, filter_.now_ns()) < kFoundWrongly_s;
-  return memory_[again ? 2 : 1];
+rollback<landmark_ekf::kMaxCalibration>::generation landmark_ekf::trusted_generation() const {
+  const wm_time_ns found = life_.found_ns();
+  const bool again = found != WM_TIME_NONE && wm_seconds_between(found, filter_.now_ns()) < kFoundWrongly_s;
+  return again ? rollback_.kStart : rollback_.kSafe;
 }
 
-// A wrong pose teaches wrong things of the sensors.
 void landmark_ekf::restore_calibration() {
-  for (int i = kPoseStates; i < calibration_states_; i++)
-    filter_.forget(i, memory_[1].value[i], memory_[1].variance[i]);
-  lasting_.release_all();
+  rollback_.restore(&filter_);
+  errors_.release_all();
   map_.release_all();
-  if (tilt_state_ >= 0)
-    for (int k = 0; k < 2; k++) filter_.forget(tilt_state_ + k, 0.0, square(params_.tilt_sigma_rad));
+  for (int k = 0; k < 2 && tilt_state_ >= 0; k++) filter_.forget(tilt_state_ + k, 0.0, square(params_.tilt_sigma_rad));
 }
 
-// Is the pose unknown, or so vague (a robot that stood blind for seconds while it turned) that what is seen should find
-// it rather than correct it? A range says nothing of the heading, which its motion shows in time. While nobody knows
-// how the robot moves, what is seen can't be carried together, and corrects as well as it can.
+// Is the pose unknown, or so vague (after seconds of blind turning) that observations should find it rather than
+// correct it? A range holds no information about the heading, which its motion shows in time. While the motion is
+// unknown, observations cannot be carried together, and correct as well as they can.
 bool landmark_ekf::is_sought(wm_time_ns t_ns, bool by_bearing) {
-  if (state_ == WM_STATE_SEARCHING) return true;
+  if (life_.searching()) return true;
   const double heading = filter_.variance(kHeading), spread = 0.5 * (filter_.variance(kX) + filter_.variance(kY));
   const bool vague = (by_bearing && heading > square(kVague_rad)) || spread > square(kVaguePlace) * map_variance_m2_;
-  if (!params_.recover || state_ != WM_STATE_TRACKING || !vague || filter_.is_overdue()) {
+  if (!params_.recover || !life_.tracking() || !vague || filter_.is_overdue()) {
     vague_ns_ = WM_TIME_NONE;
     return false;
   }
   if (vague_ns_ == WM_TIME_NONE) {
     vague_ns_ = t_ns;
-    observation &place = vague_[0] = {};
-    place.t_ns = t_ns;
-    place.key = -1;
-    place.sensor = filter_.odom();
+    observation &place = vague_[0] = observation_at(t_ns, -1, filter_.odom());
     place.travelled_m = filter_.travelled_m();
     place.turned_rad = filter_.turned_rad();
     observation &toward = vague_[1] = place;
@@ -209,35 +238,29 @@ bool landmark_ekf::is_sought(wm_time_ns t_ns, bool by_bearing) {
 
 void landmark_ekf::seek(wm_time_ns t_ns) {
   const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
-  if (state_ == WM_STATE_SEARCHING) return search(window, prior_, prior_count_);
+  if (life_.searching()) return search(window, prior_, prior_count_);
   search(vague_ns_ > window ? vague_ns_ : window, vague_, 2);
 }
 
-// Looks for the pose among the clues since `since_ns`; takes it where it is sure.
+// Looks for the pose among the observations since `since_ns`; takes it where it is sure.
 void landmark_ekf::search(wm_time_ns since_ns, const observation *prior, int prior_count) {
   const wm_time_ns now = filter_.now_ns();
-  if (!params_.recover) return;
-  if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now) < kSearchEvery_s) return;
-  searched_ns_ = now;
+  if (!params_.recover || !life_.search_due(now)) return;
+  life_.searched(now);
   const search_limits limits = {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad,
                                 kNumbers + (prior == vague_ ? kPoseNumbers : 0)};
   search_result result = observations_.find(since_ns, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(),
                                             prior, prior_count, limits);
   if (!result.found) return;
   restore_calibration();
-  // What the mounting's yaw may still be off by, the heading found is off by, too.
-  for (size_t i = 0; i < setup_->sensor_count; i++) {
-    const int yaw = sensor_state_[i][kYaw];
-    if (yaw >= 0) result.covariance[2][2] += filter_.variance(yaw);
-  }
-  found_ns_ = now;
+  // The heading found is wrong by the mounting's yaw as well.
+  for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++)
+    if (const int yaw = slots_.at(i, kYaw); yaw >= 0) result.covariance[2][2] += filter_.variance(yaw);
   filter_.set_pose(result.pose, result.covariance);
   start_trial_.begin_found(result.pose, result.covariance, filter_.odom(), filter_.travelled_m(), filter_.turned_rad(),
                            since_ns);
   evidence_.begin(kFoundWrong);
-  resets_++;
-  fused_ns_ = now;
-  state_ = WM_STATE_TRACKING;
+  life_.relocalized(now);
 }
 
 }  // namespace wm

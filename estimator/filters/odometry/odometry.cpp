@@ -15,7 +15,8 @@ struct odometry_params {
   wm_motion_states states;
 };
 
-const wm_param kParams[] = {WM_MOTION_STATE_PARAMS(odometry_params, states)};
+const wm_param kParams[] = {WM_MOTION_STATE_PARAMS(odometry_params, states),
+                            WM_WHEEL_HEADING_PARAMS(odometry_params, states)};
 
 class odometry {
  public:
@@ -23,7 +24,7 @@ class odometry {
 
   void init(const odometry_params &params, const wm_setup &setup) {
     setup_ = &setup;
-    filter_.init(setup, params.states);
+    filter_.init(setup, params.states, kPoseStates + planar_filter::count_motion_states(params.states));
     searching_ = !start_is_known(setup.start);
     resets_ = 1;
   }
@@ -68,7 +69,7 @@ class odometry {
   }
 
  private:
-  planar_filter filter_;
+  planar_filter_of<kPoseStates + kCalibrationCount + 2> filter_;  // 2: the wheels' heading and difference
   const wm_setup *setup_;
   uint32_t resets_;
   bool searching_;

@@ -38,7 +38,7 @@ void pf_edges::init(const wm_pf_edges_params &params, const wm_setup &setup) {
   std::memset(static_cast<void *>(this), 0, sizeof *this);
   setup_ = &setup;
   params_ = params;
-  odometry_.init(setup, wm_motion_states{});
+  odometry_.init(setup, wm_motion_states{}, kPoseStates);
   uint8_t *behind = reinterpret_cast<uint8_t *>(this) + aligned(sizeof *this);
   particles_.init(params.particles, setup.seed, behind);
   behind += aligned(particles::bytes(params.particles));

@@ -38,7 +38,7 @@ class pf_edges {
 
   const wm_setup *setup_;
   wm_pf_edges_params params_;
-  planar_filter odometry_;  // motion alone: pose increments, twist
+  planar_filter_of<kPoseStates + 1> odometry_;  // motion alone: pose increments, twist
   particles particles_;
   edge_map map_;
   score_table table_;

@@ -43,7 +43,10 @@ typedef struct wm_motion_states {
                   "Start sigma of the motion's delay behind its samples, s. 0: off."), \
   WM_MOTION_STATE(type, member, 8, "turn_slowdown", "_mps", 0.0, \
                   "Start sigma of the loss of a commanded speed at a turn rate of 1 rad/s, m/s; it grows with the " \
-                  "square of the turn rate (drives that limit or round their wheels' speeds). 0: off."), \
+                  "square of the turn rate (drives that limit or round their wheels' speeds). 0: off.")
+
+// For filters that hold the heading of the wheels' counts against the gyro's (wheel_heading.hpp).
+#define WM_WHEEL_HEADING_PARAMS(type, member) \
   {"states.wheel_difference_sigma", WM_PARAM_F64, offsetof(type, member.wheel_difference_sigma), 0, 0, 1, NULL, \
    "With speed by ticks and the heading by a yaw rate: start sigma of the relative difference of the wheels' radii. " \
    "The ticks then measure the heading, too, which bounds the random walk of the gyro's noise. 0: off."}, \

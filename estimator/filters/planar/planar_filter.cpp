@@ -13,9 +13,11 @@ int planar_filter::count_motion_states(const wm_motion_states &states) {
   return count + wheel_heading::count_states(states);
 }
 
-void planar_filter::init(const wm_setup &setup, const wm_motion_states &states) {
-  std::memset(static_cast<void *>(this), 0, sizeof *this);
-  stride_ = even(kMaxStates);
+void planar_filter::init(const wm_setup &setup, const wm_motion_states &motion, int states, double *arrays) {
+  arrays_.set(arrays);
+  n_ = 0;
+  stride_ = even(states);
+  std::memset(arrays, 0, doubles(states) * sizeof(double));
   init_motion(setup);
   const double sigma_xy = finite(setup.start.sigma_xy_m) ? setup.start.sigma_xy_m : 0.05;
   const double sigma_heading = finite(setup.start.sigma_heading_rad) ? setup.start.sigma_heading_rad : 0.05;
@@ -23,26 +25,16 @@ void planar_filter::init(const wm_setup &setup, const wm_motion_states &states) 
   add_state(finite(setup.start.p_m[1]) ? setup.start.p_m[1] : 0.0, sigma_xy);
   add_state(finite(setup.start.heading_rad) ? wrap(setup.start.heading_rad) : 0.0, sigma_heading);
   for (int i = 0; i < kCalibrationCount; i++) {
-    const bool on = states.sigma[i] > 0.0;
-    set_motion_state(states, i, on ? add_state(calibration_.value[i], states.sigma[i]) : -1);
+    const bool on = motion.sigma[i] > 0.0;
+    set_motion_state(motion, i, on ? add_state(calibration_.value[i], motion.sigma[i]) : -1);
   }
-  wheels_.init(*this, states);
+  wheels_.init(*this, motion);
 }
 
 int planar_filter::add_state(double value, double sigma) {
   const int state = n_++;
-  // Rows lie close together, so that the whole covariance of a small filter stays in few cache lines.
-  const int stride = even(n_);
-  if (stride != stride_ || state == 0) {
-    alignas(16) double old[kMaxStates * kMaxStates];
-    std::memcpy(old, p_, sizeof old);
-    std::memset(p_, 0, sizeof p_);
-    for (int i = 0; i < state; i++)
-      for (int j = 0; j < state; j++) p_[i * stride + j] = old[i * stride_ + j];
-    stride_ = stride;
-  }
-  x_[state] = value;
-  p_[state * stride_ + state] = square(sigma);
+  x()[state] = value;
+  p()[state * stride_ + state] = square(sigma);
   return state;
 }
 
@@ -51,11 +43,11 @@ void planar_filter::move(const wm_event &motion) {
   move_to(motion.t_ns);
   double innovation, variance;
   if (standstill_bias(&innovation, &variance)) {
-    sparse_row row;
+    planar_row row;
     row.add(motion_state_[kYawRateBias], 1.0);
     projection projected;
     project(row, &projected);
-    update(projected, innovation, variance);
+    (void)update(projected, innovation, variance);  // its variance is a parameter above 0
   }
   wheels_.update(*this, front_);
 }
@@ -66,16 +58,16 @@ void planar_filter::move_to(wm_time_ns t_ns) {
       [this](const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
         propagate(piece, twist, noise);
       },
-      [this](int state, double variance) { p_[state * stride_ + state] += variance; });
+      [this](int state, double variance) { p()[state * stride_ + state] += variance; });
 }
 
 void planar_filter::propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
-  const pose_step step = make_pose_step(piece, twist, noise, x_[kHeading], twist_, motion_state_);
+  const pose_step step = make_pose_step(piece, twist, noise, x()[kHeading], twist_, motion_state_);
   // Rows: T = F P, in place. Rows 0 and 1 need the old row 2, so it comes last.
-  double *rows[3] = {p_, p_ + stride_, p_ + 2 * stride_};
+  double *rows[3] = {p(), p() + stride_, p() + 2 * stride_};
   for (int r = 0; r < 3; r++)
     for (int k = 0; k < step.columns; k++)
-      if (step.by[k][r] != 0.0) vectors::add_scaled(rows[r], p_ + step.column[k] * stride_, step.by[k][r], stride_);
+      if (step.by[k][r] != 0.0) vectors::add_scaled(rows[r], p() + step.column[k] * stride_, step.by[k][r], stride_);
   // The pose's own block of T F', then the mirror of the rest.
   double block[3][3];
   for (int r = 0; r < 3; r++)
@@ -87,34 +79,34 @@ void planar_filter::propagate(const motion_segment &piece, const motion_twist &t
   for (int r = 0; r < 3; r++)
     for (int c = r; c < 3; c++) rows[r][c] = rows[c][r] = block[r][c];
   for (int i = kPoseStates; i < n_; i++)
-    for (int r = 0; r < 3; r++) p_[i * stride_ + r] = rows[r][i];
+    for (int r = 0; r < 3; r++) p()[i * stride_ + r] = rows[r][i];
 
-  x_[kX] += step.x_m;
-  x_[kY] += step.y_m;
-  x_[kHeading] = wrap(x_[kHeading] + step.turn_rad);
+  x()[kX] += step.x_m;
+  x()[kY] += step.y_m;
+  x()[kHeading] = wrap(x()[kHeading] + step.turn_rad);
   take_step(piece, twist, step);
 }
 
-void planar_filter::project(const sparse_row &row, projection *out) const {
+void planar_filter::project(const planar_row &row, projection *out) const {
   if (row.count == 0) {
     for (int i = 0; i < stride_; i++) out->gain[i] = 0.0;
     out->variance = 0.0;
     return;
   }
-  vectors::set_scaled(out->gain, p_ + row.index[0] * stride_, row.by[0], stride_);
-  for (int k = 1; k < row.count; k++) vectors::add_scaled(out->gain, p_ + row.index[k] * stride_, row.by[k], stride_);
+  vectors::set_scaled(out->gain, p() + row.index[0] * stride_, row.by[0], stride_);
+  for (int k = 1; k < row.count; k++) vectors::add_scaled(out->gain, p() + row.index[k] * stride_, row.by[k], stride_);
   out->variance = project_onto(row, *out);
 }
 
-double planar_filter::project_onto(const sparse_row &row, const projection &other) const {
+double planar_filter::project_onto(const planar_row &row, const projection &other) const {
   double sum = 0.0;
   for (int k = 0; k < row.count; k++) sum += row.by[k] * other.gain[row.index[k]];
   return sum;
 }
 
-void planar_filter::update(const projection &projected, double innovation, double noise, int kept_from, int kept_to) {
+bool planar_filter::update(const projection &projected, double innovation, double noise, int kept_from, int kept_to) {
   const double s = projected.variance + noise;
-  if (!(s > 0.0)) return;
+  if (!(s > 0.0) || !finite(s) || !finite(innovation)) return false;
   const double inverse = 1.0 / s;
   alignas(16) double k[kMaxStates], b[kMaxStates];
   vectors::set_scaled(k, projected.gain, inverse, stride_);
@@ -122,72 +114,73 @@ void planar_filter::update(const projection &projected, double innovation, doubl
   // K b' + b K' with b = s/2 K - g is Joseph's form for one row.
   vectors::set_scaled(b, k, 0.5 * s, stride_);
   vectors::add_scaled(b, projected.gain, -1.0, stride_);
-  vectors::add_symmetric_outer(p_, k, b, n_, stride_);
-  vectors::add_scaled(x_, k, innovation, stride_);
-  x_[kHeading] = wrap(x_[kHeading]);
-  take_calibration(x_);
+  vectors::add_symmetric_outer(p(), k, b, n_, stride_);
+  vectors::add_scaled(x(), k, innovation, stride_);
+  x()[kHeading] = wrap(x()[kHeading]);
+  take_calibration(x());
+  return true;
 }
 
 void planar_filter::forget(int state, double value, double variance) {
-  for (int j = 0; j < n_; j++) p_[state * stride_ + j] = p_[j * stride_ + state] = 0.0;
-  p_[state * stride_ + state] = variance;
-  x_[state] = value;
-  take_calibration(x_);
+  for (int j = 0; j < n_; j++) p()[state * stride_ + j] = p()[j * stride_ + state] = 0.0;
+  p()[state * stride_ + state] = variance;
+  x()[state] = value;
+  take_calibration(x());
 }
 
-void planar_filter::carry_state(int state, const sparse_row &by, double change, double added_variance) {
-  double *row = p_ + state * stride_;
-  for (int k = 0; k < by.count; k++) vectors::add_scaled(row, p_ + by.index[k] * stride_, by.by[k], stride_);
+void planar_filter::carry_state(int state, const planar_row &by, double change, double added_variance) {
+  double *row = p() + state * stride_;
+  for (int k = 0; k < by.count; k++) vectors::add_scaled(row, p() + by.index[k] * stride_, by.by[k], stride_);
   for (int k = 0; k < by.count; k++) row[state] += by.by[k] * row[by.index[k]];
   row[state] += added_variance;
-  for (int j = 0; j < n_; j++) p_[j * stride_ + state] = row[j];
-  x_[state] += change;
+  for (int j = 0; j < n_; j++) p()[j * stride_ + state] = row[j];
+  x()[state] += change;
 }
 
 void planar_filter::copy_state(int state, int from, double added_variance) {
-  double *row = p_ + state * stride_;
-  const double *source = p_ + from * stride_;
-  for (int j = 0; j < n_; j++) row[j] = p_[j * stride_ + state] = source[j];
+  double *row = p() + state * stride_;
+  const double *source = p() + from * stride_;
+  for (int j = 0; j < n_; j++) row[j] = p()[j * stride_ + state] = source[j];
   row[state] = source[from] + added_variance;
-  x_[state] = x_[from];
+  x()[state] = x()[from];
 }
 
 void planar_filter::fade(int state, double factor, double added_variance) {
   for (int j = 0; j < n_; j++) {
     if (j == state) continue;
-    p_[state * stride_ + j] *= factor;
-    p_[j * stride_ + state] = p_[state * stride_ + j];
+    p()[state * stride_ + j] *= factor;
+    p()[j * stride_ + state] = p()[state * stride_ + j];
   }
-  double &own = p_[state * stride_ + state];
+  double &own = p()[state * stride_ + state];
   own = own * factor * factor + added_variance;
-  x_[state] *= factor;
+  x()[state] *= factor;
 }
 
 void planar_filter::set_pose(const wm_pose2 &pose, const double covariance[3][3]) {
   const double value[3] = {pose.x_m, pose.y_m, wrap(pose.heading_rad)};
   for (int i = 0; i < 3; i++) forget(i, value[i], 0.0);
   for (int i = 0; i < 3; i++)
-    for (int j = 0; j < 3; j++) p_[i * stride_ + j] = i <= j ? covariance[i][j] : covariance[j][i];
+    for (int j = 0; j < 3; j++) p()[i * stride_ + j] = i <= j ? covariance[i][j] : covariance[j][i];
   wheels_.restart();
 }
 
 void planar_filter::inflate_pose(double variance_m2, double variance_rad2) {
-  p_[kX * stride_ + kX] += variance_m2;
-  p_[kY * stride_ + kY] += variance_m2;
-  p_[kHeading * stride_ + kHeading] += variance_rad2;
+  p()[kX * stride_ + kX] += variance_m2;
+  p()[kY * stride_ + kY] += variance_m2;
+  p()[kHeading * stride_ + kHeading] += variance_rad2;
   wheels_.restart();
 }
 
 void planar_filter::add_chance(double probability, const double off[kMaxStates]) {
   for (int i = 0; i < n_; i++)
-    for (int j = 0; j < n_; j++) p_[i * stride_ + j] += off[i] * off[j] * probability;
+    for (int j = 0; j < n_; j++) p()[i * stride_ + j] += off[i] * off[j] * probability;
   wheels_.restart();
 }
 
-void planar_filter::loosen_pose(double factor) {
+void planar_filter::scale_pose_sigmas(double factor) {
   for (int i = 0; i < n_; i++)
     for (int j = 0; j < n_; j++)
-      p_[i * stride_ + j] *= (i < kPoseStates ? factor : 1.0) * (j < kPoseStates ? factor : 1.0);
+      p()[i * stride_ + j] *= (i < kPoseStates ? factor : 1.0) * (j < kPoseStates ? factor : 1.0);
 }
 
 void planar_filter::estimate(wm_estimate *out) const {
@@ -202,7 +195,7 @@ void planar_filter::estimate(wm_estimate *out) const {
 void planar_filter::list_motion_states(calibration_list *list) const {
   list_motion_states_of(*this, list);
   if (const int state = wheels_.difference_state(); state >= 0)
-    list->add("motion.wheel_difference", x_[state], std::sqrt(variance(state)));
+    list->add("motion.wheel_difference", x()[state], std::sqrt(variance(state)));
 }
 
 }  // namespace wm

@@ -12,6 +12,11 @@ void planar_motion::init_motion(const wm_setup &setup) {
   start_ns_ = setup.start.t_ns;
   odom_ = {};
   travelled_m_ = turned_rad_ = twist_[0] = twist_[1] = 0.0;
+  sensor_states_ = 0;
+}
+
+void planar_motion::set_sensor_state(int state, double walk, double low, double high) {
+  sensor_state_[sensor_states_++] = {state, square(walk), low, high};
 }
 
 void planar_motion::set_motion_state(const wm_motion_states &states, int i, int state) {
@@ -47,6 +52,11 @@ void planar_motion::take_calibration(double *states) {
   for (int i = 0; i < kCalibrationCount; i++) {
     const int state = motion_state_[i];
     if (state >= 0) calibration_.value[i] = states[state] = motion_state_within_limits(i, states[state]);
+  }
+  for (int i = 0; i < sensor_states_; i++) {
+    double &value = states[sensor_state_[i].state];
+    if (value < sensor_state_[i].low) value = sensor_state_[i].low;
+    if (value > sensor_state_[i].high) value = sensor_state_[i].high;
   }
 }
 

@@ -16,6 +16,9 @@
 
 namespace wm {
 
+// Errors of sensors that are states, of all sensors together (landmark_ekf asserts it).
+inline constexpr int kMaxSensorStates = 192;
+
 class planar_motion {
  public:
   // Time of the state; WM_TIME_NONE before the first event.
@@ -43,6 +46,8 @@ class planar_motion {
   void init_motion(const wm_setup &setup);
   // Start variance and random walk of a calibration term; `state` is its index in the filter, -1: not a state.
   void set_motion_state(const wm_motion_states &states, int i, int state);
+  // A state of a sensor's error: its random walk per sqrt(s), and the limits beyond which an update is cut.
+  void set_sensor_state(int state, double walk, double low, double high);
 
   // Takes a motion event that check_motion() accepts; move the state to its t_ns next. Returns the state to reset where
   // the speed's source changed to a sensor with another scale; -1: none.
@@ -73,6 +78,8 @@ class planar_motion {
     front_.advance(t_ns, calibration_, propagate);
     for (int i = 0; i < kCalibrationCount; i++)
       if (motion_state_[i] >= 0) walk(motion_state_[i], walk_[i] * dt);
+    for (int i = 0; i < sensor_states_; i++)
+      if (sensor_state_[i].walk > 0.0) walk(sensor_state_[i].state, sensor_state_[i].walk * dt);
   }
   // Odometry over one such segment.
   void take_step(const motion_segment &segment, const motion_twist &twist, const pose_step &step);
@@ -90,6 +97,12 @@ class planar_motion {
   wm_motion_calibration calibration_;
   int motion_state_[kCalibrationCount];
   double walk_[kCalibrationCount], start_variance_[kCalibrationCount];
+  struct sensor_state_limits {
+    int state;
+    double walk, low, high;  // walk: variance per s
+  };
+  sensor_state_limits sensor_state_[kMaxSensorStates];
+  int sensor_states_;
   wm_time_ns start_ns_;
   wm_pose2 odom_;
   double travelled_m_, turned_rad_;

@@ -10,7 +10,8 @@
 
 namespace wm {
 
-enum pose_state { kX = 0, kY = 1, kHeading = 2, kPoseStates = 3 };
+enum pose_state { kX = 0, kY = 1, kHeading = 2 };
+inline constexpr int kPoseStates = 3;
 
 struct pose_step {
   static constexpr int kMaxColumns = 10;

@@ -7,14 +7,6 @@
 #include "filters/core/param_rows.h"
 
 // clang-format off
-#define WM_SENSOR_STATE_PARAMS \
-  F64("states.sensor_xy_sigma_m", sensor_xy_sigma_m, 0, 0, 10, \
-      "Start sigma of each sensor's place on the robot about calibration.yaml's, forwards and sideways, m. 0: off."), \
-  F64("states.sensor_time_offset_sigma_s", sensor_time_offset_sigma_s, 0, 0, 1, \
-      "Start sigma of each sensor's time offset, s: its sightings are that much older than their stamps. 0: off."), \
-  F64("states.range_bias_sigma_m", range_bias_sigma_m, 0, 0, 10, \
-      "Start sigma of each sensor's range bias, m. 0: off.")
-
 #define WM_SIGHTING_NOISE_PARAMS \
   F64("noise.bearing_default_rad", bearing_sigma_default_rad, 0.02, 1e-5, 3, \
       "Sigma of a bearing where neither the sighting nor the sensor gives one, rad."), \

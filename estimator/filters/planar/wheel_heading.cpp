@@ -66,7 +66,7 @@ void wheel_heading::propagate(planar_filter &filter, const motion_front_end &fro
   const wm_motion_calibration &c = filter.calibration();
   const double track = track_m(filter, front), middle_m = 0.5 * (left_m + right_m);
   const double turn = c.value[kSpeedScale] * (right_m - left_m + filter.value(difference_) * middle_m) / track;
-  sparse_row by;
+  planar_row by;
   if (square(turn) > kTurn_nis * rounding_rad2(filter, front)) {
     by.add(filter.motion_state(kSpeedScale), turn / c.value[kSpeedScale]);
     by.add(filter.motion_state(kTrackScale), -turn / c.value[kTrackScale]);
@@ -78,15 +78,14 @@ void wheel_heading::propagate(planar_filter &filter, const motion_front_end &fro
 }
 
 bool wheel_heading::fuse_gyro_heading(planar_filter &filter, const motion_front_end &front) {
-  sparse_row row;
+  planar_row row;
   row.add(kHeading, 1.0);
   row.add(heading_, -1.0);
   projection projected;
   filter.project(row, &projected);
   const double apart = wrap(filter.value(heading_) - filter.value(kHeading)), noise = rounding_rad2(filter, front);
   if (square(apart) > kSlip_nis * (projected.variance + noise)) return false;
-  filter.update(projected, apart, noise);
-  return true;
+  return filter.update(projected, apart, noise);
 }
 
 }  // namespace wm

@@ -7,6 +7,7 @@
 
 #include <cstdint>
 
+#include "sensors/sensor_model.hpp"
 #include "waymark/frames.h"
 #include "waymark/time.h"
 
@@ -30,8 +31,6 @@ struct observation {
 };
 // Odometry's error in parts of the way and of the turn, before calibration.
 inline constexpr double kWayError = 0.05, kTurnError = 0.07;
-
-inline constexpr int kMaxSensors = 16;
 
 enum search_kind : uint32_t {
   kObservedBearing = 1,

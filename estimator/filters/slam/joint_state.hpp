@@ -15,6 +15,7 @@
 #ifndef WAYMARK_ESTIMATOR_SLAM_JOINT_STATE_HPP
 #define WAYMARK_ESTIMATOR_SLAM_JOINT_STATE_HPP
 
+#include "filters/core/row.hpp"
 #include "filters/planar/planar_motion.hpp"
 #include "filters/relocalize/line_search.hpp"
 #include "math/elementary.hpp"
@@ -22,23 +23,8 @@
 
 namespace wm {
 
-// A row of a derivative: few entries are not zero. The same state may stand there twice; entries add up.
-struct joint_row {
-  static constexpr int kMax = 64;
-  int count = 0;
-  int index[kMax];
-  double by[kMax];
-
-  void add(int state, double derivative) {  // state < 0: not a state, or off
-    if (state < 0 || derivative == 0.0 || count == kMax) return;
-    index[count] = state;
-    by[count] = derivative;
-    count++;
-  }
-  void add(const joint_row &other, double factor) {
-    for (int i = 0; i < other.count; i++) add(other.index[i], factor * other.by[i]);
-  }
-};
+// A row of a derivative. Two views of two landmarks from two clones, with all errors of a sensor each, take most.
+using joint_row = jacobian_row<64>;
 
 struct joint_layout {
   int robot_states;  // pose, calibration, lent states and clones; made even
@@ -64,6 +50,11 @@ class joint_state : public planar_motion {
   };
   void set_motion_states(const wm_motion_states &states, const wheel_slip &slip, int first);  // from `first` on
   static int count_motion_states(const wm_motion_states &states, const wheel_slip &slip);
+  // Makes `state` one of a sensor's error: its start, its random walk per sqrt(s) and its limits.
+  void begin_sensor_state(int state, double value, double sigma, double walk, double low, double high) {
+    forget(state, value, square(sigma));
+    set_sensor_state(state, walk, low, high);
+  }
 
   // Whether the way's scale is a state. If so, what of the way goes with the map's scale follows it; call
   // follow_scale() for each other state that does. `carries`: the covariance is carried along, too, for a second pass

@@ -16,7 +16,7 @@ constexpr double kGate = 9.0;
 // independent of theirs (F. R. Helmert's transform of a regression with a constant). One row more, O(n^2); none once it
 // would say little.
 void slam::level_camera(int landmark, int sensor, const marker_reading &r) {
-  const int roll = sensor_state_[sensor][kRoll], pitch = sensor_state_[sensor][kPitch];
+  const int roll = slots_.at(sensor, kRoll), pitch = slots_.at(sensor, kPitch);
   landmark_note &note = notes()[landmark];
   if (roll < 0) return;
   // Another camera sees it elsewhere in its own axes; a print that two see in turn levels the one that saw it first.

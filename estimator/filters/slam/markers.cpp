@@ -49,7 +49,8 @@ slam::marker_reading slam::read_marker(const wm_marker &m, const double p_m[3], 
   for (int i = 0; i < 3; i++)
     told[i] = sensor.axis[0][i] * p_m[0] + sensor.axis[1][i] * p_m[1] + sensor.axis[2][i] * p_m[2];
   // What is left of the camera's tilt, small turns about the levelled axes ahead and to the left.
-  const double roll = sensor_value(m.sensor, kRoll, 0.0), pitch = sensor_value(m.sensor, kPitch, 0.0);
+  const sensor_errors errors = errors_of(m.sensor);
+  const double roll = errors[kRoll], pitch = errors[kPitch];
   level[0] = told[0] + pitch * told[2];
   level[1] = told[1] - roll * told[2];
   level[2] = told[2] + roll * told[1] - pitch * told[0];
@@ -147,25 +148,25 @@ void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past
   const double dx = place[0] - from.x_m, dy = place[1] - from.y_m;
   const double u[2] = {h.cos * dx + h.sin * dy, h.cos * dy - h.sin * dx};
   const double lever_x = from.x_m - past.pose.x_m, lever_y = from.y_m - past.pose.y_m;
-  const int *states = sensor_state_[sensor];
+  const auto slot = [&](sensor_state state) { return slots_.at(sensor, state); };
   double by_age[3];  // per s that the picture is older than its stamp says
   for (int k = 0; k < 2; k++) {
     const double a[2] = {k == 0 ? r.along[0] : -r.along[1], k == 0 ? r.along[1] : r.along[0]};
-    const double scale = k == 0 ? errors.range_scale : 1.0;
+    const double scale = k == 0 ? errors[kRangeScale] : 1.0;
     // By the place: a' R(-heading).
     const double g[2] = {scale * (a[0] * h.cos - a[1] * h.sin), scale * (a[0] * h.sin + a[1] * h.cos)};
     const double turn = scale * (a[0] * u[1] - a[1] * u[0]);
     const double by[3] = {-g[0], -g[1], turn + g[0] * lever_y - g[1] * lever_x};
     const double plain = a[0] * u[0] + a[1] * u[1];
     out->row[k].count = 0;
-    add_pose(out->row[k], by, past, states[kTimeOffset]);
+    add_past_pose(&out->row[k], by, past, slot(kTimeOffset));
     by_age[k] = by[0] * past.age_by[0] + by[1] * past.age_by[1] + by[2] * past.age_by[2];
-    out->row[k].add(states[kYaw], turn);
-    out->row[k].add(states[kMountX], -g[0] * base.cos - g[1] * base.sin);
-    out->row[k].add(states[kMountY], g[0] * base.sin - g[1] * base.cos);
-    if (k == 0) out->row[k].add(states[kRangeScale], plain);
-    out->row[k].add(states[kRoll], a[1] * r.told[2]);
-    out->row[k].add(states[kPitch], -a[0] * r.told[2]);
+    out->row[k].add(slot(kYaw), turn);
+    out->row[k].add(slot(kMountX), -g[0] * base.cos - g[1] * base.sin);
+    out->row[k].add(slot(kMountY), g[0] * base.sin - g[1] * base.cos);
+    if (k == 0) out->row[k].add(slot(kRangeScale), plain);
+    out->row[k].add(slot(kRoll), a[1] * r.told[2]);
+    out->row[k].add(slot(kPitch), -a[0] * r.told[2]);
     out->by_landmark[k][0] = g[0];
     out->by_landmark[k][1] = g[1];
     out->by_landmark[k][2] = 0.0;
@@ -175,9 +176,9 @@ void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past
   }
   const double by[3] = {0.0, 0.0, -1.0};
   out->row[2].count = 0;
-  add_pose(out->row[2], by, past, states[kTimeOffset]);
+  add_past_pose(&out->row[2], by, past, slot(kTimeOffset));
   by_age[2] = by[2] * past.age_by[2];
-  out->row[2].add(states[kYaw], -1.0);
+  out->row[2].add(slot(kYaw), -1.0);
   out->by_landmark[2][0] = out->by_landmark[2][1] = 0.0;
   out->by_landmark[2][2] = 1.0;
   out->observed[2] = wrap(r.yaw_rad);
@@ -262,7 +263,7 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
 slam::sighted slam::sighted_of(const wm_marker &m, const marker_reading &r) const {
   const double floor_m = std::sqrt(square(r.level[0]) + square(r.level[1]));
   return {floor_m > kUnder_m ? atan2(r.along[1], r.along[0]) : std::nan(""),
-          floor_m / sensor_value(m.sensor, kRangeScale, 1.0),
+          floor_m / errors_of(m.sensor)[kRangeScale],
           r.turned ? wrap(sensor_[m.sensor].yaw_rad + r.yaw_rad) : std::nan(""),
           std::sqrt(r.noise[1]) / larger(floor_m, kUnder_m),
           std::sqrt(r.noise[0]),
@@ -273,7 +274,7 @@ slam::sighted slam::sighted_of(const wm_marker &m, const marker_reading &r) cons
 void slam::join_marker(const wm_marker &m, const marker_reading &r, const past_pose &past, wm_innovation blank,
                        record_list records) {
   const wm_pose2 from = sensor_pose(m.sensor, past);
-  const double scale = errors_of(m.sensor).range_scale;
+  const double scale = errors_of(m.sensor)[kRangeScale];
   const wm_pose2 there = compose(from, {r.level[0] / scale, r.level[1] / scale, r.yaw_rad});
   const double place[3] = {there.x_m, there.y_m, there.heading_rad};
   blank.verdict = make_room() ? WM_FUSED : WM_REJECTED_NO_ASSOCIATION;

@@ -16,21 +16,14 @@ static const wm_param kParams[] = {
         "lasts "
         "for seconds, where noise.ticks_per_sqrt_m is fresh with each tick. 0: off."),
     F64("states.wheel_slip_tau_s", wheel_slip_tau_s, 5, 0.01, 1e6, "And forgets by 1/e in this time, s."),
-    F64("states.sensor_yaw_sigma_rad", sensor_yaw_sigma_rad, 0, 0, 3.2,
-        "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off."),
-    WM_SENSOR_STATE_PARAMS,
-    F64("states.range_scale_sigma", range_scale_sigma, 0, 0, 1,
-        "Start sigma of each sensor's range scale about 1. 0: off. It is found against the motion's scale alone."),
-    F64("states.depth_axis_sigma_rad", depth_axis_sigma_rad, 0, 0, 1,
-        "Start sigma of the angle from where a sensor's bearings are 0 to the axis along which its depths are measured "
-        "(range_is: depth): a camera's middle column need not lie on its lens's axis. 0: off."),
-    F64("states.sensor_tilt_sigma_rad", sensor_tilt_sigma_rad, 0, 0, 1,
-        "For coded markers: start sigma of each camera's roll and of its pitch about calibration.yaml's, rad. Found by "
-        "how high a marker seems to hang from here and from there. 0: off."),
-    F64("states.sensor_stamp_sigma_s", sensor_stamp_sigma_s, 0, 0, 1,
-        "Sigma of the error of each picture's stamp, s: alike for all that is seen in it, another in the next one. A "
-        "robot "
-        "that turns at 1 rad/s sees all of it that much rad beside. 0: off."),
+    // clang-format off
+    WM_SENSOR_STATE_PARAMS
+        // clang-format on
+        F64("states.sensor_stamp_sigma_s", sensor_stamp_sigma_s, 0, 0, 1,
+            "Sigma of the error of each picture's stamp, s: alike for all that is seen in it, another in the next one. "
+            "A "
+            "robot "
+            "that turns at 1 rad/s sees all of it that much rad beside. 0: off."),
     BOOL("use.bearing", use_bearing, 1, "Fuse bearings."),
     BOOL("use.range", use_range, 1, "Fuse ranges. Without them landmarks join once their parallax suffices."),
     WM_SIGHTING_NOISE_PARAMS,
@@ -114,4 +107,10 @@ static const wm_param kParams[] = {
         "Nothing fused for so long: the state says dead reckoning."),
 };
 
-const wm_param_table wm_slam_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), NULL};
+static const wm_param_old kOld[] = {
+    {"states.wheel_difference_sigma", NULL, "slam never read it; landmark_ekf and odometry have it"},
+    {"states.wheel_difference_walk", NULL, "slam never read it; landmark_ekf and odometry have it"},
+    {NULL, NULL, NULL},
+};
+
+const wm_param_table wm_slam_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), kOld};

@@ -6,6 +6,7 @@
 #include <stdint.h>
 
 #include "filters/planar/motion_states.h"
+#include "sensors/sensor_states.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -18,9 +19,8 @@ enum { WM_SLAM_LINE_UNSCENTED = 0, WM_SLAM_LINE_LINEAR = 1, WM_SLAM_LINE_INVERSE
 typedef struct wm_slam_params {
   wm_motion_states motion;
   double wheel_slip_sigma, wheel_slip_tau_s;  // the wheels' scales wander about their means
-  // states, one of each kind a sensor; 0: off
-  double sensor_yaw_sigma_rad, sensor_xy_sigma_m, sensor_time_offset_sigma_s;
-  double range_bias_sigma_m, range_scale_sigma, depth_axis_sigma_rad, sensor_tilt_sigma_rad, sensor_stamp_sigma_s;
+  wm_sensor_states sensor_states;
+  double sensor_stamp_sigma_s;  // of each picture's stamp
   // noise of one sighting
   int32_t use_bearing, use_range;
   double bearing_sigma_default_rad, range_sigma_default_m;

@@ -20,10 +20,10 @@ void slam::begin_ray(int32_t id, const wm_sighting &s, const reading &r, const p
   bearing_tracks::track *track = tracks_.begin(id, s.sensor);
   track->first_ns = track->last_ns = joint_.now_ns();
   const int clone = keep_clone(s.sensor, past, joint_.now_ns());
-  tracks_.add(track, clone, s.bearing_rad, r.bearing_sigma, 1);
+  tracks_.add(track, clone, s.bearing_rad, r.bearing_sigma_rad, 1);
   const int state = ray_state(*track), lasting = lend(s.sensor, id, joint_.now_ns());
   joint_row row;
-  double variance = square(r.bearing_sigma);
+  double variance = square(r.bearing_sigma_rad);
   if (lasting >= 0 && lasting_bearing_offset_ >= 0)
     row.add(lasting + lasting_bearing_offset_, -params_.lasting_bearing_rad);
   else
@@ -70,18 +70,17 @@ void slam::follow_ray(int32_t id, const wm_sighting &s, const reading &r, const 
   const double lever_x = from.x_m - past.pose.x_m, lever_y = from.y_m - past.pose.y_m;
   const double by[3] = {-inverse * gx, -inverse * gy, inverse * (gx * lever_y - gy * lever_x) - 1.0};
   const sin_cos h = sincos(past.pose.heading_rad);
-  const int *states = sensor_state_[s.sensor];
   joint_row row;
-  add_pose(row, by, past, states[kTimeOffset]);
-  row.add(states[kYaw], -1.0);
-  row.add(states[kMountX], by[0] * h.cos + by[1] * h.sin);
-  row.add(states[kMountY], by[1] * h.cos - by[0] * h.sin);
+  add_past_pose(&row, by, past, slots_.at(s.sensor, kTimeOffset));
+  row.add(slots_.at(s.sensor, kYaw), -1.0);
+  row.add(slots_.at(s.sensor, kMountX), by[0] * h.cos + by[1] * h.sin);
+  row.add(slots_.at(s.sensor, kMountY), by[1] * h.cos - by[0] * h.sin);
   row.add(anchor, inverse * gx);
   row.add(anchor + 1, inverse * gy);
   row.add(anchor + 2, turn);
   row.add(state, turn);
   row.add(state + 1, gx * ax + gy * ay);
-  double noise = square(r.bearing_sigma);
+  double noise = square(r.bearing_sigma_rad);
   double expected = atan2(vy, vx) - from.heading_rad;
   const int lasting = lend(s.sensor, id, now);
   if (lasting >= 0 && lasting_bearing_offset_ >= 0) {

@@ -164,7 +164,7 @@ bool slam::relocalize() {
     return false;
   }
   for (size_t i = 0; i < setup_->sensor_count; i++)  // the heading found is off by the mounting's yaw
-    if (const int yaw = sensor_state_[i][kYaw]; yaw >= 0) found.covariance[2][2] += joint_.variance(yaw);
+    if (const int yaw = slots_.at((int)i, kYaw); yaw >= 0) found.covariance[2][2] += joint_.variance(yaw);
   joint_.set_pose(found.pose, found.covariance);
   take_found();
   return true;

@@ -6,11 +6,7 @@
 namespace wm {
 namespace {
 
-constexpr double kFarthest_m = 1e6;
 constexpr double kOneNumber = 6.635 / 9.210;  // 99 % of chi2 with one degree of freedom against two
-
-bool is_sigma(double value) { return std::isnan(value) || (value > 0.0 && value < 1e6); }
-double first_number(double a, double b, double c) { return finite(a) ? a : finite(b) ? b : c; }
 
 }  // namespace
 
@@ -21,94 +17,47 @@ void slam::begin_picture(int sensor, wm_time_ns t_ns) {
   joint_.forget(stamp_state_[sensor], 0.0, square(params_.sensor_stamp_sigma_s));
 }
 
-slam::past_pose slam::look_back(int sensor) const {
-  past_pose out;
-  out.stamp_state = stamp_state_[sensor];
-  const double age_s =
-      sensor_value(sensor, kTimeOffset, 0.0) + (out.stamp_state < 0 ? 0.0 : joint_.value(out.stamp_state));
-  const wm_time_ns now = joint_.now_ns();
-  const wm_time_ns then = now - wm_ns_from_seconds(age_s);
-  motion_twist twist{};
-  wm_pose2 step{};  // from now's base_link to then's
-  if (then < now) {
-    step = between(joint_.path(then, now, &twist), wm_pose2{});
-  } else if (then > now) {
-    step = joint_.path(now, then, &twist);
-  } else {
-    joint_.path(now - 1, now, &twist);
-  }
-  out.pose = compose(joint_.pose(), step);
-  out.lever_x = out.pose.x_m - joint_.value(kX);
-  out.lever_y = out.pose.y_m - joint_.value(kY);
-  const sin_cos h = sincos(out.pose.heading_rad);
-  out.age_by[0] = -twist.v * h.cos;
-  out.age_by[1] = -twist.v * h.sin;
-  out.age_by[2] = -twist.w;
+past_pose slam::look_back(int sensor) const {
+  const int slot = slots_.at(sensor, kTimeOffset), stamp = stamp_state_[sensor];
+  const double offset_s = slot < 0 ? 0.0 : joint_.value(slot), stamp_error_s = stamp < 0 ? 0.0 : joint_.value(stamp);
+  past_pose out = pose_before(joint_, offset_s + stamp_error_s);
+  out.stamp_slot = stamp;
   return out;
 }
 
-// A derivative by the past pose becomes one by the pose now and by the time offset.
-void slam::add_pose(joint_row &row, const double by[3], const past_pose &past, int time_state) const {
-  row.add(kX, by[0]);
-  row.add(kY, by[1]);
-  row.add(kHeading, by[2] - by[0] * past.lever_y + by[1] * past.lever_x);
-  const double by_age = by[0] * past.age_by[0] + by[1] * past.age_by[1] + by[2] * past.age_by[2];
-  row.add(time_state, by_age);
-  row.add(past.stamp_state, by_age);
-}
-
-double slam::sensor_value(int sensor, int which, double neutral) const {
-  const int state = sensor_state_[sensor][which];
-  return state < 0 ? neutral : joint_.value(state);
-}
-
 sensor_errors slam::errors_of(int sensor) const {
-  return {sensor_value(sensor, kYaw, 0.0), sensor_value(sensor, kMountX, 0.0), sensor_value(sensor, kMountY, 0.0),
-          sensor_value(sensor, kRangeScale, 1.0), sensor_value(sensor, kRangeBias, 0.0)};
+  return slots_.errors(sensor, [this](int slot) { return joint_.value(slot); });
 }
 
 wm_pose2 slam::sensor_pose(int sensor, const past_pose &past) const {
   const mounted_sensor &m = sensor_[sensor];
   const sensor_errors e = errors_of(sensor);
-  return compose(past.pose, {m.x_m + e.x_m, m.y_m + e.y_m, m.yaw_rad + e.yaw_rad});
+  return compose(past.pose, {m.x_m + e[kMountX], m.y_m + e[kMountY], m.yaw_rad + e[kYaw]});
 }
 
 // The error of this sensor on this landmark that lasts: a slot of states, faded to now. -1 where none is carried.
 int slam::lend(int sensor, int32_t id, wm_time_ns t_ns) {
-  bool fresh;
-  auto *slot = lasting_.take((int64_t)id * kSlamSensors + sensor, &fresh);
-  if (!slot) return -1;
-  const int width = lasting_width_;
-  const double left = fresh ? 0.0 : exp(-wm_seconds_between(slot->used_ns, t_ns) / params_.lasting_tau_s);
-  for (int k = 0; k < width; k++) {
-    if (fresh)
-      joint_.forget(slot->state + k, 0.0, 1.0);
-    else if (left < 1.0)
-      joint_.fade(slot->state + k, left, 1.0 - left * left);
-  }
-  slot->used_ns = t_ns;
-  return slot->state;
+  const int64_t key = static_cast<int64_t>(id) * kSlamSensors + sensor;
+  return lasting_.lend(&joint_, key, lasting_width_, params_.lasting_tau_s, t_ns);
 }
 
 void slam::see(const wm_sighting &s, const reading &r, const past_pose &past, const double place[2], int lasting,
                view *out) const {
   const int sensor = s.sensor;
   const double at[3] = {place[0], place[1], std::nan("")};
-  const expected_sighting e = expect(sensor_[sensor], errors_of(sensor), past.pose, at);
-  const int *states = sensor_state_[sensor];
+  const unsigned components = (r.bearing ? kBearing : 0u) | (r.range ? kRange : 0u) | components_;
+  const expected_sighting e = expect(sensor_[sensor], errors_of(sensor), past.pose, at, components);
   out->count = 0;
   out->possible = e.possible;
   out->distance_m = e.distance_m;
   if (!e.possible) return;
-  const auto add = [&](wm_residual kind, double observed, double expected, const double by[6], double variance,
+  const auto add = [&](wm_residual kind, double observed, double expected, const double by[kCauses], double variance,
                        int lasting_offset, double lasting_size) {
     const int i = out->count++;
     joint_row &row = out->row[i];
     row.count = 0;
-    add_pose(row, by, past, states[kTimeOffset]);
-    row.add(states[kYaw], by[3]);
-    row.add(states[kMountX], by[4]);
-    row.add(states[kMountY], by[5]);
+    add_past_pose(&row, by, past, slots_.at(sensor, kTimeOffset));
+    slots_.add_to(&row, sensor, by);
     if (lasting >= 0 && lasting_offset >= 0) {
       row.add(lasting + lasting_offset, lasting_size);
       expected += lasting_size * joint_.value(lasting + lasting_offset);
@@ -126,31 +75,13 @@ void slam::see(const wm_sighting &s, const reading &r, const past_pose &past, co
   const double distance = e.distance_m > 0.1 ? e.distance_m : 0.1;
   if (r.bearing)
     add(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad, e.bearing_by,
-        square(r.bearing_sigma) + square(params_.lateral_sigma_m / distance), lasting_bearing_offset_,
+        square(r.bearing_sigma_rad) + square(params_.lateral_sigma_m / distance), lasting_bearing_offset_,
         std::sqrt(square(params_.lasting_bearing_rad) + square(params_.lasting_lateral_m / distance)));
   if (r.range) {
-    // Depth is along an axis of its own: as if the sensor were turned by so much.
-    sensor_errors turned = errors_of(sensor);
-    turned.yaw_rad += sensor_value(sensor, kDepthAxis, 0.0);
-    const expected_sighting depth = states[kDepthAxis] < 0 ? e : expect(sensor_[sensor], turned, past.pose, at);
-    add(WM_RESIDUAL_RANGE, s.range_m, depth.range_m, depth.range_by,
-        square(r.range_sigma) + square(params_.range_sigma_rel * depth.range_m), lasting_range_offset_,
-        std::sqrt(square(params_.lasting_range_m) + square(params_.lasting_range_rel * depth.range_m)));
-    joint_row &row = out->row[out->count - 1];
-    row.add(states[kRangeBias], 1.0);
-    row.add(states[kRangeScale], depth.range_by_scale);
-    row.add(states[kDepthAxis], depth.range_by[kByYaw]);
+    add(WM_RESIDUAL_RANGE, s.range_m, e.range_m, e.range_by,
+        square(r.range_sigma_m) + square(params_.range_sigma_rel * e.range_m), lasting_range_offset_,
+        std::sqrt(square(params_.lasting_range_m) + square(params_.lasting_range_rel * e.range_m)));
   }
-}
-
-wm_status slam::check_sighting(const wm_sighting &s) const {
-  const bool has_bearing = !std::isnan(s.bearing_rad), has_range = !std::isnan(s.range_m);
-  if ((!has_bearing && !has_range) || std::isinf(s.bearing_rad) || std::isinf(s.range_m)) return WM_NOT_FINITE;
-  if (s.sensor >= setup_->sensor_count || (has_bearing && std::fabs(s.bearing_rad) > 100.0) ||
-      (has_range && !(s.range_m >= 0.0 && s.range_m < kFarthest_m)) || !is_sigma(s.bearing_sigma_rad) ||
-      !is_sigma(s.range_sigma_m))
-    return WM_OUT_OF_RANGE;
-  return WM_OK;
 }
 
 wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
@@ -167,7 +98,7 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
     records.add(blank);
     return WM_OK;
   };
-  wm_status status = check_sighting(s);
+  wm_status status = check_sighting(s, setup_->sensor_count);
   if (status != WM_OK) {
     drop(status == WM_NOT_FINITE ? WM_REJECTED_NOT_FINITE : WM_REJECTED_OUT_OF_RANGE);
     return status;
@@ -179,13 +110,7 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   look_after(event.t_ns);
 
   const mounted_sensor &sensor = sensor_[s.sensor];
-  reading r;
-  r.bearing = !std::isnan(s.bearing_rad) && params_.use_bearing;
-  r.range = !std::isnan(s.range_m) && params_.use_range;
-  r.bearing_sigma = params_.bearing_sigma_factor *
-                    first_number(s.bearing_sigma_rad, sensor.bearing_sigma_rad, params_.bearing_sigma_default_rad);
-  r.range_sigma =
-      params_.range_sigma_factor * first_number(s.range_sigma_m, sensor.range_sigma_m, params_.range_sigma_default_m);
+  const reading r = read_sighting(s, sensor, params_);
   if (!r.bearing && !r.range) return drop(WM_REJECTED_BY_CONFIG);
   if (!std::isnan(s.range_m) && s.range_m > sensor.max_range_m) return drop(WM_REJECTED_OUT_OF_RANGE);
 
@@ -231,12 +156,12 @@ slam::sighted slam::sighted_of(const wm_sighting &s, const reading &r) const {
   const sensor_errors errors = errors_of(s.sensor);
   const bool depth = sensor_[s.sensor].range_is_depth && r.bearing;
   const double range =
-      (s.range_m - errors.range_bias_m) / errors.range_scale / (depth ? larger(cos(s.bearing_rad), 0.1) : 1.0);
+      (s.range_m - errors[kRangeBias]) / errors[kRangeScale] / (depth ? larger(cos(s.bearing_rad), 0.1) : 1.0);
   return {r.bearing ? s.bearing_rad : std::nan(""),
           r.range ? range : std::nan(""),
           std::nan(""),
-          std::sqrt(square(r.bearing_sigma) + square(params_.lasting_bearing_rad)),
-          std::sqrt(square(r.range_sigma) + square(params_.lasting_range_m) +
+          std::sqrt(square(r.bearing_sigma_rad) + square(params_.lasting_bearing_rad)),
+          std::sqrt(square(r.range_sigma_m) + square(params_.lasting_range_m) +
                     square((params_.range_sigma_rel + params_.lasting_range_rel) * range)),
           0.0};
 }
@@ -305,7 +230,7 @@ void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, cons
 void slam::join_seen(int32_t id, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
                      record_list records) {
   const sensor_errors errors = errors_of(s.sensor);
-  double range = (s.range_m - errors.range_bias_m) / errors.range_scale;
+  double range = (s.range_m - errors[kRangeBias]) / errors[kRangeScale];
   if (sensor_[s.sensor].range_is_depth) range /= larger(cos(s.bearing_rad), 0.1);
   const wm_pose2 from = sensor_pose(s.sensor, past);
   const sin_cos ray = sincos(from.heading_rad + s.bearing_rad);
@@ -357,14 +282,13 @@ int slam::keep_clone(int sensor, const past_pose &past, wm_time_ns t_ns) {
   const int clone = tracks_.take_clone(sensor, t_ns, pose.x_m, pose.y_m);
   const double lever_x = pose.x_m - past.pose.x_m, lever_y = pose.y_m - past.pose.y_m;
   const sin_cos h = sincos(past.pose.heading_rad);
-  const int *states = sensor_state_[sensor];
   const double by[3][6] = {{1, 0, -lever_y, 0, h.cos, -h.sin}, {0, 1, lever_x, 0, h.sin, h.cos}, {0, 0, 1, 1, 0, 0}};
   joint_row rows[3];
   for (int k = 0; k < 3; k++) {
-    add_pose(rows[k], by[k], past, states[kTimeOffset]);
-    rows[k].add(states[kYaw], by[k][3]);
-    rows[k].add(states[kMountX], by[k][4]);
-    rows[k].add(states[kMountY], by[k][5]);
+    add_past_pose(&rows[k], by[k], past, slots_.at(sensor, kTimeOffset));
+    rows[k].add(slots_.at(sensor, kYaw), by[k][3]);
+    rows[k].add(slots_.at(sensor, kMountX), by[k][4]);
+    rows[k].add(slots_.at(sensor, kMountY), by[k][5]);
   }
   const double none[3][3] = {}, values[3] = {pose.x_m, pose.y_m, pose.heading_rad};
   joint_.assign(clone_state(clone), 3, rows, none, values);
@@ -392,7 +316,7 @@ void slam::track_bearing(int32_t id, const wm_sighting &s, const reading &r, con
       return;
     }
   }
-  const double sigma = std::sqrt(square(r.bearing_sigma) + square(params_.lasting_bearing_rad));
+  const double sigma = std::sqrt(square(r.bearing_sigma_rad) + square(params_.lasting_bearing_rad));
   const int clone = keep_clone(s.sensor, past, now);
   tracks_.add(track, clone, s.bearing_rad, sigma, params_.line_poses);
   if (track->count >= 3 && join_line(*track)) {

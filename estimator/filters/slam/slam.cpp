@@ -13,8 +13,6 @@
 namespace wm {
 namespace {
 
-constexpr const char *kSensorStateNames[] = {
-    "yaw_rad", "x_m", "y_m", "time_offset_s", "range_bias_m", "range_scale", "depth_axis_rad", "roll_rad", "pitch_rad"};
 constexpr double kOwnFrame_m = 1e-3, kOwnFrame_rad = 1e-3;  // the map begins where the robot starts
 constexpr double kSurveyed_m = 1e-4, kSurveyed_rad = 0.01;  // no map is better; headings come without a sigma
 const double kAbsent = std::numeric_limits<double>::quiet_NaN();
@@ -39,12 +37,9 @@ int lasting_states(const wm_slam_params &p) {
 joint_state::wheel_slip slip_of(const wm_slam_params &p) { return {p.wheel_slip_sigma, p.wheel_slip_tau_s}; }
 
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
-  const int each_sensor = (p.sensor_yaw_sigma_rad > 0.0) + 2 * (p.sensor_xy_sigma_m > 0.0) +
-                          (p.sensor_time_offset_sigma_s > 0.0) + (p.range_bias_sigma_m > 0.0) +
-                          (p.range_scale_sigma > 0.0) + (p.depth_axis_sigma_rad > 0.0) +
-                          2 * (p.sensor_tilt_sigma_rad > 0.0) + (p.sensor_stamp_sigma_s > 0.0);
-  return kPoseStates + joint_state::count_motion_states(p.motion, slip_of(p)) + each_sensor * (int)setup.sensor_count +
-         p.lasting_slots * lasting_states(p);
+  return kPoseStates + joint_state::count_motion_states(p.motion, slip_of(p)) +
+         sensor_slots::count(p.sensor_states, setup.sensor_count) +
+         (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count + p.lasting_slots * lasting_states(p);
 }
 
 // Azimuth and inverse distance for each ray, of which there are as many as clones.
@@ -108,18 +103,15 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
     joint_.forget(next, value, square(sigma));
     return next++;
   };
-  for (size_t i = 0; i < setup.sensor_count; i++) {
-    sensor_[i].init(setup.sensors[i]);
-    sensor_state_[i][kYaw] = add(0.0, params.sensor_yaw_sigma_rad);
-    sensor_state_[i][kMountX] = add(0.0, params.sensor_xy_sigma_m);
-    sensor_state_[i][kMountY] = add(0.0, params.sensor_xy_sigma_m);
-    sensor_state_[i][kTimeOffset] = add(0.0, params.sensor_time_offset_sigma_s);
-    sensor_state_[i][kRangeBias] = add(0.0, params.range_bias_sigma_m);
-    sensor_state_[i][kRangeScale] = add(1.0, params.range_scale_sigma);
-    sensor_state_[i][kDepthAxis] = add(0.0, params.depth_axis_sigma_rad);
-    sensor_state_[i][kRoll] = add(0.0, params.sensor_tilt_sigma_rad);
-    sensor_state_[i][kPitch] = add(0.0, params.sensor_tilt_sigma_rad);
-    stamp_state_[i] = add(0.0, params.sensor_stamp_sigma_s);
+  for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
+  slots_.init(params.sensor_states, setup.sensor_count,
+              [&](double value, double sigma, double walk, double low, double high) {
+                joint_.begin_sensor_state(next, value, sigma, walk, low, high);
+                return next++;
+              });
+  components_ = params.sensor_states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
+  for (size_t i = 0; i < kSlamSensors; i++) {
+    stamp_state_[i] = i < setup.sensor_count ? add(0.0, params.sensor_stamp_sigma_s) : -1;
     picture_ns_[i] = WM_TIME_NONE;
   }
   lasting_bearing_offset_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
@@ -138,12 +130,12 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
 // Nothing measures how large the map is where the way's scale and the ranges' are both states, or no ranges are used.
 // Prints are known so much better than wheels that a filter learns next to nothing where it should learn nothing.
 void slam::follow_scale() {
-  const bool ranges_tell = params_.use_range && !(params_.range_scale_sigma > 0.0);
+  const bool ranges_tell = params_.use_range && !(params_.sensor_states.sigma[WM_SENSOR_ROW_kRangeScale] > 0.0);
   if (ranges_tell || params_.map != WM_SLAM_MAP_NONE || !joint_.find_scale(!params_.markers)) return;
-  for (size_t i = 0; i < setup_->sensor_count; i++) {
-    joint_.follow_scale(sensor_state_[i][kRangeScale], -1.0, true);
-    joint_.follow_scale(sensor_state_[i][kMountX], 1.0, false);
-    joint_.follow_scale(sensor_state_[i][kMountY], 1.0, false);
+  for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++) {
+    joint_.follow_scale(slots_.at(i, kRangeScale), -1.0, true);
+    joint_.follow_scale(slots_.at(i, kMountX), 1.0, false);
+    joint_.follow_scale(slots_.at(i, kMountY), 1.0, false);
   }
   for (int k = first_ray_; k < first_clone_; k += 2) joint_.follow_scale(k + 1, -1.0, false);
 }
@@ -294,10 +286,7 @@ void slam::estimate(wm_estimate *out) const {
 size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const {
   calibration_list list(out, capacity);
   joint_.list_motion_states(&list);
-  for (size_t i = 0; i < setup_->sensor_count; i++)
-    for (int k = 0; k < kSensorStates; k++)
-      if (const int state = sensor_state_[i][k]; state >= 0)
-        list.add(setup_->sensors[i].name, kSensorStateNames[k], joint_.value(state), std::sqrt(joint_.variance(state)));
+  slots_.list(*setup_, joint_, &list);
   for (size_t i = 0; i < setup_->sensor_count; i++)
     if (finite(edge_shift_px_[i])) list.add(setup_->sensors[i].name, "edge_shift_px", edge_shift_px_[i], kAbsent);
   return list.count();

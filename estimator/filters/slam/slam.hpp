@@ -3,15 +3,18 @@
 #ifndef WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 #define WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 
+#include "filters/core/gate.hpp"
 #include "filters/core/landmark_evidence.hpp"
 #include "filters/core/record_list.hpp"
+#include "filters/core/sensor_slots.hpp"
 #include "filters/core/state_pool.hpp"
+#include "filters/planar/past_pose.hpp"
 #include "filters/relocalize/line_search.hpp"
 #include "filters/relocalize/pose_search.hpp"
 #include "filters/slam/bearing_tracks.hpp"
 #include "filters/slam/joint_state.hpp"
 #include "filters/slam/params.h"
-#include "sensors/sensor_model.hpp"
+#include "sensors/sighting.hpp"
 
 namespace wm {
 
@@ -75,26 +78,6 @@ class slam {
   uint32_t motion_health() const { return joint_.motion_health(); }
 
  private:
-  enum sensor_state {
-    kYaw,
-    kMountX,
-    kMountY,
-    kTimeOffset,
-    kRangeBias,
-    kRangeScale,
-    kDepthAxis,
-    kRoll,
-    kPitch,
-    kSensorStates
-  };
-
-  // The pose when a sighting was true, `age` before its stamp, and what moves it.
-  struct past_pose {
-    wm_pose2 pose;
-    double lever_x, lever_y;  // from now's position to it: what a heading error now makes of it
-    double age_by[3];         // of x, y, heading by the time offset
-    int stamp_state;          // of the picture's own stamp error; -1: off
-  };
   // A sighting as rows: what is expected, derivatives by the state (the landmark's apart), noise.
   struct view {
     int count;
@@ -111,11 +94,7 @@ class slam {
     double bearing_rad, range_m, heading_rad;
     double sigma_rad, sigma_m, heading_sigma_rad;
   };
-  // What a sighting is compared with: sigmas and which numbers count.
-  struct reading {
-    bool bearing, range;
-    double bearing_sigma, range_sigma;
-  };
+  using reading = sighting_reading;
 
   // A marker, levelled: along the sensor's yaw, on the floor.
   struct marker_reading {
@@ -154,15 +133,12 @@ class slam {
     double apart[2], s[2][2];
   };
 
-  past_pose look_back(int sensor) const;
+  past_pose look_back(int sensor) const;  // by the sensor's time offset
   void begin_picture(int sensor, wm_time_ns t_ns);
-  void add_pose(joint_row &row, const double by[3], const past_pose &past, int time_state) const;
-  double sensor_value(int sensor, int which, double neutral) const;
   sensor_errors errors_of(int sensor) const;
   wm_pose2 sensor_pose(int sensor, const past_pose &past) const;
 
   wm_status fuse_sighting(const wm_event &event, record_list records);
-  wm_status check_sighting(const wm_sighting &s) const;
   sighted sighted_of(const wm_sighting &s, const reading &r) const;
   wm_status take_pose(const wm_event &event);
   void see(const wm_sighting &s, const reading &r, const past_pose &past, const double place[2], int lasting,
@@ -258,7 +234,8 @@ class slam {
   const wm_setup *setup_;
   wm_slam_params params_;
   mounted_sensor sensor_[kSlamSensors];
-  int sensor_state_[kSlamSensors][kSensorStates];
+  sensor_slots slots_;
+  unsigned components_;                  // of expect(): whether the angle scale is a state
   int stamp_state_[kSlamSensors];        // error of the newest picture's stamp; -1: off
   wm_time_ns picture_ns_[kSlamSensors];  // that stamp
   state_pool<24> lasting_;

@@ -20,7 +20,7 @@ constexpr int kMax = 16;
 wm_motion_params params;
 wm_motion_states states;
 wm_setup setup;
-wm::planar_filter *filter;
+wm::planar_filter_of<64> *filter;
 
 double random_number(uint64_t i) { return wm_random_normal(5, 2, i); }
 
@@ -41,7 +41,7 @@ void make_busy_filter() {
   make_setup(wheels);
   const double sigma[9] = {0.1, 0.1, 0.02, 0.05, 0.05, 0.05, 0, 0, 0.05};
   std::memcpy(states.sigma, sigma, sizeof sigma);
-  filter->init(setup, states);
+  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
   for (int i = 0; i <= 20; i++) filter->move(make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i)));
 }
 
@@ -101,7 +101,7 @@ void test_prediction_carries_the_right_derivatives(void) {
   params.noise_side_rel = 0;
   const double sigma[9] = {0.1, 0.1, 0.02, 0.05, 0.05, 0.05, 0, 0.1, 0.05};
   std::memcpy(states.sigma, sigma, sizeof sigma);
-  filter->init(setup, states);
+  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
   for (int i = 0; i <= 20; i++) filter->move(make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i)));
   int state = 3, checked = 0;
   for (int k = 0; k < wm::kCalibrationCount; k++) {
@@ -132,7 +132,7 @@ void test_josephs_form_is_the_plain_one_at_the_best_gain(void) {
   const int n = filter->states();
   double p[kMax][kMax];
   copy_covariance(p);
-  wm::sparse_row row;
+  wm::planar_row row;
   row.add(0, 0.3);
   row.add(2, -1.1);
   row.add(5, 0.7);
@@ -145,7 +145,7 @@ void test_josephs_form_is_the_plain_one_at_the_best_gain(void) {
     for (int j = 0; j < n; j++) g[i] += p[i][j] * h[j];
   for (int i = 0; i < n; i++) s += h[i] * g[i];
   TEST_ASSERT_DOUBLE_WITHIN(1e-14, s - 0.05, projected.variance);
-  filter->update(projected, 0.2, 0.05);
+  TEST_ASSERT_TRUE(filter->update(projected, 0.2, 0.05));
   for (int i = 0; i < n; i++) {
     for (int j = 0; j < n; j++) {
       // (I - KH) P (I - KH)' + K R K', written out in full.
@@ -182,15 +182,15 @@ void test_one_number_after_the_other_is_all_at_once(void) {
   const double det = s[0][0] * s[1][1] - s[0][1] * s[1][0];
   const double inverse[2][2] = {{s[1][1] / det, -s[0][1] / det}, {-s[1][0] / det, s[0][0] / det}};
 
-  wm::sparse_row row[2];
+  wm::planar_row row[2];
   for (int k = 0; k < 2; k++)
     for (int i = 0; i < n; i++) row[k].add(i, h[k][i]);
   wm::projection first, second;
   filter->project(row[0], &first);
   const double cross = filter->project_onto(row[1], first);
-  filter->update(first, z[0], r[0]);
+  TEST_ASSERT_TRUE(filter->update(first, z[0], r[0]));
   filter->project(row[1], &second);
-  filter->update(second, z[1] - cross / (first.variance + r[0]) * z[0], r[1]);
+  TEST_ASSERT_TRUE(filter->update(second, z[1] - cross / (first.variance + r[0]) * z[0], r[1]));
 
   for (int i = 0; i < n; i++) {
     double want = x[i];
@@ -210,7 +210,7 @@ void test_one_number_after_the_other_is_all_at_once(void) {
 void test_standing_still_teaches_the_gyros_bias(void) {
   make_setup(make::car());
   states.sigma[2] = 0.02;
-  filter->init(setup, states);
+  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
   for (int i = 0; i < 300; i++)
     filter->move(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 0.0}, {WM_Q_YAW_RATE, 0.015 + 0.002 * (i % 2)}}));
   TEST_ASSERT_DOUBLE_WITHIN(0.001, 0.016, filter->calibration().value[wm::kYawRateBias]);
@@ -233,7 +233,7 @@ void test_fading_and_forgetting_keep_the_rest(void) {
 
 void test_the_estimate_of_a_drive_has_its_twist(void) {
   make_setup(make::no_wheels());
-  filter->init(setup, states);
+  filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
   for (int i = 0; i <= 10; i++) filter->move(make::twist(0.1 * i, 1.5, i < 5 ? 0.0 : 0.2));
   filter->move_to(make::at(1.1));
   wm_estimate out;
@@ -247,7 +247,8 @@ void test_the_estimate_of_a_drive_has_its_twist(void) {
 }  // namespace
 
 void setUp(void) {
-  filter = static_cast<wm::planar_filter *>(aligned_alloc(16, (sizeof(wm::planar_filter) + 15) / 16 * 16));
+  filter =
+      static_cast<wm::planar_filter_of<64> *>(aligned_alloc(16, (sizeof(wm::planar_filter_of<64>) + 15) / 16 * 16));
 }
 void tearDown(void) { free(filter); }
 

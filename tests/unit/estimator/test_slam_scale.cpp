@@ -36,8 +36,8 @@ void make_room() {
   wm_params_defaults(&wm_motion_params_table, &motion);
   wm_params_defaults(&slam->params, &params);
   params.motion.sigma[0] = kPrior;  // speed_scale
-  params.range_scale_sigma = kPrior;
-  params.sensor_yaw_sigma_rad = 0.05;
+  params.sensor_states.sigma[WM_SENSOR_ROW_kRangeScale] = kPrior;
+  params.sensor_states.sigma[WM_SENSOR_ROW_kYaw] = 0.05;
   motion.noise_yaw_rate_radps = 0.03;
   sensor = make::sensor("camera", 0.005, 0.02);
   sensor.range_is_depth = 1;
@@ -169,7 +169,7 @@ worn drive_under_prints() {
 void test_a_map_under_prints_is_as_large_as_they_say(void) {
   params.motion.sigma[0] = 0.0;
   for (int i = 0; i < 3; i++) params.motion.sigma[wm::kLeftScale + i] = 0.02;  // left, right, track
-  params.range_scale_sigma = 0.003;
+  params.sensor_states.sigma[WM_SENSOR_ROW_kRangeScale] = 0.003;
   params.markers = 1;
   params.marker_sigma_m = 0.0015;
   params.marker_sigma_rel = 0.0;
@@ -184,7 +184,7 @@ void test_a_map_under_prints_is_as_large_as_they_say(void) {
 
 // GIVEN a camera whose bearings are 0 beside its lens's axis WHEN it is driven THEN the angle between is found.
 void test_the_axis_of_depth_is_found(void) {
-  params.depth_axis_sigma_rad = 0.05;
+  params.sensor_states.sigma[WM_SENSOR_ROW_kDepthAxis] = 0.05;
   for (double axis : {-0.04, 0.03}) {
     const found f = drive(7, axis);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.01, f.axis_sigma);

@@ -20,7 +20,7 @@ struct Car {
   wm_motion_params motion;
   wm_setup setup = {};
   wm_motion_states states = {};
-  std::unique_ptr<wm::planar_filter> filter = std::make_unique<wm::planar_filter>();
+  std::unique_ptr<wm::planar_filter_of<64>> filter = std::make_unique<wm::planar_filter_of<64>>();
   double t_s = 0, left_m = 0, right_m = 0;
   uint64_t sample = 0;
 
@@ -40,7 +40,7 @@ struct Car {
     states.sigma[wm::kYawRateBias] = 0.005;
     states.sigma[wm::kTrackScale] = 0.01;
     states.wheel_difference_sigma = with_wheels ? 0.0141 : 0.0;
-    filter->init(setup, states);
+    filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
   }
 
   // One step of 10 ms; the right wheel is larger than stated by `difference`.
@@ -136,7 +136,7 @@ void test_a_day_leaves_the_covariance_sound(void) {
 void test_wheels_of_unknown_track_are_left_alone(void) {
   Car car(true);
   car.setup.wheels.track_m = NAN;
-  car.filter->init(car.setup, car.states);
+  car.filter->init(car.setup, car.states, wm::kPoseStates + wm::planar_filter::count_motion_states(car.states));
   for (int i = 0; i < 2000; i++) car.step(2.0, 0.1, 0.0, 0.01);
   TEST_ASSERT_TRUE(wm::finite(car.filter->pose().heading_rad) && wm::finite(car.sigma_heading()));
   TEST_ASSERT_EQUAL_DOUBLE(0, named(car, "motion.wheel_difference").value);

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+// The slots of the sensors' calibration states in a filter's state vector: all that follows from the table of
+// sensors/sensor_states.h.
+#ifndef WAYMARK_ESTIMATOR_CORE_SENSOR_SLOTS_HPP
+#define WAYMARK_ESTIMATOR_CORE_SENSOR_SLOTS_HPP
+
+#include <cmath>
+
+#include "filters/core/calibration_list.hpp"
+#include "sensors/sensor_model.hpp"
+#include "waymark/estimator.h"
+
+namespace wm {
+
+class sensor_slots {
+ public:
+  // States that so many sensors take.
+  static int count(const wm_sensor_states &states, size_t sensors) {
+    int each = 0;
+    for (const sensor_state_spec &spec : kSensorStateSpecs) each += states.sigma[spec.row] > 0.0;
+    return each * static_cast<int>(sensors);
+  }
+
+  // add(neutral, sigma, walk, low, high) appends a state to the filter and returns its index.
+  template <class Add>
+  void init(const wm_sensor_states &states, size_t sensors, Add add) {
+    for (size_t i = 0; i < kMaxSensors; i++)
+      for (int k = 0; k < kSensorStates; k++) {
+        const sensor_state_spec &s = kSensorStateSpecs[k];
+        const double sigma = states.sigma[s.row];
+        slot_[i][k] = i < sensors && sigma > 0.0 ? add(s.neutral, sigma, states.walk[s.row], s.low, s.high) : -1;
+      }
+  }
+
+  int at(int sensor, int state) const { return slot_[sensor][state]; }  // -1: off
+
+  // The errors as value(slot) gives them; neutral where the state is off.
+  template <class Value>
+  sensor_errors errors(int sensor, Value value) const {
+    sensor_errors out;
+    for (int k = 0; k < kSensorStates; k++)
+      if (slot_[sensor][k] >= 0) out[k] = value(slot_[sensor][k]);
+    return out;
+  }
+
+  // Adds the derivatives by all of a sensor's errors but the time offset to a Jacobian row. `by`: by sighting_cause.
+  template <class Row>
+  void add_to(Row *row, int sensor, const double by[kCauses]) const {
+    for (int k = 0; k < kSensorStates; k++)
+      if (k != kTimeOffset) row->add(slot_[sensor][k], by[kBySensor + k]);
+  }
+
+  template <class Filter>
+  void list(const wm_setup &setup, const Filter &filter, calibration_list *out) const {
+    for (size_t i = 0; i < setup.sensor_count; i++)
+      for (int k = 0; k < kSensorStates; k++)
+        if (const int slot = slot_[i][k]; slot >= 0)
+          out->add(setup.sensors[i].name, kSensorStateSpecs[k].name, filter.value(slot),
+                   std::sqrt(filter.variance(slot)));
+  }
+
+ private:
+  int slot_[kMaxSensors][kSensorStates];
+};
+
+}  // namespace wm
+
+#endif

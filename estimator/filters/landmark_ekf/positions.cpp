@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Positions (GNSS) and headings, from the event to the rows of their updates.
+#include "filters/landmark_ekf/landmark_ekf.hpp"
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kMaxPosition_m = 1e7;     // beyond, a coordinate is an error of the sender
+constexpr double kClutterPlace_m = 200.0;  // a false position lies anywhere in a square of this side
+
+wm_status check_position(const wm_position &p) {
+  if (!finite(p.p_m[0]) || !finite(p.p_m[1]) || !finite(p.sigma_xy_m)) return WM_NOT_FINITE;
+  const bool possible = std::fabs(p.p_m[0]) <= kMaxPosition_m && std::fabs(p.p_m[1]) <= kMaxPosition_m &&
+                        p.sigma_xy_m > 0.0 && p.sigma_xy_m < kMaxSigma;
+  return possible ? WM_OK : WM_OUT_OF_RANGE;
+}
+
+wm_status check_heading(const wm_heading &h) {
+  if (!finite(h.heading_rad) || !finite(h.sigma_rad)) return WM_NOT_FINITE;
+  const bool possible = std::fabs(h.heading_rad) <= kMaxAngle_rad && h.sigma_rad > 0.0 && h.sigma_rad < kMaxAngle_rad;
+  return possible ? WM_OK : WM_OUT_OF_RANGE;
+}
+
+}  // namespace
+
+// The receiver's time-correlated error on each axis: a Gauss-Markov process.
+void landmark_ekf::decay_gnss_error(wm_time_ns t_ns) {
+  if (gnss_error_state_ < 0) return;
+  const double left =
+      gnss_error_ns_ == WM_TIME_NONE ? 1.0 : decay_over(gnss_error_ns_, t_ns, params_.gnss_lasting_tau_s);
+  for (int k = 0; k < 2; k++) decay_state(&filter_, gnss_error_state_ + k, left, square(params_.gnss_lasting_m));
+  gnss_error_ns_ = t_ns;
+}
+
+wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records) {
+  const wm_position &p = event.as.position;
+  wm_innovation record = record_of(event, WM_RESIDUAL_X);
+  record.observed = p.p_m[0];
+  wm_status status = check_position(p);
+  if (status != WM_OK) return refuse(records, record, status);
+  status = filter_.check_time(event.t_ns);
+  if (status != WM_OK) return status;
+  filter_.move_to(event.t_ns);
+  if (!params_.use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
+  double sigma = params_.gnss_sigma_factor * p.sigma_xy_m;
+  if (sigma < params_.gnss_sigma_min_m) sigma = params_.gnss_sigma_min_m;
+  decay_gnss_error(event.t_ns);
+  const past_pose past = pose_before(filter_, gnss_time_state_ < 0 ? 0.0 : filter_.value(gnss_time_state_));
+  observation seen = observation_at(event.t_ns, kPositionKey, compose(filter_.odom(), past.step));
+  seen.kind = kObservedPosition;
+  seen.place_m[0] = p.p_m[0];
+  seen.place_m[1] = p.p_m[1];
+  seen.sigma_length_m = std::sqrt(square(sigma) + square(params_.gnss_lasting_m));
+  buffer_observation(seen);
+  if (life_.searching()) {
+    seek(event.t_ns);
+    return reject(records, record, WM_REJECTED_SEARCHING);
+  }
+  residual rows[2];
+  for (int k = 0; k < 2; k++) {
+    residual &r = rows[k];
+    const double by[3] = {k == 0 ? 1.0 : 0.0, k == 1 ? 1.0 : 0.0, 0.0};
+    add_past_pose(&r.row, by, past, gnss_time_state_);
+    double expected = k == 0 ? past.pose.x_m : past.pose.y_m;
+    if (gnss_error_state_ >= 0) {
+      r.row.add(gnss_error_state_ + k, 1.0);
+      expected += filter_.value(gnss_error_state_ + k);
+    }
+    r.record = record;
+    r.record.residual = k == 0 ? WM_RESIDUAL_X : WM_RESIDUAL_Y;
+    r.record.observed = p.p_m[k];
+    r.record.expected = expected;
+    r.innovation = p.p_m[k] - expected;
+    r.noise = square(sigma);
+  }
+  note(event.t_ns, kPositionKey, fuse(rows, 2, square(kClutterPlace_m), true, records));
+  return WM_OK;
+}
+
+wm_status landmark_ekf::fuse_heading(const wm_event &event, record_list records) {
+  const wm_heading &h = event.as.heading;
+  residual r;
+  r.record = record_of(event, WM_RESIDUAL_HEADING);
+  r.record.observed = h.heading_rad;
+  wm_status status = check_heading(h);
+  if (status != WM_OK) return refuse(records, r.record, status);
+  status = filter_.check_time(event.t_ns);
+  if (status != WM_OK) return status;
+  filter_.move_to(event.t_ns);
+  if (!params_.use_heading) return reject(records, r.record, WM_REJECTED_BY_CONFIG);
+  observation seen = observation_at(event.t_ns, kHeadingKey, filter_.odom());
+  seen.kind = kObservedHeading;
+  seen.bearing_rad = h.heading_rad;
+  seen.sigma_angle_rad = h.sigma_rad;
+  buffer_observation(seen);
+  if (life_.searching()) {
+    seek(event.t_ns);
+    return reject(records, r.record, WM_REJECTED_SEARCHING);
+  }
+  r.row.add(kHeading, 1.0);
+  r.record.expected = filter_.pose().heading_rad;
+  r.innovation = wrap(h.heading_rad - r.record.expected);
+  r.noise = square(h.sigma_rad);
+  note(event.t_ns, kHeadingKey, fuse(&r, 1, kTwoPi, true, records));
+  return WM_OK;
+}
+
+}  // namespace wm

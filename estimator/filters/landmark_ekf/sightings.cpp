@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: Apache-2.0
+// A sighting, from the event to the rows of its update: validation, association, expectation, Jacobian, noise.
+#include "filters/landmark_ekf/landmark_ekf.hpp"
+#include "math/arc.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kClutterRange_m = 30.0;  // a false range lies anywhere within this
+constexpr double kOnSensor_m = 0.05;      // nearer to the sensor a landmark has no bearing
+constexpr double kNear_m = 0.1;           // floor of a distance that an error across the line of sight is divided by
+constexpr double kBeyondRange = 1.5;      // times the sensor's range: landmarks farther away are not associated
+constexpr double kClearlyBest = 0.5;      // of the soft gate: only a fit within this is associated
+
+// The second-order correction of a sighting for an uncertain position: bias and variance of its expectation
+// [Athans1968]. It matters after seconds of blind driving, when the position is uncertain by metres.
+struct curvature {
+  double bearing_rad, bearing_variance, range_m, range_variance, elevation_rad, elevation_variance;
+};
+
+curvature curvature_of(const expected_sighting &e, double xx, double xy, double yy) {
+  const double bx = e.bearing_by[kByX], by = e.bearing_by[kByY];
+  // Covariance of the place across and along the line of sight, over the distance squared.
+  const double across = bx * bx * xx + 2.0 * bx * by * xy + by * by * yy;
+  const double along = by * by * xx - 2.0 * bx * by * xy + bx * bx * yy;
+  const double both = bx * by * (xx - yy) + (by * by - bx * bx) * xy;
+  // The elevation's tangent is height over distance.
+  const double tangent = finite(e.elevation_rad) ? tan(e.elevation_rad) : 0.0, over = 1.0 / (1.0 + square(tangent));
+  const double by_along = 2.0 * tangent * square(over) * along, by_across = -tangent * over * across;
+  return {-both,
+          along * across + square(both),
+          0.5 * e.distance_m * across,
+          0.5 * square(e.distance_m * across),
+          0.5 * (by_along + by_across),
+          0.5 * (square(by_along) + square(by_across))};
+}
+
+double at_least(double value, double floor) { return value > floor ? value : floor; }
+
+}  // namespace
+
+const sensor_errors landmark_ekf::errors_of(int sensor) const {
+  return slots_.errors(sensor, [this](int slot) { return filter_.value(slot); });
+}
+
+double landmark_ekf::time_offset(int sensor) const {
+  const int slot = slots_.at(sensor, kTimeOffset);
+  return slot < 0 ? 0.0 : filter_.value(slot);
+}
+
+double landmark_ekf::map_sigma(int landmark) const {
+  return at_least(setup_->landmarks[landmark].sigma_m, params_.map_sigma_min_m);
+}
+
+wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records) {
+  const wm_sighting &s = event.as.sighting;
+  const bool has_bearing = !std::isnan(s.bearing_rad);
+  wm_innovation record = record_of(event, has_bearing ? WM_RESIDUAL_BEARING : WM_RESIDUAL_RANGE);
+  record.sensor = s.sensor;
+  record.landmark_id = s.landmark_id;
+  record.observed = has_bearing ? s.bearing_rad : s.range_m;
+  wm_status status = check_sighting(s, setup_->sensor_count);
+  if (status != WM_OK) return refuse(records, record, status);
+  status = filter_.check_time(event.t_ns);
+  if (status != WM_OK) return status;
+  filter_.move_to(event.t_ns);
+
+  sighting_context at;
+  const wm_verdict verdict = associate(event, &at);
+  if (verdict != WM_FUSED) return reject(records, record, verdict);
+  record.landmark_id = setup_->landmarks[at.landmark].id;
+  if (params_.recover) buffer_observation(observation_of(at, event.t_ns));
+  if (is_sought(event.t_ns, at.reading.bearing)) {
+    seek(event.t_ns);
+    return reject(records, record, WM_REJECTED_SEARCHING);
+  }
+
+  const unsigned components = kBearing | (at.reading.range ? kRange : 0u) | (at.elevation ? kElevation : 0u) |
+                              components_;  // the bearing's derivatives are the curvature's, too
+  const expected_sighting e =
+      expect(sensor_[s.sensor], errors_of(s.sensor), at.past.pose, setup_->landmarks[at.landmark].p_m, components);
+  if (!e.possible && e.distance_m < kOnSensor_m) return reject(records, record, WM_REJECTED_SINGULAR);
+  if (!e.possible) {
+    note(event.t_ns, at.landmark, landmark_evidence::max_log_bayes_factor());
+    return reject(records, record, WM_REJECTED_OUT_OF_RANGE);
+  }
+  residual rows[2];
+  const int count = sighting_rows(at, e, record, rows);
+  const double clutter_volume = (at.reading.bearing ? kTwoPi : 1.0) * (at.reading.range ? kClutterRange_m : 1.0);
+  const bool usable = !records_[static_cast<size_t>(at.landmark)].moved && !evidence_.biased(at.landmark, event.t_ns);
+  double before[planar_row::kMax];
+  for (int k = 0; at.elevation && k < rows[1].row.count; k++) before[k] = filter_.value(rows[1].row.index[k]);
+  const double log_bayes = fuse(rows, at.elevation ? 1 : count, clutter_volume, usable, records);
+  if (at.elevation) fuse_elevation(rows, before, records);
+  if (at.reading.bearing)
+    note(event.t_ns, at.landmark, log_bayes, rows[0].innovation,
+         rows[0].innovation / std::sqrt(rows[0].record.variance));
+  else
+    note(event.t_ns, at.landmark, log_bayes);
+  return WM_OK;
+}
+
+wm_verdict landmark_ekf::associate(const wm_event &event, sighting_context *out) {
+  const wm_sighting &s = event.as.sighting;
+  const mounted_sensor &sensor = sensor_[s.sensor];
+  out->s = &s;
+  out->reading = read_sighting(s, sensor, params_);
+  if (!out->reading.bearing && !out->reading.range) return WM_REJECTED_BY_CONFIG;
+  if (!std::isnan(s.range_m) && s.range_m > sensor.max_range_m) return WM_REJECTED_OUT_OF_RANGE;
+  out->past = pose_before(filter_, time_offset(s.sensor));
+  if (s.landmark_id >= 0) {
+    out->landmark = index_.find(setup_->landmarks, s.landmark_id);
+    if (out->landmark < 0) return WM_REJECTED_UNKNOWN_ID;
+  } else {
+    out->landmark = params_.associate_unknown && life_.tracking() ? associate_nearest(*out) : -1;
+    if (out->landmark < 0) return WM_REJECTED_NO_ASSOCIATION;
+  }
+  out->elevation = wm_sighting_has_elevation(&s) && params_.use_elevation && out->reading.bearing &&
+                   !out->reading.range && finite(setup_->landmarks[out->landmark].p_m[2]) && finite(sensor.z_m);
+  return WM_FUSED;
+}
+
+// The one landmark that a sighting without identity fits: within half the gate, and no other within all of it.
+int landmark_ekf::associate_nearest(const sighting_context &at) {
+  const wm_sighting &s = *at.s;
+  const mounted_sensor &sensor = sensor_[s.sensor];
+  const sensor_errors errors = errors_of(s.sensor);
+  int best = -1, fitting = 0;
+  double least = params_.gate_soft;
+  for (int i = 0; i < static_cast<int>(setup_->landmark_count); i++) {
+    const expected_sighting e =
+        expect(sensor, errors, at.past.pose, setup_->landmarks[i].p_m, kBearing | kRange | components_);
+    if (!e.possible || e.distance_m > kBeyondRange * sensor.max_range_m) continue;
+    double chi2 = 0.0;
+    const auto test = [&](double observed, double expected, const double by[kCauses], double variance, bool angle) {
+      if (std::isnan(observed)) return;
+      planar_row row;
+      add_past_pose(&row, by, at.past, slots_.at(s.sensor, kTimeOffset));
+      slots_.add_to(&row, s.sensor, by);
+      projection p;
+      filter_.project(row, &p);
+      const double on_map = square(map_sigma(i)) * (square(by[kByX]) + square(by[kByY]));
+      const double difference = angle ? wrap(observed - expected) : observed - expected;
+      chi2 += square(difference) / (p.variance + variance + on_map);
+    };
+    test(s.bearing_rad, e.bearing_rad, e.bearing_by,
+         square(at.reading.bearing_sigma_rad) + square(params_.lateral_sigma_m / at_least(e.distance_m, kNear_m)),
+         true);
+    test(s.range_m, e.range_m, e.range_by,
+         square(at.reading.range_sigma_m) + square(params_.range_sigma_rel * e.range_m), false);
+    fitting += chi2 < params_.gate_soft;
+    if (chi2 < kClearlyBest * least) {
+      least = chi2 / kClearlyBest;
+      best = i;
+    }
+  }
+  return fitting == 1 ? best : -1;
+}
+
+landmark_ekf::lent_slots landmark_ekf::lend_states(int sensor, int landmark, wm_time_ns t_ns) {
+  lent_slots out;
+  const int64_t key = static_cast<int64_t>(landmark) * kMaxSensors + sensor;
+  out.error = errors_.lend(&filter_, key, error_width_, params_.lasting_tau_s, t_ns);
+  out.map = -1;
+  const double sigma = map_sigma(landmark);
+  if (!(sigma > 0.0)) return out;
+  bool fresh;
+  auto *slot = map_.take(landmark, &fresh);
+  if (!slot) return out;
+  out.map = slot->state;
+  slot->used_ns = t_ns;
+  const int width = params_.use_elevation ? 3 : 2;
+  for (int k = 0; fresh && k < width; k++) filter_.forget(slot->state + k, 0.0, square(sigma));
+  return out;
+}
+
+// The body's tilt on its suspension: a Gauss-Markov process, carried on to the time of each elevation.
+void landmark_ekf::decay_tilt(wm_time_ns t_ns) {
+  if (tilt_state_ < 0) return;
+  const double left = tilt_ns_ == WM_TIME_NONE ? 1.0 : decay_over(tilt_ns_, t_ns, params_.tilt_tau_s);
+  for (int k = 0; k < 2; k++) decay_state(&filter_, tilt_state_ + k, left, square(params_.tilt_sigma_rad));
+  tilt_ns_ = t_ns;
+}
+
+// Adds to a row all that is wrong beside the pose: the sensor, the time-correlated error, the landmark's place, the
+// body's tilt. An error that is a state changes the expectation; one that is not adds to the noise.
+void landmark_ekf::add_errors(const sighting_context &at, const lent_slots &lent, const double by[kCauses],
+                              int error_offset, double error_size, residual *r) const {
+  const int sensor = at.s->sensor;
+  add_past_pose(&r->row, by, at.past, slots_.at(sensor, kTimeOffset));
+  slots_.add_to(&r->row, sensor, by);
+  const auto add_state = [&](int state, double derivative) {
+    r->row.add(state, derivative);
+    r->record.expected += derivative * filter_.value(state);
+  };
+  if (lent.error >= 0 && error_offset >= 0)
+    add_state(lent.error + error_offset, error_size);
+  else
+    r->noise += square(error_size);
+  if (lent.map >= 0) {
+    add_state(lent.map, -by[kByX]);
+    add_state(lent.map + 1, -by[kByY]);
+  } else {
+    r->noise += square(map_sigma(at.landmark)) * (square(by[kByX]) + square(by[kByY]));
+  }
+  if (!at.elevation) return;
+  if (lent.map >= 0)
+    add_state(lent.map + 2, by[kByHeight]);
+  else
+    r->noise += square(map_sigma(at.landmark) * by[kByHeight]);
+  if (tilt_state_ < 0) return;
+  add_state(tilt_state_, by[kByBodyRoll]);
+  add_state(tilt_state_ + 1, by[kByBodyPitch]);
+}
+
+// `expected`: by pose and sensor; r->record.expected has what the lent states add.
+void landmark_ekf::finish_row(wm_residual kind, double observed, double expected, const wm_innovation &record,
+                              residual *r) const {
+  const double total = expected + r->record.expected;
+  r->record = record;
+  r->record.residual = static_cast<uint8_t>(kind);
+  r->record.observed = observed;
+  r->record.expected = total;
+  const double difference = observed - total;
+  r->innovation = kind == WM_RESIDUAL_BEARING ? wrap(difference) : difference;
+}
+
+int landmark_ekf::sighting_rows(const sighting_context &at, const expected_sighting &e, const wm_innovation &record,
+                                residual rows[2]) {
+  const wm_sighting &s = *at.s;
+  const lent_slots lent = lend_states(s.sensor, at.landmark, record.t_ns);
+  if (at.elevation) decay_tilt(record.t_ns);
+  const double distance = at_least(e.distance_m, kNear_m);
+  const curvature second = curvature_of(e, filter_.variance(kX), filter_.covariance(kX, kY), filter_.variance(kY));
+  int count = 0;
+  if (at.reading.bearing) {
+    residual &r = rows[count++];
+    r.record.expected = 0.0;
+    r.noise =
+        square(at.reading.bearing_sigma_rad) + square(params_.lateral_sigma_m / distance) + second.bearing_variance;
+    add_errors(at, lent, e.bearing_by, bearing_error_,
+               std::sqrt(square(params_.lasting_bearing_rad) + square(params_.lasting_lateral_m / distance)), &r);
+    finish_row(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad + second.bearing_rad, record, &r);
+  }
+  if (at.reading.range) {
+    residual &r = rows[count++];
+    r.record.expected = 0.0;
+    r.noise = square(at.reading.range_sigma_m) + square(params_.range_sigma_rel * e.range_m) + second.range_variance;
+    add_errors(at, lent, e.range_by, range_error_,
+               std::sqrt(square(params_.lasting_range_m) + square(params_.lasting_range_rel * e.range_m)), &r);
+    finish_row(WM_RESIDUAL_RANGE, s.range_m, e.range_m + second.range_m, record, &r);
+  }
+  if (at.elevation) {
+    residual &r = rows[count++];
+    r.record.expected = 0.0;
+    r.noise = square(s.elevation_sigma_rad) + second.elevation_variance;
+    add_errors(at, lent, e.elevation_by, -1, 0.0, &r);
+    finish_row(WM_RESIDUAL_ELEVATION, s.elevation_rad, e.elevation_rad + second.elevation_rad, record, &r);
+  }
+  return count;
+}
+
+}  // namespace wm

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// From the rows of an observation to its gate, its update and its records.
+#include "filters/landmark_ekf/landmark_ekf.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kUnproven_nis = 9.21;   // 99 % of chi2 with two degrees of freedom
+constexpr double kInflate = 1.5;         // times the pose's sigmas while misfits go on ...
+constexpr double kInflateEvery_s = 1.0;  // ... and slower than a search may find the pose
+
+}  // namespace
+
+// A start that is surer than it should be must not bend the calibration: until the pose is proven the gate is at 99 %.
+bool landmark_ekf::passes(const gate_result &g, int dof) const {
+  const bool unproven = params_.recover && !evidence_.proven();
+  return g.passed && (!unproven || g.nis <= kUnproven_nis * gate_scale(dof));
+}
+
+// The components of one observation are gated together: a wrong one spoils the other. Then they are fused one after the
+// other ([Stepanov2017]), each with its innovation as the ones before left it, which is the same as both at once.
+double landmark_ekf::fuse(residual *r, int count, double clutter_volume, bool usable, record_list records) {
+  projection first;
+  filter_.project(r[0].row, &first);
+  const double s00 = first.variance + r[0].noise;
+  double nis = square(r[0].innovation) / s00, cross = 0.0, determinant = s00, s11 = 0.0;
+  if (count == 2) {
+    projection second;
+    filter_.project(r[1].row, &second);
+    cross = filter_.project_onto(r[1].row, first);
+    s11 = second.variance + r[1].noise;
+    determinant = s00 * s11 - cross * cross;
+    nis = (s11 * square(r[0].innovation) - 2.0 * cross * r[0].innovation * r[1].innovation +
+           s00 * square(r[1].innovation)) /
+          determinant;
+  }
+  const double density = exp(-0.5 * nis) / std::sqrt((count == 2 ? square(kTwoPi) : kTwoPi) * determinant);
+  const double log_bayes = landmark_evidence::log_bayes_factor(density, clutter_volume);
+  const gate_result g = gate(nis, count, {params_.gate_soft, params_.gate_hard});
+  const wm_time_ns now = filter_.now_ns();
+  if (g.soft && evidence_.doubtful() &&
+      (loosened_ns_ == WM_TIME_NONE || wm_seconds_between(loosened_ns_, now) > kInflateEvery_s)) {
+    // Several misfits lately: the pose is less sure than its covariance, not this measurement alone.
+    loosened_ns_ = now;
+    filter_.scale_pose_sigmas(kInflate);
+    filter_.project(r[0].row, &first);
+    if (count == 2) cross = filter_.project_onto(r[1].row, first);
+  }
+  wm_verdict verdict = usable && passes(g, count) ? WM_FUSED : WM_REJECTED_GATE;
+  if (verdict == WM_FUSED) verdict = update(r, count, g, &first, cross);
+  for (int i = 0; i < count; i++) {
+    put_gate(g, count, i == 0 ? s00 : s11, verdict, &r[i].record);
+    records.add(r[i].record);
+  }
+  return verdict == WM_FUSED || (usable && g.passed) ? log_bayes : landmark_evidence::max_log_bayes_factor();
+}
+
+// Between the two gates the noise is inflated. While several observations misfit, the pose may move, but calibration
+// states are considered, not corrected [Schmidt1966].
+wm_verdict landmark_ekf::update(residual *r, int count, const gate_result &g, projection *first, double cross) {
+  if (r[0].row.missing > 0 || (count == 2 && r[1].row.missing > 0)) return WM_REJECTED_NUMERIC;
+  const int kept = g.soft && evidence_.doubtful() ? calibration_states_ : kPoseStates;
+  const double noise = r[0].noise * g.noise_scale;
+  if (!filter_.update(*first, r[0].innovation, noise, kPoseStates, kept)) return WM_REJECTED_NUMERIC;
+  if (count == 2) {
+    const double left = r[1].innovation - cross / (first->variance + noise) * r[0].innovation;
+    filter_.project(r[1].row, first);
+    if (!filter_.update(*first, left, r[1].noise * g.noise_scale, kPoseStates, kept)) return WM_REJECTED_NUMERIC;
+  }
+  life_.fused(filter_.now_ns());
+  return WM_FUSED;
+}
+
+// After its bearing, with the innovation that this left of it (`before`: the row's states before). It has a gate of its
+// own and is no evidence about the pose: a camera with a larger tilt than stated must not make the robot lost.
+void landmark_ekf::fuse_elevation(residual bearing_then_own[2], const double *before, record_list records) {
+  residual &r = bearing_then_own[1];
+  for (int k = 0; k < r.row.count; k++) {
+    const double moved = filter_.value(r.row.index[k]) - before[k];
+    r.innovation -= r.row.by[k] * (r.row.index[k] == kHeading ? wrap(moved) : moved);
+  }
+  projection own;
+  filter_.project(r.row, &own);
+  const double variance = own.variance + r.noise;
+  r.record.expected = r.record.observed - r.innovation;
+  const gate_result g = gate(square(r.innovation) / variance, 1, {params_.gate_soft, params_.gate_hard});
+  const bool fits = passes(g, 1) && bearing_then_own[0].record.verdict == WM_FUSED;
+  wm_verdict verdict = fits ? WM_FUSED : WM_REJECTED_GATE;
+  if (fits && (r.row.missing > 0 || !filter_.update(own, r.innovation, r.noise))) verdict = WM_REJECTED_NUMERIC;
+  put_gate(g, 1, variance, verdict, &r.record);
+  records.add(r.record);
+}
+
+}  // namespace wm

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+// The pose at the time of a measurement, which lies before (or, by an uncertain time offset, behind) the time at which
+// the planar filter's state stands.
+#ifndef WAYMARK_ESTIMATOR_PLANAR_PAST_POSE_HPP
+#define WAYMARK_ESTIMATOR_PLANAR_PAST_POSE_HPP
+
+#include "filters/planar/planar_motion.hpp"
+#include "math/arc.hpp"
+
+namespace wm {
+
+struct past_pose {
+  wm_pose2 pose;            // base_link in map at the time of measurement
+  wm_pose2 step;            // the same in base_link now
+  double lever_x, lever_y;  // from the present position to it, m: the derivative by a heading error now
+  double age_by[3];         // of x, y, heading by the time offset
+  int stamp_slot;           // state of the error of this measurement's stamp; -1: none
+};
+
+// `filter` is planar: it has pose(), now_ns() and path(). `age_s`: how long before now the measurement was taken.
+template <class Filter>
+past_pose pose_before(const Filter &filter, double age_s) {
+  past_pose out;
+  out.stamp_slot = -1;
+  const wm_time_ns now = filter.now_ns(), then = now - wm_ns_from_seconds(age_s);
+  motion_twist twist{};
+  out.step = {};
+  if (then < now) {
+    out.step = between(filter.path(then, now, &twist), wm_pose2{});
+  } else if (then > now) {
+    out.step = filter.path(now, then, &twist);
+  } else {
+    filter.path(now - 1, now, &twist);
+  }
+  const wm_pose2 present = filter.pose();
+  out.pose = compose(present, out.step);
+  out.lever_x = out.pose.x_m - present.x_m;
+  out.lever_y = out.pose.y_m - present.y_m;
+  const sin_cos h = sincos(out.pose.heading_rad);
+  out.age_by[0] = -twist.v * h.cos;
+  out.age_by[1] = -twist.v * h.sin;
+  out.age_by[2] = -twist.w;
+  return out;
+}
+
+// Turns derivatives by the past pose's x, y, heading into those by the present pose and by the time offset.
+template <class Row>
+void add_past_pose(Row *row, const double by[3], const past_pose &past, int time_offset_slot) {
+  row->add(kX, by[0]);
+  row->add(kY, by[1]);
+  row->add(kHeading, by[2] - by[0] * past.lever_y + by[1] * past.lever_x);
+  const double by_age = by[0] * past.age_by[0] + by[1] * past.age_by[1] + by[2] * past.age_by[2];
+  row->add(time_offset_slot, by_age);
+  row->add(past.stamp_slot, by_age);
+}
+
+}  // namespace wm
+
+#endif

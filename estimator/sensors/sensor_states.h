@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// The table of the sensors' calibration states, for every filter that takes sightings or markers. A row gives the keys
+// and their unit, the name in calibration(), the neutral value, limits, and whether the state walks. From it follow the
+// parameters, the slots, start, process noise, roll-back, limits, the list of calibration values and the capacity. The
+// derivative of a new state stands in sensor_model.cpp; nothing else names it.
+#ifndef WAYMARK_ESTIMATOR_SENSORS_SENSOR_STATES_H
+#define WAYMARK_ESTIMATOR_SENSORS_SENSOR_STATES_H
+
+#include <stddef.h>
+
+#include "waymark/params.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// ONE(state, key, unit, name, neutral, low, high, WALK or CONSTANT, most, text)
+// TWO(state, second, key, unit, name, second name, neutral, low, high, ..., most, text): two states with one sigma
+// `low` and `high`: beyond these an update is cut, since the model no longer holds; `most`: of the sigma parameter.
+// clang-format off
+#define WM_SENSOR_STATES(ONE, TWO) \
+  ONE(kYaw, "sensor_yaw", "_rad", "yaw_rad", 0, -3.2, 3.2, WALK, 3.2, \
+      "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off.") \
+  TWO(kMountX, kMountY, "sensor_xy", "_m", "x_m", "y_m", 0, -100, 100, CONSTANT, 10, \
+      "Start sigma of each sensor's place on the robot about calibration.yaml's, forwards and sideways, m. 0: off.") \
+  TWO(kRoll, kPitch, "sensor_tilt", "_rad", "roll_rad", "pitch_rad", 0, -1, 1, CONSTANT, 1, \
+      "Start sigma of each sensor's roll and of its pitch about calibration.yaml's, rad: they move bearings to " \
+      "landmarks above or below the sensor, and the places of coded markers. 0: off.") \
+  ONE(kAngleScale, "sensor_angle_scale", "", "angle_scale", 0, -0.5, 0.5, CONSTANT, 1, \
+      "Start sigma of each sensor's relative error of angles from its axis: a wrongly calibrated focal length. 0: off.") \
+  ONE(kTimeOffset, "sensor_time_offset", "_s", "time_offset_s", 0, -5, 5, CONSTANT, 1, \
+      "Start sigma of each sensor's time offset, s: its sightings are that much older than their stamps. 0: off.") \
+  ONE(kRangeBias, "range_bias", "_m", "range_bias_m", 0, -100, 100, CONSTANT, 10, \
+      "Start sigma of each sensor's range bias, m. 0: off.") \
+  ONE(kRangeScale, "range_scale", "", "range_scale", 1, 0.1, 10, WALK, 1, \
+      "Start sigma of each sensor's range scale about 1. 0: off. Needs ranges of many lengths beside a range bias.") \
+  ONE(kDepthAxis, "depth_axis", "_rad", "depth_axis_rad", 0, -1, 1, CONSTANT, 1, \
+      "Start sigma of the angle from where a sensor's bearings are 0 to the axis along which its depths are measured " \
+      "(range_is: depth): a camera's middle column need not lie on its lens's axis. 0: off.")
+
+#define WM_SENSOR_ROW_ONE(state, ...) WM_SENSOR_ROW_##state,
+#define WM_SENSOR_ROW_TWO(state, ...) WM_SENSOR_ROW_##state,
+enum { WM_SENSOR_STATES(WM_SENSOR_ROW_ONE, WM_SENSOR_ROW_TWO) WM_SENSOR_ROWS };
+
+// By row of the table.
+typedef struct wm_sensor_states {
+  double sigma[WM_SENSOR_ROWS];  // at the start; 0: not a state
+  double walk[WM_SENSOR_ROWS];   // random walk, per sqrt(s)
+} wm_sensor_states;
+
+// Rows of parameters, in a file whose struct `params` has the member `sensor_states`.
+#define WM_SENSOR_WALK_CONSTANT(state, key, unit)
+#define WM_SENSOR_WALK_WALK(state, key, unit) \
+  {"states." key "_walk" unit, WM_PARAM_F64, offsetof(params, sensor_states.walk[WM_SENSOR_ROW_##state]), 0, 0, 1, NULL, \
+   "Random walk of that state per sqrt(s). 0: it is constant."},
+#define WM_SENSOR_PARAM_ONE(state, key, unit, name, neutral, low, high, noise, most, text) \
+  {"states." key "_sigma" unit, WM_PARAM_F64, offsetof(params, sensor_states.sigma[WM_SENSOR_ROW_##state]), 0, 0, most, \
+   NULL, text}, \
+  WM_SENSOR_WALK_##noise(state, key, unit)
+#define WM_SENSOR_PARAM_TWO(state, second, key, unit, name, name2, neutral, low, high, noise, most, text) \
+  WM_SENSOR_PARAM_ONE(state, key, unit, name, neutral, low, high, noise, most, text)
+#define WM_SENSOR_STATE_PARAMS WM_SENSOR_STATES(WM_SENSOR_PARAM_ONE, WM_SENSOR_PARAM_TWO)
+// clang-format on
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
