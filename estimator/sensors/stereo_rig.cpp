@@ -6,7 +6,7 @@
 namespace wm {
 namespace {
 
-constexpr double kNearest_m = 0.02;
+constexpr double kNearest_m = 0.02;  // along the optical axis; nearer points have no useful pixel
 
 bool positive(double x) { return finite(x) && x > 0.0; }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The camera pair as the filter uses it: two rectified pinhole pictures, left and right, side by side.
+// A rectified pair of pinhole cameras, side by side.
 #ifndef WAYMARK_ESTIMATOR_STEREO_RIG_HPP
 #define WAYMARK_ESTIMATOR_STEREO_RIG_HPP
 
@@ -16,14 +16,15 @@ struct stereo_rig {
   mat3 R_base_optical;  // axes of the left camera: x right, y down, z along the view
   vec3 place;           // of the left camera in base_link
 
-  // False with *why set (a constant string) where the calibration has no usable pair; without one, `there` is false.
+  // False with *why set (a constant string): the pair of the calibration is not usable. Without a pair, `there` is
+  // false.
   bool init(const wm_rig *rig, const char **why);
 
   // Pixel of a point in the left camera's axes; z > 0. Derivatives by the point.
   void see(const vec3 &x, double px[4], double by[4][3]) const;
-  // The point from its four pixels and the derivatives; false where left and right are closer than `disparity_min_px`.
+  // The point of four pixels, and its derivatives. False: the disparity is below `disparity_min_px`.
   bool triangulate(const double px[4], double disparity_min_px, vec3 *x, double by[3][4]) const;
-  // Whether the pair's pictures both hold it, `margin_px` from their edges.
+  // Whether both pictures show the point, `margin_px` from their edges.
   bool in_view(const vec3 &x, double margin_px) const;
 };
 

@@ -8,7 +8,8 @@
 namespace wm {
 namespace {
 
-constexpr double kInside_px = 8.0;  // so far from the picture's edge a point is expected to be seen
+// Margin from the picture's edge within which a point need not be found: half of a detector's patch. Not swept.
+constexpr double kInside_px = 8.0;
 
 }  // namespace
 
@@ -25,8 +26,8 @@ void stereo_ekf::begin_picture(wm_time_ns t_ns) {
   motion_.begin_picture();
 }
 
-// [BorisovND]: a point that is out of view goes, one that is expected and not seen is kept unused for some steps.
-// Here one that is out of view is kept for a while, too: the vehicle may come back.
+// [BorisovND] removes a point out of view at once, and keeps one that was missed for some steps. Here a point out of
+// view is kept for a while, too: the vehicle may return.
 void stereo_ekf::end_picture() {
   if (picture_ns_ == WM_TIME_NONE) return;
   filter_.settle();
@@ -36,7 +37,7 @@ void stereo_ekf::end_picture() {
       point_info &point = info()[slot];
       if (point.seen_ns == picture_ns_ || point.unseen == kOfMap) continue;
       const vec3 x = in_camera(filter_.point(slot), past);
-      // One whose own sightings don't fit stands in the wrong place, be that in view or not.
+      // A point whose observations are outliers has a wrong place, in view or not.
       if (point.misfit_ns == picture_ns_ || rig_.in_view(x, kInside_px)) {
         if (++point.unseen > params_.keep_unseen_steps) remove_point(slot);
       } else if (wm_seconds_between(point.seen_ns, picture_ns_) > params_.keep_outside_s) {
@@ -53,7 +54,7 @@ void stereo_ekf::remove_point(int slot) {
   info()[slot] = info()[last];
 }
 
-// The one that was not seen for longest leaves; none of those that the running picture shows.
+// Removes the found point that was not seen for longest; points of the present picture stay.
 bool stereo_ekf::make_room() {
   int oldest = -1;
   for (int i = 0; i < filter_.point_count(); i++)
@@ -65,7 +66,7 @@ bool stereo_ekf::make_room() {
   return true;
 }
 
-// A known point's error on the map is the same whenever it is seen: a state, where there is room for it.
+// The error of a known point on the map is constant: it is a state where there is capacity. -1: none.
 int stereo_ekf::slot_of_known(int landmark) {
   const wm_landmark &known = setup_->landmarks[landmark];
   const double sigma = map_sigma(known);
@@ -89,7 +90,7 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
     records.add(record);
     return;
   }
-  // Left and right of a rectified pair lie in one row: what doesn't is a wrong match.
+  // Left and right of a rectified pair lie in one row; otherwise the match is wrong.
   const double row_variance = square(sigma_px_[1]) + square(sigma_px_[3]);
   record.observed = px[1] - px[3];
   record.variance = row_variance;
@@ -121,9 +122,9 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
   records.add(record);
 }
 
-// A sighting that does not fit the point whose number it has. Where one sighting alone stands against it, either may be
-// the wrong match: it begins again with the newer one, and whichever is wrong is contradicted by the next. (Left alone,
-// a point begun by a wrong match would stand far off, out of view, and turn away all that is seen of it.)
+// An observation that is an outlier for the point with its number. A point of one observation begins again with the
+// newer one: either may be the wrong match, and the next observation decides. (Otherwise a point that began with a
+// wrong match stays far off and out of view, and rejects every later observation.)
 void stereo_ekf::contradict_point(int slot, const wm_stereo &seen, const wm_innovation &blank, record_list records) {
   info()[slot].misfit_ns = picture_ns_;
   if (info()[slot].seen_ns != info()[slot].begun_ns) return;

@@ -14,7 +14,8 @@
 namespace wm {
 namespace {
 
-// Velocity and rates as states are carried in steps so long.
+// Prediction with velocity and rates as states: step, and the number of steps that bounds the cost of a pause. At 1
+// rad/s a step of 0.05 s leaves second-order terms of 1e-3.
 constexpr double kStep_s = 0.05;
 constexpr int kStepsMax = 40;
 constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
@@ -145,7 +146,7 @@ wm_status stereo_ekf::predict(const wm_event &motion) {
   const bool early = start_ns_ != WM_TIME_NONE && motion.t_ns < start_ns_;
   if (now_ns_ != WM_TIME_NONE && motion.t_ns < now_ns_) return WM_TIME_RAN_BACK;
   motion_.feed(motion);
-  if (early) {  // the pose is known later on: until then only what holds is kept
+  if (early) {  // the start pose is of a later time: until then samples are kept, not integrated
     now_ns_ = motion.t_ns;
     return WM_OK;
   }

@@ -30,17 +30,17 @@ class stereo_ekf {
   uint32_t motion_health() const { return motion_.health(); }
 
  private:
-  // A point of the state: whose it is, when it began, was seen last, and did not fit last.
   static constexpr int32_t kOfMap = -1;
   // Observations of the last seconds are used to find the pose; odometry relates them. Not swept.
   static constexpr double kWindow_s = 3.0;
   static constexpr int kDepthKey = -4;  // beside core/landmark_evidence.hpp's keys
+  // A point of the state.
   struct point_info {
-    wm_time_ns begun_ns, seen_ns, misfit_ns;
+    wm_time_ns begun_ns, seen_ns, misfit_ns;  // first and last fused, last outlier
     int32_t id;
-    int32_t unseen;  // kOfMap, or pictures in which it was expected and not seen, or did not fit
+    int32_t unseen;  // kOfMap, or pictures in which it was missed or was an outlier
   };
-  // The pose when an observation was true, and the twist about then, in body axes.
+  // The pose at the time of measurement, and the twist about then, in body axes.
   struct past_pose {
     pose3 at;
     mat3 R;
@@ -138,7 +138,7 @@ class stereo_ekf {
   arrays arrays_;
   double sigma_px_[4];
   wm_time_ns now_ns_, start_ns_;
-  wm_time_ns picture_ns_;    // the picture that points are being taken of; NONE between pictures
+  wm_time_ns picture_ns_;    // the present picture; NONE between pictures
   travelled_pose odometry_;  // motion alone
   landmark_evidence evidence_;
   pose_consensus observations_;
