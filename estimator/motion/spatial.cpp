@@ -47,6 +47,7 @@ bool spatial_history::is_plausible(wm_time_ns t_ns, const spatial_twist &twist) 
 bool spatial_history::feed(wm_time_ns t_ns, const spatial_twist &twist) {
   if (!is_plausible(t_ns, twist)) {
     last_refusal_ns_ = t_ns;
+    outliers_++;
     if (refused_since_ns_ == WM_TIME_NONE) refused_since_ns_ = samples_ > 0 ? sample_[0].t_ns : t_ns;
     return false;
   }

@@ -57,6 +57,7 @@ class spatial_history {
   double period_s() const { return period_s_; }                       // between the last two samples that were no gap
   bool refuses() const { return refused_since_ns_ != WM_TIME_NONE; }  // the newest sample was refused
   bool refused_lately() const;
+  uint64_t outliers() const { return outliers_; }  // samples that were refused
 
  private:
   template <class Step>
@@ -71,6 +72,7 @@ class spatial_history {
   spatial_rules rules_;
   sample_check check_[6];
   wm_time_ns refused_since_ns_, last_refusal_ns_;
+  uint64_t outliers_;
   spatial_sample sample_[3];  // the newest first
   int samples_;
   double period_s_;
@@ -129,6 +131,7 @@ class spatial_motion {
   bool sample_now(spatial_twist *now, spatial_twist *slope) const;
   // Variances of one sample's components.
   void sample_noise(vec3 *v_var, vec3 *w_var) const;
+  uint64_t outliers() const { return front_.outliers() + history_.outliers(); }
   uint32_t health() const { return front_.health() | (history_.refused_lately() ? WM_MOTION_HEALTH_IMPLAUSIBLE : 0u); }
 
  private:

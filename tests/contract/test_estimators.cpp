@@ -374,6 +374,26 @@ void test_counters_are_typed(void) {
   }
 }
 
+// GIVEN a steady drive WHEN one sample says 138 m/s THEN it is counted, once.
+void test_motion_that_no_robot_can_do_is_counted(void) {
+  machine a;
+  for (int i = 0; i < 200; i++) {
+    wm_event e{};
+    e.t_ns = wm_ns_from_seconds(0.02 * i);
+    e.kind = WM_EVENT_TWIST2;
+    e.as.twist2 = {i == 150 ? 138.0 : 0.5, 0.0};
+    (void)a.take(e);
+  }
+  wm_counter counters[WM_HEALTH_COUNTERS_MAX];
+  const size_t count = estimator->counters(a.state, counters, WM_HEALTH_COUNTERS_MAX);
+  for (size_t k = 0; k < count; k++)
+    if (counters[k].kind == WM_COUNTER_MOTION_OUTLIERS) {
+      TEST_ASSERT_EQUAL(1, counters[k].count);
+      return;
+    }
+  TEST_FAIL_MESSAGE("motion outliers are not counted");
+}
+
 void test_what_is_learnt_is_listed_and_given_to_the_predictor(void) {
   machine a;
   for (uint64_t i = 0; i < 500; i++) a.take(event_at(i, 0.02 * (double)i));
@@ -455,6 +475,7 @@ int main(void) {
     RUN_TEST(test_a_day_without_drift_of_symmetry);
     RUN_TEST(test_the_lost_probability_is_a_probability_or_absent);
     RUN_TEST(test_counters_are_typed);
+    RUN_TEST(test_motion_that_no_robot_can_do_is_counted);
     RUN_TEST(test_what_is_learnt_is_listed_and_given_to_the_predictor);
   }
   if (wm_estimator_find("no such") || count < 2) return 1;

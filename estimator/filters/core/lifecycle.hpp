@@ -47,6 +47,7 @@ class lifecycle {
     corrected(t_ns);
     state_ = WM_STATE_TRACKING;
     found_ns_ = t_ns;
+    relocalizations_++;
   }
 
   bool searching() const { return state_ == WM_STATE_SEARCHING; }
@@ -73,10 +74,11 @@ class lifecycle {
   wm_time_ns lost_ns() const { return lost_ns_; }
   wm_time_ns found_ns() const { return found_ns_; }
   uint32_t resets() const { return resets_; }
+  uint32_t relocalizations() const { return relocalizations_; }  // poses that a search found
 
  private:
   uint8_t state_ = WM_STATE_SEARCHING;
-  uint32_t resets_ = 0;
+  uint32_t resets_ = 0, relocalizations_ = 0;
   wm_time_ns fused_ns_ = WM_TIME_NONE, lost_ns_ = WM_TIME_NONE, found_ns_ = WM_TIME_NONE;
   wm_time_ns searched_ns_ = WM_TIME_NONE, inflated_ns_ = WM_TIME_NONE;
 };

@@ -76,6 +76,7 @@ void edge_mcl::watch(const normal_equations &scan, double dt_s) {
     restore_calibration();
   } else if (state_ != WM_STATE_TRACKING && odds < kFoundOdds) {
     state_ = WM_STATE_TRACKING;
+    relocalizations_++;
     on_trial_ = false;
   } else if (on_trial_ && odds > kLostOdds) {
     on_trial_ = false;

@@ -232,9 +232,10 @@ size_t edge_mcl::list_calibration(wm_calibration_value *out, size_t capacity) co
 
 size_t edge_mcl::list_counters(wm_counter *out, size_t capacity) const {
   counter_list list(out, capacity);
+  list.add(WM_COUNTER_MOTION_OUTLIERS, filter_.motion_outliers());
+  list.add(WM_COUNTER_RELOCALIZATIONS, relocalizations_);
   list.add(WM_COUNTER_ALIASED_POSES, (uint64_t)alike_.count());
   list.add(WM_COUNTER_EXPLAINED_PERMILLE, (uint64_t)(1000.0 * explained_ + 0.5));
-  list.add(WM_COUNTER_MOTION_OUTLIERS, filter_.motion_outliers());
   return list.count();
 }
 

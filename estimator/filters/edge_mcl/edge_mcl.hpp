@@ -132,7 +132,7 @@ class edge_mcl {
   double shortfall_;              // what scans were short of what is usual, in that time, on average
   double alike_m_;                // way when look-alikes were last weighed
   double watched_m_;              // way when the last scan was judged
-  uint32_t resets_;
+  uint32_t resets_, relocalizations_;
   uint8_t state_;
   bool at_ease_;   // what is seen is what was to be expected
   bool in_doubt_;  // of the pose: what was seen lately is looked for elsewhere

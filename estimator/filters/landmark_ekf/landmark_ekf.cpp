@@ -222,8 +222,9 @@ size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity
 
 size_t landmark_ekf::list_counters(wm_counter *out, size_t capacity) const {
   counter_list list(out, capacity);
-  list.add(WM_COUNTER_LANDMARKS_MOVED, (uint64_t)moved_, moved_id_);
+  list.add(WM_COUNTER_LANDMARKS_MOVED, moved_, moved_id_);
   list.add(WM_COUNTER_MOTION_OUTLIERS, filter_.motion_outliers());
+  list.add(WM_COUNTER_RELOCALIZATIONS, life_.relocalizations());
   return list.count();
 }
 

@@ -189,6 +189,12 @@ void pf_edges::estimate(wm_estimate *out) const {
       pose, [&m](int r, int c) { return m.covariance[r][c] + (r == c ? kCovarianceMin[r] : 0.0); }, out);
 }
 
+size_t pf_edges::list_counters(wm_counter *out, size_t capacity) const {
+  counter_list list(out, capacity);
+  list.add(WM_COUNTER_MOTION_OUTLIERS, odometry_.motion_outliers());
+  return list.count();
+}
+
 size_t pf_edges::list_particles(wm_particle *out, size_t capacity) const {
   const size_t count = (size_t)particles_.count();
   for (size_t i = 0; i < count && i < capacity; i++)

@@ -177,6 +177,7 @@ void slam::take_found() {
   begin_evidence(params_.line_rejoin);  // no identity proves a pose found by a pattern
   fused_ns_ = joint_.now_ns();
   resets_++;
+  counts_.relocalized++;
 }
 
 void slam::open_gates() {

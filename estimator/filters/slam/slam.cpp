@@ -303,6 +303,7 @@ size_t slam::list_counters(wm_counter *out, size_t capacity) const {
   if (params_.line_rejoin) list.add(WM_COUNTER_LANDMARKS_MERGED, counts_.rejoined);
   list.add(WM_COUNTER_MAP_FULL, counts_.no_room);
   list.add(WM_COUNTER_MOTION_OUTLIERS, joint_.motion_outliers());
+  list.add(WM_COUNTER_RELOCALIZATIONS, counts_.relocalized);
   return list.count();
 }
 

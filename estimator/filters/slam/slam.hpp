@@ -38,7 +38,7 @@ struct landmark_note {
 };
 
 struct slam_counts {
-  uint64_t joined, left, moved, doubled, no_room, rejoined, jolts;
+  uint64_t joined, left, moved, doubled, no_room, rejoined, jolts, relocalized;
 };
 
 // What one look's bearings, of landmarks that are known, differed by where they were refused.

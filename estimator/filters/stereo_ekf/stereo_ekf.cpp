@@ -193,6 +193,13 @@ void stereo_ekf::estimate(wm_estimate *out) const {
 
 wm_motion_calibration stereo_ekf::motion_calibration() const { return kNeutralCalibration; }
 
+size_t stereo_ekf::list_counters(wm_counter *out, size_t capacity) const {
+  counter_list list(out, capacity);
+  list.add(WM_COUNTER_MOTION_OUTLIERS, motion_.outliers());
+  list.add(WM_COUNTER_RELOCALIZATIONS, life_.relocalizations());
+  return list.count();
+}
+
 size_t stereo_ekf::list_calibration(wm_calibration_value *out, size_t capacity) const {
   calibration_list list(out, capacity);
   for (int k = 0; k < kHeadStates; k++) {

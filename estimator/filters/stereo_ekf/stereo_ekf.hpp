@@ -25,6 +25,7 @@ class stereo_ekf {
   wm_status correct(const wm_event &event, record_list records);
   void estimate(wm_estimate *out) const;
   size_t list_calibration(wm_calibration_value *out, size_t capacity) const;
+  size_t list_counters(wm_counter *out, size_t capacity) const;
   size_t list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const;
   wm_motion_calibration motion_calibration() const;
   uint32_t motion_health() const { return motion_.health(); }
