@@ -399,7 +399,8 @@ void test_what_is_learnt_is_listed_and_given_to_the_predictor(void) {
   for (uint64_t i = 0; i < 500; i++) a.take(event_at(i, 0.02 * (double)i));
   wm_calibration_value values[64];
   const size_t count = estimator->calibration(a.state, values, 64);
-  TEST_ASSERT_GREATER_THAN(0, count);
+  const bool has_states = strcmp(estimator->name, "pf_edges") != 0;  // it estimates the pose alone
+  TEST_ASSERT_EQUAL(has_states, count > 0);
   TEST_ASSERT_EQUAL(count, estimator->calibration(a.state, values, 1));
   wm_motion_calibration c;
   estimator->motion(a.state, &c);

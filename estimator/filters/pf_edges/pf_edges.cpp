@@ -182,11 +182,17 @@ void pf_edges::estimate(wm_estimate *out) const {
   out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
   // Normalised weights rank the particles; none of them measures how well the best one fits.
   out->lost_probability = state_ == WM_STATE_SEARCHING ? 1.0 : std::numeric_limits<double>::quiet_NaN();
+  // Before the first scan the given pose is exact; the particles are only samples of it.
+  if (fused_ns_ == WM_TIME_NONE && state_ == WM_STATE_TRACKING) return;
   const particle_moments m = particles_.main_cluster(kCluster_m, kCluster_rad);
   // The particles stand at the last scan.
   const wm_pose2 pose = compose(m.mean, between(odom_, odometry_.odom()));
   put_planar_estimate(
-      pose, [&m](int r, int c) { return m.covariance[r][c] + (r == c ? kCovarianceMin[r] : 0.0); }, out);
+      pose,
+      [&m](int r, int c) {
+        return r == c ? m.covariance[r][r] + kCovarianceMin[r] : m.covariance[r < c ? r : c][r < c ? c : r];
+      },
+      out);
 }
 
 size_t pf_edges::list_counters(wm_counter *out, size_t capacity) const {
