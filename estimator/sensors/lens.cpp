@@ -10,30 +10,30 @@ struct plane_point {
   double x, y;
 };
 
-double bent_angle(const lens &self, double theta) {
+double distorted_angle(const lens &self, double theta) {
   const double t = theta * theta;
   return theta * (1 + t * (self.k[0] + t * (self.k[1] + t * (self.k[2] + t * self.k[3]))));
 }
 
-double bent_angle_slope(const lens &self, double theta) {
+double distorted_angle_slope(const lens &self, double theta) {
   const double t = theta * theta;
   return 1 + t * (3 * self.k[0] + t * (5 * self.k[1] + t * (7 * self.k[2] + t * 9 * self.k[3])));
 }
 
-// The angle up to which the curve rises.
+// The angle up to which the distorted angle is monotonous.
 double largest_angle(const lens &self) {
   constexpr int kSteps = 512;
   for (int i = 1; i <= kSteps; i++)
-    if (!(bent_angle_slope(self, kPi * i / kSteps) > 0)) return kPi * (i - 1) / kSteps;
+    if (!(distorted_angle_slope(self, kPi * i / kSteps) > 0)) return kPi * (i - 1) / kSteps;
   return kPi;
 }
 
-struct bent_point {
+struct distorted_point {
   plane_point at;
   double dxx, dxy, dyy;  // Jacobian, symmetric
 };
 
-bent_point bend(const lens &self, const plane_point &p) {
+distorted_point distort(const lens &self, const plane_point &p) {
   const double k1 = self.k[0], k2 = self.k[1], p1 = self.k[2], p2 = self.k[3], k3 = self.k[4];
   const double x = p.x, y = p.y, r2 = x * x + y * y;
   const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
@@ -44,22 +44,22 @@ bent_point bend(const lens &self, const plane_point &p) {
           radial + y * y * slope + 6 * p1 * y + 2 * p2 * x};
 }
 
-// Beyond the fold one pixel would have two rays.
-bool is_folded(const bent_point &b) { return !(b.dxx * b.dyy - b.dxy * b.dxy > 1e-9 && b.dxx + b.dyy > 0); }
+// Beyond the fold a pixel would have two rays.
+bool is_folded(const distorted_point &b) { return !(b.dxx * b.dyy - b.dxy * b.dxy > 1e-9 && b.dxx + b.dyy > 0); }
 
-bool bend_unfolded(const lens &self, const plane_point &p, plane_point *out) {
-  const bent_point b = bend(self, p);
+bool distort_unfolded(const lens &self, const plane_point &p, plane_point *out) {
+  const distorted_point b = distort(self, p);
   *out = b.at;
   return !is_folded(b);
 }
 
-// Newton's method from the bent point itself.
-bool unbend(const lens &self, const plane_point &bent, plane_point *out) {
-  *out = bent;
+// Newton's method, from the distorted point.
+bool undistort(const lens &self, const plane_point &distorted, plane_point *out) {
+  *out = distorted;
   for (int i = 0; i < 40; i++) {
-    const bent_point b = bend(self, *out);
+    const distorted_point b = distort(self, *out);
     if (is_folded(b)) return false;
-    const double det = b.dxx * b.dyy - b.dxy * b.dxy, mx = bent.x - b.at.x, my = bent.y - b.at.y;
+    const double det = b.dxx * b.dyy - b.dxy * b.dxy, mx = distorted.x - b.at.x, my = distorted.y - b.at.y;
     const double sx = (b.dyy * mx - b.dxy * my) / det, sy = (b.dxx * my - b.dxy * mx) / det;
     out->x += sx;
     out->y += sy;
@@ -71,38 +71,38 @@ bool unbend(const lens &self, const plane_point &bent, plane_point *out) {
 bool project_equidistant(const lens &self, const vec3 &d, plane_point *out) {
   const double r = std::sqrt(d.x * d.x + d.y * d.y), theta = atan2(r, d.z);
   if (theta > self.angle_max_rad) return false;
-  const double scale = r > 0 ? bent_angle(self, theta) / r : 0;
+  const double scale = r > 0 ? distorted_angle(self, theta) / r : 0;
   *out = {d.x * scale, d.y * scale};
   return r > 0 || d.z > 0;
 }
 
 bool unproject_equidistant(const lens &self, const plane_point &m, vec3 *out) {
-  const double bent = std::sqrt(m.x * m.x + m.y * m.y);
-  if (!(bent <= bent_angle(self, self.angle_max_rad))) return false;
-  // The curve rises in this interval: Newton's steps, halved where they would leave it.
-  double low = 0, high = self.angle_max_rad, theta = bent < high ? bent : high;
+  const double distorted = std::sqrt(m.x * m.x + m.y * m.y);
+  if (!(distorted <= distorted_angle(self, self.angle_max_rad))) return false;
+  // Monotonous in this interval: Newton's method, bisection where a step would leave it.
+  double low = 0, high = self.angle_max_rad, theta = distorted < high ? distorted : high;
   for (int i = 0; i < 60; i++) {
-    const double miss = bent - bent_angle(self, theta);
+    const double miss = distorted - distorted_angle(self, theta);
     (miss > 0 ? low : high) = theta;
-    double next = theta + miss / bent_angle_slope(self, theta);
+    double next = theta + miss / distorted_angle_slope(self, theta);
     if (!(next >= low && next <= high)) next = 0.5 * (low + high);
     if (next == theta) break;
     theta = next;
   }
   const sin_cos a = sincos(theta);
-  *out = bent > 0 ? vec3{m.x / bent * a.sin, m.y / bent * a.sin, a.cos} : vec3{0, 0, 1};
+  *out = distorted > 0 ? vec3{m.x / distorted * a.sin, m.y / distorted * a.sin, a.cos} : vec3{0, 0, 1};
   return true;
 }
 
-// `d` has length 1 in the models of spheres.
+// `d` has length 1.
 bool project_omni(const lens &self, const vec3 &d, plane_point *out) {
   if (!(d.z > (self.xi > 1 ? -1 / self.xi : -self.xi) + 1e-9)) return false;
-  return bend_unfolded(self, {d.x / (d.z + self.xi), d.y / (d.z + self.xi)}, out);
+  return distort_unfolded(self, {d.x / (d.z + self.xi), d.y / (d.z + self.xi)}, out);
 }
 
 bool unproject_omni(const lens &self, const plane_point &m, vec3 *out) {
   plane_point p;
-  if (!unbend(self, m, &p)) return false;
+  if (!undistort(self, m, &p)) return false;
   const double r2 = p.x * p.x + p.y * p.y, root = 1 + (1 - self.xi * self.xi) * r2;
   if (!(root >= 0)) return false;
   const double factor = (self.xi + std::sqrt(root)) / (r2 + 1);
@@ -168,7 +168,7 @@ bool project(const lens &self, const vec3 &ray, pixel *out) {
   bool there = false;
   switch (self.model) {
     case WM_CAMERA_EQUIDISTANT: there = project_equidistant(self, d, &m); break;
-    case WM_CAMERA_PINHOLE_RADTAN: there = d.z > 1e-6 && bend_unfolded(self, {d.x / d.z, d.y / d.z}, &m); break;
+    case WM_CAMERA_PINHOLE_RADTAN: there = d.z > 1e-6 && distort_unfolded(self, {d.x / d.z, d.y / d.z}, &m); break;
     case WM_CAMERA_OMNI: there = project_omni(self, d, &m); break;
     case WM_CAMERA_DOUBLE_SPHERE: there = project_double_sphere(self, d, &m); break;
     default: break;
@@ -184,7 +184,7 @@ bool unproject(const lens &self, const pixel &at, vec3 *out) {
   switch (self.model) {
     case WM_CAMERA_EQUIDISTANT: there = unproject_equidistant(self, m, out); break;
     case WM_CAMERA_PINHOLE_RADTAN:
-      there = unbend(self, m, &p);
+      there = undistort(self, m, &p);
       *out = {p.x, p.y, 1};
       break;
     case WM_CAMERA_OMNI: there = unproject_omni(self, m, out); break;
@@ -200,7 +200,7 @@ const char *mounted_camera_init(mounted_camera *out, const wm_camera &camera) {
   *out = mounted_camera{};
   const char *why = lens_init(&out->optics, camera);
   if (why) return why;
-  if (camera.width_px == 0 || camera.height_px == 0) return "the camera's size isn't given";
+  if (camera.width_px == 0 || camera.height_px == 0) return "the camera's size is not given";
   out->width_px = camera.width_px;
   out->height_px = camera.height_px;
   // The optical axes lie along (-y, -z, x) of the body.

@@ -186,14 +186,16 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
 }  // namespace wm
 
 extern "C" const wm_detector wm_cascade_detector = {
-    "cascade",
-    "objects of a class (signs, posters) by OpenCV's cascades, LBP or HAAR: bearings and distances without identities",
-    WM_EVENT_BIT(WM_EVENT_SIGHTING),
-    1,
-    wm_cascade_params_table,
-    wm::state_bytes,
-    wm::init,
-    wm::detect,
-    0,
-    nullptr,
+    .name = "cascade",
+    .about =
+        "objects of a class (signs, posters) by OpenCV's cascades, LBP or HAAR: bearings and distances without "
+        "identities",
+    .gives = WM_EVENT_BIT(WM_EVENT_SIGHTING),
+    .pictures = 1,
+    .params = wm_cascade_params_table,
+    .state_bytes = wm::state_bytes,
+    .init = wm::init,
+    .detect = wm::detect,
+    .is_guided = 0,
+    .looked_for = nullptr,
 };

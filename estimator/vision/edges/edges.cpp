@@ -292,14 +292,14 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
 }  // namespace wm
 
 extern "C" const wm_detector wm_edges_detector = {
-    "edges",
-    "borders of the floor: feet of walls, doors and pillars",
-    WM_EVENT_BIT(WM_EVENT_POINTS),
-    1,
-    wm_edges_params_table,
-    wm::state_bytes,
-    wm::init,
-    wm::detect,
-    0,
-    nullptr,
+    .name = "edges",
+    .about = "borders of the floor: feet of walls, doors and pillars",
+    .gives = WM_EVENT_BIT(WM_EVENT_POINTS),
+    .pictures = 1,
+    .params = wm_edges_params_table,
+    .state_bytes = wm::state_bytes,
+    .init = wm::init,
+    .detect = wm::detect,
+    .is_guided = 0,
+    .looked_for = nullptr,
 };

@@ -41,8 +41,9 @@ int walk(const mounted_camera &camera, const wm_edges_params &params, double cos
 template <class Each>
 void each_direction(Each each) {
   // From -pi to pi; one of them straight ahead.
-  const int half = static_cast<int>(kPi / kRayStep_rad);
-  for (int i = -half; i <= half && i < kRaysMax - half; i++) {
+  constexpr int half = static_cast<int>(kPi / kRayStep_rad);
+  static_assert(2 * half < kRaysMax);
+  for (int i = -half; i <= half; i++) {
     const double direction = i * kRayStep_rad;
     each(direction, sincos(direction));
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Walls are straight: an edge point has neighbours on a line with it. That tells false points, and gives the direction
-// of the edge far better than a few pixels do.
+// Walls are straight: an edge point has neighbours on a line with it. This rejects false points, and gives the
+// direction of the edge far better than a few pixels do.
 #ifndef WAYMARK_ESTIMATOR_VISION_SUPPORT_HPP
 #define WAYMARK_ESTIMATOR_VISION_SUPPORT_HPP
 

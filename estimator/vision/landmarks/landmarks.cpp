@@ -412,14 +412,14 @@ size_t looked_for(const void *memory, wm_looked_for *out, size_t capacity) {
 }  // namespace wm
 
 extern "C" const wm_detector wm_landmarks_detector = {
-    "landmarks",
-    "known landmarks (signs, house numbers, windows) by how they look: bearings with identities and sigmas",
-    WM_EVENT_BIT(WM_EVENT_SIGHTING),
-    1,
-    wm_landmarks_params_table,
-    wm::state_bytes,
-    wm::init,
-    wm::detect,
-    1,
-    wm::looked_for,
+    .name = "landmarks",
+    .about = "known landmarks (signs, house numbers, windows) by their appearance: bearings with identities and sigmas",
+    .gives = WM_EVENT_BIT(WM_EVENT_SIGHTING),
+    .pictures = 1,
+    .params = wm_landmarks_params_table,
+    .state_bytes = wm::state_bytes,
+    .init = wm::init,
+    .detect = wm::detect,
+    .is_guided = 1,
+    .looked_for = wm::looked_for,
 };

@@ -140,14 +140,14 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
 }  // namespace wm
 
 extern "C" const wm_detector wm_lines_detector = {
-    "lines",
-    "upright lines (corners, door frames, pillars), followed from picture to picture: azimuths with a number each",
-    WM_EVENT_BIT(WM_EVENT_SIGHTING),
-    1,
-    wm_lines_params_table,
-    wm::state_bytes,
-    wm::init,
-    wm::detect,
-    0,
-    nullptr,
+    .name = "lines",
+    .about = "upright lines (corners, door frames, pillars), tracked from picture to picture: azimuths with identities",
+    .gives = WM_EVENT_BIT(WM_EVENT_SIGHTING),
+    .pictures = 1,
+    .params = wm_lines_params_table,
+    .state_bytes = wm::state_bytes,
+    .init = wm::init,
+    .detect = wm::detect,
+    .is_guided = 0,
+    .looked_for = nullptr,
 };

@@ -180,14 +180,14 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
 }  // namespace wm
 
 extern "C" const wm_detector wm_mr_detector = {
-    "mr",
-    "Coded markers (MR code: a pentagon with 8 x 8 modules) on ceilings and walls",
-    WM_EVENT_BIT(WM_EVENT_MARKER),
-    1,
-    wm_mr_params_table,
-    wm::state_bytes,
-    wm::init,
-    wm::detect,
-    0,
-    nullptr,
+    .name = "mr",
+    .about = "Coded markers (MR code: a pentagon with 8 x 8 modules) on ceilings and walls",
+    .gives = WM_EVENT_BIT(WM_EVENT_MARKER),
+    .pictures = 1,
+    .params = wm_mr_params_table,
+    .state_bytes = wm::state_bytes,
+    .init = wm::init,
+    .detect = wm::detect,
+    .is_guided = 0,
+    .looked_for = nullptr,
 };

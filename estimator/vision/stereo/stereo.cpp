@@ -37,7 +37,7 @@ struct stereo_state {
 
   int32_t track_count, next_id;
   wm_time_ns before_ns;  // of the previous pictures; WM_TIME_NONE: none
-  bool knows_motion;
+  bool has_motion;
   vec3 turn_radps, move_mps;  // of the newest motion: previous camera to current camera
   rigid world_camera;
   uint64_t number;  // of pictures: seed of the random choices
@@ -133,7 +133,7 @@ bool take_pictures(stereo_state *self, const wm_frame *frames) {
 
 void end_tracks(stereo_state *self) {
   self->track_count = 0;
-  self->knows_motion = false;
+  self->has_motion = false;
 }
 
 bool is_visible(const stereo_state &self, const track &one) {
@@ -153,10 +153,10 @@ bool has_slipped(const stereo_state &self, const track &one) {
 // Follows all tracks into the newest pictures. Ends those that are lost or disagree with the common motion.
 void follow(stereo_state *self, double dt_s) {
   rigid expected = kNoMotion;
-  if (self->knows_motion) expected = {matrix_of(turn_by(dt_s * self->turn_radps)), dt_s * self->move_mps};
+  if (self->has_motion) expected = {matrix_of(turn_by(dt_s * self->turn_radps)), dt_s * self->move_mps};
   const pair_pictures pictures = {&self->pictures[2], &self->pictures[0], &self->pictures[1]};
   const rigid camera_world = expected * inverse(self->world_camera);
-  const int levels = self->knows_motion ? kLevelsKnown : kLevelsUnknown;
+  const int levels = self->has_motion ? kLevelsKnown : kLevelsUnknown;
   seen_twice points[STEREO_TRACKS_MAX];
   int32_t kept = 0;
   for (int32_t i = 0; i < self->track_count; i++) {
@@ -171,7 +171,7 @@ void follow(stereo_state *self, double dt_s) {
   self->track_count = kept;
   uint8_t agrees[STEREO_TRACKS_MAX];
   rigid moved;
-  if (!find_motion(self->pair, points, kept, self->knows_motion ? &expected : nullptr, kAgree_px, self->number, &moved,
+  if (!find_motion(self->pair, points, kept, self->has_motion ? &expected : nullptr, kAgree_px, self->number, &moved,
                    agrees)) {
     end_tracks(self);
     return;
@@ -185,7 +185,7 @@ void follow(stereo_state *self, double dt_s) {
   }
   self->turn_radps = (1.0 / dt_s) * turn_of(quat_of(moved.R));
   self->move_mps = (1.0 / dt_s) * moved.t;
-  self->knows_motion = true;
+  self->has_motion = true;
 }
 
 bool is_crowded(const stereo_state &self, const pixel &at) {
@@ -268,14 +268,14 @@ wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_e
 }  // namespace wm
 
 extern "C" const wm_detector wm_stereo_detector = {
-    "stereo",
-    "World points in both pictures of a stereo pair, tracked from picture to picture: for stereo_ekf",
-    WM_EVENT_BIT(WM_EVENT_STEREO),
-    2,
-    wm_stereo_params_table,
-    wm::state_bytes,
-    wm::init,
-    wm::detect,
-    0,
-    nullptr,
+    .name = "stereo",
+    .about = "World points in both pictures of a stereo pair, tracked from picture to picture: for stereo_ekf",
+    .gives = WM_EVENT_BIT(WM_EVENT_STEREO),
+    .pictures = 2,
+    .params = wm_stereo_params_table,
+    .state_bytes = wm::state_bytes,
+    .init = wm::init,
+    .detect = wm::detect,
+    .is_guided = 0,
+    .looked_for = nullptr,
 };
