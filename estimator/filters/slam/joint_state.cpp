@@ -299,6 +299,8 @@ void joint_state::prepare(const joint_row *rows, const double *innovations, cons
   std::memcpy(l, out->s, sizeof l);
   out->nis = 1e300;
   out->determinant = 0.0;
+  for (int k = 0; k < count; k++)
+    if (rows[k].missing > 0) return;
   if (!factor(l, count)) return;
   out->nis = 0.0;
   out->determinant = 1.0;
@@ -320,6 +322,7 @@ double joint_state::innovation_block::density() const {
 
 bool joint_state::fuse(innovation_block &block, const double *more_noise, scope which) {
   const int rows = block.rows;
+  if (!(block.determinant > 0.0)) return false;
   for (int k = 0; k < rows; k++) block.s[k][k] += more_noise[k];
   double l[kRows][kRows], y[kRows] = {};
   std::memcpy(l, block.s, sizeof l);

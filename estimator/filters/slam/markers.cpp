@@ -158,7 +158,7 @@ void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past
     const double turn = scale * (a[0] * u[1] - a[1] * u[0]);
     const double by[3] = {-g[0], -g[1], turn + g[0] * lever_y - g[1] * lever_x};
     const double plain = a[0] * u[0] + a[1] * u[1];
-    out->row[k].count = 0;
+    out->row[k].count = out->row[k].missing = 0;
     add_past_pose(&out->row[k], by, past, slot(kTimeOffset));
     by_age[k] = by[0] * past.age_by[0] + by[1] * past.age_by[1] + by[2] * past.age_by[2];
     out->row[k].add(slot(kYaw), turn);
@@ -175,7 +175,7 @@ void slam::see_marker(int sensor, const marker_reading &r, const past_pose &past
     out->innovation[k] = out->observed[k] - out->expected[k];
   }
   const double by[3] = {0.0, 0.0, -1.0};
-  out->row[2].count = 0;
+  out->row[2].count = out->row[2].missing = 0;
   add_past_pose(&out->row[2], by, past, slot(kTimeOffset));
   by_age[2] = by[2] * past.age_by[2];
   out->row[2].add(slot(kYaw), -1.0);
@@ -238,7 +238,7 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
   for (int i = 0; i < count; i++) variance[i] = block.s[i][i];
   const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
   const double more[3] = {v.noise[0] * weaker, v.noise[1] * weaker, v.noise[2] * weaker};
-  const bool failed = fits && !joint_.fuse(block, more, scope_now());
+  const bool failed = !(block.determinant > 0.0) || (fits && !joint_.fuse(block, more, scope_now()));
   for (int i = 0; i < count; i++) {
     wm_innovation record = blank;
     record.residual = (uint8_t)kKinds[i];
@@ -248,7 +248,7 @@ void slam::fuse_known_marker(int landmark, const wm_marker &m, const marker_read
     record.nis = block.nis;
     record.gate = hard;
     record.gate_dof = (uint8_t)count;
-    record.verdict = failed ? WM_REJECTED_SINGULAR : fits ? WM_FUSED : WM_REJECTED_GATE;
+    record.verdict = failed ? WM_REJECTED_NUMERIC : fits ? WM_FUSED : WM_REJECTED_GATE;
     records.add(record);
   }
   if (r.turned) note_turn(fits, v.innovation[2], true, notes()[landmark].last_ns);

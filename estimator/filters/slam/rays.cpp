@@ -101,7 +101,8 @@ void slam::follow_ray(int32_t id, const wm_sighting &s, const reading &r, const 
   const bool fits = block.nis <= blank.gate;
   const double more = block.nis > soft ? noise * (block.nis / soft - 1.0) : 0.0;
   const bool fused = fits && joint_.fuse(block, &more, joint_state::scope::all);
-  blank.verdict = fused ? WM_FUSED : fits ? WM_REJECTED_SINGULAR : WM_REJECTED_GATE;
+  const bool failed = fits || !(block.determinant > 0.0);
+  blank.verdict = fused ? WM_FUSED : failed ? WM_REJECTED_NUMERIC : WM_REJECTED_GATE;
   records.add(blank);
   note_turn(fits, innovation, false, track->last_ns);
   if (!fused) {

@@ -55,7 +55,7 @@ void slam::see(const wm_sighting &s, const reading &r, const past_pose &past, co
                        int lasting_offset, double lasting_size) {
     const int i = out->count++;
     joint_row &row = out->row[i];
-    row.count = 0;
+    row.count = row.missing = 0;
     add_past_pose(&row, by, past, slots_.at(sensor, kTimeOffset));
     slots_.add_to(&row, sensor, by);
     if (lasting >= 0 && lasting_offset >= 0) {
@@ -205,7 +205,7 @@ void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, cons
   for (int i = 0; i < v.count; i++) variance[i] = block.s[i][i];
   const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
   const double more[2] = {v.noise[0] * weaker, v.count == 2 ? v.noise[1] * weaker : 0.0};
-  const bool failed = fused && !joint_.fuse(block, more, scope_now());
+  const bool failed = !(block.determinant > 0.0) || (fused && !joint_.fuse(block, more, scope_now()));
   for (int i = 0; i < v.count; i++) {
     wm_innovation record = blank;
     record.residual = (uint8_t)v.kind[i];
@@ -215,7 +215,7 @@ void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, cons
     record.nis = block.nis;
     record.gate = hard;
     record.gate_dof = (uint8_t)v.count;
-    record.verdict = failed ? WM_REJECTED_SINGULAR : fused ? WM_FUSED : WM_REJECTED_GATE;
+    record.verdict = failed ? WM_REJECTED_NUMERIC : fused ? WM_FUSED : WM_REJECTED_GATE;
     records.add(record);
   }
   if (r.bearing) note_turn(fused, v.innovation[0], false, note.last_ns);

@@ -337,6 +337,43 @@ void test_a_wheel_that_slips_comes_back_to_its_mean(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.005 * 0.005, m.state->variance(left));
 }
 
+// A row that has no room for all its derivatives is not fused.
+void test_a_row_with_missing_entries_is_refused(void) {
+  made a(true);
+  joint_row row;
+  for (int i = 0; i <= joint_row::kMax; i++) row.add(0, 0.01);
+  const double innovation = 1.0, noise = 0.1, none = 0.0, before = a.state->value(0);
+  joint_state::innovation_block block;
+  a.state->prepare(&row, &innovation, &noise, 1, &block);
+  TEST_ASSERT_TRUE(block.nis > 1e6);
+  TEST_ASSERT_FALSE(a.state->fuse(block, &none, wm::joint_state::scope::all));
+  TEST_ASSERT_EQUAL_DOUBLE(before, a.state->value(0));
+}
+
+// In doubt a correction moves the pose; calibration and map stay, and the half matrix stays symmetric.
+void test_the_pose_alone_is_corrected(void) {
+  made a(true);
+  a.state->move(make::twist(0.0, 0.0, 0.0));
+  const int s = a.state->landmark_state(a.add(1.6, 2.1));
+  joint_row row;
+  row.add(0, 1.0), row.add(2, 0.5), row.add(3, 0.3);
+  const double innovation = 0.1, noise = 0.01, none = 0.0, place = a.state->value(s), scale = a.state->value(3);
+  joint_state::innovation_block block;
+  a.state->prepare(&row, &innovation, &noise, 1, &block);
+  const double x = a.state->value(0), variance = a.state->variance(0), of_place = a.state->variance(s);
+  TEST_ASSERT_TRUE(a.state->fuse(block, &none, wm::joint_state::scope::pose));
+  TEST_ASSERT_TRUE(a.state->value(0) != x && a.state->variance(0) < variance);
+  TEST_ASSERT_EQUAL_DOUBLE(place, a.state->value(s));
+  TEST_ASSERT_EQUAL_DOUBLE(scale, a.state->value(3));
+  TEST_ASSERT_EQUAL_DOUBLE(of_place, a.state->variance(s));
+  double from_2[64], from_3[64];
+  joint_row second, third;
+  second.add(2, 1.0), third.add(3, 1.0);
+  a.state->project(second, from_2);
+  a.state->project(third, from_3);
+  TEST_ASSERT_EQUAL_DOUBLE(from_2[3], from_3[2]);
+}
+
 }  // namespace
 
 void setUp(void) { dice = {7, 1, 0}; }
@@ -353,5 +390,7 @@ int main(void) {
   RUN_TEST(test_frozen_landmarks_stay_and_the_robot_is_corrected);
   RUN_TEST(test_the_map_s_heading_is_not_learnt_from_looking);
   RUN_TEST(test_a_wheel_that_slips_comes_back_to_its_mean);
+  RUN_TEST(test_a_row_with_missing_entries_is_refused);
+  RUN_TEST(test_the_pose_alone_is_corrected);
   return UNITY_END();
 }
