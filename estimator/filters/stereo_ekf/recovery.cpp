@@ -103,10 +103,14 @@ void stereo_ekf::buffer_observation(const wm_stereo &seen, const wm_landmark &la
 void stereo_ekf::note(wm_time_ns t_ns, int key, const row_verdict &result, double clutter_volume,
                       landmark_record *record) {
   if (!params_.recover || result.verdict == WM_REJECTED_NUMERIC) return;
-  double log_density = 0.0;
-  for (int k = 0; k < result.rows; k++) log_density -= 0.5 * (result.nis[k] + log(kTwoPi * result.variance[k]));
-  const double log_bayes = result.fused ? landmark_evidence::log_bayes_factor(exp(log_density), clutter_volume)
-                                        : landmark_evidence::max_log_bayes_factor();
+  double nis = 0.0, determinant = 1.0;
+  for (int k = 0; k < result.rows; k++) {
+    nis += result.nis[k];
+    determinant *= kTwoPi * result.variance[k];
+  }
+  const double log_bayes =
+      result.fused ? landmark_evidence::log_bayes_factor(exp(-0.5 * nis) / std::sqrt(determinant), clutter_volume)
+                   : landmark_evidence::max_log_bayes_factor();
   const double no_angle = std::numeric_limits<double>::quiet_NaN();
   evidence_.note(t_ns, key, log_bayes, no_angle, 0.0, record);
   if (life_.tracking() && evidence_.contradicted()) life_.lose(t_ns);
