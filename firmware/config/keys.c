@@ -29,7 +29,7 @@ const config_key kConfigKeys[] = {
     {"vision", "map", "none",
      "Detectors that look at pictures, each with its parameters: `{edges: {}}`. See below. Beside them `cameras: "
      "[NAME]` "
-     "says at whose; without it at those of all cameras that have any."},
+     "names the cameras; without it all cameras that have pictures."},
     {"vision.cascade.classes", "list", "needed for `vision.cascade`",
      "What it looks for, at most 8: `{file: FILE, height_m: H}`, a cascade in OpenCV's format and the height in m of "
      "what "
@@ -75,17 +75,18 @@ const config_key kConfigCameraDeviceKeys[] = {
     {"device", "path", "by card and bus",
      "`/dev/video0`, or a name that stays the same when it is plugged in again: `/dev/v4l/by-id/...`."},
     {"card", "text", "as first opened",
-     "The model, as `v4l2-ctl -D` says it: another camera is not taken for this one."},
-    {"bus", "text", "as first opened", "Where it is plugged in, as `v4l2-ctl -D` says it."},
+     "The model, as `v4l2-ctl -D` prints it: another camera is not taken for this one."},
+    {"bus", "text", "as first opened", "Where it is plugged in, as `v4l2-ctl -D` prints it."},
     {"libcamera", "text", "by V4L2",
-     "Instead of device, card and bus: libcamera's identifier, as `cam -l` says it in brackets (live.md)."},
+     "Instead of device, card and bus: libcamera's identifier, as `cam -l` prints it in brackets (live.md)."},
     {"format", "`GREY`, `YUYV`, `UYVY`, `NV12`, `Y10`, `Y16`, `MJPG`, `RGB3`, `BGR3`", "the driver's",
      "What the camera sends."},
     {"rate_hz", "number from 0 to 1000", "the driver's", "Pictures a second."},
     {"exposure_ms", "number from 0 to 1000", "the driver's",
-     "ms. Exposure, where the driver doesn't tell it: a picture's time is the middle of it."},
+     "ms. Exposure, where the driver does not report it: a picture's time is the middle of it."},
     {"latency_ms", "number from 0 to 1000", "0", "ms. From the exposure's start or end to the driver's stamp."},
-    {"stamp", "`auto`, `start`, `end`", "auto", "What the driver's stamp is of; auto believes the driver."},
+    {"stamp", "`auto`, `start`, `end`", "auto",
+     "The moment that the driver's stamp marks; auto: as the driver reports it."},
     {"controls", "map", "none",
      "V4L2 controls by the names of `v4l2-ctl -l`, e.g. `{auto_exposure: 1, gain: 20}`; libcamera's by its own, "
      "whole numbers, e.g. `{AeEnable: 0, ExposureTime: 4000}`."},

@@ -26,16 +26,15 @@ static const wm_param kParams[] = {
         "m. A correction that moves the map pose against odom by more than this is announced as a jump."),
     F64("publish.jump_deg", publish_jump_deg, 2.0, 0, 360, "degrees. As jump_m, for the heading."),
     F64("publish.motion_stale_ms", publish_motion_stale_ms, 200, 1, 60000,
-        "ms. Motion older than this sets the flag that the pose is carried on by old speeds. Wheel encoders speak "
-        "every "
-        "10 to 50 ms."),
+        "ms. Motion older than this sets the flag that the pose is carried on by old speeds. Wheel encoders send "
+        "every 10 to 50 ms."),
     BOOL("publish.lcm", publish_lcm, 1,
          "Whether poses are sent over LCM. Without a network the run goes on all the same."),
     F64("publish.useless_m", publish_useless_m, 1.0, 1e-3, 1000,
-        "m. Sigma of position from which on a pose is of no use: health says how many metres and seconds of dead "
+        "m. Sigma of position from which on a pose is of no use: health has the metres and seconds of dead "
         "reckoning are left until there."),
     F64("start.max_age_s", start_max_age_s, 86400, 0, 1e9,
-        "s. A saved pose that is older than this is not used: by then somebody may have carried the robot away."),
+        "s. A saved pose that is older than this is not used: by then the robot may have been carried away."),
     F64("start.moved_m", start_moved_m, 0.2, 0, 1000,
         "m. Sigma of what may have moved the robot while it was off, added to that of the saved pose."),
     F64("start.moved_deg", start_moved_deg, 3.0, 0, 180, "degrees. As moved_m, for the heading."),

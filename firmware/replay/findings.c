@@ -64,7 +64,7 @@ static void about_silence(speaker *to, const wm_source_health *s) {
   if (!s->stale) return;
   char line[160];
   if (s->received == 0) {
-    (void)snprintf(line, sizeof line, "%s: never said anything", s->name);
+    (void)snprintf(line, sizeof line, "%s: gave no data", s->name);
   } else {
     (void)snprintf(line, sizeof line, "%s: silent for the last %.1f s", s->name, (double)s->silent_ns * 1e-9);
   }
