@@ -151,79 +151,81 @@ void edge_map::init(const wm_raster &raster, void *memory) {
 
 // First pass: to the nearest edge in the same column, in offset.y; reach + 1 where there is none.
 void edge_map::sweep_columns() {
-  const int none = reach_px_ + 1;
   for (int tx = 0; tx < tile_columns_; tx++) {
-    const int x0 = tx << kTileShift;
-    const int width = (int)raster_->width_px - x0 < kTile ? (int)raster_->width_px - x0 : kTile;
-    int above[kTile], below[kTile];
-    for (int &a : above) a = none;
-    for (int &b : below) b = none;
-    for (int row = 0; row < (int)raster_->height_px; row++) {
-      const uint32_t tile = tiles()[((row >> kTileShift) + 1) << row_shift_ | (tx + 1)];
-      if (!tile) continue;  // out of reach: so is every edge above it
-      const uint8_t *edges = raster_->edges + (size_t)row * raster_->width_px + (size_t)x0;
-      offset *to = offsets() + tile + in_row(0, row);
-      for (int i = 0; i < width; i++) {
-        above[i] = edges[i] ? 0 : above[i] < none ? above[i] + 1 : none;
-        to[i].y = (int8_t)-above[i];
-      }
-    }
-    for (int row = (int)raster_->height_px - 1; row >= 0; row--) {
-      const uint32_t tile = tiles()[((row >> kTileShift) + 1) << row_shift_ | (tx + 1)];
-      if (!tile) continue;
-      const uint8_t *edges = raster_->edges + (size_t)row * raster_->width_px + (size_t)x0;
-      offset *to = offsets() + tile + in_row(0, row);
-      for (int i = 0; i < width; i++) {
-        below[i] = edges[i] ? 0 : below[i] < none ? below[i] + 1 : none;
-        if (below[i] < -to[i].y) to[i].y = (int8_t)below[i];
-      }
+    sweep_tile_column(tx, true);
+    sweep_tile_column(tx, false);
+  }
+}
+
+// Rows since the last edge pixel, downwards; then upwards where that is less.
+void edge_map::sweep_tile_column(int tx, bool down) {
+  const int none = reach_px_ + 1, x0 = tx << kTileShift, rows = (int)raster_->height_px;
+  const int width = (int)raster_->width_px - x0 < kTile ? (int)raster_->width_px - x0 : kTile;
+  int since[kTile];
+  for (int &s : since) s = none;
+  for (int n = 0; n < rows; n++) {
+    const int row = down ? n : rows - 1 - n;
+    const uint32_t tile = tiles()[((row >> kTileShift) + 1) << row_shift_ | (tx + 1)];
+    if (!tile) continue;  // out of reach: so is every edge passed before
+    const uint8_t *edges = raster_->edges + (size_t)row * raster_->width_px + (size_t)x0;
+    offset *to = offsets() + tile + in_row(0, row);
+    for (int i = 0; i < width; i++) {
+      since[i] = edges[i] ? 0 : since[i] < none ? since[i] + 1 : none;
+      if (down)
+        to[i].y = (int8_t)-since[i];
+      else if (since[i] < -to[i].y)
+        to[i].y = (int8_t)since[i];
     }
   }
 }
 
-// Second pass: the lower envelope of the parabolas that stand over a row's columns.
-void edge_map::sweep_row(int row) {
+// Calls visit(column, index of the pixel) for the pixels of a row that are within reach of an edge.
+template <class Visit>
+void edge_map::each_pixel_in_reach(int row, Visit visit) const {
   const uint32_t *tile = tiles() + (((row >> kTileShift) + 1) << row_shift_) + 1;
-  uint8_t *distance = at<uint8_t>(distance_at_);
-  offset *edge_offset = offsets();
-  const int width = (int)raster_->width_px, none = reach_px_ + 1;
-  int32_t *site = at<int32_t>(scratch_at_), *site_y = site + width, *start = site_y + width;
-  int count = 0;
+  const int width = (int)raster_->width_px;
   for (int tx = 0; tx < tile_columns_; tx++) {
     if (!tile[tx]) continue;
     const int end = (tx + 1) << kTileShift < width ? (tx + 1) << kTileShift : width;
-    for (int column = tx << kTileShift; column < end; column++) {
-      const int y = +edge_offset[tile[tx] + in_row(column, row)].y;  // signed
-      if (y == none || y == -none) continue;
-      int from = INT32_MIN;
-      while (count > 0) {
-        // From here on this one is the lower: (own - other)/(2 (column - other's)), rounded up.
-        const int other = site[count - 1], twice = 2 * (column - other);
-        const int difference = y * y + column * column - site_y[count - 1] * site_y[count - 1] - other * other;
-        from = difference <= 0 ? -((-difference) / twice) : (difference + twice - 1) / twice;
-        if (from > start[count - 1]) break;
-        count--;
-      }
-      site[count] = column;
-      site_y[count] = y;
-      start[count] = count == 0 ? INT32_MIN : from;
-      count++;
-    }
+    for (int column = tx << kTileShift; column < end; column++) visit(column, tile[tx] + in_row(column, row));
   }
-  int at = 0;
-  for (int tx = 0; tx < tile_columns_ && count > 0; tx++) {
-    if (!tile[tx]) continue;
-    const int end = (tx + 1) << kTileShift < width ? (tx + 1) << kTileShift : width;
-    for (int column = tx << kTileShift; column < end; column++) {
-      while (at + 1 < count && start[at + 1] <= column) at++;
-      const int dx = site[at] - column, dy = site_y[at];
-      const int square_px = dx * dx + dy * dy;
-      if (square_px > reach_px_ * reach_px_) continue;
-      edge_offset[tile[tx] + in_row(column, row)] = {(int8_t)dx, (int8_t)dy};
-      const double steps = std::sqrt((double)square_px) * raster_->resolution_m / unit_m_ + 0.5;
-      distance[tile[tx] + (uint32_t)inside(column, row)] = steps < kFar ? (uint8_t)steps : (uint8_t)(kFar - 1);
+}
+
+// Second pass: the lower envelope of the parabolas that stand over a row's columns, then each pixel's parabola.
+void edge_map::sweep_row(int row) {
+  offset *edge_offset = offsets();
+  uint8_t *distance = at<uint8_t>(distance_at_);
+  const int width = (int)raster_->width_px, none = reach_px_ + 1;
+  int32_t *site = at<int32_t>(scratch_at_), *site_y = site + width, *start = site_y + width;
+  int count = 0;
+  each_pixel_in_reach(row, [&](int column, uint32_t pixel) {
+    const int y = +edge_offset[pixel].y;  // signed
+    if (y == none || y == -none) return;
+    int from = INT32_MIN;
+    while (count > 0) {
+      // From here on this one is the lower: (own - other)/(2 (column - other's)), rounded up.
+      const int other = site[count - 1], twice = 2 * (column - other);
+      const int difference = y * y + column * column - site_y[count - 1] * site_y[count - 1] - other * other;
+      from = difference <= 0 ? -((-difference) / twice) : (difference + twice - 1) / twice;
+      if (from > start[count - 1]) break;
+      count--;
     }
-  }
+    site[count] = column;
+    site_y[count] = y;
+    start[count] = count == 0 ? INT32_MIN : from;
+    count++;
+  });
+  if (count == 0) return;
+  int nearest = 0;
+  each_pixel_in_reach(row, [&](int column, uint32_t pixel) {
+    while (nearest + 1 < count && start[nearest + 1] <= column) nearest++;
+    const int dx = site[nearest] - column, dy = site_y[nearest];
+    const int square_px = dx * dx + dy * dy;
+    if (square_px > reach_px_ * reach_px_) return;
+    edge_offset[pixel] = {(int8_t)dx, (int8_t)dy};
+    const double steps = std::sqrt((double)square_px) * raster_->resolution_m / unit_m_ + 0.5;
+    distance[pixel] = steps < kFar ? (uint8_t)steps : (uint8_t)(kFar - 1);
+  });
 }
 
 // The line through an edge's pixels near by: mean and principal axis. Where they don't lie on one (corners, ends of

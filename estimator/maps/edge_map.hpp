@@ -86,6 +86,9 @@ class edge_map {
            raster_->edges[(size_t)row * raster_->width_px + (size_t)column];
   }
   void sweep_columns();
+  void sweep_tile_column(int tx, bool down);
+  template <class Visit>
+  void each_pixel_in_reach(int row, Visit visit) const;
   void sweep_row(int row);
   void fit_lines();
 

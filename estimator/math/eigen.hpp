@@ -50,17 +50,39 @@ template <int kN>
   return llt.info() == Eigen::Success && finite(out->sum());
 }
 
+// x := (L L')^-1 x, by the lower triangle of `l`.
+template <int kN>
+void substitute(const matrix<kN> &l, vector<kN> *x) {
+  for (int i = 0; i < kN; i++) {
+    for (int k = 0; k < i; k++) (*x)[i] -= l(i, k) * (*x)[k];
+    (*x)[i] /= l(i, i);
+  }
+  for (int i = kN - 1; i >= 0; i--) {
+    for (int k = i + 1; k < kN; k++) (*x)[i] -= l(k, i) * (*x)[k];
+    (*x)[i] /= l(i, i);
+  }
+}
+
+// Eigen unrolls substitution up to 8 rows; beyond, it wants a heap.
+template <int kN>
+void solve_by(const Eigen::LLT<matrix<kN>> &llt, vector<kN> *x) {
+  if constexpr (kN <= 8) {
+    llt.matrixL().solveInPlace(*x);
+    llt.matrixU().solveInPlace(*x);
+  } else {
+    substitute<kN>(llt.matrixLLT(), x);
+  }
+}
+
 // X with A X = B, for a symmetric positive definite A. False: A is not, or X is not finite. Column by column: Eigen's
 // solver of a whole matrix is blocked and takes memory from the heap.
 template <int kN, int kCols>
 [[nodiscard]] bool solve_positive(const matrix<kN> &a, const matrix<kN, kCols> &b, matrix<kN, kCols> *out) {
-  static_assert(kN <= 8, "Eigen unrolls substitution up to 8 rows; beyond, it wants a heap");
   const Eigen::LLT<matrix<kN>> llt(a);
   if (llt.info() != Eigen::Success) return false;
   for (int c = 0; c < kCols; c++) {
     vector<kN> x = b.col(c);
-    llt.matrixL().solveInPlace(x);
-    llt.matrixU().solveInPlace(x);
+    solve_by<kN>(llt, &x);
     out->col(c) = x;
   }
   return finite(out->sum());
@@ -70,7 +92,6 @@ template <int kN, int kCols>
 // `pivot_min` of its diagonal element (a direction is hardly determined), or the inverse is not finite.
 template <int kN>
 [[nodiscard]] bool invert_positive(const matrix<kN> &a, matrix<kN> *out, double pivot_min = 0.0) {
-  static_assert(kN <= 8, "Eigen unrolls substitution up to 8 rows; beyond, it wants a heap");
   const Eigen::LLT<matrix<kN>> llt(a);
   if (llt.info() != Eigen::Success) return false;
   for (int i = 0; i < kN; i++)
@@ -78,8 +99,7 @@ template <int kN>
   matrix<kN> inverse;
   for (int c = 0; c < kN; c++) {
     vector<kN> x = vector<kN>::Unit(c);
-    llt.matrixL().solveInPlace(x);
-    llt.matrixU().solveInPlace(x);
+    solve_by<kN>(llt, &x);
     inverse.col(c) = x;
   }
   *out = 0.5 * (inverse + inverse.transpose());

@@ -301,10 +301,10 @@ std::vector<scenario> scenarios() {
        {}},
 
       {"edge_mcl", "tracking", motion::twist, kPoints, kSilence, 10, kMotionStates, {}},
-      {"edge_mcl", "cloud", motion::twist, kPoints, 0, 8, {{"pose", 1}}, {}},
       {"edge_mcl", "reflections", motion::ticks, kPoints, kReflections, 15, {}, {}},
       {"edge_mcl", "carried off", motion::twist, kPoints, kCarriedOff, 14, {}, {}, {"lost."}},
       {"edge_mcl", "no start", motion::twist, kPoints, kNoStart, 14, {}, {}, {"search."}},
+      {"pf_edges", "tracking", motion::twist, kPoints, kSilence, 10, {}, {}},
   };
   return out;
 }

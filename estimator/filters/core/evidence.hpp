@@ -21,6 +21,11 @@ class evidence {
   void set(double log_odds) {
     value_ = log_odds > kMaxLogOdds ? kMaxLogOdds : log_odds < kMinLogOdds ? kMinLogOdds : log_odds;
   }
+  // The hypothesis may have become true meanwhile, with this probability: p := p + (1 - p) hazard.
+  void add_hazard(double hazard) {
+    const double p = probability(), later = p + (1.0 - p) * hazard;
+    set(log(later / (1.0 - later)));
+  }
   // What was observed dt_s ago counts exp(-dt/tau) as much; without observations the prior remains.
   void forget(double dt_s, double tau_s, double prior_log_odds) {
     if (dt_s > 0.0) value_ = prior_log_odds + (value_ - prior_log_odds) * exp(-dt_s / tau_s);

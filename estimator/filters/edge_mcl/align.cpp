@@ -4,54 +4,17 @@
 #include "math/elementary.hpp"
 
 namespace wm {
-namespace {
-
-void solve(const double lower[kAlignStates][kAlignStates], const double *b, int n, double *x) {
-  for (int i = 0; i < n; i++) {
-    x[i] = b[i];
-    for (int k = 0; k < i; k++) x[i] -= lower[i][k] * x[k];
-    x[i] /= lower[i][i];
+void floor_points::copy(int to, const floor_points &from, int i) {
+  camera[to] = from.camera[i];
+  x_m[to] = from.x_m[i];
+  y_m[to] = from.y_m[i];
+  ray_x_m[to] = from.ray_x_m[i];
+  ray_y_m[to] = from.ray_y_m[i];
+  reflection[to] = from.reflection[i];
+  for (int k = 0; k < kMountingErrors; k++) {
+    x_by[k][to] = from.x_by[k][i];
+    y_by[k][to] = from.y_by[k][i];
   }
-  for (int i = n - 1; i >= 0; i--) {
-    for (int k = i + 1; k < n; k++) x[i] -= lower[k][i] * x[k];
-    x[i] /= lower[i][i];
-  }
-}
-
-}  // namespace
-
-bool factor_positive(const double a[kAlignStates][kAlignStates], int n, double lower[kAlignStates][kAlignStates]) {
-  for (int i = 0; i < n; i++)
-    for (int j = 0; j <= i; j++) {
-      double sum = a[i][j];
-      for (int k = 0; k < j; k++) sum -= lower[i][k] * lower[j][k];
-      if (i != j)
-        lower[i][j] = sum / lower[j][j];
-      else if (!(sum > 0.0))
-        return false;
-      else
-        lower[i][i] = std::sqrt(sum);
-    }
-  return true;
-}
-
-bool solve_positive(const double a[kAlignStates][kAlignStates], const double *b, int n, double *x) {
-  double lower[kAlignStates][kAlignStates];
-  if (!factor_positive(a, n, lower)) return false;
-  solve(lower, b, n, x);
-  return true;
-}
-
-bool invert_positive(const double a[kAlignStates][kAlignStates], int n, double out[kAlignStates][kAlignStates]) {
-  double lower[kAlignStates][kAlignStates];
-  if (!factor_positive(a, n, lower)) return false;
-  for (int j = 0; j < n; j++) {
-    double unit[kAlignStates] = {}, column[kAlignStates];
-    unit[j] = 1.0;
-    solve(lower, unit, n, column);
-    for (int i = 0; i < n; i++) out[i][j] = column[i];
-  }
-  return true;
 }
 
 bool on_a_line(const wm_points &points, uint32_t i) {
@@ -60,26 +23,29 @@ bool on_a_line(const wm_points &points, uint32_t i) {
   const double bx = (double)points.x_m[i + 1], by = (double)points.y_m[i + 1];
   const double x = (double)points.x_m[i], y = (double)points.y_m[i];
   const double length2 = square(bx - ax) + square(by - ay), across = (bx - ax) * (y - ay) - (by - ay) * (x - ax);
+  // Neighbours at most 0.6 m apart (a gap otherwise), the point within 3 cm and a pixel's error, which grows with the
+  // range squared. Chosen on corridor-hard; not swept.
   return length2 < square(0.6) && square(across) < square(0.03 + 0.005 * (x * x + y * y)) * length2;
 }
 
 bool before_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m, double ray_y_m) {
-  constexpr double kGrazing_m = 0.1, kMost = 0.5;
-  constexpr double kLooks[] = {0.0, 0.3};  // the map knows what is within 0.6 m alone
-  for (const double on : kLooks) {
+  constexpr double kGrazing_m = 0.1;        // rays nearly along an edge meet it anywhere
+  constexpr double kBeyondMax = 0.5;        // of the ray: the map's edge is at most so much farther than its reflection
+  constexpr double kProbes[] = {0.0, 0.3};  // places along the ray: edge_map reaches 0.6 m
+  for (const double on : kProbes) {
     const edge_line line = map.nearest(x_m + on * ray_x_m, y_m + on * ray_y_m);
     const double towards_m = line.normal_x * ray_x_m + line.normal_y * ray_y_m;
     if (!line.found || std::fabs(towards_m) < kGrazing_m) continue;
     const double beyond = on + line.offset_m / towards_m;
-    if (beyond > 0.0 && beyond < kMost) return true;
+    if (beyond > 0.0 && beyond < kBeyondMax) return true;
   }
   return false;
 }
 
-// From pixel to pixel by the distance to the nearest edge, which none can be within.
+// Sphere tracing: steps by the distance to the nearest edge.
 bool through_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m, double ray_y_m) {
   constexpr double kBegin_m = 0.1, kFarthest_m = 20.0;
-  constexpr double kMargin_m = 0.2, kMargin = 0.05;  // what a pose and a camera may be off by
+  constexpr double kMargin_m = 0.2, kMargin = 0.05;  // error of pose and camera: constant, and per metre of range
   const double range = std::sqrt(square(ray_x_m) + square(ray_y_m));
   double end = range - (kMargin_m + kMargin * range);
   if (end > kFarthest_m) end = kFarthest_m;
@@ -96,114 +62,126 @@ bool through_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m
   return false;
 }
 
-void align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, int stride, double gate_m,
-                double explained_m, int iterations, wm_pose2 *pose) {
-  for (int round = 0; round < iterations; round++) {
-    double a[kAlignStates][kAlignStates] = {}, b[kAlignStates] = {}, step[kAlignStates];
-    const sin_cos h = sincos(pose->heading_rad);
-    for (int i = 0; i < count; i += stride) {
-      const double px = (double)x_m[i], py = (double)y_m[i];
-      const double rx = h.cos * px - h.sin * py, ry = h.sin * px + h.cos * py;
-      const edge_line line = map.nearest(pose->x_m + rx, pose->y_m + ry);
-      if (!line.found || line.distance_m > gate_m) continue;
-      const double row[3] = {line.normal_x, line.normal_y, line.normal_y * rx - line.normal_x * ry};
-      const double weight = square(explained_m) / (square(explained_m) + square(line.offset_m));
-      for (int r = 0; r < 3; r++) {
-        b[r] += weight * row[r] * line.offset_m;
-        for (int c = 0; c <= r; c++) a[r][c] += weight * row[r] * row[c];
-      }
-    }
-    for (int r = 0; r < 3; r++) a[r][r] += 1.0;  // what the scan doesn't say stays
-    if (!solve_positive(a, b, 3, step)) break;   // reads the lower triangle
-    pose->x_m += step[0];
-    pose->y_m += step[1];
-    pose->heading_rad = wrap(pose->heading_rad + step[2]);
-  }
-}
-
 namespace {
 
-constexpr double kTogether =
-    15.0;  // so many points err together, where they are held against what is known of a camera
+// Weight of a residual of `sigma`, as Cauchy's distribution has it.
+double cauchy_weight(double residual, double sigma) { return square(sigma) / (square(sigma) + square(residual)); }
 
-// Where a point is by these errors.
-inline void moved(const slack_points &points, int i, const double error[kSlackMost], double *x, double *y) {
+// A point's place by these errors of its camera's mounting.
+inline void shifted(const floor_points &points, int i, const double error[kMountingAll], double *x, double *y) {
   *x = (double)points.x_m[i];
   *y = (double)points.y_m[i];
-  for (int k = 0; k < kSlackErrors; k++) {
-    const double e = error[kSlackErrors * points.camera[i] + k];
+  for (int k = 0; k < kMountingErrors; k++) {
+    const double e = error[kMountingErrors * points.camera[i] + k];
     *x += e * (double)points.x_by[k][i];
     *y += e * (double)points.y_by[k][i];
   }
 }
 
+// A point and its edge as the pose's derivative has them: towards the edge by x, y, heading.
+struct pose_row {
+  edge_line line;
+  vector<3> by;
+};
+pose_row row_at(const edge_map &map, const wm_pose2 &pose, const sin_cos &h, double x, double y) {
+  const double rx = h.cos * x - h.sin * y, ry = h.sin * x + h.cos * y;
+  pose_row row;
+  row.line = map.nearest(pose.x_m + rx, pose.y_m + ry);
+  row.by << row.line.normal_x, row.line.normal_y, row.line.normal_y * rx - row.line.normal_x * ry;
+  return row;
+}
+
+void step_pose(const double *step, wm_pose2 *pose) {
+  pose->x_m += step[0];
+  pose->y_m += step[1];
+  pose->heading_rad = wrap(pose->heading_rad + step[2]);
+}
+
+// Levenberg's damping, in points: directions without information stay.
+constexpr double kDamping = 1.0;
+// Points whose errors are common, where they are weighed against the prior of a camera's mounting. Not swept.
+constexpr double kCorrelatedPoints = 15.0;
+
 }  // namespace
 
-void align_place(const edge_map &map, const slack_points &points, int stride, double gate_m, double explained_m,
-                 int iterations, wm_pose2 *pose, double error[kSlackMost]) {
-  constexpr int kOf = 3 + kSlackErrors;  // states that a point speaks of: the pose, its camera's errors
+void align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, int stride, double gate_m,
+                double explained_m, int iterations, wm_pose2 *pose) {
   for (int round = 0; round < iterations; round++) {
-    double part[kSlackCameras][kOf][kOf] = {}, right[kSlackCameras][kOf] = {};
-    int cameras = 1;
+    matrix<3> a = kDamping * matrix<3>::Identity();
+    vector<3> b = vector<3>::Zero(), step;
     const sin_cos h = sincos(pose->heading_rad);
-    for (int i = 0; i < points.count; i += stride) {
-      double px, py;
-      moved(points, i, error, &px, &py);
-      const double rx = h.cos * px - h.sin * py, ry = h.sin * px + h.cos * py;
-      const edge_line line = map.nearest(pose->x_m + rx, pose->y_m + ry);
-      if (!line.found || line.distance_m > gate_m) continue;
-      double row[kOf] = {line.normal_x, line.normal_y, line.normal_y * rx - line.normal_x * ry, 0.0, 0.0, 0.0};
-      // The normal as base_link sees it.
-      const double ahead = h.cos * line.normal_x + h.sin * line.normal_y;
-      const double left = h.cos * line.normal_y - h.sin * line.normal_x;
-      for (int k = 0; k < kSlackErrors; k++)
-        row[3 + k] = ahead * (double)points.x_by[k][i] + left * (double)points.y_by[k][i];
-      const double weight = square(explained_m) / (square(explained_m) + square(line.offset_m));
-      const int camera = points.camera[i];
-      if (camera >= cameras) cameras = camera + 1;
-      for (int r = 0; r < kOf; r++) {
-        const double weighted = weight * row[r];
-        right[camera][r] += weighted * line.offset_m;
-        for (int c = 0; c <= r; c++) part[camera][r][c] += weighted * row[c];
-      }
+    for (int i = 0; i < count; i += stride) {
+      const pose_row row = row_at(map, *pose, h, (double)x_m[i], (double)y_m[i]);
+      if (!row.line.found || row.line.distance_m > gate_m) continue;
+      const vector<3> weighted = cauchy_weight(row.line.offset_m, explained_m) * row.by;
+      b += row.line.offset_m * weighted;
+      a.noalias() += weighted * row.by.transpose();
     }
-    double a[kAlignStates][kAlignStates] = {}, b[kAlignStates] = {}, step[kAlignStates];
-    for (int k = 0; k < cameras; k++)
-      for (int r = 0; r < kOf; r++) {
-        const int of = kSlackErrors * k, to = r < 3 ? r : of + r;
-        b[to] += right[k][r];
-        for (int c = 0; c <= r; c++) a[to][c < 3 ? c : of + c] += part[k][r][c];
-      }
-    for (int r = 0; r < 3; r++) a[r][r] += 1.0;  // what the points don't say stays
-    const int n = 3 + kSlackErrors * cameras;
-    const double known = kTogether * square(explained_m);
-    for (int r = 3; r < n; r++) {
-      a[r][r] += known;
-      b[r] -= known * error[r - 3];
-    }
-    if (!solve_positive(a, b, n, step)) break;
-    pose->x_m += step[0];
-    pose->y_m += step[1];
-    pose->heading_rad = wrap(pose->heading_rad + step[2]);
-    for (int r = 3; r < n; r++) error[r - 3] += step[r];
+    if (!solve_positive(a, b, &step)) break;
+    step_pose(step.data(), pose);
   }
 }
 
-double explained_share(const edge_map &map, const slack_points &points, double explained_m, const wm_pose2 &pose,
-                       const double error[kSlackMost], bool images) {
+void align_place(const edge_map &map, const floor_points &points, int stride, double gate_m, double explained_m,
+                 int iterations, wm_pose2 *pose, double error[kMountingAll]) {
+  constexpr int kOwn = 3 + kMountingErrors, kAll = 3 + kMountingAll;  // unknowns of a point; of all points
+  for (int round = 0; round < iterations; round++) {
+    matrix<kOwn> information[kMountingCameras] = {matrix<kOwn>::Zero(), matrix<kOwn>::Zero()};
+    vector<kOwn> right[kMountingCameras] = {vector<kOwn>::Zero(), vector<kOwn>::Zero()};
+    const sin_cos h = sincos(pose->heading_rad);
+    for (int i = 0; i < points.count; i += stride) {
+      double x, y;
+      shifted(points, i, error, &x, &y);
+      const pose_row row = row_at(map, *pose, h, x, y);
+      const edge_line &line = row.line;
+      if (!line.found || line.distance_m > gate_m) continue;
+      vector<kOwn> by;
+      by.head<3>() = row.by;
+      // The normal in base_link.
+      const double ahead = h.cos * line.normal_x + h.sin * line.normal_y;
+      const double left = h.cos * line.normal_y - h.sin * line.normal_x;
+      for (int k = 0; k < kMountingErrors; k++)
+        by[3 + k] = ahead * (double)points.x_by[k][i] + left * (double)points.y_by[k][i];
+      const vector<kOwn> weighted = cauchy_weight(line.offset_m, explained_m) * by;
+      right[points.camera[i]] += line.offset_m * weighted;
+      information[points.camera[i]].noalias() += weighted * by.transpose();
+    }
+    matrix<kAll> a = matrix<kAll>::Zero();
+    vector<kAll> b = vector<kAll>::Zero(), step;
+    a.topLeftCorner<3, 3>() = kDamping * matrix<3>::Identity();
+    const double known = kCorrelatedPoints * square(explained_m);
+    for (int c = 0; c < kMountingCameras; c++) {
+      const int at = 3 + kMountingErrors * c;
+      a.topLeftCorner<3, 3>() += information[c].topLeftCorner<3, 3>();
+      b.head<3>() += right[c].head<3>();
+      a.block<kMountingErrors, 3>(at, 0) = information[c].bottomLeftCorner<kMountingErrors, 3>();
+      a.block<3, kMountingErrors>(0, at) = information[c].topRightCorner<3, kMountingErrors>();
+      a.block<kMountingErrors, kMountingErrors>(at, at) =
+          information[c].bottomRightCorner<kMountingErrors, kMountingErrors>() +
+          known * matrix<kMountingErrors>::Identity();
+      for (int k = 0; k < kMountingErrors; k++) b[at + k] = right[c][3 + k] - known * error[kMountingErrors * c + k];
+    }
+    if (!solve_positive(a, b, &step)) break;
+    step_pose(step.data(), pose);
+    for (int k = 0; k < kMountingAll; k++) error[k] += step[3 + k];
+  }
+}
+
+double explained_share(const edge_map &map, const floor_points &points, double explained_m, const wm_pose2 &pose,
+                       const double error[kMountingAll], bool reflections) {
   const sin_cos h = sincos(pose.heading_rad);
   double explained = 0.0;
   for (int i = 0; i < points.count; i++) {
     double px, py;
-    moved(points, i, error, &px, &py);
+    shifted(points, i, error, &px, &py);
     const double x = pose.x_m + h.cos * px - h.sin * py, y = pose.y_m + h.sin * px + h.cos * py;
     const edge_line line = map.nearest(x, y);
     if (line.found && line.distance_m <= explained_m) {
       explained += 1.0;
-    } else if (images) {
+    } else if (reflections) {
       const double rx = (double)points.ray_x_m[i], ry = (double)points.ray_y_m[i];
       if (before_an_edge(map, x, y, h.cos * rx - h.sin * ry, h.sin * rx + h.cos * ry))
-        explained += (double)points.image[i];
+        explained += (double)points.reflection[i];
     }
   }
   return points.count > 0 ? explained / points.count : 0.0;

@@ -1,21 +1,40 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a scan moves the filter: aligned with the map's lines from the prediction on, together with what the camera may
-// be off by, and taken in as one measurement.
+// The measurement update: a scan is aligned with the map's lines from the prediction on, together with the camera's
+// errors, and fused as one measurement.
 #include "filters/edge_mcl/edge_mcl.hpp"
 #include "math/arc.hpp"
 
 namespace wm {
 namespace {
 
+// Gauss-Newton steps of one descent; in the first ones a point's gate includes the prior's spread. Not swept.
 constexpr int kRounds = 4, kCoarseRounds = 2;
+constexpr double kCoarseGateMax_m = 0.5;  // below edge_map's reach
+// Along an axis that the prediction leaves open, descents start this far apart (door recesses are 0.1 m to 0.3 m deep)
+// and up to so many sigmas, so many on each side at most. Not swept.
 constexpr double kStartStep_m = 0.12, kStartSigmas = 2.5;
-constexpr int kStartsMax = 6;  // on each side
-constexpr double kDoubtOdds = -1.5;
-constexpr double kLeastExplained = 0.4;
-constexpr double kSureHeading_rad = 0.08;
-constexpr double kSameEnd_m = 0.1, kSameEnd_rad = 0.05, kLeastChance = 0.01;
-constexpr double kOpenSigmas = 2.5;                     // that a point is looked for off its place
-constexpr double kErrsAnew_m = 0.1, kErrsAnew_s = 5.0;  // from one scan to the next that errs by itself
+constexpr int kStartsMax = 6;
+constexpr double kSureHeading_rad = 0.08;  // a heading less sure than this gets three starts: 5 degrees
+// Minima nearer than this are one; those less probable are left out.
+constexpr double kSameMinimum_m = 0.1, kSameMinimum_rad = 0.05, kLeastProbability = 0.01;
+constexpr double kNormalGateCos = 0.8253356149096783;  // of 0.6 rad between a point's edge and the map's; not swept
+constexpr double kOpenSigmas = 2.5;                    // of a point's place by the prior, added to the gate
+// Errors of a scan are independent of the last one's after this distance or time. Chosen on 2 of 75 corridor-hard
+// drives that were lost while they stood; not swept.
+constexpr double kIndependent_m = 0.1, kIndependent_s = 5.0;
+constexpr double kExplained_m = 0.06, kExplainedSigmas2 = 9.0;  // a point so near to an edge is explained by the map
+constexpr int kLeastExplained = 5;                              // points without which a scan gives no pose
+constexpr double kLeastExplainedLost = 0.4;   // fraction of a scan that the map must explain while the robot is lost
+constexpr double kCalibrationLogOdds = -1.5;  // of being lost, above which a scan corrects the pose alone
+constexpr double kRankDeficient = 1e-9;       // of a pivot, in parts of its diagonal
+
+// Half the squared residual as Student's distribution with 4 degrees of freedom has it: (nu + 1)/2 log(1 + r2/nu).
+double student_cost(double squared, double variance) { return 2.5 * log(1.0 + 0.25 * (squared / variance)); }
+// Its weight in iteratively reweighted least squares: (nu + 1)/(nu + r2).
+double student_weight(double squared, double variance) { return 5.0 / (4.0 + squared / variance); }
+
+// Where the heading enters, differences are wrapped.
+double difference(int state, double a, double b) { return state == kAlignHeading ? wrap(a - b) : a - b; }
 
 }  // namespace
 
@@ -32,167 +51,174 @@ edge_mcl::alignment edge_mcl::alignment_of(int camera) const {
   return a;
 }
 
-edge_mcl::taken_from edge_mcl::look_back(const alignment &a) const {
+edge_mcl::capture edge_mcl::capture_of(const alignment &a) const {
   const wm_time_ns now = filter_.now_ns(), age = wm_ns_from_seconds(a.value[kAlignTime]);
-  taken_from t{};
+  capture c{};
   motion_twist twist{};
   const wm_pose2 way = age >= 0 ? filter_.path(now - age, now, &twist) : filter_.path(now, now - age, &twist);
-  t.from_now = age >= 0 ? between(way, wm_pose2{}) : way;
-  t.pose = compose({a.value[kAlignX], a.value[kAlignY], a.value[kAlignHeading]}, t.from_now);
-  t.v_mps = twist.v;
-  t.w_radps = twist.w;
-  return t;
+  c.from_now = age >= 0 ? between(way, wm_pose2{}) : way;
+  c.pose = compose({a.value[kAlignX], a.value[kAlignY], a.value[kAlignHeading]}, c.from_now);
+  c.v_mps = twist.v;
+  c.w_radps = twist.w;
+  c.turn = sincos(c.pose.heading_rad);
+  const double x = a.camera >= 0 ? camera_[a.camera].x_m : 0.0, y = a.camera >= 0 ? camera_[a.camera].y_m : 0.0;
+  c.eye_x_m = c.pose.x_m + c.turn.cos * x - c.turn.sin * y;
+  c.eye_y_m = c.pose.y_m + c.turn.sin * x + c.turn.cos * y;
+  return c;
 }
 
-bool edge_mcl::belief_of(int camera, belief *out) const {
+bool edge_mcl::predict_scan(int camera, prediction *out) const {
   out->mean = alignment_of(camera);
-  out->n = 0;
-  for (int k = 0; k < kAlignStates; k++)
-    if (out->mean.state[k] >= 0) out->index[out->n++] = k;
-  double covariance[kAlignStates][kAlignStates], root[kAlignStates][kAlignStates];
-  for (int r = 0; r < out->n; r++)
-    for (int c = 0; c < out->n; c++)
-      covariance[r][c] = filter_.covariance(out->mean.state[out->index[r]], out->mean.state[out->index[c]]);
-  if (!invert_positive(covariance, out->n, out->inverse) || !factor_positive(covariance, out->n, root)) return false;
+  const int *state = out->mean.state;
+  align_matrix covariance;
   for (int r = 0; r < kAlignStates; r++)
-    for (int c = 0; c < kAlignStates; c++) out->root[r][c] = 0.0;
-  for (int r = 0; r < out->n; r++)
-    for (int c = 0; c <= r; c++) out->root[out->index[r]][c] = root[r][c];
+    for (int c = 0; c < kAlignStates; c++)
+      covariance(r, c) = state[r] >= 0 && state[c] >= 0 ? filter_.covariance(state[r], state[c]) : r == c;
+  if (!invert_positive(covariance, &out->inverse) || !cholesky(covariance, &out->root)) return false;
+  for (int k = 0; k < kAlignStates; k++)
+    if (state[k] < 0) out->inverse(k, k) = out->root(k, k) = 0.0;  // its rows of a measurement are 0 as well
   return true;
 }
 
-void edge_mcl::accumulate(const wm_points &points, const alignment &a, double gate_m, const belief *prior,
-                          normal_equations *out) const {
+// Corrects a point by the camera's errors and finds the map's edge next to it. False: it is not used.
+bool edge_mcl::match(const wm_points &points, uint32_t i, const alignment &a, const capture &from,
+                     matched_point *out) const {
+  out->floor = {(double)points.x_m[i], (double)points.y_m[i], {}, {}};
+  floor_point &p = out->floor;
+  if (a.camera >= 0) {
+    if (camera_[a.camera].range(p.x, p.y) > params_.range_max_m) return false;
+    if (!camera_[a.camera].correct(p.x, p.y, a.value + kAlignCamera, &p)) return false;
+  }
+  const sin_cos &h = from.turn;
+  out->from_x_m = h.cos * p.x - h.sin * p.y;
+  out->from_y_m = h.sin * p.x + h.cos * p.y;
+  out->x_m = from.pose.x_m + out->from_x_m;
+  out->y_m = from.pose.y_m + out->from_y_m;
+  out->on_line = on_a_line(points, i);
+  out->own2 = square(point_sigma(points, i, a.camera)) + square(params_.point_sigma_m);
+  out->sigma2 = out->own2;
+  if (a.camera >= 0)
+    out->sigma2 += square(camera_[a.camera].sigma(camera_[a.camera].range(p.x, p.y), params_.common_px));
+  out->line = map_.nearest(out->x_m, out->y_m);
+  edge_line &line = out->line;
+  // The floor on this side of an edge was seen: its normal points away from the camera.
+  if (line.normal_x * (out->x_m - from.eye_x_m) + line.normal_y * (out->y_m - from.eye_y_m) < 0.0) {
+    line.normal_x = -line.normal_x;
+    line.normal_y = -line.normal_y;
+    line.offset_m = -line.offset_m;
+  }
+  out->same_side = true;
+  if (line.found && finite((double)points.normal_rad[i])) {
+    const sin_cos n = sincos((double)points.normal_rad[i] + from.pose.heading_rad);
+    out->same_side = n.cos * line.normal_x + n.sin * line.normal_y >= kNormalGateCos;
+  }
+  out->residual_m = line.offset_m - (edge_state_ >= 0 ? a.value[kAlignEdge] : 0.0);
+  return true;
+}
+
+// A point on a line that no edge explains lies beyond an edge, or is an edge's reflection in the floor, or neither.
+void edge_mcl::count_unexplained(const matched_point &p, const capture &from, normal_equations *out) const {
+  if (!p.on_line) return;
+  const double ray_x = p.x_m - from.eye_x_m, ray_y = p.y_m - from.eye_y_m;
+  if (through_an_edge(map_, p.x_m, p.y_m, ray_x, ray_y))
+    out->beyond++;
+  else
+    out->reflected += before_an_edge(map_, p.x_m, p.y_m, ray_x, ray_y);
+}
+
+// Derivatives of a point's distance to its edge, towards smaller residuals.
+void edge_mcl::jacobian_of(const matched_point &p, const alignment &a, const capture &from, align_vector *row) const {
+  const edge_line &line = p.line;
+  const sin_cos &h = from.turn;
+  row->setZero();
+  (*row)[kAlignX] = line.normal_x;
+  (*row)[kAlignY] = line.normal_y;
+  (*row)[kAlignHeading] = line.normal_y * (p.x_m - a.value[kAlignX]) - line.normal_x * (p.y_m - a.value[kAlignY]);
+  for (int k = 0; k < kCameraErrors; k++)
+    (*row)[kAlignCamera + k] = line.normal_x * (h.cos * p.floor.x_by[k] - h.sin * p.floor.y_by[k]) +
+                               line.normal_y * (h.sin * p.floor.x_by[k] + h.cos * p.floor.y_by[k]);
+  (*row)[kAlignTime] = -(line.normal_x * (from.v_mps * h.cos - from.w_radps * p.from_y_m) +
+                         line.normal_y * (from.v_mps * h.sin + from.w_radps * p.from_x_m));
+  (*row)[kAlignEdge] = 1.0;
+  for (int k = 0; k < kAlignStates; k++)
+    if (a.state[k] < 0) (*row)[k] = 0.0;
+}
+
+// Normal equations of a scan at an alignment. `open`: a point's place is as uncertain as this prior leaves it, too, and
+// nothing is counted. Null: by its own error alone, and each point is counted as explained or not.
+void edge_mcl::linearize(const wm_points &points, const alignment &a, double gate_m, const prediction *open,
+                         normal_equations *out) const {
   *out = normal_equations{};
-  const taken_from then = look_back(a);
-  const sin_cos h = sincos(then.pose.heading_rad);
-  const double seen_from[2] = {a.camera >= 0 ? camera_[a.camera].x_m : 0.0,
-                               a.camera >= 0 ? camera_[a.camera].y_m : 0.0};
-  const double eye_x = then.pose.x_m + h.cos * seen_from[0] - h.sin * seen_from[1];
-  const double eye_y = then.pose.y_m + h.sin * seen_from[0] + h.cos * seen_from[1];
-  const double cos_gate = cos(params_.normal_gate_rad);
-  const double together = params_.correlated / fresh_;
+  align_vector row;
+  const capture from = capture_of(a);
+  const double correlated = params_.correlated / independence_;  // points that count as one
+  matched_point p;
   for (uint32_t i = 0; i < points.count; i++) {
-    floor_point p{(double)points.x_m[i], (double)points.y_m[i], {}, {}};
-    if (a.camera >= 0) {
-      if (camera_[a.camera].range(p.x, p.y) > params_.range_max_m) continue;
-      if (!camera_[a.camera].correct(p.x, p.y, a.value + kAlignCamera, &p)) continue;
-    }
-    const double rx = h.cos * p.x - h.sin * p.y, ry = h.sin * p.x + h.cos * p.y;  // from base_link then, in map axes
-    const double x = then.pose.x_m + rx, y = then.pose.y_m + ry;
-    const bool lined = on_a_line(points, i);
-    out->seen += lined;
-    edge_line line = map_.nearest(x, y);
-    const double own2 = square(point_sigma(points, i, a.camera)) + square(params_.point_sigma_m);
-    double sigma2 = own2;
-    if (a.camera >= 0) sigma2 += square(camera_[a.camera].sigma(camera_[a.camera].range(p.x, p.y), params_.common_px));
-    const double none = 2.5 * log(1.0 + square(params_.gate_m) / (4.0 * sigma2)) / together;
-    out->cost += none;
-    const auto take_unexplained = [&] {
-      if (prior || !lined) return;
-      if (through_an_edge(map_, x, y, x - eye_x, y - eye_y))
-        out->through++;
-      else
-        out->before += before_an_edge(map_, x, y, x - eye_x, y - eye_y);
-    };
-    if (!line.found || (!prior && line.distance_m > gate_m)) {
-      take_unexplained();
+    if (!match(points, i, a, from, &p)) continue;
+    out->seen += p.on_line;
+    const double unmatched = student_cost(square(params_.gate_m), p.sigma2) / correlated;
+    out->cost += unmatched;
+    if (!p.line.found || (!open && p.line.distance_m > gate_m) || !p.same_side) {
+      if (!open) count_unexplained(p, from, out);
       continue;
     }
-    // What is seen of an edge is the floor on this side of it: its normal points away.
-    if (line.normal_x * (x - eye_x) + line.normal_y * (y - eye_y) < 0.0) {
-      line.normal_x = -line.normal_x;
-      line.normal_y = -line.normal_y;
-      line.offset_m = -line.offset_m;
-    }
-    if (finite((double)points.normal_rad[i])) {
-      const sin_cos n = sincos((double)points.normal_rad[i] + then.pose.heading_rad);
-      if (n.cos * line.normal_x + n.sin * line.normal_y < cos_gate) {
-        take_unexplained();
-        continue;
-      }
-    }
-    const double residual = line.offset_m - (edge_state_ >= 0 ? a.value[kAlignEdge] : 0.0);
-    const double misfit = residual * residual / sigma2;
-    const double cost = 2.5 * log(1.0 + 0.25 * misfit) / together;
-    if (cost < none) out->cost += cost - none;
-    if (line.distance_m >= 0.06 && residual * residual >= 9.0 * own2) {
-      take_unexplained();
-    } else if (!prior) {
+    const double residual2 = p.residual_m * p.residual_m;
+    const double cost = student_cost(residual2, p.sigma2) / correlated;
+    if (cost < unmatched) out->cost += cost - unmatched;
+    if (!open && p.line.distance_m >= kExplained_m && residual2 >= kExplainedSigmas2 * p.own2) {
+      count_unexplained(p, from, out);
+    } else if (!open) {
       out->explained++;
-      out->seen += !lined;
+      out->seen += !p.on_line;
     }
-
-    double row[kAlignStates] = {};
-    row[kAlignX] = line.normal_x;
-    row[kAlignY] = line.normal_y;
-    row[kAlignHeading] = line.normal_y * (x - a.value[kAlignX]) - line.normal_x * (y - a.value[kAlignY]);
-    for (int k = 0; k < kCameraErrors; k++)
-      row[kAlignCamera + k] = line.normal_x * (h.cos * p.x_by[k] - h.sin * p.y_by[k]) +
-                              line.normal_y * (h.sin * p.x_by[k] + h.cos * p.y_by[k]);
-    row[kAlignTime] = -(line.normal_x * (then.v_mps * h.cos - then.w_radps * ry) +
-                        line.normal_y * (then.v_mps * h.sin + then.w_radps * rx));
-    row[kAlignEdge] = 1.0;
-    double open2 = 0.0;
-    for (int c = 0; prior && c < prior->n; c++) {
-      double sum = 0.0;
-      for (int r = 0; r < kAlignStates; r++) sum += row[r] * prior->root[r][c];
-      open2 += sum * sum;
-    }
-    if (prior && square(line.distance_m) > square(gate_m) + square(kOpenSigmas) * open2) continue;
-    // Student's distribution with 4 degrees of freedom: what doesn't fit has little to say.
-    const double weight = 5.0 / (4.0 + residual * residual / (sigma2 + open2)) / ((sigma2 + open2) * together);
-    for (int r = 0; r < kAlignStates; r++) {
-      if (a.state[r] < 0) continue;
-      out->gradient[r] += weight * row[r] * residual;
-      for (int c = 0; c < kAlignStates; c++)
-        if (a.state[c] >= 0) out->information[r][c] += weight * row[r] * row[c];
-    }
+    jacobian_of(p, a, from, &row);
+    const double open2 = open ? (open->root.transpose() * row).squaredNorm() : 0.0;
+    if (open && square(p.line.distance_m) > square(gate_m) + square(kOpenSigmas) * open2) continue;
+    const double variance = p.sigma2 + open2, weight = student_weight(residual2, variance) / (variance * correlated);
+    out->gradient += weight * p.residual_m * row;
+    out->information.noalias() += (weight * row) * row.transpose();
   }
 }
 
-// Gauss-Newton from a.value on; the cost of prediction and scan together where it ends, equations there.
-double edge_mcl::descend(const wm_points &points, const belief &prior, double slack_m, alignment *a,
+align_vector edge_mcl::difference_of(const alignment &a, const alignment &b) {
+  align_vector d;
+  for (int k = 0; k < kAlignStates; k++) d[k] = difference(k, a.value[k], b.value[k]);
+  return d;
+}
+
+// Gauss-Newton from a.value on. Returns the cost of prediction and scan together where it ends; `e` is linearized
+// there.
+double edge_mcl::descend(const wm_points &points, const prediction &prior, double slack_m, alignment *a,
                          normal_equations *e) const {
-  const int *index = prior.index, n = prior.n;
-  const auto off = [&](int k) {
-    const double d = prior.mean.value[index[k]] - a->value[index[k]];
-    return index[k] == kAlignHeading ? wrap(d) : d;
-  };
   for (int round = 0; round < kRounds; round++) {
-    // From as far as pose and camera may be off down to the gate.
+    // The gate narrows from the uncertainty of pose and camera to that of a point.
     const bool coarse = round < kCoarseRounds;
     const double gate = params_.gate_m + (coarse ? slack_m : 0.0);
-    accumulate(points, *a, gate > 0.5 ? 0.5 : gate, coarse ? &prior : nullptr, e);
+    linearize(points, *a, gate > kCoarseGateMax_m ? kCoarseGateMax_m : gate, coarse ? &prior : nullptr, e);
     if (round + 1 == kRounds) break;
-    double total[kAlignStates][kAlignStates], right[kAlignStates], step[kAlignStates];
-    for (int r = 0; r < n; r++) {
-      right[r] = e->gradient[index[r]];
-      for (int c = 0; c < n; c++) {
-        total[r][c] = prior.inverse[r][c] + e->information[index[r]][index[c]];
-        right[r] += prior.inverse[r][c] * off(c);
-      }
-    }
-    if (!solve_positive(total, right, n, step)) break;
-    for (int r = 0; r < n; r++) a->value[index[r]] += step[r];
+    align_matrix total = prior.inverse + e->information;
+    const align_vector right = e->gradient + prior.inverse * difference_of(prior.mean, *a);
+    for (int k = 0; k < kAlignStates; k++)
+      if (a->state[k] < 0) total(k, k) = 1.0;
+    align_vector step;
+    if (!solve_positive(total, right, &step)) break;
+    for (int k = 0; k < kAlignStates; k++) a->value[k] += step[k];
     a->value[kAlignHeading] = wrap(a->value[kAlignHeading]);
   }
-  double cost = e->cost;
-  for (int r = 0; r < n; r++)
-    for (int c = 0; c < n; c++) cost += 0.5 * off(r) * prior.inverse[r][c] * off(c);
-  return cost;
+  const align_vector off = difference_of(prior.mean, *a);
+  return e->cost + 0.5 * off.dot(prior.inverse * off);
 }
 
-// Ends that lie together are one.
-void edge_mcl::ends::take(const alignment &a, double its_cost, const normal_equations &e) {
+// Keeps the best first; minima that lie together are one.
+void edge_mcl::minima::take(const alignment &a, double its_cost, const normal_equations &e) {
   const auto same = [&a](const alignment &b) {
     return square(a.value[kAlignX] - b.value[kAlignX]) + square(a.value[kAlignY] - b.value[kAlignY]) <
-               square(kSameEnd_m) &&
-           std::fabs(wrap(a.value[kAlignHeading] - b.value[kAlignHeading])) < kSameEnd_rad;
+               square(kSameMinimum_m) &&
+           std::fabs(wrap(a.value[kAlignHeading] - b.value[kAlignHeading])) < kSameMinimum_rad;
   };
   int i = 0;
   while (i < count && !same(at[i])) i++;
-  if (i == kMost || (i < count && its_cost >= cost[i])) return;
+  if (i == kCapacity || (i < count && its_cost >= cost[i])) return;
   if (i == count) count++;
   if (its_cost < cost[0] || i == 0) {
     at[i] = at[0];
@@ -204,9 +230,9 @@ void edge_mcl::ends::take(const alignment &a, double its_cost, const normal_equa
   cost[i] = its_cost;
 }
 
-// A scan has several places where it fits nearly (doors, pillars). Where the prediction is sure it says which; along an
-// axis that it isn't sure of, every step of half a door's depth is a start, and the least cost leads.
-void edge_mcl::descend_from_several(const wm_points &points, const belief &prior, ends *out) const {
+// A scan has several local minima (doors, pillars). Descents start along the axis that the prediction leaves most open,
+// and, of a heading that is not sure, at three headings.
+void edge_mcl::find_minima(const wm_points &points, const prediction &prior, minima *out) const {
   const double xx = filter_.variance(kX), yy = filter_.variance(kY), xy = filter_.covariance(kX, kY);
   const double half = 0.5 * (xx + yy), spread = std::sqrt(square(0.5 * (xx - yy)) + square(xy));
   const double sigma = std::sqrt(half + spread), angle = 0.5 * atan2(2.0 * xy, xx - yy);
@@ -218,20 +244,20 @@ void edge_mcl::descend_from_several(const wm_points &points, const belief &prior
     step = kStartSigmas * sigma / sides;
   }
   const double slack = sides > 0 ? step : 3.0 * std::sqrt(half + spread + 9.0 * filter_.variance(kHeading));
-  // Nor is a heading found that is off by more than a few degrees.
   const double turn = std::sqrt(filter_.variance(kHeading));
-  const bool placed = state_ == WM_STATE_TRACKING || on_trial_;
+  const bool placed = state_ == WM_STATE_TRACKING || tentative_;
   const int turns = placed && turn > kSureHeading_rad ? 1 : 0;
-  if (state_ == WM_STATE_SEARCHING && !placed) sides = 0;  // about a place that is none there is nothing to be found
+  if (state_ == WM_STATE_SEARCHING && !placed) sides = 0;  // the pose is arbitrary: no use in starts around it
   out->count = 0;
   for (int k = -sides; k <= sides; k++)
     for (int m = -turns; m <= turns; m++) {
-      // The prediction's mean, given that it is k steps along the axis, and turned.
+      // The prior's mean, conditioned on k steps along the axis; then turned.
       alignment a = prior.mean;
-      for (int i = 0; i < prior.n; i++) {
-        const int state = a.state[prior.index[i]];
-        const double shared = axis.cos * filter_.covariance(state, kX) + axis.sin * filter_.covariance(state, kY);
-        a.value[prior.index[i]] += k * step * shared / square(sigma);
+      for (int i = 0; i < kAlignStates; i++) {
+        if (a.state[i] < 0) continue;
+        const double shared =
+            axis.cos * filter_.covariance(a.state[i], kX) + axis.sin * filter_.covariance(a.state[i], kY);
+        a.value[i] += k * step * shared / square(sigma);
       }
       a.value[kAlignHeading] = wrap(a.value[kAlignHeading] + m * turn);
       normal_equations e;
@@ -240,47 +266,36 @@ void edge_mcl::descend_from_several(const wm_points &points, const belief &prior
     }
 }
 
-// How far every state is off, and with what probability, if the robot isn't where the scan fits best but at another
-// end.
-void edge_mcl::allow_for(const ends &found, const belief &prior, double off[ends::kMost][kMaxStates],
-                         double *chance) const {
+// Probability of each minimum, and by how much every state differs there from the best one.
+void edge_mcl::compare_minima(const minima &found, const prediction &prior,
+                              double off[minima::kCapacity][kMaxEdgeStates], double *probability) const {
   double total = 0.0;
-  for (int k = 0; k < found.count; k++) total += chance[k] = exp(found.cost[0] - found.cost[k]);
+  for (int k = 0; k < found.count; k++) total += probability[k] = exp(found.cost[0] - found.cost[k]);
   for (int k = 0; k < found.count; k++) {
-    chance[k] /= total;
-    double scaled[kAlignStates] = {};  // P^-1 (end - best)
-    for (int c = 0; c < prior.n; c++) {
-      const int which = prior.index[c];
-      double way = found.at[k].value[which] - found.at[0].value[which];
-      if (which == kAlignHeading) way = wrap(way);
-      for (int r = 0; r < prior.n; r++) scaled[r] += prior.inverse[r][c] * way;
-    }
+    probability[k] /= total;
+    const align_vector scaled = prior.inverse * difference_of(found.at[k], found.at[0]);
     for (int i = 0; i < filter_.states(); i++) {
       off[k][i] = 0.0;
-      for (int r = 0; r < prior.n; r++)
-        off[k][i] += filter_.covariance(i, prior.mean.state[prior.index[r]]) * scaled[r];
+      for (int r = 0; r < kAlignStates; r++)
+        if (prior.mean.state[r] >= 0) off[k][i] += filter_.covariance(i, prior.mean.state[r]) * scaled[r];
     }
   }
 }
 
-// What the scan says of the place along the axis of the map that it knows better, with what it says of the rest from
-// there: one distance, in a corridor that to its walls.
-void edge_mcl::describe(const normal_equations &scan, const belief &prior, const alignment &a,
-                        wm_innovation *record) const {
-  const int *index = prior.index, n = prior.n;
-  const int best = scan.information[kAlignX][kAlignX] > scan.information[kAlignY][kAlignY] ? kAlignX : kAlignY;
-  const double known = scan.information[best][best];
+// The innovation along the map axis of which the scan has more information, with its information of the other states
+// given that axis: one distance, in a corridor that to its walls.
+void edge_mcl::describe(const normal_equations &scan, const alignment &a, wm_innovation *record) const {
+  const int best = scan.information(kAlignX, kAlignX) > scan.information(kAlignY, kAlignY) ? kAlignX : kAlignY;
+  const double known = scan.information(best, best);
   if (!(known > 0.0)) return;
-  const double aslant = scan.information[kAlignX][kAlignY] / known, length = std::sqrt(1.0 + aslant * aslant);
+  const double aslant = scan.information(kAlignX, kAlignY) / known, length = std::sqrt(1.0 + aslant * aslant);
   double innovation = scan.gradient[best] / known;
   planar_row row;
-  for (int i = 0; i < n; i++) {
-    const int state = a.state[index[i]];
-    double off = a.value[index[i]] - filter_.value(state);
-    if (index[i] == kAlignHeading) off = wrap(off);
-    const double share = scan.information[best][index[i]] / known;
-    row.add(state, share);
-    innovation += share * off;
+  for (int k = 0; k < kAlignStates; k++) {
+    if (a.state[k] < 0) continue;
+    const double share = scan.information(best, k) / known;
+    row.add(a.state[k], share);
+    innovation += share * difference(k, a.value[k], filter_.value(a.state[k]));
   }
   projection projected;
   filter_.project(row, &projected);
@@ -290,76 +305,72 @@ void edge_mcl::describe(const normal_equations &scan, const belief &prior, const
   record->gate_dof = 1;
 }
 
-// Iterated: minimises the prediction's and the scan's misfit together, then takes in what the scan says there as scalar
-// measurements, one for each row of the information's factor. Source: the iterated extended Kalman filter (B. M. Bell,
-// F. W. Cathey, "The iterated Kalman filter update as a Gauss-Newton method", 1993), in information form.
-bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan, wm_innovation *record) {
-  // What looks like an edge and is none, and by what each edge is seen off, are the same from the same place.
-  const int by = camera >= 0 ? camera : kCamerasMax;
-  const double way = filter_.travelled_m() + filter_.turned_rad();
-  fresh_ = aligned_ns_[by] == WM_TIME_NONE ? 1.0
-                                           : (way - aligned_m_[by]) / kErrsAnew_m +
-                                                 wm_seconds_between(aligned_ns_[by], filter_.now_ns()) / kErrsAnew_s;
-  if (fresh_ > 1.0) fresh_ = 1.0;
-  belief prior;
-  if (!belief_of(camera, &prior)) return false;
-  const int *index = prior.index, n = prior.n;
-  ends found;
-  descend_from_several(points, prior, &found);
-  const alignment &a = found.at[0];
-  const normal_equations &e = *scan = found.best;
-  record->verdict = e.explained < 5 ? (uint8_t)WM_REJECTED_SINGULAR : (uint8_t)WM_FUSED;
-  if (e.explained < 5) return false;
-  describe(e, prior, a, record);
-  // Lost: of what the map doesn't explain a few points happen to lie near its edges. They would drag the pose there,
-  // which odometry carries on meanwhile as one of the places that are possible.
-  if (state_ != WM_STATE_TRACKING && e.explained < kLeastExplained * e.seen) {
-    record->verdict = (uint8_t)WM_REJECTED_GATE;
-    return false;
-  }
-
-  aligned_m_[by] = way;
-  aligned_ns_[by] = filter_.now_ns();
-
-  double elsewhere[ends::kMost][kMaxStates], chance[ends::kMost];
-  allow_for(found, prior, elsewhere, chance);
-  // information = L D L'; the rows of L' measure what the scan knows, with variances 1/D.
-  double lower[kAlignStates][kAlignStates] = {}, d[kAlignStates];
-  for (int i = 0; i < n; i++) {
-    d[i] = e.information[index[i]][index[i]];
+// The scan's information A = L D L' as scalar measurements: row i of L' with variance 1/D_i, where D_i is not 0. False:
+// a variance was not positive, and that row was not fused.
+bool edge_mcl::fuse_information(const normal_equations &e, const alignment &a) {
+  double lower[kAlignStates][kAlignStates] = {}, d[kAlignStates], forward[kAlignStates];  // forward: L^-1 gradient
+  for (int i = 0; i < kAlignStates; i++) {
+    d[i] = e.information(i, i);
     for (int k = 0; k < i; k++) d[i] -= lower[i][k] * lower[i][k] * d[k];
-    if (!(d[i] > 1e-9 * e.information[index[i]][index[i]])) d[i] = 0.0;
+    if (!(d[i] > kRankDeficient * e.information(i, i))) d[i] = 0.0;
     lower[i][i] = 1.0;
-    for (int j = i + 1; j < n; j++) {
-      double sum = e.information[index[j]][index[i]];
+    for (int j = i + 1; j < kAlignStates; j++) {
+      double sum = e.information(j, i);
       for (int k = 0; k < i; k++) sum -= lower[j][k] * lower[i][k] * d[k];
       lower[j][i] = d[i] > 0.0 ? sum / d[i] : 0.0;
     }
-  }
-  double forward[kAlignStates];  // L^-1 gradient
-  for (int i = 0; i < n; i++) {
-    forward[i] = e.gradient[index[i]];
+    forward[i] = e.gradient[i];
     for (int k = 0; k < i; k++) forward[i] -= lower[i][k] * forward[k];
   }
-  // In doubt of the pose a scan teaches nothing of sensors and camera.
-  const int kept_to = odds_lost() > kDoubtOdds ? filter_.states() : kPoseStates;
-  for (int i = 0; i < n; i++) {
+  const int considered_to = lost_log_odds() > kCalibrationLogOdds ? filter_.states() : kPoseStates;
+  bool numeric = true;
+  for (int i = 0; i < kAlignStates; i++) {
     if (!(d[i] > 0.0)) continue;
     planar_row row;
     double innovation = forward[i] / d[i];
-    for (int j = i; j < n; j++) {
-      const int state = a.state[index[j]];
-      double off = a.value[index[j]] - filter_.value(state);
-      if (index[j] == kAlignHeading) off = wrap(off);
-      row.add(state, lower[j][i]);
-      innovation += lower[j][i] * off;
+    for (int j = i; j < kAlignStates; j++) {
+      if (a.state[j] < 0) continue;
+      row.add(a.state[j], lower[j][i]);
+      innovation += lower[j][i] * difference(j, a.value[j], filter_.value(a.state[j]));
     }
     projection projected;
     filter_.project(row, &projected);
-    (void)filter_.update(projected, innovation, 1.0 / d[i], kPoseStates, kept_to);
+    numeric &= filter_.update(projected, innovation, 1.0 / d[i], kPoseStates, considered_to);
   }
+  return numeric;
+}
+
+// Iterated extended Kalman filter in information form (B. M. Bell, F. W. Cathey, "The iterated Kalman filter update as
+// a Gauss-Newton method", 1993): minimises prediction's and scan's cost together, then fuses the scan's information at
+// the minimum. False: the scan was not fused; the record's verdict has the reason.
+bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan, wm_innovation *record) {
+  const int by = camera >= 0 ? camera : kCamerasMax;
+  const double way = filter_.travelled_m() + filter_.turned_rad();
+  independence_ = aligned_ns_[by] == WM_TIME_NONE
+                      ? 1.0
+                      : (way - aligned_m_[by]) / kIndependent_m +
+                            wm_seconds_between(aligned_ns_[by], filter_.now_ns()) / kIndependent_s;
+  if (independence_ > 1.0) independence_ = 1.0;
+  prediction before;
+  if (!predict_scan(camera, &before)) return false;
+  minima found;
+  find_minima(points, before, &found);
+  *scan = found.best;
+  record->verdict = scan->explained < kLeastExplained ? (uint8_t)WM_REJECTED_SINGULAR : (uint8_t)WM_FUSED;
+  if (scan->explained < kLeastExplained) return false;
+  describe(*scan, found.at[0], record);
+  // While lost, points lie near edges by chance. They would draw the pose there, which only odometry carries on.
+  if (state_ != WM_STATE_TRACKING && scan->explained < kLeastExplainedLost * scan->seen) {
+    record->verdict = (uint8_t)WM_REJECTED_GATE;
+    return false;
+  }
+  aligned_m_[by] = way;
+  aligned_ns_[by] = filter_.now_ns();
+  double off[minima::kCapacity][kMaxEdgeStates], probability[minima::kCapacity];
+  compare_minima(found, before, off, probability);
+  if (!fuse_information(*scan, found.at[0])) record->verdict = (uint8_t)WM_REJECTED_NUMERIC;
   for (int k = 1; k < found.count; k++)
-    if (chance[k] > kLeastChance) filter_.add_chance(chance[k], elsewhere[k]);
+    if (probability[k] > kLeastProbability) filter_.add_chance(probability[k], off[k]);
   return true;
 }
 

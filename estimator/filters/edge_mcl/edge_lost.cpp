@@ -1,127 +1,95 @@
 // SPDX-License-Identifier: Apache-2.0
-// Is the robot where the filter says? And if not, where?
+// Lost or not, and relocalization.
 #include "filters/edge_mcl/edge_mcl.hpp"
 #include "math/arc.hpp"
 
 namespace wm {
 namespace {
 
-constexpr double kOddsMax = 6.0;
-constexpr double kLostOdds = 1.0, kFoundOdds = -3.0, kTrustedOdds = -4.5, kEasyOdds = -5.5, kMemory_s = 2.0,
-                 kUsual_s = 10.0, kExpected_s = 60.0;
-constexpr double kApart_m = 0.3, kApart_rad = 0.15;
-constexpr double kFoundSigma_m = 0.1, kFoundSigma_rad = 0.03;
-constexpr double kFresh_s = 0.5, kFresh_m = 0.2;  // scans further apart speak each for itself
-constexpr double kWander_m = 0.1, kLoosened_m2ps = 0.002, kLoosened_rad2ps = 0.0002;
-constexpr double kDoubtOdds = -2.0;
-// Held against other places an image speaks for one's own as an edge does; of itself it says less.
-constexpr double kImageSpeaks = 0.5;
-constexpr int kFewKeyframes = 4, kManyKeyframes = 10;  // 0.4 m each
-constexpr int kAtEase = 4, kNotAtEase = 2;             // a scan's work through it is what a sweep for look-alikes has
-constexpr int kLeisure = 8, kWeighedInDoubt = 6, kWeighingShare = 4;
-constexpr int kPosesLeast = place_search::kAligningCost + place_search::kWeighingCost;
-static_assert(kPosesLeast <= EDGE_MCL_SEARCH_POSES_LEAST && lookalikes::kPosesLeast <= EDGE_MCL_SEARCH_POSES_LEAST);
-constexpr double kBetter = 0.15, kMuchBetter = 0.4, kRival = 0.01;
-constexpr double kCarriedOff = 7.0;  // odds that nobody has carried it off in the last metres, logarithm of
-constexpr double kNowhere = -1e3;
+// Log odds of being lost: lost above, found below; below the third the calibration is remembered; below the fourth
+// nothing is suspicious. The hysteresis was chosen on 43 rendered drives (docs/consistency.md); not swept one by one.
+constexpr double kLostLogOdds = 1.0, kFoundLogOdds = -3.0, kTrustedLogOdds = -4.5, kNominalLogOdds = -5.5;
+constexpr double kSuspiciousLogOdds = -2.0;
+constexpr double kMemory_s = 2.0;                  // between two generations of the remembered calibration
+constexpr double kSame_m = 0.3, kSame_rad = 0.15;  // an adopted pose nearer than this to the tracked one is no jump
+constexpr double kFoundSigma_m = 0.1, kFoundSigma_rad = 0.03;  // of a pose that the search found
+// While lost the pose follows odometry; its covariance grows by this up to the sigma, so that it does not freeze.
+constexpr double kDriftSigma_m = 0.1, kDrift_m2ps = 0.002, kDrift_rad2ps = 0.0002;
+constexpr int kKeyframesSuspicious = 4, kKeyframesIdle = 10;  // of 0.4 m, from which on the map is searched
+// Budgets of a scan, as divisors of search.poses: the alias sweep when all is nominal and otherwise; the idle search;
+// weighing of hypotheses. And how many of these are weighed while suspicious, at most.
+constexpr int kAliasNominal = 4, kAliasOtherwise = 2, kIdle = 8, kWeighingShare = 4, kWeighedMax = 6;
+constexpr int kPosesMin = place_search::kAligningCost + place_search::kWeighingCost;
+static_assert(kPosesMin <= EDGE_MCL_SEARCH_POSES_LEAST && aliased_poses::kPosesMin <= EDGE_MCL_SEARCH_POSES_LEAST);
+// A hypothesis is adopted with this probability, this fraction explained, and so much more of it than the tracked pose.
+constexpr double kAdoptProbability = 0.95, kAdoptExplained = 0.6, kAdoptMargin = 0.15;
+// An alias becomes a hypothesis at these odds, or, while suspicious, where it explains so much more.
+constexpr double kAliasOdds = 0.01, kAliasMargin = 0.4;
+constexpr double kNotKidnapped = 7.0;  // log prior odds of the tracked pose: not carried off in the last metres
+constexpr double kNoPose = -1e3;       // the same where there is no tracked pose
 
-bool near(const wm_pose2 &a, const wm_pose2 &b) {
-  const wm_pose2 way = between(a, b);
-  return square(way.x_m) + square(way.y_m) < square(kApart_m) && std::fabs(way.heading_rad) < kApart_rad;
-}
+constexpr double kFoundCovariance[3][3] = {{kFoundSigma_m * kFoundSigma_m, 0, 0},
+                                           {0, kFoundSigma_m *kFoundSigma_m, 0},
+                                           {0, 0, kFoundSigma_rad *kFoundSigma_rad}};
 
 }  // namespace
 
-// What a scan says of being lost, as the logarithm of the odds: by the share of its points that the map explains from
-// the pose, and by where the others are.
-double edge_mcl::speaks_for_lost(const normal_equations &scan, double explained) const {
-  // Every scan holds some points that are no edge of the map, wherever it was taken: where few are seen, in the dark,
-  // they are most of them. And places differ in how much of them a map explains, and drives in how often it is less:
-  // what is usual here, and by what scans fall short of it, set the bar.
-  const double own_bar = usual_ - params_.lost_below - params_.lost_spread * shortfall_;
-  const double bar = can_be_edges(scan.seen) * (own_bar > params_.lost_explained ? own_bar : params_.lost_explained);
-  // On this side of the map's edges may stand what the map doesn't have, or the floor may change; one such thing hides
-  // all behind it, so that all of the points together say little. But nobody sees through a wall.
-  const double through = (double)scan.through / scan.seen, rest = 1.0 - explained - through;
-  const double misfit = through + params_.lost_hidden * (rest > 0.0 ? rest : 0.0);
-  const double said = params_.lost_gain * (bar - 1.0 + misfit);
-  const double unusual = through - params_.lost_spread * usual_through_;
-  return (said < params_.lost_most ? said : params_.lost_most) +
-         (unusual > 0.0 ? params_.lost_gain * (params_.lost_through - 1.0) * unusual : 0.0);
+double edge_mcl::lost_log_odds() const {
+  const double elsewhere = state_ == WM_STATE_TRACKING ? others_.odds_elsewhere() : 0.0;
+  return log(exp(fit_.log_odds()) + aliases_.odds() + elsewhere);
 }
 
-// The odds of being lost: each scan speaks, scans of one moment or of one place together no more than once; and out of
-// the blue somebody lifts the robot.
-void edge_mcl::watch(const normal_equations &scan, double dt_s) {
-  const int seen = scan.seen;
-  if (seen < 8) return;
-  const double explained = (scan.explained + kImageSpeaks * image_counts(seen) * scan.before) / seen;
+void edge_mcl::update_lost(const normal_equations &scan, double dt_s) {
+  if (scan.seen < fit_evidence::kPointsMin) return;
   const double way = filter_.travelled_m() + filter_.turned_rad() - watched_m_;
   watched_m_ += way;
-  double fresh = dt_s / kFresh_s < way / kFresh_m ? dt_s / kFresh_s : way / kFresh_m;
-  if (fresh > 1.0) fresh = 1.0;
-  explained_ += fresh * (explained - explained_);
-  const double said = fresh * speaks_for_lost(scan, explained);
-  lost_odds_ += said;
-  // p := p + (1 - p) rate dt
-  const double p = 1.0 / (1.0 + exp(-lost_odds_)), blue = p + (1.0 - p) * params_.lost_per_s * dt_s;
-  lost_odds_ = log(blue / (1.0 - blue));
-  if (!(lost_odds_ < kOddsMax)) lost_odds_ = kOddsMax;
-  if (!(lost_odds_ > -kOddsMax)) lost_odds_ = -kOddsMax;
+  update_state(fit_.add(scan, dt_s, way));
+  update_suspicion();
+  if (state_ == WM_STATE_TRACKING && lost_log_odds() < kTrustedLogOdds) {
+    remember_calibration();
+    fit_.learn(scan, dt_s);
+  }
+  if (state_ != WM_STATE_TRACKING && filter_.variance(kX) < square(kDriftSigma_m))
+    filter_.inflate_pose(kDrift_m2ps * dt_s, kDrift_rad2ps * dt_s);
+}
 
-  const double odds = odds_lost();
-  if (state_ == WM_STATE_TRACKING && said < 0.0 && odds < kTrustedOdds) search_.mark();
-  if (state_ == WM_STATE_TRACKING && odds > kLostOdds) {
+void edge_mcl::update_state(double log_bayes_factor) {
+  const double odds = lost_log_odds();
+  if (state_ == WM_STATE_TRACKING && log_bayes_factor < 0.0 && odds < kTrustedLogOdds) search_.mark();
+  if (state_ == WM_STATE_TRACKING && odds > kLostLogOdds) {
     state_ = WM_STATE_LOST;
     restore_calibration();
-  } else if (state_ != WM_STATE_TRACKING && odds < kFoundOdds) {
+  } else if (state_ != WM_STATE_TRACKING && odds < kFoundLogOdds) {
     state_ = WM_STATE_TRACKING;
     relocalizations_++;
-    on_trial_ = false;
-  } else if (on_trial_ && odds > kLostOdds) {
-    on_trial_ = false;
+    tentative_ = false;
+  } else if (odds > kLostLogOdds) {
+    tentative_ = false;
   }
-  if (!in_doubt_ && odds > kDoubtOdds) {
-    in_doubt_ = true;
-    swept_ = false;
-    if (lost_odds_ > kDoubtOdds)
-      search_.begin_at_mark();
-    else
-      search_.begin_ago(alike_.likelier_for_m());
-  } else if (in_doubt_ && odds < kTrustedOdds) {
-    in_doubt_ = false;
-  }
-  if (state_ == WM_STATE_TRACKING && odds < kTrustedOdds) {
-    remember_calibration();
-    const double many = can_be_edges(seen);
-    usual_ += dt_s / kUsual_s * (explained - many * usual_);
-    expected_s_ = expected_s_ + dt_s < kExpected_s ? expected_s_ + dt_s : kExpected_s;
-    if (expected_s_ > 0.0) {
-      const double lack = usual_ - explained / many;
-      expected_ += dt_s / expected_s_ * (explained - expected_);
-      usual_through_ += dt_s / expected_s_ * ((double)scan.through / seen - usual_through_);
-      shortfall_ += dt_s / expected_s_ * ((lack > 0.0 ? lack : 0.0) - shortfall_);
-    }
-  }
-  // Its own place stays one of those that are possible, so it is not left to wander to what happens to fit.
-  if (state_ != WM_STATE_TRACKING && filter_.variance(kX) < square(kWander_m))
-    filter_.inflate_pose(kLoosened_m2ps * dt_s, kLoosened_rad2ps * dt_s);
 }
 
-double edge_mcl::odds_lost() const {
-  const double elsewhere = state_ == WM_STATE_TRACKING ? others_.odds_elsewhere() : 0.0;
-  return log(exp(lost_odds_) + alike_.odds() + elsewhere);
+// Suspicious: the search looks at recent keyframes only, since the scans last fitted, or since an alias began to be
+// likelier (E. S. Page, "Continuous inspection schemes", 1954).
+void edge_mcl::update_suspicion() {
+  const double odds = lost_log_odds();
+  if (suspicious_ && odds < kTrustedLogOdds) suspicious_ = false;
+  if (suspicious_ || !(odds > kSuspiciousLogOdds)) return;
+  suspicious_ = true;
+  map_searched_ = false;
+  if (fit_.log_odds() > kSuspiciousLogOdds)
+    search_.begin_at_mark();
+  else
+    search_.begin_ago(aliases_.likelier_for_m());
 }
 
-// Motion sensors were silent. Scans from before can't be put together with those from now on, and whether the next
-// scans fit must show soon.
-void edge_mcl::doubt_motion() {
+// Motion sensors were silent: keyframes from before and after the gap have no known relation.
+void edge_mcl::on_motion_gap() {
   search_.clear();
   others_.clear(filter_.pose(), filter_.odom());
-  in_doubt_ = on_trial_ = true;
-  swept_ = false;
+  suspicious_ = tentative_ = true;
+  map_searched_ = false;
   if (state_ == WM_STATE_TRACKING) state_ = WM_STATE_LOST;
-  if (lost_odds_ < 0.0) lost_odds_ = 0.0;
+  if (fit_.log_odds() < 0.0) fit_.set_log_odds(0.0);
 }
 
 void edge_mcl::remember_calibration() {
@@ -139,99 +107,100 @@ void edge_mcl::restore_calibration() {
   for (int i = kPoseStates; i < filter_.states(); i++) filter_.forget(i, memory_[0].value[i], memory_[0].variance[i]);
 }
 
-// Which places look as the one that is tracked? They are looked for at leisure while what is seen is what was to be
-// expected; with half of a scan's work, and with a sweep of that scan's own, as soon as it isn't: if somebody has just
-// set the robot down elsewhere, it is now that it shows. In doubt the search needs the work: they are carried on.
-void edge_mcl::look_for_lookalikes(double dt_s) {
-  const double way = filter_.travelled_m() - alike_m_;
-  alike_m_ += way;
-  alike_.carry(filter_.odom());
-  const bool sure = state_ == WM_STATE_TRACKING && !in_doubt_, at_ease = lost_odds_ < kEasyOdds;
-  if (at_ease_ && !at_ease) alike_.begin_again();
-  at_ease_ = at_ease;
-  const int share = params_.search_poses / (at_ease ? kAtEase : kNotAtEase);
-  const int poses = share > lookalikes::kPosesLeast ? share : lookalikes::kPosesLeast;
-  alike_.look(map_, search_.field(), lined_, filter_.pose(), way, expected_, sure ? params_.lost_per_s * dt_s : 0.0,
-              sure ? poses : 0);
-  // A sweep at leisure over what the last metres looked like takes a while. What has become likely among those that
-  // look the same is weighed by it at once; in doubt also what explains much more.
-  constexpr double kNoError[kSlackMost] = {};
-  for (int i = 0; state_ != WM_STATE_SEARCHING && i < alike_.count(); i++)
-    if (alike_[i].weight > kRival) others_.offer(alike_[i].pose, alike_[i].explained, kNoError);
-  const int best = alike_.best();
-  if (in_doubt_ && state_ != WM_STATE_SEARCHING && best >= 0 && alike_[best].explained > kMuchBetter &&
-      others_.count() < hypotheses::kMost / 2)
-    others_.offer(alike_[best].pose, alike_[best].explained, kNoError);
+// Aliases of the tracked pose are swept for while it is trusted: with a small budget while all is nominal, with more,
+// by a new sweep, as soon as it is not. While suspicious they are carried on and weighed only; the search has the
+// budget.
+void edge_mcl::update_aliases(double dt_s) {
+  const double way = filter_.travelled_m() - aliases_m_;
+  aliases_m_ += way;
+  aliases_.carry(filter_.odom());
+  const bool sure = state_ == WM_STATE_TRACKING && !suspicious_, nominal = fit_.log_odds() < kNominalLogOdds;
+  if (nominal_ && !nominal) aliases_.restart_sweep();
+  nominal_ = nominal;
+  const int share = params_.search_poses / (nominal ? kAliasNominal : kAliasOtherwise);
+  const int poses = share > aliased_poses::kPosesMin ? share : aliased_poses::kPosesMin;
+  aliases_.update(map_, search_.field(), scan_, filter_.pose(), way, fit_.mean_explained(),
+                  sure ? params_.lost_per_s * dt_s : 0.0, sure ? poses : 0);
+  if (state_ == WM_STATE_SEARCHING) return;
+  constexpr double kNoError[kMountingAll] = {};
+  for (int i = 0; i < aliases_.count(); i++)
+    if (aliases_[i].odds > kAliasOdds) others_.offer(aliases_[i].pose, aliases_[i].explained, kNoError);
+  const int best = aliases_.best();
+  if (suspicious_ && best >= 0 && aliases_[best].explained > kAliasMargin &&
+      others_.count() < hypotheses::kCapacity / 2)
+    others_.offer(aliases_[best].pose, aliases_[best].explained, kNoError);
 }
 
-// Where else could it be? Sweeps over the map bring places, at leisure while there is no doubt; what the last metres
-// say of each decides.
-void edge_mcl::ponder() {
+// The search brings hypotheses, with a small budget while nothing is suspicious; the keyframes of the last metres weigh
+// them.
+void edge_mcl::relocalize() {
   others_.carry(filter_.pose(), filter_.odom());
-  if (search_.keyframes() < (in_doubt_ ? kFewKeyframes : kManyKeyframes)) return;
-  // A scan's work is bounded: what weighing may need is set aside, the rest is the search's.
+  if (search_.keyframes() < (suspicious_ ? kKeyframesSuspicious : kKeyframesIdle)) return;
   int poses = params_.search_poses;
-  if (!in_doubt_) poses = poses / kLeisure > kPosesLeast ? poses / kLeisure : kPosesLeast;
+  if (!suspicious_) poses = poses / kIdle > kPosesMin ? poses / kIdle : kPosesMin;
   const int affordable = poses / kWeighingShare / place_search::kWeighingCost;
-  const int weighed = !in_doubt_ || affordable < 1 ? 1 : affordable < kWeighedInDoubt ? affordable : kWeighedInDoubt;
+  const int weighed = !suspicious_ || affordable < 1 ? 1 : affordable < kWeighedMax ? affordable : kWeighedMax;
   if (search_.step(map_, poses - weighed * place_search::kWeighingCost, filter_.odom())) {
     others_.offer(search_);
-    swept_ = true;
+    map_searched_ = true;
   }
-  const double own_prior = state_ == WM_STATE_SEARCHING && !on_trial_ ? kNowhere
-                           : state_ == WM_STATE_TRACKING              ? kCarriedOff
-                                                                      : 0.0;
-  // One's own place explains at least what it explains now: it has been corrected all along, the others have not.
-  const double own_least = state_ == WM_STATE_TRACKING ? explained_ : 0.0;
-  const double telling = state_ == WM_STATE_TRACKING ? search_.telling() : (double)search_.keyframes();
-  others_.weigh(map_, &search_, own_prior, own_least, telling, weighed);
+  const bool tracking = state_ == WM_STATE_TRACKING;
+  const double own_prior = tracking ? kNotKidnapped : state_ == WM_STATE_SEARCHING && !tentative_ ? kNoPose : 0.0;
+  // The tracked pose was corrected by the filter all along: it explains at least what it does now.
+  const double own_least = tracking ? fit_.explained() : 0.0;
+  // While lost, keyframes of few points count like others: the tracked pose has no advantage to defend.
+  const double information = tracking ? search_.information() : (double)search_.keyframes();
+  others_.weigh(map_, &search_, own_prior, own_least, information, weighed);
+  decide();
+}
+
+// Adopts the best hypothesis, or begins to trust the tracked pose again. While lost, not before the whole map has been
+// searched: the true pose may not be in the list yet.
+void edge_mcl::decide() {
   const int best = others_.best();
   const hypothesis &there = others_[best];
-  const bool sure = there.weighed && there.share >= params_.search_share && there.explained >= params_.search_explained;
-  // Lost: until all of the map has been looked at, the true place may be none of those that are known.
-  const bool known = state_ == WM_STATE_TRACKING || swept_;
-  if (best > 0 && sure && known &&
-      there.explained >= others_[0].explained + (state_ == WM_STATE_SEARCHING ? 0.0 : kBetter)) {
-    take_place(best);
-  } else if (best == 0 && sure && state_ != WM_STATE_TRACKING && !on_trial_) {
-    lost_odds_ = 0.0;
-    alike_.forget_odds();
-    on_trial_ = true;
+  if (!there.weighed || there.probability < kAdoptProbability || there.explained < kAdoptExplained) return;
+  const bool tracking = state_ == WM_STATE_TRACKING;
+  const double margin = state_ == WM_STATE_SEARCHING ? 0.0 : kAdoptMargin;
+  if (best > 0 && (tracking || map_searched_) && there.explained >= others_[0].explained + margin) {
+    adopt(best);
+  } else if (best == 0 && !tracking && !tentative_) {
+    fit_.set_log_odds(0.0);
+    aliases_.forget_odds();
+    tentative_ = true;
   }
 }
 
-void edge_mcl::take_place(int hypothesis) {
-  const double covariance[3][3] = {
-      {square(kFoundSigma_m), 0, 0}, {0, square(kFoundSigma_m), 0}, {0, 0, square(kFoundSigma_rad)}};
+void edge_mcl::adopt(int hypothesis) {
   const wm_pose2 pose = others_[hypothesis].pose;
   if (state_ == WM_STATE_TRACKING) {
     state_ = WM_STATE_LOST;
     restore_calibration();
   }
-  lost_odds_ = 0.0;
-  in_doubt_ = on_trial_ = true;
-  if (!near(filter_.pose(), pose)) resets_++;
+  fit_.set_log_odds(0.0);
+  suspicious_ = tentative_ = true;
+  const wm_pose2 way = between(filter_.pose(), pose);
+  if (!same_pose(wm_pose2{}, way, kSame_m, kSame_rad)) resets_++;
   others_.adopt(hypothesis);
-  alike_.forget_odds();
-  filter_.set_pose(pose, covariance);
+  aliases_.forget_odds();
+  filter_.set_pose(pose, kFoundCovariance);
 }
 
-// The covariance of all that is possible about the pose that is given out: the places with their probabilities; while
-// lost, what is left may be anywhere in the map.
-void edge_mcl::spread_over_hypotheses(wm_estimate *out) const {
+// Moments of all hypotheses about the published pose; while lost, the rest of the probability is spread over the map.
+void edge_mcl::add_hypotheses_spread(wm_estimate *out) const {
   const int at[3] = {0, 1, 5};
   const wm_pose2 pose = {out->pose_map_base.p_m[0], out->pose_map_base.p_m[1], out->heading_rad};
   double rest = 1.0;
   for (int i = 0; i < others_.count(); i++) {
     const hypothesis &h = others_[i];
-    rest -= h.share;
+    rest -= h.probability;
     if (i == 0) continue;
     const double d[3] = {h.pose.x_m - pose.x_m, h.pose.y_m - pose.y_m, wrap(h.pose.heading_rad - pose.heading_rad)};
     for (int r = 0; r < 3; r++)
-      for (int c = 0; c < 3; c++) out->covariance[wm_cov_index(at[r], at[c])] += h.share * d[r] * d[c];
+      for (int c = 0; c < 3; c++) out->covariance[wm_cov_index(at[r], at[c])] += h.probability * d[r] * d[c];
   }
   if (state_ == WM_STATE_TRACKING) return;
-  if (!on_trial_) rest = 1.0;
+  if (!tentative_) rest = 1.0;
   const wm_raster &map = map_.raster();
   const double width = map.width_px * map.resolution_m, height = map.height_px * map.resolution_m;
   const double anywhere = rest * (square(width) + square(height)) / 12.0;

@@ -4,20 +4,20 @@
 #include <cstring>
 
 #include "filters/core/contract.hpp"
+#include "filters/core/gate.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
 #include "math/arc.hpp"
+#include "memory/layout.hpp"
 #include "sensors/points.hpp"
 
 namespace wm {
 namespace {
 
-constexpr double kShortfall = 0.1, kThrough = 0.05;  // where nothing is known of them yet
-constexpr double kSilent_s = 1.0;  // between two messages of the motion sensors, after which the way is unknown
-constexpr double kFoundCovariance[6] = {0.02, 0.0, 0.02, 0.0, 0.0, 0.0018};  // of a place that the search found
-constexpr size_t kAlign = 64;
-
-constexpr size_t aligned(size_t bytes) { return (bytes + kAlign - 1) & ~(kAlign - 1); }
+constexpr double kMotionGap_s = 1.0;      // between two messages of the motion sensors, beyond which the way is unknown
+constexpr double kUnknownSigma_m = 0.03;  // of a point without a sigma and without a camera
+// Variances of a listed hypothesis: 14 cm, 2.4 degrees. Of hypotheses that were right, on corridor-hard; not swept.
+constexpr double kHypothesisCovariance[6] = {0.02, 0.0, 0.02, 0.0, 0.0, 0.0018};
 
 }  // namespace
 
@@ -28,7 +28,10 @@ size_t edge_mcl::bytes(const wm_edge_mcl_params &, const wm_setup &setup, const 
     *why = "edge_mcl takes at most 2 cameras";
     return 0;
   }
-  return aligned(sizeof(edge_mcl)) + aligned(map) + place_search::bytes(*setup.map) + kAlign;
+  memory_layout layout(nullptr, sizeof(edge_mcl));
+  layout.take<uint8_t>(map);
+  layout.take<uint8_t>(place_search::bytes(*setup.map));
+  return layout.bytes();
 }
 
 void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
@@ -53,18 +56,18 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
     camera_state_[c][kHeight] = add(params.height_sigma_m);
     camera_state_[c][kCameraErrors] = add(params.time_offset_sigma_s);
   }
-  uint8_t *behind = reinterpret_cast<uint8_t *>(this) + aligned(sizeof *this);
-  map_.init(*setup.map, behind);
-  search_.init(map_, behind + aligned(edge_map::bytes(*setup.map)));
-  alike_.init(map_);
-  usual_ = expected_ = params.lost_explained;
-  expected_s_ = 0.0;
-  shortfall_ = kShortfall;
-  usual_through_ = kThrough;
-  fused_ns_ = watched_ns_ = remembered_ns_ = driven_ns_ = WM_TIME_NONE;
-  remember_calibration();
-  remembered_ns_ = WM_TIME_NONE;
-  remember_calibration();
+  memory_layout layout(this, sizeof *this);
+  map_.init(*setup.map, layout.take<uint8_t>(edge_map::bytes(*setup.map)));
+  search_.init(map_, layout.take<uint8_t>(place_search::bytes(*setup.map)));
+  aliases_.init(map_);
+  fit_.init(params);
+  watched_ns_ = driven_ns_ = WM_TIME_NONE;
+  for (calibration_memory &m : memory_)
+    for (int i = kPoseStates; i < filter_.states(); i++) {
+      m.value[i] = filter_.value(i);
+      m.variance[i] = filter_.variance(i);
+    }
+  remembered_ns_ = filter_.now_ns();
   start_again(start_is_known(setup.start));
 }
 
@@ -75,15 +78,12 @@ void edge_mcl::start_again(bool known) {
   fused_ns_ = WM_TIME_NONE;
   for (wm_time_ns &t_ns : aligned_ns_) t_ns = WM_TIME_NONE;
   watched_m_ = filter_.travelled_m() + filter_.turned_rad();
-  explained_ = params_.lost_explained;
+  fit_.reset(known);
   others_.clear(filter_.pose(), filter_.odom());
-  alike_.clear(filter_.odom());
-  alike_m_ = filter_.travelled_m();
-  at_ease_ = false;
-  in_doubt_ = !known;
-  swept_ = false;
-  on_trial_ = false;
-  lost_odds_ = known ? -4.0 : 6.0;
+  aliases_.clear(filter_.odom());
+  aliases_m_ = filter_.travelled_m();
+  nominal_ = map_searched_ = tentative_ = false;
+  suspicious_ = !known;
   state_ = known ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
   resets_++;
 }
@@ -95,7 +95,7 @@ wm_status edge_mcl::predict(const wm_event &motion) {
   driven_ns_ = motion.t_ns;
   if (watched_ns_ == WM_TIME_NONE) watched_ns_ = motion.t_ns;
   filter_.move(motion);
-  if (silent_s > kSilent_s) doubt_motion();
+  if (silent_s > kMotionGap_s) on_motion_gap();
   return status;
 }
 
@@ -131,84 +131,74 @@ wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
   watched_ns_ = event.t_ns;
 
   const int camera = camera_of(points);
-  prepare(points, camera);
+  place_scan(points, camera);
   scan_odom_ = filter_.odom();
-  wm_innovation record{};
-  record.t_ns = event.t_ns;
-  record.source = event.source;
-  record.landmark_id = -1;
-  record.residual = WM_RESIDUAL_RANGE;
-  normal_equations scan{};
+  wm_innovation record = record_of(event, WM_RESIDUAL_RANGE);
+  normal_equations scan;
   if (align(points, camera, &scan, &record)) fused_ns_ = event.t_ns;
-  watch(scan, dt);
-  search_.see(lined_, filter_.odom());
-  ponder();
-  look_for_lookalikes(dt);
+  update_lost(scan, dt);
+  search_.add_keyframe(scan_, filter_.odom());
+  relocalize();
+  update_aliases(dt);
   records.add(record);
   return WM_OK;
 }
 
-// Of a recording's points nobody knows the camera; where there is one only, it was that.
+// Recorded points name no camera; where there is one only, it was that.
 int edge_mcl::camera_of(const wm_points &points) const {
   if (points.camera >= 0 && points.camera < camera_count_) return points.camera;
   return points.camera < 0 && camera_count_ == 1 ? 0 : -1;
 }
 
 double edge_mcl::point_sigma(const wm_points &points, uint32_t i, int camera) const {
-  double own = 0.03;
-  if (finite((double)points.sigma_m[i]) && points.sigma_m[i] > 0.0f)
-    own = (double)points.sigma_m[i];
-  else if (camera >= 0)
-    own = camera_[camera].sigma(camera_[camera].range((double)points.x_m[i], (double)points.y_m[i]), params_.pixel_px);
-  return own;
+  if (finite((double)points.sigma_m[i]) && points.sigma_m[i] > 0.0f) return (double)points.sigma_m[i];
+  if (camera < 0) return kUnknownSigma_m;
+  return camera_[camera].sigma(camera_[camera].range((double)points.x_m[i], (double)points.y_m[i]), params_.pixel_px);
 }
 
-// The scan as the hypotheses take it: corrected by the camera's calibration, as seen from now's base_link.
-void edge_mcl::prepare(const wm_points &points, int camera) {
+// The scan as the hypotheses take it: points on lines, corrected by the camera's calibration, in now's base_link.
+void edge_mcl::place_scan(const wm_points &points, int camera) {
   const alignment a = alignment_of(camera);
-  const taken_from then = look_back(a);
-  const sin_cos h = sincos(then.from_now.heading_rad);
-  lined_.count = 0;
-  const float image = (float)image_counts((int)points.count);
+  const wm_pose2 from = capture_of(a).from_now;
+  const sin_cos h = sincos(from.heading_rad);
+  const auto turn = [&h](double x, double y, float *to_x, float *to_y) {
+    *to_x = (float)(h.cos * x - h.sin * y);
+    *to_y = (float)(h.sin * x + h.cos * y);
+  };
+  double sigma[kMountingErrors];
+  for (int k = 0; k < kMountingErrors; k++) {
+    const int state = camera >= 0 ? camera_state_[camera][kMountingError[k]] : -1;
+    sigma[k] = state >= 0 ? std::sqrt(filter_.variance(state)) : 0.0;
+  }
+  scan_.count = 0;
   for (uint32_t i = 0; i < points.count; i++) {
     floor_point p{(double)points.x_m[i], (double)points.y_m[i], {}, {}};
     if (!on_a_line(points, i)) continue;
     if (camera >= 0 && (camera_[camera].range(p.x, p.y) > params_.range_max_m ||
                         !camera_[camera].correct(p.x, p.y, a.value + kAlignCamera, &p)))
       continue;
-    const int to = lined_.count++;
-    lined_.x_m[to] = (float)(then.from_now.x_m + h.cos * p.x - h.sin * p.y);
-    lined_.y_m[to] = (float)(then.from_now.y_m + h.sin * p.x + h.cos * p.y);
-    lined_.camera[to] = camera > 0 ? camera : 0;
-    lined_.image[to] = image;
-    const double ray_x = p.x - (camera >= 0 ? camera_[camera].x_m : 0.0);
-    const double ray_y = p.y - (camera >= 0 ? camera_[camera].y_m : 0.0);
-    lined_.ray_x_m[to] = (float)(h.cos * ray_x - h.sin * ray_y);
-    lined_.ray_y_m[to] = (float)(h.sin * ray_x + h.cos * ray_y);
-    for (int k = 0; k < kSlackErrors; k++) {
-      const int state = camera >= 0 ? camera_state_[camera][kSlackError[k]] : -1;
-      const double sigma = state >= 0 ? std::sqrt(filter_.variance(state)) : 0.0;
-      lined_.x_by[k][to] = (float)(sigma * (h.cos * p.x_by[kSlackError[k]] - h.sin * p.y_by[kSlackError[k]]));
-      lined_.y_by[k][to] = (float)(sigma * (h.sin * p.x_by[kSlackError[k]] + h.cos * p.y_by[kSlackError[k]]));
-    }
+    const int to = scan_.count++;
+    scan_.x_m[to] = (float)(from.x_m + h.cos * p.x - h.sin * p.y);
+    scan_.y_m[to] = (float)(from.y_m + h.sin * p.x + h.cos * p.y);
+    scan_.camera[to] = camera > 0 ? camera : 0;
+    scan_.reflection[to] = (float)reflection_weight((int)points.count);
+    turn(p.x - (camera >= 0 ? camera_[camera].x_m : 0.0), p.y - (camera >= 0 ? camera_[camera].y_m : 0.0),
+         &scan_.ray_x_m[to], &scan_.ray_y_m[to]);
+    for (int k = 0; k < kMountingErrors; k++)
+      turn(sigma[k] * p.x_by[kMountingError[k]], sigma[k] * p.y_by[kMountingError[k]], &scan_.x_by[k][to],
+           &scan_.y_by[k][to]);
   }
 }
-
-double edge_mcl::image_counts(int seen) const {
-  return seen > 0 ? params_.lost_false_points / (seen + params_.lost_false_points) : 0.0;
-}
-
-double edge_mcl::can_be_edges(int seen) const { return seen > 0 ? seen / (seen + params_.lost_false_points) : 0.0; }
 
 void edge_mcl::estimate(wm_estimate *out) const {
   filter_.estimate(out);
   out->resets = resets_;
+  out->lost_probability = state_ == WM_STATE_SEARCHING ? 1.0 : probability_of(lost_log_odds());
   const bool fresh =
       fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, filter_.now_ns()) <= params_.dead_reckoning_after_s;
   out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
-  out->lost_probability = state_ == WM_STATE_SEARCHING ? 1.0 : 1.0 / (1.0 + exp(-odds_lost()));
-  if (state_ != WM_STATE_SEARCHING) spread_over_hypotheses(out);
-  if (fused_ns_ == WM_TIME_NONE) return;  // the pose is what was said, as sure as it was said
+  if (state_ != WM_STATE_SEARCHING) add_hypotheses_spread(out);
+  if (fused_ns_ == WM_TIME_NONE) return;  // still the given pose with the given covariance
   out->covariance[wm_cov_index(0, 0)] += square(params_.lasting_xy_m);
   out->covariance[wm_cov_index(1, 1)] += square(params_.lasting_xy_m);
   out->covariance[wm_cov_index(5, 5)] += square(params_.lasting_heading_rad);
@@ -234,25 +224,25 @@ size_t edge_mcl::list_counters(wm_counter *out, size_t capacity) const {
   counter_list list(out, capacity);
   list.add(WM_COUNTER_MOTION_OUTLIERS, filter_.motion_outliers());
   list.add(WM_COUNTER_RELOCALIZATIONS, relocalizations_);
-  list.add(WM_COUNTER_ALIASED_POSES, (uint64_t)alike_.count());
-  list.add(WM_COUNTER_EXPLAINED_PERMILLE, (uint64_t)(1000.0 * explained_ + 0.5));
+  list.add(WM_COUNTER_ALIASED_POSES, (uint64_t)aliases_.count());
+  list.add(WM_COUNTER_EXPLAINED_PERMILLE, (uint64_t)(1000.0 * fit_.explained() + 0.5));
   return list.count();
 }
 
-// Of what speaks for the filter's own place, those that look the same have their part.
+// Aliased poses share the tracked pose's probability mass.
 size_t edge_mcl::list_hypotheses(wm_hypothesis *out, size_t capacity) const {
   const wm_pose2 since = between(scan_odom_, filter_.odom());
   size_t count = 0;
-  const auto list = [&](const wm_pose2 &at, const double(&covariance)[6], double weight) {
+  const auto list = [&](const wm_pose2 &at, const double(&covariance)[6], double probability) {
     if (count++ >= capacity) return;
     const wm_pose2 pose = compose(at, since);
-    out[count - 1] = {pose.x_m, pose.y_m, pose.heading_rad, {}, weight};
+    out[count - 1] = {pose.x_m, pose.y_m, pose.heading_rad, {}, probability};
     for (int k = 0; k < 6; k++) out[count - 1].covariance[k] = covariance[k];
   };
   for (int i = 1; i < others_.count(); i++)
-    if (others_[i].weighed) list(others_[i].pose, kFoundCovariance, others_[i].share);
-  const double each = others_[0].share / (1.0 + alike_.odds());
-  for (int i = 0; i < alike_.count(); i++) list(alike_[i].pose, alike_[i].covariance, each * alike_[i].weight);
+    if (others_[i].weighed) list(others_[i].pose, kHypothesisCovariance, others_[i].probability);
+  const double each = others_[0].probability / (1.0 + aliases_.odds());
+  for (int i = 0; i < aliases_.count(); i++) list(aliases_[i].pose, aliases_[i].covariance, each * aliases_[i].odds);
   return count;
 }
 
@@ -260,9 +250,8 @@ size_t edge_mcl::list_hypotheses(wm_hypothesis *out, size_t capacity) const {
 
 const wm_estimator wm_edge_mcl_estimator = wm::estimator_of<wm::edge_mcl, wm_edge_mcl_params>(
     "edge_mcl",
-    "Kalman filter that aligns edges on the floor with a raster map's lines, calibrates cameras and motion sensors, "
-    "and "
-    "finds the pose when lost.",
+    "Kalman filter that aligns edges on the floor with a raster map's lines, calibrates cameras and motion "
+    "sensors, and finds the pose when lost.",
     WM_EVENT_BIT(WM_EVENT_POINTS) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
         WM_EVENT_BIT(WM_EVENT_RESET),
     wm_edge_mcl_params_table);

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // Localization by edges on the floor against a raster map: an iterated Kalman filter that aligns each scan with the
 // map's lines and calibrates motion sensors and cameras, beside hypotheses of other poses. docs/estimators.md has the
-// model. pf_edges is the particle filter of the paper.
+// model; pf_edges is the particle filter for the same map and points.
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 
 #include "filters/core/record_list.hpp"
+#include "filters/edge_mcl/aliased_poses.hpp"
 #include "filters/edge_mcl/align.hpp"
+#include "filters/edge_mcl/fit_evidence.hpp"
 #include "filters/edge_mcl/hypotheses.hpp"
-#include "filters/edge_mcl/lookalikes.hpp"
 #include "filters/edge_mcl/params.h"
 #include "filters/edge_mcl/place_search.hpp"
 #include "filters/planar/planar_filter.hpp"
@@ -21,7 +22,7 @@ inline constexpr int kMaxEdgeStates = kPoseStates + kCalibrationCount + 2 + 1 + 
 
 class edge_mcl {
  public:
-  static constexpr int kCamerasMax = 2;
+  static constexpr int kCamerasMax = kMountingCameras;
 
   static size_t bytes(const wm_edge_mcl_params &params, const wm_setup &setup, const char **why);
   void init(const wm_edge_mcl_params &params, const wm_setup &setup);
@@ -36,32 +37,41 @@ class edge_mcl {
   uint32_t motion_health() const { return filter_.motion_health(); }
 
  private:
-  // What an alignment changes, and where the scan was taken by the newest guess of the time offset.
+  // The unknowns of an alignment: their states in the filter (-1: off) and values.
   struct alignment {
-    int camera, count;
-    int state[kAlignStates];  // of the filter; -1: not one
+    int camera;
+    int state[kAlignStates];
     double value[kAlignStates];
   };
-  // The alignment before a scan: the states that it has, in order; their covariance's inverse, and its root by number
-  // of align_state.
-  struct belief {
+  // The prediction before a scan. Rows of unknowns that are off are 0.
+  struct prediction {
     alignment mean;
-    int index[kAlignStates], n;
-    double inverse[kAlignStates][kAlignStates], root[kAlignStates][kAlignStates];
+    align_matrix inverse, root;  // of the covariance; its lower Cholesky factor
   };
-  // Where a scan fits, and how well: the best comes first.
-  struct ends {
-    static constexpr int kMost = 16;
+  // Local minima of an alignment's cost; the best comes first.
+  struct minima {
+    static constexpr int kCapacity = 16;
     int count;
-    alignment at[kMost];
-    double cost[kMost];
+    alignment at[kCapacity];
+    double cost[kCapacity];
     normal_equations best;
     void take(const alignment &a, double its_cost, const normal_equations &e);
   };
-  struct taken_from {
-    wm_pose2 pose;      // base_link in map when the picture was taken
-    wm_pose2 from_now;  // the same as seen from now's base_link
+  // The robot when the picture was taken.
+  struct capture {
+    wm_pose2 pose;            // base_link in map
+    wm_pose2 from_now;        // the same, seen from now's base_link
+    sin_cos turn;             // of the pose's heading
+    double eye_x_m, eye_y_m;  // under the camera, in map
     double v_mps, w_radps;
+  };
+  struct matched_point {
+    floor_point floor;                // in base_link
+    double from_x_m, from_y_m;        // from base_link, in the map's axes
+    double x_m, y_m;                  // in map
+    edge_line line;                   // next to it, its normal away from the camera
+    double residual_m, own2, sigma2;  // variance of its own; with the wall's common error
+    bool on_line, same_side;
   };
 
   wm_status take_points(const wm_event &event, record_list records);
@@ -70,32 +80,37 @@ class edge_mcl {
 
   int camera_of(const wm_points &points) const;
   double point_sigma(const wm_points &points, uint32_t i, int camera) const;
-  void prepare(const wm_points &points, int camera);
-  // What of a scan of so many points one counts that lies before an edge: of few most may be images, of many few.
-  double image_counts(int seen) const;
-  // Share of a scan of so many points that can be edges of the map.
-  double can_be_edges(int seen) const;
+  void place_scan(const wm_points &points, int camera);
+
   alignment alignment_of(int camera) const;
-  taken_from look_back(const alignment &a) const;
-  bool belief_of(int camera, belief *out) const;
-  // `prior`: each point may be off by what this leaves open of its place, too. Null: by its own error alone.
-  void accumulate(const wm_points &points, const alignment &a, double gate_m, const belief *prior,
-                  normal_equations *out) const;
-  double descend(const wm_points &points, const belief &prior, double slack_m, alignment *a, normal_equations *e) const;
-  void descend_from_several(const wm_points &points, const belief &prior, ends *out) const;
-  void allow_for(const ends &found, const belief &prior, double off[ends::kMost][kMaxStates], double *chance) const;
-  // Whether the scan was taken in; how many of its points say something and how many of these the map explains.
+  capture capture_of(const alignment &a) const;
+  bool predict_scan(int camera, prediction *out) const;
+  bool match(const wm_points &points, uint32_t i, const alignment &a, const capture &from, matched_point *out) const;
+  void count_unexplained(const matched_point &p, const capture &from, normal_equations *out) const;
+  void jacobian_of(const matched_point &p, const alignment &a, const capture &from, align_vector *row) const;
+  void linearize(const wm_points &points, const alignment &a, double gate_m, const prediction *open,
+                 normal_equations *out) const;
+  static align_vector difference_of(const alignment &a, const alignment &b);
+  double descend(const wm_points &points, const prediction &prior, double slack_m, alignment *a,
+                 normal_equations *e) const;
+  void find_minima(const wm_points &points, const prediction &prior, minima *out) const;
+  void compare_minima(const minima &found, const prediction &prior, double off[minima::kCapacity][kMaxEdgeStates],
+                      double *probability) const;
+  void describe(const normal_equations &scan, const alignment &a, wm_innovation *record) const;
+  bool fuse_information(const normal_equations &e, const alignment &a);
   bool align(const wm_points &points, int camera, normal_equations *scan, wm_innovation *record);
-  void describe(const normal_equations &scan, const belief &prior, const alignment &a, wm_innovation *record) const;
-  double speaks_for_lost(const normal_equations &scan, double explained) const;
-  void watch(const normal_equations &scan, double dt_s);
-  // Logarithm of the odds of being lost: what is seen is not explained here, or better elsewhere.
-  double odds_lost() const;
-  void doubt_motion();
-  void ponder();
-  void look_for_lookalikes(double dt_s);
-  void take_place(int hypothesis);
-  void spread_over_hypotheses(wm_estimate *out) const;
+
+  // Log odds that the pose is wrong: the scans' fit, and what other poses explain.
+  double lost_log_odds() const;
+  void update_lost(const normal_equations &scan, double dt_s);
+  void update_state(double log_bayes_factor);
+  void update_suspicion();
+  void on_motion_gap();
+  void relocalize();
+  void decide();
+  void update_aliases(double dt_s);
+  void adopt(int hypothesis);
+  void add_hypotheses_spread(wm_estimate *out) const;
   void remember_calibration();
   void restore_calibration();
 
@@ -103,41 +118,35 @@ class edge_mcl {
   wm_edge_mcl_params params_;
   planar_filter_of<kMaxEdgeStates> filter_;
   edge_map map_;
-  slack_points lined_;  // those that lie on a line with their neighbours
+  floor_points scan_;  // those on a line with their neighbours, in now's base_link
   place_search search_;
   hypotheses others_;
-  lookalikes alike_;
+  aliased_poses aliases_;
+  fit_evidence fit_;
   floor_camera camera_[kCamerasMax];
   int camera_count_;
   int camera_state_[kCamerasMax][kCameraErrors + 1];  // and the time offset
   int edge_state_;
-  int calibration_states_;
-  // What was known of sensors and camera while the scans still fitted: two generations, of which the older is safe.
+  // Calibration while the scans fitted, in two generations: the older one is from before any doubt.
   struct calibration_memory {
-    double value[kMaxStates], variance[kMaxStates];
+    double value[kMaxEdgeStates], variance[kMaxEdgeStates];
   };
   calibration_memory memory_[2];
   wm_time_ns remembered_ns_;
   wm_pose2 scan_odom_;  // odometry at the last scan
   wm_time_ns fused_ns_, watched_ns_, driven_ns_;
-  // Of each camera, and of points that are none's: when a scan was taken in last, and the way till then.
+  // Of each camera, and of points without one: time and travelled distance when a scan was fused last.
   wm_time_ns aligned_ns_[kCamerasMax + 1];
   double aligned_m_[kCamerasMax + 1];
-  double fresh_;                  // how much of a scan isn't what the last one said
-  double lost_odds_;              // logarithm of
-  double explained_;              // share, smoothed
-  double usual_;                  // the same of what can be edges, over a longer time, while the pose is trusted
-  double expected_, expected_s_;  // the same over a drive's last minute, and over how long
-  double usual_through_;          // share of the points that seemed to be seen through edges, in that time
-  double shortfall_;              // what scans were short of what is usual, in that time, on average
-  double alike_m_;                // way when look-alikes were last weighed
-  double watched_m_;              // way when the last scan was judged
+  double independence_;  // of a scan's errors from the last one's: 0 to 1
+  double aliases_m_;     // travelled distance when aliases were weighed last
+  double watched_m_;     // the same, plus rotation, when the last scan was judged
   uint32_t resets_, relocalizations_;
   uint8_t state_;
-  bool at_ease_;   // what is seen is what was to be expected
-  bool in_doubt_;  // of the pose: what was seen lately is looked for elsewhere
-  bool swept_;     // the whole map has been looked at for what was seen since then
-  bool on_trial_;  // a place was taken, the scans have not confirmed it yet
+  bool nominal_;       // no doubt at all: aliases get their smaller budget
+  bool suspicious_;    // recent scans are looked for elsewhere
+  bool map_searched_;  // the whole map, since then
+  bool tentative_;     // a pose was adopted that scans have not confirmed yet
 };
 
 }  // namespace wm

@@ -1,29 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/edge_mcl/hypotheses.hpp"
 
-#include "math/arc.hpp"
-
 namespace wm {
 namespace {
 
-// What a keyframe that is explained as a whole says against one that isn't at all: its 32 points err together, with one
-// another and with the next keyframe's.
-constexpr double kNats = 3.0;
-constexpr double kByChance = 0.5;  // explained where nothing is known of the place: walls run alike
-constexpr double kHopeless = 12.0;
+constexpr double kUnknownExplained = 0.5;  // by a place that is not in the list: walls are parallel
+constexpr double kDropNats = 12.0;         // below the best, from which on a hypothesis is dropped; not swept
+constexpr double kUnweighed = -1e3;        // log weight
+// Hypotheses nearer than this are one. Less than a sweep's places: an error of half a metre along a corridor must
+// remain another hypothesis (0.6 m let one of 20 corridor-hard drives stay off).
 constexpr double kSame_m = 0.4, kSame_rad = 0.2;
+constexpr double kLeastProbability = 1e-6;  // of the tracked pose, for its odds
 
-bool same(const wm_pose2 &a, const wm_pose2 &b) {
-  return square(a.x_m - b.x_m) + square(a.y_m - b.y_m) < square(kSame_m) &&
-         std::fabs(wrap(a.heading_rad - b.heading_rad)) < kSame_rad;
-}
+bool same(const wm_pose2 &a, const wm_pose2 &b) { return same_pose(a, b, kSame_m, kSame_rad); }
 
 }  // namespace
 
 void hypotheses::clear(const wm_pose2 &own, const wm_pose2 &odom) {
   count_ = 1;
   next_ = 0;
-  of_[0] = {own, 0.0, 1.0, false, {}};
+  of_[0] = {own, 0.0, 1.0, 0, {}};
   log_weight_[0] = 0.0;
   odom_ = odom;
 }
@@ -42,18 +38,20 @@ void hypotheses::offer(const place_search &search) {
   for (int k = 0; k < found; k++) offer(compose(places[k].pose, since), places[k].explained, places[k].error);
 }
 
-void hypotheses::offer(const wm_pose2 &pose, double explained, const double error[kSlackMost]) {
-  if (count_ == kMost) return;
+void hypotheses::offer(const wm_pose2 &pose, double explained, const double error[kMountingAll]) {
+  if (count_ == kCapacity) return;
   for (int i = 0; i < count_; i++)
     if (same(of_[i].pose, pose)) return;
   log_weight_[count_] = 0.0;
-  hypothesis &h = of_[count_++] = {pose, explained, 0.0, false, {}};
-  for (int e = 0; e < kSlackMost; e++) h.error[e] = error[e];
+  hypothesis &h = of_[count_++] = {pose, explained, 0.0, 0, {}};
+  for (int e = 0; e < kMountingAll; e++) h.error[e] = error[e];
 }
 
-void hypotheses::weigh(const edge_map &map, place_search *search, double own_prior, double own_least, double telling,
-                       int some) {
-  const double nats = kNats * telling;
+// log w = n explained + prior - error^2 / 2, n: kNatsAKeyframe times the information; beside them stands a place that
+// is not in the list.
+void hypotheses::weigh(const edge_map &map, place_search *search, double own_prior, double own_least,
+                       double information, int some) {
+  const double nats = kNatsAKeyframe * information;
   for (int n = 0; n < some && n < count_; n++, next_++) {
     if (next_ >= count_) next_ = 0;
     hypothesis &h = of_[next_];
@@ -67,24 +65,24 @@ void hypotheses::weigh(const edge_map &map, place_search *search, double own_pri
     }
     h.weighed = 1;
   }
-  double best = nats * kByChance;
+  double best = nats * kUnknownExplained;
   for (int i = 0; i < count_; i++) {
-    log_weight_[i] = of_[i].weighed ? nats * of_[i].explained + (i == 0 ? own_prior : 0.0) : -1e3;
+    log_weight_[i] = of_[i].weighed ? nats * of_[i].explained + (i == 0 ? own_prior : 0.0) : kUnweighed;
     for (const double e : of_[i].error) log_weight_[i] -= 0.5 * e * e;
     if (log_weight_[i] > best) best = log_weight_[i];
   }
-  double total = exp(nats * kByChance - best);
-  for (int i = 0; i < count_; i++) total += of_[i].share = exp(log_weight_[i] - best);
-  for (int i = 0; i < count_; i++) of_[i].share /= total;
-  drop_the_hopeless(best);
+  double total = exp(nats * kUnknownExplained - best);
+  for (int i = 0; i < count_; i++) total += of_[i].probability = exp(log_weight_[i] - best);
+  for (int i = 0; i < count_; i++) of_[i].probability /= total;
+  drop_unlikely(best);
 }
 
-void hypotheses::drop_the_hopeless(double best) {
+void hypotheses::drop_unlikely(double best) {
   int kept = 1;
   for (int i = 1; i < count_; i++) {
-    bool again = of_[i].weighed && log_weight_[i] < best - kHopeless;
-    for (int k = 0; k < kept; k++) again |= same(of_[k].pose, of_[i].pose);
-    if (again) continue;
+    bool drop = of_[i].weighed && log_weight_[i] < best - kDropNats;
+    for (int k = 0; k < kept; k++) drop |= same(of_[k].pose, of_[i].pose);
+    if (drop) continue;
     log_weight_[kept] = log_weight_[i];
     of_[kept++] = of_[i];
   }
@@ -98,17 +96,16 @@ void hypotheses::adopt(int i) {
 }
 
 double hypotheses::odds_elsewhere() const {
-  constexpr double kLeast = 1e-6;
   double sum = 0.0;
   for (int i = 1; i < count_; i++)
-    if (of_[i].weighed) sum += of_[i].share;
-  return sum / (of_[0].share > kLeast ? of_[0].share : kLeast);
+    if (of_[i].weighed) sum += of_[i].probability;
+  return sum / (of_[0].probability > kLeastProbability ? of_[0].probability : kLeastProbability);
 }
 
 int hypotheses::best() const {
   int best = 0;
   for (int i = 1; i < count_; i++)
-    if (of_[i].share > of_[best].share) best = i;
+    if (of_[i].probability > of_[best].probability) best = i;
   return best;
 }
 

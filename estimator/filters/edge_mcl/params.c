@@ -17,62 +17,69 @@ static const wm_param kParams[] = {
     F64("states.time_offset_sigma_s", time_offset_sigma_s, 0.03, 0, 0.3,
         "Start sigma of each camera's time offset, s: its pictures are that much older than their stamps. 0: off."),
     F64("states.edge_offset_sigma_m", edge_offset_sigma_m, 0.01, 0, 0.3,
-        "Start sigma of what lies between the edge that the detector sees and the map's, m: skirting, contact shadow. "
-        "0: off."),
+        "Start sigma of the distance between the detected edge and the map's, m: skirting, contact shadow. 0: off."),
 
     F64("points.pixel_px", pixel_px, 0.5, 0.01, 10,
-        "Sigma of an edge in the picture, pixels, where the detector doesn't give it in metres."),
+        "Sigma of an edge in the picture, pixels, where the detector gives none in metres."),
     F64("points.sigma_m", point_sigma_m, 0.012, 0.001, 1, "Sigma of a point besides: map and edge, m."),
     F64("points.common_px", common_px, 0.6, 0, 10,
-        "Sigma of what the edges of one wall are seen off by together, pixels: blur, and the wall's image in a shiny "
-        "floor. Far off it is more than points that agree with each other say."),
+        "Sigma of the error that all points of one wall share, pixels: blur, the wall's reflection in a glossy floor."),
     F64("points.correlated", correlated, 30, 1, 1000,
-        "As many points of successive scans err together: the alignment counts each as so many times less."),
+        "Number of points of successive scans whose errors are common: the information of each is divided by it."),
     F64("points.range_max_m", range_max_m, 6.0, 0.5, 50, "Points farther from the camera are not used, m."),
     F64("points.gate_m", gate_m, 0.15, 0.01, 0.6, "A point farther from the map's edge than this is not aligned, m."),
-    F64("points.normal_gate_rad", normal_gate_rad, 0.6, 0.05, 1.6,
-        "Nor is one whose edge runs otherwise than the map's by more than this, rad."),
     F64("lasting.xy_m", lasting_xy_m, 0.01, 0, 1,
-        "What the pose is unsure of beside the filter's covariance, m: errors that last longer than it remembers, as "
-        "where exactly the camera sits."),
+        "Sigma that the published position has besides the filter's, m: errors that last longer than a drive, as of "
+        "the "
+        "camera's position."),
     F64("lasting.heading_rad", lasting_heading_rad, 0.0005, 0, 1, "The same of the heading, rad."),
 
     F64("lost.explained", lost_explained, 0.5, 0.05, 0.95,
-        "Share of the points that the map explains at which a scan of many points speaks neither for nor against being "
-        "lost."),
+        "Fraction of a scan's points that the map explains at which the scan is evidence neither for nor against being "
+        "lost. Of n points n/(n + 60) can be edges; the fraction is taken of these."),
     F64("lost.below", lost_below, 0.2, 0, 1,
-        "So is what is less than usual in this place by this and by lost.spread, both taken of as many points as can "
-        "be edges (lost.false_points); the larger of the two shares counts."),
-    F64("lost.spread", lost_spread, 4, 0, 100,
-        "Times what the scans of the last minute were short of what was usual, on average: where a floor shines or "
-        "tape lies about, a scan that explains little says less."),
-    F64("lost.hidden", lost_hidden, 0.9, 0, 1,
-        "What a point counts as unexplained that lies on this side of the map's edges: something stands there, or the "
-        "floor changes, that the map doesn't have."),
-    F64("lost.most", lost_most, 1, 0.01, 100,
-        "What a scan says at most, logarithm of the odds, besides what is seen through edges: one thing in the way "
-        "hides all behind it."),
+        "Margin below the drive's own mean fraction. The threshold is the larger of lost.explained and mean - "
+        "lost.below - 4 times the mean shortfall."),
     F64("lost.through", lost_through, 3, 1, 100,
-        "What a point counts as unexplained that lies behind an edge of the map, where the robot can't see if it is "
-        "where it believes; less what is usual of them in the drive (lost.spread times)."),
-    F64("lost.false_points", lost_false_points, 60, 0, 1000,
-        "Points of a scan with which half of that share is enough: some are no edge of the map wherever it is, and of "
-        "few they are most. What lies before an edge, as its image in a shiny floor does, counts by it, too."),
-    F64("lost.gain", lost_gain, 8, 0.1, 100,
-        "How much a scan speaks: the logarithm of the odds changes by this times the share's difference."),
+        "Weight of an unexplained point beyond an edge of the map, where a camera at the estimated pose cannot see; "
+        "less 4 times their usual fraction. 1: as any other (glass walls, lines on the floor that the map has)."),
     F64("lost.per_s", lost_per_s, 0.0001, 0, 1,
-        "Probability of being lost out of the blue, per s: someone lifts it, once in some hours. The prior of places "
-        "that look the same, too."),
-    F64("search.explained", search_explained, 0.6, 0.05, 1,
-        "Share of the last metres' points that a place must explain."),
-    F64("search.share", search_share, 0.95, 0.1, 1,
-        "Probability, among all places that are possible, from which on a place is taken."),
+        "Probability of being carried off, per s; the prior of perceptually aliased poses, too."),
     I32("search.poses", search_poses, 80000, EDGE_MCL_SEARCH_POSES_LEAST, 10000000,
-        "Work of a scan at most while in doubt, in poses that a sweep over the map scores by 24 points one by one; an "
-        "eighth of it otherwise, and a quarter, at most half of it for places that look as the tracked one. Aligning "
-        "places (8704 each) and weighing them (3072) come out of it. 80000: 1 ms on a PC."),
+        "Largest work of a scan while suspicious or lost, in poses that a sweep over the map scores by 24 points. An "
+        "eighth of it otherwise, and a quarter to a half for aliased poses. Aligning a place counts 8704, weighing it "
+        "3072. 80000: 1 ms on a PC."),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 1.0, 0.05, 3600,
-        "Nothing fused for so long: the state says dead reckoning."),
+        "The state is dead reckoning when no scan was fused for this time, s."),
 };
 
-const wm_param_table wm_edge_mcl_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), NULL};
+// Keys that the table had before.
+#define NO_PARTICLES "the particle filter is an estimator of its own now: pf_edges"
+#define CONSTANT "it is a constant of the filter now"
+static const wm_param_old kOld[] = {
+    {"states.angle_walk_rad", NULL, "nothing read it"},
+    {"particles", NULL, NO_PARTICLES},
+    {"weight", NULL, NO_PARTICLES},
+    {"pose", NULL, NO_PARTICLES},
+    {"exponent", NULL, NO_PARTICLES},
+    {"sigma_m", NULL, NO_PARTICLES},
+    {"floor", NULL, NO_PARTICLES},
+    {"resample_below", NULL, NO_PARTICLES},
+    {"noise.way", NULL, NO_PARTICLES},
+    {"noise.side", NULL, NO_PARTICLES},
+    {"noise.turn", NULL, NO_PARTICLES},
+    {"noise.turn_rest", NULL, NO_PARTICLES},
+    {"noise.turn_rel", NULL, NO_PARTICLES},
+    {"pull", NULL, NO_PARTICLES},
+    {"points.normal_gate_rad", NULL, CONSTANT},
+    {"lost.spread", NULL, CONSTANT},
+    {"lost.hidden", NULL, CONSTANT},
+    {"lost.most", NULL, CONSTANT},
+    {"lost.false_points", NULL, CONSTANT},
+    {"lost.gain", NULL, CONSTANT},
+    {"search.explained", NULL, CONSTANT},
+    {"search.share", NULL, CONSTANT},
+    {NULL, NULL, NULL},
+};
+
+const wm_param_table wm_edge_mcl_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), kOld};

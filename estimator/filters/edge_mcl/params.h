@@ -11,20 +11,17 @@
 extern "C" {
 #endif
 
-// What a search must be allowed a scan, so that a place can be aligned and another weighed.
+// Least work of a scan, so that a place can be aligned and another weighed.
 enum { EDGE_MCL_SEARCH_POSES_LEAST = 12000 };
 
 typedef struct wm_edge_mcl_params {
   wm_motion_states motion;
   double pitch_sigma_rad, roll_sigma_rad, yaw_sigma_rad, height_sigma_m, time_offset_sigma_s, edge_offset_sigma_m;
 
-  double pixel_px, point_sigma_m, common_px, correlated, range_max_m;
-  double gate_m, normal_gate_rad;
+  double pixel_px, point_sigma_m, common_px, correlated, range_max_m, gate_m;
   double lasting_xy_m, lasting_heading_rad;
 
-  double lost_explained, lost_below, lost_spread, lost_hidden, lost_through, lost_most, lost_false_points, lost_gain,
-      lost_per_s;
-  double search_explained, search_share;
+  double lost_explained, lost_below, lost_through, lost_per_s;
   int32_t search_poses;
   double dead_reckoning_after_s;
 } wm_edge_mcl_params;

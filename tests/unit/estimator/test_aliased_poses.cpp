@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "filters/edge_mcl/lookalikes.hpp"
+#include "filters/edge_mcl/aliased_poses.hpp"
 #include "math/arc.hpp"
 #include "unity.h"
 
@@ -23,8 +23,8 @@ wm_raster raster;
 char *map_memory, *field_memory;
 wm::edge_map map;
 wm::search_field field;
-wm::lookalikes alike;
-wm::slack_points scan;
+wm::aliased_poses alike;
+wm::floor_points scan;
 
 // Of a pose in the first room that in the second.
 wm_pose2 twin(const wm_pose2 &p) { return {17 - p.x_m, 7 - p.y_m, wm::wrap(p.heading_rad + wm::kPi)}; }
@@ -49,7 +49,7 @@ void see(const wm_pose2 &pose, bool box) {
   for (int i = 0; box && i < 120; i++) add(2.5 + 0.5 * (i % 12) / 12, 2.5);
 }
 
-const wm::lookalike *listed(const wm_pose2 &pose) {
+const wm::aliased_pose *listed(const wm_pose2 &pose) {
   for (int i = 0; i < alike.count(); i++) {
     const wm_pose2 off = wm::between(pose, alike[i].pose);
     if (std::sqrt(off.x_m * off.x_m + off.y_m * off.y_m) < 0.1 && std::fabs(off.heading_rad) < 0.03) return &alike[i];
@@ -60,7 +60,7 @@ const wm::lookalike *listed(const wm_pose2 &pose) {
 const wm_pose2 kHere = {2.0, 3.0, 0.3};
 
 void look(int scans, const wm_pose2 &pose, double new_m) {
-  for (int i = 0; i < scans; i++) alike.look(map, field, scan, pose, new_m, 1.0, 1e-5, 40000);
+  for (int i = 0; i < scans; i++) alike.update(map, field, scan, pose, new_m, 1.0, 1e-5, 40000);
 }
 
 // GIVEN a robot in the first room WHEN it has seen all of it a few times THEN the same place of the second room is
@@ -68,10 +68,10 @@ void look(int scans, const wm_pose2 &pose, double new_m) {
 void the_same_place_of_a_room_that_looks_the_same_is_listed(void) {
   see(kHere, false);
   look(6, kHere, 0.0);
-  const wm::lookalike *there = listed(twin(kHere));
+  const wm::aliased_pose *there = listed(twin(kHere));
   TEST_ASSERT_NOT_NULL(there);
   TEST_ASSERT_EQUAL(1, alike.count());
-  TEST_ASSERT_TRUE(there->weight > 0 && there->weight < 1e-3);
+  TEST_ASSERT_TRUE(there->odds > 0 && there->odds < 1e-3);
   TEST_ASSERT_TRUE(there->covariance[0] > 0 && there->covariance[0] < 0.05);
 }
 
@@ -99,13 +99,13 @@ void a_view_that_tells_them_apart_drops_it(void) {
 void the_odds_turn_with_what_is_seen(void) {
   see(kHere, false);
   look(6, kHere, 0.0);
-  const double before = listed(twin(kHere))->weight;
+  const double before = listed(twin(kHere))->odds;
   const wm_pose2 believed = wm::compose(kHere, {0.3, 0.3, 0.0});
   look(10, believed, 0.4);
   TEST_ASSERT_NOT_NULL(listed(twin(kHere)));
-  TEST_ASSERT_TRUE(listed(twin(kHere))->weight > 100 * before);
+  TEST_ASSERT_TRUE(listed(twin(kHere))->odds > 100 * before);
   look(20, believed, 0.4);
-  const double weight = listed(twin(kHere))->weight;
+  const double weight = listed(twin(kHere))->odds;
   TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, weight);
   TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(50.0, weight);
   TEST_ASSERT_DOUBLE_WITHIN(3.0, 11.0, alike.likelier_for_m());
@@ -118,18 +118,19 @@ void what_is_explained_beyond_the_usual_says_nothing(void) {
   see(kHere, false);
   look(6, kHere, 0.0);
   const wm_pose2 believed = wm::compose(kHere, {0.3, 0.3, 0.0});
-  for (int i = 0; i < 10; i++) alike.look(map, field, scan, believed, 0.4, 0.0, 1e-5, 40000);
+  for (int i = 0; i < 10; i++) alike.update(map, field, scan, believed, 0.4, 0.0, 1e-5, 40000);
   TEST_ASSERT_TRUE(alike.odds() < 1e-3);
 }
 
 // GIVEN a fit whose information can't be inverted WHEN its covariance is asked for THEN there is none, and what the
 // caller had stays.
 void a_failed_inverse_gives_no_covariance(void) {
-  double information[3][3] = {{100, 0, 0}, {0, 100, 0}, {0, 0, 100}}, out[6] = {-1, -1, -1, -1, -1, -1};
+  wm::matrix<3> information = 100.0 * wm::matrix<3>::Identity();
+  double out[6] = {-1, -1, -1, -1, -1, -1};
   TEST_ASSERT_TRUE(wm::place_covariance(information, out));
   TEST_ASSERT_TRUE(out[0] > 0 && out[2] > 0 && out[5] > 0);
   for (double &v : out) v = -1;
-  information[1][1] = NAN;
+  information(1, 1) = NAN;
   TEST_ASSERT_FALSE(wm::place_covariance(information, out));
   for (const double v : out) TEST_ASSERT_EQUAL_DOUBLE(-1.0, v);
 }
