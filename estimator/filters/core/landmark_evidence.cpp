@@ -41,9 +41,9 @@ double landmark_evidence::log_bayes_factor(double density, double clutter_volume
 }
 double landmark_evidence::max_log_bayes_factor() { return -log(kFalseShare); }
 
-// What a landmark adds to the log odds of being lost.
-double landmark_evidence::contribution(double log_bayes, double moved) {
-  return -log((1.0 - moved) * exp(-log_bayes) + moved);
+// The factor by which a landmark divides the odds of being lost.
+double landmark_evidence::likelihood_kept(double log_bayes, double moved) {
+  return (1.0 - moved) * exp(-log_bayes) + moved;
 }
 
 // The source of this key; the one not seen for longest is replaced.
@@ -98,19 +98,21 @@ void landmark_evidence::note(wm_time_ns t_ns, int key, double log_bayes, double 
   sum(t_ns);
 }
 
+// One logarithm of the product rather than one a landmark: terms lie between m and exp(4), so that 24 of them neither
+// overflow nor vanish.
 void landmark_evidence::sum(wm_time_ns t_ns) {
-  double odds = prior_;
-  double best = 0.0;
+  double product = 1.0, best = 1.0;
   for (int i = 0; i < count_; i++) {
     const source &s = source_[i];
-    const double added = contribution(s.log_bayes * exp(-wm_seconds_between(s.t_ns, t_ns) / kMemory_s), s.moved);
-    odds += added;
-    if (s.key >= 0 && added < best) best = added;
+    const double left = s.t_ns == t_ns ? 1.0 : exp(-wm_seconds_between(s.t_ns, t_ns) / kMemory_s);
+    const double kept = likelihood_kept(s.log_bayes * left, s.moved);
+    product *= kept;
+    if (s.key >= 0 && kept > best) best = kept;
   }
-  odds_.set(odds - best);  // without the landmark that fits best
+  odds_.set(prior_ - log(product / best));  // without the landmark that fits best
   observed_++;
   if (contradicted()) contradicted_once_ = true;
-  if ((contradicted_once_ ? log_odds() : log_odds() + best) < kTrusted && observed_ >= kProvenAfter) {
+  if (!proven_ && observed_ >= kProvenAfter && (contradicted_once_ ? log_odds() : log_odds() - log(best)) < kTrusted) {
     proven_ = true;
     prior_ = kKidnapped;
   }
@@ -142,7 +144,7 @@ bool landmark_evidence::moved(int key) const {
       contradicts = s.log_bayes > kSurelyNot;
       continue;
     }
-    others += contribution(s.log_bayes, s.moved);
+    others -= log(likelihood_kept(s.log_bayes, s.moved));
     fitting += s.log_bayes < kFitting;
   }
   return contradicts && fitting >= kEnough && others < kTrusted;

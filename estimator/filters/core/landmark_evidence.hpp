@@ -84,7 +84,7 @@ class landmark_evidence {
 
   source &source_of(int key, wm_time_ns t_ns, double angle_rad, bool *known);
   static double scatter_checked(source &s, double log_bayes, double angle_rad, double dt, bool known);
-  static double contribution(double log_bayes, double moved);
+  static double likelihood_kept(double log_bayes, double moved);
   void sum(wm_time_ns t_ns);
 
   source source_[kSources];
