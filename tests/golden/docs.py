@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Makes docs/config.md and docs/errors.md from the programs that know: the tables of parameters, and the tests of the
 messages. docs.py check|write BUILD. `check` prints what differs and fails; `write` brings the files up to date. Both check
-that each reference cited as [Author2015] stands once in docs/references.md, and that what docs/glossary.md names in code
-is there; docs.py references checks that alone."""
+that each reference cited as [Author2015] stands once in docs/references.md, and that what docs/glossary.md and docs/design.md
+name in code is there; docs.py references checks that alone."""
 import collections
 import difflib
 import pathlib
@@ -113,13 +113,26 @@ def glossary():
     return faults
 
 
+def walks():
+    """Prints functions of docs/design.md's walks that are not in the file beside them; returns how many."""
+    faults = 0
+    row = re.compile(r"^\| \d \| `([^`]+)` \| `([^`]+)` \|")
+    for number, line in enumerate((ROOT / "docs/design.md").read_text().splitlines(), 1):
+        match = row.match(line)
+        path = ROOT / "estimator" / match.group(2) if match else None
+        if path and (not path.exists() or match.group(1) + "(" not in path.read_text()):
+            faults += 1
+            print(f"docs/design.md:{number}: {match.group(1)} is not in {match.group(2)}")
+    return faults
+
+
 def main():
     if sys.argv[1:] == ["references"]:
-        return 1 if references() + glossary() else 0
+        return 1 if references() + glossary() + walks() else 0
     if len(sys.argv) != 3 or sys.argv[1] not in ("check", "write"):
         sys.exit(__doc__)
     tests = pathlib.Path(sys.argv[2]) / "tests"
-    stale = 1 if references() + glossary() else 0
+    stale = 1 if references() + glossary() + walks() else 0
     for name, make in (("config.md", config_md), ("errors.md", errors_md)):
         path = ROOT / "docs" / name
         fresh = make(tests)
