@@ -97,8 +97,9 @@ class motion_front_end {
   void push_quantities(wm_time_ns t_ns, uint32_t fresh, bool frozen, bool refused);
   bool is_plausible(const wm_quantities &q, wm_time_ns t_ns);
   bool counter_is_wrong(const wm_quantities &q, wm_time_ns t_ns) const;
-  bool is_plausible_count(int side, wm_time_ns t_ns, double count);
-  bool is_plausible_level(int slot, wm_time_ns t_ns, double value);
+  // `bound`: this fraction of the limits.
+  bool is_plausible_count(int side, wm_time_ns t_ns, double count, double bound);
+  bool is_plausible_level(int slot, wm_time_ns t_ns, double value, double bound = 1.0);
   void note_period(int id, wm_time_ns t_ns, int frames);
   void note_plausibility(wm_time_ns t_ns, uint32_t slots, bool plausible);
   void mark_refused(motion_input *input) const;

@@ -6,16 +6,19 @@
 namespace wm {
 namespace {
 
-// A message whose counter skips n frames comes after n + 1 periods. Earlier than this fraction of them, its counter is
-// wrong, and so may be the rest of it. Halfway between the stamps of one lost frame and of none.
+// A message whose counter skips n frames comes after n + 1 periods. Earlier than this fraction of them, its counter
+// contradicts its stamp: the message is corrupt, or its stamp is late by jitter. Halfway between one lost frame and
+// none.
 constexpr double kSkipFraction = 0.75;
+// Of the bounds, for such a message: 3 m/s2 beyond a step of 0.6 m/s is a hard braking between two good samples.
+constexpr double kDoubtedBound = 0.2;
 
 }  // namespace
 
 // Whether a message's values are plausible after those before them, and its counter against its stamp.
 bool motion_front_end::is_plausible(const wm_quantities &q, wm_time_ns t_ns) {
-  const bool wrong_counter = counter_is_wrong(q, t_ns);
-  bool plausible = !wrong_counter;
+  const double bound = counter_is_wrong(q, t_ns) ? kDoubtedBound : 1.0;
+  bool plausible = true;
   uint32_t slots = 0;
   for (int i = 0; i < q.count; i++) {
     const int id = q.id[i];
@@ -23,8 +26,8 @@ bool motion_front_end::is_plausible(const wm_quantities &q, wm_time_ns t_ns) {
     note_period(id, t_ns, q.lost_before + 1);
     if (!count && !(kSpeeds & quantity_bit(id)) && id != WM_Q_YAW_RATE) continue;
     slots |= quantity_bit(id);
-    if (wrong_counter) continue;
-    plausible &= count ? is_plausible_count(id, t_ns, q.value[i]) : is_plausible_level(id, t_ns, q.value[i]);
+    plausible &=
+        count ? is_plausible_count(id, t_ns, q.value[i], bound) : is_plausible_level(id, t_ns, q.value[i], bound);
   }
   note_plausibility(t_ns, slots, plausible);
   return plausible;
@@ -51,20 +54,21 @@ void motion_front_end::note_period(int id, wm_time_ns t_ns, int frames) {
   period_s += period_s > 0.0 ? kPeriodGain * (counted_s - period_s) : counted_s;
 }
 
-bool motion_front_end::is_plausible_count(int side, wm_time_ns t_ns, double count) {
+bool motion_front_end::is_plausible_count(int side, wm_time_ns t_ns, double count, double bound) {
   const double tick_m = kTwoPi * wheels_.radius_m / wheels_.ticks_per_turn;
   if (!(params_->limits_mps2 > 0.0) || !finite(tick_m)) return true;
   const plausibility verdict =
-      check_[side].check_position(t_ns, count * tick_m, params_->limits_mps2, wheel_[side].period_s, tick_m);
+      check_[side].check_position(t_ns, count * tick_m, params_->limits_mps2, wheel_[side].period_s, tick_m, bound);
   if (verdict == plausibility::new_run) wheel_[side].is_new_run = true;
   return verdict != plausibility::refused;
 }
 
-bool motion_front_end::is_plausible_level(int slot, wm_time_ns t_ns, double value) {
+bool motion_front_end::is_plausible_level(int slot, wm_time_ns t_ns, double value, double bound) {
   const bool turn = slot == WM_Q_YAW_RATE || slot == kTwistRate;
   const double per_s = turn ? params_->limits_radps2 : params_->limits_mps2;
   if (!(per_s > 0.0)) return true;
-  return check_[slot].check_level(t_ns, value, turn ? kRateStep_radps : kSpeedStep_mps, per_s) != plausibility::refused;
+  const double step = turn ? kRateStep_radps : kSpeedStep_mps;
+  return check_[slot].check_level(t_ns, value, bound * step, bound * per_s) != plausibility::refused;
 }
 
 void motion_front_end::note_plausibility(wm_time_ns t_ns, uint32_t slots, bool plausible) {

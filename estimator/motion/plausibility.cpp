@@ -47,7 +47,7 @@ plausibility sample_check::check_level(wm_time_ns t_ns, double value, double ste
 }
 
 plausibility sample_check::check_position(wm_time_ns t_ns, double position_m, double mps2, double period_s,
-                                          double tick_m) {
+                                          double tick_m, double bound) {
   // Counts that come in a burst share the period before them: their own stamps give no speed.
   const auto seconds = [&](const run &r) {
     const double dt = wm_seconds_between(r.t_ns, t_ns);
@@ -59,7 +59,7 @@ plausibility sample_check::check_position(wm_time_ns t_ns, double position_m, do
         const double s = seconds(r), moved_m = position_m - r.value;
         if (r.count < 2) return std::fabs(moved_m) <= kSpeedMost_mps * s;
         const double expected_m = r.rate * wm_seconds_between(r.t_ns, t_ns);
-        const double bound_m = (kSpeedStep_mps + mps2 * s) * s + period_s * std::fabs(r.rate) + 2.0 * tick_m;
+        const double bound_m = bound * (kSpeedStep_mps + mps2 * s) * s + period_s * std::fabs(r.rate) + 2.0 * tick_m;
         return std::fabs(moved_m - expected_m) <= bound_m;
       },
       [&](const run &r) { return (position_m - r.value) / seconds(r); });

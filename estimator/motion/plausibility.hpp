@@ -27,8 +27,10 @@ class sample_check {
   // A level (speed, turn rate): |x - last| <= step + per_s dt, since sensors and commands change in steps.
   plausibility check_level(wm_time_ns t_ns, double value, double step, double per_s);
   // A wheel's position in m by its counts: its speed since the last count is bounded like a level, with `mps2` for
-  // per_s. `period_s`: usual time between counts, by which stamps may be off; `tick_m`: rounding.
-  plausibility check_position(wm_time_ns t_ns, double position_m, double mps2, double period_s, double tick_m);
+  // per_s. `period_s`: usual time between counts, by which stamps may be off; `tick_m`: rounding; `bound`: this
+  // fraction of step and limit.
+  plausibility check_position(wm_time_ns t_ns, double position_m, double mps2, double period_s, double tick_m,
+                              double bound);
 
  private:
   struct run {

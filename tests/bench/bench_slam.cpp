@@ -80,7 +80,7 @@ struct filter {
     const double none[3] = {};
     joint_state::innovation_block block;
     state->prepare(rows, innovation, noise, width, &block);
-    state->fuse(block, none, false);
+    if (!state->fuse(block, none, wm::joint_state::scope::all)) std::abort();
   }
 };
 

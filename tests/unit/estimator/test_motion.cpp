@@ -471,18 +471,19 @@ void test_counts_that_go_on_from_elsewhere_are_a_new_start(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, front.twist_at(make::at(2.0), calibration).v);
 }
 
-// GIVEN counts each 20 ms WHEN a message's counter claims that frames were lost THEN its small jump is refused where it
-// comes too early for that, and taken where frames were lost. A bus that hands on every other frame is no doubt.
+// GIVEN counts each 20 ms WHEN a message's counter claims that frames were lost THEN its jump of 6 cm is
+// refused where it comes too early for that. A bus that hands on every other frame is no doubt, nor is a good count
+// whose stamp is late.
 void test_a_counter_that_contradicts_the_stamp_is_doubt(void) {
   for (int lost : {0, 1, 99}) {
     start(make::two_wheels());
     const double each = 0.02 / kTick;
     for (int i = 0; i <= 50; i++) {
-      const double count = each * i + (i == 40 ? 0.03 / kTick : 0.0);
+      const double count = each * i + (i == 40 ? 0.06 / kTick : 0.0);
       wm_event e = make::quantities(0.02 * i, {{WM_Q_WHEEL_TICKS_LEFT, count}, {WM_Q_WHEEL_TICKS_RIGHT, count}});
       if (i == 40) e.as.quantities.lost_before = (uint16_t)lost;
       feed(e);
-      if (i == 40) TEST_ASSERT_DOUBLE_WITHIN(1e-6, lost ? 0.8 : 0.83, pose.x_m);
+      if (i == 40) TEST_ASSERT_DOUBLE_WITHIN(1e-6, lost ? 0.8 : 0.86, pose.x_m);
       if (i == 40) TEST_ASSERT_EQUAL_UINT32(lost ? WM_MOTION_HEALTH_IMPLAUSIBLE : 0u, front.health());
     }
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, pose.x_m);
@@ -492,6 +493,16 @@ void test_a_counter_that_contradicts_the_stamp_is_doubt(void) {
     const double count = 0.04 / kTick * i;
     wm_event e = make::quantities(0.04 * i, {{WM_Q_WHEEL_TICKS_LEFT, count}, {WM_Q_WHEEL_TICKS_RIGHT, count}});
     e.as.quantities.lost_before = i > 0;
+    feed(e);
+    TEST_ASSERT_EQUAL_UINT32(0, front.health());
+  }
+  start(make::two_wheels());
+  for (int i = 0; i <= 50; i++) {
+    if (i == 40) continue;                             // lost ...
+    const double late_s = i == 39 ? 0.7 * 0.02 : 0.0;  // ... behind one that came late
+    const double count = 0.02 / kTick * i;
+    wm_event e = make::quantities(0.02 * i + late_s, {{WM_Q_WHEEL_TICKS_LEFT, count}, {WM_Q_WHEEL_TICKS_RIGHT, count}});
+    e.as.quantities.lost_before = i == 41;
     feed(e);
     TEST_ASSERT_EQUAL_UINT32(0, front.health());
   }
