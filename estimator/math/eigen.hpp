@@ -10,7 +10,9 @@
 #error "Eigen's packets would add in another order on each machine: compile with EIGEN_DONT_VECTORIZE"
 #endif
 #define EIGEN_NO_DEBUG  // no assert()
-#define EIGEN_NO_IO     // no streams
+// Buffers of products larger than 8 rows lie on the stack, whatever their size: never on the heap.
+#define EIGEN_STACK_ALLOCATION_LIMIT __SIZE_MAX__
+#define EIGEN_NO_IO  // no streams
 #define EIGEN_NO_AUTOMATIC_RESIZING
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
