@@ -475,37 +475,28 @@ void test_counts_that_go_on_from_elsewhere_are_a_new_start(void) {
 // refused where it comes too early for that. A bus that hands on every other frame is no doubt, nor is a good count
 // whose stamp is late.
 void test_a_counter_that_contradicts_the_stamp_is_doubt(void) {
+  const auto count_at = [](double t_s, double way_m, int lost) {  // both wheels
+    wm_event e =
+        make::quantities(t_s, {{WM_Q_WHEEL_TICKS_LEFT, way_m / kTick}, {WM_Q_WHEEL_TICKS_RIGHT, way_m / kTick}});
+    e.as.quantities.lost_before = (uint16_t)lost;
+    feed(e);
+  };
   for (int lost : {0, 1, 99}) {
     start(make::two_wheels());
-    const double each = 0.02 / kTick;
     for (int i = 0; i <= 50; i++) {
-      const double count = each * i + (i == 40 ? 0.06 / kTick : 0.0);
-      wm_event e = make::quantities(0.02 * i, {{WM_Q_WHEEL_TICKS_LEFT, count}, {WM_Q_WHEEL_TICKS_RIGHT, count}});
-      if (i == 40) e.as.quantities.lost_before = (uint16_t)lost;
-      feed(e);
+      count_at(0.02 * i, 0.02 * i + (i == 40 ? 0.06 : 0.0), i == 40 ? lost : 0);
       if (i == 40) TEST_ASSERT_DOUBLE_WITHIN(1e-6, lost ? 0.8 : 0.86, pose.x_m);
       if (i == 40) TEST_ASSERT_EQUAL_UINT32(lost ? WM_MOTION_HEALTH_IMPLAUSIBLE : 0u, front.health());
     }
     TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, pose.x_m);
   }
   start(make::two_wheels());
-  for (int i = 0; i <= 50; i++) {
-    const double count = 0.04 / kTick * i;
-    wm_event e = make::quantities(0.04 * i, {{WM_Q_WHEEL_TICKS_LEFT, count}, {WM_Q_WHEEL_TICKS_RIGHT, count}});
-    e.as.quantities.lost_before = i > 0;
-    feed(e);
-    TEST_ASSERT_EQUAL_UINT32(0, front.health());
-  }
+  for (int i = 0; i <= 50; i++) count_at(0.04 * i, 0.04 * i, i > 0);
+  TEST_ASSERT_EQUAL_UINT32(0, front.health());
   start(make::two_wheels());
-  for (int i = 0; i <= 50; i++) {
-    if (i == 40) continue;                             // lost ...
-    const double late_s = i == 39 ? 0.7 * 0.02 : 0.0;  // ... behind one that came late
-    const double count = 0.02 / kTick * i;
-    wm_event e = make::quantities(0.02 * i + late_s, {{WM_Q_WHEEL_TICKS_LEFT, count}, {WM_Q_WHEEL_TICKS_RIGHT, count}});
-    e.as.quantities.lost_before = i == 41;
-    feed(e);
-    TEST_ASSERT_EQUAL_UINT32(0, front.health());
-  }
+  for (int i = 0; i <= 41; i++)  // the frame before 41 is lost, and the one before that came late
+    if (i != 40) count_at(0.02 * (i == 39 ? 39.7 : i), 0.02 * i, i == 41);
+  TEST_ASSERT_EQUAL_UINT32(0, front.health());
 }
 
 void test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns(void) {
