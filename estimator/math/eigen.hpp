@@ -44,12 +44,34 @@ Eigen::Map<const vector<kRows>> map(const double (&a)[kRows]) {
   return Eigen::Map<const vector<kRows>>(a);
 }
 
+// The factor L of A = L L' by plain loops, for more than 8 rows: Eigen's products of that size want a heap.
+template <int kN>
+bool factorize_by_loops(matrix<kN> *a) {  // into its lower triangle
+  for (int j = 0; j < kN; j++) {
+    double pivot = (*a)(j, j);
+    for (int k = 0; k < j; k++) pivot -= square((*a)(j, k));
+    if (!(pivot > 0.0)) return false;
+    const double root = (*a)(j, j) = std::sqrt(pivot);
+    for (int i = j + 1; i < kN; i++) {
+      double sum = (*a)(i, j);
+      for (int k = 0; k < j; k++) sum -= (*a)(i, k) * (*a)(j, k);
+      (*a)(i, j) = sum / root;
+    }
+  }
+  return true;
+}
+
 // Lower triangle L with A = L L'. False: A is not positive definite or not finite, and *out is undefined.
 template <int kN>
 [[nodiscard]] bool cholesky(const matrix<kN> &a, matrix<kN> *out) {
-  const Eigen::LLT<matrix<kN>> llt(a);
-  *out = llt.matrixL();
-  return llt.info() == Eigen::Success && finite(out->sum());
+  if constexpr (kN <= 8) {
+    const Eigen::LLT<matrix<kN>> llt(a);
+    *out = llt.matrixL();
+    return llt.info() == Eigen::Success && finite(out->sum());
+  } else {
+    *out = a.template triangularView<Eigen::Lower>();
+    return factorize_by_loops<kN>(out) && finite(out->sum());
+  }
 }
 
 // x := (L L')^-1 x, by the lower triangle of `l`.
@@ -65,26 +87,43 @@ void substitute(const matrix<kN> &l, vector<kN> *x) {
   }
 }
 
-// Eigen unrolls substitution up to 8 rows; beyond, it wants a heap.
+// The factor L of a symmetric positive definite matrix, kept to solve by. False: the matrix is not.
 template <int kN>
-void solve_by(const Eigen::LLT<matrix<kN>> &llt, vector<kN> *x) {
-  if constexpr (kN <= 8) {
-    llt.matrixL().solveInPlace(*x);
-    llt.matrixU().solveInPlace(*x);
-  } else {
-    substitute<kN>(llt.matrixLLT(), x);
+class factor {
+ public:
+  [[nodiscard]] bool init(const matrix<kN> &a) {
+    l_ = a;
+    if constexpr (kN <= 8) {
+      const Eigen::LLT<matrix<kN>> llt(a);
+      l_ = llt.matrixLLT();
+      return llt.info() == Eigen::Success;
+    } else {
+      return factorize_by_loops<kN>(&l_);
+    }
   }
-}
+  double pivot(int i) const { return square(l_(i, i)); }
+  void solve(vector<kN> *x) const {
+    if constexpr (kN <= 8) {
+      l_.template triangularView<Eigen::Lower>().solveInPlace(*x);
+      l_.transpose().template triangularView<Eigen::Upper>().solveInPlace(*x);
+    } else {
+      substitute<kN>(l_, x);
+    }
+  }
+
+ private:
+  matrix<kN> l_;
+};
 
 // X with A X = B, for a symmetric positive definite A. False: A is not, or X is not finite. Column by column: Eigen's
 // solver of a whole matrix is blocked and takes memory from the heap.
 template <int kN, int kCols>
 [[nodiscard]] bool solve_positive(const matrix<kN> &a, const matrix<kN, kCols> &b, matrix<kN, kCols> *out) {
-  const Eigen::LLT<matrix<kN>> llt(a);
-  if (llt.info() != Eigen::Success) return false;
+  factor<kN> l;
+  if (!l.init(a)) return false;
   for (int c = 0; c < kCols; c++) {
     vector<kN> x = b.col(c);
-    solve_by<kN>(llt, &x);
+    l.solve(&x);
     out->col(c) = x;
   }
   return finite(out->sum());
@@ -94,14 +133,14 @@ template <int kN, int kCols>
 // `pivot_min` of its diagonal element (a direction is hardly determined), or the inverse is not finite.
 template <int kN>
 [[nodiscard]] bool invert_positive(const matrix<kN> &a, matrix<kN> *out, double pivot_min = 0.0) {
-  const Eigen::LLT<matrix<kN>> llt(a);
-  if (llt.info() != Eigen::Success) return false;
+  factor<kN> l;
+  if (!l.init(a)) return false;
   for (int i = 0; i < kN; i++)
-    if (square(llt.matrixLLT()(i, i)) <= pivot_min * a(i, i)) return false;
+    if (l.pivot(i) <= pivot_min * a(i, i)) return false;
   matrix<kN> inverse;
   for (int c = 0; c < kN; c++) {
     vector<kN> x = vector<kN>::Unit(c);
-    solve_by<kN>(llt, &x);
+    l.solve(&x);
     inverse.col(c) = x;
   }
   *out = 0.5 * (inverse + inverse.transpose());

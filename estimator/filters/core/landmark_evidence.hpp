@@ -69,7 +69,7 @@ class landmark_evidence {
 
  private:
   struct source {
-    int key;
+    int64_t key;       // of 64 bits for lack of padding: the same events must give the same bytes
     double log_bayes;  // L
     double fresh;      // weight of one observation of the newest stamp
     double moved;      // m

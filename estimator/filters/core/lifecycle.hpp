@@ -68,7 +68,7 @@ class lifecycle {
   // As published: tracking without a fused observation for so long is dead reckoning.
   uint8_t state(wm_time_ns now_ns, double dead_reckoning_after_s) const {
     const bool fresh = fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, now_ns) <= dead_reckoning_after_s;
-    return tracking() && !fresh ? static_cast<uint8_t>(WM_STATE_DEAD_RECKONING) : state_;
+    return tracking() && !fresh ? static_cast<uint8_t>(WM_STATE_DEAD_RECKONING) : static_cast<uint8_t>(state_);
   }
   wm_time_ns fused_ns() const { return fused_ns_; }  // WM_TIME_NONE: never
   wm_time_ns lost_ns() const { return lost_ns_; }
@@ -77,7 +77,8 @@ class lifecycle {
   uint32_t relocalizations() const { return relocalizations_; }  // poses that a search found
 
  private:
-  uint8_t state_ = WM_STATE_SEARCHING;
+  // No padding: the same events must give the same bytes.
+  uint32_t state_ = WM_STATE_SEARCHING, unused_ = 0;
   uint32_t resets_ = 0, relocalizations_ = 0;
   wm_time_ns fused_ns_ = WM_TIME_NONE, lost_ns_ = WM_TIME_NONE, found_ns_ = WM_TIME_NONE;
   wm_time_ns searched_ns_ = WM_TIME_NONE, inflated_ns_ = WM_TIME_NONE;

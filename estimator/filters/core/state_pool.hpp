@@ -28,13 +28,13 @@ class state_pool {
  public:
   struct slot {
     int64_t key;  // -1: free
-    int state;    // first of its states
     wm_time_ns used_ns;
+    int state, unused;  // first of its states; no padding: the same events must give the same bytes
   };
 
   void clear() { count_ = 0; }
   int count() const { return count_; }
-  void add(int first_state) { slot_[count_++] = {-1, first_state, WM_TIME_NONE}; }
+  void add(int first_state) { slot_[count_++] = {-1, WM_TIME_NONE, first_state, 0}; }
   void release_all() {
     for (int i = 0; i < count_; i++) slot_[i].key = -1, slot_[i].used_ns = WM_TIME_NONE;
   }

@@ -16,7 +16,7 @@ void planar_motion::init_motion(const wm_setup &setup) {
 }
 
 void planar_motion::set_sensor_state(int state, double walk, double low, double high) {
-  sensor_state_[sensor_states_++] = {state, square(walk), low, high};
+  sensor_state_[sensor_states_++] = {state, 0, square(walk), low, high};
 }
 
 void planar_motion::set_motion_state(const wm_motion_states &states, int i, int state) {

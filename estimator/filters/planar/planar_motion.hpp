@@ -98,7 +98,7 @@ class planar_motion {
   int motion_state_[kCalibrationCount];
   double walk_[kCalibrationCount], start_variance_[kCalibrationCount];
   struct sensor_state_limits {
-    int state;
+    int state, unused;       // no padding: the same events must give the same bytes
     double walk, low, high;  // walk: variance per s
   };
   sensor_state_limits sensor_state_[kMaxSensorStates];

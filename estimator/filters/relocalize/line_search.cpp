@@ -128,7 +128,7 @@ void line_search::vote(const wm_pose2 &place, const landmark_places &map) {
     for (uint32_t bits = voted[bin] | voted[next]; bits != 0; bits &= bits - 1) both++;
     if (2 * both < look_.count) continue;
     const wm_pose2 eye = {place.x_m, place.y_m, wrap((bin + 1) * (kTwoPi / kBins))};
-    offer({compose(eye, between(look_.sensor, wm_pose2{})), both});
+    offer({compose(eye, between(look_.sensor, wm_pose2{})), both, 0});
   }
 }
 

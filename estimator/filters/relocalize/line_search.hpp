@@ -42,7 +42,7 @@ class line_search {
  private:
   struct candidate {
     wm_pose2 pose;
-    int votes;
+    int votes, unused;  // no padding: the same events must give the same bytes
   };
   static constexpr int kCandidates = 12;
   void begin(const bearing_look &look, const wm_pose2 &odom, const landmark_places &map);

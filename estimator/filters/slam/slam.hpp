@@ -35,6 +35,7 @@ struct landmark_note {
   double levelled_m[3], levelled;
   bool revisited;  // seen again where it was, after it was out of sight
   landmark_record record;
+  uint8_t unused[5];  // no padding: the same events must give the same bytes
 };
 
 struct slam_counts {
