@@ -10,8 +10,8 @@
 #error "Eigen's packets would add in another order on each machine: compile with EIGEN_DONT_VECTORIZE"
 #endif
 #define EIGEN_NO_DEBUG  // no assert()
-// Buffers of products larger than 8 rows lie on the stack, whatever their size: never on the heap.
-#define EIGEN_STACK_ALLOCATION_LIMIT __SIZE_MAX__
+// Products of up to 64 rows are sums by coefficient. Eigen's blocked products want buffers, some of them on the heap.
+#define EIGEN_CACHEFRIENDLY_PRODUCT_THRESHOLD 64
 #define EIGEN_NO_IO  // no streams
 #define EIGEN_NO_AUTOMATIC_RESIZING
 #include <Eigen/Cholesky>
