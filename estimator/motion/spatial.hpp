@@ -31,7 +31,7 @@ struct spatial_piece {
 // taken as soon as the second is there; else the first has held, so that nothing is revised.
 struct spatial_rules {
   double gap_after_s, hold_max_s;
-  bool bridges;
+  int64_t bridges;      // is a gap bridged by the next sample? Of 64 bits: no padding, so that states compare by bytes
   double mps2, radps2;  // motion.limits; 0: none
 };
 
