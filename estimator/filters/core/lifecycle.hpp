@@ -78,7 +78,7 @@ class lifecycle {
 
  private:
   // No padding: the same events must give the same bytes.
-  uint32_t state_ = WM_STATE_SEARCHING, unused_ = 0;
+  uint64_t state_ = WM_STATE_SEARCHING;
   uint32_t resets_ = 0, relocalizations_ = 0;
   wm_time_ns fused_ns_ = WM_TIME_NONE, lost_ns_ = WM_TIME_NONE, found_ns_ = WM_TIME_NONE;
   wm_time_ns searched_ns_ = WM_TIME_NONE, inflated_ns_ = WM_TIME_NONE;
