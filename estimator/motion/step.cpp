@@ -14,7 +14,7 @@ constexpr double kUnknownRate_radps = 0.3;
 constexpr double kUnknownSteeringRate_radps = 0.1;
 // Above this the speed is an artefact of two counts with nearly equal stamps; robots with counters are slower.
 constexpr double kCatchUp_mps = 30.0;
-// Below this fraction of the middle's speed (a turn about the encoder's wheel) the encoder's speed tells nothing.
+// Below this fraction of the middle's speed (a turn about the encoder's wheel) the encoder does not measure the speed.
 constexpr double kEncoderFractionLeast = 0.2;
 
 // v = (l + r)/2, w = (r - l)/b, with l and r each by its own scale and b by the track's.

@@ -30,8 +30,8 @@ constexpr double kSeldom_s = 0.5;        // identities that are misread now and 
 constexpr double kSeldomWeight = 0.5;    // longer apart, misfits weigh less
 constexpr double kPositionWrong = 0.05;  // probability that a position is wrong by multipath, which passes with ...
 constexpr double kPositionWrong_s = 5.0;
-constexpr double kKidnapped = -5.0;  // log prior once the pose is proven: somebody carries the robot off
-constexpr int kEnough = 3;           // landmarks; two fit some pose near by in any case
+constexpr double kKidnapped = -5.0;                  // log prior of a kidnapped robot, once the pose is proven
+constexpr int kEnough = 3;                           // landmarks; two fit some pose near by in any case
 constexpr double kFitting = -1.5, kSurelyNot = 6.9;  // nats
 
 }  // namespace

@@ -23,7 +23,7 @@ inline constexpr double kSweepApart_m = 0.6, kSweepApart_rad = 0.3;
 
 struct swept_place {
   wm_pose2 pose;  // base_link in map when the sweep began
-  int64_t score;  // as wide as the rest: a copy has no bytes that nobody wrote
+  int64_t score;  // 64 bits: no padding
 };
 
 // At most kHeadings headings, kPoints points, and the kBest best places. kPlacesAPose: places whose score is counted as

@@ -18,7 +18,7 @@ struct hypothesis {
   wm_pose2 pose;     // base_link in map now
   double explained;  // fraction of the keyframes' points
   double probability;
-  int64_t weighed;             // 0: not yet. As wide as the rest: a copy has no bytes that nobody wrote
+  int64_t weighed;             // 0: not yet. 64 bits: no padding
   double error[kMountingAll];  // of the cameras' mountings if it is there, in sigmas
 };
 
@@ -30,7 +30,7 @@ class hypotheses {
   void clear(const wm_pose2 &own, const wm_pose2 &odom);
   void carry(const wm_pose2 &own, const wm_pose2 &odom);
   void offer(const place_search &search);
-  // Base_link in map now, and the fraction that it is said to explain.
+  // Base_link in map now, and the fraction of points that it explains.
   void offer(const wm_pose2 &pose, double explained, const double error[kMountingAll]);
   // Aligns and weighs `some` of them, in turn. `own_prior`: log prior odds of the tracked pose against another one;
   // `own_least`: fraction that it explains at least; `information`: of the keyframes.

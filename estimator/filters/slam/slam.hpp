@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Planar SLAM on sightings: landmarks whose places nobody measured. docs/estimators.md has the model.
+// Planar SLAM on sightings of landmarks at unknown places. docs/estimators.md has the model.
 #ifndef WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 #define WAYMARK_ESTIMATOR_SLAM_SLAM_HPP
 
