@@ -94,8 +94,8 @@ class landmark_ekf {
   void fuse_elevation(residual bearing_then_own[2], const double *before, record_list records);
 
   double map_sigma(int landmark) const;
-  const sensor_errors errors_of(int sensor) const;
-  const sensor_errors remembered_errors_of(int sensor) const;
+  sensor_errors errors_of(int sensor) const;
+  sensor_errors remembered_errors_of(int sensor) const;
   double time_offset(int sensor) const;
 
   // Relocalization (recovery.cpp).

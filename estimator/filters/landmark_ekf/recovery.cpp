@@ -26,7 +26,7 @@ constexpr double kLeastDepth = 0.1;  // floor of the cosine between a depth's ax
 }  // namespace
 
 // A wrong pose bends the calibration; a search must not start from that.
-const sensor_errors landmark_ekf::remembered_errors_of(int sensor) const {
+sensor_errors landmark_ekf::remembered_errors_of(int sensor) const {
   const auto generation = trusted_generation();
   return slots_.errors(sensor, [&](int slot) { return rollback_.value(generation, slot); });
 }

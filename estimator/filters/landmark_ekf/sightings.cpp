@@ -39,7 +39,7 @@ double at_least(double value, double floor) { return value > floor ? value : flo
 
 }  // namespace
 
-const sensor_errors landmark_ekf::errors_of(int sensor) const {
+sensor_errors landmark_ekf::errors_of(int sensor) const {
   return slots_.errors(sensor, [this](int slot) { return filter_.value(slot); });
 }
 
