@@ -123,7 +123,7 @@ size_t wm_findings(const wm_health *health, wm_finding_fn function, void *contex
   about_map(&to, health);
   if (health->outputs_lost > 0) {
     char line[160];
-    (void)snprintf(line, sizeof line, "outputs: %" PRIu64 " records were lost because the sinks were too slow",
+    (void)snprintf(line, sizeof line, "outputs: %" PRIu64 " records were lost because the disk or LCM was too slow",
                    health->outputs_lost);
     say(&to, line);
   }

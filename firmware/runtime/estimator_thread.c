@@ -12,6 +12,7 @@
 // ── what it says goes into rings ────────────────────────────────────────────────────────────────────────────────────
 
 static int push(wm_ring *ring, uint64_t kind, const void *record, size_t bytes) {
+  if (OUTPUT_RECORD_HEAD + bytes > ring->slot_bytes) return 0;  // never: see wm_output_bytes, PUBLISH_RECORD_BYTES
   output_record *slot = wm_ring_reserve(ring);
   if (!slot) return 0;
   slot->kind = kind;
@@ -20,25 +21,29 @@ static int push(wm_ring *ring, uint64_t kind, const void *record, size_t bytes) 
   return 1;
 }
 
-// A log with a hole says so: before the next event that fits goes the count of those that did not.
-static void push_event(live_estimator *self, const void *event, size_t bytes) {
+// A log with a hole marks it: before the next event that fits goes the count of those that did not.
+static void push_event(live_estimator *self, const wm_event *event, size_t bytes) {
+  if (event->kind == WM_EVENT_SIGHTING) (void)push(&self->to_publish, WM_OUTPUT_EVENT, event, bytes);
   if (self->events_lost > 0) {
-    if (!push(&self->outputs, OUTPUT_GAP, &self->events_lost, sizeof self->events_lost)) {
+    if (!push(&self->to_disk, OUTPUT_GAP, &self->events_lost, sizeof self->events_lost)) {
       self->events_lost++;
       return;
     }
     self->events_lost = 0;
   }
-  if (!push(&self->outputs, WM_OUTPUT_EVENT, event, bytes)) self->events_lost++;
+  if (!push(&self->to_disk, WM_OUTPUT_EVENT, event, bytes)) self->events_lost++;
 }
 
 static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
   live_estimator *self = context;
   if (kind == WM_OUTPUT_EVENT) {
     push_event(self, record, bytes);
-  } else {
-    (void)push(&self->outputs, (uint64_t)kind, record, bytes);  // what doesn't fit is counted by the ring
+    return;
   }
+  // Records that find no room are counted by the ring.
+  if (kind == WM_OUTPUT_PUBLISHED || kind == WM_OUTPUT_INNOVATION)
+    (void)push(&self->to_publish, (uint64_t)kind, record, bytes);
+  (void)push(&self->to_disk, (uint64_t)kind, record, bytes);
 }
 
 wm_output estimator_output(live_estimator *self) { return (wm_output){.put = put, .context = self}; }
@@ -72,16 +77,22 @@ static void publish(live *run, wm_time_ns now_ns) {
   put(self, WM_OUTPUT_PUBLISHED, &published, sizeof published);
 }
 
+uint64_t outputs_lost(const live_estimator *self) {
+  return wm_ring_dropped(&self->to_publish) + wm_ring_dropped(&self->to_disk);
+}
+
 static void report_health(live *run, wm_time_ns now_ns) {
   live_estimator *self = &run->estimator;
   if (now_ns < self->next_health_ns) return;
   while (self->next_health_ns <= now_ns) self->next_health_ns += HEALTH_EVERY_NS;
-  wm_health *health = wm_ring_reserve(&self->healths);
-  if (!health) return;
+  health_record *record = wm_ring_reserve(&self->healths);
+  if (!record) return;
+  wm_health *health = &record->health;
+  record->watermark_ns = wm_merge_watermark(self->pipeline.merge);
   wm_pipeline_health(&self->pipeline, now_ns, health);
   health->loops = self->loops;
   health->deadlines_missed = self->deadlines_missed;
-  health->outputs_lost = wm_ring_dropped(&self->outputs);
+  health->outputs_lost = outputs_lost(self);
   wm_ring_commit(&self->healths);
 }
 

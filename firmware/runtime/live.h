@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // A live run's parts and what its threads share: rings, and flags that are atomics. Everything else belongs to one
 // thread at a time.
+//
+//   source threads ── events ──► estimator ──┬─ to_publish, healths ──► publish thread: LCM, watchdog
+//                                            └─ to_disk ─────────────► disk thread: files ◄── lines ── publish thread
 #ifndef WAYMARK_FIRMWARE_LIVE_H
 #define WAYMARK_FIRMWARE_LIVE_H
 
@@ -36,11 +39,17 @@ typedef struct live_source {
   uint8_t said_device;  // the thread's own
 } live_source;
 
-// The estimator's thread.
+// A health record, and how far the merge is, for the watchdog.
+typedef struct health_record {
+  wm_health health;
+  wm_time_ns watermark_ns;  // wm_merge_watermark
+} health_record;
+
+// The estimator's thread. It fills three rings.
 typedef struct live_estimator {
   wm_pipeline pipeline;
-  wm_ring outputs, healths;
-  void *outputs_memory, *healths_memory;
+  wm_ring to_publish, to_disk, healths;
+  void *to_publish_memory, *to_disk_memory, *healths_memory;
   wm_time_ns loop_ns, publish_ns, next_publish_ns, next_health_ns;
   uint64_t loops, deadlines_missed;
   uint64_t events_lost;  // not yet marked in the log
@@ -49,24 +58,32 @@ typedef struct live_estimator {
   atomic_int done;
 } live_estimator;
 
-// The sink's thread.
-typedef struct live_sink {
-  wm_run_folder *folder;  // NULL: nothing is written
+// The publish thread: LCM and the service manager. It touches no file, so that a slow disk delays no pose.
+typedef struct live_publish {
   lcm_sink lcm;
-  black_box box;
   notify notify;
-  wm_time_ns next_flush_ns, next_landmarks_ns;
-  int said_unwritable;
-  // The last pose that was worth keeping, and whether it is on the disk.
-  wm_estimate last_pose;
-  int keeps_pose, has_last_pose, said_unsaved;
+  wm_ring lines;  // of text, to the disk thread, which writes them to standard error
+  void *lines_memory;
+  wm_time_ns next_landmarks_ns;
   int has_published;
   wm_estimate last_published;
-  wm_time_ns next_save_ns;
-  // What was said of the sources and the motion sensors, so that only a change is said.
+  wm_histogram send_ns;  // from a pose made to its message handed to LCM
+  // Last reported of the sources and the motion sensors, so that only a change is reported.
   uint8_t said_stale[WM_SOURCES_MAX];
   uint32_t said_motion_health;
-} live_sink;
+  atomic_int done;
+} live_publish;
+
+// The disk thread: run folder, event log, black box, saved pose, and standard error.
+typedef struct live_disk {
+  wm_run_folder *folder;  // NULL: nothing is written
+  black_box box;
+  wm_time_ns next_flush_ns, next_save_ns;
+  int said_unwritable, said_slow, said_unsaved;
+  // The last pose that was worth keeping, and whether it is on the disk.
+  wm_estimate last_pose;
+  int keeps_pose, has_last_pose;
+} live_disk;
 
 struct live {
   const wm_config *config;
@@ -77,12 +94,14 @@ struct live {
   wm_feed *feeds;
   live_source sources[WM_SOURCES_MAX];
   live_estimator estimator;
-  live_sink sink;
+  live_publish publish;
+  live_disk disk;
   atomic_int stop;        // sources: say no more
   atomic_int restarting;  // it goes on with another configuration: no end for the service manager
 };
 
-// One record in the output ring.
+// One record in a ring of outputs. A slot of `to_disk` has room for what the run's sources make necessary
+// (wm_output_bytes), one of `to_publish` for the kinds that go over LCM.
 typedef struct output_record {
   uint64_t kind;  // wm_output_kind, or OUTPUT_GAP
   union {
@@ -97,14 +116,24 @@ typedef struct output_record {
 } output_record;
 #define OUTPUT_GAP 100
 #define OUTPUT_RECORD_HEAD offsetof(output_record, as)
+#define PUBLISH_RECORD_BYTES (OUTPUT_RECORD_HEAD + sizeof(wm_published))
+_Static_assert(sizeof(wm_innovation) <= sizeof(wm_published) && WM_EVENT_SMALL_BYTES <= sizeof(wm_published),
+               "a slot of to_publish holds each kind that goes over LCM");
 
-// Where the estimator's side puts its records: into the ring to the sinks.
+// Where the estimator's side puts its records: into the rings to the publish and the disk thread.
 wm_output estimator_output(live_estimator *self);
+// Records that found no room in either ring.
+uint64_t outputs_lost(const live_estimator *self);
 
 void *source_thread(void *live_source_pointer);
 void *estimator_thread(void *live_pointer);
-void *sink_thread(void *live_pointer);
+void *publish_thread(void *live_pointer);
+void *disk_thread(void *live_pointer);
 
+// A line for a person, to standard error or the service's log. May wait for it: not for the estimator's or the publish
+// thread.
 void live_say(live *self, const char *format, ...) __attribute__((format(printf, 2, 3)));
+// The same from the publish thread: the disk thread writes it. `line` as wm_finding_fn, `context` is the run.
+void live_say_later(void *context, const char *line);
 
 #endif

@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
@@ -47,31 +48,36 @@ void notify_open(notify *self) {
   self->socket = path ? connect_to(path) : -1;
   self->feed_every_ns = watchdog_period_ns() / 2;
   self->opened_ns = wm_monotonic_ns();
-  self->fused_until_ns = WM_TIME_NONE;
 }
 
-void notify_pose(notify *self, const wm_published *published) {
-  if (!self->said_ready) {
-    send_text(self, "READY=1\nSTATUS=localizing");
-    self->said_ready = 1;
-  }
-  notify_progress(self, published->fused_until_ns, !(published->status_flags & WM_PUB_MOTION_STALE));
+void notify_pose(notify *self) {
+  if (self->said_ready) return;
+  send_text(self, "READY=1");
+  self->said_ready = 1;
 }
 
-void notify_progress(notify *self, wm_time_ns fused_until_ns, int motion_is_fresh) {
-  if (fused_until_ns <= self->fused_until_ns || !motion_is_fresh) return;
-  self->fused_until_ns = fused_until_ns;
-  self->is_fresh = 1;
+void notify_alive(notify *self, uint64_t loops) {
+  if (loops == self->loops) return;
+  self->loops = loops;
+  self->is_alive = 1;
+}
+
+void notify_status(notify *self, const char *text) {
+  if (strncmp(self->status, text, sizeof self->status - 1) == 0) return;
+  char line[NOTIFY_STATUS_BYTES + 8];
+  (void)snprintf(self->status, sizeof self->status, "%s", text);
+  (void)snprintf(line, sizeof line, "STATUS=%s", self->status);
+  send_text(self, line);
 }
 
 void notify_tick(notify *self, wm_time_ns now_ns) {
   if (!self->said_ready && now_ns - self->opened_ns > READY_WITHOUT_POSE_NS) {
-    send_text(self, "READY=1\nSTATUS=no pose yet: searching, or no motion");
+    send_text(self, "READY=1");  // STATUS has the reason
     self->said_ready = 1;
   }
-  if (self->feed_every_ns == 0 || now_ns < self->next_feed_ns || !self->is_fresh) return;
+  if (self->feed_every_ns == 0 || now_ns < self->next_feed_ns || !self->is_alive) return;
   send_text(self, "WATCHDOG=1");
-  self->is_fresh = 0;
+  self->is_alive = 0;
   self->next_feed_ns = now_ns + self->feed_every_ns;
 }
 

@@ -4,8 +4,11 @@
 #ifndef WAYMARK_FIRMWARE_NOTIFY_H
 #define WAYMARK_FIRMWARE_NOTIFY_H
 
-#include "waymark/pose.h"
+#include <stdint.h>
+
 #include "waymark/time.h"
+
+#define NOTIFY_STATUS_BYTES 160
 
 typedef struct notify {
   int socket;  // -1: no service manager
@@ -13,18 +16,22 @@ typedef struct notify {
   wm_time_ns opened_ns;
   wm_time_ns feed_every_ns;  // half of WATCHDOG_USEC; 0: no watchdog
   wm_time_ns next_feed_ns;
-  wm_time_ns fused_until_ns;  // of the pose that the dog was last fed with
-  int is_fresh;               // fused time advanced, with fresh motion, since it was last fed
+  uint64_t loops;  // of the estimator's thread, as last reported
+  int is_alive;    // they advanced since the watchdog was last fed
+  char status[NOTIFY_STATUS_BYTES];
 } notify;
 
 void notify_open(notify *self);
-// A pose went out. READY=1 with the first one; the rest as notify_progress.
-void notify_pose(notify *self, const wm_published *published);
-// How far is fused, and whether motion is fresh: the watchdog is fed only for what advanced with fresh motion. Also
-// while no pose is known yet: searching is no reason to be restarted.
-void notify_progress(notify *self, wm_time_ns fused_until_ns, int motion_is_fresh);
-// Called often: feeds the watchdog when it is due and deserved; says READY=1 in a stated degraded state when no pose
-// has come for a while.
+// A pose went out: READY=1 with the first one.
+void notify_pose(notify *self);
+// The estimator's thread has done so many loops. The watchdog is fed where they advanced. It proves that our threads
+// live, and nothing else: a silent bus, an absent camera or a blocked disk are health, and a restart mends none of
+// them.
+void notify_alive(notify *self, uint64_t loops);
+// STATUS= where it changed. The service manager shows it.
+void notify_status(notify *self, const char *text);
+// Called often: feeds the watchdog when it is due and the estimator lives; READY=1 with a stated reason when no pose
+// has come for 10 s.
 void notify_tick(notify *self, wm_time_ns now_ns);
 void notify_stopping(notify *self);
 void notify_close(notify *self);

@@ -28,20 +28,15 @@ void live_say(live *self, const char *format, ...) {
   self->options->say(self->options->say_context, line);
 }
 
-static void say_nothing(void *context, const char *line) {
-  (void)context;
-  (void)line;
-}
-
 // ── memory ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-#define NEEDS_MAX (WM_PIPELINE_NEEDS + 3 + WM_SOURCES_MAX + WM_VISION_NEEDS)
+#define NEEDS_MAX (WM_PIPELINE_NEEDS + 5 + WM_SOURCES_MAX + WM_VISION_NEEDS)
 
 static size_t record_bytes(const live *self) { return OUTPUT_RECORD_HEAD + wm_output_bytes(self->assembly.kinds); }
 
-// Records that may hold a picture's points are large (8 kB), and most sources of such a robot speak seldom: an eighth
-// of the slots holds half a second and more of them, and the sink looks every 2 ms. All of it is locked memory.
-static size_t output_slots(const live *self) {
+// Records that may hold a picture's points are large (8 kB), and most sources of such a robot are slow: an eighth of
+// the slots holds half a second and more of them. All of it is locked memory.
+static size_t disk_slots(const live *self) {
   size_t slots = kThreads[THREAD_ESTIMATOR].ring_slots;
   return record_bytes(self) > 1024 ? slots / 8 : slots;
 }
@@ -51,9 +46,12 @@ static size_t list_needs(live *self, wm_arena_need needs[NEEDS_MAX]) {
   size_t n = WM_PIPELINE_NEEDS, slots = (size_t)self->config->runtime.realtime_ring_events;
   wm_pipeline_needs(&e->pipeline, &self->assembly, needs);
   needs[n++] = (wm_arena_need){"feeds", self->assembly.source_count * sizeof(wm_feed), (void **)&self->feeds};
+  needs[n++] = (wm_arena_need){"disk ring", wm_ring_bytes(disk_slots(self), record_bytes(self)), &e->to_disk_memory};
   needs[n++] =
-      (wm_arena_need){"outputs ring", wm_ring_bytes(output_slots(self), record_bytes(self)), &e->outputs_memory};
-  needs[n++] = (wm_arena_need){"health ring", wm_ring_bytes(HEALTH_RING_SLOTS, sizeof(wm_health)), &e->healths_memory};
+      (wm_arena_need){"publish ring", wm_ring_bytes(PUBLISH_RING_SLOTS, PUBLISH_RECORD_BYTES), &e->to_publish_memory};
+  needs[n++] =
+      (wm_arena_need){"health ring", wm_ring_bytes(HEALTH_RING_SLOTS, sizeof(health_record)), &e->healths_memory};
+  needs[n++] = (wm_arena_need){"lines ring", wm_ring_bytes(LINE_RING_SLOTS, LINE_BYTES), &self->publish.lines_memory};
   for (size_t i = 0; i < self->assembly.source_count; i++) {
     size_t slot_bytes = wm_merge_slot_bytes(self->assembly.sources[i].kinds);
     needs[n++] = (wm_arena_need){self->assembly.sources[i].name, wm_ring_bytes(slots, slot_bytes),
@@ -69,8 +67,10 @@ static wm_status take_memory(live *self, wm_error *err) {
   wm_status status = wm_arena_fill(&self->arena, needs, count, self->config->runtime.realtime_lock_memory, err);
   if (status != WM_OK) return status;
   live_estimator *e = &self->estimator;
-  wm_ring_init(&e->outputs, e->outputs_memory, output_slots(self), record_bytes(self));
-  wm_ring_init(&e->healths, e->healths_memory, HEALTH_RING_SLOTS, sizeof(wm_health));
+  wm_ring_init(&e->to_disk, e->to_disk_memory, disk_slots(self), record_bytes(self));
+  wm_ring_init(&e->to_publish, e->to_publish_memory, PUBLISH_RING_SLOTS, PUBLISH_RECORD_BYTES);
+  wm_ring_init(&e->healths, e->healths_memory, HEALTH_RING_SLOTS, sizeof(health_record));
+  wm_ring_init(&self->publish.lines, self->publish.lines_memory, LINE_RING_SLOTS, LINE_BYTES);
   for (size_t i = 0; i < self->assembly.source_count; i++)
     wm_ring_init(&self->sources[i].ring, self->sources[i].ring_memory,
                  (size_t)self->config->runtime.realtime_ring_events,
@@ -146,7 +146,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   if (status == WM_OK) status = wm_vision_start(self->assembly.vision, err);
   if (status == WM_OK) status = wm_feeds_open(&self->assembly, self->feeds, wm_monotonic_ns(), &first_ns, err);
   if (status == WM_OK && self->options->out_dir)
-    status = wm_run_folder_open(self->options->out_dir, &self->assembly, &self->sink.folder, err);
+    status = wm_run_folder_open(self->options->out_dir, &self->assembly, &self->disk.folder, err);
   if (status != WM_OK) return status;
 
   const wm_runtime_params *params = &self->config->runtime;
@@ -156,15 +156,14 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
     self->sources[i].run = self;
     self->sources[i].feed = &self->feeds[i];
   }
-  lcm_sink_open(&self->sink.lcm, params->publish_lcm, self->config->lcm_url, self->config->channel_prefix,
-                &self->assembly, self->options->say ? self->options->say : say_nothing, self->options->say_context,
-                NULL);
-  black_box_open(&self->sink.box, wm_recording_is_robot(recording) ? self->config->black_box : "",
+  lcm_sink_open(&self->publish.lcm, params->publish_lcm, self->config->lcm_url, self->config->channel_prefix,
+                &self->assembly, live_say_later, self, NULL);
+  black_box_open(&self->disk.box, wm_recording_is_robot(recording) ? self->config->black_box : "",
                  params->black_box_keep_s, params->black_box_pictures_hz, &self->assembly, self->options->say,
                  self->options->say_context);
-  wm_vision_tell_pictures(self->assembly.vision, black_box_picture, &self->sink.box);
-  notify_open(&self->sink.notify);
-  self->sink.keeps_pose = wm_recording_is_robot(recording) && self->config->saved_pose[0];
+  wm_vision_tell_pictures(self->assembly.vision, black_box_picture, &self->disk.box);
+  notify_open(&self->publish.notify);
+  self->disk.keeps_pose = wm_recording_is_robot(recording) && self->config->saved_pose[0];
   return WM_OK;
 }
 
@@ -200,16 +199,19 @@ static void steady_memory(live *self, wm_live_report *report) {
 }
 
 typedef struct thread_list {
-  pthread_t source[WM_SOURCES_MAX], estimator, sink;
+  pthread_t source[WM_SOURCES_MAX], estimator, publish, disk;
   size_t sources_started;
-  int estimator_started, sink_started;
+  int estimator_started, publish_started, disk_started;
 } thread_list;
 
 static wm_status start_threads(live *self, thread_list *threads, wm_live_report *report, wm_error *err) {
   int is_realtime;
-  wm_status status = thread_start(THREAD_SINK, 0, self->config, sink_thread, self, &threads->sink, &is_realtime, err);
+  wm_status status = thread_start(THREAD_DISK, 0, self->config, disk_thread, self, &threads->disk, &is_realtime, err);
   if (status != WM_OK) return status;
-  threads->sink_started = 1;
+  threads->disk_started = 1;
+  status = thread_start(THREAD_PUBLISH, 0, self->config, publish_thread, self, &threads->publish, &is_realtime, err);
+  if (status != WM_OK) return status;
+  threads->publish_started = 1;
   status = thread_start(THREAD_ESTIMATOR, 0, self->config, estimator_thread, self, &threads->estimator,
                         &report->is_realtime, err);
   if (status != WM_OK) return status;
@@ -276,7 +278,12 @@ static void join_threads(live *self, thread_list *threads) {
   } else {
     atomic_store_explicit(&self->estimator.done, 1, memory_order_release);
   }
-  if (threads->sink_started) pthread_join(threads->sink, NULL);
+  if (threads->publish_started) {
+    pthread_join(threads->publish, NULL);
+  } else {
+    atomic_store_explicit(&self->publish.done, 1, memory_order_release);
+  }
+  if (threads->disk_started) pthread_join(threads->disk, NULL);
 }
 
 static void fill_report(live *self, wm_live_report *report) {
@@ -292,26 +299,28 @@ static void fill_report(live *self, wm_live_report *report) {
   }
   run->health.loops = e->loops;
   run->health.deadlines_missed = e->deadlines_missed;
-  run->health.outputs_lost = wm_ring_dropped(&e->outputs);
+  run->health.outputs_lost = outputs_lost(e);
   run->poses = e->pipeline.fuser.poses;
   run->events = e->pipeline.fuser.events;
   run->recorded_s = wm_seconds_between(self->clock.run_ns, end_ns);
   run->memory_bytes = self->arena.bytes;
   run->allocations_after_start = e->allocations;
   run->page_faults_after_start = e->page_faults;
-  report->has_last = self->sink.has_published;
-  report->last = self->sink.last_published;
+  report->has_last = self->publish.has_published;
+  report->last = self->publish.last_published;
   report->deadlines_missed = e->deadlines_missed;
   report->deadlines_total = e->loops + e->deadlines_missed;
   report->wake_p99_ns = wm_histogram_quantile(&e->wake_ns, 0.99);
   report->wake_max_ns = e->wake_ns.max_ns;
   report->loop_p99_ns = wm_histogram_quantile(&e->cycle_ns, 0.99);
   report->loop_max_ns = e->cycle_ns.max_ns;
+  report->send_p99_ns = wm_histogram_quantile(&self->publish.send_ns, 0.99);
+  report->send_max_ns = self->publish.send_ns.max_ns;
   report->age_p99_ns = wm_histogram_quantile(&e->age_ns, 0.99);
 }
 
 static wm_status write_summary(live *self, const wm_live_report *report, wm_error *err) {
-  if (!self->sink.folder) return WM_OK;
+  if (!self->disk.folder) return WM_OK;
   const live_estimator *e = &self->estimator;
   wm_histogram decode_ns, detect_ns;
   wm_vision_times(self->assembly.vision, &decode_ns, &detect_ns);
@@ -323,7 +332,8 @@ static wm_status write_summary(live *self, const wm_live_report *report, wm_erro
                                     {"predict", &e->pipeline.fuser.predict_ns},
                                     {"correct", &e->pipeline.fuser.correct_ns},
                                     {"publish", &e->pipeline.publish_ns},
-                                    {"age", &e->age_ns}};
+                                    {"age", &e->age_ns},
+                                    {"send", &self->publish.send_ns}};
   const wm_timing timing = {.stages = stages,
                             .stage_count = sizeof stages / sizeof stages[0],
                             .allocations_after_start = e->allocations,
@@ -331,10 +341,10 @@ static wm_status write_summary(live *self, const wm_live_report *report, wm_erro
                             .deadlines_missed = report->deadlines_missed,
                             .deadlines_total = report->deadlines_total,
                             .memory_bytes = self->arena.bytes};
-  wm_status status = wm_run_folder_health(self->sink.folder, &report->run.health, err);
+  wm_status status = wm_run_folder_health(self->disk.folder, &report->run.health, err);
   const wm_fuser *fuser = &e->pipeline.fuser;
-  if (status == WM_OK) status = wm_run_folder_map(self->sink.folder, fuser->estimator, fuser->state, err);
-  return status == WM_OK ? wm_run_folder_timing(self->sink.folder, &timing, err) : status;
+  if (status == WM_OK) status = wm_run_folder_map(self->disk.folder, fuser->estimator, fuser->state, err);
+  return status == WM_OK ? wm_run_folder_timing(self->disk.folder, &timing, err) : status;
 }
 
 static wm_status first_source_error(const live *self, wm_error *err) {
@@ -361,7 +371,7 @@ static wm_status run(live *self, wm_recording *recording, wm_live_report *report
   status = start_threads(self, &threads, report, err);
   if (status == WM_OK) wait_for_end(self, report);
   join_threads(self, &threads);
-  notify_close(&self->sink.notify);
+  notify_close(&self->publish.notify);
   if (status != WM_OK) return status;
   fill_report(self, report);
   status = write_summary(self, report, err);
@@ -378,7 +388,7 @@ wm_status wm_run_live(const wm_config *config, wm_recording *recording, const wm
   self->options = options;
   wm_status status = run(self, recording, report, err);
   wm_error close_error;
-  wm_status closed = wm_run_folder_close(self->sink.folder, &close_error);
+  wm_status closed = wm_run_folder_close(self->disk.folder, &close_error);
   if (status == WM_OK && closed != WM_OK) {
     status = closed;
     if (err) *err = close_error;

@@ -4,6 +4,7 @@
 #include <errno.h>
 #include <malloc.h>
 #include <sched.h>
+#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -11,10 +12,11 @@
 
 // clang-format off
 const thread_spec kThreads[THREAD_ROLES] = {
-  //                   name         real time  stack            ring slots  wakes every         never
-  [THREAD_SOURCE]    = {"wm-source",   0,      (size_t)2 << 20, 0,          0                }, // touches the estimator
-  [THREAD_ESTIMATOR] = {"wm-estimate", 1,      (size_t)2 << 20, 8192,       0                }, // allocates, locks, makes a system call but its sleep
-  [THREAD_SINK]      = {"wm-sink",     0,      (size_t)2 << 20, 0,          2 * WM_NS_PER_MS }, // holds the estimator up
+  //                   name         real time  stack            ring slots  wakes every         must not
+  [THREAD_SOURCE]    = {"wm-source",   0,      (size_t)2 << 20, 0,          0                }, // touch the estimator
+  [THREAD_ESTIMATOR] = {"wm-estimate", 1,      (size_t)2 << 20, 8192,       0                }, // allocate, lock, make a system call but its sleep
+  [THREAD_PUBLISH]   = {"wm-publish",  0,      (size_t)2 << 20, 0,          2 * WM_NS_PER_MS }, // touch a file, wait for a disk or a terminal
+  [THREAD_DISK]      = {"wm-disk",     0,      (size_t)2 << 20, 0,          5 * WM_NS_PER_MS }, // hold any other thread up
 };
 // clang-format on
 
@@ -54,12 +56,16 @@ wm_status thread_start(thread_role role, size_t number, const wm_config *config,
   if (*is_realtime) want_realtime(&attributes, &config->runtime);
   if (spec->is_realtime) bind_to_cpu(&attributes, config->runtime.realtime_cpu);
 
+  sigset_t all, before;
+  sigfillset(&all);
+  pthread_sigmask(SIG_SETMASK, &all, &before);
   int failed = pthread_create(out, &attributes, body, argument);
   if (failed == EPERM && *is_realtime) {
     *is_realtime = 0;
     pthread_attr_setinheritsched(&attributes, PTHREAD_INHERIT_SCHED);
     failed = pthread_create(out, &attributes, body, argument);
   }
+  pthread_sigmask(SIG_SETMASK, &before, NULL);
   pthread_attr_destroy(&attributes);
   if (failed == EINVAL && spec->is_realtime && config->runtime.realtime_cpu >= 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s: realtime.cpu: this computer has no CPU %d", config->path,

@@ -10,7 +10,7 @@
 #include "waymark/status.h"
 #include "waymark/time.h"
 
-typedef enum thread_role { THREAD_SOURCE, THREAD_ESTIMATOR, THREAD_SINK, THREAD_ROLES } thread_role;
+typedef enum thread_role { THREAD_SOURCE, THREAD_ESTIMATOR, THREAD_PUBLISH, THREAD_DISK, THREAD_ROLES } thread_role;
 
 typedef struct thread_spec {
   const char *name;      // as `ps -T` and `top -H` show it
@@ -32,11 +32,16 @@ extern const thread_spec kThreads[THREAD_ROLES];
 #define LIBRARY_STACK_BYTES ((size_t)2 << 20)
 void threads_of_libraries(void);
 
-// Health records wait in a ring of their own: they are large and rare.
+// Records for LCM: a second of them at 1 kHz. Health records have a ring of their own: they are large and rare.
+#define PUBLISH_RING_SLOTS 1024
 #define HEALTH_RING_SLOTS 4
+// Lines of text from the publish thread to the disk thread.
+#define LINE_RING_SLOTS 16
+#define LINE_BYTES 400
 
-// Starts a thread of that role. `number` tells the sources apart in the name. *is_realtime says whether it got its
-// priority; without the right to it (CAP_SYS_NICE, RLIMIT_RTPRIO) it runs as a normal thread.
+// Starts a thread of that role, with all signals blocked: they are for the thread that started the run. `number` tells
+// the sources apart in the name. *is_realtime says whether it got its priority; without the right to it (CAP_SYS_NICE,
+// RLIMIT_RTPRIO) it runs as a normal thread.
 wm_status thread_start(thread_role role, size_t number, const wm_config *config, void *(*body)(void *), void *argument,
                        pthread_t *out, int *is_realtime, wm_error *err);
 

@@ -35,7 +35,7 @@ static void path_of(const black_box *self, const char *name, char out[NAME_MAX_B
 static unsigned number_of(const char *name) {
   unsigned number = 0;
   char what[8];
-  if (sscanf(name, "%4[a-z]-%4u-", what, &number) != 2) return 0;
+  if (sscanf(name, "%4[a-z]-%u-", what, &number) != 2) return 0;
   return strcmp(what, "lost") == 0 || strcmp(what, "died") == 0 ? number : 0;
 }
 

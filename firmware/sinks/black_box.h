@@ -2,7 +2,7 @@
 // The last seconds of what was fused, and of what the cameras saw, kept where the robot got lost or the run died: event
 // logs that replay (each from the pose at its beginning). In the folder: now.wmlog and before.wmlog, which take turns
 // and hold between one and two times `keep_s`; and what was kept: lost-0001-before.wmlog, lost-0001-now.wmlog,
-// died-0002-... . Of the sink's thread.
+// died-0002-... . Of the disk thread.
 #ifndef WM_FIRMWARE_BLACK_BOX_H
 #define WM_FIRMWARE_BLACK_BOX_H
 

@@ -202,9 +202,7 @@ def inside():
         shutil.rmtree(work)
 
 
-def main():
-    if len(sys.argv) > 1 and sys.argv[1] == "inside":
-        return inside()
+def need_network():
     for program in ("lcm-logger", "lcm-gen", "ip", "unshare"):
         if not shutil.which(program):
             skip(f"there is no {program}")
@@ -213,7 +211,13 @@ def main():
         skip("LCM's Python binding is missing; tests/judges/setup.sh fetches it")
     if subprocess.run(["unshare", "-n", "true"], capture_output=True).returncode:
         skip("no right to a network namespace (root, or user namespaces)")
-    return subprocess.run(["unshare", "-n", python, __file__, "inside"]).returncode
+    return python
+
+
+def main():
+    if len(sys.argv) > 1 and sys.argv[1] == "inside":
+        return inside()
+    return subprocess.run(["unshare", "-n", need_network(), __file__, "inside"]).returncode
 
 
 if __name__ == "__main__":

@@ -21,4 +21,7 @@ wm_script_test(run_office_lost COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/offic
 wm_script_test(run_landmarks_real COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/landmarks_real.py LABELS release-only)
 wm_script_test(run_edges_hardship COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/edges_hardship.py LABELS release-only)
 wm_script_test(run_silence COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/silence.py LABELS release-only)
+add_library(slow_disk MODULE slow_disk.c)
+target_link_libraries(slow_disk PRIVATE wm_rules ${CMAKE_DL_LIBS})
+wm_script_test(run_slow_disk COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/slow_disk.py $<TARGET_FILE:slow_disk> LABELS release-only)
 wm_script_test(run_disk_full COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/disk_full.py LABELS release-only)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A live run with real threads: a thread a source, the estimator's real-time thread, a sink thread. Its sources are
-// devices, or a recording's, played at real speed on the monotonic clock. The threads, their priorities, stacks and
-// rings stand in one table, firmware/runtime/threads.c; docs/runtime.md draws it.
+// A live run with real threads: a thread a source, the estimator's real-time thread, one that publishes, one for the
+// disk. Its sources are devices, or a recording's, played at real speed on the monotonic clock. The threads, their
+// priorities, stacks and rings stand in one table, firmware/runtime/threads.c; docs/runtime.md draws it.
 #ifndef WAYMARK_RUN_H
 #define WAYMARK_RUN_H
 
@@ -37,7 +37,8 @@ typedef struct wm_live_report {
   uint64_t deadlines_missed, deadlines_total;
   wm_time_ns wake_p99_ns, wake_max_ns;  // how late the estimator's thread woke
   wm_time_ns loop_p99_ns, loop_max_ns;  // how long a cycle took
-  wm_time_ns age_p99_ns;                // sent_ns minus t_ns of the poses
+  wm_time_ns age_p99_ns;                // made minus t_ns of the poses
+  wm_time_ns send_p99_ns, send_max_ns;  // from a pose made to its message handed to LCM
   int is_realtime, memory_locked;
   int wants_restart;
   int has_last;      // a pose was published

@@ -17,7 +17,7 @@ typedef struct wm_run_folder wm_run_folder;
 
 // Makes `dir` if it isn't there; files of an earlier run in it are written anew.
 wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_run_folder **out, wm_error *err);
-// Where records go: give it to the pipeline, or call it from a sink thread.
+// Where records go: give it to the pipeline, or call it from the disk thread.
 wm_output wm_run_folder_output(wm_run_folder *self);
 // Events that the sink lost are marked in the log, so that a replay of it knows.
 void wm_run_folder_gap(wm_run_folder *self, uint64_t missing_events);

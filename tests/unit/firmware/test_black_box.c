@@ -153,6 +153,21 @@ static void the_oldest_go(void) {
   TEST_ASSERT_EQUAL(BLACK_BOX_KEPT_MAX, files("lost-*-now.wmlog"));
 }
 
+// After 9999 incidents the newest are not taken for old ones.
+static void numbers_go_on_beyond_four_digits(void) {
+  char path[128];
+  (void)snprintf(path, sizeof path, "%s/lost-10041-now.wmlog", folder);
+  FILE *f = fopen(path, "w");
+  TEST_ASSERT_NOT_NULL(f);
+  (void)fclose(f);
+  open_box();
+  drive(5, WM_STATE_TRACKING);
+  drive(1, WM_STATE_LOST);
+  black_box_close(&box);
+  TEST_ASSERT_EQUAL(1, files("lost-10041-now.wmlog"));
+  TEST_ASSERT_EQUAL(1, files("lost-10042-now.wmlog"));
+}
+
 // Ten pictures a second come, two are kept.
 static void see(int seconds) {
   static uint8_t grey[16 * 4];
@@ -218,6 +233,7 @@ int main(void) {
   RUN_TEST(an_end_in_order_leaves_nothing_to_keep);
   RUN_TEST(an_end_soon_after_a_loss_keeps_it);
   RUN_TEST(the_oldest_go);
+  RUN_TEST(numbers_go_on_beyond_four_digits);
   RUN_TEST(pictures_are_kept_with_it);
   RUN_TEST(a_disk_that_takes_nothing_is_said_once);
   return UNITY_END();

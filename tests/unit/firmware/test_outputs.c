@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The estimator's thread never waits for its sinks: what finds no room is counted, and a hole in the log is marked.
+// The estimator's thread never waits for LCM or the disk: records that find no room are counted, and a hole in the log
+// is marked.
 #include <stdlib.h>
 
 #include "live.h"
@@ -10,18 +11,21 @@
 
 static live_estimator *estimator;
 static wm_output output;
-static void *memory;
+static void *memory, *publish_memory;
 
 void setUp(void) {
   estimator = aligned_alloc(WM_CACHE_LINE, (sizeof *estimator + WM_CACHE_LINE - 1) / WM_CACHE_LINE * WM_CACHE_LINE);
   memset(estimator, 0, sizeof *estimator);
   size_t slot_bytes = OUTPUT_RECORD_HEAD + wm_output_bytes(0);
   memory = malloc(wm_ring_bytes(SLOTS, slot_bytes));
-  wm_ring_init(&estimator->outputs, memory, SLOTS, slot_bytes);
+  wm_ring_init(&estimator->to_disk, memory, SLOTS, slot_bytes);
+  publish_memory = malloc(wm_ring_bytes(SLOTS, PUBLISH_RECORD_BYTES));
+  wm_ring_init(&estimator->to_publish, publish_memory, SLOTS, PUBLISH_RECORD_BYTES);
   output = estimator_output(estimator);
 }
 
 void tearDown(void) {
+  free(publish_memory);
   free(memory);
   free(estimator);
 }
@@ -32,11 +36,11 @@ static void put_event(uint32_t i) {
 }
 
 static uint64_t take(uint64_t *what) {
-  const output_record *record = wm_ring_front(&estimator->outputs);
+  const output_record *record = wm_ring_front(&estimator->to_disk);
   if (!record) return 0;
   uint64_t kind = record->kind;
   *what = kind == OUTPUT_GAP ? record->as.gap : record->as.event.seq;
-  wm_ring_pop(&estimator->outputs);
+  wm_ring_pop(&estimator->to_disk);
   return kind;
 }
 
@@ -76,8 +80,24 @@ static void a_mark_without_its_event_is_followed_by_another(void) {
 static void poses_that_find_no_room_are_counted(void) {
   wm_published published = {.sent_ns = 1};
   for (int i = 0; i < 10; i++) output.put(output.context, WM_OUTPUT_PUBLISHED, &published, sizeof published);
-  TEST_ASSERT_EQUAL_UINT64(10 - SLOTS, wm_ring_dropped(&estimator->outputs));
+  TEST_ASSERT_EQUAL_UINT64(10 - SLOTS, wm_ring_dropped(&estimator->to_disk));
+  TEST_ASSERT_EQUAL_UINT64(2 * (10 - SLOTS), outputs_lost(estimator));  // neither thread took any
   TEST_ASSERT_EQUAL_UINT64(0, estimator->events_lost);
+}
+
+static void a_blocked_disk_holds_no_message_up(void) {
+  int sent = 0;
+  for (uint32_t i = 0; i < 10; i++) {
+    wm_event e = fixture_event(i);
+    e.kind = WM_EVENT_SIGHTING;
+    output.put(output.context, WM_OUTPUT_EVENT, &e, wm_event_bytes(&e));
+    while (wm_ring_front(&estimator->to_publish)) {
+      wm_ring_pop(&estimator->to_publish);
+      sent++;
+    }
+  }
+  TEST_ASSERT_EQUAL(10, sent);
+  TEST_ASSERT_EQUAL_UINT64(10 - SLOTS, estimator->events_lost);
 }
 
 int main(void) {
@@ -85,5 +105,6 @@ int main(void) {
   RUN_TEST(events_that_found_no_room_are_marked_before_the_next_one);
   RUN_TEST(a_mark_without_its_event_is_followed_by_another);
   RUN_TEST(poses_that_find_no_room_are_counted);
+  RUN_TEST(a_blocked_disk_holds_no_message_up);
   return UNITY_END();
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the sink thread speaks: LCM (memq: published and received in one process) and systemd's protocol.
+// The publish thread: LCM (memq: published and received in one process) and systemd's protocol.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -142,33 +142,23 @@ static void close_manager(notify *n) {
   unsetenv("WATCHDOG_USEC");
 }
 
-static void the_watchdog_is_fed_only_while_the_fused_time_advances_with_fresh_motion(void) {
+static void the_watchdog_is_fed_while_the_estimators_loops_advance(void) {
   notify n;
   open_manager(&n, "2000000");
   TEST_ASSERT_TRUE(n.socket >= 0);
   wm_time_ns now = n.opened_ns;
   notify_tick(&n, now);
   TEST_ASSERT_EQUAL_STRING("", hear());
-  wm_published p = {.fused_until_ns = 100};
-  notify_pose(&n, &p);
-  TEST_ASSERT_EQUAL_STRING("READY=1\nSTATUS=localizing", hear());
+  notify_alive(&n, 200);
   notify_tick(&n, now += WM_NS_PER_S);
   TEST_ASSERT_EQUAL_STRING("WATCHDOG=1", hear());
-  notify_pose(&n, &p);  // the fused time stands still
+  notify_alive(&n, 200);  // the loop stands still
   notify_tick(&n, now += 2 * WM_NS_PER_S);
   TEST_ASSERT_EQUAL_STRING("", hear());
-  p.fused_until_ns = 200;
-  p.status_flags = WM_PUB_MOTION_STALE;
-  notify_pose(&n, &p);
-  notify_tick(&n, now += 2 * WM_NS_PER_S);
-  TEST_ASSERT_EQUAL_STRING("", hear());
-  p.fused_until_ns = 300;
-  p.status_flags = 0;
-  notify_pose(&n, &p);
+  notify_alive(&n, 400);
   notify_tick(&n, now += WM_NS_PER_S);
   TEST_ASSERT_EQUAL_STRING("WATCHDOG=1", hear());
-  p.fused_until_ns = 400;
-  notify_pose(&n, &p);
+  notify_alive(&n, 600);
   notify_tick(&n, now + WM_NS_PER_S / 2);  // not yet due
   TEST_ASSERT_EQUAL_STRING("", hear());
   notify_stopping(&n);
@@ -176,27 +166,28 @@ static void the_watchdog_is_fed_only_while_the_fused_time_advances_with_fresh_mo
   close_manager(&n);
 }
 
-static void searching_with_fresh_motion_is_no_reason_to_be_restarted(void) {
+static void the_first_pose_makes_ready_and_a_change_of_status_is_sent_once(void) {
   notify n;
   open_manager(&n, "2000000");
-  wm_time_ns now = n.opened_ns;
-  for (int i = 1; i < 4; i++) {
-    notify_progress(&n, i * WM_NS_PER_S, 1);
-    notify_tick(&n, now += WM_NS_PER_S);
-    TEST_ASSERT_EQUAL_STRING("WATCHDOG=1", hear());
-  }
-  notify_progress(&n, 9 * WM_NS_PER_S, 0);
-  notify_tick(&n, now + WM_NS_PER_S);
+  notify_status(&n, "tracking");
+  TEST_ASSERT_EQUAL_STRING("STATUS=tracking", hear());
+  notify_status(&n, "tracking");
   TEST_ASSERT_EQUAL_STRING("", hear());
+  notify_pose(&n);
+  TEST_ASSERT_EQUAL_STRING("READY=1", hear());
+  notify_pose(&n);
+  TEST_ASSERT_EQUAL_STRING("", hear());
+  notify_status(&n, "dead_reckoning; silent: can");
+  TEST_ASSERT_EQUAL_STRING("STATUS=dead_reckoning; silent: can", hear());
   close_manager(&n);
 }
 
-static void without_a_pose_ready_says_so(void) {
+static void ready_comes_without_a_pose_after_ten_seconds(void) {
   notify n;
   open_manager(&n, "junk");
   TEST_ASSERT_EQUAL_INT64(0, n.feed_every_ns);
   notify_tick(&n, n.opened_ns + 11 * WM_NS_PER_S);
-  TEST_ASSERT_EQUAL_STRING("READY=1\nSTATUS=no pose yet: searching, or no motion", hear());
+  TEST_ASSERT_EQUAL_STRING("READY=1", hear());
   close_manager(&n);
 }
 
@@ -205,8 +196,7 @@ static void without_a_service_manager_nothing_happens(void) {
   unsetenv("NOTIFY_SOCKET");
   notify_open(&n);
   TEST_ASSERT_EQUAL(-1, n.socket);
-  wm_published p = {.fused_until_ns = 1};
-  notify_pose(&n, &p);
+  notify_pose(&n);
   notify_tick(&n, n.opened_ns + WM_NS_PER_S);
   notify_close(&n);
   setenv("NOTIFY_SOCKET", "not/absolute", 1);
@@ -349,9 +339,9 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(messages_arrive_over_memq);
   RUN_TEST(no_way_out_is_said_once_and_tried_again);
-  RUN_TEST(the_watchdog_is_fed_only_while_the_fused_time_advances_with_fresh_motion);
-  RUN_TEST(searching_with_fresh_motion_is_no_reason_to_be_restarted);
-  RUN_TEST(without_a_pose_ready_says_so);
+  RUN_TEST(the_watchdog_is_fed_while_the_estimators_loops_advance);
+  RUN_TEST(the_first_pose_makes_ready_and_a_change_of_status_is_sent_once);
+  RUN_TEST(ready_comes_without_a_pose_after_ten_seconds);
   RUN_TEST(without_a_service_manager_nothing_happens);
   RUN_TEST(poses_and_resets_that_are_told_become_events);
   RUN_TEST(nonsense_that_is_told_is_refused);

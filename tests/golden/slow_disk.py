@@ -1,0 +1,108 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""A disk that blocks for 3 s delays no pose on LCM and does not stop the watchdog; nothing is lost. The robot's motion falls
+silent for the last part of the drive, which does not stop the watchdog either. Needs what lcm_tools.py needs (else 77).
+
+    slow_disk.py LIBRARY        (tests/golden/slow_disk.c, to be preloaded)"""
+import os
+import pathlib
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+import lcm_tools
+
+BLOCK_S, DRIVE_S, SILENT_S, WATCHDOG_S = 3, 6, 5, 1
+
+
+class Manager(threading.Thread):
+    """The service manager's end of the notification socket."""
+
+    def __init__(self, path):
+        super().__init__(daemon=True)
+        self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        self.socket.bind(str(path))
+        self.heard = []
+
+    def run(self):
+        while True:
+            text = self.socket.recv(4096).decode()
+            self.heard.append((time.monotonic(), text))
+
+
+class Subscriber(threading.Thread):
+    def __init__(self, pose_t):
+        super().__init__(daemon=True)
+        import lcm
+        self.node = lcm.LCM(lcm_tools.URL)
+        self.arrivals = []
+        self.node.subscribe("WAYMARK_POSE",
+                            lambda _, data: self.arrivals.append((time.monotonic(), pose_t.decode(data).t_ns)))
+
+    def run(self):
+        while True:
+            self.node.handle_timeout(100)
+
+
+def largest_gap(times):
+    return max(b - a for a, b in zip(times, times[1:]))
+
+
+def inside(library):
+    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-slow-disk-"))
+    try:
+        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
+        subprocess.run(lcm_tools.ROUTE, check=True)
+        types = work / "types"
+        subprocess.run(["lcm-gen", "-p", "--ppath", types, *sorted((lcm_tools.ROOT / "msgs/lcm").glob("*.lcm"))], check=True)
+        sys.path.insert(0, str(types))
+        import waymark
+        recording = work / "recording"
+        lcm_tools.write_recording(recording, DRIVE_S)
+        with open(recording / "sightings.csv", "a") as f:  # sightings go on without motion
+            for i in range(DRIVE_S * 10, (DRIVE_S + SILENT_S) * 10):
+                f.write(f"{i * 100_000_000},eye,0,0,5\n")
+        (work / "config.yaml").write_text(
+            "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
+            "realtime: {lock_memory: false}\n")
+        manager, subscriber = Manager(work / "notify"), Subscriber(waymark.pose_t)
+        manager.start()
+        subscriber.start()
+        environment = dict(os.environ, LD_PRELOAD=library, WM_BLOCK_FOLDER=str(work / "out"), WM_BLOCK_AFTER_S="2",
+                           WM_BLOCK_S=str(BLOCK_S), NOTIFY_SOCKET=str(work / "notify"),
+                           WATCHDOG_USEC=str(int(WATCHDOG_S * 2e6)))
+        done = subprocess.run([lcm_tools.WAYMARK, "run", "--config", work / "config.yaml", "--recording", recording,
+                               "--out", work / "out"], capture_output=True, text=True, env=environment)
+        end = time.monotonic()
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert "slow disk: blocked" in done.stderr, done.stderr
+        time.sleep(0.3)
+        rows = lcm_tools.published(work / "out")
+        heard = [t_ns for _, t_ns in subscriber.arrivals]
+        gap = largest_gap([at for at, _ in subscriber.arrivals])
+        fed = [at for at, text in manager.heard if "WATCHDOG=1" in text]
+        print(f"{len(heard)} poses heard, {len(rows)} written, largest gap {gap:.3f} s; watchdog fed {len(fed)} times, "
+              f"largest gap {largest_gap(fed):.2f} s")
+        assert heard == sorted(rows) and len(heard) > 150, "a pose is missing"
+        assert gap < BLOCK_S / 2, "the disk held poses up"
+        assert largest_gap(fed + [end]) < BLOCK_S and len(fed) > 6, "a slow disk or silent motion stops the watchdog"
+        states = [text for _, text in manager.heard if text.startswith("STATUS=")]
+        print(" | ".join(states))
+        assert any("silent: motion" in text for text in states), states
+        assert "outputs: " not in done.stderr + done.stdout
+    finally:
+        shutil.rmtree(work)
+
+
+def main():
+    if len(sys.argv) > 2 and sys.argv[2] == "inside":
+        return inside(sys.argv[1])
+    return subprocess.run(["unshare", "-n", lcm_tools.need_network(), __file__, sys.argv[1], "inside"]).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())
