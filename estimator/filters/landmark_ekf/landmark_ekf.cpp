@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "filters/core/contract.hpp"
+#include "filters/core/recovery.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
 #include "math/arc.hpp"
@@ -11,9 +12,9 @@
 namespace wm {
 namespace {
 
-constexpr double kStartWrong = -2.5;   // log odds that a stated pose is wrong: one in twelve
-constexpr double kDoubtedStart = 0.1;  // below this probability a stated start is published as it was stated
-constexpr double kAround_m = 5.0;      // a lost robot is among the landmarks, or within this of them
+// Probability of a wrong start below which the filter's covariance is published alone. Not swept.
+constexpr double kDoubtedStart = 0.1;
+constexpr double kAround_m = 5.0;  // sigma of a lost robot's distance from the landmarks; not swept
 
 // States of one slot of a time-correlated error.
 int error_states(const wm_landmark_ekf_params &p) {
@@ -99,19 +100,19 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   map_variance_m2_ = spread_of(setup);
   moved_id_ = -1;
   rollback_.begin(filter_, kPoseStates, calibration_states_);
-  weighed_ns_ = loosened_ns_ = vague_ns_ = WM_TIME_NONE;
+  start_tested_ns_ = inflated_ns_ = vague_ns_ = WM_TIME_NONE;
   life_ = {};
   start_again();
 }
 
-// A pose that was stated, or none: what was observed before no longer counts.
+// A pose that was stated, or none: earlier observations no longer count.
 void landmark_ekf::begin_life(bool pose_known) {
   life_.begin(pose_known);
   evidence_.begin(kStartWrong);
   observations_.clear();
   prior_count_ = 0;
-  start_trial_.close();
-  if (pose_known) try_start();
+  start_.close();
+  if (pose_known) begin_start_test();
 }
 
 // Known start: track from it. Unknown: the known part of it becomes an observation for the search.
@@ -183,10 +184,10 @@ void landmark_ekf::estimate(wm_estimate *out) const {
   out->state = life_.state(filter_.now_ns(), params_.dead_reckoning_after_s);
   out->lost_probability = lost_probability();
   if (life_.lost()) widen(out);
-  if (life_.tracking()) mix_start(out);
+  if (life_.tracking()) add_start_mixture(out);
 }
 
-// Lost, the pose may be anywhere with the probability of being lost.
+// Lost, the pose is anywhere among the landmarks with the probability of being lost.
 void landmark_ekf::widen(wm_estimate *out) const {
   const double p = evidence_.probability();
   out->covariance[wm_cov_index(0, 0)] += p * map_variance_m2_;
@@ -196,17 +197,17 @@ void landmark_ekf::widen(wm_estimate *out) const {
 
 // While a stated start is in doubt, the covariance of the mixture of both hypotheses about the published pose. Gates
 // keep the filter's own.
-void landmark_ekf::mix_start(wm_estimate *out) const {
-  const double p = start_trial_.off();
+void landmark_ekf::add_start_mixture(wm_estimate *out) const {
+  const double p = start_.wrong_probability();
   if (p < kDoubtedStart) return;
-  const wm_pose2 &there = start_trial_.pose();
+  const wm_pose2 &there = start_.pose();
   const wm_pose2 here = filter_.pose();
   const double off[3] = {there.x_m - here.x_m, there.y_m - here.y_m, wrap(there.heading_rad - here.heading_rad)};
-  constexpr int kOf[3] = {0, 1, 5};
+  constexpr int kOf[3] = {0, 1, 5};  // x, y, heading among six
   for (int r = 0; r < 3; r++)
     for (int c = r; c < 3; c++) {
       double &both = out->covariance[wm_cov_index(kOf[r], kOf[c])];
-      both = (1.0 - p) * both + p * (start_trial_.covariance()[r][c] + off[r] * off[c]);
+      both = (1.0 - p) * both + p * (start_.covariance()[r][c] + off[r] * off[c]);
       out->covariance[wm_cov_index(kOf[c], kOf[r])] = both;
     }
 }

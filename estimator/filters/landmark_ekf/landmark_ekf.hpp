@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The landmark filter of system 1 [Stepanov2017] with self-calibration, time-correlated errors and relocalization.
-// docs/estimators.md has the model. One observation's way: correct() -> fuse_sighting() -> associate() -> expect() ->
-// sighting_rows() -> fuse() -> planar_filter::update() -> note().
+// docs/estimators/landmark_ekf.md has the model. One observation's way: correct() -> fuse_sighting() -> associate() ->
+// expect() -> sighting_rows() -> fuse() -> planar_filter::update() -> note().
 #ifndef WAYMARK_ESTIMATOR_LANDMARK_EKF_HPP
 #define WAYMARK_ESTIMATOR_LANDMARK_EKF_HPP
 
@@ -14,7 +14,7 @@
 #include "filters/core/sensor_slots.hpp"
 #include "filters/core/state_pool.hpp"
 #include "filters/landmark_ekf/params.h"
-#include "filters/landmark_ekf/start_trial.hpp"
+#include "filters/landmark_ekf/start_hypotheses.hpp"
 #include "filters/planar/past_pose.hpp"
 #include "filters/planar/planar_filter.hpp"
 #include "filters/relocalize/pose_search.hpp"
@@ -103,14 +103,14 @@ class landmark_ekf {
   observation observation_at(wm_time_ns t_ns, int key, const wm_pose2 &sensor_in_odom) const;
   void buffer_observation(const observation &seen);
   void note(wm_time_ns t_ns, int key, double log_bayes, double angle_rad = NAN, double normalised = NAN);
-  void mend(wm_time_ns t_ns);
-  bool is_sought(wm_time_ns t_ns, bool by_bearing);
-  void seek(wm_time_ns t_ns);
+  travelled_pose2 odometry() const { return {filter_.odom(), filter_.travelled_m(), filter_.turned_rad()}; }
+  bool needs_search(wm_time_ns t_ns, bool by_bearing);
+  void search_now(wm_time_ns t_ns);
   void search(wm_time_ns since_ns, const observation *prior, int prior_count);
   void begin_life(bool pose_known);
   void start_again();
-  void try_start();
-  void weigh_start(wm_time_ns t_ns);
+  void begin_start_test();
+  void test_start(wm_time_ns t_ns);
   double lost_probability() const;
   rollback<kMaxCalibration>::generation trusted_generation() const;
   void restore_calibration();
@@ -118,7 +118,7 @@ class landmark_ekf {
   bool is_elsewhere(wm_time_ns since_ns, wm_time_ns t_ns);
   void update_moved(int landmark);
   void widen(wm_estimate *out) const;
-  void mix_start(wm_estimate *out) const;
+  void add_start_mixture(wm_estimate *out) const;
 
   struct arrays {
     double *filter;
@@ -147,11 +147,11 @@ class landmark_ekf {
   lifecycle life_;
   landmark_evidence evidence_;
   pose_search observations_;
-  start_trial start_trial_;
+  start_hypotheses start_;
   observation prior_[2];
   int prior_count_;
   observation vague_[2];  // the pose when it had become too vague to be corrected
-  wm_time_ns weighed_ns_, loosened_ns_, vague_ns_;
+  wm_time_ns start_tested_ns_, inflated_ns_, vague_ns_;
   uint32_t moved_;
   int32_t moved_id_;        // of the last one
   double map_variance_m2_;  // of a place anywhere among the landmarks, each axis

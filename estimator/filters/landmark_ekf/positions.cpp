@@ -54,7 +54,7 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   seen.sigma_length_m = std::sqrt(square(sigma) + square(params_.gnss_lasting_m));
   buffer_observation(seen);
   if (life_.searching()) {
-    seek(event.t_ns);
+    search_now(event.t_ns);
     return reject(records, record, WM_REJECTED_SEARCHING);
   }
   residual rows[2];
@@ -95,7 +95,7 @@ wm_status landmark_ekf::fuse_heading(const wm_event &event, record_list records)
   seen.sigma_angle_rad = h.sigma_rad;
   buffer_observation(seen);
   if (life_.searching()) {
-    seek(event.t_ns);
+    search_now(event.t_ns);
     return reject(records, r.record, WM_REJECTED_SEARCHING);
   }
   r.row.add(kHeading, 1.0);

@@ -70,8 +70,8 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   if (verdict != WM_FUSED) return reject(records, record, verdict);
   record.landmark_id = setup_->landmarks[at.landmark].id;
   if (params_.recover) buffer_observation(observation_of(at, event.t_ns));
-  if (is_sought(event.t_ns, at.reading.bearing)) {
-    seek(event.t_ns);
+  if (needs_search(event.t_ns, at.reading.bearing)) {
+    search_now(event.t_ns);
     return reject(records, record, WM_REJECTED_SEARCHING);
   }
 

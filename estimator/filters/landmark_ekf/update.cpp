@@ -5,20 +5,20 @@
 namespace wm {
 namespace {
 
-constexpr double kUnproven_nis = 9.21;   // 99 % of chi2 with two degrees of freedom
-constexpr double kInflate = 1.5;         // times the pose's sigmas while misfits go on ...
-constexpr double kInflateEvery_s = 1.0;  // ... and slower than a search may find the pose
+constexpr double kUnproven_nis = 9.21;  // 99 % quantile of chi2, 2 degrees of freedom
+// Times the pose's sigmas while several observations misfit, slower than a search finds the pose. Not swept.
+constexpr double kScaleSigmas = 1.5, kScaleEvery_s = 1.0;
 
 }  // namespace
 
-// A start that is surer than it should be must not bend the calibration: until the pose is proven the gate is at 99 %.
+// A start with too small a covariance must not falsify the calibration: until the pose is proven, the gate is at 99 %.
 bool landmark_ekf::passes(const gate_result &g, int dof) const {
   const bool unproven = params_.recover && !evidence_.proven();
   return g.passed && (!unproven || g.nis <= kUnproven_nis * gate_scale(dof));
 }
 
-// The components of one observation are gated together: a wrong one spoils the other. Then they are fused one after the
-// other ([Stepanov2017]), each with its innovation as the ones before left it, which is the same as both at once.
+// The components of one observation are gated jointly: if one is wrong, so is the other. Then they are fused one after
+// the other [Stepanov2017], the second with the innovation that the first leaves, which equals a joint update.
 double landmark_ekf::fuse(residual *r, int count, double clutter_volume, bool usable, record_list records) {
   projection first;
   filter_.project(r[0].row, &first);
@@ -39,10 +39,10 @@ double landmark_ekf::fuse(residual *r, int count, double clutter_volume, bool us
   const gate_result g = gate(nis, count, {params_.gate_soft, params_.gate_hard});
   const wm_time_ns now = filter_.now_ns();
   if (g.soft && evidence_.doubtful() &&
-      (loosened_ns_ == WM_TIME_NONE || wm_seconds_between(loosened_ns_, now) > kInflateEvery_s)) {
-    // Several misfits lately: the pose is less sure than its covariance, not this measurement alone.
-    loosened_ns_ = now;
-    filter_.scale_pose_sigmas(kInflate);
+      (inflated_ns_ == WM_TIME_NONE || wm_seconds_between(inflated_ns_, now) > kScaleEvery_s)) {
+    // After several misfits the pose's covariance is too small, not this measurement's alone.
+    inflated_ns_ = now;
+    filter_.scale_pose_sigmas(kScaleSigmas);
     filter_.project(r[0].row, &first);
     if (count == 2) cross = filter_.project_onto(r[1].row, first);
   }

@@ -10,20 +10,20 @@
 namespace wm {
 namespace {
 
-constexpr int kCellsAStep = 512;  // 1 to 2 ms with 30 bearings and 80 landmarks
-constexpr int kMostCells = 8192;
-constexpr double kCell_m = 0.25;                    // a landmark 3 m away moves by 0.06 rad from cell to cell
-constexpr double kMargin_m = 1.5;                   // around the map's landmarks
-constexpr double kRange_m = 12.0;                   // landmarks farther away are not seen
-constexpr int kBins = 96;                           // of the heading, 0.065 rad
-constexpr double kApart_m = 0.6, kApart_rad = 0.2;  // candidates nearer to each other are one
-constexpr int kRefinements = 12;
+constexpr int kCellsAStep = 512;                         // 1 to 2 ms with 30 bearings and 80 landmarks
+constexpr int kMostCells = 8192;                         // 16 looks; larger maps get larger cells
+constexpr double kCell_m = 0.25, kCellGrowth = 1.4;      // from cell to cell, a landmark at 3 m moves by 0.06 rad
+constexpr double kMargin_m = 1.5;                        // around the map's landmarks
+constexpr double kRange_m = 12.0, kNearest_m = 0.1;      // landmarks farther or nearer are not visible
+constexpr int kBins = 96;                                // of the heading, 0.065 rad
+constexpr int kRefinements = 12;                         // half of them while the gate narrows
 constexpr double kWideGate_rad = 0.2, kGate_rad = 0.02;  // of an azimuth: at first, and at the end
+constexpr double kDamping = 1e-6;                        // of the normal equations, 1/m2 and 1/rad2
 constexpr int kFewest = 6;                               // bearings; fewer have no pattern
 constexpr double kShare = 0.7;                           // of the bearings must be explained
-constexpr double kLead = 0.15;                           // of the bearings: another place must explain that many fewer
-constexpr double kSigma_rad = 0.01;                      // of a bearing, the landmark's place included
-constexpr double kLeast_m = 0.03, kLeast_rad = 0.01;     // sigmas of a pose that was found
+constexpr double kLead = 0.15;                           // of the bearings: another pose must explain that many fewer
+constexpr double kSigma_rad = 0.01;                      // of a bearing, with the landmark's error
+constexpr double kLeast_m = 0.03, kLeast_rad = 0.01;     // sigmas added to those of a found pose
 
 // The landmark whose azimuth from `eye` is nearest to the bearing; -1: none within the gate.
 int nearest(const wm_pose2 &eye, double bearing_rad, const landmark_places &map, double gate_rad, double *off_rad) {
@@ -32,7 +32,7 @@ int nearest(const wm_pose2 &eye, double bearing_rad, const landmark_places &map,
   for (int i = 0; i < map.count; i++) {
     const double dx = map.data[i * map.stride] - eye.x_m, dy = map.data[i * map.stride + 1] - eye.y_m;
     const double ahead = ray.cos * dx + ray.sin * dy, across = ray.cos * dy - ray.sin * dx;
-    if (!(ahead > 0.1) || ahead > kRange_m || std::fabs(across) > gate_rad * ahead) continue;
+    if (!(ahead > kNearest_m) || ahead > kRange_m || std::fabs(across) > gate_rad * ahead) continue;
     gate_rad = std::fabs(across) / ahead;
     *off_rad = -across / ahead;
     best = i;
@@ -44,7 +44,7 @@ int nearest(const wm_pose2 &eye, double bearing_rad, const landmark_places &map,
 bool refine(const bearing_look &look, const landmark_places &map, double gate_rad, wm_pose2 *pose, matrix<3> *inverse) {
   const wm_pose2 eye = compose(*pose, look.sensor);
   const double lever_x = eye.x_m - pose->x_m, lever_y = eye.y_m - pose->y_m;
-  matrix<3> a = matrix<3>::Identity() * 1e-6;
+  matrix<3> a = matrix<3>::Identity() * kDamping;
   vector<3> b = vector<3>::Zero();
   for (int k = 0; k < look.count; k++) {
     double off;
@@ -85,7 +85,7 @@ int line_search::explained(const bearing_look &look, const wm_pose2 &pose, const
 void line_search::begin(const bearing_look &look, const wm_pose2 &odom, const landmark_places &map) {
   look_ = look;
   odom_ = odom;
-  candidates_ = 0;
+  candidates_.clear();
   double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
   for (int i = 0; i < map.count; i++)
     for (int k = 0; k < 2; k++) {
@@ -94,7 +94,7 @@ void line_search::begin(const bearing_look &look, const wm_pose2 &odom, const la
       high[k] = at > high[k] ? at : high[k];
     }
   step_m_ = kCell_m;
-  for (;; step_m_ *= 1.4) {
+  for (;; step_m_ *= kCellGrowth) {
     for (int k = 0; k < 2; k++) {
       corner_m_[k] = low[k] - kMargin_m;
       cells_[k] = 1 + (int)((high[k] - low[k] + 2.0 * kMargin_m) / step_m_);
@@ -103,8 +103,8 @@ void line_search::begin(const bearing_look &look, const wm_pose2 &odom, const la
   }
 }
 
-// The sensor is at `place`: the heading that most bearings vote for, each once a bin; two neighbouring bins count
-// together, since a heading lies between them as often as not.
+// Votes for the heading of a sensor at `place`, each bearing once a bin. Two neighbouring bins count together, since a
+// heading may lie between them.
 void line_search::vote(const wm_pose2 &place, const landmark_places &map) {
   uint8_t votes[kBins] = {};
   uint32_t voted[kBins] = {};
@@ -128,30 +128,17 @@ void line_search::vote(const wm_pose2 &place, const landmark_places &map) {
     for (uint32_t bits = voted[bin] | voted[next]; bits != 0; bits &= bits - 1) both++;
     if (2 * both < look_.count) continue;
     const wm_pose2 eye = {place.x_m, place.y_m, wrap((bin + 1) * (kTwoPi / kBins))};
-    offer({compose(eye, between(look_.sensor, wm_pose2{})), both, 0});
+    candidates_.offer({compose(eye, between(look_.sensor, wm_pose2{})), both, 0});
   }
 }
 
-// The best candidates that are not neighbours, the best first.
-void line_search::offer(const candidate &c) {
-  int at = 0;
-  for (; at < candidates_; at++)
-    if (std::fabs(candidate_[at].pose.x_m - c.pose.x_m) + std::fabs(candidate_[at].pose.y_m - c.pose.y_m) < kApart_m &&
-        std::fabs(wrap(candidate_[at].pose.heading_rad - c.pose.heading_rad)) < kApart_rad)
-      break;
-  if (at < candidates_ && candidate_[at].votes >= c.votes) return;
-  if (at == candidates_ && candidates_ == kCandidates && candidate_[--at].votes >= c.votes) return;
-  if (at == candidates_) candidates_++;
-  for (; at > 0 && candidate_[at - 1].votes < c.votes; at--) candidate_[at] = candidate_[at - 1];
-  candidate_[at] = c;
-}
-
+// Refines each candidate with its own look, then, carried on by odometry, with the newest one.
 line_search_result line_search::verify(const bearing_look &now, const wm_pose2 &odom, const landmark_places &map) {
   line_search_result out{};
   const wm_pose2 way = between(odom_, odom);
   int best = 0, second = 0;
-  for (int c = 0; c < candidates_; c++) {
-    wm_pose2 pose = candidate_[c].pose;
+  for (int c = 0; c < candidates_.count; c++) {
+    wm_pose2 pose = candidates_.best[c].pose;
     matrix<3> inverse;
     bool good = true;
     const auto converge = [&](const bearing_look &look) {
@@ -165,8 +152,7 @@ line_search_result line_search::verify(const bearing_look &now, const wm_pose2 &
     converge(now);
     if (!good) continue;
     const int score = explained(now, pose, map, kGate_rad);
-    const bool same = best > 0 && std::fabs(pose.x_m - out.pose.x_m) + std::fabs(pose.y_m - out.pose.y_m) < kApart_m &&
-                      std::fabs(wrap(pose.heading_rad - out.pose.heading_rad)) < kApart_rad;
+    const bool same = best > 0 && are_near(pose, out.pose);
     if (score <= best) {
       if (!same && score > second) second = score;
       continue;

@@ -1,18 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pose by bearings of landmarks without identity: which place and heading on the map explains their pattern? Each
-// cell of a grid over the map lets all pairs of a bearing and a landmark vote for a heading (a Hough transform, R. O.
-// Duda, P. E. Hart, 1972); the best cells are refined by Gauss-Newton on nearest azimuths. The grid is swept over
-// several looks, so that each costs a counted share; the result is verified with the newest look.
+// Relocalization by bearings of landmarks without identity: the pose that explains their pattern. In each cell of a
+// grid over the map, all pairs of a bearing and a landmark vote for a heading (a Hough transform). The best cells are
+// refined by Gauss-Newton on nearest azimuths. The sweep is spread over several looks, so that the cost of each is
+// bounded; the result is verified with the newest look.
 #ifndef WAYMARK_ESTIMATOR_LINE_SEARCH_HPP
 #define WAYMARK_ESTIMATOR_LINE_SEARCH_HPP
 
+#include "filters/relocalize/shortlist.hpp"
+#include "math/elementary.hpp"
 #include "waymark/frames.h"
 
 namespace wm {
 
 // The bearings of one look, in the sensor's frame.
 struct bearing_look {
-  static constexpr int kCapacity = 32;
+  static constexpr int kCapacity = 32;  // bits of a vote
   int count;
   double bearing_rad[kCapacity];
   wm_pose2 sensor;  // in base_link
@@ -43,19 +45,26 @@ class line_search {
   struct candidate {
     wm_pose2 pose;
     int votes, unused;  // no padding: the same events must give the same bytes
+
+    bool is_near(const candidate &o) const { return are_near(pose, o.pose); }
+    bool is_better(const candidate &o) const { return votes > o.votes; }
   };
-  static constexpr int kCandidates = 12;
+  // Two poses nearer than this are one candidate.
+  static constexpr double kApart_m = 0.6, kApart_rad = 0.2;
+  static bool are_near(const wm_pose2 &a, const wm_pose2 &b) {
+    return std::fabs(a.x_m - b.x_m) + std::fabs(a.y_m - b.y_m) < kApart_m &&
+           std::fabs(wrap(a.heading_rad - b.heading_rad)) < kApart_rad;
+  }
+  static constexpr int kCandidates = 12;  // that are refined; not swept
   void begin(const bearing_look &look, const wm_pose2 &odom, const landmark_places &map);
   void vote(const wm_pose2 &place, const landmark_places &map);
-  void offer(const candidate &c);
   line_search_result verify(const bearing_look &now, const wm_pose2 &odom, const landmark_places &map);
 
   bearing_look look_;
   wm_pose2 odom_;
   double corner_m_[2], step_m_;
   int cells_[2], cell_;  // cell_: the next one; 0: nothing begun
-  candidate candidate_[kCandidates];
-  int candidates_;
+  shortlist<candidate, kCandidates> candidates_;
 };
 
 }  // namespace wm

@@ -17,7 +17,7 @@ constexpr int kFewestPoints = 3;        // that differ, among the inliers
 constexpr int kRounds = 4;              // of the refinement; it stops earlier where the cost no longer falls
 // Sigma of the odometry per metre travelled and per radian turned: a bad velocity log. Not swept.
 constexpr double kTravelSigma_mpm = 0.05, kTurnSigma_radprad = 0.05;
-constexpr uint64_t kStream = 0x636f6e73;
+constexpr uint64_t kStream = 0x636f6e73;  // of random numbers: "cons"
 
 struct matches {
   vec3 from[pose_consensus::kCapacity], to[pose_consensus::kCapacity];

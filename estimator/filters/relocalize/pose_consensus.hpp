@@ -34,7 +34,7 @@ struct pose_found {
 
 class pose_consensus {
  public:
-  static constexpr int kCapacity = 64;
+  static constexpr int kCapacity = 64;  // observations: three pictures of 20 points. Not swept.
 
   void clear() { count_ = 0; }
   void add(const point_observation &observation);

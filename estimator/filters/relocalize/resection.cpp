@@ -6,8 +6,9 @@
 namespace wm {
 namespace {
 
-constexpr double kFlat = 1e-4;   // sine between two lines below which they are alike
-constexpr double kTouch = 1.05;  // noise may lift C a little above what A and B reach
+constexpr double kParallel = 1e-4;     // sine between two lines below which they are parallel
+constexpr double kNoiseMargin = 1.05;  // noise may make C a little larger than sqrt(A^2 + B^2)
+constexpr double kCircle = 1e-6;       // of A and B relative to their terms: all sensors and landmarks on one circle
 
 double cross(const double a[2], const double b[2]) { return a[0] * b[1] - a[1] * b[0]; }
 
@@ -25,7 +26,7 @@ int resect(const line_of_sight line[3], wm_pose2 out[2]) {
     weight[i] = cross(line[(i + 1) % 3].along, line[(i + 2) % 3].along);
     if (std::fabs(weight[i]) > std::fabs(weight[best])) best = i;
   }
-  if (!(std::fabs(weight[best]) > kFlat)) return 0;
+  if (!(std::fabs(weight[best]) > kParallel)) return 0;
   double a[3], b[3], c[3], sum[3] = {0, 0, 0}, size = 0.0;
   for (int i = 0; i < 3; i++) {
     const double nx = -line[i].along[1], ny = line[i].along[0];
@@ -38,7 +39,7 @@ int resect(const line_of_sight line[3], wm_pose2 out[2]) {
     size += std::fabs(weight[i]) * std::sqrt(a[i] * a[i] + b[i] * b[i]);
   }
   const double reach = std::sqrt(sum[0] * sum[0] + sum[1] * sum[1]);
-  if (!(reach > 1e-6 * size) || !(std::fabs(sum[2]) < kTouch * reach)) return 0;
+  if (!(reach > kCircle * size) || !(std::fabs(sum[2]) < kNoiseMargin * reach)) return 0;
   const double left = reach * reach - sum[2] * sum[2];
   const double middle = atan2(sum[1], sum[0]), aside = atan2(left > 0.0 ? std::sqrt(left) : 0.0, sum[2]);
   int found = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where one is, from three bearings to known places: in closed form, also where they were taken from three places.
+// Resection: the pose by three bearings to known places, in closed form, also where they were taken from three places.
 #ifndef WAYMARK_ESTIMATOR_RESECTION_HPP
 #define WAYMARK_ESTIMATOR_RESECTION_HPP
 
@@ -13,7 +13,7 @@ struct line_of_sight {
 };
 
 // Poses of the odometry's frame in map from which each landmark lies on its line, ahead: none, one or two. Two where
-// the lines begin at different places; 0 where the geometry says nothing (all on one circle, or lines alike).
+// the lines begin at different places; 0 where the geometry is singular (all on one circle, or parallel lines).
 // Derivation: with d the direction, n = (-d_y, d_x), s the line's beginning, L the landmark, R(a) and t the frame,
 // n' R'(L - t) = n' s is linear in (cos a, sin a, R' t); weights that make the three n vanish leave
 // A cos a + B sin a = C. (Of one beginning, C = 0: the classic resection of Snellius and Pothenot.)

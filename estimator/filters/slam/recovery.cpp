@@ -157,8 +157,8 @@ bool slam::relocalize() {
   if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now) < kSearchInterval_s) return false;
   searched_ns_ = now;
   const wm_time_ns since = now - wm_ns_from_seconds(kWindow_s);
-  search_result found = observations_.find(since, joint_.odom(), joint_.travelled_m(), joint_.turned_rad(), nullptr, 0,
-                                           {kFound_m, kFound_rad, kNumbers});
+  search_result found = observations_.find(since, {joint_.odom(), joint_.travelled_m(), joint_.turned_rad()}, nullptr,
+                                           0, {kFound_m, kFound_rad, kNumbers});
   if (!found.found || landmarks_fitting(found.pose, since) < 2) {
     open_gates();
     return false;

@@ -2,15 +2,12 @@
 // Start, set_pose, evidence about the pose, and relocalization.
 #include <limits>
 
+#include "filters/core/recovery.hpp"
 #include "filters/stereo_ekf/stereo_ekf.hpp"
 
 namespace wm {
 namespace {
 
-// Log odds that a stated start and a found pose are wrong: one in twelve. As landmark_ekf's; not swept here.
-constexpr double kStartWrong = -2.5, kFoundWrong = -2.5;
-// Inflation while lost, each second, as in landmark_ekf: a second's worth of an unmeasured motion.
-constexpr double kInflate_m = 0.5, kInflate_rad = 0.2, kInflateUpTo_m = 30.0;
 constexpr double kDefaultSigma = 0.05;  // m and rad, of a start without sigmas
 // A found pose is taken when the consensus is at least so certain. Not swept.
 constexpr double kFoundSigma_m = 0.5, kFoundSigma_rad = 0.25;
@@ -115,18 +112,8 @@ void stereo_ekf::note(wm_time_ns t_ns, int key, const row_verdict &result, doubl
   evidence_.note(t_ns, key, log_bayes, no_angle, 0.0, record);
   if (life_.tracking() && evidence_.contradicted()) life_.lose(t_ns);
   if (life_.tracking() && evidence_.fits()) remembered_.remember(filter_, t_ns);
-  if (!life_.lost()) return;
-  if (evidence_.fits()) {
-    life_.fits_again();
-    return;
-  }
-  if (!life_.announced(t_ns)) return;
-  const wm_time_ns window = t_ns - wm_ns_from_seconds(kWindow_s), doubted = evidence_.doubted_since_ns();
-  search(doubted > window ? doubted : window);
-  if (life_.inflation_due(t_ns) && filter_.variance(kPlace) < square(kInflateUpTo_m)) {
-    filter_.inflate_pose(square(kInflate_m), square(kInflate_rad));
-    life_.inflated(t_ns);
-  }
+  if (life_.lost())
+    recover_pose(&life_, evidence_, &filter_, t_ns, kWindow_s, [this](wm_time_ns since_ns) { search(since_ns); });
 }
 
 void stereo_ekf::search(wm_time_ns since_ns) {

@@ -8,7 +8,7 @@
 
 #include "events.hpp"
 #include "filters/landmark_ekf/params.h"
-#include "filters/landmark_ekf/start_trial.hpp"
+#include "filters/landmark_ekf/start_hypotheses.hpp"
 #include "filters/relocalize/pose_search.hpp"
 #include "math/elementary.hpp"
 #include "motion/motion_params.h"
@@ -211,9 +211,9 @@ void test_it_tells_the_distance_and_not_more_than_the_tilt_allows(void) {
   TEST_ASSERT_TRUE(std::sqrt(e.covariance[0]) > 0.8 * lasting_m);
 }
 
-// Bearings of three things that fit some pose, as three always do, and of two while driving: taken with heights that
-// bear it out, and with none, but not where one hangs at another height than it would there.
-void test_a_start_that_bearings_alone_cannot_tell_from_a_wrong_one(void) {
+// Bearings of three landmarks fit some pose, as three always do, and those of two while driving: the pose is found with
+// heights that agree with it and without heights, but not with one that contradicts it.
+void test_a_contradicting_height_rejects_a_found_pose(void) {
   static wm::pose_search search;
   const double place_m[3][2] = {{5.0, 3.0}, {7.0, -4.0}, {1.0, 6.0}};
   const auto found = [&](int count, double heights, double wrong_m) {
@@ -236,7 +236,7 @@ void test_a_start_that_bearings_alone_cannot_tell_from_a_wrong_one(void) {
       seen.sigma_tangent = 0.008;
       search.add(seen);
     }
-    return search.find(0, wm_pose2{3.3, 0.0, 0.0}, 3.3, 0.0, nullptr, 0, {5.0, 1.0, 5}).found;
+    return search.find(0, {{3.3, 0.0, 0.0}, 3.3, 0.0}, nullptr, 0, {5.0, 1.0, 5}).found;
   };
   for (const int count : {2, 3}) {
     TEST_ASSERT_TRUE(found(count, 0.0, 0.0));
@@ -248,12 +248,12 @@ void test_a_start_that_bearings_alone_cannot_tell_from_a_wrong_one(void) {
 
 // Three landmarks ahead while the robot stands: a start that is half a metre short is explained by a heading and three
 // places that are a little off as well, but then all three hang too low.
-void test_a_start_that_is_off_is_told_by_heights(void) {
-  static wm::pose_search clues;
-  static wm::start_trial trial;
+void test_heights_reject_a_wrong_start(void) {
+  static wm::pose_search observations;
+  static wm::start_hypotheses start;
   const double place_m[3][2] = {{4.0, 1.0}, {5.0, -1.2}, {4.5, 0.2}};
   const auto off = [&](bool heights, double short_m) {
-    clues.clear();
+    observations.clear();
     for (int n = 0; n < 30; n++) {
       const int i = n % 3;
       wm::observation seen{};
@@ -267,13 +267,13 @@ void test_a_start_that_is_off_is_told_by_heights(void) {
       seen.sigma_angle_rad = 0.005;
       seen.sigma_place_m = seen.sigma_height_m = 0.02;
       seen.sigma_tangent = 0.008;
-      clues.add(seen);
+      observations.add(seen);
     }
     const double covariance[3][3] = {{0.0025, 0, 0}, {0, 0.0025, 0}, {0, 0, 0.0001}};
     const wm_pose2 stated = {-short_m, 0, 0};
-    trial.begin(stated, covariance, {}, 0, 0);
-    trial.weigh(clues, {0.0035, 0, 0.1}, stated, {}, 0, 0, 0);
-    return trial.off();
+    start.begin(stated, covariance, {});
+    start.test(observations, {0.0035, 0, 0.1}, stated, {}, 0);
+    return start.wrong_probability();
   };
   std::printf("off: %.3f by bearings, %.3f by heights, too; right: %.3f and %.3f\n", off(false, 0.5), off(true, 0.5),
               off(false, 0.0), off(true, 0.0));
@@ -314,7 +314,7 @@ int main(void) {
   RUN_TEST(test_absurd_elevations_are_refused_and_told);
   RUN_TEST(test_where_a_height_is_not_known_there_is_no_elevation);
   RUN_TEST(test_it_tells_the_distance_and_not_more_than_the_tilt_allows);
-  RUN_TEST(test_a_start_that_bearings_alone_cannot_tell_from_a_wrong_one);
-  RUN_TEST(test_a_start_that_is_off_is_told_by_heights);
+  RUN_TEST(test_a_contradicting_height_rejects_a_found_pose);
+  RUN_TEST(test_heights_reject_a_wrong_start);
   return UNITY_END();
 }

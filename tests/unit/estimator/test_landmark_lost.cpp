@@ -260,9 +260,7 @@ void test_a_second_landmark_seen_from_one_place_alone_is_not_enough(void) {
     seen.sigma_place_m = 0.02;
     search.add(seen);
   };
-  const auto is_found = [] {
-    return search.find(0, wm_pose2{3.0, 0.0, 0.0}, 3.0, 0.0, nullptr, 0, {5.0, 1.0, 5}).found;
-  };
+  const auto is_found = [] { return search.find(0, {{3.0, 0.0, 0.0}, 3.0, 0.0}, nullptr, 0, {5.0, 1.0, 5}).found; };
   for (int i = 0; i < 7; i++) see(0, 0.5 * i, 400 * i);
   see(1, 3.0, 2400);
   TEST_ASSERT_FALSE(is_found());
