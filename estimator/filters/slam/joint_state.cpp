@@ -16,7 +16,7 @@ size_t joint_state::doubles(const joint_layout &layout) {
 }
 
 void joint_state::init(const wm_setup &setup, const joint_layout &layout, double *arrays) {
-  offset_ = reinterpret_cast<char *>(arrays) - reinterpret_cast<char *>(this);
+  arrays_.set(arrays);
   layout_ = layout;
   layout_.robot_states = even(layout.robot_states);
   capacity_ = even(layout_.robot_states + layout.landmarks * layout.landmark_width);
@@ -190,7 +190,7 @@ void joint_state::set_pose(const wm_pose2 &pose, const double covariance[3][3]) 
     for (int j = i; j < 3; j++) p().set(i, j, covariance[i][j]);
 }
 
-void joint_state::loosen(double xy_m2, double heading_rad2) {
+void joint_state::inflate_pose(double xy_m2, double heading_rad2) {
   for (int i = kX; i <= kY; i++) p().set(i, i, variance(i) + xy_m2);
   p().set(kHeading, kHeading, variance(kHeading) + heading_rad2);
 }

@@ -20,6 +20,7 @@
 #include "filters/relocalize/line_search.hpp"
 #include "math/elementary.hpp"
 #include "math/half_covariance.hpp"
+#include "memory/layout.hpp"
 
 namespace wm {
 
@@ -42,7 +43,7 @@ class joint_state : public planar_motion {
 
   // Doubles that the arrays behind need.
   static size_t doubles(const joint_layout &layout);
-  // `arrays` lies in the same block of memory as *this, at a distance that copies keep.
+  // `arrays` lies in the same block of memory as *this.
   void init(const wm_setup &setup, const joint_layout &layout, double *arrays);
   // A wheel's scale that wanders about its mean, Gauss-Markov; the means are states, too. sigma 0: it doesn't.
   struct wheel_slip {
@@ -88,7 +89,7 @@ class joint_state : public planar_motion {
   void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
   // The robot may have been moved and turned just now, as noise of its motion: variances of x and y, and of the
   // heading.
-  void loosen(double xy_m2, double heading_rad2);
+  void inflate_pose(double xy_m2, double heading_rad2);
 
   // ---- landmarks ----
   int landmarks() const { return landmarks_; }
@@ -125,13 +126,11 @@ class joint_state : public planar_motion {
   double covariance_of(const joint_row &a, const joint_row &b) const;
 
  private:
-  double *arrays() { return reinterpret_cast<double *>(reinterpret_cast<char *>(this) + offset_); }
-  const double *arrays() const {
-    return reinterpret_cast<const double *>(reinterpret_cast<const char *>(this) + offset_);
-  }
   // Behind the covariance: the mean, the gains, e and r.
-  half_covariance p() const { return {const_cast<double *>(arrays()), capacity_}; }
-  double *column(int k) { return arrays() + half_covariance::doubles(capacity_) + static_cast<size_t>(k * capacity_); }
+  half_covariance p() const { return {const_cast<double *>(arrays_.get()), capacity_}; }
+  double *column(int k) {
+    return arrays_.get() + half_covariance::doubles(capacity_) + static_cast<size_t>(k * capacity_);
+  }
   double *x() { return column(0); }
   const double *x() const { return const_cast<joint_state *>(this)->column(0); }
   double *gain(int k) { return column(1 + k); }
@@ -146,7 +145,7 @@ class joint_state : public planar_motion {
 
   void wander(double dt_s);
 
-  std::ptrdiff_t offset_;
+  relative_array<double> arrays_;
   joint_layout layout_;
   wheel_slip slip_;
   int slip_mean_[2];  // states, of the left and the right wheel

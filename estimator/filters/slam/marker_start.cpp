@@ -24,18 +24,14 @@ constexpr int kRefuted = 2;           // sightings of one marker in a row that d
 // Lost on a map. False: not known yet.
 bool slam::find_start(int landmark, const wm_marker &m, const marker_reading &r, bool two) {
   const mounted_sensor &sensor = sensor_[m.sensor];
-  const double turn_variance = two ? kNoTurn : (r.turned ? 1.0 : square(kRough)) * r.noise[2] + square(kMapped_rad);
+  const double turn_variance =
+      two ? kNoTurn : (r.has_heading ? 1.0 : square(kRough)) * r.noise[2] + square(kMapped_rad);
   const seen_marker now = {m.id, r.noise[0] + square(kMapped_m), turn_variance,
                            compose({sensor.x_m, sensor.y_m, sensor.yaw_rad}, {r.level[0], r.level[1], r.yaw_rad}),
                            joint_.odom()};
   if (!start_by_two(landmark, now) && !start_by_one(landmark, m, r, now)) return false;
   take_found();
   return true;
-}
-
-wm_pose2 slam::on_map(int landmark) const {
-  const int state = joint_.landmark_state(landmark);
-  return {joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};
 }
 
 // The robot, whose heading this is, sees the marker there. What else it says of the pose is fused after this.
@@ -60,7 +56,7 @@ bool slam::start_by_two(int landmark, const seen_marker &now) {
     before.variance_m2 += square(kCarried_m);
     before.turn_variance += square(kCarried_rad);
   }
-  const wm_pose2 other = compose(way, before.seen), marker = on_map(landmark), other_marker = on_map(earlier);
+  const wm_pose2 other = compose(way, before.seen), marker = pose_of(landmark), other_marker = pose_of(earlier);
   const double seen[2] = {other.x_m - now.seen.x_m, other.y_m - now.seen.y_m};
   const double mapped[2] = {other_marker.x_m - marker.x_m, other_marker.y_m - marker.y_m};
   const double apart = std::sqrt(square(mapped[0]) + square(mapped[1]));
@@ -92,7 +88,7 @@ bool slam::start_by_two(int landmark, const seen_marker &now) {
 bool slam::start_by_one(int landmark, const wm_marker &m, const marker_reading &r, const seen_marker &now) {
   const double turn_variance = r.noise[2] + joint_.variance(joint_.landmark_state(landmark) + 2);
   const double distance2 = square(now.seen.x_m) + square(now.seen.y_m);
-  if (params_.map != WM_SLAM_MAP_FROZEN || one_refuted_ || !r.turned) return false;
+  if (params_.map != WM_SLAM_MAP_FROZEN || one_refuted_ || !r.has_heading) return false;
   if (turn_variance * distance2 > square(kAlone_m)) return false;
   const lone_marker one = {m.id,
                            1,
@@ -111,7 +107,7 @@ bool slam::start_by_one(int landmark, const wm_marker &m, const marker_reading &
   const bool mirrored = finite(m.yaw_sigma_rad);  // an upright marker; a level one has no second pose
   if (++lone_.seen < kAloneSeen || (mirrored && square(2.0 * wrap(one.sight_rad - lone_.sight_rad)) < turn2))
     return false;
-  const wm_pose2 marker = on_map(landmark);
+  const wm_pose2 marker = pose_of(landmark);
   start_at(marker, now.seen, marker.heading_rad - now.seen.heading_rad);
   rests_on_ = m.id;
   return true;
@@ -122,7 +118,7 @@ void slam::doubt_start(int misfits) {
   if (rests_on_ < 0 || misfits < kRefuted) return;
   rests_on_ = candidate_.id = -1;
   one_refuted_ = true;
-  state_ = WM_STATE_SEARCHING;
+  life_.begin(false);
 }
 
 }  // namespace wm

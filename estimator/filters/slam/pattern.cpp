@@ -26,9 +26,7 @@ constexpr double kSigmas = 3.0, kWidest_rad = 0.15;  // of the gate
 
 }  // namespace
 
-landmark_places slam::places() const { return joint_.places(); }
-
-// A bearing of the newest look, of the sensor that was first in it.
+// A bearing of the newest picture, of the sensor that was first in it.
 void slam::collect_bearing(const wm_sighting &s, const past_pose &past) {
   if (bearings_.count == 0) {
     const wm_pose2 from = sensor_pose(s.sensor, past);
@@ -40,10 +38,10 @@ void slam::collect_bearing(const wm_sighting &s, const past_pose &past) {
     bearings_.bearing_rad[bearings_.count++] = s.bearing_rad;
 }
 
-// The look is complete: evidence for or against the pose, or a share of the search.
+// The picture is complete: evidence for or against the pose, or a share of the search.
 void slam::end_bearings(wm_time_ns t_ns) {
   if (bearings_.count >= kFewest && params_.recover && params_.line_rejoin) {
-    if (state_ == WM_STATE_TRACKING)
+    if (life_.tracking())
       weigh_pattern(t_ns);
     else
       search_pattern();
@@ -58,7 +56,7 @@ void slam::weigh_pattern(wm_time_ns t_ns) {
   const double spread = square(kBearing_rad) + joint_.variance(kHeading) +
                         (joint_.variance(kX) + joint_.variance(kY)) / square(kTypical_m);
   const double gate = kSigmas * std::sqrt(spread) < kWidest_rad ? kSigmas * std::sqrt(spread) : kWidest_rad;
-  const landmark_places map = places();
+  const landmark_places map = joint_.places();
   int near = 0;
   for (int i = 0; i < map.count; i++)
     near += square(map.data[i * map.stride] - then.x_m) + square(map.data[i * map.stride + 1] - then.y_m) <
@@ -76,12 +74,14 @@ void slam::weigh_pattern(wm_time_ns t_ns) {
   if (pattern_odds_.value() > kLost) return lose();
   if (pattern_odds_.value() > kDoubt) return;
   fit_ns_ = t_ns;
+  rollback_.remember(joint_, t_ns);
   usual_share_ += (dt < kUsual_s ? dt / kUsual_s : 1.0) * (share - usual_share_);
 }
 
 void slam::search_pattern() {
-  const line_search_result found = line_search_.step(bearings_, bearings_odom_, places());
+  const line_search_result found = line_search_.step(bearings_, bearings_odom_, joint_.places());
   if (!found.found) return;
+  rollback_.restore(&joint_);
   joint_.set_pose(compose(found.pose, between(bearings_odom_, joint_.odom())), found.covariance);
   take_found();
 }

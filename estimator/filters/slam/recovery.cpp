@@ -11,20 +11,17 @@ namespace {
 // Log odds above which the map is held. A proven pose rests at -5 (kidnapped) and below; one misread identity adds 1.6
 // at most, two hold the map. Not swept.
 constexpr double kHoldMap = -3.0;
-constexpr double kOwnFrame = -5.0;          // log prior of a pose that defines the map's frame: as of a proven one
-constexpr double kStated = -2.5;            // of a pose that was stated or found: 8 % are wrong, as in landmark_ekf
-constexpr double kClutterRange_m = 30;      // a false detection lies anywhere up to this distance, as in landmark_ekf
-constexpr double kSearchInterval_s = 0.25;  // bounds the cost: one search over 64 observations takes 0.5 ms
-constexpr double kLostAtLeast_s = 0.2;      // so that a consumer of 10 Hz sees the state
-constexpr double kWindow_s = 20.0;          // observations older than this are not searched, as in landmark_ekf
+constexpr double kOwnFrame = -5.0;  // log prior of a pose that defines the map's frame: as of a proven one
+constexpr double kStated = -2.5;    // of a pose that was stated or found: 8 % are wrong, as in landmark_ekf
+constexpr double kWindow_s = 20.0;  // observations older than this are not searched, as in landmark_ekf
 constexpr double kFound_m = 0.5, kFound_rad = 0.15;  // a pose with larger sigmas is not taken
 constexpr int kNumbers = 5;                          // must agree; two more than a pose has
 constexpr double kFits_m = 0.5, kFits_rad = 0.2;     // of a landmark from the pose found
 constexpr double kRevisited_s = 5.0;                 // out of sight for so long and seen again where it was: a witness
 constexpr uint32_t kEstablished = 20;                // sightings: hardly any of these was another landmark's
 constexpr double kOld_s = 60.0;                      // or known for so long
-constexpr double kInflateAfter_s = 3.0, kInflateInterval_s = 1.0;  // lost and not found: the gates are opened
-constexpr double kInflate_m = 0.5, kInflate_rad = 0.2, kInflateUpTo_m = 30.0;
+constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;  // sigmas added while lost, as in landmark_ekf ...
+constexpr double kInflateUpTo_m = 30.0;                 // ... up to this
 
 }  // namespace
 
@@ -37,7 +34,7 @@ void slam::begin_evidence(bool own_frame) {
   line_search_.clear();
 }
 
-bool slam::map_is_held() const { return state_ != WM_STATE_TRACKING || evidence_.log_odds() > kHoldMap; }
+bool slam::map_is_held() const { return !life_.tracking() || evidence_.log_odds() > kHoldMap; }
 
 // Which states a correction may change now.
 joint_state::scope slam::scope_now() const {
@@ -49,9 +46,8 @@ joint_state::scope slam::scope_now() const {
 // it is evidence for a pose: of a given map, seen again after it was out of sight, or known for long. Against a pose an
 // established one is enough: seen often, or looked for again.
 bool slam::is_witness(const landmark_note &note) const {
-  if (note.surveyed) return true;
-  return note.seen >= (uint32_t)params_.confirm_seen &&
-         (note.revisited || wm_seconds_between(note.first_ns, joint_.now_ns()) > kOld_s);
+  return note.surveyed ||
+         (is_confirmed(note) && (note.revisited || wm_seconds_between(note.first_ns, joint_.now_ns()) > kOld_s));
 }
 
 // The evidence of one observation of a known landmark, before it is fused. A tracker's number (lines.rejoin) is no
@@ -59,69 +55,65 @@ bool slam::is_witness(const landmark_note &note) const {
 // the landmark's index may be another.
 bool slam::weigh(int landmark, const joint_state::innovation_block &block, bool passed, double clutter_volume,
                  double angle_rad) {
-  landmark_note &note = notes()[landmark];
+  landmark_note &seen = note(landmark);
   if (!params_.recover || params_.line_rejoin) return true;
   const wm_time_ns now = joint_.now_ns();
-  if (passed && note.last_ns != WM_TIME_NONE && wm_seconds_between(note.last_ns, now) > kRevisited_s && !map_is_held())
-    note.revisited = true;
-  const bool witness = is_witness(note);
+  const bool returned = seen.last_ns != WM_TIME_NONE && wm_seconds_between(seen.last_ns, now) > kRevisited_s;
+  if (passed && returned && !map_is_held()) seen.revisited = true;
+  const bool witness = is_witness(seen);
   const double log_bayes = passed ? landmark_evidence::log_bayes_factor(block.density(), clutter_volume)
                                   : landmark_evidence::max_log_bayes_factor();
-  const bool established = note.seen >= kEstablished || (note.seen >= (uint32_t)params_.confirm_seen &&
-                                                         wm_seconds_between(note.last_ns, now) > kRevisited_s);
+  const bool established =
+      seen.seen >= kEstablished || (seen.seen >= static_cast<uint32_t>(params_.confirm_seen) && returned);
   if (!witness && (!established || log_bayes < 0.0)) return true;
-  evidence_.note(now, note.id, log_bayes, angle_rad, angle_rad / std::sqrt(block.s[0][0]), &note.record);
-  if (state_ == WM_STATE_TRACKING && evidence_.contradicted()) {
+  evidence_.note(now, seen.id, log_bayes, angle_rad, angle_rad / std::sqrt(block.s[0][0]), &seen.record);
+  if (life_.tracking() && evidence_.contradicted()) {
     lose();
     return false;
   }
-  if (state_ == WM_STATE_LOST && evidence_.fits() && wm_seconds_between(lost_ns_, now) > kLostAtLeast_s)
-    state_ = WM_STATE_TRACKING;
+  if (life_.lost() && evidence_.fits() && life_.announced(now)) life_.fits_again();
   if (map_is_held()) return true;
-  if (passed && witness) fit_ns_ = now;
+  if (passed && witness) {
+    fit_ns_ = now;
+    rollback_.remember(joint_, now);
+  }
   observations_.clear();
   return true;
 }
 
-double slam::clutter_volume(bool bearing, bool range) {
-  return (bearing ? kTwoPi : 1.0) * (range ? kClutterRange_m : 1.0);
-}
-
 // The landmarks that joined since the pose last fitted stand where the wrong pose put them.
 void slam::lose() {
-  state_ = WM_STATE_LOST;
-  lost_ns_ = inflated_ns_ = joint_.now_ns();
+  life_.lose(joint_.now_ns());
   line_search_.clear();
   for (int i = joint_.landmarks() - 1; i >= 0 && fit_ns_ != WM_TIME_NONE; i--)
-    if (const landmark_note &note = notes()[i]; !is_witness(note) && note.first_ns > fit_ns_) drop_landmark(i);
+    if (!is_witness(note(i)) && note(i).first_ns > fit_ns_) drop_landmark(i);
   forget_lines();
 }
 
 // Keeps an observation for the search, while the map is held: a place that moves would be another landmark's.
-void slam::keep_observation(int landmark, int sensor, const past_pose &past, const sighted &seen) {
-  const landmark_note &note = notes()[landmark];
-  if (!params_.recover || !map_is_held() || !(note.surveyed || note.seen >= (uint32_t)params_.confirm_seen)) return;
+void slam::keep_observation(int landmark, const context &at, const planar_observation &seen) {
+  if (!params_.recover || !map_is_held() || !is_confirmed(note(landmark))) return;
   const int state = joint_.landmark_state(landmark);
-  const mounted_sensor &mounting = sensor_[sensor];
+  const mounted_sensor &mounting = sensor_[at.sensor];
   observation o{};
   o.t_ns = joint_.now_ns();
   o.kind = (finite(seen.bearing_rad) ? kObservedBearing : 0u) | (finite(seen.range_m) ? kObservedRange : 0u);
-  o.key = note.id;
-  const wm_pose2 base = compose(joint_.odom(), between(joint_.pose(), past.pose));
+  o.key = at.id;
+  const wm_pose2 base = compose(joint_.odom(), between(joint_.pose(), at.past.pose));
   o.sensor = compose(base, {mounting.x_m, mounting.y_m, mounting.yaw_rad});
   o.place_m[0] = joint_.value(state);
   o.place_m[1] = joint_.value(state + 1);
   o.bearing_rad = seen.bearing_rad;
   o.range_m = seen.range_m;
-  o.sigma_angle_rad = seen.sigma_rad;
-  o.sigma_length_m = seen.sigma_m;
+  o.sigma_angle_rad = seen.bearing_sigma_rad;
+  o.sigma_length_m = seen.range_sigma_m;
   o.sigma_place_m = std::sqrt(0.5 * (joint_.variance(state) + joint_.variance(state + 1)));
   o.travelled_m = joint_.travelled_m();
   o.turned_rad = joint_.turned_rad();
   observations_.add(o);
   if (!finite(seen.heading_rad) || joint_.variance(state + 2) > square(kFound_rad)) return;
   o.kind = kObservedHeading;
-  o.key = -1 - note.id;
+  o.key = -1 - at.id;
   o.sensor = base;
   o.bearing_rad = wrap(joint_.value(state + 2) - seen.heading_rad);  // of the robot, in map
   o.sigma_angle_rad = std::sqrt(square(seen.heading_sigma_rad) + joint_.variance(state + 2));
@@ -152,17 +144,17 @@ int slam::landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns) const {
 // LOST, or SEARCHING from the start: the pose by the observations of late. True: found.
 bool slam::relocalize() {
   const wm_time_ns now = joint_.now_ns();
-  if (!params_.recover || state_ == WM_STATE_TRACKING) return false;
-  if (state_ == WM_STATE_LOST && wm_seconds_between(lost_ns_, now) < kLostAtLeast_s) return false;
-  if (searched_ns_ != WM_TIME_NONE && wm_seconds_between(searched_ns_, now) < kSearchInterval_s) return false;
-  searched_ns_ = now;
+  if (!params_.recover || life_.tracking() || (life_.lost() && !life_.announced(now)) || !life_.search_due(now))
+    return false;
+  life_.searched(now);
   const wm_time_ns since = now - wm_ns_from_seconds(kWindow_s);
   search_result found = observations_.find(since, {joint_.odom(), joint_.travelled_m(), joint_.turned_rad()}, nullptr,
                                            0, {kFound_m, kFound_rad, kNumbers});
   if (!found.found || landmarks_fitting(found.pose, since) < 2) {
-    open_gates();
+    inflate_while_lost();
     return false;
   }
+  rollback_.restore(&joint_);
   for (size_t i = 0; i < setup_->sensor_count; i++)  // the heading found is off by the mounting's yaw
     if (const int yaw = slots_.at((int)i, kYaw); yaw >= 0) found.covariance[2][2] += joint_.variance(yaw);
   joint_.set_pose(found.pose, found.covariance);
@@ -172,21 +164,15 @@ bool slam::relocalize() {
 
 // The pose was found: a new life of the evidence, the map held until it is proven.
 void slam::take_found() {
-  state_ = WM_STATE_TRACKING;
   forget_lines();
   begin_evidence(params_.line_rejoin);  // no identity proves a pose found by a pattern
-  fused_ns_ = joint_.now_ns();
-  resets_++;
-  counts_.relocalized++;
+  life_.relocalized(joint_.now_ns());
 }
 
-void slam::open_gates() {
-  const wm_time_ns now = joint_.now_ns();
-  if (state_ != WM_STATE_LOST || wm_seconds_between(lost_ns_, now) < kInflateAfter_s) return;
-  if (wm_seconds_between(inflated_ns_, now) < kInflateInterval_s || joint_.variance(kX) > square(kInflateUpTo_m))
-    return;
-  joint_.loosen(square(kInflate_m), square(kInflate_rad));
-  inflated_ns_ = now;
+void slam::inflate_while_lost() {
+  if (!life_.inflation_due(joint_.now_ns()) || joint_.variance(kX) > square(kInflateUpTo_m)) return;
+  joint_.inflate_pose(square(kInflate_m), square(kInflate_rad));
+  life_.inflated(joint_.now_ns());
 }
 
 // Lost, the robot is anywhere on the map, and heads anywhere.

@@ -21,7 +21,7 @@ double nis_of(const double d[2], const double s[2][2]) {
 }  // namespace
 
 bool slam::may_be_one(int fresh, int lost) const {
-  const landmark_note &f = notes()[fresh], &l = notes()[lost];
+  const landmark_note &f = note(fresh), &l = note(lost);
   if (fresh == lost || f.seen < kSeen || l.seen < kSeen || l.last_ns >= f.first_ns) return false;
   const int a = joint_.landmark_state(fresh), b = joint_.landmark_state(lost);
   return std::fabs(joint_.value(a) - joint_.value(b)) < kNear_m &&
@@ -29,15 +29,15 @@ bool slam::may_be_one(int fresh, int lost) const {
 }
 
 // Covariance of one pair's difference with another's.
-void slam::covariance_of_pairs(const pair &p, const pair &q, double out[2][2]) const {
+void slam::covariance_of_pairs(const landmark_pair &p, const landmark_pair &q, double out[2][2]) const {
   for (int k = 0; k < 2; k++)
     for (int l = 0; l < 2; l++)
       out[k][l] = joint_.covariance(p.fresh + k, q.fresh + l) - joint_.covariance(p.fresh + k, q.lost + l) -
                   joint_.covariance(p.lost + k, q.fresh + l) + joint_.covariance(p.lost + k, q.lost + l);
 }
 
-slam::pair slam::make_pair(int fresh, int lost) const {
-  pair out{joint_.landmark_state(fresh), joint_.landmark_state(lost), {}, {}};
+slam::landmark_pair slam::pair_of(int fresh, int lost) const {
+  landmark_pair out{joint_.landmark_state(fresh), joint_.landmark_state(lost), {}, {}};
   for (int k = 0; k < 2; k++) out.apart[k] = joint_.value(out.fresh + k) - joint_.value(out.lost + k);
   covariance_of_pairs(out, out, out.s);
   for (int k = 0; k < 2; k++) out.s[k][k] += square(kSame_m);
@@ -46,14 +46,14 @@ slam::pair slam::make_pair(int fresh, int lost) const {
 
 // Is there another pair that agrees with this one, far better than where the two could have been by chance? Joint
 // compatibility of two pairs [Neira2001].
-bool slam::borne_out(const pair &p) const {
+bool slam::is_compatible_with_another(const landmark_pair &p) const {
   const double determinant = p.s[0][0] * p.s[1][1] - p.s[0][1] * p.s[1][0];
   const double inverse[2][2] = {{p.s[1][1] / determinant, -p.s[0][1] / determinant},
                                 {-p.s[1][0] / determinant, p.s[0][0] / determinant}};
   for (int f = 0; f < joint_.landmarks(); f++)
     for (int l = 0; l < joint_.landmarks(); l++) {
       if (joint_.landmark_state(f) == p.fresh || joint_.landmark_state(l) == p.lost || !may_be_one(f, l)) continue;
-      const pair q = make_pair(f, l);
+      const landmark_pair q = pair_of(f, l);
       double cross[2][2], gain[2][2], d[2], s[2][2];
       covariance_of_pairs(q, p, cross);
       for (int i = 0; i < 2; i++)
@@ -69,12 +69,12 @@ bool slam::borne_out(const pair &p) const {
 
 // Two landmarks of which one was lost before the other was first seen, at one place as far as is known, and no third
 // one near: their difference is measured to be nothing, and the old one goes on under the new one's number.
-void slam::rejoin(int fresh) {
+void slam::merge_if_one(int fresh) {
   int best = -1;
   double least = 1e300, second = 1e300;
   for (int l = 0; l < joint_.landmarks(); l++) {
     if (!may_be_one(fresh, l)) continue;
-    const pair p = make_pair(fresh, l);
+    const landmark_pair p = pair_of(fresh, l);
     const double nis = nis_of(p.apart, p.s);
     if (nis < least) {
       second = least;
@@ -85,9 +85,9 @@ void slam::rejoin(int fresh) {
     }
   }
   if (best < 0 || !(least < kGate) || !(second > least + kGate)) return;
-  const pair p = make_pair(fresh, best);
+  const landmark_pair p = pair_of(fresh, best);
   const double unsure = p.s[0][0] + p.s[1][1];
-  if (unsure > kUnsure_m2 || (unsure > kSure_m2 && !borne_out(p))) return;
+  if (unsure > kUnsure_m2 || (unsure > kSure_m2 && !is_compatible_with_another(p))) return;
   joint_row rows[2];
   double noise[2], difference[2];
   const double none[2] = {0.0, 0.0};
@@ -100,16 +100,16 @@ void slam::rejoin(int fresh) {
   joint_state::innovation_block block;
   joint_.prepare(rows, difference, noise, 2, &block);
   if (!joint_.fuse(block, none, joint_state::scope::all)) return;
-  landmark_note &kept = notes()[best];
-  const landmark_note gone = notes()[fresh];
+  landmark_note &kept = note(best);
+  const landmark_note gone = note(fresh);
   kept.id = gone.id;
   kept.seen += gone.seen;
   kept.last_ns = gone.last_ns;
   kept.sensor = gone.sensor;
   kept.misfits = gone.misfits;
   joint_.remove_landmark(fresh);
-  notes()[fresh] = notes()[joint_.landmarks()];
-  counts_.rejoined++;
+  note(fresh) = note(joint_.landmarks());
+  counts_.merged++;
 }
 
 }  // namespace wm

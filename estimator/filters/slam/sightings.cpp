@@ -1,364 +1,227 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a sighting to a correction or to a new landmark.
+// From a sighting to an update or to a new landmark.
 #include "filters/slam/slam.hpp"
 #include "math/arc.hpp"
 
 namespace wm {
 namespace {
 
-constexpr double kOneNumber = 6.635 / 9.210;  // 99 % of chi2 with one degree of freedom against two
+constexpr double kLeastLever_m = 0.1;       // floor of the distance by which a lateral error becomes an angle
+constexpr double kOnSensor_m = 0.05;        // nearer, a landmark has no direction
+constexpr double kLeastDepth = 0.1;         // floor of the cosine between a depth's axis and the bearing
+constexpr double kAmbiguous = 2.0;          // the second best association must be worse by this factor; not swept
+constexpr double kClutterRange_m = 30.0;    // a false detection lies anywhere up to this distance, as in landmark_ekf
+constexpr double kLeastDeterminant = 1e-9;  // of H_l; in a regular geometry it is 1 / distance, 1e-6 at the least
+constexpr int kNewtonSteps = 3;             // to the place that a sensor that is not level sees; each squares the error
+
+double clutter_volume(const sighting_reading &r) {
+  return (r.bearing ? kTwoPi : 1.0) * (r.range ? kClutterRange_m : 1.0);
+}
+
+// Distance on the floor by a range that may be a depth.
+double distance_of(const wm_sighting &s, const mounted_sensor &sensor, const sensor_errors &errors) {
+  const double range = (s.range_m - errors[kRangeBias]) / errors[kRangeScale];
+  const bool depth = sensor.range_is_depth && !std::isnan(s.bearing_rad);
+  return range / (depth ? larger(cos(s.bearing_rad), kLeastDepth) : 1.0);
+}
 
 }  // namespace
 
-// Each picture's stamp has an error of its own, alike for all that is seen in it.
-void slam::begin_picture(int sensor, wm_time_ns t_ns) {
-  if (stamp_state_[sensor] < 0 || picture_ns_[sensor] == t_ns) return;
-  picture_ns_[sensor] = t_ns;
-  joint_.forget(stamp_state_[sensor], 0.0, square(params_.sensor_stamp_sigma_s));
+wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
+  const wm_sighting &s = event.as.sighting;
+  const bool has_bearing = !std::isnan(s.bearing_rad);
+  context at{
+      s.sensor, s.landmark_id, {}, record_of(event, has_bearing ? WM_RESIDUAL_BEARING : WM_RESIDUAL_RANGE), records};
+  at.record.sensor = s.sensor;
+  at.record.landmark_id = s.landmark_id;
+  at.record.observed = has_bearing ? s.bearing_rad : s.range_m;
+  wm_status status = check_sighting(s, setup_->sensor_count);
+  if (status != WM_OK) return refuse(records, at.record, status);
+  status = begin_observation(event.t_ns);
+  if (status != WM_OK) return status;
+  const reading r = read_sighting(s, sensor_[s.sensor], params_);
+  if (!r.bearing && !r.range) return reject(records, at.record, WM_REJECTED_BY_CONFIG);
+  if (s.range_m > sensor_[s.sensor].max_range_m) return reject(records, at.record, WM_REJECTED_OUT_OF_RANGE);
+
+  begin_picture(s.sensor, event.t_ns);
+  at.past = look_back(s.sensor);
+  int landmark;
+  const wm_verdict verdict = identify(s, r, &at, &landmark);
+  if (verdict != WM_FUSED) return reject(records, at.record, verdict);
+  if (landmark >= 0 && s.landmark_id >= 0 && map_is_held()) {
+    keep_observation(landmark, at, observation_of(s, r));
+    if (relocalize()) return reject(records, at.record, WM_REJECTED_SEARCHING);
+  }
+  if (params_.line_rejoin && r.bearing && !r.range) collect_bearing(s, at.past);
+  if (life_.searching() || (life_.lost() && params_.line_rejoin))
+    return reject(records, at.record, WM_REJECTED_SEARCHING);
+  if (landmark >= 0) {
+    fuse_known(at, s, r, landmark);
+    return WM_OK;
+  }
+  return begin_landmark(at, s, r);
 }
 
-past_pose slam::look_back(int sensor) const {
-  const int slot = slots_.at(sensor, kTimeOffset), stamp = stamp_state_[sensor];
-  const double offset_s = slot < 0 ? 0.0 : joint_.value(slot), stamp_error_s = stamp < 0 ? 0.0 : joint_.value(stamp);
-  past_pose out = pose_before(joint_, offset_s + stamp_error_s);
-  out.stamp_slot = stamp;
-  return out;
+// The landmark of a sighting; -1: a new one. WM_FUSED: go on.
+wm_verdict slam::identify(const wm_sighting &s, const reading &r, context *at, int *landmark) {
+  *landmark = s.landmark_id >= 0 ? find_landmark(s.landmark_id) : -1;
+  if (s.landmark_id >= 0) return is_ambiguous(at->id, *landmark, s.sensor) ? WM_REJECTED_NO_ASSOCIATION : WM_FUSED;
+  bool fresh = false;
+  if (params_.associate_unknown && r.bearing && r.range && s.range_m <= params_.associate_max_range_m)
+    *landmark = associate(s, r, at->past, &fresh);
+  if (*landmark < 0 && !fresh) return WM_REJECTED_NO_ASSOCIATION;
+  at->id = at->record.landmark_id = *landmark < 0 ? own_id() : note(*landmark).id;
+  return WM_FUSED;
 }
 
-sensor_errors slam::errors_of(int sensor) const {
-  return slots_.errors(sensor, [this](int slot) { return joint_.value(slot); });
+// Nearest neighbour by NIS, in both directions: no other landmark is near, and no other sighting of the same stamp was
+// this landmark's. *fresh: no landmark is near, it is a new one.
+int slam::associate(const wm_sighting &s, const reading &r, const past_pose &past, bool *fresh) const {
+  const wm_pose2 from = sensor_pose(s.sensor, past);
+  const sin_cos ray = sincos(from.heading_rad + s.bearing_rad);
+  const double x = from.x_m + s.range_m * ray.cos, y = from.y_m + s.range_m * ray.sin;
+  int best = -1;
+  double least = params_.new_gate, second = params_.new_gate;
+  for (int i = 0; i < joint_.landmarks(); i++) {
+    const int state = joint_.landmark_state(i);
+    const wm_pose2 place = pose_of(i);
+    if (std::fabs(place.x_m - x) > params_.associate_near_m || std::fabs(place.y_m - y) > params_.associate_near_m)
+      continue;
+    landmark_rows v;
+    if (expect_sighting(s, r, past, place, -1, &v) != WM_FUSED) continue;
+    for (int k = 0; k < 2; k++)
+      for (int j = 0; j < 2; j++) v.row[k].add(state + j, v.by_landmark[k][j]);
+    const double s00 = joint_.variance_of(v.row[0]) + v.noise[0], s11 = joint_.variance_of(v.row[1]) + v.noise[1];
+    const double s01 = joint_.covariance_of(v.row[0], v.row[1]);
+    const double nis = (s11 * square(v.innovation[0]) - 2.0 * s01 * v.innovation[0] * v.innovation[1] +
+                        s00 * square(v.innovation[1])) /
+                       (s00 * s11 - s01 * s01);
+    if (nis < least) {
+      second = least;
+      least = nis;
+      best = i;
+    } else if (nis < second) {
+      second = nis;
+    }
+  }
+  *fresh = best < 0;
+  const bool taken = best >= 0 && note(best).last_ns == joint_.now_ns();
+  return best >= 0 && !taken && least < params_.associate_gate && second > kAmbiguous * least ? best : -1;
 }
 
-wm_pose2 slam::sensor_pose(int sensor, const past_pose &past) const {
-  const mounted_sensor &m = sensor_[sensor];
-  const sensor_errors e = errors_of(sensor);
-  return compose(past.pose, {m.x_m + e[kMountX], m.y_m + e[kMountY], m.yaw_rad + e[kYaw]});
+// For the search of the pose. Its sigmas need no cross terms: the search allows for odometry's errors besides.
+slam::planar_observation slam::observation_of(const wm_sighting &s, const reading &r) const {
+  const double range = distance_of(s, sensor_[s.sensor], errors_of(s.sensor));
+  return {.bearing_rad = r.bearing ? s.bearing_rad : std::nan(""),
+          .range_m = r.range ? range : std::nan(""),
+          .heading_rad = std::nan(""),
+          .bearing_sigma_rad = std::sqrt(square(r.bearing_sigma_rad) + square(params_.lasting_bearing_rad)),
+          .range_sigma_m = std::sqrt(square(r.range_sigma_m) + square(params_.lasting_range_m) +
+                                     square((params_.range_sigma_rel + params_.lasting_range_rel) * range)),
+          .heading_sigma_rad = std::nan("")};
 }
 
-// The error of this sensor on this landmark that lasts: a slot of states, faded to now. -1 where none is carried.
-int slam::lend(int sensor, int32_t id, wm_time_ns t_ns) {
-  const int64_t key = static_cast<int64_t>(id) * kSlamSensors + sensor;
-  return lasting_.lend(&joint_, key, lasting_width_, params_.lasting_tau_s, t_ns);
-}
-
-void slam::see(const wm_sighting &s, const reading &r, const past_pose &past, const double place[2], int lasting,
-               view *out) const {
-  const int sensor = s.sensor;
-  const double at[3] = {place[0], place[1], std::nan("")};
+// The rows of bearing and range. `error_state`: of the time-correlated errors; -1: they count as noise.
+wm_verdict slam::expect_sighting(const wm_sighting &s, const reading &r, const past_pose &past, const wm_pose2 &place,
+                                 int error_state, landmark_rows *out) const {
+  const double at[3] = {place.x_m, place.y_m, std::nan("")};
   const unsigned components = (r.bearing ? kBearing : 0u) | (r.range ? kRange : 0u) | components_;
-  const expected_sighting e = expect(sensor_[sensor], errors_of(sensor), past.pose, at, components);
-  out->count = 0;
-  out->possible = e.possible;
-  out->distance_m = e.distance_m;
-  if (!e.possible) return;
+  const expected_sighting e = expect(sensor_[s.sensor], errors_of(s.sensor), past.pose, at, components);
+  if (!e.possible) return e.distance_m < kOnSensor_m ? WM_REJECTED_SINGULAR : WM_REJECTED_OUT_OF_RANGE;
   const auto add = [&](wm_residual kind, double observed, double expected, const double by[kCauses], double variance,
-                       int lasting_offset, double lasting_size) {
+                       int error_offset, double error_size) {
     const int i = out->count++;
     joint_row &row = out->row[i];
-    row.count = row.missing = 0;
-    add_past_pose(&row, by, past, slots_.at(sensor, kTimeOffset));
-    slots_.add_to(&row, sensor, by);
-    if (lasting >= 0 && lasting_offset >= 0) {
-      row.add(lasting + lasting_offset, lasting_size);
-      expected += lasting_size * joint_.value(lasting + lasting_offset);
+    add_past_pose(&row, by, past, slots_.at(s.sensor, kTimeOffset));
+    slots_.add_to(&row, s.sensor, by);
+    if (error_state >= 0 && error_offset >= 0) {
+      row.add(error_state + error_offset, error_size);
+      expected += error_size * joint_.value(error_state + error_offset);
     } else {
-      variance += square(lasting_size);
+      variance += square(error_size);
     }
-    out->by_landmark[i][0] = -by[0];
-    out->by_landmark[i][1] = -by[1];
+    for (int k = 0; k < 3; k++) out->by_landmark[i][k] = k < 2 ? -by[k] : 0.0;
     out->kind[i] = kind;
     out->observed[i] = observed;
     out->expected[i] = expected;
     out->innovation[i] = kind == WM_RESIDUAL_BEARING ? wrap(observed - expected) : observed - expected;
     out->noise[i] = variance;
   };
-  const double distance = e.distance_m > 0.1 ? e.distance_m : 0.1;
+  const double lever_m = larger(e.distance_m, kLeastLever_m);
   if (r.bearing)
     add(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad, e.bearing_by,
-        square(r.bearing_sigma_rad) + square(params_.lateral_sigma_m / distance), lasting_bearing_offset_,
-        std::sqrt(square(params_.lasting_bearing_rad) + square(params_.lasting_lateral_m / distance)));
-  if (r.range) {
+        square(r.bearing_sigma_rad) + square(params_.lateral_sigma_m / lever_m), bearing_error_,
+        std::sqrt(square(params_.lasting_bearing_rad) + square(params_.lasting_lateral_m / lever_m)));
+  if (r.range)
     add(WM_RESIDUAL_RANGE, s.range_m, e.range_m, e.range_by,
-        square(r.range_sigma_m) + square(params_.range_sigma_rel * e.range_m), lasting_range_offset_,
+        square(r.range_sigma_m) + square(params_.range_sigma_rel * e.range_m), range_error_,
         std::sqrt(square(params_.lasting_range_m) + square(params_.lasting_range_rel * e.range_m)));
-  }
+  return WM_FUSED;
 }
 
-wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
-  const wm_sighting &s = event.as.sighting;
-  wm_innovation blank{};
-  blank.t_ns = event.t_ns;
-  blank.source = event.source;
-  blank.sensor = s.sensor;
-  blank.landmark_id = s.landmark_id;
-  blank.residual = (uint8_t)(std::isnan(s.bearing_rad) ? WM_RESIDUAL_RANGE : WM_RESIDUAL_BEARING);
-  blank.observed = std::isnan(s.bearing_rad) ? s.range_m : s.bearing_rad;
-  const auto drop = [&](wm_verdict verdict) {
-    blank.verdict = (uint8_t)verdict;
-    records.add(blank);
-    return WM_OK;
-  };
-  wm_status status = check_sighting(s, setup_->sensor_count);
-  if (status != WM_OK) {
-    drop(status == WM_NOT_FINITE ? WM_REJECTED_NOT_FINITE : WM_REJECTED_OUT_OF_RANGE);
-    return status;
-  }
-  status = joint_.check_time(event.t_ns);
-  if (status != WM_OK) return status;
-  joint_.move_to(event.t_ns);
-  begin_look(event.t_ns);
-  look_after(event.t_ns);
-
-  const mounted_sensor &sensor = sensor_[s.sensor];
-  const reading r = read_sighting(s, sensor, params_);
-  if (!r.bearing && !r.range) return drop(WM_REJECTED_BY_CONFIG);
-  if (!std::isnan(s.range_m) && s.range_m > sensor.max_range_m) return drop(WM_REJECTED_OUT_OF_RANGE);
-
-  begin_picture(s.sensor, event.t_ns);
-  const past_pose past = look_back(s.sensor);
-  int32_t id = s.landmark_id;
-  int landmark = id >= 0 ? find_landmark(id) : -1;
-  if (id < 0) {
-    bool fresh = false;
-    if (params_.associate_unknown && r.bearing && r.range && s.range_m <= params_.associate_max_range_m)
-      landmark = associate(s, r, past, &fresh);
-    if (landmark < 0 && !fresh) return drop(WM_REJECTED_NO_ASSOCIATION);
-    id = landmark < 0 ? own_id() : notes()[landmark].id;
-    blank.landmark_id = id;
-  } else if (doubled(id, landmark, s.sensor)) {
-    return drop(WM_REJECTED_NO_ASSOCIATION);
-  }
-  if (landmark >= 0 && s.landmark_id >= 0 && map_is_held()) {
-    keep_observation(landmark, s.sensor, past, sighted_of(s, r));
-    if (relocalize()) return drop(WM_REJECTED_SEARCHING);
-  }
-  if (params_.line_rejoin && r.bearing && !r.range) collect_bearing(s, past);
-  if (state_ == WM_STATE_SEARCHING || (state_ == WM_STATE_LOST && params_.line_rejoin))
-    return drop(WM_REJECTED_SEARCHING);
-  const bool may_join = params_.map != WM_SLAM_MAP_FROZEN && r.bearing && (r.range || params_.line_clones > 0);
-  if (landmark >= 0)
-    fuse_known(landmark, s, r, past, blank, records);
-  else if (may_join && map_is_held())
-    drop(WM_REJECTED_SEARCHING);
-  else if (!may_join)
-    drop(WM_REJECTED_UNKNOWN_ID);
-  else if (r.range)
-    join_seen(id, s, r, past, blank, records);
-  else if (params_.line_method == WM_SLAM_LINE_INVERSE_DISTANCE)
-    follow_ray(id, s, r, past, blank, records);
-  else
-    track_bearing(id, s, r, past, blank, records);
-  return WM_OK;
-}
-
-// What is stated of its sigmas here needs no cross terms: the search allows for odometry's errors besides.
-slam::sighted slam::sighted_of(const wm_sighting &s, const reading &r) const {
-  const sensor_errors errors = errors_of(s.sensor);
-  const bool depth = sensor_[s.sensor].range_is_depth && r.bearing;
-  const double range =
-      (s.range_m - errors[kRangeBias]) / errors[kRangeScale] / (depth ? larger(cos(s.bearing_rad), 0.1) : 1.0);
-  return {r.bearing ? s.bearing_rad : std::nan(""),
-          r.range ? range : std::nan(""),
-          std::nan(""),
-          std::sqrt(square(r.bearing_sigma_rad) + square(params_.lasting_bearing_rad)),
-          std::sqrt(square(r.range_sigma_m) + square(params_.lasting_range_m) +
-                    square((params_.range_sigma_rel + params_.lasting_range_rel) * range)),
-          0.0};
-}
-
-// Bearing and range are gated together: a wrong one spoils its fellow. Between the two gates a sighting counts less, as
-// a Student distribution would have it; above, not at all.
-void slam::fuse_known(int landmark, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
-                      record_list records) {
-  const landmark_note &note = notes()[landmark];
-  const int state = joint_.landmark_state(landmark);
-  const double place[2] = {joint_.value(state), joint_.value(state + 1)};
-  const wm_time_ns now = joint_.now_ns();
-  view v;
-  see(s, r, past, place, lend(s.sensor, note.id, now), &v);
-  if (!v.possible) {
-    blank.verdict = v.distance_m < 0.05 ? WM_REJECTED_SINGULAR : WM_REJECTED_OUT_OF_RANGE;
-    records.add(blank);
-    return;
-  }
-  for (int i = 0; i < v.count; i++) {
-    v.row[i].add(state, v.by_landmark[i][0]);
-    v.row[i].add(state + 1, v.by_landmark[i][1]);
-  }
+// Bearing and range are gated together: a wrong one spoils the other.
+void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r, int landmark) {
+  landmark_rows v;
+  const wm_verdict possible = expect_sighting(s, r, at.past, pose_of(landmark), lend(at), &v);
+  if (possible != WM_FUSED) return (void)reject(at.records, at.record, possible);
   joint_state::innovation_block block;
-  joint_.prepare(v.row, v.innovation, v.noise, v.count, &block);
-  const double scale = v.count == 2 ? 1.0 : kOneNumber;
-  const double hard = params_.gate_hard * scale, soft = params_.gate_soft * scale;
-  const bool fused = block.nis <= hard;
-  if (s.landmark_id >= 0 &&
-      !weigh(landmark, block, fused, clutter_volume(r.bearing, r.range), r.bearing ? v.innovation[0] : std::nan(""))) {
-    blank.verdict = WM_REJECTED_SEARCHING;
-    records.add(blank);
-    return;
-  }
-  if (fused && s.landmark_id >= 0 && !believable(landmark, block, v.noise[0], scale)) {
-    blank.verdict = WM_REJECTED_SEARCHING;
-    records.add(blank);
-    return;
-  }
-  double variance[2];
-  for (int i = 0; i < v.count; i++) variance[i] = block.s[i][i];
-  const double weaker = block.nis > soft ? block.nis / soft - 1.0 : 0.0;
-  const double more[2] = {v.noise[0] * weaker, v.count == 2 ? v.noise[1] * weaker : 0.0};
-  const bool failed = !(block.determinant > 0.0) || (fused && !joint_.fuse(block, more, scope_now()));
-  for (int i = 0; i < v.count; i++) {
-    wm_innovation record = blank;
-    record.residual = (uint8_t)v.kind[i];
-    record.observed = v.observed[i];
-    record.expected = v.expected[i];
-    record.variance = variance[i];
-    record.nis = block.nis;
-    record.gate = hard;
-    record.gate_dof = (uint8_t)v.count;
-    record.verdict = failed ? WM_REJECTED_NUMERIC : fused ? WM_FUSED : WM_REJECTED_GATE;
-    records.add(record);
-  }
-  if (r.bearing) note_turn(fused, v.innovation[0], false, note.last_ns);
-  if (!fused)
-    misfit(landmark, r.range);
-  else if (!failed)
+  prepare(landmark, &v, &block);
+  const gate_result g = gate(block.nis, v.count, gates());
+  const double angle_rad = r.bearing ? v.innovation[0] : std::nan("");
+  if (s.landmark_id >= 0 && (!weigh(landmark, block, g.passed, clutter_volume(r), angle_rad) ||
+                             (g.passed && !is_plausible(landmark, block, v.noise[0]))))
+    return (void)reject(at.records, at.record, WM_REJECTED_SEARCHING);
+  const wm_verdict verdict = fuse_rows(at, v, g, &block);
+  if (r.bearing) note_rotation(g.passed, v.innovation[0], false, note(landmark).last_ns);
+  if (!g.passed)
+    note_misfit(landmark, r.range);
+  else if (verdict == WM_FUSED)
     note_fused(landmark, s.sensor);
 }
 
-// Paper, system 2, new marker: P_aa = G_x P G_x' + G_z R G_z' with all cross terms. G by the sighting's own
-// derivatives: 0 = H_x dx + H_l dl + v, so dl = -H_l^-1 (H_x dx + v).
-void slam::join_seen(int32_t id, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
-                     record_list records) {
-  const sensor_errors errors = errors_of(s.sensor);
-  double range = (s.range_m - errors[kRangeBias]) / errors[kRangeScale];
-  if (sensor_[s.sensor].range_is_depth) range /= larger(cos(s.bearing_rad), 0.1);
-  const wm_pose2 from = sensor_pose(s.sensor, past);
+// A sighting of a landmark that is not on the map.
+wm_status slam::begin_landmark(context at, const wm_sighting &s, const reading &r) {
+  const bool may_join = params_.map != WM_SLAM_MAP_FROZEN && r.bearing && (r.range || params_.line_clones > 0);
+  const bool as_ray = params_.line_method == WM_SLAM_LINE_INVERSE_DISTANCE;
+  wm_verdict verdict = WM_REJECTED_UNKNOWN_ID;
+  if (may_join && map_is_held())
+    verdict = WM_REJECTED_SEARCHING;
+  else if (may_join && r.range)
+    verdict = join_seen(at, s, r);
+  else if (may_join && !as_ray)
+    verdict = track_bearing(at, s.bearing_rad, r.bearing_sigma_rad);
+  else if (may_join) {
+    if (bearing_tracks::track *ray = current_ray(at)) return follow_ray(at, ray, s.bearing_rad, r.bearing_sigma_rad);
+    begin_ray(at, s.bearing_rad, r.bearing_sigma_rad);
+    verdict = WM_FUSED;
+  }
+  if (verdict == WM_FUSED) at.record.expected = at.record.observed;  // it defines the landmark
+  return reject(at.records, at.record, verdict);
+}
+
+// By bearing and range. The first guess takes the sensor as level; Newton's steps end where it sees the landmark.
+wm_verdict slam::join_seen(const context &at, const wm_sighting &s, const reading &r) {
+  const double range = distance_of(s, sensor_[s.sensor], errors_of(s.sensor));
+  const wm_pose2 from = sensor_pose(s.sensor, at.past);
   const sin_cos ray = sincos(from.heading_rad + s.bearing_rad);
   double place[3] = {from.x_m + range * ray.cos, from.y_m + range * ray.sin, 0.0};
-  const int lasting = lend(s.sensor, id, joint_.now_ns());
-  view v;
-  double inverse[2][2];
-  for (int step = 0;; step++) {  // a sensor that isn't level sees another place than the first guess
-    see(s, r, past, place, lasting, &v);
-    const double(*h)[2] = v.by_landmark;
-    const double determinant = v.possible ? h[0][0] * h[1][1] - h[0][1] * h[1][0] : 0.0;
-    if (!(std::fabs(determinant) > 1e-9) || !(range > 0.05)) {
-      blank.verdict = WM_REJECTED_SINGULAR;
-      records.add(blank);
-      return;
+  const int error_state = lend(at);
+  for (int step = 0;; step++) {
+    landmark_rows v;
+    const wm_verdict possible = expect_sighting(s, r, at.past, {place[0], place[1], 0.0}, error_state, &v);
+    const double(*h)[3] = v.by_landmark;
+    const double determinant = possible == WM_FUSED ? h[0][0] * h[1][1] - h[0][1] * h[1][0] : 0.0;
+    if (!(std::fabs(determinant) > kLeastDeterminant) || !(range > kOnSensor_m)) return WM_REJECTED_SINGULAR;
+    const double inverse[3][3] = {{h[1][1] / determinant, -h[0][1] / determinant, 0.0},
+                                  {-h[1][0] / determinant, h[0][0] / determinant, 0.0},
+                                  {0.0, 0.0, 0.0}};
+    if (step == kNewtonSteps) {
+      if (!finite(place[0]) || !finite(place[1]) || !make_room()) return WM_REJECTED_NO_ASSOCIATION;
+      join(at, v, inverse, place, square(kPi));  // a heading, where landmarks have one, is unknown
+      return WM_FUSED;
     }
-    inverse[0][0] = h[1][1] / determinant;
-    inverse[0][1] = -h[0][1] / determinant;
-    inverse[1][0] = -h[1][0] / determinant;
-    inverse[1][1] = h[0][0] / determinant;
-    if (step == 3) break;
     for (int k = 0; k < 2; k++) place[k] += inverse[k][0] * v.innovation[0] + inverse[k][1] * v.innovation[1];
   }
-  if (!finite(place[0]) || !finite(place[1]) || !make_room()) {
-    blank.verdict = WM_REJECTED_NO_ASSOCIATION;
-    records.add(blank);
-    return;
-  }
-  joint_row rows[3];
-  double noise[3][3] = {};
-  for (int k = 0; k < 2; k++)
-    for (int i = 0; i < 2; i++) {
-      rows[k].add(v.row[i], -inverse[k][i]);
-      for (int l = 0; l < 2; l++) noise[k][l] += inverse[k][i] * v.noise[i] * inverse[l][i];
-    }
-  noise[2][2] = square(kPi);  // a heading, where landmarks have one, is unknown
-  note_landmark(id, joint_.add_landmark(rows, noise, place), s.sensor, joint_.now_ns());
-  fused_ns_ = joint_.now_ns();
-  blank.verdict = WM_FUSED;
-  blank.expected = blank.observed;  // it defines the landmark; there was nothing to hold it against
-  records.add(blank);
-}
-
-// The sensor's pose in map when a sighting was true, as a clone in the state.
-int slam::keep_clone(int sensor, const past_pose &past, wm_time_ns t_ns) {
-  const int there = tracks_.find_clone(sensor, t_ns);
-  if (there >= 0) return there;
-  const wm_pose2 pose = sensor_pose(sensor, past);
-  const int clone = tracks_.take_clone(sensor, t_ns, pose.x_m, pose.y_m);
-  const double lever_x = pose.x_m - past.pose.x_m, lever_y = pose.y_m - past.pose.y_m;
-  const sin_cos h = sincos(past.pose.heading_rad);
-  const double by[3][6] = {{1, 0, -lever_y, 0, h.cos, -h.sin}, {0, 1, lever_x, 0, h.sin, h.cos}, {0, 0, 1, 1, 0, 0}};
-  joint_row rows[3];
-  for (int k = 0; k < 3; k++) {
-    add_past_pose(&rows[k], by[k], past, slots_.at(sensor, kTimeOffset));
-    rows[k].add(slots_.at(sensor, kYaw), by[k][3]);
-    rows[k].add(slots_.at(sensor, kMountX), by[k][4]);
-    rows[k].add(slots_.at(sensor, kMountY), by[k][5]);
-  }
-  const double none[3][3] = {}, values[3] = {pose.x_m, pose.y_m, pose.heading_rad};
-  joint_.assign(clone_state(clone), 3, rows, none, values);
-  return clone;
-}
-
-void slam::track_bearing(int32_t id, const wm_sighting &s, const reading &r, const past_pose &past, wm_innovation blank,
-                         record_list records) {
-  const wm_time_ns now = joint_.now_ns();
-  blank.verdict = WM_REJECTED_SEARCHING;  // kept until the parallax suffices
-  bearing_tracks::track *track = tracks_.find(id, s.sensor);
-  if (!track) {
-    track = tracks_.begin(id, s.sensor);
-    track->first_ns = now;
-  }
-  track->last_ns = now;
-  // All lines of a picture share a clone, and pictures that are too near to the last one have none.
-  const wm_pose2 here = sensor_pose(s.sensor, past);
-  const int newest = tracks_.newest_clone(s.sensor);
-  if (newest >= 0 && tracks_.find_clone(s.sensor, now) < 0) {
-    const int state = clone_state(newest);
-    const double dx = here.x_m - joint_.value(state), dy = here.y_m - joint_.value(state + 1);
-    if (dx * dx + dy * dy < square(params_.line_step_m)) {
-      records.add(blank);
-      return;
-    }
-  }
-  const double sigma = std::sqrt(square(r.bearing_sigma_rad) + square(params_.lasting_bearing_rad));
-  const int clone = keep_clone(s.sensor, past, now);
-  tracks_.add(track, clone, s.bearing_rad, sigma, params_.line_poses);
-  if (track->count >= 3 && join_line(*track)) {
-    bearing_tracks::end(track);
-    fused_ns_ = now;
-    blank.verdict = WM_FUSED;
-    blank.expected = blank.observed;
-  }
-  records.add(blank);
-}
-
-bool slam::join_line(const bearing_tracks::track &track) {
-  line_bundle bundle;
-  bundle.count = track.count;
-  for (int i = 0; i < track.count; i++) {
-    const int state = clone_state(track.clone[i]);
-    bundle.pose[i] = {joint_.value(state), joint_.value(state + 1), joint_.value(state + 2)};
-    bundle.azimuth_rad[i] = track.azimuth_rad[i];
-    bundle.sigma_rad[i] = track.sigma_rad[i];
-    for (int j = 0; j < track.count; j++)
-      for (int k = 0; k < 3; k++)
-        for (int l = 0; l < 3; l++)
-          bundle.pose_covariance[3 * i + k][3 * j + l] = joint_.covariance(state + k, clone_state(track.clone[j]) + l);
-  }
-  const line_landmark line = find_line(bundle, params_.line_method == WM_SLAM_LINE_UNSCENTED);
-  if (!line.solved || line.parallax_rad < params_.line_parallax_rad || line.misfit > params_.gate_soft) return false;
-  joint_row rows[3];
-  double noise[3][3] = {};
-  for (int r = 0; r < 2; r++) {
-    for (int j = 0; j < 3 * track.count; j++) rows[r].add(clone_state(track.clone[j / 3]) + j % 3, line.by_pose[r][j]);
-    for (int c = 0; c < 2; c++) noise[r][c] = line.noise[r][c];
-  }
-  // How well it is known from the last pose: the poses' own common error is not the landmark's.
-  joint_row relative[2] = {rows[0], rows[1]};
-  const int last = clone_state(track.clone[track.count - 1]);
-  for (int r = 0; r < 2; r++) relative[r].add(last + r, -1.0);
-  const double variance = joint_.variance_of(relative[0]) + joint_.variance_of(relative[1]) + noise[0][0] + noise[1][1];
-  if (variance > square(params_.line_sigma_rel * line.distance_m) || !make_room()) return false;
-  noise[2][2] = square(kPi);
-  const double place[3] = {line.place_m[0], line.place_m[1], 0.0};
-  note_line(track, joint_.add_landmark(rows, noise, place));
-  return true;
 }
 
 }  // namespace wm

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// SLAM's start, its poses from outside, its landmarks' coming and going, and the contract.
 #include "filters/slam/slam.hpp"
 
 #include <cstring>
-#include <limits>
 
 #include "filters/core/contract.hpp"
 #include "filters/planar/set_pose.hpp"
@@ -13,21 +11,22 @@
 namespace wm {
 namespace {
 
-constexpr double kOwnFrame_m = 1e-3, kOwnFrame_rad = 1e-3;  // the map begins where the robot starts
+constexpr double kOwnFrame_m = 1e-3, kOwnFrame_rad = 1e-3;  // sigmas of a start that defines the map's frame
+constexpr double kStart_m = 0.05, kStart_rad = 0.05;        // of a start without sigmas, as in landmark_ekf
 constexpr double kSurveyed_m = 1e-4, kSurveyed_rad = 0.01;  // no map is better; headings come without a sigma
-const double kAbsent = std::numeric_limits<double>::quiet_NaN();
 
 landmark_note note_of(int32_t id, int sensor, wm_time_ns t_ns) {
   landmark_note out{};
   out.id = id;
   out.first_ns = out.last_ns = t_ns;
   out.sensor = sensor;
-  out.levelled_by = -1;
-  out.doubted_ns = WM_TIME_NONE;
+  out.tilt_sensor = -1;
+  out.deferred_ns = WM_TIME_NONE;
   return out;
 }
 
-int lasting_states(const wm_slam_params &p) {
+// States of one slot of a time-correlated error.
+int error_states(const wm_slam_params &p) {
   if (p.lasting_slots == 0) return 0;
   if (p.markers && p.marker_lasting > 0.0) return 2;
   return (p.lasting_bearing_rad > 0.0 || p.lasting_lateral_m > 0.0) +
@@ -39,7 +38,7 @@ joint_state::wheel_slip slip_of(const wm_slam_params &p) { return {p.wheel_slip_
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
   return kPoseStates + joint_state::count_motion_states(p.motion, slip_of(p)) +
          sensor_slots::count(p.sensor_states, setup.sensor_count) +
-         (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count + p.lasting_slots * lasting_states(p);
+         (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count + p.lasting_slots * error_states(p);
 }
 
 // Azimuth and inverse distance for each ray, of which there are as many as clones.
@@ -58,51 +57,50 @@ joint_layout layout_of(const wm_slam_params &p, const wm_setup &setup) {
   return out;
 }
 
-size_t aligned(size_t bytes) { return (bytes + 15) / 16 * 16; }
-
-size_t arrays_at(const wm_slam_params &p) {
-  return aligned(sizeof(slam) + (size_t)p.landmark_capacity * sizeof(landmark_note));
-}
-
 }  // namespace
+
+slam::arrays slam::place(memory_layout *out, const wm_slam_params &params, const wm_setup &setup) {
+  return {out->take<landmark_note>(static_cast<size_t>(params.landmark_capacity)),
+          out->take<double>(joint_state::doubles(layout_of(params, setup)))};
+}
 
 size_t slam::bytes(const wm_slam_params &params, const wm_setup &setup, const char **why) {
   if (setup.sensor_count > kSlamSensors) {
     *why = "slam takes at most 8 sensors";
     return 0;
   }
-  const joint_layout layout = layout_of(params, setup);
-  if (layout.robot_states > joint_state::kMaxRobot) {
+  if (layout_of(params, setup).robot_states > joint_state::kMaxRobot) {
     *why =
         "slam holds at most 192 states beside the landmarks: pose 3, one for each states.*_sigma that is not 0 (those "
         "of sensors once for each sensor), one or two for each of lasting.slots, three for each of lines.clones; lower "
         "lasting.slots or lines.clones";
     return 0;
   }
-  if (params.map != WM_SLAM_MAP_NONE && setup.landmark_count > (size_t)params.landmark_capacity) {
+  if (params.map != WM_SLAM_MAP_NONE && setup.landmark_count > static_cast<size_t>(params.landmark_capacity)) {
     *why = "landmarks.csv has more landmarks than landmarks.capacity; raise it";
     return 0;
   }
-  return arrays_at(params) + joint_state::doubles(layout) * sizeof(double);
+  memory_layout layout(nullptr, sizeof(slam));
+  place(&layout, params, setup);
+  return layout.bytes();
 }
 
 void slam::init(const wm_slam_params &params, const wm_setup &setup) {
-  std::memset(static_cast<void *>(this), 0, arrays_at(params));
-  for (double &shift_px : edge_shift_px_) shift_px = kAbsent;
+  std::memset(static_cast<void *>(this), 0, sizeof *this);
   setup_ = &setup;
   params_ = params;
+  memory_layout memory(this, sizeof *this);
+  const arrays behind = place(&memory, params, setup);
+  notes_.set(behind.notes);
+  std::memset(static_cast<void *>(behind.notes), 0,
+              static_cast<size_t>(params.landmark_capacity) * sizeof(landmark_note));
   const joint_layout layout = layout_of(params, setup);
-  joint_.init(setup, layout, reinterpret_cast<double *>(reinterpret_cast<char *>(this) + arrays_at(params)));
+  joint_.init(setup, layout, behind.joint);
   first_clone_ = layout.first_clone;
   first_ray_ = first_clone_ - ray_states(params);
   int next = kPoseStates;
   joint_.set_motion_states(params.motion, slip_of(params), next);
   next += joint_state::count_motion_states(params.motion, slip_of(params));
-  const auto add = [&](double value, double sigma) {
-    if (!(sigma > 0.0)) return -1;
-    joint_.forget(next, value, square(sigma));
-    return next++;
-  };
   for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
   slots_.init(params.sensor_states, setup.sensor_count,
               [&](double value, double sigma, double walk, double low, double high) {
@@ -110,28 +108,28 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
                 return next++;
               });
   components_ = params.sensor_states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
-  for (size_t i = 0; i < kSlamSensors; i++) {
-    stamp_state_[i] = i < setup.sensor_count ? add(0.0, params.sensor_stamp_sigma_s) : -1;
+  rollback_.begin(joint_, kPoseStates, next);
+  for (int i = 0; i < kSlamSensors; i++) {
+    const bool on = i < static_cast<int>(setup.sensor_count) && params.sensor_stamp_sigma_s > 0.0;
+    stamp_state_[i] = on ? next++ : -1;  // its variance is set with each picture
     picture_ns_[i] = WM_TIME_NONE;
+    edge_shift_px_[i] = std::nan("");
   }
-  lasting_bearing_offset_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
-  lasting_range_offset_ =
-      params.lasting_range_m > 0.0 || params.lasting_range_rel > 0.0 ? (lasting_bearing_offset_ >= 0 ? 1 : 0) : -1;
-  lasting_width_ = lasting_states(params);
-  lasting_.clear();
-  for (int i = 0; i < params.lasting_slots && lasting_width_ > 0; i++) {
-    lasting_.add(next);
-    for (int k = 0; k < lasting_width_; k++) add(0.0, 1.0);
-  }
+  bearing_error_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
+  range_error_ = params.lasting_range_m > 0.0 || params.lasting_range_rel > 0.0 ? (bearing_error_ >= 0 ? 1 : 0) : -1;
+  error_width_ = error_states(params);
+  for (int i = 0; i < params.lasting_slots && error_width_ > 0; i++, next += error_width_) errors_.add(next);
   follow_scale();
+  life_ = {};
   start_again();
 }
 
-// Nothing measures how large the map is where the way's scale and the ranges' are both states, or no ranges are used.
-// Prints are known so much better than wheels that a filter learns next to nothing where it should learn nothing.
+// The map's scale is unobservable where the way's scale and the ranges' are both states, or no ranges are used. With
+// markers, far more accurate than wheels, the filter hardly gains false certainty, so the covariance is not
+// transported.
 void slam::follow_scale() {
-  const bool ranges_tell = params_.use_range && !(params_.sensor_states.sigma[WM_SENSOR_ROW_kRangeScale] > 0.0);
-  if (ranges_tell || params_.map != WM_SLAM_MAP_NONE || !joint_.find_scale(!params_.markers)) return;
+  const bool is_observed = params_.use_range && !(params_.sensor_states.sigma[WM_SENSOR_ROW_kRangeScale] > 0.0);
+  if (is_observed || params_.map != WM_SLAM_MAP_NONE || !joint_.find_scale(!params_.markers)) return;
   for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++) {
     joint_.follow_scale(slots_.at(i, kRangeScale), -1.0, true);
     joint_.follow_scale(slots_.at(i, kMountX), 1.0, false);
@@ -140,61 +138,46 @@ void slam::follow_scale() {
   for (int k = first_ray_; k < first_clone_; k += 2) joint_.follow_scale(k + 1, -1.0, false);
 }
 
-// The map begins where the robot starts, unless a start or a map says otherwise.
+// The map's frame is that of the start pose, unless a start or a map is given.
 void slam::start_again() {
   const wm_start &start = setup_->start;
   const bool place = finite(start.p_m[0]) && finite(start.p_m[1]), heading = finite(start.heading_rad);
-  const double sigma_xy = place ? (finite(start.sigma_xy_m) ? start.sigma_xy_m : 0.05) : kOwnFrame_m;
-  const double sigma_heading =
-      heading ? (finite(start.sigma_heading_rad) ? start.sigma_heading_rad : 0.05) : kOwnFrame_rad;
+  const double stated_m = finite(start.sigma_xy_m) ? start.sigma_xy_m : kStart_m;
+  const double stated_rad = finite(start.sigma_heading_rad) ? start.sigma_heading_rad : kStart_rad;
+  const double xy = square(place ? stated_m : kOwnFrame_m), turn = square(heading ? stated_rad : kOwnFrame_rad);
+  const double covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, turn}};
   while (joint_.landmarks() > 0) joint_.remove_landmark(joint_.landmarks() - 1);
-  const double xy = square(sigma_xy);
-  const double covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(sigma_heading)}};
   joint_.set_pose({place ? start.p_m[0] : 0.0, place ? start.p_m[1] : 0.0, heading ? start.heading_rad : 0.0},
                   covariance);
   forget_lines();
-  lasting_.release_all();
-  fused_ns_ = WM_TIME_NONE;
+  errors_.release_all();
   next_id_ = 0;
   cursor_ = 0;
   for (int i = 0; i < 2; i++) {
     other_fused_ns_[i] = WM_TIME_NONE;
     other_fused_id_[i] = -1;
   }
-  moved_.count = doubled_.count = 0;
-  look_.t_ns = WM_TIME_NONE;
-  look_.fused = look_.refused = look_.before = 0;
-  resets_++;
+  moved_.clear();
+  ambiguous_.clear();
+  outliers_.t_ns = WM_TIME_NONE;
+  outliers_.fused = outliers_.rejected = outliers_.before = 0;
   const bool given = params_.map != WM_SLAM_MAP_NONE;
-  state_ = given && params_.recover && !(place && heading) ? WM_STATE_SEARCHING : WM_STATE_TRACKING;
+  life_.begin(!given || !params_.recover || (place && heading));
   begin_evidence(!given);
   bearings_.count = 0;
   usual_share_ = 0.0;
-  searched_ns_ = WM_TIME_NONE;
   candidate_.id = lone_.id = rests_on_ = -1;
   one_refuted_ = false;
   if (given) load_map();
 }
 
-void slam::forget_lines() {
-  for (int state = first_ray_; state < first_clone_ + 3 * params_.line_clones; state++) joint_.forget(state, 0.0, 0.0);
-  forget_tracks();
-}
-
-void slam::forget_tracks() {
-  const bool rays = params_.line_method == WM_SLAM_LINE_INVERSE_DISTANCE;
-  tracks_.clear(params_.line_clones, rays ? params_.line_clones : bearing_tracks::kTracks);
-}
-
 namespace {
 
-// What all landmarks are unsure of alike is where the map's own axes lie, which is no error on the map.
+// The variance that all headings share is that of the map's own axes, which is no error on the map.
 double common_yaw_variance(const wm_setup &setup) {
   double least = square(kPi);
-  for (size_t i = 0; i < setup.landmark_count; i++) {
-    const double variance = square(setup.landmarks[i].yaw_sigma_rad);
-    if (variance < least) least = variance;
-  }
+  for (size_t i = 0; i < setup.landmark_count; i++)
+    if (const double variance = square(setup.landmarks[i].yaw_sigma_rad); variance < least) least = variance;
   return least;
 }
 
@@ -219,9 +202,9 @@ void slam::load_map() {
     const double place[3] = {l.p_m[0], l.p_m[1], turned ? wrap(l.yaw_rad) : 0.0};
     const joint_row rows[3] = {};
     const int landmark = joint_.add_landmark(rows, noise, place);
-    notes()[landmark] = note_of(l.id, -1, WM_TIME_NONE);
-    notes()[landmark].z_m = l.p_m[2];
-    notes()[landmark].surveyed = 1;
+    note(landmark) = note_of(l.id, -1, WM_TIME_NONE);
+    note(landmark).z_m = l.p_m[2];
+    note(landmark).surveyed = 1;
   }
 }
 
@@ -248,39 +231,34 @@ wm_status slam::correct(const wm_event &event, record_list records) {
 
 // RESET begins a new map. SET_POSE moves the robot within this one.
 wm_status slam::take_pose(const wm_event &event) {
-  if (event.kind == WM_EVENT_RESET) {
-    const wm_status status = joint_.check_time(event.t_ns);
-    if (status != WM_OK) return status;
-    joint_.move_to(event.t_ns);
-    start_again();
-    return WM_OK;
-  }
+  const bool reset = event.kind == WM_EVENT_RESET;
   given_pose given;
-  wm_status status = read_set_pose(event, &given);
+  wm_status status = reset ? WM_OK : read_set_pose(event, &given);
   if (status == WM_OK) status = joint_.check_time(event.t_ns);
   if (status != WM_OK) return status;
   joint_.move_to(event.t_ns);
+  if (reset) {
+    start_again();
+    return WM_OK;
+  }
   const double xy = square(given.sigma_xy_m);
   const double covariance[3][3] = {{xy, 0, 0}, {0, xy, 0}, {0, 0, square(given.sigma_heading_rad)}};
   joint_.set_pose(given.pose, covariance);
   forget_tracks();
-  state_ = WM_STATE_TRACKING;
+  life_.begin(true);
   begin_evidence(false);
   rests_on_ = -1;
-  resets_++;
   return WM_OK;
 }
 
 void slam::estimate(wm_estimate *out) const {
   joint_.estimate(out);
-  out->resets = resets_;
-  const bool fresh =
-      fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, joint_.now_ns()) <= params_.dead_reckoning_after_s;
-  out->state = (uint8_t)(state_ != WM_STATE_TRACKING ? state_ : fresh ? WM_STATE_TRACKING : WM_STATE_DEAD_RECKONING);
-  out->lost_probability = state_ == WM_STATE_SEARCHING ? 1.0
-                          : params_.line_rejoin        ? pattern_odds_.probability()
-                                                       : evidence_.probability();
-  if (state_ != WM_STATE_TRACKING) widen(out);
+  out->resets = life_.resets();
+  out->state = life_.state(joint_.now_ns(), params_.dead_reckoning_after_s);
+  out->lost_probability = life_.searching()     ? 1.0
+                          : params_.line_rejoin ? pattern_odds_.probability()
+                                                : evidence_.probability();
+  if (!life_.tracking()) widen(out);
 }
 
 size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const {
@@ -288,38 +266,40 @@ size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const 
   joint_.list_motion_states(&list);
   slots_.list(*setup_, joint_, &list);
   for (size_t i = 0; i < setup_->sensor_count; i++)
-    if (finite(edge_shift_px_[i])) list.add(setup_->sensors[i].name, "edge_shift_px", edge_shift_px_[i], kAbsent);
+    if (finite(edge_shift_px_[i])) list.add(setup_->sensors[i].name, "edge_shift_px", edge_shift_px_[i], std::nan(""));
   return list.count();
 }
 
 size_t slam::list_counters(wm_counter *out, size_t capacity) const {
   counter_list list(out, capacity);
-  list.add(WM_COUNTER_LANDMARKS, (uint64_t)joint_.landmarks());
+  list.add(WM_COUNTER_LANDMARKS, static_cast<uint64_t>(joint_.landmarks()));
   list.add(WM_COUNTER_LANDMARKS_ADDED, counts_.joined);
   list.add(WM_COUNTER_LANDMARKS_REMOVED, counts_.left);
-  list.add(WM_COUNTER_LANDMARKS_MOVED, counts_.moved);
-  list.add(WM_COUNTER_IDENTITIES_AMBIGUOUS, counts_.doubled);
-  list.add(WM_COUNTER_ROTATION_OUTLIERS, counts_.jolts);
-  if (params_.line_rejoin) list.add(WM_COUNTER_LANDMARKS_MERGED, counts_.rejoined);
+  list.add(WM_COUNTER_LANDMARKS_MOVED, counts_.moved, moved_.last);
+  list.add(WM_COUNTER_IDENTITIES_AMBIGUOUS, counts_.ambiguous, ambiguous_.last);
+  list.add(WM_COUNTER_ROTATION_OUTLIERS, counts_.rotation_outliers);
+  if (params_.line_rejoin) list.add(WM_COUNTER_LANDMARKS_MERGED, counts_.merged);
   list.add(WM_COUNTER_MAP_FULL, counts_.no_room);
   list.add(WM_COUNTER_MOTION_OUTLIERS, joint_.motion_outliers());
-  list.add(WM_COUNTER_RELOCALIZATIONS, counts_.relocalized);
+  list.add(WM_COUNTER_RELOCALIZATIONS, life_.relocalizations());
   return list.count();
 }
 
 size_t slam::list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const {
   size_t count = 0;
   for (int i = 0; i < joint_.landmarks(); i++) {
-    const landmark_note &note = notes()[i];
-    if (!note.surveyed && note.seen < (uint32_t)params_.confirm_seen) continue;
+    if (!is_confirmed(note(i))) continue;
     if (count < capacity) {
       const int s = joint_.landmark_state(i);
       const double xx = joint_.variance(s), xy = joint_.covariance(s, s + 1), yy = joint_.variance(s + 1);
-      const double most = 0.5 * (xx + yy) + std::sqrt(square(0.5 * (xx - yy)) + square(xy));
-      const double turn = params_.markers ? joint_.variance(s + 2) : kAbsent;
-      out[count] = {note.id,         {joint_.value(s), joint_.value(s + 1), note.z_m},
-                    std::sqrt(most), params_.markers ? joint_.value(s + 2) : kAbsent,
-                    {xx, xy, yy},    params_.markers ? std::sqrt(turn) : 0.0};
+      const double largest = 0.5 * (xx + yy) + std::sqrt(square(0.5 * (xx - yy)) + square(xy));
+      const double turn = params_.markers ? joint_.variance(s + 2) : std::nan("");
+      out[count] = {.id = note(i).id,
+                    .p_m = {joint_.value(s), joint_.value(s + 1), note(i).z_m},
+                    .sigma_m = std::sqrt(largest),
+                    .yaw_rad = params_.markers ? joint_.value(s + 2) : std::nan(""),
+                    .cov_m2 = {xx, xy, yy},
+                    .yaw_sigma_rad = std::sqrt(turn)};
       if (covariance) {
         const double c[4] = {xx, xy, yy, turn};
         std::memcpy(covariance[count], c, sizeof c);
@@ -330,14 +310,31 @@ size_t slam::list_landmarks(wm_landmark *out, double (*covariance)[4], size_t ca
   return count;
 }
 
-// ---- landmarks come and go ----
+// ---- landmarks ----
+
+// Of an observation: predicts to its stamp.
+wm_status slam::begin_observation(wm_time_ns t_ns) {
+  const wm_status status = joint_.check_time(t_ns);
+  if (status != WM_OK) return status;
+  joint_.move_to(t_ns);
+  end_picture(t_ns);
+  maintain_map(t_ns);
+  return WM_OK;
+}
+
+// In map; without markers there is no heading.
+wm_pose2 slam::pose_of(int landmark) const {
+  const int state = joint_.landmark_state(landmark);
+  return {joint_.value(state), joint_.value(state + 1), params_.markers ? joint_.value(state + 2) : 0.0};
+}
 
 int slam::find_landmark(int32_t id) const {
   for (int i = 0; i < joint_.landmarks(); i++)
-    if (notes()[i].id == id) return i;
+    if (note(i).id == id) return i;
   return -1;
 }
 
+// An identity for a landmark that was observed without one.
 int32_t slam::own_id() {
   while (find_landmark(next_id_) >= 0) next_id_++;
   return next_id_++;
@@ -345,19 +342,16 @@ int32_t slam::own_id() {
 
 void slam::drop_landmark(int landmark) {
   joint_.remove_landmark(landmark);
-  notes()[landmark] = notes()[joint_.landmarks()];
+  note(landmark) = note(joint_.landmarks());
   counts_.left++;
 }
 
-// Room for one more: the unconfirmed landmark that wasn't seen for longest leaves. False: all are confirmed.
+// Room for one more: the unconfirmed landmark that was not seen for longest leaves. False: all are confirmed.
 bool slam::make_room() {
   if (joint_.landmarks() < joint_.landmark_capacity()) return true;
   int oldest = -1;
-  for (int i = 0; i < joint_.landmarks(); i++) {
-    const landmark_note &note = notes()[i];
-    if (note.surveyed || note.seen >= (uint32_t)params_.confirm_seen) continue;
-    if (oldest < 0 || note.last_ns < notes()[oldest].last_ns) oldest = i;
-  }
+  for (int i = 0; i < joint_.landmarks(); i++)
+    if (!is_confirmed(note(i)) && (oldest < 0 || note(i).last_ns < note(oldest).last_ns)) oldest = i;
   if (oldest < 0) {
     counts_.no_room++;
     return false;
@@ -367,27 +361,19 @@ bool slam::make_room() {
 }
 
 // One landmark at a time, so that the cost stays bounded.
-void slam::look_after(wm_time_ns t_ns) {
+void slam::maintain_map(wm_time_ns t_ns) {
   if (joint_.landmarks() == 0 || params_.map == WM_SLAM_MAP_FROZEN || map_is_held()) return;
   cursor_ = (cursor_ + 1) % joint_.landmarks();
-  const landmark_note &note = notes()[cursor_];
-  const bool unconfirmed = !note.surveyed && note.seen < (uint32_t)params_.confirm_seen;
-  if (unconfirmed && wm_seconds_between(note.last_ns, t_ns) > params_.leave_after_s)
+  if (!is_confirmed(note(cursor_)) && wm_seconds_between(note(cursor_).last_ns, t_ns) > params_.leave_after_s)
     drop_landmark(cursor_);
   else if (params_.line_rejoin)
-    rejoin(cursor_);
+    merge_if_one(cursor_);
 }
 
-int slam::note_landmark(int32_t id, int landmark, int sensor, wm_time_ns t_ns) {
-  notes()[landmark] = note_of(id, sensor, t_ns);
-  notes()[landmark].seen = 1;
+int slam::note_landmark(int32_t id, int landmark, int sensor) {
+  note(landmark) = note_of(id, sensor, joint_.now_ns());
+  note(landmark).seen = 1;
   counts_.joined++;
-  return landmark;
-}
-
-int slam::note_line(const bearing_tracks::track &track, int landmark) {
-  note_landmark(track.id, landmark, track.sensor, joint_.now_ns());
-  notes()[landmark].first_ns = track.first_ns;
   return landmark;
 }
 
@@ -395,8 +381,7 @@ int slam::note_line(const bearing_tracks::track &track, int landmark) {
 
 const wm_estimator wm_slam_estimator = wm::estimator_of<wm::slam, wm_slam_params>(
     "slam",
-    "EKF-SLAM in the plane, right-invariant: the robot, its sensors' errors and "
-    "landmarks whose places nobody measured, "
+    "EKF-SLAM in the plane, right-invariant: the robot, its sensors' errors and landmarks at unknown places, "
     "from coded markers, bearings and ranges, or bearings alone, with or without identities.",
     WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
         WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
