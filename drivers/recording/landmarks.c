@@ -45,11 +45,12 @@ static wm_landmark landmark_of(const csv_row *row) {
   wm_landmark out = {
       .id = (int32_t)row->whole[ID],
       .p_m = {row->number[X], row->number[Y], isnan(row->number[Z]) ? 0.0 : row->number[Z]},
-      .sigma_m = isnan(row->number[SIGMA]) ? 0.0 : row->number[SIGMA],
+      .sigma_m = row->number[SIGMA],
       .yaw_rad = row->number[YAW],
-      .yaw_sigma_rad = isnan(row->number[COV_TT]) ? 0.0 : sqrt(row->number[COV_TT]),
+      .cov_m2 = {(double)NAN, (double)NAN, (double)NAN},
+      .yaw_sigma_rad = sqrt(row->number[COV_TT]),
   };
-  // As a run writes its map. What is no covariance (not positive) is none.
+  // As a run writes its map. A covariance that is not positive definite counts as absent.
   const double xx = row->number[COV_XX], xy = row->number[COV_XY], yy = row->number[COV_YY];
   if (xx > 0.0 && yy > 0.0 && xy * xy < xx * yy) memcpy(out.cov_m2, (const double[3]){xx, xy, yy}, sizeof out.cov_m2);
   return out;

@@ -96,7 +96,7 @@ static const char *fill_marker(const csv_row *row, uint16_t sensor, wm_event *ou
                                .yaw_rad = wrapped(p[3]),
                                .along_sigma_m = (double)NAN,
                                .yaw_sigma_rad = (double)NAN,
-                               .edge_shift_px = (double)NAN};
+                               .bloom_px = (double)NAN};
   return NULL;
 }
 

@@ -41,7 +41,7 @@ static void put_marker(wm_writer *w, const wm_marker *m) {
   wm_put_f64(w, m->other_yaw_rad);
   wm_put_f64(w, m->along_sigma_m);
   wm_put_f64(w, m->yaw_sigma_rad);
-  wm_put_f64(w, m->edge_shift_px);
+  wm_put_f64(w, m->bloom_px);
 }
 
 static void put_points(wm_writer *w, const wm_points *p) {
@@ -150,7 +150,7 @@ static void get_marker(wm_reader *r, unsigned version, wm_marker *m) {
   m->other_yaw_rad = wm_get_f64(r);
   m->along_sigma_m = get_optional(r, version);
   m->yaw_sigma_rad = get_optional(r, version);
-  m->edge_shift_px = get_optional(r, version);
+  m->bloom_px = get_optional(r, version);
 }
 
 static void get_points(wm_reader *r, wm_points *p) {

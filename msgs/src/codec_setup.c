@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <math.h>
+
 #include "waymark/bytes.h"
 #include "waymark/codec.h"
 
 #define WHEELS_VERSION 1
 #define SENSOR_VERSION 1
-#define LANDMARK_VERSION 2
+#define LANDMARK_VERSION 3
+#define LANDMARK_ZERO_IS_ABSENT 2  // read, too: zeros stand for absent numbers; hashes are of this version
 #define START_VERSION 1
 
 #define LANDMARK_ENCODED_BYTES 77
@@ -75,9 +78,9 @@ wm_status wm_sensor_decode(const void *data, size_t size, wm_sensor *out, size_t
   return r.bad ? WM_BAD_DATA : WM_OK;
 }
 
-size_t wm_landmark_encode(const wm_landmark *v, void *out, size_t capacity) {
+static size_t encode_landmark(const wm_landmark *v, unsigned version, void *out, size_t capacity) {
   wm_writer w = wm_writer_of(out, capacity);
-  wm_put_u8(&w, LANDMARK_VERSION);
+  wm_put_u8(&w, (uint8_t)version);
   wm_put_i32(&w, v->id);
   wm_put_f64s(&w, v->p_m, 3);
   wm_put_f64(&w, v->sigma_m);
@@ -87,16 +90,26 @@ size_t wm_landmark_encode(const wm_landmark *v, void *out, size_t capacity) {
   return w.full ? 0 : w.used;
 }
 
+size_t wm_landmark_encode(const wm_landmark *v, void *out, size_t capacity) {
+  return encode_landmark(v, LANDMARK_VERSION, out, capacity);
+}
+
 wm_status wm_landmark_decode(const void *data, size_t size, wm_landmark *out, size_t *used) {
   memset(out, 0, sizeof *out);
   wm_reader r = wm_reader_of(data, size);
-  if (wm_get_u8(&r) != LANDMARK_VERSION) r.bad = 1;
+  const unsigned version = wm_get_u8(&r);
+  if (version != LANDMARK_VERSION && version != LANDMARK_ZERO_IS_ABSENT) r.bad = 1;
   out->id = wm_get_i32(&r);
   wm_get_f64s(&r, out->p_m, 3);
   out->sigma_m = wm_get_f64(&r);
   out->yaw_rad = wm_get_f64(&r);
   wm_get_f64s(&r, out->cov_m2, 3);
   out->yaw_sigma_rad = wm_get_f64(&r);
+  if (version == LANDMARK_ZERO_IS_ABSENT) {
+    if (out->sigma_m == 0.0) out->sigma_m = (double)NAN;
+    if (out->yaw_sigma_rad == 0.0) out->yaw_sigma_rad = (double)NAN;
+    if (out->cov_m2[0] == 0.0) out->cov_m2[0] = out->cov_m2[1] = out->cov_m2[2] = (double)NAN;
+  }
   *used = r.used;
   return r.bad ? WM_BAD_DATA : WM_OK;
 }
@@ -133,11 +146,16 @@ uint64_t wm_hash(uint64_t hash, const void *bytes, size_t count) {
   return hash;
 }
 
+// Absent numbers are hashed as zeros, so that maps in logs of before keep their hash.
 uint64_t wm_landmarks_hash(const wm_landmark *landmarks, size_t count) {
   uint64_t hash = WM_HASH_START;
   for (size_t i = 0; i < count; i++) {
     uint8_t bytes[LANDMARK_ENCODED_BYTES];
-    hash = wm_hash(hash, bytes, wm_landmark_encode(&landmarks[i], bytes, sizeof bytes));
+    wm_landmark v = landmarks[i];
+    double *const optional[] = {&v.sigma_m, &v.cov_m2[0], &v.cov_m2[1], &v.cov_m2[2], &v.yaw_sigma_rad};
+    for (size_t k = 0; k < sizeof optional / sizeof *optional; k++)
+      if (isnan(*optional[k])) *optional[k] = 0.0;
+    hash = wm_hash(hash, bytes, encode_landmark(&v, LANDMARK_ZERO_IS_ABSENT, bytes, sizeof bytes));
   }
   return hash;
 }

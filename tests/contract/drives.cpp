@@ -199,7 +199,7 @@ void scene::add_marker(int landmark, const double level_m[3], double yaw_rad, do
   const bool knows = seen_ % 3 == 0;
   m.yaw_sigma_rad = knows ? 0.015 : static_cast<double>(NAN);
   m.along_sigma_m = knows ? 0.01 * std::fabs(level_m[0]) : static_cast<double>(NAN);
-  m.edge_shift_px = static_cast<double>(NAN);
+  m.bloom_px = static_cast<double>(NAN);
   if (seen_ % 4 != 1) return;
   m.poses = 2;
   std::memcpy(m.other_p_m, m.p_m, sizeof m.p_m);

@@ -192,6 +192,19 @@ void test_the_estimate_is_sound_at_every_event_and_stands_at_its_time(void) {
   TEST_ASSERT_GREATER_THAN(2000, taken);
 }
 
+void test_an_absent_number_of_a_landmark_counts_as_zero(void) {
+  wm_estimate with[2] = {};
+  for (const double absent : {0.0, kAbsent}) {
+    for (wm_landmark &l : landmarks) l.sigma_m = l.cov_m2[0] = l.cov_m2[1] = l.cov_m2[2] = l.yaw_sigma_rad = absent;
+    machine a;
+    for (uint64_t i = 0; i < 3000; i++) a.take(event_at(i, 0.02 * (double)i));
+    with[std::isnan(absent)] = a.estimate();
+    TEST_ASSERT_TRUE(std::isfinite(with[1].covariance[0]));
+  }
+  TEST_ASSERT_EQUAL_DOUBLE(with[0].heading_rad, with[1].heading_rad);
+  for (int k = 0; k < 36; k++) TEST_ASSERT_EQUAL_DOUBLE(with[0].covariance[k], with[1].covariance[k]);
+}
+
 void assert_refused(machine &a, const wm_event &e, wm_status want) {
   std::vector<char> before((char *)a.state, (char *)a.state + a.bytes);
   TEST_ASSERT_EQUAL(takes(e.kind) ? want : WM_UNSUPPORTED, a.take(e));
@@ -470,6 +483,7 @@ int main(void) {
     RUN_TEST(test_the_same_events_give_the_same_bytes_and_a_copy_goes_on_alike);
     RUN_TEST(test_it_never_allocates);
     RUN_TEST(test_the_estimate_is_sound_at_every_event_and_stands_at_its_time);
+    RUN_TEST(test_an_absent_number_of_a_landmark_counts_as_zero);
     RUN_TEST(test_nonsense_is_refused_with_a_status_and_changes_nothing);
     RUN_TEST(test_time_never_runs_back);
     RUN_TEST(test_set_pose_works_at_any_time);

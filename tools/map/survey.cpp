@@ -186,7 +186,7 @@ std::vector<std::string> cameras_of(const nlohmann::json &health) {
     std::string said;
     if (what == "range_scale")
       said = text("scale %.4f +- %.4f", value.at("value").get<double>(), value.at("sigma").get<double>());
-    if (what == "edge_shift_px") said = text("edge shift %.3f px", value.at("value").get<double>());
+    if (what == "bloom_px" || what == "edge_shift_px") said = text("bloom %.3f px", value.at("value").get<double>());
     if (said.empty()) continue;
     std::string &line = lines[whose];
     line += (line.empty() ? "" : ", ") + said;

@@ -29,7 +29,7 @@ struct LandmarkSurvey {
 
 struct Survey {
   std::vector<LandmarkSurvey> landmarks;  // by id
-  std::vector<std::string> cameras;       // "ceiling: range scale 1.0013 +- 0.0029, edge shift 0.203 px"
+  std::vector<std::string> cameras;       // "ceiling: range scale 1.0013 +- 0.0029, bloom 0.203 px"
   [[nodiscard]] size_t findings() const;
 };
 

@@ -60,7 +60,7 @@ wm_status make_events(const sim::Recording &recording, std::vector<SmallEvent> &
     seen.id = m.id;
     for (int k = 0; k < 3; k++) seen.p_m[k] = m.p_m[k];
     seen.yaw_rad = m.yaw_rad;
-    seen.along_sigma_m = seen.yaw_sigma_rad = seen.edge_shift_px = NAN;
+    seen.along_sigma_m = seen.yaw_sigma_rad = seen.bloom_px = NAN;
     out.emplace_back(e);
   }
   for (const sim::Fix &f : recording.fixes) {

@@ -98,7 +98,8 @@ Meaning meaning_of(const std::string &name) {
   if (what == "track_scale") return {100, -100, "%", "the wheels act as if this much farther apart than stated"};
   if (what == "steering_offset_rad")
     return {degrees, 0, "°", "the wheels point this far to the left when the steering says straight"};
-  if (what == "edge_shift_px") return {1, 0, "px", "bright areas are wider by this in the pictures of " + sensor};
+  if (what == "bloom_px" || what == "edge_shift_px")  // its name before
+    return {1, 0, "px", "bright areas are wider by this in the pictures of " + sensor};
   if (what.ends_with("_radps")) return {degrees, 0, "°/s", ""};
   if (what.ends_with("_rad")) return {degrees, 0, "°", ""};
   if (what.ends_with("_s")) return {1e3, 0, "ms", ""};

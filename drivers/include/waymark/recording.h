@@ -77,9 +77,9 @@ wm_status wm_start_read(const wm_yaml_node *map, wm_start *out, wm_error *err);
 // A decoder from a DBC file and a can-signals.yaml. Allocates.
 wm_status wm_can_decoder_load(const char *dbc_path, const char *signals_path, wm_can_decoder **out, wm_error *err);
 
-// landmarks.csv alone; *out is the caller's to free. An empty z_m or sigma_m is 0 (z_m with a warning), an empty
-// yaw_rad NaN; cov_xx, cov_xy, cov_yy and cov_tt, as a run writes them, may be there; an id that stands there twice, or
-// a row that can't be read, is an error.
+// landmarks.csv alone; the caller frees *out. An empty z_m is 0, with a warning; an empty sigma_m or yaw_rad is NaN.
+// Columns cov_xx, cov_xy, cov_yy and cov_tt, as a run writes them, are optional. A duplicate id and a row that can't be
+// read are errors.
 wm_status wm_landmarks_load(const char *path, wm_warn_fn warn, void *context, wm_landmark **out, size_t *count,
                             wm_error *err);
 

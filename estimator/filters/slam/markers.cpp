@@ -30,7 +30,7 @@ wm_status check_marker(const wm_marker &m, size_t sensors) {
                             two ? m.other_p_m[2] : 0.0,
                             zero_if_absent(m.along_sigma_m)};
   const double angles[] = {m.yaw_rad, two ? m.other_yaw_rad : 0.0, zero_if_absent(m.yaw_sigma_rad),
-                           zero_if_absent(m.edge_shift_px)};
+                           zero_if_absent(m.bloom_px)};
   bool all_finite = true, in_range = m.sensor < sensors && !(m.along_sigma_m <= 0.0) && !(m.yaw_sigma_rad <= 0.0);
   for (double n : lengths) {
     all_finite &= finite(n);
@@ -92,7 +92,7 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   if (status != WM_OK) return status;
   if (!params_.markers) return reject(records, at.record, WM_REJECTED_BY_CONFIG);
   if (m.id < 0) return reject(records, at.record, WM_REJECTED_NO_ASSOCIATION);
-  if (finite(m.edge_shift_px)) edge_shift_px_[m.sensor] = m.edge_shift_px;
+  if (finite(m.bloom_px)) bloom_px_[m.sensor] = m.bloom_px;
 
   marker_reading r = read_marker(m, m.p_m, m.yaw_rad);
   if (r.length_m > sensor_[m.sensor].max_range_m) return reject(records, at.record, WM_REJECTED_OUT_OF_RANGE);

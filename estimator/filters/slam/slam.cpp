@@ -113,7 +113,7 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
     const bool on = i < static_cast<int>(setup.sensor_count) && params.sensor_stamp_sigma_s > 0.0;
     stamp_state_[i] = on ? next++ : -1;  // its variance is set with each picture
     picture_ns_[i] = WM_TIME_NONE;
-    edge_shift_px_[i] = std::nan("");
+    bloom_px_[i] = std::nan("");
   }
   bearing_error_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
   range_error_ = params.lasting_range_m > 0.0 || params.lasting_range_rel > 0.0 ? (bearing_error_ >= 0 ? 1 : 0) : -1;
@@ -266,7 +266,7 @@ size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const 
   joint_.list_motion_states(&list);
   slots_.list(*setup_, joint_, &list);
   for (size_t i = 0; i < setup_->sensor_count; i++)
-    if (finite(edge_shift_px_[i])) list.add(setup_->sensors[i].name, "edge_shift_px", edge_shift_px_[i], std::nan(""));
+    if (finite(bloom_px_[i])) list.add(setup_->sensors[i].name, "bloom_px", bloom_px_[i], std::nan(""));
   return list.count();
 }
 

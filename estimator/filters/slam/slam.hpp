@@ -275,7 +275,7 @@ class slam {
   bearing_tracks tracks_;
   int first_ray_, first_clone_;
   slam_counts counts_;
-  double edge_shift_px_[kSlamSensors];  // of the last marker that has one; NaN: none has
+  double bloom_px_[kSlamSensors];  // of the last marker that has one; NaN: none has
   int32_t next_id_;
   int cursor_;                    // of maintain_map
   wm_time_ns other_fused_ns_[2];  // when the last two different landmarks were fused

@@ -143,7 +143,7 @@ void appearance::make(const wm_appearance &learnt, const wm_landmark &landmark, 
   *this = appearance{};
   id = landmark.id;
   place_m = vec_of(landmark.p_m);
-  sigma_m = landmark.sigma_m;
+  sigma_m = finite(landmark.sigma_m) ? landmark.sigma_m : 0.0;
   width_m = learnt.width_m;
   height_m = learnt.height_m;
   yaw_rad = learnt.yaw_rad;

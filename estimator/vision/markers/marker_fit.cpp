@@ -338,7 +338,7 @@ int wm_marker_fit_read(wm_marker_fit *self, const wm_frame *frame, const double 
   out->yaw_sigma_rad =
       poses.turn_sigma_rad > 0 ? std::sqrt(square(poses.turn_sigma_rad) + square(kTurnSigmaMin_rad)) : kAbsent;
   const double bloom_px = wm_marker_fit_bloom_px(self);
-  out->edge_shift_px = bloom_px != 0.0 ? bloom_px : kAbsent;  // 0: not measured yet
+  out->bloom_px = bloom_px != 0.0 ? bloom_px : kAbsent;  // 0: not measured yet
   out->poses = poses.has_other ? 2 : 1;
   if (poses.has_other) {
     write_pose(*self, poses.other, out->other_p_m, &out->other_yaw_rad);

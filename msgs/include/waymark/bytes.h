@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Little-endian fields, one after the other, with bounds. A writer that is full and a reader that is at its end go on
-// without touching memory and say so once at the end, so that a codec reads as a list of its fields. Any thread; no
-// allocation.
+// Little-endian fields, one after the other, with bounds. A full writer and a reader at its end touch no memory and set
+// a flag, which a codec checks once after its list of fields. Any thread; no allocation.
+//
 #ifndef WAYMARK_BYTES_H
 #define WAYMARK_BYTES_H
 
@@ -13,14 +13,14 @@ typedef struct wm_writer {
   uint8_t *data;
   size_t capacity;
   size_t used;
-  int full;  // something didn't fit: what was written is worth nothing
+  int full;  // a field didn't fit: the bytes written are not valid
 } wm_writer;
 
 typedef struct wm_reader {
   const uint8_t *data;
   size_t size;
   size_t used;
-  int bad;  // something was missing: what was read since is zeros
+  int bad;  // bytes were missing: the fields read since are zeros
 } wm_reader;
 
 static inline wm_writer wm_writer_of(void *data, size_t capacity) {
@@ -78,7 +78,7 @@ static inline uint64_t wm_get_u64(wm_reader *r) { return wm_get_le(r, 8); }
 static inline int32_t wm_get_i32(wm_reader *r) { return (int32_t)wm_get_u32(r); }
 static inline int64_t wm_get_i64(wm_reader *r) { return (int64_t)wm_get_u64(r); }
 
-// The bits of a double or float as they are, NaN's too.
+// The bits of a double or float, unchanged for NaN as well.
 static inline void wm_put_f64(wm_writer *w, double v) {
   uint64_t bits;
   memcpy(&bits, &v, sizeof bits);

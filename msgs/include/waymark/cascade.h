@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A cascade of boosted classifiers as OpenCV's XML files have it (stage type BOOST, features LBP or HAAR): the numbers
-// of such a file, checked, so that whoever evaluates it needn't check anything. P. Viola, M. Jones 2001 (cascade, Haar
-// features); S. Liao et al. 2007 (multi-block LBP). Part of the setup of one process: its arrays belong to whoever read
-// the file, and it is never logged or sent.
+// of such a file, checked by its reader. P. Viola, M. Jones 2001 (cascade, Haar features); S. Liao et al. 2007
+// (multi-block LBP). Part of the setup of one process: its arrays belong to the reader of the file, and it is never
+// logged or sent.
 #ifndef WAYMARK_CASCADE_H
 #define WAYMARK_CASCADE_H
 
@@ -42,7 +42,7 @@ typedef struct wm_cascade_stage {
 typedef struct wm_cascade {
   uint32_t is_lbp;
   uint32_t width_px, height_px;  // of a window
-  double height_m;               // of what a window shows; its middle is the landmark's
+  double height_m;               // of the object in a window; its middle is the landmark's place
   size_t feature_count, node_count, leaf_count, tree_count, stage_count;
   wm_cascade_feature *features;
   wm_cascade_node *nodes;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The structs of this room as bytes: little-endian fields, a version first, every count and index checked when read.
-// What is in the event log, and what is hashed. Pure functions: any thread, no allocation, cost linear in the bytes.
+// The structs of msgs/ as bytes: little-endian fields, a version first, every count and index checked when read.
+// They are stored in the event log and hashed. Pure functions: any thread, no allocation, cost linear in the bytes.
 //
 // Encoders return the bytes written, 0 where `capacity` is too small. Decoders take bytes from anywhere (a file that
-// was cut, a fuzzer) and return WM_OK, or WM_BAD_DATA with *out unspecified; `*used` says how many bytes were read.
+// was cut, a fuzzer) and return WM_OK, or WM_BAD_DATA with *out unspecified; `*used` is the number of bytes read.
 #ifndef WAYMARK_CODEC_H
 #define WAYMARK_CODEC_H
 
@@ -50,11 +50,11 @@ wm_status wm_landmark_decode(const void *data, size_t size, wm_landmark *out, si
 size_t wm_start_encode(const wm_start *start, void *out, size_t capacity);
 wm_status wm_start_decode(const void *data, size_t size, wm_start *out, size_t *used);
 
-// 64-bit FNV-1a over bytes; begin with WM_HASH_START. For telling a wrong map or a datum sent twice, not for secrets.
+// 64-bit FNV-1a over bytes; begin with WM_HASH_START. Detects a wrong map or a duplicate; not for cryptography.
 #define WM_HASH_START UINT64_C(0xcbf29ce484222325)
 uint64_t wm_hash(uint64_t hash, const void *bytes, size_t count);
 
-// Hash of landmarks in their order, as the event log names a map.
+// Hash of landmarks in their order, by which the event log identifies a map.
 uint64_t wm_landmarks_hash(const wm_landmark *landmarks, size_t count);
 
 #ifdef __cplusplus

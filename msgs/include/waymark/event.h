@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An event: one datum with the time at which it was true and the time at which it arrived. Everything that an
-// estimator ever sees is an event; what is in the rings, in the merge and in the event log is this struct.
+// An event: one datum with the time at which it was true and the time at which it arrived. An estimator's whole input
+// is events. The rings, the merge and the event log hold this struct.
 // Fixed size, no pointers. A ring that carries only small events has slots of WM_EVENT_SMALL_BYTES.
 //
 // An absent number of type double or float is NaN, in every event, log and message. Zero is a value. (Events of logs
@@ -29,7 +29,7 @@ typedef enum wm_event_kind {
   WM_EVENT_MARKER,      // a coded marker's pose in the sensor frame
   WM_EVENT_STEREO,      // a point in both pictures of a rectified pair
   WM_EVENT_POINTS,      // edge points on the floor in base_link
-  WM_EVENT_LOOKED,      // a sensor looked and saw nothing
+  WM_EVENT_LOOKED,      // a sensor looked and detected nothing
   WM_EVENT_SET_POSE,    // the robot's pose, given by a person or a program
   WM_EVENT_RESET,       // start again from the start pose of the setup
   WM_EVENT_KIND_COUNT
@@ -59,7 +59,7 @@ typedef enum wm_quantity {
 #define WM_QUANTITIES_MAX 8
 #define WM_POINTS_MAX 512
 
-// Bits of wm_quantities.doubt: the values are not reliable and are no evidence that the robot stands still.
+// Bits of wm_quantities.doubt: the values are not reliable, and are no evidence of standstill.
 #define WM_DOUBT_FROZEN_COUNTER (1u << 0)  // the message's counter stands still: the sender is stuck
 
 typedef struct wm_quantities {
@@ -78,12 +78,12 @@ typedef struct wm_twist6 {
   double v_mps[3], w_radps[3];
 } wm_twist6;
 
-// Bearing is positive to the left of the sensor's x axis. Bearing or range may be absent, not both. Elevation is above
-// the sensor's xy plane (of a sensor that looks up or down: above the level, as its bearing is the azimuth), and of the
-// same ray as the bearing.
+// Bearing is positive to the left of the sensor's x axis. Bearing or range may be absent, not both. Elevation belongs
+// to the bearing's ray and is measured from the sensor's xy plane. For a sensor that looks up or down the bearing is
+// the azimuth, and elevation is measured from the horizontal plane.
 typedef struct wm_sighting {
   uint16_t sensor;      // index into wm_setup.sensors
-  int32_t landmark_id;  // the map's id, or -1 where unknown
+  int32_t landmark_id;  // identity in the map; -1: unknown
   double bearing_rad;
   double range_m;
   double bearing_sigma_rad;  // NaN: the sensor's own
@@ -106,19 +106,19 @@ typedef struct wm_heading {
 // A coded marker.
 typedef struct wm_marker {
   uint16_t sensor;
-  uint16_t poses;  // 2: the corners allow a second pose as well, other_*; else there is one and other_* are not read
+  uint16_t poses;  // 2: the corners fit a second pose, too: other_*; else other_* are not read
   int32_t id;
   double p_m[3];  // in the sensor's frame
   double yaw_rad;
   double other_p_m[3], other_yaw_rad;
-  double along_sigma_m;  // of its distance along the line of sight; NaN: the configuration's
+  double along_sigma_m;  // of the distance along the line of sight; NaN: the configuration's
   double yaw_sigma_rad;  // NaN: the configuration's
-  double edge_shift_px;  // blooming: bright areas of this camera's pictures are wider by this on each edge
+  double bloom_px;       // growth of bright areas over each edge in this camera's pictures; NaN: not measured
 } wm_marker;
 
 typedef struct wm_stereo {
   int32_t id;
-  double left_px[2];  // NaN where that camera doesn't see it
+  double left_px[2];  // NaN where the point is not in that camera's picture
   double right_px[2];
 } wm_stereo;
 
@@ -126,7 +126,7 @@ typedef struct wm_stereo {
 typedef struct wm_points {
   uint32_t count;
   uint32_t dropped;          // points of this stamp beyond WM_POINTS_MAX
-  int32_t camera;            // index into wm_rig.cameras, or -1 where unknown
+  int32_t camera;            // index into wm_rig.cameras; -1: unknown
   float x_m[WM_POINTS_MAX];  // in base_link, by the calibration's mounting
   float y_m[WM_POINTS_MAX];
   float normal_rad[WM_POINTS_MAX];  // direction of the edge's normal in base_link; NaN where unknown
@@ -144,8 +144,8 @@ typedef struct wm_set_pose {
 } wm_set_pose;
 
 typedef struct wm_event {
-  wm_time_ns t_ns;        // when it was true
-  wm_time_ns arrival_ns;  // when it reached this computer
+  wm_time_ns t_ns;        // time of validity
+  wm_time_ns arrival_ns;  // time of arrival at this computer
   uint32_t seq;           // order within its source, from 0
   uint16_t source;        // index into the run's table of sources
   uint8_t kind;           // wm_event_kind
@@ -168,10 +168,10 @@ typedef struct wm_event {
 #define WM_EVENT_HEADER_BYTES offsetof(wm_event, as)
 #define WM_EVENT_SMALL_BYTES (WM_EVENT_HEADER_BYTES + 96)
 
-// Bytes of `event` that carry something: copy this many, from a ring or to one. Constant cost. Any thread.
+// Bytes of `event` in use: copy this many, from a ring or to one. Constant cost. Any thread.
 size_t wm_event_bytes(const wm_event *event);
 
-// Whether a sighting has an elevation and its sigma; neither is checked for its size.
+// True if a sighting has an elevation and its sigma. Their values are not checked.
 static inline int wm_sighting_has_elevation(const wm_sighting *s) {
   return s->elevation_rad == s->elevation_rad && s->elevation_sigma_rad == s->elevation_sigma_rad;
 }

@@ -10,7 +10,7 @@
 
 typedef struct wm_frame {
   wm_time_ns t_ns;         // middle of the exposure of the middle row
-  wm_time_ns arrival_ns;   // when it reached this computer
+  wm_time_ns arrival_ns;   // time of arrival at this computer
   wm_time_ns exposure_ns;  // 0 where unknown
   uint64_t number;         // row of the camera's CSV, or the driver's sequence number, from 0
   int32_t camera;          // index into wm_rig.cameras

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a run is doing: counts a source, calibration states, counters, deadlines. Fixed size, no pointers. Every datum
-// that a source handed out is in exactly one of: fused, rejected, refused, late, dropped, duplicates, future, or still
-// waiting in the merge.
+// Health of a run: counts by source, calibration states, counters, deadlines. Fixed size, no pointers. Every datum from
+// a source is in exactly one of: fused, rejected, refused, late, dropped, duplicates, future, or still waiting in the
+// merge.
 #ifndef WAYMARK_HEALTH_H
 #define WAYMARK_HEALTH_H
 
@@ -22,12 +22,12 @@
 typedef enum wm_device_state {
   WM_DEVICE_NONE = 0,
   WM_DEVICE_WORKS,
-  WM_DEVICE_ABSENT,   // unplugged, or never there; looked for again and again
-  WM_DEVICE_DOWN,     // there, but switched off (a CAN interface that is down)
-  WM_DEVICE_PASSIVE,  // a CAN controller that saw many errors
-  WM_DEVICE_BUS_OFF,  // a CAN controller that left the bus
-  WM_DEVICE_STALLED,  // a camera that gives no pictures
-  WM_DEVICE_FROZEN,   // a camera that gives the same picture again and again
+  WM_DEVICE_ABSENT,   // unplugged, or never plugged in; searched for repeatedly
+  WM_DEVICE_DOWN,     // present, but switched off (a CAN interface that is down)
+  WM_DEVICE_PASSIVE,  // a CAN controller in the state error-passive
+  WM_DEVICE_BUS_OFF,  // a CAN controller in the state bus-off
+  WM_DEVICE_STALLED,  // a camera that delivers no pictures
+  WM_DEVICE_FROZEN,   // a camera that delivers the same picture repeatedly
   WM_DEVICE_STATE_COUNT
 } wm_device_state;
 
@@ -36,11 +36,11 @@ const char *wm_device_state_name(unsigned state);
 
 typedef struct wm_source_health {
   char name[WM_HEALTH_NAME_MAX];
-  uint64_t received;                    // handed out by the source
-  uint64_t fused;                       // motion taken; observations of which at least one update was fused
+  uint64_t received;                    // delivered by the source
+  uint64_t fused;                       // motion accepted; observations of which at least one update was fused
   uint64_t rejected[WM_VERDICT_COUNT];  // observations of which none was fused, by the first update's verdict
-  uint64_t refused[WM_STATUS_COUNT];    // what the estimator would not take, by its status
-  uint64_t late;                        // older than the watermark when it came
+  uint64_t refused[WM_STATUS_COUNT];    // not accepted by the estimator, by its status
+  uint64_t late;                        // older than the watermark at its arrival
   uint64_t dropped;                     // ring or merge full
   uint64_t duplicates;                  // the same datum again
   uint64_t future;                      // stamped later than it arrived
@@ -51,7 +51,7 @@ typedef struct wm_source_health {
   wm_time_ns newest_ns;                                                 // newest stamp, WM_TIME_NONE before the first
   wm_time_ns silent_ns;                                                 // since its last datum, on the arrival clock
   wm_time_ns stamp_uncertainty_ns;                                      // of a device; 0 for a recording
-  uint8_t stale;                                                        // silent for far longer than it used to be
+  uint8_t stale;                                                        // silent for far longer than usual
   uint8_t device;                                                       // wm_device_state
   uint64_t looks[WM_LOOK_COUNT];  // of a detector of known landmarks: one for each landmark and picture, by wm_look
 } wm_source_health;
@@ -70,9 +70,9 @@ typedef struct wm_health {
   uint32_t counter_count;
   wm_counter counters[WM_HEALTH_COUNTERS_MAX];
   uint64_t loops, deadlines_missed;
-  uint64_t outputs_lost;  // records that the sinks didn't take in time
+  uint64_t outputs_lost;  // records dropped because a sink was too slow
   uint64_t published;
-  // What is left of dead reckoning until the pose is of no use: infinite while the robot stands, NaN without a pose.
+  // Remaining dead reckoning until the pose is too uncertain: infinite while the robot stands, NaN without a pose.
   double reckoning_left_m, reckoning_left_s;
 } wm_health;
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Structs of this room as LCM messages of the package `waymark` (msgs/lcm/*.lcm): bytes ready to be published. No
-// allocation, no liblcm. One thread at a time: the first call of a kind computes its fingerprint. Each returns the
-// bytes written, 0 where `capacity` is too small.
+// Structs of msgs/ as LCM messages of the package `waymark` (msgs/lcm/*.lcm): bytes ready to be published. No
+// allocation, no liblcm. One thread at a time: the first call for a type computes its fingerprint. Each writer returns
+// the bytes written, 0 where `capacity` is too small.
 #ifndef WAYMARK_LCM_MESSAGES_H
 #define WAYMARK_LCM_MESSAGES_H
 
@@ -23,28 +23,28 @@ extern "C" {
 
 size_t wm_lcm_pose(const wm_published *published, void *out, size_t capacity);
 size_t wm_lcm_health(const wm_health *health, void *out, size_t capacity);
-// Messages to the robot: NULL and *out (t_ns 0: now; arrival unset), or what is wrong with it. Cost fixed.
+// Messages to the robot: NULL and *out (t_ns 0: now; arrival unset), or a text with the fault. Constant cost.
 const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *out);
 const char *wm_lcm_read_reset(const void *message, size_t length, wm_event *out);
-// `sensor` has room for WM_NAME_MAX bytes, `out` for WM_LCM_OBSERVATIONS_MAX; their `sensor` is the caller's to fill
-// in. Bearings come wrapped, sigmas as NaN: the sensor's own. One that is neither bearing nor range, or can't be,
-// refuses the whole message.
+// `sensor` has room for WM_NAME_MAX bytes, `out` for WM_LCM_OBSERVATIONS_MAX; the caller sets their `sensor`. Bearings
+// are wrapped, sigmas are NaN: the sensor's own. A sighting without bearing and range, or with a number out of its
+// limits, refuses the whole message.
 const char *wm_lcm_read_sightings(const void *message, size_t length, char *sensor, wm_time_ns *t_ns, wm_sighting *out,
                                   size_t *count);
-// Messages of a run, for who watches it: NULL, or what is wrong with it.
+// Messages of a run, for viewers: NULL, or a text with the fault.
 const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *out);
 const char *wm_lcm_read_health(const void *message, size_t length, wm_health *out);
 const char *wm_lcm_read_innovation(const void *message, size_t length, wm_innovation *out);
-// For who sends one (`t_ns` 0: now).
+// A message to the robot (`t_ns` 0: now).
 size_t wm_lcm_set_pose(const wm_set_pose *pose, wm_time_ns t_ns, void *out, size_t capacity);
 
 size_t wm_lcm_innovation(const wm_innovation *innovation, void *out, size_t capacity);
 
-// `count` sightings of one sensor at one stamp, the first WM_LCM_OBSERVATIONS_MAX are sent and the others counted.
+// `count` sightings of one sensor at one stamp: the first WM_LCM_OBSERVATIONS_MAX are sent, the others are counted.
 size_t wm_lcm_observations(const char *sensor_name, const wm_event *sightings, size_t count, void *out,
                            size_t capacity);
 
-// Landmarks from `first` on, at most WM_LCM_LANDMARKS_MAX; `total` is how many the map has.
+// Landmarks from `first` on, at most WM_LCM_LANDMARKS_MAX; `total` is the number in the map.
 size_t wm_lcm_landmarks(const wm_landmark *landmarks, size_t total, size_t first, wm_time_ns t_ns, void *out,
                         size_t capacity);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What became of a landmark that a detector had to do with in a picture: found, or why not.
+// Outcome of a detector's search for one landmark in one picture: found, or the reason why not.
 #ifndef WAYMARK_LOOK_H
 #define WAYMARK_LOOK_H
 
@@ -15,18 +15,18 @@ typedef enum wm_look {
   WM_LOOK_NOT_IN_VIEW,   // outside of the picture, not all in it, or beyond the range
   WM_LOOK_FACES_AWAY,    // seen from behind, or too slanted
   WM_LOOK_TOO_SMALL,     // in the picture
-  WM_LOOK_UNCERTAIN,     // where it should be is less sure than a window is large
+  WM_LOOK_UNCERTAIN,     // the predicted place is more uncertain than a search window is large
   WM_LOOK_LOW_CONTRAST,  // the place is dark, white or fogged
-  WM_LOOK_BLURRED,       // there, but without the edges that it should have
-  WM_LOOK_UNLIKE,        // something else is there: hidden, moved or replaced
-  WM_LOOK_AMBIGUOUS,     // several places look like it
+  WM_LOOK_BLURRED,       // at its place, but without its edges
+  WM_LOOK_UNLIKE,        // the place looks different: hidden, moved or replaced
+  WM_LOOK_AMBIGUOUS,     // several places match it
   WM_LOOK_COUNT
 } wm_look;
 
 // "found", "not_in_view" ...; "?" beyond.
 const char *wm_look_name(unsigned look);
 
-// Whether it was expected in the picture, large enough and at a place that is known well enough.
+// True if it was expected in the picture, large enough and with a certain enough predicted place.
 static inline int wm_look_is_expected(unsigned look) {
   return look == WM_LOOK_FOUND || (look >= WM_LOOK_LOW_CONTRAST && look < WM_LOOK_COUNT);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is known of the robot at one time, what one update did, and what is sent.
+// State of the robot at one time, record of one update, and the published pose.
 #ifndef WAYMARK_POSE_H
 #define WAYMARK_POSE_H
 
@@ -16,7 +16,7 @@ typedef enum wm_state {
   WM_STATE_SEARCHING = 0,       // no pose known yet
   WM_STATE_TRACKING = 1,        // observations are being fused and fit
   WM_STATE_DEAD_RECKONING = 2,  // no observation fused for a while; the covariance grows
-  WM_STATE_LOST = 3             // observations contradict the pose; being mended
+  WM_STATE_LOST = 3             // observations contradict the pose; relocalization is under way
 } wm_state;
 
 const char *wm_state_name(unsigned state);
@@ -33,13 +33,13 @@ typedef struct wm_estimate {
   uint32_t resets;    // times that the pose was set anew: start, set_pose, recovery
   uint8_t dof;        // 3 or 6
   uint8_t state;      // wm_state
-  // Probability that the robot is not where this pose is: 1 while searching, NaN where an estimator cannot tell.
+  // Probability that the robot is not where this pose is: 1 while searching, NaN: not estimated.
   double lost_probability;
 } wm_estimate;
 
 static inline int wm_cov_index(int row, int column) { return 6 * row + column; }
 
-// What a scalar (or jointly gated) update was about.
+// Measured quantity of a scalar (or jointly gated) update.
 typedef enum wm_residual {
   WM_RESIDUAL_BEARING = 0,
   WM_RESIDUAL_RANGE,
@@ -55,7 +55,7 @@ typedef enum wm_residual {
 
 typedef enum wm_verdict {
   WM_FUSED = 0,
-  WM_REJECTED_GATE,            // too far from what was expected
+  WM_REJECTED_GATE,            // innovation beyond the gate
   WM_REJECTED_UNKNOWN_ID,      // no such landmark in the map
   WM_REJECTED_NO_ASSOCIATION,  // id -1 and no landmark fits, or more than one
   WM_REJECTED_OUT_OF_RANGE,    // beyond the sensor's range, or behind it
@@ -70,7 +70,7 @@ typedef enum wm_verdict {
 const char *wm_residual_name(unsigned residual);
 const char *wm_verdict_name(unsigned verdict);
 
-// One record an update, fused or not: enough to explain it.
+// Record of one update, fused or not.
 typedef struct wm_innovation {
   wm_time_ns t_ns;
   uint16_t source;
@@ -82,11 +82,11 @@ typedef struct wm_innovation {
   double expected;
   double variance;  // of the innovation, HPH' + R
   double nis;       // normalised innovation squared of the gated group
-  double gate;      // threshold that nis was held against; 0: none (points of edges are gated one by one)
+  double gate;      // threshold for nis; 0: none (points of edges are gated one by one)
   uint8_t gate_dof;
 } wm_innovation;
 
-// A pose as it is sent. Valid at t_ns, made at sent_ns.
+// The published pose. Valid at t_ns, made at sent_ns.
 typedef struct wm_published {
   wm_estimate now;  // carried on by odometry from fused_until_ns to now.t_ns
   wm_time_ns sent_ns;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is known beforehand of a robot and a place: wheels, sensors, landmarks, start. Drivers read it, estimators use
-// it. These structs are for one process: wm_raster and wm_appearance (and wm_frame, wm_cascade in headers of their own)
-// borrow memory by pointers, so that they are never copied to a ring, a log or a message.
+// Prior knowledge of a robot and a place: wheels, sensors, landmarks, start. Drivers read it, estimators use it.
+// wm_raster and wm_appearance (and wm_frame, wm_cascade in headers of their own) borrow memory by pointers. They are
+// for one process and are never copied to a ring, a log or a message.
 #ifndef WAYMARK_SETUP_H
 #define WAYMARK_SETUP_H
 
@@ -46,7 +46,7 @@ typedef enum wm_camera_model {
 
 #define WM_INTRINSICS_MAX 16
 
-// calibration.yaml: a camera. Pixels' centres have whole coordinates; what isn't given of the distortion is 0.
+// calibration.yaml: a camera. Centres of pixels have integer coordinates. Absent distortion coefficients are 0.
 typedef struct wm_camera {
   char name[WM_NAME_MAX];
   int32_t model;  // wm_camera_model
@@ -54,7 +54,7 @@ typedef struct wm_camera {
   uint32_t intrinsics_count, distortion_count;
   double intrinsics[WM_INTRINSICS_MAX];
   double distortion[WM_INTRINSICS_MAX];
-  wm_time_ns readout_ns;  // rolling shutter: from the first row to the last; 0: global
+  wm_time_ns readout_ns;  // rolling shutter: from the first row to the last; 0: global shutter
   wm_mounting mounting;   // of the camera's body frame in base_link
 } wm_camera;
 
@@ -68,7 +68,7 @@ typedef struct wm_stereo_pair {
 
 #define WM_CAMERAS_MAX 16
 
-// What the cameras, the vehicle's twist and the coded markers are like.
+// Cameras, noise of the vehicle's twist, and coded markers.
 typedef struct wm_rig {
   wm_camera cameras[WM_CAMERAS_MAX];
   uint32_t camera_count;
@@ -78,38 +78,38 @@ typedef struct wm_rig {
   double marker_size_m;                                   // outer edge of the black square; NaN where not given
 } wm_rig;
 
-// Makes a rig without cameras, all else unknown.
+// Makes a rig without cameras; all other fields are unknown.
 void wm_rig_init(wm_rig *out);
 // Index of the camera of this name, or -1.
 int wm_rig_find_camera(const wm_rig *rig, const char *name);
 
 // A raster map. Row 0 is the top (largest y); 255 is edge or drivable, 0 is not. The centre of pixel (column, row) is
-// origin + R(yaw) (column + 0.5, height - 0.5 - row) resolution. The pixels are somebody else's and outlive this.
+// origin + R(yaw) (column + 0.5, height - 0.5 - row) resolution. The pixels are borrowed and must outlive the struct.
 typedef struct wm_raster {
   uint32_t width_px, height_px;
   double resolution_m;                            // of a pixel
   double origin_x_m, origin_y_m, origin_yaw_rad;  // outer corner of the lower left pixel, in map
-  const uint8_t *edges;                           // height x width; NULL where there is no such layer
+  const uint8_t *edges;                           // height x width; NULL: no such layer
   const uint8_t *drivable;                        // likewise
-  uint64_t hash;                                  // of all of the above
+  uint64_t hash;                                  // of all fields above
 } wm_raster;
 
-typedef struct wm_landmark {
+typedef struct wm_landmark {  // absent numbers are NaN; readers take a sigma or covariance of 0 for absent, too
   int32_t id;
   double p_m[3];
-  double sigma_m;
-  double yaw_rad;        // NaN where not given
-  double cov_m2[3];      // xx, xy, yy of the place; all 0 where not given: sigma_m on each axis
-  double yaw_sigma_rad;  // 0 where not given
+  double sigma_m;        // of the place on each axis; absent: the estimator's least sigma of a map
+  double yaw_rad;        // direction of a marker; absent: unknown
+  double cov_m2[3];      // xx, xy, yy of the place; absent (or not positive definite): sigma_m on each axis
+  double yaw_sigma_rad;  // absent: unknown
 } wm_landmark;
 
-// How a landmark looks: an upright flat picture, its middle at the landmark's place. One landmark may have several.
+// Appearance of a landmark: an upright flat picture, its centre at the landmark's place. A landmark may have several.
 typedef struct wm_appearance {
   int32_t landmark_id;
   uint32_t width_px, height_px;
-  const uint8_t *grey;  // height x width, row 0 at the top, as a reader sees it; somebody else's, outlives this
+  const uint8_t *grey;  // height x width, row 0 at the top, not mirrored; borrowed, must outlive the struct
   double width_m, height_m;
-  double yaw_rad;  // direction in the map from its left edge to its right one, as a reader sees it
+  double yaw_rad;  // direction in the map from its left edge to its right edge, seen from the front
 } wm_appearance;
 
 // Start pose. NaN where unknown.

@@ -274,7 +274,7 @@ static void other_streams(void) {
   TEST_ASSERT_EQUAL(10, event.as.marker.id);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 2 * M_PI - 3.2, event.as.marker.yaw_rad);
   TEST_ASSERT_TRUE(isnan(event.as.marker.along_sigma_m) && isnan(event.as.marker.yaw_sigma_rad) &&
-                   isnan(event.as.marker.edge_shift_px));
+                   isnan(event.as.marker.bloom_px));
   wm_source *stereo = source("stereo");
   event = next(stereo);
   TEST_ASSERT_TRUE(event.as.stereo.left_px[1] == 2 && isnan(event.as.stereo.right_px[0]));

@@ -92,7 +92,7 @@ inline wm_marker marker(int32_t id, double x, double y, double z, double yaw_rad
   m.p_m[1] = y;
   m.p_m[2] = z;
   m.yaw_rad = yaw_rad;
-  m.along_sigma_m = m.yaw_sigma_rad = m.edge_shift_px = NAN;
+  m.along_sigma_m = m.yaw_sigma_rad = m.bloom_px = NAN;
   return m;
 }
 

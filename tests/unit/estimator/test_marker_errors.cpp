@@ -32,7 +32,7 @@ wm_event seen(double t_s, int32_t id, const wm_pose2 &from_eye) {
   e.as.marker.p_m[1] = from_eye.y_m;
   e.as.marker.p_m[2] = 1.0;
   e.as.marker.yaw_rad = wm::wrap(from_eye.heading_rad);
-  e.as.marker.along_sigma_m = e.as.marker.edge_shift_px = NAN;
+  e.as.marker.along_sigma_m = e.as.marker.bloom_px = NAN;
   e.as.marker.yaw_sigma_rad = std::sqrt(kFresh_rad * kFresh_rad + kLasts_rad * kLasts_rad);
   return e;
 }

@@ -142,7 +142,7 @@ worn drive_under_prints() {
       m.p_m[0] = h.cos * dx + h.sin * dy + 0.012 + 0.0045 * wm_random_next_normal(&noise);
       m.p_m[1] = h.cos * dy - h.sin * dx + 0.0045 * wm_random_next_normal(&noise);
       m.p_m[2] = 2.0;
-      m.along_sigma_m = m.yaw_sigma_rad = m.edge_shift_px = NAN;
+      m.along_sigma_m = m.yaw_sigma_rad = m.bloom_px = NAN;
       m.yaw_rad = wm::wrap(0.3 * i - truth.heading_rad + 0.009 * wm_random_next_normal(&noise));
       wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
       size_t count = 0;

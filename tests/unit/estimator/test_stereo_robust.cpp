@@ -162,6 +162,7 @@ void test_a_kidnapped_vehicle_is_found_and_keeps_its_calibration(void) {
   for (const bool kidnapped : {false, true}) {
     scene s;
     s.set("states.velocity_scale_sigma", 0.2);
+    for (wm_landmark &l : s.map) l.sigma_m = kAbsent;
     s.begin();
     const auto drive = [&s](int steps) {
       bool lost = false;

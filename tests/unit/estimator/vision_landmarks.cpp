@@ -204,6 +204,15 @@ void found_where_it_is_with_the_sigma_that_it_has() {
   TEST_ASSERT_TRUE(std::sqrt(up_squares / count) < 1.3);
 }
 
+void a_landmark_without_sigma_is_found() {
+  landmark.sigma_m = NAN;
+  const Eyes eyes;
+  const Place at = {1.5, 0.2, 0.1};
+  const wm_estimate guess = pose_of(at, 0.05, 0.01);
+  TEST_ASSERT_EQUAL(1, eyes.look(draw(at, {}), &guess));
+  TEST_ASSERT_TRUE(events[0].as.sighting.bearing_sigma_rad > 0.0);
+}
+
 void what_is_not_there_is_not_found_and_said_why() {
   const Eyes eyes;
   const Place at = {1, 0.3, 0.1};
@@ -453,6 +462,7 @@ int main() {
   detector = wm_detector_find("landmarks");
   UNITY_BEGIN();
   RUN_TEST(found_where_it_is_with_the_sigma_that_it_has);
+  RUN_TEST(a_landmark_without_sigma_is_found);
   RUN_TEST(what_is_not_there_is_not_found_and_said_why);
   RUN_TEST(found_anywhere_without_a_pose);
   RUN_TEST(found_without_a_pose_where_it_has_thirteen_pixels);

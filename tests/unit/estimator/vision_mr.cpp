@@ -63,7 +63,7 @@ void place_and_turn_are_right() {
     const double yaw = std::remainder(m.yaw_rad + M_PI / 2 + tilt, 2 * M_PI);
     TEST_ASSERT_TRUE(std::fabs(yaw) < 4 * m.yaw_sigma_rad + 0.002);
     TEST_ASSERT_TRUE(m.yaw_sigma_rad > 0 && m.along_sigma_m > 0 && m.along_sigma_m < 0.02);
-    TEST_ASSERT_TRUE(m.edge_shift_px > 0.02);
+    TEST_ASSERT_TRUE(m.bloom_px > 0.02);
   }
 }
 

@@ -178,7 +178,7 @@ static void zeros_that_stood_for_absent_numbers_become_nan(void) {
   length = wm_event_encode(&in, bytes, sizeof bytes);
   bytes[0] = 4;
   TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length, &out, &used));
-  TEST_ASSERT_TRUE(isnan(out.as.marker.along_sigma_m) && isnan(out.as.marker.edge_shift_px));
+  TEST_ASSERT_TRUE(isnan(out.as.marker.along_sigma_m) && isnan(out.as.marker.bloom_px));
   TEST_ASSERT_EQUAL_DOUBLE(0.25, out.as.marker.yaw_sigma_rad);
   TEST_ASSERT_EQUAL_DOUBLE(0, out.as.marker.yaw_rad);
 }
@@ -319,6 +319,25 @@ static void a_rig_comes_back_and_a_cut_one_is_refused(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_rig_decode(bytes, count, &back, &used));
 }
 
+static void absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs(void) {
+  wm_landmark in = {
+      .id = 3, .p_m = {1, 2, 3}, .sigma_m = NAN, .yaw_rad = NAN, .cov_m2 = {NAN, NAN, NAN}, .yaw_sigma_rad = NAN};
+  wm_landmark zeros = in, out;
+  zeros.sigma_m = zeros.cov_m2[0] = zeros.cov_m2[1] = zeros.cov_m2[2] = zeros.yaw_sigma_rad = 0.0;
+  uint8_t bytes[128];
+  size_t used, length = wm_landmark_encode(&zeros, bytes, sizeof bytes);
+  TEST_ASSERT_EQUAL(WM_OK, wm_landmark_decode(bytes, length, &out, &used));
+  TEST_ASSERT_EQUAL_DOUBLE(0, out.yaw_sigma_rad);  // today a zero is a zero
+  bytes[0] = 2;
+  TEST_ASSERT_EQUAL(WM_OK, wm_landmark_decode(bytes, length, &out, &used));
+  TEST_ASSERT_TRUE(isnan(out.sigma_m) && isnan(out.cov_m2[0]) && isnan(out.cov_m2[1]) && isnan(out.cov_m2[2]) &&
+                   isnan(out.yaw_sigma_rad));
+  TEST_ASSERT_EQUAL_UINT64(wm_landmarks_hash(&zeros, 1), wm_landmarks_hash(&in, 1));
+  TEST_ASSERT_EQUAL_UINT64(wm_hash(WM_HASH_START, bytes, length), wm_landmarks_hash(&in, 1));
+  bytes[0] = 1;
+  TEST_ASSERT_EQUAL(WM_BAD_DATA, wm_landmark_decode(bytes, length, &out, &used));
+}
+
 static void the_hash_of_a_map_sees_every_number_and_the_order(void) {
   wm_landmark map[2] = {{.id = 1, .p_m = {1, 2, 0}, .sigma_m = 0.01, .yaw_rad = NAN},
                         {.id = 2, .p_m = {3, 4, 0}, .sigma_m = 0.01, .yaw_rad = NAN}};
@@ -344,6 +363,7 @@ int main(void) {
   RUN_TEST(an_innovation_comes_back_and_unknown_verdicts_do_not);
   RUN_TEST(a_setup_comes_back);
   RUN_TEST(a_rig_comes_back_and_a_cut_one_is_refused);
+  RUN_TEST(absent_numbers_of_a_landmark_are_nan_and_keep_the_hash_of_older_logs);
   RUN_TEST(the_hash_of_a_map_sees_every_number_and_the_order);
   return UNITY_END();
 }

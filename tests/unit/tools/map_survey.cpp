@@ -35,7 +35,7 @@ Survey of(const std::string &rows) {
   run.write("map-estimate.csv", kMap);
   run.write("health.json",
             R"({"calibration": {"up.range_scale": {"value": 1.0013, "sigma": 0.0029},
-                                "up.edge_shift_px": {"value": 0.2, "sigma": 0}}})");
+                                "up.bloom_px": {"value": 0.2, "sigma": 0}}})");
   return survey_run(run.path());
 }
 
@@ -59,7 +59,7 @@ void test_a_good_run() {
   TEST_ASSERT_EQUAL_STRING("x", s.landmarks[0].residuals[1].kind.c_str());
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.01, s.landmarks[0].residuals[1].rms);
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 1.0, s.landmarks[0].residuals[1].in_sigmas);
-  TEST_ASSERT_EQUAL_STRING("up: edge shift 0.200 px, scale 1.0013 +- 0.0029", s.cameras[0].c_str());
+  TEST_ASSERT_EQUAL_STRING("up: bloom 0.200 px, scale 1.0013 +- 0.0029", s.cameras[0].c_str());
   TEST_ASSERT_EQUAL(2, survey_json(s)["landmarks"].size());
 }
 
