@@ -39,7 +39,7 @@ double angle_of_pixel(const mounted_camera &camera) {
 
 // Range of the pixels' azimuths about that of the middle. A steep camera sees all azimuths.
 void azimuths_of(const mounted_camera &camera, double *left_rad, double *right_rad) {
-  constexpr double kStep_px = 8;
+  constexpr double kStep_px = 8;  // of the grid of pixels: bounds the time at the start
   const vec3 axis = camera.R_base_optical * vec3{0, 0, 1};
   const bool steep = is_steep_axis(axis.z);
   const double middle = steep ? 0 : atan2(axis.y, axis.x);

@@ -25,8 +25,9 @@ struct cylinder {
   uint8_t *grey;             // rows are `columns + kBeside` apart: vectors may read beyond the last column
   uint32_t *sums, *squares;  // integral images, modulo 2^32; rows are columns + 1 apart
 
-  static constexpr int kBeside = 16, kParts = 16;
-  static constexpr uint16_t kNowhere = 0xffff;
+  static constexpr int kBeside = 16;            // bytes: one vector of pixels
+  static constexpr int kParts = 16;             // of a pixel
+  static constexpr uint16_t kNowhere = 0xffff;  // no column: pictures are narrower than 4096 px
 
   const uint8_t *row(int y) const { return grey + static_cast<ptrdiff_t>(y) * (columns + kBeside); }
   bool is_seen(int x, int y) const { return from[2 * (static_cast<ptrdiff_t>(y) * columns + x)] != kNowhere; }

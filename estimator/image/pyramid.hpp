@@ -10,7 +10,7 @@
 
 namespace wm {
 
-inline constexpr int kLevels = 4;
+inline constexpr int kLevels = 4;  // the last is an eighth of the picture: 80 x 60 px of 640 x 480
 
 // Grey pixels, row after row.
 struct grey_plane {

@@ -11,7 +11,7 @@
 namespace wm {
 
 struct ray_table {
-  static constexpr int kStep_px = 4;
+  static constexpr int kStep_px = 4;  // between nodes; error above
   int columns, rows;
   float *xyz;  // three a node; NaN where the lens has no ray
 

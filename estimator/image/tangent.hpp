@@ -4,8 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_IMAGE_TANGENT_HPP
 #define WAYMARK_ESTIMATOR_IMAGE_TANGENT_HPP
 
-#include "sensors/lens.hpp"
-#include "waymark/frame.h"
+#include "image/picture_sample.hpp"
 
 namespace wm {
 
@@ -51,7 +50,7 @@ inline vec3 ray_of(const tangent_view &self, const tangent_point &p) {
 
 // False beyond 84 degrees from the direction, where the plane is useless.
 inline bool point_of_ray(const tangent_view &self, const vec3 &ray, tangent_point *out) {
-  constexpr double kCosMin = 0.1;
+  constexpr double kCosMin = 0.1;  // 84 degrees
   const vec3 d = transposed_times(self.R_optical_view, ray);
   if (!(d.z > kCosMin * length(d))) return false;
   *out = {self.focal_px * d.x / d.z, self.focal_px * d.y / d.z};
@@ -64,10 +63,7 @@ inline bool grey_at(const tangent_view &self, const wm_frame &frame, const tange
   if (!project(*self.optics, ray_of(self, p), &at)) return false;
   if (!(at.u >= 0 && at.v >= 0 && at.u < frame.width_px - 1.0 && at.v < frame.height_px - 1.0)) return false;
   const int u = static_cast<int>(at.u), v = static_cast<int>(at.v);
-  const uint8_t *row = frame.grey + static_cast<size_t>(v) * frame.stride_bytes + u;
-  const uint8_t *below = row + frame.stride_bytes;
-  const double a = at.u - u, b = at.v - v;
-  *out = (1 - b) * ((1 - a) * row[0] + a * row[1]) + b * ((1 - a) * below[0] + a * below[1]);
+  *out = bilinear(frame.grey + static_cast<size_t>(v) * frame.stride_bytes + u, frame.stride_bytes, at.u - u, at.v - v);
   return true;
 }
 
@@ -80,7 +76,7 @@ struct tangent_line {
 // Intersection. False where they are within 6 degrees of parallel.
 inline bool meet(const tangent_line &a, const tangent_line &b, tangent_point *out) {
   const double determinant = cross(a.n, b.n);
-  constexpr double kSinMin = 0.1;
+  constexpr double kSinMin = 0.1;  // 6 degrees
   if (!(std::fabs(determinant) > kSinMin)) return false;
   *out = {(a.d * b.n.y - b.d * a.n.y) / determinant, (a.n.x * b.d - b.n.x * a.d) / determinant};
   return true;

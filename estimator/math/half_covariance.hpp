@@ -35,7 +35,7 @@ struct half_covariance {
 
 // What one update does to the covariance: P - sum over k of w[k] w[k]' + e r' + r e'. `e` null: without the last two.
 struct half_update {
-  static constexpr int kRows = 3;
+  static constexpr int kRows = 3;  // at most: a bearing, a range and an elevation
   int rows;
   const double *w[kRows];
   const double *e, *r;

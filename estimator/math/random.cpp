@@ -8,7 +8,7 @@ namespace {
 // The paper's constants: two odd multipliers and the increments of the key.
 constexpr uint32_t kMultiplier0 = 0xD2511F53u, kMultiplier1 = 0xCD9E8D57u;
 constexpr uint32_t kKeyStep0 = 0x9E3779B9u, kKeyStep1 = 0xBB67AE85u;
-constexpr int kRounds = 10;
+constexpr int kRounds = 10;  // the paper's Philox4x32-10
 
 double uniform_from(uint32_t high, uint32_t low) {
   const uint64_t bits = ((uint64_t)high << 32 | low) >> 11;

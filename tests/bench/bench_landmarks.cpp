@@ -59,7 +59,7 @@ void everywhere(const drawn_street &street) {
     const double begin = thread_us();
     search.around.take(pyramid);
     const double taken = thread_us();
-    places = search.search(camera, known, kSigns, 40, 0.17, 0.021, 1 << 30);
+    places = search.search(camera, known, kSigns, 40, 0.021, 1 << 30);
     compare.push_back(thread_us() - taken);
     take.push_back(taken - begin);
   }

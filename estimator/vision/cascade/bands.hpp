@@ -16,7 +16,7 @@ struct window_band {
 // `low_m`, `high_m`: of the objects' middles above the camera. The cylinders' step of 1.26 makes the rows uncertain by
 // half of it, and the cascade's window by as much.
 inline window_band band_of(const wm_cascade &cascade, double low_m, double high_m) {
-  constexpr double kMargin = 1.2;
+  constexpr double kMargin = 1.2;  // about 1.26
   const double rows = cascade.height_px / cascade.height_m;
   return {high_m * rows * (high_m > 0 ? kMargin : 1 / kMargin), low_m * rows * (low_m < 0 ? kMargin : 1 / kMargin)};
 }

@@ -19,7 +19,7 @@ struct window_group {
 };
 
 struct window_groups {
-  static constexpr size_t kMax = 256;
+  static constexpr size_t kMax = 256;  // bounds the memory and the time of grouping
   window_group list[kMax];
   size_t count;
 

@@ -15,12 +15,17 @@ namespace wm {
 
 namespace {
 
-constexpr int32_t kSupportMin = 3;   // of the 8 neighbouring rays, with points on a line through this one. Not swept
-constexpr double kSpacing_m = 0.1;   // of points on a window's line: about that of rays
-constexpr int kLinesCrossed = 4;     // joints and cables that a ray crosses before its search ends: bounds the cost
-constexpr double kBlur_px = 1.0;     // added to the width of a line in the picture
-constexpr int kBehindBand_px = 4;    // averaged behind a band, to compare with the floor before it
-constexpr double kFloorAgain = 1.5;  // off the middle, in changes, that is still the floor before (which is at 0.5)
+constexpr int32_t kSupportMin = 3;  // of the 8 neighbouring rays, with points on a line through this one. Not swept
+// Widths of dark bands on the floor that are no walls. Rays meet joints along the robot's path at a flat angle; walls
+// nearer than a few times this, beside the camera, are not detected.
+constexpr double kJoint_m = 0.035;  // always: joints of tiles, cables
+constexpr double kBand_m = 0.1;     // if the floor behind is as bright as before: floor tape, a threshold. Not swept
+constexpr double kWindowSigma_m = 0.03;  // of a line's points across it, by windows; on the tables of docs/edges.md
+constexpr double kSpacing_m = 0.1;       // of points on a window's line: about that of rays
+constexpr int kLinesCrossed = 4;         // joints and cables that a ray crosses before its search ends: bounds the cost
+constexpr double kBlur_px = 1.0;         // added to the width of a line in the picture
+constexpr int kBehindBand_px = 4;        // averaged behind a band, to compare with the floor before it
+constexpr double kFloorAgain = 1.5;      // off the middle, in changes, that is still the floor before (which is at 0.5)
 constexpr double kSlopeMin_grey_per_px = 0.2;  // below, an edge has no direction: noise
 constexpr double kAveragedPixels = 9;          // of the 5 x 5 gradient, for its noise
 constexpr double kMargin_px = 2.5;             // from the edge of the picture: half of the gradient's mask
@@ -46,11 +51,11 @@ size_t lay_out(edges_state *state, uint32_t rays, uint32_t samples, const bird_v
   memory_layout memory(state, sizeof *state);
   ray_fan fan{};
   fan.rays = memory.take<ray>(rays);
-  fan.samples = memory.take<ray_sample>(samples);
+  fan.samples = memory.take<picture_sample>(samples);
   fan.range_m = memory.take<float>(samples);
   const size_t area = static_cast<size_t>(bird.width) * static_cast<size_t>(bird.height);
   bird_view view = bird;
-  view.table = memory.take<bird_pixel>(area);
+  view.table = memory.take<picture_sample>(area);
   view.grey = memory.take<uint8_t>(area);
   view.edge = memory.take<uint8_t>(area);
   view.inner = memory.take<uint8_t>(area);
@@ -189,11 +194,10 @@ found floor_point(const edges_state &state, const ray_edge &edge, const wm_frame
   // rays.line_rel is a length along the ray; its width across the edge.
   const double along = gx * r.cos + gy * r.sin,
                board_px = state.params.rays_line_rel * range * std::fabs(along) / picture,
-               line_px = kBlur_px + state.params.rays_line_m * floor / picture;
+               line_px = kBlur_px + kJoint_m * floor / picture;
   const double sign = edge.is_fall ? -1 : 1;  // down the slope of a fall, up that of a rise
   const pixels_behind across = {frame, at.u, at.v, sign * gu / picture, sign * gv / picture};
-  if (is_narrow(across, edge, board_px > line_px ? board_px : line_px,
-                kBlur_px + state.params.rays_band_m * floor / picture))
+  if (is_narrow(across, edge, board_px > line_px ? board_px : line_px, kBlur_px + kBand_m * floor / picture))
     return found::kLine;
   const double noise = state.params.noise_grey / picture / std::sqrt(kAveragedPixels);
   const double sigma_px = std::sqrt(square(state.params.sigma_px) + square(noise));
@@ -251,12 +255,12 @@ void points_of_segment(const edges_state &state, const line_vertex &from, const 
     points->x_m[i] = static_cast<float>(bird.x_min_m + x / bird.px_per_m);
     points->y_m[i] = static_cast<float>(bird.y_min_m + y / bird.px_per_m);
     points->normal_rad[i] = static_cast<float>(grey_at(-2) >= grey_at(2) ? wrap(normal) : wrap(normal + kPi));
-    points->sigma_m[i] = static_cast<float>(state.params.hough.windows_sigma_m);
+    points->sigma_m[i] = static_cast<float>(kWindowSigma_m);
   }
 }
 
 void points_of_windows(edges_state *state, const wm_frame &frame, wm_points *points) {
-  const int pieces = find_pieces(state->bird, frame, state->params.hough, state->pieces, state->graph.capacity);
+  const int pieces = find_pieces(state->bird, frame, state->pieces, state->graph.capacity);
   const int vertices = make_polylines(state->pieces, pieces, {}, &state->graph, state->vertices);
   for (int i = 1; i < vertices; i++) {
     const line_vertex &from = state->vertices[i - 1], &to = state->vertices[i];

@@ -23,35 +23,27 @@ static const wm_param kParams[] = {
      "edges have the other sign and are not the joint of wall and floor."},
     F64("rays.contrast_grey", rays_contrast_grey, 6.0, 0.5, 255,
         "Grey levels. Smallest difference of both sides, averaged over four pixels each: above noise and compression."),
-    F64("rays.contrast_rel", rays_contrast_rel, 0.10, 0.0, 1,
-        "Smallest difference of both sides over their sum: above that of neighbouring boards, stains and reflections."),
     F64("rays.line_rel", rays_line_rel, 0.05, 0.0, 1,
         "Fraction of the range. A narrower dark band on the floor is a line (a joint of tiles, a cable), not a wall: "
         "the "
         "height of a board over the camera's height, less than half of the lowest skirting."),
-    F64("rays.line_m", rays_line_m, 0.035, 0.0, 1,
-        "m. A dark band narrower than this across is a line, too: rays meet joints along the robot's path at a flat "
-        "angle. Walls nearer than a few times this, beside the camera, are not detected."),
-    F64("rays.band_m", rays_band_m, 0.1, 0.0, 1,
-        "m. A band up to this wide is a line if the floor behind it is as bright as before: floor tape, a threshold."),
-    F64("rays.mirror_rel", rays_mirror_rel, 0.3, 0.0, 2,
-        "Fraction of the range. A stronger edge up to this far behind the first one replaces it: glossy floors mirror "
-        "a "
-        "skirting board, and its image begins before the joint by the board's height over the camera's."),
     F64("bird.px_per_m", hough.bird_px_per_m, 75, 10, 500, "px/m of the bird's-eye view; the paper's."),
     F64("bird.x_min_m", hough.bird_x_min_m, 1.5, -20, 50, "m ahead of base_link. Near end of the bird's-eye view."),
     F64("bird.x_max_m", hough.bird_x_max_m, 7.1, -20, 50, "m ahead of base_link. Far end of the bird's-eye view."),
     F64("bird.side_m", hough.bird_side_m, 3.0, 0.2, 50,
         "m. Extent of the bird's-eye view to the left and to the right."),
-    F64("windows.variance_min", hough.windows_variance_min, 5000, 0, 1e9,
-        "Smallest variance of the Hough sums over the offsets of one slope, for a line in a window; the paper's."),
-    F64("windows.sigma_m", hough.windows_sigma_m, 0.03, 1e-4, 5, "m. Error of a line's points across it."),
     F64("sigma_px", sigma_px, 0.3, 0.01, 10, "px. Error of an edge across it, where contrast is good."),
     F64("noise_grey", noise_grey, 2.0, 0.0, 100,
         "Grey levels. Noise of a pixel; divided by an edge's gradient it adds to sigma_px."),
 };
 
 static const wm_param_old kOld[] = {
+    {"rays.contrast_rel", NULL, "a constant now: 0.1 of the sum of both sides"},
+    {"rays.line_m", NULL, "a constant now: 0.035 m"},
+    {"rays.band_m", NULL, "a constant now: 0.1 m"},
+    {"rays.mirror_rel", NULL, "a constant now: 0.3 of the range"},
+    {"windows.variance_min", NULL, "a constant now: the paper's 5000"},
+    {"windows.sigma_m", NULL, "a constant now: 0.03 m"},
     {"rays.step_rad", NULL, "a constant now: 0.011 rad"},
     {"rays.support_min", NULL, "a constant now: 3 of 8 neighbouring rays"},
     {"windows.px", NULL, "a constant now: the paper's 50 px"},

@@ -9,6 +9,13 @@ constexpr double kRayStep_rad = 0.011;  // between rays: a point each 7 cm at 6 
 constexpr double kMargin_px = 2;        // for the pixels that interpolation and gradients read
 constexpr double kProbe = 0.002;        // of the numerical derivative, per metre of range plus height
 constexpr double kMovedMin_px = 1e-9;   // of a probe: a ray that stands still in the picture
+// Change of an edge over the sum of its sides: above that of neighbouring boards, stains and reflections. Chosen on
+// rendered corridors.
+constexpr double kContrastMin = 0.10;
+// Fraction of the range within which a stronger edge behind the first one replaces it: glossy floors mirror a skirting
+// board, and its image begins before the joint by the board's height over the camera's. This suits boards up to a
+// fourth of the camera's height. Not swept.
+constexpr double kMirror = 0.3;
 
 // Samples a ray in steps of a pixel and calls `take(pixel, range, index)` for each, while it is in the picture.
 template <class Take>
@@ -42,7 +49,6 @@ template <class Each>
 void each_direction(Each each) {
   // From -pi to pi; one of them straight ahead.
   constexpr int half = static_cast<int>(kPi / kRayStep_rad);
-  static_assert(2 * half < kRaysMax);
   for (int i = -half; i <= half; i++) {
     const double direction = i * kRayStep_rad;
     each(direction, sincos(direction));
@@ -51,20 +57,11 @@ void each_direction(Each each) {
 
 constexpr int kSamplesMin = 12;  // of a ray: both sides of an edge with neighbours
 
-uint8_t part_of_256(double x) { return static_cast<uint8_t>(x * 256 < 255 ? x * 256 : 255); }
-
 // Grey levels along the ray, in 1/256.
 int read_profile(const ray_fan &fan, const ray &r, const wm_frame &frame, int32_t *out) {
-  const ray_sample *samples = fan.samples + r.first;
+  const picture_sample *samples = fan.samples + r.first;
   const int count = static_cast<int>(r.count);
-  for (int i = 0; i < count; i++) {
-    const ray_sample s = samples[i];
-    const uint8_t *p = frame.grey + static_cast<size_t>(s.row) * frame.stride_bytes + s.column;
-    const uint8_t *q = p + frame.stride_bytes;
-    const int32_t right = s.right, down = s.down;
-    const int32_t upper = p[0] * (256 - right) + p[1] * right, lower = q[0] * (256 - right) + q[1] * right;
-    out[i] = (upper * (256 - down) + lower * down) >> 8;
-  }
+  for (int i = 0; i < count; i++) out[i] = grey_of(frame, samples[i]) >> 8;
   return count;
 }
 
@@ -129,16 +126,15 @@ bool find_first_step(const profile &p, double usual_grey, const wm_edges_params 
     const double before = p.before(i), level = is_fall && floor.grey < before ? floor.grey : before;
     *out = {i, level, p.after(i), is_fall};
     const double change = is_fall ? out->level - out->after : out->after - out->level;
-    if (change < params.rays_contrast_grey * 256 || change < params.rays_contrast_rel * (out->level + out->after))
-      continue;
+    if (change < params.rays_contrast_grey * 256 || change < kContrastMin * (out->level + out->after)) continue;
     if (!is_line(p, *out, params.rays_line_rel)) return true;
   }
   return false;
 }
 
 // The rise behind the step: the upper edge of a skirting board. 0 if none is within reach.
-int find_upper_edge(const profile &p, const profile_step &s, double reach_rel) {
-  const double until = p.range(s.at) * (1 + reach_rel) / (1 - reach_rel);
+int find_upper_edge(const profile &p, const profile_step &s) {
+  const double until = p.range(s.at) * (1 + kMirror) / (1 - kMirror);
   double darkest = s.after;
   for (int k = s.at + 1; k < p.end() && p.range(k) < until; k++) {
     if (p.grey[k] < darkest) darkest = p.grey[k];
@@ -158,9 +154,9 @@ int find_upper_edge(const profile &p, const profile_step &s, double reach_rel) {
 int joint_behind(const profile &p, const profile_step &first, const wm_edges_params &params) {
   constexpr double kWeak = 0.25;     // of the first step's change, near the predicted place. Not swept
   constexpr double kStronger = 1.2;  // the same, elsewhere. Not swept
-  const int upper = find_upper_edge(p, first, params.rays_mirror_rel);
+  const int upper = find_upper_edge(p, first);
   const double predicted = upper > 0 ? 2 / (1 / p.range(first.at) + 1 / p.range(upper)) : 0;
-  const double until = p.range(first.at) * (1 + params.rays_mirror_rel);
+  const double until = p.range(first.at) * (1 + kMirror);
   const int end = upper > 0 ? upper - 1 : p.end();
   const double first_change = p.before(first.at) - p.after(first.at);
   double strongest = first_change;
@@ -196,10 +192,8 @@ void ray_fan_make(const mounted_camera &camera, const wm_edges_params &params, r
     if (walk(camera, params, d.cos, d.sin, [](const pixel &, double, int) {}) < kSamplesMin) return;
     const uint32_t first = out->sample_count;
     const int count = walk(camera, params, d.cos, d.sin, [&](const pixel &at, double range, int i) {
-      const double column = std::floor(at.u), row = std::floor(at.v);
       const uint32_t place = first + static_cast<uint32_t>(i);
-      out->samples[place] = {static_cast<uint16_t>(column), static_cast<uint16_t>(row), part_of_256(at.u - column),
-                             part_of_256(at.v - row), 0};
+      out->samples[place] = sample_of(at);
       out->range_m[place] = static_cast<float>(range);
     });
     out->rays[out->ray_count++] = {first, static_cast<uint32_t>(count), direction, d.cos, d.sin};
@@ -221,7 +215,7 @@ double usual_floor(const ray_fan &fan, const wm_frame &frame) {
   constexpr int kBins = 256;
   uint32_t counts[kBins] = {0};
   for (uint32_t i = 0; i < fan.ray_count; i++) {
-    const ray_sample s = fan.samples[fan.rays[i].first];
+    const picture_sample s = fan.samples[fan.rays[i].first];
     counts[frame.grey[static_cast<size_t>(s.row) * frame.stride_bytes + s.column]]++;
   }
   int bin = 0;

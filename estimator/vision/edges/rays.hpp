@@ -4,21 +4,12 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_RAYS_HPP
 #define WAYMARK_ESTIMATOR_VISION_RAYS_HPP
 
-#include "sensors/lens.hpp"
+#include "image/picture_sample.hpp"
 #include "vision/edges/params.h"
-#include "waymark/frame.h"
 
 namespace wm {
 
-inline constexpr int kRaySamplesMax = 2048;
-inline constexpr int kRaysMax = 6400;
-
-// A place in the picture, in 1/256 px: column and row of the upper left of four pixels, and the offset within them.
-struct ray_sample {
-  uint16_t column, row;
-  uint8_t right, down;
-  uint16_t pad;
-};
+inline constexpr int kRaySamplesMax = 2048;  // of a ray: a step is a pixel, so above a picture's diagonal
 
 struct ray {
   uint32_t first, count;  // samples
@@ -38,7 +29,7 @@ struct ray_edge {
 struct ray_fan {
   uint32_t ray_count, sample_count;
   ray *rays;
-  ray_sample *samples;
+  picture_sample *samples;
   float *range_m;  // of each sample
 };
 

@@ -10,7 +10,7 @@ namespace wm {
 
 namespace {
 
-constexpr int kLanes = 16;
+constexpr int kLanes = 16;  // bytes of a vector
 typedef int16_t lanes __attribute__((vector_size(32), may_alias));
 typedef int16_t lanes_anywhere __attribute__((vector_size(32), aligned(2), may_alias));
 typedef uint32_t squares __attribute__((vector_size(32)));

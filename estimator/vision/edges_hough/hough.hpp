@@ -9,7 +9,7 @@
 
 namespace wm {
 
-inline constexpr int kHoughSideMax = 64;
+inline constexpr int kHoughSideMax = 64;  // px of a window; the paper's have 50
 // Offsets from -(side - 1) to side - 1, and zeros: a sum reads up to half a side beyond.
 inline constexpr int kHoughStride = 2 * kHoughSideMax + 48;
 

@@ -2,10 +2,9 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_PARAMS_H
 #define WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_PARAMS_H
 
-// Parameters `bird.*` and `windows.*` of the detector `edges`.
+// Parameters `bird.*` of the detector `edges`.
 struct wm_edges_hough_params {
   double bird_px_per_m, bird_x_min_m, bird_x_max_m, bird_side_m;
-  double windows_variance_min, windows_sigma_m;
 };
 
 #endif

@@ -9,6 +9,7 @@ namespace {
 
 constexpr int32_t kWindow_px = 50, kOverlap_px = 10, kStep_px = kWindow_px - kOverlap_px;  // the paper's
 static_assert(kWindow_px <= kHoughSideMax);
+constexpr float kVarianceMin = 5000;  // of the Hough sums over the offsets of one slope; the paper's
 
 int windows_along(int32_t size) { return size < kWindow_px ? 0 : (size - kWindow_px) / kStep_px + 1; }
 
@@ -16,12 +17,8 @@ int windows_along(int32_t size) { return size < kWindow_px ? 0 : (size - kWindow
 void sample_view(const bird_view &view, const wm_frame &frame) {
   const int32_t count = view.width * view.height;
   for (int32_t i = 0; i < count; i++) {
-    const bird_pixel b = view.table[i];
-    if (b.column == kNoFloor) continue;
-    const uint8_t *p = frame.grey + static_cast<size_t>(b.row) * frame.stride_bytes + b.column;
-    const uint8_t *q = p + frame.stride_bytes;
-    const int32_t upper = p[0] * (256 - b.right) + p[1] * b.right, lower = q[0] * (256 - b.right) + q[1] * b.right;
-    view.grey[i] = static_cast<uint8_t>((upper * (256 - b.down) + lower * b.down) >> 16);
+    const picture_sample b = view.table[i];
+    if (is_sample(b)) view.grey[i] = static_cast<uint8_t>(grey_of(frame, b) >> 16);
   }
 }
 
@@ -66,8 +63,7 @@ line_piece piece_of(const window_peak &c, int side) {
   return {across[0], along[0], across[1], along[1]};
 }
 
-bool find_in_window(const bird_view &view, int32_t x0, int32_t y0, const wm_edges_hough_params &params,
-                    line_piece *out) {
+bool find_in_window(const bird_view &view, int32_t x0, int32_t y0, line_piece *out) {
   constexpr int side = kWindow_px;
   window_peak best = {{0, 0, 0, -1.0F}, 0};
   const uint8_t *window = view.edge + static_cast<ptrdiff_t>(y0) * view.width + x0;
@@ -83,7 +79,7 @@ bool find_in_window(const bird_view &view, int32_t x0, int32_t y0, const wm_edge
     const hough_peak peak = hough_find(*plane, side);
     if (peak.variance > best.peak.variance) best = {peak, quadrant};
   }
-  if (!(static_cast<double>(best.peak.variance) > params.windows_variance_min)) return false;
+  if (!(best.peak.variance > kVarianceMin)) return false;
   *out = piece_of(best, side);
   out->x0 += static_cast<float>(x0);
   out->x1 += static_cast<float>(x0);
@@ -108,19 +104,14 @@ void bird_view_make(const mounted_camera &camera, bird_view *out) {
   for (int32_t y = 0; y < out->height; y++)
     for (int32_t x = 0; x < out->width; x++) {
       pixel at;
-      bird_pixel &b = out->table[y * out->width + x];
-      b = {kNoFloor, 0, 0, 0};
       const vec3 p = {out->x_min_m + x / out->px_per_m, out->y_min_m + y / out->px_per_m, 0};
-      if (!pixel_of(camera, p, 1.5, &at)) continue;
-      const double column = std::floor(at.u), row = std::floor(at.v);
-      b = {static_cast<uint16_t>(column), static_cast<uint16_t>(row), static_cast<uint8_t>((at.u - column) * 256),
-           static_cast<uint8_t>((at.v - row) * 256)};
+      out->table[y * out->width + x] = pixel_of(camera, p, 1.5, &at) ? sample_of(at) : kNoSample;
     }
   const size_t bytes = static_cast<size_t>(out->width) * static_cast<size_t>(out->height);
   std::memset(out->grey, 0, bytes);
   std::memset(out->edge, 0, bytes);
   std::memset(out->inner, 0, bytes);
-  const auto is_floor = [&](int32_t i) { return out->table[i].column != kNoFloor; };
+  const auto is_floor = [&](int32_t i) { return is_sample(out->table[i]); };
   for (int32_t y = 1; y + 1 < out->height; y++)
     for (int32_t x = 1; x + 1 < out->width; x++) {
       const int32_t i = y * out->width + x;
@@ -134,20 +125,19 @@ void bird_view_make(const mounted_camera &camera, bird_view *out) {
     const int32_t x0 = i % across * step, y0 = i / across * step;
     int32_t seen = 0;
     for (int32_t y = y0; y < y0 + side; y++)
-      for (int32_t x = x0; x < x0 + side; x++) seen += out->table[y * out->width + x].column != kNoFloor;
+      for (int32_t x = x0; x < x0 + side; x++) seen += is_sample(out->table[y * out->width + x]);
     out->whole[i] = 2 * seen > side * side;
   }
 }
 
-int find_pieces(const bird_view &view, const wm_frame &frame, const wm_edges_hough_params &params, line_piece *out,
-                int capacity) {
+int find_pieces(const bird_view &view, const wm_frame &frame, line_piece *out, int capacity) {
   sample_view(view, frame);
   find_gradient(view);
   constexpr int32_t step = kStep_px;
   const int32_t across = windows_along(view.width);
   int count = 0;
   for (int32_t i = 0; across > 0 && i < view.windows && count < capacity; i++)
-    if (view.whole[i] && find_in_window(view, i % across * step, i / across * step, params, &out[count])) count++;
+    if (view.whole[i] && find_in_window(view, i % across * step, i / across * step, &out[count])) count++;
   return count;
 }
 

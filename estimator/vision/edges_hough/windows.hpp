@@ -5,26 +5,18 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_WINDOWS_HPP
 #define WAYMARK_ESTIMATOR_VISION_EDGES_HOUGH_WINDOWS_HPP
 
-#include "sensors/lens.hpp"
+#include "image/picture_sample.hpp"
 #include "vision/edges_hough/hough.hpp"
 #include "vision/edges_hough/params.h"
 #include "vision/edges_hough/polylines.hpp"
-#include "waymark/frame.h"
 
 namespace wm {
-
-// A pixel of the bird's-eye view: the upper left of four pixels of the picture, and the offset within them in 1/256 px.
-struct bird_pixel {
-  uint16_t column, row;  // column kNoFloor: outside of the picture
-  uint8_t right, down;
-};
-inline constexpr uint16_t kNoFloor = 0xFFFF;
 
 // Rows along the robot's y axis (left), columns along x (ahead), from (x_min, y_min).
 struct bird_view {
   int32_t width, height, windows;
   double x_min_m, y_min_m, px_per_m;
-  bird_pixel *table;
+  picture_sample *table;
   uint8_t *grey, *edge;  // brightness; gradient's magnitude
   uint8_t *inner;        // 255 where the pixel and its four neighbours are in the picture, else 0
   uint8_t *whole;        // one per window: more than half of it is visible
@@ -36,8 +28,7 @@ void bird_view_size(const wm_edges_hough_params &params, bird_view *out);
 // Fills the table. The arrays are width x height, `hough` is zero.
 void bird_view_make(const mounted_camera &camera, bird_view *out);
 // The strongest line of each window that has one. Returns their number, at most `capacity`.
-int find_pieces(const bird_view &view, const wm_frame &frame, const wm_edges_hough_params &params, line_piece *out,
-                int capacity);
+int find_pieces(const bird_view &view, const wm_frame &frame, line_piece *out, int capacity);
 
 }  // namespace wm
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "vision/landmarks/align.hpp"
 
+#include "image/picture_sample.hpp"
 #include "math/eigen.hpp"
 
 namespace wm {
@@ -67,10 +68,8 @@ bool invert_products(const align_work &work, int n, double out[kAlignColumns][kA
 bool grey_at(const grey_plane &picture, double u, double v, double *out) {
   if (!(u >= 0) || !(v >= 0) || !(u < picture.width - 1) || !(v < picture.height - 1)) return false;
   const int column = static_cast<int>(u), row = static_cast<int>(v);
-  const double fx = u - column, fy = v - row;
-  const uint8_t *p = picture.grey + static_cast<ptrdiff_t>(row) * picture.width + column;
-  const uint8_t *q = p + picture.width;
-  *out = (1 - fy) * ((1 - fx) * p[0] + fx * p[1]) + fy * ((1 - fx) * q[0] + fx * q[1]);
+  *out =
+      bilinear(picture.grey + static_cast<ptrdiff_t>(row) * picture.width + column, picture.width, u - column, v - row);
   return true;
 }
 

@@ -15,8 +15,8 @@ namespace wm {
 
 // A learnt picture as a pyramid.
 struct appearance {
-  static constexpr int kSizes = 6;
-  static constexpr int kSideMax = 256;
+  static constexpr int kSizes = 6;      // of the pyramid: from kSideMax to 8 px
+  static constexpr int kSideMax = 256;  // px of the largest size: more than a landmark has in a picture
   int32_t id;
   vec3 place_m;  // of its middle, in map
   double sigma_m, width_m, height_m, yaw_rad;

@@ -193,7 +193,7 @@ void global_search::need(const mounted_camera &camera, double width_m, double he
 }
 
 int global_search::search_one(const mounted_camera &camera, const appearance *known, int which, double range_max_m,
-                              double facing_min, double tilt_rad) {
+                              double tilt_rad) {
   const appearance &what = known[which];
   const double height_m = what.place_m.z - camera.centre_m.z;
   const template_size shape = size_of(what.width_m, what.height_m, height_m);
@@ -201,7 +201,7 @@ int global_search::search_one(const mounted_camera &camera, const appearance *kn
   int compared = 0;
   for (const double facing : kFacing) {
     cylinder_template drawn;
-    if (facing < facing_min || !draw_template(what, shape, height_m, facing, &drawn)) break;
+    if (!draw_template(what, shape, height_m, facing, &drawn)) break;
     for (const cylinder &on : around.cylinders) {
       const double distance_m = what.height_m / (shape.rows * on.step_rad);
       if (distance_m > range_max_m || distance_m < kNearest_m) continue;
@@ -223,13 +223,13 @@ void global_search::insert(const place_hypothesis &place) {
 }
 
 int global_search::search(const mounted_camera &camera, const appearance *known, int known_count, double range_max_m,
-                          double facing_min, double tilt_rad, int compare_max) {
+                          double tilt_rad, int compare_max) {
   int compared = 0;
   count = 0;
   for (int i = 0; i < known_count && compared < compare_max; i++) {
     const int which = next;
     next = next + 1 < known_count ? next + 1 : 0;
-    compared += search_one(camera, known, which, range_max_m, facing_min, tilt_rad);
+    compared += search_one(camera, known, which, range_max_m, tilt_rad);
   }
   return compared;
 }

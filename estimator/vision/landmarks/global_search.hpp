@@ -20,7 +20,7 @@ struct place_hypothesis {
 };
 
 struct global_search {
-  static constexpr int kPlaces = 16;
+  static constexpr int kPlaces = 16;  // twice as many as are verified in a picture
   panorama around;
   int next;   // landmark that is searched next
   int count;  // of places, the best first
@@ -31,11 +31,10 @@ struct global_search {
   // Searches for the next landmarks in turn until `compare_max` places have been compared; `around` has taken the
   // picture. Returns the number of comparisons.
   int search(const mounted_camera &camera, const appearance *known, int known_count, double range_max_m,
-             double facing_min, double tilt_rad, int compare_max);
+             double tilt_rad, int compare_max);
 
  private:
-  int search_one(const mounted_camera &camera, const appearance *known, int which, double range_max_m,
-                 double facing_min, double tilt_rad);
+  int search_one(const mounted_camera &camera, const appearance *known, int which, double range_max_m, double tilt_rad);
   void insert(const place_hypothesis &place);
 };
 

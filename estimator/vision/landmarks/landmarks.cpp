@@ -15,7 +15,7 @@ namespace wm {
 
 namespace {
 
-constexpr size_t kFoundMax = 128;
+constexpr size_t kFoundMax = 128;      // sightings of a picture: bounds the memory
 constexpr double kWindowSigmas = 3.5;  // half width of the search window: 1 in 2000 landmarks outside
 constexpr double kWindowMax_px = 64;   // a landmark with a larger window is not searched: cost, look-alikes
 constexpr int kTries = 8;          // hypotheses verified at full resolution per picture at kRate_hz: bounds the cost
@@ -356,7 +356,7 @@ void search_all(landmarks_state *self, const wm_frame &frame, const wm_estimate 
   }
   const double budget = budget_of(*self, frame.t_ns);
   search.around.take(self->eye.picture);
-  search.search(self->eye.camera, self->known, self->count, params.range_max_m, params.facing_min, tilt_of(params),
+  search.search(self->eye.camera, self->known, self->count, params.range_max_m, tilt_of(params),
                 static_cast<int>(budget * params.search_places));
   for (int i = 0; i < search.count && i < static_cast<int>(budget * kTries); i++) {
     const size_t before = most;

@@ -4,7 +4,7 @@
 namespace wm {
 namespace {
 
-constexpr int kLanes = 16;
+constexpr int kLanes = 16;             // bytes of a vector
 constexpr int kCoarseAbove_px2 = 500;  // larger landmarks correlate over 2 px: every second place first. Not swept
 constexpr double kVarianceMin_grey2 = 0.25;  // of the picture's pixels: rounding
 
@@ -43,7 +43,7 @@ correlation correlation_at(const grey_plane &picture, const drawn_view &what, in
 
 namespace {
 
-constexpr float kNone = -2.0F;
+constexpr float kNone = -2.0F;  // score of no place: below every correlation
 
 // A search: the scores of the window's places, and the best one.
 struct window {

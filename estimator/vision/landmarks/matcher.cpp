@@ -14,6 +14,7 @@ constexpr double kSigmaOfSize = 0.002;  // of the middle, in sizes: errors of th
 constexpr double kMargin_px = 2;        // from the edge of the picture
 constexpr double kFits = 1.1;           // of the longer side, beside 4 px: room in the drawn view for a tilted landmark
 constexpr double kBeforeAlign = 0.1;    // likeness on whole pixels may be this much below the needed one
+constexpr double kContrastMin_grey = 4;       // standard deviation of a place in the picture: noise has 1 to 3
 constexpr double kNear_px = 8, kFar_px = 32;  // window, from likeness_min to likeness_far
 
 double likeness_needed(const matcher &self, int pixels, double reach_px) {
@@ -34,7 +35,7 @@ wm_look expect_landmark(const matcher &self, const camera_guess &guess, const ap
            at->u <= self.camera.width_px - 1 - kMargin_px && at->v <= self.camera.height_px - 1 - kMargin_px;
   };
   if (!in_picture(out->view.middle, &out->middle)) return WM_LOOK_NOT_IN_VIEW;
-  if (!(out->view.facing >= self.params.facing_min)) return WM_LOOK_FACES_AWAY;
+  if (!(out->view.facing >= kFacingMin)) return WM_LOOK_FACES_AWAY;
   const sin_cos yaw = sincos(what.yaw_rad);
   const vec3 right =
                  transposed_times(guess.R_map_optical, {0.5 * what.width_m * yaw.cos, 0.5 * what.width_m * yaw.sin, 0}),
@@ -70,7 +71,7 @@ wm_look match_landmark(matcher *self, const expected_view &one, double across_px
   if (!search_window(picture, self->drawn, static_cast<int>(across), static_cast<int>(down), self->scores, &best))
     return WM_LOOK_NOT_IN_VIEW;
   out->likeness = best.likeness;
-  if (best.spread_grey < self->params.contrast_grey) return WM_LOOK_LOW_CONTRAST;
+  if (best.spread_grey < kContrastMin_grey) return WM_LOOK_LOW_CONTRAST;
   const double needed = likeness_needed(*self, self->drawn.count, is_final ? larger(across_px, down_px) : 0);
   if (best.likeness < needed - kBeforeAlign)
     return best.spread_grey < kBlurred * self->drawn.spread_grey ? WM_LOOK_BLURRED : WM_LOOK_UNLIKE;

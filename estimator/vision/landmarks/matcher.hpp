@@ -13,6 +13,8 @@ namespace wm {
 
 // Landmarks are measured at the pyramid's level at which they have at most this area: cost, and no gain beyond.
 inline constexpr double kAreaMax_px2 = 2000;
+// Smallest cosine between the line of sight and a landmark's normal, 80 degrees: more slanted ones are not searched.
+inline constexpr double kFacingMin = 0.17;
 
 // A camera's picture and the work space of the matching.
 struct matcher {

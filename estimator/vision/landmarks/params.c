@@ -10,15 +10,10 @@ static const wm_param kParams[] = {
     F64("range_max_m", range_max_m, 40, 1, 1000, "m. Landmarks farther away are not searched."),
     F64("size_min_px", size_min_px, 7, 4, 100,
         "px. Smallest shorter side of a landmark in the picture: smaller ones are ambiguous."),
-    F64("facing_min", facing_min, 0.17, 0, 1,
-        "Smallest cosine of the angle between the line of sight and the landmark's normal: more slanted ones are not "
-        "searched."),
     F64("mounting_sigma_rad", mounting_sigma_rad, 0.007, 0, 0.1,
         "rad. Error of the camera's mounting, each axis; widens the search window."),
     F64("likeness_min", likeness_min, 0.7, 0.3, 1,
         "Smallest normalised correlation of picture and appearance; small landmarks need more."),
-    F64("contrast_grey", contrast_grey, 4, 1, 255,
-        "Grey levels. Smallest standard deviation of a landmark's place in the picture."),
     F64("search_places", search_places, 250000, 0, 1e8,
         "Places compared per picture while no pose predicts the landmarks, some 20 ns each, at 30 pictures a second; "
         "at "
@@ -41,9 +36,14 @@ static const wm_param kParams[] = {
 };
 
 static const wm_param_old kOld[] = {
-    {"window_sigmas", NULL, "a constant now: 3.5"}, {"window_max_px", NULL, "a constant now: 64 px"},
-    {"apart_min", NULL, "a constant now: 0.06"},    {"sigma_size", NULL, "a constant now: 0.002 of the size"},
-    {"sigma_factor", NULL, "a constant now: 1.3"},  {NULL, NULL, NULL},
+    {"window_sigmas", NULL, "a constant now: 3.5"},
+    {"window_max_px", NULL, "a constant now: 64 px"},
+    {"apart_min", NULL, "a constant now: 0.06"},
+    {"sigma_size", NULL, "a constant now: 0.002 of the size"},
+    {"sigma_factor", NULL, "a constant now: 1.3"},
+    {"facing_min", NULL, "a constant now: a cosine of 0.17"},
+    {"contrast_grey", NULL, "a constant now: 4 grey levels"},
+    {NULL, NULL, NULL},
 };
 
 const wm_param_table wm_landmarks_params_table = {kParams, sizeof kParams / sizeof kParams[0],

@@ -11,9 +11,9 @@ extern "C" {
 #endif
 
 struct wm_landmarks_params {
-  double range_max_m, size_min_px, facing_min;
+  double range_max_m, size_min_px;
   double mounting_sigma_rad;
-  double likeness_min, contrast_grey;
+  double likeness_min;
   double search_places, search_area_px2, search_after_s, likeness_alone, likeness_far;
   double blur_px, sigma_px;
 };

@@ -46,7 +46,7 @@ bool recognise(matcher *self, const appearance &what, const place_hypothesis &wh
     out->likeness = seen.likeness;
   }
   out->guess = guess_there();
-  return facing >= self->params.facing_min && finite(out->guess.base_m);
+  return facing >= kFacingMin && finite(out->guess.base_m);
 }
 
 void correct_guess(const matcher &self, const appearance *known, const wm_looked_for *looks, int count,

@@ -7,8 +7,8 @@ namespace wm {
 
 namespace {
 
-constexpr double kBin_rad = 0.004;  // of the histogram of rotations: about a pixel of a 160 degree fisheye
-constexpr int kBinsMax = 1024;
+constexpr double kBin_rad = 0.004;       // of the histogram of rotations: about a pixel of a 160 degree fisheye
+constexpr int kBinsMax = 1024;           // half of them: 2 rad, above the largest turn_max_rad
 constexpr int kSmoothing_bins = 3;       // half width of the triangular kernel: parallax spreads the votes. Not swept
 constexpr double kGate_rad = 0.02;       // of the azimuth about its prediction: parallax of a picture. Not swept
 constexpr double kAppearance_grey = 20;  // sigma of a side's brightness from picture to picture: exposure, backgrounds

@@ -9,7 +9,7 @@
 
 namespace wm {
 
-inline constexpr int kLineTracksMax = 192;
+inline constexpr int kLineTracksMax = 192;  // bounds the memory and the time of association
 
 struct line_track {
   int32_t id;  // 0: free; never used twice

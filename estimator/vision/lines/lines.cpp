@@ -38,7 +38,7 @@ size_t lay_out(lines_state *state, const polar_view &polar) {
   const size_t columns = static_cast<size_t>(polar.columns), rows = static_cast<size_t>(polar.rows);
   polar_view view = polar;
   view.row = memory.take<polar_row>(rows);
-  view.table = memory.take<polar_sample>(rows * columns);
+  view.table = memory.take<picture_sample>(rows * columns);
   view.grey = memory.take<int16_t>(rows * static_cast<size_t>(polar.stride()));
   auto *next = memory.take<int16_t>(kVoteArrays * columns);
   if (!state) return memory.bytes();

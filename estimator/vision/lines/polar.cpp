@@ -73,16 +73,14 @@ void polar_make(const mounted_camera &camera, const wm_lines_params &params, pol
     row.tan = tan(elevation);
     row.px_per_column = scale * out->step_rad;
     row.half = row.px_per_column > kFine_px ? 2 : row.px_per_column > kMiddle_px ? 4 : 8;
-    polar_sample *samples = out->table + static_cast<size_t>(r) * static_cast<size_t>(out->columns);
+    picture_sample *samples = out->table + static_cast<size_t>(r) * static_cast<size_t>(out->columns);
     // A place outside of the picture repeats the last one inside: the end of the view is no edge.
     int last = -1;
     for (int pass = 0; pass < 2; pass++)
       for (int c = 0; c < out->columns; c++) {
         pixel at;
         if (pixel_at(camera, out->azimuth_of(c), elevation, kMargin_px, &at)) {
-          const int u = static_cast<int>(at.u), v = static_cast<int>(at.v);
-          samples[c] = {static_cast<uint16_t>(u), static_cast<uint16_t>(v), static_cast<uint8_t>((at.u - u) * 256),
-                        static_cast<uint8_t>((at.v - v) * 256)};
+          samples[c] = sample_of(at);
           last = c;
         } else if (last >= 0) {
           samples[c] = samples[last];
@@ -94,19 +92,10 @@ void polar_make(const mounted_camera &camera, const wm_lines_params &params, pol
 }
 
 void polar_fill(polar_view *view, const wm_frame &frame) {
-  const uint32_t stride = frame.stride_bytes;
-  const uint8_t *const grey = frame.grey;
   for (int r = 0; r < view->rows; r++) {
-    const polar_sample *samples = view->table + static_cast<size_t>(r) * static_cast<size_t>(view->columns);
+    const picture_sample *samples = view->table + static_cast<size_t>(r) * static_cast<size_t>(view->columns);
     int16_t *out = view->line(r);
-    for (int c = 0; c < view->columns; c++) {
-      const polar_sample s = samples[c];
-      const uint8_t *p = grey + static_cast<size_t>(s.row) * stride + s.column;
-      const uint8_t *q = p + stride;
-      const int32_t right = s.right, down = s.down;
-      const int32_t upper = p[0] * 256 + (p[1] - p[0]) * right, lower = q[0] * 256 + (q[1] - q[0]) * right;
-      out[c] = static_cast<int16_t>((upper * 256 + (lower - upper) * down + 2048) >> 12);
-    }
+    for (int c = 0; c < view->columns; c++) out[c] = static_cast<int16_t>((grey_of(frame, samples[c]) + 2048) >> 12);
     std::memcpy(out - kPolarPad, out + view->columns - kPolarPad, kPolarPad * sizeof(int16_t));
     std::memcpy(out + view->columns, out, kPolarPad * sizeof(int16_t));
   }

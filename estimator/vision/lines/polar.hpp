@@ -4,9 +4,8 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_POLAR_HPP
 #define WAYMARK_ESTIMATOR_VISION_POLAR_HPP
 
-#include "sensors/lens.hpp"
+#include "image/picture_sample.hpp"
 #include "vision/lines/params.h"
-#include "waymark/frame.h"
 
 namespace wm {
 
@@ -15,12 +14,6 @@ inline constexpr int kPolarRowsMax = 320;      // at most 0.01 rad a row from ho
 inline constexpr int kPolarColumnsMax = 4096;  // 1.5 mrad: finer than the lenses of the fisheyes known
 inline constexpr double kRowStep_rad = 0.01;   // elevation from row to row: finer than segments of six rows need
 inline constexpr int kPolarScale = 16;         // levels of the polar picture per grey level
-
-// A place in the picture, in 1/256 px: column and row of the upper left of four pixels, and the offset within them.
-struct polar_sample {
-  uint16_t column, row;
-  uint8_t right, down;
-};
 
 struct polar_row {
   double elevation_rad, tan;
@@ -33,8 +26,8 @@ struct polar_view {
   double step_rad;    // from column to column; column 0 is azimuth -pi
   double row_px;      // distance in the picture from row to row, in the middle row
   polar_row *row;
-  polar_sample *table;  // rows x columns
-  int16_t *grey;        // rows x stride, each row after its pad; in 1/kPolarScale of a grey level
+  picture_sample *table;  // rows x columns
+  int16_t *grey;          // rows x stride, each row after its pad; in 1/kPolarScale of a grey level
   int stride() const { return columns + 2 * kPolarPad; }
   const int16_t *line(int r) const { return grey + static_cast<size_t>(r) * static_cast<size_t>(stride()) + kPolarPad; }
   int16_t *line(int r) { return grey + static_cast<size_t>(r) * static_cast<size_t>(stride()) + kPolarPad; }

@@ -7,7 +7,7 @@
 
 namespace wm {
 
-inline constexpr int kRadialEdgesMax = 192;
+inline constexpr int kRadialEdgesMax = 192;  // of a picture: bounds the memory and the time
 
 struct radial_edge {
   double azimuth_rad, sigma_rad;  // at the horizon, in base_link

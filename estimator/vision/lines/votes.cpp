@@ -11,7 +11,7 @@ namespace {
 constexpr int kGapMax_rows = 5;  // consecutive rows without a vote that end a run: a handle, a sign. Not swept
 
 struct eight {
-  static constexpr int kLanes = 8;
+  static constexpr int kLanes = 8;  // numbers of 16 bits in a vector
   typedef int16_t lanes __attribute__((vector_size(16), may_alias));
   typedef int16_t lanes_anywhere __attribute__((vector_size(16), aligned(2), may_alias));
   static lanes load(const int16_t *p) { return *reinterpret_cast<const lanes *>(p); }
@@ -22,7 +22,7 @@ struct eight {
 };
 
 struct one {
-  static constexpr int kLanes = 1;
+  static constexpr int kLanes = 1;  // no vector
   typedef int16_t lanes;
   static lanes load(const int16_t *p) { return *p; }
   static lanes load_anywhere(const int16_t *p) { return *p; }

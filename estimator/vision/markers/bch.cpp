@@ -27,7 +27,7 @@ constexpr galois make_field() {
   return f;
 }
 
-constexpr galois kField = make_field();
+constexpr galois kField = make_field();  // GF(64)
 
 constexpr uint8_t times(uint8_t a, uint8_t b) { return a && b ? kField.power[kField.log[a] + kField.log[b]] : 0; }
 constexpr uint8_t over(uint8_t a, uint8_t b) { return a ? kField.power[kField.log[a] + kOrder - kField.log[b]] : 0; }
@@ -51,7 +51,7 @@ constexpr uint64_t make_generator() {
   return bits;
 }
 
-constexpr uint64_t kGenerator = make_generator();
+constexpr uint64_t kGenerator = make_generator();  // of degree 47
 static_assert(std::bit_width(kGenerator) == kBchLength - kBchData + 1);
 
 // Error locator by Berlekamp and Massey: the shortest linear recurrence of the syndromes, whose roots are the inverses

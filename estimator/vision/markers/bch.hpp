@@ -9,7 +9,7 @@
 
 namespace wm {
 
-inline constexpr int kBchLength = 63, kBchData = 16, kBchErrors = 11;
+inline constexpr int kBchLength = 63, kBchData = 16, kBchErrors = 11;  // bits
 
 // Code word whose upper 16 bits are `data`.
 uint64_t bch_encode(uint32_t data);

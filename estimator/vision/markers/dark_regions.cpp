@@ -9,7 +9,8 @@ namespace wm {
 
 namespace {
 
-constexpr int32_t kTile = 4, kLanes = 16;
+constexpr int32_t kTile = 4;    // px, as in the paper
+constexpr int32_t kLanes = 16;  // bytes of a vector
 using bytes16 = uint8_t __attribute__((vector_size(kLanes)));
 
 bytes16 load(const uint8_t *from) {

@@ -10,7 +10,7 @@ namespace {
 // Added to each word, because the code is linear: without it an all-white print would be identity 0. The test mr_code
 // checks that regular patterns are far from all identities.
 constexpr uint64_t kMask = UINT64_C(0x9A3C5D0E71B6482F);
-constexpr uint64_t kParity = UINT64_C(1) << 63;
+constexpr uint64_t kParity = UINT64_C(1) << 63;  // the module beyond the code's 63
 
 uint64_t with_parity(uint64_t word) { return std::popcount(word) % 2 ? word | kParity : word; }
 

@@ -42,7 +42,7 @@ struct reader {
   bool grey(double x, double y, double *out) const { return grey_at(view, frame, h(x, y), out); }
   // Mean over the middle of a module.
   bool module(double x, double y, double *out) const {
-    constexpr double kOff = 0.2 * WM_MR_MODULE;
+    constexpr double kOff = 0.2 * WM_MR_MODULE;  // from the middle: within the part that blur leaves
     double sum = 0, one;
     for (int i = 0; i < 5; i++) {
       const double dx = i == 0 ? 0 : i % 2 ? kOff : -kOff, dy = i == 0 ? 0 : i < 3 ? kOff : -kOff;

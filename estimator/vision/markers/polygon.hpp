@@ -7,7 +7,7 @@
 
 namespace wm {
 
-inline constexpr int kPolygonMax = 8;
+inline constexpr int kPolygonMax = 8;  // vertices; prints have 4 or 5
 
 // Fits straight sides to `count` points of a simple closed border, counterclockwise with y down. `corner`: `vertices`
 // of them (at most kPolygonMax), clockwise, on the line of the points. False where the border is no such polygon: not

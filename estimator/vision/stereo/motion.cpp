@@ -8,8 +8,8 @@
 namespace wm {
 namespace {
 
-constexpr int kHypotheses = 60;
-constexpr int kRounds = 6;
+constexpr int kHypotheses = 60;   // with 40 % of the points in agreement one is right with 98 %
+constexpr int kRounds = 6;        // of Gauss-Newton, two of them with a wider limit. Not swept
 constexpr double kEnough = 0.85;  // of all agree: no better guess is looked for
 constexpr uint64_t kStream = 0x73746572;
 

@@ -27,7 +27,7 @@ struct rigid {
   mat3 R;
   vec3 t;
 };
-inline constexpr rigid kNoMotion = {kIdentity3, {0, 0, 0}};
+inline constexpr rigid kNoMotion = {kIdentity3, {0, 0, 0}};  // identity
 inline vec3 operator*(const rigid &m, const vec3 &x) { return m.R * x + m.t; }
 inline rigid operator*(const rigid &a, const rigid &b) { return {a.R * b.R, a.R * b.t + a.t}; }
 inline rigid inverse(const rigid &m) {
@@ -44,8 +44,8 @@ struct seen_twice {
 // prior, where there is one, is one of the guesses. `agrees` gets a byte a point. False where fewer than kAgreeing of
 // them, or than kFewest, agree. Random choices by `seed`. Cost: about 50 hypotheses over all points, 0.2 ms for 100.
 // Sources: [Fischler1981]; [Horn1987] for three points; Gauss-Newton on pixels.
-inline constexpr int kFewest = 6;
-inline constexpr double kAgreeing = 0.4;
+inline constexpr int kFewest = 6;         // twice as many as determine a motion
+inline constexpr double kAgreeing = 0.4;  // of the points; the others are moving objects and slipped tracks. Not swept
 bool find_motion(const pair_geometry &rig, const seen_twice *points, int count, const rigid *prior, double agree_px,
                  uint64_t seed, rigid *out, uint8_t *agrees);
 

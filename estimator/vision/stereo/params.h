@@ -10,7 +10,7 @@
 extern "C" {
 #endif
 
-#define STEREO_TRACKS_MAX 240
+#define STEREO_TRACKS_MAX 240  // bounds the memory and the time of a picture
 
 struct wm_stereo_params {
   int32_t tracks, confirm_seen;

@@ -93,7 +93,7 @@ namespace {
 // Grey levels of the warped patch and a border of one pixel, in eighths. False where it leaves the picture.
 bool sample_warped(const grey_plane &picture, const pixel &at, const warp2 &warp,
                    int16_t source[kSourceSide][kSourceSide]) {
-  constexpr double kOne = 65536.0;
+  constexpr double kOne = 65536.0;  // fixed-point numbers with 16 bits behind the point
   constexpr int kHalf = kSourceSide / 2;
   const auto fixed = [](double x) { return static_cast<int32_t>(std::floor(x * kOne + 0.5)); };
   const int32_t uu = fixed(warp.uu), uv = fixed(warp.uv), vu = fixed(warp.vu), vv = fixed(warp.vv);

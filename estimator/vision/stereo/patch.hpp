@@ -25,7 +25,7 @@ struct patch_template {
 struct warp2 {
   double uu, uv, vu, vv;  // u by u, u by v, v by u, v by v
 };
-inline constexpr warp2 kNoWarp = {1, 0, 0, 1};
+inline constexpr warp2 kNoWarp = {1, 0, 0, 1};  // identity
 
 // Template about `at`, warped. False where it leaves the picture or has no contrast in some direction.
 bool make_template(const grey_plane &picture, const pixel &at, const warp2 &warp, patch_template *out);

@@ -46,17 +46,15 @@ const char *rectification_init(rectification *out, const wm_camera &camera, cons
 void rectification_table(rectification *self) {
   if (self->is_rectified) return;
   const double right = self->camera.width_px - 1.0, bottom = self->camera.height_px - 1.0;
-  raw_pixel *to = self->table;
+  picture_sample *to = self->table;
   for (int32_t v = 0; v < self->height; v++)
     for (int32_t u = 0; u < self->width; u++, to++) {
-      *to = {kNoPixel, 0, 0, 0};
+      *to = kNoSample;
       const vec3 ray = self->R_base_rectified * vec3{(u - self->cu) / self->fu, (v - self->cv) / self->fv, 1.0};
       pixel at;
       if (!project(self->camera.optics, transposed_times(self->camera.R_base_optical, ray), &at)) continue;
       if (!(at.u >= 0) || !(at.v >= 0) || !(at.u < right) || !(at.v < bottom)) continue;
-      const auto x = static_cast<uint32_t>(at.u * 256), y = static_cast<uint32_t>(at.v * 256);
-      *to = {static_cast<uint16_t>(x >> 8), static_cast<uint16_t>(y >> 8), static_cast<uint8_t>(x & 255),
-             static_cast<uint8_t>(y & 255)};
+      *to = sample_of(at);
     }
 }
 
@@ -66,17 +64,9 @@ void rectify(const rectification &self, const wm_frame &frame, const grey_plane 
     for (size_t v = 0; v < height; v++) std::memcpy(out.grey + v * width, frame.grey + v * frame.stride_bytes, width);
     return;
   }
-  const raw_pixel *from = self.table;
-  for (size_t i = 0; i < width * height; i++, from++) {
-    if (from->column == kNoPixel) {
-      out.grey[i] = 0;
-      continue;
-    }
-    const uint8_t *at = frame.grey + static_cast<size_t>(from->row) * frame.stride_bytes + from->column;
-    const uint8_t *below = at + frame.stride_bytes;
-    const uint32_t fx = from->right, fy = from->down;
-    const uint32_t top = at[0] * (256 - fx) + at[1] * fx, bottom = below[0] * (256 - fx) + below[1] * fx;
-    out.grey[i] = static_cast<uint8_t>((top * (256 - fy) + bottom * fy + 32768) >> 16);
+  for (size_t i = 0; i < width * height; i++) {
+    const picture_sample &from = self.table[i];
+    out.grey[i] = is_sample(from) ? static_cast<uint8_t>((grey_of(frame, from) + 32768) >> 16) : 0;
   }
 }
 
@@ -86,7 +76,7 @@ bool sees(const rectification &self, const pixel &at, int32_t half) {
     for (int32_t j = -1; j <= 1; j++) {
       const int32_t x = u + j * half, y = v + i * half;
       if (x < 0 || y < 0 || x >= self.width || y >= self.height) return false;
-      if (!self.is_rectified && self.table[static_cast<ptrdiff_t>(y) * self.width + x].column == kNoPixel) return false;
+      if (!self.is_rectified && !is_sample(self.table[static_cast<ptrdiff_t>(y) * self.width + x])) return false;
     }
   return true;
 }

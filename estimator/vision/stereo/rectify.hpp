@@ -4,26 +4,18 @@
 #ifndef WAYMARK_ESTIMATOR_VISION_RECTIFY_HPP
 #define WAYMARK_ESTIMATOR_VISION_RECTIFY_HPP
 
+#include "image/picture_sample.hpp"
 #include "image/pyramid.hpp"
-#include "sensors/lens.hpp"
-#include "waymark/frame.h"
 
 namespace wm {
-
-// The upper left of four raw pixels, and the offset within them in 1/256 px.
-struct raw_pixel {
-  uint16_t column, row;  // column kNoPixel: outside of the raw picture
-  uint8_t right, down;
-};
-inline constexpr uint16_t kNoPixel = 0xFFFF;
 
 struct rectification {
   mounted_camera camera;
   int32_t width, height;
   double fu, fv, cu, cv;
   mat3 R_base_rectified;
-  bool is_rectified;  // the camera's pictures are rectified already
-  raw_pixel *table;   // width x height; unused then
+  bool is_rectified;      // the camera's pictures are rectified already
+  picture_sample *table;  // width x height; unused then
 };
 
 // Sets everything but `out->table`. NULL, or the reason why it is impossible (a constant string).

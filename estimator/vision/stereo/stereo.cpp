@@ -71,8 +71,8 @@ size_t lay_out(stereo_state *state, const rectification cameras[2], const wm_ste
   memory_layout memory(state, sizeof *state);
   uint8_t *pictures[3];
   for (uint8_t *&picture : pictures) picture = memory.take<uint8_t>(pyramid_bytes(width, height));
-  raw_pixel *tables[2];
-  for (int i = 0; i < 2; i++) tables[i] = memory.take<raw_pixel>(cameras[i].is_rectified ? 0 : area);
+  picture_sample *tables[2];
+  for (int i = 0; i < 2; i++) tables[i] = memory.take<picture_sample>(cameras[i].is_rectified ? 0 : area);
   auto *row = memory.take<uint16_t>(static_cast<size_t>(width));
   auto *work = memory.take<uint8_t>(corners_bytes(width / 2)),
        *taken = memory.take<uint8_t>(static_cast<size_t>(cells));

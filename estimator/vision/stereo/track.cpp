@@ -66,7 +66,7 @@ bool take_pair(const pair_geometry &rig, const wm_stereo_params &params, const p
 // Warp from offsets now to offsets in the first picture: inverse of the derivatives of the map over the surface, by
 // differences over the patch.
 bool anchor_by_now(const pair_geometry &rig, const track &self, const rigid &camera_anchor, warp2 *out) {
-  constexpr double kStep_px = 4.0;
+  constexpr double kStep_px = 4.0;  // of the differences: half of a patch
   const auto seen_now = [&](double du, double dv, pair_pixels *px) {
     const vec3 ray = {(self.anchor.u + du - rig.cu) / rig.fu, (self.anchor.v + dv - rig.cv) / rig.fv, 1.0};
     const double inverse_depth = dot(self.anchor_surface, ray);
