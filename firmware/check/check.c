@@ -14,7 +14,12 @@ static void messages(const wm_config *config, findings *out) {
     find(out, FINDING_NOTE, "publish", "a higher realtime.loop_hz, or a lower publish.rate_hz",
          "publish.rate_hz %g is more than realtime.loop_hz %d: poses would go out at %d Hz", p->publish_rate_hz,
          (int)p->realtime_loop_hz, (int)p->realtime_loop_hz);
-  if (!url[0] || !p->publish_lcm) return;
+  if (p->commands_lcm || config->devices.sightings_by_lcm)
+    find(out, FINDING_NOTE, "commands", "a firewall rule for LCM's port, or commands.lcm: false",
+         "%s taken over LCM: any program that reaches its UDP port (7667 by default), on this computer or on a network "
+         "that it is in, can move the pose",
+         p->commands_lcm ? "commands are" : "sightings are");
+  if (!url[0]) return;
   int known = 0;
   for (size_t i = 0; i < sizeof kWays / sizeof kWays[0]; i++) known |= strncmp(url, kWays[i], strlen(kWays[i])) == 0;
   const char *ttl = strstr(url, "ttl=");
@@ -23,7 +28,7 @@ static void messages(const wm_config *config, findings *out) {
          "publish.lcm_url: '%s' is no way that LCM knows (udpm, tcpq, memq, file)", url);
   else if (ttl && strtol(ttl + 4, NULL, 10) > 0)
     find(out, FINDING_NOTE, "publish", "ttl=0 keeps messages on this computer",
-         "publish.lcm_url: poses go out into the network, and commands may come from it (%s)", url);
+         "publish.lcm_url: poses go out into the network (%s)", url);
 }
 
 // The folder in which something is to be made.

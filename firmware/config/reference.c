@@ -70,7 +70,7 @@ void wm_config_reference(FILE *to) {
   print_keys(to, kConfigCanDeviceKeys);
   fprintf(to, "\n## Each entry of `devices.cameras`\n\n");
   print_keys(to, kConfigCameraDeviceKeys);
-  fprintf(to, "\n## `merge`, `publish`, `realtime`, `start`, `black_box`\n\n");
+  fprintf(to, "\n## `merge`, `publish`, `commands`, `realtime`, `start`, `black_box`\n\n");
   print_table(to, &sections[0]);
   fprintf(to, "\n## `motion`\n\n");
   print_table(to, &sections[1]);

@@ -109,9 +109,9 @@ static void start_where_it_was(live *self) {
            start->p_m[0], start->p_m[1], start->heading_rad * 180 / M_PI, start->sigma_xy_m);
 }
 
-// What is told over LCM is a source as any other, so that it is in its place in time, and in the log.
+// Commands over LCM are a source as any other, so that they are in their place in time, and in the log.
 static wm_status add_commands(live *self, wm_recording *recording, wm_error *err) {
-  if (!self->config->runtime.publish_lcm) return WM_OK;
+  if (!self->config->runtime.commands_lcm) return WM_OK;
   wm_source *commands;
   wm_status status = lcm_commands_open(self->config->lcm_url, self->config->channel_prefix, NULL, &commands, err);
   return status == WM_OK ? wm_recording_add_device(recording, commands, 0, err) : status;

@@ -9,9 +9,14 @@
 
 static int room(size_t length) { return length > INT32_MAX ? INT32_MAX : (int)length; }
 
+// Names come from any sender and go to a terminal: control characters (C0, DEL, and C1 in UTF-8) become '?'.
 static void take_name(char *out, size_t capacity, const uint8_t *name, size_t length) {
   size_t n = length < capacity ? length : capacity;
-  memcpy(out, name, n);
+  for (size_t i = 0; i < n; i++) {
+    const int is_c1 = i > 0 && name[i - 1] == 0xc2 && name[i] >= 0x80 && name[i] < 0xa0;
+    const int is_control = name[i] != '\0' && (name[i] < 0x20 || name[i] == 0x7f || is_c1);
+    out[i] = is_control ? '?' : (char)name[i];
+  }
   out[n - 1] = '\0';
 }
 

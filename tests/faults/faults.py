@@ -84,7 +84,7 @@ class Drive:
         self.config = (
             drives.with_realtime((ROOT / "config" / own).read_text(), "lock_memory: false") + f"\ninitial_pose: {drives.start_of(recording)}\n"
             "calibration: calibration.yaml\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\n" + devices +
-            f"publish: {{lcm_url: '{drives.URL}'}}\n"
+            f"publish: {{lcm_url: '{drives.URL}'}}\ncommands: {{lcm: true}}\n"
             "start: {saved_pose: pose.yaml, save_every_s: 0.5}\n")
         (self.folder / "robot.yaml").write_text(self.config)
         subprocess.run(["ip", "link", "set", "lo", "up"], check=True)

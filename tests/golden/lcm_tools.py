@@ -86,11 +86,13 @@ def check_logger(work):
 
     log = work / "lcm.log"
     logger = subprocess.Popen(["lcm-logger", "-q", "-f", f"--lcm-url={URL}", log])
-    time.sleep(0.5)
-    finish(run(work / "recording", work / "config.yaml", work / "heard"))
-    time.sleep(0.5)
-    logger.send_signal(signal.SIGINT)
-    logger.wait(timeout=10)
+    try:
+        time.sleep(0.5)
+        finish(run(work / "recording", work / "config.yaml", work / "heard"))
+        time.sleep(0.5)
+    finally:
+        logger.send_signal(signal.SIGINT)
+        logger.wait(timeout=10)
 
     decoders = {"WAYMARK_POSE": waymark.pose_t, "WAYMARK_HEALTH": waymark.health_t,
                 "WAYMARK_INNOVATION": waymark.innovation_t, "WAYMARK_OBSERVATIONS": waymark.observations_t,
@@ -193,6 +195,7 @@ def inside():
         write_recording(work / "recording", 4)
         (work / "config.yaml").write_text(
             "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm_url: '" + URL + "'}\n"
+            "commands: {lcm: true}\n"
             "realtime: {lock_memory: false}\n")
         check_logger(work)
         check_commands(work)

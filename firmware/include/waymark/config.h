@@ -61,6 +61,7 @@ typedef struct wm_runtime_params {
   double publish_jump_m, publish_jump_deg;  // map against odom: larger moves are announced as jumps
   double publish_motion_stale_ms;
   int32_t publish_lcm;                    // 0: no LCM
+  int32_t commands_lcm;                   // 0: SET_POSE and RESET are not taken
   double publish_useless_m;               // sigma of position from which on a pose is of no use
   double start_max_age_s;                 // of the saved pose
   double start_moved_m, start_moved_deg;  // sigmas of what may have happened to the robot while it was off

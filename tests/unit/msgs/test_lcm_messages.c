@@ -87,6 +87,19 @@ static void the_largest_health_fits(void) {
   TEST_ASSERT_EQUAL(WM_HEALTH_COUNTERS_MAX, read.counter_count);
 }
 
+static void names_from_a_stranger_cannot_write_to_a_terminal(void) {
+  static wm_health h, read;
+  h = (wm_health){.source_count = 2};
+  strcpy(h.sources[0].name,
+         "EVIL\x1b]0;owned\a\xc2\x9b"
+         "31m");
+  strcpy(h.sources[1].name, "caméra");
+  const size_t length = wm_lcm_health(&h, bytes, sizeof bytes);
+  TEST_ASSERT_NULL(wm_lcm_read_health(bytes, length, &read));
+  TEST_ASSERT_EQUAL_STRING("EVIL?]0;owned?\xc2?31m", read.sources[0].name);
+  TEST_ASSERT_EQUAL_STRING("caméra", read.sources[1].name);
+}
+
 // Senders from before NaN stood for every absent number have elevations with a sigma of 0.
 static void a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation(void) {
   waymark_observations_t m = {.t_ns = 1, .count = 2, .elevation_sigma_rad = {0, 0.5}};
@@ -181,6 +194,7 @@ int main(void) {
   RUN_TEST(a_pose_arrives_whole);
   RUN_TEST(health_arrives_with_its_sources);
   RUN_TEST(the_largest_health_fits);
+  RUN_TEST(names_from_a_stranger_cannot_write_to_a_terminal);
   RUN_TEST(a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation);
   RUN_TEST(every_value_of_an_enum_has_its_constant);
   RUN_TEST(an_innovation_arrives);
