@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "maps/edge_map.hpp"
 
+#include <bit>
 #include <cstring>
 
 #include "math/elementary.hpp"
@@ -8,11 +9,14 @@
 namespace wm {
 namespace {
 
-constexpr size_t aligned(size_t bytes) { return (bytes + 63) & ~(size_t)63; }
-constexpr int kLineRadius = 6;  // pixels on each side that a line is fitted to
-constexpr double kLineUnit_px = 1.0 / 32;
-constexpr double kLineVariance_px2 = 0.7;  // across it; a line of one pixel's width has up to 1/6
-constexpr int8_t kNoLine = -128;
+constexpr int kSideMax_px = 32768;  // of a map: rows and columns of tiles are counted on the stack
+constexpr int kLineRadius_px = 6;   // a line is fitted to the edge pixels up to so far: 8 cm at 75 px/m; not swept
+constexpr double kLineUnit_px = 1.0 / 32;  // of a line's offset, which is kept in a byte: up to 4 px
+// Variance of edge pixels across their line: at most 1/6 for a line of one pixel, 0.67 for one of three; a corner has
+// more.
+constexpr double kLineVariance_px2 = 0.7;
+constexpr double kLineLength_px2 = 1.0;  // least variance along it: about four pixels
+constexpr int8_t kNoLine = -128;         // marks a pixel without a line
 
 int tiles_along(uint32_t pixels) { return (int)((pixels + edge_map::kTile - 1) >> edge_map::kTileShift); }
 
@@ -51,48 +55,48 @@ void each_tile_with_edges(const wm_raster &raster, Visit visit) {
     }
 }
 
-// Tiles between a tile with edges and the farthest one that is within reach of it: two at most.
-constexpr int kNeighboursMax = (edge_map::kReachPixelsMax + edge_map::kTile - 1) / edge_map::kTile;
-int neighbours_of(int reach_px) { return (reach_px + edge_map::kTile - 1) / edge_map::kTile; }
+// Calls mark(tile column, tile row) for every tile within reach of an edge, for most of them more than once.
+template <class Mark>
+void each_tile_in_reach(const wm_raster &raster, Mark mark) {
+  const int columns = tiles_along(raster.width_px), rows = tiles_along(raster.height_px);
+  const int neighbours = (reach_of(raster) + edge_map::kTile - 1) / edge_map::kTile;
+  each_tile_with_edges(raster, [&](int column, int row) {
+    for (int y = row - neighbours; y <= row + neighbours; y++)
+      for (int x = column - neighbours; x <= column + neighbours; x++)
+        if (x >= 0 && y >= 0 && x < columns && y < rows) mark(x, y);
+  });
+}
+
+// The directory has a ring of tiles around the map; its rows are a power of two long.
+size_t directory_size(const wm_raster &raster) {
+  return (size_t)(tiles_along(raster.height_px) + 2) << shift_for(tiles_along(raster.width_px) + 2);
+}
 
 }  // namespace
 
-// Counts the tiles within reach with the marks of five rows of tiles at a time.
+// The blocks behind the directory, for so many tiles.
+void edge_map::lay_out(memory_layout *layout, size_t tiles, edge_map *own) {
+  auto *distances = layout->take<uint8_t>(tiles * kTilePixels);
+  auto *offsets = layout->take<offset>(tiles * kTilePixels);
+  if (own) own->distances_.set(distances), own->offsets_.set(offsets);
+}
+
 size_t edge_map::bytes(const wm_raster &raster) {
-  if (!raster.edges || raster.width_px == 0 || raster.height_px == 0 || raster.width_px > 32768 ||
-      raster.height_px > 32768 || !(raster.resolution_m > 0.0))
+  if (!raster.edges || raster.width_px == 0 || raster.height_px == 0 || raster.width_px > kSideMax_px ||
+      raster.height_px > kSideMax_px || !(raster.resolution_m > 0.0))
     return 0;
-  const int columns = tiles_along(raster.width_px), rows = tiles_along(raster.height_px);
-  static_assert(32768 / kTile <= 512);
-  const int neighbours = neighbours_of(reach_of(raster));
-  static_assert(kNeighboursMax == 2);
-  bool marked[5][512 + 4] = {};  // rows of tiles: two above, this, two below
-  int newest = -1;
+  constexpr int kTilesAlong = kSideMax_px / kTile;
+  uint64_t reached[kTilesAlong][kTilesAlong / 64] = {};  // a bit a tile: 32 kB
+  each_tile_in_reach(raster, [&](int column, int row) { reached[row][column / 64] |= (uint64_t)1 << column % 64; });
   size_t count = 1;
-  const auto close_row = [&](int row) {  // counts what is within reach in `row`
-    for (int c = 0; c < columns; c++) {
-      bool near = false;
-      for (int dy = -neighbours; dy <= neighbours; dy++)
-        for (int dx = -neighbours; dx <= neighbours; dx++) near |= marked[(row + dy + 5) % 5][c + dx + 2];
-      count += near;
-    }
-  };
-  const auto open_row = [&](int row) { std::memset(marked[(row + 5) % 5], 0, sizeof marked[0]); };
-  const auto advance = [&](int row) {  // rows up to `row` are complete but for `row` itself
-    while (newest < row) {
-      newest++;
-      if (newest >= neighbours + 1) close_row(newest - neighbours - 1);
-      open_row(newest);
-    }
-  };
-  each_tile_with_edges(raster, [&](int column, int row) {
-    advance(row);
-    marked[row % 5][column + 2] = true;
-  });
-  advance(rows + neighbours);
+  for (const auto &row : reached)
+    for (const uint64_t tiles : row) count += (size_t)std::popcount(tiles);
   if (count > kTilesMax) return 0;
-  return aligned(((size_t)(rows + 2) << shift_for(columns + 2)) * sizeof(uint32_t)) +
-         count * kTilePixels * (1 + sizeof(offset)) + aligned((size_t)3 * raster.width_px * sizeof(int32_t));
+  memory_layout layout(nullptr, 0);
+  layout.take<uint32_t>(directory_size(raster));
+  lay_out(&layout, count, nullptr);
+  layout.take<int32_t>((size_t)3 * raster.width_px);
+  return layout.bytes();
 }
 
 size_t edge_map::bytes_or_reason(const wm_raster *raster, const char **why) {
@@ -121,31 +125,19 @@ void edge_map::init(const wm_raster &raster, void *memory) {
   tile_columns_ = tiles_along(raster.width_px);
   tile_rows_ = tiles_along(raster.height_px);
   row_shift_ = shift_for(tile_columns_ + 2);
-  const int directory = (tile_rows_ + 2) << row_shift_;
-  const auto place = [this](const void *there) {
-    return (ptrdiff_t)(reinterpret_cast<uintptr_t>(there) - reinterpret_cast<uintptr_t>(this));
-  };
-  const int neighbours = neighbours_of(reach_px_);
-  uint32_t *tile = static_cast<uint32_t *>(memory);
-  tile_at_ = place(tile);
-  std::memset(tile, 0, (size_t)directory * sizeof(uint32_t));
-  each_tile_with_edges(raster, [&](int column, int row) {
-    for (int y = row - neighbours; y <= row + neighbours; y++)
-      for (int x = column - neighbours; x <= column + neighbours; x++)
-        if (x >= 0 && y >= 0 && x < tile_columns_ && y < tile_rows_) tile[(y + 1) << row_shift_ | (x + 1)] = 1;
-  });
+  memory_layout layout(memory, 0);
+  auto *tile = layout.take<uint32_t>(directory_size(raster));
+  tiles_.set(tile);
+  std::memset(tile, 0, directory_size(raster) * sizeof *tile);
+  each_tile_in_reach(raster, [&](int column, int row) { tile[(row + 1) << row_shift_ | (column + 1)] = 1; });
   uint32_t count = 1;
-  for (int i = 0; i < directory; i++)
+  for (size_t i = 0; i < directory_size(raster); i++)
     if (tile[i]) tile[i] = count++ * kTilePixels;
-  uint8_t *next = static_cast<uint8_t *>(memory) + aligned((size_t)directory * sizeof(uint32_t));
-  distance_at_ = place(next);
-  std::memset(next, kFar, (size_t)count * kTilePixels);
-  next += (size_t)count * kTilePixels;
-  offset_at_ = place(next);
-  next += (size_t)count * kTilePixels * sizeof(offset);
-  scratch_at_ = place(next);
+  lay_out(&layout, count, this);
+  std::memset(distances_.get(), kFar, (size_t)count * kTilePixels);
+  auto *scratch = layout.take<int32_t>((size_t)3 * raster.width_px);
   sweep_columns();
-  for (int row = 0; row < (int)raster.height_px; row++) sweep_row(row);
+  for (int row = 0; row < (int)raster.height_px; row++) sweep_row(row, scratch);
   fit_lines();
 }
 
@@ -168,7 +160,7 @@ void edge_map::sweep_tile_column(int tx, bool down) {
     const uint32_t tile = tiles()[((row >> kTileShift) + 1) << row_shift_ | (tx + 1)];
     if (!tile) continue;  // out of reach: so is every edge passed before
     const uint8_t *edges = raster_->edges + (size_t)row * raster_->width_px + (size_t)x0;
-    offset *to = offsets() + tile + in_row(0, row);
+    offset *to = offsets_.get() + tile + in_row(0, row);
     for (int i = 0; i < width; i++) {
       since[i] = edges[i] ? 0 : since[i] < none ? since[i] + 1 : none;
       if (down)
@@ -191,12 +183,13 @@ void edge_map::each_pixel_in_reach(int row, Visit visit) const {
   }
 }
 
-// Second pass: the lower envelope of the parabolas that stand over a row's columns, then each pixel's parabola.
-void edge_map::sweep_row(int row) {
-  offset *edge_offset = offsets();
-  uint8_t *distance = at<uint8_t>(distance_at_);
+// `site`: work space for three numbers a column. Second pass: the lower envelope of the parabolas that stand over a
+// row's columns, then each pixel's parabola.
+void edge_map::sweep_row(int row, int32_t *site) {
+  offset *edge_offset = offsets_.get();
+  uint8_t *distance = distances_.get();
   const int width = (int)raster_->width_px, none = reach_px_ + 1;
-  int32_t *site = at<int32_t>(scratch_at_), *site_y = site + width, *start = site_y + width;
+  int32_t *site_y = site + width, *start = site_y + width;
   int count = 0;
   each_pixel_in_reach(row, [&](int column, uint32_t pixel) {
     const int y = +edge_offset[pixel].y;  // signed
@@ -239,8 +232,8 @@ void edge_map::fit_lines() {
       }
       if (!is_edge(column, row)) continue;
       int n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
-      for (int y = -kLineRadius; y <= kLineRadius; y++)
-        for (int x = -kLineRadius; x <= kLineRadius; x++) {
+      for (int y = -kLineRadius_px; y <= kLineRadius_px; y++)
+        for (int x = -kLineRadius_px; x <= kLineRadius_px; x++) {
           if (!is_edge(column + x, row + y)) continue;
           n++;
           sx += x;
@@ -253,9 +246,9 @@ void edge_map::fit_lines() {
       const double xx = (double)sxx / n - mean_x * mean_x, yy = (double)syy / n - mean_y * mean_y;
       const double xy = (double)sxy / n - mean_x * mean_y;
       const double half = 0.5 * (xx + yy), spread = std::sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy);
-      offset &to = offsets()[tile_of(column, row) + in_row(column, row)];
+      offset &to = offsets_[tile_of(column, row) + in_row(column, row)];
       to = {0, kNoLine};
-      if (half - spread > kLineVariance_px2 || half + spread < 1.0) continue;
+      if (half - spread > kLineVariance_px2 || half + spread < kLineLength_px2) continue;
       const double normal = 0.5 * atan2(2.0 * xy, xx - yy) + kHalfPi;  // (0, pi]
       const int turn = (int)(normal * (256.0 / kPi) + 0.5) & 255;
       const sin_cos a = sincos(turn * (kPi / 256.0));
@@ -290,11 +283,11 @@ edge_line edge_map::nearest(double x_m, double y_m) const {
   const int steps = distance_of(column, row);
   if (steps == kFar) return out;
   if (steps > 0) {
-    const offset way = offsets()[tile_of(column, row) + in_row(column, row)];
+    const offset way = offsets_[tile_of(column, row) + in_row(column, row)];
     column += way.x;
     row += way.y;
   }
-  const offset line = offsets()[tile_of(column, row) + in_row(column, row)];
+  const offset line = offsets_[tile_of(column, row) + in_row(column, row)];
   const double du = column + 0.5 - u, dv = row + 0.5 - v;
   out.distance_m = std::sqrt(du * du + dv * dv) * raster_->resolution_m;
   if (line.y == kNoLine) return out;

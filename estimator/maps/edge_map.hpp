@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "memory/layout.hpp"
 #include "waymark/frames.h"
 #include "waymark/setup.h"
 
@@ -16,7 +17,7 @@ namespace wm {
 
 // Where the nearest edge is seen from a place, in map axes.
 struct edge_line {
-  double normal_x, normal_y;  // unit; which of its two sides it points to says nothing
+  double normal_x, normal_y;  // unit, towards either side
   double offset_m;            // normal . (line - place)
   double distance_m;          // to the nearest edge pixel
   bool found;                 // within reach
@@ -24,9 +25,10 @@ struct edge_line {
 
 class edge_map {
  public:
+  // Pixels along a tile and in it: its distances fill a page of memory.
   static constexpr int kTileShift = 6, kTile = 1 << kTileShift, kTilePixels = kTile * kTile;
-  static constexpr int kReachPixelsMax = 120;      // offsets are kept in a byte
-  static constexpr double kReach_m = 0.6;          // beyond it an edge is none
+  static constexpr int kReachPixelsMax = 120;      // offsets are kept in a signed byte
+  static constexpr double kReach_m = 0.6;          // farther edges are none: four gates of 0.15 m
   static constexpr int kFar = 255;                 // distance of what is out of reach
   static constexpr uint32_t kTilesMax = 1u << 19;  // 3 bytes a pixel: 6 GB
 
@@ -52,8 +54,8 @@ class edge_map {
   // For kernels. The directory has a ring of tiles around the map in which every edge is out of reach, so that with
   // kTile added and clamped to [0, padded_columns()), [0, padded_rows()) any pixel may be looked up: its byte is
   // distances()[tiles()[row / kTile << row_shift() | column / kTile] + inside].
-  const uint8_t *distances() const { return at<const uint8_t>(distance_at_); }
-  const uint32_t *tiles() const { return at<const uint32_t>(tile_at_); }
+  const uint8_t *distances() const { return distances_.get(); }
+  const uint32_t *tiles() const { return tiles_.get(); }
   int padded_columns() const { return (tile_columns_ + 2) << kTileShift; }
   int padded_rows() const { return (tile_rows_ + 2) << kTileShift; }
   int row_shift() const { return row_shift_; }  // a row of tiles is 2^row_shift() of them
@@ -80,16 +82,16 @@ class edge_map {
     return tiles()[((row >> kTileShift) + 1) << row_shift_ | ((column >> kTileShift) + 1)];
   }
   static uint32_t in_row(int column, int row) { return (uint32_t)inside(column, row); }
-  offset *offsets() const { return at<offset>(offset_at_); }
   bool is_edge(int column, int row) const {
     return column >= 0 && row >= 0 && column < (int)raster_->width_px && row < (int)raster_->height_px &&
            raster_->edges[(size_t)row * raster_->width_px + (size_t)column];
   }
+  static void lay_out(memory_layout *layout, size_t tiles, edge_map *own);
   void sweep_columns();
   void sweep_tile_column(int tx, bool down);
   template <class Visit>
   void each_pixel_in_reach(int row, Visit visit) const;
-  void sweep_row(int row);
+  void sweep_row(int row, int32_t *site);
   void fit_lines();
 
   const wm_raster *raster_;
@@ -99,13 +101,9 @@ class edge_map {
   unit_vector normal_[256];  // of a line, by the byte that is kept of it
   double cos_yaw_, sin_yaw_, unit_m_, pixels_a_metre_;
   int reach_px_, tile_columns_, tile_rows_, row_shift_;
-  // Bytes from this object on, so that a copy of the whole state has a map of its own. Of each tile the index of its
-  // first pixel, 0 where it is out of reach; then distances, offsets and a row's work space.
-  ptrdiff_t tile_at_, distance_at_, offset_at_, scratch_at_;
-  template <class T>
-  T *at(ptrdiff_t bytes) const {
-    return reinterpret_cast<T *>(reinterpret_cast<uintptr_t>(this) + (uintptr_t)bytes);
-  }
+  relative_array<uint32_t> tiles_;  // index of each tile's first pixel, 0 where it is out of reach
+  relative_array<uint8_t> distances_;
+  relative_array<offset> offsets_;
 };
 
 }  // namespace wm

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How well a scan of edge points fits the map from a pose: the kernel that a particle costs. Integers from the look-up
-// on, so that the order of summation is nobody's business; the vector form and its scalar twin give the same bits.
+// Log likelihood of a scan of edge points from a pose, for maps that are too large for a score_field. Integers from the
+// look-up on, so the vector form and its scalar twin give the same bits in any order of summation.
 #ifndef WAYMARK_ESTIMATOR_MAPS_LIKELIHOOD_HPP
 #define WAYMARK_ESTIMATOR_MAPS_LIKELIHOOD_HPP
 
@@ -9,8 +9,8 @@
 
 namespace wm {
 
-inline constexpr int kSigmaClasses = 4;
-inline constexpr int kScanLanes = 8;
+inline constexpr int kSigmaClasses = 4;  // of points; pf_edges has their sigmas
+inline constexpr int kScanLanes = 8;     // floats of the widest vector
 
 // Points in base_link, in the order of their classes of sigma; behind the last one repeated to a full vector.
 struct scan_points {
@@ -21,12 +21,13 @@ struct scan_points {
   alignas(16) float y_m[WM_POINTS_MAX + kScanLanes];
 };
 
-// Of each class: what a point counts by the distance byte under it.
+// A point's score by its class and the distance byte under it.
 struct score_table {
   int32_t value[kSigmaClasses][256];
 };
 
-inline constexpr double kScoreUnit = 1.0 / 4096;  // of a score, whatever it is
+inline constexpr double kScoreUnit =
+    1.0 / 4096;  // nats, or the likelihood itself, of 1 in a score: its rounding is no noise
 
 // Table of log((1 - floor) exp(-d^2/2 sigma^2) + floor), or, `sum`, of the same without the logarithm (the paper's
 // likelihood: a sum over the points).

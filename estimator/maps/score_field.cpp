@@ -9,21 +9,22 @@
 namespace wm {
 namespace {
 
-constexpr int kTileShift = 8, kTile = 1 << kTileShift, kTileArea = kTile * kTile;
+constexpr int kTileShift = 8;  // of pixels along a tile: a place in a tile is 16 bits
+constexpr int kTile = 1 << kTileShift, kTileArea = kTile * kTile;
 // Within a tile cells of 8 x 8 pixels, a cache line each: from the places of one point seen by all particles few are
 // far.
 constexpr int kCellShift = 3;
 constexpr int16_t kLow = (1 << kCellShift) - 1, kMiddle = (kTile - 1) & ~kLow;
-constexpr int kRing = 1;  // pixels around the map that count as far from any edge: where clamped points go
-constexpr int kUnitShiftMax = 6;
-constexpr double kUnity = 32767.0;
+constexpr int kRing = 1;            // pixels around the map that count as far from any edge: where clamped points go
+constexpr int kUnitShiftMax = 6;    // a turned point is rounded to 1/64 pixel at best
+constexpr double kUnity = 32767.0;  // of a cosine in 16 bits
 
 int tiles_for(uint32_t pixels) { return ((int)pixels + 2 * kRing + kTile - 1) >> kTileShift; }
 
 int16_t rounded(double value) { return (int16_t)std::floor(value + 0.5); }
 
-// What a block of points counts, added to the sum of every pose. Vectors of kLanes points; a vector's address words are
-// interleaved as the machine does it best, which puts the points in another order.
+// The scores of a block of points, added to the sum of every pose. Vectors of kLanes points; a vector's address words
+// are interleaved as the machine does it best, which puts the points in another order.
 struct block_view {
   const int16_t *x, *y, *used;
   const uint8_t *layer;
@@ -167,8 +168,8 @@ void score_field::init(const edge_map &map, const score_table &table, void *memo
   }
   tile_columns_ = tiles_for(map.raster().width_px);
   tile_rows_ = tiles_for(map.raster().height_px);
-  layers_at_ = (ptrdiff_t)(reinterpret_cast<uintptr_t>(memory) - reinterpret_cast<uintptr_t>(this));
   auto *layer = static_cast<uint8_t *>(memory);
+  layers_.set(layer);
   std::memset(layer, 0, bytes(map.raster()));
   const int32_t least = table.value[0][edge_map::kFar];
   int32_t most = least + 1;
@@ -259,7 +260,7 @@ void score_field::score(const packed_scan &scan, const field_poses &poses, int c
     const block_view block = {scan.x + first,
                               scan.y + first,
                               scan.used + first,
-                              layers() + scan.layer[b] * area,
+                              layers_.get() + scan.layer[b] * area,
                               scan.shift,
                               tile_columns_,
                               (tile_columns_ << kTileShift) - 1,

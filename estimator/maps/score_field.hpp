@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a cloud of particles costs: for every particle and every point of a scan one look-up. So what a point counts is
-// baked into the map when it is made ready: a layer of bytes for each class of sigma, in tiles of 256 x 256, so that
-// the place within a tile and the tile's number are 16 bits each and an address is the one behind the other; within a
-// tile in cells of 8 x 8, a cache line each. One dependent load is left of each point. Integers all the way: the order
-// of summation is nobody's business, and vectors of any width give the same bits.
+// Scores of a cloud of particles: one look-up for every particle and point of a scan. A point's score is baked into the
+// map: a layer of bytes for each class of sigma, in tiles of 256 x 256 pixels, within them cells of 8 x 8, a cache line
+// each. An address is the tile's number behind the place in the tile, 16 bits each. Sums are of integers, so vectors of
+// any width give the same bits.
 #ifndef WAYMARK_ESTIMATOR_MAPS_SCORE_FIELD_HPP
 #define WAYMARK_ESTIMATOR_MAPS_SCORE_FIELD_HPP
 
@@ -13,6 +12,7 @@ namespace wm {
 
 // A scan in fixed point, 16 points of one class at a time.
 struct packed_scan {
+  // Points of a block: the widest vector of words. Blocks of a full scan, one in part for each class.
   static constexpr int kBlock = 16, kBlocksMax = WM_POINTS_MAX / kBlock + kSigmaClasses;
   int count;  // of points
   int blocks;
@@ -31,9 +31,9 @@ struct field_poses {
 
 class score_field {
  public:
-  static constexpr size_t kBytesMax = (size_t)1 << 28;  // of all layers: 64 million pixels
-  static constexpr int kPixelsMax = 16000;              // along a side
-  static constexpr int kReachPixels = 8000;             // points farther away don't count
+  static constexpr size_t kBytesMax = (size_t)1 << 28;  // of all layers: 64 million pixels, a hall of 100 m
+  static constexpr int kPixelsMax = 16000;              // along a side: a pixel and its fractions are 16 bits
+  static constexpr int kReachPixels = 8000;             // farther points have no score: 107 m at 75 px/m
 
   // Bytes that init() needs for a map of this size; 0 where it is too large, and particles look at distances instead.
   static size_t bytes(const wm_raster &raster);
@@ -53,14 +53,11 @@ class score_field {
   void score(const packed_scan &scan, const field_poses &poses, int count, int32_t *sums) const;
 
  private:
-  const uint8_t *layers() const {
-    return reinterpret_cast<const uint8_t *>(reinterpret_cast<uintptr_t>(this) + (uintptr_t)layers_at_);
-  }
   void bake(const edge_map &map, const uint8_t *value, uint8_t *layer) const;
 
   int tile_columns_, tile_rows_;
   double unit_, floor_;
-  ptrdiff_t layers_at_;  // from this object on, so that a copy of the whole state has a field of its own
+  relative_array<uint8_t> layers_;
 };
 
 }  // namespace wm

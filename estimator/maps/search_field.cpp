@@ -10,7 +10,7 @@
 namespace wm {
 namespace {
 
-constexpr double kFinest_m = 0.1;
+constexpr double kFinest_m = 0.1;  // cell: a building of 100 m takes 1 MB, the second level cache; not swept
 
 struct extent {
   double cell_m;
@@ -34,9 +34,7 @@ extent extent_of(const wm_raster &raster) {
   }
 }
 
-size_t standing_bytes(const extent &e) { return (size_t)(e.runs * e.grid_rows) * sizeof(uint16_t); }
-
-// What vectors of kLanes words add up; the cells of a run's places are the lower bytes of words side by side.
+// Sums by vectors of kLanes words; the cells of a run's places are the lower bytes of words side by side.
 template <int kLanes>
 WM_KERNEL void sum_lists(const uint8_t *from, const int32_t *steps, int stride, int headings, int count, int least,
                          uint16_t (*sums)[search_field::kRun], bool *reached) {
@@ -77,7 +75,10 @@ WM_WIDE void sum_lists_wide(const uint8_t *from, const int32_t *steps, int strid
 
 size_t search_field::bytes(const wm_raster &raster) {
   const extent e = extent_of(raster);
-  return standing_bytes(e) + (size_t)e.stride * (size_t)e.all_rows;
+  memory_layout layout(nullptr, 0);
+  layout.take<uint16_t>((size_t)(e.runs * e.grid_rows));
+  layout.take<uint8_t>((size_t)e.stride * (size_t)e.all_rows);
+  return layout.bytes();
 }
 
 void search_field::sum_run(ptrdiff_t corner, const int32_t *steps, int stride, int headings, int count, int least,
@@ -86,7 +87,7 @@ void search_field::sum_run(ptrdiff_t corner, const int32_t *steps, int stride, i
 #if WM_HAS_WIDE
   if (wm_vectors_wide()) sum = sum_lists_wide;
 #endif
-  sum(cells() + corner, steps, stride, headings, count, least, sums, reached);
+  sum(cells_.get() + corner, steps, stride, headings, count, least, sums, reached);
 }
 
 void search_field::place_of(const edge_map &map, int64_t run, int64_t row, int i, double *x_m, double *y_m) const {
@@ -111,8 +112,11 @@ void search_field::init(const edge_map &map, void *memory) {
   stride_ = (ptrdiff_t)e.stride;
   runs_ = e.runs;
   rows_ = e.grid_rows;
-  standing_before_ = (ptrdiff_t)standing_bytes(e);
-  cells_at_ = (ptrdiff_t)(reinterpret_cast<uintptr_t>(memory) - reinterpret_cast<uintptr_t>(this)) + standing_before_;
+  memory_layout layout(memory, 0);
+  auto *standing = layout.take<uint16_t>((size_t)(e.runs * e.grid_rows));
+  standing_.set(standing);
+  auto *to = layout.take<uint8_t>((size_t)e.stride * (size_t)e.all_rows);
+  cells_.set(to);
   const double least = log(kFloor);
   unit_ = -least / 255.0;
   uint8_t value[256];
@@ -120,7 +124,6 @@ void search_field::init(const edge_map &map, void *memory) {
     const double d = i * map.unit_m() / kSigma_m, hit = i == edge_map::kFar ? 0.0 : exp(-0.5 * d * d);
     value[i] = (uint8_t)((log((1.0 - kFloor) * hit + kFloor) - least) / unit_ + 0.5);
   }
-  auto *standing = static_cast<uint16_t *>(memory);
   for (int64_t row = 0; row < rows_; row++)
     for (int64_t run = 0; run < runs_; run++) {
       uint32_t bits = 0;
@@ -131,7 +134,6 @@ void search_field::init(const edge_map &map, void *memory) {
       }
       *standing++ = (uint16_t)bits;
     }
-  uint8_t *to = static_cast<uint8_t *>(memory) + standing_before_;
   std::memset(to, 0, (size_t)e.stride * (size_t)e.all_rows);
   const double pixels = cell_m_ / raster.resolution_m;
   for (int64_t r = 0; r < e.rows; r++)

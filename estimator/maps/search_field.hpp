@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The map as a sweep over all of it sees it: cells of 0.1 m, a byte each for how well a point fits that falls there. So
-// coarse, a building fits into the second level cache, and a point turned once for a heading is a fixed step in memory
-// from every place: a look-up costs two loads and an addition [Olson2009].
-// A sweep looks from a grid, every second cell, at 16 places of a row at a time: of all of them a point's cells lie
-// side by side, so that a vector is loaded where 16 bytes would be. Integers: the same bits everywhere.
+// A coarse likelihood field for sweeps over the whole map [Olson2009]: cells of 0.1 m, a byte each. A point that is
+// rotated once for a heading is a fixed step in memory from every place: a look-up is two loads and an addition.
+// A sweep's grid is every second cell. 16 places of a row are scored at a time, since a point's cells lie side by side.
+// Integers: the same bits everywhere.
 #ifndef WAYMARK_ESTIMATOR_MAPS_SEARCH_FIELD_HPP
 #define WAYMARK_ESTIMATOR_MAPS_SEARCH_FIELD_HPP
 
@@ -16,11 +15,12 @@ namespace wm {
 
 class search_field {
  public:
-  static constexpr double kSigma_m = 0.2, kFloor = 0.1;  // of a point's likelihood: half a grid step is no miss
-  static constexpr int kReachCells = 160;                // around the map, where nothing fits
-  static constexpr size_t kBytesMax = (size_t)1 << 26;   // a larger map gets larger cells
-
-  static constexpr int kGridCells = 2, kRun = 16;  // of the sweep's grid; places that are looked from at a time
+  // Of a point's likelihood: sigma, so that half a grid step is no misfit, and least value, for outliers. Not swept.
+  static constexpr double kSigma_m = 0.2, kFloor = 0.1;
+  static constexpr int kReachCells = 160;  // empty border: points up to 16 m from a robot at the map's edge
+  static constexpr size_t kBytesMax = (size_t)1 << 26;  // 64 MB; a larger map has larger cells
+  static constexpr int kGridCells = 2;                  // of 0.1 m: a grid of 0.2 m, the likelihood's sigma
+  static constexpr int kRun = 16;                       // places of a vector
 
   // Bytes that init() needs for this raster.
   static size_t bytes(const wm_raster &raster);
@@ -28,12 +28,12 @@ class search_field {
   void init(const edge_map &map, void *memory);
 
   double cell_m() const { return cell_m_; }
-  double unit() const { return unit_; }  // logarithm of the likelihood that 1 of a sum stands for
+  double unit() const { return unit_; }  // nats of 1 in a sum
   // The corner of cells `column`, `row` (from the map's left and upper border) as an index; it lies within the map.
   ptrdiff_t at(int64_t column, int64_t row) const {
     return (ptrdiff_t)(row + kReachCells) * stride_ + (ptrdiff_t)(column + kReachCells);
   }
-  // What a point within reach_m() adds to the index of its robot's corner: metres to the right and down the map.
+  // From the index of the robot's corner to a point's, within reach_m(): metres to the right and down the map.
   int32_t step(double right_m, double down_m) const {
     return (int32_t)((ptrdiff_t)std::floor(down_m / cell_m_) * stride_ + (ptrdiff_t)std::floor(right_m / cell_m_));
   }
@@ -42,7 +42,7 @@ class search_field {
   ptrdiff_t nearest(const edge_map &map, double x_m, double y_m) const;
   // Sum over the steps from that corner. O(count).
   int32_t sum(ptrdiff_t corner, const int32_t *steps, int count) const {
-    const uint8_t *from = cells() + corner;
+    const uint8_t *from = cells_.get() + corner;
     int32_t out = 0;
     for (int i = 0; i < count; i++) out += from[steps[i]];
     return out;
@@ -52,7 +52,7 @@ class search_field {
   int64_t runs() const { return runs_; }
   int64_t rows() const { return rows_; }
   // Bit i: a robot may stand at place i of the run.
-  uint32_t standing(int64_t run, int64_t row) const { return standing_at()[row * runs_ + run]; }
+  uint32_t standing(int64_t run, int64_t row) const { return standing_[(size_t)(row * runs_ + run)]; }
   ptrdiff_t corner_of(int64_t run, int64_t row) const {
     return at(kGridCells * kRun * run + kGridCells / 2, kGridCells * row + kGridCells / 2);
   }
@@ -63,14 +63,11 @@ class search_field {
                uint16_t (*sums)[kRun], bool *reached) const;
 
  private:
-  const uint8_t *cells() const {
-    return reinterpret_cast<const uint8_t *>(reinterpret_cast<uintptr_t>(this) + (uintptr_t)cells_at_);
-  }
-  const uint16_t *standing_at() const { return reinterpret_cast<const uint16_t *>(cells() - standing_before_); }
-
   double cell_m_, unit_;
   int64_t runs_, rows_;
-  ptrdiff_t stride_, cells_at_, standing_before_;  // from this object on; from the cells back
+  ptrdiff_t stride_;
+  relative_array<uint16_t> standing_;
+  relative_array<uint8_t> cells_;
 };
 
 }  // namespace wm

@@ -115,6 +115,23 @@ class factor {
   matrix<kN> l_;
 };
 
+// A = L D L' of a symmetric positive semidefinite A: L has a unit diagonal. A pivot of at most `rank_deficient` of its
+// diagonal element is 0 in D, with no column of L below it.
+template <int kN>
+void factorize_semidefinite(const matrix<kN> &a, double rank_deficient, matrix<kN> *l, vector<kN> *d) {
+  l->setIdentity();
+  for (int i = 0; i < kN; i++) {
+    double pivot = a(i, i);
+    for (int k = 0; k < i; k++) pivot -= square((*l)(i, k)) * (*d)[k];
+    (*d)[i] = pivot > rank_deficient * a(i, i) ? pivot : 0.0;
+    for (int j = i + 1; j < kN; j++) {
+      double sum = a(j, i);
+      for (int k = 0; k < i; k++) sum -= (*l)(j, k) * (*l)(i, k) * (*d)[k];
+      (*l)(j, i) = (*d)[i] > 0.0 ? sum / (*d)[i] : 0.0;
+    }
+  }
+}
+
 // X with A X = B, for a symmetric positive definite A. False: A is not, or X is not finite. Column by column: Eigen's
 // solver of a whole matrix is blocked and takes memory from the heap.
 template <int kN, int kCols>

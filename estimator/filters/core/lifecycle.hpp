@@ -50,6 +50,13 @@ class lifecycle {
     relocalizations_++;
   }
 
+  // In two steps: the published pose jumps to one that a search found; later observations confirm it.
+  void jumped() { resets_++; }
+  void confirmed() {
+    state_ = WM_STATE_TRACKING;
+    relocalizations_++;
+  }
+
   bool searching() const { return state_ == WM_STATE_SEARCHING; }
   bool tracking() const { return state_ == WM_STATE_TRACKING; }
   bool lost() const { return state_ == WM_STATE_LOST; }

@@ -10,12 +10,10 @@ namespace wm {
 
 // Copies of the states [from, to) of a filter with value(), variance() and forget(): the newest, the one before it,
 // which is safe while a fault is not yet noticed, and the start's.
-template <int kCapacity>
+// `kEvery_s`: seconds between two copies. A fault is noticed well within this time.
+template <int kCapacity, int kEvery_s = 10>
 class rollback {
  public:
-  // Seconds between two copies: a fault is noticed well within this time.
-  static constexpr double kEvery_s = 10.0;
-
   enum generation { kNewest, kSafe, kStart, kGenerations };
 
   template <class Filter>

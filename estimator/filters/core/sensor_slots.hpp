@@ -4,9 +4,7 @@
 #ifndef WAYMARK_ESTIMATOR_CORE_SENSOR_SLOTS_HPP
 #define WAYMARK_ESTIMATOR_CORE_SENSOR_SLOTS_HPP
 
-#include <cmath>
-
-#include "filters/core/calibration_list.hpp"
+#include "filters/core/state_slots.hpp"
 #include "sensors/sensor_model.hpp"
 #include "waymark/estimator.h"
 
@@ -24,22 +22,21 @@ class sensor_slots {
   // add(neutral, sigma, walk, low, high) appends a state to the filter and returns its index.
   template <class Add>
   void init(const wm_sensor_states &states, size_t sensors, Add add) {
-    for (size_t i = 0; i < kMaxSensors; i++)
-      for (int k = 0; k < kSensorStates; k++) {
-        const sensor_state_spec &s = kSensorStateSpecs[k];
-        const double sigma = states.sigma[s.row];
-        slot_[i][k] = i < sensors && sigma > 0.0 ? add(s.neutral, sigma, states.walk[s.row], s.low, s.high) : -1;
-      }
+    slots_.init(static_cast<int>(sensors), [&](int k) {
+      const sensor_state_spec &s = kSensorStateSpecs[k];
+      const double sigma = states.sigma[s.row];
+      return sigma > 0.0 ? add(s.neutral, sigma, states.walk[s.row], s.low, s.high) : -1;
+    });
   }
 
-  int at(int sensor, int state) const { return slot_[sensor][state]; }  // -1: off
+  int at(int sensor, int state) const { return slots_.at(sensor, state); }  // -1: off
 
   // The errors as value(slot) gives them; neutral where the state is off.
   template <class Value>
   sensor_errors errors(int sensor, Value value) const {
     sensor_errors out;
     for (int k = 0; k < kSensorStates; k++)
-      if (slot_[sensor][k] >= 0) out[k] = value(slot_[sensor][k]);
+      if (at(sensor, k) >= 0) out[k] = value(at(sensor, k));
     return out;
   }
 
@@ -47,20 +44,18 @@ class sensor_slots {
   template <class Row>
   void add_to(Row *row, int sensor, const double by[kCauses]) const {
     for (int k = 0; k < kSensorStates; k++)
-      if (k != kTimeOffset) row->add(slot_[sensor][k], by[kBySensor + k]);
+      if (k != kTimeOffset) row->add(at(sensor, k), by[kBySensor + k]);
   }
 
   template <class Filter>
   void list(const wm_setup &setup, const Filter &filter, calibration_list *out) const {
     for (size_t i = 0; i < setup.sensor_count; i++)
-      for (int k = 0; k < kSensorStates; k++)
-        if (const int slot = slot_[i][k]; slot >= 0)
-          out->add(setup.sensors[i].name, kSensorStateSpecs[k].name, filter.value(slot),
-                   std::sqrt(filter.variance(slot)));
+      slots_.list(
+          static_cast<int>(i), setup.sensors[i].name, filter, [](int k) { return kSensorStateSpecs[k].name; }, out);
   }
 
  private:
-  int slot_[kMaxSensors][kSensorStates];
+  state_slots<kMaxSensors, kSensorStates> slots_;
 };
 
 }  // namespace wm

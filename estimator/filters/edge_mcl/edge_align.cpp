@@ -245,9 +245,9 @@ void edge_mcl::find_minima(const wm_points &points, const prediction &prior, min
   }
   const double slack = sides > 0 ? step : 3.0 * std::sqrt(half + spread + 9.0 * filter_.variance(kHeading));
   const double turn = std::sqrt(filter_.variance(kHeading));
-  const bool placed = state_ == WM_STATE_TRACKING || tentative_;
+  const bool placed = life_.tracking() || tentative_;
   const int turns = placed && turn > kSureHeading_rad ? 1 : 0;
-  if (state_ == WM_STATE_SEARCHING && !placed) sides = 0;  // the pose is arbitrary: no use in starts around it
+  if (life_.searching() && !placed) sides = 0;  // the pose is arbitrary: no use in starts around it
   out->count = 0;
   for (int k = -sides; k <= sides; k++)
     for (int m = -turns; m <= turns; m++) {
@@ -308,20 +308,11 @@ void edge_mcl::describe(const normal_equations &scan, const alignment &a, wm_inn
 // The scan's information A = L D L' as scalar measurements: row i of L' with variance 1/D_i, where D_i is not 0. False:
 // a variance was not positive, and that row was not fused.
 bool edge_mcl::fuse_information(const normal_equations &e, const alignment &a) {
-  double lower[kAlignStates][kAlignStates] = {}, d[kAlignStates], forward[kAlignStates];  // forward: L^-1 gradient
-  for (int i = 0; i < kAlignStates; i++) {
-    d[i] = e.information(i, i);
-    for (int k = 0; k < i; k++) d[i] -= lower[i][k] * lower[i][k] * d[k];
-    if (!(d[i] > kRankDeficient * e.information(i, i))) d[i] = 0.0;
-    lower[i][i] = 1.0;
-    for (int j = i + 1; j < kAlignStates; j++) {
-      double sum = e.information(j, i);
-      for (int k = 0; k < i; k++) sum -= lower[j][k] * lower[i][k] * d[k];
-      lower[j][i] = d[i] > 0.0 ? sum / d[i] : 0.0;
-    }
-    forward[i] = e.gradient[i];
-    for (int k = 0; k < i; k++) forward[i] -= lower[i][k] * forward[k];
-  }
+  align_matrix lower;
+  align_vector d, forward = e.gradient;  // forward: L^-1 gradient
+  factorize_semidefinite(e.information, kRankDeficient, &lower, &d);
+  for (int i = 0; i < kAlignStates; i++)
+    for (int k = 0; k < i; k++) forward[i] -= lower(i, k) * forward[k];
   const int considered_to = lost_log_odds() > kCalibrationLogOdds ? filter_.states() : kPoseStates;
   bool numeric = true;
   for (int i = 0; i < kAlignStates; i++) {
@@ -330,8 +321,8 @@ bool edge_mcl::fuse_information(const normal_equations &e, const alignment &a) {
     double innovation = forward[i] / d[i];
     for (int j = i; j < kAlignStates; j++) {
       if (a.state[j] < 0) continue;
-      row.add(a.state[j], lower[j][i]);
-      innovation += lower[j][i] * difference(j, a.value[j], filter_.value(a.state[j]));
+      row.add(a.state[j], lower(j, i));
+      innovation += lower(j, i) * difference(j, a.value[j], filter_.value(a.state[j]));
     }
     projection projected;
     filter_.project(row, &projected);
@@ -360,7 +351,7 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
   if (scan->explained < kLeastExplained) return false;
   describe(*scan, found.at[0], record);
   // While lost, points lie near edges by chance. They would draw the pose there, which only odometry carries on.
-  if (state_ != WM_STATE_TRACKING && scan->explained < kLeastExplainedLost * scan->seen) {
+  if (!life_.tracking() && scan->explained < kLeastExplainedLost * scan->seen) {
     record->verdict = (uint8_t)WM_REJECTED_GATE;
     return false;
   }

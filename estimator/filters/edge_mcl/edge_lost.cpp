@@ -10,7 +10,6 @@ namespace {
 // nothing is suspicious. The hysteresis was chosen on 43 rendered drives (docs/consistency.md); not swept one by one.
 constexpr double kLostLogOdds = 1.0, kFoundLogOdds = -3.0, kTrustedLogOdds = -4.5, kNominalLogOdds = -5.5;
 constexpr double kSuspiciousLogOdds = -2.0;
-constexpr double kMemory_s = 2.0;                  // between two generations of the remembered calibration
 constexpr double kSame_m = 0.3, kSame_rad = 0.15;  // an adopted pose nearer than this to the tracked one is no jump
 constexpr double kFoundSigma_m = 0.1, kFoundSigma_rad = 0.03;  // of a pose that the search found
 // While lost the pose follows odometry; its covariance grows by this up to the sigma, so that it does not freeze.
@@ -35,7 +34,7 @@ constexpr double kFoundCovariance[3][3] = {{kFoundSigma_m * kFoundSigma_m, 0, 0}
 }  // namespace
 
 double edge_mcl::lost_log_odds() const {
-  const double elsewhere = state_ == WM_STATE_TRACKING ? others_.odds_elsewhere() : 0.0;
+  const double elsewhere = life_.tracking() ? others_.odds_elsewhere() : 0.0;
   return log(exp(fit_.log_odds()) + aliases_.odds() + elsewhere);
 }
 
@@ -45,23 +44,21 @@ void edge_mcl::update_lost(const normal_equations &scan, double dt_s) {
   watched_m_ += way;
   update_state(fit_.add(scan, dt_s, way));
   update_suspicion();
-  if (state_ == WM_STATE_TRACKING && lost_log_odds() < kTrustedLogOdds) {
-    remember_calibration();
+  if (life_.tracking() && lost_log_odds() < kTrustedLogOdds) {
+    rollback_.remember(filter_, filter_.now_ns());
     fit_.learn(scan, dt_s);
   }
-  if (state_ != WM_STATE_TRACKING && filter_.variance(kX) < square(kDriftSigma_m))
+  if (!life_.tracking() && filter_.variance(kX) < square(kDriftSigma_m))
     filter_.inflate_pose(kDrift_m2ps * dt_s, kDrift_rad2ps * dt_s);
 }
 
 void edge_mcl::update_state(double log_bayes_factor) {
   const double odds = lost_log_odds();
-  if (state_ == WM_STATE_TRACKING && log_bayes_factor < 0.0 && odds < kTrustedLogOdds) search_.mark();
-  if (state_ == WM_STATE_TRACKING && odds > kLostLogOdds) {
-    state_ = WM_STATE_LOST;
-    restore_calibration();
-  } else if (state_ != WM_STATE_TRACKING && odds < kFoundLogOdds) {
-    state_ = WM_STATE_TRACKING;
-    relocalizations_++;
+  if (life_.tracking() && log_bayes_factor < 0.0 && odds < kTrustedLogOdds) search_.mark();
+  if (life_.tracking() && odds > kLostLogOdds) {
+    lose();
+  } else if (!life_.tracking() && odds < kFoundLogOdds) {
+    life_.confirmed();
     tentative_ = false;
   } else if (odds > kLostLogOdds) {
     tentative_ = false;
@@ -88,23 +85,14 @@ void edge_mcl::on_motion_gap() {
   others_.clear(filter_.pose(), filter_.odom());
   suspicious_ = tentative_ = true;
   map_searched_ = false;
-  if (state_ == WM_STATE_TRACKING) state_ = WM_STATE_LOST;
+  if (life_.tracking()) life_.lose(filter_.now_ns());
   if (fit_.log_odds() < 0.0) fit_.set_log_odds(0.0);
 }
 
-void edge_mcl::remember_calibration() {
-  const wm_time_ns now = filter_.now_ns();
-  if (remembered_ns_ != WM_TIME_NONE && wm_seconds_between(remembered_ns_, now) < kMemory_s) return;
-  remembered_ns_ = now;
-  memory_[0] = memory_[1];
-  for (int i = kPoseStates; i < filter_.states(); i++) {
-    memory_[1].value[i] = filter_.value(i);
-    memory_[1].variance[i] = filter_.variance(i);
-  }
-}
-
-void edge_mcl::restore_calibration() {
-  for (int i = kPoseStates; i < filter_.states(); i++) filter_.forget(i, memory_[0].value[i], memory_[0].variance[i]);
+// A wrong pose pulls the calibration after it.
+void edge_mcl::lose() {
+  life_.lose(filter_.now_ns());
+  rollback_.restore(&filter_);
 }
 
 // Aliases of the tracked pose are swept for while it is trusted: with a small budget while all is nominal, with more,
@@ -114,14 +102,14 @@ void edge_mcl::update_aliases(double dt_s) {
   const double way = filter_.travelled_m() - aliases_m_;
   aliases_m_ += way;
   aliases_.carry(filter_.odom());
-  const bool sure = state_ == WM_STATE_TRACKING && !suspicious_, nominal = fit_.log_odds() < kNominalLogOdds;
+  const bool sure = life_.tracking() && !suspicious_, nominal = fit_.log_odds() < kNominalLogOdds;
   if (nominal_ && !nominal) aliases_.restart_sweep();
   nominal_ = nominal;
   const int share = params_.search_poses / (nominal ? kAliasNominal : kAliasOtherwise);
   const int poses = share > aliased_poses::kPosesMin ? share : aliased_poses::kPosesMin;
   aliases_.update(map_, search_.field(), scan_, filter_.pose(), way, fit_.mean_explained(),
                   sure ? params_.lost_per_s * dt_s : 0.0, sure ? poses : 0);
-  if (state_ == WM_STATE_SEARCHING) return;
+  if (life_.searching()) return;
   constexpr double kNoError[kMountingAll] = {};
   for (int i = 0; i < aliases_.count(); i++)
     if (aliases_[i].odds > kAliasOdds) others_.offer(aliases_[i].pose, aliases_[i].explained, kNoError);
@@ -144,8 +132,8 @@ void edge_mcl::relocalize() {
     others_.offer(search_);
     map_searched_ = true;
   }
-  const bool tracking = state_ == WM_STATE_TRACKING;
-  const double own_prior = tracking ? kNotKidnapped : state_ == WM_STATE_SEARCHING && !tentative_ ? kNoPose : 0.0;
+  const bool tracking = life_.tracking();
+  const double own_prior = tracking ? kNotKidnapped : life_.searching() && !tentative_ ? kNoPose : 0.0;
   // The tracked pose was corrected by the filter all along: it explains at least what it does now.
   const double own_least = tracking ? fit_.explained() : 0.0;
   // While lost, keyframes of few points count like others: the tracked pose has no advantage to defend.
@@ -160,8 +148,8 @@ void edge_mcl::decide() {
   const int best = others_.best();
   const hypothesis &there = others_[best];
   if (!there.weighed || there.probability < kAdoptProbability || there.explained < kAdoptExplained) return;
-  const bool tracking = state_ == WM_STATE_TRACKING;
-  const double margin = state_ == WM_STATE_SEARCHING ? 0.0 : kAdoptMargin;
+  const bool tracking = life_.tracking();
+  const double margin = life_.searching() ? 0.0 : kAdoptMargin;
   if (best > 0 && (tracking || map_searched_) && there.explained >= others_[0].explained + margin) {
     adopt(best);
   } else if (best == 0 && !tracking && !tentative_) {
@@ -173,14 +161,11 @@ void edge_mcl::decide() {
 
 void edge_mcl::adopt(int hypothesis) {
   const wm_pose2 pose = others_[hypothesis].pose;
-  if (state_ == WM_STATE_TRACKING) {
-    state_ = WM_STATE_LOST;
-    restore_calibration();
-  }
+  if (life_.tracking()) lose();
   fit_.set_log_odds(0.0);
   suspicious_ = tentative_ = true;
   const wm_pose2 way = between(filter_.pose(), pose);
-  if (!same_pose(wm_pose2{}, way, kSame_m, kSame_rad)) resets_++;
+  if (!same_pose(wm_pose2{}, way, kSame_m, kSame_rad)) life_.jumped();
   others_.adopt(hypothesis);
   aliases_.forget_odds();
   filter_.set_pose(pose, kFoundCovariance);
@@ -199,7 +184,7 @@ void edge_mcl::add_hypotheses_spread(wm_estimate *out) const {
     for (int r = 0; r < 3; r++)
       for (int c = 0; c < 3; c++) out->covariance[wm_cov_index(at[r], at[c])] += h.probability * d[r] * d[c];
   }
-  if (state_ == WM_STATE_TRACKING) return;
+  if (life_.tracking()) return;
   if (!tentative_) rest = 1.0;
   const wm_raster &map = map_.raster();
   const double width = map.width_px * map.resolution_m, height = map.height_px * map.resolution_m;

@@ -62,12 +62,8 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   aliases_.init(map_);
   fit_.init(params);
   watched_ns_ = driven_ns_ = WM_TIME_NONE;
-  for (calibration_memory &m : memory_)
-    for (int i = kPoseStates; i < filter_.states(); i++) {
-      m.value[i] = filter_.value(i);
-      m.variance[i] = filter_.variance(i);
-    }
-  remembered_ns_ = filter_.now_ns();
+  life_ = lifecycle();
+  rollback_.begin(filter_, kPoseStates, filter_.states());
   start_again(start_is_known(setup.start));
 }
 
@@ -75,7 +71,8 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
 void edge_mcl::start_again(bool known) {
   scan_odom_ = filter_.odom();
   search_.clear();
-  fused_ns_ = WM_TIME_NONE;
+  life_.begin(known);
+  life_.fused(WM_TIME_NONE);
   for (wm_time_ns &t_ns : aligned_ns_) t_ns = WM_TIME_NONE;
   watched_m_ = filter_.travelled_m() + filter_.turned_rad();
   fit_.reset(known);
@@ -84,8 +81,6 @@ void edge_mcl::start_again(bool known) {
   aliases_m_ = filter_.travelled_m();
   nominal_ = map_searched_ = tentative_ = false;
   suspicious_ = !known;
-  state_ = known ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
-  resets_++;
 }
 
 wm_status edge_mcl::predict(const wm_event &motion) {
@@ -135,7 +130,7 @@ wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
   scan_odom_ = filter_.odom();
   wm_innovation record = record_of(event, WM_RESIDUAL_RANGE);
   normal_equations scan;
-  if (align(points, camera, &scan, &record)) fused_ns_ = event.t_ns;
+  if (align(points, camera, &scan, &record)) life_.fused(event.t_ns);
   update_lost(scan, dt);
   search_.add_keyframe(scan_, filter_.odom());
   relocalize();
@@ -192,13 +187,11 @@ void edge_mcl::place_scan(const wm_points &points, int camera) {
 
 void edge_mcl::estimate(wm_estimate *out) const {
   filter_.estimate(out);
-  out->resets = resets_;
-  out->lost_probability = state_ == WM_STATE_SEARCHING ? 1.0 : probability_of(lost_log_odds());
-  const bool fresh =
-      fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, filter_.now_ns()) <= params_.dead_reckoning_after_s;
-  out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
-  if (state_ != WM_STATE_SEARCHING) add_hypotheses_spread(out);
-  if (fused_ns_ == WM_TIME_NONE) return;  // still the given pose with the given covariance
+  out->resets = life_.resets();
+  out->lost_probability = life_.searching() ? 1.0 : probability_of(lost_log_odds());
+  out->state = life_.state(filter_.now_ns(), params_.dead_reckoning_after_s);
+  if (!life_.searching()) add_hypotheses_spread(out);
+  if (life_.fused_ns() == WM_TIME_NONE) return;  // still the given pose with the given covariance
   out->covariance[wm_cov_index(0, 0)] += square(params_.lasting_xy_m);
   out->covariance[wm_cov_index(1, 1)] += square(params_.lasting_xy_m);
   out->covariance[wm_cov_index(5, 5)] += square(params_.lasting_heading_rad);
@@ -223,7 +216,7 @@ size_t edge_mcl::list_calibration(wm_calibration_value *out, size_t capacity) co
 size_t edge_mcl::list_counters(wm_counter *out, size_t capacity) const {
   counter_list list(out, capacity);
   list.add(WM_COUNTER_MOTION_OUTLIERS, filter_.motion_outliers());
-  list.add(WM_COUNTER_RELOCALIZATIONS, relocalizations_);
+  list.add(WM_COUNTER_RELOCALIZATIONS, life_.relocalizations());
   list.add(WM_COUNTER_ALIASED_POSES, (uint64_t)aliases_.count());
   list.add(WM_COUNTER_EXPLAINED_PERMILLE, (uint64_t)(1000.0 * fit_.explained() + 0.5));
   return list.count();

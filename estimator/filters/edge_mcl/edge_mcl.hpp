@@ -5,7 +5,9 @@
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_HPP
 
+#include "filters/core/lifecycle.hpp"
 #include "filters/core/record_list.hpp"
+#include "filters/core/rollback.hpp"
 #include "filters/edge_mcl/aliased_poses.hpp"
 #include "filters/edge_mcl/align.hpp"
 #include "filters/edge_mcl/fit_evidence.hpp"
@@ -111,8 +113,7 @@ class edge_mcl {
   void update_aliases(double dt_s);
   void adopt(int hypothesis);
   void add_hypotheses_spread(wm_estimate *out) const;
-  void remember_calibration();
-  void restore_calibration();
+  void lose();
 
   const wm_setup *setup_;
   wm_edge_mcl_params params_;
@@ -127,26 +128,20 @@ class edge_mcl {
   int camera_count_;
   int camera_state_[kCamerasMax][kCameraErrors + 1];  // and the time offset
   int edge_state_;
-  // Calibration while the scans fitted, in two generations: the older one is from before any doubt.
-  struct calibration_memory {
-    double value[kMaxEdgeStates], variance[kMaxEdgeStates];
-  };
-  calibration_memory memory_[2];
-  wm_time_ns remembered_ns_;
+  rollback<kMaxEdgeStates, 2> rollback_;  // calibration while the scans fitted: being lost is noticed within 2 s
+  lifecycle life_;
   wm_pose2 scan_odom_;  // odometry at the last scan
-  wm_time_ns fused_ns_, watched_ns_, driven_ns_;
+  wm_time_ns watched_ns_, driven_ns_;
   // Of each camera, and of points without one: time and travelled distance when a scan was fused last.
   wm_time_ns aligned_ns_[kCamerasMax + 1];
   double aligned_m_[kCamerasMax + 1];
   double independence_;  // of a scan's errors from the last one's: 0 to 1
   double aliases_m_;     // travelled distance when aliases were weighed last
   double watched_m_;     // the same, plus rotation, when the last scan was judged
-  uint32_t resets_, relocalizations_;
-  uint8_t state_;
-  bool nominal_;       // no doubt at all: aliases get their smaller budget
-  bool suspicious_;    // recent scans are looked for elsewhere
-  bool map_searched_;  // the whole map, since then
-  bool tentative_;     // a pose was adopted that scans have not confirmed yet
+  bool nominal_;         // no doubt at all: aliases get their smaller budget
+  bool suspicious_;      // recent scans are looked for elsewhere
+  bool map_searched_;    // the whole map, since then
+  bool tentative_;       // a pose was adopted that scans have not confirmed yet
 };
 
 }  // namespace wm

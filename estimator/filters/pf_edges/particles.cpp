@@ -4,25 +4,15 @@
 #include <cstring>
 
 #include "math/arc.hpp"
+#include "math/eigen.hpp"
 #include "waymark/random.h"
 
 namespace wm {
 namespace {
 
-constexpr int kDrawsMost = 200;  // of a place before an undrivable one is taken: 0.5 % drivable is found by 63 %
-
-// Lower triangle of a covariance. A pivot that is not positive becomes 0: no spread along that axis.
-void cholesky3(const double covariance[3][3], double lower[3][3]) {
-  for (int i = 0; i < 3; i++)
-    for (int j = 0; j <= i; j++) {
-      double sum = covariance[i][j];
-      for (int k = 0; k < j; k++) sum -= lower[i][k] * lower[j][k];
-      if (i == j)
-        lower[i][i] = sum > 0.0 ? std::sqrt(sum) : 0.0;
-      else
-        lower[i][j] = lower[j][j] > 0.0 ? sum / lower[j][j] : 0.0;
-    }
-}
+constexpr int kDrawsMax = 200;  // of a place, before an undrivable one is taken: of 0.5 % drivable floor 63 % are found
+constexpr double kImpossible = -1.0e300;  // score where the map is not drivable
+constexpr double kTotalMin = 1.0e-280;  // of the products' sum, from which on it is normalised: above denormal numbers
 
 }  // namespace
 
@@ -30,7 +20,7 @@ void particles::init(int count, uint64_t seed, void *memory) {
   count_ = count;
   seed_ = seed;
   step_ = 0;
-  memory_at_ = (ptrdiff_t)(reinterpret_cast<uintptr_t>(memory) - reinterpret_cast<uintptr_t>(this));
+  arrays_.set(static_cast<double *>(memory));
   std::memset(memory, 0, bytes(count));
 }
 
@@ -50,15 +40,19 @@ void particles::level() {
 }
 
 void particles::spread(const wm_pose2 &pose, const double covariance[3][3]) {
-  double lower[3][3] = {};
-  cholesky3(covariance, lower);
+  matrix<3> lower;
+  vector<3> variance;  // 0 along an axis without spread
+  factorize_semidefinite<3>(Eigen::Map<const matrix<3>>(&covariance[0][0]), 0.0, &lower, &variance);
   step_++;
   for (int i = 0; i < count_; i++) {
     double n[4];
     normals(i, n);
-    array(0)[i] = pose.x_m + lower[0][0] * n[0];
-    array(1)[i] = pose.y_m + lower[1][0] * n[0] + lower[1][1] * n[1];
-    array(2)[i] = wrap(pose.heading_rad + lower[2][0] * n[0] + lower[2][1] * n[1] + lower[2][2] * n[2]);
+    vector<3> off;
+    for (int k = 0; k < 3; k++) off[k] = std::sqrt(variance[k]) * n[k];
+    off = lower * off.eval();
+    array(0)[i] = pose.x_m + off[0];
+    array(1)[i] = pose.y_m + off[1];
+    array(2)[i] = wrap(pose.heading_rad + off[2]);
   }
   level();
 }
@@ -66,7 +60,7 @@ void particles::spread(const wm_pose2 &pose, const double covariance[3][3]) {
 void particles::spread_over(const edge_map &map) {
   const wm_raster &raster = map.raster();
   for (int i = 0; i < count_; i++) {
-    for (int draw = 0; draw < kDrawsMost; draw++) {
+    for (int draw = 0; draw < kDrawsMax; draw++) {
       step_++;
       map.to_map(raster.width_px * wm_random_uniform(seed_, step_, 0),
                  raster.height_px * wm_random_uniform(seed_, step_, 1), &array(0)[i], &array(1)[i]);
@@ -121,7 +115,7 @@ bool particles::weigh(const edge_map &map, const score_field &field, const scan_
   bool any = false;
   for (int i = 0; i < count_; i++) {
     if (!map.drivable(x[i], y[i])) {
-      scored[i] = -1.0e300;
+      scored[i] = kImpossible;
       continue;
     }
     if (!field.ready()) {
@@ -134,11 +128,13 @@ bool particles::weigh(const edge_map &map, const score_field &field, const scan_
   if (!any || (sum && !(best > 0.0))) return false;
   double total = 0.0;
   for (int i = 0; i < count_; i++) {
-    const double likelihood = scored[i] <= -1.0e300 ? 0.0 : sum ? scored[i] / best : exp(exponent * (scored[i] - best));
+    const double likelihood = scored[i] <= kImpossible ? 0.0
+                              : sum                    ? scored[i] / best
+                                                       : exp(exponent * (scored[i] - best));
     scored[i] = weight[i] * likelihood;
     total += scored[i];
   }
-  if (!(total > 1e-280)) return false;
+  if (!(total > kTotalMin)) return false;
   for (int i = 0; i < count_; i++) weight[i] = scored[i] / total;
   return true;
 }

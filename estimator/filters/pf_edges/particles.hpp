@@ -52,17 +52,15 @@ class particles {
   particle_moments main_cluster(double radius_m, double radius_rad) const;
 
  private:
-  double *array(int k) const {
-    return reinterpret_cast<double *>(reinterpret_cast<uintptr_t>(this) + (uintptr_t)memory_at_) +
-           (ptrdiff_t)k * count_;
-  }
+  double *array(int k) { return arrays_.get() + (ptrdiff_t)k * count_; }
+  const double *array(int k) const { return arrays_.get() + (ptrdiff_t)k * count_; }
   void level();
   void score_by_field(const edge_map &map, const score_field &field, const scan_points &points, double *scored);
   void normals(int particle, double out[4]) const;
 
   int count_;
   uint64_t seed_, step_;
-  ptrdiff_t memory_at_;  // x, y, heading, weight, and as much work space
+  relative_array<double> arrays_;  // x, y, heading, weight, and as much work space
 };
 
 }  // namespace wm

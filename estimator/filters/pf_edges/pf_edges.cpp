@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "filters/core/contract.hpp"
+#include "filters/core/gate.hpp"
 #include "filters/planar/set_pose.hpp"
 #include "filters/registry.h"
 #include "math/arc.hpp"
@@ -15,23 +16,27 @@ namespace {
 
 // Sigmas of a point for which the map has a baked layer; the last one serves larger sigmas, too.
 constexpr double kClassSigma_m[kSigmaClasses] = {0.01, 0.03, 0.06, 0.12};
-constexpr double kUnknownSigma_m = 0.03;  // of a point whose detector gives none
-constexpr int kPointsMin = 5;             // fewer are no scan
+constexpr double kUnknownSigma_m = 0.03;  // of a point whose detector gives none: a pixel at 4 m
+constexpr int kPointsMin = 5;             // of a scan: fewer leave a pose open
 // The published mean is that of particles about the heaviest one. Half a corridor's width, 20 degrees; not swept.
 constexpr double kCluster_m = 0.5, kCluster_rad = 0.35;
-constexpr double kFoundShare = 0.9;  // of the weight in that cluster, from which on a search has ended
+constexpr double kFoundShare = 0.9;  // of the weight in that cluster, from which on a search has ended; not swept
 constexpr double kCovarianceMin[3] = {1.6e-5, 1.6e-5, 1e-6};  // a pixel of 1.3 cm / sqrt(12), 1 mrad; squared
-constexpr size_t kAlign = 64;
-
-constexpr size_t aligned(size_t bytes) { return (bytes + kAlign - 1) & ~(kAlign - 1); }
 
 }  // namespace
 
 size_t pf_edges::bytes(const wm_pf_edges_params &params, const wm_setup &setup, const char **why) {
   const size_t map = edge_map::bytes_or_reason(setup.map, why);
   if (map == 0) return 0;
-  return aligned(sizeof(pf_edges)) + aligned(particles::bytes(params.particles)) + aligned(map) +
-         score_field::bytes(*setup.map) + kAlign;
+  memory_layout layout(nullptr, sizeof(pf_edges));
+  lay_out(&layout, params, setup);
+  return layout.bytes();
+}
+
+pf_edges::blocks pf_edges::lay_out(memory_layout *layout, const wm_pf_edges_params &params, const wm_setup &setup) {
+  uint8_t *const cloud = layout->take<uint8_t>(particles::bytes(params.particles));
+  uint8_t *const map = layout->take<uint8_t>(edge_map::bytes(*setup.map));
+  return {cloud, map, layout->take<uint8_t>(score_field::bytes(*setup.map))};
 }
 
 void pf_edges::init(const wm_pf_edges_params &params, const wm_setup &setup) {
@@ -39,14 +44,15 @@ void pf_edges::init(const wm_pf_edges_params &params, const wm_setup &setup) {
   setup_ = &setup;
   params_ = params;
   odometry_.init(setup, wm_motion_states{}, kPoseStates);
-  uint8_t *behind = reinterpret_cast<uint8_t *>(this) + aligned(sizeof *this);
-  particles_.init(params.particles, setup.seed, behind);
-  behind += aligned(particles::bytes(params.particles));
-  map_.init(*setup.map, behind);
+  life_ = lifecycle();
+  memory_layout layout(this, sizeof *this);
+  const blocks memory = lay_out(&layout, params, setup);
+  particles_.init(params.particles, setup.seed, memory.cloud);
+  map_.init(*setup.map, memory.map);
   double sigma[kSigmaClasses];
   for (int k = 0; k < kSigmaClasses; k++) sigma[k] = std::sqrt(square(params.sigma_m) + square(kClassSigma_m[k]));
   make_score_table(map_, sigma, params.false_points, params.weight == PF_EDGES_SUM, &table_);
-  field_.init(map_, table_, behind + aligned(edge_map::bytes(*setup.map)));
+  field_.init(map_, table_, memory.field);
   start_again(start_is_known(setup.start));
 }
 
@@ -62,9 +68,8 @@ void pf_edges::start_again(bool known) {
   travelled_m_ = odometry_.travelled_m();
   turned_rad_ = odometry_.turned_rad();
   scan_ns_ = odometry_.now_ns();
-  fused_ns_ = WM_TIME_NONE;
-  state_ = known ? WM_STATE_TRACKING : WM_STATE_SEARCHING;
-  resets_++;
+  life_.begin(known);
+  life_.fused(WM_TIME_NONE);
 }
 
 wm_status pf_edges::predict(const wm_event &motion) {
@@ -105,14 +110,9 @@ wm_status pf_edges::take_points(const wm_event &event, record_list records) {
   const bool fused = weigh(event.as.points);
   if (fused) resample();
 
-  if (fused) fused_ns_ = event.t_ns;
-  if (state_ == WM_STATE_SEARCHING && particles_.main_cluster(kCluster_m, kCluster_rad).share > kFoundShare)
-    state_ = WM_STATE_TRACKING;
-  wm_innovation record{};
-  record.t_ns = event.t_ns;
-  record.source = event.source;
-  record.landmark_id = -1;
-  record.residual = WM_RESIDUAL_RANGE;
+  if (fused) life_.fused(event.t_ns);
+  if (life_.searching() && particles_.main_cluster(kCluster_m, kCluster_rad).share > kFoundShare) life_.fits_again();
+  wm_innovation record = record_of(event, WM_RESIDUAL_RANGE);
   record.verdict = fused ? (uint8_t)WM_FUSED : (uint8_t)WM_REJECTED_SINGULAR;
   records.add(record);
   return WM_OK;
@@ -176,14 +176,12 @@ void pf_edges::select_points(const wm_points &points) {
 
 void pf_edges::estimate(wm_estimate *out) const {
   odometry_.estimate(out);  // time and twist
-  out->resets = resets_;
-  const bool fresh =
-      fused_ns_ != WM_TIME_NONE && wm_seconds_between(fused_ns_, odometry_.now_ns()) <= params_.dead_reckoning_after_s;
-  out->state = state_ == WM_STATE_TRACKING && !fresh ? (uint8_t)WM_STATE_DEAD_RECKONING : state_;
+  out->resets = life_.resets();
+  out->state = life_.state(odometry_.now_ns(), params_.dead_reckoning_after_s);
   // Normalised weights rank the particles; none of them measures how well the best one fits.
-  out->lost_probability = state_ == WM_STATE_SEARCHING ? 1.0 : std::numeric_limits<double>::quiet_NaN();
+  out->lost_probability = life_.searching() ? 1.0 : std::numeric_limits<double>::quiet_NaN();
   // Before the first scan the given pose is exact; the particles are only samples of it.
-  if (fused_ns_ == WM_TIME_NONE && state_ == WM_STATE_TRACKING) return;
+  if (life_.fused_ns() == WM_TIME_NONE && life_.tracking()) return;
   const particle_moments m = particles_.main_cluster(kCluster_m, kCluster_rad);
   // The particles stand at the last scan.
   const wm_pose2 pose = compose(m.mean, between(odom_, odometry_.odom()));

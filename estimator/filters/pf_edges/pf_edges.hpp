@@ -6,6 +6,7 @@
 #ifndef WAYMARK_ESTIMATOR_PF_EDGES_HPP
 #define WAYMARK_ESTIMATOR_PF_EDGES_HPP
 
+#include "filters/core/lifecycle.hpp"
 #include "filters/core/record_list.hpp"
 #include "filters/pf_edges/params.h"
 #include "filters/pf_edges/particles.hpp"
@@ -29,6 +30,10 @@ class pf_edges {
   uint32_t motion_health() const { return odometry_.motion_health(); }
 
  private:
+  struct blocks {
+    uint8_t *cloud, *map, *field;
+  };
+  static blocks lay_out(memory_layout *layout, const wm_pf_edges_params &params, const wm_setup &setup);
   void start_again(bool known);
   wm_status take_pose(const wm_event &event);
   wm_status take_points(const wm_event &event, record_list records);
@@ -48,9 +53,8 @@ class pf_edges {
   // Odometry at the last scan.
   wm_pose2 odom_;
   double travelled_m_, turned_rad_;
-  wm_time_ns scan_ns_, fused_ns_;
-  uint32_t resets_;
-  uint8_t state_;
+  wm_time_ns scan_ns_;
+  lifecycle life_;
 };
 
 }  // namespace wm
