@@ -13,6 +13,7 @@ namespace wm {
 
 // 99 % quantiles of chi2 by degrees of freedom, over that of two (9.210).
 inline double gate_scale(int dof) {
+  // 0 to 4 degrees of freedom.
   constexpr double kQuantile[5] = {0.0, 6.635 / 9.210, 1.0, 11.345 / 9.210, 13.277 / 9.210};
   return kQuantile[dof];
 }

@@ -124,8 +124,8 @@ void landmark_ekf::start_again() {
   seen.travelled_m = filter_.travelled_m();
   seen.turned_rad = filter_.turned_rad();
   const bool place = finite(start.p_m[0]) && finite(start.p_m[1]), heading = finite(start.heading_rad);
-  const double sigma_xy = finite(start.sigma_xy_m) ? start.sigma_xy_m : 0.05;
-  const double sigma_heading = finite(start.sigma_heading_rad) ? start.sigma_heading_rad : 0.05;
+  const double sigma_xy = given_or_default(start.sigma_xy_m);
+  const double sigma_heading = given_or_default(start.sigma_heading_rad);
   if (place) {
     seen.kind = kObservedPosition;
     seen.place_m[0] = start.p_m[0];

@@ -19,8 +19,8 @@ void planar_filter::init(const wm_setup &setup, const wm_motion_states &motion, 
   stride_ = even(states);
   std::memset(arrays, 0, doubles(states) * sizeof(double));
   init_motion(setup);
-  const double sigma_xy = finite(setup.start.sigma_xy_m) ? setup.start.sigma_xy_m : 0.05;
-  const double sigma_heading = finite(setup.start.sigma_heading_rad) ? setup.start.sigma_heading_rad : 0.05;
+  const double sigma_xy = given_or_default(setup.start.sigma_xy_m);
+  const double sigma_heading = given_or_default(setup.start.sigma_heading_rad);
   add_state(finite(setup.start.p_m[0]) ? setup.start.p_m[0] : 0.0, sigma_xy);
   add_state(finite(setup.start.p_m[1]) ? setup.start.p_m[1] : 0.0, sigma_xy);
   add_state(finite(setup.start.heading_rad) ? wrap(setup.start.heading_rad) : 0.0, sigma_heading);

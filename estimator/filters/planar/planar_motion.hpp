@@ -19,6 +19,10 @@ namespace wm {
 // Errors of sensors that are states, of all sensors together (landmark_ekf asserts it).
 inline constexpr int kMaxSensorStates = 192;
 
+// Sigma of a start's coordinate or heading, m and rad, where none is stated: a robot put on a mark by hand. Not swept.
+inline constexpr double kDefaultStartSigma = 0.05;
+inline double given_or_default(double sigma) { return finite(sigma) ? sigma : kDefaultStartSigma; }
+
 class planar_motion {
  public:
   // Time of the state; WM_TIME_NONE before the first event.

@@ -6,9 +6,9 @@
 namespace wm {
 namespace {
 
-// Limits of the calibration's terms: beyond, the model is wrong, or the lag exceeds the history.
-constexpr double kLowest[kCalibrationCount] = {0.3, 0.3, -1.0, 0.3, 0.3, 0.3, -0.5, 0.0, -1.0};
-constexpr double kHighest[kCalibrationCount] = {3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0};
+// Limits of the calibration's terms, by calibration_index: beyond, the model is wrong, or the lag exceeds the history.
+constexpr double kLowest[kCalibrationCount] = {0.3, 0.3, -1.0, 0.3, 0.3, 0.3, -0.5, 0.0, -1.0},
+                 kHighest[kCalibrationCount] = {3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0};
 
 }  // namespace
 

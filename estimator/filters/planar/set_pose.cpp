@@ -2,11 +2,10 @@
 #include "filters/planar/set_pose.hpp"
 
 #include "math/elementary.hpp"
+#include "sensors/validation.hpp"
 
 namespace wm {
 namespace {
-
-constexpr double kFarthest_m = 1e7;
 
 // Heading of a quaternion (x, y, z, w): that of the body's x axis seen from above.
 double heading_of(const double q[4]) {
@@ -22,17 +21,9 @@ void set(planar_filter &filter, const wm_pose2 &pose, double sigma_xy, double si
 
 wm_status read_set_pose(const wm_event &event, given_pose *out) {
   const wm_set_pose &s = event.as.set_pose;
+  if (const wm_status bad = check_set_pose(s, 2); bad != WM_OK) return bad;
   const double *p = s.pose_map_base.p_m;
-  const double *q = s.pose_map_base.q_xyzw;
-  double length = 0.0;
-  for (int i = 0; i < 4; i++) length += q[i] * q[i];
-  if (!finite(p[0]) || !finite(p[1]) || !finite(length) || !finite(s.sigma_xy_m) || !finite(s.sigma_heading_rad))
-    return WM_NOT_FINITE;
-  if (std::fabs(p[0]) > kFarthest_m || std::fabs(p[1]) > kFarthest_m || std::fabs(length - 1.0) > 0.01 ||
-      !(s.sigma_xy_m > 0.0 && s.sigma_xy_m <= kFarthest_m) ||
-      !(s.sigma_heading_rad > 0.0 && s.sigma_heading_rad < 10.0))
-    return WM_OUT_OF_RANGE;
-  *out = {{p[0], p[1], heading_of(q)}, s.sigma_xy_m, s.sigma_heading_rad};
+  *out = {{p[0], p[1], heading_of(s.pose_map_base.q_xyzw)}, s.sigma_xy_m, s.sigma_heading_rad};
   return WM_OK;
 }
 
@@ -52,8 +43,8 @@ wm_status reset_pose(planar_filter &filter, const wm_start &start, wm_time_ns t_
   filter.move_to(t_ns);
   const bool place = finite(start.p_m[0]) && finite(start.p_m[1]), heading = finite(start.heading_rad);
   set(filter, {place ? start.p_m[0] : 0.0, place ? start.p_m[1] : 0.0, heading ? start.heading_rad : 0.0},
-      place ? (finite(start.sigma_xy_m) ? start.sigma_xy_m : 0.05) : kUnknownPosition_m,
-      heading ? (finite(start.sigma_heading_rad) ? start.sigma_heading_rad : 0.05) : kUnknownHeading_rad);
+      place ? (given_or_default(start.sigma_xy_m)) : kUnknownPosition_m,
+      heading ? (given_or_default(start.sigma_heading_rad)) : kUnknownHeading_rad);
   return WM_OK;
 }
 

@@ -12,9 +12,8 @@ inline bool start_is_known(const wm_start &start) {
   return finite(start.p_m[0]) && finite(start.p_m[1]) && finite(start.heading_rad);
 }
 
-// Sigmas of a pose of which nothing is known.
-inline constexpr double kUnknownPosition_m = 1000.0;
-inline constexpr double kUnknownHeading_rad = kPi;
+// Sigmas of an unknown pose: beyond any map that is searched, and an upper bound of that of a uniform heading.
+inline constexpr double kUnknownPosition_m = 1000.0, kUnknownHeading_rad = kPi;
 
 // The pose of SET_POSE. WM_NOT_FINITE, WM_OUT_OF_RANGE: it is impossible.
 struct given_pose {

@@ -2,25 +2,21 @@
 // Control of the observations: whether a datum is valid and should be fused, and its record. rows.cpp has the rows.
 #include "filters/core/gate.hpp"
 #include "filters/stereo_ekf/stereo_ekf.hpp"
+#include "sensors/validation.hpp"
 
 namespace wm {
 namespace {
 
-// Bounds of what a datum can mean; far beyond any sensor, so that squares and differences stay finite.
-constexpr double kFarthest_m = 1e6, kFarthest_px = 1e6, kFarthestPosition_m = 1e7, kLargestSigma = 1e6;
-constexpr double kLargestAngle_rad = 100.0;
+constexpr double kFarthest_px = 1e6;  // beyond, a pixel is an error of the sender
 // A horizontal sigma from here on means that the datum is a depth alone.
 constexpr double kNoHorizontal_m = 1e5;
-// Estimate moved by pending corrections beyond which they are applied at once, rad: second-order terms are 5e-5 rad.
+// Rotation by pending corrections beyond which they are applied at once, rad: second-order terms are then 5e-5 rad.
 constexpr double kApplyBeyond_rad = 0.01;
 
 // Where an observation lies that is not of this pose: distances spread over kClutter_m, a disparity over a quarter of
 // the picture's width, the rows of both pictures over kClutterRows_px. Orders of magnitude, not swept: a factor of 10
 // is 2.3 nats.
 constexpr double kClutter_m = 100.0, kClutterDisparity = 0.25, kClutterRows_px = 10.0;
-
-bool is_sigma(double sigma) { return sigma > 0.0 && sigma < kLargestSigma; }
-bool is_absent_or_sigma(double sigma) { return std::isnan(sigma) || is_sigma(sigma); }
 
 wm_status check_stereo(const wm_stereo &s) {
   const double px[4] = {s.left_px[0], s.left_px[1], s.right_px[0], s.right_px[1]};
@@ -33,15 +29,6 @@ wm_status check_stereo(const wm_stereo &s) {
   return s.id < 0 ? WM_OUT_OF_RANGE : WM_OK;
 }
 
-wm_status check_sighting(const wm_sighting &s, size_t sensors) {
-  const bool has_bearing = !std::isnan(s.bearing_rad), has_range = !std::isnan(s.range_m);
-  if ((!has_bearing && !has_range) || std::isinf(s.bearing_rad) || std::isinf(s.range_m)) return WM_NOT_FINITE;
-  const bool bearing = !has_bearing || std::fabs(s.bearing_rad) <= kLargestAngle_rad;
-  const bool range = !has_range || (s.range_m >= 0.0 && s.range_m < kFarthest_m);
-  const bool sigmas = is_absent_or_sigma(s.bearing_sigma_rad) && is_absent_or_sigma(s.range_sigma_m);
-  return s.sensor < sensors && bearing && range && sigmas ? WM_OK : WM_OUT_OF_RANGE;
-}
-
 // Which coordinates of a position are there: [first, last).
 struct coordinates {
   int first, last;
@@ -51,22 +38,6 @@ coordinates coordinates_of(const wm_position &p) {
   const bool horizontal = !(std::isnan(p.p_m[0]) && std::isnan(p.p_m[1])) && !(p.sigma_xy_m >= kNoHorizontal_m);
   if (finite(p.p_m[2]) && !horizontal) return {2, 3};
   return {0, finite(p.p_m[2]) && finite(p.sigma_z_m) ? 3 : 2};
-}
-
-wm_status check_position(const wm_position &p, const coordinates &there) {
-  for (int i = there.first; i < there.last; i++)
-    if (!finite(p.p_m[i]) || !finite(i == 2 ? p.sigma_z_m : p.sigma_xy_m)) return WM_NOT_FINITE;
-  for (int i = there.first; i < there.last; i++)
-    if (std::fabs(p.p_m[i]) > kFarthestPosition_m || !is_sigma(i == 2 ? p.sigma_z_m : p.sigma_xy_m))
-      return WM_OUT_OF_RANGE;
-  return WM_OK;
-}
-
-wm_status check_heading(const wm_heading &h) {
-  if (!finite(h.heading_rad) || !finite(h.sigma_rad)) return WM_NOT_FINITE;
-  const bool good =
-      std::fabs(h.heading_rad) <= kLargestAngle_rad && h.sigma_rad > 0.0 && h.sigma_rad < kLargestAngle_rad;
-  return good ? WM_OK : WM_OUT_OF_RANGE;
 }
 
 }  // namespace
@@ -122,7 +93,7 @@ wm_status stereo_ekf::fuse_stereo(const wm_event &event, record_list records) {
   if (const wm_status bad = check_time(event.t_ns); bad != WM_OK) return bad;
   move_to(event.t_ns);
   begin_picture(event.t_ns);
-  const int known = find_landmark(s.id);
+  const int known = index_.find(setup_->landmarks, s.id);
   if (known >= 0) return fuse_known_point(event, known, blank, records);
   if (params_.points_max == 0) return reject(records, blank, WM_REJECTED_UNKNOWN_ID);
   if (life_.searching()) return reject(records, blank, WM_REJECTED_SEARCHING);
@@ -130,8 +101,8 @@ wm_status stereo_ekf::fuse_stereo(const wm_event &event, record_list records) {
   if (slot < 0) {
     add_point(s, blank, records);
   } else if (fuse_point(s, filter_.point(slot), 0.0, slot, blank, records).fused) {
-    info()[slot].seen_ns = event.t_ns;
-    info()[slot].unseen = 0;
+    info_[(size_t)slot].seen_ns = event.t_ns;
+    info_[(size_t)slot].unseen = 0;
   } else {
     contradict_point(slot, s, blank, records);
   }
@@ -151,7 +122,7 @@ wm_status stereo_ekf::fuse_known_point(const wm_event &event, int known, const w
   const int slot = slot_of_known(known);
   const vec3 place = slot >= 0 ? filter_.point(slot) : vec_of(landmark.p_m);
   const row_verdict result = fuse_point(s, place, slot >= 0 ? 0.0 : map_sigma(landmark), slot, blank, records);
-  note(event.t_ns, s.id, result, clutter_volume_of(s), landmark_records() + known);
+  note(event.t_ns, s.id, result, clutter_volume_of(s), &records_[(size_t)known]);
   return WM_OK;
 }
 
@@ -165,7 +136,7 @@ wm_status stereo_ekf::fuse_sighting(const wm_event &event, record_list records) 
   if (const wm_status bad = check_time(event.t_ns); bad != WM_OK) return bad;
   move_to(event.t_ns);
   if (s.landmark_id < 0) return reject(records, blank, WM_REJECTED_NO_ASSOCIATION);
-  const int known = find_landmark(s.landmark_id);
+  const int known = index_.find(setup_->landmarks, s.landmark_id);
   if (known < 0) return reject(records, blank, WM_REJECTED_UNKNOWN_ID);
   if (life_.searching()) return reject(records, blank, WM_REJECTED_SEARCHING);
   if (has_range && s.range_m > setup_->sensors[s.sensor].max_range_m)
@@ -173,7 +144,7 @@ wm_status stereo_ekf::fuse_sighting(const wm_event &event, record_list records) 
   const int slot = has_range ? slot_of_known(known) : -1;
   row_block rows;
   if (!sighting_rows(s, known, slot, &rows)) return reject(records, blank, WM_REJECTED_SINGULAR);
-  note(event.t_ns, s.landmark_id, fuse_rows(rows, blank, records), clutter_volume_of(s), landmark_records() + known);
+  note(event.t_ns, s.landmark_id, fuse_rows(rows, blank, records), clutter_volume_of(s), &records_[(size_t)known]);
   return WM_OK;
 }
 
@@ -183,7 +154,8 @@ wm_status stereo_ekf::fuse_position(const wm_event &event, record_list records) 
   const coordinates there = coordinates_of(p);
   const bool depth = there.first == 2;
   const wm_innovation blank = record_of(event, depth ? WM_RESIDUAL_Z : WM_RESIDUAL_X);
-  if (const wm_status bad = check_position(p, there); bad != WM_OK) return refuse(records, blank, bad);
+  if (const wm_status bad = check_position(p, there.first, there.last); bad != WM_OK)
+    return refuse(records, blank, bad);
   if (const wm_status bad = check_time(event.t_ns); bad != WM_OK) return bad;
   move_to(event.t_ns);
   if (life_.searching()) return reject(records, blank, WM_REJECTED_SEARCHING);

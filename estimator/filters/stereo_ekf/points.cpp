@@ -16,7 +16,7 @@ constexpr double kInside_px = 8.0;
 int stereo_ekf::find_slot(int32_t id) const {
   const int count = filter_.point_count();
   for (int i = 0; i < count; i++)
-    if (info()[i].id == id) return i;
+    if (info_[(size_t)i].id == id) return i;
   return -1;
 }
 
@@ -34,7 +34,7 @@ void stereo_ekf::end_picture() {
   if (filter_.point_count() > 0) {
     const past_pose past = state_at_picture();
     for (int slot = filter_.point_count() - 1; slot >= 0; slot--) {
-      point_info &point = info()[slot];
+      point_info &point = info_[(size_t)slot];
       if (point.seen_ns == picture_ns_ || point.unseen == kOfMap) continue;
       const vec3 x = in_camera(filter_.point(slot), past);
       // A point whose observations are outliers has a wrong place, in view or not.
@@ -51,15 +51,15 @@ void stereo_ekf::end_picture() {
 void stereo_ekf::remove_point(int slot) {
   const int last = filter_.point_count() - 1;
   filter_.remove_point(slot);
-  info()[slot] = info()[last];
+  info_[(size_t)slot] = info_[(size_t)last];
 }
 
 // Removes the found point that was not seen for longest; points of the present picture stay.
 bool stereo_ekf::make_room() {
   int oldest = -1;
   for (int i = 0; i < filter_.point_count(); i++)
-    if (info()[i].unseen != kOfMap && info()[i].seen_ns != picture_ns_ &&
-        (oldest < 0 || info()[i].seen_ns < info()[oldest].seen_ns))
+    if (info_[(size_t)i].unseen != kOfMap && info_[(size_t)i].seen_ns != picture_ns_ &&
+        (oldest < 0 || info_[(size_t)i].seen_ns < info_[(size_t)oldest].seen_ns))
       oldest = i;
   if (oldest < 0) return false;
   remove_point(oldest);
@@ -76,7 +76,7 @@ int stereo_ekf::slot_of_known(int landmark) {
   if (filter_.point_count() == filter_.point_capacity() && !make_room()) return -1;
   const int slot = filter_.point_count();
   filter_.add_point(vec_of(known.p_m), sigma);
-  info()[slot] = {now_ns_, now_ns_, WM_TIME_NONE, known.id, kOfMap};
+  info_[(size_t)slot] = {now_ns_, now_ns_, WM_TIME_NONE, known.id, kOfMap};
   return slot;
 }
 
@@ -117,7 +117,7 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
   const point_view view = view_point(place, past);
   const int slot = filter_.point_count();
   filter_.add_point(place, view.by, view.A, noise);
-  info()[slot] = {picture_ns_, picture_ns_, WM_TIME_NONE, seen.id, 0};
+  info_[(size_t)slot] = {picture_ns_, picture_ns_, WM_TIME_NONE, seen.id, 0};
   record.verdict = WM_FUSED;
   records.add(record);
 }
@@ -126,8 +126,8 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
 // newer one: either may be the wrong match, and the next observation decides. (Otherwise a point that began with a
 // wrong match stays far off and out of view, and rejects every later observation.)
 void stereo_ekf::contradict_point(int slot, const wm_stereo &seen, const wm_innovation &blank, record_list records) {
-  info()[slot].misfit_ns = picture_ns_;
-  if (info()[slot].seen_ns != info()[slot].begun_ns) return;
+  info_[(size_t)slot].misfit_ns = picture_ns_;
+  if (info_[(size_t)slot].seen_ns != info_[(size_t)slot].begun_ns) return;
   remove_point(slot);
   add_point(seen, blank, records);
 }
@@ -138,7 +138,7 @@ size_t stereo_ekf::list_landmarks(wm_landmark *out, double (*covariance)[4], siz
     const int state = filter_.point_state((int)i);
     const vec3 place = filter_.point((int)i) + filter_.pending(state);
     std::memset(&out[i], 0, sizeof out[i]);
-    out[i].id = info()[i].id;
+    out[i].id = info_[(size_t)i].id;
     for (int k = 0; k < 3; k++) out[i].p_m[k] = place[k];
     out[i].sigma_m =
         std::sqrt((filter_.variance(state) + filter_.variance(state + 1) + filter_.variance(state + 2)) / 3.0);

@@ -4,6 +4,7 @@
 
 #include "filters/core/recovery.hpp"
 #include "filters/stereo_ekf/stereo_ekf.hpp"
+#include "sensors/validation.hpp"
 
 namespace wm {
 namespace {
@@ -56,26 +57,17 @@ void stereo_ekf::start_pose() {
 }
 
 wm_status stereo_ekf::take_pose(const wm_event &event) {
-  wm_status status = WM_OK;
   const wm_set_pose &s = event.as.set_pose;
-  const double *p = s.pose_map_base.p_m, *q = s.pose_map_base.q_xyzw;
-  if (event.kind == WM_EVENT_SET_POSE) {
-    const double size = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
-    const vec3 place = vec_of(p);
-    if (!finite(place) || !finite(size) || !finite(s.sigma_xy_m) || !finite(s.sigma_heading_rad)) return WM_NOT_FINITE;
-    if (std::fabs(p[0]) > 1e7 || std::fabs(p[1]) > 1e7 || std::fabs(p[2]) > 1e7 || std::fabs(size - 1.0) > 0.01 ||
-        !(s.sigma_xy_m > 0.0 && s.sigma_xy_m <= 1e7) || !(s.sigma_heading_rad > 0.0 && s.sigma_heading_rad < 10.0))
-      return WM_OUT_OF_RANGE;
-  }
-  status = check_time(event.t_ns);
+  const wm_status status = event.kind == WM_EVENT_SET_POSE ? check_set_pose(s, 3) : WM_OK;
   if (status != WM_OK) return status;
+  if (const wm_status bad = check_time(event.t_ns); bad != WM_OK) return bad;
   move_to(event.t_ns);
   if (event.kind == WM_EVENT_RESET) {
     filter_.restart_head();
     start_pose();
     return WM_OK;
   }
-  set_pose({vec_of(p), quat_of(q)}, s.sigma_xy_m, s.sigma_heading_rad);
+  set_pose({vec_of(s.pose_map_base.p_m), quat_of(s.pose_map_base.q_xyzw)}, s.sigma_xy_m, s.sigma_heading_rad);
   begin_pose(true, kStartWrong);
   return WM_OK;
 }

@@ -190,19 +190,29 @@ bool stereo_ekf::heading_rows(const wm_heading &h, row_block *out) const {
   return true;
 }
 
-// A measured twist that is ahead of the vehicle's by a lag: its value a lag ago is the vehicle's present one.
+// A measured velocity v/s + lag dv/dt or measured rates w + b + lag dw/dt, by the states v, s, w, b and lag: a measured
+// twist that is ahead of the vehicle's had its present value a lag ago.
 row_block stereo_ekf::twist_rows(head_state which, const vec3 &measured, const vec3 &slope_per_s, const vec3 &variance,
                                  bool planar) const {
-  const int lag_state = which == kVelocity ? kVelocityLag : kRateLag;
+  const bool velocity = which == kVelocity;
+  const int lag_state = velocity ? kVelocityLag : kRateLag;
   const vec3 now = measured - filter_.head1(lag_state, 0.0) * slope_per_s, state = filter_.head3(which);
+  const double scale = velocity ? filter_.head1(kVelocityScale, 1.0) : 1.0;
+  const vec3 bias = velocity ? vec3{0, 0, 0} : filter_.head3(kRateBias);
   row_block out;
-  const int first = out.add_columns(filter_.at(which), 3);
-  const int lag = filter_.at(lag_state) >= 0 ? out.add_columns(filter_.at(lag_state), 1) : -1;
+  const auto columns_of = [&](int cause, int width) {
+    return filter_.at(cause) >= 0 ? out.add_columns(filter_.at(cause), width) : -1;
+  };
+  const int first = columns_of(which, 3), lag = columns_of(lag_state, 1);
+  const int by_scale = velocity ? columns_of(kVelocityScale, 1) : -1,
+            by_bias = velocity ? -1 : columns_of(kRateBias, 3);
   for (int i = 0; i < 3; i++) {
-    if (planar && i != (which == kVelocity ? 0 : 2)) continue;
-    const int row = out.add_row(WM_RESIDUAL_X, now[i], now[i] - state[i], variance[i]);
-    out.by[row][first + i] = 1.0;
+    if (planar && i != (velocity ? 0 : 2)) continue;
+    const int row = out.add_row(WM_RESIDUAL_X, now[i], now[i] - (state[i] / scale + bias[i]), variance[i]);
+    out.by[row][first + i] = 1.0 / scale;
     if (lag >= 0) out.by[row][lag] = slope_per_s[i];
+    if (by_scale >= 0) out.by[row][by_scale] = -state[i] / square(scale);
+    if (by_bias >= 0) out.by[row][by_bias + i] = 1.0;
   }
   return out;
 }

@@ -15,18 +15,18 @@ int head_size(const head_model models[kHeadStates]) {
 
 }  // namespace
 
-size_t space_filter::tail_bytes(const head_model models[kHeadStates], int points_max) {
+size_t space_filter::doubles(const head_model models[kHeadStates], int points_max) {
   const auto stride = (size_t)even(head_size(models) + 3 * points_max);
-  return (kRowsBefore + 1 + stride) * stride * sizeof(double);
+  return (kRowsBefore + 1 + stride) * stride;
 }
 
-void space_filter::init(size_t tail, const head_model models[kHeadStates], int points_max) {
-  tail_ = tail;
+void space_filter::init(double *memory, const head_model models[kHeadStates], int points_max) {
+  memory_.set(memory);
   std::memcpy(models_, models, sizeof models_);
   points_max_ = points_max;
   n_ = first_point_ = head_size(models);
   stride_ = even(n_ + 3 * points_max);
-  std::memset(this->tail(), 0, tail_bytes(models, points_max));
+  std::memset(memory, 0, doubles(models, points_max) * sizeof(double));
   int state = kPose6;
   for (int k = 0; k < kHeadStates; k++) {
     at_[k] = models[k].sigma > 0.0 ? state : -1;

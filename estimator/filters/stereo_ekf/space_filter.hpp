@@ -2,7 +2,7 @@
 // The core of filters in space: pose, states of the sensors and points, with their covariance.
 //
 // Errors are in map axes: R_true = Exp(dr) R, p_true = p + dp, l_true = l + dl. The covariance is that of the
-// right-invariant error (A. Barrau, S. Bonnabel, "An EKF-SLAM algorithm with consistency properties", 2015):
+// right-invariant error [Barrau2015]:
 // e_p = dp + p x dr, e_l = dl + l x dr: a rotation or a displacement of the whole scene stays unobservable, as it is.
 // The covariance is stored in plain coordinates; when the estimate moves by D, dp becomes dp - D x dr. With the
 // camera's rotation or time offset as states, dr in this is the camera's rotation: the vehicle's and theirs.
@@ -17,6 +17,7 @@
 #include "filters/stereo_ekf/states.hpp"
 #include "math/rotation.hpp"
 #include "math/symmetric.hpp"
+#include "memory/layout.hpp"
 #include "motion/spatial.hpp"
 #include "waymark/event.h"
 #include "waymark/pose.h"
@@ -30,7 +31,7 @@ inline constexpr double kUnknownPlace_m = 1000.0, kUnknownTurn_rad = 1.8;
 // Up to kRank rows of one observation: their derivatives by the states of its columns, column after column.
 // The widest block, a stereo point's, has 16 columns: place 3, rotation 3, camera 6, time offset 1, point 3.
 struct row_block {
-  static constexpr int kColumns = 24, kWidest = 3;
+  static constexpr int kColumns = 24, kWidest = 3;  // states of a block, and of one cause
   int rows = 0, columns = 0;
   int without_room = 0;  // columns beyond kColumns: fuse() refuses the block
   int index[kColumns];
@@ -79,9 +80,10 @@ using body_stretch = spatial_step;
 
 class space_filter {
  public:
-  static size_t tail_bytes(const head_model models[kHeadStates], int points_max);
-  // `tail`: bytes from `this` to the tail_bytes() that belong to this filter; 16-byte aligned.
-  void init(size_t tail, const head_model models[kHeadStates], int points_max);
+  // Doubles of the memory behind the filter.
+  static size_t doubles(const head_model models[kHeadStates], int points_max);
+  // `memory` is 16-byte aligned and lies in the same block of memory as *this, at a distance that copies keep.
+  void init(double *memory, const head_model models[kHeadStates], int points_max);
   // Axes of the camera in the body, as they are without the state of its rotation.
   void set_camera_axes(const mat3 &R_base_camera) { camera_axes_ = R_base_camera; }
   // The vehicle's turn rate at the newest picture, rad/s in body axes.
@@ -138,19 +140,19 @@ class space_filter {
   int states() const { return n_; }
 
  private:
-  double *tail() { return reinterpret_cast<double *>(reinterpret_cast<char *>(this) + tail_); }
-  const double *tail() const { return reinterpret_cast<const double *>(reinterpret_cast<const char *>(this) + tail_); }
-  // Rows of the tail: correction, gains, scratch, points, then the covariance.
-  double *correction() { return tail(); }
-  const double *correction() const { return tail(); }
-  double *gains() { return tail() + stride_; }
-  const double *gains() const { return tail() + stride_; }
-  double *scratch() { return tail() + (1 + kRank) * stride_; }
-  double *points() { return tail() + kRowsBefore * stride_; }
-  const double *points() const { return tail() + kRowsBefore * stride_; }
-  double *p() { return tail() + (kRowsBefore + 1) * stride_; }
-  const double *p() const { return tail() + (kRowsBefore + 1) * stride_; }
-  static constexpr int kRowsBefore = 1 + kRank + 2 * kTurns;
+  // Rows of the memory: correction, gains, scratch, points, then the covariance.
+  double *row(int i) { return memory_.get() + i * stride_; }
+  const double *row(int i) const { return memory_.get() + i * stride_; }
+  double *correction() { return row(0); }
+  const double *correction() const { return row(0); }
+  double *gains() { return row(1); }
+  const double *gains() const { return row(1); }
+  double *scratch() { return row(1 + kRank); }
+  double *points() { return row(kRowsBefore); }
+  const double *points() const { return row(kRowsBefore); }
+  double *p() { return row(kRowsBefore + 1); }
+  const double *p() const { return row(kRowsBefore + 1); }
+  static constexpr int kRowsBefore = 1 + kRank + 2 * kTurns;  // of the points
 
   void project(const row_block &block);
   struct factors {
@@ -158,7 +160,7 @@ class space_filter {
   };
   void innovations_of(const row_block &block, factors *f, row_verdict *out) const;
   static bool factorize_and_gate(const row_block &block, const gates &limits, factors *f, row_verdict *out);
-  static constexpr int kTurningStates = 4;
+  static constexpr int kTurningStates = 4;  // the camera's rotation, and the time offset
   struct turning_state {
     int state;
     vec3 by;
@@ -182,7 +184,7 @@ class space_filter {
   void decorrelate(int state, int width, double variance);
   void restart(int which);
 
-  size_t tail_;
+  relative_array<double> memory_;
   int n_, stride_, first_point_, points_max_;
   int at_[kHeadStates];
   head_model models_[kHeadStates];

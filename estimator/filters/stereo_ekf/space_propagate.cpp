@@ -35,7 +35,7 @@ struct integrated_noise {
 integrated_noise integrated_noise_of(const head_model &m, double dt_s) {
   if (!(m.tau_s > 0.0)) return {square(m.walk) * dt_s * dt_s * dt_s / 3.0, 0.5 * square(m.walk) * dt_s * dt_s};
   const double s2 = square(m.sigma), a = dt_s / m.tau_s, gone = 1.0 - exp(-a);
-  // Below a = 0.01 the closed form loses more digits than the series' left out terms are (a^2 / 10 of it).
+  // Below a = 0.01 cancellation costs the closed form more than truncation the series (a^2 / 10 of it).
   const double sum = a < 0.01 ? a * a * a * (1.0 / 3 - 0.25 * a) : a - 2.0 * gone + 0.5 * gone * (2.0 - gone);
   return {2.0 * s2 * square(m.tau_s) * sum, s2 * m.tau_s * square(gone)};
 }
@@ -53,7 +53,7 @@ struct space_filter::step {
 
 // F's rows of the pose beside the identity, block by block: the derivative of the moved pose by `width` states.
 struct space_filter::transition {
-  static constexpr int kBlocks = 4;
+  static constexpr int kBlocks = 4;  // the turn, and two or three states of the motion
   struct block {
     int state, width;
     double by[kPose6][3];

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/stereo_ekf/stereo_ekf.hpp"
 
-#include <algorithm>
 #include <cstring>
 #include <limits>
 
@@ -15,13 +14,13 @@ namespace wm {
 namespace {
 
 // Prediction with velocity and rates as states: step, and the number of steps that bounds the cost of a pause. At 1
-// rad/s a step of 0.05 s leaves second-order terms of 1e-3.
+// rad/s a step of 0.05 s leaves second-order terms of 1e-3. Not swept.
 constexpr double kStep_s = 0.05;
-constexpr int kStepsMax = 40;
+constexpr int kStepsMax = 40;  // 2 s
 constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
-constexpr size_t kLandmarksMax = 1u << 20;
+constexpr size_t kLandmarksMax = 1u << 20;  // so that sizes and indices of the map stay within an int
 
-// Of a measured twist, where neither the parameters nor the calibration give them.
+// Sigmas of a measured twist, where neither the parameters nor the calibration give them: a Doppler log and MEMS gyros.
 constexpr double kTwistSigma_mps = 0.03, kTwistSigma_radps = 0.01;
 
 double first_of(double set, double calibrated, double otherwise) {
@@ -55,27 +54,24 @@ size_t stereo_ekf::bytes(const wm_stereo_ekf_params &params, const wm_setup &set
     *why = "noise.pixel_px is 0, and calibration.yaml's stereo has no sigma_px; give one of them";
     return 0;
   }
-  return lay_out(nullptr, params, setup.landmark_count, nullptr);
+  memory_layout layout(nullptr, sizeof(stereo_ekf));
+  place(&layout, params, setup);
+  return layout.bytes();
 }
 
-size_t stereo_ekf::lay_out(void *state, const wm_stereo_ekf_params &params, size_t landmarks, arrays *out) {
+stereo_ekf::arrays stereo_ekf::place(memory_layout *layout, const wm_stereo_ekf_params &params, const wm_setup &setup) {
   head_model models[kHeadStates];
   models_of(params, models);
-  memory_layout layout(state, sizeof(stereo_ekf));
-  const auto take = [&]<class item>(size_t count, item *) {
-    return (size_t)(reinterpret_cast<char *>(layout.take<item>(count)) - static_cast<char *>(state));
-  };
-  const arrays at = {take(landmarks, (int *)nullptr), take(landmarks, (landmark_record *)nullptr),
-                     take((size_t)params.points_max, (point_info *)nullptr),
-                     take(space_filter::tail_bytes(models, params.points_max), (char *)nullptr)};
-  if (out) *out = at;
-  return layout.bytes();
+  return {layout->take<int>(setup.landmark_count), layout->take<landmark_record>(setup.landmark_count),
+          layout->take<point_info>((size_t)params.points_max),
+          layout->take<double>(space_filter::doubles(models, params.points_max))};
 }
 
 void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup) {
   const char *why = "";
   std::memset(static_cast<void *>(this), 0, bytes(params, setup, &why));
-  lay_out(this, params, setup.landmark_count, &arrays_);
+  memory_layout layout(this, sizeof *this);
+  const arrays behind = place(&layout, params, setup);
   params_ = params;
   setup_ = &setup;
   (void)rig_.init(setup.rig, &why);
@@ -83,33 +79,16 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   motion_.init(setup.motion, &setup.wheels, twist_noise_of(params, setup.rig), params.gap_after_s);
   head_model models[kHeadStates];
   models_of(params, models);
-  const auto before = (size_t)(reinterpret_cast<char *>(&filter_) - reinterpret_cast<char *>(this));
-  filter_.init(arrays_.filter - before, models, params.points_max);
+  filter_.init(behind.filter, models, params.points_max);
   if (rig_.there) filter_.set_camera_axes(rig_.R_base_optical);
-  int *order = landmark_order();
-  for (size_t i = 0; i < setup.landmark_count; i++) order[i] = (int)i;
-  std::sort(order, order + setup.landmark_count, [&setup](int a, int b) {
-    const int32_t id_a = setup.landmarks[a].id, id_b = setup.landmarks[b].id;
-    return id_a != id_b ? id_a < id_b : a < b;
-  });
+  index_.init(setup.landmarks, setup.landmark_count, behind.order);
+  records_.set(behind.records);
+  info_.set(behind.info);
   now_ns_ = picture_ns_ = WM_TIME_NONE;
   life_ = lifecycle();
   start_ns_ = setup.start.t_ns;
   odometry_ = {{{0, 0, 0}, kNoTurn}, 0.0, 0.0};
   start_pose();
-}
-
-int stereo_ekf::find_landmark(int32_t id) const {
-  const int *order = landmark_order();
-  size_t low = 0, high = setup_->landmark_count;
-  while (low < high) {
-    const size_t middle = (low + high) / 2;
-    if (setup_->landmarks[order[middle]].id < id)
-      low = middle + 1;
-    else
-      high = middle;
-  }
-  return low < setup_->landmark_count && setup_->landmarks[order[low]].id == id ? order[low] : -1;
 }
 
 wm_status stereo_ekf::check_time(wm_time_ns t_ns) const { return check_event_time(t_ns, start_ns_, now_ns_); }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // System 3 of the papers: a stereo camera, acoustic ranges, depth, heading and a velocity log in six degrees of
-// freedom; known points, points found on the way, or both. docs/estimators.md has the model.
+// freedom; known points, points found on the way, or both. docs/estimators/stereo_ekf.md has the model.
 #ifndef WAYMARK_ESTIMATOR_STEREO_EKF_HPP
 #define WAYMARK_ESTIMATOR_STEREO_EKF_HPP
 
@@ -11,6 +11,8 @@
 #include "filters/relocalize/pose_consensus.hpp"
 #include "filters/stereo_ekf/params.h"
 #include "filters/stereo_ekf/space_filter.hpp"
+#include "maps/landmark_index.hpp"
+#include "memory/layout.hpp"
 #include "sensors/stereo_rig.hpp"
 #include "waymark/estimator.h"
 
@@ -31,7 +33,7 @@ class stereo_ekf {
   uint32_t motion_health() const { return motion_.health(); }
 
  private:
-  static constexpr int32_t kOfMap = -1;
+  static constexpr int32_t kOfMap = -1;  // point_info::unseen of a point of the map, which is not removed
   // Observations of the last seconds are used to find the pose; odometry relates them. Not swept.
   static constexpr double kWindow_s = 3.0;
   static constexpr int kDepthKey = -4;  // beside core/landmark_evidence.hpp's keys
@@ -107,28 +109,17 @@ class stereo_ekf {
   void begin_pose(bool known, double log_odds_wrong);
   void search(wm_time_ns since_ns);
 
-  int find_landmark(int32_t id) const;
   double map_sigma(const wm_landmark &landmark) const {
     return landmark.sigma_m > params_.map_min_m ? landmark.sigma_m : params_.map_min_m;
   }
-  // Arrays behind the struct, by their distance from it in bytes: a copy of the state has them at the same place.
+  // Arrays behind the struct.
   struct arrays {
-    size_t order, records, info, filter;
+    int *order;
+    landmark_record *records;
+    point_info *info;
+    double *filter;
   };
-  static size_t lay_out(void *state, const wm_stereo_ekf_params &params, size_t landmarks, arrays *out);
-  template <class item>
-  item *array(size_t at) {
-    return reinterpret_cast<item *>(reinterpret_cast<char *>(this) + at);
-  }
-  template <class item>
-  const item *array(size_t at) const {
-    return reinterpret_cast<const item *>(reinterpret_cast<const char *>(this) + at);
-  }
-  int *landmark_order() { return array<int>(arrays_.order); }  // by rising id
-  const int *landmark_order() const { return array<int>(arrays_.order); }
-  landmark_record *landmark_records() { return array<landmark_record>(arrays_.records); }
-  point_info *info() { return array<point_info>(arrays_.info); }
-  const point_info *info() const { return array<point_info>(arrays_.info); }
+  static arrays place(memory_layout *layout, const wm_stereo_ekf_params &params, const wm_setup &setup);
   gates limits() const { return {params_.gate_soft, params_.gate_hard}; }
 
   space_filter filter_;
@@ -136,7 +127,9 @@ class stereo_ekf {
   stereo_rig rig_;
   wm_stereo_ekf_params params_;
   const wm_setup *setup_;
-  arrays arrays_;
+  landmark_index index_;
+  relative_array<landmark_record> records_;  // by landmark
+  relative_array<point_info> info_;          // by slot of the state
   double sigma_px_[4];
   wm_time_ns now_ns_, start_ns_;
   wm_time_ns picture_ns_;    // the present picture; NONE between pictures

@@ -38,6 +38,8 @@ struct scene {
   double t_s = 0;
   uint64_t draws = 0;
   double noise_v = 0.02, noise_w = 0.003;
+  double log_scale = 1.0;  // of the measured velocity: what it has to be multiplied by
+  vec3 gyro_bias = {0, 0, 0};
 
   explicit scene(int count = 400) {
     motion.resize(wm_motion_params_table.bytes);
@@ -111,8 +113,8 @@ struct scene {
   void swim(double dt_s, const vec3 &v, const vec3 &w) {
     wm_event e = make::empty(t_s, WM_EVENT_TWIST6);
     for (int i = 0; i < 3; i++) {
-      e.as.twist6.v_mps[i] = v[i] + noise_v * noise();
-      e.as.twist6.w_radps[i] = w[i] + noise_w * noise();
+      e.as.twist6.v_mps[i] = v[i] / log_scale + noise_v * noise();
+      e.as.twist6.w_radps[i] = w[i] + gyro_bias[i] + noise_w * noise();
     }
     TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &e));
     start_of_step = truth.p;

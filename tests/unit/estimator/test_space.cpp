@@ -22,17 +22,17 @@ void assert_near(const vec3 &want, const vec3 &got, double within) {
   for (int i = 0; i < 3; i++) TEST_ASSERT_DOUBLE_WITHIN(within, want[i], got[i]);
 }
 
-// A filter with room for its tail behind it.
+// A filter with its memory behind it.
 struct machine {
   char *memory;
   space_filter *filter;
   explicit machine(const head_model *models, int points) {
     const size_t own = (sizeof(space_filter) + 15) / 16 * 16;
-    const size_t bytes = own + space_filter::tail_bytes(models, points);
+    const size_t bytes = own + sizeof(double) * space_filter::doubles(models, points);
     memory = static_cast<char *>(aligned_alloc(16, (bytes + 15) / 16 * 16));
     std::memset(memory, 0, bytes);
     filter = reinterpret_cast<space_filter *>(memory);
-    filter->init(own, models, points);
+    filter->init(reinterpret_cast<double *>(memory + own), models, points);
   }
   ~machine() { free(memory); }
   machine(const machine &) = delete;

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <vector>
 
+#include "filters/stereo_ekf/params.h"
 #include "stereo_scene.hpp"
 
 using namespace wm;
@@ -295,6 +296,39 @@ void test_the_time_of_pictures_is_told_by_a_twist_that_swings_alone(void) {
   }
 }
 
+// A log that reads too little and gyros with a bias are calibrated whether the twist is an input or an observation.
+void test_scale_and_bias_of_the_twist_are_found_in_both_predictions(void) {
+  for (const int prediction : {WM_PREDICT_TWIST, WM_PREDICT_CONSTANT_VELOCITY}) {
+    scene s;
+    s.set("prediction", prediction);
+    s.set("states.velocity_scale_sigma", 0.1);
+    s.set("states.rate_bias_sigma_radps", 0.05);
+    s.log_scale = 1.08;
+    s.gyro_bias = {0.01, -0.02, 0.03};
+    s.begin();
+    for (int i = 0; i < 400; i++) {
+      const double side = i / 20 % 2 ? -1.0 : 1.0;
+      s.swim(0.05, {0.5 * side, 0.1 * side, 0}, {0.1 * side, 0, 0.3});
+      s.look();
+    }
+    wm_calibration_value values[16];
+    const size_t count = s.ekf->calibration(s.state, values, 16);
+    int checked = 0;
+    for (size_t i = 0; i < count; i++) {
+      const char *const names[] = {"motion.velocity_scale", "motion.rate_bias_x_radps", "motion.rate_bias_y_radps",
+                                   "motion.rate_bias_z_radps"};
+      const double truth[] = {s.log_scale, s.gyro_bias.x, s.gyro_bias.y, s.gyro_bias.z};
+      for (int k = 0; k < 4; k++) {
+        if (std::strcmp(values[i].name, names[k]) != 0) continue;
+        TEST_ASSERT_DOUBLE_WITHIN(3.5 * values[i].sigma, truth[k], values[i].value);
+        TEST_ASSERT_LESS_THAN_DOUBLE(k == 0 ? 0.03 : 0.005, values[i].sigma);
+        checked++;
+      }
+    }
+    TEST_ASSERT_EQUAL(4, checked);
+  }
+}
+
 void test_ranges_depth_and_heading_are_rows_too(void) {
   scene s;
   s.map = {{1, {10, 0, -2}, 0.001, kAbsent, {}, 0},
@@ -368,6 +402,7 @@ int main(void) {
   RUN_TEST(test_a_point_that_does_not_fit_any_more_leaves);
   RUN_TEST(test_pictures_that_are_late);
   RUN_TEST(test_the_time_of_pictures_is_told_by_a_twist_that_swings_alone);
+  RUN_TEST(test_scale_and_bias_of_the_twist_are_found_in_both_predictions);
   RUN_TEST(test_ranges_depth_and_heading_are_rows_too);
   RUN_TEST(test_a_copy_with_points_goes_on_alike);
   return UNITY_END();

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// Validation of sightings, positions, headings and stated poses, the same for every filter. WM_NOT_FINITE,
+// WM_OUT_OF_RANGE: the datum cannot be a measurement.
+#ifndef WAYMARK_ESTIMATOR_SENSORS_VALIDATION_HPP
+#define WAYMARK_ESTIMATOR_SENSORS_VALIDATION_HPP
+
+#include <cmath>
+
+#include "math/elementary.hpp"
+#include "waymark/event.h"
+#include "waymark/status.h"
+
+namespace wm {
+
+inline constexpr double kMaxRange_m = 1e6, kMaxSigma = 1e6;  // beyond, a number is an error of the sender
+inline constexpr double kMaxAngle_rad = 100.0;               // unwrapped angles may have turned a few times
+
+inline constexpr double kMaxPosition_m = 1e7;         // beyond, a coordinate is an error of the sender
+inline constexpr double kMaxHeadingSigma_rad = 10.0;  // of a stated pose; pi is an unknown heading
+inline constexpr double kUnitNorm = 0.01;             // a quaternion's squared length may differ from 1 by this
+
+// NaN: the sensor's own sigma.
+inline bool is_sigma(double value) { return std::isnan(value) || (value > 0.0 && value < kMaxSigma); }
+
+// Absent, or an angle above a plane with its sigma.
+inline bool is_elevation(const wm_sighting &s) {
+  return !wm_sighting_has_elevation(&s) ||
+         (std::fabs(s.elevation_rad) <= kHalfPi && s.elevation_sigma_rad > 0.0 && s.elevation_sigma_rad < kMaxSigma);
+}
+
+inline wm_status check_sighting(const wm_sighting &s, size_t sensor_count) {
+  const bool has_bearing = !std::isnan(s.bearing_rad), has_range = !std::isnan(s.range_m);
+  if ((!has_bearing && !has_range) || std::isinf(s.bearing_rad) || std::isinf(s.range_m) || std::isinf(s.elevation_rad))
+    return WM_NOT_FINITE;
+  const bool in_range = s.sensor < sensor_count && !(has_bearing && std::fabs(s.bearing_rad) > kMaxAngle_rad) &&
+                        !(has_range && !(s.range_m >= 0.0 && s.range_m < kMaxRange_m)) &&
+                        is_sigma(s.bearing_sigma_rad) && is_sigma(s.range_sigma_m) && is_elevation(s);
+  return in_range ? WM_OK : WM_OUT_OF_RANGE;
+}
+
+// Coordinates [first, last) of a position.
+inline wm_status check_position(const wm_position &p, int first, int last) {
+  const auto sigma = [&p](int i) { return i == 2 ? p.sigma_z_m : p.sigma_xy_m; };
+  for (int i = first; i < last; i++)
+    if (!finite(p.p_m[i]) || !finite(sigma(i))) return WM_NOT_FINITE;
+  for (int i = first; i < last; i++)
+    if (std::fabs(p.p_m[i]) > kMaxPosition_m || !is_sigma(sigma(i))) return WM_OUT_OF_RANGE;
+  return WM_OK;
+}
+
+inline wm_status check_heading(const wm_heading &h) {
+  if (!finite(h.heading_rad) || !finite(h.sigma_rad)) return WM_NOT_FINITE;
+  const bool possible = std::fabs(h.heading_rad) <= kMaxAngle_rad && h.sigma_rad > 0.0 && h.sigma_rad < kMaxAngle_rad;
+  return possible ? WM_OK : WM_OUT_OF_RANGE;
+}
+
+// `coordinates`: 2 in the plane, 3 in space.
+inline wm_status check_set_pose(const wm_set_pose &s, int coordinates) {
+  double norm = 0.0;
+  for (const double q : s.pose_map_base.q_xyzw) norm += q * q;
+  if (!finite(norm) || !finite(s.sigma_xy_m) || !finite(s.sigma_heading_rad)) return WM_NOT_FINITE;
+  for (int i = 0; i < coordinates; i++)
+    if (!finite(s.pose_map_base.p_m[i])) return WM_NOT_FINITE;
+  for (int i = 0; i < coordinates; i++)
+    if (std::fabs(s.pose_map_base.p_m[i]) > kMaxPosition_m) return WM_OUT_OF_RANGE;
+  const bool possible = std::fabs(norm - 1.0) <= kUnitNorm && s.sigma_xy_m > 0.0 && s.sigma_xy_m <= kMaxPosition_m &&
+                        s.sigma_heading_rad > 0.0 && s.sigma_heading_rad < kMaxHeadingSigma_rad;
+  return possible ? WM_OK : WM_OUT_OF_RANGE;
+}
+
+}  // namespace wm
+
+#endif
