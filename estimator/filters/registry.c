@@ -13,6 +13,14 @@ const wm_estimator *const *wm_estimators(size_t *count) {
   return kEstimators;
 }
 
+int wm_estimator_reads(const wm_estimator *estimator, const char *key) {
+  for (const char *const *at = estimator->reads; at && *at; at++) {
+    const int is_not = **at == '!';
+    if (strncmp(key, *at + is_not, strlen(*at + is_not)) == 0) return !is_not;
+  }
+  return 0;
+}
+
 const wm_estimator *wm_estimator_find(const char *name) {
   for (size_t i = 0; i < kCount; i++)
     if (strcmp(kEstimators[i]->name, name) == 0) return kEstimators[i];

@@ -1,14 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "motion/motion_params.h"
 
+#include "param_rows.h"
+
+typedef struct wm_motion_params params;
+
 static const char *const kModels[] = {"auto", "ticks", "speed_yaw_rate", "ackermann", "twist", NULL};
 
-#define F64(key, field, initial, min, max, about) \
-  { key, WM_PARAM_F64, offsetof(struct wm_motion_params, field), initial, min, max, NULL, about }
+// A calibration state of the motion sensors: the sigma at its start, and its random walk.
+#define STATE(term, name, unit, walk_initial, about)                          \
+  F64("states." name "_sigma" unit, states.sigma[term], 0, 0, 1, about),      \
+      F64("states." name "_walk" unit, states.walk[term], walk_initial, 0, 1, \
+          "Random walk of that state per sqrt(s).")
 
 static const wm_param kParams[] = {
-    {"model", WM_PARAM_ENUM, offsetof(struct wm_motion_params, model), WM_MOTION_AUTO, 0, WM_MOTION_TWIST, kModels,
-     "Motion model. auto: the first of ticks, speed and yaw rate, speed and steering, twist whose data come."},
+    ENUM("model", model, WM_MOTION_AUTO, WM_MOTION_TWIST, kModels,
+         "Motion model. auto: the first of ticks, speed and yaw rate, speed and steering, twist whose data come."),
     F64("noise.speed_mps", noise_speed_mps, 0.02, 0, 10,
         "White noise of the speed, m/s per sqrt(s): slip and play at walking pace."),
     F64("noise.speed_rel", noise_speed_rel, 0.03, 0, 2,
@@ -61,19 +68,37 @@ static const wm_param kParams[] = {
         "which the speed changes."),
     F64("commands.yaw_rate_change", commands_yaw_rate_change, 0, 0, 10,
         "As speed_change, for the rotation: rad per square root of a rad/s. 0.04 is 0.06 s for a change of 0.4 rad/s."),
+    STATE(WM_SPEED_SCALE, "speed_scale", "", 0,
+          "Start sigma of the speed's scale about 1 (tyres, a controller that gives less than asked). 0: off."),
+    STATE(WM_YAW_RATE_SCALE, "yaw_rate_scale", "", 0, "Start sigma of the turn rate's scale about 1. 0: off."),
+    STATE(WM_YAW_RATE_BIAS, "yaw_rate_bias", "_radps", 0.0001,
+          "Start sigma of the turn rate's bias, rad/s (a cheap gyro: 0.02). 0: off."),
+    STATE(WM_LEFT_SCALE, "left_scale", "", 0, "Start sigma of the left wheel's scale about 1, for ticks. 0: off."),
+    STATE(WM_RIGHT_SCALE, "right_scale", "", 0, "Start sigma of the right wheel's scale about 1, for ticks. 0: off."),
+    STATE(WM_TRACK_SCALE, "track_scale", "", 0, "Start sigma of the track's scale about 1, for ticks. 0: off."),
+    STATE(WM_STEERING_OFFSET, "steering_offset", "_rad", 0,
+          "Start sigma of the road wheel's zero, rad, for speed and steering. 0: off."),
+    STATE(WM_LAG, "lag", "_s", 0, "Start sigma of the motion's delay behind its samples, s. 0: off."),
+    STATE(WM_TURN_SLOWDOWN, "turn_slowdown", "_mps", 0,
+          "Start sigma of the loss of a commanded speed at a turn rate of 1 rad/s, m/s; it grows with the square of "
+          "the turn rate (drives that limit or round their wheels' speeds). 0: off."),
+    F64("states.wheel_difference_sigma", states.wheel_difference_sigma, 0, 0, 1,
+        "With speed by ticks and the heading by a yaw rate: start sigma of the relative difference of the wheels' "
+        "radii. The ticks then measure the heading, too, which bounds the random walk of the gyro's noise. 0: off."),
+    F64("states.wheel_difference_walk", states.wheel_difference_walk, 0.00001, 0, 1,
+        "Random walk of that state per sqrt(m): tyres warm up, loads move."),
 };
 
 static const wm_param_old kOld[] = {{"noise.speed_change", "commands.speed_change", NULL},
                                     {"noise.yaw_rate_change", "commands.yaw_rate_change", NULL},
                                     {NULL, NULL, NULL}};
 
-const wm_param_table wm_motion_params_table = {kParams, sizeof kParams / sizeof kParams[0],
-                                               sizeof(struct wm_motion_params), kOld};
+const wm_param_table wm_motion_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), kOld};
 
-const char *wm_motion_params_clash(const wm_motion_params *params, const char **key) {
+const char *wm_motion_params_clash(const wm_motion_params *p, const char **key) {
   // 0 is off for either; where they are equal, every left turn overflows that is wider than the drive's widest.
-  const double overflow_m = params->commands_radius_overflow_m;
-  if (!(overflow_m > 0.0 && overflow_m < params->commands_radius_max_m)) return NULL;
+  const double overflow_m = p->commands_radius_overflow_m;
+  if (!(overflow_m > 0.0 && overflow_m < p->commands_radius_max_m)) return NULL;
   *key = "commands.radius_overflow_m";
   return "is below motion.commands.radius_max_m, which the drive still obeys: nothing overflows there; set it to at "
          "least that, or to 0 if no radius overflows";

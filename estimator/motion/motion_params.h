@@ -9,6 +9,13 @@
 extern "C" {
 #endif
 
+// Calibration states of the motion sensors, by wm_motion_term.
+typedef struct wm_motion_states {
+  double sigma[WM_MOTION_TERMS];  // at the start; 0: not a state
+  double walk[WM_MOTION_TERMS];   // random walk, per sqrt(s)
+  double wheel_difference_sigma, wheel_difference_walk;
+} wm_motion_states;
+
 struct wm_motion_params {
   int32_t model;  // wm_motion_model
   double noise_speed_mps;
@@ -29,6 +36,7 @@ struct wm_motion_params {
   double limits_mps2, limits_radps2;
   double commands_radius_max_m, commands_radius_overflow_m;
   double commands_speed_change, commands_yaw_rate_change;
+  wm_motion_states states;
 };
 
 #ifdef __cplusplus

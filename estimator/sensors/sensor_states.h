@@ -47,19 +47,6 @@ typedef struct wm_sensor_states {
   double sigma[WM_SENSOR_ROWS];  // at the start; 0: not a state
   double walk[WM_SENSOR_ROWS];   // random walk, per sqrt(s)
 } wm_sensor_states;
-
-// Rows of parameters, in a file whose struct `params` has the member `sensor_states`.
-#define WM_SENSOR_WALK_CONSTANT(state, key, unit)
-#define WM_SENSOR_WALK_WALK(state, key, unit) \
-  {"states." key "_walk" unit, WM_PARAM_F64, offsetof(params, sensor_states.walk[WM_SENSOR_ROW_##state]), 0, 0, 1, NULL, \
-   "Random walk of that state per sqrt(s). 0: it is constant."},
-#define WM_SENSOR_PARAM_ONE(state, key, unit, name, neutral, low, high, noise, most, text) \
-  {"states." key "_sigma" unit, WM_PARAM_F64, offsetof(params, sensor_states.sigma[WM_SENSOR_ROW_##state]), 0, 0, most, \
-   NULL, text}, \
-  WM_SENSOR_WALK_##noise(state, key, unit)
-#define WM_SENSOR_PARAM_TWO(state, second, key, unit, name, name2, neutral, low, high, noise, most, text) \
-  WM_SENSOR_PARAM_ONE(state, key, unit, name, neutral, low, high, noise, most, text)
-#define WM_SENSOR_STATE_PARAMS WM_SENSOR_STATES(WM_SENSOR_PARAM_ONE, WM_SENSOR_PARAM_TWO)
 // clang-format on
 
 #ifdef __cplusplus

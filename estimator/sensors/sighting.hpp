@@ -7,6 +7,7 @@
 
 #include "math/elementary.hpp"
 #include "sensors/sensor_model.hpp"
+#include "sensors/sighting_params.h"
 #include "sensors/validation.hpp"
 
 namespace wm {
@@ -19,9 +20,8 @@ struct sighting_reading {
   double bearing_sigma_rad, range_sigma_m;
 };
 
-// `params`: of a filter that has the rows WM_SIGHTING_NOISE_PARAMS.
-template <class Params>
-sighting_reading read_sighting(const wm_sighting &s, const mounted_sensor &sensor, const Params &params) {
+inline sighting_reading read_sighting(const wm_sighting &s, const mounted_sensor &sensor,
+                                      const wm_sighting_params &params) {
   sighting_reading r;
   r.bearing = !std::isnan(s.bearing_rad) && params.use_bearing;
   r.range = !std::isnan(s.range_m) && params.use_range;
@@ -30,6 +30,17 @@ sighting_reading read_sighting(const wm_sighting &s, const mounted_sensor &senso
   r.range_sigma_m =
       params.range_sigma_factor * first_number(s.range_sigma_m, sensor.range_sigma_m, params.range_sigma_default_m);
   return r;
+}
+
+// The states of a slot of time-correlated errors: `width` of them; the offsets of the bearing's and the range's error
+// in it, -1: not carried. An error of sigma 1 is scaled by the parameters.
+struct correlated_slot {
+  int bearing, range, width;
+};
+inline correlated_slot correlated_slot_of(const wm_sighting_params &p) {
+  const bool bearing = p.correlated_bearing_rad > 0.0 || p.correlated_lateral_m > 0.0;
+  const bool range = p.correlated_range_m > 0.0 || p.correlated_range_rel > 0.0;
+  return {bearing ? 0 : -1, range ? static_cast<int>(bearing) : -1, p.correlated_slots > 0 ? bearing + range : 0};
 }
 
 }  // namespace wm

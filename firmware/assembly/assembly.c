@@ -98,6 +98,7 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
 
   wm_setup *setup = &out->setup;
   setup->motion = config->motion;
+  setup->sightings = config->sightings;
   setup->wheels = *wm_recording_wheels(recording);
   setup->sensors = wm_recording_sensors(recording, &setup->sensor_count);
   setup->landmarks = wm_recording_landmarks(recording, &setup->landmark_count);

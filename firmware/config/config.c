@@ -38,47 +38,77 @@ static wm_status read_estimator(const wm_yaml_node *root, wm_config *out, wm_err
   return status;
 }
 
+// Opens the shared sections with these structs of theirs.
+static void open_shared(config_shared *self, wm_motion_params *motion, wm_sighting_params *sightings,
+                        const wm_estimator *reader) {
+  memset(self, 0, sizeof *self);
+  self->reader = reader;
+  self->of[CONFIG_MOTION] = (config_filling){.prefix = "motion.", .table = &wm_motion_params_table, .out = motion};
+  self->of[CONFIG_SIGHTINGS] =
+      (config_filling){.prefix = "sightings.", .table = &wm_sighting_params_table, .out = sightings};
+}
+
+static wm_status fill_estimator(const wm_yaml_node *section, const wm_estimator *estimator, void *out,
+                                config_shared *shared, char *warnings, wm_error *err) {
+  char prefix[WM_NAME_MAX + 2];
+  snprintf(prefix, sizeof prefix, "%s.", estimator->name);
+  config_filling own = {.prefix = prefix, .table = &estimator->params, .out = out};
+  return config_fill(section, &own, "", shared, warnings, err);
+}
+
 // A section of an estimator that isn't chosen is checked, too: it will be chosen one day.
-static wm_status check_other_estimator(const wm_yaml_node *section, const wm_param_table *table, wm_config *out,
+static wm_status check_other_estimator(const wm_yaml_node *section, const wm_estimator *estimator, wm_config *out,
                                        wm_error *err) {
-  void *scratch = malloc(table->bytes + 1);
-  if (!scratch) return wm_fail(err, WM_IO, "%s: no memory to read it", wm_yaml_file(section));
-  wm_params_defaults(table, scratch);
-  wm_status status = config_fill(section, table, "", scratch, out->warnings, err);
-  free(scratch);
+  const wm_param_table *tables[] = {&estimator->params, &wm_motion_params_table, &wm_sighting_params_table};
+  void *scratch[3] = {NULL};
+  wm_status status = WM_OK;
+  for (int i = 0; i < 3; i++) {
+    scratch[i] = calloc(1, tables[i]->bytes + 1);
+    if (!scratch[i]) status = wm_fail(err, WM_IO, "%s: no memory to read it", wm_yaml_file(section));
+  }
+  config_shared shared;
+  open_shared(&shared, scratch[1], scratch[2], NULL);
+  if (status == WM_OK) status = fill_estimator(section, estimator, scratch[0], &shared, out->warnings, err);
+  for (int i = 0; i < 3; i++) free(scratch[i]);
   return status;
 }
 
 // What each parameter allows by itself may make no sense beside another.
-static wm_status read_motion(const wm_yaml_node *section, wm_config *out, wm_error *err) {
-  const char *key;
-  wm_status status = config_fill(section, &wm_motion_params_table, "", out->motion, out->warnings, err);
-  const char *clash = status == WM_OK ? wm_motion_params_clash(out->motion, &key) : NULL;
-  if (!clash) return status;
+static wm_status check_motion(const wm_yaml_node *section, const wm_config *config, wm_error *err) {
+  const char *key, *clash = wm_motion_params_clash(config->motion, &key);
+  if (!clash) return WM_OK;
   wm_yaml_node node = wm_yaml_get(section, key);
   if (!wm_yaml_there(&node)) node.id = section->id;  // its key is written with dots: the section's line will do
   return wm_yaml_fail(&node, err, "%s", clash);
 }
 
+static wm_status read_section(const wm_yaml_node *value, const char *key, config_shared *shared, wm_config *out,
+                              wm_error *err) {
+  const wm_estimator *estimator = wm_estimator_find(key);
+  if (estimator && estimator == out->estimator)
+    return fill_estimator(value, estimator, out->estimator_params, shared, out->warnings, err);
+  if (estimator) return check_other_estimator(value, estimator, out, err);
+  if (strcmp(key, "sightings") == 0)
+    return config_fill(value, &shared->of[CONFIG_SIGHTINGS], "", shared, out->warnings, err);
+  if (strcmp(key, "motion") != 0) return WM_OK;
+  wm_status status = config_fill(value, &shared->of[CONFIG_MOTION], "", shared, out->warnings, err);
+  return status == WM_OK ? check_motion(value, out, err) : status;
+}
+
 static wm_status read_sections(const wm_yaml_node *root, wm_config *out, wm_error *err) {
-  for (size_t i = 0; i < wm_yaml_count(root); i++) {
+  config_shared shared;
+  open_shared(&shared, out->motion, out->sightings, out->estimator);
+  wm_status status = WM_OK;
+  for (size_t i = 0; status == WM_OK && i < wm_yaml_count(root); i++) {
     const char *key;
     int line;
     wm_yaml_node value = wm_yaml_value(root, i, &key, &line);
-    const wm_estimator *estimator = wm_estimator_find(key);
-    wm_status status = WM_OK;
-    if (estimator == out->estimator && estimator)
-      status = config_fill(&value, &estimator->params, "", out->estimator_params, out->warnings, err);
-    else if (estimator)
-      status = check_other_estimator(&value, &estimator->params, out, err);
-    else if (strcmp(key, "motion") == 0)
-      status = read_motion(&value, out, err);
-    if (status != WM_OK) return status;
+    status = read_section(&value, key, &shared, out, err);
   }
-  return WM_OK;
+  return status;
 }
 
-// All keys at the top: sections of estimators and of motion are looked at by read_sections.
+// All keys at the top: sections of estimators, motion and sightings are read by read_sections.
 static wm_status check_top(const wm_yaml_node *root, wm_config *out, wm_error *err) {
   static const char *const kGroups[] = {"merge", "publish", "commands", "realtime", "start", "black_box", NULL};
   for (size_t i = 0; i < wm_yaml_count(root); i++) {
@@ -86,12 +116,13 @@ static wm_status check_top(const wm_yaml_node *root, wm_config *out, wm_error *e
     int line, known = 0;
     wm_yaml_node value = wm_yaml_value(root, i, &key, &line);
     for (size_t k = 0; kConfigKeys[k].key; k++) known |= strcmp(kConfigKeys[k].key, key) == 0;
-    if (known || strcmp(key, "motion") == 0 || wm_estimator_find(key)) continue;
+    if (known || strcmp(key, "motion") == 0 || strcmp(key, "sightings") == 0 || wm_estimator_find(key)) continue;
     for (size_t g = 0; kGroups[g]; g++) {
       if (strcmp(kGroups[g], key) != 0) continue;
       char prefix[16];
       snprintf(prefix, sizeof prefix, "%s.", key);
-      wm_status status = config_fill(&value, &wm_runtime_params_table, prefix, &out->runtime, out->warnings, err);
+      config_filling runtime = {.prefix = "", .table = &wm_runtime_params_table, .out = &out->runtime};
+      wm_status status = config_fill(&value, &runtime, prefix, NULL, out->warnings, err);
       if (status != WM_OK) return status;
       known = 1;
     }
@@ -154,9 +185,12 @@ static wm_status allocate(wm_config *out, wm_error *err) {
   const wm_param_table *table = &out->estimator->params;
   out->estimator_params = calloc(1, table->bytes + 1);
   out->motion = calloc(1, wm_motion_params_table.bytes + 1);
-  if (!out->estimator_params || !out->motion) return wm_fail(err, WM_IO, "%s: no memory to read it", out->path);
+  out->sightings = calloc(1, wm_sighting_params_table.bytes + 1);
+  if (!out->estimator_params || !out->motion || !out->sightings)
+    return wm_fail(err, WM_IO, "%s: no memory to read it", out->path);
   wm_params_defaults(table, out->estimator_params);
   wm_params_defaults(&wm_motion_params_table, out->motion);
+  wm_params_defaults(&wm_sighting_params_table, out->sightings);
   return WM_OK;
 }
 
@@ -223,6 +257,7 @@ void wm_config_free(wm_config *config) {
   free(config->text);
   free(config->estimator_params);
   free(config->motion);
+  free(config->sightings);
   for (size_t i = 0; i < config->vision_count; i++) {
     free(config->vision[i].params);
     for (size_t k = 0; k < config->vision[i].cascade_count; k++) wm_cascade_free(&config->vision[i].cascades[k]);
@@ -230,6 +265,7 @@ void wm_config_free(wm_config *config) {
   config->text = NULL;
   config->estimator_params = NULL;
   config->motion = NULL;
+  config->sightings = NULL;
   config->vision_count = 0;
 }
 

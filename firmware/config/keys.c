@@ -95,8 +95,13 @@ const config_key kConfigCameraDeviceKeys[] = {
 
 size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]) {
   out[0] = (config_section){"runtime", "", "", &wm_runtime_params_table};
-  out[1] = (config_section){"motion", "", "motion.", &wm_motion_params_table};
-  size_t count = 2, estimators;
+  out[1] = (config_section){"motion", "For every estimator: the motion sensors, and their calibration states.",
+                            "motion.", &wm_motion_params_table};
+  out[2] = (config_section){"sightings",
+                            "For every estimator that takes sightings of landmarks: their noise, the sensors' "
+                            "calibration states, time-correlated errors and gates.",
+                            "sightings.", &wm_sighting_params_table};
+  size_t count = 3, estimators;
   const wm_estimator *const *all = wm_estimators(&estimators);
   for (size_t i = 0; i < estimators && count < CONFIG_SECTIONS_MAX; i++, count++) {
     out[count] = (config_section){all[i]->name, all[i]->about, "", &all[i]->params};
@@ -206,12 +211,6 @@ static int find(const wm_param_table *table, const char *key) {
   return -1;
 }
 
-static const wm_param_old *find_old(const wm_param_table *table, const char *key) {
-  for (const wm_param_old *old = table->old; old && old->key; old++)
-    if (strcmp(old->key, key) == 0) return old;
-  return NULL;
-}
-
 static int stands_in(const char *key, const char *group, size_t length) {
   return strncmp(key, group, length) == 0 && key[length] == '.';
 }
@@ -264,13 +263,12 @@ static wm_status read_param(const wm_yaml_node *node, const wm_param *param, voi
   return status;
 }
 
-// A section as it is read. `given` has the key by which each parameter was given: none, its own, or an old one.
-typedef struct filling {
-  const wm_param_table *table;
-  void *out;
-  char *warnings;  // WM_CONFIG_WARNINGS_MAX bytes
-  enum { NOT_GIVEN = 0, BY_ITS_KEY, BY_AN_OLD_KEY } * given;
-} filling;
+// A section as it is read.
+typedef struct reading {
+  config_filling *own;
+  config_shared *shared;  // NULL: none
+  char *warnings;         // WM_CONFIG_WARNINGS_MAX bytes
+} reading;
 
 static void warn(char *to, const wm_yaml_node *value, int line, const char *text) {
   size_t used = strlen(to);
@@ -278,63 +276,107 @@ static void warn(char *to, const wm_yaml_node *value, int line, const char *text
                  text);
 }
 
-static wm_status take_param(filling *self, const wm_yaml_node *value, int index, int by, wm_error *err) {
-  const wm_param *param = &self->table->params[index];
-  if (self->given[index] != NOT_GIVEN && (by == BY_AN_OLD_KEY || self->given[index] == BY_AN_OLD_KEY))
-    return wm_yaml_fail(value, err, "'%s' is given by its old name, too; keep one of them", param->key);
-  self->given[index] = by;
-  return read_param(value, param, self->out, err);
-}
-
-// A key that the table had before.
-static wm_status take_old(filling *self, const wm_yaml_node *value, int line, const wm_param_old *old, wm_error *err) {
-  char text[400];
-  if (!old->new_key) {
-    (void)snprintf(text, sizeof text, "is no parameter any more and is ignored: %s", old->about ? old->about : "");
-    warn(self->warnings, value, line, text);
-    return WM_OK;
-  }
-  int index = find(self->table, old->new_key);
-  if (index < 0) return wm_yaml_fail(value, err, "was renamed to '%s', which is no parameter", old->new_key);
-  (void)snprintf(text, sizeof text, "is now '%.*s%s', and read as that%s%s",
-                 (int)(strlen(value->path) - strlen(old->key)), value->path, old->new_key, old->about ? "; " : "",
-                 old->about ? old->about : "");
+static void warn_if_not_read(const reading *self, const config_filling *of, const wm_yaml_node *value, int line,
+                             const wm_param *param) {
+  char key[KEY_MAX], text[100];
+  const wm_estimator *reader = self->shared ? self->shared->reader : NULL;
+  if (!reader || of < self->shared->of || of >= self->shared->of + CONFIG_SHARED) return;
+  snprintf(key, sizeof key, "%s%s", of->prefix, param->key);
+  if (wm_estimator_reads(reader, key)) return;
+  snprintf(text, sizeof text, "estimator %s does not take it", reader->name);
   warn(self->warnings, value, line, text);
-  return take_param(self, value, index, BY_AN_OLD_KEY, err);
 }
 
-static wm_status fill(filling *self, const wm_yaml_node *map, const char *prefix, wm_error *err) {
+static wm_status take_param(const reading *self, config_filling *to, const wm_yaml_node *value, int line, int index,
+                            int is_old, wm_error *err) {
+  const wm_param *param = &to->table->params[index];
+  if (index >= CONFIG_PARAMS_MAX) return wm_yaml_fail(value, err, "there are more parameters than can be read");
+  if (to->line[index] && (is_old || to->is_old[index]))
+    return wm_yaml_fail(value, err, "'%s%s' is given on line %d, too; keep one of them", to->prefix, param->key,
+                        to->line[index]);
+  to->line[index] = line;
+  to->is_old[index] = (char)is_old;
+  warn_if_not_read(self, to, value, line, param);
+  return read_param(value, param, to->out, err);
+}
+
+// Whether the row is of this key; *tail: what a `*` stands for.
+static int is_of(const wm_param_old *old, const char *key, const char **tail) {
+  const size_t n = strcspn(old->key, "*");
+  *tail = key + n;
+  return strncmp(old->key, key, n) == 0 && (old->key[n] == '*' || key[n] == '\0');
+}
+
+// The section and the parameter that the row leads to, -1: no parameter.
+static int new_place(const reading *self, const wm_param_old *old, const char *tail, config_filling **to) {
+  char key[KEY_MAX];
+  *to = self->own;
+  if (!old->new_key) return -1;
+  snprintf(key, sizeof key, "%.*s%s", (int)strcspn(old->new_key, "*"), old->new_key, tail);
+  if (*key != '/') return find(self->own->table, key);
+  for (int i = 0; self->shared && i < CONFIG_SHARED; i++) {
+    *to = &self->shared->of[i];
+    const size_t n = strlen((*to)->prefix);
+    if (strncmp(key + 1, (*to)->prefix, n) == 0) return find((*to)->table, key + 1 + n);
+  }
+  return -1;
+}
+
+// A key that the table had before. *known: whether it had.
+static wm_status take_old(const reading *self, const wm_yaml_node *value, int line, const char *key, int *known,
+                          wm_error *err) {
+  char text[400];
+  for (const wm_param_old *old = self->own->table->old; old && old->key; old++) {
+    const char *tail;
+    config_filling *to;
+    if (!is_of(old, key, &tail)) continue;
+    const int index = new_place(self, old, tail, &to);
+    if (index < 0 && old->new_key) continue;
+    *known = 1;
+    const char *about = old->about ? old->about : "";
+    if (!old->new_key) {
+      (void)snprintf(text, sizeof text, "is no parameter any more and is ignored: %s", about);
+      warn(self->warnings, value, line, text);
+      return WM_OK;
+    }
+    const int kept = to == self->own || self->shared->reader;
+    (void)snprintf(text, sizeof text, "is now '%s%s', and %s%s%s", to->prefix, to->table->params[index].key,
+                   kept ? "read as that" : "not read of an estimator that isn't chosen", old->about ? "; " : "", about);
+    warn(self->warnings, value, line, text);
+    return take_param(self, to, value, line, index, 1, err);
+  }
+  return WM_OK;
+}
+
+static wm_status fill(const reading *self, const wm_yaml_node *map, const char *prefix, wm_error *err) {
+  const wm_param_table *table = self->own->table;
   if (wm_yaml_is_list(map) || wm_yaml_is_scalar(map))  // nothing behind the colon is an empty section
     return wm_yaml_fail(map, err, "a map of parameters (KEY: VALUE) is needed");
   for (size_t i = 0; i < wm_yaml_count(map); i++) {
     const char *name;
-    int line;
+    int line, known = 1;
     char key[128];
     wm_yaml_node value = wm_yaml_value(map, i, &name, &line);
     snprintf(key, sizeof key, "%s%s", prefix, name);
-    const int index = find(self->table, key);
-    const wm_param_old *old = find_old(self->table, key);
+    const int index = find(table, key);
     wm_status status = WM_OK;
     if (index >= 0) {
-      status = take_param(self, &value, index, BY_ITS_KEY, err);
-    } else if (old) {
-      status = take_old(self, &value, line, old, err);
-    } else if (is_group(self->table, key)) {
+      status = take_param(self, self->own, &value, line, index, 0, err);
+    } else if (is_group(table, key)) {
       snprintf(key, sizeof key, "%s%s.", prefix, name);
       status = fill(self, &value, key, err);
     } else if (!is_other_key(value.path)) {
-      status = config_unknown(&value, line, err);
+      known = 0;
+      status = take_old(self, &value, line, key, &known, err);
     }
+    if (!known) status = config_unknown(&value, line, err);
     if (status != WM_OK) return status;
   }
   return WM_OK;
 }
 
-wm_status config_fill(const wm_yaml_node *map, const wm_param_table *table, const char *prefix, void *out,
+wm_status config_fill(const wm_yaml_node *map, config_filling *self, const char *prefix, config_shared *shared,
                       char warnings[WM_CONFIG_WARNINGS_MAX], wm_error *err) {
-  filling self = {table, out, warnings, calloc(table->count + 1, sizeof *self.given)};
-  if (!self.given) return wm_fail(err, WM_IO, "%s: no memory to read it", wm_yaml_file(map));
-  wm_status status = fill(&self, map, prefix, err);
-  free(self.given);
-  return status;
+  const reading all = {self, shared, warnings};
+  return fill(&all, map, prefix, err);
 }

@@ -35,9 +35,28 @@ size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]);
 // "FILE:LINE: KEY: unknown key" with the known key that was most likely meant. WM_BAD_CONFIG.
 wm_status config_unknown(const wm_yaml_node *value, int line, wm_error *err);
 
-// Reads `map`, which stands at `prefix` of the table, into `out` (which has its defaults). Every key must be one of the
-// table's, one that the table had before (a warning), or one of kConfigKeys, which are left alone.
-wm_status config_fill(const wm_yaml_node *map, const wm_param_table *table, const char *prefix, void *out,
+#define CONFIG_PARAMS_MAX 128
+
+// A table's struct while it is filled.
+typedef struct config_filling {
+  const char *prefix;  // of the section, as in config_section
+  const wm_param_table *table;
+  void *out;                    // has its defaults
+  int line[CONFIG_PARAMS_MAX];  // on which each parameter is given; 0: nowhere
+  char is_old[CONFIG_PARAMS_MAX];
+} config_filling;
+
+enum { CONFIG_MOTION = 0, CONFIG_SIGHTINGS, CONFIG_SHARED };
+
+// The shared sections, which stay open while the estimator's is read: it may have had some of their keys before.
+typedef struct config_shared {
+  config_filling of[CONFIG_SHARED];
+  const wm_estimator *reader;  // a parameter that it does not read is warned of; NULL: what is read here is not kept
+} config_shared;
+
+// Reads `map`, which stands at `prefix` of the table. Every key must be one of the table's, one that the table had
+// before (a warning), or one of kConfigKeys, which are left alone. `shared` may be NULL.
+wm_status config_fill(const wm_yaml_node *map, config_filling *self, const char *prefix, config_shared *shared,
                       char warnings[WM_CONFIG_WARNINGS_MAX], wm_error *err);
 
 #endif

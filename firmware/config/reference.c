@@ -38,25 +38,47 @@ static void print_keys(FILE *to, const config_key *keys) {
   for (; keys->key; keys++) fprintf(to, "| `%s` | %s | %s | %s |\n", keys->key, keys->type, keys->initial, keys->about);
 }
 
-static void print_table(FILE *to, const config_section *section) {
-  fprintf(to, "| key | value | default | meaning |\n| --- | --- | --- | --- |\n");
+// A key of before, and the new one; both with their sections.
+static void print_old(FILE *to, const config_section *section, const wm_param_old *old) {
+  fprintf(to, "| `%s%s` | ", section->prefix, old->key);
+  if (!old->new_key) {
+    fprintf(to, "removed: %s |\n", old->about);
+    return;
+  }
+  const int is_shared = *old->new_key == '/';
+  fprintf(to, "`%s%s`%s%s |\n", is_shared ? "" : section->prefix, old->new_key + is_shared, old->about ? "; " : "",
+          old->about ? old->about : "");
+}
+
+// The estimators that take a parameter of a shared section.
+static void print_takers(FILE *to, const config_section *section, const wm_param *p) {
+  size_t count, taking = 0;
+  char key[128];
+  const wm_estimator *const *all = wm_estimators(&count);
+  snprintf(key, sizeof key, "%s%s", section->prefix, p->key);
+  for (size_t i = 0; i < count; i++)
+    if (wm_estimator_reads(all[i], key)) fprintf(to, "%s`%s`", taking++ ? ", " : " ", all[i]->name);
+  fprintf(to, " |");
+}
+
+static void print_table(FILE *to, const config_section *section, int is_shared) {
+  if (section->table->count > 0)
+    fprintf(to, "| key | value | default | meaning |%s\n| --- | --- | --- | --- |%s\n", is_shared ? " taken by |" : "",
+            is_shared ? " --- |" : "");
+  else
+    fprintf(to, "It has no parameters of its own.\n");
   for (size_t i = 0; i < section->table->count; i++) {
     const wm_param *p = &section->table->params[i];
     fprintf(to, "| `%s%s` | ", section->prefix, p->key);
     print_type(to, p);
     print_initial(to, p);
-    fprintf(to, " %s |\n", p->about);
+    fprintf(to, " %s |", p->about);
+    if (is_shared) print_takers(to, section, p);
+    fprintf(to, "\n");
   }
   if (!section->table->old || !section->table->old->key) return;
   fprintf(to, "\nKeys of before, which are read with a warning:\n\n| key | now |\n| --- | --- |\n");
-  for (const wm_param_old *old = section->table->old; old->key; old++) {
-    fprintf(to, "| `%s%s` | ", section->prefix, old->key);
-    if (old->new_key)
-      fprintf(to, "`%s%s`%s%s |\n", section->prefix, old->new_key, old->about ? "; " : "",
-              old->about ? old->about : "");
-    else
-      fprintf(to, "removed: %s |\n", old->about);
-  }
+  for (const wm_param_old *old = section->table->old; old->key; old++) print_old(to, section, old);
 }
 
 void wm_config_reference(FILE *to) {
@@ -71,12 +93,10 @@ void wm_config_reference(FILE *to) {
   fprintf(to, "\n## Each entry of `devices.cameras`\n\n");
   print_keys(to, kConfigCameraDeviceKeys);
   fprintf(to, "\n## `merge`, `publish`, `commands`, `realtime`, `start`, `black_box`\n\n");
-  print_table(to, &sections[0]);
-  fprintf(to, "\n## `motion`\n\n");
-  print_table(to, &sections[1]);
-  for (size_t i = 2; i < count; i++) {
+  print_table(to, &sections[0], 0);
+  for (size_t i = 1; i < count; i++) {
     int is_vision = strncmp(sections[i].prefix, "vision.", 7) == 0;
     fprintf(to, "\n## `%s%s`\n\n%s\n\n", is_vision ? "vision." : "", sections[i].name, sections[i].about);
-    print_table(to, &sections[i]);
+    print_table(to, &sections[i], i <= CONFIG_SHARED);
   }
 }

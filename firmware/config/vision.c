@@ -75,7 +75,10 @@ static wm_status read_detector(const wm_yaml_node *section, const wm_detector *d
   if (!v->params) return wm_fail(err, WM_IO, "%s: no memory to read it", wm_yaml_file(section));
   out->vision_count++;
   wm_params_defaults(&detector->params, v->params);
-  wm_status status = config_fill(section, &detector->params, "", v->params, out->warnings, err);
+  char prefix[WM_NAME_MAX + 10];
+  snprintf(prefix, sizeof prefix, "vision.%s.", detector->name);
+  config_filling own = {.prefix = prefix, .table = &detector->params, .out = v->params};
+  wm_status status = config_fill(section, &own, "", NULL, out->warnings, err);
   if (status == WM_OK) status = read_classes(section, must_be_there, out, v, err);
   return status == WM_OK ? read_cameras(section, v, err) : status;
 }

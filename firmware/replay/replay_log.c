@@ -25,6 +25,7 @@ static void assemble(log_replay *self, const wm_config *config, const wm_log_hea
   wm_assembly *a = &self->assembly;
   a->config = config;
   a->setup = (wm_setup){.motion = config->motion,
+                        .sightings = config->sightings,
                         .wheels = head->wheels,
                         .sensors = head->sensors,
                         .sensor_count = head->sensor_count,

@@ -55,9 +55,9 @@ int main() {
   std::vector<bench::setting> all = bench::kCalibrationStates;
   for (const bench::setting &s : {bench::setting{"states.range_bias_sigma_m", 0.05},
                                   {"states.range_scale_sigma", 0.05},
-                                  {"lasting.slots", 10},
-                                  {"lasting.lateral_m", 0.02},
-                                  {"lasting.range_m", 0.02}})
+                                  {"correlated.slots", 10},
+                                  {"correlated.lateral_m", 0.02},
+                                  {"correlated.range_m", 0.02}})
     all.push_back(s);
   measure("pose + 8 calibration states + 10 x 2 lasting, range too", all, true);
   return 0;

@@ -114,6 +114,7 @@ int main(void) {
   static wm_assembly assembly;
   assembly.config = &config;
   assembly.setup = (wm_setup){.motion = config.motion,
+                              .sightings = config.sightings,
                               .sensors = &sensor,
                               .sensor_count = 1,
                               .landmarks = landmarks,

@@ -60,6 +60,8 @@ scene make_scene(int count) {
 void measure(const char *title, int count, int seen, bool known, double limit_us, double peak) {
   const wm_estimator *ekf = wm_estimator_find("stereo_ekf");
   std::vector<char> motion(wm_motion_params_table.bytes), params(ekf->params.bytes);
+  std::vector<char> sightings(wm_sighting_params_table.bytes);
+  wm_params_defaults(&wm_sighting_params_table, sightings.data());
   wm_params_defaults(&wm_motion_params_table, motion.data());
   wm_params_defaults(&ekf->params, params.data());
   const auto set = [&](const char *key, double value) {
@@ -85,6 +87,7 @@ void measure(const char *title, int count, int seen, bool known, double limit_us
   rig.stereo = {0, 1, kBaseline_m, {kFocal, kFocal, kCentre[0], kCentre[1]}, {0.5, 0.5, 0.5, 0.5}};
   wm_setup setup{};
   setup.motion = reinterpret_cast<const wm_motion_params *>(motion.data());
+  setup.sightings = reinterpret_cast<const wm_sighting_params *>(sightings.data());
   setup.wheels = {kAbsent, kAbsent, kAbsent, kAbsent, kAbsent, kAbsent, 0, {}, {}};
   setup.landmarks = world.points.data();
   setup.landmark_count = known ? world.points.size() : 0;

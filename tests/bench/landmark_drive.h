@@ -29,19 +29,13 @@ inline const std::vector<setting> kCalibrationStates = {
 class landmark_drive {
  public:
   landmark_drive(const std::vector<setting> &settings, bool range)
-      : range_(range), motion_(wm_motion_params_table.bytes), params_(ekf_->params.bytes) {
-    wm_params_defaults(&wm_motion_params_table, motion_.data());
-    wm_params_defaults(&ekf_->params, params_.data());
-    for (const setting &s : settings)
-      for (size_t i = 0; i < ekf_->params.count; i++) {
-        const wm_param &p = ekf_->params.params[i];
-        if (std::strcmp(p.key, s.key) != 0) continue;
-        const int32_t whole = (int32_t)s.value;
-        if (p.type == WM_PARAM_F64)
-          std::memcpy(&params_[p.offset], &s.value, sizeof s.value);
-        else
-          std::memcpy(&params_[p.offset], &whole, sizeof whole);
-      }
+      : range_(range),
+        motion_(wm_motion_params_table.bytes),
+        sightings_(wm_sighting_params_table.bytes),
+        params_(ekf_->params.bytes) {
+    fill(wm_motion_params_table, settings, &motion_);
+    fill(wm_sighting_params_table, settings, &sightings_);
+    fill(ekf_->params, settings, &params_);
     std::strcpy(sensor_.name, "eye");
     sensor_.bearing_sigma_rad = 0.02;
     sensor_.range_sigma_m = 0.1;
@@ -49,6 +43,7 @@ class landmark_drive {
     for (int i = 0; i < 4; i++)
       landmarks_[i] = {i, {6 * std::cos(1.57 * i), 6 * std::sin(1.57 * i), 0}, 0.01, kAbsent, {}, 0};
     setup_.motion = reinterpret_cast<const wm_motion_params *>(motion_.data());
+    setup_.sightings = reinterpret_cast<const wm_sighting_params *>(sightings_.data());
     setup_.wheels = {kAbsent, kAbsent, kAbsent, kAbsent, kAbsent, kAbsent, 0, {}, {}};
     setup_.sensors = &sensor_;
     setup_.sensor_count = 1;
@@ -101,10 +96,25 @@ class landmark_drive {
   }
 
  private:
+  // Defaults, and those settings whose keys the table has.
+  static void fill(const wm_param_table &table, const std::vector<setting> &settings, std::vector<char> *out) {
+    wm_params_defaults(&table, out->data());
+    for (const setting &s : settings)
+      for (size_t i = 0; i < table.count; i++) {
+        const wm_param &p = table.params[i];
+        if (std::strcmp(p.key, s.key) != 0) continue;
+        const int32_t whole = (int32_t)s.value;
+        if (p.type == WM_PARAM_F64)
+          std::memcpy(&(*out)[p.offset], &s.value, sizeof s.value);
+        else
+          std::memcpy(&(*out)[p.offset], &whole, sizeof whole);
+      }
+  }
+
   static constexpr double kAbsent = std::numeric_limits<double>::quiet_NaN();
   const wm_estimator *ekf_ = wm_estimator_find("landmark_ekf");
   bool range_;
-  std::vector<char> motion_, params_;
+  std::vector<char> motion_, sightings_, params_;
   wm_sensor sensor_{};
   wm_landmark landmarks_[4];
   wm_setup setup_{};  // the estimator reads it as long as it lives

@@ -131,8 +131,9 @@ void scene::begin(unsigned happens) {
   }
 }
 
-const wm_setup &scene::setup(const wm_motion_params *params) {
-  setup_.motion = params;
+const wm_setup &scene::setup(const wm_motion_params *motion, const wm_sighting_params *sightings) {
+  setup_.motion = motion;
+  setup_.sightings = sightings;
   return setup_;
 }
 

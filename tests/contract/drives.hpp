@@ -47,7 +47,7 @@ class scene {
   scene(const scene &) = delete;
   scene &operator=(const scene &) = delete;
 
-  const wm_setup &setup(const wm_motion_params *params);
+  const wm_setup &setup(const wm_motion_params *motion, const wm_sighting_params *sightings);
   const std::vector<wm_event> &events() const { return events_; }
 
  protected:

@@ -42,6 +42,8 @@ std::vector<double> moved(const wm_param &param, double from) {
   return out;
 }
 
+constexpr size_t kAllValues = 1000;
+
 struct recorded_stage {
   const stage *of;
   trace output;
@@ -54,8 +56,9 @@ bool made_for(const stage &s, const wm_param &param) {
   return false;
 }
 
-// Where the parameter changes something: "stage: key = value"; empty: nowhere.
-std::string effect(const wm_param_table &table, const wm_param &param, const std::vector<recorded_stage> &stages) {
+// Where the parameter changes something: "stage: key = value"; empty: nowhere. `most`: values to try on each stage.
+std::string effect(const wm_param_table &table, const wm_param &param, const std::vector<recorded_stage> &stages,
+                   size_t most) {
   std::vector<const recorded_stage *> order;
   for (const bool first : {true, false})
     for (const recorded_stage &s : stages)
@@ -64,7 +67,9 @@ std::string effect(const wm_param_table &table, const wm_param &param, const std
     const recorded_stage &s = *at;
     values set(table, s.of->settings);
     const double from = set.get(param);
-    for (const double value : moved(param, from)) {
+    std::vector<double> others = moved(param, from);
+    if (others.size() > most) others.resize(most);
+    for (const double value : others) {
       set.set(param, value);
       trace output(&s.output);
       const bool ran = s.of->run(set, &output);
@@ -115,44 +120,48 @@ bool trace::step() {
   return !differs_;
 }
 
-std::vector<std::string> sweep(const char *owner, const wm_param_table &table, const std::vector<stage> &stages,
-                               const std::vector<std::string> &known) {
+std::vector<std::string> sweep(const owner &of, const std::vector<std::string> &known) {
+  const wm_param_table &table = of.table;
+  const char *owner = of.name;
   std::vector<recorded_stage> recorded;
-  for (const stage &s : stages) {
+  for (const stage &s : of.stages) {
     recorded.push_back({&s, trace(), false});
     recorded.back().ran = s.run(values(table, s.settings), &recorded.back().output);
     if (!recorded.back().ran) std::printf("%s: stage \"%s\" is refused\n", owner, s.name.c_str());
   }
-  std::vector<std::string> dead;
+  std::vector<std::string> wrong;
   const bool tells = std::getenv("WM_PARAMETERS_TELL") != nullptr;
   for (size_t i = 0; i < table.count; i++) {
     const std::string name = std::string(owner) + "." + table.params[i].key;
     const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
     if (is_known && !tells) continue;
-    const std::string where = effect(table, table.params[i], recorded);
+    const bool is_read = !of.reads || of.reads(table.params[i]);
+    const std::string where = effect(table, table.params[i], recorded, is_read ? kAllValues : 2);
     if (tells)
       std::printf("%6.2f %-50s %s\n", 1.0 * clock() / CLOCKS_PER_SEC, name.c_str(),
                   where.empty() ? "NOTHING" : where.c_str());
+    if (!is_read && !where.empty()) wrong.push_back(name + " is not said to be read, but changes: " + where);
+    if (!is_read) continue;
     if (where.empty() && is_known) std::printf("%s changes nothing, as is known\n", name.c_str());
-    if (where.empty() && !is_known) dead.push_back(name);
+    if (where.empty() && !is_known)
+      wrong.push_back(name + ": no scenario's output changes when it is moved, and no value is refused");
     if (!where.empty() && is_known)
       std::printf("%s has an effect now: take it off the list of exceptions\n", name.c_str());
   }
-  return dead;
+  return wrong;
 }
 
 int report(const std::vector<owner> &owners, const std::vector<std::string> &known, const char *only) {
-  std::vector<std::string> dead;
+  std::vector<std::string> wrong;
   size_t count = 0;
   for (const owner &o : owners) {
     if (only && std::strcmp(only, o.name) != 0) continue;
-    for (std::string &name : sweep(o.name, o.table, o.stages, known)) dead.push_back(std::move(name));
+    for (std::string &text : sweep(o, known)) wrong.push_back(std::move(text));
     count += o.table.count;
   }
-  for (const std::string &name : dead)
-    std::printf("%s: no scenario's output changes when it is moved, and no value is refused\n", name.c_str());
-  std::printf("%zu parameters, %zu without effect\n", count, dead.size());
-  return dead.empty() && count > 0 ? 0 : 1;
+  for (const std::string &text : wrong) std::printf("%s\n", text.c_str());
+  std::printf("%zu parameters, %zu wrong\n", count, wrong.size());
+  return wrong.empty() && count > 0 ? 0 : 1;
 }
 
 }  // namespace parameters

@@ -59,16 +59,19 @@ struct stage {
   std::function<bool(const values &, trace *)> run;
 };
 
-// Parameters for which no stage differs and none refuses, as "owner.key"; those in `known` are printed, not returned.
-std::vector<std::string> sweep(const char *owner, const wm_param_table &table, const std::vector<stage> &stages,
-                               const std::vector<std::string> &known);
-
-// Runs the sweeps of all owners; the program's exit code. `only`: an owner, or nullptr.
+// A table, the stages on which its parameters are moved, and which of them must have an effect; the others must have
+// none. Without `reads`: all.
 struct owner {
   const char *name;
   wm_param_table table;
   std::vector<stage> stages;
+  std::function<bool(const wm_param &)> reads = nullptr;
 };
+
+// What is wrong, a text for each parameter; those in `known` ("owner.key") may be without effect.
+std::vector<std::string> sweep(const owner &of, const std::vector<std::string> &known);
+
+// Runs the sweeps of all owners; the program's exit code. `only`: an owner, or nullptr.
 int report(const std::vector<owner> &owners, const std::vector<std::string> &known, const char *only);
 
 }  // namespace parameters

@@ -43,7 +43,7 @@ namespace {
 
 const double kAbsent = std::numeric_limits<double>::quiet_NaN();
 const wm_estimator *estimator;
-std::vector<char> motion_params, params;
+std::vector<char> motion_params, sighting_params, params;
 wm_setup setup;
 wm_sensor sensor;
 wm_landmark landmarks[4];
@@ -437,15 +437,21 @@ void set_param(const wm_param_table &table, std::vector<char> &out, const char *
 void setUp(void) {
   motion_params.resize(wm_motion_params_table.bytes);
   wm_params_defaults(&wm_motion_params_table, motion_params.data());
-  params.resize(estimator->params.bytes);
+  sighting_params.resize(wm_sighting_params_table.bytes);
+  wm_params_defaults(&wm_sighting_params_table, sighting_params.data());
+  params.resize(estimator->params.bytes + 1);
   wm_params_defaults(&estimator->params, params.data());
   // Everything that may be learnt is switched on, where the estimator has it.
   const char *sigmas[] = {"states.speed_scale_sigma",         "states.yaw_rate_scale_sigma",
                           "states.yaw_rate_bias_sigma_radps", "states.lag_sigma_s",
                           "states.sensor_yaw_sigma_rad",      "states.sensor_time_offset_sigma_s",
-                          "states.range_bias_sigma_m",        "lasting.gnss_m",
+                          "states.range_bias_sigma_m",        "correlated.gnss_m",
                           "states.rate_bias_sigma_radps",     "states.velocity_scale_sigma"};
-  for (const char *key : sigmas) set_param(estimator->params, params, key, 0.1);
+  for (const char *key : sigmas) {
+    set_param(estimator->params, params, key, 0.1);
+    set_param(wm_motion_params_table, motion_params, key, 0.1);
+    set_param(wm_sighting_params_table, sighting_params, key, 0.1);
+  }
   sensor = {};
   std::strcpy(sensor.name, "eye");
   sensor.bearing_sigma_rad = sensor.range_sigma_m = NAN;
@@ -453,6 +459,7 @@ void setUp(void) {
   for (int i = 0; i < 4; i++) landmarks[i] = {40 - i, {5.0 * cos(i), 5.0 * sin(i), 0}, 0.01, NAN, {}, 0};
   setup = {};
   setup.motion = reinterpret_cast<const wm_motion_params *>(motion_params.data());
+  setup.sightings = reinterpret_cast<const wm_sighting_params *>(sighting_params.data());
   setup.wheels = {NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}};
   setup.sensors = &sensor;
   setup.sensor_count = 1;

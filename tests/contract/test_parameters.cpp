@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// Every parameter of every estimator and of the motion, moved from its default, changes the output of some scenario or
-// is refused with the reason. What an estimator gives out counts: pose, covariance, state, innovations, landmarks,
-// particles, other places; not its list of calibration states, where a state that nothing uses would show.
+// Every parameter of every estimator, moved from its default, changes the output of some scenario or is refused with
+// the reason; so does every parameter of the shared sections that it reads, and none that it does not. What an
+// estimator gives out counts: pose, covariance, state, innovations, landmarks, particles, other places; not its list of
+// calibration states, where a state that nothing uses would show.
 //
 // An estimator without stages of its own below is run on those of all.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <deque>
 #include <memory>
+#include <string>
 
 #include "drives.hpp"
 #include "parameter_sweep.hpp"
@@ -64,11 +67,44 @@ void add_lists(const wm_estimator &of, const void *state, trace *out) {
   for (size_t i = 0; i < others && i < 256; i++) out->add(places[i].x_m), out->add(places[i].weight);
 }
 
-bool run(const wm_estimator &of, drives::scene &scene, const values &motion_values, const values &params, trace *out) {
-  const auto *moving = static_cast<const wm_motion_params *>(motion_values.data());
+// An estimator's table and those of the shared sections as one, whose struct is the three structs one behind another.
+class whole_table {
+ public:
+  explicit whole_table(const wm_estimator &of) {
+    append("", of.params);
+    motion_at_ = append("motion.", wm_motion_params_table);
+    sightings_at_ = append("sightings.", wm_sighting_params_table);
+  }
+  wm_param_table table() const { return {rows_.data(), rows_.size(), bytes_, nullptr}; }
+  const wm_motion_params *motion(const values &v) const {
+    return reinterpret_cast<const wm_motion_params *>(static_cast<const char *>(v.data()) + motion_at_);
+  }
+  const wm_sighting_params *sightings(const values &v) const {
+    return reinterpret_cast<const wm_sighting_params *>(static_cast<const char *>(v.data()) + sightings_at_);
+  }
+
+ private:
+  size_t append(const char *prefix, const wm_param_table &table) {
+    const size_t at = bytes_;
+    for (size_t i = 0; i < table.count; i++) {
+      keys_.push_back(std::string(prefix) + table.params[i].key);
+      rows_.push_back(table.params[i]);
+      rows_.back().key = keys_.back().c_str();
+      rows_.back().offset += static_cast<uint32_t>(at);
+    }
+    bytes_ = at + (table.bytes + 7) / 8 * 8;
+    return at;
+  }
+
+  std::vector<wm_param> rows_;
+  std::deque<std::string> keys_;
+  size_t bytes_ = 0, motion_at_, sightings_at_;
+};
+
+bool run(const wm_estimator &of, const whole_table &tables, drives::scene &scene, const values &params, trace *out) {
   const char *why = "", *key = "";
-  if (wm_motion_params_clash(moving, &key)) return false;
-  const wm_setup &setup = scene.setup(moving);
+  if (wm_motion_params_clash(tables.motion(params), &key)) return false;
+  const wm_setup &setup = scene.setup(tables.motion(params), tables.sightings(params));
   const size_t bytes = of.state_bytes(params.data(), &setup, &why);
   if (bytes == 0) return false;
   const block state(std::aligned_alloc(64, (bytes + 63) / 64 * 64));
@@ -101,25 +137,26 @@ struct scenario {
   motion by;
   unsigned sees, happens;
   double seconds;
-  std::vector<setting> params, moving;
+  std::vector<setting> params;
   std::vector<const char *> first_for = {};
 };
 
 const std::vector<setting> kMotionStates = {
-    {"states.speed_scale_sigma", 0.05},         {"states.yaw_rate_scale_sigma", 0.05},
-    {"states.yaw_rate_bias_sigma_radps", 0.02}, {"states.left_scale_sigma", 0.02},
-    {"states.right_scale_sigma", 0.02},         {"states.track_scale_sigma", 0.02},
-    {"states.steering_offset_sigma_rad", 0.02}, {"states.lag_sigma_s", 0.05},
-    {"states.turn_slowdown_sigma_mps", 0.02},   {"states.wheel_difference_sigma", 0.01},
+    {"motion.states.speed_scale_sigma", 0.05},         {"motion.states.yaw_rate_scale_sigma", 0.05},
+    {"motion.states.yaw_rate_bias_sigma_radps", 0.02}, {"motion.states.left_scale_sigma", 0.02},
+    {"motion.states.right_scale_sigma", 0.02},         {"motion.states.track_scale_sigma", 0.02},
+    {"motion.states.steering_offset_sigma_rad", 0.02}, {"motion.states.lag_sigma_s", 0.05},
+    {"motion.states.turn_slowdown_sigma_mps", 0.02},   {"motion.states.wheel_difference_sigma", 0.01},
 };
 const std::vector<setting> kSensorStates = {
-    {"states.sensor_yaw_sigma_rad", 0.05},       {"states.sensor_xy_sigma_m", 0.05},
-    {"states.sensor_time_offset_sigma_s", 0.05}, {"states.range_bias_sigma_m", 0.1},
-    {"states.range_scale_sigma", 0.05},          {"states.sensor_angle_scale_sigma", 0.02},
+    {"sightings.states.sensor_yaw_sigma_rad", 0.05},       {"sightings.states.sensor_xy_sigma_m", 0.05},
+    {"sightings.states.sensor_time_offset_sigma_s", 0.05}, {"sightings.states.range_bias_sigma_m", 0.1},
+    {"sightings.states.range_scale_sigma", 0.05},          {"sightings.states.sensor_angle_scale_sigma", 0.02},
 };
-const std::vector<setting> kLasting = {
-    {"lasting.slots", 6},      {"lasting.bearing_rad", 0.01}, {"lasting.lateral_m", 0.03},
-    {"lasting.range_m", 0.05}, {"lasting.range_rel", 0.01},   {"lasting.gnss_m", 0.5},
+const std::vector<setting> kCorrelated = {
+    {"sightings.correlated.slots", 6},        {"sightings.correlated.bearing_rad", 0.01},
+    {"sightings.correlated.lateral_m", 0.03}, {"sightings.correlated.range_m", 0.05},
+    {"sightings.correlated.range_rel", 0.01}, {"correlated.gnss_m", 0.5},
 };
 
 std::vector<setting> all(std::initializer_list<std::vector<setting>> lists) {
@@ -136,29 +173,28 @@ using drives::kCarriedOff, drives::kNoStart, drives::kSilence, drives::kOutliers
 std::vector<scenario> scenarios() {
   const unsigned kAll = kBearings | kRanges | kPositions | kHeadings;
   std::vector<scenario> out = {
-      {"", "twist", motion::twist, 0, kSilence, 14, kMotionStates, {}},
-      {"", "ticks", motion::ticks, 0, kSilence, 14, kMotionStates, {}},
-      {"", "ticks and gyro", motion::ticks_and_gyro, 0, kSilence, 14, kMotionStates, {}},
-      {"", "speed and gyro", motion::speed_and_gyro, 0, kSilence, 14, kMotionStates, {}},
+      {"", "twist", motion::twist, 0, kSilence, 14, kMotionStates},
+      {"", "ticks", motion::ticks, 0, kSilence, 14, kMotionStates},
+      {"", "ticks and gyro", motion::ticks_and_gyro, 0, kSilence, 14, kMotionStates},
+      {"", "speed and gyro", motion::speed_and_gyro, 0, kSilence, 14, kMotionStates},
       {"",
        "speed by ticks, turn by gyro",
        motion::ticks_and_gyro,
        0,
        kSilence,
        14,
-       kMotionStates,
-       {{"model", 2}},
-       {"states.wheel_difference"}},
-      {"", "steering", motion::steering, 0, kSilence, 14, kMotionStates, {}, {"states.steering"}},
-      {"motion", "samples that no robot can follow", motion::speed_and_gyro, 0, kGlitches, 10, {}, {}},
-      {"motion",
+       all({kMotionStates, {{"motion.model", 2}}}),
+       {"motion.states.wheel_difference"}},
+      {"", "steering", motion::steering, 0, kSilence, 14, kMotionStates, {"motion.states.steering"}},
+      {"", "samples that no robot can follow", motion::speed_and_gyro, 0, kGlitches, 10, {}, {"motion.limits."}},
+      {"",
        "commands of a drive with a largest radius",
        motion::twist,
        0,
        0,
        10,
-       {},
-       {{"commands.radius_max_m", 2}, {"commands.radius_overflow_m", 10}}},
+       {{"motion.commands.radius_max_m", 2}, {"motion.commands.radius_overflow_m", 10}},
+       {"motion.commands."}},
 
       {"landmark_ekf",
        "all sensors",
@@ -168,28 +204,25 @@ std::vector<scenario> scenarios() {
        25,
        all({kMotionStates,
             kSensorStates,
-            kLasting,
+            kCorrelated,
             {{"states.map_slots", 4}, {"states.gnss_time_offset_sigma_s", 0.1}}}),
-       {},
-       {"states.gnss", "noise.gnss", "lasting.", "use."}},
+       {"states.gnss", "noise.gnss", "correlated.", "sightings.correlated.", "use.", "sightings.use."}},
       {"landmark_ekf",
        "fixed errors",
        motion::twist,
        kAll | kNameless,
        kOutliers,
        15,
-       {{"gate.associate_unknown", 1}, {"noise.lateral_m", 0.03}, {"noise.range_rel", 0.02}},
-       {},
-       {"gate."}},
+       {{"sightings.use.unidentified", 1}, {"sightings.noise.lateral_m", 0.03}, {"sightings.noise.range_rel", 0.02}},
+       {"sightings.gate."}},
       {"landmark_ekf",
        "depths",
        motion::twist,
        kBearings | kRanges,
        kDepth,
        15,
-       {{"states.depth_axis_sigma_rad", 0.02}, {"states.sensor_yaw_sigma_rad", 0.02}},
-       {},
-       {"states.depth_axis"}},
+       {{"sightings.states.depth_axis_sigma_rad", 0.02}, {"sightings.states.sensor_yaw_sigma_rad", 0.02}},
+       {"sightings.states.depth_axis"}},
       {"landmark_ekf",
        "elevations",
        motion::twist,
@@ -197,12 +230,11 @@ std::vector<scenario> scenarios() {
        kSilence,
        15,
        all({kSensorStates,
-            {{"use.elevation", 1},
+            {{"sightings.use.elevation", 1},
              {"states.map_slots", 4},
-             {"states.sensor_tilt_sigma_rad", 0.02},
-             {"states.sensor_angle_scale_sigma", 0.02}}}),
-       {},
-       {"states.tilt", "states.sensor_tilt", "states.sensor_angle"}},
+             {"sightings.states.sensor_tilt_sigma_rad", 0.02},
+             {"sightings.states.sensor_angle_scale_sigma", 0.02}}}),
+       {"states.tilt", "sightings.states.sensor_tilt", "sightings.states.sensor_angle"}},
       {"landmark_ekf",
        "carried off",
        motion::ticks_and_gyro,
@@ -210,9 +242,8 @@ std::vector<scenario> scenarios() {
        kCarriedOff,
        20,
        kSensorStates,
-       {},
        {"recover."}},
-      {"landmark_ekf", "no start", motion::twist, kBearings, kNoStart | kOneMoved, 25, {}, {}},
+      {"landmark_ekf", "no start", motion::twist, kBearings, kNoStart | kOneMoved, 25, {}},
       {"landmark_ekf",
        "no start, two landmarks",
        motion::twist,
@@ -220,91 +251,70 @@ std::vector<scenario> scenarios() {
        kNoStart | kFewBeacons,
        20,
        {},
-       {},
        {"recover."}},
-      {"landmark_ekf", "wrong start", motion::twist, kBearings, kWrongStart | kSilence, 20, {}, {}},
+      {"landmark_ekf", "wrong start", motion::twist, kBearings, kWrongStart | kSilence, 20, {}},
 
-      {"slam",
-       "ranges",
-       motion::twist,
-       kBearings | kRanges,
-       kNoMap | kOutliers | kBlind | kOneMoved,
-       25,
-       all({kMotionStates, kSensorStates, kLasting}),
-       {}},
-      {"slam",
-       "ranges, wheels",
-       motion::ticks,
-       kBearings | kRanges,
-       kNoMap | kDepth,
-       20,
+      {"slam", "ranges", motion::twist, kBearings | kRanges, kNoMap | kOutliers | kBlind | kOneMoved, 25,
+       all({kMotionStates, kSensorStates, kCorrelated})},
+      {"slam", "ranges, wheels", motion::ticks, kBearings | kRanges, kNoMap | kDepth, 20,
        all({kMotionStates,
             {{"states.wheel_slip_sigma", 0.02},
-             {"states.depth_axis_sigma_rad", 0.02},
+             {"sightings.states.depth_axis_sigma_rad", 0.02},
              {"states.sensor_stamp_sigma_s", 0.01},
-             {"states.sensor_yaw_sigma_rad", 0.02}}}),
-       {}},
-      {"slam", "ranges, wheels and gyro", motion::ticks_and_gyro, kBearings | kRanges, kNoMap, 20, kMotionStates, {}},
+             {"sightings.states.sensor_yaw_sigma_rad", 0.02}}})},
+      {"slam", "ranges, wheels and gyro", motion::ticks_and_gyro, kBearings | kRanges, kNoMap, 20, kMotionStates},
       {"slam",
        "fixed errors",
        motion::twist,
        kBearings | kRanges | kNameless,
        kNoMap | kOutliers,
        20,
-       {{"association.unknown", 1}, {"noise.lateral_m", 0.03}, {"noise.range_rel", 0.02}},
-       {}},
-      {"slam",
-       "markers",
-       motion::ticks,
-       kMarkers,
-       kNoMap | kOutliers | kOneMoved,
-       25,
-       all({kLasting,
+       {{"sightings.use.unidentified", 1}, {"sightings.noise.lateral_m", 0.03}, {"sightings.noise.range_rel", 0.02}}},
+      {"slam", "markers", motion::ticks, kMarkers, kNoMap | kOutliers | kOneMoved, 25,
+       all({kCorrelated,
             {{"markers.on", 1},
-             {"markers.lasting", 0.5},
-             {"states.sensor_tilt_sigma_rad", 0.05},
-             {"states.sensor_time_offset_sigma_s", 0.05},
-             {"markers.heading_most_rad", 0.014}}}),
-       {}},
+             {"markers.correlated", 0.5},
+             {"sightings.states.sensor_tilt_sigma_rad", 0.05},
+             {"sightings.states.sensor_time_offset_sigma_s", 0.05},
+             {"markers.heading_most_rad", 0.014}}})},
       {"slam",
        "markers on a map",
        motion::ticks,
        kMarkers,
        kNoStart | kOneMoved,
        20,
-       {{"markers.on", 1}, {"landmarks.map", 2}},
-       {}},
-      {"slam", "a map that grows", motion::twist, kBearings | kRanges, kOneMoved, 15, {{"landmarks.map", 1}}, {}},
+       {{"markers.on", 1}, {"landmarks.map", 2}}},
+      {"slam", "a map that grows", motion::twist, kBearings | kRanges, kOneMoved, 15, {{"landmarks.map", 1}}},
       {"slam",
        "lines, unscented",
        motion::twist,
        kBearings,
        kNoMap | kOutliers,
        25,
-       {{"lines.clones", 16}, {"lasting.slots", 6}, {"lasting.bearing_rad", 0.004}},
-       {}},
+       {{"lines.clones", 16}, {"sightings.correlated.slots", 6}, {"sightings.correlated.bearing_rad", 0.004}}},
       {"slam",
        "lines, inverse distance",
        motion::twist,
        kBearings,
        kNoMap | kBlind | kSilence,
        25,
-       {{"lines.clones", 16}, {"lines.method", 2}, {"lasting.slots", 6}, {"lasting.bearing_rad", 0.004}},
-       {}},
+       {{"lines.clones", 16},
+        {"lines.method", 2},
+        {"sightings.correlated.slots", 6},
+        {"sightings.correlated.bearing_rad", 0.004}}},
       {"slam",
        "lines that come back",
        motion::twist,
        kBearings | kRenamed,
        kNoMap,
        40,
-       {{"lines.clones", 16}, {"lines.method", 2}},
-       {}},
+       {{"lines.clones", 16}, {"lines.method", 2}}},
 
-      {"edge_mcl", "tracking", motion::twist, kPoints, kSilence, 10, kMotionStates, {}},
-      {"edge_mcl", "reflections", motion::ticks, kPoints, kReflections, 15, {}, {}},
-      {"edge_mcl", "carried off", motion::twist, kPoints, kCarriedOff, 14, {}, {}, {"lost."}},
-      {"edge_mcl", "no start", motion::twist, kPoints, kNoStart, 14, {}, {}, {"search."}},
-      {"pf_edges", "tracking", motion::twist, kPoints, kSilence, 10, {}, {}},
+      {"edge_mcl", "tracking", motion::twist, kPoints, kSilence, 10, kMotionStates},
+      {"edge_mcl", "reflections", motion::ticks, kPoints, kReflections, 15, {}},
+      {"edge_mcl", "carried off", motion::twist, kPoints, kCarriedOff, 14, {}, {"lost."}},
+      {"edge_mcl", "no start", motion::twist, kPoints, kNoStart, 14, {}, {"search."}},
+      {"pf_edges", "tracking", motion::twist, kPoints, kSilence, 10, {}},
   };
   return out;
 }
@@ -333,50 +343,28 @@ std::vector<dive_scenario> dive_scenarios() {
   };
 }
 
-// Scenes by what they are made of, so that equal ones are made once.
-std::vector<stage> stages_of(const wm_estimator &of, std::vector<std::unique_ptr<drives::scene>> *kept) {
+std::vector<stage> stages_of(const wm_estimator &of, const whole_table &tables,
+                             std::vector<std::unique_ptr<drives::scene>> *kept) {
   std::vector<stage> out;
-  const auto add = [&](const char *name, const std::vector<setting> &params, const std::vector<setting> &moving,
-                       const std::vector<const char *> &first_for, std::unique_ptr<drives::scene> made) {
+  const auto add = [&](const char *name, const std::vector<setting> &params, const std::vector<const char *> &first_for,
+                       std::unique_ptr<drives::scene> made) {
     drives::scene *scene = made.get();
     kept->push_back(std::move(made));
-    out.push_back({name, params, first_for, [&of, scene, moving](const values &v, trace *t) {
-                     return run(of, *scene, values(wm_motion_params_table, moving), v, t);
-                   }});
+    out.push_back({name, params, first_for,
+                   [&of, &tables, scene](const values &v, trace *t) { return run(of, tables, *scene, v, t); }});
   };
-  const std::vector<scenario> list = scenarios();
-  bool has_own = false;
-  for (const scenario &s : list) has_own = has_own || std::strcmp(s.estimator, of.name) == 0;
-  const bool in_space = std::strcmp(of.name, "stereo_ekf") == 0;
-  for (const scenario &s : list) {
-    const bool own = std::strcmp(s.estimator, of.name) == 0, general = s.estimator[0] == '\0';
-    if (in_space || !(own || (!has_own && std::strcmp(s.estimator, "motion") != 0) || general)) continue;
-    // Where nothing is seen the general ones test the motion alone: they are given something to see.
-    const unsigned takes = of.takes;
-    unsigned sees = s.sees;
-    if (general && (takes & WM_EVENT_BIT(WM_EVENT_SIGHTING))) sees |= kBearings | kRanges;
-    if (general && (takes & WM_EVENT_BIT(WM_EVENT_POINTS))) sees |= kPoints;
-    add(s.name, s.params, s.moving, s.first_for, std::make_unique<drives::scene>(s.by, sees, s.happens, s.seconds));
-  }
-  if (!in_space && (has_own || !(of.takes & WM_EVENT_BIT(WM_EVENT_STEREO)))) return out;
-  for (const dive_scenario &s : dive_scenarios())
-    add(s.name, s.params, {}, {}, std::make_unique<drives::dive>(s.happens, s.seconds));
-  return out;
-}
-
-// The motion's own table, by dead reckoning.
-std::vector<stage> motion_stages(std::vector<std::unique_ptr<drives::scene>> *kept) {
-  std::vector<stage> out;
-  const wm_estimator &of = *wm_estimator_find("odometry");
   for (const scenario &s : scenarios()) {
-    if (s.estimator[0] != '\0' && std::strcmp(s.estimator, "motion") != 0) continue;
-    kept->push_back(std::make_unique<drives::scene>(s.by, 0, s.happens, s.seconds));
-    drives::scene *scene = kept->back().get();
-    const std::vector<setting> params = s.params;
-    out.push_back({s.name, s.moving, {}, [&of, scene, params](const values &v, trace *t) {
-                     return run(of, *scene, v, values(of.params, params), t);
-                   }});
+    const bool general = s.estimator[0] == '\0';
+    if (!general && std::strcmp(s.estimator, of.name) != 0) continue;
+    // The general ones test the motion: an estimator is given something to see besides.
+    unsigned sees = s.sees;
+    if (general && (of.takes & WM_EVENT_BIT(WM_EVENT_SIGHTING))) sees |= kBearings | kRanges;
+    if (general && (of.takes & WM_EVENT_BIT(WM_EVENT_POINTS))) sees |= kPoints;
+    add(s.name, s.params, s.first_for, std::make_unique<drives::scene>(s.by, sees, s.happens, s.seconds));
   }
+  if (!(of.takes & WM_EVENT_BIT(WM_EVENT_STEREO))) return out;
+  for (const dive_scenario &s : dive_scenarios())
+    add(s.name, s.params, {}, std::make_unique<drives::dive>(s.happens, s.seconds));
   return out;
 }
 
@@ -387,11 +375,19 @@ void tearDown() {}
 
 int main(int argc, char **argv) {
   std::vector<std::unique_ptr<drives::scene>> scenes;
+  std::deque<whole_table> tables;
   std::vector<parameters::owner> owners;
   size_t count = 0;
   const wm_estimator *const *estimators = wm_estimators(&count);
-  owners.push_back({"motion", wm_motion_params_table, motion_stages(&scenes)});
-  for (size_t i = 0; i < count; i++)
-    owners.push_back({estimators[i]->name, estimators[i]->params, stages_of(*estimators[i], &scenes)});
+  for (size_t i = 0; i < count; i++) {
+    const wm_estimator &of = *estimators[i];
+    tables.emplace_back(of);
+    const auto reads = [&of](const wm_param &param) {
+      const bool is_shared =
+          std::strncmp(param.key, "motion.", 7) == 0 || std::strncmp(param.key, "sightings.", 10) == 0;
+      return !is_shared || wm_estimator_reads(&of, param.key);
+    };
+    owners.push_back({of.name, tables.back().table(), stages_of(of, tables.back(), &scenes), reads});
+  }
   return parameters::report(owners, kKnown, argc > 1 ? argv[1] : nullptr);
 }

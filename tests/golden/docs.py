@@ -28,8 +28,9 @@ sources:                        # the order that holds at equal stamps; what isn
   - {name: gnss, until_s: 25}
 merge: {horizon_ms: 300}
 publish: {rate_hz: 50}
-landmark_ekf:
+sightings:
   states: {sensor_yaw_sigma_rad: 0.1}
+landmark_ekf: {recover.sigma_xy_m: 3}
 ```
 
 Dots in the tables below are nested maps: `publish.rate_hz` is `publish: {rate_hz: 50}`. Units stand in the names.

@@ -59,7 +59,7 @@ def landmarks(work):
     (rec / "sightings.csv").write_text("t_ns,sensor,id,bearing_rad,range_m\n" + "".join(
         f"{i * 100_000_000},eye,1,0.1974,5.0990\n" for i in range(6000)))
     (work / "landmarks.yaml").write_text("format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm: false}\n"
-                                         "landmark_ekf: {states: {sensor_yaw_sigma_rad: 0.05}}\n")
+                                         "sightings: {states: {sensor_yaw_sigma_rad: 0.05}}\n")
     return work / "landmarks.yaml", rec
 
 

@@ -127,6 +127,7 @@ wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const 
   const wm_rig rig = rig_of(scenario);
   wm_setup setup{};
   setup.motion = config.motion;
+  setup.sightings = config.sightings;
   setup.wheels = scenario.robot.wheels;
   setup.sensors = recording.sensors.data();
   setup.sensor_count = recording.sensors.size();

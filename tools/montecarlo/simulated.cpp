@@ -77,6 +77,7 @@ wm_status make_events(const sim::Recording &recording, std::vector<SmallEvent> &
 SimulatedFilter::SimulatedFilter(const wm_config &config, const sim::Recording &recording, const wm_wheels &wheels)
     : estimator_(config.estimator), config_(config) {
   setup_.motion = config.motion;
+  setup_.sightings = config.sightings;
   setup_.wheels = wheels;
   setup_.sensors = recording.sensors.data();
   setup_.sensor_count = recording.sensors.size();

@@ -30,6 +30,7 @@ class Filter {
   Filter(const EdgeDrive &drive, const wm_config &config, bool start_known, uint64_t seed)
       : ops_(*config.estimator), head_(drive.head()) {
     setup_.motion = config.motion;
+    setup_.sightings = config.sightings;
     setup_.wheels = head_.wheels;
     setup_.sensors = head_.sensors;
     setup_.sensor_count = head_.sensor_count;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The estimator contract for a class: `estimator_of<filter, params>(name, about, takes, table)` gives the struct of
-// functions. The filter is trivially copyable and has
+// The estimator contract for a class: `estimator_of<filter, params>(name, about, takes, table, reads)` gives the
+// struct of functions. The filter is trivially copyable and has
 //   static size_t bytes(const params &, const wm_setup &, const char **why);   void init(const params &, const wm_setup
 //   &); wm_status predict(const wm_event &);   wm_status correct(const wm_event &, record_list); void
 //   estimate(wm_estimate *) const;   wm_motion_calibration motion_calibration() const; uint32_t motion_health() const;
@@ -18,13 +18,15 @@
 namespace wm {
 
 template <class filter, class params>
-wm_estimator estimator_of(const char *name, const char *about, uint32_t takes, wm_param_table table) {
+wm_estimator estimator_of(const char *name, const char *about, uint32_t takes, wm_param_table table,
+                          const char *const *reads) {
   static_assert(std::is_trivially_copyable_v<filter>, "a copy of the state continues identically");
   wm_estimator e{};
   e.name = name;
   e.about = about;
   e.takes = takes;
   e.params = table;
+  e.reads = reads;
   e.state_bytes = [](const void *p, const wm_setup *setup, const char **why) {
     return filter::bytes(*static_cast<const params *>(p), *setup, why);
   };

@@ -19,6 +19,8 @@ constexpr double kUnknownSigma_m = 0.03;  // of a point without a sigma and with
 // Variances of a listed hypothesis: 14 cm, 2.4 degrees. Of hypotheses that were right, on corridor-hard; not swept.
 constexpr double kHypothesisCovariance[6] = {0.02, 0.0, 0.02, 0.0, 0.0, 0.0018};
 
+const char *const kReads[] = {"motion.", nullptr};
+
 }  // namespace
 
 size_t edge_mcl::bytes(const wm_edge_mcl_params &, const wm_setup &setup, const char **why) {
@@ -42,8 +44,9 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   const int each_camera = (params.pitch_sigma_rad > 0.0) + (params.roll_sigma_rad > 0.0) +
                           (params.yaw_sigma_rad > 0.0) + (params.height_sigma_m > 0.0) +
                           (params.time_offset_sigma_s > 0.0);
-  filter_.init(setup, params.motion,
-               kPoseStates + planar_filter::count_motion_states(params.motion) + (params.edge_offset_sigma_m > 0.0) +
+  const wm_motion_states &motion = setup.motion->states;
+  filter_.init(setup, motion,
+               kPoseStates + planar_filter::count_motion_states(motion) + (params.edge_offset_sigma_m > 0.0) +
                    each_camera * cameras);
   const auto add = [this](double sigma) { return sigma > 0.0 ? filter_.add_state(0.0, sigma) : -1; };
   edge_state_ = add(params.edge_offset_sigma_m);
@@ -192,9 +195,9 @@ void edge_mcl::estimate(wm_estimate *out) const {
   out->state = life_.state(filter_.now_ns(), params_.dead_reckoning_after_s);
   if (!life_.searching()) add_hypotheses_spread(out);
   if (life_.fused_ns() == WM_TIME_NONE) return;  // still the given pose with the given covariance
-  out->covariance[wm_cov_index(0, 0)] += square(params_.lasting_xy_m);
-  out->covariance[wm_cov_index(1, 1)] += square(params_.lasting_xy_m);
-  out->covariance[wm_cov_index(5, 5)] += square(params_.lasting_heading_rad);
+  out->covariance[wm_cov_index(0, 0)] += square(params_.systematic_xy_m);
+  out->covariance[wm_cov_index(1, 1)] += square(params_.systematic_xy_m);
+  out->covariance[wm_cov_index(5, 5)] += square(params_.systematic_heading_rad);
 }
 
 size_t edge_mcl::list_calibration(wm_calibration_value *out, size_t capacity) const {
@@ -247,4 +250,4 @@ const wm_estimator wm_edge_mcl_estimator = wm::estimator_of<wm::edge_mcl, wm_edg
     "sensors, and finds the pose when lost.",
     WM_EVENT_BIT(WM_EVENT_POINTS) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
         WM_EVENT_BIT(WM_EVENT_RESET),
-    wm_edge_mcl_params_table);
+    wm_edge_mcl_params_table, wm::kReads);

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/edge_mcl/params.h"
 
-#include "filters/core/param_rows.h"
+#include "param_rows.h"
 
 typedef struct wm_edge_mcl_params params;
 
 static const wm_param kParams[] = {
-    WM_MOTION_STATE_PARAMS(params, motion),
-    WM_WHEEL_HEADING_PARAMS(params, motion),
     F64("states.pitch_sigma_rad", pitch_sigma_rad, 0.01, 0, 0.5,
         "Start sigma of each camera's pitch about calibration.yaml's, rad. 0.1 degrees are 7 cm of floor at 4 m. 0: "
         "off."),
@@ -28,11 +26,10 @@ static const wm_param kParams[] = {
         "Number of points of successive scans whose errors are common: the information of each is divided by it."),
     F64("points.range_max_m", range_max_m, 6.0, 0.5, 50, "Points farther from the camera are not used, m."),
     F64("points.gate_m", gate_m, 0.15, 0.01, 0.6, "A point farther from the map's edge than this is not aligned, m."),
-    F64("lasting.xy_m", lasting_xy_m, 0.01, 0, 1,
-        "Sigma that the published position has besides the filter's, m: errors that last longer than a drive, as of "
-        "the "
+    F64("systematic.xy_m", systematic_xy_m, 0.01, 0, 1,
+        "Sigma of the position that is added to the published covariance, m: systematic errors of a drive, as of the "
         "camera's position."),
-    F64("lasting.heading_rad", lasting_heading_rad, 0.0005, 0, 1, "The same of the heading, rad."),
+    F64("systematic.heading_rad", systematic_heading_rad, 0.0005, 0, 1, "The same of the heading, rad."),
 
     F64("lost.explained", lost_explained, 0.5, 0.05, 0.95,
         "Fraction of a scan's points that the map explains at which the scan is evidence neither for nor against being "
@@ -58,6 +55,8 @@ static const wm_param kParams[] = {
 #define CONSTANT "it is a constant of the filter now"
 static const wm_param_old kOld[] = {
     {"states.angle_walk_rad", NULL, "nothing read it"},
+    {"states.*", "/motion.states.*", NULL},
+    {"lasting.*", "systematic.*", NULL},
     {"particles", NULL, NO_PARTICLES},
     {"weight", NULL, NO_PARTICLES},
     {"pose", NULL, NO_PARTICLES},

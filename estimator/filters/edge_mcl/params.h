@@ -4,7 +4,6 @@
 
 #include <stdint.h>
 
-#include "filters/planar/motion_states.h"
 #include "waymark/params.h"
 
 #ifdef __cplusplus
@@ -15,11 +14,10 @@ extern "C" {
 enum { EDGE_MCL_SEARCH_POSES_LEAST = 12000 };
 
 typedef struct wm_edge_mcl_params {
-  wm_motion_states motion;
   double pitch_sigma_rad, roll_sigma_rad, yaw_sigma_rad, height_sigma_m, time_offset_sigma_s, edge_offset_sigma_m;
 
   double pixel_px, point_sigma_m, common_px, correlated, range_max_m, gate_m;
-  double lasting_xy_m, lasting_heading_rad;
+  double systematic_xy_m, systematic_heading_rad;
 
   double lost_explained, lost_below, lost_through, lost_per_s;
   int32_t search_poses;

@@ -16,20 +16,16 @@ namespace {
 constexpr double kDoubtedStart = 0.1;
 constexpr double kAround_m = 5.0;  // sigma of a lost robot's distance from the landmarks; not swept
 
-// States of one slot of a time-correlated error.
-int error_states(const wm_landmark_ekf_params &p) {
-  if (p.lasting_slots == 0) return 0;
-  return (p.lasting_bearing_rad > 0.0 || p.lasting_lateral_m > 0.0) +
-         (p.lasting_range_m > 0.0 || p.lasting_range_rel > 0.0);
-}
+const char *const kReads[] = {"motion.", "sightings.", nullptr};
 
-int map_states(const wm_landmark_ekf_params &p) { return p.use_elevation ? 3 : 2; }
+int map_states(const wm_sighting_params &p) { return p.use_elevation ? 3 : 2; }
 
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
-  return kPoseStates + planar_filter::count_motion_states(p.motion) +
-         sensor_slots::count(p.sensor_states, setup.sensor_count) + (p.gnss_time_offset_sigma_s > 0.0) +
-         2 * (p.gnss_lasting_m > 0.0) + p.lasting_slots * error_states(p) + map_states(p) * p.map_slots +
-         2 * (p.use_elevation && p.tilt_sigma_rad > 0.0);
+  const wm_sighting_params &s = *setup.sightings;
+  return kPoseStates + planar_filter::count_motion_states(setup.motion->states) +
+         sensor_slots::count(s.states, setup.sensor_count) + (p.gnss_time_offset_sigma_s > 0.0) +
+         2 * (p.gnss_correlated_m > 0.0) + s.correlated_slots * correlated_slot_of(s).width +
+         map_states(s) * p.map_slots + 2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
 }
 
 // Variance of a place anywhere among the landmarks, each axis, m2.
@@ -68,31 +64,29 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   params_ = params;
   memory_layout layout(this, sizeof *this);
   const arrays behind = place(&layout, params, setup);
-  filter_.init(setup, params.motion, count_states(params, setup), behind.filter);
+  filter_.init(setup, setup.motion->states, count_states(params, setup), behind.filter);
   const auto add = [this](double value, double sigma) { return sigma > 0.0 ? filter_.add_state(value, sigma) : -1; };
   for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
-  slots_.init(params.sensor_states, setup.sensor_count,
+  slots_.init(sightings().states, setup.sensor_count,
               [this](double value, double sigma, double walk, double low, double high) {
                 return filter_.add_sensor_state(value, sigma, walk, low, high);
               });
-  components_ = params.sensor_states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
+  components_ = sightings().states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
   gnss_time_state_ = add(0.0, params.gnss_time_offset_sigma_s);
-  gnss_error_state_ = add(0.0, params.gnss_lasting_m);
-  if (gnss_error_state_ >= 0) add(0.0, params.gnss_lasting_m);
+  gnss_error_state_ = add(0.0, params.gnss_correlated_m);
+  if (gnss_error_state_ >= 0) add(0.0, params.gnss_correlated_m);
   gnss_error_ns_ = tilt_ns_ = WM_TIME_NONE;
   calibration_states_ = filter_.states();
-  bearing_error_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
-  range_error_ = params.lasting_range_m > 0.0 || params.lasting_range_rel > 0.0 ? (bearing_error_ >= 0 ? 1 : 0) : -1;
-  error_width_ = error_states(params);
-  for (int i = 0; i < params.lasting_slots && error_width_ > 0; i++) {
+  error_ = correlated_slot_of(sightings());
+  for (int i = 0; i < sightings().correlated_slots && error_.width > 0; i++) {
     errors_.add(filter_.states());
-    for (int k = 0; k < error_width_; k++) filter_.add_state(0.0, 1.0);
+    for (int k = 0; k < error_.width; k++) filter_.add_state(0.0, 1.0);
   }
   for (int i = 0; i < params.map_slots; i++) {
     map_.add(filter_.states());
-    for (int k = 0; k < map_states(params); k++) filter_.add_state(0.0, 0.0);
+    for (int k = 0; k < map_states(sightings()); k++) filter_.add_state(0.0, 0.0);
   }
-  tilt_state_ = params.use_elevation ? add(0.0, params.tilt_sigma_rad) : -1;
+  tilt_state_ = sightings().use_elevation ? add(0.0, params.tilt_sigma_rad) : -1;
   if (tilt_state_ >= 0) add(0.0, params.tilt_sigma_rad);
   index_.init(setup.landmarks, setup.landmark_count, behind.order);
   records_.set(behind.records);
@@ -238,4 +232,4 @@ const wm_estimator wm_landmark_ekf_estimator = wm::estimator_of<wm::landmark_ekf
     "headings. Finds the pose when lost.",
     WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_POSITION) | WM_EVENT_BIT(WM_EVENT_HEADING) |
         WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
-    wm_landmark_ekf_params_table);
+    wm_landmark_ekf_params_table, wm::kReads);

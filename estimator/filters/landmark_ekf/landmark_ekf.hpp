@@ -38,7 +38,7 @@ class landmark_ekf {
   uint32_t motion_health() const { return filter_.motion_health(); }
 
  private:
-  static constexpr int kErrorSlots = 24, kMapSlots = 16;  // most of lasting.slots and states.map_slots
+  static constexpr int kErrorSlots = 24, kMapSlots = 16;  // most of correlated.slots and states.map_slots
   static constexpr int kGnssStates = 3;                   // time offset, time-correlated error on each axis
   static constexpr int kMaxCalibration =
       kCalibrationCount + 2 + kMaxSensors * kSensorStates + kGnssStates;  // 2: the wheels' heading
@@ -125,6 +125,7 @@ class landmark_ekf {
     int *order;
     landmark_record *records;
   };
+  const wm_sighting_params &sightings() const { return *setup_->sightings; }
   static arrays place(memory_layout *layout, const wm_landmark_ekf_params &params, const wm_setup &setup);
 
   planar_filter filter_;
@@ -138,7 +139,7 @@ class landmark_ekf {
   int gnss_time_state_, gnss_error_state_;
   wm_time_ns gnss_error_ns_;
   state_pool<kErrorSlots> errors_;
-  int bearing_error_, range_error_, error_width_;  // offsets within a slot (-1: not carried), and its states
+  correlated_slot error_;  // a slot of these
   state_pool<kMapSlots> map_;
   int tilt_state_;  // the body's roll and pitch; -1: not carried
   wm_time_ns tilt_ns_;

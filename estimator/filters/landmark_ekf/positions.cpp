@@ -17,8 +17,8 @@ constexpr double kClutterPlace_m = 200.0;
 void landmark_ekf::decay_gnss_error(wm_time_ns t_ns) {
   if (gnss_error_state_ < 0) return;
   const double left =
-      gnss_error_ns_ == WM_TIME_NONE ? 1.0 : decay_over(gnss_error_ns_, t_ns, params_.gnss_lasting_tau_s);
-  for (int k = 0; k < 2; k++) decay_state(&filter_, gnss_error_state_ + k, left, square(params_.gnss_lasting_m));
+      gnss_error_ns_ == WM_TIME_NONE ? 1.0 : decay_over(gnss_error_ns_, t_ns, params_.gnss_correlated_tau_s);
+  for (int k = 0; k < 2; k++) decay_state(&filter_, gnss_error_state_ + k, left, square(params_.gnss_correlated_m));
   gnss_error_ns_ = t_ns;
 }
 
@@ -40,7 +40,7 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   seen.kind = kObservedPosition;
   seen.place_m[0] = p.p_m[0];
   seen.place_m[1] = p.p_m[1];
-  seen.sigma_length_m = std::sqrt(square(sigma) + square(params_.gnss_lasting_m));
+  seen.sigma_length_m = std::sqrt(square(sigma) + square(params_.gnss_correlated_m));
   buffer_observation(seen);
   if (life_.searching()) {
     search_now(event.t_ns);

@@ -45,7 +45,7 @@ observation landmark_ekf::observation_of(const sighting_context &at, wm_time_ns 
   const mounted_sensor &sensor = sensor_[s.sensor];
   const wm_landmark &target = setup_->landmarks[at.landmark];
   const sensor_errors errors = remembered_errors_of(s.sensor);
-  const double *sigma = params_.sensor_states.sigma;
+  const double *sigma = sightings().states.sigma;
   const double tilt_sigma = sigma[WM_SENSOR_ROW_kRoll], scale_sigma = sigma[WM_SENSOR_ROW_kAngleScale];
   const wm_pose2 mounting = {sensor.x_m + errors[kMountX], sensor.y_m + errors[kMountY], sensor.yaw_rad + errors[kYaw]};
   observation seen = observation_at(t_ns, at.landmark * kMaxSensors + s.sensor,
@@ -68,13 +68,13 @@ observation landmark_ekf::observation_of(const sighting_context &at, wm_time_ns 
   const double along =
       at.reading.range && sensor.range_is_depth && !std::isnan(s.bearing_rad) ? cos(s.bearing_rad) : 1.0;
   seen.range_m = (s.range_m - errors[kRangeBias]) / errors[kRangeScale] / (along > kLeastDepth ? along : kLeastDepth);
-  seen.sigma_angle_rad = std::sqrt(square(at.reading.bearing_sigma_rad) + square(params_.lasting_bearing_rad) +
+  seen.sigma_angle_rad = std::sqrt(square(at.reading.bearing_sigma_rad) + square(sightings().correlated_bearing_rad) +
                                    square(scale_sigma * kHalfPi));
   seen.sigma_place_m = std::sqrt(square(map_sigma(at.landmark)) + square(sigma[WM_SENSOR_ROW_kMountX]) +
                                  square(tilt_sigma * (target.p_m[2] - sensor.z_m)));
-  seen.sigma_length_m =
-      std::sqrt(square(at.reading.range_sigma_m) + square(params_.lasting_range_m) + square(map_sigma(at.landmark)) +
-                square((params_.range_sigma_rel + params_.lasting_range_rel) * seen.range_m));
+  seen.sigma_length_m = std::sqrt(
+      square(at.reading.range_sigma_m) + square(sightings().correlated_range_m) + square(map_sigma(at.landmark)) +
+      square((sightings().range_sigma_rel + sightings().correlated_range_rel) * seen.range_m));
   return seen;
 }
 
@@ -165,7 +165,8 @@ void landmark_ekf::test_start(wm_time_ns t_ns) {
   if (start_tested_ns_ != WM_TIME_NONE && wm_seconds_between(start_tested_ns_, t_ns) < kTestStartEvery_s) return;
   start_tested_ns_ = t_ns;
   start_.test(observations_,
-              {params_.sensor_states.sigma[WM_SENSOR_ROW_kYaw], params_.lasting_bearing_rad, params_.lasting_lateral_m},
+              {sightings().states.sigma[WM_SENSOR_ROW_kYaw], sightings().correlated_bearing_rad,
+               sightings().correlated_lateral_m},
               filter_.pose(), odometry(), t_ns);
   if (!start_.rejected()) return;
   restore_calibration();

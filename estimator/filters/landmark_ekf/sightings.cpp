@@ -49,7 +49,7 @@ double landmark_ekf::time_offset(int sensor) const {
 }
 
 double landmark_ekf::map_sigma(int landmark) const {
-  return at_least(setup_->landmarks[landmark].sigma_m, params_.map_sigma_min_m);
+  return at_least(setup_->landmarks[landmark].sigma_m, sightings().map_sigma_min_m);
 }
 
 wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records) {
@@ -104,7 +104,7 @@ wm_verdict landmark_ekf::associate(const wm_event &event, sighting_context *out)
   const wm_sighting &s = event.as.sighting;
   const mounted_sensor &sensor = sensor_[s.sensor];
   out->s = &s;
-  out->reading = read_sighting(s, sensor, params_);
+  out->reading = read_sighting(s, sensor, sightings());
   if (!out->reading.bearing && !out->reading.range) return WM_REJECTED_BY_CONFIG;
   if (!std::isnan(s.range_m) && s.range_m > sensor.max_range_m) return WM_REJECTED_OUT_OF_RANGE;
   out->past = pose_before(filter_, time_offset(s.sensor));
@@ -112,10 +112,10 @@ wm_verdict landmark_ekf::associate(const wm_event &event, sighting_context *out)
     out->landmark = index_.find(setup_->landmarks, s.landmark_id);
     if (out->landmark < 0) return WM_REJECTED_UNKNOWN_ID;
   } else {
-    out->landmark = params_.associate_unknown && life_.tracking() ? associate_nearest(*out) : -1;
+    out->landmark = sightings().use_unidentified && life_.tracking() ? associate_nearest(*out) : -1;
     if (out->landmark < 0) return WM_REJECTED_NO_ASSOCIATION;
   }
-  out->elevation = wm_sighting_has_elevation(&s) && params_.use_elevation && out->reading.bearing &&
+  out->elevation = wm_sighting_has_elevation(&s) && sightings().use_elevation && out->reading.bearing &&
                    !out->reading.range && finite(setup_->landmarks[out->landmark].p_m[2]) && finite(sensor.z_m);
   return WM_FUSED;
 }
@@ -126,7 +126,7 @@ int landmark_ekf::associate_nearest(const sighting_context &at) {
   const mounted_sensor &sensor = sensor_[s.sensor];
   const sensor_errors errors = errors_of(s.sensor);
   int best = -1, fitting = 0;
-  double least = params_.gate_soft;
+  double least = sightings().gate_soft;
   for (int i = 0; i < static_cast<int>(setup_->landmark_count); i++) {
     const expected_sighting e =
         expect(sensor, errors, at.past.pose, setup_->landmarks[i].p_m, kBearing | kRange | components_);
@@ -144,11 +144,11 @@ int landmark_ekf::associate_nearest(const sighting_context &at) {
       chi2 += square(difference) / (p.variance + variance + on_map);
     };
     test(s.bearing_rad, e.bearing_rad, e.bearing_by,
-         square(at.reading.bearing_sigma_rad) + square(params_.lateral_sigma_m / at_least(e.distance_m, kNear_m)),
+         square(at.reading.bearing_sigma_rad) + square(sightings().lateral_sigma_m / at_least(e.distance_m, kNear_m)),
          true);
     test(s.range_m, e.range_m, e.range_by,
-         square(at.reading.range_sigma_m) + square(params_.range_sigma_rel * e.range_m), false);
-    fitting += chi2 < params_.gate_soft;
+         square(at.reading.range_sigma_m) + square(sightings().range_sigma_rel * e.range_m), false);
+    fitting += chi2 < sightings().gate_soft;
     if (chi2 < kClearlyBest * least) {
       least = chi2 / kClearlyBest;
       best = i;
@@ -160,7 +160,7 @@ int landmark_ekf::associate_nearest(const sighting_context &at) {
 landmark_ekf::lent_slots landmark_ekf::lend_states(int sensor, int landmark, wm_time_ns t_ns) {
   lent_slots out;
   const int64_t key = static_cast<int64_t>(landmark) * kMaxSensors + sensor;
-  out.error = errors_.lend(&filter_, key, error_width_, params_.lasting_tau_s, t_ns);
+  out.error = errors_.lend(&filter_, key, error_.width, sightings().correlated_tau_s, t_ns);
   out.map = -1;
   const double sigma = map_sigma(landmark);
   if (!(sigma > 0.0)) return out;
@@ -169,7 +169,7 @@ landmark_ekf::lent_slots landmark_ekf::lend_states(int sensor, int landmark, wm_
   if (!slot) return out;
   out.map = slot->state;
   slot->used_ns = t_ns;
-  const int width = params_.use_elevation ? 3 : 2;
+  const int width = sightings().use_elevation ? 3 : 2;
   for (int k = 0; fresh && k < width; k++) filter_.forget(slot->state + k, 0.0, square(sigma));
   return out;
 }
@@ -237,17 +237,21 @@ int landmark_ekf::sighting_rows(const sighting_context &at, const expected_sight
     residual &r = rows[count++];
     r.record.expected = 0.0;
     r.noise =
-        square(at.reading.bearing_sigma_rad) + square(params_.lateral_sigma_m / distance) + second.bearing_variance;
-    add_errors(at, lent, e.bearing_by, bearing_error_,
-               std::sqrt(square(params_.lasting_bearing_rad) + square(params_.lasting_lateral_m / distance)), &r);
+        square(at.reading.bearing_sigma_rad) + square(sightings().lateral_sigma_m / distance) + second.bearing_variance;
+    add_errors(
+        at, lent, e.bearing_by, error_.bearing,
+        std::sqrt(square(sightings().correlated_bearing_rad) + square(sightings().correlated_lateral_m / distance)),
+        &r);
     finish_row(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad + second.bearing_rad, record, &r);
   }
   if (at.reading.range) {
     residual &r = rows[count++];
     r.record.expected = 0.0;
-    r.noise = square(at.reading.range_sigma_m) + square(params_.range_sigma_rel * e.range_m) + second.range_variance;
-    add_errors(at, lent, e.range_by, range_error_,
-               std::sqrt(square(params_.lasting_range_m) + square(params_.lasting_range_rel * e.range_m)), &r);
+    r.noise =
+        square(at.reading.range_sigma_m) + square(sightings().range_sigma_rel * e.range_m) + second.range_variance;
+    add_errors(at, lent, e.range_by, error_.range,
+               std::sqrt(square(sightings().correlated_range_m) + square(sightings().correlated_range_rel * e.range_m)),
+               &r);
     finish_row(WM_RESIDUAL_RANGE, s.range_m, e.range_m + second.range_m, record, &r);
   }
   if (at.elevation) {

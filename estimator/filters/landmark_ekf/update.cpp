@@ -36,7 +36,7 @@ double landmark_ekf::fuse(residual *r, int count, double clutter_volume, bool us
   }
   const double density = exp(-0.5 * nis) / std::sqrt((count == 2 ? square(kTwoPi) : kTwoPi) * determinant);
   const double log_bayes = landmark_evidence::log_bayes_factor(density, clutter_volume);
-  const gate_result g = gate(nis, count, {params_.gate_soft, params_.gate_hard});
+  const gate_result g = gate(nis, count, {sightings().gate_soft, sightings().gate_hard});
   const wm_time_ns now = filter_.now_ns();
   if (g.soft && evidence_.doubtful() &&
       (inflated_ns_ == WM_TIME_NONE || wm_seconds_between(inflated_ns_, now) > kScaleEvery_s)) {
@@ -83,7 +83,7 @@ void landmark_ekf::fuse_elevation(residual bearing_then_own[2], const double *be
   filter_.project(r.row, &own);
   const double variance = own.variance + r.noise;
   r.record.expected = r.record.observed - r.innovation;
-  const gate_result g = gate(square(r.innovation) / variance, 1, {params_.gate_soft, params_.gate_hard});
+  const gate_result g = gate(square(r.innovation) / variance, 1, {sightings().gate_soft, sightings().gate_hard});
   const bool fits = passes(g, 1) && bearing_then_own[0].record.verdict == WM_FUSED;
   wm_verdict verdict = fits ? WM_FUSED : WM_REJECTED_GATE;
   if (fits && (r.row.missing > 0 || !filter_.update(own, r.innovation, r.noise))) verdict = WM_REJECTED_NUMERIC;

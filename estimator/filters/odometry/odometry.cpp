@@ -11,20 +11,18 @@
 namespace wm {
 namespace {
 
-struct odometry_params {
-  wm_motion_states states;
-};
-
-const wm_param kParams[] = {WM_MOTION_STATE_PARAMS(odometry_params, states),
-                            WM_WHEEL_HEADING_PARAMS(odometry_params, states)};
+struct odometry_params {};
+const wm_param_old kOld[] = {{"states.*", "/motion.states.*", nullptr}, {nullptr, nullptr, nullptr}};
+const char *const kReads[] = {"motion.", nullptr};
 
 class odometry {
  public:
   static size_t bytes(const odometry_params &, const wm_setup &, const char **) { return sizeof(odometry); }
 
-  void init(const odometry_params &params, const wm_setup &setup) {
+  void init(const odometry_params &, const wm_setup &setup) {
     setup_ = &setup;
-    filter_.init(setup, params.states, kPoseStates + planar_filter::count_motion_states(params.states));
+    const wm_motion_states &states = setup.motion->states;
+    filter_.init(setup, states, kPoseStates + planar_filter::count_motion_states(states));
     searching_ = !start_is_known(setup.start);
     resets_ = 1;
   }
@@ -80,5 +78,4 @@ class odometry {
 
 const wm_estimator wm_odometry_estimator = wm::estimator_of<wm::odometry, wm::odometry_params>(
     "odometry", "Dead reckoning from the motion sensors alone, with its growing covariance. Takes no observation.",
-    WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
-    {wm::kParams, sizeof wm::kParams / sizeof wm::kParams[0], sizeof(wm::odometry_params), nullptr});
+    WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET), {nullptr, 0, 0, wm::kOld}, wm::kReads);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/pf_edges/params.h"
 
-#include "filters/core/param_rows.h"
+#include "param_rows.h"
 
 typedef struct wm_pf_edges_params params;
 

@@ -23,6 +23,9 @@ constexpr double kCluster_m = 0.5, kCluster_rad = 0.35;
 constexpr double kFoundShare = 0.9;  // of the weight in that cluster, from which on a search has ended; not swept
 constexpr double kCovarianceMin[3] = {1.6e-5, 1.6e-5, 1e-6};  // a pixel of 1.3 cm / sqrt(12), 1 mrad; squared
 
+// Of the motion the mean alone: the particles' noise is its own.
+const char *const kReads[] = {"!motion.noise.", "!motion.states.", "motion.", nullptr};
+
 }  // namespace
 
 size_t pf_edges::bytes(const wm_pf_edges_params &params, const wm_setup &setup, const char **why) {
@@ -214,4 +217,4 @@ const wm_estimator wm_pf_edges_estimator = wm::estimator_of<wm::pf_edges, wm_pf_
     "pose.",
     WM_EVENT_BIT(WM_EVENT_POINTS) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
         WM_EVENT_BIT(WM_EVENT_RESET),
-    wm_pf_edges_params_table);
+    wm_pf_edges_params_table, wm::kReads);

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "filters/core/calibration_list.hpp"
-#include "filters/planar/motion_states.h"
 #include "filters/planar/pose_step.hpp"
 #include "math/elementary.hpp"
 #include "motion/event_time.hpp"

@@ -6,7 +6,6 @@
 #ifndef WAYMARK_ESTIMATOR_PLANAR_WHEEL_HEADING_HPP
 #define WAYMARK_ESTIMATOR_PLANAR_WHEEL_HEADING_HPP
 
-#include "filters/planar/motion_states.h"
 #include "motion/front_end.hpp"
 
 namespace wm {

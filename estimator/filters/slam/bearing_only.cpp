@@ -68,7 +68,7 @@ wm_verdict slam::track_bearing(const context &at, double bearing_rad, double sig
     const double dx = here.x_m - joint_.value(state), dy = here.y_m - joint_.value(state + 1);
     if (dx * dx + dy * dy < square(params_.line_step_m)) return WM_REJECTED_SEARCHING;
   }
-  const double sigma = std::sqrt(square(sigma_rad) + square(params_.lasting_bearing_rad));
+  const double sigma = std::sqrt(square(sigma_rad) + square(sightings().correlated_bearing_rad));
   const int clone = keep_clone(at);
   tracks_.add(track, clone, bearing_rad, sigma, params_.line_poses);
   if (track->count < 3 || !join_line(at, *track)) return WM_REJECTED_SEARCHING;
@@ -91,7 +91,8 @@ bool slam::join_line(const context &at, const bearing_tracks::track &track) {
     for (int j = 0; j < 3 * track.count; j++)
       bundle.pose_covariance[i][j] = joint_.covariance(state_of(i), state_of(j));
   const line_landmark line = find_line(bundle, params_.line_method == WM_SLAM_LINE_UNSCENTED);
-  if (!line.solved || line.parallax_rad < params_.line_parallax_rad || line.misfit > params_.gate_soft) return false;
+  if (!line.solved || line.parallax_rad < params_.line_parallax_rad || line.misfit > sightings().gate_soft)
+    return false;
   joint_row rows[3];
   double noise[3][3] = {};
   for (int r = 0; r < 2; r++) {
@@ -120,10 +121,10 @@ void slam::begin_ray(const context &at, double bearing_rad, double sigma_rad) {
   const int state = ray_state(*track), error_state = lend(at);
   joint_row row;
   double variance = square(sigma_rad);
-  if (error_state >= 0 && bearing_error_ >= 0)
-    row.add(error_state + bearing_error_, -params_.lasting_bearing_rad);
+  if (error_state >= 0 && error_.bearing >= 0)
+    row.add(error_state + error_.bearing, -sightings().correlated_bearing_rad);
   else
-    variance += square(params_.lasting_bearing_rad);
+    variance += square(sightings().correlated_bearing_rad);
   const double noise[1][3] = {{variance, 0, 0}};
   joint_.assign(state, 1, &row, noise, &bearing_rad);
   const double middle = 0.5 / params_.line_near_m;  // from infinity (two sigmas below) to line_near_m (two above)
@@ -173,11 +174,11 @@ wm_verdict slam::expect_ray(const context &at, const bearing_tracks::track &trac
   out->kind[0] = WM_RESIDUAL_BEARING;
   out->noise[0] = square(sigma_rad);
   double expected = atan2(vy, vx) - from.heading_rad;
-  if (const int error_state = lend(at); error_state >= 0 && bearing_error_ >= 0) {
-    row.add(error_state + bearing_error_, params_.lasting_bearing_rad);
-    expected += params_.lasting_bearing_rad * joint_.value(error_state + bearing_error_);
+  if (const int error_state = lend(at); error_state >= 0 && error_.bearing >= 0) {
+    row.add(error_state + error_.bearing, sightings().correlated_bearing_rad);
+    expected += sightings().correlated_bearing_rad * joint_.value(error_state + error_.bearing);
   } else {
-    out->noise[0] += square(params_.lasting_bearing_rad);
+    out->noise[0] += square(sightings().correlated_bearing_rad);
   }
   out->observed[0] = bearing_rad;
   out->expected[0] = wrap(expected);

@@ -63,15 +63,16 @@ slam::marker_reading slam::read_marker(const wm_marker &m, const double p_m[3], 
   r.along[0] = floor_m > kLeastLength_m ? level[0] / floor_m : 1.0;
   r.along[1] = floor_m > kLeastLength_m ? level[1] / floor_m : 0.0;
   r.yaw_rad = yaw_rad;
-  const double across =
-      params_.bearing_sigma_factor * number_or(sensor.bearing_sigma_rad, params_.bearing_sigma_default_rad) * floor_m;
-  const double range = params_.range_sigma_factor * number_or(sensor.range_sigma_m, params_.range_sigma_default_m);
+  const double across = sightings().bearing_sigma_factor *
+                        number_or(sensor.bearing_sigma_rad, sightings().bearing_sigma_default_rad) * floor_m;
+  const double range =
+      sightings().range_sigma_factor * number_or(sensor.range_sigma_m, sightings().range_sigma_default_m);
   const double least = square(params_.marker_sigma_m) + square(params_.marker_sigma_rel * r.length_m);
   // The error along the line of sight: its parts on the floor and upwards.
   const double along_sigma_m = zero_if_absent(m.along_sigma_m);
   const bool apart = r.length_m > kLeastLength_m;
-  const double along = apart ? params_.range_sigma_factor * along_sigma_m * floor_m / r.length_m : 0.0;
-  const double up = apart ? params_.range_sigma_factor * along_sigma_m * level[2] / r.length_m : 0.0;
+  const double along = apart ? sightings().range_sigma_factor * along_sigma_m * floor_m / r.length_m : 0.0;
+  const double up = apart ? sightings().range_sigma_factor * along_sigma_m * level[2] / r.length_m : 0.0;
   r.noise[0] = least + square(range) + square(along);
   r.noise[1] = least + square(across);
   r.noise[2] = square(number_or(m.yaw_sigma_rad, params_.marker_heading_sigma_rad));
@@ -203,14 +204,14 @@ void slam::expect_marker(const context &at, const marker_reading &r, const wm_po
     out->kind[k] = kKinds[k];
     out->noise[k] = r.noise[k] + square(by_age[k] * params_.marker_stamp_sigma_s);
   }
-  if (error_state >= 0 && params_.marker_lasting > 0.0) carry_marker_errors(r, error_state, out);
+  if (error_state >= 0 && params_.marker_correlated > 0.0) carry_marker_errors(r, error_state, out);
 }
 
 // The time-correlated share of the errors along and of the heading is a state of this sensor and marker.
 void slam::carry_marker_errors(const marker_reading &r, int error_state, landmark_rows *out) const {
   for (int k = 0; k < 3; k += 2) {
     const int state = error_state + k / 2;
-    const double size = params_.marker_lasting * std::sqrt(r.noise[k]), error = size * joint_.value(state);
+    const double size = params_.marker_correlated * std::sqrt(r.noise[k]), error = size * joint_.value(state);
     out->row[k].add(state, size);
     out->noise[k] -= square(size);
     out->expected[k] += error;

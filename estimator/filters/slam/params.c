@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/slam/params.h"
 
-#include "filters/planar/sighting_params.h"
+#include "param_rows.h"
 
 typedef struct wm_slam_params params;
 
@@ -10,23 +10,14 @@ static const char *const kMaps[] = {"none", "extend", "frozen", NULL};
 static const char *const kMethods[] = {"unscented", "linear", "inverse_distance", NULL};
 
 static const wm_param kParams[] = {
-    WM_MOTION_STATE_PARAMS(params, motion),
     F64("states.wheel_slip_sigma", wheel_slip_sigma, 0, 0, 1,
         "For ticks: each wheel's scale wanders by so much (one sigma) about a mean that is a state, too: slip that "
         "lasts "
         "for seconds, where noise.ticks_per_sqrt_m is fresh with each tick. 0: off."),
     F64("states.wheel_slip_tau_s", wheel_slip_tau_s, 5, 0.01, 1e6, "And forgets by 1/e in this time, s."),
-    // clang-format off
-    WM_SENSOR_STATE_PARAMS
-        // clang-format on
-        F64("states.sensor_stamp_sigma_s", sensor_stamp_sigma_s, 0, 0, 1,
-            "Sigma of the error of each picture's stamp, s: alike for all that is seen in it, another in the next one. "
-            "A "
-            "robot "
-            "that turns at 1 rad/s sees all of it that much rad beside. 0: off."),
-    BOOL("use.bearing", use_bearing, 1, "Fuse bearings."),
-    BOOL("use.range", use_range, 1, "Fuse ranges. Without them landmarks join once their parallax suffices."),
-    WM_SIGHTING_NOISE_PARAMS,
+    F64("states.sensor_stamp_sigma_s", sensor_stamp_sigma_s, 0, 0, 1,
+        "Sigma of the error of each picture's stamp, s: the same for all that is seen in it, independent between "
+        "pictures. 0: off."),
     BOOL("markers.on", markers, 0,
          "Take coded markers: each landmark has a heading, too, and a marker gives all three at once."),
     F64("markers.sigma_m", marker_sigma_m, 0.002, 1e-5, 10,
@@ -35,19 +26,15 @@ static const wm_param kParams[] = {
     F64("markers.heading_sigma_rad", marker_heading_sigma_rad, 0.02, 1e-5, 3, "Noise of a marker's heading, rad."),
     F64("markers.stamp_sigma_s", marker_stamp_sigma_s, 0, 0, 1,
         "How far a picture's stamp scatters, s: a robot that turns at 1 rad/s sees a marker that much rad beside."),
-    F64("markers.lasting", marker_lasting, 0, 0, 0.99,
+    F64("markers.correlated", marker_correlated, 0, 0, 0.99,
         "The part of a marker's sigma along the line of sight and in heading that is the same from one sighting of it "
         "to "
-        "the next (pixels under its corners, light, its bend), fading with lasting.tau_s; needs lasting.slots. 0: all "
-        "of it is fresh."),
+        "the next (pixels under its corners, light, its bend), with the time constant sightings.correlated.tau_s; "
+        "needs "
+        "sightings.correlated.slots. 0: all of it is independent."),
     F64("markers.heading_most_rad", marker_heading_most_rad, 10, 1e-5, 10,
         "A marker's heading is taken where the detector is surer of it than this, rad: seen small and nearly face on, "
         "a print seems turned by several degrees to one side for as long as it is seen so."),
-    WM_LASTING_PARAMS,
-    F64("gate.soft", gate_soft, 9, 1, 1e6,
-        "Normalised innovation squared for two numbers above which the measurement is believed less, as a "
-        "distribution with long tails does; for one or three numbers it is scaled. 99 % of good ones lie below 9.2."),
-    F64("gate.hard", gate_hard, 25, 1, 1e6, "The same, above which it is rejected and counted: a misread code."),
     ENUM("landmarks.map", map, WM_SLAM_MAP_NONE, WM_SLAM_MAP_FROZEN, kMaps,
          "What landmarks.csv is for. none: nothing, all are found anew; extend: they are in the state from the start, "
          "as unsure as their sigma_m, and new ones join; frozen: they stay as they are and only the robot is located."),
@@ -61,9 +48,9 @@ static const wm_param kParams[] = {
     I32("landmarks.moved_after", moved_after, 12, 2, 1000,
         "So many sightings of a landmark in a row that don't fit, while others do: it was moved. It leaves, counted, "
         "and joins anew where it is."),
-    BOOL("association.unknown", associate_unknown, 0, "Take sightings without an identity."),
     F64("association.gate", associate_gate, 9.2, 1, 1000,
-        "Such a sighting is one of the nearest landmark's where its normalised innovation squared is below this, no "
+        "A sighting without an identity (sightings.use.unidentified) is one of the nearest landmark's where its "
+        "normalised innovation squared is below this, no "
         "sighting of the same stamp was that landmark's, and no other landmark comes near."),
     F64("association.new_gate", new_gate, 40, 1, 1e6,
         "It is a new landmark's where all landmarks are farther than this. What lies between is left alone."),
@@ -110,6 +97,14 @@ static const wm_param kParams[] = {
 static const wm_param_old kOld[] = {
     {"states.wheel_difference_sigma", NULL, "slam never read it; landmark_ekf and odometry have it"},
     {"states.wheel_difference_walk", NULL, "slam never read it; landmark_ekf and odometry have it"},
+    {"association.unknown", "/sightings.use.unidentified", NULL},
+    {"markers.lasting", "markers.correlated", NULL},
+    {"states.*", "/motion.states.*", NULL},
+    {"states.*", "/sightings.states.*", NULL},
+    {"use.*", "/sightings.use.*", NULL},
+    {"noise.*", "/sightings.noise.*", NULL},
+    {"lasting.*", "/sightings.correlated.*", NULL},
+    {"gate.*", "/sightings.gate.*", NULL},
     {NULL, NULL, NULL},
 };
 

@@ -39,7 +39,7 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   if (status != WM_OK) return refuse(records, at.record, status);
   status = begin_observation(event.t_ns);
   if (status != WM_OK) return status;
-  const reading r = read_sighting(s, sensor_[s.sensor], params_);
+  const reading r = read_sighting(s, sensor_[s.sensor], sightings());
   if (!r.bearing && !r.range) return reject(records, at.record, WM_REJECTED_BY_CONFIG);
   if (s.range_m > sensor_[s.sensor].max_range_m) return reject(records, at.record, WM_REJECTED_OUT_OF_RANGE);
 
@@ -67,7 +67,7 @@ wm_verdict slam::identify(const wm_sighting &s, const reading &r, context *at, i
   *landmark = s.landmark_id >= 0 ? find_landmark(s.landmark_id) : -1;
   if (s.landmark_id >= 0) return is_ambiguous(at->id, *landmark, s.sensor) ? WM_REJECTED_NO_ASSOCIATION : WM_FUSED;
   bool fresh = false;
-  if (params_.associate_unknown && r.bearing && r.range && s.range_m <= params_.associate_max_range_m)
+  if (sightings().use_unidentified && r.bearing && r.range && s.range_m <= params_.associate_max_range_m)
     *landmark = associate(s, r, at->past, &fresh);
   if (*landmark < 0 && !fresh) return WM_REJECTED_NO_ASSOCIATION;
   at->id = at->record.landmark_id = *landmark < 0 ? own_id() : note(*landmark).id;
@@ -115,9 +115,9 @@ slam::planar_observation slam::observation_of(const wm_sighting &s, const readin
   return {.bearing_rad = r.bearing ? s.bearing_rad : std::nan(""),
           .range_m = r.range ? range : std::nan(""),
           .heading_rad = std::nan(""),
-          .bearing_sigma_rad = std::sqrt(square(r.bearing_sigma_rad) + square(params_.lasting_bearing_rad)),
-          .range_sigma_m = std::sqrt(square(r.range_sigma_m) + square(params_.lasting_range_m) +
-                                     square((params_.range_sigma_rel + params_.lasting_range_rel) * range)),
+          .bearing_sigma_rad = std::sqrt(square(r.bearing_sigma_rad) + square(sightings().correlated_bearing_rad)),
+          .range_sigma_m = std::sqrt(square(r.range_sigma_m) + square(sightings().correlated_range_m) +
+                                     square((sightings().range_sigma_rel + sightings().correlated_range_rel) * range)),
           .heading_sigma_rad = std::nan("")};
 }
 
@@ -150,12 +150,12 @@ wm_verdict slam::expect_sighting(const wm_sighting &s, const reading &r, const p
   const double lever_m = larger(e.distance_m, kLeastLever_m);
   if (r.bearing)
     add(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad, e.bearing_by,
-        square(r.bearing_sigma_rad) + square(params_.lateral_sigma_m / lever_m), bearing_error_,
-        std::sqrt(square(params_.lasting_bearing_rad) + square(params_.lasting_lateral_m / lever_m)));
+        square(r.bearing_sigma_rad) + square(sightings().lateral_sigma_m / lever_m), error_.bearing,
+        std::sqrt(square(sightings().correlated_bearing_rad) + square(sightings().correlated_lateral_m / lever_m)));
   if (r.range)
     add(WM_RESIDUAL_RANGE, s.range_m, e.range_m, e.range_by,
-        square(r.range_sigma_m) + square(params_.range_sigma_rel * e.range_m), range_error_,
-        std::sqrt(square(params_.lasting_range_m) + square(params_.lasting_range_rel * e.range_m)));
+        square(r.range_sigma_m) + square(sightings().range_sigma_rel * e.range_m), error_.range,
+        std::sqrt(square(sightings().correlated_range_m) + square(sightings().correlated_range_rel * e.range_m)));
   return WM_FUSED;
 }
 

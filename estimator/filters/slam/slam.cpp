@@ -25,20 +25,23 @@ landmark_note note_of(int32_t id, int sensor, wm_time_ns t_ns) {
   return out;
 }
 
-// States of one slot of a time-correlated error.
-int error_states(const wm_slam_params &p) {
-  if (p.lasting_slots == 0) return 0;
-  if (p.markers && p.marker_lasting > 0.0) return 2;
-  return (p.lasting_bearing_rad > 0.0 || p.lasting_lateral_m > 0.0) +
-         (p.lasting_range_m > 0.0 || p.lasting_range_rel > 0.0);
+const char *const kReads[] = {"!motion.states.wheel_difference", "motion.",    "!sightings.use.elevation",
+                              "!sightings.noise.map_min",        "sightings.", nullptr};
+
+// Markers' errors take two states: along the line of sight, and of the heading.
+correlated_slot error_slot_of(const wm_slam_params &p, const wm_sighting_params &s) {
+  correlated_slot out = correlated_slot_of(s);
+  if (s.correlated_slots > 0 && p.markers && p.marker_correlated > 0.0) out.width = 2;
+  return out;
 }
 
 joint_state::wheel_slip slip_of(const wm_slam_params &p) { return {p.wheel_slip_sigma, p.wheel_slip_tau_s}; }
 
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
-  return kPoseStates + joint_state::count_motion_states(p.motion, slip_of(p)) +
-         sensor_slots::count(p.sensor_states, setup.sensor_count) +
-         (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count + p.lasting_slots * error_states(p);
+  const wm_sighting_params &s = *setup.sightings;
+  return kPoseStates + joint_state::count_motion_states(setup.motion->states, slip_of(p)) +
+         sensor_slots::count(s.states, setup.sensor_count) + (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count +
+         s.correlated_slots * error_slot_of(p, s).width;
 }
 
 // Azimuth and inverse distance for each ray, of which there are as many as clones.
@@ -72,8 +75,8 @@ size_t slam::bytes(const wm_slam_params &params, const wm_setup &setup, const ch
   if (layout_of(params, setup).robot_states > joint_state::kMaxRobot) {
     *why =
         "slam holds at most 192 states beside the landmarks: pose 3, one for each states.*_sigma that is not 0 (those "
-        "of sensors once for each sensor), one or two for each of lasting.slots, three for each of lines.clones; lower "
-        "lasting.slots or lines.clones";
+        "of sensors once for each sensor), one or two for each of sightings.correlated.slots, three for each of "
+        "lines.clones; lower sightings.correlated.slots or lines.clones";
     return 0;
   }
   if (params.map != WM_SLAM_MAP_NONE && setup.landmark_count > static_cast<size_t>(params.landmark_capacity)) {
@@ -99,15 +102,15 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   first_clone_ = layout.first_clone;
   first_ray_ = first_clone_ - ray_states(params);
   int next = kPoseStates;
-  joint_.set_motion_states(params.motion, slip_of(params), next);
-  next += joint_state::count_motion_states(params.motion, slip_of(params));
+  joint_.set_motion_states(setup.motion->states, slip_of(params), next);
+  next += joint_state::count_motion_states(setup.motion->states, slip_of(params));
   for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
-  slots_.init(params.sensor_states, setup.sensor_count,
+  slots_.init(sightings().states, setup.sensor_count,
               [&](double value, double sigma, double walk, double low, double high) {
                 joint_.begin_sensor_state(next, value, sigma, walk, low, high);
                 return next++;
               });
-  components_ = params.sensor_states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
+  components_ = sightings().states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
   rollback_.begin(joint_, kPoseStates, next);
   for (int i = 0; i < kSlamSensors; i++) {
     const bool on = i < static_cast<int>(setup.sensor_count) && params.sensor_stamp_sigma_s > 0.0;
@@ -115,10 +118,8 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
     picture_ns_[i] = WM_TIME_NONE;
     bloom_px_[i] = std::nan("");
   }
-  bearing_error_ = params.lasting_bearing_rad > 0.0 || params.lasting_lateral_m > 0.0 ? 0 : -1;
-  range_error_ = params.lasting_range_m > 0.0 || params.lasting_range_rel > 0.0 ? (bearing_error_ >= 0 ? 1 : 0) : -1;
-  error_width_ = error_states(params);
-  for (int i = 0; i < params.lasting_slots && error_width_ > 0; i++, next += error_width_) errors_.add(next);
+  error_ = error_slot_of(params, sightings());
+  for (int i = 0; i < sightings().correlated_slots && error_.width > 0; i++, next += error_.width) errors_.add(next);
   follow_scale();
   life_ = {};
   start_again();
@@ -128,7 +129,7 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
 // markers, far more accurate than wheels, the filter hardly gains false certainty, so the covariance is not
 // transported.
 void slam::follow_scale() {
-  const bool is_observed = params_.use_range && !(params_.sensor_states.sigma[WM_SENSOR_ROW_kRangeScale] > 0.0);
+  const bool is_observed = sightings().use_range && !(sightings().states.sigma[WM_SENSOR_ROW_kRangeScale] > 0.0);
   if (is_observed || params_.map != WM_SLAM_MAP_NONE || !joint_.find_scale(!params_.markers)) return;
   for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++) {
     joint_.follow_scale(slots_.at(i, kRangeScale), -1.0, true);
@@ -385,4 +386,4 @@ const wm_estimator wm_slam_estimator = wm::estimator_of<wm::slam, wm_slam_params
     "from coded markers, bearings and ranges, or bearings alone, with or without identities.",
     WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) | WM_EVENT_BIT(WM_EVENT_LOOKED) |
         WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
-    wm_slam_params_table);
+    wm_slam_params_table, wm::kReads);

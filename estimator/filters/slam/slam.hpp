@@ -167,7 +167,7 @@ class slam {
   sensor_errors errors_of(int sensor) const;
   wm_pose2 sensor_pose(int sensor, const past_pose &past) const;
   int lend(const context &at);
-  gate_limits gates() const { return {params_.gate_soft, params_.gate_hard}; }
+  gate_limits gates() const { return {sightings().gate_soft, sightings().gate_hard}; }
   void prepare(int landmark, landmark_rows *v, joint_state::innovation_block *out);
   wm_verdict fuse_rows(const context &at, const landmark_rows &v, const gate_result &g,
                        joint_state::innovation_block *block);
@@ -261,6 +261,7 @@ class slam {
   relative_array<landmark_note> notes_;
   landmark_note &note(int landmark) { return notes_[static_cast<size_t>(landmark)]; }
   const landmark_note &note(int landmark) const { return notes_[static_cast<size_t>(landmark)]; }
+  const wm_sighting_params &sightings() const { return *setup_->sightings; }
 
   const wm_setup *setup_;
   wm_slam_params params_;
@@ -270,8 +271,7 @@ class slam {
   int stamp_state_[kSlamSensors];        // error of the newest picture's stamp; -1: off
   wm_time_ns picture_ns_[kSlamSensors];  // that stamp
   state_pool<24> errors_;                // time-correlated errors of a sensor on a landmark
-  int bearing_error_, range_error_;      // offsets within a slot; -1: not carried
-  int error_width_;                      // states of a slot
+  correlated_slot error_;                // a slot of these
   bearing_tracks tracks_;
   int first_ray_, first_clone_;
   slam_counts counts_;

@@ -33,7 +33,7 @@ wm_pose2 slam::sensor_pose(int sensor, const past_pose &past) const {
 // The states of this sensor's time-correlated error on this landmark, decayed to now. -1: none is carried.
 int slam::lend(const context &at) {
   const int64_t key = static_cast<int64_t>(at.id) * kSlamSensors + at.sensor;
-  return errors_.lend(&joint_, key, error_width_, params_.lasting_tau_s, joint_.now_ns());
+  return errors_.lend(&joint_, key, error_.width, sightings().correlated_tau_s, joint_.now_ns());
 }
 
 // Completes the rows by the landmark's own derivatives; S and the NIS of all rows together.

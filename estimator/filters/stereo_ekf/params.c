@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/stereo_ekf/params.h"
 
-#include "filters/core/param_rows.h"
+#include "param_rows.h"
 
 typedef struct wm_stereo_ekf_params params;
 
@@ -58,12 +58,6 @@ static const wm_param kParams[] = {
         "vehicle. With constant_velocity only. 0: off."),
     F64("noise.pixel_px", pixel_px, 0, 0, 1000,
         "Sigma of one coordinate of a point in a picture, px. 0: calibration.yaml's stereo.sigma_px."),
-    F64("noise.range_default_m", range_m, 0.1, 1e-4, 100,
-        "Sigma of a range when neither the sighting nor the sensor gives one, m."),
-    F64("noise.bearing_default_rad", bearing_rad, 0.02, 1e-5, 3,
-        "Sigma of a bearing when neither the sighting nor the sensor gives one, rad."),
-    F64("noise.map_min_m", map_min_m, 0, 0, 10,
-        "Lower limit of a known point's sigma, m, for maps whose sigmas are too small."),
     F64("gate.soft", gate_soft, 7, 1, 1e6,
         "Normalised innovation squared of one row above which its variance is inflated, as for a distribution with "
         "long "
@@ -86,6 +80,9 @@ static const wm_param kParams[] = {
 };
 
 static const wm_param_old kOld[] = {
+    {"noise.range_default_m", "/sightings.noise.range_default_m", NULL},
+    {"noise.bearing_default_rad", "/sightings.noise.bearing_default_rad", NULL},
+    {"noise.map_min_m", "/sightings.noise.map_min_m", NULL},
     {"constant_velocity.sample_at", NULL,
      "stamps are the reader's: `end` is now sources: [{name: motion6, sample_at: next_stamp}]"},
     {"recover.window_s", NULL, "observations of the last 3 s are used to find the pose"},

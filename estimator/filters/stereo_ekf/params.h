@@ -28,7 +28,7 @@ typedef struct wm_stereo_ekf_params {
   double range_bias_sigma, bearing_bias_sigma;
   double twist_lag_sigma;
   // noise of one row
-  double pixel_px, range_m, bearing_rad, map_min_m;
+  double pixel_px;
   double gate_soft, gate_hard;
   // points found on the way
   int32_t points_max, keep_unseen_steps;

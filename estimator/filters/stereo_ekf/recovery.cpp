@@ -78,8 +78,9 @@ void stereo_ekf::buffer_observation(const wm_stereo &seen, const wm_landmark &la
   double by[3][4];
   if (!params_.recover || std::isnan(px[0]) || std::isnan(px[2])) return;
   if (!rig_.triangulate(px, params_.disparity_min_px, &x, by)) return;
-  double variance = square(finite(landmark.sigma_m) ? landmark.sigma_m : 0.0) + square(params_.map_min_m) +
-                    square(params_.camera_rotation_sigma * length(x)) + square(params_.camera_place_sigma);
+  double variance = square(finite(landmark.sigma_m) ? landmark.sigma_m : 0.0) +
+                    square(setup_->sightings->map_sigma_min_m) + square(params_.camera_rotation_sigma * length(x)) +
+                    square(params_.camera_place_sigma);
   for (const auto &row : by)
     for (int k = 0; k < 4; k++) variance += square(row[k] * sigma_px_[k]);
   const vec3 in_body = rig_.place + rig_.R_base_optical * x;

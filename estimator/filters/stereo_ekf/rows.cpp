@@ -130,7 +130,7 @@ bool stereo_ekf::sighting_rows(const wm_sighting &s, int landmark, int slot, row
   if (!(distance > kNearest_m)) return false;
   double by_end[2][3], by_turn[2][3] = {};
   if (!std::isnan(s.range_m)) {
-    const double sigma = first_finite(s.range_sigma_m, sensor.range_sigma_m, params_.range_m);
+    const double sigma = first_finite(s.range_sigma_m, sensor.range_sigma_m, setup_->sightings->range_sigma_default_m);
     const int row = out->add_row(WM_RESIDUAL_RANGE, s.range_m, s.range_m - distance - filter_.head1(kRangeBias, 0.0),
                                  square(sigma) + square(map));
     for (int j = 0; j < 3; j++) by_end[row][j] = -to[j] / distance;
@@ -140,7 +140,8 @@ bool stereo_ekf::sighting_rows(const wm_sighting &s, int landmark, int slot, row
     const vec3 x = transposed_times(S, transposed_times(past.R, to));
     const double q = x.x * x.x + x.y * x.y;
     if (!(q > square(kNearest_m))) return false;
-    const double sigma = first_finite(s.bearing_sigma_rad, sensor.bearing_sigma_rad, params_.bearing_rad);
+    const double sigma =
+        first_finite(s.bearing_sigma_rad, sensor.bearing_sigma_rad, setup_->sightings->bearing_sigma_default_rad);
     const int row = out->add_row(WM_RESIDUAL_BEARING, s.bearing_rad,
                                  wrap(s.bearing_rad - atan2(x.y, x.x) - filter_.head1(kBearingBias, 0.0)),
                                  square(sigma) + square(map) / q);

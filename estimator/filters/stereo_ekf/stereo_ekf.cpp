@@ -37,6 +37,15 @@ spatial_noise twist_noise_of(const wm_stereo_ekf_params &p, const wm_rig *rig) {
   return out;
 }
 
+// The velocities' noise is its own; twists' own states carry their errors.
+const char *const kReads[] = {"!motion.noise.",
+                              "!motion.states.",
+                              "motion.",
+                              "sightings.noise.bearing_default",
+                              "sightings.noise.range_default",
+                              "sightings.noise.map_min",
+                              nullptr};
+
 }  // namespace
 
 size_t stereo_ekf::bytes(const wm_stereo_ekf_params &params, const wm_setup &setup, const char **why) {
@@ -198,4 +207,4 @@ const wm_estimator wm_stereo_ekf_estimator = wm::estimator_of<wm::stereo_ekf, wm
     WM_EVENT_BIT(WM_EVENT_STEREO) | WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_POSITION) |
         WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
         WM_EVENT_BIT(WM_EVENT_RESET),
-    wm_stereo_ekf_params_table);
+    wm_stereo_ekf_params_table, wm::kReads);

@@ -13,6 +13,7 @@
 #include "filters/stereo_ekf/space_filter.hpp"
 #include "maps/landmark_index.hpp"
 #include "memory/layout.hpp"
+#include "sensors/sighting_params.h"
 #include "sensors/stereo_rig.hpp"
 #include "waymark/estimator.h"
 
@@ -110,7 +111,8 @@ class stereo_ekf {
   void search(wm_time_ns since_ns);
 
   double map_sigma(const wm_landmark &landmark) const {
-    return landmark.sigma_m > params_.map_min_m ? landmark.sigma_m : params_.map_min_m;
+    const double least = setup_->sightings->map_sigma_min_m;
+    return landmark.sigma_m > least ? landmark.sigma_m : least;
   }
   // Arrays behind the struct.
   struct arrays {

@@ -20,9 +20,15 @@
 extern "C" {
 #endif
 
+// `sightings:` of the config: noise, calibration states, time-correlated errors and gates of sightings, for every
+// estimator that takes them. The fields and their meaning are in wm_sighting_params_table (sensors/sighting_params.c).
+typedef struct wm_sighting_params wm_sighting_params;
+extern const wm_param_table wm_sighting_params_table;
+
 // What belongs to a robot and a place. Must live, unchanged, as long as the estimator's state.
 typedef struct wm_setup {
   const wm_motion_params *motion;
+  const wm_sighting_params *sightings;
   wm_wheels wheels;
   const wm_sensor *sensors;
   size_t sensor_count;
@@ -52,6 +58,9 @@ typedef struct wm_estimator {
   const char *about;
   uint32_t takes;  // WM_EVENT_BIT of each observation that it takes; motion is always taken
   wm_param_table params;
+  // Parameters of the shared sections `motion` and `sightings` that it reads, as beginnings of their keys
+  // ("sightings.noise."); behind a '!' such that it does not. The first that fits decides; NULL ends the list.
+  const char *const *reads;
 
   // Bytes of state for these parameters and this setup; 0 with *why set (a constant string) if they don't go together.
   size_t (*state_bytes)(const void *params, const wm_setup *setup, const char **why);
@@ -88,6 +97,8 @@ typedef struct wm_estimator {
 const wm_estimator *const *wm_estimators(size_t *count);
 // By name, or NULL.
 const wm_estimator *wm_estimator_find(const char *name);
+// Whether an estimator reads this parameter of a shared section ("motion.noise.speed_mps").
+int wm_estimator_reads(const wm_estimator *estimator, const char *key);
 
 #ifdef __cplusplus
 }

@@ -28,10 +28,11 @@ typedef struct wm_param {
 } wm_param;
 
 // A key that the table had before. The config reader takes a renamed key for the new one, with a warning; of a removed
-// key it warns with the sentence and goes on. Old and new key together are an error.
+// key it warns with the sentence and goes on. Old and new key together are an error. The first row that fits holds.
+// A row with `*` at the end of both keys is a rule for all keys that begin so; it fits where the new key exists.
 typedef struct wm_param_old {
   const char *key;      // the old key; NULL ends the list
-  const char *new_key;  // a key of the table, with the same unit and meaning; NULL: removed
+  const char *new_key;  // a key of the table, or "/SECTION.KEY" of a shared one; unit and meaning stay; NULL: removed
   const char *about;    // removed: why, and what to use; renamed: NULL, or what else changed
 } wm_param_old;
 

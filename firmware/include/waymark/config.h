@@ -21,6 +21,7 @@
 //   start: {saved_pose: FILE, ...}
 //   black_box: {folder: FOLDER, ...}
 //   motion: {...}                  # wm_motion_params_table
+//   sightings: {...}               # wm_sighting_params_table
 //   vision: {edges: {cameras: [front], ...}}   # detectors on pictures, with their tables
 //   vision: {cascade: {classes: [{file: FILE, height_m: 0.9}]}}
 //   landmark_ekf: {...}            # the estimator's own table
@@ -97,6 +98,7 @@ typedef struct wm_config {
   const wm_estimator *estimator;
   void *estimator_params;  // estimator->params.bytes bytes
   wm_motion_params *motion;
+  wm_sighting_params *sightings;
   wm_runtime_params runtime;
   wm_recording_overrides overrides;
   wm_vision_config vision[WM_VISION_MAX];
@@ -110,7 +112,8 @@ typedef struct wm_config {
   char saved_pose[WM_PATH_MAX];  // start.saved_pose; "": none
   char black_box[WM_PATH_MAX];   // black_box.folder; "": none
   char channel_prefix[48];       // publish.channel_prefix, "WAYMARK_"
-  // Keys that were renamed or removed: a line each, "FILE:LINE: KEY: what to do", with a line feed; "": none.
+  // Keys that were renamed, removed, or that the estimator does not take: a line each, "FILE:LINE: KEY: what to do",
+  // with a line feed; "": none.
   char warnings[WM_CONFIG_WARNINGS_MAX];
 } wm_config;
 

@@ -9,6 +9,7 @@
 #include <initializer_list>
 #include <utility>
 
+#include "sensors/sighting_params.h"
 #include "waymark/estimator.h"
 #include "waymark/event.h"
 #include "waymark/setup.h"
@@ -89,10 +90,18 @@ inline wm_sensor sensor(const char *name, double bearing_sigma_rad, double range
   return s;
 }
 
+// The shared parameters of sightings; those of motion are each test's.
+inline wm_sighting_params sightings;
+inline void shared_defaults(wm_motion_params *motion) {
+  wm_params_defaults(&wm_motion_params_table, motion);
+  wm_params_defaults(&wm_sighting_params_table, &sightings);
+}
+
 // A robot of which only its motion and one sensor are known; both must outlive what is started with it.
 inline wm_setup setup(const wm_motion_params &motion, const wm_sensor &sensor) {
   wm_setup s{};
   s.motion = &motion;
+  s.sightings = &sightings;
   s.wheels = no_wheels();
   s.sensors = &sensor;
   s.sensor_count = 1;

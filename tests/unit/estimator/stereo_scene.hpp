@@ -29,6 +29,7 @@ struct scene {
   std::vector<wm_landmark> map;
   wm_rig rig;
   wm_sensor sensor;
+  wm_sighting_params sightings;
   wm_setup setup;
   void *state = nullptr;
   size_t bytes = 0;
@@ -44,6 +45,7 @@ struct scene {
   explicit scene(int count = 400) {
     motion.resize(wm_motion_params_table.bytes);
     wm_params_defaults(&wm_motion_params_table, motion.data());
+    wm_params_defaults(&wm_sighting_params_table, &sightings);
     params.resize(ekf->params.bytes);
     wm_params_defaults(&ekf->params, params.data());
     set("noise.pixel_px", 0.5);
@@ -91,6 +93,7 @@ struct scene {
   }
   void begin() {
     setup.motion = reinterpret_cast<const wm_motion_params *>(motion.data());
+    setup.sightings = &sightings;
     setup.sensors = &sensor;
     setup.sensor_count = 1;
     setup.landmarks = map.data();

@@ -49,7 +49,7 @@ double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
 
 void make_room() {
   ekf = wm_estimator_find("landmark_ekf");
-  wm_params_defaults(&wm_motion_params_table, &motion);
+  make::shared_defaults(&motion);
   wm_params_defaults(&ekf->params, &params);
   const double places[8][2] = {{6, 0}, {0, 6}, {-6, 1}, {1, -6}, {5, 5}, {-4, -5}, {-5, 4}, {4, -4}};
   for (int i = 0; i < 8; i++) landmarks[i] = {100 + 7 * i, {places[i][0], places[i][1], 0}, 0.0, NAN, {}, 0};
@@ -277,13 +277,13 @@ void test_it_tracks_and_its_covariance_is_honest(void) {
 }
 
 void test_it_finds_every_error_of_its_sensors(void) {
-  params.motion.sigma[0] = 0.1;
-  params.motion.sigma[1] = 0.1;
-  params.motion.sigma[2] = 0.05;
-  params.motion.sigma[7] = 0.2;
-  params.sensor_states.sigma[WM_SENSOR_ROW_kYaw] = 0.2;
-  params.sensor_states.sigma[WM_SENSOR_ROW_kTimeOffset] = 0.1;
-  params.sensor_states.sigma[WM_SENSOR_ROW_kRangeBias] = 0.2;
+  motion.states.sigma[0] = 0.1;
+  motion.states.sigma[1] = 0.1;
+  motion.states.sigma[2] = 0.05;
+  motion.states.sigma[7] = 0.2;
+  make::sightings.states.sigma[WM_SENSOR_ROW_kYaw] = 0.2;
+  make::sightings.states.sigma[WM_SENSOR_ROW_kTimeOffset] = 0.1;
+  make::sightings.states.sigma[WM_SENSOR_ROW_kRangeBias] = 0.2;
   fault.speed_scale = 0.93;
   fault.yaw_scale = 1.06;
   fault.yaw_bias = 0.03;
@@ -328,14 +328,14 @@ void test_misread_codes_are_rejected_and_do_no_harm(void) {
 // GIVEN sightings without an identity WHEN one landmark fits THEN it is that one; WHEN two fit THEN none is.
 void test_nameless_sightings_are_of_the_one_that_fits(void) {
   fault.nameless = true;
-  params.associate_unknown = 1;
+  make::sightings.use_unidentified = 1;
   begin();
   TEST_ASSERT_GREATER_THAN_INT(1400, drive(60, kBearings | kRanges));
   TEST_ASSERT_LESS_THAN_DOUBLE(0.06, off());
   free(state);
   make_room();
   fault.nameless = true;
-  params.associate_unknown = 1;
+  make::sightings.use_unidentified = 1;
   for (int i = 0; i < 4; i++) {  // each of them twice, a hand apart
     landmarks[i + 4] = landmarks[i];
     landmarks[i + 4].id += 1;
@@ -472,7 +472,7 @@ void test_each_refusal_has_its_verdict(void) {
   TEST_ASSERT_EQUAL(WM_REJECTED_NOT_FINITE, verdict(make::sighting(now_s, 100, NAN, NAN), WM_NOT_FINITE));
   TEST_ASSERT_EQUAL(WM_REJECTED_GATE, verdict(make::sighting(now_s, 100, 3, NAN)));
   TEST_ASSERT_GREATER_THAN_DOUBLE(r[0].gate, r[0].nis);
-  params.use_range = 0;
+  make::sightings.use_range = 0;
   free(state);
   begin();
   drive(1, kNothing);
@@ -483,13 +483,13 @@ void test_each_refusal_has_its_verdict(void) {
 void test_sixteen_fully_calibrated_sensors(void) {
   static wm_sensor sensors[17];
   for (wm_sensor &s : sensors) s = sensor;
-  params.lasting_slots = 24;
-  params.lasting_bearing_rad = params.lasting_range_m = 0.1;
+  make::sightings.correlated_slots = 24;
+  make::sightings.correlated_bearing_rad = make::sightings.correlated_range_m = 0.1;
   params.map_slots = 16;
-  params.map_sigma_min_m = 0.01;
-  params.use_elevation = 1;
-  for (double &sigma : params.sensor_states.sigma) sigma = 0.01;
-  for (double &sigma : params.motion.sigma) sigma = 0.01;
+  make::sightings.map_sigma_min_m = 0.01;
+  make::sightings.use_elevation = 1;
+  for (double &sigma : make::sightings.states.sigma) sigma = 0.01;
+  for (double &sigma : motion.states.sigma) sigma = 0.01;
   setup.sensors = sensors;
   setup.sensor_count = 17;
   const char *why = nullptr;

@@ -129,7 +129,7 @@ void test_a_ray_is_levelled(void) {
 }
 
 void run_without(int use, bool told, wm_estimate *out) {
-  params.use_elevation = use;
+  make::sightings.use_elevation = use;
   begin();
   wm_random noise = {5, 1, 0};
   for (int i = 0; i < 100; i++) {
@@ -286,10 +286,10 @@ void test_heights_reject_a_wrong_start(void) {
 
 void setUp(void) {
   ekf = wm_estimator_find("landmark_ekf");
-  wm_params_defaults(&wm_motion_params_table, &motion);
+  make::shared_defaults(&motion);
   wm_params_defaults(&ekf->params, &params);
-  params.use_elevation = 1;
-  params.sensor_states.sigma[WM_SENSOR_ROW_kRoll] = 0.0035;
+  make::sightings.use_elevation = 1;
+  make::sightings.states.sigma[WM_SENSOR_ROW_kRoll] = 0.0035;
   params.map_slots = 3;
   const double places[3][3] = {{8, 0, 2.5}, {3, 5, 1.8}, {2, -6, 3}};
   for (int i = 0; i < 3; i++) landmarks[i] = {10 + i, {places[i][0], places[i][1], places[i][2]}, 0.02, NAN, {}, 0};

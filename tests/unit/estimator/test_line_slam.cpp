@@ -45,7 +45,7 @@ double uniform(double from, double to) { return from + (to - from) * wm_random_n
 
 void begin(int method, bool rejoin = false) {
   slam = wm_estimator_find("slam");
-  wm_params_defaults(&wm_motion_params_table, &motion);
+  make::shared_defaults(&motion);
   wm_params_defaults(&slam->params, &params);
   params.line_clones = 24;
   params.line_method = method;

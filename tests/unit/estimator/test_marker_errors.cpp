@@ -85,9 +85,9 @@ double mean_nees() {
 
 void test_errors_that_last_are_not_averaged_away(void) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(5.0, mean_nees());
-  params.marker_lasting = kLasts_rad / std::sqrt(kFresh_rad * kFresh_rad + kLasts_rad * kLasts_rad);
-  params.lasting_slots = 8;
-  params.lasting_tau_s = kLasts_s;
+  params.marker_correlated = kLasts_rad / std::sqrt(kFresh_rad * kFresh_rad + kLasts_rad * kLasts_rad);
+  make::sightings.correlated_slots = 8;
+  make::sightings.correlated_tau_s = kLasts_s;
   const double told = mean_nees();
   TEST_ASSERT_LESS_THAN_DOUBLE(2.0, told);
   TEST_ASSERT_GREATER_THAN_DOUBLE(0.3, told);
@@ -97,7 +97,7 @@ void test_errors_that_last_are_not_averaged_away(void) {
 
 void setUp(void) {
   slam = wm_estimator_find("slam");
-  wm_params_defaults(&wm_motion_params_table, &motion);
+  make::shared_defaults(&motion);
   wm_params_defaults(&slam->params, &params);
   params.markers = 1;
   params.marker_sigma_m = kPlace_m;

@@ -104,7 +104,7 @@ void test_markers_with_two_poses_from_the_start_have_a_place_and_no_heading(void
 
 void test_landmarks_without_identity_are_told_apart(void) {
   nameless = true;
-  params.associate_unknown = 1;
+  make::sightings.use_unidentified = 1;
   params.associate_near_m = 2.0;
   begin();
   drive(40);
@@ -116,7 +116,7 @@ void test_landmarks_without_identity_are_told_apart(void) {
 
 void test_a_landmark_seen_twice_in_a_frame_without_identity_is_fused_once(void) {
   nameless = twice = true;
-  params.associate_unknown = 1;
+  make::sightings.use_unidentified = 1;
   params.associate_near_m = 2.0;
   begin();
   drive(40);

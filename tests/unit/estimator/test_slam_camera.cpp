@@ -12,7 +12,7 @@ double worst_of_leaning(double sigma_rad) {
   leans[0] = 0.03;
   leans[1] = -0.04;
   params.markers = 1;
-  params.sensor_states.sigma[WM_SENSOR_ROW_kRoll] = sigma_rad;
+  make::sightings.states.sigma[WM_SENSOR_ROW_kRoll] = sigma_rad;
   begin();
   drive(60);
   size_t found = 0;

@@ -100,8 +100,8 @@ void test_recovery_can_be_switched_off(void) {
 
 // Identities up to 2^31 - 1 have lasting errors of their own.
 void test_large_identities_keep_their_slots(void) {
-  params.lasting_slots = 4;
-  params.lasting_bearing_rad = 0.02;
+  make::sightings.correlated_slots = 4;
+  make::sightings.correlated_bearing_rad = 0.02;
   for (int i = 0; i < kCount; i++) known[i].id = INT32_MAX - i;
   params.map = WM_SLAM_MAP_EXTEND;
   begin();

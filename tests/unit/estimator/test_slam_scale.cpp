@@ -33,11 +33,11 @@ struct found {
 
 void make_room() {
   slam = wm_estimator_find("slam");
-  wm_params_defaults(&wm_motion_params_table, &motion);
+  make::shared_defaults(&motion);
   wm_params_defaults(&slam->params, &params);
-  params.motion.sigma[0] = kPrior;  // speed_scale
-  params.sensor_states.sigma[WM_SENSOR_ROW_kRangeScale] = kPrior;
-  params.sensor_states.sigma[WM_SENSOR_ROW_kYaw] = 0.05;
+  motion.states.sigma[0] = kPrior;  // speed_scale
+  make::sightings.states.sigma[WM_SENSOR_ROW_kRangeScale] = kPrior;
+  make::sightings.states.sigma[WM_SENSOR_ROW_kYaw] = 0.05;
   motion.noise_yaw_rate_radps = 0.03;
   sensor = make::sensor("camera", 0.005, 0.02);
   sensor.range_is_depth = 1;
@@ -167,9 +167,9 @@ worn drive_under_prints() {
 // GIVEN wheels known to 2 % and prints to 0.3 %, and sightings worse than they are told WHEN it is driven round and
 // round THEN the map is as large as both together say, the prints above all: it doesn't grow or shrink with the rounds.
 void test_a_map_under_prints_is_as_large_as_they_say(void) {
-  params.motion.sigma[0] = 0.0;
-  for (int i = 0; i < 3; i++) params.motion.sigma[wm::kLeftScale + i] = 0.02;  // left, right, track
-  params.sensor_states.sigma[WM_SENSOR_ROW_kRangeScale] = 0.003;
+  motion.states.sigma[0] = 0.0;
+  for (int i = 0; i < 3; i++) motion.states.sigma[wm::kLeftScale + i] = 0.02;  // left, right, track
+  make::sightings.states.sigma[WM_SENSOR_ROW_kRangeScale] = 0.003;
   params.markers = 1;
   params.marker_sigma_m = 0.0015;
   params.marker_sigma_rel = 0.0;
@@ -184,7 +184,7 @@ void test_a_map_under_prints_is_as_large_as_they_say(void) {
 
 // GIVEN a camera whose bearings are 0 beside its lens's axis WHEN it is driven THEN the angle between is found.
 void test_the_axis_of_depth_is_found(void) {
-  params.sensor_states.sigma[WM_SENSOR_ROW_kDepthAxis] = 0.05;
+  make::sightings.states.sigma[WM_SENSOR_ROW_kDepthAxis] = 0.05;
   for (double axis : {-0.04, 0.03}) {
     const found f = drive(7, axis);
     TEST_ASSERT_LESS_THAN_DOUBLE(0.01, f.axis_sigma);

@@ -79,9 +79,60 @@ static void a_removed_key_is_ignored_with_a_warning(void) {
 
 static void a_key_by_old_and_new_name_is_refused(void) {
   refused(HEAD "pole_filter:\n  gate: 4\n  gate_sigmas: 4\n",
-          "dir/x.yaml:5: pole_filter.gate_sigmas: 'gate' is given by its old name, too; keep one of them");
-  refused(HEAD "pole_filter:\n  states.places: 3\n  states: {slots: 3}\n",
-          "dir/x.yaml:5: pole_filter.states.slots: 'states.slots' is given by its old name, too; keep one of them");
+          "dir/x.yaml:5: pole_filter.gate_sigmas: 'pole_filter.gate' is given on line 4, too; keep one of them");
+  refused(
+      HEAD "pole_filter:\n  states.places: 3\n  states: {slots: 3}\n",
+      "dir/x.yaml:5: pole_filter.states.slots: 'pole_filter.states.slots' is given on line 4, too; keep one of them");
+}
+
+static double motion_param(int i) { return ((const double *)(const void *)config.motion)[i]; }
+static double sighting_param(int i) { return ((const double *)(const void *)config.sightings)[i]; }
+
+// A parameter that several estimators had is in a section of its own now.
+static void an_old_key_leads_to_another_section(void) {
+  parse(HEAD "pole_filter: {states: {scale_sigma: 0.3, yaw_walk_rad: 0.4, slots: 3}, lasting.tau_s: 5}\n");
+  TEST_ASSERT_EQUAL_DOUBLE(0.3, motion_param(2));
+  TEST_ASSERT_EQUAL_DOUBLE(0.4, sighting_param(1));
+  TEST_ASSERT_EQUAL_DOUBLE(5, sighting_param(0));
+  TEST_ASSERT_EQUAL(3, params()->slots);
+  TEST_ASSERT_EQUAL_STRING(
+      "dir/x.yaml:3: pole_filter.states.scale_sigma: is now 'motion.states.scale_sigma', and read as that\n"
+      "dir/x.yaml:3: pole_filter.states.yaw_walk_rad: is now 'sightings.states.yaw_walk_rad', and read as that\n"
+      "dir/x.yaml:3: pole_filter.lasting.tau_s: is now 'sightings.correlated.tau_s', and read as that\n",
+      config.warnings);
+  refused(HEAD "pole_filter: {states: {places_sigma: 1}}\n",
+          "dir/x.yaml:3: pole_filter.states.places_sigma: unknown key; known here: yaw_sigma_rad, slots, deep");
+  refused(HEAD "pole_filter: {lasting: {tau_s: 50}}\n",
+          "dir/x.yaml:3: pole_filter.lasting.tau_s: '50' is out of range; a number from 0 to 10 is needed");
+}
+
+// In whichever order they stand.
+static void both_sections_together_are_refused(void) {
+  refused(HEAD "motion:\n  states: {scale_sigma: 0.1}\npole_filter:\n  states: {scale_sigma: 0.3}\n",
+          "dir/x.yaml:6: pole_filter.states.scale_sigma: 'motion.states.scale_sigma' is given on line 4, too; keep one "
+          "of them");
+  refused(HEAD "pole_filter:\n  states: {scale_sigma: 0.3}\nmotion:\n  states: {scale_sigma: 0.1}\n",
+          "dir/x.yaml:6: motion.states.scale_sigma: 'motion.states.scale_sigma' is given on line 4, too; keep one of "
+          "them");
+}
+
+static void a_shared_parameter_that_the_estimator_does_not_take_is_warned_of(void) {
+  parse(HEAD "motion: {states: {lag_sigma_s: 0.2, scale_sigma: 0.1}}\n");
+  TEST_ASSERT_EQUAL_STRING("dir/x.yaml:3: motion.states.lag_sigma_s: estimator pole_filter does not take it\n",
+                           config.warnings);
+}
+
+// The section of an estimator that isn't chosen changes nothing of what the chosen one reads.
+static void an_old_key_of_another_estimator_is_not_taken(void) {
+  parse(
+      "format: waymark-config/1\nestimator: cloud_filter\npole_filter: {states: {scale_sigma: 0.3}}\n"
+      "motion: {states.scale_sigma: 0.1}\n");
+  TEST_ASSERT_EQUAL_DOUBLE(0.1, motion_param(2));
+  TEST_ASSERT_EQUAL_STRING(
+      "dir/x.yaml:3: pole_filter.states.scale_sigma: is now 'motion.states.scale_sigma', and not read of an estimator "
+      "that isn't chosen\n"
+      "dir/x.yaml:4: motion.states.scale_sigma: estimator cloud_filter does not take it\n",
+      config.warnings);
 }
 
 static void keep_line(void *context, const char *line) { (void)snprintf(context, 100, "%s", line); }
@@ -223,8 +274,7 @@ static void misspelt(void) {
       HEAD "something: 1\n",
       "dir/x.yaml:3: something: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
       "can_signals, devices, map, initial_pose, vision, start, black_box, publish, merge, commands, realtime, motion, "
-      "pole_filter, "
-      "cloud_filter");
+      "sightings, pole_filter, cloud_filter");
   refused(HEAD "pole_filter: {states: {other: 1}}\n",
           "dir/x.yaml:3: pole_filter.states.other: unknown key; known here: yaw_sigma_rad, slots, deep");
   refused("format: waymark-config/1\nestimator: pole_filtre\n",
@@ -330,6 +380,10 @@ int main(void) {
   RUN_TEST(a_renamed_key_is_read_with_a_warning);
   RUN_TEST(a_removed_key_is_ignored_with_a_warning);
   RUN_TEST(a_key_by_old_and_new_name_is_refused);
+  RUN_TEST(an_old_key_leads_to_another_section);
+  RUN_TEST(both_sections_together_are_refused);
+  RUN_TEST(a_shared_parameter_that_the_estimator_does_not_take_is_warned_of);
+  RUN_TEST(an_old_key_of_another_estimator_is_not_taken);
   RUN_TEST(warnings_come_line_by_line);
   RUN_TEST(many_warnings_are_cut);
   RUN_TEST(an_old_logs_configuration_is_read);

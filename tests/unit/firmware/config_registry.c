@@ -21,6 +21,9 @@ static const wm_param_old kOld[] = {
     {"states.places", "states.slots", "at most 16 by now"},
     {"walls.weight", "model", NULL},
     {"walls.image_share", NULL, "images are found by their number."},
+    {"states.*", "/motion.states.*", NULL},
+    {"states.*", "/sightings.states.*", NULL},
+    {"lasting.*", "/sightings.correlated.*", NULL},
     {NULL, NULL, NULL},
 };
 static const wm_param kOtherParams[] = {
@@ -28,9 +31,16 @@ static const wm_param kOtherParams[] = {
 };
 static const wm_param kMotionParams[] = {
     {"noise.speed_mps", WM_PARAM_F64, 0, 0.02, 0.0, 10.0, NULL, "Noise, m/s."},
+    {"states.lag_sigma_s", WM_PARAM_F64, sizeof(double), 0, 0, 1, NULL, "Lag, s."},
+    {"states.scale_sigma", WM_PARAM_F64, 2 * sizeof(double), 0, 0, 1, NULL, "Scale."},
+};
+static const wm_param kSightingParams[] = {
+    {"correlated.tau_s", WM_PARAM_F64, 0, 2, 0.0, 10.0, NULL, "Time constant, s."},
+    {"states.yaw_walk_rad", WM_PARAM_F64, sizeof(double), 0, 0.0, 10.0, NULL, "Walk, rad."},
 };
 
-const wm_param_table wm_motion_params_table = {kMotionParams, 1, sizeof(double), NULL};
+const wm_param_table wm_motion_params_table = {kMotionParams, 3, 3 * sizeof(double), NULL};
+const wm_param_table wm_sighting_params_table = {kSightingParams, 2, 2 * sizeof(double), NULL};
 const char *wm_motion_params_clash(const wm_motion_params *params, const char **key) {
   double noise;
   memcpy(&noise, params, sizeof noise);
@@ -48,6 +58,11 @@ static const wm_estimator *const kAll[] = {&kPole, &kCloud};
 const wm_estimator *const *wm_estimators(size_t *count) {
   *count = 2;
   return kAll;
+}
+
+// pole_filter takes all but the lag, cloud_filter nothing.
+int wm_estimator_reads(const wm_estimator *estimator, const char *key) {
+  return estimator == &kPole && strcmp(key, "motion.states.lag_sigma_s") != 0;
 }
 
 const wm_estimator *wm_estimator_find(const char *name) {

@@ -24,15 +24,15 @@ ESTIMATOR_NEVER = re.compile(
 
 # Inside estimator/: folder -> folders whose headers it may include (its own always). A detector includes no other detector
 # and no filter, a filter no other filter.
-SENSING = ["math", "memory", "sensors", "image", "vision"]
-FILTER = ["math", "memory", "motion", "maps", "sensors", "filters", "filters/core", "filters/planar", "filters/relocalize"]
+SENSING = ["", "math", "memory", "sensors", "image", "vision"]
+FILTER = ["", "math", "memory", "motion", "maps", "sensors", "filters", "filters/core", "filters/planar", "filters/relocalize"]
 FOLDER_MAY_USE = {
     "": [],
     "math": [],
     "memory": [],
-    "motion": ["math", "memory"],
+    "motion": ["", "math", "memory"],
     "maps": ["math", "memory"],
-    "sensors": ["math", "memory"],
+    "sensors": ["", "math", "memory"],
     "image": ["math", "memory", "sensors"],
     "vision": [],
     "vision/cascade": SENSING,

@@ -10,8 +10,8 @@
 
 const error_case kErrorCases[] = {
     // Configuration.
-    {CONFIG, "Parameter misspelt", FILE_, "landmark_ekf: {gaet: {hard: 20}}\n",
-     "config/robot.yaml:3: landmark_ekf.gaet: unknown key; did you mean 'landmark_ekf.gate'?"},
+    {CONFIG, "Parameter misspelt", FILE_, "sightings: {gaet: {hard: 20}}\n",
+     "config/robot.yaml:3: sightings.gaet: unknown key; did you mean 'sightings.gate'?"},
     {CONFIG, "Estimator's section misspelt", FILE_, "landmark_efk: {gate: {hard: 20}}\n",
      "config/robot.yaml:3: landmark_efk: unknown key; did you mean 'landmark_ekf'?"},
     {CONFIG, "Parameter in the wrong place", FILE_, "horizon_ms: 500\n",
@@ -19,15 +19,14 @@ const error_case kErrorCases[] = {
     {CONFIG, "Key that nobody knows", FILE_, "colour: red\n",
      "config/robot.yaml:3: colour: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
      "can_signals, devices, map, initial_pose, vision, start, black_box, publish, merge, commands, realtime, motion, "
-     "odometry, "
-     "landmark_ekf, edge_mcl, pf_edges, slam, "
+     "sightings, landmark_ekf, edge_mcl, pf_edges, slam, "
      "stereo_ekf"},
     {CONFIG, "CAN interface without its name", FILE_, "devices: {can: [{dbc: car.dbc, can_signals: s.yaml}]}\n",
      "config/robot.yaml:3: devices.can[0]: interface: is missing; `ip link` lists them"},
     {CONFIG, "CAN interface without its DBC", FILE_, "devices: {can: [{interface: can0}]}\n",
      "config/robot.yaml:3: devices.can[0]: dbc: is missing; name one here or at the top of the configuration"},
-    {CONFIG, "Text where a number is needed", FILE_, "landmark_ekf: {gate: {hard: abc}}\n",
-     "config/robot.yaml:3: landmark_ekf.gate.hard: 'abc' is not a number; a number from 1 to 1000000 is needed"},
+    {CONFIG, "Text where a number is needed", FILE_, "sightings: {gate: {hard: abc}}\n",
+     "config/robot.yaml:3: sightings.gate.hard: 'abc' is not a number; a number from 1 to 1000000 is needed"},
     {CONFIG, "Number in quotes", FILE_, "publish: {rate_hz: '50'}\n",
      "config/robot.yaml:3: publish.rate_hz: the text '50' is not a number; a number from 0.1 to 1000 is needed"},
     {CONFIG, "Number out of range", FILE_, "publish: {rate_hz: 5000}\n",

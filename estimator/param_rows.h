@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Rows of a table of parameters, for files that call their struct `params`.
-#ifndef WAYMARK_ESTIMATOR_FILTERS_PARAM_ROWS_H
-#define WAYMARK_ESTIMATOR_FILTERS_PARAM_ROWS_H
+#ifndef WAYMARK_ESTIMATOR_PARAM_ROWS_H
+#define WAYMARK_ESTIMATOR_PARAM_ROWS_H
 
 #include <stddef.h>
 
