@@ -56,10 +56,8 @@ void slam::forget_tracks() {
 wm_verdict slam::track_bearing(const context &at, double bearing_rad, double sigma_rad) {
   const wm_time_ns now = joint_.now_ns();
   bearing_tracks::track *track = tracks_.find(at.id, at.sensor);
-  if (!track) {
-    track = tracks_.begin(at.id, at.sensor);
-    track->first_ns = now;
-  }
+  if (!track) track = tracks_.begin(at.id, at.sensor, now);
+  if (!track) return WM_REJECTED_SEARCHING;
   track->last_ns = now;
   const int newest = tracks_.newest_clone(at.sensor);
   if (newest >= 0 && tracks_.find_clone(at.sensor, now) < 0) {
@@ -113,9 +111,10 @@ bool slam::join_line(const context &at, const bearing_tracks::track &track) {
 
 // ---- rays ----
 
-void slam::begin_ray(const context &at, double bearing_rad, double sigma_rad) {
-  bearing_tracks::track *track = tracks_.begin(at.id, at.sensor);
-  track->first_ns = track->last_ns = joint_.now_ns();
+// WM_REJECTED_SEARCHING: there is no place for another ray.
+wm_verdict slam::begin_ray(const context &at, double bearing_rad, double sigma_rad) {
+  bearing_tracks::track *track = tracks_.begin(at.id, at.sensor, joint_.now_ns());
+  if (!track) return WM_REJECTED_SEARCHING;
   const int clone = keep_clone(at);
   tracks_.add(track, clone, bearing_rad, sigma_rad, 1);
   const int state = ray_state(*track), error_state = lend(at);
@@ -129,7 +128,7 @@ void slam::begin_ray(const context &at, double bearing_rad, double sigma_rad) {
   joint_.assign(state, 1, &row, noise, &bearing_rad);
   const double middle = 0.5 / params_.line_near_m;  // from infinity (two sigmas below) to line_near_m (two above)
   joint_.forget(state + 1, middle, square(0.5 * middle));
-  track->misfits = 0;
+  return WM_FUSED;
 }
 
 void slam::end_ray(bearing_tracks::track *track) {

@@ -52,8 +52,8 @@ class bearing_tracks {
   void clear(int clones, int tracks);
   int index(const track &t) const { return (int)(&t - track_); }
   track *find(int32_t id, int sensor);
-  // A free track; the one not seen for longest where there is none.
-  track *begin(int32_t id, int sensor);
+  // A free track; else the one not observed for longest, NULL where all are in view.
+  track *begin(int32_t id, int sensor, wm_time_ns t_ns);
   static void end(track *t) { t->id = -1; }
   // Full (`most`): the bearing goes that was taken nearest to its neighbour, so that what is left sees from far apart.
   void add(track *t, int clone, double azimuth_rad, double sigma_rad, int most);

@@ -11,7 +11,6 @@ constexpr double kNear_m = 2.0;      // farther apart no two are compared
 constexpr double kGate = 9.21;       // 99 % of chi2 with two degrees of freedom
 constexpr double kSure_m2 = 0.01;    // so well is known where the two lie to each other that no other pair is asked
 constexpr double kUnsure_m2 = 0.25;  // so badly that nothing is said
-constexpr uint32_t kSeen = 10;       // sightings of each
 
 double nis_of(const double d[2], const double s[2][2]) {
   return (s[1][1] * d[0] * d[0] - 2.0 * s[0][1] * d[0] * d[1] + s[0][0] * d[1] * d[1]) /
@@ -22,7 +21,7 @@ double nis_of(const double d[2], const double s[2][2]) {
 
 bool slam::may_be_one(int fresh, int lost) const {
   const landmark_note &f = note(fresh), &l = note(lost);
-  if (fresh == lost || f.seen < kSeen || l.seen < kSeen || l.last_ns >= f.first_ns) return false;
+  if (fresh == lost || f.seen < kMergeSeen || l.seen < kMergeSeen || l.last_ns >= f.first_ns) return false;
   const int a = joint_.landmark_state(fresh), b = joint_.landmark_state(lost);
   return std::fabs(joint_.value(a) - joint_.value(b)) < kNear_m &&
          std::fabs(joint_.value(a + 1) - joint_.value(b + 1)) < kNear_m;

@@ -192,8 +192,7 @@ wm_status slam::begin_landmark(context at, const wm_sighting &s, const reading &
     verdict = track_bearing(at, s.bearing_rad, r.bearing_sigma_rad);
   else if (may_join) {
     if (bearing_tracks::track *ray = current_ray(at)) return follow_ray(at, ray, s.bearing_rad, r.bearing_sigma_rad);
-    begin_ray(at, s.bearing_rad, r.bearing_sigma_rad);
-    verdict = WM_FUSED;
+    verdict = begin_ray(at, s.bearing_rad, r.bearing_sigma_rad);
   }
   if (verdict == WM_FUSED) at.record.expected = at.record.observed;  // it defines the landmark
   return reject(at.records, at.record, verdict);

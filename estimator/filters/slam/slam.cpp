@@ -365,7 +365,10 @@ bool slam::make_room() {
 void slam::maintain_map(wm_time_ns t_ns) {
   if (joint_.landmarks() == 0 || params_.map == WM_SLAM_MAP_FROZEN || map_is_held()) return;
   cursor_ = (cursor_ + 1) % joint_.landmarks();
-  if (!is_confirmed(note(cursor_)) && wm_seconds_between(note(cursor_).last_ns, t_ns) > params_.leave_after_s)
+  const landmark_note &n = note(cursor_);
+  // A tracker's number does not come back: a line that was seen too rarely to be merged is never found again.
+  const bool is_kept = is_confirmed(n) && (!params_.line_rejoin || n.surveyed || n.seen >= kMergeSeen);
+  if (!is_kept && wm_seconds_between(n.last_ns, t_ns) > params_.leave_after_s)
     drop_landmark(cursor_);
   else if (params_.line_rejoin)
     merge_if_one(cursor_);

@@ -24,6 +24,8 @@
 namespace wm {
 
 inline constexpr int kSlamSensors = 8;
+// Observations of each of two lines that may be one (lines.rejoin): a false line rarely lasts a second. Not swept.
+inline constexpr uint32_t kMergeSeen = 10;
 
 // What is known of a landmark beside its place.
 struct landmark_note {
@@ -192,7 +194,7 @@ class slam {
   wm_verdict track_bearing(const context &at, double bearing_rad, double sigma_rad);
   bool join_line(const context &at, const bearing_tracks::track &track);
   bearing_tracks::track *current_ray(const context &at);
-  void begin_ray(const context &at, double bearing_rad, double sigma_rad);
+  wm_verdict begin_ray(const context &at, double bearing_rad, double sigma_rad);
   wm_verdict expect_ray(const context &at, const bearing_tracks::track &track, double bearing_rad, double sigma_rad,
                         landmark_rows *out);
   wm_status follow_ray(const context &at, bearing_tracks::track *track, double bearing_rad, double sigma_rad);

@@ -39,21 +39,23 @@ int fused, refused, waiting, told, lies;
 double renumbered_s;  // all lines are lost for 2 s and come back under other numbers so often; 0: never
 double moved_m;       // then each second one is another, so far beside it
 double jolt_rad;      // after 30 s the robot is turned by so much, and no wheel tells
+int shuffle;          // each look begins with another line, so many on; 0: always in order
 
 double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
 double uniform(double from, double to) { return from + (to - from) * wm_random_next_uniform(&noise); }
 
-void begin(int method, bool rejoin = false) {
+void begin(int method, bool rejoin = false, int clones = 24) {
   slam = wm_estimator_find("slam");
   make::shared_defaults(&motion);
   wm_params_defaults(&slam->params, &params);
-  params.line_clones = 24;
+  params.line_clones = clones;
   params.line_method = method;
   params.line_near_m = 1;
   params.line_parallax_rad = 0.2;
   params.line_step_m = 0.1;
   params.line_rejoin = rejoin;
   renumbered_s = moved_m = jolt_rad = 0.0;
+  shuffle = 0;
   noise = {7, 1, 0};
   for (int i = 0; i < kLines; i++) {
     const wm::sin_cos a = wm::sincos(wm::kTwoPi * i / kLines + 0.1);
@@ -116,12 +118,13 @@ outcome drive(double seconds, int lies_of_ten) {
     TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
     const int epoch = renumbered_s > 0.0 ? static_cast<int>(t_s / renumbered_s) : 0;
     const bool dark = epoch > 0 && t_s - epoch * renumbered_s < 2.0;
-    for (int i = 0; step % 5 == 0 && !dark && i < kLines; i++) {
+    for (int k = 0; step % 5 == 0 && !dark && k < kLines; k++) {
+      const int i = (k + shuffle * (step / 5)) % kLines;
       const double beside = epoch > 0 && i % 2 == 0 ? moved_m : 0.0;
       say(t_s, 10 + i + 100 * epoch,
           wm::atan2(place[i][1] - truth.y_m, place[i][0] + beside - truth.x_m) - truth.heading_rad + gauss(kSigma));
       // So many lies that they are their share of all.
-      for (int k = 0; k < 2; k++)
+      for (int twice = 0; twice < 2; twice++)
         if (uniform(0, 2) < lies_of_ten / (10.0 - lies_of_ten)) lie(t_s, static_cast<int>(uniform(0, 1000)));
     }
     const wm::arc a = wm::make_arc(0.02 * v, 0.02 * w);
@@ -199,6 +202,17 @@ void test_lost_lines_are_found_again(void) {
   }
 }
 
+// GIVEN more lines in view than rays (as in a hall after the lights failed: all are new) THEN those that have a ray
+// keep it until they are places, and the others follow: all lines come onto the map.
+void test_more_lines_than_rays(void) {
+  begin(WM_SLAM_LINE_INVERSE_DISTANCE, false, kLines / 2);
+  shuffle = 7;
+  const outcome o = drive(50, 0);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.15, o.largest_m);
+  TEST_ASSERT_LESS_THAN_DOUBLE(2 * M_PI / 180, o.largest_rad);
+  TEST_ASSERT_EQUAL(kLines, o.right);
+}
+
 double counted(wm_counter_kind kind) {
   wm_counter counters[16];
   const size_t n = slam->counters(state, counters, 16);
@@ -233,6 +247,7 @@ int main(void) {
   RUN_TEST(test_honest_sightings);
   RUN_TEST(test_six_of_ten_are_lies);
   RUN_TEST(test_lost_lines_are_found_again);
+  RUN_TEST(test_more_lines_than_rays);
   RUN_TEST(test_a_robot_that_is_turned_by_hand_keeps_its_map);
   std::free(state);
   return UNITY_END();
