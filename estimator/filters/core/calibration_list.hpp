@@ -17,24 +17,24 @@ class calibration_list {
     if (count_ < capacity_) put(nullptr, name, value, sigma);
     count_++;
   }
-  // "whose.what"; a name of somebody that is too long is cut.
-  void add(const char *whose, const char *what, double value, double sigma) {
-    if (count_ < capacity_) put(whose, what, value, sigma);
+  // "owner.name"; an owner that is too long is cut.
+  void add(const char *owner, const char *name, double value, double sigma) {
+    if (count_ < capacity_) put(owner, name, value, sigma);
     count_++;
   }
   size_t count() const { return count_; }
 
  private:
-  void put(const char *whose, const char *what, double value, double sigma) {
+  void put(const char *owner, const char *name, double value, double sigma) {
     wm_calibration_value &v = out_[count_];
     std::memset(&v, 0, sizeof v);
     char *end = v.name;
-    if (whose) {
-      const char *const cut = v.name + sizeof v.name - 2 - std::strlen(what);
-      while (*whose && end < cut) *end++ = *whose++;
+    if (owner) {
+      const char *const cut = v.name + sizeof v.name - 2 - std::strlen(name);
+      while (*owner && end < cut) *end++ = *owner++;
       *end++ = '.';
     }
-    while (*what) *end++ = *what++;
+    while (*name) *end++ = *name++;
     v.value = value;
     v.sigma = sigma;
   }

@@ -105,6 +105,7 @@ void landmark_ekf::begin_life(bool pose_known) {
   evidence_.begin(kStartWrong);
   observations_.clear();
   prior_count_ = 0;
+  vague_ns_ = WM_TIME_NONE;
   start_.close();
   if (pose_known) begin_start_test();
 }

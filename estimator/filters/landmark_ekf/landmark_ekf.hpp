@@ -89,7 +89,7 @@ class landmark_ekf {
   // Gates one or two components jointly, weakens or rejects, updates, writes the records. Returns the log Bayes factor
   // of "anywhere in clutter_volume" against "as expected". `usable` false: the source is known to be wrong.
   double fuse(residual *rows, int count, double clutter_volume, bool usable, record_list records);
-  wm_verdict update(residual *rows, int count, const gate_result &g, projection *first, double cross);
+  wm_verdict update(const residual *rows, int count, const gate_result &g, projection *first);
   bool passes(const gate_result &g, int dof) const;
   void fuse_elevation(residual bearing_then_own[2], const double *before, record_list records);
 

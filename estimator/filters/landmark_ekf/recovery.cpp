@@ -14,10 +14,10 @@ constexpr double kFoundWrongly_s = 60.0;  // lost again within this time: the re
 // Numbers that must agree with a pose that is found, two more than it has: three bearings always fit some pose. A pose
 // that contradicts the tracked one needs one more; one near a vague pose, whose three numbers count, that many more.
 constexpr int kNumbers = 5, kNumbersElsewhere = 6, kPoseNumbers = 3;
-constexpr double kRecent_s = 2.0;
+constexpr double kRecent_s = 2.0;  // a kidnapped robot's observations fit by chance in between
 // Kidnapped: the tracked pose explains less than one in so many observations, and the other pose is at least so far.
-constexpr int kFewOf = 3;
-constexpr double kElsewhere_m = 0.5, kElsewhere_rad = 0.2;
+constexpr int kFewOf = 3;                                   // one in three
+constexpr double kElsewhere_m = 0.5, kElsewhere_rad = 0.2;  // added to 3 sigma
 // Sigmas above which a pose is vague and a Kalman update far from linear: of the heading, and of the place over that of
 // one anywhere among the landmarks. It is searched for kVagueFor_s, and then updated nevertheless.
 constexpr double kVague_rad = 0.5, kVaguePlace = 0.5, kVagueFor_s = 5.0;

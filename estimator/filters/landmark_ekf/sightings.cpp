@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sighting, from the event to the rows of its update: validation, association, expectation, Jacobian, noise.
+// Constants were chosen on drawn crossings (waymark-montecarlo-landmarks) and not swept.
 #include "filters/landmark_ekf/landmark_ekf.hpp"
 #include "math/arc.hpp"
 
 namespace wm {
 namespace {
 
-constexpr double kClutterRange_m = 30.0;  // a false range lies anywhere within this
-constexpr double kOnSensor_m = 0.05;      // nearer to the sensor a landmark has no bearing
+constexpr double kClutterRange_m = 30.0;  // a false range lies anywhere within this; a factor of 10 is 2.3 nats
+constexpr double kOnSensor_m = 0.05;      // nearer to the sensor, a landmark has no bearing
 constexpr double kNear_m = 0.1;           // floor of a distance that an error across the line of sight is divided by
-constexpr double kBeyondRange = 1.5;      // times the sensor's range: landmarks farther away are not associated
+constexpr double kBeyondRange = 1.5;      // times the sensor's range; beyond, no landmark is associated
 constexpr double kClearlyBest = 0.5;      // of the soft gate: only a fit within this is associated
 
 // The second-order correction of a sighting for an uncertain position: bias and variance of its expectation
-// [Athans1968]. It matters after seconds of blind driving, when the position is uncertain by metres.
+// [Athans1968]. It matters after seconds of blind driving, with a position uncertain by metres.
 struct curvature {
   double bearing_rad, bearing_variance, range_m, range_variance, elevation_rad, elevation_variance;
 };
@@ -120,7 +121,7 @@ wm_verdict landmark_ekf::associate(const wm_event &event, sighting_context *out)
   return WM_FUSED;
 }
 
-// The one landmark that a sighting without identity fits: within half the gate, and no other within all of it.
+// The one landmark that a sighting without identity fits: within half the gate, and no other within the gate.
 int landmark_ekf::associate_nearest(const sighting_context &at) {
   const wm_sighting &s = *at.s;
   const mounted_sensor &sensor = sensor_[s.sensor];
@@ -182,8 +183,8 @@ void landmark_ekf::decay_tilt(wm_time_ns t_ns) {
   tilt_ns_ = t_ns;
 }
 
-// Adds to a row all that is wrong beside the pose: the sensor, the time-correlated error, the landmark's place, the
-// body's tilt. An error that is a state changes the expectation; one that is not adds to the noise.
+// Adds all errors beside the pose's to a row: the sensor's, the time-correlated one, the landmark's on the map, the
+// body's tilt. An error that is a state adds to the expectation, another one to the noise.
 void landmark_ekf::add_errors(const sighting_context &at, const lent_slots &lent, const double by[kCauses],
                               int error_offset, double error_size, residual *r) const {
   const int sensor = at.s->sensor;

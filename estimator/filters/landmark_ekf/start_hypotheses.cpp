@@ -24,7 +24,7 @@ constexpr double kEnd_m = 10.0, kEnd_s = 10.0;
 constexpr double kMatters_m = 0.3, kMatters_rad = 0.1;  // the update corrects a smaller difference
 // Fewest landmarks (fewer fit many poses) and bearings, and the share of them that must agree with "wrong".
 constexpr int kFewestLandmarks = 3, kFewestBearings = 6;
-constexpr double kAgreeing = 0.6;
+constexpr double kAgreeing = 0.6;     // share
 constexpr double kNever = -1e9;       // logarithm of the probability of a hypothesis that is not tested
 constexpr double kNearest_m2 = 0.01;  // squared distance below which a landmark has no bearing
 // Sigmas across the line of sight that widen the bearings' noise, m, one a step of Gauss-Newton: far from the solution
@@ -33,7 +33,7 @@ constexpr double kWidened_m[] = {1.0, 0.3, 0.1, 0.03, 0.0, 0.0, 0.0};
 
 // Capacities. Further landmarks and sensors are left out of the test.
 constexpr int kMostLandmarks = 12, kMostSensors = 4, kMostUnknowns = 3 + 2 * kMostLandmarks + kMostSensors;
-constexpr int kMostHypotheses = 2 + kMostLandmarks;
+constexpr int kMostHypotheses = 2 + kMostLandmarks;  // right, wrong, moved k
 
 struct bearing {
   wm_pose2 sensor;  // in the start's base_link

@@ -44,10 +44,9 @@ double landmark_ekf::fuse(residual *r, int count, double clutter_volume, bool us
     inflated_ns_ = now;
     filter_.scale_pose_sigmas(kScaleSigmas);
     filter_.project(r[0].row, &first);
-    if (count == 2) cross = filter_.project_onto(r[1].row, first);
   }
   wm_verdict verdict = usable && passes(g, count) ? WM_FUSED : WM_REJECTED_GATE;
-  if (verdict == WM_FUSED) verdict = update(r, count, g, &first, cross);
+  if (verdict == WM_FUSED) verdict = update(r, count, g, &first);
   for (int i = 0; i < count; i++) {
     put_gate(g, count, i == 0 ? s00 : s11, verdict, &r[i].record);
     records.add(r[i].record);
@@ -57,13 +56,15 @@ double landmark_ekf::fuse(residual *r, int count, double clutter_volume, bool us
 
 // Between the two gates the noise is inflated. While several observations misfit, the pose may move, but calibration
 // states are considered, not corrected [Schmidt1966].
-wm_verdict landmark_ekf::update(residual *r, int count, const gate_result &g, projection *first, double cross) {
+wm_verdict landmark_ekf::update(const residual *r, int count, const gate_result &g, projection *first) {
   if (r[0].row.missing > 0 || (count == 2 && r[1].row.missing > 0)) return WM_REJECTED_NUMERIC;
   const int kept = g.soft && evidence_.doubtful() ? calibration_states_ : kPoseStates;
   const double noise = r[0].noise * g.noise_scale;
+  const double left =
+      count < 2 ? 0.0
+                : filter_.innovation_left(r[1].row, r[1].innovation, *first, r[0].innovation, noise, kPoseStates, kept);
   if (!filter_.update(*first, r[0].innovation, noise, kPoseStates, kept)) return WM_REJECTED_NUMERIC;
   if (count == 2) {
-    const double left = r[1].innovation - cross / (first->variance + noise) * r[0].innovation;
     filter_.project(r[1].row, first);
     if (!filter_.update(*first, left, r[1].noise * g.noise_scale, kPoseStates, kept)) return WM_REJECTED_NUMERIC;
   }
@@ -71,8 +72,8 @@ wm_verdict landmark_ekf::update(residual *r, int count, const gate_result &g, pr
   return WM_FUSED;
 }
 
-// After its bearing, with the innovation that this left of it (`before`: the row's states before). It has a gate of its
-// own and is no evidence about the pose: a camera with a larger tilt than stated must not make the robot lost.
+// Fused after the bearing, with the innovation that this leaves (`before`: the row's states before). It has a gate of
+// its own and is no evidence about the pose: a larger tilt than stated must not make the robot lost.
 void landmark_ekf::fuse_elevation(residual bearing_then_own[2], const double *before, record_list records) {
   residual &r = bearing_then_own[1];
   for (int k = 0; k < r.row.count; k++) {

@@ -104,6 +104,14 @@ double planar_filter::project_onto(const planar_row &row, const projection &othe
   return sum;
 }
 
+double planar_filter::innovation_left(const planar_row &second, double innovation, const projection &first,
+                                      double first_innovation, double first_noise, int kept_from, int kept_to) const {
+  double cross = 0.0;  // H_second P H_first' over the states that the first update corrects
+  for (int k = 0; k < second.count; k++)
+    if (second.index[k] < kept_from || second.index[k] >= kept_to) cross += second.by[k] * first.gain[second.index[k]];
+  return innovation - cross / (first.variance + first_noise) * first_innovation;
+}
+
 bool planar_filter::update(const projection &projected, double innovation, double noise, int kept_from, int kept_to) {
   const double s = projected.variance + noise;
   if (!(s > 0.0) || !finite(s) || !finite(innovation)) return false;

@@ -61,14 +61,18 @@ class planar_filter : public planar_motion {
     return update(projected, innovation, noise, 0, 0);
   }
   // The same, but the states from `kept_from` up to `kept_to` keep their values: they are considered, not corrected
-  // (S. F. Schmidt, 1966). Joseph's form holds for any gain.
+  // [Schmidt1966]. Joseph's form holds for any gain.
   [[nodiscard]] bool update(const projection &projected, double innovation, double noise, int kept_from, int kept_to);
+  // What the update by a first row (its projection, innovation and noise) leaves of the innovation of a second row that
+  // was observed at the same time. Call it before that update; kept_from and kept_to as there.
+  double innovation_left(const planar_row &second, double innovation, const projection &first, double first_innovation,
+                         double first_noise, int kept_from = 0, int kept_to = 0) const;
 
   void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
   void inflate_pose(double variance_m2, double variance_rad2);
-  // It may as well be elsewhere: by `off`, of every state, with this probability.
+  // Covariance of a mixture: with this probability, the states differ by `off`.
   void add_chance(double probability, const double off[kMaxStates]);
-  // Scales the pose's sigmas; what it shares with other states keeps its correlation.
+  // Scales the pose's sigmas; correlations remain.
   void scale_pose_sigmas(double factor);
   // Fills mean, covariance and twist.
   void estimate(wm_estimate *out) const;
@@ -81,12 +85,13 @@ class planar_filter : public planar_motion {
   double variance(int state) const { return covariance(state, state); }
   int states() const { return n_; }
 
-  // x := factor x + noise, for a state that no other one's motion depends on (Gauss-Markov, lazily carried on).
+  // x := factor x + noise: a step of a Gauss-Markov process that the motion does not depend on.
   void fade(int state, double factor, double added_variance);
+  // Resets a state; its correlations are cut.
   void forget(int state, double value, double variance);
   // x += change and P = F P F' + added_variance, F the identity but for this state's row, which has `by` besides.
   void carry_state(int state, const planar_row &by, double change, double added_variance);
-  // The state becomes a copy of `from`, as unsure, correlated alike, and `added_variance` apart from it.
+  // The state becomes a clone of `from` with the same correlations, and an own variance beside.
   void copy_state(int state, int from, double added_variance);
 
  private:

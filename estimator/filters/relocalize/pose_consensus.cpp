@@ -8,7 +8,7 @@
 namespace wm {
 namespace {
 
-// With 40 % outliers one triple in five is clean: 100 triples miss all clean ones with a probability of 3e-11.
+// With 40 % outliers one triple in five has none: 100 triples all have some with a probability of 3e-11.
 constexpr int kHypotheses = 100;
 constexpr double kInlierChi2 = 11.345;  // 99 % quantile of chi2, 3 degrees of freedom
 constexpr double kInlierShare = 0.6;    // of the observations, at least, for a pose to be taken; not swept

@@ -24,7 +24,7 @@ constexpr double kHeightChi2 = 4.0, kHeightOfFew = 2.0;
 constexpr double kMarginChi2 = 9.0;  // the second best pose must be worse by this
 // Share of the observations that must agree; the lower one where at least kMany landmarks support the pose.
 constexpr double kAgreeing = 0.7, kAgreeingOfMany = 0.5;
-constexpr int kMany = 4;
+constexpr int kMany = 4;  // landmarks
 // With fewer landmarks, all of bearings, each must be observed from two places: one may be a false detection.
 constexpr int kFew = 3;
 constexpr double kRival = 0.85;        // a pose with this share of the best one's observations is as good

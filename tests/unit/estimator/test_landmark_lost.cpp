@@ -270,6 +270,32 @@ void test_a_second_landmark_seen_from_one_place_alone_is_not_enough(void) {
   TEST_ASSERT_TRUE(is_found());
 }
 
+// A vague pose is searched for, by what is known of it. One set anew is another pose: what was known before does not
+// count.
+void test_a_vague_pose_set_anew_is_searched_anew(void) {
+  setup.start.sigma_heading_rad = 1.0;
+  begin();
+  const auto verdict_of_a_sighting = [] {
+    const wm_event e = make::sighting(now_s, landmarks[0].id, 0.3, NAN);
+    wm_innovation records[8];
+    size_t count = 0;
+    TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &e, records, 8, &count));
+    TEST_ASSERT_EQUAL(1, count);
+    return records[0].verdict;
+  };
+  drive(0.5, 0);
+  TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, verdict_of_a_sighting());
+  drive(6.0, 0);
+  wm_event pose = make::empty(now_s, WM_EVENT_SET_POSE);
+  pose.as.set_pose.pose_map_base = {{truth.x_m, truth.y_m, 0},
+                                    {0, 0, wm::sin(0.5 * truth.heading_rad), wm::cos(0.5 * truth.heading_rad)}};
+  pose.as.set_pose.sigma_xy_m = 0.1;
+  pose.as.set_pose.sigma_heading_rad = 1.0;
+  size_t count = 0;
+  TEST_ASSERT_EQUAL(WM_OK, ekf->correct(state, &pose, nullptr, 0, &count));
+  TEST_ASSERT_EQUAL(WM_REJECTED_SEARCHING, verdict_of_a_sighting());
+}
+
 void test_two_landmarks_and_driving_are_enough(void) {
   begin_without_pose();
   drive(20, 2);
@@ -406,6 +432,7 @@ int main(void) {
   RUN_TEST(test_started_without_a_pose_three_bearings_are_enough);
   RUN_TEST(test_a_pose_found_by_a_moved_landmark_is_mended);
   RUN_TEST(test_a_second_landmark_seen_from_one_place_alone_is_not_enough);
+  RUN_TEST(test_a_vague_pose_set_anew_is_searched_anew);
   RUN_TEST(test_two_landmarks_and_driving_are_enough);
   RUN_TEST(test_a_known_place_and_an_unknown_heading);
   RUN_TEST(test_a_start_that_is_surer_than_right_is_told_and_mended);

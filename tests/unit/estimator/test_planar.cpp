@@ -160,6 +160,24 @@ void test_josephs_form_is_the_plain_one_at_the_best_gain(void) {
   }
 }
 
+// What an update leaves of a second innovation is by the states as they are then: considered ones have not moved.
+void test_the_second_innovation_by_the_corrected_states(void) {
+  for (const int kept_to : {3, 6}) {
+    make_busy_filter();
+    wm::planar_row row[2];
+    row[0].add(0, 1.0), row[0].add(2, 0.4), row[0].add(4, 0.7);
+    row[1].add(1, -0.8), row[1].add(2, 0.9), row[1].add(4, 0.5);
+    wm::projection first;
+    filter->project(row[0], &first);
+    const double left = filter->innovation_left(row[1], -0.05, first, 0.3, 0.01, 3, kept_to);
+    double by_states = -0.05;
+    for (int k = 0; k < row[1].count; k++) by_states += row[1].by[k] * filter->value(row[1].index[k]);
+    TEST_ASSERT_TRUE(filter->update(first, 0.3, 0.01, 3, kept_to));
+    for (int k = 0; k < row[1].count; k++) by_states -= row[1].by[k] * filter->value(row[1].index[k]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, by_states, left);
+  }
+}
+
 // Theorem (e.g. Bar-Shalom, Estimation with Applications, 2001, 7.2): with uncorrelated noises, updating by one row
 // after the other is the same as by all at once. Premise, asserted: the prior couples the two rows.
 void test_one_number_after_the_other_is_all_at_once(void) {
@@ -187,10 +205,10 @@ void test_one_number_after_the_other_is_all_at_once(void) {
     for (int i = 0; i < n; i++) row[k].add(i, h[k][i]);
   wm::projection first, second;
   filter->project(row[0], &first);
-  const double cross = filter->project_onto(row[1], first);
+  const double after_first = filter->innovation_left(row[1], z[1], first, z[0], r[0]);
   TEST_ASSERT_TRUE(filter->update(first, z[0], r[0]));
   filter->project(row[1], &second);
-  TEST_ASSERT_TRUE(filter->update(second, z[1] - cross / (first.variance + r[0]) * z[0], r[1]));
+  TEST_ASSERT_TRUE(filter->update(second, after_first, r[1]));
 
   for (int i = 0; i < n; i++) {
     double want = x[i];
@@ -257,6 +275,7 @@ int main(void) {
   RUN_TEST(test_kernels_and_their_scalar_twins_give_the_same_bits);
   RUN_TEST(test_prediction_carries_the_right_derivatives);
   RUN_TEST(test_josephs_form_is_the_plain_one_at_the_best_gain);
+  RUN_TEST(test_the_second_innovation_by_the_corrected_states);
   RUN_TEST(test_one_number_after_the_other_is_all_at_once);
   RUN_TEST(test_standing_still_teaches_the_gyros_bias);
   RUN_TEST(test_the_estimate_of_a_drive_has_its_twist);
