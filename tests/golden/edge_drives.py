@@ -43,8 +43,8 @@ def main():
         if number(out, "lost") > 0 or number(out, "with a false alarm") > 0:
             wrong.append("lost, or a false alarm")
         trials = number(out, "kidnap:")
-        if trials < DRIVES - 1 or number(out, "said within 5 s") < trials - 1:
-            wrong.append("carried away and did not say so")
+        if trials < DRIVES - 1 or number(out, "detected within 5 s") < trials - 1:
+            wrong.append("carried away and not detected")
         if number(out, "right within 20 m") < trials - 1:
             wrong.append("carried away and not found again")
         if number(out, "off by > 1 m for > 10 s") > 0:

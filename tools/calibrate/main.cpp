@@ -5,6 +5,7 @@
 
 #include "calibrate/commands.h"
 #include "common/failure.h"
+#include "common/program.h"
 
 int main(int argc, char **argv) {
   using namespace wm;
@@ -17,14 +18,7 @@ int main(int argc, char **argv) {
   const auto import = calibrate::import_command(*import_app);
   const auto camera = calibrate::camera_command(*camera_app);
   const auto mounting = calibrate::mounting_command(*mounting_app);
-  try {
-    app.parse(argc, argv);
+  return tools::run_program(app, argc, argv, [&] {
     return import_app->parsed() ? import() : mounting_app->parsed() ? mounting() : camera();
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? tools::kDone : tools::kUsage;
-  } catch (const std::exception &problem) {
-    std::fprintf(stderr, "waymark calibrate: %s\n", problem.what());
-    const auto *failure = dynamic_cast<const tools::Failure *>(&problem);
-    return failure != nullptr ? failure->exit_code : tools::kFailed;
-  }
+  });
 }

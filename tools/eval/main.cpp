@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "common/failure.h"
+#include "common/program.h"
 #include "common/recording_folder.h"
 #include "eval/compare.h"
 #include "eval/detector.h"
@@ -107,8 +108,7 @@ int main(int argc, char **argv) {
   Arguments arguments;
   CLI::App app("", "waymark eval");
   parse(&app, &arguments);
-  try {
-    app.parse(argc, argv);
+  return run_program(app, argc, argv, [&] {
     if (arguments.compare.from_s && arguments.compare.to_s && *arguments.compare.from_s >= *arguments.compare.to_s)
       throw Failure("--from must be before --to", kUsage);
     if (!arguments.detector.empty()) {
@@ -129,13 +129,5 @@ int main(int argc, char **argv) {
     const std::string text = arguments.json ? figures.dump(1) + "\n" : figures_table(figures, title, arguments.against);
     std::fputs(text.c_str(), stdout);
     return kDone;
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? kDone : kUsage;
-  } catch (const Failure &problem) {
-    std::fprintf(stderr, "waymark eval: %s\n", problem.what());
-    return problem.exit_code;
-  } catch (const std::exception &problem) {
-    std::fprintf(stderr, "waymark eval: %s\n", problem.what());
-    return kFailed;
-  }
+  });
 }

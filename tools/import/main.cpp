@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "common/failure.h"
+#include "common/program.h"
 #include "import/import.h"
 
 namespace {
@@ -45,14 +46,5 @@ int main(int argc, char **argv) {
       "Pictures become grey, which is what the robot reads.\n"
       "Exit code: 0 done, 1 the work failed, 2 usage.\n"
       "Example: waymark import phone.mp4 --camera front --out recordings/drive");
-  try {
-    app.parse(argc, argv);
-    return run(wish);
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? wm::tools::kDone : wm::tools::kUsage;
-  } catch (const std::exception &problem) {
-    std::fprintf(stderr, "waymark import: %s\n", problem.what());
-    const auto *failure = dynamic_cast<const Failure *>(&problem);
-    return failure != nullptr ? failure->exit_code : wm::tools::kFailed;
-  }
+  return wm::tools::run_program(app, argc, argv, [&] { return run(wish); });
 }

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "common/failure.h"
+#include "common/program.h"
 #include "common/yaml.h"
 #include "map/add_landmark.h"
 #include "map/check.h"
@@ -359,8 +360,7 @@ int main(int argc, char **argv) {
   parse_train(*train_app, train_arguments);
   parse_make(*make_app, make_arguments);
   parse_check(*check_app, check_arguments);
-  try {
-    app.parse(argc, argv);
+  return run_program(app, argc, argv, [&] {
     if (survey_app->parsed()) return survey(survey_arguments);
     if (look_app->parsed()) return look_at_picture(look_arguments) > 0 ? kDone : kFailed;
     if (add_app->parsed()) return add(add_arguments);
@@ -370,11 +370,5 @@ int main(int argc, char **argv) {
     }
     if (print_app->parsed()) return print_markers(print_arguments);
     return make_app->parsed() ? make(make_arguments) : check(check_arguments);
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? kDone : kUsage;
-  } catch (const std::exception &problem) {
-    std::fprintf(stderr, "waymark map: %s\n", problem.what());
-    const auto *failure = dynamic_cast<const Failure *>(&problem);
-    return failure != nullptr ? failure->exit_code : kFailed;
-  }
+  });
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The posterior Cramér-Rao bound of a simulated drive: the error that no estimator can go below, given what the sensors
-// say and how large the scenario says their errors are. docs/consistency.md derives it.
+// say and the scenario's standard deviations of their errors. docs/consistency.md derives it.
 #pragma once
 
 #include <functional>
@@ -35,7 +35,7 @@ struct SeenBearing {
 };
 
 // The same for bearings that a detector found in rendered pictures, each with its own sigma. Beside those above the
-// cameras' mounting (yaw, x, y) and their clock are unknown, as the scenario says; roll, pitch and intrinsics are taken
+// cameras' mounting (yaw, x, y) and their clock are unknown, as in the scenario; roll, pitch and intrinsics are taken
 // as known, which lowers the bound a little.
 std::vector<Bound> bound(const sim::Scenario &scenario, const Truth &truth, const std::vector<SeenBearing> &seen,
                          size_t landmarks, size_t cameras, const std::vector<double> &times_s);

@@ -12,6 +12,7 @@
 #include "common/csv.h"
 #include "common/event_log.h"
 #include "common/failure.h"
+#include "common/program.h"
 #include "common/recording_folder.h"
 #include "montecarlo/bound.h"
 
@@ -135,7 +136,7 @@ int main(int argc, char **argv) {
   std::string scenario, run_folder, recording;
   CLI::App app(
       "The error that no estimator can go below on a rendered drive past known landmarks, with the bearings (and their "
-      "sigmas) that a run's detector found in its pictures, and errors as large as the scenario says.",
+      "sigmas) that a run's detector found in its pictures, and errors as large as in the scenario.",
       "waymark-montecarlo-bound");
   app.add_option("SCENARIO", scenario, "scenario file (YAML) of the recording")->required();
   app.add_option("RUN", run_folder, "folder that `waymark replay` wrote")->required();
@@ -143,14 +144,5 @@ int main(int argc, char **argv) {
   app.footer(
       "example: waymark-montecarlo-bound config/worlds/crossing-easy.yaml out/run out/drive\n"
       "docs/consistency.md derives it. Exit code: 0 done, 1 failed, 2 usage.");
-  try {
-    app.parse(argc, argv);
-    return run(scenario, run_folder, recording);
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? wm::tools::kDone : wm::tools::kUsage;
-  } catch (const std::exception &problem) {
-    std::fprintf(stderr, "waymark-montecarlo-bound: %s\n", problem.what());
-    const auto *failure = dynamic_cast<const Failure *>(&problem);
-    return failure != nullptr ? failure->exit_code : wm::tools::kFailed;
-  }
+  return wm::tools::run_program(app, argc, argv, [&] { return run(scenario, run_folder, recording); });
 }

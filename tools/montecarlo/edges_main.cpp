@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "common/failure.h"
+#include "common/program.h"
 #include "common/statistics.h"
 #include "montecarlo/reliability.h"
 #include "montecarlo/trial.h"
@@ -71,7 +72,8 @@ void print_row(const Row &row) {
   } else {
     const auto cut_s = [](int64_t t) { return t == INT64_MIN ? 0.0 : std::fmod(1e-9 * static_cast<double>(t), 1000); };
     std::printf("%8s | %6.1f %6.1f | %6.2f | %6.2f | %6.1f | %5.2f\n", row.drive.c_str(), cut_s(row.trial.cut_ns),
-                cut_s(row.trial.on_ns), value(o.said_after_s()), value(o.right_after_m()), o.astray_s(), o.covered());
+                cut_s(row.trial.on_ns), value(o.detected_after_s()), value(o.right_after_m()), o.astray_s(),
+                o.covered());
   }
   std::fflush(stdout);
 }
@@ -80,23 +82,23 @@ void print_header(TrialKind kind) {
   if (kind == TrialKind::kNormal)
     std::printf("   drive |  mean m   max m | heading |  NEES |      | false alarms\n");
   else
-    std::printf("   drive |  cut s   on s | said s | right m | astray s | covered\n");
+    std::printf("   drive |  cut s   on s | lost s | right m | astray s | covered\n");
 }
 
 void print_summary(const std::string &name, const std::vector<Row> &rows) {
-  std::vector<double> mean, most, heading, nees, said, way;
-  size_t lost = 0, alarms = 0, said5 = 0, right20 = 0, astray = 0, covered = 0;
+  std::vector<double> mean, most, heading, nees, detected, way;
+  size_t lost = 0, alarms = 0, detected5 = 0, right20 = 0, astray = 0, covered = 0;
   for (const Row &r : rows) {
     const Outcome &o = r.outcome;
     mean.push_back(o.position_mean_m());
     most.push_back(o.position_max_m());
     heading.push_back(o.heading_mean_deg());
     nees.push_back(o.nees_inside());
-    said.push_back(value(o.said_after_s()));
+    detected.push_back(value(o.detected_after_s()));
     way.push_back(value(o.right_after_m()));
     lost += o.lost();
     alarms += o.false_alarms() > 0;
-    said5 += said.back() <= 5;
+    detected5 += detected.back() <= 5;
     right20 += way.back() <= 20;
     astray += o.astray_s() > 10;
     covered += o.covered() >= 0.95;
@@ -109,10 +111,10 @@ void print_summary(const std::string &name, const std::vector<Row> &rows) {
     std::printf("  %-34s mean %8.3f\n", "NEES inside 95 %", wm::tools::mean(nees));
     std::printf("  lost %zu, with a false alarm %zu\n", lost, alarms);
   } else {
-    spread("until it says so", "s", said);
+    spread("until detected", "s", detected);
     spread("way until it is right", "m", way);
-    std::printf("  said within 5 s %zu, right within 20 m %zu, tracking off by > 1 m for > 10 s %zu, covered %zu\n",
-                said5, right20, astray, covered);
+    std::printf("  detected within 5 s %zu, right within 20 m %zu, tracking off by > 1 m for > 10 s %zu, covered %zu\n",
+                detected5, right20, astray, covered);
   }
 }
 
@@ -188,14 +190,5 @@ int main(int argc, char **argv) {
   app.add_option("--diagram", a.diagram, "writes the reliability diagram of the probability of being lost here (SVG)");
   app.add_flag("--quiet", a.quiet, "the summaries alone");
   app.footer("docs/consistency.md defines each figure. Exit code: 0 done, 1 failed, 2 usage or configuration.");
-  try {
-    app.parse(argc, argv);
-    return run(a);
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? wm::tools::kDone : wm::tools::kUsage;
-  } catch (const std::exception &problem) {
-    std::fprintf(stderr, "waymark-montecarlo-edges: %s\n", problem.what());
-    const auto *failure = dynamic_cast<const Failure *>(&problem);
-    return failure != nullptr ? failure->exit_code : wm::tools::kFailed;
-  }
+  return wm::tools::run_program(app, argc, argv, [&] { return run(a); });
 }

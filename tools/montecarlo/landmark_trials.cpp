@@ -105,8 +105,8 @@ std::optional<double> driven_until_right(const sim::Recording &r, double from_s,
 
 }  // namespace
 
-const std::vector<Ordeal> &ordeals() {
-  static const std::vector<Ordeal> all = {
+const std::vector<LandmarkTrial> &landmark_trials() {
+  static const std::vector<LandmarkTrial> all = {
       {.name = "as-driven"},
       {.name = "start", .start = true},
       {.name = "start-false", .start = true, .false_share = 0.3},
@@ -151,9 +151,9 @@ sim::Recording LandmarkWorld::record(const sim::Faults &faults) {
   return film_.recording;
 }
 
-sim::Recording LandmarkWorld::drive(const Ordeal &ordeal, double *at_s) {
+sim::Recording LandmarkWorld::drive(const LandmarkTrial &trial, double *at_s) {
   sim::Recording out = driven_;
-  if (ordeal.kidnap) {
+  if (trial.kidnap) {
     sim::Faults faults = film_.scenario.faults;
     const double end = driven_.duration_s;
     for (uint64_t n = 0; n < 200; n++) {
@@ -170,16 +170,16 @@ sim::Recording LandmarkWorld::drive(const Ordeal &ordeal, double *at_s) {
   // Faults of detectors come on top of what was seen rightly.
   sim::Scenario more = film_.scenario;
   more.faults = {};
-  more.faults.sightings_false = ordeal.false_share;
-  more.faults.sightings_misread = ordeal.misread_share;
-  if (ordeal.landmarks > 0) {
+  more.faults.sightings_false = trial.false_share;
+  more.faults.sightings_misread = trial.misread_share;
+  if (trial.landmarks > 0) {
     std::vector<int32_t> ids = seen_most(out);
-    ids.resize(std::min(ids.size(), static_cast<size_t>(ordeal.landmarks)));
+    ids.resize(std::min(ids.size(), static_cast<size_t>(trial.landmarks)));
     keep_only(ids, out);
   }
-  if (ordeal.moved > 0) {
+  if (trial.moved > 0) {
     keep_only(seen_most(out), out);  // only landmarks that are seen can be found to have moved
-    more.faults.landmarks_moved = ordeal.moved;
+    more.faults.landmarks_moved = trial.moved;
     more.faults.landmarks_moved_m = 1.5;
     sim::move_landmarks(more, out);
   }
@@ -187,24 +187,24 @@ sim::Recording LandmarkWorld::drive(const Ordeal &ordeal, double *at_s) {
   return out;
 }
 
-LandmarkOutcome run_ordeal(LandmarkWorld &world, const wm_config &config, const Ordeal &ordeal) {
+LandmarkOutcome run_landmark_trial(LandmarkWorld &world, const wm_config &config, const LandmarkTrial &trial) {
   wm_error error{};
   double at_s = NAN;
-  const sim::Recording recording = world.drive(ordeal, &at_s);
+  const sim::Recording recording = world.drive(trial, &at_s);
   std::vector<SmallEvent> events;
   check(make_events(recording, events, &error), error, "events");
   SimulatedFilter filter(config, recording, world.scenario().robot.wheels);
-  double from_s = ordeal.kidnap ? at_s : 0, begin_s = 0;
-  if (ordeal.start) {
+  double from_s = trial.kidnap ? at_s : 0, begin_s = 0;
+  if (trial.start) {
     begin_s = moving_at(recording, 2, 0, recording.duration_s - kWayAhead_s).value_or(0);
     from_s = begin_s;
     wm_start &start = filter.start();
     start.p_m[0] = start.p_m[1] = start.heading_rad = NAN;
   }
-  if (ordeal.start_off_m > 0) {
+  if (trial.start_off_m > 0) {
     const double direction = 2 * sim::kPi * wm_random_uniform(recording.seed, kPlaces + 3, 0);
-    filter.start().p_m[0] += ordeal.start_off_m * std::cos(direction);
-    filter.start().p_m[1] += ordeal.start_off_m * std::sin(direction);
+    filter.start().p_m[0] += trial.start_off_m * std::cos(direction);
+    filter.start().p_m[1] += trial.start_off_m * std::sin(direction);
     filter.start().sigma_xy_m = 0.05;
   }
   check(filter.init(&error), error, "init");
@@ -231,7 +231,8 @@ LandmarkOutcome run_ordeal(LandmarkWorld &world, const wm_config &config, const 
     wm_estimate estimate{};
     filter.ops().estimate(filter.state(), &estimate);
     const bool astray = estimate.state == WM_STATE_LOST || estimate.state == WM_STATE_SEARCHING;
-    if (ordeal.kidnap && astray && !out.said_after_s && t_s >= first_view_s) out.said_after_s = t_s - first_view_s;
+    if (trial.kidnap && astray && !out.detected_after_s && t_s >= first_view_s)
+      out.detected_after_s = t_s - first_view_s;
     if (t_s < look_s || estimate.t_ns == WM_TIME_NONE) continue;
     look_s = t_s + kLook_s;
     const Sample s = judge.look(estimate);
@@ -242,15 +243,15 @@ LandmarkOutcome run_ordeal(LandmarkWorld &world, const wm_config &config, const 
   const double n = static_cast<double>(std::max<size_t>(1, out.outcome.samples.size()));
   out.rms_m = std::sqrt(squares_m / n);
   out.rms_deg = std::sqrt(squares_deg / n);
-  std::vector<Sample> told = out.outcome.samples;
-  if (ordeal.kidnap && out.said_after_s)
-    std::erase_if(told, [&](const Sample &s) { return from_s + s.t_s < first_view_s + *out.said_after_s; });
-  out.wrong_s = longest(told, confidently_wrong);
-  if (ordeal.start || ordeal.kidnap) out.right_after_s = driven_until_right(recording, from_s, out.outcome.samples);
+  std::vector<Sample> judged = out.outcome.samples;
+  if (trial.kidnap && out.detected_after_s)
+    std::erase_if(judged, [&](const Sample &s) { return from_s + s.t_s < first_view_s + *out.detected_after_s; });
+  out.wrong_s = longest(judged, confidently_wrong);
+  if (trial.start || trial.kidnap) out.right_after_s = driven_until_right(recording, from_s, out.outcome.samples);
   const wm_counter moved = filter.counter(WM_COUNTER_LANDMARKS_MOVED);
-  out.told_moved = static_cast<double>(moved.count);
+  out.reported_moved = static_cast<double>(moved.count);
   const int32_t last = moved.landmark_id;
-  out.right_moved =
+  out.rightly_named =
       std::any_of(recording.moved.begin(), recording.moved.end(), [last](int32_t id) { return last == id; });
   return out;
 }

@@ -88,7 +88,7 @@ def only_one(drive, landmark, folder):
 
 
 def without_pose(drive, folder):
-    """The same drive, whose recording doesn't say where it starts."""
+    """The same drive, whose recording has no start."""
     folder.mkdir()
     for file in drive.iterdir():
         if file.name != "recording.yaml":
@@ -135,13 +135,13 @@ def found_itself(run, drive, from_ns=0):
 
 
 def false_alarm(run, drive):
-    """Whether it ever said that it is lost, or searched, while its pose was within 0.3 m."""
+    """Whether its state was ever lost or searching while its pose was within 0.3 m."""
     return any(not tracks(state) and off < 0.3 for _, _, state, off, _ in looks(run, drive))
 
 
 def carried(a, drive, seed, scratch):
-    """Set down elsewhere: seconds from the first view there until it says so (none: never; not asked if no landmark is seen there),
-    seconds of driving until it is right again, and for how long, from when it said so, it was sure of a wrong place."""
+    """Set down elsewhere: seconds from the first view there until its state is lost or searching (none: never; not asked if no landmark is seen there),
+    seconds of driving until it is right again, and for how long, from then on, it was confidently wrong."""
     cut = carried_off.seam(drive, seed)
     view_s = cut and carried_off.first_view(drive, *cut)
     if view_s is None:
@@ -150,10 +150,10 @@ def carried(a, drive, seed, scratch):
     carried_off.carry_off(drive, folder, *cut)
     replay(a, folder, a.config, run, "--seed", seed)
     view_ns = cut[0] + int(1e9 * view_s)
-    said_ns = next((t_ns for t_ns, _, state, _, _ in looks(run, folder, cut[0]) if not tracks(state) and t_ns >= view_ns), None)
+    detected_ns = next((t_ns for t_ns, _, state, _, _ in looks(run, folder, cut[0]) if not tracks(state) and t_ns >= view_ns), None)
     right, _ = found_itself(run, folder, cut[0])
-    _, wrong_s = found_itself(run, folder, cut[0] if said_ns is None else said_ns)
-    return {"said_s": None if said_ns is None else 1e-9 * (said_ns - view_ns), "right_s": right, "wrong_s": wrong_s}
+    _, wrong_s = found_itself(run, folder, cut[0] if detected_ns is None else detected_ns)
+    return {"detected_s": None if detected_ns is None else 1e-9 * (detected_ns - view_ns), "right_s": right, "wrong_s": wrong_s}
 
 
 def judge(a, scenario, drive, seed):
@@ -248,9 +248,9 @@ def summary(rows):
     kidnaps = [r["kidnap"] for r in rows if r.get("kidnap")]
     if kidnaps:
         text += (
-            f"\nset down elsewhere, seconds from the first view until it says so: {until([k['said_s'] for k in kidnaps])}"
+            f"\nset down elsewhere, seconds from the first view until detected: {until([k['detected_s'] for k in kidnaps])}"
             f"\n  seconds of driving until right again: {until([k['right_s'] for k in kidnaps])}; sure of a wrong place for more than "
-            f"0.5 s after it said so: {sum(k['wrong_s'] > 0.5 for k in kidnaps)}"
+            f"0.5 s after the detection: {sum(k['wrong_s'] > 0.5 for k in kidnaps)}"
         )
     ones = [r for r in rows if "one" in r]
     if ones:

@@ -12,6 +12,7 @@
 #include <map>
 
 #include "common/failure.h"
+#include "common/program.h"
 #include "common/statistics.h"
 #include "montecarlo/landmark_trials.h"
 #include "montecarlo/reliability.h"
@@ -77,30 +78,32 @@ void print_row(const std::string &name, const Outcomes &all) {
 }
 
 void print_found(const std::string &name, const Outcomes &all, bool kidnapped) {
-  std::vector<double> said, right;
-  size_t said5 = 0, right5 = 0;
+  std::vector<double> detected, right;
+  size_t detected5 = 0, right5 = 0;
   for (const LandmarkOutcome &o : all) {
-    said.push_back(o.said_after_s.value_or(NAN));
+    detected.push_back(o.detected_after_s.value_or(NAN));
     right.push_back(o.right_after_s.value_or(NAN));
-    said5 += said.back() <= 5;
+    detected5 += detected.back() <= 5;
     right5 += right.back() <= 5;
   }
   std::printf("%s: right after %s s of driving (median, 90 %%, worst), within 5 s %zu of %zu", name.c_str(),
               spread(right).c_str(), right5, all.size());
   if (kidnapped)
-    std::printf("; says so %s s after the first view, within 5 s %zu of %zu", spread(said).c_str(), said5, all.size());
+    std::printf("; detected %s s after the first view, within 5 s %zu of %zu", spread(detected).c_str(), detected5,
+                all.size());
   std::printf("\n");
 }
 
 void print_moved(const std::string &name, const Outcomes &all) {
-  size_t seen = 0, told = 0, named = 0;
+  size_t seen = 0, reported = 0, named = 0;
   for (const LandmarkOutcome &o : all) {
     seen += o.moved_seen >= 20;
-    told += o.moved_seen >= 20 && o.told_moved > 0;
-    named += o.moved_seen >= 20 && o.told_moved > 0 && o.right_moved;
+    reported += o.moved_seen >= 20 && o.reported_moved > 0;
+    named += o.moved_seen >= 20 && o.reported_moved > 0 && o.rightly_named;
   }
-  std::printf("%s: a moved landmark was seen 20 times or more in %zu drives; told in %zu, by its name in %zu\n",
-              name.c_str(), seen, told, named);
+  std::printf(
+      "%s: a moved landmark was seen 20 times or more in %zu drives; reported in %zu, with its identity in %zu\n",
+      name.c_str(), seen, reported, named);
 }
 
 void print_cost(const std::map<std::string, Outcomes> &all) {
@@ -115,9 +118,9 @@ void print_cost(const std::map<std::string, Outcomes> &all) {
     if (const auto at = all.find(name); at != all.end())
       std::printf("%s: RMS over all drives %.4f m, as driven %.4f m: %+.1f %%\n", name, pooled(at->second),
                   pooled(plain->second), 100 * (pooled(at->second) / pooled(plain->second) - 1));
-  size_t told = 0;
-  for (const LandmarkOutcome &o : plain->second) told += o.told_moved > 0;
-  std::printf("as-driven: told that a landmark was moved in %zu of %zu\n", told, plain->second.size());
+  size_t reported = 0;
+  for (const LandmarkOutcome &o : plain->second) reported += o.reported_moved > 0;
+  std::printf("as-driven: a landmark was reported as moved in %zu of %zu\n", reported, plain->second.size());
 }
 
 void write_looks(const std::string &file, const std::map<std::string, Outcomes> &all) {
@@ -141,15 +144,15 @@ int run(const Arguments &a) {
   if (wm::sim::load_scenario(a.scenario, scenario, &error) != WM_OK) throw Failure(error.text, wm::tools::kUsage);
   if (wm_config_load(a.config.c_str(), &config, &error) != WM_OK) throw Failure(error.text, wm::tools::kUsage);
   std::fputs(config.warnings, stderr);
-  std::vector<Ordeal> wanted;
-  for (const Ordeal &o : ordeals())
+  std::vector<LandmarkTrial> wanted;
+  for (const LandmarkTrial &o : landmark_trials())
     if (a.kinds.empty() || std::find(a.kinds.begin(), a.kinds.end(), o.name) != a.kinds.end()) wanted.push_back(o);
   std::map<std::string, Outcomes> all;
   Reliability reliability;
   for (uint64_t i = 0; i < a.drives; i++) {
     LandmarkWorld world(scenario, a.first + i);
-    for (const Ordeal &o : wanted) {
-      all[o.name].push_back(run_ordeal(world, config, o));
+    for (const LandmarkTrial &o : wanted) {
+      all[o.name].push_back(run_landmark_trial(world, config, o));
       const std::string name = o.name;
       if (name == "as-driven" || name == "kidnap" || name == "start") reliability.take(all[name].back().outcome);
     }
@@ -160,9 +163,9 @@ int run(const Arguments &a) {
               a.config.c_str(), a.drives);
   wm_config_free(&config);
   print_header();
-  for (const Ordeal &o : wanted) print_row(o.name, all[o.name]);
+  for (const LandmarkTrial &o : wanted) print_row(o.name, all[o.name]);
   std::printf("\n");
-  for (const Ordeal &o : wanted) {
+  for (const LandmarkTrial &o : wanted) {
     if (o.start || o.kidnap) print_found(o.name, all[o.name], o.kidnap);
     if (o.moved > 0) print_moved(o.name, all[o.name]);
   }
@@ -182,7 +185,7 @@ int main(int argc, char **argv) {
       "carried off, with false detections, wrong identities, moved landmarks, and few of them.",
       "waymark-montecarlo-landmarks");
   std::vector<std::string> names;
-  for (const Ordeal &o : ordeals()) names.emplace_back(o.name);
+  for (const LandmarkTrial &o : landmark_trials()) names.emplace_back(o.name);
   app.add_option("SCENARIO", a.scenario, "scenario file (YAML)")->required();
   app.add_option("--config", a.config, "configuration of the estimator")->required();
   app.add_option("--trials", a.kinds, "which; all if not given")->delimiter(',')->check(CLI::IsMember(names));
@@ -193,14 +196,5 @@ int main(int argc, char **argv) {
   app.footer(
       "example: waymark-montecarlo-landmarks config/worlds/crossing-easy.yaml --config config/crossing-cameras.yaml\n"
       "docs/consistency.md defines each figure. Exit code: 0 done, 1 failed, 2 usage or configuration.");
-  try {
-    app.parse(argc, argv);
-    return run(a);
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? wm::tools::kDone : wm::tools::kUsage;
-  } catch (const std::exception &problem) {
-    std::fprintf(stderr, "waymark-montecarlo-landmarks: %s\n", problem.what());
-    const auto *failure = dynamic_cast<const Failure *>(&problem);
-    return failure != nullptr ? failure->exit_code : wm::tools::kFailed;
-  }
+  return wm::tools::run_program(app, argc, argv, [&] { return run(a); });
 }

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "common/failure.h"
+#include "common/program.h"
 #include "montecarlo/montecarlo.h"
 #include "simulate/angle.h"
 
@@ -186,19 +187,11 @@ wm_status load_and_run(const Arguments &a, wm_error *err) {
 
 int main(int argc, char **argv) {
   CLI::App app("", "waymark-montecarlo");
-  try {
-    Arguments arguments;
-    parse(&app, &arguments);
-    app.parse(argc, argv);
+  Arguments arguments;
+  parse(&app, &arguments);
+  return wm::tools::run_program(app, argc, argv, [&arguments] {
     wm_error err{};
-    const wm_status status = load_and_run(arguments, &err);
-    if (status == WM_OK) return wm::tools::kDone;
-    std::fprintf(stderr, "waymark-montecarlo: %s\n", err.text[0] ? err.text : wm_status_text(status));
-    return status == WM_BAD_CONFIG || status == WM_NOT_FOUND ? wm::tools::kUsage : wm::tools::kFailed;
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? wm::tools::kDone : wm::tools::kUsage;
-  } catch (const std::exception &problem) {
-    std::fprintf(stderr, "waymark-montecarlo: %s\n", problem.what());
-    return wm::tools::kFailed;
-  }
+    wm::tools::need_ok(load_and_run(arguments, &err), err);
+    return wm::tools::kDone;
+  });
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many simulated drives of one scenario through one estimator, in this process: is it as good as it says (consistency),
-// and how near does it come to what is possible at all (efficiency)? docs/consistency.md.
+// Many simulated drives of one scenario through one estimator, in this process: are its errors as large as its
+// covariance (consistency), and how near does it come to what is possible at all (efficiency)? docs/consistency.md.
 #pragma once
 
 #include <cstddef>

@@ -17,7 +17,7 @@ void Reliability::take(const Outcome &outcome) {
     const double was = s.error_m > 0.5 || s.error_rad > 0.2618 ? 1 : 0;
     Bin &bin = bins_[static_cast<size_t>(std::min(kBins - 1, static_cast<int>(p * kBins)))];
     bin.count++;
-    bin.said += p;
+    bin.stated += p;
     bin.was += was;
     squares_ += (p - was) * (p - was);
     count_++;
@@ -26,9 +26,9 @@ void Reliability::take(const Outcome &outcome) {
 
 void Reliability::print() const {
   if (count_ == 0) return;
-  std::printf("probability of being lost: said, was, of so many looks (score %.4f)\n", brier());
+  std::printf("probability of being lost: stated, observed share, looks (score %.4f)\n", brier());
   for (const Bin &bin : bins_)
-    if (bin.count > 0) std::printf("  %5.3f  %5.3f  %8.0f\n", bin.said / bin.count, bin.was / bin.count, bin.count);
+    if (bin.count > 0) std::printf("  %5.3f  %5.3f  %8.0f\n", bin.stated / bin.count, bin.was / bin.count, bin.count);
 }
 
 void Reliability::draw(const std::string &file) const {
@@ -54,17 +54,17 @@ void Reliability::draw(const std::string &file) const {
   std::string way;
   for (const Bin &bin : bins_) {
     if (bin.count == 0) continue;
-    const double said = bin.said / bin.count, was = bin.was / bin.count;
+    const double stated = bin.stated / bin.count, was = bin.was / bin.count;
     char point[60];
-    std::snprintf(point, sizeof point, "%c%.1f %.1f", way.empty() ? 'M' : 'L', x(said), y(was));
+    std::snprintf(point, sizeof point, "%c%.1f %.1f", way.empty() ? 'M' : 'L', x(stated), y(was));
     way += point;
     print(
         "<circle cx=\"%.1f\" cy=\"%.1f\" r=\"%.1f\" fill=\"#0072b2\" fill-opacity=\".7\"><title>%.0f "
         "looks</title></circle>\n",
-        x(said), y(was), 2 + 1.5 * std::log10(bin.count), bin.count);
+        x(stated), y(was), 2 + 1.5 * std::log10(bin.count), bin.count);
   }
   print("<path d=\"%s\" stroke=\"#0072b2\" stroke-width=\"2\" fill=\"none\"/>\n", way.c_str());
-  print("<text x=\"%.1f\" y=\"440\" text-anchor=\"middle\">probability of being lost, as said</text>\n", x(0.5));
+  print("<text x=\"%.1f\" y=\"440\" text-anchor=\"middle\">probability of being lost, as stated</text>\n", x(0.5));
   print("<text transform=\"translate(16 %.1f) rotate(-90)\" text-anchor=\"middle\">share in which it was</text>\n",
         y(0.5));
   print("<text x=\"%.1f\" y=\"20\">%.0f looks, a tenth of a second each; score %.4f</text>\n</svg>\n", x(0), count_,

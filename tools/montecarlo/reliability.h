@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Is a probability right? Of all times at which the filter said "lost with p", the share in which it was.
+// Is a probability right? Of all times at which the filter's lost_probability was p, the share in which it was.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@ class Reliability {
  private:
   static constexpr int kBins = 10;
   struct Bin {
-    double count = 0, said = 0, was = 0;
+    double count = 0, stated = 0, was = 0;
   };
   std::array<Bin, kBins> bins_;
   double squares_ = 0, count_ = 0;

@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "common/failure.h"
+#include "common/program.h"
 #include "common/statistics.h"
 #include "montecarlo/slam_trials.h"
 
@@ -33,17 +34,17 @@ double percentile_of(const std::vector<SlamOutcome> &all, double percent, double
 
 void print_each(const char *name, const SlamOutcome &o) {
   std::printf("%-12s %3" PRIu64
-              ": cut %5.1f s by %4.1f m %4.0f deg, told %5.1f, right %5.1f, alarms %d, wrong %4.1f s, end %6.3f m, "
+              ": cut %5.1f s by %4.1f m %4.0f deg, detected %5.1f, right %5.1f, alarms %d, wrong %4.1f s, end %6.3f m, "
               "map %.3f -> %.3f m\n",
-              name, o.seed, o.cut_s, o.moved_m, o.turned_rad * 57.3, o.told_after_s.value_or(NAN),
+              name, o.seed, o.cut_s, o.moved_m, o.turned_rad * 57.3, o.detected_after_s.value_or(NAN),
               o.right_after_s.value_or(NAN), o.alarms, o.wrong_s, o.end_m, o.map_before_m, o.map_after_m);
 }
 
 void print_row(const char *name, const std::vector<SlamOutcome> &all) {
-  size_t told = 0, right = 0, alarms = 0, wrong = 0, looks = 0, inside = 0;
+  size_t detected = 0, right = 0, alarms = 0, wrong = 0, looks = 0, inside = 0;
   double longest = 0;
   for (const SlamOutcome &o : all) {
-    told += o.told_after_s.value_or(1e9) <= 5;
+    detected += o.detected_after_s.value_or(1e9) <= 5;
     right += o.right_after_s.value_or(1e9) <= 20;
     alarms += o.alarms > 0;
     wrong += o.wrong_s > 10;
@@ -56,7 +57,7 @@ void print_row(const char *name, const std::vector<SlamOutcome> &all) {
   const auto after_m = [](const SlamOutcome &o) { return o.map_after_m; };
   const bool undisturbed = std::strcmp(name, "as-driven") == 0;
   char found[60] = "   -      -   ";
-  if (!undisturbed) std::snprintf(found, sizeof found, "%3zu    %3zu  ", told, right);
+  if (!undisturbed) std::snprintf(found, sizeof found, "%3zu    %3zu  ", detected, right);
   std::printf("%-12s | %3zu    | %s| %s | %3zu (%5.1f s)  | %.3f  %.3f  | %.3f -> %.3f  %.3f | %.3f\n", name,
               all.size(), found, undisturbed ? std::to_string(alarms).c_str() : "-", wrong, longest,
               percentile_of(all, 50, end_m), percentile_of(all, 100, end_m), percentile_of(all, 50, before_m),
@@ -77,7 +78,7 @@ int run(const Arguments &a) {
   std::printf(
       "%s, %s, seeds %" PRIu64 " to %" PRIu64
       "\n\n"
-      "             |        | told   right | with   | wrong for     | error at the  | map error, median, m  | NEES\n"
+      "             |        | lost   right | with   | wrong for     | error at the  | map error, median, m  | NEES\n"
       "             | drives | in 5 s in 20 | alarms | > 10 s (most) | end, m (most) | before -> after, most | in 95 "
       "%%\n",
       scenario.name.c_str(), a.config.c_str(), a.first, a.first + a.drives - 1);
@@ -113,14 +114,5 @@ int main(int argc, char **argv) {
   app.footer(
       "example: waymark-montecarlo-slam config/worlds/loops-markers.yaml --config config/loops-markers.yaml\n"
       "docs/consistency.md defines each figure. Exit code: 0 done, 1 failed, 2 usage or configuration.");
-  try {
-    app.parse(argc, argv);
-    return run(a);
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? wm::tools::kDone : wm::tools::kUsage;
-  } catch (const std::exception &problem) {
-    std::fprintf(stderr, "waymark-montecarlo-slam: %s\n", problem.what());
-    const auto *failure = dynamic_cast<const Failure *>(&problem);
-    return failure != nullptr ? failure->exit_code : wm::tools::kFailed;
-  }
+  return wm::tools::run_program(app, argc, argv, [&] { return run(a); });
 }

@@ -224,10 +224,11 @@ void judge(const std::vector<Look> &looks, double enough_s, SlamOutcome &out) {
     out.inside += l.nees <= bound;
   }
   for (const Look &l : looks)
-    if (l.t_s > out.cut_s && l.astray() && !out.told_after_s) out.told_after_s = std::max(0.0, l.t_s - enough_s);
+    if (l.t_s > out.cut_s && l.astray() && !out.detected_after_s)
+      out.detected_after_s = std::max(0.0, l.t_s - enough_s);
   for (const Look &l : looks)
-    if (l.t_s >= enough_s && l.right() && (!out.told_after_s || *out.told_after_s > l.t_s - enough_s)) {
-      out.told_after_s = l.t_s - enough_s;
+    if (l.t_s >= enough_s && l.right() && (!out.detected_after_s || *out.detected_after_s > l.t_s - enough_s)) {
+      out.detected_after_s = l.t_s - enough_s;
       break;
     }
   out.right_after_s = right_after(looks, out.cut_s);

@@ -38,7 +38,7 @@ struct SlamOutcome {
   double moved_m = 0, turned_rad = 0;
   // From when enough was seen since the cut (two landmarks of the map, four sightings; renumbered: eight sightings)
   // until the state is LOST or SEARCHING; 0: the pose was right by then. None: never.
-  std::optional<double> told_after_s;
+  std::optional<double> detected_after_s;
   std::optional<double> right_after_s;       // from the cut until right (tracking, 0.3 m, 5 degrees) for 2 s
   int alarms = 0;                            // changes to LOST or SEARCHING without a disturbance
   double wrong_s = 0;                        // longest time of TRACKING off by more than 0.5 m and 3.5 sigma

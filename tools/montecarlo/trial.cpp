@@ -196,11 +196,11 @@ std::vector<Trial> draw_trials(const EdgeDrive &drive, TrialKind kind, int count
     const bool far = std::hypot(way.x_m, way.y_m) >= 3;
     if (kind == TrialKind::kKidnap) {
       if (!far && std::fabs(way.heading_rad) < 45 * kDegree) continue;
-      if (viewer.telling(there, here) > kOtherView) out.push_back(t);
+      if (viewer.distinction(there, here) > kOtherView) out.push_back(t);
       continue;
     }
     if (!far || Viewer::difference(viewer.at(here), viewer.at(there)) > 0.1) continue;
-    // How long it stays alike, while the robot drives on there and believes to drive on here.
+    // How long it stays alike, while the robot drives on there and the filter predicts on here.
     double alike_s = 0;
     for (; alike_s < 20; alike_s += 0.5) {
       const wm_pose2 now = drive.truth(t.on_ns + ns(alike_s));
@@ -254,7 +254,7 @@ int Outcome::false_alarms() const {
   return count;
 }
 
-std::optional<double> Outcome::said_after_s() const {
+std::optional<double> Outcome::detected_after_s() const {
   for (const Sample &s : samples)
     if (!s.tracking) return s.t_s;
   return std::nullopt;

@@ -36,10 +36,10 @@ struct Outcome {
   [[nodiscard]] double position_mean_m() const, position_max_m() const, heading_mean_deg() const, nees_inside() const;
   // Off by more than 0.5 m or 15 degrees for longer than 2 s, or at the end.
   [[nodiscard]] bool lost() const;
-  // Times that it said lost or searching while it was right.
+  // Times that its state became lost or searching while it was right.
   [[nodiscard]] int false_alarms() const;
-  // Seconds until it said lost or searching; none: never.
-  [[nodiscard]] std::optional<double> said_after_s() const;
+  // Seconds until its state is lost or searching; none: never.
+  [[nodiscard]] std::optional<double> detected_after_s() const;
   // Way until it is right (tracking, within 0.3 m and 10 degrees) and stays so for 2 s.
   [[nodiscard]] std::optional<double> right_after_m() const;
   // Longest time that it tracks and is off by more than 1 m, s.

@@ -53,14 +53,14 @@ double Viewer::difference(const View &a, const View &b) {
   return met > 0 ? static_cast<double>(other) / met : 0;
 }
 
-double Viewer::telling(const wm_pose2 &there, const wm_pose2 &believed) const {
+double Viewer::distinction(const wm_pose2 &there, const wm_pose2 &estimated) const {
   const View seen = at(there);
   double least = 1;
   for (int turn = -2; turn <= 2; turn++)
     for (int along = -2; along <= 2; along++)
       for (int across = -2; across <= 2; across++) {
         const wm_pose2 shift{0.5 * along * kShift_m, 0.5 * across * kShift_m, 0.5 * turn * kTurn_rad};
-        least = std::min(least, difference(seen, at(composed(believed, shift))));
+        least = std::min(least, difference(seen, at(composed(estimated, shift))));
       }
   return least;
 }

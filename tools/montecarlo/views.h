@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a camera on the floor would see of a map's edges from a pose, by the map alone: whether two places can be told
-// apart at all.
+// What a camera on the floor would see of a map's edges from a pose, by the map alone: whether two places can be
+// distinguished apart at all.
 #pragma once
 
 #include <vector>
@@ -21,9 +21,9 @@ class Viewer {
   // Share of the rays, of those that meet an edge in either view, that are longer in one of them by more than 0.15 m
   // and a twentieth.
   [[nodiscard]] static double difference(const View &a, const View &b);
-  // The smallest difference of the view at `there` from those within 0.5 m and 8 degrees of `believed`: what a filter
+  // The smallest difference of the view at `there` from those within 0.5 m and 8 degrees of `estimated`: what a filter
   // that shifts its pose a little can't talk away.
-  [[nodiscard]] double telling(const wm_pose2 &there, const wm_pose2 &believed) const;
+  [[nodiscard]] double distinction(const wm_pose2 &there, const wm_pose2 &estimated) const;
 
  private:
   [[nodiscard]] double cast(double x_m, double y_m, double angle_rad) const;

@@ -11,6 +11,7 @@
 
 #include "common/edge_points.h"
 #include "common/failure.h"
+#include "common/program.h"
 #include "common/run_folder.h"
 #include "reference/smoother.h"
 #include "waymark/map.h"
@@ -130,14 +131,5 @@ int main(int argc, char **argv) {
       "  waymark reference runs/corridor recordings/corridor\n"
       "  waymark eval runs/corridor recordings/corridor --reference\n"
       "The mounting and the stamps are taken as calibration.yaml states them.");
-  try {
-    app.parse(argc, argv);
-    return run(a);
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? kDone : kUsage;
-  } catch (const std::exception &problem) {
-    std::fprintf(stderr, "waymark reference: %s\n", problem.what());
-    const auto *failure = dynamic_cast<const Failure *>(&problem);
-    return failure != nullptr ? failure->exit_code : kFailed;
-  }
+  return run_program(app, argc, argv, [&] { return run(a); });
 }

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "common/failure.h"
+#include "common/program.h"
 #include "report/data.h"
 #include "report/page.h"
 #include "report/picture.h"
@@ -42,21 +43,12 @@ int main(int argc, char **argv) {
   Arguments arguments;
   CLI::App app("", "waymark report");
   parse(&app, &arguments);
-  try {
-    app.parse(argc, argv);
+  return run_program(app, argc, argv, [&] {
     if (arguments.out.empty() && arguments.svg.empty())
       throw Failure("where to? --out FILE.html, or --svg FILE.svg, or both", kUsage);
     const ReportData data = load_report_data(arguments.run, arguments.recording);
     if (!arguments.out.empty()) write(arguments.out, report_page(data));
     if (!arguments.svg.empty()) write(arguments.svg, draw_picture(data, true).svg);
     return kDone;
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? kDone : kUsage;
-  } catch (const Failure &problem) {
-    std::fprintf(stderr, "waymark report: %s\n", problem.what());
-    return problem.exit_code;
-  } catch (const std::exception &problem) {
-    std::fprintf(stderr, "waymark report: %s\n", problem.what());
-    return kFailed;
-  }
+  });
 }

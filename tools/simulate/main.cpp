@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "common/failure.h"
+#include "common/program.h"
 #include "simulate/film.h"
 #include "simulate/simulate.h"
 #include "simulate/write.h"
@@ -148,19 +149,11 @@ wm_status simulate(const Arguments &a, wm_error *err) {
 
 int main(int argc, char **argv) {
   CLI::App app("", "waymark simulate");
-  try {
-    Arguments arguments;
-    parse(&app, &arguments);
-    app.parse(argc, argv);
+  Arguments arguments;
+  parse(&app, &arguments);
+  return tools::run_program(app, argc, argv, [&arguments] {
     wm_error err{};
-    const wm_status status = simulate(arguments, &err);
-    if (status == WM_OK) return tools::kDone;
-    std::fprintf(stderr, "waymark simulate: %s\n", err.text[0] ? err.text : wm_status_text(status));
-    return status == WM_BAD_CONFIG || status == WM_NOT_FOUND ? tools::kUsage : tools::kFailed;
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? tools::kDone : tools::kUsage;
-  } catch (const std::exception &problem) {
-    std::fprintf(stderr, "waymark simulate: %s\n", problem.what());
-    return tools::kFailed;
-  }
+    tools::need_ok(simulate(arguments, &err), err);
+    return tools::kDone;
+  });
 }

@@ -30,7 +30,7 @@ Scenario simple() {
   s.robot.wheels.wheelbase_m = 1.8;
   s.errors.start_xy_m = 0.03;
   s.errors.start_heading_rad = 0.01;
-  s.errors.yaw_rate_noise_radps = 1e9;  // the gyro says nothing
+  s.errors.yaw_rate_noise_radps = 1e9;  // the gyro has no information
   s.errors.yaw_rate_bias_radps = 1e-9;
   return s;
 }
@@ -107,7 +107,7 @@ void test_one_landmark_ahead() {
 }
 
 // The same landmark by a camera that is turned by an unknown angle, with bearings as a detector handed them on;
-// standing, the clock's error says nothing.
+// standing, the clock's error has no information.
 void test_bearings_of_a_camera_that_is_turned() {
   Scenario s = simple();
   s.errors.landmark_m = 0.02;

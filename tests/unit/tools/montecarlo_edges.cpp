@@ -32,16 +32,16 @@ void draw_corridor() {
 
 void a_straight_corridor_looks_the_same_all_along(void) {
   const Viewer viewer(map, 1);
-  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, viewer.telling({20, 2, 0}, {26, 2, 0}));
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.05, viewer.distinction({20, 2, 0}, {26, 2, 0}));
   TEST_ASSERT_LESS_THAN_DOUBLE(0.05, Viewer::difference(viewer.at({20, 2, 0}), viewer.at({26, 2, 0})));
 }
 
 void its_end_and_a_turn_look_otherwise(void) {
   const Viewer viewer(map, 1);
-  TEST_ASSERT_GREATER_THAN_DOUBLE(wm::montecarlo::kOtherView, viewer.telling({36.5, 2, 0}, {26, 2, 0}));
-  TEST_ASSERT_GREATER_THAN_DOUBLE(wm::montecarlo::kOtherView, viewer.telling({20, 2, 1}, {20, 2, 0}));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(wm::montecarlo::kOtherView, viewer.distinction({36.5, 2, 0}, {26, 2, 0}));
+  TEST_ASSERT_GREATER_THAN_DOUBLE(wm::montecarlo::kOtherView, viewer.distinction({20, 2, 1}, {20, 2, 0}));
   // A little aside is no other view: the filter may be off by as much.
-  TEST_ASSERT_LESS_THAN_DOUBLE(wm::montecarlo::kOtherView, viewer.telling({20, 2.2, 0}, {20, 2, 0}));
+  TEST_ASSERT_LESS_THAN_DOUBLE(wm::montecarlo::kOtherView, viewer.distinction({20, 2.2, 0}, {20, 2, 0}));
 }
 
 Sample at(double t_s, double error_m, bool tracking) {
@@ -59,7 +59,7 @@ void a_run_is_judged_by_when_it_says_so_and_when_it_is_right(void) {
   for (int i = 0; i < 30; i++) o.samples.push_back(at(0.1 * i, 5, true));
   for (int i = 30; i < 80; i++) o.samples.push_back(at(0.1 * i, 5, false));
   for (int i = 80; i < 150; i++) o.samples.push_back(at(0.1 * i, 0.05, true));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 3, *o.said_after_s());
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 3, *o.detected_after_s());
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 8, *o.right_after_m());
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.9, o.astray_s());
   TEST_ASSERT_TRUE(o.lost());  // for longer than 2 s
