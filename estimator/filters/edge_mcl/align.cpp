@@ -4,17 +4,25 @@
 #include "math/elementary.hpp"
 
 namespace wm {
-void floor_points::copy(int to, const floor_points &from, int i) {
-  camera[to] = from.camera[i];
-  x_m[to] = from.x_m[i];
-  y_m[to] = from.y_m[i];
-  ray_x_m[to] = from.ray_x_m[i];
-  ray_y_m[to] = from.ray_y_m[i];
-  reflection[to] = from.reflection[i];
-  for (int k = 0; k < kMountingErrors; k++) {
-    x_by[k][to] = from.x_by[k][i];
-    y_by[k][to] = from.y_by[k][i];
-  }
+
+floor_edge moved(const floor_edge &point, const wm_pose2 &from, const sin_cos &h) {
+  const auto turn = [&h](float x, float y, float *to_x, float *to_y) {
+    *to_x = (float)(h.cos * (double)x - h.sin * (double)y);
+    *to_y = (float)(h.sin * (double)x + h.cos * (double)y);
+  };
+  const double x = (double)point.x_m, y = (double)point.y_m;
+  floor_edge out = point;
+  out.x_m = (float)(from.x_m + h.cos * x - h.sin * y);
+  out.y_m = (float)(from.y_m + h.sin * x + h.cos * y);
+  turn(point.ray_x_m, point.ray_y_m, &out.ray_x_m, &out.ray_y_m);
+  for (int e = 0; e < kMountingErrors; e++) turn(point.x_by[e], point.y_by[e], &out.x_by[e], &out.y_by[e]);
+  return out;
+}
+
+int take_evenly(const floor_edge *points, int count, int most, floor_edge *out) {
+  if (most > count) most = count;
+  for (int i = 0; i < most; i++) out[i] = points[(int64_t)i * count / most];
+  return most;
 }
 
 bool on_a_line(const wm_points &points, uint32_t i) {
@@ -68,13 +76,13 @@ namespace {
 double cauchy_weight(double residual, double sigma) { return square(sigma) / (square(sigma) + square(residual)); }
 
 // A point's place by these errors of its camera's mounting.
-inline void shifted(const floor_points &points, int i, const double error[kMountingAll], double *x, double *y) {
-  *x = (double)points.x_m[i];
-  *y = (double)points.y_m[i];
+inline void shifted(const floor_edge &point, const double error[kMountingAll], double *x, double *y) {
+  *x = (double)point.x_m;
+  *y = (double)point.y_m;
   for (int k = 0; k < kMountingErrors; k++) {
-    const double e = error[kMountingErrors * points.camera[i] + k];
-    *x += e * (double)points.x_by[k][i];
-    *y += e * (double)points.y_by[k][i];
+    const double e = error[kMountingErrors * point.camera + k];
+    *x += e * (double)point.x_by[k];
+    *y += e * (double)point.y_by[k];
   }
 }
 
@@ -104,14 +112,14 @@ constexpr double kCorrelatedPoints = 15.0;
 
 }  // namespace
 
-void align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, int stride, double gate_m,
-                double explained_m, int iterations, wm_pose2 *pose) {
+void align_pose(const edge_map &map, const floor_edge *points, int count, int stride, double gate_m, double explained_m,
+                int iterations, wm_pose2 *pose) {
   for (int round = 0; round < iterations; round++) {
     matrix<3> a = kDamping * matrix<3>::Identity();
     vector<3> b = vector<3>::Zero(), step;
     const sin_cos h = sincos(pose->heading_rad);
     for (int i = 0; i < count; i += stride) {
-      const pose_row row = row_at(map, *pose, h, (double)x_m[i], (double)y_m[i]);
+      const pose_row row = row_at(map, *pose, h, (double)points[i].x_m, (double)points[i].y_m);
       if (!row.line.found || row.line.distance_m > gate_m) continue;
       const vector<3> weighted = cauchy_weight(row.line.offset_m, explained_m) * row.by;
       b += row.line.offset_m * weighted;
@@ -130,8 +138,9 @@ void align_place(const edge_map &map, const floor_points &points, int stride, do
     vector<kOwn> right[kMountingCameras] = {vector<kOwn>::Zero(), vector<kOwn>::Zero()};
     const sin_cos h = sincos(pose->heading_rad);
     for (int i = 0; i < points.count; i += stride) {
+      const floor_edge &point = points.of[i];
       double x, y;
-      shifted(points, i, error, &x, &y);
+      shifted(point, error, &x, &y);
       const pose_row row = row_at(map, *pose, h, x, y);
       const edge_line &line = row.line;
       if (!line.found || line.distance_m > gate_m) continue;
@@ -141,10 +150,10 @@ void align_place(const edge_map &map, const floor_points &points, int stride, do
       const double ahead = h.cos * line.normal_x + h.sin * line.normal_y;
       const double left = h.cos * line.normal_y - h.sin * line.normal_x;
       for (int k = 0; k < kMountingErrors; k++)
-        by[3 + k] = ahead * (double)points.x_by[k][i] + left * (double)points.y_by[k][i];
+        by[3 + k] = ahead * (double)point.x_by[k] + left * (double)point.y_by[k];
       const vector<kOwn> weighted = cauchy_weight(line.offset_m, explained_m) * by;
-      right[points.camera[i]] += line.offset_m * weighted;
-      information[points.camera[i]].noalias() += weighted * by.transpose();
+      right[point.camera] += line.offset_m * weighted;
+      information[point.camera].noalias() += weighted * by.transpose();
     }
     matrix<kAll> a = matrix<kAll>::Zero();
     vector<kAll> b = vector<kAll>::Zero(), step;
@@ -172,16 +181,17 @@ double explained_share(const edge_map &map, const floor_points &points, double e
   const sin_cos h = sincos(pose.heading_rad);
   double explained = 0.0;
   for (int i = 0; i < points.count; i++) {
+    const floor_edge &point = points.of[i];
     double px, py;
-    shifted(points, i, error, &px, &py);
+    shifted(point, error, &px, &py);
     const double x = pose.x_m + h.cos * px - h.sin * py, y = pose.y_m + h.sin * px + h.cos * py;
     const edge_line line = map.nearest(x, y);
     if (line.found && line.distance_m <= explained_m) {
       explained += 1.0;
     } else if (reflections) {
-      const double rx = (double)points.ray_x_m[i], ry = (double)points.ray_y_m[i];
+      const double rx = (double)point.ray_x_m, ry = (double)point.ray_y_m;
       if (before_an_edge(map, x, y, h.cos * rx - h.sin * ry, h.sin * rx + h.cos * ry))
-        explained += (double)points.reflection[i];
+        explained += (double)point.reflection;
     }
   }
   return points.count > 0 ? explained / points.count : 0.0;

@@ -5,6 +5,7 @@
 
 #include "filters/edge_mcl/floor_camera.hpp"
 #include "maps/edge_map.hpp"
+#include "math/arc.hpp"
 #include "math/eigen.hpp"
 #include "waymark/event.h"
 
@@ -40,16 +41,22 @@ struct normal_equations {
 inline constexpr int kMountingErrors = 3, kMountingCameras = 2, kMountingAll = kMountingErrors * kMountingCameras;
 inline constexpr int kMountingError[kMountingErrors] = {kPitch, kRoll, kHeight};
 
-// Points in base_link, with the shift of each by a sigma of an error of its camera's mounting.
+// A point of an edge on the floor, in base_link.
+struct floor_edge {
+  float x_m, y_m;
+  float ray_x_m, ray_y_m;                              // from under the camera to the point
+  float x_by[kMountingErrors], y_by[kMountingErrors];  // shift by a sigma of each error of its camera's mounting
+  float reflection;                                    // weight as explained, where it lies before an edge
+  int32_t camera;
+};
 struct floor_points {
   int count;
-  int camera[WM_POINTS_MAX];
-  float x_m[WM_POINTS_MAX], y_m[WM_POINTS_MAX];
-  float x_by[kMountingErrors][WM_POINTS_MAX], y_by[kMountingErrors][WM_POINTS_MAX];
-  float ray_x_m[WM_POINTS_MAX], ray_y_m[WM_POINTS_MAX];  // from under the camera to the point
-  float reflection[WM_POINTS_MAX];                       // weight as explained, where it lies before an edge
-  void copy(int to, const floor_points &from, int i);    // point i of `from`
+  floor_edge of[WM_POINTS_MAX];
 };
+// The point from another pose: `from` is its base_link, h the cosine and sine of from's heading.
+floor_edge moved(const floor_edge &point, const wm_pose2 &from, const sin_cos &h);
+// At most `most` of `count` points, evenly taken. Returns how many.
+int take_evenly(const floor_edge *points, int count, int most, floor_edge *out);
 
 // Information weight of a scan of n points, as a multiple of a scan's of kUsualPoints: few points fit many places.
 // n / (n + kHalfPoints), normalised. Both counts were read off corridor-a's scans (a ray each 1.3 degrees); not swept.
@@ -69,9 +76,9 @@ bool through_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m
 // Whether a point lies between its neighbours, as an edge's do. Noise and reflections are scattered.
 bool on_a_line(const wm_points &points, uint32_t i);
 
-// Aligns every `stride`th of the points in base_link by the pose alone, from `pose` on. O(iterations * count / stride).
-void align_pose(const edge_map &map, const float *x_m, const float *y_m, int count, int stride, double gate_m,
-                double explained_m, int iterations, wm_pose2 *pose);
+// Aligns every `stride`th of the points by the pose alone, from `pose` on. O(iterations * count / stride).
+void align_pose(const edge_map &map, const floor_edge *points, int count, int stride, double gate_m, double explained_m,
+                int iterations, wm_pose2 *pose);
 // The same with the cameras' mounting errors as unknowns, in sigmas, from `error` on.
 void align_place(const edge_map &map, const floor_points &points, int stride, double gate_m, double explained_m,
                  int iterations, wm_pose2 *pose, double error[kMountingAll]);

@@ -19,7 +19,7 @@ constexpr int kKeyframesSuspicious = 4, kKeyframesIdle = 10;  // of 0.4 m, from 
 // weighing of hypotheses. And how many of these are weighed while suspicious, at most.
 constexpr int kAliasNominal = 4, kAliasOtherwise = 2, kIdle = 8, kWeighingShare = 4, kWeighedMax = 6;
 constexpr int kPosesMin = place_search::kAligningCost + place_search::kWeighingCost;
-static_assert(kPosesMin <= EDGE_MCL_SEARCH_POSES_LEAST && aliased_poses::kPosesMin <= EDGE_MCL_SEARCH_POSES_LEAST);
+static_assert(kPosesMin <= EDGE_MCL_SEARCH_POSES_LEAST && hypotheses::kPosesMin <= EDGE_MCL_SEARCH_POSES_LEAST);
 // A hypothesis is adopted with this probability, this fraction explained, and so much more of it than the tracked pose.
 constexpr double kAdoptProbability = 0.95, kAdoptExplained = 0.6, kAdoptMargin = 0.15;
 // An alias becomes a hypothesis at these odds, or, while suspicious, where it explains so much more.
@@ -34,8 +34,8 @@ constexpr double kFoundCovariance[3][3] = {{kFoundSigma_m * kFoundSigma_m, 0, 0}
 }  // namespace
 
 double edge_mcl::lost_log_odds() const {
-  const double elsewhere = life_.tracking() ? others_.odds_elsewhere() : 0.0;
-  return log(exp(fit_.log_odds()) + aliases_.odds() + elsewhere);
+  const double elsewhere = life_.tracking() ? others_.searched_odds() : 0.0;
+  return log(exp(fit_.log_odds()) + others_.aliased_odds() + elsewhere);
 }
 
 void edge_mcl::update_lost(const normal_equations &scan, double dt_s) {
@@ -76,13 +76,14 @@ void edge_mcl::update_suspicion() {
   if (fit_.log_odds() > kSuspiciousLogOdds)
     search_.begin_at_mark();
   else
-    search_.begin_ago(aliases_.likelier_for_m());
+    search_.begin_ago(others_.likelier_for_m());
 }
 
 // Motion sensors were silent: keyframes from before and after the gap have no known relation.
 void edge_mcl::on_motion_gap() {
   search_.clear();
-  others_.clear(filter_.pose(), filter_.odom());
+  others_.carry(filter_.pose(), filter_.odom());
+  others_.drop_searched(filter_.pose());
   suspicious_ = tentative_ = true;
   map_searched_ = false;
   if (life_.tracking()) life_.lose(filter_.now_ns());
@@ -101,22 +102,22 @@ void edge_mcl::lose() {
 void edge_mcl::update_aliases(double dt_s) {
   const double way = filter_.travelled_m() - aliases_m_;
   aliases_m_ += way;
-  aliases_.carry(filter_.odom());
   const bool sure = life_.tracking() && !suspicious_, nominal = fit_.log_odds() < kNominalLogOdds;
-  if (nominal_ && !nominal) aliases_.restart_sweep();
+  if (nominal_ && !nominal) others_.restart_sweep();
   nominal_ = nominal;
   const int share = params_.search_poses / (nominal ? kAliasNominal : kAliasOtherwise);
-  const int poses = share > aliased_poses::kPosesMin ? share : aliased_poses::kPosesMin;
-  aliases_.update(map_, search_.field(), scan_, filter_.pose(), way, fit_.mean_explained(),
-                  sure ? params_.lost_per_s * dt_s : 0.0, sure ? poses : 0);
+  const int poses = share > hypotheses::kPosesMin ? share : hypotheses::kPosesMin;
+  others_.update_aliased(map_, search_.field(), scan_, way, fit_.mean_explained(),
+                         sure ? params_.lost_per_s * dt_s : 0.0, sure ? poses : 0);
   if (life_.searching()) return;
   constexpr double kNoError[kMountingAll] = {};
-  for (int i = 0; i < aliases_.count(); i++)
-    if (aliases_[i].odds > kAliasOdds) others_.offer(aliases_[i].pose, aliases_[i].explained, kNoError);
-  const int best = aliases_.best();
-  if (suspicious_ && best >= 0 && aliases_[best].explained > kAliasMargin &&
-      others_.count() < hypotheses::kCapacity / 2)
-    others_.offer(aliases_[best].pose, aliases_[best].explained, kNoError);
+  const auto offer = [&](const hypothesis &alias) { others_.offer(alias.pose, alias.explained, kNoError); };
+  for (int i = 0; i < others_.aliased(); i++)
+    if (others_.alias(i).odds > kAliasOdds) offer(others_.alias(i));
+  const int best = others_.best_aliased();
+  if (suspicious_ && best >= 0 && others_.alias(best).explained > kAliasMargin &&
+      others_.searched() < hypotheses::kSearchedMax / 2)
+    offer(others_.alias(best));
 }
 
 // The search brings hypotheses, with a small budget while nothing is suspicious; the keyframes of the last metres weigh
@@ -154,7 +155,7 @@ void edge_mcl::decide() {
     adopt(best);
   } else if (best == 0 && !tracking && !tentative_) {
     fit_.set_log_odds(0.0);
-    aliases_.forget_odds();
+    others_.forget_aliased_odds();
     tentative_ = true;
   }
 }
@@ -167,7 +168,7 @@ void edge_mcl::adopt(int hypothesis) {
   const wm_pose2 way = between(filter_.pose(), pose);
   if (!same_pose(wm_pose2{}, way, kSame_m, kSame_rad)) life_.jumped();
   others_.adopt(hypothesis);
-  aliases_.forget_odds();
+  others_.forget_aliased_odds();
   filter_.set_pose(pose, kFoundCovariance);
 }
 
@@ -176,7 +177,7 @@ void edge_mcl::add_hypotheses_spread(wm_estimate *out) const {
   const int at[3] = {0, 1, 5};
   const wm_pose2 pose = {out->pose_map_base.p_m[0], out->pose_map_base.p_m[1], out->heading_rad};
   double rest = 1.0;
-  for (int i = 0; i < others_.count(); i++) {
+  for (int i = 0; i < others_.searched(); i++) {
     const hypothesis &h = others_[i];
     rest -= h.probability;
     if (i == 0) continue;

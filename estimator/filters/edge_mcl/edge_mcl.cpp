@@ -16,8 +16,6 @@ namespace {
 
 constexpr double kMotionGap_s = 1.0;      // between two messages of the motion sensors, beyond which the way is unknown
 constexpr double kUnknownSigma_m = 0.03;  // of a point without a sigma and without a camera
-// Variances of a listed hypothesis: 14 cm, 2.4 degrees. Of hypotheses that were right, on corridor-hard; not swept.
-constexpr double kHypothesisCovariance[6] = {0.02, 0.0, 0.02, 0.0, 0.0, 0.0018};
 
 const char *const kReads[] = {"motion.", nullptr};
 
@@ -62,7 +60,7 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   memory_layout layout(this, sizeof *this);
   map_.init(*setup.map, layout.take<uint8_t>(edge_map::bytes(*setup.map)));
   search_.init(map_, layout.take<uint8_t>(place_search::bytes(*setup.map)));
-  aliases_.init(map_);
+  others_.init(map_);
   fit_.init(params);
   watched_ns_ = driven_ns_ = WM_TIME_NONE;
   life_ = lifecycle();
@@ -80,7 +78,6 @@ void edge_mcl::start_again(bool known) {
   watched_m_ = filter_.travelled_m() + filter_.turned_rad();
   fit_.reset(known);
   others_.clear(filter_.pose(), filter_.odom());
-  aliases_.clear(filter_.odom());
   aliases_m_ = filter_.travelled_m();
   nominal_ = map_searched_ = tentative_ = false;
   suspicious_ = !known;
@@ -175,16 +172,15 @@ void edge_mcl::place_scan(const wm_points &points, int camera) {
     if (camera >= 0 && (camera_[camera].range(p.x, p.y) > params_.range_max_m ||
                         !camera_[camera].correct(p.x, p.y, a.value + kAlignCamera, &p)))
       continue;
-    const int to = scan_.count++;
-    scan_.x_m[to] = (float)(from.x_m + h.cos * p.x - h.sin * p.y);
-    scan_.y_m[to] = (float)(from.y_m + h.sin * p.x + h.cos * p.y);
-    scan_.camera[to] = camera > 0 ? camera : 0;
-    scan_.reflection[to] = (float)reflection_weight((int)points.count);
-    turn(p.x - (camera >= 0 ? camera_[camera].x_m : 0.0), p.y - (camera >= 0 ? camera_[camera].y_m : 0.0),
-         &scan_.ray_x_m[to], &scan_.ray_y_m[to]);
+    floor_edge &to = scan_.of[scan_.count++];
+    to.x_m = (float)(from.x_m + h.cos * p.x - h.sin * p.y);
+    to.y_m = (float)(from.y_m + h.sin * p.x + h.cos * p.y);
+    to.camera = camera > 0 ? camera : 0;
+    to.reflection = (float)reflection_weight((int)points.count);
+    turn(p.x - (camera >= 0 ? camera_[camera].x_m : 0.0), p.y - (camera >= 0 ? camera_[camera].y_m : 0.0), &to.ray_x_m,
+         &to.ray_y_m);
     for (int k = 0; k < kMountingErrors; k++)
-      turn(sigma[k] * p.x_by[kMountingError[k]], sigma[k] * p.y_by[kMountingError[k]], &scan_.x_by[k][to],
-           &scan_.y_by[k][to]);
+      turn(sigma[k] * p.x_by[kMountingError[k]], sigma[k] * p.y_by[kMountingError[k]], &to.x_by[k], &to.y_by[k]);
   }
 }
 
@@ -220,7 +216,7 @@ size_t edge_mcl::list_counters(wm_counter *out, size_t capacity) const {
   counter_list list(out, capacity);
   list.add(WM_COUNTER_MOTION_OUTLIERS, filter_.motion_outliers());
   list.add(WM_COUNTER_RELOCALIZATIONS, life_.relocalizations());
-  list.add(WM_COUNTER_ALIASED_POSES, (uint64_t)aliases_.count());
+  list.add(WM_COUNTER_ALIASED_POSES, (uint64_t)others_.aliased());
   list.add(WM_COUNTER_EXPLAINED_PERMILLE, (uint64_t)(1000.0 * fit_.explained() + 0.5));
   return list.count();
 }
@@ -228,17 +224,16 @@ size_t edge_mcl::list_counters(wm_counter *out, size_t capacity) const {
 // Aliased poses share the tracked pose's probability mass.
 size_t edge_mcl::list_hypotheses(wm_hypothesis *out, size_t capacity) const {
   const wm_pose2 since = between(scan_odom_, filter_.odom());
+  const double each = others_[0].probability / (1.0 + others_.aliased_odds());
   size_t count = 0;
-  const auto list = [&](const wm_pose2 &at, const double(&covariance)[6], double probability) {
-    if (count++ >= capacity) return;
-    const wm_pose2 pose = compose(at, since);
-    out[count - 1] = {pose.x_m, pose.y_m, pose.heading_rad, {}, probability};
-    for (int k = 0; k < 6; k++) out[count - 1].covariance[k] = covariance[k];
-  };
-  for (int i = 1; i < others_.count(); i++)
-    if (others_[i].weighed) list(others_[i].pose, kHypothesisCovariance, others_[i].probability);
-  const double each = others_[0].probability / (1.0 + aliases_.odds());
-  for (int i = 0; i < aliases_.count(); i++) list(aliases_[i].pose, aliases_[i].covariance, each * aliases_[i].odds);
+  for (int i = 1; i < others_.count(); i++) {
+    const hypothesis &h = others_[i];
+    if ((h.origin == kSearched && !h.weighed) || count++ >= capacity) continue;
+    const wm_pose2 pose = compose(h.pose, since);
+    wm_hypothesis &to = out[count - 1];
+    to = {pose.x_m, pose.y_m, pose.heading_rad, {}, h.origin == kSearched ? h.probability : each * h.odds};
+    for (int k = 0; k < 6; k++) to.covariance[k] = h.covariance[k];
+  }
   return count;
 }
 

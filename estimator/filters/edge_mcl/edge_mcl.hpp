@@ -8,7 +8,6 @@
 #include "filters/core/lifecycle.hpp"
 #include "filters/core/record_list.hpp"
 #include "filters/core/rollback.hpp"
-#include "filters/edge_mcl/aliased_poses.hpp"
 #include "filters/edge_mcl/align.hpp"
 #include "filters/edge_mcl/fit_evidence.hpp"
 #include "filters/edge_mcl/hypotheses.hpp"
@@ -122,7 +121,6 @@ class edge_mcl {
   floor_points scan_;  // those on a line with their neighbours, in now's base_link
   place_search search_;
   hypotheses others_;
-  aliased_poses aliases_;
   fit_evidence fit_;
   floor_camera camera_[kCamerasMax];
   int camera_count_;

@@ -50,20 +50,7 @@ bool place_search::add_keyframe(const floor_points &scan, const wm_pose2 &odom) 
   keyframe &k = keyframes_[seen_++ % kKeyframes];
   k.odom = odom;
   k.information = information_weight(scan.count);
-  k.count = scan.count < kPointsEach ? scan.count : kPointsEach;
-  for (int i = 0; i < k.count; i++) {
-    const int from = (int)((int64_t)i * scan.count / k.count);
-    k.camera[i] = scan.camera[from];
-    k.x_m[i] = scan.x_m[from];
-    k.y_m[i] = scan.y_m[from];
-    k.ray_x_m[i] = scan.ray_x_m[from];
-    k.ray_y_m[i] = scan.ray_y_m[from];
-    k.reflection[i] = scan.reflection[from];
-    for (int e = 0; e < kMountingErrors; e++) {
-      k.x_by[e][i] = scan.x_by[e][from];
-      k.y_by[e][i] = scan.y_by[e][from];
-    }
-  }
+  k.count = take_evenly(scan.of, scan.count, kPointsEach, k.of);
   return true;
 }
 
@@ -74,20 +61,7 @@ void place_search::gather(const wm_pose2 &odom, floor_points *out) const {
     const keyframe &k = keyframes_[n % kKeyframes];
     const wm_pose2 from = between(odom, k.odom);
     const sin_cos h = sincos(from.heading_rad);
-    const auto turn = [&h](float x, float y, float *to_x, float *to_y) {
-      *to_x = (float)(h.cos * (double)x - h.sin * (double)y);
-      *to_y = (float)(h.sin * (double)x + h.cos * (double)y);
-    };
-    for (int i = 0; i < k.count && out->count < WM_POINTS_MAX; i++) {
-      const int to = out->count++;
-      const double x = (double)k.x_m[i], y = (double)k.y_m[i];
-      out->camera[to] = k.camera[i];
-      out->x_m[to] = (float)(from.x_m + h.cos * x - h.sin * y);
-      out->y_m[to] = (float)(from.y_m + h.sin * x + h.cos * y);
-      out->reflection[to] = k.reflection[i];
-      turn(k.ray_x_m[i], k.ray_y_m[i], &out->ray_x_m[to], &out->ray_y_m[to]);
-      for (int e = 0; e < kMountingErrors; e++) turn(k.x_by[e][i], k.y_by[e][i], &out->x_by[e][to], &out->y_by[e][to]);
-    }
+    for (int i = 0; i < k.count && out->count < WM_POINTS_MAX; i++) out->of[out->count++] = moved(k.of[i], from, h);
   }
 }
 
@@ -105,10 +79,10 @@ int place_search::list_sure_points(int *out) const {
   for (double open_m = kOpen_m; open_m < kOpenMax_m && count < kSweepPoints; open_m *= 2.0) {
     count = 0;
     for (int i = 0; i < all_.count; i++) {
+      const floor_edge &p = all_.of[i];
       double open2 = 0.0;
-      for (int e = 0; e < kMountingErrors; e++)
-        open2 += square((double)all_.x_by[e][i]) + square((double)all_.y_by[e][i]);
-      const double range2 = square((double)all_.x_m[i]) + square((double)all_.y_m[i]);
+      for (int e = 0; e < kMountingErrors; e++) open2 += square((double)p.x_by[e]) + square((double)p.y_by[e]);
+      const double range2 = square((double)p.x_m) + square((double)p.y_m);
       if (range2 < square(field_.reach_m()) && open2 < square(open_m)) out[count++] = i;
     }
   }
@@ -129,8 +103,8 @@ void place_search::begin(const edge_map &map, const wm_pose2 &odom) {
   const int all = list_sure_points(sure), count = all < kSweepPoints ? all : kSweepPoints;
   for (int phase = 0; phase < kStride; phase++) {
     for (int i = phase; i < count; i += kStride) {
-      const int point = sure[(int64_t)i * all / count];
-      sweep_.add_point(field_, map.raster().origin_yaw_rad, (double)all_.x_m[point], (double)all_.y_m[point]);
+      const floor_edge &p = all_.of[sure[(int64_t)i * all / count]];
+      sweep_.add_point(field_, map.raster().origin_yaw_rad, (double)p.x_m, (double)p.y_m);
     }
     if (phase == 0) sweep_.set_first(sweep_.points());
   }

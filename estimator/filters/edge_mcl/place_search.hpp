@@ -71,10 +71,8 @@ class place_search {
   struct keyframe {
     wm_pose2 odom;
     double information;
-    int count, camera[kPointsEach];
-    float x_m[kPointsEach], y_m[kPointsEach];
-    float x_by[kMountingErrors][kPointsEach], y_by[kMountingErrors][kPointsEach];
-    float ray_x_m[kPointsEach], ray_y_m[kPointsEach], reflection[kPointsEach];
+    int64_t count;  // 64 bits: no padding
+    floor_edge of[kPointsEach];
   };
   keyframe keyframes_[kKeyframes];
   uint64_t seen_, marked_, from_;

@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "filters/edge_mcl/aliased_poses.hpp"
+#include "filters/edge_mcl/hypotheses.hpp"
 #include "math/arc.hpp"
 #include "unity.h"
 
@@ -23,7 +23,7 @@ wm_raster raster;
 char *map_memory, *field_memory;
 wm::edge_map map;
 wm::search_field field;
-wm::aliased_poses alike;
+wm::hypotheses alike;
 wm::floor_points scan;
 
 // Of a pose in the first room that in the second.
@@ -41,18 +41,19 @@ void see(const wm_pose2 &pose, bool box) {
   const double c = std::cos(pose.heading_rad), s = std::sin(pose.heading_rad);
   const auto add = [&](double x, double y) {
     const double dx = x - pose.x_m, dy = y - pose.y_m;
-    scan.x_m[scan.count] = (float)(c * dx + s * dy);
-    scan.y_m[scan.count++] = (float)(c * dy - s * dx);
+    scan.of[scan.count].x_m = (float)(c * dx + s * dy);
+    scan.of[scan.count++].y_m = (float)(c * dy - s * dx);
   };
   for (const segment &w : kRoom)
     for (int i = 0; i < 20; i++) add(w.ax + (w.bx - w.ax) * i / 20, w.ay + (w.by - w.ay) * i / 20);
   for (int i = 0; box && i < 120; i++) add(2.5 + 0.5 * (i % 12) / 12, 2.5);
 }
 
-const wm::aliased_pose *listed(const wm_pose2 &pose) {
-  for (int i = 0; i < alike.count(); i++) {
-    const wm_pose2 off = wm::between(pose, alike[i].pose);
-    if (std::sqrt(off.x_m * off.x_m + off.y_m * off.y_m) < 0.1 && std::fabs(off.heading_rad) < 0.03) return &alike[i];
+const wm::hypothesis *listed(const wm_pose2 &pose) {
+  for (int i = 0; i < alike.aliased(); i++) {
+    const wm_pose2 off = wm::between(pose, alike.alias(i).pose);
+    if (std::sqrt(off.x_m * off.x_m + off.y_m * off.y_m) < 0.1 && std::fabs(off.heading_rad) < 0.03)
+      return &alike.alias(i);
   }
   return nullptr;
 }
@@ -60,7 +61,8 @@ const wm::aliased_pose *listed(const wm_pose2 &pose) {
 const wm_pose2 kHere = {2.0, 3.0, 0.3};
 
 void look(int scans, const wm_pose2 &pose, double new_m) {
-  for (int i = 0; i < scans; i++) alike.update(map, field, scan, pose, new_m, 1.0, 1e-5, 40000);
+  alike.carry(pose, {});
+  for (int i = 0; i < scans; i++) alike.update_aliased(map, field, scan, new_m, 1.0, 1e-5, 40000);
 }
 
 // GIVEN a robot in the first room WHEN it has seen all of it a few times THEN the same place of the second room is
@@ -68,9 +70,9 @@ void look(int scans, const wm_pose2 &pose, double new_m) {
 void the_same_place_of_a_room_that_looks_the_same_is_listed(void) {
   see(kHere, false);
   look(6, kHere, 0.0);
-  const wm::aliased_pose *there = listed(twin(kHere));
+  const wm::hypothesis *there = listed(twin(kHere));
   TEST_ASSERT_NOT_NULL(there);
-  TEST_ASSERT_EQUAL(1, alike.count());
+  TEST_ASSERT_EQUAL(1, alike.aliased());
   TEST_ASSERT_TRUE(there->odds > 0 && there->odds < 1e-3);
   TEST_ASSERT_TRUE(there->covariance[0] > 0 && there->covariance[0] < 0.05);
 }
@@ -80,7 +82,7 @@ void odometry_carries_it_along(void) {
   see(kHere, false);
   look(6, kHere, 0.0);
   const wm_pose2 way = {0.7, 0.1, 0.4};
-  alike.carry(way);
+  alike.carry(kHere, way);
   TEST_ASSERT_NOT_NULL(listed(twin(wm::compose(kHere, way))));
 }
 
@@ -109,8 +111,8 @@ void the_odds_turn_with_what_is_seen(void) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(1.0, weight);
   TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(50.0, weight);
   TEST_ASSERT_DOUBLE_WITHIN(3.0, 11.0, alike.likelier_for_m());
-  alike.forget_odds();
-  TEST_ASSERT_TRUE(alike.odds() == 0.0);
+  alike.forget_aliased_odds();
+  TEST_ASSERT_TRUE(alike.aliased_odds() == 0.0);
 }
 
 // GIVEN that WHEN the map usually explains no more than it does where the robot is believed to be THEN nothing turns.
@@ -118,8 +120,9 @@ void what_is_explained_beyond_the_usual_says_nothing(void) {
   see(kHere, false);
   look(6, kHere, 0.0);
   const wm_pose2 believed = wm::compose(kHere, {0.3, 0.3, 0.0});
-  for (int i = 0; i < 10; i++) alike.update(map, field, scan, believed, 0.4, 0.0, 1e-5, 40000);
-  TEST_ASSERT_TRUE(alike.odds() < 1e-3);
+  alike.carry(believed, {});
+  for (int i = 0; i < 10; i++) alike.update_aliased(map, field, scan, 0.4, 0.0, 1e-5, 40000);
+  TEST_ASSERT_TRUE(alike.aliased_odds() < 1e-3);
 }
 
 // GIVEN a fit whose information can't be inverted WHEN its covariance is asked for THEN there is none, and what the
@@ -165,7 +168,7 @@ void nothing_is_seen_through_a_wall(void) {
 
 void setUp(void) {
   alike.init(map);
-  alike.clear({});
+  alike.clear({}, {});
 }
 void tearDown(void) {}
 

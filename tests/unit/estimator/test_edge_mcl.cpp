@@ -239,14 +239,14 @@ struct searching {
     for (int k = 0; k < 16; k++, d.truth.x_m += 0.5, odom.x_m += 0.5) {
       d.scan(&e);
       scan.count = (int)e.as.points.count;
-      std::memcpy(scan.x_m, e.as.points.x_m, sizeof e.as.points.x_m);
-      std::memcpy(scan.y_m, e.as.points.y_m, sizeof e.as.points.y_m);
       for (int i = 0; i < scan.count; i++) {
-        const double x = (double)scan.x_m[i], y = (double)scan.y_m[i], by = 0.02 * std::sqrt(x * x + y * y);
-        scan.x_by[0][i] = (float)(by * x);
-        scan.y_by[0][i] = (float)(by * y);
-        scan.x_m[i] = (float)(x - off * by * x);
-        scan.y_m[i] = (float)(y - off * by * y);
+        wm::floor_edge &p = scan.of[i];
+        const double x = (double)e.as.points.x_m[i], y = (double)e.as.points.y_m[i],
+                     by = 0.02 * std::sqrt(x * x + y * y);
+        p.x_by[0] = (float)(by * x);
+        p.y_by[0] = (float)(by * y);
+        p.x_m = (float)(x - off * by * x);
+        p.y_m = (float)(y - off * by * y);
       }
       TEST_ASSERT_TRUE(search.add_keyframe(scan, odom));
     }
@@ -296,7 +296,7 @@ void weighing_places_spends_what_it_says(void) {
   others.clear({2, 2, 0}, s.odom);
   while (!s.search.step(s.edge_map, 80000, s.odom)) continue;
   others.offer(s.search);
-  TEST_ASSERT_GREATER_THAN_INT(3, others.count());
+  TEST_ASSERT_GREATER_THAN_INT(3, others.searched());
   const uint64_t before = s.search.spent();
   others.weigh(s.edge_map, &s.search, 0.0, 0.0, s.search.information(), 3);
   TEST_ASSERT_EQUAL_UINT64(3 * wm::place_search::kWeighingCost, s.search.spent() - before);
