@@ -33,8 +33,9 @@ constexpr double kFoundCovariance[3][3] = {{kFoundSigma_m * kFoundSigma_m, 0, 0}
 
 }  // namespace
 
+// Odds of all hypotheses but the tracked one. While searching there is no tracked pose to hold them against.
 double edge_mcl::lost_log_odds() const {
-  const double elsewhere = life_.tracking() ? others_.searched_odds() : 0.0;
+  const double elsewhere = life_.searching() ? 0.0 : others_.searched_odds();
   return log(exp(fit_.log_odds()) + others_.aliased_odds() + elsewhere);
 }
 

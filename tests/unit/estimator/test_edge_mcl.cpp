@@ -174,6 +174,26 @@ void carried_away_it_says_so_and_finds_back(void) {
 
 // GIVEN a robot on its way WHEN something that the map doesn't have hides nearly all for 1.5 s THEN it is not taken for
 // lost; WHEN as much of what it sees is behind walls THEN it is, in as much time.
+// GIVEN robots that are carried off WHEN they search THEN with each scan the probability of being lost is at least the
+// one that the listed hypotheses have together, in whatever state.
+void listed_hypotheses_are_part_of_the_probability_of_being_lost(void) {
+  const wm_pose2 to[] = {{10.53, 2.02, 5.417}, {3.97, 4.89, 3.707}, {12.55, 2.39, 0.689}};
+  for (const wm_pose2 &there : to) {
+    filter f;
+    drive d;
+    d.go(f, 4, 1.0, 0.0);
+    d.truth = there;
+    for (int i = 0; i < 60; i++) {
+      d.go(f, 0.1, i % 20 < 10 ? 0.8 : -0.8, 0.0);
+      wm_hypothesis all[200];
+      const size_t count = f.ops->hypotheses(f.state, all, 200);
+      double sum = 0;
+      for (size_t k = 0; k < count; k++) sum += all[k].weight;
+      TEST_ASSERT_TRUE(f.estimate().lost_probability > sum - 0.02);
+    }
+  }
+}
+
 void something_in_the_way_is_not_being_lost_but_sight_through_walls_is(void) {
   filter f;
   drive d;
@@ -341,6 +361,7 @@ int main(void) {
   RUN_TEST(motion_sensors_that_fall_silent_are_not_believed);
   RUN_TEST(a_camera_that_looks_lower_than_believed_is_found_out);
   RUN_TEST(carried_away_it_says_so_and_finds_back);
+  RUN_TEST(listed_hypotheses_are_part_of_the_probability_of_being_lost);
   RUN_TEST(something_in_the_way_is_not_being_lost_but_sight_through_walls_is);
   RUN_TEST(glass_walls_are_usual);
   RUN_TEST(it_starts_without_being_told_where);
