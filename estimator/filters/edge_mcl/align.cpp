@@ -37,7 +37,7 @@ bool on_a_line(const wm_points &points, uint32_t i) {
 }
 
 bool before_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m, double ray_y_m) {
-  constexpr double kGrazing_m = 0.1;        // rays nearly along an edge meet it anywhere
+  constexpr double kGrazing_m = 0.1;        // least way of a ray towards an edge: grazing rays meet it anywhere
   constexpr double kBeyondMax = 0.5;        // of the ray: the map's edge is at most so much farther than its reflection
   constexpr double kProbes[] = {0.0, 0.3};  // places along the ray: edge_map reaches 0.6 m
   for (const double on : kProbes) {
@@ -52,8 +52,8 @@ bool before_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m,
 
 // Sphere tracing: steps by the distance to the nearest edge.
 bool through_an_edge(const edge_map &map, double x_m, double y_m, double ray_x_m, double ray_y_m) {
-  constexpr double kBegin_m = 0.1, kFarthest_m = 20.0;
-  constexpr double kMargin_m = 0.2, kMargin = 0.05;  // error of pose and camera: constant, and per metre of range
+  constexpr double kBegin_m = 0.1, kFarthest_m = 20.0;  // of the ray: bounds the work; cameras see the floor to 6 m
+  constexpr double kMargin_m = 0.2, kMargin = 0.05;     // error of pose and camera, and per metre of range; not swept
   const double range = std::sqrt(square(ray_x_m) + square(ray_y_m));
   double end = range - (kMargin_m + kMargin * range);
   if (end > kFarthest_m) end = kFarthest_m;

@@ -17,9 +17,9 @@ enum align_state {
   kAlignY,
   kAlignHeading,
   kAlignCamera,
-  kAlignTime = kAlignCamera + kCameraErrors,
-  kAlignEdge,
-  kAlignStates
+  kAlignTime = kAlignCamera + kCameraTime,
+  kAlignEdge = kAlignCamera + kEdgeOffset,
+  kAlignStates = kAlignCamera + kCameraStates
 };
 using align_matrix = matrix<kAlignStates>;
 using align_vector = vector<kAlignStates>;

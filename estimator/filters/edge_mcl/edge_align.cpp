@@ -9,7 +9,7 @@ namespace {
 
 // Gauss-Newton steps of one descent; in the first ones a point's gate includes the prior's spread. Not swept.
 constexpr int kRounds = 4, kCoarseRounds = 2;
-constexpr double kCoarseGateMax_m = 0.5;  // below edge_map's reach
+constexpr double kCoarseGateMax_m = 0.5;  // below edge_map's reach of 0.6 m
 // Along an axis that the prediction leaves open, descents start this far apart (door recesses are 0.1 m to 0.3 m deep)
 // and up to so many sigmas, so many on each side at most. Not swept.
 constexpr double kStartStep_m = 0.12, kStartSigmas = 2.5;
@@ -22,10 +22,14 @@ constexpr double kOpenSigmas = 2.5;                    // of a point's place by 
 // Errors of a scan are independent of the last one's after this distance or time. Chosen on 2 of 75 corridor-hard
 // drives that were lost while they stood; not swept.
 constexpr double kIndependent_m = 0.1, kIndependent_s = 5.0;
-constexpr double kExplained_m = 0.06, kExplainedSigmas2 = 9.0;  // a point so near to an edge is explained by the map
-constexpr int kLeastExplained = 5;                              // points without which a scan gives no pose
-constexpr double kLeastExplainedLost = 0.4;   // fraction of a scan that the map must explain while the robot is lost
-constexpr double kCalibrationLogOdds = -1.5;  // of being lost, above which a scan corrects the pose alone
+// Points of successive scans whose errors are common, so each has so much less information. By the NEES of 43 rendered
+// drives; not swept.
+constexpr double kCorrelatedPoints = 30.0;
+constexpr double kExplained_m = 0.06,
+                 kExplainedSigmas2 = 9.0;     // a point so near to an edge is explained by the map; not swept
+constexpr int kLeastExplained = 5;            // points of a scan: fewer leave a pose open
+constexpr double kLeastExplainedLost = 0.4;   // fraction of a scan that the map must explain while lost; not swept
+constexpr double kCalibrationLogOdds = -1.5;  // of being lost (18 %), above which a scan corrects the pose alone
 constexpr double kRankDeficient = 1e-9;       // of a pivot, in parts of its diagonal
 
 // Half the squared residual as Student's distribution with 4 degrees of freedom has it: (nu + 1)/2 log(1 + r2/nu).
@@ -44,7 +48,7 @@ edge_mcl::alignment edge_mcl::alignment_of(int camera) const {
   for (int k = 0; k < kAlignStates; k++) a.state[k] = -1;
   for (int k = 0; k < kPoseStates; k++) a.state[k] = k;
   if (camera >= 0)
-    for (int k = 0; k <= kCameraErrors; k++) a.state[kAlignCamera + k] = camera_state_[camera][k];
+    for (int k = 0; k <= kCameraTime; k++) a.state[kAlignCamera + k] = slots_.at(camera, k);
   a.state[kAlignEdge] = edge_state_;
   for (int k = 0; k < kAlignStates; k++)
     if (a.state[k] >= 0) a.value[k] = filter_.value(a.state[k]);
@@ -151,7 +155,7 @@ void edge_mcl::linearize(const wm_points &points, const alignment &a, double gat
   *out = normal_equations{};
   align_vector row;
   const capture from = capture_of(a);
-  const double correlated = params_.correlated / independence_;  // points that count as one
+  const double correlated = kCorrelatedPoints / independence_;  // points that count as one
   matched_point p;
   for (uint32_t i = 0; i < points.count; i++) {
     if (!match(points, i, a, from, &p)) continue;

@@ -6,26 +6,33 @@
 namespace wm {
 namespace {
 
-// Log odds of being lost: lost above, found below; below the third the calibration is remembered; below the fourth
-// nothing is suspicious. The hysteresis was chosen on 43 rendered drives (docs/consistency.md); not swept one by one.
+// Log odds of being lost: lost above (73 %), found below (5 %); below the third (1 %) the calibration is remembered;
+// below the fourth (0.4 %) nothing is suspicious; suspicious above the fifth (12 %). The hysteresis was chosen on 43
+// rendered drives (docs/consistency.md); not swept one by one.
 constexpr double kLostLogOdds = 1.0, kFoundLogOdds = -3.0, kTrustedLogOdds = -4.5, kNominalLogOdds = -5.5;
 constexpr double kSuspiciousLogOdds = -2.0;
-constexpr double kSame_m = 0.3, kSame_rad = 0.15;  // an adopted pose nearer than this to the tracked one is no jump
-constexpr double kFoundSigma_m = 0.1, kFoundSigma_rad = 0.03;  // of a pose that the search found
-// While lost the pose follows odometry; its covariance grows by this up to the sigma, so that it does not freeze.
+constexpr double kSame_m = 0.3,
+                 kSame_rad = 0.15;  // an adopted pose nearer than this to the tracked one is no jump; not swept
+constexpr double kFoundSigma_m = 0.1,
+                 kFoundSigma_rad = 0.03;  // of a pose that the search found: its grid's half step, aligned; not swept
+// While lost the pose follows odometry; its covariance grows by this up to the sigma, so that it does not freeze. Not
+// swept.
 constexpr double kDriftSigma_m = 0.1, kDrift_m2ps = 0.002, kDrift_rad2ps = 0.0002;
 constexpr int kKeyframesSuspicious = 4, kKeyframesIdle = 10;  // of 0.4 m, from which on the map is searched
 // Budgets of a scan, as divisors of search.poses: the alias sweep when all is nominal and otherwise; the idle search;
-// weighing of hypotheses. And how many of these are weighed while suspicious, at most.
+// weighing of hypotheses. And how many of these are weighed while suspicious, at most. Not swept.
 constexpr int kAliasNominal = 4, kAliasOtherwise = 2, kIdle = 8, kWeighingShare = 4, kWeighedMax = 6;
 constexpr int kPosesMin = place_search::kAligningCost + place_search::kWeighingCost;
 static_assert(kPosesMin <= EDGE_MCL_SEARCH_POSES_LEAST && hypotheses::kPosesMin <= EDGE_MCL_SEARCH_POSES_LEAST);
 // A hypothesis is adopted with this probability, this fraction explained, and so much more of it than the tracked pose.
+// The margin keeps two poses of a corridor from taking turns. Not swept.
 constexpr double kAdoptProbability = 0.95, kAdoptExplained = 0.6, kAdoptMargin = 0.15;
-// An alias becomes a hypothesis at these odds, or, while suspicious, where it explains so much more.
+// An aliased pose is offered as a searched one, too, at these odds, or, while suspicious, where it explains so much
+// more. Not swept.
 constexpr double kAliasOdds = 0.01, kAliasMargin = 0.4;
-constexpr double kNotKidnapped = 7.0;  // log prior odds of the tracked pose: not carried off in the last metres
-constexpr double kNoPose = -1e3;       // the same where there is no tracked pose
+constexpr double kNotKidnapped =
+    7.0;                          // log prior odds of the tracked pose: 1 kidnapping in 1100 windows of 6 m; not swept
+constexpr double kNoPose = -1e3;  // the same where there is no tracked pose
 
 constexpr double kFoundCovariance[3][3] = {{kFoundSigma_m * kFoundSigma_m, 0, 0},
                                            {0, kFoundSigma_m *kFoundSigma_m, 0},
@@ -109,7 +116,7 @@ void edge_mcl::update_aliases(double dt_s) {
   const int share = params_.search_poses / (nominal ? kAliasNominal : kAliasOtherwise);
   const int poses = share > hypotheses::kPosesMin ? share : hypotheses::kPosesMin;
   others_.update_aliased(map_, search_.field(), scan_, way, fit_.mean_explained(),
-                         sure ? params_.lost_per_s * dt_s : 0.0, sure ? poses : 0);
+                         sure ? params_.kidnapped_per_s * dt_s : 0.0, sure ? poses : 0);
   if (life_.searching()) return;
   constexpr double kNoError[kMountingAll] = {};
   const auto offer = [&](const hypothesis &alias) { others_.offer(alias.pose, alias.explained, kNoError); };

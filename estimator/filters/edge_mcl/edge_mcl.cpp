@@ -14,8 +14,8 @@
 namespace wm {
 namespace {
 
-constexpr double kMotionGap_s = 1.0;      // between two messages of the motion sensors, beyond which the way is unknown
-constexpr double kUnknownSigma_m = 0.03;  // of a point without a sigma and without a camera
+constexpr double kMotionGap_s = 1.0;      // between two motion messages, beyond which the way is unknown; not swept
+constexpr double kUnknownSigma_m = 0.03;  // of a point without a sigma and a camera: a pixel at 4 m
 
 const char *const kReads[] = {"motion.", nullptr};
 
@@ -39,24 +39,17 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   setup_ = &setup;
   params_ = params;
   const int cameras = setup.rig ? static_cast<int>(setup.rig->camera_count) : 0;
-  const int each_camera = (params.pitch_sigma_rad > 0.0) + (params.roll_sigma_rad > 0.0) +
-                          (params.yaw_sigma_rad > 0.0) + (params.height_sigma_m > 0.0) +
-                          (params.time_offset_sigma_s > 0.0);
+  int each_camera = 0;
+  for (int k = 0; k <= kCameraTime; k++) each_camera += params.sigma[k] > 0.0;
   const wm_motion_states &motion = setup.motion->states;
   filter_.init(setup, motion,
-               kPoseStates + planar_filter::count_motion_states(motion) + (params.edge_offset_sigma_m > 0.0) +
+               kPoseStates + planar_filter::count_motion_states(motion) + (params.sigma[kEdgeOffset] > 0.0) +
                    each_camera * cameras);
-  const auto add = [this](double sigma) { return sigma > 0.0 ? filter_.add_state(0.0, sigma) : -1; };
-  edge_state_ = add(params.edge_offset_sigma_m);
-  camera_count_ = setup.rig ? (int)setup.rig->camera_count : 0;
-  for (int c = 0; c < camera_count_; c++) {
-    camera_[c].init(setup.rig->cameras[c]);
-    camera_state_[c][kPitch] = add(params.pitch_sigma_rad);
-    camera_state_[c][kRoll] = add(params.roll_sigma_rad);
-    camera_state_[c][kCameraYaw] = add(params.yaw_sigma_rad);
-    camera_state_[c][kHeight] = add(params.height_sigma_m);
-    camera_state_[c][kCameraErrors] = add(params.time_offset_sigma_s);
-  }
+  const auto add = [&](int row) { return params.sigma[row] > 0.0 ? filter_.add_state(0.0, params.sigma[row]) : -1; };
+  edge_state_ = add(kEdgeOffset);
+  camera_count_ = cameras;
+  for (int c = 0; c < camera_count_; c++) camera_[c].init(setup.rig->cameras[c]);
+  slots_.init(camera_count_, add);
   memory_layout layout(this, sizeof *this);
   map_.init(*setup.map, layout.take<uint8_t>(edge_map::bytes(*setup.map)));
   search_.init(map_, layout.take<uint8_t>(place_search::bytes(*setup.map)));
@@ -162,7 +155,7 @@ void edge_mcl::place_scan(const wm_points &points, int camera) {
   };
   double sigma[kMountingErrors];
   for (int k = 0; k < kMountingErrors; k++) {
-    const int state = camera >= 0 ? camera_state_[camera][kMountingError[k]] : -1;
+    const int state = camera >= 0 ? slots_.at(camera, kMountingError[k]) : -1;
     sigma[k] = state >= 0 ? std::sqrt(filter_.variance(state)) : 0.0;
   }
   scan_.count = 0;
@@ -197,18 +190,15 @@ void edge_mcl::estimate(wm_estimate *out) const {
 }
 
 size_t edge_mcl::list_calibration(wm_calibration_value *out, size_t capacity) const {
-  static constexpr const char *kNames[kCameraErrors + 1] = {"pitch_rad", "roll_rad", "yaw_rad", "height_m",
-                                                            "time_offset_s"};
+#define WM_CAMERA_NAME(state, key, unit, name, ...) name,
+  static constexpr const char *kNames[] = {WM_CAMERA_STATES(WM_CAMERA_NAME)};
   calibration_list list(out, capacity);
   filter_.list_motion_states(&list);
   for (int c = 0; c < camera_count_; c++)
-    for (int k = 0; k <= kCameraErrors; k++) {
-      const int state = camera_state_[c][k];
-      if (state >= 0)
-        list.add(setup_->rig->cameras[c].name, kNames[k], filter_.value(state), std::sqrt(filter_.variance(state)));
-    }
+    slots_.list(
+        c, setup_->rig->cameras[c].name, filter_, [](int k) { return kNames[k]; }, &list);
   if (edge_state_ >= 0)
-    list.add("edges", "offset_m", filter_.value(edge_state_), std::sqrt(filter_.variance(edge_state_)));
+    list.add("edges", kNames[kEdgeOffset], filter_.value(edge_state_), std::sqrt(filter_.variance(edge_state_)));
   return list.count();
 }
 

@@ -8,6 +8,7 @@
 #include "filters/core/lifecycle.hpp"
 #include "filters/core/record_list.hpp"
 #include "filters/core/rollback.hpp"
+#include "filters/core/state_slots.hpp"
 #include "filters/edge_mcl/align.hpp"
 #include "filters/edge_mcl/fit_evidence.hpp"
 #include "filters/edge_mcl/hypotheses.hpp"
@@ -18,8 +19,8 @@
 
 namespace wm {
 
-// Pose, motion, the edges' common offset, and five errors of each of two cameras.
-inline constexpr int kMaxEdgeStates = kPoseStates + kCalibrationCount + 2 + 1 + 2 * 5;
+// Pose, motion, and the table's: all but the last row for each camera.
+inline constexpr int kMaxEdgeStates = kPoseStates + kCalibrationCount + 2 + kMountingCameras * (kCameraStates - 1) + 1;
 
 class edge_mcl {
  public:
@@ -124,7 +125,7 @@ class edge_mcl {
   fit_evidence fit_;
   floor_camera camera_[kCamerasMax];
   int camera_count_;
-  int camera_state_[kCamerasMax][kCameraErrors + 1];  // and the time offset
+  state_slots<kCamerasMax, kCameraTime + 1> slots_;
   int edge_state_;
   rollback<kMaxEdgeStates, 2> rollback_;  // calibration while the scans fitted: being lost is noticed within 2 s
   lifecycle life_;

@@ -4,12 +4,12 @@
 namespace wm {
 namespace {
 
-constexpr double kKnownLogOdds = -4.0, kUnknownLogOdds = 6.0;  // of a pose that was given; of none
-constexpr double kLeastLogOdds = -6.0;  // keeps a kidnapping noticeable within two or three scans
+constexpr double kKnownLogOdds = -4.0, kUnknownLogOdds = 6.0;  // of a given pose, 2 %; of none, 99.8 %; not swept
+constexpr double kLeastLogOdds = -6.0;  // 0.25 %: keeps a kidnapping noticeable within two or three scans
 // Scans at least so far apart are independent evidence. Chosen with the numbers below.
 constexpr double kIndependent_s = 0.5, kIndependent_m = 0.2;
-constexpr double kUsual_s = 10.0, kMean_s = 60.0;             // time constants of the means
-constexpr double kStartShortfall = 0.1, kStartBeyond = 0.05;  // means before anything was learned
+constexpr double kUsual_s = 10.0, kMean_s = 60.0;             // time constants of the means; not swept
+constexpr double kStartShortfall = 0.1, kStartBeyond = 0.05;  // fractions of points, before a scan; not swept
 // Numbers of the test, chosen on 43 corridor-easy and corridor-hard drives (docs/consistency.md), judged on others; not
 // swept one by one.
 constexpr double kGain = 8.0;        // nats per unit of the explained fraction
@@ -22,9 +22,9 @@ constexpr double kReflection = 0.5;  // weight of a reflection, half of what it 
 
 void fit_evidence::init(const wm_edge_mcl_params &params) {
   lost_explained_ = params.lost_explained;
-  lost_below_ = params.lost_below;
-  lost_beyond_ = params.lost_through;
-  lost_per_s_ = params.lost_per_s;
+  lost_margin_ = params.lost_margin;
+  lost_beyond_ = params.lost_beyond_weight;
+  kidnapped_per_s_ = params.kidnapped_per_s;
   usual_ = mean_explained_ = params.lost_explained;
   averaged_s_ = 0.0;
   mean_shortfall_ = kStartShortfall;
@@ -41,10 +41,10 @@ double fit_evidence::explained_by(const normal_equations &scan) const {
 }
 
 // gain x (threshold - explained), where points on this side of the map's edges count a little less, and points beyond
-// them, less their usual fraction, lost.through times. The two sides of a beam model (S. Thrun, W. Burgard, D. Fox,
-// "Probabilistic Robotics", 2005, 6.3).
+// them, less their usual fraction, lost.beyond_weight times. The two sides of a beam model (S. Thrun, W. Burgard, D.
+// Fox, "Probabilistic Robotics", 2005, 6.3).
 double fit_evidence::log_bayes_factor(const normal_equations &scan, double explained) const {
-  const double own = usual_ - lost_below_ - kShortfalls * mean_shortfall_;
+  const double own = usual_ - lost_margin_ - kShortfalls * mean_shortfall_;
   const double threshold = expected_edges(scan.seen) * (own > lost_explained_ ? own : lost_explained_);
   const double beyond = (double)scan.beyond / scan.seen, rest = 1.0 - explained - beyond;
   const double misfit = beyond + kHidden * (rest > 0.0 ? rest : 0.0);
@@ -60,7 +60,7 @@ double fit_evidence::add(const normal_equations &scan, double dt_s, double way) 
   const double factor = fresh * log_bayes_factor(scan, explained);
   // Unclamped until the hazard of being carried off is in.
   odds_.reset(odds_.value() + factor);
-  odds_.add_hazard(lost_per_s_ * dt_s);
+  odds_.add_hazard(kidnapped_per_s_ * dt_s);
   if (!(odds_.value() > kLeastLogOdds)) odds_.set(kLeastLogOdds);
   return factor;
 }

@@ -38,7 +38,7 @@ class fit_evidence {
   double log_bayes_factor(const normal_equations &scan, double explained) const;
 
   evidence odds_;
-  double lost_explained_, lost_below_, lost_beyond_, lost_per_s_;
+  double lost_explained_, lost_margin_, lost_beyond_, kidnapped_per_s_;
   double explained_;
   double usual_;                         // fraction explained of the points that can be edges, over 10 s
   double mean_explained_, averaged_s_;   // over the last minute, and over how much of it

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a point of the floor really is when the camera that saw it is mounted a little otherwise than calibration.yaml
-// says.
+// Corrects a point on the floor by the errors of its camera's mounting.
 #ifndef WAYMARK_ESTIMATOR_EDGE_MCL_FLOOR_CAMERA_HPP
 #define WAYMARK_ESTIMATOR_EDGE_MCL_FLOOR_CAMERA_HPP
 
+#include "filters/edge_mcl/camera_states.h"
 #include "math/elementary.hpp"
 #include "waymark/setup.h"
 
 namespace wm {
 
-enum camera_error { kPitch, kRoll, kCameraYaw, kHeight, kCameraErrors };
+#define WM_CAMERA_STATE(state, ...) state,
+enum camera_state { WM_CAMERA_STATES(WM_CAMERA_STATE) kCameraStates };
+inline constexpr int kCameraErrors = kCameraTime;  // errors of the mounting: they move points
 
 // A point in base_link and its derivatives by the errors.
 struct floor_point {

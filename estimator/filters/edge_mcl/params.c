@@ -5,25 +5,17 @@
 
 typedef struct wm_edge_mcl_params params;
 
-static const wm_param kParams[] = {
-    F64("states.pitch_sigma_rad", pitch_sigma_rad, 0.01, 0, 0.5,
-        "Start sigma of each camera's pitch about calibration.yaml's, rad. 0.1 degrees are 7 cm of floor at 4 m. 0: "
-        "off."),
-    F64("states.roll_sigma_rad", roll_sigma_rad, 0.01, 0, 0.5, "The same of its roll about the view, rad. 0: off."),
-    F64("states.yaw_sigma_rad", yaw_sigma_rad, 0.01, 0, 0.5, "The same of its yaw, rad. 0: off."),
-    F64("states.height_sigma_m", height_sigma_m, 0.01, 0, 0.5, "The same of its height above the floor, m. 0: off."),
-    F64("states.time_offset_sigma_s", time_offset_sigma_s, 0.03, 0, 0.3,
-        "Start sigma of each camera's time offset, s: its pictures are that much older than their stamps. 0: off."),
-    F64("states.edge_offset_sigma_m", edge_offset_sigma_m, 0.01, 0, 0.3,
-        "Start sigma of the distance between the detected edge and the map's, m: skirting, contact shadow. 0: off."),
+#define WM_CAMERA_PARAM(state, key, unit, name, initial, most, text) \
+  F64("states." key "_sigma" unit, sigma[WM_CAMERA_ROW_##state], initial, 0, most, text),
 
-    F64("points.pixel_px", pixel_px, 0.5, 0.01, 10,
-        "Sigma of an edge in the picture, pixels, where the detector gives none in metres."),
+static const wm_param kParams[] = {
+    WM_CAMERA_STATES(WM_CAMERA_PARAM)
+
+        F64("points.pixel_px", pixel_px, 0.5, 0.01, 10,
+            "Sigma of an edge in the picture, pixels, where the detector gives none in metres."),
     F64("points.sigma_m", point_sigma_m, 0.012, 0.001, 1, "Sigma of a point besides: map and edge, m."),
     F64("points.common_px", common_px, 0.6, 0, 10,
         "Sigma of the error that all points of one wall share, pixels: blur, the wall's reflection in a glossy floor."),
-    F64("points.correlated", correlated, 30, 1, 1000,
-        "Number of points of successive scans whose errors are common: the information of each is divided by it."),
     F64("points.range_max_m", range_max_m, 6.0, 0.5, 50, "Points farther from the camera are not used, m."),
     F64("points.gate_m", gate_m, 0.15, 0.01, 0.6, "A point farther from the map's edge than this is not aligned, m."),
     F64("systematic.xy_m", systematic_xy_m, 0.01, 0, 1,
@@ -34,14 +26,14 @@ static const wm_param kParams[] = {
     F64("lost.explained", lost_explained, 0.5, 0.05, 0.95,
         "Fraction of a scan's points that the map explains at which the scan is evidence neither for nor against being "
         "lost. Of n points n/(n + 60) can be edges; the fraction is taken of these."),
-    F64("lost.below", lost_below, 0.2, 0, 1,
+    F64("lost.margin", lost_margin, 0.2, 0, 1,
         "Margin below the drive's own mean fraction. The threshold is the larger of lost.explained and mean - "
-        "lost.below - 4 times the mean shortfall."),
-    F64("lost.through", lost_through, 3, 1, 100,
+        "lost.margin - 4 times the mean shortfall."),
+    F64("lost.beyond_weight", lost_beyond_weight, 3, 1, 100,
         "Weight of an unexplained point beyond an edge of the map, where a camera at the estimated pose cannot see; "
         "less 4 times their usual fraction. 1: as any other (glass walls, lines on the floor that the map has)."),
-    F64("lost.per_s", lost_per_s, 0.0001, 0, 1,
-        "Probability of being carried off, per s; the prior of perceptually aliased poses, too."),
+    F64("lost.kidnapped_per_s", kidnapped_per_s, 0.0001, 0, 1,
+        "Rate of kidnapping, a prior, per s; the prior of perceptually aliased poses, too."),
     I32("search.poses", search_poses, 80000, EDGE_MCL_SEARCH_POSES_LEAST, 10000000,
         "Largest work of a scan while suspicious or lost, in poses that a sweep over the map scores by 24 points. An "
         "eighth of it otherwise, and a quarter to a half for aliased poses. Aligning a place counts 8704, weighing it "
@@ -57,6 +49,10 @@ static const wm_param_old kOld[] = {
     {"states.angle_walk_rad", NULL, "nothing read it"},
     {"states.*", "/motion.states.*", NULL},
     {"lasting.*", "systematic.*", NULL},
+    {"lost.below", "lost.margin", NULL},
+    {"lost.through", "lost.beyond_weight", NULL},
+    {"lost.per_s", "lost.kidnapped_per_s", NULL},
+    {"points.correlated", NULL, CONSTANT},
     {"particles", NULL, NO_PARTICLES},
     {"weight", NULL, NO_PARTICLES},
     {"pose", NULL, NO_PARTICLES},

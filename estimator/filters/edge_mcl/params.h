@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "filters/edge_mcl/camera_states.h"
 #include "waymark/params.h"
 
 #ifdef __cplusplus
@@ -14,12 +15,12 @@ extern "C" {
 enum { EDGE_MCL_SEARCH_POSES_LEAST = 12000 };
 
 typedef struct wm_edge_mcl_params {
-  double pitch_sigma_rad, roll_sigma_rad, yaw_sigma_rad, height_sigma_m, time_offset_sigma_s, edge_offset_sigma_m;
+  double sigma[WM_CAMERA_ROWS];  // at the start, of each state; 0: not a state
 
-  double pixel_px, point_sigma_m, common_px, correlated, range_max_m, gate_m;
+  double pixel_px, point_sigma_m, common_px, range_max_m, gate_m;
   double systematic_xy_m, systematic_heading_rad;
 
-  double lost_explained, lost_below, lost_through, lost_per_s;
+  double lost_explained, lost_margin, lost_beyond_weight, kidnapped_per_s;
   int32_t search_poses;
   double dead_reckoning_after_s;
 } wm_edge_mcl_params;

@@ -4,14 +4,15 @@
 namespace wm {
 namespace {
 
-constexpr uint64_t kKeyframesLeast = 4;
+constexpr uint64_t kKeyframesLeast = 4;                    // 1.6 m: one keyframe fits anywhere; not swept
 constexpr double kKeyframe_m = 0.4, kKeyframe_rad = 0.25;  // from one keyframe to the next; not swept
-constexpr int kPointsMin = 8;                              // of a keyframe
+constexpr int kPointsMin = 8;                              // of a keyframe: fewer leave a pose open
 // Points whose place the mounting's uncertainty leaves open by more than this are left out of the sweep, whose places
 // can't move them: half a grid step. Where too few remain, twice that, up to the maximum.
 constexpr double kOpen_m = 0.1, kOpenMax_m = 2.0;
 constexpr double kHopeful = 0.35;  // nats by which a further point may be better than the mean of the first; not swept
-constexpr double kGate_m = 0.3, kExplained_m = 0.1;  // of points that are aligned; that are explained
+constexpr double kGate_m = 0.3,
+                 kExplained_m = 0.1;  // of points that are aligned; that are explained: half of the sweep's sigma
 
 }  // namespace
 

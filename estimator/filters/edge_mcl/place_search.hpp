@@ -19,7 +19,7 @@ struct place {
 
 class place_search {
  public:
-  static constexpr int kPlaces = 24;
+  static constexpr int kPlaces = 24;  // best places of a sweep; not swept
   // Work of explained(), 2 poses a point and look-up, and of a place that step() aligns, 4 a point (as measured: wider
   // gates, colder memory). step() needs the latter at once.
   static constexpr int kWeighingCost = 2 * (4 * WM_POINTS_MAX / 2 + WM_POINTS_MAX);
@@ -54,6 +54,7 @@ class place_search {
   int keyframes() const { return (int)(seen_ - oldest()); }
 
  private:
+  // 16 keyframes are 6.4 m; 72 headings are 5 degrees apart, 0.35 m at 4 m. Not swept.
   static constexpr int kKeyframes = 16, kPointsEach = 32, kSweepPoints = 96, kFirstPoints = 24, kHeadings = 72;
   using sweep = grid_sweep<kHeadings, kSweepPoints, kPlaces, 1>;
   static_assert(sweep::kRunCostMax <= kAligningCost);

@@ -79,6 +79,8 @@ struct drive {
   double t = 0;
   uint64_t draws = 0;
   double pitch_rad = 0;         // of the camera, more than is believed
+  int late = 0;                 // hundredths of a second by which pictures are older than their stamps
+  double thick_m = 0;           // walls' edges are seen so much nearer than the map has them
   bool silent = false;          // motion sensors say nothing
   double blocked_m = INFINITY;  // something stands across the way, so far before the camera
   int glass = 0;                // so many rays, from the right on, go on through the wall
@@ -93,7 +95,7 @@ struct drive {
     const double eye_x = truth.x_m + std::cos(truth.heading_rad), eye_y = truth.y_m + std::sin(truth.heading_rad);
     for (int i = 0; i < 140; i++) {
       const double angle = -1.2 + 2.4 * i / 139, wall = cast(eye_x, eye_y, truth.heading_rad + angle);
-      const double range = std::fmin(i < glass ? 1.5 * wall : wall, blocked_m / std::cos(angle));
+      const double range = std::fmin((i < glass ? 1.5 * wall : wall) - thick_m, blocked_m / std::cos(angle));
       if (range < 0.3 || range > 5) continue;
       // Seen at an angle below the horizon of atan(h/r); believed to be pitched less, it seems farther.
       const double seen = std::atan2(0.4, range) - pitch_rad * std::cos(angle) + 0.001 * noise();
@@ -114,14 +116,18 @@ struct drive {
       e.t_ns = wm_ns_from_seconds(t);
       e.as.twist2 = {v, w};
       if (!silent) TEST_ASSERT_EQUAL(WM_OK, f.ops->predict(f.state, &e));
+      wm_event picture{};
       for (int k = 0; k < 10; k++) {
+        if (k == 10 - late) scan(&picture);
         truth.heading_rad += 0.005 * w * 1.01;
         truth.x_m += 0.01 * v * 0.99 * std::cos(truth.heading_rad);
         truth.y_m += 0.01 * v * 0.99 * std::sin(truth.heading_rad);
         truth.heading_rad += 0.005 * w * 1.01;
       }
       t += 0.1;
-      scan(&e);
+      if (late == 0) scan(&picture);
+      e = picture;
+      e.t_ns = wm_ns_from_seconds(t);
       if (nonsense)
         for (uint32_t k = 0; k < e.as.points.count; k++) {
           e.as.points.x_m[k] = (float)(3 + 2 * noise());
