@@ -19,6 +19,7 @@ NEES_LEAST = 0.85
 COVERAGE_LEAST = 0.95   # of the best one's share of stamps with a pose: silence is no accuracy
 WRONG_M = 0.5
 WRONG_SIGMA = 3.5
+OUTAGES_S = (240, 330, 420)   # since the first stamp
 
 # Chosen by hand with sight of the truth, where no shipped configuration fits.
 RANGES_BY_HAND = """
@@ -141,19 +142,36 @@ def confidently_wrong(run, recording):
     return wrong / total if total else None
 
 
+def first_stamp_ns(recording):
+    stamps = [int(r["t_ns"]) for name in ("motion", "sightings", "gnss") if (recording / f"{name}.csv").exists() for r in rows(recording / f"{name}.csv")[:1]]
+    if (recording / "can.log").exists():
+        with open(recording / "can.log") as log:
+            stamps.append(round(float(log.readline().split()[0].strip("()")) * 1e9))
+    return min(stamps)
+
+
 def outages(bin_dir, recording, text, folder):
-    """Largest error in % of the way after 60 s without GNSS, of three outages."""
+    """Largest error in % of the way after 60 s without GNSS, of three outages; None where there is no pose."""
     worst = 0
-    for begin_s in (120, 240, 360):
+    for begin_s in OUTAGES_S:
         config = folder / "outage.yaml"
         config.write_text(f"{text}\nsources: [{{name: gnss, until_s: {begin_s}}}]\n")
         try:
             command(bin_dir / "waymark", "replay", recording, "--config", config, "--out", folder / "outage")
-            judged = json.loads(command(bin_dir / "waymark-eval", folder / "outage", recording, "--json", *GNSS, "--from", begin_s, "--to", begin_s + 60))
-        except Refused:
+            first_pose_s = (int(rows(folder / "outage/trajectory.csv")[0]["t_ns"]) - first_stamp_ns(recording)) * 1e-9
+            begin = max(begin_s - first_pose_s, 0)
+            judged = json.loads(command(bin_dir / "waymark-eval", folder / "outage", recording, "--json", *GNSS, "--from", begin, "--to", begin + 60))
+        except (Refused, IndexError):
             return None
         worst = max(worst, judged["position_end_percent"])
     return worst
+
+
+def found_after_s(trajectory, recording):
+    """Time from the first position with a sigma of 10 m or less to the first pose."""
+    usable = [int(r["t_ns"]) for r in rows(recording / "gnss.csv") if float(r["sigma_xy_m"]) <= 10]
+    begun = [int(r["t_ns"]) for r in trajectory if r["state"] == "tracking"]
+    return max(begun[0] - usable[0], 0) * 1e-9 if begun and usable else None
 
 
 def figures(bin_dir, case, recording, config, folder):
@@ -166,9 +184,8 @@ def figures(bin_dir, case, recording, config, folder):
     against_gnss = "gnss" in case.options
     out["nees_inside_95"] = None if against_gnss else out["nees_inside_95"]
     out["confidently_wrong"] = None if against_gnss else confidently_wrong(folder, recording)
-    states = rows(folder / "trajectory.csv")
-    begun = [int(r["t_ns"]) for r in states if r["state"] == "tracking"]
-    out["found_s"] = (begun[0] - int(states[0]["t_ns"])) * 1e-9 if begun else None
+    if "found_s" in case.bars:
+        out["found_s"] = found_after_s(rows(folder / "trajectory.csv"), recording)
     return out
 
 
