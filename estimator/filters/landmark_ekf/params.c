@@ -14,22 +14,22 @@ static const wm_param kParams[] = {
         "Start sigma of the receiver's time offset, s: its positions are that much older than their stamps. 0: off."),
     I32("states.map_slots", map_slots, 0, 0, 16,
         "Landmarks (the last seen ones) whose error on the map, by their sigma_m, is carried as states. 0: the map's "
-        "error is taken as fresh noise of each sighting, which is too sure of itself where one landmark is seen "
-        "often."),
+        "error counts as independent noise of each sighting, and the covariance is too small where one landmark is "
+        "seen often."),
     BOOL("use.position", use_position, 1, "Fuse positions (GNSS)."),
     BOOL("use.heading", use_heading, 1, "Fuse headings."),
-    F64("noise.gnss_factor", gnss_sigma_factor, 1, 0.01, 100, "Times the position's sigma."),
-    F64("noise.gnss_min_m", gnss_sigma_min_m, 0.01, 0, 1000, "A position's sigma is never taken to be smaller, m."),
+    F64("noise.gnss_factor", gnss_sigma_factor, 1, 0.01, 100, "Factor of the position's sigma."),
+    F64("noise.gnss_min_m", gnss_sigma_min_m, 0.01, 0, 1000, "Lower limit of a position's sigma, m."),
     F64("correlated.gnss_m", gnss_correlated_m, 0, 0, 1000,
         "Sigma of a position's time-correlated error on each axis, m (reflections, atmosphere). 0: none."),
     F64("correlated.gnss_tau_s", gnss_correlated_tau_s, 60, 0.1, 1e6, "Time constant of that error, s."),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
-        "Nothing fused for so long: the state says dead reckoning."),
-    BOOL("recover.on", recover, 1, "Search the pose anew when observations keep contradicting it."),
+        "Time without a fused observation after which the state is dead reckoning, s."),
+    BOOL("recover.on", recover, 1, "Relocalize when the observations show that the pose is wrong."),
     F64("recover.window_s", recover_window_s, 20, 1, 600,
-        "Observations that are used to find the pose are at most so old; odometry carries them together."),
+        "Age up to which observations are used for relocalization, s; odometry relates them."),
     F64("recover.sigma_xy_m", recover_sigma_xy_m, 1, 0.001, 100,
-        "A pose found anew is taken when it is known at least so well, m (GNSS alone: a few metres)."),
+        "Largest sigma with which a found pose is accepted, m (GNSS alone: a few metres)."),
     F64("recover.sigma_heading_rad", recover_sigma_heading_rad, 0.25, 0.001, 3, "The same for the heading, rad."),
 };
 

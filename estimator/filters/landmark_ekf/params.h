@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fields of `landmark_ekf:`; their meaning is told once, in params.c.
+// The fields of `landmark_ekf:`; params.c documents them.
 #ifndef WAYMARK_ESTIMATOR_LANDMARK_EKF_PARAMS_H
 #define WAYMARK_ESTIMATOR_LANDMARK_EKF_PARAMS_H
 

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "math/arc.hpp"
+#include "math/cholesky.hpp"
 #include "math/elementary.hpp"
 
 namespace wm {
@@ -268,24 +269,6 @@ double joint_state::covariance_of(const joint_row &a, const joint_row &b) const 
 
 double joint_state::variance_of(const joint_row &row) const { return covariance_of(row, row); }
 
-namespace {
-
-// Cholesky: s = l l', in place of the lower half. False where s is no covariance.
-bool factor(double (*l)[joint_state::kRows], int n) {
-  for (int j = 0; j < n; j++) {
-    for (int k = 0; k < j; k++) l[j][j] -= l[j][k] * l[j][k];
-    if (!(l[j][j] > 0.0)) return false;
-    l[j][j] = std::sqrt(l[j][j]);
-    for (int i = j + 1; i < n; i++) {
-      for (int k = 0; k < j; k++) l[i][j] -= l[i][k] * l[j][k];
-      l[i][j] /= l[j][j];
-    }
-  }
-  return true;
-}
-
-}  // namespace
-
 void joint_state::prepare(const joint_row *rows, const double *innovations, const double *noise, int count,
                           innovation_block *out) {
   out->rows = count;
@@ -301,7 +284,7 @@ void joint_state::prepare(const joint_row *rows, const double *innovations, cons
   out->determinant = 0.0;
   for (int k = 0; k < count; k++)
     if (rows[k].missing > 0) return;
-  if (!factor(l, count)) return;
+  if (!factorize(count, l[0], kRows)) return;
   out->nis = 0.0;
   out->determinant = 1.0;
   for (int k = 0; k < count; k++) {
@@ -326,7 +309,7 @@ bool joint_state::fuse(innovation_block &block, const double *more_noise, scope 
   for (int k = 0; k < rows; k++) block.s[k][k] += more_noise[k];
   double l[kRows][kRows], y[kRows] = {};
   std::memcpy(l, block.s, sizeof l);
-  if (!factor(l, rows)) return false;
+  if (!factorize(rows, l[0], kRows)) return false;
   // W = G L'^-1 in place of the gains; K innovation = W y, y = L^-1 innovation; P - G S^-1 G' = P - W W'.
   for (int k = 0; k < rows; k++) {
     y[k] = block.innovation[k];

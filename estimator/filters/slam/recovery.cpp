@@ -2,6 +2,7 @@
 // The kidnapped robot: observations of landmarks that are known well are evidence for or against the pose
 // (core/landmark_evidence.hpp). In doubt the map and the calibration are held: updates move the pose alone. A pose that
 // is contradicted is LOST; recent observations are then matched with the map (relocalize/pose_search.hpp).
+#include "filters/core/recovery.hpp"
 #include "filters/slam/slam.hpp"
 #include "math/arc.hpp"
 
@@ -12,7 +13,6 @@ namespace {
 // at most, two hold the map. Not swept.
 constexpr double kHoldMap = -3.0;
 constexpr double kOwnFrame = -5.0;  // log prior of a pose that defines the map's frame: as of a proven one
-constexpr double kStated = -2.5;    // of a pose that was stated or found: 8 % are wrong, as in landmark_ekf
 constexpr double kWindow_s = 20.0;  // observations older than this are not searched, as in landmark_ekf
 constexpr double kFound_m = 0.5, kFound_rad = 0.15;  // a pose with larger sigmas is not taken
 constexpr int kNumbers = 5;                          // must agree; two more than a pose has
@@ -20,13 +20,11 @@ constexpr double kFits_m = 0.5, kFits_rad = 0.2;     // of a landmark from the p
 constexpr double kRevisited_s = 5.0;                 // out of sight for so long and seen again where it was: a witness
 constexpr uint32_t kEstablished = 20;                // sightings: hardly any of these was another landmark's
 constexpr double kOld_s = 60.0;                      // or known for so long
-constexpr double kInflate_m = 0.5, kInflate_rad = 0.2;  // sigmas added while lost, as in landmark_ekf ...
-constexpr double kInflateUpTo_m = 30.0;                 // ... up to this
 
 }  // namespace
 
 void slam::begin_evidence(bool own_frame) {
-  evidence_.begin(own_frame ? kOwnFrame : kStated);
+  evidence_.begin(own_frame ? kOwnFrame : kStartWrong);
   observations_.clear();
   fit_ns_ = WM_TIME_NONE;
   pattern_odds_.reset(kOwnFrame);
@@ -169,11 +167,7 @@ void slam::take_found() {
   life_.relocalized(joint_.now_ns());
 }
 
-void slam::inflate_while_lost() {
-  if (!life_.inflation_due(joint_.now_ns()) || joint_.variance(kX) > square(kInflateUpTo_m)) return;
-  joint_.inflate_pose(square(kInflate_m), square(kInflate_rad));
-  life_.inflated(joint_.now_ns());
-}
+void slam::inflate_while_lost() { inflate_lost_pose(&life_, &joint_, joint_.now_ns()); }
 
 // Lost, the robot is anywhere on the map, and heads anywhere.
 void slam::widen(wm_estimate *out) const {
