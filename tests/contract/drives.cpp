@@ -399,11 +399,13 @@ dive::dive(unsigned happens, double seconds) {
     const bool carried = (happens & kCarriedOff) && t > 0.5 * seconds;
     const placed vehicle = swim(t - 0.02, carried);
     const bool silent = (happens & kSilence) && ((t > 3 && t < 3.7) || (t > 0.6 * seconds && t < 0.6 * seconds + 3));
+    const bool glitch = (happens & kGlitches) && i % 30 == 20;
     if (!silent)
       add(WM_EVENT_TWIST6, t)->as.twist6 = {
-          {0.57 + 0.1 * std::sin(t) + 0.02 * normal(), 0.02 * normal(), 0.04 * std::cos(0.4 * t) + 0.02 * normal()},
+          {(glitch ? 30 : 0.57) + 0.1 * std::sin(t) + 0.02 * normal(), 0.02 * normal(),
+           0.04 * std::cos(0.4 * t) + 0.02 * normal()},
           {0.035 * std::cos(0.7 * t) + 0.004 + 0.003 * normal(), 0.02 * std::cos(0.5 * t) + 0.003 * normal(),
-           0.14 + 0.003 * normal()}};
+           (glitch ? 20 : 0.14) + 0.003 * normal()}};
     const bool blind = (happens & kBlind) && t > 0.4 * seconds && t < 0.7 * seconds;
     if (i % 2 == 0 && !blind) add_picture(vehicle, t + 0.002, happens);
     if (i % 10 == 5) add_beacons(vehicle, t + 0.01);

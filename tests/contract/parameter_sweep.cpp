@@ -58,7 +58,7 @@ bool made_for(const stage &s, const wm_param &param) {
 
 // Where the parameter changes something: "stage: key = value"; empty: nowhere. `most`: values to try on each stage.
 std::string effect(const wm_param_table &table, const wm_param &param, const std::vector<recorded_stage> &stages,
-                   size_t most) {
+                   size_t most, bool refusal_counts) {
   std::vector<const recorded_stage *> order;
   for (const bool first : {true, false})
     for (const recorded_stage &s : stages)
@@ -73,7 +73,8 @@ std::string effect(const wm_param_table &table, const wm_param &param, const std
       set.set(param, value);
       trace output(&s.output);
       const bool ran = s.of->run(set, &output);
-      if (!ran || output.differs()) return s.of->name + ": " + std::to_string(value) + (ran ? "" : " is refused");
+      if (ran ? output.differs() : refusal_counts)
+        return s.of->name + ": " + std::to_string(value) + (ran ? "" : " is refused");
     }
   }
   return "";
@@ -136,7 +137,7 @@ std::vector<std::string> sweep(const owner &of, const std::vector<std::string> &
     const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
     if (is_known && !tells) continue;
     const bool is_read = !of.reads || of.reads(table.params[i]);
-    const std::string where = effect(table, table.params[i], recorded, is_read ? kAllValues : 2);
+    const std::string where = effect(table, table.params[i], recorded, is_read ? kAllValues : 2, is_read);
     if (tells)
       std::printf("%6.2f %-50s %s\n", 1.0 * clock() / CLOCKS_PER_SEC, name.c_str(),
                   where.empty() ? "NOTHING" : where.c_str());

@@ -23,8 +23,8 @@ constexpr double kCluster_m = 0.5, kCluster_rad = 0.35;
 constexpr double kFoundShare = 0.9;  // of the weight in that cluster, from which on a search has ended; not swept
 constexpr double kCovarianceMin[3] = {1.6e-5, 1.6e-5, 1e-6};  // a pixel of 1.3 cm / sqrt(12), 1 mrad; squared
 
-// Of the motion the mean alone: the particles' noise is its own.
-const char *const kReads[] = {"!motion.noise.", "!motion.states.", "motion.", nullptr};
+// The motion's noise until the first scan; then the particles have noise of their own.
+const char *const kReads[] = {"!motion.states.", "!motion.standstill.bias", "motion.", nullptr};
 
 }  // namespace
 

@@ -40,6 +40,9 @@ spatial_noise twist_noise_of(const wm_stereo_ekf_params &p, const wm_rig *rig) {
 // The velocities' noise is its own; twists' own states carry their errors.
 const char *const kReads[] = {"!motion.noise.",
                               "!motion.states.",
+                              "!motion.commands.",
+                              "!motion.standstill.yaw_rate",
+                              "!motion.standstill.bias",
                               "motion.",
                               "sightings.noise.bearing_default",
                               "sightings.noise.range_default",
