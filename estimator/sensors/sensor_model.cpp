@@ -145,12 +145,16 @@ expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &erro
   const bool scaled = (components & kAngleScaled) || errors[kAngleScale] != 0.0;
   const axis_angle stretch = scaled ? by_angle_scale(v, flat, length) : axis_angle{0.0, 0.0};
   if (components & kBearing) {
-    out.bearing_rad = wrap(atan2(v[1], v[0]) + errors[kAngleScale] * stretch.bearing);
+    const double by_x = -v[1] / flat, by_y = v[0] / flat;
+    out.bearing_rad = wrap(atan2(v[1], v[0]) + errors[kAngleScale] * stretch.bearing + errors[kEccentricX] * by_x +
+                           errors[kEccentricY] * by_y);
     for (int i = 0; i < causes; i++) {
       const double *d = ray.by[kRayCauses[i]];
       out.bearing_by[kRayCauses[i]] = (v[0] * d[1] - v[1] * d[0]) * over_q;
     }
     out.bearing_by[kBySensor + kAngleScale] = stretch.bearing;
+    out.bearing_by[kBySensor + kEccentricX] = by_x;
+    out.bearing_by[kBySensor + kEccentricY] = by_y;
   }
   if (components & kRange) {
     const sin_cos axis = errors[kDepthAxis] != 0.0 ? sincos(errors[kDepthAxis]) : sin_cos{0.0, 1.0};

@@ -28,6 +28,10 @@ extern "C" {
       "landmarks above or below the sensor, and the places of coded markers. 0: off.") \
   ONE(kAngleScale, "sensor_angle_scale", "", "angle_scale", 0, -0.5, 0.5, CONSTANT, 1, \
       "Start sigma of each sensor's relative error of angles from its axis: a wrongly calibrated focal length. 0: off.") \
+  TWO(kEccentricX, kEccentricY, "sensor_eccentricity", "_rad", "eccentric_x_rad", "eccentric_y_rad", 0, -0.3, 0.3, \
+      CONSTANT, 0.3, \
+      "Start sigma of a turntable's eccentricity, rad: its axis beside the angle encoder's centre, forwards and " \
+      "sideways, over the encoder's radius. A rotating laser's bearings err by -x sin(bearing) + y cos(bearing). 0: off.") \
   ONE(kTimeOffset, "sensor_time_offset", "_s", "time_offset_s", 0, -5, 5, CONSTANT, 1, \
       "Start sigma of each sensor's time offset, s: its sightings are that much older than their stamps. 0: off.") \
   ONE(kRangeBias, "range_bias", "_m", "range_bias_m", 0, -100, 100, CONSTANT, 10, \

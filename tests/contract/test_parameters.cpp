@@ -149,9 +149,13 @@ const std::vector<setting> kMotionStates = {
     {"motion.states.turn_slowdown_sigma_mps", 0.02},   {"motion.states.wheel_difference_sigma", 0.01},
 };
 const std::vector<setting> kSensorStates = {
-    {"sightings.states.sensor_yaw_sigma_rad", 0.05},       {"sightings.states.sensor_xy_sigma_m", 0.05},
-    {"sightings.states.sensor_time_offset_sigma_s", 0.05}, {"sightings.states.range_bias_sigma_m", 0.1},
-    {"sightings.states.range_scale_sigma", 0.05},          {"sightings.states.sensor_angle_scale_sigma", 0.02},
+    {"sightings.states.sensor_yaw_sigma_rad", 0.05},
+    {"sightings.states.sensor_xy_sigma_m", 0.05},
+    {"sightings.states.sensor_time_offset_sigma_s", 0.05},
+    {"sightings.states.range_bias_sigma_m", 0.1},
+    {"sightings.states.range_scale_sigma", 0.05},
+    {"sightings.states.sensor_angle_scale_sigma", 0.02},
+    {"sightings.states.sensor_eccentricity_sigma_rad", 0.02},
 };
 const std::vector<setting> kCorrelated = {
     {"sightings.correlated.slots", 6},        {"sightings.correlated.bearing_rad", 0.01},
@@ -339,6 +343,7 @@ std::vector<dive_scenario> dive_scenarios() {
       {"points found on the way", kNoMap | kOutliers, 12, {{"slam.points", 60}}},
       {"a map's points as states", kBlind, 12, {{"slam.points", 60}}},
       {"carried off", kCarriedOff, 10, {}},
+      {"samples that no vehicle can follow", kGlitches, 10, {}},
       {"no start", kNoStart, 8, {}},
   };
 }
@@ -356,10 +361,11 @@ std::vector<stage> stages_of(const wm_estimator &of, const whole_table &tables,
   for (const scenario &s : scenarios()) {
     const bool general = s.estimator[0] == '\0';
     if (!general && std::strcmp(s.estimator, of.name) != 0) continue;
-    // The general ones test the motion: an estimator is given something to see besides.
+    // The general ones test the motion: an estimator is given something to see besides, but for particles, whose
+    // covariance is theirs from the first scan on.
     unsigned sees = s.sees;
     if (general && (of.takes & WM_EVENT_BIT(WM_EVENT_SIGHTING))) sees |= kBearings | kRanges;
-    if (general && (of.takes & WM_EVENT_BIT(WM_EVENT_POINTS))) sees |= kPoints;
+    if (general && (of.takes & WM_EVENT_BIT(WM_EVENT_POINTS)) && !of.particles) sees |= kPoints;
     add(s.name, s.params, s.first_for, std::make_unique<drives::scene>(s.by, sees, s.happens, s.seconds));
   }
   if (!(of.takes & WM_EVENT_BIT(WM_EVENT_STEREO))) return out;

@@ -36,6 +36,7 @@ inline double false_share;  // of sightings that are of nothing
 inline bool hidden, twice, nameless, coded, two_poses, two_heights;
 inline double turned[kCount];      // coded: by how much a print hangs otherwise than it did
 inline double leans[2];            // coded: the camera's roll and pitch beyond what calibration.yaml says
+inline double eccentric[2];        // of a turntable: bearings err by -x sin + y cos
 inline bool in_turn;               // coded: with a second camera, 1 m higher, which doesn't lean
 inline wm_innovation last;         // what became of the last sighting, its last number
 inline int fused, rejected, twin;  // twin: 0, or where a second print of the first identity hangs
@@ -64,7 +65,7 @@ inline void make_room() {
   now_s = false_share = 0.0;
   hidden = twice = nameless = coded = two_poses = two_heights = false;
   for (double &by : turned) by = 0.0;
-  leans[0] = leans[1] = 0.0;
+  leans[0] = leans[1] = eccentric[0] = eccentric[1] = 0.0;
   in_turn = false;
   fused = rejected = twin = 0;
 }
@@ -110,7 +111,8 @@ inline void drive(double seconds, bool range = true) {
         const double bearing = wm::wrap(wm::atan2(dy, dx) - truth.heading_rad), distance = std::sqrt(dx * dx + dy * dy);
         if (std::fabs(bearing) > 1.2) continue;
         const bool wrong = wm_random_next_uniform(&noise) < false_share;
-        const double b = wrong ? gauss(0.7) : bearing + gauss(0.01);
+        const double error = eccentric[1] * wm::cos(bearing) - eccentric[0] * wm::sin(bearing);
+        const double b = wrong ? gauss(0.7) : bearing + error + gauss(0.01);
         const double r = wrong ? 1.0 + 5.0 * wm_random_next_uniform(&noise) : distance + gauss(0.03);
         if (coded) {
           wm_event seen = make::empty(now_s, WM_EVENT_MARKER);
@@ -157,11 +159,14 @@ inline double sigma() {
   return std::sqrt(e.covariance[0] + e.covariance[wm_cov_index(1, 1)]);
 }
 
-inline double calibrated(const char *name) {
+inline double calibrated(const char *name, double *sigma = nullptr) {
   wm_calibration_value values[64];
   const size_t n = slam->calibration(state, values, 64);
   for (size_t i = 0; i < n; i++)
-    if (std::strcmp(values[i].name, name) == 0) return values[i].value;
+    if (std::strcmp(values[i].name, name) == 0) {
+      if (sigma) *sigma = values[i].sigma;
+      return values[i].value;
+    }
   return NAN;
 }
 

@@ -33,6 +33,7 @@ double now_s;
 // What is wrong with the robot, unknown to the filter.
 struct faults {
   double speed_scale = 1, yaw_scale = 1, yaw_bias = 0, lag_s = 0, sensor_yaw = 0, delay_s = 0, range_bias = 0;
+  double eccentric_x = 0, eccentric_y = 0;
   double misread = 0, gnss_delay_s = 0;
   bool nameless = false;
 } fault;
@@ -150,7 +151,9 @@ int drive(double for_s, unsigned sight, int seen = 3, bool carried_blind = false
       const wm_pose2 eye = wm::compose(p, {0.3, 0, 0.2 + fault.sensor_yaw});
       const double dx = target.p_m[0] - eye.x_m, dy = target.p_m[1] - eye.y_m;
       const bool wrong = wm_random_next_uniform(&noise) < fault.misread;
-      const double bearing = wm::wrap(atan2(dy, dx) - eye.heading_rad + gauss(0.01));
+      const double true_bearing = wm::wrap(atan2(dy, dx) - eye.heading_rad);
+      const double bearing = wm::wrap(true_bearing + gauss(0.01) - fault.eccentric_x * wm::sin(true_bearing) +
+                                      fault.eccentric_y * wm::cos(true_bearing));
       const double range = std::sqrt(dx * dx + dy * dy) + fault.range_bias + gauss(0.05);
       const int32_t read = wrong ? landmarks[(step / 10 + 3 * k + 1) % 8].id : target.id;
       const wm_event e = make::sighting(now_s, fault.nameless ? -1 : read, sight & kBearings ? bearing : kAbsent,
@@ -306,6 +309,22 @@ void test_it_finds_every_error_of_its_sensors(void) {
     TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(0.03, sigma, w.name);
   }
   TEST_ASSERT_LESS_THAN_DOUBLE(0.06, off());
+}
+
+// A rotating laser whose angle encoder sits beside its axis.
+void test_an_eccentric_turntable_is_found(void) {
+  make::sightings.states.sigma[WM_SENSOR_ROW_kEccentricX] = 0.05;
+  fault.eccentric_x = 0.04;
+  fault.eccentric_y = -0.03;
+  begin();
+  drive(60, kBearings | kRanges);
+  const char *const names[] = {"camera.eccentric_x_rad", "camera.eccentric_y_rad"};
+  for (int i = 0; i < 2; i++) {
+    double sigma;
+    const double got = calibration(names[i], &sigma);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(3 * sigma, i == 0 ? 0.04 : -0.03, got, names[i]);
+    TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(0.005, sigma, names[i]);
+  }
 }
 
 void test_gnss_and_its_delay(void) {
@@ -538,6 +557,7 @@ int main(void) {
   RUN_TEST(test_expected_bearing_is_the_papers);
   RUN_TEST(test_it_tracks_and_its_covariance_is_honest);
   RUN_TEST(test_it_finds_every_error_of_its_sensors);
+  RUN_TEST(test_an_eccentric_turntable_is_found);
   RUN_TEST(test_gnss_and_its_delay);
   RUN_TEST(test_misread_codes_are_rejected_and_do_no_harm);
   RUN_TEST(test_nameless_sightings_are_of_the_one_that_fits);

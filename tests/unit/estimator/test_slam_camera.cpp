@@ -39,6 +39,22 @@ void test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.01, leans[1], calibrated("camera.pitch_rad"));
 }
 
+// A rotating laser whose angle encoder sits beside its axis: found while the map is built.
+void test_an_eccentric_turntable_is_found(void) {
+  make::sightings.states.sigma[WM_SENSOR_ROW_kEccentricX] = 0.05;
+  eccentric[0] = 0.04;
+  eccentric[1] = -0.03;
+  begin();
+  drive(120);
+  const char *const names[] = {"camera.eccentric_x_rad", "camera.eccentric_y_rad"};
+  for (int i = 0; i < 2; i++) {
+    double sigma = 0.0;
+    const double got = calibrated(names[i], &sigma);
+    TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(3 * sigma, eccentric[i], got, names[i]);
+    TEST_ASSERT_LESS_THAN_DOUBLE_MESSAGE(0.02, sigma, names[i]);
+  }
+}
+
 void test_taken_for_level_it_bends_the_map(void) { TEST_ASSERT_GREATER_THAN_DOUBLE(0.06, worst_of_leaning(0)); }
 
 // A turn of 0.25 rad/s and a stamp that is off by 0.2 s: 0.05 rad.
@@ -90,6 +106,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_a_camera_that_leans_is_found_by_how_high_markers_seem_to_hang);
   RUN_TEST(test_a_second_camera_that_sees_the_same_markers_has_its_own_tilt);
+  RUN_TEST(test_an_eccentric_turntable_is_found);
   RUN_TEST(test_taken_for_level_it_bends_the_map);
   RUN_TEST(test_stamps_that_scatter_matter_where_it_turns);
   RUN_TEST(test_a_late_stamp_turns_all_bearings_alike);
