@@ -99,14 +99,14 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   if (r.length_m > sensor_[m.sensor].max_range_m) return reject(records, at.record, WM_REJECTED_OUT_OF_RANGE);
   const int landmark = find_landmark(m.id);
   if (is_ambiguous(m.id, landmark, m.sensor)) return reject(records, at.record, WM_REJECTED_NO_ASSOCIATION);
-  if (life_.searching() && (landmark < 0 || !find_start(landmark, m, r, m.poses == 2)))
-    return reject(records, at.record, WM_REJECTED_SEARCHING);
   begin_picture(m.sensor, event.t_ns);
   at.past = look_back(m.sensor);
   if (landmark >= 0 && map_is_held()) {
+    note(landmark).level = !finite(m.yaw_sigma_rad);
     keep_observation(landmark, at, observation_of(m, r));
     if (relocalize()) return reject(records, at.record, WM_REJECTED_SEARCHING);
   }
+  if (life_.searching()) return reject(records, at.record, WM_REJECTED_SEARCHING);
   if (m.poses == 2) r = choose_pose(at, m, r, landmark);
   if (landmark >= 0) {
     fuse_known_marker(at, r, landmark);

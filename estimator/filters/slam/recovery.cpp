@@ -2,7 +2,6 @@
 // The kidnapped robot: observations of landmarks that are known well are evidence for or against the pose
 // (core/landmark_evidence.hpp). In doubt the map and the calibration are held: updates move the pose alone. A pose that
 // is contradicted is LOST; recent observations are then matched with the map (relocalize/pose_search.hpp).
-#include "filters/core/recovery.hpp"
 #include "filters/slam/slam.hpp"
 #include "math/arc.hpp"
 
@@ -12,9 +11,16 @@ namespace {
 // Log odds above which the map is held. A proven pose rests at -5 (kidnapped) and below; one misread identity adds 1.6
 // at most, two hold the map. Not swept.
 constexpr double kHoldMap = -3.0;
-constexpr double kOwnFrame = -5.0;  // log prior of a pose that defines the map's frame: as of a proven one
+// A pose found by one marker: its log prior of being wrong, 18 %, so that one other marker contradicts it; the sigma of
+// its place; observations of the marker; its bearing's error of odometry between these, a picture's stamp included.
+constexpr double kByOnePrior = -1.5;
+constexpr double kByOne_m = 0.1;
+constexpr int kByOneSeen = 3;
+constexpr double kDrift_rad = 0.005;
+constexpr double kSigmas = 3.0;
 constexpr double kWindow_s = 20.0;  // observations older than this are not searched, as in landmark_ekf
 constexpr double kFound_m = 0.5, kFound_rad = 0.15;  // a pose with larger sigmas is not taken
+constexpr double kLoose_m = 0.2, kLoose_rad = 0.05;  // added: errors of sensors and map that the search takes as white
 constexpr int kNumbers = 5;                          // must agree; two more than a pose has
 constexpr double kFits_m = 0.5, kFits_rad = 0.2;     // of a landmark from the pose found
 constexpr double kRevisited_s = 5.0;                 // out of sight for so long and seen again where it was: a witness
@@ -23,11 +29,11 @@ constexpr double kOld_s = 60.0;                      // or known for so long
 
 }  // namespace
 
-void slam::begin_evidence(bool own_frame) {
-  evidence_.begin(own_frame ? kOwnFrame : kStartWrong);
+void slam::begin_evidence(double log_prior) {
+  evidence_.begin(log_prior);
   observations_.clear();
   fit_ns_ = WM_TIME_NONE;
-  pattern_odds_.reset(kOwnFrame);
+  pattern_odds_.reset(kOwnFramePrior);
   pattern_ns_ = WM_TIME_NONE;
   line_search_.clear();
 }
@@ -69,6 +75,7 @@ bool slam::weigh(int landmark, const joint_state::innovation_block &block, bool 
     lose();
     return false;
   }
+  if (evidence_.proven()) by_one_ = false;
   if (life_.lost() && evidence_.fits() && life_.announced(now)) life_.fits_again();
   if (map_is_held()) return true;
   if (passed && witness) {
@@ -82,6 +89,7 @@ bool slam::weigh(int landmark, const joint_state::innovation_block &block, bool 
 // The landmarks that joined since the pose last fitted stand where the wrong pose put them.
 void slam::lose() {
   life_.lose(joint_.now_ns());
+  if (by_one_) one_refuted_ = true;
   line_search_.clear();
   for (int i = joint_.landmarks() - 1; i >= 0 && fit_ns_ != WM_TIME_NONE; i--)
     if (!is_witness(note(i)) && note(i).first_ns > fit_ns_) drop_landmark(i);
@@ -118,8 +126,8 @@ void slam::keep_observation(int landmark, const context &at, const planar_observ
   observations_.add(o);
 }
 
-// How many different landmarks of those observed since then a pose explains: two, where one may have been moved.
-int slam::landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns) const {
+// How many different landmarks of those observed since then a pose explains; *id: one of these.
+int slam::landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns, int32_t *id) const {
   const wm_pose2 frame = compose(pose, between(joint_.odom(), wm_pose2{}));
   int32_t fitting[pose_search::kCapacity];
   int count = 0;
@@ -134,9 +142,30 @@ int slam::landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns) const {
     if (!bearing_fits || ((o.kind & kObservedRange) && std::fabs(distance - o.range_m) > kFits_m)) continue;
     int k = 0;
     while (k < count && fitting[k] != o.key) k++;
-    if (k == count) fitting[count++] = o.key;
+    if (k == count) fitting[count++] = *id = o.key;
   }
   return count;
+}
+
+// Two landmarks must agree, since one may have moved. Whether one marker does for all that: its second pose is the
+// mirror image about the line of sight, whose heading turns twice as far as that while the robot drives by: it must
+// have become impossible. Not where the map grows, since a marker that has moved would spoil it.
+bool slam::is_found_by_one(const search_result &found, wm_time_ns since_ns, int32_t id) const {
+  if (params_.map != WM_SLAM_MAP_FROZEN || one_refuted_ || !params_.markers) return false;
+  if (found.covariance[0][0] + found.covariance[1][1] > 2.0 * square(kByOne_m)) return false;
+  double first_rad = 0.0, turned_rad = 0.0, heading_sigma_rad = 0.0;
+  int seen = 0;
+  for (int i = 0; i < observations_.kept(); i++) {
+    const observation &o = observations_.at(i);
+    if (o.t_ns >= since_ns && o.key == -1 - id) heading_sigma_rad = larger(heading_sigma_rad, o.sigma_angle_rad);
+    if (o.t_ns < since_ns || o.key != id || !(o.kind & kObservedBearing)) continue;
+    const double sight_rad = o.sensor.heading_rad + o.bearing_rad;
+    if (seen++ == 0) first_rad = sight_rad;
+    turned_rad = larger(turned_rad, std::fabs(wrap(sight_rad - first_rad)));
+  }
+  const int landmark = find_landmark(id);
+  const double spread_rad = std::sqrt(2.0 * square(heading_sigma_rad) + square(kDrift_rad));
+  return seen >= kByOneSeen && landmark >= 0 && (note(landmark).level || 2.0 * turned_rad > kSigmas * spread_rad);
 }
 
 // LOST, or SEARCHING from the start: the pose by the observations of late. True: found.
@@ -148,22 +177,26 @@ bool slam::relocalize() {
   const wm_time_ns since = now - wm_ns_from_seconds(kWindow_s);
   search_result found = observations_.find(since, {joint_.odom(), joint_.travelled_m(), joint_.turned_rad()}, nullptr,
                                            0, {kFound_m, kFound_rad, kNumbers});
-  if (!found.found || landmarks_fitting(found.pose, since) < 2) {
+  int32_t id = -1;
+  const bool by_one = found.found && landmarks_fitting(found.pose, since, &id) < 2;
+  if (!found.found || (by_one && !is_found_by_one(found, since, id))) {
     inflate_while_lost();
     return false;
   }
   rollback_.restore(&joint_);
   for (size_t i = 0; i < setup_->sensor_count; i++)  // the heading found is off by the mounting's yaw
     if (const int yaw = slots_.at((int)i, kYaw); yaw >= 0) found.covariance[2][2] += joint_.variance(yaw);
+  for (int k = 0; k < 3; k++) found.covariance[k][k] += square(k < 2 ? kLoose_m : kLoose_rad);
   joint_.set_pose(found.pose, found.covariance);
-  take_found();
+  take_found(by_one ? kByOnePrior : kFoundWrong);
+  by_one_ = by_one;
   return true;
 }
 
 // The pose was found: a new life of the evidence, the map held until it is proven.
-void slam::take_found() {
+void slam::take_found(double log_prior) {
   forget_lines();
-  begin_evidence(params_.line_rejoin);  // no identity proves a pose found by a pattern
+  begin_evidence(log_prior);
   life_.relocalized(joint_.now_ns());
 }
 

@@ -164,11 +164,10 @@ void slam::start_again() {
   outliers_.fused = outliers_.rejected = outliers_.before = 0;
   const bool given = params_.map != WM_SLAM_MAP_NONE;
   life_.begin(!given || !params_.recover || (place && heading));
-  begin_evidence(!given);
+  begin_evidence(given ? kStartWrong : kOwnFramePrior);
   bearings_.count = 0;
   usual_share_ = 0.0;
-  candidate_.id = lone_.id = rests_on_ = -1;
-  one_refuted_ = false;
+  by_one_ = one_refuted_ = false;
   if (given) load_map();
 }
 
@@ -247,8 +246,8 @@ wm_status slam::take_pose(const wm_event &event) {
   joint_.set_pose(given.pose, covariance);
   forget_tracks();
   life_.begin(true);
-  begin_evidence(false);
-  rests_on_ = -1;
+  begin_evidence(kStartWrong);
+  by_one_ = false;
   return WM_OK;
 }
 

@@ -9,6 +9,7 @@
 #include "filters/core/landmark_evidence.hpp"
 #include "filters/core/lifecycle.hpp"
 #include "filters/core/record_list.hpp"
+#include "filters/core/recovery.hpp"
 #include "filters/core/rollback.hpp"
 #include "filters/core/sensor_slots.hpp"
 #include "filters/core/state_pool.hpp"
@@ -26,6 +27,8 @@ namespace wm {
 inline constexpr int kSlamSensors = 8;
 // Observations of each of two lines that may be one (lines.rejoin): a false line rarely lasts a second. Not swept.
 inline constexpr uint32_t kMergeSeen = 10;
+// Log odds that a pose is wrong which defines the map's frame: as of a proven one.
+inline constexpr double kOwnFramePrior = -5.0;
 
 // What is known of a landmark beside its place.
 struct landmark_note {
@@ -40,8 +43,9 @@ struct landmark_note {
   wm_time_ns deferred_ns;   // when a surprising observation was deferred (trust.cpp)
   double mean_m[3], means;  // of a coded marker: its mean place in that sensor's levelled axes, of so many observations
   bool revisited;           // seen again where it was, after it was out of sight
+  bool level;               // a coded marker without a second pose
   landmark_record record;
-  uint8_t unused[5];  // no padding: the same events must give the same bytes
+  uint8_t unused[4];  // no padding: the same events must give the same bytes
 };
 
 struct slam_counts {
@@ -120,20 +124,6 @@ class slam {
     double z_noise;   // of its height
     double length_m;
     bool has_heading;  // false: ambiguous, or not accurate enough
-  };
-  // A marker observed while the pose is unknown.
-  struct seen_marker {
-    int64_t id;
-    double variance_m2, turn_variance;  // of its distance and of its heading
-    wm_pose2 seen, odom;                // in base_link; where that was
-  };
-  // The marker by whose heading alone the pose may be found, as the first of the observations that agree had it.
-  struct lone_marker {
-    int32_t id;
-    int seen;          // observations that agree
-    wm_pose2 odom;     // the marker in odom
-    double sight_rad;  // there, from the sensor to it
-    double variance_m2, turn_variance;
   };
   // Two landmarks that may be one line: their states, the difference of their places and its covariance.
   struct landmark_pair {
@@ -216,13 +206,6 @@ class slam {
   wm_verdict join_marker(const context &at, const marker_reading &r);
   void fuse_height(int landmark, int sensor, const marker_reading &r);
 
-  // marker_start.cpp
-  bool find_start(int landmark, const wm_marker &m, const marker_reading &r, bool two);
-  void start_at(const wm_pose2 &marker, const wm_pose2 &seen, double heading_rad);
-  bool start_by_two(int landmark, const seen_marker &now);
-  bool start_by_one(int landmark, const wm_marker &m, const marker_reading &r, const seen_marker &now);
-  void doubt_start(int misfits);
-
   // trust.cpp
   bool is_plausible(int landmark, const joint_state::innovation_block &block, double noise);
   bool is_ambiguous(int32_t id, int landmark, int sensor);
@@ -239,7 +222,7 @@ class slam {
   bool is_compatible_with_another(const landmark_pair &p) const;
 
   // recovery.cpp
-  void begin_evidence(bool own_frame);
+  void begin_evidence(double log_prior);
   bool map_is_held() const;
   joint_state::scope scope_now() const;
   bool is_witness(const landmark_note &note) const;
@@ -247,9 +230,10 @@ class slam {
              double angle_rad);
   void lose();
   void keep_observation(int landmark, const context &at, const planar_observation &seen);
-  int landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns) const;
+  int landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns, int32_t *id) const;
+  bool is_found_by_one(const search_result &found, wm_time_ns since_ns, int32_t id) const;
   bool relocalize();
-  void take_found();
+  void take_found(double log_prior);
   void inflate_while_lost();
   void widen(wm_estimate *out) const;
 
@@ -296,10 +280,8 @@ class slam {
   evidence pattern_odds_;
   double usual_share_;  // of a picture's bearings that the map explains
   wm_time_ns pattern_ns_;
-  seen_marker candidate_;  // the one that was seen first; its id is -1: none
-  lone_marker lone_;       // its id is -1: none
-  int32_t rests_on_;       // the one marker by which the pose was found, until another is fused; else -1
-  bool one_refuted_;       // by the others: it takes two
+  bool by_one_;       // the pose was found by one marker and is not proven yet
+  bool one_refuted_;  // by others; since then it takes two
 };
 
 }  // namespace wm

@@ -97,7 +97,6 @@ void slam::note_fused(int landmark, int sensor) {
   seen.last_ns = now;
   seen.sensor = sensor;
   life_.fused(now);
-  if (seen.id != rests_on_) rests_on_ = -1;
   if (other_fused_id_[0] != seen.id) {
     other_fused_id_[1] = other_fused_id_[0];
     other_fused_ns_[1] = other_fused_ns_[0];
@@ -111,7 +110,6 @@ void slam::note_fused(int landmark, int sensor) {
 void slam::note_misfit(int landmark, bool ranged) {
   landmark_note &seen = note(landmark);
   seen.misfits++;
-  doubt_start(seen.misfits);
   if (map_is_held()) return;
   if (ranged && !is_confirmed(seen) && seen.misfits >= kUnconfirmedMisfits) return drop_landmark(landmark);
   const bool frozen = params_.map == WM_SLAM_MAP_FROZEN;
