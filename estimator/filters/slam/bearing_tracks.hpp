@@ -10,7 +10,7 @@ namespace wm {
 
 inline constexpr int kLinePoses = 8;
 
-// Lines of sight from poses (x, y, heading of the sensor), and how unsure they are.
+// Lines of sight from poses (x, y, heading of the sensor), with their covariance.
 struct line_bundle {
   int count;
   wm_pose2 pose[kLinePoses];
@@ -18,8 +18,8 @@ struct line_bundle {
   double pose_covariance[3 * kLinePoses][3 * kLinePoses];
 };
 
-// A landmark found from a bundle: its place, its derivative by each pose's x, y, heading, and the covariance of what
-// comes besides (azimuths' noise and what the derivative doesn't tell).
+// A landmark found from a bundle: its place, its derivative by each pose's x, y, heading, and the covariance that
+// the derivative does not explain (azimuths' noise, remainder of the transform).
 struct line_landmark {
   bool solved;  // the lines cross, ahead of every pose
   double place_m[2];
@@ -30,10 +30,10 @@ struct line_landmark {
   double misfit;        // mean squared angle by which the lines miss it, in units of its variance
 };
 
-// System 5, initialisation: each pose gives one homogeneous equation, the singular vector of the smallest singular
+// [LinesND], initialisation: each pose gives one homogeneous equation, the singular vector of the smallest singular
 // value is the place; its distribution by the unscented transform over (poses 2..k relative to the first,
-// azimuths 1..k), or by one linearisation. Mended: the poses' joint covariance is used whole and the result stays
-// correlated with every one of them; and the place must lie ahead along each azimuth.
+// azimuths 1..k), or by one linearisation. Beyond the source: the poses' joint covariance is used whole, the result
+// stays correlated with each of them, and the place must lie ahead along each azimuth.
 line_landmark find_line(const line_bundle &bundle, bool unscented);
 
 // Which bearings wait for which landmark. Plain memory.
@@ -50,15 +50,15 @@ class bearing_tracks {
 
   // At most so many clones and tracks.
   void clear(int clones, int tracks);
-  int index(const track &t) const { return (int)(&t - track_); }
+  int index(const track &t) const { return static_cast<int>(&t - track_); }
   track *find(int32_t id, int sensor);
   // A free track; else the one not observed for longest, NULL where all are in view.
   track *begin(int32_t id, int sensor, wm_time_ns t_ns);
   static void end(track *t) { t->id = -1; }
-  // Full (`most`): the bearing goes that was taken nearest to its neighbour, so that what is left sees from far apart.
+  // Full (`most`): the bearing taken nearest to its neighbour leaves, so that the others are far apart.
   void add(track *t, int clone, double azimuth_rad, double sigma_rad, int most);
-  // A clone's number to use anew, for a sensor at (x, y): one that no track needs, else the one that lies nearest to
-  // another, which leaves its tracks.
+  // A clone to overwrite, for a sensor at (x, y): one without tracks, else the one nearest to another, which leaves its
+  // tracks.
   int take_clone(int sensor, wm_time_ns t_ns, double x_m, double y_m);
   // The clone of this sensor at this stamp, -1 where there is none.
   int find_clone(int sensor, wm_time_ns t_ns) const;
@@ -73,7 +73,7 @@ class bearing_tracks {
   int clones_, tracks_;
   wm_time_ns clone_ns_[kClones];
   int clone_sensor_[kClones];
-  double clone_m_[kClones][2];  // where it was taken: for choosing alone
+  double clone_m_[kClones][2];  // where it was taken, for take_clone alone
 };
 
 }  // namespace wm

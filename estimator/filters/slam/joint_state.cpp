@@ -68,7 +68,7 @@ void joint_state::set_motion_states(const wm_motion_states &states, const wheel_
 void joint_state::move(const wm_event &motion) {
   if (const int state = feed(motion); state >= 0) {
     forget(state, 1.0, start_variance_[kSpeedScale]);
-    tell_scale_anew();
+    anchor_scale_again();
   }
   move_to(motion.t_ns);
   double innovation, variance;
@@ -303,10 +303,10 @@ double joint_state::innovation_block::density() const {
   return exp(-0.5 * nis) / std::sqrt(scale);
 }
 
-bool joint_state::fuse(innovation_block &block, const double *more_noise, scope which) {
+bool joint_state::fuse(innovation_block &block, const double *added_noise, scope which) {
   const int rows = block.rows;
   if (!(block.determinant > 0.0)) return false;
-  for (int k = 0; k < rows; k++) block.s[k][k] += more_noise[k];
+  for (int k = 0; k < rows; k++) block.s[k][k] += added_noise[k];
   double l[kRows][kRows], y[kRows] = {};
   std::memcpy(l, block.s, sizeof l);
   if (!factorize(rows, l[0], kRows)) return false;
@@ -349,7 +349,7 @@ bool joint_state::fuse(innovation_block &block, const double *more_noise, scope 
 }
 
 // The correction of the mean: on the group of turns and places for the invariant filter (the map turns as a whole with
-// the heading, it doesn't shear), by addition for the plain one. e: what T needs.
+// the heading and does not shear), by addition for the plain one. e: as in T.
 void joint_state::move_mean(const double *change, double *e) {
   double *mean = x();
   for (int j = 0; j < even(n_); j++) e[j] = 0.0;

@@ -2,14 +2,13 @@
 // The core of planar SLAM: robot, calibration, lent states and clones in front, landmarks of two or three numbers each
 // behind them, one joint covariance (upper half), all in one block of memory.
 //
-// Consistency: a plain EKF-SLAM evaluates its derivatives at estimates that move, and so gains heading from nothing.
-// Here every correction carries the covariance over to the places that it moved: P <- T P T', T = I + e h', h the
-// heading, e = J (new place - old place) for each place in the state. That is the right-invariant filter (A. Barrau,
-// S. Bonnabel, "An EKF-SLAM algorithm with consistency properties", 2015; T. Zhang et al., "Convergence and consistency
-// analysis for a 3-D invariant-EKF SLAM", RA-L 2(2), 2017) written in map coordinates: its error of a place is
-// p_est - Exp(heading error) p, and what the change of coordinates between two estimates does is T. In this form the
-// prediction touches the pose's rows alone. Where the map's scale is as unknown as its heading (find_scale), the same
-// is done once more, with d = new - old of all that goes with the scale and g' that picks the scale: scale.cpp.
+// Consistency: a plain EKF-SLAM evaluates its derivatives at estimates that move, and so gains false certainty of the
+// heading. Here every correction transports the covariance to the new places: P <- T P T', T = I + e h', h the heading,
+// e = J (new place - old place) for each place in the state. That is the right-invariant filter [Barrau2015]
+// [Zhang2017] in map coordinates: its error of a place is p_est - Exp(heading error) p, and T is the change of
+// coordinates between two estimates. In this form the prediction touches the pose's rows alone. Where the map's scale
+// is unobservable, too (find_scale), the same is done once more, with d = new - old of all states that scale and g'
+// that picks the scale.
 //
 // Cost: prediction O(n), correction O(n^2) with one pass over the half for up to three rows.
 #ifndef WAYMARK_ESTIMATOR_SLAM_JOINT_STATE_HPP
@@ -24,7 +23,7 @@
 
 namespace wm {
 
-// A row of a derivative. Two views of two landmarks from two clones, with all errors of a sensor each, take most.
+// A row of a Jacobian. A ray's has most: pose, sensor states, clone, ray, time-correlated error; join() adds up three.
 using joint_row = jacobian_row<64>;
 
 struct joint_layout {
@@ -57,13 +56,12 @@ class joint_state : public planar_motion {
     set_sensor_state(state, walk, low, high);
   }
 
-  // Whether the way's scale is a state. If so, what of the way goes with the map's scale follows it; call
-  // follow_scale() for each other state that does. `carries`: the covariance is carried along, too, for a second pass
-  // over the half.
+  // Whether the scale of the way is a state. If so, the motion states that scale with the map follow it; call
+  // follow_scale() for each other state that does. `carries`: the covariance is transported, too, by a second pass over
+  // the half.
   bool find_scale(bool carries);
-  // `share` 1: as many times as large in a larger map; -1: as many times as small. `told`: what it starts with says how
-  // large the map is, as well as its sigma allows.
-  void follow_scale(int state, double share, bool told);
+  // `share`: exponent of the state under a change of the map's scale, +1 or -1. `anchors`: its prior holds the scale.
+  void follow_scale(int state, double share, bool anchors);
 
   // ---- time and motion ----
   void move(const wm_event &motion);
@@ -79,7 +77,7 @@ class joint_state : public planar_motion {
   double covariance(int i, int j) const { return p().at(i, j); }
   double variance(int state) const { return p().at(state, state); }
   void set_value(int state, double value) { x()[state] = value; }
-  // The state becomes `value`, as unsure as `variance`, independent of all others.
+  // The state becomes `value` with `variance`, independent of all others.
   void forget(int state, double value, double variance);
   // x := factor x + noise (Gauss-Markov), for a state that no other one's motion depends on.
   void fade(int state, double factor, double added_variance);
@@ -88,8 +86,7 @@ class joint_state : public planar_motion {
   // States first..first+count-1 become rows[k] of the state plus noise of covariance `noise`.
   void assign(int first, int count, const joint_row *rows, const double (*noise)[3], const double *values);
   void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
-  // The robot may have been moved and turned just now, as noise of its motion: variances of x and y, and of the
-  // heading.
+  // Adds variances of x and y, and of the heading, as noise of the motion does.
   void inflate_pose(double xy_m2, double heading_rad2);
 
   // ---- landmarks ----
@@ -103,24 +100,22 @@ class joint_state : public planar_motion {
   void remove_landmark(int landmark);
 
   // ---- correction ----
-  // P H' of up to three rows and S = H P H' + diag(noise); then their innovation squared. What `prepare` made is used
-  // by the calls after it, until the state changes.
+  // P H' of up to three rows, S = H P H' + diag(noise), and the NIS; valid until the state changes.
   struct innovation_block {
     int rows;
     double s[kRows][kRows];  // lower triangle
     double innovation[kRows];
     double nis;
-    double determinant;      // of S; 0: S is no covariance, the nis infinite
+    double determinant;      // of S; 0: S is not positive definite, the NIS 1e300
     double density() const;  // of the innovation, normal with covariance S
   };
-  // Which states a correction may change. Others are considered: their covariance counts, they stay as they are (S. F.
-  // Schmidt, 1966).
+  // Which states a correction may change. Others are considered: their covariance counts, they stay [Schmidt1966].
   enum class scope { all, robot, pose };
   void prepare(const joint_row *rows, const double *innovations, const double *noise, int count, innovation_block *out);
-  // Fuses what `prepare` made, with `more_noise[k]` added to each row's. False: S is no covariance, nothing changed.
-  [[nodiscard]] bool fuse(innovation_block &block, const double *more_noise, scope which);
+  // Fuses the rows prepared, with `added_noise[k]` for each. False: S is not positive definite, nothing changed.
+  [[nodiscard]] bool fuse(innovation_block &block, const double *added_noise, scope which);
 
-  // P H' of a single row, without changing what `prepare` made; n doubles.
+  // P H' of a single row, without changing the rows prepared; n doubles.
   void project(const joint_row &row, double *gain) const;
   double dot(const joint_row &row, const double *gain) const;
   double variance_of(const joint_row &row) const;  // H P H', without a pass over the state
@@ -140,7 +135,7 @@ class joint_state : public planar_motion {
   void move_mean(const double *change, double *e);
   void move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e);
   void fuse_part(int states, int rows, const double *change);
-  void tell_scale_anew();
+  void anchor_scale_again();
   void hold_scale(double *e);
   void carry_scale(const double *before);
 
@@ -150,8 +145,8 @@ class joint_state : public planar_motion {
   joint_layout layout_;
   wheel_slip slip_;
   int slip_mean_[2];  // states, of the left and the right wheel
-  // scale.cpp: the state that stands for the map's scale (-1: something tells it), by how much each state follows, and
-  // what those that are told start with (variance 0: it isn't told). Places are as large as they are from `origin`.
+  // scale.cpp: the state of the map's scale (-1: it is observed), each state's exponent, and the prior of those that
+  // anchor it (variance 0: it does not). Places scale about the origin.
   int scale_state_;
   double scale_share_[kMaxRobot], scale_start_[kMaxRobot], scale_variance_[kMaxRobot];
   double scale_origin_m_[2];

@@ -261,7 +261,7 @@ wm_verdict slam::join_marker(const context &at, const marker_reading &r) {
 // A tilted camera sees a marker at a height that depends on its distance and side. The height is no state: it is
 // unknown and the same each time, so each observation is compared with the mean of those before, z - mean z = pitch (x
 // - mean x) - roll (y - mean y). Its noise (1 + 1/n) sigma^2 is independent of theirs (Helmert's transform of a
-// regression with a constant). One row more, O(n^2); none once it would tell little.
+// regression with a constant). One row more, O(n^2); none once it carries little information.
 void slam::fuse_height(int landmark, int sensor, const marker_reading &r) {
   const int roll = slots_.at(sensor, kRoll), pitch = slots_.at(sensor, kPitch);
   landmark_note &marker = note(landmark);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The fields of `slam:`; their meaning is told once, in params.c.
+// The fields of `slam:`; params.c has their meaning.
 #ifndef WAYMARK_ESTIMATOR_SLAM_PARAMS_H
 #define WAYMARK_ESTIMATOR_SLAM_PARAMS_H
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kidnapped robot among lines without identity (lines.rejoin): the share of a look's bearings that the map explains
-// is held against the share that is usual in this drive and against chance. Lost, the pose is found by their pattern
+// The kidnapped robot among lines without identity (lines.rejoin): the share of a picture's bearings that the map
+// explains is compared with the usual share of this drive and with chance. Lost, the pose is found by their pattern
 // (relocalize/line_search.hpp).
 #include "filters/core/evidence.hpp"
 #include "filters/slam/slam.hpp"
@@ -9,19 +9,20 @@
 namespace wm {
 namespace {
 
-// Chosen on loops-lines (seeds 1 to 6) and held against hall-a and hall-hard 1 to 5; not swept.
-constexpr int kFewest = 6;              // bearings of a look; fewer have no pattern
+// Chosen on loops-lines (seeds 1 to 6), checked on hall-a and hall-hard 1 to 5; not swept.
+constexpr int kFewest = 6;              // bearings of a picture; fewer have no pattern
 constexpr double kPrior = -6.0;         // log odds of being kidnapped at any time
-constexpr double kDoubt = -4.0;         // log odds above which the look is neither usual nor proof of a fit
+constexpr double kDoubt = -4.0;         // log odds above which a picture neither is usual nor counts as a fit
 constexpr double kLost = 1.0;           // log odds from which the state is LOST: 73 %
 constexpr double kMemory_s = 5.0;       // of the evidence
-constexpr double kTelling = 0.3;        // usual less chance: a map as dense as its gates are wide explains any look
-constexpr double kMostALook = 1.5;      // nats: a look's bearings are wrong together where something stands in the way
+constexpr double kInformative = 0.3;    // usual less chance: a map as dense as its gates are wide explains any picture
+constexpr double kMaxBayes = 1.5;       // nats a picture: bearings are wrong together where something stands in the way
 constexpr double kUsual_s = 20.0;       // memory of the share that is usual
 constexpr double kMostUsual = 0.9;      // new lines come into view
 constexpr double kMostChance = 0.8;     // of a bearing to be explained by chance
 constexpr double kBearing_rad = 0.005;  // of a bearing and of a landmark's place, seen from kTypical_m
-constexpr double kTypical_m = 4.0, kRange_m = 12.0;
+constexpr double kTypical_m = 4.0;      // distance of a landmark
+constexpr double kRange_m = 12.0;       // landmarks farther away are rarely detected
 constexpr double kSigmas = 3.0, kWidest_rad = 0.15;  // of the gate
 
 }  // namespace
@@ -66,10 +67,10 @@ void slam::weigh_pattern(wm_time_ns t_ns) {
   const double share = (double)explained / bearings_.count;
   const double usual = usual_share_ < kMostUsual ? usual_share_ : kMostUsual;
   pattern_odds_.forget(dt, kMemory_s, kPrior);
-  if (usual > chance + kTelling && chance > 0.0) {
+  if (usual > chance + kInformative && chance > 0.0) {
     const double log_bayes =
         explained * log(chance / usual) + (bearings_.count - explained) * log((1.0 - chance) / (1.0 - usual));
-    pattern_odds_.add(log_bayes > kMostALook ? kMostALook : log_bayes < -kMostALook ? -kMostALook : log_bayes);
+    pattern_odds_.add(log_bayes > kMaxBayes ? kMaxBayes : log_bayes < -kMaxBayes ? -kMaxBayes : log_bayes);
   }
   if (pattern_odds_.value() > kLost) return lose();
   if (pattern_odds_.value() > kDoubt) return;

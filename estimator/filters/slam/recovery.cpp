@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The kidnapped robot: observations of landmarks that are known well are evidence for or against the pose
+// The kidnapped robot: observations of well known landmarks are evidence for or against the pose
 // (core/landmark_evidence.hpp). In doubt the map and the calibration are held: updates move the pose alone. A pose that
 // is contradicted is LOST; recent observations are then matched with the map (relocalize/pose_search.hpp).
 #include "filters/slam/slam.hpp"
@@ -17,15 +17,15 @@ constexpr double kByOnePrior = -1.5;
 constexpr double kByOne_m = 0.1;
 constexpr int kByOneSeen = 3;
 constexpr double kDrift_rad = 0.005;
-constexpr double kSigmas = 3.0;
+constexpr double kSigmas = 3.0;     // by which the mirror image must be excluded
 constexpr double kWindow_s = 20.0;  // observations older than this are not searched, as in landmark_ekf
 constexpr double kFound_m = 0.5, kFound_rad = 0.15;  // a pose with larger sigmas is not taken
 constexpr double kLoose_m = 0.2, kLoose_rad = 0.05;  // added: errors of sensors and map that the search takes as white
 constexpr int kNumbers = 5;                          // must agree; two more than a pose has
-constexpr double kFits_m = 0.5, kFits_rad = 0.2;     // of a landmark from the pose found
+constexpr double kFits_m = 0.5, kFits_rad = 0.2;     // of a landmark seen from the pose found: room for its covariance
 constexpr double kRevisited_s = 5.0;                 // out of sight for so long and seen again where it was: a witness
 constexpr uint32_t kEstablished = 20;                // sightings: hardly any of these was another landmark's
-constexpr double kOld_s = 60.0;                      // or known for so long
+constexpr double kOld_s = 60.0;                      // or on the map for so long: no kidnapping was that long ago
 
 }  // namespace
 
@@ -46,8 +46,8 @@ joint_state::scope slam::scope_now() const {
   return params_.map == WM_SLAM_MAP_FROZEN ? joint_state::scope::robot : joint_state::scope::all;
 }
 
-// A landmark that was found after a kidnapping fits the wrong pose, so only one that proved to stand where the map has
-// it is evidence for a pose: of a given map, seen again after it was out of sight, or known for long. Against a pose an
+// A landmark that was found after a kidnapping fits the wrong pose, so only one that proved its place is evidence for a
+// pose: of a given map, seen again after it was out of sight, or on the map for long. Against a pose an
 // established one is enough: seen often, or looked for again.
 bool slam::is_witness(const landmark_note &note) const {
   return note.surveyed ||

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines that were lost and come back under another number: two landmarks that are one line become one again.
+// Lines that were lost and return under another number: two landmarks that are one line are merged. Constants were
+// chosen on hall-a; not swept.
 #include "filters/slam/slam.hpp"
 
 namespace wm {
 namespace {
 
-constexpr double kSame_m = 0.02;     // of one line, seen from elsewhere
-constexpr double kTied_m = 0.1;      // so loosely they are tied: one pair in many is wrong for all that
+constexpr double kSame_m = 0.02;     // sigma of one line's place, seen from elsewhere: an edge has a width
+constexpr double kMerged_m = 0.1;    // sigma of their measured difference, wide: one pair in many is wrong after all
 constexpr double kNear_m = 2.0;      // farther apart no two are compared
-constexpr double kGate = 9.21;       // 99 % of chi2 with two degrees of freedom
-constexpr double kSure_m2 = 0.01;    // so well is known where the two lie to each other that no other pair is asked
-constexpr double kUnsure_m2 = 0.25;  // so badly that nothing is said
+constexpr double kGate_nis = 9.21;   // 99 % of chi2 with two degrees of freedom
+constexpr double kSure_m2 = 0.01;    // variance of their difference below which no second pair must agree
+constexpr double kUnsure_m2 = 0.25;  // variance above which nothing is decided
 
 double nis_of(const double d[2], const double s[2][2]) {
   return (s[1][1] * d[0] * d[0] - 2.0 * s[0][1] * d[0] * d[1] + s[0][0] * d[1] * d[1]) /
@@ -43,8 +44,7 @@ slam::landmark_pair slam::pair_of(int fresh, int lost) const {
   return out;
 }
 
-// Is there another pair that agrees with this one, far better than where the two could have been by chance? Joint
-// compatibility of two pairs [Neira2001].
+// Whether another pair agrees with this one much better than by chance: joint compatibility of two pairs [Neira2001].
 bool slam::is_compatible_with_another(const landmark_pair &p) const {
   const double determinant = p.s[0][0] * p.s[1][1] - p.s[0][1] * p.s[1][0];
   const double inverse[2][2] = {{p.s[1][1] / determinant, -p.s[0][1] / determinant},
@@ -61,13 +61,13 @@ bool slam::is_compatible_with_another(const landmark_pair &p) const {
         d[i] = q.apart[i] - gain[i][0] * p.apart[0] - gain[i][1] * p.apart[1];
         for (int j = 0; j < 2; j++) s[i][j] = q.s[i][j] - gain[i][0] * cross[j][0] - gain[i][1] * cross[j][1];
       }
-      if (s[0][0] + s[1][1] < kSure_m2 && nis_of(d, s) < kGate) return true;
+      if (s[0][0] + s[1][1] < kSure_m2 && nis_of(d, s) < kGate_nis) return true;
     }
   return false;
 }
 
-// Two landmarks of which one was lost before the other was first seen, at one place as far as is known, and no third
-// one near: their difference is measured to be nothing, and the old one goes on under the new one's number.
+// Two landmarks of which one was lost before the other was first seen, at one place within their covariance, and no
+// third one near: their difference is measured to be nothing, and the old one goes on under the new one's number.
 void slam::merge_if_one(int fresh) {
   int best = -1;
   double least = 1e300, second = 1e300;
@@ -83,7 +83,7 @@ void slam::merge_if_one(int fresh) {
       second = nis;
     }
   }
-  if (best < 0 || !(least < kGate) || !(second > least + kGate)) return;
+  if (best < 0 || !(least < kGate_nis) || !(second > least + kGate_nis)) return;
   const landmark_pair p = pair_of(fresh, best);
   const double unsure = p.s[0][0] + p.s[1][1];
   if (unsure > kUnsure_m2 || (unsure > kSure_m2 && !is_compatible_with_another(p))) return;
@@ -93,7 +93,7 @@ void slam::merge_if_one(int fresh) {
   for (int k = 0; k < 2; k++) {
     rows[k].add(p.fresh + k, 1.0);
     rows[k].add(p.lost + k, -1.0);
-    noise[k] = square(kTied_m);
+    noise[k] = square(kMerged_m);
     difference[k] = -p.apart[k];
   }
   joint_state::innovation_block block;

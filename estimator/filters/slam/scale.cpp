@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-// The map's scale, where nothing measures it. Make the map, the way and the wheels as many times as large and the
-// ranges' scale as many times as small: every sighting stays as it is. An EKF becomes sure of such a scale all the
-// same, and wrong, by what its derivatives make of estimates that move. So its covariance is carried along with it, as
-// it is with the heading (joint_state.hpp); and its mean stays where what the states start with puts it, the only thing
-// that tells.
+// The map's scale, where it is unobservable: with the map, the way and the wheels s times as large and the ranges'
+// scale s times as small every sighting is the same. An EKF, whose derivatives are taken at estimates that move, gains
+// false certainty of it all the same. So the covariance is transported with the scale, as with the heading
+// (joint_state.hpp); and the mean is held where the states' priors put it, the only information about it.
 #include "filters/slam/joint_state.hpp"
 
 namespace wm {
 
 bool joint_state::find_scale(bool carries) {
   const int speed = motion_state_[kSpeedScale], left = motion_state_[kLeftScale], right = motion_state_[kRightScale];
-  if (speed < 0 && (left < 0 || right < 0)) return false;  // the way tells the scale
+  if (speed < 0 && (left < 0 || right < 0)) return false;  // the way measures the scale
   carries_scale_ = carries;
   if (speed >= 0) {
     scale_state_ = speed;
@@ -28,21 +27,20 @@ bool joint_state::find_scale(bool carries) {
   return true;
 }
 
-void joint_state::follow_scale(int state, double share, bool told) {
+void joint_state::follow_scale(int state, double share, bool anchors) {
   if (state < 0) return;
   scale_share_[state] = share;
   scale_start_[state] = value(state);
-  scale_variance_[state] = told ? variance(state) : 0.0;
+  scale_variance_[state] = anchors ? variance(state) : 0.0;
 }
 
-// The speed comes from another sensor: what the map has come to is what the others have to say of the scale from now
-// on.
-void joint_state::tell_scale_anew() {
+// The speed comes from another sensor: from now on the other states anchor the scale where they are.
+void joint_state::anchor_scale_again() {
   for (int j = 0; j < layout_.first_clone; j++)
     if (scale_variance_[j] > 0.0) follow_scale(j, scale_share_[j], true);
 }
 
-// All of it becomes 1 + s times as large, s by one step of Newton's on what the states start with:
+// All is scaled by 1 + s, s by one Newton step on the priors:
 // sum of ((value (1 + share s) - start) / sigma)^2. `e` holds how places have moved, as move_mean() leaves it.
 void joint_state::hold_scale(double *e) {
   double *mean = x();

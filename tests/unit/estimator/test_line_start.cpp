@@ -115,6 +115,70 @@ void test_the_unscented_start_is_not_worse_than_the_linear_one(void) {
   }
 }
 
+// The derivatives by the poses against differences, and the covariance against their sum with the azimuths' noise: of a
+// bundle without errors, whose weights then do not matter. Both methods.
+void test_the_derivatives_are_those_of_differences(void) {
+  double place[2] = {4.0, 1.5};
+  wm::line_bundle b{};
+  b.count = kPoses;
+  const auto aim = [&place](const wm_pose2 &from) {
+    return wm::wrap(wm::atan2(place[1] - from.y_m, place[0] - from.x_m) - from.heading_rad);
+  };
+  for (int i = 0; i < kPoses; i++) {
+    b.pose[i] = {0.1 * i, 0.4 * i * (i % 2 == 0 ? 1.0 : 0.8), 0.7 - 0.2 * i};
+    b.azimuth_rad[i] = aim(b.pose[i]);
+    b.sigma_rad[i] = 0.002;
+    for (int k = 0; k < 3; k++) b.pose_covariance[3 * i + k][3 * i + k] = wm::square(k < 2 ? 0.003 : 0.002);
+  }
+  for (bool unscented : {true, false}) {
+    const wm::line_landmark l = wm::find_line(b, unscented);
+    TEST_ASSERT_TRUE(l.solved);
+    double want[2][2] = {}, got[2][2];
+    const auto difference = [&](double *number, double by[2]) {
+      const double step = 1e-5, before = *number;
+      *number = before + step;
+      const wm::line_landmark plus = wm::find_line(b, unscented);
+      *number = before - step;
+      const wm::line_landmark minus = wm::find_line(b, unscented);
+      *number = before;
+      for (int r = 0; r < 2; r++) by[r] = (plus.place_m[r] - minus.place_m[r]) / (2 * step);
+    };
+    for (int j = 0; j < 4 * kPoses; j++) {
+      const int i = j < 3 * kPoses ? j / 3 : j - 3 * kPoses, k = j < 3 * kPoses ? j % 3 : 3;
+      double by[2];
+      difference(k == 0   ? &b.pose[i].x_m
+                 : k == 1 ? &b.pose[i].y_m
+                 : k == 2 ? &b.pose[i].heading_rad
+                          : &b.azimuth_rad[i],
+                 by);
+      for (int r = 0; r < 2; r++) {
+        if (k < 3) TEST_ASSERT_DOUBLE_WITHIN(0.01 + 0.01 * std::fabs(by[r]), by[r], l.by_pose[r][j]);
+        for (int c = 0; c < 2; c++)
+          want[r][c] += by[r] * by[c] * (k < 3 ? b.pose_covariance[j][j] : wm::square(b.sigma_rad[i]));
+      }
+    }
+    for (int r = 0; r < 2; r++)
+      for (int c = 0; c < 2; c++) {
+        got[r][c] = l.noise[r][c];
+        for (int j = 0; j < 3 * kPoses; j++) got[r][c] += l.by_pose[r][j] * b.pose_covariance[j][j] * l.by_pose[c][j];
+      }
+    for (int r = 0; r < 2; r++)
+      for (int c = 0; c < 2; c++) TEST_ASSERT_DOUBLE_WITHIN(0.02 * want[r][r], want[r][c], got[r][c]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, place[0], l.place_m[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, place[1], l.place_m[1]);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.0, l.misfit);
+  }
+}
+
+// A place behind one of the poses solves the equations and is none.
+void test_a_place_behind_a_pose_is_none(void) {
+  double place[2];
+  wm::line_bundle b = draw(2.0, 1, place);
+  TEST_ASSERT_TRUE(wm::find_line(b, true).solved);
+  b.azimuth_rad[2] = wm::wrap(b.azimuth_rad[2] + wm::kPi);
+  TEST_ASSERT_FALSE(wm::find_line(b, true).solved);
+}
+
 }  // namespace
 
 void setUp(void) {}
@@ -123,5 +187,7 @@ void tearDown(void) {}
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_the_unscented_start_is_not_worse_than_the_linear_one);
+  RUN_TEST(test_the_derivatives_are_those_of_differences);
+  RUN_TEST(test_a_place_behind_a_pose_is_none);
   return UNITY_END();
 }

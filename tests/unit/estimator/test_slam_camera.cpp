@@ -97,6 +97,33 @@ void test_a_late_stamp_turns_all_bearings_alike(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.6 * turned_rad[0], turned_rad[1]);
 }
 
+// Each error of the mounting alone, on a map whose landmarks are known: a wrong sign in a Jacobian would drive it away.
+void test_each_error_of_the_mounting_is_found(void) {
+  const struct {
+    int row;
+    const char *name;
+    double yaw_rad, x_m, y_m;  // beyond calibration.yaml
+  } cases[] = {{WM_SENSOR_ROW_kYaw, "camera.yaw_rad", 0.05, 0, 0},
+               {WM_SENSOR_ROW_kMountX, "camera.x_m", 0, 0.08, 0},
+               {WM_SENSOR_ROW_kMountX, "camera.y_m", 0, 0, -0.06}};
+  for (bool of_markers : {true, false})
+    for (const auto &c : cases) {
+      make_room();
+      coded = of_markers;
+      params.markers = of_markers;
+      params.map = WM_SLAM_MAP_FROZEN;
+      for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
+      sensor.mounting.xyz_m[0] -= c.x_m;
+      sensor.mounting.xyz_m[1] -= c.y_m;
+      sensor.mounting.rpy_rad[2] -= c.yaw_rad;
+      make::sightings.states.sigma[c.row] = 0.1;
+      begin();
+      drive(40);
+      TEST_ASSERT_DOUBLE_WITHIN(0.02, c.yaw_rad + c.x_m + c.y_m, calibrated(c.name));
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.03, off());
+    }
+}
+
 }  // namespace
 
 void setUp(void) { make_room(); }
@@ -110,5 +137,6 @@ int main(void) {
   RUN_TEST(test_taken_for_level_it_bends_the_map);
   RUN_TEST(test_stamps_that_scatter_matter_where_it_turns);
   RUN_TEST(test_a_late_stamp_turns_all_bearings_alike);
+  RUN_TEST(test_each_error_of_the_mounting_is_found);
   return UNITY_END();
 }
