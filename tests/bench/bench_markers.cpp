@@ -75,7 +75,8 @@ int main() {
   auto *memory = static_cast<uint8_t *>(std::aligned_alloc(64, bytes));
   if (!memory) return 1;
   wm::dark_work_lay_out(&work, frame.width_px, frame.height_px, memory);
-  std::printf("dark_regions_640x480_us %.0f\n", bench::median_us(31, [&] { wm::find_dark_regions(&work, frame, 20); }));
+  std::printf("dark_regions_640x480_us %.0f\n",
+              bench::median_us(31, [&] { wm::find_regions(&work, frame, 20, false); }));
   uint32_t id = 0;
   int wrong = 0;
   uint64_t modules = wm_mr_encode(77) ^ 0x1001001;

@@ -112,12 +112,13 @@ struct PrintMarkers {
 
 void parse_print(CLI::App &app, PrintMarkers &a) {
   app.description("Writes coded markers as pages to print at true scale (PDF), with cut marks and a ruler.");
-  app.add_option("--family", a.sheet.family, "mr, tag36h11 or tagStandard41h12")->capture_default_str();
+  app.add_option("--family", a.sheet.family, "mr, or a family of vision.apriltag.family: tag36h11, aruco_4x4_50 ...")
+      ->capture_default_str();
   app.add_option("--ids", a.ids, "identities, as in 1-20,25")->required();
-  app.add_option(
-         "--size", a.sheet.size_m,
-         "m; mr: largest width of the black; tags: edge of the black square (tagStandard41h12: of the white one "
-         "in its ring). It is markers.size_m of calibration.yaml")
+  app.add_option("--size", a.sheet.size_m,
+                 "m; mr: largest width of the black; others: edge of the black square (tagCircle, tagCustom, "
+                 "tagStandard: of the "
+                 "white one in its ring). It is markers.size_m of calibration.yaml")
       ->check(CLI::Range(0.005, 2.0))
       ->capture_default_str();
   app.add_option("--paper", a.sheet.paper, "a4, a3 or letter")->capture_default_str();

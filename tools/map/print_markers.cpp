@@ -1,28 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "map/print_markers.h"
 
-extern "C" {
-#include <apriltag/apriltag.h>
-#include <apriltag/tag36h11.h>
-#include <apriltag/tagStandard41h12.h>
-}
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include "common/failure.h"
 #include "map/pdf.h"
+#include "waymark/detectors.h"
 #include "waymark/mr_code.h"
 
 namespace wm::tools {
 namespace {
 
 constexpr double kMargin_mm = 6, kCaption_mm = 9, kFoot_mm = 16, kCut_mm = 4;
-constexpr double kOverlap_mm = 0.01;  // so that no viewer shows a gap between two black modules
+constexpr uint32_t kCodesMax = 65536;  // of a family: all
+constexpr double kOverlap_mm = 0.01;   // so that no viewer shows a gap between two black modules
 
 struct Paper {
   const char *name;
@@ -86,37 +83,42 @@ Print mr_print(double size_mm) {
   return print;
 }
 
-// `turned`: the other way up than in the library's pictures, as ArUco and our recordings have tag36h11.
-Print tag_print(std::shared_ptr<apriltag_family_t> family, double size_mm, bool turned) {
-  const int across = family->total_width;
-  const double module_mm = size_mm / family->width_at_border, half = 0.5 * across * module_mm;
-  const double rim = family->reversed_border ? 0 : module_mm;  // the picture has it, where the border is black
+// Upright as its reader sees it.
+Print square_print(const MarkerSheet &sheet, double size_mm) {
+  std::shared_ptr<wm_square_family> family = std::make_shared<wm_square_family>();
+  uint64_t *memory = nullptr;
+  if (!wm_marker_family_make(sheet.family.c_str(), kCodesMax, family.get(), &memory))
+    throw Failure("--family: '" + sheet.family + "' is neither mr nor one of vision.apriltag.family (docs/config.md)",
+                  kUsage);
+  const std::shared_ptr<uint64_t> codes(memory, std::free);
+  const int across = family->across, beside = (across - family->border) / 2;
+  const double module_mm = size_mm / family->border, half = 0.5 * across * module_mm;
   Print print;
-  print.left_mm = print.top_mm = -half + rim;
-  print.right_mm = print.bottom_mm = half - rim;
+  print.left_mm = print.top_mm = -half;
+  print.right_mm = print.bottom_mm = half;
   print.rim_mm = module_mm;
   print.measure =
-      family->reversed_border ? "edge of the white square inside the black ring" : "edge of the black square";
-  print.count = static_cast<int>(family->ncodes);
+      family->is_white_inside ? "edge of the white square inside the black ring" : "edge of the black square";
+  print.count = static_cast<int>(family->count);
   print.draw = [=](Pdf &pdf, Pdf::Point c, int id) {
-    image_u8_t *image = apriltag_to_image(family.get(), static_cast<uint32_t>(id));
-    modules(pdf, {c.x_mm - half, c.y_mm - half}, module_mm, across, [=](int x, int y) {
-      const int u = turned ? across - 1 - x : x, v = turned ? across - 1 - y : y;
-      return image->buf[v * image->stride + u] < 128;
-    });
-    std::free(image->buf);
-    std::free(image);
+    std::vector<char> black(static_cast<size_t>(across * across));
+    const auto at = [&](int x, int y) -> char & {
+      const int u = x + beside, v = y + beside;
+      return black[static_cast<size_t>(family->half_turned ? across * across - 1 - v * across - u : v * across + u)];
+    };
+    const int from = family->is_white_inside ? -1 : 0, to = family->border - 1 - from;  // of the black ring
+    for (int i = from; i <= to; i++) at(i, from) = at(i, to) = at(from, i) = at(to, i) = 1;
+    for (int i = 0; i < family->bits; i++)
+      at(family->x[i], family->y[i]) = (codes.get()[id] >> (family->bits - 1 - i) & 1) == 0;
+    modules(pdf, {c.x_mm - half, c.y_mm - half}, module_mm, across,
+            [&](int x, int y) { return black[static_cast<size_t>(y * across + x)] != 0; });
   };
   return print;
 }
 
 Print print_of(const MarkerSheet &sheet) {
   const double size_mm = 1000 * sheet.size_m;
-  if (sheet.family == "mr") return mr_print(size_mm);
-  if (sheet.family == "tag36h11") return tag_print({tag36h11_create(), tag36h11_destroy}, size_mm, true);
-  if (sheet.family == "tagStandard41h12")
-    return tag_print({tagStandard41h12_create(), tagStandard41h12_destroy}, size_mm, false);
-  throw Failure("--family: '" + sheet.family + "' is none of mr, tag36h11, tagStandard41h12", kUsage);
+  return sheet.family == "mr" ? mr_print(size_mm) : square_print(sheet, size_mm);
 }
 
 std::string text(const char *format, double value) {

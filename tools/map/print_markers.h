@@ -8,7 +8,7 @@
 namespace wm::tools {
 
 struct MarkerSheet {
-  std::string family = "mr";  // or tag36h11, tagStandard41h12
+  std::string family = "mr";  // or one of wm_marker_family_names
   std::vector<int> ids;
   double size_m = 0.18;      // mr: largest width of the black; tags: edge of the square that the detector finds
   std::string paper = "a4";  // a4, a3, letter

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Detectors that lean on a library. Behind the contract of waymark/detector.h; their allocations, a few a picture, are
-// the library's.
+// Detectors that lean on a library, behind the contract of waymark/detector.h, and the families of square markers whose
+// codes it has. They allocate at the start only.
 #ifndef WAYMARK_DETECTORS_H
 #define WAYMARK_DETECTORS_H
 
 #include <stddef.h>
 
 #include "waymark/detector.h"
+#include "waymark/square_marker.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -14,6 +15,12 @@ extern "C" {
 
 // All of them; constant.
 const wm_detector *const *wm_library_detectors(size_t *count);
+
+// Families of square markers, AprilTag's and ArUco's: "calibration" (the one that calibration.yaml names), then all
+// names, then NULL.
+extern const char *const wm_marker_family_names[];
+// The first `codes_max` codes of a family; 0 where there is none of that name. `*memory` holds them: to be freed.
+int wm_marker_family_make(const char *name, uint32_t codes_max, wm_square_family *out, uint64_t **memory);
 
 #ifdef __cplusplus
 }

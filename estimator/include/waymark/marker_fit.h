@@ -44,7 +44,8 @@ size_t wm_marker_fit_bytes(void);
 const char *wm_marker_fit_init(wm_marker_fit *self, const wm_camera *camera, const wm_marker_print *print);
 
 // `corners_px`: the print's corners in its order, within about two pixels; whole coordinates are the centres of pixels.
-// Writes everything of *out except sensor and id. False where the edges are not found. About 0.1 ms; no allocation.
+// Writes everything of *out except sensor and id. Where the edges cannot be measured (short or blurred sides), the pose
+// is that of the given corners, with larger sigmas. False where no pose fits. About 0.1 ms; no allocation.
 int wm_marker_fit_read(wm_marker_fit *self, const wm_frame *frame, const double (*corners_px)[2], wm_marker *out);
 // Bloom: how far white extends over an edge, px; its mean until now.
 double wm_marker_fit_bloom_px(const wm_marker_fit *self);

@@ -71,8 +71,8 @@ void make_tiles(dark_work *work, const wm_frame &frame) {
   }
 }
 
-// The threshold of each pixel of a row of tiles: 0 where there is no contrast.
-void make_threshold(dark_work *work, int32_t y, int contrast) {
+// The threshold of each pixel of a row of tiles; `flat` where there is no contrast.
+void make_threshold(dark_work *work, int32_t y, int contrast, int flat) {
   const int32_t columns = tiles_of(work->width), across = columns + 2;
   const uint8_t *least = work->least + y * across, *most = work->most + y * across;
   for (int32_t x = 0; x < columns; x++) {
@@ -83,24 +83,27 @@ void make_threshold(dark_work *work, int32_t y, int contrast) {
         low = a < low ? a : low;
         high = b > high ? b : high;
       }
-    const int middle = high - low < contrast ? 0 : low + (high - low) / 2;
+    const int middle = high - low < contrast ? flat : low + (high - low) / 2;
     std::memset(work->threshold + x * kTile, middle, kTile);
   }
 }
 
+// Pixels below the threshold, or above it. Without contrast no pixel is: the threshold is 0 or 255 there.
+template <bool kIsLight>
 void make_mask(dark_work *work, const wm_frame &frame, int contrast) {
   const int32_t rows = tiles_of(work->height);
   for (int32_t y = 0; y < rows; y++) {
-    make_threshold(work, y, contrast);
+    make_threshold(work, y, contrast, kIsLight ? 255 : 0);
     for (int32_t v = y * kTile; v < (y + 1) * kTile && v < work->height; v++) {
       const uint8_t *grey = frame.grey + static_cast<size_t>(v) * frame.stride_bytes;
       uint8_t *mask = work->mask + static_cast<size_t>(v + 1) * static_cast<size_t>(work->stride) + 1;
       int32_t u = 0;
       for (; u + kLanes <= work->width; u += kLanes) {
-        const bytes16 dark = reinterpret_cast<bytes16>(load(grey + u) < load(work->threshold + u));
-        store(mask + u, dark);
+        const bytes16 here = load(grey + u), limit = load(work->threshold + u);
+        store(mask + u, reinterpret_cast<bytes16>(kIsLight ? here > limit : here < limit));
       }
-      for (; u < work->width; u++) mask[u] = grey[u] < work->threshold[u] ? 255 : 0;
+      for (; u < work->width; u++)
+        mask[u] = (kIsLight ? grey[u] > work->threshold[u] : grey[u] < work->threshold[u]) ? 255 : 0;
     }
   }
 }
@@ -191,9 +194,9 @@ size_t dark_work_lay_out(dark_work *out, uint32_t width, uint32_t height, uint8_
   return layout.bytes();
 }
 
-void find_dark_regions(dark_work *work, const wm_frame &frame, int contrast) {
+void find_regions(dark_work *work, const wm_frame &frame, int contrast, bool is_light) {
   make_tiles(work, frame);
-  make_mask(work, frame, contrast);
+  is_light ? make_mask<true>(work, frame, contrast) : make_mask<false>(work, frame, contrast);
   uint32_t next = 0;
   for (int32_t v = 0; v < work->height; v++) {
     work->first[v] = next;

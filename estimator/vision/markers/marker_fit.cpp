@@ -36,10 +36,12 @@ constexpr double kContrastMin_grey = 12.0;           // over an edge: above nois
 constexpr double kMonotonousMin = 0.6;               // net over total rise of a profile: a single edge. Not swept
 constexpr double kOutlier_px = 0.6;                  // a point farther off its side is left out. Not swept
 constexpr double kSideMin_px = 8.0;                  // shortest side of a print that can be measured
+constexpr double kSideLeast_px = 1.0;                // for the sigma of one that cannot: against division by 0
 constexpr double kBloomMemory = 1600.0;              // sides in the running mean: some minutes of prints
 constexpr double kBloomMax_px = 1.0;                 // a larger one is a wrong edge
 constexpr double kWidthStep_px = 0.5, kWidthMin_px = 1.0,
                  kWide_px = 6.5;             // of the classes; the last one: no interaction
+constexpr double kRough_px = 0.5;            // sigma of corners whose sides are too short to be measured: bloom, steps
 constexpr double kTurnSigmaMin_rad = 0.003;  // of an upright print: the camera's own tilt, the paper's bend
 
 // Offset along `normal` from `at` of a rise of grey, its centroid. False where there is no single clear edge.
@@ -300,6 +302,23 @@ struct print_view {
       if (!fit_side(points[i], bloom_of(fit, width_px[i]), bloom_of(fit, kWide_px), &side[i])) return false;
     return corners_of(side, count, corner);
   }
+  // Sides, bloom, and corners without bloom. False where a side cannot be measured.
+  bool measure(wm_marker_fit *fit, const wm_frame &frame) {
+    const wm_marker_print &print = fit->print;
+    // Twice: a profile that is not centred on its edge cuts off one tail more than the other.
+    if (!refine(frame, print) || !refine(frame, print)) return false;
+    for (int i = 0; i < print.corners; i++) find_other_border(view, frame, print, h, i, &points[i]);
+    measure_bloom(fit, view, frame, h, points, width_px);
+    return correct_bloom(*fit);
+  }
+  double shortest_px(int count) const {
+    double least = length(corner[1] - corner[0]);
+    for (int i = 1; i < count; i++) {
+      const double size = length(corner[(i + 1) % count] - corner[i]);
+      if (size < least) least = size;
+    }
+    return larger(least, kSideLeast_px);
+  }
 };
 
 }  // namespace
@@ -324,19 +343,22 @@ int wm_marker_fit_read(wm_marker_fit *self, const wm_frame *frame, const double 
   using namespace wm;
   const wm_marker_print &print = self->print;
   print_view seen;
-  // Twice: a profile that is not centred on its edge cuts off one tail more than the other.
-  if (!seen.place(self->optics, print, corners_px) || !seen.refine(*frame, print) || !seen.refine(*frame, print))
-    return 0;
-  for (int i = 0; i < print.corners; i++) find_other_border(seen.view, *frame, print, seen.h, i, &seen.points[i]);
-  measure_bloom(self, seen.view, *frame, seen.h, seen.points, seen.width_px);
+  if (!seen.place(self->optics, print, corners_px)) return 0;
+  const bool is_measured = seen.measure(self, *frame);
+  if (!is_measured && !seen.place(self->optics, print, corners_px)) return 0;
   marker_poses poses;
-  if (!seen.correct_bloom(*self) || !pose_of(seen.view, print, seen.corner, self->up, &poses)) return 0;
+  if (!pose_of(seen.view, print, seen.corner, self->up, &poses)) return 0;
   const vec3 all = poses.best.centre_m + poses.other.centre_m;
   if (!wm::finite(all) || !(length(poses.best.centre_m) > 0.0)) return 0;
   write_pose(*self, poses.best, out->p_m, &out->yaw_rad);
   out->along_sigma_m = poses.range_sigma_m > 0.0 ? poses.range_sigma_m : kAbsent;
   out->yaw_sigma_rad =
       poses.turn_sigma_rad > 0 ? std::sqrt(square(poses.turn_sigma_rad) + square(kTurnSigmaMin_rad)) : kAbsent;
+  if (!is_measured) {
+    const double part = kRough_px / seen.shortest_px(print.corners), range_m = length(poses.best.centre_m);
+    out->along_sigma_m = std::sqrt(square(poses.range_sigma_m) + square(part * range_m));
+    out->yaw_sigma_rad = std::sqrt(square(poses.turn_sigma_rad) + square(kTurnSigmaMin_rad) + square(part));
+  }
   const double bloom_px = wm_marker_fit_bloom_px(self);
   out->bloom_px = bloom_px != 0.0 ? bloom_px : kAbsent;  // 0: not measured yet
   out->poses = poses.has_other ? 2 : 1;

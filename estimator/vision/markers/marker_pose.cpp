@@ -11,7 +11,7 @@ constexpr double kPlane_chi2 = 25.0;       // above, a print is neither level no
 constexpr int kTurns = 33;                 // angles of the coarse search: 5 degrees, the minima are wider
 constexpr double kNever = 1e300;           // cost
 constexpr double kFreeTilt_rad = 15.0;     // tilt sigma of a free print, per corner's error over its size. Not swept
-constexpr double kFreeTiltMax_rad = 0.08;  // a free print whose tilt is less certain is refused. Not swept
+constexpr double kFreeTiltMax_rad = 0.25;  // a free print whose tilt is less certain is refused: below 7 px. Not swept
 constexpr double kTurnMax_rad = 1.36;      // largest angle of an upright print to the line of sight: 78 degrees
 constexpr double kStepMin_rad = 0.005, kStepMax_rad = 0.05;  // of the search for the turn's sigma
 constexpr double kTurnPrior_rad = 0.5;                       // sigma at which the curvature is cut off

@@ -35,7 +35,7 @@ void many_small_ones_share_a_page_and_families_differ() {
   sheet.ids = ids_of("1-20,25");
   TEST_ASSERT_EQUAL(21, sheet.ids.size());
   TEST_ASSERT_EQUAL(25, sheet.ids.back());
-  for (const char *family : {"mr", "tag36h11", "tagStandard41h12"}) {
+  for (const char *family : {"mr", "tag36h11", "tagStandard41h12", "aruco_4x4_50"}) {
     sheet.family = family;
     int pages = 0;
     sheet.size_m = 0.05;
@@ -66,7 +66,7 @@ void what_cannot_be_printed_is_said() {
   refused(sheet, "a4, a3, letter");
   sheet.paper = "a4";
   sheet.family = "qr";
-  refused(sheet, "none of mr");
+  refused(sheet, "neither mr");
   sheet.family = "tag36h11";
   sheet.ids = {587};
   refused(sheet, "0 to 586");
