@@ -128,7 +128,7 @@ bool stereo_ekf::sighting_rows(const wm_sighting &s, int landmark, int slot, row
   const vec3 to = target - past.at.p - past.R * arm;
   const double distance = length(to), map = slot >= 0 ? 0.0 : map_sigma(known);
   if (!(distance > kNearest_m)) return false;
-  double by_end[2][3], by_turn[2][3] = {};
+  double by_end[2][3] = {}, by_turn[2][3] = {};
   if (!std::isnan(s.range_m)) {
     const double sigma = first_finite(s.range_sigma_m, sensor.range_sigma_m, setup_->sightings->range_sigma_default_m);
     const int row = out->add_row(WM_RESIDUAL_RANGE, s.range_m, s.range_m - distance - filter_.head1(kRangeBias, 0.0),
@@ -167,7 +167,7 @@ void stereo_ekf::position_rows(const wm_position &p, int first, int last, row_bl
   static constexpr wm_residual kKinds[3] = {WM_RESIDUAL_X, WM_RESIDUAL_Y, WM_RESIDUAL_Z};
   double by_end[3][3] = {};
   const double by_turn[3][3] = {};
-  for (int i = first; i < last; i++) {
+  for (int i = first; i < last && i < 3; i++) {
     const int row = out->add_row(kKinds[i], p.p_m[i], p.p_m[i] - filter_.nominal().p[i],
                                  square(i == 2 ? p.sigma_z_m : p.sigma_xy_m));
     by_end[row][i] = 1.0;
