@@ -99,6 +99,26 @@ axis_angle by_angle_scale(const double v[3], double flat_m, double length_m) {
   return {angle * v[1] * length_m * length_m / off_axis / (flat_m * flat_m), angle * v[0] * v[2] / (off_axis * flat_m)};
 }
 
+// `causes`: of kRayCauses, as many as count; `length_m`: of the ray.
+void expect_range(const mounted_sensor &sensor, const sensor_errors &errors, const sensor_ray &ray, int causes,
+                  double length_m, expected_sighting *out) {
+  const double *v = ray.v;
+  const sin_cos axis = errors[kDepthAxis] != 0.0 ? sincos(errors[kDepthAxis]) : sin_cos{0.0, 1.0};
+  const double along[3] = {sensor.range_is_depth ? axis.cos : v[0] / length_m,
+                           sensor.range_is_depth ? axis.sin : v[1] / length_m,
+                           sensor.range_is_depth ? 0.0 : v[2] / length_m};
+  const double plain = sensor.range_is_depth ? axis.cos * v[0] + axis.sin * v[1] : length_m;
+  out->range_m = errors[kRangeScale] * plain + errors[kRangeBias];
+  for (int i = 0; i < causes; i++) {
+    const double *d = ray.by[kRayCauses[i]];
+    out->range_by[kRayCauses[i]] = errors[kRangeScale] * (along[0] * d[0] + along[1] * d[1] + along[2] * d[2]);
+  }
+  out->range_by[kBySensor + kRangeBias] = 1.0;
+  out->range_by[kBySensor + kRangeScale] = plain;
+  if (sensor.range_is_depth)
+    out->range_by[kBySensor + kDepthAxis] = errors[kRangeScale] * (axis.cos * v[1] - axis.sin * v[0]);
+}
+
 }  // namespace
 
 void mounted_sensor::init(const wm_sensor &sensor) {
@@ -156,22 +176,7 @@ expected_sighting expect(const mounted_sensor &sensor, const sensor_errors &erro
     out.bearing_by[kBySensor + kEccentricX] = by_x;
     out.bearing_by[kBySensor + kEccentricY] = by_y;
   }
-  if (components & kRange) {
-    const sin_cos axis = errors[kDepthAxis] != 0.0 ? sincos(errors[kDepthAxis]) : sin_cos{0.0, 1.0};
-    const double along[3] = {sensor.range_is_depth ? axis.cos : v[0] / length,
-                             sensor.range_is_depth ? axis.sin : v[1] / length,
-                             sensor.range_is_depth ? 0.0 : v[2] / length};
-    const double plain = sensor.range_is_depth ? axis.cos * v[0] + axis.sin * v[1] : length;
-    out.range_m = errors[kRangeScale] * plain + errors[kRangeBias];
-    for (int i = 0; i < causes; i++) {
-      const double *d = ray.by[kRayCauses[i]];
-      out.range_by[kRayCauses[i]] = errors[kRangeScale] * (along[0] * d[0] + along[1] * d[1] + along[2] * d[2]);
-    }
-    out.range_by[kBySensor + kRangeBias] = 1.0;
-    out.range_by[kBySensor + kRangeScale] = plain;
-    if (sensor.range_is_depth)
-      out.range_by[kBySensor + kDepthAxis] = errors[kRangeScale] * (axis.cos * v[1] - axis.sin * v[0]);
-  }
+  if (components & kRange) expect_range(sensor, errors, ray, causes, length, &out);
   out.elevation_rad = std::numeric_limits<double>::quiet_NaN();
   if ((components & kElevation) && with_height) {
     const double over_length2 = 1.0 / (length * length);
