@@ -6,6 +6,12 @@
 namespace wm {
 namespace {
 
+// An interval between two samples beyond this is a gap, over which their mean is taken: logs give 5 samples a second or
+// more. Not swept.
+constexpr double kGapAfter_s = 0.2;
+// Random walks of the velocity and of the turn rates over a gap, per sqrt(s): accelerations of a vehicle in water or of
+// a head. Not swept.
+constexpr double kGapWalk_mps = 0.3, kGapWalk_radps = 0.3;
 constexpr double kFirstPeriod_s = 0.02;  // of a sensor that has given one sample; 50 a second
 // Of the low-pass behind a time offset's derivative. Chosen on seabed-a (offset 15 ms); not swept.
 constexpr double kSmoothing_s = 0.3;
@@ -95,12 +101,11 @@ bool spatial_history::moved_since(double age_s, pose3 *out, spatial_twist *twist
   return age_s <= 0.0;
 }
 
-void spatial_motion::init(const wm_motion_params *params, const wm_wheels *wheels, const spatial_noise &noise,
-                          double gap_after_s) {
+void spatial_motion::init(const wm_motion_params *params, const wm_wheels *wheels, const spatial_noise &noise) {
   std::memset(static_cast<void *>(this), 0, sizeof *this);
   front_.init(params, wheels);
   const wm_motion_params &p = front_.params();
-  history_.init({gap_after_s, p.hold_max_s, true, p.limits_mps2, p.limits_radps2});
+  history_.init({kGapAfter_s, p.hold_max_s, true, p.limits_mps2, p.limits_radps2});
   noise_ = noise;
 }
 
@@ -150,10 +155,10 @@ spatial_step spatial_motion::step_of(const spatial_piece &piece) const {
   const double held_s2 = s.dt_s * (s.dt_s > history_.period_s() ? s.dt_s : history_.period_s());
   const wm_motion_params &p = front_.params();
   for (int i = 0; i < 3; i++) {
-    s.place_m2[i] = variance_of(noise_.v_mps[i], noise_.v_rel, speed) * held_s2 +
-                    square(noise_.gap_v_walk) * piece.walk_s3 + square(p.limits_mps2) * piece.refused_s4 / 3.0;
+    s.place_m2[i] = variance_of(noise_.v_mps[i], noise_.v_rel, speed) * held_s2 + square(kGapWalk_mps) * piece.walk_s3 +
+                    square(p.limits_mps2) * piece.refused_s4 / 3.0;
     s.turn_rad2[i] = variance_of(noise_.w_radps[i], noise_.w_rel, rate) * held_s2 +
-                     square(noise_.gap_w_walk) * piece.walk_s3 + square(p.limits_radps2) * piece.refused_s4 / 3.0;
+                     square(kGapWalk_radps) * piece.walk_s3 + square(p.limits_radps2) * piece.refused_s4 / 3.0;
   }
   return s;
 }

@@ -80,11 +80,10 @@ class spatial_history {
   uint64_t pieces_;
 };
 
-// Noise of a sample's twist: sigmas a component and a fraction of the size; walk over gaps per sqrt(s).
+// Noise of a sample's twist: sigmas a component and a fraction of the size.
 struct spatial_noise {
   vec3 v_mps, w_radps;
   double v_rel, w_rel;
-  double gap_v_walk, gap_w_walk;
 };
 
 // A piece with the variances of what it integrates to on each axis.
@@ -97,7 +96,7 @@ struct spatial_step {
 // The motion of a filter in space: any motion event as a twist, with noise and what a time offset's derivative needs.
 class spatial_motion {
  public:
-  void init(const wm_motion_params *params, const wm_wheels *wheels, const spatial_noise &noise, double gap_after_s);
+  void init(const wm_motion_params *params, const wm_wheels *wheels, const spatial_noise &noise);
   // Whether a motion event can be taken; changes nothing.
   wm_status check(const wm_event &event) const { return front_.check(event); }
 

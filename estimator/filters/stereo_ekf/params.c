@@ -21,12 +21,6 @@ static const wm_param kParams[] = {
         "A further sigma of the velocity, as a fraction of the speed; the variances are added."),
     F64("noise.w_rel", w_rel, 0, 0, 2,
         "A further sigma of the turn rates, as a fraction of the rate; the variances are added."),
-    F64("gap.after_s", gap_after_s, 0.2, 0.001, 3600,
-        "A twist holds to the next sample. Beyond this interval between two samples, their mean is taken for the gap, "
-        "s."),
-    F64("gap.v_walk", gap_v_walk, 0.3, 0, 100,
-        "Random walk of the velocity over a gap, m/s per sqrt(s): a measure of the vehicle's accelerations."),
-    F64("gap.w_walk", gap_w_walk, 0.3, 0, 100, "Random walk of the turn rates over a gap, rad/s per sqrt(s)."),
     F64("constant_velocity.v_sigma_mps", cv_v_sigma, 0.5, 1e-6, 100, "Start sigma of the velocity as a state, m/s."),
     F64("constant_velocity.w_sigma_radps", cv_w_sigma, 0.3, 1e-6, 100, "Start sigma of the turn rates, rad/s."),
     F64("constant_velocity.v_walk", cv_v_walk, 0.1, 0, 100, "Random walk of the velocity, m/s per sqrt(s)."),
@@ -72,14 +66,17 @@ static const wm_param kParams[] = {
         "Pictures in which a point of the state may be missing although it should be in view; then it is removed."),
     F64("slam.keep_outside_s", keep_outside_s, 10, 0, 1e6,
         "Time for which a point out of view is kept, to be found again, s. 0: it is removed at once, as in the paper."),
-    F64("slam.disparity_min_px", disparity_min_px, 3, 0.1, 1000,
-        "Smallest disparity at which a point is added, px: below it, its distance is too uncertain."),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
         "Time without a fused observation after which the state is dead reckoning, s."),
     BOOL("recover.on", recover, 1, "Relocalize by known points when the observations show that the pose is wrong."),
 };
 
+#define CONSTANT "it is a constant of the filter now"
 static const wm_param_old kOld[] = {
+    {"gap.after_s", NULL, CONSTANT},
+    {"gap.v_walk", NULL, CONSTANT},
+    {"gap.w_walk", NULL, CONSTANT},
+    {"slam.disparity_min_px", NULL, CONSTANT},
     {"noise.range_default_m", "/sightings.noise.range_default_m", NULL},
     {"noise.bearing_default_rad", "/sightings.noise.bearing_default_rad", NULL},
     {"noise.map_min_m", "/sightings.noise.map_min_m", NULL},

@@ -17,7 +17,6 @@ typedef struct wm_stereo_ekf_params {
   int32_t prediction;  // wm_stereo_prediction
   // noise of motion
   double v_mps, w_radps, v_rel, w_rel;
-  double gap_after_s, gap_v_walk, gap_w_walk;
   double cv_v_sigma, cv_w_sigma, cv_v_walk, cv_w_walk, cv_tau_s;
   // states; 0: off
   double rate_bias_sigma, rate_bias_walk;
@@ -32,7 +31,7 @@ typedef struct wm_stereo_ekf_params {
   double gate_soft, gate_hard;
   // points found on the way
   int32_t points_max, keep_unseen_steps;
-  double keep_outside_s, disparity_min_px;
+  double keep_outside_s;
   // finding the pose
   double dead_reckoning_after_s;
   int32_t recover;

@@ -85,7 +85,7 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
   const double px[4] = {seen.left_px[0], seen.left_px[1], seen.right_px[0], seen.right_px[1]};
   vec3 x;
   double by[3][4];
-  if (std::isnan(px[0]) || std::isnan(px[2]) || !rig_.triangulate(px, params_.disparity_min_px, &x, by)) {
+  if (std::isnan(px[0]) || std::isnan(px[2]) || !rig_.triangulate(px, kDisparityLeast_px, &x, by)) {
     record.verdict = WM_REJECTED_UNKNOWN_ID;
     records.add(record);
     return;

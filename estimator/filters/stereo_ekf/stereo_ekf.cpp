@@ -29,7 +29,7 @@ double first_of(double set, double calibrated, double otherwise) {
 }
 
 spatial_noise twist_noise_of(const wm_stereo_ekf_params &p, const wm_rig *rig) {
-  spatial_noise out = {{}, {}, p.v_rel, p.w_rel, p.gap_v_walk, p.gap_w_walk};
+  spatial_noise out = {{}, {}, p.v_rel, p.w_rel};
   for (int i = 0; i < 3; i++) {
     out.v_mps[i] = first_of(p.v_mps, rig ? rig->twist6_sigma_v_mps[i] : 0.0, kTwistSigma_mps);
     out.w_radps[i] = first_of(p.w_radps, rig ? rig->twist6_sigma_w_radps[i] : 0.0, kTwistSigma_radps);
@@ -88,7 +88,7 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   setup_ = &setup;
   (void)rig_.init(setup.rig, &why);
   for (int i = 0; i < 4; i++) sigma_px_[i] = params.pixel_px > 0.0 ? params.pixel_px : rig_.sigma_px[i];
-  motion_.init(setup.motion, &setup.wheels, twist_noise_of(params, setup.rig), params.gap_after_s);
+  motion_.init(setup.motion, &setup.wheels, twist_noise_of(params, setup.rig));
   head_model models[kHeadStates];
   models_of(params, models);
   filter_.init(behind.filter, models, params.points_max);

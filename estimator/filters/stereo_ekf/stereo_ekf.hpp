@@ -37,6 +37,9 @@ class stereo_ekf {
   static constexpr int32_t kOfMap = -1;  // point_info::unseen of a point of the map, which is not removed
   // Observations of the last seconds are used to find the pose; odometry relates them. Not swept.
   static constexpr double kWindow_s = 3.0;
+  // At a disparity below this a point's distance is too uncertain to be linearised: at 0.5 px, one sixth of it. Not
+  // swept.
+  static constexpr double kDisparityLeast_px = 3.0;
   static constexpr int kDepthKey = -4;  // beside core/landmark_evidence.hpp's keys
   // A point of the state.
   struct point_info {
