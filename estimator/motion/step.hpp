@@ -27,7 +27,7 @@ inline constexpr wm_motion_calibration kNeutralCalibration = {{1.0, 1.0, 0.0, 1.
 // Twist (speed in m/s, turn rate in rad/s) of base_link and its derivatives by the calibration; only the first `count`
 // entries of `index`, `v_by`, `w_by` are set. The lag is not among them: it moves the ends of the interval.
 struct motion_twist {
-  static constexpr int kMax = 8;
+  static constexpr int kMax = 8;  // capacity; a model has fewer terms
   double v, w;
   int count;
   int index[kMax];

@@ -11,7 +11,7 @@
 
 namespace wm {
 
-inline constexpr int kMaxSensors = 16;
+inline constexpr int kMaxSensors = 16;  // capacity
 
 // A sensor's mounting, ready for use.
 struct mounted_sensor {

@@ -8,7 +8,7 @@
 
 namespace wm {
 
-inline constexpr int kLinePoses = 8;
+inline constexpr int kLinePoses = 8;  // capacity of a start: find_line costs their cube
 
 // Lines of sight from poses (x, y, heading of the sensor), with their covariance.
 struct line_bundle {
@@ -39,7 +39,7 @@ line_landmark find_line(const line_bundle &bundle, bool unscented);
 // Which bearings wait for which landmark. Plain memory.
 class bearing_tracks {
  public:
-  static constexpr int kTracks = 128;
+  static constexpr int kTracks = 128;  // capacity; a hall shows 60 to 70 lines
   struct track {
     int32_t id;  // -1: free
     int sensor, count, misfits;
@@ -64,7 +64,7 @@ class bearing_tracks {
   int find_clone(int sensor, wm_time_ns t_ns) const;
   // The sensor's newest clone, -1 where there is none.
   int newest_clone(int sensor) const;
-  static constexpr int kClones = 40;
+  static constexpr int kClones = 40;  // capacity: bounds 120 states
 
  private:
   static void remove(track *t, int which);

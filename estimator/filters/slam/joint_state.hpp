@@ -37,7 +37,7 @@ struct joint_layout {
 
 class joint_state : public planar_motion {
  public:
-  static constexpr int kMaxRobot = 192;
+  static constexpr int kMaxRobot = 192;             // capacity of states beside landmarks
   static constexpr int kRows = half_update::kRows;  // of one correction
 
   // Doubles that the arrays behind need.

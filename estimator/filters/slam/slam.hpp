@@ -24,7 +24,7 @@
 
 namespace wm {
 
-inline constexpr int kSlamSensors = 8;
+inline constexpr int kSlamSensors = 8;  // capacity
 // Observations of each of two lines that may be one (lines.rejoin): a false line rarely lasts a second. Not swept.
 inline constexpr uint32_t kMergeSeen = 10;
 // Log odds that a pose is wrong which defines the map's frame: as of a proven one.
@@ -54,7 +54,7 @@ struct slam_counts {
 
 // Innovations of one picture's outliers: of bearings to known landmarks, or of markers' headings.
 struct picture_outliers {
-  static constexpr int kCapacity = 32;
+  static constexpr int kCapacity = 32;  // further ones are not looked at
   wm_time_ns t_ns;
   int fused, rejected, before;  // before: both, in the picture before
   bool of_markers;
@@ -63,7 +63,7 @@ struct picture_outliers {
 
 // The last identities with a property.
 struct identity_list {
-  static constexpr int kCapacity = 16;
+  static constexpr int kCapacity = 16;  // a further one replaces the oldest
   int32_t id[kCapacity];
   int count, last;  // last: the newest one; -1: none
   void clear() { count = 0, last = -1; }

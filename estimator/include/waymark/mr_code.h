@@ -16,9 +16,9 @@
 extern "C" {
 #endif
 
-#define WM_MR_IDS 65536
-#define WM_MR_CORRECTED 6
-#define WM_MR_DISTANCE 24
+#define WM_MR_IDS 65536    // identities: 16 bits
+#define WM_MR_CORRECTED 6  // module errors that the code corrects
+#define WM_MR_DISTANCE 24  // least distance of two codes in any rotation, modules
 
 // The print in units of its size, which is the pentagon's largest width (from its left to its right vertex, outer edge
 // of the black). Origin at the pentagon's centre, x to the right, y DOWN for a reader.
