@@ -16,7 +16,8 @@ const wm_estimator *const *wm_estimators(size_t *count) {
 int wm_estimator_reads(const wm_estimator *estimator, const char *key) {
   for (const char *const *at = estimator->reads; at && *at; at++) {
     const int is_not = **at == '!';
-    if (strncmp(key, *at + is_not, strlen(*at + is_not)) == 0) return !is_not;
+    const size_t length = strlen(*at + is_not);
+    if (strlen(key) >= length && memcmp(key, *at + is_not, length) == 0) return !is_not;
   }
   return 0;
 }
