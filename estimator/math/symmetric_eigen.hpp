@@ -24,21 +24,25 @@ void jacobi_rotate(double (&a)[kN][kN], double (&vectors)[kN][kN], int i, int j)
   for (int k = 0; k < kN; k++) turn(vectors[k][i], vectors[k][j]);
 }
 
+// Whether the elements beside the diagonal are zero to double precision.
+template <int kN>
+bool is_diagonal(const double (&a)[kN][kN]) {
+  double off = 0.0, diagonal = 0.0;
+  for (int i = 0; i < kN; i++)
+    for (int j = i; j < kN; j++) (i == j ? diagonal : off) += a[i][j] * a[i][j];
+  return off <= 1e-30 * diagonal;
+}
+
 // `a` becomes diagonal: its eigenvalues, in no order. Column k of `vectors` is the unit vector of a[k][k].
 // Convergence is quadratic: four or five sweeps reach double precision up to 6 x 6, twelve bound the cost.
 template <int kN>
 void symmetric_eigen(double (&a)[kN][kN], double (&vectors)[kN][kN]) {
   for (int i = 0; i < kN; i++)
     for (int j = 0; j < kN; j++) vectors[i][j] = i == j ? 1.0 : 0.0;
-  for (int sweep = 0; sweep < 12; sweep++) {
-    double off = 0.0, diagonal = 0.0;
-    for (int i = 0; i < kN; i++)
-      for (int j = i; j < kN; j++) (i == j ? diagonal : off) += a[i][j] * a[i][j];
-    if (off <= 1e-30 * diagonal) return;
+  for (int sweep = 0; sweep < 12 && !is_diagonal(a); sweep++)
     for (int i = 0; i < kN - 1; i++)
       for (int j = i + 1; j < kN; j++)
         if (a[i][j] != 0.0) jacobi_rotate(a, vectors, i, j);
-  }
 }
 
 }  // namespace wm

@@ -76,26 +76,8 @@ class motion_history {
     while (next > oldest && at(next - 1).t_ns > from_ns) next--;
     wm_time_ns begin = from_ns;
     while (begin < to_ns) {
-      motion_segment segment;
       wm_time_ns end = next < count_ && at(next).t_ns < to_ns ? at(next).t_ns : to_ns;
-      if (next > oldest) {
-        segment.input = at(next - 1);
-        const wm_time_ns held_until = segment.input.t_ns + hold_max_ns;
-        segment.input.stale = begin >= held_until;
-        if (!segment.input.stale && end > held_until) end = held_until;
-        if (segment.input.counted) segment.input.stale = 0;  // the distance is known, however long it took
-        segment.overdue_s = wm_seconds_between(segment.input.t_ns, begin) - due_s(next, oldest);
-        segment.refused_s = segment.input.refused_s + wm_seconds_between(segment.input.t_ns, begin);
-        segment.unknown_s = begin > held_until ? wm_seconds_between(held_until, begin) : 0.0;
-        const bool begins = next > oldest + 1 && begin == segment.input.t_ns;
-        segment.changed[0] = begins ? segment.input.a - at(next - 2).a : 0.0;
-        segment.changed[1] = begins ? segment.input.b - at(next - 2).b : 0.0;
-      } else {
-        segment.input = motion_input{};
-        segment.changed[0] = segment.changed[1] = 0.0;
-        segment.overdue_s = -1.0;
-        segment.unknown_s = segment.refused_s = 0.0;
-      }
+      motion_segment segment = next > oldest ? held(next, oldest, begin, hold_max_ns, &end) : unknown();
       segment.has_next = next < count_;
       segment.dt_s = wm_seconds_between(begin, end);
       segment.first = begin == from_ns;
@@ -107,6 +89,29 @@ class motion_history {
   }
 
  private:
+  static motion_segment unknown() {
+    motion_segment segment{};
+    segment.overdue_s = -1.0;
+    return segment;
+  }
+
+  // The input before `next` holds from `begin` on. Where it becomes stale before *end, *end is that time.
+  motion_segment held(uint64_t next, uint64_t oldest, wm_time_ns begin, wm_time_ns hold_max_ns, wm_time_ns *end) const {
+    motion_segment segment{};
+    segment.input = at(next - 1);
+    const wm_time_ns held_until = segment.input.t_ns + hold_max_ns;
+    segment.input.stale = begin >= held_until;
+    if (!segment.input.stale && *end > held_until) *end = held_until;
+    if (segment.input.counted) segment.input.stale = 0;  // the distance is known, however long it took
+    segment.overdue_s = wm_seconds_between(segment.input.t_ns, begin) - due_s(next, oldest);
+    segment.refused_s = segment.input.refused_s + wm_seconds_between(segment.input.t_ns, begin);
+    segment.unknown_s = begin > held_until ? wm_seconds_between(held_until, begin) : 0.0;
+    if (next <= oldest + 1 || begin != segment.input.t_ns) return segment;
+    segment.changed[0] = segment.input.a - at(next - 2).a;
+    segment.changed[1] = segment.input.b - at(next - 2).b;
+    return segment;
+  }
+
   // How old the input before `next` may become before `next` is overdue.
   double due_s(uint64_t next, uint64_t oldest) const {
     if (next <= oldest + 1) return kOverdueS;
