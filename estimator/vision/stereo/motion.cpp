@@ -87,7 +87,7 @@ bool find_motion(const pair_geometry &rig, const seen_twice *points, int count, 
                  uint64_t seed, rigid *out, uint8_t *agrees) {
   if (count < kFewest) return false;
   const double limit = square(agree_px);
-  rigid best = prior ? *prior : kNoMotion;
+  rigid best = prior ? *prior : kIdentityMotion;
   int agreeing;
   double least = cost_of(rig, points, count, best, limit, &agreeing);
   uint64_t draw = 0;

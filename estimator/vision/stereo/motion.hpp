@@ -27,7 +27,7 @@ struct rigid {
   mat3 R;
   vec3 t;
 };
-inline constexpr rigid kNoMotion = {kIdentity3, {0, 0, 0}};  // identity
+inline constexpr rigid kIdentityMotion = {kIdentity3, {0, 0, 0}};
 inline vec3 operator*(const rigid &m, const vec3 &x) { return m.R * x + m.t; }
 inline rigid operator*(const rigid &a, const rigid &b) { return {a.R * b.R, a.R * b.t + a.t}; }
 inline rigid inverse(const rigid &m) {

@@ -113,7 +113,7 @@ wm_status init(void *memory, const void *params, const wm_view *view) {
   for (rectification &camera : state->cameras) rectification_table(&camera);
   state->before_ns = WM_TIME_NONE;
   state->next_id = kFirstId;
-  state->world_camera = kNoMotion;
+  state->world_camera = kIdentityMotion;
   return WM_OK;
 }
 
@@ -152,7 +152,7 @@ bool has_slipped(const stereo_state &self, const track &one) {
 
 // Follows all tracks into the newest pictures. Ends those that are lost or disagree with the common motion.
 void follow(stereo_state *self, double dt_s) {
-  rigid expected = kNoMotion;
+  rigid expected = kIdentityMotion;
   if (self->has_motion) expected = {matrix_of(turn_by(dt_s * self->turn_radps)), dt_s * self->move_mps};
   const pair_pictures pictures = {&self->pictures[2], &self->pictures[0], &self->pictures[1]};
   const rigid camera_world = expected * inverse(self->world_camera);

@@ -111,6 +111,21 @@ def check_folders():
         yield f"estimator/{file} does not include {header} any more: take it off FOLDER_EXCEPTIONS"
 
 
+def check_names():
+    """Names in wm:: stand in one header each: the linker silently merges two inline variables of one name, whatever their types."""
+    defined = re.compile(r"^(?:inline constexpr [\w:<>, ]*?(\w+)(?:\[\w*\])* = |(?:struct|class|union|enum|enum class) (\w+)\b[^;]*$)")
+    first = {}
+    for path in sources("estimator"):
+        if path.suffix != ".hpp":
+            continue
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            match = defined.match(line)
+            name = match and (match[1] or match[2])
+            where = f"{path.relative_to(ROOT)}:{number}"
+            if name and first.setdefault(name, where) != where:
+                yield f"{where}: {name} is defined in {first[name]}, too"
+
+
 def check_sources():
     for room in [*MAY_USE, "tests"]:
         for path in sources(room):
@@ -127,7 +142,7 @@ def sources(room):
 
 
 def main():
-    offences = [*check_includes(), *check_folders(), *check_sources()]
+    offences = [*check_includes(), *check_folders(), *check_names(), *check_sources()]
     count = sum(len(sources(room)) for room in MAY_USE)
     if count == 0:
         print(f"no sources under {ROOT}: wrong folder?")
