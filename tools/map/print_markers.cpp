@@ -104,14 +104,17 @@ Print square_print(const MarkerSheet &sheet, double size_mm) {
     std::vector<char> black(static_cast<size_t>(across * across));
     const auto at = [&](int x, int y) -> char & {
       const int u = x + beside, v = y + beside;
-      return black[static_cast<size_t>(family->half_turned ? across * across - 1 - v * across - u : v * across + u)];
+      const int module = family->half_turned ? across * across - 1 - v * across - u : v * across + u;
+      return black[static_cast<size_t>(module)];
     };
     const int from = family->is_white_inside ? -1 : 0, to = family->border - 1 - from;  // of the black ring
     for (int i = from; i <= to; i++) at(i, from) = at(i, to) = at(from, i) = at(to, i) = 1;
     for (int i = 0; i < family->bits; i++)
       at(family->x[i], family->y[i]) = (codes.get()[id] >> (family->bits - 1 - i) & 1) == 0;
-    modules(pdf, {c.x_mm - half, c.y_mm - half}, module_mm, across,
-            [&](int x, int y) { return black[static_cast<size_t>(y * across + x)] != 0; });
+    modules(pdf, {c.x_mm - half, c.y_mm - half}, module_mm, across, [&](int x, int y) {
+      const int module = y * across + x;
+      return black[static_cast<size_t>(module)] != 0;
+    });
   };
   return print;
 }

@@ -46,7 +46,7 @@ class grid_sweep {
   // well enough to come among the best, if a point of them is better by `hopeful` (in scores) than one of the first.
   void begin(int headings, double hopeful) {
     running_ = true;
-    swept_ = false;
+    swept_ = excludes_ = false;
     headings_ = headings;
     points_ = first_ = count_ = 0;
     next_ = 0;
@@ -64,7 +64,7 @@ class grid_sweep {
     points_++;
   }
   void set_first(int first) { first_ = first; }
-  // Places are offered from this score on, and not near `own`.
+  // After begin(): places are offered from this score on, and not near `own`.
   void set_least(int least) { least_ = least; }
   void exclude(const wm_pose2 &own) { own_ = own, excludes_ = true; }
   int points() const { return points_; }

@@ -109,7 +109,6 @@ void test_the_unscented_start_is_not_worse_than_the_linear_one(void) {
                 std::sqrt(took[0].error() * took[0].error() + took[1].error() * took[1].error()));
     TEST_ASSERT_GREATER_THAN(kTrials * 9 / 10, error[0].count);
     TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(2.0 * worse_error.error(), worse_error.mean());
-    TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(1.2 * took[1].mean(), took[0].mean());  // a busy machine's fifth
     const double off = std::fabs(nees[0].mean() - 1.0), off_linear = std::fabs(nees[1].mean() - 1.0);
     TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(off_linear + 2.0 * (nees[0].error() + nees[1].error()), off);
   }
