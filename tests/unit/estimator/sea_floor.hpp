@@ -60,7 +60,7 @@ struct particle {
 struct view_of_floor {
   explicit view_of_floor(const floor_grain &g) : grain(&g) {}
   const floor_grain *grain;
-  wm::rigid map_base = wm::kNoMotion;  // where the vehicle is
+  wm::rigid map_base = wm::kIdentityMotion;  // where the vehicle is
   double noise_grey = 1.0, gain = 1.0, level = 110.0;
   uint64_t seed = 1;
   std::vector<particle> particles;
