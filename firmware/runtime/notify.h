@@ -24,9 +24,8 @@ typedef struct notify {
 void notify_open(notify *self);
 // A pose went out: READY=1 with the first one.
 void notify_pose(notify *self);
-// The estimator's thread has done so many loops. The watchdog is fed where they advanced. It proves that our threads
-// live, and nothing else: a silent bus, an absent camera or a blocked disk are health, and a restart mends none of
-// them.
+// Count of the estimator thread's loops. The watchdog is fed where it advanced: it proves that the threads run, and
+// nothing else. A restart repairs no silent bus, absent camera or blocked disk; those are reported in health.
 void notify_alive(notify *self, uint64_t loops);
 // STATUS= where it changed. The service manager shows it.
 void notify_status(notify *self, const char *text);

@@ -39,9 +39,9 @@ void threads_of_libraries(void);
 #define LINE_RING_SLOTS 16
 #define LINE_BYTES 400
 
-// Starts a thread of that role, with all signals blocked: they are for the thread that started the run. `number` tells
-// the sources apart in the name. *is_realtime says whether it got its priority; without the right to it (CAP_SYS_NICE,
-// RLIMIT_RTPRIO) it runs as a normal thread.
+// Starts a thread of that role with all signals blocked; the thread that started the run handles them. `number` makes a
+// source's name unique. *is_realtime: it has its priority. Without the right to that (CAP_SYS_NICE, RLIMIT_RTPRIO) it
+// runs as a normal thread.
 wm_status thread_start(thread_role role, size_t number, const wm_config *config, void *(*body)(void *), void *argument,
                        pthread_t *out, int *is_realtime, wm_error *err);
 

@@ -16,8 +16,8 @@ constexpr double kWrong = 0.08, kWrong_m = 2.0, kWrong_rad = 0.3;
 // Prior probability that a landmark has moved, and the sigma of its motion.
 constexpr double kMoved = 0.02, kMovedBy_m = 2.0;
 constexpr double kFalse = 0.2;  // share of false detections, when nothing is known of the detector
-// "Wrong" is accepted above kSure for kLasts_s: false detections do not persist. For a found pose, which nobody stated,
-// less is enough.
+// "Wrong" is accepted above kSure for kLasts_s, since false detections do not persist. For a found pose, not a stated
+// one, less is enough.
 constexpr double kSure = 0.999, kSureFound = 0.9, kLasts_s = 0.25;
 // The test ends after this distance or time: odometry's error is then larger than the start's.
 constexpr double kEnd_m = 10.0, kEnd_s = 10.0;

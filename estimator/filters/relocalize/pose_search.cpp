@@ -6,7 +6,7 @@
 #include "math/arc.hpp"
 
 // Constants were chosen on drawn crossings (waymark-montecarlo-landmarks) and the recordings mrclam-d6-r1 to r5,
-// kidnapped and without a start, and not swept one by one unless it is said.
+// kidnapped and without a start, and not swept one by one unless stated.
 namespace wm {
 namespace {
 

@@ -32,7 +32,7 @@ uint64_t checksum() {
 
 void the_table_is_what_was_made() { TEST_ASSERT_EQUAL_HEX64(UINT64_C(0xC5DB3C93F958064A), checksum()); }
 
-// Codes of one family in all rotations are as far apart as it is said, which bounds what may be corrected.
+// Codes of one family, in all rotations, have the stated least distance. It bounds the correctable modules.
 void distances_are_as_said() {
   for (const char *const *name = wm_marker_family_names + 1; *name; name++) {
     wm_square_family family;
