@@ -13,6 +13,7 @@ constexpr double kRoundMin = 0.3;    // 4 pi area / border^2: a square has 0.79,
 constexpr double kOff_px = 1.2;      // largest distance of a border's point from its side: pixel steps. Not swept
 constexpr double kOffOfSize = 0.02;  // the same, as a fraction of the root of the doubled area: lens residuals
 constexpr double kHalfPixel = 0.5;   // from a border pixel's centre to the edge
+constexpr double kRim_px = 1.5;      // a fitted corner nearer to the picture's rim lies on it
 
 // Whether a border can be a convex polygon's, by its area and length.
 bool is_round(const border_point *border, int32_t count) {
@@ -38,6 +39,45 @@ bool undistort_border(outline_work *self, const dark_run &box, int32_t count, ta
       return false;
   }
   return true;
+}
+
+bool is_at_rim(const outline_work &self, const tangent_view &view, const tangent_point &p) {
+  pixel at;
+  return project(self.optics, ray_of(view, p), &at) &&
+         (at.u < kRim_px || at.v < kRim_px || at.u > self.width_px - 1 - kRim_px ||
+          at.v > self.height_px - 1 - kRim_px);
+}
+
+// The polygon whose corner the picture's rim cut off: has a side more, on the rim. Its neighbours are extended to meet.
+bool restore_corner(const outline_work &self, const tangent_view &view, const tangent_point *cut, int count,
+                    tangent_point *corner) {
+  int rim = -1;
+  for (int i = 0; i <= count; i++)
+    if (is_at_rim(self, view, cut[i]) && is_at_rim(self, view, cut[(i + 1) % (count + 1)])) {
+      if (rim >= 0) return false;
+      rim = i;
+    }
+  if (rim < 0) return false;
+  const auto at = [&](int i) { return cut[(rim + i + count + 1) % (count + 1)]; };
+  const auto line = [](const tangent_point &a, const tangent_point &b) {
+    const tangent_point pair[2] = {a, b};
+    return line_through(pair, 2, {0, 0});
+  };
+  for (int i = 1; i < count; i++) corner[i] = at(i + 1);
+  return meet(line(at(-1), at(0)), line(at(1), at(2)), &corner[0]);
+}
+
+// Corners on the line of the border's points. A region at the picture's rim may lack a corner.
+bool find_corners(const outline_work &self, const tangent_view &view, const dark_run &box, int points, int count,
+                  tangent_point *inside) {
+  const double size = std::sqrt(std::fabs(doubled_area(self.border, points)));
+  const double off = larger(kOff_px, kOffOfSize * size);
+  const bool is_beside_rim =
+      box.left == 0 || box.row == 0 || box.right + 1U >= self.width_px || box.bottom + 1U >= self.height_px;
+  tangent_point cut[kOutlineCornersMax + 1];
+  if (is_beside_rim && polygon_of(self.border, points, count + 1, off, cut))
+    return restore_corner(self, view, cut, count, inside);
+  return polygon_of(self.border, points, count, off, inside);
 }
 
 // Moves the sides of a polygon outwards.
@@ -76,15 +116,11 @@ void outline_place(outline_work *self, memory_layout *memory, bool is_counting) 
 bool find_outline(outline_work *self, uint32_t region, int count, tangent_view *view, tangent_point *corner) {
   const dark_run &box = self->regions.runs[region];
   if (box.right - box.left < kBoxMin_px || box.bottom - box.row < kBoxMin_px) return false;
-  if (box.left == 0 || box.row == 0 || box.right + 1U >= self->width_px || box.bottom + 1U >= self->height_px)
-    return false;
   const int32_t points = trace_border(&self->regions, region);
   if (points < kBorderMin_px || !is_round(self->regions.border, points)) return false;
   if (!undistort_border(self, box, points, view)) return false;
   tangent_point inside[kOutlineCornersMax];
-  const double size = std::sqrt(std::fabs(doubled_area(self->border, points)));
-  return polygon_of(self->border, points, count, larger(kOff_px, kOffOfSize * size), inside) &&
-         move_out(inside, count, kHalfPixel, corner);
+  return find_corners(*self, *view, box, points, count, inside) && move_out(inside, count, kHalfPixel, corner);
 }
 
 bool outline_in_picture(const outline_work &self, const tangent_view &view, const tangent_point *corner, int count,

@@ -25,7 +25,8 @@ const char *outline_init(outline_work *self, const wm_camera &camera);
 void outline_place(outline_work *self, memory_layout *memory, bool is_counting);
 
 // Outer corners of the region that begins with this run, clockwise, in the tangent plane of its middle. False where it
-// is no convex polygon of `count` corners (at most kOutlineCornersMax), touches the picture's edge or is too small.
+// is no convex polygon of `count` corners (at most kOutlineCornersMax) or is too small. One corner may lie outside of
+// the picture.
 bool find_outline(outline_work *self, uint32_t region, int count, tangent_view *view, tangent_point *corner);
 // Corners `first`, first + 1, ... in the picture.
 bool outline_in_picture(const outline_work &self, const tangent_view &view, const tangent_point *corner, int count,

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cstring>
 #include <initializer_list>
+#include <limits>
 
 #include "vision/markers/outline.hpp"
 #include "vision/markers/print_reader.hpp"
@@ -13,11 +14,13 @@ namespace wm {
 
 namespace {
 
-constexpr double kFalseMax = 2e-4;     // probability that a random pattern is a code: some clutter is square
-constexpr int kCorrectedMax = 2;       // bits: more gain no recall on rendered views
-constexpr double kRingWrongMax = 0.1;  // of the modules of the rings, which are known: blur, a finger. Not swept
+constexpr double kFalseMax = 2e-4;      // probability that a random pattern is a code: some clutter is square
+constexpr int kCorrectedMax = 2;        // bits: more gain no recall on rendered views
+constexpr double kRingWrongMax = 0.1;   // of the modules of the rings, which are known: blur, a finger. Not swept
+constexpr double kRingUnreadMax = 0.2;  // of the same, beyond the picture's rim: about a corner. Not swept
 // Corners of the ring's outer border, in parts of its size.
 constexpr double kOutline[4][2] = {{-0.5, -0.5}, {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}};
+constexpr double kUnread = std::numeric_limits<double>::quiet_NaN();
 constexpr int kModulesMax = WM_SQUARE_ACROSS_MAX * WM_SQUARE_ACROSS_MAX;
 
 enum module_kind : int8_t { kOther, kBlack, kWhite };
@@ -86,7 +89,8 @@ bool is_good(const wm_square_family &f) {
   return true;
 }
 
-// Levels of all modules. False outside of the picture or without contrast.
+// Levels of all modules; NaN for a ring's module outside of the picture. False where a module of the code is outside or
+// has no contrast.
 bool read_levels(const wm_square_reader &self, print_reader *r, double *level) {
   const double module_size = r->module_size;
   const double ring = 1 - module_size, rim = 1 + module_size;  // middles of both rings
@@ -95,9 +99,26 @@ bool read_levels(const wm_square_reader &self, print_reader *r, double *level) {
     return false;
   const double middle = 0.5 * (self.across - 1);
   for (int y = 0; y < self.across; y++)
-    for (int x = 0; x < self.across; x++)
-      if (!r->level((x - middle) * module_size, (y - middle) * module_size, &level[y * self.across + x])) return false;
+    for (int x = 0; x < self.across; x++) {
+      const int i = y * self.across + x;
+      if (r->level((x - middle) * module_size, (y - middle) * module_size, &level[i])) continue;
+      if (self.kind[i] == kOther) return false;
+      level[i] = kUnread;
+    }
   return true;
+}
+
+// Gives ring modules that were not read the level they are printed with. False where these are too many.
+bool complete_rings(const wm_square_reader &self, double *level) {
+  int known = 0, unread = 0;
+  for (int i = 0; i < self.across * self.across; i++) {
+    if (self.kind[i] == kOther) continue;
+    known++;
+    if (level[i] == level[i]) continue;
+    unread++;
+    level[i] = self.kind[i] == kBlack ? -0.5 : 0.5;
+  }
+  return unread <= kRingUnreadMax * known;
 }
 
 // Whether the rings are black and white where they must be.
@@ -134,7 +155,8 @@ bool read_code(const wm_square_reader &self, const tangent_view &view, const wm_
                const tangent_point corner[4], square_reading *out) {
   print_reader r = {view, frame, 1.0 / self.border, {}, {}, {}};
   double level[kModulesMax];
-  if (!homography_init(&r.h, kOutline, corner, 4) || !read_levels(self, &r, level)) return false;
+  if (!homography_init(&r.h, kOutline, corner, 4) || !read_levels(self, &r, level) || !complete_rings(self, level))
+    return false;
   for (const double sharpen : {kSharpen, 0.0}) {
     bool is_black[kModulesMax];
     for (int i = 0; i < self.across * self.across; i++) is_black[i] = is_black_module(level, self.across, i, sharpen);

@@ -149,6 +149,24 @@ void test_codes_are_as_far_as_they_are_whatever_lies_along_their_borders(void) {
     }
 }
 
+// The corner's module of the ring lies partly beyond the picture's rim: two sides end there and are extended.
+void test_a_print_is_read_whose_corner_is_outside_of_the_picture(void) {
+  for (double corner_px : {2.0, -1.0, -4.0}) {  // distance of the corner from the rim
+    begin();
+    const double distance_m = 2.0, half_diagonal_px = 450 * 0.70710678 * kSize_m / distance_m;
+    const pose want = {distance_m, (322.5 - half_diagonal_px - corner_px) / 450 * distance_m, 0.1, 0.78539816};
+    draw(want, 1.0);
+    wm_event seen[4];
+    TEST_ASSERT_EQUAL(1, look(seen));
+    const wm_marker &m = seen[0].as.marker;
+    TEST_ASSERT_EQUAL(kTag, m.id);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03 * want.x, want.x, m.p_m[0]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, want.y, m.p_m[1]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, want.z, m.p_m[2]);
+    TEST_ASSERT_DOUBLE_WITHIN(0.03, 0.0, std::remainder(m.yaw_rad - want.yaw, 6.283185307179586));
+  }
+}
+
 void test_an_empty_picture_and_one_of_another_size(void) {
   begin();
   grey.assign(kWidth * kHeight, 128);
@@ -186,6 +204,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_place_direction_and_distance_are_right_whatever_the_response);
   RUN_TEST(test_codes_are_as_far_as_they_are_whatever_lies_along_their_borders);
+  RUN_TEST(test_a_print_is_read_whose_corner_is_outside_of_the_picture);
   RUN_TEST(test_an_empty_picture_and_one_of_another_size);
   RUN_TEST(test_what_it_lacks_is_said);
   std::free(state);
