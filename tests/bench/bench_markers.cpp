@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a 640 x 480 picture to markers costs: MR codes by us, AprilTags by their library, edges and pose included. Three
-// rendered views of each (tests/common/marker_views.hpp), and an office's worth of clutter in all of them.
+// Time of a 640 x 480 picture with coded markers, edges and pose included, and of the AprilTag library's search in the
+// same pictures, at full resolution and at half of it (its default), with one thread and without poses. Three rendered
+// views of each (tests/common/marker_views.hpp), with an office's worth of clutter.
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 
@@ -31,12 +32,16 @@ Ink tag_ink(const image_u8_t *image) {
   };
 }
 
-void whole(const char *name, const wm_detector *detector, const char *family, const Ink &ink) {
+constexpr int kViews = 3, kRounds = 31;
+
+View view_of(int i) { return draw_view(2 * static_cast<uint64_t>(i), 0.4); }
+
+// Mean over the views of each one's median, us.
+double whole(const char *name, const wm_detector *detector, const char *family, const Ink &ink) {
   double sum = 0;
   size_t found = 0;
-  constexpr int kViews = 3;
   for (int i = 0; i < kViews; i++) {
-    const View view = draw_view(2 * static_cast<uint64_t>(i), 0.4);
+    const View view = view_of(i);
     const std::vector<uint8_t> grey = take_picture(view, ink);
     wm_rig rig;
     wm_rig_init(&rig);
@@ -48,10 +53,38 @@ void whole(const char *name, const wm_detector *detector, const char *family, co
     bench::detector_at_work work(detector, {&rig, &camera, nullptr, 0, nullptr, 0, nullptr, 0});
     size_t count = 0;
     const wm_frame frame = frame_of(grey, view.camera);
-    sum += bench::median_us(31, [&] { count = work.look(&frame); });
+    sum += bench::median_us(kRounds, [&] { count = work.look(&frame); });
     found += count;
   }
   std::printf("markers_640x480_%s_us %.0f (%zu markers in %d pictures)\n", name, sum / kViews, found, kViews);
+  return sum / kViews;
+}
+
+// The AprilTag library's search; `ours_us` is compared with it.
+void whole_by_library(apriltag_family_t *family, int decimate, const Ink &ink, double ours_us) {
+  apriltag_detector_t *detector = apriltag_detector_create();
+  apriltag_detector_add_family(detector, family);
+  detector->quad_decimate = static_cast<float>(decimate);
+  double sum = 0;
+  int found = 0;
+  for (int i = 0; i < kViews; i++) {
+    const View view = view_of(i);
+    std::vector<uint8_t> grey = take_picture(view, ink);
+    const auto width = static_cast<int32_t>(view.camera.width_px), height = static_cast<int32_t>(view.camera.height_px);
+    image_u8_t image = {width, height, width, grey.data()};
+    int count = 0;
+    sum += bench::median_us(kRounds, [&] {
+      zarray_t *seen = apriltag_detector_detect(detector, &image);
+      count = zarray_size(seen);
+      apriltag_detections_destroy(seen);
+    });
+    found += count;
+  }
+  apriltag_detector_remove_family(detector, family);
+  apriltag_detector_destroy(detector);
+  std::printf("markers_640x480_tag36h11_library_decimate_%d_us %.0f (%d markers in %d pictures)\n", decimate,
+              sum / kViews, found, kViews);
+  std::printf("markers_640x480_tag36h11_over_library_decimate_%d %.2f\n", decimate, ours_us * kViews / sum);
 }
 
 }  // namespace
@@ -65,7 +98,8 @@ int main() {
   whole("mr", wm_detector_find("mr"), "mr", mr_ink(7));
   apriltag_family_t *family = tag36h11_create();
   image_u8_t *image = apriltag_to_image(family, 7);
-  whole("tag36h11", tags, "tag36h11", tag_ink(image));
+  const double ours_us = whole("tag36h11", tags, "tag36h11", tag_ink(image));
+  for (const int decimate : {1, 2}) whole_by_library(family, decimate, tag_ink(image), ours_us);
   // Its first part: threshold, mask, regions.
   const View view = draw_view(0, 0.4);
   const std::vector<uint8_t> grey = take_picture(view, mr_ink(7));
