@@ -29,11 +29,18 @@ static const wm_param kParams[] = {
         "Above 0: velocity and rates are Gauss-Markov processes with these sigmas and this time constant, s, instead "
         "of "
         "random walks (a head that is swung, a vehicle in still water)."),
-    F64("states.rate_bias_sigma_radps", rate_bias_sigma, 0, 0, 1,
+    F64("states.rate_bias_sigma_radps", rate_bias_sigma, 0.003, 0, 1,
         "Start sigma of the turn rates' bias on each axis, rad/s. 0: off."),
     F64("states.rate_bias_walk", rate_bias_walk, 0.0001, 0, 1, "Random walk of that bias, rad/s per sqrt(s)."),
-    F64("states.velocity_scale_sigma", velocity_scale_sigma, 0, 0, 1,
+    F64("states.velocity_scale_sigma", velocity_scale_sigma, 0.01, 0, 1,
         "Start sigma of the measured velocity's scale about 1 (speed of sound, a log's calibration). 0: off."),
+    F64("states.twist_axes_sigma_rad", twist_axes_sigma, 0.03, 0, 1,
+        "Start sigma of the rotation of the measured twist's axes against the body's, rad: the mounting of a log or of "
+        "gyros. 0: off."),
+    F64("states.velocity_direction_sigma_rad", velocity_direction_sigma, 0.02, 0, 1,
+        "Sigma of the velocity's direction against those axes, rad: sideslip, a pitch by load or current. 0: off."),
+    F64("states.velocity_direction_tau_s", velocity_direction_tau_s, 10, 0, 1e6,
+        "Time constant of that direction as a Gauss-Markov process, s. 0: it is constant."),
     F64("states.camera_rotation_sigma_rad", camera_rotation_sigma, 0, 0, 1,
         "Sigma of the rotation of the camera pair against calibration.yaml's mounting, about each axis, rad. 0: off."),
     F64("states.camera_rotation_tau_s", camera_rotation_tau_s, 0, 0, 1e6,
@@ -42,16 +49,17 @@ static const wm_param kParams[] = {
     F64("states.camera_place_sigma_m", camera_place_sigma, 0, 0, 10,
         "Sigma of the camera pair's place against calibration.yaml's, on each axis, m. 0: off."),
     F64("states.camera_place_tau_s", camera_place_tau_s, 0, 0, 1e6, "As camera_rotation_tau_s, for the place."),
-    F64("states.time_offset_sigma_s", time_offset_sigma, 0, 0, 0.2,
+    F64("states.time_offset_sigma_s", time_offset_sigma, 0.02, 0, 0.2,
         "Start sigma of the pictures' time offset, s: by how much they are older than their stamps. 0: off."),
-    F64("states.range_bias_sigma_m", range_bias_sigma, 0, 0, 10, "Start sigma of acoustic ranges' bias, m. 0: off."),
-    F64("states.bearing_bias_sigma_rad", bearing_bias_sigma, 0, 0, 1,
+    F64("states.range_bias_sigma_m", range_bias_sigma, 0.05, 0, 10, "Start sigma of acoustic ranges' bias, m. 0: off."),
+    F64("states.bearing_bias_sigma_rad", bearing_bias_sigma, 0.01, 0, 1,
         "Start sigma of the bias of bearings and headings (a compass' deviation), rad. 0: off."),
     F64("states.twist_lag_sigma_s", twist_lag_sigma, 0, 0, 0.2,
         "Start sigma of two time offsets, s: by how much the measured velocity and the measured rates are ahead of the "
         "vehicle. With constant_velocity only. 0: off."),
     F64("noise.pixel_px", pixel_px, 0, 0, 1000,
-        "Sigma of one coordinate of a point in a picture, px. 0: calibration.yaml's stereo.sigma_px."),
+        "Sigma of one coordinate of a point in a picture, px. 0: calibration.yaml's stereo.sigma_px, or 0.5 without "
+        "that."),
     F64("gate.soft", gate_soft, 7, 1, 1e6,
         "Normalised innovation squared of one row above which its variance is inflated, as for a distribution with "
         "long "

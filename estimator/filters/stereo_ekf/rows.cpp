@@ -25,10 +25,8 @@ double first_finite(double a, double b, double otherwise) { return finite(a) ? a
 stereo_ekf::past_pose stereo_ekf::state_before(double age_s) const {
   past_pose out;
   const bool rates = constant_velocity();
-  const double scale = rates ? 1.0 : filter_.head1(kVelocityScale, 1.0);
-  const vec3 bias = rates ? vec3{0, 0, 0} : filter_.head3(kRateBias);
-  out.v_mps = rates ? filter_.head3(kVelocity) : motion_.steady_v_mps();
-  out.w_radps = rates ? filter_.head3(kRates) : motion_.steady_w_radps();
+  out.v_mps = rates ? filter_.head3(kVelocity) : filter_.velocity_of(motion_.steady_v_mps());
+  out.w_radps = rates ? filter_.head3(kRates) : filter_.rates_of(motion_.steady_w_radps());
   out.at = filter_.nominal();
   out.R = filter_.R();
   if (age_s != 0.0) {
@@ -39,8 +37,6 @@ stereo_ekf::past_pose stereo_ekf::state_before(double age_s) const {
     out.R = matrix_of(out.at.q);
     out.at.p = out.at.p - out.R * since.p;
   }
-  out.v_mps = scale * out.v_mps;
-  out.w_radps = out.w_radps - bias;
   return out;
 }
 
@@ -191,8 +187,9 @@ bool stereo_ekf::heading_rows(const wm_heading &h, row_block *out) const {
   return true;
 }
 
-// A measured velocity v/s + lag dv/dt or measured rates w + b + lag dw/dt, by the states v, s, w, b and lag: a measured
-// twist that is ahead of the vehicle's had its present value a lag ago.
+// A measured velocity (v - r x v)/s + lag dv/dt or measured rates w - r x w + b + lag dw/dt, by the states v, s, w, b,
+// lag and r, the rotation of the twist's axes (and of the velocity's direction): a measured twist that is ahead of the
+// vehicle's had its present value a lag ago.
 row_block stereo_ekf::twist_rows(head_state which, const vec3 &measured, const vec3 &slope_per_s, const vec3 &variance,
                                  bool planar) const {
   const bool velocity = which == kVelocity;
@@ -207,12 +204,20 @@ row_block stereo_ekf::twist_rows(head_state which, const vec3 &measured, const v
   const int first = columns_of(which, 3), lag = columns_of(lag_state, 1);
   const int by_scale = velocity ? columns_of(kVelocityScale, 1) : -1,
             by_bias = velocity ? -1 : columns_of(kRateBias, 3);
+  const int by_axes = columns_of(kTwistAxes, 3), by_direction = velocity ? columns_of(kVelocityDirection, 3) : -1;
+  const vec3 turned = filter_.head3(kTwistAxes) + (velocity ? filter_.head3(kVelocityDirection) : vec3{0, 0, 0});
+  const vec3 seen = (1.0 / scale) * (state - cross(turned, state));
+  const mat3 by_state = (1.0 / scale) * (kIdentity3 + -1.0 * skew(turned)), by_turn = (1.0 / scale) * skew(state);
   for (int i = 0; i < 3; i++) {
     if (planar && i != (velocity ? 0 : 2)) continue;
-    const int row = out.add_row(WM_RESIDUAL_X, now[i], now[i] - (state[i] / scale + bias[i]), variance[i]);
-    out.by[row][first + i] = 1.0 / scale;
+    const int row = out.add_row(WM_RESIDUAL_X, now[i], now[i] - (seen[i] + bias[i]), variance[i]);
+    for (int j = 0; j < 3; j++) {
+      out.by[row][first + j] = by_state.m[i][j];
+      if (by_axes >= 0) out.by[row][by_axes + j] = by_turn.m[i][j];
+      if (by_direction >= 0) out.by[row][by_direction + j] = by_turn.m[i][j];
+    }
     if (lag >= 0) out.by[row][lag] = slope_per_s[i];
-    if (by_scale >= 0) out.by[row][by_scale] = -state[i] / square(scale);
+    if (by_scale >= 0) out.by[row][by_scale] = -seen[i] / scale;
     if (by_bias >= 0) out.by[row][by_bias + i] = 1.0;
   }
   return out;

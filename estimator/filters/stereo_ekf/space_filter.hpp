@@ -89,6 +89,13 @@ class space_filter {
   // The vehicle's turn rate at the newest picture, rad/s in body axes.
   void set_turn_rate(const vec3 &w_radps) { turn_rate_ = w_radps; }
 
+  // The body's velocity and rates by a measured twist, with the states of its errors; rotations to first order.
+  vec3 velocity_of(const vec3 &measured) const {
+    const vec3 turned = measured + cross(head3(kTwistAxes), measured);
+    return head1(kVelocityScale, 1.0) * (turned + cross(head3(kVelocityDirection), turned));
+  }
+  vec3 rates_of(const vec3 &measured) const { return measured + cross(head3(kTwistAxes), measured) - head3(kRateBias); }
+
   void propagate(const body_stretch &s);
   // Gates row after row, each with the innovation that the rows before leave; a row above the hard gate rejects all.
   // Between the gates its noise is inflated in proportion. Sequential update of a Kalman filter by the LDL' factors of

@@ -53,7 +53,7 @@ struct space_filter::step {
 
 // F's rows of the pose beside the identity, block by block: the derivative of the moved pose by `width` states.
 struct space_filter::transition {
-  static constexpr int kBlocks = 4;  // the turn, and two or three states of the motion
+  static constexpr int kBlocks = 5;  // the turn, and up to four states of the motion
   struct block {
     int state, width;
     double by[kPose6][3];
@@ -80,8 +80,8 @@ struct space_filter::transition {
 space_filter::step space_filter::step_of(const body_stretch &s) const {
   const bool has_rates = at_[kRates] >= 0;
   const double reach_s = has_rates ? reach_of(models_[kRates].tau_s, s.dt_s) : s.dt_s;
-  const vec3 v = has_rates ? head3(kVelocity) : head1(kVelocityScale, 1.0) * s.v_mps;
-  const vec3 w = has_rates ? head3(kRates) : s.w_radps - head3(kRateBias);
+  const vec3 v = has_rates ? head3(kVelocity) : velocity_of(s.v_mps);
+  const vec3 w = has_rates ? head3(kRates) : rates_of(s.w_radps);
   step out;
   out.dt_s = s.dt_s;
   out.turn = reach_s * w;
@@ -96,23 +96,27 @@ space_filter::step space_filter::step_of(const body_stretch &s) const {
 // half of that times the way.
 void space_filter::transition_of(const step &s, const body_stretch &twist, transition *f) const {
   add_block(f->add(kTurn, 3).by, kPlace, -1.0 * s.swing);
-  const auto add_turning = [&](int state, double reach_s) {
-    const mat3 turn = reach_s * s.mean;
+  const auto add_turning = [&](int state, const mat3 &turn) -> transition::block & {
     transition::block &b = f->add(state, 3);
     add_block(b.by, kTurn, turn);
     add_block(b.by, kPlace, -0.5 * (s.swing * turn));
+    return b;
   };
   if (at_[kRates] >= 0) {
     add_block(f->add(at_[kVelocity], 3).by, kPlace, reach_of(models_[kVelocity].tau_s, s.dt_s) * s.mean);
-    add_turning(at_[kRates], reach_of(models_[kRates].tau_s, s.dt_s));
+    add_turning(at_[kRates], reach_of(models_[kRates].tau_s, s.dt_s) * s.mean);
     return;
   }
-  if (at_[kRateBias] >= 0) add_turning(at_[kRateBias], -s.dt_s);
+  if (at_[kRateBias] >= 0) add_turning(at_[kRateBias], -s.dt_s * s.mean);
   if (at_[kVelocityScale] >= 0) {
-    const vec3 by = s.dt_s * (s.mean * twist.v_mps);
+    const vec3 by = (1.0 / head1(kVelocityScale, 1.0)) * s.way;
     transition::block &b = f->add(at_[kVelocityScale], 1);
     for (int i = 0; i < 3; i++) b.by[kPlace + i][0] = by[i];
   }
+  const mat3 direction = -s.dt_s * (s.mean * skew(velocity_of(twist.v_mps)));
+  if (at_[kTwistAxes] >= 0)
+    add_block(add_turning(at_[kTwistAxes], -s.dt_s * (s.mean * skew(twist.w_radps))).by, kPlace, direction);
+  if (at_[kVelocityDirection] >= 0) add_block(f->add(at_[kVelocityDirection], 3).by, kPlace, direction);
 }
 
 // P' = F P F' of the head: the pose and the states that move it.

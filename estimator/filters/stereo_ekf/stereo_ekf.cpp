@@ -23,6 +23,10 @@ constexpr size_t kLandmarksMax = 1u << 20;  // so that sizes and indices of the 
 // Sigmas of a measured twist, where neither the parameters nor the calibration give them: a Doppler log and MEMS gyros.
 constexpr double kTwistSigma_mps = 0.03, kTwistSigma_radps = 0.01;
 
+// Of a coordinate in a picture, where neither gives it: a corner followed to a third of a pixel, and an imperfect
+// rectification.
+constexpr double kPixel_px = 0.5;
+
 double first_of(double set, double calibrated, double otherwise) {
   if (set > 0.0) return set;
   return finite(calibrated) && calibrated > 0.0 ? calibrated : otherwise;
@@ -62,10 +66,6 @@ size_t stereo_ekf::bytes(const wm_stereo_ekf_params &params, const wm_setup &set
     *why = "slam.points is above 0, but calibration.yaml has no `stereo`";
     return 0;
   }
-  if (rig.there && !(params.pixel_px > 0.0) && !(rig.sigma_px[0] > 0.0)) {
-    *why = "noise.pixel_px is 0, and calibration.yaml's stereo has no sigma_px; give one of them";
-    return 0;
-  }
   memory_layout layout(nullptr, sizeof(stereo_ekf));
   place(&layout, params, setup);
   return layout.bytes();
@@ -87,7 +87,7 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   params_ = params;
   setup_ = &setup;
   (void)rig_.init(setup.rig, &why);
-  for (int i = 0; i < 4; i++) sigma_px_[i] = params.pixel_px > 0.0 ? params.pixel_px : rig_.sigma_px[i];
+  for (int i = 0; i < 4; i++) sigma_px_[i] = first_of(params.pixel_px, rig_.sigma_px[i], kPixel_px);
   motion_.init(setup.motion, &setup.wheels, twist_noise_of(params, setup.rig));
   head_model models[kHeadStates];
   models_of(params, models);
@@ -171,8 +171,8 @@ void stereo_ekf::estimate(wm_estimate *out) const {
   filter_.estimate(out);
   out->t_ns = now_ns_;
   const bool rates = constant_velocity();
-  const vec3 v = rates ? filter_.head3(kVelocity) : filter_.head1(kVelocityScale, 1.0) * motion_.v_mps();
-  const vec3 w = rates ? filter_.head3(kRates) : motion_.w_radps() - filter_.head3(kRateBias);
+  const vec3 v = rates ? filter_.head3(kVelocity) : filter_.velocity_of(motion_.v_mps());
+  const vec3 w = rates ? filter_.head3(kRates) : filter_.rates_of(motion_.w_radps());
   for (int i = 0; i < 3; i++) {
     out->v_mps[i] = v[i];
     out->w_radps[i] = w[i];
