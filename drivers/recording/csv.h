@@ -6,7 +6,7 @@
 
 #include "lines.h"
 
-#define CSV_COLUMNS_MAX 12  // that a format knows
+#define CSV_COLUMNS_MAX 16  // that a format knows
 #define CSV_FIELDS_MAX 64   // that a file may have
 
 typedef enum csv_type {

@@ -73,9 +73,10 @@ static wm_status check_format(const wm_yaml_node *root, wm_error *err) {
 }
 
 static int is_read(const char *file) {
-  static const char *const kRead[] = {"can.log",     "vehicle.dbc", "can-signals.yaml", "motion.csv",
-                                      "motion6.csv", "points.csv",  "sightings.csv",    "markers.csv",
-                                      "stereo.csv",  "gnss.csv",    "landmarks.csv",    "calibration.yaml"};
+  static const char *const kRead[] = {"can.log",         "vehicle.dbc",    "can-signals.yaml", "motion.csv",
+                                      "motion6.csv",     "increments.csv", "points.csv",       "sightings.csv",
+                                      "markers.csv",     "stereo.csv",     "gnss.csv",         "landmarks.csv",
+                                      "calibration.yaml"};
   for (size_t i = 0; i < sizeof kRead / sizeof kRead[0]; i++)
     if (strcmp(file, kRead[i]) == 0) return 1;
   return 0;
@@ -253,19 +254,20 @@ static wm_status add_sensor_streams(wm_recording *self, const stream_kind *kind,
 }
 
 static wm_status add_can(wm_recording *self, wm_error *err) {
-  char log[WM_PATH_MAX], dbc[WM_PATH_MAX], signals[WM_PATH_MAX], motion[WM_PATH_MAX], motion6[WM_PATH_MAX];
-  int have_log, have_dbc, have_signals, have_motion, have_motion6;
+  char log[WM_PATH_MAX], dbc[WM_PATH_MAX], signals[WM_PATH_MAX], motion[WM_PATH_MAX];
+  int have_log, have_dbc, have_signals, have_motion = 0;
   wm_status status = find_stream(self, "can.log", log, &have_log, err);
   if (status != WM_OK || !have_log) return status;
   status = choose(self, self->overrides.dbc, "vehicle.dbc", dbc, &have_dbc, err);
   if (status == WM_OK)
     status = choose(self, self->overrides.can_signals, "can-signals.yaml", signals, &have_signals, err);
-  if (status == WM_OK) status = choose(self, "", "motion.csv", motion, &have_motion, err);
-  if (status == WM_OK) status = choose(self, "", "motion6.csv", motion6, &have_motion6, err);
+  const stream_kind *const others[] = {&kStreamMotion, &kStreamMotion6, &kStreamIncrements};
+  for (size_t i = 0; status == WM_OK && !have_motion && i < sizeof others / sizeof others[0]; i++)
+    status = choose(self, "", stream_file(others[i]), motion, &have_motion, err);
   if (status != WM_OK) return status;
   if (!have_dbc || !have_signals) {
     const char *missing = have_dbc ? signals : dbc;
-    if (!have_motion && !have_motion6)
+    if (!have_motion)
       return wm_fail(err, WM_NOT_FOUND,
                      "%s: is not there, but needed to read can.log; name one in the configuration or put "
                      "it into the folder",
@@ -282,8 +284,10 @@ static wm_status add_sources(wm_recording *self, wm_error *err) {
   wm_status status = add_can(self, err);
   if (status == WM_OK) status = add_stream(self, &kStreamMotion, err);
   if (status == WM_OK) status = add_stream(self, &kStreamMotion6, err);
+  if (status == WM_OK) status = add_stream(self, &kStreamIncrements, err);
   if (status == WM_OK && self->source_count == 0)
-    return wm_fail(err, WM_BAD_CONFIG, "%s: no motion source: can.log, motion.csv or motion6.csv is needed", self->dir);
+    return wm_fail(err, WM_BAD_CONFIG,
+                   "%s: no motion source: can.log, motion.csv, motion6.csv or increments.csv is needed", self->dir);
   if (status == WM_OK) status = add_sensor_streams(self, &kStreamSightings, &self->sighting_sensors, err);
   if (status == WM_OK) status = add_sensor_streams(self, &kStreamMarkers, &self->marker_sensors, err);
   if (status == WM_OK) status = add_stream(self, &kStreamStereo, err);

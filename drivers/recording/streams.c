@@ -17,6 +17,8 @@
 #define PLACE -1e8, 1e8
 #define SIGMA DBL_MIN, 1e6
 #define PIXEL -1e5, 1e5
+#define VARIANCE 0.0, 1e12
+#define COVARIANCE -1e12, 1e12
 #define ANY_ID 0.0, 2147483647.0
 #define ID_OR_UNKNOWN -1.0, 2147483647.0
 
@@ -66,6 +68,24 @@ static const char *fill_motion6(const csv_row *row, uint16_t sensor, wm_event *o
   return NULL;
 }
 
+// Fields from `first` on that are empty.
+static int count_empty(const csv_row *row, int first, int count) {
+  int empty = 0;
+  for (int i = 0; i < count; i++) empty += isnan(row->number[first + i]);
+  return empty;
+}
+
+static const char *fill_increment(const csv_row *row, uint16_t sensor, wm_event *out) {
+  (void)sensor;
+  const double *n = &row->number[FIRST + 1];
+  const int empty = count_empty(row, FIRST + 4, 6);
+  if (row->whole[FIRST] >= row->whole[T]) return "from_ns is not before t_ns";
+  if (empty != 0 && empty != 6) return "a part of the covariance is empty";
+  out->as.increment = (wm_increment){.from_ns = row->whole[FIRST], .dx_m = n[0], .dy_m = n[1], .dheading_rad = n[2]};
+  memcpy(out->as.increment.covariance, &n[3], sizeof out->as.increment.covariance);
+  return NULL;
+}
+
 // Into (-pi, pi] from at most one turn beyond.
 static double wrapped(double angle_rad) {
   if (angle_rad > M_PI) return angle_rad - 2.0 * M_PI;
@@ -73,19 +93,37 @@ static double wrapped(double angle_rad) {
   return angle_rad;
 }
 
+// Sigmas of bearing and range by the covariance of the place in the sensor's frame; their correlation is left out.
+static const char *polar_sigmas(const csv_row *row, wm_sighting *s) {
+  const double *cov = &row->number[FIRST + 6];
+  const int empty = count_empty(row, FIRST + 6, 3);
+  if (empty == 3) return NULL;
+  if (empty > 0) return "a part of the covariance is empty";
+  if (isnan(s->bearing_rad) || isnan(s->range_m)) return "a covariance needs both bearing_rad and range_m";
+  if (!(cov[0] * cov[2] > cov[1] * cov[1])) return "the covariance is not positive definite";
+  const double x = cos(s->bearing_rad), y = sin(s->bearing_rad);
+  const double along = x * x * cov[0] + 2.0 * x * y * cov[1] + y * y * cov[2];
+  const double across = y * y * cov[0] - 2.0 * x * y * cov[1] + x * x * cov[2];
+  if (isnan(s->bearing_sigma_rad)) s->bearing_sigma_rad = sqrt(across) / s->range_m;
+  if (isnan(s->range_sigma_m)) s->range_sigma_m = sqrt(along);
+  return NULL;
+}
+
 static const char *fill_sighting(const csv_row *row, uint16_t sensor, wm_event *out) {
-  double bearing_rad = row->number[FIRST + 2], range_m = row->number[FIRST + 3];
+  const double *n = &row->number[FIRST];
+  double bearing_rad = n[2], range_m = n[3];
   if (isnan(bearing_rad) && isnan(range_m)) return "bearing_rad and range_m are both empty";
+  if (isnan(n[9]) != isnan(n[10])) return "one of elevation_rad and elevation_sigma_rad is empty";
   int64_t id = row->whole[FIRST + 1];
   out->as.sighting = (wm_sighting){.sensor = sensor,
                                    .landmark_id = id == WM_TIME_NONE ? -1 : (int32_t)id,
                                    .bearing_rad = wrapped(bearing_rad),
                                    .range_m = range_m,
-                                   .bearing_sigma_rad = (double)NAN,
-                                   .range_sigma_m = (double)NAN,
-                                   .elevation_rad = (double)NAN,
-                                   .elevation_sigma_rad = (double)NAN};
-  return NULL;
+                                   .bearing_sigma_rad = n[4],
+                                   .range_sigma_m = n[5],
+                                   .elevation_rad = n[9],
+                                   .elevation_sigma_rad = n[10]};
+  return polar_sigmas(row, &out->as.sighting);
 }
 
 static const char *fill_marker(const csv_row *row, uint16_t sensor, wm_event *out) {
@@ -156,8 +194,31 @@ const stream_kind kStreamSightings = {"sightings.csv",
                                         {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
                                         {"id", CSV_WHOLE, CSV_MAY_EMPTY, ID_OR_UNKNOWN},
                                         {"bearing_rad", CSV_NUMBER, CSV_ONE_OF, ANGLE},
-                                        {"range_m", CSV_NUMBER, CSV_ONE_OF, RANGE}}},
+                                        {"range_m", CSV_NUMBER, CSV_ONE_OF, RANGE},
+                                        {"bearing_sigma_rad", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
+                                        {"range_sigma_m", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
+                                        {"cov_xx_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
+                                        {"cov_xy_m2", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
+                                        {"cov_yy_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
+                                        {"elevation_rad", CSV_NUMBER, CSV_OPTIONAL, ANGLE},
+                                        {"elevation_sigma_rad", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
                                       fill_sighting};
+
+const stream_kind kStreamIncrements = {"increments.csv",
+                                       "increments",
+                                       WM_EVENT_INCREMENT,
+                                       {{STAMPS,
+                                         {"from_ns", CSV_TIME, CSV_NEEDED, 0, 0},
+                                         {"dx_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                         {"dy_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                         {"dheading_rad", CSV_NUMBER, CSV_NEEDED, ANGLE},
+                                         {"cov_xx", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
+                                         {"cov_xy", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
+                                         {"cov_yy", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
+                                         {"cov_xt", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
+                                         {"cov_yt", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
+                                         {"cov_tt", CSV_NUMBER, CSV_OPTIONAL, VARIANCE}}},
+                                       fill_increment};
 
 const stream_kind kStreamMarkers = {"markers.csv",
                                     "markers",

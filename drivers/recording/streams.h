@@ -9,8 +9,8 @@
 typedef struct stream_kind stream_kind;
 
 // In the order of the format's table of files.
-extern const stream_kind kStreamMotion, kStreamMotion6, kStreamSightings, kStreamMarkers, kStreamStereo, kStreamPoints,
-    kStreamGnss;
+extern const stream_kind kStreamMotion, kStreamMotion6, kStreamIncrements, kStreamSightings, kStreamMarkers,
+    kStreamStereo, kStreamPoints, kStreamGnss;
 
 const char *stream_file(const stream_kind *kind);  // "motion.csv"
 

@@ -8,8 +8,9 @@
 
 namespace wm {
 
-// Motion over a way s with a turn w, both constant in time, in the frame at its beginning: (s sin(w)/w, s (1-cos w)/w,
-// w). Derivatives are with respect to s and w.
+// Motion over a way s forwards and l to the left with a turn w, all constant in time, in the frame at its beginning:
+// (V (s, l), w) with V = [[sin(w)/w, -(1-cos w)/w], [(1-cos w)/w, sin(w)/w]]. Derivatives are with respect to s and w;
+// that by l is that by s turned by a right angle to the left.
 struct arc {
   double x_m, y_m, turn_rad;
   double x_by_way, y_by_way;    // = cos and sin of the chord, times its length over the arc's
@@ -19,7 +20,7 @@ struct arc {
 // Below this turn the series are exact to the last digit: the first term left out is turn^6 / 5040.
 inline constexpr double kSmallTurn = 0.01;
 
-inline arc make_arc(double way_m, double turn_rad) {
+inline arc make_arc(double way_m, double side_m, double turn_rad) {
   arc out;
   out.turn_rad = turn_rad;
   double sinc, cosc;    // sin(w)/w, (1-cos w)/w
@@ -38,14 +39,16 @@ inline arc make_arc(double way_m, double turn_rad) {
     dsinc = (a.cos - sinc) * inverse;
     dcosc = (a.sin - cosc) * inverse;
   }
-  out.x_m = way_m * sinc;
-  out.y_m = way_m * cosc;
+  out.x_m = way_m * sinc - side_m * cosc;
+  out.y_m = way_m * cosc + side_m * sinc;
   out.x_by_way = sinc;
   out.y_by_way = cosc;
-  out.x_by_turn = way_m * dsinc;
-  out.y_by_turn = way_m * dcosc;
+  out.x_by_turn = way_m * dsinc - side_m * dcosc;
+  out.y_by_turn = way_m * dcosc + side_m * dsinc;
   return out;
 }
+
+inline arc make_arc(double way_m, double turn_rad) { return make_arc(way_m, 0.0, turn_rad); }
 
 // a (+) b: b is given in a's frame.
 inline wm_pose2 compose(const wm_pose2 &a, const wm_pose2 &b) {
@@ -62,15 +65,23 @@ inline wm_pose2 between(const wm_pose2 &a, const wm_pose2 &b) {
   return {h.cos * dx + h.sin * dy, h.cos * dy - h.sin * dx, wrap(b.heading_rad - a.heading_rad)};
 }
 
+// The constant twist over one unit of time that makes the motion `whole`: forwards, to the left, turning.
+struct ways {
+  double way_m, side_m, turn_rad;
+};
+inline ways ways_of(const wm_pose2 &whole) {
+  const arc all = make_arc(1.0, whole.heading_rad);
+  const double determinant = all.x_m * all.x_m + all.y_m * all.y_m;
+  return {(all.x_m * whole.x_m + all.y_m * whole.y_m) / determinant,
+          (all.x_m * whole.y_m - all.y_m * whole.x_m) / determinant, whole.heading_rad};
+}
+
 // The part `fraction` of the motion `whole`, taken along the constant twist that makes it.
 inline wm_pose2 part_of(const wm_pose2 &whole, double fraction) {
-  const arc all = make_arc(1.0, whole.heading_rad);
-  // whole = V(w) (u, v) with V = [[sinc, -cosc], [cosc, sinc]].
-  const double determinant = all.x_m * all.x_m + all.y_m * all.y_m;
-  const double u = (all.x_m * whole.x_m + all.y_m * whole.y_m) / determinant;
-  const double v = (all.x_m * whole.y_m - all.y_m * whole.x_m) / determinant;
+  const ways all = ways_of(whole);
   const arc part = make_arc(fraction, fraction * whole.heading_rad);
-  return {part.x_m * u - part.y_m * v, part.y_m * u + part.x_m * v, fraction * whole.heading_rad};
+  return {part.x_m * all.way_m - part.y_m * all.side_m, part.y_m * all.way_m + part.x_m * all.side_m,
+          fraction * whole.heading_rad};
 }
 
 }  // namespace wm

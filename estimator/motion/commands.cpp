@@ -18,11 +18,11 @@ double driven_rate(const wm_motion_params &p, double v_mps, double w_radps) {
   return v_mps / (left ? radius_max : -radius_max);
 }
 
-motion_twist twist_of_command(double speed, double rate, const wm_motion_calibration &c, double track_m) {
+motion_twist twist_of_command(double speed, double side, double rate, const wm_motion_calibration &c, double track_m) {
   const double size = std::fabs(speed), turning = square(rate);
   const double slower = c.value[kTurnSlowdown] * turning;
   const double fraction = size > 0.0 && slower < size ? (size - slower) / size : size > 0.0 ? 0.0 : 1.0;
-  motion_twist t = twist_of_sample(fraction * speed, rate, c, track_m);
+  motion_twist t = twist_of_sample(fraction * speed, side, rate, c, track_m);
   if (fraction > 0.0 && size > 0.0) {
     // Both wheels lose the same, so unequal wheels change the turn a little, too.
     const double lost = speed > 0.0 ? -turning : turning;

@@ -15,7 +15,7 @@ bool are_commands(const wm_motion_params &params);
 double driven_rate(const wm_motion_params &params, double v_mps, double w_radps);
 
 // Twist with the calibration's slowdown in turns: v = sign(v) max(0, |v| - slowdown w^2).
-motion_twist twist_of_command(double speed, double rate, const wm_motion_calibration &c, double track_m);
+motion_twist twist_of_command(double speed, double side, double rate, const wm_motion_calibration &c, double track_m);
 
 // Noise of a change of command: its time and shape differ each time. Variances are proportional to the change, not to
 // its square, so that a change in many small steps counts as one in a single step.

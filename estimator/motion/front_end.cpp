@@ -2,6 +2,7 @@
 #include "motion/front_end.hpp"
 
 #include <cstring>
+#include <limits>
 
 #include "math/elementary.hpp"
 #include "motion/event_time.hpp"
@@ -23,6 +24,11 @@ constexpr double kYawStuckAlone_s = 30.0, kYawStuckAgainst_s = 3.0;
 constexpr double kYawStuckTurn_radps = 0.1;
 constexpr double kDriving_mps = 0.5;
 
+// The best first: increments have a covariance of their own; a gyro's turn is better than the wheels' difference, which
+// is then its second source (wheel_heading); steering knows less of the turn than the rear wheels' ticks.
+constexpr uint8_t kPreferred[] = {WM_MOTION_INCREMENTS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_TICKS, WM_MOTION_ACKERMANN,
+                                  WM_MOTION_TWIST};
+
 double limit_of(int quantity) {
   switch (quantity) {
     case WM_Q_WHEEL_TICKS_LEFT:
@@ -43,7 +49,7 @@ wm_status check_value(double value, double limit) {
 
 }  // namespace
 
-void motion_front_end::init(const wm_motion_params *params, const wm_wheels *wheels) {
+void motion_front_end::init(const wm_motion_params *params, const wm_wheels *wheels, const wm_rig *rig) {
   std::memset(static_cast<void *>(this), 0, sizeof *this);
   params_ = params;
   wheels_ = *wheels;
@@ -54,6 +60,12 @@ void motion_front_end::init(const wm_motion_params *params, const wm_wheels *whe
   for (wm_time_ns &stamp : stamp_ns_) stamp = WM_TIME_NONE;
   for (wm_time_ns &stamp : message_ns_) stamp = WM_TIME_NONE;
   for (tick_wheel &wheel : wheel_) wheel.t_ns = WM_TIME_NONE;
+  increment_ns_ = twist_ns_ = WM_TIME_NONE;
+  for (int i = 0; i < 3; i++) {
+    off_plane_since_ns_[i] = WM_TIME_NONE;
+    stated_v_mps_[i] = rig ? rig->twist6_sigma_v_mps[i] : std::numeric_limits<double>::quiet_NaN();
+    stated_w_radps_[i] = rig ? rig->twist6_sigma_w_radps[i] : std::numeric_limits<double>::quiet_NaN();
+  }
 }
 
 wm_status motion_front_end::check(const wm_event &event) const {
@@ -77,6 +89,7 @@ wm_status motion_front_end::check(const wm_event &event) const {
         if (status == WM_OK) status = check_value(event.as.twist6.w_radps[i], kRateMost_radps);
       }
       break;
+    case WM_EVENT_INCREMENT: status = check_increment(event); break;
     default: return WM_UNSUPPORTED;
   }
   if (status == WM_OK && now_ns_ != WM_TIME_NONE && event.t_ns < now_ns_) return WM_TIME_RAN_BACK;
@@ -84,32 +97,47 @@ wm_status motion_front_end::check(const wm_event &event) const {
 }
 
 void motion_front_end::feed(const wm_event &event) {
-  if (now_ns_ == WM_TIME_NONE) now_ns_ = event.t_ns;
+  if (now_ns_ == WM_TIME_NONE) now_ns_ = event.kind == WM_EVENT_INCREMENT ? event.as.increment.from_ns : event.t_ns;
   yaw_fresh_ = 0;
   if (now_ns_ > fed_ns_ && history_.is_overdue(now_ns_)) observed_without_ = 3;
   fed_ns_ = event.t_ns;
-  if (event.kind == WM_EVENT_QUANTITIES) {
+  if (event.kind == WM_EVENT_QUANTITIES)
     take_quantities(event);
-    return;
-  }
+  else if (event.kind == WM_EVENT_INCREMENT)
+    take_increment(event);
+  else
+    take_twist(event);
+}
+
+void motion_front_end::take_twist(const wm_event &event) {
   const bool planar = event.kind == WM_EVENT_TWIST2;
   const double v = planar ? event.as.twist2.v_mps : event.as.twist6.v_mps[0];
   const double rate = planar ? event.as.twist2.w_radps : event.as.twist6.w_radps[2];
   const double w = commands_ ? driven_rate(*params_, v, rate) : rate;
-  choose_model(true);
+  const double u = planar ? 0.0 : event.as.twist6.v_mps[1];
+  if (!planar) watch_plane(event.t_ns, event.as.twist6);
+  choose_model(WM_EVENT_BIT(event.kind));
   if (model_ != WM_MOTION_TWIST) return;
+  twists_in_space_ = !planar;
+  if (twist_ns_ != WM_TIME_NONE && event.t_ns > twist_ns_ && !is_overdue(event.t_ns)) {
+    const double dt = wm_seconds_between(twist_ns_, event.t_ns);
+    twist_period_s_ += twist_period_s_ > 0.0 ? kPeriodGain * (dt - twist_period_s_) : dt;
+  }
+  twist_ns_ = event.t_ns;
   const bool v_plausible = is_plausible_level(kTwistSpeed, event.t_ns, v);
   const bool w_plausible = is_plausible_level(kTwistRate, event.t_ns, w);
-  const bool plausible = v_plausible && w_plausible;
+  const bool u_plausible = planar || is_plausible_level(kTwistSide, event.t_ns, u);
+  const bool plausible = v_plausible && u_plausible && w_plausible;
   note_plausibility(event.t_ns, quantity_bit(kTwistSpeed), v_plausible);
+  if (!planar) note_plausibility(event.t_ns, quantity_bit(kTwistSide), u_plausible);
   note_plausibility(event.t_ns, quantity_bit(kTwistRate), w_plausible);
-  watch_standstill(event.t_ns, plausible && std::fabs(v) < params_->standstill_speed_mps &&
+  watch_standstill(event.t_ns, plausible && speed_of({v, u, w}) < params_->standstill_speed_mps &&
                                    std::fabs(w) < params_->standstill_yaw_rate_radps);
   const motion_input held = history_.empty() ? motion_input{} : history_.newest();
   if (plausible)
-    push_input(event.t_ns, v, w, false, false);
+    push_input(event.t_ns, v, w, false, false, u);
   else
-    push_input(event.t_ns, held.a, held.b, true, false);
+    push_input(event.t_ns, held.a, held.b, true, false, held.side_mps);
 }
 
 void motion_front_end::take_quantities(const wm_event &event) {
@@ -126,12 +154,15 @@ void motion_front_end::take_quantities(const wm_event &event) {
     value_[id] = q.value[i];
     stamp_ns_[id] = event.t_ns;
   }
-  choose_model(false);
+  choose_model(WM_EVENT_BIT(WM_EVENT_QUANTITIES));
   if ((fresh & kCounts) && !refused) watch_encoders();
-  if (model_ != WM_MOTION_TICKS)
+  if (model_ != WM_MOTION_TICKS) {
     push_quantities(event.t_ns, fresh, frozen, refused);
-  else if (fresh & kCounts)
-    push_ticks(event.t_ns, frozen, refused);
+    return;
+  }
+  double v = 0.0;
+  if ((fresh & quantity_bit(WM_Q_YAW_RATE)) && !refused && read_speed(&v)) watch_yaw_rate(event.t_ns, v, true);
+  if (fresh & kCounts) push_ticks(event.t_ns, frozen, refused);
 }
 
 // `fresh`: the quantities of this message, a bit each.
@@ -151,22 +182,29 @@ void motion_front_end::push_quantities(wm_time_ns t_ns, uint32_t fresh, bool fro
   }
 }
 
-// The best model that the quantities seen so far allow, or the one that the config names.
-void motion_front_end::choose_model(bool twist) {
+// The best model that the data seen so far allow, or the one that the config names. `kinds`: of the newest event.
+void motion_front_end::choose_model(uint32_t kinds) {
   double ignored;
   const bool speed = read_speed(&ignored);
-  const bool possible[] = {false, counts_ticks() && finite(wheels_.track_m), speed && seen(WM_Q_YAW_RATE),
-                           speed && finite(wheels_.wheelbase_m) && read_road_wheel(&ignored), twist};
+  const bool ticks = counts_ticks() && finite(wheels_.track_m);
+  // A gyro that fell silent or stuck yields to the wheels' difference, until it is back.
+  const bool gyro = seen(WM_Q_YAW_RATE) &&
+                    !(ticks && (silent(WM_Q_YAW_RATE, now_ns_) || (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK)));
+  const bool possible[] = {false,
+                           ticks,
+                           speed && gyro,
+                           speed && finite(wheels_.wheelbase_m) && read_road_wheel(&ignored),
+                           (kinds & WM_TWIST_EVENTS) != 0,
+                           (kinds & WM_EVENT_BIT(WM_EVENT_INCREMENT)) != 0};
   const int wanted = params_->model;
   if (wanted != WM_MOTION_AUTO) {
     if (possible[wanted]) model_ = (uint8_t)wanted;
     return;
   }
-  const int last = model_ == WM_MOTION_AUTO ? (int)WM_MOTION_TWIST : model_;
-  for (int model = WM_MOTION_TICKS; model <= last; model++) {
-    if (!possible[model]) continue;
-    model_ = (uint8_t)model;
-    return;
+  for (uint8_t model : kPreferred) {
+    if (possible[model] && model_ == WM_MOTION_SPEED_YAW_RATE && model == WM_MOTION_TICKS) leave_gyro();
+    if (possible[model]) model_ = model;
+    if (model_ == model && (possible[model] || model != WM_MOTION_SPEED_YAW_RATE || !ticks)) return;
   }
 }
 
@@ -242,11 +280,13 @@ bool motion_front_end::watch_standstill(wm_time_ns t_ns, bool still) {
 }
 
 // `doubtful`: the input that holds from here on; `miscounted`: the counts of the segment that ends here.
-void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted) {
+void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted,
+                                  double side_mps) {
   motion_input input{};
   input.t_ns = t_ns;
   input.a = a;
   input.b = b;
+  input.side_mps = side_mps;
   input.model = model_;
   input.command = model_ == WM_MOTION_TWIST && commands_;
   input.doubtful = doubtful;
@@ -289,7 +329,7 @@ bool motion_front_end::speed_source_changed() {
 }
 
 wm_time_ns motion_front_end::lag_of(const wm_motion_calibration &calibration) const {
-  return ticks_drive() ? 0 : wm_ns_from_seconds(calibration.value[kLag]);
+  return ticks_drive() || model_ == WM_MOTION_INCREMENTS ? 0 : wm_ns_from_seconds(calibration.value[kLag]);
 }
 
 motion_twist motion_front_end::twist_at(wm_time_ns t_ns, const wm_motion_calibration &calibration) const {
@@ -323,6 +363,10 @@ bool motion_front_end::read_other_turn_rate(double speed_mps, double *rate_radps
   double angle;
   if (finite(wheels_.wheelbase_m) && read_road_wheel(&angle)) {
     *rate_radps = speed_mps * tan(angle) / wheels_.wheelbase_m;
+    return true;
+  }
+  if (finite(wheels_.track_m) && counts_ticks()) {
+    *rate_radps = counted_turn_rate();
     return true;
   }
   if (finite(wheels_.track_m) && seen(WM_Q_WHEEL_SPEED_REAR_LEFT) && seen(WM_Q_WHEEL_SPEED_REAR_RIGHT)) {

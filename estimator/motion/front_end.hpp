@@ -25,7 +25,8 @@ inline constexpr double kPeriodGain = 1.0 / 16.0;  // of the average of a messag
 // Plain memory, no pointers but to the parameters, which outlive it.
 class motion_front_end {
  public:
-  void init(const wm_motion_params *params, const wm_wheels *wheels);
+  // `rig`: what the recording states of its twists in space; nullptr: nothing.
+  void init(const wm_motion_params *params, const wm_wheels *wheels, const wm_rig *rig = nullptr);
 
   // Would the event be taken? WM_UNSUPPORTED, WM_NOT_FINITE, WM_OUT_OF_RANGE, WM_TIME_RAN_BACK; changes nothing.
   wm_status check(const wm_event &event) const;
@@ -51,10 +52,12 @@ class motion_front_end {
     const wm_time_ns lag_ns = lag_of(calibration);
     history_.walk(from_ns - lag_ns, to_ns - lag_ns, hold_max_ns_, [&](const motion_segment &segment) {
       const motion_twist twist = twist_of(segment.input, calibration, wheels_);
-      motion_noise noise = noise_of(segment.input, twist, segment.dt_s, *params_, wheels_, calibration);
+      motion_noise noise =
+          noise_of(segment.input, twist, segment.dt_s, *params_, wheels_, calibration, stated_noise_now());
       add_overdue_noise(segment, *params_, ticks_drive() && segment.has_next, &noise);
       add_refused_noise(segment, *params_, &noise);
       if (segment.input.command) add_change_noise(segment, *params_, &noise);
+      if (twist.u != 0.0 && segment.input.model == WM_MOTION_TWIST) turn_to_axes(twist, &noise);
       visit(segment, twist, noise);
     });
   }
@@ -90,10 +93,15 @@ class motion_front_end {
   bool standstill_yaw_rate(double *yaw_rate_radps) const;
 
  private:
-  enum { kTwistSpeed = WM_Q_COUNT, kTwistRate, kSlots };  // of check_: a slot for each quantity and these
+  enum { kTwistSpeed = WM_Q_COUNT, kTwistRate, kTwistSide, kSlots };  // of check_: a slot for each quantity and these
   enum speed_source : uint8_t { kNone, kFrontWheels, kVehicleSpeed, kTicksMean, kRearWheels };
 
   void take_quantities(const wm_event &event);
+  void take_twist(const wm_event &event);
+  void take_increment(const wm_event &event);
+  wm_status check_increment(const wm_event &event) const;
+  stated_noise stated_noise_now() const;
+  void watch_plane(wm_time_ns t_ns, const wm_twist6 &twist);
   void push_quantities(wm_time_ns t_ns, uint32_t fresh, bool frozen, bool refused);
   bool is_plausible(const wm_quantities &q, wm_time_ns t_ns);
   bool counter_is_wrong(const wm_quantities &q, wm_time_ns t_ns) const;
@@ -104,7 +112,7 @@ class motion_front_end {
   void note_plausibility(wm_time_ns t_ns, uint32_t slots, bool plausible);
   void mark_refused(motion_input *input) const;
   void take_count(int side, wm_time_ns t_ns, double count);
-  void choose_model(bool twist);
+  void choose_model(uint32_t kinds);
   void watch_encoders();
   void watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fresh);
   bool watch_standstill(wm_time_ns t_ns, bool still);
@@ -112,7 +120,8 @@ class motion_front_end {
   bool read_road_wheel(double *angle_rad) const;
   bool read_other_turn_rate(double speed_mps, double *rate_radps) const;
   double counted_turn_rate() const;
-  void push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted);
+  void leave_gyro();
+  void push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted, double side_mps = 0.0);
   void push_ticks(wm_time_ns t_ns, bool doubtful, bool miscounted);
   void note_integrated(const motion_segment &segment);
   void drop_silent_distance(wm_time_ns t_ns, double dt_s);
@@ -138,6 +147,12 @@ class motion_front_end {
   uint32_t refused_slots_;  // of check_: the last sample was refused
   wm_time_ns refused_since_ns_, last_refusal_ns_;
   tick_wheel wheel_[2];
+  wm_time_ns increment_ns_;                     // end of the newest increment; WM_TIME_NONE: none came
+  wm_time_ns off_plane_since_ns_[3];            // rising, rolling, pitching; WM_TIME_NONE: it doesn't
+  double off_plane_[3];                         // the last such value
+  double stated_v_mps_[3], stated_w_radps_[3];  // sigmas of a twist in space; NaN: not stated
+  double twist_period_s_;                       // usual time between two twists; 0: unknown
+  wm_time_ns twist_ns_;
   wm_time_ns still_since_ns_;  // speed below the threshold since; WM_TIME_NONE while moving
   wm_time_ns yaw_same_since_ns_;
   double yaw_last_;
@@ -148,6 +163,7 @@ class motion_front_end {
   uint8_t speed_source_;
   uint8_t speed_source_changed_;
   uint8_t commands_;          // twists are commands
+  uint8_t twists_in_space_;   // the newest twist had six components
   uint8_t yaw_fresh_;         // the last event brought a yaw rate
   uint8_t observed_without_;  // per wheel: observations corrected the pose while counts were missing; no count since
   uint8_t speed_is_signed_;   // a negative speed came: the sign is the sensor's, not the gear's

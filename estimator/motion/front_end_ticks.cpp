@@ -134,6 +134,13 @@ void motion_front_end::drop_silent_distance(wm_time_ns t_ns, double dt_s) {
   }
 }
 
+// The wheels drive singly from here on: what is left of their mean distance is left of each.
+void motion_front_end::leave_gyro() {
+  const double left_m =
+      mean_of_wheels(wheel_[0].position_m - wheel_[0].integrated_m, wheel_[1].position_m - wheel_[1].integrated_m);
+  for (tick_wheel &wheel : wheel_) wheel.integrated_m = wheel.position_m - left_m;
+}
+
 void motion_front_end::note_integrated(const motion_segment &segment) {
   const bool both = segment.input.model == WM_MOTION_TICKS;
   wheel_[0].integrated_m += segment.input.a * segment.dt_s;

@@ -13,19 +13,23 @@ namespace wm {
 
 enum refused_bits : uint8_t { kRefusedSpeed = 1, kRefusedTurn = 2 };
 
-// A raw input; a and b mean, by model: ticks: speed of the left and the right wheel (m/s); speed_yaw_rate and twist:
-// speed (m/s) and turn rate (rad/s); ackermann: speed (m/s) and road wheel angle (rad).
+// A raw input; a and b mean, by model: ticks: speed of the left and the right wheel (m/s); speed_yaw_rate, twist and
+// increments: speed (m/s) and turn rate (rad/s); ackermann: speed (m/s) and road wheel angle (rad).
 struct motion_input {
   wm_time_ns t_ns;  // holds until the next one's
   double a, b;
-  uint8_t model;     // wm_motion_model; AUTO: nothing known yet
-  uint8_t standing;  // the robot is known to stand
-  uint8_t doubtful;  // of a frozen counter, a dead encoder
-  uint8_t stale;     // set by walk(): held for longer than hold_max
-  uint8_t counted;   // by the counts at its end: true until then, however long
-  uint8_t command;   // a twist that is a command
-  uint8_t refused;   // kRefusedSpeed, kRefusedTurn: samples of it are refused, and this is the last plausible one
-  double refused_s;  // at t_ns: for how long
+  double side_mps;  // to the left; of twists in space and increments
+  // Of increments: variance per s of distance, of sideways and of rotation, and their covariances; NaN: not given.
+  float increment_noise[6];
+  float period_s, unused;  // between increments; 0: that between the inputs
+  uint8_t model;           // wm_motion_model; AUTO: nothing known yet
+  uint8_t standing;        // the robot is known to stand
+  uint8_t doubtful;        // of a frozen counter, a dead encoder
+  uint8_t stale;           // set by walk(): held for longer than hold_max
+  uint8_t counted;         // by the counts or the increment at its end: true until then, however long
+  uint8_t command;         // a twist that is a command
+  uint8_t refused;         // kRefusedSpeed, kRefusedTurn: samples of it are refused, and this is the last plausible one
+  double refused_s;        // at t_ns: for how long
 };
 
 // Part of an interval over which one input holds.
@@ -115,7 +119,9 @@ class motion_history {
   // How old the input before `next` may become before `next` is overdue.
   double due_s(uint64_t next, uint64_t oldest) const {
     if (next <= oldest + 1) return kOverdueS;
-    const double usual_s = kOverduePeriods * wm_seconds_between(at(next - 2).t_ns, at(next - 1).t_ns);
+    const double own_s = static_cast<double>(at(next - 1).period_s);
+    const double period_s = own_s > 0.0 ? own_s : wm_seconds_between(at(next - 2).t_ns, at(next - 1).t_ns);
+    const double usual_s = kOverduePeriods * period_s;
     return usual_s > kOverdueS ? usual_s : kOverdueS;
   }
   const motion_input &at(uint64_t index) const { return ring_[index & (kCapacity - 1)]; }

@@ -5,7 +5,7 @@
 
 typedef struct wm_motion_params params;
 
-static const char *const kModels[] = {"auto", "ticks", "speed_yaw_rate", "ackermann", "twist", NULL};
+static const char *const kModels[] = {"auto", "ticks", "speed_yaw_rate", "ackermann", "twist", "increments", NULL};
 
 // A calibration state of the motion sensors: the sigma at its start, and its random walk.
 #define STATE(term, name, unit, walk_initial, about)                          \
@@ -14,8 +14,9 @@ static const char *const kModels[] = {"auto", "ticks", "speed_yaw_rate", "ackerm
           "Random walk of that state per sqrt(s).")
 
 static const wm_param kParams[] = {
-    ENUM("model", model, WM_MOTION_AUTO, WM_MOTION_TWIST, kModels,
-         "Motion model. auto: the first of ticks, speed and yaw rate, speed and steering, twist whose data come."),
+    ENUM("model", model, WM_MOTION_AUTO, WM_MOTION_INCREMENTS, kModels,
+         "Motion model. auto: the first of increments, speed and yaw rate, ticks, speed and steering, twist whose data "
+         "come; the speed of speed and yaw rate may be the ticks'."),
     F64("noise.speed_mps", noise_speed_mps, 0.02, 0, 10,
         "White noise of the speed, m/s per sqrt(s): slip and play at walking pace."),
     F64("noise.speed_rel", noise_speed_rel, 0.03, 0, 2,

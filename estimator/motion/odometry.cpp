@@ -26,9 +26,10 @@ struct wm_odometry {
 namespace {
 
 void carry_point(wm_odom_point &point, double dt_s, const wm::motion_twist &twist, const wm::motion_noise &noise) {
-  const wm::arc a = wm::make_arc(twist.v * dt_s, twist.w * dt_s);
+  const wm::arc a = wm::make_arc(twist.v * dt_s, twist.u * dt_s, twist.w * dt_s);
   point.pose_odom_base = wm::compose(point.pose_odom_base, {a.x_m, a.y_m, a.turn_rad});
   point.v_mps = twist.v;
+  point.side_mps = twist.u;
   point.w_radps = twist.w;
   point.along_var_m2 += noise.distance_m2;
   point.across_var_m2 += noise.lateral_m2;
@@ -151,6 +152,7 @@ void carry_planar(const wm_odom_point &from, const wm_odom_point &to, wm_estimat
   out->pose_map_base.q_xyzw[2] = half.sin;
   out->pose_map_base.q_xyzw[3] = half.cos;
   out->v_mps[0] = to.v_mps;
+  out->v_mps[1] = to.side_mps;
   out->w_radps[2] = to.w_radps;
 }
 

@@ -48,16 +48,17 @@ static const char *model_lacks(int model, const wm_wheels *wheels, uint32_t kind
     case WM_MOTION_ACKERMANN:
       lacks = speed_lacks(wheels, quantities);
       return lacks ? lacks : steering_lacks(wheels, quantities);
+    case WM_MOTION_INCREMENTS: return kinds & WM_EVENT_BIT(WM_EVENT_INCREMENT) ? NULL : "increments.csv";
     default: break;
   }
-  return kinds & (WM_EVENT_BIT(WM_EVENT_TWIST2) | WM_EVENT_BIT(WM_EVENT_TWIST6)) ? NULL : "motion.csv or motion6.csv";
+  return kinds & WM_TWIST_EVENTS ? NULL : "motion.csv or motion6.csv";
 }
 
 const char *wm_motion_lacks(const wm_motion_params *params, const wm_wheels *wheels, uint32_t kinds,
                             uint32_t quantities) {
   if (!(kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES))) quantities = 0;
   if (params->model != WM_MOTION_AUTO) return model_lacks(params->model, wheels, kinds, quantities);
-  for (int model = WM_MOTION_TICKS; model <= WM_MOTION_TWIST; model++)
+  for (int model = WM_MOTION_TICKS; model <= WM_MOTION_INCREMENTS; model++)
     if (!model_lacks(model, wheels, kinds, quantities)) return NULL;
   if (quantities & BOTH_TICKS) return ticks_lack(wheels, quantities);
   return quantities & STEERING ? model_lacks(WM_MOTION_ACKERMANN, wheels, kinds, quantities)

@@ -122,6 +122,7 @@ void spatial_motion::feed(const wm_event &event) {
                    [](const motion_segment &, const motion_twist &, const motion_noise &) {});
     const motion_twist twist = front_.twist_at(event.t_ns, kNeutralCalibration);
     now.v.x = twist.v;
+    now.v.y = twist.u;
     now.w.z = twist.w;
   }
   const bool first = history_.samples() == 0;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "motion/step.hpp"
 
+#include <limits>
+
 #include "math/elementary.hpp"
 #include "motion/commands.hpp"
 
@@ -62,7 +64,7 @@ double least(double a, double b) { return a < b ? a : b; }
 
 }  // namespace
 
-motion_twist twist_of_sample(double speed, double rate, const wm_motion_calibration &c, double track_m) {
+motion_twist twist_of_sample(double speed, double side, double rate, const wm_motion_calibration &c, double track_m) {
   motion_twist t = finite(track_m) ? from_wheels(speed - 0.5 * track_m * rate, speed + 0.5 * track_m * rate, c, track_m)
                                    : motion_twist{};
   if (!finite(track_m)) {
@@ -75,8 +77,9 @@ motion_twist twist_of_sample(double speed, double rate, const wm_motion_calibrat
     t.w_by[i] *= c.value[kYawRateScale];
   }
   t.v = c.value[kSpeedScale] * v;
+  t.u = c.value[kSpeedScale] * side;
   t.w = c.value[kYawRateScale] * (w - c.value[kYawRateBias]);
-  t.add(kSpeedScale, v, 0.0);
+  t.add(kSpeedScale, v, 0.0, side);
   t.add(kYawRateScale, 0.0, w - c.value[kYawRateBias]);
   t.add(kYawRateBias, 0.0, -c.value[kYawRateScale]);
   return t;
@@ -89,8 +92,10 @@ motion_twist twist_of(const motion_input &input, const wm_motion_calibration &c,
     case WM_MOTION_SPEED_YAW_RATE: return from_speed_and_rate(input.a, input.b, c);
     case WM_MOTION_ACKERMANN: return from_steering(input.a, input.b, c, wheels);
     case WM_MOTION_TWIST:
-      return input.command ? twist_of_command(input.a, input.b, c, wheels.track_m)
-                           : twist_of_sample(input.a, input.b, c, wheels.track_m);
+      return input.command ? twist_of_command(input.a, input.side_mps, input.b, c, wheels.track_m)
+                           : twist_of_sample(input.a, input.side_mps, input.b, c, wheels.track_m);
+    case WM_MOTION_INCREMENTS:
+      return twist_of_sample(input.a, input.side_mps, input.b, c, std::numeric_limits<double>::quiet_NaN());
     default: return motion_twist{};
   }
 }
@@ -111,20 +116,37 @@ motion_noise noise_of_ticks(const motion_input &input, double dt_s, const wm_mot
   return n;
 }
 
+motion_noise noise_of_increment(const motion_input &input, double dt_s) {
+  const float *of = input.increment_noise;
+  motion_noise n{};
+  n.distance_m2 = static_cast<double>(of[0]) * dt_s;
+  n.distance_lateral = static_cast<double>(of[1]) * dt_s;
+  n.lateral_m2 = static_cast<double>(of[2]) * dt_s;
+  n.distance_rotation = static_cast<double>(of[3]) * dt_s;
+  n.lateral_rotation = static_cast<double>(of[4]) * dt_s;
+  n.rotation_rad2 = static_cast<double>(of[5]) * dt_s;
+  return n;
+}
+
 // White noise of speed and turn rate; with steering, of the angle in place of the turn rate's.
 motion_noise noise_of_rates(const motion_input &input, const motion_twist &twist, double dt_s,
-                            const wm_motion_params &p, const wm_wheels &wheels, bool unknown) {
+                            const wm_motion_params &p, const wm_wheels &wheels, const stated_noise &stated,
+                            bool unknown) {
   motion_noise n{};
-  const bool slow = std::fabs(input.a) < p.standstill_speed_mps;
-  const bool no_turn = input.model == WM_MOTION_TWIST && std::fabs(input.b) < p.standstill_yaw_rate_radps;
+  const double speed = speed_of(twist);
+  const bool slow = speed_of({input.a, input.side_mps, 0.0}) < p.standstill_speed_mps;
+  const bool no_turn = input.model >= WM_MOTION_TWIST && std::fabs(input.b) < p.standstill_yaw_rate_radps;
   const bool at_rest = input.standing || (slow && no_turn);
   const double rest = square(p.noise_rest_factor);
   const double speed_factor = slow && !unknown ? rest : 1.0;
   const double rate_factor = at_rest && !unknown ? rest : 1.0;
-  n.distance_m2 = (square(p.noise_speed_mps) * speed_factor + square(p.noise_speed_rel * twist.v)) * dt_s;
-  n.rotation_rad2 = (square(p.noise_yaw_rate_radps) * rate_factor + square(p.noise_yaw_rate_rel * twist.w) +
-                     square(p.noise_yaw_rate_per_mps * twist.v)) *
-                    dt_s;
+  const bool states = finite(stated.distance_m2), states_turn = finite(stated.rotation_rad2);
+  const double speed2 = states ? stated.distance_m2 : square(p.noise_speed_mps);
+  const double rate2 = states_turn ? stated.rotation_rad2 : square(p.noise_yaw_rate_radps);
+  n.distance_m2 = (speed2 * speed_factor + square(p.noise_speed_rel * speed)) * dt_s;
+  n.rotation_rad2 =
+      (rate2 * rate_factor + square(p.noise_yaw_rate_rel * twist.w) + square(p.noise_yaw_rate_per_mps * speed)) * dt_s;
+  if (states) n.lateral_m2 = stated.lateral_m2 * speed_factor * dt_s;
   if (input.model != WM_MOTION_ACKERMANN || unknown) return n;
   const double tangent = std::fabs(twist.v) > 1e-9 ? twist.w * wheels.wheelbase_m / twist.v : 0.0;
   const double curvature = tangent / wheels.wheelbase_m;
@@ -137,7 +159,7 @@ motion_noise noise_of_rates(const motion_input &input, const motion_twist &twist
 // The robot may go on as it did, or not: sigma is the motion that was last trusted. A straight drive may have begun to
 // turn since, which `turns` takes for granted.
 void add_unknown_noise(const motion_input &input, bool doubtful, double dt_s, motion_noise *n) {
-  const double speed = std::fabs(input.a);
+  const double speed = speed_of({input.a, input.side_mps, 0.0});
   const double rate = input.model == WM_MOTION_ACKERMANN ? kUnknownSteeringRate_radps : std::fabs(input.b);
   const bool turns = input.model == WM_MOTION_TICKS || input.refused || (input.stale && rate < kUnknownRate_radps);
   const bool speed_unknown = doubtful || (input.refused & kRefusedSpeed);
@@ -149,23 +171,37 @@ void add_unknown_noise(const motion_input &input, bool doubtful, double dt_s, mo
 }  // namespace
 
 motion_noise noise_of(const motion_input &input, const motion_twist &twist, double dt_s, const wm_motion_params &p,
-                      const wm_wheels &wheels, const wm_motion_calibration &c) {
+                      const wm_wheels &wheels, const wm_motion_calibration &c, const stated_noise &stated) {
   const bool doubtful = input.stale || input.doubtful || input.model == WM_MOTION_AUTO;
   const bool unknown = doubtful || input.refused;
-  motion_noise n = input.model == WM_MOTION_TICKS && !unknown ? noise_of_ticks(input, dt_s, p, wheels, c)
-                                                              : noise_of_rates(input, twist, dt_s, p, wheels, unknown);
+  if (input.model == WM_MOTION_INCREMENTS && !unknown && finite(input.increment_noise[0]))
+    return noise_of_increment(input, dt_s);
+  motion_noise n = input.model == WM_MOTION_TICKS && !unknown
+                       ? noise_of_ticks(input, dt_s, p, wheels, c)
+                       : noise_of_rates(input, twist, dt_s, p, wheels, stated, unknown);
   // Sideways, by the speed; by the distance where a count's stamp is nanoseconds behind another event's.
-  const double speed_mps = std::fabs(twist.v);
-  n.lateral_m2 = speed_mps > kCatchUp_mps ? square(p.noise_side_rel) * kCatchUp_mps * speed_mps * dt_s
-                                          : square(p.noise_side_rel * twist.v) * dt_s;
+  const double speed_mps = speed_of(twist);
+  n.lateral_m2 += speed_mps > kCatchUp_mps ? square(p.noise_side_rel) * kCatchUp_mps * speed_mps * dt_s
+                                           : square(p.noise_side_rel * speed_mps) * dt_s;
   if (unknown) add_unknown_noise(input, doubtful, dt_s, &n);
   return n;
 }
 
+void turn_to_axes(const planar_twist &twist, motion_noise *noise) {
+  const double speed = speed_of(twist);
+  if (!(speed > 0.0)) return;
+  const double forwards = twist.v / speed, left = twist.u / speed;
+  const double along = noise->distance_m2, across = noise->lateral_m2;
+  noise->distance_m2 = along * forwards * forwards + across * left * left;
+  noise->lateral_m2 = along * left * left + across * forwards * forwards;
+  noise->distance_lateral = (along - across) * forwards * left;
+}
+
 void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p, bool is_counted, motion_noise *noise) {
+  if (segment.input.model == WM_MOTION_INCREMENTS && segment.input.counted) return;
   if (segment.input.stale) {
     // It may have gone on all the while in any direction, as it last did or as it may have begun to since.
-    const double left = std::fabs(segment.input.a), right = std::fabs(segment.input.b);
+    const double left = speed_of({segment.input.a, segment.input.side_mps, 0.0}), right = std::fabs(segment.input.b);
     const double last_mps = segment.input.model == WM_MOTION_TICKS && right > left ? right : left;
     const double begun_mps = 0.5 * p.noise_hold_mps2 * p.hold_max_s;
     const double speed_mps = last_mps > begun_mps ? last_mps : begun_mps;

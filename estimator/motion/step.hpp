@@ -3,6 +3,8 @@
 #ifndef WAYMARK_ESTIMATOR_MOTION_STEP_HPP
 #define WAYMARK_ESTIMATOR_MOTION_STEP_HPP
 
+#include <cmath>
+
 #include "motion/history.hpp"
 #include "motion/motion_params.h"
 
@@ -24,19 +26,26 @@ enum calibration_index {
 
 inline constexpr wm_motion_calibration kNeutralCalibration = {{1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0}};
 
-// Twist (speed in m/s, turn rate in rad/s) of base_link and its derivatives by the calibration; only the first `count`
-// entries of `index`, `v_by`, `w_by` are set. The lag is not among them: it moves the ends of the interval.
-struct motion_twist {
+// Twist of base_link: speed forwards and to the left in m/s, turn rate in rad/s.
+struct planar_twist {
+  double v, u, w;
+};
+
+inline double speed_of(const planar_twist &t) { return t.u == 0.0 ? std::fabs(t.v) : std::sqrt(t.v * t.v + t.u * t.u); }
+
+// The twist and its derivatives by the calibration; only the first `count` entries of `index`, `v_by`, `u_by`, `w_by`
+// are set. The lag is not among them: it moves the ends of the interval.
+struct motion_twist : planar_twist {
   static constexpr int kMax = 8;  // capacity; a model has fewer terms
-  double v, w;
   int count;
   int index[kMax];
-  double v_by[kMax], w_by[kMax];
+  double v_by[kMax], u_by[kMax], w_by[kMax];
 
-  void add(int term, double v_by_term, double w_by_term) {
+  void add(int term, double v_by_term, double w_by_term, double u_by_term = 0.0) {
     if (count == kMax) return;
     index[count] = term;
     v_by[count] = v_by_term;
+    u_by[count] = u_by_term;
     w_by[count++] = w_by_term;
   }
 };
@@ -45,15 +54,24 @@ struct motion_twist {
 motion_twist twist_of(const motion_input &input, const wm_motion_calibration &calibration, const wm_wheels &wheels);
 
 // A measured twist; where the track is known, as a controller makes it by two wheels with their own scales.
-motion_twist twist_of_sample(double speed, double rate, const wm_motion_calibration &c, double track_m);
+motion_twist twist_of_sample(double speed, double side, double rate, const wm_motion_calibration &c, double track_m);
 
-// Variances of a segment: distance, rotation, their covariance, and sideways.
+// Variances of a segment on base_link's axes: distance forwards, rotation, to the left, and their covariances.
 struct motion_noise {
-  double distance_m2, rotation_rad2, distance_rotation, lateral_m2;
+  double distance_m2, rotation_rad2, distance_rotation, lateral_m2, distance_lateral, lateral_rotation;
 };
 
+// Noise that a recording states of its twists in space, as variances per s; NaN: not stated, motion.noise has it.
+struct stated_noise {
+  double distance_m2, lateral_m2, rotation_rad2;
+};
+
+// Distance and sideways are along and across the way until turn_to_axes().
 motion_noise noise_of(const motion_input &input, const motion_twist &twist, double dt_s, const wm_motion_params &params,
-                      const wm_wheels &wheels, const wm_motion_calibration &calibration);
+                      const wm_wheels &wheels, const wm_motion_calibration &calibration, const stated_noise &stated);
+
+// From along and across the way to base_link's axes, for a robot that moves sideways.
+void turn_to_axes(const planar_twist &twist, motion_noise *noise);
 
 // Noise of a held input once the next one is overdue: the robot may have accelerated at noise.hold_mps2 and
 // noise.hold_radps2 since, sigma = a t^2 / 2; after hold_max_s the turn is unknown. `is_counted`: counts have come

@@ -47,7 +47,8 @@ const config_key kConfigKeys[] = {
 
 const config_key kConfigSourceKeys[] = {
     {"name", "text", "needed",
-     "`can`, `motion`, `motion6`, `sightings`, `markers`, `stereo`, `points` or `gnss`; `sightings:SENSOR` for one "
+     "`can`, `motion`, `motion6`, `increments`, `sightings`, `markers`, `stereo`, `points` or `gnss`; "
+     "`sightings:SENSOR` for one "
      "sensor; a detector under `vision`, or `DETECTOR:CAMERA`."},
     {"use", "true or false", "true", "false: the source is not opened."},
     {"lateness_max_ms", "number from 0 to merge.horizon_ms", "merge.lateness_max_ms",

@@ -8,8 +8,8 @@
 #include "sources.h"
 #include "waymark/text.h"
 
-static const char *const kNames[] = {"can",    "motion", "motion6", "sightings", "markers",
-                                     "stereo", "points", "gnss",    NULL};
+static const char *const kNames[] = {"can",     "motion", "motion6", "increments", "sightings",
+                                     "markers", "stereo", "points",  "gnss",       NULL};
 
 static wm_source_config defaults(const wm_config *config) {
   return (wm_source_config){

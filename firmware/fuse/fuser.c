@@ -21,12 +21,14 @@ size_t wm_output_bytes(uint32_t kinds) {
 }
 
 wm_driving wm_driving_choose(uint32_t kinds, uint32_t quantities) {
+  if (kinds & WM_EVENT_BIT(WM_EVENT_INCREMENT))
+    return (wm_driving){.kinds = WM_EVENT_BIT(WM_EVENT_INCREMENT), .quantities = 0};
   static const uint32_t kPreferred[] = {TICKS, Q_BIT(WM_Q_YAW_RATE), SPEEDS};
   if (kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES))
     for (size_t i = 0; i < sizeof kPreferred / sizeof kPreferred[0]; i++)
       if (quantities & kPreferred[i])
         return (wm_driving){.kinds = WM_EVENT_BIT(WM_EVENT_QUANTITIES), .quantities = kPreferred[i]};
-  return (wm_driving){.kinds = WM_EVENT_BIT(WM_EVENT_TWIST2) | WM_EVENT_BIT(WM_EVENT_TWIST6)};
+  return (wm_driving){.kinds = WM_TWIST_EVENTS};
 }
 
 int wm_driving_is(const wm_driving *driving, const wm_event *event) {

@@ -84,7 +84,8 @@ static void about_motion(speaker *to, uint32_t bits) {
       "motion: the right encoder stood still while the robot moved (dead?)",
       "motion: a message's counter stood still: its sender is stuck; its values were not taken for standing still",
       "motion: the yaw rate never changed (stuck sensor?)",
-      "motion: samples were refused in the last seconds, since no robot accelerates so (motion.limits)"};
+      "motion: samples were refused in the last seconds, since no robot accelerates so (motion.limits)",
+      "motion: the vehicle rose, rolled or pitched for seconds, which an estimator in the plane does not model"};
   for (unsigned i = 0; i < sizeof kLines / sizeof kLines[0]; i++)
     if ((bits >> i) & 1u) say(to, kLines[i]);
 }

@@ -121,11 +121,11 @@ static void put_names(FILE *f, const char *key, const char *const *names, const 
 }
 
 static void put_motion_health(FILE *f, uint32_t bits) {
-  static const char *const kNames[] = {"encoder_left_dead", "encoder_right_dead", "counter_frozen", "yaw_rate_stuck",
-                                       "implausible"};
-  int wanted[5];
-  for (int i = 0; i < 5; i++) wanted[i] = (bits >> i) & 1u;
-  put_names(f, "motion_health", kNames, wanted, 5);
+  static const char *const kNames[] = {"encoder_left_dead", "encoder_right_dead", "counter_frozen",
+                                       "yaw_rate_stuck",    "implausible",        "not_planar"};
+  int wanted[6];
+  for (int i = 0; i < 6; i++) wanted[i] = (bits >> i) & 1u;
+  put_names(f, "motion_health", kNames, wanted, 6);
 }
 
 static void put_stale(FILE *f, const wm_health *h) {

@@ -68,6 +68,13 @@ static void put_payload(wm_writer *w, const wm_event *e) {
       wm_put_f64s(w, e->as.twist6.v_mps, 3);
       wm_put_f64s(w, e->as.twist6.w_radps, 3);
       break;
+    case WM_EVENT_INCREMENT:
+      wm_put_i64(w, e->as.increment.from_ns);
+      wm_put_f64(w, e->as.increment.dx_m);
+      wm_put_f64(w, e->as.increment.dy_m);
+      wm_put_f64(w, e->as.increment.dheading_rad);
+      wm_put_f64s(w, e->as.increment.covariance, 6);
+      break;
     case WM_EVENT_SIGHTING: put_sighting(w, &e->as.sighting); break;
     case WM_EVENT_POSITION:
       wm_put_f64s(w, e->as.position.p_m, 3);
@@ -176,6 +183,13 @@ static void get_payload(wm_reader *r, unsigned version, wm_event *e) {
     case WM_EVENT_TWIST6:
       wm_get_f64s(r, e->as.twist6.v_mps, 3);
       wm_get_f64s(r, e->as.twist6.w_radps, 3);
+      break;
+    case WM_EVENT_INCREMENT:
+      e->as.increment.from_ns = wm_get_i64(r);
+      e->as.increment.dx_m = wm_get_f64(r);
+      e->as.increment.dy_m = wm_get_f64(r);
+      e->as.increment.dheading_rad = wm_get_f64(r);
+      wm_get_f64s(r, e->as.increment.covariance, 6);
       break;
     case WM_EVENT_SIGHTING: get_sighting(r, version, &e->as.sighting); break;
     case WM_EVENT_POSITION:

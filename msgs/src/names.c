@@ -9,7 +9,7 @@
 #include "waymark/pose.h"
 
 static const char *const kKinds[] = {"none",   "quantities", "twist2", "twist6", "sighting", "position", "heading",
-                                     "marker", "stereo",     "points", "looked", "set_pose", "reset"};
+                                     "marker", "stereo",     "points", "looked", "set_pose", "reset",    "increment"};
 static const char *const kQuantities[] = {"wheel_ticks_left",       "wheel_ticks_right",
                                           "wheel_speed_front_left", "wheel_speed_front_right",
                                           "wheel_speed_rear_left",  "wheel_speed_rear_right",

@@ -407,6 +407,23 @@ void test_motion_that_no_robot_can_do_is_counted(void) {
   TEST_FAIL_MESSAGE("motion outliers are not counted");
 }
 
+// GIVEN a start that is well known WHEN the robot moves sideways on a circle THEN each estimator goes there.
+void test_sideways_motion_counts(void) {
+  setup.start.sigma_xy_m = setup.start.sigma_heading_rad = 1e-3;
+  machine a;
+  for (int i = 0; i <= 40; i++) {
+    wm_event e{};
+    e.t_ns = wm_ns_from_seconds(0.1 * i);
+    e.kind = WM_EVENT_TWIST6;
+    e.as.twist6 = {{0, 0.5, 0}, {0, 0, 0.25}};
+    TEST_ASSERT_EQUAL(WM_OK, a.take(e));
+  }
+  const wm_estimate out = a.estimate();
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, -2.0 * (1.0 - cos(1.0)), out.pose_map_base.p_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 2.0 * sin(1.0), out.pose_map_base.p_m[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 1.0, out.heading_rad);
+}
+
 void test_what_is_learnt_is_listed_and_given_to_the_predictor(void) {
   machine a;
   for (uint64_t i = 0; i < 500; i++) a.take(event_at(i, 0.02 * (double)i));
@@ -498,6 +515,7 @@ int main(void) {
     RUN_TEST(test_the_lost_probability_is_a_probability_or_absent);
     RUN_TEST(test_counters_are_typed);
     RUN_TEST(test_motion_that_no_robot_can_do_is_counted);
+    RUN_TEST(test_sideways_motion_counts);
     RUN_TEST(test_what_is_learnt_is_listed_and_given_to_the_predictor);
   }
   if (wm_estimator_find("no such") || count < 2) return 1;

@@ -14,7 +14,7 @@
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static const stream_kind *const kKinds[] = {&kStreamMotion, &kStreamMotion6, &kStreamSightings, &kStreamMarkers,
-                                            &kStreamStereo, &kStreamPoints,  &kStreamGnss};
+                                            &kStreamStereo, &kStreamPoints,  &kStreamGnss,      &kStreamIncrements};
 
 static void check(int good) {
   if (!good) abort();
@@ -30,6 +30,11 @@ static void drain(wm_source *source) {
     if (event.kind == WM_EVENT_TWIST2) check(isfinite(event.as.twist2.v_mps) && isfinite(event.as.twist2.w_radps));
     if (event.kind == WM_EVENT_SIGHTING)
       check(isfinite(event.as.sighting.bearing_rad) || isfinite(event.as.sighting.range_m));
+    if (event.kind == WM_EVENT_INCREMENT) {
+      const wm_increment *i = &event.as.increment;
+      check(i->from_ns < event.t_ns && isfinite(i->dx_m) && isfinite(i->dy_m) && isfinite(i->dheading_rad));
+      for (int k = 1; k < 6; k++) check(isnan(i->covariance[k]) == isnan(i->covariance[0]));
+    }
     if (event.kind == WM_EVENT_POSITION) check(isfinite(event.as.position.p_m[0]) && event.as.position.sigma_xy_m > 0);
     if (event.kind == WM_EVENT_POINTS) check(event.as.points.count > 0 && event.as.points.count <= WM_POINTS_MAX);
     newest_ns = event.arrival_ns;

@@ -62,8 +62,7 @@ edge_mcl::capture edge_mcl::capture_of(const alignment &a) const {
   const wm_pose2 way = age >= 0 ? filter_.path(now - age, now, &twist) : filter_.path(now, now - age, &twist);
   c.from_now = age >= 0 ? between(way, wm_pose2{}) : way;
   c.pose = compose({a.value[kAlignX], a.value[kAlignY], a.value[kAlignHeading]}, c.from_now);
-  c.v_mps = twist.v;
-  c.w_radps = twist.w;
+  c.twist = twist;
   c.turn = sincos(c.pose.heading_rad);
   const double x = a.camera >= 0 ? camera_[a.camera].x_m : 0.0, y = a.camera >= 0 ? camera_[a.camera].y_m : 0.0;
   c.eye_x_m = c.pose.x_m + c.turn.cos * x - c.turn.sin * y;
@@ -141,8 +140,9 @@ void edge_mcl::jacobian_of(const matched_point &p, const alignment &a, const cap
   for (int k = 0; k < kCameraErrors; k++)
     (*row)[kAlignCamera + k] = line.normal_x * (h.cos * p.floor.x_by[k] - h.sin * p.floor.y_by[k]) +
                                line.normal_y * (h.sin * p.floor.x_by[k] + h.cos * p.floor.y_by[k]);
-  (*row)[kAlignTime] = -(line.normal_x * (from.v_mps * h.cos - from.w_radps * p.from_y_m) +
-                         line.normal_y * (from.v_mps * h.sin + from.w_radps * p.from_x_m));
+  const planar_twist &t = from.twist;
+  (*row)[kAlignTime] = -(line.normal_x * (t.v * h.cos - t.w * p.from_y_m - t.u * h.sin) +
+                         line.normal_y * (t.v * h.sin + t.w * p.from_x_m + t.u * h.cos));
   (*row)[kAlignEdge] = 1.0;
   for (int k = 0; k < kAlignStates; k++)
     if (a.state[k] < 0) (*row)[k] = 0.0;

@@ -65,7 +65,7 @@ class edge_mcl {
     wm_pose2 from_now;        // the same, seen from now's base_link
     sin_cos turn;             // of the pose's heading
     double eye_x_m, eye_y_m;  // under the camera, in map
-    double v_mps, w_radps;
+    planar_twist twist;
   };
   struct matched_point {
     floor_point floor;                // in base_link

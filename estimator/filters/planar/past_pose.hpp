@@ -37,8 +37,8 @@ past_pose pose_before(const Filter &filter, double age_s) {
   out.lever_x = out.pose.x_m - present.x_m;
   out.lever_y = out.pose.y_m - present.y_m;
   const sin_cos h = sincos(out.pose.heading_rad);
-  out.age_by[0] = -twist.v * h.cos;
-  out.age_by[1] = -twist.v * h.sin;
+  out.age_by[0] = -twist.v * h.cos + twist.u * h.sin;
+  out.age_by[1] = -twist.v * h.sin - twist.u * h.cos;
   out.age_by[2] = -twist.w;
   return out;
 }

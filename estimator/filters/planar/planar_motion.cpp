@@ -6,12 +6,13 @@
 namespace wm {
 
 void planar_motion::init_motion(const wm_setup &setup) {
-  front_.init(setup.motion, &setup.wheels);
+  front_.init(setup.motion, &setup.wheels, setup.rig);
   calibration_ = kNeutralCalibration;
   for (int &state : motion_state_) state = -1;
   start_ns_ = setup.start.t_ns;
   odom_ = {};
-  travelled_m_ = turned_rad_ = twist_[0] = twist_[1] = 0.0;
+  travelled_m_ = turned_rad_ = 0.0;
+  twist_ = {};
   sensor_states_ = 0;
 }
 
@@ -33,7 +34,7 @@ wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist 
               [&](const motion_segment &segment, const motion_twist &t, const motion_noise &) {
                 if (first) *twist = t;
                 first = false;
-                const arc a = make_arc(t.v * segment.dt_s, t.w * segment.dt_s);
+                const arc a = make_arc(t.v * segment.dt_s, t.u * segment.dt_s, t.w * segment.dt_s);
                 sum = compose(sum, {a.x_m, a.y_m, a.turn_rad});
               });
   if (first) *twist = front_.twist_at(from_ns, calibration_);
@@ -42,10 +43,9 @@ wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist 
 
 void planar_motion::take_step(const motion_segment &segment, const motion_twist &twist, const pose_step &step) {
   odom_ = compose(odom_, step.body);
-  travelled_m_ += std::fabs(twist.v) * segment.dt_s;
+  travelled_m_ += speed_of(twist) * segment.dt_s;
   turned_rad_ += std::fabs(step.turn_rad);
-  twist_[0] = twist.v;
-  twist_[1] = twist.w;
+  twist_ = twist;
 }
 
 void planar_motion::take_calibration(double *states) {

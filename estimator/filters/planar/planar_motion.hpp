@@ -109,7 +109,7 @@ class planar_motion {
   wm_time_ns start_ns_;
   wm_pose2 odom_;
   double travelled_m_, turned_rad_;
-  double twist_[2];  // m/s and rad/s, of the last segment
+  planar_twist twist_;  // of the last segment
 };
 
 // A planar pose's estimate; covariance(i, j) is that of x, y and heading.

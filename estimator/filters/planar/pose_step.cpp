@@ -23,10 +23,10 @@ double motion_state_within_limits(int calibration_index, double value) {
 }
 
 pose_step make_pose_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
-                         double heading_rad, const double before[2], const int motion_state[kCalibrationCount]) {
+                         double heading_rad, const planar_twist &before, const int motion_state[kCalibrationCount]) {
   pose_step out;
   const double dt = segment.dt_s;
-  const arc a = make_arc(twist.v * dt, twist.w * dt);
+  const arc a = make_arc(twist.v * dt, twist.u * dt, twist.w * dt);
   const sin_cos h = sincos(heading_rad);
   const double dx = h.cos * a.x_m - h.sin * a.y_m;
   const double dy = h.sin * a.x_m + h.cos * a.y_m;
@@ -40,9 +40,9 @@ pose_step make_pose_step(const motion_segment &segment, const motion_twist &twis
   out.by[0][1] = dx;
   out.by[0][2] = 0.0;
   out.columns = 1;
-  const auto add_column = [&](int state, double distance_by, double turn_by) {
-    const double bx = a.x_by_way * distance_by + a.x_by_turn * turn_by;
-    const double by_body = a.y_by_way * distance_by + a.y_by_turn * turn_by;
+  const auto add_column = [&](int state, double distance_by, double side_by, double turn_by) {
+    const double bx = a.x_by_way * distance_by + a.x_by_turn * turn_by - a.y_by_way * side_by;
+    const double by_body = a.y_by_way * distance_by + a.y_by_turn * turn_by + a.x_by_way * side_by;
     double *by = out.by[out.columns];
     out.column[out.columns++] = state;
     by[0] = h.cos * bx - h.sin * by_body;
@@ -51,34 +51,35 @@ pose_step make_pose_step(const motion_segment &segment, const motion_twist &twis
   };
   for (int i = 0; i < twist.count; i++) {
     const int state = motion_state[twist.index[i]];
-    if (state >= 0) add_column(state, twist.v_by[i] * dt, twist.w_by[i] * dt);
+    if (state >= 0) add_column(state, twist.v_by[i] * dt, twist.u_by[i] * dt, twist.w_by[i] * dt);
   }
   // More lag: the interval contains more of the inputs before it, at its beginning, which rotates all that follows, and
   // less of the last ones.
   const int lag = motion_state[kLag];
   if (lag >= 0 && (segment.first || segment.last)) {
-    add_column(lag, segment.last ? -twist.v : 0.0, segment.last ? -twist.w : 0.0);
+    add_column(lag, segment.last ? -twist.v : 0.0, segment.last ? -twist.u : 0.0, segment.last ? -twist.w : 0.0);
     if (segment.first) {
       double *by = out.by[out.columns - 1];
-      by[0] += h.cos * before[0] - dy * before[1];
-      by[1] += h.sin * before[0] + dx * before[1];
-      by[2] += before[1];
+      by[0] += h.cos * before.v - dy * before.w - h.sin * before.u;
+      by[1] += h.sin * before.v + dx * before.w + h.cos * before.u;
+      by[2] += before.w;
     }
   }
 
-  // Noise along the path, of the rotation, and sideways.
+  // Noise along the path, of the rotation, and sideways, with their covariances.
   const double way_x = h.cos * a.x_by_way - h.sin * a.y_by_way, way_y = h.sin * a.x_by_way + h.cos * a.y_by_way;
   const double turn_x = h.cos * a.x_by_turn - h.sin * a.y_by_turn, turn_y = h.sin * a.x_by_turn + h.cos * a.y_by_turn;
   const double q_distance = noise.distance_m2, q_rotation = noise.rotation_rad2, q_both = noise.distance_rotation,
-               q_lateral = noise.lateral_m2;
+               q_lateral = noise.lateral_m2, q_place = noise.distance_lateral, q_side = noise.lateral_rotation;
   out.noise[0][0] = way_x * way_x * q_distance + 2.0 * way_x * turn_x * q_both + turn_x * turn_x * q_rotation +
-                    way_y * way_y * q_lateral;
+                    way_y * way_y * q_lateral - 2.0 * way_x * way_y * q_place - 2.0 * way_y * turn_x * q_side;
   out.noise[0][1] = way_x * way_y * q_distance + (way_x * turn_y + turn_x * way_y) * q_both +
-                    turn_x * turn_y * q_rotation - way_x * way_y * q_lateral;
+                    turn_x * turn_y * q_rotation - way_x * way_y * q_lateral +
+                    (way_x * way_x - way_y * way_y) * q_place + (way_x * turn_x - way_y * turn_y) * q_side;
   out.noise[1][1] = way_y * way_y * q_distance + 2.0 * way_y * turn_y * q_both + turn_y * turn_y * q_rotation +
-                    way_x * way_x * q_lateral;
-  out.noise[0][2] = way_x * q_both + turn_x * q_rotation;
-  out.noise[1][2] = way_y * q_both + turn_y * q_rotation;
+                    way_x * way_x * q_lateral + 2.0 * way_x * way_y * q_place + 2.0 * way_x * turn_y * q_side;
+  out.noise[0][2] = way_x * q_both + turn_x * q_rotation - way_y * q_side;
+  out.noise[1][2] = way_y * q_both + turn_y * q_rotation + way_x * q_side;
   out.noise[2][2] = q_rotation;
   return out;
 }

@@ -27,7 +27,7 @@ struct pose_step {
 // `before`: the twist that held until the segment began. `motion_state`: index of each calibration state, -1 where off.
 // F and W of [Stepanov2017], with exact arcs in place of the first-order step, and a column for each calibration state.
 pose_step make_pose_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
-                         double heading_rad, const double before[2], const int motion_state[kCalibrationCount]);
+                         double heading_rad, const planar_twist &before, const int motion_state[kCalibrationCount]);
 
 // Names of the motion's calibration states, by calibration_index.
 extern const char *const kMotionStateNames[kCalibrationCount];

@@ -150,8 +150,9 @@ void joint_state::estimate(wm_estimate *out) const {
   out->t_ns = now_ns();
   put_planar_estimate(
       pose(), [this](int i, int j) { return covariance(i, j); }, out);
-  out->v_mps[0] = twist_[0];
-  out->w_radps[2] = twist_[1];
+  out->v_mps[0] = twist_.v;
+  out->v_mps[1] = twist_.u;
+  out->w_radps[2] = twist_.w;
 }
 
 // ---- the state ----

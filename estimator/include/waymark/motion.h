@@ -18,11 +18,12 @@ extern "C" {
 #endif
 
 typedef enum wm_motion_model {
-  WM_MOTION_AUTO = 0,        // the best that the recording's quantities allow, in the order of this list
+  WM_MOTION_AUTO = 0,        // the best that the recording's data allow (motion.model)
   WM_MOTION_TICKS,           // differential from both wheels' ticks
   WM_MOTION_SPEED_YAW_RATE,  // wheel or vehicle speed and yaw rate
   WM_MOTION_ACKERMANN,       // speed and steering (table, ratio or road wheel angle)
-  WM_MOTION_TWIST            // motion.csv
+  WM_MOTION_TWIST,           // motion.csv, motion6.csv
+  WM_MOTION_INCREMENTS       // increments.csv
 } wm_motion_model;
 
 // `motion:` of the config. The fields and their meaning are in wm_motion_params_table (motion_params.c).
@@ -45,6 +46,7 @@ const char *wm_motion_lacks(const wm_motion_params *params, const wm_wheels *whe
 #define WM_MOTION_HEALTH_COUNTER_FROZEN (1u << 2)
 #define WM_MOTION_HEALTH_YAW_RATE_STUCK (1u << 3)
 #define WM_MOTION_HEALTH_IMPLAUSIBLE (1u << 4)  // a sample was refused within the last 5 s (motion.limits)
+#define WM_MOTION_HEALTH_NOT_PLANAR (1u << 5)  // motion6.csv: it rises, rolls or pitches, which the plane does not have
 
 // Calibration of the motion sensors, as an estimator has learnt it. Neutral: scales 1, the rest 0.
 typedef enum wm_motion_term {
@@ -72,8 +74,8 @@ typedef struct wm_odometry wm_odometry;
 typedef struct wm_odom_point {
   wm_time_ns t_ns;
   wm_pose2 pose_odom_base;
-  double v_mps, w_radps;
-  double along_var_m2;  // accumulated process variances since the start (rise without end)
+  double v_mps, side_mps, w_radps;  // forwards, to the left, turning
+  double along_var_m2;              // accumulated process variances since the start (rise without end)
   double across_var_m2;
   double heading_var_rad2;
 } wm_odom_point;

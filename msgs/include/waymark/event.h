@@ -32,12 +32,13 @@ typedef enum wm_event_kind {
   WM_EVENT_LOOKED,      // a sensor looked and detected nothing
   WM_EVENT_SET_POSE,    // the robot's pose, given by a person or a program
   WM_EVENT_RESET,       // start again from the start pose of the setup
+  WM_EVENT_INCREMENT,   // motion: how base_link moved from one time to another
   WM_EVENT_KIND_COUNT
 } wm_event_kind;
 
 #define WM_EVENT_BIT(kind) (UINT32_C(1) << (kind))
-#define WM_MOTION_EVENTS \
-  (WM_EVENT_BIT(WM_EVENT_QUANTITIES) | WM_EVENT_BIT(WM_EVENT_TWIST2) | WM_EVENT_BIT(WM_EVENT_TWIST6))
+#define WM_TWIST_EVENTS (WM_EVENT_BIT(WM_EVENT_TWIST2) | WM_EVENT_BIT(WM_EVENT_TWIST6))
+#define WM_MOTION_EVENTS (WM_EVENT_BIT(WM_EVENT_QUANTITIES) | WM_TWIST_EVENTS | WM_EVENT_BIT(WM_EVENT_INCREMENT))
 
 // Quantities that CAN signals are bound to (recording-format: can-signals.yaml). SI units, forwards and left positive.
 typedef enum wm_quantity {
@@ -77,6 +78,13 @@ typedef struct wm_twist2 {
 typedef struct wm_twist6 {
   double v_mps[3], w_radps[3];
 } wm_twist6;
+
+// Pose of base_link at the event's time, seen from base_link at `from_ns`.
+typedef struct wm_increment {
+  wm_time_ns from_ns;
+  double dx_m, dy_m, dheading_rad;
+  double covariance[6];  // xx, xy, yy, x heading, y heading, heading heading, on the same axes; NaN: not given
+} wm_increment;
 
 // Bearing is positive to the left of the sensor's x axis. Bearing or range may be absent, not both. Elevation belongs
 // to the bearing's ray and is measured from the sensor's xy plane. For a sensor that looks up or down the bearing is
@@ -154,6 +162,7 @@ typedef struct wm_event {
     wm_quantities quantities;
     wm_twist2 twist2;
     wm_twist6 twist6;
+    wm_increment increment;
     wm_sighting sighting;
     wm_position position;
     wm_heading heading;

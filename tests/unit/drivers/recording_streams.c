@@ -239,6 +239,50 @@ static void sightings_by_sensor(void) {
   TEST_ASSERT_NULL(strstr(warnings, "'front'"));
 }
 
+// Sigmas of a row, its covariance on axes turned by the bearing, and what is not whole.
+static void sightings_with_their_own_noise(void) {
+  folder_write("calibration.yaml", "sensors:\n  eye: {bearing_sigma_rad: 0.01}\n");
+  folder_write(
+      "sightings.csv",
+      "t_ns,sensor,id,bearing_rad,range_m,bearing_sigma_rad,range_sigma_m,cov_xx_m2,cov_xy_m2,cov_yy_m2,"
+      "elevation_rad,elevation_sigma_rad\n"
+      "1,eye,1,0,2,0.03,0.2,,,,0.1,0.02\n"
+      "2,eye,1,1.5707963267948966,2,,,0.04,0,0.09,,\n"
+      "3,eye,1,0.78539816339744831,2,,,0.04,0.03,0.04,,\n"
+      "4,eye,1,0,2,,,0.04,,0.09,,\n5,eye,1,0,,,,0.04,0,0.09,,\n6,eye,1,0,2,,,1,2,1,,\n7,eye,1,0,2,,,,,,0.1,\n");
+  wm_source *eye = source("sightings:eye");
+  wm_sighting s = next(eye).as.sighting;
+  TEST_ASSERT_TRUE(s.bearing_sigma_rad == 0.03 && s.range_sigma_m == 0.2);
+  TEST_ASSERT_TRUE(s.elevation_rad == 0.1 && s.elevation_sigma_rad == 0.02);
+  s = next(eye).as.sighting;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.3, s.range_sigma_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.2 / 2, s.bearing_sigma_rad);
+  TEST_ASSERT_FALSE(wm_sighting_has_elevation(&s));
+  s = next(eye).as.sighting;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, sqrt(0.07), s.range_sigma_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, sqrt(0.01) / 2, s.bearing_sigma_rad);
+  at_end(eye);
+  TEST_ASSERT_EQUAL(4, eye->counts.malformed);
+}
+
+static void increments_with_and_without_covariance(void) {
+  folder_write("increments.csv",
+               "t_ns,from_ns,dx_m,dy_m,dheading_rad,cov_xx,cov_xy,cov_yy,cov_xt,cov_yt,cov_tt\n"
+               "5,0,0.1,0.2,0.3,1,0.1,2,0.2,0.3,3\n10,5,0.1,0,0.01,,,,,,\n15,15,1,0,0,,,,,,\n20,15,1,0,0,1,0,1,0,0,\n");
+  wm_source *increments = source("increments");
+  TEST_ASSERT_TRUE(increments->is_motion);
+  wm_event event = next(increments);
+  const wm_increment *i = &event.as.increment;
+  TEST_ASSERT_EQUAL(WM_EVENT_INCREMENT, event.kind);
+  TEST_ASSERT_TRUE(event.t_ns == 5 && i->from_ns == 0 && i->dx_m == 0.1 && i->dy_m == 0.2 && i->dheading_rad == 0.3);
+  const double covariance[6] = {1, 0.1, 2, 0.2, 0.3, 3};
+  TEST_ASSERT_EQUAL_MEMORY(covariance, i->covariance, sizeof covariance);
+  event = next(increments);
+  TEST_ASSERT_TRUE(isnan(event.as.increment.covariance[0]) && isnan(event.as.increment.covariance[5]));
+  at_end(increments);
+  TEST_ASSERT_EQUAL(2, increments->counts.malformed);
+}
+
 static void points_by_stamp(void) {
   folder_write("points.csv", "t_ns,x_m,y_m\n1,1,2\n1,3,4\n2,5,6\n");
   wm_source *points = source("points");
@@ -301,6 +345,8 @@ int main(void) {
   RUN_TEST(values_of_the_row_before);
   RUN_TEST(leaping_stamps);
   RUN_TEST(sightings_by_sensor);
+  RUN_TEST(sightings_with_their_own_noise);
+  RUN_TEST(increments_with_and_without_covariance);
   RUN_TEST(points_by_stamp);
   RUN_TEST(too_many_points);
   RUN_TEST(other_streams);

@@ -31,6 +31,19 @@ inline wm_event twist(double t_s, double v, double w) {
   return e;
 }
 
+inline wm_event twist6(double t_s, double vx, double vy, double wz) {
+  wm_event e = empty(t_s, WM_EVENT_TWIST6);
+  e.as.twist6 = {{vx, vy, 0.0}, {0.0, 0.0, wz}};
+  return e;
+}
+
+inline wm_event increment(double from_s, double to_s, const wm_pose2 &step, const double covariance[6]) {
+  wm_event e = empty(to_s, WM_EVENT_INCREMENT);
+  e.as.increment = {at(from_s), step.x_m, step.y_m, step.heading_rad, {}};
+  std::memcpy(e.as.increment.covariance, covariance, sizeof e.as.increment.covariance);
+  return e;
+}
+
 inline wm_event quantities(double t_s, std::initializer_list<std::pair<wm_quantity, double>> list) {
   wm_event e = empty(t_s, WM_EVENT_QUANTITIES);
   for (const auto &[id, value] : list) {

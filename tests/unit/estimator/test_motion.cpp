@@ -53,7 +53,8 @@ constexpr double kTick = 2 * M_PI * 0.1 / 1000;  // of make::two_wheels()
 // Each model, each calibration state: derivative by central differences, and scales' meaning at a turn.
 void test_every_derivative_of_every_model(void) {
   const int kCommand = -1;
-  const int models[] = {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_ACKERMANN, WM_MOTION_TWIST, kCommand};
+  const int models[] = {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE, WM_MOTION_ACKERMANN,
+                        WM_MOTION_TWIST, WM_MOTION_INCREMENTS,     kCommand};
   int checked = 0;
   for (int model : models) {
     wm_wheels w = make::car();
@@ -61,6 +62,7 @@ void test_every_derivative_of_every_model(void) {
     wm::motion_input input{};
     input.a = 1.3;
     input.b = model == WM_MOTION_TICKS ? 1.1 : 0.2;
+    input.side_mps = 0.6;
     input.model = (uint8_t)(model == kCommand ? (int)WM_MOTION_TWIST : model);
     input.command = model == kCommand;
     const wm_motion_calibration c = {{1.05, 0.93, 0.02, 1.02, 0.97, 1.04, 0.03, 0.1, 0.07}};
@@ -73,15 +75,16 @@ void test_every_derivative_of_every_model(void) {
       up.value[state] += h;
       down.value[state] -= h;
       const wm::motion_twist a = wm::twist_of(input, up, w), b = wm::twist_of(input, down, w);
-      double v_by = 0, w_by = 0;
+      double v_by = 0, u_by = 0, w_by = 0;
       for (int i = 0; i < t.count; i++)
-        if (t.index[i] == state) v_by += t.v_by[i], w_by += t.w_by[i];
+        if (t.index[i] == state) v_by += t.v_by[i], u_by += t.u_by[i], w_by += t.w_by[i];
       TEST_ASSERT_DOUBLE_WITHIN(1e-8, (a.v - b.v) / (2 * h), v_by);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-8, (a.u - b.u) / (2 * h), u_by);
       TEST_ASSERT_DOUBLE_WITHIN(1e-8, (a.w - b.w) / (2 * h), w_by);
       checked += v_by != 0 || w_by != 0;
     }
   }
-  TEST_ASSERT_EQUAL(3 + 3 + 2 + 6 + 7, checked);
+  TEST_ASSERT_EQUAL(3 + 3 + 2 + 6 + 3 + 7, checked);
 }
 
 void test_ticks_make_exact_arcs(void) {

@@ -44,6 +44,10 @@ static void fill(wm_event *e, unsigned kind) {
         e->as.twist6.w_radps[i] = random_f64();
       }
       break;
+    case WM_EVENT_INCREMENT:
+      e->as.increment = (wm_increment){
+          INT64_MIN, random_f64(), random_f64(), -0.0, {random_f64(), NAN, random_f64(), 1, 2, random_f64()}};
+      break;
     case WM_EVENT_SIGHTING:
       e->as.sighting = (wm_sighting){65535, -1, random_f64(), NAN, NAN, random_f64(), random_f64(), 0.25};
       break;

@@ -64,7 +64,7 @@ const error_case kErrorCases[] = {
      "still obeys: nothing overflows there; set it to at least that, or to 0 if no radius overflows"},
     {CONFIG, "Unknown source", FILE_, "sources: [{name: gpss}]\n",
      "config/robot.yaml:3: sources[0].name: 'gpss' is unknown; did you mean 'gnss'? (one of: can, motion, motion6, "
-     "sightings, markers, stereo, points, gnss)"},
+     "increments, sightings, markers, stereo, points, gnss)"},
     {CONFIG, "Source twice", FILE_, "sources:\n  - name: gnss\n  - name: gnss\n",
      "config/robot.yaml:5: sources[1].name: 'gnss' stands there twice (first in line 4)"},
     {CONFIG, "Until before from", FILE_, "sources: [{name: gnss, from_s: 30, until_s: 25}]\n",
@@ -113,7 +113,7 @@ const error_case kErrorCases[] = {
      "format: waymark-recording/1\nvehicle:\n  initial_pose: {qx: 0, qy: 0, qz: 1, qw: 1}\n",
      "rec/recording.yaml:3: vehicle.initial_pose: the quaternion's length is 1.414; 1 is needed"},
     {REC, "No motion at all", "motion.csv", NULL,
-     "rec: no motion source: can.log, motion.csv or motion6.csv is needed"},
+     "rec: no motion source: can.log, motion.csv, motion6.csv or increments.csv is needed"},
     {REC, "CAN without a DBC", "vehicle.dbc", NULL,
      "rec/vehicle.dbc: is not there, but needed to read can.log; name one in the configuration or put it into the "
      "folder"},

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: Apache-2.0
+// Motion in the plane with all three of its components: sideways twists, increments with a covariance, and twists that
+// leave the plane.
+#include <cmath>
+
+#include "events.hpp"
+#include "filters/planar/past_pose.hpp"
+#include "filters/planar/planar_filter.hpp"
+#include "math/eigen.hpp"
+#include "math/se2.hpp"
+#include "unity.h"
+
+namespace {
+
+wm_motion_params params;
+wm_rig rig;
+wm_setup setup;
+wm::planar_filter_of<16> filter;
+
+void begin(const wm_rig *known = nullptr, double speed_scale_sigma = 0.0) {
+  wm_params_defaults(&wm_motion_params_table, &params);
+  wm_motion_states states{};
+  states.sigma[WM_SPEED_SCALE] = speed_scale_sigma;
+  setup = {};
+  setup.motion = &params;
+  setup.wheels = make::no_wheels();
+  setup.rig = known;
+  setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0, 1e-6, 1e-6};
+  filter.init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
+}
+
+// Heading to the centre: a circle sideways of 2 m radius, a radian of it.
+void test_a_circle_sideways(void) {
+  begin();
+  for (int i = 0; i <= 40; i++) filter.move(make::twist6(0.1 * i, 0.0, 0.5, 0.25));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -2.0 * (1.0 - cos(1.0)), filter.pose().x_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0 * sin(1.0), filter.pose().y_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 1.0, filter.pose().heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2.0, filter.travelled_m());
+  wm_estimate e;
+  filter.estimate(&e);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, e.v_mps[1]);
+}
+
+// Variance is added along the way, wherever the robot's front is: sideways is no more exact than forwards.
+void test_sideways_is_as_uncertain_as_forwards(void) {
+  double along[2], across[2];
+  for (int sideways : {0, 1}) {
+    begin();
+    params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
+    for (int i = 0; i <= 20; i++) filter.move(make::twist6(0.1 * i, sideways ? 0.0 : 0.7, sideways ? 0.7 : 0.0, 0.0));
+    along[sideways] = filter.covariance(sideways, sideways);
+    across[sideways] = filter.covariance(1 - sideways, 1 - sideways);
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, along[0], along[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, across[0], across[1]);
+  TEST_ASSERT_TRUE(along[0] > 2 * across[0]);
+}
+
+void drive_askew(int from) {
+  for (int i = from; i <= 20; i++) filter.move(make::twist6(0.1 * i, 0.4, -0.6 + 0.02 * i, 0.5));
+}
+
+void test_derivatives_of_a_sideways_drive(void) {
+  constexpr double kStep = 1e-5, kSigma = 0.1;
+  wm_pose2 end[2];
+  for (int up : {0, 1}) {
+    begin(nullptr, kSigma);
+    filter.move(make::twist6(0.0, 0.4, -0.6, 0.5));
+    filter.forget(3, 1.0 + (up ? kStep : -kStep), kSigma * kSigma);
+    drive_askew(1);
+    end[up] = filter.pose();
+  }
+  begin(nullptr, kSigma);
+  drive_askew(0);
+  const double variance = kSigma * kSigma;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-8, (end[1].x_m - end[0].x_m) / (2 * kStep) * variance, filter.covariance(0, 3));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-8, (end[1].y_m - end[0].y_m) / (2 * kStep) * variance, filter.covariance(1, 3));
+  // By the age of a measurement.
+  const double h = 1e-4;
+  const wm::past_pose at = wm::pose_before(filter, 0.05), older = wm::pose_before(filter, 0.05 + h);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, (older.pose.x_m - at.pose.x_m) / h, at.age_by[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, (older.pose.y_m - at.pose.y_m) / h, at.age_by[1]);
+}
+
+// A recording's own sigmas of its twist take the place of motion.noise.
+void test_stated_sigmas_replace_the_configured_noise(void) {
+  double variance[2];
+  for (int stated : {0, 1}) {
+    wm_rig_init(&rig);
+    if (stated)
+      for (int i = 0; i < 3; i++) rig.twist6_sigma_v_mps[i] = 0.5, rig.twist6_sigma_w_radps[i] = 0.4;
+    begin(&rig);
+    for (int i = 0; i <= 200; i++) filter.move(make::twist6(0.1 * i, 0.3, 0.0, 0.0));
+    variance[stated] = filter.covariance(2, 2);
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 20 * params.noise_yaw_rate_radps * params.noise_yaw_rate_radps, variance[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(0.02 * 20 * 0.1 * 0.16, 20 * 0.1 * 0.16, variance[1]);
+}
+
+constexpr double kCovariance[6] = {4e-4, 1e-4, 9e-4, 2e-5, -3e-5, 1e-4};
+
+// c = a (+) b with P_c = A P_a A' + B Q B'.
+void compose_with(wm_pose2 *pose, wm::matrix<3> *p, const wm_pose2 &step, const double q[6]) {
+  wm::matrix<3> by_pose, by_step, noise;
+  *pose = wm::compose(*pose, step, &by_pose, &by_step);
+  noise << q[0], q[1], q[3], q[1], q[2], q[4], q[3], q[4], q[5];
+  *p = wm::transformed(by_pose, *p) + wm::transformed(by_step, noise);
+}
+
+// An increment is composed as a pose, with all of its covariance, however observations cut its time.
+void test_increments_are_poses(void) {
+  for (int cuts : {0, 1, 5}) {
+    begin();
+    wm_pose2 pose{};
+    wm::matrix<3> p = wm::matrix<3>::Identity() * 1e-12;
+    for (int i = 0; i < 10; i++) {
+      const wm_pose2 step = {0.2 + 0.01 * i, -0.05, i % 2 ? 0.4 : -0.1};
+      for (int c = 1; c <= cuts && i > 0; c++) filter.move_to(make::at(0.5 * i + 0.5 * c / (cuts + 1)));
+      filter.move(make::increment(0.5 * i, 0.5 * (i + 1), step, kCovariance));
+      compose_with(&pose, &p, step, kCovariance);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9, pose.x_m, filter.pose().x_m);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9, pose.y_m, filter.pose().y_m);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9, pose.heading_rad, filter.pose().heading_rad);
+    }
+    for (int i = 0; i < 3 && cuts == 0; i++)
+      for (int j = 0; j < 3; j++) TEST_ASSERT_DOUBLE_WITHIN(1e-6 * p(j, j), p(i, j), filter.covariance(i, j));
+    TEST_ASSERT_DOUBLE_WITHIN(0.1 * p(2, 2), p(2, 2), filter.variance(2));
+  }
+}
+
+// Two that overlap by half count the common half once.
+void test_increments_that_overlap(void) {
+  begin();
+  filter.move(make::increment(0.0, 1.0, {1.0, 0.0, 0.0}, kCovariance));
+  filter.move(make::increment(0.5, 1.5, {1.0, 0.0, 0.0}, kCovariance));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.5, filter.pose().x_m);
+}
+
+void test_impossible_increments_are_refused(void) {
+  begin();
+  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(1.0, 1.0, {1, 0, 0}, kCovariance)));
+  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(0.0, 1.0, {500, 0, 0}, kCovariance)));
+  TEST_ASSERT_EQUAL(WM_NOT_FINITE, filter.check_motion(make::increment(0.0, 1.0, {1, NAN, 0}, kCovariance)));
+  const double wide[6] = {1, 2, 1, 0, 0, 1};  // a correlation of 2
+  TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, wide)));
+  const double none[6] = {NAN, NAN, NAN, NAN, NAN, NAN};
+  TEST_ASSERT_EQUAL(WM_OK, filter.check_motion(make::increment(0.0, 1.0, {1, 0, 0}, none)));
+  filter.move(make::increment(0.0, 1.0, {1, 0, 0}, none));
+  const double rel = params.noise_speed_rel, constant = params.noise_speed_mps;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, rel * rel + constant * constant, filter.covariance(0, 0));
+}
+
+// A bump and a steady slope are of the plane, a dive is not.
+void test_motion_that_leaves_the_plane(void) {
+  const struct {
+    double rise_mps, pitch_radps, for_s;
+    bool leaves;
+  } drives[] = {{0.3, 0, 1.0, false}, {0.05, 0.03, 10.0, false}, {0.4, 0, 3.0, true}, {0, -0.2, 3.0, true}};
+  for (const auto &drive : drives) {
+    begin();
+    for (int i = 0; i <= 100; i++) {
+      wm_event e = make::twist6(0.1 * i, 1.0, 0.0, 0.0);
+      if (0.1 * i < drive.for_s) e.as.twist6.v_mps[2] = drive.rise_mps, e.as.twist6.w_radps[1] = drive.pitch_radps;
+      filter.move(e);
+    }
+    TEST_ASSERT_EQUAL(drive.leaves, (filter.motion_health() & WM_MOTION_HEALTH_NOT_PLANAR) != 0);
+  }
+}
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_a_circle_sideways);
+  RUN_TEST(test_sideways_is_as_uncertain_as_forwards);
+  RUN_TEST(test_derivatives_of_a_sideways_drive);
+  RUN_TEST(test_stated_sigmas_replace_the_configured_noise);
+  RUN_TEST(test_increments_are_poses);
+  RUN_TEST(test_increments_that_overlap);
+  RUN_TEST(test_impossible_increments_are_refused);
+  RUN_TEST(test_motion_that_leaves_the_plane);
+  return UNITY_END();
+}
