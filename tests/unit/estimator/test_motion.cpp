@@ -525,44 +525,6 @@ void test_what_can_not_be_is_refused(void) {
   TEST_ASSERT_EQUAL(WM_OUT_OF_RANGE, front.check(e));
 }
 
-// What a model lacks is told before the drive; what it doesn't lack, it can drive with (the tests above).
-void test_what_a_model_lacks(void) {
-  const auto lacks = [](int model, const wm_wheels &w, uint32_t quantities, bool twists = false) {
-    start(w, model);
-    const uint32_t kinds =
-        (quantities ? WM_EVENT_BIT(WM_EVENT_QUANTITIES) : 0) | (twists ? WM_EVENT_BIT(WM_EVENT_TWIST2) : 0);
-    const char *text = wm_motion_lacks(&params, &w, kinds, quantities);
-    return text ? text : "nothing";
-  };
-  const auto bits = [](std::initializer_list<int> quantities) {
-    uint32_t all = 0;
-    for (int q : quantities) all |= 1u << q;
-    return all;
-  };
-  const uint32_t ticks = bits({WM_Q_WHEEL_TICKS_LEFT, WM_Q_WHEEL_TICKS_RIGHT}), rate = bits({WM_Q_YAW_RATE});
-  const uint32_t speed = bits({WM_Q_VEHICLE_SPEED}), actuator = bits({WM_Q_STEERING_ACTUATOR});
-  wm_wheels unknown = {NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}};
-
-  TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_TICKS, make::two_wheels(), ticks));
-  TEST_ASSERT_EQUAL_STRING("wheel_ticks_left and wheel_ticks_right over CAN",
-                           lacks(WM_MOTION_TICKS, make::two_wheels(), bits({WM_Q_WHEEL_TICKS_LEFT}), true));
-  TEST_ASSERT_EQUAL_STRING("wheels.radius_m and wheels.ticks_per_turn in calibration.yaml",
-                           lacks(WM_MOTION_TICKS, unknown, ticks));
-  TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_SPEED_YAW_RATE, unknown, speed | rate));
-  TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_SPEED_YAW_RATE, make::two_wheels(), ticks | rate));
-  TEST_ASSERT_EQUAL_STRING("yaw_rate over CAN", lacks(WM_MOTION_SPEED_YAW_RATE, unknown, speed));
-  TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_ACKERMANN, make::car(), speed | actuator));
-  TEST_ASSERT_EQUAL_STRING("wheels.wheelbase_m in calibration.yaml",
-                           lacks(WM_MOTION_ACKERMANN, unknown, speed | actuator));
-  unknown.wheelbase_m = 1;
-  TEST_ASSERT_EQUAL_STRING("wheels.steering_table in calibration.yaml",
-                           lacks(WM_MOTION_ACKERMANN, unknown, speed | actuator));
-  TEST_ASSERT_EQUAL_STRING("motion.csv or motion6.csv", lacks(WM_MOTION_TWIST, make::car(), speed | rate));
-  TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_TWIST, make::car(), 0, true));
-  TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_AUTO, make::car(), speed, true));
-  TEST_ASSERT_EQUAL_STRING("yaw_rate over CAN", lacks(WM_MOTION_AUTO, make::car(), speed));
-}
-
 }  // namespace
 
 void setUp(void) {}
@@ -597,6 +559,5 @@ int main(void) {
   RUN_TEST(test_a_counter_that_contradicts_the_stamp_is_doubt);
   RUN_TEST(test_a_stuck_yaw_rate_is_noticed_where_the_steering_turns);
   RUN_TEST(test_what_can_not_be_is_refused);
-  RUN_TEST(test_what_a_model_lacks);
   return UNITY_END();
 }

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// The choice of the motion's model: by the data that come, and by what is known to be there before the drive.
+#include <initializer_list>
+
+#include "events.hpp"
+#include "math/arc.hpp"
+#include "motion/front_end.hpp"
+#include "unity.h"
+
+namespace {
+
+// What a model lacks is told before the drive; what it doesn't lack, it can drive with (the tests above).
+void test_what_a_model_lacks(void) {
+  const auto lacks = [](int model, const wm_wheels &w, uint32_t quantities, bool twists = false) {
+    wm_motion_params params;
+    wm_params_defaults(&wm_motion_params_table, &params);
+    params.model = model;
+    const uint32_t kinds =
+        (quantities ? WM_EVENT_BIT(WM_EVENT_QUANTITIES) : 0) | (twists ? WM_EVENT_BIT(WM_EVENT_TWIST2) : 0);
+    const char *text = wm_motion_lacks(&params, &w, kinds, quantities);
+    return text ? text : "nothing";
+  };
+  const auto bits = [](std::initializer_list<int> quantities) {
+    uint32_t all = 0;
+    for (int q : quantities) all |= 1u << q;
+    return all;
+  };
+  const uint32_t ticks = bits({WM_Q_WHEEL_TICKS_LEFT, WM_Q_WHEEL_TICKS_RIGHT}), rate = bits({WM_Q_YAW_RATE});
+  const uint32_t speed = bits({WM_Q_VEHICLE_SPEED}), actuator = bits({WM_Q_STEERING_ACTUATOR});
+  wm_wheels unknown = {NAN, NAN, NAN, NAN, NAN, NAN, 0, {}, {}};
+
+  TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_TICKS, make::two_wheels(), ticks));
+  TEST_ASSERT_EQUAL_STRING("wheel_ticks_left and wheel_ticks_right over CAN",
+                           lacks(WM_MOTION_TICKS, make::two_wheels(), bits({WM_Q_WHEEL_TICKS_LEFT}), true));
+  TEST_ASSERT_EQUAL_STRING("wheels.radius_m and wheels.ticks_per_turn in calibration.yaml",
+                           lacks(WM_MOTION_TICKS, unknown, ticks));
+  TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_SPEED_YAW_RATE, unknown, speed | rate));
+  TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_SPEED_YAW_RATE, make::two_wheels(), ticks | rate));
+  TEST_ASSERT_EQUAL_STRING("yaw_rate over CAN", lacks(WM_MOTION_SPEED_YAW_RATE, unknown, speed));
+  TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_ACKERMANN, make::car(), speed | actuator));
+  TEST_ASSERT_EQUAL_STRING("wheels.wheelbase_m in calibration.yaml",
+                           lacks(WM_MOTION_ACKERMANN, unknown, speed | actuator));
+  unknown.wheelbase_m = 1;
+  TEST_ASSERT_EQUAL_STRING("wheels.steering_table in calibration.yaml",
+                           lacks(WM_MOTION_ACKERMANN, unknown, speed | actuator));
+  TEST_ASSERT_EQUAL_STRING("motion.csv or motion6.csv", lacks(WM_MOTION_TWIST, make::car(), speed | rate));
+  TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_TWIST, make::car(), 0, true));
+  TEST_ASSERT_EQUAL_STRING("increments.csv", lacks(WM_MOTION_INCREMENTS, make::car(), 0, true));
+  TEST_ASSERT_EQUAL_STRING("nothing", lacks(WM_MOTION_AUTO, make::car(), speed, true));
+  TEST_ASSERT_EQUAL_STRING("yaw_rate over CAN", lacks(WM_MOTION_AUTO, make::car(), speed));
+}
+
+constexpr double kTick = 2 * M_PI * 0.1 / 1000;  // of make::two_wheels()
+
+// A robot with ticks whose right wheel is 4 % larger than its calibration, and a gyro that may fall silent.
+struct drive {
+  wm_motion_params params;
+  wm_wheels wheels = make::two_wheels();
+  wm::motion_front_end front;
+  wm_pose2 pose{};
+  int steps = 0;
+  double left = 0, right = 0;
+
+  explicit drive(int model = WM_MOTION_AUTO) {
+    wm_params_defaults(&wm_motion_params_table, &params);
+    params.model = model;
+    front.init(&params, &wheels);
+  }
+  void feed(const wm_event &e) {
+    TEST_ASSERT_EQUAL(WM_OK, front.check(e));
+    front.feed(e);
+    front.advance(e.t_ns, wm::kNeutralCalibration,
+                  [this](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &) {
+                    const wm::arc a = wm::make_arc(t.v * s.dt_s, t.w * s.dt_s);
+                    pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
+                  });
+  }
+  // At 0.5 m/s straight on; the right wheel's radius makes its counts a turn of 0.04 rad/s to the left.
+  void go(double seconds, bool gyro, double gyro_noise_radps = 1e-6) {
+    for (const int end = steps + (int)(50 * seconds); steps < end; steps++) {
+      const double t = 0.02 * steps;
+      left += 0.01 / kTick, right += 0.0104 / kTick;
+      feed(make::quantities(t, {{WM_Q_WHEEL_TICKS_LEFT, left}, {WM_Q_WHEEL_TICKS_RIGHT, right}}));
+      if (gyro) feed(make::quantities(t + 0.005, {{WM_Q_YAW_RATE, steps % 2 ? gyro_noise_radps : -gyro_noise_radps}}));
+    }
+  }
+};
+
+// GIVEN ticks and a gyro WHEN no model is configured THEN the way is the ticks' and the turn the gyro's.
+void test_ticks_and_a_gyro_are_both_used(void) {
+  drive d;
+  d.go(10, true);
+  TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, d.front.model());
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.0, d.pose.heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(0.03, 0.5 * 10 * 1.02, d.pose.x_m);
+  drive without;
+  without.go(10, false);
+  TEST_ASSERT_EQUAL(WM_MOTION_TICKS, without.front.model());
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.0004 / 0.02 / 0.5 * 10, without.pose.heading_rad);
+}
+
+// GIVEN both WHEN the gyro falls silent THEN the wheels' difference turns on without a jump, and the gyro again later.
+void test_a_silent_gyro_yields_to_the_ticks(void) {
+  drive d;
+  d.go(10, true);
+  d.go(10, false);
+  TEST_ASSERT_EQUAL(WM_MOTION_TICKS, d.front.model());
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.04 * (10 - 2), d.pose.heading_rad);  // 2 s: motion.hold_max_s
+  const double way = std::sqrt(d.pose.x_m * d.pose.x_m + d.pose.y_m * d.pose.y_m);
+  TEST_ASSERT_DOUBLE_WITHIN(0.1, 0.5 * 20 * 1.02, way);
+  d.go(1, true);
+  TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, d.front.model());
+}
+
+// A gyro that is stuck at a bias is left, but not where the configuration names the model.
+void test_a_stuck_gyro_yields_to_the_ticks(void) {
+  for (int model : {WM_MOTION_AUTO, WM_MOTION_SPEED_YAW_RATE}) {
+    drive d(model);
+    for (; d.steps < 50 * 60; d.steps++) {
+      d.left += 0.012 / kTick, d.right += 0.012 / kTick;
+      d.feed(make::quantities(0.02 * d.steps, {{WM_Q_WHEEL_TICKS_LEFT, d.left}, {WM_Q_WHEEL_TICKS_RIGHT, d.right}}));
+      d.feed(make::quantities(0.02 * d.steps + 0.005, {{WM_Q_YAW_RATE, 0.01}}));
+    }
+    TEST_ASSERT_TRUE(d.front.health() & WM_MOTION_HEALTH_YAW_RATE_STUCK);
+    const double turned_s = model == WM_MOTION_AUTO ? 30.0 : 60.0;
+    TEST_ASSERT_DOUBLE_WITHIN(0.02, 0.01 * turned_s, d.pose.heading_rad);
+  }
+}
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_what_a_model_lacks);
+  RUN_TEST(test_ticks_and_a_gyro_are_both_used);
+  RUN_TEST(test_a_silent_gyro_yields_to_the_ticks);
+  RUN_TEST(test_a_stuck_gyro_yields_to_the_ticks);
+  return UNITY_END();
+}
