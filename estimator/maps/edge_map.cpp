@@ -17,6 +17,11 @@ constexpr double kLineUnit_px = 1.0 / 32;  // of a line's offset, which is kept 
 constexpr double kLineVariance_px2 = 0.7;
 constexpr double kLineLength_px2 = 1.0;  // least variance along it: about four pixels
 constexpr int8_t kNoLine = -128;         // marks a pixel without a line
+constexpr double kBeside_px = 3.0;       // from a line, where its sides are looked at: an edge is drawn up to 3 px wide
+// A wall's near face is looked for from a place on its far face in so many steps: walls inside a building are 5 cm to
+// 40 cm thick. Not swept.
+constexpr double kFaceStep_m = 0.1;
+constexpr int kFaceSteps = 4;
 
 int tiles_along(uint32_t pixels) { return (int)((pixels + edge_map::kTile - 1) >> edge_map::kTileShift); }
 
@@ -297,6 +302,33 @@ edge_line edge_map::nearest(double x_m, double y_m) const {
   out.normal_y = sin_yaw_ * a.cos - cos_yaw_ * a.sin;
   out.found = true;
   return out;
+}
+
+// Whether floor is on the far side of a line alone. `away`: 1 where its normal points away from the eye, else -1.
+bool edge_map::other_face(const edge_line &line, double x_m, double y_m, double away) const {
+  const double beside_m = away * kBeside_px * pixel_m();
+  const auto floor_at = [&](double off_m) {
+    return drivable(x_m + off_m * line.normal_x, y_m + off_m * line.normal_y);
+  };
+  return !floor_at(line.offset_m - beside_m) && floor_at(line.offset_m + beside_m);
+}
+
+edge_line edge_map::nearest_seen(double x_m, double y_m, double ray_x_m, double ray_y_m) const {
+  const auto away = [&](const edge_line &l) { return l.normal_x * ray_x_m + l.normal_y * ray_y_m < 0.0 ? -1.0 : 1.0; };
+  edge_line line = nearest(x_m, y_m);
+  if (!raster_->drivable || !line.found || !other_face(line, x_m, y_m, away(line))) return line;
+  const double step_m = -away(line) * kFaceStep_m, step_x = step_m * line.normal_x, step_y = step_m * line.normal_y;
+  for (int k = 1; k <= kFaceSteps; k++) {
+    const double dx = k * step_x, dy = k * step_y;
+    edge_line near = nearest(x_m + dx, y_m + dy);
+    if (!near.found || other_face(near, x_m + dx, y_m + dy, away(near))) continue;
+    near.offset_m += near.normal_x * dx + near.normal_y * dy;  // now from the place itself
+    const edge_line foot = nearest(x_m + near.offset_m * near.normal_x, y_m + near.offset_m * near.normal_y);
+    near.distance_m = std::sqrt(near.offset_m * near.offset_m + foot.distance_m * foot.distance_m);
+    return near;
+  }
+  line.found = false;
+  return line;
 }
 
 bool edge_map::drivable(double x_m, double y_m) const {

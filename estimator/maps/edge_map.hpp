@@ -71,6 +71,9 @@ class edge_map {
   }
 
   edge_line nearest(double x_m, double y_m) const;
+  // The same of edges that can be seen along a ray to the place: a wall hides its other face. The drivable layer has
+  // the side on which the floor is; lines with floor on both sides or on neither are seen from either. O(1).
+  edge_line nearest_seen(double x_m, double y_m, double ray_x_m, double ray_y_m) const;
   // Whether base_link may be there: by the drivable layer; outside of the map never, without the layer anywhere in it.
   bool drivable(double x_m, double y_m) const;
 
@@ -78,6 +81,7 @@ class edge_map {
   struct offset {  // to the nearest edge pixel; of an edge's own pixel: its line
     int8_t x, y;   // or: normal in 1/256 of half a turn (unsigned), way along it to the line in 1/32 pixels
   };
+  bool other_face(const edge_line &line, double x_m, double y_m, double away) const;
   uint32_t tile_of(int column, int row) const {
     return tiles()[((row >> kTileShift) + 1) << row_shift_ | ((column >> kTileShift) + 1)];
   }

@@ -102,7 +102,7 @@ bool edge_mcl::match(const wm_points &points, uint32_t i, const alignment &a, co
   out->sigma2 = out->own2;
   if (a.camera >= 0)
     out->sigma2 += square(camera_[a.camera].sigma(camera_[a.camera].range(p.x, p.y), params_.common_px));
-  out->line = map_.nearest(out->x_m, out->y_m);
+  out->line = map_.nearest_seen(out->x_m, out->y_m, out->x_m - from.eye_x_m, out->y_m - from.eye_y_m);
   edge_line &line = out->line;
   // The floor on this side of an edge was seen: its normal points away from the camera.
   if (line.normal_x * (out->x_m - from.eye_x_m) + line.normal_y * (out->y_m - from.eye_y_m) < 0.0) {

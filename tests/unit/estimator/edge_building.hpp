@@ -206,6 +206,23 @@ inline void draw(const char *estimator) {
   setup.seed = 1;
 }
 
+// All walls get a second face, so far behind the first, and floor behind it.
+inline void thin_walls(double thickness_m) {
+  const std::vector<uint8_t> floor = drivable;
+  const int reach = (int)(thickness_m / kPixel_m + 0.5);
+  for (int row = reach; row + reach < kHeight; row++)
+    for (int column = reach; column + reach < kWidth; column++) {
+      int nearest2 = reach * reach + 1;
+      for (int y = -reach; y <= reach; y++)
+        for (int x = -reach; x <= reach; x++)
+          if (floor[(size_t)(row + y) * kWidth + (size_t)(column + x)] && x * x + y * y < nearest2)
+            nearest2 = x * x + y * y;
+      const size_t at = (size_t)row * kWidth + (size_t)column;
+      if (nearest2 > reach * reach) drivable[at] = 255;
+      if (nearest2 <= reach * reach && nearest2 > (reach - 1) * (reach - 1)) edges[at] = 255;
+    }
+}
+
 }  // namespace edge_building
 
 #endif
