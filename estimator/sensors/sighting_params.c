@@ -18,14 +18,17 @@ typedef struct wm_sighting_params params;
   ONE(state, key, unit, name, neutral, low, high, noise, most, text)
 // clang-format on
 
+static const char *const kUnidentified[] = {"false", "true", "auto", NULL};
+
 static const wm_param kParams[] = {
     BOOL("use.bearing", use_bearing, 1, "Fuse bearings."),
     BOOL("use.range", use_range, 1, "Fuse ranges. In SLAM without them, landmarks join once their parallax suffices."),
     BOOL("use.elevation", use_elevation, 0,
          "Fuse elevations, of sightings without a range, where the map has the landmark's height: the height above "
          "the sensor gives the distance. The robot's tilt and the heights of the map's slots become states."),
-    BOOL("use.unidentified", use_unidentified, 0,
-         "Fuse sightings without an identity, each with the one landmark that fits where no other does."),
+    ENUM("use.unidentified", use_unidentified, WM_UNIDENTIFIED_AUTO, WM_UNIDENTIFIED_AUTO, kUnidentified,
+         "Fuse sightings without an identity, each with the one landmark that fits where no other does. auto: in slam "
+         "those of sensors that give no identities (one that does could not read it), else all."),
     F64("noise.bearing_default_rad", bearing_sigma_default_rad, 0.02, 1e-5, 3,
         "Sigma of a bearing where neither the sighting nor the sensor gives one, rad."),
     F64("noise.range_default_m", range_sigma_default_m, 0.1, 1e-4, 100,

@@ -10,6 +10,9 @@
 extern "C" {
 #endif
 
+// Of sightings without an identity.
+enum { WM_UNIDENTIFIED_OFF = 0, WM_UNIDENTIFIED_ON = 1, WM_UNIDENTIFIED_AUTO = 2 };
+
 struct wm_sighting_params {
   int32_t use_bearing, use_range, use_elevation, use_unidentified;
   double bearing_sigma_default_rad, range_sigma_default_m;

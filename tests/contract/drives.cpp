@@ -189,8 +189,9 @@ void scene::add_motion(motion by, double t_s, bool glitch) {
 }
 
 // A coded marker with the wrong one of two poses in every fourth sighting.
-void scene::add_marker(int landmark, const double level_m[3], double yaw_rad, double t_s, bool wrong) {
+void scene::add_marker(int sensor, int landmark, const double level_m[3], double yaw_rad, double t_s, bool wrong) {
   wm_marker &m = add(WM_EVENT_MARKER, t_s)->as.marker;
+  m.sensor = static_cast<uint16_t>(sensor);
   m.id = 10 + landmark;
   m.poses = 1;
   for (int k = 0; k < 3; k++) m.p_m[k] = level_m[k] * (1 + 0.004 * normal());
@@ -220,9 +221,9 @@ void scene::add_sighting(unsigned sees, int sensor, int landmark, double t_s, bo
   if (std::fabs(bearing) > 1.3 || range > s.max_range_m) return;
   seen_++;
   const double up = place[2] - xyz[2];
-  if ((sees & kMarkers) && sensor == 0) {
+  if (sees & kMarkers) {
     const double level[3] = {range * std::cos(bearing), range * std::sin(bearing), up};
-    add_marker(landmark, level, 0.5 * landmark - heading, t_s, wrong);
+    add_marker(sensor, landmark, level, 0.5 * landmark - heading, t_s, wrong);
     return;
   }
   const double nothing = static_cast<double>(NAN);

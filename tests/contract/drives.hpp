@@ -65,7 +65,7 @@ class scene {
   void add_motion(motion by, double t_s, bool glitch);
   void add_sightings(unsigned sees, unsigned happens, double t_s, double seconds);
   void add_sighting(unsigned sees, int sensor, int landmark, double t_s, bool wrong);
-  void add_marker(int landmark, const double level_m[3], double yaw_rad, double t_s, bool wrong);
+  void add_marker(int sensor, int landmark, const double level_m[3], double yaw_rad, double t_s, bool wrong);
   void add_scan(unsigned happens, double t_s);
   wm_event *add(wm_event_kind kind, double t_s);
 

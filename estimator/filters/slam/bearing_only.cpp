@@ -40,13 +40,15 @@ int slam::keep_clone(const context &at) {
 }
 
 void slam::forget_lines() {
-  for (int state = first_ray_; state < first_clone_ + 3 * params_.line_clones; state++) joint_.forget(state, 0.0, 0.0);
+  for (int state = first_ray_; state < first_clone_ + 3 * joint_.layout().clones; state++)
+    joint_.forget(state, 0.0, 0.0);
   forget_tracks();
 }
 
 void slam::forget_tracks() {
   const bool rays = params_.line_method == WM_SLAM_LINE_INVERSE_DISTANCE;
-  tracks_.clear(params_.line_clones, rays ? params_.line_clones : bearing_tracks::kTracks);
+  const int clones = joint_.layout().clones;
+  tracks_.clear(clones, rays ? clones : bearing_tracks::kTracks);
 }
 
 // ---- clones that wait for parallax ----

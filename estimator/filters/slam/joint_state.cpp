@@ -11,8 +11,17 @@ namespace wm {
 
 // ---- start ----
 
+namespace {
+
+int capacity_of(const joint_layout &layout) {
+  if (layout.capacity > 0) return even(layout.capacity);
+  return even(even(layout.robot_states) + layout.landmarks * layout.landmark_width);
+}
+
+}  // namespace
+
 size_t joint_state::doubles(const joint_layout &layout) {
-  const int capacity = even(even(layout.robot_states) + layout.landmarks * layout.landmark_width);
+  const int capacity = capacity_of(layout);
   return half_covariance::doubles(capacity) + static_cast<size_t>(capacity) * static_cast<size_t>(1 + kRows + 2);
 }
 
@@ -20,7 +29,7 @@ void joint_state::init(const wm_setup &setup, const joint_layout &layout, double
   arrays_.set(arrays);
   layout_ = layout;
   layout_.robot_states = even(layout.robot_states);
-  capacity_ = even(layout_.robot_states + layout.landmarks * layout.landmark_width);
+  capacity_ = capacity_of(layout);
   std::memset(arrays, 0, doubles(layout) * sizeof(double));
   n_ = layout_.robot_states;
   landmarks_ = 0;
@@ -237,6 +246,28 @@ void joint_state::remove_landmark(int landmark) {
   }
   n_ = last;
   landmarks_--;
+}
+
+// The landmarks' elements go to higher rows and columns: the last one first, so that none is overwritten unread.
+void joint_state::grow(const joint_layout &to) {
+  const half_covariance cov = p();
+  const int first = layout_.robot_states, width = layout_.landmark_width, old = n_;
+  const int new_first = even(to.robot_states), new_width = to.landmark_width;
+  const auto moved = [&](int state) {
+    return state < first ? state : new_first + (state - first) / width * new_width + (state - first) % width;
+  };
+  for (int i = old - 1; i >= first; i--) {
+    for (int j = old - 1; j >= i; j--) cov.set(moved(i), moved(j), cov.at(i, j));
+    x()[moved(i)] = x()[i];
+  }
+  for (int i = 0; i < first; i++)
+    for (int j = old - 1; j >= first; j--) cov.set(i, moved(j), cov.at(i, j));
+  layout_ = to;
+  layout_.robot_states = new_first;
+  n_ = new_first + landmarks_ * new_width;
+  for (int state = first; state < new_first; state++) forget(state, 0.0, 0.0);
+  for (int i = 0; i < landmarks_; i++)
+    for (int k = width; k < new_width; k++) forget(landmark_state(i) + k, 0.0, square(kPi));
 }
 
 // ---- correction ----

@@ -33,6 +33,7 @@ struct joint_layout {
   int landmark_width;  // 2: x, y; 3: x, y, heading
   int landmarks;       // capacity
   bool invariant;      // false: the plain EKF, for comparison
+  int capacity = 0;    // of states, for what grow() adds; 0: of this layout
 };
 
 class joint_state : public planar_motion {
@@ -50,6 +51,10 @@ class joint_state : public planar_motion {
   };
   void set_motion_states(const wm_motion_states &states, const wheel_slip &slip, int first);  // from `first` on
   static int count_motion_states(const wm_motion_states &states, const wheel_slip &slip);
+  // Puts states of the robot (those of `to`: zero, with variance 0) in front of the landmarks, and makes these as wide
+  // (a heading, where it is new, is unknown). `to` is at least as large in each, and within its capacity.
+  void grow(const joint_layout &to);
+  const joint_layout &layout() const { return layout_; }
   // Makes `state` one of a sensor's error: its start, its random walk per sqrt(s) and its limits.
   void begin_sensor_state(int state, double value, double sigma, double walk, double low, double high) {
     forget(state, value, square(sigma));
@@ -60,6 +65,8 @@ class joint_state : public planar_motion {
   // follow_scale() for each other state that does. `carries`: the covariance is transported, too, by a second pass over
   // the half.
   bool find_scale(bool carries);
+  void carry_scale_no_more() { carries_scale_ = false; }
+  bool follows_scale() const { return scale_state_ >= 0; }
   // `share`: exponent of the state under a change of the map's scale, +1 or -1. `anchors`: its prior holds the scale.
   void follow_scale(int state, double share, bool anchors);
 

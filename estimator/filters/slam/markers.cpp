@@ -64,9 +64,10 @@ slam::marker_reading slam::read_marker(const wm_marker &m, const double p_m[3], 
   r.along[1] = floor_m > kLeastLength_m ? level[1] / floor_m : 0.0;
   r.yaw_rad = yaw_rad;
   const double across = sightings().bearing_sigma_factor *
-                        number_or(sensor.bearing_sigma_rad, sightings().bearing_sigma_default_rad) * floor_m;
-  const double range =
-      sightings().range_sigma_factor * number_or(sensor.range_sigma_m, sightings().range_sigma_default_m);
+                        number_or(sensor.bearing_sigma_rad, params_.marker_bearing_sigma_rad) * floor_m;
+  // A detector that gives the error along the line of sight leaves none to assume.
+  const double assumed_m = finite(m.along_sigma_m) ? 0.0 : sightings().range_sigma_default_m;
+  const double range = sightings().range_sigma_factor * number_or(sensor.range_sigma_m, assumed_m);
   const double least = square(params_.marker_sigma_m) + square(params_.marker_sigma_rel * r.length_m);
   // The error along the line of sight: its parts on the floor and upwards.
   const double along_sigma_m = zero_if_absent(m.along_sigma_m);
@@ -91,9 +92,9 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   if (status != WM_OK) return refuse(records, at.record, status);
   status = begin_observation(event.t_ns);
   if (status != WM_OK) return status;
-  if (!params_.markers) return reject(records, at.record, WM_REJECTED_BY_CONFIG);
   if (m.id < 0) return reject(records, at.record, WM_REJECTED_NO_ASSOCIATION);
   if (finite(m.bloom_px)) bloom_px_[m.sensor] = m.bloom_px;
+  take_headings();
 
   marker_reading r = read_marker(m, m.p_m, m.yaw_rad);
   if (r.length_m > sensor_[m.sensor].max_range_m) return reject(records, at.record, WM_REJECTED_OUT_OF_RANGE);

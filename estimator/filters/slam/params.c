@@ -7,6 +7,7 @@ typedef struct wm_slam_params params;
 
 static const char *const kConsistency[] = {"invariant", "plain", NULL};
 static const char *const kMaps[] = {"none", "extend", "frozen", NULL};
+static const char *const kRejoin[] = {"false", "true", "auto", NULL};
 static const char *const kMethods[] = {"unscented", "linear", "inverse_distance", NULL};
 
 static const wm_param kParams[] = {
@@ -18,10 +19,12 @@ static const wm_param kParams[] = {
     F64("states.sensor_stamp_sigma_s", sensor_stamp_sigma_s, 0, 0, 1,
         "Sigma of the error of each picture's stamp, s: the same for all that is seen in it, independent between "
         "pictures. 0: off."),
-    BOOL("markers.on", markers, 0, "Take coded markers: each gives place and heading; landmarks have a heading, too."),
     F64("markers.sigma_m", marker_sigma_m, 0.002, 1e-5, 10,
         "Sigma of a marker's place, m; the sensor's sigmas, along and across, are added in squares."),
     F64("markers.sigma_rel", marker_sigma_rel, 0, 0, 1, "The same as a part of the distance."),
+    F64("markers.bearing_sigma_rad", marker_bearing_sigma_rad, 0.001, 1e-5, 3,
+        "Sigma of a marker's direction where the sensor gives none, rad: half a pixel of a camera with a focal length "
+        "of 500 pixels."),
     F64("markers.heading_sigma_rad", marker_heading_sigma_rad, 0.02, 1e-5, 3, "Sigma of a marker's heading, rad."),
     F64("markers.stamp_sigma_s", marker_stamp_sigma_s, 0, 0, 1,
         "Sigma of a picture's stamp as noise of each marker, s; at 1 rad/s it is so many rad across."),
@@ -36,9 +39,10 @@ static const wm_param kParams[] = {
     ENUM("landmarks.map", map, WM_SLAM_MAP_NONE, WM_SLAM_MAP_FROZEN, kMaps,
          "Use of landmarks.csv. none: not used; extend: its landmarks are in the state from the start, with their "
          "covariance, and new ones join; frozen: they are considered, not corrected, and only the robot is located."),
-    I32("landmarks.capacity", landmark_capacity, 256, 1, 2000,
-        "Largest number of landmarks. Memory and the cost of a correction grow with the square of the number in the "
-        "state."),
+    I32("landmarks.capacity", landmark_capacity, 700, 1, 2000,
+        "Largest number of landmarks; a further one is counted and left out. Memory grows with its square, the cost of "
+        "a "
+        "correction with the square of the number in the state."),
     I32("landmarks.confirm_seen", confirm_seen, 3, 1, 1000, "Observations after which a landmark is confirmed."),
     F64("landmarks.leave_after_s", leave_after_s, 10, 0.1, 1e6,
         "An unconfirmed landmark that was not seen for so long is removed, s."),
@@ -55,11 +59,12 @@ static const wm_param kParams[] = {
         "Landmarks farther than this from the sighting's place are not compared with it, m."),
     F64("association.max_range_m", associate_max_range_m, 1e4, 0.1, 1e6,
         "Largest range of a sighting without identity, m: far ones are few pixels or one beam wide."),
-    I32("lines.clones", line_clones, 0, 0, 40,
-        "Past poses kept in the state for landmarks seen by bearings alone; 12 to 24 suffice. 0: such landmarks are "
-        "not used."),
+    I32("lines.clones", line_clones, 30, 0, 40,
+        "Largest number of past poses kept in the state for landmarks seen by bearings alone, from the first such "
+        "bearing on; fewer where the robot's 192 states have no room for them. 12 to 24 suffice. 0: such landmarks "
+        "are not used."),
     I32("lines.poses", line_poses, 6, 3, 8, "Largest number of poses from which a landmark is initialised."),
-    ENUM("lines.method", line_method, WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_INVERSE_DISTANCE, kMethods,
+    ENUM("lines.method", line_method, WM_SLAM_LINE_INVERSE_DISTANCE, WM_SLAM_LINE_INVERSE_DISTANCE, kMethods,
          "How such a landmark joins. unscented: once the parallax suffices, by the unscented transform over poses and "
          "bearings; linear: the same by one linearisation (for comparison); inverse_distance: at once, as a ray with "
          "the inverse of its length, which corrects the heading where dead reckoning drifts fast."),
@@ -72,9 +77,10 @@ static const wm_param kParams[] = {
     F64("lines.step_m", line_step_m, 0.15, 0.001, 100, "Distance between two poses that are kept, m."),
     F64("lines.sigma_rel", line_sigma_rel, 0.25, 0.001, 1,
         "Largest sigma of a landmark's place before it joins, as a part of its distance."),
-    BOOL("lines.rejoin", line_rejoin, 0,
+    ENUM("lines.rejoin", line_rejoin, WM_SLAM_REJOIN_AUTO, WM_SLAM_REJOIN_AUTO, kRejoin,
          "A line's number is its tracker's own and changes when it was lost. Two landmarks, one lost before the other "
-         "was first seen, are merged where their places agree within their covariance."),
+         "was first seen, are merged where their places agree within their covariance. auto: so for bearings without "
+         "a range, on no given map, until two identities come back after 5 s out of sight."),
     ENUM("consistency", consistency, WM_SLAM_INVARIANT, WM_SLAM_PLAIN, kConsistency,
          "invariant: the right-invariant filter, consistent in the unobservable heading and place of the map; plain: "
          "the textbook's, which gains false certainty of its heading (for comparison)."),
@@ -88,6 +94,7 @@ static const wm_param kParams[] = {
 static const wm_param_old kOld[] = {
     {"states.wheel_difference_sigma", NULL, "slam never read it; landmark_ekf and odometry have it"},
     {"states.wheel_difference_walk", NULL, "slam never read it; landmark_ekf and odometry have it"},
+    {"markers.on", NULL, "markers are taken wherever a sensor gives them"},
     {"association.unknown", "/sightings.use.unidentified", NULL},
     {"markers.lasting", "markers.correlated", NULL},
     {"states.*", "/motion.states.*", NULL},

@@ -13,15 +13,15 @@ extern "C" {
 
 enum { WM_SLAM_INVARIANT = 0, WM_SLAM_PLAIN = 1 };
 enum { WM_SLAM_MAP_NONE = 0, WM_SLAM_MAP_EXTEND = 1, WM_SLAM_MAP_FROZEN = 2 };
+enum { WM_SLAM_REJOIN_OFF = 0, WM_SLAM_REJOIN_ON = 1, WM_SLAM_REJOIN_AUTO = 2 };
 enum { WM_SLAM_LINE_UNSCENTED = 0, WM_SLAM_LINE_LINEAR = 1, WM_SLAM_LINE_INVERSE_DISTANCE = 2 };
 
 typedef struct wm_slam_params {
   double wheel_slip_sigma, wheel_slip_tau_s;  // the wheels' scales wander about their means
   double sensor_stamp_sigma_s;                // of each picture's stamp
   // coded markers
-  int32_t markers;
-  double marker_sigma_m, marker_sigma_rel, marker_heading_sigma_rad, marker_stamp_sigma_s, marker_correlated,
-      marker_heading_most_rad;
+  double marker_sigma_m, marker_sigma_rel, marker_bearing_sigma_rad, marker_heading_sigma_rad, marker_stamp_sigma_s,
+      marker_correlated, marker_heading_most_rad;
   // landmarks
   int32_t map, landmark_capacity;
   int32_t confirm_seen;

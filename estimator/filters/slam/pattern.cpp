@@ -41,7 +41,7 @@ void slam::collect_bearing(const wm_sighting &s, const past_pose &past) {
 
 // The picture is complete: evidence for or against the pose, or a share of the search.
 void slam::end_bearings(wm_time_ns t_ns) {
-  if (bearings_.count >= kFewest && params_.recover && params_.line_rejoin) {
+  if (bearings_.count >= kFewest && params_.recover && rejoins_) {
     if (life_.tracking())
       weigh_pattern(t_ns);
     else

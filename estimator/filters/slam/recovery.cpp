@@ -60,7 +60,7 @@ bool slam::is_witness(const landmark_note &note) const {
 bool slam::weigh(int landmark, const joint_state::innovation_block &block, bool passed, double clutter_volume,
                  double angle_rad) {
   landmark_note &seen = note(landmark);
-  if (!params_.recover || params_.line_rejoin) return true;
+  if (!params_.recover || rejoins_) return true;
   const wm_time_ns now = joint_.now_ns();
   const bool returned = seen.last_ns != WM_TIME_NONE && wm_seconds_between(seen.last_ns, now) > kRevisited_s;
   if (passed && returned && !map_is_held()) seen.revisited = true;
@@ -151,7 +151,7 @@ int slam::landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns, int32_t *
 // mirror image about the line of sight, whose heading turns twice as far as that while the robot drives by: it must
 // have become impossible. Not where the map grows, since a marker that has moved would spoil it.
 bool slam::is_found_by_one(const search_result &found, wm_time_ns since_ns, int32_t id) const {
-  if (params_.map != WM_SLAM_MAP_FROZEN || one_refuted_ || !params_.markers) return false;
+  if (params_.map != WM_SLAM_MAP_FROZEN || one_refuted_ || !has_headings()) return false;
   if (found.covariance[0][0] + found.covariance[1][1] > 2.0 * square(kByOne_m)) return false;
   double first_rad = 0.0, turned_rad = 0.0, heading_sigma_rad = 0.0;
   int seen = 0;

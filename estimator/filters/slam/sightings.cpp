@@ -10,6 +10,7 @@ constexpr double kLeastLever_m = 0.1;       // floor of the distance by which a 
 constexpr double kOnSensor_m = 0.05;        // nearer, a landmark has no direction
 constexpr double kLeastDepth = 0.1;         // floor of the cosine between a depth's axis and the bearing
 constexpr double kAmbiguous = 2.0;          // the second best association must be worse by this factor; not swept
+constexpr int kNameless = 20;               // sightings without an identity, none with one; not swept
 constexpr double kClutterRange_m = 30.0;    // a false detection lies anywhere up to this distance, as in landmark_ekf
 constexpr double kLeastDeterminant = 1e-9;  // of H_l; in a regular geometry it is 1 / distance, 1e-6 at the least
 constexpr int kNewtonSteps = 3;             // to the place that a sensor that is not level sees; each squares the error
@@ -52,9 +53,9 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
     keep_observation(landmark, at, observation_of(s, r));
     if (relocalize()) return reject(records, at.record, WM_REJECTED_SEARCHING);
   }
-  if (params_.line_rejoin && r.bearing && !r.range) collect_bearing(s, at.past);
-  if (life_.searching() || (life_.lost() && params_.line_rejoin))
-    return reject(records, at.record, WM_REJECTED_SEARCHING);
+  if (landmark < 0 && r.bearing && !r.range) take_lines();
+  if (rejoins_ && r.bearing && !r.range) collect_bearing(s, at.past);
+  if (life_.searching() || (life_.lost() && rejoins_)) return reject(records, at.record, WM_REJECTED_SEARCHING);
   if (landmark >= 0) {
     fuse_known(at, s, r, landmark);
     return WM_OK;
@@ -62,12 +63,26 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   return begin_landmark(at, s, r);
 }
 
+// auto: a sensor that has given an identity could not read this one's; so could one that has given few sightings.
+bool slam::takes_unidentified(int sensor) const {
+  if (sightings().use_unidentified != WM_UNIDENTIFIED_AUTO) return sightings().use_unidentified != WM_UNIDENTIFIED_OFF;
+  return nameless_[sensor] >= kNameless;
+}
+
+void slam::note_identity(int sensor, bool named) {
+  if (named || nameless_[sensor] < 0)
+    nameless_[sensor] = -1;
+  else if (nameless_[sensor] < kNameless)
+    nameless_[sensor]++;
+}
+
 // The landmark of a sighting; -1: a new one. WM_FUSED: go on.
 wm_verdict slam::identify(const wm_sighting &s, const reading &r, context *at, int *landmark) {
+  note_identity(s.sensor, s.landmark_id >= 0);
   *landmark = s.landmark_id >= 0 ? find_landmark(s.landmark_id) : -1;
   if (s.landmark_id >= 0) return is_ambiguous(at->id, *landmark, s.sensor) ? WM_REJECTED_NO_ASSOCIATION : WM_FUSED;
   bool fresh = false;
-  if (sightings().use_unidentified && r.bearing && r.range && s.range_m <= params_.associate_max_range_m)
+  if (takes_unidentified(s.sensor) && r.bearing && r.range && s.range_m <= params_.associate_max_range_m)
     *landmark = associate(s, r, at->past, &fresh);
   if (*landmark < 0 && !fresh) return WM_REJECTED_NO_ASSOCIATION;
   at->id = at->record.landmark_id = *landmark < 0 ? own_id() : note(*landmark).id;
@@ -173,15 +188,17 @@ void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r,
     return (void)reject(at.records, at.record, WM_REJECTED_SEARCHING);
   const wm_verdict verdict = fuse_rows(at, v, g, &block);
   if (r.bearing) note_rotation(g.passed, v.innovation[0], false, note(landmark).last_ns);
-  if (!g.passed)
-    note_misfit(landmark, r.range);
-  else if (verdict == WM_FUSED)
+  if (!g.passed) return note_misfit(landmark, r.range);
+  if (verdict == WM_FUSED) {
+    if (!r.range && note(landmark).last_ns != WM_TIME_NONE)
+      note_return(wm_seconds_between(note(landmark).last_ns, joint_.now_ns()));
     note_fused(landmark, s.sensor);
+  }
 }
 
 // A sighting of a landmark that is not on the map.
 wm_status slam::begin_landmark(context at, const wm_sighting &s, const reading &r) {
-  const bool may_join = params_.map != WM_SLAM_MAP_FROZEN && r.bearing && (r.range || params_.line_clones > 0);
+  const bool may_join = params_.map != WM_SLAM_MAP_FROZEN && r.bearing && (r.range || has_lines());
   const bool as_ray = params_.line_method == WM_SLAM_LINE_INVERSE_DISTANCE;
   wm_verdict verdict = WM_REJECTED_UNKNOWN_ID;
   if (may_join && map_is_held())

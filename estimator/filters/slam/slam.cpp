@@ -31,7 +31,7 @@ const char *const kReads[] = {"!motion.states.wheel_difference", "motion.",    "
 // Markers' errors take two states: along the line of sight, and of the heading.
 correlated_slot error_slot_of(const wm_slam_params &p, const wm_sighting_params &s) {
   correlated_slot out = correlated_slot_of(s);
-  if (s.correlated_slots > 0 && p.markers && p.marker_correlated > 0.0) out.width = 2;
+  if (s.correlated_slots > 0 && p.marker_correlated > 0.0) out.width = 2;
   return out;
 }
 
@@ -44,27 +44,46 @@ int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
          s.correlated_slots * error_slot_of(p, s).width;
 }
 
-// Azimuth and inverse distance for each ray, of which there are as many as clones.
-int ray_states(const wm_slam_params &p) {
-  return p.line_method == WM_SLAM_LINE_INVERSE_DISTANCE ? 2 * p.line_clones : 0;
+// Azimuth and inverse distance of a ray, of which there are as many as clones.
+int states_of_ray(const wm_slam_params &p) { return p.line_method == WM_SLAM_LINE_INVERSE_DISTANCE ? 2 : 0; }
+
+// As many as lines.clones allows and the robot's states have room for.
+int clones_of(const wm_slam_params &p, const wm_setup &setup) {
+  const int room = (joint_state::kMaxRobot - states_before_clones(p, setup)) / (states_of_ray(p) + 3);
+  return p.line_clones < room ? p.line_clones : room;
 }
 
-joint_layout layout_of(const wm_slam_params &p, const wm_setup &setup) {
+// With clones, and with headings of landmarks, or without.
+joint_layout layout_of(const wm_slam_params &p, const wm_setup &setup, bool lines, bool headings) {
   joint_layout out{};
-  out.first_clone = states_before_clones(p, setup) + ray_states(p);
-  out.clones = p.line_clones;
-  out.robot_states = out.first_clone + 3 * p.line_clones;
-  out.landmark_width = p.markers ? 3 : 2;
+  out.clones = lines ? clones_of(p, setup) : 0;
+  out.first_clone = states_before_clones(p, setup) + states_of_ray(p) * out.clones;
+  out.robot_states = out.first_clone + 3 * out.clones;
+  out.landmark_width = headings ? 3 : 2;
   out.landmarks = p.landmark_capacity;
   out.invariant = p.consistency == WM_SLAM_INVARIANT;
   return out;
+}
+
+// The same with room for what grows during the drive.
+joint_layout first_layout(const wm_slam_params &p, const wm_setup &setup, bool headings) {
+  const joint_layout most = layout_of(p, setup, true, true);
+  joint_layout out = layout_of(p, setup, false, headings);
+  out.capacity = even(most.robot_states) + most.landmarks * most.landmark_width;
+  return out;
+}
+
+bool map_has_headings(const wm_slam_params &p, const wm_setup &setup) {
+  for (size_t i = 0; p.map != WM_SLAM_MAP_NONE && i < setup.landmark_count; i++)
+    if (finite(setup.landmarks[i].yaw_rad)) return true;
+  return false;
 }
 
 }  // namespace
 
 slam::arrays slam::place(memory_layout *out, const wm_slam_params &params, const wm_setup &setup) {
   return {out->take<landmark_note>(static_cast<size_t>(params.landmark_capacity)),
-          out->take<double>(joint_state::doubles(layout_of(params, setup)))};
+          out->take<double>(joint_state::doubles(first_layout(params, setup, false)))};
 }
 
 size_t slam::bytes(const wm_slam_params &params, const wm_setup &setup, const char **why) {
@@ -72,11 +91,10 @@ size_t slam::bytes(const wm_slam_params &params, const wm_setup &setup, const ch
     *why = "slam takes at most 8 sensors";
     return 0;
   }
-  if (layout_of(params, setup).robot_states > joint_state::kMaxRobot) {
+  if (states_before_clones(params, setup) > joint_state::kMaxRobot) {
     *why =
         "slam holds at most 192 states beside the landmarks: pose 3, one for each states.*_sigma that is not 0 (those "
-        "of sensors once for each sensor), one or two for each of sightings.correlated.slots, three for each of "
-        "lines.clones; lower sightings.correlated.slots or lines.clones";
+        "of sensors once for each sensor), one or two for each of sightings.correlated.slots; lower that";
     return 0;
   }
   if (params.map != WM_SLAM_MAP_NONE && setup.landmark_count > static_cast<size_t>(params.landmark_capacity)) {
@@ -97,10 +115,10 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   notes_.set(behind.notes);
   std::memset(static_cast<void *>(behind.notes), 0,
               static_cast<size_t>(params.landmark_capacity) * sizeof(landmark_note));
-  const joint_layout layout = layout_of(params, setup);
+  const joint_layout layout = first_layout(params, setup, map_has_headings(params, setup));
   joint_.init(setup, layout, behind.joint);
-  first_clone_ = layout.first_clone;
-  first_ray_ = first_clone_ - ray_states(params);
+  first_ray_ = first_clone_ = layout.first_clone;
+  rejoins_ = params.line_rejoin == WM_SLAM_REJOIN_ON;
   int next = kPoseStates;
   joint_.set_motion_states(setup.motion->states, slip_of(params), next);
   next += joint_state::count_motion_states(setup.motion->states, slip_of(params));
@@ -127,16 +145,44 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
 
 // The map's scale is unobservable where the way's scale and the ranges' are both states, or no ranges are used. With
 // markers, far more accurate than wheels, the filter hardly gains false certainty, so the covariance is not
-// transported.
+// transported from the first one on.
 void slam::follow_scale() {
   const bool is_observed = sightings().use_range && !(sightings().states.sigma[WM_SENSOR_ROW_kRangeScale] > 0.0);
-  if (is_observed || params_.map != WM_SLAM_MAP_NONE || !joint_.find_scale(!params_.markers)) return;
+  if (is_observed || params_.map != WM_SLAM_MAP_NONE || !joint_.find_scale(!has_headings())) return;
   for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++) {
     joint_.follow_scale(slots_.at(i, kRangeScale), -1.0, true);
     joint_.follow_scale(slots_.at(i, kMountX), 1.0, false);
     joint_.follow_scale(slots_.at(i, kMountY), 1.0, false);
   }
-  for (int k = first_ray_; k < first_clone_; k += 2) joint_.follow_scale(k + 1, -1.0, false);
+}
+
+// The first marker: from now on landmarks have a heading, too.
+void slam::take_headings() {
+  if (has_headings()) return;
+  joint_layout to = joint_.layout();
+  to.landmark_width = 3;
+  joint_.grow(to);
+  joint_.carry_scale_no_more();
+}
+
+// The first bearing without a range: from now on there are clones, which landmarks wait in. Identities are taken for
+// numbers of a tracker until two come back (note_return); those of a given map are not.
+void slam::take_lines() {
+  if (has_lines() || clones_of(params_, *setup_) == 0 || params_.map == WM_SLAM_MAP_FROZEN) return;
+  joint_layout to = layout_of(params_, *setup_, true, has_headings());
+  to.capacity = joint_.layout().capacity;
+  joint_.grow(to);
+  first_clone_ = to.first_clone;
+  if (joint_.follows_scale())
+    for (int k = first_ray_; k < first_clone_; k += 2) joint_.follow_scale(k + 1, -1.0, false);
+  if (params_.line_rejoin == WM_SLAM_REJOIN_AUTO) rejoins_ = params_.map == WM_SLAM_MAP_NONE && returned_ < kReturned;
+  forget_tracks();
+}
+
+// An identity that was out of sight and is seen again is the landmark's own, not a tracker's.
+void slam::note_return(double unseen_s) {
+  if (unseen_s < kUnseen_s || params_.line_rejoin != WM_SLAM_REJOIN_AUTO) return;
+  if (++returned_ == kReturned) rejoins_ = false;
 }
 
 // The map's frame is that of the start pose, unless a start or a map is given.
@@ -255,9 +301,7 @@ void slam::estimate(wm_estimate *out) const {
   joint_.estimate(out);
   out->resets = life_.resets();
   out->state = life_.state(joint_.now_ns(), params_.dead_reckoning_after_s);
-  out->lost_probability = life_.searching()     ? 1.0
-                          : params_.line_rejoin ? pattern_odds_.probability()
-                                                : evidence_.probability();
+  out->lost_probability = life_.searching() ? 1.0 : rejoins_ ? pattern_odds_.probability() : evidence_.probability();
   if (!life_.tracking()) widen(out);
 }
 
@@ -278,7 +322,7 @@ size_t slam::list_counters(wm_counter *out, size_t capacity) const {
   list.add(WM_COUNTER_LANDMARKS_MOVED, counts_.moved, moved_.last);
   list.add(WM_COUNTER_IDENTITIES_AMBIGUOUS, counts_.ambiguous, ambiguous_.last);
   list.add(WM_COUNTER_ROTATION_OUTLIERS, counts_.rotation_outliers);
-  if (params_.line_rejoin) list.add(WM_COUNTER_LANDMARKS_MERGED, counts_.merged);
+  if (rejoins_ || counts_.merged > 0) list.add(WM_COUNTER_LANDMARKS_MERGED, counts_.merged);
   list.add(WM_COUNTER_MAP_FULL, counts_.no_room);
   list.add(WM_COUNTER_MOTION_OUTLIERS, joint_.motion_outliers());
   list.add(WM_COUNTER_RELOCALIZATIONS, life_.relocalizations());
@@ -293,11 +337,11 @@ size_t slam::list_landmarks(wm_landmark *out, double (*covariance)[4], size_t ca
       const int s = joint_.landmark_state(i);
       const double xx = joint_.variance(s), xy = joint_.covariance(s, s + 1), yy = joint_.variance(s + 1);
       const double largest = 0.5 * (xx + yy) + std::sqrt(square(0.5 * (xx - yy)) + square(xy));
-      const double turn = params_.markers ? joint_.variance(s + 2) : std::nan("");
+      const double turn = has_headings() ? joint_.variance(s + 2) : std::nan("");
       out[count] = {.id = note(i).id,
                     .p_m = {joint_.value(s), joint_.value(s + 1), note(i).z_m},
                     .sigma_m = std::sqrt(largest),
-                    .yaw_rad = params_.markers ? joint_.value(s + 2) : std::nan(""),
+                    .yaw_rad = has_headings() ? joint_.value(s + 2) : std::nan(""),
                     .cov_m2 = {xx, xy, yy},
                     .yaw_sigma_rad = std::sqrt(turn)};
       if (covariance) {
@@ -325,7 +369,7 @@ wm_status slam::begin_observation(wm_time_ns t_ns) {
 // In map; without markers there is no heading.
 wm_pose2 slam::pose_of(int landmark) const {
   const int state = joint_.landmark_state(landmark);
-  return {joint_.value(state), joint_.value(state + 1), params_.markers ? joint_.value(state + 2) : 0.0};
+  return {joint_.value(state), joint_.value(state + 1), has_headings() ? joint_.value(state + 2) : 0.0};
 }
 
 int slam::find_landmark(int32_t id) const {
@@ -366,10 +410,10 @@ void slam::maintain_map(wm_time_ns t_ns) {
   cursor_ = (cursor_ + 1) % joint_.landmarks();
   const landmark_note &n = note(cursor_);
   // A tracker's number does not come back: a line that was seen too rarely to be merged is never found again.
-  const bool is_kept = is_confirmed(n) && (!params_.line_rejoin || n.surveyed || n.seen >= kMergeSeen);
+  const bool is_kept = is_confirmed(n) && (!rejoins_ || n.surveyed || n.seen >= kMergeSeen);
   if (!is_kept && wm_seconds_between(n.last_ns, t_ns) > params_.leave_after_s)
     drop_landmark(cursor_);
-  else if (params_.line_rejoin)
+  else if (rejoins_)
     merge_if_one(cursor_);
 }
 

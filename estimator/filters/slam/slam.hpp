@@ -27,6 +27,10 @@ namespace wm {
 inline constexpr int kSlamSensors = 8;  // capacity
 // Observations of each of two lines that may be one (lines.rejoin): a false line rarely lasts a second. Not swept.
 inline constexpr uint32_t kMergeSeen = 10;
+// An identity that was unseen for so long and comes back is the landmark's own: a tracker bridges a few pictures. Two
+// of them decide, since one may be a number that began anew. Not swept.
+inline constexpr double kUnseen_s = 5.0;
+inline constexpr int kReturned = 2;
 // Log odds that a pose is wrong which defines the map's frame: as of a proven one.
 inline constexpr double kOwnFramePrior = -5.0;
 
@@ -138,6 +142,11 @@ class slam {
   };
   static arrays place(memory_layout *out, const wm_slam_params &params, const wm_setup &setup);
   void follow_scale();
+  bool has_headings() const { return joint_.layout().landmark_width == 3; }
+  bool has_lines() const { return joint_.layout().clones > 0; }
+  void take_headings();
+  void take_lines();
+  void note_return(double unseen_s);
   void load_map();
   void start_again();
   wm_status take_pose(const wm_event &event);
@@ -168,6 +177,8 @@ class slam {
 
   // sightings.cpp
   wm_status fuse_sighting(const wm_event &event, record_list records);
+  bool takes_unidentified(int sensor) const;
+  void note_identity(int sensor, bool named);
   wm_verdict identify(const wm_sighting &s, const reading &r, context *at, int *landmark);
   int associate(const wm_sighting &s, const reading &r, const past_pose &past, bool *fresh) const;
   planar_observation observation_of(const wm_sighting &s, const reading &r) const;
@@ -252,6 +263,7 @@ class slam {
   const wm_setup *setup_;
   wm_slam_params params_;
   mounted_sensor sensor_[kSlamSensors];
+  int32_t nameless_[kSlamSensors];  // sightings, none of them with an identity; -1: one had
   sensor_slots slots_;
   unsigned components_;                  // of expect(): whether the angle scale is a state
   int stamp_state_[kSlamSensors];        // error of the newest picture's stamp; -1: off
@@ -260,6 +272,8 @@ class slam {
   correlated_slot error_;                // a slot of these
   bearing_tracks tracks_;
   int first_ray_, first_clone_;
+  int returned_;  // identities of bearings alone that came back
+  bool rejoins_;  // identities of bearings alone are numbers of a tracker
   slam_counts counts_;
   double bloom_px_[kSlamSensors];  // of the last marker that has one; NaN: none has
   int32_t next_id_;

@@ -46,7 +46,7 @@ bool slam::is_ambiguous(int32_t id, int landmark, int sensor) {
 // each other's numbers, all shifted alike: that is no rotation of the robot.
 void slam::note_rotation(bool fused, double innovation_rad, bool of_marker, wm_time_ns last_ns) {
   outliers_.of_markers = of_marker;
-  if (!fused && params_.line_rejoin && wm_seconds_between(last_ns, joint_.now_ns()) > kContinuous_s) return;
+  if (!fused && rejoins_ && wm_seconds_between(last_ns, joint_.now_ns()) > kContinuous_s) return;
   if (fused)
     outliers_.fused++;
   else if (outliers_.rejected < picture_outliers::kCapacity)

@@ -22,7 +22,7 @@ past_pose slam::look_back(int sensor) const {
   const double offset_s = slot < 0 ? 0.0 : joint_.value(slot), stamp_error_s = stamp < 0 ? 0.0 : joint_.value(stamp);
   past_pose out = pose_before(joint_, offset_s + stamp_error_s);
   out.stamp_slot = stamp;
-  if (!params_.line_rejoin || !joint_.counts_wheels()) return out;
+  if (!rejoins_ || !joint_.counts_wheels()) return out;
   // The twist of the last count, which the pose was carried on by, has the count's noise. As the derivative by the
   // offset it would correlate with that of the innovation, and the offset would approach the count's age.
   motion_twist ignored{};

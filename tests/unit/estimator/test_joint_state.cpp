@@ -28,14 +28,15 @@ struct made {
   wm_setup setup{};
   joint_state *state;
 
-  explicit made(bool invariant, int width = 2, int landmarks = 8, const joint_state::wheel_slip &slip = {})
+  explicit made(bool invariant, int width = 2, int landmarks = 8, const joint_state::wheel_slip &slip = {},
+                int capacity = 0)
       : motion(wm_motion_params_table.bytes) {
     wm_params_defaults(&wm_motion_params_table, motion.data());
     setup.motion = reinterpret_cast<const wm_motion_params *>(motion.data());
     setup.wheels = make::no_wheels();
     setup.start.t_ns = WM_TIME_NONE;
     const int more = slip.sigma > 0.0 ? 4 : 0;
-    const wm::joint_layout layout = {10 + more, 7 + more, 1, width, landmarks, invariant};
+    const wm::joint_layout layout = {10 + more, 7 + more, 1, width, landmarks, invariant, capacity};
     const size_t head = (sizeof(joint_state) + 15) / 16 * 16;
     memory.resize(head + joint_state::doubles(layout) * sizeof(double) + 16);
     char *at = memory.data() + (16 - reinterpret_cast<uintptr_t>(memory.data()) % 16) % 16;
@@ -374,6 +375,35 @@ void test_the_pose_alone_is_corrected(void) {
   TEST_ASSERT_EQUAL_DOUBLE(from_2[3], from_3[2]);
 }
 
+void test_states_that_join_in_front_of_landmarks_leave_the_others_as_they_were(void) {
+  const int robot = 10, more = 15, landmarks = 4, wide = 3;
+  made m(true, 2, landmarks, {}, wm::even(robot + more) + landmarks * wide);
+  for (int i = 0; i < landmarks; i++) m.add(3.0 + i, 1.0 - 0.5 * i);
+  const matrix before = m.covariance();
+  std::vector<double> value;
+  for (int i = 0; i < m.state->states(); i++) value.push_back(m.state->value(i));
+  wm::joint_layout to = m.state->layout();
+  to.robot_states = robot + more;
+  to.first_clone = robot + 3;
+  to.clones = 4;
+  to.landmark_width = wide;
+  m.state->grow(to);
+  const int first = wm::even(robot + more);
+  TEST_ASSERT_EQUAL(first + landmarks * wide, m.state->states());
+  matrix want((size_t)m.state->states(), std::vector<double>((size_t)m.state->states()));
+  const auto place = [&](int i) { return (size_t)(i < robot ? i : first + (i - robot) / 2 * wide + (i - robot) % 2); };
+  for (size_t i = 0; i < before.size(); i++) {
+    TEST_ASSERT_EQUAL_DOUBLE(value[i], m.state->value((int)place((int)i)));
+    for (size_t j = 0; j < before.size(); j++) want[place((int)i)][place((int)j)] = before[i][j];
+  }
+  for (int i = 0; i < landmarks; i++) {
+    const size_t heading = (size_t)(first + i * wide + 2);
+    want[heading][heading] = wm::kPi * wm::kPi;
+    TEST_ASSERT_EQUAL_DOUBLE(0.0, m.state->value((int)heading));
+  }
+  assert_near(want, m.covariance());
+}
+
 }  // namespace
 
 void setUp(void) { dice = {7, 1, 0}; }
@@ -392,5 +422,6 @@ int main(void) {
   RUN_TEST(test_a_wheel_that_slips_comes_back_to_its_mean);
   RUN_TEST(test_a_row_with_missing_entries_is_refused);
   RUN_TEST(test_the_pose_alone_is_corrected);
+  RUN_TEST(test_states_that_join_in_front_of_landmarks_leave_the_others_as_they_were);
   return UNITY_END();
 }

@@ -99,7 +99,6 @@ void setUp(void) {
   slam = wm_estimator_find("slam");
   make::shared_defaults(&motion);
   wm_params_defaults(&slam->params, &params);
-  params.markers = 1;
   params.marker_sigma_m = kPlace_m;
   motion.noise_yaw_rate_radps = kGyro_radps * std::sqrt(0.02);
   motion.noise_yaw_rate_rel = 0;

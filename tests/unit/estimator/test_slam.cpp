@@ -20,7 +20,6 @@ void test_landmarks_are_found_by_bearing_and_range(void) {
 void test_landmarks_are_found_by_bearings_alone_whatever_the_method(void) {
   for (int method : {WM_SLAM_LINE_UNSCENTED, WM_SLAM_LINE_LINEAR, WM_SLAM_LINE_INVERSE_DISTANCE}) {
     make_room();
-    params.line_clones = 20;
     params.line_method = method;
     begin();
     drive(60, false);
@@ -31,9 +30,34 @@ void test_landmarks_are_found_by_bearings_alone_whatever_the_method(void) {
   }
 }
 
+// Two identities that were out of sight for 5 s and fit again: no tracker's numbers. Then they are evidence for a pose.
+void test_identities_of_bearings_that_come_back_are_landmarks_own(void) {
+  begin();
+  drive(10, false);
+  TEST_ASSERT_TRUE(counted(WM_COUNTER_LANDMARKS_MERGED) >= 0.0);  // listed: they may be a tracker's
+  drive(50, false);
+  TEST_ASSERT_TRUE(counted(WM_COUNTER_LANDMARKS_MERGED) < 0.0);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.3, off());
+}
+
+void test_the_first_marker_widens_a_map_of_points(void) {
+  begin();
+  drive(20);
+  size_t found;
+  const double worst = worst_landmark(&found);
+  wm_event e = make::empty(now_s, WM_EVENT_MARKER);
+  e.as.marker = marker(99, 2.0, 0.0, 1.0, 0.3);
+  TEST_ASSERT_EQUAL(WM_FUSED, see(e));
+  size_t still;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, worst, worst_landmark(&still));
+  TEST_ASSERT_EQUAL(found, still);
+  drive(20);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&still));
+}
+
 void test_coded_markers_give_place_and_heading_at_once(void) {
   coded = true;
-  params.markers = 1;
   params.marker_heading_sigma_rad = 0.01;
   begin();
   drive(40);
@@ -51,7 +75,6 @@ void test_coded_markers_give_place_and_heading_at_once(void) {
 }
 
 void test_absurd_markers_are_refused_and_change_nothing(void) {
-  params.markers = 1;
   begin();
   drive(1);
   wm_innovation out[WM_INNOVATIONS_PER_EVENT_MAX];
@@ -73,7 +96,6 @@ void test_absurd_markers_are_refused_and_change_nothing(void) {
 
 void test_of_two_poses_the_one_is_taken_that_fits_the_map(void) {
   coded = true;
-  params.markers = 1;
   params.marker_heading_sigma_rad = 0.01;
   begin();
   drive(20);
@@ -90,7 +112,6 @@ void test_of_two_poses_the_one_is_taken_that_fits_the_map(void) {
 
 void test_markers_with_two_poses_from_the_start_have_a_place_and_no_heading(void) {
   coded = two_poses = true;
-  params.markers = 1;
   begin();
   drive(40);
   size_t found;
@@ -104,7 +125,6 @@ void test_markers_with_two_poses_from_the_start_have_a_place_and_no_heading(void
 
 void test_landmarks_without_identity_are_told_apart(void) {
   nameless = true;
-  make::sightings.use_unidentified = 1;
   params.associate_near_m = 2.0;
   begin();
   drive(40);
@@ -116,7 +136,6 @@ void test_landmarks_without_identity_are_told_apart(void) {
 
 void test_a_landmark_seen_twice_in_a_frame_without_identity_is_fused_once(void) {
   nameless = twice = true;
-  make::sightings.use_unidentified = 1;
   params.associate_near_m = 2.0;
   begin();
   drive(40);
@@ -140,7 +159,6 @@ void test_the_same_identity_twice_in_a_frame_at_two_places_keeps_one(void) {
 
 void test_a_marker_seen_twice_in_a_picture_is_fused_once_and_told(void) {
   coded = twice = true;
-  params.markers = 1;
   begin();
   drive(40);
   TEST_ASSERT_EQUAL(fused, rejected);
@@ -154,7 +172,6 @@ void test_a_marker_seen_twice_in_a_picture_is_fused_once_and_told(void) {
 
 void test_two_markers_of_one_identity_are_told_and_left_alone(void) {
   coded = true;
-  params.markers = 1;
   begin();
   drive(30);
   const double before[2] = {place[0][0], place[0][1]};
@@ -173,7 +190,6 @@ void test_two_markers_of_one_identity_are_told_and_left_alone(void) {
 
 void test_two_markers_of_one_identity_on_opposite_sides_spoil_nothing(void) {
   coded = true;
-  params.markers = 1;
   twin = 6;  // opposite
   begin();
   for (int turn = 0; turn < 8; turn++) {
@@ -189,7 +205,6 @@ void test_two_markers_of_one_identity_on_opposite_sides_spoil_nothing(void) {
 
 void test_half_a_minute_without_markers_is_said_and_mended(void) {
   coded = true;
-  params.markers = 1;
   begin();
   drive(30);
   const double sure = sigma();
@@ -218,7 +233,6 @@ void test_a_landmark_that_moved_leaves_is_counted_and_joins_anew(void) {
 
 void test_a_marker_that_moved_is_told_and_pulls_nothing(void) {
   coded = true;
-  params.markers = 1;
   begin();
   drive(30);
   place[2][0] += 0.6;
@@ -240,7 +254,6 @@ void test_a_robot_that_was_turned_does_not_turn_its_map(void) {
     leave_room();
     make_room();
     coded = true;
-    params.markers = 1;
     params.marker_heading_sigma_rad = 0.01;
     begin();
     drive(30.0);
@@ -260,7 +273,6 @@ void test_a_robot_that_was_turned_does_not_turn_its_map(void) {
 // Two markers of five or six in view are turned by somebody, alike: the others say that it wasn't the robot.
 void test_markers_that_were_turned_do_not_turn_the_robot(void) {
   coded = true;
-  params.markers = 1;
   params.marker_heading_sigma_rad = 0.01;
   begin();
   drive(30.0);
@@ -272,7 +284,6 @@ void test_markers_that_were_turned_do_not_turn_the_robot(void) {
 
 void test_most_markers_seen_where_none_are_is_survived(void) {
   coded = true;
-  params.markers = 1;
   begin();
   drive(30);
   false_share = 0.6;
@@ -393,6 +404,8 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_landmarks_are_found_by_bearing_and_range);
   RUN_TEST(test_landmarks_are_found_by_bearings_alone_whatever_the_method);
+  RUN_TEST(test_identities_of_bearings_that_come_back_are_landmarks_own);
+  RUN_TEST(test_the_first_marker_widens_a_map_of_points);
   RUN_TEST(test_coded_markers_give_place_and_heading_at_once);
   RUN_TEST(test_absurd_markers_are_refused_and_change_nothing);
   RUN_TEST(test_of_two_poses_the_one_is_taken_that_fits_the_map);

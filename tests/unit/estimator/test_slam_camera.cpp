@@ -11,7 +11,6 @@ double worst_of_leaning(double sigma_rad) {
   coded = two_heights = true;
   leans[0] = 0.03;
   leans[1] = -0.04;
-  params.markers = 1;
   make::sightings.states.sigma[WM_SENSOR_ROW_kRoll] = sigma_rad;
   begin();
   drive(60);
@@ -63,7 +62,6 @@ void test_stamps_that_scatter_matter_where_it_turns(void) {
   for (int i = 0; i < 2; i++) {
     make_room();
     coded = true;
-    params.markers = 1;
     params.marker_stamp_sigma_s = 0.2 * i;
     begin();
     drive(0.5);
@@ -110,7 +108,6 @@ void test_each_error_of_the_mounting_is_found(void) {
     for (const auto &c : cases) {
       make_room();
       coded = of_markers;
-      params.markers = of_markers;
       params.map = WM_SLAM_MAP_FROZEN;
       for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
       sensor.mounting.xyz_m[0] -= c.x_m;

@@ -36,7 +36,6 @@ found watch(double seconds) {
 
 void check_found(bool of_markers) {
   coded = of_markers;
-  params.markers = of_markers;
   begin();
   drive(60);
   size_t count;

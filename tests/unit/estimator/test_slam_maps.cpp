@@ -8,7 +8,6 @@ using namespace room;
 
 void test_a_marker_that_moved_is_told_on_a_frozen_map_too(void) {
   coded = true;
-  params.markers = 1;
   params.map = WM_SLAM_MAP_FROZEN;
   for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
   place[0][0] += 1.5;
@@ -42,7 +41,6 @@ void test_a_saved_map_frozen_or_extended_needs_no_first_lap(void) {
 
 void test_started_lost_on_a_map_of_markers_it_finds_itself(void) {
   coded = true;
-  params.markers = 1;
   params.map = WM_SLAM_MAP_FROZEN;
   for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
   setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = kAbsent;
@@ -71,7 +69,6 @@ wm_verdict see_from_start(int i, double far_m, double turned_rad) {
 }
 
 void start_lost_before_markers(int map = WM_SLAM_MAP_FROZEN) {
-  params.markers = 1;
   params.map = map;
   for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
   setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = kAbsent;
@@ -205,7 +202,6 @@ void test_a_map_with_nan_loses_those_landmarks_alone(void) {
 // A map of markers with NaN for a place, for a heading and for a sigma.
 void test_a_frozen_map_of_markers_with_nan_locates_by_the_others(void) {
   coded = true;
-  params.markers = 1;
   params.map = WM_SLAM_MAP_FROZEN;
   for (int i = 0; i < kCount; i++) known[i].yaw_rad = wm::wrap(0.5 * i);
   known[3].p_m[1] = kAbsent;
