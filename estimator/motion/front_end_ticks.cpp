@@ -141,6 +141,16 @@ void motion_front_end::leave_gyro() {
   for (tick_wheel &wheel : wheel_) wheel.integrated_m = wheel.position_m - left_m;
 }
 
+// A count is a position whose error is evenly distributed over a step, variance step^2 / 12; a speed is a difference of
+// two.
+void motion_front_end::count_noise(double *speed_mps, double *turn_rate_radps) const {
+  *speed_mps = *turn_rate_radps = 0.0;
+  if (!ticks_drive() || !(wheel_[0].period_s > 0.0)) return;
+  const double wheel_mps = kTwoPi * wheels_.radius_m / wheels_.ticks_per_turn / (std::sqrt(6.0) * wheel_[0].period_s);
+  *speed_mps = wheel_mps / std::sqrt(2.0);
+  if (model_ == WM_MOTION_TICKS) *turn_rate_radps = wheel_mps * std::sqrt(2.0) / wheels_.track_m;
+}
+
 void motion_front_end::note_integrated(const motion_segment &segment) {
   const bool both = segment.input.model == WM_MOTION_TICKS;
   wheel_[0].integrated_m += segment.input.a * segment.dt_s;

@@ -11,6 +11,7 @@
 #include "math/elementary.hpp"
 #include "motion/event_time.hpp"
 #include "motion/front_end.hpp"
+#include "motion/steady_rate.hpp"
 #include "waymark/estimator.h"
 
 namespace wm {
@@ -37,6 +38,8 @@ class planar_motion {
   const wm_motion_calibration &calibration() const { return calibration_; }
   uint32_t motion_health() const { return front_.health(); }
   uint64_t motion_outliers() const { return front_.outliers(); }
+  // The twist for the derivative of a time offset: low-passed, without the steps of counts.
+  planar_twist steady_twist() const { return {steady_[0].banded, steady_[1].banded, steady_[2].banded}; }
   // The next motion input is overdue.
   bool is_overdue() const { return front_.is_overdue(now_ns()); }
   wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time
@@ -109,7 +112,8 @@ class planar_motion {
   wm_time_ns start_ns_;
   wm_pose2 odom_;
   double travelled_m_, turned_rad_;
-  planar_twist twist_;  // of the last segment
+  planar_twist twist_;     // of the last segment
+  steady_rate steady_[3];  // of its v, u and w
 };
 
 // A planar pose's estimate; covariance(i, j) is that of x, y and heading.

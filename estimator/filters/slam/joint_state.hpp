@@ -77,7 +77,6 @@ class joint_state : public planar_motion {
   void estimate(wm_estimate *out) const;
 
   // ---- the state ----
-  bool counts_wheels() const { return front_.model() == WM_MOTION_TICKS; }
   wm_pose2 pose() const { return {value(kX), value(kY), value(kHeading)}; }
   int states() const { return n_; }
   double value(int state) const { return x()[state]; }

@@ -1,14 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // From the rows of an observation to its update, or to a new landmark.
 #include "filters/slam/slam.hpp"
-#include "math/arc.hpp"
 
 namespace wm {
-namespace {
-
-constexpr double kTwistWindow_s = 0.1;  // some counts of a wheel, and less than a turn takes to begin; not swept
-
-}  // namespace
 
 // Each picture's stamp has an error of its own, the same for all that is seen in it.
 void slam::begin_picture(int sensor, wm_time_ns t_ns) {
@@ -22,16 +16,6 @@ past_pose slam::look_back(int sensor) const {
   const double offset_s = slot < 0 ? 0.0 : joint_.value(slot), stamp_error_s = stamp < 0 ? 0.0 : joint_.value(stamp);
   past_pose out = pose_before(joint_, offset_s + stamp_error_s);
   out.stamp_slot = stamp;
-  if (!rejoins_ || !joint_.counts_wheels()) return out;
-  // The twist of the last count, which the pose was carried on by, has the count's noise. As the derivative by the
-  // offset it would correlate with that of the innovation, and the offset would approach the count's age.
-  motion_twist ignored{};
-  const wm_time_ns now = joint_.now_ns();
-  const wm_pose2 step = joint_.path(now - wm_ns_from_seconds(kTwistWindow_s), now, &ignored);
-  const sin_cos h = sincos(out.pose.heading_rad - 0.5 * step.heading_rad);
-  out.age_by[0] = -(h.cos * step.x_m - h.sin * step.y_m) / kTwistWindow_s;
-  out.age_by[1] = -(h.sin * step.x_m + h.cos * step.y_m) / kTwistWindow_s;
-  out.age_by[2] = -step.heading_rad / kTwistWindow_s;
   return out;
 }
 

@@ -106,6 +106,36 @@ void test_a_slip_is_not_believed(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.002, 0.01, named(slipping, "motion.wheel_difference").value);
 }
 
+// GIVEN counts of 0.09 m WHEN the robot drives straight THEN the turn rate by the counts jumps by 3 rad/s, and the one
+// for a time offset's derivative stays 0. In a turn that is faster than the dead band it follows.
+void test_steps_of_the_counts_are_no_turn(void) {
+  Car car(false);
+  car.motion.model = WM_MOTION_TICKS;
+  car.setup.wheels.ticks_per_turn = 20;
+  car.filter->init(car.setup, car.states, wm::kPoseStates + wm::planar_filter::count_motion_states(car.states));
+  constexpr double kCoarse_m = 2 * M_PI * 0.3 / 20;
+  double left_m = 0.03, right_m = 0, most = 0, most_shiver = 0;
+  const auto drive = [&](double w, int steps) {
+    for (int i = 0; i < steps; i++) {
+      car.filter->move(make::quantities(car.t_s, {{WM_Q_WHEEL_TICKS_LEFT, std::floor(left_m / kCoarse_m)},
+                                                  {WM_Q_WHEEL_TICKS_RIGHT, std::floor(right_m / kCoarse_m)}}));
+      left_m += 0.02 * (1.0 - 0.5 * kTrack_m * w);
+      right_m += 0.02 * (1.0 + 0.5 * kTrack_m * w);
+      car.t_s += 0.02;
+      most = std::fmax(most, std::fabs(car.filter->steady_twist().w));
+      wm::motion_twist twist{};
+      car.filter->path(car.filter->now_ns(), car.filter->now_ns() + 1, &twist);
+      most_shiver = std::fmax(most_shiver, std::fabs(twist.w));
+    }
+  };
+  drive(0, 500);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(3.0, most_shiver);
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, most);
+  drive(3.0, 500);
+  TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(3.5, car.filter->steady_twist().w);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.5, car.filter->steady_twist().w);
+}
+
 void test_a_pose_given_from_outside_is_kept(void) {
   Car car(true);
   for (int i = 0; i < 2000; i++) car.step(2.0, 0, 0.0, 0.0);
@@ -153,6 +183,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_the_gyro_tells_the_wheels_and_the_wheels_hold_the_heading);
   RUN_TEST(test_a_slip_is_not_believed);
+  RUN_TEST(test_steps_of_the_counts_are_no_turn);
   RUN_TEST(test_a_pose_given_from_outside_is_kept);
   RUN_TEST(test_a_day_leaves_the_covariance_sound);
   RUN_TEST(test_wheels_of_unknown_track_are_left_alone);
