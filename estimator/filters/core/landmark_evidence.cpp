@@ -100,7 +100,7 @@ void landmark_evidence::note(wm_time_ns t_ns, int key, double log_bayes, double 
 
 // One logarithm of the product rather than one a landmark: terms lie between m and exp(4), so that 24 of them neither
 // overflow nor vanish.
-void landmark_evidence::sum(wm_time_ns t_ns) {
+double landmark_evidence::log_of_sources(wm_time_ns t_ns, double *best_out) const {
   double product = 1.0, best = 1.0;
   for (int i = 0; i < count_; i++) {
     const source &s = source_[i];
@@ -109,7 +109,13 @@ void landmark_evidence::sum(wm_time_ns t_ns) {
     product *= kept;
     if (s.key >= 0 && kept > best) best = kept;
   }
-  odds_.set(prior_ - log(product / best));  // without the landmark that fits best
+  if (best_out) *best_out = best;
+  return log(product / best);  // without the landmark that fits best
+}
+
+void landmark_evidence::sum(wm_time_ns t_ns) {
+  double best;
+  odds_.set(prior_ - log_of_sources(t_ns, &best));
   observed_++;
   if (contradicted()) contradicted_once_ = true;
   if (!proven_ && observed_ >= kProvenAfter && (contradicted_once_ ? log_odds() : log_odds() - log(best)) < kTrusted) {

@@ -51,6 +51,8 @@ class landmark_evidence {
   // landmark that is not where it is expected stays where it is. So a misfit near the previous one counts, and a misfit
   // elsewhere cancels it. `normalised`: that innovation over its sigma. `record`: of the landmark, null for others.
   void note(wm_time_ns t_ns, int key, double log_bayes, double angle_rad, double normalised, landmark_record *record);
+  // Without observations the contributions decay, too.
+  void forget(wm_time_ns t_ns) { odds_.set(prior_ - log_of_sources(t_ns, nullptr)); }
   // Its innovations have one sign all the time and those of others do not: it pulls the pose without being gated.
   bool biased(int key, wm_time_ns t_ns) const;
 
@@ -85,6 +87,7 @@ class landmark_evidence {
   source &source_of(int key, wm_time_ns t_ns, double angle_rad, bool *known);
   static double scatter_checked(source &s, double log_bayes, double angle_rad, double dt, bool known);
   static double likelihood_kept(double log_bayes, double moved);
+  double log_of_sources(wm_time_ns t_ns, double *best) const;
   void sum(wm_time_ns t_ns);
 
   source source_[kSources];

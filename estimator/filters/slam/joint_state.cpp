@@ -201,6 +201,24 @@ void joint_state::set_pose(const wm_pose2 &pose, const double covariance[3][3]) 
     for (int j = i; j < 3; j++) p().set(i, j, covariance[i][j]);
 }
 
+// In the invariant filter by P <- T P T', T = I + e h', e = J (to - from).
+void joint_state::shift_pose(const wm_pose2 &to, const double added[3][3]) {
+  const half_covariance cov = p();
+  const double e[2] = {value(kY) - to.y_m, to.x_m - value(kX)};
+  for (int i = kX; i <= kY && layout_.invariant; i++) {
+    const double own = cov.at(i, i) + 2.0 * e[i] * cov.at(i, kHeading) + square(e[i]) * cov.at(kHeading, kHeading);
+    for (int j = 0; j < n_; j++)
+      if (j != i) cov.set(i, j, cov.at(i, j) + e[i] * cov.at(kHeading, j));
+    cov.set(i, i, own);
+  }
+  for (int i = 0; i < 3; i++)
+    for (int j = i; j < 3; j++) cov.set(i, j, cov.at(i, j) + added[i][j]);
+  double *mean = x();
+  mean[kX] = to.x_m;
+  mean[kY] = to.y_m;
+  mean[kHeading] = wrap(to.heading_rad);
+}
+
 void joint_state::inflate_pose(double xy_m2, double heading_rad2) {
   for (int i = kX; i <= kY; i++) p().set(i, i, variance(i) + xy_m2);
   p().set(kHeading, kHeading, variance(kHeading) + heading_rad2);

@@ -92,6 +92,8 @@ class joint_state : public planar_motion {
   // States first..first+count-1 become rows[k] of the state plus noise of covariance `noise`.
   void assign(int first, int count, const joint_row *rows, const double (*noise)[3], const double *values);
   void set_pose(const wm_pose2 &pose, const double covariance[3][3]);
+  // The pose moves to `to`, whose covariance beyond the present one is `added`.
+  void shift_pose(const wm_pose2 &to, const double added[3][3]);
   // Adds variances of x and y, and of the heading, as noise of the motion does.
   void inflate_pose(double xy_m2, double heading_rad2);
 

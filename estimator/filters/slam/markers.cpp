@@ -110,7 +110,7 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   if (life_.searching()) return reject(records, at.record, WM_REJECTED_SEARCHING);
   if (m.poses == 2) r = choose_pose(at, m, r, landmark);
   if (landmark >= 0) {
-    fuse_known_marker(at, r, landmark);
+    fuse_known_marker(at, m, r, landmark);
     return WM_OK;
   }
   const bool frozen = params_.map == WM_SLAM_MAP_FROZEN;
@@ -220,14 +220,18 @@ void slam::carry_marker_errors(const marker_reading &r, int error_state, landmar
   }
 }
 
-void slam::fuse_known_marker(const context &at, const marker_reading &r, int landmark) {
+void slam::fuse_known_marker(const context &at, const wm_marker &m, const marker_reading &r, int landmark) {
   landmark_rows v;
   expect_marker(at, r, pose_of(landmark), lend(at), &v);
   v.count = r.has_heading ? 3 : 2;
   joint_state::innovation_block block;
   prepare(landmark, &v, &block);
   const gate_result g = gate(block.nis, v.count, gates());
-  if (!weigh(landmark, block, g.passed, square(kClutter_m) * (r.has_heading ? kTwoPi : 1.0), std::nan("")))
+  const double volume = square(kClutter_m) * (r.has_heading ? kTwoPi : 1.0);
+  const double log_bayes = g.passed ? landmark_evidence::log_bayes_factor(block.density(), volume)
+                                    : landmark_evidence::max_log_bayes_factor();
+  if (weigh_slip(landmark, at, observation_of(m, r), g.passed) ||
+      !weigh(landmark, g.passed, log_bayes, std::nan(""), std::nan("")))
     return (void)reject(at.records, at.record, WM_REJECTED_SEARCHING);
   const wm_verdict verdict = fuse_rows(at, v, g, &block);
   landmark_note &marker = note(landmark);

@@ -38,7 +38,19 @@ void slam::begin_evidence(double log_prior) {
   line_search_.clear();
 }
 
-bool slam::map_is_held() const { return !life_.tracking() || evidence_.log_odds() > kHoldMap; }
+// Doubts end where nothing is observed that would prove or refute them.
+void slam::end_doubt() {
+  const wm_time_ns now = joint_.now_ns();
+  if (life_.tracking() && evidence_.log_odds() > kHoldMap) evidence_.forget(now);
+  if (by_slip_ && !slips_.is_convincing(now)) {
+    by_slip_ = false;
+    life_.fits_again();
+  }
+}
+
+bool slam::map_is_held() const {
+  return !life_.tracking() || evidence_.log_odds() > kHoldMap || slips_.doubts(joint_.now_ns());
+}
 
 // Which states a correction may change now.
 joint_state::scope slam::scope_now() const {
@@ -55,28 +67,25 @@ bool slam::is_witness(const landmark_note &note) const {
 }
 
 // The evidence of one observation of a known landmark, before it is fused. A tracker's number (lines.rejoin) is no
-// identity: it contradicts nothing when the tracker changes to another edge. False: the pose is lost from now on, and
-// the landmark's index may be another.
-bool slam::weigh(int landmark, const joint_state::innovation_block &block, bool passed, double clutter_volume,
-                 double angle_rad) {
+// identity: it contradicts nothing when the tracker changes to another edge. `angle_rad`, `normalised`: the bearing's
+// innovation, and over its sigma. False: the pose is lost from now on, and the landmark's index may be another.
+bool slam::weigh(int landmark, bool passed, double log_bayes, double angle_rad, double normalised) {
   landmark_note &seen = note(landmark);
   if (!params_.recover || rejoins_) return true;
   const wm_time_ns now = joint_.now_ns();
   const bool returned = seen.last_ns != WM_TIME_NONE && wm_seconds_between(seen.last_ns, now) > kRevisited_s;
   if (passed && returned && !map_is_held()) seen.revisited = true;
   const bool witness = is_witness(seen);
-  const double log_bayes = passed ? landmark_evidence::log_bayes_factor(block.density(), clutter_volume)
-                                  : landmark_evidence::max_log_bayes_factor();
   const bool established =
       seen.seen >= kEstablished || (seen.seen >= static_cast<uint32_t>(params_.confirm_seen) && returned);
   if (!witness && (!established || log_bayes < 0.0)) return true;
-  evidence_.note(now, seen.id, log_bayes, angle_rad, angle_rad / std::sqrt(block.s[0][0]), &seen.record);
+  evidence_.note(now, seen.id, log_bayes, angle_rad, normalised, &seen.record);
   if (life_.tracking() && evidence_.contradicted()) {
     lose();
     return false;
   }
   if (evidence_.proven()) by_one_ = false;
-  if (life_.lost() && evidence_.fits() && life_.announced(now)) life_.fits_again();
+  if (life_.lost() && !by_slip_ && evidence_.fits() && life_.announced(now)) life_.fits_again();
   if (map_is_held()) return true;
   if (passed && witness) {
     fit_ns_ = now;
@@ -96,9 +105,7 @@ void slam::lose() {
   forget_lines();
 }
 
-// Keeps an observation for the search, while the map is held: a place that moves would be another landmark's.
-void slam::keep_observation(int landmark, const context &at, const planar_observation &seen) {
-  if (!params_.recover || !map_is_held() || !is_confirmed(note(landmark))) return;
+observation slam::observation_from(int landmark, const context &at, const planar_observation &seen) const {
   const int state = joint_.landmark_state(landmark);
   const mounted_sensor &mounting = sensor_[at.sensor];
   observation o{};
@@ -116,11 +123,19 @@ void slam::keep_observation(int landmark, const context &at, const planar_observ
   o.sigma_place_m = std::sqrt(0.5 * (joint_.variance(state) + joint_.variance(state + 1)));
   o.travelled_m = joint_.travelled_m();
   o.turned_rad = joint_.turned_rad();
+  return o;
+}
+
+// Keeps an observation for the search, while the map is held: a place that moves would be another landmark's.
+void slam::keep_observation(int landmark, const context &at, const planar_observation &seen) {
+  if (!params_.recover || !map_is_held() || !is_confirmed(note(landmark))) return;
+  const int state = joint_.landmark_state(landmark);
+  observation o = observation_from(landmark, at, seen);
   observations_.add(o);
   if (!finite(seen.heading_rad) || joint_.variance(state + 2) > square(kFound_rad)) return;
   o.kind = kObservedHeading;
   o.key = -1 - at.id;
-  o.sensor = base;
+  o.sensor = compose(joint_.odom(), between(joint_.pose(), at.past.pose));
   o.bearing_rad = wrap(joint_.value(state + 2) - seen.heading_rad);  // of the robot, in map
   o.sigma_angle_rad = std::sqrt(square(seen.heading_sigma_rad) + joint_.variance(state + 2));
   observations_.add(o);
@@ -171,12 +186,12 @@ bool slam::is_found_by_one(const search_result &found, wm_time_ns since_ns, int3
 // LOST, or SEARCHING from the start: the pose by the observations of late. True: found.
 bool slam::relocalize() {
   const wm_time_ns now = joint_.now_ns();
-  if (!params_.recover || life_.tracking() || (life_.lost() && !life_.announced(now)) || !life_.search_due(now))
+  if (!params_.recover || by_slip_ || life_.tracking() || (life_.lost() && !life_.announced(now)) ||
+      !life_.search_due(now))
     return false;
   life_.searched(now);
   const wm_time_ns since = now - wm_ns_from_seconds(kWindow_s);
-  search_result found = observations_.find(since, {joint_.odom(), joint_.travelled_m(), joint_.turned_rad()}, nullptr,
-                                           0, {kFound_m, kFound_rad, kNumbers});
+  search_result found = observations_.find(since, odometry(), nullptr, 0, {kFound_m, kFound_rad, kNumbers});
   int32_t id = -1;
   const bool by_one = found.found && landmarks_fitting(found.pose, since, &id) < 2;
   if (!found.found || (by_one && !is_found_by_one(found, since, id))) {

@@ -174,20 +174,52 @@ wm_verdict slam::expect_sighting(const wm_sighting &s, const reading &r, const p
   return WM_FUSED;
 }
 
+// Whether an identified sighting may be fused, or counted as an outlier. False: the landmark's index may be another.
+bool slam::weigh_identified(int landmark, const context &at, const wm_sighting &s, const reading &r,
+                            const landmark_rows &v, const joint_state::innovation_block &block, bool passed) {
+  if (weigh_slip(landmark, at, observation_of(s, r), passed)) return false;
+  const double angle_rad = v.kind[0] == WM_RESIDUAL_BEARING ? v.innovation[0] : std::nan("");
+  const double volume = v.kind[0] == WM_RESIDUAL_X ? kPi * square(kClutterRange_m) : clutter_volume(r);
+  const double log_bayes =
+      passed ? landmark_evidence::log_bayes_factor(block.density(), volume) : landmark_evidence::max_log_bayes_factor();
+  return weigh(landmark, passed, log_bayes, angle_rad, angle_rad / std::sqrt(block.s[0][0])) &&
+         (!passed || is_plausible(landmark, block, v.noise[0]));
+}
+
+// Rows along and across the line of sight, which are linear in the landmark's place: where a landmark is expected
+// behind a sensor of depths, bearing and depth have no derivatives. It contradicts like any other, or fits an uncertain
+// pose.
+void slam::expect_point(const context &at, const planar_observation &seen, int landmark, landmark_rows *out) const {
+  const slip_sighting point{observation_from(landmark, at, seen), 0, joint_.landmark_state(landmark)};
+  const slip_rows r = slip_search::rows_of(point, joint_, joint_.pose(), odometry());
+  out->count = 2;
+  for (int k = 0; k < 2; k++) {
+    for (int i = 0; i < 3; i++) out->row[k].add(r.index[i], r.by[k][i]);
+    for (int i = 0; i < 3; i++) out->by_landmark[k][i] = i < 2 ? r.by[k][3 + i] : 0.0;
+    out->kind[k] = k == 0 ? WM_RESIDUAL_X : WM_RESIDUAL_Y;
+    out->observed[k] = k == 0 ? seen.range_m : 0.0;
+    out->expected[k] = out->observed[k] - r.innovation[k];
+    out->innovation[k] = r.innovation[k];
+    out->noise[k] = r.noise[k];
+  }
+}
+
 // Bearing and range are gated together: a wrong one spoils the other.
 void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r, int landmark) {
   landmark_rows v;
   const wm_verdict possible = expect_sighting(s, r, at.past, pose_of(landmark), lend(at), &v);
-  if (possible != WM_FUSED) return (void)reject(at.records, at.record, possible);
+  const bool is_point = possible == WM_REJECTED_OUT_OF_RANGE && r.bearing && r.range;
+  if (is_point)
+    expect_point(at, observation_of(s, r), landmark, &v);
+  else if (possible != WM_FUSED)
+    return (void)reject(at.records, at.record, possible);
   joint_state::innovation_block block;
   prepare(landmark, &v, &block);
   const gate_result g = gate(block.nis, v.count, gates());
-  const double angle_rad = r.bearing ? v.innovation[0] : std::nan("");
-  if (s.landmark_id >= 0 && (!weigh(landmark, block, g.passed, clutter_volume(r), angle_rad) ||
-                             (g.passed && !is_plausible(landmark, block, v.noise[0]))))
+  if (s.landmark_id >= 0 && !weigh_identified(landmark, at, s, r, v, block, g.passed))
     return (void)reject(at.records, at.record, WM_REJECTED_SEARCHING);
   const wm_verdict verdict = fuse_rows(at, v, g, &block);
-  if (r.bearing) note_rotation(g.passed, v.innovation[0], false, note(landmark).last_ns);
+  if (r.bearing && !is_point) note_rotation(g.passed, v.innovation[0], false, note(landmark).last_ns);
   if (!g.passed) return note_misfit(landmark, r.range);
   if (verdict == WM_FUSED) {
     if (!r.range && note(landmark).last_ns != WM_TIME_NONE)
@@ -233,7 +265,8 @@ wm_verdict slam::join_seen(const context &at, const wm_sighting &s, const readin
                                   {0.0, 0.0, 0.0}};
     if (step == kNewtonSteps) {
       if (!finite(place[0]) || !finite(place[1]) || !make_room()) return WM_REJECTED_NO_ASSOCIATION;
-      join(at, v, inverse, place, square(kPi));  // a heading, where landmarks have one, is unknown
+      // A heading, where landmarks have one, is unknown.
+      note(join(at, v, inverse, place, square(kPi))).may_be_misread = s.landmark_id >= 0;
       return WM_FUSED;
     }
     for (int k = 0; k < 2; k++) place[k] += inverse[k][0] * v.innovation[0] + inverse[k][1] * v.innovation[1];

@@ -22,6 +22,7 @@ landmark_note note_of(int32_t id, int sensor, wm_time_ns t_ns) {
   out.sensor = sensor;
   out.tilt_sensor = -1;
   out.deferred_ns = WM_TIME_NONE;
+  out.apart_from = -1;
   return out;
 }
 
@@ -204,6 +205,7 @@ void slam::start_again() {
     other_fused_ns_[i] = WM_TIME_NONE;
     other_fused_id_[i] = -1;
   }
+  slips_.begin();
   moved_.clear();
   ambiguous_.clear();
   outliers_.t_ns = WM_TIME_NONE;
@@ -213,7 +215,7 @@ void slam::start_again() {
   begin_evidence(given ? kStartWrong : kOwnFramePrior);
   bearings_.count = 0;
   usual_share_ = 0.0;
-  by_one_ = one_refuted_ = false;
+  by_one_ = one_refuted_ = by_slip_ = false;
   if (given) load_map();
 }
 
@@ -293,7 +295,8 @@ wm_status slam::take_pose(const wm_event &event) {
   forget_tracks();
   life_.begin(true);
   begin_evidence(kStartWrong);
-  by_one_ = false;
+  by_one_ = by_slip_ = false;
+  slips_.begin();
   return WM_OK;
 }
 
@@ -362,6 +365,7 @@ wm_status slam::begin_observation(wm_time_ns t_ns) {
   if (status != WM_OK) return status;
   joint_.move_to(t_ns);
   end_picture(t_ns);
+  end_doubt();
   maintain_map(t_ns);
   return WM_OK;
 }
@@ -408,9 +412,10 @@ bool slam::make_room() {
 void slam::maintain_map(wm_time_ns t_ns) {
   if (joint_.landmarks() == 0 || params_.map == WM_SLAM_MAP_FROZEN || map_is_held()) return;
   cursor_ = (cursor_ + 1) % joint_.landmarks();
+  find_double(cursor_);
   const landmark_note &n = note(cursor_);
   // A tracker's number does not come back: a line that was seen too rarely to be merged is never found again.
-  const bool is_kept = is_confirmed(n) && (!rejoins_ || n.surveyed || n.seen >= kMergeSeen);
+  const bool is_kept = is_seen_enough(n) && !n.is_double && (!rejoins_ || n.surveyed || n.seen >= kMergeSeen);
   if (!is_kept && wm_seconds_between(n.last_ns, t_ns) > params_.leave_after_s)
     drop_landmark(cursor_);
   else if (rejoins_)
@@ -420,6 +425,7 @@ void slam::maintain_map(wm_time_ns t_ns) {
 int slam::note_landmark(int32_t id, int landmark, int sensor) {
   note(landmark) = note_of(id, sensor, joint_.now_ns());
   note(landmark).seen = 1;
+  note(landmark).first_view = joint_.odom();
   counts_.joined++;
   return landmark;
 }

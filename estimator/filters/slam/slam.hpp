@@ -19,6 +19,7 @@
 #include "filters/slam/bearing_tracks.hpp"
 #include "filters/slam/joint_state.hpp"
 #include "filters/slam/params.h"
+#include "filters/slam/slip_search.hpp"
 #include "memory/layout.hpp"
 #include "sensors/sighting.hpp"
 
@@ -46,10 +47,17 @@ struct landmark_note {
   int32_t tilt_sensor;      // the sensor whose observations `mean_m` averages; -1: none
   wm_time_ns deferred_ns;   // when a surprising observation was deferred (trust.cpp)
   double mean_m[3], means;  // of a coded marker: its mean place in that sensor's levelled axes, of so many observations
+  wm_pose2 first_view;      // base_link in the odometry's frame when it joined
+  int32_t apart_from;       // a landmark that was seen in one stamp with this one, though it stands here; -1: none
   bool revisited;           // seen again where it was, after it was out of sight
   bool level;               // a coded marker without a second pose
   landmark_record record;
-  uint8_t unused[4];  // no padding: the same events must give the same bytes
+  // Of a sighting with a range, whose identity may be misread: a line is seen from several places before it joins, and
+  // a marker's code has a check.
+  bool may_be_misread;
+  bool viewed_twice;  // from two places, or for some seconds
+  bool is_double;     // it stands where another one does that is seen more often: probably that one, misread
+  uint8_t unused[5];  // no padding: the same events must give the same bytes
 };
 
 struct slam_counts {
@@ -157,8 +165,12 @@ class slam {
   void maintain_map(wm_time_ns t_ns);
   void drop_landmark(int landmark);
   int note_landmark(int32_t id, int landmark, int sensor);
-  bool is_confirmed(const landmark_note &note) const {
+  bool is_seen_enough(const landmark_note &note) const {
     return note.surveyed || note.seen >= static_cast<uint32_t>(params_.confirm_seen);
+  }
+  // A landmark seen from one place alone stays, but its identity may be misread, so that it is not confirmed.
+  bool is_confirmed(const landmark_note &note) const {
+    return is_seen_enough(note) && (!note.may_be_misread || (note.viewed_twice && !note.is_double));
   }
   wm_pose2 pose_of(int landmark) const;
 
@@ -184,6 +196,9 @@ class slam {
   planar_observation observation_of(const wm_sighting &s, const reading &r) const;
   wm_verdict expect_sighting(const wm_sighting &s, const reading &r, const past_pose &past, const wm_pose2 &place,
                              int error_state, landmark_rows *out) const;
+  bool weigh_identified(int landmark, const context &at, const wm_sighting &s, const reading &r, const landmark_rows &v,
+                        const joint_state::innovation_block &block, bool passed);
+  void expect_point(const context &at, const planar_observation &seen, int landmark, landmark_rows *out) const;
   void fuse_known(const context &at, const wm_sighting &s, const reading &r, int landmark);
   wm_status begin_landmark(context at, const wm_sighting &s, const reading &r);
   wm_verdict join_seen(const context &at, const wm_sighting &s, const reading &r);
@@ -213,7 +228,7 @@ class slam {
   void expect_marker(const context &at, const marker_reading &r, const wm_pose2 &place, int error_state,
                      landmark_rows *out) const;
   void carry_marker_errors(const marker_reading &r, int error_state, landmark_rows *out) const;
-  void fuse_known_marker(const context &at, const marker_reading &r, int landmark);
+  void fuse_known_marker(const context &at, const wm_marker &m, const marker_reading &r, int landmark);
   wm_verdict join_marker(const context &at, const marker_reading &r);
   void fuse_height(int landmark, int sensor, const marker_reading &r);
 
@@ -224,6 +239,10 @@ class slam {
   void end_picture(wm_time_ns t_ns);
   void note_fused(int landmark, int sensor);
   void note_misfit(int landmark, bool ranged);
+  int most_misfits(const landmark_note &seen) const;
+  bool do_others_fit(const landmark_note &seen) const;
+  bool stands_with(int one, int other) const;
+  void find_double(int landmark);
 
   // rejoin.cpp
   void merge_if_one(int fresh);
@@ -237,9 +256,9 @@ class slam {
   bool map_is_held() const;
   joint_state::scope scope_now() const;
   bool is_witness(const landmark_note &note) const;
-  bool weigh(int landmark, const joint_state::innovation_block &block, bool passed, double clutter_volume,
-             double angle_rad);
+  bool weigh(int landmark, bool passed, double log_bayes, double angle_rad, double normalised);
   void lose();
+  observation observation_from(int landmark, const context &at, const planar_observation &seen) const;
   void keep_observation(int landmark, const context &at, const planar_observation &seen);
   int landmarks_fitting(const wm_pose2 &pose, wm_time_ns since_ns, int32_t *id) const;
   bool is_found_by_one(const search_result &found, wm_time_ns since_ns, int32_t id) const;
@@ -247,6 +266,12 @@ class slam {
   void take_found(double log_prior);
   void inflate_while_lost();
   void widen(wm_estimate *out) const;
+
+  // slips.cpp
+  travelled_pose2 odometry() const;
+  bool weigh_slip(int landmark, const context &at, const planar_observation &seen, bool fits);
+  void end_doubt();
+  void take_slip(const slip_hypothesis &found);
 
   // pattern.cpp
   void collect_bearing(const wm_sighting &s, const past_pose &past);
@@ -286,14 +311,16 @@ class slam {
   rollback<kMaxCalibration> rollback_;
   landmark_evidence evidence_;
   pose_search observations_;  // since the map is held
-  wm_time_ns fit_ns_;         // when a witness fitted last
-  bearing_look bearings_;     // of the newest picture, where lines have no identity
+  slip_search slips_;
+  wm_time_ns fit_ns_;      // when a witness fitted last
+  bearing_look bearings_;  // of the newest picture, where lines have no identity
   wm_pose2 bearings_odom_;
   int bearings_sensor_;
   line_search line_search_;
   evidence pattern_odds_;
   double usual_share_;  // of a picture's bearings that the map explains
   wm_time_ns pattern_ns_;
+  bool by_slip_;      // LOST by a slip, which more sightings confirm
   bool by_one_;       // the pose was found by one marker and is not proven yet
   bool one_refuted_;  // by others; since then it takes two
 };

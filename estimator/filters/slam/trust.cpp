@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Outliers: misread codes, landmarks that moved, identities that stand at two places, a robot that was turned.
 #include "filters/slam/slam.hpp"
+#include "math/arc.hpp"
 
 namespace wm {
 namespace {
@@ -9,6 +10,15 @@ constexpr int kUnconfirmedMisfits = 2;   // a landmark joins by one observation 
 constexpr double kSurprising_nis = 4.0;  // of two numbers: one in seven
 constexpr double kUncertain = 25.0;      // variance of the innovation over the observation's own: five sigmas wide
 constexpr double kOthersFit_s = 3.0;     // a landmark has moved where others were fused so lately; not swept
+// Two views of a landmark: robot's motion, and its turn, between them. A code that is misread once is misread again
+// while nothing moves.
+constexpr double kView_m = 0.1, kView_rad = 0.05;
+constexpr double kBurst_s = 5.0;  // light changes, too; not swept
+// A new identity is misread with this probability. Otherwise its landmark stands anywhere near the other: landmarks
+// stand in groups, one on 20 m2 or so. Not swept.
+constexpr double kMisread = 0.02, kOwnArea_m2 = 20.0;
+constexpr double kOnePicture_s = 0.02;  // sightings of one picture have stamps that are nearer
+constexpr double kOnePlace_m = 2.0;     // landmarks farther apart are not compared
 // Rotation outliers. Chosen on hall-hard and office-hard, seeds 1 and 2; not swept.
 constexpr int kAlikeBearings = 5;            // rejected by the same angle, at least
 constexpr int kAlikeMarkers = 2;             // the same of markers: each gives the robot's pose by itself
@@ -96,6 +106,17 @@ void slam::note_fused(int landmark, int sensor) {
   if (!map_is_held()) seen.seen++;
   seen.last_ns = now;
   seen.sensor = sensor;
+  const wm_pose2 moved = between(seen.first_view, joint_.odom());
+  if (square(moved.x_m) + square(moved.y_m) > square(kView_m) || std::fabs(moved.heading_rad) > kView_rad ||
+      (seen.first_ns != WM_TIME_NONE && wm_seconds_between(seen.first_ns, now) > kBurst_s))
+    seen.viewed_twice = true;
+  for (int i = 0; i < joint_.landmarks(); i++) {
+    const bool together = note(i).last_ns != WM_TIME_NONE && wm_seconds_between(note(i).last_ns, now) < kOnePicture_s;
+    if (i == landmark || !together || !stands_with(landmark, i)) continue;
+    seen.apart_from = note(i).id;
+    note(i).apart_from = seen.id;
+  }
+  find_double(landmark);
   life_.fused(now);
   if (other_fused_id_[0] != seen.id) {
     other_fused_id_[1] = other_fused_id_[0];
@@ -103,6 +124,26 @@ void slam::note_fused(int landmark, int sensor) {
   }
   other_fused_id_[0] = seen.id;
   other_fused_ns_[0] = now;
+}
+
+// Outliers in a row after which it left its place. One that was on the map during one visit only may have been misread
+// then: as many as there were sightings decide.
+int slam::most_misfits(const landmark_note &seen) const {
+  const int most = seen.seen < static_cast<uint32_t>(params_.moved_after) ? (int)seen.seen : params_.moved_after;
+  return seen.surveyed || seen.revisited ? params_.moved_after
+         : most > kUnconfirmedMisfits    ? most
+                                         : kUnconfirmedMisfits;
+}
+
+// Landmarks that were on the map before fit the pose, so that it is right.
+bool slam::do_others_fit(const landmark_note &seen) const {
+  const wm_time_ns now = joint_.now_ns();
+  if (slips_.fitted_ns() != WM_TIME_NONE) return wm_seconds_between(slips_.fitted_ns(), now) <= kOthersFit_s;
+  for (int i = 0; i < 2; i++)
+    if (other_fused_id_[i] >= 0 && other_fused_id_[i] != seen.id &&
+        wm_seconds_between(other_fused_ns_[i], now) <= kOthersFit_s)
+      return true;
+  return false;
 }
 
 // A landmark that misfits again and again while others fit has moved: it leaves and joins anew where it is. One that
@@ -113,15 +154,37 @@ void slam::note_misfit(int landmark, bool ranged) {
   if (map_is_held()) return;
   if (ranged && !is_confirmed(seen) && seen.misfits >= kUnconfirmedMisfits) return drop_landmark(landmark);
   const bool frozen = params_.map == WM_SLAM_MAP_FROZEN;
-  if (seen.misfits < params_.moved_after || (frozen && moved_.has(seen.id))) return;
-  for (int i = 0; i < 2; i++) {
-    if (other_fused_id_[i] < 0 || other_fused_id_[i] == seen.id) continue;
-    if (wm_seconds_between(other_fused_ns_[i], joint_.now_ns()) > kOthersFit_s) continue;
+  if (seen.misfits < (ranged ? most_misfits(seen) : params_.moved_after) || (frozen && moved_.has(seen.id))) return;
+  if (!do_others_fit(seen)) return;
+  if (seen.misfits >= params_.moved_after) {
     counts_.moved++;
     (moved_.has(seen.id) ? ambiguous_ : moved_).add(seen.id);
-    if (!frozen) drop_landmark(landmark);
-    return;
   }
+  if (!frozen) drop_landmark(landmark);
+}
+
+// Two landmarks stand at one place: that they are one, misread, is more probable than that another one stands there.
+bool slam::stands_with(int one, int other) const {
+  const int a = joint_.landmark_state(one), b = joint_.landmark_state(other);
+  if (std::fabs(joint_.value(a) - joint_.value(b)) > kOnePlace_m ||
+      std::fabs(joint_.value(a + 1) - joint_.value(b + 1)) > kOnePlace_m)
+    return false;
+  const landmark_pair p = pair_of(one, other);
+  const double determinant = p.s[0][0] * p.s[1][1] - p.s[0][1] * p.s[1][0];
+  const double nis =
+      (p.s[1][1] * square(p.apart[0]) - 2.0 * p.s[0][1] * p.apart[0] * p.apart[1] + p.s[0][0] * square(p.apart[1])) /
+      determinant;
+  return determinant > 0.0 && kMisread * kOwnArea_m2 * exp(-0.5 * nis) > kTwoPi * std::sqrt(determinant);
+}
+
+// Where an identity is misread, its landmark stands where the one does that was seen, and they are never seen together.
+void slam::find_double(int landmark) {
+  landmark_note &own = note(landmark);
+  own.is_double = false;
+  if (!own.may_be_misread) return;
+  for (int i = 0; i < joint_.landmarks() && !own.is_double; i++)
+    own.is_double =
+        i != landmark && note(i).seen > own.seen && own.apart_from != note(i).id && stands_with(landmark, i);
 }
 
 }  // namespace wm
