@@ -285,9 +285,6 @@ static wm_status add_sources(wm_recording *self, wm_error *err) {
   if (status == WM_OK) status = add_stream(self, &kStreamMotion, err);
   if (status == WM_OK) status = add_stream(self, &kStreamMotion6, err);
   if (status == WM_OK) status = add_stream(self, &kStreamIncrements, err);
-  if (status == WM_OK && self->source_count == 0)
-    return wm_fail(err, WM_BAD_CONFIG,
-                   "%s: no motion source: can.log, motion.csv, motion6.csv or increments.csv is needed", self->dir);
   if (status == WM_OK) status = add_sensor_streams(self, &kStreamSightings, &self->sighting_sensors, err);
   if (status == WM_OK) status = add_sensor_streams(self, &kStreamMarkers, &self->marker_sensors, err);
   if (status == WM_OK) status = add_stream(self, &kStreamStereo, err);

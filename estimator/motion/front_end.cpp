@@ -54,6 +54,7 @@ void motion_front_end::init(const wm_motion_params *params, const wm_wheels *whe
   params_ = params;
   wheels_ = *wheels;
   commands_ = are_commands(*params);
+  if (params->model == WM_MOTION_CONSTANT_VELOCITY) model_ = WM_MOTION_CONSTANT_VELOCITY;
   hold_max_ns_ = wm_ns_from_seconds(params->hold_max_s);
   now_ns_ = newest_ns_ = fed_ns_ = still_since_ns_ = yaw_same_since_ns_ = WM_TIME_NONE;
   refused_since_ns_ = last_refusal_ns_ = WM_TIME_NONE;
@@ -140,6 +141,15 @@ void motion_front_end::take_twist(const wm_event &event) {
     push_input(event.t_ns, held.a, held.b, true, false, held.side_mps);
 }
 
+// Holds for good: the states move the velocity.
+void motion_front_end::begin_velocity() {
+  motion_input input{};
+  input.t_ns = now_ns_;
+  input.model = WM_MOTION_CONSTANT_VELOCITY;
+  input.counted = 1;
+  history_.push(input);
+}
+
 void motion_front_end::take_quantities(const wm_event &event) {
   const wm_quantities &q = event.as.quantities;
   const bool frozen = (q.doubt & WM_DOUBT_FROZEN_COUNTER) != 0;
@@ -197,6 +207,7 @@ void motion_front_end::choose_model(uint32_t kinds) {
                            (kinds & WM_TWIST_EVENTS) != 0,
                            (kinds & WM_EVENT_BIT(WM_EVENT_INCREMENT)) != 0};
   const int wanted = params_->model;
+  if (wanted == WM_MOTION_CONSTANT_VELOCITY) return;
   if (wanted != WM_MOTION_AUTO) {
     if (possible[wanted]) model_ = (uint8_t)wanted;
     return;

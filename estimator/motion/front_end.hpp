@@ -51,7 +51,8 @@ class motion_front_end {
   void walk(wm_time_ns from_ns, wm_time_ns to_ns, const wm_motion_calibration &calibration, Visit visit) const {
     const wm_time_ns lag_ns = lag_of(calibration);
     history_.walk(from_ns - lag_ns, to_ns - lag_ns, hold_max_ns_, [&](const motion_segment &segment) {
-      const motion_twist twist = twist_of(segment.input, calibration, wheels_);
+      motion_twist twist = twist_of(segment.input, calibration, wheels_);
+      if (segment.input.model == WM_MOTION_CONSTANT_VELOCITY) static_cast<planar_twist &>(twist) = velocity_;
       motion_noise noise =
           noise_of(segment.input, twist, segment.dt_s, *params_, wheels_, calibration, stated_noise_now());
       add_overdue_noise(segment, *params_, ticks_drive() && segment.has_next, &noise);
@@ -68,7 +69,13 @@ class motion_front_end {
   // Twists are commands, although no parameter shows it: an estimator learns how much speed they lose in turns.
   void take_commands() { commands_ = 1; }
 
-  void set_now(wm_time_ns t_ns) { now_ns_ = t_ns; }
+  void set_now(wm_time_ns t_ns) {
+    now_ns_ = t_ns;
+    if (model_ == WM_MOTION_CONSTANT_VELOCITY && history_.empty()) begin_velocity();
+  }
+  // The velocity of WM_MOTION_CONSTANT_VELOCITY, on the map's axes: the estimator's states.
+  void set_velocity(const planar_twist &velocity) { velocity_ = velocity; }
+  const planar_twist &velocity() const { return velocity_; }
   wm_time_ns now_ns() const { return now_ns_; }
   wm_time_ns newest_ns() const { return newest_ns_; }  // newest event that the model uses
   uint32_t health() const { return health_; }
@@ -84,7 +91,7 @@ class motion_front_end {
   }
   int model() const { return model_; }
   // The next input is overdue at that time.
-  bool is_overdue(wm_time_ns t_ns) const { return history_.is_overdue(t_ns); }
+  bool is_overdue(wm_time_ns t_ns) const { return model_ != WM_MOTION_CONSTANT_VELOCITY && history_.is_overdue(t_ns); }
   // Sigmas of the speed and the turn rate of one period by the counts' steps; 0 where no counts drive.
   void count_noise(double *speed_mps, double *turn_rate_radps) const;
   // The last event counted a wheel, and the distance is the counted one.
@@ -123,6 +130,7 @@ class motion_front_end {
   bool read_other_turn_rate(double speed_mps, double *rate_radps) const;
   double counted_turn_rate() const;
   void leave_gyro();
+  void begin_velocity();
   void push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted, double side_mps = 0.0);
   void push_ticks(wm_time_ns t_ns, bool doubtful, bool miscounted);
   void note_integrated(const motion_segment &segment);
@@ -149,6 +157,7 @@ class motion_front_end {
   uint32_t refused_slots_;  // of check_: the last sample was refused
   wm_time_ns refused_since_ns_, last_refusal_ns_;
   tick_wheel wheel_[2];
+  planar_twist velocity_;
   wm_time_ns increment_ns_;                     // end of the newest increment; WM_TIME_NONE: none came
   wm_time_ns off_plane_since_ns_[3];            // rising, rolling, pitching; WM_TIME_NONE: it doesn't
   double off_plane_[3];                         // the last such value

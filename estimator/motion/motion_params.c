@@ -5,7 +5,8 @@
 
 typedef struct wm_motion_params params;
 
-static const char *const kModels[] = {"auto", "ticks", "speed_yaw_rate", "ackermann", "twist", "increments", NULL};
+static const char *const kModels[] = {"auto",  "ticks",      "speed_yaw_rate",    "ackermann",
+                                      "twist", "increments", "constant_velocity", NULL};
 
 // A calibration state of the motion sensors: the sigma at its start, and its random walk.
 #define STATE(term, name, unit, walk_initial, about)                          \
@@ -14,7 +15,7 @@ static const char *const kModels[] = {"auto", "ticks", "speed_yaw_rate", "ackerm
           "Random walk of that state per sqrt(s).")
 
 static const wm_param kParams[] = {
-    ENUM("model", model, WM_MOTION_AUTO, WM_MOTION_INCREMENTS, kModels,
+    ENUM("model", model, WM_MOTION_AUTO, WM_MOTION_CONSTANT_VELOCITY, kModels,
          "Motion model. auto: the first of increments, speed and yaw rate, ticks, speed and steering, twist whose data "
          "come; the speed of speed and yaw rate may be the ticks'."),
     F64("noise.speed_mps", noise_speed_mps, 0.02, 0, 10,
@@ -69,6 +70,12 @@ static const wm_param kParams[] = {
         "which the speed changes."),
     F64("commands.yaw_rate_change", commands_yaw_rate_change, 0, 0, 10,
         "As speed_change, for the rotation: rad per square root of a rad/s. 0.04 is 0.06 s for a change of 0.4 rad/s."),
+    F64("constant_velocity.speed_walk", velocity_speed_walk, 0.5, 1e-6, 100,
+        "m/s per sqrt(s). Without motion data: random walk of the velocity on each of the map's axes, which is a "
+        "state. "
+        "Its start sigma is twice this in m/s. 0.5: a person, a cart; a car 2. Not swept."),
+    F64("constant_velocity.turn_walk", velocity_turn_walk, 0.5, 1e-6, 100,
+        "rad/s per sqrt(s). The same of the turn rate."),
     STATE(WM_SPEED_SCALE, "speed_scale", "", 0,
           "Start sigma of the speed's scale about 1 (tyres, a controller that gives less than asked). 0: off."),
     STATE(WM_YAW_RATE_SCALE, "yaw_rate_scale", "", 0, "Start sigma of the turn rate's scale about 1. 0: off."),

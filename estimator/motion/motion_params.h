@@ -9,6 +9,9 @@
 extern "C" {
 #endif
 
+// Beyond wm_motion_model: no motion data; speed, sideways speed and turn rate are states, which walk randomly.
+enum { WM_MOTION_CONSTANT_VELOCITY = WM_MOTION_INCREMENTS + 1 };
+
 // Calibration states of the motion sensors, by wm_motion_term.
 typedef struct wm_motion_states {
   double sigma[WM_MOTION_TERMS];  // at the start; 0: not a state
@@ -36,6 +39,7 @@ struct wm_motion_params {
   double limits_mps2, limits_radps2;
   double commands_radius_max_m, commands_radius_overflow_m;
   double commands_speed_change, commands_yaw_rate_change;
+  double velocity_speed_walk, velocity_turn_walk;
   wm_motion_states states;
 };
 

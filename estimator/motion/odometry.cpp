@@ -156,6 +156,24 @@ void carry_planar(const wm_odom_point &from, const wm_odom_point &to, wm_estimat
   out->w_radps[2] = to.w_radps;
 }
 
+// Without motion data the estimate's own velocity holds and walks; odom stays where it is.
+void carry_by_own_velocity(const wm_motion_params &params, const wm_estimate *fused, wm_time_ns t_ns, wm_estimate *out,
+                           wm_odom_point *odom) {
+  const double dt_s = wm_seconds_between(fused->t_ns, t_ns), walked_s3 = growth(0.0, dt_s * dt_s * dt_s / 3.0);
+  wm_odom_point from{}, to{};
+  to.t_ns = t_ns;
+  wm::motion_twist twist{};
+  twist.v = fused->v_mps[0], twist.u = fused->v_mps[1], twist.w = fused->w_radps[2];
+  wm::motion_noise noise{};
+  noise.distance_m2 = noise.lateral_m2 = wm::square(params.velocity_speed_walk) * walked_s3;
+  noise.rotation_rad2 = wm::square(params.velocity_turn_walk) * walked_s3;
+  carry_point(to, dt_s, twist, noise);
+  *out = *fused;
+  out->t_ns = t_ns;
+  carry_planar(from, to, out);
+  if (odom) *odom = {t_ns, {}, twist.v, twist.u, twist.w, 0.0, 0.0, 0.0};
+}
+
 }  // namespace
 
 size_t wm_odometry_bytes(void) { return sizeof(wm_odometry); }
@@ -232,6 +250,10 @@ wm_status wm_odometry_at(const wm_odometry *self, wm_time_ns t_ns, wm_odom_point
 
 wm_status wm_odometry_carry(const wm_odometry *self, const wm_estimate *fused, wm_time_ns t_ns, wm_estimate *out,
                             wm_odom_point *odom) {
+  if (self->front.model() == WM_MOTION_CONSTANT_VELOCITY) {
+    carry_by_own_velocity(self->front.params(), fused, t_ns, out, odom);
+    return WM_OK;
+  }
   wm_odom_point from, to;
   wm_status status = wm_odometry_at(self, fused->t_ns, &from);
   if (status == WM_OK) status = wm_odometry_at(self, t_ns, &to);

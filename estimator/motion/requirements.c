@@ -49,6 +49,7 @@ static const char *model_lacks(int model, const wm_wheels *wheels, uint32_t kind
       lacks = speed_lacks(wheels, quantities);
       return lacks ? lacks : steering_lacks(wheels, quantities);
     case WM_MOTION_INCREMENTS: return kinds & WM_EVENT_BIT(WM_EVENT_INCREMENT) ? NULL : "increments.csv";
+    case WM_MOTION_CONSTANT_VELOCITY: return NULL;
     default: break;
   }
   return kinds & WM_TWIST_EVENTS ? NULL : "motion.csv or motion6.csv";

@@ -174,6 +174,13 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
                       const wm_wheels &wheels, const wm_motion_calibration &c, const stated_noise &stated) {
   const bool doubtful = input.stale || input.doubtful || input.model == WM_MOTION_AUTO;
   const bool unknown = doubtful || input.refused;
+  if (input.model == WM_MOTION_CONSTANT_VELOCITY) {
+    // Integral of a velocity that walks.
+    motion_noise walked{};
+    walked.distance_m2 = walked.lateral_m2 = square(p.velocity_speed_walk) * dt_s * dt_s * dt_s / 3.0;
+    walked.rotation_rad2 = square(p.velocity_turn_walk) * dt_s * dt_s * dt_s / 3.0;
+    return walked;
+  }
   if (input.model == WM_MOTION_INCREMENTS && !unknown && finite(input.increment_noise[0]))
     return noise_of_increment(input, dt_s);
   motion_noise n = input.model == WM_MOTION_TICKS && !unknown
@@ -198,7 +205,7 @@ void turn_to_axes(const planar_twist &twist, motion_noise *noise) {
 }
 
 void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p, bool is_counted, motion_noise *noise) {
-  if (segment.input.model == WM_MOTION_INCREMENTS && segment.input.counted) return;
+  if (segment.input.model >= WM_MOTION_INCREMENTS && segment.input.counted) return;
   if (segment.input.stale) {
     // It may have gone on all the while in any direction, as it last did or as it may have begun to since.
     const double left = speed_of({segment.input.a, segment.input.side_mps, 0.0}), right = std::fabs(segment.input.b);

@@ -24,6 +24,13 @@ enum calibration_index {
   kCalibrationCount = WM_MOTION_TERMS
 };
 
+// Without motion data the velocity on the map's axes and the turn rate are three states, after the calibration's.
+inline constexpr int kVelocityStates = 3;
+inline constexpr int kVelocityX = kCalibrationCount, kVelocityY = kVelocityX + 1, kTurnState = kVelocityX + 2;
+inline constexpr int kMotionStates = kVelocityX + kVelocityStates;
+// How many of them there are with this motion.model.
+constexpr int count_velocity_states(int model) { return model == WM_MOTION_CONSTANT_VELOCITY ? kVelocityStates : 0; }
+
 inline constexpr wm_motion_calibration kNeutralCalibration = {{1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0}};
 
 // Twist of base_link: speed forwards and to the left in m/s, turn rate in rad/s.

@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 static wm_time_ns ns_from_ms(double ms) { return wm_ns_from_seconds(ms * 1e-3); }
@@ -60,12 +61,31 @@ static wm_status check_estimator(const wm_assembly *self, wm_error *err) {
 
 // A model without its input would leave the pose where it is, and the state would not tell.
 static wm_status check_motion(const wm_assembly *self, uint32_t quantities, wm_error *err) {
-  const char *lacks = wm_motion_lacks(self->config->motion, &self->setup.wheels, self->kinds, quantities);
+  const char *lacks = wm_motion_lacks(self->setup.motion, &self->setup.wheels, self->kinds, quantities);
   if (!lacks) return WM_OK;
   return wm_fail(err, WM_BAD_CONFIG,
                  "%s: motion.model: with '%s' it needs %s; put that there, or take another model (auto takes the first "
                  "that is possible)",
                  self->config->path, self->recording, lacks);
+}
+
+wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err) {
+  if (self->kinds & WM_MOTION_EVENTS) return WM_OK;
+  const wm_param_table *table = &wm_motion_params_table;
+  for (size_t i = 0; i < table->count; i++) {
+    const wm_param *row = &table->params[i];
+    int32_t model;
+    if (strcmp(row->key, "model") != 0) continue;
+    memcpy(&model, (const char *)self->config->motion + row->offset, sizeof model);
+    if (model != WM_MOTION_AUTO) return WM_OK;  // check_motion() tells what it lacks
+    self->own_motion = malloc(table->bytes);
+    if (!self->own_motion) return wm_fail(err, WM_IO, "no memory for the parameters of the motion");
+    memcpy(self->own_motion, self->config->motion, table->bytes);
+    model = (int32_t)row->max;  // constant_velocity, the last of the choices
+    memcpy((char *)self->own_motion + row->offset, &model, sizeof model);
+    self->setup.motion = self->own_motion;
+  }
+  return WM_OK;
 }
 
 // Only who takes points on a map's edges is given one: it may be large.
@@ -114,17 +134,19 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   status = add_vision(out, recording, err);
   if (status != WM_OK) return status;
   setup->sensors = wm_recording_sensors(recording, &setup->sensor_count);  // cameras have joined
-  if (!(out->kinds & WM_MOTION_EVENTS))
-    return wm_fail(err, WM_BAD_CONFIG, "%s: no motion: %s is there or used; the pose can't be carried on without one",
-                   wm_recording_dir(recording),
-                   wm_recording_is_robot(recording) ? "no CAN interface (devices.can)"
-                                                    : "neither can.log with can-signals.yaml nor motion.csv");
+  if (!(out->kinds & out->config->estimator->takes) && !(out->kinds & WM_MOTION_EVENTS))
+    return wm_fail(err, WM_BAD_CONFIG, "%s: no motion and no observation is there or used",
+                   wm_recording_dir(recording));
+  status = wm_assembly_choose_motion(out, err);
+  if (status != WM_OK) return status;
   out->driving = wm_driving_choose(out->kinds, wm_recording_quantities(recording));
   status = check_motion(out, wm_recording_quantities(recording), err);
   return status == WM_OK ? check_estimator(out, err) : status;
 }
 
 void wm_assembly_close(wm_assembly *self) {
+  free(self->own_motion);
+  self->own_motion = NULL;
   wm_vision_close(self->vision);
   self->vision = NULL;
 }

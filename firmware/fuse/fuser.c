@@ -21,6 +21,7 @@ size_t wm_output_bytes(uint32_t kinds) {
 }
 
 wm_driving wm_driving_choose(uint32_t kinds, uint32_t quantities) {
+  if (!(kinds & WM_MOTION_EVENTS)) return (wm_driving){.kinds = kinds};
   if (kinds & WM_EVENT_BIT(WM_EVENT_INCREMENT))
     return (wm_driving){.kinds = WM_EVENT_BIT(WM_EVENT_INCREMENT), .quantities = 0};
   static const uint32_t kPreferred[] = {TICKS, Q_BIT(WM_Q_YAW_RATE), SPEEDS};
@@ -162,7 +163,6 @@ void wm_fuser_feed(wm_fuser *self, const wm_event *event) {
       return;
     }
     counts->fused++;
-    if (wm_driving_is(&self->driving, event)) self->row_ns = event->t_ns;
   } else {
     wm_status status = correct(self, event);
     if (status != WM_OK) {
@@ -171,6 +171,7 @@ void wm_fuser_feed(wm_fuser *self, const wm_event *event) {
     }
     write_particles(self, event);
   }
+  if (wm_driving_is(&self->driving, event)) self->row_ns = event->t_ns;
   self->until_ns = event->t_ns;
 }
 

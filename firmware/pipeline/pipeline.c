@@ -40,7 +40,7 @@ wm_status wm_pipeline_start(wm_pipeline *self, wm_output output, wm_error *err) 
   if (status != WM_OK)
     return wm_fail(err, status, "%s: estimator '%s' can't start: %s", config->path, config->estimator->name,
                    wm_status_text(status));
-  status = wm_odometry_init(self->odometry_memory, config->motion, &assembly->setup.wheels);
+  status = wm_odometry_init(self->odometry_memory, assembly->setup.motion, &assembly->setup.wheels);
   if (status != WM_OK)
     return wm_fail(err, status, "%s: motion: odometry can't start: %s", config->path, wm_status_text(status));
 

@@ -150,7 +150,8 @@ wm_status wm_replay_log(const wm_config *config, wm_log_reader *log, const wm_re
   log_replay *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "no memory for a replay");
   assemble(self, config, wm_log_reader_head(log), options->map);
-  wm_status status = run(self, log, options, report, err);
+  wm_status status = wm_assembly_choose_motion(&self->assembly, err);
+  if (status == WM_OK) status = run(self, log, options, report, err);
   wm_error close_error;
   wm_status closed = wm_run_folder_close(self->folder, &close_error);
   if (status == WM_OK && closed != WM_OK) {
@@ -158,6 +159,7 @@ wm_status wm_replay_log(const wm_config *config, wm_log_reader *log, const wm_re
     if (err) *err = close_error;
   }
   wm_arena_close(&self->arena);
+  wm_assembly_close(&self->assembly);
   free(self);
   return status;
 }

@@ -46,7 +46,7 @@ struct filter {
     wm_motion_states states{};
     for (double &sigma : states.sigma) sigma = 0.01;
     states.sigma[7] = states.sigma[8] = 0.0;
-    state->set_motion_states(states, {}, wm::kPoseStates);
+    state->set_motion_states(states, WM_MOTION_AUTO, {}, wm::kPoseStates);
     const double start[3][3] = {{1e-4, 0, 0}, {0, 1e-4, 0}, {0, 0, 1e-4}};
     state->set_pose({0, 0, 0}, start);
     if (width == 3) state->find_scale(false);  // as under coded markers

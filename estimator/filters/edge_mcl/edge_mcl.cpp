@@ -43,8 +43,8 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   for (int k = 0; k <= kCameraTime; k++) each_camera += params.sigma[k] > 0.0;
   const wm_motion_states &motion = setup.motion->states;
   filter_.init(setup, motion,
-               kPoseStates + planar_filter::count_motion_states(motion) + (params.sigma[kEdgeOffset] > 0.0) +
-                   each_camera * cameras);
+               kPoseStates + planar_filter::count_motion_states(motion, setup.motion->model) +
+                   (params.sigma[kEdgeOffset] > 0.0) + each_camera * cameras);
   const auto add = [&](int row) { return params.sigma[row] > 0.0 ? filter_.add_state(0.0, params.sigma[row]) : -1; };
   edge_state_ = add(kEdgeOffset);
   camera_count_ = cameras;

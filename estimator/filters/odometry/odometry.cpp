@@ -13,16 +13,20 @@ namespace {
 
 struct odometry_params {};
 const wm_param_old kOld[] = {{"states.*", "/motion.states.*", nullptr}, {nullptr, nullptr, nullptr}};
-const char *const kReads[] = {"motion.", nullptr};
+const char *const kReads[] = {"!motion.constant_velocity.", "motion.", nullptr};
 
 class odometry {
  public:
-  static size_t bytes(const odometry_params &, const wm_setup &, const char **) { return sizeof(odometry); }
+  static size_t bytes(const odometry_params &, const wm_setup &setup, const char **why) {
+    if (setup.motion->model != WM_MOTION_CONSTANT_VELOCITY) return sizeof(odometry);
+    *why = "dead reckoning needs motion data";
+    return 0;
+  }
 
   void init(const odometry_params &, const wm_setup &setup) {
     setup_ = &setup;
     const wm_motion_states &states = setup.motion->states;
-    filter_.init(setup, states, kPoseStates + planar_filter::count_motion_states(states));
+    filter_.init(setup, states, kPoseStates + planar_filter::count_motion_states(states, setup.motion->model));
     searching_ = !start_is_known(setup.start);
     resets_ = 1;
   }

@@ -31,6 +31,10 @@ const char *const kReads[] = {"!motion.states.", "!motion.standstill.bias", "mot
 size_t pf_edges::bytes(const wm_pf_edges_params &params, const wm_setup &setup, const char **why) {
   const size_t map = edge_map::bytes_or_reason(setup.map, why);
   if (map == 0) return 0;
+  if (setup.motion->model == WM_MOTION_CONSTANT_VELOCITY) {
+    *why = "it needs motion data: its particles have no velocity";
+    return 0;
+  }
   memory_layout layout(nullptr, sizeof(pf_edges));
   lay_out(&layout, params, setup);
   return layout.bytes();

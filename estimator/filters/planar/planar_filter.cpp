@@ -7,8 +7,8 @@
 
 namespace wm {
 
-int planar_filter::count_motion_states(const wm_motion_states &states) {
-  int count = 0;
+int planar_filter::count_motion_states(const wm_motion_states &states, int model) {
+  int count = count_velocity_states(model);
   for (double sigma : states.sigma) count += sigma > 0.0;
   return count + wheel_heading::count_states(states);
 }
@@ -27,6 +27,10 @@ void planar_filter::init(const wm_setup &setup, const wm_motion_states &motion, 
   for (int i = 0; i < kCalibrationCount; i++) {
     const bool on = motion.sigma[i] > 0.0;
     set_motion_state(motion, i, on ? add_state(calibration_.value[i], motion.sigma[i]) : -1);
+  }
+  if (count_velocity_states(setup.motion->model) > 0) {
+    set_velocity_states(n_);
+    for (int k = 0; k < kVelocityStates; k++) add_state(0.0, velocity_sigma(k));
   }
   wheels_.init(*this, motion);
 }
@@ -58,7 +62,13 @@ void planar_filter::move_to(wm_time_ns t_ns) {
       [this](const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {
         propagate(piece, twist, noise);
       },
-      [this](int state, double variance) { p()[state * stride_ + state] += variance; });
+      [this](int state, double variance) { p()[state * stride_ + state] += variance; },
+      [this](int state, double factor, double variance) { fade(state, factor, variance); });
+  if (!has_velocity()) return;
+  take_calibration(x());
+  const double heading = x()[kHeading], spread = variance(kHeading);
+  if (spread > kAnyHeading_rad2) fade(kHeading, std::sqrt(kAnyHeading_rad2 / spread), 0.0);
+  x()[kHeading] = heading;
 }
 
 void planar_filter::propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {

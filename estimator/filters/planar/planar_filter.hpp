@@ -29,8 +29,8 @@ struct projection {
 
 class planar_filter : public planar_motion {
  public:
-  // How many states the motion's calibration takes.
-  static int count_motion_states(const wm_motion_states &states);
+  // How many states the motion's calibration takes with this motion.model.
+  static int count_motion_states(const wm_motion_states &states, int model = WM_MOTION_AUTO);
 
   // Doubles of the memory behind a filter of so many states.
   static constexpr size_t doubles(int states) {

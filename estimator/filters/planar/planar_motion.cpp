@@ -22,6 +22,7 @@ void planar_motion::init_motion(const wm_setup &setup) {
   travelled_m_ = turned_rad_ = 0.0;
   twist_ = {};
   for (steady_rate &rate : steady_) rate.restart(0.0);
+  heading_rad_ = 0.0;
   sensor_states_ = 0;
 }
 
@@ -36,7 +37,30 @@ void planar_motion::set_motion_state(const wm_motion_states &states, int i, int 
   if (i == kTurnSlowdown && state >= 0) front_.take_commands();
 }
 
+planar_twist planar_motion::velocity_at(double heading_rad) const {
+  const planar_twist &v = front_.velocity();
+  const sin_cos h = sincos(heading_rad);
+  return {h.cos * v.v + h.sin * v.u, h.cos * v.u - h.sin * v.v, v.w};
+}
+
+void planar_motion::set_velocity_states(int first) {
+  const wm_motion_params &params = front_.params();
+  for (int i = kVelocityX; i < kMotionStates; i++) {
+    const double walk = i == kTurnState ? params.velocity_turn_walk : params.velocity_speed_walk;
+    walk_[i] = square(walk);
+    start_variance_[i] = 4.0 * square(walk);
+    motion_state_[i] = first + i - kVelocityX;
+  }
+}
+
 wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const {
+  if (has_velocity() && now_ns() != WM_TIME_NONE) {
+    const planar_twist &v = front_.velocity();
+    const double at_rad = heading_rad_ + v.w * wm_seconds_between(now_ns(), from_ns);
+    const double dt = wm_seconds_between(from_ns, to_ns);
+    static_cast<planar_twist &>(*twist) = velocity_at(at_rad);
+    return {twist->v * dt, twist->u * dt, v.w * dt};
+  }
   wm_pose2 sum{};
   bool first = true;
   front_.walk(from_ns, to_ns, calibration_,
@@ -54,20 +78,29 @@ void planar_motion::take_step(const motion_segment &segment, const motion_twist 
   odom_ = compose(odom_, step.body);
   travelled_m_ += speed_of(twist) * segment.dt_s;
   turned_rad_ += std::fabs(step.turn_rad);
-  twist_ = twist;
+  if (has_velocity())
+    twist_ = velocity_at(heading_rad_);
+  else
+    twist_ = twist;
+  heading_rad_ += step.turn_rad;
   double v_sigma, w_sigma;
   front_.count_noise(&v_sigma, &w_sigma);
   const double share = segment.dt_s / (segment.dt_s + kSteady_s);
-  steady_[0].step(twist.v, share, v_sigma);
-  steady_[1].step(twist.u, share, 0.0);
-  steady_[2].step(twist.w, share, w_sigma);
+  steady_[0].step(twist_.v, share, v_sigma);
+  steady_[1].step(twist_.u, share, 0.0);
+  steady_[2].step(twist_.w, share, w_sigma);
 }
 
 void planar_motion::take_calibration(double *states) {
-  for (int i = 0; i < kCalibrationCount; i++) {
+  for (int i = 0; i < kMotionStates; i++) {
     const int state = motion_state_[i];
-    if (state >= 0) calibration_.value[i] = states[state] = motion_state_within_limits(i, states[state]);
+    if (state >= 0) states[state] = motion_state_within_limits(i, states[state]);
+    if (state >= 0 && i < kCalibrationCount) calibration_.value[i] = states[state];
   }
+  if (!has_velocity() || motion_state_[kVelocityX] < 0) return;
+  const double *velocity = states + motion_state_[kVelocityX];
+  front_.set_velocity({velocity[0], velocity[1], velocity[2]});
+  heading_rad_ = states[kHeading];
   for (int i = 0; i < sensor_states_; i++) {
     double &value = states[sensor_state_[i].state];
     if (value < sensor_state_[i].low) value = sensor_state_[i].low;

@@ -23,6 +23,14 @@ inline constexpr int kMaxSensorStates = 192;
 inline constexpr double kDefaultStartSigma = 0.05;
 inline double given_or_default(double sigma) { return finite(sigma) ? sigma : kDefaultStartSigma; }
 
+// Steps of the prediction while the velocity walks. Not swept.
+inline constexpr wm_time_ns kVelocityStep_ns = 100 * WM_NS_PER_MS;
+// The velocity is a first-order Gauss-Markov process with this time constant: its sigma stays at the start's, which is
+// twice the walk. Without it an unseen robot would be at any speed. Not swept.
+inline constexpr double kVelocityTau_s = 8.0;
+// Variance of a heading that may be any.
+inline constexpr double kAnyHeading_rad2 = kPi * kPi / 3.0;
+
 class planar_motion {
  public:
   // Time of the state; WM_TIME_NONE before the first event.
@@ -52,6 +60,12 @@ class planar_motion {
   void init_motion(const wm_setup &setup);
   // Start variance and random walk of a calibration term; `state` is its index in the filter, -1: not a state.
   void set_motion_state(const wm_motion_states &states, int i, int state);
+  // The states of a constant velocity are `first` and those behind it.
+  void set_velocity_states(int first);
+  bool has_velocity() const { return front_.model() == WM_MOTION_CONSTANT_VELOCITY; }
+  // The velocity in the robot's axes at a heading.
+  planar_twist velocity_at(double heading_rad) const;
+  double velocity_sigma(int k) const { return std::sqrt(start_variance_[kCalibrationCount + k]); }
   // A state of a sensor's error: its random walk per sqrt(s), and the limits beyond which an update is cut.
   void set_sensor_state(int state, double walk, double low, double high);
 
@@ -72,18 +86,26 @@ class planar_motion {
 
   // propagate(segment, twist, noise) for each segment until `t_ns`, then walk(state, variance) for each calibration
   // state.
-  template <class Propagate, class Walk>
-  void advance(wm_time_ns t_ns, Propagate propagate, Walk walk) {
+  // fade(state, factor, variance): a state of the velocity, x := factor x + noise.
+  template <class Propagate, class Walk, class Fade>
+  void advance(wm_time_ns t_ns, Propagate propagate, Walk walk, Fade fade) {
     if (now_ns() == WM_TIME_NONE) front_.set_now(t_ns);
     if (now_ns() < start_ns_) {  // the start pose is later: until then only the inputs that hold are kept
       front_.advance(t_ns < start_ns_ ? t_ns : start_ns_, calibration_,
                      [](const motion_segment &, const motion_twist &, const motion_noise &) {});
     }
-    if (t_ns <= now_ns()) return;
+    // A walking velocity moves the pose by its own variance, so that long times are cut.
+    const wm_time_ns longest = has_velocity() ? kVelocityStep_ns : INT64_MAX;
+    while (t_ns > now_ns()) advance_once(t_ns - now_ns() > longest ? now_ns() + longest : t_ns, propagate, walk, fade);
+  }
+  template <class Propagate, class Walk, class Fade>
+  void advance_once(wm_time_ns t_ns, Propagate propagate, Walk walk, Fade fade) {
     const double dt = wm_seconds_between(now_ns(), t_ns);
     front_.advance(t_ns, calibration_, propagate);
     for (int i = 0; i < kCalibrationCount; i++)
       if (motion_state_[i] >= 0) walk(motion_state_[i], walk_[i] * dt);
+    for (int i = kVelocityX; has_velocity() && i < kMotionStates; i++)
+      fade(motion_state_[i], exp(-dt / kVelocityTau_s), walk_[i] * dt);
     for (int i = 0; i < sensor_states_; i++)
       if (sensor_state_[i].walk > 0.0) walk(sensor_state_[i].state, sensor_state_[i].walk * dt);
   }
@@ -94,15 +116,15 @@ class planar_motion {
 
   template <class Filter>
   void list_motion_states_of(const Filter &filter, calibration_list *out) const {
-    for (int i = 0; i < kCalibrationCount; i++)
+    for (int i = 0; i < kMotionStates; i++)
       if (const int state = motion_state_[i]; state >= 0)
         out->add(kMotionStateNames[i], filter.value(state), std::sqrt(filter.variance(state)));
   }
 
   motion_front_end front_;
   wm_motion_calibration calibration_;
-  int motion_state_[kCalibrationCount];
-  double walk_[kCalibrationCount], start_variance_[kCalibrationCount];
+  int motion_state_[kMotionStates];
+  double walk_[kMotionStates], start_variance_[kMotionStates];
   struct sensor_state_limits {
     int state, unused;       // no padding: the same events must give the same bytes
     double walk, low, high;  // walk: variance per s
@@ -114,6 +136,7 @@ class planar_motion {
   double travelled_m_, turned_rad_;
   planar_twist twist_;     // of the last segment
   steady_rate steady_[3];  // of its v, u and w
+  double heading_rad_;     // only where has_velocity()
 };
 
 // A planar pose's estimate; covariance(i, j) is that of x, y and heading.

@@ -2,30 +2,60 @@
 #include "filters/planar/pose_step.hpp"
 
 #include "math/arc.hpp"
+#include "motion/plausibility.hpp"
 
 namespace wm {
 namespace {
 
+// A robot that turns faster spins: no landmark is identified then.
+constexpr double kTurnMost_radps = 10.0;
 // Limits of the calibration's terms, by calibration_index: beyond, the model is wrong, or the lag exceeds the history.
-constexpr double kLowest[kCalibrationCount] = {0.3, 0.3, -1.0, 0.3, 0.3, 0.3, -0.5, 0.0, -1.0},
-                 kHighest[kCalibrationCount] = {3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0};
+constexpr double kLowest[kMotionStates] =
+    {0.3, 0.3, -1.0, 0.3, 0.3, 0.3, -0.5, 0.0, -1.0, -kSpeedMost_mps, -kSpeedMost_mps, -kTurnMost_radps},
+                 kHighest[kMotionStates] = {
+                     3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0, kSpeedMost_mps, kSpeedMost_mps, kTurnMost_radps};
 
 }  // namespace
 
-const char *const kMotionStateNames[kCalibrationCount] = {
-    "motion.speed_scale",         "motion.yaw_rate_scale", "motion.yaw_rate_bias_radps",
-    "motion.left_scale",          "motion.right_scale",    "motion.track_scale",
-    "motion.steering_offset_rad", "motion.lag_s",          "motion.turn_slowdown_mps"};
+const char *const kMotionStateNames[kMotionStates] = {
+    "motion.speed_scale",       "motion.yaw_rate_scale", "motion.yaw_rate_bias_radps", "motion.left_scale",
+    "motion.right_scale",       "motion.track_scale",    "motion.steering_offset_rad", "motion.lag_s",
+    "motion.turn_slowdown_mps", "motion.velocity_x_mps", "motion.velocity_y_mps",      "motion.turn_rate_radps"};
 
 double motion_state_within_limits(int calibration_index, double value) {
   if (value < kLowest[calibration_index]) return kLowest[calibration_index];
   return value > kHighest[calibration_index] ? kHighest[calibration_index] : value;
 }
 
+namespace {
+
+// A velocity on the map's axes does not turn with the robot: no column by the heading.
+pose_step make_velocity_step(double dt, const motion_twist &twist, const motion_noise &noise, double heading_rad,
+                             const int motion_state[kMotionStates]) {
+  pose_step out{};
+  out.x_m = twist.v * dt;
+  out.y_m = twist.u * dt;
+  out.turn_rad = twist.w * dt;
+  out.body = between({0.0, 0.0, heading_rad}, {out.x_m, out.y_m, heading_rad + out.turn_rad});
+  out.columns = kVelocityStates;
+  for (int k = 0; k < kVelocityStates; k++) {
+    out.column[k] = motion_state[kVelocityX + k];
+    out.by[k][k] = dt;
+  }
+  out.noise[kX][kX] = noise.distance_m2;
+  out.noise[kY][kY] = noise.lateral_m2;
+  out.noise[kHeading][kHeading] = noise.rotation_rad2;
+  return out;
+}
+
+}  // namespace
+
 pose_step make_pose_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
-                         double heading_rad, const planar_twist &before, const int motion_state[kCalibrationCount]) {
-  pose_step out;
+                         double heading_rad, const planar_twist &before, const int motion_state[kMotionStates]) {
   const double dt = segment.dt_s;
+  if (segment.input.model == WM_MOTION_CONSTANT_VELOCITY)
+    return make_velocity_step(dt, twist, noise, heading_rad, motion_state);
+  pose_step out;
   const arc a = make_arc(twist.v * dt, twist.u * dt, twist.w * dt);
   const sin_cos h = sincos(heading_rad);
   const double dx = h.cos * a.x_m - h.sin * a.y_m;

@@ -49,19 +49,21 @@ bool is_on(const wm_motion_states &states, const joint_state::wheel_slip &slip, 
 
 }  // namespace
 
-int joint_state::count_motion_states(const wm_motion_states &states, const wheel_slip &slip) {
-  int count = slip.sigma > 0.0 ? 2 : 0;
+int joint_state::count_motion_states(const wm_motion_states &states, int model, const wheel_slip &slip) {
+  int count = (slip.sigma > 0.0 ? 2 : 0) + count_velocity_states(model);
   for (int i = 0; i < kCalibrationCount; i++) count += is_on(states, slip, i);
   return count;
 }
 
-void joint_state::set_motion_states(const wm_motion_states &states, const wheel_slip &slip, int first) {
+void joint_state::set_motion_states(const wm_motion_states &states, int model, const wheel_slip &slip, int first) {
   slip_ = slip;
   for (int i = 0; i < kCalibrationCount; i++) {
     const bool on = is_on(states, slip, i);
     set_motion_state(states, i, on ? first++ : -1);
     if (on) forget(motion_state_[i], kNeutralCalibration.value[i], start_variance_[i]);
   }
+  if (count_velocity_states(model) > 0) set_velocity_states(first);
+  for (int k = 0; k < count_velocity_states(model); k++) forget(first++, 0.0, square(velocity_sigma(k)));
   if (!(slip.sigma > 0.0)) return;
   for (int side = 0; side < 2; side++) {
     const int wheel = motion_state_[kLeftScale + side], mean = slip_mean_[side] = first++;
@@ -101,7 +103,14 @@ void joint_state::move_to(wm_time_ns t_ns) {
       [this](int state, double variance) {
         p().row(state)[state] += variance;
         if (scale_variance_[state] > 0.0) scale_variance_[state] += variance;
-      });
+      },
+      [this](int state, double factor, double variance) { fade(state, factor, variance); });
+  if (has_velocity()) {
+    take_calibration(x());
+    const double heading = x()[kHeading], spread = variance(kHeading);
+    if (spread > kAnyHeading_rad2) fade(kHeading, std::sqrt(kAnyHeading_rad2 / spread), 0.0);
+    x()[kHeading] = heading;
+  }
   if (slip_.sigma > 0.0 && before_ns != WM_TIME_NONE && now_ns() > before_ns)
     wander(wm_seconds_between(before_ns, now_ns()));
 }

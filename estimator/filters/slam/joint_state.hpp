@@ -49,8 +49,9 @@ class joint_state : public planar_motion {
   struct wheel_slip {
     double sigma, tau_s;
   };
-  void set_motion_states(const wm_motion_states &states, const wheel_slip &slip, int first);  // from `first` on
-  static int count_motion_states(const wm_motion_states &states, const wheel_slip &slip);
+  void set_motion_states(const wm_motion_states &states, int model, const wheel_slip &slip,
+                         int first);  // from `first` on
+  static int count_motion_states(const wm_motion_states &states, int model, const wheel_slip &slip);
   // Puts states of the robot (those of `to`: zero, with variance 0) in front of the landmarks, and makes these as wide
   // (a heading, where it is new, is unknown). `to` is at least as large in each, and within its capacity.
   void grow(const joint_layout &to);

@@ -40,7 +40,7 @@ joint_state::wheel_slip slip_of(const wm_slam_params &p) { return {p.wheel_slip_
 
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
-  return kPoseStates + joint_state::count_motion_states(setup.motion->states, slip_of(p)) +
+  return kPoseStates + joint_state::count_motion_states(setup.motion->states, setup.motion->model, slip_of(p)) +
          sensor_slots::count(s.states, setup.sensor_count) + (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count +
          s.correlated_slots * error_slot_of(p, s).width;
 }
@@ -121,8 +121,8 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   first_ray_ = first_clone_ = layout.first_clone;
   rejoins_ = params.line_rejoin == WM_SLAM_REJOIN_ON;
   int next = kPoseStates;
-  joint_.set_motion_states(setup.motion->states, slip_of(params), next);
-  next += joint_state::count_motion_states(setup.motion->states, slip_of(params));
+  joint_.set_motion_states(setup.motion->states, setup.motion->model, slip_of(params), next);
+  next += joint_state::count_motion_states(setup.motion->states, setup.motion->model, slip_of(params));
   for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
   slots_.init(sightings().states, setup.sensor_count,
               [&](double value, double sigma, double walk, double low, double high) {

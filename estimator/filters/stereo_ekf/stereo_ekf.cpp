@@ -45,6 +45,7 @@ spatial_noise twist_noise_of(const wm_stereo_ekf_params &p, const wm_rig *rig) {
 const char *const kReads[] = {"!motion.noise.",
                               "!motion.states.",
                               "!motion.commands.",
+                              "!motion.constant_velocity.",
                               "!motion.standstill.yaw_rate",
                               "!motion.standstill.bias",
                               "motion.",

@@ -27,6 +27,7 @@ typedef struct wm_assembled_source {
 typedef struct wm_assembly {
   const wm_config *config;
   wm_setup setup;
+  wm_motion_params *own_motion;  // without motion data: the configuration's with that motion.model; else NULL
   wm_driving driving;
   uint32_t kinds;  // of all used sources
   wm_assembled_source sources[WM_SOURCES_MAX];
@@ -40,10 +41,13 @@ typedef struct wm_assembly {
   char recording[WM_NAME_MAX + 96];  // the recording's name
 } wm_assembly;
 
-// `config` and `recording` outlive the assembly. WM_BAD_CONFIG where they don't go together: no motion, a source named
+// `config` and `recording` outlive the assembly. WM_BAD_CONFIG where they don't go together: no data, a source named
 // in the configuration that isn't there under any recording's name, an estimator that can't work with this setup.
 // Where it fails, too, wm_assembly_close is to be called.
 wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t seed, wm_assembly *out, wm_error *err);
+// motion.model `auto` becomes `constant_velocity` where no source gives motion. WM_BAD_CONFIG where the configuration
+// has another one.
+wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err);
 // Closes what it opened: the pictures. Before the recording is closed, and before the memory of the run.
 void wm_assembly_close(wm_assembly *self);
 

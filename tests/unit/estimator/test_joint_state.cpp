@@ -47,7 +47,7 @@ struct made {
     states.sigma[wm::kYawRateScale] = 0.05;
     states.sigma[wm::kYawRateBias] = 0.01;
     states.sigma[wm::kLag] = 0.02;
-    state->set_motion_states(states, slip, wm::kPoseStates);
+    state->set_motion_states(states, WM_MOTION_AUTO, slip, wm::kPoseStates);
     const double start[3][3] = {{0.01, 0, 0}, {0, 0.01, 0}, {0, 0, 0.01}};
     state->set_pose({1, 2, 0.3}, start);
   }

@@ -6,9 +6,12 @@
 #include "events.hpp"
 #include "filters/planar/past_pose.hpp"
 #include "filters/planar/planar_filter.hpp"
+#include "math/cholesky.hpp"
 #include "math/eigen.hpp"
 #include "math/se2.hpp"
+#include "motion/motion_params.h"
 #include "unity.h"
+#include "waymark/random.h"
 
 namespace {
 
@@ -168,6 +171,54 @@ void test_motion_that_leaves_the_plane(void) {
   }
 }
 
+// GIVEN no motion data WHEN a robot whose velocity walks is seen each 0.5 s THEN pose and velocity are found, and their
+// errors are as large as their sigmas say: NEES over 40 drives.
+void test_a_velocity_of_its_own(void) {
+  double nees = 0.0, speed_errors = 0.0;
+  const int drives = 40, steps = 60, fine = 50;
+  for (uint64_t drive = 0; drive < drives; drive++) {
+    uint64_t draw = 0;
+    const auto normal = [&] { return wm_random_normal(7, drive, draw++); };
+    wm_params_defaults(&wm_motion_params_table, &params);
+    params.model = WM_MOTION_CONSTANT_VELOCITY;
+    setup = {};
+    setup.motion = &params;
+    setup.wheels = make::no_wheels();
+    setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0, 0.1, 0.1};
+    filter.init(setup, {}, wm::kPoseStates + wm::planar_filter::count_motion_states({}, params.model));
+    wm_pose2 truth = {0.1 * normal(), 0.1 * normal(), 0.1 * normal()};
+    double v[3] = {normal(), normal(), normal()};  // a start sigma of two of the walk
+    filter.move_to(0);
+    for (int i = 1; i <= steps; i++) {
+      for (int k = 0; k < fine; k++) {
+        truth = {truth.x_m + 0.01 * v[0], truth.y_m + 0.01 * v[1], wm::wrap(truth.heading_rad + 0.01 * v[2])};
+        for (double &each : v) each = each * (1.0 - 0.01 / 8.0) + 0.5 * 0.1 * normal();
+      }
+      filter.move_to(make::at(0.5 * i));
+      const double seen[3] = {truth.x_m, truth.y_m, truth.heading_rad};
+      for (int k = 0; k < 3; k++) {
+        wm::planar_row row;
+        row.add(k, 1.0);
+        wm::projection projected;
+        filter.project(row, &projected);
+        const double off = seen[k] + 0.05 * normal() - filter.value(k);
+        TEST_ASSERT_TRUE(filter.update(projected, k == 2 ? wm::wrap(off) : off, 0.05 * 0.05));
+      }
+    }
+    wm::matrix<3> p;
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++) p(i, j) = filter.covariance(i, j);
+    const wm::vector<3> off = {truth.x_m - filter.pose().x_m, truth.y_m - filter.pose().y_m,
+                               wm::wrap(truth.heading_rad - filter.pose().heading_rad)};
+    wm::matrix<3> inverse;
+    TEST_ASSERT_TRUE(wm::invert_positive(p, &inverse));
+    nees += off.dot(inverse * off) / drives;
+    speed_errors += wm::square(v[0] - filter.value(3)) / filter.variance(3) / drives;
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(1.0, 3.0, nees);  // 2.6 sigma of the mean
+  TEST_ASSERT_DOUBLE_WITHIN(0.6, 1.0, speed_errors);
+}
+
 }  // namespace
 
 void setUp(void) {}
@@ -183,5 +234,6 @@ int main(void) {
   RUN_TEST(test_increments_that_overlap);
   RUN_TEST(test_impossible_increments_are_refused);
   RUN_TEST(test_motion_that_leaves_the_plane);
+  RUN_TEST(test_a_velocity_of_its_own);
   return UNITY_END();
 }

@@ -112,8 +112,6 @@ const error_case kErrorCases[] = {
     {REC, "Quaternion of the wrong length", "recording.yaml",
      "format: waymark-recording/1\nvehicle:\n  initial_pose: {qx: 0, qy: 0, qz: 1, qw: 1}\n",
      "rec/recording.yaml:3: vehicle.initial_pose: the quaternion's length is 1.414; 1 is needed"},
-    {REC, "No motion at all", "motion.csv", NULL,
-     "rec: no motion source: can.log, motion.csv, motion6.csv or increments.csv is needed"},
     {REC, "CAN without a DBC", "vehicle.dbc", NULL,
      "rec/vehicle.dbc: is not there, but needed to read can.log; name one in the configuration or put it into the "
      "folder"},
