@@ -53,7 +53,7 @@ void motion_front_end::init(const wm_motion_params *params, const wm_wheels *whe
   std::memset(static_cast<void *>(this), 0, sizeof *this);
   params_ = params;
   wheels_ = *wheels;
-  commands_ = are_commands(*params);
+  commands_ = are_commands(*params) || params->twist == WM_TWIST_COMMANDS ? kStated : 0;
   if (params->model == WM_MOTION_CONSTANT_VELOCITY) model_ = WM_MOTION_CONSTANT_VELOCITY;
   hold_max_ns_ = wm_ns_from_seconds(params->hold_max_s);
   now_ns_ = newest_ns_ = fed_ns_ = still_since_ns_ = yaw_same_since_ns_ = WM_TIME_NONE;
@@ -118,6 +118,10 @@ void motion_front_end::take_twist(const wm_event &event) {
   const double u = planar ? 0.0 : event.as.twist6.v_mps[1];
   if (!planar) watch_plane(event.t_ns, event.as.twist6);
   choose_model(WM_EVENT_BIT(event.kind));
+  twists_.note(v, rate,
+               std::fabs(v) > params_->standstill_speed_mps || std::fabs(rate) > params_->standstill_yaw_rate_radps);
+  if (params_->twist == WM_TWIST_AUTO)
+    commands_ = (commands_ & kStated) | (twists_.kind() == kKindCommands ? kDetected : 0);
   if (model_ != WM_MOTION_TWIST) return;
   twists_in_space_ = !planar;
   if (twist_ns_ != WM_TIME_NONE && event.t_ns > twist_ns_ && !is_overdue(event.t_ns)) {
@@ -219,6 +223,19 @@ void motion_front_end::choose_model(uint32_t kinds) {
   }
 }
 
+motion_kind motion_front_end::kind() const {
+  switch (model_) {
+    case WM_MOTION_TICKS: return kKindTicks;
+    case WM_MOTION_SPEED_YAW_RATE: return kKindGyro;
+    case WM_MOTION_ACKERMANN: return kKindSteering;
+    case WM_MOTION_INCREMENTS: return increments_are_calibrated_ ? kKindCalibrated : kKindMeasured;
+    case WM_MOTION_TWIST: break;
+    default: return kKindUnknown;
+  }
+  if (commands_) return kKindCommands;
+  return params_->twist == WM_TWIST_MEASURED || twists_.kind() == kKindMeasured ? kKindMeasured : kKindTwist;
+}
+
 double motion_front_end::by_gear(double value, bool is_signed) const {
   const bool reverse = seen(WM_Q_GEAR) && value_[WM_Q_GEAR] < 0.0;
   return reverse && !is_signed ? -value : value;
@@ -299,7 +316,8 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.b = b;
   input.side_mps = side_mps;
   input.model = model_;
-  input.command = model_ == WM_MOTION_TWIST && commands_;
+  input.command = model_ == WM_MOTION_TWIST && commands_ != 0;
+  input.kind = kind();
   input.doubtful = doubtful;
   mark_refused(&input);
   input.standing = still_since_ns_ != WM_TIME_NONE && !doubtful && !input.refused &&

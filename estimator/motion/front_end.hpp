@@ -6,6 +6,7 @@
 
 #include "motion/commands.hpp"
 #include "motion/history.hpp"
+#include "motion/motion_kind.hpp"
 #include "motion/plausibility.hpp"
 #include "motion/step.hpp"
 #include "motion/wheel.hpp"
@@ -67,7 +68,7 @@ class motion_front_end {
   motion_twist twist_at(wm_time_ns t_ns, const wm_motion_calibration &calibration) const;
 
   // Twists are commands, although no parameter shows it: an estimator learns how much speed they lose in turns.
-  void take_commands() { commands_ = 1; }
+  void take_commands() { commands_ |= kStated; }
 
   void set_now(wm_time_ns t_ns) {
     now_ns_ = t_ns;
@@ -90,6 +91,7 @@ class motion_front_end {
     return true;
   }
   int model() const { return model_; }
+  motion_kind kind() const;
   // The next input is overdue at that time.
   bool is_overdue(wm_time_ns t_ns) const { return model_ != WM_MOTION_CONSTANT_VELOCITY && history_.is_overdue(t_ns); }
   // Sigmas of the speed and the turn rate of one period by the counts' steps; 0 where no counts drive.
@@ -103,6 +105,7 @@ class motion_front_end {
 
  private:
   enum { kTwistSpeed = WM_Q_COUNT, kTwistRate, kTwistSide, kSlots };  // of check_: a slot for each quantity and these
+  enum : uint8_t { kStated = 1, kDetected = 2 };                      // of commands_
   enum speed_source : uint8_t { kNone, kFrontWheels, kVehicleSpeed, kTicksMean, kRearWheels };
 
   void take_quantities(const wm_event &event);
@@ -154,6 +157,7 @@ class motion_front_end {
   wm_time_ns stamp_ns_[WM_Q_COUNT], message_ns_[WM_Q_COUNT];  // newest accepted value; newest message
   double period_s_[WM_Q_COUNT];  // usual time between two messages with that quantity; 0: unknown
   sample_check check_[kSlots];
+  command_detector twists_;
   uint32_t refused_slots_;  // of check_: the last sample was refused
   wm_time_ns refused_since_ns_, last_refusal_ns_;
   tick_wheel wheel_[2];
@@ -173,9 +177,10 @@ class motion_front_end {
   uint8_t model_;
   uint8_t speed_source_;
   uint8_t speed_source_changed_;
-  uint8_t commands_;          // twists are commands
-  uint8_t twists_in_space_;   // the newest twist had six components
-  uint8_t yaw_fresh_;         // the last event brought a yaw rate
+  uint8_t commands_;                   // twists are commands: why
+  uint8_t twists_in_space_;            // the newest twist had six components
+  uint8_t increments_are_calibrated_;  // the newest increment had a covariance
+  uint8_t yaw_fresh_;                  // the last event brought a yaw rate
   uint8_t observed_without_;  // per wheel: observations corrected the pose while counts were missing; no count since
   uint8_t speed_is_signed_;   // a negative speed came: the sign is the sensor's, not the gear's
 };

@@ -72,7 +72,9 @@ void motion_front_end::take_increment(const wm_event &event) {
   wm_time_ns from_ns = step.from_ns;
   const double whole_s = wm_seconds_between(from_ns, event.t_ns);
   motion_input done{};
+  increments_are_calibrated_ = !std::isnan(step.covariance[0]);
   done.model = model_;
+  done.kind = kind();
   if (std::isnan(step.covariance[0]))
     done.increment_noise[0] = std::numeric_limits<float>::quiet_NaN();
   else
@@ -127,11 +129,12 @@ stated_noise motion_front_end::stated_noise_now() const {
 void motion_front_end::watch_plane(wm_time_ns t_ns, const wm_twist6 &twist) {
   const double speed = speed_of({twist.v_mps[0], twist.v_mps[1], 0.0});
   const double stated = finite(stated_v_mps_[2]) ? stated_v_mps_[2] : params_->noise_speed_mps;
-  const double rise = square(stated) + square(params_->noise_speed_rel * speed);
+  const rate_noise white = rate_noise_of(*params_, kind());
+  const double rise = square(stated) + square(white.speed_rel * speed);
   const double value[3] = {twist.v_mps[2], twist.w_radps[0], twist.w_radps[1]};
   bool lasts = false;
   for (int i = 0; i < 3; i++) {
-    const double w = i > 0 && finite(stated_w_radps_[i - 1]) ? stated_w_radps_[i - 1] : params_->noise_yaw_rate_radps;
+    const double w = i > 0 && finite(stated_w_radps_[i - 1]) ? stated_w_radps_[i - 1] : white.yaw_rate_radps;
     const double variance = i == 0 ? rise : square(w) + square(kGyroBias_radps);
     const bool off = square(value[i]) > square(kOffPlaneSigmas) * variance;
     if (!off || value[i] * off_plane_[i] < 0.0) off_plane_since_ns_[i] = off ? t_ns : WM_TIME_NONE;

@@ -28,6 +28,7 @@ struct motion_input {
   uint8_t stale;           // set by walk(): held for longer than hold_max
   uint8_t counted;         // by the counts or the increment at its end: true until then, however long
   uint8_t command;         // a twist that is a command
+  uint8_t kind;            // motion_kind
   uint8_t refused;         // kRefusedSpeed, kRefusedTurn: samples of it are refused, and this is the last plausible one
   double refused_s;        // at t_ns: for how long
 };

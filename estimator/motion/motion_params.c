@@ -7,24 +7,33 @@ typedef struct wm_motion_params params;
 
 static const char *const kModels[] = {"auto",  "ticks",      "speed_yaw_rate",    "ackermann",
                                       "twist", "increments", "constant_velocity", NULL};
+static const char *const kTwists[] = {"auto", "measured", "commands", NULL};
 
 // A calibration state of the motion sensors: the sigma at its start, and its random walk.
-#define STATE(term, name, unit, walk_initial, about)                          \
-  F64("states." name "_sigma" unit, states.sigma[term], 0, 0, 1, about),      \
-      F64("states." name "_walk" unit, states.walk[term], walk_initial, 0, 1, \
+#define STATE(term, name, unit, initial, walk_initial, about)                   \
+  F64("states." name "_sigma" unit, states.sigma[term], initial, -1, 1, about), \
+      F64("states." name "_walk" unit, states.walk[term], walk_initial, 0, 1,   \
           "Random walk of that state per sqrt(s).")
+#define BY_KIND " 0: off. Below 0: of that size, "
 
 static const wm_param kParams[] = {
     ENUM("model", model, WM_MOTION_AUTO, WM_MOTION_CONSTANT_VELOCITY, kModels,
          "Motion model. auto: the first of increments, speed and yaw rate, ticks, speed and steering, twist whose data "
          "come; the speed of speed and yaw rate may be the ticks'."),
+    ENUM("twist", twist, WM_TWIST_AUTO, WM_TWIST_COMMANDS, kTwists,
+         "Whether the rows of motion.csv are commands or measured. auto: commands, where rows "
+         "repeat the one before; vehicle.motion_kind of recording.yaml decides where it is there."),
     F64("noise.speed_mps", noise_speed_mps, 0.02, 0, 10,
         "White noise of the speed, m/s per sqrt(s): slip and play at walking pace."),
-    F64("noise.speed_rel", noise_speed_rel, 0.03, 0, 2,
-        "White noise of the speed relative to the speed, per sqrt(s); variances are added."),
-    F64("noise.yaw_rate_radps", noise_yaw_rate_radps, 0.01, 0, 10, "White noise of the turn rate, rad/s per sqrt(s)."),
-    F64("noise.yaw_rate_rel", noise_yaw_rate_rel, 0.03, 0, 2,
-        "White noise of the turn rate relative to the turn rate, per sqrt(s)."),
+    F64("noise.speed_rel", noise_speed_rel, -1, -1, 2,
+        "White noise of the speed relative to the speed, per sqrt(s); variances are added. "
+        "Below 0: 0.06 of commands, 0.03 of a measured twist or with steering, 0.02 with a yaw rate."),
+    F64("noise.yaw_rate_radps", noise_yaw_rate_radps, -1, -1, 10,
+        "White noise of the turn rate, rad/s per sqrt(s). "
+        "Below 0: 0.02 of commands, 0.004 of a yaw rate's sensor, else 0.01."),
+    F64("noise.yaw_rate_rel", noise_yaw_rate_rel, -1, -1, 2,
+        "White noise of the turn rate relative to the turn rate, per sqrt(s). "
+        "Below 0: 0.13 of commands, 0.05 of a measured twist, 0.01 of a yaw rate's sensor, else 0.03."),
     F64("noise.yaw_rate_per_mps", noise_yaw_rate_per_mps, 0.0, 0, 10,
         "White noise of the turn rate in rad/s per m/s of speed, per sqrt(s): castors, ruts, a wheel that slips."),
     F64("noise.side_rel", noise_side_rel, 0.01, 0, 2,
@@ -76,23 +85,33 @@ static const wm_param kParams[] = {
         "Its start sigma is twice this in m/s. 0.5: a person, a cart; a car 2. Not swept."),
     F64("constant_velocity.turn_walk", velocity_turn_walk, 0.5, 1e-6, 100,
         "rad/s per sqrt(s). The same of the turn rate."),
-    STATE(WM_SPEED_SCALE, "speed_scale", "", 0,
-          "Start sigma of the speed's scale about 1 (tyres, a controller that gives less than asked). 0: off."),
-    STATE(WM_YAW_RATE_SCALE, "yaw_rate_scale", "", 0, "Start sigma of the turn rate's scale about 1. 0: off."),
-    STATE(WM_YAW_RATE_BIAS, "yaw_rate_bias", "_radps", 0.0001,
-          "Start sigma of the turn rate's bias, rad/s (a cheap gyro: 0.02). 0: off."),
-    STATE(WM_LEFT_SCALE, "left_scale", "", 0, "Start sigma of the left wheel's scale about 1, for ticks. 0: off."),
-    STATE(WM_RIGHT_SCALE, "right_scale", "", 0, "Start sigma of the right wheel's scale about 1, for ticks. 0: off."),
-    STATE(WM_TRACK_SCALE, "track_scale", "", 0, "Start sigma of the track's scale about 1, for ticks. 0: off."),
-    STATE(WM_STEERING_OFFSET, "steering_offset", "_rad", 0,
-          "Start sigma of the road wheel's zero, rad, for speed and steering. 0: off."),
-    STATE(WM_LAG, "lag", "_s", 0, "Start sigma of the motion's delay behind its samples, s. 0: off."),
-    STATE(WM_TURN_SLOWDOWN, "turn_slowdown", "_mps", 0,
+    STATE(WM_SPEED_SCALE, "speed_scale", "", -0.05, 0,
+          "Start sigma of the speed's scale about 1 (tyres, a controller that gives less than asked)." BY_KIND
+          "where a speed is measured or commanded."),
+    STATE(WM_YAW_RATE_SCALE, "yaw_rate_scale", "", -0.1, 0,
+          "Start sigma of the turn rate's scale about 1." BY_KIND "where the turn rate is measured or commanded."),
+    STATE(WM_YAW_RATE_BIAS, "yaw_rate_bias", "_radps", -0.02, 0.0001,
+          "Start sigma of the turn rate's bias, rad/s (a cheap gyro: 0.02)." BY_KIND
+          "where the turn rate is measured or commanded."),
+    STATE(WM_LEFT_SCALE, "left_scale", "", -0.02, 0,
+          "Start sigma of the left wheel's scale about 1, for ticks." BY_KIND "where ticks drive."),
+    STATE(WM_RIGHT_SCALE, "right_scale", "", -0.02, 0,
+          "Start sigma of the right wheel's scale about 1, for ticks." BY_KIND "where ticks drive."),
+    STATE(WM_TRACK_SCALE, "track_scale", "", -0.02, 0,
+          "Start sigma of the track's scale about 1, for ticks." BY_KIND
+          "where ticks drive, or are a second source of the heading."),
+    STATE(WM_STEERING_OFFSET, "steering_offset", "_rad", -0.02, 0,
+          "Start sigma of the road wheel's zero, rad, for speed and steering." BY_KIND "where steering drives."),
+    STATE(WM_LAG, "lag", "_s", -0.2, 0,
+          "Start sigma of the motion's delay behind its samples, s." BY_KIND
+          "where twists are commands: a measured motion's delay cannot be told from the observations' time offsets."),
+    STATE(WM_TURN_SLOWDOWN, "turn_slowdown", "_mps", -0.25, 0,
           "Start sigma of the loss of a commanded speed at a turn rate of 1 rad/s, m/s; it grows with the square of "
-          "the turn rate (drives that limit or round their wheels' speeds). 0: off."),
-    F64("states.wheel_difference_sigma", states.wheel_difference_sigma, 0, 0, 1,
+          "the turn rate (drives that limit or round their wheels' speeds)." BY_KIND "where twists are commands."),
+    F64("states.wheel_difference_sigma", states.wheel_difference_sigma, 0.0141, 0, 1,
         "With speed by ticks and the heading by a yaw rate: start sigma of the relative difference of the wheels' "
-        "radii. The ticks then measure the heading, too, which bounds the random walk of the gyro's noise. 0: off."),
+        "radii. The ticks then measure the heading, too, which bounds the random walk of the gyro's noise. 0: off. Two "
+        "wheels of 1 % each."),
     F64("states.wheel_difference_walk", states.wheel_difference_walk, 0.00001, 0, 1,
         "Random walk of that state per sqrt(m): tyres warm up, loads move."),
 };

@@ -11,16 +11,18 @@ extern "C" {
 
 // Beyond wm_motion_model: no motion data; speed, sideways speed and turn rate are states, which walk randomly.
 enum { WM_MOTION_CONSTANT_VELOCITY = WM_MOTION_INCREMENTS + 1 };
+typedef enum wm_twist_kind { WM_TWIST_AUTO, WM_TWIST_MEASURED, WM_TWIST_COMMANDS } wm_twist_kind;
 
 // Calibration states of the motion sensors, by wm_motion_term.
 typedef struct wm_motion_states {
-  double sigma[WM_MOTION_TERMS];  // at the start; 0: not a state
+  double sigma[WM_MOTION_TERMS];  // at the start; 0: not a state; below 0: by the motion's kind
   double walk[WM_MOTION_TERMS];   // random walk, per sqrt(s)
   double wheel_difference_sigma, wheel_difference_walk;
 } wm_motion_states;
 
 struct wm_motion_params {
   int32_t model;  // wm_motion_model
+  int32_t twist;  // wm_twist_kind
   double noise_speed_mps;
   double noise_speed_rel;
   double noise_yaw_rate_radps;

@@ -103,8 +103,8 @@ void carry_spatial(const wm_motion_params &params, const spatial_point &from, co
   covariance = wm::transformed(by_start, covariance);
   const double walk_s3 = growth(from.walk_s3, to.walk_s3), white_s = growth(0.0, dt_s);
   const double place_m2 = wm::square(params.noise_speed_mps) * white_s + wm::square(params.noise_hold_mps2) * walk_s3;
-  const double rotation_rad2 =
-      wm::square(params.noise_yaw_rate_radps) * white_s + wm::square(params.noise_hold_radps2) * walk_s3;
+  const double rotation_rad2 = wm::square(wm::rate_noise_of(params, wm::kKindMeasured).yaw_rate_radps) * white_s +
+                               wm::square(params.noise_hold_radps2) * walk_s3;
   for (int i = 0; i < 6; i++) {
     covariance(i, i) += i < 3 ? place_m2 : rotation_rad2;
     for (int j = 0; j <= i; j++)

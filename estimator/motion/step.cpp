@@ -5,6 +5,7 @@
 
 #include "math/elementary.hpp"
 #include "motion/commands.hpp"
+#include "motion/motion_kind.hpp"
 
 namespace wm {
 namespace {
@@ -140,12 +141,13 @@ motion_noise noise_of_rates(const motion_input &input, const motion_twist &twist
   const double rest = square(p.noise_rest_factor);
   const double speed_factor = slow && !unknown ? rest : 1.0;
   const double rate_factor = at_rest && !unknown ? rest : 1.0;
+  const rate_noise white = rate_noise_of(p, static_cast<motion_kind>(input.kind));
   const bool states = finite(stated.distance_m2), states_turn = finite(stated.rotation_rad2);
   const double speed2 = states ? stated.distance_m2 : square(p.noise_speed_mps);
-  const double rate2 = states_turn ? stated.rotation_rad2 : square(p.noise_yaw_rate_radps);
-  n.distance_m2 = (speed2 * speed_factor + square(p.noise_speed_rel * speed)) * dt_s;
+  const double rate2 = states_turn ? stated.rotation_rad2 : square(white.yaw_rate_radps);
+  n.distance_m2 = (speed2 * speed_factor + square(white.speed_rel * speed)) * dt_s;
   n.rotation_rad2 =
-      (rate2 * rate_factor + square(p.noise_yaw_rate_rel * twist.w) + square(p.noise_yaw_rate_per_mps * speed)) * dt_s;
+      (rate2 * rate_factor + square(white.yaw_rate_rel * twist.w) + square(p.noise_yaw_rate_per_mps * speed)) * dt_s;
   if (states) n.lateral_m2 = stated.lateral_m2 * speed_factor * dt_s;
   if (input.model != WM_MOTION_ACKERMANN || unknown) return n;
   const double tangent = std::fabs(twist.v) > 1e-9 ? twist.w * wheels.wheelbase_m / twist.v : 0.0;

@@ -14,6 +14,11 @@ namespace wm {
 
 inline double first_number(double a, double b, double c) { return finite(a) ? a : finite(b) ? b : c; }
 
+// A parameter of a sigma: below 0 the multiple of `sigma`.
+inline double absolute_sigma(double parameter, double sigma) {
+  return parameter < 0.0 ? -parameter * sigma : parameter;
+}
+
 // Which components of a sighting are fused, and how noisy they are.
 struct sighting_reading {
   bool bearing, range;
@@ -32,14 +37,31 @@ inline sighting_reading read_sighting(const wm_sighting &s, const mounted_sensor
   return r;
 }
 
+// Sigma of a sighting's time-correlated error: of the bearing, without and with that across the line of sight, and of
+// the range, without and with the part that is relative to it. 0 without slots.
+inline double correlated_bearing(const wm_sighting_params &p, double sigma_rad) {
+  return p.correlated_slots > 0 ? absolute_sigma(p.correlated_bearing_rad, sigma_rad) : 0.0;
+}
+inline double correlated_bearing(const wm_sighting_params &p, double sigma_rad, double distance_m) {
+  if (p.correlated_slots == 0) return 0.0;
+  return std::sqrt(square(correlated_bearing(p, sigma_rad)) + square(p.correlated_lateral_m / distance_m));
+}
+inline double correlated_range(const wm_sighting_params &p, double sigma_m) {
+  return p.correlated_slots > 0 ? absolute_sigma(p.correlated_range_m, sigma_m) : 0.0;
+}
+inline double correlated_range(const wm_sighting_params &p, double sigma_m, double range_m) {
+  if (p.correlated_slots == 0) return 0.0;
+  return std::sqrt(square(correlated_range(p, sigma_m)) + square(p.correlated_range_rel * range_m));
+}
+
 // The states of a slot of time-correlated errors: `width` of them; the offsets of the bearing's and the range's error
 // in it, -1: not carried. An error of sigma 1 is scaled by the parameters.
 struct correlated_slot {
   int bearing, range, width;
 };
 inline correlated_slot correlated_slot_of(const wm_sighting_params &p) {
-  const bool bearing = p.correlated_bearing_rad > 0.0 || p.correlated_lateral_m > 0.0;
-  const bool range = p.correlated_range_m > 0.0 || p.correlated_range_rel > 0.0;
+  const bool bearing = p.correlated_bearing_rad != 0.0 || p.correlated_lateral_m > 0.0;
+  const bool range = p.correlated_range_m != 0.0 || p.correlated_range_rel > 0.0;
   return {bearing ? 0 : -1, range ? static_cast<int>(bearing) : -1, p.correlated_slots > 0 ? bearing + range : 0};
 }
 

@@ -11,11 +11,12 @@ typedef struct wm_sighting_params params;
 #define WALK_WALK(state, key, unit) \
   F64("states." key "_walk" unit, states.walk[WM_SENSOR_ROW_##state], 0, 0, 1, \
       "Random walk of that state per sqrt(s). 0: it is constant."),
-#define ONE(state, key, unit, name, neutral, low, high, noise, most, text) \
-  F64("states." key "_sigma" unit, states.sigma[WM_SENSOR_ROW_##state], 0, 0, most, text), \
+#define ONE(state, key, unit, name, neutral, low, high, noise, initial, most, text) \
+  F64("states." key "_sigma" unit, states.sigma[WM_SENSOR_ROW_##state], initial, (initial) < 0 ? -(most) : 0, most, \
+      text), \
   WALK_##noise(state, key, unit)
-#define TWO(state, second, key, unit, name, name2, neutral, low, high, noise, most, text) \
-  ONE(state, key, unit, name, neutral, low, high, noise, most, text)
+#define TWO(state, second, key, unit, name, name2, neutral, low, high, noise, initial, most, text) \
+  ONE(state, key, unit, name, neutral, low, high, noise, initial, most, text)
 // clang-format on
 
 static const char *const kUnidentified[] = {"false", "true", "auto", NULL};
@@ -46,21 +47,23 @@ static const wm_param kParams[] = {
     // clang-format off
     WM_SENSOR_STATES(ONE, TWO)
     // clang-format on
-    I32("correlated.slots", correlated_slots, 0, 0, 24,
+    I32("correlated.slots", correlated_slots, 10, 0, 24,
         "Pairs of sensor and landmark (the last seen ones) whose time-correlated error is carried as Gauss-Markov "
-        "states."),
-    F64("correlated.bearing_rad", correlated_bearing_rad, 0, 0, 3,
-        "Sigma of a bearing's time-correlated error, rad. 0: none."),
-    F64("correlated.lateral_m", correlated_lateral_m, 0, 0, 10,
+        "states. 0: no error is time-correlated."),
+    F64("correlated.bearing_rad", correlated_bearing_rad, -1, -10, 3,
+        "Sigma of a bearing's time-correlated error, rad. 0: none. Below 0: that multiple of the bearing's sigma; flat "
+        "from 0.5 to 1."),
+    F64("correlated.lateral_m", correlated_lateral_m, 0.02, 0, 10,
         "Sigma of the time-correlated error across the line of sight, m; the variances are added."),
-    F64("correlated.range_m", correlated_range_m, 0, 0, 100, "Sigma of a range's time-correlated error, m."),
-    F64("correlated.range_rel", correlated_range_rel, 0, 0, 1,
+    F64("correlated.range_m", correlated_range_m, -0.5, -10, 100,
+        "Sigma of a range's time-correlated error, m. Below 0: that multiple of the range's sigma."),
+    F64("correlated.range_rel", correlated_range_rel, 0.01, 0, 1,
         "The same as a fraction of the range; the variances are added."),
     F64("correlated.tau_s", correlated_tau_s, 2, 0.01, 1e6, "Time constant of these errors, s."),
     F64("gate.soft", gate_soft, 9, 1, 1e6,
         "Normalised innovation squared for two degrees of freedom above which the noise is inflated, as for a "
         "distribution with long tails; scaled for one and three. 99 % of correct measurements lie below 9.2."),
-    F64("gate.hard", gate_hard, 25, 1, 1e6, "The same, above which a measurement is an outlier and rejected."),
+    F64("gate.hard", gate_hard, 50, 1, 1e6, "The same, above which a measurement is an outlier and rejected."),
 };
 
 const wm_param_table wm_sighting_params_table = {kParams, sizeof kParams / sizeof kParams[0], sizeof(params), NULL};

@@ -191,6 +191,7 @@ std::vector<scenario> scenarios() {
        {"motion.states.wheel_difference"}},
       {"", "steering", motion::steering, 0, kSilence, 14, kMotionStates, {"motion.states.steering"}},
       {"", "samples that no robot can follow", motion::speed_and_gyro, 0, kGlitches, 10, {}, {"motion.limits."}},
+      {"", "twists", motion::twist, 0, 0, 10, {}, {"motion.twist"}},
       {"",
        "commands of a drive with a largest radius",
        motion::twist,
@@ -262,7 +263,7 @@ std::vector<scenario> scenarios() {
        kBearings,
        kNoStart | kFewBeacons,
        20,
-       {},
+       {{"sightings.correlated.slots", 0}, {"recover.sigma_xy_m", 1}},
        {"recover."}},
       {"landmark_ekf", "wrong start", motion::twist, kBearings, kWrongStart | kSilence, 20, {}},
 

@@ -5,27 +5,32 @@
 #define WAYMARK_ESTIMATOR_CORE_SENSOR_SLOTS_HPP
 
 #include "filters/core/state_slots.hpp"
-#include "sensors/sensor_model.hpp"
+#include "sensors/sighting.hpp"
 #include "waymark/estimator.h"
 
 namespace wm {
 
 class sensor_slots {
  public:
-  // States that so many sensors take.
-  static int count(const wm_sensor_states &states, size_t sensors) {
+  // States that so many sensors take. `known_map`: landmarks are where it has them; else ranges are the only standard
+  // of length, and the default leaves their scale out.
+  static int count(const wm_sensor_states &states, size_t sensors, bool known_map) {
     int each = 0;
-    for (const sensor_state_spec &spec : kSensorStateSpecs) each += states.sigma[spec.row] > 0.0;
+    for (const sensor_state_spec &spec : kSensorStateSpecs) each += is_on(states, spec.row, known_map);
     return each * static_cast<int>(sensors);
   }
 
   // add(neutral, sigma, walk, low, high) appends a state to the filter and returns its index.
   template <class Add>
-  void init(const wm_sensor_states &states, size_t sensors, Add add) {
-    slots_.init(static_cast<int>(sensors), [&](int k) {
+  void init(const wm_setup &setup, bool known_map, Add add) {
+    const wm_sighting_params &p = *setup.sightings;
+    slots_.init(static_cast<int>(setup.sensor_count), [&](int sensor, int k) {
       const sensor_state_spec &s = kSensorStateSpecs[k];
-      const double sigma = states.sigma[s.row];
-      return sigma > 0.0 ? add(s.neutral, sigma, states.walk[s.row], s.low, s.high) : -1;
+      const double range_sigma_m =
+          first_number(setup.sensors[sensor].range_sigma_m, p.range_sigma_default_m, p.range_sigma_default_m);
+      const double sigma =
+          absolute_sigma(p.states.sigma[s.row], s.row == WM_SENSOR_ROW_kRangeBias ? range_sigma_m : 1.0);
+      return is_on(p.states, s.row, known_map) ? add(s.neutral, sigma, p.states.walk[s.row], s.low, s.high) : -1;
     });
   }
 
@@ -55,6 +60,10 @@ class sensor_slots {
   }
 
  private:
+  static bool is_on(const wm_sensor_states &states, int row, bool known_map) {
+    return states.sigma[row] > 0.0 || (states.sigma[row] < 0.0 && (known_map || row != WM_SENSOR_ROW_kRangeScale));
+  }
+
   state_slots<kMaxSensors, kSensorStates> slots_;
 };
 

@@ -12,11 +12,11 @@ namespace wm {
 template <int kOwners, int kRows>
 class state_slots {
  public:
-  // add(row) appends a state to the filter and returns its index, or -1 where the row is off.
+  // add(owner, row) appends a state to the filter and returns its index, or -1 where the row is off.
   template <class Add>
   void init(int owners, Add add) {
     for (int i = 0; i < kOwners; i++)
-      for (int k = 0; k < kRows; k++) slot_[i][k] = i < owners ? add(k) : -1;
+      for (int k = 0; k < kRows; k++) slot_[i][k] = i < owners ? add(i, k) : -1;
   }
 
   int at(int owner, int row) const { return slot_[owner][row]; }  // -1: off

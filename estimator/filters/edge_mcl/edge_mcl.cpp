@@ -49,7 +49,7 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   edge_state_ = add(kEdgeOffset);
   camera_count_ = cameras;
   for (int c = 0; c < camera_count_; c++) camera_[c].init(setup.rig->cameras[c]);
-  slots_.init(camera_count_, add);
+  slots_.init(camera_count_, [&](int, int row) { return add(row); });
   memory_layout layout(this, sizeof *this);
   map_.init(*setup.map, layout.take<uint8_t>(edge_map::bytes(*setup.map)));
   search_.init(map_, layout.take<uint8_t>(place_search::bytes(*setup.map)));

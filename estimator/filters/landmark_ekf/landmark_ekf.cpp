@@ -23,8 +23,8 @@ int map_states(const wm_sighting_params &p) { return p.use_elevation ? 3 : 2; }
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
-         sensor_slots::count(s.states, setup.sensor_count) + (p.gnss_time_offset_sigma_s > 0.0) +
-         2 * (p.gnss_correlated_m > 0.0) + s.correlated_slots * correlated_slot_of(s).width +
+         sensor_slots::count(s.states, setup.sensor_count, true) + (p.gnss_time_offset_sigma_s > 0.0) +
+         2 * (p.gnss_correlated_m != 0.0) + s.correlated_slots * correlated_slot_of(s).width +
          map_states(s) * p.map_slots + 2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
 }
 
@@ -67,14 +67,13 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   filter_.init(setup, setup.motion->states, count_states(params, setup), behind.filter);
   const auto add = [this](double value, double sigma) { return sigma > 0.0 ? filter_.add_state(value, sigma) : -1; };
   for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
-  slots_.init(sightings().states, setup.sensor_count,
-              [this](double value, double sigma, double walk, double low, double high) {
-                return filter_.add_sensor_state(value, sigma, walk, low, high);
-              });
+  slots_.init(setup, true, [this](double value, double sigma, double walk, double low, double high) {
+    return filter_.add_sensor_state(value, sigma, walk, low, high);
+  });
   components_ = sightings().states.sigma[WM_SENSOR_ROW_kAngleScale] > 0.0 ? kAngleScaled : 0u;
   gnss_time_state_ = add(0.0, params.gnss_time_offset_sigma_s);
-  gnss_error_state_ = add(0.0, params.gnss_correlated_m);
-  if (gnss_error_state_ >= 0) add(0.0, params.gnss_correlated_m);
+  gnss_error_state_ = add(0.0, std::fabs(params.gnss_correlated_m));  // below 0: the first position sets its variance
+  if (gnss_error_state_ >= 0) add(0.0, std::fabs(params.gnss_correlated_m));
   gnss_error_ns_ = tilt_ns_ = WM_TIME_NONE;
   calibration_states_ = filter_.states();
   error_ = correlated_slot_of(sightings());

@@ -84,7 +84,7 @@ class landmark_ekf {
                   double error_size, residual *r) const;
   void finish_row(wm_residual kind, double observed, double expected, const wm_innovation &record, residual *r) const;
   void decay_tilt(wm_time_ns t_ns);
-  void decay_gnss_error(wm_time_ns t_ns);
+  void decay_gnss_error(wm_time_ns t_ns, double sigma_m);
 
   // Gates one or two components jointly, weakens or rejects, updates, writes the records. Returns the log Bayes factor
   // of "anywhere in clutter_volume" against "as expected". `usable` false: the source is known to be wrong.
@@ -106,6 +106,7 @@ class landmark_ekf {
   travelled_pose2 odometry() const { return {filter_.odom(), filter_.travelled_m(), filter_.turned_rad()}; }
   bool needs_search(wm_time_ns t_ns, bool by_bearing);
   void search_now(wm_time_ns t_ns);
+  double found_sigma_m(wm_time_ns since_ns) const;
   void search(wm_time_ns since_ns, const observation *prior, int prior_count);
   void begin_life(bool pose_known);
   void start_again();

@@ -13,12 +13,14 @@ constexpr double kClutterPlace_m = 200.0;
 
 }  // namespace
 
-// The receiver's time-correlated error on each axis: a Gauss-Markov process.
-void landmark_ekf::decay_gnss_error(wm_time_ns t_ns) {
+// The receiver's time-correlated error on each axis: a Gauss-Markov process, which approaches this sigma.
+void landmark_ekf::decay_gnss_error(wm_time_ns t_ns, double sigma_m) {
   if (gnss_error_state_ < 0) return;
+  const bool is_first = gnss_error_ns_ == WM_TIME_NONE && params_.gnss_correlated_m < 0.0;
+  for (int k = 0; k < 2 && is_first; k++) filter_.forget(gnss_error_state_ + k, 0.0, square(sigma_m));
   const double left =
       gnss_error_ns_ == WM_TIME_NONE ? 1.0 : decay_over(gnss_error_ns_, t_ns, params_.gnss_correlated_tau_s);
-  for (int k = 0; k < 2; k++) decay_state(&filter_, gnss_error_state_ + k, left, square(params_.gnss_correlated_m));
+  for (int k = 0; k < 2; k++) decay_state(&filter_, gnss_error_state_ + k, left, square(sigma_m));
   gnss_error_ns_ = t_ns;
 }
 
@@ -34,13 +36,14 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
   if (!params_.use_position) return reject(records, record, WM_REJECTED_BY_CONFIG);
   double sigma = params_.gnss_sigma_factor * p.sigma_xy_m;
   if (sigma < params_.gnss_sigma_min_m) sigma = params_.gnss_sigma_min_m;
-  decay_gnss_error(event.t_ns);
+  const double correlated_m = absolute_sigma(params_.gnss_correlated_m, p.sigma_xy_m);
+  decay_gnss_error(event.t_ns, correlated_m);
   const past_pose past = pose_before(filter_, gnss_time_state_ < 0 ? 0.0 : filter_.value(gnss_time_state_));
   observation seen = observation_at(event.t_ns, kPositionKey, compose(filter_.odom(), past.step));
   seen.kind = kObservedPosition;
   seen.place_m[0] = p.p_m[0];
   seen.place_m[1] = p.p_m[1];
-  seen.sigma_length_m = std::sqrt(square(sigma) + square(params_.gnss_correlated_m));
+  seen.sigma_length_m = std::sqrt(square(sigma) + square(correlated_m));
   buffer_observation(seen);
   if (life_.searching()) {
     search_now(event.t_ns);

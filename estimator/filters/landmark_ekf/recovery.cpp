@@ -21,6 +21,9 @@ constexpr double kElsewhere_m = 0.5, kElsewhere_rad = 0.2;  // added to 3 sigma
 // Sigmas above which a pose is vague and a Kalman update far from linear: of the heading, and of the place over that of
 // one anywhere among the landmarks. It is searched for kVagueFor_s, and then updated nevertheless.
 constexpr double kVague_rad = 0.5, kVaguePlace = 0.5, kVagueFor_s = 5.0;
+// Largest sigma of a found place: where only bearings find it, and the least limit by accurate ranges. Not swept; 0.3 m
+// with bearings loses crossing-laps.
+constexpr double kFoundByBearings_m = 1.0, kFoundLeast_m = 0.3;
 constexpr double kLeastDepth = 0.1;  // floor of the cosine between a depth's axis and the bearing
 
 }  // namespace
@@ -68,13 +71,15 @@ observation landmark_ekf::observation_of(const sighting_context &at, wm_time_ns 
   const double along =
       at.reading.range && sensor.range_is_depth && !std::isnan(s.bearing_rad) ? cos(s.bearing_rad) : 1.0;
   seen.range_m = (s.range_m - errors[kRangeBias]) / errors[kRangeScale] / (along > kLeastDepth ? along : kLeastDepth);
-  seen.sigma_angle_rad = std::sqrt(square(at.reading.bearing_sigma_rad) + square(sightings().correlated_bearing_rad) +
-                                   square(scale_sigma * kHalfPi));
+  seen.sigma_angle_rad =
+      std::sqrt(square(at.reading.bearing_sigma_rad) +
+                square(correlated_bearing(sightings(), at.reading.bearing_sigma_rad)) + square(scale_sigma * kHalfPi));
   seen.sigma_place_m = std::sqrt(square(map_sigma(at.landmark)) + square(sigma[WM_SENSOR_ROW_kMountX]) +
                                  square(tilt_sigma * (target.p_m[2] - sensor.z_m)));
-  seen.sigma_length_m = std::sqrt(
-      square(at.reading.range_sigma_m) + square(sightings().correlated_range_m) + square(map_sigma(at.landmark)) +
-      square((sightings().range_sigma_rel + sightings().correlated_range_rel) * seen.range_m));
+  seen.sigma_length_m =
+      std::sqrt(square(at.reading.range_sigma_m) + square(correlated_range(sightings(), at.reading.range_sigma_m)) +
+                square(map_sigma(at.landmark)) +
+                square((sightings().range_sigma_rel + sightings().correlated_range_rel) * seen.range_m));
   return seen;
 }
 
@@ -130,7 +135,7 @@ bool landmark_ekf::is_elsewhere(wm_time_ns since_ns, wm_time_ns t_ns) {
   if (kFewOf * fitting > recent) return false;
   const search_result other =
       observations_.find(since_ns, odometry(), nullptr, 0,
-                         {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad, kNumbersElsewhere});
+                         {found_sigma_m(since_ns), params_.recover_sigma_heading_rad, kNumbersElsewhere});
   if (!other.found || kFewOf * fitting > other.agreeing) return false;
   const double place = filter_.variance(kX) + filter_.variance(kY) + other.covariance[0][0] + other.covariance[1][1];
   const double heading = filter_.variance(kHeading) + other.covariance[2][2];
@@ -152,6 +157,17 @@ void landmark_ekf::update_moved(int landmark) {
   }
 }
 
+// Of all sensors.
+static double most_correlated_bearing(const wm_setup &setup) {
+  const double by_default = setup.sightings->bearing_sigma_default_rad;
+  double most = correlated_bearing(*setup.sightings, setup.sensor_count > 0 ? 0.0 : by_default);
+  for (size_t i = 0; i < setup.sensor_count; i++) {
+    const double sigma = first_number(setup.sensors[i].bearing_sigma_rad, by_default, by_default);
+    if (const double own = correlated_bearing(*setup.sightings, sigma); own > most) most = own;
+  }
+  return most;
+}
+
 void landmark_ekf::begin_start_test() {
   double covariance[3][3];
   for (int i = 0; i < 3; i++)
@@ -165,7 +181,7 @@ void landmark_ekf::test_start(wm_time_ns t_ns) {
   if (start_tested_ns_ != WM_TIME_NONE && wm_seconds_between(start_tested_ns_, t_ns) < kTestStartEvery_s) return;
   start_tested_ns_ = t_ns;
   start_.test(observations_,
-              {sightings().states.sigma[WM_SENSOR_ROW_kYaw], sightings().correlated_bearing_rad,
+              {sightings().states.sigma[WM_SENSOR_ROW_kYaw], most_correlated_bearing(*setup_),
                sightings().correlated_lateral_m},
               filter_.pose(), odometry(), t_ns);
   if (!start_.rejected()) return;
@@ -225,6 +241,20 @@ bool landmark_ekf::needs_search(wm_time_ns t_ns, bool by_bearing) {
   return wm_seconds_between(vague_ns_, t_ns) < kVagueFor_s;
 }
 
+// The largest sigma with which a place is accepted that is found by the observations since then.
+double landmark_ekf::found_sigma_m(wm_time_ns since_ns) const {
+  if (params_.recover_sigma_xy_m >= 0.0) return params_.recover_sigma_xy_m;
+  double least_m = INFINITY;
+  for (int i = 0; i < observations_.kept(); i++) {
+    const observation &o = observations_.at(i);
+    const bool has_length = (o.kind & (kObservedRange | kObservedPosition)) != 0 && o.t_ns >= since_ns;
+    if (has_length && o.sigma_length_m < least_m) least_m = o.sigma_length_m;
+  }
+  if (!finite(least_m)) return kFoundByBearings_m;
+  const double limit_m = absolute_sigma(params_.recover_sigma_xy_m, least_m);
+  return limit_m > kFoundLeast_m ? limit_m : kFoundLeast_m;
+}
+
 void landmark_ekf::search_now(wm_time_ns t_ns) {
   const wm_time_ns window = t_ns - wm_ns_from_seconds(params_.recover_window_s);
   if (life_.searching()) return search(window, prior_, prior_count_);
@@ -236,7 +266,7 @@ void landmark_ekf::search(wm_time_ns since_ns, const observation *prior, int pri
   const wm_time_ns now = filter_.now_ns();
   if (!params_.recover || !life_.search_due(now)) return;
   life_.searched(now);
-  const search_limits limits = {params_.recover_sigma_xy_m, params_.recover_sigma_heading_rad,
+  const search_limits limits = {found_sigma_m(since_ns), params_.recover_sigma_heading_rad,
                                 kNumbers + (prior == vague_ ? kPoseNumbers : 0)};
   search_result result = observations_.find(since_ns, odometry(), prior, prior_count, limits);
   if (!result.found) return;

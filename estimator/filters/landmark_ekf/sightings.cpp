@@ -239,10 +239,8 @@ int landmark_ekf::sighting_rows(const sighting_context &at, const expected_sight
     r.record.expected = 0.0;
     r.noise =
         square(at.reading.bearing_sigma_rad) + square(sightings().lateral_sigma_m / distance) + second.bearing_variance;
-    add_errors(
-        at, lent, e.bearing_by, error_.bearing,
-        std::sqrt(square(sightings().correlated_bearing_rad) + square(sightings().correlated_lateral_m / distance)),
-        &r);
+    add_errors(at, lent, e.bearing_by, error_.bearing,
+               correlated_bearing(sightings(), at.reading.bearing_sigma_rad, distance), &r);
     finish_row(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad + second.bearing_rad, record, &r);
   }
   if (at.reading.range) {
@@ -250,8 +248,7 @@ int landmark_ekf::sighting_rows(const sighting_context &at, const expected_sight
     r.record.expected = 0.0;
     r.noise =
         square(at.reading.range_sigma_m) + square(sightings().range_sigma_rel * e.range_m) + second.range_variance;
-    add_errors(at, lent, e.range_by, error_.range,
-               std::sqrt(square(sightings().correlated_range_m) + square(sightings().correlated_range_rel * e.range_m)),
+    add_errors(at, lent, e.range_by, error_.range, correlated_range(sightings(), at.reading.range_sigma_m, e.range_m),
                &r);
     finish_row(WM_RESIDUAL_RANGE, s.range_m, e.range_m + second.range_m, record, &r);
   }

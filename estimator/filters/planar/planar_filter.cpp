@@ -9,7 +9,7 @@ namespace wm {
 
 int planar_filter::count_motion_states(const wm_motion_states &states, int model) {
   int count = count_velocity_states(model);
-  for (double sigma : states.sigma) count += sigma > 0.0;
+  for (int i = 0; i < kCalibrationCount; i++) count += may_be_state(states.sigma[i], i, model);
   return count + wheel_heading::count_states(states);
 }
 
@@ -25,8 +25,8 @@ void planar_filter::init(const wm_setup &setup, const wm_motion_states &motion, 
   add_state(finite(setup.start.p_m[1]) ? setup.start.p_m[1] : 0.0, sigma_xy);
   add_state(finite(setup.start.heading_rad) ? wrap(setup.start.heading_rad) : 0.0, sigma_heading);
   for (int i = 0; i < kCalibrationCount; i++) {
-    const bool on = motion.sigma[i] > 0.0;
-    set_motion_state(motion, i, on ? add_state(calibration_.value[i], motion.sigma[i]) : -1);
+    const bool on = may_be_state(motion.sigma[i], i, setup.motion->model);
+    set_motion_state(motion, i, on ? add_state(calibration_.value[i], start_sigma(motion.sigma[i])) : -1);
   }
   if (count_velocity_states(setup.motion->model) > 0) {
     set_velocity_states(n_);

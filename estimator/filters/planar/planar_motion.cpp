@@ -17,6 +17,8 @@ void planar_motion::init_motion(const wm_setup &setup) {
   front_.init(setup.motion, &setup.wheels, setup.rig);
   calibration_ = kNeutralCalibration;
   for (int &state : motion_state_) state = -1;
+  for (int &state : own_state_) state = -1;
+  kind_ = kKindUnknown;
   start_ns_ = setup.start.t_ns;
   odom_ = {};
   travelled_m_ = turned_rad_ = 0.0;
@@ -33,8 +35,20 @@ void planar_motion::set_sensor_state(int state, double walk, double low, double 
 void planar_motion::set_motion_state(const wm_motion_states &states, int i, int state) {
   walk_[i] = square(states.walk[i]);
   start_variance_[i] = square(states.sigma[i]);
-  motion_state_[i] = state;
-  if (i == kTurnSlowdown && state >= 0) front_.take_commands();
+  own_state_[i] = state;
+  by_kind_[i] = states.sigma[i] < 0.0;
+  motion_state_[i] = by_kind_[i] ? -1 : state;
+  if (i == kTurnSlowdown && motion_state_[i] >= 0) front_.take_commands();
+}
+
+void planar_motion::take_kind() {
+  const motion_kind kind = front_.kind();
+  kind_ = kind;
+  for (int i = 0; i < kCalibrationCount; i++) {
+    if (!by_kind_[i]) continue;
+    motion_state_[i] = is_state(-1.0, i, kind) ? own_state_[i] : -1;
+    if (motion_state_[i] < 0) calibration_.value[i] = kNeutralCalibration.value[i];
+  }
 }
 
 planar_twist planar_motion::velocity_at(double heading_rad) const {

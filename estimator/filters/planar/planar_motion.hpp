@@ -58,7 +58,8 @@ class planar_motion {
  protected:
   // All calibration neutral, none of it a state.
   void init_motion(const wm_setup &setup);
-  // Start variance and random walk of a calibration term; `state` is its index in the filter, -1: not a state.
+  // Start variance and random walk of a calibration term; `state` is its index in the filter, -1: never a state. By
+  // default it becomes one with the motion's kind: until then it keeps its start's value and variance.
   void set_motion_state(const wm_motion_states &states, int i, int state);
   // The states of a constant velocity are `first` and those behind it.
   void set_velocity_states(int first);
@@ -73,6 +74,7 @@ class planar_motion {
   // the speed's source changed to a sensor with another scale; -1: none.
   int feed(const wm_event &motion) {
     front_.feed(motion);
+    if (front_.kind() != kind_) take_kind();
     return front_.speed_source_changed() ? motion_state_[kSpeedScale] : -1;
   }
   // At standstill the gyro measures its bias: innovation of that state and its variance. False: no measurement.
@@ -109,6 +111,8 @@ class planar_motion {
     for (int i = 0; i < sensor_states_; i++)
       if (sensor_state_[i].walk > 0.0) walk(sensor_state_[i].state, sensor_state_[i].walk * dt);
   }
+  // The kind of the motion has become known, or another one.
+  void take_kind();
   // Odometry over one such segment.
   void take_step(const motion_segment &segment, const motion_twist &twist, const pose_step &step);
   // The calibration takes the states' values, which are cut to their limits.
@@ -123,7 +127,8 @@ class planar_motion {
 
   motion_front_end front_;
   wm_motion_calibration calibration_;
-  int motion_state_[kMotionStates];
+  int motion_state_[kMotionStates];   // -1: off, or not of this kind of motion
+  int own_state_[kCalibrationCount];  // the same for any kind
   double walk_[kMotionStates], start_variance_[kMotionStates];
   struct sensor_state_limits {
     int state, unused;       // no padding: the same events must give the same bytes
@@ -131,6 +136,8 @@ class planar_motion {
   };
   sensor_state_limits sensor_state_[kMaxSensorStates];
   int sensor_states_;
+  int32_t kind_;                        // motion_kind
+  int32_t by_kind_[kCalibrationCount];  // a state only with kinds of motion that have the term
   wm_time_ns start_ns_;
   wm_pose2 odom_;
   double travelled_m_, turned_rad_;

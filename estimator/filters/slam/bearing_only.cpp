@@ -68,7 +68,7 @@ wm_verdict slam::track_bearing(const context &at, double bearing_rad, double sig
     const double dx = here.x_m - joint_.value(state), dy = here.y_m - joint_.value(state + 1);
     if (dx * dx + dy * dy < square(params_.line_step_m)) return WM_REJECTED_SEARCHING;
   }
-  const double sigma = std::sqrt(square(sigma_rad) + square(sightings().correlated_bearing_rad));
+  const double sigma = std::sqrt(square(sigma_rad) + square(correlated_bearing(sightings(), sigma_rad)));
   const int clone = keep_clone(at);
   tracks_.add(track, clone, bearing_rad, sigma, params_.line_poses);
   if (track->count < 3 || !join_line(at, *track)) return WM_REJECTED_SEARCHING;
@@ -123,9 +123,9 @@ wm_verdict slam::begin_ray(const context &at, double bearing_rad, double sigma_r
   joint_row row;
   double variance = square(sigma_rad);
   if (error_state >= 0 && error_.bearing >= 0)
-    row.add(error_state + error_.bearing, -sightings().correlated_bearing_rad);
+    row.add(error_state + error_.bearing, -correlated_bearing(sightings(), sigma_rad));
   else
-    variance += square(sightings().correlated_bearing_rad);
+    variance += square(correlated_bearing(sightings(), sigma_rad));
   const double noise[1][3] = {{variance, 0, 0}};
   joint_.assign(state, 1, &row, noise, &bearing_rad);
   const double middle = 0.5 / params_.line_near_m;  // from infinity (two sigmas below) to line_near_m (two above)
@@ -176,10 +176,10 @@ wm_verdict slam::expect_ray(const context &at, const bearing_tracks::track &trac
   out->noise[0] = square(sigma_rad);
   double expected = atan2(vy, vx) - from.heading_rad;
   if (const int error_state = lend(at); error_state >= 0 && error_.bearing >= 0) {
-    row.add(error_state + error_.bearing, sightings().correlated_bearing_rad);
-    expected += sightings().correlated_bearing_rad * joint_.value(error_state + error_.bearing);
+    row.add(error_state + error_.bearing, correlated_bearing(sightings(), sigma_rad));
+    expected += correlated_bearing(sightings(), sigma_rad) * joint_.value(error_state + error_.bearing);
   } else {
-    out->noise[0] += square(sightings().correlated_bearing_rad);
+    out->noise[0] += square(correlated_bearing(sightings(), sigma_rad));
   }
   out->observed[0] = bearing_rad;
   out->expected[0] = wrap(expected);

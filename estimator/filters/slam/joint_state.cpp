@@ -43,30 +43,30 @@ void joint_state::init(const wm_setup &setup, const joint_layout &layout, double
 namespace {
 
 bool is_wheel(int i) { return i == kLeftScale || i == kRightScale; }
-bool is_on(const wm_motion_states &states, const joint_state::wheel_slip &slip, int i) {
-  return states.sigma[i] > 0.0 || (is_wheel(i) && slip.sigma > 0.0);
+bool is_on(const wm_motion_states &states, int model, const joint_state::wheel_slip &slip, int i) {
+  return may_be_state(states.sigma[i], i, model) || (is_wheel(i) && slip.sigma > 0.0);
 }
 
 }  // namespace
 
 int joint_state::count_motion_states(const wm_motion_states &states, int model, const wheel_slip &slip) {
   int count = (slip.sigma > 0.0 ? 2 : 0) + count_velocity_states(model);
-  for (int i = 0; i < kCalibrationCount; i++) count += is_on(states, slip, i);
+  for (int i = 0; i < kCalibrationCount; i++) count += is_on(states, model, slip, i);
   return count;
 }
 
 void joint_state::set_motion_states(const wm_motion_states &states, int model, const wheel_slip &slip, int first) {
   slip_ = slip;
   for (int i = 0; i < kCalibrationCount; i++) {
-    const bool on = is_on(states, slip, i);
+    const bool on = is_on(states, model, slip, i);
     set_motion_state(states, i, on ? first++ : -1);
-    if (on) forget(motion_state_[i], kNeutralCalibration.value[i], start_variance_[i]);
+    if (on) forget(own_state_[i], kNeutralCalibration.value[i], start_variance_[i]);
   }
   if (count_velocity_states(model) > 0) set_velocity_states(first);
   for (int k = 0; k < count_velocity_states(model); k++) forget(first++, 0.0, square(velocity_sigma(k)));
   if (!(slip.sigma > 0.0)) return;
   for (int side = 0; side < 2; side++) {
-    const int wheel = motion_state_[kLeftScale + side], mean = slip_mean_[side] = first++;
+    const int wheel = own_state_[kLeftScale + side], mean = slip_mean_[side] = first++;
     const double variance = start_variance_[kLeftScale + side];
     forget(mean, 1.0, variance);
     p().set(mean, wheel, variance);
@@ -118,7 +118,7 @@ void joint_state::move_to(wm_time_ns t_ns) {
 void joint_state::wander(double dt_s) {
   const double left = exp(-dt_s / slip_.tau_s);
   for (int side = 0; side < 2; side++)
-    draw_to(motion_state_[kLeftScale + side], slip_mean_[side], left, square(slip_.sigma) * (1.0 - left * left));
+    draw_to(own_state_[kLeftScale + side], slip_mean_[side], left, square(slip_.sigma) * (1.0 - left * left));
   take_calibration(x());
 }
 

@@ -71,6 +71,11 @@ class joint_state : public planar_motion {
   // `share`: exponent of the state under a change of the map's scale, +1 or -1. `anchors`: its prior holds the scale.
   void follow_scale(int state, double share, bool anchors);
 
+  // The way's scale is a state.
+  bool has_way_scale() const {
+    return motion_state(kSpeedScale) >= 0 || (motion_state(kLeftScale) >= 0 && motion_state(kRightScale) >= 0);
+  }
+
   // ---- time and motion ----
   void move(const wm_event &motion);
   void move_to(wm_time_ns t_ns);

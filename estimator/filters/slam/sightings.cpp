@@ -130,8 +130,9 @@ slam::planar_observation slam::observation_of(const wm_sighting &s, const readin
   return {.bearing_rad = r.bearing ? s.bearing_rad : std::nan(""),
           .range_m = r.range ? range : std::nan(""),
           .heading_rad = std::nan(""),
-          .bearing_sigma_rad = std::sqrt(square(r.bearing_sigma_rad) + square(sightings().correlated_bearing_rad)),
-          .range_sigma_m = std::sqrt(square(r.range_sigma_m) + square(sightings().correlated_range_m) +
+          .bearing_sigma_rad =
+              std::sqrt(square(r.bearing_sigma_rad) + square(correlated_bearing(sightings(), r.bearing_sigma_rad))),
+          .range_sigma_m = std::sqrt(square(r.range_sigma_m) + square(correlated_range(sightings(), r.range_sigma_m)) +
                                      square((sightings().range_sigma_rel + sightings().correlated_range_rel) * range)),
           .heading_sigma_rad = std::nan("")};
 }
@@ -166,11 +167,11 @@ wm_verdict slam::expect_sighting(const wm_sighting &s, const reading &r, const p
   if (r.bearing)
     add(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad, e.bearing_by,
         square(r.bearing_sigma_rad) + square(sightings().lateral_sigma_m / lever_m), error_.bearing,
-        std::sqrt(square(sightings().correlated_bearing_rad) + square(sightings().correlated_lateral_m / lever_m)));
+        correlated_bearing(sightings(), r.bearing_sigma_rad, lever_m));
   if (r.range)
     add(WM_RESIDUAL_RANGE, s.range_m, e.range_m, e.range_by,
         square(r.range_sigma_m) + square(sightings().range_sigma_rel * e.range_m), error_.range,
-        std::sqrt(square(sightings().correlated_range_m) + square(sightings().correlated_range_rel * e.range_m)));
+        correlated_range(sightings(), r.range_sigma_m, e.range_m));
   return WM_FUSED;
 }
 

@@ -41,8 +41,8 @@ joint_state::wheel_slip slip_of(const wm_slam_params &p) { return {p.wheel_slip_
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
   return kPoseStates + joint_state::count_motion_states(setup.motion->states, setup.motion->model, slip_of(p)) +
-         sensor_slots::count(s.states, setup.sensor_count) + (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count +
-         s.correlated_slots * error_slot_of(p, s).width;
+         sensor_slots::count(s.states, setup.sensor_count, p.map != WM_SLAM_MAP_NONE) +
+         (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count + s.correlated_slots * error_slot_of(p, s).width;
 }
 
 // Azimuth and inverse distance of a ray, of which there are as many as clones.
@@ -124,7 +124,7 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   joint_.set_motion_states(setup.motion->states, setup.motion->model, slip_of(params), next);
   next += joint_state::count_motion_states(setup.motion->states, setup.motion->model, slip_of(params));
   for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
-  slots_.init(sightings().states, setup.sensor_count,
+  slots_.init(setup, params.map != WM_SLAM_MAP_NONE,
               [&](double value, double sigma, double walk, double low, double high) {
                 joint_.begin_sensor_state(next, value, sigma, walk, low, high);
                 return next++;
@@ -144,11 +144,12 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   start_again();
 }
 
-// The map's scale is unobservable where the way's scale and the ranges' are both states, or no ranges are used. With
+// The map's scale is unobservable where the way's scale and the ranges' are both states, or no ranges come. With
 // markers, far more accurate than wheels, the filter hardly gains false certainty, so the covariance is not
 // transported from the first one on.
 void slam::follow_scale() {
-  const bool is_observed = sightings().use_range && !(sightings().states.sigma[WM_SENSOR_ROW_kRangeScale] > 0.0);
+  const bool is_observed =
+      !by_bearings_ && sightings().use_range && !(sightings().states.sigma[WM_SENSOR_ROW_kRangeScale] > 0.0);
   if (is_observed || params_.map != WM_SLAM_MAP_NONE || !joint_.find_scale(!has_headings())) return;
   for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++) {
     joint_.follow_scale(slots_.at(i, kRangeScale), -1.0, true);
@@ -174,6 +175,8 @@ void slam::take_lines() {
   to.capacity = joint_.layout().capacity;
   joint_.grow(to);
   first_clone_ = to.first_clone;
+  by_bearings_ = joint_.landmarks() == 0;
+  follow_scale();
   if (joint_.follows_scale())
     for (int k = first_ray_; k < first_clone_; k += 2) joint_.follow_scale(k + 1, -1.0, false);
   if (params_.line_rejoin == WM_SLAM_REJOIN_AUTO) rejoins_ = params_.map == WM_SLAM_MAP_NONE && returned_ < kReturned;
@@ -258,7 +261,10 @@ void slam::load_map() {
 
 wm_status slam::predict(const wm_event &motion) {
   const wm_status status = joint_.check_motion(motion);
-  if (status == WM_OK) joint_.move(motion);
+  if (status != WM_OK) return status;
+  const bool had_scale = joint_.has_way_scale();
+  joint_.move(motion);
+  if (joint_.has_way_scale() != had_scale) follow_scale();
   return status;
 }
 

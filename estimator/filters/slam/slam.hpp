@@ -297,8 +297,9 @@ class slam {
   correlated_slot error_;                // a slot of these
   bearing_tracks tracks_;
   int first_ray_, first_clone_;
-  int returned_;  // identities of bearings alone that came back
-  bool rejoins_;  // identities of bearings alone are numbers of a tracker
+  int returned_;      // identities of bearings alone that came back
+  bool by_bearings_;  // the map began with bearings alone
+  bool rejoins_;      // identities of bearings alone are numbers of a tracker
   slam_counts counts_;
   double bloom_px_[kSlamSensors];  // of the last marker that has one; NaN: none has
   int32_t next_id_;

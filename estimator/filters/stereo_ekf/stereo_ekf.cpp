@@ -42,7 +42,8 @@ spatial_noise twist_noise_of(const wm_stereo_ekf_params &p, const wm_rig *rig) {
 }
 
 // The velocities' noise is its own; twists' own states carry their errors.
-const char *const kReads[] = {"!motion.noise.",
+const char *const kReads[] = {"!motion.twist",
+                              "!motion.noise.",
                               "!motion.states.",
                               "!motion.commands.",
                               "!motion.constant_velocity.",

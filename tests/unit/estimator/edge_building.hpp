@@ -10,6 +10,7 @@
 #include <memory>
 #include <vector>
 
+#include "events.hpp"
 #include "math/arc.hpp"
 #include "unity.h"
 #include "waymark/estimator.h"
@@ -194,7 +195,7 @@ inline void draw(const char *estimator) {
   rig.cameras[0].intrinsics[0] = rig.cameras[0].intrinsics[1] = 520;
   rig.cameras[0].mounting = {{1.0, 0, 0.4}, {0, 0.38, 0}};
   motion_params.resize(wm_motion_params_table.bytes);
-  wm_params_defaults(&wm_motion_params_table, motion_params.data());
+  make::exact_motion(reinterpret_cast<wm_motion_params *>(motion_params.data()));
   params.resize(ops->params.bytes);
   wm_params_defaults(&ops->params, params.data());
   setup = {};

@@ -9,6 +9,8 @@
 #include <initializer_list>
 #include <utility>
 
+#include "filters/landmark_ekf/params.h"
+#include "motion/motion_params.h"
 #include "sensors/sighting_params.h"
 #include "waymark/estimator.h"
 #include "waymark/event.h"
@@ -103,11 +105,33 @@ inline wm_sensor sensor(const char *name, double bearing_sigma_rad, double range
   return s;
 }
 
+// The defaults, but measured twists and nothing to calibrate: what a test is not about is exact.
+inline void exact_motion(wm_motion_params *motion) {
+  wm_params_defaults(&wm_motion_params_table, motion);
+  motion->twist = WM_TWIST_MEASURED;
+  motion->noise_speed_rel = motion->noise_yaw_rate_rel = 0.03;
+  motion->noise_yaw_rate_radps = 0.01;
+  for (double &sigma : motion->states.sigma) sigma = 0.0;
+  motion->states.wheel_difference_sigma = 0.0;
+}
+
 // The shared parameters of sightings; those of motion are each test's.
 inline wm_sighting_params sightings;
-inline void shared_defaults(wm_motion_params *motion) {
-  wm_params_defaults(&wm_motion_params_table, motion);
+inline void exact_sensors(wm_motion_params *motion) {
+  exact_motion(motion);
   wm_params_defaults(&wm_sighting_params_table, &sightings);
+  for (double &sigma : sightings.states.sigma) sigma = 0.0;
+  sightings.correlated_slots = 0;
+  sightings.correlated_bearing_rad = sightings.correlated_lateral_m = 0.0;
+  sightings.correlated_range_m = sightings.correlated_range_rel = 0.0;
+  sightings.gate_hard = 25.0;
+}
+inline void exact_map(wm_landmark_ekf_params *params) {
+  wm_params_defaults(&wm_landmark_ekf_params_table, params);
+  params->gnss_time_offset_sigma_s = params->gnss_correlated_m = 0.0;
+  params->gnss_sigma_factor = params->recover_sigma_xy_m = 1.0;
+  params->gnss_correlated_tau_s = 60.0;
+  params->map_slots = 0;
 }
 
 // A robot of which only its motion and one sensor are known; both must outlive what is started with it.

@@ -45,7 +45,7 @@ inline double gauss(double sigma) { return sigma * wm_random_next_normal(&noise)
 
 inline void make_room() {
   slam = wm_estimator_find("slam");
-  make::shared_defaults(&motion);
+  make::exact_sensors(&motion);
   wm_params_defaults(&slam->params, &params);
   for (int i = 0; i < kCount; i++) {
     const wm::sin_cos a = wm::sincos(wm::kTwoPi * i / kCount + 0.1);

@@ -50,8 +50,8 @@ double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
 
 void make_room() {
   ekf = wm_estimator_find("landmark_ekf");
-  make::shared_defaults(&motion);
-  wm_params_defaults(&ekf->params, &params);
+  make::exact_sensors(&motion);
+  make::exact_map(&params);
   const double places[8][2] = {{6, 0}, {0, 6}, {-6, 1}, {1, -6}, {5, 5}, {-4, -5}, {-5, 4}, {4, -4}};
   for (int i = 0; i < 8; i++) landmarks[i] = {100 + 7 * i, {places[i][0], places[i][1], 0}, 0.0, NAN, {}, 0};
   sensor = make::sensor("camera", 0.01, 0.05);

@@ -287,8 +287,8 @@ void test_heights_reject_a_wrong_start(void) {
 
 void setUp(void) {
   ekf = wm_estimator_find("landmark_ekf");
-  make::shared_defaults(&motion);
-  wm_params_defaults(&ekf->params, &params);
+  make::exact_sensors(&motion);
+  make::exact_map(&params);
   make::sightings.use_elevation = 1;
   make::sightings.states.sigma[WM_SENSOR_ROW_kRoll] = 0.0035;
   params.map_slots = 3;

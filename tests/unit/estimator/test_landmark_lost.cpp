@@ -406,8 +406,8 @@ void test_a_moved_landmark_is_told_and_does_no_harm(void) {
 
 void setUp(void) {
   ekf = wm_estimator_find("landmark_ekf");
-  make::shared_defaults(&motion);
-  wm_params_defaults(&ekf->params, &params);
+  make::exact_sensors(&motion);
+  make::exact_map(&params);
   for (int i = 0; i < kLandmarks; i++) landmarks[i] = {10 + i, {kPlaces[i][0], kPlaces[i][1], 0}, 0.0, NAN, {}, 0};
   sensor = make::sensor("camera", 0.006, NAN);
   setup = make::setup(motion, sensor);

@@ -46,7 +46,7 @@ double uniform(double from, double to) { return from + (to - from) * wm_random_n
 
 void begin(int method, bool rejoin = false, int clones = 24, bool wheels = false) {
   slam = wm_estimator_find("slam");
-  make::shared_defaults(&motion);
+  make::exact_sensors(&motion);
   wm_params_defaults(&slam->params, &params);
   params.line_clones = clones;
   params.line_method = method;

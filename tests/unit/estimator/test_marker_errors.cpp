@@ -97,7 +97,7 @@ void test_errors_that_last_are_not_averaged_away(void) {
 
 void setUp(void) {
   slam = wm_estimator_find("slam");
-  make::shared_defaults(&motion);
+  make::exact_sensors(&motion);
   wm_params_defaults(&slam->params, &params);
   params.marker_sigma_m = kPlace_m;
   motion.noise_yaw_rate_radps = kGyro_radps * std::sqrt(0.02);

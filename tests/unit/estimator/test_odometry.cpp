@@ -19,7 +19,7 @@ wm_wheels wheels;
 
 void start(const wm_wheels &w) {
   wheels = w;
-  wm_params_defaults(&wm_motion_params_table, &params);
+  make::exact_motion(&params);
   TEST_ASSERT_EQUAL(WM_OK, wm_odometry_init(odom, &params, &wheels));
 }
 

@@ -25,7 +25,7 @@ wm::planar_filter_of<64> *filter;
 double random_number(uint64_t i) { return wm_random_normal(5, 2, i); }
 
 void make_setup(const wm_wheels &wheels) {
-  wm_params_defaults(&wm_motion_params_table, &params);
+  make::exact_motion(&params);
   setup = {};
   setup.motion = &params;
   setup.wheels = wheels;

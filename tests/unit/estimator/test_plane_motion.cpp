@@ -21,7 +21,7 @@ wm_setup setup;
 wm::planar_filter_of<16> filter;
 
 void begin(const wm_rig *known = nullptr, double speed_scale_sigma = 0.0) {
-  wm_params_defaults(&wm_motion_params_table, &params);
+  make::exact_motion(&params);
   wm_motion_states states{};
   states.sigma[WM_SPEED_SCALE] = speed_scale_sigma;
   setup = {};

@@ -33,7 +33,7 @@ struct found {
 
 void make_room() {
   slam = wm_estimator_find("slam");
-  make::shared_defaults(&motion);
+  make::exact_sensors(&motion);
   wm_params_defaults(&slam->params, &params);
   motion.states.sigma[0] = kPrior;  // speed_scale
   make::sightings.states.sigma[WM_SENSOR_ROW_kRangeScale] = kPrior;

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// The kind of the motion's source: by its model, and of twists, whether they are commands or measured. From it follow
+// the calibration states that a default turns on, and the default noise.
+#ifndef WAYMARK_ESTIMATOR_MOTION_KIND_HPP
+#define WAYMARK_ESTIMATOR_MOTION_KIND_HPP
+
+#include "motion/motion_params.h"
+
+namespace wm {
+
+enum motion_kind : uint8_t {
+  kKindUnknown,
+  kKindTicks,
+  kKindGyro,      // a speed and a yaw rate
+  kKindSteering,  // a speed and a steering angle
+  kKindTwist,     // of which the kind is not yet known
+  kKindMeasured,
+  kKindCommands,
+  kKindCalibrated  // increments with covariances: who states these has calibrated the source
+};
+
+// The sigma at the start of a state whose parameter is below 0: its size.
+inline double start_sigma(double parameter) { return parameter < 0.0 ? -parameter : parameter; }
+
+// Whether a term of the calibration is a state: always, where its sigma is above 0; by the kind, where it is below.
+bool is_state(double sigma, int term, motion_kind kind);
+// Whether it may become one with this model (wm_motion_model).
+bool may_be_state(double sigma, int term, int model);
+
+// Relative noise of the speed, and noise of the turn rate; parameters below 0 by the kind.
+struct rate_noise {
+  double speed_rel, yaw_rate_radps, yaw_rate_rel;
+};
+rate_noise rate_noise_of(const wm_motion_params &params, motion_kind kind);
+
+// Commands repeat until they change, whereas a measurement has noise: the rows that equal the row before are counted
+// while the robot moves.
+class command_detector {
+ public:
+  void note(double v_mps, double w_radps, bool moving);
+  motion_kind kind() const { return static_cast<motion_kind>(kind_); }
+
+ private:
+  double last_v_mps_, last_w_radps_;
+  uint32_t moving_, repeated_;
+  uint32_t run_;   // repeated rows until now
+  uint32_t kind_;  // 0: not yet known
+};
+
+}  // namespace wm
+
+#endif

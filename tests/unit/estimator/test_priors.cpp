@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the defaults leave open: calibration states with priors by the kind of the motion and by the sensor's own sigma,
+// which keep these priors where the data cannot observe them.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "events.hpp"
+#include "filters/core/sensor_slots.hpp"
+#include "motion/motion_kind.hpp"
+#include "motion/step.hpp"
+#include "unity.h"
+#include "waymark/random.h"
+
+namespace {
+
+const wm_estimator *ekf;
+wm_motion_params motion;
+wm_landmark_ekf_params params;
+wm_sensor sensor;
+wm_landmark landmarks[2];
+wm_setup setup;
+std::unique_ptr<void, void (*)(void *)> state(nullptr, std::free);
+
+void begin() {
+  state.reset(make::begun(*ekf, &params, setup));
+  TEST_ASSERT_NOT_NULL(state.get());
+}
+
+void feed(const wm_event &e) {
+  const bool moves = e.kind == WM_EVENT_TWIST2 || e.kind == WM_EVENT_QUANTITIES;
+  size_t count = 0;
+  TEST_ASSERT_EQUAL(WM_OK, moves ? ekf->predict(state.get(), &e) : ekf->correct(state.get(), &e, nullptr, 0, &count));
+}
+
+std::vector<wm_calibration_value> calibration() {
+  std::vector<wm_calibration_value> out(64);
+  out.resize(ekf->calibration(state.get(), out.data(), out.size()));
+  return out;
+}
+
+// NaN: not listed.
+double sigma_of(const std::string &name) {
+  for (const wm_calibration_value &v : calibration())
+    if (name == v.name) return v.sigma;
+  return NAN;
+}
+
+// A joystick's command each half second, or what wheels measure of it.
+wm_event driven(int i, bool commands) {
+  const double v = 0.3 + 0.1 * (i / 10 % 3), w = 0.4 * (i / 10 % 5) - 0.8;
+  const auto noise = [i](uint64_t of) { return 0.01 * wm_random_normal(3, of, static_cast<uint64_t>(i)); };
+  return make::twist(0.05 * i, commands ? v : v + noise(1), commands ? w : w + noise(2));
+}
+
+void test_commands_are_told_by_rows_that_repeat() {
+  for (const bool commands : {false, true}) {
+    begin();
+    TEST_ASSERT_TRUE(std::isnan(sigma_of("motion.lag_s")));
+    for (int i = 0; i < 200; i++) feed(driven(i, commands));
+    TEST_ASSERT_FALSE(std::isnan(sigma_of("motion.speed_scale")));
+    TEST_ASSERT_EQUAL(commands, !std::isnan(sigma_of("motion.lag_s")));
+    TEST_ASSERT_EQUAL(commands, !std::isnan(sigma_of("motion.turn_slowdown_mps")));
+  }
+}
+
+// Wheels that stand measure the same speed, too, if not quite zero.
+void test_a_measurement_that_stands_is_no_command() {
+  begin();
+  for (int i = 0; i < 1000; i++) {
+    wm_event e = driven(i, false);
+    if (i < 500) e.as.twist2 = {-0.022, 0.0006};
+    feed(e);
+  }
+  TEST_ASSERT_TRUE(std::isnan(sigma_of("motion.lag_s")));
+}
+
+void test_a_stated_kind_decides() {
+  for (const bool commands : {false, true}) {
+    motion.twist = commands ? WM_TWIST_COMMANDS : WM_TWIST_MEASURED;
+    begin();
+    for (int i = 0; i < 200; i++) feed(driven(i, !commands));
+    TEST_ASSERT_EQUAL(commands, !std::isnan(sigma_of("motion.lag_s")));
+  }
+}
+
+// Until the kind is known, the larger noise holds.
+void test_the_kind_gives_the_noise() {
+  double variance[2];
+  for (const bool commands : {false, true}) {
+    motion.twist = commands ? WM_TWIST_COMMANDS : WM_TWIST_MEASURED;
+    for (double &sigma : motion.states.sigma) sigma = 0.0;
+    begin();
+    for (int i = 0; i < 200; i++) feed(driven(i, commands));
+    wm_estimate e;
+    ekf->estimate(state.get(), &e);
+    variance[commands] = e.covariance[wm_cov_index(5, 5)];
+  }
+  TEST_ASSERT_TRUE(variance[1] > 3.0 * variance[0]);
+}
+
+void test_a_prior_is_a_multiple_of_the_sensors_own_sigma() {
+  for (const double sigma_m : {0.03, 0.5}) {
+    sensor.range_sigma_m = sigma_m;
+    begin();
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.5 * sigma_m, sigma_of("camera.range_bias_m"));
+    make::sightings.states.sigma[WM_SENSOR_ROW_kRangeBias] = 0.2;
+    begin();
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.2, sigma_of("camera.range_bias_m"));
+    make::sightings.states.sigma[WM_SENSOR_ROW_kRangeBias] = -0.5;
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.04, wm::correlated_bearing(make::sightings, 0.04));
+  make::sightings.correlated_slots = 0;
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, wm::correlated_range(make::sightings, 0.1, 5.0));
+}
+
+// All states of both tables are on. A robot that stands and sees bearings alone cannot observe any scale, delay or
+// range; one that sees nothing cannot observe anything.
+void test_a_state_that_nothing_observes_keeps_its_prior() {
+  for (double &sigma : make::sightings.states.sigma) sigma = sigma == 0.0 ? 0.02 : sigma;
+  for (double &sigma : motion.states.sigma) sigma = sigma < 0.0 ? -sigma : sigma;
+  motion.states.wheel_difference_sigma = 0.0;
+  for (const bool stands : {true, false}) {
+    begin();
+    const auto before = calibration();
+    TEST_ASSERT_EQUAL(wm::kSensorStates + wm::kCalibrationCount + 1, before.size());
+    for (int i = 0; i < 600; i++) {
+      feed(make::twist(0.1 * i, stands ? 0.0 : 0.4, stands ? 0.0 : 0.3 * (i / 50 % 3 - 1)));
+      if (stands) feed(make::sighting(0.1 * i, i % 2, i % 2 ? 1.2 : 0.0, NAN));
+    }
+    const auto after = calibration();
+    int kept = 0;
+    for (size_t i = 0; i < before.size(); i++) {
+      const std::string name = before[i].name;
+      // The walk of a rate's bias is by the defaults; a bearing observes the mounting, once the pose is known.
+      const bool walks = name == "motion.yaw_rate_bias_radps";
+      const bool seen = stands && name.compare(0, 7, "camera.") == 0 && name != "camera.time_offset_s" &&
+                        name != "camera.range_bias_m" && name != "camera.range_scale" &&
+                        name != "camera.depth_axis_rad";
+      if (walks || seen) continue;
+      kept++;
+      TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.01 * before[i].sigma, before[i].sigma, after[i].sigma, name.c_str());
+    }
+    TEST_ASSERT_TRUE(kept >= (stands ? 13 : 21));
+  }
+}
+
+// The limit of a found place follows the positions that find it: a receiver of 10 m finds what one of 1 m does.
+void test_a_vague_receiver_finds_the_robot_too() {
+  for (const double sigma_m : {1.0, 10.0}) {
+    setup.start.p_m[0] = setup.start.p_m[1] = setup.start.heading_rad = NAN;
+    begin();
+    wm_estimate e;
+    int found = -1;
+    for (int i = 0; i < 600 && found < 0; i++) {
+      feed(make::twist(0.1 * i, 10.0, 0.0));
+      if (i % 10 == 0) feed(make::position(0.1 * i, 1.0 * i, 0.0, sigma_m));
+      ekf->estimate(state.get(), &e);
+      if (e.state == WM_STATE_TRACKING) found = i;
+    }
+    TEST_ASSERT_TRUE(found > 0);
+    TEST_ASSERT_TRUE(e.covariance[0] > 0.01 * sigma_m * sigma_m);
+  }
+}
+
+}  // namespace
+
+void setUp() {
+  ekf = wm_estimator_find("landmark_ekf");
+  wm_params_defaults(&wm_motion_params_table, &motion);
+  wm_params_defaults(&wm_sighting_params_table, &make::sightings);
+  wm_params_defaults(&wm_landmark_ekf_params_table, &params);
+  sensor = make::sensor("camera", 0.01, 0.1);
+  landmarks[0] = {0, {5, 0, 0}, 0.0, NAN, {}, 0};
+  landmarks[1] = {1, {2, 5, 0}, 0.0, NAN, {}, 0};
+  setup = make::setup(motion, sensor);
+  setup.landmarks = landmarks;
+  setup.landmark_count = 2;
+  setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0.0, 0.05, 0.05};
+}
+void tearDown() { state.reset(); }
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_commands_are_told_by_rows_that_repeat);
+  RUN_TEST(test_a_measurement_that_stands_is_no_command);
+  RUN_TEST(test_a_stated_kind_decides);
+  RUN_TEST(test_the_kind_gives_the_noise);
+  RUN_TEST(test_a_prior_is_a_multiple_of_the_sensors_own_sigma);
+  RUN_TEST(test_a_state_that_nothing_observes_keeps_its_prior);
+  RUN_TEST(test_a_vague_receiver_finds_the_robot_too);
+  return UNITY_END();
+}
