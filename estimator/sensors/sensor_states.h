@@ -17,11 +17,12 @@ extern "C" {
 // ONE(state, key, unit, name, neutral, low, high, WALK or CONSTANT, initial, most, text)
 // TWO(state, second, key, unit, name, second name, neutral, low, high, ..., initial, most, text): two states, one sigma
 // `low` and `high`: beyond these an update is cut, since the model no longer holds; `initial` and `most`: of the sigma
-// parameter. Defaults are what a tape measure and a data sheet leave open; the mounting's yaw is flat from 0.05 to 0.1.
+// parameter, below 0: only for sightings that state no sigmas of their own, and as the text says. Defaults are what a
+// tape measure and a data sheet leave open; the mounting's yaw is flat from 0.05 to 0.1.
 // clang-format off
 #define WM_SENSOR_STATES(ONE, TWO) \
-  ONE(kYaw, "sensor_yaw", "_rad", "yaw_rad", 0, -3.2, 3.2, WALK, 0.05, 3.2, \
-      "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off.") \
+  ONE(kYaw, "sensor_yaw", "_rad", "yaw_rad", 0, -3.2, 3.2, WALK, -0.05, 3.2, \
+      "Start sigma of each sensor's mounting yaw about calibration.yaml's, rad. 0: off. Below 0: see range_bias_sigma_m.") \
   TWO(kMountX, kMountY, "sensor_xy", "_m", "x_m", "y_m", 0, -100, 100, CONSTANT, 0, 10, \
       "Start sigma of each sensor's place on the robot about calibration.yaml's, forwards and sideways, m. 0: off.") \
   TWO(kRoll, kPitch, "sensor_tilt", "_rad", "roll_rad", "pitch_rad", 0, -1, 1, CONSTANT, 0, 1, \
@@ -33,10 +34,12 @@ extern "C" {
       CONSTANT, 0, 0.3, \
       "Start sigma of a turntable's eccentricity, rad: its axis beside the angle encoder's centre, forwards and " \
       "sideways, over the encoder's radius. A rotating laser's bearings err by -x sin(bearing) + y cos(bearing). 0: off.") \
-  ONE(kTimeOffset, "sensor_time_offset", "_s", "time_offset_s", 0, -5, 5, CONSTANT, 0.1, 1, \
-      "Start sigma of each sensor's time offset, s: its sightings are that much older than their stamps. 0: off.") \
+  ONE(kTimeOffset, "sensor_time_offset", "_s", "time_offset_s", 0, -5, 5, CONSTANT, -0.1, 1, \
+      "Start sigma of each sensor's time offset, s: its sightings are that much older than their stamps. 0: off. " \
+      "Below 0: see range_bias_sigma_m.") \
   ONE(kRangeBias, "range_bias", "_m", "range_bias_m", 0, -100, 100, CONSTANT, -0.5, 10, \
-      "Start sigma of each sensor's range bias, m. 0: off. Below 0: that multiple of the sensor's range sigma.") \
+      "Start sigma of each sensor's range bias, m. 0: off. Below 0: that multiple of the sensor's range sigma. " \
+      "States below 0 act on sightings that state no sigmas of their own; who states these has calibrated the sensor.") \
   ONE(kRangeScale, "range_scale", "", "range_scale", 1, 0.1, 10, WALK, -0.05, 1, \
       "Start sigma of each sensor's range scale about 1. 0: off. Needs ranges of many lengths beside a range bias. " \
       "Below 0: of that size where the map is known; else ranges are the only standard of length.") \

@@ -24,6 +24,7 @@ class sensor_slots {
   template <class Add>
   void init(const wm_setup &setup, bool known_map, Add add) {
     const wm_sighting_params &p = *setup.sightings;
+    for (int k = 0; k < kSensorStates; k++) by_default_[k] = p.states.sigma[kSensorStateSpecs[k].row] < 0.0;
     slots_.init(static_cast<int>(setup.sensor_count), [&](int sensor, int k) {
       const sensor_state_spec &s = kSensorStateSpecs[k];
       const double range_sigma_m =
@@ -35,6 +36,8 @@ class sensor_slots {
   }
 
   int at(int sensor, int state) const { return slots_.at(sensor, state); }  // -1: off
+  // `stated`: of a sighting with its own sigmas, on which states of a default do not act.
+  int at(int sensor, int state, bool stated) const { return stated && by_default_[state] ? -1 : at(sensor, state); }
 
   // The errors as value(slot) gives them; neutral where the state is off.
   template <class Value>
@@ -47,9 +50,9 @@ class sensor_slots {
 
   // Adds the derivatives by all of a sensor's errors but the time offset to a Jacobian row. `by`: by sighting_cause.
   template <class Row>
-  void add_to(Row *row, int sensor, const double by[kCauses]) const {
+  void add_to(Row *row, int sensor, const double by[kCauses], bool stated = false) const {
     for (int k = 0; k < kSensorStates; k++)
-      if (k != kTimeOffset) row->add(at(sensor, k), by[kBySensor + k]);
+      if (k != kTimeOffset) row->add(at(sensor, k, stated), by[kBySensor + k]);
   }
 
   template <class Filter>
@@ -65,6 +68,7 @@ class sensor_slots {
   }
 
   state_slots<kMaxSensors, kSensorStates> slots_;
+  bool by_default_[kSensorStates];
 };
 
 }  // namespace wm

@@ -181,7 +181,7 @@ void landmark_ekf::test_start(wm_time_ns t_ns) {
   if (start_tested_ns_ != WM_TIME_NONE && wm_seconds_between(start_tested_ns_, t_ns) < kTestStartEvery_s) return;
   start_tested_ns_ = t_ns;
   start_.test(observations_,
-              {sightings().states.sigma[WM_SENSOR_ROW_kYaw], most_correlated_bearing(*setup_),
+              {std::fabs(sightings().states.sigma[WM_SENSOR_ROW_kYaw]), most_correlated_bearing(*setup_),
                sightings().correlated_lateral_m},
               filter_.pose(), odometry(), t_ns);
   if (!start_.rejected()) return;

@@ -188,8 +188,8 @@ void landmark_ekf::decay_tilt(wm_time_ns t_ns) {
 void landmark_ekf::add_errors(const sighting_context &at, const lent_slots &lent, const double by[kCauses],
                               int error_offset, double error_size, residual *r) const {
   const int sensor = at.s->sensor;
-  add_past_pose(&r->row, by, at.past, slots_.at(sensor, kTimeOffset));
-  slots_.add_to(&r->row, sensor, by);
+  add_past_pose(&r->row, by, at.past, slots_.at(sensor, kTimeOffset, at.reading.stated));
+  slots_.add_to(&r->row, sensor, by, at.reading.stated);
   const auto add_state = [&](int state, double derivative) {
     r->row.add(state, derivative);
     r->record.expected += derivative * filter_.value(state);
@@ -239,8 +239,7 @@ int landmark_ekf::sighting_rows(const sighting_context &at, const expected_sight
     r.record.expected = 0.0;
     r.noise =
         square(at.reading.bearing_sigma_rad) + square(sightings().lateral_sigma_m / distance) + second.bearing_variance;
-    add_errors(at, lent, e.bearing_by, error_.bearing,
-               correlated_bearing(sightings(), at.reading.bearing_sigma_rad, distance), &r);
+    add_errors(at, lent, e.bearing_by, error_.bearing, correlated_bearing(sightings(), at.reading, distance), &r);
     finish_row(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad + second.bearing_rad, record, &r);
   }
   if (at.reading.range) {
@@ -248,8 +247,7 @@ int landmark_ekf::sighting_rows(const sighting_context &at, const expected_sight
     r.record.expected = 0.0;
     r.noise =
         square(at.reading.range_sigma_m) + square(sightings().range_sigma_rel * e.range_m) + second.range_variance;
-    add_errors(at, lent, e.range_by, error_.range, correlated_range(sightings(), at.reading.range_sigma_m, e.range_m),
-               &r);
+    add_errors(at, lent, e.range_by, error_.range, correlated_range(sightings(), at.reading, e.range_m), &r);
     finish_row(WM_RESIDUAL_RANGE, s.range_m, e.range_m + second.range_m, record, &r);
   }
   if (at.elevation) {

@@ -148,8 +148,8 @@ wm_verdict slam::expect_sighting(const wm_sighting &s, const reading &r, const p
                        int error_offset, double error_size) {
     const int i = out->count++;
     joint_row &row = out->row[i];
-    add_past_pose(&row, by, past, slots_.at(s.sensor, kTimeOffset));
-    slots_.add_to(&row, s.sensor, by);
+    add_past_pose(&row, by, past, slots_.at(s.sensor, kTimeOffset, r.stated));
+    slots_.add_to(&row, s.sensor, by, r.stated);
     if (error_state >= 0 && error_offset >= 0) {
       row.add(error_state + error_offset, error_size);
       expected += error_size * joint_.value(error_state + error_offset);
@@ -167,11 +167,11 @@ wm_verdict slam::expect_sighting(const wm_sighting &s, const reading &r, const p
   if (r.bearing)
     add(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad, e.bearing_by,
         square(r.bearing_sigma_rad) + square(sightings().lateral_sigma_m / lever_m), error_.bearing,
-        correlated_bearing(sightings(), r.bearing_sigma_rad, lever_m));
+        correlated_bearing(sightings(), r, lever_m));
   if (r.range)
     add(WM_RESIDUAL_RANGE, s.range_m, e.range_m, e.range_by,
         square(r.range_sigma_m) + square(sightings().range_sigma_rel * e.range_m), error_.range,
-        correlated_range(sightings(), r.range_sigma_m, e.range_m));
+        correlated_range(sightings(), r, e.range_m));
   return WM_FUSED;
 }
 

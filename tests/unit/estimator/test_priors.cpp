@@ -111,7 +111,7 @@ void test_a_prior_is_a_multiple_of_the_sensors_own_sigma() {
   }
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.04, wm::correlated_bearing(make::sightings, 0.04));
   make::sightings.correlated_slots = 0;
-  TEST_ASSERT_EQUAL_DOUBLE(0.0, wm::correlated_range(make::sightings, 0.1, 5.0));
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, wm::correlated_range(make::sightings, 0.1));
 }
 
 // All states of both tables are on. A robot that stands and sees bearings alone cannot observe any scale, delay or
@@ -142,6 +142,21 @@ void test_a_state_that_nothing_observes_keeps_its_prior() {
       TEST_ASSERT_DOUBLE_WITHIN_MESSAGE(0.01 * before[i].sigma, before[i].sigma, after[i].sigma, name.c_str());
     }
     TEST_ASSERT_TRUE(kept >= (stands ? 13 : 21));
+  }
+}
+
+// Who states the sigmas of each sighting has calibrated the sensor.
+void test_sightings_with_sigmas_leave_the_sensors_priors() {
+  for (const bool stated : {false, true}) {
+    begin();
+    const double before = sigma_of("camera.range_bias_m");
+    for (int i = 0; i < 100; i++) {
+      wm_event e = make::sighting(0.1 * i, i % 2, i % 2 ? 1.19 : 0.0, i % 2 ? 5.385 : 5.0);
+      if (stated) e.as.sighting.bearing_sigma_rad = 0.01, e.as.sighting.range_sigma_m = 0.1;
+      feed(make::twist(0.1 * i, 0.0, 0.0));
+      feed(e);
+    }
+    TEST_ASSERT_EQUAL(stated, sigma_of("camera.range_bias_m") == before);
   }
 }
 
@@ -188,6 +203,7 @@ int main() {
   RUN_TEST(test_the_kind_gives_the_noise);
   RUN_TEST(test_a_prior_is_a_multiple_of_the_sensors_own_sigma);
   RUN_TEST(test_a_state_that_nothing_observes_keeps_its_prior);
+  RUN_TEST(test_sightings_with_sigmas_leave_the_sensors_priors);
   RUN_TEST(test_a_vague_receiver_finds_the_robot_too);
   return UNITY_END();
 }
