@@ -22,7 +22,7 @@ static const wm_param kParams[] = {
          "come; the speed of speed and yaw rate may be the ticks'."),
     ENUM("twist", twist, WM_TWIST_AUTO, WM_TWIST_COMMANDS, kTwists,
          "Whether the rows of motion.csv are commands or measured. auto: commands, where rows "
-         "repeat the one before; vehicle.motion_kind of recording.yaml decides where it is there."),
+         "repeat the one before."),
     F64("noise.speed_mps", noise_speed_mps, 0.02, 0, 10,
         "White noise of the speed, m/s per sqrt(s): slip and play at walking pace."),
     F64("noise.speed_rel", noise_speed_rel, -1, -1, 2,

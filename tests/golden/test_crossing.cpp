@@ -107,7 +107,8 @@ void test_perfect_sensors_lead_to_the_truth_by_odometry() {
   make_perfect(scenario);
   std::filesystem::create_directories(folder);
   const std::string config = folder + "/trusting.yaml";
-  std::ofstream(config) << "format: waymark-config/1\nestimator: odometry\nmotion: {model: speed_yaw_rate}\n";
+  std::ofstream(config) << "format: waymark-config/1\nestimator: odometry\nmotion: {model: speed_yaw_rate, states: "
+                           "{wheel_difference_sigma: 0, yaw_rate_bias_sigma_radps: 0}}\n";
   drive(config, "run");
   is_below(0.003, largest_error_m("run"), "odometry with perfect sensors");
   const Row last = for_each_pose("run", [](const Row &row, const State &truth) {
