@@ -136,8 +136,12 @@ void motion_front_end::take_twist(const wm_event &event) {
   note_plausibility(event.t_ns, quantity_bit(kTwistSpeed), v_plausible);
   if (!planar) note_plausibility(event.t_ns, quantity_bit(kTwistSide), u_plausible);
   note_plausibility(event.t_ns, quantity_bit(kTwistRate), w_plausible);
-  watch_standstill(event.t_ns, plausible && speed_of({v, u, w}) < params_->standstill_speed_mps &&
-                                   std::fabs(w) < params_->standstill_yaw_rate_radps);
+  const bool still = watch_standstill(event.t_ns, plausible && speed_of({v, u, w}) < params_->standstill_speed_mps &&
+                                                      std::fabs(w) < params_->standstill_yaw_rate_radps);
+  if (still && !commands_ && rate != 0.0) {  // a measured rate; a rate of exactly 0 is one that was set to it
+    value_[WM_Q_YAW_RATE] = rate;
+    yaw_fresh_ = 1;
+  }
   const motion_input held = history_.empty() ? motion_input{} : history_.newest();
   if (plausible)
     push_input(event.t_ns, v, w, false, false, u);

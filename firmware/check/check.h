@@ -51,7 +51,7 @@ void motion_data_judge(const motion_data *self, uint32_t bound, findings *out);
 typedef struct source_facts {
   uint64_t events;
   wm_time_ns first_ns, last_ns, latest_ns;
-  uint64_t sightings, unknown_landmarks;
+  uint64_t sightings, unknown_landmarks, bare_ranges;  // bare_ranges: without a bearing
 } source_facts;
 
 // Reads the source to its end and judges what it gave. What can't be read is a finding, too.

@@ -22,6 +22,7 @@ static void take(source_facts *facts, const wm_setup *setup, const wm_event *eve
                : event->kind == WM_EVENT_MARKER ? event->as.marker.id
                                                 : -1;
   if (id < 0) return;
+  facts->bare_ranges += event->kind == WM_EVENT_SIGHTING && isnan(event->as.sighting.bearing_rad);
   facts->sightings++;
   facts->unknown_landmarks += !is_landmark(setup, id);
 }
@@ -63,6 +64,13 @@ static void judge(const wm_assembly *assembly, const wm_assembled_source *s, con
     find(out, FINDING_NOTE, s->name, mend, "as much as %.0f ms late, more than its lateness_max_ms (%.0f)",
          (double)facts->latest_ns * 1e-6, (double)s->merge.lateness_max_ns * 1e-6);
   }
+  if (facts->bare_ranges > 0 && strcmp(assembly->config->estimator->name, "slam") == 0)
+    find(out, FINDING_NOTE, s->name,
+         "drive curves within reach of each: a straight way leaves a landmark and its mirror image open",
+         "%" PRIu64
+         " of 100 sightings are ranges without a bearing: such a landmark begins as a circle and joins the "
+         "map once its place is decided",
+         of_hundred(facts->bare_ranges, facts->sightings));
   int needs_landmarks = assembly->setup.landmark_count > 0;
   if (needs_landmarks && of_hundred(facts->unknown_landmarks, facts->sightings) > 50)
     find(out, FINDING_BAD, s->name, "are they the landmarks of this place, by these ids?",

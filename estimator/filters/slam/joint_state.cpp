@@ -407,6 +407,37 @@ bool joint_state::fuse(innovation_block &block, const double *added_noise, scope
   return true;
 }
 
+void joint_state::widen_landmark(int landmark, const double d[2], double share) {
+  const int first = landmark_state(landmark);
+  for (int k = 0; k < 2; k++)
+    for (int l = k; l < 2; l++) p().set(first + k, first + l, covariance(first + k, first + l) + share * d[k] * d[l]);
+}
+
+// Of the optimal gain only the landmark's two rows are applied, as in fuse_part; then the covariance is transported to
+// the new place: T = I + e h' with e of that place alone.
+void joint_state::fuse_landmark(int landmark, const innovation_block &block) {
+  if (!(block.determinant > 0.0)) return;
+  const half_covariance cov = p();
+  const int first = landmark_state(landmark);
+  const double *g = gain(0), s = block.s[0][0];
+  double own[2][2], step[2];
+  for (int k = 0; k < 2; k++) {
+    step[k] = g[first + k] * block.innovation[0] / s;
+    for (int l = 0; l < 2; l++) own[k][l] = cov.at(first + k, first + l) - g[first + k] * g[first + l] / s;
+    for (int j = 0; j < n_; j++)
+      if (j != first && j != first + 1) cov.set(first + k, j, cov.at(first + k, j) - g[first + k] * g[j] / s);
+    x()[first + k] += step[k];
+  }
+  const double e[2] = {layout_.invariant ? -step[1] : 0.0, layout_.invariant ? step[0] : 0.0};
+  const double turn[2] = {cov.at(first, kHeading), cov.at(first + 1, kHeading)}, hh = variance(kHeading);
+  for (int k = 0; k < 2; k++) {
+    for (int l = k; l < 2; l++)
+      cov.set(first + k, first + l, own[k][l] + e[k] * turn[l] + turn[k] * e[l] + e[k] * e[l] * hh);
+    for (int j = 0; j < n_; j++)
+      if (j != first && j != first + 1) cov.set(first + k, j, cov.at(first + k, j) + e[k] * cov.at(kHeading, j));
+  }
+}
+
 // The correction of the mean: on the group of turns and places for the invariant filter (the map turns as a whole with
 // the heading and does not shear), by addition for the plain one. e: as in T.
 void joint_state::move_mean(const double *change, double *e) {

@@ -129,6 +129,11 @@ class joint_state : public planar_motion {
   // Fuses the rows prepared, with `added_noise[k]` for each. False: S is not positive definite, nothing changed.
   [[nodiscard]] bool fuse(innovation_block &block, const double *added_noise, scope which);
 
+  // Adds `share` of d d' to the covariance of a landmark's place.
+  void widen_landmark(int landmark, const double d[2], double share);
+  // Corrects a landmark by the row prepared, of the block of rows the first one. All others are considered.
+  void fuse_landmark(int landmark, const innovation_block &block);
+
   // P H' of a single row, without changing the rows prepared; n doubles.
   void project(const joint_row &row, double *gain) const;
   double dot(const joint_row &row, const double *gain) const;

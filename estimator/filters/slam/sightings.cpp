@@ -7,7 +7,6 @@ namespace wm {
 namespace {
 
 constexpr double kLeastLever_m = 0.1;       // floor of the distance by which a lateral error becomes an angle
-constexpr double kOnSensor_m = 0.05;        // nearer, a landmark has no direction
 constexpr double kLeastDepth = 0.1;         // floor of the cosine between a depth's axis and the bearing
 constexpr double kAmbiguous = 2.0;          // the second best association must be worse by this factor; not swept
 constexpr int kNameless = 20;               // sightings without an identity, none with one; not swept
@@ -19,14 +18,16 @@ double clutter_volume(const sighting_reading &r) {
   return (r.bearing ? kTwoPi : 1.0) * (r.range ? kClutterRange_m : 1.0);
 }
 
+}  // namespace
+
 // Distance on the floor by a range that may be a depth.
-double distance_of(const wm_sighting &s, const mounted_sensor &sensor, const sensor_errors &errors) {
+double slam::distance_of(const wm_sighting &s) const {
+  const mounted_sensor &sensor = sensor_[s.sensor];
+  const sensor_errors errors = errors_of(s.sensor);
   const double range = (s.range_m - errors[kRangeBias]) / errors[kRangeScale];
   const bool depth = sensor.range_is_depth && !std::isnan(s.bearing_rad);
   return range / (depth ? larger(cos(s.bearing_rad), kLeastDepth) : 1.0);
 }
-
-}  // namespace
 
 wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   const wm_sighting &s = event.as.sighting;
@@ -98,6 +99,7 @@ int slam::associate(const wm_sighting &s, const reading &r, const past_pose &pas
   int best = -1;
   double least = params_.new_gate, second = params_.new_gate;
   for (int i = 0; i < joint_.landmarks(); i++) {
+    if (is_member(note(i))) continue;
     const int state = joint_.landmark_state(i);
     const wm_pose2 place = pose_of(i);
     if (std::fabs(place.x_m - x) > params_.associate_near_m || std::fabs(place.y_m - y) > params_.associate_near_m)
@@ -126,7 +128,7 @@ int slam::associate(const wm_sighting &s, const reading &r, const past_pose &pas
 
 // For the search of the pose. Its sigmas need no cross terms: the search allows for odometry's errors besides.
 slam::planar_observation slam::observation_of(const wm_sighting &s, const reading &r) const {
-  const double range = distance_of(s, sensor_[s.sensor], errors_of(s.sensor));
+  const double range = distance_of(s);
   return {.bearing_rad = r.bearing ? s.bearing_rad : std::nan(""),
           .range_m = r.range ? range : std::nan(""),
           .heading_rad = std::nan(""),
@@ -214,6 +216,7 @@ void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r,
     expect_point(at, observation_of(s, r), landmark, &v);
   else if (possible != WM_FUSED)
     return (void)reject(at.records, at.record, possible);
+  if (!r.bearing) v.noise[0] += curvature_variance(at, landmark, v);
   joint_state::innovation_block block;
   prepare(landmark, &v, &block);
   const gate_result g = gate(block.nis, v.count, gates());
@@ -234,7 +237,9 @@ wm_status slam::begin_landmark(context at, const wm_sighting &s, const reading &
   const bool may_join = params_.map != WM_SLAM_MAP_FROZEN && r.bearing && (r.range || has_lines());
   const bool as_ray = params_.line_method == WM_SLAM_LINE_INVERSE_DISTANCE;
   wm_verdict verdict = WM_REJECTED_UNKNOWN_ID;
-  if (may_join && map_is_held())
+  if (!r.bearing && params_.map != WM_SLAM_MAP_FROZEN)
+    verdict = map_is_held() ? WM_REJECTED_SEARCHING : follow_annulus(at, s, r);
+  else if (may_join && map_is_held())
     verdict = WM_REJECTED_SEARCHING;
   else if (may_join && r.range)
     verdict = join_seen(at, s, r);
@@ -250,7 +255,7 @@ wm_status slam::begin_landmark(context at, const wm_sighting &s, const reading &
 
 // By bearing and range. The first guess takes the sensor as level; Newton's steps end where it sees the landmark.
 wm_verdict slam::join_seen(const context &at, const wm_sighting &s, const reading &r) {
-  const double range = distance_of(s, sensor_[s.sensor], errors_of(s.sensor));
+  const double range = distance_of(s);
   const wm_pose2 from = sensor_pose(s.sensor, at.past);
   const sin_cos ray = sincos(from.heading_rad + s.bearing_rad);
   double place[3] = {from.x_m + range * ray.cos, from.y_m + range * ray.sin, 0.0};

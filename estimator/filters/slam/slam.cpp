@@ -15,17 +15,6 @@ constexpr double kOwnFrame_m = 1e-3, kOwnFrame_rad = 1e-3;  // sigmas of a start
 constexpr double kStart_m = 0.05, kStart_rad = 0.05;        // of a start without sigmas, as in landmark_ekf
 constexpr double kSurveyed_m = 1e-4, kSurveyed_rad = 0.01;  // no map is better; headings come without a sigma
 
-landmark_note note_of(int32_t id, int sensor, wm_time_ns t_ns) {
-  landmark_note out{};
-  out.id = id;
-  out.first_ns = out.last_ns = t_ns;
-  out.sensor = sensor;
-  out.tilt_sensor = -1;
-  out.deferred_ns = WM_TIME_NONE;
-  out.apart_from = -1;
-  return out;
-}
-
 const char *const kReads[] = {"!motion.states.wheel_difference", "motion.",    "!sightings.use.elevation",
                               "!sightings.noise.map_min",        "sightings.", nullptr};
 
@@ -81,6 +70,17 @@ bool map_has_headings(const wm_slam_params &p, const wm_setup &setup) {
 }
 
 }  // namespace
+
+landmark_note note_of(int32_t id, int sensor, wm_time_ns t_ns) {
+  landmark_note out{};
+  out.id = id;
+  out.first_ns = out.last_ns = t_ns;
+  out.sensor = sensor;
+  out.tilt_sensor = -1;
+  out.deferred_ns = WM_TIME_NONE;
+  out.apart_from = -1;
+  return out;
+}
 
 slam::arrays slam::place(memory_layout *out, const wm_slam_params &params, const wm_setup &setup) {
   return {out->take<landmark_note>(static_cast<size_t>(params.landmark_capacity)),
@@ -202,7 +202,7 @@ void slam::start_again() {
                   covariance);
   forget_lines();
   errors_.release_all();
-  next_id_ = 0;
+  next_id_ = members_ = 0;
   cursor_ = 0;
   for (int i = 0; i < 2; i++) {
     other_fused_ns_[i] = WM_TIME_NONE;
@@ -325,7 +325,7 @@ size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const 
 
 size_t slam::list_counters(wm_counter *out, size_t capacity) const {
   counter_list list(out, capacity);
-  list.add(WM_COUNTER_LANDMARKS, static_cast<uint64_t>(joint_.landmarks()));
+  list.add(WM_COUNTER_LANDMARKS, static_cast<uint64_t>(joint_.landmarks() - members_));
   list.add(WM_COUNTER_LANDMARKS_ADDED, counts_.joined);
   list.add(WM_COUNTER_LANDMARKS_REMOVED, counts_.left);
   list.add(WM_COUNTER_LANDMARKS_MOVED, counts_.moved, moved_.last);
@@ -384,7 +384,7 @@ wm_pose2 slam::pose_of(int landmark) const {
 
 int slam::find_landmark(int32_t id) const {
   for (int i = 0; i < joint_.landmarks(); i++)
-    if (note(i).id == id) return i;
+    if (note(i).id == id && !is_member(note(i))) return i;
   return -1;
 }
 
@@ -395,9 +395,13 @@ int32_t slam::own_id() {
 }
 
 void slam::drop_landmark(int landmark) {
+  const bool member = is_member(note(landmark));
   joint_.remove_landmark(landmark);
   note(landmark) = note(joint_.landmarks());
-  counts_.left++;
+  if (member)
+    members_--;
+  else
+    counts_.left++;
 }
 
 // Room for one more: the unconfirmed landmark that was not seen for longest leaves. False: all are confirmed.
@@ -405,7 +409,8 @@ bool slam::make_room() {
   if (joint_.landmarks() < joint_.landmark_capacity()) return true;
   int oldest = -1;
   for (int i = 0; i < joint_.landmarks(); i++)
-    if (!is_confirmed(note(i)) && (oldest < 0 || note(i).last_ns < note(oldest).last_ns)) oldest = i;
+    if (!is_confirmed(note(i)) && !is_member(note(i)) && (oldest < 0 || note(i).last_ns < note(oldest).last_ns))
+      oldest = i;
   if (oldest < 0) {
     counts_.no_room++;
     return false;
@@ -418,6 +423,7 @@ bool slam::make_room() {
 void slam::maintain_map(wm_time_ns t_ns) {
   if (joint_.landmarks() == 0 || params_.map == WM_SLAM_MAP_FROZEN || map_is_held()) return;
   cursor_ = (cursor_ + 1) % joint_.landmarks();
+  if (is_member(note(cursor_))) return;
   find_double(cursor_);
   const landmark_note &n = note(cursor_);
   // A tracker's number does not come back: a line that was seen too rarely to be merged is never found again.

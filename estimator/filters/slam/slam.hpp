@@ -25,7 +25,8 @@
 
 namespace wm {
 
-inline constexpr int kSlamSensors = 8;  // capacity
+inline constexpr int kSlamSensors = 8;       // capacity
+inline constexpr double kOnSensor_m = 0.05;  // nearer, a landmark has no direction
 // Observations of each of two lines that may be one (lines.rejoin): a false line rarely lasts a second. Not swept.
 inline constexpr uint32_t kMergeSeen = 10;
 // An identity that was unseen for so long and comes back is the landmark's own: a tracker bridges a few pictures. Two
@@ -46,6 +47,7 @@ struct landmark_note {
   int32_t sensor;           // that saw it last
   int32_t tilt_sensor;      // the sensor whose observations `mean_m` averages; -1: none
   wm_time_ns deferred_ns;   // when a surprising observation was deferred (trust.cpp)
+  double weight;            // of a place that a landmark seen by ranges alone may be at (annulus.cpp); 0: decided
   double mean_m[3], means;  // of a coded marker: its mean place in that sensor's levelled axes, of so many observations
   wm_pose2 first_view;      // base_link in the odometry's frame when it joined
   int32_t apart_from;       // a landmark that was seen in one stamp with this one, though it stands here; -1: none
@@ -72,6 +74,9 @@ struct picture_outliers {
   bool of_markers;
   double innovation_rad[kCapacity];
 };
+
+// Of a landmark that is seen for the first time.
+landmark_note note_of(int32_t id, int sensor, wm_time_ns t_ns);
 
 // The last identities with a property.
 struct identity_list {
@@ -165,6 +170,7 @@ class slam {
   void maintain_map(wm_time_ns t_ns);
   void drop_landmark(int landmark);
   int note_landmark(int32_t id, int landmark, int sensor);
+  bool is_member(const landmark_note &note) const { return note.weight > 0.0; }
   bool is_seen_enough(const landmark_note &note) const {
     return note.surveyed || note.seen >= static_cast<uint32_t>(params_.confirm_seen);
   }
@@ -218,6 +224,15 @@ class slam {
   void end_ray(bearing_tracks::track *track);
   void forget_lines();
   void forget_tracks();
+
+  // annulus.cpp
+  double distance_of(const wm_sighting &s) const;
+  wm_verdict follow_annulus(const context &at, const wm_sighting &s, const reading &r);
+  wm_verdict begin_annulus(const context &at, const wm_sighting &s, const reading &r);
+  void weigh_members(const context &at, const wm_sighting &s, const reading &r, int first);
+  double curvature_variance(const context &at, int landmark, const landmark_rows &v) const;
+  void merge_members(int32_t id, int first, double range_variance);
+  void decide_member(const context &at, int first);
 
   // markers.cpp
   wm_status fuse_marker(const wm_event &event, record_list records);
@@ -303,6 +318,7 @@ class slam {
   slam_counts counts_;
   double bloom_px_[kSlamSensors];  // of the last marker that has one; NaN: none has
   int32_t next_id_;
+  int members_;                   // landmarks that are places of undecided ones
   int cursor_;                    // of maintain_map
   wm_time_ns other_fused_ns_[2];  // when the last two different landmarks were fused
   int32_t other_fused_id_[2];

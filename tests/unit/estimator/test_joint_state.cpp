@@ -375,6 +375,68 @@ void test_the_pose_alone_is_corrected(void) {
   TEST_ASSERT_EQUAL_DOUBLE(from_2[3], from_3[2]);
 }
 
+// [Schmidt1966] with the gain of one landmark alone, on the whole matrix: P <- (I - K H) P (I - K H)' + K R K'.
+void test_a_landmark_alone_is_corrected(void) {
+  made m(false);
+  for (int i = 0; i < 3; i++) m.add(3.0 + i, 1.0 - 0.5 * i);
+  const matrix before = m.covariance();
+  const size_t n = before.size();
+  const int landmark = 1, first = m.state->landmark_state(landmark);
+  joint_row row;
+  row.add(wm::kX, -0.6);
+  row.add(wm::kY, 0.8);
+  row.add(first, 0.6);
+  row.add(first + 1, -0.8);
+  const double noise = 0.02, innovation = 0.3;
+  joint_state::innovation_block block;
+  m.state->prepare(&row, &innovation, &noise, 1, &block);
+  std::vector<double> h(n), gain(n), value;
+  for (int k = 0; k < row.count; k++) h[(size_t)row.index[k]] += row.by[k];
+  for (size_t i = (size_t)first; i < (size_t)first + 2; i++)
+    for (size_t j = 0; j < n; j++) gain[i] += before[i][j] * h[j] / block.s[0][0];
+  matrix a(n, std::vector<double>(n));
+  for (size_t i = 0; i < n; i++)
+    for (size_t j = 0; j < n; j++) a[i][j] = (i == j) - gain[i] * h[j];
+  matrix want = times(times(a, before, false), a, true);
+  for (size_t i = 0; i < n; i++) {
+    value.push_back(m.state->value((int)i) + gain[i] * innovation);
+    for (size_t j = 0; j < n; j++) want[i][j] += gain[i] * noise * gain[j];
+  }
+  m.state->fuse_landmark(landmark, block);
+  assert_near(want, m.covariance());
+  for (size_t i = 0; i < n; i++) TEST_ASSERT_DOUBLE_WITHIN(1e-12, value[i], m.state->value((int)i));
+}
+
+// The invariant filter's is the plain one's, transported by T = I + e h', e = J (new place - old place).
+void test_a_landmark_alone_is_transported_to_its_new_place(void) {
+  matrix covariance[2];
+  double moved[2];
+  int first = 0;
+  for (const bool invariant : {false, true}) {
+    made m(invariant);
+    for (int i = 0; i < 3; i++) m.add(3.0 + i, 1.0 - 0.5 * i);
+    first = m.state->landmark_state(1);
+    joint_row row;
+    row.add(wm::kX, -0.6);
+    row.add(wm::kY, 0.8);
+    row.add(first, 0.6);
+    row.add(first + 1, -0.8);
+    const double noise = 0.02, innovation = 0.3;
+    joint_state::innovation_block block;
+    m.state->prepare(&row, &innovation, &noise, 1, &block);
+    for (int k = 0; k < 2; k++) moved[k] = -m.state->value(first + k);
+    m.state->fuse_landmark(1, block);
+    for (int k = 0; k < 2; k++) moved[k] += m.state->value(first + k);
+    covariance[invariant] = m.covariance();
+  }
+  const size_t n = covariance[0].size();
+  matrix t(n, std::vector<double>(n));
+  for (size_t i = 0; i < n; i++) t[i][i] = 1.0;
+  t[(size_t)first][wm::kHeading] = -moved[1];
+  t[(size_t)first + 1][wm::kHeading] = moved[0];
+  assert_near(times(times(t, covariance[0], false), t, true), covariance[1]);
+}
+
 void test_states_that_join_in_front_of_landmarks_leave_the_others_as_they_were(void) {
   const int robot = 10, more = 15, landmarks = 4, wide = 3;
   made m(true, 2, landmarks, {}, wm::even(robot + more) + landmarks * wide);
@@ -422,6 +484,8 @@ int main(void) {
   RUN_TEST(test_a_wheel_that_slips_comes_back_to_its_mean);
   RUN_TEST(test_a_row_with_missing_entries_is_refused);
   RUN_TEST(test_the_pose_alone_is_corrected);
+  RUN_TEST(test_a_landmark_alone_is_corrected);
+  RUN_TEST(test_a_landmark_alone_is_transported_to_its_new_place);
   RUN_TEST(test_states_that_join_in_front_of_landmarks_leave_the_others_as_they_were);
   return UNITY_END();
 }

@@ -56,6 +56,22 @@ void test_the_first_marker_widens_a_map_of_points(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&still));
 }
 
+// A rate that is measured while the robot stands is the gyro's bias; one of exactly 0 was set.
+void test_a_measured_twist_at_standstill_gives_the_bias(void) {
+  for (const double rate : {0.0015, 0.0}) {
+    make_room();
+    motion.states.sigma[wm::kYawRateBias] = 0.02;
+    begin();
+    for (int i = 0; i < 100; i++) {
+      const wm_event e = make::twist(0.02 * i, 0.0, rate);
+      TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
+    }
+    double sigma_radps;
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, rate, calibrated("yaw_rate_bias_radps", &sigma_radps));
+    TEST_ASSERT_TRUE(rate > 0.0 ? sigma_radps < 0.003 : sigma_radps > 0.019);
+  }
+}
+
 void test_coded_markers_give_place_and_heading_at_once(void) {
   coded = true;
   params.marker_heading_sigma_rad = 0.01;
@@ -406,6 +422,7 @@ int main(void) {
   RUN_TEST(test_landmarks_are_found_by_bearings_alone_whatever_the_method);
   RUN_TEST(test_identities_of_bearings_that_come_back_are_landmarks_own);
   RUN_TEST(test_the_first_marker_widens_a_map_of_points);
+  RUN_TEST(test_a_measured_twist_at_standstill_gives_the_bias);
   RUN_TEST(test_coded_markers_give_place_and_heading_at_once);
   RUN_TEST(test_absurd_markers_are_refused_and_change_nothing);
   RUN_TEST(test_of_two_poses_the_one_is_taken_that_fits_the_map);
