@@ -67,7 +67,7 @@ void test_a_measured_twist_at_standstill_gives_the_bias(void) {
       TEST_ASSERT_EQUAL(WM_OK, slam->predict(state, &e));
     }
     double sigma_radps;
-    TEST_ASSERT_DOUBLE_WITHIN(1e-3, rate, calibrated("yaw_rate_bias_radps", &sigma_radps));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-3, rate, calibrated("motion.yaw_rate_bias_radps", &sigma_radps));
     TEST_ASSERT_TRUE(rate > 0.0 ? sigma_radps < 0.003 : sigma_radps > 0.019);
   }
 }
