@@ -33,7 +33,7 @@ double gauss(double sigma) { return sigma * wm_random_next_normal(&noise); }
 void begin(double spacing_m, double sigma_m, uint64_t seed) {
   std::free(state);
   slam = wm_estimator_find("slam");
-  make::shared_defaults(&motion);
+  make::exact_sensors(&motion);
   wm_params_defaults(&slam->params, &params);
   motion.noise_speed_mps = kSpeedNoise_mps;
   motion.noise_yaw_rate_radps = kRateNoise_radps;
