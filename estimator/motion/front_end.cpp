@@ -98,7 +98,7 @@ wm_status motion_front_end::check(const wm_event &event) const {
 }
 
 void motion_front_end::feed(const wm_event &event) {
-  if (now_ns_ == WM_TIME_NONE) now_ns_ = event.kind == WM_EVENT_INCREMENT ? event.as.increment.from_ns : event.t_ns;
+  if (now_ns_ == WM_TIME_NONE) set_now(event.kind == WM_EVENT_INCREMENT ? event.as.increment.from_ns : event.t_ns);
   yaw_fresh_ = 0;
   if (now_ns_ > fed_ns_ && history_.is_overdue(now_ns_)) observed_without_ = 3;
   fed_ns_ = event.t_ns;
