@@ -3,7 +3,7 @@
 """SLAM after slips and with misread identities, injected into recordings whose landmarks have identities. A slip is a
 turn that the odometry reports and the robot did not make, in a gap without sightings. A misread identity is another one
 of the recording, in bursts. Each disturbed replay is compared with the undisturbed one. Skips (77) where the recordings
-are not there.
+are not there. Those whose source gives covariances are replayed with them.
 
     slips.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--seed N] [--set KEY=VALUE] [--json]"""
 import argparse
@@ -14,9 +14,11 @@ import random
 import sys
 import tempfile
 
+import covariances
 import defaults
 
 RECORDINGS = ("dlr-a", "mrclam-d6-r1", "mrclam-d6-r2", "mrclam-d6-r3", "mrclam-d6-r5", "mrclam-d6-t5")
+MOTIONS = (("increments.csv", "dheading_rad"), ("motion6.csv", "wz_radps"), ("motion.csv", "w_radps"))
 SLIPS_DEG = (40, 70)
 SLIP_S = 1.0            # a slip takes so long
 GAP_S = 2.0             # without sightings
@@ -40,8 +42,7 @@ class Recording:
 
     def __init__(self, folder):
         self.folder = folder
-        self.motion_name = "motion6.csv" if (folder / "motion6.csv").exists() else "motion.csv"
-        self.rate = "wz_radps" if self.motion_name == "motion6.csv" else "w_radps"
+        self.motion_name, self.turn = next(m for m in MOTIONS if (folder / m[0]).exists())
         self.motion = defaults.rows(folder / self.motion_name)
         self.sightings = defaults.rows(folder / "sightings.csv")
         self.stamps = sorted({int(r["t_ns"]) for r in self.sightings})
@@ -80,9 +81,10 @@ class Recording:
         begin_ns = (gap[0] + gap[1]) // 2 - int(SLIP_S * 0.5e9)
         within = [k for k, r in enumerate(self.motion[:-1]) if begin_ns <= int(r["t_ns"]) < begin_ns + SLIP_S * 1e9]
         whole_s = (int(self.motion[within[-1] + 1]["t_ns"]) - int(self.motion[within[0]]["t_ns"])) * 1e-9
+        share = len(within) if self.turn == "dheading_rad" else whole_s   # a row is a turn, or a turn rate
         out = [dict(r) for r in self.motion]
         for k in within:
-            out[k][self.rate] = f"{number(out[k][self.rate]) + angle_rad / whole_s:.9f}"
+            out[k][self.turn] = f"{number(out[k][self.turn]) + angle_rad / share:.9f}"
         return out
 
     def misread(self, rng):
@@ -150,7 +152,11 @@ def row_of(name, out, **more):
 
 
 def judge(options, name, scratch):
-    recording = Recording(options.data_dir / name)
+    folder = options.data_dir / name
+    if (folder / "steps-covariance.csv").exists():   # the source's covariances, which are beside the recording
+        covariances.copy(folder, scratch / name)
+        folder = scratch / name
+    recording = Recording(folder)
     case = defaults.Case(name, "slam", ())
     text = defaults.plain(case, options.set)
     rng = random.Random(f"{name} {options.seed}")
