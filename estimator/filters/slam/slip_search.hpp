@@ -60,8 +60,11 @@ class slip_search {
   void add(const observation &seen, bool is_misfit, const travelled_pose2 &odometry);
   // Most of the landmarks seen lately misfit, and B is not clearly worse than A.
   bool doubts(wm_time_ns now_ns) const;
+  bool doubts_one() const { return count_ == 1; }  // one landmark alone
   // When a landmark last fitted that was on the map at the last such fit: the pose is right. WM_TIME_NONE: never.
   wm_time_ns fitted_ns() const { return fitted_ns_; }
+  // When one that was seen before fitted, also one that joined after a gap without any.
+  wm_time_ns linked_ns() const { return linked_ns_; }
   // A landmark that was on the map since `joined_ns` fits. False: it joined after the last fit and fits any pose.
   bool links(wm_time_ns joined_ns, wm_time_ns now_ns, const travelled_pose2 &odometry);
 

@@ -17,6 +17,8 @@ constexpr double kBurst_s = 5.0;  // light changes, too; not swept
 // A new identity is misread with this probability. Otherwise its landmark stands anywhere near the other: landmarks
 // stand in groups, one on 20 m2 or so. Not swept.
 constexpr double kMisread = 0.02, kOwnArea_m2 = 20.0;
+constexpr double kMostAlone = 2.0;  // nats, one for each second that the other is seen and this one is not; not swept
+constexpr double kUnmodelled_m = 0.08;  // sigma of a difference of two places beyond their covariance; not swept
 constexpr double kOnePicture_s = 0.02;  // sightings of one picture have stamps that are nearer
 constexpr double kOnePlace_m = 2.0;     // landmarks farther apart are not compared
 // Rotation outliers. Chosen on hall-hard and office-hard, seeds 1 and 2; not swept.
@@ -138,7 +140,9 @@ int slam::most_misfits(const landmark_note &seen) const {
 // Landmarks that were on the map before fit the pose, so that it is right.
 bool slam::do_others_fit(const landmark_note &seen) const {
   const wm_time_ns now = joint_.now_ns();
-  if (slips_.fitted_ns() != WM_TIME_NONE) return wm_seconds_between(slips_.fitted_ns(), now) <= kOthersFit_s;
+  // One that was on the map during one visit only was misread more probably than the odometry slipped since.
+  const wm_time_ns fitted_ns = seen.may_be_misread && !seen.revisited ? slips_.linked_ns() : slips_.fitted_ns();
+  if (fitted_ns != WM_TIME_NONE) return wm_seconds_between(fitted_ns, now) <= kOthersFit_s;
   for (int i = 0; i < 2; i++)
     if (other_fused_id_[i] >= 0 && other_fused_id_[i] != seen.id &&
         wm_seconds_between(other_fused_ns_[i], now) <= kOthersFit_s)
@@ -151,7 +155,9 @@ bool slam::do_others_fit(const landmark_note &seen) const {
 void slam::note_misfit(int landmark, bool ranged) {
   landmark_note &seen = note(landmark);
   seen.misfits++;
-  if (map_is_held()) return;
+  // Held by this landmark alone, which more probably was misread.
+  const bool is_alone = life_.tracking() && seen.may_be_misread && !seen.revisited && slips_.doubts_one();
+  if (map_is_held() && !is_alone) return;
   if (ranged && !is_confirmed(seen) && seen.misfits >= kUnconfirmedMisfits) return drop_landmark(landmark);
   const bool frozen = params_.map == WM_SLAM_MAP_FROZEN;
   if (seen.misfits < (ranged ? most_misfits(seen) : params_.moved_after) || (frozen && moved_.has(seen.id))) return;
@@ -164,17 +170,21 @@ void slam::note_misfit(int landmark, bool ranged) {
 }
 
 // Two landmarks stand at one place: that they are one, misread, is more probable than that another one stands there.
+// More so where the other one is still seen after this one was seen last.
 bool slam::stands_with(int one, int other) const {
   const int a = joint_.landmark_state(one), b = joint_.landmark_state(other);
   if (std::fabs(joint_.value(a) - joint_.value(b)) > kOnePlace_m ||
       std::fabs(joint_.value(a + 1) - joint_.value(b + 1)) > kOnePlace_m)
     return false;
-  const landmark_pair p = pair_of(one, other);
+  landmark_pair p = pair_of(one, other);
+  for (int k = 0; k < 2; k++) p.s[k][k] += square(kUnmodelled_m);
   const double determinant = p.s[0][0] * p.s[1][1] - p.s[0][1] * p.s[1][0];
   const double nis =
       (p.s[1][1] * square(p.apart[0]) - 2.0 * p.s[0][1] * p.apart[0] * p.apart[1] + p.s[0][0] * square(p.apart[1])) /
       determinant;
-  return determinant > 0.0 && kMisread * kOwnArea_m2 * exp(-0.5 * nis) > kTwoPi * std::sqrt(determinant);
+  const double alone_s = wm_seconds_between(note(one).last_ns, note(other).last_ns);
+  const double alone = alone_s < 0.0 ? 0.0 : alone_s < kMostAlone ? alone_s : kMostAlone;
+  return determinant > 0.0 && kMisread * kOwnArea_m2 * exp(alone - 0.5 * nis) > kTwoPi * std::sqrt(determinant);
 }
 
 // Where an identity is misread, its landmark stands where the one does that was seen, and they are never seen together.
