@@ -17,8 +17,8 @@ constexpr double kBurst_s = 5.0;  // light changes, too; not swept
 // A new identity is misread with this probability. Otherwise its landmark stands anywhere near the other: landmarks
 // stand in groups, one on 20 m2 or so. Not swept.
 constexpr double kMisread = 0.02, kOwnArea_m2 = 20.0;
-constexpr double kMostAlone = 2.0;  // nats, one for each second that the other is seen and this one is not; not swept
-constexpr double kUnmodelled_m = 0.08;  // sigma of a difference of two places beyond their covariance; not swept
+constexpr double kMostAlone = 1.0;  // nats, one for each second that the other is seen and this one is not; not swept
+constexpr double kUnmodelled_m = 0.05;  // sigma of a difference of two places beyond their covariance; not swept
 constexpr double kOnePicture_s = 0.02;  // sightings of one picture have stamps that are nearer
 constexpr double kOnePlace_m = 2.0;     // landmarks farther apart are not compared
 // Rotation outliers. Chosen on hall-hard and office-hard, seeds 1 and 2; not swept.
