@@ -18,6 +18,13 @@ constexpr double kSmoothing_s = 0.3;
 
 double variance_of(double sigma, double rel, double size) { return square(sigma) + square(rel * size); }
 
+// Variance of a value that is held while the truth goes on to the next sample: a change c, evenly made, leaves c^2/3 on
+// average. Two samples' noise is taken off.
+double held_variance(double change, double sigma) {
+  const double real = square(change) - 2.0 * square(sigma);
+  return real > 0.0 ? real / 3.0 : 0.0;
+}
+
 // The output of a dead band of that half width: it follows its input only beyond.
 double dead_band(double output, double input, double half_width) {
   if (input > output + half_width) return input - half_width;
@@ -77,6 +84,11 @@ double spatial_history::refused_s4(wm_time_ns from_ns, wm_time_ns to_ns) const {
     return s < 0.0 ? 0.0 : s < rules_.hold_max_s ? s : rules_.hold_max_s;
   };
   return 0.25 * (square(square(since(to_ns))) - square(square(since(from_ns))));
+}
+
+spatial_twist spatial_history::last_change() const {
+  if (samples_ < 2 || wm_seconds_between(sample_[1].t_ns, sample_[0].t_ns) > rules_.gap_after_s) return {};
+  return {sample_[0].twist.v - sample_[1].twist.v, sample_[0].twist.w - sample_[1].twist.w};
 }
 
 void spatial_history::remember(const spatial_piece &piece) { piece_[pieces_++ % kPieces] = piece; }
@@ -155,11 +167,16 @@ spatial_step spatial_motion::step_of(const spatial_piece &piece) const {
   const double speed = length(s.v_mps), rate = length(s.w_radps);
   const double held_s2 = s.dt_s * (s.dt_s > history_.period_s() ? s.dt_s : history_.period_s());
   const wm_motion_params &p = front_.params();
+  const spatial_twist changed = history_.last_change();
   for (int i = 0; i < 3; i++) {
-    s.place_m2[i] = variance_of(noise_.v_mps[i], noise_.v_rel, speed) * held_s2 + square(kGapWalk_mps) * piece.walk_s3 +
-                    square(p.limits_mps2) * piece.refused_s4 / 3.0;
-    s.turn_rad2[i] = variance_of(noise_.w_radps[i], noise_.w_rel, rate) * held_s2 +
-                     square(kGapWalk_radps) * piece.walk_s3 + square(p.limits_radps2) * piece.refused_s4 / 3.0;
+    const double v_var =
+        variance_of(noise_.v_mps[i], noise_.v_rel, speed) + held_variance(changed.v[i], noise_.v_mps[i]);
+    const double w_var =
+        variance_of(noise_.w_radps[i], noise_.w_rel, rate) + held_variance(changed.w[i], noise_.w_radps[i]);
+    s.place_m2[i] =
+        v_var * held_s2 + square(kGapWalk_mps) * piece.walk_s3 + square(p.limits_mps2) * piece.refused_s4 / 3.0;
+    s.turn_rad2[i] =
+        w_var * held_s2 + square(kGapWalk_radps) * piece.walk_s3 + square(p.limits_radps2) * piece.refused_s4 / 3.0;
   }
   return s;
 }

@@ -52,6 +52,7 @@ class spatial_history {
   // holds. *twist: where not null, that at the beginning. False: older than what is remembered, which *out begins with.
   bool moved_since(double age_s, pose3 *out, spatial_twist *twist = nullptr) const;
 
+  spatial_twist last_change() const;        // between the last two samples; 0 over a gap
   int samples() const { return samples_; }  // up to 3
   const spatial_sample &sample(int back) const { return sample_[back]; }
   double period_s() const { return period_s_; }                       // between the last two samples that were no gap

@@ -186,7 +186,7 @@ def figures(bin_dir, case, recording, config, folder):
     out = json.loads(command(bin_dir / "waymark-eval", folder, recording, "--json", *case.options))
     health = json.loads((folder / "health.json").read_text())
     out["landmarks_moved"] = (find(health, "landmarks_moved") or {"count": 0})["count"]
-    out["velocity_scale"] = find(health, "velocity_scale")
+    out["velocity_scale"] = find(health, "motion.velocity_scale")
     against_gnss = "gnss" in case.options
     out["nees_inside_95"] = None if against_gnss else out["nees_inside_95"]
     out["confidently_wrong"] = None if against_gnss else confidently_wrong(folder, recording)

@@ -362,6 +362,7 @@ std::vector<dive_scenario> dive_scenarios() {
   return {
       {"known points", kSilence | kOutliers, 10, states},
       {"constant velocity", kSilence, 10, all({states, {{"prediction", 1}}})},
+      {"tracks between pictures", kNoMap, 12, {{"slam.points", 0}}},
       {"points found on the way", kNoMap | kOutliers, 12, {{"slam.points", 60}}},
       {"a map's points as states", kBlind, 12, {{"slam.points", 60}}},
       {"carried off", kCarriedOff, 10, {}},

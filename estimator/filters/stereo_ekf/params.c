@@ -29,7 +29,7 @@ static const wm_param kParams[] = {
         "Above 0: velocity and rates are Gauss-Markov processes with these sigmas and this time constant, s, instead "
         "of "
         "random walks (a head that is swung, a vehicle in still water)."),
-    F64("states.rate_bias_sigma_radps", rate_bias_sigma, 0.003, 0, 1,
+    F64("states.rate_bias_sigma_radps", rate_bias_sigma, 0.002, 0, 1,
         "Start sigma of the turn rates' bias on each axis, rad/s. 0: off."),
     F64("states.rate_bias_walk", rate_bias_walk, 0.0001, 0, 1, "Random walk of that bias, rad/s per sqrt(s)."),
     F64("states.velocity_scale_sigma", velocity_scale_sigma, 0.01, 0, 1,
@@ -51,6 +51,11 @@ static const wm_param kParams[] = {
     F64("states.camera_place_tau_s", camera_place_tau_s, 0, 0, 1e6, "As camera_rotation_tau_s, for the place."),
     F64("states.time_offset_sigma_s", time_offset_sigma, 0.02, 0, 0.2,
         "Start sigma of the pictures' time offset, s: by how much they are older than their stamps. 0: off."),
+    F64("states.increment_scale_sigma", increment_scale_sigma, 0.02, 0, 1,
+        "Sigma of the share by which motion between two pictures is too long: disparities that are all off by 0.2 px at "
+        "10 px. 0: off."),
+    F64("states.increment_direction_sigma_rad", increment_direction_sigma, 0.02, 0, 1,
+        "Sigma of the angle by which that motion is turned, rad: cameras that are not quite parallel. 0: off."),
     F64("states.range_bias_sigma_m", range_bias_sigma, 0.05, 0, 10, "Start sigma of acoustic ranges' bias, m. 0: off."),
     F64("states.bearing_bias_sigma_rad", bearing_bias_sigma, 0.01, 0, 1,
         "Start sigma of the bias of bearings and headings (a compass' deviation), rad. 0: off."),
@@ -66,13 +71,15 @@ static const wm_param kParams[] = {
         "tails. 99 % of correct rows lie below 6.6."),
     F64("gate.hard", gate_hard, 20, 1, 1e6,
         "Normalised innovation squared of one row above which the whole observation is an outlier."),
-    I32("slam.points", points_max, 0, 0, 256,
+    BOOL("increments.on", increments, 1,
+         "Use tracks that are no points of the state, as far ones, for the motion between two pictures (visual odometry)."),
+    I32("slam.points", points_max, 250, 0, 256,
         "Capacity of the state for points: points found by stereo, and points of the map, whose error on it (sigma_m) "
         "is "
         "the same in each picture. 0: known points only, with an independent error in each picture."),
     I32("slam.keep_unseen_steps", keep_unseen_steps, 5, 0, 1000000,
         "Pictures in which a point of the state may be missing although it should be in view; then it is removed."),
-    F64("slam.keep_outside_s", keep_outside_s, 10, 0, 1e6,
+    F64("slam.keep_outside_s", keep_outside_s, 600, 0, 1e6,
         "Time for which a point out of view is kept, to be found again, s. 0: it is removed at once, as in the paper."),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
         "Time without a fused observation after which the state is dead reckoning, s."),

@@ -25,12 +25,14 @@ typedef struct wm_stereo_ekf_params {
   double camera_rotation_sigma, camera_rotation_tau_s;
   double camera_place_sigma, camera_place_tau_s;
   double time_offset_sigma;
+  double increment_scale_sigma, increment_direction_sigma;
   double range_bias_sigma, bearing_bias_sigma;
   double twist_lag_sigma;
   // noise of one row
   double pixel_px;
   double gate_soft, gate_hard;
   // points found on the way
+  int32_t increments;  // motion between pictures by tracks that are no points of the state
   int32_t points_max, keep_unseen_steps;
   double keep_outside_s;
   // finding the pose

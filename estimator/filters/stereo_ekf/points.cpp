@@ -35,8 +35,12 @@ void stereo_ekf::end_picture() {
     const past_pose past = state_at_picture();
     for (int slot = filter_.point_count() - 1; slot >= 0; slot--) {
       point_info &point = info_[(size_t)slot];
-      if (point.seen_ns == picture_ns_ || point.unseen == kOfMap) continue;
+      if (point.unseen == kOfMap) continue;
       const vec3 x = in_camera(filter_.point(slot), past);
+      if (point.seen_ns == picture_ns_) {
+        if (grows_fast(x.z)) remove_point(slot);
+        continue;
+      }
       // A point whose observations are outliers has a wrong place, in view or not.
       if (point.misfit_ns == picture_ns_ || rig_.in_view(x, kInside_px)) {
         if (++point.unseen > params_.keep_unseen_steps) remove_point(slot);
@@ -45,6 +49,7 @@ void stereo_ekf::end_picture() {
       }
     }
   }
+  if (params_.increments) fuse_increment();
   picture_ns_ = WM_TIME_NONE;
 }
 
@@ -54,13 +59,21 @@ void stereo_ekf::remove_point(int slot) {
   info_[(size_t)slot] = info_[(size_t)last];
 }
 
-// Removes the found point that was not seen for longest; points of the present picture stay.
-bool stereo_ekf::make_room() {
+// The found point that was not seen for longest, which may be removed; points of the present picture stay. -1: none.
+int stereo_ekf::oldest_point() const {
   int oldest = -1;
   for (int i = 0; i < filter_.point_count(); i++)
     if (info_[(size_t)i].unseen != kOfMap && info_[(size_t)i].seen_ns != picture_ns_ &&
         (oldest < 0 || info_[(size_t)i].seen_ns < info_[(size_t)oldest].seen_ns))
       oldest = i;
+  return oldest;
+}
+
+bool stereo_ekf::has_room() const { return filter_.point_count() < filter_.point_capacity() || oldest_point() >= 0; }
+
+bool stereo_ekf::make_room() {
+  if (filter_.point_count() < filter_.point_capacity()) return true;
+  const int oldest = oldest_point();
   if (oldest < 0) return false;
   remove_point(oldest);
   return true;
@@ -73,11 +86,32 @@ int stereo_ekf::slot_of_known(int landmark) {
   if (params_.points_max == 0 || !(sigma > 0.0)) return -1;
   const int found = find_slot(known.id);
   if (found >= 0) return found;
-  if (filter_.point_count() == filter_.point_capacity() && !make_room()) return -1;
+  if (!make_room()) return -1;
   const int slot = filter_.point_count();
   filter_.add_point(vec_of(known.p_m), sigma);
   info_[(size_t)slot] = {now_ns_, now_ns_, WM_TIME_NONE, known.id, kOfMap};
   return slot;
+}
+
+// Left and right of a rectified pair lie in one row; otherwise the match is wrong.
+bool stereo_ekf::matches_itself(const wm_stereo &seen, wm_innovation *record) const {
+  record->observed = seen.left_px[1] - seen.right_px[1];
+  record->variance = square(sigma_px_[1]) + square(sigma_px_[3]);
+  record->nis = square(record->observed) / record->variance;
+  record->gate = params_.gate_soft;
+  record->verdict = record->nis > params_.gate_soft ? WM_REJECTED_GATE : WM_FUSED;
+  return record->verdict == WM_FUSED;
+}
+
+bool stereo_ekf::grows_fast(double depth_m) const {
+  return params_.increments && !(length(filter_.moved().p) < kGrowthMost * depth_m);
+}
+
+bool stereo_ekf::is_landmark(const wm_stereo &seen) const {
+  const double sigma = std::sqrt(square(sigma_px_[0]) + square(sigma_px_[2]));
+  const double disparity = seen.left_px[0] - seen.right_px[0];
+  if (params_.points_max == 0 || (params_.increments && !has_room())) return false;
+  return !params_.increments || (disparity > sigma / kNearShare && !grows_fast(rig_.fu * rig_.baseline_m / disparity));
 }
 
 void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, record_list records) {
@@ -90,18 +124,11 @@ void stereo_ekf::add_point(const wm_stereo &seen, const wm_innovation &blank, re
     records.add(record);
     return;
   }
-  // Left and right of a rectified pair lie in one row; otherwise the match is wrong.
-  const double row_variance = square(sigma_px_[1]) + square(sigma_px_[3]);
-  record.observed = px[1] - px[3];
-  record.variance = row_variance;
-  record.nis = square(record.observed) / row_variance;
-  record.gate = params_.gate_soft;
-  if (record.nis > params_.gate_soft) {
-    record.verdict = WM_REJECTED_GATE;
+  if (!matches_itself(seen, &record)) {
     records.add(record);
     return;
   }
-  if (filter_.point_count() == filter_.point_capacity() && !make_room()) {
+  if (!make_room()) {
     record.verdict = WM_REJECTED_NO_ASSOCIATION;
     records.add(record);
     return;

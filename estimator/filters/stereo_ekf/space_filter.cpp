@@ -6,6 +6,8 @@
 namespace wm {
 namespace {
 
+constexpr int kConsidered = 4;  // kPictureScale and kPictureDirection
+
 int head_size(const head_model models[kHeadStates]) {
   int n = kPose6;
   for (int k = 0; k < kHeadStates; k++)
@@ -32,7 +34,7 @@ void space_filter::init(double *memory, const head_model models[kHeadStates], in
     at_[k] = models[k].sigma > 0.0 ? state : -1;
     if (at_[k] >= 0) state += kHeadSpecs[k].width;
   }
-  pose_ = {{0, 0, 0}, kNoTurn};
+  pose_ = moved_ = {{0, 0, 0}, kNoTurn};
   r_ = camera_axes_ = kIdentity3;
   turn_rate_ = {0, 0, 0};
   pending_ = false;
@@ -40,8 +42,14 @@ void space_filter::init(double *memory, const head_model models[kHeadStates], in
   restart_head();
 }
 
+void space_filter::begin_increment() {
+  moved_ = {{0, 0, 0}, kNoTurn};
+  if (at_[kMovedPlace] >= 0) decorrelate(at_[kMovedPlace], kMovers - kPose6, 0.0);
+}
+
 void space_filter::restart(int which) {
   if (at_[which] < 0) return;
+  if (which == kMovedPlace || which == kMovedTurn) return begin_increment();
   decorrelate(at_[which], kHeadSpecs[which].width, square(models_[which].sigma));
   for (int i = 0; i < kHeadSpecs[which].width; i++) head_[at_[which] + i] = kHeadSpecs[which].neutral;
 }
@@ -131,6 +139,11 @@ bool space_filter::factorize_and_gate(const row_block &block, const gates &limit
   return true;
 }
 
+space_filter::considered_states space_filter::considered() const {
+  const int scale = at_[kPictureScale], direction = at_[kPictureDirection];
+  return {scale >= 0 ? scale : direction, (scale >= 0 ? 1 : 0) + (direction >= 0 ? 3 : 0)};
+}
+
 row_verdict space_filter::fuse(const row_block &block, const gates &limits) {
   row_verdict out{};
   out.verdict = WM_REJECTED_NUMERIC;
@@ -148,7 +161,15 @@ row_verdict space_filter::fuse(const row_block &block, const gates &limits) {
     vectors::add_scaled(correction(), gain, f.left[k] / f.d[k], width);
     vectors::set_scaled(gain, gain, 1.0 / std::sqrt(f.d[k]), width);
   }
+  const considered_states kept = considered();
+  double block_kept[kConsidered][kConsidered];
+  for (int i = 0; i < kept.count; i++)
+    for (int j = i; j < kept.count; j++) block_kept[i][j] = p()[(kept.first + i) * stride_ + kept.first + j];
   vectors::subtract_gram(p(), gains(), n_, stride_);
+  for (int i = 0; i < kept.count; i++) {
+    for (int j = i; j < kept.count; j++) p()[(kept.first + i) * stride_ + kept.first + j] = block_kept[i][j];
+    correction()[kept.first + i] = 0.0;
+  }
   pending_ = true;
   out.fused = true;
   out.verdict = WM_FUSED;
@@ -177,7 +198,11 @@ void space_filter::apply_correction(double *a) {
   pose_.q = normalized(turn_by(turn) * pose_.q);
   r_ = matrix_of(pose_.q);
   moved(kPlace, place);
-  for (int i = kPose6; i < first_point_; i++) head_[i] += x[i];
+  if (at_[kMovedPlace] >= 0) {
+    moved_.p = moved_.p + vec_of(x + at_[kMovedPlace]);
+    moved_.q = normalized(turn_by(vec_of(x + at_[kMovedTurn])) * moved_.q);
+  }
+  for (int i = movers(); i < first_point_; i++) head_[i] += x[i];
   for (int slot = 0; slot < point_count(); slot++) {
     const int state = point_state(slot);
     const vec3 by = spread * vec_of(x + state);

@@ -97,6 +97,10 @@ class space_filter {
   vec3 rates_of(const vec3 &measured) const { return measured + cross(head3(kTwistAxes), measured) - head3(kRateBias); }
 
   void propagate(const body_stretch &s);
+  // The motion since begin_increment(), in axes of the body then, without what is pending. Its error is a state:
+  // the pose's clone of [Roumeliotis2002] in other coordinates, in which no absolute pose appears.
+  const pose3 &moved() const { return moved_; }
+  void begin_increment();
   // Gates row after row, each with the innovation that the rows before leave; a row above the hard gate rejects all.
   // Between the gates its noise is inflated in proportion. Sequential update of a Kalman filter by the LDL' factors of
   // the innovations' covariance; P - G S^-1 G' is exact for this gain and symmetric by storage.
@@ -137,7 +141,7 @@ class space_filter {
   // States of one number, for the roll-back of calibration.
   double value(int state) const { return head_[state]; }
   void forget(int state, double value, double variance);
-  int calibration_begin() const { return kPose6 + (at_[kRates] >= 0 ? 6 : 0); }
+  int calibration_begin() const { return movers() + (at_[kRates] >= 0 ? 6 : 0); }
   int calibration_end() const { return first_point_; }
   void inflate_pose(double place_m2, double turn_rad2);
   double covariance(int i, int j) const { return entry(p(), i, j, stride_); }
@@ -161,6 +165,15 @@ class space_filter {
   const double *p() const { return row(kRowsBefore + 1); }
   static constexpr int kRowsBefore = 1 + kRank + 2 * kTurns;  // of the points
 
+  // States that motion moves: the pose, and the motion since the last picture where it is on.
+  int movers() const { return at_[kMovedPlace] >= 0 ? kMovers : kPose6; }
+
+  // Considered states keep their value and their own covariance [Schmidt1966]; all others are updated as ever.
+  struct considered_states {
+    int first, count;
+  };
+  considered_states considered() const;
+
   void project(const row_block &block);
   struct factors {
     double l[kRank][kRank], d[kRank], left[kRank];  // left: the innovation that the rows before leave
@@ -180,9 +193,11 @@ class space_filter {
   struct transition;
   step step_of(const body_stretch &s) const;
   void transition_of(const step &s, const body_stretch &twist, transition *f) const;
+  void add_sensor_blocks(const step &s, const body_stretch &twist, transition *f) const;
   void transform_head(const transition &f);
   void transform_points(const transition &f);
   void add_motion_noise(const step &s, const body_stretch &twist);
+  void add_increment_noise(int row, int column, const mat3 &noise, const mat3 &then);
   void add_integrated_noise(int which, int into, const step &s);
   void walk(double dt_s);
   double pose_variance(int state) const;  // sum of three
@@ -196,7 +211,7 @@ class space_filter {
   int at_[kHeadStates];
   head_model models_[kHeadStates];
   bool pending_;
-  pose3 pose_;
+  pose3 pose_, moved_;
   mat3 r_, camera_axes_;
   vec3 turn_rate_;
   double head_[kHeadMax];  // by state; the pose's own are not used

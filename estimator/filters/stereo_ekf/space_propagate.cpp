@@ -7,7 +7,7 @@
 namespace wm {
 namespace {
 
-void add_block(double out[kPose6][3], int row, const mat3 &m) {
+void add_block(double out[kMovers][3], int row, const mat3 &m) {
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) out[row + i][j] += m.m[i][j];
 }
@@ -49,14 +49,15 @@ struct space_filter::step {
   mat3 mean;   // mean rotation on the way, body to map
   vec3 way;    // in map axes
   mat3 swing;  // skew(way)
+  mat3 then;   // axes of the body at the last picture, in the map
 };
 
 // F's rows of the pose beside the identity, block by block: the derivative of the moved pose by `width` states.
 struct space_filter::transition {
-  static constexpr int kBlocks = 5;  // the turn, and up to four states of the motion
+  static constexpr int kBlocks = 6;  // the turns, and up to four states of the motion
   struct block {
     int state, width;
-    double by[kPose6][3];
+    double by[kMovers][3];
   } blocks[kBlocks];
   int count = 0;
 
@@ -88,6 +89,7 @@ space_filter::step space_filter::step_of(const body_stretch &s) const {
   out.mean = r_ * mean_turn(out.turn);
   out.way = (has_rates ? reach_of(models_[kVelocity].tau_s, s.dt_s) : s.dt_s) * (out.mean * v);
   out.swing = skew(out.way);
+  out.then = r_ * transposed(matrix_of(moved_.q));
   return out;
 }
 
@@ -95,7 +97,24 @@ space_filter::step space_filter::step_of(const body_stretch &s) const {
 // noise and the sensors' states. Rates that are wrong by b in an even turn rotate the end by b dt, and displace it by
 // half of that times the way.
 void space_filter::transition_of(const step &s, const body_stretch &twist, transition *f) const {
+  add_sensor_blocks(s, twist, f);
+  // The motion since the last picture: the same in that picture's axes.
+  const mat3 back = transposed(s.then);
+  if (movers() == kMovers)
+    for (int i = 0; i < f->count; i++) {
+      transition::block &b = f->blocks[i];
+      for (int part = 0; part < kPose6; part += 3) {
+        mat3 rows;
+        std::memcpy(&rows, b.by[part], sizeof rows);
+        add_block(b.by, kPose6 + part, back * rows);
+      }
+    }
   add_block(f->add(kTurn, 3).by, kPlace, -1.0 * s.swing);
+  if (movers() == kMovers)
+    add_block(f->add(at_[kMovedTurn], 3).by, kPose6 + kPlace, -1.0 * skew(transposed_times(s.then, s.way)));
+}
+
+void space_filter::add_sensor_blocks(const step &s, const body_stretch &twist, transition *f) const {
   const auto add_turning = [&](int state, const mat3 &turn) -> transition::block & {
     transition::block &b = f->add(state, 3);
     add_block(b.by, kTurn, turn);
@@ -123,15 +142,16 @@ void space_filter::transition_of(const step &s, const body_stretch &twist, trans
 void space_filter::transform_head(const transition &f) {
   double *P = p();
   const int head = first_point_;
-  double old_rows[kPose6][kHeadMax], new_rows[kPose6][kHeadMax];
-  for (int i = 0; i < kPose6; i++)
+  const int moving = movers();
+  double old_rows[kMovers][kHeadMax], new_rows[kMovers][kHeadMax];
+  for (int i = 0; i < moving; i++)
     for (int j = 0; j < head; j++) old_rows[i][j] = entry(P, i, j, stride_);
-  for (int i = 0; i < kPose6; i++)
+  for (int i = 0; i < moving; i++)
     for (int j = 0; j < head; j++)
-      new_rows[i][j] = f.row_sum(i, [&](int k) { return k < kPose6 ? old_rows[k][j] : entry(P, k, j, stride_); });
-  for (int i = 0; i < kPose6; i++) {
-    for (int j = i; j < kPose6; j++) P[i * stride_ + j] = f.row_sum(j, [&](int k) { return new_rows[i][k]; });
-    for (int j = kPose6; j < head; j++) P[i * stride_ + j] = new_rows[i][j];
+      new_rows[i][j] = f.row_sum(i, [&](int k) { return k < moving ? old_rows[k][j] : entry(P, k, j, stride_); });
+  for (int i = 0; i < moving; i++) {
+    for (int j = i; j < moving; j++) P[i * stride_ + j] = f.row_sum(j, [&](int k) { return new_rows[i][k]; });
+    for (int j = moving; j < head; j++) P[i * stride_ + j] = new_rows[i][j];
   }
 }
 
@@ -141,15 +161,16 @@ void space_filter::transform_points(const transition &f) {
   if (n_ <= head) return;
   double *P = p();
   const int from = head & ~1, width = even(n_) - from;
-  double keep[kPose6] = {};  // of an odd head the last column comes along, which is done already
-  for (int i = 0; i < kPose6; i++) keep[i] = P[i * stride_ + from];
-  for (int i = 0; i < kPose6; i++)
+  const int moving = movers();
+  double keep[kMovers] = {};  // of an odd head the last column comes along, which is done already
+  for (int i = 0; i < moving; i++) keep[i] = P[i * stride_ + from];
+  for (int i = 0; i < moving; i++)
     for (int b = 0; b < f.count; b++)
       for (int k = 0; k < f.blocks[b].width; k++)
         if (const double by = f.blocks[b].by[i][k]; by != 0.0)
           vectors::add_scaled(P + i * stride_ + from, P + (f.blocks[b].state + k) * stride_ + from, by, width);
   if (from < head)
-    for (int i = 0; i < kPose6; i++) P[i * stride_ + from] = keep[i];
+    for (int i = 0; i < moving; i++) P[i * stride_ + from] = keep[i];
 }
 
 // White noise along the step: a rotation error made evenly on the way displaces the end by half the way on average,
@@ -164,6 +185,23 @@ void space_filter::add_motion_noise(const step &s, const body_stretch &twist) {
       if (i <= j) P[i * stride_ + j] += place.m[i][j] + lever_noise.m[i][j];
       if (i <= j) P[(kTurn + i) * stride_ + kTurn + j] += turn.m[i][j];
       P[i * stride_ + kTurn + j] += cross_noise.m[i][j];
+    }
+  if (movers() == kMovers) {
+    add_increment_noise(kPlace, kPlace, place + lever_noise, s.then);
+    add_increment_noise(kPlace, kTurn, cross_noise, s.then);
+    add_increment_noise(kTurn, kPlace, transposed(cross_noise), s.then);
+    add_increment_noise(kTurn, kTurn, turn, s.then);
+  }
+}
+
+// The part of the pose's noise in map axes that has those rows and columns, of the motion since the last picture.
+void space_filter::add_increment_noise(int row, int column, const mat3 &noise, const mat3 &then) {
+  const mat3 crossed = noise * then, own = transposed(then) * crossed;
+  const int moved = at_[kMovedPlace];
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++) {
+      p()[(row + i) * stride_ + moved + column + j] += crossed.m[i][j];
+      if (row + i <= column + j) p()[(moved + row + i) * stride_ + moved + column + j] += own.m[i][j];
     }
 }
 
@@ -184,6 +222,8 @@ void space_filter::propagate(const body_stretch &twist) {
   }
   bound_pose(kPlace, 3.0 * square(kUnknownPlace_m), place_before);
   bound_pose(kTurn, 3.0 * square(kUnknownTurn_rad), turn_before);
+  moved_.p = moved_.p + transposed_times(s.then, s.way);
+  moved_.q = normalized(moved_.q * turn_by(s.turn));
   pose_.p = pose_.p + s.way;
   pose_.q = normalized(pose_.q * turn_by(s.turn));
   r_ = matrix_of(pose_.q);
@@ -213,6 +253,12 @@ void space_filter::add_integrated_noise(int which, int into, const step &s) {
     P[(into + i) * stride_ + into + i] += noise.variance;
     for (int j = 0; j < 3; j++) P[(into + i) * stride_ + at_[which] + j] += noise.with_rate * s.mean.m[i][j];
   }
+  if (movers() < kMovers) return;
+  const mat3 mean = transposed(s.then) * s.mean;
+  add_increment_noise(into, into, noise.variance * kIdentity3, s.then);
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++)
+      P[(at_[kMovedPlace] + into + i) * stride_ + at_[which] + j] += noise.with_rate * mean.m[i][j];
 }
 
 void space_filter::walk(double dt_s) {

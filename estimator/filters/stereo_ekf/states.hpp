@@ -8,12 +8,14 @@
 
 namespace wm {
 
-enum space_state { kPlace = 0, kTurn = 3, kPose6 = 6 };
+enum space_state { kPlace = 0, kTurn = 3, kPose6 = 6, kMovers = 12 };
 
 // In the order of the state vector; a state whose sigma is 0 is left out.
 enum head_state {
-  kVelocity,  // m/s in body axes
-  kRates,     // rad/s
+  kMovedPlace,  // error of the motion since the last picture, in axes of the body then, m
+  kMovedTurn,   // rad; behind kMovedPlace, and both behind the pose
+  kVelocity,    // m/s in body axes
+  kRates,       // rad/s
   kRateBias,
   kVelocityScale,
   kTwistAxes,          // rad: the measured twist's axes against the body's, of velocity and rates alike
@@ -21,6 +23,8 @@ enum head_state {
   kCameraRotation,
   kCameraPlace,
   kTimeOffset,
+  kPictureScale,      // by which the motion between pictures is too long: disparities that are off alike
+  kPictureDirection,  // rad, by which it is turned: cameras that are not quite parallel
   kRangeBias,
   kBearingBias,
   kVelocityLag,  // s: the measured velocity is ahead of the state of velocity by this
@@ -31,7 +35,7 @@ enum head_state {
 struct head_spec {
   int width;
   double neutral;
-  const char *name[3];
+  const char *name[3];  // NULL: not listed
   // Start sigma; random walk per sqrt(s); above 0: time constant of a Gauss-Markov process of that sigma. NULL: 0.
   double wm_stereo_ekf_params::*sigma, wm_stereo_ekf_params::*walk, wm_stereo_ekf_params::*tau_s;
   bool of_rates;  // exists with velocity and rates as states only
@@ -39,6 +43,8 @@ struct head_spec {
 
 using stereo_params = wm_stereo_ekf_params;
 inline constexpr head_spec kHeadSpecs[kHeadStates] = {
+    {3, 0, {}, nullptr, nullptr, nullptr, false},
+    {3, 0, {}, nullptr, nullptr, nullptr, false},
     {3,
      0,
      {"motion.vx_mps", "motion.vy_mps", "motion.vz_mps"},
@@ -90,6 +96,8 @@ inline constexpr head_spec kHeadSpecs[kHeadStates] = {
      &stereo_params::camera_place_tau_s,
      false},
     {1, 0, {"stereo.time_offset_s"}, &stereo_params::time_offset_sigma, nullptr, nullptr, false},
+    {1, 0, {}, &stereo_params::increment_scale_sigma, nullptr, nullptr, false},
+    {3, 0, {}, &stereo_params::increment_direction_sigma, nullptr, nullptr, false},
     {1, 0, {"range.bias_m"}, &stereo_params::range_bias_sigma, nullptr, nullptr, false},
     {1, 0, {"bearing.bias_rad"}, &stereo_params::bearing_bias_sigma, nullptr, nullptr, false},
     {1, 0, {"motion.velocity_lag_s"}, &stereo_params::twist_lag_sigma, nullptr, nullptr, true},
@@ -108,12 +116,21 @@ struct head_model {
   double sigma, walk, tau_s;
 };
 
+inline constexpr double kMovedSigma = 1.0;  // that the states of the motion since a picture exist; it begins at 0
+
+constexpr bool is_of_increments(int state) {
+  return state == kMovedPlace || state == kMovedTurn || state == kPictureScale || state == kPictureDirection;
+}
+
 inline void models_of(const wm_stereo_ekf_params &params, head_model out[kHeadStates]) {
   const bool rates = params.prediction == WM_PREDICT_CONSTANT_VELOCITY;
   for (int k = 0; k < kHeadStates; k++) {
     const head_spec &s = kHeadSpecs[k];
-    out[k] = {s.of_rates && !rates ? 0.0 : params.*s.sigma, s.walk ? params.*s.walk : 0.0,
-              s.tau_s ? params.*s.tau_s : 0.0};
+    const bool off = (s.of_rates && !rates) || (!params.increments && is_of_increments(k));
+    out[k] = {off       ? 0.0
+              : s.sigma ? params.*s.sigma
+                        : kMovedSigma,
+              s.walk ? params.*s.walk : 0.0, s.tau_s ? params.*s.tau_s : 0.0};
   }
 }
 

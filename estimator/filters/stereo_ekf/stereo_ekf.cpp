@@ -41,6 +41,13 @@ spatial_noise twist_noise_of(const wm_stereo_ekf_params &p, const wm_rig *rig) {
   return out;
 }
 
+// Without a pair of cameras there are no points and no tracks.
+wm_stereo_ekf_params usable(const wm_stereo_ekf_params &params, const stereo_rig &rig) {
+  wm_stereo_ekf_params out = params;
+  if (!rig.there) out.points_max = out.increments = 0;
+  return out;
+}
+
 // The velocities' noise is its own; twists' own states carry their errors.
 const char *const kReads[] = {"!motion.twist",
                               "!motion.noise.",
@@ -64,12 +71,8 @@ size_t stereo_ekf::bytes(const wm_stereo_ekf_params &params, const wm_setup &set
     *why = "the map has more than 1048576 landmarks";
     return 0;
   }
-  if (params.points_max > 0 && !rig.there) {
-    *why = "slam.points is above 0, but calibration.yaml has no `stereo`";
-    return 0;
-  }
   memory_layout layout(nullptr, sizeof(stereo_ekf));
-  place(&layout, params, setup);
+  place(&layout, usable(params, rig), setup);
   return layout.bytes();
 }
 
@@ -85,20 +88,20 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   const char *why = "";
   std::memset(static_cast<void *>(this), 0, bytes(params, setup, &why));
   memory_layout layout(this, sizeof *this);
-  const arrays behind = place(&layout, params, setup);
-  params_ = params;
-  setup_ = &setup;
   (void)rig_.init(setup.rig, &why);
+  params_ = usable(params, rig_);
+  const arrays behind = place(&layout, params_, setup);
+  setup_ = &setup;
   for (int i = 0; i < 4; i++) sigma_px_[i] = first_of(params.pixel_px, rig_.sigma_px[i], kPixel_px);
   motion_.init(setup.motion, &setup.wheels, twist_noise_of(params, setup.rig));
   head_model models[kHeadStates];
-  models_of(params, models);
-  filter_.init(behind.filter, models, params.points_max);
+  models_of(params_, models);
+  filter_.init(behind.filter, models, params_.points_max);
   if (rig_.there) filter_.set_camera_axes(rig_.R_base_optical);
   index_.init(setup.landmarks, setup.landmark_count, behind.order);
   records_.set(behind.records);
   info_.set(behind.info);
-  now_ns_ = picture_ns_ = WM_TIME_NONE;
+  now_ns_ = picture_ns_ = last_picture_ns_ = WM_TIME_NONE;
   life_ = lifecycle();
   start_ns_ = setup.start.t_ns;
   odometry_ = {{{0, 0, 0}, kNoTurn}, 0.0, 0.0};
@@ -197,7 +200,7 @@ size_t stereo_ekf::list_calibration(wm_calibration_value *out, size_t capacity) 
   calibration_list list(out, capacity);
   for (int k = 0; k < kHeadStates; k++) {
     const int first = filter_.at(k);
-    for (int i = first; first >= 0 && i < first + kHeadSpecs[k].width; i++)
+    for (int i = first; first >= 0 && kHeadSpecs[k].name[0] && i < first + kHeadSpecs[k].width; i++)
       list.add(kHeadSpecs[k].name[i - first], filter_.head(i) + filter_.pending1(i), std::sqrt(filter_.variance(i)));
   }
   return list.count();

@@ -180,6 +180,56 @@ void test_sensor_states_swing_the_way_as_they_should(void) {
                                 a.filter->covariance(i, j));
 }
 
+// The error of the motion since a picture is the pose's own, in that picture's axes, where the pose was exact then.
+// Considered states keep their covariance while what they correlate with is learnt.
+void test_motion_since_a_picture_and_considered_states(void) {
+  head_model models[kHeadStates] = {};
+  for (const int which : {kMovedPlace, kMovedTurn}) models[which] = {1, 0, 0};
+  for (const int which : {kRateBias, kTwistAxes, kPictureDirection}) models[which] = {0.02, 0, 0};
+  models[kVelocityScale] = models[kPictureScale] = {0.02, 0, 0};
+  machine a(models, 0);
+  const double none[6][6] = {};
+  const pose3 start = {{3, -2, 5}, turn_by({0.4, -1.0, 2.0})};
+  a.filter->set_pose(start, none);
+  a.filter->begin_increment();
+  for (int i = 0; i < 5; i++)
+    a.filter->propagate({0.1, {0.8, -0.2, 0.4}, {0.3, 1.1, -0.7}, {1e-4, 2e-4, 3e-4}, {1e-5, 2e-5, 3e-5}});
+  const mat3 R = matrix_of(start.q);
+  assert_near(start.p + R * a.filter->moved().p, a.filter->pose().p, 1e-12);
+  const int moved = a.filter->at(kMovedPlace);
+  const auto block = [&](int row, int column) {
+    mat3 out;
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++) out.m[i][j] = a.filter->covariance(row + i, column + j);
+    return out;
+  };
+  for (int row = 0; row < 6; row += 3)
+    for (int column = 0; column < 6; column += 3) {
+      const mat3 own = R * (block(moved + row, moved + column) * transposed(R)),
+                 crossed = block(row, moved + column) * transposed(R);
+      const mat3 pose = block(row, column);
+      for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+          TEST_ASSERT_DOUBLE_WITHIN(1e-14, pose.m[i][j], own.m[i][j]);
+          TEST_ASSERT_DOUBLE_WITHIN(1e-14, pose.m[i][j], crossed.m[i][j]);
+        }
+    }
+  const double scale = a.filter->variance(a.filter->at(kVelocityScale));
+  for (int i = 0; i < 50; i++) {
+    row_block seen;
+    const int way = seen.add_columns(moved, 1), error = seen.add_columns(a.filter->at(kPictureScale), 1);
+    const int row = seen.add_row(WM_RESIDUAL_X, 0.05, 0.05, 1e-6);
+    seen.by[row][way] = 1;
+    seen.by[row][error] = a.filter->moved().p.x;
+    TEST_ASSERT_TRUE(a.filter->fuse(seen, {1e9, 1e9}).fused);
+  }
+  a.filter->settle();
+  TEST_ASSERT_EQUAL_DOUBLE(square(0.02), a.filter->variance(a.filter->at(kPictureScale)));
+  TEST_ASSERT_EQUAL_DOUBLE(0.0, a.filter->head1(kPictureScale, 1));
+  const double left = a.filter->variance(a.filter->at(kVelocityScale));
+  TEST_ASSERT_TRUE(left < scale && left > 0.4 * scale);
+}
+
 // One block of rows against the textbook's dense update; then points added, removed and their correlations.
 void test_an_update_is_kalmans(void) {
   machine m(kNone, 8);
@@ -418,6 +468,7 @@ int main(void) {
   RUN_TEST(test_kernels_have_scalar_twins);
   RUN_TEST(test_propagation_carries_errors_as_the_motion_does);
   RUN_TEST(test_sensor_states_swing_the_way_as_they_should);
+  RUN_TEST(test_motion_since_a_picture_and_considered_states);
   RUN_TEST(test_an_update_is_kalmans);
   RUN_TEST(test_a_block_with_too_many_columns_is_refused);
   RUN_TEST(test_what_cannot_be_seen_is_not_learnt);
