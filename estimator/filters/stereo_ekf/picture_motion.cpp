@@ -139,49 +139,55 @@ double picture_motion::median_misfit(int count, const vector<6> &x) {
   return sorted_[count / 2];
 }
 
-bool picture_motion::fit(const pair_view &pair, const pose3 &moved, const matrix<6> &prior, motion_error *out) {
-  const int count = make_rows(pair, moved);
-  matrix<6> expected;
-  if (count < kLeast || !invert_positive<6>(prior, &expected)) return false;
-  vector<6> x = vector<6>::Zero();
-  const auto sum_up = [&](matrix<6> *information, vector<6> *weighted) {
-    for (int i = 0; i < count; i++) {
-      const fit_row &row = row_[i];
-      for (int k = 0; k < 3; k++)
-        for (int a = 0; a < 6; a++) {
-          const double by = row.weight * row.by[k][a];
-          (*weighted)[a] += by * row.left[k];
-          for (int b = a; b < 6; b++) (*information)(a, b) += by * row.by[k][b];
-        }
+// Adds the rows' information and its product with what is left of them; the upper triangle, then mirrored.
+void picture_motion::sum_up(int count, matrix<6> *information, vector<6> *weighted) const {
+  for (int i = 0; i < 3 * count; i++) {
+    const fit_row &row = row_[i / 3];
+    const double(&by)[6] = row.by[i % 3];
+    for (int a = 0; a < 6; a++) {
+      const double scaled = row.weight * by[a];
+      (*weighted)[a] += scaled * row.left[i % 3];
+      for (int b = a; b < 6; b++) (*information)(a, b) += scaled * by[b];
     }
-    for (int a = 0; a < 6; a++)
-      for (int b = 0; b < a; b++) (*information)(a, b) = (*information)(b, a);
-  };
+  }
+  for (int a = 1; a < 6; a++)
+    for (int b = 0; b < a; b++) (*information)(a, b) = (*information)(b, a);
+}
+
+// Iterated weighted least squares with the prediction as prior.
+bool picture_motion::iterate(int count, const matrix<6> &prior, vector<6> *x) {
+  matrix<6> expected;
+  if (!invert_positive<6>(prior, &expected)) return false;
+  *x = vector<6>::Zero();
   for (int iteration = 0; iteration < kIterations; iteration++) {
-    const double median = median_misfit(count, x);
+    const double median = median_misfit(count, *x);
     const double scale = kKernel * (median > kMedianLeast ? median : kMedianLeast);
-    for (int i = 0; i < count; i++) row_[i].weight = 1.0 / square(1.0 + misfit(row_[i], x) / scale);
+    for (int i = 0; i < count; i++) row_[i].weight = 1.0 / square(1.0 + misfit(row_[i], *x) / scale);
     matrix<6> information = expected;
     vector<6> weighted = vector<6>::Zero();
-    sum_up(&information, &weighted);
+    sum_up(count, &information, &weighted);
     factor<6> f;
     if (!f.init(information)) return false;
-    x = weighted;
-    f.solve(&x);
+    *x = weighted;
+    f.solve(x);
   }
-  double scale = median_misfit(count, x) / kMedianOfThree;
-  const double noisy = scale > 1.0 ? scale : 1.0;
-  scale = noisy < kScaleMost ? noisy : kScaleMost;
+  return true;
+}
+
+bool picture_motion::fit(const pair_view &pair, const pose3 &moved, const matrix<6> &prior, motion_error *out) {
+  const int count = make_rows(pair, moved);
+  vector<6> x;
+  if (count < kLeast || !iterate(count, prior, &x)) return false;
+  const double shown = median_misfit(count, x) / kMedianOfThree, noisy = shown > 1.0 ? shown : 1.0;
+  const double cut = kCut * (noisy < kScaleMost ? noisy : kScaleMost);
   for (int i = 0; i < count; i++) {
-    const bool fits = misfit(row_[i], x) < kCut * scale;
-    if (!fits) {
-      tracks()[row_[i].earlier].misses++;
-      row_[i].weight = 0.0;
-    }
+    if (misfit(row_[i], x) < cut) continue;
+    tracks()[row_[i].earlier].misses++;
+    row_[i].weight = 0.0;
   }
   matrix<6> information = kLeastInformation * matrix<6>::Identity(), covariance;
   vector<6> weighted = vector<6>::Zero();
-  sum_up(&information, &weighted);
+  sum_up(count, &information, &weighted);
   if (!invert_positive<6>(information, &covariance)) return false;
   map(out->value) = covariance * weighted;
   map(out->covariance) = kAlike * noisy * covariance;

@@ -58,13 +58,15 @@ class picture_motion {
   struct fit_row {
     double left[3], by[3][6];
     double weight;
-    int32_t earlier, fits;  // fits: 1 or 0
+    int64_t earlier;  // index of its track; of 64 bits: no padding, so that states compare by bytes
   };
 
   bool make_row(const pair_view &pair, const pose3 &moved, const view &now, fit_row *out) const;
   int make_rows(const pair_view &pair, const pose3 &moved);
   double misfit(const fit_row &row, const vector<6> &x) const;
   double median_misfit(int count, const vector<6> &x);
+  void sum_up(int count, matrix<6> *information, vector<6> *weighted) const;
+  bool iterate(int count, const matrix<6> &prior, vector<6> *x);
 
   track *tracks() { return track_[side_]; }
   const track *tracks() const { return track_[side_]; }
