@@ -52,7 +52,8 @@ static const wm_param kParams[] = {
     F64("states.time_offset_sigma_s", time_offset_sigma, 0.02, 0, 0.2,
         "Start sigma of the pictures' time offset, s: by how much they are older than their stamps. 0: off."),
     F64("states.increment_scale_sigma", increment_scale_sigma, 0.02, 0, 1,
-        "Sigma of the share by which motion between two pictures is too long: disparities that are all off by 0.2 px at "
+        "Sigma of the share by which motion between two pictures is too long: disparities that are all off by 0.2 px "
+        "at "
         "10 px. 0: off."),
     F64("states.increment_direction_sigma_rad", increment_direction_sigma, 0.02, 0, 1,
         "Sigma of the angle by which that motion is turned, rad: cameras that are not quite parallel. 0: off."),
@@ -72,7 +73,8 @@ static const wm_param kParams[] = {
     F64("gate.hard", gate_hard, 20, 1, 1e6,
         "Normalised innovation squared of one row above which the whole observation is an outlier."),
     BOOL("increments.on", increments, 1,
-         "Use tracks that are no points of the state, as far ones, for the motion between two pictures (visual odometry)."),
+         "Use tracks that are no points of the state, as far ones, for the motion between two pictures (visual "
+         "odometry)."),
     I32("slam.points", points_max, 250, 0, 256,
         "Capacity of the state for points: points found by stereo, and points of the map, whose error on it (sigma_m) "
         "is "
