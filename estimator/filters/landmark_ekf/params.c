@@ -35,7 +35,8 @@ static const wm_param kParams[] = {
     F64("recover.sigma_xy_m", recover_sigma_xy_m, -3, -100, 100,
         "Largest sigma with which a found pose is accepted, m. Below 0: that multiple of the least sigma of the "
         "positions and ranges that it is found by, and 1 m where there are only bearings."),
-    F64("recover.sigma_heading_rad", recover_sigma_heading_rad, 0.25, 0.001, 3, "The same for the heading, rad."),
+    F64("recover.sigma_heading_rad", recover_sigma_heading_rad, 0.4, 0.001, 3,
+        "The same for the heading, rad. 0.25 finds a car by GNSS after 10 s instead of 6."),
 };
 
 static const wm_param_old kOld[] = {
