@@ -5,6 +5,7 @@
 #define WAYMARK_ESTIMATOR_CORE_SENSOR_SLOTS_HPP
 
 #include "filters/core/state_slots.hpp"
+#include "motion/motion_params.h"
 #include "sensors/sighting.hpp"
 #include "waymark/estimator.h"
 
@@ -13,11 +14,12 @@ namespace wm {
 class sensor_slots {
  public:
   // States that so many sensors take. `known_map`: landmarks are where it has them; else ranges are the only standard
-  // of length, and the default leaves their scale out.
-  static int count(const wm_sensor_states &states, size_t sensors, bool known_map) {
+  // of length, and the default leaves their scale out. Without motion data it leaves out what only a motion beside the
+  // observations shows: where the sensor looks, and how late it is.
+  static int count(const wm_setup &setup, bool known_map) {
     int each = 0;
-    for (const sensor_state_spec &spec : kSensorStateSpecs) each += is_on(states, spec.row, known_map);
-    return each * static_cast<int>(sensors);
+    for (const sensor_state_spec &spec : kSensorStateSpecs) each += is_on(setup, spec.row, known_map);
+    return each * static_cast<int>(setup.sensor_count);
   }
 
   // add(neutral, sigma, walk, low, high) appends a state to the filter and returns its index.
@@ -31,7 +33,7 @@ class sensor_slots {
           first_number(setup.sensors[sensor].range_sigma_m, p.range_sigma_default_m, p.range_sigma_default_m);
       const double sigma =
           absolute_sigma(p.states.sigma[s.row], s.row == WM_SENSOR_ROW_kRangeBias ? range_sigma_m : 1.0);
-      return is_on(p.states, s.row, known_map) ? add(s.neutral, sigma, p.states.walk[s.row], s.low, s.high) : -1;
+      return is_on(setup, s.row, known_map) ? add(s.neutral, sigma, p.states.walk[s.row], s.low, s.high) : -1;
     });
   }
 
@@ -63,8 +65,12 @@ class sensor_slots {
   }
 
  private:
-  static bool is_on(const wm_sensor_states &states, int row, bool known_map) {
-    return states.sigma[row] > 0.0 || (states.sigma[row] < 0.0 && (known_map || row != WM_SENSOR_ROW_kRangeScale));
+  static bool is_on(const wm_setup &setup, int row, bool known_map) {
+    const double sigma = setup.sightings->states.sigma[row];
+    const bool shown_by_motion = row == WM_SENSOR_ROW_kYaw || row == WM_SENSOR_ROW_kTimeOffset;
+    const bool moves = setup.motion->model != WM_MOTION_CONSTANT_VELOCITY;
+    return sigma > 0.0 ||
+           (sigma < 0.0 && (known_map || row != WM_SENSOR_ROW_kRangeScale) && (moves || !shown_by_motion));
   }
 
   state_slots<kMaxSensors, kSensorStates> slots_;

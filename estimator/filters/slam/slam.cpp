@@ -30,7 +30,7 @@ joint_state::wheel_slip slip_of(const wm_slam_params &p) { return {p.wheel_slip_
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
   return kPoseStates + joint_state::count_motion_states(setup.motion->states, setup.motion->model, slip_of(p)) +
-         sensor_slots::count(s.states, setup.sensor_count, p.map != WM_SLAM_MAP_NONE) +
+         sensor_slots::count(setup, p.map != WM_SLAM_MAP_NONE) +
          (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count + s.correlated_slots * error_slot_of(p, s).width;
 }
 
