@@ -4,6 +4,8 @@
 #ifndef WAYMARK_ESTIMATOR_CORE_SENSOR_SLOTS_HPP
 #define WAYMARK_ESTIMATOR_CORE_SENSOR_SLOTS_HPP
 
+#include <cmath>
+
 #include "filters/core/state_slots.hpp"
 #include "motion/motion_params.h"
 #include "sensors/sighting.hpp"
@@ -13,13 +15,16 @@ namespace wm {
 
 class sensor_slots {
  public:
-  // States that so many sensors take. `known_map`: landmarks are where it has them; else ranges are the only standard
-  // of length, and the default leaves their scale out. Without motion data it leaves out what only a motion beside the
-  // observations shows: where the sensor looks, and how late it is.
+  // States that the sensors take. `known_map`: landmarks are where it has them; else ranges are the only standard of
+  // length, and the default leaves their scale out. Not of a sensor with a sigma of ranges alone: those are times of
+  // flight of radio or sound, by a clock or a speed of sound, which are no better than wheels. Without motion data it
+  // leaves out what only a motion beside the observations shows: where the sensor looks, and how late it is.
   static int count(const wm_setup &setup, bool known_map) {
-    int each = 0;
-    for (const sensor_state_spec &spec : kSensorStateSpecs) each += is_on(setup, spec.row, known_map);
-    return each * static_cast<int>(setup.sensor_count);
+    int out = 0;
+    for (size_t i = 0; i < setup.sensor_count; i++)
+      for (const sensor_state_spec &spec : kSensorStateSpecs)
+        out += is_on(setup, spec.row, known_map || gives_ranges_alone(setup.sensors[i]));
+    return out;
   }
 
   // add(neutral, sigma, walk, low, high) appends a state to the filter and returns its index.
@@ -31,9 +36,12 @@ class sensor_slots {
       const sensor_state_spec &s = kSensorStateSpecs[k];
       const double range_sigma_m =
           first_number(setup.sensors[sensor].range_sigma_m, p.range_sigma_default_m, p.range_sigma_default_m);
-      const double sigma =
-          absolute_sigma(p.states.sigma[s.row], s.row == WM_SENSOR_ROW_kRangeBias ? range_sigma_m : 1.0);
-      return is_on(setup, s.row, known_map) ? add(s.neutral, sigma, p.states.walk[s.row], s.low, s.high) : -1;
+      const bool flight = !known_map && gives_ranges_alone(setup.sensors[sensor]) && s.row == WM_SENSOR_ROW_kRangeScale;
+      const double unit = s.row == WM_SENSOR_ROW_kRangeBias ? range_sigma_m : flight ? kFlightScale : 1.0;
+      const double sigma = absolute_sigma(p.states.sigma[s.row], unit);
+      return is_on(setup, s.row, known_map || gives_ranges_alone(setup.sensors[sensor]))
+                 ? add(s.neutral, sigma, p.states.walk[s.row], s.low, s.high)
+                 : -1;
     });
   }
 
@@ -64,7 +72,14 @@ class sensor_slots {
           static_cast<int>(i), setup.sensors[i].name, filter, [](int k) { return kSensorStateSpecs[k].name; }, out);
   }
 
+  // Of the default's sigma of a range's scale, for times of flight without a map: 10 %. The speed of sound varies by
+  // that in water and air. Not swept.
+  static constexpr double kFlightScale = 2.0;
+
  private:
+  static bool gives_ranges_alone(const wm_sensor &s) {
+    return std::isnan(s.bearing_sigma_rad) && !std::isnan(s.range_sigma_m);
+  }
   static bool is_on(const wm_setup &setup, int row, bool known_map) {
     const double sigma = setup.sightings->states.sigma[row];
     const bool shown_by_motion = row == WM_SENSOR_ROW_kYaw || row == WM_SENSOR_ROW_kTimeOffset;

@@ -148,8 +148,9 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
 // markers, far more accurate than wheels, the filter hardly gains false certainty, so the covariance is not
 // transported from the first one on.
 void slam::follow_scale() {
-  const bool is_observed =
-      !by_bearings_ && sightings().use_range && !(sightings().states.sigma[WM_SENSOR_ROW_kRangeScale] > 0.0);
+  bool is_standard = setup_->sensor_count == 0;  // a sensor's ranges are a standard of length
+  for (size_t i = 0; i < setup_->sensor_count; i++) is_standard |= slots_.at(static_cast<int>(i), kRangeScale) < 0;
+  const bool is_observed = !by_bearings_ && sightings().use_range && is_standard;
   if (is_observed || params_.map != WM_SLAM_MAP_NONE || !joint_.find_scale(!has_headings())) return;
   for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++) {
     joint_.follow_scale(slots_.at(i, kRangeScale), -1.0, true);
