@@ -76,6 +76,7 @@ void measure(const char *title, int count, int seen, bool known, double limit_us
     }
   };
   set("noise.pixel_px", 0.5);
+  set("increments.on", 0);  // all tracks are points of the state
   set("slam.points", known ? 0 : count);
   set("slam.keep_unseen_steps", 1000000);
   const scene world = make_scene(count);
