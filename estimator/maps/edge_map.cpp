@@ -17,7 +17,7 @@ constexpr double kLineUnit_px = 1.0 / 32;  // of a line's offset, which is kept 
 constexpr double kLineVariance_px2 = 0.7;
 constexpr double kLineLength_px2 = 1.0;  // least variance along it: about four pixels
 constexpr int8_t kNoLine = -128;         // marks a pixel without a line
-constexpr double kBeside_px = 3.0;       // from a line, where its sides are looked at: an edge is drawn up to 3 px wide
+constexpr double kBeside_px = 2.0;       // from a line, where its sides are looked at: an edge is 1 px to 3 px wide
 // A wall's near face is looked for from a place on its far face in so many steps: walls inside a building are 5 cm to
 // 40 cm thick. Not swept.
 constexpr double kFaceStep_m = 0.1;
@@ -226,8 +226,64 @@ void edge_map::sweep_row(int row, int32_t *site) {
   });
 }
 
-// The line through an edge's pixels near by: mean and principal axis. Where they don't lie on one (corners, ends of
-// three walls), the pixel has none.
+// Moments of edge pixels about one of them.
+struct edge_map::moments {
+  int n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
+  void add(int x, int y) {
+    n++;
+    sx += x;
+    sy += y;
+    sxx += x * x;
+    sxy += x * y;
+    syy += y * y;
+  }
+};
+
+// All edge pixels near by.
+void edge_map::add_near(int column, int row, moments *out) const {
+  for (int y = -kLineRadius_px; y <= kLineRadius_px; y++)
+    for (int x = -kLineRadius_px; x <= kLineRadius_px; x++)
+      if (is_edge(column + x, row + y)) out->add(x, y);
+}
+
+// Those of them that are connected with it: one face of a wall that is thinner than the radius.
+void edge_map::add_connected(int column, int row, moments *out) const {
+  constexpr int kSide = 2 * kLineRadius_px + 1;
+  bool seen[kSide][kSide] = {};
+  int8_t queue[kSide * kSide][2];
+  int count = 0;
+  const auto visit = [&](int x, int y) {
+    if (x < -kLineRadius_px || x > kLineRadius_px || y < -kLineRadius_px || y > kLineRadius_px) return;
+    bool &been = seen[y + kLineRadius_px][x + kLineRadius_px];
+    if (been || !is_edge(column + x, row + y)) return;
+    been = true;
+    queue[count][0] = (int8_t)x;
+    queue[count++][1] = (int8_t)y;
+    out->add(x, y);
+  };
+  visit(0, 0);
+  for (int next = 0; next < count; next++)
+    for (int y = -1; y <= 1; y++)
+      for (int x = -1; x <= 1; x++) visit(queue[next][0] + x, queue[next][1] + y);
+}
+
+// A line's normal and offset as they are kept; false where the pixels lie on none (corners, ends of three walls).
+bool edge_map::fit_line(const moments &m, offset *out) {
+  const double mean_x = (double)m.sx / m.n, mean_y = (double)m.sy / m.n;
+  const double xx = (double)m.sxx / m.n - mean_x * mean_x, yy = (double)m.syy / m.n - mean_y * mean_y;
+  const double xy = (double)m.sxy / m.n - mean_x * mean_y;
+  const double half = 0.5 * (xx + yy), spread = std::sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy);
+  if (half - spread > kLineVariance_px2 || half + spread < kLineLength_px2) return false;
+  const double normal = 0.5 * atan2(2.0 * xy, xx - yy) + kHalfPi;  // (0, pi]
+  const int turn = (int)(normal * (256.0 / kPi) + 0.5) & 255;
+  const sin_cos a = sincos(turn * (kPi / 256.0));
+  const double way = (a.cos * mean_x + a.sin * mean_y) / kLineUnit_px;
+  *out = {(int8_t)(uint8_t)turn, (int8_t)(int)std::floor(way + 0.5)};
+  return true;
+}
+
+// The line through an edge's pixels near by: mean and principal axis; through those connected with it where all
+// together lie on none.
 void edge_map::fit_lines() {
   for (int row = 0; row < (int)raster_->height_px; row++)
     for (int column = 0; column < (int)raster_->width_px; column++) {
@@ -236,29 +292,12 @@ void edge_map::fit_lines() {
         continue;
       }
       if (!is_edge(column, row)) continue;
-      int n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
-      for (int y = -kLineRadius_px; y <= kLineRadius_px; y++)
-        for (int x = -kLineRadius_px; x <= kLineRadius_px; x++) {
-          if (!is_edge(column + x, row + y)) continue;
-          n++;
-          sx += x;
-          sy += y;
-          sxx += x * x;
-          sxy += x * y;
-          syy += y * y;
-        }
-      const double mean_x = (double)sx / n, mean_y = (double)sy / n;
-      const double xx = (double)sxx / n - mean_x * mean_x, yy = (double)syy / n - mean_y * mean_y;
-      const double xy = (double)sxy / n - mean_x * mean_y;
-      const double half = 0.5 * (xx + yy), spread = std::sqrt(0.25 * (xx - yy) * (xx - yy) + xy * xy);
       offset &to = offsets_[tile_of(column, row) + in_row(column, row)];
-      to = {0, kNoLine};
-      if (half - spread > kLineVariance_px2 || half + spread < kLineLength_px2) continue;
-      const double normal = 0.5 * atan2(2.0 * xy, xx - yy) + kHalfPi;  // (0, pi]
-      const int turn = (int)(normal * (256.0 / kPi) + 0.5) & 255;
-      const sin_cos a = sincos(turn * (kPi / 256.0));
-      const double way = (a.cos * mean_x + a.sin * mean_y) / kLineUnit_px;
-      to = {(int8_t)(uint8_t)turn, (int8_t)(int)std::floor(way + 0.5)};
+      moments all, connected;
+      add_near(column, row, &all);
+      if (fit_line(all, &to)) continue;
+      add_connected(column, row, &connected);
+      if (!fit_line(connected, &to)) to = {0, kNoLine};
     }
 }
 

@@ -96,6 +96,10 @@ class edge_map {
   template <class Visit>
   void each_pixel_in_reach(int row, Visit visit) const;
   void sweep_row(int row, int32_t *site);
+  struct moments;
+  void add_near(int column, int row, moments *out) const;
+  void add_connected(int column, int row, moments *out) const;
+  static bool fit_line(const moments &m, offset *out);
   void fit_lines();
 
   const wm_raster *raster_;

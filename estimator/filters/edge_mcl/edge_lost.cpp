@@ -90,6 +90,7 @@ void edge_mcl::update_suspicion() {
 // Motion sensors were silent: keyframes from before and after the gap have no known relation.
 void edge_mcl::on_motion_gap() {
   search_.clear();
+  odometry_.clear();
   others_.carry(filter_.pose(), filter_.odom());
   others_.drop_searched(filter_.pose());
   suspicious_ = tentative_ = true;
@@ -177,6 +178,7 @@ void edge_mcl::adopt(int hypothesis) {
   if (!same_pose(wm_pose2{}, way, kSame_m, kSame_rad)) life_.jumped();
   others_.adopt(hypothesis);
   others_.forget_aliased_odds();
+  odometry_.clear();
   filter_.set_pose(pose, kFoundCovariance);
 }
 

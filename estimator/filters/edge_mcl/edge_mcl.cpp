@@ -65,6 +65,7 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
 void edge_mcl::start_again(bool known) {
   scan_odom_ = filter_.odom();
   search_.clear();
+  odometry_.clear();
   life_.begin(known);
   life_.fused(WM_TIME_NONE);
   for (wm_time_ns &t_ns : aligned_ns_) t_ns = WM_TIME_NONE;
@@ -128,8 +129,20 @@ wm_status edge_mcl::take_points(const wm_event &event, record_list records) {
   search_.add_keyframe(scan_, filter_.odom());
   relocalize();
   update_aliases(dt);
+  check_odometry();
   records.add(record);
   return WM_OK;
+}
+
+// While lost there is no pose that odometry could contradict.
+void edge_mcl::check_odometry() {
+  if (!life_.tracking()) {
+    odometry_.clear();
+    return;
+  }
+  const double position_m2 = 0.5 * (filter_.variance(kX) + filter_.variance(kY)) + square(params_.systematic_xy_m);
+  const double heading_rad2 = filter_.variance(kHeading) + square(params_.systematic_heading_rad);
+  odometry_.add(filter_.pose(), position_m2, heading_rad2, filter_.odom(), filter_.travelled_m());
 }
 
 // Recorded points name no camera; where there is one only, it was that.
@@ -187,6 +200,11 @@ void edge_mcl::estimate(wm_estimate *out) const {
   out->covariance[wm_cov_index(0, 0)] += square(params_.systematic_xy_m);
   out->covariance[wm_cov_index(1, 1)] += square(params_.systematic_xy_m);
   out->covariance[wm_cov_index(5, 5)] += square(params_.systematic_heading_rad);
+  const double *disagreement = odometry_.covariance();
+  out->covariance[wm_cov_index(0, 0)] += disagreement[0];
+  out->covariance[wm_cov_index(0, 1)] += disagreement[1];
+  out->covariance[wm_cov_index(1, 0)] += disagreement[1];
+  out->covariance[wm_cov_index(1, 1)] += disagreement[2];
 }
 
 size_t edge_mcl::list_calibration(wm_calibration_value *out, size_t capacity) const {

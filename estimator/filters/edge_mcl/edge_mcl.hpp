@@ -12,6 +12,7 @@
 #include "filters/edge_mcl/align.hpp"
 #include "filters/edge_mcl/fit_evidence.hpp"
 #include "filters/edge_mcl/hypotheses.hpp"
+#include "filters/edge_mcl/odometry_check.hpp"
 #include "filters/edge_mcl/params.h"
 #include "filters/edge_mcl/place_search.hpp"
 #include "filters/planar/planar_filter.hpp"
@@ -107,6 +108,7 @@ class edge_mcl {
   void update_lost(const normal_equations &scan, double dt_s);
   void update_state(double log_bayes_factor);
   void update_suspicion();
+  void check_odometry();
   void on_motion_gap();
   void relocalize();
   void decide();
@@ -123,6 +125,7 @@ class edge_mcl {
   place_search search_;
   hypotheses others_;
   fit_evidence fit_;
+  odometry_check odometry_;
   floor_camera camera_[kCamerasMax];
   int camera_count_;
   state_slots<kCamerasMax, kCameraTime + 1> slots_;

@@ -103,6 +103,22 @@ void lines_are_found_to_a_part_of_a_pixel(void) {
   }
 }
 
+// GIVEN a wall whose faces are four pixels apart WHEN lines are looked up THEN each face has its own.
+void the_faces_of_a_thin_wall_have_lines_of_their_own(void) {
+  drawn d(200, 100, -0.3);
+  d.line(20, 50, 180, 50);
+  d.line(20, 54, 180, 54);
+  d.build();
+  for (const double row : {49.0, 51.0, 53.5, 56.0}) {
+    double x, y, u, v;
+    d.map.to_map(100.5, row, &x, &y);
+    const wm::edge_line line = d.map.nearest(x, y);
+    TEST_ASSERT_TRUE(line.found);
+    d.map.to_pixels(x + line.offset_m * line.normal_x, y + line.offset_m * line.normal_y, &u, &v);
+    TEST_ASSERT_DOUBLE_WITHIN(0.1, row < 52.0 ? 50.5 : 54.5, v);
+  }
+}
+
 // GIVEN a wall of 32 cm between two rooms WHEN a place is nearer to the face that the wall hides THEN the face towards
 // the eye is found, from either room; without a drivable layer, and where floor is on both sides, the nearest one.
 void a_wall_hides_its_other_face(void) {
@@ -204,6 +220,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(distances_are_exact);
   RUN_TEST(lines_are_found_to_a_part_of_a_pixel);
+  RUN_TEST(the_faces_of_a_thin_wall_have_lines_of_their_own);
   RUN_TEST(a_wall_hides_its_other_face);
   RUN_TEST(outside_of_the_map_there_is_nothing);
   RUN_TEST(what_is_no_map_is_refused);
