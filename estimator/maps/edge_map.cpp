@@ -83,7 +83,8 @@ size_t directory_size(const wm_raster &raster) {
 void edge_map::lay_out(memory_layout *layout, size_t tiles, edge_map *own) {
   auto *distances = layout->take<uint8_t>(tiles * kTilePixels);
   auto *offsets = layout->take<offset>(tiles * kTilePixels);
-  if (own) own->distances_.set(distances), own->offsets_.set(offsets);
+  auto *faces = layout->take<uint8_t>(tiles * kTilePixels / 4);
+  if (own) own->distances_.set(distances), own->offsets_.set(offsets), own->faces_.set(faces);
 }
 
 size_t edge_map::bytes(const wm_raster &raster) {
@@ -140,6 +141,7 @@ void edge_map::init(const wm_raster &raster, void *memory) {
     if (tile[i]) tile[i] = count++ * kTilePixels;
   lay_out(&layout, count, this);
   std::memset(distances_.get(), kFar, (size_t)count * kTilePixels);
+  std::memset(faces_.get(), 0, (size_t)count * kTilePixels / 4);
   auto *scratch = layout.take<int32_t>((size_t)3 * raster.width_px);
   sweep_columns();
   for (int row = 0; row < (int)raster.height_px; row++) sweep_row(row, scratch);
@@ -295,10 +297,30 @@ void edge_map::fit_lines() {
       offset &to = offsets_[tile_of(column, row) + in_row(column, row)];
       moments all, connected;
       add_near(column, row, &all);
-      if (fit_line(all, &to)) continue;
-      add_connected(column, row, &connected);
-      if (!fit_line(connected, &to)) to = {0, kNoLine};
+      if (!fit_line(all, &to)) {
+        add_connected(column, row, &connected);
+        if (!fit_line(connected, &to)) {
+          to = {0, kNoLine};
+          continue;
+        }
+      }
+      const uint32_t pixel = tile_of(column, row) + in_row(column, row);
+      faces_[pixel >> 2] = (uint8_t)(faces_[pixel >> 2] | (face_of(column, row, to) + 1) << 2 * (pixel & 3));
     }
+}
+
+bool edge_map::floor_at(double column, double row) const {
+  return inside_map(column, row) && raster_->drivable[(size_t)(int)row * raster_->width_px + (size_t)(int)column];
+}
+
+int edge_map::face_of(int column, int row, const offset &line) const {
+  if (!raster_->drivable) return 0;
+  const unit_vector &a = normal_[(uint8_t)line.x];
+  const auto beside = [&](double off_px) {
+    return floor_at(column + 0.5 + off_px * a.cos, row + 0.5 + off_px * a.sin);
+  };
+  const double way = line.y * kLineUnit_px;
+  return (int)beside(way + kBeside_px) - (int)beside(way - kBeside_px);
 }
 
 void edge_map::to_pixels(double x_m, double y_m, double *column, double *row) const {
@@ -339,28 +361,22 @@ edge_line edge_map::nearest(double x_m, double y_m) const {
   out.offset_m = (a.cos * du + a.sin * dv + line.y * kLineUnit_px) * raster_->resolution_m;
   out.normal_x = cos_yaw_ * a.cos + sin_yaw_ * a.sin;  // rows grow downwards
   out.normal_y = sin_yaw_ * a.cos - cos_yaw_ * a.sin;
+  const uint32_t pixel = tile_of(column, row) + in_row(column, row);
+  out.face = (faces_[pixel >> 2] >> 2 * (pixel & 3) & 3) - 1;
   out.found = true;
   return out;
 }
 
-// Whether floor is on the far side of a line alone. `away`: 1 where its normal points away from the eye, else -1.
-bool edge_map::other_face(const edge_line &line, double x_m, double y_m, double away) const {
-  const double beside_m = away * kBeside_px * pixel_m();
-  const auto floor_at = [&](double off_m) {
-    return drivable(x_m + off_m * line.normal_x, y_m + off_m * line.normal_y);
-  };
-  return !floor_at(line.offset_m - beside_m) && floor_at(line.offset_m + beside_m);
-}
-
 edge_line edge_map::nearest_seen(double x_m, double y_m, double ray_x_m, double ray_y_m) const {
-  const auto away = [&](const edge_line &l) { return l.normal_x * ray_x_m + l.normal_y * ray_y_m < 0.0 ? -1.0 : 1.0; };
+  const auto away = [&](const edge_line &l) { return l.normal_x * ray_x_m + l.normal_y * ray_y_m < 0.0 ? -1 : 1; };
+  const auto hidden = [&](const edge_line &l) { return l.face * away(l) > 0; };
   edge_line line = nearest(x_m, y_m);
-  if (!raster_->drivable || !line.found || !other_face(line, x_m, y_m, away(line))) return line;
+  if (!line.found || !hidden(line)) return line;
   const double step_m = -away(line) * kFaceStep_m, step_x = step_m * line.normal_x, step_y = step_m * line.normal_y;
   for (int k = 1; k <= kFaceSteps; k++) {
     const double dx = k * step_x, dy = k * step_y;
     edge_line near = nearest(x_m + dx, y_m + dy);
-    if (!near.found || other_face(near, x_m + dx, y_m + dy, away(near))) continue;
+    if (!near.found || hidden(near)) continue;
     near.offset_m += near.normal_x * dx + near.normal_y * dy;  // now from the place itself
     const edge_line foot = nearest(x_m + near.offset_m * near.normal_x, y_m + near.offset_m * near.normal_y);
     near.distance_m = std::sqrt(near.offset_m * near.offset_m + foot.distance_m * foot.distance_m);

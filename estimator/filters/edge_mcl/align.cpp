@@ -25,11 +25,6 @@ int take_evenly(const floor_edge *points, int count, int most, floor_edge *out) 
   return most;
 }
 
-edge_line line_seen(const edge_map &map, const floor_edge &point, const sin_cos &h, double x_m, double y_m) {
-  const double ray_x = (double)point.ray_x_m, ray_y = (double)point.ray_y_m;
-  return map.nearest_seen(x_m, y_m, h.cos * ray_x - h.sin * ray_y, h.sin * ray_x + h.cos * ray_y);
-}
-
 bool on_a_line(const wm_points &points, uint32_t i) {
   if (i == 0 || i + 1 >= points.count) return false;
   const double ax = (double)points.x_m[i - 1], ay = (double)points.y_m[i - 1];
@@ -96,11 +91,10 @@ struct pose_row {
   edge_line line;
   vector<3> by;
 };
-pose_row row_at(const edge_map &map, const wm_pose2 &pose, const sin_cos &h, const floor_edge &point, double x,
-                double y) {
+pose_row row_at(const edge_map &map, const wm_pose2 &pose, const sin_cos &h, double x, double y) {
   const double rx = h.cos * x - h.sin * y, ry = h.sin * x + h.cos * y;
   pose_row row;
-  row.line = line_seen(map, point, h, pose.x_m + rx, pose.y_m + ry);
+  row.line = map.nearest(pose.x_m + rx, pose.y_m + ry);
   row.by << row.line.normal_x, row.line.normal_y, row.line.normal_y * rx - row.line.normal_x * ry;
   return row;
 }
@@ -125,7 +119,7 @@ void align_pose(const edge_map &map, const floor_edge *points, int count, int st
     vector<3> b = vector<3>::Zero(), step;
     const sin_cos h = sincos(pose->heading_rad);
     for (int i = 0; i < count; i += stride) {
-      const pose_row row = row_at(map, *pose, h, points[i], (double)points[i].x_m, (double)points[i].y_m);
+      const pose_row row = row_at(map, *pose, h, (double)points[i].x_m, (double)points[i].y_m);
       if (!row.line.found || row.line.distance_m > gate_m) continue;
       const vector<3> weighted = cauchy_weight(row.line.offset_m, explained_m) * row.by;
       b += row.line.offset_m * weighted;
@@ -147,7 +141,7 @@ void align_place(const edge_map &map, const floor_points &points, int stride, do
       const floor_edge &point = points.of[i];
       double x, y;
       shifted(point, error, &x, &y);
-      const pose_row row = row_at(map, *pose, h, point, x, y);
+      const pose_row row = row_at(map, *pose, h, x, y);
       const edge_line &line = row.line;
       if (!line.found || line.distance_m > gate_m) continue;
       vector<kOwn> by;
@@ -191,7 +185,7 @@ double explained_share(const edge_map &map, const floor_points &points, double e
     double px, py;
     shifted(point, error, &px, &py);
     const double x = pose.x_m + h.cos * px - h.sin * py, y = pose.y_m + h.sin * px + h.cos * py;
-    const edge_line line = line_seen(map, point, h, x, y);
+    const edge_line line = map.nearest(x, y);
     if (line.found && line.distance_m <= explained_m) {
       explained += 1.0;
     } else if (reflections) {

@@ -55,8 +55,6 @@ struct floor_points {
 };
 // The point from another pose: `from` is its base_link, h the cosine and sine of from's heading.
 floor_edge moved(const floor_edge &point, const wm_pose2 &from, const sin_cos &h);
-// The edge next to a place in the map at which the point is seen, h the cosine and sine of base_link's heading.
-edge_line line_seen(const edge_map &map, const floor_edge &point, const sin_cos &h, double x_m, double y_m);
 // At most `most` of `count` points, evenly taken. Returns how many.
 int take_evenly(const floor_edge *points, int count, int most, floor_edge *out);
 

@@ -231,7 +231,7 @@ hypotheses::fit hypotheses::fit_at(const edge_map &map, const wm_pose2 &pose) co
     const floor_edge &p = points_[i];
     const double px = (double)p.x_m, py = (double)p.y_m;
     const double rx = h.cos * px - h.sin * py, ry = h.sin * px + h.cos * py;
-    const edge_line line = line_seen(map, p, h, pose.x_m + rx, pose.y_m + ry);
+    const edge_line line = map.nearest(pose.x_m + rx, pose.y_m + ry);
     if (!line.found || line.distance_m > kExplained_m) {
       const double ray_x = (double)p.ray_x_m, ray_y = (double)p.ray_y_m;
       if (before_an_edge(map, pose.x_m + rx, pose.y_m + ry, h.cos * ray_x - h.sin * ray_y,

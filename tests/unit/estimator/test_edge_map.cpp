@@ -122,33 +122,32 @@ void the_faces_of_a_thin_wall_have_lines_of_their_own(void) {
 // GIVEN a wall of 32 cm between two rooms WHEN a place is nearer to the face that the wall hides THEN the face towards
 // the eye is found, from either room; without a drivable layer, and where floor is on both sides, the nearest one.
 void a_wall_hides_its_other_face(void) {
-  drawn d(200, 150, 0.6);
-  d.line(20, 70, 180, 70);
-  d.line(20, 78, 180, 78);
-  d.line(20, 120, 180, 120);  // on the floor
-  d.build();
-  std::vector<uint8_t> floor(d.edges.size(), 255);
-  for (size_t row = 70; row <= 78; row++) std::memset(floor.data() + row * 200, 0, 200);
-  const auto face = [&](double row, double from_row, bool *found) {
-    double x, y, eye_x, eye_y, u, v;
-    d.map.to_map(100.5, row, &x, &y);
-    d.map.to_map(60.5, from_row, &eye_x, &eye_y);
-    const wm::edge_line line = d.map.nearest_seen(x, y, x - eye_x, y - eye_y);
-    *found = line.found;
-    d.map.to_pixels(x + line.offset_m * line.normal_x, y + line.offset_m * line.normal_y, &u, &v);
-    TEST_ASSERT_DOUBLE_WITHIN(0.02, std::fabs(v - row) * kPixel_m, line.distance_m);
-    return v;
-  };
-  bool found;
-  TEST_ASSERT_DOUBLE_WITHIN(0.1, 78.5, face(75.5, 20, &found));
-  d.raster.drivable = floor.data();
-  for (const double row : {68.0, 72.0, 75.5, 80.0, 84.0}) {
-    TEST_ASSERT_DOUBLE_WITHIN(0.1, 70.5, face(row, 20, &found));
-    TEST_ASSERT_TRUE(found);
-    TEST_ASSERT_DOUBLE_WITHIN(0.1, 78.5, face(row, 140, &found));
-    TEST_ASSERT_TRUE(found);
+  for (const bool layer : {false, true}) {
+    drawn d(200, 150, 0.6);
+    d.line(20, 70, 180, 70);
+    d.line(20, 78, 180, 78);
+    d.line(20, 120, 180, 120);  // on the floor
+    std::vector<uint8_t> floor(d.edges.size(), 255);
+    for (size_t row = 70; row <= 78; row++) std::memset(floor.data() + row * 200, 0, 200);
+    if (layer) d.raster.drivable = floor.data();
+    d.build();
+    const auto face = [&](double row, double from_row) {
+      double x, y, eye_x, eye_y, u, v;
+      d.map.to_map(100.5, row, &x, &y);
+      d.map.to_map(60.5, from_row, &eye_x, &eye_y);
+      const wm::edge_line line = d.map.nearest_seen(x, y, x - eye_x, y - eye_y);
+      TEST_ASSERT_TRUE(line.found);
+      d.map.to_pixels(x + line.offset_m * line.normal_x, y + line.offset_m * line.normal_y, &u, &v);
+      TEST_ASSERT_DOUBLE_WITHIN(0.02, std::fabs(v - row) * kPixel_m, line.distance_m);
+      return v;
+    };
+    for (const double row : {68.0, 72.0, 75.5, 80.0, 84.0}) {
+      const double nearest = row < 74.5 ? 70.5 : 78.5;
+      TEST_ASSERT_DOUBLE_WITHIN(0.1, layer ? 70.5 : nearest, face(row, 20));
+      TEST_ASSERT_DOUBLE_WITHIN(0.1, layer ? 78.5 : nearest, face(row, 140));
+    }
+    for (const double row : {118.0, 122.0}) TEST_ASSERT_DOUBLE_WITHIN(0.1, 120.5, face(row, 100));
   }
-  for (const double row : {118.0, 122.0}) TEST_ASSERT_DOUBLE_WITHIN(0.1, 120.5, face(row, 100, &found));
 }
 
 void outside_of_the_map_there_is_nothing(void) {

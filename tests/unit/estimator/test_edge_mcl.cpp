@@ -347,8 +347,6 @@ struct searching {
         p.y_by[0] = (float)(by * y);
         p.x_m = (float)(x - off * by * x);
         p.y_m = (float)(y - off * by * y);
-        p.ray_x_m = (float)(x - 1.0);
-        p.ray_y_m = (float)y;
       }
       TEST_ASSERT_TRUE(search.add_keyframe(scan, odom));
     }
