@@ -13,7 +13,7 @@ struct past_pose {
   wm_pose2 pose;            // base_link in map at the time of measurement
   wm_pose2 step;            // the same in base_link now
   double lever_x, lever_y;  // from the present position to it, m: the derivative by a heading error now
-  double age_by[3];         // of x, y, heading by the time offset: minus the steady twist
+  double age_by[3];         // of x, y, heading by the time offset: minus the twist
   int stamp_slot;           // state of the error of this measurement's stamp; -1: none
 };
 
@@ -23,19 +23,21 @@ past_pose pose_before(const Filter &filter, double age_s) {
   past_pose out;
   out.stamp_slot = -1;
   const wm_time_ns now = filter.now_ns(), then = now - wm_ns_from_seconds(age_s);
-  motion_twist ignored{};
+  motion_twist there{};
   out.step = {};
   if (then < now) {
-    out.step = between(filter.path(then, now, &ignored), wm_pose2{});
+    out.step = between(filter.path(then, now, &there), wm_pose2{});
   } else if (then > now) {
-    out.step = filter.path(now, then, &ignored);
+    out.step = filter.path(now, then, &there);
+  } else {
+    filter.path(now - 1, now, &there);
   }
   const wm_pose2 present = filter.pose();
   out.pose = compose(present, out.step);
   out.lever_x = out.pose.x_m - present.x_m;
   out.lever_y = out.pose.y_m - present.y_m;
   const sin_cos h = sincos(out.pose.heading_rad);
-  const planar_twist twist = filter.steady_twist();
+  const planar_twist twist = filter.steady(there);
   out.age_by[0] = -twist.v * h.cos + twist.u * h.sin;
   out.age_by[1] = -twist.v * h.sin - twist.u * h.cos;
   out.age_by[2] = -twist.w;

@@ -101,8 +101,13 @@ void planar_motion::take_step(const motion_segment &segment, const motion_twist 
   front_.count_noise(&v_sigma, &w_sigma);
   const double share = segment.dt_s / (segment.dt_s + kSteady_s);
   steady_[0].step(twist_.v, share, v_sigma);
-  steady_[1].step(twist_.u, share, 0.0);
-  steady_[2].step(twist_.w, share, w_sigma);
+  steady_[1].step(twist_.w, share, w_sigma);
+}
+
+planar_twist planar_motion::steady(const planar_twist &twist) const {
+  double v_sigma, w_sigma;
+  front_.count_noise(&v_sigma, &w_sigma);
+  return {v_sigma > 0.0 ? steady_[0].banded : twist.v, twist.u, w_sigma > 0.0 ? steady_[1].banded : twist.w};
 }
 
 void planar_motion::take_calibration(double *states) {

@@ -46,8 +46,9 @@ class planar_motion {
   const wm_motion_calibration &calibration() const { return calibration_; }
   uint32_t motion_health() const { return front_.health(); }
   uint64_t motion_outliers() const { return front_.outliers(); }
-  // The twist for the derivative of a time offset: low-passed, without the steps of counts.
-  planar_twist steady_twist() const { return {steady_[0].banded, steady_[1].banded, steady_[2].banded}; }
+  // A twist for the derivative of a time offset: where counts give the speed or the turn, low-passed, without their
+  // steps.
+  planar_twist steady(const planar_twist &twist) const;
   // The next motion input is overdue.
   bool is_overdue() const { return front_.is_overdue(now_ns()); }
   wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time
@@ -142,7 +143,7 @@ class planar_motion {
   wm_pose2 odom_;
   double travelled_m_, turned_rad_;
   planar_twist twist_;     // of the last segment
-  steady_rate steady_[3];  // of its v, u and w
+  steady_rate steady_[2];  // of its v and w
   double heading_rad_;     // only where has_velocity()
 };
 

@@ -122,7 +122,7 @@ void test_steps_of_the_counts_are_no_turn(void) {
       left_m += 0.02 * (1.0 - 0.5 * kTrack_m * w);
       right_m += 0.02 * (1.0 + 0.5 * kTrack_m * w);
       car.t_s += 0.02;
-      most = std::fmax(most, std::fabs(car.filter->steady_twist().w));
+      most = std::fmax(most, std::fabs(car.filter->steady({}).w));
       wm::motion_twist twist{};
       car.filter->path(car.filter->now_ns(), car.filter->now_ns() + 1, &twist);
       most_shiver = std::fmax(most_shiver, std::fabs(twist.w));
@@ -132,8 +132,8 @@ void test_steps_of_the_counts_are_no_turn(void) {
   TEST_ASSERT_GREATER_THAN_DOUBLE(3.0, most_shiver);
   TEST_ASSERT_EQUAL_DOUBLE(0.0, most);
   drive(3.0, 500);
-  TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(3.5, car.filter->steady_twist().w);
-  TEST_ASSERT_GREATER_THAN_DOUBLE(0.5, car.filter->steady_twist().w);
+  TEST_ASSERT_LESS_OR_EQUAL_DOUBLE(3.5, car.filter->steady({}).w);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(0.5, car.filter->steady({}).w);
 }
 
 void test_a_pose_given_from_outside_is_kept(void) {
