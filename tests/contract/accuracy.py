@@ -303,7 +303,7 @@ def hall():
     bar("hall: NEES inside 95 %", plain["nees_inside_95"], least=0.85)
     bar("hall: lines of the map for each one labelled: lost ones are joined", plain["landmarks_estimated"] / plain["landmarks_total"], most=1.3)
     scaled_ = run(recording, "hall", "--align", "sim2")
-    bar("hall: position RMSE, aligned with scale", scaled_["position_rmse_m"], most=0.012)
+    bar("hall: position RMSE, aligned with scale", scaled_["position_rmse_m"], most=0.007)
     bar("hall: heading RMSE, aligned with scale", scaled_["heading_rmse_deg"], most=0.25)
     lines = detected(recording, "hall", "lines")
     bar(f"hall: share found of {lines['with_contrast']} lines with contrast (of {lines['labelled']} labelled)", lines["recall"], least=0.80)

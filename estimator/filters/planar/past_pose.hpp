@@ -13,9 +13,19 @@ struct past_pose {
   wm_pose2 pose;            // base_link in map at the time of measurement
   wm_pose2 step;            // the same in base_link now
   double lever_x, lever_y;  // from the present position to it, m: the derivative by a heading error now
-  double age_by[3];         // of x, y, heading by the time offset: minus the twist
+  double age_by[3];         // of x, y, heading by the time offset: minus the twist, without the steps of counts
+  double stamp_by[3];       // the same by the error of one stamp, from the low-passed twist
   int stamp_slot;           // state of the error of this measurement's stamp; -1: none
 };
+
+// Derivatives of a pose with heading `h` by the time that it is older.
+inline void put_age(const planar_twist &twist, const sin_cos &h, double by[3]) {
+  by[0] = -twist.v * h.cos + twist.u * h.sin;
+  by[1] = -twist.v * h.sin - twist.u * h.cos;
+  by[2] = -twist.w;
+}
+
+inline double product(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // `filter` is planar: it has pose(), now_ns() and path(). `age_s`: how long before now the measurement was taken.
 template <class Filter>
@@ -37,10 +47,8 @@ past_pose pose_before(const Filter &filter, double age_s) {
   out.lever_x = out.pose.x_m - present.x_m;
   out.lever_y = out.pose.y_m - present.y_m;
   const sin_cos h = sincos(out.pose.heading_rad);
-  const planar_twist twist = filter.steady(there);
-  out.age_by[0] = -twist.v * h.cos + twist.u * h.sin;
-  out.age_by[1] = -twist.v * h.sin - twist.u * h.cos;
-  out.age_by[2] = -twist.w;
+  put_age(filter.steady(there), h, out.age_by);
+  put_age(filter.low_passed(there), h, out.stamp_by);
   return out;
 }
 
@@ -50,9 +58,8 @@ void add_past_pose(Row *row, const double by[3], const past_pose &past, int time
   row->add(kX, by[0]);
   row->add(kY, by[1]);
   row->add(kHeading, by[2] - by[0] * past.lever_y + by[1] * past.lever_x);
-  const double by_age = by[0] * past.age_by[0] + by[1] * past.age_by[1] + by[2] * past.age_by[2];
-  row->add(time_offset_slot, by_age);
-  row->add(past.stamp_slot, by_age);
+  row->add(time_offset_slot, product(by, past.age_by));
+  row->add(past.stamp_slot, product(by, past.stamp_by));
 }
 
 }  // namespace wm

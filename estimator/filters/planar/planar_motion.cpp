@@ -110,6 +110,12 @@ planar_twist planar_motion::steady(const planar_twist &twist) const {
   return {v_sigma > 0.0 ? steady_[0].banded : twist.v, twist.u, w_sigma > 0.0 ? steady_[1].banded : twist.w};
 }
 
+planar_twist planar_motion::low_passed(const planar_twist &twist) const {
+  double v_sigma, w_sigma;
+  front_.count_noise(&v_sigma, &w_sigma);
+  return {v_sigma > 0.0 ? steady_[0].smooth : twist.v, twist.u, w_sigma > 0.0 ? steady_[1].smooth : twist.w};
+}
+
 void planar_motion::take_calibration(double *states) {
   for (int i = 0; i < kMotionStates; i++) {
     const int state = motion_state_[i];

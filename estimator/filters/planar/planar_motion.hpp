@@ -49,6 +49,8 @@ class planar_motion {
   // A twist for the derivative of a time offset: where counts give the speed or the turn, low-passed, without their
   // steps.
   planar_twist steady(const planar_twist &twist) const;
+  // The same without the dead band, for the error of one stamp: it is new in each, and gains nothing from noise.
+  planar_twist low_passed(const planar_twist &twist) const;
   // The next motion input is overdue.
   bool is_overdue() const { return front_.is_overdue(now_ns()); }
   wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time

@@ -71,10 +71,8 @@ class joint_state : public planar_motion {
   // `share`: exponent of the state under a change of the map's scale, +1 or -1. `anchors`: its prior holds the scale.
   void follow_scale(int state, double share, bool anchors);
 
-  // The way's scale is a state.
-  bool has_way_scale() const {
-    return motion_state(kSpeedScale) >= 0 || (motion_state(kLeftScale) >= 0 && motion_state(kRightScale) >= 0);
-  }
+  // The way's scale is a state: the speed's, or that of both wheels. A scale that wanders about an exact mean is none.
+  bool has_way_scale() const;
 
   // ---- time and motion ----
   void move(const wm_event &motion);

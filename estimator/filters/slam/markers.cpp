@@ -178,7 +178,7 @@ void slam::expect_marker(const context &at, const marker_reading &r, const wm_po
     const double component = a[0] * u[0] + a[1] * u[1];
     joint_row &row = out->row[k];
     add_past_pose(&row, by, at.past, slot(kTimeOffset));
-    by_age[k] = by[0] * at.past.age_by[0] + by[1] * at.past.age_by[1] + by[2] * at.past.age_by[2];
+    by_age[k] = product(by, at.past.stamp_by);
     row.add(slot(kYaw), turn);
     row.add(slot(kMountX), -g[0] * base.cos - g[1] * base.sin);
     row.add(slot(kMountY), g[0] * base.sin - g[1] * base.cos);
@@ -194,7 +194,7 @@ void slam::expect_marker(const context &at, const marker_reading &r, const wm_po
   }
   const double by[3] = {0.0, 0.0, -1.0};
   add_past_pose(&out->row[2], by, at.past, slot(kTimeOffset));
-  by_age[2] = by[2] * at.past.age_by[2];
+  by_age[2] = product(by, at.past.stamp_by);
   out->row[2].add(slot(kYaw), -1.0);
   out->by_landmark[2][0] = out->by_landmark[2][1] = 0.0;
   out->by_landmark[2][2] = 1.0;

@@ -7,9 +7,16 @@
 
 namespace wm {
 
+bool joint_state::has_way_scale() const {
+  const auto is_free = [this](int side) {
+    return motion_state_[kLeftScale + side] >= 0 && (!(slip_.sigma > 0.0) || variance(slip_mean_[side]) > 0.0);
+  };
+  return motion_state_[kSpeedScale] >= 0 || (is_free(0) && is_free(1));
+}
+
 bool joint_state::find_scale(bool carries) {
-  const int speed = motion_state_[kSpeedScale], left = motion_state_[kLeftScale], right = motion_state_[kRightScale];
-  if (speed < 0 && (left < 0 || right < 0)) return false;  // the way measures the scale
+  const int speed = motion_state_[kSpeedScale], left = motion_state_[kLeftScale];
+  if (!has_way_scale()) return false;  // the way measures the scale
   carries_scale_ = carries;
   if (speed >= 0) {
     scale_state_ = speed;
