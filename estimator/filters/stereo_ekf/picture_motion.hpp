@@ -75,7 +75,8 @@ class picture_motion {
   view view_[kTracks];
   fit_row row_[kTracks];
   double sorted_[kTracks];
-  int32_t tracks_, seen_, side_, reserved_;
+  int32_t tracks_, seen_;
+  int64_t side_;  // of 64 bits: no padding
 };
 
 }  // namespace wm

@@ -187,6 +187,15 @@ bool stereo_ekf::heading_rows(const wm_heading &h, row_block *out) const {
   return true;
 }
 
+namespace {
+
+// Three derivatives of a row, from a column on; -1: none.
+void put_row(const double by[3], int row, int column, row_block *out) {
+  for (int j = 0; column >= 0 && j < 3; j++) out->by[row][column + j] = by[j];
+}
+
+}  // namespace
+
 // A measured velocity (v - r x v)/s + lag dv/dt or measured rates w - r x w + b + lag dw/dt, by the states v, s, w, b,
 // lag and r, the rotation of the twist's axes (and of the velocity's direction): a measured twist that is ahead of the
 // vehicle's had its present value a lag ago.
@@ -211,11 +220,9 @@ row_block stereo_ekf::twist_rows(head_state which, const vec3 &measured, const v
   for (int i = 0; i < 3; i++) {
     if (planar && i != (velocity ? 0 : 2)) continue;
     const int row = out.add_row(WM_RESIDUAL_X, now[i], now[i] - (seen[i] + bias[i]), variance[i]);
-    for (int j = 0; j < 3; j++) {
-      out.by[row][first + j] = by_state.m[i][j];
-      if (by_axes >= 0) out.by[row][by_axes + j] = by_turn.m[i][j];
-      if (by_direction >= 0) out.by[row][by_direction + j] = by_turn.m[i][j];
-    }
+    put_row(by_state.m[i], row, first, &out);
+    put_row(by_turn.m[i], row, by_axes, &out);
+    put_row(by_turn.m[i], row, by_direction, &out);
     if (lag >= 0) out.by[row][lag] = slope_per_s[i];
     if (by_scale >= 0) out.by[row][by_scale] = -seen[i] / scale;
     if (by_bias >= 0) out.by[row][by_bias + i] = 1.0;
