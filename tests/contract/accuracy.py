@@ -12,15 +12,11 @@ import sys
 import tempfile
 
 import covariances
+import replays
+from replays import each_row, rows, scaled, shifted, turned
 
 BIN, SOURCE, DATA = (pathlib.Path(p).resolve() for p in sys.argv[1:4])
 failures = []
-
-
-def rows(path):
-    head, *lines = path.read_text().splitlines()
-    names = head.split(",")
-    return [dict(zip(names, line.split(","))) for line in lines]
 
 
 def longest_beyond(trajectory, truth, sigmas):
@@ -82,59 +78,11 @@ class disturbed:
     def __enter__(self):
         self.folder = tempfile.TemporaryDirectory()
         here = pathlib.Path(self.folder.name) / self.recording.name
-        here.mkdir()
-        for file in self.recording.iterdir():
-            if file.is_dir() and any(name.startswith(f"{file.name}/") for name in self.changes):
-                (here / file.name).mkdir()
-                for inner in file.iterdir():
-                    change = self.changes.get(f"{file.name}/{inner.name}")
-                    if change and inner.suffix == ".avi":
-                        (here / file.name / inner.name).write_bytes(change(inner.read_bytes()))
-                    elif change:
-                        (here / file.name / inner.name).write_text(change(inner.read_text()))
-                    else:
-                        (here / file.name / inner.name).symlink_to(inner)
-            elif file.name in self.changes:
-                before = file.read_text()
-                after = self.changes[file.name](before)
-                assert after != before, f"{file}: the disturbance changed nothing"
-                (here / file.name).write_text(after)
-            else:
-                (here / file.name).symlink_to(file)
+        replays.copy_changed(self.recording, here, self.changes)
         return here
 
     def __exit__(self, *_):
         self.folder.cleanup()
-
-
-def each_row(change):
-    def whole(text):
-        head, *rows = text.splitlines()
-        names = head.split(",")
-        out = []
-        for row in rows:
-            fields = dict(zip(names, row.split(",")))
-            change(fields)
-            out.append(",".join(fields[n] for n in names))
-        return "\n".join([head, *out]) + "\n"
-    return whole
-
-
-def shifted(seconds):
-    def change(f):
-        f["t_ns"] = str(int(f["t_ns"]) + round(seconds * 1e9))
-    return each_row(change)
-
-
-def scaled(column, factor):
-    def change(f):
-        f[column] = repr(float(f[column]) * factor) if f[column] else ""
-    return each_row(change)
-
-
-def turned(degrees):
-    return lambda text: re.sub(r"rpy_deg: \[([^,]+), ([^,]+), ([^\]]+)\]",
-                               lambda m: f"rpy_deg: [{m[1]}, {m[2]}, {float(m[3]) + degrees}]", text)
 
 
 def yaw_rate_offset(radps):

@@ -13,9 +13,9 @@ import json
 import pathlib
 import random
 import re
-import subprocess
-import sys
 import tempfile
+
+from replays import command, replaced
 
 TICKS = (256, 1024, 4096, 16384)
 RADIUS_SIGMA = TRACK_SIGMA = 0.02
@@ -23,19 +23,6 @@ YAW_SIGMA_RAD = 0.02
 CLOCK_SIGMA_S = 0.02
 RMS_LEAST, RMS_MOST = 0.8, 1.25
 BEYOND_SIGMAS, BEYOND_MOST = 4, 0.01
-
-
-def command(*words):
-    done = subprocess.run([str(w) for w in words], capture_output=True, text=True)
-    if done.returncode != 0:
-        sys.exit(f"{' '.join(map(str, words))}: {done.returncode}\n{done.stderr}")
-
-
-def replaced(pattern, change, text):
-    """Each match's first group, as a number, changed."""
-    out, count = re.subn(pattern, lambda m: m[0].replace(m[1], f"{change(float(m[1])):.9g}", 1), text, flags=re.M)
-    assert count, f"nothing matches {pattern}"
-    return out
 
 
 def drive(args, world, seed, where):

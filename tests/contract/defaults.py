@@ -7,20 +7,18 @@ where the recordings are not there.
     defaults.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--set KEY=VALUE] [--json]
 
 --set changes a key of the plain configurations, as `sightings.gate.hard=1000`: a trial of another default on all of them."""
-import argparse
 import json
 import pathlib
-import subprocess
 import sys
 import tempfile
 
 import covariances
+import replays
+from replays import Refused, command, confidently_wrong, find, printed, rows
 
 RATIO_MOST = 1.3
 NEES_LEAST = 0.85
 COVERAGE_LEAST = 0.95   # of the best one's share of stamps with a pose: silence is no accuracy
-WRONG_M = 0.5
-WRONG_SIGMA = 3.5
 OUTAGES_S = (240, 330, 420)   # since the first stamp
 
 # Chosen by hand with sight of the truth, where no shipped configuration fits.
@@ -93,61 +91,6 @@ CASES = [
 ]
 
 
-class Refused(RuntimeError):
-    """A program's error instead of a result."""
-
-
-def command(*words):
-    done = subprocess.run([str(w) for w in words], capture_output=True, text=True)
-    if done.returncode != 0:
-        raise Refused(done.stderr.strip() or f"{words[0]}: {done.returncode}")
-    return done.stdout
-
-
-def rows(path):
-    head, *lines = path.read_text().splitlines()
-    names = head.split(",")
-    return [dict(zip(names, line.split(","))) for line in lines]
-
-
-def mahalanobis2(d, p):
-    """d' P^-1 d for two or three numbers, by Gauss's elimination. Infinite where P is singular."""
-    n = len(d)
-    a = [[*p[i], d[i]] for i in range(n)]
-    total = 0.0
-    for i in range(n):
-        if not a[i][i] > 0:
-            return float("inf")
-        total += a[i][n] ** 2 / a[i][i]
-        for j in range(i + 1, n):
-            f = a[j][i] / a[i][i]
-            a[j] = [x - f * y for x, y in zip(a[j], a[i])]
-    return total
-
-
-def confidently_wrong(run, recording):
-    """Share of the truth's time with state tracking while the position is off by more than WRONG_M and WRONG_SIGMA."""
-    trajectory, truth = rows(run / "trajectory.csv"), rows(recording / "truth.csv")
-    axes = "xyz" if "cov_zz" in trajectory[0] else "xy"
-    place = [f"{a}_m" for a in axes]
-    at, wrong, total, last = 0, 0, 0, None
-    for row in truth:
-        t = int(row["t_ns"])
-        while at + 1 < len(trajectory) and int(trajectory[at + 1]["t_ns"]) <= t:
-            at += 1
-        if at + 1 >= len(trajectory) or int(trajectory[at]["t_ns"]) > t:
-            continue
-        a, b = trajectory[at], trajectory[at + 1]
-        share = (t - int(a["t_ns"])) / (int(b["t_ns"]) - int(a["t_ns"]))
-        d = [float(row[k]) - float(a[k]) - share * (float(b[k]) - float(a[k])) for k in place]
-        p = [[float(a["cov_" + min(i, j) + max(i, j)]) for j in axes] for i in axes]
-        bad = a["state"] == "tracking" and sum(x * x for x in d) > WRONG_M ** 2 and mahalanobis2(d, p) > WRONG_SIGMA ** 2
-        if last is not None:
-            wrong, total = wrong + bad * (t - last), total + t - last
-        last = t
-    return wrong / total if total else None
-
-
 def first_stamp_ns(recording):
     stamps = [int(r["t_ns"]) for name in ("motion", "sightings", "gnss") if (recording / f"{name}.csv").exists() for r in rows(recording / f"{name}.csv")[:1]]
     if (recording / "can.log").exists():
@@ -193,22 +136,6 @@ def figures(bin_dir, case, recording, config, folder):
     if "found_s" in case.bars:
         out["found_s"] = found_after_s(rows(folder / "trajectory.csv"), recording)
     return out
-
-
-def find(tree, key):
-    """The first value under a key, or of the entry with this name, in a tree of maps and lists."""
-    if isinstance(tree, dict):
-        if key in tree:
-            return tree[key]
-        if tree.get("name") == key:
-            return tree
-        tree = list(tree.values())
-    if isinstance(tree, list):
-        for branch in tree:
-            value = find(branch, key)
-            if value is not None:
-                return value
-    return None
 
 
 def plain(case, settings=()):
@@ -314,23 +241,12 @@ COLUMNS = (("position_rmse_m", 4, 8), ("best_position_rmse_m", 4, 8), ("ratio", 
            ("best_confidently_wrong", 3, 6))
 
 
-def printed(value, digits):
-    return "-" if value is None else f"{value:.{digits}f}"
-
-
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name in ("bin_dir", "source_dir", "data_dir"):
-        parser.add_argument(name, type=lambda p: pathlib.Path(p).resolve())
-    parser.add_argument("--only", default="", help="cases whose title contains one of these words")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a key of the plain configurations")
-    parser.add_argument("--json", action="store_true", help="one object a case instead of the table")
-    options = parser.parse_args()
+    options = replays.parser(__doc__, "cases whose title contains one of these words").parse_args()
     if not options.data_dir.is_dir():
         print(f"{options.data_dir}: no recordings here")
         return 77
-    words = [w for w in options.only.split(",") if w]
-    cases = [c for c in CASES if not words or any(w in c.title() for w in words)]
+    cases = [c for c in CASES if replays.is_chosen(options, c.title())]
     if not options.json:
         print(f"{'recording or world, estimator':34} " + " ".join(f"{name:>{width}}" for name, (_, _, width) in zip(HEADINGS, COLUMNS))
               + "  best configuration; bars missed")

@@ -6,7 +6,6 @@ of the recording, in bursts. Each disturbed replay is compared with the undistur
 are not there. Those whose source gives covariances are replayed with them.
 
     slips.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--seed N] [--set KEY=VALUE] [--json]"""
-import argparse
 import json
 import math
 import pathlib
@@ -16,6 +15,7 @@ import tempfile
 
 import covariances
 import defaults
+import replays
 
 RECORDINGS = ("dlr-a", "mrclam-d6-r1", "mrclam-d6-r2", "mrclam-d6-r3", "mrclam-d6-r5", "mrclam-d6-t5")
 MOTIONS = (("increments.csv", "dheading_rad"), ("motion6.csv", "wz_radps"), ("motion.csv", "w_radps"))
@@ -43,8 +43,8 @@ class Recording:
     def __init__(self, folder):
         self.folder = folder
         self.motion_name, self.turn = next(m for m in MOTIONS if (folder / m[0]).exists())
-        self.motion = defaults.rows(folder / self.motion_name)
-        self.sightings = defaults.rows(folder / "sightings.csv")
+        self.motion = replays.rows(folder / self.motion_name)
+        self.sightings = replays.rows(folder / "sightings.csv")
         self.stamps = sorted({int(r["t_ns"]) for r in self.sightings})
 
     def known_before(self, t_ns):
@@ -109,19 +109,17 @@ class Recording:
         return out
 
     def write(self, folder, motion=None, sightings=None):
-        folder.mkdir()
-        for source in self.folder.iterdir():
-            table = {self.motion_name: motion, "sightings.csv": sightings}.get(source.name)
-            if table is None:
-                (folder / source.name).symlink_to(source)
-                continue
-            names = list(table[0])
-            (folder / source.name).write_text("\n".join([",".join(names), *(",".join(r[n] for n in names) for r in table)]) + "\n")
+        tables = {self.motion_name: motion, "sightings.csv": sightings}
+        replays.copy_changed(self.folder, folder, {})
+        for name, table in tables.items():
+            if table is not None:
+                (folder / name).unlink()
+                replays.write_rows(folder / name, table)
 
 
 def poses(run):
     return {int(r["t_ns"]): (float(r["x_m"]), float(r["y_m"]), 2 * math.atan2(float(r["qz"]), float(r["qw"])))
-            for r in defaults.rows(run / "trajectory.csv")}
+            for r in replays.rows(run / "trajectory.csv")}
 
 
 def is_right(a, b):
@@ -179,26 +177,20 @@ def judge(options, name, scratch):
 
 def printed(row):
     def value(key, digits):
-        return defaults.printed(row.get(key), digits)
+        return replays.printed(row.get(key), digits)
     verdict = "" if "good" not in row else "good" if row["good"] else "MISSED"
     return (f"{row['case']:38} {value('position_rmse_m', 3):>8} {value('nees_inside_95', 2):>5} {value('landmark_rmse_own_fit_m', 3):>8} "
             f"{row['landmarks_moved']:>5} {value('confidently_wrong', 3):>6} {value('first_s', 1):>8} {value('right', 2):>6} {value('ratio', 2):>6}  {verdict}")
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name in ("bin_dir", "source_dir", "data_dir"):
-        parser.add_argument(name, type=lambda p: pathlib.Path(p).resolve())
-    parser.add_argument("--only", default="", help="recordings whose name contains one of these words")
+    parser = replays.parser(__doc__, "recordings whose name contains one of these words")
     parser.add_argument("--seed", type=int, default=1, help="of the gaps, the slips' directions and the misread identities")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a key of the configuration")
-    parser.add_argument("--json", action="store_true", help="one object a row instead of the table")
     options = parser.parse_args()
     if not options.data_dir.is_dir():
         print(f"{options.data_dir}: no recordings here")
         return 77
-    words = [w for w in options.only.split(",") if w]
-    names = [n for n in RECORDINGS if (options.data_dir / n).is_dir() and (not words or any(w in n for w in words))]
+    names = [n for n in RECORDINGS if (options.data_dir / n).is_dir() and replays.is_chosen(options, n)]
     if not options.json:
         print(f"{'recording and disturbance':38} {'se2 m':>8} {'NEES':>5} {'map m':>8} {'moved':>5} {'wrong':>6} {'found s':>8} {'right':>6} {'map x':>6}")
     results = []
