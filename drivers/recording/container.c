@@ -106,7 +106,10 @@ wm_status container_read(const container *self, const payload *picture, uint8_t 
   uint64_t size;
   wm_status status = picture_path(self, picture->frame, path, err);
   if (status == WM_OK) status = open_file(path, &fd, &size, err);
-  if (status != WM_OK) return wm_fail_in(err, "frame %" PRIu64, picture->frame), WM_BAD_DATA;
+  if (status != WM_OK) {
+    (void)wm_fail_in(err, "frame %" PRIu64, picture->frame);
+    return WM_BAD_DATA;
+  }
   status = read_at(fd, path, 0, out, (size_t)picture->length, err);
   close(fd);
   return status == WM_END ? wm_fail(err, WM_BAD_DATA, "%s: became shorter", path) : status;

@@ -43,6 +43,14 @@ static void take_lines(live *run) {
     live_say(run, "%s", line);
 }
 
+static void say_lost_lines(live *run) {
+  const uint64_t lost = wm_ring_dropped(&run->publish.lines), fresh = lost - run->disk.said_lines_lost;
+  run->disk.said_lines_lost = lost;
+  if (fresh > 0)
+    live_say(run, "%llu lines are missing here: the disk or the terminal was blocked (lines_lost in health)",
+             (unsigned long long)fresh);
+}
+
 static void say_slow(live *run) {
   if (run->disk.said_slow || wm_ring_dropped(&run->estimator.to_disk) == 0) return;
   run->disk.said_slow = 1;
@@ -92,6 +100,7 @@ void *disk_thread(void *argument) {
     last = atomic_load_explicit(&run->publish.done, memory_order_acquire);  // which ends after the estimator
     take_outputs(run);
     take_lines(run);
+    say_lost_lines(run);
     say_slow(run);
     do_what_is_due(run, wm_monotonic_ns());
   }

@@ -69,8 +69,8 @@ static void publish(lcm_sink *self, const char *what, size_t length) {
 
 // ── messages ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-void lcm_sink_pose(lcm_sink *self, const wm_published *published) {
-  publish(self, "POSE", wm_lcm_pose(published, self->bytes, sizeof self->bytes));
+void lcm_sink_pose(lcm_sink *self, const wm_published *published, wm_time_ns sent_ns) {
+  publish(self, "POSE", wm_lcm_pose(published, sent_ns, self->bytes, sizeof self->bytes));
 }
 
 void lcm_sink_innovation(lcm_sink *self, const wm_innovation *innovation) {

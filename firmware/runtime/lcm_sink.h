@@ -31,7 +31,7 @@ typedef struct lcm_sink {
 // `url` "" is LCM_DEFAULT_URL or LCM's own default. `lent` may be NULL.
 void lcm_sink_open(lcm_sink *self, int is_on, const char *url, const char *prefix, const wm_assembly *assembly,
                    wm_finding_fn say, void *say_context, lcm_t *lent);
-void lcm_sink_pose(lcm_sink *self, const wm_published *published);
+void lcm_sink_pose(lcm_sink *self, const wm_published *published, wm_time_ns sent_ns);
 void lcm_sink_innovation(lcm_sink *self, const wm_innovation *innovation);
 void lcm_sink_health(lcm_sink *self, const wm_health *health);
 // Sightings are collected and sent when the next stamp or sensor comes; other events are not sent.

@@ -80,6 +80,7 @@ typedef struct live_disk {
   black_box box;
   wm_time_ns next_flush_ns, next_save_ns;
   int said_unwritable, said_slow, said_unsaved;
+  uint64_t said_lines_lost;
   // The last pose that was worth keeping, and whether it is on the disk.
   wm_estimate last_pose;
   int keeps_pose, has_last_pose;
@@ -124,6 +125,8 @@ _Static_assert(sizeof(wm_innovation) <= sizeof(wm_published) && WM_EVENT_SMALL_B
 wm_output estimator_output(live_estimator *self);
 // Records that found no room in either ring.
 uint64_t outputs_lost(const live_estimator *self);
+// The publish thread's own part of a health record.
+void live_publish_health(const live_publish *self, wm_health *health);
 
 void *source_thread(void *live_source_pointer);
 void *estimator_thread(void *live_pointer);

@@ -14,7 +14,7 @@
 void live_say_later(void *context, const char *line) {
   live *run = context;
   char *slot = wm_ring_reserve(&run->publish.lines);
-  if (!slot) return;  // 16 lines wait for a disk that is blocked
+  if (!slot) return;  // 16 lines wait for a disk that is blocked; the ring counts those that find no room
   (void)snprintf(slot, LINE_BYTES, "%s", line);
   wm_ring_commit(&run->publish.lines);
 }
@@ -36,8 +36,9 @@ static void send_pose(live *run, const wm_published *record) {
   live_publish *self = &run->publish;
   wm_published published = *record;
   tell_utc(run, &published);
-  wm_histogram_add(&self->send_ns, run_now(&run->clock) - published.sent_ns);
-  lcm_sink_pose(&self->lcm, &published);
+  const wm_time_ns sent_ns = run_now(&run->clock);
+  wm_histogram_add(&self->send_ns, sent_ns - published.sent_ns);
+  lcm_sink_pose(&self->lcm, &published, sent_ns);
   self->last_published = published.now;
   self->has_published = 1;
   notify_pose(&self->notify);
@@ -78,6 +79,11 @@ static void add_source_counts(live *run, wm_health *health) {
     for (int k = 0; k < WM_LOOK_COUNT; k++) to->looks[k] = atomic_load_explicit(&from->looks[k], memory_order_relaxed);
     to->device = (uint8_t)atomic_load_explicit(&from->device, memory_order_relaxed);
   }
+}
+
+void live_publish_health(const live_publish *self, wm_health *health) {
+  health->send_p99_ns = wm_histogram_quantile(&self->send_ns, 0.99);
+  health->lines_lost = wm_ring_dropped(&self->lines);
 }
 
 // Sources that fell silent, motion sensors that failed, and their return: once each.
@@ -124,6 +130,7 @@ static void take_healths(live *run) {
        wm_ring_pop(&run->estimator.healths)) {
     wm_health health = record->health;
     add_source_counts(run, &health);
+    live_publish_health(self, &health);
     lcm_sink_health(&self->lcm, &health);
     char status[NOTIFY_STATUS_BYTES];
     describe(&health, status);

@@ -300,6 +300,7 @@ static void fill_report(live *self, wm_live_report *report) {
   run->health.loops = e->loops;
   run->health.deadlines_missed = e->deadlines_missed;
   run->health.outputs_lost = outputs_lost(e);
+  live_publish_health(&self->publish, &run->health);
   run->poses = e->pipeline.fuser.poses;
   run->events = e->pipeline.fuser.events;
   run->recorded_s = wm_seconds_between(self->clock.run_ns, end_ns);

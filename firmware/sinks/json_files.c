@@ -45,7 +45,7 @@ static void time_or_null(FILE *f, wm_time_ns t_ns) {
 static FILE *open_json(const char *dir, const char *name, char *path, size_t capacity, wm_error *err) {
   (void)snprintf(path, capacity, "%s/%s", dir, name);
   FILE *f = fopen(path, "we");
-  if (!f) wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(errno));
+  if (!f) (void)wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(errno));
   return f;
 }
 
@@ -182,6 +182,8 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
   number(f, h->reckoning_left_m);
   (void)fputs(",\n  \"reckoning_left_s\": ", f);
   number(f, h->reckoning_left_s);
+  (void)fprintf(f, ",\n  \"send_p99_ms\": %.6g,\n  \"lines_lost\": %" PRIu64, (double)h->send_p99_ns * 1e-6,
+                h->lines_lost);
   (void)fputs(",\n  \"fused_until_ns\": ", f);
   time_or_null(f, h->fused_until_ns);
   (void)fprintf(f,

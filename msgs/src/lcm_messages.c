@@ -31,11 +31,12 @@ static void put_name(uint8_t *out, size_t capacity, const char *name) {
   memcpy(out, name, length);
 }
 
-size_t wm_lcm_pose(const wm_published *p, void *out, size_t capacity) {
+size_t wm_lcm_pose(const wm_published *p, wm_time_ns sent_ns, void *out, size_t capacity) {
   const wm_estimate *e = &p->now;
   waymark_pose_t m = {
       .t_ns = e->t_ns,
-      .sent_ns = p->sent_ns,
+      .sent_ns = sent_ns,
+      .made_ns = p->sent_ns,
       .fused_until_ns = p->fused_until_ns,
       .utc_offset_ns = p->utc_offset_ns,
       .utc_uncertainty_ns = p->utc_uncertainty_ns,
@@ -104,6 +105,8 @@ size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {
       .published = (int64_t)h->published,
       .reckoning_left_m = h->reckoning_left_m,
       .reckoning_left_s = h->reckoning_left_s,
+      .send_p99_ns = h->send_p99_ns,
+      .lines_lost = (int64_t)h->lines_lost,
   };
   m.source_count = (int32_t)(h->source_count < WM_HEALTH_SOURCES_MAX ? h->source_count : WM_HEALTH_SOURCES_MAX);
   for (int32_t i = 0; i < m.source_count; i++) put_source(&m.sources[i], &h->sources[i]);

@@ -23,7 +23,7 @@ static void take_name(char *out, size_t capacity, const uint8_t *name, size_t le
 const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *out) {
   waymark_pose_t m;
   if (waymark_pose_t_decode(message, 0, room(length), &m) < 0) return "is no pose_t of this version";
-  *out = (wm_published){.sent_ns = m.sent_ns,
+  *out = (wm_published){.sent_ns = m.made_ns,
                         .fused_until_ns = m.fused_until_ns,
                         .pose_odom_base = {m.odom_position_m[0], m.odom_position_m[1], m.odom_heading_rad},
                         .jumps = (uint32_t)m.jumps,
@@ -93,6 +93,8 @@ const char *wm_lcm_read_health(const void *message, size_t length, wm_health *ou
   out->published = (uint64_t)m.published;
   out->reckoning_left_m = m.reckoning_left_m;
   out->reckoning_left_s = m.reckoning_left_s;
+  out->send_p99_ns = m.send_p99_ns;
+  out->lines_lost = (uint64_t)m.lines_lost;
   for (int32_t i = 0; i < m.source_count && i < WM_HEALTH_SOURCES_MAX; i++)
     take_source(&out->sources[out->source_count++], &m.sources[i]);
   for (int32_t i = 0; i < m.calibration_count && i < WM_HEALTH_CALIBRATION_MAX; i++) {

@@ -133,9 +133,9 @@ void measure(const char *title, int count, int seen, bool known, double limit_us
     wm_innovation records[8];
     size_t n;
     const int64_t begin = bench::now_ns();
-    ekf->predict(state, &twist);
+    (void)ekf->predict(state, &twist);
     for (const wm_event &e : picture) {
-      ekf->correct(state, &e, records, 8, &n);
+      (void)ekf->correct(state, &e, records, 8, &n);
       (records[0].verdict == WM_FUSED ? fused : rejected)++;
     }
     const int64_t end = bench::now_ns();

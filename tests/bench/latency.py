@@ -109,13 +109,13 @@ def drive(work, recording, config, observed, loaded):
     rows = {"stamp to arrival (the recording's)": [], "arrival to a pose that has it": [], "stamp to that pose on LCM": []}
     at = 0
     for t_ns, arrival_ns in data:
-        while at < len(poses) and (poses[at][1].fused_until_ns < t_ns or poses[at][1].sent_ns < arrival_ns):
+        while at < len(poses) and (poses[at][1].fused_until_ns < t_ns or poses[at][1].made_ns < arrival_ns):
             at += 1
         if at == len(poses):
             break
         heard_utc_ns, pose = poses[at]
         rows["stamp to arrival (the recording's)"].append((arrival_ns - t_ns) * 1e-6)
-        rows["arrival to a pose that has it"].append((pose.sent_ns - arrival_ns) * 1e-6)
+        rows["arrival to a pose that has it"].append((pose.made_ns - arrival_ns) * 1e-6)
         rows["stamp to that pose on LCM"].append((heard_utc_ns - pose.utc_offset_ns - t_ns) * 1e-6)
     stages = {name: quantiles(values) for name, values in rows.items()}
     timing = json.loads((out / "timing.json").read_text())
@@ -126,7 +126,8 @@ def drive(work, recording, config, observed, loaded):
             stages[name] = of_stage(timing[key])
         if key == "correct":
             stages["the same corrections again, in a replay"] = corrections_again(out, recording)
-    stages["pose's time to sending"] = of_stage(timing["age"])
+    stages["pose's time to its making"] = of_stage(timing["age"])
+    stages["pose made to its message handed to LCM"] = quantiles((p.sent_ns - p.made_ns) * 1e-6 for _, p in poses)
     stages["sending to another process, over LCM"] = quantiles((utc_ns - p.utc_offset_ns - p.t_ns) * 1e-6 for utc_ns, p in poses)
     counted = {}
     for thread in json.loads((work / "cyclictest.json").read_text())["thread"].values():

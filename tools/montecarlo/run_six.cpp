@@ -166,7 +166,7 @@ wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const 
     if (!wm_event_is_motion(&e)) {
       wm_innovation innovations[WM_INNOVATIONS_PER_EVENT_MAX];
       size_t count = 0;
-      ops.correct(state, &e, innovations, WM_INNOVATIONS_PER_EVENT_MAX, &count);
+      (void)ops.correct(state, &e, innovations, WM_INNOVATIONS_PER_EVENT_MAX, &count);
       if (count > 0) (innovations[0].verdict == WM_FUSED ? out.fused : out.rejected)++;
       continue;
     }
@@ -198,7 +198,7 @@ wm_status run_one(const sim::Scenario &scenario, const wm_config &config, const 
         run.position_max_m = HUGE_VAL;  // no pose although there should be one
       }
     }
-    ops.predict(state, &e);
+    (void)ops.predict(state, &e);
   }
   const double n = static_cast<double>(std::max<uint64_t>(judged, 1));
   run.position_rms_m = std::isinf(run.position_max_m) ? HUGE_VAL : std::sqrt(run.position_rms_m / n);

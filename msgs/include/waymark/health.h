@@ -74,6 +74,8 @@ typedef struct wm_health {
   uint64_t published;
   // Remaining dead reckoning until the pose is too uncertain: infinite while the robot stands, NaN without a pose.
   double reckoning_left_m, reckoning_left_s;
+  wm_time_ns send_p99_ns;  // from a pose made to its message handed to LCM, 99 of 100
+  uint64_t lines_lost;     // lines of text that a blocked disk or terminal had no room for
 } wm_health;
 
 // The counter of this kind, or a null pointer where the estimator has none.

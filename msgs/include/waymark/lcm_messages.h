@@ -21,7 +21,8 @@ extern "C" {
 #define WM_LCM_OBSERVATIONS_MAX 64
 #define WM_LCM_LANDMARKS_MAX 256
 
-size_t wm_lcm_pose(const wm_published *published, void *out, size_t capacity);
+// `sent_ns`: now, on the clock of published->sent_ns, which is when the pose was made.
+size_t wm_lcm_pose(const wm_published *published, wm_time_ns sent_ns, void *out, size_t capacity);
 size_t wm_lcm_health(const wm_health *health, void *out, size_t capacity);
 // Messages to the robot: NULL and *out (t_ns 0: now; arrival unset), or a text with the fault. Constant cost.
 const char *wm_lcm_read_set_pose(const void *message, size_t length, wm_event *out);

@@ -28,7 +28,7 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
 
 void setUp(void) {
   said[0] = '\0';
-  tiny_init(&state, NULL, NULL);
+  (void)tiny_init(&state, NULL, NULL);
   wm_fuser_init(&fuser, &kTiny, &state, wm_driving_choose(WM_EVENT_BIT(WM_EVENT_TWIST2), 0), (wm_output){put, NULL});
 }
 void tearDown(void) {}

@@ -100,11 +100,26 @@ static void a_blocked_disk_holds_no_message_up(void) {
   TEST_ASSERT_EQUAL_UINT64(10 - SLOTS, estimator->events_lost);
 }
 
+// Lines of text of the publish thread wait for the same disk.
+static void lines_that_find_no_room_are_counted_in_health(void) {
+  static live run;
+  static wm_health health;
+  void *lines = malloc(wm_ring_bytes(SLOTS, 400));
+  wm_ring_init(&run.publish.lines, lines, SLOTS, 400);
+  for (int i = 0; i < 10; i++) live_say_later(&run, "camera: silent");
+  wm_histogram_add(&run.publish.send_ns, 3 * WM_NS_PER_MS);
+  live_publish_health(&run.publish, &health);
+  TEST_ASSERT_EQUAL_UINT64(10 - SLOTS, health.lines_lost);
+  TEST_ASSERT_INT64_WITHIN(WM_NS_PER_MS, 3 * WM_NS_PER_MS, health.send_p99_ns);
+  free(lines);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(events_that_found_no_room_are_marked_before_the_next_one);
   RUN_TEST(a_mark_without_its_event_is_followed_by_another);
   RUN_TEST(poses_that_find_no_room_are_counted);
   RUN_TEST(a_blocked_disk_holds_no_message_up);
+  RUN_TEST(lines_that_find_no_room_are_counted_in_health);
   return UNITY_END();
 }

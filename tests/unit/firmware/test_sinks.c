@@ -65,7 +65,7 @@ static void messages_arrive_over_memq(void) {
 
   wm_published p = {.sent_ns = 12};
   p.now.t_ns = 11;
-  lcm_sink_pose(&sink, &p);
+  lcm_sink_pose(&sink, &p, 13);
   wm_innovation i = {.t_ns = 3};
   lcm_sink_innovation(&sink, &i);
   static wm_health h;
@@ -104,7 +104,7 @@ static void no_way_out_is_said_once_and_tried_again(void) {
   TEST_ASSERT_EQUAL(1, lines);
   TEST_ASSERT_NOT_NULL(strstr(said, "Localizing goes on"));
   wm_published p = {.sent_ns = 1};
-  lcm_sink_pose(&sink, &p);
+  lcm_sink_pose(&sink, &p, 13);
   TEST_ASSERT_EQUAL_UINT64(1, sink.not_sent);
   TEST_ASSERT_EQUAL(1, lines);
   lcm_sink_close(&sink);

@@ -73,7 +73,7 @@ static void a_message_is_read_as_it_was_sent(void) {
   pose.now.covariance[7] = 0.5;
   pose.now.v_mps[0] = 1.5;
   pose.status_flags = WM_PUB_JUMPED;
-  length = wm_lcm_pose(&pose, bytes, sizeof bytes);
+  length = wm_lcm_pose(&pose, 0, bytes, sizeof bytes);
   TEST_ASSERT_NULL(wm_lcm_read_pose(bytes, length, &read_pose));
   TEST_ASSERT_EQUAL_MEMORY(&pose, &read_pose, sizeof pose);
   TEST_ASSERT_NOT_NULL(wm_lcm_read_pose("rubbish", 7, &read_pose));
@@ -82,7 +82,7 @@ static void a_message_is_read_as_it_was_sent(void) {
 
 static void the_view_has_pose_sources_and_what_is_left(void) {
   pose.now.pose_map_base = (wm_pose3){{12.5, -3, 0}, {0, 0, sqrt(0.5), sqrt(0.5)}};
-  watch_pose(&seen, bytes, wm_lcm_pose(&pose, bytes, sizeof bytes), 10 * WM_NS_PER_S);
+  watch_pose(&seen, bytes, wm_lcm_pose(&pose, 0, bytes, sizeof bytes), 10 * WM_NS_PER_S);
   health.lost_probability = 0.25;
   health.counter_count = 1;
   health.counters[0] = (wm_counter){WM_COUNTER_ALIASED_POSES, -1, 3};
@@ -155,7 +155,7 @@ static void the_page_is_told_what_is_seen(void) {
   (void)state_of_health();
   pose.now.pose_map_base.q_xyzw[3] = 1;
   pose.now.pose_map_base.p_m[0] = 12.5;
-  watch_pose(&seen, bytes, wm_lcm_pose(&pose, bytes, sizeof bytes), 10 * WM_NS_PER_S);
+  watch_pose(&seen, bytes, wm_lcm_pose(&pose, 0, bytes, sizeof bytes), 10 * WM_NS_PER_S);
   TEST_ASSERT_GREATER_THAN(100, web_answer(&page, &seen, 10 * WM_NS_PER_S, "/state.json", answer, sizeof answer));
   const char *const said[] = {"\"state\": \"tracking\"", "\"x_m\": 12.5",   "\"left_m\": 41.6",
                               "\"left_s\": null",        "\"rejected\": 7", "\"name\": \"ab\""};

@@ -19,7 +19,7 @@ void tearDown(void) {}
 static uint8_t bytes[WM_LCM_MESSAGE_MAX];
 
 static void a_pose_arrives_whole(void) {
-  wm_published p = {.sent_ns = 12,
+  wm_published p = {.sent_ns = 11,
                     .fused_until_ns = 7,
                     .jumps = 3,
                     .last_jump_m = 0.5,
@@ -34,7 +34,7 @@ static void a_pose_arrives_whole(void) {
   p.now.lost_probability = 0.25;
   for (int i = 0; i < 36; i++) p.now.covariance[i] = i;
   p.now.pose_map_base.q_xyzw[3] = 1;
-  size_t length = wm_lcm_pose(&p, bytes, sizeof bytes);
+  size_t length = wm_lcm_pose(&p, 12, bytes, sizeof bytes);
   waymark_pose_t m;
   TEST_ASSERT_EQUAL(length, waymark_pose_t_decode(bytes, 0, (int)length, &m));
   TEST_ASSERT_EQUAL_INT64(INT64_C(1234567890123456789), m.t_ns);
@@ -45,12 +45,14 @@ static void a_pose_arrives_whole(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0.25, m.lost_probability);
   TEST_ASSERT_EQUAL_DOUBLE(3, m.odom_heading_rad);
   TEST_ASSERT_EQUAL_INT64(-1, m.utc_uncertainty_ns);
-  TEST_ASSERT_EQUAL(0, wm_lcm_pose(&p, bytes, length - 1));
+  TEST_ASSERT_EQUAL_INT64(11, m.made_ns);
+  TEST_ASSERT_EQUAL_INT64(12, m.sent_ns);
+  TEST_ASSERT_EQUAL(0, wm_lcm_pose(&p, 12, bytes, length - 1));
 }
 
 static void health_arrives_with_its_sources(void) {
   static wm_health h;
-  h = (wm_health){.t_ns = 1, .source_count = 2, .calibration_count = 1, .loops = 77};
+  h = (wm_health){.t_ns = 1, .source_count = 2, .calibration_count = 1, .loops = 77, .send_p99_ns = 8, .lines_lost = 9};
   strcpy(h.sources[1].name, "sightings:laser");
   h.sources[1].rejected[WM_REJECTED_GATE] = 5;
   h.sources[1].stale = 1;
@@ -73,6 +75,8 @@ static void health_arrives_with_its_sources(void) {
   TEST_ASSERT_EQUAL(WAYMARK_COUNTER_T_LANDMARKS_MOVED, m.counters[0].kind);
   TEST_ASSERT_EQUAL(7, m.counters[0].landmark_id);
   TEST_ASSERT_EQUAL_INT64(3, m.counters[0].count);
+  TEST_ASSERT_EQUAL_INT64(8, m.send_p99_ns);
+  TEST_ASSERT_EQUAL_INT64(9, m.lines_lost);
 }
 
 static void the_largest_health_fits(void) {
