@@ -143,7 +143,7 @@ static wm_status bind_selectors(maker *m, const dbc_signal *s, const char *name,
   int count = wm_dbc_selectors(m->dbc, s, above);
   if (count < 0)
     return refuse(m,
-                  "%s (%s:%d) is multiplexed, but the file does not say by which signal: one M in the message, or "
+                  "%s (%s:%d) is multiplexed, but the file does not state by which signal: one M in the message, or "
                   "SG_MUL_VAL_ lines without a ring, are needed",
                   name, m->dbc->path, s->line);
   wm_can_decoder *self = m->self;
@@ -206,7 +206,8 @@ static wm_status bind_signal(maker *m, const char *name) {
     return refuse(m, "%s (%s:%d) needs %u bytes, but %s has %u; one of the two is wrong in the DBC", name, m->dbc->path,
                   s->line, signal_bytes(&s->bits), m->binding->message, m->message->length);
   if (s->factor == 0.0)
-    return refuse(m, "%s (%s:%d) has the factor 0 in the DBC, so it says nothing", name, m->dbc->path, s->line);
+    return refuse(m, "%s (%s:%d) has the factor 0 in the DBC, so its value is always the same", name, m->dbc->path,
+                  s->line);
   int is_float = s->bits.kind == SIGNAL_FLOAT || s->bits.kind == SIGNAL_DOUBLE;
   if (is_float && (is_ticks(m->binding) || is_gear(m->binding)))
     return refuse(m, "%s is a floating-point number; an integer signal is needed", name);

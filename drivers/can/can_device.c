@@ -100,7 +100,7 @@ static void count_queue(can_device *self, const can_received *received) {
   self->queue_dropped = received->queue_dropped;
 }
 
-// Stamps and counts it; what the controller says of itself is taken. *arrival_ns: when it was read.
+// Stamps and counts it; the controller's own state is taken. *arrival_ns: when it was read.
 static void look_at_frame(can_device *self, can_received *received, wm_time_ns *when_ns) {
   wm_source_counts *counts = &self->base.counts;
   wm_can_frame *frame = &received->frame;
@@ -113,7 +113,7 @@ static void look_at_frame(can_device *self, can_received *received, wm_time_ns *
   if (frame->is_error) {
     can_error_take(frame, self->interface, counts);
   } else if (counts->device != WM_DEVICE_PASSIVE) {
-    set_state(self, WM_DEVICE_WORKS, "speaks again");
+    set_state(self, WM_DEVICE_WORKS, "receives again");
   }
 }
 

@@ -24,7 +24,7 @@ typedef struct dbc_signal {
   int line;
   signal_bits bits;
   double factor, offset, min, max;
-  uint8_t is_selector;  // M: its value says which others are there
+  uint8_t is_selector;  // M: its value chooses the other signals
   uint8_t is_selected;  // mN: there only for some values of `selector`
   uint64_t selected_by;
   uint32_t first_range, range_count;  // of SG_MUL_VAL_; without any, `selected_by` alone

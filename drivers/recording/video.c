@@ -381,7 +381,7 @@ static wm_status size_of_first(wm_video *self, wm_error *err) {
   self->next.head.width_px = self->width_px;
   self->next.head.height_px = self->height_px;
   if (verdict == JPEG_GOOD) return WM_OK;
-  return wm_fail(err, WM_BAD_DATA, "%s: the first picture can't be read, and nothing else says how large they are",
+  return wm_fail(err, WM_BAD_DATA, "%s: the first picture can't be read, and nothing else gives the pictures' size",
                  self->file.path);
 }
 
@@ -406,7 +406,7 @@ static wm_status open_all(wm_video *self, const char *dir, const wm_camera *came
     return wm_fail(err, WM_NOT_FOUND, "%s: the path is longer than %d bytes", dir, WM_PATH_MAX - 1);
   status = csv_open(&self->csv, path, &kFormat, warn->fn, warn->context, err);
   if (status == WM_NOT_FOUND)
-    return wm_fail(err, WM_NOT_FOUND, "%s: is not there; it has to say when each picture of %s was taken", path,
+    return wm_fail(err, WM_NOT_FOUND, "%s: is not there; it holds the stamp of each picture of %s", path,
                    self->file.path);
   if (status == WM_OK) status = jpeg_open(&self->jpeg, err);
   if (status != WM_OK) return status;

@@ -106,7 +106,8 @@ static const wm_param kParams[] = {
           "Start sigma of the road wheel's zero, rad, for speed and steering." BY_KIND "where steering drives."),
     STATE(WM_LAG, "lag", "_s", -0.2, 0,
           "Start sigma of the motion's delay behind its samples, s." BY_KIND
-          "where twists are commands: a measured motion's delay cannot be told from the observations' time offsets."),
+          "where twists are commands: a measured motion's delay and the observations' time offsets are not observable "
+          "apart."),
     STATE(WM_TURN_SLOWDOWN, "turn_slowdown", "_mps", -0.25, 0,
           "Start sigma of the loss of a commanded speed at a turn rate of 1 rad/s, m/s; it grows with the square of "
           "the turn rate (drives that limit or round their wheels' speeds)." BY_KIND "where twists are commands."),

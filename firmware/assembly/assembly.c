@@ -17,8 +17,8 @@ static void leave_out(wm_assembly *self, const char *name, const char *why) {
 static const char *reason_to_leave_out(const wm_config *config, const wm_source *source,
                                        const wm_source_config *wanted) {
   uint32_t takes = config->estimator->takes | WM_MOTION_EVENTS;
-  if (!wanted->use) return "the configuration says `use: false`";
-  if (!(source->kinds & takes)) return "the estimator doesn't take what it says";
+  if (!wanted->use) return "`use: false` in the configuration";
+  if (!(source->kinds & takes)) return "the estimator doesn't take its data";
   return NULL;
 }
 
@@ -55,7 +55,7 @@ static wm_status check_estimator(const wm_assembly *self, wm_error *err) {
   const char *why = NULL;
   if (config->estimator->state_bytes(config->estimator_params, &self->setup, &why) == 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s: estimator '%s' can't work with '%s': %s", config->path,
-                   config->estimator->name, self->recording, why ? why : "it doesn't say why");
+                   config->estimator->name, self->recording, why ? why : "no reason given");
   return WM_OK;
 }
 
@@ -77,7 +77,7 @@ wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err) {
     int32_t model;
     if (strcmp(row->key, "model") != 0) continue;
     memcpy(&model, (const char *)self->config->motion + row->offset, sizeof model);
-    if (model != WM_MOTION_AUTO) return WM_OK;  // check_motion() tells what it lacks
+    if (model != WM_MOTION_AUTO) return WM_OK;  // check_motion() reports missing data
     self->own_motion = malloc(table->bytes);
     if (!self->own_motion) return wm_fail(err, WM_IO, "no memory for the parameters of the motion");
     memcpy(self->own_motion, self->config->motion, table->bytes);
@@ -99,7 +99,7 @@ static wm_status add_vision(wm_assembly *self, wm_recording *recording, wm_error
   const wm_config *config = self->config;
   for (size_t i = 0; i < config->vision_count; i++)
     if (!(config->vision[i].detector->gives & config->estimator->takes))
-      leave_out(self, config->vision[i].detector->name, "the estimator doesn't take what it says");
+      leave_out(self, config->vision[i].detector->name, "the estimator doesn't take its data");
   wm_status status = wm_vision_open(config, recording, NULL, NULL, &self->vision, err);
   for (size_t i = 0; status == WM_OK && i < wm_vision_count(self->vision); i++) {
     if (self->source_count == WM_SOURCES_MAX)

@@ -138,7 +138,7 @@ static void sensor(const wm_sensor *s, findings *out) {
          s->bearing_sigma_rad / kDegree);
   if (s->range_sigma_m > 20)
     find(out, FINDING_BAD, ABOUT, "metres are meant: was it measured in mm or cm?",
-         "sensors.%s.range_sigma_m: %g m says nothing", s->name, s->range_sigma_m);
+         "sensors.%s.range_sigma_m: %g m is too large to be of use", s->name, s->range_sigma_m);
   if (s->max_range_m < 0.2)
     find(out, FINDING_BAD, ABOUT, "metres are meant; leave it out where there is no limit",
          "sensors.%s.max_range_m: beyond %g m nothing would be taken", s->name, s->max_range_m);

@@ -25,7 +25,7 @@ static void messages(const wm_config *config, findings *out) {
   const char *ttl = strstr(url, "ttl=");
   if (!known)
     find(out, FINDING_BAD, "publish", "udpm://239.255.76.67:7667?ttl=0 keeps messages on this computer",
-         "publish.lcm_url: '%s' is no way that LCM knows (udpm, tcpq, memq, file)", url);
+         "publish.lcm_url: '%s' is no provider of LCM (udpm, tcpq, memq, file)", url);
   else if (ttl && strtol(ttl + 4, NULL, 10) > 0)
     find(out, FINDING_NOTE, "publish", "ttl=0 keeps messages on this computer",
          "publish.lcm_url: poses go out into the network (%s)", url);

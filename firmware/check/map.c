@@ -62,7 +62,7 @@ static void start_on_map(const wm_raster *map, const wm_start *start, findings *
          map->height_px * map->resolution_m);
   else if (map->drivable && !map->drivable[(size_t)row * map->width_px + column])
     find(out, FINDING_BAD, "start", "mend the start, the map's origin, or layers.drivable (white is drivable)",
-         "(%.2f, %.2f) is where the map says that nobody can drive", start->p_m[0], start->p_m[1]);
+         "(%.2f, %.2f) is not free space in the map", start->p_m[0], start->p_m[1]);
 }
 
 void check_map(const wm_assembly *assembly, findings *out) {

@@ -10,7 +10,7 @@
 #define FASTEST_MPS 70.0
 #define FASTEST_TURN_RADPS 6.0
 #define PAIRS_MIN 100
-#define TURN_RMS_MIN 0.02  // rad/s: a drive straight ahead says nothing
+#define TURN_RMS_MIN 0.02  // rad/s: a drive straight ahead has no information
 
 void motion_data_init(motion_data *self, const wm_wheels *wheels) {
   memset(self, 0, sizeof *self);
@@ -49,7 +49,7 @@ static double wheel_speed(const motion_data *self, int is_right) {
   return isnan(rear) ? self->last[is_right ? WM_Q_WHEEL_SPEED_FRONT_RIGHT : WM_Q_WHEEL_SPEED_FRONT_LEFT] : rear;
 }
 
-// The way that the gear says, where there is one: speeds of wheels may have no sign.
+// The direction by the gear, where there is one: speeds of wheels may have no sign.
 static double direction(const motion_data *self) { return self->last[WM_Q_GEAR] < 0 ? -1 : 1; }
 
 static void take_turn(motion_data *self) {
@@ -85,7 +85,7 @@ void motion_data_take(motion_data *self, const wm_event *event) {
           (fabs(wheel_speed(self, 0)) + fabs(wheel_speed(self, 1))) / 2);
 }
 
-// ── what it says ────────────────────────────────────────────────────────────────────────────────────────────────────
+// ── findings ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static void ranges(const motion_data *self, findings *out) {
   static const struct {
@@ -122,13 +122,13 @@ static void turns(const agreement *a, const char *other, findings *out) {
   if (a->ab / sqrt(a->aa * a->bb) < -0.5)
     find(out, FINDING_BAD, ABOUT,
          "`scale: -1` at the one that is not positive to the left; or left and right are swapped",
-         "yaw_rate says left where %s says right (correlation %.2f)", other, a->ab / sqrt(a->aa * a->bb));
+         "yaw_rate turns left where %s turns right (correlation %.2f)", other, a->ab / sqrt(a->aa * a->bb));
 }
 
 void motion_data_judge(const motion_data *self, uint32_t bound, findings *out) {
   for (unsigned q = 0; q < WM_Q_COUNT; q++)
     if (((bound >> q) & 1u) && self->count[q] == 0)
-      find(out, FINDING_BAD, ABOUT, "look at message and bus in can-signals.yaml, and at what candump hears",
+      find(out, FINDING_BAD, ABOUT, "look at message and bus in can-signals.yaml, and at what candump receives",
            "%s is bound, but no frame with a value of it came", wm_quantity_name(q));
   ranges(self, out);
   turns(&self->turn_wheels, "the difference of the wheels' speeds", out);
@@ -137,6 +137,7 @@ void motion_data_judge(const motion_data *self, uint32_t bound, findings *out) {
   const agreement *s = &self->speed_wheels;
   double ratio = s->bb > 0 ? s->ab / s->bb : 1;
   if (s->count >= PAIRS_MIN && s->bb / (double)s->count > 0.01 && (ratio < 0.6 || ratio > 1.6))
-    find(out, FINDING_BAD, ABOUT, "one of them has another unit than it says (km/h is 3.6 times m/s): write `unit:`",
+    find(out, FINDING_BAD, ABOUT,
+         "one of them has another unit than its binding states (km/h is 3.6 times m/s): write `unit:`",
          "vehicle_speed is %.2f times the wheels' speeds", ratio);
 }

@@ -35,15 +35,15 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, fin
   if (c->first_problem[0])
     find(out, of_hundred(c->malformed, all) >= 5 ? FINDING_BAD : FINDING_NOTE, s->name,
          s->source->is_motion ? "the DBC and what is on the bus are not the same; or the file is damaged"
-                              : "the file is damaged, or its columns are others than it says",
+                              : "the file is damaged, or its columns differ from its first line",
          "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, c->malformed, of_hundred(c->malformed, all));
   if (of_hundred(c->lost, facts->events + c->lost) >= 1)
     find(out, FINDING_NOTE, s->name, "a bus or a recorder that is too slow: look at its load and at `waymark doctor`",
          "%" PRIu64 " of 100 are missing by the sender's count or stamps",
          of_hundred(c->lost, facts->events + c->lost));
   if (of_hundred(c->frozen, all) >= 1)
-    find(out, FINDING_NOTE, s->name, "the sender is stuck: its values are not believed while it is",
-         "%" PRIu64 " of 100 say the same as the one before, which they can't", of_hundred(c->frozen, all));
+    find(out, FINDING_NOTE, s->name, "the sender is stuck: its values are not used while it is",
+         "%" PRIu64 " of 100 equal the one before, which noise makes impossible", of_hundred(c->frozen, all));
   if (of_hundred(c->out_of_order, all) >= 1)
     find(out, FINDING_NOTE, s->name, "the recorder's clock was set, or two recordings were put together",
          "%" PRIu64 " of 100 are older than the one before", of_hundred(c->out_of_order, all));
@@ -52,7 +52,7 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, fin
 static void judge(const wm_assembly *assembly, const wm_assembled_source *s, const source_facts *facts, findings *out) {
   if (facts->events == 0) {
     const char *why = s->source->counts.first_problem;
-    find(out, FINDING_BAD, s->name, "record again, or leave it out (`use: false`)", "says nothing at all%s%s",
+    find(out, FINDING_BAD, s->name, "record again, or leave it out (`use: false`)", "holds no datum%s%s",
          why[0] ? ": " : "", why);
     return;
   }

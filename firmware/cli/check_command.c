@@ -106,7 +106,7 @@ static void check_sources(const wm_assembly *assembly, uint32_t bound, findings 
     const wm_assembled_source *s = &assembly->sources[i];
     source_facts facts;
     if (s->source->is_live) {
-      fact("source       %-20s a device (`waymark doctor` says whether it is there)\n", s->name);
+      fact("source       %-20s a device (`waymark doctor` finds out whether it is there)\n", s->name);
       continue;
     }
     check_source(assembly, s, bound, &facts, found);

@@ -11,7 +11,8 @@
 static const char kHelp[] =
     "usage: waymark record --config FILE --out RECORDING [options]\n"
     "\n"
-    "Writes what the robot's devices say into a recording: all CAN frames, cameras' pictures (MJPEG as it is, others "
+    "Writes the data of the robot's devices into a recording: all CAN frames, cameras' pictures (MJPEG as it is, "
+    "others "
     "as\n"
     "uncompressed grey), calibration, DBC and configuration. It is whole at every moment, also after a power cut. "
     "Ends\n"

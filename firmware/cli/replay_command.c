@@ -29,7 +29,7 @@ static const char kHelp[] =
     "  --frames-of LOG     only the pictures that a run fed from this recording saw, by its event log: what it lost\n"
     "                      is lost here, too, and its poses can be compared\n"
     "  --from S, --until S only this part of the recording, s from its first stamp\n"
-    "  --lost              begin without a start pose, whatever the recording says\n"
+    "  --lost              begin without a start pose, even if the recording has one\n"
     "  --reference         also reference.csv: all of the drive looked at as a whole (edges on a raster map; at a "
     "desk)\n"
     "\n"

@@ -116,7 +116,7 @@ static wm_status read_which(const wm_yaml_node *item, wm_camera_device_config *o
     return wm_yaml_fail(
         item, err,
         "device: is missing: a path (/dev/v4l/by-id/... stays the same when it is plugged in again), or "
-        "card or bus as `v4l2-ctl -D` says them, or libcamera: an identifier as `cam -l` says it");
+        "card or bus as `v4l2-ctl -D` prints them, or libcamera: an identifier as `cam -l` prints it");
   wm_yaml_node node = wm_yaml_get(item, "libcamera");
   if (is_v4l2 && out->libcamera[0])
     return wm_yaml_fail(&node, err, "device, card and bus are V4L2's; name the camera by them or by libcamera:");

@@ -36,7 +36,7 @@ const config_key kConfigKeys[] = {
      "its window shows (docs/landmarks.md)."},
     {"start.saved_pose", "path", "none",
      "File that keeps the robot's last pose, on devices: a run begins there, if it isn't older than start.max_age_s, "
-     "whatever `initial_pose` says."},
+     "whatever `initial_pose` is."},
     {"black_box.folder", "path", "none",
      "Folder, on devices, with the last seconds of what was fused, as event logs; kept there where the robot gets lost "
      "or a run died, the newest 20 times."},

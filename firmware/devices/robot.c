@@ -29,7 +29,7 @@ static wm_status check_cameras(const wm_config *config, const wm_recording *robo
       return wm_fail(err, WM_BAD_CONFIG, "%s:%d: devices.cameras[%zu].name: '%s' is no camera of the calibration",
                      config->path, devices->cameras[i].line, i, devices->cameras[i].name);
     if (wm_recording_rig(robot)->cameras[index].width_px == 0)
-      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: devices.cameras[%zu]: the calibration of '%s' says no image_size",
+      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: devices.cameras[%zu]: the calibration of '%s' has no image_size",
                      config->path, devices->cameras[i].line, i, devices->cameras[i].name);
   }
   if (devices->camera_count > 0 && config->vision_count == 0 && warn)

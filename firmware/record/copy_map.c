@@ -17,7 +17,7 @@
 #define PICTURES_MAX 3
 
 typedef struct picture {
-  char named[WM_PATH_MAX];  // as the YAML says it
+  char named[WM_PATH_MAX];  // as in the YAML
   char beside[WM_NAME_MAX + 8];
 } picture;
 

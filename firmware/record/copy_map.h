@@ -6,7 +6,8 @@
 #include "waymark/status.h"
 
 // `map_yaml` and the pictures that it names into OUT_DIR/map, which is made; there they lie side by side, and the YAML
-// names them so. A picture that isn't there is left out: who reads the map says so. WM_IO, WM_BAD_CONFIG. Allocates.
+// names them so. A picture that isn't there is left out: the reader of the map reports it. WM_IO, WM_BAD_CONFIG.
+// Allocates.
 wm_status copy_map(const char *map_yaml, const char *out_dir, wm_error *err);
 
 #endif

@@ -78,7 +78,7 @@ wm_status wm_feeds_open(const wm_assembly *assembly, wm_feed *feeds, wm_time_ns 
   }
   if (!recorded) *first_ns = now_ns;
   if (*first_ns == INT64_MAX)
-    return wm_fail(err, WM_BAD_DATA, "'%s' has nothing to say: none of its %zu sources holds a datum that can be used",
+    return wm_fail(err, WM_BAD_DATA, "'%s' is empty: none of its %zu sources holds a datum that can be used",
                    assembly->recording, assembly->source_count);
   for (size_t i = 0; i < assembly->source_count; i++) {
     feeds[i].from_ns = limit(*first_ns, assembly->sources[i].from_s, INT64_MIN);

@@ -96,10 +96,10 @@ static void about_map(speaker *to, const wm_health *health) {
     wm_counter_kind kind;
     const char *what;
   } kCounts[] = {
-      {WM_COUNTER_LANDMARKS_MOVED, "times a landmark was elsewhere than before; `waymark map survey RUN` says which"},
+      {WM_COUNTER_LANDMARKS_MOVED, "times a landmark was elsewhere than before; `waymark map survey RUN` lists them"},
       {WM_COUNTER_IDENTITIES_AMBIGUOUS,
        "sightings whose identity (or, of a line, its track's number) stood for two landmarks; `waymark map "
-       "survey RUN` says which"},
+       "survey RUN` lists them"},
       {WM_COUNTER_MAP_FULL, "times a new landmark found no room; raise slam.landmarks.capacity"}};
   for (size_t k = 0; k < sizeof kCounts / sizeof kCounts[0]; k++) {
     const wm_counter *counter = wm_health_counter(health, kCounts[k].kind);

@@ -64,7 +64,7 @@ static wm_status start(log_replay *self, const wm_replay_options *options, wm_er
   size_t bytes = config->estimator->state_bytes(config->estimator_params, &self->assembly.setup, &why);
   if (bytes == 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s: estimator '%s' can't work with this log: %s", config->path,
-                   config->estimator->name, why ? why : "it doesn't say why");
+                   config->estimator->name, why ? why : "no reason given");
   wm_arena_need need = {"estimator", bytes, &self->state};
   wm_status status = wm_arena_fill(&self->arena, &need, 1, 0, err);
   if (status != WM_OK) return status;

@@ -77,7 +77,7 @@ static void save_pose(live *run) {
   if (wm_saved_pose_write(run->config->saved_pose, &self->last_pose, utc_s, &err) == WM_OK || self->said_unsaved)
     return;
   self->said_unsaved = 1;
-  live_say(run, "%s. Localizing goes on; the next start will not know where the robot is", err.text);
+  live_say(run, "%s. Localizing goes on; the next start will begin without a saved pose", err.text);
 }
 
 static void do_what_is_due(live *run, wm_time_ns now_ns) {

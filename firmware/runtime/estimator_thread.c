@@ -9,7 +9,7 @@
 
 #define HEALTH_EVERY_NS WM_NS_PER_S
 
-// ── what it says goes into rings ────────────────────────────────────────────────────────────────────────────────────
+// ── its output goes into rings ────────────────────────────────────────────────────────────────────────────────────
 
 static int push(wm_ring *ring, uint64_t kind, const void *record, size_t bytes) {
   if (OUTPUT_RECORD_HEAD + bytes > ring->slot_bytes) return 0;  // never: see wm_output_bytes, PUBLISH_RECORD_BYTES

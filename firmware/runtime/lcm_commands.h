@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a person or a program tells the robot over LCM: set_pose_t and reset_t, as a source of events.
+// Commands over LCM, set_pose_t and reset_t, as a source of events.
 #ifndef WAYMARK_FIRMWARE_LCM_COMMANDS_H
 #define WAYMARK_FIRMWARE_LCM_COMMANDS_H
 

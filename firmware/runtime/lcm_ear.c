@@ -29,7 +29,7 @@ void lcm_ear_subscribe(lcm_ear *self, const char *channel, lcm_msg_handler_t han
   (void)lcm_subscribe(self->lcm, name, handler, context);
 }
 
-// The sink says where there is no way.
+// The sink reports an address that can't be reached.
 static void try_open(lcm_ear *self) {
   const char *why;
   wm_time_ns now_ns = wm_monotonic_ns();

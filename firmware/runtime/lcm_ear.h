@@ -21,7 +21,7 @@ void lcm_ear_subscribe(lcm_ear *self, const char *channel, lcm_msg_handler_t han
 // Waits for up to WM_DEVICE_WAIT_MS for one message, which goes to its handler. What the source is to say of it goes
 // into *counts.
 void lcm_ear_wait(lcm_ear *self, wm_source_counts *counts);
-// A message that can't be used: counted, and the first one told.
+// A message that can't be used: counted, and the first one reported.
 void lcm_ear_refuse(wm_source_counts *counts, const char *channel, const char *why);
 void lcm_ear_close(lcm_ear *self);
 

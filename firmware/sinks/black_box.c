@@ -134,7 +134,7 @@ void black_box_pose(black_box *self, const wm_estimate *pose, wm_time_ns now_ns)
   if (!self->folder[0]) return;
   if (self->rotate_ns == WM_TIME_NONE || now_ns >= self->rotate_ns) begin_log(self, pose, now_ns);
   int is_lost = pose->state == WM_STATE_LOST;
-  // What comes after tells, too: a quarter of the time is of it.
+  // The time after the fault matters, too: it gets a quarter.
   if (is_lost && self->was_tracking && self->kept_from_ns == WM_TIME_NONE)
     self->kept_from_ns = now_ns + self->keep_ns / 4;
   self->was_tracking = pose->state == WM_STATE_TRACKING || pose->state == WM_STATE_DEAD_RECKONING;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// looked-for.csv of a run: each landmark that a detector knows, and how often it was found, or why not.
+// looked-for.csv of a run: each landmark of a detector's map, and how often it was found, or why not.
 #ifndef WAYMARK_FIRMWARE_LOOKED_FOR_H
 #define WAYMARK_FIRMWARE_LOOKED_FOR_H
 

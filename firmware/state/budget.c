@@ -5,7 +5,7 @@
 #include <string.h>
 
 #define SMOOTH 0.2         // of a second's step
-#define LEAST_STEP_M 0.05  // less tells nothing of a rate per metre
+#define LEAST_STEP_M 0.05  // a rate per metre is not observable from less
 #define FARTHEST_M 1e5
 #define STANDING_MPS 0.01
 

@@ -137,7 +137,7 @@ static void go_on(wm_start *start, double way_m, double turn_rad) {
 
 static double together(double a, double b, double c) { return sqrt(a * a + b * b + c * c); }
 
-// A clock that went back (a board without a battery, before its time is set) tells nothing of the age.
+// A clock that went back (a board without a battery, before its time is set) gives no age.
 int wm_saved_pose_start(const wm_saved_pose *saved, double utc_s, double max_age_s, double moved_m, double moved_rad,
                         wm_start *out) {
   double age_s = utc_s - saved->utc_s;

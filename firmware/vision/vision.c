@@ -78,7 +78,7 @@ static wm_status open_devices(const wm_vision *all, vision_source *self, const w
     if (reader)
       return wm_fail(err, WM_BAD_CONFIG,
                      "%s:%d: vision.%s: the camera '%s' is looked through by %s already, and a device has one reader; "
-                     "say which by `cameras`, or take one detector",
+                     "name them by `cameras`, or take one detector",
                      config->path, wanted->line, self->detector->name, camera->name, reader->detector->name);
     status = wm_camera_device_open(device, camera, self->cameras[i], warn, context, &self->devices.devices[i], err);
     self->devices.count += status == WM_OK;
@@ -124,7 +124,7 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   s->state_bytes = s->detector->state_bytes(s->params, &s->view, &why);
   if (s->state_bytes == 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s: can't work with the camera '%s': %s", config->path,
-                   wanted->line, s->detector->name, first->name, why ? why : "it doesn't say why");
+                   wanted->line, s->detector->name, first->name, why ? why : "no reason given");
   if (wm_recording_is_robot(recording)) return open_devices(self, s, config, wanted, warn, context, err);
   for (uint32_t i = 0; i < s->detector->pictures; i++) {
     wm_status status = wm_video_open(wm_recording_dir(recording), &rig->cameras[s->cameras[i]], s->cameras[i], warn,

@@ -48,8 +48,8 @@ void watch_innovation(watch *self, const void *message, size_t length) {
 // Limits: chi-squared of about a hundred, with room for the gate, which cuts the tails off.
 const char *watch_consistency(const watch *self) {
   if (self->innovations < 50) return "too few observations to tell";
-  if (self->nis > 1.6) return "observations are further off than it believes";
-  if (self->nis < 0.3) return "observations are nearer than it believes: its noises are too large";
+  if (self->nis > 1.6) return "observations are further off than the covariance allows";
+  if (self->nis < 0.3) return "observations are nearer than the covariance allows: the noises are too large";
   return "consistent";
 }
 

@@ -22,9 +22,9 @@ typedef struct watch {
 void watch_pose(watch *self, const void *message, size_t length, wm_time_ns now_ns);
 void watch_health(watch *self, const void *message, size_t length, wm_time_ns now_ns);
 void watch_innovation(watch *self, const void *message, size_t length);
-// Whether what observations say agrees with what the estimator believes of itself: a verdict in words.
+// Whether the observations agree with the estimator's covariance: a verdict in words.
 const char *watch_consistency(const watch *self);
-// One word for how it stands ("tracking", "degraded", "lost" ...), and why, as far as health tells.
+// One word for how it stands ("tracking", "degraded", "lost" ...), and why, as far as health has the reason.
 const char *watch_state(const watch *self, wm_time_ns now_ns, char *why, size_t why_bytes);
 // The whole view, some lines.
 void watch_print(const watch *self, wm_time_ns now_ns, FILE *to);

@@ -132,7 +132,7 @@ FAULTS = [
     ("lateness above the horizon", C, C, "200", "900", "is above merge.horizon_ms"),
     ("file that isn't there", C, C, "initial_pose", "landmarks: hall.csv\ninitial_pose", "cannot be read"),
     ("publishes faster than it thinks", C, C, "rate_hz: 50", "rate_hz: 400", "poses would go out at 200 Hz"),
-    ("way of messages that isn't any", C, C, "rate_hz: 50", "lcm_url: 'udp://x'", "is no way that LCM knows"),
+    ("way of messages that isn't any", C, C, "rate_hz: 50", "lcm_url: 'udp://x'", "is no provider of LCM"),
     ("poses leave the computer", C, C, "rate_hz: 50", "lcm_url: 'udpm://239.255.76.67:7667?ttl=1'", "out into the network"),
     ("nowhere to save the pose", C, C, "initial_pose", "start: {saved_pose: /nonexistent/pose.yaml}\ninitial_pose", "no pose would be kept"),
     ("nowhere for the black box", C, C, "initial_pose", "black_box: {folder: /nonexistent/box}\ninitial_pose", "nothing would be kept"),
@@ -164,7 +164,7 @@ FAULTS = [
     ("map's resolution in pixels", E, "rec/map/map.yaml", "resolution: 0.05", "resolution: 20", "resolution: 20 m"),
     ("map's yaw in degrees", E, "rec/map/map.yaml", "[-5, -5, 0]", "[-5, -5, 90]", "a yaw of 90"),
     ("start beside the map", E, "rec/map/map.yaml", "[-5, -5, 0]", "[50, -5, 0]", "is not on the map"),
-    ("start in a wall", E, E, "x_m: 0", "x_m: -4.9", "nobody can drive"),
+    ("start in a wall", E, E, "x_m: 0", "x_m: -4.9", "is not free space"),
     ("map without an edge", E, "rec/map/edges.pgm", None, pgm(lambda c, r: 0), "there is no edge in it"),
     ("edges black on white", E, "rec/map/edges.pgm", None, pgm(lambda c, r: 0 if c % 40 == 0 else 255), "of it would be edges"),
     ("nothing drivable", E, "rec/map/drivable.pgm", None, pgm(lambda c, r: 0), "nothing of it is drivable"),
@@ -173,7 +173,7 @@ FAULTS = [
     ("signals of a longer message", C, "rec/can.log", None, can_log(short=True), "of 100)"),
     ("km/h taken as m/s", C, "rec/vehicle.dbc", "Left : 0|16@1- (0.001,0)", "Left : 0|16@1- (0.1,0)", "wheel_speed_rear_left: as much as"),
     ("deg/s taken as rad/s", C, "rec/can.log", None, can_log(turn=57.3), "yaw_rate: as much as"),
-    ("gyro the wrong way round", C, "rec/can.log", None, can_log(turn=-1), "yaw_rate says left where"),
+    ("gyro the wrong way round", C, "rec/can.log", None, can_log(turn=-1), "yaw_rate turns left where"),
     ("speeds of two units", C, "rec/can.log", None, can_log(speed=3.6), "vehicle_speed is 3.6"),
 ]
 

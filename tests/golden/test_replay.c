@@ -126,7 +126,7 @@ static void landmarks_that_moved_are_told(void) {
                                                 {.kind = WM_COUNTER_IDENTITIES_AMBIGUOUS, .landmark_id = -1}}};
   TEST_ASSERT_EQUAL(1, wm_findings(&health, keep_any, NULL));
   TEST_ASSERT_EQUAL_STRING(
-      "map: 2 times a landmark was elsewhere than before; `waymark map survey RUN` says which; the last one is 7",
+      "map: 2 times a landmark was elsewhere than before; `waymark map survey RUN` lists them; the last one is 7",
       finding);
 }
 

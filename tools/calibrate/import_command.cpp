@@ -116,7 +116,7 @@ std::function<int()> import_command(CLI::App &app) {
   app.add_option("--model", a->model, "fit to this model; auto: the file's where we have it, else the best of ours")
       ->check(CLI::IsMember({"auto", "equidistant", "double-sphere", "pinhole-radtan", "omni"}))
       ->capture_default_str();
-  app.add_option("--size", a->size, "WIDTHxHEIGHT of the pictures, where the file doesn't say");
+  app.add_option("--size", a->size, "WIDTHxHEIGHT of the pictures, where the file doesn't have it");
   app.add_option("--lens", a->lens, "OpenCV's four coefficients are of a plain lens or of a fisheye")
       ->check(CLI::IsMember({"plain", "fisheye"}));
   app.add_option("--out", a->out, "a new file to write; default: the screen");

@@ -42,8 +42,7 @@ void read_size(const FlatFile &file, const ImportHints &hints, int &width, int &
     if (both.size() == 2) width = static_cast<int>(both[0]), height = static_cast<int>(both[1]);
   }
   if (width <= 0 || height <= 0)
-    throw tools::Failure(file.path() + ": doesn't say how large the pictures were; give --size WIDTHxHEIGHT",
-                         tools::kUsage);
+    throw tools::Failure(file.path() + ": has no size of the pictures; give --size WIDTHxHEIGHT", tools::kUsage);
 }
 
 bool is_fisheye(const FlatFile &file, const ImportHints &hints, const std::string &key, size_t coefficients) {
@@ -56,7 +55,7 @@ bool is_fisheye(const FlatFile &file, const ImportHints &hints, const std::strin
   if (coefficients == 4 && model.empty())
     file.fail(key,
               "four coefficients are k1 k2 p1 p2 of a plain lens or k1 k2 k3 k4 of a fisheye, and the file "
-              "doesn't say which; give --lens plain (cv2.calibrateCamera) or --lens fisheye (cv2.fisheye)");
+              "the file doesn't state which; give --lens plain (cv2.calibrateCamera) or --lens fisheye (cv2.fisheye)");
   return false;
 }
 

@@ -11,7 +11,7 @@ int main(int argc, char **argv) {
   using namespace wm;
   CLI::App app("What a robot's cameras are like and how they sit on it.", "waymark calibrate");
   app.require_subcommand(1);
-  app.footer("example: waymark calibrate import camchain.yaml\nwaymark calibrate SUBCOMMAND --help says more.");
+  app.footer("example: waymark calibrate import camchain.yaml\nwaymark calibrate SUBCOMMAND --help has more.");
   CLI::App *import_app = app.add_subcommand("import", "calibrations of OpenCV, Kalibr, ROS and OCamCalib into ours");
   CLI::App *camera_app = app.add_subcommand("camera", "a camera's model from pictures of a chessboard or an AprilGrid");
   CLI::App *mounting_app = app.add_subcommand("mounting", "how a camera sits on the robot, from a drive with a map");

@@ -73,7 +73,7 @@ class Replayed {
     int status = 0;
     if (child < 0 || waitpid(child, &status, 0) != child || !WIFEXITED(status) || WEXITSTATUS(status) != 0) {
       fs::remove_all(folder_);
-      throw Failure("waymark replay " + a.recording + " failed; what it says stands above");
+      throw Failure("waymark replay " + a.recording + " failed; its messages are above");
     }
   }
   ~Replayed() {
@@ -161,7 +161,7 @@ int report(const Mounting &found, const wm_camera &camera) {
   const double really[kMountingErrors] = {is.rpy_rad[1], is.rpy_rad[0], is.rpy_rad[2], is.xyz_m[2]};
   std::printf("%s, from %d pictures: %.0f %% of the points lie on the map's lines, %.1f mm off\n\n", camera.name,
               found.scans, 100 * found.explained, 1e3 * found.rms_m);
-  std::printf("%-14s %10s %10s %9s %10s\n", "", "believed", "off by", "+-", "is");
+  std::printf("%-14s %10s %10s %9s %10s\n", "", "before", "off by", "+-", "found");
   bool all_known = true;
   for (size_t i = 0; i < kMountingErrors; i++) {
     const Kind &k = kKinds[i];
@@ -175,7 +175,7 @@ int report(const Mounting &found, const wm_camera &camera) {
     if (!known)
       std::printf(" not known well enough (%g): it takes %s", k.sigma_max, k.needs);
     else if (std::fabs(value) < 2 * sigma)
-      std::printf(" as believed");
+      std::printf(" as before");
     std::printf("\n");
     all_known = all_known && (known || !k.mounting);
   }
@@ -192,7 +192,7 @@ int report(const Mounting &found, const wm_camera &camera) {
     std::printf("    mounting: {xyz_m: [%.4f, %.4f, %.4f], rpy_deg: [%.3f, %.3f, %.3f]}\n", is.xyz_m[0], is.xyz_m[1],
                 is.xyz_m[2], is.rpy_rad[0] / kDegree, is.rpy_rad[1] / kDegree, is.rpy_rad[2] / kDegree);
   if (fits && std::fabs(found.value[kTimeOffset]) > 2 * found.sigma[kTimeOffset])
-    std::printf("its pictures are %.1f ms %s than their stamps say\n", 1e3 * std::fabs(found.value[kTimeOffset]),
+    std::printf("its pictures are %.1f ms %s than their stamps\n", 1e3 * std::fabs(found.value[kTimeOffset]),
                 found.value[kTimeOffset] > 0 ? "older" : "younger");
   return fits && all_known ? tools::kDone : tools::kFailed;
 }
@@ -200,7 +200,7 @@ int report(const Mounting &found, const wm_camera &camera) {
 int run(const Arguments &a) {
   std::unique_ptr<Replayed> replayed;
   if (a.run.empty()) {
-    if (a.config.empty()) throw Failure("say --config FILE, or --run of a replay that there is already", tools::kUsage);
+    if (a.config.empty()) throw Failure("give --config FILE, or --run FOLDER of a replay", tools::kUsage);
     replayed = std::make_unique<Replayed>(a);
   }
   const fs::path folder = replayed ? replayed->folder() : fs::path(a.run);

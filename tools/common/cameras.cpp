@@ -64,7 +64,7 @@ const NamedCamera &choose_camera(const std::vector<NamedCamera> &cameras, const 
     known += (known.empty() ? "" : ", ") + camera.name;
   }
   if (cameras.empty()) throw Failure(calibration.string() + ": has no cameras");
-  throw Failure(calibration.string() + (name.empty() ? ": has several cameras; --camera says which: " + known
+  throw Failure(calibration.string() + (name.empty() ? ": has several cameras; choose one by --camera: " + known
                                                      : ": has no camera '" + name + "'; it has " + known),
                 kUsage);
 }

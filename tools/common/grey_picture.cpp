@@ -56,7 +56,7 @@ std::string only_video(const fs::path &recording, const std::string &camera) {
     all += (all.empty() ? "" : ", ") + found;
   }
   if (all.empty()) throw Failure(recording.string() + ": has no video/*.csv");
-  if (all != found) throw Failure(recording.string() + ": has several cameras; --camera says which: " + all, kUsage);
+  if (all != found) throw Failure(recording.string() + ": has several cameras; choose one by --camera: " + all, kUsage);
   return found;
 }
 

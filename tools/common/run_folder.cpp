@@ -136,7 +136,7 @@ Trajectory load_trajectory(const fs::path &run) {
     throw Failure(run.string() +
                   ": has neither trajectory.csv nor trajectory.tum; RUN is what `waymark replay --out RUN` wrote");
   Trajectory out = csv ? load_csv(file) : load_tum(file);
-  if (out.poses.empty()) throw Failure(file.string() + ": has no pose in it; health.json says what the run did");
+  if (out.poses.empty()) throw Failure(file.string() + ": has no pose in it; see the run's health.json");
   return out;
 }
 

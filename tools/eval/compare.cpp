@@ -103,7 +103,7 @@ Similarity align(const std::vector<Eigen::Vector3d> &from, const std::vector<Eig
   b.colwise() -= b_mean;
   if (planar) a.row(2).setZero(), b.row(2).setZero();
   if (n < 2 || a.norm() < 1e-9 || b.norm() < 1e-9)
-    throw Failure("--align: the poses are all at one place: nothing says how to turn them");
+    throw Failure("--align: the poses are all at one place: the rotation is not observable");
 
   const Eigen::Matrix3d moment = b * a.transpose();
   if (planar) {

@@ -147,7 +147,8 @@ AddedLandmark add_landmark(const AddLandmark &a) {
   const std::optional<Vector3d> known = place_in(out.landmarks, a.id);
   if (!known && a.at_m.empty())
     throw Failure(
-        out.landmarks.string() + ": has no landmark " + std::to_string(a.id) + "; --at X,Y,Z says where it is", kUsage);
+        out.landmarks.string() + ": has no landmark " + std::to_string(a.id) + "; give its place by --at X,Y,Z",
+        kUsage);
   const Vector3d at = a.at_m.empty() ? *known : vector_of(a.at_m);
   if (known && (*known - at).norm() > 1e-3)
     throw Failure(out.landmarks.string() + ": landmark " + std::to_string(a.id) +

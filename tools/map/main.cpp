@@ -57,7 +57,7 @@ void parse_survey(CLI::App &app, SurveyArguments &a) {
       "  waymark map survey out/run\n"
       "  waymark map survey out/run --poses recordings/drive --out map\n"
       "Residuals are observed less expected: bearing (rad) and range (m), or along and across the line of sight (x, y, "
-      "m) and\nheading (rad) of coded markers. docs/estimators.md says what is fused when.\n"
+      "m) and\nheading (rad) of coded markers. docs/estimators.md: what is fused when.\n"
       "Exit code: 0 good, 1 something was found or can't be read.");
 }
 
@@ -66,7 +66,7 @@ void parse_make(CLI::App &app, Make &a) {
   app.add_option("PLAN", a.plan,
                  "a picture with dark walls on a light floor (PNG, PGM, JPEG), or ROS map_server's map.yaml")
       ->required();
-  app.add_option("--resolution", a.resolution_m, "m of a pixel of the picture; a map.yaml says it itself")
+  app.add_option("--resolution", a.resolution_m, "m of a pixel of the picture; a map.yaml has its own")
       ->check(CLI::Range(1e-4, 1.0));
   app.add_option("--origin", a.origin, "X,Y[,YAW_DEG]: where the lower left corner of the picture lies in the map")
       ->delimiter(',')
@@ -98,7 +98,7 @@ void parse_make(CLI::App &app, Make &a) {
 void parse_check(CLI::App &app, Check &a) {
   app.description("Says what a raster map is like, and what is wrong with it.");
   app.add_option("MAP", a.map, "a map.yaml")->required();
-  app.add_option("--recording", a.recording, "also asks whether its start pose lies on the map");
+  app.add_option("--recording", a.recording, "also check whether its start pose is on the map");
   app.add_option("--draw", a.draw, "a PNG to draw");
   app.footer(
       "example: waymark map check map/map.yaml --recording recordings/drive --draw map.png\n"
@@ -127,7 +127,7 @@ void parse_print(CLI::App &app, PrintMarkers &a) {
       "examples:\n"
       "  waymark map print-markers --family mr --ids 1-20 --size 0.18 --out sheet.pdf\n"
       "  waymark map print-markers --family tag36h11 --ids 0-11 --size 0.08 --out tags.pdf\n"
-      "Print at 100 %, measure the ruler, leave the white rim. docs/markers.md says more.");
+      "Print at 100 %, measure the ruler, leave the white rim. More: docs/markers.md.");
 }
 
 void parse_add(CLI::App &app, AddLandmark &a) {
@@ -163,20 +163,20 @@ void parse_add(CLI::App &app, AddLandmark &a) {
       "  waymark map add-landmark map --id 8 --picture left.jpg --at 6,2,2 --from 0,0,1.4 --calibration "
       "calibration.yaml "
       "--camera left --corners 410,208,470,205,472,262,411,266\n"
-      "The second picture of a landmark is one more way that it may look. docs/landmarks.md says more.");
+      "The second picture of a landmark is one more way that it may look. More: docs/landmarks.md.");
 }
 
 int add(const AddLandmark &a) {
   const AddedLandmark made = add_landmark(a);
   std::printf("%s: %d x %d px of %.3f x %.3f m, contrast %.0f grey levels%s\n  %s and %s know landmark %d\n",
               made.picture.c_str(), made.width_px, made.height_px, made.width_m, made.height_m, made.spread_grey,
-              made.spread_grey < 12 ? ": LITTLE, it will hardly be told from a wall" : "", made.landmarks.c_str(),
-              made.appearances.c_str(), a.id);
+              made.spread_grey < 12 ? ": LITTLE, it can hardly be distinguished from a wall" : "",
+              made.landmarks.c_str(), made.appearances.c_str(), a.id);
   return kDone;
 }
 
 void parse_look(CLI::App &app, LookAtPicture &a) {
-  app.description("Looks for a map's landmarks in one picture, as a run would, and says what became of each.");
+  app.description("Looks for a map's landmarks in one picture, as a run would, and prints the outcome of each.");
   app.add_option("MAP", a.map, "the folder with landmarks.csv and landmarks/, or the landmarks.csv")->required();
   app.add_option("--picture", a.picture, "JPEG, PNG or PGM")->required();
   app.add_option("--calibration", a.calibration, "calibration.yaml of the camera that took it")->required();
@@ -224,7 +224,7 @@ void parse_train(CLI::App &app, TrainCascade &a) {
   app.add_option("--seed", a.seed, "of the choice of windows")->capture_default_str();
   app.footer(
       "example: waymark map train-cascade drives/* --size 0.7,0.7 --out sign.xml\n"
-      "Labelled recordings are what `waymark simulate` writes for crossings. docs/landmarks.md says more.");
+      "Labelled recordings are what `waymark simulate` writes for crossings. More: docs/landmarks.md.");
 }
 
 int print_markers(PrintMarkers &a) {
@@ -336,7 +336,7 @@ int main(int argc, char **argv) {
   CLI::App app("Maps: raster maps made from plans and checked, landmarks surveyed, coded markers printed.",
                "waymark map");
   app.require_subcommand(1);
-  app.footer("example: waymark map make plan.png --resolution 0.02\nwaymark map SUBCOMMAND --help says more.");
+  app.footer("example: waymark map make plan.png --resolution 0.02\nwaymark map SUBCOMMAND --help has more.");
   Make make_arguments;
   Check check_arguments;
   SurveyArguments survey_arguments;

@@ -249,8 +249,8 @@ std::string frames_section(const ReportData &data) {
   if (marks)
     body +=
         legend({{"<circle class=\"hope\" cx=\"14\" r=\"6\"/>", "where the robot expected a landmark, with its number"},
-                {"<circle class=\"hit\" cx=\"14\" r=\"4\"/>", "the direction in which it was seen, believed"},
-                {"<circle class=\"miss\" cx=\"14\" r=\"4\"/>", "seen, and not believed"}});
+                {"<circle class=\"hit\" cx=\"14\" r=\"4\"/>", "the direction in which it was seen; used"},
+                {"<circle class=\"miss\" cx=\"14\" r=\"4\"/>", "seen, and refused"}});
   if (edges)
     body += legend(
         {{"<path class=\"edge-seen\" d=\"M4 0h0M14 0h0M24 0h0\"/>",

@@ -79,7 +79,7 @@ std::string with_truth(const ReportData &data) {
   const double rmse = figure(data, "position_rmse_m");
   std::string text = "The robot drove " + strong(length_text(figure(data, "distance_m"))) + " in " +
                      strong(duration_text(figure(data, "duration_s"))) + ". It was typically " +
-                     strong(length_text(rmse)) + " from where it believed to be, at worst " +
+                     strong(length_text(rmse)) + " from its estimate, at worst " +
                      strong(length_text(figure(data, "position_max_m")));
   const std::string turn = data.trajectory.planar ? "heading" : "rotation";  // in space the whole of it
   const double turned = figure(data, (turn + "_rmse_deg").c_str());
@@ -110,8 +110,9 @@ std::string without_truth(const ReportData &data) {
   std::string text = "By its own reckoning the robot drove " + strong(length_text(way)) + " in " +
                      strong(duration_text(data.end_s())) + ".";
   if (known)
-    text += " It says that it typically knew its position to " + strong(length_text(percentile(radii, 50))) +
-            " and at worst to " + strong(length_text(max_abs(radii))) + ", with 95&nbsp;% confidence.";
+    text += " By its own covariance, the typical error of the position was " +
+            strong(length_text(percentile(radii, 50))) + " and at worst to " + strong(length_text(max_abs(radii))) +
+            ", with 95&nbsp;% confidence.";
   text += blindness(data) + " There is no truth to hold this against.";
   std::vector<Tile> all{{length_text(way), "driven, by its own reckoning"},
                         {duration_text(data.end_s()), "from the first pose to the last"}};

@@ -184,7 +184,7 @@ std::string innovation_section(const ReportData &data) {
             " more kinds with fewer data are not drawn.</p>";
   return section(
       "What the sensors said",
-      "Each measurement is compared with what the robot expected to see from where it believed to be. The differences "
+      "Each measurement is compared with its prediction from the estimated pose. The differences "
       "should "
       "scatter evenly about zero, within the band, in the shape of the bell; a constant offset means that something is "
       "mounted or timed otherwise than stated. NIS sums them up: about 1, within the shaded bounds, is right; above, "

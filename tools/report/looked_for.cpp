@@ -88,7 +88,7 @@ std::string looked_for_section(const ReportData &data) {
                  "its front, and its "
                  "place known well enough to look there. Unlike: something else is there, the landmark is hidden, "
                  "moved or replaced. "
-                 "A landmark that is unlike again and again wants a new picture or a new place. The last four columns "
+                 "A landmark that is unlike again and again needs a new picture or a new place. The last four columns "
                  "are pictures in "
                  "which it was not to be seen, or nobody knew where.",
                  "<div class=\"wide\"><table><tr><th>landmark</th><th>expected</th><th>found</th>" + head + "</tr>" +

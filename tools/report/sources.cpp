@@ -33,9 +33,9 @@ const char *reason_in_words(const std::string &reason) {
       {"no_association", "no landmark fits, or more than one"},
       {"out_of_range", "beyond the sensor’s range"},
       {"not_finite", "not a number"},
-      {"singular", "from there it says nothing"},
+      {"singular", "no information from there (singular)"},
       {"searching", "seen while the pose was not known yet"},
-      {"by_config", "the configuration says not to use it"},
+      {"by_config", "the configuration leaves it out"},
   }};
   for (const auto &[name, words] : kReasons)
     if (reason == name) return words;
@@ -90,14 +90,13 @@ Meaning meaning_of(const std::string &name) {
   if (what == "lag_s") return {1e3, 0, "ms", "the robot follows its motion data this much later"};
   if (what == "range_bias_m") return {100, 0, "cm", sensor + " measures ranges too long by this"};
   if (what == "range_scale") return {100, -100, "%", sensor + " measures ranges too long by this share"};
-  if (what == "speed_scale") return {100, -100, "%", "the robot drives this much farther than its speed says"};
-  if (what == "yaw_rate_scale") return {100, -100, "%", "the robot turns this much more than its turn rate says"};
-  if (what == "yaw_rate_bias_radps") return {degrees, 0, "°/s", "the gyro says this much while nothing turns"};
+  if (what == "speed_scale") return {100, -100, "%", "true speed above the measured one"};
+  if (what == "yaw_rate_scale") return {100, -100, "%", "true turn rate above the measured one"};
+  if (what == "yaw_rate_bias_radps") return {degrees, 0, "°/s", "the gyro's output at rest"};
   if (what == "left_scale") return {100, -100, "%", "the left wheel rolls this much farther a turn than stated"};
   if (what == "right_scale") return {100, -100, "%", "the right wheel rolls this much farther a turn than stated"};
   if (what == "track_scale") return {100, -100, "%", "the wheels act as if this much farther apart than stated"};
-  if (what == "steering_offset_rad")
-    return {degrees, 0, "°", "the wheels point this far to the left when the steering says straight"};
+  if (what == "steering_offset_rad") return {degrees, 0, "°", "the wheels' direction to the left at steering 0"};
   if (what == "bloom_px" || what == "edge_shift_px")  // its name before
     return {1, 0, "px", "bright areas are wider by this in the pictures of " + sensor};
   if (what.ends_with("_radps")) return {degrees, 0, "°/s", ""};
@@ -305,7 +304,7 @@ std::string calibration_section(const ReportData &data) {
   return section(
       "What it learned about itself",
       "These are not constants from a data sheet but states that the robot estimated while driving, each with its "
-      "standard deviation at the end. A value within two standard deviations of zero says that the calibration was "
+      "standard deviation at the end. A value within two standard deviations of zero shows that the calibration was "
       "right. Counts and shares stand without one.",
       "<div class=\"wide\"><table><tr><th>state</th><th>value ± σ</th><th class=\"words\">what it means</th></tr>" +
           rows + "</table></div>");

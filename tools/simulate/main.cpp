@@ -46,7 +46,7 @@ void parse(CLI::App *app, Arguments *a) {
   app->add_flag("--perfect", a->perfect, "no errors, no noise, no faults");
   app->footer(
       "example: waymark simulate config/worlds/crossing.yaml --landmarks 3 --out out/crossing\n"
-      "docs/simulate.md tells all keys of a scenario. Exit code: 0 done, 1 can't write, 2 usage or scenario.");
+      "docs/simulate.md lists all keys of a scenario. Exit code: 0 done, 1 can't write, 2 usage or scenario.");
 }
 
 // Says on a terminal how far it is and how long it takes yet.

@@ -48,7 +48,7 @@ void read_landmark_sensor(Reader &r, const wm_yaml_node &map, Sensor &out) {
   out.gives_bearing = there(r, map, "bearing_sigma_deg");
   out.gives_range = there(r, map, "range_sigma_m");
   if (r.ok() && out.kind == Kind::landmarks && !out.gives_bearing && !out.gives_range)
-    return r.fail(map, "bearing_sigma_deg, range_sigma_m or both say what this sensor measures");
+    return r.fail(map, "give bearing_sigma_deg, range_sigma_m or both: they choose what this sensor measures");
   const bool marker = out.kind == Kind::markers;
   r.number(map, "bearing_sigma_deg", 0, 45, kDeg, out.bearing_sigma_rad, marker || out.kind == Kind::compass);
   r.number(map, "range_sigma_m", 0, 1000, 1, out.range_sigma_m, marker);

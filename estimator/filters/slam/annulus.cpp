@@ -20,8 +20,8 @@ constexpr double kOverlap = 0.6;
 // mirror image, at 1e-5 and 1e-6 none.
 constexpr double kDoubt = 1e-6;
 constexpr double kLeastWeight = 1e-8;  // a member below leaves: well below kDoubt
-// Members are one within one sigma of the heavier one's covariance, or where hardly a range tells them apart: within
-// four sigmas of a range. At two sigmas, 2 of 30 simulated beacons 5 m apart stayed undecided.
+// Members are one within one sigma of the heavier one's covariance, or within four sigmas of a range of it, where
+// ranges hardly distinguish the two. At two sigmas, 2 of 30 simulated beacons 5 m apart stayed undecided.
 constexpr double kMergeRanges = 4.0;
 constexpr double kOutlier = 0.05;        // share of false ranges, as in landmark_evidence
 constexpr double kFalseRange_m = 100.0;  // these lie anywhere up to this distance, the reach of radio and sound

@@ -65,7 +65,7 @@ wm_status wm_log_close(wm_log_writer *self, wm_error *err);
 
 typedef struct wm_log_reader wm_log_reader;
 
-// What the head says. Pointers live as long as the reader.
+// The head's content. Pointers live as long as the reader.
 typedef struct wm_log_head {
   char program[32], estimator[WM_NAME_MAX], recording[WM_NAME_MAX + 96], config_path[WM_PATH_MAX],
       map_path[WM_PATH_MAX];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hands final events to the estimator and says what came of it: the event itself (for the log), innovations, and the
+// Hands final events to the estimator and returns what came of it: the event itself (for the log), innovations, and the
 // fused pose at each stamp of the driving motion stream. It depends on nothing but the events and their order, so a
 // recording, a live run and an event log give the same poses. No clock but for measuring; no allocation. One thread.
 #ifndef WAYMARK_FUSER_H

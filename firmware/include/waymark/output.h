@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the estimator's side says to the sinks: one function that takes tagged records. In replay it writes files; in a
+// What the estimator's side gives to the sinks: one function that takes tagged records. In replay it writes files; in a
 // run it puts the record into a ring and returns at once.
 #ifndef WAYMARK_OUTPUT_H
 #define WAYMARK_OUTPUT_H

@@ -18,7 +18,7 @@ typedef struct wm_saved_pose {
 wm_status wm_saved_pose_write(const char *path, const wm_estimate *pose, double utc_s, wm_error *err);
 // WM_NOT_FOUND: there is none. WM_BAD_CONFIG: it can't be read. Allocates.
 wm_status wm_saved_pose_read(const char *path, wm_saved_pose *out, wm_error *err);
-// Whether a pose tells anything to begin with: finite, not searching, not lost, sigma below 50 m and 1.5 rad.
+// Whether a pose is fit to begin with: finite, not searching, not lost, sigma below 50 m and 1.5 rad.
 int wm_saved_pose_is_worth_it(const wm_estimate *pose);
 // The same as a start at once, in this process: `blind_s` of motion at its speed are added to its sigma.
 void wm_start_from_estimate(const wm_estimate *pose, double blind_s, wm_start *out);

@@ -71,7 +71,7 @@ mark back
 wait $run || fail "waymark run among faults: exit code $?"
 cat faults.txt
 # A removed adapter's interface is heard to go down first, or it is gone at once.
-for said in "can0 went down" "can0 speaks again" "can0 is (gone \(No such device\)|not there \(adapter)" "can: is back"; do
+for said in "can0 went down" "can0 receives again" "can0 is (gone \(No such device\)|not there \(adapter)" "can: is back"; do
   grep -qE "$said" faults.txt || fail "not said: $said"
 done
 kill $logger

@@ -140,7 +140,8 @@ static const bad_input kTable[] = {
      "can-signals.yaml:1: yaw_rate: TOO_FAR (car.dbc:9) needs 5 bytes, but YAW has 4; one of the two is wrong in the "
      "DBC"},
     {"multiplexed by nothing", BINDING, "{quantity: yaw_rate, message: YAW, signal: LOST}",
-     "can-signals.yaml:1: yaw_rate: LOST (car.dbc:10) is multiplexed, but the file does not say by which signal: one M "
+     "can-signals.yaml:1: yaw_rate: LOST (car.dbc:10) is multiplexed, but the file does not state by which signal: one "
+     "M "
      "in the message, or SG_MUL_VAL_ lines without a ring, are needed"},
     {"gear without names", BINDING, "{quantity: gear, message: GEARBOX, signal: GEAR}",
      "can-signals.yaml:1: gear: the DBC has no VAL_ names for this signal; write `values: {forward: [1], reverse: [2], "
@@ -151,7 +152,8 @@ static const bad_input kTable[] = {
     {"gear in floating point", BINDING, "{quantity: gear, message: GEARBOX, signal: POWER}",
      "can-signals.yaml:1: gear: POWER is a floating-point number; an integer signal is needed"},
     {"factor of zero", BINDING, "{quantity: vehicle_speed, message: GEARBOX, signal: ZERO}",
-     "can-signals.yaml:1: vehicle_speed: ZERO (car.dbc:15) has the factor 0 in the DBC, so it says nothing"},
+     "can-signals.yaml:1: vehicle_speed: ZERO (car.dbc:15) has the factor 0 in the DBC, so its value is always the "
+     "same"},
     {"scale of zero", BINDING, "{quantity: yaw_rate, message: YAW, signal: YAW_RATE, scale: 0}",
      "can-signals.yaml:1: yaw_rate: scale must be a number other than 0 (1 or -1 as a rule), offset a number"},
     {"bound twice", BINDING,

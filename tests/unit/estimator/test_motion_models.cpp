@@ -9,7 +9,7 @@
 
 namespace {
 
-// What a model lacks is told before the drive; what it doesn't lack, it can drive with (the tests above).
+// Data that a model needs and that don't come are named before the drive; with all of them it drives (tests above).
 void test_what_a_model_lacks(void) {
   const auto lacks = [](int model, const wm_wheels &w, uint32_t quantities, bool twists = false) {
     wm_motion_params params;

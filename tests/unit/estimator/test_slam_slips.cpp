@@ -116,7 +116,7 @@ void test_a_slip_is_found_with_one_landmark_in_view(void) {
   TEST_ASSERT_EQUAL_DOUBLE(0, counted(WM_COUNTER_LANDMARKS_MOVED));
 }
 
-// GIVEN a landmark on the map whose identity is misread in a burst THEN the identity that nobody knows is no landmark.
+// GIVEN a landmark on the map whose identity is misread in a burst THEN the unknown identity becomes no landmark.
 void test_a_burst_of_an_unknown_identity_is_no_landmark(void) {
   begin();
   drive(60);

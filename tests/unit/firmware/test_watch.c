@@ -140,11 +140,11 @@ static void innovations_give_a_verdict(void) {
   TEST_ASSERT_EQUAL_STRING("consistent", watch_consistency(&seen));
   i.observed = 0.3;
   for (int n = 0; n < 200; n++) watch_innovation(&seen, bytes, wm_lcm_innovation(&i, bytes, sizeof bytes));
-  TEST_ASSERT_EQUAL_STRING("observations are further off than it believes", watch_consistency(&seen));
+  TEST_ASSERT_EQUAL_STRING("observations are further off than the covariance allows", watch_consistency(&seen));
   i.verdict = WM_REJECTED_GATE;
   i.observed = 0;
   for (int n = 0; n < 2000; n++) watch_innovation(&seen, bytes, wm_lcm_innovation(&i, bytes, sizeof bytes));
-  TEST_ASSERT_EQUAL_STRING("observations are further off than it believes", watch_consistency(&seen));
+  TEST_ASSERT_EQUAL_STRING("observations are further off than the covariance allows", watch_consistency(&seen));
 }
 
 static char answer[32768];

@@ -299,7 +299,7 @@ void test_a_recording_that_ends_early_is_of_the_same_world() {
 
 void test_mistakes_are_told() {
   refuse("{kind: landmarks}",
-         "x.yaml:6: sensors[0]: bearing_sigma_deg, range_sigma_m or both say what this sensor measures");
+         "x.yaml:6: sensors[0]: give bearing_sigma_deg, range_sigma_m or both: they choose what this sensor measures");
   refuse("{kind: landmarks, bearing_sigma_deg: 1, sigma_px: 1}",
          "x.yaml:6: sensors[0].sigma_px: only a sensor of kind stereo has this");
   refuse("{kind: stereo}", "x.yaml:6: sensors[0]: `sigma_px` is missing here");

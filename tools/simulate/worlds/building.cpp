@@ -54,8 +54,8 @@ wm_status from_ros(const wm_yaml_node &root, const std::string &path, double cei
     return wm_fail(err, WM_BAD_CONFIG, "%s: no pixel is occupied (darker than grey %d); is `negate` right?",
                    file.c_str(), occupied_below);
   if (out.faces.size() > kFacesMax)
-    return wm_fail(err, WM_BAD_CONFIG, "%s: %zu walls, more than %zu: a map this rough wants to be cleaned first",
-                   file.c_str(), out.faces.size(), kFacesMax);
+    return wm_fail(err, WM_BAD_CONFIG, "%s: %zu walls, more than %zu: clean such a rough map first", file.c_str(),
+                   out.faces.size(), kFacesMax);
   const auto turned = wm::sincos(map.origin[2]);
   for (Face &f : out.faces)
     for (Point *p : {&f.a, &f.b})
