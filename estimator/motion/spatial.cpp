@@ -25,12 +25,6 @@ double held_variance(double change, double sigma) {
   return real > 0.0 ? real / 3.0 : 0.0;
 }
 
-// The output of a dead band of that half width: it follows its input only beyond.
-double dead_band(double output, double input, double half_width) {
-  if (input > output + half_width) return input - half_width;
-  return input < output - half_width ? input + half_width : output;
-}
-
 }  // namespace
 
 void spatial_history::init(const spatial_rules &rules) {
@@ -138,7 +132,12 @@ void spatial_motion::feed(const wm_event &event) {
     now.w.z = twist.w;
   }
   const bool first = history_.samples() == 0;
-  if (history_.feed(event.t_ns, now) && first) smooth_ = banded_ = steady_[0] = steady_[1] = now;
+  if (!history_.feed(event.t_ns, now) || !first) return;
+  steady_[0] = steady_[1] = now;
+  for (int i = 0; i < 3; i++) {
+    smooth_v_[i].restart(now.v[i]);
+    smooth_w_[i].restart(now.w[i]);
+  }
 }
 
 void spatial_motion::sample_noise(vec3 *v_var, vec3 *w_var) const {
@@ -183,11 +182,9 @@ spatial_step spatial_motion::step_of(const spatial_piece &piece) const {
 
 void spatial_motion::smooth(const spatial_piece &piece) {
   const double share = piece.dt_s / (piece.dt_s + kSmoothing_s);
-  smooth_.v = smooth_.v + share * (piece.twist.v - smooth_.v);
-  smooth_.w = smooth_.w + share * (piece.twist.w - smooth_.w);
   for (int i = 0; i < 3; i++) {
-    banded_.v[i] = dead_band(banded_.v[i], smooth_.v[i], noise_.v_mps[i]);
-    banded_.w[i] = dead_band(banded_.w[i], smooth_.w[i], noise_.w_radps[i]);
+    smooth_v_[i].step(piece.twist.v[i], share, noise_.v_mps[i]);
+    smooth_w_[i].step(piece.twist.w[i], share, noise_.w_radps[i]);
   }
 }
 

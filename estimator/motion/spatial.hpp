@@ -6,6 +6,7 @@
 
 #include "math/se3.hpp"
 #include "motion/front_end.hpp"
+#include "motion/steady_rate.hpp"
 
 namespace wm {
 
@@ -124,7 +125,13 @@ class spatial_motion {
   // a time offset.
   const vec3 &steady_v_mps() const { return steady_[0].v; }
   const vec3 &steady_w_radps() const { return steady_[0].w; }
-  void begin_picture() { steady_[0] = steady_[1], steady_[1] = banded_; }
+  void begin_picture() {
+    steady_[0] = steady_[1];
+    for (int i = 0; i < 3; i++) {
+      steady_[1].v[i] = smooth_v_[i].banded;
+      steady_[1].w[i] = smooth_w_[i].banded;
+    }
+  }
   const vec3 &v_mps() const { return history_.sample(0).twist.v; }
   const vec3 &w_radps() const { return history_.sample(0).twist.w; }
   // The sample that holds now and its slope per second by the one before it. False: none yet, or it was refused.
@@ -141,8 +148,8 @@ class spatial_motion {
   motion_front_end front_;
   spatial_history history_;
   spatial_noise noise_;
-  spatial_twist smooth_, banded_;  // low-passed; with the dead band
-  spatial_twist steady_[2];        // at the picture before the newest, and at the newest
+  steady_rate smooth_v_[3], smooth_w_[3];
+  spatial_twist steady_[2];  // at the picture before the newest, and at the newest
 };
 
 template <class Visit>

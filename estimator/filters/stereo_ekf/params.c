@@ -11,7 +11,7 @@ static const wm_param kParams[] = {
     {"prediction", WM_PARAM_ENUM, offsetof(params, prediction), WM_PREDICT_TWIST, 0, WM_PREDICT_CONSTANT_VELOCITY,
      kPredictions,
      "twist: prediction by the measured twist. constant_velocity: velocity and rates are states, and a measured twist "
-     "is an observation of them; for noisy twists, or twists with gaps."},
+     "is an observation of them; for noisy twists, or twists with gaps, and always without a stream of motion."},
     F64("noise.v_mps", v_mps, 0, 0, 100,
         "Sigma of one measured velocity on each axis, independent in each sample, m/s. 0: calibration.yaml's "
         "motion6.sigma_v_mps, or 0.03 without that."),
@@ -21,10 +21,12 @@ static const wm_param kParams[] = {
         "A further sigma of the velocity, as a fraction of the speed; the variances are added."),
     F64("noise.w_rel", w_rel, 0, 0, 2,
         "A further sigma of the turn rates, as a fraction of the rate; the variances are added."),
-    F64("constant_velocity.v_sigma_mps", cv_v_sigma, 0.5, 1e-6, 100, "Start sigma of the velocity as a state, m/s."),
-    F64("constant_velocity.w_sigma_radps", cv_w_sigma, 0.3, 1e-6, 100, "Start sigma of the turn rates, rad/s."),
-    F64("constant_velocity.v_walk", cv_v_walk, 0.1, 0, 100, "Random walk of the velocity, m/s per sqrt(s)."),
-    F64("constant_velocity.w_walk", cv_w_walk, 0.1, 0, 100, "Random walk of the turn rates, rad/s per sqrt(s)."),
+    // Of a car, the fastest that is expected: half a minute to 100 km/h, and bends in a second. Without motion, walks
+    // of 0.5, 1 and 2 m/s give 7.0, 7.0 and 7.0 mm at the sea floor, and 15, 7.5 and 4.7 m with a car.
+    F64("constant_velocity.v_sigma_mps", cv_v_sigma, 4, 1e-6, 100, "Start sigma of the velocity as a state, m/s."),
+    F64("constant_velocity.w_sigma_radps", cv_w_sigma, 0.5, 1e-6, 100, "Start sigma of the turn rates, rad/s."),
+    F64("constant_velocity.v_walk", cv_v_walk, 2, 0, 100, "Random walk of the velocity, m/s per sqrt(s)."),
+    F64("constant_velocity.w_walk", cv_w_walk, 0.5, 0, 100, "Random walk of the turn rates, rad/s per sqrt(s)."),
     F64("constant_velocity.tau_s", cv_tau_s, 0, 0, 1e6,
         "Above 0: velocity and rates are Gauss-Markov processes with these sigmas and this time constant, s, instead "
         "of "
@@ -41,8 +43,11 @@ static const wm_param kParams[] = {
         "Sigma of the velocity's direction against those axes, rad: sideslip, a pitch by load or current. 0: off."),
     F64("states.velocity_direction_tau_s", velocity_direction_tau_s, 10, 0, 1e6,
         "Time constant of that direction as a Gauss-Markov process, s. 0: it is constant."),
-    F64("states.camera_rotation_sigma_rad", camera_rotation_sigma, 0, 0, 1,
-        "Sigma of the rotation of the camera pair against calibration.yaml's mounting, about each axis, rad. 0: off."),
+    F64("states.camera_rotation_sigma_rad", camera_rotation_sigma, -1, -1, 1,
+        "Sigma of the rotation of the camera pair against calibration.yaml's mounting, about each axis, rad. 0: off. "
+        "Below 0: what a pixel's sigma has beyond a detector's 1 px, over the focal length, with a time constant of 2 "
+        "s "
+        "where camera_rotation_tau_s is 0."),
     F64("states.camera_rotation_tau_s", camera_rotation_tau_s, 0, 0, 1e6,
         "Time constant of that rotation as a Gauss-Markov process, s: play of a mounting, shutters and clocks that "
         "differ a little. 0: it is constant."),
@@ -50,7 +55,8 @@ static const wm_param kParams[] = {
         "Sigma of the camera pair's place against calibration.yaml's, on each axis, m. 0: off."),
     F64("states.camera_place_tau_s", camera_place_tau_s, 0, 0, 1e6, "As camera_rotation_tau_s, for the place."),
     F64("states.time_offset_sigma_s", time_offset_sigma, 0.02, 0, 0.2,
-        "Start sigma of the pictures' time offset, s: by how much they are older than their stamps. 0: off."),
+        "Start sigma of the pictures' time offset, s: by how much they are older than their stamps. With twist only. "
+        "0: off."),
     F64("states.increment_scale_sigma", increment_scale_sigma, 0.02, 0, 1,
         "Sigma of the share by which motion between two pictures is too long: disparities that are all off by 0.2 px "
         "at "

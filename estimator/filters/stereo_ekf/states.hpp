@@ -32,76 +32,80 @@ enum head_state {
   kHeadStates
 };
 
+// With which prediction a state exists. With velocity and rates as states the pictures' time offset is none of them:
+// its derivative would be a velocity by the same pictures.
+enum class head_use { always, with_rates, with_twist };
+
 struct head_spec {
   int width;
   double neutral;
   const char *name[3];  // NULL: not listed
   // Start sigma; random walk per sqrt(s); above 0: time constant of a Gauss-Markov process of that sigma. NULL: 0.
   double wm_stereo_ekf_params::*sigma, wm_stereo_ekf_params::*walk, wm_stereo_ekf_params::*tau_s;
-  bool of_rates;  // exists with velocity and rates as states only
+  head_use use;
 };
 
 using stereo_params = wm_stereo_ekf_params;
 inline constexpr head_spec kHeadSpecs[kHeadStates] = {
-    {3, 0, {}, nullptr, nullptr, nullptr, false},
-    {3, 0, {}, nullptr, nullptr, nullptr, false},
+    {3, 0, {}, nullptr, nullptr, nullptr, head_use::always},
+    {3, 0, {}, nullptr, nullptr, nullptr, head_use::always},
     {3,
      0,
      {"motion.vx_mps", "motion.vy_mps", "motion.vz_mps"},
      &stereo_params::cv_v_sigma,
      &stereo_params::cv_v_walk,
      &stereo_params::cv_tau_s,
-     true},
+     head_use::with_rates},
     {3,
      0,
      {"motion.wx_radps", "motion.wy_radps", "motion.wz_radps"},
      &stereo_params::cv_w_sigma,
      &stereo_params::cv_w_walk,
      &stereo_params::cv_tau_s,
-     true},
+     head_use::with_rates},
     {3,
      0,
      {"motion.rate_bias_x_radps", "motion.rate_bias_y_radps", "motion.rate_bias_z_radps"},
      &stereo_params::rate_bias_sigma,
      &stereo_params::rate_bias_walk,
      nullptr,
-     false},
-    {1, 1, {"motion.velocity_scale"}, &stereo_params::velocity_scale_sigma, nullptr, nullptr, false},
+     head_use::always},
+    {1, 1, {"motion.velocity_scale"}, &stereo_params::velocity_scale_sigma, nullptr, nullptr, head_use::always},
     {3,
      0,
      {"motion.axes_x_rad", "motion.axes_y_rad", "motion.axes_z_rad"},
      &stereo_params::twist_axes_sigma,
      nullptr,
      nullptr,
-     false},
+     head_use::always},
     {3,
      0,
      {"motion.direction_x_rad", "motion.direction_y_rad", "motion.direction_z_rad"},
      &stereo_params::velocity_direction_sigma,
      nullptr,
      &stereo_params::velocity_direction_tau_s,
-     false},
+     head_use::always},
     {3,
      0,
      {"stereo.turn_right_rad", "stereo.turn_down_rad", "stereo.turn_ahead_rad"},
      &stereo_params::camera_rotation_sigma,
      nullptr,
      &stereo_params::camera_rotation_tau_s,
-     false},
+     head_use::always},
     {3,
      0,
      {"stereo.x_m", "stereo.y_m", "stereo.z_m"},
      &stereo_params::camera_place_sigma,
      nullptr,
      &stereo_params::camera_place_tau_s,
-     false},
-    {1, 0, {"stereo.time_offset_s"}, &stereo_params::time_offset_sigma, nullptr, nullptr, false},
-    {1, 0, {}, &stereo_params::increment_scale_sigma, nullptr, nullptr, false},
-    {3, 0, {}, &stereo_params::increment_direction_sigma, nullptr, nullptr, false},
-    {1, 0, {"range.bias_m"}, &stereo_params::range_bias_sigma, nullptr, nullptr, false},
-    {1, 0, {"bearing.bias_rad"}, &stereo_params::bearing_bias_sigma, nullptr, nullptr, false},
-    {1, 0, {"motion.velocity_lag_s"}, &stereo_params::twist_lag_sigma, nullptr, nullptr, true},
-    {1, 0, {"motion.rate_lag_s"}, &stereo_params::twist_lag_sigma, nullptr, nullptr, true},
+     head_use::always},
+    {1, 0, {"stereo.time_offset_s"}, &stereo_params::time_offset_sigma, nullptr, nullptr, head_use::with_twist},
+    {1, 0, {}, &stereo_params::increment_scale_sigma, nullptr, nullptr, head_use::always},
+    {3, 0, {}, &stereo_params::increment_direction_sigma, nullptr, nullptr, head_use::always},
+    {1, 0, {"range.bias_m"}, &stereo_params::range_bias_sigma, nullptr, nullptr, head_use::always},
+    {1, 0, {"bearing.bias_rad"}, &stereo_params::bearing_bias_sigma, nullptr, nullptr, head_use::always},
+    {1, 0, {"motion.velocity_lag_s"}, &stereo_params::twist_lag_sigma, nullptr, nullptr, head_use::with_rates},
+    {1, 0, {"motion.rate_lag_s"}, &stereo_params::twist_lag_sigma, nullptr, nullptr, head_use::with_rates},
 };
 
 constexpr int head_width_max() {
@@ -126,7 +130,8 @@ inline void models_of(const wm_stereo_ekf_params &params, head_model out[kHeadSt
   const bool rates = params.prediction == WM_PREDICT_CONSTANT_VELOCITY;
   for (int k = 0; k < kHeadStates; k++) {
     const head_spec &s = kHeadSpecs[k];
-    const bool off = (s.of_rates && !rates) || (!params.increments && is_of_increments(k));
+    const bool unused = s.use == (rates ? head_use::with_twist : head_use::with_rates);
+    const bool off = unused || (!params.increments && is_of_increments(k));
     out[k] = {off       ? 0.0
               : s.sigma ? params.*s.sigma
                         : kMovedSigma,

@@ -9,6 +9,7 @@
 #include "filters/registry.h"
 #include "memory/layout.hpp"
 #include "motion/event_time.hpp"
+#include "motion/motion_params.h"
 
 namespace wm {
 namespace {
@@ -27,6 +28,10 @@ constexpr double kTwistSigma_mps = 0.03, kTwistSigma_radps = 0.01;
 // rectification.
 constexpr double kPixel_px = 0.5;
 
+// A detector finds a corner to a pixel. What a stated sigma has beyond that is of the calibration and of the shutters:
+// all of a picture's points err alike, for about as long as the view stays the same. Not swept.
+constexpr double kDetector_px = 1.0, kLasting_s = 2.0;
+
 double first_of(double set, double calibrated, double otherwise) {
   if (set > 0.0) return set;
   return finite(calibrated) && calibrated > 0.0 ? calibrated : otherwise;
@@ -41,10 +46,33 @@ spatial_noise twist_noise_of(const wm_stereo_ekf_params &p, const wm_rig *rig) {
   return out;
 }
 
-// Without a pair of cameras there are no points and no tracks.
-wm_stereo_ekf_params usable(const wm_stereo_ekf_params &params, const stereo_rig &rig) {
+// Of one coordinate in a picture, px.
+double pixel_sigma(const wm_stereo_ekf_params &p, const stereo_rig &rig, int coordinate) {
+  return first_of(p.pixel_px, rig.sigma_px[coordinate], kPixel_px);
+}
+
+// Sigma of the camera pair's rotation by which all points of a picture err alike, rad.
+double lasting_error_of(const wm_stereo_ekf_params &p, const stereo_rig &rig) {
+  if (!rig.there) return 0.0;
+  double excess_px2 = -square(kDetector_px);
+  for (int i = 0; i < 4; i++) excess_px2 += 0.25 * square(pixel_sigma(p, rig, i));
+  return excess_px2 > 0.0 ? std::sqrt(excess_px2) / rig.fu : 0.0;
+}
+
+// The parameters with what the setup decides: without a pair of cameras there are no points and no tracks, and without
+// a stream of motion velocity and rates are states, and those of a measured twist are not.
+wm_stereo_ekf_params usable(const wm_stereo_ekf_params &params, const stereo_rig &rig, const wm_setup &setup) {
   wm_stereo_ekf_params out = params;
   if (!rig.there) out.points_max = out.increments = 0;
+  if (out.camera_rotation_sigma < 0.0) {
+    out.camera_rotation_sigma = lasting_error_of(params, rig);
+    if (!(out.camera_rotation_tau_s > 0.0)) out.camera_rotation_tau_s = kLasting_s;
+  }
+  if (setup.motion->model == WM_MOTION_CONSTANT_VELOCITY) {
+    out.prediction = WM_PREDICT_CONSTANT_VELOCITY;
+    out.rate_bias_sigma = out.velocity_scale_sigma = out.twist_axes_sigma = out.velocity_direction_sigma = 0.0;
+    out.twist_lag_sigma = 0.0;
+  }
   return out;
 }
 
@@ -72,7 +100,7 @@ size_t stereo_ekf::bytes(const wm_stereo_ekf_params &params, const wm_setup &set
     return 0;
   }
   memory_layout layout(nullptr, sizeof(stereo_ekf));
-  place(&layout, usable(params, rig), setup);
+  place(&layout, usable(params, rig, setup), setup);
   return layout.bytes();
 }
 
@@ -89,10 +117,10 @@ void stereo_ekf::init(const wm_stereo_ekf_params &params, const wm_setup &setup)
   std::memset(static_cast<void *>(this), 0, bytes(params, setup, &why));
   memory_layout layout(this, sizeof *this);
   (void)rig_.init(setup.rig, &why);
-  params_ = usable(params, rig_);
+  params_ = usable(params, rig_, setup);
   const arrays behind = place(&layout, params_, setup);
   setup_ = &setup;
-  for (int i = 0; i < 4; i++) sigma_px_[i] = first_of(params.pixel_px, rig_.sigma_px[i], kPixel_px);
+  for (int i = 0; i < 4; i++) sigma_px_[i] = pixel_sigma(params, rig_, i);
   motion_.init(setup.motion, &setup.wheels, twist_noise_of(params, setup.rig));
   head_model models[kHeadStates];
   models_of(params_, models);

@@ -11,6 +11,7 @@
 #include "events.hpp"
 #include "math/eigen.hpp"
 #include "math/rotation.hpp"
+#include "motion/motion_params.h"
 #include "unity.h"
 #include "waymark/estimator.h"
 #include "waymark/random.h"
@@ -97,6 +98,11 @@ struct scene {
     }
     TEST_FAIL_MESSAGE(key);
   }
+  // As the assembly chooses for a recording without any stream of motion.
+  void without_motion() {
+    const int32_t model = WM_MOTION_CONSTANT_VELOCITY;
+    std::memcpy(&motion[offsetof(wm_motion_params, model)], &model, sizeof model);
+  }
   void begin() {
     setup.motion = reinterpret_cast<const wm_motion_params *>(motion.data());
     setup.sightings = &sightings;
@@ -120,16 +126,20 @@ struct scene {
   }
   // Truth and filter go on by dt with a twist that holds.
   void swim(double dt_s, const vec3 &v, const vec3 &w) {
+    say_twist(v, w);
+    start_of_step = truth.p;
+    truth.p = truth.p + matrix_of(truth.q) * (dt_s * (mean_turn(dt_s * w) * v));
+    truth.q = normalized(truth.q * turn_by(dt_s * w));
+    t_s += dt_s;
+  }
+  void say_twist(const vec3 &v, const vec3 &w) {
+    if (reinterpret_cast<const wm_motion_params *>(motion.data())->model == WM_MOTION_CONSTANT_VELOCITY) return;
     wm_event e = make::empty(t_s, WM_EVENT_TWIST6);
     for (int i = 0; i < 3; i++) {
       e.as.twist6.v_mps[i] = v[i] / log_scale + noise_v * noise();
       e.as.twist6.w_radps[i] = w[i] + gyro_bias[i] + noise_w * noise();
     }
     TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &e));
-    start_of_step = truth.p;
-    truth.p = truth.p + matrix_of(truth.q) * (dt_s * (mean_turn(dt_s * w) * v));
-    truth.q = normalized(truth.q * turn_by(dt_s * w));
-    t_s += dt_s;
   }
   bool pixels(const wm_landmark &l, double px[4]) const {
     const vec3 b = transposed_times(matrix_of(truth.q), vec_of(l.p_m) - truth.p);
@@ -163,6 +173,19 @@ struct scene {
     wm_estimate e;
     ekf->estimate(state, &e);
     return e;
+  }
+  // Normalised error squared of the place, over its three degrees.
+  double nees() const {
+    const wm_estimate at = estimate();
+    vector<3> off, whole;
+    matrix<3> p, root;
+    for (int i = 0; i < 3; i++) {
+      off(i) = whole(i) = truth.p[i] - at.pose_map_base.p_m[i];
+      for (int j = 0; j < 3; j++) p(i, j) = at.covariance[wm_cov_index(i, j)];
+    }
+    TEST_ASSERT_TRUE(cholesky<3>(p, &root));
+    substitute<3>(root, &whole);
+    return off.dot(whole) / 3;
   }
   double place_error() const { return length(vec_of(estimate().pose_map_base.p_m) - truth.p); }
   double turn_error() const { return length(turn_of(conjugate(quat_of(estimate().pose_map_base.q_xyzw)) * truth.q)); }
