@@ -20,6 +20,7 @@
 #define EXPOSURE_EVERY_NS WM_NS_PER_S  // automatic exposure is slow
 
 struct wm_camera_device {
+  wm_frame_source base;
   wm_camera_device_config config;
   uint32_t width, height;  // as calibrated
   int32_t index;
@@ -32,6 +33,8 @@ struct wm_camera_device {
   camera_mode mode;
   int format;
   int has_held, was_told;
+  int has_head;  // of the held buffer, whose pixels nobody has seen yet
+  wm_frame head;
   camera_buffer newest;
   uint32_t held;   // the buffer whose pixels the caller has
   uint32_t stale;  // buffers still to be thrown away
@@ -72,7 +75,7 @@ __attribute__((format(printf, 2, 3))) static void tell(const wm_camera_device *s
 static void shut(wm_camera_device *self) {
   if (self->camera) self->io->close(self->camera);
   self->camera = NULL;
-  self->has_held = 0;
+  self->has_held = self->has_head = 0;
 }
 
 // What the driver changed is said; another size than the calibration's can't be used at all.
@@ -231,27 +234,37 @@ static int judge(wm_camera_device *self, const camera_buffer *b, wm_frame *out) 
                     .camera = self->index,
                     .width_px = self->width,
                     .height_px = self->height,
-                    .stride_bytes = self->width,
-                    .grey = self->grey};
+                    .stride_bytes = self->width};
   return stamp(self, b, now_ns, out);
 }
 
 static void give_back(wm_camera_device *self, uint32_t buffer) { (void)self->io->give_back(self->camera, buffer); }
 
+// Rows of a driver's buffer, which may be memory that is slow to read: each byte once.
+static void copy_rows(const uint8_t *from, uint32_t stride, uint32_t width, uint32_t height, uint8_t *to) {
+  for (uint32_t y = 0; y < height; y++) memcpy(to + (size_t)y * width, from + (size_t)y * stride, width);
+}
+
 // Grey pixels of the held buffer.
 static int see(wm_camera_device *self, const camera_buffer *b, wm_frame *out) {
   char why[120];
+  uint8_t *grey = self->base.into ? self->base.into : self->grey;
+  out->grey = grey;
   if (pixels_are_grey(self->format)) {
-    out->grey = b->data;
-    out->stride_bytes = self->mode.stride;
+    if (self->base.into) {
+      copy_rows(b->data, self->mode.stride, self->width, self->height, grey);
+    } else {
+      out->grey = b->data;
+      out->stride_bytes = self->mode.stride;
+    }
   } else if (self->format == PIXELS_MJPEG) {
-    if (jpeg_decode(&self->jpeg, b->data, b->bytes, self->width, self->height, self->grey, self->width, why,
-                    sizeof why) != JPEG_GOOD) {
+    if (jpeg_decode(&self->jpeg, b->data, b->bytes, self->width, self->height, grey, self->width, why, sizeof why) !=
+        JPEG_GOOD) {
       self->counts.damaged++;
       return 0;
     }
   } else {
-    pixels_to_grey(self->format, b->data, self->width, self->height, self->mode.stride, self->grey);
+    pixels_to_grey(self->format, b->data, self->width, self->height, self->mode.stride, grey);
   }
   return 1;
 }
@@ -299,8 +312,9 @@ static int take_newest(wm_camera_device *self, camera_buffer *kept, wm_frame *fr
   return have;
 }
 
-wm_status wm_camera_device_next(wm_camera_device *self, wm_frame *out, wm_error *err) {
-  (void)err;
+// The newest picture, not yet seen: self->head.
+static wm_status find_head(wm_camera_device *self) {
+  if (self->has_head) return WM_OK;
   if (self->has_held) give_back(self, self->held);
   self->has_held = 0;
   if (!self->camera) look_for_camera(self, self->io->monotonic_ns(self->io_context));
@@ -309,7 +323,7 @@ wm_status wm_camera_device_next(wm_camera_device *self, wm_frame *out, wm_error 
     return WM_AGAIN;
   }
   camera_buffer kept = {0};
-  int got = take_newest(self, &kept, out);
+  int got = take_newest(self, &kept, &self->head);
   if (got < 0) {
     gone(self, -got);
     return WM_AGAIN;
@@ -320,8 +334,17 @@ wm_status wm_camera_device_next(wm_camera_device *self, wm_frame *out, wm_error 
   }
   self->held = kept.index;
   self->newest = kept;
-  self->has_held = 1;
-  if (!see(self, &kept, out)) return WM_AGAIN;
+  self->has_held = self->has_head = 1;
+  return WM_OK;
+}
+
+wm_status wm_camera_device_next(wm_camera_device *self, wm_frame *out, wm_error *err) {
+  (void)err;
+  wm_status status = find_head(self);
+  if (status != WM_OK) return status;
+  self->has_head = 0;
+  *out = self->head;
+  if (!see(self, &self->newest, out)) return WM_AGAIN;
   set_state(self, WM_DEVICE_WORKS, "gives pictures");
   self->counts.frames++;
   return WM_OK;
@@ -332,6 +355,52 @@ void wm_camera_device_raw(const wm_camera_device *self, wm_camera_raw *out) {
 }
 
 const wm_camera_counts *wm_camera_device_counted(const wm_camera_device *self) { return &self->counts; }
+
+// ── as a frame source ───────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_status peek(wm_frame_source *base, wm_frame *out, wm_error *err) {
+  wm_camera_device *self = (wm_camera_device *)base;
+  (void)err;
+  wm_status status = find_head(self);
+  if (status == WM_OK) *out = self->head;
+  return status;
+}
+
+static wm_status next(wm_frame_source *base, wm_frame *out, wm_error *err) {
+  return wm_camera_device_next((wm_camera_device *)base, out, err);
+}
+
+static wm_status skip(wm_frame_source *base, wm_error *err) {
+  wm_camera_device *self = (wm_camera_device *)base;
+  (void)err;
+  wm_status status = find_head(self);
+  self->counts.skipped += status == WM_OK;
+  self->has_head = 0;
+  return status;
+}
+
+static void raw(const wm_frame_source *base, wm_camera_raw *out) {
+  wm_camera_device_raw((const wm_camera_device *)base, out);
+}
+
+static void count(const wm_frame_source *base, wm_source_counts *out) {
+  const wm_camera_counts *c = &((const wm_camera_device *)base)->counts;
+  *out = (wm_source_counts){.lost = c->lost,
+                            .malformed = c->damaged,
+                            .not_finite = c->bad_stamps,
+                            .out_of_order = c->out_of_order,
+                            .frozen = c->duplicated,
+                            .overflows = c->skipped,
+                            .device = c->device,
+                            .stamp_uncertainty_ns = c->stamp_uncertainty_ns};
+  memcpy(out->device_note, c->device_note, sizeof out->device_note);
+}
+
+static void close_device(wm_frame_source *base) { wm_camera_device_close((wm_camera_device *)base); }
+
+static const wm_frame_source_ops kFrames = {peek, next, skip, NULL, raw, count, close_device};
+
+wm_frame_source *wm_camera_device_frames(wm_camera_device *self) { return &self->base; }
 
 void wm_camera_device_close(wm_camera_device *self) {
   if (!self) return;
@@ -347,6 +416,7 @@ wm_status camera_device_make(const wm_camera_device_config *config, const wm_cam
   *out = NULL;
   wm_camera_device *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "camera %s: no memory for it", config->name);
+  self->base = (wm_frame_source){.ops = &kFrames, .is_live = 1};
   self->config = *config;
   self->width = camera->width_px;
   self->height = camera->height_px;

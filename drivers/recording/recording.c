@@ -19,7 +19,7 @@
 struct wm_recording {
   char dir[WM_PATH_MAX];
   char name[128];
-  int is_robot;  // no folder: the overrides' files and devices
+  int has_folder;  // else: the overrides' files, and what is added
   double duration_s;
   wm_start start;
   wm_yaml *about;  // recording.yaml
@@ -39,6 +39,7 @@ struct wm_recording {
   uint32_t quantities;
   wm_source *sources[WM_SOURCES_MAX];
   size_t source_count;
+  wm_pictures *pictures;  // NULL: the folder's videos
 };
 
 static wm_status path_of(const wm_recording *self, const char *file, char out[WM_PATH_MAX], wm_error *err) {
@@ -56,7 +57,7 @@ static wm_status choose(const wm_recording *self, const char *override, const ch
     return WM_OK;
   }
   wm_status status = path_of(self, file, out, err);
-  *there = status == WM_OK && !self->is_robot && access(out, F_OK) == 0;
+  *there = status == WM_OK && self->has_folder && access(out, F_OK) == 0;
   return status;
 }
 
@@ -303,6 +304,7 @@ wm_status wm_recording_open(const char *dir, const wm_recording_overrides *overr
   snprintf(self->dir, sizeof self->dir, "%.*s", (int)(length < WM_PATH_MAX ? length : WM_PATH_MAX - 1), dir);
   const char *slash = strrchr(self->dir, '/');
   snprintf(self->name, sizeof self->name, "%s", slash && slash[1] ? slash + 1 : self->dir);
+  self->has_folder = 1;
   self->duration_s = (double)NAN;
   self->warn = (warner){warn, context};
   if (overrides) self->overrides = *overrides;
@@ -326,7 +328,6 @@ wm_status wm_recording_open_robot(const char *name, const wm_recording_overrides
   if (!self) return wm_fail(err, WM_IO, "%s: no memory for it", name);
   snprintf(self->name, sizeof self->name, "%s", name);
   snprintf(self->dir, sizeof self->dir, "%s", name);
-  self->is_robot = 1;
   self->duration_s = (double)NAN;
   self->warn = (warner){warn, context};
   self->overrides = *overrides;
@@ -347,11 +348,14 @@ wm_status wm_recording_add_device(wm_recording *self, wm_source *device, uint32_
   return add_source(self, device, err);
 }
 
-int wm_recording_is_robot(const wm_recording *self) { return self->is_robot; }
+void wm_recording_set_pictures(wm_recording *self, wm_pictures *pictures) { self->pictures = pictures; }
+
+wm_pictures *wm_recording_pictures(const wm_recording *self) { return self->pictures; }
 
 void wm_recording_close(wm_recording *self) {
   if (!self) return;
   for (size_t i = 0; i < self->source_count; i++) self->sources[i]->ops->close(self->sources[i]);
+  if (self->pictures) self->pictures->ops->close(self->pictures);
   wm_yaml_free(self->about);
   free(self->calibration_text);
   free(self->landmarks);

@@ -31,6 +31,7 @@ typedef struct located {
 } located;
 
 struct wm_video {
+  wm_frame_source base;
   container file;
   csv_reader csv;
   jpeg_decoder jpeg;
@@ -363,6 +364,45 @@ wm_status wm_video_skip_to(wm_video *self, wm_time_ns now_ns, wm_error *err) {
   return status == WM_END ? WM_OK : status;
 }
 
+// ── as a frame source ───────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_status peek(wm_frame_source *base, wm_frame *out, wm_error *err) {
+  return wm_video_peek((wm_video *)base, out, err);
+}
+
+static wm_status next(wm_frame_source *base, wm_frame *out, wm_error *err) {
+  wm_video *self = (wm_video *)base;
+  return wm_video_next_into(self, base->into ? base->into : self->pixels, self->width_px, out, err);
+}
+
+static wm_status skip(wm_frame_source *base, wm_error *err) { return wm_video_skip((wm_video *)base, err); }
+
+static wm_status skip_to(wm_frame_source *base, wm_time_ns now_ns, wm_error *err) {
+  return wm_video_skip_to((wm_video *)base, now_ns, err);
+}
+
+static void raw(const wm_frame_source *base, wm_camera_raw *out) {
+  const wm_video *self = (const wm_video *)base;
+  *out = (wm_camera_raw){.data = self->bytes[1],  // the newest; the other one is for the next
+                         .bytes = (uint32_t)self->before_length,
+                         .is_jpeg = self->file.coding == PICTURE_JPEG};
+}
+
+static void count_all(const wm_frame_source *base, wm_source_counts *out) {
+  const wm_video_counts *c = &((const wm_video *)base)->counts;
+  *out = (wm_source_counts){.lost = c->lost + c->empty + c->without_picture,
+                            .malformed = c->malformed + c->damaged + c->wrong_size + c->without_stamp,
+                            .frozen = c->duplicated,
+                            .overflows = c->skipped};
+  (void)snprintf(out->first_problem, sizeof out->first_problem, "%s", c->first_problem);
+}
+
+static void close_video(wm_frame_source *base) { wm_video_close((wm_video *)base); }
+
+static const wm_frame_source_ops kFrames = {peek, next, skip, skip_to, raw, count_all, close_video};
+
+wm_frame_source *wm_video_frames(wm_video *self) { return &self->base; }
+
 // ── opening ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 // A camera of unknown size has that of its first picture.
@@ -421,6 +461,7 @@ wm_status wm_video_open(const char *recording_dir, const wm_camera *camera, int3
   *out = NULL;
   wm_video *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "%s: no memory to open its video", recording_dir);
+  self->base.ops = &kFrames;
   self->file.fd = self->csv.lines.fd = -1;
   self->camera = index;
   self->newest_row = -1;

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <inttypes.h>
+#include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 
 #include "commands.h"
 #include "options.h"
 #include "waymark/clock.h"
+#include "waymark/record.h"
 #include "waymark/robot.h"
 #include "waymark/run.h"
 #include "waymark/saved_pose.h"
@@ -24,6 +27,7 @@ static const char kHelp[] =
     "  --config FILE          which estimator, and its parameters\n"
     "  --recording RECORDING  play this recording instead of devices\n"
     "  --out FOLDER           trajectory, published poses, event log, health and timing\n"
+    "  --record NEW           records the devices meanwhile, into a new folder, as `waymark record` does\n"
     "  --duration S           seconds, then stop\n"
     "  --speed X              times real speed (default 1)\n"
     "  --seed N               of random numbers (default 1)\n"
@@ -36,11 +40,12 @@ static const char kHelp[] =
     "  waymark run --config config/starry-night-plan.yaml --recording RECORDING --out out/run --duration 60\n";
 
 typedef struct arguments {
-  const char *config, *recording, *landmarks, *calibration, *map;
+  const char *config, *recording, *record, *landmarks, *calibration, *map;
   wm_run_options run;
 } arguments;
 
-#define BLIND_S 0.5  // from the end of one run to the first motion of the next, in one process
+#define RECORD_FREE_MB 500  // left on the disk for others, as `waymark record` does by default
+#define BLIND_S 0.5         // from the end of one run to the first motion of the next, in one process
 
 static atomic_int stop, reload_asked;
 
@@ -85,12 +90,19 @@ static void close_all(opened *self) {
   self->recording = NULL;
 }
 
+// A recording that is played stands in for the robot's devices; the robot's own state is left alone.
+static void without_robot(wm_config *config) {
+  config->saved_pose[0] = config->black_box[0] = '\0';
+  config->devices.sightings_by_lcm = 0;
+}
+
 static wm_status open_all(const arguments *args, opened *out, wm_error *err) {
   wm_config *config = &out->config;
   memset(out, 0, sizeof *out);
   wm_status status = wm_config_load(args->config, config, err);
   if (status != WM_OK) return err->status = WM_BAD_CONFIG;  // also where it isn't there
   wm_config_each_warning(config, print_note, NULL);
+  if (args->recording) without_robot(config);
   status = override_path(config->overrides.landmarks, args->landmarks, err);
   if (status == WM_OK) status = override_path(config->overrides.calibration, args->calibration, err);
   if (status == WM_OK) status = override_path(config->overrides.map, args->map, err);
@@ -119,14 +131,74 @@ static wm_status open_next(void *context, wm_error *err) {
   return status;
 }
 
-static wm_status run_once(const opened *with, const wm_run_options *options, wm_live_report *report, wm_error *err) {
+// ── recording meanwhile ─────────────────────────────────────────────────────────────────────────────────────────────
+
+typedef struct recorder {
+  const wm_config *config;
+  wm_record_options options;
+  wm_record_report report;
+  atomic_int stop;
+  wm_status status;
+  wm_error error;
+  pthread_t thread;
+  int is_started;
+} recorder;
+
+static void *record(void *argument) {
+  recorder *self = argument;
+  self->status = wm_record(self->config, &self->options, &self->report, &self->error);
+  if (self->status != WM_OK) {
+    char line[sizeof self->error.text + 60];
+    (void)snprintf(line, sizeof line, "record: %s. Localizing goes on", self->error.text);
+    print_note(NULL, line);
+  }
+  return NULL;
+}
+
+// Signals are the first thread's.
+static void recorder_start(recorder *self, const opened *with, const char *out_dir) {
+  sigset_t all, before;
+  memset(self, 0, sizeof *self);
+  if (!out_dir) return;
+  self->config = &with->config;
+  self->options = (wm_record_options){.robot = with->recording,
+                                      .out_dir = out_dir,
+                                      .bytes_free_min = RECORD_FREE_MB * UINT64_C(1000000),
+                                      .stop = &self->stop,
+                                      .say = print_note};
+  (void)sigfillset(&all);
+  (void)pthread_sigmask(SIG_SETMASK, &all, &before);
+  self->is_started = pthread_create(&self->thread, NULL, record, self) == 0;
+  (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
+  if (!self->is_started) self->status = wm_fail(&self->error, WM_IO, "no thread to record by");
+}
+
+static wm_status recorder_end(recorder *self, wm_error *err) {
+  atomic_store(&self->stop, 1);
+  if (!self->is_started) return self->status;
+  (void)pthread_join(self->thread, NULL);
+  (void)printf("%s: %" PRIu64 " CAN frames, %" PRIu64 " pictures, %.1f MB; %" PRIu64 " lost\n", self->options.out_dir,
+               self->report.frames, self->report.pictures, (double)self->report.bytes * 1e-6, self->report.lost);
+  if (self->status != WM_OK) *err = self->error;
+  return self->status;
+}
+
+// ── one configuration's run ─────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_status run_once(const opened *with, const char *record_dir, const wm_run_options *options,
+                          wm_live_report *report, wm_error *err) {
+  static recorder beside;
+  wm_error record_error = {0};
   wm_time_ns begin_ns = wm_monotonic_ns();
+  recorder_start(&beside, with, record_dir);
   wm_status status = wm_run_live(&with->config, with->recording, options, report, err);
+  wm_status recorded = recorder_end(&beside, &record_error);
   if (status != WM_OK) return status;
+  if (recorded != WM_OK) *err = record_error;
   print_report(&report->run, wm_recording_name(with->recording), options->out_dir ? options->out_dir : "nowhere",
                wm_seconds_between(begin_ns, wm_monotonic_ns()));
   print_times(report);
-  return status;
+  return recorded;
 }
 
 static int run(const arguments *args) {
@@ -137,13 +209,13 @@ static int run(const arguments *args) {
   if (open_all(args, &now, &err) != WM_OK) return complain(&err);
   wm_run_options options = args->run;
   wm_start start;
-  char out_dir[WM_PATH_MAX + 16];
+  char out_dir[WM_PATH_MAX + 16], record_dir[WM_PATH_MAX + 16];
   reload.args = args;
   options.reload = open_next;
   options.reload_context = &reload;
   options.reload_asked = args->recording ? NULL : &reload_asked;
   catch_signals();
-  wm_status status = run_once(&now, &options, &report, &err);
+  wm_status status = run_once(&now, args->record, &options, &report, &err);
   for (int part = 2; status == WM_OK && report.wants_restart; part++) {
     close_all(&now);
     now = reload.next;
@@ -152,13 +224,22 @@ static int run(const arguments *args) {
       wm_start_from_estimate(&report.last, BLIND_S, &start);
       options.start = &start;
     }
-    // A log holds one configuration.
+    // A log holds one configuration, and so does a recording.
     (void)snprintf(out_dir, sizeof out_dir, "%s.%d", args->run.out_dir ? args->run.out_dir : "", part);
     if (args->run.out_dir) options.out_dir = out_dir;
-    status = run_once(&now, &options, &report, &err);
+    (void)snprintf(record_dir, sizeof record_dir, "%s.%d", args->record ? args->record : "", part);
+    status = run_once(&now, args->record ? record_dir : NULL, &options, &report, &err);
   }
   close_all(&now);
   return status == WM_OK ? EXIT_DONE : complain(&err);
+}
+
+static wm_status check_new_recording(const char *folder, const char *played, wm_error *err) {
+  struct stat there;
+  if (played) return wm_fail(err, WM_BAD_USAGE, "--record: records devices; with --recording there are none");
+  if (stat(folder, &there) == 0)
+    return wm_fail(err, WM_BAD_USAGE, "--record: %s is there already; a recording is never written over", folder);
+  return WM_OK;
 }
 
 int command_run(int argc, char *const *argv) {
@@ -167,6 +248,7 @@ int command_run(int argc, char *const *argv) {
   const option options[] = {{"--config", OPTION_TEXT, &args.config},
                             {"--recording", OPTION_TEXT, &args.recording},
                             {"--out", OPTION_TEXT, &args.run.out_dir},
+                            {"--record", OPTION_TEXT, &args.record},
                             {"--duration", OPTION_F64, &args.run.duration_s},
                             {"--speed", OPTION_F64, &args.run.speed},
                             {"--seed", OPTION_U64, &args.run.seed},
@@ -191,6 +273,7 @@ int command_run(int argc, char *const *argv) {
     (void)wm_fail(&err, WM_BAD_USAGE, "--speed: devices run at real speed; it is for a recording (--recording)");
     return complain(&err);
   }
+  if (args.record && check_new_recording(args.record, args.recording, &err) != WM_OK) return complain(&err);
   if (args.run.out_dir && check_out_dir(args.run.out_dir, args.recording ? args.recording : "", &err) != WM_OK)
     return complain(&err);
   return run(&args);

@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "cameras.h"
+
 // "can" for the only interface, "can:can1" where there are several.
 static wm_status add_can(const wm_config *config, wm_recording *robot, wm_error *err) {
   const wm_devices_config *devices = &config->devices;
@@ -19,9 +21,8 @@ static wm_status add_can(const wm_config *config, wm_recording *robot, wm_error 
   return status;
 }
 
-// Cameras are opened by who looks at their pictures (wm_vision_open).
-static wm_status check_cameras(const wm_config *config, const wm_recording *robot, wm_warn_fn warn, void *context,
-                               wm_error *err) {
+// A camera is opened with the first reader of its pictures.
+static wm_status check_cameras(const wm_config *config, const wm_recording *robot, wm_error *err) {
   const wm_devices_config *devices = &config->devices;
   for (size_t i = 0; i < devices->camera_count; i++) {
     int index = wm_rig_find_camera(wm_recording_rig(robot), devices->cameras[i].name);
@@ -32,8 +33,24 @@ static wm_status check_cameras(const wm_config *config, const wm_recording *robo
       return wm_fail(err, WM_BAD_CONFIG, "%s:%d: devices.cameras[%zu]: the calibration of '%s' has no image_size",
                      config->path, devices->cameras[i].line, i, devices->cameras[i].name);
   }
-  if (devices->camera_count > 0 && config->vision_count == 0 && warn)
-    warn(context, "devices.cameras: nothing looks at their pictures: `vision:` names no detector");
+  return WM_OK;
+}
+
+wm_status wm_robot_open_site(const wm_config *config, wm_warn_fn warn, void *context, wm_recording **out,
+                             wm_error *err) {
+  wm_recording *robot;
+  wm_pictures *pictures;
+  *out = NULL;
+  wm_status status = wm_recording_open_robot("robot", &config->overrides, warn, context, &robot, err);
+  if (status != WM_OK) return status;
+  status = check_cameras(config, robot, err);
+  if (status == WM_OK) status = cameras_open(config, warn, context, &pictures, err);
+  if (status != WM_OK) {
+    wm_recording_close(robot);
+    return status;
+  }
+  wm_recording_set_pictures(robot, pictures);
+  *out = robot;
   return WM_OK;
 }
 
@@ -45,10 +62,11 @@ wm_status wm_robot_open(const wm_config *config, wm_warn_fn warn, void *context,
                    "[{interface: can0}]}) or --recording",
                    config->path);
   wm_recording *robot;
-  wm_status status = wm_recording_open_robot("robot", &config->overrides, warn, context, &robot, err);
+  wm_status status = wm_robot_open_site(config, warn, context, &robot, err);
   if (status != WM_OK) return status;
-  status = check_cameras(config, robot, warn, context, err);
-  if (status == WM_OK) status = add_can(config, robot, err);
+  if (config->devices.camera_count > 0 && config->vision_count == 0 && warn)
+    warn(context, "devices.cameras: nothing looks at their pictures: `vision:` names no detector");
+  status = add_can(config, robot, err);
   if (status != WM_OK) {
     wm_recording_close(robot);
     return status;

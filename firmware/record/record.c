@@ -15,11 +15,14 @@
 #include "avi_writer.h"
 #include "copy_map.h"
 #include "waymark/clock.h"
+#include "waymark/robot.h"
 #include "waymark/text.h"
 
 #define LOOK_EVERY_MS 100
 #define SYNC_EVERY_NS WM_NS_PER_S
 #define FILE_BYTES_MAX (16u << 20)
+// A disk that is busy for a quarter of a second at 30 Hz costs no picture.
+static const wm_frame_wishes kEveryPicture = {.waiting_max = 8, .wait_ms = WM_DEVICE_WAIT_MS, .wants_raw = 1};
 
 typedef struct recorder recorder;
 
@@ -29,7 +32,7 @@ typedef struct stream {
   pthread_t thread;
   int started;
   wm_can_listener *can;
-  wm_camera_device *camera;
+  wm_frame_source *camera;
   char name[WM_NAME_MAX];
   FILE *data, *stamps;
   char data_path[WM_PATH_MAX + 80], stamps_path[WM_PATH_MAX + 80];
@@ -84,7 +87,8 @@ static int begin_video(stream *self, const wm_camera_raw *raw, const wm_frame *f
 static void take_picture(stream *self, const wm_frame *frame) {
   wm_camera_raw raw;
   recorder *all = self->all;
-  wm_camera_device_raw(self->camera, &raw);
+  self->camera->ops->raw(self->camera, &raw);
+  if (raw.is_jpeg && !raw.data) return;  // no memory for it
   int failed = self->pictures > 0 ? 0 : begin_video(self, &raw, frame);
   if (!failed && raw.is_jpeg) failed = avi_picture(self->data, raw.data, raw.bytes, 1, 0);
   if (!failed && !raw.is_jpeg)
@@ -99,10 +103,10 @@ static void take_picture(stream *self, const wm_frame *frame) {
   atomic_fetch_add(&all->bytes, raw.is_jpeg ? raw.bytes : (uint64_t)frame->width_px * frame->height_px);
 }
 
-static void say_device(stream *self, unsigned state, const char *note) {
-  if (state == self->said_device) return;
-  self->said_device = (uint8_t)state;
-  say(self->all, self->name, note);
+static void say_device(stream *self, const wm_source_counts *counts) {
+  if (counts->device == self->said_device) return;
+  self->said_device = counts->device;
+  say(self->all, self->name, counts->device_note);
 }
 
 static void *record_stream(void *argument) {
@@ -110,20 +114,19 @@ static void *record_stream(void *argument) {
   wm_error err;
   uint64_t lost = 0;
   while (!atomic_load(&self->all->stop)) {
-    uint64_t lost_now;
+    wm_source_counts counts;
     if (self->can) {
       wm_can_frame frame;
       if (wm_can_listener_next(self->can, &frame, &err) == WM_OK) take_frame(self, &frame);
-      const wm_source_counts *counts = wm_can_listener_counted(self->can);
-      lost_now = counts->overflows;
-      say_device(self, counts->device, counts->device_note);
+      counts = *wm_can_listener_counted(self->can);
+      counts.lost = counts.malformed = 0;  // what isn't there is no fault of the recording
     } else {
       wm_frame frame;
-      if (wm_camera_device_next(self->camera, &frame, &err) == WM_OK) take_picture(self, &frame);
-      const wm_camera_counts *counts = wm_camera_device_counted(self->camera);
-      lost_now = counts->lost + counts->skipped + counts->damaged;
-      say_device(self, counts->device, counts->device_note);
+      if (self->camera->ops->next(self->camera, &frame, &err) == WM_OK) take_picture(self, &frame);
+      self->camera->ops->counts(self->camera, &counts);
     }
+    say_device(self, &counts);
+    uint64_t lost_now = counts.lost + counts.overflows + counts.malformed;
     atomic_fetch_add(&self->all->lost, lost_now - lost);
     lost = lost_now;
   }
@@ -243,26 +246,23 @@ static wm_status open_cameras(recorder *self, wm_error *err) {
   if (devices->camera_count == 0) return WM_OK;
   (void)snprintf(folder, sizeof folder, "%s/video", self->options->out_dir);
   wm_status status = make_folder(folder, err);
+  wm_pictures *pictures = wm_recording_pictures(self->robot);
   for (size_t i = 0; status == WM_OK && i < devices->camera_count; i++) {
     const wm_rig *rig = wm_recording_rig(self->robot);
     int index = wm_rig_find_camera(rig, devices->cameras[i].name);
-    if (index < 0)
-      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: devices.cameras[%zu].name: '%s' is no camera of the calibration",
-                     self->config->path, devices->cameras[i].line, i, devices->cameras[i].name);
     stream *s = &self->streams[self->stream_count];
     s->all = self;
     (void)snprintf(s->name, sizeof s->name, "%s", devices->cameras[i].name);
     (void)snprintf(s->data_path, sizeof s->data_path, "%s/%s.avi", folder, devices->cameras[i].name);
     (void)snprintf(s->stamps_path, sizeof s->stamps_path, "%s/%s.csv", folder, devices->cameras[i].name);
-    status = wm_camera_device_open(&devices->cameras[i], &rig->cameras[index], index, self->options->say,
-                                   self->options->say_context, &s->camera, err);
+    status = pictures->ops->open(pictures, &rig->cameras[index], index, &kEveryPicture, &s->camera, err);
     if (status != WM_OK) return status;
     self->stream_count++;
     s->data = fopen(s->data_path, "wbe");
     s->stamps = fopen(s->stamps_path, "we");
     if (!s->data || !s->stamps) return wm_fail(err, WM_IO, "%s: can't be written: %s", s->data_path, strerror(errno));
   }
-  return status;
+  return status == WM_OK ? pictures->ops->start(pictures, err) : status;
 }
 
 // ── while it records ────────────────────────────────────────────────────────────────────────────────────────────────
@@ -316,12 +316,12 @@ static void close_all(recorder *self) {
   for (size_t i = 0; i < self->stream_count; i++) {
     stream *s = &self->streams[i];
     wm_can_listener_close(s->can);
-    wm_camera_device_close(s->camera);
+    if (s->camera) s->camera->ops->close(s->camera);
     if (s->data && fclose(s->data) != 0) fail(self, s->data_path, errno);
     if (s->stamps && fclose(s->stamps) != 0) fail(self, s->stamps_path, errno);
   }
   if (self->can_log && fclose(self->can_log) != 0) fail(self, "can.log", errno);
-  wm_recording_close(self->robot);
+  if (!self->options->robot) wm_recording_close(self->robot);
 }
 
 wm_status wm_record(const wm_config *config, const wm_record_options *options, wm_record_report *report,
@@ -333,8 +333,9 @@ wm_status wm_record(const wm_config *config, const wm_record_options *options, w
   if (!self) return wm_fail(err, WM_IO, "no memory to record");
   self->config = config;
   self->options = options;
-  wm_status status =
-      wm_recording_open_robot("robot", &config->overrides, options->say, options->say_context, &self->robot, err);
+  wm_status status = WM_OK;
+  self->robot = options->robot;
+  if (!self->robot) status = wm_robot_open_site(config, options->say, options->say_context, &self->robot, err);
   if (status == WM_OK) status = make_folder(options->out_dir, err);
   if (status == WM_OK) status = write_about(self, err);
   if (status == WM_OK) status = open_can(self, err);

@@ -99,6 +99,7 @@ void *disk_thread(void *argument) {
     sleep_until(wm_monotonic_ns() + kThreads[THREAD_DISK].period_ns);
     last = atomic_load_explicit(&run->publish.done, memory_order_acquire);  // which ends after the estimator
     take_outputs(run);
+    black_box_take_pictures(&run->disk.box);
     take_lines(run);
     say_lost_lines(run);
     say_slow(run);

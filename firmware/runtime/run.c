@@ -119,7 +119,7 @@ static wm_status add_commands(live *self, wm_recording *recording, wm_error *err
 
 // So are sightings that another program sends.
 static wm_status add_sightings(live *self, wm_recording *recording, wm_error *err) {
-  if (!wm_recording_is_robot(recording) || !self->config->devices.sightings_by_lcm) return WM_OK;
+  if (!self->config->devices.sightings_by_lcm) return WM_OK;
   size_t count;
   const wm_sensor *sensors = wm_recording_sensors(recording, &count);
   if (count == 0)
@@ -137,7 +137,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   if (status == WM_OK) status = wm_assemble(self->config, recording, self->options->seed, &self->assembly, err);
   if (status == WM_OK && self->options->start) {
     self->assembly.setup.start = *self->options->start;
-  } else if (status == WM_OK && wm_recording_is_robot(recording)) {
+  } else if (status == WM_OK) {
     start_where_it_was(self);
   }
   if (status == WM_OK) status = take_memory(self, err);
@@ -158,13 +158,16 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   }
   lcm_sink_open(&self->publish.lcm, params->publish_lcm, self->config->lcm_url, self->config->channel_prefix,
                 &self->assembly, live_say_later, self, NULL);
-  black_box_open(&self->disk.box, wm_recording_is_robot(recording) ? self->config->black_box : "",
-                 params->black_box_keep_s, params->black_box_pictures_hz, &self->assembly, self->options->say,
-                 self->options->say_context);
-  wm_vision_tell_pictures(self->assembly.vision, black_box_picture, &self->disk.box);
+  black_box_open(&self->disk.box, self->config->black_box, params->black_box_keep_s, params->black_box_pictures_hz,
+                 &self->assembly, self->options->say, self->options->say_context);
+  wm_pictures *pictures = wm_recording_pictures(recording);
+  if (pictures) {
+    status = black_box_open_pictures(&self->disk.box, pictures, wm_recording_rig(recording), err);
+    if (status == WM_OK) status = pictures->ops->start(pictures, err);
+  }
   notify_open(&self->publish.notify);
-  self->disk.keeps_pose = wm_recording_is_robot(recording) && self->config->saved_pose[0];
-  return WM_OK;
+  self->disk.keeps_pose = self->config->saved_pose[0];
+  return status;
 }
 
 static void start_clock(live *self) {
@@ -394,6 +397,7 @@ wm_status wm_run_live(const wm_config *config, wm_recording *recording, const wm
     status = closed;
     if (err) *err = close_error;
   }
+  black_box_close(&self->disk.box);  // where no thread did
   wm_assembly_close(&self->assembly);
   wm_arena_close(&self->arena);
   free(self);

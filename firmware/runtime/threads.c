@@ -14,6 +14,7 @@
 const thread_spec kThreads[THREAD_ROLES] = {
   //                   name         real time  stack            ring slots  wakes every         must not
   [THREAD_SOURCE]    = {"wm-source",   0,      (size_t)2 << 20, 0,          0                }, // touch the estimator
+  [THREAD_CAMERA]    = {"wm-camera",   0,      (size_t)2 << 20, 0,          0                }, // wait for a reader
   [THREAD_ESTIMATOR] = {"wm-estimate", 1,      (size_t)2 << 20, 8192,       0                }, // allocate, lock, make a system call but its sleep
   [THREAD_PUBLISH]   = {"wm-publish",  0,      (size_t)2 << 20, 0,          2 * WM_NS_PER_MS }, // touch a file, wait for a disk or a terminal
   [THREAD_DISK]      = {"wm-disk",     0,      (size_t)2 << 20, 0,          5 * WM_NS_PER_MS }, // hold any other thread up
@@ -73,7 +74,7 @@ wm_status thread_start(thread_role role, size_t number, const wm_config *config,
   if (failed) return wm_fail(err, WM_IO, "thread %s can't be started: %s", spec->name, strerror(failed));
 
   char name[16];
-  if (role == THREAD_SOURCE) {
+  if (role == THREAD_SOURCE || role == THREAD_CAMERA) {
     (void)snprintf(name, sizeof name, "%s-%zu", spec->name, number % WM_SOURCES_MAX);
   } else {
     (void)snprintf(name, sizeof name, "%s", spec->name);

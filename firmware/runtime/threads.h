@@ -10,7 +10,14 @@
 #include "waymark/status.h"
 #include "waymark/time.h"
 
-typedef enum thread_role { THREAD_SOURCE, THREAD_ESTIMATOR, THREAD_PUBLISH, THREAD_DISK, THREAD_ROLES } thread_role;
+typedef enum thread_role {
+  THREAD_SOURCE,
+  THREAD_CAMERA,
+  THREAD_ESTIMATOR,
+  THREAD_PUBLISH,
+  THREAD_DISK,
+  THREAD_ROLES
+} thread_role;
 
 typedef struct thread_spec {
   const char *name;      // as `ps -T` and `top -H` show it
@@ -40,8 +47,8 @@ void threads_of_libraries(void);
 #define LINE_BYTES 400
 
 // Starts a thread of that role with all signals blocked; the thread that started the run handles them. `number` makes a
-// source's name unique. *is_realtime: it has its priority. Without the right to that (CAP_SYS_NICE, RLIMIT_RTPRIO) it
-// runs as a normal thread.
+// source's or camera's name unique. *is_realtime: it has its priority. Without the right to that (CAP_SYS_NICE,
+// RLIMIT_RTPRIO) it runs as a normal thread.
 wm_status thread_start(thread_role role, size_t number, const wm_config *config, void *(*body)(void *), void *argument,
                        pthread_t *out, int *is_realtime, wm_error *err);
 

@@ -144,15 +144,16 @@ void black_box_pose(black_box *self, const wm_estimate *pose, wm_time_ns now_ns)
   self->kept_from_ns = self->rotate_ns = WM_TIME_NONE;
 }
 
-void black_box_picture(void *context, size_t camera, const char *name, const wm_frame *frame,
-                       const wm_camera_raw *raw) {
-  black_box *self = context;
-  box_pictures_put(&self->pictures, camera, name, frame, raw);
+wm_status black_box_open_pictures(black_box *self, wm_pictures *pictures, const wm_rig *rig, wm_error *err) {
+  return box_pictures_subscribe(&self->pictures, pictures, rig, err);
+}
+
+void black_box_take_pictures(black_box *self) {
+  int failed = box_pictures_take(&self->pictures);
+  if (failed) unwritable(self, strerror(failed));
 }
 
 void black_box_flush(black_box *self) {
-  int failed = atomic_exchange(&self->pictures.failed, 0);
-  if (failed) unwritable(self, strerror(failed));
   if (!self->is_open) return;
   wm_log_flush(&self->log);
   if (self->log.failed) unwritable(self, strerror(self->log.failed));
@@ -163,4 +164,5 @@ void black_box_close(black_box *self) {
   close_log(self);
   if (self->kept_from_ns != WM_TIME_NONE) keep(self, "lost");
   box_pictures_close(&self->pictures);
+  self->folder[0] = '\0';
 }

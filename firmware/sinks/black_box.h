@@ -33,11 +33,13 @@ void black_box_open(black_box *self, const char *folder, double keep_s, double p
 void black_box_event(black_box *self, const wm_event *event);
 // The newest pose: a log begins with one, and a loss is seen by it. `now_ns`: monotonic.
 void black_box_pose(black_box *self, const wm_estimate *pose, wm_time_ns now_ns);
-// For wm_vision_tell_pictures: `context` is the black box. Of the cameras' threads.
-void black_box_picture(void *context, size_t camera, const char *name, const wm_frame *frame, const wm_camera_raw *raw);
+// Reads the pictures of each camera of `rig` that there is, until it is closed.
+wm_status black_box_open_pictures(black_box *self, wm_pictures *pictures, const wm_rig *rig, wm_error *err);
+// Takes the pictures that came. Every few milliseconds.
+void black_box_take_pictures(black_box *self);
 // Hands what is buffered to the system. Once a second.
 void black_box_flush(black_box *self);
-// In order: what is in it is not kept.
+// In order: what is in it is not kept. A second time it does nothing.
 void black_box_close(black_box *self);
 
 #endif

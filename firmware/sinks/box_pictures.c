@@ -76,20 +76,44 @@ static int put(box_camera *camera, const wm_frame *frame, const wm_camera_raw *r
   return failed;
 }
 
-void box_pictures_put(box_pictures *self, size_t index, const char *name, const wm_frame *frame,
-                      const wm_camera_raw *raw) {
-  if (!self->folder[0] || index >= WM_CAMERA_DEVICES_MAX) return;
-  box_camera *camera = &self->cameras[index];
-  if (frame->arrival_ns < camera->next_ns) return;
+static int take_picture(box_pictures *self, box_camera *camera, const wm_frame *frame) {
+  if (frame->arrival_ns < camera->next_ns) return 0;
   camera->next_ns = frame->arrival_ns + self->period_ns;
-  if (!camera->name[0]) (void)snprintf(camera->name, sizeof camera->name, "%s", name);
+  wm_camera_raw raw;
+  camera->frames->ops->raw(camera->frames, &raw);
   int failed = 0;
+  if (raw.is_jpeg && !raw.data) return ENOMEM;
   if (!camera->video || !camera->stamps || frame->arrival_ns >= camera->rotate_ns)
-    failed = begin(self, camera, frame, raw);
-  if (!failed) failed = put(camera, frame, raw);
-  if (!failed) return;
-  atomic_store(&self->failed, failed);
-  close_files(camera);  // tried again with the next one
+    failed = begin(self, camera, frame, &raw);
+  if (!failed) failed = put(camera, frame, &raw);
+  if (failed) close_files(camera);  // tried again with the next one
+  return failed;
+}
+
+int box_pictures_take(box_pictures *self) {
+  int failed = 0;
+  for (size_t i = 0; i < self->camera_count; i++) {
+    box_camera *camera = &self->cameras[i];
+    wm_frame frame;
+    if (camera->frames->ops->next(camera->frames, &frame, NULL) != WM_OK) continue;
+    int reason = take_picture(self, camera, &frame);
+    if (reason) failed = reason;
+  }
+  return failed;
+}
+
+wm_status box_pictures_subscribe(box_pictures *self, wm_pictures *pictures, const wm_rig *rig, wm_error *err) {
+  const wm_frame_wishes wishes = {.waiting_max = 1, .wait_ms = 0, .wants_raw = 1};
+  wm_status status = WM_OK;
+  if (!self->folder[0]) return WM_OK;
+  for (uint32_t i = 0; status == WM_OK && i < rig->camera_count && self->camera_count < WM_CAMERA_DEVICES_MAX; i++) {
+    box_camera *camera = &self->cameras[self->camera_count];
+    if (!pictures->ops->has(pictures, rig->cameras[i].name)) continue;
+    (void)snprintf(camera->name, sizeof camera->name, "%s", rig->cameras[i].name);
+    status = pictures->ops->open(pictures, &rig->cameras[i], (int32_t)i, &wishes, &camera->frames, err);
+    self->camera_count += status == WM_OK;
+  }
+  return status;
 }
 
 int box_pictures_keep(const char *folder, const char *what, unsigned number) {
@@ -108,5 +132,10 @@ int box_pictures_keep(const char *folder, const char *what, unsigned number) {
 }
 
 void box_pictures_close(box_pictures *self) {
-  for (size_t i = 0; i < WM_CAMERA_DEVICES_MAX; i++) close_files(&self->cameras[i]);
+  for (size_t i = 0; i < self->camera_count; i++) {
+    box_camera *camera = &self->cameras[i];
+    close_files(camera);
+    camera->frames->ops->close(camera->frames);
+  }
+  self->camera_count = 0;
 }

@@ -6,12 +6,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "videos.h"
 #include "vision_source.h"
 
 struct wm_vision {
   vision_source sources[WM_VISION_SOURCES_MAX];
   size_t count;
   newest_pose newest;
+  videos videos;
   char need_names[WM_VISION_NEEDS][40];
 };
 
@@ -51,46 +53,23 @@ static uint16_t sensor_of(wm_recording *recording, const char *camera) {
   return NO_SENSOR;
 }
 
-static const wm_camera_device_config *device_of(const wm_config *config, const char *camera) {
-  for (size_t i = 0; i < config->devices.camera_count; i++)
-    if (strcmp(config->devices.cameras[i].name, camera) == 0) return &config->devices.cameras[i];
-  return NULL;
-}
+// Who looks wants the newest picture, and only that.
+static const wm_frame_wishes kDetector = {.waiting_max = 1, .wait_ms = WM_DEVICE_WAIT_MS};
 
-// Another source that looks through this camera already: a device has one reader.
-static const vision_source *reader_of(const wm_vision *self, int32_t camera) {
-  for (size_t i = 0; i < self->count; i++)
-    for (uint32_t k = 0; k < self->sources[i].devices.count; k++)
-      if (self->sources[i].cameras[k] == camera) return &self->sources[i];
-  return NULL;
-}
-
-static wm_status open_devices(const wm_vision *all, vision_source *self, const wm_config *config,
-                              const wm_vision_config *wanted, wm_warn_fn warn, void *context, wm_error *err) {
+static wm_status open_pictures(vision_source *self, wm_pictures *pictures, wm_error *err) {
   wm_status status = WM_OK;
-  for (uint32_t i = 0; status == WM_OK && i < self->detector->pictures; i++) {
-    const wm_camera *camera = &self->view.rig->cameras[self->cameras[i]];
-    const wm_camera_device_config *device = device_of(config, camera->name);
-    if (!device)
-      return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s: the camera '%s' is not in devices.cameras", config->path,
-                     wanted->line, self->detector->name, camera->name);
-    const vision_source *reader = reader_of(all, self->cameras[i]);
-    if (reader)
-      return wm_fail(err, WM_BAD_CONFIG,
-                     "%s:%d: vision.%s: the camera '%s' is looked through by %s already, and a device has one reader; "
-                     "name them by `cameras`, or take one detector",
-                     config->path, wanted->line, self->detector->name, camera->name, reader->detector->name);
-    status = wm_camera_device_open(device, camera, self->cameras[i], warn, context, &self->devices.devices[i], err);
-    self->devices.count += status == WM_OK;
-  }
-  self->base.is_live = 1;
-  self->base.skip_to = NULL;
-  return status;
+  for (uint32_t i = 0; status == WM_OK && i < self->detector->pictures; i++)
+    status = pictures->ops->open(pictures, &self->view.rig->cameras[self->cameras[i]], self->cameras[i], &kDetector,
+                                 &self->pictures[i], err);
+  if (status != WM_OK) return status;
+  self->base.is_live = self->pictures[0]->is_live;
+  self->base.skip_to = self->pictures[0]->ops->skip_to ? skip_to : NULL;
+  return WM_OK;
 }
 
 // A source of this detector on as many of `cameras` as it takes at once.
 static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_config *wanted, wm_recording *recording,
-                     const int32_t cameras[PICTURES_MAX], wm_warn_fn warn, void *context, wm_error *err) {
+                     const int32_t cameras[PICTURES_MAX], wm_pictures *pictures, wm_error *err) {
   const wm_rig *rig = wm_recording_rig(recording);
   const wm_camera *first = &rig->cameras[cameras[0]];
   if (self->count == WM_VISION_SOURCES_MAX)
@@ -110,7 +89,7 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
     s->newest = &self->newest;
   }
   if (!looks_open(&s->looks, s->view.appearance_count)) return wm_fail(err, WM_IO, "no memory for detectors");
-  s->base = (wm_source){.ops = &kOps, .in_order = 1, .skip_to = skip_to};
+  s->base = (wm_source){.ops = &kOps, .in_order = 1};
   (void)snprintf(s->base.name, sizeof s->base.name, "%s:%s", s->detector->name, first->name);
   s->gives_looked = (config->estimator->takes & WM_EVENT_BIT(WM_EVENT_LOOKED)) != 0;
   s->base.kinds = s->detector->gives | (s->gives_looked ? WM_EVENT_BIT(WM_EVENT_LOOKED) : 0);
@@ -125,24 +104,18 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   if (s->state_bytes == 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s: can't work with the camera '%s': %s", config->path,
                    wanted->line, s->detector->name, first->name, why ? why : "no reason given");
-  if (wm_recording_is_robot(recording)) return open_devices(self, s, config, wanted, warn, context, err);
-  for (uint32_t i = 0; i < s->detector->pictures; i++) {
-    wm_status status = wm_video_open(wm_recording_dir(recording), &rig->cameras[s->cameras[i]], s->cameras[i], warn,
-                                     context, &s->videos[i], err);
-    if (status != WM_OK) return status;
-  }
-  return WM_OK;
+  return open_pictures(s, pictures, err);
 }
 
 static wm_status add_pair(wm_vision *self, const wm_config *config, const wm_vision_config *wanted,
-                          wm_recording *recording, wm_warn_fn warn, void *context, wm_error *err) {
+                          wm_recording *recording, wm_pictures *pictures, wm_error *err) {
   const wm_stereo_pair *pair = &wm_recording_rig(recording)->stereo;
   if (pair->left < 0 || pair->right < 0)
     return wm_fail(err, WM_BAD_CONFIG,
                    "%s:%d: vision.%s: needs a pair of cameras: stereo: {left: ..., right: ...} in calibration.yaml",
                    config->path, wanted->line, wanted->detector->name);
   const int32_t cameras[2] = {pair->left, pair->right};
-  return add(self, config, wanted, recording, cameras, warn, context, err);
+  return add(self, config, wanted, recording, cameras, pictures, err);
 }
 
 static int is_wanted(const wm_vision_config *wanted, const char *camera) {
@@ -151,14 +124,9 @@ static int is_wanted(const wm_vision_config *wanted, const char *camera) {
   return 0;
 }
 
-static int has_pictures(const wm_config *config, wm_recording *recording, const char *camera) {
-  if (wm_recording_is_robot(recording)) return device_of(config, camera) != NULL;
-  return wm_video_there(wm_recording_dir(recording), camera);
-}
-
 // The cameras that are named, or else all that have pictures.
 static wm_status add_singles(wm_vision *self, const wm_config *config, const wm_vision_config *wanted,
-                             wm_recording *recording, wm_warn_fn warn, void *context, wm_error *err) {
+                             wm_recording *recording, wm_pictures *pictures, wm_error *err) {
   const wm_rig *rig = wm_recording_rig(recording);
   for (uint32_t i = 0; i < wanted->camera_count; i++)
     if (wm_rig_find_camera(rig, wanted->cameras[i]) < 0)
@@ -167,19 +135,14 @@ static wm_status add_singles(wm_vision *self, const wm_config *config, const wm_
   size_t before = self->count;
   for (int32_t i = 0; i < (int32_t)rig->camera_count; i++) {
     const char *name = rig->cameras[i].name;
-    if (wanted->camera_count > 0 ? !is_wanted(wanted, name) : !has_pictures(config, recording, name)) continue;
+    if (wanted->camera_count > 0 ? !is_wanted(wanted, name) : !pictures->ops->has(pictures, name)) continue;
     const int32_t cameras[2] = {i, i};
-    wm_status status = add(self, config, wanted, recording, cameras, warn, context, err);
+    wm_status status = add(self, config, wanted, recording, cameras, pictures, err);
     if (status != WM_OK) return status;
   }
   if (self->count > before) return WM_OK;
-  if (wm_recording_is_robot(recording))
-    return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s: there is no camera to look through: devices.cameras",
-                   config->path, wanted->line, wanted->detector->name);
-  return wm_fail(err, WM_BAD_CONFIG,
-                 "%s:%d: vision.%s: '%s' has no pictures (video/CAMERA.avi, .mkv or a folder of JPEG) of a camera of "
-                 "calibration.yaml",
-                 config->path, wanted->line, wanted->detector->name, wm_recording_dir(recording));
+  return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s: '%s' %s", config->path, wanted->line, wanted->detector->name,
+                 wm_recording_dir(recording), pictures->lacking);
 }
 
 wm_status wm_vision_open(const wm_config *config, wm_recording *recording, wm_warn_fn warn, void *context,
@@ -191,9 +154,11 @@ wm_status wm_vision_open(const wm_config *config, wm_recording *recording, wm_wa
     if (!(wanted->detector->gives & config->estimator->takes)) continue;
     if (!self) self = calloc(1, sizeof *self);
     if (!self) return wm_fail(err, WM_IO, "no memory for detectors");
-    wm_status status = wanted->detector->pictures == 2
-                           ? add_pair(self, config, wanted, recording, warn, context, err)
-                           : add_singles(self, config, wanted, recording, warn, context, err);
+    videos_of(&self->videos, recording, warn, context);
+    wm_pictures *pictures = wm_recording_pictures(recording);
+    if (!pictures) pictures = &self->videos.base;
+    wm_status status = wanted->detector->pictures == 2 ? add_pair(self, config, wanted, recording, pictures, err)
+                                                       : add_singles(self, config, wanted, recording, pictures, err);
     if (status != WM_OK) {
       wm_vision_close(self);
       return status;
@@ -207,8 +172,10 @@ void wm_vision_close(wm_vision *self) {
   if (!self) return;
   for (size_t i = 0; i < self->count; i++) {
     vision_ahead_stop(&self->sources[i]);
-    for (size_t k = 0; k < PICTURES_MAX; k++) wm_video_close(self->sources[i].videos[k]);
-    camera_set_close(&self->sources[i].devices);
+    for (size_t k = 0; k < PICTURES_MAX; k++) {
+      wm_frame_source *pictures = self->sources[i].pictures[k];
+      if (pictures) pictures->ops->close(pictures);
+    }
     looks_close(&self->sources[i].looks);
     free(self->sources[i].only);
   }
@@ -220,17 +187,6 @@ wm_source *wm_vision_source(wm_vision *self, size_t i) { return &self->sources[i
 
 void wm_vision_look_only_at(wm_vision *self, size_t i, wm_seen *seen, size_t count) {
   vision_look_only_at(&self->sources[i], seen, count);
-}
-
-void wm_vision_tell_pictures(wm_vision *self, wm_picture_fn tell, void *context) {
-  size_t cameras = 0;
-  for (size_t i = 0; i < wm_vision_count(self); i++) {
-    vision_source *s = &self->sources[i];
-    s->tell_picture = tell;
-    s->tell_context = context;
-    s->first_camera = cameras;
-    cameras += s->devices.count;
-  }
 }
 
 // ── memory, start ───────────────────────────────────────────────────────────────────────────────────────────────────

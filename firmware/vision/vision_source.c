@@ -7,26 +7,40 @@
 
 #include "waymark/clock.h"
 
-// What the videos counted, in the terms of a source.
-static void take_video_counts(vision_source *self) {
-  wm_source_counts *out = &self->counts;
-  out->lost = out->malformed = out->frozen = out->overflows = 0;
-  for (uint32_t i = 0; i < self->detector->pictures; i++) {
-    const wm_video_counts *c = wm_video_counted(self->videos[i]);
-    out->lost += c->lost + c->empty + c->without_picture;
-    out->malformed += c->malformed + c->damaged + c->wrong_size + c->without_stamp;
-    out->frozen += c->duplicated;
-    out->overflows += c->skipped;
-    if (!out->first_problem[0]) (void)snprintf(out->first_problem, sizeof out->first_problem, "%s", c->first_problem);
-  }
+// Which of two states a person should hear of.
+static int worse(uint8_t a, uint8_t b) {
+  static const uint8_t kHowBad[WM_DEVICE_STATE_COUNT] = {
+      [WM_DEVICE_NONE] = 1,    [WM_DEVICE_WORKS] = 0, [WM_DEVICE_FROZEN] = 2,
+      [WM_DEVICE_STALLED] = 3, [WM_DEVICE_DOWN] = 4,  [WM_DEVICE_ABSENT] = 5};
+  return kHowBad[a] > kHowBad[b];
 }
 
+static void add_counts(wm_source_counts *sum, const wm_source_counts *one, int is_first) {
+  sum->lost += one->lost;
+  sum->malformed += one->malformed;
+  sum->frozen += one->frozen;
+  sum->overflows += one->overflows;
+  sum->out_of_order += one->out_of_order;
+  sum->not_finite += one->not_finite;
+  if (one->stamp_uncertainty_ns > sum->stamp_uncertainty_ns) sum->stamp_uncertainty_ns = one->stamp_uncertainty_ns;
+  if (!sum->first_problem[0]) memcpy(sum->first_problem, one->first_problem, sizeof sum->first_problem);
+  if (!is_first && !worse(one->device, sum->device)) return;
+  sum->device = one->device;
+  memcpy(sum->device_note, one->device_note, sizeof sum->device_note);
+}
+
+// What all its cameras counted, with what became of the pictures here.
 static void take_counts(vision_source *self) {
-  if (self->devices.count > 0) {
-    camera_set_counts(&self->devices, &self->counts);
-  } else {
-    take_video_counts(self);
+  wm_source_counts sum = {.received = self->counts.received};
+  memcpy(sum.looks, self->counts.looks, sizeof sum.looks);
+  for (uint32_t i = 0; i < self->detector->pictures; i++) {
+    wm_source_counts one;
+    self->pictures[i]->ops->counts(self->pictures[i], &one);
+    add_counts(&sum, &one, i == 0);
   }
+  sum.out_of_order += self->went_back;
+  sum.malformed += self->refused;
+  self->counts = sum;
 }
 
 #define ONLY_TOLERANCE_NS (50 * WM_NS_PER_MS)  // of a run's stamp from the recording's; or less than half a period
@@ -50,7 +64,7 @@ static const wm_seen *wanted(const vision_source *self, wm_time_ns t_ns) {
 static wm_status skip_all(vision_source *self, wm_error *err) {
   wm_status status = WM_OK;
   for (uint32_t i = 0; status == WM_OK && i < self->detector->pictures; i++)
-    status = wm_video_skip(self->videos[i], err);
+    status = self->pictures[i]->ops->skip(self->pictures[i], err);
   return status;
 }
 
@@ -64,44 +78,38 @@ void vision_look_only_at(vision_source *self, wm_seen *seen, size_t count) {
   self->only_tolerance_ns = nearest_ns / 5 * 2 < ONLY_TOLERANCE_NS ? nearest_ns / 5 * 2 : ONLY_TOLERANCE_NS;
 }
 
+static int are_together(const vision_source *self, const wm_frame *frames) {
+  if (self->detector->pictures == 1) return 1;
+  wm_time_ns apart_ns = frames[1].t_ns - frames[0].t_ns;
+  return apart_ns <= PAIR_TOLERANCE_NS && apart_ns >= -PAIR_TOLERANCE_NS;
+}
+
 // Of a pair, passes over pictures whose other half is missing. The heads of what belongs together into `heads`.
 static wm_status find_together(vision_source *self, wm_frame *heads, wm_error *err) {
   for (;;) {
     for (uint32_t i = 0; i < self->detector->pictures; i++) {
-      wm_status status = wm_video_peek(self->videos[i], &heads[i], err);
+      wm_status status = self->pictures[i]->ops->peek(self->pictures[i], &heads[i], err);
       if (status != WM_OK) return status;
     }
-    wm_time_ns apart_ns = self->detector->pictures == 1 ? 0 : heads[1].t_ns - heads[0].t_ns;
-    int is_together = apart_ns <= PAIR_TOLERANCE_NS && apart_ns >= -PAIR_TOLERANCE_NS;
+    int is_together = are_together(self, heads);
     if (is_together && (!self->only || wanted(self, heads[0].t_ns))) return WM_OK;
-    wm_status status = is_together ? skip_all(self, err) : wm_video_skip(self->videos[apart_ns < 0], err);
+    wm_frame_source *older = self->pictures[self->detector->pictures == 2 && heads[1].t_ns < heads[0].t_ns];
+    wm_status status = is_together ? skip_all(self, err) : older->ops->skip(older, err);
     if (status != WM_OK) return status;
   }
 }
 
-// Decodes what belongs together. WM_AGAIN where one of a pair turned out to be damaged, or a device has nothing yet.
+// Decodes what belongs together, or takes what another thread has decoded.
 static wm_status decode(vision_source *self, wm_frame *frames, wm_error *err) {
-  if (self->devices.count > 0) return camera_set_next(&self->devices, frames, err);
   wm_frame heads[PICTURES_MAX] = {0};
   wm_status status = find_together(self, heads, err);
-  wm_time_ns begin_ns = wm_monotonic_ns();
-  for (uint32_t i = 0; status == WM_OK && i < self->detector->pictures; i++)
-    status = wm_video_next(self->videos[i], &frames[i], err);
-  if (status != WM_OK) return status;
-  wm_histogram_add(&self->decode_ns, wm_monotonic_ns() - begin_ns);
-  if (self->detector->pictures == 1) return WM_OK;
-  wm_time_ns apart_ns = frames[1].t_ns - frames[0].t_ns;
-  return apart_ns <= PAIR_TOLERANCE_NS && apart_ns >= -PAIR_TOLERANCE_NS ? WM_OK : WM_AGAIN;
-}
-
-static void tell_pictures(const vision_source *self, const wm_frame *frames) {
-  if (!self->tell_picture) return;
-  for (uint32_t i = 0; i < self->devices.count; i++) {
-    wm_camera_raw raw;
-    wm_camera_device_raw(self->devices.devices[i], &raw);
-    self->tell_picture(self->tell_context, self->first_camera + i, self->view.rig->cameras[self->cameras[i]].name,
-                       &frames[i], &raw);
+  wm_time_ns begin_ns = wm_monotonic_ns(), elsewhere_ns = 0;
+  for (uint32_t i = 0; status == WM_OK && i < self->detector->pictures; i++) {
+    status = self->pictures[i]->ops->next(self->pictures[i], &frames[i], err);
+    elsewhere_ns += self->pictures[i]->decoded_in_ns;
   }
+  if (status == WM_OK) wm_histogram_add(&self->decode_ns, wm_monotonic_ns() - begin_ns + elsewhere_ns);
+  return status;
 }
 
 // Looks at the next picture: self->events, from the first.
@@ -109,15 +117,14 @@ static wm_status look(vision_source *self, wm_error *err) {
   wm_frame frames[PICTURES_MAX] = {0};
   self->event_count = self->next_event = 0;
   wm_status status = decode(self, frames, err);
-  if (status == WM_AGAIN) return self->devices.count > 0 ? WM_AGAIN : WM_OK;
   if (status != WM_OK) return status;
+  if (!are_together(self, frames)) return WM_OK;  // one of a pair turned out to be damaged
   // A camera's pictures come in their order; who goes back has a broken clock.
   if (self->newest_ns != WM_TIME_NONE && frames[0].t_ns <= self->newest_ns) {
-    self->counts.out_of_order++;
+    self->went_back++;
     return WM_OK;
   }
   self->newest_ns = frames[0].t_ns;
-  tell_pictures(self, frames);
   wm_time_ns arrival_ns = frames[0].arrival_ns;
   if (self->detector->pictures == 2 && frames[1].arrival_ns > arrival_ns) arrival_ns = frames[1].arrival_ns;
   const wm_seen *seen = self->only ? wanted(self, frames[0].t_ns) : NULL;
@@ -129,7 +136,7 @@ static wm_status look(vision_source *self, wm_error *err) {
   status = self->detector->detect(self->state, frames, prediction, self->events, self->capacity, &self->event_count);
   wm_histogram_add(&self->detect_ns, wm_monotonic_ns() - begin_ns);
   if (status != WM_OK) {
-    self->counts.malformed++;
+    self->refused++;
     self->event_count = 0;
     return WM_OK;
   }
@@ -169,7 +176,7 @@ static wm_status announce(vision_source *self, wm_event *out, wm_error *err) {
 
 wm_status vision_next(vision_source *self, wm_event *out, wm_error *err) {
   while (self->next_event == self->event_count) {
-    if (self->newest && self->devices.count == 0 && !self->announced) return announce(self, out, err);
+    if (self->newest && !self->base.is_live && !self->announced) return announce(self, out, err);
     self->announced = 0;
     wm_status status = look(self, err);
     take_counts(self);
@@ -183,6 +190,7 @@ wm_status vision_next(vision_source *self, wm_event *out, wm_error *err) {
 
 void vision_skip_to(vision_source *self, wm_time_ns now_ns) {
   if (self->next_event < self->event_count) return;  // of a picture that was looked at
-  for (uint32_t i = 0; i < self->detector->pictures; i++) (void)wm_video_skip_to(self->videos[i], now_ns, NULL);
+  for (uint32_t i = 0; i < self->detector->pictures; i++)
+    (void)self->pictures[i]->ops->skip_to(self->pictures[i], now_ns, NULL);
   take_counts(self);
 }

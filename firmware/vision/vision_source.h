@@ -5,14 +5,14 @@
 
 #include <pthread.h>
 
-#include "camera_set.h"
 #include "looks.h"
 #include "newest_pose.h"
 #include "waymark/detector.h"
-#include "waymark/video.h"
+#include "waymark/frame_source.h"
 #include "waymark/vision.h"
 
-#define PICTURES_MAX CAMERA_SET_MAX
+#define PICTURES_MAX 2
+#define PAIR_TOLERANCE_NS (2 * WM_NS_PER_MS)  // pictures of a pair are triggered together
 #define AHEAD_EVENTS 8
 
 typedef struct vision_source vision_source;
@@ -36,9 +36,8 @@ struct vision_source {
   const void *params;
   wm_view view;
   int32_t cameras[PICTURES_MAX];
-  wm_video *videos[PICTURES_MAX];
-  camera_set devices;  // instead of videos: the robot's own cameras
-  uint16_t sensor;     // of WM_EVENT_LOOKED
+  wm_frame_source *pictures[PICTURES_MAX];  // of each camera; those of a pair are taken at the same instant
+  uint16_t sensor;                          // of WM_EVENT_LOOKED
   int gives_looked;
   size_t state_bytes, capacity;
   void *state, *events_memory;
@@ -46,15 +45,13 @@ struct vision_source {
   size_t event_count, next_event;
   wm_time_ns newest_ns;
   uint32_t seq;
-  wm_source_counts counts;  // the working thread's own
+  wm_source_counts counts;      // the working thread's own
+  uint64_t went_back, refused;  // pictures that are older than the one before; that the detector didn't take
   wm_histogram decode_ns, detect_ns;
   looks looks;
   wm_seen *only;  // the only pictures to be looked at, rising; NULL: all
   size_t only_count;
   wm_time_ns only_tolerance_ns;
-  wm_picture_fn tell_picture;  // may be NULL
-  void *tell_context;
-  size_t first_camera;  // of those that are told
   newest_pose *newest;  // NULL: nothing guides the detector
   int announced;        // guided and recorded: the next picture's arrival was told
   vision_ahead ahead;

@@ -29,7 +29,7 @@ from published import ABSENT, BUS_OFF, DOWN, FROZEN, IS_BUSY, MOTION_STALE, STAL
 
 BUILD = pathlib.Path(sys.argv[1]).resolve()
 WAYMARK = BUILD / "tests/waymark-played"
-SECONDS, RATE_HZ = 64, 10
+SECONDS, WALLS_S, RATE_HZ = 64, 24, 10
 CAMERA, CAN, SIGHTINGS = "edges:front", "can", "sightings"
 LCM_GROUP = ("239.255.76.67", 7667)
 ROUTE = ["ip", "route", "add", "224.0.0.0/4", "dev", "lo"]
@@ -43,18 +43,23 @@ def packet(channel, message, number=0):
 # ── what is driven ──────────────────────────────────────────────────────────────────────────────────────────────────
 
 def prepare(work, worlds):
-    """Two worlds: a corridor that a camera sees, and a crossing whose landmarks another program sees."""
+    """Three worlds: a corridor that a camera sees, a crossing whose landmarks another program sees, and an office with two
+    kinds of markers on its walls."""
     world = (ROOT / "config/worlds/corridor-easy.yaml").read_text().replace(
         "\npictures:", f"\ncameras: [{{name: front, size: [320, 180], rate_hz: {RATE_HZ}, colour: false}}]\n\npictures:")
     (work / "world.yaml").write_text(world)
-    for name, scenario in (("corridor", work / "world.yaml"), ("crossing", ROOT / "config/worlds/crossing.yaml")):
+    walls = (ROOT / "config/worlds/office-walls.yaml").read_text().replace(
+        "\npictures:", f"\ncameras: [{{name: front, size: [640, 400], rate_hz: {RATE_HZ}, colour: false}}]\n\npictures:")
+    (work / "walls.yaml").write_text(walls)
+    for name, scenario, seconds in (("corridor", work / "world.yaml", SECONDS), ("crossing", ROOT / "config/worlds/crossing.yaml", SECONDS),
+                                    ("walls", work / "walls.yaml", WALLS_S)):
         if name not in worlds:
             continue
         (work / name).mkdir()
         recording = work / name / "recording"
-        subprocess.run([BUILD / "bin/waymark-simulate", scenario, "--out", recording, "--duration", str(SECONDS)], check=True)
+        subprocess.run([BUILD / "bin/waymark-simulate", scenario, "--out", recording, "--duration", str(seconds)], check=True)
         items, blob = list(drives.can_items(recording)), bytearray()
-        if name == "corridor":
+        if name != "crossing":
             with open(recording / "video/front.csv", newline="") as f:
                 for row, picture in zip(csv.DictReader(f), edges.pictures(recording / "video/front.avi")):
                     items.append((int(row["t_ns"]), f"p {len(blob)} {len(picture)}"))
@@ -77,10 +82,11 @@ class Drive:
         for file in ("timeline", "pictures"):
             (self.folder / file).symlink_to(self.world / file)
         (self.folder / "faults").write_text("".join(" ".join(map(str, fault)) + "\n" for fault in faults))
-        devices = (f"devices: {{can: [{{interface: can0}}], cameras: [{{name: front, device: /dev/video0, format: MJPG, rate_hz: {RATE_HZ}}}]}}\n"
-                   "map: map/map.yaml\n") if world == "corridor" else (
-                   "devices: {can: [{interface: can0}], sightings: lcm}\nlandmarks: landmarks.csv\n")
-        own = {"corridor": "corridor.yaml", "crossing": "crossing-points.yaml"}[world]
+        camera_ = f"devices: {{can: [{{interface: can0}}], cameras: [{{name: front, device: /dev/video0, format: MJPG, rate_hz: {RATE_HZ}}}]}}\n"
+        own, devices = {
+            "corridor": ("corridor.yaml", camera_ + "map: map/map.yaml\n"),
+            "crossing": ("crossing-points.yaml", "devices: {can: [{interface: can0}], sightings: lcm}\nlandmarks: landmarks.csv\n"),
+            "walls": ("office-walls.yaml", camera_)}[world]
         self.config = (
             drives.with_realtime((ROOT / "config" / own).read_text(), "lock_memory: false") + f"\ninitial_pose: {drives.start_of(recording)}\n"
             "calibration: calibration.yaml\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\n" + devices +
@@ -340,8 +346,40 @@ def box(work):
     return heard.failures
 
 
+def readers(work):
+    """One camera, four readers: two detectors (config/office-walls.yaml), the black box and a recording, whose replay gives the
+    poses of the run."""
+    drive, until_s = Drive(work, "walls", "readers", []), WALLS_S - 3
+    (drive.folder / "robot.yaml").write_text(drive.config + "black_box: {folder: box, keep_s: 8, pictures_hz: 2}\n")
+    run = drive.run("--record", "recorded", "--out", "run")
+    drive.end(run, until_s)
+    heard = drive.hear()
+    heard.check(run.returncode == 0, f"exit code {run.returncode}")
+    heard.goes_on("two detectors", 2, until_s - 1)
+    health = heard.health_at(until_s - 1)
+    for detector in ("apriltag:front", "mr:front"):
+        source = messages.source(health, detector)
+        heard.device(detector, detector, WORKS, 3, until_s - 1)
+        heard.check(source is not None and source.fused > 20, f"{detector}: {source and source.fused} of its observations are fused")
+    replay = subprocess.run([BUILD / "bin/waymark", "replay", drive.folder / "recorded", "--config", drive.folder / "recorded/config.yaml",
+                             "--frames-of", drive.folder / "run/events.wmlog", "--out", drive.folder / "again"], capture_output=True, text=True)
+    heard.check(replay.returncode == 0, f"the recording replays {replay.stderr[-300:]}")
+    if replay.returncode == 0:
+        poses = [p for p in messages.rows([p for _, p in heard.poses]) if p[0] > drive.begin_ns + 2e9]
+        apart = list(drives.apart_of(poses, drives.table(drive.folder / "again/published.csv"), 0))
+        worst_m, worst_deg = max((m for m, _ in apart), default=math.inf), max((d for _, d in apart), default=math.inf)
+        heard.check(len(apart) > 40 * (until_s - 4) and worst_m < 0.02 and worst_deg < 0.2,
+                    f"{len(apart)} poses at most {worst_m:.4f} m and {worst_deg:.3f} degrees from the replay of its recording")
+    stamps = sum(len((drive.folder / f"box/pictures-front-{part}.csv").read_text().splitlines()) - 1 for part in "ab"
+                 if (drive.folder / f"box/pictures-front-{part}.csv").exists())
+    heard.check(stamps > 16, f"the black box has {stamps} pictures")
+    recorded = len((drive.folder / "recorded/video/front.csv").read_text().splitlines()) - 1
+    heard.check(recorded > 0.9 * RATE_HZ * until_s, f"the recording has {recorded} pictures of {until_s} s at {RATE_HZ} Hz")
+    return heard.failures
+
+
 DRIVES = {"camera": (camera, "corridor"), "clock": (clock, "corridor"), "can": (can, "crossing"), "process": (process, "crossing"),
-          "recorder": (recorder, "corridor"), "box": (box, "corridor")}
+          "recorder": (recorder, "corridor"), "box": (box, "corridor"), "readers": (readers, "walls")}
 
 
 def main():

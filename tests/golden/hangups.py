@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""A hundred times another configuration (SIGHUP) while detectors look through two cameras: the same process goes on, and
+"""A hundred times another configuration (SIGHUP) while two detectors look through each of two cameras: the same process goes on, and
 neither its memory nor its open files grow. CAN and cameras are absent, which is no error."""
 import os
 import pathlib
@@ -30,7 +30,7 @@ def write_robot(work):
     (work / "robot.yaml").write_text(
         "format: waymark-config/1\nestimator: slam\ncalibration: calibration.yaml\npublish: {lcm: false}\n"
         "initial_pose: {x_m: 0, y_m: 0, heading_rad: 0}\nrealtime: {priority: 0, lock_memory: false}\n"
-        "vision: {apriltag: {family: tag36h11, size_m: 0.2}}\n"
+        "vision: {apriltag: {family: tag36h11, size_m: 0.2}, mr: {size_m: 0.27}}\n"
         "devices:\n  can: [{interface: nocan7, dbc: car.dbc, can_signals: signals.yaml}]\n"
         "  cameras: [{name: left, device: /dev/nowhere-l}, {name: right, device: /dev/nowhere-r}]\n")
 

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "waymark/frame.h"
+#include "waymark/frame_source.h"
 #include "waymark/recording.h"
 #include "waymark/source.h"
 #include "waymark/status.h"
@@ -86,14 +87,10 @@ wm_status wm_camera_device_open(const wm_camera_device_config *config, const wm_
 // driver has them, the others decoded or copied (1 ms for 640x400 MJPEG at a desk). One thread.
 wm_status wm_camera_device_next(wm_camera_device *self, wm_frame *out, wm_error *err);
 // The picture that wm_camera_device_next gave last, as the camera sent it; until the next call.
-typedef struct wm_camera_raw {
-  const uint8_t *data;
-  uint32_t bytes;
-  int is_jpeg;
-  double rate_hz;  // 0: unknown
-} wm_camera_raw;
 void wm_camera_device_raw(const wm_camera_device *self, wm_camera_raw *out);
 const wm_camera_counts *wm_camera_device_counted(const wm_camera_device *self);
+// The same camera as a frame source, which closes it.
+wm_frame_source *wm_camera_device_frames(wm_camera_device *self);
 void wm_camera_device_close(wm_camera_device *self);  // NULL is fine
 
 #define WM_CAN_DEVICES_MAX 4

@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "waymark/can.h"
+#include "waymark/frame_source.h"
 #include "waymark/setup.h"
 #include "waymark/source.h"
 #include "waymark/status.h"
@@ -42,6 +43,10 @@ wm_status wm_recording_open_robot(const char *name, const wm_recording_overrides
 // Takes the source over, also where it fails (WM_FULL). `quantities`: bit per wm_quantity that it can give.
 wm_status wm_recording_add_device(wm_recording *self, wm_source *device, uint32_t quantities, wm_error *err);
 
+// Its cameras, if they aren't the videos of its folder; taken over, and closed with it.
+void wm_recording_set_pictures(wm_recording *self, wm_pictures *pictures);
+wm_pictures *wm_recording_pictures(const wm_recording *self);  // NULL: the folder's videos
+
 wm_status wm_recording_open(const char *dir, const wm_recording_overrides *overrides, wm_warn_fn warn, void *context,
                             wm_recording **out, wm_error *err);
 void wm_recording_close(wm_recording *self);
@@ -57,7 +62,6 @@ wm_status wm_recording_camera_sensor(wm_recording *self, const char *camera, uin
 const wm_landmark *wm_recording_landmarks(const wm_recording *self, size_t *count);
 const wm_rig *wm_recording_rig(const wm_recording *self);      // cameras; an empty one where calibration.yaml has none
 const wm_start *wm_recording_start(const wm_recording *self);  // initial_pose; NaN where unknown
-int wm_recording_is_robot(const wm_recording *self);
 // Path of the map's YAML: the override, else map/map.yaml of the folder; "" where neither is there.
 const char *wm_recording_map_path(const wm_recording *self);
 // The raster map, read when first asked for and kept as long as the recording; NULL where there is none. Errors as

@@ -13,6 +13,7 @@
 #include <stdint.h>
 
 #include "waymark/frame.h"
+#include "waymark/frame_source.h"
 #include "waymark/recording.h"
 #include "waymark/setup.h"
 #include "waymark/status.h"
@@ -68,6 +69,8 @@ wm_status wm_video_skip(wm_video *self, wm_error *err);
 wm_status wm_video_skip_to(wm_video *self, wm_time_ns now_ns, wm_error *err);
 
 const wm_video_counts *wm_video_counted(const wm_video *self);
+// The same video as a frame source, which closes it.
+wm_frame_source *wm_video_frames(wm_video *self);
 
 #ifdef __cplusplus
 }

@@ -13,6 +13,7 @@
 #include "waymark/status.h"
 
 typedef struct wm_record_options {
+  wm_recording *robot;  // whose cameras others read, too (wm_robot_open), outlives the recording; NULL: its own
   const char *out_dir;
   double duration_s;        // 0: until *stop
   uint64_t bytes_max;       // of the whole recording; 0: as much as there is

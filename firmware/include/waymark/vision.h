@@ -3,9 +3,11 @@
 // of its cameras (or for the stereo pair), called DETECTOR:CAMERA. A picture that shows nothing gives WM_EVENT_LOOKED
 // where the estimator takes that. A detector's state, and the pictures that it looks at, are in the run's memory.
 //
-// In a run the source's own thread decodes and detects, and passes over pictures that have become old meanwhile. In a
-// replay a thread for each source works ahead, a few pictures at most; the order, and the bytes, are the same. What the
-// newest pose guides (is_guided of the detector) is looked at when it arrives, a recorded picture by who asks.
+// Pictures come from frame sources (waymark/frame_source.h); detection is the same whatever these are. On a robot a
+// thread a camera decodes, the source's own thread detects, and each detector looks at the newest picture. Recorded
+// pictures are decoded by the source's thread; in a replay one for each source works ahead, a few pictures at most, and
+// the order, and the bytes, are the same. Detectors that the newest pose guides (is_guided) run when the picture
+// arrives; in a replay, on the caller's thread.
 #ifndef WAYMARK_VISION_H
 #define WAYMARK_VISION_H
 
@@ -13,7 +15,6 @@
 
 #include "waymark/arena.h"
 #include "waymark/config.h"
-#include "waymark/devices.h"
 #include "waymark/histogram.h"
 #include "waymark/look.h"
 #include "waymark/pose.h"
@@ -42,12 +43,6 @@ typedef struct wm_seen {
 // Source i of a recording looks at the pictures nearest to these and at no others, which are counted as skipped; what
 // it finds in them arrives then. `seen` rises by t_ns and is from malloc; it is taken over. Before wm_vision_run_ahead.
 void wm_vision_look_only_at(wm_vision *self, size_t i, wm_seen *seen, size_t count);
-
-// Who wants to have each picture that a device gives, as the camera sent it: by the thread that looks at it, before it
-// does; gone after the call. `camera` counts from 0 over all sources. NULL for `vision` is fine. Before the threads.
-typedef void (*wm_picture_fn)(void *context, size_t camera, const char *name, const wm_frame *frame,
-                              const wm_camera_raw *raw);
-void wm_vision_tell_pictures(wm_vision *vision, wm_picture_fn tell, void *context);
 
 // The memory that it wants; at most WM_VISION_NEEDS lines. Returns how many.
 size_t wm_vision_needs(wm_vision *self, wm_arena_need *needs);
