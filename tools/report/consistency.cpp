@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Did the errors have the size that the robot said they would have: NEES over time.
+// Whether the errors have the size of the stated covariance: NEES over time.
 #include <algorithm>
 #include <cmath>
 
@@ -56,7 +56,7 @@ std::string consistency_section(const ReportData &data) {
       "inside of the bound " + percent_text(inside) + " of the time (95 % is ideal) · mean " +
       fixed(data.figures["nees_mean"].is_number() ? data.figures["nees_mean"].get<double>() : kNan, 2);
   return section(
-      "Was it as accurate as it said?",
+      "Consistency (NEES)",
       "NEES compares each error with the uncertainty that was stated for it, all of x, y and heading at once: " +
           std::to_string(dof) +
           " is as expected, more is surer than right, less is more careful than needed. It should lie below the dashed "

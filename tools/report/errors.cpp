@@ -135,11 +135,11 @@ std::string error_section(const ReportData &data) {
   std::string body;
   for (size_t i = 0; i < all.size(); ++i) body += panel(all[i], data.end_s(), i + 1 == all.size());
   std::vector<std::pair<std::string, std::string>> marks{
-      {"<path class=\"estimate\" d=\"M0 0H28\"/>", "error: what it said minus what was"}};
+      {"<path class=\"estimate\" d=\"M0 0H28\"/>", "error: estimate minus truth"}};
   if (data.trajectory.has_covariance)
     marks.emplace_back("<path fill=\"var(--band)\" d=\"M0-7H28V7H0ZM0-7H28V7H0Z\"/>",
                        "±3 σ as the robot stated it at that moment");
-  return section("How far off it was",
+  return section("Errors",
                  data.trajectory.has_covariance
                      ? "The line is the error; the band is where the robot itself said that the error would be. The "
                        "line should lie "
@@ -169,7 +169,7 @@ std::string uncertainty_section(const ReportData &data) {
     box.line(t, v, "value", kGapS);
     return box.html({.title = "<span>" + what + ", " + unit.name + "</span>", .describes = what, .x_text = last});
   };
-  return section("How sure it was",
+  return section("Uncertainty",
                  "There is no truth in this recording, so this is the robot’s own word: in 95 of 100 moments it should "
                  "be nearer to "
                  "its stated pose than this line.",

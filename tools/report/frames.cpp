@@ -252,16 +252,16 @@ std::string frames_section(const ReportData &data) {
                 {"<circle class=\"hit\" cx=\"14\" r=\"4\"/>", "the direction in which it was seen; used"},
                 {"<circle class=\"miss\" cx=\"14\" r=\"4\"/>", "seen, and refused"}});
   if (edges)
-    body += legend(
-        {{"<path class=\"edge-seen\" d=\"M4 0h0M14 0h0M24 0h0\"/>",
-          "edges of the floor that were found in the picture"},
-         {"<path class=\"edge-mapped\" d=\"M2 0h0M6 0h0M10 0h0M14 0h0M18 0h0M22 0h0M26 0h0\"/>",
-          "the map’s edges, as they look from where the robot said it was: on the found ones, where it was right"}});
+    body +=
+        legend({{"<path class=\"edge-seen\" d=\"M4 0h0M14 0h0M24 0h0\"/>",
+                 "edges of the floor that were found in the picture"},
+                {"<path class=\"edge-mapped\" d=\"M2 0h0M6 0h0M10 0h0M14 0h0M18 0h0M22 0h0M26 0h0\"/>",
+                 "the map’s edges, projected from the estimated pose: they lie on the found ones where it was right"}});
   if (lines)
     body += legend({{"<path class=\"line-seen\" d=\"M2 0H26\"/>", "upright lines that were found and followed"},
                     {"<path class=\"line-mapped\" d=\"M2 0H26\"/>",
-                     "lines of the finished map, as they look from where the robot said it was (walls hide some)"}});
-  return section("What it saw", "Pictures of its cameras, spread over what each filmed of the drive.", body);
+                     "lines of the finished map, projected from the estimated pose (walls hide some)"}});
+  return section("Pictures", "Pictures of its cameras, spread over what each filmed of the drive.", body);
 }
 
 }  // namespace wm::tools

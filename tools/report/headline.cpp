@@ -27,27 +27,25 @@ double figure(const ReportData &data, const char *key) {
 
 std::string strong(const std::string &text) { return "<em>" + text + "</em>"; }
 
-// Whether the stated uncertainty can be believed, by how often truth lay in the stated 95 % region.
+// Whether the stated uncertainty is consistent, by how often truth lay in the stated 95 % region.
 std::string honesty(double inside, double nees_per_dof) {
   const std::string share = strong(percent_text(inside));
   if (!std::isfinite(inside)) return "";
   if (inside >= 0.97 && nees_per_dof < 0.4)
-    return " It was more careful than it had to be: truth lay inside of its 95&nbsp;% region " + share +
-           " of the time.";
+    return " The stated uncertainty is conservative: truth lay inside the 95&nbsp;% region " + share + " of the time.";
   if (inside >= 0.85)
-    return " Its own word on its accuracy can be trusted: truth lay inside of its 95&nbsp;% region " + share +
-           " of the time.";
+    return " The stated uncertainty is consistent: truth lay inside the 95&nbsp;% region " + share + " of the time.";
   if (inside >= 0.6)
-    return " It was somewhat surer of itself than it should have been: truth lay inside of its 95&nbsp;% region only " +
-           share + " of the time.";
-  return " Its own word on its accuracy can’t be trusted: truth lay inside of its 95&nbsp;% region only " + share +
+    return " The stated uncertainty is somewhat too small: truth lay inside the 95&nbsp;% region only " + share +
+           " of the time.";
+  return " The stated uncertainty is not to be relied on: truth lay inside the 95&nbsp;% region only " + share +
          " of the time.";
 }
 
 std::string losing(const ReportData &data) {
   const double count = figure(data, "lost_count");
-  if (!(count > 0)) return " It was never lost.";
-  return " It was lost " + strong(times_text(static_cast<int64_t>(count))) + ", for " +
+  if (!(count > 0)) return " It was never LOST.";
+  return " It was LOST " + strong(times_text(static_cast<int64_t>(count))) + ", for " +
          duration_text(figure(data, "lost_s")) + " in all.";
 }
 
@@ -60,7 +58,7 @@ std::string blindness(const ReportData &data) {
       blind_s += data.seconds(poses[i].t_ns) - data.seconds(poses[i - 1].t_ns);
   const double share = blind_s / std::max(data.end_s(), 1e-9);
   if (share < 0.05) return "";
-  return " For " + strong(percent_text(share)) + " of the time it saw nothing to go by but its own motion.";
+  return " For " + strong(percent_text(share)) + " of the time it had no observation: dead reckoning.";
 }
 
 // Radius in metres of the stated 95 % region, its longer half axis.
@@ -78,9 +76,8 @@ std::vector<double> stated_radii(const Trajectory &trajectory) {
 std::string with_truth(const ReportData &data) {
   const double rmse = figure(data, "position_rmse_m");
   std::string text = "The robot drove " + strong(length_text(figure(data, "distance_m"))) + " in " +
-                     strong(duration_text(figure(data, "duration_s"))) + ". It was typically " +
-                     strong(length_text(rmse)) + " from its estimate, at worst " +
-                     strong(length_text(figure(data, "position_max_m")));
+                     strong(duration_text(figure(data, "duration_s"))) + ". Its pose was typically off by " +
+                     strong(length_text(rmse)) + ", at worst by " + strong(length_text(figure(data, "position_max_m")));
   const std::string turn = data.trajectory.planar ? "heading" : "rotation";  // in space the whole of it
   const double turned = figure(data, (turn + "_rmse_deg").c_str());
   const std::string turn_words = data.trajectory.planar ? "heading" : "orientation";
@@ -96,8 +93,8 @@ std::string with_truth(const ReportData &data) {
     all.push_back({angle_text(turned), turn_words + " error, root mean square; at worst " +
                                            angle_text(figure(data, (turn + "_max_deg").c_str()))});
   if (std::isfinite(figure(data, "nees_inside_95")))
-    all.push_back({percent_text(figure(data, "nees_inside_95")),
-                   "of the time truth lay where the robot said; 95&nbsp;% is ideal"});
+    all.push_back(
+        {percent_text(figure(data, "nees_inside_95")), "of the time truth lay inside the stated 95&nbsp;% region"});
   if (figure(data, "coverage") < 0.995)
     all.push_back({percent_text(figure(data, "coverage")), "of truth’s stamps have a pose to compare with"});
   return "<p class=\"headline\">" + text + "</p>" + tiles(all);
@@ -107,14 +104,14 @@ std::string without_truth(const ReportData &data) {
   const double way = path_length(data.trajectory.poses, data.trajectory.planar);
   const auto radii = stated_radii(data.trajectory);
   const bool known = data.trajectory.has_covariance && !radii.empty();
-  std::string text = "By its own reckoning the robot drove " + strong(length_text(way)) + " in " +
+  std::string text = "By its estimate the robot drove " + strong(length_text(way)) + " in " +
                      strong(duration_text(data.end_s())) + ".";
   if (known)
     text += " By its own covariance, the typical error of the position was " +
             strong(length_text(percentile(radii, 50))) + " and at worst to " + strong(length_text(max_abs(radii))) +
             ", with 95&nbsp;% confidence.";
-  text += blindness(data) + " There is no truth to hold this against.";
-  std::vector<Tile> all{{length_text(way), "driven, by its own reckoning"},
+  text += blindness(data) + " There is no truth to compare it with.";
+  std::vector<Tile> all{{length_text(way), "driven, by its estimate"},
                         {duration_text(data.end_s()), "from the first pose to the last"}};
   if (known) {
     all.push_back({length_text(percentile(radii, 50)), "radius of its 95&nbsp;% region, median"});

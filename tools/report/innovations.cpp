@@ -183,7 +183,7 @@ std::string innovation_section(const ReportData &data) {
     body += "<p class=\"note\">" + std::to_string(groups.size() - kGroupsAtMost) +
             " more kinds with fewer data are not drawn.</p>";
   return section(
-      "What the sensors said",
+      "Observations",
       "Each measurement is compared with its prediction from the estimated pose. The differences "
       "should "
       "scatter evenly about zero, within the band, in the shape of the bell; a constant offset means that something is "

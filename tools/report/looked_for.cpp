@@ -83,7 +83,7 @@ std::string looked_for_section(const ReportData &data) {
             " that were seldom expected are not listed.";
   std::string head;
   for (const wm_look reason : kReasons) head += "<th>" + plain(wm_look_name(reason)) + "</th>";
-  return section("What it looked for",
+  return section("Landmarks looked for",
                  "Each landmark of the map once for each picture. Expected: in the picture, large enough, seen from "
                  "its front, and its "
                  "place known well enough to look there. Unlike: something else is there, the landmark is hidden, "

@@ -69,8 +69,8 @@ std::string legend(const std::vector<std::pair<std::string, std::string>> &marks
 std::string map_section(const ReportData &data) {
   const Picture picture = draw_picture(data, false);
   std::vector<std::pair<std::string, std::string>> marks;
-  if (data.truth) marks.emplace_back("<path class=\"truth\" d=\"M0 0H28\"/>", "where it was (truth)");
-  marks.emplace_back("<path class=\"estimate\" d=\"M0 0H28\"/>", "where it said it was");
+  if (data.truth) marks.emplace_back("<path class=\"truth\" d=\"M0 0H28\"/>", "truth");
+  marks.emplace_back("<path class=\"estimate\" d=\"M0 0H28\"/>", "estimate");
   if (picture.ellipse_scale > 0)
     marks.emplace_back(
         "<ellipse class=\"ellipse\" cx=\"14\" rx=\"13\" ry=\"7\"/>",
@@ -80,21 +80,20 @@ std::string map_section(const ReportData &data) {
   if (!data.landmarks.empty())
     marks.emplace_back("<path class=\"landmark\" d=\"M14-7l7 7l-7 7l-7-7Z\"/>", "landmark, with its number");
   if (!data.estimated_landmarks.empty())
-    marks.emplace_back("<path class=\"guess\" d=\"M8 0h12m-6-6v12\"/>", "landmark as the robot mapped it");
+    marks.emplace_back("<path class=\"guess\" d=\"M8 0h12m-6-6v12\"/>", "landmark of the robot's own map");
   if (data.edge_layer) marks.emplace_back("<path class=\"edges\" d=\"M0 0H28\"/>", "edges of the map");
   if (!data.cloud.empty())
     marks.emplace_back("<path class=\"cloud\" d=\"M4 0h0M14 0h0M24 0h0\"/>", "particles at some instants");
-  if (picture.sight_lines) marks.emplace_back("<path class=\"sight\" d=\"M0 0H28\"/>", "what it saw at some instants");
+  if (picture.sight_lines) marks.emplace_back("<path class=\"sight\" d=\"M0 0H28\"/>", "sightings at some instants");
   if (!data.truth && !data.gnss.empty())
     marks.emplace_back("<path class=\"gnss\" d=\"M4 0h0M14 0h0M24 0h0\"/>", "GNSS positions");
-  const std::string how =
-      std::string("The drive from above, in metres. ") +
-      (data.truth ? "Where the thin line covers the broad one, the robot knew where it was. " : "") +
-      "Arrows: start and end, pointing where the robot looked. Point at a chart below to see the place here.";
+  const std::string how = std::string("The drive from above, in metres. ") +
+                          (data.truth ? "Where the thin line covers the broad one, the pose was right. " : "") +
+                          "Arrows: start and end, with the heading. Point at a chart below to see the place here.";
   std::string notes;
   for (const std::string &note : data.notes) notes += "<p class=\"note\">" + escape(note) + "</p>";
   return section(
-             "Where it drove", how,
+             "Path", how,
              "<figure>" + picture.svg + legend(marks) + "</figure>" + side_views(data, picture.ellipse_scale) + notes) +
          "<script>const track=" + track_json(data, picture) + "</script>\n";
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What became of the data, what the robot thought of its own state, and what it learned about itself.
+// The data by source, the life cycle's state over time, and the calibration states.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -238,7 +238,7 @@ std::string source_section(const ReportData &data) {
     rows += "<td class=\"words\">" + reasons(source) + "</td></tr>";
   }
   return section(
-      "What became of the data",
+      "Data by source",
       "Nothing is lost silently: each datum that a source gave was used, or is counted here with the reason why not. A "
       "refused datum "
       "contradicted what the robot knew; late ones came after their moment was closed; lost ones are missing by the "
@@ -283,7 +283,7 @@ std::string state_section(const ReportData &data) {
     if (spent[k] > 0)
       marks.emplace_back("<i class=\"key " + std::string(wm_state_name(static_cast<unsigned>(k))) + "\"></i>",
                          std::string(kWords[k]) + " (" + percent_text(spent[k] / std::max(data.end_s(), 1e-9)) + ")");
-  return section("What state it was in", "The whole drive from left to right, as the robot judged itself.",
+  return section("State", "The whole drive from left to right, by the estimator's life cycle.",
                  "<figure><div class=\"strip\">" + strip + "</div>" + legend(marks) + "</figure>");
 }
 
@@ -302,7 +302,7 @@ std::string calibration_section(const ReportData &data) {
   rows += counter_rows(data.health);
   if (rows.empty()) return "";
   return section(
-      "What it learned about itself",
+      "Calibration states and counters",
       "These are not constants from a data sheet but states that the robot estimated while driving, each with its "
       "standard deviation at the end. A value within two standard deviations of zero shows that the calibration was "
       "right. Counts and shares stand without one.",

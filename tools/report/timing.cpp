@@ -146,7 +146,7 @@ std::string timing_section(const ReportData &data) {
             count_text(static_cast<int64_t>(missed)) + " of " + count_text(static_cast<int64_t>(total)) + "</td></tr>";
   }
   if (!rows.empty()) body += "<table>" + rows + "</table>";
-  return section("How long it took",
+  return section("Time",
                  "Each row is a stage of the work, from fast on the left to slow on the right, on a logarithmic scale. "
                  "What matters in a "
                  "robot is not the mean but the slowest case: the last orange line.",

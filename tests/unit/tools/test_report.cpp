@@ -144,10 +144,10 @@ void test_page_says_what_happened() {
   make(run, recording);
   const std::string page = report_page(load_report_data(run.path(), recording.path()));
   for (const char *words :
-       {"a &lt;made&gt; drive", "<em>10.0\u202fm</em>", "<em>5.0\u202fcm</em>", "It was never lost",
-        "How far off it was", "Bearing of sightings by eye", "1 too far from what was expected", "eye: yaw",
-        "<b>4.601</b> ± 0.040", "2 of 500", "left wheel’s encoder stood still", "gnss had fallen silent",
-        "slowest 31 µs", "lost: what it saw contradicted its pose, being mended (40"})
+       {"a &lt;made&gt; drive", "<em>10.0\u202fm</em>", "<em>5.0\u202fcm</em>", "It was never LOST", "Errors",
+        "Bearing of sightings by eye", "1 too far from what was expected", "eye: yaw", "<b>4.601</b> ± 0.040",
+        "2 of 500", "left wheel’s encoder stood still", "gnss had fallen silent", "slowest 31 µs",
+        "lost: what it saw contradicted its pose, being mended (40"})
     TEST_ASSERT_TRUE_MESSAGE(has(page, words), words);
   if (has(page, "nan")) TEST_FAIL_MESSAGE(page.substr(page.find("nan") - 60, 80).c_str());
   TEST_ASSERT_FALSE(has(page, "<made>"));
@@ -162,18 +162,18 @@ void test_page_without_truth_and_without_recording() {
   make(run, recording);
   std::filesystem::remove(recording.path() / "truth.csv");
   const std::string page = report_page(load_report_data(run.path(), recording.path()));
-  TEST_ASSERT_TRUE(has(page, "There is no truth to hold this against"));
-  TEST_ASSERT_TRUE(has(page, "How sure it was"));
-  TEST_ASSERT_FALSE(has(page, "How far off it was"));
+  TEST_ASSERT_TRUE(has(page, "There is no truth to compare it with"));
+  TEST_ASSERT_TRUE(has(page, "Uncertainty"));
+  TEST_ASSERT_FALSE(has(page, "Errors"));
   const std::string alone = report_page(load_report_data(run.path(), ""));
-  TEST_ASSERT_TRUE(has(alone, "Where it drove"));
+  TEST_ASSERT_TRUE(has(alone, "Path"));
   // A trajectory and nothing else.
   for (const char *file : {"innovations.csv", "health.json", "timing.json", "trajectory.csv"})
     std::filesystem::remove(run.path() / file);
   run.write("trajectory.tum", "0 0 0 0 0 0 0 1\n1 1 0 0 0 0 0 1\n");
   const std::string bare = report_page(load_report_data(run.path(), ""));
-  TEST_ASSERT_TRUE(has(bare, "Where it drove"));
-  TEST_ASSERT_FALSE(has(bare, "What the sensors said"));
+  TEST_ASSERT_TRUE(has(bare, "Path"));
+  TEST_ASSERT_FALSE(has(bare, "Observations"));
   if (has(bare, "nan")) TEST_FAIL_MESSAGE(bare.substr(bare.find("nan") - 60, 80).c_str());
 }
 
@@ -183,7 +183,7 @@ void test_odd_files_are_survived_or_refused_with_words() {
   make(run, recording);
   run.write("health.json", R"({"sources":[1,2],"calibration":{"a":1}})");
   run.write("timing.json", R"({"predict":{"p50_us":null},"deadlines_missed":"many"})");
-  TEST_ASSERT_TRUE(has(report_page(load_report_data(run.path(), recording.path())), "Where it drove"));
+  TEST_ASSERT_TRUE(has(report_page(load_report_data(run.path(), recording.path())), "Path"));
   run.write("health.json", "{");
   try {
     load_report_data(run.path(), recording.path());
@@ -357,7 +357,7 @@ void shows(const std::vector<double> &film_s, const std::string &times, const st
   if (!note.empty()) says(note, data.film_notes[0]);
   const std::string section = frames_section(data);
   TEST_ASSERT_EQUAL(data.frames.size(), count(section, "<figure"));
-  TEST_ASSERT_TRUE(has(section, note.empty() ? "What it saw" : "<p class=\"note\">" + note + "</p>"));
+  TEST_ASSERT_TRUE(has(section, note.empty() ? "Pictures" : "<p class=\"note\">" + note + "</p>"));
 }
 
 void test_pictures_are_of_what_the_camera_filmed() {
