@@ -22,6 +22,10 @@ int wm_estimator_reads(const wm_estimator *estimator, const char *key) {
   return 0;
 }
 
+const wm_keeper *wm_keeper_of(const wm_estimator *estimator) {
+  return estimator == &wm_slam_estimator ? &wm_slam_keeper : NULL;
+}
+
 const wm_estimator *wm_estimator_find(const char *name) {
   for (size_t i = 0; i < kCount; i++)
     if (strcmp(kEstimators[i]->name, name) == 0) return kEstimators[i];

@@ -4,6 +4,7 @@
 #define WAYMARK_ESTIMATOR_REGISTRY_H
 
 #include "waymark/estimator.h"
+#include "waymark/keeper.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -15,6 +16,7 @@ extern const wm_estimator wm_edge_mcl_estimator;
 extern const wm_estimator wm_pf_edges_estimator;
 extern const wm_estimator wm_stereo_ekf_estimator;
 extern const wm_estimator wm_slam_estimator;
+extern const wm_keeper wm_slam_keeper;
 
 #ifdef __cplusplus
 }

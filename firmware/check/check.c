@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include "check.h"
+#include "waymark/keeper.h"
 
 static void messages(const wm_config *config, findings *out) {
   static const char *const kWays[] = {"udpm://", "tcpq://", "memq://", "file://"};
@@ -51,5 +52,12 @@ void check_config(const wm_config *config, findings *out) {
   wm_config_each_warning(config, note_warning, out);
   messages(config, out);
   folder_of("start.saved_pose", config->saved_pose, "no pose would be kept", out);
+  folder_of("start.saved_map", config->saved_map, "no map would be kept", out);
+  if (config->saved_map[0] && !wm_keeper_of(config->estimator))
+    find(out, FINDING_NOTE, "start", "leave start.saved_map out", "start.saved_map: estimator %s makes no map to keep",
+         config->estimator->name);
+  if (config->saved_map[0] && !config->saved_pose[0])
+    find(out, FINDING_NOTE, "start", "start.saved_pose, beside it",
+         "start.saved_map without start.saved_pose: after a restart the robot has to be found in its map");
   folder_of("black_box.folder", config->black_box, "nothing would be kept", out);
 }

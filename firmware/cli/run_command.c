@@ -31,6 +31,8 @@ static const char kHelp[] =
     "  --duration S           seconds, then stop\n"
     "  --speed X              times real speed (default 1)\n"
     "  --seed N               of random numbers (default 1)\n"
+    "  --resume               with a recording, too: begin where the run before ended (start.saved_pose,\n"
+    "                         start.saved_map), and keep both\n"
     "  --landmarks FILE       instead of the recording's map\n"
     "  --map FILE             a map.yaml instead of the recording's\n"
     "  --calibration FILE     instead of the recording's\n"
@@ -41,6 +43,7 @@ static const char kHelp[] =
 
 typedef struct arguments {
   const char *config, *recording, *record, *landmarks, *calibration, *map;
+  int resumes;
   wm_run_options run;
 } arguments;
 
@@ -90,9 +93,10 @@ static void close_all(opened *self) {
   self->recording = NULL;
 }
 
-// A recording that is played stands in for the robot's devices; the robot's own state is left alone.
-static void without_robot(wm_config *config) {
-  config->saved_pose[0] = config->black_box[0] = '\0';
+// A recording that is played stands in for the robot's devices; the robot's own state is left alone, but for --resume.
+static void without_robot(wm_config *config, int resumes) {
+  config->black_box[0] = '\0';
+  if (!resumes) config->saved_pose[0] = config->saved_map[0] = '\0';
   config->devices.sightings_by_lcm = 0;
 }
 
@@ -102,7 +106,7 @@ static wm_status open_all(const arguments *args, opened *out, wm_error *err) {
   wm_status status = wm_config_load(args->config, config, err);
   if (status != WM_OK) return err->status = WM_BAD_CONFIG;  // also where it isn't there
   wm_config_each_warning(config, print_note, NULL);
-  if (args->recording) without_robot(config);
+  if (args->recording) without_robot(config, args->resumes);
   status = override_path(config->overrides.landmarks, args->landmarks, err);
   if (status == WM_OK) status = override_path(config->overrides.calibration, args->calibration, err);
   if (status == WM_OK) status = override_path(config->overrides.map, args->map, err);
@@ -252,6 +256,7 @@ int command_run(int argc, char *const *argv) {
                             {"--duration", OPTION_F64, &args.run.duration_s},
                             {"--speed", OPTION_F64, &args.run.speed},
                             {"--seed", OPTION_U64, &args.run.seed},
+                            {"--resume", OPTION_FLAG, &args.resumes},
                             {"--landmarks", OPTION_TEXT, &args.landmarks},
                             {"--calibration", OPTION_TEXT, &args.calibration},
                             {"--map", OPTION_TEXT, &args.map},

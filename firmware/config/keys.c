@@ -37,6 +37,10 @@ const config_key kConfigKeys[] = {
     {"start.saved_pose", "path", "none",
      "File that keeps the robot's last pose, on devices: a run begins there, if it isn't older than start.max_age_s, "
      "whatever `initial_pose` is."},
+    {"start.saved_map", "path", "none",
+     "File that keeps the map that `slam` makes, on devices, with its covariances and the calibration states: a run "
+     "goes on with it, if estimator, parameters and calibration are the same. The pose in it is that of "
+     "`start.saved_pose`; without one the robot is searched in the map."},
     {"black_box.folder", "path", "none",
      "Folder, on devices, with the last seconds of what was fused, as event logs; kept there where the robot gets lost "
      "or a run died, the newest 20 times."},

@@ -8,7 +8,7 @@
 #include "waymark/eventlog.h"
 
 #define MAGIC "WMLOG 2\n"
-#define RECORD_MAX (UINT32_C(16) << 20)  // a configuration is text; nothing is larger
+#define RECORD_MAX (UINT32_C(256) << 20)  // a kept map of 7500 states; nothing is larger
 
 struct wm_log_reader {
   FILE *file;
@@ -21,6 +21,7 @@ struct wm_log_reader {
   wm_landmark *landmarks;
   size_t sensor_capacity, landmark_capacity;
   char *config_text, *calibration_text;
+  void *kept;
   uint64_t events;
   int closed, saw_wheels, saw_start, saw_hash;
 };
@@ -176,6 +177,11 @@ static wm_status take_head_record(wm_log_reader *self, const record *r, wm_error
     case WM_LOG_SENSOR: return take_sensor(self, r, err);
     case WM_LOG_LANDMARK: return take_landmark(self, r, err);
     case WM_LOG_SOURCE: return take_source(self, r, err);
+    case WM_LOG_KEPT:
+      free(self->kept);
+      h->kept = self->kept = copy_text(r);
+      h->kept_bytes = r->count;
+      break;
     case WM_LOG_HEAD_END:
     case WM_LOG_EVENT:
     case WM_LOG_GAP:
@@ -196,7 +202,7 @@ static wm_status read_head(wm_log_reader *self, wm_error *err) {
     if (status == WM_END) return bad(self, err, "the file ends within its head; nothing can be replayed from it");
     if (status != WM_OK) return status;
     if (r.tag == WM_LOG_HEAD_END) break;
-    if (r.tag >= WM_LOG_EVENT) return bad(self, err, "an event before the end of the head");
+    if (r.tag >= WM_LOG_EVENT && r.tag != WM_LOG_KEPT) return bad(self, err, "an event before the end of the head");
     status = take_head_record(self, &r, err);
     if (status != WM_OK) return status;
   }
@@ -284,5 +290,6 @@ void wm_log_reader_close(wm_log_reader *self) {
   free(self->landmarks);
   free(self->config_text);
   free(self->calibration_text);
+  free(self->kept);
   free(self);
 }

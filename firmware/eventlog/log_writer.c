@@ -88,6 +88,7 @@ wm_status wm_log_create(wm_log_writer *self, const char *path, const wm_assembly
   write_setup(self, &assembly->setup);
   write_map(self, assembly);
   write_sources(self, assembly);
+  if (assembly->kept) write_record(self, WM_LOG_KEPT, assembly->kept, assembly->kept_bytes);
   write_record(self, WM_LOG_HEAD_END, "", 0);
   return WM_OK;
 }

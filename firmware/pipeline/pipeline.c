@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "waymark/clock.h"
+#include "waymark/keeper.h"
 #include "waymark/motion.h"
 
 static wm_time_ns ns_from_ms(double ms) { return wm_ns_from_seconds(ms * 1e-3); }
@@ -52,6 +53,16 @@ wm_status wm_pipeline_start(wm_pipeline *self, wm_output output, wm_error *err) 
   wm_predictor_init(&self->predictor, &params, self->odometry_memory);
   wm_budget_init(&self->budget, config->runtime.publish_useless_m);
   return WM_OK;
+}
+
+void wm_pipeline_take_kept(wm_pipeline *self, const void *image, size_t bytes) {
+  const wm_keeper *keeper = wm_keeper_of(self->fuser.estimator);
+  if (keeper && image) keeper->take(self->fuser.state, image, bytes);
+}
+
+size_t wm_pipeline_keep(const wm_pipeline *self, void *out, size_t capacity) {
+  const wm_keeper *keeper = wm_keeper_of(self->fuser.estimator);
+  return keeper ? keeper->keep(self->fuser.state, out, capacity) : 0;
 }
 
 void wm_pipeline_arrive(wm_pipeline *self, const wm_event *event) {

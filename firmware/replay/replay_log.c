@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "waymark/arena.h"
+#include "waymark/keeper.h"
 #include "waymark/replay.h"
 #include "waymark/run_folder.h"
 #include "waymark/steady.h"
@@ -35,6 +36,8 @@ static void assemble(log_replay *self, const wm_config *config, const wm_log_hea
                         .map = map,
                         .start = head->start,
                         .seed = head->seed};
+  a->kept = head->kept;
+  a->kept_bytes = head->kept_bytes;
   a->map_path = head->map_path;
   a->driving = head->driving;
   a->source_count = head->source_count;
@@ -58,6 +61,19 @@ static wm_status check_map(const wm_log_head *head, const wm_raster *map, wm_err
                  head->map_path, head->map_hash, hash);
 }
 
+// The map that the run had taken up at its start.
+static wm_status take_kept(log_replay *self, wm_error *err) {
+  const wm_assembly *a = &self->assembly;
+  const wm_keeper *keeper = wm_keeper_of(a->config->estimator);
+  if (!a->kept) return WM_OK;
+  const char *why = keeper ? keeper->why_not(a->config->estimator_params, &a->setup, a->kept, a->kept_bytes)
+                           : "the estimator makes no map";
+  if (why)
+    return wm_fail(err, WM_BAD_DATA, "%s: the log's map of the run before can't be taken up: %s", a->config->path, why);
+  keeper->take(self->state, a->kept, a->kept_bytes);
+  return WM_OK;
+}
+
 static wm_status start(log_replay *self, const wm_replay_options *options, wm_error *err) {
   const wm_config *config = self->assembly.config;
   const char *why = NULL;
@@ -71,6 +87,8 @@ static wm_status start(log_replay *self, const wm_replay_options *options, wm_er
   status = config->estimator->init(self->state, config->estimator_params, &self->assembly.setup);
   if (status != WM_OK)
     return wm_fail(err, status, "estimator '%s' can't start: %s", config->estimator->name, wm_status_text(status));
+  status = take_kept(self, err);
+  if (status != WM_OK) return status;
   status = wm_run_folder_open(options->out_dir, &self->assembly, &self->folder, err);
   if (status != WM_OK) return status;
   wm_fuser_init(&self->fuser, config->estimator, self->state, self->assembly.driving,

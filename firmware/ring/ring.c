@@ -4,7 +4,7 @@
 static size_t slot_size(size_t slot_bytes) { return (slot_bytes + 7) & ~(size_t)7; }
 
 size_t wm_ring_slots(size_t slots) {
-  size_t n = 2;
+  size_t n = 1;
   while (n < slots) n *= 2;
   return n;
 }

@@ -6,6 +6,7 @@
 
 #include "live.h"
 #include "threads.h"
+#include "waymark/keeper.h"
 #include "waymark/saved_pose.h"
 #include "waymark/steady.h"
 
@@ -66,15 +67,45 @@ static void flush(live *run) {
   live_say(run, "%s. Localizing goes on", err.text);
 }
 
+void live_save_map(live *run, const void *image, size_t bytes) {
+  live_disk *self = &run->disk;
+  const wm_config *config = run->config;
+  wm_error err;
+  const char *why =
+      wm_keeper_of(config->estimator)->why_not(config->estimator_params, &run->assembly.setup, image, bytes);
+  wm_status status = why ? wm_fail(&err, WM_INTERNAL, "%s: the map of now is not saved: %s", config->saved_map, why)
+                         : wm_saved_map_write(config->saved_map, &self->map_identity, live_utc_s(), image, bytes, &err);
+  if (status == WM_OK || self->said_map) return;
+  self->said_map = 1;
+  live_say(run, "%s. Localizing goes on; the next start will not have the map of now", err.text);
+}
+
+static void save_map(live *run) {
+  live_disk *self = &run->disk;
+  if (!self->keeps_map) return;
+  const kept_map *map = wm_ring_front(&run->estimator.maps);
+  if (map) {
+    live_save_map(run, map->image, map->bytes);
+    wm_ring_pop(&run->estimator.maps);
+  }
+  const uint64_t late = wm_ring_dropped(&run->estimator.maps);
+  if (late > self->said_maps_late && self->said_maps_late == 0)
+    live_say(run, "the disk was blocked: the map was not saved when it was due");
+  self->said_maps_late = late;
+}
+
+double live_utc_s(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_REALTIME, &now);
+  return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
 static void save_pose(live *run) {
   live_disk *self = &run->disk;
-  struct timespec utc;
   wm_error err;
   if (!self->has_last_pose) return;
   self->has_last_pose = 0;
-  clock_gettime(CLOCK_REALTIME, &utc);
-  double utc_s = (double)utc.tv_sec + (double)utc.tv_nsec * 1e-9;
-  if (wm_saved_pose_write(run->config->saved_pose, &self->last_pose, utc_s, &err) == WM_OK || self->said_unsaved)
+  if (wm_saved_pose_write(run->config->saved_pose, &self->last_pose, live_utc_s(), &err) == WM_OK || self->said_unsaved)
     return;
   self->said_unsaved = 1;
   live_say(run, "%s. Localizing goes on; the next start will begin without a saved pose", err.text);
@@ -104,6 +135,7 @@ void *disk_thread(void *argument) {
     say_lost_lines(run);
     say_slow(run);
     do_what_is_due(run, wm_monotonic_ns());
+    save_map(run);
   }
   save_pose(run);
   black_box_close(&run->disk.box);

@@ -96,6 +96,19 @@ static void report_health(live *run, wm_time_ns now_ns) {
   wm_ring_commit(&self->healths);
 }
 
+// A pass over the estimator's covariance, no more than a correction takes.
+static void keep_map(live *run, wm_time_ns now_ns) {
+  live_estimator *self = &run->estimator;
+  if (!self->maps_memory || now_ns < self->next_map_ns) return;
+  self->next_map_ns = now_ns + wm_ns_from_seconds(run->config->runtime.start_save_map_every_s);
+  kept_map *slot = wm_ring_reserve(&self->maps);
+  if (!slot) return;  // the disk has not taken the one before; the ring counts it
+  wm_time_ns begin_ns = wm_monotonic_ns();
+  slot->bytes = wm_pipeline_keep(&self->pipeline, slot->image, self->maps.slot_bytes - sizeof *slot);
+  wm_histogram_add(&self->keep_ns, wm_monotonic_ns() - begin_ns);
+  if (slot->bytes > 0) wm_ring_commit(&self->maps);
+}
+
 static int all_sources_done(live *run) {
   for (size_t i = 0; i < run->assembly.source_count; i++)
     if (!atomic_load_explicit(&run->sources[i].done, memory_order_acquire)) return 0;
@@ -125,6 +138,7 @@ static void loop(live *run) {
     wm_pipeline_advance(&self->pipeline, now_ns);
     publish(run, now_ns);
     report_health(run, now_ns);
+    keep_map(run, now_ns);
     self->loops++;
     wm_time_ns end_ns = wm_monotonic_ns();
     wm_histogram_add(&self->cycle_ns, end_ns - begin_ns);

@@ -3,7 +3,7 @@
 // thread at a time.
 //
 //   source threads ── events ──► estimator ──┬─ to_publish, healths ──► publish thread: LCM, watchdog
-//                                            └─ to_disk ─────────────► disk thread: files ◄── lines ── publish thread
+//                                            └─ to_disk, maps ───────► disk thread: files ◄── lines ── publish thread
 #ifndef WAYMARK_FIRMWARE_LIVE_H
 #define WAYMARK_FIRMWARE_LIVE_H
 
@@ -19,6 +19,7 @@
 #include "waymark/ring.h"
 #include "waymark/run.h"
 #include "waymark/run_folder.h"
+#include "waymark/saved_map.h"
 
 typedef struct live live;
 
@@ -45,15 +46,22 @@ typedef struct health_record {
   wm_time_ns watermark_ns;  // wm_merge_watermark
 } health_record;
 
-// The estimator's thread. It fills three rings.
+// The estimator's map, as wm_keeper writes it: one slot, which is free again once the map is on the disk.
+typedef struct kept_map {
+  size_t bytes;
+  uint8_t image[];
+} kept_map;
+
+// The estimator's thread. It fills four rings.
 typedef struct live_estimator {
   wm_pipeline pipeline;
-  wm_ring to_publish, to_disk, healths;
+  wm_ring to_publish, to_disk, healths, maps;
   void *to_publish_memory, *to_disk_memory, *healths_memory;
-  wm_time_ns loop_ns, publish_ns, next_publish_ns, next_health_ns;
+  void *maps_memory;  // NULL: no map is kept
+  wm_time_ns loop_ns, publish_ns, next_publish_ns, next_health_ns, next_map_ns;
   uint64_t loops, deadlines_missed;
   uint64_t events_lost;  // not yet marked in the log
-  wm_histogram wake_ns, cycle_ns, age_ns;
+  wm_histogram wake_ns, cycle_ns, age_ns, keep_ns;
   int64_t allocations, page_faults;  // after start
   atomic_int done;
 } live_estimator;
@@ -84,6 +92,9 @@ typedef struct live_disk {
   // The last pose that was worth keeping, and whether it is on the disk.
   wm_estimate last_pose;
   int keeps_pose, has_last_pose;
+  int keeps_map, said_map;
+  wm_map_identity map_identity;
+  uint64_t said_maps_late;
 } live_disk;
 
 struct live {
@@ -97,6 +108,7 @@ struct live {
   live_estimator estimator;
   live_publish publish;
   live_disk disk;
+  wm_saved_map map;       // of the run before; no image: none
   atomic_int stop;        // sources: say no more
   atomic_int restarting;  // it goes on with another configuration: no end for the service manager
 };
@@ -127,6 +139,11 @@ wm_output estimator_output(live_estimator *self);
 uint64_t outputs_lost(const live_estimator *self);
 // The publish thread's own part of a health record.
 void live_publish_health(const live_publish *self, wm_health *health);
+
+// Puts a map on the disk; what is wrong is reported once. The disk thread's, and the main thread's after it.
+void live_save_map(live *self, const void *image, size_t bytes);
+// This computer's UTC in seconds.
+double live_utc_s(void);
 
 void *source_thread(void *live_source_pointer);
 void *estimator_thread(void *live_pointer);

@@ -6,12 +6,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 
 #include "lcm_commands.h"
 #include "lcm_sightings.h"
 #include "live.h"
 #include "threads.h"
+#include "waymark/keeper.h"
 #include "waymark/saved_pose.h"
 #include "waymark/steady.h"
 
@@ -30,7 +30,7 @@ void live_say(live *self, const char *format, ...) {
 
 // ── memory ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-#define NEEDS_MAX (WM_PIPELINE_NEEDS + 5 + WM_SOURCES_MAX + WM_VISION_NEEDS)
+#define NEEDS_MAX (WM_PIPELINE_NEEDS + 6 + WM_SOURCES_MAX + WM_VISION_NEEDS)
 
 static size_t record_bytes(const live *self) { return OUTPUT_RECORD_HEAD + wm_output_bytes(self->assembly.kinds); }
 
@@ -39,6 +39,12 @@ static size_t record_bytes(const live *self) { return OUTPUT_RECORD_HEAD + wm_ou
 static size_t disk_slots(const live *self) {
   size_t slots = kThreads[THREAD_ESTIMATOR].ring_slots;
   return record_bytes(self) > 1024 ? slots / 8 : slots;
+}
+
+static size_t map_slot_bytes(const live *self) {
+  const char *why;
+  const wm_config *config = self->config;
+  return sizeof(kept_map) + config->estimator->state_bytes(config->estimator_params, &self->assembly.setup, &why);
 }
 
 static size_t list_needs(live *self, wm_arena_need needs[NEEDS_MAX]) {
@@ -52,6 +58,8 @@ static size_t list_needs(live *self, wm_arena_need needs[NEEDS_MAX]) {
   needs[n++] =
       (wm_arena_need){"health ring", wm_ring_bytes(HEALTH_RING_SLOTS, sizeof(health_record)), &e->healths_memory};
   needs[n++] = (wm_arena_need){"lines ring", wm_ring_bytes(LINE_RING_SLOTS, LINE_BYTES), &self->publish.lines_memory};
+  if (self->disk.keeps_map)
+    needs[n++] = (wm_arena_need){"map ring", wm_ring_bytes(1, map_slot_bytes(self)), &e->maps_memory};
   for (size_t i = 0; i < self->assembly.source_count; i++) {
     size_t slot_bytes = wm_merge_slot_bytes(self->assembly.sources[i].kinds);
     needs[n++] = (wm_arena_need){self->assembly.sources[i].name, wm_ring_bytes(slots, slot_bytes),
@@ -70,6 +78,7 @@ static wm_status take_memory(live *self, wm_error *err) {
   wm_ring_init(&e->to_disk, e->to_disk_memory, disk_slots(self), record_bytes(self));
   wm_ring_init(&e->to_publish, e->to_publish_memory, PUBLISH_RING_SLOTS, PUBLISH_RECORD_BYTES);
   wm_ring_init(&e->healths, e->healths_memory, HEALTH_RING_SLOTS, sizeof(health_record));
+  if (e->maps_memory) wm_ring_init(&e->maps, e->maps_memory, 1, map_slot_bytes(self));
   wm_ring_init(&self->publish.lines, self->publish.lines_memory, LINE_RING_SLOTS, LINE_BYTES);
   for (size_t i = 0; i < self->assembly.source_count; i++)
     wm_ring_init(&self->sources[i].ring, self->sources[i].ring_memory,
@@ -80,33 +89,71 @@ static wm_status take_memory(live *self, wm_error *err) {
 
 // ── start ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-static double utc_s(void) {
-  struct timespec now;
-  clock_gettime(CLOCK_REALTIME, &now);
-  return (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-}
-
-// The saved pose where there is one that holds; else the configuration's start.
-static void start_where_it_was(live *self) {
+// The saved pose where there is one that holds (1); else the configuration's start.
+static int start_where_it_was(live *self) {
   const wm_runtime_params *params = &self->config->runtime;
   const char *path = self->config->saved_pose;
   wm_start *start = &self->assembly.setup.start;
   wm_saved_pose saved;
   wm_error err;
-  if (!path[0]) return;
+  if (!path[0]) return 0;
   wm_status status = wm_saved_pose_read(path, &saved, &err);
   if (status != WM_OK) {
     live_say(self, "start: no saved pose is used: %s", err.text);
-    return;
+    return 0;
   }
-  double age_s = utc_s() - saved.utc_s;
-  if (!wm_saved_pose_start(&saved, utc_s(), params->start_max_age_s, params->start_moved_m,
+  double now_s = live_utc_s(), age_s = now_s - saved.utc_s;
+  if (!wm_saved_pose_start(&saved, now_s, params->start_max_age_s, params->start_moved_m,
                            params->start_moved_deg * M_PI / 180, start)) {
     live_say(self, "start: the saved pose is %.0f s old, more than start.max_age_s; it is not used", age_s);
-    return;
+    return 0;
   }
   live_say(self, "start: where it was %.0f s ago: x %.2f m, y %.2f m, heading %.1f deg, sigma %.2f m", age_s,
            start->p_m[0], start->p_m[1], start->heading_rad * 180 / M_PI, start->sigma_xy_m);
+  return 1;
+}
+
+// The map of the run before. Without a pose in it the configuration's start means nothing: it was another map's.
+static void go_on_with_map(live *self, int has_pose) {
+  wm_setup *setup = &self->assembly.setup;
+  wm_error err;
+  wm_status status = wm_saved_map_read(self->config->saved_map, self->config, setup, &self->map, &err);
+  if (status != WM_OK) {
+    live_say(self, "start: no saved map is used: %s", err.text);
+    return;
+  }
+  self->assembly.kept = self->map.image;
+  self->assembly.kept_bytes = self->map.bytes;
+  if (!has_pose) {
+    const wm_time_ns t_ns = setup->start.t_ns;
+    wm_start_init(&setup->start);
+    setup->start.t_ns = t_ns;
+  }
+  live_say(self, "start: goes on with the map saved %.0f s ago%s", live_utc_s() - self->map.utc_s,
+           has_pose ? "" : "; where the robot is in it has to be found");
+}
+
+static void take_up_what_was(live *self) {
+  const wm_config *config = self->config;
+  int has_pose = self->options->start != NULL;
+  if (has_pose) {
+    self->assembly.setup.start = *self->options->start;
+  } else {
+    has_pose = start_where_it_was(self);
+  }
+  self->disk.keeps_pose = config->saved_pose[0];
+  self->disk.keeps_map = config->saved_map[0] && wm_keeper_of(config->estimator);
+  if (!self->disk.keeps_map) return;
+  self->disk.map_identity = wm_map_identity_of(config, &self->assembly.setup);
+  go_on_with_map(self, has_pose);
+}
+
+// At the end, when the estimator's and the disk's thread are over.
+static void save_last_map(live *self) {
+  if (!self->disk.keeps_map) return;
+  kept_map *map = self->estimator.maps_memory;
+  map->bytes = wm_pipeline_keep(&self->estimator.pipeline, map->image, self->estimator.maps.slot_bytes - sizeof *map);
+  if (map->bytes > 0) live_save_map(self, map->image, map->bytes);
 }
 
 // Commands over LCM are a source as any other, so that they are in their place in time, and in the log.
@@ -135,13 +182,10 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   wm_status status = add_sightings(self, recording, err);
   if (status == WM_OK) status = add_commands(self, recording, err);
   if (status == WM_OK) status = wm_assemble(self->config, recording, self->options->seed, &self->assembly, err);
-  if (status == WM_OK && self->options->start) {
-    self->assembly.setup.start = *self->options->start;
-  } else if (status == WM_OK) {
-    start_where_it_was(self);
-  }
+  if (status == WM_OK) take_up_what_was(self);
   if (status == WM_OK) status = take_memory(self, err);
   if (status == WM_OK) status = wm_pipeline_start(&self->estimator.pipeline, estimator_output(&self->estimator), err);
+  if (status == WM_OK) wm_pipeline_take_kept(&self->estimator.pipeline, self->map.image, self->map.bytes);
   wm_time_ns first_ns;
   if (status == WM_OK) status = wm_vision_start(self->assembly.vision, err);
   if (status == WM_OK) status = wm_feeds_open(&self->assembly, self->feeds, wm_monotonic_ns(), &first_ns, err);
@@ -166,7 +210,6 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
     if (status == WM_OK) status = pictures->ops->start(pictures, err);
   }
   notify_open(&self->publish.notify);
-  self->disk.keeps_pose = self->config->saved_pose[0];
   return status;
 }
 
@@ -176,6 +219,7 @@ static void start_clock(live *self) {
   self->clock = (run_clock){begin_ns, first ? first->next.arrival_ns : begin_ns, self->options->speed};
   self->estimator.next_publish_ns = self->clock.run_ns;
   self->estimator.next_health_ns = self->clock.run_ns;
+  self->estimator.next_map_ns = self->clock.run_ns + wm_ns_from_seconds(self->config->runtime.start_save_map_every_s);
 }
 
 static void tell_memory(live *self) {
@@ -337,7 +381,8 @@ static wm_status write_summary(live *self, const wm_live_report *report, wm_erro
                                     {"correct", &e->pipeline.fuser.correct_ns},
                                     {"publish", &e->pipeline.publish_ns},
                                     {"age", &e->age_ns},
-                                    {"send", &self->publish.send_ns}};
+                                    {"send", &self->publish.send_ns},
+                                    {"keep", &e->keep_ns}};
   const wm_timing timing = {.stages = stages,
                             .stage_count = sizeof stages / sizeof stages[0],
                             .allocations_after_start = e->allocations,
@@ -375,6 +420,7 @@ static wm_status run(live *self, wm_recording *recording, wm_live_report *report
   status = start_threads(self, &threads, report, err);
   if (status == WM_OK) wait_for_end(self, report);
   join_threads(self, &threads);
+  if (status == WM_OK) save_last_map(self);
   notify_close(&self->publish.notify);
   if (status != WM_OK) return status;
   fill_report(self, report);
@@ -400,6 +446,7 @@ wm_status wm_run_live(const wm_config *config, wm_recording *recording, const wm
   black_box_close(&self->disk.box);  // where no thread did
   wm_assembly_close(&self->assembly);
   wm_arena_close(&self->arena);
+  free(self->map.image);
   free(self);
   return status;
 }

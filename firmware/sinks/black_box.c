@@ -120,6 +120,7 @@ void black_box_open(black_box *self, const char *folder, double keep_s, double p
   (void)snprintf(self->folder, sizeof self->folder, "%s", folder);
   self->keep_ns = wm_ns_from_seconds(keep_s);
   self->assembly = *assembly;
+  self->assembly.kept = NULL;  // its logs begin later than the run, when that map is another one
   if (mkdir(folder, 0777) != 0 && errno != EEXIST) unwritable(self, strerror(errno));
   path_of(self, "now", now);
   if (has_died(now)) keep(self, "died");

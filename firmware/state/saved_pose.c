@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/saved_pose.h"
 
-#include <errno.h>
-#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
 
+#include "replace_file.h"
 #include "waymark/recording.h"
 #include "waymark/yaml.h"
 
@@ -36,36 +35,10 @@ int wm_saved_pose_is_worth_it(const wm_estimate *e) {
          sigma_heading(e->covariance) < SIGMA_HEADING_MAX_RAD;
 }
 
-// To the disk and not only to the system: a name that points to an empty file would be worse than none.
-static int write_through(int fd, const char *text, size_t length) {
-  while (length > 0) {
-    ssize_t written = write(fd, text, length);
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return errno;
-    text += written;
-    length -= (size_t)written;
-  }
-  return fsync(fd) == 0 ? 0 : errno;
-}
-
-static int rename_through(const char *from, const char *to) {
-  char folder[WM_PATH_MAX];
-  if (rename(from, to) != 0) return errno;
-  (void)snprintf(folder, sizeof folder, "%s", to);
-  char *slash = strrchr(folder, '/');
-  if (slash == folder) slash++;
-  if (slash) *slash = '\0';
-  int fd = open(slash ? folder : ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return 0;  // the file is there; its name may be lost with the power
-  (void)fsync(fd);
-  (void)close(fd);
-  return 0;
-}
-
 static double finite_or_0(double value) { return isfinite(value) ? value : 0; }
 
 wm_status wm_saved_pose_write(const char *path, const wm_estimate *e, double utc_s, wm_error *err) {
-  char text[640], beside[WM_PATH_MAX + 8];
+  char text[640];
   const double *p = e->pose_map_base.p_m, *q = e->pose_map_base.q_xyzw;
   int length =
       snprintf(text, sizeof text,
@@ -76,15 +49,8 @@ wm_status wm_saved_pose_write(const char *path, const wm_estimate *e, double utc
                "speed_mps: %.4f\nrate_radps: %.5f\n",
                utc_s, p[0], p[1], p[2], e->heading_rad, q[0], q[1], q[2], q[3], fmax(sigma_xy(e->covariance), 1e-6),
                fmax(sigma_heading(e->covariance), 1e-6), finite_or_0(e->v_mps[0]), finite_or_0(e->w_radps[2]));
-  (void)snprintf(beside, sizeof beside, "%s.new", path);
-  int fd = open(beside, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (fd < 0) return wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(errno));
-  int failed = write_through(fd, text, (size_t)length);
-  if (close(fd) != 0 && !failed) failed = errno;
-  if (!failed) failed = rename_through(beside, path);
-  if (!failed) return WM_OK;
-  (void)unlink(beside);
-  return wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(failed));
+  const file_part part = {text, (size_t)length < sizeof text ? (size_t)length : sizeof text - 1};
+  return replace_file(path, &part, 1, err);
 }
 
 // ── reading ─────────────────────────────────────────────────────────────────────────────────────────────────────────

@@ -76,11 +76,24 @@ void joint_state::set_motion_states(const wm_motion_states &states, int model, c
 
 // ---- time and motion ----
 
+bool joint_state::is_velocity(int state) const {
+  for (int i = kVelocityX; i < kMotionStates; i++)
+    if (motion_state_[i] == state) return true;
+  return false;
+}
+
+void joint_state::take_kept(const double scale_origin_m[2]) {
+  std::memcpy(scale_origin_m_, scale_origin_m, sizeof scale_origin_m_);
+  take_calibration(x());
+}
+
 void joint_state::move(const wm_event &motion) {
+  const int32_t kind = kind_;
   if (const int state = feed(motion); state >= 0) {
     forget(state, 1.0, start_variance_[kSpeedScale]);
     anchor_scale_again();
   }
+  if (kind_ != kind) take_calibration(x());  // values that a kept map brought along
   move_to(motion.t_ns);
   double innovation, variance;
   if (standstill_bias(&innovation, &variance)) {

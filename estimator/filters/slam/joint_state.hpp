@@ -87,6 +87,13 @@ class joint_state : public planar_motion {
   double covariance(int i, int j) const { return p().at(i, j); }
   double variance(int state) const { return p().at(state, state); }
   void set_value(int state, double value) { x()[state] = value; }
+  // For keep.cpp: the mean; a row of the covariance, whose elements from `state` on count; what a map brings along.
+  const double *values() const { return x(); }
+  const double *covariance_row(int state) const { return p().row(state); }
+  void set_covariance(int i, int j, double value) { p().set(i, j, value); }
+  const double *scale_origin_m() const { return scale_origin_m_; }
+  bool is_velocity(int state) const;
+  void take_kept(const double scale_origin_m[2]);
   // The state becomes `value` with `variance`, independent of all others.
   void forget(int state, double value, double variance);
   // x := factor x + noise (Gauss-Markov), for a state that no other one's motion depends on.

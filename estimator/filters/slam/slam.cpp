@@ -27,11 +27,15 @@ correlated_slot error_slot_of(const wm_slam_params &p, const wm_sighting_params 
 
 joint_state::wheel_slip slip_of(const wm_slam_params &p) { return {p.wheel_slip_sigma, p.wheel_slip_tau_s}; }
 
+int states_that_last(const wm_slam_params &p, const wm_setup &setup) {
+  return kPoseStates + joint_state::count_motion_states(setup.motion->states, setup.motion->model, slip_of(p)) +
+         sensor_slots::count(setup, p.map != WM_SLAM_MAP_NONE);
+}
+
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
-  return kPoseStates + joint_state::count_motion_states(setup.motion->states, setup.motion->model, slip_of(p)) +
-         sensor_slots::count(setup, p.map != WM_SLAM_MAP_NONE) +
-         (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count + s.correlated_slots * error_slot_of(p, s).width;
+  return states_that_last(p, setup) + (p.sensor_stamp_sigma_s > 0.0) * (int)setup.sensor_count +
+         s.correlated_slots * error_slot_of(p, s).width;
 }
 
 // Azimuth and inverse distance of a ray, of which there are as many as clones.
@@ -80,6 +84,10 @@ landmark_note note_of(int32_t id, int sensor, wm_time_ns t_ns) {
   out.deferred_ns = WM_TIME_NONE;
   out.apart_from = -1;
   return out;
+}
+
+int slam::lasting_states(const wm_slam_params &params, const wm_setup &setup) {
+  return states_that_last(params, setup);
 }
 
 slam::arrays slam::place(memory_layout *out, const wm_slam_params &params, const wm_setup &setup) {
@@ -176,7 +184,7 @@ void slam::take_lines() {
   to.capacity = joint_.layout().capacity;
   joint_.grow(to);
   first_clone_ = to.first_clone;
-  by_bearings_ = joint_.landmarks() == 0;
+  by_bearings_ |= joint_.landmarks() == 0;
   follow_scale();
   if (joint_.follows_scale())
     for (int k = first_ray_; k < first_clone_; k += 2) joint_.follow_scale(k + 1, -1.0, false);
@@ -371,6 +379,7 @@ wm_status slam::begin_observation(wm_time_ns t_ns) {
   const wm_status status = joint_.check_time(t_ns);
   if (status != WM_OK) return status;
   joint_.move_to(t_ns);
+  if (is_kept_) age_kept(t_ns);
   end_picture(t_ns);
   end_doubt();
   maintain_map(t_ns);

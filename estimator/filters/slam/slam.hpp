@@ -105,6 +105,10 @@ class slam {
   size_t list_landmarks(wm_landmark *out, double (*covariance)[4], size_t capacity) const;
   const wm_motion_calibration &motion_calibration() const { return joint_.calibration(); }
   uint32_t motion_health() const { return joint_.motion_health(); }
+  // keep.cpp: wm_keeper's functions
+  size_t keep(void *out, size_t capacity) const;
+  static const char *why_not_kept(const wm_slam_params &params, const wm_setup &setup, const void *image, size_t bytes);
+  void take_kept(const void *image);
 
  private:
   static constexpr int kMaxCalibration = kCalibrationCount + 2 + kSlamSensors * kSensorStates;  // 2: means of the slip
@@ -154,6 +158,7 @@ class slam {
     double *joint;
   };
   static arrays place(memory_layout *out, const wm_slam_params &params, const wm_setup &setup);
+  static int lasting_states(const wm_slam_params &params, const wm_setup &setup);  // pose and calibration
   void follow_scale();
   bool has_headings() const { return joint_.layout().landmark_width == 3; }
   bool has_lines() const { return joint_.layout().clones > 0; }
@@ -179,6 +184,11 @@ class slam {
     return is_seen_enough(note) && (!note.may_be_misread || (note.viewed_twice && !note.is_double));
   }
   wm_pose2 pose_of(int landmark) const;
+
+  // keep.cpp
+  void take_kept_landmark(const void *image, int from);
+  void place_in_kept();
+  void age_kept(wm_time_ns t_ns);
 
   // update.cpp: rows of an observation
   void begin_picture(int sensor, wm_time_ns t_ns);
@@ -340,6 +350,7 @@ class slam {
   bool by_slip_;      // LOST by a slip, which more sightings confirm
   bool by_one_;       // the pose was found by one marker and is not proven yet
   bool one_refuted_;  // by others; since then it takes two
+  bool is_kept_;      // the map is that of a run before, and nothing was observed yet
 };
 
 }  // namespace wm

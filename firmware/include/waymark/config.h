@@ -66,7 +66,7 @@ typedef struct wm_runtime_params {
   double publish_useless_m;               // sigma of position from which on a pose is of no use
   double start_max_age_s;                 // of the saved pose
   double start_moved_m, start_moved_deg;  // sigmas of what may have happened to the robot while it was off
-  double start_save_every_s;
+  double start_save_every_s, start_save_map_every_s;
   double black_box_keep_s, black_box_pictures_hz;
   int32_t realtime_loop_hz;
   int32_t realtime_priority;  // SCHED_FIFO, 0: normal thread
@@ -110,6 +110,7 @@ typedef struct wm_config {
   size_t source_count;
   char lcm_url[128];             // publish.lcm_url; "" : LCM_DEFAULT_URL or LCM's own default
   char saved_pose[WM_PATH_MAX];  // start.saved_pose; "": none
+  char saved_map[WM_PATH_MAX];   // start.saved_map; "": none
   char black_box[WM_PATH_MAX];   // black_box.folder; "": none
   char channel_prefix[48];       // publish.channel_prefix, "WAYMARK_"
   // Keys that were renamed, removed, or that the estimator does not take: a line each, "FILE:LINE: KEY: what to do",

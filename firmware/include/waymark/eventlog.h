@@ -38,9 +38,10 @@ typedef enum wm_log_tag {
   WM_LOG_MAP_HASH,       // u64; absent where there was no map
   WM_LOG_MAP_PATH,       // text: where the map was; it is not in the log
   WM_LOG_HEAD_END,
-  WM_LOG_EVENT,  // struct
-  WM_LOG_GAP,    // u64: events that the sink could not write in time and that are missing here
-  WM_LOG_CLOSED  // u64: events in the file; the run ended in order
+  WM_LOG_EVENT,   // struct
+  WM_LOG_GAP,     // u64: events that the sink could not write in time and that are missing here
+  WM_LOG_CLOSED,  // u64: events in the file; the run ended in order
+  WM_LOG_KEPT     // of the head: the map that the run began with (waymark/keeper.h); absent where it had none
 } wm_log_tag;
 
 // ── writing ─────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -81,6 +82,8 @@ typedef struct wm_log_head {
   const wm_landmark *landmarks;
   size_t landmark_count;
   wm_driving driving;
+  const void *kept;  // NULL: no map was taken up
+  size_t kept_bytes;
   uint32_t source_count;
   struct {
     char name[WM_SOURCE_NAME_MAX];

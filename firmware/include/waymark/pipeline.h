@@ -39,6 +39,11 @@ void wm_pipeline_needs(wm_pipeline *self, const wm_assembly *assembly, wm_arena_
 // With the memory in place. The only function of these that may take long.
 wm_status wm_pipeline_start(wm_pipeline *self, wm_output output, wm_error *err);
 
+// A map of a run before (waymark/keeper.h), which `why_not` let pass: after the start, before the first event.
+void wm_pipeline_take_kept(wm_pipeline *self, const void *image, size_t bytes);
+// What is to be kept now, into `out`: its bytes; 0 where the estimator keeps nothing or the pose is in doubt.
+size_t wm_pipeline_keep(const wm_pipeline *self, void *out, size_t capacity);
+
 void wm_pipeline_arrive(wm_pipeline *self, const wm_event *event);
 void wm_pipeline_advance(wm_pipeline *self, wm_time_ns now_ns);
 // The pose of `now_ns` into *out, not yet sent. 0 where there is none to tell.

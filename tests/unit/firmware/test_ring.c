@@ -52,8 +52,20 @@ static void when_full_the_newest_is_dropped_and_counted(void) {
   TEST_ASSERT_TRUE(push(10));
 }
 
+static void a_ring_of_one_slot_holds_one_record(void) {
+  static uint8_t few[64];
+  wm_ring_init(&ring, few, 1, sizeof(record));
+  TEST_ASSERT_TRUE(push(1));
+  TEST_ASSERT_FALSE(push(2));
+  TEST_ASSERT_EQUAL_UINT64(1, ((const record *)wm_ring_front(&ring))->number);
+  TEST_ASSERT_FALSE(push(3));  // still being read
+  wm_ring_pop(&ring);
+  TEST_ASSERT_TRUE(push(4));
+  TEST_ASSERT_EQUAL_UINT64(2, wm_ring_dropped(&ring));
+}
+
 static void slots_are_a_power_of_two(void) {
-  TEST_ASSERT_EQUAL(2, wm_ring_slots(0));
+  TEST_ASSERT_EQUAL(1, wm_ring_slots(0));
   TEST_ASSERT_EQUAL(8, wm_ring_slots(5));
   TEST_ASSERT_EQUAL(8, wm_ring_slots(8));
   TEST_ASSERT_EQUAL(8 * 16, wm_ring_bytes(7, 9));
@@ -98,6 +110,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(it_hands_out_in_order_and_then_nothing);
   RUN_TEST(when_full_the_newest_is_dropped_and_counted);
+  RUN_TEST(a_ring_of_one_slot_holds_one_record);
   RUN_TEST(slots_are_a_power_of_two);
   RUN_TEST(two_threads_lose_nothing_and_see_whole_records);
   return UNITY_END();

@@ -9,6 +9,9 @@
 
 #include "unity.h"
 #include "waymark/budget.h"
+#include "waymark/config.h"
+#include "waymark/keeper.h"
+#include "waymark/saved_map.h"
 #include "waymark/saved_pose.h"
 
 static char folder[64], path[128];
@@ -175,6 +178,132 @@ static void growth_that_is_seen_while_reckoning_counts(void) {
   TEST_ASSERT_DOUBLE_WITHIN(0.1, 9.8, way_m);  // 0.05 a metre, 0.49 left
 }
 
+// ── the saved map ───────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_config slam;
+static wm_sensor eye = {.name = "eye", .bearing_sigma_rad = 0.01, .range_sigma_m = 0.03};
+static uint8_t image[1 << 14];
+
+static wm_setup setup_of_slam(const char *parameters) {
+  char text[300];
+  int n = snprintf(text, sizeof text, "format: waymark-config/1\nestimator: slam\n%s", parameters);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, (size_t)n, "slam.yaml", &slam, &err), err.text);
+  wm_setup setup = {.motion = slam.motion, .sightings = slam.sightings, .sensors = &eye, .sensor_count = 1};
+  wm_start_init(&setup.start);
+  return setup;
+}
+
+static size_t image_of(const wm_setup *setup) {
+  const char *why;
+  const size_t bytes = slam.estimator->state_bytes(slam.estimator_params, setup, &why);
+  void *state = aligned_alloc(64, (bytes + 63) / 64 * 64);
+  TEST_ASSERT_EQUAL(WM_OK, slam.estimator->init(state, slam.estimator_params, setup));
+  const size_t kept = wm_keeper_of(slam.estimator)->keep(state, image, sizeof image);
+  free(state);
+  TEST_ASSERT_GREATER_THAN(100, kept);
+  return kept;
+}
+
+static void refused_as(const wm_setup *setup, const char *why) {
+  wm_saved_map map;
+  TEST_ASSERT_NOT_EQUAL(WM_OK, wm_saved_map_read(path, &slam, setup, &map, &err));
+  TEST_ASSERT_NULL(map.image);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, why), err.text);
+}
+
+static void write_file(const void *bytes, size_t count) {
+  FILE *f = fopen(path, "wb");
+  TEST_ASSERT_EQUAL(count, fwrite(bytes, 1, count, f));
+  fclose(f);
+}
+
+static void a_map_is_there_again_and_a_damaged_one_is_refused(void) {
+  wm_setup setup = setup_of_slam("");
+  const wm_map_identity of = wm_map_identity_of(&slam, &setup);
+  static uint8_t whole[1 << 14];
+  wm_saved_map map;
+  refused_as(&setup, "is not there");
+  const size_t bytes = image_of(&setup);
+  for (int i = 0; i < 2; i++)
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_map_write(path, &of, 1000 + i, image, bytes, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_map_read(path, &slam, &setup, &map, &err), err.text);
+  TEST_ASSERT_EQUAL(bytes, map.bytes);
+  TEST_ASSERT_EQUAL_MEMORY(image, map.image, bytes);
+  TEST_ASSERT_EQUAL_DOUBLE(1001, map.utc_s);
+  free(map.image);
+
+  FILE *f = fopen(path, "rb");
+  const size_t length = fread(whole, 1, sizeof whole, f);
+  fclose(f);
+  for (size_t cut = 0; cut < length; cut += 1 + cut / 50) {
+    write_file(whole, cut);
+    refused_as(&setup, "it is cut");
+  }
+  for (size_t at = 8; at < length; at += 1 + at / 50) {
+    whole[at] ^= 0x40;
+    write_file(whole, length);
+    refused_as(&setup, at < 32 || at >= 40 ? "checksum is wrong" : "it is cut");
+    whole[at] ^= 0x40;
+  }
+  whole[6] = '2';
+  write_file(whole, length);
+  refused_as(&setup, "another version");
+  wm_config_free(&slam);
+}
+
+static void a_map_of_another_configuration_or_robot_is_refused(void) {
+  wm_setup setup = setup_of_slam("");
+  const wm_map_identity of = wm_map_identity_of(&slam, &setup);
+  const size_t bytes = image_of(&setup);
+  TEST_ASSERT_EQUAL(WM_OK, wm_saved_map_write(path, &of, 1, image, bytes, &err));
+  eye.mounting.xyz_m[0] = 0.1;
+  refused_as(&setup, "another calibration");
+  eye.mounting.xyz_m[0] = 0;
+  wm_config_free(&slam);
+  setup = setup_of_slam("publish: {rate_hz: 20}\n");  // of the runtime: the map is the same
+  wm_saved_map map;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_map_read(path, &slam, &setup, &map, &err), err.text);
+  free(map.image);
+  wm_config_free(&slam);
+  setup = setup_of_slam("slam: {landmarks: {confirm_seen: 7}}\n");
+  refused_as(&setup, "another configuration");
+  wm_config_free(&slam);
+  setup = setup_of_slam("motion: {noise: {speed_mps: 0.33}}\n");
+  refused_as(&setup, "another configuration");
+  wm_config_free(&slam);
+}
+
+// What is wrong inside is found though the sum is right.
+static void a_map_with_nan_is_refused(void) {
+  wm_setup setup = setup_of_slam("");
+  const wm_map_identity of = wm_map_identity_of(&slam, &setup);
+  const size_t bytes = image_of(&setup);
+  const double nan = NAN;
+  memcpy(image + bytes - sizeof nan, &nan, sizeof nan);
+  TEST_ASSERT_EQUAL(WM_OK, wm_saved_map_write(path, &of, 1, image, bytes, &err));
+  refused_as(&setup, "not finite");
+  wm_config_free(&slam);
+}
+
+// Who may write into the folder may lay links there, which a program with more rights must not follow.
+static void links_are_not_followed(void) {
+  char beside[160], other[160];
+  (void)snprintf(beside, sizeof beside, "%s.new", path);
+  (void)snprintf(other, sizeof other, "%s/other", folder);
+  FILE *f = fopen(other, "w");
+  fputs("precious", f);
+  fclose(f);
+  TEST_ASSERT_EQUAL(0, symlink(other, beside));
+  wm_estimate e = tracking(1, 0.1);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_saved_pose_write(path, &e, 1000, &err), err.text);
+  char text[16] = {0};
+  f = fopen(other, "r");
+  TEST_ASSERT_NOT_NULL(fgets(text, sizeof text, f));
+  fclose(f);
+  TEST_ASSERT_EQUAL_STRING("precious", text);
+  (void)unlink(other);
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_pose_is_there_again);
@@ -185,5 +314,9 @@ int main(void) {
   RUN_TEST(the_way_left_is_where_the_variance_reaches_the_limit);
   RUN_TEST(a_robot_that_stands_has_time_without_end);
   RUN_TEST(growth_that_is_seen_while_reckoning_counts);
+  RUN_TEST(a_map_is_there_again_and_a_damaged_one_is_refused);
+  RUN_TEST(a_map_of_another_configuration_or_robot_is_refused);
+  RUN_TEST(a_map_with_nan_is_refused);
+  RUN_TEST(links_are_not_followed);
   return UNITY_END();
 }

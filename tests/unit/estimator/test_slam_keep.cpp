@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+// A map that outlives a restart (waymark/keeper.h): kept with its joint covariance, taken up, refused where it is
+// wrong.
+#include <vector>
+
+#include "slam_room.hpp"
+#include "waymark/keeper.h"
+
+namespace {
+
+using namespace room;
+
+const wm_keeper *keeper;
+std::vector<char> image;
+
+void keep() {
+  const char *why = nullptr;
+  image.assign(slam->state_bytes(&params, &setup, &why), 0);
+  image.resize(keeper->keep(state, image.data(), image.size()));
+}
+
+const char *why_not() { return keeper->why_not(&params, &setup, image.data(), image.size()); }
+
+// The program begins anew, on another clock, where the robot is known to be within these sigmas.
+void restart(double x_m, double y_m, double heading_rad, double sigma_m = 0.2, double sigma_rad = 0.05) {
+  setup.start = {WM_TIME_NONE, {x_m, y_m, 0}, {0, 0, 0, 1}, heading_rad, sigma_m, sigma_rad};
+  now_s = 7.0;
+  begin();
+  TEST_ASSERT_NULL(why_not());
+  keeper->take(state, image.data(), image.size());
+}
+
+void learn() {
+  begin();
+  drive(40);
+  keep();
+  TEST_ASSERT_GREATER_THAN(0, image.size());
+}
+
+// GIVEN a map that was learnt WHEN the program begins anew where the robot stands THEN the map is the same at once, the
+// pose is as unsure as the start, and both are right again after the first sightings.
+void test_map_and_calibration_are_taken_up_with_their_covariances() {
+  for (const bool with_codes : {false, true}) {
+    make_room();
+    coded = with_codes;
+    learn();
+    wm_landmark before[64], after[64];
+    double was[64][4], is[64][4], bias_sigma = 0.0;
+    const size_t count = slam->landmarks(state, before, was, 64);
+    const double bias = calibrated("motion.yaw_rate_bias_radps", &bias_sigma);
+    restart(truth.x_m, truth.y_m, truth.heading_rad);
+    TEST_ASSERT_EQUAL(count, slam->landmarks(state, after, is, 64));
+    TEST_ASSERT_GREATER_THAN(6, count);
+    for (size_t i = 0; i < count; i++) {
+      TEST_ASSERT_EQUAL(before[i].id, after[i].id);
+      for (int k = 0; k < 2; k++) TEST_ASSERT_DOUBLE_WITHIN(0.1, before[i].p_m[k], after[i].p_m[k]);
+      for (int k = 0; k < 3; k++) TEST_ASSERT_DOUBLE_WITHIN(1e-4, was[i][k], is[i][k]);
+    }
+    double sigma_again = 0.0;
+    const double bias_again = calibrated("motion.yaw_rate_bias_radps", &sigma_again);
+    if (std::isfinite(bias)) {
+      TEST_ASSERT_EQUAL_DOUBLE(bias, bias_again);
+      TEST_ASSERT_EQUAL_DOUBLE(bias_sigma, sigma_again);
+    }
+    TEST_ASSERT_GREATER_THAN_DOUBLE(0.2, sigma());
+    drive(1);
+    TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.06, off());
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, sigma());
+    drive(30);
+    size_t found;
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&found));
+    TEST_ASSERT_EQUAL(kCount, found);
+    TEST_ASSERT_EQUAL_DOUBLE(0, counted(WM_COUNTER_LANDMARKS_MOVED));
+  }
+}
+
+// GIVEN a map that was taken up WHEN the pose is proven again THEN the map is kept again.
+void test_a_map_that_was_taken_up_is_kept_again() {
+  learn();
+  const size_t bytes = image.size();
+  restart(truth.x_m, truth.y_m, truth.heading_rad);
+  keep();
+  TEST_ASSERT_EQUAL(0, image.size());  // not yet proven
+  drive(2);
+  keep();
+  TEST_ASSERT_EQUAL(bytes, image.size());
+  restart(truth.x_m, truth.y_m, truth.heading_rad);
+  drive(2);
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.06, off());
+}
+
+// GIVEN a kept map WHEN the robot was carried away while it was off THEN it is found in the map.
+void test_a_robot_that_was_moved_while_off_is_found_in_its_map() {
+  coded = true;
+  learn();
+  restart(truth.x_m - 2.5, truth.y_m + 1.5, truth.heading_rad + 1.0);
+  TEST_ASSERT_GREATER_THAN_DOUBLE(2.0, off());
+  drive(5);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+  size_t found;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, worst_landmark(&found));
+}
+
+void test_without_a_pose_it_is_searched_in_the_map() {
+  coded = true;
+  learn();
+  restart(kAbsent, kAbsent, kAbsent);
+  TEST_ASSERT_EQUAL(WM_STATE_SEARCHING, published_state());
+  drive(5);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, published_state());
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.1, off());
+}
+
+void test_an_image_that_is_wrong_is_refused_with_the_reason() {
+  learn();
+  const std::vector<char> good = image;
+  for (size_t bytes = 0; bytes < good.size(); bytes += 97) {
+    image.assign(good.begin(), good.begin() + (long)bytes);
+    TEST_ASSERT_EQUAL_STRING("it is cut", why_not());
+  }
+  image = good;
+  image[0] ^= 1;
+  TEST_ASSERT_EQUAL_STRING("it is no map of slam", why_not());
+  image = good;
+  image[8] ^= 2;
+  TEST_ASSERT_EQUAL_STRING("it is of another version", why_not());
+  const double nan = kAbsent, large = 1e6;
+  for (const size_t from_end : {size_t{8}, size_t{512}, size_t{1024}}) {  // the last variance, two covariances
+    image = good;
+    std::memcpy(&image[image.size() - from_end], &nan, sizeof nan);
+    TEST_ASSERT_NOT_NULL(why_not());
+    std::memcpy(&image[image.size() - from_end], &large, sizeof large);
+    if (from_end != 8) TEST_ASSERT_NOT_NULL(why_not());
+  }
+  image = good;
+  params.landmark_capacity = 5;
+  TEST_ASSERT_EQUAL_STRING("it has more landmarks than slam.landmarks.capacity", why_not());
+  make_room();
+  image = good;
+  motion.states.sigma[WM_SPEED_SCALE] = 0.02;
+  TEST_ASSERT_EQUAL_STRING("it has other calibration states than the configuration", why_not());
+}
+
+void test_an_image_with_too_little_room_is_not_written() {
+  learn();
+  std::vector<char> small(image.size() - 1, 0x5a);
+  TEST_ASSERT_EQUAL(0, keeper->keep(state, small.data(), small.size()));
+  for (const char c : small) TEST_ASSERT_EQUAL(0x5a, c);
+}
+
+void test_estimators_without_a_map_of_their_own_keep_nothing() {
+  TEST_ASSERT_NULL(wm_keeper_of(wm_estimator_find("landmark_ekf")));
+  TEST_ASSERT_NOT_NULL(wm_keeper_of(wm_estimator_find("slam")));
+}
+
+}  // namespace
+
+void setUp(void) {
+  make_room();
+  keeper = wm_keeper_of(slam);
+}
+void tearDown(void) { leave_room(); }
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_map_and_calibration_are_taken_up_with_their_covariances);
+  RUN_TEST(test_a_map_that_was_taken_up_is_kept_again);
+  RUN_TEST(test_a_robot_that_was_moved_while_off_is_found_in_its_map);
+  RUN_TEST(test_without_a_pose_it_is_searched_in_the_map);
+  RUN_TEST(test_an_image_that_is_wrong_is_refused_with_the_reason);
+  RUN_TEST(test_an_image_with_too_little_room_is_not_written);
+  RUN_TEST(test_estimators_without_a_map_of_their_own_keep_nothing);
+  return UNITY_END();
+}
