@@ -39,6 +39,7 @@ static void add_source(wm_assembly *self, wm_source *source) {
   (void)snprintf(s->name, sizeof s->name, "%s", source->name);
   s->source = source;
   source->sample_at_next = (uint8_t)wanted.sample_at_next;
+  source->ready_after_ns = ns_from_ms(wanted.ready_after_ms);
   s->kinds = source->kinds;
   s->from_s = wanted.from_s;
   s->until_s = wanted.until_s;

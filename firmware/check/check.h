@@ -50,7 +50,9 @@ void motion_data_judge(const motion_data *self, uint32_t bound, findings *out);
 
 typedef struct source_facts {
   uint64_t events;
-  wm_time_ns first_ns, last_ns, latest_ns;
+  wm_time_ns first_ns, last_ns;
+  wm_time_ns latest_ns;  // largest lateness, with look_ns
+  wm_time_ns look_ns;    // what detection takes on this computer; 0 for what is no detector
   uint64_t sightings, unknown_landmarks, bare_ranges;  // bare_ranges: without a bearing
 } source_facts;
 

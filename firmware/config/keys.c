@@ -59,6 +59,10 @@ const config_key kConfigSourceKeys[] = {
      "ms. A datum that arrives later than this after its stamp is late, and dropped."},
     {"period_ms", "number from 0 to 60000", "0",
      "ms. Above 0: after a datum the source promises silence for so long, and the merge need not wait for it."},
+    {"ready_after_ms", "number from 0 to 60000", "0",
+     "ms. A detector on recorded pictures, in a replay: its observations arrive so long after the picture. On devices "
+     "the "
+     "time that detection takes counts by itself (`detect` in timing.json)."},
     {"sample_at", "`stamp`, `next_stamp`", "stamp",
      "`motion` and `motion6` of a recording. next_stamp: a row is stamped with the beginning of the interval over "
      "which "

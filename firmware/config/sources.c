@@ -53,6 +53,16 @@ static wm_status check_lateness(const wm_yaml_node *node, double lateness_ms, do
       lateness_ms, horizon_ms, horizon_ms, lateness_ms);
 }
 
+// What a detector would take, where its time isn't the computer's that replays.
+static wm_status read_ready_after(const wm_yaml_node *item, wm_source_config *out, wm_error *err) {
+  char base[WM_SOURCE_NAME_MAX];
+  wm_yaml_node node = wm_yaml_get(item, "ready_after_ms");
+  if (!wm_yaml_there(&node)) return WM_OK;
+  snprintf(base, sizeof base, "%.*s", (int)strcspn(out->name, ":"), out->name);
+  if (!config_detector_find(base)) return wm_yaml_fail(&node, err, "only a detector's observations take time");
+  return wm_yaml_f64(&node, 0, 60000, &out->ready_after_ms, err);
+}
+
 // A file's convention for the stamps of its rows; other sources stamp what they measure.
 static wm_status read_sample_at(const wm_yaml_node *item, wm_source_config *out, wm_error *err) {
   static const char *const kChoices[] = {"stamp", "next_stamp", NULL};
@@ -64,7 +74,7 @@ static wm_status read_sample_at(const wm_yaml_node *item, wm_source_config *out,
 }
 
 static wm_status read_source(const wm_yaml_node *item, const wm_config *config, wm_source_config *out, wm_error *err) {
-  static const char *const kKeys[] = {"name",      "use",    "lateness_max_ms", "period_ms",
+  static const char *const kKeys[] = {"name",      "use",    "lateness_max_ms", "period_ms", "ready_after_ms",
                                       "sample_at", "from_s", "until_s",         NULL};
   *out = defaults(config);
   out->line = wm_yaml_line(item);
@@ -80,6 +90,7 @@ static wm_status read_source(const wm_yaml_node *item, const wm_config *config, 
   if (status == WM_OK && wm_yaml_there(&lateness))
     status = check_lateness(&lateness, out->lateness_max_ms, config->runtime.merge_horizon_ms, err);
   if (status == WM_OK) status = number(item, "period_ms", 0, 60000, &out->period_ms, err);
+  if (status == WM_OK) status = read_ready_after(item, out, err);
   if (status == WM_OK) status = read_sample_at(item, out, err);
   if (status == WM_OK) status = number(item, "from_s", -HUGE_VAL, 1e9, &out->from_s, err);
   if (status == WM_OK) status = number(item, "until_s", -1e9, HUGE_VAL, &out->until_s, err);

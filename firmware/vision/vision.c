@@ -77,7 +77,7 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   vision_source *s = &self->sources[self->count++];
   s->detector = wanted->detector;
   s->params = wanted->params;
-  s->newest_ns = WM_TIME_NONE;
+  s->newest_ns = s->busy_until_ns = WM_TIME_NONE;
   memcpy(s->cameras, cameras, sizeof s->cameras);
   s->view = (wm_view){.rig = rig, .cameras = s->cameras};
   s->view.landmarks = wm_recording_landmarks(recording, &s->view.landmark_count);
@@ -231,6 +231,11 @@ void wm_vision_tell(wm_vision *self, const wm_estimate *newest) {
 size_t wm_vision_looks(const wm_vision *self, size_t i, const wm_landmark_looks **rows) {
   *rows = self->sources[i].looks.rows;
   return self->sources[i].looks.count;
+}
+
+wm_time_ns wm_vision_look_p99(const wm_vision *self, size_t i) {
+  const vision_source *s = &self->sources[i];
+  return wm_histogram_quantile(&s->decode_ns, 0.99) + wm_histogram_quantile(&s->detect_ns, 0.99);
 }
 
 void wm_vision_times(const wm_vision *self, wm_histogram *decode_ns, wm_histogram *detect_ns) {

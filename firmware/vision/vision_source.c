@@ -128,13 +128,16 @@ static wm_status look(vision_source *self, wm_error *err) {
   wm_time_ns arrival_ns = frames[0].arrival_ns;
   if (self->detector->pictures == 2 && frames[1].arrival_ns > arrival_ns) arrival_ns = frames[1].arrival_ns;
   const wm_seen *seen = self->only ? wanted(self, frames[0].t_ns) : NULL;
-  if (seen) arrival_ns = seen->arrival_ns;
+  arrival_ns = seen ? seen->arrival_ns : arrival_ns + self->base.ready_after_ns;
 
   wm_estimate newest;
   const wm_estimate *prediction = self->newest && newest_pose_get(self->newest, &newest) ? &newest : NULL;
   wm_time_ns begin_ns = wm_monotonic_ns();
   status = self->detector->detect(self->state, frames, prediction, self->events, self->capacity, &self->event_count);
-  wm_histogram_add(&self->detect_ns, wm_monotonic_ns() - begin_ns);
+  wm_time_ns ready_ns = wm_monotonic_ns();
+  wm_histogram_add(&self->detect_ns, ready_ns - begin_ns);
+  if (self->base.is_live) arrival_ns = ready_ns;  // an observation arrives when it is ready, not with its picture
+  self->busy_until_ns = arrival_ns;
   if (status != WM_OK) {
     self->refused++;
     self->event_count = 0;
@@ -170,6 +173,8 @@ static wm_status announce(vision_source *self, wm_event *out, wm_error *err) {
   out->kind = WM_EVENT_NONE;
   out->t_ns = heads[0].t_ns;
   out->arrival_ns = seen ? seen->arrival_ns : heads[0].arrival_ns;
+  // A detector that is busy looks when it is done.
+  if (out->arrival_ns < self->busy_until_ns) out->arrival_ns = self->busy_until_ns;
   self->announced = 1;
   return WM_OK;
 }

@@ -52,8 +52,9 @@ struct vision_source {
   wm_seen *only;  // the only pictures to be looked at, rising; NULL: all
   size_t only_count;
   wm_time_ns only_tolerance_ns;
-  newest_pose *newest;  // NULL: nothing guides the detector
-  int announced;        // guided and recorded: the next picture's arrival was told
+  newest_pose *newest;       // NULL: nothing guides the detector
+  wm_time_ns busy_until_ns;  // recorded: until its detector would have been done
+  int announced;             // guided and recorded: the next picture's arrival was told
   vision_ahead ahead;
 };
 

@@ -58,8 +58,9 @@ struct wm_source {
   uint8_t is_rare;                // speaks when someone asks for it: its silence means nothing
   uint8_t in_order;               // promises that its stamps never go back (a file without arrival_ns, a CAN bus)
   uint8_t sample_at_next;         // of a CSV of motion: each row's values get the stamp of the row after it
-  double lateness_max_ms;         // where the configuration doesn't name the source; 0: merge.lateness_max_ms
-  uint32_t kinds;                 // WM_EVENT_BIT of what it hands out
+  wm_time_ns ready_after_ns;  // of recorded pictures: from a picture's arrival to that of what a detector finds in it
+  double lateness_max_ms;     // where the configuration doesn't name the source; 0: merge.lateness_max_ms
+  uint32_t kinds;             // WM_EVENT_BIT of what it hands out
   wm_source_counts counts;
   wm_time_ns from_ns, until_ns;  // of the part that a run takes: looks outside of it aren't counted
   // NULL where everything is to be told. Pictures are large and take long: those that aren't the newest any more at

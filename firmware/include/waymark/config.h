@@ -48,8 +48,9 @@ typedef struct wm_source_config {
   int32_t use;                    // 0: not opened
   double lateness_max_ms;         // older than this on the arrival clock is final (and late)
   double period_ms;               // > 0: promises not to speak again before this after a datum
-  int32_t sample_at_next;         // of motion.csv, motion6.csv: a row's values get the stamp of the next row
-  double from_s, until_s;         // seconds from the run's first stamp; only data with stamps inside are taken
+  double ready_after_ms;   // of a detector on recorded pictures: its observations arrive so long after the picture
+  int32_t sample_at_next;  // of motion.csv, motion6.csv: a row's values get the stamp of the next row
+  double from_s, until_s;  // seconds from the run's first stamp; only data with stamps inside are taken
   int line;
 } wm_source_config;
 

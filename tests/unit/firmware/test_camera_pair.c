@@ -10,6 +10,7 @@
 #include "frame_hub.h"
 #include "unity.h"
 #include "waymark/arena.h"
+#include "waymark/clock.h"
 #include "waymark/vision.h"
 
 #define MS WM_NS_PER_MS
@@ -35,7 +36,7 @@ static wm_status pair_init(void *state, const void *params, const wm_view *view)
   (void)state, (void)params, (void)view;
   return WM_OK;
 }
-static wm_time_ns seen_ns[2];
+static wm_time_ns seen_ns[2], detected_ns;
 static wm_status pair_detect(void *state, const wm_frame *frames, const wm_estimate *prediction, wm_event *out,
                              size_t capacity, size_t *count) {
   (void)state, (void)prediction;
@@ -45,6 +46,7 @@ static wm_status pair_detect(void *state, const wm_frame *frames, const wm_estim
   out->kind = WM_EVENT_STEREO;
   out->t_ns = frames[0].t_ns;
   *count = 1;
+  detected_ns = wm_monotonic_ns();
   return WM_OK;
 }
 static const wm_detector kPair = {.name = "pair",
@@ -135,8 +137,9 @@ void tearDown(void) {
   folder_remove();
 }
 
+static wm_event event;
+
 static wm_status next(void) {
-  static wm_event event;
   wm_source *source = wm_vision_source(vision, 0);
   wm_status status = WM_AGAIN;
   for (int i = 0; i < 40 && status == WM_AGAIN; i++) {
@@ -176,6 +179,16 @@ static void a_picture_without_its_other_half_is_counted(void) {
   TEST_ASSERT_EQUAL(WM_DEVICE_WORKS, counts.device);
 }
 
+// Lateness is that of the observation: a detector's time counts.
+static void observations_arrive_when_they_are_ready(void) {
+  for (int i = 0; i < 2; i++) add(i, FAKE_PICTURE, AT(100), 4);
+  make();
+  expect_pair(AT(100), AT(100));
+  TEST_ASSERT_EQUAL_INT64(AT(100), event.t_ns);
+  TEST_ASSERT_GREATER_OR_EQUAL_INT64(detected_ns, event.arrival_ns);
+  TEST_ASSERT_LESS_OR_EQUAL_INT64(wm_monotonic_ns(), event.arrival_ns);
+}
+
 static void one_that_is_unplugged_is_said_and_comes_back(void) {
   add(0, FAKE_PICTURE, AT(100), 4);
   add(1, FAKE_PICTURE, AT(100), 4);
@@ -194,6 +207,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(pictures_of_one_instant_are_given_together);
   RUN_TEST(a_picture_without_its_other_half_is_counted);
+  RUN_TEST(observations_arrive_when_they_are_ready);
   RUN_TEST(one_that_is_unplugged_is_said_and_comes_back);
   return UNITY_END();
 }

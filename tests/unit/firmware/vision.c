@@ -168,6 +168,21 @@ static void old_pictures_are_passed_over(void) {
   TEST_ASSERT_EQUAL(WM_END, source->ops->next(source, &event, &err));  // the last one shows nothing
 }
 
+// What a detector would take on the robot, in a replay.
+static void observations_arrive_after_the_time_that_detection_takes(void) {
+  static wm_event event;
+  open_it("vision: {edges: {cameras: [front]}}\nsources: [{name: edges, ready_after_ms: 40}]\n", POINTS);
+  wm_source *source = wm_vision_source(vision, 0);
+  wm_source_config wanted;
+  int rank;
+  wm_config_source(&config, source->name, &wanted, &rank);
+  TEST_ASSERT_EQUAL_DOUBLE(40, wanted.ready_after_ms);
+  source->ready_after_ns = wm_ns_from_seconds(wanted.ready_after_ms * 1e-3);
+  TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
+  TEST_ASSERT_EQUAL_INT64(100000000, event.t_ns);
+  TEST_ASSERT_EQUAL_INT64(170000000, event.arrival_ns);
+}
+
 static void only_for_who_takes_it(void) {
   parse("vision: {edges: {cameras: [front]}}\n", 0);
   TEST_ASSERT_EQUAL(WM_OK, wm_vision_open(&config, recording, NULL, NULL, &vision, &err));
@@ -253,6 +268,7 @@ int main(void) {
   RUN_TEST(events_of_pictures);
   RUN_TEST(ended_in_the_middle);
   RUN_TEST(old_pictures_are_passed_over);
+  RUN_TEST(observations_arrive_after_the_time_that_detection_takes);
   RUN_TEST(only_for_who_takes_it);
   RUN_TEST(what_is_not_there);
   RUN_TEST(opened_and_closed_without_growth);

@@ -81,6 +81,8 @@ const error_case kErrorCases[] = {
     {CONFIG, "Tab as indentation", FILE_, "merge:\n\thorizon_ms: 300\n",
      "config/robot.yaml:4: not valid YAML: found character that cannot start any token, while scanning for the next "
      "token"},
+    {CONFIG, "Time of detection where nothing is detected", FILE_, "sources: [{name: gnss, ready_after_ms: 40}]\n",
+     "config/robot.yaml:3: sources[0].ready_after_ms: only a detector's observations take time"},
     {CONFIG, "Bracket not closed", FILE_, "sources: [{name: gnss}\nmerge: {horizon_ms: 300}\n",
      "config/robot.yaml:4: not valid YAML: did not find expected ',' or ']', while parsing a flow sequence that begins "
      "in line 3"},
