@@ -13,6 +13,9 @@ namespace wm::tools {
 namespace {
 
 constexpr double kNearestM = 0.5;
+// Pairs of wrong identities leave about the spread of the true places, however the map is laid over them: 0.7 of it and
+// more with five landmarks.
+constexpr double kShapeless = 0.5;
 
 struct Pair {
   const Landmark *estimate;
@@ -53,9 +56,6 @@ std::vector<Pair> by_place(const std::vector<Landmark> &estimate, const std::vec
   return out;
 }
 
-// The estimate's ids are truth's where at least half of them occur there; else they are its own.
-bool shares_ids(const std::vector<Landmark> &estimate, size_t pairs) { return 2 * pairs >= estimate.size(); }
-
 // What is left when the map as a whole is laid over the true one: its shape alone, wherever a causal trajectory says
 // that it lies. NaN with fewer than three landmarks.
 double rms_by_own_fit(const std::vector<Pair> &pairs, Alignment kind) {
@@ -73,10 +73,27 @@ double rms_by_own_fit(const std::vector<Pair> &pairs, Alignment kind) {
   return rms(off_m);
 }
 
+double spread(const std::vector<Pair> &pairs) {
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Pair &pair : pairs) mean += pair.truth->p_m.head<2>() / static_cast<double>(pairs.size());
+  std::vector<double> off_m;
+  for (const Pair &pair : pairs) off_m.push_back((pair.truth->p_m.head<2>() - mean).norm());
+  return rms(off_m);
+}
+
+// Whether the estimate's ids are truth's: at least half of them occur there. Ids that a filter gave out itself (lines,
+// landmarks without identity) occur there by chance: then the map has truth's shape by place, and none by id.
+bool shares_ids(const std::vector<Landmark> &estimate, const std::vector<Pair> &named, const std::vector<Pair> &placed,
+                Alignment kind) {
+  if (2 * named.size() < estimate.size()) return false;
+  return named.size() < 3 || 2 * placed.size() < estimate.size() ||
+         !(rms_by_own_fit(named, kind) > kShapeless * spread(named));
+}
+
 }  // namespace
 
 void add_landmark_figures(const std::vector<Landmark> &estimate, const std::vector<Landmark> &truth,
-                          const Comparison &comparison, Figures *figures) {
+                          const Comparison &comparison, bool has_identities, Figures *figures) {
   std::vector<Landmark> aligned = estimate;
   const Similarity &alignment = comparison.alignment;
   const double turned = std::atan2(alignment.R(1, 0), alignment.R(0, 0));
@@ -84,9 +101,10 @@ void add_landmark_figures(const std::vector<Landmark> &estimate, const std::vect
     landmark.p_m = alignment.scale * (alignment.R * landmark.p_m) + alignment.t;
     landmark.yaw_rad += turned;
   }
-  auto pairs = by_id(aligned, truth);
-  const bool same_ids = shares_ids(aligned, pairs.size());
-  if (!same_ids) pairs = by_place(aligned, truth, comparison.planar);
+  const Alignment kind = alignment.scale == 1 ? Alignment::kSe2 : Alignment::kSim2;
+  const auto named = by_id(aligned, truth), placed = by_place(aligned, truth, comparison.planar);
+  const bool same_ids = has_identities && shares_ids(aligned, named, placed, kind);
+  const std::vector<Pair> &pairs = same_ids ? named : placed;
 
   std::vector<double> off_m;
   std::vector<double> off_deg;
@@ -104,8 +122,7 @@ void add_landmark_figures(const std::vector<Landmark> &estimate, const std::vect
   f["landmark_max_m"] =
       number(off_m.empty() ? std::numeric_limits<double>::quiet_NaN() : *std::max_element(off_m.begin(), off_m.end()));
   f["landmark_rmse_own_fit_m"] =
-      number(comparison.planar ? rms_by_own_fit(pairs, alignment.scale == 1 ? Alignment::kSe2 : Alignment::kSim2)
-                               : std::numeric_limits<double>::quiet_NaN());
+      number(comparison.planar ? rms_by_own_fit(pairs, kind) : std::numeric_limits<double>::quiet_NaN());
   f["landmarks_matched_by"] = same_ids ? "id" : "place";
 }
 

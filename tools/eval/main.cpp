@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // waymark eval: a run's poses against truth, or its detections against labels.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 
@@ -79,6 +80,14 @@ fs::path true_landmarks(const fs::path &recording) {
   return fs::exists(surveyed) ? surveyed : recording / "landmarks.csv";
 }
 
+// False: sightings without identity are all that there is to see landmarks by, so that a map's ids are its filter's
+// own.
+bool has_identities(const fs::path &recording) {
+  const auto seen = load_sightings(recording);
+  const bool is_named = std::any_of(seen.begin(), seen.end(), [](const Sighting &s) { return s.id >= 0; });
+  return is_named || seen.empty() || fs::exists(recording / "markers.csv") || fs::exists(recording / "video");
+}
+
 Figures evaluate(const Arguments &a) {
   const fs::path run = a.run;
   const fs::path recording = a.recording;
@@ -97,7 +106,7 @@ Figures evaluate(const Arguments &a) {
     add_sighting_figures(comparison, load_sightings(recording), load_landmarks(recording / "landmarks.csv"), &figures);
   if (fs::exists(run / "map-estimate.csv") && fs::exists(true_landmarks(recording)))
     add_landmark_figures(load_landmarks(run / "map-estimate.csv"), load_landmarks(true_landmarks(recording)),
-                         comparison, &figures);
+                         comparison, has_identities(recording), &figures);
   if (a.published) add_published_figures(published, &figures);
   return figures;
 }

@@ -58,10 +58,10 @@ std::string figures_table(const Figures &f, const std::string &title, const std:
     out += "  position rms where a landmark was seen within 2 s: " + cell(f, "position_rmse_landmark_seen_m", 4, " m") +
            "\n";
   if (f["landmarks_total"].is_number())
-    out += "  landmarks: " + cell(f, "landmarks_found", 0) + " of " + cell(f, "landmarks_total", 0) + " found (by " +
-           f["landmarks_matched_by"].get<std::string>() + "), rms " + cell(f, "landmark_rmse_m", 3, " m") +
-           ", largest " + cell(f, "landmark_max_m", 3, " m") + ", map laid over the true one " +
-           cell(f, "landmark_rmse_own_fit_m", 3, " m") + ", heading " +
+    out += "  landmarks: " + cell(f, "landmarks_found", 0) + " of " + cell(f, "landmarks_total", 0) +
+           " found (matched by " + f["landmarks_matched_by"].get<std::string>() + "), rms " +
+           cell(f, "landmark_rmse_m", 3, " m") + ", largest " + cell(f, "landmark_max_m", 3, " m") +
+           ", map laid over the true one " + cell(f, "landmark_rmse_own_fit_m", 3, " m") + ", heading " +
            cell(f, "landmark_heading_rmse_deg", 2, " deg") + "\n";
   if (f.contains("published"))
     out += "  published: " + cell(f, "published", 0) + " poses, t_ns " +

@@ -307,7 +307,7 @@ void test_landmarks_by_id_and_by_place() {
   };
   const std::vector<Landmark> truth{at(1, 0, 0, 0), at(2, 5, 0, 0), at(3, 0, 5, 0)};
   Figures f;
-  add_landmark_figures({at(1, 0.3, 0, 0.1), at(2, 5, 0.4, -0.1)}, truth, comparison, &f);
+  add_landmark_figures({at(1, 0.3, 0, 0.1), at(2, 5, 0.4, -0.1)}, truth, comparison, true, &f);
   expect(f, "landmarks_found", 2);
   expect(f, "landmarks_total", 3);
   expect(f, "landmark_rmse_m", std::sqrt((0.09 + 0.16) / 2));
@@ -315,14 +315,40 @@ void test_landmarks_by_id_and_by_place() {
   expect(f, "landmark_max_m", 0.4);
   TEST_ASSERT_TRUE(f["landmark_rmse_own_fit_m"].is_null());  // two landmarks have no shape
   TEST_ASSERT_EQUAL_STRING("id", f["landmarks_matched_by"].get<std::string>().c_str());
-  add_landmark_figures({at(1, 1, 2, 0), at(2, 1, 7, 0), at(3, -4, 2, 0)}, truth, comparison, &f);  // turned and moved
+  add_landmark_figures({at(1, 1, 2, 0), at(2, 1, 7, 0), at(3, -4, 2, 0)}, truth, comparison, true,
+                       &f);  // turned and moved
   expect(f, "landmark_rmse_own_fit_m", 0);
   // Ids of its own: the one beyond 0.5 m is not found, of two near one landmark the nearer.
-  add_landmark_figures({at(101, 0.3, 0, NAN), at(102, 0.1, 0, NAN), at(103, 5, 0.6, NAN)}, truth, comparison, &f);
+  add_landmark_figures({at(101, 0.3, 0, NAN), at(102, 0.1, 0, NAN), at(103, 5, 0.6, NAN)}, truth, comparison, true, &f);
   expect(f, "landmarks_found", 1);
   expect(f, "landmark_rmse_m", 0.1);
   TEST_ASSERT_EQUAL_STRING("place", f["landmarks_matched_by"].get<std::string>().c_str());
   TEST_ASSERT_TRUE(f["landmark_heading_rmse_deg"].is_null());
+}
+
+// Numbers that the filter gave out itself, some of which are truth's ids by chance.
+void test_landmarks_whose_ids_are_the_filters_own() {
+  Comparison comparison;
+  std::vector<Landmark> truth, estimate, distorted;
+  for (int i = 0; i < 10; i++) {
+    const auto at = [](int64_t id, double x, double y) {
+      return Landmark{id, {x, y, 0}, Eigen::Matrix2d::Zero(), NAN};
+    };
+    const double x = 3.0 * (i % 4), y = 4.0 * (i / 4);
+    truth.push_back(at(i, x, y));
+    estimate.push_back(at((7 * i + 3) % 10, x + 0.1, y));
+    distorted.push_back(at(i, x + 0.2 * y, y + 0.15 * x));  // up to 2 m off
+  }
+  Figures f;
+  add_landmark_figures(estimate, truth, comparison, true, &f);
+  TEST_ASSERT_EQUAL_STRING("place", f["landmarks_matched_by"].get<std::string>().c_str());
+  expect(f, "landmarks_found", 10);
+  expect(f, "landmark_rmse_m", 0.1);
+  add_landmark_figures(distorted, truth, comparison, true, &f);  // a bad map with truth's identities
+  TEST_ASSERT_EQUAL_STRING("id", f["landmarks_matched_by"].get<std::string>().c_str());
+  expect(f, "landmarks_found", 10);
+  add_landmark_figures(distorted, truth, comparison, false, &f);  // the same of a recording without any
+  TEST_ASSERT_EQUAL_STRING("place", f["landmarks_matched_by"].get<std::string>().c_str());
 }
 
 void test_statistics() {
@@ -448,6 +474,7 @@ int main() {
   RUN_TEST(test_alignment_keeps_nees);
   RUN_TEST(test_a_covariance_that_is_none_is_not_inside);
   RUN_TEST(test_landmarks_by_id_and_by_place);
+  RUN_TEST(test_landmarks_whose_ids_are_the_filters_own);
   RUN_TEST(test_statistics);
   RUN_TEST(test_errors_say_where);
   RUN_TEST(test_tum_serves_where_there_is_no_csv);
