@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "crc32.h"
+#include "new_file.h"
 #include "waymark/bytes.h"
 #include "waymark/eventlog.h"
 
@@ -72,7 +73,7 @@ static void write_sources(wm_log_writer *self, const wm_assembly *assembly) {
 wm_status wm_log_create(wm_log_writer *self, const char *path, const wm_assembly *assembly, wm_error *err) {
   self->events = 0;
   self->failed = 0;
-  self->file = fopen(path, "wbe");
+  self->file = new_file(path);
   if (!self->file) return wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(errno));
   setvbuf(self->file, self->buffer, _IOFBF, sizeof self->buffer);
 

@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "new_file.h"
 #include "waymark/recording.h"
 #include "waymark/text.h"
 #include "waymark/yaml.h"
@@ -32,7 +33,7 @@ static wm_status copy_file(const char *from, const char *to, wm_error *err) {
   static const size_t kChunk = 1 << 16;
   FILE *in = fopen(from, "rbe");
   if (!in) return errno == ENOENT ? WM_OK : wm_fail(err, WM_IO, "%s: can't be read: %s", from, strerror(errno));
-  FILE *out = fopen(to, "wbe");
+  FILE *out = new_file(to);
   char *chunk = malloc(kChunk);
   int failed = !out ? errno : !chunk ? ENOMEM : 0;
   for (size_t length; !failed && (length = fread(chunk, 1, kChunk, in)) > 0;)
@@ -46,7 +47,7 @@ static wm_status copy_file(const char *from, const char *to, wm_error *err) {
 
 // Line by line, names of pictures replaced by those that lie beside it.
 static wm_status write_yaml(const char *text, const picture *pictures, size_t count, const char *to, wm_error *err) {
-  FILE *out = fopen(to, "we");
+  FILE *out = new_file(to);
   if (!out) return wm_fail(err, WM_IO, "%s: can't be written: %s", to, strerror(errno));
   int failed = 0;
   while (*text && !failed) {

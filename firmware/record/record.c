@@ -14,6 +14,7 @@
 
 #include "avi_writer.h"
 #include "copy_map.h"
+#include "new_file.h"
 #include "waymark/clock.h"
 #include "waymark/robot.h"
 #include "waymark/text.h"
@@ -138,7 +139,7 @@ static void *record_stream(void *argument) {
 static wm_status write_text(recorder *self, const char *name, const char *text, size_t length, wm_error *err) {
   char path[WM_PATH_MAX + 80];
   (void)snprintf(path, sizeof path, "%s/%s", self->options->out_dir, name);
-  FILE *f = fopen(path, "wbe");
+  FILE *f = new_file(path);
   int failed = f ? 0 : errno;
   if (f && fwrite(text, 1, length, f) != length) failed = errno;
   if (f && (fflush(f) != 0 || fsync(fileno(f)) != 0)) failed = errno;
@@ -226,7 +227,7 @@ static wm_status open_can(recorder *self, wm_error *err) {
   char path[WM_PATH_MAX + 80];
   if (devices->can_count == 0) return WM_OK;
   (void)snprintf(path, sizeof path, "%s/can.log", self->options->out_dir);
-  self->can_log = fopen(path, "we");
+  self->can_log = new_file(path);
   if (!self->can_log) return wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(errno));
   for (size_t i = 0; i < devices->can_count; i++) {
     stream *s = &self->streams[self->stream_count];
@@ -258,8 +259,8 @@ static wm_status open_cameras(recorder *self, wm_error *err) {
     status = pictures->ops->open(pictures, &rig->cameras[index], index, &kEveryPicture, &s->camera, err);
     if (status != WM_OK) return status;
     self->stream_count++;
-    s->data = fopen(s->data_path, "wbe");
-    s->stamps = fopen(s->stamps_path, "we");
+    s->data = new_file(s->data_path);
+    s->stamps = new_file(s->stamps_path);
     if (!s->data || !s->stamps) return wm_fail(err, WM_IO, "%s: can't be written: %s", s->data_path, strerror(errno));
   }
   return status == WM_OK ? pictures->ops->start(pictures, err) : status;

@@ -3,6 +3,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +13,8 @@
 #include "waymark/saved_pose.h"
 
 #define NAME_MAX_BYTES (WM_PATH_MAX + 40)
+// Deaths nearer to each other than this are one crash loop: a restart takes a second, other faults are rarer.
+#define CRASH_LOOP_S 600.0
 static const char *const kParts[] = {"before", "now"};
 
 static void say(black_box *self, const char *text, const char *what) {
@@ -58,8 +61,41 @@ static unsigned tidy(black_box *self) {
   return newest;
 }
 
+static void remove_kept(const black_box *self, unsigned number) {
+  DIR *folder = opendir(self->folder);
+  if (!folder) return;
+  for (struct dirent *entry; (entry = readdir(folder)) != NULL;) {
+    char path[NAME_MAX_BYTES + 260];
+    if (number_of(entry->d_name) != number) continue;
+    (void)snprintf(path, sizeof path, "%s/%s", self->folder, entry->d_name);
+    (void)unlink(path);
+  }
+  (void)closedir(folder);
+}
+
+// When the log of death `number` was written last, in s; 0: there is none. Number 0 is the present log.
+static double died_at(const black_box *self, unsigned number) {
+  char name[40], path[NAME_MAX_BYTES];
+  struct stat file;
+  (void)snprintf(name, sizeof name, number ? "died-%04u-now" : "now", number);
+  path_of(self, name, path);
+  return stat(path, &file) == 0 ? (double)file.st_mtim.tv_sec : 0;
+}
+
+// A run that dies again and again leaves its first and its newest death, so that older incidents are not evicted: the
+// one before makes place for this one. The number of this one.
+static unsigned number_of_death(black_box *self, unsigned newest) {
+  const double now_s = died_at(self, 0), last_s = newest > 1 ? died_at(self, newest) : 0,
+               before_s = newest > 1 ? died_at(self, newest - 1) : 0;
+  if (now_s == 0 || last_s == 0 || before_s == 0) return newest + 1;
+  if (fabs(now_s - last_s) > CRASH_LOOP_S || fabs(last_s - before_s) > CRASH_LOOP_S) return newest + 1;
+  remove_kept(self, newest);
+  return newest;
+}
+
 static void keep(black_box *self, const char *what) {
-  unsigned number = tidy(self) + 1;
+  const unsigned newest = tidy(self);
+  const unsigned number = strcmp(what, "died") == 0 ? number_of_death(self, newest) : newest + 1;
   char from[NAME_MAX_BYTES], to[NAME_MAX_BYTES], name[40];
   for (size_t i = 0; i < 2; i++) {
     path_of(self, kParts[i], from);

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "avi_writer.h"
+#include "new_file.h"
 
 #define PREFIX "pictures-"
 #define PATH_BYTES (WM_PATH_MAX + 300)
@@ -40,7 +41,7 @@ static FILE *begin_file(const box_pictures *self, const box_camera *camera, cons
   char path[PATH_BYTES];
   (void)snprintf(path, sizeof path, "%s/" PREFIX "%s-%c.%s", self->folder, camera->name, 'a' + camera->part, ending);
   (void)unlink(path);
-  return fopen(path, "wbe");
+  return new_file(path);
 }
 
 static void close_files(box_camera *camera) {

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "new_file.h"
 #include "waymark/motion.h"
 
 // ── a few words of JSON ─────────────────────────────────────────────────────────────────────────────────────────────
@@ -44,7 +45,7 @@ static void time_or_null(FILE *f, wm_time_ns t_ns) {
 
 static FILE *open_json(const char *dir, const char *name, char *path, size_t capacity, wm_error *err) {
   (void)snprintf(path, capacity, "%s/%s", dir, name);
-  FILE *f = fopen(path, "we");
+  FILE *f = new_file(path);
   if (!f) (void)wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(errno));
   return f;
 }

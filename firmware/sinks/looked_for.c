@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "looked_for.h"
+#include "new_file.h"
 
 #include <errno.h>
 #include <inttypes.h>
@@ -22,7 +23,7 @@ wm_status wm_write_looked_for(const char *dir, wm_vision *vision, wm_error *err)
     (void)remove(path);  // of an earlier run
     return WM_OK;
   }
-  FILE *f = fopen(path, "we");
+  FILE *f = new_file(path);
   if (!f) return wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(errno));
   (void)fputs("source,landmark", f);
   for (unsigned i = 0; i < WM_LOOK_COUNT; i++) (void)fprintf(f, ",%s", wm_look_name(i));

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "json_files.h"
+#include "new_file.h"
 #include "row.h"
 #include "waymark/run_folder.h"
 
@@ -41,7 +42,7 @@ wm_status wm_write_map(const char *dir, const wm_estimator *estimator, const voi
   wm_status status = have_memory ? WM_OK : wm_fail(err, WM_IO, "%s: no memory for the map", dir);
   char path[WM_PATH_MAX + 32];
   (void)snprintf(path, sizeof path, "%s/map-estimate.csv", dir);
-  FILE *file = status == WM_OK ? fopen(path, "we") : NULL;
+  FILE *file = status == WM_OK ? new_file(path) : NULL;
   if (status == WM_OK && !file) status = wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(errno));
   if (file && entries && landmarks && covariances) {
     estimator->landmarks(state, landmarks, covariances, count);

@@ -8,6 +8,7 @@
 
 #include "json_files.h"
 #include "looked_for.h"
+#include "new_file.h"
 #include "row.h"
 #include "waymark/eventlog.h"
 
@@ -253,7 +254,7 @@ static wm_status open_table(wm_run_folder *self, int which, wm_error *err) {
   if (which == PARTICLES && !self->assembly->config->estimator->particles) return WM_OK;
   if (which == HYPOTHESES && !self->assembly->config->estimator->hypotheses) return WM_OK;
   (void)snprintf(t->path, sizeof t->path, "%s/%s", self->dir, kTables[which]);
-  t->file = fopen(t->path, "we");
+  t->file = new_file(t->path);
   if (!t->file) return wm_fail(err, WM_IO, "%s: can't be written: %s", t->path, strerror(errno));
   setvbuf(t->file, t->buffer, _IOFBF, sizeof t->buffer);
   return WM_OK;

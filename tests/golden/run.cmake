@@ -5,6 +5,7 @@ wm_test(run_live SOURCES test_live.c small_recording.c USES wm_run pthread LABEL
 wm_test(run_devices SOURCES test_devices.c small_recording.c USES wm_run pthread LABELS threads)
 target_include_directories(run_devices PRIVATE ${CMAKE_SOURCE_DIR}/drivers/can)
 wm_script_test(run_service COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/service.sh)
+wm_script_test(run_service_net COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/service_net.py LABELS release-only)
 wm_script_test(run_doctor COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/doctor.sh $<TARGET_FILE:waymark> ${CMAKE_SOURCE_DIR}/config/etc)
 wm_script_test(run_command_line COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/cli.sh)
 wm_script_test(run_lcm_tools COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_tools.py LABELS release-only)

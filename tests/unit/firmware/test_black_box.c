@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is left of the last seconds, after a loss, a death, and an end in order.
+#include <fcntl.h>
 #include <glob.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "black_box.h"
 #include "unity.h"
@@ -153,6 +156,47 @@ static void the_oldest_go(void) {
   TEST_ASSERT_EQUAL(BLACK_BOX_KEPT_MAX, files("lost-*-now.wmlog"));
 }
 
+static void die(double at_s) {
+  char path[128];
+  open_box();
+  drive(2, WM_STATE_TRACKING);
+  (void)fclose(box.log.file);
+  (void)snprintf(path, sizeof path, "%s/now.wmlog", folder);
+  const struct timespec when[2] = {{.tv_sec = (time_t)at_s}, {.tv_sec = (time_t)at_s}};
+  TEST_ASSERT_EQUAL(0, utimensat(AT_FDCWD, path, when, 0));
+}
+
+// GIVEN an old incident WHEN a run dies again and again THEN the incident stays, with the loop's first and newest
+// death.
+static void a_crash_loop_evicts_no_old_incident(void) {
+  open_box();
+  drive(5, WM_STATE_TRACKING);
+  drive(1, WM_STATE_LOST);
+  black_box_close(&box);
+  for (int i = 0; i < 30; i++) die(1000000 + 2 * i);
+  open_box();  // keeps the last death
+  black_box_close(&box);
+  TEST_ASSERT_EQUAL(1, files("lost-0001-now.wmlog"));
+  TEST_ASSERT_EQUAL(2, files("died-*-now.wmlog"));
+  die(1010000);  // hours later: another fault
+  open_box();
+  black_box_close(&box);
+  TEST_ASSERT_EQUAL(3, files("died-*-now.wmlog"));
+  TEST_ASSERT_EQUAL(1, files("lost-0001-now.wmlog"));
+}
+
+static void a_link_in_its_folder_is_not_followed(void) {
+  char path[128], other[128];
+  (void)snprintf(path, sizeof path, "%s/now.wmlog", folder);
+  (void)snprintf(other, sizeof other, "%s/other", folder);
+  TEST_ASSERT_EQUAL(0, symlink(other, path));
+  open_box();
+  drive(1, WM_STATE_TRACKING);
+  black_box_close(&box);
+  TEST_ASSERT_EQUAL(0, files("other"));
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "symbolic link"), said);
+}
+
 // After 9999 incidents the newest are not taken for old ones.
 static void numbers_go_on_beyond_four_digits(void) {
   char path[128];
@@ -281,6 +325,8 @@ int main(void) {
   RUN_TEST(an_end_in_order_leaves_nothing_to_keep);
   RUN_TEST(an_end_soon_after_a_loss_keeps_it);
   RUN_TEST(the_oldest_go);
+  RUN_TEST(a_crash_loop_evicts_no_old_incident);
+  RUN_TEST(a_link_in_its_folder_is_not_followed);
   RUN_TEST(numbers_go_on_beyond_four_digits);
   RUN_TEST(pictures_are_kept_with_it);
   RUN_TEST(a_disk_that_takes_nothing_is_said_once);
