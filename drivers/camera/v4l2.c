@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// V4L2 by system calls: memory-mapped streaming. Source: the kernel's Documentation/userspace-api/media/v4l.
+// V4L2 by system calls: memory-mapped streaming, single-planar and multi-planar (of one plane, as most image processors
+// have it). Source: the kernel's Documentation/userspace-api/media/v4l.
 #include <ctype.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -19,12 +20,33 @@
 
 typedef struct v4l2_camera {
   int fd;
+  uint32_t type;    // V4L2_BUF_TYPE_VIDEO_CAPTURE, or _MPLANE
+  uint32_t planes;  // of a multi-planar buffer
   uint32_t count;
   struct {
-    void *start;
+    void *start;  // the driver's memory, on many boards without a cache: read once, from one end to the other
     size_t length;
+    uint8_t *copy;  // what everybody else reads
   } buffer[CAMERA_BUFFERS_MAX];
 } v4l2_camera;
+
+// A buffer as the ioctls want it, with room for the description of its planes.
+typedef struct described {
+  struct v4l2_buffer b;
+  struct v4l2_plane planes[VIDEO_MAX_PLANES];
+} described;
+
+static int is_multi_planar(const v4l2_camera *self) { return self->type == V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE; }
+
+static struct v4l2_buffer *describe(const v4l2_camera *self, uint32_t index, described *out) {
+  memset(out, 0, sizeof *out);
+  out->b = (struct v4l2_buffer){.type = self->type, .memory = V4L2_MEMORY_MMAP, .index = index};
+  if (is_multi_planar(self)) {
+    out->b.m.planes = out->planes;
+    out->b.length = VIDEO_MAX_PLANES;
+  }
+  return &out->b;
+}
 
 static int call(int fd, unsigned long request, void *argument) {
   int result;
@@ -35,14 +57,16 @@ static int call(int fd, unsigned long request, void *argument) {
 
 // ── which one ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// Opens a node that captures and streams; who it is, into *is. The number, or -errno.
-static int open_node(const char *path, camera_identity *is) {
+// Opens a node that captures and streams; who it is, into *is, and the type of its buffers. The number, or -errno.
+static int open_node(const char *path, camera_identity *is, uint32_t *type) {
   struct v4l2_capability can = {0};
   int fd = open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC);
   if (fd < 0) return errno == ENOENT || errno == ENXIO ? -ENODEV : -errno;
   int failed = call(fd, VIDIOC_QUERYCAP, &can);
   uint32_t caps = can.capabilities & V4L2_CAP_DEVICE_CAPS ? can.device_caps : can.capabilities;
-  if (!failed && !((caps & V4L2_CAP_VIDEO_CAPTURE) && (caps & V4L2_CAP_STREAMING))) failed = -ENOTTY;
+  *type = caps & V4L2_CAP_VIDEO_CAPTURE ? V4L2_BUF_TYPE_VIDEO_CAPTURE : V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE;
+  const uint32_t captures = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_VIDEO_CAPTURE_MPLANE;
+  if (!failed && !((caps & captures) && (caps & V4L2_CAP_STREAMING))) failed = -ENOTTY;
   if (failed) {
     (void)close(fd);
     return failed;
@@ -59,9 +83,9 @@ static int is_wanted(const camera_identity *wanted, const camera_identity *is) {
 
 // By its path; else, where it is known who it is, under any number: a camera that was unplugged may come back as
 // another one.
-static int find_node(camera_identity *wanted) {
+static int find_node(camera_identity *wanted, uint32_t *type) {
   camera_identity is;
-  int fd = wanted->path[0] ? open_node(wanted->path, &is) : -ENODEV;
+  int fd = wanted->path[0] ? open_node(wanted->path, &is, type) : -ENODEV;
   if (fd >= 0 && is_wanted(wanted, &is)) {
     memcpy(wanted->card, is.card, sizeof wanted->card);
     memcpy(wanted->bus, is.bus, sizeof wanted->bus);
@@ -73,7 +97,7 @@ static int find_node(camera_identity *wanted) {
   for (int i = 0; i < NODES_MAX; i++) {
     char path[32];
     (void)snprintf(path, sizeof path, "/dev/video%d", i);
-    fd = open_node(path, &is);
+    fd = open_node(path, &is, type);
     if (fd >= 0 && is_wanted(wanted, &is)) return fd;
     if (fd >= 0) (void)close(fd);
   }
@@ -82,7 +106,8 @@ static int find_node(camera_identity *wanted) {
 
 static int open_camera(void *context, camera_identity *wanted, void **camera) {
   (void)context;
-  int fd = find_node(wanted);
+  uint32_t type;
+  int fd = find_node(wanted, &type);
   if (fd < 0) return fd;
   v4l2_camera *self = calloc(1, sizeof *self);
   if (!self) {
@@ -90,14 +115,16 @@ static int open_camera(void *context, camera_identity *wanted, void **camera) {
     return -ENOMEM;
   }
   self->fd = fd;
+  self->type = type;
   *camera = self;
   return 0;
 }
 
 // ── mode and controls ───────────────────────────────────────────────────────────────────────────────────────────────
 
-static void set_rate(int fd, double *rate_hz) {
-  struct v4l2_streamparm p = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+static void set_rate(const v4l2_camera *self, double *rate_hz) {
+  const int fd = self->fd;
+  struct v4l2_streamparm p = {.type = self->type};
   if (*rate_hz > 0) {
     p.parm.capture.timeperframe = (struct v4l2_fract){1000, (uint32_t)(*rate_hz * 1000 + 0.5)};
     (void)call(fd, VIDIOC_S_PARM, &p);
@@ -108,9 +135,33 @@ static void set_rate(int fd, double *rate_hz) {
     *rate_hz = (double)period->denominator / period->numerator;
 }
 
+// With several planes a picture's colour is apart; only the first would be read, and nobody asked for that.
+static int set_planes(v4l2_camera *self, camera_mode *mode) {
+  struct v4l2_format f = {.type = self->type};
+  struct v4l2_pix_format_mplane *pix = &f.fmt.pix_mp;
+  (void)call(self->fd, VIDIOC_G_FMT, &f);  // what isn't asked for stays
+  if (mode->width) pix->width = mode->width;
+  if (mode->height) pix->height = mode->height;
+  if (mode->fourcc) pix->pixelformat = mode->fourcc;
+  pix->field = V4L2_FIELD_ANY;
+  memset(pix->plane_fmt, 0, sizeof pix->plane_fmt);
+  int failed = call(self->fd, VIDIOC_S_FMT, &f);
+  if (failed) return failed;
+  self->planes = pix->num_planes;
+  if (self->planes != 1) return -EOPNOTSUPP;
+  mode->fourcc = pix->pixelformat;
+  mode->width = pix->width;
+  mode->height = pix->height;
+  mode->stride = pix->plane_fmt[0].bytesperline;
+  mode->image_bytes = pix->plane_fmt[0].sizeimage;
+  set_rate(self, &mode->rate_hz);
+  return 0;
+}
+
 static int set_mode(void *camera, camera_mode *mode) {
   v4l2_camera *self = camera;
-  struct v4l2_format f = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE};
+  struct v4l2_format f = {.type = self->type};
+  if (is_multi_planar(self)) return set_planes(self, mode);
   (void)call(self->fd, VIDIOC_G_FMT, &f);  // what isn't asked for stays
   if (mode->width) f.fmt.pix.width = mode->width;
   if (mode->height) f.fmt.pix.height = mode->height;
@@ -124,7 +175,7 @@ static int set_mode(void *camera, camera_mode *mode) {
   mode->height = f.fmt.pix.height;
   mode->stride = f.fmt.pix.bytesperline;
   mode->image_bytes = f.fmt.pix.sizeimage;
-  set_rate(self->fd, &mode->rate_hz);
+  set_rate(self, &mode->rate_hz);
   return 0;
 }
 
@@ -168,38 +219,53 @@ static wm_time_ns exposure_ns(void *camera) {
 // ── streaming ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static int give_back(void *camera, uint32_t index) {
-  struct v4l2_buffer b = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE, .memory = V4L2_MEMORY_MMAP, .index = index};
-  return call(((v4l2_camera *)camera)->fd, VIDIOC_QBUF, &b);
+  const v4l2_camera *self = camera;
+  described d;
+  struct v4l2_buffer *b = describe(self, index, &d);
+  if (is_multi_planar(self)) b->length = self->planes;
+  return call(self->fd, VIDIOC_QBUF, b);
 }
 
 static int map_buffer(v4l2_camera *self, uint32_t i) {
-  struct v4l2_buffer b = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE, .memory = V4L2_MEMORY_MMAP, .index = i};
-  int failed = call(self->fd, VIDIOC_QUERYBUF, &b);
+  described d;
+  const struct v4l2_buffer *b = describe(self, i, &d);
+  int failed = call(self->fd, VIDIOC_QUERYBUF, &d.b);
   if (failed) return failed;
-  void *start = mmap(NULL, b.length, PROT_READ | PROT_WRITE, MAP_SHARED, self->fd, b.m.offset);
+  const size_t length = is_multi_planar(self) ? d.planes[0].length : b->length;
+  const off_t offset = is_multi_planar(self) ? d.planes[0].m.mem_offset : b->m.offset;
+  void *start = mmap(NULL, length, PROT_READ, MAP_SHARED, self->fd, offset);
   if (start == MAP_FAILED) return -errno;
   self->buffer[i].start = start;
-  self->buffer[i].length = b.length;
+  self->buffer[i].length = length;
   self->count = i + 1;
-  return give_back(self, i);
+  self->buffer[i].copy = malloc(length);
+  return self->buffer[i].copy ? give_back(self, i) : -ENOMEM;
 }
 
 static int start(void *camera, uint32_t buffers) {
   v4l2_camera *self = camera;
-  struct v4l2_requestbuffers r = {.count = buffers, .type = V4L2_BUF_TYPE_VIDEO_CAPTURE, .memory = V4L2_MEMORY_MMAP};
-  int failed = call(self->fd, VIDIOC_REQBUFS, &r), type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  struct v4l2_requestbuffers r = {.count = buffers, .type = self->type, .memory = V4L2_MEMORY_MMAP};
+  int failed = call(self->fd, VIDIOC_REQBUFS, &r);
   if (!failed && r.count == 0) failed = -ENOMEM;
   for (uint32_t i = 0; !failed && i < r.count && i < CAMERA_BUFFERS_MAX; i++) failed = map_buffer(self, i);
-  return failed ? failed : call(self->fd, VIDIOC_STREAMON, &type);
+  return failed ? failed : call(self->fd, VIDIOC_STREAMON, &self->type);
 }
 
+// The driver's memory is read here and nowhere else.
 static void fill(const v4l2_camera *self, const struct v4l2_buffer *b, camera_buffer *out) {
-  *out = (camera_buffer){.index = b->index, .bytes = b->bytesused, .sequence = b->sequence};
+  const size_t length = self->buffer[b->index].length;
+  size_t used = b->bytesused, offset = 0;
+  if (is_multi_planar(self)) {  // bytesused counts from the plane's beginning
+    offset = b->m.planes[0].data_offset < length ? b->m.planes[0].data_offset : length;
+    used = b->m.planes[0].bytesused > offset ? b->m.planes[0].bytesused - offset : 0;
+  }
+  if (used > length - offset) used = length - offset;
+  *out = (camera_buffer){.index = b->index, .bytes = (uint32_t)used, .sequence = b->sequence};
   out->stamp_ns = (wm_time_ns)b->timestamp.tv_sec * WM_NS_PER_S + (wm_time_ns)b->timestamp.tv_usec * WM_NS_PER_US;
   if ((b->flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE) out->flags |= CAMERA_STAMP_START;
   if (b->flags & V4L2_BUF_FLAG_ERROR) out->flags |= CAMERA_BUFFER_ERROR;
-  out->data = self->buffer[b->index].start;
-  if (out->bytes > self->buffer[b->index].length) out->bytes = (uint32_t)self->buffer[b->index].length;
+  memcpy(self->buffer[b->index].copy, (const uint8_t *)self->buffer[b->index].start + offset, used);
+  out->data = self->buffer[b->index].copy;
 }
 
 static int take(void *camera, int wait_ms, camera_buffer *out) {
@@ -208,20 +274,23 @@ static int take(void *camera, int wait_ms, camera_buffer *out) {
   int ready = poll(&waiting, 1, wait_ms);
   if (ready == 0 || (ready < 0 && errno == EINTR)) return 0;
   if (ready < 0) return -errno;
-  struct v4l2_buffer b = {.type = V4L2_BUF_TYPE_VIDEO_CAPTURE, .memory = V4L2_MEMORY_MMAP};
-  int failed = call(self->fd, VIDIOC_DQBUF, &b);
+  described d;
+  struct v4l2_buffer *b = describe(self, 0, &d);
+  int failed = call(self->fd, VIDIOC_DQBUF, b);
   if (failed == -EAGAIN) return waiting.revents & (POLLERR | POLLHUP) ? -EIO : 0;
   if (failed) return failed;
-  if (b.index >= self->count) return -EIO;
-  fill(self, &b, out);
+  if (b->index >= self->count) return -EIO;
+  fill(self, b, out);
   return 1;
 }
 
 static void close_camera(void *camera) {
   v4l2_camera *self = camera;
-  int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  (void)call(self->fd, VIDIOC_STREAMOFF, &type);
-  for (uint32_t i = 0; i < self->count; i++) (void)munmap(self->buffer[i].start, self->buffer[i].length);
+  (void)call(self->fd, VIDIOC_STREAMOFF, &self->type);
+  for (uint32_t i = 0; i < self->count; i++) {
+    (void)munmap(self->buffer[i].start, self->buffer[i].length);
+    free(self->buffer[i].copy);
+  }
   (void)close(self->fd);
   free(self);
 }

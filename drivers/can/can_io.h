@@ -32,6 +32,11 @@ typedef struct can_io {
 
 extern const can_io kSocketCan;
 
+// The kernel counts about 0.8 kB a frame, and doubles what is asked: half a second of a full bus of 500 kbit/s.
+#define CAN_QUEUE_BYTES (1 << 20)
+// Asks for so many bytes of a socket's queue, by force where that is allowed. Returns what was granted.
+int can_queue_grow(int socket, int bytes);
+
 // A message of `bytes` bytes as the kernel hands it out (struct can_frame or canfd_frame, stamps and drop count beside
 // it) into *out. 0 where it is none. Pure.
 int can_message_read(const struct msghdr *message, size_t bytes, can_received *out);

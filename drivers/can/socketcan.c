@@ -17,8 +17,6 @@
 
 #include "can_io.h"
 
-#define QUEUE_BYTES (1 << 20)  // half a second of a full bus
-
 static unsigned find_interface(void *context, const char *interface, int *is_up) {
   (void)context;
   struct ifreq request = {0};
@@ -46,7 +44,7 @@ static int set_filters(int fd, const uint32_t *ids, const uint8_t *is_extended, 
 
 // What an old kernel or adapter can't do is done without; only the filters must be.
 static void ask_for_more(int fd) {
-  int one = 1, bytes = QUEUE_BYTES;
+  int one = 1;
   can_err_mask_t errors = CAN_ERR_MASK;
   int stamps = SOF_TIMESTAMPING_RX_SOFTWARE | SOF_TIMESTAMPING_SOFTWARE | SOF_TIMESTAMPING_RX_HARDWARE |
                SOF_TIMESTAMPING_RAW_HARDWARE;
@@ -54,7 +52,7 @@ static void ask_for_more(int fd) {
   (void)setsockopt(fd, SOL_CAN_RAW, CAN_RAW_ERR_FILTER, &errors, sizeof errors);
   (void)setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPING, &stamps, sizeof stamps);
   (void)setsockopt(fd, SOL_SOCKET, SO_RXQ_OVFL, &one, sizeof one);
-  (void)setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
+  (void)can_queue_grow(fd, CAN_QUEUE_BYTES);
 }
 
 static int open_socket(void *context, unsigned interface_index, const uint32_t *ids, const uint8_t *is_extended,

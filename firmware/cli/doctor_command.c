@@ -40,6 +40,8 @@ static int look(const wm_config *config, double seconds, int as_json) {
   doctor_limits(&found);
   doctor_lcm(lcm_way_url(config ? config->lcm_url : ""), &found);
   doctor_can("", config, &found);
+  int wanted, granted = wm_can_queue_bytes(&wanted);
+  if (config && config->devices.can_count > 0 && granted > 0) doctor_can_queue(wanted, granted, &found);
   doctor_interrupts("", config, sysconf(_SC_NPROCESSORS_ONLN), &found);
   doctor_cameras(config, &found);
   doctor_latency(seconds, priority, &wake_ns, &is_realtime);

@@ -74,6 +74,25 @@ static void can_interface(const char *root, const char *interface, findings *out
     find(out, FINDING_GOOD, about, "", "is up, without errors");
 }
 
+// The kernel's account of a queued frame of eight bytes, and such frames in a second of a full bus of 500 kbit/s.
+#define FRAME_QUEUE_BYTES 768
+#define FRAMES_PER_S 4000
+
+void doctor_can_queue(int wanted, int granted, findings *out) {
+  char mend[120];
+  const double queue_ms = 2e3 * granted / FRAME_QUEUE_BYTES / FRAMES_PER_S;  // it counts twice what is granted
+  if (granted >= wanted) {
+    find(out, FINDING_GOOD, "can queue", "", "a socket holds %.0f ms of a full bus", queue_ms);
+    return;
+  }
+  (void)snprintf(mend, sizeof mend, "sysctl -w net.core.rmem_max=%d, and the same in /etc/sysctl.d/waymark.conf",
+                 wanted);
+  find(out, FINDING_NOTE, "can queue", mend,
+       "a socket holds %.0f ms of a full bus (%d kB of the %d that are asked for): frames are lost when a thread waits "
+       "longer",
+       queue_ms, granted / 1024, wanted / 1024);
+}
+
 void doctor_can(const char *root, const wm_config *config, findings *out) {
   for (size_t i = 0; config && i < config->devices.can_count; i++)
     can_interface(root, config->devices.can[i].interface, out);

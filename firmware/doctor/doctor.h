@@ -14,6 +14,8 @@ void doctor_power(const char *root, findings *out);   // governors, temperatures
 void doctor_limits(findings *out);                    // real-time priority, locked memory
 void doctor_lcm(const char *url, findings *out);      // a way for messages, and how far they go
 void doctor_can(const char *root, const wm_config *config, findings *out);
+// Of bytes that were wanted and granted (wm_can_queue_bytes) for the queue of a CAN socket.
+void doctor_can_queue(int wanted, int granted, findings *out);
 // The priority of the CAN interfaces' interrupt threads against the estimator's; nothing where there are none.
 void doctor_interrupts(const char *root, const wm_config *config, long cpus, findings *out);
 void doctor_cameras(const wm_config *config, findings *out);

@@ -115,11 +115,16 @@ static void keep_raw(frame_hub *self, picture *p) {
   p->raw.data = p->raw_bytes;
 }
 
+static picture *oldest_waiting(subscription *self) {
+  picture *oldest = self->waiting[0];
+  self->waiting_count--;
+  for (uint32_t i = 0; i < self->waiting_count; i++) self->waiting[i] = self->waiting[i + 1];
+  return oldest;
+}
+
 static void hand_out(subscription *self, picture *p) {
   if (self->waiting_count == self->wishes.waiting_max) {
-    self->waiting[0]->readers--;
-    self->waiting_count--;
-    memmove(self->waiting, self->waiting + 1, self->waiting_count * sizeof self->waiting[0]);
+    oldest_waiting(self)->readers--;
     self->dropped++;
   }
   self->waiting[self->waiting_count++] = p;
@@ -180,9 +185,7 @@ static wm_status hold_next(subscription *self, wm_error *err) {
     if (hub->ended != WM_OK && err) *err = hub->why;
     return hub->ended != WM_OK ? hub->ended : WM_AGAIN;
   }
-  self->held = self->waiting[0];
-  self->waiting_count--;
-  memmove(self->waiting, self->waiting + 1, self->waiting_count * sizeof self->waiting[0]);
+  self->held = oldest_waiting(self);
   self->is_peeked = 1;
   return WM_OK;
 }

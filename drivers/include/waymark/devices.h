@@ -25,6 +25,8 @@ typedef struct wm_can_device_config {
 // All frames of an interface, of whatever kind, stamped on the monotonic clock: for a recorder. As the source: it waits
 // for up to WM_DEVICE_WAIT_MS, then WM_AGAIN; the interface needn't be there. One thread.
 typedef struct wm_can_listener wm_can_listener;
+// Bytes that the kernel grants the queue of a CAN socket, asked for *wanted; 0: it has no CAN.
+int wm_can_queue_bytes(int *wanted);
 wm_status wm_can_listener_open(const char *interface, wm_can_listener **out, wm_error *err);
 wm_status wm_can_listener_next(wm_can_listener *self, wm_can_frame *out, wm_error *err);
 const wm_source_counts *wm_can_listener_counted(const wm_can_listener *self);

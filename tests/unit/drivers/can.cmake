@@ -15,5 +15,7 @@ wm_test(can_decode SOURCES can_decode.c USES wm_can)
 wm_script_test(can_judge COMMAND tests/judges/run.sh tests/judges/can_judge.py $<TARGET_FILE:can_judge>)
 
 # A CAN interface as a source, on a system that does what the test says.
+wm_test(can_queue SOURCES can_queue.c USES wm_can_device)
+target_include_directories(can_queue PRIVATE ${CMAKE_SOURCE_DIR}/drivers/can)
 wm_test(can_device SOURCES can_device.c fake_can.c USES wm_can_device wm_clock)
 target_include_directories(can_device PRIVATE ${CMAKE_SOURCE_DIR}/drivers/can)

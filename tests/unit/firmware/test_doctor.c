@@ -156,11 +156,21 @@ static void latency_is_measured(void) {
   expect("latency", FINDING_BAD, "a real-time thread");
 }
 
+static void a_short_can_queue_is_found(void) {
+  doctor_can_queue(1 << 20, 212992, &found);
+  expect("can queue", FINDING_NOTE, "holds 139 ms of a full bus (208 kB of the 1024 that are asked for)");
+  TEST_ASSERT_NOT_NULL(strstr(about("can queue")->mend, "net.core.rmem_max=1048576"));
+  memset(&found, 0, sizeof found);
+  doctor_can_queue(1 << 20, 1 << 20, &found);
+  expect("can queue", FINDING_GOOD, "holds 683 ms");
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_good_computer_is_found_good);
   RUN_TEST(what_is_broken_is_found);
   RUN_TEST(can_interfaces_are_looked_at);
+  RUN_TEST(a_short_can_queue_is_found);
   RUN_TEST(interrupts_below_the_estimator_are_found);
   RUN_TEST(cameras_are_looked_at);
   RUN_TEST(no_way_for_messages_is_found);
