@@ -35,7 +35,8 @@ struct wm_recording {
   size_t appearance_count;
   char map_path[WM_PATH_MAX];  // "" where there is none
   wm_map *map;                 // NULL until it is asked for
-  sensor_names sighting_sensors, marker_sensors;
+  sensor_names sighting_sensors, marker_sensors, corner_sensors;
+  wm_corner_reader *corners[WM_SENSORS_MAX];  // by corner_sensors
   uint32_t quantities;
   wm_source *sources[WM_SOURCES_MAX];
   size_t source_count;
@@ -74,10 +75,10 @@ static wm_status check_format(const wm_yaml_node *root, wm_error *err) {
 }
 
 static int is_read(const char *file) {
-  static const char *const kRead[] = {"can.log",         "vehicle.dbc",    "can-signals.yaml", "motion.csv",
-                                      "motion6.csv",     "increments.csv", "points.csv",       "sightings.csv",
-                                      "markers.csv",     "stereo.csv",     "gnss.csv",         "landmarks.csv",
-                                      "calibration.yaml"};
+  static const char *const kRead[] = {"can.log",       "vehicle.dbc",        "can-signals.yaml", "motion.csv",
+                                      "motion6.csv",   "increments.csv",     "points.csv",       "sightings.csv",
+                                      "markers.csv",   "marker-corners.csv", "stereo.csv",       "gnss.csv",
+                                      "landmarks.csv", "calibration.yaml"};
   for (size_t i = 0; i < sizeof kRead / sizeof kRead[0]; i++)
     if (strcmp(file, kRead[i]) == 0) return 1;
   return 0;
@@ -207,7 +208,7 @@ static wm_status add_stream(wm_recording *self, const stream_kind *kind, wm_erro
   wm_source *source;
   wm_status status = find_stream(self, stream_file(kind), path, &there, err);
   if (status != WM_OK || !there) return status;
-  status = stream_open(path, kind, NULL, 0, NULL, 0, self->warn.fn, self->warn.context, &source, err);
+  status = stream_open(path, kind, NULL, 0, NULL, 0, NULL, self->warn.fn, self->warn.context, &source, err);
   return status == WM_OK ? add_source(self, source, err) : status;
 }
 
@@ -235,6 +236,16 @@ static wm_status sensor_index(wm_recording *self, const char *path, const char *
   return WM_OK;
 }
 
+static wm_status make_corner_reader(wm_recording *self, const char *path, const char *name, wm_corner_reader **out,
+                                    wm_error *err) {
+  const wm_rig *rig = &self->calibration.rig;
+  const int32_t camera = wm_rig_find_camera(rig, name);
+  if (camera < 0)
+    return wm_fail(err, WM_BAD_CONFIG, "%s: the sensor '%s' is no camera of calibration.yaml; corners need its lens",
+                   path, name);
+  return wm_corner_reader_make(path, name, &rig->cameras[camera], rig->marker_size_m, out, err);
+}
+
 // A source a sensor: each reads the file by itself, so that memory stays bounded however unevenly they are asked.
 static wm_status add_sensor_streams(wm_recording *self, const stream_kind *kind, sensor_names *names, wm_error *err) {
   char path[WM_PATH_MAX];
@@ -246,9 +257,11 @@ static wm_status add_sensor_streams(wm_recording *self, const stream_kind *kind,
     uint16_t index;
     wm_source *source;
     status = sensor_index(self, path, names->name[i], &index, err);
+    wm_corner_reader **corners = kind == &kStreamCorners ? &self->corners[i] : NULL;
+    if (status == WM_OK && corners) status = make_corner_reader(self, path, names->name[i], corners, err);
     if (status != WM_OK) break;
-    status = stream_open(path, kind, names->name[i], index, names, i == 0, i == 0 ? self->warn.fn : NULL,
-                         self->warn.context, &source, err);
+    status = stream_open(path, kind, names->name[i], index, names, i == 0, corners ? *corners : NULL,
+                         i == 0 ? self->warn.fn : NULL, self->warn.context, &source, err);
     if (status == WM_OK) status = add_source(self, source, err);
   }
   return status;
@@ -288,6 +301,7 @@ static wm_status add_sources(wm_recording *self, wm_error *err) {
   if (status == WM_OK) status = add_stream(self, &kStreamIncrements, err);
   if (status == WM_OK) status = add_sensor_streams(self, &kStreamSightings, &self->sighting_sensors, err);
   if (status == WM_OK) status = add_sensor_streams(self, &kStreamMarkers, &self->marker_sensors, err);
+  if (status == WM_OK) status = add_sensor_streams(self, &kStreamCorners, &self->corner_sensors, err);
   if (status == WM_OK) status = add_stream(self, &kStreamStereo, err);
   if (status == WM_OK) status = add_stream(self, &kStreamPoints, err);
   if (status == WM_OK) status = add_stream(self, &kStreamGnss, err);

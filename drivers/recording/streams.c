@@ -27,16 +27,18 @@ enum { T, ARRIVAL, FIRST };
 #define STAMPS \
   {"t_ns", CSV_TIME, CSV_NEEDED, 0, 0}, { "arrival_ns", CSV_TIME, CSV_OPTIONAL, 0, 0 }
 
+typedef struct stream stream;
+
 struct stream_kind {
   const char *file;
   const char *name;
   wm_event_kind event;
   csv_format format;
   // Fills the event's body from a row. A row that says nothing: the reason, else NULL.
-  const char *(*fill)(const csv_row *row, uint16_t sensor, wm_event *out);
+  const char *(*fill)(const stream *self, const csv_row *row, wm_event *out);
 };
 
-typedef struct stream {
+struct stream {
   wm_source base;
   const stream_kind *kind;
   csv_reader csv;
@@ -51,16 +53,17 @@ typedef struct stream {
   int row_waits;   // points: `row` belongs to the next stamp
   csv_row before;  // base.sample_at_next: the row whose values wait for the next stamp
   int has_before;
-} stream;
+  const wm_corner_reader *corners;  // of kStreamCorners
+};
 
-static const char *fill_motion(const csv_row *row, uint16_t sensor, wm_event *out) {
-  (void)sensor;
+static const char *fill_motion(const stream *self, const csv_row *row, wm_event *out) {
+  (void)self;
   out->as.twist2 = (wm_twist2){row->number[FIRST], row->number[FIRST + 1]};
   return NULL;
 }
 
-static const char *fill_motion6(const csv_row *row, uint16_t sensor, wm_event *out) {
-  (void)sensor;
+static const char *fill_motion6(const stream *self, const csv_row *row, wm_event *out) {
+  (void)self;
   for (int i = 0; i < 3; i++) {
     out->as.twist6.v_mps[i] = row->number[FIRST + i];
     out->as.twist6.w_radps[i] = row->number[FIRST + 3 + i];
@@ -75,8 +78,8 @@ static int count_empty(const csv_row *row, int first, int count) {
   return empty;
 }
 
-static const char *fill_increment(const csv_row *row, uint16_t sensor, wm_event *out) {
-  (void)sensor;
+static const char *fill_increment(const stream *self, const csv_row *row, wm_event *out) {
+  (void)self;
   const double *n = &row->number[FIRST + 1];
   const int empty = count_empty(row, FIRST + 4, 6);
   if (row->whole[FIRST] >= row->whole[T]) return "from_ns is not before t_ns";
@@ -109,13 +112,13 @@ static const char *polar_sigmas(const csv_row *row, wm_sighting *s) {
   return NULL;
 }
 
-static const char *fill_sighting(const csv_row *row, uint16_t sensor, wm_event *out) {
+static const char *fill_sighting(const stream *self, const csv_row *row, wm_event *out) {
   const double *n = &row->number[FIRST];
   double bearing_rad = n[2], range_m = n[3];
   if (isnan(bearing_rad) && isnan(range_m)) return "bearing_rad and range_m are both empty";
   if (isnan(n[9]) != isnan(n[10])) return "one of elevation_rad and elevation_sigma_rad is empty";
   int64_t id = row->whole[FIRST + 1];
-  out->as.sighting = (wm_sighting){.sensor = sensor,
+  out->as.sighting = (wm_sighting){.sensor = self->sensor_index,
                                    .landmark_id = id == WM_TIME_NONE ? -1 : (int32_t)id,
                                    .bearing_rad = wrapped(bearing_rad),
                                    .range_m = range_m,
@@ -126,9 +129,9 @@ static const char *fill_sighting(const csv_row *row, uint16_t sensor, wm_event *
   return polar_sigmas(row, &out->as.sighting);
 }
 
-static const char *fill_marker(const csv_row *row, uint16_t sensor, wm_event *out) {
+static const char *fill_marker(const stream *self, const csv_row *row, wm_event *out) {
   const double *p = &row->number[FIRST + 2];
-  out->as.marker = (wm_marker){.sensor = sensor,
+  out->as.marker = (wm_marker){.sensor = self->sensor_index,
                                .id = (int32_t)row->whole[FIRST + 1],
                                .p_m = {p[0], p[1], p[2]},
                                .yaw_rad = wrapped(p[3]),
@@ -138,8 +141,15 @@ static const char *fill_marker(const csv_row *row, uint16_t sensor, wm_event *ou
   return NULL;
 }
 
-static const char *fill_stereo(const csv_row *row, uint16_t sensor, wm_event *out) {
-  (void)sensor;
+static const char *fill_corners(const stream *self, const csv_row *row, wm_event *out) {
+  double px[4][2];
+  memcpy(px, &row->number[FIRST + 2], sizeof px);
+  out->as.marker = (wm_marker){.sensor = self->sensor_index, .id = (int32_t)row->whole[FIRST + 1]};
+  return wm_corner_reader_pose(self->corners, px, row->number[FIRST + 10], &out->as.marker);
+}
+
+static const char *fill_stereo(const stream *self, const csv_row *row, wm_event *out) {
+  (void)self;
   const double *px = &row->number[FIRST + 1];
   if (isnan(px[0]) != isnan(px[1]) || isnan(px[2]) != isnan(px[3])) return "one of u and v is empty";
   if (isnan(px[0]) && isnan(px[2])) return "no camera sees the point";
@@ -147,15 +157,15 @@ static const char *fill_stereo(const csv_row *row, uint16_t sensor, wm_event *ou
   return NULL;
 }
 
-static const char *fill_gnss(const csv_row *row, uint16_t sensor, wm_event *out) {
-  (void)sensor;
+static const char *fill_gnss(const stream *self, const csv_row *row, wm_event *out) {
+  (void)self;
   const double *n = &row->number[FIRST];
   out->as.position = (wm_position){.p_m = {n[0], n[1], n[2]}, .sigma_xy_m = n[3], .sigma_z_m = n[4]};
   return NULL;
 }
 
-static const char *fill_point(const csv_row *row, uint16_t sensor, wm_event *out) {
-  (void)sensor;
+static const char *fill_point(const stream *self, const csv_row *row, wm_event *out) {
+  (void)self;
   wm_points *points = &out->as.points;
   if (points->count >= WM_POINTS_MAX) {
     points->dropped++;
@@ -231,6 +241,23 @@ const stream_kind kStreamMarkers = {"markers.csv",
                                       {"z_m", CSV_NUMBER, CSV_NEEDED, PLACE},
                                       {"yaw_rad", CSV_NUMBER, CSV_NEEDED, ANGLE}}},
                                     fill_marker};
+
+const stream_kind kStreamCorners = {"marker-corners.csv",
+                                    "corners",
+                                    WM_EVENT_MARKER,
+                                    {{STAMPS,
+                                      {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
+                                      {"id", CSV_WHOLE, CSV_NEEDED, ANY_ID},
+                                      {"u0_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"v0_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"u1_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"v1_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"u2_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"v2_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"u3_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"v3_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"sigma_px", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
+                                    fill_corners};
 
 const stream_kind kStreamStereo = {"stereo.csv",
                                    "stereo",
@@ -391,7 +418,7 @@ static wm_status next_single(wm_source *base, wm_event *out, wm_error *err) {
     const csv_row *values = values_row(self, &before);
     if (!values) continue;
     begin_event(self, out);
-    const char *problem = self->kind->fill(values, self->sensor_index, out);
+    const char *problem = self->kind->fill(self, values, out);
     if (!problem) {
       hand_out(self, arrival_of(&self->row), out);
       return WM_OK;
@@ -409,7 +436,7 @@ static wm_status next_points(wm_source *base, wm_event *out, wm_error *err) {
   begin_event(self, out);
   wm_time_ns arrival_ns = arrival_of(&self->row);
   for (;;) {
-    (void)self->kind->fill(&self->row, 0, out);
+    (void)self->kind->fill(self, &self->row, out);
     if (arrival_of(&self->row) > arrival_ns) arrival_ns = arrival_of(&self->row);
     status = next_row(self, err);
     if (status != WM_OK && status != WM_END) return status;
@@ -429,8 +456,8 @@ static const wm_source_ops kSingle = {next_single, close_stream};
 static const wm_source_ops kPoints = {next_points, close_stream};
 
 wm_status stream_open(const char *path, const stream_kind *kind, const char *sensor, uint16_t sensor_index,
-                      const sensor_names *others, int takes_broken, wm_warn_fn warn, void *context, wm_source **out,
-                      wm_error *err) {
+                      const sensor_names *others, int takes_broken, const wm_corner_reader *corners, wm_warn_fn warn,
+                      void *context, wm_source **out, wm_error *err) {
   *out = NULL;
   stream *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "%s: no memory to read it", path);
@@ -449,6 +476,7 @@ wm_status stream_open(const char *path, const stream_kind *kind, const char *sen
   self->sensor_index = sensor_index;
   self->names = others;
   self->takes_broken = takes_broken;
+  self->corners = corners;
   *out = &self->base;
   return WM_OK;
 }

@@ -4,13 +4,14 @@
 #define WM_RECORDING_STREAMS_H
 
 #include "csv.h"
+#include "waymark/marker_corners.h"
 #include "waymark/source.h"
 
 typedef struct stream_kind stream_kind;
 
 // In the order of the format's table of files.
 extern const stream_kind kStreamMotion, kStreamMotion6, kStreamIncrements, kStreamSightings, kStreamMarkers,
-    kStreamStereo, kStreamPoints, kStreamGnss;
+    kStreamCorners, kStreamStereo, kStreamPoints, kStreamGnss;
 
 const char *stream_file(const stream_kind *kind);  // "motion.csv"
 
@@ -26,9 +27,10 @@ wm_status stream_find_sensors(const char *path, const stream_kind *kind, sensor_
 
 // A source on a stream's file. `sensor`: only rows of this one, with `sensor_index` in their events; NULL where the
 // file has no sensors. `others`: the names that other sources take; a row of none of them (broken beyond that) is
-// counted by the source with `takes_broken`. The names must live as long as the source.
+// counted by the source with `takes_broken`. The names must live as long as the source, as must `corners`, which
+// kStreamCorners needs.
 wm_status stream_open(const char *path, const stream_kind *kind, const char *sensor, uint16_t sensor_index,
-                      const sensor_names *others, int takes_broken, wm_warn_fn warn, void *context, wm_source **out,
-                      wm_error *err);
+                      const sensor_names *others, int takes_broken, const wm_corner_reader *corners, wm_warn_fn warn,
+                      void *context, wm_source **out, wm_error *err);
 
 #endif

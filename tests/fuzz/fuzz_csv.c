@@ -13,8 +13,9 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-static const stream_kind *const kKinds[] = {&kStreamMotion, &kStreamMotion6, &kStreamSightings, &kStreamMarkers,
-                                            &kStreamStereo, &kStreamPoints,  &kStreamGnss,      &kStreamIncrements};
+static const stream_kind *const kKinds[] = {&kStreamMotion,  &kStreamMotion6,    &kStreamSightings,
+                                            &kStreamMarkers, &kStreamStereo,     &kStreamPoints,
+                                            &kStreamGnss,    &kStreamIncrements, &kStreamCorners};
 
 static void check(int good) {
   if (!good) abort();
@@ -47,12 +48,19 @@ static void read_as(const char *path, const stream_kind *kind) {
   sensor_names names;
   wm_source *source;
   wm_error err;
-  int has_sensors = kind == &kStreamSightings || kind == &kStreamMarkers;
+  int has_sensors = kind == &kStreamSightings || kind == &kStreamMarkers || kind == &kStreamCorners;
+  const wm_camera camera = {.model = WM_CAMERA_PINHOLE_RADTAN,
+                            .width_px = 640,
+                            .height_px = 480,
+                            .intrinsics_count = 4,
+                            .intrinsics = {500, 500, 320, 240}};
+  static wm_corner_reader *corners;
+  if (!corners) check(wm_corner_reader_make(path, "front", &camera, 0.2, &corners, NULL) == WM_OK);
   names.count = 0;
   if (has_sensors && stream_find_sensors(path, kind, &names, &err) != WM_OK) return;
   for (size_t i = 0; i < (has_sensors ? names.count : 1); i++) {
     wm_status status = stream_open(path, kind, has_sensors ? names.name[i] : NULL, (uint16_t)i,
-                                   has_sensors ? &names : NULL, i == 0, NULL, NULL, &source, &err);
+                                   has_sensors ? &names : NULL, i == 0, corners, NULL, NULL, &source, &err);
     if (status != WM_OK) return;
     drain(source);
     source->ops->close(source);

@@ -98,7 +98,8 @@ void wm_appearances_free(wm_appearance *list, size_t count);
 wm_status wm_recording_appearances(wm_recording *self, const wm_appearance **out, size_t *count, wm_error *err);
 
 // The recording's sources, in the order of the format's table of files: can, motion, motion6, increments, then a source
-// a sensor for sightings ("sightings:NAME"), markers ("markers:NAME"), then stereo, points, gnss. Indices are 0, 1, 2
+// a sensor for sightings ("sightings:NAME"), markers ("markers:NAME") and their corners ("corners:NAME"), then stereo,
+// points, gnss. Indices are 0, 1, 2
 // ... in this order. Owned by the recording. Each hands out its events in the order of their arrival: a row that is
 // older than the one above it arrived with that one; it is counted as out of order and handed out. A single stamp far
 // ahead of the rows around it is counted (not_finite) and skipped.

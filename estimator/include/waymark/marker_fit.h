@@ -47,6 +47,8 @@ const char *wm_marker_fit_init(wm_marker_fit *self, const wm_camera *camera, con
 // Writes everything of *out except sensor and id. Where the edges cannot be measured (short or blurred sides), the pose
 // is that of the given corners, with larger sigmas. False where no pose fits. About 0.1 ms; no allocation.
 int wm_marker_fit_read(wm_marker_fit *self, const wm_frame *frame, const double (*corners_px)[2], wm_marker *out);
+// The same by corners that another detector measured, to `sigma_px` in each coordinate: no picture, no bloom.
+int wm_marker_fit_corners(const wm_marker_fit *self, const double (*corners_px)[2], double sigma_px, wm_marker *out);
 // Bloom: how far white extends over an edge, px; its mean until now.
 double wm_marker_fit_bloom_px(const wm_marker_fit *self);
 

@@ -35,6 +35,7 @@ constexpr double kStep_px = 0.5;                     // of a profile
 constexpr double kContrastMin_grey = 12.0;           // over an edge: above noise and compression. Not swept
 constexpr double kMonotonousMin = 0.6;               // net over total rise of a profile: a single edge. Not swept
 constexpr double kOutlier_px = 0.6;                  // a point farther off its side is left out. Not swept
+constexpr double kCorner_px = 0.12;                  // sigma of a corner's coordinate: measured on rendered prints
 constexpr double kSideMin_px = 8.0;                  // shortest side of a print that can be measured
 constexpr double kSideLeast_px = 1.0;                // for the sigma of one that cannot: against division by 0
 constexpr double kBloomMemory = 1600.0;              // sides in the running mean: some minutes of prints
@@ -321,6 +322,30 @@ struct print_view {
   }
 };
 
+// Pose and sigmas by corners whose coordinates have this sigma; `rough`: a further sigma as a share of the print's
+// size, or 0. False where no pose fits.
+bool write_marker(const wm_marker_fit &self, const print_view &seen, double corner_px, double rough, wm_marker *out) {
+  marker_poses poses;
+  if (!pose_of(seen.view, self.print, seen.corner, corner_px, self.up, &poses)) return false;
+  const vec3 all = poses.best.centre_m + poses.other.centre_m;
+  if (!finite(all) || !(length(poses.best.centre_m) > 0.0)) return false;
+  write_pose(self, poses.best, out->p_m, &out->yaw_rad);
+  const double along_m = rough * length(poses.best.centre_m);
+  out->along_sigma_m =
+      poses.range_sigma_m > 0.0 || rough > 0.0 ? std::sqrt(square(poses.range_sigma_m) + square(along_m)) : kAbsent;
+  out->yaw_sigma_rad = poses.turn_sigma_rad > 0.0 || rough > 0.0
+                           ? std::sqrt(square(poses.turn_sigma_rad) + square(kTurnSigmaMin_rad) + square(rough))
+                           : kAbsent;
+  out->poses = poses.has_other ? 2 : 1;
+  if (poses.has_other) {
+    write_pose(self, poses.other, out->other_p_m, &out->other_yaw_rad);
+  } else {
+    for (double &p : out->other_p_m) p = kAbsent;
+    out->other_yaw_rad = kAbsent;
+  }
+  return true;
+}
+
 }  // namespace
 }  // namespace wm
 
@@ -346,29 +371,18 @@ int wm_marker_fit_read(wm_marker_fit *self, const wm_frame *frame, const double 
   if (!seen.place(self->optics, print, corners_px)) return 0;
   const bool is_measured = seen.measure(self, *frame);
   if (!is_measured && !seen.place(self->optics, print, corners_px)) return 0;
-  marker_poses poses;
-  if (!pose_of(seen.view, print, seen.corner, self->up, &poses)) return 0;
-  const vec3 all = poses.best.centre_m + poses.other.centre_m;
-  if (!wm::finite(all) || !(length(poses.best.centre_m) > 0.0)) return 0;
-  write_pose(*self, poses.best, out->p_m, &out->yaw_rad);
-  out->along_sigma_m = poses.range_sigma_m > 0.0 ? poses.range_sigma_m : kAbsent;
-  out->yaw_sigma_rad =
-      poses.turn_sigma_rad > 0 ? std::sqrt(square(poses.turn_sigma_rad) + square(kTurnSigmaMin_rad)) : kAbsent;
-  if (!is_measured) {
-    const double part = kRough_px / seen.shortest_px(print.corners), range_m = length(poses.best.centre_m);
-    out->along_sigma_m = std::sqrt(square(poses.range_sigma_m) + square(part * range_m));
-    out->yaw_sigma_rad = std::sqrt(square(poses.turn_sigma_rad) + square(kTurnSigmaMin_rad) + square(part));
-  }
+  const double rough = is_measured ? 0.0 : kRough_px / seen.shortest_px(print.corners);
+  if (!write_marker(*self, seen, kCorner_px, rough, out)) return 0;
   const double bloom_px = wm_marker_fit_bloom_px(self);
   out->bloom_px = bloom_px != 0.0 ? bloom_px : kAbsent;  // 0: not measured yet
-  out->poses = poses.has_other ? 2 : 1;
-  if (poses.has_other) {
-    write_pose(*self, poses.other, out->other_p_m, &out->other_yaw_rad);
-  } else {
-    for (double &p : out->other_p_m) p = kAbsent;
-    out->other_yaw_rad = kAbsent;
-  }
   return 1;
+}
+
+int wm_marker_fit_corners(const wm_marker_fit *self, const double (*corners_px)[2], double sigma_px, wm_marker *out) {
+  wm::print_view seen;
+  if (!seen.place(self->optics, self->print, corners_px)) return 0;
+  out->bloom_px = wm::kAbsent;
+  return wm::write_marker(*self, seen, sigma_px, 0.0, out);
 }
 
 double wm_marker_fit_bloom_px(const wm_marker_fit *self) { return wm::bloom_of(*self, wm::kWide_px); }

@@ -5,7 +5,6 @@ namespace wm {
 
 namespace {
 
-constexpr double kCorner_px = 0.12;        // sigma of a corner's coordinate: measured on rendered prints
 constexpr double kAmbiguous_chi2 = 12.0;   // difference up to which the second solution is kept: 3.5 sigma
 constexpr double kPlane_chi2 = 25.0;       // above, a print is neither level nor upright: 8 corners' coordinates - 4
 constexpr int kTurns = 33;                 // angles of the coarse search: 5 degrees, the minima are wider
@@ -81,6 +80,7 @@ struct upright_print {
   const tangent_view &view;
   const wm_marker_print &print;
   const tangent_point *corner;
+  double corner_px;   // sigma of a coordinate
   vec3 ahead, aside;  // level; ahead is towards the print
 
   bool at(double turn, plane_fit *out) const {
@@ -109,7 +109,7 @@ bool refine(const upright_print &t, double *turn, double step, plane_fit *best, 
 
 // Distance from the best turn in the direction of `step` at which chi2 has grown by 4, which is two sigmas.
 double two_sigmas(const upright_print &t, double turn, double least, double step) {
-  const double most = least + 4.0 * square(kCorner_px);
+  const double most = least + 4.0 * square(t.corner_px);
   double before = least;
   for (double off = step;; off += step) {
     plane_fit f;
@@ -165,7 +165,7 @@ double fit_upright(const upright_print &t, marker_poses *out) {
   const double turn = minima.turn[first], least = minima.fit[first].cost_px2;
   // The width of a print shrinks with the cosine of its turn, which noise reaches only from below: seen nearly face on,
   // the best turn is too large to either side. So estimate and sigma are those of the interval in which chi2 stays low.
-  const double noise = square(kCorner_px);
+  const double noise = square(t.corner_px);
   const double curvature_sigma =
       std::sqrt(2 * noise / larger(minima.curvature[first], 2 * noise / square(kTurnPrior_rad)));
   const double step_rad = curvature_sigma > kStepMax_rad ? kStepMax_rad : larger(curvature_sigma, kStepMin_rad);
@@ -183,7 +183,7 @@ double fit_upright(const upright_print &t, marker_poses *out) {
   }
   const double distance = length(out->best.centre_m);
   const double size_px = t.print.size_m / distance * t.view.focal_px;
-  out->range_sigma_m = distance * kCorner_px / (0.5 * size_px);
+  out->range_sigma_m = distance * t.corner_px / (0.5 * size_px);
   if (t.at(middle + kDerivativeStep_rad, &beside))
     out->range_sigma_m = std::sqrt(square(out->range_sigma_m) + square((length(beside.pose.centre_m) - distance) /
                                                                        kDerivativeStep_rad * out->turn_sigma_rad));
@@ -192,8 +192,8 @@ double fit_upright(const upright_print &t, marker_poses *out) {
 
 }  // namespace
 
-bool pose_of(const tangent_view &view, const wm_marker_print &print, const tangent_point *corner, const vec3 &up,
-             marker_poses *out) {
+bool pose_of(const tangent_view &view, const wm_marker_print &print, const tangent_point *corner, double corner_px,
+             const vec3 &up, marker_poses *out) {
   // The tilt of a small print is mostly noise, so the better fit of level and upright decides.
   const vec3 ahead = {view.R_optical_view.m[0][2], view.R_optical_view.m[1][2], view.R_optical_view.m[2][2]};
   const vec3 level = ahead - dot(ahead, up) * up;
@@ -201,11 +201,11 @@ bool pose_of(const tangent_view &view, const wm_marker_print &print, const tange
   double upright_cost_px2 = kNever;
   if (length(level) > kLevelMin) {
     const vec3 forward = 1.0 / length(level) * level;
-    upright_cost_px2 = fit_upright({view, print, corner, forward, cross(up, forward)}, out);
+    upright_cost_px2 = fit_upright({view, print, corner, corner_px, forward, cross(up, forward)}, out);
   }
   plane_fit level_fit;
   const bool is_level = fit_in_plane(view, print, corner, dot(ahead, up) > 0.0 ? up : -1.0 * up, &level_fit);
-  const double noise = square(kCorner_px), level_cost_px2 = is_level ? level_fit.cost_px2 : kNever;
+  const double noise = square(corner_px), level_cost_px2 = is_level ? level_fit.cost_px2 : kNever;
   if (upright_cost_px2 < kPlane_chi2 * noise && upright_cost_px2 <= level_cost_px2) return true;
   *out = marker_poses{};
   if (level_cost_px2 < kPlane_chi2 * noise) {
@@ -218,7 +218,7 @@ bool pose_of(const tangent_view &view, const wm_marker_print &print, const tange
   if (!rough_normal(view, print, corner, &n) || !fit_in_plane(view, print, corner, n, &tilted)) return false;
   out->best = tilted.pose;
   const double distance = length(tilted.pose.centre_m), size_px = print.size_m / distance * view.focal_px;
-  out->turn_sigma_rad = kFreeTilt_rad * kCorner_px / size_px;
+  out->turn_sigma_rad = kFreeTilt_rad * corner_px / size_px;
   out->range_sigma_m = distance * out->turn_sigma_rad;
   return out->turn_sigma_rad < kFreeTiltMax_rad;
 }

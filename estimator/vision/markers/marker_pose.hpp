@@ -19,9 +19,10 @@ struct marker_poses {
   double range_sigma_m, turn_sigma_rad;  // of an upright or free print; else 0
 };
 
-// `corner`: the print's corners in the view. `up`: the vertical in optical axes. False where no pose fits.
-bool pose_of(const tangent_view &view, const wm_marker_print &print, const tangent_point *corner, const vec3 &up,
-             marker_poses *out);
+// `corner`: the print's corners in the view, `corner_px` the sigma of a coordinate. `up`: the vertical in optical axes.
+// False where no pose fits.
+bool pose_of(const tangent_view &view, const wm_marker_print &print, const tangent_point *corner, double corner_px,
+             const vec3 &up, marker_poses *out);
 
 }  // namespace wm
 

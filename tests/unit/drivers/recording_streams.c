@@ -334,6 +334,47 @@ static void other_streams(void) {
   }
 }
 
+// Raw corners of a print 2 m ahead on a wall, seen askew by 0.5 rad: the pose of the print, with sigmas by its size.
+static void marker_corners(void) {
+  const double place[3] = {2, 0.3, 0.1}, askew = 0.5, half_m = 0.1, focal = 500;  // x forward, y left, z up
+  const int right[4] = {-1, 1, 1, -1}, down[4] = {-1, -1, 1, 1};
+  char text[1024], row[512] = "";
+  size_t n = 0;
+  for (int i = 0; i < 4; i++) {
+    const double x = place[0] + half_m * right[i] * sin(askew), y = place[1] - half_m * right[i] * cos(askew);
+    const double z = place[2] - half_m * down[i];
+    n += (size_t)snprintf(row + n, sizeof row - n, ",%.6f,%.6f", 320 - focal * y / x, 240 - focal * z / x);
+  }
+  (void)snprintf(
+      text, sizeof text,
+      "t_ns,sensor,id,u0_px,v0_px,u1_px,v1_px,u2_px,v2_px,u3_px,v3_px,sigma_px\n1,front,7%s,0.1\n2,front,7%s,\n"
+      "3,front,7,10,10,10,10,10,10,10,10,\n",
+      row, row);
+  folder_write("marker-corners.csv", text);
+  folder_write("calibration.yaml",
+               "cameras:\n  front: {model: pinhole-radtan, size: [640, 480], intrinsics: [500, 500, 320, 240],\n"
+               "    mounting: {xyz_m: [0, 0, 0.3], rpy_deg: [0, 0, 0]}}\nmarkers: {family: tag36h11, size_m: 0.2}\n");
+  wm_source *corners = source("corners:front");
+  wm_event event = next(corners);
+  const wm_marker sharp = event.as.marker;
+  TEST_ASSERT_EQUAL(WM_EVENT_MARKER, event.kind);
+  TEST_ASSERT_EQUAL(7, sharp.id);
+  for (int i = 0; i < 3; i++) TEST_ASSERT_DOUBLE_WITHIN(0.005, place[i], sharp.p_m[i]);
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, atan2(-cos(askew), sin(askew)), sharp.yaw_rad);
+  TEST_ASSERT_TRUE(sharp.along_sigma_m > 0.001 && sharp.along_sigma_m < 0.05 && sharp.yaw_sigma_rad > 0);
+  TEST_ASSERT_TRUE(next(corners).as.marker.along_sigma_m > 1.5 * sharp.along_sigma_m);
+  at_end(corners);
+  TEST_ASSERT_EQUAL(1, corners->counts.malformed);
+}
+
+static void corners_need_a_camera(void) {
+  folder_write("marker-corners.csv",
+               "t_ns,sensor,id,u0_px,v0_px,u1_px,v1_px,u2_px,v2_px,u3_px,v3_px\n"
+               "1,front,7,1,1,2,1,2,2,1,2\n");
+  TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_recording_open(folder_path("."), NULL, keep_warning, NULL, &recording, &err));
+  TEST_ASSERT_NOT_NULL(strstr(err.text, "'front' is no camera"));
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(motion_exact);
@@ -350,5 +391,7 @@ int main(void) {
   RUN_TEST(points_by_stamp);
   RUN_TEST(too_many_points);
   RUN_TEST(other_streams);
+  RUN_TEST(marker_corners);
+  RUN_TEST(corners_need_a_camera);
   return UNITY_END();
 }
