@@ -25,6 +25,7 @@ wm_script_test(run_silence COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/silence.p
 add_library(slow_disk MODULE slow_disk.c)
 target_link_libraries(slow_disk PRIVATE wm_rules ${CMAKE_DL_LIBS})
 wm_script_test(run_slow_disk COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/slow_disk.py $<TARGET_FILE:slow_disk> LABELS release-only)
+wm_script_test(run_bad_disks COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/bad_disks.py $<TARGET_FILE:slow_disk> LABELS release-only)
 wm_script_test(run_restarts COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/restarts.py 4 LABELS release-only)
 wm_script_test(run_restarts_20 COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/restarts.py 20 LABELS slow release-only)
 wm_script_test(run_disk_full COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/disk_full.py LABELS release-only)

@@ -1,0 +1,126 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""A robot's disk that blocks for 5 s, is full, or becomes read-only, under a run of `slam` with log, saved pose and saved map: no
+pose is missing on LCM, what is lost is counted, and it is reported once. Needs what lcm_tools.py needs, and the right to a mount
+namespace (else 77).
+
+    bad_disks.py LIBRARY        (tests/golden/slow_disk.c, to be preloaded)"""
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+import lcm_tools
+import restarts
+
+DRIVE_S, BLOCK_S = 9, 5
+
+
+def drive(work, subscriber, disk, words=(), environment=None, meanwhile=None):
+    """One drive whose files are in `disk`: what it printed, and its poses by LCM."""
+    (work / "config.yaml").write_text(
+        "format: waymark-config/1\nestimator: slam\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
+        f"realtime: {{lock_memory: false}}\nstart: {{saved_pose: {disk}/pose.yaml, save_every_s: 0.5, saved_map: {disk}/map.bin, "
+        "save_map_every_s: 1}\n")
+    subscriber.poses.clear()
+    subscriber.healths.clear()
+    run = subprocess.Popen([lcm_tools.WAYMARK, "run", "--config", work / "config.yaml", "--recording", work / "rest", "--resume", *words],
+                           stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=dict(os.environ, **(environment or {})))
+    if meanwhile:
+        meanwhile()
+    out, said = run.communicate()
+    time.sleep(0.3)
+    poses = list(subscriber.poses)
+    stamps = [pose.t_ns for _, pose in poses]
+    missing = sum(round((b - a) / 20e6) - 1 for a, b in zip(stamps, stamps[1:]))
+    gap_s = max(b - a for (a, _), (b, _) in zip(poses, poses[1:]))
+    off_m = max(restarts.off_m(pose) for _, pose in poses)
+    return {"code": run.returncode, "said": out + said, "poses": len(poses), "missing": missing, "gap_s": gap_s, "off_m": off_m,
+            "lost": subscriber.healths[-1].outputs_lost}
+
+
+def show(name, run):
+    print(f"{name}: {run['poses']} poses, {run['missing']} ticks without one, largest gap {run['gap_s']:.3f} s, {run['lost']} records lost, "
+          f"{run['off_m']:.3f} m off at most, exit code {run['code']}")
+    for line in run["said"].splitlines():
+        if "disk" in line or "written" in line or "saved" in line:
+            print("   ", line)
+
+
+def small_disk(work, size):
+    disk = work / "disk"
+    disk.mkdir(exist_ok=True)
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", disk], check=True)
+    return disk
+
+
+def inside(library):
+    work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-bad-disks-"))
+    try:
+        subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
+        subprocess.run(lcm_tools.ROUTE, check=True)
+        subprocess.run(["lcm-gen", "-p", "--ppath", work / "types", *sorted((lcm_tools.ROOT / "msgs/lcm").glob("*.lcm"))], check=True)
+        sys.path.insert(0, str(work / "types"))
+        import waymark
+        restarts.write_rest(work / "rest", 0.0, DRIVE_S)
+        subscriber = restarts.Subscriber(waymark)
+        subscriber.start()
+
+        (work / "good").mkdir()
+        good = drive(work, subscriber, work / "good", ["--out", work / "good/run"])
+        show("good", good)
+        assert good["code"] == 0 and good["lost"] == 0
+
+        (work / "slow").mkdir()
+        slow = drive(work, subscriber, work / "slow", ["--out", work / "slow/run"],
+                     {"LD_PRELOAD": library, "WM_BLOCK_FOLDER": str(work / "slow"), "WM_BLOCK_AFTER_S": "2", "WM_BLOCK_S": str(BLOCK_S)})
+        show(f"blocked for {BLOCK_S} s", slow)
+        assert "slow disk: blocked" in slow["said"]
+        assert slow["code"] == 0 and slow["lost"] == 0, "the ring holds so much"
+        assert slow["said"].count("the map was not saved when it was due") == 1, slow["said"]
+        assert restarts.check_files(work / "slow") >= 5
+
+        disk = small_disk(work, "120k")
+        full = drive(work, subscriber, disk, ["--out", disk / "run"])
+        show("full", full)
+        assert full["code"] == 1 and "No space left" in full["said"] and full["said"].count("the next start will not") <= 2
+        subprocess.run(["umount", disk], check=True)
+
+        disk = small_disk(work, "4m")
+        def make_read_only():
+            time.sleep(4)
+            for _ in range(100):
+                if subprocess.run(["mount", "-o", "remount,ro", disk], capture_output=True).returncode == 0:
+                    return
+                time.sleep(0.01)
+            raise RuntimeError("the disk could not be made read-only")
+        read_only = drive(work, subscriber, disk, meanwhile=make_read_only)
+        show("read-only", read_only)
+        assert read_only["said"].count("Read-only file system") == 2, read_only["said"]  # pose and map, once each
+        restarts.check_files(disk)
+        subprocess.run(["umount", disk], check=True)
+
+        for name, run in (("slow", slow), ("full", full), ("read-only", read_only)):
+            # A busy computer delays a pose as well without it.
+            assert run["missing"] <= good["missing"] + 10 and run["poses"] > 0.9 * good["poses"], f"{name}: poses are missing"
+            assert run["gap_s"] < BLOCK_S / 2, f"{name}: the disk held poses up"
+            assert run["off_m"] < restarts.RIGHT_M
+    finally:
+        subprocess.run(["umount", work / "disk"], capture_output=True)
+        shutil.rmtree(work)
+
+
+def main():
+    if len(sys.argv) > 2 and sys.argv[2] == "inside":
+        return inside(sys.argv[1])
+    python = lcm_tools.need_network()
+    if subprocess.run(["unshare", "-m", "true"], capture_output=True).returncode:
+        lcm_tools.skip("no right to a mount namespace")
+    return subprocess.run(["unshare", "-n", "-m", python, __file__, sys.argv[1], "inside"]).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())
