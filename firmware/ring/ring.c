@@ -26,15 +26,15 @@ static uint8_t *slot(const wm_ring *self, uint64_t position) {
   return self->slots + (position & self->mask) * self->slot_bytes;
 }
 
-void *wm_ring_reserve(wm_ring *self) {
+void *wm_ring_reserve(wm_ring *self, size_t bytes) {
   uint64_t head = atomic_load_explicit(&self->head, memory_order_relaxed);  // ours
   if (head - self->tail_seen > self->mask) {
     // Acquire: the consumer is done with the slot before we write into it.
     self->tail_seen = atomic_load_explicit(&self->tail, memory_order_acquire);
-    if (head - self->tail_seen > self->mask) {
-      atomic_fetch_add_explicit(&self->dropped, 1, memory_order_relaxed);
-      return NULL;
-    }
+  }
+  if (head - self->tail_seen > self->mask || bytes > self->slot_bytes) {
+    atomic_fetch_add_explicit(&self->dropped, 1, memory_order_relaxed);
+    return NULL;
   }
   return slot(self, head);
 }

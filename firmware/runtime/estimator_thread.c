@@ -12,8 +12,7 @@
 // ── its output goes into rings ────────────────────────────────────────────────────────────────────────────────────
 
 static int push(wm_ring *ring, uint64_t kind, const void *record, size_t bytes) {
-  if (OUTPUT_RECORD_HEAD + bytes > ring->slot_bytes) return 0;  // never: see wm_output_bytes, PUBLISH_RECORD_BYTES
-  output_record *slot = wm_ring_reserve(ring);
+  output_record *slot = wm_ring_reserve(ring, OUTPUT_RECORD_HEAD + bytes);
   if (!slot) return 0;
   slot->kind = kind;
   memcpy(&slot->as, record, bytes);
@@ -85,7 +84,7 @@ static void report_health(live *run, wm_time_ns now_ns) {
   live_estimator *self = &run->estimator;
   if (now_ns < self->next_health_ns) return;
   while (self->next_health_ns <= now_ns) self->next_health_ns += HEALTH_EVERY_NS;
-  health_record *record = wm_ring_reserve(&self->healths);
+  health_record *record = wm_ring_reserve(&self->healths, sizeof *record);
   if (!record) return;
   wm_health *health = &record->health;
   record->watermark_ns = wm_merge_watermark(self->pipeline.merge);
@@ -101,7 +100,7 @@ static void keep_map(live *run, wm_time_ns now_ns) {
   live_estimator *self = &run->estimator;
   if (!self->maps_memory || now_ns < self->next_map_ns) return;
   self->next_map_ns = now_ns + wm_ns_from_seconds(run->config->runtime.start_save_map_every_s);
-  kept_map *slot = wm_ring_reserve(&self->maps);
+  kept_map *slot = wm_ring_reserve(&self->maps, sizeof *slot);
   if (!slot) return;  // the disk has not taken the one before; the ring counts it
   wm_time_ns begin_ns = wm_monotonic_ns();
   slot->bytes = wm_pipeline_keep(&self->pipeline, slot->image, self->maps.slot_bytes - sizeof *slot);

@@ -13,7 +13,7 @@
 
 void live_say_later(void *context, const char *line) {
   live *run = context;
-  char *slot = wm_ring_reserve(&run->publish.lines);
+  char *slot = wm_ring_reserve(&run->publish.lines, LINE_BYTES);
   if (!slot) return;  // 16 lines wait for a disk that is blocked; the ring counts those that find no room
   (void)snprintf(slot, LINE_BYTES, "%s", line);
   wm_ring_commit(&run->publish.lines);

@@ -20,7 +20,7 @@ static int wait_until(const live *run, wm_time_ns monotonic_ns) {
 
 static void put(live_source *self) {
   const wm_event *event = &self->feed->next;
-  void *slot = wm_ring_reserve(&self->ring);
+  void *slot = wm_ring_reserve(&self->ring, wm_event_bytes(event));
   if (!slot) return;  // counted by the ring
   memcpy(slot, event, wm_event_bytes(event));
   wm_ring_commit(&self->ring);

@@ -8,6 +8,7 @@
 #include <stdint.h>
 
 #include "waymark/pose.h"
+#include "waymark/realtime.h"
 
 #define NEWEST_POSE_WORDS (sizeof(wm_estimate) / sizeof(uint64_t))
 _Static_assert(sizeof(wm_estimate) % sizeof(uint64_t) == 0, "a pose is whole words");
@@ -17,7 +18,7 @@ typedef struct newest_pose {
   _Atomic uint64_t word[NEWEST_POSE_WORDS];
 } newest_pose;
 
-void newest_pose_put(newest_pose *self, const wm_estimate *pose);
+WM_REALTIME void newest_pose_put(newest_pose *self, const wm_estimate *pose);
 // 0 where there is none yet.
 int newest_pose_get(newest_pose *self, wm_estimate *out);
 

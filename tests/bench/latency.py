@@ -87,13 +87,14 @@ def drive(work, recording, config, observed, loaded):
     """One drive; {stage: quantiles in ms}, deadlines missed and in all."""
     out = work / f"{recording.name}-{'loaded' if loaded else 'idle'}"
     robot = work / "run.yaml"
-    robot.write_text(config.read_text() + f"\npublish: {{lcm_url: '{URL}'}}\n")
+    # As a robot has it: a log, and the pose saved once a second. (A played recording has no black box.)
+    robot.write_text(config.read_text() + f"\npublish: {{lcm_url: '{URL}'}}\nstart: {{saved_pose: {out.name}-pose.yaml}}\n")
     log = work / f"{out.name}.lcm"
     logger = subprocess.Popen(["lcm-logger", "-q", "-f", f"--lcm-url={URL}", log], stderr=subprocess.DEVNULL)
     load = stress(SECONDS + 20) if loaded else None
     time.sleep(1)
     judge = cyclictest(work / "cyclictest.json", SECONDS)
-    subprocess.run([BUILD / "bin/waymark", "run", "--config", robot, "--recording", recording, "--out", out], check=True,
+    subprocess.run([BUILD / "bin/waymark", "run", "--config", robot, "--recording", recording, "--resume", "--out", out], check=True,
                    capture_output=True)
     judge.wait()
     if load:

@@ -9,6 +9,8 @@ wm_script_test(run_service_net COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/servi
 wm_script_test(run_doctor COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/doctor.sh $<TARGET_FILE:waymark> ${CMAKE_SOURCE_DIR}/config/etc)
 wm_script_test(run_command_line COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/cli.sh)
 wm_script_test(run_lcm_tools COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_tools.py LABELS release-only)
+wm_script_test(run_realtime_calls COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/realtime_calls.py ${CMAKE_BINARY_DIR} ${CMAKE_OBJDUMP}
+  LABELS release-only desk)
 wm_script_test(run_system_calls COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/system_calls.py LABELS release-only)
 wm_script_test(run_recordings COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/recordings.py LABELS release-only)
 wm_script_test(run_live_minute COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/recordings.py live LABELS slow release-only)

@@ -7,6 +7,7 @@
 
 #include "waymark/motion.h"
 #include "waymark/pose.h"
+#include "waymark/realtime.h"
 
 typedef struct wm_budget {
   double limit_m;  // one sigma of position
@@ -22,9 +23,9 @@ typedef struct wm_budget {
 
 void wm_budget_init(wm_budget *self, double limit_m);
 // Once in a while (a second), with the pose and the odometry of the same time. Constant cost.
-void wm_budget_take(wm_budget *self, const wm_estimate *now, const wm_odom_point *odom);
+WM_REALTIME void wm_budget_take(wm_budget *self, const wm_estimate *now, const wm_odom_point *odom);
 // Metres, and seconds at the present speed; infinite where nothing grows or the robot stands; 0 where the limit is
 // passed.
-void wm_budget_left(const wm_budget *self, const wm_estimate *now, double *way_m, double *time_s);
+WM_REALTIME void wm_budget_left(const wm_budget *self, const wm_estimate *now, double *way_m, double *time_s);
 
 #endif

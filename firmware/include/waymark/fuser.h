@@ -13,6 +13,7 @@
 #include "waymark/health.h"
 #include "waymark/histogram.h"
 #include "waymark/output.h"
+#include "waymark/realtime.h"
 #include "waymark/source.h"
 
 // Which motion events make a row of the trajectory: ticks, else yaw rate, else speed, else twists.
@@ -51,13 +52,13 @@ typedef struct wm_fuser {
 // `state` is made by estimator->init already.
 void wm_fuser_init(wm_fuser *self, const wm_estimator *estimator, void *state, wm_driving driving, wm_output output);
 // The next event in the order of the merge; event->source < WM_SOURCES_MAX.
-void wm_fuser_feed(wm_fuser *self, const wm_event *event);
+WM_REALTIME void wm_fuser_feed(wm_fuser *self, const wm_event *event);
 // After the last event: writes the pose that waits.
-void wm_fuser_finish(wm_fuser *self);
+WM_REALTIME void wm_fuser_finish(wm_fuser *self);
 // What the estimator reports of itself: state, lost probability, resets, motion health, calibration states and
 // counters; at most as many as `out` has room for. The rest of `out` is left alone.
-void wm_fuser_health(const wm_fuser *self, wm_health *out);
+WM_REALTIME void wm_fuser_health(const wm_fuser *self, wm_health *out);
 // Whether an estimate holds a pose at all (finite, not searching).
-int wm_estimate_has_pose(const wm_estimate *estimate);
+WM_REALTIME int wm_estimate_has_pose(const wm_estimate *estimate);
 
 #endif

@@ -6,6 +6,7 @@
 
 #include <stdint.h>
 
+#include "waymark/realtime.h"
 #include "waymark/time.h"
 
 #define WM_HISTOGRAM_BINS 640  // up to 2^43 ns
@@ -17,7 +18,7 @@ typedef struct wm_histogram {
 } wm_histogram;
 
 // Negative durations count as 0. Constant time.
-void wm_histogram_add(wm_histogram *self, wm_time_ns duration_ns);
+WM_REALTIME void wm_histogram_add(wm_histogram *self, wm_time_ns duration_ns);
 // Adds all of `other`.
 void wm_histogram_merge(wm_histogram *self, const wm_histogram *other);
 // Upper edge of the bin in which the quantile (0 to 1) lies, at most the maximum; 0 where nothing was added.

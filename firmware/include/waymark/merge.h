@@ -18,6 +18,7 @@
 #include <stdint.h>
 
 #include "waymark/event.h"
+#include "waymark/realtime.h"
 #include "waymark/status.h"
 #include "waymark/time.h"
 
@@ -60,25 +61,25 @@ wm_merge *wm_merge_init(void *memory, const wm_merge_source *sources, size_t sou
                         size_t slot_bytes, wm_time_ns horizon_ns);
 
 // An event that arrived (event->source is an index into the sources given at init; arrival_ns is set).
-wm_merge_verdict wm_merge_push(wm_merge *self, const wm_event *event);
+WM_REALTIME wm_merge_verdict wm_merge_push(wm_merge *self, const wm_event *event);
 // The arrival clock is at `now_ns`; never goes back.
-void wm_merge_advance(wm_merge *self, wm_time_ns now_ns);
+WM_REALTIME void wm_merge_advance(wm_merge *self, wm_time_ns now_ns);
 // No source will speak again: all that waits is final.
-void wm_merge_flush(wm_merge *self);
+WM_REALTIME void wm_merge_flush(wm_merge *self);
 // The next final event, or NULL; valid until the pop.
-const wm_event *wm_merge_front(wm_merge *self);
-void wm_merge_pop(wm_merge *self);
+WM_REALTIME const wm_event *wm_merge_front(wm_merge *self);
+WM_REALTIME void wm_merge_pop(wm_merge *self);
 
 // Everything before this stamp is final. WM_TIME_NONE before the first advance.
-wm_time_ns wm_merge_watermark(const wm_merge *self);
+WM_REALTIME wm_time_ns wm_merge_watermark(const wm_merge *self);
 size_t wm_merge_waiting(const wm_merge *self);
 size_t wm_merge_waiting_of(const wm_merge *self, size_t source);
-const wm_merge_counts *wm_merge_source_counts(const wm_merge *self, size_t source);
+WM_REALTIME const wm_merge_counts *wm_merge_source_counts(const wm_merge *self, size_t source);
 // Lateness (arrival minus stamp) that 99 of 100 data keep below, rounded up to a millisecond. 0 before the first.
-wm_time_ns wm_merge_lateness_p99(const wm_merge *self, size_t source);
+WM_REALTIME wm_time_ns wm_merge_lateness_p99(const wm_merge *self, size_t source);
 // On the arrival clock since its last datum, or since the start where it never spoke.
-wm_time_ns wm_merge_silent_ns(const wm_merge *self, size_t source, wm_time_ns now_ns);
+WM_REALTIME wm_time_ns wm_merge_silent_ns(const wm_merge *self, size_t source, wm_time_ns now_ns);
 // Silent for longer than a second and than ten times its mean period. A message, not a rule of the merge.
-int wm_merge_is_stale(const wm_merge *self, size_t source, wm_time_ns now_ns);
+WM_REALTIME int wm_merge_is_stale(const wm_merge *self, size_t source, wm_time_ns now_ns);
 
 #endif

@@ -19,6 +19,7 @@
 #include "waymark/merge.h"
 #include "waymark/output.h"
 #include "waymark/predictor.h"
+#include "waymark/realtime.h"
 
 #define WM_PIPELINE_NEEDS 3
 
@@ -42,17 +43,17 @@ wm_status wm_pipeline_start(wm_pipeline *self, wm_output output, wm_error *err);
 // A map of a run before (waymark/keeper.h), which `why_not` let pass: after the start, before the first event.
 void wm_pipeline_take_kept(wm_pipeline *self, const void *image, size_t bytes);
 // What is to be kept now, into `out`: its bytes; 0 where the estimator keeps nothing or the pose is in doubt.
-size_t wm_pipeline_keep(const wm_pipeline *self, void *out, size_t capacity);
+WM_REALTIME size_t wm_pipeline_keep(const wm_pipeline *self, void *out, size_t capacity);
 
-void wm_pipeline_arrive(wm_pipeline *self, const wm_event *event);
-void wm_pipeline_advance(wm_pipeline *self, wm_time_ns now_ns);
+WM_REALTIME void wm_pipeline_arrive(wm_pipeline *self, const wm_event *event);
+WM_REALTIME void wm_pipeline_advance(wm_pipeline *self, wm_time_ns now_ns);
 // The pose of `now_ns` into *out, not yet sent. 0 where there is none to tell.
-int wm_pipeline_publish(wm_pipeline *self, wm_time_ns now_ns, wm_published *out);
+WM_REALTIME int wm_pipeline_publish(wm_pipeline *self, wm_time_ns now_ns, wm_published *out);
 // What the pictures of `now_ns` are looked at with (wm_predictor_expect). 0 where nothing is known.
-int wm_pipeline_expect(const wm_pipeline *self, wm_time_ns now_ns, wm_estimate *out);
-void wm_pipeline_finish(wm_pipeline *self);
+WM_REALTIME int wm_pipeline_expect(const wm_pipeline *self, wm_time_ns now_ns, wm_estimate *out);
+WM_REALTIME void wm_pipeline_finish(wm_pipeline *self);
 
 // Fills all but what sources and loop count themselves. Not cheap (tens of us): once a second.
-void wm_pipeline_health(wm_pipeline *self, wm_time_ns now_ns, wm_health *out);
+WM_REALTIME void wm_pipeline_health(wm_pipeline *self, wm_time_ns now_ns, wm_health *out);
 
 #endif

@@ -7,6 +7,7 @@
 #include "waymark/estimator.h"
 #include "waymark/motion.h"
 #include "waymark/pose.h"
+#include "waymark/realtime.h"
 
 typedef struct wm_predictor_params {
   double jump_m, jump_rad;  // map against odom: larger moves between two messages are announced
@@ -29,13 +30,14 @@ typedef struct wm_predictor {
 // `odometry` is initialised and outlives the predictor.
 void wm_predictor_init(wm_predictor *self, const wm_predictor_params *params, wm_odometry *odometry);
 // A motion event arrived.
-void wm_predictor_motion(wm_predictor *self, const wm_event *event);
+WM_REALTIME void wm_predictor_motion(wm_predictor *self, const wm_event *event);
 // The estimator is at a new fused pose and knows this of the motion sensors.
-void wm_predictor_fused(wm_predictor *self, const wm_estimate *fused, const wm_motion_calibration *calibration);
+WM_REALTIME void wm_predictor_fused(wm_predictor *self, const wm_estimate *fused,
+                                    const wm_motion_calibration *calibration);
 // The pose at `now_ns`. 0 where there is none to tell: searching, no motion yet, or now_ns not after the last one.
-int wm_predictor_publish(wm_predictor *self, wm_time_ns now_ns, wm_published *out);
+WM_REALTIME int wm_predictor_publish(wm_predictor *self, wm_time_ns now_ns, wm_published *out);
 // What the pictures of `now_ns` are looked at with: the pose, or while there is none (searching) how the robot moves.
 // 0 where nothing is known: no motion yet.
-int wm_predictor_expect(const wm_predictor *self, wm_time_ns now_ns, wm_estimate *out);
+WM_REALTIME int wm_predictor_expect(const wm_predictor *self, wm_time_ns now_ns, wm_estimate *out);
 
 #endif

@@ -9,6 +9,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "waymark/realtime.h"
+
 #define WM_CACHE_LINE 64
 
 typedef struct wm_ring {
@@ -25,22 +27,23 @@ typedef struct wm_ring {
   uint64_t head_seen;
 } wm_ring;
 
-// Slots that `slots` is rounded up to: a power of two, at least 2.
+// Slots that `slots` is rounded up to: a power of two, at least 1.
 size_t wm_ring_slots(size_t slots);
 // Bytes of memory for that many slots of `slot_bytes` each (each rounded up to 8).
 size_t wm_ring_bytes(size_t slots, size_t slot_bytes);
 // `memory` is 8-byte aligned, wm_ring_bytes long and outlives the ring. Before the threads start.
 void wm_ring_init(wm_ring *self, void *memory, size_t slots, size_t slot_bytes);
 
-// Producer. The next free slot to write into, or NULL when the ring is full (counted). Then commit it. Constant time.
-void *wm_ring_reserve(wm_ring *self);
-void wm_ring_commit(wm_ring *self);
+// Producer. The next free slot, for a record of so many bytes; NULL when the ring is full or a slot has no room for it
+// (both counted). Then commit it. Constant time.
+WM_REALTIME void *wm_ring_reserve(wm_ring *self, size_t bytes);
+WM_REALTIME void wm_ring_commit(wm_ring *self);
 
 // Consumer. The oldest record, or NULL when there is none; then pop it. Constant time.
-const void *wm_ring_front(wm_ring *self);
-void wm_ring_pop(wm_ring *self);
+WM_REALTIME const void *wm_ring_front(wm_ring *self);
+WM_REALTIME void wm_ring_pop(wm_ring *self);
 
 // Records that found no place. Any thread.
-uint64_t wm_ring_dropped(const wm_ring *self);
+WM_REALTIME uint64_t wm_ring_dropped(const wm_ring *self);
 
 #endif

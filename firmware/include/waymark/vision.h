@@ -18,6 +18,7 @@
 #include "waymark/histogram.h"
 #include "waymark/look.h"
 #include "waymark/pose.h"
+#include "waymark/realtime.h"
 #include "waymark/recording.h"
 #include "waymark/source.h"
 
@@ -48,7 +49,7 @@ void wm_vision_look_only_at(wm_vision *self, size_t i, wm_seen *seen, size_t cou
 size_t wm_vision_needs(wm_vision *self, wm_arena_need *needs);
 // The newest pose (searching: how the robot moves), for detectors that it guides. By one thread, from start on; never
 // waits. `self` may be NULL.
-void wm_vision_tell(wm_vision *self, const wm_estimate *newest);
+WM_REALTIME void wm_vision_tell(wm_vision *self, const wm_estimate *newest);
 // With the memory in place: makes the detectors' tables. Takes a while.
 wm_status wm_vision_start(wm_vision *self, wm_error *err);
 // From here on a thread a source works ahead of who asks for its events. Not for a run. A guided detector needs the

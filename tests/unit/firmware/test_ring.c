@@ -18,7 +18,7 @@ static _Alignas(64) uint8_t memory[1 << 16];
 static wm_ring ring;
 
 static int push(uint64_t number) {
-  record *slot = wm_ring_reserve(&ring);
+  record *slot = wm_ring_reserve(&ring, sizeof(record));
   if (!slot) return 0;
   slot->number = number;
   for (int i = 0; i < 7; i++) slot->copies[i] = number * 3;
@@ -62,6 +62,14 @@ static void a_ring_of_one_slot_holds_one_record(void) {
   wm_ring_pop(&ring);
   TEST_ASSERT_TRUE(push(4));
   TEST_ASSERT_EQUAL_UINT64(2, wm_ring_dropped(&ring));
+}
+
+static void a_record_larger_than_a_slot_finds_no_place(void) {
+  static uint8_t few[64];
+  wm_ring_init(&ring, few, 2, sizeof(record));
+  TEST_ASSERT_NULL(wm_ring_reserve(&ring, ring.slot_bytes + 1));
+  TEST_ASSERT_EQUAL_UINT64(1, wm_ring_dropped(&ring));
+  TEST_ASSERT_TRUE(push(1));
 }
 
 static void slots_are_a_power_of_two(void) {
@@ -111,6 +119,7 @@ int main(void) {
   RUN_TEST(it_hands_out_in_order_and_then_nothing);
   RUN_TEST(when_full_the_newest_is_dropped_and_counted);
   RUN_TEST(a_ring_of_one_slot_holds_one_record);
+  RUN_TEST(a_record_larger_than_a_slot_finds_no_place);
   RUN_TEST(slots_are_a_power_of_two);
   RUN_TEST(two_threads_lose_nothing_and_see_whole_records);
   return UNITY_END();
