@@ -106,7 +106,7 @@ static int find_node(camera_identity *wanted, uint32_t *type) {
 
 static int open_camera(void *context, camera_identity *wanted, void **camera) {
   (void)context;
-  uint32_t type;
+  uint32_t type = 0;
   int fd = find_node(wanted, &type);
   if (fd < 0) return fd;
   v4l2_camera *self = calloc(1, sizeof *self);

@@ -22,6 +22,8 @@ typedef struct can_stream {
   uint32_t seq;
   log_frame frame, ahead;
   int has_ahead;  // `ahead` was read, but not yet handed on
+  can_buses buses;
+  size_t bus;  // which of them this is
 } can_stream;
 
 static void keep_problem(can_stream *self, long line, const char *why) {
@@ -29,7 +31,16 @@ static void keep_problem(can_stream *self, long line, const char *why) {
   if (!first[0]) snprintf(first, sizeof self->base.counts.first_problem, "%s:%ld: %s", self->lines.path, line, why);
 }
 
-// The next frame of the log; lines that aren't one are counted.
+// Where a log has several buses, each stream takes its own frames; the first one counts what is nobody's.
+static int is_mine(can_stream *self, const char *interface) {
+  size_t i = 0;
+  if (self->buses.count == 0) return 1;
+  while (i < self->buses.count && strcmp(self->buses.bus[i].interface, interface) != 0) i++;
+  self->base.counts.ignored += i == self->buses.count && self->bus == 0;
+  return i == self->bus;
+}
+
+// The next frame of the log; lines that aren't one are counted, once.
 static wm_status read_frame(can_stream *self, log_frame *out, wm_error *err) {
   for (;;) {
     const char *text;
@@ -41,8 +52,8 @@ static wm_status read_frame(can_stream *self, log_frame *out, wm_error *err) {
     out->line = self->lines.number;
     status = too_long ? wm_fail(&why, WM_BAD_DATA, "the line is longer than %d bytes", LINES_BUFFER_BYTES)
                       : wm_candump_parse(text, length, &out->can, &why);
-    if (status == WM_OK) return WM_OK;
-    if (status == WM_AGAIN) continue;
+    if (status == WM_OK && is_mine(self, out->can.iface)) return WM_OK;
+    if (status == WM_OK || status == WM_AGAIN || self->bus > 0) continue;
     self->base.counts.malformed++;
     keep_problem(self, out->line, why.text);
   }
@@ -99,8 +110,9 @@ static void close_can(wm_source *base) {
 
 static const wm_source_ops kCan = {next_quantities, close_can};
 
-wm_status can_stream_open(const char *log, const char *dbc, const char *signals, wm_source **out, uint32_t *quantities,
+wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, wm_source **out, uint32_t *quantities,
                           wm_error *err) {
+  const can_bus *is = &buses->bus[bus];
   *out = NULL;
   can_stream *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "%s: no memory to read it", log);
@@ -109,8 +121,11 @@ wm_status can_stream_open(const char *log, const char *dbc, const char *signals,
   self->base.in_order = 1;
   self->base.kinds = WM_EVENT_BIT(WM_EVENT_QUANTITIES);
   self->lines.fd = -1;
-  snprintf(self->base.name, sizeof self->base.name, "can");
-  wm_status status = wm_can_decoder_load(dbc, signals, &self->decoder, err);
+  self->buses = *buses;
+  self->bus = bus;
+  snprintf(self->base.name, sizeof self->base.name, "can%s%s", buses->count > 1 ? ":" : "",
+           buses->count > 1 ? is->interface : "");
+  wm_status status = wm_can_decoder_load(is->dbc, is->signals, &self->decoder, err);
   if (status == WM_OK) status = lines_open(&self->lines, log, err);
   if (status != WM_OK) {
     close_can(&self->base);

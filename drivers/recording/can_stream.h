@@ -1,12 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
-// can.log as a source of quantities.
+// can.log as sources of events: one for each bus that recording.yaml names under `can`, or one for all frames.
 #ifndef WM_RECORDING_CAN_STREAM_H
 #define WM_RECORDING_CAN_STREAM_H
 
+#include "waymark/can.h"
+#include "waymark/devices.h"
 #include "waymark/source.h"
 
-// Reads the DBC and the binding, opens the log. *quantities: bit per wm_quantity that is bound.
-wm_status can_stream_open(const char *log, const char *dbc, const char *signals, wm_source **out, uint32_t *quantities,
+typedef struct can_bus {
+  char interface[WM_CAN_IFACE_MAX];  // as the log's lines name it
+  char dbc[WM_PATH_MAX], signals[WM_PATH_MAX];
+} can_bus;
+
+typedef struct can_buses {
+  size_t count;  // 0: one decoder, bus[0], for the frames of all interfaces
+  can_bus bus[WM_CAN_DEVICES_MAX];
+} can_buses;
+
+// `can:` of recording.yaml, a list of {interface, dbc, signals}; files are in `dir`. Nothing where it isn't there.
+wm_status can_buses_read(const wm_yaml_node *list, const char *dir, can_buses *out, wm_error *err);
+
+// The stream of one of the buses. *quantities: bit per wm_quantity that it can give.
+wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, wm_source **out, uint32_t *quantities,
                           wm_error *err);
 
 #endif

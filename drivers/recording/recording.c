@@ -267,31 +267,62 @@ static wm_status add_sensor_streams(wm_recording *self, const stream_kind *kind,
   return status;
 }
 
+// The buses of recording.yaml, or one for all. A configuration's DBC and binding take the place of the recording's
+// where there is one bus; several have files of their own.
+static wm_status find_buses(const wm_recording *self, can_buses *out, wm_error *err) {
+  int there;
+  wm_yaml_node root = wm_yaml_root(self->about), list = wm_yaml_get(&root, "can");
+  wm_status status = can_buses_read(&list, self->dir, out, err);
+  if (status == WM_OK && out->count > 1 && (self->overrides.dbc[0] || self->overrides.can_signals[0]))
+    warn_line(&self->warn,
+              "%s: has %zu CAN buses with files of their own; the configuration's dbc and can_signals are "
+              "not taken",
+              self->dir, out->count);
+  if (status != WM_OK || out->count > 1) return status;
+  can_bus *bus = &out->bus[0];
+  if (out->count == 0 || self->overrides.dbc[0])
+    status = choose(self, self->overrides.dbc, "vehicle.dbc", bus->dbc, &there, err);
+  if (status == WM_OK && (out->count == 0 || self->overrides.can_signals[0]))
+    status = choose(self, self->overrides.can_signals, "can-signals.yaml", bus->signals, &there, err);
+  return status;
+}
+
+// The recording's first file that isn't there; NULL: all are.
+static const char *missing_of(const wm_recording *self, const can_buses *buses) {
+  for (size_t i = 0; i == 0 || i < buses->count; i++) {
+    const char *dbc = buses->bus[i].dbc, *signals = buses->bus[i].signals;
+    if (strcmp(dbc, self->overrides.dbc) != 0 && access(dbc, F_OK) != 0) return dbc;
+    if (strcmp(signals, self->overrides.can_signals) != 0 && access(signals, F_OK) != 0) return signals;
+  }
+  return NULL;
+}
+
 static wm_status add_can(wm_recording *self, wm_error *err) {
-  char log[WM_PATH_MAX], dbc[WM_PATH_MAX], signals[WM_PATH_MAX], motion[WM_PATH_MAX];
-  int have_log, have_dbc, have_signals, have_motion = 0;
+  char log[WM_PATH_MAX], motion[WM_PATH_MAX];
+  int have_log, have_motion = 0;
+  can_buses buses;
   wm_status status = find_stream(self, "can.log", log, &have_log, err);
   if (status != WM_OK || !have_log) return status;
-  status = choose(self, self->overrides.dbc, "vehicle.dbc", dbc, &have_dbc, err);
-  if (status == WM_OK)
-    status = choose(self, self->overrides.can_signals, "can-signals.yaml", signals, &have_signals, err);
+  status = find_buses(self, &buses, err);
   const stream_kind *const others[] = {&kStreamMotion, &kStreamMotion6, &kStreamIncrements};
   for (size_t i = 0; status == WM_OK && !have_motion && i < sizeof others / sizeof others[0]; i++)
     status = choose(self, "", stream_file(others[i]), motion, &have_motion, err);
   if (status != WM_OK) return status;
-  if (!have_dbc || !have_signals) {
-    const char *missing = have_dbc ? signals : dbc;
-    if (!have_motion)
-      return wm_fail(err, WM_NOT_FOUND,
-                     "%s: is not there, but needed to read can.log; name one in the configuration or put "
-                     "it into the folder",
-                     missing);
-    warn_line(&self->warn, "%s: is not there; can.log is not read", missing);
-    return WM_OK;
+  const char *missing = missing_of(self, &buses);
+  if (missing && !have_motion)
+    return wm_fail(err, WM_NOT_FOUND,
+                   "%s: is not there, but needed to read can.log; name one in the configuration or put "
+                   "it into the folder",
+                   missing);
+  if (missing) warn_line(&self->warn, "%s: is not there; can.log is not read", missing);
+  for (size_t i = 0; !missing && status == WM_OK && (i == 0 || i < buses.count); i++) {
+    wm_source *source;
+    uint32_t quantities = 0;
+    status = can_stream_open(log, &buses, i, &source, &quantities, err);
+    self->quantities |= quantities;
+    if (status == WM_OK) status = add_source(self, source, err);
   }
-  wm_source *source;
-  status = can_stream_open(log, dbc, signals, &source, &self->quantities, err);
-  return status == WM_OK ? add_source(self, source, err) : status;
+  return status;
 }
 
 static wm_status add_sources(wm_recording *self, wm_error *err) {

@@ -18,6 +18,7 @@
 #include "waymark/clock.h"
 #include "waymark/robot.h"
 #include "waymark/text.h"
+#include "waymark/yaml.h"
 
 #define LOOK_EVERY_MS 100
 #define SYNC_EVERY_NS WM_NS_PER_S
@@ -158,41 +159,78 @@ static wm_status copy_file(recorder *self, const char *from, const char *name, w
   return status;
 }
 
-// The name that a file of the robot has in the recording, where this line of the configuration names one.
-static const char *own_name(const char *line) {
-  static const char *const kNames[][2] = {{"calibration:", "calibration.yaml"},
-                                          {"landmarks:", "landmarks.csv"},
-                                          {"map:", "map/map.yaml"},
-                                          {"dbc:", "vehicle.dbc"},
-                                          {"can_signals:", "can-signals.yaml"}};
-  for (size_t i = 0; i < sizeof kNames / sizeof kNames[0]; i++)
-    if (strncmp(line, kNames[i][0], strlen(kNames[i][0])) == 0) return kNames[i][1];
-  return NULL;
+typedef struct bus_files {
+  char dbc[WM_CAN_IFACE_MAX + 20], signals[WM_CAN_IFACE_MAX + 20];
+} bus_files;
+
+// The first bus has the names that a recording of one bus has.
+static bus_files files_of(const wm_config *config, size_t bus) {
+  bus_files out;
+  const char *interface = config->devices.can[bus].interface;
+  (void)snprintf(out.dbc, sizeof out.dbc, "%s.dbc", bus ? interface : "vehicle");
+  (void)snprintf(out.signals, sizeof out.signals, "%s-signals.yaml", bus ? interface : "can");
+  return out;
+}
+
+#define CHANGES_MAX (5 + 2 * WM_CAN_DEVICES_MAX)
+
+// Files by their names in the recording.
+static size_t changes_of(const wm_config *config, const wm_yaml *doc, bus_files buses[WM_CAN_DEVICES_MAX],
+                         wm_yaml_change out[CHANGES_MAX]) {
+  const struct {
+    const char *key, *name;
+  } files[] = {{"calibration", "calibration.yaml"},
+               {"landmarks", "landmarks.csv"},
+               {"map", "map/map.yaml"},
+               {"dbc", config->devices.can_count > 1 ? NULL : "vehicle.dbc"},
+               {"can_signals", config->devices.can_count > 1 ? NULL : "can-signals.yaml"}};
+  wm_yaml_node root = wm_yaml_root(doc);
+  size_t count = 0;
+  for (size_t i = 0; i < sizeof files / sizeof files[0]; i++) {
+    wm_yaml_node named = wm_yaml_get(&root, files[i].key);
+    if (!wm_yaml_there(&named)) continue;
+    (void)snprintf(out[count].path, sizeof out[count].path, "%s", files[i].key);
+    out[count++].text = files[i].name;
+  }
+  for (size_t i = 0; i < config->devices.can_count; i++) {
+    buses[i] = files_of(config, i);
+    (void)snprintf(out[count].path, sizeof out[count].path, "devices.can[%zu].dbc", i);
+    out[count++].text = buses[i].dbc;
+    (void)snprintf(out[count].path, sizeof out[count].path, "devices.can[%zu].can_signals", i);
+    out[count++].text = buses[i].signals;
+  }
+  return count;
 }
 
 // The configuration, with the recording's own files: it replays wherever it is taken to.
 static wm_status write_config(recorder *self, wm_error *err) {
-  const char *line = self->config->text;
+  const wm_config *config = self->config;
+  wm_yaml_change changes[CHANGES_MAX];
+  bus_files buses[WM_CAN_DEVICES_MAX];
+  wm_yaml *doc;
   char *text = NULL;
   size_t length = 0;
+  wm_status status = wm_yaml_parse(config->text, config->text_length, config->path, &doc, err);
+  if (status != WM_OK) return status;
   FILE *f = open_memstream(&text, &length);
-  if (!f) return wm_fail(err, WM_IO, "%s: no memory for the configuration", self->options->out_dir);
-  for (size_t left = self->config->text_length; left > 0;) {
-    const char *end = memchr(line, '\n', left);
-    size_t bytes = end ? (size_t)(end - line) + 1 : left;
-    const char *name = own_name(line);
-    if (name) {
-      (void)fprintf(f, "%.*s %s\n", (int)strcspn(line, ":") + 1, line, name);
-    } else {
-      (void)fwrite(line, 1, bytes, f);
-    }
-    line += bytes;
-    left -= bytes;
-  }
-  wm_status status = fclose(f) == 0
-                         ? write_text(self, "config.yaml", text, length, err)
-                         : wm_fail(err, WM_IO, "%s: no memory for the configuration", self->options->out_dir);
+  if (!f) status = wm_fail(err, WM_IO, "%s: no memory for the configuration", self->options->out_dir);
+  if (f) status = wm_yaml_write(doc, changes, changes_of(config, doc, buses, changes), f, err);
+  if (f && fclose(f) != 0 && status == WM_OK)
+    status = wm_fail(err, WM_IO, "%s: no memory for the configuration", self->options->out_dir);
+  if (status == WM_OK) status = write_text(self, "config.yaml", text, length, err);
   free(text);
+  wm_yaml_free(doc);
+  return status;
+}
+
+static wm_status copy_buses(recorder *self, wm_error *err) {
+  const wm_devices_config *devices = &self->config->devices;
+  wm_status status = WM_OK;
+  for (size_t i = 0; status == WM_OK && i < devices->can_count; i++) {
+    const bus_files files = files_of(self->config, i);
+    status = copy_file(self, devices->can[i].dbc, files.dbc, err);
+    if (status == WM_OK) status = copy_file(self, devices->can[i].can_signals, files.signals, err);
+  }
   return status;
 }
 
@@ -203,6 +241,12 @@ static wm_status write_about(recorder *self, wm_error *err) {
   int used = snprintf(
       text, sizeof text,
       "format: waymark-recording/1\nname: recorded\nsource: waymark record %s\nvehicle: {kind: robot}\n", WM_VERSION);
+  if (config->devices.can_count > 0) used += snprintf(text + used, sizeof text - (size_t)used, "can:\n");
+  for (size_t i = 0; i < config->devices.can_count; i++) {
+    const bus_files files = files_of(config, i);
+    used += snprintf(text + used, sizeof text - (size_t)used, "  - {interface: \"%s\", dbc: \"%s\", signals: \"%s\"}\n",
+                     config->devices.can[i].interface, files.dbc, files.signals);
+  }
   // No list of streams: what is there is read, also after a cut.
   wm_status status = write_text(self, "recording.yaml", text, (size_t)used, err);
   if (status == WM_OK) status = write_config(self, err);
@@ -210,11 +254,7 @@ static wm_status write_about(recorder *self, wm_error *err) {
   if (status == WM_OK) status = copy_file(self, config->overrides.landmarks, "landmarks.csv", err);
   if (status == WM_OK && config->overrides.map[0])
     status = copy_map(config->overrides.map, self->options->out_dir, err);
-  if (status == WM_OK && config->devices.can_count > 0)
-    status = copy_file(self, config->devices.can[0].dbc, "vehicle.dbc", err);
-  if (status == WM_OK && config->devices.can_count > 0)
-    status = copy_file(self, config->devices.can[0].can_signals, "can-signals.yaml", err);
-  return status;
+  return status == WM_OK ? copy_buses(self, err) : status;
 }
 
 static wm_status make_folder(const char *path, wm_error *err) {

@@ -7,6 +7,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 #include "waymark/status.h"
 
@@ -61,6 +62,14 @@ wm_status wm_yaml_fail(const wm_yaml_node *node, wm_error *err, const char *form
 typedef enum wm_yaml_strictness { WM_YAML_STRICT, WM_YAML_NEAR } wm_yaml_strictness;
 wm_status wm_yaml_check_keys(const wm_yaml_node *map, const char *const *known, wm_yaml_strictness strictness,
                              size_t *unknown, wm_error *err);
+
+// One place that is written in another way.
+typedef struct wm_yaml_change {
+  char path[128];    // as wm_yaml_node has it: "devices.can[0].dbc"; where its map is there and it isn't, it is added
+  const char *text;  // of a scalar; NULL: it is left out
+} wm_yaml_change;
+// The document with changes: the same values for who reads it, without its comments. WM_IO.
+wm_status wm_yaml_write(const wm_yaml *doc, const wm_yaml_change *changes, size_t count, FILE *to, wm_error *err);
 
 #ifdef __cplusplus
 }

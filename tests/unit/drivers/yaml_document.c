@@ -51,6 +51,35 @@ static void walks(void) {
   TEST_ASSERT_EQUAL_STRING("x.yaml:5: b.e f: the text '7' is not a number; a number from 0 to 10 is needed", err.text);
 }
 
+static void is_written(const char *text, const wm_yaml_change *changes, size_t count, const char *expected) {
+  char *out = NULL;
+  size_t length = 0;
+  (void)parse(text);
+  FILE *f = open_memstream(&out, &length);
+  TEST_ASSERT_EQUAL(WM_OK, wm_yaml_write(doc, changes, count, f, &err));
+  (void)fclose(f);
+  wm_yaml_free(doc);
+  TEST_ASSERT_EQUAL_STRING(expected, out);
+  // And means the same.
+  (void)parse(out);
+  free(out);
+  f = open_memstream(&out, &length);
+  TEST_ASSERT_EQUAL(WM_OK, wm_yaml_write(doc, NULL, 0, f, &err));
+  (void)fclose(f);
+  TEST_ASSERT_EQUAL_STRING(expected, out);
+  free(out);
+}
+
+static void is_written_again_with_changes(void) {
+  is_written("a: 1.5  # of course\nb:\n  - c: [x, 'y, z', ~]\n    d: \"7\"\n  - usb-1.0:1\ne f: |\n  two\n  lines\n",
+             NULL, 0, "a: 1.5\nb: [{c: [x, \"y, z\", null], d: \"7\"}, usb-1.0:1]\n\"e f\": \"two\\x0Alines\\x0A\"\n");
+  wm_yaml_free(doc);
+  const wm_yaml_change changes[] = {
+      {"b[0].d", "new"}, {"a", NULL}, {"b[0].added", "too: this"}, {"g", "last"}, {"nowhere.h", "none"}};
+  is_written("{a: 1, b: [{c: 2, d: 3}, {c: 4}]}\n", changes, 5,
+             "b: [{c: 2, d: new, added: \"too: this\"}, {c: 4}]\ng: last\n");
+}
+
 static void says(wm_status status, const char *message) {
   TEST_ASSERT_EQUAL(WM_BAD_CONFIG, status);
   TEST_ASSERT_EQUAL_STRING(message, err.text);
@@ -184,6 +213,7 @@ static void missing_file(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(walks);
+  RUN_TEST(is_written_again_with_changes);
   RUN_TEST(typed_reads);
   RUN_TEST(unknown_keys);
   RUN_TEST(bad_documents);

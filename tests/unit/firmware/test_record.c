@@ -143,9 +143,62 @@ static void without_its_devices_a_recording_is_begun_and_ended(void) {
     TEST_ASSERT_EQUAL_MESSAGE(0, access(path, R_OK), path);
   }
   expect_text("rec/config.yaml",
-              "format: waymark-config/1\nestimator: odometry\ndbc: vehicle.dbc\ndevices: {can: [{interface: nocan7}]}\n"
+              "format: waymark-config/1\nestimator: odometry\ndbc: vehicle.dbc\n"
+              "devices: {can: [{interface: nocan7, dbc: vehicle.dbc, can_signals: can-signals.yaml}]}\n"
               "can_signals: can-signals.yaml\n");
   wm_config_free(&config);
+}
+
+#define SIGNALS(quantity, signal) "- {quantity: " quantity ", message: Motion, signal: " signal "}\n"
+
+// Two buses with the same id for another meaning: each has its DBC and binding, in the recording, too.
+static void two_buses_are_recorded_and_read_again(void) {
+  char text[1000], path[200], out[128];
+  wm_config config;
+  wm_record_report report;
+  wm_recording *recording;
+  put("fast.dbc", "BO_ 256 Motion: 2 X\n SG_ V : 0|16@1+ (0.001,0) [0|65] \"m/s\" X\n");
+  put("fast.yaml", SIGNALS("vehicle_speed", "V"));
+  put("body.dbc", "BO_ 256 Motion: 2 X\n SG_ W : 0|16@1- (0.001,0) [-32|32] \"rad/s\" X\n");
+  put("body.yaml", SIGNALS("yaw_rate", "W"));
+  // Any style: a map in lines, a list in brackets, the second bus by the files at the top.
+  (void)snprintf(
+      text, sizeof text,
+      "{format: waymark-config/1, estimator: odometry, dbc: body.dbc,\n  can_signals: \"body.yaml\", devices:\n"
+      "    {can: [{dbc: fast.dbc, interface: nocan7, can_signals: fast.yaml}, {interface: nocan8}]}}\n");
+  (void)snprintf(path, sizeof path, "%s/robot.yaml", folder);
+  (void)snprintf(out, sizeof out, "%s/rec", folder);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_parse(text, strlen(text), path, &config, &err), err.text);
+  const wm_record_options options = {.out_dir = out, .duration_s = 0.2};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_record(&config, &options, &report, &err), err.text);
+  wm_config_free(&config);
+  put("rec/can.log", "(1.000000) nocan7 100#E803\n(1.010000) nocan8 100#9CFF\n(1.020000) nocan9 100#0000\n");
+
+  // What was written is a configuration, and names the recording's own files.
+  (void)snprintf(path, sizeof path, "%s/config.yaml", out);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_load(path, &config, &err), err.text);
+  TEST_ASSERT_EQUAL(2, config.devices.can_count);
+  TEST_ASSERT_NOT_NULL(strstr(config.devices.can[0].dbc, "rec/vehicle.dbc"));
+  TEST_ASSERT_NOT_NULL(strstr(config.devices.can[1].dbc, "rec/nocan8.dbc"));
+  TEST_ASSERT_NOT_NULL(strstr(config.devices.can[1].can_signals, "rec/nocan8-signals.yaml"));
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_recording_open(out, &config.overrides, NULL, NULL, &recording, &err), err.text);
+  wm_config_free(&config);
+  size_t count;
+  wm_source *const *sources = wm_recording_sources(recording, &count);
+  TEST_ASSERT_EQUAL(2, count);
+  TEST_ASSERT_EQUAL_HEX32(1u << WM_Q_VEHICLE_SPEED | 1u << WM_Q_YAW_RATE, wm_recording_quantities(recording));
+  const double expected[] = {1.0, -0.1};
+  for (size_t i = 0; i < 2; i++) {
+    static wm_event event;
+    TEST_ASSERT_EQUAL_STRING(i ? "can:nocan8" : "can:nocan7", sources[i]->name);
+    TEST_ASSERT_EQUAL(WM_OK, sources[i]->ops->next(sources[i], &event, &err));
+    TEST_ASSERT_EQUAL(1, event.as.quantities.count);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected[i], event.as.quantities.value[0]);
+    TEST_ASSERT_EQUAL(WM_END, sources[i]->ops->next(sources[i], &event, &err));
+  }
+  TEST_ASSERT_EQUAL_UINT64(1, sources[0]->counts.ignored);  // nobody's
+  TEST_ASSERT_EQUAL_UINT64(0, sources[1]->counts.ignored);
+  wm_recording_close(recording);
 }
 
 // Wherever its pictures lie, in the recording they lie beside it.
@@ -195,6 +248,7 @@ int main(void) {
   RUN_TEST(a_video_that_was_cut_anywhere_is_read_up_to_there);
   RUN_TEST(an_empty_configuration_is_refused);
   RUN_TEST(without_its_devices_a_recording_is_begun_and_ended);
+  RUN_TEST(two_buses_are_recorded_and_read_again);
   RUN_TEST(a_full_disk_ends_it_and_says_so);
   RUN_TEST(a_map_is_copied_with_its_pictures);
   return UNITY_END();
