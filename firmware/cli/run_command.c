@@ -28,6 +28,7 @@ static const char kHelp[] =
     "  --recording RECORDING  play this recording instead of devices\n"
     "  --out FOLDER           trajectory, published poses, event log, health and timing\n"
     "  --record NEW           records the devices meanwhile, into a new folder, as `waymark record` does\n"
+    "  --out-max-mb N         tables and log below so much: at half of it they are put aside as trajectory.1.csv ...\n"
     "  --duration S           seconds, then stop\n"
     "  --speed X              times real speed (default 1)\n"
     "  --seed N               of random numbers (default 1)\n"
@@ -253,6 +254,7 @@ int command_run(int argc, char *const *argv) {
                             {"--recording", OPTION_TEXT, &args.recording},
                             {"--out", OPTION_TEXT, &args.run.out_dir},
                             {"--record", OPTION_TEXT, &args.record},
+                            {"--out-max-mb", OPTION_F64, &args.run.out_max_mb},
                             {"--duration", OPTION_F64, &args.run.duration_s},
                             {"--speed", OPTION_F64, &args.run.speed},
                             {"--seed", OPTION_U64, &args.run.seed},

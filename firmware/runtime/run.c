@@ -192,6 +192,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   if (status == WM_OK && self->options->out_dir)
     status = wm_run_folder_open(self->options->out_dir, &self->assembly, &self->disk.folder, err);
   if (status != WM_OK) return status;
+  if (self->disk.folder) wm_run_folder_limit(self->disk.folder, (uint64_t)(self->options->out_max_mb * 1e6));
 
   const wm_runtime_params *params = &self->config->runtime;
   self->estimator.loop_ns = WM_NS_PER_S / params->realtime_loop_hz;

@@ -11,6 +11,7 @@
 #include "new_file.h"
 #include "row.h"
 #include "waymark/eventlog.h"
+#include "waymark/saved_pose.h"
 
 typedef struct table {
   char path[WM_PATH_MAX + 32];
@@ -30,6 +31,9 @@ struct wm_run_folder {
   int trajectory_has_head, published_has_head;
   wm_log_writer log;
   wm_row line;
+  uint64_t bytes_max;     // 0: no limit
+  wm_assembly continued;  // the run's, with the start of a log that begins later
+  wm_estimate newest;     // published; WM_TIME_NONE: none
 };
 
 static const char kAxes[6][3] = {"x", "y", "z", "rx", "ry", "rz"};
@@ -217,7 +221,10 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
     case WM_OUTPUT_EVENT: wm_log_write_event(&self->log, record); break;
     case WM_OUTPUT_POSE: fused_pose(self, record); break;
     case WM_OUTPUT_INNOVATION: innovation(self, record); break;
-    case WM_OUTPUT_PUBLISHED: published(self, record); break;
+    case WM_OUTPUT_PUBLISHED:
+      self->newest = ((const wm_published *)record)->now;
+      published(self, record);
+      break;
     case WM_OUTPUT_PARTICLES: particles(self, record); break;
     case WM_OUTPUT_HYPOTHESES: hypotheses(self, record); break;
     case WM_OUTPUT_HEALTH: break;  // written once, at the end
@@ -253,31 +260,13 @@ static wm_status open_table(wm_run_folder *self, int which, wm_error *err) {
   table *t = &self->tables[which];
   if (which == PARTICLES && !self->assembly->config->estimator->particles) return WM_OK;
   if (which == HYPOTHESES && !self->assembly->config->estimator->hypotheses) return WM_OK;
-  (void)snprintf(t->path, sizeof t->path, "%s/%s", self->dir, kTables[which]);
   t->file = new_file(t->path);
   if (!t->file) return wm_fail(err, WM_IO, "%s: can't be written: %s", t->path, strerror(errno));
   setvbuf(t->file, t->buffer, _IOFBF, sizeof t->buffer);
   return WM_OK;
 }
 
-wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_run_folder **out, wm_error *err) {
-  *out = NULL;
-  wm_status status = make_dir(dir, err);
-  if (status != WM_OK) return status;
-  wm_run_folder *self = calloc(1, sizeof *self);
-  if (!self) return wm_fail(err, WM_IO, "%s: no memory", dir);
-  (void)snprintf(self->dir, sizeof self->dir, "%s", dir);
-  self->assembly = assembly;
-  for (int i = 0; i < TABLE_COUNT && status == WM_OK; i++) status = open_table(self, i, err);
-  if (status == WM_OK) {
-    char path[WM_PATH_MAX + 32];
-    (void)snprintf(path, sizeof path, "%s/events.wmlog", dir);
-    status = wm_log_create(&self->log, path, assembly, err);
-  }
-  if (status != WM_OK) {
-    (void)wm_run_folder_close(self, NULL);
-    return status;
-  }
+static void write_heads(wm_run_folder *self) {
   wm_row_text(begin(self), "t_ns,source,sensor,landmark,residual,observed,expected,variance,nis,gate,verdict");
   end(self, INNOVATIONS);
   if (self->tables[PARTICLES].file) {
@@ -288,7 +277,88 @@ wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_ru
     wm_row_text(begin(self), "t_ns,x_m,y_m,heading_rad,cov_xx,cov_xy,cov_yy,cov_xt,cov_yt,cov_tt,weight");
     end(self, HYPOTHESES);
   }
+}
+
+wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_run_folder **out, wm_error *err) {
+  *out = NULL;
+  wm_status status = make_dir(dir, err);
+  if (status != WM_OK) return status;
+  wm_run_folder *self = calloc(1, sizeof *self);
+  if (!self) return wm_fail(err, WM_IO, "%s: no memory", dir);
+  (void)snprintf(self->dir, sizeof self->dir, "%s", dir);
+  self->assembly = assembly;
+  self->newest.t_ns = WM_TIME_NONE;
+  for (int i = 0; i < TABLE_COUNT; i++)
+    (void)snprintf(self->tables[i].path, sizeof self->tables[i].path, "%s/%s", dir, kTables[i]);
+  for (int i = 0; i < TABLE_COUNT && status == WM_OK; i++) status = open_table(self, i, err);
+  if (status == WM_OK) {
+    char path[WM_PATH_MAX + 32];
+    (void)snprintf(path, sizeof path, "%s/events.wmlog", dir);
+    status = wm_log_create(&self->log, path, assembly, err);
+  }
+  if (status != WM_OK) {
+    (void)wm_run_folder_close(self, NULL);
+    return status;
+  }
+  write_heads(self);
   *out = self;
+  return WM_OK;
+}
+
+// ── a limit of their size ───────────────────────────────────────────────────────────────────────────────────────────
+
+void wm_run_folder_limit(wm_run_folder *self, uint64_t bytes) { self->bytes_max = bytes; }
+
+static uint64_t size_of(FILE *file) {
+  const off_t at = file ? ftello(file) : 0;
+  return at > 0 ? (uint64_t)at : 0;
+}
+
+// "DIR/trajectory.csv" becomes "DIR/trajectory.1.csv".
+static int put_aside(const char *path) {
+  char aside[WM_PATH_MAX + 40];
+  const char *dot = strrchr(path, '.');
+  (void)snprintf(aside, sizeof aside, "%.*s.1%s", (int)(dot - path), path, dot);
+  return rename(path, aside) == 0 ? 0 : errno;
+}
+
+static wm_status begin_table_again(wm_run_folder *self, int which, wm_error *err) {
+  table *t = &self->tables[which];
+  if (!t->file) return WM_OK;
+  int failed = fclose(t->file) != 0 ? errno : put_aside(t->path);
+  t->file = NULL;
+  wm_status status = failed ? wm_fail(err, WM_IO, "%s: can't be put aside: %s", t->path, strerror(failed))
+                            : open_table(self, which, err);
+  if (status != WM_OK) t->failed = failed ? failed : EIO;  // nothing is written from here on
+  return status;
+}
+
+// From the newest pose on, as a log of the black box.
+static wm_status begin_log_again(wm_run_folder *self, wm_error *err) {
+  char path[WM_PATH_MAX + 32];
+  (void)snprintf(path, sizeof path, "%s/events.wmlog", self->dir);
+  wm_status status = wm_log_close(&self->log, err);
+  if (status != WM_OK) return status;
+  const int failed = put_aside(path);
+  self->log.failed = EIO;  // nothing is written until it has begun again
+  if (failed) return wm_fail(err, WM_IO, "%s: can't be put aside: %s", path, strerror(failed));
+  self->continued = *self->assembly;
+  self->continued.kept = NULL;
+  if (self->newest.t_ns != WM_TIME_NONE) wm_start_from_estimate(&self->newest, 0, &self->continued.setup.start);
+  status = wm_log_create(&self->log, path, &self->continued, err);
+  if (status != WM_OK) self->log.failed = EIO;
+  return status;
+}
+
+static wm_status keep_limit(wm_run_folder *self, wm_error *err) {
+  uint64_t bytes = size_of(self->log.file);
+  for (int i = 0; i < TABLE_COUNT; i++) bytes += size_of(self->tables[i].file);
+  if (self->bytes_max == 0 || bytes < self->bytes_max / 2) return WM_OK;
+  wm_status status = begin_log_again(self, err);
+  for (int i = 0; i < TABLE_COUNT && status == WM_OK; i++) status = begin_table_again(self, i, err);
+  if (status != WM_OK) return status;
+  self->trajectory_has_head = self->published_has_head = 0;
+  write_heads(self);
   return WM_OK;
 }
 
@@ -302,7 +372,7 @@ wm_status wm_run_folder_flush(wm_run_folder *self, wm_error *err) {
     if (fflush(t->file) != 0 && !t->failed) t->failed = errno ? errno : EIO;
     if (t->failed) return wm_fail(err, WM_IO, "%s: can't be written on: %s", t->path, strerror(t->failed));
   }
-  return WM_OK;
+  return keep_limit(self, err);
 }
 
 wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_error *err) {

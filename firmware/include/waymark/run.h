@@ -15,6 +15,7 @@
 
 typedef struct wm_run_options {
   const char *out_dir;  // NULL: nothing is written
+  double out_max_mb;    // of the folder's tables and log, which rotate; 0: no limit
   uint64_t seed;
   double duration_s;  // 0: to the recording's end; on devices until *stop
   double speed;       // 1: real speed; on devices it has to be 1

@@ -21,6 +21,9 @@ wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_ru
 wm_output wm_run_folder_output(wm_run_folder *self);
 // Events that the sink lost are marked in the log, so that a replay of it knows.
 void wm_run_folder_gap(wm_run_folder *self, uint64_t missing_events);
+// Tables and log together stay below so many bytes (0: without a limit): from half of it on they are renamed to
+// trajectory.1.csv ..., in place of those of before, and begun anew, the log from the newest pose.
+void wm_run_folder_limit(wm_run_folder *self, uint64_t bytes);
 // To the system, so that a power cut costs at most what came since. WM_IO with the first thing that can't be written (a
 // full disk): what was asked for is not going to be there, though the run goes on.
 wm_status wm_run_folder_flush(wm_run_folder *self, wm_error *err);

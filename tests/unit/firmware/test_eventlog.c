@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <stdlib.h>
+#include <sys/stat.h>
+
 #include "log_fixture.h"
 #include "unity.h"
+#include "waymark/run_folder.h"
 
 void setUp(void) {}
 void tearDown(void) {}
@@ -171,6 +175,72 @@ static void the_fuzzers_seeds_are_read_to_their_ends(void) {
   }
 }
 
+// ── a run folder below its limit ────────────────────────────────────────────────────────────────────────────────────
+
+static long size_of(const char *dir, const char *name) {
+  char path[200];
+  struct stat file;
+  (void)snprintf(path, sizeof path, "%s/%s", dir, name);
+  return stat(path, &file) == 0 ? (long)file.st_size : -1;
+}
+
+static void first_line(const char *dir, const char *name, char out[200]) {
+  char path[200];
+  (void)snprintf(path, sizeof path, "%s/%s", dir, name);
+  FILE *f = fopen(path, "r");
+  TEST_ASSERT_NOT_NULL(f);
+  TEST_ASSERT_NOT_NULL(fgets(out, 200, f));
+  fclose(f);
+}
+
+// GIVEN a limit of 400 kB WHEN a run writes for long THEN tables and log rotate, and the log goes on from the newest
+// pose.
+static void tables_and_log_rotate_by_their_size(void) {
+  char dir[] = "/tmp/wm_rotate_XXXXXX", command[64], head[200], again[200], path[200];
+  static wm_config config;
+  static wm_assembly assembly;
+  fixture_assembly(&config, &assembly);
+  TEST_ASSERT_NOT_NULL(mkdtemp(dir));
+  wm_run_folder *folder;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_folder_open(dir, &assembly, &folder, &err), err.text);
+  wm_run_folder_limit(folder, 400000);
+  wm_output out = wm_run_folder_output(folder);
+  for (int second = 0; second < 100; second++) {
+    for (int i = 0; i < 50; i++) {
+      wm_published p = {.now = {.t_ns = second * WM_NS_PER_S + i, .state = WM_STATE_TRACKING, .dof = 3}};
+      p.now.pose_map_base.p_m[0] = second;
+      p.now.pose_map_base.q_xyzw[3] = 1;
+      out.put(out.context, WM_OUTPUT_POSE, &p.now, sizeof p.now);
+      out.put(out.context, WM_OUTPUT_PUBLISHED, &p, sizeof p);
+      wm_event e = fixture_event((uint32_t)(second * 50 + i));
+      out.put(out.context, WM_OUTPUT_EVENT, &e, wm_event_bytes(&e));
+    }
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_folder_flush(folder, &err), err.text);
+  }
+  TEST_ASSERT_EQUAL(WM_OK, wm_run_folder_close(folder, &err));
+  static const char *const kNames[] = {"trajectory.csv",    "trajectory.tum",   "published.csv",    "innovations.csv",
+                                       "events.wmlog",      "trajectory.1.csv", "trajectory.1.tum", "published.1.csv",
+                                       "innovations.1.csv", "events.1.wmlog"};
+  long bytes = 0;
+  for (size_t i = 0; i < sizeof kNames / sizeof kNames[0]; i++) {
+    TEST_ASSERT_GREATER_THAN_MESSAGE(0, size_of(dir, kNames[i]), kNames[i]);
+    bytes += size_of(dir, kNames[i]);
+  }
+  TEST_ASSERT_LESS_THAN(440000, bytes);  // a second more on each side
+  first_line(dir, "published.csv", head);
+  first_line(dir, "published.1.csv", again);
+  TEST_ASSERT_EQUAL_STRING(head, again);
+  for (int part = 0; part < 2; part++) {
+    wm_log_reader *log;
+    (void)snprintf(path, sizeof path, "%s/events%s.wmlog", dir, part ? ".1" : "");
+    TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(path, &log, &err), err.text);
+    TEST_ASSERT_GREATER_THAN_DOUBLE(1, wm_log_reader_head(log)->start.p_m[0]);
+    wm_log_reader_close(log);
+  }
+  (void)snprintf(command, sizeof command, "rm -rf %s", dir);
+  TEST_ASSERT_EQUAL(0, system(command));
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(what_was_written_is_read);
@@ -181,5 +251,6 @@ int main(void) {
   RUN_TEST(what_is_no_log_is_said_to_be_none);
   RUN_TEST(a_full_disk_is_told_at_the_end);
   RUN_TEST(the_fuzzers_seeds_are_read_to_their_ends);
+  RUN_TEST(tables_and_log_rotate_by_their_size);
   return UNITY_END();
 }
