@@ -144,7 +144,7 @@ static wm_status decode_message(wm_can_decoder *self, bound_message *m, const wm
     given++;
   }
   counts->not_finite += (uint64_t)refused;
-  if (refused > 0 && given == 0) return bad_frame(m, frame, "its signals are marked as not available", err);
+  if (refused > 0 && given == 0) return bad_frame(m, frame, "its signals mark that there is no value", err);
   if (given == 0) counts->ignored++;  // none of this frame's multiplexed signals is bound
   return given > 0 ? WM_OK : WM_AGAIN;
 }

@@ -281,7 +281,7 @@ static void what_is_refused(void) {
   avi_head(&file, "MJPG", W, H, 0);
   add_jpeg(1);
   save("video/front.avi");
-  refused(WM_NOT_FOUND, "has to say when each picture");
+  refused(WM_NOT_FOUND, "it holds the stamp of each picture");
   rows("frame,exposure_ns\n");
   refused(WM_BAD_CONFIG, "t_ns");
   folder_write("video/front.avi", "RIFF");
