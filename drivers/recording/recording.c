@@ -14,27 +14,14 @@
 #include "waymark/text.h"
 #include "waymark/yaml.h"
 
-#define CALIBRATION_BYTES_MAX (1u << 20)
-
 struct wm_recording {
   char dir[WM_PATH_MAX];
   char name[128];
-  int has_folder;  // else: the overrides' files, and what is added
   double duration_s;
-  wm_start start;
-  wm_yaml *about;  // recording.yaml
+  wm_site *site;
+  wm_yaml *about;  // recording.yaml; NULL: no folder, sources are added
   wm_recording_overrides overrides;
   warner warn;
-  char *calibration_text;
-  size_t calibration_length;
-  calibration calibration;
-  wm_landmark *landmarks;
-  size_t landmark_count;
-  char landmarks_path[WM_PATH_MAX];  // "" where there are none
-  wm_appearance *appearances;        // NULL until they are asked for
-  size_t appearance_count;
-  char map_path[WM_PATH_MAX];  // "" where there is none
-  wm_map *map;                 // NULL until it is asked for
   sensor_names sighting_sensors, marker_sensors, corner_sensors;
   wm_corner_reader *corners[WM_SENSORS_MAX];  // by corner_sensors
   uint32_t quantities;
@@ -58,7 +45,7 @@ static wm_status choose(const wm_recording *self, const char *override, const ch
     return WM_OK;
   }
   wm_status status = path_of(self, file, out, err);
-  *there = status == WM_OK && self->has_folder && access(out, F_OK) == 0;
+  *there = status == WM_OK && access(out, F_OK) == 0;
   return status;
 }
 
@@ -103,10 +90,12 @@ static wm_status check_streams(const wm_recording *self, const wm_yaml_node *str
   return WM_OK;
 }
 
-static wm_status read_start(wm_recording *self, const wm_yaml_node *root, wm_error *err) {
+static wm_status read_start(wm_recording *self, wm_error *err) {
+  const wm_yaml_node root_node = wm_yaml_root(self->about), *root = &root_node;
   wm_error said;
   size_t unknown;
-  wm_start_init(&self->start);
+  wm_start start;
+  wm_start_init(&start);
   wm_yaml_node pose = wm_yaml_get(root, "vehicle.initial_pose");
   wm_yaml_node misplaced = wm_yaml_get(root, "initial_pose");
   if (wm_yaml_there(&misplaced))
@@ -116,7 +105,9 @@ static wm_status read_start(wm_recording *self, const wm_yaml_node *root, wm_err
   // Unknown keys are allowed in recording.yaml; a misspelt one is worth a word.
   if (wm_yaml_check_keys(&pose, wm_start_keys, WM_YAML_NEAR, &unknown, &said) != WM_OK || unknown)
     warn_line(&self->warn, "%s", said.text);
-  return wm_start_read(&pose, &self->start, err);
+  wm_status status = wm_start_read(&pose, &start, err);
+  if (status == WM_OK) wm_site_set_start(self->site, &start);
+  return status;
 }
 
 static wm_status read_about(wm_recording *self, wm_error *err) {
@@ -138,38 +129,6 @@ static wm_status read_about(wm_recording *self, wm_error *err) {
   if (status == WM_OK && wm_yaml_there(&duration)) status = wm_yaml_f64(&duration, 0, 1e9, &self->duration_s, err);
   if (status == WM_OK && wm_yaml_there(&offset)) status = wm_yaml_f64_list(&offset, 3, 3, offset_m, NULL, err);
   if (status == WM_OK) status = check_streams(self, &streams, err);
-  return status == WM_OK ? read_start(self, &root, err) : status;
-}
-
-static wm_status read_calibration(wm_recording *self, wm_error *err) {
-  char path[WM_PATH_MAX];
-  int there;
-  calibration_init(&self->calibration);
-  wm_status status = choose(self, self->overrides.calibration, "calibration.yaml", path, &there, err);
-  if (status != WM_OK || !there) return status;
-  status = wm_text_read_file(path, CALIBRATION_BYTES_MAX, &self->calibration_text, &self->calibration_length, err);
-  if (status != WM_OK) return status;
-  wm_yaml *doc;
-  status = wm_yaml_parse(self->calibration_text, self->calibration_length, path, &doc, err);
-  if (status != WM_OK) return status;
-  status = calibration_read(doc, &self->warn, &self->calibration, err);
-  wm_yaml_free(doc);
-  return status;
-}
-
-static wm_status read_landmarks(wm_recording *self, wm_error *err) {
-  char path[WM_PATH_MAX];
-  int there;
-  wm_status status = choose(self, self->overrides.landmarks, "landmarks.csv", path, &there, err);
-  if (status != WM_OK || !there) return status;
-  memcpy(self->landmarks_path, path, sizeof path);
-  return landmarks_read(path, &self->warn, &self->landmarks, &self->landmark_count, err);
-}
-
-static wm_status find_map(wm_recording *self, wm_error *err) {
-  int there;
-  wm_status status = choose(self, self->overrides.map, "map/map.yaml", self->map_path, &there, err);
-  if (!there) self->map_path[0] = '\0';
   return status;
 }
 
@@ -212,33 +171,9 @@ static wm_status add_stream(wm_recording *self, const stream_kind *kind, wm_erro
   return status == WM_OK ? add_source(self, source, err) : status;
 }
 
-// Index of the sensor; one that `sensors` of calibration.yaml doesn't have sits where the camera of its name sits, or
-// at base_link.
-static wm_status sensor_index(wm_recording *self, const char *path, const char *name, uint16_t *out, wm_error *err) {
-  calibration *known = &self->calibration;
-  for (size_t i = 0; i < known->sensor_count; i++) {
-    *out = (uint16_t)i;
-    if (strcmp(known->sensors[i].name, name) == 0) return WM_OK;
-  }
-  if (known->sensor_count == WM_SENSORS_MAX)
-    return wm_fail(err, WM_FULL, "%s: more than %d sensors, with those of calibration.yaml", path, WM_SENSORS_MAX);
-  const wm_mounting *mounting = calibration_camera_mounting(known, name);
-  wm_sensor *sensor = &known->sensors[known->sensor_count];
-  *sensor = (wm_sensor){.bearing_sigma_rad = (double)NAN, .range_sigma_m = (double)NAN, .max_range_m = HUGE_VAL};
-  snprintf(sensor->name, sizeof sensor->name, "%s", name);
-  if (mounting)
-    sensor->mounting = *mounting;
-  else
-    warn_line(&self->warn,
-              "%s: the sensor '%s' is not in calibration.yaml; it is taken to sit at base_link, sigmas unknown", path,
-              name);
-  *out = (uint16_t)known->sensor_count++;
-  return WM_OK;
-}
-
 static wm_status make_corner_reader(wm_recording *self, const char *path, const char *name, wm_corner_reader **out,
                                     wm_error *err) {
-  const wm_rig *rig = &self->calibration.rig;
+  const wm_rig *rig = wm_site_rig(self->site);
   const int32_t camera = wm_rig_find_camera(rig, name);
   if (camera < 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s: the sensor '%s' is no camera of calibration.yaml; corners need its lens",
@@ -256,7 +191,7 @@ static wm_status add_sensor_streams(wm_recording *self, const stream_kind *kind,
   for (size_t i = 0; status == WM_OK && i < names->count; i++) {
     uint16_t index;
     wm_source *source;
-    status = sensor_index(self, path, names->name[i], &index, err);
+    status = wm_site_sensor(self->site, path, names->name[i], &index, err);
     wm_corner_reader **corners = kind == &kStreamCorners ? &self->corners[i] : NULL;
     if (status == WM_OK && corners) status = make_corner_reader(self, path, names->name[i], corners, err);
     if (status != WM_OK) break;
@@ -349,14 +284,12 @@ wm_status wm_recording_open(const char *dir, const wm_recording_overrides *overr
   snprintf(self->dir, sizeof self->dir, "%.*s", (int)(length < WM_PATH_MAX ? length : WM_PATH_MAX - 1), dir);
   const char *slash = strrchr(self->dir, '/');
   snprintf(self->name, sizeof self->name, "%s", slash && slash[1] ? slash + 1 : self->dir);
-  self->has_folder = 1;
   self->duration_s = (double)NAN;
   self->warn = (warner){warn, context};
   if (overrides) self->overrides = *overrides;
   wm_status status = read_about(self, err);
-  if (status == WM_OK) status = read_calibration(self, err);
-  if (status == WM_OK) status = read_landmarks(self, err);
-  if (status == WM_OK) status = find_map(self, err);
+  if (status == WM_OK) status = wm_site_open(self->dir, &self->overrides, warn, context, &self->site, err);
+  if (status == WM_OK) status = read_start(self, err);
   if (status == WM_OK) status = add_sources(self, err);
   if (status != WM_OK) {
     wm_recording_close(self);
@@ -366,25 +299,17 @@ wm_status wm_recording_open(const char *dir, const wm_recording_overrides *overr
   return WM_OK;
 }
 
-wm_status wm_recording_open_robot(const char *name, const wm_recording_overrides *overrides, wm_warn_fn warn,
-                                  void *context, wm_recording **out, wm_error *err) {
-  *out = NULL;
+wm_status wm_recording_of_site(const char *name, wm_site *site, wm_recording **out, wm_error *err) {
   wm_recording *self = calloc(1, sizeof *self);
-  if (!self) return wm_fail(err, WM_IO, "%s: no memory for it", name);
+  *out = self;
+  if (!self) {
+    wm_site_close(site);
+    return wm_fail(err, WM_IO, "%s: no memory for it", name);
+  }
   snprintf(self->name, sizeof self->name, "%s", name);
   snprintf(self->dir, sizeof self->dir, "%s", name);
   self->duration_s = (double)NAN;
-  self->warn = (warner){warn, context};
-  self->overrides = *overrides;
-  wm_start_init(&self->start);
-  wm_status status = read_calibration(self, err);
-  if (status == WM_OK) status = read_landmarks(self, err);
-  if (status == WM_OK) status = find_map(self, err);
-  if (status != WM_OK) {
-    wm_recording_close(self);
-    return status;
-  }
-  *out = self;
+  self->site = site;
   return WM_OK;
 }
 
@@ -402,69 +327,15 @@ void wm_recording_close(wm_recording *self) {
   for (size_t i = 0; i < self->source_count; i++) self->sources[i]->ops->close(self->sources[i]);
   if (self->pictures) self->pictures->ops->close(self->pictures);
   wm_yaml_free(self->about);
-  free(self->calibration_text);
-  free(self->landmarks);
-  wm_appearances_free(self->appearances, self->appearance_count);
-  wm_map_free(self->map);
+  wm_site_close(self->site);
   free(self);
 }
 
 const char *wm_recording_name(const wm_recording *self) { return self->name; }
 const char *wm_recording_dir(const wm_recording *self) { return self->dir; }
 double wm_recording_duration_s(const wm_recording *self) { return self->duration_s; }
-const wm_wheels *wm_recording_wheels(const wm_recording *self) { return &self->calibration.wheels; }
-
-const wm_sensor *wm_recording_sensors(const wm_recording *self, size_t *count) {
-  *count = self->calibration.sensor_count;
-  return self->calibration.sensors;
-}
-
-wm_status wm_recording_camera_sensor(wm_recording *self, const char *camera, uint16_t *out, wm_error *err) {
-  return sensor_index(self, self->dir, camera, out, err);
-}
-
-const wm_landmark *wm_recording_landmarks(const wm_recording *self, size_t *count) {
-  *count = self->landmark_count;
-  return self->landmarks;
-}
-
-wm_status wm_recording_appearances(wm_recording *self, const wm_appearance **out, size_t *count, wm_error *err) {
-  char path[WM_PATH_MAX];
-  *out = self->appearances;
-  *count = self->appearance_count;
-  if (self->appearances || !self->landmarks_path[0]) return WM_OK;
-  const char *slash = strrchr(self->landmarks_path, '/');
-  const int folder = slash ? (int)(slash - self->landmarks_path) + 1 : 0;
-  if (snprintf(path, sizeof path, "%.*slandmarks/appearance.csv", folder, self->landmarks_path) >= WM_PATH_MAX)
-    return wm_fail(err, WM_BAD_USAGE, "%s: the path of landmarks/appearance.csv beside it is too long",
-                   self->landmarks_path);
-  if (access(path, F_OK) != 0) return WM_OK;
-  wm_status status =
-      wm_appearances_load(path, self->warn.fn, self->warn.context, &self->appearances, &self->appearance_count, err);
-  *out = self->appearances;
-  *count = self->appearance_count;
-  return status;
-}
-
-const char *wm_recording_map_path(const wm_recording *self) { return self->map_path; }
-
-wm_status wm_recording_map(wm_recording *self, const wm_raster **out, wm_error *err) {
-  *out = NULL;
-  if (!self->map_path[0]) return WM_OK;
-  wm_status status =
-      self->map ? WM_OK : wm_map_load(self->map_path, self->warn.fn, self->warn.context, &self->map, err);
-  if (status == WM_OK) *out = wm_map_raster(self->map);
-  return status;
-}
-
-const wm_rig *wm_recording_rig(const wm_recording *self) { return &self->calibration.rig; }
-const wm_start *wm_recording_start(const wm_recording *self) { return &self->start; }
+wm_site *wm_recording_site(const wm_recording *self) { return self->site; }
 uint32_t wm_recording_quantities(const wm_recording *self) { return self->quantities; }
-
-const char *wm_recording_calibration_text(const wm_recording *self, size_t *length) {
-  *length = self->calibration_length;
-  return self->calibration_text ? self->calibration_text : "";
-}
 
 wm_source *const *wm_recording_sources(wm_recording *self, size_t *count) {
   *count = self->source_count;

@@ -92,8 +92,8 @@ wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err) {
 // Only who takes points on a map's edges is given one: it may be large.
 static wm_status add_map(wm_assembly *self, wm_recording *recording, wm_error *err) {
   if (!(self->config->estimator->takes & WM_EVENT_BIT(WM_EVENT_POINTS))) return WM_OK;
-  self->map_path = wm_recording_map_path(recording);
-  return wm_recording_map(recording, &self->setup.map, err);
+  self->map_path = wm_site_map_path(wm_recording_site(recording));
+  return wm_site_map(wm_recording_site(recording), &self->setup.map, err);
 }
 
 static wm_status add_vision(wm_assembly *self, wm_recording *recording, wm_error *err) {
@@ -115,16 +115,16 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   memset(out, 0, sizeof *out);
   out->config = config;
   (void)snprintf(out->recording, sizeof out->recording, "%s", wm_recording_name(recording));
-  out->calibration_text = wm_recording_calibration_text(recording, &out->calibration_length);
+  out->calibration_text = wm_site_calibration_text(wm_recording_site(recording), &out->calibration_length);
 
   wm_setup *setup = &out->setup;
   setup->motion = config->motion;
   setup->sightings = config->sightings;
-  setup->wheels = *wm_recording_wheels(recording);
-  setup->sensors = wm_recording_sensors(recording, &setup->sensor_count);
-  setup->landmarks = wm_recording_landmarks(recording, &setup->landmark_count);
-  setup->rig = wm_recording_rig(recording);
-  setup->start = config->has_initial_pose ? config->initial_pose : *wm_recording_start(recording);
+  setup->wheels = *wm_site_wheels(wm_recording_site(recording));
+  setup->sensors = wm_site_sensors(wm_recording_site(recording), &setup->sensor_count);
+  setup->landmarks = wm_site_landmarks(wm_recording_site(recording), &setup->landmark_count);
+  setup->rig = wm_site_rig(wm_recording_site(recording));
+  setup->start = config->has_initial_pose ? config->initial_pose : *wm_site_start(wm_recording_site(recording));
   setup->seed = seed;
 
   wm_status status = add_map(out, recording, err);
@@ -134,7 +134,7 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   for (size_t i = 0; i < count && i < WM_SOURCES_MAX; i++) add_source(out, sources[i]);
   status = add_vision(out, recording, err);
   if (status != WM_OK) return status;
-  setup->sensors = wm_recording_sensors(recording, &setup->sensor_count);  // cameras have joined
+  setup->sensors = wm_site_sensors(wm_recording_site(recording), &setup->sensor_count);  // cameras have joined
   if (!(out->kinds & out->config->estimator->takes) && !(out->kinds & WM_MOTION_EVENTS))
     return wm_fail(err, WM_BAD_CONFIG, "%s: no motion and no observation is there or used",
                    wm_recording_dir(recording));

@@ -25,11 +25,11 @@ static wm_status add_can(const wm_config *config, wm_recording *robot, wm_error 
 static wm_status check_cameras(const wm_config *config, const wm_recording *robot, wm_error *err) {
   const wm_devices_config *devices = &config->devices;
   for (size_t i = 0; i < devices->camera_count; i++) {
-    int index = wm_rig_find_camera(wm_recording_rig(robot), devices->cameras[i].name);
+    int index = wm_rig_find_camera(wm_site_rig(wm_recording_site(robot)), devices->cameras[i].name);
     if (index < 0)
       return wm_fail(err, WM_BAD_CONFIG, "%s:%d: devices.cameras[%zu].name: '%s' is no camera of the calibration",
                      config->path, devices->cameras[i].line, i, devices->cameras[i].name);
-    if (wm_recording_rig(robot)->cameras[index].width_px == 0)
+    if (wm_site_rig(wm_recording_site(robot))->cameras[index].width_px == 0)
       return wm_fail(err, WM_BAD_CONFIG, "%s:%d: devices.cameras[%zu]: the calibration of '%s' has no image_size",
                      config->path, devices->cameras[i].line, i, devices->cameras[i].name);
   }
@@ -39,9 +39,11 @@ static wm_status check_cameras(const wm_config *config, const wm_recording *robo
 wm_status wm_robot_open_site(const wm_config *config, wm_warn_fn warn, void *context, wm_recording **out,
                              wm_error *err) {
   wm_recording *robot;
+  wm_site *site;
   wm_pictures *pictures;
   *out = NULL;
-  wm_status status = wm_recording_open_robot("robot", &config->overrides, warn, context, &robot, err);
+  wm_status status = wm_site_open(NULL, &config->overrides, warn, context, &site, err);
+  if (status == WM_OK) status = wm_recording_of_site("robot", site, &robot, err);
   if (status != WM_OK) return status;
   status = check_cameras(config, robot, err);
   if (status == WM_OK) status = cameras_open(config, warn, context, &pictures, err);

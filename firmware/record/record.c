@@ -289,7 +289,7 @@ static wm_status open_cameras(recorder *self, wm_error *err) {
   wm_status status = make_folder(folder, err);
   wm_pictures *pictures = wm_recording_pictures(self->robot);
   for (size_t i = 0; status == WM_OK && i < devices->camera_count; i++) {
-    const wm_rig *rig = wm_recording_rig(self->robot);
+    const wm_rig *rig = wm_site_rig(wm_recording_site(self->robot));
     int index = wm_rig_find_camera(rig, devices->cameras[i].name);
     stream *s = &self->streams[self->stream_count];
     s->all = self;

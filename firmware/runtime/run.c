@@ -168,7 +168,7 @@ static wm_status add_commands(live *self, wm_recording *recording, wm_error *err
 static wm_status add_sightings(live *self, wm_recording *recording, wm_error *err) {
   if (!self->config->devices.sightings_by_lcm) return WM_OK;
   size_t count;
-  const wm_sensor *sensors = wm_recording_sensors(recording, &count);
+  const wm_sensor *sensors = wm_site_sensors(wm_recording_site(recording), &count);
   if (count == 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s: devices.sightings: calibration.yaml has no `sensors` that could see them",
                    self->config->path);
@@ -207,7 +207,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
                  &self->assembly, self->options->say, self->options->say_context);
   wm_pictures *pictures = wm_recording_pictures(recording);
   if (pictures) {
-    status = black_box_open_pictures(&self->disk.box, pictures, wm_recording_rig(recording), err);
+    status = black_box_open_pictures(&self->disk.box, pictures, wm_site_rig(wm_recording_site(recording)), err);
     if (status == WM_OK) status = pictures->ops->start(pictures, err);
   }
   notify_open(&self->publish.notify);

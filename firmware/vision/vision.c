@@ -47,7 +47,7 @@ static const wm_source_ops kOps = {.next = next, .close = close_nothing};
 
 static uint16_t sensor_of(wm_recording *recording, const char *camera) {
   size_t count;
-  const wm_sensor *sensors = wm_recording_sensors(recording, &count);
+  const wm_sensor *sensors = wm_site_sensors(wm_recording_site(recording), &count);
   for (size_t i = 0; i < count; i++)
     if (strcmp(sensors[i].name, camera) == 0) return (uint16_t)i;
   return NO_SENSOR;
@@ -70,7 +70,7 @@ static wm_status open_pictures(vision_source *self, wm_pictures *pictures, wm_er
 // A source of this detector on as many of `cameras` as it takes at once.
 static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_config *wanted, wm_recording *recording,
                      const int32_t cameras[PICTURES_MAX], wm_pictures *pictures, wm_error *err) {
-  const wm_rig *rig = wm_recording_rig(recording);
+  const wm_rig *rig = wm_site_rig(wm_recording_site(recording));
   const wm_camera *first = &rig->cameras[cameras[0]];
   if (self->count == WM_VISION_SOURCES_MAX)
     return wm_fail(err, WM_FULL, "%s: vision: more than %d detectors and cameras", config->path, WM_VISION_SOURCES_MAX);
@@ -80,11 +80,12 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   s->newest_ns = s->busy_until_ns = WM_TIME_NONE;
   memcpy(s->cameras, cameras, sizeof s->cameras);
   s->view = (wm_view){.rig = rig, .cameras = s->cameras};
-  s->view.landmarks = wm_recording_landmarks(recording, &s->view.landmark_count);
+  s->view.landmarks = wm_site_landmarks(wm_recording_site(recording), &s->view.landmark_count);
   s->view.cascades = wanted->cascades;
   s->view.cascade_count = wanted->cascade_count;
   if (s->detector->is_guided) {
-    wm_status status = wm_recording_appearances(recording, &s->view.appearances, &s->view.appearance_count, err);
+    wm_status status =
+        wm_site_appearances(wm_recording_site(recording), &s->view.appearances, &s->view.appearance_count, err);
     if (status != WM_OK) return status;
     s->newest = &self->newest;
   }
@@ -95,7 +96,7 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   s->base.kinds = s->detector->gives | (s->gives_looked ? WM_EVENT_BIT(WM_EVENT_LOOKED) : 0);
   s->sensor = sensor_of(recording, first->name);
   if (s->sensor == NO_SENSOR && (s->detector->gives & kSaidOfSensors)) {
-    wm_status status = wm_recording_camera_sensor(recording, first->name, &s->sensor, err);
+    wm_status status = wm_site_camera_sensor(wm_recording_site(recording), first->name, &s->sensor, err);
     if (status != WM_OK) return status;
   }
   s->capacity = s->detector->gives & WM_EVENT_BIT(WM_EVENT_POINTS) ? EVENTS_WITH_POINTS : EVENTS_SMALL;
@@ -109,7 +110,7 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
 
 static wm_status add_pair(wm_vision *self, const wm_config *config, const wm_vision_config *wanted,
                           wm_recording *recording, wm_pictures *pictures, wm_error *err) {
-  const wm_stereo_pair *pair = &wm_recording_rig(recording)->stereo;
+  const wm_stereo_pair *pair = &wm_site_rig(wm_recording_site(recording))->stereo;
   if (pair->left < 0 || pair->right < 0)
     return wm_fail(err, WM_BAD_CONFIG,
                    "%s:%d: vision.%s: needs a pair of cameras: stereo: {left: ..., right: ...} in calibration.yaml",
@@ -127,7 +128,7 @@ static int is_wanted(const wm_vision_config *wanted, const char *camera) {
 // The cameras that are named, or else all that have pictures.
 static wm_status add_singles(wm_vision *self, const wm_config *config, const wm_vision_config *wanted,
                              wm_recording *recording, wm_pictures *pictures, wm_error *err) {
-  const wm_rig *rig = wm_recording_rig(recording);
+  const wm_rig *rig = wm_site_rig(wm_recording_site(recording));
   for (uint32_t i = 0; i < wanted->camera_count; i++)
     if (wm_rig_find_camera(rig, wanted->cameras[i]) < 0)
       return wm_fail(err, WM_BAD_CONFIG, "%s:%d: vision.%s.cameras: '%s' is no camera of calibration.yaml",

@@ -128,7 +128,9 @@ static wm_recording *robot_on(bus *can, const wm_config *config) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_dbc_parse(kDbc, strlen(kDbc), "car.dbc", &dbc, &err), err.text);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_can_decoder_make(dbc, bindings, 2, &decoder, &err), err.text);
   wm_dbc_free(dbc);
-  TEST_ASSERT_EQUAL(WM_OK, wm_recording_open_robot("robot", &config->overrides, NULL, NULL, &robot, &err));
+  wm_site *site;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_site_open(NULL, &config->overrides, NULL, NULL, &site, &err), err.text);
+  TEST_ASSERT_EQUAL(WM_OK, wm_recording_of_site("robot", site, &robot, &err));
   TEST_ASSERT_EQUAL(WM_OK, can_device_make("can0", decoder, &io, can, &source, &err));
   TEST_ASSERT_EQUAL(WM_OK,
                     wm_recording_add_device(robot, source, 1u << WM_Q_VEHICLE_SPEED | 1u << WM_Q_YAW_RATE, &err));

@@ -82,7 +82,7 @@ void detect(const Arguments &a) {
   if (wm_recording_open(a.recording.c_str(), &config.overrides, nullptr, nullptr, &opened, &err) != WM_OK)
     throw Failure(err.text);
   const std::unique_ptr<wm_recording, decltype(&wm_recording_close)> recording(opened, wm_recording_close);
-  const wm_rig &rig = *wm_recording_rig(recording.get());
+  const wm_rig &rig = *wm_site_rig(wm_recording_site(recording.get()));
   size_t done = 0;
   for (size_t i = 0; i < config.vision_count; i++) {
     if (!(config.vision[i].detector->gives & WM_EVENT_BIT(WM_EVENT_POINTS))) continue;

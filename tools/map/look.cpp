@@ -23,15 +23,15 @@ struct Freer {
   void operator()(void *p) const { std::free(p); }
 };
 
-std::unique_ptr<wm_recording, decltype(&wm_recording_close)> open(const LookAtPicture &a) {
+std::unique_ptr<wm_site, decltype(&wm_site_close)> open(const LookAtPicture &a) {
   wm_recording_overrides files{};
   const std::string landmarks = a.map.extension() == ".csv" ? a.map : a.map / "landmarks.csv";
   std::snprintf(files.landmarks, sizeof files.landmarks, "%s", landmarks.c_str());
   std::snprintf(files.calibration, sizeof files.calibration, "%s", a.calibration.c_str());
-  wm_recording *opened = nullptr;
+  wm_site *opened = nullptr;
   wm_error err{};
-  if (wm_recording_open_robot("map", &files, nullptr, nullptr, &opened, &err) != WM_OK) throw Failure(err.text, kUsage);
-  return {opened, wm_recording_close};
+  if (wm_site_open(nullptr, &files, nullptr, nullptr, &opened, &err) != WM_OK) throw Failure(err.text, kUsage);
+  return {opened, wm_site_close};
 }
 
 void set(const wm_param_table &table, const std::string &key, double value, void *params) {
@@ -91,16 +91,16 @@ void draw(const GreyPicture &grey, const std::vector<wm_looked_for> &looks, cons
 int look_at_picture(const LookAtPicture &a) {
   need_finite("--pose", a.pose);
   const auto map = open(a);
-  const wm_rig &rig = *wm_recording_rig(map.get());
+  const wm_rig &rig = *wm_site_rig(map.get());
   int32_t index = 0;
   if (rig.camera_count != 1 || !a.camera.empty()) index = wm_rig_find_camera(&rig, a.camera.c_str());
   if (index < 0) throw Failure(a.calibration + ": --camera: '" + a.camera + "' is none of its cameras", kUsage);
   wm_view view{};
   view.rig = &rig;
   view.cameras = &index;
-  view.landmarks = wm_recording_landmarks(map.get(), &view.landmark_count);
+  view.landmarks = wm_site_landmarks(map.get(), &view.landmark_count);
   wm_error err{};
-  if (wm_recording_appearances(map.get(), &view.appearances, &view.appearance_count, &err) != WM_OK)
+  if (wm_site_appearances(map.get(), &view.appearances, &view.appearance_count, &err) != WM_OK)
     throw Failure(err.text, kUsage);
 
   const wm_detector *detector = wm_detector_find("landmarks");

@@ -67,7 +67,7 @@ class Reader {
   }
 
   void read(int every, int first) {
-    const wm_rig &rig = *wm_recording_rig(opened_.get());
+    const wm_rig &rig = *wm_site_rig(wm_recording_site(opened_.get()));
     for (uint32_t i = 0; i < rig.camera_count; i++)
       if (wm_video_there(recording_.c_str(), rig.cameras[i].name)) read_camera(rig.cameras[i], i, every, first);
   }

@@ -189,7 +189,7 @@ std::vector<ReportFrame> load_frames(const fs::path &recording, ReportData *data
     return out;
   }
   const Opened opened(made, wm_recording_close);
-  const wm_rig *rig = wm_recording_rig(opened.get());
+  const wm_rig *rig = wm_site_rig(wm_recording_site(opened.get()));
   for (uint32_t i = 0; i < rig->camera_count; i++) {
     const wm_camera &camera = rig->cameras[i];
     if (!wm_video_there(recording.c_str(), camera.name)) continue;

@@ -56,15 +56,15 @@ static void bare(void) {
   open_it();
   TEST_ASSERT_EQUAL_STRING("drive", wm_recording_name(recording));
   TEST_ASSERT_EQUAL_DOUBLE(12.5, wm_recording_duration_s(recording));
-  const wm_start *start = wm_recording_start(recording);
+  const wm_start *start = wm_site_start(wm_recording_site(recording));
   TEST_ASSERT_TRUE(start->t_ns == WM_TIME_NONE && isnan(start->p_m[0]) && isnan(start->heading_rad));
-  TEST_ASSERT_TRUE(isnan(wm_recording_wheels(recording)->radius_m));
+  TEST_ASSERT_TRUE(isnan(wm_site_wheels(wm_recording_site(recording))->radius_m));
   size_t count;
-  wm_recording_sensors(recording, &count);
+  wm_site_sensors(wm_recording_site(recording), &count);
   TEST_ASSERT_EQUAL(0, count);
-  wm_recording_landmarks(recording, &count);
+  wm_site_landmarks(wm_recording_site(recording), &count);
   TEST_ASSERT_EQUAL(0, count);
-  TEST_ASSERT_EQUAL_STRING("", wm_recording_calibration_text(recording, &count));
+  TEST_ASSERT_EQUAL_STRING("", wm_site_calibration_text(wm_recording_site(recording), &count));
   TEST_ASSERT_EQUAL(0, wm_recording_quantities(recording));
   TEST_ASSERT_EQUAL_STRING("", warnings);
 }
@@ -80,7 +80,7 @@ static void start_pose(void) {
   folder_write("recording.yaml",
                ABOUT "vehicle:\n  initial_pose: {t_ns: 5, x_m: 1, y_m: 2, heading_rad: 4, sigma_heading_deg: 9}\n");
   open_it();
-  const wm_start *start = wm_recording_start(recording);
+  const wm_start *start = wm_site_start(wm_recording_site(recording));
   TEST_ASSERT_TRUE(start->t_ns == 5 && start->p_m[1] == 2 && isnan(start->p_m[2]) && isnan(start->q_xyzw[0]));
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 4 - 2 * M_PI, start->heading_rad);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, M_PI / 20, start->sigma_heading_rad);
@@ -89,7 +89,7 @@ static void start_pose(void) {
                "vehicle:\n  initial_pose: {x_m: 1, z_m: 3, qx: 0, qy: 0, qz: 0.70711, qw: 0.70711, hedaing_rad: "
                "1}\ninitial_pose: {}\n");
   open_it();
-  start = wm_recording_start(recording);
+  start = wm_site_start(wm_recording_site(recording));
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, sqrt(0.5), start->q_xyzw[2]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, M_PI / 2, start->heading_rad);
   TEST_ASSERT_NOT_NULL(strstr(warnings, "recording.yaml:7: initial_pose: belongs under vehicle; here it is ignored"));
@@ -118,7 +118,7 @@ static void whole_calibration(void) {
       "1]}\nlidar_x: 5\n");
   open_it();
   size_t count;
-  const wm_sensor *sensors = wm_recording_sensors(recording, &count);
+  const wm_sensor *sensors = wm_site_sensors(wm_recording_site(recording), &count);
   TEST_ASSERT_EQUAL(3 + 5, count);  // with coded markers the other cameras are sensors, too
   TEST_ASSERT_EQUAL_STRING("a", sensors[3].name);
   TEST_ASSERT_EQUAL_DOUBLE(9, sensors[2].mounting.xyz_m[0]);  // the camera's of the same name
@@ -127,7 +127,7 @@ static void whole_calibration(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, M_PI / 180, sensors[0].bearing_sigma_rad);
   TEST_ASSERT_TRUE(sensors[0].mounting.xyz_m[2] == 3 && sensors[0].max_range_m == 30 && sensors[0].range_is_depth);
   TEST_ASSERT_TRUE(isnan(sensors[1].range_sigma_m) && isinf(sensors[1].max_range_m) && !sensors[1].range_is_depth);
-  const wm_wheels *wheels = wm_recording_wheels(recording);
+  const wm_wheels *wheels = wm_site_wheels(wm_recording_site(recording));
   TEST_ASSERT_TRUE(wheels->ticks_per_turn == 2048 && wheels->encoder_offset_m == -0.2 && wheels->steering_ratio == 13);
   TEST_ASSERT_EQUAL(3, wheels->steering_table_count);
   TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.008, wheels->actuator_m[0]);
@@ -135,7 +135,7 @@ static void whole_calibration(void) {
   TEST_ASSERT_NOT_NULL(strstr(warnings, "lidar_x: unknown key, ignored"));
   TEST_ASSERT_NULL(strstr(warnings, "x_maker"));
   TEST_ASSERT_NOT_NULL(strstr(warnings, "sensors.sonar: no mounting given; it is taken to sit at base_link"));
-  const char *text = wm_recording_calibration_text(recording, &count);
+  const char *text = wm_site_calibration_text(wm_recording_site(recording), &count);
   TEST_ASSERT_EQUAL(strlen(text), count);
   TEST_ASSERT_EQUAL_STRING_LEN("sensors:\n", text, 9);
 }
@@ -171,7 +171,7 @@ static void landmarks(void) {
   folder_write("landmarks.csv", "id,x_m,y_m,z_m,sigma_m,yaw_rad\r\n7,1,2,,0.5,\r\n3,4,5,6,,1.5\r\n");
   open_it();
   size_t count;
-  const wm_landmark *all = wm_recording_landmarks(recording, &count);
+  const wm_landmark *all = wm_site_landmarks(wm_recording_site(recording), &count);
   TEST_ASSERT_EQUAL(2, count);
   TEST_ASSERT_TRUE(all[0].id == 7 && all[0].p_m[2] == 0 && all[0].sigma_m == 0.5 && isnan(all[0].yaw_rad));
   TEST_ASSERT_TRUE(all[1].id == 3 && all[1].p_m[2] == 6 && isnan(all[1].sigma_m) && all[1].yaw_rad == 1.5);
@@ -181,7 +181,7 @@ static void landmarks(void) {
                "id,x_m,y_m,z_m,sigma_m,cov_xx,cov_xy,cov_yy,yaw_rad,cov_tt\n"
                "1,1,2,3,0.2,0.04,0.01,0.01,0.5,0.0004\n2,1,2,3,0.2,0.04,0.03,0.01,,\n");
   open_it();
-  all = wm_recording_landmarks(recording, &count);
+  all = wm_site_landmarks(wm_recording_site(recording), &count);
   TEST_ASSERT_TRUE(all[0].cov_m2[0] == 0.04 && all[0].cov_m2[1] == 0.01 && all[0].cov_m2[2] == 0.01);
   TEST_ASSERT_EQUAL_DOUBLE(0.02, all[0].yaw_sigma_rad);
   TEST_ASSERT_TRUE(isnan(all[1].cov_m2[0]) && isnan(all[1].cov_m2[1]) && isnan(all[1].yaw_sigma_rad));
@@ -196,7 +196,7 @@ static void overridden(void) {
   snprintf(overrides.landmarks, sizeof overrides.landmarks, "%s", folder_path("other.csv"));
   open_it();
   size_t count;
-  wm_recording_landmarks(recording, &count);
+  wm_site_landmarks(wm_recording_site(recording), &count);
   TEST_ASSERT_EQUAL(2, count);
   snprintf(overrides.calibration, sizeof overrides.calibration, "no/such.yaml");
   refused("no/such.yaml: there is no such file");

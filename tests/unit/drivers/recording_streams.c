@@ -212,7 +212,7 @@ static void sightings_by_sensor(void) {
                "5,,1,0,1\n6,left,-2,0,1\n7,right,3,0,0\n");
   wm_source *left = source("sightings:left"), *right = source("sightings:right"), *front = source("sightings:front");
   size_t count;
-  const wm_sensor *sensors = wm_recording_sensors(recording, &count);
+  const wm_sensor *sensors = wm_site_sensors(wm_recording_site(recording), &count);
   TEST_ASSERT_EQUAL(3, count);
   wm_event event = next(left);
   TEST_ASSERT_EQUAL_STRING("left", sensors[event.as.sighting.sensor].name);

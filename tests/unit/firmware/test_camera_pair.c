@@ -102,8 +102,9 @@ static void make(void) {
   taker = *config.estimator;
   taker.takes |= kPair.gives;
   config.estimator = &taker;
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_recording_open_robot("robot", &config.overrides, NULL, NULL, &robot, &err),
-                            err.text);
+  wm_site *site;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_site_open(NULL, &config.overrides, NULL, NULL, &site, &err), err.text);
+  TEST_ASSERT_EQUAL(WM_OK, wm_recording_of_site("robot", site, &robot, &err));
   wm_recording_set_pictures(robot, &pictures);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_vision_open(&config, robot, NULL, NULL, &vision, &err), err.text);
   TEST_ASSERT_EQUAL(WM_OK, wm_arena_fill(&arena, needs, wm_vision_needs(vision, needs), 0, &err));

@@ -63,7 +63,7 @@ void test_what_was_known_beforehand_is_read_back() {
   write_and_open(false);
   TEST_ASSERT_EQUAL_STRING("crossing", wm_recording_name(opened));
   TEST_ASSERT_DOUBLE_WITHIN(1e-3, made.drive.duration_s(), wm_recording_duration_s(opened));
-  const wm_wheels *w = wm_recording_wheels(opened);
+  const wm_wheels *w = wm_site_wheels(wm_recording_site(opened));
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.25, w->radius_m);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1024, w->ticks_per_turn);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.2, w->track_m);
@@ -74,20 +74,20 @@ void test_what_was_known_beforehand_is_read_back() {
     TEST_ASSERT_DOUBLE_WITHIN(1e-8, scenario.robot.wheels.road_wheel_rad[i], w->road_wheel_rad[i]);
   }
   size_t count = 0;
-  const wm_sensor *sensors = wm_recording_sensors(opened, &count);
+  const wm_sensor *sensors = wm_site_sensors(wm_recording_site(opened), &count);
   TEST_ASSERT_EQUAL(2, count);
   TEST_ASSERT_EQUAL_STRING("right", sensors[1].name);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, -50 * kPi / 180, sensors[1].mounting.rpy_rad[2]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, -0.4, sensors[1].mounting.xyz_m[1]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.3 * kPi / 180, sensors[0].bearing_sigma_rad);
-  const wm_landmark *landmarks = wm_recording_landmarks(opened, &count);
+  const wm_landmark *landmarks = wm_site_landmarks(wm_recording_site(opened), &count);
   TEST_ASSERT_EQUAL(3, count);
   for (size_t i = 0; i < 3; i++) {
     TEST_ASSERT_EQUAL(made.map[i].id, landmarks[i].id);
     for (int axis = 0; axis < 3; axis++) TEST_ASSERT_DOUBLE_WITHIN(1e-6, made.map[i].p_m[axis], landmarks[i].p_m[axis]);
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.02, landmarks[i].sigma_m);
   }
-  const wm_start *start = wm_recording_start(opened);
+  const wm_start *start = wm_site_start(wm_recording_site(opened));
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, made.start.p_m[0], start->p_m[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-6, made.start.heading_rad, start->heading_rad);
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.03, start->sigma_xy_m);
@@ -99,9 +99,9 @@ void test_bearings_are_those_of_truth() {
   size_t sources = 0, seen = 0;
   wm_source *const *all = wm_recording_sources(opened, &sources);
   size_t sensor_count = 0;
-  const wm_sensor *sensors = wm_recording_sensors(opened, &sensor_count);
+  const wm_sensor *sensors = wm_site_sensors(wm_recording_site(opened), &sensor_count);
   size_t landmark_count = 0;
-  const wm_landmark *landmarks = wm_recording_landmarks(opened, &landmark_count);
+  const wm_landmark *landmarks = wm_site_landmarks(wm_recording_site(opened), &landmark_count);
   for (size_t i = 0; i < sources; i++) {
     if (std::strncmp(all[i]->name, "sightings:", 10) != 0) continue;
     for (const wm_event &e : events_of(all[i])) {

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is known of a place and of the robot in it: calibration, landmarks and how they look, map, start. Of a
+// recording's folder or of single files. Small files are read whole when it is opened. Allocates; never on the
+// real-time thread.
+#ifndef WAYMARK_SITE_H
+#define WAYMARK_SITE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "waymark/setup.h"
+#include "waymark/status.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define WM_PATH_MAX 512
+#define WM_SENSORS_MAX 32
+
+// Files to take instead of the folder's own; "" where the folder's own is meant.
+typedef struct wm_recording_overrides {
+  char calibration[WM_PATH_MAX];
+  char landmarks[WM_PATH_MAX];
+  char dbc[WM_PATH_MAX];
+  char can_signals[WM_PATH_MAX];
+  char map[WM_PATH_MAX];  // a map.yaml
+} wm_recording_overrides;
+
+// Unknown keys and other oddities that don't stop are handed to `warn` (may be NULL), one line each.
+typedef void (*wm_warn_fn)(void *context, const char *text);
+
+typedef struct wm_site wm_site;
+
+// The folder `dir` with `files` (may be NULL) in place of its own; `dir` NULL: `files` alone.
+wm_status wm_site_open(const char *dir, const wm_recording_overrides *files, wm_warn_fn warn, void *context,
+                       wm_site **out, wm_error *err);
+void wm_site_close(wm_site *self);  // NULL is fine
+
+const wm_wheels *wm_site_wheels(const wm_site *self);
+const wm_rig *wm_site_rig(const wm_site *self);      // cameras; an empty one where calibration.yaml has none
+const wm_start *wm_site_start(const wm_site *self);  // initial_pose; NaN where unknown
+void wm_site_set_start(wm_site *self, const wm_start *start);
+const wm_sensor *wm_site_sensors(const wm_site *self, size_t *count);
+// Index of the sensor of this name, which `path` names. One that `sensors` of calibration.yaml doesn't have is added
+// where the camera of its name sits, or at base_link, sigmas unknown: ask for the sensors afterwards. WM_FULL: no room.
+wm_status wm_site_sensor(wm_site *self, const char *path, const char *name, uint16_t *out, wm_error *err);
+// The same for the sensor that a camera's detectors are.
+wm_status wm_site_camera_sensor(wm_site *self, const char *camera, uint16_t *out, wm_error *err);
+const wm_landmark *wm_site_landmarks(const wm_site *self, size_t *count);
+// Those of landmarks/appearance.csv beside the landmarks.csv in use, read when first asked for and kept as long as the
+// site; none where there is no such file.
+wm_status wm_site_appearances(wm_site *self, const wm_appearance **out, size_t *count, wm_error *err);
+// Path of the map's YAML: the file that is named, else map/map.yaml of the folder; "" where neither is there.
+const char *wm_site_map_path(const wm_site *self);
+// The raster map, read when first asked for and kept as long as the site; NULL where there is none. Errors as
+// wm_map_load (waymark/map.h).
+wm_status wm_site_map(wm_site *self, const wm_raster **out, wm_error *err);
+// Text of calibration.yaml as read ("" where there is none), for the event log.
+const char *wm_site_calibration_text(const wm_site *self, size_t *length);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
