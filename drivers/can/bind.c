@@ -28,7 +28,7 @@ __attribute__((format(printf, 2, 3))) static wm_status refuse(maker *m, const ch
   va_end(args);
   const wm_can_binding *b = m->binding;
   return wm_fail(m->err, WM_BAD_CONFIG, "%s:%d: %s: %s", b->file[0] ? b->file : "can-signals.yaml", b->line,
-                 wm_quantity_name((unsigned)b->quantity), what);
+                 wm_can_quantity_name((unsigned)b->quantity), what);
 }
 
 static int is_ticks(const wm_can_binding *b) {
@@ -309,7 +309,7 @@ static void find_counter(const maker *m, bound_message *out) {
 static wm_status refuse_twice_bound(maker *m, const wm_can_binding *bindings, size_t count) {
   for (size_t i = 0; i < count; i++) {
     m->binding = &bindings[i];
-    if (bindings[i].quantity < 0 || bindings[i].quantity >= WM_Q_COUNT)
+    if (bindings[i].quantity < 0 || bindings[i].quantity >= WM_CAN_COUNT)
       return refuse(m, "%d is no quantity", bindings[i].quantity);
     for (size_t k = 0; k < i; k++)
       if (bindings[k].quantity == bindings[i].quantity)
@@ -348,7 +348,11 @@ static int by_key(const void *a, const void *b) {
 }
 
 static wm_can_decoder *allocate(size_t dbc_ranges) {
-  enum { kQuantities = WM_Q_COUNT, kSignals = kQuantities * WM_CAN_SUM_MAX, kSelectors = kSignals * DBC_SELECTORS_MAX };
+  enum {
+    kQuantities = WM_CAN_COUNT,
+    kSignals = kQuantities * WM_CAN_SUM_MAX,
+    kSelectors = kSignals * DBC_SELECTORS_MAX
+  };
   wm_can_decoder *self = calloc(1, sizeof *self);
   if (!self) return NULL;
   self->messages = calloc(kQuantities, sizeof *self->messages);
@@ -365,7 +369,7 @@ wm_status wm_can_decoder_make(const wm_dbc *dbc, const wm_can_binding *bindings,
                               wm_error *err) {
   *out = NULL;
   maker m = {.dbc = dbc, .err = err};
-  wm_status status = refuse_twice_bound(&m, bindings, count);  // so there are at most WM_Q_COUNT
+  wm_status status = refuse_twice_bound(&m, bindings, count);  // so there are at most WM_CAN_COUNT
   if (status != WM_OK) return status;
   if (!(m.self = allocate(dbc->range_count))) return wm_fail(err, WM_FULL, "no memory for the CAN decoder");
   if (dbc->range_count > 0) memcpy(m.self->ranges, dbc->ranges, dbc->range_count * sizeof *dbc->ranges);

@@ -27,6 +27,7 @@ typedef struct can_device {
   can_clock clock;
   uint32_t queue_dropped;
   uint32_t seq;
+  wm_can_gnss gnss;
 } can_device;
 
 static void set_state(can_device *self, wm_device_state state, const char *note) {
@@ -122,12 +123,17 @@ static int take_frame(can_device *self, const wm_can_frame *frame, wm_time_ns ar
   wm_source_counts *counts = &self->base.counts;
   wm_error why = {0};
   if (frame->is_error) return 0;
+  wm_quantities values;
   memset(out, 0, WM_EVENT_SMALL_BYTES);
-  wm_status status = wm_can_decode(self->decoder, frame, &out->as.quantities, counts, &why);
+  wm_status status = wm_can_decode(self->decoder, frame, &values, counts, &why);
   if (status == WM_BAD_DATA && !counts->first_problem[0])
     (void)snprintf(counts->first_problem, sizeof counts->first_problem, "%.255s", why.text);
   if (status != WM_OK) return 0;  // counted by the decoder
-  out->kind = WM_EVENT_QUANTITIES;
+  out->kind = self->base.is_motion ? WM_EVENT_QUANTITIES : WM_EVENT_POSITION;
+  if (self->base.is_motion)
+    out->as.quantities = values;
+  else if (!wm_can_gnss_take(&self->gnss, &values, &out->as.position))
+    return 0;
   out->source = self->base.index;
   out->t_ns = frame->t_ns;
   out->arrival_ns = arrival_ns;
@@ -210,6 +216,13 @@ wm_status can_device_make(const char *interface, wm_can_decoder *decoder, const 
   if (self->id_count > IDS_MAX) self->id_count = IDS_MAX;
   *out = &self->base;
   return WM_OK;
+}
+
+void can_device_gives_positions(wm_source *device, const double gnss_origin[3]) {
+  device->is_motion = 0;
+  device->kinds = WM_EVENT_BIT(WM_EVENT_POSITION);
+  (void)snprintf(device->name, sizeof device->name, "can-gnss");
+  wm_can_gnss_init(&((can_device *)device)->gnss, gnss_origin);
 }
 
 // ── all frames, as they are ─────────────────────────────────────────────────────────────────────────────────────────

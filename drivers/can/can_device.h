@@ -10,6 +10,8 @@
 // interface needn't be there: it is looked for again and again.
 wm_status can_device_make(const char *interface, wm_can_decoder *decoder, const can_io *io, void *io_context,
                           wm_source **out, wm_error *err);
+// Of the values of a GNSS receiver, in place of quantities.
+void can_device_gives_positions(wm_source *device, const double gnss_origin[3]);
 // What an error frame says of the controller (linux/can/error.h), counted into `counts`. Pure.
 void can_error_take(const wm_can_frame *frame, const char *interface, wm_source_counts *counts);
 

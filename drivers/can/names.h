@@ -15,7 +15,7 @@ typedef enum wm_dimension {
 
 // SI units of a dimension, as a text for messages: "m/s, km/h, mph", ...
 const char *wm_dimension_units(wm_dimension dimension);
-// The dimension of a wm_quantity.
+// The dimension of a quantity that signals are bound to.
 wm_dimension wm_quantity_dimension(int quantity);
 
 // A unit in one of its spellings (upper or lower case, with or without blanks, the degree sign in UTF-8 or

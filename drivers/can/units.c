@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "names.h"
+#include "waymark/can.h"
 #include "waymark/event.h"
 
 #define PI 3.14159265358979323846
@@ -123,6 +124,8 @@ const char *wm_dimension_units(wm_dimension dimension) {
 }
 
 wm_dimension wm_quantity_dimension(int quantity) {
+  if (quantity == WM_CAN_LATITUDE || quantity == WM_CAN_LONGITUDE) return WM_DIM_ANGLE;
+  if (quantity > WM_CAN_LONGITUDE && quantity < WM_CAN_VALID) return WM_DIM_LENGTH;
   switch ((wm_quantity)quantity) {
     case WM_Q_WHEEL_SPEED_FRONT_LEFT:
     case WM_Q_WHEEL_SPEED_FRONT_RIGHT:

@@ -30,6 +30,7 @@ void calibration_init(calibration *self) {
   wm_wheels *w = &self->wheels;
   w->radius_m = w->ticks_per_turn = w->track_m = w->wheelbase_m = w->steering_ratio = w->encoder_offset_m = (double)NAN;
   wm_rig_init(&self->rig);
+  for (int i = 0; i < 3; i++) self->gnss_origin[i] = (double)NAN;
 }
 
 wm_status calibration_keys(const wm_yaml_node *map, const char *const *known, const warner *warn, wm_error *err) {
@@ -269,19 +270,28 @@ static wm_status read_motion6(const wm_yaml_node *motion6, const warner *warn, w
   return WM_OK;
 }
 
+static wm_status read_gnss(const wm_yaml_node *gnss, const warner *warn, double origin[3], wm_error *err) {
+  static const char *const kKeys[] = {"origin", NULL};
+  TRY(calibration_keys(gnss, kKeys, warn, err));
+  wm_yaml_node node = wm_yaml_get(gnss, "origin");
+  return wm_yaml_there(&node) ? list_in(&node, 3, 3, -1e4, 1e4, origin, NULL, err) : WM_OK;
+}
+
 wm_status calibration_read(const wm_yaml *doc, const warner *warn, calibration *out, wm_error *err) {
-  static const char *const kKeys[] = {"cameras", "sensors", "stereo", "wheels", "markers", "motion6", NULL};
+  static const char *const kKeys[] = {"cameras", "sensors", "stereo", "wheels", "markers", "motion6", "gnss", NULL};
   calibration_init(out);
   wm_yaml_node root = wm_yaml_root(doc);
   TRY(calibration_keys(&root, kKeys, warn, err));
   wm_yaml_node cameras = wm_yaml_get(&root, "cameras"), sensors = wm_yaml_get(&root, "sensors"),
                stereo = wm_yaml_get(&root, "stereo"), wheels = wm_yaml_get(&root, "wheels"),
-               markers = wm_yaml_get(&root, "markers"), motion6 = wm_yaml_get(&root, "motion6");
+               markers = wm_yaml_get(&root, "markers"), motion6 = wm_yaml_get(&root, "motion6"),
+               gnss = wm_yaml_get(&root, "gnss");
   TRY(read_cameras(&cameras, warn, out, err));
   TRY(read_sensors(&sensors, warn, out, err));
   TRY(read_wheels(&wheels, warn, &out->wheels, err));
   if (wm_yaml_there(&stereo)) TRY(read_stereo(&stereo, warn, &out->rig, err));
   TRY(read_markers(&markers, warn, &out->rig, err));
   if (out->rig.marker_family[0]) add_marker_cameras(out);
-  return read_motion6(&motion6, warn, &out->rig, err);
+  TRY(read_motion6(&motion6, warn, &out->rig, err));
+  return read_gnss(&gnss, warn, out->gnss_origin, err);
 }

@@ -19,6 +19,7 @@ typedef struct calibration {
   wm_rig rig;
   wm_sensor sensors[WM_SENSORS_MAX];
   size_t sensor_count;
+  double gnss_origin[3];  // latitude and longitude in degrees, altitude in m; NaN: unknown
 } calibration;
 
 // Nothing known: no wheels, no sensors.

@@ -21,8 +21,8 @@ static wm_status optional(const wm_yaml_node *item, const char *key, char *out, 
 }
 
 static wm_status read_quantity(const wm_yaml_node *item, wm_can_binding *out, wm_error *err) {
-  const char *names[WM_Q_COUNT + 1] = {NULL};
-  for (unsigned q = 0; q < WM_Q_COUNT; q++) names[q] = wm_quantity_name(q);
+  const char *names[WM_CAN_COUNT + 1] = {NULL};
+  for (unsigned q = 0; q < WM_CAN_COUNT; q++) names[q] = wm_can_quantity_name(q);
   wm_yaml_node node = wm_yaml_get(item, "quantity");
   if (!wm_yaml_there(&node)) return wm_yaml_fail(item, err, "quantity: is missing");
   int32_t quantity;
@@ -101,7 +101,7 @@ static wm_status read_binding(const wm_yaml_node *item, wm_can_binding *out, wm_
 }
 
 static wm_status read_bindings(const wm_yaml_node *list, wm_can_binding *out, wm_error *err) {
-  int line_of[WM_Q_COUNT] = {0};
+  int line_of[WM_CAN_COUNT] = {0};
   for (size_t i = 0; i < wm_yaml_count(list); i++) {
     wm_yaml_node item = wm_yaml_item(list, i);
     wm_status status = read_binding(&item, &out[i], err);
@@ -109,7 +109,7 @@ static wm_status read_bindings(const wm_yaml_node *list, wm_can_binding *out, wm
     int *before = &line_of[out[i].quantity];
     if (*before)
       return wm_yaml_fail(&item, err, "%s is bound twice (first in line %d)",
-                          wm_quantity_name((unsigned)out[i].quantity), *before);
+                          wm_can_quantity_name((unsigned)out[i].quantity), *before);
     *before = out[i].line;
   }
   return WM_OK;
@@ -144,14 +144,24 @@ wm_status can_signals_read(const char *path, wm_can_binding **out, size_t *count
   return status;
 }
 
-wm_status wm_can_decoder_load(const char *dbc_path, const char *signals_path, wm_can_decoder **out, wm_error *err) {
+// Leaves those of one part.
+static size_t keep_part(wm_can_binding *bindings, size_t count, wm_can_part part) {
+  size_t kept = 0;
+  for (size_t i = 0; i < count; i++)
+    if ((bindings[i].quantity >= WM_CAN_LATITUDE) == (part == WM_CAN_GNSS)) bindings[kept++] = bindings[i];
+  return kept;
+}
+
+wm_status wm_can_decoder_load(const char *dbc_path, const char *signals_path, wm_can_part part, wm_can_decoder **out,
+                              wm_error *err) {
   wm_dbc *dbc = NULL;
   wm_can_binding *bindings = NULL;
   size_t count = 0;
   *out = NULL;
   wm_status status = wm_dbc_load(dbc_path, &dbc, err);
   if (status == WM_OK) status = can_signals_read(signals_path, &bindings, &count, err);
-  if (status == WM_OK) status = wm_can_decoder_make(dbc, bindings, count, out, err);
+  if (status == WM_OK) count = keep_part(bindings, count, part);
+  if (status == WM_OK && count > 0) status = wm_can_decoder_make(dbc, bindings, count, out, err);
   free(bindings);
   wm_dbc_free(dbc);
   return status;

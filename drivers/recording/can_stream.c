@@ -18,6 +18,8 @@ typedef struct can_stream {
   wm_source base;
   line_reader lines;
   wm_can_decoder *decoder;
+  wm_can_part part;
+  wm_can_gnss gnss;
   arrival_order order;
   uint32_t seq;
   log_frame frame, ahead;
@@ -78,20 +80,25 @@ static wm_status next_frame(can_stream *self, wm_error *err) {
   }
 }
 
-static wm_status next_quantities(wm_source *base, wm_event *out, wm_error *err) {
+static wm_status next_event(wm_source *base, wm_event *out, wm_error *err) {
   can_stream *self = (can_stream *)base;
   for (;;) {
     wm_error why = {0};
     wm_status status = next_frame(self, err);
     if (status != WM_OK) return status;
     const wm_can_frame *frame = &self->frame.can;
+    wm_quantities values;
     memset(out, 0, WM_EVENT_SMALL_BYTES);
-    status = wm_can_decode(self->decoder, frame, &out->as.quantities, &base->counts, &why);
+    status = wm_can_decode(self->decoder, frame, &values, &base->counts, &why);
     if (status != WM_OK) {  // counted by the decoder
       if (why.text[0]) keep_problem(self, self->frame.line, why.text);
       continue;
     }
-    out->kind = WM_EVENT_QUANTITIES;
+    out->kind = self->part == WM_CAN_GNSS ? WM_EVENT_POSITION : WM_EVENT_QUANTITIES;
+    if (self->part == WM_CAN_MOTION)
+      out->as.quantities = values;
+    else if (!wm_can_gnss_take(&self->gnss, &values, &out->as.position))
+      continue;
     out->source = base->index;
     out->t_ns = frame->t_ns;
     out->arrival_ns = arrival_order_next(&self->order, frame->t_ns, &base->counts);
@@ -108,30 +115,32 @@ static void close_can(wm_source *base) {
   free(self);
 }
 
-static const wm_source_ops kCan = {next_quantities, close_can};
+static const wm_source_ops kCan = {next_event, close_can};
 
-wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, wm_source **out, uint32_t *quantities,
-                          wm_error *err) {
+wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, wm_can_part part,
+                          const double gnss_origin[3], wm_source **out, uint32_t *quantities, wm_error *err) {
   const can_bus *is = &buses->bus[bus];
   *out = NULL;
   can_stream *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "%s: no memory to read it", log);
   self->base.ops = &kCan;
-  self->base.is_motion = 1;
+  self->base.is_motion = part == WM_CAN_MOTION;
   self->base.in_order = 1;
-  self->base.kinds = WM_EVENT_BIT(WM_EVENT_QUANTITIES);
+  self->base.kinds = WM_EVENT_BIT(part == WM_CAN_GNSS ? WM_EVENT_POSITION : WM_EVENT_QUANTITIES);
+  self->part = part;
+  wm_can_gnss_init(&self->gnss, gnss_origin);
   self->lines.fd = -1;
   self->buses = *buses;
   self->bus = bus;
-  snprintf(self->base.name, sizeof self->base.name, "can%s%s", buses->count > 1 ? ":" : "",
-           buses->count > 1 ? is->interface : "");
-  wm_status status = wm_can_decoder_load(is->dbc, is->signals, &self->decoder, err);
-  if (status == WM_OK) status = lines_open(&self->lines, log, err);
-  if (status != WM_OK) {
+  snprintf(self->base.name, sizeof self->base.name, "can%s%s%s", part == WM_CAN_GNSS ? "-gnss" : "",
+           buses->count > 1 ? ":" : "", buses->count > 1 ? is->interface : "");
+  wm_status status = wm_can_decoder_load(is->dbc, is->signals, part, &self->decoder, err);
+  if (status == WM_OK && self->decoder) status = lines_open(&self->lines, log, err);
+  if (status != WM_OK || !self->decoder) {
     close_can(&self->base);
     return status;
   }
-  *quantities = wm_can_decoder_quantities(self->decoder);
+  if (part == WM_CAN_MOTION) *quantities = wm_can_decoder_quantities(self->decoder);
   *out = &self->base;
   return WM_OK;
 }

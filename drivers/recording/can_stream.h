@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// can.log as sources of events: one for each bus that recording.yaml names under `can`, or one for all frames.
+// can.log as sources of events: one for each bus that recording.yaml names under `can`, or one for all frames; and
+// those of the buses' GNSS receivers.
 #ifndef WM_RECORDING_CAN_STREAM_H
 #define WM_RECORDING_CAN_STREAM_H
 
@@ -20,8 +21,9 @@ typedef struct can_buses {
 // `can:` of recording.yaml, a list of {interface, dbc, signals}; files are in `dir`. Nothing where it isn't there.
 wm_status can_buses_read(const wm_yaml_node *list, const char *dir, can_buses *out, wm_error *err);
 
-// The stream of one of the buses. *quantities: bit per wm_quantity that it can give.
-wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, wm_source **out, uint32_t *quantities,
-                          wm_error *err);
+// The stream of one of the buses: quantities, or the GNSS receiver's positions about `gnss_origin`. *quantities: bit
+// per wm_quantity that it can give. *out is NULL where nothing of that part is bound.
+wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, wm_can_part part,
+                          const double gnss_origin[3], wm_source **out, uint32_t *quantities, wm_error *err);
 
 #endif

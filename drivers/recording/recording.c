@@ -232,6 +232,15 @@ static const char *missing_of(const wm_recording *self, const can_buses *buses) 
   return NULL;
 }
 
+static wm_status add_bus(wm_recording *self, const char *log, const can_buses *buses, size_t bus, wm_can_part part,
+                         wm_error *err) {
+  wm_source *source;
+  uint32_t quantities = 0;
+  wm_status status = can_stream_open(log, buses, bus, part, wm_site_gnss_origin(self->site), &source, &quantities, err);
+  self->quantities |= quantities;
+  return status == WM_OK && source ? add_source(self, source, err) : status;
+}
+
 static wm_status add_can(wm_recording *self, wm_error *err) {
   char log[WM_PATH_MAX], motion[WM_PATH_MAX];
   int have_log, have_motion = 0;
@@ -251,11 +260,8 @@ static wm_status add_can(wm_recording *self, wm_error *err) {
                    missing);
   if (missing) warn_line(&self->warn, "%s: is not there; can.log is not read", missing);
   for (size_t i = 0; !missing && status == WM_OK && (i == 0 || i < buses.count); i++) {
-    wm_source *source;
-    uint32_t quantities = 0;
-    status = can_stream_open(log, &buses, i, &source, &quantities, err);
-    self->quantities |= quantities;
-    if (status == WM_OK) status = add_source(self, source, err);
+    status = add_bus(self, log, &buses, i, WM_CAN_MOTION, err);
+    if (status == WM_OK) status = add_bus(self, log, &buses, i, WM_CAN_GNSS, err);
   }
   return status;
 }

@@ -6,17 +6,26 @@
 
 #include "cameras.h"
 
-// "can" for the only interface, "can:can1" where there are several.
+// One interface, or of several with its name behind the source's: "can:can1".
+static wm_status add_interface(const wm_can_device_config *device, int is_one, wm_can_part part, wm_recording *robot,
+                               wm_error *err) {
+  wm_source *source;
+  uint32_t quantities = 0;
+  wm_status status =
+      wm_can_device_open(device, part, wm_site_gnss_origin(wm_recording_site(robot)), &source, &quantities, err);
+  if (status != WM_OK || !source) return status;
+  const size_t end = strlen(source->name);
+  if (!is_one) snprintf(source->name + end, sizeof source->name - end, ":%s", device->interface);
+  return wm_recording_add_device(robot, source, quantities, err);
+}
+
 static wm_status add_can(const wm_config *config, wm_recording *robot, wm_error *err) {
   const wm_devices_config *devices = &config->devices;
   wm_status status = WM_OK;
   for (size_t i = 0; status == WM_OK && i < devices->can_count; i++) {
-    wm_source *source;
-    uint32_t quantities = 0;
-    status = wm_can_device_open(&devices->can[i], &source, &quantities, err);
-    if (status != WM_OK) return status;
-    if (devices->can_count > 1) snprintf(source->name, sizeof source->name, "can:%s", devices->can[i].interface);
-    status = wm_recording_add_device(robot, source, quantities, err);
+    const int is_one = devices->can_count == 1;
+    status = add_interface(&devices->can[i], is_one, WM_CAN_MOTION, robot, err);
+    if (status == WM_OK) status = add_interface(&devices->can[i], is_one, WM_CAN_GNSS, robot, err);
   }
   return status;
 }

@@ -48,11 +48,41 @@ wm_status wm_dbc_load(const char *path, wm_dbc **out, wm_error *err);
 wm_status wm_dbc_parse(const char *text, size_t length, const char *path_for_messages, wm_dbc **out, wm_error *err);
 void wm_dbc_free(wm_dbc *dbc);  // NULL is fine
 
+// Further quantities: those of a GNSS receiver, which become positions (wm_can_gnss). Angles in rad, lengths in m.
+enum {
+  WM_CAN_LATITUDE = WM_Q_COUNT,
+  WM_CAN_LONGITUDE,
+  WM_CAN_ALTITUDE,
+  WM_CAN_SIGMA_XY,
+  WM_CAN_SIGMA_Z,
+  WM_CAN_VALID,  // 0: the receiver has no fix
+  WM_CAN_COUNT
+};
+// Of a wm_quantity or of the above, as can-signals.yaml writes it; "?" where there is none.
+const char *wm_can_quantity_name(unsigned quantity);
+
+// The bindings of one source: what moves the robot, or its GNSS receiver.
+typedef enum wm_can_part { WM_CAN_MOTION, WM_CAN_GNSS } wm_can_part;
+
+// Positions from the values of a GNSS receiver, in metres east and north of an origin (WGS84 by its radii of curvature
+// there: 1 m at 10 km) and above it.
+typedef struct wm_can_gnss {
+  double origin[3];  // rad, rad, m; NaN: the first position
+  double level_m;    // the map's above the ellipsoid
+  double value[WM_CAN_COUNT - WM_CAN_LATITUDE];
+  uint32_t fresh;  // bit per value since the last position
+} wm_can_gnss;
+// `origin`: latitude and longitude in degrees, altitude in m; NaN: unknown.
+void wm_can_gnss_init(wm_can_gnss *self, const double origin[3]);
+// Takes the values of a frame. 1: with latitude and longitude it makes a position. Without a stated accuracy 5 m, and
+// twice the horizontal one for the altitude; without an altitude its fields are NaN.
+int wm_can_gnss_take(wm_can_gnss *self, const wm_quantities *values, wm_position *out);
+
 // The line of can-signals.yaml that binds signals to one quantity.
 #define WM_CAN_SUM_MAX 4
 #define WM_CAN_VALUES_MAX 32
 typedef struct wm_can_binding {
-  int quantity;                     // wm_quantity
+  int quantity;                     // wm_quantity or WM_CAN_LATITUDE ...
   char message[64];                 // name in the DBC, short or long
   char signal[WM_CAN_SUM_MAX][64];  // several: their sum
   uint32_t signal_count;

@@ -106,8 +106,10 @@ typedef struct wm_devices_config {
 } wm_devices_config;
 
 // A SocketCAN interface: quantities as its DBC and binding say, filtered by the kernel to the ids that are needed.
-// *quantities: bit per wm_quantity that it can give. WM_BAD_CONFIG where DBC or binding are wrong.
-wm_status wm_can_device_open(const wm_can_device_config *config, wm_source **out, uint32_t *quantities, wm_error *err);
+// *quantities: bit per wm_quantity that it can give. The part of a GNSS receiver gives positions about the origin. *out
+// is NULL where nothing of that part is bound. WM_BAD_CONFIG where DBC or binding are wrong.
+wm_status wm_can_device_open(const wm_can_device_config *config, wm_can_part part, const double gnss_origin[3],
+                             wm_source **out, uint32_t *quantities, wm_error *err);
 
 #ifdef __cplusplus
 }

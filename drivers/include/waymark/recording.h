@@ -48,8 +48,9 @@ extern const char *const wm_start_keys[];
 void wm_start_init(wm_start *out);
 wm_status wm_start_read(const wm_yaml_node *map, wm_start *out, wm_error *err);
 
-// A decoder from a DBC file and a can-signals.yaml. Allocates.
-wm_status wm_can_decoder_load(const char *dbc_path, const char *signals_path, wm_can_decoder **out, wm_error *err);
+// A decoder from a DBC file and one part of a can-signals.yaml; NULL where nothing of that part is bound. Allocates.
+wm_status wm_can_decoder_load(const char *dbc_path, const char *signals_path, wm_can_part part, wm_can_decoder **out,
+                              wm_error *err);
 
 // landmarks.csv alone; the caller frees *out. An empty z_m is 0, with a warning; an empty sigma_m or yaw_rad is NaN.
 // Columns cov_xx, cov_xy, cov_yy and cov_tt, as a run writes them, are optional. A duplicate id and a row that can't be

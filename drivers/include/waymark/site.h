@@ -47,6 +47,8 @@ const wm_sensor *wm_site_sensors(const wm_site *self, size_t *count);
 wm_status wm_site_sensor(wm_site *self, const char *path, const char *name, uint16_t *out, wm_error *err);
 // The same for the sensor that a camera's detectors are.
 wm_status wm_site_camera_sensor(wm_site *self, const char *camera, uint16_t *out, wm_error *err);
+// Latitude and longitude in degrees and altitude in m of the map's origin; NaN where calibration.yaml has none.
+const double *wm_site_gnss_origin(const wm_site *self);
 const wm_landmark *wm_site_landmarks(const wm_site *self, size_t *count);
 // Those of landmarks/appearance.csv beside the landmarks.csv in use, read when first asked for and kept as long as the
 // site; none where there is no such file.

@@ -250,6 +250,44 @@ static void can_and_its_binding(void) {
   TEST_ASSERT_NOT_NULL(strstr(warnings, "vehicle.dbc: is not there; can.log is not read"));
 }
 
+// Positions of a receiver on the bus: about the origin of calibration.yaml, with its own accuracy, none without a fix.
+static void gnss_over_can(void) {
+  folder_write("vehicle.dbc",
+               "BU_: CAR\nBO_ 3 GPS: 8 CAR\n SG_ LAT : 0|32@1- (1e-07,0) [0|0] \"deg\" CAR\n"
+               " SG_ LON : 32|32@1- (1e-07,0) [0|0] \"deg\" CAR\n"
+               "BO_ 4 FIX: 4 CAR\n SG_ OK : 0|8@1+ (1,0) [0|0] \"\" CAR\n SG_ ACC : 8|8@1+ (0.1,0) [0|0] \"m\" CAR\n"
+               " SG_ ALT : 16|16@1- (0.1,0) [0|0] \"m\" CAR\n");
+  folder_write("can-signals.yaml",
+               "- {quantity: gnss_latitude, message: GPS, signal: LAT}\n"
+               "- {quantity: gnss_longitude, message: GPS, signal: LON}\n"
+               "- {quantity: gnss_valid, message: FIX, signal: OK}\n"
+               "- {quantity: gnss_sigma_xy, message: FIX, signal: ACC}\n"
+               "- {quantity: gnss_altitude, message: FIX, signal: ALT}\n");
+  folder_write("calibration.yaml", "gnss: {origin: [52.5, 13.4, 30]}\n");
+  folder_write("can.log",
+               "(1.0) can0 004#01195E01\n(1.1) can0 003#40DD4A1F80ADFC07\n(2.0) can0 003#50044B1F80ADFC07\n"
+               "(3.0) can0 004#00195E01\n(3.1) can0 003#50044B1F80ADFC07\n(4.0) can0 7FF#00\n");
+  open_it();
+  TEST_ASSERT_EQUAL(0, wm_recording_quantities(recording));
+  size_t count;
+  wm_source *const *sources = wm_recording_sources(recording, &count);
+  TEST_ASSERT_EQUAL(2, count);  // and motion.csv
+  wm_source *gnss = sources[0];
+  TEST_ASSERT_EQUAL_STRING("can-gnss", gnss->name);
+  TEST_ASSERT_FALSE(gnss->is_motion);
+  wm_event event;
+  TEST_ASSERT_EQUAL(WM_OK, gnss->ops->next(gnss, &event, &err));
+  TEST_ASSERT_EQUAL(WM_EVENT_POSITION, event.kind);
+  TEST_ASSERT_EQUAL(1100000000, event.t_ns);
+  const double first[3] = {0, 0, 5};
+  for (int i = 0; i < 3; i++) TEST_ASSERT_DOUBLE_WITHIN(1e-6, first[i], event.as.position.p_m[i]);
+  TEST_ASSERT_EQUAL_DOUBLE(2.5, event.as.position.sigma_xy_m);
+  TEST_ASSERT_EQUAL_DOUBLE(5.0, event.as.position.sigma_z_m);
+  TEST_ASSERT_EQUAL(WM_OK, gnss->ops->next(gnss, &event, &err));
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 111.27, event.as.position.p_m[1]);  // 0.001 degrees of the meridian there
+  TEST_ASSERT_EQUAL(WM_END, gnss->ops->next(gnss, &event, &err));
+}
+
 static void too_many_sensors(void) {
   char text[8192] = "t_ns,sensor,id,bearing_rad,range_m\n";
   for (int i = 0; i < 33; i++) sprintf(text + strlen(text), "%d,s%d,1,0,1\n", i, i);
@@ -268,6 +306,7 @@ int main(void) {
   RUN_TEST(overridden);
   RUN_TEST(unlisted_streams);
   RUN_TEST(can_and_its_binding);
+  RUN_TEST(gnss_over_can);
   RUN_TEST(too_many_sensors);
   return UNITY_END();
 }
