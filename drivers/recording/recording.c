@@ -331,6 +331,7 @@ wm_pictures *wm_recording_pictures(const wm_recording *self) { return self->pict
 void wm_recording_close(wm_recording *self) {
   if (!self) return;
   for (size_t i = 0; i < self->source_count; i++) self->sources[i]->ops->close(self->sources[i]);
+  for (size_t i = 0; i < WM_SENSORS_MAX; i++) wm_corner_reader_free(self->corners[i]);
   if (self->pictures) self->pictures->ops->close(self->pictures);
   wm_yaml_free(self->about);
   wm_site_close(self->site);
