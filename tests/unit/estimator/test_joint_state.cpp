@@ -375,6 +375,17 @@ void test_the_pose_alone_is_corrected(void) {
   TEST_ASSERT_EQUAL_DOUBLE(from_2[3], from_3[2]);
 }
 
+// One row of a landmark seen from the robot.
+static joint_state::innovation_block see_landmark(made *m, int first, double innovation, double noise, joint_row *row) {
+  row->add(wm::kX, -0.6);
+  row->add(wm::kY, 0.8);
+  row->add(first, 0.6);
+  row->add(first + 1, -0.8);
+  joint_state::innovation_block block;
+  m->state->prepare(row, &innovation, &noise, 1, &block);
+  return block;
+}
+
 // [Schmidt1966] with the gain of one landmark alone, on the whole matrix: P <- (I - K H) P (I - K H)' + K R K'.
 void test_a_landmark_alone_is_corrected(void) {
   made m(false);
@@ -382,14 +393,9 @@ void test_a_landmark_alone_is_corrected(void) {
   const matrix before = m.covariance();
   const size_t n = before.size();
   const int landmark = 1, first = m.state->landmark_state(landmark);
-  joint_row row;
-  row.add(wm::kX, -0.6);
-  row.add(wm::kY, 0.8);
-  row.add(first, 0.6);
-  row.add(first + 1, -0.8);
   const double noise = 0.02, innovation = 0.3;
-  joint_state::innovation_block block;
-  m.state->prepare(&row, &innovation, &noise, 1, &block);
+  joint_row row;
+  const joint_state::innovation_block block = see_landmark(&m, first, innovation, noise, &row);
   std::vector<double> h(n), gain(n), value;
   for (int k = 0; k < row.count; k++) h[(size_t)row.index[k]] += row.by[k];
   for (size_t i = (size_t)first; i < (size_t)first + 2; i++)
@@ -417,13 +423,7 @@ void test_a_landmark_alone_is_transported_to_its_new_place(void) {
     for (int i = 0; i < 3; i++) m.add(3.0 + i, 1.0 - 0.5 * i);
     first = m.state->landmark_state(1);
     joint_row row;
-    row.add(wm::kX, -0.6);
-    row.add(wm::kY, 0.8);
-    row.add(first, 0.6);
-    row.add(first + 1, -0.8);
-    const double noise = 0.02, innovation = 0.3;
-    joint_state::innovation_block block;
-    m.state->prepare(&row, &innovation, &noise, 1, &block);
+    const joint_state::innovation_block block = see_landmark(&m, first, 0.3, 0.02, &row);
     for (int k = 0; k < 2; k++) moved[k] = -m.state->value(first + k);
     m.state->fuse_landmark(1, block);
     for (int k = 0; k < 2; k++) moved[k] += m.state->value(first + k);
