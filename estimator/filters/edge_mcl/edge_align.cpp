@@ -83,6 +83,18 @@ bool edge_mcl::predict_scan(int camera, prediction *out) const {
   return true;
 }
 
+void edge_mcl::prepare_points(const wm_points &points, int camera) {
+  for (uint32_t i = 0; i < points.count; i++) {
+    scan_point &to = points_[i];
+    const bool directed = finite((double)points.normal_rad[i]);
+    const sin_cos n = directed ? sincos((double)points.normal_rad[i]) : sin_cos{};
+    to.normal_cos = n.cos;
+    to.normal_sin = n.sin;
+    to.own2 = square(point_sigma(points, i, camera)) + square(params_.point_sigma_m);
+    to.on_line = on_a_line(points, i);
+  }
+}
+
 // Corrects a point by the camera's errors and finds the map's edge next to it. False: it is not used.
 bool edge_mcl::match(const wm_points &points, uint32_t i, const alignment &a, const capture &from,
                      matched_point *out) const {
@@ -97,9 +109,8 @@ bool edge_mcl::match(const wm_points &points, uint32_t i, const alignment &a, co
   out->from_y_m = h.sin * p.x + h.cos * p.y;
   out->x_m = from.pose.x_m + out->from_x_m;
   out->y_m = from.pose.y_m + out->from_y_m;
-  out->on_line = on_a_line(points, i);
-  out->own2 = square(point_sigma(points, i, a.camera)) + square(params_.point_sigma_m);
-  out->sigma2 = out->own2;
+  const scan_point &own = points_[i];
+  out->sigma2 = own.own2;
   if (a.camera >= 0)
     out->sigma2 += square(camera_[a.camera].sigma(camera_[a.camera].range(p.x, p.y), params_.common_px));
   out->line = map_.nearest_seen(out->x_m, out->y_m, out->x_m - from.eye_x_m, out->y_m - from.eye_y_m);
@@ -111,9 +122,10 @@ bool edge_mcl::match(const wm_points &points, uint32_t i, const alignment &a, co
     line.offset_m = -line.offset_m;
   }
   out->same_side = true;
-  if (line.found && finite((double)points.normal_rad[i])) {
-    const sin_cos n = sincos((double)points.normal_rad[i] + from.pose.heading_rad);
-    out->same_side = n.cos * line.normal_x + n.sin * line.normal_y >= kNormalGateCos;
+  if (line.found && (own.normal_cos != 0.0 || own.normal_sin != 0.0)) {
+    const double nx = h.cos * own.normal_cos - h.sin * own.normal_sin;
+    const double ny = h.sin * own.normal_cos + h.cos * own.normal_sin;
+    out->same_side = nx * line.normal_x + ny * line.normal_y >= kNormalGateCos;
   }
   out->residual_m = line.offset_m - (edge_state_ >= 0 ? a.value[kAlignEdge] : 0.0);
   return true;
@@ -121,12 +133,29 @@ bool edge_mcl::match(const wm_points &points, uint32_t i, const alignment &a, co
 
 // A point on a line that no edge explains lies beyond an edge, or is an edge's reflection in the floor, or neither.
 void edge_mcl::count_unexplained(const matched_point &p, const capture &from, normal_equations *out) const {
-  if (!p.on_line) return;
   const double ray_x = p.x_m - from.eye_x_m, ray_y = p.y_m - from.eye_y_m;
   if (through_an_edge(map_, p.x_m, p.y_m, ray_x, ray_y))
     out->beyond++;
   else
     out->reflected += before_an_edge(map_, p.x_m, p.y_m, ray_x, ray_y);
+}
+
+// Adds a point's cost and counts it. `near`: an edge is within the gate, on the side that is seen.
+void edge_mcl::count_point(const matched_point &p, const scan_point &own, bool near, const capture &from,
+                           double correlated, normal_equations *out) const {
+  const double residual2 = square(p.residual_m), unmatched = student_cost(square(params_.gate_m), p.sigma2) / correlated;
+  out->seen += (int)own.on_line;
+  out->cost += unmatched;
+  if (near) {
+    const double cost = student_cost(residual2, p.sigma2) / correlated;
+    if (cost < unmatched) out->cost += cost - unmatched;
+  }
+  if (near && (p.line.distance_m < kExplained_m || residual2 < kExplainedSigmas2 * own.own2)) {
+    out->explained++;
+    out->seen += own.on_line == 0;
+  } else if (own.on_line) {
+    count_unexplained(p, from, out);
+  }
 }
 
 // Derivatives of a point's distance to its edge, towards smaller residuals.
@@ -148,10 +177,10 @@ void edge_mcl::jacobian_of(const matched_point &p, const alignment &a, const cap
     if (a.state[k] < 0) (*row)[k] = 0.0;
 }
 
-// Normal equations of a scan at an alignment. `open`: a point's place is as uncertain as this prior leaves it, too, and
-// nothing is counted. Null: by its own error alone, and each point is counted as explained or not.
+// Normal equations of a scan at an alignment. `open`: a point's place is as uncertain as this prior leaves it, too; null:
+// by its own error alone. `counted`: with the cost, and each point is counted as explained or not.
 void edge_mcl::linearize(const wm_points &points, const alignment &a, double gate_m, const prediction *open,
-                         normal_equations *out) const {
+                         bool counted, normal_equations *out) const {
   *out = normal_equations{};
   align_vector row;
   const capture from = capture_of(a);
@@ -159,26 +188,14 @@ void edge_mcl::linearize(const wm_points &points, const alignment &a, double gat
   matched_point p;
   for (uint32_t i = 0; i < points.count; i++) {
     if (!match(points, i, a, from, &p)) continue;
-    out->seen += p.on_line;
-    const double unmatched = student_cost(square(params_.gate_m), p.sigma2) / correlated;
-    out->cost += unmatched;
-    if (!p.line.found || (!open && p.line.distance_m > gate_m) || !p.same_side) {
-      if (!open) count_unexplained(p, from, out);
-      continue;
-    }
-    const double residual2 = p.residual_m * p.residual_m;
-    const double cost = student_cost(residual2, p.sigma2) / correlated;
-    if (cost < unmatched) out->cost += cost - unmatched;
-    if (!open && p.line.distance_m >= kExplained_m && residual2 >= kExplainedSigmas2 * p.own2) {
-      count_unexplained(p, from, out);
-    } else if (!open) {
-      out->explained++;
-      out->seen += !p.on_line;
-    }
+    const bool near = p.line.found && (open || p.line.distance_m <= gate_m) && p.same_side;
+    if (counted) count_point(p, points_[i], near, from, correlated, out);
+    if (!near) continue;
     jacobian_of(p, a, from, &row);
     const double open2 = open ? (open->root.transpose() * row).squaredNorm() : 0.0;
     if (open && square(p.line.distance_m) > square(gate_m) + square(kOpenSigmas) * open2) continue;
-    const double variance = p.sigma2 + open2, weight = student_weight(residual2, variance) / (variance * correlated);
+    const double variance = p.sigma2 + open2;
+    const double weight = student_weight(square(p.residual_m), variance) / (variance * correlated);
     out->gradient += weight * p.residual_m * row;
     out->information.noalias() += (weight * row) * row.transpose();
   }
@@ -198,14 +215,15 @@ double edge_mcl::descend(const wm_points &points, const prediction &prior, doubl
     // The gate narrows from the uncertainty of pose and camera to that of a point.
     const bool coarse = round < kCoarseRounds;
     const double gate = params_.gate_m + (coarse ? slack_m : 0.0);
-    linearize(points, *a, gate > kCoarseGateMax_m ? kCoarseGateMax_m : gate, coarse ? &prior : nullptr, e);
-    if (round + 1 == kRounds) break;
+    const bool last = round + 1 == kRounds;
+    linearize(points, *a, gate > kCoarseGateMax_m ? kCoarseGateMax_m : gate, coarse ? &prior : nullptr, last, e);
+    if (last) break;
     align_matrix total = prior.inverse + e->information;
     const align_vector right = e->gradient + prior.inverse * difference_of(prior.mean, *a);
     for (int k = 0; k < kAlignStates; k++)
       if (a->state[k] < 0) total(k, k) = 1.0;
     align_vector step;
-    if (!solve_positive(total, right, &step)) break;
+    if (!solve_positive(total, right, &step)) continue;
     for (int k = 0; k < kAlignStates; k++) a->value[k] += step[k];
     a->value[kAlignHeading] = wrap(a->value[kAlignHeading]);
   }
@@ -348,6 +366,7 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
   if (independence_ > 1.0) independence_ = 1.0;
   prediction before;
   if (!predict_scan(camera, &before)) return false;
+  prepare_points(points, camera);
   minima found;
   find_minima(points, before, &found);
   *scan = found.best;

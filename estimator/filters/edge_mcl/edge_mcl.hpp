@@ -68,13 +68,19 @@ class edge_mcl {
     double eye_x_m, eye_y_m;  // under the camera, in map
     planar_twist twist;
   };
+  // What an alignment reads of a point of the scan and does not change.
+  struct scan_point {
+    double normal_cos, normal_sin;  // of its edge, in base_link; 0 where the detector gives none
+    double own2;                    // variance of its own, m2
+    int64_t on_line;                // 64 bits: no padding
+  };
   struct matched_point {
     floor_point floor;                // in base_link
     double from_x_m, from_y_m;        // from base_link, in the map's axes
     double x_m, y_m;                  // in map
     edge_line line;                   // next to it, its normal away from the camera
-    double residual_m, own2, sigma2;  // variance of its own; with the wall's common error
-    bool on_line, same_side;
+    double residual_m, sigma2;        // sigma2: with the wall's common error
+    bool same_side;
   };
 
   wm_status take_points(const wm_event &event, record_list records);
@@ -84,14 +90,17 @@ class edge_mcl {
   int camera_of(const wm_points &points) const;
   double point_sigma(const wm_points &points, uint32_t i, int camera) const;
   void place_scan(const wm_points &points, int camera);
+  void prepare_points(const wm_points &points, int camera);
 
   alignment alignment_of(int camera) const;
   capture capture_of(const alignment &a) const;
   bool predict_scan(int camera, prediction *out) const;
   bool match(const wm_points &points, uint32_t i, const alignment &a, const capture &from, matched_point *out) const;
+  void count_point(const matched_point &p, const scan_point &own, bool near, const capture &from, double correlated,
+                   normal_equations *out) const;
   void count_unexplained(const matched_point &p, const capture &from, normal_equations *out) const;
   void jacobian_of(const matched_point &p, const alignment &a, const capture &from, align_vector *row) const;
-  void linearize(const wm_points &points, const alignment &a, double gate_m, const prediction *open,
+  void linearize(const wm_points &points, const alignment &a, double gate_m, const prediction *open, bool counted,
                  normal_equations *out) const;
   static align_vector difference_of(const alignment &a, const alignment &b);
   double descend(const wm_points &points, const prediction &prior, double slack_m, alignment *a,
@@ -122,6 +131,7 @@ class edge_mcl {
   planar_filter_of<kMaxEdgeStates> filter_;
   edge_map map_;
   floor_points scan_;  // those on a line with their neighbours, in now's base_link
+  scan_point points_[WM_POINTS_MAX];
   place_search search_;
   hypotheses others_;
   fit_evidence fit_;
