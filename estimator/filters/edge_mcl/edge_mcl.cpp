@@ -142,7 +142,9 @@ void edge_mcl::check_odometry() {
   }
   const double position_m2 = 0.5 * (filter_.variance(kX) + filter_.variance(kY)) + square(params_.systematic_xy_m);
   const double heading_rad2 = filter_.variance(kHeading) + square(params_.systematic_heading_rad);
-  odometry_.add(filter_.pose(), position_m2, heading_rad2, filter_.odom(), filter_.travelled_m());
+  const int scale = filter_.motion_state(kSpeedScale);
+  odometry_.add({filter_.pose(), filter_.odom(), position_m2, heading_rad2, filter_.travelled_m(),
+                 filter_.calibration().value[kSpeedScale], scale >= 0 ? filter_.variance(scale) : 0.0});
 }
 
 // Recorded points name no camera; where there is one only, it was that.

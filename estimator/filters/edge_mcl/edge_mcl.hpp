@@ -60,6 +60,8 @@ class edge_mcl {
     normal_equations best;
     void take(const alignment &a, double its_cost, const normal_equations &e);
   };
+  // Passes of a descent: the first weighs whether each point is on an edge of the map, the last counts.
+  enum class descent_pass { kFirst, kNext, kLast };
   // The robot when the picture was taken.
   struct capture {
     wm_pose2 pose;            // base_link in map
@@ -75,11 +77,11 @@ class edge_mcl {
     int64_t on_line;                // 64 bits: no padding
   };
   struct matched_point {
-    floor_point floor;                // in base_link
-    double from_x_m, from_y_m;        // from base_link, in the map's axes
-    double x_m, y_m;                  // in map
-    edge_line line;                   // next to it, its normal away from the camera
-    double residual_m, sigma2;        // sigma2: with the wall's common error
+    floor_point floor;          // in base_link
+    double from_x_m, from_y_m;  // from base_link, in the map's axes
+    double x_m, y_m;            // in map
+    edge_line line;             // next to it, its normal away from the camera
+    double residual_m, sigma2;  // sigma2: with the wall's common error
     bool same_side;
   };
 
@@ -96,12 +98,12 @@ class edge_mcl {
   capture capture_of(const alignment &a) const;
   bool predict_scan(int camera, prediction *out) const;
   bool match(const wm_points &points, uint32_t i, const alignment &a, const capture &from, matched_point *out) const;
-  void count_point(const matched_point &p, const scan_point &own, bool near, const capture &from, double correlated,
-                   normal_equations *out) const;
+  void count_point(const matched_point &p, const scan_point &own, bool near, double mapped, const capture &from,
+                   double correlated, normal_equations *out) const;
   void count_unexplained(const matched_point &p, const capture &from, normal_equations *out) const;
   void jacobian_of(const matched_point &p, const alignment &a, const capture &from, align_vector *row) const;
-  void linearize(const wm_points &points, const alignment &a, double gate_m, const prediction *open, bool counted,
-                 normal_equations *out) const;
+  void linearize(const wm_points &points, const alignment &a, double gate_m, const prediction *open, descent_pass pass,
+                 double mapped[WM_POINTS_MAX], normal_equations *out) const;
   static align_vector difference_of(const alignment &a, const alignment &b);
   double descend(const wm_points &points, const prediction &prior, double slack_m, alignment *a,
                  normal_equations *e) const;
@@ -147,13 +149,14 @@ class edge_mcl {
   // Of each camera, and of points without one: time and travelled distance when a scan was fused last.
   wm_time_ns aligned_ns_[kCamerasMax + 1];
   double aligned_m_[kCamerasMax + 1];
-  double independence_;  // of a scan's errors from the last one's: 0 to 1
-  double aliases_m_;     // travelled distance when aliases were weighed last
-  double watched_m_;     // the same, plus rotation, when the last scan was judged
-  bool nominal_;         // no doubt at all: aliases get their smaller budget
-  bool suspicious_;      // recent scans are looked for elsewhere
-  bool map_searched_;    // the whole map, since then
-  bool tentative_;       // a pose was adopted that scans have not confirmed yet
+  double unmapped_per_m_;  // density of edges that the map does not have, across a wall
+  double independence_;    // of a scan's errors from the last one's: 0 to 1
+  double aliases_m_;       // travelled distance when aliases were weighed last
+  double watched_m_;       // the same, plus rotation, when the last scan was judged
+  bool nominal_;           // no doubt at all: aliases get their smaller budget
+  bool suspicious_;        // recent scans are looked for elsewhere
+  bool map_searched_;      // the whole map, since then
+  bool tentative_;         // a pose was adopted that scans have not confirmed yet
 };
 
 }  // namespace wm

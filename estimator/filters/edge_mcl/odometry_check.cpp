@@ -23,12 +23,18 @@ void odometry_check::clear() {
 }
 
 // The difference d of both displacements is N(0, s2) where they agree and N(0, s2 + kWrong^2) where one is wrong. With
-// the latter's probability p the pose's second moment grows by p / 2 d d'.
-void odometry_check::compare(const anchor &then, const anchor &now) {
-  const wm_pose2 by_odometry = compose(then.pose, between(then.odom, now.odom));
+// the latter's probability p the pose's second moment grows by p / 2 d d'. Odometry has the scale of `then`: a wrong
+// wall draws the scale after the pose, and by the later one they agree.
+void odometry_check::compare(const odometry_anchor &then, const odometry_anchor &now) {
+  wm_pose2 way = between(then.odom, now.odom);
+  const double stretch = 2.0 * then.scale / (then.scale + now.scale);  // from the mean scale of the way
+  way.x_m *= stretch;
+  way.y_m *= stretch;
+  const wm_pose2 by_odometry = compose(then.pose, way);
   const double dx = now.pose.x_m - by_odometry.x_m, dy = now.pose.y_m - by_odometry.y_m;
   const double d2 = square(dx) + square(dy), way2 = square(now.way_m - then.way_m);
-  const double agreed = then.position_m2 + now.position_m2 + (square(kOdometryError) + then.heading_rad2) * way2;
+  const double agreed =
+      then.position_m2 + now.position_m2 + (square(kOdometryError) + then.heading_rad2 + then.scale_variance) * way2;
   const double wrong = agreed + square(kWrong_m);
   // Two dimensions: the ratio of the densities' heights is that of the variances.
   const double log_odds = log(kWrongProbability / (1.0 - kWrongProbability)) - log(wrong / agreed) +
@@ -41,14 +47,12 @@ void odometry_check::compare(const anchor &then, const anchor &now) {
   covariance_[2] = share * dy * dy;
 }
 
-void odometry_check::add(const wm_pose2 &pose, double position_m2, double heading_rad2, const wm_pose2 &odom,
-                         double way_m) {
-  const anchor now = {pose, odom, position_m2, heading_rad2, way_m};
+void odometry_check::add(const odometry_anchor &now) {
   for (double &c : covariance_) c = 0.0;
   largest_m2_ = 0.0;
   for (uint64_t back = 2; back <= seen_ && back <= kAnchors; back *= 2)
     compare(anchors_[(seen_ - back) % kAnchors], now);
-  if (seen_ == 0 || way_m - anchors_[(seen_ - 1) % kAnchors].way_m >= kStep_m) anchors_[seen_++ % kAnchors] = now;
+  if (seen_ == 0 || now.way_m - anchors_[(seen_ - 1) % kAnchors].way_m >= kStep_m) anchors_[seen_++ % kAnchors] = now;
 }
 
 }  // namespace wm

@@ -11,12 +11,18 @@
 
 namespace wm {
 
+// A corrected pose after `way_m` of travelled distance, with its variances of position (mean of both axes) and heading,
+// the odometry, and the scale of its ways as it was calibrated then.
+struct odometry_anchor {
+  wm_pose2 pose, odom;
+  double position_m2, heading_rad2, way_m, scale, scale_variance;
+};
+
 class odometry_check {
  public:
   void clear();
-  // A corrected pose after `way_m` of travelled distance, with its variances of position (mean of both axes) and
-  // heading, and the odometry. O(1).
-  void add(const wm_pose2 &pose, double position_m2, double heading_rad2, const wm_pose2 &odom, double way_m);
+  // O(1).
+  void add(const odometry_anchor &now);
   // Covariance (xx, xy, yy) of the position that the disagreement leaves, m2.
   const double *covariance() const { return covariance_; }
 
@@ -25,13 +31,9 @@ class odometry_check {
   static constexpr double kStep_m = 0.25;
   static constexpr int kAnchors = 64;
 
-  struct anchor {
-    wm_pose2 pose, odom;
-    double position_m2, heading_rad2, way_m;
-  };
-  void compare(const anchor &then, const anchor &now);
+  void compare(const odometry_anchor &then, const odometry_anchor &now);
 
-  anchor anchors_[kAnchors];
+  odometry_anchor anchors_[kAnchors];
   uint64_t seen_;
   double largest_m2_;  // of the comparisons with all anchors
   double covariance_[3];
