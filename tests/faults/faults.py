@@ -9,6 +9,7 @@ import json
 import math
 import os
 import pathlib
+import re
 import shutil
 import signal
 import socket
@@ -348,22 +349,32 @@ def box(work):
 
 def readers(work):
     """One camera, four readers: two detectors (config/office-walls.yaml), the black box and a recording, whose replay gives the
-    poses of the run."""
+    poses of the run. Two CAN interfaces: the wheels on one, the gyro on the other."""
     drive, until_s = Drive(work, "walls", "readers", []), WALLS_S - 3
-    (drive.folder / "robot.yaml").write_text(drive.config + "black_box: {folder: box, keep_s: 8, pictures_hz: 2}\n")
+    signals = re.split(r"(?m)^(?=- )", (drive.folder / "can-signals.yaml").read_text())
+    for name, on_it in (("gyro", True), ("wheels", False)):
+        (drive.folder / f"{name}.yaml").write_text("".join(one for one in signals if one.startswith("- ") and ("yaw_rate" in one) == on_it))
+    (drive.folder / "robot.yaml").write_text(drive.config.replace(
+        "can: [{interface: can0}]", "can: [{interface: can0, can_signals: wheels.yaml}, {interface: can1, can_signals: gyro.yaml}]") +
+        "black_box: {folder: box, keep_s: 8, pictures_hz: 2}\n")
     run = drive.run("--record", "recorded", "--out", "run")
     drive.end(run, until_s)
     heard = drive.hear()
     heard.check(run.returncode == 0, f"exit code {run.returncode}")
     heard.goes_on("two detectors", 2, until_s - 1)
     health = heard.health_at(until_s - 1)
+    for bus in ("can:can0", "can:can1"):
+        source = messages.source(health, bus)
+        heard.check(source is not None and source.fused > 40 * (until_s - 1), f"{bus}: {source and source.fused} frames are fused")
     for detector in ("apriltag:front", "mr:front"):
         source = messages.source(health, detector)
         heard.device(detector, detector, WORKS, 3, until_s - 1)
         heard.check(source is not None and source.fused > 20, f"{detector}: {source and source.fused} of its observations are fused")
     replay = subprocess.run([BUILD / "bin/waymark", "replay", drive.folder / "recorded", "--config", drive.folder / "recorded/config.yaml",
                              "--frames-of", drive.folder / "run/events.wmlog", "--out", drive.folder / "again"], capture_output=True, text=True)
-    heard.check(replay.returncode == 0, f"the recording replays {replay.stderr[-300:]}")
+    heard.check(replay.returncode == 0, f"the recording replays{'' if replay.returncode == 0 else ': ' + replay.stderr[-300:]}")
+    said = {line.split()[1] for line in (drive.folder / "recorded/can.log").read_text().splitlines()}
+    heard.check(said == {"can0", "can1"}, f"the recording has frames of {sorted(said)}")
     if replay.returncode == 0:
         poses = [p for p in messages.rows([p for _, p in heard.poses]) if p[0] > drive.begin_ns + 2e9]
         apart = list(drives.apart_of(poses, drives.table(drive.folder / "again/published.csv"), 0))
