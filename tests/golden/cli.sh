@@ -37,6 +37,8 @@ expect 2 "did you mean 'replay'" repaly
 expect 2 "'dance' is no command" dance
 for command in run replay check doctor record watch stamps; do expect 0 "example:" "$command" --help; done
 
+expect 2 "--record: records devices" run --config "$work/good.yaml" --recording "$work/rec" --record "$work/new"
+expect 2 "is there already; a recording is never written over" run --config "$work/good.yaml" --record "$work/rec"
 expect 2 "replay needs a recording" replay
 expect 2 "replay needs --out" replay "$work/rec"
 expect 2 "needs --config" replay "$work/rec" --out "$work/out"
