@@ -28,6 +28,9 @@ Figures pose_figures(const Comparison &comparison, bool has_covariance, bool gns
 // RMSE where a known landmark was seen within the last 2 s; null without sightings.
 void add_sighting_figures(const Comparison &comparison, const std::vector<Sighting> &sightings,
                           const std::vector<Landmark> &known, Figures *figures);
+// False: sightings without identity are all that there is to see landmarks by, so that a map's ids are its filter's
+// own.
+bool has_identities(const std::filesystem::path &recording);
 // SLAM: landmarks against their true places, after the pose alignment. `has_identities`: the filter was given some.
 void add_landmark_figures(const std::vector<Landmark> &estimate, const std::vector<Landmark> &truth,
                           const Comparison &comparison, bool has_identities, Figures *figures);

@@ -92,6 +92,13 @@ bool shares_ids(const std::vector<Landmark> &estimate, const std::vector<Pair> &
 
 }  // namespace
 
+bool has_identities(const std::filesystem::path &recording) {
+  const auto seen = load_sightings(recording);
+  const bool is_named = std::any_of(seen.begin(), seen.end(), [](const Sighting &s) { return s.id >= 0; });
+  return is_named || seen.empty() || std::filesystem::exists(recording / "markers.csv") ||
+         std::filesystem::exists(recording / "video");
+}
+
 void add_landmark_figures(const std::vector<Landmark> &estimate, const std::vector<Landmark> &truth,
                           const Comparison &comparison, bool has_identities, Figures *figures) {
   std::vector<Landmark> aligned = estimate;

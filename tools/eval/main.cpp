@@ -80,14 +80,6 @@ fs::path true_landmarks(const fs::path &recording) {
   return fs::exists(surveyed) ? surveyed : recording / "landmarks.csv";
 }
 
-// False: sightings without identity are all that there is to see landmarks by, so that a map's ids are its filter's
-// own.
-bool has_identities(const fs::path &recording) {
-  const auto seen = load_sightings(recording);
-  const bool is_named = std::any_of(seen.begin(), seen.end(), [](const Sighting &s) { return s.id >= 0; });
-  return is_named || seen.empty() || fs::exists(recording / "markers.csv") || fs::exists(recording / "video");
-}
-
 Figures evaluate(const Arguments &a) {
   const fs::path run = a.run;
   const fs::path recording = a.recording;

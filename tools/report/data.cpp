@@ -98,7 +98,8 @@ void load_recording(const fs::path &recording, ReportData *out) {
   out->truth = compare(out->trajectory, load_truth(recording), options);
   out->figures = pose_figures(*out->truth, out->trajectory.has_covariance, false);
   if (!out->estimated_landmarks.empty() && !out->landmarks.empty())
-    add_landmark_figures(out->estimated_landmarks, out->landmarks, *out->truth, &out->figures);
+    add_landmark_figures(out->estimated_landmarks, out->landmarks, *out->truth, has_identities(recording),
+                         &out->figures);
 }
 
 }  // namespace
