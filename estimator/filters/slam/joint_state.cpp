@@ -375,7 +375,17 @@ double joint_state::innovation_block::density() const {
   return exp(-0.5 * nis) / std::sqrt(scale);
 }
 
-bool joint_state::fuse(innovation_block &block, const double *added_noise, scope which) {
+// Places and what scales with them are considered: their gains leave gain(0) for gain(1), and `change`.
+void joint_state::keep_places(int own, double *change) {
+  for (int j = 0; j < even(n_); j++) {
+    const bool moves = j == kHeading || (j >= kPoseStates && j < layout_.first_clone && scale_share_[j] == 0.0);
+    gain(1)[j] = moves || j == own ? 0.0 : gain(0)[j];
+    if (gain(1)[j] != 0.0) change[j] = 0.0;
+  }
+  vectors::set_scaled(gain(2), gain(1), 0.5, even(n_));
+}
+
+bool joint_state::fuse(innovation_block &block, const double *added_noise, scope which, int own) {
   const int rows = block.rows;
   if (!(block.determinant > 0.0)) return false;
   for (int k = 0; k < rows; k++) block.s[k][k] += added_noise[k];
@@ -396,7 +406,9 @@ bool joint_state::fuse(innovation_block &block, const double *added_noise, scope
   double *e = column(1 + kRows), *r = column(2 + kRows);
   vectors::set_scaled(r, gain(0), y[0], even(n_));
   for (int k = 1; k < rows; k++) vectors::add_scaled(r, gain(k), y[k], even(n_));
-  if (which != scope::all) {
+  const bool keeps = which == scope::directions;
+  if (keeps) keep_places(own, r);
+  if (which != scope::all && !keeps) {
     fuse_part(which == scope::pose ? (int)kPoseStates : layout_.robot_states, rows, r);
     return true;
   }
@@ -416,6 +428,8 @@ bool joint_state::fuse(innovation_block &block, const double *added_noise, scope
     update.r = r;
   }
   vectors::apply(p(), update, n_);
+  if (keeps)
+    vectors::apply(p(), {0, {}, gain(1), gain(2)}, n_);  // Joseph's form: P - w w' + u u', u what is considered
   if (layout_.invariant && carries_scale_) carry_scale(before);
   return true;
 }

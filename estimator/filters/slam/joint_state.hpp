@@ -68,6 +68,9 @@ class joint_state : public planar_motion {
   bool find_scale(bool carries);
   void carry_scale_no_more() { carries_scale_ = false; }
   bool follows_scale() const { return scale_state_ >= 0; }
+  // Adds the derivative by a state that follows the scale to a row that is linearised about `at` of that state: the
+  // covariance is that of its present value, and of all multiples of the scale.
+  void add_at(joint_row *row, int state, double derivative, double at) const;
   // `share`: exponent of the state under a change of the map's scale, +1 or -1. `anchors`: its prior holds the scale.
   void follow_scale(int state, double share, bool anchors);
 
@@ -129,10 +132,15 @@ class joint_state : public planar_motion {
     double density() const;  // of the innovation, normal with covariance S
   };
   // Which states a correction may change. Others are considered: their covariance counts, they stay [Schmidt1966].
-  enum class scope { all, robot, pose };
+  // `directions`: by one row, all but places and what scales with them; `own`: a state that is none of the latter.
+  enum class scope { all, robot, pose, directions };
   void prepare(const joint_row *rows, const double *innovations, const double *noise, int count, innovation_block *out);
+  // By how much the update by a single row prepared will change a state.
+  double change_of(int state, const innovation_block &block) const {
+    return column(1)[state] * block.innovation[0] / block.s[0][0];
+  }
   // Fuses the rows prepared, with `added_noise[k]` for each. False: S is not positive definite, nothing changed.
-  [[nodiscard]] bool fuse(innovation_block &block, const double *added_noise, scope which);
+  [[nodiscard]] bool fuse(innovation_block &block, const double *added_noise, scope which, int own = -1);
 
   // Adds `share` of d d' to the covariance of a landmark's place.
   void widen_landmark(int landmark, const double d[2], double share);
@@ -151,11 +159,13 @@ class joint_state : public planar_motion {
   double *column(int k) {
     return arrays_.get() + half_covariance::doubles(capacity_) + static_cast<size_t>(k * capacity_);
   }
+  const double *column(int k) const { return const_cast<joint_state *>(this)->column(k); }
   double *x() { return column(0); }
-  const double *x() const { return const_cast<joint_state *>(this)->column(0); }
+  const double *x() const { return column(0); }
   double *gain(int k) { return column(1 + k); }
 
   void propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise);
+  void keep_places(int own, double *change);
   void move_mean(const double *change, double *e);
   void move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e);
   void fuse_part(int states, int rows, const double *change);

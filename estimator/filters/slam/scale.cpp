@@ -41,6 +41,13 @@ void joint_state::follow_scale(int state, double share, bool anchors) {
   scale_variance_[state] = anchors ? variance(state) : 0.0;
 }
 
+// H T, T as in carry_scale() with the state alone moved to `at`. So the row sees no scale.
+void joint_state::add_at(joint_row *row, int state, double derivative, double at) const {
+  row->add(state, derivative);
+  if (layout_.invariant && carries_scale_)
+    row->add(scale_state_, derivative * scale_share_[state] * (at - value(state)) / value(scale_state_));
+}
+
 // The speed comes from another sensor: from now on the other states anchor the scale where they are.
 void joint_state::anchor_scale_again() {
   for (int j = 0; j < layout_.first_clone; j++)

@@ -57,11 +57,15 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   if (landmark < 0 && r.bearing && !r.range) take_lines();
   if (rejoins_ && r.bearing && !r.range) collect_bearing(s, at.past);
   if (life_.searching() || (life_.lost() && rejoins_)) return reject(records, at.record, WM_REJECTED_SEARCHING);
-  if (landmark >= 0) {
-    fuse_known(at, s, r, landmark);
-    return WM_OK;
-  }
-  return begin_landmark(at, s, r);
+  const wm_status taken = take_sighting(at, s, r, landmark);
+  take_waiting(at);
+  return taken;
+}
+
+wm_status slam::take_sighting(const context &at, const wm_sighting &s, const reading &r, int landmark) {
+  if (landmark < 0) return begin_landmark(at, s, r);
+  fuse_known(at, s, r, landmark);
+  return WM_OK;
 }
 
 // auto: a sensor that has given an identity could not read this one's; so could one that has given few sightings.
@@ -219,6 +223,7 @@ void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r,
   if (!r.bearing) v.noise[0] += curvature_variance(at, landmark, v);
   joint_state::innovation_block block;
   prepare(landmark, &v, &block);
+  if (r.bearing && !r.range && waits_for_another(at, line_bearing_of(s, r), v, block)) return;
   const gate_result g = gate(block.nis, v.count, gates());
   if (s.landmark_id >= 0 && !weigh_identified(landmark, at, s, r, v, block, g.passed))
     return (void)reject(at.records, at.record, WM_REJECTED_SEARCHING);
@@ -230,6 +235,12 @@ void slam::fuse_known(const context &at, const wm_sighting &s, const reading &r,
       note_return(wm_seconds_between(note(landmark).last_ns, joint_.now_ns()));
     note_fused(landmark, s.sensor);
   }
+}
+
+slam::line_bearing slam::line_bearing_of(const wm_sighting &s, const reading &r) const {
+  const bool none = r.stated && sightings().correlated_bearing_rad < 0.0;
+  return {s.bearing_rad, s.bearing_sigma_rad, r.bearing_sigma_rad,
+          none ? 0.0 : correlated_bearing(sightings(), r.bearing_sigma_rad), r.stated};
 }
 
 // A sighting of a landmark that is not on the map.
@@ -244,10 +255,10 @@ wm_status slam::begin_landmark(context at, const wm_sighting &s, const reading &
   else if (may_join && r.range)
     verdict = join_seen(at, s, r);
   else if (may_join && !as_ray)
-    verdict = track_bearing(at, s.bearing_rad, r.bearing_sigma_rad);
+    verdict = track_bearing(at, line_bearing_of(s, r));
   else if (may_join) {
-    if (bearing_tracks::track *ray = current_ray(at)) return follow_ray(at, ray, s.bearing_rad, r.bearing_sigma_rad);
-    verdict = begin_ray(at, s.bearing_rad, r.bearing_sigma_rad);
+    if (bearing_tracks::track *ray = current_ray(at)) return follow_ray(at, ray, line_bearing_of(s, r));
+    verdict = begin_ray(at, line_bearing_of(s, r));
   }
   if (verdict == WM_FUSED) at.record.expected = at.record.observed;  // it defines the landmark
   return reject(at.records, at.record, verdict);

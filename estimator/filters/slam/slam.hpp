@@ -33,6 +33,8 @@ inline constexpr uint32_t kMergeSeen = 10;
 // of them decide, since one may be a number that began anew. Not swept.
 inline constexpr double kUnseen_s = 5.0;
 inline constexpr int kReturned = 2;
+// Bearings in a picture: fewer have no majority, and state little together. Not swept.
+inline constexpr int kManyBearings = 5;
 // Log odds that a pose is wrong which defines the map's frame: as of a proven one.
 inline constexpr double kOwnFramePrior = -5.0;
 
@@ -77,6 +79,19 @@ struct picture_outliers {
 
 // Of a landmark that is seen for the first time.
 landmark_note note_of(int32_t id, int sensor, wm_time_ns t_ns);
+
+// Bearings at the beginning of a picture, of which none agrees with another one (first_bearings.cpp).
+struct first_bearings {
+  static constexpr int kCapacity = 4;
+  struct one {
+    int32_t id, sensor;
+    double bearing_rad, given_sigma_rad;
+    double innovation, variance;
+    joint_row row;
+  };
+  one waiting[kCapacity];
+  int count, settled;  // settled: two agree, or none will
+};
 
 // The last identities with a property.
 struct identity_list {
@@ -136,6 +151,11 @@ class slam {
     double bearing_rad, range_m, heading_rad;
     double bearing_sigma_rad, range_sigma_m, heading_sigma_rad;
   };
+  // A bearing without a range. Its sigma as it came, and as it counts.
+  struct line_bearing {
+    double bearing_rad, given_sigma_rad, sigma_rad, correlated_rad;
+    bool stated;
+  };
   // A marker in levelled axes along the sensor's yaw.
   struct marker_reading {
     double level[3], along[2];  // place; unit vector towards it on the floor
@@ -160,6 +180,7 @@ class slam {
   static arrays place(memory_layout *out, const wm_slam_params &params, const wm_setup &setup);
   static int lasting_states(const wm_slam_params &params, const wm_setup &setup);  // pose and calibration
   void follow_scale();
+  bool sees_many() const { return outliers_.before >= kManyBearings; }  // in the picture before
   bool has_headings() const { return joint_.layout().landmark_width == 3; }
   bool has_lines() const { return joint_.layout().clones > 0; }
   void take_headings();
@@ -199,7 +220,7 @@ class slam {
   gate_limits gates() const { return {sightings().gate_soft, sightings().gate_hard}; }
   void prepare(int landmark, landmark_rows *v, joint_state::innovation_block *out);
   wm_verdict fuse_rows(const context &at, const landmark_rows &v, const gate_result &g,
-                       joint_state::innovation_block *block);
+                       joint_state::innovation_block *block, int unknown = -1);
   int join(const context &at, const landmark_rows &v, const double inverse[3][3], const double place[3],
            double heading_variance);
 
@@ -212,6 +233,8 @@ class slam {
   planar_observation observation_of(const wm_sighting &s, const reading &r) const;
   wm_verdict expect_sighting(const wm_sighting &s, const reading &r, const past_pose &past, const wm_pose2 &place,
                              int error_state, landmark_rows *out) const;
+  wm_status take_sighting(const context &at, const wm_sighting &s, const reading &r, int landmark);
+  line_bearing line_bearing_of(const wm_sighting &s, const reading &r) const;
   bool weigh_identified(int landmark, const context &at, const wm_sighting &s, const reading &r, const landmark_rows &v,
                         const joint_state::innovation_block &block, bool passed);
   void expect_point(const context &at, const planar_observation &seen, int landmark, landmark_rows *out) const;
@@ -222,14 +245,16 @@ class slam {
   // bearing_only.cpp
   int clone_state(int clone) const { return first_clone_ + 3 * clone; }
   int ray_state(const bearing_tracks::track &track) const { return first_ray_ + 2 * tracks_.index(track); }
-  int keep_clone(const context &at);
-  wm_verdict track_bearing(const context &at, double bearing_rad, double sigma_rad);
+  int keep_clone(const context &at, bool stated);
+  wm_verdict track_bearing(const context &at, const line_bearing &seen);
   bool join_line(const context &at, const bearing_tracks::track &track);
   bearing_tracks::track *current_ray(const context &at);
-  wm_verdict begin_ray(const context &at, double bearing_rad, double sigma_rad);
-  wm_verdict expect_ray(const context &at, const bearing_tracks::track &track, double bearing_rad, double sigma_rad,
+  wm_verdict begin_ray(const context &at, const line_bearing &seen);
+  wm_verdict expect_ray(const context &at, const bearing_tracks::track &track, const line_bearing &seen, double inverse,
                         landmark_rows *out);
-  wm_status follow_ray(const context &at, bearing_tracks::track *track, double bearing_rad, double sigma_rad);
+  wm_verdict prepare_ray(const context &at, const bearing_tracks::track &track, const line_bearing &seen,
+                         landmark_rows *v, joint_state::innovation_block *block);
+  wm_status follow_ray(const context &at, bearing_tracks::track *track, const line_bearing &seen);
   void settle_ray(const context &at, const wm_pose2 &from, bearing_tracks::track *track);
   void end_ray(bearing_tracks::track *track);
   void forget_lines();
@@ -268,6 +293,11 @@ class slam {
   bool do_others_fit(const landmark_note &seen) const;
   bool stands_with(int one, int other) const;
   void find_double(int landmark);
+
+  // first_bearings.cpp
+  bool waits_for_another(const context &at, const line_bearing &seen, const landmark_rows &v,
+                         const joint_state::innovation_block &block);
+  void take_waiting(const context &newest);
 
   // rejoin.cpp
   void merge_if_one(int fresh);
@@ -334,6 +364,7 @@ class slam {
   int32_t other_fused_id_[2];
   identity_list moved_, ambiguous_;
   picture_outliers outliers_;
+  first_bearings first_;
   lifecycle life_;
   rollback<kMaxCalibration> rollback_;
   landmark_evidence evidence_;

@@ -70,6 +70,7 @@ void slam::note_rotation(bool fused, double innovation_rad, bool of_marker, wm_t
 // inflated by that angle. False detections scatter.
 void slam::end_picture(wm_time_ns t_ns) {
   if (t_ns == outliers_.t_ns) return;
+  first_.count = first_.settled = 0;
   end_bearings(t_ns);
   const double least = outliers_.of_markers ? kMarkerHeading_rad : 0.0;
   int most = 0;

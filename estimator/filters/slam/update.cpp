@@ -45,7 +45,7 @@ void slam::prepare(int landmark, landmark_rows *v, joint_state::innovation_block
 
 // Fuses what passed the gate and writes the records: WM_FUSED, WM_REJECTED_GATE or WM_REJECTED_NUMERIC.
 wm_verdict slam::fuse_rows(const context &at, const landmark_rows &v, const gate_result &g,
-                           joint_state::innovation_block *block) {
+                           joint_state::innovation_block *block, int unknown) {
   record_list records = at.records;
   double variance[3], added[3];
   for (int i = 0; i < v.count; i++) {
@@ -53,7 +53,10 @@ wm_verdict slam::fuse_rows(const context &at, const landmark_rows &v, const gate
     added[i] = v.noise[i] * (g.noise_scale - 1.0);
   }
   wm_verdict verdict = g.passed ? WM_FUSED : WM_REJECTED_GATE;
-  if (!(block->determinant > 0.0) || (g.passed && !joint_.fuse(*block, added, scope_now())))
+  const joint_state::scope now = scope_now();
+  const joint_state::scope which =
+      unknown >= 0 && now == joint_state::scope::all ? joint_state::scope::directions : now;
+  if (!(block->determinant > 0.0) || (g.passed && !joint_.fuse(*block, added, which, unknown)))
     verdict = WM_REJECTED_NUMERIC;
   for (int i = 0; i < v.count; i++) {
     wm_innovation record = at.record;
