@@ -353,11 +353,17 @@ struct dive_scenario {
 
 std::vector<dive_scenario> dive_scenarios() {
   const std::vector<setting> states = {
-      {"states.rate_bias_sigma_radps", 0.01},     {"states.velocity_scale_sigma", 0.05},
-      {"states.twist_axes_sigma_rad", 0.05},      {"states.velocity_direction_sigma_rad", 0.05},
-      {"states.camera_rotation_sigma_rad", 0.02}, {"states.camera_place_sigma_m", 0.05},
-      {"states.time_offset_sigma_s", 0.05},       {"states.range_bias_sigma_m", 0.2},
-      {"states.bearing_bias_sigma_rad", 0.05},    {"states.twist_lag_sigma_s", 0.05},
+      {"states.rate_bias_sigma_radps", 0.01},
+      {"states.velocity_scale_sigma", 0.05},
+      {"states.rate_scale_sigma", 0.05},
+      {"states.twist_axes_sigma_rad", 0.05},
+      {"states.velocity_direction_sigma_rad", 0.05},
+      {"states.camera_rotation_sigma_rad", 0.02},
+      {"states.camera_place_sigma_m", 0.05},
+      {"states.time_offset_sigma_s", 0.05},
+      {"states.range_bias_sigma_m", 0.2},
+      {"states.bearing_bias_sigma_rad", 0.05},
+      {"states.twist_lag_sigma_s", 0.05},
   };
   return {
       {"known points", kSilence | kOutliers, 10, states},

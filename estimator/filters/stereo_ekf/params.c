@@ -36,6 +36,8 @@ static const wm_param kParams[] = {
     F64("states.rate_bias_walk", rate_bias_walk, 0.0001, 0, 1, "Random walk of that bias, rad/s per sqrt(s)."),
     F64("states.velocity_scale_sigma", velocity_scale_sigma, 0.01, 0, 1,
         "Start sigma of the measured velocity's scale about 1 (speed of sound, a log's calibration). 0: off."),
+    F64("states.rate_scale_sigma", rate_scale_sigma, 0.02, 0, 1,
+        "Start sigma of the measured turn rates' scale about 1, one for all axes. 0: off."),
     F64("states.twist_axes_sigma_rad", twist_axes_sigma, 0.03, 0, 1,
         "Start sigma of the rotation of the measured twist's axes against the body's, rad: the mounting of a log or of "
         "gyros. 0: off."),

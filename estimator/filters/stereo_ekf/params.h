@@ -20,7 +20,7 @@ typedef struct wm_stereo_ekf_params {
   double cv_v_sigma, cv_w_sigma, cv_v_walk, cv_w_walk, cv_tau_s;
   // states; 0: off
   double rate_bias_sigma, rate_bias_walk;
-  double velocity_scale_sigma;
+  double velocity_scale_sigma, rate_scale_sigma;
   double twist_axes_sigma, velocity_direction_sigma, velocity_direction_tau_s;
   double camera_rotation_sigma, camera_rotation_tau_s;
   double camera_place_sigma, camera_place_tau_s;

@@ -196,23 +196,22 @@ void put_row(const double by[3], int row, int column, row_block *out) {
 
 }  // namespace
 
-// A measured velocity (v - r x v)/s + lag dv/dt or measured rates w - r x w + b + lag dw/dt, by the states v, s, w, b,
-// lag and r, the rotation of the twist's axes (and of the velocity's direction): a measured twist that is ahead of the
-// vehicle's had its present value a lag ago.
+// A measured velocity (v - r x v)/s + lag dv/dt or measured rates (w - r x w)/s + b + lag dw/dt, by the states v, s, w,
+// b, lag and r, the rotation of the twist's axes (and of the velocity's direction): a measured twist that is ahead of
+// the vehicle's had its present value a lag ago.
 row_block stereo_ekf::twist_rows(head_state which, const vec3 &measured, const vec3 &slope_per_s, const vec3 &variance,
                                  bool planar) const {
   const bool velocity = which == kVelocity;
-  const int lag_state = velocity ? kVelocityLag : kRateLag;
+  const int lag_state = velocity ? kVelocityLag : kRateLag, scale_state = velocity ? kVelocityScale : kRateScale;
   const vec3 now = measured - filter_.head1(lag_state, 0.0) * slope_per_s, state = filter_.head3(which);
-  const double scale = velocity ? filter_.head1(kVelocityScale, 1.0) : 1.0;
+  const double scale = filter_.head1(scale_state, 1.0);
   const vec3 bias = velocity ? vec3{0, 0, 0} : filter_.head3(kRateBias);
   row_block out;
   const auto columns_of = [&](int cause, int width) {
     return filter_.at(cause) >= 0 ? out.add_columns(filter_.at(cause), width) : -1;
   };
   const int first = columns_of(which, 3), lag = columns_of(lag_state, 1);
-  const int by_scale = velocity ? columns_of(kVelocityScale, 1) : -1,
-            by_bias = velocity ? -1 : columns_of(kRateBias, 3);
+  const int by_scale = columns_of(scale_state, 1), by_bias = velocity ? -1 : columns_of(kRateBias, 3);
   const int by_axes = columns_of(kTwistAxes, 3), by_direction = velocity ? columns_of(kVelocityDirection, 3) : -1;
   const vec3 turned = filter_.head3(kTwistAxes) + (velocity ? filter_.head3(kVelocityDirection) : vec3{0, 0, 0});
   const vec3 seen = (1.0 / scale) * (state - cross(turned, state));

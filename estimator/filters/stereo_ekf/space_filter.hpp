@@ -94,7 +94,10 @@ class space_filter {
     const vec3 turned = measured + cross(head3(kTwistAxes), measured);
     return head1(kVelocityScale, 1.0) * (turned + cross(head3(kVelocityDirection), turned));
   }
-  vec3 rates_of(const vec3 &measured) const { return measured + cross(head3(kTwistAxes), measured) - head3(kRateBias); }
+  vec3 rates_of(const vec3 &measured) const {
+    const vec3 turned = measured + cross(head3(kTwistAxes), measured);
+    return head1(kRateScale, 1.0) * turned - head3(kRateBias);
+  }
 
   void propagate(const body_stretch &s);
   // The motion since begin_increment(), in axes of the body then, without what is pending. Its error is a state:

@@ -54,7 +54,7 @@ struct space_filter::step {
 
 // F's rows of the pose beside the identity, block by block: the derivative of the moved pose by `width` states.
 struct space_filter::transition {
-  static constexpr int kBlocks = 6;  // the turns, and up to four states of the motion
+  static constexpr int kBlocks = 7;  // the turns, and up to five states of the motion
   struct block {
     int state, width;
     double by[kMovers][3];
@@ -131,6 +131,15 @@ void space_filter::add_sensor_blocks(const step &s, const body_stretch &twist, t
     const vec3 by = (1.0 / head1(kVelocityScale, 1.0)) * s.way;
     transition::block &b = f->add(at_[kVelocityScale], 1);
     for (int i = 0; i < 3; i++) b.by[kPlace + i][0] = by[i];
+  }
+  if (at_[kRateScale] >= 0) {
+    const vec3 turn = s.mean * (s.dt_s / head1(kRateScale, 1.0) * (rates_of(twist.w_radps) + head3(kRateBias)));
+    const vec3 place = -0.5 * (s.swing * turn);
+    transition::block &b = f->add(at_[kRateScale], 1);
+    for (int i = 0; i < 3; i++) {
+      b.by[kTurn + i][0] = turn[i];
+      b.by[kPlace + i][0] = place[i];
+    }
   }
   const mat3 direction = -s.dt_s * (s.mean * skew(velocity_of(twist.v_mps)));
   if (at_[kTwistAxes] >= 0)

@@ -18,6 +18,7 @@ enum head_state {
   kRates,       // rad/s
   kRateBias,
   kVelocityScale,
+  kRateScale,
   kTwistAxes,          // rad: the measured twist's axes against the body's, of velocity and rates alike
   kVelocityDirection,  // rad: of the velocity alone, against those axes: sideslip, a pitch by the load
   kCameraRotation,
@@ -71,6 +72,7 @@ inline constexpr head_spec kHeadSpecs[kHeadStates] = {
      nullptr,
      head_use::always},
     {1, 1, {"motion.velocity_scale"}, &stereo_params::velocity_scale_sigma, nullptr, nullptr, head_use::always},
+    {1, 1, {"motion.rate_scale"}, &stereo_params::rate_scale_sigma, nullptr, nullptr, head_use::always},
     {3,
      0,
      {"motion.axes_x_rad", "motion.axes_y_rad", "motion.axes_z_rad"},

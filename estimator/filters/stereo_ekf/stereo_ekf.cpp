@@ -70,7 +70,8 @@ wm_stereo_ekf_params usable(const wm_stereo_ekf_params &params, const stereo_rig
   }
   if (setup.motion->model == WM_MOTION_CONSTANT_VELOCITY) {
     out.prediction = WM_PREDICT_CONSTANT_VELOCITY;
-    out.rate_bias_sigma = out.velocity_scale_sigma = out.twist_axes_sigma = out.velocity_direction_sigma = 0.0;
+    out.rate_bias_sigma = out.velocity_scale_sigma = out.rate_scale_sigma = 0.0;
+    out.twist_axes_sigma = out.velocity_direction_sigma = 0.0;
     out.twist_lag_sigma = 0.0;
   }
   return out;

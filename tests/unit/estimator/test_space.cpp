@@ -142,13 +142,14 @@ void test_sensor_states_swing_the_way_as_they_should(void) {
   head_model models[kHeadStates] = {};
   models[kRateBias] = {1e-4, 0, 0};
   models[kVelocityScale] = {1e-4, 0, 0};
+  models[kRateScale] = {1e-4, 0, 0};
   models[kTwistAxes] = {1e-4, 0, 0};
   models[kVelocityDirection] = {1e-4, 0, 0};
   const double none[6][6] = {};
   machine a(models, 0);
   a.filter->set_pose({{0, 0, 0}, turn_by({0.2, 0.3, -0.4})}, none);
   double covariance[6][6] = {};
-  for (int k = 0; k < 10; k++) {
+  for (int k = 0; k < 11; k++) {
     machine b(models, 0), zero(models, 0);
     for (machine *m : {&b, &zero}) m->filter->set_pose({{0, 0, 0}, turn_by({0.2, 0.3, -0.4})}, none);
     body_stretch s = {0.02, {0.8, -0.2, 0.4}, {0.3, 1.1, -0.7}, {}, {}};
@@ -157,6 +158,8 @@ void test_sensor_states_swing_the_way_as_they_should(void) {
       wrong.w_radps[k] -= 1e-4;
     else if (k == 3)
       wrong.v_mps = (1 + 1e-4) * s.v_mps;
+    else if (k == 10)
+      wrong.w_radps = (1 + 1e-4) * s.w_radps;
     else {
       vec3 axes = {0, 0, 0};
       axes[(k - 4) % 3] = 1e-4;

@@ -18,7 +18,7 @@ struct street {
   double drift[kTracks][2] = {};
   int32_t id[kTracks];
   int32_t next = 1;
-  double moving = 0.4, drift_px = 0.5;
+  double moving = 0.4, drift_px = 0.5, rates_too_large = 1.0;
   uint64_t seed;
 
   explicit street(uint64_t seed_) : seed(seed_) {
@@ -79,7 +79,7 @@ struct street {
       const vec3 v = {log || i >= 40 ? 8.0 : 0.2 * i, 0, 0}, w = {0, 0, i / 50 == 1 ? 0.15 : i / 50 == 2 ? -0.15 : 0};
       if (log)
         say(0.99 * (v - cross(tilt, v)) + 0.02 * vec3{s.noise(), s.noise(), s.noise()},
-            w + 0.003 * vec3{s.noise(), s.noise(), s.noise()});
+            rates_too_large * w + 0.003 * vec3{s.noise(), s.noise(), s.noise()});
       if (pictures) look(0.1);
       s.truth.p = s.truth.p + matrix_of(s.truth.q) * (0.1 * (mean_turn(0.1 * w) * v));
       s.truth.q = normalized(s.truth.q * turn_by(0.1 * w));
@@ -87,12 +87,12 @@ struct street {
     }
     if (log) say({8, 0, 0}, {0, 0, 0});
   }
-  wm_calibration_value scale() const {
+  wm_calibration_value calibrated(const char *name) const {
     wm_calibration_value values[32];
     const size_t count = s.ekf->calibration(s.state, values, 32);
     for (size_t i = 0; i < count && i < 32; i++)
-      if (std::strcmp(values[i].name, "motion.velocity_scale") == 0) return values[i];
-    TEST_FAIL_MESSAGE("no scale");
+      if (std::strcmp(values[i].name, name) == 0) return values[i];
+    TEST_FAIL_MESSAGE(name);
     return {};
   }
 };
@@ -111,7 +111,8 @@ void test_far_and_moving_tracks_improve_a_drive(void) {
     with += square(seen.s.place_error()) / drives;
     without += square(blind.s.place_error()) / drives;
     nees += seen.s.nees() / drives;
-    TEST_ASSERT_DOUBLE_WITHIN(2 * seen.scale().sigma, 1 / 0.99, seen.scale().value);
+    const wm_calibration_value scale = seen.calibrated("motion.velocity_scale");
+    TEST_ASSERT_DOUBLE_WITHIN(2 * scale.sigma, 1 / 0.99, scale.value);
     TEST_ASSERT_LESS_THAN_DOUBLE(2.0, seen.s.nees());
   }
   TEST_ASSERT_LESS_THAN_DOUBLE(0.4 * std::sqrt(without), std::sqrt(with));
@@ -133,6 +134,24 @@ void test_a_drive_by_pictures_alone_is_honest(void) {
   }
   TEST_ASSERT_LESS_THAN_DOUBLE(0.02 * 144, std::sqrt(off_m2));
   TEST_ASSERT_LESS_THAN_DOUBLE(1.6, nees);
+}
+
+// Gyros that measure 5 % too much: the pictures show it, and it costs the drive little.
+void test_a_scale_of_the_rates_is_found(void) {
+  double exact = 0, scaled = 0;
+  const int drives = 4;
+  for (uint64_t i = 0; i < drives; i++) {
+    street as_stated(i), falsified(i);
+    falsified.rates_too_large = 1.05;
+    as_stated.drive(true);
+    falsified.drive(true);
+    exact += square(as_stated.s.place_error()) / drives;
+    scaled += square(falsified.s.place_error()) / drives;
+    const wm_calibration_value scale = falsified.calibrated("motion.rate_scale");
+    TEST_ASSERT_DOUBLE_WITHIN(3 * scale.sigma, 1 / 1.05, scale.value);
+    TEST_ASSERT_LESS_THAN_DOUBLE(0.015, scale.sigma);
+  }
+  TEST_ASSERT_LESS_THAN_DOUBLE(1.25 * std::sqrt(exact), std::sqrt(scaled));
 }
 
 // No track of a street becomes a point of the state: it is far, or its patch grows.
@@ -200,6 +219,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_far_and_moving_tracks_improve_a_drive);
   RUN_TEST(test_a_drive_by_pictures_alone_is_honest);
+  RUN_TEST(test_a_scale_of_the_rates_is_found);
   RUN_TEST(test_tracks_of_a_street_are_no_landmarks);
   RUN_TEST(test_a_repeated_picture_moves_nothing);
   RUN_TEST(test_a_fit_finds_the_motion_and_bans_what_moves);
