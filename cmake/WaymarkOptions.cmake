@@ -34,6 +34,17 @@ target_compile_options(wm_rules INTERFACE
   # The same bits on every machine: no fused multiply-add, no reordering (docs/design.md, numbers).
   -ffp-contract=off -fno-fast-math
   -fno-omit-frame-pointer)
+# As Debian builds its packages (dpkg-buildflags, hardening=+all). All programs: addresses are resolved and read-only before
+# they begin; the robot's rooms, also checked copies and canaries on the stack (of code with the property WM_HARDENED). Sanitizers
+# bring their own checks. tests/package/hardening.py looks for it in the programs.
+if(NOT WM_SANITIZE)
+  set(hardened $<BOOL:$<TARGET_PROPERTY:WM_HARDENED>>)
+  set(checked $<AND:${hardened},$<NOT:$<CONFIG:Debug>>>) # without an optimizer nothing is checked, and a warning says so
+  target_compile_options(wm_rules INTERFACE $<${hardened}:-fstack-protector-strong>)
+  # -U: a compiler may have set another level.
+  target_compile_options(wm_rules INTERFACE $<${checked}:-U_FORTIFY_SOURCE> $<${checked}:-D_FORTIFY_SOURCE=3>)
+  target_link_options(wm_rules INTERFACE -Wl,-z,relro,-z,now)
+endif()
 target_compile_definitions(wm_rules INTERFACE _GNU_SOURCE EIGEN_DONT_VECTORIZE EIGEN_MPL2_ONLY
   # On 32 bits, too: recordings of more than 2 GB, and folders whose places need 64 bits.
   $<$<EQUAL:${CMAKE_SIZEOF_VOID_P},4>:_FILE_OFFSET_BITS=64>
@@ -52,6 +63,9 @@ function(wm_library name)
   cmake_parse_arguments(A "" "" "SOURCES;USES;PRIVATE_USES" ${ARGN})
   add_library(${name} STATIC ${A_SOURCES})
   target_link_libraries(${name} PUBLIC ${A_USES} PRIVATE wm_rules ${A_PRIVATE_USES})
+  if(CMAKE_CURRENT_SOURCE_DIR MATCHES "^${CMAKE_SOURCE_DIR}/(msgs|estimator|drivers|firmware)(/|$)")
+    set_target_properties(${name} PROPERTIES WM_HARDENED ON)
+  endif()
 endfunction()
 
 # What runs under the thread sanitizer: the tests with the label "threads".

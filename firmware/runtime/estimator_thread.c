@@ -71,8 +71,8 @@ static void publish(live *run, wm_time_ns now_ns) {
   if (wm_pipeline_expect(&self->pipeline, now_ns, &expected)) wm_vision_tell(run->assembly.vision, &expected);
   if (!wm_pipeline_publish(&self->pipeline, now_ns, &published)) return;
   published.deadlines_missed = (uint32_t)self->deadlines_missed;
-  published.sent_ns = run_now(&run->clock);
-  wm_histogram_add(&self->age_ns, published.sent_ns - published.now.t_ns);
+  published.made_ns = run_now(&run->clock);
+  wm_histogram_add(&self->age_ns, published.made_ns - published.now.t_ns);
   put(self, WM_OUTPUT_PUBLISHED, &published, sizeof published);
 }
 

@@ -37,7 +37,7 @@ static void send_pose(live *run, const wm_published *record) {
   wm_published published = *record;
   tell_utc(run, &published);
   const wm_time_ns sent_ns = run_now(&run->clock);
-  wm_histogram_add(&self->send_ns, sent_ns - published.sent_ns);
+  wm_histogram_add(&self->send_ns, sent_ns - published.made_ns);
   lcm_sink_pose(&self->lcm, &published, sent_ns);
   self->last_published = published.now;
   self->has_published = 1;

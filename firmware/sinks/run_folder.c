@@ -139,7 +139,7 @@ static void published(wm_run_folder *self, const wm_published *p) {
   wm_row *line = begin(self);
   wm_row_int(line, p->now.t_ns);
   wm_row_char(line, ',');
-  wm_row_int(line, p->sent_ns);
+  wm_row_int(line, p->made_ns);
   wm_row_char(line, ',');
   wm_row_int(line, p->fused_until_ns);
   wm_row_char(line, ',');

@@ -40,7 +40,7 @@ size_t wm_published_encode(const wm_published *p, void *out, size_t capacity) {
   wm_writer w = wm_writer_of(out, capacity);
   wm_put_u8(&w, PUBLISHED_VERSION);
   put_estimate(&w, &p->now);
-  wm_put_i64(&w, p->sent_ns);
+  wm_put_i64(&w, p->made_ns);
   wm_put_i64(&w, p->fused_until_ns);
   wm_put_f64(&w, p->pose_odom_base.x_m);
   wm_put_f64(&w, p->pose_odom_base.y_m);
@@ -61,7 +61,7 @@ wm_status wm_published_decode(const void *data, size_t size, wm_published *out, 
   const unsigned version = wm_get_u8(&r);
   if (version < WITHOUT_LOST_PROBABILITY || version > PUBLISHED_VERSION) r.bad = 1;
   get_estimate(&r, version, &out->now);
-  out->sent_ns = wm_get_i64(&r);
+  out->made_ns = wm_get_i64(&r);
   out->fused_until_ns = wm_get_i64(&r);
   out->pose_odom_base.x_m = wm_get_f64(&r);
   out->pose_odom_base.y_m = wm_get_f64(&r);

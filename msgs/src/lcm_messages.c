@@ -36,7 +36,7 @@ size_t wm_lcm_pose(const wm_published *p, wm_time_ns sent_ns, void *out, size_t 
   waymark_pose_t m = {
       .t_ns = e->t_ns,
       .sent_ns = sent_ns,
-      .made_ns = p->sent_ns,
+      .made_ns = p->made_ns,
       .fused_until_ns = p->fused_until_ns,
       .utc_offset_ns = p->utc_offset_ns,
       .utc_uncertainty_ns = p->utc_uncertainty_ns,

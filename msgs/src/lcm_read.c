@@ -23,7 +23,7 @@ static void take_name(char *out, size_t capacity, const uint8_t *name, size_t le
 const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *out) {
   waymark_pose_t m;
   if (waymark_pose_t_decode(message, 0, room(length), &m) < 0) return "is no pose_t of this version";
-  *out = (wm_published){.sent_ns = m.made_ns,
+  *out = (wm_published){.made_ns = m.made_ns,
                         .fused_until_ns = m.fused_until_ns,
                         .pose_odom_base = {m.odom_position_m[0], m.odom_position_m[1], m.odom_heading_rad},
                         .jumps = (uint32_t)m.jumps,

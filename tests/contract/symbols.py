@@ -12,7 +12,7 @@ ALLOWED |= {"__cpu_model", "__cpu_indicator_init", "__popcountdi2", "__ctzdi2", 
 # msgs/, which the estimator stands on.
 ALLOWED_PATTERNS = [re.compile(r"^wm_")]
 # What compilers and sanitizers add on their own.
-TOOLS = re.compile(r"^(__stack_chk_fail|_GLOBAL_OFFSET_TABLE_|__(asan|ubsan|tsan|sanitizer|sancov)_.*|__gxx_personality_v0|"
+TOOLS = re.compile(r"^(__stack_chk_fail|__mem(cpy|set|move)_chk|_GLOBAL_OFFSET_TABLE_|__(asan|ubsan|tsan|sanitizer|sancov)_.*|__gxx_personality_v0|"
                    r"__aeabi_.*|_Unwind_Resume|__gcov_.*)$")
 
 

@@ -22,14 +22,18 @@ CHECKED = re.compile(r"^__(\w+)_chk$|^__stack_chk_fail$")
 def functions_of(obj, objdump):
     """{function: names that its code refers to}"""
     out = subprocess.run([objdump, "-dr", "--no-show-raw-insn", obj], check=True, capture_output=True, text=True).stdout
-    found, now = {}, None
-    for line in out.splitlines():
+    found, now, target = {}, None, None
+    for line in [*out.splitlines(), ""]:
+        relocated = re.search(r"\sR_\w+\s+([A-Za-z_]\w*)", line)
+        if target and not relocated:  # with a relocation the target printed is what stands behind the instruction
+            now.add(target)
+        target = None
         if match := re.match(r"^[0-9a-f]+ <([^>]+)>:$", line):
             now = found.setdefault(match[1], set())
-        elif now is not None and (match := re.search(r"\sR_\w+\s+([A-Za-z_]\w*)", line)):
-            now.add(match[1])
+        elif now is not None and relocated:
+            now.add(relocated[1])
         elif now is not None and (match := re.search(r"\t(?:call|jmp|bl|b)\w*\s+[0-9a-f]+ <([A-Za-z_]\w*)>$", line)):
-            now.add(match[1])
+            target = match[1]
     return found
 
 

@@ -49,6 +49,7 @@ inside() { chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin LC_ALL=C.UTF
 cp "$runtime" "$root/trial/waymark.deb"
 say "dpkg -i $(basename "$runtime")"
 inside dpkg -i /trial/waymark.deb
+python3 tests/package/hardening.py "$root/usr/bin/waymark" || fail "hardening"
 inside waymark --version
 echo "machine: $(inside uname -m)"
 inside waymark doctor --seconds 1 || [ $? -eq 1 ] || fail "doctor"

@@ -62,7 +62,7 @@ inline wm_status reject(record_list records, wm_innovation record, wm_verdict ve
 
 // A datum that is refused leaves its record, too.
 inline wm_status refuse(record_list records, const wm_innovation &record, wm_status status) {
-  reject(records, record, status == WM_NOT_FINITE ? WM_REJECTED_NOT_FINITE : WM_REJECTED_OUT_OF_RANGE);
+  (void)reject(records, record, status == WM_NOT_FINITE ? WM_REJECTED_NOT_FINITE : WM_REJECTED_OUT_OF_RANGE);
   return status;
 }
 

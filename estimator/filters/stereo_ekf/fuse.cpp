@@ -68,7 +68,7 @@ row_verdict stereo_ekf::fuse_point(const wm_stereo &seen, const vec3 &place, dou
   filter_.set_turn_rate(past.w_radps);
   row_block rows;
   if (point_rows(seen, place, place_sigma_m, slot, past, &rows)) return fuse_rows(rows, blank, records);
-  reject(records, blank, WM_REJECTED_OUT_OF_RANGE);
+  (void)reject(records, blank, WM_REJECTED_OUT_OF_RANGE);
   row_verdict out{};
   out.verdict = WM_REJECTED_OUT_OF_RANGE;
   return out;
@@ -117,7 +117,7 @@ wm_status stereo_ekf::fuse_known_point(const wm_event &event, int known, const w
   const wm_landmark &landmark = setup_->landmarks[known];
   buffer_observation(s, landmark, event.t_ns);
   if (life_.searching()) {
-    reject(records, blank, WM_REJECTED_SEARCHING);
+    (void)reject(records, blank, WM_REJECTED_SEARCHING);
     search(event.t_ns - wm_ns_from_seconds(kWindow_s));
     return WM_OK;
   }

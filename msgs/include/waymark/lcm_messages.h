@@ -21,7 +21,7 @@ extern "C" {
 #define WM_LCM_OBSERVATIONS_MAX 64
 #define WM_LCM_LANDMARKS_MAX 256
 
-// `sent_ns`: now, on the clock of published->sent_ns, which is when the pose was made.
+// `sent_ns`: now, on the clock of published->made_ns, which is when the pose was made.
 size_t wm_lcm_pose(const wm_published *published, wm_time_ns sent_ns, void *out, size_t capacity);
 size_t wm_lcm_health(const wm_health *health, void *out, size_t capacity);
 // Messages to the robot: NULL and *out (t_ns 0: now; arrival unset), or a text with the fault. Constant cost.

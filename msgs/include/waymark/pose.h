@@ -86,10 +86,10 @@ typedef struct wm_innovation {
   uint8_t gate_dof;
 } wm_innovation;
 
-// The published pose. Valid at t_ns, made at sent_ns.
+// The published pose. Valid at t_ns, made at made_ns.
 typedef struct wm_published {
   wm_estimate now;  // carried on by odometry from fused_until_ns to now.t_ns
-  wm_time_ns sent_ns;
+  wm_time_ns made_ns;
   wm_time_ns fused_until_ns;
   wm_pose2 pose_odom_base;  // continuous: never jumps
   uint32_t jumps;           // times that map against odom moved by more than the threshold

@@ -8,7 +8,15 @@
 extern "C" {
 #endif
 
-typedef enum wm_status {
+// A status that a caller drops is a warning: in C++, and by GCC (10 and later) in C. clang has no such attribute of a
+// type in C17.
+#if defined(__cplusplus) || (defined(__GNUC__) && __GNUC__ >= 10 && !defined(__clang__))
+#define WM_NODISCARD [[nodiscard]]
+#else
+#define WM_NODISCARD
+#endif
+
+typedef enum WM_NODISCARD wm_status {
   WM_OK = 0,
   WM_END,            // the end of a source's data; not an error
   WM_AGAIN,          // no datum now, ask later; not an error

@@ -78,7 +78,7 @@ static void a_mark_without_its_event_is_followed_by_another(void) {
 }
 
 static void poses_that_find_no_room_are_counted(void) {
-  wm_published published = {.sent_ns = 1};
+  wm_published published = {.made_ns = 1};
   for (int i = 0; i < 10; i++) output.put(output.context, WM_OUTPUT_PUBLISHED, &published, sizeof published);
   TEST_ASSERT_EQUAL_UINT64(10 - SLOTS, wm_ring_dropped(&estimator->to_disk));
   TEST_ASSERT_EQUAL_UINT64(2 * (10 - SLOTS), outputs_lost(estimator));  // neither thread took any

@@ -63,7 +63,7 @@ static void messages_arrive_over_memq(void) {
   lcm_subscribe(lcm, "TEST_.*", received, NULL);
   lcm_sink_open(&sink, 1, "memq://", "TEST_", &assembly, say, NULL, lcm);
 
-  wm_published p = {.sent_ns = 12};
+  wm_published p = {.made_ns = 12};
   p.now.t_ns = 11;
   lcm_sink_pose(&sink, &p, 13);
   wm_innovation i = {.t_ns = 3};
@@ -103,7 +103,7 @@ static void no_way_out_is_said_once_and_tried_again(void) {
   for (wm_time_ns t = 0; t < 10 * WM_NS_PER_S; t += 500 * WM_NS_PER_MS) lcm_sink_tick(&sink, t);
   TEST_ASSERT_EQUAL(1, lines);
   TEST_ASSERT_NOT_NULL(strstr(said, "Localizing goes on"));
-  wm_published p = {.sent_ns = 1};
+  wm_published p = {.made_ns = 1};
   lcm_sink_pose(&sink, &p, 13);
   TEST_ASSERT_EQUAL_UINT64(1, sink.not_sent);
   TEST_ASSERT_EQUAL(1, lines);

@@ -210,7 +210,7 @@ static void bytes_are_little_endian_on_every_machine(void) {
 }
 
 static void a_published_pose_comes_back(void) {
-  wm_published in = {.sent_ns = 5, .fused_until_ns = -3, .jumps = 2, .status_flags = 7, .utc_uncertainty_ns = -1}, out;
+  wm_published in = {.made_ns = 5, .fused_until_ns = -3, .jumps = 2, .status_flags = 7, .utc_uncertainty_ns = -1}, out;
   for (int i = 0; i < 36; i++) in.now.covariance[i] = random_f64();
   in.now.pose_map_base.q_xyzw[3] = 1;
   in.now.dof = 3;
@@ -228,7 +228,7 @@ static void a_published_pose_comes_back(void) {
 
 // The version before had no probability behind the estimate's state.
 static void a_published_pose_of_the_version_before_is_read(void) {
-  wm_published in = {.sent_ns = 5, .jumps = 2}, out;
+  wm_published in = {.made_ns = 5, .jumps = 2}, out;
   in.now.state = WM_STATE_LOST;
   in.now.lost_probability = 0.25;
   uint8_t bytes[WM_PUBLISHED_ENCODED_MAX];
@@ -240,7 +240,7 @@ static void a_published_pose_of_the_version_before_is_read(void) {
   TEST_ASSERT_EQUAL(length - 8, used);
   TEST_ASSERT_TRUE(isnan(out.now.lost_probability));
   TEST_ASSERT_EQUAL(WM_STATE_LOST, out.now.state);
-  TEST_ASSERT_EQUAL_INT64(5, out.sent_ns);
+  TEST_ASSERT_EQUAL_INT64(5, out.made_ns);
   TEST_ASSERT_EQUAL(2, out.jumps);
 }
 

@@ -19,7 +19,7 @@ void tearDown(void) {}
 static uint8_t bytes[WM_LCM_MESSAGE_MAX];
 
 static void a_pose_arrives_whole(void) {
-  wm_published p = {.sent_ns = 11,
+  wm_published p = {.made_ns = 11,
                     .fused_until_ns = 7,
                     .jumps = 3,
                     .last_jump_m = 0.5,
