@@ -321,6 +321,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.side_mps = side_mps;
   input.model = model_;
   input.command = model_ == WM_MOTION_TWIST && commands_ != 0;
+  if (input.command) begin_response(*params_, history_.empty() ? nullptr : &history_.newest(), &input);
   input.kind = kind();
   input.doubtful = doubtful;
   mark_refused(&input);

@@ -51,8 +51,9 @@ class motion_front_end {
   template <class Visit>
   void walk(wm_time_ns from_ns, wm_time_ns to_ns, const wm_motion_calibration &calibration, Visit visit) const {
     const wm_time_ns lag_ns = lag_of(calibration);
-    history_.walk(from_ns - lag_ns, to_ns - lag_ns, hold_max_ns_, [&](const motion_segment &segment) {
-      motion_twist twist = twist_of(segment.input, calibration, wheels_);
+    history_.walk(from_ns - lag_ns, to_ns - lag_ns, hold_max_ns_, [&](motion_segment &segment) {
+      if (segment.input.command) respond(*params_, calibration, wheels_, &segment);
+      motion_twist twist = twist_of(segment.input, calibration, wheels_, segment.drive);
       if (segment.input.model == WM_MOTION_CONSTANT_VELOCITY) static_cast<planar_twist &>(twist) = velocity_;
       motion_noise noise =
           noise_of(segment.input, twist, segment.dt_s, *params_, wheels_, calibration, stated_noise_now());

@@ -13,6 +13,11 @@ namespace wm {
 
 enum refused_bits : uint8_t { kRefusedSpeed = 1, kRefusedTurn = 2 };
 
+// Twist of base_link: speed forwards and to the left in m/s, turn rate in rad/s.
+struct planar_twist {
+  double v, u, w;
+};
+
 // A raw input; a and b mean, by model: ticks: speed of the left and the right wheel (m/s); speed_yaw_rate, twist and
 // increments: speed (m/s) and turn rate (rad/s); ackermann: speed (m/s) and road wheel angle (rad).
 struct motion_input {
@@ -21,7 +26,9 @@ struct motion_input {
   double side_mps;  // to the left; of twists in space and increments
   // Of increments: variance per s of distance, of sideways and of rotation, and their covariances; NaN: not given.
   float increment_noise[6];
-  float period_s, unused;  // between increments; 0: that between the inputs
+  float period_s;          // between increments; 0: that between the inputs
+  float response[2];       // of commands: speed and turn rate of the drive at t_ns (commands.hpp)
+  float unused;
   uint8_t model;           // wm_motion_model; AUTO: nothing known yet
   uint8_t standing;        // the robot is known to stand
   uint8_t doubtful;        // of a frozen counter, a dead encoder
@@ -33,11 +40,20 @@ struct motion_input {
   double refused_s;        // at t_ns: for how long
 };
 
+// Of commands (commands.hpp): rises of the speed and of the turn rate per s, and by how much a drive by radius turns
+// faster, rad/s.
+struct drive_terms {
+  double rise[2], gentle_radps;
+};
+
 // Part of an interval over which one input holds.
 struct motion_segment {
   motion_input input;
   double dt_s;
-  double changed[2];  // at its beginning: by how much the input's a and b differ from the one before
+  double held_s;      // at its beginning: since the input's t_ns
+  drive_terms drive;
+  double changed2[2];  // of commands: squares of what the drive still has to change, beginning less end
+  planar_twist end;    // of commands: at its end
   double overdue_s;   // at its beginning: for how long the next input has been overdue; below 0: it isn't
   double unknown_s;   // at its beginning: for how long the input has been held for too long; 0: it isn't
   double refused_s;   // at its beginning: for how long samples have been refused; only where input.refused
@@ -111,9 +127,7 @@ class motion_history {
     segment.overdue_s = wm_seconds_between(segment.input.t_ns, begin) - due_s(next, oldest);
     segment.refused_s = segment.input.refused_s + wm_seconds_between(segment.input.t_ns, begin);
     segment.unknown_s = begin > held_until ? wm_seconds_between(held_until, begin) : 0.0;
-    if (next <= oldest + 1 || begin != segment.input.t_ns) return segment;
-    segment.changed[0] = segment.input.a - at(next - 2).a;
-    segment.changed[1] = segment.input.b - at(next - 2).b;
+    segment.held_s = wm_seconds_between(segment.input.t_ns, begin);
     return segment;
   }
 

@@ -40,7 +40,7 @@ struct wm_motion_params {
   double hold_max_s;
   double limits_mps2, limits_radps2;
   double commands_radius_max_m, commands_radius_overflow_m;
-  double commands_speed_change, commands_yaw_rate_change;
+  double commands_response_s, commands_delay_sigma_s;
   double velocity_speed_walk, velocity_turn_walk;
   wm_motion_states states;
 };

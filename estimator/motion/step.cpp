@@ -86,14 +86,15 @@ motion_twist twist_of_sample(double speed, double side, double rate, const wm_mo
   return t;
 }
 
-motion_twist twist_of(const motion_input &input, const wm_motion_calibration &c, const wm_wheels &wheels) {
+motion_twist twist_of(const motion_input &input, const wm_motion_calibration &c, const wm_wheels &wheels,
+                      const drive_terms &drive) {
   if (input.standing || input.stale) return motion_twist{};
   switch (input.model) {
     case WM_MOTION_TICKS: return from_wheels(input.a, input.b, c, wheels.track_m);
     case WM_MOTION_SPEED_YAW_RATE: return from_speed_and_rate(input.a, input.b, c);
     case WM_MOTION_ACKERMANN: return from_steering(input.a, input.b, c, wheels);
     case WM_MOTION_TWIST:
-      return input.command ? twist_of_command(input.a, input.side_mps, input.b, c, wheels.track_m)
+      return input.command ? twist_of_command({input.a, input.side_mps, input.b}, drive, c, wheels.track_m)
                            : twist_of_sample(input.a, input.side_mps, input.b, c, wheels.track_m);
     case WM_MOTION_INCREMENTS:
       return twist_of_sample(input.a, input.side_mps, input.b, c, std::numeric_limits<double>::quiet_NaN());

@@ -21,6 +21,9 @@ enum calibration_index {
   kSteeringOffset = WM_STEERING_OFFSET,
   kLag = WM_LAG,
   kTurnSlowdown = WM_TURN_SLOWDOWN,
+  kSpeedOnset = WM_SPEED_ONSET,
+  kTurnOnset = WM_TURN_ONSET,
+  kGentleTurns = WM_GENTLE_TURNS,
   kCalibrationCount = WM_MOTION_TERMS
 };
 
@@ -31,19 +34,14 @@ inline constexpr int kMotionStates = kVelocityX + kVelocityStates;
 // How many of them there are with this motion.model.
 constexpr int count_velocity_states(int model) { return model == WM_MOTION_CONSTANT_VELOCITY ? kVelocityStates : 0; }
 
-inline constexpr wm_motion_calibration kNeutralCalibration = {{1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0}};
-
-// Twist of base_link: speed forwards and to the left in m/s, turn rate in rad/s.
-struct planar_twist {
-  double v, u, w;
-};
+inline constexpr wm_motion_calibration kNeutralCalibration = {{1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}};
 
 inline double speed_of(const planar_twist &t) { return t.u == 0.0 ? std::fabs(t.v) : std::sqrt(t.v * t.v + t.u * t.u); }
 
 // The twist and its derivatives by the calibration; only the first `count` entries of `index`, `v_by`, `u_by`, `w_by`
 // are set. The lag is not among them: it moves the ends of the interval.
 struct motion_twist : planar_twist {
-  static constexpr int kMax = 8;  // capacity; a model has fewer terms
+  static constexpr int kMax = 11;  // capacity; a model has fewer terms
   int count;
   int index[kMax];
   double v_by[kMax], u_by[kMax], w_by[kMax];
@@ -57,8 +55,9 @@ struct motion_twist : planar_twist {
   }
 };
 
-// Car: [Stepanov2017], V and Phi; differential drive by ticks: [FengND].
-motion_twist twist_of(const motion_input &input, const wm_motion_calibration &calibration, const wm_wheels &wheels);
+// Car: [Stepanov2017], V and Phi; differential drive by ticks: [FengND]. `drive`: of commands alone.
+motion_twist twist_of(const motion_input &input, const wm_motion_calibration &calibration, const wm_wheels &wheels,
+                      const drive_terms &drive);
 
 // A measured twist; where the track is known, as a controller makes it by two wheels with their own scales.
 motion_twist twist_of_sample(double speed, double side, double rate, const wm_motion_calibration &c, double track_m);

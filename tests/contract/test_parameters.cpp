@@ -147,6 +147,8 @@ const std::vector<setting> kMotionStates = {
     {"motion.states.right_scale_sigma", 0.02},         {"motion.states.track_scale_sigma", 0.02},
     {"motion.states.steering_offset_sigma_rad", 0.02}, {"motion.states.lag_sigma_s", 0.05},
     {"motion.states.turn_slowdown_sigma_mps", 0.02},   {"motion.states.wheel_difference_sigma", 0.01},
+    {"motion.states.speed_onset_sigma_s", 0.02},       {"motion.states.turn_onset_sigma_s", 0.02},
+    {"motion.states.gentle_turns_sigma", 0.1},
 };
 const std::vector<setting> kSensorStates = {
     {"sightings.states.sensor_yaw_sigma_rad", 0.05},

@@ -95,7 +95,7 @@ void planar_motion::take_step(const motion_segment &segment, const motion_twist 
   if (has_velocity())
     twist_ = velocity_at(heading_rad_);
   else
-    twist_ = twist;
+    twist_ = segment.input.command ? segment.end : twist;
   heading_rad_ += step.turn_rad;
   double v_sigma, w_sigma;
   front_.count_noise(&v_sigma, &w_sigma);

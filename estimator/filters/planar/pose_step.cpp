@@ -11,16 +11,16 @@ namespace {
 constexpr double kTurnMost_radps = 10.0;
 // Limits of the calibration's terms, by calibration_index: beyond, the model is wrong, or the lag exceeds the history.
 constexpr double kLowest[kMotionStates] =
-    {0.3, 0.3, -1.0, 0.3, 0.3, 0.3, -0.5, 0.0, -1.0, -kSpeedMost_mps, -kSpeedMost_mps, -kTurnMost_radps},
-                 kHighest[kMotionStates] = {
-                     3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0, kSpeedMost_mps, kSpeedMost_mps, kTurnMost_radps};
+    {0.3, 0.3, -1.0, 0.3, 0.3, 0.3, -0.5, 0.0, -1.0, -1.0, -1.0, -1.0, -kSpeedMost_mps, -kSpeedMost_mps, -kTurnMost_radps},
+                 kHighest[kMotionStates] = {3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0, 1.0, 1.0, 2.0, kSpeedMost_mps,
+                                            kSpeedMost_mps, kTurnMost_radps};
 
 }  // namespace
 
 const char *const kMotionStateNames[kMotionStates] = {
     "motion.speed_scale",       "motion.yaw_rate_scale", "motion.yaw_rate_bias_radps", "motion.left_scale",
     "motion.right_scale",       "motion.track_scale",    "motion.steering_offset_rad", "motion.lag_s",
-    "motion.turn_slowdown_mps", "motion.velocity_x_mps", "motion.velocity_y_mps",      "motion.turn_rate_radps"};
+    "motion.turn_slowdown_mps", "motion.speed_onset_s", "motion.turn_onset_s", "motion.gentle_turns", "motion.velocity_x_mps", "motion.velocity_y_mps",      "motion.turn_rate_radps"};
 
 double motion_state_within_limits(int calibration_index, double value) {
   if (value < kLowest[calibration_index]) return kLowest[calibration_index];
@@ -87,7 +87,8 @@ pose_step make_pose_step(const motion_segment &segment, const motion_twist &twis
   // less of the last ones.
   const int lag = motion_state[kLag];
   if (lag >= 0 && (segment.first || segment.last)) {
-    add_column(lag, segment.last ? -twist.v : 0.0, segment.last ? -twist.u : 0.0, segment.last ? -twist.w : 0.0);
+    const planar_twist &end = segment.input.command ? segment.end : twist;
+    add_column(lag, segment.last ? -end.v : 0.0, segment.last ? -end.u : 0.0, segment.last ? -end.w : 0.0);
     if (segment.first) {
       double *by = out.by[out.columns - 1];
       by[0] += h.cos * before.v - dy * before.w - h.sin * before.u;

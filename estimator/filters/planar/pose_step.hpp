@@ -14,7 +14,7 @@ enum pose_state { kX = 0, kY = 1, kHeading = 2 };
 inline constexpr int kPoseStates = 3;  // x, y, heading
 
 struct pose_step {
-  static constexpr int kMaxColumns = 10;  // the heading, and the calibration's nine terms; a model has fewer
+  static constexpr int kMaxColumns = 13;  // the heading, and the calibration's twelve terms; a model has fewer
   double x_m, y_m, turn_rad;              // motion of the pose, in map
   wm_pose2 body;                          // the same in base_link at the segment's beginning
   // F is the identity but for the pose's rows, which have by[k][row] besides in column[k].

@@ -59,6 +59,9 @@ typedef enum wm_motion_term {
   WM_STEERING_OFFSET,  // rad
   WM_LAG,              // s by which the motion follows its samples
   WM_TURN_SLOWDOWN,    // m/s that a commanded speed loses at a turn rate of 1 rad/s; grows with the rate's square
+  WM_SPEED_ONSET,      // s by which a rise of the commanded speed comes later than a fall: the rise times this is lost
+  WM_TURN_ONSET,       // the same of the turn rate
+  WM_GENTLE_TURNS,     // share by which gentle turns are driven with the largest radius of a drive by radius
   WM_MOTION_TERMS
 } wm_motion_term;
 

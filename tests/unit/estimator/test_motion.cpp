@@ -65,8 +65,9 @@ void test_every_derivative_of_every_model(void) {
     input.side_mps = 0.6;
     input.model = (uint8_t)(model == kCommand ? (int)WM_MOTION_TWIST : model);
     input.command = model == kCommand;
-    const wm_motion_calibration c = {{1.05, 0.93, 0.02, 1.02, 0.97, 1.04, 0.03, 0.1, 0.07}};
-    const wm::motion_twist t = wm::twist_of(input, c, w);
+    const wm_motion_calibration c = {{1.05, 0.93, 0.02, 1.02, 0.97, 1.04, 0.03, 0.1, 0.07, 0.15, 0.04, 0.3}};
+    const wm::drive_terms drive = {{0.4, -0.7}, 0.05};
+    const wm::motion_twist t = wm::twist_of(input, c, w, drive);
     TEST_ASSERT_GREATER_THAN(1, t.count);
     for (int state = 0; state < wm::kCalibrationCount; state++) {
       if (state == wm::kLag) continue;  // moves the ends of the interval, not the twist
@@ -74,7 +75,7 @@ void test_every_derivative_of_every_model(void) {
       wm_motion_calibration up = c, down = c;
       up.value[state] += h;
       down.value[state] -= h;
-      const wm::motion_twist a = wm::twist_of(input, up, w), b = wm::twist_of(input, down, w);
+      const wm::motion_twist a = wm::twist_of(input, up, w, drive), b = wm::twist_of(input, down, w, drive);
       double v_by = 0, u_by = 0, w_by = 0;
       for (int i = 0; i < t.count; i++)
         if (t.index[i] == state) v_by += t.v_by[i], u_by += t.u_by[i], w_by += t.w_by[i];
@@ -84,7 +85,7 @@ void test_every_derivative_of_every_model(void) {
       checked += v_by != 0 || w_by != 0;
     }
   }
-  TEST_ASSERT_EQUAL(3 + 3 + 2 + 6 + 3 + 7, checked);
+  TEST_ASSERT_EQUAL(3 + 3 + 2 + 6 + 3 + 10, checked);
 }
 
 void test_ticks_make_exact_arcs(void) {
@@ -235,28 +236,6 @@ void test_a_held_speed_is_doubted_more_and_more(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, way_var - 0.25 * 0.75 * 0.75 * 0.75 * 0.75);  // the first one's habit isn't known
 }
 
-// A command that changes is obeyed sooner or later: the way and the turn are unsure by how much it changed, in one step
-// or in many, and however often it is asked.
-void test_a_change_of_command_is_doubted(void) {
-  for (int steps : {1, 8}) {
-    start(make::no_wheels());
-    params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
-    params.commands_speed_change = 0.02;
-    params.commands_yaw_rate_change = 0.03;
-    front.init(&params, &wheels);
-    feed(make::twist(0, 0.1, 0.0));
-    for (int i = 1; i <= steps; i++) {
-      const double share = (double)i / steps;
-      feed(make::twist(0.2 * share, 0.1 + 0.1 * share, -0.4 * share));
-      advance(0.2 * share + 0.01);
-    }
-    advance(0.25);
-    feed(make::twist(0.3, 0.2, -0.4));
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02 * 0.02 * 0.1, way_var);
-    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.03 * 0.03 * 0.4, turn_var);
-  }
-}
-
 // A second of silence. Nobody looked meanwhile: the counts bring all of the way at its end; only the gyro's turn is
 // unknown. The pose went through it without them, corrected by what was seen: they don't move it once more.
 void test_counts_after_a_silence(void) {
@@ -323,52 +302,6 @@ void test_commands_are_obeyed_late(void) {
   feed(make::twist(2, 0, 0));
   feed(make::twist(3, 0, 0));
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 1.0, pose.x_m);
-}
-
-// GIVEN a drive that takes speed and radius WHEN a wider turn is commanded THEN it drives the widest that it knows.
-void test_a_drive_knows_no_wider_radius(void) {
-  start(make::no_wheels());
-  const auto driven = [](double v, double w) {
-    static double t_s = 0;
-    feed(make::twist(t_s += 0.1, v, w));
-    return front.twist_at(make::at(t_s), calibration).w;
-  };
-  TEST_ASSERT_EQUAL_DOUBLE(0.001, driven(0.1, 0.001));  // unless it is told, any turn is driven as asked
-  params.commands_radius_max_m = 2.0;
-  front.init(&params, &wheels);
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, driven(0.1, 0.001));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, -0.001));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, driven(-0.1, 0.001));  // backwards
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(-0.1, -0.001));
-  TEST_ASSERT_EQUAL_DOUBLE(0.06, driven(0.1, 0.06));
-  TEST_ASSERT_EQUAL_DOUBLE(-0.4, driven(-0.1, -0.4));
-  TEST_ASSERT_EQUAL_DOUBLE(0.0, driven(0.1, 0.0));
-  TEST_ASSERT_EQUAL_DOUBLE(0.3, driven(0.0, 0.3));  // on the spot
-  params.commands_radius_overflow_m = 12.0;
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, driven(0.1, 0.01));    // 10 m
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, 0.005));  // 20 m
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, -0.005));
-  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, 1e-300));
-}
-
-// A drive can't overflow at a radius that it obeys; 0 is off for either.
-void test_an_overflow_lies_beyond_what_is_obeyed(void) {
-  const auto wrong = [](double radius_max_m, double overflow_m) {
-    wm_params_defaults(&wm_motion_params_table, &params);
-    params.commands_radius_max_m = radius_max_m;
-    params.commands_radius_overflow_m = overflow_m;
-    const char *key = "none";
-    const bool clash = wm_motion_params_clash(&params, &key) != nullptr;
-    TEST_ASSERT_EQUAL_STRING(clash ? "commands.radius_overflow_m" : "none", key);
-    return clash;
-  };
-  TEST_ASSERT_FALSE(wrong(0, 0));
-  TEST_ASSERT_FALSE(wrong(2, 0));
-  TEST_ASSERT_FALSE(wrong(0, 1));
-  TEST_ASSERT_FALSE(wrong(2, 12));
-  TEST_ASSERT_FALSE(wrong(2, 2));
-  TEST_ASSERT_TRUE(wrong(2, 1.999));
-  TEST_ASSERT_TRUE(wrong(2, 1e-6));
 }
 
 void test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn(void) {
@@ -544,12 +477,9 @@ int main(void) {
   RUN_TEST(test_rear_wheels_are_preferred_and_a_silent_source_yields);
   RUN_TEST(test_ackermann_by_table_ratio_and_road_wheel);
   RUN_TEST(test_a_held_speed_is_doubted_more_and_more);
-  RUN_TEST(test_a_change_of_command_is_doubted);
   RUN_TEST(test_counts_after_a_silence);
   RUN_TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading);
   RUN_TEST(test_commands_are_obeyed_late);
-  RUN_TEST(test_a_drive_knows_no_wider_radius);
-  RUN_TEST(test_an_overflow_lies_beyond_what_is_obeyed);
   RUN_TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn);
   RUN_TEST(test_a_frozen_counter_is_doubt_not_standstill);
   RUN_TEST(test_a_speed_that_no_robot_reaches_is_refused);

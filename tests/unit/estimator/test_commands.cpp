@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+// Twists that are commands: response, onset, gentle turns, what a change leaves unsure.
+#include "events.hpp"
+#include "math/arc.hpp"
+#include "motion/front_end.hpp"
+#include "unity.h"
+
+namespace {
+
+wm_motion_params params;
+wm_wheels wheels;
+wm::motion_front_end front;
+wm_motion_calibration calibration;
+wm_pose2 pose;
+double way_var, turn_var;
+
+void advance(double t_s) {
+  front.advance(make::at(t_s), calibration,
+                [](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &n) {
+                  const wm::arc a = wm::make_arc(t.v * s.dt_s, t.w * s.dt_s);
+                  pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
+                  way_var += n.distance_m2;
+                  turn_var += n.rotation_rad2;
+                });
+}
+
+void feed(const wm_event &e) {
+  TEST_ASSERT_EQUAL(WM_OK, front.check(e));
+  front.feed(e);
+  advance(1e-9 * (double)e.t_ns);
+}
+
+// Commands: y' = (c - y) / response, however the time is cut.
+void start_commands(double response_s, double delay_sigma_s) {
+  wheels = make::no_wheels();
+  wm_params_defaults(&wm_motion_params_table, &params);
+  calibration = wm::kNeutralCalibration;
+  pose = {};
+  way_var = turn_var = 0;
+  params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
+  params.noise_hold_mps2 = params.noise_hold_radps2 = 0;
+  params.twist = WM_TWIST_COMMANDS;
+  params.commands_response_s = response_s;
+  params.commands_delay_sigma_s = delay_sigma_s;
+  front.init(&params, &wheels);
+}
+
+void test_a_command_is_obeyed_with_a_response(void) {
+  for (int cuts : {1, 7}) {
+    start_commands(0.2, 0.0);
+    feed(make::twist(0, 0.1, 0.0));
+    feed(make::twist(1, 0.3, -0.4));
+    for (int i = 1; i <= cuts; i++) advance(1.0 + 0.5 * i / cuts);
+    feed(make::twist(1.5, 0.3, 0.0));
+    for (int i = 1; i <= cuts; i++) advance(1.5 + 0.3 * i / cuts);
+    const double left = exp(-2.5), turned = -0.4 * (0.5 - 0.2 * (1 - left));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-7, turned - 0.4 * (1 - left) * 0.2 * (1 - exp(-1.5)), pose.heading_rad);
+  }
+}
+
+// A rise is late, a fall is not: each pulse loses onset times its height. A turn to the other side falls, then rises.
+void test_short_turns_are_obeyed_in_part(void) {
+  for (double before : {0.0, 0.3}) {
+    double turned[2];
+    for (int with : {0, 1}) {
+      start_commands(0.05, 0.0);
+      calibration.value[WM_TURN_ONSET] = with ? 0.04 : 0.0;
+      feed(make::twist(0, 0.1, before));
+      for (int i = 1; i <= 20; i++) feed(make::twist(i, 0.1, i % 2 ? -0.4 : before));
+      advance(21);
+      turned[with] = pose.heading_rad;
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0.04 * (0.4 - before) * 10, turned[1] - turned[0]);
+  }
+}
+
+// A drive by speed and radius turns gentle turns with its largest radius; as asked, where they are tighter.
+void test_gentle_turns_have_the_largest_radius(void) {
+  for (double rate : {0.02, 0.1}) {
+    start_commands(0.05, 0.0);
+    calibration.value[WM_GENTLE_TURNS] = 0.75;
+    feed(make::twist(0, 0.1, rate));
+    feed(make::twist(1, 0.1, rate));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, rate < 0.05 ? 0.25 * rate + 0.75 * 0.05 : rate, pose.heading_rad);
+  }
+}
+
+// The dead time differs from change to change: the way and the turn are unsure by it times the change, however the
+// time is cut, and by less for a slow change.
+void test_a_change_of_command_is_doubted(void) {
+  for (int cuts : {1, 8}) {
+    start_commands(0.1, 0.08);
+    feed(make::twist(0, 0.1, 0.0));
+    feed(make::twist(0.2, 0.2, -0.4));
+    for (int i = 1; i <= cuts; i++) advance(0.2 + 1.8 * i / cuts);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.08 * 0.08 * 0.1 * 0.1, way_var);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.08 * 0.08 * 0.4 * 0.4, turn_var);
+  }
+  start_commands(0.1, 0.08);
+  for (int i = 0; i <= 100; i++) feed(make::twist(0.02 * i, 0.1, -0.004 * i));
+  TEST_ASSERT_TRUE(turn_var < 0.2 * 0.08 * 0.08 * 0.4 * 0.4);
+}
+
+// GIVEN a drive that takes speed and radius WHEN a wider turn is commanded THEN it drives the widest that it knows.
+void test_a_drive_knows_no_wider_radius(void) {
+  start_commands(0.01, 0.0);
+  params.twist = WM_TWIST_AUTO;
+  front.init(&params, &wheels);
+  const auto driven = [](double v, double w) {
+    static double t_s = 0;
+    feed(make::twist(t_s += 1, v, w));
+    return front.twist_at(make::at(t_s + 0.9), calibration).w;
+  };
+  TEST_ASSERT_EQUAL_DOUBLE(0.001, driven(0.1, 0.001));  // by default, any turn is driven as asked
+  params.commands_radius_max_m = 2.0;
+  front.init(&params, &wheels);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, driven(0.1, 0.001));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, -0.001));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, driven(-0.1, 0.001));  // backwards
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(-0.1, -0.001));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.06, driven(0.1, 0.06));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.4, driven(-0.1, -0.4));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.0, driven(0.1, 0.0));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.3, driven(0.0, 0.3));  // on the spot
+  params.commands_radius_overflow_m = 12.0;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.05, driven(0.1, 0.01));    // 10 m
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, 0.005));  // 20 m
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, -0.005));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -0.05, driven(0.1, 1e-300));
+}
+
+// A drive can't overflow at a radius that it obeys; 0 is off for either.
+void test_an_overflow_lies_beyond_what_is_obeyed(void) {
+  const auto wrong = [](double radius_max_m, double overflow_m) {
+    wm_params_defaults(&wm_motion_params_table, &params);
+    params.commands_radius_max_m = radius_max_m;
+    params.commands_radius_overflow_m = overflow_m;
+    const char *key = "none";
+    const bool clash = wm_motion_params_clash(&params, &key) != nullptr;
+    TEST_ASSERT_EQUAL_STRING(clash ? "commands.radius_overflow_m" : "none", key);
+    return clash;
+  };
+  TEST_ASSERT_FALSE(wrong(0, 0));
+  TEST_ASSERT_FALSE(wrong(2, 0));
+  TEST_ASSERT_FALSE(wrong(0, 1));
+  TEST_ASSERT_FALSE(wrong(2, 12));
+  TEST_ASSERT_FALSE(wrong(2, 2));
+  TEST_ASSERT_TRUE(wrong(2, 1.999));
+  TEST_ASSERT_TRUE(wrong(2, 1e-6));
+}
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_a_command_is_obeyed_with_a_response);
+  RUN_TEST(test_short_turns_are_obeyed_in_part);
+  RUN_TEST(test_gentle_turns_have_the_largest_radius);
+  RUN_TEST(test_a_change_of_command_is_doubted);
+  RUN_TEST(test_a_drive_knows_no_wider_radius);
+  RUN_TEST(test_an_overflow_lies_beyond_what_is_obeyed);
+  return UNITY_END();
+}
