@@ -86,8 +86,7 @@ void respond(const wm_motion_params &p, const wm_motion_calibration &c, const wm
 motion_twist twist_of_command(const planar_twist &response, const drive_terms &drive, const wm_motion_calibration &c,
                               double track_m) {
   const double speed = response.v - c.value[kSpeedOnset] * drive.rise[0];
-  const double rate =
-      response.w - c.value[kTurnOnset] * drive.rise[1] + c.value[kGentleTurns] * drive.gentle_radps;
+  const double rate = response.w - c.value[kTurnOnset] * drive.rise[1] + c.value[kGentleTurns] * drive.gentle_radps;
   const double size = std::fabs(speed), turning = square(rate);
   const double slower = c.value[kTurnSlowdown] * turning;
   const double fraction = size > 0.0 && slower < size ? (size - slower) / size : size > 0.0 ? 0.0 : 1.0;
@@ -104,8 +103,8 @@ motion_twist twist_of_command(const planar_twist &response, const drive_terms &d
   // The turn rate changes the speed by the slowdown, and by wheels of unequal scale.
   const double slows_by = slows * 2.0 * c.value[kTurnSlowdown] * rate;
   const double half = wheels ? 0.5 * track_m : 0.0;
-  const double v_by_rate = v_by * slows_by + 0.5 * c.value[kSpeedScale] * half *
-                                                 (c.value[kRightScale] - c.value[kLeftScale]);
+  const double v_by_rate =
+      v_by * slows_by + 0.5 * c.value[kSpeedScale] * half * (c.value[kRightScale] - c.value[kLeftScale]);
   const double own = wheels ? half * inverse_track * (c.value[kRightScale] + c.value[kLeftScale]) : 1.0;
   const double w_by_rate = w_by * slows_by + c.value[kYawRateScale] * own;
   if (drive.rise[1] != 0.0) t.add(kTurnOnset, -v_by_rate * drive.rise[1], -w_by_rate * drive.rise[1]);

@@ -26,18 +26,18 @@ struct motion_input {
   double side_mps;  // to the left; of twists in space and increments
   // Of increments: variance per s of distance, of sideways and of rotation, and their covariances; NaN: not given.
   float increment_noise[6];
-  float period_s;          // between increments; 0: that between the inputs
-  float response[2];       // of commands: speed and turn rate of the drive at t_ns (commands.hpp)
+  float period_s;     // between increments; 0: that between the inputs
+  float response[2];  // of commands: speed and turn rate of the drive at t_ns (commands.hpp)
   float unused;
-  uint8_t model;           // wm_motion_model; AUTO: nothing known yet
-  uint8_t standing;        // the robot is known to stand
-  uint8_t doubtful;        // of a frozen counter, a dead encoder
-  uint8_t stale;           // set by walk(): held for longer than hold_max
-  uint8_t counted;         // by the counts or the increment at its end: true until then, however long
-  uint8_t command;         // a twist that is a command
-  uint8_t kind;            // motion_kind
-  uint8_t refused;         // kRefusedSpeed, kRefusedTurn: samples of it are refused, and this is the last plausible one
-  double refused_s;        // at t_ns: for how long
+  uint8_t model;     // wm_motion_model; AUTO: nothing known yet
+  uint8_t standing;  // the robot is known to stand
+  uint8_t doubtful;  // of a frozen counter, a dead encoder
+  uint8_t stale;     // set by walk(): held for longer than hold_max
+  uint8_t counted;   // by the counts or the increment at its end: true until then, however long
+  uint8_t command;   // a twist that is a command
+  uint8_t kind;      // motion_kind
+  uint8_t refused;   // kRefusedSpeed, kRefusedTurn: samples of it are refused, and this is the last plausible one
+  double refused_s;  // at t_ns: for how long
 };
 
 // Of commands (commands.hpp): rises of the speed and of the turn rate per s, and by how much a drive by radius turns
@@ -50,15 +50,15 @@ struct drive_terms {
 struct motion_segment {
   motion_input input;
   double dt_s;
-  double held_s;      // at its beginning: since the input's t_ns
+  double held_s;  // at its beginning: since the input's t_ns
   drive_terms drive;
   double changed2[2];  // of commands: squares of what the drive still has to change, beginning less end
   planar_twist end;    // of commands: at its end
-  double overdue_s;   // at its beginning: for how long the next input has been overdue; below 0: it isn't
-  double unknown_s;   // at its beginning: for how long the input has been held for too long; 0: it isn't
-  double refused_s;   // at its beginning: for how long samples have been refused; only where input.refused
-  bool has_next;      // a later input has come
-  bool first, last;   // of the interval: their length depends on the lag
+  double overdue_s;    // at its beginning: for how long the next input has been overdue; below 0: it isn't
+  double unknown_s;    // at its beginning: for how long the input has been held for too long; 0: it isn't
+  double refused_s;    // at its beginning: for how long samples have been refused; only where input.refused
+  bool has_next;       // a later input has come
+  bool first, last;    // of the interval: their length depends on the lag
 };
 
 class motion_history {

@@ -17,15 +17,14 @@ constexpr uint32_t kTerms[] = {
     bit(kSpeedScale) | bit(kSteeringOffset),
     kRates,
     kRates,
-    kRates | bit(kLag) | bit(kTurnSlowdown) | bit(kSpeedOnset) | bit(kTurnOnset) |
-        bit(kGentleTurns),
+    kRates | bit(kLag) | bit(kTurnSlowdown) | bit(kSpeedOnset) | bit(kTurnOnset) | bit(kGentleTurns),
     0,
 };
 
 // Noise per sqrt(s), by motion_kind; of a twist of unknown kind the larger one. Measured twists and gyros: flat within
-// a factor of 2 on plaza, starry-night, comma2k19 and the crossings. Commands: regression of the turn's squared errors on
-// the ten robots of mrclam, besides commands.delay_sigma_s: 0.005 and 0.11 to 0.13 over 2, 5 and 10 s alike. Steering:
-// not swept.
+// a factor of 2 on plaza, starry-night, comma2k19 and the crossings. Commands: regression of the turn's squared errors
+// on the ten robots of mrclam, besides commands.delay_sigma_s: 0.005 and 0.11 to 0.13 over 2, 5 and 10 s alike.
+// Steering: not swept.
 constexpr rate_noise kNoise[] = {
     {0.03, 0.01, 0.03},   // unknown
     {0.03, 0.01, 0.03},   // ticks: only while their noise is not used

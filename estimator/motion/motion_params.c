@@ -79,8 +79,8 @@ static const wm_param kParams[] = {
     F64("commands.response_s", commands_response_s, 0.15, 0.01, 2,
         "Where twists are commands: time constant of the drive's first-order response to a change, behind the dead "
         "time, which is the lag."),
-    // Steps of the turn rate on the ten robots of mrclam against truth: 0.19 s +- 0.06 to 0.12 s, of any size. Flat from
-    // 0.07 to 0.13.
+    // Steps of the turn rate on the ten robots of mrclam against truth: 0.19 s +- 0.06 to 0.12 s, of any size. Flat
+    // from 0.07 to 0.13.
     F64("commands.delay_sigma_s", commands_delay_sigma_s, 0.1, 0, 2,
         "Where twists are commands: sigma of the dead time about its mean, which differs from change to change (a "
         "controller's cycle): noise of the distance and of the rotation, times the change."),

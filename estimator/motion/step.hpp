@@ -34,7 +34,8 @@ inline constexpr int kMotionStates = kVelocityX + kVelocityStates;
 // How many of them there are with this motion.model.
 constexpr int count_velocity_states(int model) { return model == WM_MOTION_CONSTANT_VELOCITY ? kVelocityStates : 0; }
 
-inline constexpr wm_motion_calibration kNeutralCalibration = {{1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}};
+inline constexpr wm_motion_calibration kNeutralCalibration = {
+    {1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}};
 
 inline double speed_of(const planar_twist &t) { return t.u == 0.0 ? std::fabs(t.v) : std::sqrt(t.v * t.v + t.u * t.u); }
 

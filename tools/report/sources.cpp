@@ -88,8 +88,11 @@ Meaning meaning_of(const std::string &name) {
   if (what == "turn_slowdown_mps")
     return {1, 0, "m/s", "turning at 1 rad/s the robot drives slower by this much, by the square of the turn rate"};
   if (what == "speed_onset_s" || what == "turn_onset_s")
-    return {1e3, 0, "ms", std::string("a rise of the ") + (what[0] == 's' ? "speed" : "turn rate") + " comes this much later than a fall"};
-  if (what == "gentle_turns") return {100, 0, "%", "this share of gentle turns is driven with the drive's largest radius"};
+    return {1e3, 0, "ms",
+            std::string("a rise of the ") + (what[0] == 's' ? "speed" : "turn rate") +
+                " comes this much later than a fall"};
+  if (what == "gentle_turns")
+    return {100, 0, "%", "this share of gentle turns is driven with the drive's largest radius"};
   if (what == "lag_s") return {1e3, 0, "ms", "the robot follows its motion data this much later"};
   if (what == "range_bias_m") return {100, 0, "cm", sensor + " measures ranges too long by this"};
   if (what == "range_scale") return {100, -100, "%", sensor + " measures ranges too long by this share"};

@@ -10,17 +10,32 @@ namespace {
 // A robot that turns faster spins: no landmark is identified then.
 constexpr double kTurnMost_radps = 10.0;
 // Limits of the calibration's terms, by calibration_index: beyond, the model is wrong, or the lag exceeds the history.
-constexpr double kLowest[kMotionStates] =
-    {0.3, 0.3, -1.0, 0.3, 0.3, 0.3, -0.5, 0.0, -1.0, -1.0, -1.0, -1.0, -kSpeedMost_mps, -kSpeedMost_mps, -kTurnMost_radps},
-                 kHighest[kMotionStates] = {3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0, 1.0, 1.0, 2.0, kSpeedMost_mps,
-                                            kSpeedMost_mps, kTurnMost_radps};
+constexpr double
+    kLowest[kMotionStates] = {0.3,
+                              0.3,
+                              -1.0,
+                              0.3,
+                              0.3,
+                              0.3,
+                              -0.5,
+                              0.0,
+                              -1.0,
+                              -1.0,
+                              -1.0,
+                              -1.0,
+                              -kSpeedMost_mps,
+                              -kSpeedMost_mps,
+                              -kTurnMost_radps},
+    kHighest[kMotionStates] = {
+        3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0, 1.0, 1.0, 2.0, kSpeedMost_mps, kSpeedMost_mps, kTurnMost_radps};
 
 }  // namespace
 
 const char *const kMotionStateNames[kMotionStates] = {
     "motion.speed_scale",       "motion.yaw_rate_scale", "motion.yaw_rate_bias_radps", "motion.left_scale",
     "motion.right_scale",       "motion.track_scale",    "motion.steering_offset_rad", "motion.lag_s",
-    "motion.turn_slowdown_mps", "motion.speed_onset_s", "motion.turn_onset_s", "motion.gentle_turns", "motion.velocity_x_mps", "motion.velocity_y_mps",      "motion.turn_rate_radps"};
+    "motion.turn_slowdown_mps", "motion.speed_onset_s",  "motion.turn_onset_s",        "motion.gentle_turns",
+    "motion.velocity_x_mps",    "motion.velocity_y_mps", "motion.turn_rate_radps"};
 
 double motion_state_within_limits(int calibration_index, double value) {
   if (value < kLowest[calibration_index]) return kLowest[calibration_index];

@@ -61,7 +61,7 @@ void test_a_command_is_obeyed_with_a_response(void) {
 // A rise is late, a fall is not: each pulse loses onset times its height. A turn to the other side falls, then rises.
 void test_short_turns_are_obeyed_in_part(void) {
   for (double before : {0.0, 0.3}) {
-    double turned[2];
+    double turned[2] = {};
     for (int with : {0, 1}) {
       start_commands(0.05, 0.0);
       calibration.value[WM_TURN_ONSET] = with ? 0.04 : 0.0;
