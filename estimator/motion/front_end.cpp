@@ -62,6 +62,7 @@ void motion_front_end::init(const wm_motion_params *params, const wm_wheels *whe
   for (wm_time_ns &stamp : message_ns_) stamp = WM_TIME_NONE;
   for (tick_wheel &wheel : wheel_) wheel.t_ns = WM_TIME_NONE;
   increment_ns_ = twist_ns_ = WM_TIME_NONE;
+  noise_factors_ = {1.0, 1.0};
   for (int i = 0; i < 3; i++) {
     off_plane_since_ns_[i] = WM_TIME_NONE;
     stated_v_mps_[i] = rig ? rig->twist6_sigma_v_mps[i] : std::numeric_limits<double>::quiet_NaN();

@@ -55,8 +55,8 @@ class motion_front_end {
       if (segment.input.command) respond(*params_, calibration, wheels_, &segment);
       motion_twist twist = twist_of(segment.input, calibration, wheels_, segment.drive);
       if (segment.input.model == WM_MOTION_CONSTANT_VELOCITY) static_cast<planar_twist &>(twist) = velocity_;
-      motion_noise noise =
-          noise_of(segment.input, twist, segment.dt_s, *params_, wheels_, calibration, stated_noise_now());
+      motion_noise noise = noise_of(segment.input, twist, segment.dt_s, *params_, wheels_, calibration,
+                                    stated_noise_now(), noise_factors_);
       add_overdue_noise(segment, *params_, ticks_drive() && segment.has_next, &noise);
       add_refused_noise(segment, *params_, &noise);
       if (segment.input.command) add_change_noise(segment, *params_, &noise);
@@ -78,6 +78,7 @@ class motion_front_end {
   // The velocity of WM_MOTION_CONSTANT_VELOCITY, on the map's axes: the estimator's states.
   void set_velocity(const planar_twist &velocity) { velocity_ = velocity; }
   const planar_twist &velocity() const { return velocity_; }
+  void set_noise_factors(const noise_factors &factors) { noise_factors_ = factors; }
   wm_time_ns now_ns() const { return now_ns_; }
   wm_time_ns newest_ns() const { return newest_ns_; }  // newest event that the model uses
   uint32_t health() const { return health_; }
@@ -163,6 +164,7 @@ class motion_front_end {
   wm_time_ns refused_since_ns_, last_refusal_ns_;
   tick_wheel wheel_[2];
   planar_twist velocity_;
+  noise_factors noise_factors_;
   wm_time_ns increment_ns_;                     // end of the newest increment; WM_TIME_NONE: none came
   wm_time_ns off_plane_since_ns_[3];            // rising, rolling, pitching; WM_TIME_NONE: it doesn't
   double off_plane_[3];                         // the last such value

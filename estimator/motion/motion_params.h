@@ -32,6 +32,7 @@ struct wm_motion_params {
   double noise_rest_factor;
   double noise_ticks_per_sqrt_m;
   double noise_steering_rad;
+  double noise_adapt_log_sigma;
   double noise_hold_mps2, noise_hold_radps2;
   double standstill_speed_mps;
   double standstill_yaw_rate_radps;

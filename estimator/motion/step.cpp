@@ -171,10 +171,23 @@ void add_unknown_noise(const motion_input &input, bool doubtful, double dt_s, mo
   if (doubtful || (input.refused & kRefusedTurn)) n->rotation_rad2 += square(turns ? kUnknownRate_radps : rate) * dt_s;
 }
 
+void apply(const noise_factors &factors, motion_noise *n) {
+  if (factors.way != 1.0 || factors.turn != 1.0) {
+    n->distance_m2 *= factors.way;
+    n->lateral_m2 *= factors.way;
+    n->rotation_rad2 *= factors.turn;
+    n->distance_rotation *= std::sqrt(factors.way * factors.turn);
+  }
+  n->adapted_distance_m2 = n->distance_m2;
+  n->adapted_lateral_m2 = n->lateral_m2;
+  n->adapted_rotation_rad2 = n->rotation_rad2;
+}
+
 }  // namespace
 
 motion_noise noise_of(const motion_input &input, const motion_twist &twist, double dt_s, const wm_motion_params &p,
-                      const wm_wheels &wheels, const wm_motion_calibration &c, const stated_noise &stated) {
+                      const wm_wheels &wheels, const wm_motion_calibration &c, const stated_noise &stated,
+                      const noise_factors &factors) {
   const bool doubtful = input.stale || input.doubtful || input.model == WM_MOTION_AUTO;
   const bool unknown = doubtful || input.refused;
   if (input.model == WM_MOTION_CONSTANT_VELOCITY) {
@@ -193,7 +206,10 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
   const double speed_mps = speed_of(twist);
   n.lateral_m2 += speed_mps > kCatchUp_mps ? square(p.noise_side_rel) * kCatchUp_mps * speed_mps * dt_s
                                            : square(p.noise_side_rel * speed_mps) * dt_s;
-  if (unknown) add_unknown_noise(input, doubtful, dt_s, &n);
+  if (unknown)
+    add_unknown_noise(input, doubtful, dt_s, &n);
+  else
+    apply(factors, &n);
   return n;
 }
 

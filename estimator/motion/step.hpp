@@ -66,6 +66,13 @@ motion_twist twist_of_sample(double speed, double side, double rate, const wm_mo
 // Variances of a segment on base_link's axes: distance forwards, rotation, to the left, and their covariances.
 struct motion_noise {
   double distance_m2, rotation_rad2, distance_rotation, lateral_m2, distance_lateral, lateral_rotation;
+  // The parts of the distance, to the side and of the rotation that noise_factors scale.
+  double adapted_distance_m2, adapted_lateral_m2, adapted_rotation_rad2;
+};
+
+// Factors of the variances along and across the way, and of the rotation, that an estimator has found.
+struct noise_factors {
+  double way, turn;
 };
 
 // Noise that a recording states of its twists in space, as variances per s; NaN: not stated, motion.noise has it.
@@ -75,7 +82,8 @@ struct stated_noise {
 
 // Distance and sideways are along and across the way until turn_to_axes().
 motion_noise noise_of(const motion_input &input, const motion_twist &twist, double dt_s, const wm_motion_params &params,
-                      const wm_wheels &wheels, const wm_motion_calibration &calibration, const stated_noise &stated);
+                      const wm_wheels &wheels, const wm_motion_calibration &calibration, const stated_noise &stated,
+                      const noise_factors &factors);
 
 // From along and across the way to base_link's axes, for a robot that moves sideways.
 void turn_to_axes(const planar_twist &twist, motion_noise *noise);

@@ -74,6 +74,10 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   gnss_time_state_ = add(0.0, params.gnss_time_offset_sigma_s);
   gnss_error_state_ = add(0.0, std::fabs(params.gnss_correlated_m));  // below 0: the first position sets its variance
   if (gnss_error_state_ >= 0) add(0.0, std::fabs(params.gnss_correlated_m));
+  if (gnss_error_state_ >= 0) {
+    filter_.set_correlated_position(gnss_error_state_);
+    filter_.noise().begin_correlated(square(params.gnss_correlated_m));
+  }
   gnss_error_ns_ = tilt_ns_ = WM_TIME_NONE;
   calibration_states_ = filter_.states();
   error_ = correlated_slot_of(sightings());
@@ -212,6 +216,7 @@ size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity
   slots_.list(*setup_, filter_, &list);
   if (gnss_time_state_ >= 0)
     list.add("gnss", "time_offset_s", filter_.value(gnss_time_state_), std::sqrt(filter_.variance(gnss_time_state_)));
+  filter_.noise().list(&list);
   return list.count();
 }
 

@@ -61,6 +61,7 @@ class landmark_ekf {
     planar_row row;
     double innovation, noise;
     wm_innovation record;
+    noise_adaption::source source;
   };
   // The slots of the time-correlated error of this sensor on this landmark, and of the landmark's error on the map;
   // -1: none.

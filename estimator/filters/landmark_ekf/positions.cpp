@@ -17,10 +17,13 @@ constexpr double kClutterPlace_m = 200.0;
 void landmark_ekf::decay_gnss_error(wm_time_ns t_ns, double sigma_m) {
   if (gnss_error_state_ < 0) return;
   const bool is_first = gnss_error_ns_ == WM_TIME_NONE && params_.gnss_correlated_m < 0.0;
-  for (int k = 0; k < 2 && is_first; k++) filter_.forget(gnss_error_state_ + k, 0.0, square(sigma_m));
+  const double variance = square(sigma_m) * filter_.noise().scale(noise_adaption::kPlace);
+  for (int k = 0; k < 2 && is_first; k++) filter_.forget(gnss_error_state_ + k, 0.0, variance);
+  if (is_first) filter_.noise().begin_correlated(variance);
   const double left =
       gnss_error_ns_ == WM_TIME_NONE ? 1.0 : decay_over(gnss_error_ns_, t_ns, params_.gnss_correlated_tau_s);
-  for (int k = 0; k < 2; k++) decay_state(&filter_, gnss_error_state_ + k, left, square(sigma_m));
+  for (int k = 0; k < 2; k++) decay_state(&filter_, gnss_error_state_ + k, left, variance);
+  filter_.noise().fade_correlated(left, variance * (1.0 - square(left)));
   gnss_error_ns_ = t_ns;
 }
 
@@ -64,7 +67,8 @@ wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records
     r.record.observed = p.p_m[k];
     r.record.expected = expected;
     r.innovation = p.p_m[k] - expected;
-    r.noise = square(sigma);
+    r.noise = square(sigma) * filter_.noise().scale(noise_adaption::kPlace);
+    r.source = {noise_adaption::kPlace, r.noise};
   }
   note(event.t_ns, kPositionKey, fuse(rows, 2, square(kClutterPlace_m), true, records));
   return WM_OK;

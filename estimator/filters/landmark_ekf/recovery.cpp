@@ -208,6 +208,7 @@ rollback<landmark_ekf::kMaxCalibration>::generation landmark_ekf::trusted_genera
 
 void landmark_ekf::restore_calibration() {
   rollback_.restore(&filter_);
+  filter_.noise().restart(true);
   errors_.release_all();
   map_.release_all();
   for (int k = 0; k < 2 && tilt_state_ >= 0; k++) filter_.forget(tilt_state_ + k, 0.0, square(params_.tilt_sigma_rad));

@@ -63,11 +63,17 @@ wm_verdict landmark_ekf::update(const residual *r, int count, const gate_result 
   const double left =
       count < 2 ? 0.0
                 : filter_.innovation_left(r[1].row, r[1].innovation, *first, r[0].innovation, noise, kPoseStates, kept);
-  if (!filter_.update(*first, r[0].innovation, noise, kPoseStates, kept)) return WM_REJECTED_NUMERIC;
+  const bool learns = evidence_.proven() && !evidence_.doubtful();
+  const auto source = [&](const residual &of) {
+    return learns ? noise_adaption::source{of.source.kind, of.source.own * g.noise_scale} : noise_adaption::source{};
+  };
+  if (!filter_.update(*first, r[0].innovation, noise, kPoseStates, kept, source(r[0]))) return WM_REJECTED_NUMERIC;
   if (count == 2) {
     filter_.project(r[1].row, first);
-    if (!filter_.update(*first, left, r[1].noise * g.noise_scale, kPoseStates, kept)) return WM_REJECTED_NUMERIC;
+    if (!filter_.update(*first, left, r[1].noise * g.noise_scale, kPoseStates, kept, source(r[1])))
+      return WM_REJECTED_NUMERIC;
   }
+  filter_.noise().forget(filter_.now_ns());
   life_.fused(filter_.now_ns());
   return WM_FUSED;
 }

@@ -16,6 +16,8 @@ int planar_filter::count_motion_states(const wm_motion_states &states, int model
 void planar_filter::init(const wm_setup &setup, const wm_motion_states &motion, int states, double *arrays) {
   arrays_.set(arrays);
   n_ = 0;
+  correlated_ = -1;
+  unused_ = 0;
   stride_ = even(states);
   std::memset(arrays, 0, doubles(states) * sizeof(double));
   init_motion(setup);
@@ -94,10 +96,18 @@ void planar_filter::propagate(const motion_segment &piece, const motion_twist &t
   x()[kX] += step.x_m;
   x()[kY] += step.y_m;
   x()[kHeading] = wrap(x()[kHeading] + step.turn_rad);
-  take_step(piece, twist, step);
+  take_step(piece, twist, noise, step);
 }
 
 void planar_filter::project(const planar_row &row, projection *out) const {
+  for (double &by : out->by) by = 0.0;
+  for (int k = 0; k < row.count; k++) {
+    const int state = row.index[k], axis = state - correlated_;
+    if (state < kPoseStates)
+      out->by[state] += row.by[k];
+    else if (correlated_ >= 0 && (axis == 0 || axis == 1))
+      out->by[kPoseStates + axis] += row.by[k];
+  }
   if (row.count == 0) {
     for (int i = 0; i < stride_; i++) out->gain[i] = 0.0;
     out->variance = 0.0;
@@ -122,13 +132,19 @@ double planar_filter::innovation_left(const planar_row &second, double innovatio
   return innovation - cross / (first.variance + first_noise) * first_innovation;
 }
 
-bool planar_filter::update(const projection &projected, double innovation, double noise, int kept_from, int kept_to) {
+bool planar_filter::update(const projection &projected, double innovation, double noise, int kept_from, int kept_to,
+                           const noise_adaption::source &source) {
   const double s = projected.variance + noise;
   if (!(s > 0.0) || !finite(s) || !finite(innovation)) return false;
   const double inverse = 1.0 / s;
   alignas(16) double k[kMaxStates], b[kMaxStates];
   vectors::set_scaled(k, projected.gain, inverse, stride_);
   for (int i = kept_from; i < kept_to; i++) k[i] = 0.0;
+  noise_adaption::row adapted{{}, {}, innovation, s, source.own, source.kind};
+  for (int i = 0; i < noise_adaption::kBlock; i++) adapted.by[i] = projected.by[i];
+  for (int i = 0; i < kPoseStates; i++) adapted.gain[i] = k[i];
+  for (int i = 0; correlated_ >= 0 && i < 2; i++) adapted.gain[kPoseStates + i] = k[correlated_ + i];
+  noise_.update(adapted);
   // K b' + b K' with b = s/2 K - g is Joseph's form for one row.
   vectors::set_scaled(b, k, 0.5 * s, stride_);
   vectors::add_scaled(b, projected.gain, -1.0, stride_);
@@ -179,6 +195,7 @@ void planar_filter::set_pose(const wm_pose2 &pose, const double covariance[3][3]
   for (int i = 0; i < 3; i++) forget(i, value[i], 0.0);
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) p()[i * stride_ + j] = i <= j ? covariance[i][j] : covariance[j][i];
+  noise_.restart(false);
   wheels_.restart();
 }
 

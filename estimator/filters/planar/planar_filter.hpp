@@ -25,6 +25,7 @@ using planar_row = jacobian_row<24>;
 struct projection {
   alignas(16) double gain[kMaxStates];  // P H', not yet divided by the innovation's variance
   double variance;
+  double by[noise_adaption::kBlock];  // the row's entries that noise_adaption needs
 };
 
 class planar_filter : public planar_motion {
@@ -62,7 +63,12 @@ class planar_filter : public planar_motion {
   }
   // The same, but the states from `kept_from` up to `kept_to` keep their values: they are considered, not corrected
   // [Schmidt1966]. Joseph's form holds for any gain.
-  [[nodiscard]] bool update(const projection &projected, double innovation, double noise, int kept_from, int kept_to);
+  [[nodiscard]] bool update(const projection &projected, double innovation, double noise, int kept_from, int kept_to) {
+    return update(projected, innovation, noise, kept_from, kept_to, {});
+  }
+  // The same with an innovation that the noise adapts to.
+  [[nodiscard]] bool update(const projection &projected, double innovation, double noise, int kept_from, int kept_to,
+                            const noise_adaption::source &source);
   // What the update by a first row (its projection, innovation and noise) leaves of the innovation of a second row that
   // was observed at the same time. Call it before that update; kept_from and kept_to as there.
   double innovation_left(const planar_row &second, double innovation, const projection &first, double first_innovation,
@@ -84,6 +90,8 @@ class planar_filter : public planar_motion {
   double covariance(int i, int j) const { return p()[i * stride_ + j]; }
   double variance(int state) const { return covariance(state, state); }
   int states() const { return n_; }
+  // The states of a position's time-correlated error, for the adaption of the noise.
+  void set_correlated_position(int state) { correlated_ = state; }
 
   // x := factor x + noise: a step of a Gauss-Markov process that the motion does not depend on.
   void fade(int state, double factor, double added_variance);
@@ -104,6 +112,7 @@ class planar_filter : public planar_motion {
 
   relative_array<double> arrays_;  // the mean, and behind it the covariance row by row
   int n_, stride_;
+  int correlated_, unused_;  // no padding; -1: none
   wheel_heading wheels_;
 };
 

@@ -24,6 +24,7 @@ void planar_motion::init_motion(const wm_setup &setup) {
   travelled_m_ = turned_rad_ = 0.0;
   twist_ = {};
   for (steady_rate &rate : steady_) rate.restart(0.0);
+  noise_.init(setup.motion->model == WM_MOTION_CONSTANT_VELOCITY ? 0.0 : setup.motion->noise_adapt_log_sigma);
   heading_rad_ = 0.0;
   sensor_states_ = 0;
 }
@@ -88,7 +89,9 @@ wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist 
   return sum;
 }
 
-void planar_motion::take_step(const motion_segment &segment, const motion_twist &twist, const pose_step &step) {
+void planar_motion::take_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
+                              const pose_step &step) {
+  noise_.move(step.x_m, step.y_m, noise.adapted_distance_m2, noise.adapted_lateral_m2, noise.adapted_rotation_rad2);
   odom_ = compose(odom_, step.body);
   travelled_m_ += speed_of(twist) * segment.dt_s;
   turned_rad_ += std::fabs(step.turn_rad);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "filters/core/calibration_list.hpp"
+#include "filters/core/noise_adaption.hpp"
 #include "filters/planar/pose_step.hpp"
 #include "math/elementary.hpp"
 #include "motion/event_time.hpp"
@@ -56,6 +57,8 @@ class planar_motion {
   wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time
   double travelled_m() const { return travelled_m_; }
   double turned_rad() const { return turned_rad_; }
+  noise_adaption &noise() { return noise_; }
+  const noise_adaption &noise() const { return noise_; }
   int motion_state(int calibration_index) const { return motion_state_[calibration_index]; }  // -1: off
 
  protected:
@@ -106,6 +109,7 @@ class planar_motion {
   template <class Propagate, class Walk, class Fade>
   void advance_once(wm_time_ns t_ns, Propagate propagate, Walk walk, Fade fade) {
     const double dt = wm_seconds_between(now_ns(), t_ns);
+    front_.set_noise_factors({noise_.scale(noise_adaption::kWay), noise_.scale(noise_adaption::kTurn)});
     front_.advance(t_ns, calibration_, propagate);
     for (int i = 0; i < kCalibrationCount; i++)
       if (motion_state_[i] >= 0) walk(motion_state_[i], walk_[i] * dt);
@@ -117,7 +121,8 @@ class planar_motion {
   // The kind of the motion has become known, or another one.
   void take_kind();
   // Odometry over one such segment.
-  void take_step(const motion_segment &segment, const motion_twist &twist, const pose_step &step);
+  void take_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
+                 const pose_step &step);
   // The calibration takes the states' values, which are cut to their limits.
   void take_calibration(double *states);
 
@@ -146,7 +151,8 @@ class planar_motion {
   double travelled_m_, turned_rad_;
   planar_twist twist_;     // of the last segment
   steady_rate steady_[2];  // of its v and w
-  double heading_rad_;     // only where has_velocity()
+  noise_adaption noise_;
+  double heading_rad_;  // only where has_velocity()
 };
 
 // A planar pose's estimate; covariance(i, j) is that of x, y and heading.

@@ -327,6 +327,7 @@ size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const 
   calibration_list list(out, capacity);
   joint_.list_motion_states(&list);
   slots_.list(*setup_, joint_, &list);
+  joint_.noise().list(&list);
   for (size_t i = 0; i < setup_->sensor_count; i++)
     if (finite(bloom_px_[i])) list.add(setup_->sensors[i].name, "bloom_px", bloom_px_[i], std::nan(""));
   return list.count();

@@ -111,6 +111,7 @@ inline void exact_motion(wm_motion_params *motion) {
   motion->twist = WM_TWIST_MEASURED;
   motion->noise_speed_rel = motion->noise_yaw_rate_rel = 0.03;
   motion->noise_yaw_rate_radps = 0.01;
+  motion->noise_adapt_log_sigma = 0.0;
   for (double &sigma : motion->states.sigma) sigma = 0.0;
   motion->states.wheel_difference_sigma = 0.0;
 }

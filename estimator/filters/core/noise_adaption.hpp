@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// Factors on the variances of process and measurement noise, found from the innovations: recursive maximum a posteriori
+// of their logarithms [Mehra1972] [Ljung1979]. The innovation's log likelihood has derivatives by its variance and by
+// its mean. Both follow from the derivatives of the filter's covariance and mean by each log factor, which are carried
+// for a block of states (the pose, and a time-correlated error of positions); landmarks and calibration states are left
+// out. The prior of a factor is log-normal; each log factor is a Gauss-Markov process about zero, so that without
+// evidence the stated noise returns.
+#ifndef WAYMARK_ESTIMATOR_CORE_NOISE_ADAPTION_HPP
+#define WAYMARK_ESTIMATOR_CORE_NOISE_ADAPTION_HPP
+
+#include <cmath>
+
+#include "filters/core/calibration_list.hpp"
+#include "math/elementary.hpp"
+#include "waymark/time.h"
+
+namespace wm {
+
+class noise_adaption {
+ public:
+  // Of the variances of way and turn, of white bearings and ranges, and of positions with their time-correlated error.
+  enum factor { kWay, kTurn, kBearing, kRange, kPlace, kFactors, kNone = kFactors };
+  static constexpr int kPose = 3, kBlock = 5;  // x, y, heading; a position's time-correlated error on each axis
+
+  // A row of an innovation. `by`: derivatives by the block's states. `gain`: their rows of the Kalman gain that the
+  // update applies. `variance`: of the innovation; `own`: the share of it that `kind` scales.
+  struct row {
+    double by[kBlock], gain[kBlock], innovation, variance, own;
+    int kind;
+  };
+  // What an update's innovation is of, and the share of its variance that this kind scales. Nothing is learned from
+  // another one.
+  struct source {
+    int kind = kNone;
+    double own = 0.0;
+  };
+
+  // `log_sigma`: of the prior of a variance's log factor; 0: no adaption.
+  void init(double log_sigma);
+  bool is_on() const { return log_sigma_ > 0.0; }
+  // The variance's factor; 1 without adaption.
+  double scale(int k) const { return scale_[k]; }
+  // Of a measurement with this sigma; `stated`: by the measurement itself, which holds.
+  source source_of(int kind, double sigma, bool stated) const {
+    return stated ? source{kNone, square(sigma)} : source{kind, square(sigma) * scale_[kind]};
+  }
+
+  // The pose moved by (x_m, y_m), with the adapted noise along, across and of the turn.
+  void move(double x_m, double y_m, double along_m2, double across_m2, double turn_rad2);
+  // A position's time-correlated error is a state from now on, of this variance.
+  void begin_correlated(double variance_m2);
+  // Its step: times `left`, plus an adapted variance.
+  void fade_correlated(double left, double added_m2);
+  // The factors learn from a row of a known kind; then the derivatives follow its update.
+  void update(const row &r);
+  // Time passes.
+  void forget(wm_time_ns t_ns);
+  void list(calibration_list *out) const;
+  // The pose has become another one; `and_factors`: what was learned may be wrong, too.
+  void restart(bool and_factors);
+
+ private:
+  bool is_used(int k) const { return (used_ & 1 << k) != 0; }
+  double derivatives(const row &r, int k, double dh[kBlock], double *ds) const;
+  void follow(const row &r, int k, const double dh[kBlock], double ds, double by);
+  void learn_variance(const double share[kFactors], double nis);
+  void learn_mean(const double by[kFactors], double normalised);
+  void correct(const double gain[kFactors], double step, double weight);
+
+  double log_sigma_;
+  double log_[kFactors], scale_[kFactors], covariance_[kFactors][kFactors];
+  double variance_by_[kFactors][kBlock][kBlock];  // derivative of the block's covariance by each log factor
+  double mean_by_[kFactors][kBlock];              // of its mean
+  wm_time_ns forgotten_ns_;
+  int32_t block_, used_;  // a bit for each factor with a source; no padding: the same events must give the same bytes
+};
+
+}  // namespace wm
+
+#endif
