@@ -185,7 +185,7 @@ static const char *list_of(const char *const *names, char *out, size_t capacity)
 }
 
 wm_status wm_yaml_choice(const wm_yaml_node *node, const char *const *names, int32_t *out, wm_error *err) {
-  char is[WM_SHOW_TEXT_MAX + 16], all[256];
+  char is[WM_SHOW_TEXT_MAX + 16], all[512];
   const char *text = wm_yaml_is_scalar(node) ? yaml_text(node->doc, node->id) : "";
   for (int32_t i = 0; names[i]; i++) {
     if (strcmp(text, names[i]) != 0) continue;

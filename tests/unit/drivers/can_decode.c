@@ -310,7 +310,7 @@ static void no_value(void) {
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "c 101#FEFF"));  // VAL_ says so
   TEST_ASSERT_EQUAL(WM_BAD_DATA, feed(&f, "c 101#FFFF"));  // all bits set, and outside of the range
   TEST_ASSERT_EQUAL_UINT64(2, f.counts.not_finite);
-  TEST_ASSERT_NOT_NULL(strstr(f.err.text, "not available"));
+  TEST_ASSERT_NOT_NULL(strstr(f.err.text, "no value"));
   TEST_ASSERT_EQUAL_DOUBLE(3, value_of(&f, "c 101#2C01"));
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 300,
                             value_of(&f, "c 101#3075"));  // outside of the range: makers' ranges are wrong too often
