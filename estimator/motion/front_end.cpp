@@ -122,7 +122,7 @@ void motion_front_end::take_twist(const wm_event &event) {
   twists_.note(v, rate,
                std::fabs(v) > params_->standstill_speed_mps || std::fabs(rate) > params_->standstill_yaw_rate_radps);
   if (params_->twist == WM_TWIST_AUTO)
-    commands_ = (commands_ & kStated) | (twists_.kind() == kKindCommands ? kDetected : 0);
+    commands_ = (uint8_t)((commands_ & ~kDetected) | (twists_.kind() == kKindCommands ? kDetected : 0));
   if (model_ != WM_MOTION_TWIST) return;
   twists_in_space_ = !planar;
   if (twist_ns_ != WM_TIME_NONE && event.t_ns > twist_ns_ && !is_overdue(event.t_ns)) {

@@ -68,8 +68,9 @@ class motion_front_end {
   // Twist of base_link at a time, by the inputs until now.
   motion_twist twist_at(wm_time_ns t_ns, const wm_motion_calibration &calibration) const;
 
-  // Twists are commands, although no parameter shows it: an estimator learns how much speed they lose in turns.
-  void take_commands() { commands_ |= kStated; }
+  // Whether an estimator takes twists as commands, although no parameter shows it: by the loss of speed in turns that
+  // it estimates. It may find out later that they are measured.
+  void take_commands(bool are) { commands_ = (uint8_t)((commands_ & ~kTaken) | (are ? kTaken : 0)); }
 
   void set_now(wm_time_ns t_ns) {
     now_ns_ = t_ns;
@@ -107,7 +108,7 @@ class motion_front_end {
 
  private:
   enum { kTwistSpeed = WM_Q_COUNT, kTwistRate, kTwistSide, kSlots };  // of check_: a slot for each quantity and these
-  enum : uint8_t { kStated = 1, kDetected = 2 };                      // of commands_
+  enum : uint8_t { kStated = 1, kDetected = 2, kTaken = 4 };          // of commands_
   enum speed_source : uint8_t { kNone, kFrontWheels, kVehicleSpeed, kTicksMean, kRearWheels };
 
   void take_quantities(const wm_event &event);

@@ -192,7 +192,7 @@ wm_status wm_odometry_init(wm_odometry *self, const wm_motion_params *params, co
 
 void wm_odometry_calibrate(wm_odometry *self, const wm_motion_calibration *calibration) {
   self->calibration = *calibration;
-  if (calibration->value[WM_TURN_SLOWDOWN] != 0.0) self->front.take_commands();
+  self->front.take_commands(calibration->value[WM_TURN_SLOWDOWN] != 0.0);
 }
 
 wm_status wm_odometry_feed(wm_odometry *self, const wm_event *event) {

@@ -204,10 +204,6 @@ def main():
                 failures.append(f"the good robot, {config}: {f['text']}")
         for f in check(folder / "robot.yaml"):
             failures.append(f"the good robot's devices: {f['text']}")
-        two = ROBOT.replace("edge_mcl", "slam").replace("map: rec/map/map.yaml\n", "")
-        lay_out(folder, {"two.yaml": two.replace("{edges: {}}", "{apriltag: {family: tag36h11, size_m: 0.2}, mr: {size_m: 0.2}}")})
-        if not any("a device has one reader" in f["text"] for f in check(folder / "two.yaml")):
-            failures.append("two detectors on one of the robot's cameras: not found")
         for config in sorted((ROOT / "config").glob("*.yaml")):
             for f in check(config):
                 failures.append(f"{config.name}: {f['text']}")

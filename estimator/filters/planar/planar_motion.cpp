@@ -39,7 +39,7 @@ void planar_motion::set_motion_state(const wm_motion_states &states, int i, int 
   own_state_[i] = state;
   by_kind_[i] = states.sigma[i] < 0.0;
   motion_state_[i] = by_kind_[i] ? -1 : state;
-  if (i == kTurnSlowdown && motion_state_[i] >= 0) front_.take_commands();
+  if (i == kTurnSlowdown && motion_state_[i] >= 0) front_.take_commands(true);
 }
 
 void planar_motion::take_kind() {

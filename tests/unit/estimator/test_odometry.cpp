@@ -78,6 +78,18 @@ void test_calibration_holds_from_now_on_and_nothing_jumps(void) {
   assert_pose(1.0 + 1.1 * sin(0.1) / 0.1, 1.1 * (1 - cos(0.1)) / 0.1, 0.1, pose_at(2.0));
 }
 
+// An estimator took the twists as commands for a while, and then as measured: these have no response.
+void test_twists_are_commands_as_long_as_the_estimator_takes_them_so(void) {
+  start(make::no_wheels());
+  for (int i = 0; i <= 100; i++) feed(make::twist(0.01 * i, 0.0, 0.0));
+  wm_motion_calibration c = {1, 1, 0, 1, 1, 1, 0, 0, 0.1};
+  wm_odometry_calibrate(odom, &c);
+  c.value[WM_TURN_SLOWDOWN] = 0.0;
+  wm_odometry_calibrate(odom, &c);
+  for (int i = 101; i <= 200; i++) feed(make::twist(0.01 * i, 1.0, 0.0));
+  TEST_ASSERT_DOUBLE_WITHIN(0.011, 1.0, pose_at(2.0).x_m);
+}
+
 // The carried covariance against the spread of many noisy drives, and the carried mean against the drive itself.
 void test_carry_moves_mean_and_covariance(void) {
   start(make::no_wheels());
@@ -261,6 +273,7 @@ int main(void) {
   RUN_TEST(test_extrapolates_with_the_held_twist_but_not_for_ever);
   RUN_TEST(test_a_time_too_old_or_before_any_motion_is_not_found);
   RUN_TEST(test_calibration_holds_from_now_on_and_nothing_jumps);
+  RUN_TEST(test_twists_are_commands_as_long_as_the_estimator_takes_them_so);
   RUN_TEST(test_carry_moves_mean_and_covariance);
   RUN_TEST(test_a_copy_continues_identically);
   RUN_TEST(test_a_pose_in_space_is_carried_in_space);

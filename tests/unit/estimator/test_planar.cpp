@@ -78,7 +78,7 @@ void test_kernels_and_their_scalar_twins_give_the_same_bits(void) {
 wm_pose2 drive(const double x0[3], const wm_motion_calibration &c, const wm_wheels &wheels) {
   wm::motion_front_end front;
   front.init(&params, &wheels);
-  front.take_commands();
+  front.take_commands(true);
   wm_pose2 pose = {x0[0], x0[1], x0[2]};
   for (int i = 0; i <= 20; i++) {
     const wm_event e = make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i));
