@@ -46,9 +46,8 @@ static const wm_param kParams[] = {
         "White noise of the road wheel's angle, rad per sqrt(s): play and the table's error between its points."),
     F64("noise.adapt_log_sigma", noise_adapt_log_sigma, 1.4, 0, 10,
         "Start sigma of the logarithm of factors that adapt variances to the innovations: of this noise and of "
-        "sightings "
-        "from 1 to 16, of positions (GNSS) from 1/16 to 16. 0: none adapts. 1.4: a factor of 2 in a sigma. Flat from "
-        "0.7 to 2.2. For landmark_ekf."),
+        "sightings from 1 to 16, of positions (GNSS) from 1/16 to 16. 0: none adapts. 1.4: a factor of 2 in a sigma. "
+        "Flat from 0.7 to 2.2."),
     F64("noise.hold_mps2", noise_hold_mps2, 1.0, 0, 100,
         "m/s2. Assumed acceleration while a speed is overdue (older than 0.25 s and than three of its periods): the "
         "distance's sigma grows by a t^2 / 2."),

@@ -10,7 +10,7 @@ trap 'rm -r "$dir"' EXIT
 
 # As installed, but with a folder that is there.
 cp config/etc/* "$dir"
-sed -i "s#/var/lib/waymark#$dir#" "$dir/robot.yaml"
+sed -i "s#/var/lib/waymark#$dir#g" "$dir/robot.yaml"
 said=$("$WM_BIN_DIR/waymark" check "$dir/robot.yaml") || fail "the installed configuration: $said"
 tail -1 <<<"$said" | grep -qx good || fail "the installed configuration: $said"
 

@@ -17,7 +17,7 @@ namespace {
 constexpr double kMotionGap_s = 1.0;      // between two motion messages, beyond which the way is unknown; not swept
 constexpr double kUnknownSigma_m = 0.03;  // of a point without a sigma and a camera: a pixel at 4 m
 
-const char *const kReads[] = {"motion.", nullptr};
+const char *const kReads[] = {"!motion.noise.adapt", "motion.", nullptr};
 
 }  // namespace
 

@@ -65,6 +65,7 @@ void landmark_ekf::init(const wm_landmark_ekf_params &params, const wm_setup &se
   memory_layout layout(this, sizeof *this);
   const arrays behind = place(&layout, params, setup);
   filter_.init(setup, setup.motion->states, count_states(params, setup), behind.filter);
+  if (setup.motion->model != WM_MOTION_CONSTANT_VELOCITY) filter_.noise().init(setup.motion->noise_adapt_log_sigma);
   const auto add = [this](double value, double sigma) { return sigma > 0.0 ? filter_.add_state(value, sigma) : -1; };
   for (size_t i = 0; i < setup.sensor_count; i++) sensor_[i].init(setup.sensors[i]);
   slots_.init(setup, true, [this](double value, double sigma, double walk, double low, double high) {

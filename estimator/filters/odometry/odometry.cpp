@@ -13,7 +13,7 @@ namespace {
 
 struct odometry_params {};
 const wm_param_old kOld[] = {{"states.*", "/motion.states.*", nullptr}, {nullptr, nullptr, nullptr}};
-const char *const kReads[] = {"!motion.constant_velocity.", "motion.", nullptr};
+const char *const kReads[] = {"!motion.constant_velocity.", "!motion.noise.adapt", "motion.", nullptr};
 
 class odometry {
  public:

@@ -24,7 +24,11 @@ constexpr double kFoundShare = 0.9;  // of the weight in that cluster, from whic
 constexpr double kCovarianceMin[3] = {1.6e-5, 1.6e-5, 1e-6};  // a pixel of 1.3 cm / sqrt(12), 1 mrad; squared
 
 // The motion's noise until the first scan; then the particles have noise of their own.
-const char *const kReads[] = {"!motion.states.", "!motion.standstill.bias", "!motion.constant_velocity.", "motion.",
+const char *const kReads[] = {"!motion.states.",
+                              "!motion.standstill.bias",
+                              "!motion.constant_velocity.",
+                              "!motion.noise.adapt",
+                              "motion.",
                               nullptr};
 
 }  // namespace

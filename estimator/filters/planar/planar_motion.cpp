@@ -24,7 +24,7 @@ void planar_motion::init_motion(const wm_setup &setup) {
   travelled_m_ = turned_rad_ = 0.0;
   twist_ = {};
   for (steady_rate &rate : steady_) rate.restart(0.0);
-  noise_.init(setup.motion->model == WM_MOTION_CONSTANT_VELOCITY ? 0.0 : setup.motion->noise_adapt_log_sigma);
+  noise_.init(0.0);
   heading_rad_ = 0.0;
   sensor_states_ = 0;
 }

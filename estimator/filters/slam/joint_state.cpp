@@ -34,7 +34,6 @@ void joint_state::init(const wm_setup &setup, const joint_layout &layout, double
   n_ = layout_.robot_states;
   landmarks_ = 0;
   init_motion(setup);
-  noise_.init(0.0);  // a landmark's covariance depends on the factors, too, which the adaption leaves out
   slip_ = {};
   scale_state_ = -1;
   carries_scale_ = false;
@@ -222,7 +221,6 @@ void joint_state::set_pose(const wm_pose2 &pose, const double covariance[3][3]) 
   scale_origin_m_[1] = value[1];
   for (int i = 0; i < 3; i++)
     for (int j = i; j < 3; j++) p().set(i, j, covariance[i][j]);
-  noise_.restart(false);
 }
 
 // In the invariant filter by P <- T P T', T = I + e h', e = J (to - from).
@@ -241,7 +239,6 @@ void joint_state::shift_pose(const wm_pose2 &to, const double added[3][3]) {
   mean[kX] = to.x_m;
   mean[kY] = to.y_m;
   mean[kHeading] = wrap(to.heading_rad);
-  noise_.restart(false);
 }
 
 void joint_state::inflate_pose(double xy_m2, double heading_rad2) {
@@ -352,10 +349,6 @@ void joint_state::prepare(const joint_row *rows, const double *innovations, cons
     for (int l = 0; l <= k; l++) out->s[k][l] = dot(rows[k], gain(l));
     out->s[k][k] += noise[k];
     out->innovation[k] = innovations[k];
-    out->source[k] = {};
-    for (double &by : out->by[k]) by = 0.0;
-    for (int i = 0; i < rows[k].count; i++)
-      if (rows[k].index[i] < kPoseStates) out->by[k][rows[k].index[i]] += rows[k].by[i];
   }
   double l[kRows][kRows], y[kRows];
   std::memcpy(l, out->s, sizeof l);
@@ -410,7 +403,6 @@ bool joint_state::fuse(innovation_block &block, const double *added_noise, scope
     y[k] *= inverse;
     vectors::set_scaled(gain(k), gain(k), inverse, even(n_));
   }
-  adapt_noise(block, l, y);
   double *e = column(1 + kRows), *r = column(2 + kRows);
   vectors::set_scaled(r, gain(0), y[0], even(n_));
   for (int k = 1; k < rows; k++) vectors::add_scaled(r, gain(k), y[k], even(n_));
@@ -440,21 +432,6 @@ bool joint_state::fuse(innovation_block &block, const double *added_noise, scope
     vectors::apply(p(), {0, {}, gain(1), gain(2)}, n_);  // Joseph's form: P - w w' + u u', u what is considered
   if (layout_.invariant && carries_scale_) carry_scale(before);
   return true;
-}
-
-// Row by row, each without what the rows before explain: L^-1 times the rows, of unit variance.
-void joint_state::adapt_noise(const innovation_block &block, const double l[kRows][kRows], const double y[kRows]) {
-  double by[kRows][kPoseStates];
-  for (int k = 0; k < block.rows; k++) {
-    noise_adaption::row row{{}, {}, y[k], 1.0, block.source[k].own / square(l[k][k]), block.source[k].kind};
-    for (int i = 0; i < kPoseStates; i++) {
-      by[k][i] = block.by[k][i];
-      for (int j = 0; j < k; j++) by[k][i] -= l[k][j] * by[j][i];
-      row.by[i] = by[k][i] /= l[k][k];
-      row.gain[i] = gain(k)[i];
-    }
-    noise_.update(row);
-  }
 }
 
 void joint_state::widen_landmark(int landmark, const double d[2], double share) {

@@ -128,10 +128,8 @@ class joint_state : public planar_motion {
     double s[kRows][kRows];  // lower triangle
     double innovation[kRows];
     double nis;
-    double by[kRows][kPoseStates];         // of the rows, by the pose
-    noise_adaption::source source[kRows];  // what the noise adapts to
-    double determinant;                    // of S; 0: S is not positive definite, the NIS 1e300
-    double density() const;                // of the innovation, normal with covariance S
+    double determinant;      // of S; 0: S is not positive definite, the NIS 1e300
+    double density() const;  // of the innovation, normal with covariance S
   };
   // Which states a correction may change. Others are considered: their covariance counts, they stay [Schmidt1966].
   // `directions`: by one row, all but places and what scales with them; `own`: a state that is none of the latter.
@@ -170,7 +168,6 @@ class joint_state : public planar_motion {
   void keep_places(int own, double *change);
   void move_mean(const double *change, double *e);
   void move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e);
-  void adapt_noise(const innovation_block &block, const double l[kRows][kRows], const double y[kRows]);
   void fuse_part(int states, int rows, const double *change);
   void anchor_scale_again();
   void hold_scale(double *e);

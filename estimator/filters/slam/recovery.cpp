@@ -199,7 +199,6 @@ bool slam::relocalize() {
     return false;
   }
   rollback_.restore(&joint_);
-  joint_.noise().restart(true);
   for (size_t i = 0; i < setup_->sensor_count; i++)  // the heading found is off by the mounting's yaw
     if (const int yaw = slots_.at((int)i, kYaw); yaw >= 0) found.covariance[2][2] += joint_.variance(yaw);
   for (int k = 0; k < 3; k++) found.covariance[k][k] += square(k < 2 ? kLoose_m : kLoose_rad);

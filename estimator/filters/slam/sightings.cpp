@@ -150,7 +150,6 @@ wm_verdict slam::expect_sighting(const wm_sighting &s, const reading &r, const p
   const unsigned components = (r.bearing ? kBearing : 0u) | (r.range ? kRange : 0u) | components_;
   const expected_sighting e = expect(sensor_[s.sensor], errors_of(s.sensor), past.pose, at, components);
   if (!e.possible) return e.distance_m < kOnSensor_m ? WM_REJECTED_SINGULAR : WM_REJECTED_OUT_OF_RANGE;
-  out->stated = r.stated;
   const auto add = [&](wm_residual kind, double observed, double expected, const double by[kCauses], double variance,
                        int error_offset, double error_size) {
     const int i = out->count++;
@@ -173,14 +172,12 @@ wm_verdict slam::expect_sighting(const wm_sighting &s, const reading &r, const p
   const double lever_m = larger(e.distance_m, kLeastLever_m);
   if (r.bearing)
     add(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad, e.bearing_by,
-        joint_.noise().source_of(noise_adaption::kBearing, r.bearing_sigma_rad, r.stated).own +
-            square(sightings().lateral_sigma_m / lever_m),
-        error_.bearing, correlated_bearing(sightings(), r, lever_m));
+        square(r.bearing_sigma_rad) + square(sightings().lateral_sigma_m / lever_m), error_.bearing,
+        correlated_bearing(sightings(), r, lever_m));
   if (r.range)
     add(WM_RESIDUAL_RANGE, s.range_m, e.range_m, e.range_by,
-        joint_.noise().source_of(noise_adaption::kRange, r.range_sigma_m, r.stated).own +
-            square(sightings().range_sigma_rel * e.range_m),
-        error_.range, correlated_range(sightings(), r, e.range_m));
+        square(r.range_sigma_m) + square(sightings().range_sigma_rel * e.range_m), error_.range,
+        correlated_range(sightings(), r, e.range_m));
   return WM_FUSED;
 }
 

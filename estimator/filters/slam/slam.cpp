@@ -15,8 +15,9 @@ constexpr double kOwnFrame_m = 1e-3, kOwnFrame_rad = 1e-3;  // sigmas of a start
 constexpr double kStart_m = 0.05, kStart_rad = 0.05;        // of a start without sigmas, as in landmark_ekf
 constexpr double kSurveyed_m = 1e-4, kSurveyed_rad = 0.01;  // no map is better; headings come without a sigma
 
-const char *const kReads[] = {"!motion.states.wheel_difference", "motion.",    "!sightings.use.elevation",
-                              "!sightings.noise.map_min",        "sightings.", nullptr};
+const char *const kReads[] = {
+    "!motion.states.wheel_difference", "!motion.noise.adapt", "motion.", "!sightings.use.elevation",
+    "!sightings.noise.map_min",        "sightings.",          nullptr};
 
 // Markers' errors take two states: along the line of sight, and of the heading.
 correlated_slot error_slot_of(const wm_slam_params &p, const wm_sighting_params &s) {
@@ -327,7 +328,6 @@ size_t slam::list_calibration(wm_calibration_value *out, size_t capacity) const 
   calibration_list list(out, capacity);
   joint_.list_motion_states(&list);
   slots_.list(*setup_, joint_, &list);
-  joint_.noise().list(&list);
   for (size_t i = 0; i < setup_->sensor_count; i++)
     if (finite(bloom_px_[i])) list.add(setup_->sensors[i].name, "bloom_px", bloom_px_[i], std::nan(""));
   return list.count();

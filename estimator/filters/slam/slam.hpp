@@ -140,7 +140,6 @@ class slam {
   // The rows of an observation: Jacobian by the state, and by the landmark's own states apart.
   struct landmark_rows {
     int count = 0;
-    bool stated = false;  // with its own sigmas
     wm_residual kind[3];
     joint_row row[3];
     double observed[3], expected[3], innovation[3], noise[3];

@@ -52,15 +52,6 @@ wm_verdict slam::fuse_rows(const context &at, const landmark_rows &v, const gate
     variance[i] = block->s[i][i];
     added[i] = v.noise[i] * (g.noise_scale - 1.0);
   }
-  // Bearings alone fit any length of the way.
-  const bool learns = v.count == 2 && !v.stated && life_.tracking() && scope_now() == joint_state::scope::all;
-  for (int i = 0; i < v.count && learns; i++) {
-    const int kind = v.kind[i] == WM_RESIDUAL_BEARING ? noise_adaption::kBearing
-                     : v.kind[i] == WM_RESIDUAL_RANGE ? noise_adaption::kRange
-                                                      : noise_adaption::kNone;
-    block->source[i] = {kind, v.noise[i] * g.noise_scale};
-  }
-  joint_.noise().forget(joint_.now_ns());
   wm_verdict verdict = g.passed ? WM_FUSED : WM_REJECTED_GATE;
   const joint_state::scope now = scope_now();
   const joint_state::scope which =

@@ -24,7 +24,7 @@ _waymark() {
     "map train-cascade") words='--help --size --out --rows --margin --size-min --stages --pictures --seed' ;;
   esac
   [ -n "$words" ] || case "$command" in
-    "run") words='--config --recording --out --duration --speed --seed --landmarks --map --calibration' ;;
+    "run") words='--config --recording --out --record --out-max-mb --duration --speed --seed --resume --landmarks --map --calibration' ;;
     "replay") words='--config --out --seed --landmarks --calibration --map --frames-of --from --until --lost --reference' ;;
     "record") words='--config --out --duration --max-mb --free-mb' ;;
     "watch") words='--url --prefix --duration --web --map --bind' ;;
