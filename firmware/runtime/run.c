@@ -141,8 +141,8 @@ static void take_up_what_was(live *self) {
   } else {
     has_pose = start_where_it_was(self);
   }
-  self->disk.keeps_pose = config->saved_pose[0];
-  self->disk.keeps_map = config->saved_map[0] && wm_keeper_of(config->estimator);
+  self->disk.keeps_pose = config->saved_pose[0] != '\0';
+  self->disk.keeps_map = config->saved_map[0] != '\0' && wm_keeper_of(config->estimator);
   if (!self->disk.keeps_map) return;
   self->disk.map_identity = wm_map_identity_of(config, &self->assembly.setup);
   go_on_with_map(self, has_pose);

@@ -19,7 +19,7 @@ namespace wm {
 class noise_adaption {
  public:
   // Of the variances of way and turn, of white bearings and ranges, and of positions with their time-correlated error.
-  enum factor { kWay, kTurn, kBearing, kRange, kPlace, kFactors, kNone = kFactors };
+  enum factor { kWay, kTurn, kBearings, kRanges, kPlace, kFactors, kNone = kFactors };
   static constexpr int kPose = 3, kBlock = 5;  // x, y, heading; a position's time-correlated error on each axis
 
   // A row of an innovation. `by`: derivatives by the block's states. `gain`: their rows of the Kalman gain that the

@@ -237,7 +237,7 @@ int landmark_ekf::sighting_rows(const sighting_context &at, const expected_sight
   if (at.reading.bearing) {
     residual &r = rows[count++];
     r.record.expected = 0.0;
-    r.source = filter_.noise().source_of(noise_adaption::kBearing, at.reading.bearing_sigma_rad, at.reading.stated);
+    r.source = filter_.noise().source_of(noise_adaption::kBearings, at.reading.bearing_sigma_rad, at.reading.stated);
     r.noise = r.source.own + square(sightings().lateral_sigma_m / distance) + second.bearing_variance;
     add_errors(at, lent, e.bearing_by, error_.bearing, correlated_bearing(sightings(), at.reading, distance), &r);
     finish_row(WM_RESIDUAL_BEARING, s.bearing_rad, e.bearing_rad + second.bearing_rad, record, &r);
@@ -245,7 +245,7 @@ int landmark_ekf::sighting_rows(const sighting_context &at, const expected_sight
   if (at.reading.range) {
     residual &r = rows[count++];
     r.record.expected = 0.0;
-    r.source = filter_.noise().source_of(noise_adaption::kRange, at.reading.range_sigma_m, at.reading.stated);
+    r.source = filter_.noise().source_of(noise_adaption::kRanges, at.reading.range_sigma_m, at.reading.stated);
     r.noise = r.source.own + square(sightings().range_sigma_rel * e.range_m) + second.range_variance;
     add_errors(at, lent, e.range_by, error_.range, correlated_range(sightings(), at.reading, e.range_m), &r);
     finish_row(WM_RESIDUAL_RANGE, s.range_m, e.range_m + second.range_m, record, &r);
