@@ -33,7 +33,7 @@ struct wm_camera_device {
   camera_mode mode;
   int format;
   int has_held, was_told;
-  int has_head;  // of the held buffer, whose pixels nobody has seen yet
+  int has_head;  // of the held buffer, whose pixels are not handed out yet
   wm_frame head;
   camera_buffer newest;
   uint32_t held;   // the buffer whose pixels the caller has

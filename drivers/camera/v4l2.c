@@ -135,7 +135,7 @@ static void set_rate(const v4l2_camera *self, double *rate_hz) {
     *rate_hz = (double)period->denominator / period->numerator;
 }
 
-// With several planes a picture's colour is apart; only the first would be read, and nobody asked for that.
+// With several planes a picture's colour is apart; only the first would be read.
 static int set_planes(v4l2_camera *self, camera_mode *mode) {
   struct v4l2_format f = {.type = self->type};
   struct v4l2_pix_format_mplane *pix = &f.fmt.pix_mp;

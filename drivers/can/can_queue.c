@@ -6,7 +6,7 @@
 #include "can_io.h"
 #include "waymark/devices.h"
 
-// Without the right to more (CAP_NET_ADMIN) the kernel grants net.core.rmem_max at most, and says so to nobody.
+// Without the right to more (CAP_NET_ADMIN) the kernel grants net.core.rmem_max at most, without an error.
 int can_queue_grow(int fd, int bytes) {
   int granted = 0;
   socklen_t length = sizeof granted;

@@ -33,7 +33,7 @@ static void keep_problem(can_stream *self, long line, const char *why) {
   if (!first[0]) snprintf(first, sizeof self->base.counts.first_problem, "%s:%ld: %s", self->lines.path, line, why);
 }
 
-// Where a log has several buses, each stream takes its own frames; the first one counts what is nobody's.
+// Where a log has several buses, each stream takes its own frames; the first one counts frames of no stream.
 static int is_mine(can_stream *self, const char *interface) {
   size_t i = 0;
   if (self->buses.count == 0) return 1;

@@ -36,7 +36,7 @@ static wm_status path_of(const wm_recording *self, const char *file, char out[WM
   return WM_OK;
 }
 
-// The override where there is one, else the recording's own file; `*there` says whether it is.
+// The override where there is one, else the recording's own file; `*there`: whether it is.
 static wm_status choose(const wm_recording *self, const char *override, const char *file, char out[WM_PATH_MAX],
                         int *there, wm_error *err) {
   if (*override) {

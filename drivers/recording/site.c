@@ -34,7 +34,7 @@ struct wm_site {
   wm_map *map;                 // NULL until it is asked for
 };
 
-// The file that is named, else the folder's own; `*there` says whether it is.
+// The file that is named, else the folder's own; `*there`: whether it exists.
 static wm_status choose(const wm_site *self, const char *named, const char *file, char out[WM_PATH_MAX], int *there,
                         wm_error *err) {
   if (*named) {

@@ -18,7 +18,7 @@ constexpr double kTau_s = 1000.0, kForgetEvery_s = 1.0;
 // A larger NIS counts as this much: the 99 % quantile of one degree of freedom. A larger innovation, in sigmas, counts
 // as kMost. Neither was swept.
 constexpr double kNisMost = 6.6, kMost = 3.0;
-constexpr double kLeastVariance = 1e-9;  // of what a row tells of the factors: below, nothing
+constexpr double kLeastVariance = 1e-9;  // of a row's information on the factors; less is not used
 constexpr int kNewtonSteps = 4;
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 // Variance of an innovation over the bearing's own above which a wrong bearing can turn the robot far: five sigmas
 // wide, as in trust.cpp. 4 is as good on hall-a by default, and costs hall-hard 1 to 4 by hall.yaml a tenth.
 constexpr double kByPose = 25.0;
-// Of an innovation's variance, what another one leaves: more is the landmark's own, which tells nothing of the pose.
+// Of an innovation's variance, what another one leaves: more is the landmark's own, which does not concern the pose.
 // Not swept.
 constexpr double kShared = 0.5;
 
