@@ -218,12 +218,8 @@ LandmarkOutcome run_landmark_trial(LandmarkWorld &world, const wm_config &config
     small.get(&e);
     const double t_s = seconds(recording, e.t_ns);
     if (t_s < begin_s) continue;
-    if (wm_event_is_motion(&e)) {
-      filter.ops().predict(filter.state(), &e);
-    } else {
-      wm_innovation innovations[WM_INNOVATIONS_PER_EVENT_MAX];
-      size_t count = 0;
-      filter.ops().correct(filter.state(), &e, innovations, WM_INNOVATIONS_PER_EVENT_MAX, &count);
+    filter.take(e);
+    if (!wm_event_is_motion(&e)) {
       if (t_s >= from_s && std::isnan(first_view_s)) first_view_s = t_s;
       out.moved_seen += e.kind == WM_EVENT_SIGHTING && std::find(recording.moved.begin(), recording.moved.end(),
                                                                  e.as.sighting.landmark_id) != recording.moved.end();

@@ -32,8 +32,8 @@ void run_one(const std::vector<SmallEvent> &events, const sim::Recording &record
   wm_event e{};
   for (const SmallEvent &small : events) {
     small.get(&e);
+    const std::span<const wm_innovation> innovations = filter.take(e);
     if (wm_event_is_motion(&e)) {
-      filter.ops().predict(filter.state(), &e);
       const double t_s = static_cast<double>(e.t_ns - recording.clock_start_ns) * 1e-9;
       if (next >= out.steps.size() || t_s < out.steps[next].t_s) continue;
       filter.ops().estimate(filter.state(), &estimate);
@@ -41,16 +41,13 @@ void run_one(const std::vector<SmallEvent> &events, const sim::Recording &record
       judge(estimate, recording.drive.at(at_s), out.steps[next]);
       next++;
     } else {
-      wm_innovation innovations[WM_INNOVATIONS_PER_EVENT_MAX];
-      size_t count = 0;
-      filter.ops().correct(filter.state(), &e, innovations, WM_INNOVATIONS_PER_EVENT_MAX, &count);
-      for (size_t i = 0; i < count; i++) {
-        const bool fused = innovations[i].verdict == WM_FUSED;
+      for (const wm_innovation &innovation : innovations) {
+        const bool fused = innovation.verdict == WM_FUSED;
         (fused ? out.fused : out.rejected)++;
         if (!fused) continue;
         Step &step = out.steps[std::min(next, out.steps.size() - 1)];
-        step.nis += innovations[i].nis;
-        step.nis_dof += innovations[i].gate_dof;
+        step.nis += innovation.nis;
+        step.nis_dof += innovation.gate_dof;
       }
     }
   }

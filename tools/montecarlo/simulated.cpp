@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstring>
 #include <iterator>
+#include <stdexcept>
+#include <string>
 
 #include "simulate/bus.h"
 #include "waymark/health.h"
@@ -94,6 +96,15 @@ wm_status SimulatedFilter::init(wm_error *err) {
   memory_ = std::make_unique<Block[]>((bytes + sizeof(Block) - 1) / sizeof(Block));
   const wm_status status = estimator_->init(state(), config_.estimator_params, &setup_);
   return status == WM_OK ? status : wm_fail(err, status, "%s: init: %s", estimator_->name, wm_status_text(status));
+}
+
+std::span<const wm_innovation> SimulatedFilter::take(const wm_event &event) {
+  size_t count = 0;
+  const wm_status status = wm_event_is_motion(&event)
+                               ? estimator_->predict(state(), &event)
+                               : estimator_->correct(state(), &event, innovations_.data(), innovations_.size(), &count);
+  if (status != WM_OK) throw std::runtime_error(std::string(estimator_->name) + ": " + wm_status_text(status));
+  return {innovations_.data(), count};
 }
 
 wm_counter SimulatedFilter::counter(wm_counter_kind kind) const {

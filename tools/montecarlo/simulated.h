@@ -2,8 +2,10 @@
 // A simulated recording as events, and an estimator with its memory that takes them.
 #pragma once
 
+#include <array>
 #include <cstring>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "simulate/simulate.h"
@@ -37,6 +39,9 @@ class SimulatedFilter {
   wm_status init(wm_error *err);
   void *state() { return memory_.get(); }
   const wm_estimator &ops() const { return *estimator_; }
+  // Takes one event. Motion gives no innovations; the others give at most WM_INNOVATIONS_PER_EVENT_MAX, valid until the
+  // next call. Throws std::runtime_error where the estimator refuses the event: a simulated drive has no invalid data.
+  std::span<const wm_innovation> take(const wm_event &event);
   wm_start &start() { return setup_.start; }  // before init()
   // The counter of this kind; of count 0 where the estimator has none.
   wm_counter counter(wm_counter_kind kind) const;
@@ -49,6 +54,7 @@ class SimulatedFilter {
   const wm_config &config_;
   wm_setup setup_ = {};
   std::unique_ptr<Block[]> memory_;
+  std::array<wm_innovation, WM_INNOVATIONS_PER_EVENT_MAX> innovations_;
 };
 
 }  // namespace wm::montecarlo

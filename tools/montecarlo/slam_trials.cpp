@@ -287,17 +287,11 @@ SlamOutcome run_slam_trial(const sim::Scenario &scenario, const wm_config &confi
       numbers.begin_anew();
       enough.begin(filter);
     }
-    if (wm_event_is_motion(&e)) {
-      filter.ops().predict(filter.state(), &e);
-    } else {
-      if (int32_t *id = identity_of(e)) {
-        if (cut) enough.see(*id, t_s);
-        if (options.renumber) *id = numbers.number(*id, t_s);
-      }
-      wm_innovation innovations[WM_INNOVATIONS_PER_EVENT_MAX];
-      size_t count = 0;
-      filter.ops().correct(filter.state(), &e, innovations, WM_INNOVATIONS_PER_EVENT_MAX, &count);
+    if (int32_t *id = identity_of(e)) {
+      if (cut) enough.see(*id, t_s);
+      if (options.renumber) *id = numbers.number(*id, t_s);
     }
+    filter.take(e);
     wm_estimate estimate{};
     filter.ops().estimate(filter.state(), &estimate);
     if (t_s < look_s || estimate.t_ns == WM_TIME_NONE) continue;

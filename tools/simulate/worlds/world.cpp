@@ -15,12 +15,12 @@ std::unique_ptr<World> make_world(const WorldRequest &request, wm_error *err) {
   size_t which = 0;
   while (kWorldNames[which] != nullptr && request.name != kWorldNames[which]) which++;
   if (kWorldNames[which] == nullptr) {
-    wm_fail(err, WM_BAD_CONFIG, "world: `%s` is none; there are crossing, corridor, office, hall and seabed",
-            request.name.c_str());
+    (void)wm_fail(err, WM_BAD_CONFIG, "world: `%s` is none; there are crossing, corridor, office, hall and seabed",
+                  request.name.c_str());
     return nullptr;
   }
   if (request.plan && !request.route) {
-    wm_fail(err, WM_BAD_CONFIG, "world: a plan of one's own needs a route through it");
+    (void)wm_fail(err, WM_BAD_CONFIG, "world: a plan of one's own needs a route through it");
     return nullptr;
   }
   auto world = std::make_unique<World>();
@@ -30,7 +30,7 @@ std::unique_ptr<World> make_world(const WorldRequest &request, wm_error *err) {
   if (makers[which](request, *world, err) != WM_OK) return nullptr;
   std::string error;
   if (!world->scene.commit(error)) {
-    wm_fail(err, WM_INTERNAL, "world: %s: %s", request.name.c_str(), error.c_str());
+    (void)wm_fail(err, WM_INTERNAL, "world: %s: %s", request.name.c_str(), error.c_str());
     return nullptr;
   }
   return world;
