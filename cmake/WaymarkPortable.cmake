@@ -14,7 +14,7 @@ endif()
 set(CMAKE_FIND_LIBRARY_SUFFIXES .a)
 list(PREPEND CMAKE_FIND_ROOT_PATH ${portable})
 list(PREPEND CMAKE_PREFIX_PATH / ${portable})
-# Our malloc, which counts, stands before that of glibc (firmware/memory); in a static program both are there.
+# Our malloc, which counts, stands before that of glibc (firmware/rt); in a static program both are there.
 # glibc has no start code of a static program at any address for 32-bit ARM (rcrt1.o): there it is at a fixed one.
 if(arch STREQUAL armhf)
   add_link_options(-static -Wl,-z,muldefs)

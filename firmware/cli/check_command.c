@@ -6,13 +6,13 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "check.h"
-#include "commands.h"
-#include "options.h"
-#include "waymark/arena.h"
-#include "waymark/assembly.h"
-#include "waymark/pipeline.h"
-#include "waymark/robot.h"
+#include "cli/check/check.h"
+#include "cli/commands.h"
+#include "cli/options.h"
+#include "fusion/assembly.h"
+#include "fusion/pipeline.h"
+#include "live/robot.h"
+#include "rt/arena.h"
 
 static const char kHelp[] =
     "usage: waymark check CONFIG [RECORDING] [options]\n"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The program's commands. Each takes the words after its name and returns the exit code.
-#ifndef WAYMARK_FIRMWARE_COMMANDS_H
-#define WAYMARK_FIRMWARE_COMMANDS_H
+#ifndef WAYMARK_CLI_COMMANDS_H
+#define WAYMARK_CLI_COMMANDS_H
 
-#include "waymark/config.h"
-#include "waymark/replay.h"
+#include "config/config.h"
+#include "replay/replay.h"
 #include "waymark/status.h"
 
 enum { EXIT_DONE = 0, EXIT_WORK_FAILED = 1, EXIT_USAGE = 2 };

@@ -6,8 +6,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "commands.h"
-#include "waymark/clock.h"
+#include "cli/commands.h"
+#include "output/run_findings.h"
+#include "rt/clock.h"
 
 int exit_code(wm_status status) {
   if (status == WM_OK) return EXIT_DONE;

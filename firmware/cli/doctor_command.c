@@ -3,10 +3,10 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "commands.h"
-#include "doctor.h"
-#include "lcm_way.h"
-#include "options.h"
+#include "cli/commands.h"
+#include "cli/doctor/doctor.h"
+#include "cli/options.h"
+#include "live/lcm_connect.h"
 
 static const char kHelp[] =
     "usage: waymark doctor [CONFIG] [options]\n"

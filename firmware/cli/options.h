@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A command line: `--name VALUE` or `--name=VALUE`, flags, and words in between. An option that isn't known is answered
 // with the nearest one.
-#ifndef WAYMARK_FIRMWARE_OPTIONS_H
-#define WAYMARK_FIRMWARE_OPTIONS_H
+#ifndef WAYMARK_CLI_OPTIONS_H
+#define WAYMARK_CLI_OPTIONS_H
 
 #include <stddef.h>
 #include <stdint.h>

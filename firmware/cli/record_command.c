@@ -4,9 +4,9 @@
 #include <stdio.h>
 #include <sys/stat.h>
 
-#include "commands.h"
-#include "options.h"
-#include "waymark/record.h"
+#include "cli/commands.h"
+#include "cli/options.h"
+#include "live/record.h"
 
 static const char kHelp[] =
     "usage: waymark record --config FILE --out RECORDING [options]\n"

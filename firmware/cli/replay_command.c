@@ -5,11 +5,11 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "commands.h"
-#include "options.h"
-#include "waymark/clock.h"
+#include "cli/commands.h"
+#include "cli/options.h"
+#include "output/event_log.h"
+#include "rt/clock.h"
 #include "waymark/codec.h"
-#include "waymark/eventlog.h"
 #include "waymark/map.h"
 
 static const char kHelp[] =

@@ -6,13 +6,13 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "commands.h"
-#include "options.h"
-#include "waymark/clock.h"
-#include "waymark/record.h"
-#include "waymark/robot.h"
-#include "waymark/run.h"
-#include "waymark/saved_pose.h"
+#include "cli/commands.h"
+#include "cli/options.h"
+#include "live/record.h"
+#include "live/robot.h"
+#include "live/run.h"
+#include "output/saved_pose.h"
+#include "rt/clock.h"
 
 static const char kHelp[] =
     "usage: waymark run --config FILE [--recording RECORDING] [options]\n"

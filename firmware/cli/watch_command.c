@@ -5,13 +5,13 @@
 #include <string.h>
 #include <unistd.h>
 
-#include "commands.h"
-#include "lcm_way.h"
-#include "options.h"
-#include "watch.h"
-#include "waymark/clock.h"
+#include "cli/commands.h"
+#include "cli/options.h"
+#include "cli/watch/watch.h"
+#include "cli/watch/web.h"
+#include "live/lcm_connect.h"
+#include "rt/clock.h"
 #include "waymark/map.h"
-#include "web.h"
 
 static const char kHelp[] =
     "usage: waymark watch [options]\n"

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/config.h"
+#include "config/config.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
-#include "devices.h"
-#include "keys.h"
-#include "sources.h"
-#include "vision.h"
+#include "config/devices.h"
+#include "config/keys.h"
+#include "config/sources.h"
+#include "config/vision.h"
 #include "waymark/cascade_file.h"
 #include "waymark/text.h"
 #include "waymark/yaml.h"

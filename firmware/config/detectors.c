@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "detectors.h"
+#include "config/detectors.h"
 
 #include <string.h>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `devices:` of a configuration.
-#include "devices.h"
+#include "config/devices.h"
 
 #include <stdio.h>
 #include <string.h>

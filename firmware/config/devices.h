@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#ifndef WM_CONFIG_DEVICES_H
-#define WM_CONFIG_DEVICES_H
+#ifndef WAYMARK_CONFIG_DEVICES_H
+#define WAYMARK_CONFIG_DEVICES_H
 
-#include "waymark/config.h"
+#include "config/config.h"
 #include "waymark/yaml.h"
 
 // Reads `devices:`; out->overrides are already there (a CAN interface's DBC and binding are the configuration's where

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "keys.h"
-#include "detectors.h"
+#include "config/keys.h"
+#include "config/detectors.h"
 
 #include <stdio.h>
 #include <stdlib.h>

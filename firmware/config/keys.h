@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // The keys that a configuration may have, and the reading of a section by its table.
-#ifndef WM_CONFIG_KEYS_H
-#define WM_CONFIG_KEYS_H
+#ifndef WAYMARK_CONFIG_KEYS_H
+#define WAYMARK_CONFIG_KEYS_H
 
-#include "waymark/config.h"
+#include "config/config.h"
 #include "waymark/yaml.h"
 
 // A key of a configuration that no table has.

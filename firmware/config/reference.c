@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "keys.h"
+#include "config/keys.h"
 
 static void print_type(FILE *to, const wm_param *p) {
   switch (p->type) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <stddef.h>
 
-#include "waymark/config.h"
+#include "config/config.h"
 
 #define F64(key, field, initial, min, max, about) \
   { key, WM_PARAM_F64, offsetof(wm_runtime_params, field), initial, min, max, NULL, about }

@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "detectors.h"
-#include "sources.h"
+#include "config/detectors.h"
+#include "config/sources.h"
 #include "waymark/text.h"
 
 static const char *const kNames[] = {"can",     "motion", "motion6", "increments", "sightings",

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#ifndef WM_CONFIG_SOURCES_H
-#define WM_CONFIG_SOURCES_H
+#ifndef WAYMARK_CONFIG_SOURCES_H
+#define WAYMARK_CONFIG_SOURCES_H
 
-#include "waymark/config.h"
+#include "config/config.h"
 #include "waymark/yaml.h"
 
 // Reads `sources:`; out->runtime is already there, and lateness is held against its horizon.

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // `vision:` of a configuration: the detectors that look at pictures, and at whose.
-#include "vision.h"
-#include "detectors.h"
+#include "config/vision.h"
+#include "config/detectors.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-#include "devices.h"
-#include "keys.h"
+#include "config/devices.h"
+#include "config/keys.h"
 #include "waymark/cascade_file.h"
 
 static wm_status read_cameras(const wm_yaml_node *section, wm_vision_config *out, wm_error *err) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#ifndef WM_CONFIG_VISION_H
-#define WM_CONFIG_VISION_H
+#ifndef WAYMARK_CONFIG_VISION_H
+#define WAYMARK_CONFIG_VISION_H
 
-#include "waymark/config.h"
+#include "config/config.h"
 #include "waymark/yaml.h"
 
 // Reads `vision:`. Allocates the detectors' parameters and cascades, which wm_config_free frees.

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/replay.h"
+#include "replay/replay.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "frames_of.h"
-#include "waymark/arena.h"
-#include "waymark/clock.h"
-#include "waymark/feed.h"
-#include "waymark/pipeline.h"
-#include "waymark/run_folder.h"
-#include "waymark/steady.h"
+#include "fusion/pipeline.h"
+#include "fusion/source_reader.h"
+#include "output/run_folder.h"
+#include "replay/seen_frames.h"
+#include "rt/arena.h"
+#include "rt/clock.h"
+#include "rt/memory.h"
 
 #define STACK_BYTES ((size_t)256 << 10)
 #define PROGRESS_EVERY_NS (200 * WM_NS_PER_MS)

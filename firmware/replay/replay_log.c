@@ -6,11 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "waymark/arena.h"
+#include "output/run_folder.h"
+#include "replay/replay.h"
+#include "rt/arena.h"
+#include "rt/memory.h"
 #include "waymark/keeper.h"
-#include "waymark/replay.h"
-#include "waymark/run_folder.h"
-#include "waymark/steady.h"
 
 typedef struct log_replay {
   wm_assembly assembly;

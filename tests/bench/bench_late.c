@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "waymark/arena.h"
-#include "waymark/clock.h"
-#include "waymark/pipeline.h"
+#include "fusion/pipeline.h"
+#include "rt/arena.h"
+#include "rt/clock.h"
 
 #define MS WM_NS_PER_MS
 #define SECONDS 60

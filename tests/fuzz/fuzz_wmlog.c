@@ -6,11 +6,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "crc32.h"
+#include "fusion/fuser.h"
+#include "output/crc32.h"
+#include "output/event_log.h"
 #include "tiny_estimator.h"
 #include "waymark/bytes.h"
-#include "waymark/eventlog.h"
-#include "waymark/fuser.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 

@@ -38,7 +38,7 @@ def functions_of(obj, objdump):
 
 
 def marked():
-    text = "\n".join(path.read_text() for path in (*ROOT.glob("firmware/include/waymark/*.h"), *ROOT.glob("firmware/*/*.h")))
+    text = "\n".join(path.read_text() for path in ROOT.glob("firmware/*/*.h"))
     return set(re.findall(r"^WM_REALTIME [^;(]*?\b(\w+)\(", text, re.M))
 
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Recordings in, files out, through replay, through the real threads, and from the command line.
 wm_test(run_replay SOURCES test_replay.c small_recording.c USES wm_replay)
-wm_test(run_live SOURCES test_live.c small_recording.c USES wm_run pthread LABELS threads)
-wm_test(run_devices SOURCES test_devices.c small_recording.c USES wm_run pthread LABELS threads)
+wm_test(run_live SOURCES test_live.c small_recording.c USES wm_live pthread LABELS threads)
+wm_test(run_devices SOURCES test_devices.c small_recording.c USES wm_live pthread LABELS threads)
 target_include_directories(run_devices PRIVATE ${CMAKE_SOURCE_DIR}/drivers/can)
 wm_script_test(run_service COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/service.sh)
 wm_script_test(run_service_net COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/service_net.py LABELS release-only)

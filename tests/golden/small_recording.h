@@ -6,8 +6,8 @@
 
 #include <stddef.h>
 
-#include "waymark/config.h"
-#include "waymark/replay.h"
+#include "config/config.h"
+#include "replay/replay.h"
 #include "waymark/time.h"
 
 typedef struct small_recording {

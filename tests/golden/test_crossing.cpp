@@ -18,8 +18,8 @@
 #include "simulate/write.h"
 
 extern "C" {
+#include "replay/replay.h"
 #include "unity.h"
-#include "waymark/replay.h"
 void setUp(void);
 void tearDown(void);
 }

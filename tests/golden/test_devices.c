@@ -9,13 +9,13 @@
 #include <unistd.h>
 
 #include "can_device.h"
+#include "live/robot.h"
+#include "live/run.h"
+#include "output/event_log.h"
+#include "output/saved_pose.h"
+#include "rt/clock.h"
 #include "small_recording.h"
 #include "unity.h"
-#include "waymark/clock.h"
-#include "waymark/eventlog.h"
-#include "waymark/robot.h"
-#include "waymark/run.h"
-#include "waymark/saved_pose.h"
 
 static const char kConfig[] =
     "format: waymark-config/1\nestimator: odometry\npublish: {lcm_url: \"memq://\"}\n"

@@ -7,10 +7,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "live/run.h"
+#include "output/event_log.h"
 #include "small_recording.h"
 #include "unity.h"
-#include "waymark/eventlog.h"
-#include "waymark/run.h"
 
 static const char kConfig[] =
     "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm_url: \"memq://\"}\n"

@@ -5,9 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "output/event_log.h"
+#include "output/run_findings.h"
 #include "small_recording.h"
 #include "unity.h"
-#include "waymark/eventlog.h"
 
 #define MS WM_NS_PER_MS
 

@@ -20,7 +20,7 @@
 #include "waymark/map.h"
 #include "waymark/motion.h"
 extern "C" {
-#include "waymark/config.h"
+#include "config/config.h"
 }
 
 namespace wm::calibrate {

@@ -7,7 +7,7 @@
 #include <memory>
 
 extern "C" {
-#include "waymark/eventlog.h"
+#include "output/event_log.h"
 }
 
 namespace wm::tools {

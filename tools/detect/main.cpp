@@ -9,8 +9,8 @@
 #include <memory>
 
 #include "common/failure.h"
+#include "config/config.h"
 #include "detect/polylines.h"
-#include "waymark/config.h"
 #include "waymark/recording.h"
 #include "waymark/video.h"
 

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "config/config.h"
 #include "montecarlo/trial.h"
 #include "simulate/film.h"
 #include "simulate/simulate.h"
-#include "waymark/config.h"
 
 namespace wm::montecarlo {
 

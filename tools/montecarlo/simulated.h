@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "config/config.h"
 #include "simulate/simulate.h"
-#include "waymark/config.h"
 #include "waymark/estimator.h"
 #include "waymark/event.h"
 

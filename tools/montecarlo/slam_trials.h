@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "config/config.h"
 #include "simulate/scenario.h"
-#include "waymark/config.h"
 
 namespace wm::montecarlo {
 

@@ -7,8 +7,8 @@
 #include <optional>
 #include <vector>
 
+#include "config/config.h"
 #include "montecarlo/drive.h"
-#include "waymark/config.h"
 
 namespace wm::montecarlo {
 

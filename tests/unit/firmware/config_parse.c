@@ -4,9 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "config/config.h"
 #include "config_registry.h"
 #include "unity.h"
-#include "waymark/config.h"
 
 static wm_config config;
 static wm_error err;

@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "config/config.h"
 #include "unity.h"
-#include "waymark/config.h"
 
 void setUp(void) {}
 void tearDown(void) {}

@@ -9,8 +9,8 @@
 #include <string.h>
 #include <unistd.h>
 
+#include "output/event_log.h"
 #include "tiny_estimator.h"
-#include "waymark/eventlog.h"
 
 static wm_sensor fixture_sensors[2] = {{.name = "left"}, {.name = "right"}};
 static wm_landmark fixture_landmarks[3] = {{.id = 1, .p_m = {1, 2, 0}, .sigma_m = 0.01, .yaw_rad = NAN},

@@ -4,10 +4,10 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "rt/arena.h"
+#include "rt/histogram.h"
+#include "rt/memory.h"
 #include "unity.h"
-#include "waymark/arena.h"
-#include "waymark/histogram.h"
-#include "waymark/steady.h"
 
 void setUp(void) {}
 void tearDown(void) {}

@@ -9,7 +9,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "black_box.h"
+#include "output/black_box.h"
 #include "unity.h"
 
 static const char kConfig[] = "format: waymark-config/1\nestimator: odometry\n";

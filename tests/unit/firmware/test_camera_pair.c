@@ -7,11 +7,11 @@
 #include "../drivers/fake_camera.h"
 #include "../drivers/folder.h"
 #include "camera_device.h"
-#include "frame_hub.h"
+#include "rt/arena.h"
+#include "rt/clock.h"
+#include "sources/frame_hub.h"
+#include "sources/vision.h"
 #include "unity.h"
-#include "waymark/arena.h"
-#include "waymark/clock.h"
-#include "waymark/vision.h"
 
 #define MS WM_NS_PER_MS
 #define AT(ms) (FAKE_BOOT_NS + (ms)*MS)

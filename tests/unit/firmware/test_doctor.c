@@ -5,7 +5,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "doctor.h"
+#include "cli/doctor/doctor.h"
 #include "unity.h"
 
 static char root[64];

@@ -3,8 +3,8 @@
 #include <sys/stat.h>
 
 #include "log_fixture.h"
+#include "output/run_folder.h"
 #include "unity.h"
-#include "waymark/run_folder.h"
 
 void setUp(void) {}
 void tearDown(void) {}

@@ -9,8 +9,8 @@
 #include <string.h>
 #include <sys/stat.h>
 
-#include "avi_writer.h"
-#include "frame_hub.h"
+#include "output/avi_writer.h"
+#include "sources/frame_hub.h"
 #include "unity.h"
 #include "waymark/devices.h"
 #include "waymark/video.h"

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <stdio.h>
 
+#include "fusion/fuser.h"
 #include "tiny_estimator.h"
 #include "unity.h"
-#include "waymark/fuser.h"
 
 #define MS WM_NS_PER_MS
 

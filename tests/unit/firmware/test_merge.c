@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fusion/merge.h"
 #include "unity.h"
-#include "waymark/merge.h"
 
 #define MS WM_NS_PER_MS
 #define QUEUE 512

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <string.h>
 
-#include "options.h"
+#include "cli/options.h"
 #include "unity.h"
 
 void setUp(void) {}

@@ -3,7 +3,7 @@
 // is marked.
 #include <stdlib.h>
 
-#include "live.h"
+#include "live/live.h"
 #include "log_fixture.h"
 #include "unity.h"
 

@@ -3,8 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fusion/predictor.h"
 #include "unity.h"
-#include "waymark/predictor.h"
 
 #define MS WM_NS_PER_MS
 

@@ -6,11 +6,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "avi_writer.h"
-#include "copy_map.h"
+#include "live/copy_map.h"
+#include "live/record.h"
+#include "output/avi_writer.h"
 #include "unity.h"
 #include "waymark/can.h"
-#include "waymark/record.h"
 #include "waymark/video.h"
 
 static char folder[64], video[128], stamps[128], avi[128];

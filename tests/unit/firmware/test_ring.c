@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "rt/ring.h"
 #include "unity.h"
-#include "waymark/ring.h"
 
 void setUp(void) {}
 void tearDown(void) {}

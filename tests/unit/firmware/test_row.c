@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "row.h"
+#include "output/csv_row.h"
 #include "unity.h"
 
 void setUp(void) {}

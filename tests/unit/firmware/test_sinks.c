@@ -7,13 +7,13 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "lcm_commands.h"
-#include "lcm_sightings.h"
-#include "lcm_sink.h"
+#include "live/lcm_commands.h"
+#include "live/lcm_sightings.h"
+#include "live/lcm_sink.h"
+#include "live/notify.h"
 #include "log_fixture.h"
-#include "notify.h"
+#include "rt/clock.h"
 #include "unity.h"
-#include "waymark/clock.h"
 #include "waymark_health_t.h"
 #include "waymark_innovation_t.h"
 #include "waymark_landmarks_t.h"

@@ -7,12 +7,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "config/config.h"
+#include "fusion/budget.h"
+#include "output/saved_map.h"
+#include "output/saved_pose.h"
 #include "unity.h"
-#include "waymark/budget.h"
-#include "waymark/config.h"
 #include "waymark/keeper.h"
-#include "waymark/saved_map.h"
-#include "waymark/saved_pose.h"
 
 static char folder[64], path[128];
 static wm_error err;

@@ -4,10 +4,10 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "cli/watch/watch.h"
+#include "cli/watch/web.h"
 #include "unity.h"
-#include "watch.h"
 #include "waymark/lcm_messages.h"
-#include "web.h"
 
 static watch seen;
 static wm_health health;

@@ -11,8 +11,8 @@
 #include <turbojpeg.h>
 
 #include "../drivers/folder.h"
+#include "sources/vision.h"
 #include "unity.h"
-#include "waymark/vision.h"
 
 #define W 320
 #define H 180

@@ -17,6 +17,9 @@ MAY_USE = {
     "tools": ["msgs", "estimator", "drivers", "firmware"],
 }
 
+# Inside firmware/, bottom up: a folder includes its own headers and those of the folders before it, as "folder/header.h".
+FIRMWARE_FOLDERS = ["rt", "config", "sources", "fusion", "output", "replay", "live", "cli"]
+
 # Headers that would give the estimator a clock, a file, a thread, a heap or a terminal.
 ESTIMATOR_NEVER = re.compile(
     r"<(time\.h|stdio\.h|stdlib\.h|pthread\.h|unistd\.h|errno\.h|sys/.*|linux/.*|chrono|thread|mutex|atomic|iostream|fstream"
@@ -60,6 +63,8 @@ INCLUDE = re.compile(r'^\s*#\s*include\s+([<"])([^>"]+)[>"]')
 
 
 def public_headers(room):
+    if room == "firmware":  # headers stand beside their sources; none is installed
+        return {str(p.relative_to(ROOT / room)) for p in (ROOT / room).rglob("*.h")}
     base = ROOT / room / "include"
     return {str(p.relative_to(base)) for p in base.rglob("*.h")} | {str(p.relative_to(base)) for p in base.rglob("*.hpp")}
 
@@ -111,6 +116,22 @@ def check_folders():
         yield f"estimator/{file} does not include {header} any more: take it off FOLDER_EXCEPTIONS"
 
 
+def check_firmware_folders():
+    room = ROOT / "firmware"
+    for path in sources("firmware"):
+        inside = path.relative_to(room)
+        if inside.parts[0] not in FIRMWARE_FOLDERS:
+            yield f"firmware/{inside}:1: {inside.parts[0]}/ is not in house.py's list of folders: add it where it belongs"
+            continue
+        below = FIRMWARE_FOLDERS[:FIRMWARE_FOLDERS.index(inside.parts[0]) + 1]
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            match = INCLUDE.match(line)
+            if not match or match.group(1) != '"' or match.group(2).startswith("waymark/"):
+                continue
+            if match.group(2).split("/")[0] not in below or not (room / match.group(2)).exists():
+                yield f"firmware/{inside}:{number}: {inside.parts[0]}/ may not include {match.group(2)}"
+
+
 def check_names():
     """Names in wm:: stand in one header each: the linker silently merges two inline variables of one name, whatever their types."""
     defined = re.compile(r"^(?:inline constexpr [\w:<>, ]*?(\w+)(?:\[\w*\])* = |(?:struct|class|union|enum|enum class) (\w+)\b[^;]*$)")
@@ -142,7 +163,7 @@ def sources(room):
 
 
 def main():
-    offences = [*check_includes(), *check_folders(), *check_names(), *check_sources()]
+    offences = [*check_includes(), *check_folders(), *check_firmware_folders(), *check_names(), *check_sources()]
     count = sum(len(sources(room)) for room in MAY_USE)
     if count == 0:
         print(f"no sources under {ROOT}: wrong folder?")

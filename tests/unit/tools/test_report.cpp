@@ -15,7 +15,7 @@
 #include "report/words.h"
 #include "unity.h"
 extern "C" {
-#include "waymark/eventlog.h"
+#include "output/event_log.h"
 }
 
 using namespace wm::tools;

@@ -6,9 +6,9 @@
 #include <unistd.h>
 
 #include "../../drivers/folder.h"
+#include "config/config.h"
 #include "errors_case.h"
 #include "unity.h"
-#include "waymark/config.h"
 #include "waymark/recording.h"
 
 #define CONFIG_HEAD "format: waymark-config/1\nestimator: landmark_ekf\n"

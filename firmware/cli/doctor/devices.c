@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: Apache-2.0
+// LCM, CAN, cameras.
+#include <errno.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "cli/doctor/doctor.h"
+#include "live/lcm_connect.h"
+
+void doctor_lcm(const char *url, findings *out) {
+  const char *why;
+  lcm_t *lcm = lcm_way_open(url, &why);
+  if (!lcm) {
+    find(out, FINDING_BAD, "lcm", "ip route add 224.0.0.0/4 dev lo", "no way out on %.80s: %s", url, why);
+    return;
+  }
+  lcm_destroy(lcm);
+  const char *ttl = strstr(url, "ttl=");
+  if (strncmp(url, "udpm://", 7) == 0 && ttl && strtol(ttl + 4, NULL, 10) > 0)
+    find(out, FINDING_NOTE, "lcm",
+         "publish: {lcm_url: \"udpm://239.255.76.67:7667?ttl=0\"} keeps messages on this computer",
+         "%.80s: poses go out into the network, and commands may come from it", url);
+  else
+    find(out, FINDING_GOOD, "lcm", "", "messages find their way on %.80s", url);
+}
+
+// 1: a number was there.
+static int number_of(const char *root, const char *interface, const char *what, long *out) {
+  char path[512], text[64];
+  (void)snprintf(path, sizeof path, "%s/sys/class/net/%s/%s", root, interface, what);
+  FILE *f = fopen(path, "re");
+  if (!f) return 0;
+  int got = fgets(text, sizeof text, f) != NULL;
+  (void)fclose(f);
+  if (got) *out = strtol(text, NULL, 0);
+  return got;
+}
+
+#define ARPHRD_OF_CAN 280
+#define IS_UP 1
+
+static void can_interface(const char *root, const char *interface, findings *out) {
+  char about[32], mend[160];
+  long type = 0, flags = 0, errors = 0, overruns = 0;
+  (void)snprintf(about, sizeof about, "can %s", interface);
+  if (!number_of(root, interface, "type", &type)) {
+    find(out, FINDING_BAD, about, "plug the adapter in; `lsusb`, `dmesg | grep -i can`",
+         "there is no interface of this name");
+    return;
+  }
+  if (type != ARPHRD_OF_CAN) {
+    find(out, FINDING_BAD, about, "`ip -br link show type can` lists CAN interfaces", "is no CAN interface");
+    return;
+  }
+  (void)number_of(root, interface, "flags", &flags);
+  if (!(flags & IS_UP)) {
+    (void)snprintf(mend, sizeof mend, "ip link set %s up type can bitrate 500000 restart-ms 100", interface);
+    find(out, FINDING_BAD, about, mend, "is down");
+    return;
+  }
+  (void)number_of(root, interface, "statistics/rx_errors", &errors);
+  (void)number_of(root, interface, "statistics/rx_over_errors", &overruns);
+  if (overruns > 0)
+    find(out, FINDING_BAD, about, "raise the priority of its interrupt thread above other work (chrt -f -p 60 PID)",
+         "its controller lost %ld frames because nobody took them in time", overruns);
+  else if (errors > 0)
+    find(out, FINDING_NOTE, about, "look at wiring, termination (60 ohms) and bit rate: `ip -d -s link show`",
+         "is up, with %ld receive errors since then", errors);
+  else
+    find(out, FINDING_GOOD, about, "", "is up, without errors");
+}
+
+// The kernel's account of a queued frame of eight bytes, and such frames in a second of a full bus of 500 kbit/s.
+#define FRAME_QUEUE_BYTES 768
+#define FRAMES_PER_S 4000
+
+void doctor_can_queue(int wanted, int granted, findings *out) {
+  char mend[120];
+  const double queue_ms = 2e3 * granted / FRAME_QUEUE_BYTES / FRAMES_PER_S;  // it counts twice what is granted
+  if (granted >= wanted) {
+    find(out, FINDING_GOOD, "can queue", "", "a socket holds %.0f ms of a full bus", queue_ms);
+    return;
+  }
+  (void)snprintf(mend, sizeof mend, "sysctl -w net.core.rmem_max=%d, and the same in /etc/sysctl.d/waymark.conf",
+                 wanted);
+  find(out, FINDING_NOTE, "can queue", mend,
+       "a socket holds %.0f ms of a full bus (%d kB of the %d that are asked for): frames are lost when a thread waits "
+       "longer",
+       queue_ms, granted / 1024, wanted / 1024);
+}
+
+void doctor_can(const char *root, const wm_config *config, findings *out) {
+  for (size_t i = 0; config && i < config->devices.can_count; i++)
+    can_interface(root, config->devices.can[i].interface, out);
+}
+
+static void camera(const wm_camera_device_config *c, findings *out) {
+  char about[32];
+  (void)snprintf(about, sizeof about, "camera %.20s", c->name);
+  if (!c->device[0]) return;  // known by card and bus, or to libcamera: only a run looks for it
+  int fd = open(c->device, O_RDWR | O_NONBLOCK | O_CLOEXEC);
+  if (fd >= 0) {
+    struct stat is;
+    int is_device = fstat(fd, &is) == 0 && S_ISCHR(is.st_mode);
+    (void)close(fd);
+    find(out, is_device ? FINDING_GOOD : FINDING_BAD, about, is_device ? "" : "`v4l2-ctl --list-devices` lists cameras",
+         is_device ? "%.100s is there" : "%.100s is no device", c->device);
+  } else if (errno == EACCES) {
+    find(out, FINDING_BAD, about, "SupplementaryGroups=video in the unit, or usermod -aG video USER",
+         "%.100s: no permission", c->device);
+  } else {
+    find(out, FINDING_BAD, about, "`v4l2-ctl --list-devices` lists cameras", "%.100s: %s", c->device, strerror(errno));
+  }
+}
+
+void doctor_cameras(const wm_config *config, findings *out) {
+  for (size_t i = 0; config && i < config->devices.camera_count; i++) camera(&config->devices.cameras[i], out);
+}

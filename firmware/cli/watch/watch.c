@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/watch/watch.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+#include "waymark/lcm_messages.h"
+
+#define SILENT_NS (2 * WM_NS_PER_S)
+
+void watch_pose(watch *self, const void *message, size_t length, wm_time_ns now_ns) {
+  if (wm_lcm_read_pose(message, length, &self->pose)) {
+    self->not_understood++;
+    return;
+  }
+  if (self->has_pose && now_ns > self->pose_at_ns) {
+    double rate_hz = 1e9 / (double)(now_ns - self->pose_at_ns);
+    self->rate_hz = self->rate_hz > 0 ? self->rate_hz + 0.05 * (rate_hz - self->rate_hz) : rate_hz;
+  }
+  self->has_pose = 1;
+  self->pose_at_ns = now_ns;
+}
+
+void watch_health(watch *self, const void *message, size_t length, wm_time_ns now_ns) {
+  if (wm_lcm_read_health(message, length, &self->health)) {
+    self->not_understood++;
+    return;
+  }
+  self->has_health = 1;
+  self->health_at_ns = now_ns;
+}
+
+void watch_innovation(watch *self, const void *message, size_t length) {
+  wm_innovation i;
+  if (wm_lcm_read_innovation(message, length, &i)) {
+    self->not_understood++;
+    return;
+  }
+  double off = i.observed - i.expected;
+  if (i.verdict != WM_FUSED || !(i.variance > 0) || !isfinite(off)) return;
+  if (i.residual == WM_RESIDUAL_BEARING || i.residual == WM_RESIDUAL_HEADING) off = remainder(off, 2 * M_PI);
+  double weight = self->innovations < 100 ? 1 / (double)(self->innovations + 1) : 0.01;
+  self->nis += weight * (off * off / i.variance - self->nis);
+  self->innovations++;
+}
+
+// Limits: chi-squared of about a hundred, with room for the gate, which cuts the tails off.
+const char *watch_consistency(const watch *self) {
+  if (self->innovations < 50) return "too few observations to tell";
+  if (self->nis > 1.6) return "observations are further off than the covariance allows";
+  if (self->nis < 0.3) return "observations are nearer than the covariance allows: the noises are too large";
+  return "consistent";
+}
+
+static void add(char *why, size_t why_bytes, const char *name, const char *what) {
+  size_t used = strlen(why);
+  (void)snprintf(why + used, why_bytes - used, "%s%s %s", used ? ", " : "", name, what);
+}
+
+// Every source that doesn't do what it should.
+static void list_troubles(const wm_health *h, char *why, size_t why_bytes) {
+  for (uint32_t i = 0; i < h->source_count; i++) {
+    const wm_source_health *s = &h->sources[i];
+    if (s->device > WM_DEVICE_WORKS)
+      add(why, why_bytes, s->name, wm_device_state_name(s->device));
+    else if (s->stale)
+      add(why, why_bytes, s->name, s->received ? "silent" : "never spoke");
+  }
+  if (h->motion_health) add(why, why_bytes, "motion sensor", "broken");
+}
+
+const char *watch_state(const watch *self, wm_time_ns now_ns, char *why, size_t why_bytes) {
+  why[0] = '\0';
+  if (!self->has_health || now_ns - self->health_at_ns > SILENT_NS) return self->has_health ? "silent" : "waiting";
+  list_troubles(&self->health, why, why_bytes);
+  switch (self->health.state) {
+    case WM_STATE_SEARCHING: return why[0] ? "waiting for sensors" : "searching";
+    case WM_STATE_LOST: return "lost";
+    case WM_STATE_TRACKING: return why[0] ? "degraded" : "tracking";
+    default: return why[0] ? "degraded" : "dead reckoning";
+  }
+}
+
+static void print_pose(const wm_published *p, double rate_hz, FILE *to) {
+  const wm_estimate *e = &p->now;
+  const double *q = e->pose_map_base.q_xyzw, *c = e->covariance;
+  double heading = atan2(2 * (q[3] * q[2] + q[0] * q[1]), 1 - 2 * (q[1] * q[1] + q[2] * q[2]));
+  (void)fprintf(to, "pose       x %8.2f m  y %8.2f m  heading %7.1f deg   (sigma %.2f, %.2f m, %.1f deg)\n",
+                e->pose_map_base.p_m[0], e->pose_map_base.p_m[1], heading * 180 / M_PI,
+                sqrt(fmax(c[wm_cov_index(0, 0)], 0)), sqrt(fmax(c[wm_cov_index(1, 1)], 0)),
+                sqrt(fmax(c[wm_cov_index(5, 5)], 0)) * 180 / M_PI);
+  (void)fprintf(to, "           %.2f m/s  %.1f deg/s   fused until %.0f ms ago   %.0f a second   %" PRIu32 " jumps\n",
+                e->v_mps[0], e->w_radps[2] * 180 / M_PI, (double)(e->t_ns - p->fused_until_ns) * 1e-6, rate_hz,
+                p->jumps);
+}
+
+static void print_source(const wm_source_health *s, FILE *to) {
+  uint64_t rejected = 0;
+  for (int i = 1; i < WM_VERDICT_COUNT; i++) rejected += s->rejected[i];
+  (void)fprintf(to,
+                "  %-18.18s %-14s %6.1f s ago %10" PRIu64 " fused %8" PRIu64 " rejected %6" PRIu64 " late %6" PRIu64
+                " lost\n",
+                s->name,
+                s->device  ? wm_device_state_name(s->device)
+                : s->stale ? "silent"
+                           : "",
+                (double)s->silent_ns * 1e-9, s->fused, rejected, s->late, s->lost + s->overflows + s->dropped);
+  char looks[300];
+  if (wm_looks_text(s->looks, looks, sizeof looks)) (void)fprintf(to, "    %s\n", looks);
+}
+
+static void print_left(const wm_health *h, FILE *to) {
+  if (isnan(h->reckoning_left_m)) return;
+  (void)fprintf(to, "left       without observations useful for ");
+  (void)(isinf(h->reckoning_left_m) ? fprintf(to, "any way") : fprintf(to, "%.0f m", h->reckoning_left_m));
+  (void)(isinf(h->reckoning_left_s) ? fprintf(to, ", and as long as it stands\n")
+                                    : fprintf(to, ", %.0f s at this speed\n", h->reckoning_left_s));
+}
+
+// Aliased poses are no fault, but matter to a person who has just set the robot down.
+static void print_aliased(const wm_health *h, FILE *to) {
+  const wm_counter *aliased = wm_health_counter(h, WM_COUNTER_ALIASED_POSES);
+  if (aliased && aliased->count > 0)
+    (void)fprintf(to, "aliased    %" PRIu64 " other places look the same\n", aliased->count);
+}
+
+void watch_print(const watch *self, wm_time_ns now_ns, FILE *to) {
+  char why[240];
+  const char *state = watch_state(self, now_ns, why, sizeof why);
+  (void)fprintf(to, "state      %s%s%s", state, why[0] ? ": " : "", why);
+  if (self->has_health && !isnan(self->health.lost_probability))
+    (void)fprintf(to, "   (lost with probability %.3g)", self->health.lost_probability);
+  (void)fputc('\n', to);
+  if (self->has_pose) print_pose(&self->pose, self->rate_hz, to);
+  if (self->innovations > 0)
+    (void)fprintf(to, "consistency %s (mean squared innovation %.2f of its variance)\n", watch_consistency(self),
+                  self->nis);
+  if (self->has_health) {
+    print_aliased(&self->health, to);
+    print_left(&self->health, to);
+    (void)fprintf(to, "deadlines  %" PRIu64 " of %" PRIu64 " missed\nsources\n", self->health.deadlines_missed,
+                  self->health.loops + self->health.deadlines_missed);
+    for (uint32_t i = 0; i < self->health.source_count; i++) print_source(&self->health.sources[i], to);
+  }
+  if (self->not_understood > 0)
+    (void)fprintf(to, "%" PRIu64 " messages are of another version of waymark\n", self->not_understood);
+}

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fusion/assembly.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static wm_time_ns ns_from_ms(double ms) { return wm_ns_from_seconds(ms * 1e-3); }
+
+static void leave_out(wm_assembly *self, const char *name, const char *why) {
+  char *line = self->unused[self->unused_count++];
+  (void)snprintf(line, sizeof self->unused[0], "%s: %s", name, why);
+}
+
+// Sources that the estimator can't use are not opened at all: they would hold the watermark back for nothing.
+static const char *reason_to_leave_out(const wm_config *config, const wm_source *source,
+                                       const wm_source_config *wanted) {
+  uint32_t takes = config->estimator->takes | WM_MOTION_EVENTS;
+  if (!wanted->use) return "`use: false` in the configuration";
+  if (!(source->kinds & takes)) return "the estimator doesn't take its data";
+  return NULL;
+}
+
+static void add_source(wm_assembly *self, wm_source *source) {
+  wm_source_config wanted;
+  int rank = 0;
+  wm_config_source(self->config, source->name, &wanted, &rank);
+  if ((size_t)rank == self->config->source_count && source->lateness_max_ms > 0)
+    wanted.lateness_max_ms = source->lateness_max_ms;
+  const char *why_not = reason_to_leave_out(self->config, source, &wanted);
+  if (why_not) {
+    leave_out(self, source->name, why_not);
+    return;
+  }
+  wm_time_ns lateness_ns = ns_from_ms(wanted.lateness_max_ms);
+  wm_time_ns horizon_ns = ns_from_ms(self->config->runtime.merge_horizon_ms);
+  wm_assembled_source *s = &self->sources[self->source_count++];
+  (void)snprintf(s->name, sizeof s->name, "%s", source->name);
+  s->source = source;
+  source->sample_at_next = (uint8_t)wanted.sample_at_next;
+  source->ready_after_ns = ns_from_ms(wanted.ready_after_ms);
+  s->kinds = source->kinds;
+  s->from_s = wanted.from_s;
+  s->until_s = wanted.until_s;
+  s->merge = (wm_merge_source){.rank = rank,
+                               .is_motion = source->is_motion,
+                               .in_order = source->in_order,
+                               .lateness_max_ns = lateness_ns < horizon_ns ? lateness_ns : horizon_ns,
+                               .period_ns = ns_from_ms(wanted.period_ms)};
+  self->kinds |= source->kinds;
+}
+
+static wm_status check_estimator(const wm_assembly *self, wm_error *err) {
+  const wm_config *config = self->config;
+  const char *why = NULL;
+  if (config->estimator->state_bytes(config->estimator_params, &self->setup, &why) == 0)
+    return wm_fail(err, WM_BAD_CONFIG, "%s: estimator '%s' can't work with '%s': %s", config->path,
+                   config->estimator->name, self->recording, why ? why : "no reason given");
+  return WM_OK;
+}
+
+// A model without its input would leave the pose where it is, and the state would not tell.
+static wm_status check_motion(const wm_assembly *self, uint32_t quantities, wm_error *err) {
+  const char *lacks = wm_motion_lacks(self->setup.motion, &self->setup.wheels, self->kinds, quantities);
+  if (!lacks) return WM_OK;
+  return wm_fail(err, WM_BAD_CONFIG,
+                 "%s: motion.model: with '%s' it needs %s; put that there, or take another model (auto takes the first "
+                 "that is possible)",
+                 self->config->path, self->recording, lacks);
+}
+
+wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err) {
+  if (self->kinds & WM_MOTION_EVENTS) return WM_OK;
+  const wm_param_table *table = &wm_motion_params_table;
+  for (size_t i = 0; i < table->count; i++) {
+    const wm_param *row = &table->params[i];
+    int32_t model;
+    if (strcmp(row->key, "model") != 0) continue;
+    memcpy(&model, (const char *)self->config->motion + row->offset, sizeof model);
+    if (model != WM_MOTION_AUTO) return WM_OK;  // check_motion() reports missing data
+    self->own_motion = malloc(table->bytes);
+    if (!self->own_motion) return wm_fail(err, WM_IO, "no memory for the parameters of the motion");
+    memcpy(self->own_motion, self->config->motion, table->bytes);
+    model = (int32_t)row->max;  // constant_velocity, the last of the choices
+    memcpy((char *)self->own_motion + row->offset, &model, sizeof model);
+    self->setup.motion = self->own_motion;
+  }
+  return WM_OK;
+}
+
+// Only who takes points on a map's edges is given one: it may be large.
+static wm_status add_map(wm_assembly *self, wm_recording *recording, wm_error *err) {
+  if (!(self->config->estimator->takes & WM_EVENT_BIT(WM_EVENT_POINTS))) return WM_OK;
+  self->map_path = wm_site_map_path(wm_recording_site(recording));
+  return wm_site_map(wm_recording_site(recording), &self->setup.map, err);
+}
+
+static wm_status add_vision(wm_assembly *self, wm_recording *recording, wm_error *err) {
+  const wm_config *config = self->config;
+  for (size_t i = 0; i < config->vision_count; i++)
+    if (!(config->vision[i].detector->gives & config->estimator->takes))
+      leave_out(self, config->vision[i].detector->name, "the estimator doesn't take its data");
+  wm_status status = wm_vision_open(config, recording, NULL, NULL, &self->vision, err);
+  for (size_t i = 0; status == WM_OK && i < wm_vision_count(self->vision); i++) {
+    if (self->source_count == WM_SOURCES_MAX)
+      return wm_fail(err, WM_FULL, "%s: more than %d sources", config->path, WM_SOURCES_MAX);
+    add_source(self, wm_vision_source(self->vision, i));
+  }
+  return status;
+}
+
+wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t seed, wm_assembly *out,
+                      wm_error *err) {
+  memset(out, 0, sizeof *out);
+  out->config = config;
+  (void)snprintf(out->recording, sizeof out->recording, "%s", wm_recording_name(recording));
+  out->calibration_text = wm_site_calibration_text(wm_recording_site(recording), &out->calibration_length);
+
+  wm_setup *setup = &out->setup;
+  setup->motion = config->motion;
+  setup->sightings = config->sightings;
+  setup->wheels = *wm_site_wheels(wm_recording_site(recording));
+  setup->sensors = wm_site_sensors(wm_recording_site(recording), &setup->sensor_count);
+  setup->landmarks = wm_site_landmarks(wm_recording_site(recording), &setup->landmark_count);
+  setup->rig = wm_site_rig(wm_recording_site(recording));
+  setup->start = config->has_initial_pose ? config->initial_pose : *wm_site_start(wm_recording_site(recording));
+  setup->seed = seed;
+
+  wm_status status = add_map(out, recording, err);
+  if (status != WM_OK) return status;
+  size_t count;
+  wm_source *const *sources = wm_recording_sources(recording, &count);
+  for (size_t i = 0; i < count && i < WM_SOURCES_MAX; i++) add_source(out, sources[i]);
+  status = add_vision(out, recording, err);
+  if (status != WM_OK) return status;
+  setup->sensors = wm_site_sensors(wm_recording_site(recording), &setup->sensor_count);  // cameras have joined
+  if (!(out->kinds & out->config->estimator->takes) && !(out->kinds & WM_MOTION_EVENTS))
+    return wm_fail(err, WM_BAD_CONFIG, "%s: no motion and no observation is there or used",
+                   wm_recording_dir(recording));
+  status = wm_assembly_choose_motion(out, err);
+  if (status != WM_OK) return status;
+  out->driving = wm_driving_choose(out->kinds, wm_recording_quantities(recording));
+  status = check_motion(out, wm_recording_quantities(recording), err);
+  return status == WM_OK ? check_estimator(out, err) : status;
+}
+
+void wm_assembly_close(wm_assembly *self) {
+  free(self->own_motion);
+  self->own_motion = NULL;
+  wm_vision_close(self->vision);
+  self->vision = NULL;
+}
+
+const char *wm_assembly_source_name(const wm_assembly *self, size_t source) {
+  return source < self->source_count ? self->sources[source].name : "?";
+}
+
+const char *wm_assembly_sensor_name(const wm_assembly *self, size_t sensor) {
+  return sensor < self->setup.sensor_count ? self->setup.sensors[sensor].name : "";
+}

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// A configuration and a recording (or the head of an event log) put together: which estimator, with what it is set up,
+// which sources in which order. Made once at start; allocates.
+#ifndef WAYMARK_FUSION_ASSEMBLY_H
+#define WAYMARK_FUSION_ASSEMBLY_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "config/config.h"
+#include "fusion/fuser.h"
+#include "fusion/merge.h"
+#include "sources/vision.h"
+#include "waymark/estimator.h"
+#include "waymark/recording.h"
+#include "waymark/source.h"
+
+// A source that is used; its place in the table is the `source` of its events.
+typedef struct wm_assembled_source {
+  char name[WM_SOURCE_NAME_MAX];
+  wm_source *source;  // NULL where only the table is known (event log)
+  uint32_t kinds;
+  wm_merge_source merge;
+  double from_s, until_s;
+} wm_assembled_source;
+
+typedef struct wm_assembly {
+  const wm_config *config;
+  wm_setup setup;
+  wm_motion_params *own_motion;  // without motion data: the configuration's with that motion.model; else NULL
+  wm_driving driving;
+  uint32_t kinds;  // of all used sources
+  wm_assembled_source sources[WM_SOURCES_MAX];
+  size_t source_count;
+  char unused[WM_SOURCES_MAX + WM_VISION_MAX][WM_SOURCE_NAME_MAX + 64];  // "NAME: why not"
+  size_t unused_count;
+  const char *calibration_text;
+  size_t calibration_length;
+  wm_vision *vision;  // sources of pictures; NULL where there are none
+  const void *kept;   // the map of the run before, which the estimator took up; NULL: none
+  size_t kept_bytes;
+  const char *map_path;              // NULL where the estimator takes no map
+  char recording[WM_NAME_MAX + 96];  // the recording's name
+} wm_assembly;
+
+// `config` and `recording` outlive the assembly. WM_BAD_CONFIG where they don't go together: no data, a source named
+// in the configuration that isn't there under any recording's name, an estimator that can't work with this setup.
+// Where it fails, too, wm_assembly_close is to be called.
+wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t seed, wm_assembly *out, wm_error *err);
+// motion.model `auto` becomes `constant_velocity` where no source gives motion. WM_BAD_CONFIG where the configuration
+// has another one.
+wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err);
+// Closes what it opened: the pictures. Before the recording is closed, and before the memory of the run.
+void wm_assembly_close(wm_assembly *self);
+
+// "can", "sightings:laser" ... by index; "?" beyond.
+const char *wm_assembly_source_name(const wm_assembly *self, size_t source);
+const char *wm_assembly_sensor_name(const wm_assembly *self, size_t sensor);
+
+#endif

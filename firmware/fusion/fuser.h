@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: Apache-2.0
+// Hands final events to the estimator and returns what came of it: the event itself (for the log), innovations, and the
+// fused pose at each stamp of the driving motion stream. It depends on nothing but the events and their order, so a
+// recording, a live run and an event log give the same poses. No clock but for measuring; no allocation. One thread.
+#ifndef WAYMARK_FUSION_FUSER_H
+#define WAYMARK_FUSION_FUSER_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "fusion/output.h"
+#include "rt/histogram.h"
+#include "rt/realtime.h"
+#include "waymark/estimator.h"
+#include "waymark/event.h"
+#include "waymark/health.h"
+#include "waymark/source.h"
+
+// Which motion events make a row of the trajectory: ticks, else yaw rate, else speed, else twists.
+typedef struct wm_driving {
+  uint32_t kinds;       // WM_EVENT_BIT
+  uint32_t quantities;  // bit per wm_quantity, where kinds has QUANTITIES
+} wm_driving;
+
+// From what the sources can give.
+wm_driving wm_driving_choose(uint32_t kinds, uint32_t quantities);
+int wm_driving_is(const wm_driving *driving, const wm_event *event);
+
+typedef struct wm_fuser_counts {
+  uint64_t fused;
+  uint64_t rejected[WM_VERDICT_COUNT];
+  uint64_t refused[WM_STATUS_COUNT];
+} wm_fuser_counts;
+
+typedef struct wm_fuser {
+  const wm_estimator *estimator;
+  void *state;
+  wm_driving driving;
+  wm_output output;
+  wm_time_ns row_ns;       // stamp whose pose is written as soon as a later event comes; WM_TIME_NONE: none
+  wm_time_ns last_row_ns;  // of the pose written last
+  wm_time_ns until_ns;     // stamp of the newest event that the estimator took
+  uint64_t events, innovations, poses;
+  wm_fuser_counts counts[WM_SOURCES_MAX];
+  wm_histogram predict_ns, correct_ns;
+  wm_time_ns particles_ns;  // when they were written last
+  wm_particle_set particles;
+  wm_hypothesis listed[2 * WM_HYPOTHESES_MAX];
+  wm_hypothesis_set hypotheses;
+} wm_fuser;
+
+// `state` is made by estimator->init already.
+void wm_fuser_init(wm_fuser *self, const wm_estimator *estimator, void *state, wm_driving driving, wm_output output);
+// The next event in the order of the merge; event->source < WM_SOURCES_MAX.
+WM_REALTIME void wm_fuser_feed(wm_fuser *self, const wm_event *event);
+// After the last event: writes the pose that waits.
+WM_REALTIME void wm_fuser_finish(wm_fuser *self);
+// What the estimator reports of itself: state, lost probability, resets, motion health, calibration states and
+// counters; at most as many as `out` has room for. The rest of `out` is left alone.
+WM_REALTIME void wm_fuser_health(const wm_fuser *self, wm_health *out);
+// Whether an estimate holds a pose at all (finite, not searching).
+WM_REALTIME int wm_estimate_has_pose(const wm_estimate *estimate);
+
+#endif

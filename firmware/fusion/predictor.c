@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fusion/predictor.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "fusion/fuser.h"
+
+void wm_predictor_init(wm_predictor *self, const wm_predictor_params *params, wm_odometry *odometry) {
+  memset(self, 0, sizeof *self);
+  self->params = *params;
+  self->odometry = odometry;
+  self->last_t_ns = WM_TIME_NONE;
+}
+
+void wm_predictor_motion(wm_predictor *self, const wm_event *event) {
+  if (wm_odometry_feed(self->odometry, event) != WM_OK) self->odometry_refused++;
+}
+
+void wm_predictor_fused(wm_predictor *self, const wm_estimate *fused, const wm_motion_calibration *calibration) {
+  self->fused = *fused;
+  self->has_fused = wm_estimate_has_pose(fused);
+  wm_odometry_calibrate(self->odometry, calibration);
+}
+
+static double wrapped(double angle_rad) { return remainder(angle_rad, 2 * M_PI); }
+
+// Where base_link would be in map now if map had not moved against odom since the last message.
+static wm_pose2 carried(const wm_pose2 *map_base, const wm_pose2 *odom_base, const wm_pose2 *odom_now) {
+  double dx = odom_now->x_m - odom_base->x_m, dy = odom_now->y_m - odom_base->y_m;
+  double turn = map_base->heading_rad - odom_base->heading_rad;
+  double c = cos(turn), s = sin(turn);
+  return (wm_pose2){.x_m = map_base->x_m + c * dx - s * dy,
+                    .y_m = map_base->y_m + s * dx + c * dy,
+                    .heading_rad = wrapped(odom_now->heading_rad + turn)};
+}
+
+// A jump is a move of map against odom between two messages, or a pose that was set anew.
+static void announce_jump(wm_predictor *self, wm_published *out, const wm_pose2 *map_now) {
+  if (self->has_published) {
+    wm_pose2 expected = carried(&self->map_base, &self->odom_base, &out->pose_odom_base);
+    double dx = map_now->x_m - expected.x_m, dy = map_now->y_m - expected.y_m;
+    double moved_m = sqrt(dx * dx + dy * dy);
+    double turned_rad = fabs(wrapped(map_now->heading_rad - expected.heading_rad));
+    if (moved_m > self->params.jump_m || turned_rad > self->params.jump_rad || out->now.resets != self->resets) {
+      self->jumps++;
+      self->last_jump_m = moved_m;
+      self->last_jump_rad = turned_rad;
+      out->status_flags |= WM_PUB_JUMPED;
+    }
+  }
+  self->has_published = 1;
+  self->resets = out->now.resets;
+  self->map_base = *map_now;
+  self->odom_base = out->pose_odom_base;
+  out->jumps = self->jumps;
+  out->last_jump_m = self->last_jump_m;
+  out->last_jump_rad = self->last_jump_rad;
+}
+
+int wm_predictor_publish(wm_predictor *self, wm_time_ns now_ns, wm_published *out) {
+  if (!self->has_fused || (self->last_t_ns != WM_TIME_NONE && now_ns <= self->last_t_ns)) return 0;
+  memset(out, 0, sizeof *out);
+  wm_odom_point odom;
+  if (wm_odometry_carry(self->odometry, &self->fused, now_ns, &out->now, &odom) != WM_OK) return 0;
+  if (!wm_estimate_has_pose(&out->now)) return 0;
+  out->fused_until_ns = self->fused.t_ns;
+  out->pose_odom_base = odom.pose_odom_base;
+  out->utc_uncertainty_ns = -1;
+  wm_time_ns newest_ns = wm_odometry_newest_ns(self->odometry);
+  if (newest_ns == WM_TIME_NONE || now_ns - newest_ns > self->params.motion_stale_ns)
+    out->status_flags |= WM_PUB_MOTION_STALE;
+  if (now_ns - self->fused.t_ns > self->params.fusion_stale_ns) out->status_flags |= WM_PUB_FUSION_STALE;
+  wm_pose2 map_now = {out->now.pose_map_base.p_m[0], out->now.pose_map_base.p_m[1], out->now.heading_rad};
+  announce_jump(self, out, &map_now);
+  self->last_t_ns = now_ns;
+  return 1;
+}
+
+int wm_predictor_expect(const wm_predictor *self, wm_time_ns now_ns, wm_estimate *out) {
+  wm_odom_point odom;
+  if (self->has_fused) return wm_odometry_carry(self->odometry, &self->fused, now_ns, out, &odom) == WM_OK;
+  if (wm_odometry_at(self->odometry, now_ns, &odom) != WM_OK) return 0;
+  memset(out, 0, sizeof *out);
+  out->t_ns = now_ns;
+  out->state = WM_STATE_SEARCHING;
+  out->lost_probability = 1.0;
+  out->v_mps[0] = odom.v_mps;
+  out->w_radps[2] = odom.w_radps;
+  return 1;
+}

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "fusion/source_reader.h"
+
+#include <math.h>
+#include <string.h>
+
+static wm_time_ns limit(wm_time_ns first_ns, double seconds, wm_time_ns none) {
+  if (!isfinite(seconds) || fabs(seconds) > 1e9) return none;
+  wm_time_ns t_ns;
+  if (__builtin_add_overflow(first_ns, wm_ns_from_seconds(seconds), &t_ns)) return none;
+  return t_ns;
+}
+
+static wm_status read_one(wm_feed *self, wm_error *err) {
+  wm_status status = self->source->ops->next(self->source, &self->next, err);
+  self->has_next = status == WM_OK;
+  self->next.source = self->index;
+  return status == WM_END || status == WM_AGAIN ? WM_OK : status;
+}
+
+static int inside(const wm_feed *self) { return self->next.t_ns >= self->from_ns && self->next.t_ns <= self->until_ns; }
+
+#define COUNTERS 7
+
+static void counters_of(wm_source_counts *counts, uint64_t *out[COUNTERS]) {
+  uint64_t *all[COUNTERS] = {&counts->lost,   &counts->malformed, &counts->not_finite, &counts->out_of_order,
+                             &counts->frozen, &counts->overflows, &counts->bus_errors};
+  memcpy(out, all, sizeof all);
+}
+
+// What is counted on the way to the next one belongs to those that are left out, too.
+static wm_status skip_outside(wm_feed *self, wm_error *err) {
+  uint64_t *now[COUNTERS], *skipped[COUNTERS], before[COUNTERS];
+  counters_of(&self->source->counts, now);
+  counters_of(&self->outside, skipped);
+  while (self->has_next && !inside(self)) {
+    self->outside.ignored++;
+    for (size_t i = 0; i < COUNTERS; i++) before[i] = *now[i];
+    wm_status status = read_one(self, err);
+    for (size_t i = 0; i < COUNTERS; i++) *skipped[i] += *now[i] - before[i];
+    if (status != WM_OK) return status;
+  }
+  return WM_OK;
+}
+
+void wm_feed_counts(const wm_feed *self, wm_source_counts *out) {
+  uint64_t *counts[COUNTERS], *skipped[COUNTERS];
+  wm_source_counts outside = self->outside;
+  *out = self->source->counts;
+  counters_of(out, counts);
+  counters_of(&outside, skipped);
+  // A frame that was missing outside of the part and came within it is none of either.
+  for (size_t i = 0; i < COUNTERS; i++) *counts[i] = *counts[i] > *skipped[i] ? *counts[i] - *skipped[i] : 0;
+  out->ignored += outside.ignored;
+}
+
+wm_status wm_feed_advance(wm_feed *self, wm_error *err) {
+  wm_status status = read_one(self, err);
+  return status == WM_OK ? skip_outside(self, err) : status;
+}
+
+wm_status wm_feeds_open(const wm_assembly *assembly, wm_feed *feeds, wm_time_ns now_ns, wm_time_ns *first_ns,
+                        wm_error *err) {
+  int recorded = 0;
+  *first_ns = INT64_MAX;
+  for (size_t i = 0; i < assembly->source_count; i++) {
+    wm_feed *feed = &feeds[i];
+    memset(feed, 0, sizeof *feed);
+    feed->source = assembly->sources[i].source;
+    feed->index = (uint16_t)i;
+    feed->source->from_ns = INT64_MIN;
+    feed->source->until_ns = INT64_MAX;
+    if (feed->source->is_live) continue;
+    recorded = 1;
+    wm_status status = read_one(feed, err);
+    if (status != WM_OK) return status;
+    if (feed->has_next && feed->next.t_ns < *first_ns) *first_ns = feed->next.t_ns;
+  }
+  if (!recorded) *first_ns = now_ns;
+  if (*first_ns == INT64_MAX)
+    return wm_fail(err, WM_BAD_DATA, "'%s' is empty: none of its %zu sources holds a datum that can be used",
+                   assembly->recording, assembly->source_count);
+  for (size_t i = 0; i < assembly->source_count; i++) {
+    feeds[i].from_ns = limit(*first_ns, assembly->sources[i].from_s, INT64_MIN);
+    feeds[i].until_ns = limit(*first_ns, assembly->sources[i].until_s, INT64_MAX);
+    feeds[i].source->from_ns = feeds[i].from_ns;
+    feeds[i].source->until_ns = feeds[i].until_ns;
+    wm_status status = skip_outside(&feeds[i], err);
+    if (status != WM_OK) return status;
+  }
+  return WM_OK;
+}
+
+wm_feed *wm_feeds_earliest(wm_feed *feeds, size_t count) {
+  wm_feed *earliest = NULL;
+  for (size_t i = 0; i < count; i++)
+    if (feeds[i].has_next && (!earliest || feeds[i].next.arrival_ns < earliest->next.arrival_ns)) earliest = &feeds[i];
+  return earliest;
+}
+
+void wm_feeds_health(const wm_feed *feeds, size_t count, wm_health *health) {
+  for (size_t i = 0; i < count && i < health->source_count; i++) {
+    wm_source_counts counts;
+    wm_feed_counts(&feeds[i], &counts);
+    wm_source_health *out = &health->sources[i];
+    out->lost = counts.lost;
+    out->malformed = counts.malformed;
+    out->not_finite = counts.not_finite;
+    out->out_of_order = counts.out_of_order;
+    out->ignored = counts.ignored;
+    out->frozen = counts.frozen;
+    out->overflows = counts.overflows;
+    out->bus_errors = counts.bus_errors;
+    out->device = counts.device;
+    out->stamp_uncertainty_ns = counts.stamp_uncertainty_ns;
+    memcpy(out->looks, counts.looks, sizeof out->looks);
+  }
+}

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "live/lcm_commands.h"
+
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "live/lcm_subscriber.h"
+#include "rt/clock.h"
+#include "waymark/lcm_messages.h"
+
+#define WAITING_MAX 16
+#define LATENESS_MS 20  // from a message's arrival until it is in the merge
+
+typedef struct lcm_commands {
+  wm_source base;
+  lcm_ear ear;
+  wm_event waiting[WAITING_MAX];
+  size_t waiting_count;
+  uint32_t seq;
+} lcm_commands;
+
+static void take(lcm_commands *self, const char *channel, const char *why, wm_event *event) {
+  if (why) {
+    lcm_ear_refuse(&self->base.counts, channel, why);
+    return;
+  }
+  if (self->waiting_count == WAITING_MAX) {
+    self->base.counts.overflows++;
+    return;
+  }
+  event->arrival_ns = wm_monotonic_ns();
+  if (event->t_ns == 0) event->t_ns = event->arrival_ns;
+  memcpy(&self->waiting[self->waiting_count++], event, WM_EVENT_SMALL_BYTES);
+}
+
+static void on_set_pose(const lcm_recv_buf_t *message, const char *channel, void *context) {
+  wm_event event;
+  take(context, channel, wm_lcm_read_set_pose(message->data, message->data_size, &event), &event);
+}
+
+static void on_reset(const lcm_recv_buf_t *message, const char *channel, void *context) {
+  wm_event event;
+  take(context, channel, wm_lcm_read_reset(message->data, message->data_size, &event), &event);
+}
+
+static lcm_commands *commands_of(lcm_ear *ear) {
+  return (lcm_commands *)(void *)((char *)ear - offsetof(lcm_commands, ear));
+}
+
+static void subscribe(lcm_ear *ear) {
+  lcm_ear_subscribe(ear, "SET_POSE", on_set_pose, commands_of(ear));
+  lcm_ear_subscribe(ear, "RESET", on_reset, commands_of(ear));
+}
+
+static wm_status next_command(wm_source *base, wm_event *out, wm_error *err) {
+  (void)err;
+  lcm_commands *self = (lcm_commands *)base;
+  if (self->waiting_count == 0) lcm_ear_wait(&self->ear, &base->counts);
+  if (self->waiting_count == 0) return WM_AGAIN;
+  memcpy(out, &self->waiting[0], WM_EVENT_SMALL_BYTES);
+  memmove(&self->waiting[0], &self->waiting[1], --self->waiting_count * sizeof self->waiting[0]);
+  out->seq = self->seq++;
+  out->source = base->index;
+  base->counts.received++;
+  return WM_OK;
+}
+
+static void close_commands(wm_source *base) {
+  lcm_commands *self = (lcm_commands *)base;
+  lcm_ear_close(&self->ear);
+  free(self);
+}
+
+static const wm_source_ops kCommands = {next_command, close_commands};
+
+wm_status lcm_commands_open(const char *url, const char *channel_prefix, lcm_t *lent, wm_source **out, wm_error *err) {
+  *out = NULL;
+  lcm_commands *self = calloc(1, sizeof *self);
+  if (!self) return wm_fail(err, WM_IO, "no memory to listen to LCM");
+  self->base.ops = &kCommands;
+  self->base.is_live = self->base.is_rare = 1;
+  self->base.lateness_max_ms = LATENESS_MS;
+  self->base.kinds = WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET);
+  (void)snprintf(self->base.name, sizeof self->base.name, "commands");
+  lcm_ear_open(&self->ear, url, channel_prefix, lent, subscribe);
+  *out = &self->base;
+  return WM_OK;
+}

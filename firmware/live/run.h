@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+// A live run with real threads: a thread a source, the estimator's real-time thread, one that publishes, one for the
+// disk. Its sources are devices, or a recording's, played at real speed on the monotonic clock. The threads, their
+// priorities, stacks and rings stand in one table, firmware/live/threads.c; docs/runtime.md draws it.
+#ifndef WAYMARK_LIVE_RUN_H
+#define WAYMARK_LIVE_RUN_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+
+#include "config/config.h"
+#include "output/run_findings.h"
+#include "replay/replay.h"
+#include "waymark/recording.h"
+#include "waymark/status.h"
+
+typedef struct wm_run_options {
+  const char *out_dir;  // NULL: nothing is written
+  double out_max_mb;    // of the folder's tables and log, which rotate; 0: no limit
+  uint64_t seed;
+  double duration_s;  // 0: to the recording's end; on devices until *stop
+  double speed;       // 1: real speed; on devices it has to be 1
+  // Set it to 1 (from a signal handler or another thread) and the run ends in order. May be NULL.
+  atomic_int *stop;
+  // Set it to 1 and `reload` is asked whether there is another configuration to go on with: WM_OK ends the run so that
+  // the caller can begin anew from report->last (report->wants_restart); an error is said, and the run goes on. On
+  // devices only. May be NULL.
+  atomic_int *reload_asked;
+  wm_status (*reload)(void *context, wm_error *err);
+  void *reload_context;
+  const wm_start *start;  // NULL: the saved pose, or the configuration's
+  // What a person or a log should know while it runs, a line each; from any of the run's normal threads.
+  wm_finding_fn say;
+  void *say_context;
+} wm_run_options;
+
+typedef struct wm_live_report {
+  wm_run_report run;
+  uint64_t deadlines_missed, deadlines_total;
+  wm_time_ns wake_p99_ns, wake_max_ns;  // how late the estimator's thread woke
+  wm_time_ns loop_p99_ns, loop_max_ns;  // how long a cycle took
+  wm_time_ns age_p99_ns;                // made minus t_ns of the poses
+  wm_time_ns send_p99_ns, send_max_ns;  // from a pose made to its message handed to LCM
+  int is_realtime, memory_locked;
+  int wants_restart;
+  int has_last;      // a pose was published
+  wm_estimate last;  // the last one
+} wm_live_report;
+
+// Returns when the recording is over, the duration is reached or *stop is set, and all is written. The calling thread
+// waits; signals are its own business.
+wm_status wm_run_live(const wm_config *config, wm_recording *recording, const wm_run_options *options,
+                      wm_live_report *report, wm_error *err);
+
+#endif

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// CRC-32 as in IEEE 802.3 (polynomial 0xEDB88320, reflected).
+#ifndef WAYMARK_OUTPUT_CRC32_H
+#define WAYMARK_OUTPUT_CRC32_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+// Go on with the sum of what came before; begin with 0.
+uint32_t crc32_of(uint32_t crc, const void *bytes, size_t count);
+
+#endif

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a run writes at its end: health.json, timing.json, map-estimate.csv.
+#ifndef WAYMARK_OUTPUT_JSON_FILES_H
+#define WAYMARK_OUTPUT_JSON_FILES_H
+
+#include "output/run_folder.h"
+
+wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, const wm_health *health, wm_error *err);
+wm_status wm_write_map(const char *dir, const wm_estimator *estimator, const void *state, wm_error *err);
+wm_status wm_write_timing_json(const char *dir, const wm_timing *timing, wm_error *err);
+
+#endif

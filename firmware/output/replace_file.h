@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// A file that is replaced as a whole: at every moment there is the old one or the new one, also after a power cut.
+#ifndef WAYMARK_OUTPUT_REPLACE_FILE_H
+#define WAYMARK_OUTPUT_REPLACE_FILE_H
+
+#include <stddef.h>
+
+#include "waymark/status.h"
+
+typedef struct file_part {
+  const void *bytes;
+  size_t count;
+} file_part;
+
+// Writes the parts into `path`.new, which must not be a link, to the disk, and renames it. Some ms, on a memory card up
+// to seconds: not for the real-time thread. WM_IO with the reason; the old file is then as it was.
+wm_status replace_file(const char *path, const file_part *parts, size_t count, wm_error *err);
+
+#endif

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Counts what became of each known landmark, over all pictures of one camera.
+#ifndef WAYMARK_SOURCES_SEARCH_OUTCOMES_H
+#define WAYMARK_SOURCES_SEARCH_OUTCOMES_H
+
+#include "sources/vision.h"
+#include "waymark/detector.h"
+
+typedef struct looks {
+  size_t capacity;  // appearances that the detector may know
+  size_t entries;   // those that it does know; known from the first picture on
+  wm_looked_for *newest;
+  uint32_t *row_of;  // of each entry: a landmark may have several appearances
+  uint8_t *best;     // of each row in the newest picture
+  wm_landmark_looks *rows;
+  size_t count;
+} looks;
+
+// Room for so many appearances, from malloc. 0 where there is no memory.
+int looks_open(looks *self, size_t appearances);
+void looks_close(looks *self);
+// Counts the detector's last picture, each landmark once, into the rows and into `sum`. No allocation.
+void looks_take(looks *self, const wm_detector *detector, const void *state, uint64_t sum[WM_LOOK_COUNT]);
+
+#endif

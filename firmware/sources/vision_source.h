@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// One detector on one camera, or on a pair: a source of events.
+#ifndef WAYMARK_SOURCES_VISION_SOURCE_H
+#define WAYMARK_SOURCES_VISION_SOURCE_H
+
+#include <pthread.h>
+
+#include "sources/newest_pose.h"
+#include "sources/search_outcomes.h"
+#include "sources/vision.h"
+#include "waymark/detector.h"
+#include "waymark/frame_source.h"
+
+#define PICTURES_MAX 2
+#define PAIR_TOLERANCE_NS (2 * WM_NS_PER_MS)  // pictures of a pair are triggered together
+#define AHEAD_EVENTS 8
+
+typedef struct vision_source vision_source;
+
+// Events that a thread made ahead of who asks for them.
+typedef struct vision_ahead {
+  pthread_t thread;
+  pthread_mutex_t lock;
+  pthread_cond_t changed;
+  int started, stop, ended;
+  size_t first, count;
+  wm_event *events;  // AHEAD_EVENTS
+  wm_status status;  // at the end
+  wm_error error;
+  wm_source_counts counts;  // as they were with the newest event
+} vision_ahead;
+
+struct vision_source {
+  wm_source base;
+  const wm_detector *detector;
+  const void *params;
+  wm_view view;
+  int32_t cameras[PICTURES_MAX];
+  wm_frame_source *pictures[PICTURES_MAX];  // of each camera; those of a pair are taken at the same instant
+  uint16_t sensor;                          // of WM_EVENT_LOOKED
+  int gives_looked;
+  size_t state_bytes, capacity;
+  void *state, *events_memory;
+  wm_event *events;  // of the newest picture: `capacity`, then those made ahead
+  size_t event_count, next_event;
+  wm_time_ns newest_ns;
+  uint32_t seq;
+  wm_source_counts counts;      // the working thread's own
+  uint64_t went_back, refused;  // pictures that are older than the one before; that the detector didn't take
+  wm_histogram decode_ns, detect_ns;
+  looks looks;
+  wm_seen *only;  // the only pictures to be looked at, rising; NULL: all
+  size_t only_count;
+  wm_time_ns only_tolerance_ns;
+  newest_pose *newest;       // NULL: nothing guides the detector
+  wm_time_ns busy_until_ns;  // recorded: until its detector would have been done
+  int announced;             // guided and recorded: the next picture's arrival was told
+  vision_ahead ahead;
+};
+
+// The next event, by the thread that calls.
+wm_status vision_next(vision_source *self, wm_event *out, wm_error *err);
+// Passes over pictures that are no longer the newest at `now_ns`.
+void vision_skip_to(vision_source *self, wm_time_ns now_ns);
+
+// Takes `seen` (rising, from malloc) over.
+void vision_look_only_at(vision_source *self, wm_seen *seen, size_t count);
+
+wm_status vision_ahead_start(vision_source *self, wm_error *err);
+void vision_ahead_stop(vision_source *self);
+wm_status vision_ahead_next(vision_source *self, wm_event *out, wm_error *err);
+
+#endif
