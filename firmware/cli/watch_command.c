@@ -114,11 +114,11 @@ int command_watch(int argc, char *const *argv) {
     (void)wm_fail(&err, WM_BAD_USAGE, "--web: a port from 1 to 65535 is needed");
     return complain(&err);
   }
-  lcm_t *lcm = lcm_way_open(lcm_way_url(url), &why);
+  lcm_t *lcm = lcm_connect(lcm_connect_url(url), &why);
   if (!lcm) {
     (void)wm_fail(&err, WM_IO,
                   "LCM: no way in on %s: %s (`ip route add 224.0.0.0/4 dev lo` makes a route on this computer)",
-                  lcm_way_url(url), why);
+                  lcm_connect_url(url), why);
     return complain(&err);
   }
   (void)snprintf(channel, sizeof channel, "%.80sPOSE", prefix);

@@ -11,14 +11,16 @@ static wm_time_ns limit(wm_time_ns first_ns, double seconds, wm_time_ns none) {
   return t_ns;
 }
 
-static wm_status read_one(wm_feed *self, wm_error *err) {
+static wm_status read_one(wm_source_reader *self, wm_error *err) {
   wm_status status = self->source->ops->next(self->source, &self->next, err);
   self->has_next = status == WM_OK;
   self->next.source = self->index;
   return status == WM_END || status == WM_AGAIN ? WM_OK : status;
 }
 
-static int inside(const wm_feed *self) { return self->next.t_ns >= self->from_ns && self->next.t_ns <= self->until_ns; }
+static int inside(const wm_source_reader *self) {
+  return self->next.t_ns >= self->from_ns && self->next.t_ns <= self->until_ns;
+}
 
 #define COUNTERS 7
 
@@ -29,7 +31,7 @@ static void counters_of(wm_source_counts *counts, uint64_t *out[COUNTERS]) {
 }
 
 // What is counted on the way to the next one belongs to those that are left out, too.
-static wm_status skip_outside(wm_feed *self, wm_error *err) {
+static wm_status skip_outside(wm_source_reader *self, wm_error *err) {
   uint64_t *now[COUNTERS], *skipped[COUNTERS], before[COUNTERS];
   counters_of(&self->source->counts, now);
   counters_of(&self->outside, skipped);
@@ -43,7 +45,7 @@ static wm_status skip_outside(wm_feed *self, wm_error *err) {
   return WM_OK;
 }
 
-void wm_feed_counts(const wm_feed *self, wm_source_counts *out) {
+void wm_source_reader_counts(const wm_source_reader *self, wm_source_counts *out) {
   uint64_t *counts[COUNTERS], *skipped[COUNTERS];
   wm_source_counts outside = self->outside;
   *out = self->source->counts;
@@ -54,54 +56,55 @@ void wm_feed_counts(const wm_feed *self, wm_source_counts *out) {
   out->ignored += outside.ignored;
 }
 
-wm_status wm_feed_advance(wm_feed *self, wm_error *err) {
+wm_status wm_source_reader_advance(wm_source_reader *self, wm_error *err) {
   wm_status status = read_one(self, err);
   return status == WM_OK ? skip_outside(self, err) : status;
 }
 
-wm_status wm_feeds_open(const wm_assembly *assembly, wm_feed *feeds, wm_time_ns now_ns, wm_time_ns *first_ns,
-                        wm_error *err) {
+wm_status wm_source_readers_open(const wm_assembly *assembly, wm_source_reader *readers, wm_time_ns now_ns,
+                                 wm_time_ns *first_ns, wm_error *err) {
   int recorded = 0;
   *first_ns = INT64_MAX;
   for (size_t i = 0; i < assembly->source_count; i++) {
-    wm_feed *feed = &feeds[i];
-    memset(feed, 0, sizeof *feed);
-    feed->source = assembly->sources[i].source;
-    feed->index = (uint16_t)i;
-    feed->source->from_ns = INT64_MIN;
-    feed->source->until_ns = INT64_MAX;
-    if (feed->source->is_live) continue;
+    wm_source_reader *reader = &readers[i];
+    memset(reader, 0, sizeof *reader);
+    reader->source = assembly->sources[i].source;
+    reader->index = (uint16_t)i;
+    reader->source->from_ns = INT64_MIN;
+    reader->source->until_ns = INT64_MAX;
+    if (reader->source->is_live) continue;
     recorded = 1;
-    wm_status status = read_one(feed, err);
+    wm_status status = read_one(reader, err);
     if (status != WM_OK) return status;
-    if (feed->has_next && feed->next.t_ns < *first_ns) *first_ns = feed->next.t_ns;
+    if (reader->has_next && reader->next.t_ns < *first_ns) *first_ns = reader->next.t_ns;
   }
   if (!recorded) *first_ns = now_ns;
   if (*first_ns == INT64_MAX)
     return wm_fail(err, WM_BAD_DATA, "'%s' is empty: none of its %zu sources holds a datum that can be used",
                    assembly->recording, assembly->source_count);
   for (size_t i = 0; i < assembly->source_count; i++) {
-    feeds[i].from_ns = limit(*first_ns, assembly->sources[i].from_s, INT64_MIN);
-    feeds[i].until_ns = limit(*first_ns, assembly->sources[i].until_s, INT64_MAX);
-    feeds[i].source->from_ns = feeds[i].from_ns;
-    feeds[i].source->until_ns = feeds[i].until_ns;
-    wm_status status = skip_outside(&feeds[i], err);
+    readers[i].from_ns = limit(*first_ns, assembly->sources[i].from_s, INT64_MIN);
+    readers[i].until_ns = limit(*first_ns, assembly->sources[i].until_s, INT64_MAX);
+    readers[i].source->from_ns = readers[i].from_ns;
+    readers[i].source->until_ns = readers[i].until_ns;
+    wm_status status = skip_outside(&readers[i], err);
     if (status != WM_OK) return status;
   }
   return WM_OK;
 }
 
-wm_feed *wm_feeds_earliest(wm_feed *feeds, size_t count) {
-  wm_feed *earliest = NULL;
+wm_source_reader *wm_source_readers_earliest(wm_source_reader *readers, size_t count) {
+  wm_source_reader *earliest = NULL;
   for (size_t i = 0; i < count; i++)
-    if (feeds[i].has_next && (!earliest || feeds[i].next.arrival_ns < earliest->next.arrival_ns)) earliest = &feeds[i];
+    if (readers[i].has_next && (!earliest || readers[i].next.arrival_ns < earliest->next.arrival_ns))
+      earliest = &readers[i];
   return earliest;
 }
 
-void wm_feeds_health(const wm_feed *feeds, size_t count, wm_health *health) {
+void wm_source_readers_health(const wm_source_reader *readers, size_t count, wm_health *health) {
   for (size_t i = 0; i < count && i < health->source_count; i++) {
     wm_source_counts counts;
-    wm_feed_counts(&feeds[i], &counts);
+    wm_source_reader_counts(&readers[i], &counts);
     wm_source_health *out = &health->sources[i];
     out->lost = counts.lost;
     out->malformed = counts.malformed;

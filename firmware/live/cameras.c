@@ -35,7 +35,7 @@ struct cameras {
 
 static void *take_pictures(void *argument) {
   camera *self = argument;
-  wm_touch_stack(THREAD_TOUCHED_BYTES);
+  wm_prefault_stack(THREAD_TOUCHED_BYTES);
   while (!atomic_load_explicit(&self->all->stop, memory_order_relaxed)) {
     wm_status status = frame_hub_take(self->hub, NULL);
     if (status != WM_OK && status != WM_AGAIN) sleep_until(wm_monotonic_ns() + AFTER_ERROR_NS);

@@ -125,7 +125,7 @@ static void do_what_is_due(live *run, wm_time_ns now_ns) {
 
 void *disk_thread(void *argument) {
   live *run = argument;
-  wm_touch_stack(THREAD_TOUCHED_BYTES);
+  wm_prefault_stack(THREAD_TOUCHED_BYTES);
   for (int last = 0; !last;) {
     sleep_until(wm_monotonic_ns() + kThreads[THREAD_DISK].period_ns);
     last = atomic_load_explicit(&run->publish.done, memory_order_acquire);  // which ends after the estimator

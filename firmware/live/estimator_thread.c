@@ -149,7 +149,7 @@ static void loop(live *run) {
 void *estimator_thread(void *argument) {
   live *run = argument;
   live_estimator *self = &run->estimator;
-  wm_touch_stack(THREAD_TOUCHED_BYTES);
+  wm_prefault_stack(THREAD_TOUCHED_BYTES);
   int64_t allocations = wm_allocations_of_this_thread(), page_faults = wm_page_faults_of_this_thread();
   loop(run);
   self->page_faults = wm_page_faults_of_this_thread() - page_faults;

@@ -15,7 +15,7 @@
 
 typedef struct lcm_commands {
   wm_source base;
-  lcm_ear ear;
+  lcm_subscriber subscriber;
   wm_event waiting[WAITING_MAX];
   size_t waiting_count;
   uint32_t seq;
@@ -23,7 +23,7 @@ typedef struct lcm_commands {
 
 static void take(lcm_commands *self, const char *channel, const char *why, wm_event *event) {
   if (why) {
-    lcm_ear_refuse(&self->base.counts, channel, why);
+    lcm_subscriber_refuse(&self->base.counts, channel, why);
     return;
   }
   if (self->waiting_count == WAITING_MAX) {
@@ -45,19 +45,19 @@ static void on_reset(const lcm_recv_buf_t *message, const char *channel, void *c
   take(context, channel, wm_lcm_read_reset(message->data, message->data_size, &event), &event);
 }
 
-static lcm_commands *commands_of(lcm_ear *ear) {
-  return (lcm_commands *)(void *)((char *)ear - offsetof(lcm_commands, ear));
+static lcm_commands *commands_of(lcm_subscriber *subscriber) {
+  return (lcm_commands *)(void *)((char *)subscriber - offsetof(lcm_commands, subscriber));
 }
 
-static void subscribe(lcm_ear *ear) {
-  lcm_ear_subscribe(ear, "SET_POSE", on_set_pose, commands_of(ear));
-  lcm_ear_subscribe(ear, "RESET", on_reset, commands_of(ear));
+static void subscribe(lcm_subscriber *subscriber) {
+  lcm_subscriber_add(subscriber, "SET_POSE", on_set_pose, commands_of(subscriber));
+  lcm_subscriber_add(subscriber, "RESET", on_reset, commands_of(subscriber));
 }
 
 static wm_status next_command(wm_source *base, wm_event *out, wm_error *err) {
   (void)err;
   lcm_commands *self = (lcm_commands *)base;
-  if (self->waiting_count == 0) lcm_ear_wait(&self->ear, &base->counts);
+  if (self->waiting_count == 0) lcm_subscriber_wait(&self->subscriber, &base->counts);
   if (self->waiting_count == 0) return WM_AGAIN;
   memcpy(out, &self->waiting[0], WM_EVENT_SMALL_BYTES);
   memmove(&self->waiting[0], &self->waiting[1], --self->waiting_count * sizeof self->waiting[0]);
@@ -69,7 +69,7 @@ static wm_status next_command(wm_source *base, wm_event *out, wm_error *err) {
 
 static void close_commands(wm_source *base) {
   lcm_commands *self = (lcm_commands *)base;
-  lcm_ear_close(&self->ear);
+  lcm_subscriber_close(&self->subscriber);
   free(self);
 }
 
@@ -84,7 +84,7 @@ wm_status lcm_commands_open(const char *url, const char *channel_prefix, lcm_t *
   self->base.lateness_max_ms = LATENESS_MS;
   self->base.kinds = WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET);
   (void)snprintf(self->base.name, sizeof self->base.name, "commands");
-  lcm_ear_open(&self->ear, url, channel_prefix, lent, subscribe);
+  lcm_subscriber_open(&self->subscriber, url, channel_prefix, lent, subscribe);
   *out = &self->base;
   return WM_OK;
 }

@@ -11,7 +11,7 @@
 
 #define DEFAULT_URL "udpm://239.255.76.67:7667?ttl=0"
 
-const char *lcm_way_url(const char *configured) {
+const char *lcm_connect_url(const char *configured) {
   const char *from_environment = getenv("LCM_DEFAULT_URL");
   if (configured[0]) return configured;
   return from_environment && from_environment[0] ? from_environment : DEFAULT_URL;
@@ -31,7 +31,7 @@ static int no_route(const char *url) {
   return reason;
 }
 
-lcm_t *lcm_way_open(const char *url, const char **why) {
+lcm_t *lcm_connect(const char *url, const char **why) {
   int reason = no_route(url);
   *why = reason ? strerror(reason) : "see LCM's message above";
   return reason ? NULL : lcm_create(url);

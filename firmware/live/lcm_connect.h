@@ -10,9 +10,9 @@
 #define LCM_TRY_AGAIN_NS (2 * WM_NS_PER_S)
 
 // The configuration's URL where it isn't "", else LCM_DEFAULT_URL's, else one that stays on this computer (ttl=0).
-const char *lcm_way_url(const char *configured);
+const char *lcm_connect_url(const char *configured);
 // NULL where there is none; *why is a text that stays. liblcm prints a page of help on standard error where it finds no
 // route; so the kernel is asked first.
-lcm_t *lcm_way_open(const char *url, const char **why);
+lcm_t *lcm_connect(const char *url, const char **why);
 
 #endif

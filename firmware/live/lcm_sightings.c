@@ -12,7 +12,7 @@
 
 typedef struct lcm_sightings {
   wm_source base;
-  lcm_ear ear;
+  lcm_subscriber subscriber;
   const wm_sensor *sensors;
   size_t sensor_count;
   wm_time_ns t_ns, arrival_ns;  // of the message that is being handed out
@@ -29,7 +29,7 @@ static void on_sightings(const lcm_recv_buf_t *message, const char *channel, voi
       wm_lcm_read_sightings(message->data, message->data_size, name, &self->t_ns, self->said, &self->said_count);
   if (why) {
     self->said_count = 0;
-    lcm_ear_refuse(&self->base.counts, channel, why);
+    lcm_subscriber_refuse(&self->base.counts, channel, why);
     return;
   }
   uint16_t sensor = 0;
@@ -37,21 +37,21 @@ static void on_sightings(const lcm_recv_buf_t *message, const char *channel, voi
   if (sensor == self->sensor_count) {
     (void)snprintf(text, sizeof text, "'%.40s' is no sensor of calibration.yaml", name);
     self->said_count = 0;
-    lcm_ear_refuse(&self->base.counts, channel, text);
+    lcm_subscriber_refuse(&self->base.counts, channel, text);
     return;
   }
   for (size_t i = 0; i < self->said_count; i++) self->said[i].sensor = sensor;
   self->arrival_ns = wm_monotonic_ns();
 }
 
-static void subscribe(lcm_ear *ear) {
-  lcm_ear_subscribe(ear, "SIGHTINGS", on_sightings, (char *)ear - offsetof(lcm_sightings, ear));
+static void subscribe(lcm_subscriber *subscriber) {
+  lcm_subscriber_add(subscriber, "SIGHTINGS", on_sightings, (char *)subscriber - offsetof(lcm_sightings, subscriber));
 }
 
 static wm_status next_sighting(wm_source *base, wm_event *out, wm_error *err) {
   (void)err;
   lcm_sightings *self = (lcm_sightings *)base;
-  if (self->next == self->said_count) lcm_ear_wait(&self->ear, &base->counts);
+  if (self->next == self->said_count) lcm_subscriber_wait(&self->subscriber, &base->counts);
   if (self->next == self->said_count) return WM_AGAIN;
   memset(out, 0, WM_EVENT_SMALL_BYTES);
   out->kind = WM_EVENT_SIGHTING;
@@ -66,7 +66,7 @@ static wm_status next_sighting(wm_source *base, wm_event *out, wm_error *err) {
 
 static void close_sightings(wm_source *base) {
   lcm_sightings *self = (lcm_sightings *)base;
-  lcm_ear_close(&self->ear);
+  lcm_subscriber_close(&self->subscriber);
   free(self);
 }
 
@@ -83,7 +83,7 @@ wm_status lcm_sightings_open(const char *url, const char *channel_prefix, const 
   (void)snprintf(self->base.name, sizeof self->base.name, "sightings");
   self->sensors = sensors;
   self->sensor_count = sensor_count;
-  lcm_ear_open(&self->ear, url, channel_prefix, lent, subscribe);
+  lcm_subscriber_open(&self->subscriber, url, channel_prefix, lent, subscribe);
   *out = &self->base;
   return WM_OK;
 }

@@ -23,7 +23,7 @@ static void say_once(lcm_sink *self, const char *what, const char *why) {
 
 static void try_open(lcm_sink *self) {
   const char *why;
-  self->lcm = lcm_way_open(self->url, &why);
+  self->lcm = lcm_connect(self->url, &why);
   if (!self->lcm) {
     say_once(self, "no way out", why);
     return;
@@ -37,7 +37,7 @@ static void try_open(lcm_sink *self) {
 void lcm_sink_open(lcm_sink *self, int is_on, const char *url, const char *prefix, const wm_assembly *assembly,
                    wm_finding_fn say, void *say_context, lcm_t *lent) {
   memset(self, 0, sizeof *self);
-  (void)snprintf(self->url, sizeof self->url, "%s", lcm_way_url(url));
+  (void)snprintf(self->url, sizeof self->url, "%s", lcm_connect_url(url));
   (void)snprintf(self->prefix, sizeof self->prefix, "%s", prefix);
   self->is_on = is_on;
   self->assembly = assembly;

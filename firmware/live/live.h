@@ -26,7 +26,7 @@ typedef struct live live;
 // A source's thread and its ring to the estimator's thread.
 typedef struct live_source {
   live *run;
-  wm_feed *feed;  // the thread's own while it runs
+  wm_source_reader *reader;  // the thread's own while it runs
   wm_ring ring;
   void *ring_memory;
   atomic_int done;
@@ -103,7 +103,7 @@ struct live {
   wm_assembly assembly;
   wm_arena arena;
   run_clock clock;
-  wm_feed *feeds;
+  wm_source_reader *readers;
   live_source sources[WM_SOURCES_MAX];
   live_estimator estimator;
   live_publish publish;

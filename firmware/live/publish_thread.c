@@ -143,7 +143,7 @@ static void take_healths(live *run) {
 void *publish_thread(void *argument) {
   live *run = argument;
   live_publish *self = &run->publish;
-  wm_touch_stack(THREAD_TOUCHED_BYTES);
+  wm_prefault_stack(THREAD_TOUCHED_BYTES);
   for (int last = 0; !last;) {
     sleep_until(wm_monotonic_ns() + kThreads[THREAD_PUBLISH].period_ns);
     last = atomic_load_explicit(&run->estimator.done, memory_order_acquire);  // before the rings are emptied

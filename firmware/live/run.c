@@ -51,7 +51,8 @@ static size_t list_needs(live *self, wm_arena_need needs[NEEDS_MAX]) {
   live_estimator *e = &self->estimator;
   size_t n = WM_PIPELINE_NEEDS, slots = (size_t)self->config->runtime.realtime_ring_events;
   wm_pipeline_needs(&e->pipeline, &self->assembly, needs);
-  needs[n++] = (wm_arena_need){"feeds", self->assembly.source_count * sizeof(wm_feed), (void **)&self->feeds};
+  needs[n++] =
+      (wm_arena_need){"readers", self->assembly.source_count * sizeof(wm_source_reader), (void **)&self->readers};
   needs[n++] = (wm_arena_need){"disk ring", wm_ring_bytes(disk_slots(self), record_bytes(self)), &e->to_disk_memory};
   needs[n++] =
       (wm_arena_need){"publish ring", wm_ring_bytes(PUBLISH_RING_SLOTS, PUBLISH_RECORD_BYTES), &e->to_publish_memory};
@@ -188,7 +189,8 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   if (status == WM_OK) wm_pipeline_take_kept(&self->estimator.pipeline, self->map.image, self->map.bytes);
   wm_time_ns first_ns;
   if (status == WM_OK) status = wm_vision_start(self->assembly.vision, err);
-  if (status == WM_OK) status = wm_feeds_open(&self->assembly, self->feeds, wm_monotonic_ns(), &first_ns, err);
+  if (status == WM_OK)
+    status = wm_source_readers_open(&self->assembly, self->readers, wm_monotonic_ns(), &first_ns, err);
   if (status == WM_OK && self->options->out_dir)
     status = wm_run_folder_open(self->options->out_dir, &self->assembly, &self->disk.folder, err);
   if (status != WM_OK) return status;
@@ -199,7 +201,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   self->estimator.publish_ns = wm_ns_from_seconds(1.0 / params->publish_rate_hz);
   for (size_t i = 0; i < self->assembly.source_count; i++) {
     self->sources[i].run = self;
-    self->sources[i].feed = &self->feeds[i];
+    self->sources[i].reader = &self->readers[i];
   }
   lcm_sink_open(&self->publish.lcm, params->publish_lcm, self->config->lcm_url, self->config->channel_prefix,
                 &self->assembly, live_say_later, self, NULL);
@@ -215,7 +217,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
 }
 
 static void start_clock(live *self) {
-  const wm_feed *first = wm_feeds_earliest(self->feeds, self->assembly.source_count);
+  const wm_source_reader *first = wm_source_readers_earliest(self->readers, self->assembly.source_count);
   wm_time_ns begin_ns = wm_monotonic_ns() + BEFORE_FIRST_NS;
   self->clock = (run_clock){begin_ns, first ? first->next.arrival_ns : begin_ns, self->options->speed};
   self->estimator.next_publish_ns = self->clock.run_ns;
@@ -243,7 +245,7 @@ static void steady_memory(live *self, wm_live_report *report) {
                "memory could not be locked (it needs CAP_IPC_LOCK or a larger `ulimit -l`): page faults are "
                "possible when memory is short");
   }
-  wm_touch_program();
+  wm_prefault_program();
 }
 
 typedef struct thread_list {
@@ -282,7 +284,7 @@ static wm_status start_threads(live *self, thread_list *threads, wm_live_report 
 static int recording_is_over(live *self) {
   int recorded = 0;
   for (size_t i = 0; i < self->assembly.source_count; i++) {
-    if (self->feeds[i].source->is_live) continue;
+    if (self->readers[i].source->is_live) continue;
     recorded = 1;
     if (!atomic_load_explicit(&self->sources[i].done, memory_order_acquire)) return 0;
   }
@@ -339,7 +341,7 @@ static void fill_report(live *self, wm_live_report *report) {
   wm_run_report *run = &report->run;
   wm_time_ns end_ns = run_now(&self->clock);
   wm_pipeline_health(&e->pipeline, end_ns, &run->health);
-  wm_feeds_health(self->feeds, self->assembly.source_count, &run->health);
+  wm_source_readers_health(self->readers, self->assembly.source_count, &run->health);
   for (size_t i = 0; i < self->assembly.source_count; i++) {
     uint64_t no_room = wm_ring_dropped(&self->sources[i].ring);
     run->health.sources[i].received += no_room;

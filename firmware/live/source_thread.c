@@ -19,7 +19,7 @@ static int wait_until(const live *run, wm_time_ns monotonic_ns) {
 }
 
 static void put(live_source *self) {
-  const wm_event *event = &self->feed->next;
+  const wm_event *event = &self->reader->next;
   void *slot = wm_ring_reserve(&self->ring, wm_event_bytes(event));
   if (!slot) return;  // counted by the ring
   memcpy(slot, event, wm_event_bytes(event));
@@ -28,7 +28,7 @@ static void put(live_source *self) {
 
 static void share_counts(live_source *self) {
   wm_source_counts counts;
-  wm_feed_counts(self->feed, &counts);
+  wm_source_reader_counts(self->reader, &counts);
   atomic_store_explicit(&self->lost, counts.lost, memory_order_relaxed);
   atomic_store_explicit(&self->malformed, counts.malformed, memory_order_relaxed);
   atomic_store_explicit(&self->not_finite, counts.not_finite, memory_order_relaxed);
@@ -44,47 +44,47 @@ static void share_counts(live_source *self) {
 
 static void play_recording(live_source *self) {
   const run_clock *clock = &self->run->clock;
-  while (self->feed->has_next && wait_until(self->run, monotonic_from_run(clock, self->feed->next.arrival_ns))) {
-    self->feed->next.arrival_ns = run_now(clock);  // it arrives now, whatever the recording says
-    if (self->feed->next.kind != WM_EVENT_NONE) put(self);
-    wm_source *source = self->feed->source;
+  while (self->reader->has_next && wait_until(self->run, monotonic_from_run(clock, self->reader->next.arrival_ns))) {
+    self->reader->next.arrival_ns = run_now(clock);  // it arrives now, whatever the recording says
+    if (self->reader->next.kind != WM_EVENT_NONE) put(self);
+    wm_source *source = self->reader->source;
     if (source->skip_to) source->skip_to(source, run_now(clock));
-    self->status = wm_feed_advance(self->feed, &self->error);
+    self->status = wm_source_reader_advance(self->reader, &self->error);
     share_counts(self);
     if (self->status != WM_OK) break;
   }
 }
 
 static void say_device(live_source *self) {
-  const wm_source_counts *counts = &self->feed->source->counts;
+  const wm_source_counts *counts = &self->reader->source->counts;
   if (counts->device == self->said_device) return;
   self->said_device = counts->device;
-  if (counts->device_note[0]) live_say(self->run, "%s: %s", self->feed->source->name, counts->device_note);
+  if (counts->device_note[0]) live_say(self->run, "%s: %s", self->reader->source->name, counts->device_note);
 }
 
 static void listen_to_device(live_source *self) {
   const run_clock *clock = &self->run->clock;
   while (!atomic_load_explicit(&self->run->stop, memory_order_relaxed)) {
-    self->status = wm_feed_advance(self->feed, &self->error);
+    self->status = wm_source_reader_advance(self->reader, &self->error);
     share_counts(self);
     say_device(self);
     if (self->status != WM_OK) break;
-    if (!self->feed->has_next) continue;
-    self->feed->next.t_ns = run_from_monotonic(clock, self->feed->next.t_ns);
-    self->feed->next.arrival_ns = run_from_monotonic(clock, self->feed->next.arrival_ns);
+    if (!self->reader->has_next) continue;
+    self->reader->next.t_ns = run_from_monotonic(clock, self->reader->next.t_ns);
+    self->reader->next.arrival_ns = run_from_monotonic(clock, self->reader->next.arrival_ns);
     put(self);
   }
 }
 
 void *source_thread(void *argument) {
   live_source *self = argument;
-  wm_touch_stack(THREAD_TOUCHED_BYTES);
-  if (self->feed->source->is_live) {
+  wm_prefault_stack(THREAD_TOUCHED_BYTES);
+  if (self->reader->source->is_live) {
     listen_to_device(self);
   } else {
     play_recording(self);
   }
-  if (self->status != WM_OK) live_say(self->run, "%s: ends here: %s", self->feed->source->name, self->error.text);
+  if (self->status != WM_OK) live_say(self->run, "%s: ends here: %s", self->reader->source->name, self->error.text);
   atomic_store_explicit(&self->done, 1, memory_order_release);
   return NULL;
 }

@@ -103,7 +103,7 @@ static void keep(black_box *self, const char *what) {
     path_of(self, name, to);
     if (rename(from, to) != 0 && errno != ENOENT) unwritable(self, strerror(errno));
   }
-  int failed = box_pictures_keep(self->folder, what, number);
+  int failed = black_box_video_keep(self->folder, what, number);
   if (failed) unwritable(self, strerror(failed));
   say(self, "kept as ", to);
 }
@@ -160,7 +160,7 @@ void black_box_open(black_box *self, const char *folder, double keep_s, double p
   if (mkdir(folder, 0777) != 0 && errno != EEXIST) unwritable(self, strerror(errno));
   path_of(self, "now", now);
   if (has_died(now)) keep(self, "died");
-  box_pictures_open(&self->pictures, folder, keep_s, pictures_hz);
+  black_box_video_open(&self->pictures, folder, keep_s, pictures_hz);
 }
 
 void black_box_event(black_box *self, const wm_event *event) {
@@ -182,11 +182,11 @@ void black_box_pose(black_box *self, const wm_estimate *pose, wm_time_ns now_ns)
 }
 
 wm_status black_box_open_pictures(black_box *self, wm_pictures *pictures, const wm_rig *rig, wm_error *err) {
-  return box_pictures_subscribe(&self->pictures, pictures, rig, err);
+  return black_box_video_subscribe(&self->pictures, pictures, rig, err);
 }
 
 void black_box_take_pictures(black_box *self) {
-  int failed = box_pictures_take(&self->pictures);
+  int failed = black_box_video_take(&self->pictures);
   if (failed) unwritable(self, strerror(failed));
 }
 
@@ -200,6 +200,6 @@ void black_box_close(black_box *self) {
   if (!self->folder[0]) return;
   close_log(self);
   if (self->kept_from_ns != WM_TIME_NONE) keep(self, "lost");
-  box_pictures_close(&self->pictures);
+  black_box_video_close(&self->pictures);
   self->folder[0] = '\0';
 }

@@ -21,7 +21,7 @@ typedef struct black_box {
   int is_open, was_tracking, said_unwritable;
   wm_time_ns rotate_ns;     // the present log ends then; WM_TIME_NONE: it has not begun
   wm_time_ns kept_from_ns;  // when what happened is to be kept; WM_TIME_NONE: nothing happened
-  box_pictures pictures;
+  black_box_video pictures;
   wm_finding_fn say;
   void *say_context;
 } black_box;

@@ -26,7 +26,7 @@ static void remove_old(const char *folder) {
   (void)closedir(there);
 }
 
-void box_pictures_open(box_pictures *self, const char *folder, double keep_s, double rate_hz) {
+void black_box_video_open(black_box_video *self, const char *folder, double keep_s, double rate_hz) {
   memset(self, 0, sizeof *self);
   if (!folder[0]) return;
   remove_old(folder);
@@ -37,20 +37,20 @@ void box_pictures_open(box_pictures *self, const char *folder, double keep_s, do
 }
 
 // A new file of this name: the one before may be linked to, and stays as it is.
-static FILE *begin_file(const box_pictures *self, const box_camera *camera, const char *ending) {
+static FILE *begin_file(const black_box_video *self, const black_box_camera *camera, const char *ending) {
   char path[PATH_BYTES];
   (void)snprintf(path, sizeof path, "%s/" PREFIX "%s-%c.%s", self->folder, camera->name, 'a' + camera->part, ending);
   (void)unlink(path);
   return new_file(path);
 }
 
-static void close_files(box_camera *camera) {
+static void close_files(black_box_camera *camera) {
   if (camera->video) (void)fclose(camera->video);
   if (camera->stamps) (void)fclose(camera->stamps);
   camera->video = camera->stamps = NULL;
 }
 
-static int begin(box_pictures *self, box_camera *camera, const wm_frame *frame, const wm_camera_raw *raw) {
+static int begin(black_box_video *self, black_box_camera *camera, const wm_frame *frame, const wm_camera_raw *raw) {
   close_files(camera);
   camera->part = !camera->part;
   camera->count = 0;
@@ -63,7 +63,7 @@ static int begin(box_pictures *self, box_camera *camera, const wm_frame *frame, 
                    1e9 / (double)self->period_ns);
 }
 
-static int put(box_camera *camera, const wm_frame *frame, const wm_camera_raw *raw) {
+static int put(black_box_camera *camera, const wm_frame *frame, const wm_camera_raw *raw) {
   int failed = raw->is_jpeg
                    ? avi_picture(camera->video, raw->data, raw->bytes, 1, 0)
                    : avi_picture(camera->video, frame->grey, frame->width_px, frame->height_px, frame->stride_bytes);
@@ -77,7 +77,7 @@ static int put(box_camera *camera, const wm_frame *frame, const wm_camera_raw *r
   return failed;
 }
 
-static int take_picture(box_pictures *self, box_camera *camera, const wm_frame *frame) {
+static int take_picture(black_box_video *self, black_box_camera *camera, const wm_frame *frame) {
   if (frame->arrival_ns < camera->next_ns) return 0;
   camera->next_ns = frame->arrival_ns + self->period_ns;
   wm_camera_raw raw;
@@ -91,10 +91,10 @@ static int take_picture(box_pictures *self, box_camera *camera, const wm_frame *
   return failed;
 }
 
-int box_pictures_take(box_pictures *self) {
+int black_box_video_take(black_box_video *self) {
   int failed = 0;
   for (size_t i = 0; i < self->camera_count; i++) {
-    box_camera *camera = &self->cameras[i];
+    black_box_camera *camera = &self->cameras[i];
     wm_frame frame;
     if (camera->frames->ops->next(camera->frames, &frame, NULL) != WM_OK) continue;
     int reason = take_picture(self, camera, &frame);
@@ -103,12 +103,12 @@ int box_pictures_take(box_pictures *self) {
   return failed;
 }
 
-wm_status box_pictures_subscribe(box_pictures *self, wm_pictures *pictures, const wm_rig *rig, wm_error *err) {
+wm_status black_box_video_subscribe(black_box_video *self, wm_pictures *pictures, const wm_rig *rig, wm_error *err) {
   const wm_frame_wishes wishes = {.waiting_max = 1, .wait_ms = 0, .wants_raw = 1};
   wm_status status = WM_OK;
   if (!self->folder[0]) return WM_OK;
   for (uint32_t i = 0; status == WM_OK && i < rig->camera_count && self->camera_count < WM_CAMERA_DEVICES_MAX; i++) {
-    box_camera *camera = &self->cameras[self->camera_count];
+    black_box_camera *camera = &self->cameras[self->camera_count];
     if (!pictures->ops->has(pictures, rig->cameras[i].name)) continue;
     (void)snprintf(camera->name, sizeof camera->name, "%s", rig->cameras[i].name);
     status = pictures->ops->open(pictures, &rig->cameras[i], (int32_t)i, &wishes, &camera->frames, err);
@@ -117,7 +117,7 @@ wm_status box_pictures_subscribe(box_pictures *self, wm_pictures *pictures, cons
   return status;
 }
 
-int box_pictures_keep(const char *folder, const char *what, unsigned number) {
+int black_box_video_keep(const char *folder, const char *what, unsigned number) {
   char from[PATH_BYTES], to[PATH_BYTES];
   int failed = 0;
   DIR *there = opendir(folder);
@@ -132,9 +132,9 @@ int box_pictures_keep(const char *folder, const char *what, unsigned number) {
   return failed;
 }
 
-void box_pictures_close(box_pictures *self) {
+void black_box_video_close(black_box_video *self) {
   for (size_t i = 0; i < self->camera_count; i++) {
-    box_camera *camera = &self->cameras[i];
+    black_box_camera *camera = &self->cameras[i];
     close_files(camera);
     camera->frames->ops->close(camera->frames);
   }

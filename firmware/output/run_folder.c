@@ -376,7 +376,7 @@ wm_status wm_run_folder_flush(wm_run_folder *self, wm_error *err) {
 }
 
 wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_error *err) {
-  wm_status status = wm_write_looked_for(self->dir, self->assembly->vision, err);
+  wm_status status = wm_write_search_outcomes(self->dir, self->assembly->vision, err);
   return status == WM_OK ? wm_write_health_json(self->dir, self->assembly, health, err) : status;
 }
 

@@ -13,7 +13,7 @@ static void put_row(FILE *f, const char *source, const wm_landmark_looks *row) {
   (void)fputc('\n', f);
 }
 
-wm_status wm_write_looked_for(const char *dir, wm_vision *vision, wm_error *err) {
+wm_status wm_write_search_outcomes(const char *dir, wm_vision *vision, wm_error *err) {
   const wm_landmark_looks *rows;
   size_t known = 0;
   for (size_t i = 0; i < wm_vision_count(vision); i++) known += wm_vision_looks(vision, i, &rows);

@@ -7,6 +7,6 @@
 #include "waymark/status.h"
 
 // Writes nothing where no detector of known landmarks looked (`vision` may be NULL).
-wm_status wm_write_looked_for(const char *dir, wm_vision *vision, wm_error *err);
+wm_status wm_write_search_outcomes(const char *dir, wm_vision *vision, wm_error *err);
 
 #endif

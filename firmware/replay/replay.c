@@ -20,7 +20,7 @@ typedef struct replay {
   wm_assembly assembly;
   wm_arena arena;
   wm_pipeline pipeline;
-  wm_feed *feeds;
+  wm_source_reader *readers;
   wm_run_folder *folder;
   wm_output output;
   wm_time_ns first_ns, now_ns;          // the run's clock is that of the arrivals
@@ -34,14 +34,15 @@ static wm_status take_memory(replay *self, wm_error *err) {
   wm_arena_need needs[WM_PIPELINE_NEEDS + 1 + WM_VISION_NEEDS];
   size_t count = WM_PIPELINE_NEEDS;
   wm_pipeline_needs(&self->pipeline, &self->assembly, needs);
-  needs[count++] = (wm_arena_need){"feeds", self->assembly.source_count * sizeof(wm_feed), (void **)&self->feeds};
+  needs[count++] =
+      (wm_arena_need){"readers", self->assembly.source_count * sizeof(wm_source_reader), (void **)&self->readers};
   count += wm_vision_needs(self->assembly.vision, needs + count);
   return wm_arena_fill(&self->arena, needs, count, 0, err);
 }
 
 static void begin_steady(replay *self) {
-  wm_touch_program();
-  wm_touch_stack(STACK_BYTES);
+  wm_prefault_program();
+  wm_prefault_stack(STACK_BYTES);
   self->allocations = wm_allocations_of_this_thread();
   self->page_faults = wm_page_faults_of_this_thread();
 }
@@ -84,15 +85,15 @@ static wm_status play(replay *self, const wm_replay_options *options, double dur
   wm_time_ns told_ns = wm_monotonic_ns();
   uint64_t events = 0;
   self->now_ns = WM_TIME_NONE;
-  for (wm_feed *feed; (feed = wm_feeds_earliest(self->feeds, count)) != NULL;) {
-    wm_time_ns arrival_ns = feed->next.arrival_ns;
+  for (wm_source_reader *reader; (reader = wm_source_readers_earliest(self->readers, count)) != NULL;) {
+    wm_time_ns arrival_ns = reader->next.arrival_ns;
     if (self->now_ns == WM_TIME_NONE || arrival_ns / 2 - self->now_ns / 2 > LONGEST_SILENCE_NS / 2)
       self->next_tick_ns = first_tick(arrival_ns, self->publish_ns);
     publish_until(self, arrival_ns);
     self->now_ns = arrival_ns;
     wm_pipeline_advance(&self->pipeline, arrival_ns);
-    if (feed->next.kind != WM_EVENT_NONE) wm_pipeline_arrive(&self->pipeline, &feed->next);
-    wm_status status = wm_feed_advance(feed, err);
+    if (reader->next.kind != WM_EVENT_NONE) wm_pipeline_arrive(&self->pipeline, &reader->next);
+    wm_status status = wm_source_reader_advance(reader, err);
     if (status != WM_OK) return status;
     if (options->progress && ++events % 256 == 0 && wm_monotonic_ns() - told_ns > PROGRESS_EVERY_NS) {
       told_ns = wm_monotonic_ns();
@@ -108,7 +109,7 @@ static wm_status play(replay *self, const wm_replay_options *options, double dur
 
 static wm_status write_summary(replay *self, wm_run_report *report, wm_error *err) {
   wm_pipeline_health(&self->pipeline, self->now_ns, &report->health);
-  wm_feeds_health(self->feeds, self->assembly.source_count, &report->health);
+  wm_source_readers_health(self->readers, self->assembly.source_count, &report->health);
   report->poses = self->pipeline.fuser.poses;
   report->events = self->pipeline.fuser.events;
   report->recorded_s = wm_seconds_between(self->first_ns, self->now_ns);
@@ -146,7 +147,7 @@ static wm_status run(replay *self, const wm_config *config, wm_recording *record
   }
   if (status == WM_OK) status = take_memory(self, err);
   if (status == WM_OK && options->frames_of)
-    status = frames_of_apply(options->frames_of, recording, &self->assembly, &report->log_ahead_ns, err);
+    status = seen_frames_apply(options->frames_of, recording, &self->assembly, &report->log_ahead_ns, err);
   if (status == WM_OK) status = wm_run_folder_open(options->out_dir, &self->assembly, &self->folder, err);
   if (status != WM_OK) return status;
   self->output = wm_run_folder_output(self->folder);
@@ -154,7 +155,7 @@ static wm_status run(replay *self, const wm_config *config, wm_recording *record
   status = wm_pipeline_start(&self->pipeline, self->output, err);
   if (status == WM_OK) status = wm_vision_start(self->assembly.vision, err);
   if (status == WM_OK) status = wm_vision_run_ahead(self->assembly.vision, err);
-  if (status == WM_OK) status = wm_feeds_open(&self->assembly, self->feeds, 0, &self->first_ns, err);
+  if (status == WM_OK) status = wm_source_readers_open(&self->assembly, self->readers, 0, &self->first_ns, err);
   if (status != WM_OK) return status;
 
   begin_steady(self);

@@ -146,7 +146,7 @@ static wm_status run(log_replay *self, wm_log_reader *log, const wm_replay_optio
                      wm_error *err) {
   wm_status status = start(self, options, err);
   if (status != WM_OK) return status;
-  wm_touch_program();
+  wm_prefault_program();
   int64_t allocations = wm_allocations_of_this_thread(), page_faults = wm_page_faults_of_this_thread();
   status = play(self, log, report, err);
   report->page_faults_after_start = wm_page_faults_of_this_thread() - page_faults;

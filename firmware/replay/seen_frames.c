@@ -164,8 +164,8 @@ static wm_status restrict_sources(const char *path, const wm_assembly *assembly,
   return WM_OK;
 }
 
-wm_status frames_of_apply(const char *path, wm_recording *recording, wm_assembly *assembly, wm_time_ns *offset_ns,
-                          wm_error *err) {
+wm_status seen_frames_apply(const char *path, wm_recording *recording, wm_assembly *assembly, wm_time_ns *offset_ns,
+                            wm_error *err) {
   said_list recorded = {0}, logged = {0}, stamps[WM_SOURCES_MAX] = {{0}};
   wm_status status = read_recorded_motion(recording, assembly->config, &recorded, err);
   if (status == WM_OK) status = read_log(path, assembly, &logged, stamps, err);

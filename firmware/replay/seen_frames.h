@@ -11,7 +11,7 @@
 // clock is found by the motion that both hold: what was said the same way in both, by where most of it agrees.
 // WM_BAD_DATA where log and recording have no motion in common, or the log has no pictures. *offset_ns: the run's clock
 // minus the recording's. Reads the recording's motion a second time; allocates.
-wm_status frames_of_apply(const char *path, wm_recording *recording, wm_assembly *assembly, wm_time_ns *offset_ns,
-                          wm_error *err);
+wm_status seen_frames_apply(const char *path, wm_recording *recording, wm_assembly *assembly, wm_time_ns *offset_ns,
+                            wm_error *err);
 
 #endif

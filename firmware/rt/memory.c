@@ -21,7 +21,7 @@ int64_t wm_page_faults_of_this_thread(void) {
   return (int64_t)usage.ru_minflt + (int64_t)usage.ru_majflt;
 }
 
-void wm_touch_program(void) {
+void wm_prefault_program(void) {
   FILE *maps = fopen("/proc/self/maps", "re");
   if (!maps) return;
   char line[512];
@@ -36,7 +36,7 @@ void wm_touch_program(void) {
   (void)fclose(maps);
 }
 
-void wm_touch_stack(size_t bytes) {
+void wm_prefault_stack(size_t bytes) {
   volatile uint8_t *stack = alloca(bytes);
   for (size_t i = 0; i < bytes; i += 512) stack[i] = 0;
 }

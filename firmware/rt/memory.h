@@ -16,9 +16,9 @@ int64_t wm_page_faults_of_this_thread(void);
 
 // Makes every page of the program that is mapped now present: code, libraries, data, heap. Cost: tens of ms. Start
 // only.
-void wm_touch_program(void);
+void wm_prefault_program(void);
 // Touches `bytes` of this thread's stack below the caller.
-void wm_touch_stack(size_t bytes);
+void wm_prefault_stack(size_t bytes);
 // Makes all memory of now present and locks it, and what comes later once it is touched. 0 where it isn't allowed.
 // Start only.
 int wm_lock_memory(void);

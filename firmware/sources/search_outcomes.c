@@ -6,8 +6,8 @@
 
 #define NOTHING UINT8_MAX
 
-int looks_open(looks *self, size_t appearances) {
-  *self = (looks){.capacity = appearances};
+int search_outcomes_open(search_outcomes *self, size_t appearances) {
+  *self = (search_outcomes){.capacity = appearances};
   size_t n = appearances > 0 ? appearances : 1;
   self->newest = calloc(n, sizeof *self->newest);
   self->row_of = calloc(n, sizeof *self->row_of);
@@ -16,16 +16,16 @@ int looks_open(looks *self, size_t appearances) {
   return self->newest && self->row_of && self->best && self->rows;
 }
 
-void looks_close(looks *self) {
+void search_outcomes_close(search_outcomes *self) {
   free(self->newest);
   free(self->row_of);
   free(self->best);
   free(self->rows);
-  *self = (looks){0};
+  *self = (search_outcomes){0};
 }
 
 // The detector names its landmarks in the same order each time.
-static void name_rows(looks *self) {
+static void name_rows(search_outcomes *self) {
   for (size_t i = 0; i < self->entries; i++) {
     size_t row = 0;
     while (row < self->count && self->rows[row].landmark_id != self->newest[i].landmark_id) row++;
@@ -41,7 +41,8 @@ static uint8_t better(uint8_t a, uint8_t b) {
   return a > b ? a : b;
 }
 
-void looks_take(looks *self, const wm_detector *detector, const void *state, uint64_t sum[WM_LOOK_COUNT]) {
+void search_outcomes_take(search_outcomes *self, const wm_detector *detector, const void *state,
+                          uint64_t sum[WM_LOOK_COUNT]) {
   if (!detector->looked_for) return;
   size_t entries = detector->looked_for(state, self->newest, self->capacity);
   if (entries > self->capacity) entries = self->capacity;

@@ -6,7 +6,7 @@
 #include "sources/vision.h"
 #include "waymark/detector.h"
 
-typedef struct looks {
+typedef struct search_outcomes {
   size_t capacity;  // appearances that the detector may know
   size_t entries;   // those that it does know; known from the first picture on
   wm_looked_for *newest;
@@ -14,12 +14,13 @@ typedef struct looks {
   uint8_t *best;     // of each row in the newest picture
   wm_landmark_looks *rows;
   size_t count;
-} looks;
+} search_outcomes;
 
 // Room for so many appearances, from malloc. 0 where there is no memory.
-int looks_open(looks *self, size_t appearances);
-void looks_close(looks *self);
+int search_outcomes_open(search_outcomes *self, size_t appearances);
+void search_outcomes_close(search_outcomes *self);
 // Counts the detector's last picture, each landmark once, into the rows and into `sum`. No allocation.
-void looks_take(looks *self, const wm_detector *detector, const void *state, uint64_t sum[WM_LOOK_COUNT]);
+void search_outcomes_take(search_outcomes *self, const wm_detector *detector, const void *state,
+                          uint64_t sum[WM_LOOK_COUNT]);
 
 #endif

@@ -89,7 +89,8 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
     if (status != WM_OK) return status;
     s->newest = &self->newest;
   }
-  if (!looks_open(&s->looks, s->view.appearance_count)) return wm_fail(err, WM_IO, "no memory for detectors");
+  if (!search_outcomes_open(&s->outcomes, s->view.appearance_count))
+    return wm_fail(err, WM_IO, "no memory for detectors");
   s->base = (wm_source){.ops = &kOps, .in_order = 1};
   (void)snprintf(s->base.name, sizeof s->base.name, "%s:%s", s->detector->name, first->name);
   s->gives_looked = (config->estimator->takes & WM_EVENT_BIT(WM_EVENT_LOOKED)) != 0;
@@ -177,7 +178,7 @@ void wm_vision_close(wm_vision *self) {
       wm_frame_source *pictures = self->sources[i].pictures[k];
       if (pictures) pictures->ops->close(pictures);
     }
-    looks_close(&self->sources[i].looks);
+    search_outcomes_close(&self->sources[i].outcomes);
     free(self->sources[i].only);
   }
   free(self);
@@ -230,8 +231,8 @@ void wm_vision_tell(wm_vision *self, const wm_estimate *newest) {
 }
 
 size_t wm_vision_looks(const wm_vision *self, size_t i, const wm_landmark_looks **rows) {
-  *rows = self->sources[i].looks.rows;
-  return self->sources[i].looks.count;
+  *rows = self->sources[i].outcomes.rows;
+  return self->sources[i].outcomes.count;
 }
 
 wm_time_ns wm_vision_look_p99(const wm_vision *self, size_t i) {

@@ -144,7 +144,7 @@ static wm_status look(vision_source *self, wm_error *err) {
     return WM_OK;
   }
   if (frames[0].t_ns >= self->base.from_ns && frames[0].t_ns <= self->base.until_ns)
-    looks_take(&self->looks, self->detector, self->state, self->counts.looks);
+    search_outcomes_take(&self->outcomes, self->detector, self->state, self->counts.looks);
   if (self->event_count == 0 && self->gives_looked) {
     wm_event *event = &self->events[self->event_count++];
     memset(event, 0, WM_EVENT_SMALL_BYTES);

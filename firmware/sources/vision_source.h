@@ -48,7 +48,7 @@ struct vision_source {
   wm_source_counts counts;      // the working thread's own
   uint64_t went_back, refused;  // pictures that are older than the one before; that the detector didn't take
   wm_histogram decode_ns, detect_ns;
-  looks looks;
+  search_outcomes outcomes;
   wm_seen *only;  // the only pictures to be looked at, rising; NULL: all
   size_t only_count;
   wm_time_ns only_tolerance_ns;

@@ -4,6 +4,7 @@
 checks), or is on the short list below. Followed through the object files from the thread's function on.
 
     realtime_calls.py BUILD [OBJDUMP] [--list]"""
+import json
 import pathlib
 import re
 import subprocess
@@ -12,7 +13,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 BEGIN = "estimator_thread"
 # Before its loop and after it: stack, counters of allocations and page faults.
-OUTSIDE_THE_LOOP = {"wm_touch_stack", "wm_allocations_of_this_thread", "wm_page_faults_of_this_thread"}
+OUTSIDE_THE_LOOP = {"wm_prefault_stack", "wm_allocations_of_this_thread", "wm_page_faults_of_this_thread"}
 # Of the C library. No lock, no heap; clock_nanosleep is the thread's only system call (system_calls.py traces it).
 LIBRARY = {"memcpy", "memset", "memmove", "memcmp", "strlen", "clock_gettime", "clock_nanosleep", "snprintf", "remainder", "hypot", "sqrt", "floor",
            "fabs", "sin", "cos", "sincos", "atan2", "fmin", "fmax", "isnan"}
@@ -47,8 +48,11 @@ def main():
     objdump = next((a for a in sys.argv[2:] if not a.startswith("--")), "objdump")
     defined = {}  # name: (object, names that it refers to)
     pure = set()
-    for obj in build.glob("**/*.o"):
-        where = obj.relative_to(build).as_posix()
+    for entry in json.loads((build / "compile_commands.json").read_text()):  # a build folder may hold objects of former targets, too
+        where = re.search(r" -o (\S+)", entry["command"])[1]
+        obj = build / where
+        if not obj.exists():
+            continue
         if where.startswith(("estimator/", "msgs/")):
             out = subprocess.run(["nm", "--defined-only", obj], capture_output=True, text=True).stdout
             pure |= {line.split()[-1] for line in out.splitlines()}

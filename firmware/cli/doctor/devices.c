@@ -13,7 +13,7 @@
 
 void doctor_lcm(const char *url, findings *out) {
   const char *why;
-  lcm_t *lcm = lcm_way_open(url, &why);
+  lcm_t *lcm = lcm_connect(url, &why);
   if (!lcm) {
     find(out, FINDING_BAD, "lcm", "ip route add 224.0.0.0/4 dev lo", "no way out on %.80s: %s", url, why);
     return;
