@@ -92,11 +92,11 @@ int choose_format(uint32_t fourcc, lc::StreamConfiguration *stream) {
 // go, and stops at the exit.
 std::mutex manager_mutex;
 lc::CameraManager *manager;
-int open_cameras;
+int manager_users;
 
 void stop_manager() {
   const std::lock_guard<std::mutex> lock(manager_mutex);
-  if (open_cameras > 0) return;  // a thread may still be in it
+  if (manager_users > 0) return;  // a thread may still be in it
   delete manager;
   manager = nullptr;
 }
@@ -112,7 +112,7 @@ int find(const char *id, std::shared_ptr<lc::Camera> *out) {
     (void)std::atexit(stop_manager);
   }
   *out = manager->get(id);
-  if (*out) open_cameras++;
+  if (*out) manager_users++;
   return *out ? 0 : -ENODEV;
 }
 
@@ -185,7 +185,7 @@ int Eye::shut() {
   if (!camera_) return 0;
   camera_.reset();
   const std::lock_guard<std::mutex> lock(manager_mutex);
-  open_cameras--;
+  manager_users--;
   return 0;
 }
 
