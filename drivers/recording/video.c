@@ -12,6 +12,7 @@
 #include "calibration.h"
 #include "container.h"
 #include "csv.h"
+#include "decoded.h"
 #include "jpeg.h"
 
 #define PICTURE_SIDE_MAX 16384
@@ -39,6 +40,8 @@ struct wm_video {
   uint32_t width_px, height_px;
   uint8_t *bytes[2], *pixels;  // compressed: this picture and the one before
   size_t bytes_max, before_length;
+  decoded_pictures *shared;  // with other readers of the same video; NULL: with none
+  decoded_picture *held;     // of those, the one that was handed out last
   csv_row row, ahead;
   int has_row, has_ahead, rows_ended, pictures_ended;
   payload picture;  // read from the container, waiting for its row
@@ -283,8 +286,31 @@ static jpeg_verdict decode(wm_video *self, size_t length, uint8_t *grey, uint32_
   return JPEG_GOOD;
 }
 
+// Where a picture's pixels go; `grey` NULL: among the shared ones, where there is room.
+typedef struct target {
+  uint8_t *grey;
+  uint32_t stride_bytes;
+} target;
+
+// Into the shared pictures, or from there where another reader was first.
+static jpeg_verdict decode_shared(wm_video *self, size_t length, target *out, char *why, size_t why_bytes) {
+  int is_mine;
+  const target own = {self->pixels, self->width_px};
+  decoded_picture *p = decoded_hold(self->shared, self->next.picture.frame, &is_mine, &self->base.decoded_in_ns);
+  self->held = p;
+  *out = p ? (target){p->grey, self->width_px} : own;
+  if (!p) return decode(self, length, own.grey, own.stride_bytes, why, why_bytes);
+  if (is_mine) {
+    p->why[0] = '\0';
+    p->verdict = decode(self, length, p->grey, self->width_px, p->why, sizeof p->why);
+    decoded_done(self->shared, p);
+  }
+  (void)snprintf(why, why_bytes, "%s", p->why);
+  return p->verdict;
+}
+
 // 1: a frame; 0: not one, counted; the rest by *status.
-static int take(wm_video *self, uint8_t *grey, uint32_t stride_bytes, wm_status *status, wm_error *err) {
+static int take(wm_video *self, target *to, wm_status *status, wm_error *err) {
   const payload *picture = &self->next.picture;
   char why[256];
   if (picture->length > self->bytes_max) {
@@ -308,7 +334,8 @@ static int take(wm_video *self, uint8_t *grey, uint32_t stride_bytes, wm_status 
           picture->frame);
     return 0;
   }
-  jpeg_verdict verdict = decode(self, length, grey, stride_bytes, why, sizeof why);
+  jpeg_verdict verdict = to->grey ? decode(self, length, to->grey, to->stride_bytes, why, sizeof why)
+                                  : decode_shared(self, length, to, why, sizeof why);
   if (verdict != JPEG_GOOD) {
     count(self, verdict == JPEG_DAMAGED ? &self->counts.damaged : &self->counts.wrong_size, "%s: frame %" PRIu64 ": %s",
           self->file.path, picture->frame, why);
@@ -321,24 +348,41 @@ static int take(wm_video *self, uint8_t *grey, uint32_t stride_bytes, wm_status 
   return 1;
 }
 
-wm_status wm_video_next_into(wm_video *self, uint8_t *grey, uint32_t stride_bytes, wm_frame *out, wm_error *err) {
+static wm_status next_to(wm_video *self, target wanted, wm_frame *out, wm_error *err) {
   for (;;) {
+    if (self->shared) decoded_let_go(self->shared, self->held);
+    self->held = NULL;
+    self->base.decoded_in_ns = 0;
     wm_status status = locate(self, err);
     if (status != WM_OK) return status;
-    int is_frame = take(self, grey, stride_bytes, &status, err);
+    target to = wanted;
+    int is_frame = take(self, &to, &status, err);
     if (status != WM_OK) return status;
     self->next.there = 0;
     if (!is_frame) continue;
     *out = self->next.head;
-    out->grey = grey;
-    out->stride_bytes = stride_bytes;
+    out->grey = to.grey;
+    out->stride_bytes = to.stride_bytes;
     self->counts.frames++;
     return WM_OK;
   }
 }
 
+wm_status wm_video_next_into(wm_video *self, uint8_t *grey, uint32_t stride_bytes, wm_frame *out, wm_error *err) {
+  return next_to(self, (target){grey, stride_bytes}, out, err);
+}
+
 wm_status wm_video_next(wm_video *self, wm_frame *out, wm_error *err) {
-  return wm_video_next_into(self, self->pixels, self->width_px, out, err);
+  return next_to(self, self->shared ? (target){0} : (target){self->pixels, self->width_px}, out, err);
+}
+
+wm_status wm_video_share(wm_video *self, wm_video *with, wm_error *err) {
+  if (self->file.coding != PICTURE_JPEG || self->shared) return WM_OK;
+  wm_status status = with->shared ? WM_OK : decoded_open(with->width_px, with->height_px, &with->shared, err);
+  if (status != WM_OK) return status;
+  decoded_join(with->shared);
+  self->shared = with->shared;
+  return WM_OK;
 }
 
 wm_status wm_video_peek(wm_video *self, wm_frame *out, wm_error *err) {
@@ -372,7 +416,7 @@ static wm_status peek(wm_frame_source *base, wm_frame *out, wm_error *err) {
 
 static wm_status next(wm_frame_source *base, wm_frame *out, wm_error *err) {
   wm_video *self = (wm_video *)base;
-  return wm_video_next_into(self, base->into ? base->into : self->pixels, self->width_px, out, err);
+  return base->into ? wm_video_next_into(self, base->into, self->width_px, out, err) : wm_video_next(self, out, err);
 }
 
 static wm_status skip(wm_frame_source *base, wm_error *err) { return wm_video_skip((wm_video *)base, err); }
@@ -478,6 +522,8 @@ wm_status wm_video_open(const char *recording_dir, const wm_camera *camera, int3
 
 void wm_video_close(wm_video *self) {
   if (!self) return;
+  if (self->shared) decoded_let_go(self->shared, self->held);
+  decoded_close(self->shared);
   container_close(&self->file);
   csv_close(&self->csv);
   jpeg_close(&self->jpeg);

@@ -28,6 +28,9 @@ static const char kHelp[] =
     "  --map FILE          a map.yaml instead of the recording's; an event log refuses any but its own\n"
     "  --frames-of LOG     only the pictures that a run fed from this recording saw, by its event log: what it lost\n"
     "                      is lost here, too, and its poses can be compared\n"
+    "  --timing-of RUN     detectors take the time that they took in that run (median, by its timing.json); without "
+    "it\n"
+    "                      none, or `sources: [{name: DETECTOR, ready_after_ms: 40}]`\n"
     "  --from S, --until S only this part of the recording, s from its first stamp\n"
     "  --lost              begin without a start pose, even if the recording has one\n"
     "  --reference         also reference.csv: all of the drive looked at as a whole (edges on a raster map; at a "
@@ -38,7 +41,7 @@ static const char kHelp[] =
     "  waymark replay out/run/events.wmlog --out out/again\n";
 
 typedef struct arguments {
-  const char *config, *out, *landmarks, *calibration, *map, *frames_of;
+  const char *config, *out, *landmarks, *calibration, *map, *frames_of, *timing_of;
   uint64_t seed;
   double from_s, until_s;
   int lost, reference;
@@ -70,6 +73,7 @@ static int replay_recording(const arguments *args) {
                                        .progress = progress_show,
                                        .progress_context = &progress,
                                        .frames_of = args->frames_of,
+                                       .timing_of = args->timing_of,
                                        .from_s = args->from_s,
                                        .until_s = args->until_s};
     static wm_run_report report;
@@ -183,6 +187,7 @@ int command_replay(int argc, char *const *argv) {
                             {"--calibration", OPTION_TEXT, &args.calibration},
                             {"--map", OPTION_TEXT, &args.map},
                             {"--frames-of", OPTION_TEXT, &args.frames_of},
+                            {"--timing-of", OPTION_TEXT, &args.timing_of},
                             {"--from", OPTION_F64, &args.from_s},
                             {"--until", OPTION_F64, &args.until_s},
                             {"--lost", OPTION_FLAG, &args.lost},
@@ -211,10 +216,11 @@ int command_replay(int argc, char *const *argv) {
   }
   if (stat(args.what, &there) == 0 && !S_ISDIR(there.st_mode)) {
     const int part = args.from_s > 0 || args.until_s > 0 || args.lost;
-    if (!args.reference && !args.frames_of && !part) return replay_log(&args);
+    if (!args.reference && !args.frames_of && !args.timing_of && !part) return replay_log(&args);
     (void)fprintf(stderr, "waymark: %s needs the recording; a log is what was fused, whole\n",
                   args.reference   ? "--reference"
                   : args.frames_of ? "--frames-of"
+                  : args.timing_of ? "--timing-of"
                                    : "a part of a drive (--from, --until, --lost)");
     return EXIT_USAGE;
   }

@@ -189,6 +189,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   if (status == WM_OK) wm_pipeline_take_kept(&self->estimator.pipeline, self->map.image, self->map.bytes);
   wm_time_ns first_ns;
   if (status == WM_OK) status = wm_vision_start(self->assembly.vision, err);
+  wm_vision_look_at_arrival(self->assembly.vision);
   if (status == WM_OK)
     status = wm_source_readers_open(&self->assembly, self->readers, wm_monotonic_ns(), &first_ns, err);
   if (status == WM_OK && self->options->out_dir)
@@ -373,11 +374,7 @@ static void fill_report(live *self, wm_live_report *report) {
 static wm_status write_summary(live *self, const wm_live_report *report, wm_error *err) {
   if (!self->disk.folder) return WM_OK;
   const live_estimator *e = &self->estimator;
-  wm_histogram decode_ns, detect_ns;
-  wm_vision_times(self->assembly.vision, &decode_ns, &detect_ns);
-  const wm_timing_stage stages[] = {{"decode", &decode_ns},
-                                    {"detect", &detect_ns},
-                                    {"wake", &e->wake_ns},
+  const wm_timing_stage stages[] = {{"wake", &e->wake_ns},
                                     {"loop", &e->cycle_ns},
                                     {"arrive", &e->pipeline.arrive_ns},
                                     {"predict", &e->pipeline.fuser.predict_ns},
@@ -386,7 +383,8 @@ static wm_status write_summary(live *self, const wm_live_report *report, wm_erro
                                     {"age", &e->age_ns},
                                     {"send", &self->publish.send_ns},
                                     {"keep", &e->keep_ns}};
-  const wm_timing timing = {.stages = stages,
+  const wm_timing timing = {.vision = self->assembly.vision,
+                            .stages = stages,
                             .stage_count = sizeof stages / sizeof stages[0],
                             .allocations_after_start = e->allocations,
                             .page_faults_after_start = e->page_faults,

@@ -102,7 +102,8 @@ static void put_source(FILE *f, const wm_source_health *s) {
                   ", \"device\": \"%s\", \"overflows\": %" PRIu64 ", \"bus_errors\": %" PRIu64
                   ", \"stamp_uncertainty_ms\": %.9g",
                   wm_device_state_name(s->device), s->overflows, s->bus_errors, (double)s->stamp_uncertainty_ns * 1e-6);
-  (void)fprintf(f, ", \"lateness_p99_ms\": %.9g, \"lateness_max_ms\": %.9g", (double)s->lateness_p99_ns * 1e-6,
+  (void)fprintf(f, ", \"lateness_p99_ms\": %.9g, \"lateness_worst_ms\": %.9g, \"lateness_max_ms\": %.9g",
+                (double)s->lateness_p99_ns * 1e-6, (double)s->lateness_worst_ns * 1e-6,
                 (double)s->lateness_max_ns * 1e-6);
   (void)fputs(", \"newest_ns\": ", f);
   time_or_null(f, s->newest_ns);
@@ -183,8 +184,8 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
   number(f, h->reckoning_left_m);
   (void)fputs(",\n  \"reckoning_left_s\": ", f);
   number(f, h->reckoning_left_s);
-  (void)fprintf(f, ",\n  \"send_p99_ms\": %.6g,\n  \"lines_lost\": %" PRIu64, (double)h->send_p99_ns * 1e-6,
-                h->lines_lost);
+  (void)fprintf(f, ",\n  \"send_p99_ms\": %.6g,\n  \"lines_lost\": %" PRIu64 ",\n  \"other_runs\": %" PRIu32,
+                (double)h->send_p99_ns * 1e-6, h->lines_lost, h->other_runs_total);
   (void)fputs(",\n  \"fused_until_ns\": ", f);
   time_or_null(f, h->fused_until_ns);
   (void)fprintf(f,
@@ -211,22 +212,36 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
 
 // ── timing ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
+static void put_stage(FILE *f, const char *name, const wm_histogram *h) {
+  static const double kQuantiles[] = {0.5, 0.9, 0.99, 0.999};
+  static const char *const kNames[] = {"p50_us", "p90_us", "p99_us", "p999_us"};
+  (void)fputs("  ", f);
+  string(f, name);
+  (void)fprintf(f, ": {\"count\": %" PRIu64, h->count);
+  for (int q = 0; q < 4; q++)
+    (void)fprintf(f, ", \"%s\": %.3f", kNames[q], (double)wm_histogram_quantile(h, kQuantiles[q]) * 1e-3);
+  (void)fprintf(f, ", \"max_us\": %.3f},\n", (double)h->max_ns * 1e-3);
+}
+
+static void put_vision_stages(FILE *f, const wm_vision *vision) {
+  wm_histogram decode_ns, detect_ns;
+  wm_vision_times(vision, &decode_ns, &detect_ns);
+  put_stage(f, "decode", &decode_ns);
+  put_stage(f, "detect", &detect_ns);
+  for (size_t i = 0; i < wm_vision_count(vision); i++) {
+    char name[WM_SOURCE_NAME_MAX + sizeof WM_TIMING_LOOK];
+    (void)snprintf(name, sizeof name, WM_TIMING_LOOK "%s", wm_vision_name(vision, i));
+    put_stage(f, name, wm_vision_look_ns(vision, i));
+  }
+}
+
 wm_status wm_write_timing_json(const char *dir, const wm_timing *t, wm_error *err) {
   char path[WM_PATH_MAX + 32];
   FILE *f = open_json(dir, "timing.json", path, sizeof path, err);
   if (!f) return WM_IO;
   (void)fputs("{\n", f);
-  for (size_t i = 0; i < t->stage_count; i++) {
-    const wm_histogram *h = t->stages[i].histogram;
-    static const double kQuantiles[] = {0.5, 0.9, 0.99, 0.999};
-    static const char *const kNames[] = {"p50_us", "p90_us", "p99_us", "p999_us"};
-    (void)fputs("  ", f);
-    string(f, t->stages[i].name);
-    (void)fprintf(f, ": {\"count\": %" PRIu64, h->count);
-    for (int q = 0; q < 4; q++)
-      (void)fprintf(f, ", \"%s\": %.3f", kNames[q], (double)wm_histogram_quantile(h, kQuantiles[q]) * 1e-3);
-    (void)fprintf(f, ", \"max_us\": %.3f},\n", (double)h->max_ns * 1e-3);
-  }
+  put_vision_stages(f, t->vision);
+  for (size_t i = 0; i < t->stage_count; i++) put_stage(f, t->stages[i].name, t->stages[i].histogram);
   (void)fputs("  \"allocations_after_start\": ", f);
   if (t->allocations_after_start < 0) {
     (void)fputs("null", f);

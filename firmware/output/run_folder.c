@@ -106,7 +106,7 @@ static void trajectory_head(wm_run_folder *self, int dof) {
 static void published_head(wm_run_folder *self, int dof) {
   if (self->published_has_head) return;
   wm_row *head = begin(self);
-  wm_row_text(head, "t_ns,sent_ns,fused_until_ns,");
+  wm_row_text(head, "t_ns,made_ns,fused_until_ns,");
   pose_head(head, dof);
   wm_row_text(head, ",odom_x_m,odom_y_m,odom_heading_rad,resets,lost_probability");
   end(self, PUBLISHED);

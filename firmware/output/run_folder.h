@@ -33,7 +33,10 @@ typedef struct wm_timing_stage {
   const wm_histogram *histogram;
 } wm_timing_stage;
 
+#define WM_TIMING_LOOK "look "  // before a detector's source: decoding a picture and detecting in it
+
 typedef struct wm_timing {
+  const wm_vision *vision;  // NULL: no pictures. Stages decode and detect of all, and WM_TIMING_LOOK of each source
   const wm_timing_stage *stages;
   size_t stage_count;
   int64_t allocations_after_start;  // of the estimator's thread; -1 where they can't be counted

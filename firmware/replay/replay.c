@@ -2,6 +2,7 @@
 #include "replay/replay.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -12,6 +13,7 @@
 #include "rt/arena.h"
 #include "rt/clock.h"
 #include "rt/memory.h"
+#include "waymark/yaml.h"
 
 #define STACK_BYTES ((size_t)256 << 10)
 #define PROGRESS_EVERY_NS (200 * WM_NS_PER_MS)
@@ -38,6 +40,38 @@ static wm_status take_memory(replay *self, wm_error *err) {
       (wm_arena_need){"readers", self->assembly.source_count * sizeof(wm_source_reader), (void **)&self->readers};
   count += wm_vision_needs(self->assembly.vision, needs + count);
   return wm_arena_fill(&self->arena, needs, count, 0, err);
+}
+
+// ── how long detectors take ─────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_status take_time(const wm_yaml_node *timing, const char *run, wm_source *source, wm_error *err) {
+  char stage[WM_SOURCE_NAME_MAX + sizeof WM_TIMING_LOOK];
+  (void)snprintf(stage, sizeof stage, WM_TIMING_LOOK "%s", source->name);
+  for (size_t i = 0; i < wm_yaml_count(timing); i++) {
+    const char *key;
+    double median_us;
+    wm_yaml_node found = wm_yaml_value(timing, i, &key, NULL);
+    if (strcmp(key, stage) != 0) continue;
+    found = wm_yaml_get(&found, "p50_us");
+    wm_status status = wm_yaml_f64(&found, 0, 6e7, &median_us, err);
+    if (status == WM_OK) source->ready_after_ns = wm_ns_from_seconds(median_us * 1e-6);
+    return status;
+  }
+  return wm_fail(err, WM_BAD_CONFIG, "%s/timing.json: has no stage \"%s\": that run had no such detector", run, stage);
+}
+
+// By the median of a run: what a detector takes on the computer that the run was on.
+static wm_status take_times_of(const char *run, wm_vision *vision, wm_error *err) {
+  char path[WM_PATH_MAX];
+  wm_yaml *doc;
+  (void)snprintf(path, sizeof path, "%s/timing.json", run);
+  wm_status status = wm_yaml_load(path, &doc, err);
+  if (status != WM_OK) return status;
+  const wm_yaml_node root = wm_yaml_root(doc);
+  for (size_t i = 0; status == WM_OK && i < wm_vision_count(vision); i++)
+    status = take_time(&root, run, wm_vision_source(vision, i), err);
+  wm_yaml_free(doc);
+  return status;
 }
 
 static void begin_steady(replay *self) {
@@ -117,15 +151,12 @@ static wm_status write_summary(replay *self, wm_run_report *report, wm_error *er
   report->allocations_after_start = self->allocations;
   report->page_faults_after_start = self->page_faults;
 
-  wm_histogram decode_ns, detect_ns;
-  wm_vision_times(self->assembly.vision, &decode_ns, &detect_ns);
-  const wm_timing_stage stages[] = {{"decode", &decode_ns},
-                                    {"detect", &detect_ns},
-                                    {"arrive", &self->pipeline.arrive_ns},
+  const wm_timing_stage stages[] = {{"arrive", &self->pipeline.arrive_ns},
                                     {"predict", &self->pipeline.fuser.predict_ns},
                                     {"correct", &self->pipeline.fuser.correct_ns},
                                     {"publish", &self->pipeline.publish_ns}};
-  const wm_timing timing = {.stages = stages,
+  const wm_timing timing = {.vision = self->assembly.vision,
+                            .stages = stages,
                             .stage_count = sizeof stages / sizeof stages[0],
                             .allocations_after_start = self->allocations,
                             .page_faults_after_start = self->page_faults,
@@ -148,6 +179,7 @@ static wm_status run(replay *self, const wm_config *config, wm_recording *record
   if (status == WM_OK) status = take_memory(self, err);
   if (status == WM_OK && options->frames_of)
     status = seen_frames_apply(options->frames_of, recording, &self->assembly, &report->log_ahead_ns, err);
+  if (status == WM_OK && options->timing_of) status = take_times_of(options->timing_of, self->assembly.vision, err);
   if (status == WM_OK) status = wm_run_folder_open(options->out_dir, &self->assembly, &self->folder, err);
   if (status != WM_OK) return status;
   self->output = wm_run_folder_output(self->folder);

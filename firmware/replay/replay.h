@@ -22,6 +22,7 @@ typedef struct wm_replay_options {
   void *progress_context;
   const wm_raster *map;    // event log only: the map whose hash it names; NULL where it names none
   const char *frames_of;   // recording only: the event log of a run fed from it, whose pictures alone are looked at
+  const char *timing_of;   // recording only: the folder of a run, whose detectors took the time that they take here
   double from_s, until_s;  // recording only: this part of it, s from its first stamp; until_s 0: to its end
 } wm_replay_options;
 

@@ -1,21 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sources/videos.h"
 
-#include "waymark/video.h"
-
 static int has(const wm_pictures *base, const char *camera) {
   return wm_video_there(((const videos *)base)->dir, camera);
 }
 
 static wm_status open_video(wm_pictures *base, const wm_camera *camera, int32_t index, const wm_frame_wishes *wishes,
                             wm_frame_source **out, wm_error *err) {
-  const videos *self = (const videos *)base;
+  videos *self = (videos *)base;
   wm_video *video;
   (void)wishes;
   *out = NULL;
   wm_status status = wm_video_open(self->dir, camera, index, self->warn, self->warn_context, &video, err);
-  if (status == WM_OK) *out = wm_video_frames(video);
-  return status;
+  if (status != WM_OK) return status;
+  wm_video **first = &self->first[index];
+  if (*first) status = wm_video_share(video, *first, err);
+  if (status != WM_OK) {
+    wm_video_close(video);
+    return status;
+  }
+  if (!*first) *first = video;
+  *out = wm_video_frames(video);
+  return WM_OK;
 }
 
 static wm_status start_nothing(wm_pictures *base, wm_error *err) {

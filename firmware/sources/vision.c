@@ -88,6 +88,7 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
         wm_site_appearances(wm_recording_site(recording), &s->view.appearances, &s->view.appearance_count, err);
     if (status != WM_OK) return status;
     s->newest = &self->newest;
+    s->looks_at_arrival = 1;
   }
   if (!search_outcomes_open(&s->outcomes, s->view.appearance_count))
     return wm_fail(err, WM_IO, "no memory for detectors");
@@ -154,9 +155,11 @@ wm_status wm_vision_open(const wm_config *config, wm_recording *recording, wm_wa
   for (size_t i = 0; i < config->vision_count; i++) {
     const wm_vision_config *wanted = &config->vision[i];
     if (!(wanted->detector->gives & config->estimator->takes)) continue;
-    if (!self) self = calloc(1, sizeof *self);
-    if (!self) return wm_fail(err, WM_IO, "no memory for detectors");
-    videos_of(&self->videos, recording, warn, context);
+    if (!self) {
+      self = calloc(1, sizeof *self);
+      if (!self) return wm_fail(err, WM_IO, "no memory for detectors");
+      videos_of(&self->videos, recording, warn, context);
+    }
     wm_pictures *pictures = wm_recording_pictures(recording);
     if (!pictures) pictures = &self->videos.base;
     wm_status status = wanted->detector->pictures == 2 ? add_pair(self, config, wanted, recording, pictures, err)
@@ -186,6 +189,7 @@ void wm_vision_close(wm_vision *self) {
 
 size_t wm_vision_count(const wm_vision *self) { return self ? self->count : 0; }
 wm_source *wm_vision_source(wm_vision *self, size_t i) { return &self->sources[i].base; }
+const char *wm_vision_name(const wm_vision *self, size_t i) { return self->sources[i].base.name; }
 
 void wm_vision_look_only_at(wm_vision *self, size_t i, wm_seen *seen, size_t count) {
   vision_look_only_at(&self->sources[i], seen, count);
@@ -226,6 +230,10 @@ wm_status wm_vision_run_ahead(wm_vision *self, wm_error *err) {
   return status;
 }
 
+void wm_vision_look_at_arrival(wm_vision *self) {
+  for (size_t i = 0; i < wm_vision_count(self); i++) self->sources[i].looks_at_arrival = 1;
+}
+
 void wm_vision_tell(wm_vision *self, const wm_estimate *newest) {
   if (self) newest_pose_put(&self->newest, newest);
 }
@@ -235,10 +243,7 @@ size_t wm_vision_looks(const wm_vision *self, size_t i, const wm_landmark_looks 
   return self->sources[i].outcomes.count;
 }
 
-wm_time_ns wm_vision_look_p99(const wm_vision *self, size_t i) {
-  const vision_source *s = &self->sources[i];
-  return wm_histogram_quantile(&s->decode_ns, 0.99) + wm_histogram_quantile(&s->detect_ns, 0.99);
-}
+const wm_histogram *wm_vision_look_ns(const wm_vision *self, size_t i) { return &self->sources[i].look_ns; }
 
 void wm_vision_times(const wm_vision *self, wm_histogram *decode_ns, wm_histogram *detect_ns) {
   memset(decode_ns, 0, sizeof *decode_ns);

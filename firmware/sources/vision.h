@@ -35,6 +35,7 @@ void wm_vision_close(wm_vision *self);  // NULL is fine; ends its threads
 
 size_t wm_vision_count(const wm_vision *self);  // 0 for NULL
 wm_source *wm_vision_source(wm_vision *self, size_t i);
+const char *wm_vision_name(const wm_vision *self, size_t i);  // of source i: "edges:front"
 
 // A picture that a run saw, and when its observations came.
 typedef struct wm_seen {
@@ -52,9 +53,12 @@ size_t wm_vision_needs(wm_vision *self, wm_arena_need *needs);
 WM_REALTIME void wm_vision_tell(wm_vision *self, const wm_estimate *newest);
 // With the memory in place: makes the detectors' tables. Takes a while.
 wm_status wm_vision_start(wm_vision *self, wm_error *err);
-// From here on a thread a source works ahead of who asks for its events. Not for a run. A guided detector needs the
-// pose as it is when the picture arrives: its source hands out an event of kind WM_EVENT_NONE at each picture's arrival
-// and looks when it is asked for the next one.
+// From here on a recorded picture is looked at when it arrives, as on a robot, so that the time of detection delays its
+// observations: each source hands out an event of kind WM_EVENT_NONE at a picture's arrival and looks when it is asked
+// for the next one. For a run. Sources whose detector is guided always do so.
+void wm_vision_look_at_arrival(wm_vision *self);  // NULL is fine
+// From here on a thread a source works ahead of who asks for its events. Not for a run, and not of
+// guided detectors, which need the pose as it is when the picture arrives.
 wm_status wm_vision_run_ahead(wm_vision *self, wm_error *err);
 
 // What became of a landmark in the pictures that a source looked at: how often each wm_look.
@@ -67,8 +71,8 @@ typedef struct wm_landmark_looks {
 // have ended or the run is over.
 size_t wm_vision_looks(const wm_vision *self, size_t i, const wm_landmark_looks **rows);
 
-// How long decoding and detecting take source i, 99 of 100 pictures at most; 0 where it looked at none. Valid as below.
-wm_time_ns wm_vision_look_p99(const wm_vision *self, size_t i);
+// How long decoding a picture and detecting in it take source i together. Valid as below.
+const wm_histogram *wm_vision_look_ns(const wm_vision *self, size_t i);
 // How long decoding and detecting take, of all sources together (valid when the threads have ended or the run is over).
 void wm_vision_times(const wm_vision *self, wm_histogram *decode_ns, wm_histogram *detect_ns);
 

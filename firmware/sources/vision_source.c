@@ -100,7 +100,7 @@ static wm_status find_together(vision_source *self, wm_frame *heads, wm_error *e
 }
 
 // Decodes what belongs together, or takes what another thread has decoded.
-static wm_status decode(vision_source *self, wm_frame *frames, wm_error *err) {
+static wm_status decode(vision_source *self, wm_frame *frames, wm_time_ns *took_ns, wm_error *err) {
   wm_frame heads[PICTURES_MAX] = {0};
   wm_status status = find_together(self, heads, err);
   wm_time_ns begin_ns = wm_monotonic_ns(), elsewhere_ns = 0;
@@ -108,15 +108,17 @@ static wm_status decode(vision_source *self, wm_frame *frames, wm_error *err) {
     status = self->pictures[i]->ops->next(self->pictures[i], &frames[i], err);
     elsewhere_ns += self->pictures[i]->decoded_in_ns;
   }
-  if (status == WM_OK) wm_histogram_add(&self->decode_ns, wm_monotonic_ns() - begin_ns + elsewhere_ns);
+  *took_ns = wm_monotonic_ns() - begin_ns + elsewhere_ns;
+  if (status == WM_OK) wm_histogram_add(&self->decode_ns, *took_ns);
   return status;
 }
 
 // Looks at the next picture: self->events, from the first.
 static wm_status look(vision_source *self, wm_error *err) {
   wm_frame frames[PICTURES_MAX] = {0};
+  wm_time_ns decoding_ns;
   self->event_count = self->next_event = 0;
-  wm_status status = decode(self, frames, err);
+  wm_status status = decode(self, frames, &decoding_ns, err);
   if (status != WM_OK) return status;
   if (!are_together(self, frames)) return WM_OK;  // one of a pair turned out to be damaged
   // A camera's pictures come in their order; who goes back has a broken clock.
@@ -136,6 +138,7 @@ static wm_status look(vision_source *self, wm_error *err) {
   status = self->detector->detect(self->state, frames, prediction, self->events, self->capacity, &self->event_count);
   wm_time_ns ready_ns = wm_monotonic_ns();
   wm_histogram_add(&self->detect_ns, ready_ns - begin_ns);
+  wm_histogram_add(&self->look_ns, decoding_ns + ready_ns - begin_ns);
   if (self->base.is_live) arrival_ns = ready_ns;  // an observation arrives when it is ready, not with its picture
   self->busy_until_ns = arrival_ns;
   if (status != WM_OK) {
@@ -181,7 +184,7 @@ static wm_status announce(vision_source *self, wm_event *out, wm_error *err) {
 
 wm_status vision_next(vision_source *self, wm_event *out, wm_error *err) {
   while (self->next_event == self->event_count) {
-    if (self->newest && !self->base.is_live && !self->announced) return announce(self, out, err);
+    if (self->looks_at_arrival && !self->base.is_live && !self->announced) return announce(self, out, err);
     self->announced = 0;
     wm_status status = look(self, err);
     take_counts(self);

@@ -47,14 +47,15 @@ struct vision_source {
   uint32_t seq;
   wm_source_counts counts;      // the working thread's own
   uint64_t went_back, refused;  // pictures that are older than the one before; that the detector didn't take
-  wm_histogram decode_ns, detect_ns;
+  wm_histogram decode_ns, detect_ns, look_ns;  // look: of a picture, both together
   search_outcomes outcomes;
   wm_seen *only;  // the only pictures to be looked at, rising; NULL: all
   size_t only_count;
   wm_time_ns only_tolerance_ns;
   newest_pose *newest;       // NULL: nothing guides the detector
   wm_time_ns busy_until_ns;  // recorded: until its detector would have been done
-  int announced;             // guided and recorded: the next picture's arrival was told
+  int looks_at_arrival;      // recorded: not before, as wm_vision_look_at_arrival has it
+  int announced;             // likewise: the next picture's arrival was handed out
   vision_ahead ahead;
 };
 

@@ -80,6 +80,7 @@ static void put_source(waymark_source_health_t *out, const wm_source_health *s) 
   out->frozen = (int64_t)s->frozen;
   out->lateness_p99_ns = s->lateness_p99_ns;
   out->lateness_max_ns = s->lateness_max_ns;
+  out->lateness_worst_ns = s->lateness_worst_ns;
   out->newest_ns = s->newest_ns;
   out->silent_ns = s->silent_ns;
   out->stale = (int8_t)s->stale;
@@ -107,6 +108,8 @@ size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {
       .reckoning_left_s = h->reckoning_left_s,
       .send_p99_ns = h->send_p99_ns,
       .lines_lost = (int64_t)h->lines_lost,
+      .other_runs = (int32_t)h->other_runs,
+      .other_runs_total = (int32_t)h->other_runs_total,
   };
   m.source_count = (int32_t)(h->source_count < WM_HEALTH_SOURCES_MAX ? h->source_count : WM_HEALTH_SOURCES_MAX);
   for (int32_t i = 0; i < m.source_count; i++) put_source(&m.sources[i], &h->sources[i]);

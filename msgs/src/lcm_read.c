@@ -68,6 +68,7 @@ static void take_source(wm_source_health *out, const waymark_source_health_t *s)
   out->bus_errors = (uint64_t)s->bus_errors;
   out->lateness_p99_ns = s->lateness_p99_ns;
   out->lateness_max_ns = s->lateness_max_ns;
+  out->lateness_worst_ns = s->lateness_worst_ns;
   out->newest_ns = s->newest_ns;
   out->silent_ns = s->silent_ns;
   out->stamp_uncertainty_ns = s->stamp_uncertainty_ns;
@@ -95,6 +96,8 @@ const char *wm_lcm_read_health(const void *message, size_t length, wm_health *ou
   out->reckoning_left_s = m.reckoning_left_s;
   out->send_p99_ns = m.send_p99_ns;
   out->lines_lost = (uint64_t)m.lines_lost;
+  out->other_runs = (uint32_t)m.other_runs;
+  out->other_runs_total = (uint32_t)m.other_runs_total;
   for (int32_t i = 0; i < m.source_count && i < WM_HEALTH_SOURCES_MAX; i++)
     take_source(&out->sources[out->source_count++], &m.sources[i]);
   for (int32_t i = 0; i < m.calibration_count && i < WM_HEALTH_CALIBRATION_MAX; i++) {

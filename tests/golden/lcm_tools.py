@@ -114,7 +114,7 @@ def check_logger(work):
         row = rows[pose.t_ns]
         assert pose.position_m[0] == float(row["x_m"]) and pose.position_m[1] == float(row["y_m"])
         assert pose.covariance[0][0] == float(row["cov_xx"]) and pose.covariance[5][5] == float(row["cov_tt"])
-        assert pose.made_ns == int(row["sent_ns"]) <= pose.sent_ns and pose.jumps == int(row["resets"])
+        assert pose.made_ns == int(row["made_ns"]) <= pose.sent_ns and pose.jumps == int(row["resets"])
     utc_ns = poses[-1].t_ns + poses[-1].utc_offset_ns
     assert abs(utc_ns - time.time_ns()) < 60e9 and 0 < poses[-1].utc_uncertainty_ns < 1e8, "the offset of UTC"
     assert counts["WAYMARK_HEALTH"] >= 2 and counts["WAYMARK_LANDMARKS"] >= 1

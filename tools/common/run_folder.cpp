@@ -155,7 +155,8 @@ Published load_published(const fs::path &run) {
     throw Failure(run.string() + ": is no folder; RUN is what `waymark replay --out RUN` wrote", kUsage);
   const Csv csv = Csv::load(run / "published.csv");
   const PoseColumns at = find_columns(csv);
-  const size_t sent = csv.need("sent_ns");
+  const Column older = csv.find("sent_ns");  // the name that made_ns had
+  const size_t made = older ? *older : csv.need("made_ns");
   const size_t until = csv.need("fused_until_ns");
   const std::array<Column, 3> odom{csv.find("odom_x_m"), csv.find("odom_y_m"), csv.find("odom_heading_rad")};
   const Column resets = csv.find("resets");
@@ -167,7 +168,7 @@ Published load_published(const fs::path &run) {
     PublishedRow sentence{};
     if (!read_pose(csv, row, at, &sentence.pose)) continue;
     sentence.t_ns = sentence.pose.t_ns;
-    sentence.sent_ns = csv.integer(row, sent);
+    sentence.made_ns = csv.integer(row, made);
     sentence.fused_until_ns = csv.integer(row, until);
     for (int i = 0; i < 3; ++i) sentence.odom[i] = csv.number(row, odom[static_cast<size_t>(i)]);
     sentence.resets = resets ? csv.integer(row, *resets) : 0;

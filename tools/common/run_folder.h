@@ -25,7 +25,7 @@ Trajectory load_reference(const std::filesystem::path &run);
 
 // A row of published.csv beyond the pose itself.
 struct PublishedRow {
-  int64_t t_ns, sent_ns, fused_until_ns;
+  int64_t t_ns, made_ns, fused_until_ns;
   Pose pose;
   Eigen::Vector3d odom;  // x, y, heading; NaN where absent
   int64_t announced;     // counter of announced jumps: resets, and jumps where the file has that column

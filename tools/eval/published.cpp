@@ -39,7 +39,7 @@ void add_published_figures(const Published &published, Figures *figures) {
   std::vector<double> ages_ms;
   std::vector<double> behind_ms;
   for (const PublishedRow &row : published.rows) {
-    ages_ms.push_back(static_cast<double>(row.sent_ns - row.t_ns) * 1e-6);
+    ages_ms.push_back(static_cast<double>(row.made_ns - row.t_ns) * 1e-6);
     behind_ms.push_back(static_cast<double>(row.t_ns - row.fused_until_ns) * 1e-6);
   }
   double odom_step_m = 0;

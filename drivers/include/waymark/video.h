@@ -5,7 +5,7 @@
 //
 // Memory is fixed once it is open: two compressed pictures of the largest size that the camera's can have, one
 // decoded. libturbojpeg has a heap of its own. Nothing in a file makes this stop a program: what can't be used is
-// counted and passed over. One thread at a time.
+// counted and passed over. One thread at a time a reader.
 #ifndef WAYMARK_VIDEO_H
 #define WAYMARK_VIDEO_H
 
@@ -50,6 +50,10 @@ int wm_video_there(const char *recording_dir, const char *camera_name);
 wm_status wm_video_open(const char *recording_dir, const wm_camera *camera, int32_t index, wm_warn_fn warn,
                         void *context, wm_video **out, wm_error *err);
 void wm_video_close(wm_video *self);  // NULL is fine
+
+// From here on two readers of the same video, each at its own place and on its own thread, decode a picture once: the
+// first that needs it. Before their first picture; more readers may join. Frames and other counts are as without.
+wm_status wm_video_share(wm_video *self, wm_video *with, wm_error *err);
 
 uint32_t wm_video_width(const wm_video *self);
 uint32_t wm_video_height(const wm_video *self);

@@ -52,7 +52,8 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, fin
 // What a run adds to the lateness of a picture: its observations arrive when they are ready.
 static wm_time_ns look_ns(const wm_assembly *assembly, const wm_source *source) {
   for (size_t i = 0; i < wm_vision_count(assembly->vision); i++)
-    if (wm_vision_source(assembly->vision, i) == source) return wm_vision_look_p99(assembly->vision, i);
+    if (wm_vision_source(assembly->vision, i) == source)
+      return wm_histogram_quantile(wm_vision_look_ns(assembly->vision, i), 0.99);
   return 0;
 }
 

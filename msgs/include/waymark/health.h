@@ -46,7 +46,8 @@ typedef struct wm_source_health {
   uint64_t future;                      // stamped later than it arrived
   uint64_t lost, malformed, not_finite, out_of_order, ignored, frozen;  // the source's own (wm_source_counts)
   uint64_t overflows, bus_errors;                                       // likewise
-  wm_time_ns lateness_p99_ns;                                           // arrival minus stamp
+  wm_time_ns lateness_p99_ns;                                           // arrival minus stamp, of 99 of 100
+  wm_time_ns lateness_worst_ns;                                         // of all
   wm_time_ns lateness_max_ns;                                           // the config's bound
   wm_time_ns newest_ns;                                                 // newest stamp, WM_TIME_NONE before the first
   wm_time_ns silent_ns;                                                 // since its last datum, on the arrival clock
@@ -74,8 +75,10 @@ typedef struct wm_health {
   uint64_t published;
   // Remaining dead reckoning until the pose is too uncertain: infinite while the robot stands, NaN without a pose.
   double reckoning_left_m, reckoning_left_s;
-  wm_time_ns send_p99_ns;  // from a pose made to its message handed to LCM, 99 of 100
-  uint64_t lines_lost;     // lines of text that a blocked disk or terminal had no room for
+  wm_time_ns send_p99_ns;     // from a pose made to its message handed to LCM, 99 of 100
+  uint64_t lines_lost;        // lines of text that a blocked disk or terminal had no room for
+  uint32_t other_runs;        // runs that publish on the same channels now
+  uint32_t other_runs_total;  // since the start
 } wm_health;
 
 // The counter of this kind, or a null pointer where the estimator has none.

@@ -262,6 +262,54 @@ static void cut_files_end_where_they_end(void) {
   }
 }
 
+#define SHARED 40
+// GIVEN two readers of one video WHEN one is ahead, far ahead (beyond what is kept), or skips THEN each has the pixels
+// and counts that it has alone.
+static void readers_share_what_is_decoded(void) {
+  wm_video *other;
+  wm_frame frame;
+  avi_head(&file, "MJPG", W, H, 0);
+  for (int i = 0; i < SHARED; i++) {
+    if (i == 7) {
+      avi_chunk(&file, "00dc", "this is no JPEG", 15);
+    } else {
+      add_jpeg(2 * i);
+    }
+  }
+  save("video/front.avi");
+  numbered_rows(SHARED);
+  open_it();
+  TEST_ASSERT_EQUAL(WM_OK, wm_video_open(dir, &camera, 3, NULL, NULL, &other, &err));
+  TEST_ASSERT_EQUAL(WM_OK, wm_video_share(other, video, &err));
+  for (int i = 0; i < 30; i++)
+    if (i != 7) expect_frame((uint64_t)i, 2 * i);
+  for (int i = 0; i < SHARED; i++) {
+    if (i == 7) continue;
+    if (i == 20) {
+      TEST_ASSERT_EQUAL(WM_OK, wm_video_skip(other, &err));
+      continue;
+    }
+    TEST_ASSERT_EQUAL(WM_OK, wm_video_next(other, &frame, &err));
+    TEST_ASSERT_EQUAL_UINT64(i, frame.number);
+    TEST_ASSERT_INT_WITHIN(4, 2 * i, frame.grey[5 * frame.stride_bytes + 5]);
+    if (i >= 30) {
+      const uint8_t *held = frame.grey;
+      expect_frame((uint64_t)i, 2 * i);
+      TEST_ASSERT_INT_WITHIN(4, 2 * i, held[5 * frame.stride_bytes + 5]);
+    }
+  }
+  expect_end();
+  TEST_ASSERT_EQUAL(WM_END, wm_video_next(other, &frame, &err));
+  TEST_ASSERT_EQUAL_UINT64(SHARED - 1, wm_video_counted(video)->frames);
+  TEST_ASSERT_EQUAL_UINT64(SHARED - 2, wm_video_counted(other)->frames);
+  TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(other)->skipped);
+  TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(video)->damaged);
+  TEST_ASSERT_EQUAL_UINT64(1, wm_video_counted(other)->damaged);
+  TEST_ASSERT_EQUAL_STRING(wm_video_counted(video)->first_problem, wm_video_counted(other)->first_problem);
+  wm_video_close(video);  // whoever opened it first
+  video = other;
+}
+
 static void refused(wm_status status, const char *text) {
   TEST_ASSERT_EQUAL_MESSAGE(status, wm_video_open(dir, &camera, 0, NULL, NULL, &video, &err), err.text);
   TEST_ASSERT_NULL(video);
@@ -298,6 +346,7 @@ int main(void) {
   RUN_TEST(what_is_not_right_is_counted);
   RUN_TEST(a_damaged_container_ends_the_pictures);
   RUN_TEST(cut_files_end_where_they_end);
+  RUN_TEST(readers_share_what_is_decoded);
   RUN_TEST(what_is_refused);
   return UNITY_END();
 }

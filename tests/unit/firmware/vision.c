@@ -4,6 +4,7 @@
 #include <dirent.h>
 #include <malloc.h>
 #include <math.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -101,6 +102,17 @@ static void open_it(const char *section, uint32_t takes) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_vision_start(vision, &err), err.text);
 }
 
+// Linked in the place of jpeg_decode (--wrap), which it counts.
+static atomic_int decodings;
+int __real_jpeg_decode(void *, const uint8_t *, size_t, uint32_t, uint32_t, uint8_t *, uint32_t, char *, size_t);
+int __wrap_jpeg_decode(void *self, const uint8_t *data, size_t length, uint32_t width_px, uint32_t height_px,
+                       uint8_t *grey, uint32_t stride_bytes, char *why, size_t why_bytes);
+int __wrap_jpeg_decode(void *self, const uint8_t *data, size_t length, uint32_t width_px, uint32_t height_px,
+                       uint8_t *grey, uint32_t stride_bytes, char *why, size_t why_bytes) {
+  atomic_fetch_add(&decodings, 1);
+  return __real_jpeg_decode(self, data, length, width_px, height_px, grey, stride_bytes, why, why_bytes);
+}
+
 #define POINTS WM_EVENT_BIT(WM_EVENT_POINTS)
 #define LOOKED WM_EVENT_BIT(WM_EVENT_LOOKED)
 
@@ -141,6 +153,57 @@ static void events_of_pictures(void) {
   TEST_ASSERT_EQUAL(WM_OK, wm_vision_run_ahead(vision, &err));
   TEST_ASSERT_EQUAL(bytes, drain(wm_vision_source(vision, 0), ahead, sizeof ahead));
   TEST_ASSERT_EQUAL_MEMORY(here, ahead, bytes);
+}
+
+// GIVEN two detectors on one recorded camera WHEN a replay reads both, in the order of their events THEN each picture
+// is decoded once, whether threads work ahead or not.
+static void two_detectors_on_one_camera_decode_a_picture_once(void) {
+  for (int ahead = 0; ahead < 2; ahead++) {
+    static wm_event event[2];
+    int counts[2] = {0}, has[2] = {1, 1};
+    if (ahead) {
+      tearDown();
+      setUp();
+    }
+    open_it("vision: {edges: {cameras: [front]}, apriltag: {family: tag36h11, size_m: 0.2, cameras: [front]}}\n",
+            POINTS | LOOKED | WM_EVENT_BIT(WM_EVENT_MARKER));
+    TEST_ASSERT_EQUAL(2, wm_vision_count(vision));
+    atomic_store(&decodings, 0);
+    if (ahead) TEST_ASSERT_EQUAL(WM_OK, wm_vision_run_ahead(vision, &err));
+    for (int i = 0; i < 2; i++) {
+      wm_source *source = wm_vision_source(vision, (size_t)i);
+      has[i] = source->ops->next(source, &event[i], &err) == WM_OK;
+    }
+    while (has[0] || has[1]) {
+      const int i = !has[0] || (has[1] && event[1].arrival_ns < event[0].arrival_ns);
+      wm_source *source = wm_vision_source(vision, (size_t)i);
+      counts[i]++;
+      has[i] = source->ops->next(source, &event[i], &err) == WM_OK;
+    }
+    TEST_ASSERT_EQUAL(FRAMES, counts[0]);
+    TEST_ASSERT_EQUAL(FRAMES, counts[1]);
+    TEST_ASSERT_EQUAL(FRAMES, atomic_load(&decodings));
+  }
+}
+
+// In a run a recorded picture is looked at when it arrives: detection delays what it finds.
+static void a_run_looks_at_a_recorded_picture_when_it_arrives(void) {
+  static wm_event event;
+  open_it("vision: {edges: {cameras: [front]}}\n", POINTS | LOOKED);
+  wm_vision_look_at_arrival(vision);
+  wm_source *source = wm_vision_source(vision, 0);
+  atomic_store(&decodings, 0);
+  for (int i = 0; i < FRAMES; i++) {
+    TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
+    TEST_ASSERT_EQUAL(WM_EVENT_NONE, event.kind);
+    TEST_ASSERT_EQUAL_INT64(100000000 * (i + 1) + 30000000, event.arrival_ns);
+    TEST_ASSERT_EQUAL(i, atomic_load(&decodings));  // not looked at yet
+    TEST_ASSERT_EQUAL(WM_OK, source->ops->next(source, &event, &err));
+    TEST_ASSERT_EQUAL_INT64(100000000 * (i + 1), event.t_ns);
+    TEST_ASSERT_EQUAL(i + 1, atomic_load(&decodings));
+  }
+  TEST_ASSERT_EQUAL(WM_END, source->ops->next(source, &event, &err));
+  TEST_ASSERT_EQUAL_UINT64(FRAMES, wm_vision_look_ns(vision, 0)->count);
 }
 
 static void ended_in_the_middle(void) {
@@ -266,6 +329,8 @@ static void wrong_configurations(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(events_of_pictures);
+  RUN_TEST(two_detectors_on_one_camera_decode_a_picture_once);
+  RUN_TEST(a_run_looks_at_a_recorded_picture_when_it_arrives);
   RUN_TEST(ended_in_the_middle);
   RUN_TEST(old_pictures_are_passed_over);
   RUN_TEST(observations_arrive_after_the_time_that_detection_takes);

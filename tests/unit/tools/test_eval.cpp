@@ -398,8 +398,8 @@ void test_tum_serves_where_there_is_no_csv() {
   TEST_ASSERT_TRUE(f.at("anees_dof").is_null());
 }
 
-const char *const kPublishedHeader =
-    "t_ns,sent_ns,fused_until_ns,x_m,y_m,z_m,qx,qy,qz,qw,cov_xx,cov_xy,cov_yy,cov_xt,cov_yt,cov_tt,state,"
+const std::string kPublishedHeader =
+    "t_ns,made_ns,fused_until_ns,x_m,y_m,z_m,qx,qy,qz,qw,cov_xx,cov_xy,cov_yy,cov_xt,cov_yt,cov_tt,state,"
     "odom_x_m,odom_y_m,odom_heading_rad,resets\n";
 
 std::string sent(int64_t t_ms, double age_ms, double x, double odom_x, int resets) {
@@ -438,6 +438,12 @@ void test_published() {
   const Published twice = load_published(run.path());
   TEST_ASSERT_FALSE(twice.strictly_rising);
   TEST_ASSERT_EQUAL(1, twice.trajectory.poses.size());
+
+  // A run of before the column had its name.
+  std::string older = kPublishedHeader;
+  older.replace(older.find("made_ns"), 7, "sent_ns");
+  run.write("published.csv", older + sent(20, 3, 0, 0, 1));
+  TEST_ASSERT_EQUAL_INT64(23'000'000, load_published(run.path()).rows.at(0).made_ns);
 }
 
 void test_sightings_of_known_landmarks() {
