@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A ring of fixed slots between exactly one producer thread and one consumer thread: the only thing that is shared
-// between threads. No lock, no system call, no allocation after init. When it is full the newest record is not taken
-// and counted. Source: L. Lamport, "Specifying concurrent program modules", 1983 (single producer, single consumer).
+// A ring of fixed slots between exactly one producer thread and one consumer thread [Lamport1983]. No lock, no system
+// call, no allocation after init. When it is full the newest record is dropped and counted. docs/runtime.md lists what
+// else threads share.
 #ifndef WAYMARK_RT_RING_H
 #define WAYMARK_RT_RING_H
 

@@ -114,26 +114,60 @@ def glossary():
     return faults
 
 
+WALKS = {"design.md": ROOT / "estimator", "runtime.md": ROOT}
+
+
 def walks():
-    """Prints functions of docs/design.md's walks that are not in the file beside them; returns how many."""
+    """Prints functions of the pages' walks that are not in the file beside them; returns how many."""
     faults = 0
-    row = re.compile(r"^\| \d \| `([^`]+)` \| `([^`]+)` \|")
-    for number, line in enumerate((ROOT / "docs/design.md").read_text().splitlines(), 1):
-        match = row.match(line)
-        path = ROOT / "estimator" / match.group(2) if match else None
-        if path and (not path.exists() or match.group(1) + "(" not in path.read_text()):
-            faults += 1
-            print(f"docs/design.md:{number}: {match.group(1)} is not in {match.group(2)}")
+    row = re.compile(r"^\| \d+ \| `([^`]+)` \| `([^`]+)` \|")
+    for page, below in WALKS.items():
+        for number, line in enumerate((ROOT / "docs" / page).read_text().splitlines(), 1):
+            match = row.match(line)
+            path = below / match.group(2) if match else None
+            if path and (not path.exists() or match.group(1) + "(" not in path.read_text()):
+                faults += 1
+                print(f"docs/{page}:{number}: {match.group(1)} is not in {match.group(2)}")
     return faults
+
+
+# Paths of sources in the prose of these pages.
+NAMED = re.compile(r"`((?:firmware|drivers|estimator|msgs|tests|tools)/[\w/.-]+\.(?:c|h|cpp|hpp|py))`")
+
+
+def named_files():
+    """Prints files that docs/*.md name and that are not there; returns how many."""
+    faults = 0
+    for page in sorted((ROOT / "docs").glob("*.md")):
+        for number, line in enumerate(page.read_text().splitlines(), 1):
+            for path in NAMED.findall(line):
+                if not (ROOT / path).exists():
+                    faults += 1
+                    print(f"docs/{page.name}:{number}: {path} is not there")
+    return faults
+
+
+def drawing():
+    """Prints and returns 1 where docs/images/threads.svg is not what its script draws."""
+    images = ROOT / "docs/images"
+    if run(sys.executable, images / "threads.py") == (images / "threads.svg").read_text():
+        return 0
+    print("docs/images/threads.svg is not up to date: python3 docs/images/threads.py > docs/images/threads.svg")
+    return 1
+
+
+def checked():
+    """How many faults the checks find that need no built program."""
+    return references() + glossary() + walks() + named_files() + drawing()
 
 
 def main():
     if sys.argv[1:] == ["references"]:
-        return 1 if references() + glossary() + walks() else 0
+        return 1 if checked() else 0
     if len(sys.argv) != 3 or sys.argv[1] not in ("check", "write"):
         sys.exit(__doc__)
     tests = pathlib.Path(sys.argv[2]) / "tests"
-    stale = 1 if references() + glossary() + walks() else 0
+    stale = 1 if checked() else 0
     for name, make in (("config.md", config_md), ("errors.md", errors_md)):
         path = ROOT / "docs" / name
         fresh = make(tests)
