@@ -1,9 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Makes docs/config.md and docs/errors.md from the programs that know: the tables of parameters, and the tests of the
-messages. docs.py check|write BUILD. `check` prints what differs and fails; `write` brings the files up to date. Both check
-that each reference cited as [Author2015] stands once in docs/references.md, and that what docs/glossary.md and docs/design.md
-name in code is there; docs.py references checks that alone."""
+"""Makes docs/config.md and docs/errors.md from their sources: the tables of parameters, and the tests of the messages.
+docs.py check|write BUILD. `check` prints what differs and fails; `write` brings the files up to date. Both check, and
+docs.py references checks alone, that
+- each reference cited as [Author2015] stands once in docs/references.md;
+- what docs/glossary.md, docs/design.md and docs/runtime.md name in code is there;
+- docs/runtime.md names all files of the robot's rooms that have atomics or locks;
+- docs/images/threads.svg is what its script draws."""
 import collections
 import difflib
 import pathlib
@@ -147,6 +150,22 @@ def named_files():
     return faults
 
 
+SHARED = re.compile(r"_Atomic|\batomic_u?int (?!\*)|pthread_(mutex|cond)_t|std::(mutex|atomic|condition_variable)")
+
+
+def shared():
+    """Prints sources of the robot's rooms with atomics or locks that docs/runtime.md does not name; returns how many."""
+    text, faults = (ROOT / "docs/runtime.md").read_text(), 0
+    for room in ("estimator", "drivers", "firmware"):
+        for path in sorted((ROOT / room).rglob("*")):
+            if path.suffix not in (".c", ".h", ".cpp", ".hpp") or not SHARED.search(path.read_text()):
+                continue
+            if not any(f"`{path.relative_to(ROOT).with_suffix(suffix)}`" in text for suffix in (".c", ".h", ".cpp")):
+                faults += 1
+                print(f"{path.relative_to(ROOT)}: shared between threads, and not named in docs/runtime.md")
+    return faults
+
+
 def drawing():
     """Prints and returns 1 where docs/images/threads.svg is not what its script draws."""
     images = ROOT / "docs/images"
@@ -158,7 +177,7 @@ def drawing():
 
 def checked():
     """How many faults the checks find that need no built program."""
-    return references() + glossary() + walks() + named_files() + drawing()
+    return references() + glossary() + walks() + named_files() + shared() + drawing()
 
 
 def main():
