@@ -8,8 +8,8 @@
 #include "jpeg.h"
 #include "waymark/time.h"
 
-// In a replay each detector is at most 8 events ahead (AHEAD_EVENTS), one is taken and one picture is in work; two more
-// for readers in between.
+// In a replay each detector is at most 8 events ahead (PREFETCH_EVENTS), one is taken and one picture is in work; two
+// more for readers in between.
 #define DECODED_KEPT 12
 
 typedef struct decoded_picture {

@@ -56,7 +56,7 @@ static wm_status fill_estimator(const wm_yaml_node *section, const wm_estimator 
   return config_fill(section, &own, "", shared, warnings, err);
 }
 
-// A section of an estimator that isn't chosen is checked, too: it will be chosen one day.
+// Sections of other estimators are checked, too: they may be chosen later.
 static wm_status check_other_estimator(const wm_yaml_node *section, const wm_estimator *estimator, wm_config *out,
                                        wm_error *err) {
   const wm_param_table *tables[] = {&estimator->params, &wm_motion_params_table, &wm_sighting_params_table};
@@ -73,12 +73,12 @@ static wm_status check_other_estimator(const wm_yaml_node *section, const wm_est
   return status;
 }
 
-// What each parameter allows by itself may make no sense beside another.
+// Limits between parameters, beyond those of each.
 static wm_status check_motion(const wm_yaml_node *section, const wm_config *config, wm_error *err) {
   const char *key, *clash = wm_motion_params_clash(config->motion, &key);
   if (!clash) return WM_OK;
   wm_yaml_node node = wm_yaml_get(section, key);
-  if (!wm_yaml_there(&node)) node.id = section->id;  // its key is written with dots: the section's line will do
+  if (!wm_yaml_there(&node)) node.id = section->id;  // its key is dotted: the section's line is named
   return wm_yaml_fail(&node, err, "%s", clash);
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A configuration names an estimator and its parameters; what belongs to a recording or a robot (calibration,
-// landmarks, DBC, start pose) comes from the recording's folder unless the configuration says otherwise. Read once at
-// start.
+// A configuration names an estimator and its parameters. Calibration, landmarks, DBC and start pose of a robot or
+// recording come from the recording's folder unless the configuration names others. Read once at start.
 //
 //   format: waymark-config/1
 //   estimator: landmark_ekf
@@ -47,10 +46,10 @@ typedef struct wm_source_config {
   char name[WM_SOURCE_NAME_MAX];  // a source's whole name, or what stands before its ':' ("sightings" is each of them)
   int32_t use;                    // 0: not opened
   double lateness_max_ms;         // older than this on the arrival clock is final (and late)
-  double period_ms;               // > 0: promises not to speak again before this after a datum
-  double ready_after_ms;   // of a detector on recorded pictures: its observations arrive so long after the picture
-  int32_t sample_at_next;  // of motion.csv, motion6.csv: a row's values get the stamp of the next row
-  double from_s, until_s;  // seconds from the run's first stamp; only data with stamps inside are taken
+  double period_ms;               // > 0: no event follows within this time after one
+  double ready_after_ms;          // of a detector on recorded pictures: arrival of its observations after the picture's
+  int32_t sample_at_next;         // of motion.csv, motion6.csv: a row's values get the stamp of the next row
+  double from_s, until_s;         // seconds from the run's first stamp; only data with stamps inside are taken
   int line;
 } wm_source_config;
 
@@ -64,9 +63,9 @@ typedef struct wm_runtime_params {
   double publish_motion_stale_ms;
   int32_t publish_lcm;                    // 0: no LCM
   int32_t commands_lcm;                   // 0: SET_POSE and RESET are not taken
-  double publish_useless_m;               // sigma of position from which on a pose is of no use
+  double publish_useless_m;               // sigma of position above which a pose is useless
   double start_max_age_s;                 // of the saved pose
-  double start_moved_m, start_moved_deg;  // sigmas of what may have happened to the robot while it was off
+  double start_moved_m, start_moved_deg;  // sigmas of a motion of the robot while it was off
   double start_save_every_s, start_save_map_every_s;
   double black_box_keep_s, black_box_pictures_hz;
   int32_t realtime_loop_hz;
@@ -114,18 +113,18 @@ typedef struct wm_config {
   char saved_map[WM_PATH_MAX];   // start.saved_map; "": none
   char black_box[WM_PATH_MAX];   // black_box.folder; "": none
   char channel_prefix[48];       // publish.channel_prefix, "WAYMARK_"
-  // Keys that were renamed, removed, or that the estimator does not take: a line each, "FILE:LINE: KEY: what to do",
-  // with a line feed; "": none.
+  // Renamed or removed keys, and keys that the estimator does not take: a line each, "FILE:LINE: KEY: what to do", with
+  // its line feed; "": none.
   char warnings[WM_CONFIG_WARNINGS_MAX];
 } wm_config;
 
-// Every mistake stops with file, line, key, what is there and what is allowed ("did you mean"). Allocates.
+// Each mistake is reported with file, line, key, value and what is allowed ("did you mean"). Allocates.
 wm_status wm_config_load(const char *path, wm_config *out, wm_error *err);
 wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_config *out, wm_error *err);
 // As wm_config_parse, for the text in an event log: the files that it names needn't be on this computer.
 wm_status wm_config_parse_logged(const char *text, size_t length, const char *path, wm_config *out, wm_error *err);
 void wm_config_free(wm_config *config);
-// Hands each line of config->warnings, without its line feed, to `say`.
+// Calls `say` with each line of config->warnings, without its line feed.
 void wm_config_each_warning(const wm_config *config, void (*say)(void *context, const char *line), void *context);
 // The settings of the source `name` ("sightings:laser" takes those of "sightings"), and its rank in the config's order.
 void wm_config_source(const wm_config *config, const char *name, wm_source_config *out, int *rank);

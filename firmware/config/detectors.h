@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// All detectors that a configuration may name: our own, then those that lean on a library.
+// All detectors that a configuration may name: the estimator's, then those that need a library.
 #ifndef WAYMARK_CONFIG_DETECTORS_H
 #define WAYMARK_CONFIG_DETECTORS_H
 

@@ -49,7 +49,7 @@ static wm_status read_can(const wm_yaml_node *item, wm_config *config, wm_error 
   return status;
 }
 
-// Where the text is there, it is read; else *out stays.
+// Reads the text where there is one; else *out is unchanged.
 static wm_status text(const wm_yaml_node *item, const char *key, char *out, size_t capacity, wm_error *err) {
   wm_yaml_node node = wm_yaml_get(item, key);
   return wm_yaml_there(&node) ? wm_yaml_string(&node, out, capacity, err) : WM_OK;

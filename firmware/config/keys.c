@@ -27,23 +27,21 @@ const config_key kConfigKeys[] = {
      "Start pose: `t_ns`, `x_m`, `y_m`, `z_m`, `heading_rad` or `heading_deg`, `qx`, `qy`, `qz`, `qw`, `sigma_xy_m`, "
      "`sigma_heading_rad` or `sigma_heading_deg`; what is absent is unknown."},
     {"vision", "map", "none",
-     "Detectors that look at pictures, each with its parameters: `{edges: {}}`. See below. Beside them `cameras: "
-     "[NAME]` "
-     "names the cameras; without it all cameras that have pictures."},
+     "Detectors on pictures, each with its parameters: `{edges: {}}`. See below. Beside the parameters `cameras: "
+     "[NAME]` names the cameras; without it all cameras with pictures are used."},
     {"vision.cascade.classes", "list", "needed for `vision.cascade`",
-     "What it looks for, at most 8: `{file: FILE, height_m: H}`, a cascade in OpenCV's format and the height in m of "
-     "what "
-     "its window shows (docs/landmarks.md)."},
+     "Classes of landmarks, at most 8: `{file: FILE, height_m: H}`, a cascade in OpenCV's format and the height of its "
+     "window's content in m (docs/landmarks.md)."},
     {"start.saved_pose", "path", "none",
      "File that keeps the robot's last pose, on devices: a run begins there, if it isn't older than start.max_age_s, "
      "whatever `initial_pose` is."},
     {"start.saved_map", "path", "none",
-     "File that keeps the map that `slam` makes, on devices, with its covariances and the calibration states: a run "
-     "goes on with it, if estimator, parameters and calibration are the same. The pose in it is that of "
-     "`start.saved_pose`; without one the robot is searched in the map."},
+     "File for the map of `slam`, on devices, with its covariances and the calibration states. The next run continues "
+     "with it, if estimator, parameters and calibration are the same. Its start pose is `start.saved_pose`; without "
+     "one the robot is relocalized in the map."},
     {"black_box.folder", "path", "none",
-     "Folder, on devices, with the last seconds of what was fused, as event logs; kept there where the robot gets lost "
-     "or a run died, the newest 20 times."},
+     "Folder, on devices, for event logs of the last seconds. They are kept when the robot gets lost or a run was "
+     "killed, the newest 20 times."},
     {"publish.lcm_url", "text", "LCM's own", "LCM provider, e.g. `udpm://239.255.76.67:7667?ttl=0`."},
     {"publish.channel_prefix", "text", "WAYMARK_", "What each channel's name begins with."},
     {NULL, NULL, NULL, NULL},
@@ -58,11 +56,10 @@ const config_key kConfigSourceKeys[] = {
     {"lateness_max_ms", "number from 0 to merge.horizon_ms", "merge.lateness_max_ms",
      "ms. A datum that arrives later than this after its stamp is late, and dropped."},
     {"period_ms", "number from 0 to 60000", "0",
-     "ms. Above 0: after a datum the source promises silence for so long, and the merge need not wait for it."},
+     "ms. Above 0: the source sends nothing within this time after a datum, and the merge does not wait for it."},
     {"ready_after_ms", "number from 0 to 60000", "0",
-     "ms. A detector on recorded pictures, in a replay: its observations arrive so long after the picture. On devices "
-     "the "
-     "time that detection takes counts by itself (`detect` in timing.json)."},
+     "ms. A detector on recorded pictures, in a replay: the arrival of its observations after the picture's. On "
+     "devices the measured time of detection counts (`detect` in timing.json)."},
     {"sample_at", "`stamp`, `next_stamp`", "stamp",
      "`motion` and `motion6` of a recording. next_stamp: a row is stamped with the beginning of the interval over "
      "which "
@@ -124,7 +121,7 @@ size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]) {
   return count;
 }
 
-// Hands every known key, dotted from the top, to `take`.
+// Calls `take` with each known key, dotted from the top.
 static void each_key(void (*take)(void *context, const char *key), void *context) {
   config_section sections[CONFIG_SECTIONS_MAX];
   size_t count = config_sections(sections);
@@ -137,8 +134,8 @@ static void each_key(void (*take)(void *context, const char *key), void *context
     }
 }
 
-// Finds the known key that a wrong one most likely means: alike as a whole, else by its last part alone, which also
-// finds a key that stands in the wrong section.
+// Finds the known key nearest to a wrong one: alike as a whole, else by its last part alone, which also finds a key in
+// the wrong section.
 typedef struct search {
   const char *wrong;
   int best;  // lower is nearer
@@ -224,7 +221,7 @@ static int stands_in(const char *key, const char *group, size_t length) {
   return strncmp(key, group, length) == 0 && key[length] == '.';
 }
 
-// Whether a key of the table, or one that it had before, stands in this group.
+// Whether a key of the table, or a former one, stands in this group.
 static int is_group(const wm_param_table *table, const char *key) {
   size_t n = strlen(key);
   for (size_t i = 0; i < table->count; i++)
@@ -309,14 +306,14 @@ static wm_status take_param(const reading *self, config_filling *to, const wm_ya
   return read_param(value, param, to->out, err);
 }
 
-// Whether the row is of this key; *tail: what a `*` stands for.
+// Whether the row is for this key; *tail: the text in place of a `*`.
 static int is_of(const wm_param_old *old, const char *key, const char **tail) {
   const size_t n = strcspn(old->key, "*");
   *tail = key + n;
   return strncmp(old->key, key, n) == 0 && (old->key[n] == '*' || key[n] == '\0');
 }
 
-// The section and the parameter that the row leads to, -1: no parameter.
+// The section and the parameter of the row, -1: no parameter.
 static int new_place(const reading *self, const wm_param_old *old, const char *tail, config_filling **to) {
   char key[KEY_MAX];
   *to = self->own;
@@ -331,7 +328,7 @@ static int new_place(const reading *self, const wm_param_old *old, const char *t
   return -1;
 }
 
-// A key that the table had before. *known: whether it had.
+// A former key of the table. *known: whether there was one.
 static wm_status take_old(const reading *self, const wm_yaml_node *value, int line, const char *key, int *known,
                           wm_error *err) {
   char text[400];

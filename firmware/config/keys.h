@@ -32,7 +32,7 @@ typedef struct config_section {
 // All tables: the runtime's, motion's, each registered estimator's and detector's. Returns how many there are.
 size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]);
 
-// "FILE:LINE: KEY: unknown key" with the known key that was most likely meant. WM_BAD_CONFIG.
+// "FILE:LINE: KEY: unknown key" with the nearest known key. WM_BAD_CONFIG.
 wm_status config_unknown(const wm_yaml_node *value, int line, wm_error *err);
 
 #define CONFIG_PARAMS_MAX 128
@@ -48,14 +48,14 @@ typedef struct config_filling {
 
 enum { CONFIG_MOTION = 0, CONFIG_SIGHTINGS, CONFIG_SHARED };
 
-// The shared sections, which stay open while the estimator's is read: it may have had some of their keys before.
+// The shared sections. They stay open while the estimator's section is read, which may hold former keys of theirs.
 typedef struct config_shared {
   config_filling of[CONFIG_SHARED];
-  const wm_estimator *reader;  // a parameter that it does not read is warned of; NULL: what is read here is not kept
+  const wm_estimator *reader;  // a warning is due for parameters that it does not read; NULL: values are not kept
 } config_shared;
 
-// Reads `map`, which stands at `prefix` of the table. Every key must be one of the table's, one that the table had
-// before (a warning), or one of kConfigKeys, which are left alone. `shared` may be NULL.
+// Reads `map`, which stands at `prefix` of the table. Each key must be one of the table, a former one (a warning), or
+// one of kConfigKeys, which are left alone. `shared` may be NULL.
 wm_status config_fill(const wm_yaml_node *map, config_filling *self, const char *prefix, config_shared *shared,
                       char warnings[WM_CONFIG_WARNINGS_MAX], wm_error *err);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prints what a configuration may hold, from the tables that read it.
+// Prints the keys of a configuration from the tables that read it.
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -38,7 +38,7 @@ static void print_keys(FILE *to, const config_key *keys) {
   for (; keys->key; keys++) fprintf(to, "| `%s` | %s | %s | %s |\n", keys->key, keys->type, keys->initial, keys->about);
 }
 
-// A key of before, and the new one; both with their sections.
+// A former key and the new one, with their sections.
 static void print_old(FILE *to, const config_section *section, const wm_param_old *old) {
   fprintf(to, "| `%s%s` | ", section->prefix, old->key);
   if (!old->new_key) {
@@ -77,7 +77,7 @@ static void print_table(FILE *to, const config_section *section, int is_shared) 
     fprintf(to, "\n");
   }
   if (!section->table->old || !section->table->old->key) return;
-  fprintf(to, "\nKeys of before, which are read with a warning:\n\n| key | now |\n| --- | --- |\n");
+  fprintf(to, "\nFormer keys, which are read with a warning:\n\n| key | now |\n| --- | --- |\n");
   for (const wm_param_old *old = section->table->old; old->key; old++) print_old(to, section, old);
 }
 

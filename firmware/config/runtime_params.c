@@ -26,34 +26,32 @@ static const wm_param kParams[] = {
         "m. A correction that moves the map pose against odom by more than this is announced as a jump."),
     F64("publish.jump_deg", publish_jump_deg, 2.0, 0, 360, "degrees. As jump_m, for the heading."),
     F64("publish.motion_stale_ms", publish_motion_stale_ms, 200, 1, 60000,
-        "ms. Motion older than this sets the flag that the pose is carried on by old speeds. Wheel encoders send "
-        "every 10 to 50 ms."),
-    BOOL("publish.lcm", publish_lcm, 1,
-         "Whether poses are sent over LCM. Without a network the run goes on all the same."),
+        "ms. Motion older than this sets the flag MOTION_STALE: the pose is carried on by old speeds. Wheel encoders "
+        "send every 10 to 50 ms."),
+    BOOL("publish.lcm", publish_lcm, 1, "Whether poses are sent over LCM. Without a network the run continues."),
     BOOL("commands.lcm", commands_lcm, 0,
          "Whether SET_POSE and RESET are taken over LCM. Any program that reaches its port can then move the pose: LCM "
          "listens on all of this computer's networks, whatever its ttl."),
     F64("publish.useless_m", publish_useless_m, 1.0, 1e-3, 1000,
-        "m. Sigma of position from which on a pose is of no use: health has the metres and seconds of dead "
-        "reckoning are left until there."),
+        "m. Sigma of the position above which a pose is useless: health has the metres and seconds of dead reckoning "
+        "until then."),
     F64("start.max_age_s", start_max_age_s, 86400, 0, 1e9,
-        "s. A saved pose that is older than this is not used: by then the robot may have been carried away."),
+        "s. A saved pose that is older than this is not used: the robot may have been moved since."),
     F64("start.moved_m", start_moved_m, 0.2, 0, 1000,
-        "m. Sigma of what may have moved the robot while it was off, added to that of the saved pose."),
+        "m. Sigma of a motion of the robot while it was off, added to the saved pose's."),
     F64("start.moved_deg", start_moved_deg, 3.0, 0, 180, "degrees. As moved_m, for the heading."),
     F64("start.save_every_s", start_save_every_s, 1.0, 0.1, 3600,
-        "s. How often the pose is saved: a run that was killed begins so far behind. Each time costs a write to the "
-        "disk."),
+        "s. Interval between saves of the pose. After a kill the start pose is at most this old. Each save is a write "
+        "to the disk."),
     F64("start.save_map_every_s", start_save_map_every_s, 10.0, 0.1, 3600,
-        "s. How often the map is saved while the pose is not in doubt, and at the end: a run that was killed lacks "
-        "what "
-        "it learnt since. 50 markers are 0.2 MB."),
+        "s. Interval between saves of the map while the pose is not in doubt; it is saved at the end, too. After a "
+        "kill the changes since the last save are lost. 50 markers are 0.2 MB."),
     F64("black_box.keep_s", black_box_keep_s, 60, 1, 3600,
-        "s. So much and up to twice as much of what was fused is on the disk at any time, for when the robot gets lost "
-        "or the run dies; a quarter more of what follows a loss."),
+        "s. Length of the event log on the disk, which is one to two times this, for a loss or the death of a run; "
+        "after a loss a quarter of it is added."),
     F64("black_box.pictures_hz", black_box_pictures_hz, 0, 0, 100,
-        "Hz. So many pictures a second of each camera that a detector looks through are kept with it; 0: none. One of "
-        "640 x 400 is 256 kB (grey), or some 40 (MJPEG)."),
+        "Hz. Rate at which pictures of each camera with a detector are kept with the log; 0: none. A picture of 640 x "
+        "400 is 256 kB (grey), or about 40 kB (MJPEG)."),
     I32("realtime.loop_hz", realtime_loop_hz, 200, 1, 10000,
         "Hz. How often the estimator's thread wakes. At 200 a datum waits 5 ms at most."),
     I32("realtime.priority", realtime_priority, 80, 0, 98,

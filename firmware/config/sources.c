@@ -24,7 +24,7 @@ static wm_status read_name(const wm_yaml_node *item, const wm_config *config, wm
   wm_status status = wm_yaml_string(&name, out->name, sizeof out->name, err);
   if (status != WM_OK) return status;
   snprintf(base, sizeof base, "%.*s", (int)strcspn(out->name, ":"), out->name);
-  // With a sensor's name behind the colon the part before it is judged, but the whole is shown.
+  // With a sensor's name after the colon, the part before it is checked; the message shows the whole.
   int is_detector = config_detector_find(base) != NULL;  // DETECTOR, or DETECTOR:CAMERA
   if (!is_detector && strcmp(base, out->name) == 0) {
     status = wm_yaml_choice(&name, kNames, &kind, err);
@@ -53,7 +53,7 @@ static wm_status check_lateness(const wm_yaml_node *node, double lateness_ms, do
       lateness_ms, horizon_ms, horizon_ms, lateness_ms);
 }
 
-// What a detector would take, where its time isn't the computer's that replays.
+// The time of detection on the robot, where another computer replays.
 static wm_status read_ready_after(const wm_yaml_node *item, wm_source_config *out, wm_error *err) {
   char base[WM_SOURCE_NAME_MAX];
   wm_yaml_node node = wm_yaml_get(item, "ready_after_ms");
@@ -63,7 +63,7 @@ static wm_status read_ready_after(const wm_yaml_node *item, wm_source_config *ou
   return wm_yaml_f64(&node, 0, 60000, &out->ready_after_ms, err);
 }
 
-// A file's convention for the stamps of its rows; other sources stamp what they measure.
+// A file's convention for the stamps of its rows; other sources stamp their measurements.
 static wm_status read_sample_at(const wm_yaml_node *item, wm_source_config *out, wm_error *err) {
   static const char *const kChoices[] = {"stamp", "next_stamp", NULL};
   wm_yaml_node node = wm_yaml_get(item, "sample_at");
@@ -102,7 +102,7 @@ static wm_status read_source(const wm_yaml_node *item, const wm_config *config, 
 
 wm_status config_read_sources(const wm_yaml_node *root, wm_config *out, wm_error *err) {
   wm_yaml_node lateness = wm_yaml_get(root, "merge.lateness_max_ms"), list = wm_yaml_get(root, "sources");
-  // Where the horizon is what was set too small, the fault is shown there.
+  // Where the horizon is set too small, the error is shown there.
   if (!wm_yaml_there(&lateness)) lateness = wm_yaml_get(root, "merge.horizon_ms");
   wm_status status = WM_OK;
   if (wm_yaml_there(&lateness) && out->runtime.merge_lateness_max_ms > out->runtime.merge_horizon_ms)

@@ -5,7 +5,7 @@
 #include "config/config.h"
 #include "waymark/yaml.h"
 
-// Reads `sources:`; out->runtime is already there, and lateness is held against its horizon.
+// Reads `sources:`; out->runtime is read already, and limits lateness to its horizon.
 wm_status config_read_sources(const wm_yaml_node *root, wm_config *out, wm_error *err);
 
 #endif

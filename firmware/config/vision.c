@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `vision:` of a configuration: the detectors that look at pictures, and at whose.
+// `vision:` of a configuration: detectors and their cameras.
 #include "config/vision.h"
 #include "config/detectors.h"
 
@@ -52,9 +52,10 @@ static wm_status read_classes(const wm_yaml_node *section, int must_be_there, co
   if (strcmp(out->detector->name, "cascade") != 0) return WM_OK;
   wm_yaml_node list = wm_yaml_get(section, "classes");
   if (!wm_yaml_is_list(&list) || wm_yaml_count(&list) == 0)
-    return wm_yaml_fail(section, err,
-                        "classes: what is to be found is needed: classes: [{file: cascades/street-sign.xml, height_m: "
-                        "0.91}]");
+    return wm_yaml_fail(
+        section, err,
+        "classes: is missing: name the classes to detect: classes: [{file: cascades/street-sign.xml, height_m: "
+        "0.91}]");
   if (wm_yaml_count(&list) > WM_CONFIG_CASCADES_MAX)
     return wm_yaml_fail(&list, err, "more than %d classes", WM_CONFIG_CASCADES_MAX);
   for (size_t i = 0; i < wm_yaml_count(&list); i++) {

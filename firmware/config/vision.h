@@ -5,8 +5,8 @@
 #include "config/config.h"
 #include "waymark/yaml.h"
 
-// Reads `vision:`. Allocates the detectors' parameters and cascades, which wm_config_free frees.
-// The files that it names are read where `files_must_be_there`.
+// Reads `vision:`. Allocates the detectors' parameters and cascades, which wm_config_free frees. Reads their files
+// where `files_must_be_there`.
 wm_status config_read_vision(const wm_yaml_node *root, int files_must_be_there, wm_config *out, wm_error *err);
 
 #endif

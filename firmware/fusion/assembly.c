@@ -13,7 +13,7 @@ static void leave_out(wm_assembly *self, const char *name, const char *why) {
   (void)snprintf(line, sizeof self->unused[0], "%s: %s", name, why);
 }
 
-// Sources that the estimator can't use are not opened at all: they would hold the watermark back for nothing.
+// A source that the estimator can't use is not opened: it would only hold the watermark back.
 static const char *reason_to_leave_out(const wm_config *config, const wm_source *source,
                                        const wm_source_config *wanted) {
   uint32_t takes = config->estimator->takes | WM_MOTION_EVENTS;
@@ -60,7 +60,7 @@ static wm_status check_estimator(const wm_assembly *self, wm_error *err) {
   return WM_OK;
 }
 
-// A model without its input would leave the pose where it is, and the state would not tell.
+// A model without its input would keep the pose where it is without any error.
 static wm_status check_motion(const wm_assembly *self, uint32_t quantities, wm_error *err) {
   const char *lacks = wm_motion_lacks(self->setup.motion, &self->setup.wheels, self->kinds, quantities);
   if (!lacks) return WM_OK;
@@ -89,7 +89,7 @@ wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err) {
   return WM_OK;
 }
 
-// Only who takes points on a map's edges is given one: it may be large.
+// A map may be large: only an estimator that takes points gets one.
 static wm_status add_map(wm_assembly *self, wm_recording *recording, wm_error *err) {
   if (!(self->config->estimator->takes & WM_EVENT_BIT(WM_EVENT_POINTS))) return WM_OK;
   self->map_path = wm_site_map_path(wm_recording_site(recording));
@@ -134,7 +134,8 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   for (size_t i = 0; i < count && i < WM_SOURCES_MAX; i++) add_source(out, sources[i]);
   status = add_vision(out, recording, err);
   if (status != WM_OK) return status;
-  setup->sensors = wm_site_sensors(wm_recording_site(recording), &setup->sensor_count);  // cameras have joined
+  setup->sensors =
+      wm_site_sensors(wm_recording_site(recording), &setup->sensor_count);  // the cameras' sensors have been added
   if (!(out->kinds & out->config->estimator->takes) && !(out->kinds & WM_MOTION_EVENTS))
     return wm_fail(err, WM_BAD_CONFIG, "%s: no motion and no observation is there or used",
                    wm_recording_dir(recording));

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A configuration and a recording (or the head of an event log) put together: which estimator, with what it is set up,
-// which sources in which order. Made once at start; allocates.
+// A configuration and a recording (or the head of an event log) put together: estimator, setup, and the sources in
+// their order. Made once at start; allocates.
 #ifndef WAYMARK_FUSION_ASSEMBLY_H
 #define WAYMARK_FUSION_ASSEMBLY_H
 
@@ -27,7 +27,7 @@ typedef struct wm_assembled_source {
 typedef struct wm_assembly {
   const wm_config *config;
   wm_setup setup;
-  wm_motion_params *own_motion;  // without motion data: the configuration's with that motion.model; else NULL
+  wm_motion_params *own_motion;  // a copy with motion.model set, where there is no motion data; else NULL
   wm_driving driving;
   uint32_t kinds;  // of all used sources
   wm_assembled_source sources[WM_SOURCES_MAX];
@@ -37,20 +37,20 @@ typedef struct wm_assembly {
   const char *calibration_text;
   size_t calibration_length;
   wm_vision *vision;  // sources of pictures; NULL where there are none
-  const void *kept;   // the map of the run before, which the estimator took up; NULL: none
+  const void *kept;   // map of an earlier run for the estimator (waymark/keeper.h); NULL: none
   size_t kept_bytes;
   const char *map_path;              // NULL where the estimator takes no map
   char recording[WM_NAME_MAX + 96];  // the recording's name
 } wm_assembly;
 
-// `config` and `recording` outlive the assembly. WM_BAD_CONFIG where they don't go together: no data, a source named
-// in the configuration that isn't there under any recording's name, an estimator that can't work with this setup.
-// Where it fails, too, wm_assembly_close is to be called.
+// `config` and `recording` outlive the assembly. WM_BAD_CONFIG where they don't match: no data, a source of the
+// configuration that no recording has, an estimator that can't work with this setup. wm_assembly_close is also due
+// after a failure.
 wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t seed, wm_assembly *out, wm_error *err);
 // motion.model `auto` becomes `constant_velocity` where no source gives motion. WM_BAD_CONFIG where the configuration
 // has another one.
 wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err);
-// Closes what it opened: the pictures. Before the recording is closed, and before the memory of the run.
+// Closes the pictures. Before the recording and the run's memory are closed.
 void wm_assembly_close(wm_assembly *self);
 
 // "can", "sightings:laser" ... by index; "?" beyond.

@@ -47,8 +47,8 @@ void wm_budget_take(wm_budget *self, const wm_estimate *now, const wm_odom_point
   self->is_reckoning = is_reckoning;
 }
 
-// Variance of the position after `d` metres more: noise of the way, the heading's error over it, and the heading's
-// noise.
+// Variance of the position after `d` metres more: odometry noise, the present heading error over that distance, and the
+// growth of the heading error.
 static double forecast(const wm_budget *self, const wm_estimate *now, double rate, double d) {
   double heading = fmax(now->covariance[wm_cov_index(5, 5)], 0);
   return position_variance(now) + rate * d + heading * d * d + self->heading_rate_rad2_per_m * d * d * d / 3;
@@ -60,7 +60,7 @@ void wm_budget_left(const wm_budget *self, const wm_estimate *now, double *way_m
   if (self->is_reckoning && reckoned_m > 1)
     rate = fmax(rate, (position_variance(now) - self->reckoning_variance_m2) / reckoned_m);
   double low = 0, high = FARTHEST_M;
-  if (!(position_variance(now) < limit)) high = 0;  // also where it is no number
+  if (!(position_variance(now) < limit)) high = 0;  // also for a NaN
   if (high > 0 && forecast(self, now, rate, high) < limit) low = high = (double)INFINITY;
   for (int i = 0; i < 60 && high - low > 0.01; i++) {
     double middle = 0.5 * (low + high);

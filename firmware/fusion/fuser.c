@@ -63,7 +63,7 @@ void wm_fuser_health(const wm_fuser *self, wm_health *out) {
   out->lost_probability = estimate.lost_probability;
   out->resets = estimate.resets;
   if (e->motion_health) out->motion_health = e->motion_health(self->state);
-  // Both return how many there are, which may be more than were written.
+  // Both return how many there are, possibly more than were written.
   if (e->calibration)
     out->calibration_count =
         at_most(e->calibration(self->state, out->calibration, WM_HEALTH_CALIBRATION_MAX), WM_HEALTH_CALIBRATION_MAX);
@@ -104,7 +104,7 @@ static wm_status correct(wm_fuser *self, const wm_event *event) {
   if (status != WM_OK && count == 0) return status;
 
   wm_fuser_counts *counts = &self->counts[event->source];
-  int any_fused = count == 0;  // SET_POSE, RESET, LOOKED: taken, with nothing to explain
+  int any_fused = count == 0;  // SET_POSE, RESET, LOOKED: taken, without an innovation
   for (size_t i = 0; i < count; i++) {
     any_fused |= out[i].verdict == WM_FUSED;
     out[i].source = event->source;
@@ -134,7 +134,7 @@ static void write_hypotheses(wm_fuser *self, wm_time_ns t_ns) {
   }
 }
 
-// Records have the size of the largest event, so who takes no points has no room for them.
+// Records have the size of the largest event: without points there is no room for particles.
 static void write_particles(wm_fuser *self, const wm_event *event) {
   _Static_assert(sizeof(wm_particle_set) <= sizeof(wm_event) && sizeof(wm_hypothesis_set) <= sizeof(wm_event),
                  "a set fits where an event of points does");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Hands final events to the estimator and returns what came of it: the event itself (for the log), innovations, and the
-// fused pose at each stamp of the driving motion stream. It depends on nothing but the events and their order, so a
-// recording, a live run and an event log give the same poses. No clock but for measuring; no allocation. One thread.
+// Hands final events to the estimator and outputs the event itself (for the log), its innovations, and the fused pose
+// at each stamp of the driving motion stream. The result depends on the events and their order alone, so a recording, a
+// live run and an event log give the same poses. The clock is read for measuring only; no allocation. One thread.
 #ifndef WAYMARK_FUSION_FUSER_H
 #define WAYMARK_FUSION_FUSER_H
 
@@ -22,7 +22,7 @@ typedef struct wm_driving {
   uint32_t quantities;  // bit per wm_quantity, where kinds has QUANTITIES
 } wm_driving;
 
-// From what the sources can give.
+// From what the sources give.
 wm_driving wm_driving_choose(uint32_t kinds, uint32_t quantities);
 int wm_driving_is(const wm_driving *driving, const wm_event *event);
 
@@ -37,7 +37,7 @@ typedef struct wm_fuser {
   void *state;
   wm_driving driving;
   wm_output output;
-  wm_time_ns row_ns;       // stamp whose pose is written as soon as a later event comes; WM_TIME_NONE: none
+  wm_time_ns row_ns;       // stamp whose pose is written at the next later event; WM_TIME_NONE: none
   wm_time_ns last_row_ns;  // of the pose written last
   wm_time_ns until_ns;     // stamp of the newest event that the estimator took
   uint64_t events, innovations, poses;
@@ -49,16 +49,16 @@ typedef struct wm_fuser {
   wm_hypothesis_set hypotheses;
 } wm_fuser;
 
-// `state` is made by estimator->init already.
+// `state` is initialised by estimator->init.
 void wm_fuser_init(wm_fuser *self, const wm_estimator *estimator, void *state, wm_driving driving, wm_output output);
 // The next event in the order of the merge; event->source < WM_SOURCES_MAX.
 WM_REALTIME void wm_fuser_feed(wm_fuser *self, const wm_event *event);
-// After the last event: writes the pose that waits.
+// After the last event: writes the pose of the pending row.
 WM_REALTIME void wm_fuser_finish(wm_fuser *self);
-// What the estimator reports of itself: state, lost probability, resets, motion health, calibration states and
-// counters; at most as many as `out` has room for. The rest of `out` is left alone.
+// The estimator's own health: state, lost probability, resets, motion health, calibration states and counters, as many
+// as `out` has room for. The rest of `out` is unchanged.
 WM_REALTIME void wm_fuser_health(const wm_fuser *self, wm_health *out);
-// Whether an estimate holds a pose at all (finite, not searching).
+// Whether an estimate holds a pose (finite, not searching).
 WM_REALTIME int wm_estimate_has_pose(const wm_estimate *estimate);
 
 #endif

@@ -5,7 +5,7 @@
 
 #include "waymark/codec.h"
 
-// Rows of one frame arrive together; a periodic source's promise holds once this has gone by since its last one.
+// Rows of one frame arrive together; a source's next period is excluded only once this has passed since its last row.
 #define FRAME_COMPLETE_NS (1 * WM_NS_PER_MS)
 
 typedef struct heap_entry {
@@ -33,7 +33,7 @@ struct wm_merge {
   wm_time_ns start_ns;  // of the arrival clock: its first advance
 };
 
-// Stamps come from files and devices: what can't be said in 64 bits is the largest or smallest that can.
+// Stamps come from files and devices: differences and sums saturate at the limits of 64 bits.
 static wm_time_ns minus(wm_time_ns a, wm_time_ns b) {
   wm_time_ns difference;
   if (!__builtin_sub_overflow(a, b, &difference)) return difference;
@@ -123,7 +123,7 @@ static wm_time_ns final_before(const source_state *s, wm_time_ns now_ns) {
   wm_time_ns bound = minus(now_ns, s->is.lateness_max_ns);
   wm_time_ns newest = s->counts.newest_ns;
   if (newest == WM_TIME_NONE) return bound;
-  // Not the stamp itself: more rows of the same frame may follow.
+  // Not the stamp itself: rows of the same frame may follow.
   if (s->is.in_order && newest > bound) bound = newest;
   if (s->is.period_ns > 0 && minus(now_ns, s->counts.last_arrival_ns) >= FRAME_COMPLETE_NS &&
       plus(newest, s->is.period_ns) > bound)
@@ -151,7 +151,7 @@ static void measure_lateness(wm_merge_counts *counts, wm_time_ns lateness_ns) {
   if (lateness_ns > counts->lateness_worst_ns) counts->lateness_worst_ns = lateness_ns;
 }
 
-// Stamp, kind and content, by their canonical bytes (padding and the order of arrival don't matter).
+// Hash of stamp, kind and content in their encoding (without padding and order of arrival).
 static int seen_before(source_state *s, const wm_event *event) {
   uint8_t bytes[WM_EVENT_ENCODED_MAX];
   size_t length = wm_event_encode(event, bytes, sizeof bytes);

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Many sources, one stream in the order of the stamps, with no rollback: an event is handed out when its time is final.
+// Merges many sources into one stream in the order of the stamps, without rollback: an event is handed out when its
+// time is final.
 //
 // Time t is final for a source when
-//   - it has spoken past t and keeps its order (a recorded or device stream whose stamps never go back), or
-//   - it promised not to speak again before its next period (period_ns > 0), or
+//   - it has sent an event later than t and keeps its order (a stream whose stamps never go back), or
+//   - its period excludes an event before t (period_ns > 0), or
 //   - t is older than the source's lateness_max on the arrival clock.
-// The watermark is the earliest of these over the sources. It depends on stamps and arrivals alone, so a silent source
-// costs a constant delay, and its first datum after a silence is fused. What is older than the watermark when it comes
-// is late: counted and dropped.
+// The watermark is the earliest of these times over the sources. It depends on stamps and arrivals alone: a silent
+// source costs a constant delay, and its first event after the silence is fused. An event older than the watermark at
+// its arrival is late: counted and dropped.
 //
 // Order: t_ns; then motion before observations; then the source's rank; then its own order (seq). The memory is fixed
 // (a binary heap of indices over slots); push and pop cost O(log n) comparisons. One thread.
@@ -64,7 +65,7 @@ wm_merge *wm_merge_init(void *memory, const wm_merge_source *sources, size_t sou
 WM_REALTIME wm_merge_verdict wm_merge_push(wm_merge *self, const wm_event *event);
 // The arrival clock is at `now_ns`; never goes back.
 WM_REALTIME void wm_merge_advance(wm_merge *self, wm_time_ns now_ns);
-// No source will speak again: all that waits is final.
+// No event will follow: all that wait are final.
 WM_REALTIME void wm_merge_flush(wm_merge *self);
 // The next final event, or NULL; valid until the pop.
 WM_REALTIME const wm_event *wm_merge_front(wm_merge *self);
@@ -77,9 +78,9 @@ size_t wm_merge_waiting_of(const wm_merge *self, size_t source);
 WM_REALTIME const wm_merge_counts *wm_merge_source_counts(const wm_merge *self, size_t source);
 // Lateness (arrival minus stamp) that 99 of 100 data keep below, rounded up to a millisecond. 0 before the first.
 WM_REALTIME wm_time_ns wm_merge_lateness_p99(const wm_merge *self, size_t source);
-// On the arrival clock since its last datum, or since the start where it never spoke.
+// On the arrival clock since its last event, or since the start where it has sent none.
 WM_REALTIME wm_time_ns wm_merge_silent_ns(const wm_merge *self, size_t source, wm_time_ns now_ns);
-// Silent for longer than a second and than ten times its mean period. A message, not a rule of the merge.
+// Silent for more than a second and ten times its mean period. For messages; the merge does not use it.
 WM_REALTIME int wm_merge_is_stale(const wm_merge *self, size_t source, wm_time_ns now_ns);
 
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the estimator's side gives to the sinks: one function that takes tagged records. In replay it writes files; in a
-// run it puts the record into a ring and returns at once.
+// What the estimator's side gives to its consumers: one function that takes tagged records. In a replay it writes
+// files; in a run it copies the record into a ring and returns at once.
 #ifndef WAYMARK_FUSION_OUTPUT_H
 #define WAYMARK_FUSION_OUTPUT_H
 
@@ -18,10 +18,10 @@ typedef enum wm_output_kind {
   WM_OUTPUT_PUBLISHED,   // wm_published
   WM_OUTPUT_HEALTH,      // wm_health
   WM_OUTPUT_PARTICLES,   // wm_particle_set, once a second
-  WM_OUTPUT_HYPOTHESES   // wm_hypothesis_set, with them, as many as it takes
+  WM_OUTPUT_HYPOTHESES   // with the particles, as many as fit
 } wm_output_kind;
 
-// A cloud of particles, or as much of it as a record of points has room for.
+// A cloud of particles, truncated to the size of a record of points.
 #define WM_PARTICLES_MAX 240
 typedef struct wm_particle_set {
   wm_time_ns t_ns;
@@ -29,7 +29,7 @@ typedef struct wm_particle_set {
   wm_particle particles[WM_PARTICLES_MAX];
 } wm_particle_set;
 
-// Places where the robot may be besides, as many of them as a record of points has room for.
+// Other poses that the estimator considers, truncated to the size of a record of points.
 #define WM_HYPOTHESES_MAX 100
 typedef struct wm_hypothesis_set {
   wm_time_ns t_ns;

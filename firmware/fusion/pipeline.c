@@ -73,7 +73,7 @@ void wm_pipeline_arrive(wm_pipeline *self, const wm_event *event) {
   wm_histogram_add(&self->arrive_ns, wm_monotonic_ns() - begin_ns);
 }
 
-// The predictor learns the newest fused pose and what the estimator found out about the motion sensors.
+// Hands the newest fused pose and the calibration of the motion sensors to the predictor.
 static void tell_predictor(wm_pipeline *self) {
   wm_estimate fused;
   wm_motion_calibration calibration;
@@ -133,7 +133,7 @@ static void source_health(const wm_pipeline *self, size_t i, wm_time_ns now_ns, 
   out->stale = (uint8_t)(!(source && source->is_rare) && wm_merge_is_stale(self->merge, i, now_ns));
 }
 
-// Of the fused pose: the published one's is a little less.
+// Of the fused pose; the published pose has a little less left.
 static void reckoning_left(wm_pipeline *self, const wm_estimate *fused, wm_health *out) {
   wm_odom_point odom;
   out->reckoning_left_m = out->reckoning_left_s = (double)NAN;

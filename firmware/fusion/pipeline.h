@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The estimator's side of a run as one object: merge, estimator, predictor. Replay and run call the same four functions
-// in the same order; only who calls them, and what stands behind `output`, differs.
+// in the same order; they differ in the caller and in the consumer of `output`.
 //
 //   arrive(event)      an event has arrived            (integrated for now, queued for its time)
 //   advance(now)       the arrival clock is at now     (what is final is fused)
@@ -35,25 +35,25 @@ typedef struct wm_pipeline {
   void *merge_memory, *state_memory, *odometry_memory;
 } wm_pipeline;
 
-// The memory that it wants, for a table of wm_arena_need; the addresses land in *self.
+// Its needs of memory, as lines of a table (rt/arena.h); the addresses are stored in *self.
 void wm_pipeline_needs(wm_pipeline *self, const wm_assembly *assembly, wm_arena_need needs[WM_PIPELINE_NEEDS]);
-// With the memory in place. The only function of these that may take long.
+// With the memory in place. The only one of these functions that may take long.
 wm_status wm_pipeline_start(wm_pipeline *self, wm_output output, wm_error *err);
 
-// A map of a run before (waymark/keeper.h), which `why_not` let pass: after the start, before the first event.
+// A map of an earlier run (waymark/keeper.h) that its `why_not` accepts: after the start, before the first event.
 void wm_pipeline_take_kept(wm_pipeline *self, const void *image, size_t bytes);
-// What is to be kept now, into `out`: its bytes; 0 where the estimator keeps nothing or the pose is in doubt.
+// The present map, into `out`: its bytes; 0 where the estimator keeps none or the pose is in doubt.
 WM_REALTIME size_t wm_pipeline_keep(const wm_pipeline *self, void *out, size_t capacity);
 
 WM_REALTIME void wm_pipeline_arrive(wm_pipeline *self, const wm_event *event);
 WM_REALTIME void wm_pipeline_advance(wm_pipeline *self, wm_time_ns now_ns);
-// The pose of `now_ns` into *out, not yet sent. 0 where there is none to tell.
+// The pose of `now_ns` into *out, without sending it. 0 where there is none.
 WM_REALTIME int wm_pipeline_publish(wm_pipeline *self, wm_time_ns now_ns, wm_published *out);
-// What the pictures of `now_ns` are looked at with (wm_predictor_expect). 0 where nothing is known.
+// The pose by which guided detectors search at `now_ns` (wm_predictor_expect). 0 where there is none.
 WM_REALTIME int wm_pipeline_expect(const wm_pipeline *self, wm_time_ns now_ns, wm_estimate *out);
 WM_REALTIME void wm_pipeline_finish(wm_pipeline *self);
 
-// Fills all but what sources and loop count themselves. Not cheap (tens of us): once a second.
+// Fills all but the counters of sources and loop. Tens of us: once a second.
 WM_REALTIME void wm_pipeline_health(wm_pipeline *self, wm_time_ns now_ns, wm_health *out);
 
 #endif

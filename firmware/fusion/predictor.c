@@ -25,7 +25,7 @@ void wm_predictor_fused(wm_predictor *self, const wm_estimate *fused, const wm_m
 
 static double wrapped(double angle_rad) { return remainder(angle_rad, 2 * M_PI); }
 
-// Where base_link would be in map now if map had not moved against odom since the last message.
+// The pose of base_link in map at present if map had not moved against odom since the last message.
 static wm_pose2 carried(const wm_pose2 *map_base, const wm_pose2 *odom_base, const wm_pose2 *odom_now) {
   double dx = odom_now->x_m - odom_base->x_m, dy = odom_now->y_m - odom_base->y_m;
   double turn = map_base->heading_rad - odom_base->heading_rad;
@@ -35,7 +35,7 @@ static wm_pose2 carried(const wm_pose2 *map_base, const wm_pose2 *odom_base, con
                     .heading_rad = wrapped(odom_now->heading_rad + turn)};
 }
 
-// A jump is a move of map against odom between two messages, or a pose that was set anew.
+// A jump is a move of map against odom between two messages, or a pose that was set.
 static void announce_jump(wm_predictor *self, wm_published *out, const wm_pose2 *map_now) {
   if (self->has_published) {
     wm_pose2 expected = carried(&self->map_base, &self->odom_base, &out->pose_odom_base);

@@ -30,7 +30,7 @@ static void counters_of(wm_source_counts *counts, uint64_t *out[COUNTERS]) {
   memcpy(out, all, sizeof all);
 }
 
-// What is counted on the way to the next one belongs to those that are left out, too.
+// Counts that arise while events outside of the interval are read belong to the outside.
 static wm_status skip_outside(wm_source_reader *self, wm_error *err) {
   uint64_t *now[COUNTERS], *skipped[COUNTERS], before[COUNTERS];
   counters_of(&self->source->counts, now);
@@ -51,7 +51,7 @@ void wm_source_reader_counts(const wm_source_reader *self, wm_source_counts *out
   *out = self->source->counts;
   counters_of(out, counts);
   counters_of(&outside, skipped);
-  // A frame that was missing outside of the part and came within it is none of either.
+  // A frame counted lost outside of the interval that arrives inside of it is counted in neither.
   for (size_t i = 0; i < COUNTERS; i++) *counts[i] = *counts[i] > *skipped[i] ? *counts[i] - *skipped[i] : 0;
   out->ignored += outside.ignored;
 }

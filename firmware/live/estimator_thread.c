@@ -68,7 +68,7 @@ static void publish(live *run, wm_time_ns now_ns) {
   while (self->next_publish_ns <= now_ns) self->next_publish_ns += self->publish_ns;
   wm_published published;
   wm_estimate expected;
-  if (wm_pipeline_expect(&self->pipeline, now_ns, &expected)) wm_vision_tell(run->assembly.vision, &expected);
+  if (wm_pipeline_expect(&self->pipeline, now_ns, &expected)) wm_vision_set_prediction(run->assembly.vision, &expected);
   if (!wm_pipeline_publish(&self->pipeline, now_ns, &published)) return;
   published.deadlines_missed = (uint32_t)self->deadlines_missed;
   published.made_ns = run_now(&run->clock);

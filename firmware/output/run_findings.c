@@ -25,7 +25,7 @@ static void about_lateness(speaker *to, const wm_source_health *s) {
   if (s->late == 0 && s->lateness_p99_ns <= s->lateness_max_ns) return;
   char line[500], for_all[80] = "";
   if (s->lateness_worst_ns > s->lateness_max_ns)
-    (void)snprintf(for_all, sizeof for_all, ". At worst it was %.0f ms: `lateness_max_ms: %.0f` would do for all",
+    (void)snprintf(for_all, sizeof for_all, ". At worst it was %.0f ms: `lateness_max_ms: %.0f` would suffice for all",
                    (double)s->lateness_worst_ns * 1e-6, would_do_ms(s->lateness_worst_ns));
   if (s->lateness_p99_ns <= s->lateness_max_ns)
     (void)snprintf(line, sizeof line,
@@ -36,7 +36,7 @@ static void about_lateness(speaker *to, const wm_source_health *s) {
   else
     (void)snprintf(line, sizeof line,
                    "%s: its data are late by %.0f ms (99 of 100 at most), allowed are %.0f; %" PRIu64 " of %" PRIu64
-                   " came too late and were dropped. `lateness_max_ms: %.0f` for this source would do%s",
+                   " came too late and were dropped. `lateness_max_ms: %.0f` for this source would suffice%s",
                    s->name, (double)s->lateness_p99_ns * 1e-6, (double)s->lateness_max_ns * 1e-6, s->late, s->received,
                    would_do_ms(s->lateness_p99_ns), for_all);
   say(to, line);

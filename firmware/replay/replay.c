@@ -100,7 +100,7 @@ static void publish_until(replay *self, wm_time_ns now_ns) {
       self->output.put(self->output.context, WM_OUTPUT_PUBLISHED, &published, sizeof published);
     }
     if (wm_pipeline_expect(&self->pipeline, self->next_tick_ns, &expected))
-      wm_vision_tell(self->assembly.vision, &expected);
+      wm_vision_set_prediction(self->assembly.vision, &expected);
     self->next_tick_ns += self->publish_ns;
   }
 }
@@ -186,7 +186,7 @@ static wm_status run(replay *self, const wm_config *config, wm_recording *record
   self->publish_ns = wm_ns_from_seconds(1.0 / config->runtime.publish_rate_hz);
   status = wm_pipeline_start(&self->pipeline, self->output, err);
   if (status == WM_OK) status = wm_vision_start(self->assembly.vision, err);
-  if (status == WM_OK) status = wm_vision_run_ahead(self->assembly.vision, err);
+  if (status == WM_OK) status = wm_vision_start_prefetch(self->assembly.vision, err);
   if (status == WM_OK) status = wm_source_readers_open(&self->assembly, self->readers, 0, &self->first_ns, err);
   if (status != WM_OK) return status;
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// malloc and its kin, counted a thread, in front of glibc's. Being defined in the program, they also stand in front of
-// what libraries call (operator new among them). Sanitizers bring their own malloc: then nothing is counted.
+// malloc and its relatives, counted per thread, in front of glibc's. Defined in the program, they also replace what
+// libraries call (operator new among them). Under sanitizers, which have their own malloc, nothing is counted.
 #include <errno.h>
 #include <malloc.h>
 #include <stddef.h>
@@ -26,7 +26,7 @@
 
 #if COUNTED
 
-// glibc's own names for what it would have been called by.
+// glibc's internal names of the functions that are replaced.
 // NOLINTBEGIN(bugprone-reserved-identifier)
 extern void *__libc_malloc(size_t bytes);
 extern void *__libc_calloc(size_t count, size_t bytes);

@@ -29,7 +29,7 @@ wm_status wm_arena_take(wm_arena *self, const char *name, size_t bytes, void **o
                    bytes);
   size_t need = round_up(bytes, WM_ARENA_ALIGN);
   if (need < bytes || need > self->bytes - self->used)
-    return wm_fail(err, WM_FULL, "memory: '%s' needs %zu bytes and %zu of %zu are left; %zu would do", name, bytes,
+    return wm_fail(err, WM_FULL, "memory: '%s' needs %zu bytes and %zu of %zu are left; %zu would suffice", name, bytes,
                    self->bytes - self->used, self->bytes, self->used + need);
   if (self->part_count == WM_ARENA_PARTS_MAX)
     return wm_fail(err, WM_FULL, "memory: '%s' would be part %d; %d are possible", name, WM_ARENA_PARTS_MAX + 1,
@@ -46,7 +46,7 @@ void wm_arena_seal(wm_arena *self, int lock) {
   memset(self->base + self->used, 0, self->bytes - self->used);
   volatile uint8_t *byte = self->base;
   size_t page = (size_t)sysconf(_SC_PAGESIZE);
-  for (size_t i = 0; i < self->bytes; i += page) byte[i] = byte[i];  // a write, so that each page is really there
+  for (size_t i = 0; i < self->bytes; i += page) byte[i] = byte[i];  // a write makes each page present
   if (lock) self->locked = mlock(self->base, self->bytes) == 0;
   self->sealed = 1;
 }

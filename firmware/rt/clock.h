@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The computer's monotonic clock. Answered by the C library without a system call on the platforms that we run on.
+// The computer's monotonic clock. The C library reads it without a system call on the supported platforms.
 #ifndef WAYMARK_RT_CLOCK_H
 #define WAYMARK_RT_CLOCK_H
 

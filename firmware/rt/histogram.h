@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long something takes: a histogram of durations with bins a sixteenth of an octave wide (percentiles within 6 %),
-// fixed in size. One thread.
+// A histogram of durations of fixed size; bins are a sixteenth of an octave wide (percentiles within 6 %). One thread.
 #ifndef WAYMARK_RT_HISTOGRAM_H
 #define WAYMARK_RT_HISTOGRAM_H
 

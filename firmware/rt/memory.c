@@ -8,7 +8,7 @@
 #include <sys/resource.h>
 
 #ifndef MADV_POPULATE_READ
-#define MADV_POPULATE_READ 22  // Linux 5.14; older kernels refuse it, and the first pass through the code pays instead
+#define MADV_POPULATE_READ 22  // Linux 5.14; older kernels refuse it, and the first access to a page faults
 #define MADV_POPULATE_WRITE 23
 #endif
 
@@ -31,7 +31,7 @@ void wm_prefault_program(void) {
     if (sscanf(line, "%lx-%lx %4s", &from, &to, may) != 3 || may[0] != 'r') continue;
     if (to - from > LARGEST_MAPPING) continue;
     int advice = may[1] == 'w' && may[3] == 'p' ? MADV_POPULATE_WRITE : MADV_POPULATE_READ;
-    (void)madvise((void *)from, to - from, advice);  // special mappings refuse; nothing is lost
+    (void)madvise((void *)from, to - from, advice);  // special mappings refuse, without harm
   }
   (void)fclose(maps);
 }
@@ -43,8 +43,8 @@ void wm_prefault_stack(size_t bytes) {
 
 int wm_lock_memory(void) {
 #ifdef __GLIBC__
-  (void)malloc_trim(0);  // what loading took and gave back needn't be locked
+  (void)malloc_trim(0);  // memory that loading has freed is not locked
 #endif
-  // What comes later stays from its first touch on: of a thread's stack what the thread touched, not the whole.
+  // Later mappings are locked page by page at the first access: of a thread's stack what it has used, not all of it.
   return mlockall(MCL_CURRENT) == 0 && mlockall(MCL_FUTURE | MCL_ONFAULT) == 0;
 }

@@ -27,9 +27,9 @@ static uint8_t *slot(const wm_ring *self, uint64_t position) {
 }
 
 void *wm_ring_reserve(wm_ring *self, size_t bytes) {
-  uint64_t head = atomic_load_explicit(&self->head, memory_order_relaxed);  // ours
+  uint64_t head = atomic_load_explicit(&self->head, memory_order_relaxed);  // the producer's own
   if (head - self->tail_seen > self->mask) {
-    // Acquire: the consumer is done with the slot before we write into it.
+    // Acquire: the consumer has left the slot before it is written.
     self->tail_seen = atomic_load_explicit(&self->tail, memory_order_acquire);
   }
   if (head - self->tail_seen > self->mask || bytes > self->slot_bytes) {
@@ -41,11 +41,11 @@ void *wm_ring_reserve(wm_ring *self, size_t bytes) {
 
 void wm_ring_commit(wm_ring *self) {
   uint64_t head = atomic_load_explicit(&self->head, memory_order_relaxed);
-  atomic_store_explicit(&self->head, head + 1, memory_order_release);  // the record before the position
+  atomic_store_explicit(&self->head, head + 1, memory_order_release);  // release: the record before the position
 }
 
 const void *wm_ring_front(wm_ring *self) {
-  uint64_t tail = atomic_load_explicit(&self->tail, memory_order_relaxed);  // ours
+  uint64_t tail = atomic_load_explicit(&self->tail, memory_order_relaxed);  // the consumer's own
   if (tail == self->head_seen) {
     self->head_seen = atomic_load_explicit(&self->head, memory_order_acquire);
     if (tail == self->head_seen) return NULL;

@@ -14,36 +14,36 @@
 #define WM_CACHE_LINE 64
 
 typedef struct wm_ring {
-  // What both read and nobody writes after init.
+  // Constant after init.
   uint8_t *slots;
   size_t slot_bytes;
   uint64_t mask;
-  // The producer's line: next slot to write, and what it last saw of the consumer.
+  // The producer's cache line: next slot to write, and the consumer's position as last read.
   _Alignas(WM_CACHE_LINE) _Atomic uint64_t head;
   uint64_t tail_seen;
   _Atomic uint64_t dropped;
-  // The consumer's line.
+  // The consumer's cache line.
   _Alignas(WM_CACHE_LINE) _Atomic uint64_t tail;
   uint64_t head_seen;
 } wm_ring;
 
-// Slots that `slots` is rounded up to: a power of two, at least 1.
+// `slots` rounded up to a power of two, at least 1.
 size_t wm_ring_slots(size_t slots);
-// Bytes of memory for that many slots of `slot_bytes` each (each rounded up to 8).
+// Bytes of memory for `slots` of `slot_bytes` each (each rounded up to 8).
 size_t wm_ring_bytes(size_t slots, size_t slot_bytes);
 // `memory` is 8-byte aligned, wm_ring_bytes long and outlives the ring. Before the threads start.
 void wm_ring_init(wm_ring *self, void *memory, size_t slots, size_t slot_bytes);
 
-// Producer. The next free slot, for a record of so many bytes; NULL when the ring is full or a slot has no room for it
-// (both counted). Then commit it. Constant time.
+// Producer. The next free slot, for a record of `bytes`; NULL when the ring is full or the slot too small (both
+// counted). Commit follows. Constant time.
 WM_REALTIME void *wm_ring_reserve(wm_ring *self, size_t bytes);
 WM_REALTIME void wm_ring_commit(wm_ring *self);
 
-// Consumer. The oldest record, or NULL when there is none; then pop it. Constant time.
+// Consumer. The oldest record, or NULL when there is none; pop follows. Constant time.
 WM_REALTIME const void *wm_ring_front(wm_ring *self);
 WM_REALTIME void wm_ring_pop(wm_ring *self);
 
-// Records that found no place. Any thread.
+// Records dropped for lack of room. Any thread.
 WM_REALTIME uint64_t wm_ring_dropped(const wm_ring *self);
 
 #endif

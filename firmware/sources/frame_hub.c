@@ -7,7 +7,7 @@
 
 #include "rt/clock.h"
 
-// A buffer of the pool. The hub's thread writes it while nobody reads it.
+// A buffer of the pool. The hub's thread writes it only while it has no reader.
 typedef struct picture {
   struct picture *next;
   uint32_t readers;  // subscriptions that hold it or have it waiting
@@ -26,7 +26,7 @@ typedef struct subscription {
   picture *waiting[FRAME_HUB_WAITING_MAX];  // the oldest first
   uint32_t waiting_count;
   picture *held;
-  int is_peeked;  // the held one was not handed out yet
+  int is_peeked;  // held, but not yet returned by `next`
   uint64_t dropped, alone;
 } subscription;
 
@@ -34,13 +34,13 @@ struct frame_hub {
   wm_frame_source *source;
   uint32_t width_px, height_px;
   pthread_mutex_t lock;    // of all below
-  pthread_cond_t changed;  // a picture came, or the end
+  pthread_cond_t changed;  // a picture arrived, or the source ended
   picture *pool;
   size_t pool_count, pool_needed;
   subscription *subscriptions;
   uint32_t subscription_count, raw_wanted;
-  wm_source_counts counts;  // the source's, as of its newest picture
-  wm_status ended;          // WM_OK: goes on
+  wm_source_counts counts;  // of the source, as of its newest picture
+  wm_status ended;          // WM_OK: not ended
   wm_error why;
 };
 
@@ -68,7 +68,7 @@ static wm_status add_picture(frame_hub *self, wm_error *err) {
   return WM_OK;
 }
 
-// As many as are needed, those that are read meanwhile beside them.
+// Adjusts the pool to pool_needed; buffers that are read at the moment stay.
 static wm_status fit_pool(frame_hub *self, wm_error *err) {
   for (picture **at = &self->pool; *at && self->pool_count > self->pool_needed;) {
     picture *p = *at;
@@ -85,19 +85,19 @@ static wm_status fit_pool(frame_hub *self, wm_error *err) {
   return status;
 }
 
-// There is one: the pool has one more than all subscribers can hold.
+// Never NULL: the pool has one buffer more than all subscribers can hold.
 static picture *unread(frame_hub *self) {
   picture *p = self->pool;
   while (p && p->readers > 0) p = p->next;
   return p;
 }
 
-// What a subscription may hold: those that wait, and the one that it reads.
+// Most buffers that a subscription can hold: those that wait, and the one that it reads.
 static size_t most_held(const wm_frame_wishes *wishes) { return wishes->waiting_max + 1; }
 
 // ── the hub's thread ────────────────────────────────────────────────────────────────────────────────────────────────
 
-// JPEGs differ in size: a buffer grows to the largest that it has seen, by half more.
+// JPEGs differ in size: a buffer grows to 1.5 times the picture that did not fit.
 static void keep_raw(frame_hub *self, picture *p) {
   wm_camera_raw raw = {0};
   self->source->ops->raw(self->source, &raw);
@@ -137,7 +137,7 @@ wm_status frame_hub_take(frame_hub *self, wm_error *err) {
   wm_status status = self->source->ops->peek(self->source, &head, &why);
   lock(self);
   picture *p = status == WM_OK ? unread(self) : NULL;
-  if (p) p->readers++;  // this thread's, until it is handed out
+  if (p) p->readers++;  // held by this thread until it is handed out
   int wants_raw = self->raw_wanted > 0;
   unlock(self);
   if (p) {
@@ -147,7 +147,7 @@ wm_status frame_hub_take(frame_hub *self, wm_error *err) {
     p->decoded_in_ns = wm_monotonic_ns() - begin_ns;
     p->raw = (wm_camera_raw){0};
     if (status == WM_OK && wants_raw) keep_raw(self, p);
-  } else if (status == WM_OK) {  // nobody subscribes
+  } else if (status == WM_OK) {  // no subscriber
     status = self->source->ops->skip(self->source, &why);
   }
   lock(self);
@@ -172,7 +172,7 @@ static void let_go(subscription *self) {
   self->is_peeked = 0;
 }
 
-// Under the lock: the oldest that waits becomes the held one.
+// Under the lock: the oldest waiting picture becomes the held one.
 static wm_status hold_next(subscription *self, wm_error *err) {
   frame_hub *hub = self->hub;
   if (self->is_peeked) return WM_OK;
@@ -249,7 +249,7 @@ static void close_subscription(wm_frame_source *base) {
   hub->subscription_count--;
   hub->raw_wanted -= self->wishes.wants_raw != 0;
   hub->pool_needed -= most_held(&self->wishes);
-  (void)fit_pool(hub, NULL);  // has enough
+  (void)fit_pool(hub, NULL);  // it only shrinks
   unlock(hub);
   free(self);
 }
@@ -299,7 +299,7 @@ wm_status frame_hub_open(wm_frame_source *source, uint32_t width_px, uint32_t he
   self->source = source;
   self->width_px = width_px;
   self->height_px = height_px;
-  self->pool_needed = 1;  // the one that is filled
+  self->pool_needed = 1;  // the one that is being filled
   pthread_condattr_t clock;
   (void)pthread_condattr_init(&clock);
   (void)pthread_condattr_setclock(&clock, CLOCK_MONOTONIC);

@@ -9,7 +9,7 @@ void newest_pose_put(newest_pose *self, const wm_estimate *pose) {
   const uint32_t turn = atomic_load_explicit(&self->turn, memory_order_relaxed);
   atomic_store_explicit(&self->turn, turn + 1, memory_order_relaxed);
   for (size_t i = 0; i < NEWEST_POSE_WORDS; i++) {
-    // Release: who sees a new word sees the odd turn.
+    // Release: a reader of a new word also reads the odd turn.
     atomic_store_explicit(&self->word[i], words[i], memory_order_release);
   }
   atomic_store_explicit(&self->turn, turn + 2 ? turn + 2 : 2, memory_order_release);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The newest pose, from the thread that makes it to those that look at pictures: a sequence lock over words that are
-// atomics. The writer never waits; a reader that is disturbed tries again.
+// The newest pose, from the estimator's thread to the detectors' threads: a sequence lock over atomic words. The writer
+// never waits; a reader that overlaps a write tries again.
 #ifndef WAYMARK_SOURCES_NEWEST_POSE_H
 #define WAYMARK_SOURCES_NEWEST_POSE_H
 
@@ -19,7 +19,7 @@ typedef struct newest_pose {
 } newest_pose;
 
 WM_REALTIME void newest_pose_put(newest_pose *self, const wm_estimate *pose);
-// 0 where there is none yet.
+// 0 where no pose was put yet.
 int newest_pose_get(newest_pose *self, wm_estimate *out);
 
 #endif

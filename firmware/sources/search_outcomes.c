@@ -24,7 +24,7 @@ void search_outcomes_close(search_outcomes *self) {
   *self = (search_outcomes){0};
 }
 
-// The detector names its landmarks in the same order each time.
+// The detector lists its landmarks in the same order for each picture.
 static void name_rows(search_outcomes *self) {
   for (size_t i = 0; i < self->entries; i++) {
     size_t row = 0;
@@ -34,7 +34,7 @@ static void name_rows(search_outcomes *self) {
   }
 }
 
-// Of a landmark's appearances the one that got farthest: reasons are numbered so.
+// The best outcome among a landmark's appearances; outcomes are numbered by how far the search came.
 static uint8_t better(uint8_t a, uint8_t b) {
   if (a == NOTHING) return b;
   if (a == WM_LOOK_FOUND || b == WM_LOOK_FOUND) return WM_LOOK_FOUND;

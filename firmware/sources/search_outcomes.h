@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counts what became of each known landmark, over all pictures of one camera.
+// Counts the search outcomes (wm_look) of each known landmark over all pictures of one camera.
 #ifndef WAYMARK_SOURCES_SEARCH_OUTCOMES_H
 #define WAYMARK_SOURCES_SEARCH_OUTCOMES_H
 
@@ -7,8 +7,8 @@
 #include "waymark/detector.h"
 
 typedef struct search_outcomes {
-  size_t capacity;  // appearances that the detector may know
-  size_t entries;   // those that it does know; known from the first picture on
+  size_t capacity;  // of appearances
+  size_t entries;   // appearances of the detector; set by the first picture
   wm_looked_for *newest;
   uint32_t *row_of;  // of each entry: a landmark may have several appearances
   uint8_t *best;     // of each row in the newest picture
@@ -16,10 +16,10 @@ typedef struct search_outcomes {
   size_t count;
 } search_outcomes;
 
-// Room for so many appearances, from malloc. 0 where there is no memory.
+// Room for `appearances`, from malloc. 0 without memory.
 int search_outcomes_open(search_outcomes *self, size_t appearances);
 void search_outcomes_close(search_outcomes *self);
-// Counts the detector's last picture, each landmark once, into the rows and into `sum`. No allocation.
+// Counts the detector's newest picture, each landmark once, into the rows and into `sum`. No allocation.
 void search_outcomes_take(search_outcomes *self, const wm_detector *detector, const void *state,
                           uint64_t sum[WM_LOOK_COUNT]);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The videos of a recording's folder as its cameras: each reader has its own place in the file; a picture is decoded
-// once for all.
+// The videos of a recording's folder as cameras: each reader has its own position in the file; a picture is decoded
+// once for all of them.
 #ifndef WAYMARK_SOURCES_VIDEOS_H
 #define WAYMARK_SOURCES_VIDEOS_H
 
@@ -16,7 +16,7 @@ typedef struct videos {
   void *warn_context;
 } videos;
 
-// No memory of its own; `recording` outlives it, and so do all its readers until the last is opened.
+// Allocates nothing; `recording` outlives it, and its readers stay open until the last one is opened.
 void videos_of(videos *out, const wm_recording *recording, wm_warn_fn warn, void *context);
 
 #endif

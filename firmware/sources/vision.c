@@ -17,16 +17,16 @@ struct wm_vision {
   char need_names[WM_VISION_NEEDS][40];
 };
 
-// Events that a picture may give: one with many points, or many small ones.
+// Most events of a picture: one with many points, or many small ones.
 #define EVENTS_WITH_POINTS 2
 #define EVENTS_SMALL 256
 #define NO_SENSOR UINT16_MAX
-// What an estimator holds against a sensor's mounting.
+// What an estimator needs of a sensor's mounting.
 static const uint32_t kSaidOfSensors = WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER);
 
 static wm_status next(wm_source *base, wm_event *out, wm_error *err) {
   vision_source *self = (vision_source *)base;
-  if (self->ahead.started) return vision_ahead_next(self, out, err);
+  if (self->prefetch.started) return vision_prefetch_next(self, out, err);
   wm_status status = vision_next(self, out, err);
   base->counts = self->counts;
   return status;
@@ -34,12 +34,12 @@ static wm_status next(wm_source *base, wm_event *out, wm_error *err) {
 
 static void skip_to(wm_source *base, wm_time_ns now_ns) {
   vision_source *self = (vision_source *)base;
-  if (self->ahead.started) return;
+  if (self->prefetch.started) return;
   vision_skip_to(self, now_ns);
   base->counts = self->counts;
 }
 
-static void close_nothing(wm_source *base) { (void)base; }  // wm_vision_close does
+static void close_nothing(wm_source *base) { (void)base; }  // wm_vision_close closes it
 
 static const wm_source_ops kOps = {.next = next, .close = close_nothing};
 
@@ -53,7 +53,7 @@ static uint16_t sensor_of(wm_recording *recording, const char *camera) {
   return NO_SENSOR;
 }
 
-// Who looks wants the newest picture, and only that.
+// A detector takes the newest picture only.
 static const wm_frame_wishes kDetector = {.waiting_max = 1, .wait_ms = WM_DEVICE_WAIT_MS};
 
 static wm_status open_pictures(vision_source *self, wm_pictures *pictures, wm_error *err) {
@@ -127,7 +127,7 @@ static int is_wanted(const wm_vision_config *wanted, const char *camera) {
   return 0;
 }
 
-// The cameras that are named, or else all that have pictures.
+// The cameras of the configuration, or else all that have pictures.
 static wm_status add_singles(wm_vision *self, const wm_config *config, const wm_vision_config *wanted,
                              wm_recording *recording, wm_pictures *pictures, wm_error *err) {
   const wm_rig *rig = wm_site_rig(wm_recording_site(recording));
@@ -176,7 +176,7 @@ wm_status wm_vision_open(const wm_config *config, wm_recording *recording, wm_wa
 void wm_vision_close(wm_vision *self) {
   if (!self) return;
   for (size_t i = 0; i < self->count; i++) {
-    vision_ahead_stop(&self->sources[i]);
+    vision_prefetch_stop(&self->sources[i]);
     for (size_t k = 0; k < PICTURES_MAX; k++) {
       wm_frame_source *pictures = self->sources[i].pictures[k];
       if (pictures) pictures->ops->close(pictures);
@@ -204,8 +204,8 @@ size_t wm_vision_needs(wm_vision *self, wm_arena_need *needs) {
     (void)snprintf(self->need_names[used], sizeof self->need_names[0], "%.36s", s->base.name);
     (void)snprintf(self->need_names[used + 1], sizeof self->need_names[0], "%.28s events", s->base.name);
     needs[used] = (wm_arena_need){self->need_names[used], s->state_bytes, &s->state};
-    needs[used + 1] =
-        (wm_arena_need){self->need_names[used + 1], (s->capacity + AHEAD_EVENTS) * sizeof(wm_event), &s->events_memory};
+    needs[used + 1] = (wm_arena_need){self->need_names[used + 1], (s->capacity + PREFETCH_EVENTS) * sizeof(wm_event),
+                                      &s->events_memory};
     used += 2;
   }
   return used;
@@ -215,7 +215,7 @@ wm_status wm_vision_start(wm_vision *self, wm_error *err) {
   for (size_t i = 0; i < wm_vision_count(self); i++) {
     vision_source *s = &self->sources[i];
     s->events = s->events_memory;
-    s->ahead.events = s->events + s->capacity;
+    s->prefetch.events = s->events + s->capacity;
     wm_status status = s->detector->init(s->state, s->params, &s->view);
     if (status != WM_OK)
       return wm_fail(err, status, "vision: detector '%s' can't start: %s", s->detector->name, wm_status_text(status));
@@ -223,10 +223,10 @@ wm_status wm_vision_start(wm_vision *self, wm_error *err) {
   return WM_OK;
 }
 
-wm_status wm_vision_run_ahead(wm_vision *self, wm_error *err) {
+wm_status wm_vision_start_prefetch(wm_vision *self, wm_error *err) {
   wm_status status = WM_OK;
   for (size_t i = 0; status == WM_OK && i < wm_vision_count(self); i++)
-    if (!self->sources[i].newest) status = vision_ahead_start(&self->sources[i], err);
+    if (!self->sources[i].newest) status = vision_prefetch_start(&self->sources[i], err);
   return status;
 }
 
@@ -234,7 +234,7 @@ void wm_vision_look_at_arrival(wm_vision *self) {
   for (size_t i = 0; i < wm_vision_count(self); i++) self->sources[i].looks_at_arrival = 1;
 }
 
-void wm_vision_tell(wm_vision *self, const wm_estimate *newest) {
+void wm_vision_set_prediction(wm_vision *self, const wm_estimate *newest) {
   if (self) newest_pose_put(&self->newest, newest);
 }
 

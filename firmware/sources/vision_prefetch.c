@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A thread that looks at pictures ahead of a replay, a few events at most.
+// A thread that processes pictures ahead of a replay, up to PREFETCH_EVENTS events.
 #include <stdio.h>
 #include <string.h>
 
@@ -7,12 +7,12 @@
 
 static void *work(void *argument) {
   vision_source *self = argument;
-  vision_ahead *a = &self->ahead;
+  vision_prefetch *a = &self->prefetch;
   (void)pthread_mutex_lock(&a->lock);
   for (;;) {
-    while (!a->stop && a->count == AHEAD_EVENTS) (void)pthread_cond_wait(&a->changed, &a->lock);
+    while (!a->stop && a->count == PREFETCH_EVENTS) (void)pthread_cond_wait(&a->changed, &a->lock);
     if (a->stop) break;
-    wm_event *slot = &a->events[(a->first + a->count) % AHEAD_EVENTS];
+    wm_event *slot = &a->events[(a->first + a->count) % PREFETCH_EVENTS];
     (void)pthread_mutex_unlock(&a->lock);
     wm_error error = {0};
     wm_status status = vision_next(self, slot, &error);
@@ -32,12 +32,12 @@ static void *work(void *argument) {
   return NULL;
 }
 
-wm_status vision_ahead_start(vision_source *self, wm_error *err) {
-  vision_ahead *a = &self->ahead;
+wm_status vision_prefetch_start(vision_source *self, wm_error *err) {
+  vision_prefetch *a = &self->prefetch;
   if (pthread_mutex_init(&a->lock, NULL) != 0 || pthread_cond_init(&a->changed, NULL) != 0)
-    return wm_fail(err, WM_IO, "%s: no lock to be had", self->base.name);
+    return wm_fail(err, WM_IO, "%s: a lock can't be made", self->base.name);
   if (pthread_create(&a->thread, NULL, work, self) != 0)
-    return wm_fail(err, WM_IO, "%s: no thread to be had", self->base.name);
+    return wm_fail(err, WM_IO, "%s: a thread can't be started", self->base.name);
   char name[16];
   (void)snprintf(name, sizeof name, "wm-%.12s", self->base.name);
   (void)pthread_setname_np(a->thread, name);
@@ -45,8 +45,8 @@ wm_status vision_ahead_start(vision_source *self, wm_error *err) {
   return WM_OK;
 }
 
-void vision_ahead_stop(vision_source *self) {
-  vision_ahead *a = &self->ahead;
+void vision_prefetch_stop(vision_source *self) {
+  vision_prefetch *a = &self->prefetch;
   if (!a->started) return;
   (void)pthread_mutex_lock(&a->lock);
   a->stop = 1;
@@ -56,15 +56,15 @@ void vision_ahead_stop(vision_source *self) {
   a->started = 0;
 }
 
-wm_status vision_ahead_next(vision_source *self, wm_event *out, wm_error *err) {
-  vision_ahead *a = &self->ahead;
+wm_status vision_prefetch_next(vision_source *self, wm_event *out, wm_error *err) {
+  vision_prefetch *a = &self->prefetch;
   (void)pthread_mutex_lock(&a->lock);
   while (a->count == 0 && !a->ended) (void)pthread_cond_wait(&a->changed, &a->lock);
   wm_status status = WM_OK;
   if (a->count > 0) {
     const wm_event *event = &a->events[a->first];
     memcpy(out, event, wm_event_bytes(event));
-    a->first = (a->first + 1) % AHEAD_EVENTS;
+    a->first = (a->first + 1) % PREFETCH_EVENTS;
     a->count--;
   } else {
     status = a->status;

@@ -7,7 +7,7 @@
 
 #include "rt/clock.h"
 
-// Which of two states a person should hear of.
+// Whether state `a` is to be reported rather than `b`.
 static int worse(uint8_t a, uint8_t b) {
   static const uint8_t kHowBad[WM_DEVICE_STATE_COUNT] = {
       [WM_DEVICE_NONE] = 1,    [WM_DEVICE_WORKS] = 0, [WM_DEVICE_FROZEN] = 2,
@@ -29,7 +29,7 @@ static void add_counts(wm_source_counts *sum, const wm_source_counts *one, int i
   memcpy(sum->device_note, one->device_note, sizeof sum->device_note);
 }
 
-// What all its cameras counted, with what became of the pictures here.
+// Sums what all its cameras counted, and adds this source's own counts.
 static void take_counts(vision_source *self) {
   wm_source_counts sum = {.received = self->counts.received};
   memcpy(sum.looks, self->counts.looks, sizeof sum.looks);
@@ -45,7 +45,7 @@ static void take_counts(vision_source *self) {
 
 #define ONLY_TOLERANCE_NS (50 * WM_NS_PER_MS)  // of a run's stamp from the recording's; or less than half a period
 
-// The nearest of those that are wanted, if it lies within less than half a period: no other picture is meant by it.
+// The nearest wanted picture, if within only_tolerance_ns; else NULL.
 static const wm_seen *wanted(const vision_source *self, wm_time_ns t_ns) {
   size_t low = 0, high = self->only_count;
   while (low < high) {
@@ -84,7 +84,7 @@ static int are_together(const vision_source *self, const wm_frame *frames) {
   return apart_ns <= PAIR_TOLERANCE_NS && apart_ns >= -PAIR_TOLERANCE_NS;
 }
 
-// Of a pair, passes over pictures whose other half is missing. The heads of what belongs together into `heads`.
+// Skips pictures of a pair whose other half is missing. Stamps of the next complete pair (or picture) into `heads`.
 static wm_status find_together(vision_source *self, wm_frame *heads, wm_error *err) {
   for (;;) {
     for (uint32_t i = 0; i < self->detector->pictures; i++) {
@@ -99,7 +99,7 @@ static wm_status find_together(vision_source *self, wm_frame *heads, wm_error *e
   }
 }
 
-// Decodes what belongs together, or takes what another thread has decoded.
+// Decodes a picture or a pair, or takes the pixels that another thread has decoded.
 static wm_status decode(vision_source *self, wm_frame *frames, wm_time_ns *took_ns, wm_error *err) {
   wm_frame heads[PICTURES_MAX] = {0};
   wm_status status = find_together(self, heads, err);
@@ -113,15 +113,15 @@ static wm_status decode(vision_source *self, wm_frame *frames, wm_time_ns *took_
   return status;
 }
 
-// Looks at the next picture: self->events, from the first.
+// Detects in the next picture; events into self->events.
 static wm_status look(vision_source *self, wm_error *err) {
   wm_frame frames[PICTURES_MAX] = {0};
   wm_time_ns decoding_ns;
   self->event_count = self->next_event = 0;
   wm_status status = decode(self, frames, &decoding_ns, err);
   if (status != WM_OK) return status;
-  if (!are_together(self, frames)) return WM_OK;  // one of a pair turned out to be damaged
-  // A camera's pictures come in their order; who goes back has a broken clock.
+  if (!are_together(self, frames)) return WM_OK;  // one picture of the pair is damaged
+  // A camera's stamps must rise; a stamp that goes back is a clock fault.
   if (self->newest_ns != WM_TIME_NONE && frames[0].t_ns <= self->newest_ns) {
     self->went_back++;
     return WM_OK;
@@ -166,7 +166,7 @@ static wm_status look(vision_source *self, wm_error *err) {
   return WM_OK;
 }
 
-// Says when the next picture arrives, without a look at it.
+// Hands out the arrival of the next picture, without detection.
 static wm_status announce(vision_source *self, wm_event *out, wm_error *err) {
   wm_frame heads[PICTURES_MAX] = {0};
   wm_status status = find_together(self, heads, err);
@@ -176,7 +176,7 @@ static wm_status announce(vision_source *self, wm_event *out, wm_error *err) {
   out->kind = WM_EVENT_NONE;
   out->t_ns = heads[0].t_ns;
   out->arrival_ns = seen ? seen->arrival_ns : heads[0].arrival_ns;
-  // A detector that is busy looks when it is done.
+  // A busy detector processes the picture when it has finished the one before.
   if (out->arrival_ns < self->busy_until_ns) out->arrival_ns = self->busy_until_ns;
   self->announced = 1;
   return WM_OK;
@@ -197,7 +197,7 @@ wm_status vision_next(vision_source *self, wm_event *out, wm_error *err) {
 }
 
 void vision_skip_to(vision_source *self, wm_time_ns now_ns) {
-  if (self->next_event < self->event_count) return;  // of a picture that was looked at
+  if (self->next_event < self->event_count) return;  // of a picture that is processed already
   for (uint32_t i = 0; i < self->detector->pictures; i++)
     (void)self->pictures[i]->ops->skip_to(self->pictures[i], now_ns, NULL);
   take_counts(self);

@@ -13,22 +13,22 @@
 
 #define PICTURES_MAX 2
 #define PAIR_TOLERANCE_NS (2 * WM_NS_PER_MS)  // pictures of a pair are triggered together
-#define AHEAD_EVENTS 8
+#define PREFETCH_EVENTS 8
 
 typedef struct vision_source vision_source;
 
-// Events that a thread made ahead of who asks for them.
-typedef struct vision_ahead {
+// Events that a prefetch thread has made for a replay.
+typedef struct vision_prefetch {
   pthread_t thread;
   pthread_mutex_t lock;
   pthread_cond_t changed;
   int started, stop, ended;
   size_t first, count;
-  wm_event *events;  // AHEAD_EVENTS
-  wm_status status;  // at the end
+  wm_event *events;  // PREFETCH_EVENTS
+  wm_status status;  // that ended it
   wm_error error;
-  wm_source_counts counts;  // as they were with the newest event
-} vision_ahead;
+  wm_source_counts counts;  // as of the newest event
+} vision_prefetch;
 
 struct vision_source {
   wm_source base;
@@ -41,34 +41,34 @@ struct vision_source {
   int gives_looked;
   size_t state_bytes, capacity;
   void *state, *events_memory;
-  wm_event *events;  // of the newest picture: `capacity`, then those made ahead
+  wm_event *events;  // of the newest picture: `capacity`, then the prefetched ones
   size_t event_count, next_event;
   wm_time_ns newest_ns;
   uint32_t seq;
-  wm_source_counts counts;      // the working thread's own
-  uint64_t went_back, refused;  // pictures that are older than the one before; that the detector didn't take
+  wm_source_counts counts;                     // of the working thread
+  uint64_t went_back, refused;                 // pictures older than the one before; pictures that the detector refused
   wm_histogram decode_ns, detect_ns, look_ns;  // look: of a picture, both together
   search_outcomes outcomes;
-  wm_seen *only;  // the only pictures to be looked at, rising; NULL: all
+  wm_seen *only;  // the only pictures to be processed, rising; NULL: all
   size_t only_count;
   wm_time_ns only_tolerance_ns;
-  newest_pose *newest;       // NULL: nothing guides the detector
-  wm_time_ns busy_until_ns;  // recorded: until its detector would have been done
-  int looks_at_arrival;      // recorded: not before, as wm_vision_look_at_arrival has it
-  int announced;             // likewise: the next picture's arrival was handed out
-  vision_ahead ahead;
+  newest_pose *newest;       // NULL: the detector isn't guided
+  wm_time_ns busy_until_ns;  // recorded: end of the detector's work on the picture before
+  int looks_at_arrival;      // recorded: detection at the picture's arrival (wm_vision_look_at_arrival)
+  int announced;             // with it: the next picture's arrival was handed out
+  vision_prefetch prefetch;
 };
 
-// The next event, by the thread that calls.
+// The next event, on the calling thread.
 wm_status vision_next(vision_source *self, wm_event *out, wm_error *err);
-// Passes over pictures that are no longer the newest at `now_ns`.
+// Skips pictures that are no longer the newest at `now_ns`.
 void vision_skip_to(vision_source *self, wm_time_ns now_ns);
 
-// Takes `seen` (rising, from malloc) over.
+// Takes ownership of `seen` (rising, from malloc).
 void vision_look_only_at(vision_source *self, wm_seen *seen, size_t count);
 
-wm_status vision_ahead_start(vision_source *self, wm_error *err);
-void vision_ahead_stop(vision_source *self);
-wm_status vision_ahead_next(vision_source *self, wm_event *out, wm_error *err);
+wm_status vision_prefetch_start(vision_source *self, wm_error *err);
+void vision_prefetch_stop(vision_source *self);
+wm_status vision_prefetch_next(vision_source *self, wm_event *out, wm_error *err);
 
 #endif

@@ -21,7 +21,7 @@ CONFIG_HEAD = """# Configuration
 A configuration names an estimator and its parameters. What belongs to a robot or a place (calibration, landmarks, DBC,
 start pose) comes from the recording's folder unless the configuration says otherwise, so that one configuration serves
 every recording of its kind. It is YAML, read once at start; a mistake stops with file, line, key, what is there and what
-is allowed ([errors.md](errors.md) shows them). A key that isn't given has its default; a key that nobody knows is an error.
+is allowed ([errors.md](errors.md) shows them). A key that isn't given has its default; an unknown key is an error.
 
 ```yaml
 format: waymark-config/1
@@ -42,12 +42,12 @@ Dots in the tables below are nested maps: `publish.rate_hz` is `publish: {rate_h
 
 """
 
-ERRORS_HEAD = """# What Waymark says of bad input
+ERRORS_HEAD = """# Messages about bad input
 
 Each row is a test: this input gives this message. Bad configuration stops at start, before anything moves; bad data is
 counted, reported and skipped, and the drive goes on. `rec` is the recording's folder; the lines of a configuration follow
 `format: waymark-config/1` and `estimator: landmark_ekf`; → is a tab, ⏎ a line's end. In a recording, the source puts
-`can.log:LINE:` before what it says of a candump line.
+`can.log:LINE:` before a message about a candump line.
 
 <!-- Made by tests/golden/docs.py from the tests' own tables: change them there. -->
 

@@ -41,7 +41,7 @@ static void what_does_not_fit_is_told_the_number_that_would(void) {
   TEST_ASSERT_EQUAL(WM_OK, wm_arena_open(&arena, 4096, &err));
   TEST_ASSERT_EQUAL(WM_OK, wm_arena_take(&arena, "a", 4000, &a, &err));
   TEST_ASSERT_EQUAL(WM_FULL, wm_arena_take(&arena, "b", 640, &a, &err));
-  TEST_ASSERT_NOT_NULL(strstr(err.text, "4672 would do"));
+  TEST_ASSERT_NOT_NULL(strstr(err.text, "4672 would suffice"));
   TEST_ASSERT_EQUAL(WM_FULL, wm_arena_take(&arena, "c", SIZE_MAX, &a, &err));
   wm_arena_close(&arena);
 }

@@ -150,7 +150,7 @@ static void events_of_pictures(void) {
   tearDown();
   setUp();
   open_it("vision: {edges: {cameras: [front], rays: {range_max_m: 5}}}\n", POINTS | LOOKED);
-  TEST_ASSERT_EQUAL(WM_OK, wm_vision_run_ahead(vision, &err));
+  TEST_ASSERT_EQUAL(WM_OK, wm_vision_start_prefetch(vision, &err));
   TEST_ASSERT_EQUAL(bytes, drain(wm_vision_source(vision, 0), ahead, sizeof ahead));
   TEST_ASSERT_EQUAL_MEMORY(here, ahead, bytes);
 }
@@ -169,7 +169,7 @@ static void two_detectors_on_one_camera_decode_a_picture_once(void) {
             POINTS | LOOKED | WM_EVENT_BIT(WM_EVENT_MARKER));
     TEST_ASSERT_EQUAL(2, wm_vision_count(vision));
     atomic_store(&decodings, 0);
-    if (ahead) TEST_ASSERT_EQUAL(WM_OK, wm_vision_run_ahead(vision, &err));
+    if (ahead) TEST_ASSERT_EQUAL(WM_OK, wm_vision_start_prefetch(vision, &err));
     for (int i = 0; i < 2; i++) {
       wm_source *source = wm_vision_source(vision, (size_t)i);
       has[i] = source->ops->next(source, &event[i], &err) == WM_OK;
@@ -209,7 +209,7 @@ static void a_run_looks_at_a_recorded_picture_when_it_arrives(void) {
 static void ended_in_the_middle(void) {
   open_it("vision: {edges: {}}\n", POINTS);
   TEST_ASSERT_EQUAL(2, wm_vision_count(vision));  // both cameras have pictures
-  TEST_ASSERT_EQUAL(WM_OK, wm_vision_run_ahead(vision, &err));
+  TEST_ASSERT_EQUAL(WM_OK, wm_vision_start_prefetch(vision, &err));
   static wm_event event;
   wm_source *source = wm_vision_source(vision, 1);
   TEST_ASSERT_EQUAL_STRING("edges:rear", source->name);
