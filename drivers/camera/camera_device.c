@@ -37,7 +37,8 @@ struct wm_camera_device {
   wm_frame head;
   camera_buffer newest;
   uint32_t held;   // the buffer whose pixels the caller has
-  uint32_t stale;  // buffers still to be thrown away
+  uint32_t stale;  // buffers that may still be from before the stream's begin
+  wm_time_ns begun_ns;
   frame_clock clock;
   frame_count count;
   uint64_t fingerprint;
@@ -120,6 +121,7 @@ static void set_controls(wm_camera_device *self) {
 
 static void begin_stream(wm_camera_device *self, wm_time_ns now_ns) {
   self->stale = BUFFERS;
+  self->begun_ns = now_ns;
   self->count.is_set = 0;
   self->clock.is_foreign = 0;
   self->clock.doubtful = 0;
@@ -209,16 +211,21 @@ static int stamp(wm_camera_device *self, const camera_buffer *b, wm_time_ns arri
   return 1;
 }
 
+// What a driver had in its ring before the start. A stamp of this computer's clock shows that nothing is left of it; else
+// the first pictures are thrown away, as many as the ring holds.
+static int is_stale(wm_camera_device *self, const camera_buffer *b, wm_time_ns now_ns) {
+  if (b->stamp_ns > self->begun_ns && b->stamp_ns <= now_ns) self->stale = 0;
+  if (self->stale == 0) return 0;
+  self->stale--;
+  self->counts.stale++;
+  return 1;
+}
+
 // 1: a picture worth looking at; all of *out but its pixels is filled.
 static int judge(wm_camera_device *self, const camera_buffer *b, wm_frame *out) {
   wm_time_ns now_ns = self->io->monotonic_ns(self->io_context);
   self->last_buffer_ns = now_ns;
-  // What a driver had in its ring before the start.
-  if (self->stale > 0) {
-    self->stale--;
-    self->counts.stale++;
-    return 0;
-  }
+  if (is_stale(self, b, now_ns)) return 0;
   uint64_t lost;
   (void)frame_count_take(&self->count, b->sequence, &lost);
   self->counts.lost += lost;

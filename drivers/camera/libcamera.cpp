@@ -121,8 +121,9 @@ struct Slot {
   std::unique_ptr<lc::Request> request;
   lc::FrameBuffer *buffer = nullptr;
   int fd = -1;
-  uint8_t *mapped = nullptr;
+  uint8_t *mapped = nullptr;  // the driver's memory, on many boards without a cache: read once, from one end to the other
   size_t mapped_bytes = 0, offset = 0, capacity = 0;
+  std::unique_ptr<uint8_t[]> copy;  // what everybody else reads
 };
 
 class Eye {
@@ -284,6 +285,7 @@ int Eye::add_slot(lc::FrameBuffer *buffer) {
   slot.offset = plane.offset == lc::FrameBuffer::Plane::kInvalidOffset ? 0 : plane.offset;
   slot.capacity = plane.length;
   slot.mapped_bytes = slot.offset + slot.capacity;
+  slot.copy = std::make_unique<uint8_t[]>(slot.capacity);
   slot.request = camera_->createRequest(slots_.size());
   if (!slot.request) return -ENOMEM;
   int failed = slot.request->addBuffer(configuration_->at(0).stream(), buffer);
@@ -341,7 +343,7 @@ int Eye::fill(uint32_t index, camera_buffer *out) {
   const lc::ControlList &said = slot.request->metadata();
   *out = camera_buffer{};
   out->index = index;
-  out->data = slot.mapped + slot.offset;
+  out->data = slot.copy.get();
   out->sequence = frame.sequence;
   if (slot.request->status() != lc::Request::RequestComplete || frame.status != lc::FrameMetadata::FrameSuccess)
     out->flags |= CAMERA_BUFFER_ERROR;
@@ -353,6 +355,8 @@ int Eye::fill(uint32_t index, camera_buffer *out) {
   const auto exposure_us = said.get(lc::controls::ExposureTime);
   if (exposure_us && *exposure_us > 0) exposure_ns = *exposure_us * WM_NS_PER_US;
   sync_cache(slot, DMA_BUF_SYNC_START);
+  memcpy(slot.copy.get(), slot.mapped + slot.offset, out->bytes);
+  sync_cache(slot, DMA_BUF_SYNC_END);
   return 1;
 }
 
@@ -369,7 +373,6 @@ int Eye::take(int wait_ms, camera_buffer *out) {
 
 int Eye::give_back(uint32_t index) {
   if (index >= slots_.size()) return -EINVAL;
-  sync_cache(slots_[index], DMA_BUF_SYNC_END);
   slots_[index].request->reuse(lc::Request::ReuseBuffers);
   return camera_->queueRequest(slots_[index].request.get());
 }

@@ -56,9 +56,9 @@ static fake_step *picture(wm_time_ns taken_ns, uint32_t sequence) {
   return s;
 }
 
-// Four buffers that every start throws away, the newest of number `last`.
+// Four buffers from before the start, which it throws away, the newest of number `last`.
 static void stale(wm_time_ns at_ns, uint32_t last) {
-  for (uint32_t i = 0; i < 4; i++) picture(at_ns, last - 3 + i)->at_ns = at_ns;
+  for (uint32_t i = 0; i < 4; i++) picture(at_ns - 1000 * MS, last - 3 + i)->at_ns = at_ns;
 }
 
 static void make(void) {
@@ -105,6 +105,16 @@ static void pictures_become_frames(void) {
   TEST_ASSERT_EQUAL(WM_AGAIN, next());
   TEST_ASSERT_EQUAL_UINT32(fake.given, fake.taken_back);
   TEST_ASSERT_EQUAL_STRING("", warned);
+}
+
+// At 4 Hz four pictures are a second of blindness.
+static void the_first_picture_of_a_camera_with_an_empty_ring_is_used(void) {
+  picture(AT(100), 1);
+  picture(AT(350), 2);
+  make();
+  expect_picture_of(AT(100));
+  expect_picture_of(AT(350));
+  TEST_ASSERT_EQUAL_UINT64(0, counts()->stale);
 }
 
 // v4l2loopback: a burst of what was in its ring, with old stamps, then the count leaps.
@@ -310,6 +320,7 @@ static void jpegs_are_decoded_and_garbage_is_not(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(pictures_become_frames);
+  RUN_TEST(the_first_picture_of_a_camera_with_an_empty_ring_is_used);
   RUN_TEST(what_was_in_the_ring_before_the_start_is_thrown_away);
   RUN_TEST(gaps_in_the_drivers_count_are_lost_pictures);
   RUN_TEST(damaged_buffers_are_counted_and_passed_over);
