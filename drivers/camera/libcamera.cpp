@@ -89,7 +89,8 @@ int choose_format(uint32_t fourcc, lc::StreamConfiguration *stream) {
 // ── which one ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
 // libcamera allows one manager in a process. It starts with the first camera that is looked for, sees cameras come and
-// go, and stops at the exit.
+// go, and ends with the last one that is closed: what it keeps of a camera that was unplugged ends with it. (0.0.3 ends
+// the process where a camera comes back whose end it has missed.)
 std::mutex manager_mutex;
 lc::CameraManager *manager;
 int manager_users;
@@ -108,8 +109,9 @@ int find(const char *id, std::shared_ptr<lc::Camera> *out) {
     int failed = made->start();
     if (failed) return failed;
     manager = made.release();
-    // After its start: at the exit this comes before the end of what libcamera keeps for itself.
-    (void)std::atexit(stop_manager);
+    // After its first start: at the exit this comes before the end of what libcamera keeps for itself.
+    static const int is_registered = std::atexit(stop_manager);
+    (void)is_registered;
   }
   *out = manager->get(id);
   if (*out) manager_users++;
@@ -180,13 +182,17 @@ int Eye::shut() {
     if (slot.mapped) (void)munmap(slot.mapped, slot.mapped_bytes);
   }
   allocator_.reset();
+  configuration_.reset();
   if (is_acquired_) (void)camera_->release();
   for (int end : pipe_)
     if (end >= 0) (void)::close(end);
   if (!camera_) return 0;
   camera_.reset();
-  const std::lock_guard<std::mutex> lock(manager_mutex);
-  manager_users--;
+  {
+    const std::lock_guard<std::mutex> lock(manager_mutex);
+    manager_users--;
+  }
+  stop_manager();
   return 0;
 }
 
