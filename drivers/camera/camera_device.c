@@ -211,8 +211,8 @@ static int stamp(wm_camera_device *self, const camera_buffer *b, wm_time_ns arri
   return 1;
 }
 
-// What a driver had in its ring before the start. A stamp of this computer's clock shows that nothing is left of it; else
-// the first pictures are thrown away, as many as the ring holds.
+// What a driver had in its ring before the start. A stamp of this computer's clock shows that nothing is left of it;
+// else the first pictures are thrown away, as many as the ring holds.
 static int is_stale(wm_camera_device *self, const camera_buffer *b, wm_time_ns now_ns) {
   if (b->stamp_ns > self->begun_ns && b->stamp_ns <= now_ns) self->stale = 0;
   if (self->stale == 0) return 0;

@@ -123,7 +123,8 @@ struct Slot {
   std::unique_ptr<lc::Request> request;
   lc::FrameBuffer *buffer = nullptr;
   int fd = -1;
-  uint8_t *mapped = nullptr;  // the driver's memory, on many boards without a cache: read once, from one end to the other
+  uint8_t *mapped =
+      nullptr;  // the driver's memory, on many boards without a cache: read once, from one end to the other
   size_t mapped_bytes = 0, offset = 0, capacity = 0;
   std::unique_ptr<uint8_t[]> copy;  // what everybody else reads
 };
