@@ -33,7 +33,7 @@ static const char kHelp[] =
     "  --speed X              times real speed (default 1)\n"
     "  --seed N               of random numbers (default 1)\n"
     "  --resume               with a recording, too: begin where the run before ended (start.saved_pose,\n"
-    "                         start.saved_map), and keep both\n"
+    "                         start.saved_map), keep both, and write the black box\n"
     "  --landmarks FILE       instead of the recording's map\n"
     "  --map FILE             a map.yaml instead of the recording's\n"
     "  --calibration FILE     instead of the recording's\n"
@@ -96,8 +96,7 @@ static void close_all(opened *self) {
 
 // A recording that is played stands in for the robot's devices; the robot's own state is left alone, but for --resume.
 static void without_robot(wm_config *config, int resumes) {
-  config->black_box[0] = '\0';
-  if (!resumes) config->saved_pose[0] = config->saved_map[0] = '\0';
+  if (!resumes) config->saved_pose[0] = config->saved_map[0] = config->black_box[0] = '\0';
   config->devices.sightings_by_lcm = 0;
 }
 

@@ -177,6 +177,8 @@ static wm_status read_texts(const wm_yaml_node *root, wm_config *out, wm_error *
   if (status == WM_OK && wm_yaml_there(&map)) status = config_path(&map, out->path, out->saved_map, err);
   wm_yaml_node box = wm_yaml_get(root, "black_box.folder");
   if (status == WM_OK && wm_yaml_there(&box)) status = config_path(&box, out->path, out->black_box, err);
+  wm_yaml_node commands = wm_yaml_get(root, "commands.socket");
+  if (status == WM_OK && wm_yaml_there(&commands)) status = config_path(&commands, out->path, out->commands, err);
   if (status == WM_OK && wm_yaml_there(&url)) status = wm_yaml_string(&url, out->lcm_url, sizeof out->lcm_url, err);
   if (status == WM_OK && wm_yaml_there(&prefix))
     status = wm_yaml_string(&prefix, out->channel_prefix, sizeof out->channel_prefix, err);

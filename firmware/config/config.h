@@ -112,6 +112,7 @@ typedef struct wm_config {
   char saved_pose[WM_PATH_MAX];  // start.saved_pose; "": none
   char saved_map[WM_PATH_MAX];   // start.saved_map; "": none
   char black_box[WM_PATH_MAX];   // black_box.folder; "": none
+  char commands[WM_PATH_MAX];    // commands.socket; "": none
   char channel_prefix[48];       // publish.channel_prefix, "WAYMARK_"
   // Renamed or removed keys, and keys that the estimator does not take: a line each, "FILE:LINE: KEY: what to do", with
   // its line feed; "": none.

@@ -44,6 +44,9 @@ const config_key kConfigKeys[] = {
      "killed, the newest 20 times."},
     {"publish.lcm_url", "text", "LCM's own", "LCM provider, e.g. `udpm://239.255.76.67:7667?ttl=0`."},
     {"publish.channel_prefix", "text", "WAYMARK_", "What each channel's name begins with."},
+    {"commands.socket", "path", "none",
+     "Local datagram socket (a file) on which a run takes set_pose_t and reset_t, encoded as for LCM: from programs of "
+     "this computer that may write the file (owner and group)."},
     {NULL, NULL, NULL, NULL},
 };
 

@@ -85,7 +85,8 @@ static void save_map(live *run) {
   if (!self->keeps_map) return;
   const kept_map *map = wm_ring_front(&run->estimator.maps);
   if (map) {
-    live_save_map(run, map->image, map->bytes);
+    if (run->config->saved_map[0]) live_save_map(run, map->image, map->bytes);
+    black_box_map(&self->box, map->image, map->bytes);
     wm_ring_pop(&run->estimator.maps);
   }
   const uint64_t late = wm_ring_dropped(&run->estimator.maps);

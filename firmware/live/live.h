@@ -13,6 +13,7 @@
 #include "fusion/source_reader.h"
 #include "live/lcm_sink.h"
 #include "live/notify.h"
+#include "live/other_runs.h"
 #include "live/run.h"
 #include "live/run_clock.h"
 #include "output/black_box.h"
@@ -70,6 +71,7 @@ typedef struct live_estimator {
 typedef struct live_publish {
   lcm_sink lcm;
   notify notify;
+  other_runs others;
   wm_ring lines;  // of text, to the disk thread, which writes them to standard error
   void *lines_memory;
   wm_time_ns next_landmarks_ns;

@@ -84,6 +84,7 @@ static void add_source_counts(live *run, wm_health *health) {
 void live_publish_health(const live_publish *self, wm_health *health) {
   health->send_p99_ns = wm_histogram_quantile(&self->send_ns, 0.99);
   health->lines_lost = wm_ring_dropped(&self->lines);
+  other_runs_health(&self->others, health);
 }
 
 // Sources that fell silent, motion sensors that failed, and their return: once each.
@@ -151,6 +152,7 @@ void *publish_thread(void *argument) {
     take_healths(run);
     wm_time_ns now_ns = wm_monotonic_ns();
     lcm_sink_tick(&self->lcm, now_ns);
+    other_runs_tick(&self->others, now_ns);
     notify_tick(&self->notify, now_ns);
     if (now_ns >= self->next_landmarks_ns) {
       lcm_sink_landmarks(&self->lcm, run_from_monotonic(&run->clock, now_ns));
@@ -158,6 +160,7 @@ void *publish_thread(void *argument) {
     }
   }
   lcm_sink_close(&self->lcm);
+  other_runs_close(&self->others);
   if (!atomic_load(&run->restarting)) notify_stopping(&self->notify);
   atomic_store_explicit(&self->done, 1, memory_order_release);
   return NULL;

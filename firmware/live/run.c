@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "live/command_socket.h"
 #include "live/lcm_commands.h"
 #include "live/lcm_sightings.h"
 #include "live/live.h"
@@ -42,9 +43,8 @@ static size_t disk_slots(const live *self) {
 }
 
 static size_t map_slot_bytes(const live *self) {
-  const char *why;
   const wm_config *config = self->config;
-  return sizeof(kept_map) + config->estimator->state_bytes(config->estimator_params, &self->assembly.setup, &why);
+  return sizeof(kept_map) + wm_keeper_of(config->estimator)->bytes_max(config->estimator_params, &self->assembly.setup);
 }
 
 static size_t list_needs(live *self, wm_arena_need needs[NEEDS_MAX]) {
@@ -143,23 +143,39 @@ static void take_up_what_was(live *self) {
     has_pose = start_where_it_was(self);
   }
   self->disk.keeps_pose = config->saved_pose[0] != '\0';
-  self->disk.keeps_map = config->saved_map[0] != '\0' && wm_keeper_of(config->estimator);
-  if (!self->disk.keeps_map) return;
+  self->disk.keeps_map =
+      (config->saved_map[0] != '\0' || config->black_box[0] != '\0') && wm_keeper_of(config->estimator);
+  if (!self->disk.keeps_map || config->saved_map[0] == '\0') return;
+  const size_t largest_bytes = map_slot_bytes(self);
+  if (largest_bytes > WM_SAVED_MAP_BYTES_MAX)
+    live_say(
+        self,
+        "start: a map of as many landmarks as the configuration allows would take %.0f MB, more than a saved map may "
+        "have (%.0f MB): one that grows so large is not saved. Lower the landmarks' capacity",
+        (double)largest_bytes * 1e-6, (double)WM_SAVED_MAP_BYTES_MAX * 1e-6);
   self->disk.map_identity = wm_map_identity_of(config, &self->assembly.setup);
   go_on_with_map(self, has_pose);
 }
 
 // At the end, when the estimator's and the disk's thread are over.
 static void save_last_map(live *self) {
-  if (!self->disk.keeps_map) return;
+  if (!self->disk.keeps_map || self->config->saved_map[0] == '\0') return;
   kept_map *map = self->estimator.maps_memory;
   map->bytes = wm_pipeline_keep(&self->estimator.pipeline, map->image, self->estimator.maps.slot_bytes - sizeof *map);
   if (map->bytes > 0) live_save_map(self, map->image, map->bytes);
 }
 
-// Commands over LCM are a source as any other, so that they are in their place in time, and in the log.
+// Commands are a source as any other, so that they are in their place in time, and in the log.
+static wm_status add_local_commands(live *self, wm_recording *recording, wm_error *err) {
+  wm_source *commands;
+  if (!self->config->commands[0]) return WM_OK;
+  wm_status status = command_socket_open(self->config->commands, &commands, err);
+  return status == WM_OK ? wm_recording_add_device(recording, commands, 0, err) : status;
+}
+
 static wm_status add_commands(live *self, wm_recording *recording, wm_error *err) {
-  if (!self->config->runtime.commands_lcm) return WM_OK;
+  wm_status local = add_local_commands(self, recording, err);
+  if (local != WM_OK || !self->config->runtime.commands_lcm) return local;
   wm_source *commands;
   wm_status status = lcm_commands_open(self->config->lcm_url, self->config->channel_prefix, NULL, &commands, err);
   return status == WM_OK ? wm_recording_add_device(recording, commands, 0, err) : status;
@@ -206,6 +222,8 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   }
   lcm_sink_open(&self->publish.lcm, params->publish_lcm, self->config->lcm_url, self->config->channel_prefix,
                 &self->assembly, live_say_later, self, NULL);
+  other_runs_open(&self->publish.others, params->publish_lcm, self->config->lcm_url, self->config->channel_prefix,
+                  live_say_later, self);
   black_box_open(&self->disk.box, self->config->black_box, params->black_box_keep_s, params->black_box_pictures_hz,
                  &self->assembly, self->options->say, self->options->say_context);
   wm_pictures *pictures = wm_recording_pictures(recording);

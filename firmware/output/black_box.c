@@ -130,10 +130,21 @@ static void close_log(black_box *self) {
   self->is_open = 0;
 }
 
+static void create_log(black_box *self) {
+  char now[NAME_MAX_BYTES];
+  wm_error err = {0};
+  path_of(self, "now", now);
+  self->begun_ns = WM_TIME_NONE;
+  self->is_open = wm_log_create(&self->log, now, &self->assembly, &err) == WM_OK;
+  if (self->is_open)
+    wm_log_flush(&self->log);  // of a run that dies at once, the head at least
+  else
+    unwritable(self, err.text);
+}
+
 // A new log from this pose on; the one before is the other one's place.
 static void begin_log(black_box *self, const wm_estimate *pose, wm_time_ns now_ns) {
   char now[NAME_MAX_BYTES], before[NAME_MAX_BYTES];
-  wm_error err = {0};
   path_of(self, "now", now);
   path_of(self, "before", before);
   close_log(self);
@@ -141,8 +152,7 @@ static void begin_log(black_box *self, const wm_estimate *pose, wm_time_ns now_n
   self->rotate_ns = now_ns + self->keep_ns;
   if (pose->state == WM_STATE_TRACKING || pose->state == WM_STATE_DEAD_RECKONING)
     wm_start_from_estimate(pose, 0, &self->assembly.setup.start);
-  self->is_open = wm_log_create(&self->log, now, &self->assembly, &err) == WM_OK;
-  if (!self->is_open) unwritable(self, err.text);
+  create_log(self);
 }
 
 void black_box_open(black_box *self, const char *folder, double keep_s, double pictures_hz, const wm_assembly *assembly,
@@ -156,20 +166,48 @@ void black_box_open(black_box *self, const char *folder, double keep_s, double p
   (void)snprintf(self->folder, sizeof self->folder, "%s", folder);
   self->keep_ns = wm_ns_from_seconds(keep_s);
   self->assembly = *assembly;
-  self->assembly.kept = NULL;  // its logs begin later than the run, when that map is another one
   if (mkdir(folder, 0777) != 0 && errno != EEXIST) unwritable(self, strerror(errno));
   path_of(self, "now", now);
   if (has_died(now)) keep(self, "died");
   black_box_video_open(&self->pictures, folder, keep_s, pictures_hz);
+  create_log(self);
+}
+
+// Without a pose nothing is rotated: a log that has grown for so long begins again.
+static void begin_again(black_box *self, wm_time_ns arrival_ns) {
+  if (self->rotate_ns != WM_TIME_NONE) return;
+  if (self->begun_ns == WM_TIME_NONE) self->begun_ns = arrival_ns;
+  if (arrival_ns - self->begun_ns < self->keep_ns) return;
+  close_log(self);
+  create_log(self);
+  self->begun_ns = arrival_ns;
 }
 
 void black_box_event(black_box *self, const wm_event *event) {
+  if (!self->is_open) return;
+  begin_again(self, event->arrival_ns);
   if (self->is_open) wm_log_write_event(&self->log, event);
+}
+
+void black_box_map(black_box *self, const void *image, size_t bytes) {
+  if (!self->folder[0]) return;
+  if (bytes > self->map_capacity) {
+    void *larger = realloc(self->map, bytes);
+    if (!larger) return;  // the map of before stays
+    self->map = larger;
+    self->map_capacity = bytes;
+  }
+  memcpy(self->map, image, bytes);
+  self->assembly.kept = self->map;
+  self->assembly.kept_bytes = bytes;
 }
 
 void black_box_pose(black_box *self, const wm_estimate *pose, wm_time_ns now_ns) {
   if (!self->folder[0]) return;
-  if (self->rotate_ns == WM_TIME_NONE || now_ns >= self->rotate_ns) begin_log(self, pose, now_ns);
+  if (self->rotate_ns == WM_TIME_NONE && self->is_open)
+    self->rotate_ns = now_ns + self->keep_ns;  // the run's first log
+  else if (self->rotate_ns == WM_TIME_NONE || now_ns >= self->rotate_ns)
+    begin_log(self, pose, now_ns);
   int is_lost = pose->state == WM_STATE_LOST;
   // The time after the fault matters, too: it gets a quarter.
   if (is_lost && self->was_tracking && self->kept_from_ns == WM_TIME_NONE)
@@ -201,5 +239,7 @@ void black_box_close(black_box *self) {
   close_log(self);
   if (self->kept_from_ns != WM_TIME_NONE) keep(self, "lost");
   black_box_video_close(&self->pictures);
+  free(self->map);
+  self->map = NULL;
   self->folder[0] = '\0';
 }

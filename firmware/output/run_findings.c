@@ -126,6 +126,15 @@ size_t wm_findings(const wm_health *health, wm_finding_fn function, void *contex
   }
   about_motion(&to, health->motion_health);
   about_map(&to, health);
+  if (health->other_runs_total > 0) {
+    char line[200];
+    (void)snprintf(line, sizeof line,
+                   "messages: other runs published on the same channels meanwhile (%" PRIu32
+                   "); give each its "
+                   "publish.channel_prefix",
+                   health->other_runs_total);
+    say(&to, line);
+  }
   if (health->outputs_lost > 0) {
     char line[160];
     (void)snprintf(line, sizeof line, "outputs: %" PRIu64 " records were lost because the disk or LCM was too slow",

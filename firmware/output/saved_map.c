@@ -16,7 +16,6 @@
 
 #define MAGIC "WMMAP 1\n"
 #define HEAD_BYTES 44
-#define IMAGE_BYTES_MAX ((uint64_t)1 << 30)  // 15000 states; larger is no map that this program wrote
 
 // ── what it belongs to ──────────────────────────────────────────────────────────────────────────────────────────────
 
@@ -55,6 +54,9 @@ wm_map_identity wm_map_identity_of(const wm_config *config, const wm_setup *setu
 wm_status wm_saved_map_write(const char *path, const wm_map_identity *of, double utc_s, const void *image, size_t bytes,
                              wm_error *err) {
   uint8_t head[HEAD_BYTES];
+  if (bytes > WM_SAVED_MAP_BYTES_MAX)
+    return wm_fail(err, WM_FULL, "%s: the map of now has %.0f MB, more than a saved map may have (%.0f MB)", path,
+                   (double)bytes * 1e-6, (double)WM_SAVED_MAP_BYTES_MAX * 1e-6);
   wm_writer w = wm_writer_of(head, sizeof head);
   wm_put_bytes(&w, MAGIC, sizeof MAGIC - 1);
   wm_put_u64(&w, of->configuration);
@@ -97,7 +99,8 @@ static wm_status read_image(int fd, const char *path, const wm_map_identity *wan
   const uint32_t crc = wm_get_u32(&r);
   if (memcmp(magic, MAGIC, 6) != 0) return refuse(err, path, "it is no saved map");
   if (memcmp(magic, MAGIC, sizeof magic) != 0) return refuse(err, path, "it was written by another version");
-  if (bytes > IMAGE_BYTES_MAX || (uint64_t)file.st_size != bytes + HEAD_BYTES) return refuse(err, path, "it is cut");
+  if (bytes > WM_SAVED_MAP_BYTES_MAX || (uint64_t)file.st_size != bytes + HEAD_BYTES)
+    return refuse(err, path, "it is cut");
   out->bytes = (size_t)bytes;
   out->image = malloc(out->bytes + 1);
   if (!out->image) return wm_fail(err, WM_IO, "%s: no memory for it", path);

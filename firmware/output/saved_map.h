@@ -17,6 +17,8 @@ typedef struct wm_map_identity {
 } wm_map_identity;
 wm_map_identity wm_map_identity_of(const wm_config *config, const wm_setup *setup);
 
+#define WM_SAVED_MAP_BYTES_MAX ((uint64_t)1 << 30)  // 15000 states
+
 typedef struct wm_saved_map {
   void *image;  // free() it
   size_t bytes;

@@ -108,9 +108,12 @@ size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {
       .reckoning_left_s = h->reckoning_left_s,
       .send_p99_ns = h->send_p99_ns,
       .lines_lost = (int64_t)h->lines_lost,
+      .run_id = (int64_t)h->run_id,
+      .pid = h->pid,
       .other_runs = (int32_t)h->other_runs,
       .other_runs_total = (int32_t)h->other_runs_total,
   };
+  put_name(m.host, sizeof m.host, h->host);
   m.source_count = (int32_t)(h->source_count < WM_HEALTH_SOURCES_MAX ? h->source_count : WM_HEALTH_SOURCES_MAX);
   for (int32_t i = 0; i < m.source_count; i++) put_source(&m.sources[i], &h->sources[i]);
   m.calibration_count =

@@ -96,6 +96,9 @@ const char *wm_lcm_read_health(const void *message, size_t length, wm_health *ou
   out->reckoning_left_s = m.reckoning_left_s;
   out->send_p99_ns = m.send_p99_ns;
   out->lines_lost = (uint64_t)m.lines_lost;
+  out->run_id = (uint64_t)m.run_id;
+  out->pid = m.pid;
+  take_name(out->host, sizeof out->host, m.host, sizeof m.host);
   out->other_runs = (uint32_t)m.other_runs;
   out->other_runs_total = (uint32_t)m.other_runs_total;
   for (int32_t i = 0; i < m.source_count && i < WM_HEALTH_SOURCES_MAX; i++)

@@ -129,7 +129,8 @@ def inside(kills):
         (work / "config.yaml").write_text(
             "format: waymark-config/1\nestimator: slam\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
             "realtime: {lock_memory: false}\n"
-            "start: {saved_pose: pose.yaml, save_every_s: 0.1, saved_map: map.bin, save_map_every_s: 0.2}\n")
+            "start: {saved_pose: pose.yaml, save_every_s: 0.1, saved_map: map.bin, save_map_every_s: 0.2}\n"
+            "black_box: {folder: box}\n")
         command = [lcm_tools.WAYMARK, "run", "--config", work / "config.yaml", "--recording", work / "rest", "--resume"]
         subscriber = Subscriber(waymark)
         subscriber.start()
@@ -143,6 +144,8 @@ def inside(kills):
             first.append(run["first_s"])
             wrong.append(run["wrong_until_s"])
             kept = check_files(work)
+        # The box of one that is killed begins with the map that it took up, and gives its poses.
+        run = one_run(work, subscriber, run["killed_at_s"] + 0.5, 4.0, [*command, "--out", work / "killed"])
         # One that ends in order has a log, which gives the same poses without the file of the map.
         write_rest(work / "rest", run["killed_at_s"] + 0.5, 3)
         (work / "out").mkdir()
@@ -151,6 +154,12 @@ def inside(kills):
         subprocess.run([lcm_tools.WAYMARK, "replay", work / "out/run/events.wmlog", "--out", work / "out/again"], check=True, capture_output=True)
         same = [(work / "out" / name / "trajectory.csv").read_bytes() for name in ("run", "again")]
         assert same[0] == same[1] and len(same[0]) > 10_000, "the log's replay differs from the run"
+        died = sorted((work / "box").glob("died-*-now.wmlog"))[-1]
+        subprocess.run([lcm_tools.WAYMARK, "replay", died, "--out", work / "out/box"], check=True, capture_output=True)
+        rows = [(folder / "trajectory.csv").read_text().splitlines()[:-1] for folder in (work / "killed", work / "out/box")]
+        both = min(len(r) for r in rows)
+        assert both > 100 and rows[0][:both] == rows[1][:both], f"the black box's replay differs from the run ({both} rows)"
+        print(f"the black box of a killed run gives its {both} poses bit by bit")
         end = run["poses"][-1]
         print(f"{kills} kills: a pose after {sorted(first)[len(first) // 2]:.2f} s (median), {max(first):.2f} s (most); right for good "
               f"after {max(wrong):.2f} s at most; {kept} landmarks kept at last, {off_m(end):.3f} m off at the end")

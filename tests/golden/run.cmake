@@ -9,6 +9,7 @@ wm_script_test(run_service_net COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/servi
 wm_script_test(run_doctor COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/doctor.sh $<TARGET_FILE:waymark> ${CMAKE_SOURCE_DIR}/config/etc)
 wm_script_test(run_command_line COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/cli.sh)
 wm_script_test(run_lcm_tools COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_tools.py LABELS release-only)
+wm_script_test(run_two_runs COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/two_runs.py LABELS release-only)
 wm_script_test(run_realtime_calls COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/realtime_calls.py ${CMAKE_BINARY_DIR} ${CMAKE_OBJDUMP}
   LABELS release-only desk)
 wm_script_test(run_system_calls COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/system_calls.py LABELS release-only)
@@ -30,5 +31,6 @@ wm_script_test(run_slow_disk COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/slow_di
 wm_script_test(run_bad_disks COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/bad_disks.py $<TARGET_FILE:slow_disk> LABELS release-only)
 wm_script_test(run_restarts COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/restarts.py 4 LABELS release-only)
 wm_script_test(run_restarts_20 COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/restarts.py 20 LABELS slow release-only)
+wm_script_test(run_power_cuts COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/power_cuts.py 400 LABELS release-only)
 wm_script_test(run_disk_full COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/disk_full.py LABELS release-only)
 wm_script_test(run_hangups COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/hangups.py LABELS release-only)

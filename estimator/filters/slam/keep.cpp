@@ -16,6 +16,7 @@ namespace {
 
 constexpr uint32_t kVersion = 1;
 constexpr char kMagic[8] = {'W', 'M', 'S', 'L', 'A', 'M', '\n', '\0'};
+constexpr uint32_t kWidthMax = 3;   // states of a landmark: its place, and a marker's heading
 constexpr double kRounding = 1e-6;  // of a covariance, relative to the product of its sigmas
 // A tracker's numbers begin anew at a restart. Landmarks known by such numbers get others, from the largest one down.
 constexpr int32_t kLargestId = INT32_MAX;
@@ -119,6 +120,14 @@ class image_writer {
 
 }  // namespace
 
+size_t slam::kept_bytes_max(const wm_slam_params &params, const wm_setup &setup) {
+  kept_head head{};
+  head.robot_states = static_cast<uint32_t>(lasting_states(params, setup));
+  head.landmarks = static_cast<uint32_t>(params.landmark_capacity);
+  head.width = kWidthMax;
+  return kept_layout(head).bytes;
+}
+
 size_t slam::keep(void *out, size_t capacity) const {
   if (!life_.tracking() || map_is_held()) return 0;
   const int robot = rollback_.to(), width = joint_.layout().landmark_width, first = joint_.landmark_state(0);
@@ -172,7 +181,7 @@ const char *slam::why_not_kept(const wm_slam_params &params, const wm_setup &set
   if (head.version != kVersion) return "it is of another version";
   if (head.robot_states != static_cast<uint32_t>(lasting_states(params, setup)))
     return "it has other calibration states than the configuration";
-  if (head.width < 2 || head.width > 3 || head.landmarks > static_cast<uint32_t>(params.landmark_capacity))
+  if (head.width < 2 || head.width > kWidthMax || head.landmarks > static_cast<uint32_t>(params.landmark_capacity))
     return "it has more landmarks than slam.landmarks.capacity";
   if (kept_layout(head).bytes != bytes) return "it is cut";
   return fault_in_numbers(kept_image(image));
@@ -262,6 +271,9 @@ void slam::age_kept(wm_time_ns t_ns) {
 }  // namespace wm
 
 const wm_keeper wm_slam_keeper = {
+    [](const void *params, const wm_setup *setup) {
+      return wm::slam::kept_bytes_max(*static_cast<const wm_slam_params *>(params), *setup);
+    },
     [](const void *state, void *out, size_t capacity) {
       return static_cast<const wm::slam *>(state)->keep(out, capacity);
     },

@@ -121,6 +121,7 @@ class slam {
   const wm_motion_calibration &motion_calibration() const { return joint_.calibration(); }
   uint32_t motion_health() const { return joint_.motion_health(); }
   // keep.cpp: wm_keeper's functions
+  static size_t kept_bytes_max(const wm_slam_params &params, const wm_setup &setup);
   size_t keep(void *out, size_t capacity) const;
   static const char *why_not_kept(const wm_slam_params &params, const wm_setup &setup, const void *image, size_t bytes);
   void take_kept(const void *image);

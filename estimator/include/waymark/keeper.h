@@ -11,8 +11,10 @@ extern "C" {
 #endif
 
 typedef struct wm_keeper {
-  // Writes an image of `state` and returns its bytes, fewer than the state's; 0 where the pose is in doubt or
-  // `capacity` is too small. One pass over the covariance: no more than a correction.
+  // Bytes of the largest image: of a map with as many landmarks as the parameters allow.
+  size_t (*bytes_max)(const void *params, const wm_setup *setup);
+  // Writes an image of `state` and returns its bytes; 0 where the pose is in doubt or `capacity` is too small, which
+  // bytes_max never is. One pass over the covariance: no more than a correction.
   size_t (*keep)(const void *state, void *out, size_t capacity);
   // NULL where `take` may have the image, else the reason against it (a constant string). Checks each number.
   const char *(*why_not)(const void *params, const wm_setup *setup, const void *image, size_t bytes);

@@ -16,7 +16,8 @@ static void messages(const wm_config *config, findings *out) {
          "publish.rate_hz %g is more than realtime.loop_hz %d: poses would go out at %d Hz", p->publish_rate_hz,
          (int)p->realtime_loop_hz, (int)p->realtime_loop_hz);
   if (p->commands_lcm || config->devices.sightings_by_lcm)
-    find(out, FINDING_NOTE, "commands", "a firewall rule for LCM's port, or commands.lcm: false",
+    find(out, FINDING_NOTE, "commands",
+         "commands.socket, which programs of this computer reach alone, or a firewall rule for LCM's port",
          "%s taken over LCM: any program that reaches its UDP port (7667 by default), on this computer or on a network "
          "that it is in, can move the pose",
          p->commands_lcm ? "commands are" : "sightings are");
@@ -52,6 +53,7 @@ void check_config(const wm_config *config, findings *out) {
   wm_config_each_warning(config, note_warning, out);
   messages(config, out);
   folder_of("start.saved_pose", config->saved_pose, "no pose would be kept", out);
+  folder_of("commands.socket", config->commands, "no command could be sent", out);
   folder_of("start.saved_map", config->saved_map, "no map would be kept", out);
   if (config->saved_map[0] && !wm_keeper_of(config->estimator))
     find(out, FINDING_NOTE, "start", "leave start.saved_map out", "start.saved_map: estimator %s makes no map to keep",

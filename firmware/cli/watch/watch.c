@@ -68,6 +68,7 @@ static void list_troubles(const wm_health *h, char *why, size_t why_bytes) {
       add(why, why_bytes, s->name, s->received ? "silent" : "never spoke");
   }
   if (h->motion_health) add(why, why_bytes, "motion sensor", "broken");
+  if (h->other_runs > 0) add(why, why_bytes, "another run", "on the same channels");
 }
 
 const char *watch_state(const watch *self, wm_time_ns now_ns, char *why, size_t why_bytes) {

@@ -16,6 +16,7 @@
 #define WM_HEALTH_CALIBRATION_MAX 128  // 8 sensors with all their states and the motion's
 #define WM_HEALTH_COUNTERS_MAX 16
 #define WM_HEALTH_NAME_MAX 48
+#define WM_HEALTH_HOST_MAX 64
 #define WM_STATUS_COUNT (WM_INTERNAL + 1)
 
 // A live source's device. A recording has none.
@@ -75,10 +76,12 @@ typedef struct wm_health {
   uint64_t published;
   // Remaining dead reckoning until the pose is too uncertain: infinite while the robot stands, NaN without a pose.
   double reckoning_left_m, reckoning_left_s;
-  wm_time_ns send_p99_ns;     // from a pose made to its message handed to LCM, 99 of 100
-  uint64_t lines_lost;        // lines of text that a blocked disk or terminal had no room for
-  uint32_t other_runs;        // runs that publish on the same channels now
-  uint32_t other_runs_total;  // since the start
+  wm_time_ns send_p99_ns;                 // from a pose made to its message handed to LCM, 99 of 100
+  uint64_t lines_lost;                    // lines of text that a blocked disk or terminal had no room for
+  uint64_t run_id;                        // random, of the run that sends; 0: none
+  int32_t pid;                            // its process
+  char host[WM_HEALTH_HOST_MAX];          // its computer
+  uint32_t other_runs, other_runs_total;  // that publish on the same channels: now, and since the start
 } wm_health;
 
 // The counter of this kind, or a null pointer where the estimator has none.

@@ -14,8 +14,7 @@ const wm_keeper *keeper;
 std::vector<char> image;
 
 void keep() {
-  const char *why = nullptr;
-  image.assign(slam->state_bytes(&params, &setup, &why), 0);
+  image.assign(keeper->bytes_max(&params, &setup), 0);
   image.resize(keeper->keep(state, image.data(), image.size()));
 }
 
@@ -143,6 +142,19 @@ void test_an_image_that_is_wrong_is_refused_with_the_reason() {
   TEST_ASSERT_EQUAL_STRING("it has other calibration states than the configuration", why_not());
 }
 
+// The run's slot has bytes_max: a map that has grown to its capacity is kept as any other.
+void test_a_map_at_its_capacity_is_kept() {
+  for (const bool with_codes : {false, true}) {
+    make_room();
+    coded = with_codes;
+    params.landmark_capacity = kCount / 2;
+    learn();
+    TEST_ASSERT_EQUAL_DOUBLE(kCount / 2, counted(WM_COUNTER_LANDMARKS));
+    TEST_ASSERT_LESS_OR_EQUAL(keeper->bytes_max(&params, &setup), image.size());
+    TEST_ASSERT_NULL(why_not());
+  }
+}
+
 void test_an_image_with_too_little_room_is_not_written() {
   learn();
   std::vector<char> small(image.size() - 1, 0x5a);
@@ -170,6 +182,7 @@ int main(void) {
   RUN_TEST(test_a_robot_that_was_moved_while_off_is_found_in_its_map);
   RUN_TEST(test_without_a_pose_it_is_searched_in_the_map);
   RUN_TEST(test_an_image_that_is_wrong_is_refused_with_the_reason);
+  RUN_TEST(test_a_map_at_its_capacity_is_kept);
   RUN_TEST(test_an_image_with_too_little_room_is_not_written);
   RUN_TEST(test_estimators_without_a_map_of_their_own_keep_nothing);
   return UNITY_END();

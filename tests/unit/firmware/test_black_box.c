@@ -114,6 +114,54 @@ static void a_loss_is_kept_with_what_was_before_and_after(void) {
   black_box_close(&box);
 }
 
+static void expect_kept(const char *name, const char *map, double begins_x_m) {
+  char path[128];
+  wm_error err;
+  wm_log_reader *log;
+  (void)snprintf(path, sizeof path, "%s/%s", folder, name);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_log_open(path, &log, &err), name);
+  const wm_log_head *head = wm_log_reader_head(log);
+  TEST_ASSERT_EQUAL(strlen(map), head->kept_bytes);
+  TEST_ASSERT_EQUAL_MEMORY(map, head->kept, strlen(map));
+  TEST_ASSERT_EQUAL_DOUBLE(begins_x_m, head->start.p_m[0]);
+  wm_log_reader_close(log);
+}
+
+// GIVEN a run that took a map up WHEN it is logged THEN the first log begins as the run did, with all events, and later
+// ones with the newest map.
+static void logs_have_the_map_that_they_begin_with(void) {
+  double begins_x_m;
+  wm_event early = {.kind = WM_EVENT_TWIST2, .t_ns = now_ns, .arrival_ns = now_ns};
+  assembly.kept = "a map of the run before";
+  assembly.kept_bytes = strlen(assembly.kept);
+  assembly.setup.start.p_m[0] = -7;
+  open_box();
+  black_box_event(&box, &early);  // before there is a pose
+  drive(5, WM_STATE_TRACKING);
+  black_box_map(&box, "a map of now", 12);
+  black_box_map(&box, "a larger map of now, after a while", 34);
+  drive(6, WM_STATE_TRACKING);
+  black_box_flush(&box);
+  TEST_ASSERT_EQUAL(101, events_of("before.wmlog", &begins_x_m));
+  expect_kept("before.wmlog", "a map of the run before", -7);
+  expect_kept("now.wmlog", "a larger map of now, after a while", begins_x_m = 10);
+  black_box_close(&box);
+}
+
+// A robot that waits for hours for its first pose fills no disk.
+static void a_log_without_a_pose_begins_again(void) {
+  double begins_x_m;
+  open_box();
+  for (int i = 0; i < 1000; i++) {
+    wm_event event = {.kind = WM_EVENT_TWIST2, .t_ns = now_ns, .arrival_ns = now_ns};
+    black_box_event(&box, &event);
+    now_ns += WM_NS_PER_S / 10;
+  }
+  black_box_flush(&box);
+  TEST_ASSERT_LESS_OR_EQUAL(101, events_of("now.wmlog", &begins_x_m));
+  black_box_close(&box);
+}
+
 static void a_run_that_died_leaves_its_last_seconds(void) {
   double begins_x_m;
   open_box();
@@ -321,6 +369,8 @@ static void a_disk_that_takes_nothing_is_said_once(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_loss_is_kept_with_what_was_before_and_after);
+  RUN_TEST(logs_have_the_map_that_they_begin_with);
+  RUN_TEST(a_log_without_a_pose_begins_again);
   RUN_TEST(a_run_that_died_leaves_its_last_seconds);
   RUN_TEST(an_end_in_order_leaves_nothing_to_keep);
   RUN_TEST(an_end_soon_after_a_loss_keeps_it);

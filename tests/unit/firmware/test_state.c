@@ -245,6 +245,8 @@ static void a_map_is_there_again_and_a_damaged_one_is_refused(void) {
     refused_as(&setup, at < 32 || at >= 40 ? "checksum is wrong" : "it is cut");
     whole[at] ^= 0x40;
   }
+  TEST_ASSERT_EQUAL(WM_FULL, wm_saved_map_write(path, &of, 1, image, WM_SAVED_MAP_BYTES_MAX + 1, &err));
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, "more than a saved map may have"), err.text);
   whole[6] = '2';
   write_file(whole, length);
   refused_as(&setup, "another version");
