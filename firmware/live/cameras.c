@@ -18,7 +18,7 @@ typedef struct cameras cameras;
 
 typedef struct camera {
   cameras *all;
-  frame_hub *hub;  // NULL: nobody reads it
+  frame_hub *hub;  // NULL: no reader
   pthread_t thread;
   int is_started;
 } camera;
@@ -28,7 +28,7 @@ struct cameras {
   const wm_config *config;
   wm_warn_fn warn;
   void *warn_context;
-  pthread_mutex_t lock;  // of `devices`: readers come from several threads
+  pthread_mutex_t lock;  // of `devices`, for readers on several threads
   camera devices[WM_CAMERA_DEVICES_MAX];
   atomic_int stop;
 };
@@ -43,7 +43,7 @@ static void *take_pictures(void *argument) {
   return NULL;
 }
 
-// Index of the device, or the number of all.
+// Index of the device, or the count of all.
 static size_t find(const cameras *self, const char *name) {
   size_t i = 0;
   while (i < self->config->devices.camera_count && strcmp(self->config->devices.cameras[i].name, name) != 0) i++;

@@ -22,7 +22,7 @@ typedef struct picture {
   char beside[WM_NAME_MAX + 8];
 } picture;
 
-// To the disk.
+// Syncs it to the disk.
 static int end_file(FILE *f, int failed) {
   if (!failed && (fflush(f) != 0 || fsync(fileno(f)) != 0)) failed = errno;
   if (fclose(f) != 0 && !failed) failed = errno;
@@ -45,7 +45,7 @@ static wm_status copy_file(const char *from, const char *to, wm_error *err) {
   return failed ? wm_fail(err, WM_IO, "%s: can't be written: %s", to, strerror(failed)) : WM_OK;
 }
 
-// Line by line, names of pictures replaced by those that lie beside it.
+// Line by line, with the pictures' names in the recording.
 static wm_status write_yaml(const char *text, const picture *pictures, size_t count, const char *to, wm_error *err) {
   FILE *out = new_file(to);
   if (!out) return wm_fail(err, WM_IO, "%s: can't be written: %s", to, strerror(errno));
@@ -61,7 +61,7 @@ static wm_status write_yaml(const char *text, const picture *pictures, size_t co
   return failed ? wm_fail(err, WM_IO, "%s: can't be written: %s", to, strerror(failed)) : WM_OK;
 }
 
-// A picture's name in the recording: its last part, with a number where that stands for another one, too.
+// A picture's name in the recording: its last part, with a number where two would be equal.
 static void name_beside(picture *pictures, size_t at) {
   const char *slash = strrchr(pictures[at].named, '/');
   const char *last = slash ? slash + 1 : pictures[at].named;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Everything that may wait for a disk: run folder, event log, black box, saved pose, and lines on standard error. While
-// the disk is blocked, records wait in the ring; those that find no room are counted, and the log marks the gap.
+// All work that may block on a disk: run folder, event log, black box, saved pose, and lines on standard error. While
+// the disk blocks, records wait in the ring; those without room are counted, and the log marks the gap.
 #include <string.h>
 #include <time.h>
 
@@ -129,7 +129,7 @@ void *disk_thread(void *argument) {
   wm_prefault_stack(THREAD_TOUCHED_BYTES);
   for (int last = 0; !last;) {
     sleep_until(wm_monotonic_ns() + kThreads[THREAD_DISK].period_ns);
-    last = atomic_load_explicit(&run->publish.done, memory_order_acquire);  // which ends after the estimator
+    last = atomic_load_explicit(&run->publish.done, memory_order_acquire);  // this thread ends after the estimator
     take_outputs(run);
     black_box_take_pictures(&run->disk.box);
     take_lines(run);

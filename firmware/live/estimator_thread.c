@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The real-time thread: sleeps to an absolute tick, takes what arrived, fuses what is final, publishes what is due.
+// The real-time thread: sleeps to an absolute tick, takes the arrived events, fuses the final ones, publishes when due.
 // After its start it allocates nothing, takes no lock and makes no system call but the sleep.
 #include <string.h>
 
@@ -20,7 +20,7 @@ static int push(wm_ring *ring, uint64_t kind, const void *record, size_t bytes) 
   return 1;
 }
 
-// A log with a hole marks it: before the next event that fits goes the count of those that did not.
+// The number of lost events precedes the next event that fits, so that the log marks the gap.
 static void push_event(live_estimator *self, const wm_event *event, size_t bytes) {
   if (event->kind == WM_EVENT_SIGHTING) (void)push(&self->to_publish, WM_OUTPUT_EVENT, event, bytes);
   if (self->events_lost > 0) {
@@ -39,7 +39,7 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
     push_event(self, record, bytes);
     return;
   }
-  // Records that find no room are counted by the ring.
+  // Records without room are counted by the ring.
   if (kind == WM_OUTPUT_PUBLISHED || kind == WM_OUTPUT_INNOVATION)
     (void)push(&self->to_publish, (uint64_t)kind, record, bytes);
   (void)push(&self->to_disk, (uint64_t)kind, record, bytes);
@@ -52,7 +52,7 @@ wm_output estimator_output(live_estimator *self) { return (wm_output){.put = put
 static void take_arrivals(live *run) {
   for (size_t i = 0; i < run->assembly.source_count; i++) {
     wm_ring *ring = &run->sources[i].ring;
-    // At most one ring's worth: a source that never stops can't hold the cycle.
+    // At most one ring's worth, so that a source that never stops can't block the cycle.
     for (uint64_t n = 0; n <= ring->mask; n++) {
       const wm_event *event = wm_ring_front(ring);
       if (!event) break;
@@ -95,13 +95,13 @@ static void report_health(live *run, wm_time_ns now_ns) {
   wm_ring_commit(&self->healths);
 }
 
-// A pass over the estimator's covariance, no more than a correction takes.
+// A copy of the estimator's covariance; takes no longer than a correction.
 static void keep_map(live *run, wm_time_ns now_ns) {
   live_estimator *self = &run->estimator;
   if (!self->maps_memory || now_ns < self->next_map_ns) return;
   self->next_map_ns = now_ns + wm_ns_from_seconds(run->config->runtime.start_save_map_every_s);
   kept_map *slot = wm_ring_reserve(&self->maps, sizeof *slot);
-  if (!slot) return;  // the disk has not taken the one before; the ring counts it
+  if (!slot) return;  // the disk thread has not taken the one before; counted by the ring
   wm_time_ns begin_ns = wm_monotonic_ns();
   slot->bytes = wm_pipeline_keep(&self->pipeline, slot->image, self->maps.slot_bytes - sizeof *slot);
   wm_histogram_add(&self->keep_ns, wm_monotonic_ns() - begin_ns);
@@ -114,7 +114,7 @@ static int all_sources_done(live *run) {
   return 1;
 }
 
-// Ticks that passed while the cycle was still at work, or asleep for too long.
+// Skips and counts ticks that passed during the cycle or a late wake-up.
 static wm_time_ns next_tick(live_estimator *self, wm_time_ns tick_ns, wm_time_ns now_ns) {
   tick_ns += self->loop_ns;
   while (tick_ns < now_ns) {
@@ -132,7 +132,7 @@ static void loop(live *run) {
     wm_time_ns begin_ns = wm_monotonic_ns();
     wm_time_ns now_ns = run_from_monotonic(&run->clock, begin_ns);
     wm_histogram_add(&self->wake_ns, begin_ns - tick_ns);
-    last = all_sources_done(run);  // looked at before the rings: what is in them now is all that will be
+    last = all_sources_done(run);  // before the rings are read: nothing follows what they hold now
     take_arrivals(run);
     wm_pipeline_advance(&self->pipeline, now_ns);
     publish(run, now_ns);

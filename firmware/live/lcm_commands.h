@@ -7,7 +7,7 @@
 
 #include "waymark/source.h"
 
-// `lent` may be NULL: then a way is looked for, again and again. Allocates.
+// `lent` may be NULL: then connecting is tried again and again. Allocates.
 wm_status lcm_commands_open(const char *url, const char *channel_prefix, lcm_t *lent, wm_source **out, wm_error *err);
 
 #endif

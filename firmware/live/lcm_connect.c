@@ -17,7 +17,7 @@ const char *lcm_connect_url(const char *configured) {
   return from_environment && from_environment[0] ? from_environment : DEFAULT_URL;
 }
 
-// 0, or the reason. What is not "udpm://ADDRESS:PORT..." is left to LCM.
+// 0, or errno. URLs other than "udpm://ADDRESS:PORT..." are left to LCM.
 static int no_route(const char *url) {
   char address[64];
   int port;

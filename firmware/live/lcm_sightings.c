@@ -15,7 +15,7 @@ typedef struct lcm_sightings {
   lcm_subscriber subscriber;
   const wm_sensor *sensors;
   size_t sensor_count;
-  wm_time_ns t_ns, arrival_ns;  // of the message that is being handed out
+  wm_time_ns t_ns, arrival_ns;  // of the message whose sightings are handed out
   wm_sighting said[WM_LCM_OBSERVATIONS_MAX];
   size_t said_count, next;
   uint32_t seq;

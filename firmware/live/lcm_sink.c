@@ -63,7 +63,7 @@ static void publish(lcm_sink *self, const char *what, size_t length) {
   self->not_sent++;
   if (!self->lcm || self->lent) return;
   say_once(self, "can't be sent", strerror(errno));
-  lcm_destroy(self->lcm);  // an interface that went away: a new socket finds the new one
+  lcm_destroy(self->lcm);  // the interface may be gone: a new socket finds the new one
   self->lcm = NULL;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Messages over LCM, on a normal thread. Without a route, a network or a subscriber the run goes on: the sink says so
-// once and tries again every two seconds.
+// Publishes over LCM, on a normal thread. Without a route, a network or a subscriber the run continues; the sink
+// reports it once and tries again every two seconds.
 #ifndef WAYMARK_LIVE_LCM_SINK_H
 #define WAYMARK_LIVE_LCM_SINK_H
 
@@ -13,8 +13,8 @@
 
 typedef struct lcm_sink {
   int is_on;
-  lcm_t *lcm;   // NULL while there is no way out
-  lcm_t *lent;  // given by the caller (a test's memq), not ours to destroy
+  lcm_t *lcm;   // NULL: not connected
+  lcm_t *lent;  // the caller's connection (a test's memq), never destroyed here
   char url[128], prefix[48];
   const wm_assembly *assembly;
   wm_finding_fn say;
@@ -22,7 +22,7 @@ typedef struct lcm_sink {
   int said_trouble;
   wm_time_ns next_try_ns;
   uint64_t sent, not_sent;
-  // Sightings of one sensor at one stamp, until the next stamp comes.
+  // Sightings of one sensor at one stamp, until the next stamp arrives.
   wm_event group[WM_LCM_OBSERVATIONS_MAX];
   size_t group_count, group_total;
   uint8_t bytes[WM_LCM_MESSAGE_MAX];
@@ -34,10 +34,10 @@ void lcm_sink_open(lcm_sink *self, int is_on, const char *url, const char *prefi
 void lcm_sink_pose(lcm_sink *self, const wm_published *published, wm_time_ns sent_ns);
 void lcm_sink_innovation(lcm_sink *self, const wm_innovation *innovation);
 void lcm_sink_health(lcm_sink *self, const wm_health *health);
-// Sightings are collected and sent when the next stamp or sensor comes; other events are not sent.
+// Collects sightings and sends them at the next stamp or sensor; other events are not sent.
 void lcm_sink_event(lcm_sink *self, const wm_event *event);
 void lcm_sink_landmarks(lcm_sink *self, wm_time_ns t_ns);
-// Tries to find a way out again when there is none. Called often.
+// Tries to connect again where needed. Called often.
 void lcm_sink_tick(lcm_sink *self, wm_time_ns monotonic_ns);
 void lcm_sink_close(lcm_sink *self);
 

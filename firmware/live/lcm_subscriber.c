@@ -29,7 +29,7 @@ void lcm_subscriber_add(lcm_subscriber *self, const char *channel, lcm_msg_handl
   (void)lcm_subscribe(self->lcm, name, handler, context);
 }
 
-// The sink reports an address that can't be reached.
+// The publisher (lcm_sink) reports an address without a route.
 static void try_open(lcm_subscriber *self) {
   const char *why;
   wm_time_ns now_ns = wm_monotonic_ns();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A live run's parts and what its threads share: rings, and flags that are atomics. Everything else belongs to one
-// thread at a time.
+// The parts of a live run and what its threads share (docs/runtime.md): rings, and atomics for flags and counts.
+// Everything else belongs to one thread at a time.
 //
 //   source threads ── events ──► estimator ──┬─ to_publish, healths ──► publish thread: LCM, watchdog
 //                                            └─ to_disk, maps ───────► disk thread: files ◄── lines ── publish thread
@@ -27,27 +27,27 @@ typedef struct live live;
 // A source's thread and its ring to the estimator's thread.
 typedef struct live_source {
   live *run;
-  wm_source_reader *reader;  // the thread's own while it runs
+  wm_source_reader *reader;  // of the source's thread while it runs
   wm_ring ring;
   void *ring_memory;
   atomic_int done;
-  wm_status status;  // of the thread, once it is done
+  wm_status status;  // of the thread, after its end
   wm_error error;
-  // What the source counted, for the health message.
+  // Counts of the source, for the health message.
   _Atomic uint64_t lost, malformed, not_finite, out_of_order, ignored, frozen, overflows, bus_errors;
   _Atomic uint64_t looks[WM_LOOK_COUNT];
   _Atomic int64_t stamp_uncertainty_ns;
   atomic_uint device;   // wm_device_state
-  uint8_t said_device;  // the thread's own
+  uint8_t said_device;  // of the source's thread
 } live_source;
 
-// A health record, and how far the merge is, for the watchdog.
+// A health record, and the merge's watermark for the watchdog.
 typedef struct health_record {
   wm_health health;
   wm_time_ns watermark_ns;  // wm_merge_watermark
 } health_record;
 
-// The estimator's map, as wm_keeper writes it: one slot, which is free again once the map is on the disk.
+// The estimator's map as wm_keeper writes it: one slot, free again once the map is on the disk.
 typedef struct kept_map {
   size_t bytes;
   uint8_t image[];
@@ -58,10 +58,10 @@ typedef struct live_estimator {
   wm_pipeline pipeline;
   wm_ring to_publish, to_disk, healths, maps;
   void *to_publish_memory, *to_disk_memory, *healths_memory;
-  void *maps_memory;  // NULL: no map is kept
+  void *maps_memory;  // NULL: no map is saved
   wm_time_ns loop_ns, publish_ns, next_publish_ns, next_health_ns, next_map_ns;
   uint64_t loops, deadlines_missed;
-  uint64_t events_lost;  // not yet marked in the log
+  uint64_t events_lost;  // not marked in the log yet
   wm_histogram wake_ns, cycle_ns, age_ns, keep_ns;
   int64_t allocations, page_faults;  // after start
   atomic_int done;
@@ -78,7 +78,7 @@ typedef struct live_publish {
   int has_published;
   wm_estimate last_published;
   wm_histogram send_ns;  // from a pose made to its message handed to LCM
-  // Last reported of the sources and the motion sensors, so that only a change is reported.
+  // As last reported, so that only changes are reported.
   uint8_t said_stale[WM_SOURCES_MAX];
   uint32_t said_motion_health;
   atomic_int done;
@@ -86,12 +86,12 @@ typedef struct live_publish {
 
 // The disk thread: run folder, event log, black box, saved pose, and standard error.
 typedef struct live_disk {
-  wm_run_folder *folder;  // NULL: nothing is written
+  wm_run_folder *folder;  // NULL: no output
   black_box box;
   wm_time_ns next_flush_ns, next_save_ns;
   int said_unwritable, said_slow, said_unsaved;
   uint64_t said_lines_lost;
-  // The last pose that was worth keeping, and whether it is on the disk.
+  // The last pose that can be saved, and whether it is on the disk.
   wm_estimate last_pose;
   int keeps_pose, has_last_pose;
   int keeps_map, said_map;
@@ -110,13 +110,13 @@ struct live {
   live_estimator estimator;
   live_publish publish;
   live_disk disk;
-  wm_saved_map map;       // of the run before; no image: none
-  atomic_int stop;        // sources: say no more
-  atomic_int restarting;  // it goes on with another configuration: no end for the service manager
+  wm_saved_map map;       // of an earlier run; no image: none
+  atomic_int stop;        // ends the sources' threads
+  atomic_int restarting;  // a reload: STOPPING=1 is not sent
 };
 
-// One record in a ring of outputs. A slot of `to_disk` has room for what the run's sources make necessary
-// (wm_output_bytes), one of `to_publish` for the kinds that go over LCM.
+// One record in a ring of outputs. A slot of `to_disk` has the size that the run's sources require (wm_output_bytes),
+// one of `to_publish` the size of the kinds that go over LCM.
 typedef struct output_record {
   uint64_t kind;  // wm_output_kind, or OUTPUT_GAP
   union {
@@ -135,14 +135,14 @@ typedef struct output_record {
 _Static_assert(sizeof(wm_innovation) <= sizeof(wm_published) && WM_EVENT_SMALL_BYTES <= sizeof(wm_published),
                "a slot of to_publish holds each kind that goes over LCM");
 
-// Where the estimator's side puts its records: into the rings to the publish and the disk thread.
+// The consumer of the estimator's records: the rings to the publish and the disk thread.
 wm_output estimator_output(live_estimator *self);
-// Records that found no room in either ring.
+// Records dropped by either ring.
 uint64_t outputs_lost(const live_estimator *self);
-// The publish thread's own part of a health record.
+// The publish thread's part of a health record.
 void live_publish_health(const live_publish *self, wm_health *health);
 
-// Puts a map on the disk; what is wrong is reported once. The disk thread's, and the main thread's after it.
+// Writes a map to the disk; errors are reported once. On the disk thread, and on the main thread after its end.
 void live_save_map(live *self, const void *image, size_t bytes);
 // This computer's UTC in seconds.
 double live_utc_s(void);
@@ -152,10 +152,9 @@ void *estimator_thread(void *live_pointer);
 void *publish_thread(void *live_pointer);
 void *disk_thread(void *live_pointer);
 
-// A line for a person, to standard error or the service's log. May wait for it: not for the estimator's or the publish
-// thread.
+// A line for standard error or the service's log. May block: not on the estimator's or the publish thread.
 void live_say(live *self, const char *format, ...) __attribute__((format(printf, 2, 3)));
-// The same from the publish thread: the disk thread writes it. `line` as wm_finding_fn, `context` is the run.
+// The same from the publish thread; the disk thread prints it. `line` as wm_finding_fn, `context` is the run.
 void live_say_later(void *context, const char *line);
 
 #endif

@@ -34,7 +34,7 @@ static int connect_to(const char *path) {
   return fd;
 }
 
-// WATCHDOG_USEC holds for this process only where WATCHDOG_PID says so, or is not there.
+// WATCHDOG_USEC applies to this process only if WATCHDOG_PID is its own, or absent.
 static wm_time_ns watchdog_period_ns(void) {
   const char *usec = getenv("WATCHDOG_USEC"), *pid = getenv("WATCHDOG_PID");
   if (!usec || (pid && strtol(pid, NULL, 10) != (long)getpid())) return 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// systemd's notification protocol: datagrams to the socket that NOTIFY_SOCKET names. Without a service manager nothing
-// happens. Source: sd_notify(3), "Notes": the protocol is stable and may be spoken without libsystemd.
+// systemd's notification protocol: datagrams to the socket of NOTIFY_SOCKET. Without a service manager nothing happens.
+// Source: sd_notify(3), "Notes": the protocol is stable and may be used without libsystemd.
 #ifndef WAYMARK_LIVE_NOTIFY_H
 #define WAYMARK_LIVE_NOTIFY_H
 
@@ -22,15 +22,16 @@ typedef struct notify {
 } notify;
 
 void notify_open(notify *self);
-// A pose went out: READY=1 with the first one.
+// A pose was sent: READY=1 with the first one.
 void notify_pose(notify *self);
-// Count of the estimator thread's loops. The watchdog is fed where it advanced: it proves that the threads run, and
-// nothing else. A restart repairs no silent bus, absent camera or blocked disk; those are reported in health.
+// Count of the estimator thread's loops; the watchdog is triggered where it advanced. The watchdog proves that the
+// threads run, and nothing else. A restart repairs no silent bus, absent camera or blocked disk; those are reported in
+// health.
 void notify_alive(notify *self, uint64_t loops);
-// STATUS= where it changed. The service manager shows it.
+// Sends STATUS= when it changed.
 void notify_status(notify *self, const char *text);
-// Called often: feeds the watchdog when it is due and the estimator lives; READY=1 with a stated reason when no pose
-// has come for 10 s.
+// Called often: triggers the watchdog when due while the estimator's loop advances; sends READY=1 with a reason after
+// 10 s without a pose.
 void notify_tick(notify *self, wm_time_ns now_ns);
 void notify_stopping(notify *self);
 void notify_close(notify *self);

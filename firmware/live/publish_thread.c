@@ -14,12 +14,12 @@
 void live_say_later(void *context, const char *line) {
   live *run = context;
   char *slot = wm_ring_reserve(&run->publish.lines, LINE_BYTES);
-  if (!slot) return;  // 16 lines wait for a disk that is blocked; the ring counts those that find no room
+  if (!slot) return;  // 16 lines wait for a blocked disk; the ring counts the dropped ones
   (void)snprintf(slot, LINE_BYTES, "%s", line);
   wm_ring_commit(&run->publish.lines);
 }
 
-// UTC minus the run's clock, between two readings of the monotonic clock. Unknown where the run isn't at real speed.
+// UTC minus the run's clock, between two readings of the monotonic clock. Not available at other speeds than real time.
 static void tell_utc(const live *run, wm_published *published) {
   if (run->clock.speed != 1.0) return;
   struct timespec utc;
@@ -59,7 +59,7 @@ static void take_outputs(live *run) {
     take_output(run, record);
 }
 
-// The sources' own counts, which the estimator's thread does not have.
+// Counts of the sources, which the estimator's thread does not have.
 static void add_source_counts(live *run, wm_health *health) {
   for (size_t i = 0; i < run->assembly.source_count; i++) {
     live_source *from = &run->sources[i];
@@ -87,7 +87,7 @@ void live_publish_health(const live_publish *self, wm_health *health) {
   other_runs_health(&self->others, health);
 }
 
-// Sources that fell silent, motion sensors that failed, and their return: once each.
+// Sources that fall silent, motion sensors that fail, and their return: once each.
 static void say_changes(live *run, const wm_health *health) {
   live_publish *self = &run->publish;
   char line[LINE_BYTES];
@@ -108,7 +108,7 @@ static void say_changes(live *run, const wm_health *health) {
   self->said_motion_health = health->motion_health;
 }
 
-// For `systemctl status`: why there is no pose, or which input is missing.
+// For `systemctl status`: the state, and the silent inputs.
 static void describe(const wm_health *health, char out[NOTIFY_STATUS_BYTES]) {
   int used = snprintf(out, NOTIFY_STATUS_BYTES, "%s", wm_state_name(health->state));
   const char *before = "; silent: ";
@@ -119,7 +119,7 @@ static void describe(const wm_health *health, char out[NOTIFY_STATUS_BYTES]) {
   }
 }
 
-// By construction the watermark is never older than the horizon. It is where the estimator's loop stands still inside.
+// The merge keeps the watermark within its horizon, unless the estimator's loop is stuck.
 static int merge_keeps_up(const live *run, const health_record *record) {
   const wm_time_ns horizon_ns = wm_ns_from_seconds(run->config->runtime.merge_horizon_ms * 1e-3);
   return record->watermark_ns != WM_TIME_NONE && record->health.t_ns - record->watermark_ns <= horizon_ns + WM_NS_PER_S;

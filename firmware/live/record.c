@@ -23,7 +23,7 @@
 #define LOOK_EVERY_MS 100
 #define SYNC_EVERY_NS WM_NS_PER_S
 #define FILE_BYTES_MAX (16u << 20)
-// A disk that is busy for a quarter of a second at 30 Hz costs no picture.
+// A disk that blocks for a quarter of a second at 30 Hz loses no picture.
 static const wm_frame_wishes kEveryPicture = {.waiting_max = 8, .wait_ms = WM_DEVICE_WAIT_MS, .wants_raw = 1};
 
 typedef struct recorder recorder;
@@ -48,10 +48,10 @@ struct recorder {
   wm_recording *robot;
   stream streams[WM_CAN_DEVICES_MAX + WM_CAMERA_DEVICES_MAX];
   size_t stream_count;
-  FILE *can_log;  // of all interfaces, in the order of their arrival: a line is one write, and those are atomic
+  FILE *can_log;  // of all interfaces, in the order of arrival: a line is one fwrite, which locks the file
   atomic_int stop;
   _Atomic uint64_t bytes, frames, pictures, lost;
-  _Atomic int failed;  // errno of the first thing that couldn't be written
+  _Atomic int failed;  // errno of the first write error
   char failed_path[WM_PATH_MAX + 80];
 };
 
@@ -90,12 +90,12 @@ static void take_picture(stream *self, const wm_frame *frame) {
   wm_camera_raw raw;
   recorder *all = self->all;
   self->camera->ops->raw(self->camera, &raw);
-  if (raw.is_jpeg && !raw.data) return;  // no memory for it
+  if (raw.is_jpeg && !raw.data) return;  // no memory for the JPEG
   int failed = self->pictures > 0 ? 0 : begin_video(self, &raw, frame);
   if (!failed && raw.is_jpeg) failed = avi_picture(self->data, raw.data, raw.bytes, 1, 0);
   if (!failed && !raw.is_jpeg)
     failed = avi_picture(self->data, frame->grey, frame->width_px, frame->height_px, frame->stride_bytes);
-  // The picture before its stamp: a cut leaves a picture without a stamp, never the other way.
+  // The picture before its stamp: a power cut may leave a picture without a stamp, never a stamp without its picture.
   if (!failed && fprintf(self->stamps, "%" PRIu64 ",%" PRId64 ",%" PRId64 ",%" PRId64 "\n", self->pictures, frame->t_ns,
                          frame->exposure_ns, frame->arrival_ns) < 0)
     failed = errno;
@@ -121,7 +121,7 @@ static void *record_stream(void *argument) {
       wm_can_frame frame;
       if (wm_can_listener_next(self->can, &frame, &err) == WM_OK) take_frame(self, &frame);
       counts = *wm_can_listener_counted(self->can);
-      counts.lost = counts.malformed = 0;  // what isn't there is no fault of the recording
+      counts.lost = counts.malformed = 0;  // absent signals are no loss of the recording
     } else {
       wm_frame frame;
       if (self->camera->ops->next(self->camera, &frame, &err) == WM_OK) take_picture(self, &frame);
@@ -163,7 +163,7 @@ typedef struct bus_files {
   char dbc[WM_CAN_IFACE_MAX + 20], signals[WM_CAN_IFACE_MAX + 20];
 } bus_files;
 
-// The first bus has the names that a recording of one bus has.
+// The first bus has the file names of a recording with one bus.
 static bus_files files_of(const wm_config *config, size_t bus) {
   bus_files out;
   const char *interface = config->devices.can[bus].interface;
@@ -174,7 +174,7 @@ static bus_files files_of(const wm_config *config, size_t bus) {
 
 #define CHANGES_MAX (5 + 2 * WM_CAN_DEVICES_MAX)
 
-// Files by their names in the recording.
+// Keys of the configuration and their file names in the recording.
 static size_t changes_of(const wm_config *config, const wm_yaml *doc, bus_files buses[WM_CAN_DEVICES_MAX],
                          wm_yaml_change out[CHANGES_MAX]) {
   const struct {
@@ -202,7 +202,7 @@ static size_t changes_of(const wm_config *config, const wm_yaml *doc, bus_files 
   return count;
 }
 
-// The configuration, with the recording's own files: it replays wherever it is taken to.
+// The configuration with the recording's own file names: it replays anywhere.
 static wm_status write_config(recorder *self, wm_error *err) {
   const wm_config *config = self->config;
   wm_yaml_change changes[CHANGES_MAX];
@@ -234,7 +234,7 @@ static wm_status copy_buses(recorder *self, wm_error *err) {
   return status;
 }
 
-// recording.yaml first: from then on the folder is a recording, whatever happens.
+// recording.yaml first: from then on the folder is a valid recording.
 static wm_status write_about(recorder *self, wm_error *err) {
   char text[2048];
   const wm_config *config = self->config;
@@ -247,7 +247,7 @@ static wm_status write_about(recorder *self, wm_error *err) {
     used += snprintf(text + used, sizeof text - (size_t)used, "  - {interface: \"%s\", dbc: \"%s\", signals: \"%s\"}\n",
                      config->devices.can[i].interface, files.dbc, files.signals);
   }
-  // No list of streams: what is there is read, also after a cut.
+  // No list of streams: the files that are there are read, also after a power cut.
   wm_status status = write_text(self, "recording.yaml", text, (size_t)used, err);
   if (status == WM_OK) status = write_config(self, err);
   if (status == WM_OK) status = copy_file(self, config->overrides.calibration, "calibration.yaml", err);
@@ -312,7 +312,7 @@ static void sync_file(recorder *self, FILE *f, const char *path) {
   if (f && (fflush(f) != 0 || fdatasync(fileno(f)) != 0)) fail(self, path, errno);
 }
 
-// So that a power cut costs what came in the last second.
+// Flushes, so that a power cut loses the last second at most.
 static void sync_all(recorder *self) {
   sync_file(self, self->can_log, "can.log");
   for (size_t i = 0; i < self->stream_count; i++) {

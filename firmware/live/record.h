@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A robot's devices into a recording (docs/recording-format.md): all CAN frames as candump's text, cameras' pictures as
-// they come (MJPEG as it is, others as uncompressed grey), the configuration's files. Everything is appended: after a
-// power cut what was written is a recording.
+// Records a robot's devices (docs/recording-format.md): all CAN frames as candump text, the cameras' pictures in their
+// format (MJPEG unchanged, others as uncompressed grey), the configuration's files. All files are appended to: after a
+// power cut the files are a valid recording.
 #ifndef WAYMARK_LIVE_RECORD_H
 #define WAYMARK_LIVE_RECORD_H
 
@@ -13,11 +13,11 @@
 #include "waymark/status.h"
 
 typedef struct wm_record_options {
-  wm_recording *robot;  // whose cameras others read, too (wm_robot_open), outlives the recording; NULL: its own
+  wm_recording *robot;  // shared cameras (wm_robot_open); outlives the recording; NULL: its own
   const char *out_dir;
   double duration_s;        // 0: until *stop
-  uint64_t bytes_max;       // of the whole recording; 0: as much as there is
-  uint64_t bytes_free_min;  // left on the disk for others
+  uint64_t bytes_max;       // of the whole recording; 0: no limit
+  uint64_t bytes_free_min;  // free space to be left on the disk
   atomic_int *stop;
   wm_finding_fn say;
   void *say_context;
@@ -25,12 +25,12 @@ typedef struct wm_record_options {
 
 typedef struct wm_record_report {
   uint64_t frames, pictures, bytes;
-  uint64_t lost;  // CAN frames and pictures that the kernel or a camera lost
+  uint64_t lost;  // CAN frames and pictures lost by the kernel or a camera
   int is_full;    // ended because of bytes_max or bytes_free_min
 } wm_record_report;
 
-// Returns when the time is over, *stop is set or the disk is full. WM_BAD_CONFIG: no devices. WM_IO: something could
-// not be written; what was is good.
+// Returns when the time is over, *stop is set or the disk is full. WM_BAD_CONFIG: no devices. WM_IO: a write failed;
+// all before it is valid.
 wm_status wm_record(const wm_config *config, const wm_record_options *options, wm_record_report *report, wm_error *err);
 
 #endif

@@ -6,7 +6,7 @@
 
 #include "live/cameras.h"
 
-// One interface, or of several with its name behind the source's: "can:can1".
+// The source of one interface; with several interfaces its name ends with theirs: "can:can1".
 static wm_status add_interface(const wm_can_device_config *device, int is_one, wm_can_part part, wm_recording *robot,
                                wm_error *err) {
   wm_source *source;

@@ -16,7 +16,7 @@
 #include "rt/memory.h"
 #include "waymark/keeper.h"
 
-#define BEFORE_FIRST_NS (100 * WM_NS_PER_MS)  // for the threads to stand ready
+#define BEFORE_FIRST_NS (100 * WM_NS_PER_MS)  // time for the threads to get ready
 #define LOOK_EVERY_NS (20 * WM_NS_PER_MS)
 
 void live_say(live *self, const char *format, ...) {
@@ -35,8 +35,8 @@ void live_say(live *self, const char *format, ...) {
 
 static size_t record_bytes(const live *self) { return OUTPUT_RECORD_HEAD + wm_output_bytes(self->assembly.kinds); }
 
-// Records that may hold a picture's points are large (8 kB), and most sources of such a robot are slow: an eighth of
-// the slots holds half a second and more of them. All of it is locked memory.
+// Records with a picture's points are large (8 kB), and most sources of such a robot are slow: an eighth of the slots
+// holds half a second of them. All of it is locked memory.
 static size_t disk_slots(const live *self) {
   size_t slots = kThreads[THREAD_ESTIMATOR].ring_slots;
   return record_bytes(self) > 1024 ? slots / 8 : slots;
@@ -90,7 +90,7 @@ static wm_status take_memory(live *self, wm_error *err) {
 
 // ── start ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// The saved pose where there is one that holds (1); else the configuration's start.
+// The saved pose (1) where it is valid; else the configuration's start (0).
 static int start_where_it_was(live *self) {
   const wm_runtime_params *params = &self->config->runtime;
   const char *path = self->config->saved_pose;
@@ -114,7 +114,7 @@ static int start_where_it_was(live *self) {
   return 1;
 }
 
-// The map of the run before. Without a pose in it the configuration's start means nothing: it was another map's.
+// Continues with the saved map. Without a saved pose the start is unknown: the configuration's start is of another map.
 static void go_on_with_map(live *self, int has_pose) {
   wm_setup *setup = &self->assembly.setup;
   wm_error err;
@@ -157,7 +157,7 @@ static void take_up_what_was(live *self) {
   go_on_with_map(self, has_pose);
 }
 
-// At the end, when the estimator's and the disk's thread are over.
+// At the end, after the estimator's and the disk thread.
 static void save_last_map(live *self) {
   if (!self->disk.keeps_map || self->config->saved_map[0] == '\0') return;
   kept_map *map = self->estimator.maps_memory;
@@ -165,7 +165,7 @@ static void save_last_map(live *self) {
   if (map->bytes > 0) live_save_map(self, map->image, map->bytes);
 }
 
-// Commands are a source as any other, so that they are in their place in time, and in the log.
+// Commands are a source, so that they are ordered by time and logged.
 static wm_status add_local_commands(live *self, wm_recording *recording, wm_error *err) {
   wm_source *commands;
   if (!self->config->commands[0]) return WM_OK;
@@ -181,7 +181,7 @@ static wm_status add_commands(live *self, wm_recording *recording, wm_error *err
   return status == WM_OK ? wm_recording_add_device(recording, commands, 0, err) : status;
 }
 
-// So are sightings that another program sends.
+// So are sightings of another program.
 static wm_status add_sightings(live *self, wm_recording *recording, wm_error *err) {
   if (!self->config->devices.sightings_by_lcm) return WM_OK;
   size_t count;
@@ -255,7 +255,7 @@ static void tell_memory(live *self) {
   live_say(self, "memory: %.2f MB, taken before the start: %s", (double)self->arena.bytes * 1e-6, parts);
 }
 
-// What the real-time thread needs and a desk's user may lack is said, and the run goes on without.
+// Missing rights of real-time memory are reported; the run continues without them.
 static void steady_memory(live *self, wm_live_report *report) {
   if (self->config->runtime.realtime_lock_memory) {
     report->memory_locked = wm_lock_memory();
@@ -299,7 +299,7 @@ static wm_status start_threads(live *self, thread_list *threads, wm_live_report 
 
 // ── while it runs, and its end ──────────────────────────────────────────────────────────────────────────────────────
 
-// A recording that is played is over. Devices have no end.
+// Whether all recorded sources have ended. Devices have no end.
 static int recording_is_over(live *self) {
   int recorded = 0;
   for (size_t i = 0; i < self->assembly.source_count; i++) {
@@ -340,7 +340,7 @@ static void wait_for_end(live *self, wm_live_report *report) {
 static void join_threads(live *self, thread_list *threads) {
   atomic_store(&self->stop, 1);
   for (size_t i = threads->sources_started; i < self->assembly.source_count; i++)
-    atomic_store_explicit(&self->sources[i].done, 1, memory_order_release);  // never began
+    atomic_store_explicit(&self->sources[i].done, 1, memory_order_release);  // never started
   for (size_t i = 0; i < threads->sources_started; i++) pthread_join(threads->source[i], NULL);
   if (threads->estimator_started) {
     pthread_join(threads->estimator, NULL);
@@ -462,7 +462,7 @@ wm_status wm_run_live(const wm_config *config, wm_recording *recording, const wm
     status = closed;
     if (err) *err = close_error;
   }
-  black_box_close(&self->disk.box);  // where no thread did
+  black_box_close(&self->disk.box);  // where no thread closed it
   wm_assembly_close(&self->assembly);
   wm_arena_close(&self->arena);
   free(self->map.image);

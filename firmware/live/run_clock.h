@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The run's clock: that of the recording, beginning when the run begins and running with the monotonic clock. On
+// The run's clock: the recording's, from the run's beginning on at the rate of the monotonic clock times the speed. On
 // devices it is the monotonic clock itself.
 #ifndef WAYMARK_LIVE_RUN_CLOCK_H
 #define WAYMARK_LIVE_RUN_CLOCK_H
@@ -28,7 +28,7 @@ static inline wm_time_ns monotonic_from_run(const run_clock *clock, wm_time_ns r
 
 static inline wm_time_ns run_now(const run_clock *clock) { return run_from_monotonic(clock, wm_monotonic_ns()); }
 
-// Sleeps to an instant of the monotonic clock, whatever signals come. One system call where none does.
+// Sleeps until an instant of the monotonic clock, also through signals. One system call without a signal.
 static inline void sleep_until(wm_time_ns monotonic_ns) {
   struct timespec until = {.tv_sec = monotonic_ns / WM_NS_PER_S, .tv_nsec = monotonic_ns % WM_NS_PER_S};
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, NULL) == EINTR) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Puts a source's events into its ring: a recording's when they are due, a device's as they come.
+// Puts a source's events into its ring: a recording's when due, a device's on arrival.
 #include <string.h>
 
 #include "live/live.h"
@@ -8,7 +8,7 @@
 
 #define LONGEST_SLEEP_NS (50 * WM_NS_PER_MS)  // so that a stop is noticed
 
-// 1 when the instant has come, 0 when the run is to stop.
+// 1 at that instant, 0 when the run is to stop.
 static int wait_until(const live *run, wm_time_ns monotonic_ns) {
   for (;;) {
     if (atomic_load_explicit(&run->stop, memory_order_relaxed)) return 0;
@@ -45,7 +45,7 @@ static void share_counts(live_source *self) {
 static void play_recording(live_source *self) {
   const run_clock *clock = &self->run->clock;
   while (self->reader->has_next && wait_until(self->run, monotonic_from_run(clock, self->reader->next.arrival_ns))) {
-    self->reader->next.arrival_ns = run_now(clock);  // it arrives now, whatever the recording says
+    self->reader->next.arrival_ns = run_now(clock);  // it arrives now, not at the recorded arrival
     if (self->reader->next.kind != WM_EVENT_NONE) put(self);
     wm_source *source = self->reader->source;
     if (source->skip_to) source->skip_to(source, run_now(clock));

@@ -17,7 +17,7 @@ const thread_spec kThreads[THREAD_ROLES] = {
   [THREAD_CAMERA]    = {"wm-camera",   0,      (size_t)2 << 20, 0,          0                }, // wait for a reader
   [THREAD_ESTIMATOR] = {"wm-estimate", 1,      (size_t)2 << 20, 8192,       0                }, // allocate, lock, make a system call but its sleep
   [THREAD_PUBLISH]   = {"wm-publish",  0,      (size_t)2 << 20, 0,          2 * WM_NS_PER_MS }, // touch a file, wait for a disk or a terminal
-  [THREAD_DISK]      = {"wm-disk",     0,      (size_t)2 << 20, 0,          5 * WM_NS_PER_MS }, // hold any other thread up
+  [THREAD_DISK]      = {"wm-disk",     0,      (size_t)2 << 20, 0,          5 * WM_NS_PER_MS },  // delay any other thread
 };
 // clang-format on
 
@@ -25,7 +25,7 @@ void threads_of_libraries(void) {
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
   pthread_attr_setstacksize(&attributes, LIBRARY_STACK_BYTES);
-  (void)pthread_setattr_default_np(&attributes);  // of no consequence but for memory
+  (void)pthread_setattr_default_np(&attributes);  // affects memory only
   pthread_attr_destroy(&attributes);
 #ifdef __GLIBC__
   (void)mallopt(M_ARENA_MAX, 1);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// An AVI of pictures that is appended to and never gone back into: no index, no sizes; a file that was cut is whole up
-// to its last picture. Source: Microsoft, "AVI RIFF File Reference".
+// An AVI of pictures that is only appended to: no index, no sizes. A truncated file is valid up to its last complete
+// picture. Source: Microsoft, "AVI RIFF File Reference".
 #ifndef WAYMARK_OUTPUT_AVI_WRITER_H
 #define WAYMARK_OUTPUT_AVI_WRITER_H
 

@@ -13,7 +13,7 @@
 #include "output/saved_pose.h"
 
 #define NAME_MAX_BYTES (WM_PATH_MAX + 40)
-// Deaths nearer to each other than this are one crash loop: a restart takes a second, other faults are rarer.
+// Deaths in intervals below this are one crash loop: a restart takes a second, other faults are rarer. Not swept.
 #define CRASH_LOOP_S 600.0
 static const char *const kParts[] = {"before", "now"};
 
@@ -34,7 +34,7 @@ static void path_of(const black_box *self, const char *name, char out[NAME_MAX_B
 
 // ── what is kept ────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// Number of a kept file ("lost-0012-now.wmlog", "died-0012-front-a.avi"); 0 where it is none.
+// Number of a kept file ("lost-0012-now.wmlog", "died-0012-front-a.avi"); 0 for other names.
 static unsigned number_of(const char *name) {
   unsigned number = 0;
   char what[8];
@@ -42,7 +42,7 @@ static unsigned number_of(const char *name) {
   return strcmp(what, "lost") == 0 || strcmp(what, "died") == 0 ? number : 0;
 }
 
-// The largest number there; those that are older than the newest BLACK_BOX_KEPT_MAX are removed.
+// The largest number in the folder; files older than the newest BLACK_BOX_KEPT_MAX are removed.
 static unsigned tidy(black_box *self) {
   unsigned newest = 0;
   for (int pass = 0; pass < 2; pass++) {
@@ -73,7 +73,7 @@ static void remove_kept(const black_box *self, unsigned number) {
   (void)closedir(folder);
 }
 
-// When the log of death `number` was written last, in s; 0: there is none. Number 0 is the present log.
+// Time of the last write to the log of death `number`, in s; 0: there is none. Number 0 is the present log.
 static double died_at(const black_box *self, unsigned number) {
   char name[40], path[NAME_MAX_BYTES];
   struct stat file;
@@ -82,8 +82,8 @@ static double died_at(const black_box *self, unsigned number) {
   return stat(path, &file) == 0 ? (double)file.st_mtim.tv_sec : 0;
 }
 
-// A run that dies again and again leaves its first and its newest death, so that older incidents are not evicted: the
-// one before makes place for this one. The number of this one.
+// In a crash loop only the first and the newest death are kept, so that older incidents are not evicted: the previous
+// death of the loop is removed. Returns the number of the new one.
 static unsigned number_of_death(black_box *self, unsigned newest) {
   const double now_s = died_at(self, 0), last_s = newest > 1 ? died_at(self, newest) : 0,
                before_s = newest > 1 ? died_at(self, newest - 1) : 0;
@@ -108,7 +108,7 @@ static void keep(black_box *self, const char *what) {
   say(self, "kept as ", to);
 }
 
-// A log that was not closed in order is of a run that died.
+// A log without its end record is of a run that was killed.
 static int has_died(const char *path) {
   wm_log_reader *log;
   static wm_event event;
@@ -137,12 +137,12 @@ static void create_log(black_box *self) {
   self->begun_ns = WM_TIME_NONE;
   self->is_open = wm_log_create(&self->log, now, &self->assembly, &err) == WM_OK;
   if (self->is_open)
-    wm_log_flush(&self->log);  // of a run that dies at once, the head at least
+    wm_log_flush(&self->log);  // of a run that is killed at once, the head at least
   else
     unwritable(self, err.text);
 }
 
-// A new log from this pose on; the one before is the other one's place.
+// Starts a new log at this pose; the previous one is renamed to "before".
 static void begin_log(black_box *self, const wm_estimate *pose, wm_time_ns now_ns) {
   char now[NAME_MAX_BYTES], before[NAME_MAX_BYTES];
   path_of(self, "now", now);
@@ -209,7 +209,7 @@ void black_box_pose(black_box *self, const wm_estimate *pose, wm_time_ns now_ns)
   else if (self->rotate_ns == WM_TIME_NONE || now_ns >= self->rotate_ns)
     begin_log(self, pose, now_ns);
   int is_lost = pose->state == WM_STATE_LOST;
-  // The time after the fault matters, too: it gets a quarter.
+  // After a fault the log goes on for a quarter of keep_s.
   if (is_lost && self->was_tracking && self->kept_from_ns == WM_TIME_NONE)
     self->kept_from_ns = now_ns + self->keep_ns / 4;
   self->was_tracking = pose->state == WM_STATE_TRACKING || pose->state == WM_STATE_DEAD_RECKONING;

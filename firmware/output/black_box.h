@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The last seconds of what was fused, and of what the cameras saw, kept where the robot got lost or the run died: event
-// logs that replay. The first of a run begins as the run did (start, map of the run before), so that it gives the same
-// poses; a later one begins at the pose of then, with the newest map that the estimator kept. In the folder: now.wmlog
-// and before.wmlog, which take turns and hold between one and two times `keep_s`; and what was kept:
-// lost-0001-before.wmlog, lost-0001-now.wmlog, died-0002-... . Of the disk thread.
+// Event logs and pictures of the last seconds, kept when the robot gets lost or a run was killed. The logs replay. The
+// first log of a run begins with its start and saved map and gives the same poses; a later one begins with the pose and
+// the newest map of its beginning. In the folder: now.wmlog and before.wmlog, which alternate and hold between one and
+// two times `keep_s`; and the kept ones: lost-0001-before.wmlog, lost-0001-now.wmlog, died-0002-... . On the disk
+// thread.
 #ifndef WAYMARK_OUTPUT_BLACK_BOX_H
 #define WAYMARK_OUTPUT_BLACK_BOX_H
 
@@ -12,7 +12,7 @@
 #include "output/event_log.h"
 #include "output/run_findings.h"
 
-#define BLACK_BOX_KEPT_MAX 20  // of losses and deaths; the oldest go
+#define BLACK_BOX_KEPT_MAX 20  // losses and deaths; the oldest are removed
 
 typedef struct black_box {
   char folder[WM_PATH_MAX];
@@ -23,29 +23,29 @@ typedef struct black_box {
   wm_log_writer log;
   int is_open, was_tracking, said_unwritable;
   wm_time_ns begun_ns;      // arrival of the first event of a log without a pose
-  wm_time_ns rotate_ns;     // the present log ends then; WM_TIME_NONE: no pose came since the run's or a loss's end
-  wm_time_ns kept_from_ns;  // when what happened is to be kept; WM_TIME_NONE: nothing happened
+  wm_time_ns rotate_ns;     // end of the present log; WM_TIME_NONE: no pose since the start or a loss
+  wm_time_ns kept_from_ns;  // when a pending loss is kept; WM_TIME_NONE: none pending
   black_box_video pictures;
   wm_finding_fn say;
   void *say_context;
 } black_box;
 
-// Keeps what a run that died left behind. With an empty `folder` there is no black box, and nothing below does
-// anything. What can't be written is said once, and localizing goes on. `assembly` outlives it.
+// Keeps the logs of a run that was killed. An empty `folder` switches the black box off. A write error is reported
+// once, and the run continues. `assembly` outlives it.
 void black_box_open(black_box *self, const char *folder, double keep_s, double pictures_hz, const wm_assembly *assembly,
                     wm_finding_fn say, void *say_context);
 void black_box_event(black_box *self, const wm_event *event);
 // The newest map (waymark/keeper.h), of which it makes a copy. May allocate.
 void black_box_map(black_box *self, const void *image, size_t bytes);
-// The newest pose: a log begins with one, and a loss is seen by it. `now_ns`: monotonic.
+// The newest pose: starts a log, and detects a loss. `now_ns`: monotonic.
 void black_box_pose(black_box *self, const wm_estimate *pose, wm_time_ns now_ns);
-// Reads the pictures of each camera of `rig` that there is, until it is closed.
+// Subscribes to the pictures of each camera of `rig`, until it is closed.
 wm_status black_box_open_pictures(black_box *self, wm_pictures *pictures, const wm_rig *rig, wm_error *err);
-// Takes the pictures that came. Every few milliseconds.
+// Writes the pictures that have arrived. Every few milliseconds.
 void black_box_take_pictures(black_box *self);
-// Hands what is buffered to the system. Once a second.
+// Flushes to the system. Once a second.
 void black_box_flush(black_box *self);
-// In order: what is in it is not kept. A second time it does nothing.
+// Regular end: the present log is not kept. A second call does nothing.
 void black_box_close(black_box *self);
 
 #endif

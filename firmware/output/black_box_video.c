@@ -13,7 +13,7 @@
 #define PREFIX "pictures-"
 #define PATH_BYTES (WM_PATH_MAX + 300)
 
-// Pictures of the run before, which nobody wanted to keep.
+// Removes the pictures of the run before that were not kept.
 static void remove_old(const char *folder) {
   char path[PATH_BYTES];
   DIR *there = opendir(folder);
@@ -36,7 +36,7 @@ void black_box_video_open(black_box_video *self, const char *folder, double keep
   self->period_ns = wm_ns_from_seconds(1 / rate_hz);
 }
 
-// A new file of this name: the one before may be linked to, and stays as it is.
+// A new file of this name: the old one may have a hard link and stays unchanged.
 static FILE *begin_file(const black_box_video *self, const black_box_camera *camera, const char *ending) {
   char path[PATH_BYTES];
   (void)snprintf(path, sizeof path, "%s/" PREFIX "%s-%c.%s", self->folder, camera->name, 'a' + camera->part, ending);
@@ -67,7 +67,7 @@ static int put(black_box_camera *camera, const wm_frame *frame, const wm_camera_
   int failed = raw->is_jpeg
                    ? avi_picture(camera->video, raw->data, raw->bytes, 1, 0)
                    : avi_picture(camera->video, frame->grey, frame->width_px, frame->height_px, frame->stride_bytes);
-  // Handed to the system at once, the picture before its stamp: a run that is killed leaves both.
+  // Flushed at once, the picture before its stamp: a killed run leaves both.
   if (!failed && fflush(camera->video) != 0) failed = errno;
   if (!failed && fprintf(camera->stamps, "%" PRIu64 ",%" PRId64 ",%" PRId64 ",%" PRId64 "\n", camera->count,
                          frame->t_ns, frame->exposure_ns, frame->arrival_ns) < 0)
@@ -87,7 +87,7 @@ static int take_picture(black_box_video *self, black_box_camera *camera, const w
   if (!camera->video || !camera->stamps || frame->arrival_ns >= camera->rotate_ns)
     failed = begin(self, camera, frame, &raw);
   if (!failed) failed = put(camera, frame, &raw);
-  if (failed) close_files(camera);  // tried again with the next one
+  if (failed) close_files(camera);  // tried again with the next picture
   return failed;
 }
 

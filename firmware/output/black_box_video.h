@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The black box's pictures: of each camera some a second, as the camera sent them, in two videos that take turns as the
-// logs do: pictures-CAMERA-a.avi and -b.avi with their stamps, the files of a recording. A loss or a death keeps them
-// by hard links, lost-0001-CAMERA-a.avi; what is linked is never written over. Of the disk thread.
+// The black box's pictures: some per second of each camera, in the camera's format, in two alternating videos as the
+// logs: pictures-CAMERA-a.avi and -b.avi with their stamps, as in a recording. A loss or a death keeps them by hard
+// links, lost-0001-CAMERA-a.avi; a linked file is never overwritten. On the disk thread.
 #ifndef WAYMARK_OUTPUT_BLACK_BOX_VIDEO_H
 #define WAYMARK_OUTPUT_BLACK_BOX_VIDEO_H
 
@@ -26,13 +26,13 @@ typedef struct black_box_video {
   size_t camera_count;
 } black_box_video;
 
-// `rate_hz` 0: none are kept, and nothing below does anything.
+// `rate_hz` 0: no pictures are kept, and the functions below do nothing.
 void black_box_video_open(black_box_video *self, const char *folder, double keep_s, double rate_hz);
-// Reads each camera of `rig` that `pictures` have.
+// Subscribes to each camera of `rig` that `pictures` has.
 wm_status black_box_video_subscribe(black_box_video *self, wm_pictures *pictures, const wm_rig *rig, wm_error *err);
-// Writes what came, at most `rate_hz` of each camera; waits for no picture. 0, or errno of what can't be written.
+// Writes the pictures that have arrived, at most `rate_hz` of each camera, without waiting. 0, or errno.
 int black_box_video_take(black_box_video *self);
-// Keeps what is in `folder` as WHAT-NUMBER-CAMERA-PART. 0, or errno.
+// Links the videos in `folder` as WHAT-NUMBER-CAMERA-PART. 0, or errno.
 int black_box_video_keep(const char *folder, const char *what, unsigned number);
 // Before the cameras are closed.
 void black_box_video_close(black_box_video *self);

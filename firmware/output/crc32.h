@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// Go on with the sum of what came before; begin with 0.
+// Continues the sum `crc` of the bytes before; 0 at the beginning.
 uint32_t crc32_of(uint32_t crc, const void *bytes, size_t count);
 
 #endif

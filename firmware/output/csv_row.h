@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A line of a table, put together in a fixed buffer. Numbers are written the same everywhere: '.' as decimal point,
-// never grouped, an absent one (NaN) is an empty field.
+// A row of a CSV table in a fixed buffer. Numbers do not depend on the locale: '.' as decimal point, no grouping; NaN
+// is an empty field.
 #ifndef WAYMARK_OUTPUT_CSV_ROW_H
 #define WAYMARK_OUTPUT_CSV_ROW_H
 
@@ -19,9 +19,9 @@ void wm_row_char(wm_row *self, char c);
 void wm_row_int(wm_row *self, int64_t value);
 // All bits: the shortest text that reads back to the same double.
 void wm_row_exact(wm_row *self, double value);
-// `decimals` digits behind the point, at most 9; what is too large for that is written exactly.
+// `decimals` digits after the point, at most 9; a number too large for that is written exactly.
 void wm_row_fixed(wm_row *self, double value, int decimals);
-// Nine significant digits, for what is a size rather than a place.
+// Nine significant digits, for sigmas and other sizes.
 void wm_row_short(wm_row *self, double value);
 // Seconds with nine decimals, from the integer.
 void wm_row_seconds(wm_row *self, wm_time_ns t_ns);

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// events.wmlog: what was fused, in its order, with all that is needed to fuse it again: enough to make the same
-// trajectory bit by bit without the recording. No wall-clock time in it.
+// events.wmlog: the fused events in their order, and the setup to fuse them again: it gives the same trajectory bit by
+// bit without the recording. It holds no wall-clock time.
 //
 //   file    = magic (8 bytes "WMLOG 2\n") record*
 //   record  = length u32, crc32 u32 (of what follows), tag u8, content (length - 1 bytes)
 //   content = by tag: a text, a setup struct, an event (waymark/codec.h), a gap's count
 //
-// Little-endian. The head's records come first, WM_LOG_HEAD_END closes them. A file that ends within a record was cut
-// (power, full disk): what stands before is good. A record whose sum is wrong stops the reading with its place.
+// Little-endian. The head's records come first, WM_LOG_HEAD_END closes them. A file that ends within a record was
+// truncated (power cut, full disk) and is valid up to there. At a record with a wrong checksum reading stops with its
+// position.
 #ifndef WAYMARK_OUTPUT_EVENT_LOG_H
 #define WAYMARK_OUTPUT_EVENT_LOG_H
 
@@ -39,9 +40,9 @@ typedef enum wm_log_tag {
   WM_LOG_MAP_PATH,       // text: where the map was; it is not in the log
   WM_LOG_HEAD_END,
   WM_LOG_EVENT,   // struct
-  WM_LOG_GAP,     // u64: events that the sink could not write in time and that are missing here
-  WM_LOG_CLOSED,  // u64: events in the file; the run ended in order
-  WM_LOG_KEPT     // of the head: the map that the run began with (waymark/keeper.h); absent where it had none
+  WM_LOG_GAP,     // u64: events that are missing here, because they found no room in the ring to the disk thread
+  WM_LOG_CLOSED,  // u64: events in the file; regular end of the run
+  WM_LOG_KEPT     // of the head: map of an earlier run that this one began with (waymark/keeper.h); absent without one
 } wm_log_tag;
 
 // ── writing ─────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -49,17 +50,17 @@ typedef enum wm_log_tag {
 typedef struct wm_log_writer {
   FILE *file;
   uint64_t events;
-  int failed;  // errno of the first failure; nothing is written after it
+  int failed;  // errno of the first failure, after which nothing is written
   char buffer[1 << 16];
 } wm_log_writer;
 
-// Makes the file and writes the head. The writer holds its own buffer: no allocation after this.
+// Creates the file and writes the head. Its buffer is its own: no allocation after this.
 wm_status wm_log_create(wm_log_writer *self, const char *path, const wm_assembly *assembly, wm_error *err);
 void wm_log_write_event(wm_log_writer *self, const wm_event *event);
 void wm_log_write_gap(wm_log_writer *self, uint64_t missing);
-// Hands what is buffered to the system, so that a power cut costs at most what came since.
+// Flushes to the system, so that a power cut loses at most the events since.
 void wm_log_flush(wm_log_writer *self);
-// Closes in order. WM_IO with the reason if anything could not be written.
+// Regular end. WM_IO with the reason if anything could not be written.
 wm_status wm_log_close(wm_log_writer *self, wm_error *err);
 
 // ── reading ─────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -82,7 +83,7 @@ typedef struct wm_log_head {
   const wm_landmark *landmarks;
   size_t landmark_count;
   wm_driving driving;
-  const void *kept;  // NULL: no map was taken up
+  const void *kept;  // NULL: none
   size_t kept_bytes;
   uint32_t source_count;
   struct {
@@ -91,9 +92,9 @@ typedef struct wm_log_head {
   } sources[WM_SOURCES_MAX];
 } wm_log_head;
 
-// Reads the head. WM_BAD_DATA with file and place where it is no event log, or damaged. Allocates.
+// Reads the head. WM_BAD_DATA with file and position where it is no event log, or damaged. Allocates.
 wm_status wm_log_open(const char *path, wm_log_reader **out, wm_error *err);
-// The same from an open file, which it takes over.
+// The same from an open file, of which it takes ownership.
 wm_status wm_log_open_file(FILE *file, const char *path, wm_log_reader **out, wm_error *err);
 const wm_log_head *wm_log_reader_head(const wm_log_reader *self);
 // WM_OK: an event (source below the head's source_count). WM_END: no more; *cut is 1 where the file ends within a

@@ -8,7 +8,7 @@
 #include "waymark/bytes.h"
 
 #define MAGIC "WMLOG 2\n"
-#define RECORD_MAX (UINT32_C(256) << 20)  // a kept map of 7500 states; nothing is larger
+#define RECORD_MAX (UINT32_C(256) << 20)  // a saved map of 7500 states, the largest record
 
 struct wm_log_reader {
   FILE *file;
@@ -53,7 +53,7 @@ static wm_status read_record(wm_log_reader *self, record *out, int *cut, wm_erro
   if (got < sizeof head) return WM_END;
   wm_reader r = wm_reader_of(head, sizeof head);
   uint32_t length = wm_get_u32(&r), crc = wm_get_u32(&r);
-  if (length == 0 && crc == 0) {  // a file system that lost power may leave zeros behind what was written
+  if (length == 0 && crc == 0) {  // after a power loss a file system may leave zeros at the end
     *cut = 1;
     return WM_END;
   }
@@ -87,7 +87,7 @@ static char *copy_text(const record *r) {
   return text;
 }
 
-// The next place in a growing array, or NULL without memory.
+// The next element of a growing array, or NULL without memory.
 static void *grow(void *array, size_t count, size_t *capacity, size_t item_bytes) {
   if (count < *capacity) return array;
   size_t larger = *capacity ? *capacity * 2 : 64;
@@ -245,7 +245,7 @@ const wm_log_head *wm_log_reader_head(const wm_log_reader *self) { return &self-
 
 // ── the events ──────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// Differences of stamps must fit: no clock goes for 146 years.
+// Differences of stamps must fit in 64 bits: 146 years.
 static int is_stamp(wm_time_ns t_ns) { return t_ns > -(INT64_MAX / 2) && t_ns < INT64_MAX / 2; }
 
 static wm_status take_event(wm_log_reader *self, const record *r, wm_event *out, wm_error *err) {

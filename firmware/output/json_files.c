@@ -74,7 +74,7 @@ static void put_rejected(FILE *f, const wm_source_health *s) {
   (void)fputs("}", f);
 }
 
-// What became of each landmark in each picture, where the source is a detector of known ones.
+// Search outcomes of a detector of known landmarks.
 static void put_looks(FILE *f, const wm_source_health *s) {
   const char *before = ", \"looks\": {";
   for (unsigned i = 0; i < WM_LOOK_COUNT; i++) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run writes at its end: health.json, timing.json, map-estimate.csv.
+// Files at the end of a run: health.json, timing.json, map-estimate.csv.
 #ifndef WAYMARK_OUTPUT_JSON_FILES_H
 #define WAYMARK_OUTPUT_JSON_FILES_H
 

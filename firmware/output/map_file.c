@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// map-estimate.csv: the landmarks that a run found, with their covariances. Also readable as a landmarks.csv.
+// map-estimate.csv: estimated landmarks with their covariances. Also readable as a landmarks.csv.
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -30,7 +30,7 @@ static int by_id(const void *a, const void *b) {
 wm_status wm_write_map(const char *dir, const wm_estimator *estimator, const void *state, wm_error *err) {
   if (!estimator->landmarks) return WM_OK;
   size_t count = estimator->landmarks(state, NULL, NULL, 0);
-  // One landmark and its covariance lie together, so that they are sorted together.
+  // A landmark with its covariance, so that they are sorted together.
   typedef struct entry {
     wm_landmark landmark;
     double covariance[4];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A double as text, whatever the locale: C++'s to_chars, which C has not.
+// A double as text, independent of the locale: C++'s to_chars, which C lacks.
 #ifndef WAYMARK_OUTPUT_NUMBER_TEXT_H
 #define WAYMARK_OUTPUT_NUMBER_TEXT_H
 

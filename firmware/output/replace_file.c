@@ -21,7 +21,7 @@ static int write_all(int fd, const file_part *part) {
   return 0;
 }
 
-// To the disk and not only to the system: a name that points to an empty file would be worse than none.
+// To the disk, not only to the system: after a power cut the new name must not refer to an empty file.
 static int write_through(int fd, const file_part *parts, size_t count) {
   int failed = 0;
   for (size_t i = 0; i < count && !failed; i++) failed = write_all(fd, &parts[i]);
@@ -37,7 +37,7 @@ static int rename_through(const char *from, const char *to) {
   if (slash == folder) slash++;
   if (slash) *slash = '\0';
   int fd = open(slash ? folder : ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return 0;  // the file is there; its name may be lost with the power
+  if (fd < 0) return 0;  // the file is on the disk; only its new name may be lost in a power cut
   (void)fsync(fd);
   (void)close(fd);
   return 0;
@@ -46,7 +46,7 @@ static int rename_through(const char *from, const char *to) {
 wm_status replace_file(const char *path, const file_part *parts, size_t count, wm_error *err) {
   char beside[WM_PATH_MAX + 8];
   (void)snprintf(beside, sizeof beside, "%s.new", path);
-  (void)unlink(beside);  // of a run that was killed while it wrote
+  (void)unlink(beside);  // left by a run that was killed during its write
   int fd = open(beside, O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644);
   if (fd < 0) return wm_fail(err, WM_IO, "%s: can't be written: %s", path, strerror(errno));
   int failed = write_through(fd, parts, count);

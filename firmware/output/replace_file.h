@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A file that is replaced as a whole: at every moment there is the old one or the new one, also after a power cut.
+// Atomic replacement of a file: at every moment the old or the new content is complete, also after a power cut.
 #ifndef WAYMARK_OUTPUT_REPLACE_FILE_H
 #define WAYMARK_OUTPUT_REPLACE_FILE_H
 
@@ -12,8 +12,8 @@ typedef struct file_part {
   size_t count;
 } file_part;
 
-// Writes the parts into `path`.new, which must not be a link, to the disk, and renames it. Some ms, on a memory card up
-// to seconds: not for the real-time thread. WM_IO with the reason; the old file is then as it was.
+// Writes the parts into `path`.new, which must not be a link, syncs it and renames it. Some ms, on a memory card up to
+// seconds: not on the real-time thread. WM_IO with the reason; the old file is then unchanged.
 wm_status replace_file(const char *path, const file_part *parts, size_t count, wm_error *err);
 
 #endif

@@ -18,7 +18,7 @@ static void say(speaker *to, const char *line) {
   if (to->say) to->say(to->context, line);
 }
 
-// A lateness_max_ms that a lateness keeps below, in whole 10 ms.
+// The lateness_max_ms that covers this lateness, in whole 10 ms.
 static double would_do_ms(wm_time_ns lateness_ns) { return ceil((double)lateness_ns * 1e-7) * 10; }
 
 static void about_lateness(speaker *to, const wm_source_health *s) {
@@ -94,7 +94,7 @@ static void about_motion(speaker *to, uint32_t bits) {
     if ((bits >> i) & 1u) say(to, kLines[i]);
 }
 
-// Landmarks that are not where the map has them, or for which there is no capacity.
+// Landmarks at other places than in the map, or without capacity in the map.
 static void about_map(speaker *to, const wm_health *health) {
   static const struct {
     wm_counter_kind kind;

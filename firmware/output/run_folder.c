@@ -32,7 +32,7 @@ struct wm_run_folder {
   wm_log_writer log;
   wm_row line;
   uint64_t bytes_max;     // 0: no limit
-  wm_assembly continued;  // the run's, with the start of a log that begins later
+  wm_assembly continued;  // of the run, with the start of a log that begins later
   wm_estimate newest;     // published; WM_TIME_NONE: none
 };
 
@@ -156,7 +156,7 @@ static void published(wm_run_folder *self, const wm_published *p) {
   end(self, PUBLISHED);
 }
 
-// A position or heading has no sensor of the calibration.
+// Positions and headings have no sensor in the calibration.
 static const char *sensor_of(const wm_assembly *assembly, const wm_innovation *i) {
   const uint32_t by_sensor =
       WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) | WM_EVENT_BIT(WM_EVENT_LOOKED);
@@ -245,7 +245,7 @@ static wm_status make_dir(const char *dir, wm_error *err) {
   for (char *slash = path + 1; *slash; slash++) {
     if (*slash != '/') continue;
     *slash = '\0';
-    (void)mkdir(path, 0777);  // what can't be made shows below
+    (void)mkdir(path, 0777);  // a failure shows at the first file
     *slash = '/';
   }
   struct stat there;
@@ -333,7 +333,7 @@ static wm_status begin_table_again(wm_run_folder *self, int which, wm_error *err
   return status;
 }
 
-// From the newest pose on, as a log of the black box.
+// Begins at the newest pose, as a log of the black box.
 static wm_status begin_log_again(wm_run_folder *self, wm_error *err) {
   char path[WM_PATH_MAX + 32];
   (void)snprintf(path, sizeof path, "%s/events.wmlog", self->dir);
@@ -390,7 +390,7 @@ wm_status wm_run_folder_map(wm_run_folder *self, const wm_estimator *estimator, 
 
 wm_status wm_run_folder_close(wm_run_folder *self, wm_error *err) {
   if (!self) return WM_OK;
-  if (self->tables[TRAJECTORY].file) trajectory_head(self, 3);  // a run that found no pose is a table without rows
+  if (self->tables[TRAJECTORY].file) trajectory_head(self, 3);  // a run without a pose leaves a table without rows
   if (self->tables[PUBLISHED].file) published_head(self, 3);
   wm_status status = wm_log_close(&self->log, err);
   for (int i = 0; i < TABLE_COUNT; i++) {

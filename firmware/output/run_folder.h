@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The folder that a run writes (docs/recording-format.md): trajectory.tum, trajectory.csv, published.csv,
-// innovations.csv, events.wmlog as it goes; health.json, timing.json and (SLAM) map-estimate.csv at the end. Buffers
-// are its own: no allocation after it is open. One thread, never the estimator's in a live run.
+// The output folder of a run (docs/recording-format.md): trajectory.tum, trajectory.csv, published.csv, innovations.csv
+// and events.wmlog during the run; health.json, timing.json and (SLAM) map-estimate.csv at its end. Its buffers are its
+// own: no allocation after the opening. One thread, in a live run the disk thread.
 #ifndef WAYMARK_OUTPUT_RUN_FOLDER_H
 #define WAYMARK_OUTPUT_RUN_FOLDER_H
 
@@ -15,17 +15,17 @@
 
 typedef struct wm_run_folder wm_run_folder;
 
-// Makes `dir` if it isn't there; files of an earlier run in it are written anew.
+// Creates `dir` if needed; files of an earlier run in it are overwritten.
 wm_status wm_run_folder_open(const char *dir, const wm_assembly *assembly, wm_run_folder **out, wm_error *err);
-// Where records go: give it to the pipeline, or call it from the disk thread.
+// The consumer of records: for the pipeline, or called by the disk thread.
 wm_output wm_run_folder_output(wm_run_folder *self);
-// Events that the sink lost are marked in the log, so that a replay of it knows.
+// Marks lost events in the log, so that a replay reports them.
 void wm_run_folder_gap(wm_run_folder *self, uint64_t missing_events);
-// Tables and log together stay below so many bytes (0: without a limit): from half of it on they are renamed to
-// trajectory.1.csv ..., in place of those of before, and begun anew, the log from the newest pose.
+// Limits tables and log together (0: no limit): at half of it they are renamed to trajectory.1.csv ..., which replace
+// those of before, and begun anew, the log from the newest pose.
 void wm_run_folder_limit(wm_run_folder *self, uint64_t bytes);
-// To the system, so that a power cut costs at most what came since. WM_IO with the first thing that can't be written (a
-// full disk): what was asked for is not going to be there, though the run goes on.
+// Flushes to the system, so that a power cut loses at most the records since. WM_IO with the first file that can't be
+// written (a full disk): the output is then incomplete.
 wm_status wm_run_folder_flush(wm_run_folder *self, wm_error *err);
 
 typedef struct wm_timing_stage {
@@ -45,10 +45,10 @@ typedef struct wm_timing {
   size_t memory_bytes;
 } wm_timing;
 
-// health.json; looked-for.csv where a detector looked for known landmarks.
+// health.json; looked-for.csv where a detector of known landmarks ran.
 wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_error *err);
 wm_status wm_run_folder_timing(wm_run_folder *self, const wm_timing *timing, wm_error *err);
-// map-estimate.csv: the landmarks that the estimator found; nothing where it has none.
+// map-estimate.csv: the estimated landmarks; no file without any.
 wm_status wm_run_folder_map(wm_run_folder *self, const wm_estimator *estimator, const void *state, wm_error *err);
 // Closes everything. WM_IO with the first thing that could not be written.
 wm_status wm_run_folder_close(wm_run_folder *self, wm_error *err);

@@ -10,7 +10,7 @@
 #include "waymark/recording.h"
 #include "waymark/yaml.h"
 
-// A doubtful pose is kept with its doubt: an older one would be as far off, and not say so.
+// A doubtful pose is saved with its covariance; an older one would be as wrong with a smaller covariance.
 #define SIGMA_XY_MAX_M 50.0
 #define SIGMA_HEADING_MAX_RAD 1.5
 #define GOES_ON_S 2.0
@@ -18,7 +18,7 @@
 
 // ── writing ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// The larger axis of the position's ellipse in the plane: the start takes one sigma for both.
+// The larger axis of the position's ellipse: a start has one sigma for both axes.
 static double sigma_xy(const double *p) {
   double a = p[wm_cov_index(0, 0)], b = p[wm_cov_index(0, 1)], c = p[wm_cov_index(1, 1)];
   double half = 0.5 * (a - c), root = sqrt(half * half + b * b);
@@ -87,7 +87,7 @@ wm_status wm_saved_pose_read(const char *path, wm_saved_pose *out, wm_error *err
   return status;
 }
 
-// On along the arc that it drove.
+// Continued along the arc of the last motion.
 static void go_on(wm_start *start, double way_m, double turn_rad) {
   double middle = start->heading_rad + 0.5 * turn_rad, half = 0.5 * turn_rad;
   double s = sin(half), c = cos(half), *q = start->q_xyzw, x = q[0], y = q[1], z = q[2], w = q[3];
@@ -103,7 +103,7 @@ static void go_on(wm_start *start, double way_m, double turn_rad) {
 
 static double together(double a, double b, double c) { return sqrt(a * a + b * b + c * c); }
 
-// A clock that went back (a board without a battery, before its time is set) gives no age.
+// A clock that went back (a board without a battery before its time is set) gives no age.
 int wm_saved_pose_start(const wm_saved_pose *saved, double utc_s, double max_age_s, double moved_m, double moved_rad,
                         wm_start *out) {
   double age_s = utc_s - saved->utc_s;

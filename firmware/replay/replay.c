@@ -60,7 +60,7 @@ static wm_status take_time(const wm_yaml_node *timing, const char *run, wm_sourc
   return wm_fail(err, WM_BAD_CONFIG, "%s/timing.json: has no stage \"%s\": that run had no such detector", run, stage);
 }
 
-// By the median of a run: what a detector takes on the computer that the run was on.
+// Sets ready_after_ns to a run's median time of decoding and detecting.
 static wm_status take_times_of(const char *run, wm_vision *vision, wm_error *err) {
   char path[WM_PATH_MAX];
   wm_yaml *doc;
@@ -89,7 +89,7 @@ static void end_steady(replay *self) {
 
 // ── the loop ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// Messages that were due before `now_ns`: at absolute ticks of the arrival clock, with no computing time.
+// Messages due before `now_ns`: at absolute ticks of the arrival clock, without computing time.
 static void publish_until(replay *self, wm_time_ns now_ns) {
   while (self->next_tick_ns < now_ns) {
     wm_published published;
@@ -111,7 +111,7 @@ static wm_time_ns first_tick(wm_time_ns now_ns, wm_time_ns period_ns) {
   return remainder_ns ? now_ns - remainder_ns + period_ns : now_ns;
 }
 
-// A silence of all sources that no drive has (recordings joined together, a corrupt stamp): not played tick by tick.
+// A longer silence of all sources (recordings joined together, a corrupt stamp) is skipped, not played tick by tick.
 #define LONGEST_SILENCE_NS (600 * WM_NS_PER_S)
 
 static wm_status play(replay *self, const wm_replay_options *options, double duration_s, wm_error *err) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A recording, or the event log of a run, through the very same merge and estimator as a live run: one thread, as fast
-// as it goes, the same bits every time.
+// A recording, or the event log of a run, through the merge and estimator of a live run: one thread, as fast as
+// possible, the same bits every time.
 #ifndef WAYMARK_REPLAY_REPLAY_H
 #define WAYMARK_REPLAY_REPLAY_H
 
@@ -12,7 +12,7 @@
 #include "waymark/recording.h"
 #include "waymark/status.h"
 
-// How far it is: `done` of 1, or NaN where the length isn't known. Called a few times a second at most.
+// Progress: `done` of 1, or NaN where the length is unknown. A few times a second at most.
 typedef void (*wm_progress_fn)(void *context, double done);
 
 typedef struct wm_replay_options {
@@ -20,10 +20,10 @@ typedef struct wm_replay_options {
   uint64_t seed;
   wm_progress_fn progress;  // may be NULL
   void *progress_context;
-  const wm_raster *map;    // event log only: the map whose hash it names; NULL where it names none
-  const char *frames_of;   // recording only: the event log of a run fed from it, whose pictures alone are looked at
-  const char *timing_of;   // recording only: the folder of a run, whose detectors took the time that they take here
-  double from_s, until_s;  // recording only: this part of it, s from its first stamp; until_s 0: to its end
+  const wm_raster *map;    // event log only: the map with the hash in its head; NULL where it has none
+  const char *frames_of;   // recording only: event log of a run of it, whose pictures alone are processed
+  const char *timing_of;   // recording only: folder of a run, whose times of detection are taken
+  double from_s, until_s;  // recording only: interval in s from its first stamp; until_s 0: to its end
 } wm_replay_options;
 
 typedef struct wm_run_report {
@@ -33,16 +33,16 @@ typedef struct wm_run_report {
   double recorded_s;  // from the first stamp to the last arrival
   size_t memory_bytes;
   int64_t allocations_after_start, page_faults_after_start;
-  uint64_t events_missing;  // event log only: lost by the sink of the run that wrote it
+  uint64_t events_missing;  // event log only: lost by the run that wrote it
   wm_time_ns log_ahead_ns;  // frames_of only: the log's clock minus the recording's
-  int log_was_cut;          // event log only: it ends within a record or was not closed
+  int log_was_cut;          // event log only: it ends within a record or without its end record
 } wm_run_report;
 
 wm_status wm_replay_recording(const wm_config *config, wm_recording *recording, const wm_replay_options *options,
                               wm_run_report *report, wm_error *err);
 
-// `config` is the log's own (wm_config_parse of its text) or another one to try. The seed is the log's.
-// WM_BAD_CONFIG where options->map doesn't have the hash that the log names.
+// `config` is the log's own (wm_config_parse of its text) or another one. The seed is the log's. WM_BAD_CONFIG where
+// options->map has another hash than the log's.
 wm_status wm_replay_log(const wm_config *config, wm_log_reader *log, const wm_replay_options *options,
                         wm_run_report *report, wm_error *err);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The event log of a run: its events, as they were fused, into the estimator again.
+// The event log of a run: its events, in their fused order, through the estimator again.
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -51,7 +51,7 @@ static void assemble(log_replay *self, const wm_config *config, const wm_log_hea
   (void)snprintf(a->recording, sizeof a->recording, "%s", head->recording);
 }
 
-// A log's poses belong to its map, which is not in it: another one is refused, not silently used.
+// A log's poses belong to its map, which is not in it: another map is refused.
 static wm_status check_map(const wm_log_head *head, const wm_raster *map, wm_error *err) {
   const uint64_t hash = map ? map->hash : 0;
   if (hash == head->map_hash) return WM_OK;
@@ -61,7 +61,7 @@ static wm_status check_map(const wm_log_head *head, const wm_raster *map, wm_err
                  head->map_path, head->map_hash, hash);
 }
 
-// The map that the run had taken up at its start.
+// The saved map that the run began with.
 static wm_status take_kept(log_replay *self, wm_error *err) {
   const wm_assembly *a = &self->assembly;
   const wm_keeper *keeper = wm_keeper_of(a->config->estimator);
@@ -152,7 +152,7 @@ static wm_status run(log_replay *self, wm_log_reader *log, const wm_replay_optio
   report->page_faults_after_start = wm_page_faults_of_this_thread() - page_faults;
   report->allocations_after_start = allocations < 0 ? -1 : wm_allocations_of_this_thread() - allocations;
   wm_error summary_error;
-  wm_status summary = write_summary(self, report, &summary_error);  // also of what stands before a damage
+  wm_status summary = write_summary(self, report, &summary_error);  // also of the part before a damage
   if (status == WM_OK && summary != WM_OK) {
     if (err) *err = summary_error;
     return summary;

@@ -9,11 +9,11 @@
 #include "sources/vision.h"
 #include "waymark/codec.h"
 
-#define SAME_TIME_NS (20 * WM_NS_PER_MS)  // jitter of who plays a recording, and of stamps
+#define SAME_TIME_NS (20 * WM_NS_PER_MS)  // jitter of playing a recording, and of stamps
 #define VOTES_MIN 20
-#define ALIKE_MAX 4  // data that look the same more often than this (standing still) tell nothing
+#define ALIKE_MAX 4  // more equal data (standing still) carry no information about the offset
 
-// A growing list of pairs: what was said, and when.
+// A growing list of pairs: hash of the content (or an arrival), and stamp.
 typedef struct said {
   uint64_t what;
   wm_time_ns t_ns;
@@ -73,7 +73,7 @@ static wm_status read_recorded_motion(wm_recording *recording, const wm_config *
   return status;
 }
 
-// The log's motion; stamps and arrivals (as `what`) of what each source of the assembly said.
+// The log's motion; stamps and arrivals (as `what`) of each source of the assembly.
 static wm_status read_log(const char *path, const wm_assembly *assembly, said_list *motion, said_list *stamps,
                           wm_error *err) {
   wm_log_reader *log;
@@ -101,7 +101,7 @@ static wm_status read_log(const char *path, const wm_assembly *assembly, said_li
 
 // ── the clocks ──────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// Each datum of the log votes for the differences to those of the recording that look like it.
+// Each datum of the log votes for its time differences to equal data of the recording.
 static wm_status collect_votes(const said_list *recorded, const said_list *logged, said_list *votes, wm_error *err) {
   wm_status status = WM_OK;
   for (size_t i = 0; status == WM_OK && i < logged->count; i++) {
@@ -122,7 +122,7 @@ static wm_status collect_votes(const said_list *recorded, const said_list *logge
   return status;
 }
 
-// Where most votes lie together; the middle one.
+// The median of the densest interval of votes.
 static wm_status find_offset(const char *path, const said_list *recorded, const said_list *logged,
                              wm_time_ns *offset_ns, wm_error *err) {
   said_list votes = {0};
