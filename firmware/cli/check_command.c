@@ -31,7 +31,7 @@ static const char kHelp[] =
     "example:\n"
     "  waymark check config/starry-night-plan.yaml RECORDING\n";
 
-// What is told beside the findings; a program asks for them alone.
+// Printed beside the findings; not with --json.
 static int tells_facts = 1;
 __attribute__((format(printf, 1, 2))) static void fact(const char *format, ...) {
   if (!tells_facts) return;
@@ -84,7 +84,7 @@ static void print_source(const wm_assembled_source *s, const source_facts *facts
   fact("\n");
 }
 
-// How much memory a replay takes, and takes it: detectors need theirs to read their sources.
+// Takes the memory of a replay, because detectors need theirs while their sources are read, and returns its size.
 static wm_status take_memory(wm_assembly *assembly, wm_arena *arena, wm_error *err) {
   static wm_pipeline pipeline;
   wm_arena_need needs[WM_PIPELINE_NEEDS + WM_VISION_NEEDS];
@@ -160,7 +160,7 @@ static int tell(const findings *found) {
     findings_json(found, stdout);
     (void)fputs("\n}\n", stdout);
   }
-  return is_good ? EXIT_DONE : EXIT_USAGE;  // whatever it is, it has to be mended before driving
+  return is_good ? EXIT_DONE : EXIT_USAGE;  // every finding is to be resolved before driving
 }
 
 int command_check(int argc, char *const *argv) {

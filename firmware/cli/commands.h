@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The program's commands. Each takes the words after its name and returns the exit code.
+// The program's commands. Each takes the arguments after its name and returns the exit code.
 #ifndef WAYMARK_CLI_COMMANDS_H
 #define WAYMARK_CLI_COMMANDS_H
 
@@ -25,18 +25,18 @@ int exit_code(wm_status status);
 int complain(const wm_error *err);
 // A wm_warn_fn and wm_finding_fn: "note: TEXT" on standard error.
 void print_note(void *context, const char *text);
-// `--landmarks` and `--calibration` stand above what the configuration says.
+// `--landmarks` and `--calibration` replace the configuration's files.
 wm_status override_path(char out[WM_PATH_MAX], const char *path, wm_error *err);
-// Refuses an output folder in which writing would destroy what is read: a recording, or the log being replayed.
+// Refuses an output folder whose files would overwrite the input: a recording, or the log that is replayed.
 wm_status check_out_dir(const char *out_dir, const char *input, wm_error *err);
-// Counts and state of a run, for a person, on standard output.
+// Prints counts and state of a run on standard output.
 void print_report(const wm_run_report *report, const char *name, const char *out_dir, double took_s);
 
-// A desk's command: the program waymark-COMMAND in this one's folder, then in PATH, as git finds its own, in the place
-// of this one. Returns only if there is none.
+// Executes a desk's command in place of this program: waymark-COMMAND in this program's folder, else in PATH, as git
+// does. Returns only where there is none.
 void run_desk_command(const char *command, char *const *argv);
 
-// A line on a terminal with the time that is left, from two seconds on; nothing when the output is not a terminal.
+// A line on a terminal with the remaining time, after two seconds; nothing where the output is no terminal.
 typedef struct progress_line {
   wm_time_ns begin_ns;
   int shown;

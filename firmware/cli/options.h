@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A command line: `--name VALUE` or `--name=VALUE`, flags, and words in between. An option that isn't known is answered
-// with the nearest one.
+// Parses a command line: `--name VALUE` or `--name=VALUE`, flags, and words in between. The error of an unknown option
+// suggests the nearest one.
 #ifndef WAYMARK_CLI_OPTIONS_H
 #define WAYMARK_CLI_OPTIONS_H
 
@@ -17,7 +17,7 @@ typedef struct option {
   void *out;  // const char **, uint64_t *, double *, int *
 } option;
 
-// Fills the options' places and puts the other words into `words` (at most `capacity`). WM_BAD_USAGE with the reason.
+// Stores the options' values and puts the other words into `words` (at most `capacity`). WM_BAD_USAGE with the reason.
 wm_status options_parse(int argc, char *const *argv, const option *options, size_t count, const char **words,
                         size_t capacity, size_t *word_count, wm_error *err);
 

@@ -91,7 +91,7 @@ static int replay_recording(const arguments *args) {
   return status == WM_OK ? EXIT_DONE : complain(&err);
 }
 
-// A log's poses belong to its map: another one is refused, not silently used.
+// A log's poses belong to its map: another map is refused.
 static wm_status check_map(const char *file, const wm_log_head *head, const char *log, wm_error *err) {
   if (!file) return WM_OK;
   wm_landmark *landmarks;
@@ -108,7 +108,7 @@ static wm_status check_map(const char *file, const wm_log_head *head, const char
                  log, head->landmark_count, head->landmark_hash, count, file, hash);
 }
 
-// The raster map that the log names, from where it was or from --map.
+// The raster map of the log, from its path there or from --map.
 static wm_status load_map(const char *file, const wm_log_head *head, wm_map **out, wm_error *err) {
   *out = NULL;
   if (!head->map_hash) return WM_OK;
@@ -143,8 +143,7 @@ static int replay_log(const arguments *args) {
     static wm_run_report report;
     status = wm_replay_log(&config, log, &options, &report, &err);
     if (report.log_was_cut)
-      (void)fprintf(stderr, "note: %s was not closed in order (power cut?): it holds what was fused until then\n",
-                    args->what);
+      (void)fprintf(stderr, "note: %s has no regular end (power cut?): it holds the events until then\n", args->what);
     if (report.events_missing > 0)
       (void)fprintf(stderr, "note: %s lacks %" PRIu64 " events: poses after them are not those of the run\n",
                     args->what, report.events_missing);
@@ -157,7 +156,7 @@ static int replay_log(const arguments *args) {
   return status == WM_OK ? EXIT_DONE : complain(&err);
 }
 
-// The desk's program goes on where the replay ended.
+// waymark-reference continues after the replay.
 static int make_reference(const arguments *args) {
   char program[] = "waymark-reference", map[] = "--map";
   char *const words[] = {program, (char *)args->out, (char *)args->what, args->map ? map : NULL, (char *)args->map,
@@ -168,7 +167,7 @@ static int make_reference(const arguments *args) {
   return EXIT_WORK_FAILED;
 }
 
-// A run's folder where a recording's was meant: its log can be replayed.
+// A run's folder in place of a recording: its log can be replayed.
 static int is_run_folder(const char *dir) {
   char recording[WM_PATH_MAX + 32], log[WM_PATH_MAX + 32];
   struct stat there;
@@ -217,7 +216,7 @@ int command_replay(int argc, char *const *argv) {
   if (stat(args.what, &there) == 0 && !S_ISDIR(there.st_mode)) {
     const int part = args.from_s > 0 || args.until_s > 0 || args.lost;
     if (!args.reference && !args.frames_of && !args.timing_of && !part) return replay_log(&args);
-    (void)fprintf(stderr, "waymark: %s needs the recording; a log is what was fused, whole\n",
+    (void)fprintf(stderr, "waymark: %s needs the recording; a log holds the whole run\n",
                   args.reference   ? "--reference"
                   : args.frames_of ? "--frames-of"
                   : args.timing_of ? "--timing-of"

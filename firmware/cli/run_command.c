@@ -48,7 +48,7 @@ typedef struct arguments {
   wm_run_options run;
 } arguments;
 
-#define RECORD_FREE_MB 500  // left on the disk for others, as `waymark record` does by default
+#define RECORD_FREE_MB 500  // free space left on the disk, the default of `waymark record`
 #define BLIND_S 0.5         // from the end of one run to the first motion of the next, in one process
 
 static atomic_int stop, reload_asked;
@@ -82,7 +82,7 @@ static void print_times(const wm_live_report *r) {
                (double)r->loop_max_ns * 1e-6, (double)r->age_p99_ns * 1e-6);
 }
 
-// What one configuration opens.
+// A configuration with its opened sources.
 typedef struct opened {
   wm_config config;
   wm_recording *recording;
@@ -94,7 +94,7 @@ static void close_all(opened *self) {
   self->recording = NULL;
 }
 
-// A recording that is played stands in for the robot's devices; the robot's own state is left alone, but for --resume.
+// A played recording replaces the robot's devices; the robot's saved state is not used, except with --resume.
 static void without_robot(wm_config *config, int resumes) {
   if (!resumes) config->saved_pose[0] = config->saved_map[0] = config->black_box[0] = '\0';
   config->devices.sightings_by_lcm = 0;
@@ -104,7 +104,7 @@ static wm_status open_all(const arguments *args, opened *out, wm_error *err) {
   wm_config *config = &out->config;
   memset(out, 0, sizeof *out);
   wm_status status = wm_config_load(args->config, config, err);
-  if (status != WM_OK) return err->status = WM_BAD_CONFIG;  // also where it isn't there
+  if (status != WM_OK) return err->status = WM_BAD_CONFIG;  // also for a missing file
   wm_config_each_warning(config, print_note, NULL);
   if (args->recording) without_robot(config, args->resumes);
   status = override_path(config->overrides.landmarks, args->landmarks, err);
@@ -118,7 +118,7 @@ static wm_status open_all(const arguments *args, opened *out, wm_error *err) {
   return status;
 }
 
-// Another configuration, opened and put together while the present one drives on.
+// Another configuration, opened and checked while the present run continues.
 typedef struct reloading {
   const arguments *args;
   opened next;
@@ -153,13 +153,13 @@ static void *record(void *argument) {
   self->status = wm_record(self->config, &self->options, &self->report, &self->error);
   if (self->status != WM_OK) {
     char line[sizeof self->error.text + 60];
-    (void)snprintf(line, sizeof line, "record: %s. Localizing goes on", self->error.text);
+    (void)snprintf(line, sizeof line, "record: %s. Localization continues", self->error.text);
     print_note(NULL, line);
   }
   return NULL;
 }
 
-// Signals are the first thread's.
+// Signals are handled by the first thread.
 static void recorder_start(recorder *self, const opened *with, const char *out_dir) {
   sigset_t all, before;
   memset(self, 0, sizeof *self);
@@ -174,7 +174,7 @@ static void recorder_start(recorder *self, const opened *with, const char *out_d
   (void)pthread_sigmask(SIG_SETMASK, &all, &before);
   self->is_started = pthread_create(&self->thread, NULL, record, self) == 0;
   (void)pthread_sigmask(SIG_SETMASK, &before, NULL);
-  if (!self->is_started) self->status = wm_fail(&self->error, WM_IO, "no thread to record by");
+  if (!self->is_started) self->status = wm_fail(&self->error, WM_IO, "the recorder's thread can't be started");
 }
 
 static wm_status recorder_end(recorder *self, wm_error *err) {
@@ -228,7 +228,7 @@ static int run(const arguments *args) {
       wm_start_from_estimate(&report.last, BLIND_S, &start);
       options.start = &start;
     }
-    // A log holds one configuration, and so does a recording.
+    // A log and a recording hold one configuration each.
     (void)snprintf(out_dir, sizeof out_dir, "%s.%d", args->run.out_dir ? args->run.out_dir : "", part);
     if (args->run.out_dir) options.out_dir = out_dir;
     (void)snprintf(record_dir, sizeof record_dir, "%s.%d", args->record ? args->record : "", part);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Switches the clocks of CAN adapters on, where they have to be told: before a run, which has no right to it.
+// Switches the hardware clocks of CAN adapters on. It needs a right that a run does not have.
 #include <errno.h>
 #include <linux/net_tstamp.h>
 #include <linux/sockios.h>
@@ -32,7 +32,7 @@ static int switch_on(int fd, const char *interface) {
   return ioctl(fd, SIOCSHWTSTAMP, &request) == 0 ? 0 : errno;
 }
 
-// 1: to be mended.
+// 1: an error for the user.
 static int say(const char *interface, int reason) {
   if (reason == 0) {
     (void)printf("%s: stamps by the adapter's clock\n", interface);

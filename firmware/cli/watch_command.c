@@ -56,7 +56,7 @@ static void on_innovation(const lcm_recv_buf_t *message, const char *channel, vo
 
 static watch seen;
 
-// Messages first, then browsers: neither waits long for the other.
+// Messages first, then browsers, with a short wait each.
 static wm_status serve(lcm_t *lcm, const char *address, uint64_t port, const char *map_path, double duration_s,
                        wm_error *err) {
   web page;
@@ -117,7 +117,7 @@ int command_watch(int argc, char *const *argv) {
   lcm_t *lcm = lcm_connect(lcm_connect_url(url), &why);
   if (!lcm) {
     (void)wm_fail(&err, WM_IO,
-                  "LCM: no way in on %s: %s (`ip route add 224.0.0.0/4 dev lo` makes a route on this computer)",
+                  "LCM: no connection on %s: %s (`ip route add 224.0.0.0/4 dev lo` makes a route on this computer)",
                   lcm_connect_url(url), why);
     return complain(&err);
   }

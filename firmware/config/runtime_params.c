@@ -18,7 +18,7 @@ static const wm_param kParams[] = {
         "ms. Default of the sources: a datum that reaches this computer later than this after its stamp is late, and "
         "dropped. A camera's exposure, transfer and detection take 50 to 150 ms."),
     I32("merge.queue_events", merge_queue_events, 4096, 16, 1048576,
-        "Events that may wait to be in order. 300 ms of a busy CAN bus (2000 frames/s) and cameras are under 1000."),
+        "Events that may wait in the merge. 300 ms of a busy CAN bus (2000 frames/s) and cameras are under 1000."),
     F64("publish.rate_hz", publish_rate_hz, 50, 0.1, 1000,
         "Hz. How often the pose is sent, carried on to the moment of sending. Controllers of slow robots run at 20 to "
         "50."),

@@ -55,7 +55,8 @@ static void say_lost_lines(live *run) {
 static void say_slow(live *run) {
   if (run->disk.said_slow || wm_ring_dropped(&run->estimator.to_disk) == 0) return;
   run->disk.said_slow = 1;
-  live_say(run, "the disk was blocked for so long that records were lost (outputs_lost in health). Localizing goes on");
+  live_say(run,
+           "the disk was blocked for so long that records were lost (outputs_lost in health). Localization continues");
 }
 
 static void flush(live *run) {
@@ -64,7 +65,7 @@ static void flush(live *run) {
   black_box_flush(&self->box);
   if (!self->folder || wm_run_folder_flush(self->folder, &err) == WM_OK || self->said_unwritable) return;
   self->said_unwritable = 1;
-  live_say(run, "%s. Localizing goes on", err.text);
+  live_say(run, "%s. Localization continues", err.text);
 }
 
 void live_save_map(live *run, const void *image, size_t bytes) {
@@ -73,11 +74,11 @@ void live_save_map(live *run, const void *image, size_t bytes) {
   wm_error err;
   const char *why =
       wm_keeper_of(config->estimator)->why_not(config->estimator_params, &run->assembly.setup, image, bytes);
-  wm_status status = why ? wm_fail(&err, WM_INTERNAL, "%s: the map of now is not saved: %s", config->saved_map, why)
+  wm_status status = why ? wm_fail(&err, WM_INTERNAL, "%s: the present map is not saved: %s", config->saved_map, why)
                          : wm_saved_map_write(config->saved_map, &self->map_identity, live_utc_s(), image, bytes, &err);
   if (status == WM_OK || self->said_map) return;
   self->said_map = 1;
-  live_say(run, "%s. Localizing goes on; the next start will not have the map of now", err.text);
+  live_say(run, "%s. Localization continues; the next start will lack the present map", err.text);
 }
 
 static void save_map(live *run) {
@@ -109,7 +110,7 @@ static void save_pose(live *run) {
   if (wm_saved_pose_write(run->config->saved_pose, &self->last_pose, live_utc_s(), &err) == WM_OK || self->said_unsaved)
     return;
   self->said_unsaved = 1;
-  live_say(run, "%s. Localizing goes on; the next start will begin without a saved pose", err.text);
+  live_say(run, "%s. Localization continues; the next start will begin without a saved pose", err.text);
 }
 
 static void do_what_is_due(live *run, wm_time_ns now_ns) {

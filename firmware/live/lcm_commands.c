@@ -78,7 +78,7 @@ static const wm_source_ops kCommands = {next_command, close_commands};
 wm_status lcm_commands_open(const char *url, const char *channel_prefix, lcm_t *lent, wm_source **out, wm_error *err) {
   *out = NULL;
   lcm_commands *self = calloc(1, sizeof *self);
-  if (!self) return wm_fail(err, WM_IO, "no memory to listen to LCM");
+  if (!self) return wm_fail(err, WM_IO, "no memory for an LCM subscription");
   self->base.ops = &kCommands;
   self->base.is_live = self->base.is_rare = 1;
   self->base.lateness_max_ms = LATENESS_MS;

@@ -76,7 +76,7 @@ wm_status lcm_sightings_open(const char *url, const char *channel_prefix, const 
                              lcm_t *lent, wm_source **out, wm_error *err) {
   *out = NULL;
   lcm_sightings *self = calloc(1, sizeof *self);
-  if (!self) return wm_fail(err, WM_IO, "no memory to listen to LCM");
+  if (!self) return wm_fail(err, WM_IO, "no memory for an LCM subscription");
   self->base.ops = &kSightings;
   self->base.is_live = 1;
   self->base.kinds = WM_EVENT_BIT(WM_EVENT_SIGHTING);

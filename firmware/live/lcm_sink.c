@@ -14,10 +14,11 @@ static void say_once(lcm_sink *self, const char *what, const char *why) {
   if (self->said_trouble) return;
   self->said_trouble = 1;
   char line[300];
-  (void)snprintf(line, sizeof line,
-                 "LCM: %s on %s: %s. Localizing goes on; trying again every 2 s. (`ip route add 224.0.0.0/4 dev lo` "
-                 "makes a route on this computer; `publish: {lcm: false}` turns LCM off)",
-                 what, self->url, why);
+  (void)snprintf(
+      line, sizeof line,
+      "LCM: %s on %s: %s. Localization continues; trying again every 2 s. (`ip route add 224.0.0.0/4 dev lo` "
+      "makes a route on this computer; `publish: {lcm: false}` turns LCM off)",
+      what, self->url, why);
   self->say(self->say_context, line);
 }
 
@@ -25,11 +26,11 @@ static void try_open(lcm_sink *self) {
   const char *why;
   self->lcm = lcm_connect(self->url, &why);
   if (!self->lcm) {
-    say_once(self, "no way out", why);
+    say_once(self, "no route", why);
     return;
   }
   if (self->said_trouble) {
-    self->say(self->say_context, "LCM: there is a way out again");
+    self->say(self->say_context, "LCM: connected again");
     self->said_trouble = 0;
   }
 }

@@ -339,7 +339,7 @@ static void wait_for_end(recorder *self, wm_record_report *report) {
     if (now_ns >= end_ns || (self->options->stop && atomic_load(self->options->stop))) atomic_store(&self->stop, 1);
     if (is_full(self)) {
       report->is_full = 1;
-      say(self, "record", "the room for it is used up; it ends here, and is whole");
+      say(self, "record", "its space is used up; the recording ends here and is complete");
       atomic_store(&self->stop, 1);
     }
     if (now_ns < next_sync_ns) continue;
@@ -384,7 +384,7 @@ wm_status wm_record(const wm_config *config, const wm_record_options *options, w
   for (size_t i = 0; status == WM_OK && i < self->stream_count; i++) {
     int failed = pthread_create(&self->streams[i].thread, NULL, record_stream, &self->streams[i]);
     self->streams[i].started = !failed;
-    if (failed) status = wm_fail(err, WM_IO, "no thread to record by: %s", strerror(failed));
+    if (failed) status = wm_fail(err, WM_IO, "the recorder's thread can't be started: %s", strerror(failed));
   }
   if (status != WM_OK) atomic_store(&self->stop, 1);
   if (status == WM_OK) wait_for_end(self, report);
@@ -394,7 +394,7 @@ wm_status wm_record(const wm_config *config, const wm_record_options *options, w
   report->bytes = self->bytes;
   report->lost = self->lost;
   if (status == WM_OK && self->failed)
-    status = wm_fail(err, WM_IO, "%s: can't be written: %s; what stands there is good", self->failed_path,
+    status = wm_fail(err, WM_IO, "%s: can't be written: %s; the files are valid up to there", self->failed_path,
                      strerror(self->failed));
   free(self);
   return status;

@@ -76,7 +76,7 @@ wm_status wm_robot_open(const wm_config *config, wm_warn_fn warn, void *context,
   wm_status status = wm_robot_open_site(config, warn, context, &robot, err);
   if (status != WM_OK) return status;
   if (config->devices.camera_count > 0 && config->vision_count == 0 && warn)
-    warn(context, "devices.cameras: nothing looks at their pictures: `vision:` names no detector");
+    warn(context, "devices.cameras: their pictures are not used: `vision:` names no detector");
   status = add_can(config, robot, err);
   if (status != WM_OK) {
     wm_recording_close(robot);

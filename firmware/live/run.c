@@ -109,7 +109,7 @@ static int start_where_it_was(live *self) {
     live_say(self, "start: the saved pose is %.0f s old, more than start.max_age_s; it is not used", age_s);
     return 0;
   }
-  live_say(self, "start: where it was %.0f s ago: x %.2f m, y %.2f m, heading %.1f deg, sigma %.2f m", age_s,
+  live_say(self, "start: saved pose of %.0f s ago: x %.2f m, y %.2f m, heading %.1f deg, sigma %.2f m", age_s,
            start->p_m[0], start->p_m[1], start->heading_rad * 180 / M_PI, start->sigma_xy_m);
   return 1;
 }
@@ -130,8 +130,8 @@ static void go_on_with_map(live *self, int has_pose) {
     wm_start_init(&setup->start);
     setup->start.t_ns = t_ns;
   }
-  live_say(self, "start: goes on with the map saved %.0f s ago%s", live_utc_s() - self->map.utc_s,
-           has_pose ? "" : "; where the robot is in it has to be found");
+  live_say(self, "start: continues with the map saved %.0f s ago%s", live_utc_s() - self->map.utc_s,
+           has_pose ? "" : "; the robot is relocalized in it");
 }
 
 static void take_up_what_was(live *self) {
@@ -315,10 +315,10 @@ static void look_for_reload(live *self, wm_live_report *report) {
   wm_error why = {0};
   if (!options->reload_asked || !atomic_exchange(options->reload_asked, 0)) return;
   if (options->reload(options->reload_context, &why) != WM_OK) {
-    live_say(self, "reload: %s. The run goes on as it was", why.text);
+    live_say(self, "reload: %s. The run continues unchanged", why.text);
     return;
   }
-  live_say(self, "reload: goes on with the new configuration, from the present pose");
+  live_say(self, "reload: continues with the new configuration from the present pose");
   report->wants_restart = 1;
   atomic_store(&self->restarting, 1);
   atomic_store(&self->stop, 1);

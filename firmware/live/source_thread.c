@@ -84,7 +84,7 @@ void *source_thread(void *argument) {
   } else {
     play_recording(self);
   }
-  if (self->status != WM_OK) live_say(self->run, "%s: ends here: %s", self->reader->source->name, self->error.text);
+  if (self->status != WM_OK) live_say(self->run, "%s: ended: %s", self->reader->source->name, self->error.text);
   atomic_store_explicit(&self->done, 1, memory_order_release);
   return NULL;
 }

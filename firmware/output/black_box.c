@@ -24,7 +24,7 @@ static void say(black_box *self, const char *text, const char *what) {
 }
 
 static void unwritable(black_box *self, const char *why) {
-  if (!self->said_unwritable) say(self, "can't be written, and localizing goes on: ", why);
+  if (!self->said_unwritable) say(self, "can't be written; localization continues: ", why);
   self->said_unwritable = 1;
 }
 

@@ -98,7 +98,7 @@ wm_status wm_log_open(const char *path, wm_log_reader **out, wm_error *err);
 wm_status wm_log_open_file(FILE *file, const char *path, wm_log_reader **out, wm_error *err);
 const wm_log_head *wm_log_reader_head(const wm_log_reader *self);
 // WM_OK: an event (source below the head's source_count). WM_END: no more; *cut is 1 where the file ends within a
-// record or was not closed in order. WM_BAD_DATA: damaged here. `*missing` grows by gaps. No allocation.
+// record or was no regular end. WM_BAD_DATA: damaged here. `*missing` grows by gaps. No allocation.
 wm_status wm_log_next(wm_log_reader *self, wm_event *out, uint64_t *missing, int *cut, wm_error *err);
 void wm_log_reader_close(wm_log_reader *self);
 

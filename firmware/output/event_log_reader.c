@@ -64,7 +64,7 @@ static wm_status read_record(wm_log_reader *self, record *out, int *cut, wm_erro
   if (fread(self->content, 1, length, self->file) < length) return WM_END;
   *cut = 0;
   if (crc32_of(0, self->content, length) != crc)
-    return bad(self, err, "the record's checksum is wrong; the file is damaged here, what stands before is good");
+    return bad(self, err, "the record's checksum is wrong; the file is damaged here and valid before");
   self->offset += sizeof head + length;
   *out = (record){.tag = self->content[0], .content = self->content + 1, .count = length - 1};
   return WM_OK;
@@ -211,7 +211,7 @@ static wm_status read_head(wm_log_reader *self, wm_error *err) {
       !self->saw_hash || h->source_count == 0)
     return bad(self, err, "the head lacks configuration, setup or sources");
   if (wm_landmarks_hash(h->landmarks, h->landmark_count) != h->landmark_hash)
-    return bad(self, err, "the landmarks don't have the hash that the head names");
+    return bad(self, err, "the landmarks don't have the head's hash");
   return WM_OK;
 }
 

@@ -30,12 +30,12 @@ static void about_lateness(speaker *to, const wm_source_health *s) {
   if (s->lateness_p99_ns <= s->lateness_max_ns)
     (void)snprintf(line, sizeof line,
                    "%s: %" PRIu64 " of %" PRIu64
-                   " came when what is younger had been fused (behind younger ones of a source that sends in order, or "
-                   "later than the %.0f ms that are waited for), and were dropped%s",
+                   " arrived after newer data had been fused (out of the source's order, or later than its "
+                   "lateness_max_ms of %.0f) and were dropped%s",
                    s->name, s->late, s->received, (double)s->lateness_max_ns * 1e-6, for_all);
   else
     (void)snprintf(line, sizeof line,
-                   "%s: its data are late by %.0f ms (99 of 100 at most), allowed are %.0f; %" PRIu64 " of %" PRIu64
+                   "%s: its lateness is %.0f ms (99 of 100 at most), lateness_max_ms is %.0f; %" PRIu64 " of %" PRIu64
                    " came too late and were dropped. `lateness_max_ms: %.0f` for this source would suffice%s",
                    s->name, (double)s->lateness_p99_ns * 1e-6, (double)s->lateness_max_ns * 1e-6, s->late, s->received,
                    would_do_ms(s->lateness_p99_ns), for_all);
@@ -54,7 +54,7 @@ static void about_losses(speaker *to, const wm_source_health *s) {
                {s->duplicates, "were sent twice and fused once"},
                {s->future, "had stamps from the future"},
                {s->frozen, "came with a counter that stands still"},
-               {s->overflows, "were dropped by the kernel or the device because nobody took them in time"},
+               {s->overflows, "were dropped by the kernel or the device because they were not read in time"},
                {s->bus_errors, "error frames on the bus"}};
   for (size_t i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
     if (kinds[i].count == 0) continue;
@@ -86,9 +86,9 @@ static void about_motion(speaker *to, uint32_t bits) {
   static const char *const kLines[] = {
       "motion: the left encoder stood still while the robot moved (dead?)",
       "motion: the right encoder stood still while the robot moved (dead?)",
-      "motion: a message's counter stood still: its sender is stuck; its values were not taken for standing still",
+      "motion: a message's counter stood still: its sender is stuck; its values were not used",
       "motion: the yaw rate never changed (stuck sensor?)",
-      "motion: samples were refused in the last seconds, since no robot accelerates so (motion.limits)",
+      "motion: samples of the last seconds exceeded the plausible acceleration and were refused (motion.limits)",
       "motion: the vehicle rose, rolled or pitched for seconds, which an estimator in the plane does not model"};
   for (unsigned i = 0; i < sizeof kLines / sizeof kLines[0]; i++)
     if ((bits >> i) & 1u) say(to, kLines[i]);

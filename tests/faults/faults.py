@@ -252,11 +252,11 @@ def process(work):
     heard.check(first is not None and heard.error_m(first_s, first) < 4 * heard.sigma_m(first),
                 f"killed: where it was, {heard.error_m(first_s, first):.2f} m off with a sigma of {heard.sigma_m(first):.2f} m")
     heard.goes_on("killed, over", first_s, 20)
-    heard.is_said("start: where it was")
-    heard.is_said("No space left on device. Localizing goes on")
+    heard.is_said("start: saved pose of")
+    heard.is_said("No space left on device. Localization continues")
     heard.goes_on("configuration with an error", 20, 25)
     heard.is_said("did you mean")
-    heard.is_said("The run goes on as it was")
+    heard.is_said("The run continues unchanged")
     # Nobody hears it without a route; the run itself goes on.
     silent = heard.between(26.5, 29.5)
     heard.check(len(silent) < 10, f"no route: {len(silent)} poses are heard")

@@ -118,7 +118,7 @@ kill -INT $pid
 wait $pid || { echo "SIGINT: exit code $?"; cat "$work/said"; failures=$((failures + 1)); }
 [ -s "$work/stopped/health.json" ] && [ -s "$work/stopped/timing.json" ] || { echo "SIGINT: files are missing"; failures=$((failures + 1)); }
 expect 0 "poses" replay "$work/stopped/events.wmlog" --out "$work/again"
-"$waymark" replay "$work/stopped/events.wmlog" --out "$work/again" 2>&1 | grep -q "not closed in order" && { echo "SIGINT: the log was not closed"; failures=$((failures + 1)); }
+"$waymark" replay "$work/stopped/events.wmlog" --out "$work/again" 2>&1 | grep -q "no regular end" && { echo "SIGINT: the log was not closed"; failures=$((failures + 1)); }
 
 [ $failures -eq 0 ] && echo "good"
 exit $((failures > 0))

@@ -57,7 +57,7 @@ def main():
         marks = []
         for i in range(1, HANGUPS + 1):
             run.send_signal(signal.SIGHUP)
-            heard("goes on with the new configuration", i)
+            heard("continues with the new configuration", i)
             heard("nocan7 is not there", i + 1)
             if i in (WARM, HANGUPS):
                 marks.append((kilobytes(run.pid), len(os.listdir(f"/proc/{run.pid}/fd"))))

@@ -139,7 +139,7 @@ def inside(kills):
         for kill in range(kills):
             down_s = RANDOM.uniform(0.1, 1.5)
             run = one_run(work, subscriber, run["killed_at_s"] + down_s, RANDOM.uniform(1.5, 6.0), command)
-            assert "goes on with the map" in run["said"], run["said"]
+            assert "continues with the map" in run["said"], run["said"]
             assert all(n >= kept for n in run["landmarks"]), f"{kept} landmarks were kept, {run['landmarks']} came back"
             first.append(run["first_s"])
             wrong.append(run["wrong_until_s"])

@@ -205,7 +205,7 @@ static void a_run_begins_where_the_last_one_ended(void) {
     TEST_ASSERT_LESS_THAN_DOUBLE(ended_x_m + longest_m, saved.start.p_m[0]);
     if (run == 1) {
       double began_x_m = 0;
-      const char *start = strstr(said, "start: where it was");
+      const char *start = strstr(said, "start: saved pose of");
       TEST_ASSERT_NOT_NULL_MESSAGE(start, said);
       TEST_ASSERT_EQUAL_MESSAGE(1, sscanf(strchr(start, 'x'), "x %lf", &began_x_m), start);
       TEST_ASSERT_GREATER_THAN_DOUBLE(ended_x_m - 0.0051, began_x_m);  // it is said in centimetres
@@ -250,7 +250,7 @@ static void another_configuration_is_taken_while_it_drives(void) {
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_run_live(&config, robot, &options, &live, &err), err.text);
   TEST_ASSERT_EQUAL(2, reloads);
   TEST_ASSERT_TRUE(live.wants_restart);
-  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "robot.yaml:3: is wrong. The run goes on as it was"), said);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(said, "robot.yaml:3: is wrong. The run continues unchanged"), said);
   wm_recording_close(robot);
   wm_config_free(&config);
 }

@@ -27,7 +27,7 @@ typedef struct wm_source_counts {
   uint64_t ignored;         // well-formed, but nothing is bound to it (other CAN frames)
   uint64_t frozen;          // frames whose counter stood still
   uint64_t bus_errors;      // CAN error frames: the controller says that the bus is in trouble
-  uint64_t overflows;       // dropped by the kernel or the controller because nobody took them in time
+  uint64_t overflows;       // dropped by the kernel or the controller because they were not read in time
   char first_problem[256];  // text of the first malformed one, with file and line; "" where none
   // Devices: wm_device_state with what a person should know of it, and how far a stamp may be off.
   uint8_t device;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Is the calibration that of a robot that can be? Most mistakes are a unit (mm, degrees), a picture of another size,
-// a sign.
+// Plausibility of a calibration. Most mistakes are a unit (mm, degrees), another size of picture, or a sign.
 #include <math.h>
 #include <string.h>
 
@@ -37,7 +36,7 @@ static void wheels(const wm_wheels *w, findings *out) {
 
 // ── cameras ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// Focal lengths and centre; 0 where the model keeps them otherwise.
+// Focal lengths and centre; 0 where the model has other parameters.
 static int focal_and_centre(const wm_camera *c, double f[2], double centre[2]) {
   static const int kAt[WM_CAMERA_MODEL_COUNT] = {0, 0, 1, 2, -1};
   int at = kAt[c->model];
@@ -49,12 +48,12 @@ static int focal_and_centre(const wm_camera *c, double f[2], double centre[2]) {
   return 1;
 }
 
-// The angle from the axis that a pixel at `radius` (in focal lengths) sees, without distortion.
+// Angle from the optical axis of a pixel at `radius` (in focal lengths), without distortion.
 static double angle_at(const wm_camera *c, double radius) {
   return c->model == WM_CAMERA_PINHOLE_RADTAN ? atan(radius) : radius;
 }
 
-// Whether the picture goes outwards with the angle up to its side, as it must.
+// Whether the radius in the picture grows with the angle up to the picture's side.
 static int is_folded(const wm_camera *c, double side) {
   if (c->model != WM_CAMERA_EQUIDISTANT && c->model != WM_CAMERA_PINHOLE_RADTAN) return 0;
   const double *k = c->distortion;
@@ -112,7 +111,7 @@ static int looks_for_edges(const wm_config *config) {
   return 0;
 }
 
-// Joints of wall and floor are looked for from above the floor.
+// Edges on the floor are detected from above the floor.
 static void sees_the_floor(const wm_camera *c, findings *out) {
   double f[2], centre[2];
   if (c->mounting.xyz_m[2] <= 0.02) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a configuration may say, and hardly means.
+// Values of a configuration that are allowed but implausible.
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -33,7 +33,7 @@ static void messages(const wm_config *config, findings *out) {
          "publish.lcm_url: poses go out into the network (%s)", url);
 }
 
-// The folder in which something is to be made.
+// The folder of a file that a run creates.
 static void folder_of(const char *key, const char *path, const char *what, findings *out) {
   char folder[WM_PATH_MAX];
   const char *slash = strrchr(path, '/');

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// What can be known before driving: a configuration, the files that it takes, a recording's data, this computer. Each
-// part adds its findings (doctor's, with a mend each) and goes on; limits are of what robots on wheels, cars and boats
-// are, wide enough that only a mistake lies outside. At a desk; nothing here is for a run.
+// Checks before driving: a configuration, its files, a recording's data, this computer. Each part adds its findings,
+// with a remedy each, and continues. Limits cover wheeled robots, cars and boats with a wide margin, so that only
+// mistakes exceed them. Not used by a run.
 #ifndef WAYMARK_CLI_CHECK_CHECK_H
 #define WAYMARK_CLI_CHECK_CHECK_H
 
@@ -10,32 +10,32 @@
 
 // ── parts ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// What the configuration says that is allowed, but not meant: rates, the way of messages, the saved pose's folder.
+// Allowed but implausible values: rates, LCM's URL, the folders of saved files.
 void check_config(const wm_config *config, findings *out);
-// Wheels, cameras, sensors, stereo pair: units that were mixed up, pictures of another size, signs.
+// Wheels, cameras, sensors, stereo pair: wrong units, sizes of pictures, signs.
 void check_calibration(const wm_assembly *assembly, findings *out);
 void check_landmarks(const wm_setup *setup, findings *out);
 // A raster map and the start on it.
 void check_map(const wm_assembly *assembly, findings *out);
-// Whether this computer lets a run on devices have the memory and the priority that it needs.
+// Whether this computer allows the memory and the priority of a run on devices.
 void check_computer(const wm_config *config, size_t memory_bytes, findings *out);
 
 // ── a recording's data ──────────────────────────────────────────────────────────────────────────────────────────────
 
-// Where two quantities tell of the same: how they go together.
+// Sums for the correlation and the ratio of two measurements of one quantity.
 typedef struct agreement {
   double aa, bb, ab;
   uint64_t count;
 } agreement;
 
-// What went by of the motion over CAN.
+// What was seen of the motion over CAN.
 typedef struct motion_data {
   const wm_wheels *wheels;
   uint64_t count[WM_Q_COUNT];
   double least[WM_Q_COUNT], most[WM_Q_COUNT], last[WM_Q_COUNT];
   double fastest_mps;     // by the ticks
-  wm_time_ns ticks_ns;    // of the last pair of ticks
-  double ticks[2];        // then
+  wm_time_ns ticks_ns;    // stamp of the last pair of ticks
+  double ticks[2];        // at that stamp
   double turn_by_ticks;   // rad/s, NaN: not known
   agreement turn_wheels;  // turn rate of the gyro against that of the wheels' speeds
   agreement turn_ticks;   // and of the ticks
@@ -45,18 +45,18 @@ typedef struct motion_data {
 
 void motion_data_init(motion_data *self, const wm_wheels *wheels);
 void motion_data_take(motion_data *self, const wm_event *event);
-// `bound`: bit per wm_quantity that the binding promises.
+// `bound`: bit per wm_quantity of the binding.
 void motion_data_judge(const motion_data *self, uint32_t bound, findings *out);
 
 typedef struct source_facts {
   uint64_t events;
   wm_time_ns first_ns, last_ns;
-  wm_time_ns latest_ns;  // largest lateness, with look_ns
-  wm_time_ns look_ns;    // what detection takes on this computer; 0 for what is no detector
+  wm_time_ns latest_ns;                                // largest lateness, with look_ns
+  wm_time_ns look_ns;                                  // time of detection on this computer; 0 for other sources
   uint64_t sightings, unknown_landmarks, bare_ranges;  // bare_ranges: without a bearing
 } source_facts;
 
-// Reads the source to its end and judges what it gave. What can't be read is a finding, too.
+// Reads the source to its end and checks its data. An unreadable source is a finding, too.
 void check_source(const wm_assembly *assembly, const wm_assembled_source *source, uint32_t bound, source_facts *facts,
                   findings *out);
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run on this computer's devices may have: the same questions as the doctor's, with the configuration's numbers.
+// Limits of this computer for a run on devices: as doctor, with the configuration's numbers.
 #include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 #include "cli/check/check.h"
 #include "cli/doctor/doctor.h"
 
-// /proc/meminfo: MemAvailable in bytes; 0 where it doesn't say.
+// /proc/meminfo: MemAvailable in bytes; 0 where it is missing.
 static size_t available_bytes(void) {
   char line[128];
   size_t kilobytes = 0;
@@ -41,7 +41,7 @@ static void cpu(const wm_config *config, findings *out) {
          (int)config->runtime.realtime_cpu, cpus);
 }
 
-// A camera that may not be opened is found before it is missed; one that isn't there yet is none.
+// A camera without the right to open it is a finding; an absent one is not.
 static void cameras(const wm_config *config, findings *out) {
   for (size_t i = 0; i < config->devices.camera_count; i++) {
     const char *path = config->devices.cameras[i].device;

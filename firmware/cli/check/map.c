@@ -28,7 +28,7 @@ void check_landmarks(const wm_setup *setup, findings *out) {
       find(out, FINDING_BAD, "landmarks", "measure again, or take one of them out",
            "%d and %d are at the same place (%.3f, %.3f): one of them is not there", (int)b->id, (int)a->id, a->p_m[0],
            a->p_m[1]);
-      i = setup->landmark_count - 1;  // one is enough to look at them all
+      i = setup->landmark_count - 1;  // one pair is enough: ends both loops
       break;
     }
   start_among_landmarks(setup, out);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Motion over CAN: values in another unit than the binding says, signals that go the wrong way, messages that never
-// come. Two sensors that tell of the same motion give each other away.
+// Motion over CAN: other units than in the binding, wrong signs, messages that never arrive. Found by comparing two
+// sensors of the same motion.
 #include <math.h>
 #include <string.h>
 
@@ -32,7 +32,7 @@ static void take_ticks(motion_data *self, wm_time_ns t_ns) {
   double left = self->last[WM_Q_WHEEL_TICKS_LEFT], right = self->last[WM_Q_WHEEL_TICKS_RIGHT];
   if (isnan(left) || isnan(right)) return;
   double dt_s = self->ticks_ns == WM_TIME_NONE ? -1 : wm_seconds_between(self->ticks_ns, t_ns);
-  if (dt_s >= 0 && dt_s < 0.05) return;  // of single ticks no speed can be made
+  if (dt_s >= 0 && dt_s < 0.05) return;  // single ticks give no speed
   if (dt_s > 0 && dt_s < 1) {
     double m = 2 * M_PI * self->wheels->radius_m / self->wheels->ticks_per_turn;
     double l = (left - self->ticks[0]) * m / dt_s, r = (right - self->ticks[1]) * m / dt_s;
@@ -49,7 +49,7 @@ static double wheel_speed(const motion_data *self, int is_right) {
   return isnan(rear) ? self->last[is_right ? WM_Q_WHEEL_SPEED_FRONT_RIGHT : WM_Q_WHEEL_SPEED_FRONT_LEFT] : rear;
 }
 
-// The direction by the gear, where there is one: speeds of wheels may have no sign.
+// The sign by the gear, where there is one: wheel speeds may have none.
 static double direction(const motion_data *self) { return self->last[WM_Q_GEAR] < 0 ? -1 : 1; }
 
 static void take_turn(motion_data *self) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A source's data, read to their end.
+// Checks a source's data to their end.
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
@@ -49,7 +49,7 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, fin
          "%" PRIu64 " of 100 are older than the one before", of_hundred(c->out_of_order, all));
 }
 
-// What a run adds to the lateness of a picture: its observations arrive when they are ready.
+// Adds the time of detection to the lateness of a picture: its observations arrive when they are ready.
 static wm_time_ns look_ns(const wm_assembly *assembly, const wm_source *source) {
   for (size_t i = 0; i < wm_vision_count(assembly->vision); i++)
     if (wm_vision_source(assembly->vision, i) == source)

@@ -13,7 +13,7 @@
 
 #include "cli/doctor/doctor.h"
 
-// The first line of a small file; 0 where it isn't there.
+// The first line of a small file; 0 where it is missing.
 static int line_of(const char *root, const char *path, char *out, size_t capacity) {
   char whole[512];
   (void)snprintf(whole, sizeof whole, "%s%s", root, path);
@@ -109,7 +109,7 @@ void doctor_power(const char *root, findings *out) {
   temperatures(root, out);
 }
 
-// What is allowed is tried, not concluded from limits and capabilities.
+// Rights are tried, not derived from limits and capabilities.
 static int may_be_realtime(void) {
   struct sched_param old = {0}, wanted = {.sched_priority = 80};
   int policy = sched_getscheduler(0);

@@ -28,7 +28,7 @@ void doctor_lcm(const char *url, findings *out) {
     find(out, FINDING_GOOD, "lcm", "", "messages find their way on %.80s", url);
 }
 
-// 1: a number was there.
+// 1: a number was found.
 static int number_of(const char *root, const char *interface, const char *what, long *out) {
   char path[512], text[64];
   (void)snprintf(path, sizeof path, "%s/sys/class/net/%s/%s", root, interface, what);
@@ -66,7 +66,7 @@ static void can_interface(const char *root, const char *interface, findings *out
   (void)number_of(root, interface, "statistics/rx_over_errors", &overruns);
   if (overruns > 0)
     find(out, FINDING_BAD, about, "raise the priority of its interrupt thread above other work (chrt -f -p 60 PID)",
-         "its controller lost %ld frames because nobody took them in time", overruns);
+         "its controller lost %ld frames because they were not read in time", overruns);
   else if (errors > 0)
     find(out, FINDING_NOTE, about, "look at wiring, termination (60 ohms) and bit rate: `ip -d -s link show`",
          "is up, with %ld receive errors since then", errors);
@@ -74,13 +74,14 @@ static void can_interface(const char *root, const char *interface, findings *out
     find(out, FINDING_GOOD, about, "", "is up, without errors");
 }
 
-// The kernel's account of a queued frame of eight bytes, and such frames in a second of a full bus of 500 kbit/s.
+// The kernel's size of a queued frame of eight bytes, and the rate of such frames on a full bus of 500 kbit/s.
 #define FRAME_QUEUE_BYTES 768
 #define FRAMES_PER_S 4000
 
 void doctor_can_queue(int wanted, int granted, findings *out) {
   char mend[120];
-  const double queue_ms = 2e3 * granted / FRAME_QUEUE_BYTES / FRAMES_PER_S;  // it counts twice what is granted
+  const double queue_ms =
+      2e3 * granted / FRAME_QUEUE_BYTES / FRAMES_PER_S;  // the kernel reports half of the bytes that it reserves
   if (granted >= wanted) {
     find(out, FINDING_GOOD, "can queue", "", "a socket holds %.0f ms of a full bus", queue_ms);
     return;
@@ -101,7 +102,7 @@ void doctor_can(const char *root, const wm_config *config, findings *out) {
 static void camera(const wm_camera_device_config *c, findings *out) {
   char about[32];
   (void)snprintf(about, sizeof about, "camera %.20s", c->name);
-  if (!c->device[0]) return;  // known by card and bus, or to libcamera: only a run looks for it
+  if (!c->device[0]) return;  // by card and bus, or libcamera: only a run searches for it
   int fd = open(c->device, O_RDWR | O_NONBLOCK | O_CLOEXEC);
   if (fd >= 0) {
     struct stat is;

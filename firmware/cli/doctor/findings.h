@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What was found right and wrong, with a mend each: of a computer (doctor) or of a configuration and its files (check).
+// Findings with a remedy each: of a computer (doctor) or of a configuration and its files (check).
 #ifndef WAYMARK_CLI_DOCTOR_FINDINGS_H
 #define WAYMARK_CLI_DOCTOR_FINDINGS_H
 
@@ -14,7 +14,7 @@ typedef struct finding {
   finding_level level;
   char about[32];  // "kernel", "can can0", "calibration"
   char text[WM_ERROR_TEXT_MAX];
-  char mend[240];  // "" where nothing is to be done
+  char mend[240];  // "" where nothing is to do
 } finding;
 
 #define FINDINGS_MAX 64
@@ -23,12 +23,12 @@ typedef struct findings {
   size_t count;
 } findings;
 
-// Adds one; beyond FINDINGS_MAX they are left out. `mend` may be "".
+// Adds a finding; beyond FINDINGS_MAX they are dropped. `mend` may be "".
 void find(findings *out, finding_level level, const char *about, const char *mend, const char *format, ...)
     __attribute__((format(printf, 5, 6)));
-// Adds an error: what is behind its last semicolon is what to do.
+// Adds an error; its text after the last semicolon is the remedy.
 void find_error(findings *out, const char *about, const wm_error *err);
-// How many are of this level.
+// Number of findings of this level.
 size_t findings_of(const findings *self, finding_level level);
 
 // A line each: "LEVEL ABOUT TEXT; mend: MEND".

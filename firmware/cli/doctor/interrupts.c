@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Under PREEMPT_RT interrupts are threads, at priority 50 unless somebody changed that. An estimator above the CAN
-// adapter's thread, on the same processor, holds up who empties a controller of a few frames.
+// Under PREEMPT_RT interrupts are threads, by default at priority 50. An estimator above the CAN adapter's thread on
+// the same processor delays the reading of a controller that queues only a few frames.
 #include <ctype.h>
 #include <dirent.h>
 #include <stdio.h>
@@ -11,7 +11,7 @@
 
 #define RT_PRIORITY_FIELD 40  // of /proc/PID/stat; the first behind the name is 3
 
-// The interrupt thread's name; 0 where the process is none.
+// The interrupt thread's name; 0 for other processes.
 static int name_of(const char *root, const char *pid, char out[32]) {
   char path[600];
   (void)snprintf(path, sizeof path, "%s/proc/%s/comm", root, pid);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How late a thread wakes, measured as a run's estimator wakes.
+// Wake-up latency of a thread like the estimator's.
 #include <errno.h>
 #include <pthread.h>
 #include <string.h>

@@ -45,7 +45,7 @@ void watch_innovation(watch *self, const void *message, size_t length) {
   self->innovations++;
 }
 
-// Limits: chi-squared of about a hundred, with room for the gate, which cuts the tails off.
+// Limits: chi-squared of about a hundred, widened for the gate, which cuts the tails.
 const char *watch_consistency(const watch *self) {
   if (self->innovations < 50) return "too few observations to tell";
   if (self->nis > 1.6) return "observations are further off than the covariance allows";
@@ -58,7 +58,7 @@ static void add(char *why, size_t why_bytes, const char *name, const char *what)
   (void)snprintf(why + used, why_bytes - used, "%s%s %s", used ? ", " : "", name, what);
 }
 
-// Every source that doesn't do what it should.
+// Every source with a fault.
 static void list_troubles(const wm_health *h, char *why, size_t why_bytes) {
   for (uint32_t i = 0; i < h->source_count; i++) {
     const wm_source_health *s = &h->sources[i];
@@ -119,7 +119,7 @@ static void print_left(const wm_health *h, FILE *to) {
                                     : fprintf(to, ", %.0f s at this speed\n", h->reckoning_left_s));
 }
 
-// Aliased poses are no fault, but matter to a person who has just set the robot down.
+// Aliased poses are no fault, but the user who has just placed the robot needs to know of them.
 static void print_aliased(const wm_health *h, FILE *to) {
   const wm_counter *aliased = wm_health_counter(h, WM_COUNTER_ALIASED_POSES);
   if (aliased && aliased->count > 0)

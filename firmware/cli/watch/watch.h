@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A run as a person sees it in a terminal, from its messages.
+// The view of a run in a terminal, from its messages.
 #ifndef WAYMARK_CLI_WATCH_WATCH_H
 #define WAYMARK_CLI_WATCH_WATCH_H
 
@@ -12,7 +12,7 @@ typedef struct watch {
   wm_published pose;
   wm_health health;
   int has_pose, has_health;
-  wm_time_ns pose_at_ns, health_at_ns;  // when they came, on this computer's clock
+  wm_time_ns pose_at_ns, health_at_ns;  // arrival, on this computer's clock
   double rate_hz;                       // of poses, smoothed
   double nis;  // mean squared innovation by its own variance, of about the last hundred; 1 is expected
   uint64_t innovations;
@@ -22,9 +22,9 @@ typedef struct watch {
 void watch_pose(watch *self, const void *message, size_t length, wm_time_ns now_ns);
 void watch_health(watch *self, const void *message, size_t length, wm_time_ns now_ns);
 void watch_innovation(watch *self, const void *message, size_t length);
-// Whether the observations agree with the estimator's covariance: a verdict in words.
+// Whether the observations agree with the estimator's covariance, in words.
 const char *watch_consistency(const watch *self);
-// One word for how it stands ("tracking", "degraded", "lost" ...), and why, as far as health has the reason.
+// State in a word ("tracking", "degraded", "lost" ...), with the reason where health has it.
 const char *watch_state(const watch *self, wm_time_ns now_ns, char *why, size_t why_bytes);
 // The whole view, some lines.
 void watch_print(const watch *self, wm_time_ns now_ns, FILE *to);

@@ -34,7 +34,7 @@ mkdir /run/small && mount -t tmpfs -o size=1500k tmpfs /run/small
 waymark record --config robot.yaml --out /run/small/rec --duration 20 --free-mb 0 >full.txt 2>&1
 [ $? = 1 ] || fail "full: the exit code isn't 1"
 cat full.txt
-said full "No space left on device; what stands there is good"
+said full "No space left on device; the files are valid up to there"
 rows=$(grep -c , /run/small/rec/video/front.csv)
 [ "$rows" -gt 5 ] || fail "full: only $rows rows"
 cp -r /run/small/rec /host/out/camera-full

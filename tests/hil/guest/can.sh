@@ -87,7 +87,7 @@ kill -9 $run
 wait $run
 waymark run --config robot.yaml --duration 3 --out /run/restart >restart.txt 2>&1
 cat restart.txt
-grep -q "start: where it was" restart.txt || fail "a killed run doesn't begin where it was"
+grep -q "start: saved pose of" restart.txt || fail "a killed run doesn't begin where it was"
 cp -r /run/restart /host/out/
 ls /run/box
 [ -s /run/box/died-0001-now.wmlog ] || fail "the black box of a killed run is not kept"

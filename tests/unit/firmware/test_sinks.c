@@ -102,7 +102,7 @@ static void no_way_out_is_said_once_and_tried_again(void) {
   lcm_sink_open(&sink, 1, "nosuchprovider://", "TEST_", &assembly, say, NULL, NULL);
   for (wm_time_ns t = 0; t < 10 * WM_NS_PER_S; t += 500 * WM_NS_PER_MS) lcm_sink_tick(&sink, t);
   TEST_ASSERT_EQUAL(1, lines);
-  TEST_ASSERT_NOT_NULL(strstr(said, "Localizing goes on"));
+  TEST_ASSERT_NOT_NULL(strstr(said, "Localization continues"));
   wm_published p = {.made_ns = 1};
   lcm_sink_pose(&sink, &p, 13);
   TEST_ASSERT_EQUAL_UINT64(1, sink.not_sent);
