@@ -172,7 +172,7 @@ def start_from(state, work, robot, command):
     done = subprocess.run([*command, "--duration", "0.7"], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     if f"{robot}/map.bin" in state:
-        assert "goes on with the map" in done.stderr, done.stderr
+        assert "continues with the map" in done.stderr, done.stderr
     kept = 0
     for log in (robot / "box").glob("died-*.wmlog"):
         again = subprocess.run([lcm_tools.WAYMARK, "replay", log, "--out", work / "again"], capture_output=True, text=True)
