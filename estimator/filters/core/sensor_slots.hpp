@@ -15,19 +15,16 @@ namespace wm {
 
 class sensor_slots {
  public:
-  // States that the sensors take. `known_map`: landmarks are where it has them; else ranges are the only standard of
-  // length, and the default leaves their scale out. Not of a sensor with a sigma of ranges alone: those are times of
-  // flight of radio or sound, by a clock or a speed of sound, which are no better than wheels. Without motion data it
-  // leaves out what only a motion beside the observations shows: where the sensor looks, and how late it is.
-  static int count(const wm_setup &setup, bool known_map) {
+  // States that the sensors take. Without motion data the default leaves out what only a motion beside the observations
+  // shows: where the sensor looks, and how late it is.
+  static int count(const wm_setup &setup) {
     int out = 0;
-    for (size_t i = 0; i < setup.sensor_count; i++)
-      for (const sensor_state_spec &spec : kSensorStateSpecs)
-        out += is_on(setup, spec.row, known_map || gives_ranges_alone(setup.sensors[i]));
-    return out;
+    for (const sensor_state_spec &spec : kSensorStateSpecs) out += is_on(setup, spec.row);
+    return out * static_cast<int>(setup.sensor_count);
   }
 
-  // add(neutral, sigma, walk, low, high) appends a state to the filter and returns its index.
+  // add(neutral, sigma, walk, low, high) appends a state to the filter and returns its index. Without a known map, a
+  // sensor with a sigma of ranges alone has a larger prior of their scale: those are times of flight of radio or sound.
   template <class Add>
   void init(const wm_setup &setup, bool known_map, Add add) {
     const wm_sighting_params &p = *setup.sightings;
@@ -39,13 +36,12 @@ class sensor_slots {
       const bool flight = !known_map && gives_ranges_alone(setup.sensors[sensor]) && s.row == WM_SENSOR_ROW_kRangeScale;
       const double unit = s.row == WM_SENSOR_ROW_kRangeBias ? range_sigma_m : flight ? kFlightScale : 1.0;
       const double sigma = absolute_sigma(p.states.sigma[s.row], unit);
-      return is_on(setup, s.row, known_map || gives_ranges_alone(setup.sensors[sensor]))
-                 ? add(s.neutral, sigma, p.states.walk[s.row], s.low, s.high)
-                 : -1;
+      return is_on(setup, s.row) ? add(s.neutral, sigma, p.states.walk[s.row], s.low, s.high) : -1;
     });
   }
 
   int at(int sensor, int state) const { return slots_.at(sensor, state); }  // -1: off
+  bool is_by_default(int state) const { return by_default_[state]; }
   // `stated`: of a sighting with its own sigmas, on which states of a default do not act.
   int at(int sensor, int state, bool stated) const { return stated && by_default_[state] ? -1 : at(sensor, state); }
 
@@ -80,12 +76,11 @@ class sensor_slots {
   static bool gives_ranges_alone(const wm_sensor &s) {
     return std::isnan(s.bearing_sigma_rad) && !std::isnan(s.range_sigma_m);
   }
-  static bool is_on(const wm_setup &setup, int row, bool known_map) {
+  static bool is_on(const wm_setup &setup, int row) {
     const double sigma = setup.sightings->states.sigma[row];
     const bool shown_by_motion = row == WM_SENSOR_ROW_kYaw || row == WM_SENSOR_ROW_kTimeOffset;
     const bool moves = setup.motion->model != WM_MOTION_CONSTANT_VELOCITY;
-    return sigma > 0.0 ||
-           (sigma < 0.0 && (known_map || row != WM_SENSOR_ROW_kRangeScale) && (moves || !shown_by_motion));
+    return sigma > 0.0 || (sigma < 0.0 && (moves || !shown_by_motion));
   }
 
   state_slots<kMaxSensors, kSensorStates> slots_;

@@ -23,7 +23,7 @@ int map_states(const wm_sighting_params &p) { return p.use_elevation ? 3 : 2; }
 int count_states(const wm_landmark_ekf_params &p, const wm_setup &setup) {
   const wm_sighting_params &s = *setup.sightings;
   return kPoseStates + planar_filter::count_motion_states(setup.motion->states, setup.motion->model) +
-         sensor_slots::count(setup, true) + (p.gnss_time_offset_sigma_s > 0.0) + 2 * (p.gnss_correlated_m != 0.0) +
+         sensor_slots::count(setup) + (p.gnss_time_offset_sigma_s > 0.0) + 2 * (p.gnss_correlated_m != 0.0) +
          s.correlated_slots * correlated_slot_of(s).width + map_states(s) * p.map_slots +
          2 * (s.use_elevation && p.tilt_sigma_rad > 0.0);
 }

@@ -67,6 +67,7 @@ class joint_state : public planar_motion {
   // the half.
   bool find_scale(bool carries);
   void carry_scale_no_more() { carries_scale_ = false; }
+  void leave_scale();  // it is observed
   bool follows_scale() const { return scale_state_ >= 0; }
   // Adds the derivative by a state that follows the scale to a row that is linearised about `at` of that state: the
   // covariance is that of its present value, and of all multiples of the scale.

@@ -95,6 +95,7 @@ wm_status slam::fuse_marker(const wm_event &event, record_list records) {
   if (m.id < 0) return reject(records, at.record, WM_REJECTED_NO_ASSOCIATION);
   if (finite(m.bloom_px)) bloom_px_[m.sensor] = m.bloom_px;
   take_headings();
+  note_range(m.sensor, true);
 
   marker_reading r = read_marker(m, m.p_m, m.yaw_rad);
   if (r.length_m > sensor_[m.sensor].max_range_m) return reject(records, at.record, WM_REJECTED_OUT_OF_RANGE);

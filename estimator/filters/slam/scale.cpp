@@ -34,6 +34,12 @@ bool joint_state::find_scale(bool carries) {
   return true;
 }
 
+void joint_state::leave_scale() {
+  scale_state_ = -1;
+  carries_scale_ = false;
+  for (int j = 0; j < kMaxRobot; j++) scale_share_[j] = scale_start_[j] = scale_variance_[j] = 0.0;
+}
+
 void joint_state::follow_scale(int state, double share, bool anchors) {
   if (state < 0) return;
   scale_share_[state] = share;

@@ -45,6 +45,7 @@ wm_status slam::fuse_sighting(const wm_event &event, record_list records) {
   if (!r.bearing && !r.range) return reject(records, at.record, WM_REJECTED_BY_CONFIG);
   if (s.range_m > sensor_[s.sensor].max_range_m) return reject(records, at.record, WM_REJECTED_OUT_OF_RANGE);
 
+  if (r.range) note_range(s.sensor, r.stated);
   begin_picture(s.sensor, event.t_ns);
   at.past = look_back(s.sensor);
   int landmark;

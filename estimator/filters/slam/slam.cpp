@@ -30,7 +30,7 @@ joint_state::wheel_slip slip_of(const wm_slam_params &p) { return {p.wheel_slip_
 
 int states_that_last(const wm_slam_params &p, const wm_setup &setup) {
   return kPoseStates + joint_state::count_motion_states(setup.motion->states, setup.motion->model, slip_of(p)) +
-         sensor_slots::count(setup, p.map != WM_SLAM_MAP_NONE);
+         sensor_slots::count(setup);
 }
 
 int states_before_clones(const wm_slam_params &p, const wm_setup &setup) {
@@ -153,19 +153,49 @@ void slam::init(const wm_slam_params &params, const wm_setup &setup) {
   start_again();
 }
 
+// The default's scale of ranges acts from the first range on that states no sigma. A marker has a printed size, and who
+// states sigmas has calibrated the sensor: these are standards of length, at the neutral scale.
+void slam::note_range(int sensor, bool is_standard) {
+  const unsigned bit = 1u << sensor;
+  const int slot = slots_.at(sensor, kRangeScale);
+  const unsigned before = standards_ | scaled_;
+  if (before & (is_standard ? standards_ & bit : bit)) return;
+  if (slot < 0 || !slots_.is_by_default(kRangeScale) || params_.map != WM_SLAM_MAP_NONE) return;
+  if (is_standard) {
+    standards_ |= bit;
+    scaled_ &= ~bit;
+    joint_.forget(slot, 1.0, 0.0);
+  } else {
+    scaled_ |= bit;
+  }
+  follow_scale();
+}
+
+// Whether lengths are measured by a scale that is no state. A default's scale that no range has used yet is none.
+bool slam::has_standard() const {
+  bool is_scaled = false;
+  for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++) {
+    const bool by_default = slots_.is_by_default(kRangeScale);
+    if (slots_.at(i, kRangeScale) < 0 || (standards_ >> i & 1u)) return true;
+    is_scaled |= !by_default || (scaled_ >> i & 1u);
+  }
+  return !is_scaled;
+}
+
 // The map's scale is unobservable where the way's scale and the ranges' are both states, or no ranges come. With
 // markers, far more accurate than wheels, the filter hardly gains false certainty, so the covariance is not
 // transported from the first one on.
 void slam::follow_scale() {
-  bool is_standard = setup_->sensor_count == 0;  // a sensor's ranges are a standard of length
-  for (size_t i = 0; i < setup_->sensor_count; i++) is_standard |= slots_.at(static_cast<int>(i), kRangeScale) < 0;
-  const bool is_observed = !by_bearings_ && sightings().use_range && is_standard;
+  joint_.leave_scale();
+  const bool is_observed = !by_bearings_ && sightings().use_range && has_standard();
   if (is_observed || params_.map != WM_SLAM_MAP_NONE || !joint_.find_scale(!has_headings())) return;
   for (int i = 0; i < static_cast<int>(setup_->sensor_count); i++) {
-    joint_.follow_scale(slots_.at(i, kRangeScale), -1.0, true);
+    const bool is_scaled = !slots_.is_by_default(kRangeScale) || (scaled_ >> i & 1u);
+    if (is_scaled) joint_.follow_scale(slots_.at(i, kRangeScale), -1.0, true);
     joint_.follow_scale(slots_.at(i, kMountX), 1.0, false);
     joint_.follow_scale(slots_.at(i, kMountY), 1.0, false);
   }
+  for (int k = first_ray_; k < first_clone_; k += 2) joint_.follow_scale(k + 1, -1.0, false);
 }
 
 // The first marker: from now on landmarks have a heading, too.
@@ -187,8 +217,6 @@ void slam::take_lines() {
   first_clone_ = to.first_clone;
   by_bearings_ |= joint_.landmarks() == 0;
   follow_scale();
-  if (joint_.follows_scale())
-    for (int k = first_ray_; k < first_clone_; k += 2) joint_.follow_scale(k + 1, -1.0, false);
   if (params_.line_rejoin == WM_SLAM_REJOIN_AUTO) rejoins_ = params_.map == WM_SLAM_MAP_NONE && returned_ < kReturned;
   forget_tracks();
 }

@@ -27,8 +27,11 @@ wm_slam_params params;
 wm_setup setup;
 wm_sensor sensor;
 void *state;
+bool is_reused;  // the number of a line ahead, seen once, is another line's from 2 s on
 
 void prepare() {
+  is_reused = false;
+
   slam = wm_estimator_find("slam");
   make::exact_sensors(&motion);
   wm_params_defaults(&slam->params, &params);
@@ -39,11 +42,11 @@ void prepare() {
 }
 
 struct straight {
-  double along_m, turned_rad;
+  double along_m, turned_rad, widest_rad;  // sigma of an innovation that was fused
 };
 
 // 4 m at 0.5 m/s along two rows of lines; `wrong_from_s`: from then on the line named first in each picture goes over
-// to another edge, which moves by 4 mrad a picture. Error along the way, and largest turn of the heading since then.
+// to another edge, which moves by 4 mrad a picture. Error along the way, largest turn of the heading since then.
 straight drive(uint64_t seed, double wrong_from_s, double stated_sigma_rad) {
   const char *why = "";
   std::free(state);
@@ -60,7 +63,13 @@ straight drive(uint64_t seed, double wrong_from_s, double stated_sigma_rad) {
     const bool wrong = t_s >= wrong_from_s;
     if (wrong && step % 5 == 0) slid_rad += 0.004;
     for (int i = 0; step % 5 == 0 && i < kLines; i++) {
-      const double along = 1.0 * (i / 2) - 2.0, aside = (i % 2 == 0 ? 1 : -1) * (4.0 + i % 3);
+      const int pair = i / 2;
+      double along = pair - 2.0, aside = (i % 2 == 0 ? 1 : -1) * (4.0 + i % 3);
+      if (is_reused && i == 0) {
+        if (step > 0 && t_s < 2.0) continue;
+        along = step == 0 ? 3.0 : 0.2;
+        aside = step == 0 ? 0.3 : 1.8;
+      }
       const double bearing = wm::atan2(aside, along - x_m) + kSigma * wm_random_next_normal(&noise);
       wm_event seen = make::sighting(t_s, 10 + i, wm::wrap(bearing + (i == 0 ? slid_rad : 0.0)),
                                      std::numeric_limits<double>::quiet_NaN());
@@ -68,6 +77,8 @@ straight drive(uint64_t seed, double wrong_from_s, double stated_sigma_rad) {
       wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];
       size_t count = 0;
       TEST_ASSERT_EQUAL(WM_OK, slam->correct(state, &seen, records, WM_INNOVATIONS_PER_EVENT_MAX, &count));
+      for (size_t k = 0; k < count; k++)
+        if (records[k].verdict == WM_FUSED) out.widest_rad = std::fmax(out.widest_rad, std::sqrt(records[k].variance));
     }
     slam->estimate(state, &now);
     if (!wrong) heading_rad = now.heading_rad;
@@ -117,6 +128,16 @@ void test_a_line_that_is_another_one_turns_nothing(void) {
   TEST_ASSERT_LESS_THAN_DOUBLE(2.0 * M_PI / 180, most);
 }
 
+// GIVEN a line ahead that was seen once WHEN its number returns 1 m on, at another line beside the robot THEN the ray
+// begins anew: where its bearing is uncertain by a radian no linear update holds, and no gate.
+void test_a_ray_whose_bearing_is_not_linear_begins_anew(void) {
+  prepare();
+  is_reused = true;
+  params.line_rejoin = WM_SLAM_REJOIN_OFF;
+  motion.noise_yaw_rate_radps = 0.1;
+  TEST_ASSERT_LESS_THAN_DOUBLE(0.35, drive(1, 1e9, NAN).widest_rad);
+}
+
 // GIVEN a detector that states its sigma, and the default's states, which leave such sightings alone THEN rays do, too:
 // the mounting's yaw and the time offset stay what they were.
 void test_rays_of_stated_sigmas_leave_the_defaults_states_alone(void) {
@@ -141,6 +162,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(test_a_rays_first_guess_does_not_shorten_the_way);
   RUN_TEST(test_a_line_that_is_another_one_turns_nothing);
+  RUN_TEST(test_a_ray_whose_bearing_is_not_linear_begins_anew);
   RUN_TEST(test_rays_of_stated_sigmas_leave_the_defaults_states_alone);
   std::free(state);
   return UNITY_END();
