@@ -61,7 +61,7 @@ void motion_front_end::init(const wm_motion_params *params, const wm_wheels *whe
   for (wm_time_ns &stamp : stamp_ns_) stamp = WM_TIME_NONE;
   for (wm_time_ns &stamp : message_ns_) stamp = WM_TIME_NONE;
   for (tick_wheel &wheel : wheel_) wheel.t_ns = WM_TIME_NONE;
-  increment_ns_ = twist_ns_ = WM_TIME_NONE;
+  increment_ns_ = twist_ns_ = sampled_ns_[0] = sampled_ns_[1] = WM_TIME_NONE;
   noise_factors_ = {1.0, 1.0};
   for (int i = 0; i < 3; i++) {
     off_plane_since_ns_[i] = WM_TIME_NONE;
@@ -326,6 +326,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.kind = kind();
   input.doubtful = doubtful;
   mark_refused(&input);
+  note_samples(&input);
   input.standing = still_since_ns_ != WM_TIME_NONE && !doubtful && !input.refused &&
                    wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
   if (ticks_drive()) {
@@ -350,6 +351,25 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   }
   history_.push(input);
   newest_ns_ = t_ns;
+}
+
+// Commands change when they come, and counts are of the whole time. A steering angle's changes are small between two
+// samples. After a gap add_overdue_noise() has the error.
+void motion_front_end::note_samples(motion_input *input) {
+  const bool twist = model_ == WM_MOTION_TWIST, known = !input->doubtful && !input->refused && !input->command;
+  bool speed = twist;
+  for (int id = WM_Q_WHEEL_SPEED_FRONT_LEFT; id <= WM_Q_VEHICLE_SPEED && !speed; id++)
+    speed = (kSpeeds & quantity_bit(id)) && stamp_ns_[id] == input->t_ns;
+  const bool fresh[2] = {known && speed && !ticks_drive(),
+                         known && (twist || stamp_ns_[WM_Q_YAW_RATE] == input->t_ns) && model_ != WM_MOTION_ACKERMANN};
+  const bool follows = !history_.empty() && history_.newest().model == model_ && !history_.is_overdue(input->t_ns);
+  for (int k = 0; k < 2; k++) {
+    if (!fresh[k]) continue;
+    const double changed = k ? input->b - history_.newest().b : input->a - history_.newest().a;
+    if (follows && sampled_ns_[k] != WM_TIME_NONE)
+      input->sampling[k] = static_cast<float>(square(changed * wm_seconds_between(sampled_ns_[k], input->t_ns)) / 12.0);
+    sampled_ns_[k] = input->t_ns;
+  }
 }
 
 bool motion_front_end::standstill_yaw_rate(double *yaw_rate_radps) const {

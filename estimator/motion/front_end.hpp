@@ -60,6 +60,7 @@ class motion_front_end {
       add_overdue_noise(segment, *params_, ticks_drive() && segment.has_next, &noise);
       add_refused_noise(segment, *params_, &noise);
       if (segment.input.command) add_change_noise(segment, *params_, &noise);
+      if (segment.held_s == 0.0) add_sampling_noise(segment.input, &noise);
       if (twist.u != 0.0 && segment.input.model == WM_MOTION_TWIST) turn_to_axes(twist, &noise);
       visit(segment, twist, noise);
     });
@@ -139,6 +140,7 @@ class motion_front_end {
   void begin_velocity();
   void push_input(wm_time_ns t_ns, double a, double b, bool doubtful, bool miscounted, double side_mps = 0.0);
   void push_ticks(wm_time_ns t_ns, bool doubtful, bool miscounted);
+  void note_samples(motion_input *input);
   void note_integrated(const motion_segment &segment);
   void drop_silent_distance(wm_time_ns t_ns, double dt_s);
   bool counts_ticks() const;                               // both wheels, and a tick's length is known
@@ -172,6 +174,7 @@ class motion_front_end {
   double stated_v_mps_[3], stated_w_radps_[3];  // sigmas of a twist in space; NaN: not stated
   double twist_period_s_;                       // usual time between two twists; 0: unknown
   wm_time_ns twist_ns_;
+  wm_time_ns sampled_ns_[2];   // newest sample of the speed and of the turn rate that the model uses
   wm_time_ns still_since_ns_;  // speed below the threshold since; WM_TIME_NONE while moving
   wm_time_ns yaw_same_since_ns_;
   double yaw_last_;

@@ -26,6 +26,7 @@ struct motion_input {
   double side_mps;  // to the left; of twists in space and increments
   // Of increments: variance per s of distance, of sideways and of rotation, and their covariances; NaN: not given.
   float increment_noise[6];
+  float sampling[2];  // variances of distance and rotation by the changes since the samples before
   float period_s;     // between increments; 0: that between the inputs
   float response[2];  // of commands: speed and turn rate of the drive at t_ns (commands.hpp)
   float unused;

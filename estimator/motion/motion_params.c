@@ -100,7 +100,8 @@ static const wm_param kParams[] = {
     // 3.4 % RMS of the ten robots of mrclam against truth. Mean error of slam over the best known there: 0.90, 0.94 and
     // 0.98 with 0.03, 0.04 and 0.05; landmark_ekf is flat from 0.03 to 0.1.
     STATE(WM_YAW_RATE_SCALE, "yaw_rate_scale", "", -0.04, 0,
-          "Start sigma of the turn rate's scale about 1." BY_KIND "where the turn rate is measured or commanded."),
+          "Start sigma of the turn rate's scale about 1." BY_KIND
+          "where the turn rate is measured or commanded; a gyro's at most 0.015."),
     STATE(WM_YAW_RATE_BIAS, "yaw_rate_bias", "_radps", -0.02, 0.0001,
           "Start sigma of the turn rate's bias, rad/s (a cheap gyro: 0.02)." BY_KIND
           "where the turn rate is measured or commanded."),

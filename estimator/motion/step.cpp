@@ -254,6 +254,11 @@ void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p,
   noise->distance_m2 += distance_m2 * least(square(rotation_rad2) / 8.0, 0.5);
 }
 
+void add_sampling_noise(const motion_input &input, motion_noise *noise) {
+  noise->distance_m2 += static_cast<double>(input.sampling[0]);
+  noise->rotation_rad2 += static_cast<double>(input.sampling[1]);
+}
+
 void add_refused_noise(const motion_segment &segment, const wm_motion_params &p, motion_noise *noise) {
   if (!segment.input.refused) return;
   const double from_s = least(segment.refused_s, p.hold_max_s);

@@ -94,6 +94,11 @@ void turn_to_axes(const planar_twist &twist, motion_noise *noise);
 void add_overdue_noise(const motion_segment &segment, const wm_motion_params &params, bool is_counted,
                        motion_noise *noise);
 
+// A sampled speed or turn rate holds until the next sample. A change by c between two samples, dt apart, happened at
+// any time between them: the distance or angle is evenly distributed over c dt, variance (c dt)^2 / 12. Its mean, c dt
+// / 2, is a delay, which the time offsets have.
+void add_sampling_noise(const motion_input &input, motion_noise *noise);
+
 // Noise while samples are refused as implausible: the robot may have accelerated at up to the limits, evenly
 // distributed, since the last plausible one: sigma = a t^2 / (2 sqrt 3), up to hold_max_s.
 void add_refused_noise(const motion_segment &segment, const wm_motion_params &params, motion_noise *noise);

@@ -46,6 +46,7 @@ int planar_filter::add_state(double value, double sigma) {
 
 void planar_filter::move(const wm_event &motion) {
   if (const int state = feed(motion); state >= 0) forget(state, 1.0, start_variance_[kSpeedScale]);
+  limit_gyro_scale(this);
   move_to(motion.t_ns);
   double innovation, variance;
   if (standstill_bias(&innovation, &variance)) {

@@ -94,6 +94,7 @@ void joint_state::move(const wm_event &motion) {
     anchor_scale_again();
   }
   if (kind_ != kind) take_calibration(x());  // values that a kept map brought along
+  limit_gyro_scale(this);
   move_to(motion.t_ns);
   double innovation, variance;
   if (standstill_bias(&innovation, &variance)) {

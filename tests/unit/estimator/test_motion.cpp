@@ -236,6 +236,35 @@ void test_a_held_speed_is_doubted_more_and_more(void) {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, way_var - 0.25 * 0.75 * 0.75 * 0.75 * 0.75);  // the first one's habit isn't known
 }
 
+// A sampled speed changed at any time since the sample before it; counts are of the whole time, a command is obeyed
+// from its stamp on.
+void test_a_change_between_samples_is_noise_of_its_moment(void) {
+  for (const int model : {WM_MOTION_SPEED_YAW_RATE, WM_MOTION_TWIST}) {
+    start(make::car(), model);
+    params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
+    params.twist = WM_TWIST_MEASURED;
+    for (int i = 0; i <= 10; i++) {
+      const double v = i < 5 ? 1.0 : 3.0, w = i < 7 ? 0.2 : -0.4;
+      feed(model == WM_MOTION_TWIST ? make::twist(0.1 * i, v, w)
+                                    : make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, v}, {WM_Q_YAW_RATE, w}}));
+      advance(0.1 * i + 0.03);
+    }
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 2.0 * 0.1 * 2.0 * 0.1 / 12.0, way_var);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.6 * 0.1 * 0.6 * 0.1 / 12.0, turn_var);
+  }
+  start(make::car(), WM_MOTION_SPEED_YAW_RATE);  // a slow speed beside a fast yaw rate: the speed's own period
+  params.noise_speed_mps = params.noise_speed_rel = 0;
+  for (int i = 0; i <= 100; i++) {
+    feed(i % 50 ? make::quantities(0.01 * i, {{WM_Q_YAW_RATE, 0.0}})
+                : make::quantities(0.01 * i, {{WM_Q_VEHICLE_SPEED, i < 50    ? 1.0
+                                                                   : i < 100 ? 2.0
+                                                                             : 3.0},
+                                              {WM_Q_YAW_RATE, 0.0}}));
+  }
+  advance(1.001);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 2.0 * 0.5 * 0.5 / 12.0, way_var);
+}
+
 // A second of silence. Nobody looked meanwhile: the counts bring all of the way at its end; only the gyro's turn is
 // unknown. The pose went through it without them, corrected by what was seen: they don't move it once more.
 void test_counts_after_a_silence(void) {
@@ -477,6 +506,7 @@ int main(void) {
   RUN_TEST(test_rear_wheels_are_preferred_and_a_silent_source_yields);
   RUN_TEST(test_ackermann_by_table_ratio_and_road_wheel);
   RUN_TEST(test_a_held_speed_is_doubted_more_and_more);
+  RUN_TEST(test_a_change_between_samples_is_noise_of_its_moment);
   RUN_TEST(test_counts_after_a_silence);
   RUN_TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading);
   RUN_TEST(test_commands_are_obeyed_late);

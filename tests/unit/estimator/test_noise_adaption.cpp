@@ -166,7 +166,7 @@ void test_noise_of_the_motion_stated_four_times_too_large() {
 }
 
 void test_noise_of_the_sensor_stated_wrong() {
-  TEST_ASSERT_TRUE(mean_inside({.sensor = 0.25}, true, 0.0) < 0.85);
+  TEST_ASSERT_TRUE(mean_inside({.sensor = 0.25}, true, 0.0) < 0.87);
   expect_consistent({.sensor = 0.25}, true);
   expect_consistent({.sensor = 4.0}, true);
 }

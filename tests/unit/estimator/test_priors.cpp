@@ -179,6 +179,33 @@ void test_a_vague_receiver_finds_the_robot_too() {
   }
 }
 
+// A gyro's data sheet states its scale better than a tape measure states a track; a stated sigma holds.
+void test_a_gyros_scale_is_known_from_its_data_sheet() {
+  for (const bool stated : {false, true}) {
+    motion.states.sigma[wm::kYawRateScale] = stated ? 0.08 : -0.04;
+    begin();
+    for (int i = 0; i < 5; i++) feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 1.0}, {WM_Q_YAW_RATE, 0.0}}));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-9, stated ? 0.08 : 0.015, sigma_of("motion.yaw_rate_scale"));
+    begin();
+    for (int i = 0; i < 5; i++) feed(make::twist(0.1 * i, 1.0, 0.01 * i));
+    if (!stated) TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.04, sigma_of("motion.yaw_rate_scale"));
+  }
+}
+
+// A receiver's first positions are 40 m off, as it states; soon it states 1 m. The error does not outlast its sigma.
+void test_a_receivers_lasting_error_falls_with_its_sigma() {
+  setup.start.sigma_xy_m = 30.0;
+  begin();
+  for (int i = 0; i < 600; i++) {
+    const double t_s = 0.1 * i;
+    feed(make::twist(t_s, 10.0 + 0.001 * (i % 7), 0.0));
+    if (i % 10 == 0) feed(make::position(t_s, 10.0 * t_s, t_s < 20.0 ? 40.0 : 0.0, t_s < 20.0 ? 30.0 : 1.0));
+  }
+  wm_estimate e;
+  ekf->estimate(state.get(), &e);
+  TEST_ASSERT_DOUBLE_WITHIN(2.0, 0.0, e.pose_map_base.p_m[1]);
+}
+
 }  // namespace
 
 void setUp() {
@@ -206,5 +233,7 @@ int main() {
   RUN_TEST(test_a_state_that_nothing_observes_keeps_its_prior);
   RUN_TEST(test_sightings_with_sigmas_leave_the_sensors_priors);
   RUN_TEST(test_a_vague_receiver_finds_the_robot_too);
+  RUN_TEST(test_a_gyros_scale_is_known_from_its_data_sheet);
+  RUN_TEST(test_a_receivers_lasting_error_falls_with_its_sigma);
   return UNITY_END();
 }
