@@ -4,6 +4,7 @@
 #define WAYMARK_ESTIMATOR_EDGE_MCL_ALIGN_HPP
 
 #include "filters/edge_mcl/floor_camera.hpp"
+#include "filters/edge_mcl/wall_list.hpp"
 #include "maps/edge_map.hpp"
 #include "math/arc.hpp"
 #include "math/eigen.hpp"
@@ -19,10 +20,13 @@ enum align_state {
   kAlignCamera,
   kAlignTime = kAlignCamera + kCameraTime,
   kAlignEdge = kAlignCamera + kEdgeOffset,
-  kAlignStates = kAlignCamera + kCameraStates
+  kAlignPoint = kAlignCamera + kCameraStates,  // those before it may move any point; the others one wall's points
+  kAlignWall = kAlignPoint,
+  kAlignStates = kAlignWall + wall_list::kCapacity
 };
 using align_matrix = matrix<kAlignStates>;
 using align_vector = vector<kAlignStates>;
+using point_vector = vector<kAlignPoint>;
 
 // Normal equations of a scan at an alignment: information and gradient of half the weighted squares. Rows of unknowns
 // that are no states are 0.

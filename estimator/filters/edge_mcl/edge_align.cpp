@@ -30,6 +30,9 @@ constexpr double kIndependent_m = 0.1, kIndependent_s = 5.0;
 // Points of successive scans whose errors are common, so each has so much less information. By the NEES of 43 rendered
 // drives; not swept.
 constexpr double kCorrelatedPoints = 30.0;
+// Walls are listed after so much way and rotation, by every second point. Not swept.
+constexpr double kWallsEvery_m = 0.1;
+constexpr uint32_t kWallsStride = 2;
 constexpr double kExplained_m = 0.06,
                  kExplainedSigmas2 = 9.0;     // a point so near to an edge is explained by the map; not swept
 constexpr int kLeastExplained = 5;            // points of a scan: fewer leave a pose open
@@ -51,6 +54,14 @@ double mapped_weight(double residual_m, double variance, double unmapped_per_m) 
   return square(density / (density + unmapped_per_m));
 }
 
+// H P H' of a point, whose row has an entry 1 for its wall besides.
+double variance_of(const align_matrix &p, const point_vector &row, int wall) {
+  const point_vector gain = p.topLeftCorner<kAlignPoint, kAlignPoint>().lazyProduct(row);
+  if (wall < 0) return row.dot(gain);
+  const int at = kAlignWall + wall;
+  return row.dot(gain + 2.0 * p.block<kAlignPoint, 1>(0, at)) + p(at, at);
+}
+
 // Where the heading enters, differences are wrapped.
 double difference(int state, double a, double b) { return state == kAlignHeading ? wrap(a - b) : a - b; }
 
@@ -64,6 +75,8 @@ edge_mcl::alignment edge_mcl::alignment_of(int camera) const {
   if (camera >= 0)
     for (int k = 0; k <= kCameraTime; k++) a.state[kAlignCamera + k] = slots_.at(camera, k);
   a.state[kAlignEdge] = edge_state_;
+  for (int k = 0; wall_state_ >= 0 && k < wall_list::kCapacity; k++)
+    if (walls_.used(k)) a.state[kAlignWall + k] = wall_state_ + k;
   for (int k = 0; k < kAlignStates; k++)
     if (a.state[k] >= 0) a.value[k] = filter_.value(a.state[k]);
   return a;
@@ -87,13 +100,13 @@ edge_mcl::capture edge_mcl::capture_of(const alignment &a) const {
 bool edge_mcl::predict_scan(int camera, prediction *out) const {
   out->mean = alignment_of(camera);
   const int *state = out->mean.state;
-  align_matrix covariance;
+  align_matrix &covariance = out->covariance;
   for (int r = 0; r < kAlignStates; r++)
     for (int c = 0; c < kAlignStates; c++)
       covariance(r, c) = state[r] >= 0 && state[c] >= 0 ? filter_.covariance(state[r], state[c]) : r == c;
-  if (!invert_positive(covariance, &out->inverse) || !cholesky(covariance, &out->root)) return false;
+  if (!invert_positive(covariance, &out->inverse)) return false;
   for (int k = 0; k < kAlignStates; k++)
-    if (state[k] < 0) out->inverse(k, k) = out->root(k, k) = 0.0;  // its rows of a measurement are 0 as well
+    if (state[k] < 0) out->inverse(k, k) = 0.0;  // its rows of a measurement are 0 as well
   return true;
 }
 
@@ -174,10 +187,9 @@ void edge_mcl::count_point(const matched_point &p, const scan_point &own, bool n
 }
 
 // Derivatives of a point's distance to its edge, towards smaller residuals.
-void edge_mcl::jacobian_of(const matched_point &p, const alignment &a, const capture &from, align_vector *row) const {
+void edge_mcl::jacobian_of(const matched_point &p, const alignment &a, const capture &from, point_vector *row) const {
   const edge_line &line = p.line;
   const sin_cos &h = from.turn;
-  row->setZero();
   (*row)[kAlignX] = line.normal_x;
   (*row)[kAlignY] = line.normal_y;
   (*row)[kAlignHeading] = line.normal_y * (p.x_m - a.value[kAlignX]) - line.normal_x * (p.y_m - a.value[kAlignY]);
@@ -188,8 +200,21 @@ void edge_mcl::jacobian_of(const matched_point &p, const alignment &a, const cap
   (*row)[kAlignTime] = -(line.normal_x * (t.v * h.cos - t.w * p.from_y_m - t.u * h.sin) +
                          line.normal_y * (t.v * h.sin + t.w * p.from_x_m + t.u * h.cos));
   (*row)[kAlignEdge] = 1.0;
-  for (int k = 0; k < kAlignStates; k++)
+  for (int k = 0; k < kAlignPoint; k++)
     if (a.state[k] < 0) (*row)[k] = 0.0;
+}
+
+// The wall of a matched point: its offset leaves the residual. A wall that has no state leaves each point's variance
+// larger. -1: no state.
+int edge_mcl::wall_of(const alignment &a, int guess, matched_point *p) const {
+  if (wall_state_ < 0 || !p->line.found) return -1;
+  const bool guessed = guess >= 0 && walls_.is_of(guess, p->line, p->x_m, p->y_m);
+  const int wall = guessed ? guess : walls_.find(p->line, p->x_m, p->y_m);
+  if (wall < 0)
+    p->sigma2 += square(params_.wall_sigma_m);
+  else
+    p->residual_m -= a.value[kAlignWall + wall];
+  return wall;
 }
 
 // Normal equations of a scan at an alignment. `open`: a point's place is as uncertain as this prior leaves it, too;
@@ -197,25 +222,36 @@ void edge_mcl::jacobian_of(const matched_point &p, const alignment &a, const cap
 void edge_mcl::linearize(const wm_points &points, const alignment &a, double gate_m, const prediction *open,
                          descent_pass pass, double mapped[WM_POINTS_MAX], normal_equations *out) const {
   *out = normal_equations{};
-  align_vector row;
+  point_vector row;
   const capture from = capture_of(a);
   const double correlated = kCorrelatedPoints / independence_;  // points that count as one
   matched_point p;
+  int last = -1;  // neighbours are of one wall, as a rule
   for (uint32_t i = 0; i < points.count; i++) {
     if (pass == descent_pass::kFirst) mapped[i] = 0.0;
     if (!match(points, i, a, from, &p)) continue;
-    const bool near = p.line.found && (open || p.line.distance_m <= gate_m) && p.same_side;
+    const int wall = last = wall_of(a, last, &p);
+    const double gate = wall < 0 ? gate_m : gate_m + std::fabs(a.value[kAlignWall + wall]);
+    const bool near = p.line.found && (open || p.line.distance_m <= gate) && p.same_side;
     if (pass == descent_pass::kLast) count_point(p, points_[i], near, mapped[i], from, correlated, out);
     if (!near) continue;
     jacobian_of(p, a, from, &row);
-    const double open2 = open ? (open->root.transpose() * row).squaredNorm() : 0.0;
-    if (open && square(p.line.distance_m) > square(gate_m) + square(kOpenSigmas) * open2) continue;
+    const double open2 = open ? variance_of(open->covariance, row, wall) : 0.0;
+    if (open && square(p.line.distance_m) > square(gate) + square(kOpenSigmas) * open2) continue;
     const double variance = p.sigma2 + open2;
     if (pass == descent_pass::kFirst) mapped[i] = mapped_weight(p.residual_m, variance, unmapped_per_m_);
     const double weight = mapped[i] * student_weight(square(p.residual_m), variance) / (variance * correlated);
-    out->gradient += weight * p.residual_m * row;
-    out->information.noalias() += (weight * row) * row.transpose();
+    const point_vector weighted = weight * row;
+    out->gradient.head<kAlignPoint>() += p.residual_m * weighted;
+    out->information.topLeftCorner<kAlignPoint, kAlignPoint>().noalias() += weighted * row.transpose();
+    if (wall < 0) continue;
+    const int at = kAlignWall + wall;
+    out->gradient[at] += weight * p.residual_m;
+    out->information.block<kAlignPoint, 1>(0, at) += weighted;
+    out->information(at, at) += weight;
   }
+  out->information.bottomLeftCorner<wall_list::kCapacity, kAlignPoint>() =
+      out->information.topRightCorner<kAlignPoint, wall_list::kCapacity>().transpose();
 }
 
 align_vector edge_mcl::difference_of(const alignment &a, const alignment &b) {
@@ -374,6 +410,30 @@ bool edge_mcl::fuse_information(const normal_equations &e, const alignment &a) {
   return numeric;
 }
 
+// Lists the walls of a scan as they are predicted. A new one has the prior: it may be anywhere near the map's.
+void edge_mcl::update_walls(const wm_points &points, int camera) {
+  const double way = filter_.travelled_m() + filter_.turned_rad();
+  if (wall_state_ < 0 || !life_.tracking() || way - walls_m_ < kWallsEvery_m) return;
+  walls_m_ = way;
+  const alignment a = alignment_of(camera);
+  const capture from = capture_of(a);
+  matched_point p;
+  walls_.begin();
+  for (uint32_t i = 0; i < points.count; i += kWallsStride)
+    if (match(points, i, a, from, &p) && p.line.found && p.same_side && p.line.distance_m <= params_.gate_m)
+      walls_.add(p.line, p.x_m, p.y_m);
+  const uint32_t changed = walls_.replace();
+  for (int k = 0; k < wall_list::kCapacity; k++)
+    if (changed & 1u << k) filter_.forget(wall_state_ + k, 0.0, square(params_.wall_sigma_m));
+}
+
+void edge_mcl::forget_walls() {
+  walls_.clear();
+  walls_m_ = -kWallsEvery_m;
+  for (int k = 0; wall_state_ >= 0 && k < wall_list::kCapacity; k++)
+    filter_.forget(wall_state_ + k, 0.0, square(params_.wall_sigma_m));
+}
+
 // Iterated extended Kalman filter in information form (B. M. Bell, F. W. Cathey, "The iterated Kalman filter update as
 // a Gauss-Newton method", 1993): minimises prediction's and scan's cost together, then fuses the scan's information at
 // the minimum. False: the scan was not fused; the record's verdict has the reason.
@@ -385,9 +445,10 @@ bool edge_mcl::align(const wm_points &points, int camera, normal_equations *scan
                       : (way - aligned_m_[by]) / kIndependent_m +
                             wm_seconds_between(aligned_ns_[by], filter_.now_ns()) / kIndependent_s;
   if (independence_ > 1.0) independence_ = 1.0;
+  prepare_points(points, camera);
+  update_walls(points, camera);
   prediction before;
   if (!predict_scan(camera, &before)) return false;
-  prepare_points(points, camera);
   double share = fit_.mean_explained();
   share = share < kExplainedRange[0] ? kExplainedRange[0] : share > kExplainedRange[1] ? kExplainedRange[1] : share;
   unmapped_per_m_ = kUnmapped_per_m * (1.0 - share) / share;

@@ -103,6 +103,7 @@ void edge_mcl::on_motion_gap() {
 void edge_mcl::lose() {
   life_.lose(filter_.now_ns());
   rollback_.restore(&filter_);
+  forget_walls();
 }
 
 // Aliases of the tracked pose are swept for while it is trusted: with a small budget while all is nominal, with more,

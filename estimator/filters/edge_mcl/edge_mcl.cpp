@@ -44,7 +44,8 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   const wm_motion_states &motion = setup.motion->states;
   filter_.init(setup, motion,
                kPoseStates + planar_filter::count_motion_states(motion, setup.motion->model) +
-                   (params.sigma[kEdgeOffset] > 0.0) + each_camera * cameras);
+                   (params.sigma[kEdgeOffset] > 0.0) + each_camera * cameras +
+                   (params.wall_sigma_m > 0.0) * wall_list::kCapacity);
   const auto add = [&](int row) { return params.sigma[row] > 0.0 ? filter_.add_state(0.0, params.sigma[row]) : -1; };
   edge_state_ = add(kEdgeOffset);
   camera_count_ = cameras;
@@ -58,6 +59,8 @@ void edge_mcl::init(const wm_edge_mcl_params &params, const wm_setup &setup) {
   watched_ns_ = driven_ns_ = WM_TIME_NONE;
   life_ = lifecycle();
   rollback_.begin(filter_, kPoseStates, filter_.states());
+  wall_state_ = params.wall_sigma_m > 0.0 ? filter_.states() : -1;
+  for (int k = 0; wall_state_ >= 0 && k < wall_list::kCapacity; k++) filter_.add_state(0.0, params.wall_sigma_m);
   start_again(start_is_known(setup.start));
 }
 
@@ -69,6 +72,7 @@ void edge_mcl::start_again(bool known) {
   life_.begin(known);
   life_.fused(WM_TIME_NONE);
   for (wm_time_ns &t_ns : aligned_ns_) t_ns = WM_TIME_NONE;
+  forget_walls();
   watched_m_ = filter_.travelled_m() + filter_.turned_rad();
   fit_.reset(known);
   others_.clear(filter_.pose(), filter_.odom());

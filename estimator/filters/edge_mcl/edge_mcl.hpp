@@ -20,8 +20,9 @@
 
 namespace wm {
 
-// Pose, motion, and the table's: all but the last row for each camera.
-inline constexpr int kMaxEdgeStates = kPoseStates + kCalibrationCount + 2 + kMountingCameras * (kCameraStates - 1) + 1;
+// Pose, motion, the table's (all but the last row for each camera), and walls.
+inline constexpr int kMaxEdgeStates =
+    kPoseStates + kCalibrationCount + 2 + kMountingCameras * (kCameraStates - 1) + 1 + wall_list::kCapacity;
 
 class edge_mcl {
  public:
@@ -49,7 +50,7 @@ class edge_mcl {
   // The prediction before a scan. Rows of unknowns that are off are 0.
   struct prediction {
     alignment mean;
-    align_matrix inverse, root;  // of the covariance; its lower Cholesky factor
+    align_matrix covariance, inverse;
   };
   // Local minima of an alignment's cost; the best comes first.
   struct minima {
@@ -101,7 +102,8 @@ class edge_mcl {
   void count_point(const matched_point &p, const scan_point &own, bool near, double mapped, const capture &from,
                    double correlated, normal_equations *out) const;
   void count_unexplained(const matched_point &p, const capture &from, normal_equations *out) const;
-  void jacobian_of(const matched_point &p, const alignment &a, const capture &from, align_vector *row) const;
+  void jacobian_of(const matched_point &p, const alignment &a, const capture &from, point_vector *row) const;
+  int wall_of(const alignment &a, int guess, matched_point *p) const;
   void linearize(const wm_points &points, const alignment &a, double gate_m, const prediction *open, descent_pass pass,
                  double mapped[WM_POINTS_MAX], normal_equations *out) const;
   static align_vector difference_of(const alignment &a, const alignment &b);
@@ -112,6 +114,8 @@ class edge_mcl {
                       double *probability) const;
   void describe(const normal_equations &scan, const alignment &a, wm_innovation *record) const;
   bool fuse_information(const normal_equations &e, const alignment &a);
+  void update_walls(const wm_points &points, int camera);
+  void forget_walls();
   bool align(const wm_points &points, int camera, normal_equations *scan, wm_innovation *record);
 
   // Log odds that the pose is wrong: the scans' fit, and what other poses explain.
@@ -141,7 +145,8 @@ class edge_mcl {
   floor_camera camera_[kCamerasMax];
   int camera_count_;
   state_slots<kCamerasMax, kCameraTime + 1> slots_;
-  int edge_state_;
+  wall_list walls_;
+  int edge_state_, wall_state_;           // wall_state_: the first of them; -1: off
   rollback<kMaxEdgeStates, 2> rollback_;  // calibration while the scans fitted: being lost is noticed within 2 s
   lifecycle life_;
   wm_pose2 scan_odom_;  // odometry at the last scan
@@ -151,6 +156,7 @@ class edge_mcl {
   double aligned_m_[kCamerasMax + 1];
   double unmapped_per_m_;  // density of edges that the map does not have, across a wall
   double independence_;    // of a scan's errors from the last one's: 0 to 1
+  double walls_m_;         // travelled distance and rotation when the walls were listed last
   double aliases_m_;       // travelled distance when aliases were weighed last
   double watched_m_;       // the same, plus rotation, when the last scan was judged
   bool nominal_;           // no doubt at all: aliases get their smaller budget

@@ -45,16 +45,14 @@ struct floor_camera {
   // and meets the floor again. False where it no longer does.
   bool correct(double x, double y, const double error[kCameraErrors], floor_point *out) const {
     const double v[3] = {x - x_m, y - y_m, -height_m};
-    // Turn axes: pitch about the camera's left, roll about its view's horizontal direction, yaw about the vertical.
-    const double axis[3][3] = {{-yaw_sin, yaw_cos, 0.0}, {yaw_cos, yaw_sin, 0.0}, {0.0, 0.0, 1.0}};
-    double turned[3] = {v[0], v[1], v[2]}, by[3][3];
-    for (int k = 0; k < 3; k++) {
-      const double *a = axis[k];
-      by[k][0] = a[1] * v[2] - a[2] * v[1];
-      by[k][1] = a[2] * v[0] - a[0] * v[2];
-      by[k][2] = a[0] * v[1] - a[1] * v[0];
-      for (int i = 0; i < 3; i++) turned[i] += error[k] * by[k][i];
-    }
+    // Cross products of the turn axes with it: pitch about the camera's left, roll about its view's horizontal
+    // direction, yaw about the vertical.
+    const double by[3][3] = {{yaw_cos * v[2], yaw_sin * v[2], -yaw_sin * v[1] - yaw_cos * v[0]},
+                             {yaw_sin * v[2], -yaw_cos * v[2], yaw_cos * v[1] - yaw_sin * v[0]},
+                             {-v[1], v[0], 0.0}};
+    double turned[3];
+    for (int i = 0; i < 3; i++)
+      turned[i] = v[i] + error[kPitch] * by[0][i] + error[kRoll] * by[1][i] + error[kCameraYaw] * by[2][i];
     const double down = -turned[2];
     const double height = height_m + error[kHeight];
     if (!(down > 0.02 * height_m) || !(height > 0.0)) return false;

@@ -16,6 +16,7 @@ enum { EDGE_MCL_SEARCH_POSES_LEAST = 12000 };
 
 typedef struct wm_edge_mcl_params {
   double sigma[WM_CAMERA_ROWS];  // at the start, of each state; 0: not a state
+  double wall_sigma_m;           // the same of each wall's offset
 
   double pixel_px, point_sigma_m, common_px, range_max_m, gate_m;
   double systematic_xy_m, systematic_heading_rad;
