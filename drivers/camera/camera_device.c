@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera's life: looked for, set up, streaming, stalled or frozen, gone, looked for again.
+// Life cycle of a camera: searched for, set up, streaming, stalled or frozen, gone, searched for again.
 #include "camera_device.h"
 
 #include <errno.h>
@@ -15,9 +15,9 @@
 #define BUFFERS 4
 #define LOOK_EVERY_NS (500 * WM_NS_PER_MS)
 #define STALL_NS WM_NS_PER_S           // without a buffer, or ten periods where those are longer
-#define RESTART_NS (3 * WM_NS_PER_S)   // of stalling: switched off and on
-#define FROZEN_NS WM_NS_PER_S          // of the same picture again and again
-#define EXPOSURE_EVERY_NS WM_NS_PER_S  // automatic exposure is slow
+#define RESTART_NS (3 * WM_NS_PER_S)   // of stalling: the stream is restarted
+#define FROZEN_NS WM_NS_PER_S          // of an unchanged picture
+#define EXPOSURE_EVERY_NS WM_NS_PER_S  // automatic exposure changes slowly
 
 struct wm_camera_device {
   wm_frame_source base;
@@ -33,7 +33,7 @@ struct wm_camera_device {
   camera_mode mode;
   int format;
   int has_held, was_told;
-  int has_head;  // of the held buffer, whose pixels are not handed out yet
+  int has_head;  // of the held buffer, whose pixels have not been handed out
   wm_frame head;
   camera_buffer newest;
   uint32_t held;   // the buffer whose pixels the caller has
@@ -43,7 +43,7 @@ struct wm_camera_device {
   frame_count count;
   uint64_t fingerprint;
   wm_time_ns last_stamp_ns, last_t_ns, last_buffer_ns, last_new_ns, next_look_ns, next_exposure_ns, exposure_ns;
-  uint8_t *grey;  // where the driver's rows aren't
+  uint8_t *grey;  // for formats that are not grey
   jpeg_decoder jpeg;
   wm_camera_counts counts;
 };
@@ -79,7 +79,7 @@ static void shut(wm_camera_device *self) {
   self->has_held = self->has_head = 0;
 }
 
-// What the driver changed is said; another size than the calibration's can't be used at all.
+// Reports the driver's changes of the mode; another size than the calibration's can't be used.
 static int mode_is_usable(wm_camera_device *self, const camera_mode *wanted) {
   const camera_mode *got = &self->mode;
   self->format = pixels_of_fourcc(got->fourcc);
@@ -95,7 +95,7 @@ static int mode_is_usable(wm_camera_device *self, const camera_mode *wanted) {
     return 0;
   }
   uint32_t least = (uint32_t)pixels_bytes(self->format, got->width, 1, 0);
-  if (self->mode.stride < least) self->mode.stride = least;  // some drivers leave it 0
+  if (self->mode.stride < least) self->mode.stride = least;  // some drivers leave it at 0
   if (got->width == self->width && got->height == self->height) return 1;
   set_state(self, WM_DEVICE_DOWN, "gives %ux%u pixels, but is calibrated for %ux%u", got->width, got->height,
             self->width, self->height);
@@ -171,7 +171,7 @@ static int is_whole(const wm_camera_device *self, const camera_buffer *b) {
   return b->bytes >= pixels_bytes(self->format, self->mode.width, self->mode.height, self->mode.stride);
 }
 
-// The same picture, or the same stamp: a camera that is stuck, and no new information.
+// The same pixels or the same stamp: the camera is stuck, and gives no new information.
 static int is_again(wm_camera_device *self, const camera_buffer *b, wm_time_ns now_ns) {
   uint64_t before = self->fingerprint;
   self->fingerprint = pixels_fingerprint(b->data, b->bytes);
@@ -221,7 +221,7 @@ static int is_stale(wm_camera_device *self, const camera_buffer *b, wm_time_ns n
   return 1;
 }
 
-// 1: a picture worth looking at; all of *out but its pixels is filled.
+// 1: a usable picture; all of *out but its pixels is filled.
 static int judge(wm_camera_device *self, const camera_buffer *b, wm_frame *out) {
   wm_time_ns now_ns = self->io->monotonic_ns(self->io_context);
   self->last_buffer_ns = now_ns;
@@ -247,7 +247,7 @@ static int judge(wm_camera_device *self, const camera_buffer *b, wm_frame *out) 
 
 static void give_back(wm_camera_device *self, uint32_t buffer) { (void)self->io->give_back(self->camera, buffer); }
 
-// Rows of a driver's buffer, which may be memory that is slow to read: each byte once.
+// Copies the rows of a driver's buffer, which may be slow to read: each byte once.
 static void copy_rows(const uint8_t *from, uint32_t stride, uint32_t width, uint32_t height, uint8_t *to) {
   for (uint32_t y = 0; y < height; y++) memcpy(to + (size_t)y * width, from + (size_t)y * stride, width);
 }
@@ -282,7 +282,7 @@ static void gone(wm_camera_device *self, int reason) {
   self->next_look_ns = self->io->monotonic_ns(self->io_context) + LOOK_EVERY_NS / 5;
 }
 
-// No buffer: a camera whose cable is loose or whose firmware hangs says nothing at all, not even an error.
+// Called without a buffer: a camera with a loose cable or hanging firmware gives no error at all.
 static void look_for_stall(wm_camera_device *self) {
   wm_time_ns now_ns = self->io->monotonic_ns(self->io_context), silent_ns = now_ns - self->last_buffer_ns;
   wm_time_ns periods_ns = self->mode.rate_hz > 0 ? wm_ns_from_seconds(10 / self->mode.rate_hz) : 0;
@@ -295,7 +295,7 @@ static void look_for_stall(wm_camera_device *self) {
   }
 }
 
-// All buffers that are ready; the newest good one is kept in *kept. Its place is 1 where there is one, -errno.
+// Takes all buffers that are ready and keeps the newest good one in *kept. 1: there is one; 0; -errno.
 static int take_newest(wm_camera_device *self, camera_buffer *kept, wm_frame *frame) {
   int have = 0, wait_ms = WM_DEVICE_WAIT_MS;
   for (uint32_t i = 0; i < 2 * BUFFERS; i++, wait_ms = 0) {
@@ -319,7 +319,7 @@ static int take_newest(wm_camera_device *self, camera_buffer *kept, wm_frame *fr
   return have;
 }
 
-// The newest picture, not yet seen: self->head.
+// The newest picture, not handed out yet: self->head.
 static wm_status find_head(wm_camera_device *self) {
   if (self->has_head) return WM_OK;
   if (self->has_held) give_back(self, self->held);

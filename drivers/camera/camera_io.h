@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The few things that a camera asks of the system, as a table: the real one is V4L2's, a test's says what it likes.
+// The system calls of a camera as a table: V4L2's, libcamera's, or a test's.
 #ifndef WM_CAMERA_IO_H
 #define WM_CAMERA_IO_H
 
@@ -10,7 +10,7 @@
 
 #define CAMERA_BUFFERS_MAX 8
 
-// Who a camera is: it may come back under another number.
+// Identity of a camera, which may come back under another number.
 typedef struct camera_identity {
   char path[128];  // to open: /dev/video0, /dev/v4l/by-id/..., or libcamera's identifier
   char card[48];   // the model's name, "" unknown
@@ -28,7 +28,7 @@ typedef struct camera_control {
 } camera_control;
 
 #define CAMERA_STAMP_START 1u   // else of the end
-#define CAMERA_BUFFER_ERROR 2u  // the driver says that the picture is damaged
+#define CAMERA_BUFFER_ERROR 2u  // the driver marks the picture as damaged
 typedef struct camera_buffer {
   uint32_t index, bytes, sequence, flags;
   wm_time_ns stamp_ns;  // 0: none
@@ -37,17 +37,17 @@ typedef struct camera_buffer {
 
 // Functions return 0, or -errno.
 typedef struct camera_io {
-  // Opens `wanted->path` or, where another camera is there now, the one that has the card and bus of `wanted`; fills
-  // in what was unknown. -ENODEV: there is none such. *camera is what the functions below want.
+  // Opens `wanted->path` or, where another camera is there now, the one with the card and bus of `wanted`; fills in
+  // unknown fields. -ENODEV: there is none. *camera is for the functions below.
   int (*open)(void *context, camera_identity *wanted, void **camera);
-  // Sets the mode; *mode is then what the driver made of it.
+  // Sets the mode; *mode becomes the driver's actual one.
   int (*set_mode)(void *camera, camera_mode *mode);
-  // -EINVAL: no such control; -ERANGE: beyond its limits, `control->value` has the nearest that is possible.
+  // -EINVAL: no such control; -ERANGE: beyond its limits, `control->value` has the nearest possible value.
   int (*set_control)(void *camera, camera_control *control);
-  // Present exposure, 0 where it isn't known.
+  // Present exposure, 0 where unknown.
   wm_time_ns (*exposure_ns)(void *camera);
   int (*start)(void *camera, uint32_t buffers);
-  // 1: *out is filled and is the caller's until `give_back`; 0: nothing came within `wait_ms`.
+  // 1: *out is filled and the caller's until `give_back`; 0: no buffer within `wait_ms`.
   int (*take)(void *camera, int wait_ms, camera_buffer *out);
   int (*give_back)(void *camera, uint32_t index);
   void (*close)(void *camera);

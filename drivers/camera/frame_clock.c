@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "frame_clock.h"
 
-#define OLDEST_NS (2 * WM_NS_PER_S)                 // a picture waits no longer in a driver
-#define DOUBTS 3                                    // stamps in a row that change the belief
+#define OLDEST_NS (2 * WM_NS_PER_S)                 // longer than a picture waits in a driver
+#define DOUBTS 3                                    // contradicting stamps in a row that change the assumed clock
 #define DIRECT_UNCERTAINTY_NS (500 * WM_NS_PER_US)  // interrupt of the frame's end to the stamp
 #define GUESSED_UNCERTAINTY_NS (50 * WM_NS_PER_MS)
 
@@ -36,7 +36,7 @@ stamp_verdict frame_clock_stamp(frame_clock *self, wm_time_ns stamp_ns, stamp_po
     verdict = STAMP_GUESSED;
     point = STAMP_END;  // it arrives after its end
   } else if (self->is_foreign) {
-    // What is seen is seen after the picture's end at the earliest.
+    // A picture arrives after its end at the earliest.
     wm_time_ns least_ns = point == STAMP_START ? self->readout_ns + exposure_ns : 0;
     seen_ns = foreign_clock_map(&self->camera, stamp_ns, arrival_ns, least_ns);
     self->uncertainty_ns = foreign_clock_uncertainty(&self->camera) + DIRECT_UNCERTAINTY_NS;
@@ -58,7 +58,7 @@ count_verdict frame_count_take(frame_count *self, uint32_t sequence, uint64_t *l
   if (step == 0) return COUNT_SAME;
   self->last = sequence;
   self->number++;
-  if (step > UINT32_MAX / 2) return COUNT_RESTARTED;  // back: the stream began anew
+  if (step > UINT32_MAX / 2) return COUNT_RESTARTED;  // backwards: the stream was restarted
   *lost = step - 1;
   self->number += *lost;
   return COUNT_NEXT;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras by libcamera, as another system beside V4L2 (camera_io.h). Written for 0.0.3 and what has followed.
+// Cameras by libcamera, as an alternative to V4L2 (camera_io.h). Written for 0.0.3 and later.
 //
-// libcamera completes requests on a thread of its own. All that this thread does is to write the buffer's number into a
-// pipe: there `take` waits, as V4L2's waits at its device, and between the threads is nothing else. A request belongs
-// to libcamera from `give_back` until its number is in the pipe.
+// libcamera completes requests on a thread of its own. That thread only writes the buffer's number into a pipe, on
+// which `take` waits, as V4L2's waits at its device; the threads share nothing else. A request belongs to libcamera
+// from `give_back` until its number is in the pipe.
 #include <libcamera/libcamera.h>
 #include <linux/dma-buf.h>
 #include <poll.h>
@@ -50,8 +50,8 @@ int guarded(Function function) noexcept {
 
 // ── formats ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// What both know; the first that a camera has is taken where none is asked for. DRM names colours by the word, V4L2 by
-// the bytes.
+// Formats of both systems; without a wish the camera's first one of these. DRM names colours by the word, V4L2 by the
+// bytes.
 struct Format {
   pixel_format ours;
   lc::PixelFormat theirs;
@@ -67,7 +67,7 @@ const std::array<Format, 9> kFormats{{{PIXELS_GREY, lc::formats::R8},
                                       {PIXELS_RGB, lc::formats::BGR888},
                                       {PIXELS_BGR, lc::formats::RGB888}}};
 
-// V4L2's number of a format; one that only libcamera has keeps its own.
+// V4L2's number of a format; a format of libcamera alone keeps its own.
 uint32_t fourcc_of(const lc::PixelFormat &theirs) {
   for (const Format &f : kFormats)
     if (f.theirs == theirs) return pixels_fourcc(f.ours);
@@ -83,7 +83,7 @@ int choose_format(uint32_t fourcc, lc::StreamConfiguration *stream) {
       return 0;
     }
   }
-  return fourcc != 0 ? -EINVAL : 0;  // without a wish: as it is, and the caller says that it is of no use
+  return fourcc != 0 ? -EINVAL : 0;  // without a wish: unchanged, and the caller reports that it can't be used
 }
 
 // ── which one ───────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -118,7 +118,7 @@ int find(const char *id, std::shared_ptr<lc::Camera> *out) {
   return *out ? 0 : -ENODEV;
 }
 
-// A buffer and the request that it travels with.
+// A buffer and its request.
 struct Slot {
   std::unique_ptr<lc::Request> request;
   lc::FrameBuffer *buffer = nullptr;
@@ -151,7 +151,7 @@ class Eye {
   void set_rate(double *rate_hz);
   int fill(uint32_t index, camera_buffer *out);
   void send(uint32_t what) const { (void)!write(pipe_[1], &what, sizeof what); }
-  // These two on libcamera's thread.
+  // These two run on libcamera's thread.
   void completed(lc::Request *request) { send(static_cast<uint32_t>(request->cookie())); }
   void disconnected() { send(kGone); }
 
@@ -174,9 +174,9 @@ int Eye::open(const char *id) {
 }
 
 int Eye::shut() {
-  if (camera_) (void)camera_->stop();  // returns when its thread has given everything back
+  if (camera_) (void)camera_->stop();  // returns when its thread has given all requests back
   if (is_connected_) camera_->requestCompleted.disconnect(this);
-  // Its thread may be in the signal of the unplugging still; a camera that is gone sends no second one.
+  // Its thread may still be in the signal of the unplugging; an unplugged camera sends no second one.
   if (is_connected_ && !is_gone_) camera_->disconnected.disconnect(this);
   for (Slot &slot : slots_) {
     slot.request.reset();
@@ -199,7 +199,7 @@ int Eye::shut() {
 
 // ── mode and controls ───────────────────────────────────────────────────────────────────────────────────────────────
 
-// A camera without such a control has a rate that nobody knows beforehand.
+// The rate of a camera without such a control is unknown beforehand.
 void Eye::set_rate(double *rate_hz) {
   double wanted_hz = *rate_hz;
   *rate_hz = 0;
@@ -239,8 +239,8 @@ int Eye::set_mode(camera_mode *mode) {
   return 0;
 }
 
-// Controls of several values: libcamera ends the process where such a one is given a single value, and before 0.4 it
-// doesn't say which they are.
+// Controls with several values: given a single value, libcamera ends the process; before 0.4 it does not mark such
+// controls.
 template <typename Id>
 bool is_array(const Id &id) {
   if constexpr (requires { id.isArray(); }) return id.isArray();
@@ -249,7 +249,7 @@ bool is_array(const Id &id) {
   return false;
 }
 
-// `wanted` within the control's limits, as the control wants it.
+// `wanted` within the control's limits, in the control's type.
 template <typename T>
 lc::ControlValue within(const lc::ControlInfo &info, int32_t *wanted) {
   auto of = [](const lc::ControlValue &v) { return static_cast<double>(v.get<T>()); };
@@ -285,7 +285,7 @@ int Eye::set_control(camera_control *control) {
 
 int Eye::add_slot(lc::FrameBuffer *buffer) {
   if (buffer->planes().empty()) return -EINVAL;
-  const lc::FrameBuffer::Plane &plane = buffer->planes()[0];  // of all formats the first one has the luma
+  const lc::FrameBuffer::Plane &plane = buffer->planes()[0];  // the first plane has the luma in all formats
   Slot slot;
   slot.buffer = buffer;
   slot.fd = plane.fd.get();
@@ -318,7 +318,7 @@ int Eye::start() {
   camera_->disconnected.connect(this, &Eye::disconnected);
   is_connected_ = true;
   failed = camera_->start(&controls_);
-  // Some cameras look at the start's controls, some at a request's.
+  // Some cameras read the controls of the start, some those of a request.
   slots_[0].request->controls().merge(controls_);
   for (size_t i = 0; !failed && i < slots_.size(); i++) failed = camera_->queueRequest(slots_[i].request.get());
   return failed;
@@ -330,14 +330,14 @@ wm_time_ns clock_ns(clockid_t clock) {
   return static_cast<wm_time_ns>(now.tv_sec) * WM_NS_PER_S + now.tv_nsec;
 }
 
-// Sensor stamps are of CLOCK_BOOTTIME by libcamera's documentation, of CLOCK_MONOTONIC where the kernel's driver
-// stamps; the two differ once a computer has slept. What is still to come on the one is of the other.
+// By libcamera's documentation sensor stamps are of CLOCK_BOOTTIME, but of CLOCK_MONOTONIC where the kernel's driver
+// stamps; the two differ once a computer has slept. A stamp in the future on one clock is of the other.
 wm_time_ns to_monotonic(wm_time_ns stamp_ns) {
   wm_time_ns monotonic_ns = clock_ns(CLOCK_MONOTONIC), boot_ns = clock_ns(CLOCK_BOOTTIME);
   return stamp_ns > monotonic_ns && stamp_ns <= boot_ns ? stamp_ns - (boot_ns - monotonic_ns) : stamp_ns;
 }
 
-// The processor's caches, where they don't see by themselves what a camera writes; other buffers know no such call.
+// Cache synchronisation, where caches don't see a camera's writes; other buffers reject the call.
 void sync_cache(const Slot &slot, uint64_t what) {
   struct dma_buf_sync sync = {what | DMA_BUF_SYNC_READ};
   (void)ioctl(slot.fd, DMA_BUF_IOCTL_SYNC, &sync);
@@ -407,7 +407,7 @@ int set_control(void *camera, camera_control *control) {
 
 wm_time_ns exposure_ns(void *camera) { return eye(camera)->exposure_ns; }
 
-int start(void *camera, uint32_t) {  // as many buffers as set_mode has agreed on
+int start(void *camera, uint32_t) {  // the number of buffers is set_mode's
   return guarded([&] { return eye(camera)->start(); });
 }
 

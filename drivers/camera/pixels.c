@@ -89,7 +89,7 @@ void pixels_to_grey(int format, const uint8_t *from, uint32_t width, uint32_t he
 
 uint64_t pixels_fingerprint(const uint8_t *data, size_t length) {
   uint64_t sum = length, word;
-  // An odd step, so that no column is left out for ever.
+  // An odd step, so that all columns are sampled over the rows.
   for (size_t i = 0; i + sizeof word <= length; i += 61) {
     memcpy(&word, data + i, sizeof word);
     sum = (sum ^ word) * UINT64_C(0x9E3779B97F4A7C15);

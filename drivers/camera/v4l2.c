@@ -24,13 +24,13 @@ typedef struct v4l2_camera {
   uint32_t planes;  // of a multi-planar buffer
   uint32_t count;
   struct {
-    void *start;  // the driver's memory, on many boards without a cache: read once, from one end to the other
+    void *start;  // the driver's memory, on many boards uncached: read once, in order
     size_t length;
-    uint8_t *copy;  // what everybody else reads
+    uint8_t *copy;  // the cached copy that is handed out
   } buffer[CAMERA_BUFFERS_MAX];
 } v4l2_camera;
 
-// A buffer as the ioctls want it, with room for the description of its planes.
+// A buffer as the ioctls require it, with room for the description of its planes.
 typedef struct described {
   struct v4l2_buffer b;
   struct v4l2_plane planes[VIDEO_MAX_PLANES];
@@ -57,7 +57,8 @@ static int call(int fd, unsigned long request, void *argument) {
 
 // ── which one ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// Opens a node that captures and streams; who it is, into *is, and the type of its buffers. The number, or -errno.
+// Opens a node that captures and streams; its identity into *is, and the type of its buffers. The descriptor, or
+// -errno.
 static int open_node(const char *path, camera_identity *is, uint32_t *type) {
   struct v4l2_capability can = {0};
   int fd = open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC);
@@ -81,8 +82,7 @@ static int is_wanted(const camera_identity *wanted, const camera_identity *is) {
          (!wanted->bus[0] || strcmp(wanted->bus, is->bus) == 0);
 }
 
-// By its path; else, where it is known who it is, under any number: a camera that was unplugged may come back as
-// another one.
+// By its path; else by its identity, under any number: an unplugged camera may come back under another one.
 static int find_node(camera_identity *wanted, uint32_t *type) {
   camera_identity is;
   int fd = wanted->path[0] ? open_node(wanted->path, &is, type) : -ENODEV;
@@ -135,11 +135,11 @@ static void set_rate(const v4l2_camera *self, double *rate_hz) {
     *rate_hz = (double)period->denominator / period->numerator;
 }
 
-// With several planes a picture's colour is apart; only the first would be read.
+// With several planes the colour is in another plane; only the first would be read.
 static int set_planes(v4l2_camera *self, camera_mode *mode) {
   struct v4l2_format f = {.type = self->type};
   struct v4l2_pix_format_mplane *pix = &f.fmt.pix_mp;
-  (void)call(self->fd, VIDIOC_G_FMT, &f);  // what isn't asked for stays
+  (void)call(self->fd, VIDIOC_G_FMT, &f);  // fields without a wish stay
   if (mode->width) pix->width = mode->width;
   if (mode->height) pix->height = mode->height;
   if (mode->fourcc) pix->pixelformat = mode->fourcc;
@@ -162,7 +162,7 @@ static int set_mode(void *camera, camera_mode *mode) {
   v4l2_camera *self = camera;
   struct v4l2_format f = {.type = self->type};
   if (is_multi_planar(self)) return set_planes(self, mode);
-  (void)call(self->fd, VIDIOC_G_FMT, &f);  // what isn't asked for stays
+  (void)call(self->fd, VIDIOC_G_FMT, &f);  // fields without a wish stay
   if (mode->width) f.fmt.pix.width = mode->width;
   if (mode->height) f.fmt.pix.height = mode->height;
   if (mode->fourcc) f.fmt.pix.pixelformat = mode->fourcc;
@@ -179,7 +179,7 @@ static int set_mode(void *camera, camera_mode *mode) {
   return 0;
 }
 
-// As v4l2-ctl writes names: letters and digits in small, one underscore for all between them.
+// v4l2-ctl's spelling of a name: lower case letters and digits, one underscore for all between them.
 static void plain_name(const char *from, size_t length, char *to, size_t capacity) {
   size_t used = 0;
   for (size_t i = 0; i < length && from[i] && used + 1 < capacity; i++) {
@@ -251,7 +251,7 @@ static int start(void *camera, uint32_t buffers) {
   return failed ? failed : call(self->fd, VIDIOC_STREAMON, &self->type);
 }
 
-// The driver's memory is read here and nowhere else.
+// The only place where the driver's memory is read.
 static void fill(const v4l2_camera *self, const struct v4l2_buffer *b, camera_buffer *out) {
   const size_t length = self->buffer[b->index].length;
   size_t used = b->bytesused, offset = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Making a decoder: every line of can-signals.yaml is held against the DBC, and refused where it cannot be right.
+// Makes a decoder: each line of can-signals.yaml is checked against the DBC and refused where it cannot be right.
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -13,7 +13,7 @@ enum { kTickBitsMin = 4, kSentinelBitsMin = 8 };
 
 typedef struct maker {
   const wm_dbc *dbc;
-  const wm_can_binding *binding;  // the line at hand
+  const wm_can_binding *binding;  // the line in work
   const dbc_message *message;     // its message
   wm_can_decoder *self;
   wm_error *err;
@@ -38,7 +38,7 @@ static int is_gear(const wm_can_binding *b) { return b->quantity == WM_Q_GEAR; }
 
 // ── message and signal by name ──────────────────────────────────────────────────────────────────────────────────────
 
-// Keeps the name that is nearest to what was asked for.
+// Keeps the name nearest to the wanted one.
 typedef struct nearest {
   wm_text asked, best;
   size_t distance;
@@ -114,7 +114,7 @@ static wm_status bind_unit(maker *m, const dbc_signal *s, const char *name, doub
   wm_text unit = b->unit[0] ? text_of(b->unit) : s->unit;
   shown unit_shown = wm_text_shown(unit);
   int known = wm_unit_find(unit, &found, si);
-  if (wanted == WM_DIM_NONE) {  // counts: whatever the DBC calls them
+  if (wanted == WM_DIM_NONE) {  // counts: any unit of the DBC
     *si = 1.0;
     if (known)
       return refuse(m, "%s is in '%s', but this quantity is a bare number; bind the signal that counts", name,
@@ -172,9 +172,9 @@ static void add_no_value(bound_signal *out, uint64_t raw) {
   if (out->no_value_count < NO_VALUE_MAX) out->no_value[out->no_value_count++] = raw;
 }
 
-// Raw values that stand for "there is no measurement": those that VAL_ names so, and the outermost ones (all bits set;
-// of signed signals the least and the largest) where the DBC's range leaves them out. Other values outside of the range
-// are taken: makers' ranges are too often wrong.
+// Raw values for "no measurement": those named so by VAL_, and the outermost ones (all bits set; of signed signals the
+// least and the largest) where the DBC's range excludes them. Other values outside of the range are taken: ranges in
+// DBC files are often wrong.
 static void find_no_values(const maker *m, const dbc_signal *s, bound_signal *out) {
   if (s->bits.kind != SIGNAL_UNSIGNED && s->bits.kind != SIGNAL_SIGNED) return;
   uint64_t top = s->bits.length == 64 ? UINT64_MAX : (UINT64_C(1) << s->bits.length) - 1u;
@@ -291,7 +291,7 @@ static int is_bound(const maker *m, const bound_message *message, const dbc_sign
   return 0;
 }
 
-// The signal of the message that looks most like its rolling counter; it proves itself while decoding.
+// The signal of the message whose name is most like a rolling counter's; decoding verifies it.
 static void find_counter(const maker *m, bound_message *out) {
   int best = 0;
   for (uint32_t i = 0; i < m->message->signal_count; i++) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "can_clock.h"
 
-#define OLDEST_NS (2 * WM_NS_PER_S)                   // longer than any frame waits for its reader
+#define OLDEST_NS (2 * WM_NS_PER_S)                   // longer than any frame waits in the socket's queue
 #define SOFTWARE_UNCERTAINTY_NS (250 * WM_NS_PER_US)  // interrupt to stamp, with threaded interrupts
 #define NO_STAMP_UNCERTAINTY_NS (10 * WM_NS_PER_MS)   // until a normal thread runs
 
@@ -9,12 +9,12 @@ static int can_be(wm_time_ns stamp_ns, wm_time_ns now_ns) {
   return stamp_ns <= now_ns && stamp_ns >= now_ns - OLDEST_NS;
 }
 
-// The kernel stamps by the wall clock, which may be set between the stamp and its reading: then the offset of the frame
-// before is the right one.
+// The kernel stamps by the wall clock, which may be set between the stamp and its reading: then the offset of the
+// previous frame is used.
 static wm_time_ns by_kernel(can_clock *self, wm_time_ns software_ns, wm_time_ns now_ns, wm_time_ns offset_ns) {
   wm_time_ns stamp_ns = software_ns - offset_ns, before_ns = software_ns - self->utc_offset_ns;
   if (self->has_offset && before_ns != stamp_ns && !can_be(stamp_ns, now_ns)) stamp_ns = before_ns;
-  // The two clocks are read one after the other: a little in the future is now.
+  // The two clocks are read one after the other: a stamp slightly in the future is now.
   if (stamp_ns > now_ns && stamp_ns - now_ns < WM_NS_PER_MS) stamp_ns = now_ns;
   if (can_be(stamp_ns, now_ns)) {
     self->uncertainty_ns = SOFTWARE_UNCERTAINTY_NS;

@@ -10,7 +10,7 @@
 #include "waymark/devices.h"
 
 #define IDS_MAX 4096
-#define LOOK_EVERY_NS (500 * WM_NS_PER_MS)  // for an interface that isn't there, or is another one by the same name
+#define LOOK_EVERY_NS (500 * WM_NS_PER_MS)  // for an absent interface, or another one by the same name
 
 typedef struct can_device {
   wm_source base;
@@ -61,7 +61,7 @@ static void open_it(can_device *self, unsigned index) {
   self->interface_index = index;
 }
 
-// An adapter that was unplugged comes back under the same name with another index: the old socket would wait for ever.
+// A replugged adapter has the same name and another index; the old socket would wait forever.
 static void look_for_interface(can_device *self, wm_time_ns now_ns) {
   if (now_ns < self->next_look_ns) return;
   self->next_look_ns = now_ns + LOOK_EVERY_NS;
@@ -101,7 +101,7 @@ static void count_queue(can_device *self, const can_received *received) {
   self->queue_dropped = received->queue_dropped;
 }
 
-// Stamps and counts it; the controller's own state is taken. *arrival_ns: when it was read.
+// Stamps and counts a frame; an error frame changes the state. *when_ns: time of reading.
 static void look_at_frame(can_device *self, can_received *received, wm_time_ns *when_ns) {
   wm_source_counts *counts = &self->base.counts;
   wm_can_frame *frame = &received->frame;
@@ -142,7 +142,7 @@ static int take_frame(can_device *self, const wm_can_frame *frame, wm_time_ns ar
   return 1;
 }
 
-// The next frame of any kind, or WM_AGAIN when none came until `end_ns`.
+// The next frame of any kind; WM_AGAIN without one until `end_ns`.
 static wm_status next_frame(can_device *self, wm_time_ns end_ns, can_received *received, wm_time_ns *arrival_ns) {
   wm_time_ns now_ns = self->io->monotonic_ns(self->io_context);
   if (now_ns >= end_ns) return WM_AGAIN;
@@ -154,7 +154,7 @@ static wm_status next_frame(can_device *self, wm_time_ns end_ns, can_received *r
   int got = self->io->receive(self->io_context, self->socket, WM_DEVICE_WAIT_MS, received);
   if (got < 0) {
     take_failure(self, -got);
-    self->io->sleep_ms(self->io_context, 10);  // a socket that only fails must not take the processor
+    self->io->sleep_ms(self->io_context, 10);  // a socket that only fails must not spin
   }
   if (got <= 0) return WM_AGAIN;
   look_at_frame(self, received, arrival_ns);
@@ -173,7 +173,7 @@ static wm_status next_quantities(wm_source *base, wm_event *out, wm_error *err) 
   wm_status status;
   while ((status = next_frame(self, end_ns, &received, &arrival_ns)) == WM_OK) {
     if (take_frame(self, &received.frame, arrival_ns, out)) return WM_OK;
-    if (received.frame.is_error) return WM_AGAIN;  // so that each change of the controller is seen
+    if (received.frame.is_error) return WM_AGAIN;  // so that each change of the controller is reported
   }
   return status;
 }

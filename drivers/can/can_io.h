@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The few things that a CAN device asks of the system, as a table: the real one is SocketCAN's, a test's says what it
-// likes.
+// The system calls of a CAN device as a table: SocketCAN's, or a test's.
 #ifndef WM_CAN_IO_H
 #define WM_CAN_IO_H
 
@@ -8,21 +7,21 @@
 
 #include "waymark/can.h"
 
-// What one reading of the socket gave.
+// The result of one reading of the socket.
 typedef struct can_received {
   wm_can_frame frame;      // t_ns unset
-  wm_time_ns software_ns;  // CLOCK_REALTIME, by the kernel when the frame came; 0: none
+  wm_time_ns software_ns;  // CLOCK_REALTIME, by the kernel at reception; 0: none
   wm_time_ns hardware_ns;  // the adapter's own clock; 0: none
   uint32_t queue_dropped;  // frames that the socket's queue lost since it was opened (SO_RXQ_OVFL)
   int has_queue_dropped;
 } can_received;
 
 typedef struct can_io {
-  // Index of the interface, 0 where there is none of this name; *is_up by its flags.
+  // Index of the interface of this name, 0 without one; *is_up by its flags.
   unsigned (*find)(void *context, const char *interface, int *is_up);
   // A bound raw socket for these ids (none: for all) and all error frames: its number, or -errno.
   int (*open)(void *context, unsigned interface_index, const uint32_t *ids, const uint8_t *is_extended, size_t count);
-  // 1: *out is filled; 0: nothing came within `wait_ms`; -errno.
+  // 1: *out is filled; 0: no frame within `wait_ms`; -errno.
   int (*receive)(void *context, int socket, int wait_ms, can_received *out);
   void (*close)(void *context, int socket);
   void (*sleep_ms)(void *context, int ms);
@@ -32,13 +31,14 @@ typedef struct can_io {
 
 extern const can_io kSocketCan;
 
-// The kernel counts about 0.8 kB a frame, and doubles what is asked: half a second of a full bus of 500 kbit/s.
+// The kernel reserves about 0.8 kB for a frame, and twice the requested bytes: half a second of a full bus of 500
+// kbit/s.
 #define CAN_QUEUE_BYTES (1 << 20)
-// Asks for so many bytes of a socket's queue, by force where that is allowed. Returns what was granted.
+// Requests so many bytes for a socket's queue, beyond the limit where allowed. Returns the granted bytes.
 int can_queue_grow(int socket, int bytes);
 
-// A message of `bytes` bytes as the kernel hands it out (struct can_frame or canfd_frame, stamps and drop count beside
-// it) into *out. 0 where it is none. Pure.
+// Parses a message of `bytes` bytes from the kernel (struct can_frame or canfd_frame, stamps and drop count in the
+// control data) into *out. 0 where it is none. Pure.
 int can_message_read(const struct msghdr *message, size_t bytes, can_received *out);
 
 #endif

@@ -6,7 +6,7 @@
 //   (1.000001) can0 123#1122334455667788_9    classic with the raw DLC 9; it still carries 8 bytes
 //   (1.000001) can0 123#R                     remote; 123#R8 asks for 8 bytes
 //   (1.000001) can0 123##1DEADBEEF            CAN FD with the flags 1
-//   (1.000001) can0 123#112233445566778899    more than 8 bytes: CAN FD, by a writer that does not know ##
+//   (1.000001) can0 123#112233445566778899    more than 8 bytes: CAN FD, by a writer without ##
 //   (1.000001) can0 20000080#0000000000000000 error frame: bit 29 of the eight digits
 //   (1.000001) can0 123#DEADBEEF T            with its direction, R or T
 #include "text.h"

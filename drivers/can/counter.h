@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A message's rolling counter: what it says was lost, and whether the sender is stuck.
+// A message's rolling counter: lost frames, and a stuck sender.
 #ifndef WM_CAN_COUNTER_H
 #define WM_CAN_COUNTER_H
 
@@ -8,8 +8,8 @@
 #include "signal.h"
 
 enum {
-  COUNTER_PROOF = 4,   // steps by one, in a row, before a signal is taken for a counter
-  COUNTER_FROZEN = 3,  // frames without a step before their values are doubted
+  COUNTER_PROOF = 4,   // steps by one, in a row, before a signal counts as a counter
+  COUNTER_FROZEN = 3,  // frames without a step before their values are doubtful
 };
 
 typedef struct counter {
@@ -19,20 +19,20 @@ typedef struct counter {
   uint64_t last;
   uint32_t proof;    // steps by one in a row, up to COUNTER_PROOF
   uint32_t frozen;   // frames since it last moved
-  uint64_t missing;  // bit i: of the value i + 1 before `last` nothing came yet
+  uint64_t missing;  // bit i: the value i + 1 before `last` is missing
   int seen_zero, seen_top;
 } counter;
 
-// What one more value says. `lost`: frames between this one and the one before; `late`: it is one of those that were
-// taken for lost; `repeats`: frames in a row in which it stood still, this one included.
+// Result of one more value. `lost`: frames missing before this one; `late`: it was counted as lost before; `repeats`:
+// frames in a row without a step, this one included.
 typedef struct counter_step {
   uint64_t lost;
   int late;
   uint32_t repeats;
 } counter_step;
 
-// Frames overtake each other in gateways and bridges: a value that is missing, at most half a cycle back, has come
-// late. Anything else is a step forward.
+// Frames overtake each other in gateways and bridges: a missing value at most half a cycle back is late. Any other
+// value is a step forward.
 static inline int counter_is_late(counter *self, uint64_t back, uint64_t cycle) {
   if (back == 0 || back > cycle / 2 || back > 64 || !((self->missing >> (back - 1)) & 1u)) return 0;
   self->missing &= ~(UINT64_C(1) << (back - 1));
@@ -45,8 +45,8 @@ static inline void counter_go_on(counter *self, uint64_t step) {
   if (passed > 1) self->missing |= UINT64_MAX >> (65 - passed);
 }
 
-// Many counters leave out a value (AUTOSAR E2E profile 1 counts 0 to 14, others 1 to 15), and the DBC doesn't say so:
-// a counter's cycle is taken to be without its first or last value until that has been seen.
+// Many counters leave out a value (AUTOSAR E2E profile 1 counts 0 to 14, others 1 to 15), which the DBC does not state:
+// a cycle is taken to lack its first or last value until that value occurs.
 static inline counter_step counter_next(counter *self, uint64_t value) {
   counter_step out = {0};
   uint64_t top = (UINT64_C(1) << self->bits.length) - 1u;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Loading a DBC file, and finding things in it.
+// Loading of DBC files, and searches in them.
 #include "dbc.h"
 
 #include <errno.h>

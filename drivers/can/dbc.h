@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A DBC file as it was read. Texts point into `source`; messages are sorted by id, a message's signals by name.
+// A parsed DBC file. Texts point into `source`; messages are sorted by id, a message's signals by name.
 #ifndef WM_CAN_DBC_H
 #define WM_CAN_DBC_H
 
@@ -25,7 +25,7 @@ typedef struct dbc_signal {
   signal_bits bits;
   double factor, offset, min, max;
   uint8_t is_selector;  // M: its value chooses the other signals
-  uint8_t is_selected;  // mN: there only for some values of `selector`
+  uint8_t is_selected;  // mN: present for some values of `selector` only
   uint64_t selected_by;
   uint32_t first_range, range_count;  // of SG_MUL_VAL_; without any, `selected_by` alone
   uint32_t selector;                  // index into dbc->signals
@@ -37,7 +37,7 @@ typedef struct dbc_message {
   int line;
   uint32_t id;
   uint8_t is_extended;
-  uint32_t length;  // bytes; above WM_CAN_DATA_MAX for what goes over several frames
+  uint32_t length;  // bytes; above WM_CAN_DATA_MAX for multi-frame messages
   uint32_t first_signal, signal_count;
 } dbc_message;
 
@@ -59,12 +59,12 @@ static inline uint64_t dbc_key(uint32_t id, int is_extended) { return (uint64_t)
 dbc_signal *wm_dbc_find_signal(const wm_dbc *dbc, const dbc_message *message, wm_text name);
 
 // The multiplexers above `signal`, nearest first, as indices into dbc->signals; returns how many. -1 where the file
-// does not say by what the signal is selected, or where they select each other in a ring.
+// lacks the selecting signal, or the selection is circular.
 int wm_dbc_selectors(const wm_dbc *dbc, const dbc_signal *signal, uint32_t out[DBC_SELECTORS_MAX]);
-// Whether `selected` is there when the multiplexer above it reads `raw`.
+// Whether `selected` is present when the multiplexer above it has the value `raw`.
 int wm_dbc_selects(const wm_dbc *dbc, const dbc_signal *selected, uint64_t raw);
 
-// The two readings of the text: messages and signals first, then what is said about them elsewhere in the file.
+// The two passes over the text: messages and signals first, then their attributes in other sections.
 typedef enum dbc_pass { DBC_DEFINITIONS, DBC_DETAILS } dbc_pass;
 wm_status wm_dbc_read(wm_dbc *dbc, size_t length, dbc_pass pass, wm_error *err);
 

@@ -8,10 +8,10 @@ static int is_mark(char c) { return c != '\0' && strchr(kMarks, c) != NULL; }
 
 void wm_dbc_lexer_start(lexer *self, const char *source, size_t length) {
   *self = (lexer){source, source + length, 1, 1};
-  if (length >= 3 && memcmp(source, "\xEF\xBB\xBF", 3) == 0) self->at += 3;  // UTF-8's mark
+  if (length >= 3 && memcmp(source, "\xEF\xBB\xBF", 3) == 0) self->at += 3;  // UTF-8's byte order mark
 }
 
-// A backslash takes the quote behind it into the string, as cantools and CANdb++ have it.
+// A backslash escapes the following quote, as in cantools and CANdb++.
 static token read_string(lexer *self) {
   token out = {.kind = TOKEN_STRING, .line = self->line};
   const char *from = ++self->at;

@@ -12,7 +12,7 @@ typedef struct token {
   int kind;
   wm_text text;  // of a string: without its quotes
   int line;      // from 1; of a string that goes over several lines the first
-  int is_first;  // nothing stands before it on its line
+  int is_first;  // the first token of its line
 } token;
 
 typedef struct lexer {
@@ -22,7 +22,7 @@ typedef struct lexer {
 } lexer;
 
 void wm_dbc_lexer_start(lexer *self, const char *source, size_t length);
-// TOKEN_END for ever at the end; TOKEN_OPEN_STRING for a string that never ends. Cost: linear in what it passes.
+// At the end always TOKEN_END; TOKEN_OPEN_STRING for an unterminated string. Cost: linear in the text passed.
 token wm_dbc_lexer_next(lexer *self);
 
 #endif

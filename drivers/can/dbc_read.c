@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The statements of a DBC file. What Waymark needs is read strictly: BO_, SG_, SIG_VALTYPE_, SG_MUL_VAL_, VAL_ and the
-// long names in BA_. Everything else is passed over: up to its semicolon, or to the next line that begins a statement.
+// The statements of a DBC file. The needed ones are parsed strictly: BO_, SG_, SIG_VALTYPE_, SG_MUL_VAL_, VAL_ and the
+// long names in BA_. Others are skipped: up to their semicolon, or to the next line that begins a statement.
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -17,7 +17,7 @@ typedef struct reader {
   wm_error *err;
   lexer lex;
   token now;
-  int line;              // where the statement at hand begins
+  int line;              // first line of the statement
   dbc_message *message;  // whose signals follow; NULL where none
   int skip_signals;      // of VECTOR__INDEPENDENT_SIG_MSG
 } reader;
@@ -260,7 +260,7 @@ static dbc_message *find_message(const reader *r, uint64_t id) {
   return wm_dbc_find(r->dbc, dbc_key((uint32_t)(id & ~kExtendedFlag), (id & kExtendedFlag) != 0));
 }
 
-// ID SIGNAL. 0 where either isn't in the file (makers' files do that): what is said about it is passed over.
+// ID SIGNAL. 0 where either is unknown, as in some makers' files: the statement is skipped.
 static int take_signal(reader *r, const dbc_message **message, dbc_signal **signal) {
   uint64_t id = 0;
   if (!take_u64(r, &id) || r->now.kind != TOKEN_WORD || id > UINT32_MAX) return 0;
@@ -335,7 +335,7 @@ static wm_status read_values(reader *r) {
   while (take_double(r, &raw)) {
     wm_text name = r->now.text;
     if (!take(r, TOKEN_STRING)) return expected(r, "VAL_", s->name, "a name in quotes behind each value");
-    if (raw != floor(raw) || fabs(raw) > 9e15) continue;  // stands for no integer that a gear could have
+    if (raw != floor(raw) || fabs(raw) > 9e15) continue;  // not an integer, so no gear
     if (r->dbc->value_count == kDetailsMax) return bad(r, r->now.line, "more than %d named values", kDetailsMax);
     dbc_value value = {(int64_t)raw, name};
     APPEND(r, values, value_count, value_room, value);
@@ -403,7 +403,7 @@ wm_status wm_dbc_read(wm_dbc *dbc, size_t length, dbc_pass pass, wm_error *err) 
   advance(&r);
   wm_status status = WM_OK;
   while (status == WM_OK && r.now.kind != TOKEN_END) {
-    if (take(&r, ';')) continue;  // one too many does no harm
+    if (take(&r, ';')) continue;  // a second semicolon does no harm
     status = read_statement(&r, pass);
   }
   return status;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// From frame to quantities. No allocation; a frame that nothing is bound to costs one search among a few ids.
+// From frame to quantities. No allocation; a frame without a binding costs one search among a few ids.
 #include <math.h>
 
 #include "decoder.h"
@@ -28,7 +28,7 @@ static int selects(const wm_can_decoder *self, const bound_selector *s, uint64_t
   return 0;
 }
 
-// Whether the multiplexers say that the signal is in this frame, and whether the frame is long enough for it.
+// Whether the signal is present in this frame by its multiplexers, and within the frame's length.
 static presence presence_of(const wm_can_decoder *self, const bound_signal *s, const payload *data, unsigned length) {
   for (uint32_t i = s->selector_count; i-- > 0;) {  // from the outermost
     const bound_selector *above = &self->selectors[s->first_selector + i];
@@ -44,10 +44,10 @@ static presence presence_of(const wm_can_decoder *self, const bound_signal *s, c
 #define SILENT_NS (250 * WM_NS_PER_MS)
 // Counts that come in a burst give no rate: the shortest usual period of wheels' messages.
 #define RATE_OVER_NS_MIN (5 * WM_NS_PER_MS)
-// Ticks. No wheel turns so far: the motion's plausibility checks see that the counter began anew.
+// Ticks. Farther than any wheel turns: the motion's plausibility checks reject the step as a restart of the counter.
 #define BEGAN_ANEW ((int64_t)1 << 44)
 
-// Whether the counter may have gone half way round, or further, while it was silent: which way is unknown then.
+// Whether the counter may have moved by half of its range or more during a silence: the direction is then unknown.
 static int may_have_wrapped(const bound_signal *s, wm_time_ns t_ns) {
   const wm_time_ns silent_ns = t_ns - s->last_ns;
   const double half_way = ldexp(0.5, (int)s->bits.length);
@@ -64,7 +64,7 @@ static void note_rate(bound_signal *s, int64_t step, wm_time_ns t_ns) {
   if (both_per_s > s->most_per_s) s->most_per_s = both_per_s;
 }
 
-// A counter goes on from where it was by the shorter way round, so that it may run backwards.
+// A tick counter continues from its last value by the shorter way round, so that it may run backwards.
 static double unwrap(bound_signal *s, uint64_t raw, wm_time_ns t_ns) {
   if (s->has_last && may_have_wrapped(s, t_ns)) {
     s->unwrapped += BEGAN_ANEW;
@@ -108,7 +108,7 @@ static int gear_value(const bound_quantity *q, double number, double *out) {
   return 0;
 }
 
-// Sum of the signals in SI. 0 where the frame says that there is no measurement.
+// Sum of the signals in SI. 0 where the value is marked as not available.
 static int quantity_value(const bound_quantity *q, bound_signal *signals, const payload *data, wm_time_ns t_ns,
                           double *out) {
   int is_ticks = q->quantity == WM_Q_WHEEL_TICKS_LEFT || q->quantity == WM_Q_WHEEL_TICKS_RIGHT;
@@ -130,7 +130,7 @@ static int quantity_value(const bound_quantity *q, bound_signal *signals, const 
 
 // ── one frame ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// 0 for a frame that repeats the one before it. Counts what the message's counter says was lost, until it comes late.
+// 0 for a frame that repeats the one before it. Counts lost frames by the message's counter, until they arrive late.
 static int watch_counter(bound_message *m, const payload *data, unsigned length, wm_quantities *out,
                          wm_source_counts *counts) {
   counter *c = &m->counter;

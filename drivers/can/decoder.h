@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A decoder: everything copied out of the DBC that decoding needs, in four flat tables.
+// A decoder: all needed parts of the DBC, copied into four flat tables.
 #ifndef WM_CAN_DECODER_H
 #define WM_CAN_DECODER_H
 
@@ -9,7 +9,7 @@
 
 enum { NO_VALUE_MAX = 8 };
 
-// A multiplexer that has to read one of the values for the signal below it to be there.
+// A multiplexer and the values of it for which the signal below is present.
 typedef struct bound_selector {
   signal_bits bits;
   uint32_t first_range, range_count;
@@ -19,7 +19,7 @@ typedef struct bound_signal {
   signal_bits bits;
   double factor, offset, si;  // (number * factor + offset) * si
   uint32_t first_selector, selector_count;
-  uint32_t no_value_count;  // raw values that say "not available"
+  uint32_t no_value_count;  // raw values for "not available"
   uint64_t no_value[NO_VALUE_MAX];
   int has_last;  // ticks only, as what follows
   uint64_t last;

@@ -7,7 +7,7 @@
 // WGS84: semi-major axis and the square of the eccentricity.
 #define WGS84_A_M 6378137.0
 #define WGS84_E2 6.69437999014e-3
-#define SIGMA_M 5.0  // of a receiver that states none: a common figure of data sheets
+#define SIGMA_M 5.0  // of a receiver without a stated accuracy: a common figure of data sheets
 #define DEGREE (M_PI / 180.0)
 
 enum { LATITUDE, LONGITUDE, ALTITUDE, XY, Z, VALID };
@@ -26,7 +26,7 @@ void wm_can_gnss_init(wm_can_gnss *self, const double origin[3]) {
   for (size_t i = 0; i < sizeof self->value / sizeof self->value[0]; i++) self->value[i] = (double)NAN;
 }
 
-// A receiver without a fix gives nothing, or 0 and 0.
+// A receiver without a fix gives no position, or 0 and 0.
 static int is_fix(const double *value) {
   if (value[VALID] == 0.0 || (value[LATITUDE] == 0.0 && value[LONGITUDE] == 0.0)) return 0;
   return fabs(value[LATITUDE]) < 0.5 * M_PI && fabs(value[LONGITUDE]) <= M_PI;
@@ -46,7 +46,7 @@ int wm_can_gnss_take(wm_can_gnss *self, const wm_quantities *values, wm_position
   if (!is_fix(value)) return 0;
   double *origin = self->origin;
   if (isnan(origin[LATITUDE])) memcpy(origin, value, 2 * sizeof *origin);
-  if (isnan(origin[ALTITUDE])) origin[ALTITUDE] = value[ALTITUDE];  // may be that of no fix: no part of the radii
+  if (isnan(origin[ALTITUDE])) origin[ALTITUDE] = value[ALTITUDE];  // possibly without a fix: the radii do not use it
   const double sine = sin(origin[LATITUDE]), w = 1.0 - WGS84_E2 * sine * sine;
   const double across_m = WGS84_A_M / sqrt(w) + self->level_m,
                along_m = WGS84_A_M * (1.0 - WGS84_E2) / (w * sqrt(w)) + self->level_m;

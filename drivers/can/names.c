@@ -92,7 +92,7 @@ int wm_counter_likeness(wm_text name) {
   capitals[n] = '\0';
   for (int i = 0; kSurely[i]; i++)
     if (strstr(capitals, kSurely[i])) return 2;
-  for (int i = 0; kWheel[i]; i++)  // counts the way, not the messages
+  for (int i = 0; kWheel[i]; i++)  // these signals count distance, not messages
     if (strstr(capitals, kWheel[i])) return 0;
   for (int i = 0; kLikely[i]; i++)
     if (strstr(capitals, kLikely[i])) return 1;

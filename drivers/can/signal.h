@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a signal's bits are in a frame, and how they become a number. All inline: this is what decoding costs.
+// Position of a signal's bits in a frame, and their conversion to a number. All inline, for decoding.
 #ifndef WM_CAN_SIGNAL_H
 #define WM_CAN_SIGNAL_H
 
@@ -8,7 +8,7 @@
 
 #include "waymark/can.h"
 
-// A frame's data with zeros behind it, so that eight bytes and one more can be read at any byte of the frame.
+// A frame's data with zeros after it, so that nine bytes can be read at any byte of the frame.
 typedef struct payload {
   uint8_t byte[WM_CAN_DATA_MAX + 9];
 } payload;
@@ -63,7 +63,7 @@ static inline int64_t sign_extend(uint64_t bits, unsigned length) {
   return (int64_t)((bits ^ sign) - sign);
 }
 
-// The number that the bits stand for, before factor and offset.
+// The number that the bits encode, before factor and offset.
 static inline double signal_number(const signal_bits *s, uint64_t raw) {
   switch ((signal_kind)s->kind) {
     case SIGNAL_UNSIGNED: return (double)raw;

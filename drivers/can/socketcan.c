@@ -31,7 +31,8 @@ static unsigned find_interface(void *context, const char *interface, int *is_up)
   return index;
 }
 
-// Only what is bound to something reaches this process. More ids than the kernel takes: all do, and the decoder sorts.
+// Kernel filters for the bound ids. With more ids than the kernel takes, all frames pass, and the decoder sorts them
+// out.
 static int set_filters(int fd, const uint32_t *ids, const uint8_t *is_extended, size_t count) {
   struct can_filter filters[CAN_RAW_FILTER_MAX];
   if (count == 0 || count > CAN_RAW_FILTER_MAX) return 0;
@@ -42,7 +43,7 @@ static int set_filters(int fd, const uint32_t *ids, const uint8_t *is_extended, 
   return setsockopt(fd, SOL_CAN_RAW, CAN_RAW_FILTER, filters, (socklen_t)(count * sizeof filters[0]));
 }
 
-// What an old kernel or adapter can't do is done without; only the filters must be.
+// Optional socket options: failures on an old kernel or adapter are ignored. Only the filters are mandatory.
 static void ask_for_more(int fd) {
   int one = 1;
   can_err_mask_t errors = CAN_ERR_MASK;

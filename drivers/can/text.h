@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pieces of text that belong to someone else, for the readers of candump and DBC.
+// Slices of a text, for the readers of candump and DBC.
 #ifndef WM_CAN_TEXT_H
 #define WM_CAN_TEXT_H
 
@@ -22,7 +22,7 @@ static inline int text_compare(wm_text a, wm_text b) {
   return order ? order : (a.length > b.length) - (a.length < b.length);
 }
 
-// The beginning of a text for a message: short, without anything that a terminal would act upon.
+// The beginning of a text for a message: short, without control characters.
 typedef struct shown {
   char text[48];
 } shown;

@@ -17,7 +17,7 @@ static const struct {
     {"meter/s", WM_DIM_SPEED, 1.0},
     {"meters/s", WM_DIM_SPEED, 1.0},
     {"meterpersecond", WM_DIM_SPEED, 1.0},
-    {"meterpersecon", WM_DIM_SPEED, 1.0},  // VAG cuts its names
+    {"meterpersecon", WM_DIM_SPEED, 1.0},  // VAG truncates its names
     {"cm/s", WM_DIM_SPEED, 0.01},
     {"mm/s", WM_DIM_SPEED, 0.001},
     {"km/h", WM_DIM_SPEED, 1.0 / 3.6},

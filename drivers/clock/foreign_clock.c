@@ -2,7 +2,7 @@
 #include "foreign_clock.h"
 
 #define DRIFT_PER_S (100 * WM_NS_PER_US)  // two crystals of 50 ppm each
-#define LEAP_NS (200 * WM_NS_PER_MS)      // more than any delay: the clock was set, or the device began anew
+#define LEAP_NS (200 * WM_NS_PER_MS)      // more than any delay: the clock was set, or the device restarted
 #define LATE_IN_A_ROW 8                   // a leap backwards looks like a delay at first
 #define LEAST_UNCERTAINTY_NS (50 * WM_NS_PER_US)
 
@@ -21,7 +21,7 @@ static wm_time_ns drift_since(wm_time_ns from_ns, wm_time_ns to_ns) {
 wm_time_ns foreign_clock_map(foreign_clock *self, wm_time_ns device_ns, wm_time_ns seen_ns, wm_time_ns delay_ns) {
   wm_time_ns offset_ns, mapped_ns;
   wm_time_ns arrival_ns = seen_ns - delay_ns;
-  // A stamp that isn't any (near the end of the numbers) tells nothing but when it came.
+  // A stamp near the limits of 64 bits is invalid: only its arrival is used.
   if (__builtin_sub_overflow(arrival_ns, device_ns, &offset_ns)) return arrival_ns;
   wm_time_ns later_ns;
   if (!self->is_set || __builtin_sub_overflow(offset_ns, self->offset_ns, &later_ns)) {
