@@ -73,7 +73,7 @@ __attribute__((format(printf, 2, 3))) static void tell(const wm_camera_device *s
 
 // ── set up ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-static void shut(wm_camera_device *self) {
+static void close_camera(wm_camera_device *self) {
   if (self->camera) self->io->close(self->camera);
   self->camera = NULL;
   self->has_held = self->has_head = 0;
@@ -158,7 +158,7 @@ static void look_for_camera(wm_camera_device *self, wm_time_ns now_ns) {
     return;
   }
   if (!configure(self)) {
-    shut(self);
+    close_camera(self);
     return;
   }
   begin_stream(self, now_ns);
@@ -222,7 +222,7 @@ static int is_stale(wm_camera_device *self, const camera_buffer *b, wm_time_ns n
 }
 
 // 1: a usable picture; all of *out but its pixels is filled.
-static int judge(wm_camera_device *self, const camera_buffer *b, wm_frame *out) {
+static int accept_buffer(wm_camera_device *self, const camera_buffer *b, wm_frame *out) {
   wm_time_ns now_ns = self->io->monotonic_ns(self->io_context);
   self->last_buffer_ns = now_ns;
   if (is_stale(self, b, now_ns)) return 0;
@@ -253,7 +253,7 @@ static void copy_rows(const uint8_t *from, uint32_t stride, uint32_t width, uint
 }
 
 // Grey pixels of the held buffer.
-static int see(wm_camera_device *self, const camera_buffer *b, wm_frame *out) {
+static int convert_to_grey(wm_camera_device *self, const camera_buffer *b, wm_frame *out) {
   char why[120];
   uint8_t *grey = self->base.into ? self->base.into : self->grey;
   out->grey = grey;
@@ -276,8 +276,8 @@ static int see(wm_camera_device *self, const camera_buffer *b, wm_frame *out) {
   return 1;
 }
 
-static void gone(wm_camera_device *self, int reason) {
-  shut(self);
+static void device_lost(wm_camera_device *self, int reason) {
+  close_camera(self);
   set_state(self, WM_DEVICE_ABSENT, "is gone (%s); looking for it", strerror(reason));
   self->next_look_ns = self->io->monotonic_ns(self->io_context) + LOOK_EVERY_NS / 5;
 }
@@ -289,7 +289,7 @@ static void look_for_stall(wm_camera_device *self) {
   wm_time_ns stall_ns = periods_ns > STALL_NS ? periods_ns : STALL_NS;
   if (silent_ns > stall_ns) set_state(self, WM_DEVICE_STALLED, "gives no pictures");
   if (silent_ns > stall_ns + RESTART_NS) {
-    shut(self);
+    close_camera(self);
     self->next_look_ns = now_ns;
     self->counts.restarts++;
   }
@@ -304,7 +304,7 @@ static int take_newest(wm_camera_device *self, camera_buffer *kept, wm_frame *fr
     int got = self->io->take(self->camera, wait_ms, &b);
     if (got < 0 && !have) return got;
     if (got <= 0) break;
-    if (!judge(self, &b, &f)) {
+    if (!accept_buffer(self, &b, &f)) {
       give_back(self, b.index);
       continue;
     }
@@ -332,7 +332,7 @@ static wm_status find_head(wm_camera_device *self) {
   camera_buffer kept = {0};
   int got = take_newest(self, &kept, &self->head);
   if (got < 0) {
-    gone(self, -got);
+    device_lost(self, -got);
     return WM_AGAIN;
   }
   if (got == 0) {
@@ -351,7 +351,7 @@ wm_status wm_camera_device_next(wm_camera_device *self, wm_frame *out, wm_error 
   if (status != WM_OK) return status;
   self->has_head = 0;
   *out = self->head;
-  if (!see(self, &self->newest, out)) return WM_AGAIN;
+  if (!convert_to_grey(self, &self->newest, out)) return WM_AGAIN;
   set_state(self, WM_DEVICE_WORKS, "gives pictures");
   self->counts.frames++;
   return WM_OK;
@@ -411,7 +411,7 @@ wm_frame_source *wm_camera_device_frames(wm_camera_device *self) { return &self-
 
 void wm_camera_device_close(wm_camera_device *self) {
   if (!self) return;
-  shut(self);
+  close_camera(self);
   jpeg_close(&self->jpeg);
   free(self->grey);
   free(self);

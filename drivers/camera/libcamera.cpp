@@ -129,12 +129,12 @@ struct Slot {
   std::unique_ptr<uint8_t[]> copy;  // what everybody else reads
 };
 
-class Eye {
+class LibcameraDevice {
  public:
-  Eye() = default;
-  Eye(const Eye &) = delete;
-  Eye &operator=(const Eye &) = delete;
-  ~Eye() {
+  LibcameraDevice() = default;
+  LibcameraDevice(const LibcameraDevice &) = delete;
+  LibcameraDevice &operator=(const LibcameraDevice &) = delete;
+  ~LibcameraDevice() {
     (void)guarded([this] { return shut(); });
   }
   int open(const char *id);
@@ -164,7 +164,7 @@ class Eye {
   bool is_acquired_ = false, is_connected_ = false, is_gone_ = false;
 };
 
-int Eye::open(const char *id) {
+int LibcameraDevice::open(const char *id) {
   if (pipe2(pipe_, O_CLOEXEC | O_NONBLOCK) != 0) return -errno;
   int failed = find(id, &camera_);
   if (!failed) failed = camera_->acquire();
@@ -173,7 +173,7 @@ int Eye::open(const char *id) {
   return failed;
 }
 
-int Eye::shut() {
+int LibcameraDevice::shut() {
   if (camera_) (void)camera_->stop();  // returns when its thread has given all requests back
   if (is_connected_) camera_->requestCompleted.disconnect(this);
   // Its thread may still be in the signal of the unplugging; an unplugged camera sends no second one.
@@ -200,7 +200,7 @@ int Eye::shut() {
 // ── mode and controls ───────────────────────────────────────────────────────────────────────────────────────────────
 
 // The rate of a camera without such a control is unknown beforehand.
-void Eye::set_rate(double *rate_hz) {
+void LibcameraDevice::set_rate(double *rate_hz) {
   double wanted_hz = *rate_hz;
   *rate_hz = 0;
   const auto limits = camera_->controls().find(lc::controls::FrameDurationLimits.id());
@@ -215,7 +215,7 @@ void Eye::set_rate(double *rate_hz) {
   if (period_us > 0) *rate_hz = 1e6 / static_cast<double>(period_us);
 }
 
-int Eye::set_mode(camera_mode *mode) {
+int LibcameraDevice::set_mode(camera_mode *mode) {
   for (lc::StreamRole role : {lc::StreamRole::VideoRecording, lc::StreamRole::Viewfinder, lc::StreamRole::Raw}) {
     configuration_ = camera_->generateConfiguration({role});
     if (configuration_ && !configuration_->empty()) break;
@@ -261,7 +261,7 @@ lc::ControlValue within(const lc::ControlInfo &info, int32_t *wanted) {
   return lc::ControlValue(static_cast<T>(value));
 }
 
-int Eye::set_control(camera_control *control) {
+int LibcameraDevice::set_control(camera_control *control) {
   for (const auto &[id, info] : camera_->controls()) {
     if (id->name() != control->name) continue;
     if (is_array(*id)) return -ENOTSUP;
@@ -283,7 +283,7 @@ int Eye::set_control(camera_control *control) {
 
 // ── streaming ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
-int Eye::add_slot(lc::FrameBuffer *buffer) {
+int LibcameraDevice::add_slot(lc::FrameBuffer *buffer) {
   if (buffer->planes().empty()) return -EINVAL;
   const lc::FrameBuffer::Plane &plane = buffer->planes()[0];  // the first plane has the luma in all formats
   Slot slot;
@@ -304,7 +304,7 @@ int Eye::add_slot(lc::FrameBuffer *buffer) {
   return 0;
 }
 
-int Eye::start() {
+int LibcameraDevice::start() {
   lc::Stream *stream = configuration_->at(0).stream();
   allocator_ = std::make_unique<lc::FrameBufferAllocator>(camera_);
   int allocated = allocator_->allocate(stream), failed = 0;
@@ -314,8 +314,8 @@ int Eye::start() {
     failed = add_slot(buffer.get());
     if (failed) return failed;
   }
-  camera_->requestCompleted.connect(this, &Eye::completed);
-  camera_->disconnected.connect(this, &Eye::disconnected);
+  camera_->requestCompleted.connect(this, &LibcameraDevice::completed);
+  camera_->disconnected.connect(this, &LibcameraDevice::disconnected);
   is_connected_ = true;
   failed = camera_->start(&controls_);
   // Some cameras read the controls of the start, some those of a request.
@@ -343,7 +343,7 @@ void sync_cache(const Slot &slot, uint64_t what) {
   (void)ioctl(slot.fd, DMA_BUF_IOCTL_SYNC, &sync);
 }
 
-int Eye::fill(uint32_t index, camera_buffer *out) {
+int LibcameraDevice::fill(uint32_t index, camera_buffer *out) {
   if (index >= slots_.size()) return -EIO;
   const Slot &slot = slots_[index];
   const lc::FrameMetadata &frame = slot.buffer->metadata();
@@ -367,7 +367,7 @@ int Eye::fill(uint32_t index, camera_buffer *out) {
   return 1;
 }
 
-int Eye::take(int wait_ms, camera_buffer *out) {
+int LibcameraDevice::take(int wait_ms, camera_buffer *out) {
   struct pollfd waiting = {pipe_[0], POLLIN, 0};
   int ready = poll(&waiting, 1, wait_ms);
   if (ready == 0 || (ready < 0 && errno == EINTR)) return 0;
@@ -378,7 +378,7 @@ int Eye::take(int wait_ms, camera_buffer *out) {
   return is_gone_ ? -ENODEV : fill(index, out);
 }
 
-int Eye::give_back(uint32_t index) {
+int LibcameraDevice::give_back(uint32_t index) {
   if (index >= slots_.size()) return -EINVAL;
   slots_[index].request->reuse(lc::Request::ReuseBuffers);
   return camera_->queueRequest(slots_[index].request.get());
@@ -386,11 +386,11 @@ int Eye::give_back(uint32_t index) {
 
 // ── the table ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
-Eye *eye(void *camera) { return static_cast<Eye *>(camera); }
+LibcameraDevice *eye(void *camera) { return static_cast<LibcameraDevice *>(camera); }
 
 int open_camera(void *, camera_identity *wanted, void **camera) {
   return guarded([&] {
-    auto made = std::make_unique<Eye>();
+    auto made = std::make_unique<LibcameraDevice>();
     int failed = made->open(wanted->path);
     if (!failed) *camera = made.release();
     return failed;

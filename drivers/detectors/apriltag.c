@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Detector `apriltag`: square coded markers, AprilTags and ArUco's, of one family. What finds and reads them is
-// waymark/square_marker.h; the codes of AprilTags are those of its library (E. Olson 2011).
+// Detector `apriltag`: square coded markers, AprilTags and ArUco's, of one family. waymark/square_marker.h finds and
+// reads them; the codes of AprilTags are its library's (E. Olson 2011).
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One line a detector here, one in registry.c.
+// Each detector has one line here and one in registry.c.
 #ifndef WAYMARK_DRIVERS_DETECTORS_H
 #define WAYMARK_DRIVERS_DETECTORS_H
 

@@ -6,8 +6,8 @@
 
 #include "waymark/marker_fit.h"
 
-// Sigma of a coordinate where the row has none: of corners refined to a part of a pixel, without a correction of the
-// camera's bloom. Not swept.
+// Default sigma of a coordinate, for corners refined to a part of a pixel without a correction of the camera's bloom.
+// Not swept.
 #define SIGMA_PX 0.3
 
 struct wm_corner_reader {

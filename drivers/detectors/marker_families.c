@@ -20,7 +20,7 @@ typedef struct april_family {
   const char *name;
   apriltag_family_t *(*create)(void);
   void (*destroy)(apriltag_family_t *);
-  int32_t half_turned;  // the four oldest are read the other way up than in AprilTag's own pictures, as ArUco does
+  int32_t half_turned;  // the four oldest families are read upside down against AprilTag's own pictures, as ArUco does
 } april_family;
 
 static const april_family kApril[] = {

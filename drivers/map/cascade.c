@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// OpenCV's cascade files: XML with elements and text alone. Where an element ends, its place in the tree says what its
-// numbers are.
+// OpenCV's cascade files: XML with elements and text only. At an element's end its path in the tree gives the meaning
+// of its numbers.
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -34,7 +34,7 @@ static wm_status fail(reader *r, const char *what) {
   return wm_fail(r->err, WM_BAD_CONFIG, "%s:%ld: %s", r->path, r->line, what);
 }
 
-// Room for one more item; NULL where there is none.
+// Room for one more item; NULL without memory.
 static void *more(void **list, size_t *count, size_t item_bytes) {
   const size_t n = *count;
   if (n == ITEMS_MAX) return NULL;
@@ -108,7 +108,7 @@ static wm_status end_nodes(reader *r) {
     wm_cascade_node *node = MORE(r, nodes, node_count);
     if (!node) return fail(r, "too many nodes");
     for (int k = 0; k < 2; k++) {
-      // A node that points ahead can't be come to again: evaluation ends.
+      // Nodes may only point ahead, so that evaluation ends.
       if (!is_whole(n[k], -nodes, nodes - 1) || (n[k] > 0 && n[k] <= i))
         return fail(r, "internalNodes: a node must lead to a later one of its tree or to a leaf");
       node->next[k] = (int16_t)n[k];
@@ -138,7 +138,7 @@ static wm_status end_leaves(reader *r) {
   return WM_OK;
 }
 
-// The stage's own threshold stands before its trees: the stage is made there.
+// A stage begins with its threshold, before its trees.
 static wm_status end_threshold(reader *r) {
   double value = 0;
   wm_status status = one_number(r, -1e6, 1e6, &value);
@@ -146,7 +146,7 @@ static wm_status end_threshold(reader *r) {
   wm_cascade_stage *stage = MORE(r, stages, stage_count);
   if (!stage) return fail(r, "too many stages");
   stage->first_tree = (uint32_t)r->out->tree_count;
-  stage->threshold = (float)value - 1e-5f;  // as OpenCV takes it: a sum that was rounded otherwise still reaches it
+  stage->threshold = (float)value - 1e-5f;  // OpenCV's tolerance for rounded sums
   return WM_OK;
 }
 
@@ -196,7 +196,7 @@ static int stands_in(const reader *r, int up, const char *name) {
   return r->depth > up && strcmp(r->names[r->depth - 1 - up], name) == 0;
 }
 
-// An element ended; `text` is what stood in it directly.
+// End of an element; `text` is its direct content.
 static wm_status end_element(reader *r, slice text) {
   const char *name = r->names[r->depth - 1];
   double value = 0;
@@ -235,7 +235,7 @@ static wm_status end_element(reader *r, slice text) {
                         : WM_OK;
 }
 
-// Moves over what ends with `mark`, counting lines. 0 where it doesn't end.
+// Skips up to and including `mark`, counting lines. 0 where it is missing.
 static int skip_over(reader *r, const char *mark) {
   const size_t length = strlen(mark);
   for (; (size_t)(r->end - r->at) >= length; r->at++) {

@@ -36,7 +36,7 @@ typedef struct text_at {
 
 static int is_space(uint8_t c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
-// The next number, behind white space and comments (from # to the end of the line).
+// The next number, after white space and comments (from # to the end of the line).
 static int next_number(text_at *t, uint32_t max, uint32_t *out) {
   while (t->at < t->size && (is_space(t->bytes[t->at]) || t->bytes[t->at] == '#')) {
     if (t->bytes[t->at] == '#')
@@ -67,7 +67,7 @@ static wm_status read_pgm(const uint8_t *bytes, size_t size, const char *path, w
   wm_status status = check_size(width, height, path, err);
   if (status != WM_OK) return status;
   const size_t count = (size_t)width * height, depth = white > 255 ? 2 : 1;
-  // A plain number takes two bytes at least, so memory is asked for only where the pixels can be there.
+  // A plain number takes two bytes at least, so memory is allocated only where the file is long enough.
   if ((size - t.at) < (plain ? 2 * count - 1 : depth * count))
     return wm_fail(err, WM_BAD_DATA, "%s: the PGM is cut: %zu pixels of %zu bytes are promised, %zu bytes are left",
                    path, count, depth, size - t.at);

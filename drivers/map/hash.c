@@ -5,7 +5,7 @@
 #include "waymark/codec.h"
 #include "waymark/map.h"
 
-// Layers are long runs of one value: hashing where they change costs a tenth of hashing every pixel, and says as much.
+// Layers are long runs of one value: hashing only the changes is as specific and costs a tenth of hashing every pixel.
 static uint64_t hash_layer(uint64_t hash, const uint8_t *pixels, size_t count) {
   uint8_t there = pixels != NULL;
   hash = wm_hash(hash, &there, 1);

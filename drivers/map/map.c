@@ -59,7 +59,7 @@ static wm_status read_geometry(const wm_yaml_node *root, wm_raster *out, wm_erro
   return WM_OK;
 }
 
-// A picture that the YAML names, relative to the YAML's folder.
+// A picture of the YAML, relative to the YAML's folder.
 static wm_status read_picture(const wm_yaml_node *node, wm_grey *out, wm_error *err) {
   char name[WM_PATH_MAX], path[WM_PATH_MAX];
   wm_status status = wm_yaml_string(node, name, sizeof name, err);

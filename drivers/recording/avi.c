@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// AVI (RIFF, and its OpenDML continuation beyond 1 GB): lists are walked into, so that one flat walk over the chunks
-// meets them all in their order. Source: Microsoft, "AVI RIFF File Reference"; OpenDML AVI File Format Extensions 1.02.
+// AVI (RIFF, and its OpenDML continuation beyond 1 GB): lists are entered, so that one flat walk over the chunks visits
+// them in order. Source: Microsoft, "AVI RIFF File Reference"; OpenDML AVI File Format Extensions 1.02.
 #include <string.h>
 
 #include "container.h"
@@ -16,8 +16,8 @@ typedef struct chunk {
   uint64_t at, data, length;  // head, content, bytes of it
 } chunk;
 
-// The next chunk or list; lists are stepped into, chunks over. A writer that was cut off leaves sizes of 0 or beyond
-// the file: a list's size is never needed.
+// The next chunk or list; lists are entered, chunks skipped. A truncated file has sizes of 0 or beyond its end, so a
+// list's size is never used.
 static wm_status next_chunk(container *self, chunk *out, wm_error *err) {
   uint8_t head[12];
   wm_status status = container_bytes(self, self->at, head, 8, err);
@@ -31,7 +31,7 @@ static wm_status next_chunk(container *self, chunk *out, wm_error *err) {
       return container_fail(self, err, WM_BAD_DATA, out->at, "no chunk begins here: the file is damaged");
   if (memcmp(out->id, "LIST", 4) == 0 || memcmp(out->id, "RIFF", 4) == 0) {
     status = container_bytes(self, out->data, head, 4, err);
-    memcpy(out->id, head, 4);  // its kind stands for it
+    memcpy(out->id, head, 4);  // a list is identified by its kind
     out->length = 0;
     self->at = out->data + 4;
     return status;
@@ -90,7 +90,7 @@ static wm_status read_format(container *self, const chunk *c, wm_error *err) {
 }
 
 wm_status avi_open(container *self, wm_error *err) {
-  uint64_t stream = NO_STREAM;  // that strh spoke of last
+  uint64_t stream = NO_STREAM;  // of the last strh
   int is_video = 0;
   self->track = NO_STREAM;
   self->next = next_picture;

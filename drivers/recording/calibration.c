@@ -43,7 +43,7 @@ wm_status calibration_keys(const wm_yaml_node *map, const char *const *known, co
   return WM_OK;
 }
 
-// An optional number: left as it is where the key isn't there.
+// An optional number: unchanged where the key is absent.
 static wm_status number(const wm_yaml_node *map, const char *key, double min, double max, double *out, wm_error *err) {
   wm_yaml_node node = wm_yaml_get(map, key);
   return wm_yaml_there(&node) ? wm_yaml_f64(&node, min, max, out, err) : WM_OK;
@@ -135,7 +135,7 @@ static wm_status read_cameras(const wm_yaml_node *cameras, const warner *warn, c
   return WM_OK;
 }
 
-// A sensor that has a camera's name sits where the camera sits, unless it says otherwise.
+// A sensor with a camera's name has that camera's mounting, unless it has its own.
 static wm_status read_sensor(const wm_yaml_node *node, const calibration *known, const warner *warn, wm_sensor *out,
                              wm_error *err) {
   static const char *const kKeys[] = {
@@ -169,7 +169,7 @@ static wm_status read_sensors(const wm_yaml_node *sensors, const warner *warn, c
   return WM_OK;
 }
 
-// A camera that sees coded markers is a sensor, whether or not it is named among them.
+// A camera for coded markers is a sensor, whether or not `sensors` names it.
 static void add_marker_cameras(calibration *out) {
   for (uint32_t i = 0; i < out->rig.camera_count; i++) {
     const wm_camera *camera = &out->rig.cameras[i];
@@ -185,7 +185,7 @@ static void add_marker_cameras(calibration *out) {
   }
 }
 
-// actuator_mm against road_wheel_rad: two lists of one length, the positions rising (or falling: then turned round).
+// actuator_mm against road_wheel_rad: two lists of one length, with rising positions (falling ones are reversed).
 static wm_status read_steering_table(const wm_yaml_node *table, const warner *warn, wm_wheels *out, wm_error *err) {
   static const char *const kKeys[] = {"actuator_mm", "road_wheel_rad", "road_wheel_deg", NULL};
   TRY(calibration_keys(table, kKeys, warn, err));

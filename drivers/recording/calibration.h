@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// calibration.yaml, landmarks.csv, initial_pose and can-signals.yaml: what is read whole when a recording is opened.
+// The files that are read whole when a recording is opened: calibration.yaml, landmarks.csv, initial_pose and
+// can-signals.yaml.
 #ifndef WM_RECORDING_CALIBRATION_H
 #define WM_RECORDING_CALIBRATION_H
 
@@ -11,7 +12,7 @@ typedef struct warner {
   void *context;
 } warner;
 
-// One line to the caller's `warn`, printf-like; nothing where there is none.
+// One line to the caller's `warn`, printf-like; nothing without one.
 void warn_line(const warner *warn, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 typedef struct calibration {
@@ -22,28 +23,28 @@ typedef struct calibration {
   double gnss_origin[3];  // latitude and longitude in degrees, altitude in m; NaN: unknown
 } calibration;
 
-// Nothing known: no wheels, no sensors.
+// An empty calibration: no wheels, no sensors.
 void calibration_init(calibration *self);
 // Reads and checks all of it.
 wm_status calibration_read(const wm_yaml *doc, const warner *warn, calibration *out, wm_error *err);
 
-// Checks keys as calibration.yaml wants it: near misses are errors, other unknown keys are warned of.
+// Checks the keys: near misses are errors, other unknown keys a warning.
 wm_status calibration_keys(const wm_yaml_node *map, const char *const *known, const warner *warn, wm_error *err);
 // Mounting of the camera of this name, or NULL.
 const wm_mounting *calibration_camera_mounting(const calibration *self, const char *name);
-// Reads `mounting` of `parent` (xyz_m, rpy_deg or rpy_rad; what is missing is 0). Where there is none: `otherwise`, or
-// base_link with a warning where that is NULL.
+// Reads `mounting` of `parent` (xyz_m, rpy_deg or rpy_rad; absent numbers are 0). Without it: `otherwise`, or base_link
+// with a warning where that is NULL.
 wm_status calibration_mounting(const wm_yaml_node *parent, const wm_mounting *otherwise, const warner *warn,
                                wm_mounting *out, wm_error *err);
 // One camera: model, size, intrinsics, distortion, readout, mounting.
 wm_status calibration_camera(const wm_yaml_node *node, const warner *warn, wm_camera *out, wm_error *err);
-// Reads NAME_rad or NAME_deg of `map`, limits in radians; leaves *out where neither is there. Both are an error.
+// Reads NAME_rad or NAME_deg of `map`, limits in radians; *out is unchanged without either. Both together are an error.
 wm_status calibration_angle(const wm_yaml_node *map, const char *name, double min_rad, double max_rad, double *out_rad,
                             wm_error *err);
 
-// landmarks.csv; *out is the caller's to free.
+// landmarks.csv; the caller frees *out.
 wm_status landmarks_read(const char *path, const warner *warn, wm_landmark **out, size_t *count, wm_error *err);
-// can-signals.yaml; *out is the caller's to free.
+// can-signals.yaml; the caller frees *out.
 wm_status can_signals_read(const char *path, wm_can_binding **out, size_t *count, wm_error *err);
 
 #endif

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera's entry in calibration.yaml: every model's fields are read and checked here; the models themselves are
-// vision's.
+// A camera's entry in calibration.yaml: reads and checks the fields of each model; the models themselves are vision's.
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -9,7 +8,7 @@
 
 typedef struct camera_model {
   size_t intrinsics_min, intrinsics_max;
-  int focal;  // place of fx; fy, cx, cy follow; -1: a polynomial (ocam)
+  int focal;  // index of fx; fy, cx, cy follow; -1: a polynomial (ocam)
   size_t distortion_min, distortion_max;
   const char *fields;
 } camera_model;
@@ -51,7 +50,7 @@ static wm_status read_intrinsics(const wm_yaml_node *node, const camera_model *m
     size_t focal = (size_t)model->focal;
     wm_yaml_node item = wm_yaml_item(&list, i);
     if (i == focal || i == focal + 1) status = wm_yaml_f64(&item, DBL_MIN, 1e6, &values[i], err);
-    // The centre may lie beside a cut picture, but not a whole picture away.
+    // The centre may lie outside of a cropped picture, but not a whole picture away.
     if (i >= focal + 2) status = wm_yaml_f64(&item, -size[i - focal - 2], 2 * size[i - focal - 2], &values[i], err);
     if (focal == 2 && i == 0) status = wm_yaml_f64(&item, -1, 1, &values[i], err);
     if (focal == 2 && i == 1) status = wm_yaml_f64(&item, 0, 1, &values[i], err);

@@ -144,7 +144,7 @@ wm_status can_signals_read(const char *path, wm_can_binding **out, size_t *count
   return status;
 }
 
-// Leaves those of one part.
+// Keeps the bindings of one part.
 static size_t keep_part(wm_can_binding *bindings, size_t count, wm_can_part part) {
   size_t kept = 0;
   for (size_t i = 0; i < count; i++)

@@ -23,9 +23,9 @@ typedef struct can_stream {
   arrival_order order;
   uint32_t seq;
   log_frame frame, ahead;
-  int has_ahead;  // `ahead` was read, but not yet handed on
+  int has_ahead;  // `ahead` is read, and not handed on yet
   can_buses buses;
-  size_t bus;  // which of them this is
+  size_t bus;  // its index
 } can_stream;
 
 static void keep_problem(can_stream *self, long line, const char *why) {
@@ -33,7 +33,7 @@ static void keep_problem(can_stream *self, long line, const char *why) {
   if (!first[0]) snprintf(first, sizeof self->base.counts.first_problem, "%s:%ld: %s", self->lines.path, line, why);
 }
 
-// Where a log has several buses, each stream takes its own frames; the first one counts frames of no stream.
+// In a log of several buses each stream takes its own frames; the first one counts frames of no stream.
 static int is_mine(can_stream *self, const char *interface) {
   size_t i = 0;
   if (self->buses.count == 0) return 1;
@@ -42,7 +42,7 @@ static int is_mine(can_stream *self, const char *interface) {
   return i == self->bus;
 }
 
-// The next frame of the log; lines that aren't one are counted, once.
+// The next frame of the log; other lines are counted, once.
 static wm_status read_frame(can_stream *self, log_frame *out, wm_error *err) {
   for (;;) {
     const char *text;
@@ -61,7 +61,7 @@ static wm_status read_frame(can_stream *self, log_frame *out, wm_error *err) {
   }
 }
 
-// The next frame, into self->frame. One is read ahead: a stamp is judged by the one after it.
+// The next frame, into self->frame. One is read ahead: a stamp is checked against the one after it.
 static wm_status next_frame(can_stream *self, wm_error *err) {
   wm_status status = self->has_ahead ? WM_OK : read_frame(self, &self->ahead, err);
   if (status != WM_OK) return status;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// can.log as sources of events: one for each bus that recording.yaml names under `can`, or one for all frames; and
-// those of the buses' GNSS receivers.
+// can.log as sources of events: one for each bus under `can` of recording.yaml, or one for all frames; and those of the
+// buses' GNSS receivers.
 #ifndef WM_RECORDING_CAN_STREAM_H
 #define WM_RECORDING_CAN_STREAM_H
 
@@ -9,7 +9,7 @@
 #include "waymark/source.h"
 
 typedef struct can_bus {
-  char interface[WM_CAN_IFACE_MAX];  // as the log's lines name it
+  char interface[WM_CAN_IFACE_MAX];  // name in the log's lines
   char dbc[WM_PATH_MAX], signals[WM_PATH_MAX];
 } can_bus;
 
@@ -18,11 +18,11 @@ typedef struct can_buses {
   can_bus bus[WM_CAN_DEVICES_MAX];
 } can_buses;
 
-// `can:` of recording.yaml, a list of {interface, dbc, signals}; files are in `dir`. Nothing where it isn't there.
+// `can:` of recording.yaml, a list of {interface, dbc, signals}; files are in `dir`. Unchanged without it.
 wm_status can_buses_read(const wm_yaml_node *list, const char *dir, can_buses *out, wm_error *err);
 
 // The stream of one of the buses: quantities, or the GNSS receiver's positions about `gnss_origin`. *quantities: bit
-// per wm_quantity that it can give. *out is NULL where nothing of that part is bound.
+// per wm_quantity that it can give. *out is NULL without bindings of that part.
 wm_status can_stream_open(const char *log, const can_buses *buses, size_t bus, wm_can_part part,
                           const double gnss_origin[3], wm_source **out, uint32_t *quantities, wm_error *err);
 

@@ -101,7 +101,7 @@ static wm_status fail_missing(const csv_reader *self, int column, wm_error *err)
   return csv_fail(self, err, WM_BAD_CONFIG, text);
 }
 
-// A column that nothing reads: an error where it looks like a known one that is missing, else a warning.
+// An unused column: an error where its name is near a missing one, else a warning.
 static wm_status check_unknown(const csv_reader *self, csv_field field, wm_warn_fn warn, void *context, wm_error *err) {
   char shown[WM_SHOW_TEXT_MAX], text[256];
   wm_show_text(field.text, field.length, shown, sizeof shown);

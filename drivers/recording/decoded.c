@@ -56,8 +56,8 @@ void decoded_close(decoded_pictures *self) {
   free(self);
 }
 
-// A place for `frame`: an empty one, or that of the earliest picture that nobody holds. NULL where all that may go are
-// later ones: other readers, which are ahead, will not come back to `frame`, but this one will get to those.
+// A slot for `frame`: an empty one, or that of the earliest picture without a holder. NULL where only later pictures
+// could be evicted: this reader still needs those, and the others will not come back to `frame`.
 static decoded_picture *room_for(decoded_pictures *self, uint64_t frame) {
   decoded_picture *earliest = NULL;
   for (size_t i = 0; i < DECODED_KEPT; i++) {

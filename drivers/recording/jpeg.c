@@ -36,7 +36,7 @@ jpeg_verdict jpeg_decode(jpeg_decoder *self, const uint8_t *data, size_t length,
   if (!self->handle) self->handle = tjInitDecompress();
   if (!self->handle || jpeg_size(self, data, length, &width, &height) != JPEG_GOOD) {
     (void)snprintf(why, why_bytes, "no JPEG: %s", tjGetErrorStr2(self->handle));
-    jpeg_close(self);  // libjpeg-turbo 2.1 reads the next head as this one's continuation otherwise
+    jpeg_close(self);  // libjpeg-turbo 2.1 otherwise reads the next header as this one's continuation
     return JPEG_DAMAGED;
   }
   if (width != width_px || height != height_px) {
@@ -46,7 +46,7 @@ jpeg_verdict jpeg_decode(jpeg_decoder *self, const uint8_t *data, size_t length,
   if (tjDecompress2(self->handle, data, length, grey, (int)width_px, (int)stride_bytes, (int)height_px, TJPF_GRAY,
                     TJFLAG_ACCURATEDCT | TJFLAG_LIMITSCANS) == 0)
     return JPEG_GOOD;
-  // Stray bytes between the parts of a picture do no harm, and some cameras always write them.
+  // Stray bytes between the parts of a picture are harmless, and some cameras always write them.
   const char *said = tjGetErrorStr2(self->handle);
   if (tjGetErrorCode(self->handle) == TJERR_WARNING && strstr(said, "extraneous bytes")) return JPEG_GOOD;
   (void)snprintf(why, why_bytes, "%s", said);

@@ -20,13 +20,13 @@ typedef struct jpeg_decoder {
 
 wm_status jpeg_open(jpeg_decoder *self, wm_error *err);
 void jpeg_close(jpeg_decoder *self);
-// Size by the head.
+// Size by the header.
 jpeg_verdict jpeg_size(jpeg_decoder *self, const uint8_t *data, size_t length, uint32_t *width_px, uint32_t *height_px);
-// Decodes into height rows of stride_bytes. The luma as it is stored, by the accurate transform, which gives the same
-// bytes with SIMD and without. `why` gets the reason of a verdict that isn't good.
+// Decodes into rows of stride_bytes. The luma unchanged, by the accurate transform, which gives the same bytes with
+// SIMD and without. `why` gets the reason of a verdict that isn't good.
 jpeg_verdict jpeg_decode(jpeg_decoder *self, const uint8_t *data, size_t length, uint32_t width_px, uint32_t height_px,
                          uint8_t *grey, uint32_t stride_bytes, char *why, size_t why_bytes);
-// Bytes that a JPEG of this size has at most: one that is larger is none.
+// Most bytes of a JPEG of this size: a larger one is invalid.
 size_t jpeg_bytes_max(uint32_t width_px, uint32_t height_px);
 
 #endif

@@ -50,7 +50,7 @@ static wm_landmark landmark_of(const csv_row *row) {
       .cov_m2 = {(double)NAN, (double)NAN, (double)NAN},
       .yaw_sigma_rad = sqrt(row->number[COV_TT]),
   };
-  // As a run writes its map. A covariance that is not positive definite counts as absent.
+  // The format of a run's map. A covariance that is not positive definite counts as absent.
   const double xx = row->number[COV_XX], xy = row->number[COV_XY], yy = row->number[COV_YY];
   if (xx > 0.0 && yy > 0.0 && xy * xy < xx * yy) memcpy(out.cov_m2, (const double[3]){xx, xy, yy}, sizeof out.cov_m2);
   return out;

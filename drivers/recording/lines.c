@@ -27,7 +27,7 @@ void lines_close(line_reader *self) {
   self->buffer = NULL;
 }
 
-// Moves what is left to the buffer's front and reads on behind it.
+// Moves the rest to the buffer's front and reads more after it.
 static wm_status fill(line_reader *self, wm_error *err) {
   if (self->begin > 0) memmove(self->buffer, self->buffer + self->begin, self->end - self->begin);
   self->end -= self->begin;
@@ -50,7 +50,7 @@ wm_status lines_next(line_reader *self, const char **text, size_t *length, int *
     const char *from = self->buffer + self->begin;
     const char *newline = there > searched ? memchr(from + searched, '\n', there - searched) : NULL;
     if (!newline && !self->ended) {
-      if (there == LINES_BUFFER_BYTES) {  // forget what is there, go on to the line's end
+      if (there == LINES_BUFFER_BYTES) {  // drop the content, skip to the line's end
         *too_long = 1;
         self->begin = self->end = 0;
         there = 0;

@@ -22,8 +22,8 @@ typedef struct line_reader {
 
 wm_status lines_open(line_reader *self, const char *path, wm_error *err);
 void lines_close(line_reader *self);
-// The next line without its end (LF or CRLF; the last one may lack it; a byte order mark is taken off). *text holds
-// until the next call. *too_long: the line was longer than the buffer; only its number is known. WM_OK, WM_END, WM_IO.
+// The next line without its end (LF or CRLF; the last one may lack it; a byte order mark is removed). *text is valid
+// until the next call. *too_long: the line exceeded the buffer; only its number is known. WM_OK, WM_END, WM_IO.
 wm_status lines_next(line_reader *self, const char **text, size_t *length, int *too_long, wm_error *err);
 
 #endif

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Matroska: of its tree only what leads to a picture is stepped into, so that one flat walk meets all of it in its
-// order, whether sizes are known or not. Source: RFC 8794 (EBML), RFC 9559 (Matroska).
+// Matroska: only the elements that lead to pictures are entered, so that one flat walk visits them in order, with or
+// without known sizes. Source: RFC 8794 (EBML), RFC 9559 (Matroska).
 #include <string.h>
 
 #include "container.h"
@@ -31,7 +31,7 @@ typedef struct element {
   uint64_t at, data, length;
 } element;
 
-// A number whose first byte's leading zeros say how long it is; `keep` leaves the marker in (ids).
+// A number whose length is in the leading zeros of its first byte; `keep` leaves the marker bit in (ids).
 static wm_status read_vint(const container *self, uint64_t *at, int bytes_max, int keep, uint64_t *out, wm_error *err) {
   uint8_t byte;
   wm_status status = container_bytes(self, *at, &byte, 1, err);
@@ -108,12 +108,12 @@ static wm_status next_picture(container *self, payload *out, wm_error *err) {
   }
 }
 
-// What is known of the track entry that is being read.
+// The track entry that is being read.
 typedef struct track_entry {
   uint64_t number, type, width, height;
   char codec[32];
   uint8_t code[4];  // FOURCC of a Video for Windows or uncompressed track
-  int encoded;      // compressed once more by the container
+  int encoded;      // compressed a second time by the container
 } track_entry;
 
 static wm_status read_number(const container *self, const element *e, uint64_t *out, wm_error *err) {
@@ -144,7 +144,7 @@ static wm_status read_track_element(const container *self, const element *e, tra
   }
 }
 
-// Whether the track is the one to read; the first video track is.
+// Whether the track is the one to read: the first video track.
 static wm_status judge(container *self, const track_entry *t, wm_error *err) {
   if (t->type != TYPE_VIDEO || self->track != 0) return WM_OK;
   int is_jpeg =

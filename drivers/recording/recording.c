@@ -36,7 +36,7 @@ static wm_status path_of(const wm_recording *self, const char *file, char out[WM
   return WM_OK;
 }
 
-// The override where there is one, else the recording's own file; `*there`: whether it is.
+// The override where there is one, else the recording's own file; `*there`: whether it exists.
 static wm_status choose(const wm_recording *self, const char *override, const char *file, char out[WM_PATH_MAX],
                         int *there, wm_error *err) {
   if (*override) {
@@ -71,7 +71,7 @@ static int is_read(const char *file) {
   return 0;
 }
 
-// Every file that `streams` names must be there; of files that nothing here reads (videos, truth) a word is enough.
+// Every file under `streams` must exist; for files that are not read here (videos, truth) a warning suffices.
 static wm_status check_streams(const wm_recording *self, const wm_yaml_node *streams, wm_error *err) {
   if (wm_yaml_there(streams) && !wm_yaml_is_list(streams))
     return wm_yaml_fail(streams, err, "a list of the files that are there is needed");
@@ -102,7 +102,7 @@ static wm_status read_start(wm_recording *self, wm_error *err) {
     warn_line(&self->warn, "%s:%d: initial_pose: belongs under vehicle; here it is ignored", wm_yaml_file(root),
               wm_yaml_line(&misplaced));
   if (!wm_yaml_there(&pose)) return WM_OK;
-  // Unknown keys are allowed in recording.yaml; a misspelt one is worth a word.
+  // Unknown keys are allowed in recording.yaml; a misspelt one gets a warning.
   if (wm_yaml_check_keys(&pose, wm_start_keys, WM_YAML_NEAR, &unknown, &said) != WM_OK || unknown)
     warn_line(&self->warn, "%s", said.text);
   wm_status status = wm_start_read(&pose, &start, err);
@@ -142,7 +142,7 @@ static int is_listed(const wm_recording *self, const char *file) {
   return !wm_yaml_there(&streams);
 }
 
-// Whether the stream's file is in the folder. One that `streams` forgets is read all the same.
+// Whether the stream's file is in the folder. It is read also where `streams` omits it.
 static wm_status find_stream(const wm_recording *self, const char *file, char path[WM_PATH_MAX], int *there,
                              wm_error *err) {
   wm_status status = choose(self, "", file, path, there, err);
@@ -181,7 +181,7 @@ static wm_status make_corner_reader(wm_recording *self, const char *path, const 
   return wm_corner_reader_make(path, name, &rig->cameras[camera], rig->marker_size_m, out, err);
 }
 
-// A source a sensor: each reads the file by itself, so that memory stays bounded however unevenly they are asked.
+// One source for each sensor: each reads the file by itself, so that memory stays bounded at any order of reading.
 static wm_status add_sensor_streams(wm_recording *self, const stream_kind *kind, sensor_names *names, wm_error *err) {
   char path[WM_PATH_MAX];
   int there;
@@ -202,8 +202,8 @@ static wm_status add_sensor_streams(wm_recording *self, const stream_kind *kind,
   return status;
 }
 
-// The buses of recording.yaml, or one for all. A configuration's DBC and binding take the place of the recording's
-// where there is one bus; several have files of their own.
+// The buses of recording.yaml, or one for all. With one bus a configuration's DBC and binding replace the recording's;
+// several buses have files of their own.
 static wm_status find_buses(const wm_recording *self, can_buses *out, wm_error *err) {
   int there;
   wm_yaml_node root = wm_yaml_root(self->about), list = wm_yaml_get(&root, "can");
@@ -222,7 +222,7 @@ static wm_status find_buses(const wm_recording *self, can_buses *out, wm_error *
   return status;
 }
 
-// The recording's first file that isn't there; NULL: all are.
+// The recording's first missing file; NULL: none.
 static const char *missing_of(const wm_recording *self, const can_buses *buses) {
   for (size_t i = 0; i == 0 || i < buses->count; i++) {
     const char *dbc = buses->bus[i].dbc, *signals = buses->bus[i].signals;

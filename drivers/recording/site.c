@@ -28,13 +28,13 @@ struct wm_site {
   wm_landmark *landmarks;
   size_t landmark_count;
   char landmarks_path[WM_PATH_MAX];  // "" where there are none
-  wm_appearance *appearances;        // NULL until they are asked for
+  wm_appearance *appearances;        // NULL until the first call
   size_t appearance_count;
   char map_path[WM_PATH_MAX];  // "" where there is none
-  wm_map *map;                 // NULL until it is asked for
+  wm_map *map;                 // NULL until the first call
 };
 
-// The file that is named, else the folder's own; `*there`: whether it exists.
+// The named file, else the folder's own; `*there`: whether it exists.
 static wm_status choose(const wm_site *self, const char *named, const char *file, char out[WM_PATH_MAX], int *there,
                         wm_error *err) {
   if (*named) {
@@ -82,8 +82,8 @@ static wm_status find_map(wm_site *self, wm_error *err) {
   return status;
 }
 
-// Index of the sensor; one that `sensors` of calibration.yaml doesn't have sits where the camera of its name sits, or
-// at base_link.
+// Index of the sensor; one that `sensors` of calibration.yaml lacks is added at the camera of its name, or at
+// base_link.
 wm_status wm_site_sensor(wm_site *self, const char *path, const char *name, uint16_t *out, wm_error *err) {
   calibration *known = &self->calibration;
   for (size_t i = 0; i < known->sensor_count; i++) {

@@ -13,8 +13,8 @@ void wm_start_init(wm_start *out) {
   *out = (wm_start){WM_TIME_NONE, {nan, nan, nan}, {nan, nan, nan, nan}, nan, 0.05, 0.05};
 }
 
-// Heading of a unit quaternion, to the nearest 1e-12 rad: the C library's arctangent differs in its last bit between
-// machines, and the start must not.
+// Heading of a unit quaternion, rounded to 1e-12 rad: the C library's arctangent differs in its last bit between
+// machines.
 static double heading_of(const double q[4]) {
   double heading_rad = atan2(2.0 * (q[3] * q[2] + q[0] * q[1]), 1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]));
   return round(heading_rad * 1e12) * 1e-12;

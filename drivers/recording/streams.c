@@ -9,7 +9,7 @@
 
 #include "arrival.h"
 
-// Limits of what can be: wide enough for anything that drives or swims, tight enough for a broken value.
+// Limits of plausible values: wide enough for all vehicles, tight enough for corrupt data.
 #define SPEED -1000.0, 1000.0
 #define RATE -1000.0, 1000.0
 #define ANGLE -6.2832, 6.2832
@@ -22,7 +22,7 @@
 #define ANY_ID 0.0, 2147483647.0
 #define ID_OR_UNKNOWN -1.0, 2147483647.0
 
-// Every stream begins so.
+// The first columns of every stream.
 enum { T, ARRIVAL, FIRST };
 #define STAMPS \
   {"t_ns", CSV_TIME, CSV_NEEDED, 0, 0}, { "arrival_ns", CSV_TIME, CSV_OPTIONAL, 0, 0 }
@@ -34,7 +34,7 @@ struct stream_kind {
   const char *name;
   wm_event_kind event;
   csv_format format;
-  // Fills the event's body from a row. A row that says nothing: the reason, else NULL.
+  // Fills the event's body from a row. NULL, or the reason why the row has no event.
   const char *(*fill)(const stream *self, const csv_row *row, wm_event *out);
 };
 
@@ -49,9 +49,9 @@ struct stream {
   arrival_order order;
   uint32_t seq;
   csv_row row, ahead;
-  int has_ahead;   // `ahead` was read, but not yet handed on
+  int has_ahead;   // `ahead` is read, and not handed on yet
   int row_waits;   // points: `row` belongs to the next stamp
-  csv_row before;  // base.sample_at_next: the row whose values wait for the next stamp
+  csv_row before;  // base.sample_at_next: the row whose values get the next stamp
   int has_before;
   const wm_corner_reader *corners;  // of kStreamCorners
 };
@@ -71,7 +71,7 @@ static const char *fill_motion6(const stream *self, const csv_row *row, wm_event
   return NULL;
 }
 
-// Fields from `first` on that are empty.
+// Number of empty fields from `first` on.
 static int count_empty(const csv_row *row, int first, int count) {
   int empty = 0;
   for (int i = 0; i < count; i++) empty += isnan(row->number[first + i]);
@@ -89,14 +89,14 @@ static const char *fill_increment(const stream *self, const csv_row *row, wm_eve
   return NULL;
 }
 
-// Into (-pi, pi] from at most one turn beyond.
+// Into (-pi, pi]; the argument is at most one turn beyond.
 static double wrapped(double angle_rad) {
   if (angle_rad > M_PI) return angle_rad - 2.0 * M_PI;
   if (angle_rad <= -M_PI) return angle_rad + 2.0 * M_PI;
   return angle_rad;
 }
 
-// Sigmas of bearing and range by the covariance of the place in the sensor's frame; their correlation is left out.
+// Sigmas of bearing and range from the covariance of the position in the sensor's frame; their correlation is dropped.
 static const char *polar_sigmas(const csv_row *row, wm_sighting *s) {
   const double *cov = &row->number[FIRST + 6];
   const int empty = count_empty(row, FIRST + 6, 3);
@@ -350,7 +350,7 @@ static void count_bad_row(stream *self, wm_status status, const csv_row *row, co
   count_bad(self, status, text);
 }
 
-// The next row of this source that can be read; others are counted.
+// The next readable row of this source; others are counted.
 static wm_status read_row(stream *self, csv_row *row, wm_error *err) {
   for (;;) {
     wm_error why;
@@ -369,7 +369,7 @@ static wm_time_ns arrival_of(const csv_row *row) {
   return row->whole[ARRIVAL] == WM_TIME_NONE ? row->whole[T] : row->whole[ARRIVAL];
 }
 
-// The next good row, into self->row. One row is read ahead: a stamp is judged by the one after it.
+// The next good row, into self->row. One row is read ahead: a stamp is checked against the one after it.
 static wm_status next_row(stream *self, wm_error *err) {
   wm_status status = self->has_ahead ? WM_OK : read_row(self, &self->ahead, err);
   if (status != WM_OK) return status;
@@ -399,7 +399,7 @@ static void hand_out(stream *self, wm_time_ns arrival_ns, wm_event *out) {
   self->base.counts.received++;
 }
 
-// The row with the values of an event that has self->row's stamp; NULL: of the first row the stamp is not known yet.
+// The row whose values belong to self->row's stamp; NULL at the first row, whose stamp is not known yet.
 static const csv_row *values_row(stream *self, csv_row *values) {
   if (!self->base.sample_at_next) return &self->row;
   int had = self->has_before;
@@ -427,7 +427,7 @@ static wm_status next_single(wm_source *base, wm_event *out, wm_error *err) {
   }
 }
 
-// All rows of a stamp are one event; it has arrived when the last of them has.
+// All rows of a stamp are one event; it arrives with the last of them.
 static wm_status next_points(wm_source *base, wm_event *out, wm_error *err) {
   stream *self = (stream *)base;
   wm_status status = self->row_waits ? WM_OK : next_row(self, err);

@@ -21,14 +21,13 @@ typedef struct sensor_names {
   size_t count;
 } sensor_names;
 
-// Reads the file once for the sensors that it names; a line that can't be split or a name above 31 letters is left to
-// the source to count. WM_FULL above 32 of them.
+// Reads the sensors' names of a file; lines that can't be split and names above 31 letters are left to the source,
+// which counts them. WM_FULL above 32 sensors.
 wm_status stream_find_sensors(const char *path, const stream_kind *kind, sensor_names *out, wm_error *err);
 
-// A source on a stream's file. `sensor`: only rows of this one, with `sensor_index` in their events; NULL where the
-// file has no sensors. `others`: the names that other sources take; a row of none of them (broken beyond that) is
-// counted by the source with `takes_broken`. The names must live as long as the source, as must `corners`, which
-// kStreamCorners needs.
+// A source on a stream's file. `sensor`: only this sensor's rows, with `sensor_index` in their events; NULL where the
+// file has no sensors. `others`: the names of the other sources; a row of none of them (a corrupt name) is counted by
+// the source with `takes_broken`. The names outlive the source, as do `corners`, which kStreamCorners needs.
 wm_status stream_open(const char *path, const stream_kind *kind, const char *sensor, uint16_t sensor_index,
                       const sensor_names *others, int takes_broken, const wm_corner_reader *corners, wm_warn_fn warn,
                       void *context, wm_source **out, wm_error *err);

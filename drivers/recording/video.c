@@ -16,7 +16,7 @@
 #include "jpeg.h"
 
 #define PICTURE_SIDE_MAX 16384
-#define INTERVALS 9  // whose middle is the usual period
+#define INTERVALS 9  // the usual period is their median
 
 enum { FRAME, T, EXPOSURE, ARRIVAL };
 static const csv_format kFormat = {{{"frame", CSV_WHOLE, CSV_NEEDED, 0, 2147483647.0},
@@ -24,7 +24,7 @@ static const csv_format kFormat = {{{"frame", CSV_WHOLE, CSV_NEEDED, 0, 21474836
                                     {"exposure_ns", CSV_TIME, CSV_OPTIONAL, 0, 0},
                                     {"arrival_ns", CSV_TIME, CSV_OPTIONAL, 0, 0}}};
 
-// The picture and the row that belong together and come next.
+// The next picture and its row.
 typedef struct located {
   int there;
   payload picture;
@@ -40,11 +40,11 @@ struct wm_video {
   uint32_t width_px, height_px;
   uint8_t *bytes[2], *pixels;  // compressed: this picture and the one before
   size_t bytes_max, before_length;
-  decoded_pictures *shared;  // with other readers of the same video; NULL: with none
-  decoded_picture *held;     // of those, the one that was handed out last
+  decoded_pictures *shared;  // shared with other readers of the same video; NULL: not shared
+  decoded_picture *held;     // the last one handed out
   csv_row row, ahead;
   int has_row, has_ahead, rows_ended, pictures_ended;
-  payload picture;  // read from the container, waiting for its row
+  payload picture;  // read from the container, without its row yet
   int has_picture;
   int64_t newest_row;
   arrival_order order;
@@ -67,7 +67,7 @@ static int video_path(const char *dir, const char *camera, const char *suffix, c
   return snprintf(out, WM_PATH_MAX, "%s/video/%s%s", dir, camera, suffix) < WM_PATH_MAX;
 }
 
-// Index into kPlaces of the first place from `from` on where there are pictures, or PLACE_COUNT.
+// Index into kPlaces of the first place from `from` on with pictures, or PLACE_COUNT.
 static size_t find_place(const char *dir, const char *camera, size_t from, char out[WM_PATH_MAX]) {
   for (size_t i = from; i < PLACE_COUNT; i++) {
     struct stat about;
@@ -130,7 +130,7 @@ static wm_status read_row(wm_video *self, csv_row *row, wm_error *err) {
   }
 }
 
-// The next good row, into self->row. One row is read ahead: a stamp is judged by the one after it.
+// The next good row, into self->row. One row is read ahead: a stamp is checked against the one after it.
 static wm_status next_row(wm_video *self, wm_error *err) {
   if (self->rows_ended) return WM_END;
   wm_status status = self->has_ahead ? WM_OK : read_row(self, &self->ahead, err);
@@ -153,7 +153,7 @@ static wm_status next_row(wm_video *self, wm_error *err) {
 
 // ── pictures ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// The container's next picture into self->picture; WM_END for good when it has no more or can't be told apart.
+// The container's next picture into self->picture; WM_END at its end or where it is corrupt.
 static wm_status next_picture(wm_video *self, wm_error *err) {
   wm_error why;
   if (self->has_picture) return WM_OK;
@@ -173,7 +173,7 @@ static wm_status next_picture(wm_video *self, wm_error *err) {
   return WM_END;
 }
 
-// Walks on to the picture that self->row names. WM_END: it isn't there, and is counted.
+// Advances to the picture of self->row. WM_END: it is missing, and counted.
 static wm_status find_picture(wm_video *self, payload *out, wm_error *err) {
   uint64_t wanted = (uint64_t)self->row.whole[FRAME];
   if (self->file.fd < 0) {
@@ -205,7 +205,7 @@ static int by_length(const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-// Gaps against the usual period, which is the middle of the last few. An hour is a recording joined to another.
+// Counts gaps against the usual period, the median of the last few. A gap of an hour is a joint of two recordings.
 static void count_gap(wm_video *self, wm_time_ns t_ns) {
   if (self->last_ns == WM_TIME_NONE) return;
   wm_time_ns gap_ns = t_ns - self->last_ns;
@@ -275,7 +275,7 @@ static jpeg_verdict decode(wm_video *self, size_t length, uint8_t *grey, uint32_
   if (self->file.coding == PICTURE_JPEG)
     return jpeg_decode(&self->jpeg, self->bytes[0], length, self->width_px, self->height_px, grey, stride_bytes, why,
                        why_bytes);
-  // Rows as they are, or filled up to four bytes each.
+  // Rows are packed, or padded to four bytes.
   uint32_t padded = (self->width_px + 3) & ~UINT32_C(3), stride = self->width_px;
   if (length == (size_t)padded * self->height_px) stride = padded;
   if (length != (size_t)stride * self->height_px) {
@@ -286,13 +286,13 @@ static jpeg_verdict decode(wm_video *self, size_t length, uint8_t *grey, uint32_
   return JPEG_GOOD;
 }
 
-// Where a picture's pixels go; `grey` NULL: among the shared ones, where there is room.
+// Destination of a picture's pixels; `grey` NULL: a shared picture, where there is room.
 typedef struct target {
   uint8_t *grey;
   uint32_t stride_bytes;
 } target;
 
-// Into the shared pictures, or from there where another reader was first.
+// Decodes into the shared picture, or takes it from another reader.
 static jpeg_verdict decode_shared(wm_video *self, size_t length, target *out, char *why, size_t why_bytes) {
   int is_mine;
   const target own = {self->pixels, self->width_px};
@@ -309,7 +309,7 @@ static jpeg_verdict decode_shared(wm_video *self, size_t length, target *out, ch
   return p->verdict;
 }
 
-// 1: a frame; 0: not one, counted; the rest by *status.
+// 1: a frame; 0: none, counted; other cases by *status.
 static int take(wm_video *self, target *to, wm_status *status, wm_error *err) {
   const payload *picture = &self->next.picture;
   char why[256];
@@ -427,7 +427,7 @@ static wm_status skip_to(wm_frame_source *base, wm_time_ns now_ns, wm_error *err
 
 static void raw(const wm_frame_source *base, wm_camera_raw *out) {
   const wm_video *self = (const wm_video *)base;
-  *out = (wm_camera_raw){.data = self->bytes[1],  // the newest; the other one is for the next
+  *out = (wm_camera_raw){.data = self->bytes[1],  // the newest; the other buffer is for the next
                          .bytes = (uint32_t)self->before_length,
                          .is_jpeg = self->file.coding == PICTURE_JPEG};
 }
@@ -449,7 +449,7 @@ wm_frame_source *wm_video_frames(wm_video *self) { return &self->base; }
 
 // ── opening ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// A camera of unknown size has that of its first picture.
+// A camera of unknown size takes that of its first picture.
 static wm_status size_of_first(wm_video *self, wm_error *err) {
   self->width_px = self->file.width_px;
   self->height_px = self->file.height_px;

@@ -8,7 +8,7 @@
 #define WM_YAML_BYTES_MAX (16u << 20)
 #define WM_YAML_NODES_MAX 1000000
 #define WM_YAML_DEPTH_MAX 64
-#define WM_YAML_ANCHORS_MAX 1000  // each alias looks through them
+#define WM_YAML_ANCHORS_MAX 1000  // each alias searches them
 
 typedef enum yaml_kind { YAML_KIND_NULL, YAML_KIND_SCALAR, YAML_KIND_LIST, YAML_KIND_MAP } yaml_kind;
 
@@ -23,7 +23,7 @@ typedef struct yaml_tree_node {
 
 struct wm_yaml {
   char file[512];
-  yaml_tree_node *nodes;  // [0] is "not there"
+  yaml_tree_node *nodes;  // [0] is an absent node
   size_t node_count, node_capacity;
   int *links;
   size_t link_count, link_capacity;

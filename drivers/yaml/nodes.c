@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Walking the tree, and typed reads that explain themselves.
+// Access to the tree, and typed reads with messages.
 #include <float.h>
 #include <math.h>
 #include <stdarg.h>
@@ -12,7 +12,7 @@
 
 static const yaml_tree_node *at(const wm_yaml_node *node) { return &node->doc->nodes[node->id]; }
 
-// The place of a value of a map (`key`) or of an item of a list (`key` NULL).
+// The node of a map's value (`key`) or of a list's item (`key` NULL).
 static wm_yaml_node child(const wm_yaml_node *parent, int id, const char *key, size_t index) {
   wm_yaml_node node = {.doc = parent->doc, .id = id};
   char shown[WM_SHOW_TEXT_MAX];
@@ -82,7 +82,7 @@ wm_status wm_yaml_fail(const wm_yaml_node *node, wm_error *err, const char *form
                  *node->path ? ": " : "", text);
 }
 
-// "'abc'", "a list", "nothing": what stands there.
+// "'abc'", "a list", "nothing": a node's content for messages.
 static const char *what_is(const wm_yaml_node *node, char out[WM_SHOW_TEXT_MAX + 16]) {
   char shown[WM_SHOW_TEXT_MAX];
   switch (at(node)->kind) {
@@ -112,7 +112,7 @@ static const char *number_needed(const char *noun, double min, double max, char 
   return out;
 }
 
-// Not there, or there with nothing behind the colon.
+// Absent, or empty after the colon.
 static int is_null(const wm_yaml_node *node) { return at(node)->kind == YAML_KIND_NULL; }
 static int is_plain(const wm_yaml_node *node) { return wm_yaml_is_scalar(node) && !at(node)->quoted; }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// libyaml's events to a tree with line numbers. An alias refers to the anchored node itself, so nothing is copied; what
-// it would be when written out is counted and bounded.
+// libyaml's events to a tree with line numbers. An alias refers to the anchored node itself, without a copy; its
+// expanded size is counted and bounded.
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -87,7 +87,7 @@ static int push(builder *b, int id) {
   return 1;
 }
 
-// Remembers the anchor and returns its index + 1; 0 where it fails. A name may be given anew: the last one holds.
+// Stores the anchor and returns its index + 1; 0 on failure. A redefined name has its last value.
 static size_t add_anchor(builder *b, const yaml_char_t *name, size_t line) {
   if (b->anchor_count >= WM_YAML_ANCHORS_MAX) return (size_t)fail_at(b, line, "more than 1000 anchors");
   if (!room_for(&b->anchors, &b->anchor_capacity, b->anchor_count + 1, sizeof *b->anchors)) return (size_t)no_memory(b);
@@ -245,7 +245,7 @@ wm_status wm_yaml_parse(const char *text, size_t length, const char *path, wm_ya
   if (yaml_parser_initialize(&b.parser)) {
     yaml_parser_set_encoding(&b.parser, YAML_UTF8_ENCODING);
     yaml_parser_set_input_string(&b.parser, (const unsigned char *)text, length);
-    (void)add_node(&b, YAML_KIND_NULL, 1);  // index 0: not there
+    (void)add_node(&b, YAML_KIND_NULL, 1);  // index 0: absent
     ok = b.doc->node_count == 1 && build_document(&b);
     yaml_parser_delete(&b.parser);
   } else {

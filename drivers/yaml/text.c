@@ -76,7 +76,7 @@ wm_text_number wm_text_to_i64(const char *text, size_t length, int64_t *out) {
   int negative = 0;
   if (i < length && (text[i] == '+' || text[i] == '-')) negative = text[i++] == '-';
   if (i == length || skip_digits(text, length, i) != length) return WM_TEXT_NOT_A_NUMBER;
-  int64_t value = 0;  // built below zero, which reaches one further
+  int64_t value = 0;  // negative while it is built, because that range is larger by one
   for (; i < length; i++) {
     int digit = text[i] - '0';
     if (value < (INT64_MIN + digit) / 10) return WM_TEXT_TOO_LARGE;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A document as text: its top level a key a line, what is below in brackets.
+// Writes a document as text: a line for each top-level key, flow style below.
 #include <ctype.h>
 #include <errno.h>
 #include <stdio.h>
@@ -19,7 +19,7 @@ static const wm_yaml_change *change_of(const writer *self, const char *path) {
   return NULL;
 }
 
-// The key that a change adds to the map at `path`: what is behind the path, if that has no further parts.
+// The key that a change adds to the map at `path`: the rest of its path, if that is a single part.
 static const char *key_below(const char *path, const char *changed) {
   size_t length = strlen(path);
   if (strncmp(changed, path, length) != 0) return NULL;
@@ -28,7 +28,7 @@ static const char *key_below(const char *path, const char *changed) {
   return *key && !strpbrk(key, ".[") ? key : NULL;
 }
 
-// What needs no quotes anywhere. Text with other characters is never a number, so that quotes don't change it.
+// Text that needs no quotes. Other text is never a number, so quotes don't change it.
 static int is_plain(const char *text, size_t length) {
   if (length == 0 || text[length - 1] == ':' || strcmp(text, "-") == 0) return 0;
   for (size_t i = 0; i < length; i++)
@@ -65,7 +65,7 @@ static void write_pair(const writer *self, const char *key, const wm_yaml_node *
     write_node(self, value);
 }
 
-// The pairs of a map with its changes, `between` two of them and behind the last one `end`.
+// The pairs of a map with its changes, with `between` two of them and `end` after the last.
 static void write_pairs(const writer *self, const wm_yaml_node *map, const char *between, const char *end) {
   int written = 0;
   for (size_t i = 0; i < wm_yaml_count(map); i++) {

@@ -130,7 +130,7 @@ static void source_health(const wm_pipeline *self, size_t i, wm_time_ns now_ns, 
   out->newest_ns = merged->newest_ns;
   out->silent_ns = wm_merge_silent_ns(self->merge, i, now_ns);
   const wm_source *source = self->assembly->sources[i].source;
-  out->stale = (uint8_t)(!(source && source->is_rare) && wm_merge_is_stale(self->merge, i, now_ns));
+  out->stale = (uint8_t)(!(source && source->event_driven) && wm_merge_is_stale(self->merge, i, now_ns));
 }
 
 // Of the fused pose; the published pose has a little less left.

@@ -93,7 +93,7 @@ wm_status command_socket_open(const char *path, wm_source **out, wm_error *err) 
   command_socket *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "no memory to listen to commands");
   self->base.ops = &kOps;
-  self->base.is_live = self->base.is_rare = 1;
+  self->base.is_live = self->base.event_driven = 1;
   self->base.lateness_max_ms = LATENESS_MS;
   self->base.kinds = WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET);
   self->fd = -1;

@@ -80,7 +80,7 @@ wm_status lcm_commands_open(const char *url, const char *channel_prefix, lcm_t *
   lcm_commands *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "no memory for an LCM subscription");
   self->base.ops = &kCommands;
-  self->base.is_live = self->base.is_rare = 1;
+  self->base.is_live = self->base.event_driven = 1;
   self->base.lateness_max_ms = LATENESS_MS;
   self->base.kinds = WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET);
   (void)snprintf(self->base.name, sizeof self->base.name, "commands");

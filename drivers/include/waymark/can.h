@@ -28,21 +28,20 @@ typedef struct wm_can_frame {
 } wm_can_frame;
 
 // One line of `candump -l` ("(SECONDS.MICROS) IFACE ID#DATA ..."): classic (also with a raw DLC, _9 to _F), FD (##),
-// remote and error frames (bit 29 of eight digits), with or without the direction (R, T) at its end. `line` needn't be
-// terminated. WM_AGAIN: an empty line, or one that begins with '#'. WM_BAD_DATA, WM_OUT_OF_RANGE, WM_UNSUPPORTED
-// (CAN XL): the text says why, without file and line. What candump shows on the screen is refused with a message that
-// says so. The time is exact (integers), negative ones included. Cost linear in `length`; no allocation. Any thread.
+// remote and error frames (bit 29 of eight digits), with or without a final direction (R, T). `line` needn't be
+// terminated. WM_AGAIN: an empty line, or one that begins with '#'. WM_BAD_DATA, WM_OUT_OF_RANGE, WM_UNSUPPORTED (CAN
+// XL): *err has the reason, without file and line. candump's screen format is refused with a message of its own. The
+// time is exact (integers), also a negative one. Cost linear in `length`; no allocation. Any thread.
 wm_status wm_candump_parse(const char *line, size_t length, wm_can_frame *out, wm_error *err);
 
-// The same line from a frame, with its end, terminated; stamps to the microsecond. Its length, 0 where it doesn't
-// fit (256 bytes are enough). No allocation. Any thread.
+// Writes a frame as such a line, terminated, with its line feed; stamps to the microsecond. Returns its length, 0 where
+// it doesn't fit (256 bytes suffice). No allocation. Any thread.
 size_t wm_candump_write(const wm_can_frame *frame, char *out, size_t capacity);
 
-// A DBC file, read at start, UTF-8 or Windows-1252. Allocates (at most a few times the file's size, which is at most
-// 16 MB); not for the real-time thread. WM_BAD_CONFIG with file and line for what is wrong in what Waymark reads (BO_,
-// SG_, SIG_VALTYPE_, SG_MUL_VAL_, VAL_); other sections are passed over. What may stand in a makers' file as long as
-// nobody uses it (a signal that doesn't fit into its message, a multiplexed one without a multiplexer) is refused by
-// wm_can_decoder_make.
+// A DBC file, read at start, UTF-8 or Windows-1252. Allocates (at most a few times the file's size, which is at most 16
+// MB); not for the real-time thread. WM_BAD_CONFIG with file and line for errors in BO_, SG_, SIG_VALTYPE_, SG_MUL_VAL_
+// and VAL_; other sections are skipped. Errors that matter only for a bound signal (one that doesn't fit into its
+// message, a multiplexed one without a multiplexer) are left to wm_can_decoder_make.
 typedef struct wm_dbc wm_dbc;
 wm_status wm_dbc_load(const char *path, wm_dbc **out, wm_error *err);
 wm_status wm_dbc_parse(const char *text, size_t length, const char *path_for_messages, wm_dbc **out, wm_error *err);
@@ -58,10 +57,10 @@ enum {
   WM_CAN_VALID,  // 0: the receiver has no fix
   WM_CAN_COUNT
 };
-// Of a wm_quantity or of the above, as can-signals.yaml writes it; "?" where there is none.
+// Name of a wm_quantity or of the above in can-signals.yaml; "?" for others.
 const char *wm_can_quantity_name(unsigned quantity);
 
-// The bindings of one source: what moves the robot, or its GNSS receiver.
+// The bindings of one source: motion, or the GNSS receiver.
 typedef enum wm_can_part { WM_CAN_MOTION, WM_CAN_GNSS } wm_can_part;
 
 // Positions from the values of a GNSS receiver, in metres east and north of an origin (WGS84 by its radii of curvature
@@ -94,32 +93,32 @@ typedef struct wm_can_binding {
     double raw;
     double direction;
   } gear[WM_CAN_VALUES_MAX];
-  int line;  // where it stands, for messages
+  int line;  // of can-signals.yaml, for messages
   char file[192];
 } wm_can_binding;
 
-// Decodes frames into quantities. Making one allocates, and copies what it needs: the DBC and the bindings may go.
-// Each quantity may be bound once. WM_BAD_CONFIG with the binding's file and line for what cannot be right (docs/can.md
-// has the list).
+// Decodes frames into quantities. Making one allocates and copies all it needs: the DBC and the bindings may be freed.
+// Each quantity may be bound once. WM_BAD_CONFIG with the binding's file and line for a wrong binding (docs/can.md
+// lists the checks).
 typedef struct wm_can_decoder wm_can_decoder;
 wm_status wm_can_decoder_make(const wm_dbc *dbc, const wm_can_binding *bindings, size_t count, wm_can_decoder **out,
                               wm_error *err);
 void wm_can_decoder_free(wm_can_decoder *self);  // NULL is fine
 
 // WM_OK: *out holds the quantities of this frame (ticks unwrapped, units SI), with `lost_before` and `doubt`.
-// WM_AGAIN: nothing to hand out: nothing is bound to this frame (counts.ignored), it is an error frame (bus_errors) or
-// a repeated one (frozen; from the third on they are handed out with WM_DOUBT_FROZEN_COUNTER).
-// WM_BAD_DATA: shorter than its bound signals (malformed), or all of its signals say that there is no value
-// (not_finite); the text is in *err.
-// `counts.received` and `counts.first_problem` are for the source, which hands the event out and knows file and line.
-// A message's rolling counter, where the DBC has one and it steps by one in the first frames, gives `lost`; a frame
-// that was overtaken is taken off again when it comes.
-// Ticks go on from their last value by the shorter way round: a gap must not last longer than half a cycle.
+// WM_AGAIN: no quantities: a frame without a binding (counts.ignored), an error frame (bus_errors), or a repeated one
+// (frozen; from the third on they are handed out with WM_DOUBT_FROZEN_COUNTER).
+// WM_BAD_DATA: shorter than its bound signals (malformed), or all of its signals mean "not available" (not_finite); the
+// text is in *err.
+// The source, which has file and line, fills `counts.received` and `counts.first_problem`.
+// A message's rolling counter, where the DBC has one that steps by one in the first frames, gives `lost`; a late frame
+// is subtracted again.
+// Ticks continue from their last value by the shorter way round: a gap must not exceed half a cycle.
 // No allocation. Cost: a search among the bound ids, then linear in the bound signals; on a desk computer 6 ns for an
 // unbound id and 55 ns for a frame of four signals. One thread at a time.
 wm_status wm_can_decode(wm_can_decoder *self, const wm_can_frame *frame, wm_quantities *out, wm_source_counts *counts,
                         wm_error *err);
-// CAN ids that are needed, for kernel filters; returns how many there are.
+// CAN ids for kernel filters; returns how many there are.
 size_t wm_can_decoder_ids(const wm_can_decoder *self, uint32_t *ids, uint8_t *is_extended, size_t capacity);
 // Quantities that this decoder can give: bit per wm_quantity.
 uint32_t wm_can_decoder_quantities(const wm_can_decoder *self);

@@ -11,10 +11,10 @@ extern "C" {
 
 #define WM_CASCADE_BYTES_MAX (16u << 20)
 
-// Reads a cascade as opencv_traincascade (or `waymark map train-cascade`) writes it; `height_m` is left 0. Without
-// OpenCV: the format is small, and its library would be 230 MB on a robot. WM_BAD_CONFIG with file and line for what is
-// no such file, is cut, has numbers that can't be, tilted HAAR features, or the format of OpenCV 1 (type_id
-// opencv-haar-classifier). Start only; allocates what wm_cascade_free frees (also a cascade of zeros).
+// Reads a cascade in the format of opencv_traincascade (or `waymark map train-cascade`); `height_m` is left 0. Without
+// OpenCV: the format is small, and its library would be 230 MB on a robot. WM_BAD_CONFIG with file and line for other
+// files, truncated ones, invalid numbers, tilted HAAR features, or the format of OpenCV 1 (type_id
+// opencv-haar-classifier). At start only; allocates memory for wm_cascade_free (also a cascade of zeros).
 wm_status wm_cascade_load(const char *path, wm_cascade *out, wm_error *err);
 wm_status wm_cascade_parse(const char *text, size_t length, const char *path, wm_cascade *out, wm_error *err);
 void wm_cascade_free(wm_cascade *self);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The robot's own devices as sources. Opening one never fails because the device isn't there: it is looked for again
-// and again, and `counts.device` says how it does.
+// The robot's devices as sources. An absent device is no error: it is searched for again and again, and `counts.device`
+// has its state.
 #ifndef WAYMARK_DEVICES_H
 #define WAYMARK_DEVICES_H
 
@@ -22,10 +22,10 @@ typedef struct wm_can_device_config {
   int line;
 } wm_can_device_config;
 
-// All frames of an interface, of whatever kind, stamped on the monotonic clock: for a recorder. As the source: it waits
-// for up to WM_DEVICE_WAIT_MS, then WM_AGAIN; the interface needn't be there. One thread.
+// All frames of an interface of any kind, stamped on the monotonic clock, for a recorder. As the source it waits for up
+// to WM_DEVICE_WAIT_MS, then WM_AGAIN; the interface may be absent. One thread.
 typedef struct wm_can_listener wm_can_listener;
-// Bytes that the kernel grants the queue of a CAN socket, asked for *wanted; 0: it has no CAN.
+// Bytes that the kernel grants for the queue of a CAN socket, with the requested bytes in *wanted; 0: no CAN.
 int wm_can_queue_bytes(int *wanted);
 wm_status wm_can_listener_open(const char *interface, wm_can_listener **out, wm_error *err);
 wm_status wm_can_listener_next(wm_can_listener *self, wm_can_frame *out, wm_error *err);
@@ -36,37 +36,37 @@ typedef enum wm_stamp_point { WM_STAMP_AUTO, WM_STAMP_START, WM_STAMP_END } wm_s
 
 #define WM_CAMERA_CONTROLS_MAX 16
 typedef struct wm_camera_device_config {
-  char name[WM_NAME_MAX];  // of the camera in calibration.yaml, which has its size
+  char name[WM_NAME_MAX];  // of the camera in calibration.yaml, which gives its size
   char device[128];        // /dev/video0, /dev/v4l/by-id/...
-  char libcamera[128];     // instead of it: libcamera's identifier, as `cam -l` says; "": V4L2
-  char card[48], bus[48];  // who it is, as `v4l2-ctl -D` says; "": as it is when it is opened first
+  char libcamera[128];     // instead: libcamera's identifier by `cam -l`; "": V4L2
+  char card[48], bus[48];  // identity by `v4l2-ctl -D`; "": taken at the first opening
   char format[8];          // one of wm_camera_formats; "": the driver's
   double rate_hz;          // 0: the driver's
-  double exposure_ms;      // 0: as the driver says, where it does
+  double exposure_ms;      // 0: by the driver, where it reports it
   double latency_ms;       // from the exposure's start or end to the driver's stamp
-  int32_t stamp;           // wm_stamp_point: what the driver's stamp is of
+  int32_t stamp;           // wm_stamp_point: what the driver's stamp marks
   uint32_t control_count;
   struct {
-    char name[32];  // as `v4l2-ctl -l` writes it, or libcamera ("ExposureTime")
+    char name[32];  // by `v4l2-ctl -l`, or libcamera's ("ExposureTime")
     int32_t value;
   } controls[WM_CAMERA_CONTROLS_MAX];
   int line;
 } wm_camera_device_config;
 
-// Every buffer of the driver is in one of these.
+// Every buffer of the driver is counted in one of these.
 typedef struct wm_camera_counts {
   uint64_t frames;        // handed out
-  uint64_t skipped;       // good, but a newer one was there
+  uint64_t skipped;       // good, but superseded by a newer one
   uint64_t lost;          // missing by the driver's own count
   uint64_t duplicated;    // the same picture or stamp again
   uint64_t stale;         // from before the start
   uint64_t damaged;       // with an error flag, too short, no JPEG
   uint64_t out_of_order;  // stamped before the one before
   uint64_t bad_stamps;    // handed out, stamped by their arrival
-  uint64_t restarts;      // switched off and on because it gave nothing
+  uint64_t restarts;      // stream restarted after a stall
   uint8_t device;         // wm_device_state
   char device_note[160];
-  uint8_t is_foreign_clock;  // its stamps are of a clock of its own, which is followed
+  uint8_t is_foreign_clock;  // its stamps are of a clock of its own, which is mapped
   wm_time_ns clock_offset_ns, stamp_uncertainty_ns;
 } wm_camera_counts;
 
@@ -75,23 +75,23 @@ typedef struct wm_camera_device wm_camera_device;
 // Names of the formats that a camera may have, NULL-terminated.
 extern const char *const wm_camera_formats[];
 
-// Whether this build has libcamera's driver; without it a configuration that names such a camera is wrong.
+// Whether this build has libcamera; without it a configuration that names such a camera is refused.
 int wm_camera_has_libcamera(void);
 #define WM_WITHOUT_LIBCAMERA \
   "this waymark is built without libcamera; build it where libcamera-dev is installed, or name the camera by device:"
 
-// A camera by V4L2 or libcamera, as calibration.yaml knows it (`camera`, at `index` of the rig). It needn't be there
-// yet. What the driver changes of the wishes is told to `warn` (may be NULL), once. Allocates; reopening does, too.
+// A camera by V4L2 or libcamera, with its calibration (`camera`, at `index` of the rig). It may be absent. `warn` (may
+// be NULL) gets the driver's changes of the requested mode, once. Allocates; so does reopening.
 wm_status wm_camera_device_open(const wm_camera_device_config *config, const wm_camera *camera, int32_t index,
                                 wm_warn_fn warn, void *context, wm_camera_device **out, wm_error *err);
-// The newest picture; what came before it is counted as skipped. Waits for up to WM_DEVICE_WAIT_MS, then WM_AGAIN.
-// `number` is the driver's count, from 0 at each start. The pixels stay until the next call: GREY and NV12 as the
-// driver has them, the others decoded or copied (1 ms for 640x400 MJPEG at a desk). One thread.
+// The newest picture; older ones are counted as skipped. Waits for up to WM_DEVICE_WAIT_MS, then WM_AGAIN. `number` is
+// the driver's count, from 0 at each start. The pixels stay until the next call: GREY and NV12 in the driver's buffer,
+// the others decoded or copied (1 ms for 640x400 MJPEG at a desk). One thread.
 wm_status wm_camera_device_next(wm_camera_device *self, wm_frame *out, wm_error *err);
-// The picture that wm_camera_device_next gave last, as the camera sent it; until the next call.
+// The last picture of wm_camera_device_next in the camera's format; until the next call.
 void wm_camera_device_raw(const wm_camera_device *self, wm_camera_raw *out);
 const wm_camera_counts *wm_camera_device_counted(const wm_camera_device *self);
-// The same camera as a frame source, which closes it.
+// The same camera as a frame source, whose close closes it.
 wm_frame_source *wm_camera_device_frames(wm_camera_device *self);
 void wm_camera_device_close(wm_camera_device *self);  // NULL is fine
 
@@ -105,9 +105,9 @@ typedef struct wm_devices_config {
   int32_t sightings_by_lcm;  // another program on the robot sends them
 } wm_devices_config;
 
-// A SocketCAN interface: quantities as its DBC and binding say, filtered by the kernel to the ids that are needed.
-// *quantities: bit per wm_quantity that it can give. The part of a GNSS receiver gives positions about the origin. *out
-// is NULL where nothing of that part is bound. WM_BAD_CONFIG where DBC or binding are wrong.
+// A SocketCAN interface: quantities by its DBC and binding, filtered by the kernel to the bound ids. *quantities: bit
+// per wm_quantity that it can give. The GNSS part gives positions about the origin. *out is NULL without bindings of
+// that part. WM_BAD_CONFIG for a wrong DBC or binding.
 wm_status wm_can_device_open(const wm_can_device_config *config, wm_can_part part, const double gnss_origin[3],
                              wm_source **out, uint32_t *quantities, wm_error *err);
 

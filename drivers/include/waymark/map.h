@@ -19,17 +19,17 @@ extern "C" {
 
 typedef struct wm_map wm_map;
 
-// Reads map.yaml and its layers; every pixel of them becomes 255 (grey of 128 and more) or 0. Without `layers.drivable`
-// what `image` says is free by `negate` and `free_thresh` is drivable; without `layers.edges` the raster has no edges
-// (an estimator that needs them says so). `image` itself is read only for that. WM_BAD_CONFIG, WM_NOT_FOUND, WM_IO with
-// file, line and key: missing keys, a resolution that isn't above 0, layers of different sizes, pictures that are
-// broken or too large. Unknown keys are handed to `warn` (may be NULL). Cost: linear in the pixels.
+// Reads map.yaml and its layers; their pixels become 255 (grey of 128 and more) or 0. Without `layers.drivable` the
+// free space of `image` by `negate` and `free_thresh` is drivable; `image` is read only for that. Without
+// `layers.edges` the raster has no edges (estimators that need them refuse it). WM_BAD_CONFIG, WM_NOT_FOUND, WM_IO with
+// file, line and key: missing keys, a resolution that isn't above 0, layers of different sizes, broken or too large
+// pictures. `warn` (may be NULL) gets unknown keys. Cost: linear in the pixels.
 wm_status wm_map_load(const char *path, wm_warn_fn warn, void *context, wm_map **out, wm_error *err);
 void wm_map_free(wm_map *self);
-// Lives as long as the map.
+// Valid as long as the map.
 const wm_raster *wm_map_raster(const wm_map *self);
 
-// Hash of a raster's geometry and layers, as the event log names it; the layers' pixels must be 0 or 255. Linear.
+// Hash of a raster's geometry and layers, for the event log; the layers' pixels must be 0 or 255. Linear.
 uint64_t wm_raster_hash(const wm_raster *raster);
 
 // A grey picture, row 0 at the top.
@@ -38,8 +38,8 @@ typedef struct wm_grey {
   uint8_t *pixels;  // width x height; the caller's to free
 } wm_grey;
 
-// Reads a PNG (colours become grey, what shines through is white) or a PGM. `path` is for messages. WM_BAD_DATA where
-// it is neither, broken or cut; WM_OUT_OF_RANGE beyond the limits above.
+// Reads a PNG (colours become grey, transparency becomes white) or a PGM. `path` is for messages. WM_BAD_DATA for
+// other, broken or truncated files; WM_OUT_OF_RANGE beyond the limits above.
 wm_status wm_grey_load(const char *path, wm_grey *out, wm_error *err);
 wm_status wm_grey_decode(const void *bytes, size_t size, const char *path, wm_grey *out, wm_error *err);
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is known of a place and of the robot in it: calibration, landmarks and how they look, map, start. Of a
-// recording's folder or of single files. Small files are read whole when it is opened. Allocates; never on the
-// real-time thread.
+// The site of a robot: calibration, landmarks with their appearances, map, start. From a recording's folder or from
+// single files. Small files are read whole at the opening. Allocates; never on the real-time thread.
 #ifndef WAYMARK_SITE_H
 #define WAYMARK_SITE_H
 
@@ -18,7 +17,7 @@ extern "C" {
 #define WM_PATH_MAX 512
 #define WM_SENSORS_MAX 32
 
-// Files to take instead of the folder's own; "" where the folder's own is meant.
+// Files in place of the folder's own; "": the folder's.
 typedef struct wm_recording_overrides {
   char calibration[WM_PATH_MAX];
   char landmarks[WM_PATH_MAX];
@@ -27,7 +26,7 @@ typedef struct wm_recording_overrides {
   char map[WM_PATH_MAX];  // a map.yaml
 } wm_recording_overrides;
 
-// Unknown keys and other oddities that don't stop are handed to `warn` (may be NULL), one line each.
+// `warn` (may be NULL) gets unknown keys and other warnings, one line each.
 typedef void (*wm_warn_fn)(void *context, const char *text);
 
 typedef struct wm_site wm_site;
@@ -42,21 +41,21 @@ const wm_rig *wm_site_rig(const wm_site *self);      // cameras; an empty one wh
 const wm_start *wm_site_start(const wm_site *self);  // initial_pose; NaN where unknown
 void wm_site_set_start(wm_site *self, const wm_start *start);
 const wm_sensor *wm_site_sensors(const wm_site *self, size_t *count);
-// Index of the sensor of this name, which `path` names. One that `sensors` of calibration.yaml doesn't have is added
-// where the camera of its name sits, or at base_link, sigmas unknown: ask for the sensors afterwards. WM_FULL: no room.
+// Index of the sensor of this name in the file `path`. A sensor that `sensors` of calibration.yaml lacks is added at
+// the camera of its name, or at base_link, sigmas unknown: read the sensors afterwards. WM_FULL: no room.
 wm_status wm_site_sensor(wm_site *self, const char *path, const char *name, uint16_t *out, wm_error *err);
-// The same for the sensor that a camera's detectors are.
+// The same for the sensor of a camera's detectors.
 wm_status wm_site_camera_sensor(wm_site *self, const char *camera, uint16_t *out, wm_error *err);
 // Latitude and longitude in degrees and altitude in m of the map's origin; NaN where calibration.yaml has none.
 const double *wm_site_gnss_origin(const wm_site *self);
 const wm_landmark *wm_site_landmarks(const wm_site *self, size_t *count);
-// Those of landmarks/appearance.csv beside the landmarks.csv in use, read when first asked for and kept as long as the
-// site; none where there is no such file.
+// Those of landmarks/appearance.csv beside the landmarks.csv in use, read at the first call and kept as long as the
+// site; none without such a file.
 wm_status wm_site_appearances(wm_site *self, const wm_appearance **out, size_t *count, wm_error *err);
-// Path of the map's YAML: the file that is named, else map/map.yaml of the folder; "" where neither is there.
+// Path of the map's YAML: the named file, else map/map.yaml of the folder; "" without either.
 const char *wm_site_map_path(const wm_site *self);
-// The raster map, read when first asked for and kept as long as the site; NULL where there is none. Errors as
-// wm_map_load (waymark/map.h).
+// The raster map, read at the first call and kept as long as the site; NULL without one. Errors as of wm_map_load
+// (waymark/map.h).
 wm_status wm_site_map(wm_site *self, const wm_raster **out, wm_error *err);
 // Text of calibration.yaml as read ("" where there is none), for the event log.
 const char *wm_site_calibration_text(const wm_site *self, size_t *length);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Small helpers for text that people wrote: numbers without surprises, the nearest known word, quoting for messages,
-// files read whole. Any thread; nothing here keeps state. Not for the real-time thread.
+// Helpers for text written by hand: strict numbers, the nearest known word, quoting for messages, files read whole.
+// Stateless; any thread. Not for the real-time thread.
 #ifndef WAYMARK_TEXT_H
 #define WAYMARK_TEXT_H
 
@@ -25,10 +25,10 @@ wm_text_number wm_text_to_f64(const char *text, size_t length, double *out);
 // Exact: never goes through a double. "1.0" and "1e9" are no integers.
 wm_text_number wm_text_to_i64(const char *text, size_t length, int64_t *out);
 
-// Letters that must be changed, put in, left out or swapped with their neighbour to make one from the other (optimal
-// string alignment distance). Words above 63 letters are compared by their first 63.
+// Letters to change, insert, delete or swap with their neighbour to make one from the other (optimal string alignment
+// distance). Words above 63 letters are compared by their first 63.
 int wm_word_distance(const char *a, const char *b);
-// The word of the NULL-terminated list that is at most two letters from `word` (and not all of it), or NULL.
+// The word of the NULL-terminated list within two letters of `word` (and not all of it), or NULL.
 const char *wm_word_nearest(const char *word, const char *const *known);
 
 // Writes the slice for a message: at most `capacity` bytes with the terminator, control characters and broken UTF-8 as
@@ -36,7 +36,7 @@ const char *wm_word_nearest(const char *word, const char *const *known);
 const char *wm_show_text(const char *text, size_t length, char *out, size_t capacity);
 #define WM_SHOW_TEXT_MAX 64
 
-// Reads a file of at most `max_bytes` whole; *out is terminated and the caller's to free. WM_NOT_FOUND, WM_IO, WM_FULL
+// Reads a file of at most `max_bytes` whole; *out is terminated, and the caller frees it. WM_NOT_FOUND, WM_IO, WM_FULL
 // with the path and the system's reason.
 wm_status wm_text_read_file(const char *path, size_t max_bytes, char **out, size_t *length, wm_error *err);
 

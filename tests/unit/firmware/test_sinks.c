@@ -215,7 +215,7 @@ static void poses_and_resets_that_are_told_become_events(void) {
   wm_set_pose there = {.pose_map_base = {{1, -2, 0}, {0, 0, 0, 1}}, .sigma_xy_m = 0.5, .sigma_heading_rad = 0.1};
   lcm_t *lcm = lcm_create("memq://");
   TEST_ASSERT_EQUAL(WM_OK, lcm_commands_open("memq://", "T_", lcm, &source, &err));
-  TEST_ASSERT_TRUE(source->is_live && source->is_rare);
+  TEST_ASSERT_TRUE(source->is_live && source->event_driven);
   wm_time_ns before_ns = wm_monotonic_ns();
   size_t length = wm_lcm_set_pose(&there, 0, bytes, sizeof bytes);
   TEST_ASSERT_GREATER_THAN(0, length);
