@@ -100,6 +100,8 @@ class motion_front_end {
   bool is_overdue(wm_time_ns t_ns) const { return model_ != WM_MOTION_CONSTANT_VELOCITY && history_.is_overdue(t_ns); }
   // Sigmas of the speed and the turn rate of one period by the counts' steps; 0 where no counts drive.
   void count_noise(double *speed_mps, double *turn_rate_radps) const;
+  // Variances of the way and of the rotation at `t_ns` by the steps of the newest counts; 0 where no counts drive.
+  void count_variances(wm_time_ns t_ns, double *way_m2, double *turn_rad2) const;
   // The last event counted a wheel, and the distance is the counted one.
   bool counted() const { return ticks_drive() && (wheel_[0].t_ns == fed_ns_ || wheel_[1].t_ns == fed_ns_); }
   // True once after the speed's source changed to another sensor, with another scale.

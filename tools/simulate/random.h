@@ -53,6 +53,7 @@ enum class Stream : uint64_t {
   elevation_noise,
   elevation_outlier,
   tilt,
+  command_delay,
 };
 
 class Random {

@@ -133,6 +133,33 @@ wm_status Drive::plan(const Route &route, Drive &out, wm_error *err) {
   return WM_OK;
 }
 
+Drive Drive::sampled(const std::vector<State> &states, double step_s) {
+  Drive out;
+  out.samples_ = states;
+  out.step_s_ = step_s;
+  out.planned_s_ = out.duration_s_ = step_s * static_cast<double>(states.size() - 1);
+  for (size_t i = 1; i < states.size(); i++) out.length_m_ += std::fabs(states[i].way_m - states[i - 1].way_m);
+  return out;
+}
+
+State Drive::between_samples(double t_s) const {
+  const double at = std::clamp(t_s / step_s_, 0.0, static_cast<double>(samples_.size() - 1));
+  const size_t i = std::min(static_cast<size_t>(at), samples_.size() - 2);
+  const double u = at - static_cast<double>(i);
+  const State &a = samples_[i], &b = samples_[i + 1];
+  const auto mean = [&](double State::*of) { return a.*of + u * (b.*of - a.*of); };
+  State s{};
+  s.x_m = mean(&State::x_m);
+  s.y_m = mean(&State::y_m);
+  s.heading_rad = mean(&State::heading_rad);
+  s.way_m = mean(&State::way_m);
+  const bool stands = t_s < 0 || t_s > planned_s_;
+  s.speed_mps = stands ? 0 : mean(&State::speed_mps);
+  s.yaw_rate_radps = stands ? 0 : mean(&State::yaw_rate_radps);
+  s.curvature_1pm = a.curvature_1pm;
+  return s;
+}
+
 void Drive::cut(double duration_s) { duration_s_ = std::min(duration_s_, duration_s); }
 
 wm_status Drive::carry(double at_s, double forward_s, wm_error *err) {
@@ -157,6 +184,7 @@ State Drive::at(double t_s) const {
 }
 
 State Drive::driven(double t_s) const {
+  if (!samples_.empty()) return between_samples(t_s);
   const double t = std::clamp(t_s, 0.0, planned_s_);
   double path_m = 0, speed = 0;
   if (!ramps_.empty()) {

@@ -25,6 +25,9 @@ class Drive {
   // WM_BAD_CONFIG with a text that names the leg (from 1) when it can't be driven.
   static wm_status plan(const Route &route, Drive &out, wm_error *err);
 
+  // States of a drive that was not planned so, the first at the start, `step_s` apart; linear in between.
+  static Drive sampled(const std::vector<State> &states, double step_s);
+
   double duration_s() const { return duration_s_; }
   double whole_s() const { return planned_s_ - carry_forward_s_; }  // as planned, whether it was cut or not
   double length_m() const { return length_m_; }                     // driven, forwards and backwards
@@ -52,6 +55,7 @@ class Drive {
   void add_path(double length_m, int sign, double curvature0, double curvature1);
   void add_ramp(double duration_s, double v0, double v1);
   State driven(double t_s) const;
+  State between_samples(double t_s) const;
   static void end_of(const Piece &piece, double along_m, double &x, double &y, double &heading);
 
   std::vector<Piece> pieces_;
@@ -60,6 +64,8 @@ class Drive {
   double planned_m_ = 0;  // way of the ramps
   double planned_s_ = 0;  // their duration
   State start_ = {};
+  std::vector<State> samples_;  // in place of pieces and ramps
+  double step_s_ = 0;
   double carry_at_s_ = 0, carry_forward_s_ = 0, carry_way_m_ = 0, carry_heading_rad_ = 0;
 };
 

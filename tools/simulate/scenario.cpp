@@ -67,9 +67,43 @@ void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
   out.mapped = static_cast<Mapped>(mapped);
 }
 
+void read_actuators(Reader &r, const wm_yaml_node &map, Robot &out) {
+  static const char *const known[] = {"control_hz",
+                                      "publish_hz",
+                                      "speed_step_mps",
+                                      "turn_step_radps",
+                                      "dead_ms",
+                                      "dead_jitter_ms",
+                                      "response_ms",
+                                      "acceleration_mps2",
+                                      "turn_acceleration_radps2",
+                                      "friction_mps",
+                                      "speed_scale",
+                                      "turn_scale",
+                                      nullptr};
+  if (!r.ok() || !wm_yaml_there(&map)) return;
+  r.keys(map, known);
+  if (r.ok() && !out.differential)
+    return r.fail(map, "commands are obeyed by two driven wheels; leave wheelbase_m and steering_table out");
+  Actuators &a = out.actuators;
+  out.commanded = true;
+  r.number(map, "control_hz", 1, 1000, 1, a.control_hz);
+  r.number(map, "publish_hz", 1, 1000, 1, a.publish_hz);
+  r.number(map, "speed_step_mps", 0, 1, 1, a.speed_step_mps);
+  r.number(map, "turn_step_radps", 0, 1, 1, a.turn_step_radps);
+  r.number(map, "dead_ms", 0, 2000, kMilli, a.dead_s);
+  r.number(map, "dead_jitter_ms", 0, 2000, kMilli, a.dead_jitter_s);
+  r.number(map, "response_ms", 0, 5000, kMilli, a.response_s);
+  r.number(map, "acceleration_mps2", 0, 100, 1, a.acceleration_mps2);
+  r.number(map, "turn_acceleration_radps2", 0, 1000, 1, a.turn_acceleration_radps2);
+  r.number(map, "friction_mps", 0, 10, 1, a.friction_mps);
+  r.number(map, "speed_scale", 0.1, 10, 1, a.speed_scale);
+  r.number(map, "turn_scale", 0.1, 10, 1, a.turn_scale);
+}
+
 void read_robot(Reader &r, const wm_yaml_node &map, bool steered, Robot &out) {
-  static const char *const known[] = {"wheel_radius_m", "ticks_per_turn", "track_m", "wheelbase_m",
-                                      "steering_table", "wheels_send",    nullptr};
+  static const char *const known[] = {"wheel_radius_m", "ticks_per_turn", "track_m",  "wheelbase_m",
+                                      "steering_table", "wheels_send",    "commands", nullptr};
   static const char *const sends[] = {"ticks", "speeds", nullptr};
   r.keys(map, known);
   const wm_yaml_node table = r.child(map, "steering_table", false);
@@ -88,6 +122,7 @@ void read_robot(Reader &r, const wm_yaml_node &map, bool steered, Robot &out) {
   int speeds = 0;
   r.word(map, "wheels_send", sends, speeds);
   out.sends_speeds = speeds == 1;
+  read_actuators(r, r.child(map, "commands", false), out);
 
   static const char *const known_table[] = {"actuator_mm", "road_wheel_deg", nullptr};
   if (!r.ok() || !wm_yaml_there(&table)) return;

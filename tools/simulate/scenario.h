@@ -34,10 +34,23 @@ struct Route {
   std::vector<Leg> legs;
 };
 
+// A drive that obeys commanded twists, in place of wheels that are counted.
+struct Actuators {
+  double control_hz = 10, publish_hz = 30;                 // commands; rows of motion.csv, each the newest command
+  double speed_step_mps = 0.001, turn_step_radps = 0.001;  // rounding of the published rows
+  double dead_s = 0, dead_jitter_s = 0;                    // a command acts so much later; the jitter is uniform, added
+  double response_s = 0;                                   // time constant of the first-order response
+  double acceleration_mps2 = 0, turn_acceleration_radps2 = 0;  // largest; 0: no limit
+  double friction_mps = 0;                 // a standing wheel starts above this, and stops below half
+  double speed_scale = 1, turn_scale = 1;  // true over commanded
+};
+
 struct Robot {
   wm_wheels wheels = {};      // as calibration.yaml says; the true ones differ by what `errors` draws
   bool sends_speeds = false;  // the bus gives the wheels' speeds, without sign, instead of rolling counts
   bool differential = false;  // two driven wheels, no steering
+  bool commanded = false;     // motion.csv has commands; nothing measures the motion
+  Actuators actuators;
 };
 
 // Landmarks that the seed draws, in a world of features alone.

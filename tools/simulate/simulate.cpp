@@ -176,6 +176,7 @@ void make_start(const Scenario &sc, const Random &random, Recording &out) {
 }  // namespace
 
 Messages messages_of(const Scenario &sc) {
+  if (sc.robot.commanded) return {};
   Messages sent = {sc.robot.sends_speeds ? Bus_message::wheel_speeds : Bus_message::wheels};
   if (sc.bus.yaw_rate_hz > 0) sent.push_back(Bus_message::yaw_rate);
   if (sc.bus.steering_hz > 0 && sc.robot.wheels.steering_table_count >= 2) sent.push_back(Bus_message::steering);
@@ -191,13 +192,14 @@ wm_status simulate_drive(const Scenario &sc, uint64_t seed, Recording &out, wm_e
   out.seed = seed;
   out.clock_start_ns = to_us(sc.clock_start_s);
   if (const wm_status status = Drive::plan(sc.route, out.drive, err); status != WM_OK) return status;
+  const Random random(seed);
+  if (sc.robot.commanded) out.drive = obey(sc, random, out.drive, out.commands);
   if (sc.faults.kidnap_forward_s > 0)
     if (const wm_status s = out.drive.carry(sc.faults.kidnap_at_s, sc.faults.kidnap_forward_s, err); s != WM_OK)
       return s;
   if (sc.duration_s > 0) out.drive.cut(sc.duration_s);
   out.duration_s = out.drive.duration_s();
   out.length_m = out.drive.length_m();
-  const Random random(seed);
   out.drawn = draw_constants(sc, random);
   make_start(sc, random, out);
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "simulate/bus.h"
+#include "simulate/commands.h"
 #include "simulate/route.h"
 #include "simulate/scenario.h"
 #include "simulate/worlds/path6.h"
@@ -83,6 +84,7 @@ struct Recording {
   Drive drive;  // the truth at any time since clock_start_ns
   wm_time_ns clock_start_ns;
   std::vector<wm_can_frame> can;    // by arrival
+  std::vector<Command> commands;    // of robot.commands, in place of `can`
   std::vector<Sighting> sightings;  // by arrival, as all that follows
   std::vector<MarkerSeen> markers;
   std::vector<StereoSeen> stereo;

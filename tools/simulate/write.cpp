@@ -85,7 +85,9 @@ bool has_landmarks(const Scenario &sc, const Recording &r) { return !r.landmarks
 
 // The files that are there, as `streams` of recording.yaml lists them.
 std::string streams(const Scenario &sc, const Recording &r) {
-  std::string text = r.motion6.empty() ? "can.log, vehicle.dbc, can-signals.yaml" : "motion6.csv";
+  std::string text = !r.motion6.empty()   ? "motion6.csv"
+                     : sc.robot.commanded ? "motion.csv"
+                                          : "can.log, vehicle.dbc, can-signals.yaml";
   text += ", calibration.yaml";
   if (has_map(sc, r)) text += ", landmarks.csv";
   if (has_sightings(sc)) text += ", sightings.csv";
@@ -175,6 +177,7 @@ wm_status write_calibration(const Scenario &sc, const Recording &r, const std::s
       f.print("motion6: {sigma_v_mps: [%.6g, %.6g, %.6g], sigma_w_radps: [%.6g, %.6g, %.6g]}\n", v, v, v, w, w, w);
     return f.close(err);
   }
+  if (sc.robot.commanded) return f.close(err);
   const wm_wheels &w = sc.robot.wheels;
   f.print("wheels:\n  radius_m: %.6g\n  ticks_per_turn: %.6g\n  track_m: %.6g\n", w.radius_m, w.ticks_per_turn,
           w.track_m);
@@ -268,6 +271,15 @@ wm_status write_motion6(const Recording &r, const std::string &path, wm_error *e
   return f.close(err);
 }
 
+wm_status write_commands(const Recording &r, const std::string &path, wm_error *err) {
+  File f(path);
+  f.text("t_ns,v_mps,w_radps\n");
+  for (const Command &c : r.commands)
+    f.print("%" PRId64 ",%.6f,%.6f\n", r.clock_start_ns + static_cast<wm_time_ns>(std::llround(c.t_s * 1e9)), c.v_mps,
+            c.w_radps);
+  return f.close(err);
+}
+
 wm_status write_truth6(const Recording &r, const std::string &path, wm_error *err) {
   File f(path);
   f.text("t_ns,x_m,y_m,z_m,qx,qy,qz,qw\n");
@@ -296,6 +308,8 @@ wm_status write_sensors(const Scenario &sc, const Recording &r, const std::strin
   wm_status status = WM_OK;
   if (six) {
     status = write_motion6(r, in("motion6.csv"), err);
+  } else if (sc.robot.commanded) {
+    status = write_commands(r, in("motion.csv"), err);
   } else {
     status = write_text(dbc_text(sent), in("vehicle.dbc"), err);
     if (status == WM_OK) status = write_text(can_signals_text(sent), in("can-signals.yaml"), err);

@@ -61,6 +61,15 @@ class sensor_slots {
       if (k != kTimeOffset) row->add(at(sensor, k, stated), by[kBySensor + k]);
   }
 
+  // The motion's lag has become a state, and the observations show its sum with the time offsets alone: what these have
+  // taken of it until now is theirs or the lag's.
+  template <class Filter>
+  void begin_lag(const wm_setup &setup, Filter *filter) const {
+    const double sigma = absolute_sigma(setup.sightings->states.sigma[WM_SENSOR_ROW_kTimeOffset], 1.0);
+    for (int i = 0; i < static_cast<int>(setup.sensor_count); i++)
+      if (const int slot = at(i, kTimeOffset); slot >= 0) filter->forget(slot, 0.0, square(sigma));
+  }
+
   template <class Filter>
   void list(const wm_setup &setup, const Filter &filter, calibration_list *out) const {
     for (size_t i = 0; i < setup.sensor_count; i++)

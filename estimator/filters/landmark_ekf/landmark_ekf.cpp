@@ -146,7 +146,10 @@ void landmark_ekf::start_again() {
 
 wm_status landmark_ekf::predict(const wm_event &motion) {
   const wm_status status = filter_.check_motion(motion);
-  if (status == WM_OK) filter_.move(motion);
+  if (status != WM_OK) return status;
+  const bool had_lag = filter_.motion_state(kLag) >= 0;
+  filter_.move(motion);
+  if (!had_lag && filter_.motion_state(kLag) >= 0) slots_.begin_lag(*setup_, &filter_);
   return status;
 }
 

@@ -11,6 +11,7 @@ constexpr double kClutterRange_m = 30.0;  // a false range lies anywhere within 
 constexpr double kOnSensor_m = 0.05;      // nearer to the sensor, a landmark has no bearing
 constexpr double kNear_m = 0.1;           // floor of a distance that an error across the line of sight is divided by
 constexpr double kBeyondRange = 1.5;      // times the sensor's range; beyond, no landmark is associated
+constexpr double kStepsMost = 0.2;        // share of the counts' steps in a row's noise; not swept
 constexpr double kClearlyBest = 0.5;      // of the soft gate: only a fit within this is associated
 
 // The second-order correction of a sighting for an uncertain position: bias and variance of its expectation
@@ -190,6 +191,10 @@ void landmark_ekf::add_errors(const sighting_context &at, const lent_slots &lent
   const int sensor = at.s->sensor;
   add_past_pose(&r->row, by, at.past, slots_.at(sensor, kTimeOffset, at.reading.stated));
   slots_.add_to(&r->row, sensor, by, at.reading.stated);
+  // The steps' errors of successive rows are not independent: no evidence of the motion's noise.
+  const double steps = filter_.count_variance(at.past.t_ns, by, at.past.pose.heading_rad);
+  r->noise += steps;
+  if (steps > kStepsMost * r->noise) r->source = {};
   const auto add_state = [&](int state, double derivative) {
     r->row.add(state, derivative);
     r->record.expected += derivative * filter_.value(state);

@@ -10,11 +10,14 @@
 namespace wm {
 
 struct past_pose {
+  wm_time_ns t_ns;          // of the measurement
   wm_pose2 pose;            // base_link in map at the time of measurement
   wm_pose2 step;            // the same in base_link now
   double lever_x, lever_y;  // from the present position to it, m: the derivative by a heading error now
   double age_by[3];         // of x, y, heading by the time offset: minus the twist, without the steps of counts
   double stamp_by[3];       // the same by the error of one stamp, from the low-passed twist
+  double lag_by[3];         // the same by the motion's lag, where the pose now is given
+  int lag_slot;             // state of the lag; -1: none
   int stamp_slot;           // state of the error of this measurement's stamp; -1: none
 };
 
@@ -25,6 +28,18 @@ inline void put_age(const planar_twist &twist, const sin_cos &h, double by[3]) {
   by[2] = -twist.w;
 }
 
+// More lag moves the past pose back by the twist there, and the present one by the twist now. With the present one
+// given all moves forwards by the latter, as one rigid body: the lag and the time offset are observable as a sum alone.
+inline void put_lag(const planar_twist &now, double heading_rad, const planar_twist &there, const sin_cos &h,
+                    past_pose *out) {
+  double present[3];
+  put_age(now, sincos(heading_rad), present);
+  put_age(there, h, out->lag_by);
+  out->lag_by[0] -= present[0] - present[2] * out->lever_y;
+  out->lag_by[1] -= present[1] + present[2] * out->lever_x;
+  out->lag_by[2] -= present[2];
+}
+
 inline double product(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // `filter` is planar: it has pose(), now_ns() and path(). `age_s`: how long before now the measurement was taken.
@@ -33,6 +48,7 @@ past_pose pose_before(const Filter &filter, double age_s) {
   past_pose out;
   out.stamp_slot = -1;
   const wm_time_ns now = filter.now_ns(), then = now - wm_ns_from_seconds(age_s);
+  out.t_ns = then;
   motion_twist there{};
   out.step = {};
   if (then < now) {
@@ -49,6 +65,8 @@ past_pose pose_before(const Filter &filter, double age_s) {
   const sin_cos h = sincos(out.pose.heading_rad);
   put_age(filter.steady(there), h, out.age_by);
   put_age(filter.low_passed(there), h, out.stamp_by);
+  out.lag_slot = filter.motion_state(kLag);
+  if (out.lag_slot >= 0) put_lag(filter.twist(), present.heading_rad, there, h, &out);
   return out;
 }
 
@@ -59,6 +77,7 @@ void add_past_pose(Row *row, const double by[3], const past_pose &past, int time
   row->add(kY, by[1]);
   row->add(kHeading, by[2] - by[0] * past.lever_y + by[1] * past.lever_x);
   row->add(time_offset_slot, product(by, past.age_by));
+  if (past.lag_slot >= 0) row->add(past.lag_slot, product(by, past.lag_by));
   row->add(past.stamp_slot, product(by, past.stamp_by));
 }
 

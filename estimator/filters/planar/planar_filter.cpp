@@ -45,9 +45,11 @@ int planar_filter::add_state(double value, double sigma) {
 }
 
 void planar_filter::move(const wm_event &motion) {
+  const int lag = motion_state_[kLag];
   if (const int state = feed(motion); state >= 0) forget(state, 1.0, start_variance_[kSpeedScale]);
   limit_gyro_scale(this);
   move_to(motion.t_ns);
+  if (lag < 0 && motion_state_[kLag] >= 0) begin_lag();
   double innovation, variance;
   if (standstill_bias(&innovation, &variance)) {
     planar_row row;
@@ -57,6 +59,19 @@ void planar_filter::move(const wm_event &motion) {
     (void)update(projected, innovation, variance);  // its variance is a parameter above 0
   }
   wheels_.update(*this, front_);
+}
+
+// The lag has become a state while the robot moves. The pose has been ahead by the lag since the robot stood.
+void planar_filter::begin_lag() {
+  const double heading = x()[kHeading];
+  const sin_cos h = sincos(heading);
+  const planar_twist &t = twist();
+  const double ahead[kPoseStates] = {t.v * h.cos - t.u * h.sin, t.v * h.sin + t.u * h.cos, t.w};
+  for (int i = 0; i < kPoseStates; i++) {
+    planar_row by;
+    by.add(motion_state_[kLag], -ahead[i]);
+    carry_state(i, by, 0.0, 0.0);
+  }
 }
 
 void planar_filter::move_to(wm_time_ns t_ns) {
@@ -151,6 +166,9 @@ bool planar_filter::update(const projection &projected, double innovation, doubl
   vectors::add_scaled(b, projected.gain, -1.0, stride_);
   vectors::add_symmetric_outer(p(), k, b, n_, stride_);
   vectors::add_scaled(x(), k, innovation, stride_);
+  double back;
+  if (const int state = beyond_limit(x(), &back); state >= 0 && variance(state) > 0.0)
+    vectors::add_scaled(x(), p() + state * stride_, back / variance(state), stride_);
   x()[kHeading] = wrap(x()[kHeading]);
   take_calibration(x());
   return true;

@@ -103,6 +103,7 @@ class planar_filter : public planar_motion {
   void copy_state(int state, int from, double added_variance);
 
  private:
+  void begin_lag();
   void propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise);
 
   double *x() { return arrays_.get(); }

@@ -85,7 +85,8 @@ wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist 
                 const arc a = make_arc(t.v * segment.dt_s, t.u * segment.dt_s, t.w * segment.dt_s);
                 sum = compose(sum, {a.x_m, a.y_m, a.turn_rad});
               });
-  if (first) *twist = front_.twist_at(from_ns, calibration_);
+  // A command's segment changes from its beginning to its end; its twist is the mean.
+  if (first || front_.kind() == kKindCommands) *twist = front_.twist_at(from_ns, calibration_);
   return sum;
 }
 
@@ -119,21 +120,39 @@ planar_twist planar_motion::low_passed(const planar_twist &twist) const {
   return {v_sigma > 0.0 ? steady_[0].smooth : twist.v, twist.u, w_sigma > 0.0 ? steady_[1].smooth : twist.w};
 }
 
+double planar_motion::count_variance(wm_time_ns t_ns, const double by[3], double heading_rad) const {
+  double way_m2, turn_rad2;
+  front_.count_variances(t_ns, &way_m2, &turn_rad2);
+  if (!(way_m2 > 0.0)) return 0.0;
+  const sin_cos h = sincos(heading_rad);
+  return square(by[0] * h.cos + by[1] * h.sin) * way_m2 + square(by[2]) * turn_rad2;
+}
+
+int planar_motion::beyond_limit(const double *states, double *back) const {
+  for (int i = 0; i < kCalibrationCount; i++) {
+    const int state = motion_state_[i];
+    if (state < 0) continue;
+    *back = motion_state_within_limits(i, states[state]) - states[state];
+    if (*back != 0.0) return state;
+  }
+  return -1;
+}
+
 void planar_motion::take_calibration(double *states) {
   for (int i = 0; i < kMotionStates; i++) {
     const int state = motion_state_[i];
     if (state >= 0) states[state] = motion_state_within_limits(i, states[state]);
     if (state >= 0 && i < kCalibrationCount) calibration_.value[i] = states[state];
   }
-  if (!has_velocity() || motion_state_[kVelocityX] < 0) return;
-  const double *velocity = states + motion_state_[kVelocityX];
-  front_.set_velocity({velocity[0], velocity[1], velocity[2]});
-  heading_rad_ = states[kHeading];
   for (int i = 0; i < sensor_states_; i++) {
     double &value = states[sensor_state_[i].state];
     if (value < sensor_state_[i].low) value = sensor_state_[i].low;
     if (value > sensor_state_[i].high) value = sensor_state_[i].high;
   }
+  if (!has_velocity() || motion_state_[kVelocityX] < 0) return;
+  const double *velocity = states + motion_state_[kVelocityX];
+  front_.set_velocity({velocity[0], velocity[1], velocity[2]});
+  heading_rad_ = states[kHeading];
 }
 
 }  // namespace wm

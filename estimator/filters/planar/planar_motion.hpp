@@ -47,6 +47,7 @@ class planar_motion {
   // that at `from_ns`.
   wm_pose2 path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist *twist) const;
 
+  const planar_twist &twist() const { return twist_; }  // now, by the motion until now
   const wm_motion_calibration &calibration() const { return calibration_; }
   uint32_t motion_health() const { return front_.health(); }
   uint64_t motion_outliers() const { return front_.outliers(); }
@@ -55,6 +56,9 @@ class planar_motion {
   planar_twist steady(const planar_twist &twist) const;
   // The same without the dead band, for the error of one stamp: it is new in each, and gains nothing from noise.
   planar_twist low_passed(const planar_twist &twist) const;
+  // Variance of a measurement by the steps of the counts that give the pose at `t_ns`, which may lie ahead of them;
+  // `by`: its derivatives by x, y and heading. It is no process noise: a later pose does not have it.
+  double count_variance(wm_time_ns t_ns, const double by[3], double heading_rad) const;
   // The next motion input is overdue.
   bool is_overdue() const { return front_.is_overdue(now_ns()); }
   wm_pose2 odom() const { return odom_; }  // motion alone, by the calibration as it was at each time
@@ -134,6 +138,9 @@ class planar_motion {
   // Odometry over one such segment.
   void take_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
                  const pose_step &step);
+  // The first motion state beyond its limit, and the change that brings it back; -1: none. A filter moves the states
+  // that are correlated with it along: the projection on the limit by the covariance [Simon2010].
+  int beyond_limit(const double *states, double *back) const;
   // The calibration takes the states' values, which are cut to their limits.
   void take_calibration(double *states);
 

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: Apache-2.0
+// A sensor's time offset beside what repeats it: the lag of commands, and the steps of coarse counts.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "events.hpp"
+#include "math/elementary.hpp"
+#include "unity.h"
+#include "waymark/random.h"
+
+namespace {
+
+constexpr double kStep_s = 0.001, kBearing_rad = 0.01, kRange_m = 0.03, kTrack_m = 0.5, kWheel_m = 0.1;
+
+const wm_estimator *ekf;
+wm_motion_params motion;
+wm_landmark_ekf_params params;
+wm_sensor sensor;
+wm_landmark landmarks[3];
+wm_setup setup;
+std::unique_ptr<void, void (*)(void *)> state(nullptr, std::free);
+
+void feed(const wm_event &e) {
+  const bool moves = e.kind == WM_EVENT_TWIST2 || e.kind == WM_EVENT_QUANTITIES;
+  size_t count = 0;
+  TEST_ASSERT_EQUAL(WM_OK, moves ? ekf->predict(state.get(), &e) : ekf->correct(state.get(), &e, nullptr, 0, &count));
+}
+
+wm_calibration_value found(const std::string &name) {
+  std::vector<wm_calibration_value> out(64);
+  out.resize(ekf->calibration(state.get(), out.data(), out.size()));
+  for (const wm_calibration_value &v : out)
+    if (name == v.name) return v;
+  TEST_FAIL_MESSAGE(name.c_str());
+  return {};
+}
+
+// The true drive of 120 s; commands change each two seconds, and the drive obeys them `lag_s` later with a first-order
+// response of 0.15 s. Sightings of all landmarks five times a second are `offset_s` older than their stamps.
+class Robot {
+ public:
+  Robot(double lag_s, double offset_s) : lag_s_(lag_s), offset_s_(offset_s) {}
+
+  void drive(double ticks) {
+    double v = 0, w = 0, way[2] = {0, 0};
+    wm_pose2 p{};
+    std::vector<wm_pose2> poses;
+    std::vector<double> left, right;
+    for (int k = 0; k < 120500; k++) {
+      const double t = kStep_s * k, share = kStep_s / 0.15;
+      poses.push_back(p);
+      left.push_back(way[0]), right.push_back(way[1]);
+      v += share * (speed(t - lag_s_) - v), w += share * (rate(t - lag_s_) - w);
+      p.x_m += v * kStep_s * std::cos(p.heading_rad), p.y_m += v * kStep_s * std::sin(p.heading_rad);
+      p.heading_rad += w * kStep_s;
+      way[0] += kStep_s * (v - 0.5 * kTrack_m * w), way[1] += kStep_s * (v + 0.5 * kTrack_m * w);
+    }
+    const double tick_m = ticks > 0 ? 2 * M_PI * kWheel_m / ticks : 0;
+    for (int k = 0; k < 3000; k++) {
+      const double t = 0.04 * k;
+      const auto at = size_t{40} * static_cast<size_t>(k);
+      feed(ticks > 0 ? make::quantities(t, {{WM_Q_WHEEL_TICKS_LEFT, std::floor(left[at] / tick_m)},
+                                            {WM_Q_WHEEL_TICKS_RIGHT, std::floor(right[at] / tick_m)}})
+                     : make::twist(t, speed(t), rate(t)));
+      const double seen_s = t + 0.013 - offset_s_;
+      if (k % 5 == 0 && seen_s >= 0) look(t + 0.013, poses[static_cast<size_t>(seen_s / kStep_s)], k);
+    }
+  }
+
+ private:
+  static double speed(double t) { return t < 2 ? 0 : 0.4 + 0.2 * (static_cast<int>(t / 4) % 2); }
+  static double rate(double t) { return t < 2 ? 0 : 0.4 * (static_cast<int>(t / 2) % 4) - 0.5; }
+  static void look(double t, const wm_pose2 &p, int k) {
+    for (uint64_t i = 0; i < 3; i++) {
+      const auto at = static_cast<uint64_t>(k) * 3 + i;
+      const double dx = landmarks[i].p_m[0] - p.x_m, dy = landmarks[i].p_m[1] - p.y_m;
+      const double bearing = std::atan2(dy, dx) - p.heading_rad + kBearing_rad * wm_random_normal(1, 1, at);
+      feed(make::sighting(t, landmarks[i].id, wm::wrap(bearing),
+                          std::hypot(dx, dy) + kRange_m * wm_random_normal(1, 2, at)));
+    }
+  }
+
+  double lag_s_, offset_s_;
+};
+
+void begin() {
+  state.reset(make::begun(*ekf, &params, setup));
+  TEST_ASSERT_NOT_NULL(state.get());
+}
+
+// Only the sum shows, and each keeps the sigma that the two priors leave: 0.2 0.1 / sqrt(0.2^2 + 0.1^2) = 0.089 s.
+void test_a_lag_and_a_time_offset_are_observed_as_a_sum() {
+  for (const auto &[lag_s, offset_s] : {std::pair{0.3, 0.05}, {0.1, 0.15}, {0.3, -0.1}}) {
+    begin();
+    Robot(lag_s, offset_s).drive(0);
+    const wm_calibration_value lag = found("motion.lag_s"), offset = found("camera.time_offset_s");
+    TEST_ASSERT_DOUBLE_WITHIN(0.05, lag_s + offset_s, lag.value + offset.value);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.089, lag.sigma);
+    TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.089, offset.sigma);
+    TEST_ASSERT_DOUBLE_WITHIN(3.5 * offset.sigma, offset_s, offset.value);
+  }
+}
+
+// No lag is below 0: what the sum has below it is the offset's.
+void test_a_lag_at_its_limit_leaves_the_rest_to_the_offset() {
+  begin();
+  Robot(0.0, -0.15).drive(0);
+  TEST_ASSERT_DOUBLE_WITHIN(0.02, 0, found("motion.lag_s").value);
+  TEST_ASSERT_DOUBLE_WITHIN(0.07, -0.15, found("camera.time_offset_s").value);
+}
+
+// Stamps that are too early are carried ahead of the counts by the last step of them. Steps of 12 mm must neither
+// look like noise of the turns nor falsify the track.
+void test_coarse_counts_behind_early_stamps_leave_the_track() {
+  setup.wheels = {kWheel_m, 50, kTrack_m, NAN, NAN, NAN, 0, {}, {}};
+  begin();
+  Robot(0.0, -0.15).drive(50);
+  const wm_calibration_value track = found("motion.track_scale");
+  TEST_ASSERT_DOUBLE_WITHIN(0.03, 1, track.value);
+  TEST_ASSERT_TRUE(found("noise.turn_factor").value < 4);
+}
+
+}  // namespace
+
+void setUp() {
+  ekf = wm_estimator_find("landmark_ekf");
+  wm_params_defaults(&wm_motion_params_table, &motion);
+  wm_params_defaults(&wm_sighting_params_table, &make::sightings);
+  wm_params_defaults(&wm_landmark_ekf_params_table, &params);
+  sensor = make::sensor("camera", kBearing_rad, kRange_m);
+  landmarks[0] = {0, {5, 0, 0}, 0.0, NAN, {}, 0};
+  landmarks[1] = {1, {2, 5, 0}, 0.0, NAN, {}, 0};
+  landmarks[2] = {2, {-3, -4, 0}, 0.0, NAN, {}, 0};
+  setup = make::setup(motion, sensor);
+  setup.landmarks = landmarks;
+  setup.landmark_count = 3;
+  setup.start = {WM_TIME_NONE, {0, 0, 0}, {0, 0, 0, 1}, 0.0, 0.05, 0.05};
+}
+void tearDown() { state.reset(); }
+
+int main() {
+  UNITY_BEGIN();
+  RUN_TEST(test_a_lag_and_a_time_offset_are_observed_as_a_sum);
+  RUN_TEST(test_a_lag_at_its_limit_leaves_the_rest_to_the_offset);
+  RUN_TEST(test_coarse_counts_behind_early_stamps_leave_the_track);
+  return UNITY_END();
+}
