@@ -147,9 +147,10 @@ void test_a_map_at_its_capacity_is_kept() {
   for (const bool with_codes : {false, true}) {
     make_room();
     coded = with_codes;
-    params.landmark_capacity = kCount / 2;
+    constexpr int kHalf = kCount / 2;
+    params.landmark_capacity = kHalf;
     learn();
-    TEST_ASSERT_EQUAL_DOUBLE(kCount / 2, counted(WM_COUNTER_LANDMARKS));
+    TEST_ASSERT_EQUAL_DOUBLE(kHalf, counted(WM_COUNTER_LANDMARKS));
     TEST_ASSERT_LESS_OR_EQUAL(keeper->bytes_max(&params, &setup), image.size());
     TEST_ASSERT_NULL(why_not());
   }

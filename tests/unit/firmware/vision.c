@@ -103,6 +103,7 @@ static void open_it(const char *section, uint32_t takes) {
 }
 
 // Linked in the place of jpeg_decode (--wrap), which it counts.
+// NOLINTBEGIN(bugprone-reserved-identifier)
 static atomic_int decodings;
 int __real_jpeg_decode(void *, const uint8_t *, size_t, uint32_t, uint32_t, uint8_t *, uint32_t, char *, size_t);
 int __wrap_jpeg_decode(void *self, const uint8_t *data, size_t length, uint32_t width_px, uint32_t height_px,
@@ -112,6 +113,7 @@ int __wrap_jpeg_decode(void *self, const uint8_t *data, size_t length, uint32_t 
   atomic_fetch_add(&decodings, 1);
   return __real_jpeg_decode(self, data, length, width_px, height_px, grey, stride_bytes, why, why_bytes);
 }
+// NOLINTEND(bugprone-reserved-identifier)
 
 #define POINTS WM_EVENT_BIT(WM_EVENT_POINTS)
 #define LOOKED WM_EVENT_BIT(WM_EVENT_LOOKED)

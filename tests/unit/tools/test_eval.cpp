@@ -334,7 +334,8 @@ void test_landmarks_whose_ids_are_the_filters_own() {
     const auto at = [](int64_t id, double x, double y) {
       return Landmark{id, {x, y, 0}, Eigen::Matrix2d::Zero(), NAN};
     };
-    const double x = 3.0 * (i % 4), y = 4.0 * (i / 4);
+    const int row = i / 4;
+    const double x = 3.0 * (i % 4), y = 4.0 * row;
     truth.push_back(at(i, x, y));
     estimate.push_back(at((7 * i + 3) % 10, x + 0.1, y));
     distorted.push_back(at(i, x + 0.2 * y, y + 0.15 * x));  // up to 2 m off
@@ -403,9 +404,8 @@ const std::string kPublishedHeader =
     "odom_x_m,odom_y_m,odom_heading_rad,resets\n";
 
 std::string sent(int64_t t_ms, double age_ms, double x, double odom_x, int resets) {
-  return format("%lld,%lld,%lld,", static_cast<long long>(t_ms * 1000000),
-                static_cast<long long>(t_ms * 1000000 + std::llround(age_ms * 1e6)),
-                static_cast<long long>((t_ms - 100) * 1000000)) +
+  const int64_t t_ns = t_ms * 1'000'000, made_ns = t_ns + std::llround(age_ms * 1e6), fused_ns = t_ns - 100'000'000;
+  return std::to_string(t_ns) + "," + std::to_string(made_ns) + "," + std::to_string(fused_ns) + "," +
          made::pose(x, 0, 0) + format(",1,0,1,0,0,1,tracking,%g,0,0,%d\n", odom_x, resets);
 }
 
