@@ -262,7 +262,7 @@ def process(work):
     heard.check(len(silent) < 10, f"no route: {len(silent)} poses are heard")
     heard.goes_on("no route, over; disk full all the time", 33, 37)
     heard.check(heard.health_at(35).published > heard.health_at(25.9).published + 7 * 50 * 0.8, "no route: the run went on")
-    heard.is_said("way out again")
+    heard.is_said("connected again")
     subprocess.run(["umount", small], check=True)
     return heard.failures
 

@@ -182,7 +182,7 @@ def check_no_route(work):
     said = [line for line in err.splitlines() if "LCM" in line]
     print("\n".join(said))
     assert len([line for line in said if "no route" in line]) == 1, err
-    assert len([line for line in said if "way out again" in line]) == 1, err
+    assert len([line for line in said if "connected again" in line]) == 1, err
     assert "not good" not in err, err  # liblcm's own page of help
     assert len(published(work / "silent")) > 100
 
