@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "camera_process.h"
 #include "frame_clock.h"
 #include "jpeg.h"
 #include "pixels.h"
@@ -457,10 +458,17 @@ static const camera_io *const kByLibcamera = NULL;
 
 int wm_camera_has_libcamera(void) { return kByLibcamera != NULL; }
 
+int wm_camera_is_process(int argc, char *const *argv) {
+  if (!kByLibcamera || argc != 2 || strcmp(argv[1], CAMERA_PROCESS) != 0) return 0;
+  camera_process_serve(kByLibcamera);
+  return 1;
+}
+
 wm_status wm_camera_device_open(const wm_camera_device_config *config, const wm_camera *camera, int32_t index,
                                 wm_warn_fn warn, void *context, wm_camera_device **out, wm_error *err) {
   *out = NULL;
-  const camera_io *io = config->libcamera[0] ? kByLibcamera : &kV4l2;
-  if (!io) return wm_fail(err, WM_BAD_CONFIG, "camera %s: " WM_WITHOUT_LIBCAMERA, config->name);
+  const camera_io *io = config->libcamera[0] ? &kCameraProcess : &kV4l2;
+  if (config->libcamera[0] && !kByLibcamera)
+    return wm_fail(err, WM_BAD_CONFIG, "camera %s: " WM_WITHOUT_LIBCAMERA, config->name);
   return camera_device_make(config, camera, index, warn, context, io, NULL, out, err);
 }

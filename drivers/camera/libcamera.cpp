@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cameras by libcamera, as an alternative to V4L2 (camera_io.h). Written for 0.0.3 and later.
 //
+// It runs in a process of its own (camera_process.h): libcamera ends its process when a camera is unplugged.
 // libcamera completes requests on a thread of its own. That thread only writes the buffer's number into a pipe, on
 // which `take` waits, as V4L2's waits at its device; the threads share nothing else. A request belongs to libcamera
 // from `give_back` until its number is in the pipe.
@@ -88,9 +89,8 @@ int choose_format(uint32_t fourcc, lc::StreamConfiguration *stream) {
 
 // ── which one ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
-// libcamera allows one manager in a process. It starts with the first camera that is looked for, sees cameras come and
-// go, and ends with the last one that is closed: what it keeps of a camera that was unplugged ends with it. (0.0.3 ends
-// the process where a camera comes back whose end it has missed.)
+// libcamera allows one manager in a process. It starts with the first camera that is looked for, and ends with the last
+// one that is closed.
 std::mutex manager_mutex;
 lc::CameraManager *manager;
 int manager_users;
@@ -123,10 +123,8 @@ struct Slot {
   std::unique_ptr<lc::Request> request;
   lc::FrameBuffer *buffer = nullptr;
   int fd = -1;
-  uint8_t *mapped =
-      nullptr;  // the driver's memory, on many boards without a cache: read once, from one end to the other
+  uint8_t *mapped = nullptr;
   size_t mapped_bytes = 0, offset = 0, capacity = 0;
-  std::unique_ptr<uint8_t[]> copy;  // what everybody else reads
 };
 
 class LibcameraDevice {
@@ -292,7 +290,6 @@ int LibcameraDevice::add_slot(lc::FrameBuffer *buffer) {
   slot.offset = plane.offset == lc::FrameBuffer::Plane::kInvalidOffset ? 0 : plane.offset;
   slot.capacity = plane.length;
   slot.mapped_bytes = slot.offset + slot.capacity;
-  slot.copy = std::make_unique<uint8_t[]>(slot.capacity);
   slot.request = camera_->createRequest(slots_.size());
   if (!slot.request) return -ENOMEM;
   int failed = slot.request->addBuffer(configuration_->at(0).stream(), buffer);
@@ -350,7 +347,7 @@ int LibcameraDevice::fill(uint32_t index, camera_buffer *out) {
   const lc::ControlList &said = slot.request->metadata();
   *out = camera_buffer{};
   out->index = index;
-  out->data = slot.copy.get();
+  out->data = slot.mapped + slot.offset;
   out->sequence = frame.sequence;
   if (slot.request->status() != lc::Request::RequestComplete || frame.status != lc::FrameMetadata::FrameSuccess)
     out->flags |= CAMERA_BUFFER_ERROR;
@@ -362,8 +359,6 @@ int LibcameraDevice::fill(uint32_t index, camera_buffer *out) {
   const auto exposure_us = said.get(lc::controls::ExposureTime);
   if (exposure_us && *exposure_us > 0) exposure_ns = *exposure_us * WM_NS_PER_US;
   sync_cache(slot, DMA_BUF_SYNC_START);
-  memcpy(slot.copy.get(), slot.mapped + slot.offset, out->bytes);
-  sync_cache(slot, DMA_BUF_SYNC_END);
   return 1;
 }
 
@@ -380,6 +375,7 @@ int LibcameraDevice::take(int wait_ms, camera_buffer *out) {
 
 int LibcameraDevice::give_back(uint32_t index) {
   if (index >= slots_.size()) return -EINVAL;
+  sync_cache(slots_[index], DMA_BUF_SYNC_END);
   slots_[index].request->reuse(lc::Request::ReuseBuffers);
   return camera_->queueRequest(slots_[index].request.get());
 }

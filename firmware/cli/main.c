@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "cli/commands.h"
+#include "waymark/devices.h"
 #include "waymark/text.h"
 
 static const char kHelp[] =
@@ -38,6 +39,7 @@ static const struct {
 #define COMMANDS (sizeof kCommands / sizeof kCommands[0])
 
 int main(int argc, char **argv) {
+  if (wm_camera_is_process(argc, argv)) return EXIT_DONE;
   const char *command = argc > 1 ? argv[1] : NULL;
   if (!command) {
     (void)fputs(kHelp, stderr);

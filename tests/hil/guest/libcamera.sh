@@ -54,4 +54,14 @@ kill -TERM $recording
 finish term
 [ "$(pictures term)" -gt 5 ] || fail "term: only $(pictures term) pictures"
 
+echo "== unplugged and back: the process that has the camera may end, the program does not"
+record unplugged robot.yaml 16
+sleep 4
+echo vimc.0 >/sys/bus/platform/drivers/vimc/unbind
+sleep 2
+echo vimc.0 >/sys/bus/platform/drivers/vimc/bind
+finish unplugged
+grep -qE "front (is gone|gives no pictures)" unplugged.txt || fail "unplugged: not said"
+[ "$(grep -c 'front gives pictures' unplugged.txt)" = 2 ] || fail "unplugged: it doesn't come back"
+
 exit $((fails > 0))
