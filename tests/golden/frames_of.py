@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """`waymark replay --frames-of`: the log of a drive whose pictures came only in part, on another clock; the replay of the whole
-drive by this log looks at the same pictures and gives the same poses. A log of another drive is refused."""
+drive by this log looks at the same pictures and gives the same poses. A log of another drive is refused. `--timing-of`: detectors
+take the time that they took in a run."""
 import csv
 import json
 import math
@@ -26,6 +27,27 @@ def simulate(folder, seed, seconds):
 
 def fused(folder):
     return json.loads((folder / "health.json").read_text())["sources"]["edges:front"]["fused"]
+
+
+def lateness_ms(folder):
+    return json.loads((folder / "health.json").read_text())["sources"]["edges:front"]["lateness_worst_ms"]
+
+
+def check_timing_of(drive, work):
+    """A run on a computer whose detector takes 60 ms, by its timing.json."""
+    slow = work / "slow"
+    shutil.copytree(work / "all", slow)
+    timing = json.loads((slow / "timing.json").read_text())
+    check(timing["look edges:front"]["count"] > 20, "a run's timing.json has each detector's time")
+    timing["look edges:front"]["p50_us"] = 60000.0
+    (slow / "timing.json").write_text(json.dumps(timing))
+    run("waymark", "replay", drive, "--config", CONFIG, "--timing-of", slow, "--out", work / "late")
+    check(abs(lateness_ms(work / "late") - lateness_ms(work / "all") - 60) < 1e-3,
+          f"pictures are {lateness_ms(work / 'late'):.3f} ms late at worst, without the run's time {lateness_ms(work / 'all'):.3f}")
+    del timing["look edges:front"]
+    (slow / "timing.json").write_text(json.dumps(timing))
+    said = run("waymark", "replay", drive, "--config", CONFIG, "--timing-of", slow, "--out", work / "x", expect=(2,))
+    check('has no stage "look edges:front"' in said, "a run without this detector is refused")
 
 
 def lose_pictures(drive, out, ahead_s):
@@ -68,6 +90,7 @@ with tempfile.TemporaryDirectory() as temporary:
     worst = max(math.dist(p, b.get(t, (1e9, 1e9))) for t, p in a.items())
     check(worst < 1e-6, f"at most {worst:.9f} m apart")
     check(max(math.dist(p, all_of_them[t]) for t, p in a.items()) > 1e-4, "with all pictures they would be others")
+    check_timing_of(drive, work)
     other = simulate(work, 2, 1)
     said = run("waymark", "replay", other, "--config", CONFIG, "--frames-of", work / "lossy/events.wmlog", "--out", work / "x", expect=(1,))
     check("no motion in common" in said, "the log of another drive is refused")
