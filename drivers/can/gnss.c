@@ -10,10 +10,10 @@
 #define SIGMA_M 5.0  // of a receiver without a stated accuracy: a common figure of data sheets
 #define DEGREE (M_PI / 180.0)
 
-enum { LATITUDE, LONGITUDE, ALTITUDE, XY, Z, VALID };
+enum { LATITUDE, LONGITUDE, ALTITUDE, XY, Z, VALID, ALTITUDE_VALID };
 
-static const char *const kNames[] = {"gnss_latitude", "gnss_longitude", "gnss_altitude",
-                                     "gnss_sigma_xy", "gnss_sigma_z",   "gnss_valid"};
+static const char *const kNames[] = {"gnss_latitude", "gnss_longitude", "gnss_altitude",      "gnss_sigma_xy",
+                                     "gnss_sigma_z",  "gnss_valid",     "gnss_altitude_valid"};
 
 const char *wm_can_quantity_name(unsigned quantity) {
   return quantity >= WM_CAN_LATITUDE && quantity < WM_CAN_COUNT ? kNames[quantity - WM_CAN_LATITUDE]
@@ -46,15 +46,16 @@ int wm_can_gnss_take(wm_can_gnss *self, const wm_quantities *values, wm_position
   if (!is_fix(value)) return 0;
   double *origin = self->origin;
   if (isnan(origin[LATITUDE])) memcpy(origin, value, 2 * sizeof *origin);
-  if (isnan(origin[ALTITUDE])) origin[ALTITUDE] = value[ALTITUDE];  // possibly without a fix: the radii do not use it
+  const double altitude_m = value[ALTITUDE_VALID] == 0.0 ? (double)NAN : value[ALTITUDE];
+  if (isnan(origin[ALTITUDE])) origin[ALTITUDE] = altitude_m;
   const double sine = sin(origin[LATITUDE]), w = 1.0 - WGS84_E2 * sine * sine;
   const double across_m = WGS84_A_M / sqrt(w) + self->level_m,
                along_m = WGS84_A_M * (1.0 - WGS84_E2) / (w * sqrt(w)) + self->level_m;
   const double turn = remainder(value[LONGITUDE] - origin[LONGITUDE], 2.0 * M_PI);
   out->p_m[0] = across_m * cos(origin[LATITUDE]) * turn;
   out->p_m[1] = along_m * (value[LATITUDE] - origin[LATITUDE]);
-  out->p_m[2] = value[ALTITUDE] - origin[ALTITUDE];
+  out->p_m[2] = altitude_m - origin[ALTITUDE];
   out->sigma_xy_m = value[XY] > 0.0 ? value[XY] : SIGMA_M;
-  out->sigma_z_m = isnan(value[ALTITUDE]) ? (double)NAN : value[Z] > 0.0 ? value[Z] : 2.0 * out->sigma_xy_m;
+  out->sigma_z_m = isnan(altitude_m) ? (double)NAN : value[Z] > 0.0 ? value[Z] : 2.0 * out->sigma_xy_m;
   return 1;
 }

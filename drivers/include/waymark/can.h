@@ -54,7 +54,8 @@ enum {
   WM_CAN_ALTITUDE,
   WM_CAN_SIGMA_XY,
   WM_CAN_SIGMA_Z,
-  WM_CAN_VALID,  // 0: the receiver has no fix
+  WM_CAN_VALID,           // 0: the receiver has no fix
+  WM_CAN_ALTITUDE_VALID,  // 0: its fix has no altitude
   WM_CAN_COUNT
 };
 // Name of a wm_quantity or of the above in can-signals.yaml; "?" for others.

@@ -155,7 +155,8 @@ wm_status landmark_ekf::predict(const wm_event &motion) {
 
 wm_status landmark_ekf::correct(const wm_event &event, record_list records) {
   switch (event.kind) {
-    case WM_EVENT_SIGHTING: return fuse_sighting(event, records);
+    case WM_EVENT_SIGHTING: return fuse_sighting(event, event.as.sighting, records);
+    case WM_EVENT_MARKER: return fuse_marker(event, records);
     case WM_EVENT_POSITION: return fuse_position(event, records);
     case WM_EVENT_HEADING: return fuse_heading(event, records);
     case WM_EVENT_SET_POSE:
@@ -239,6 +240,7 @@ const wm_estimator wm_landmark_ekf_estimator = wm::estimator_of<wm::landmark_ekf
     "Extended Kalman filter over the pose and the sensors' own errors: "
     "bearings and ranges to known landmarks, positions, "
     "headings. Finds the pose when lost.",
-    WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_POSITION) | WM_EVENT_BIT(WM_EVENT_HEADING) |
-        WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) | WM_EVENT_BIT(WM_EVENT_RESET),
+    WM_EVENT_BIT(WM_EVENT_SIGHTING) | WM_EVENT_BIT(WM_EVENT_MARKER) | WM_EVENT_BIT(WM_EVENT_POSITION) |
+        WM_EVENT_BIT(WM_EVENT_HEADING) | WM_EVENT_BIT(WM_EVENT_LOOKED) | WM_EVENT_BIT(WM_EVENT_SET_POSE) |
+        WM_EVENT_BIT(WM_EVENT_RESET),
     wm_landmark_ekf_params_table, wm::kReads);

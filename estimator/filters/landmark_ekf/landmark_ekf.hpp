@@ -69,13 +69,14 @@ class landmark_ekf {
     int error, map;
   };
 
-  wm_status fuse_sighting(const wm_event &event, record_list records);
+  wm_status fuse_sighting(const wm_event &event, const wm_sighting &s, record_list records);
+  wm_status fuse_marker(const wm_event &event, record_list records);
   wm_status fuse_position(const wm_event &event, record_list records);
   wm_status fuse_heading(const wm_event &event, record_list records);
   wm_status take_pose(const wm_event &event);
 
   // Whether a sighting is to be fused (WM_FUSED), and with which landmark.
-  wm_verdict associate(const wm_event &event, sighting_context *out);
+  wm_verdict associate(const wm_sighting &s, sighting_context *out);
   int associate_nearest(const sighting_context &at);
   lent_slots lend_states(int sensor, int landmark, wm_time_ns t_ns);
   // The rows of a sighting: bearing, then range or elevation. Returns how many.

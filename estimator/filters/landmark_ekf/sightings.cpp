@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sighting, from the event to the rows of its update: validation, association, expectation, Jacobian, noise.
 // Constants were chosen on drawn crossings (waymark-montecarlo-landmarks) and not swept.
+#include <limits>
+
 #include "filters/landmark_ekf/landmark_ekf.hpp"
 #include "math/arc.hpp"
 
@@ -54,8 +56,17 @@ double landmark_ekf::map_sigma(int landmark) const {
   return at_least(setup_->landmarks[landmark].sigma_m, sightings().map_sigma_min_m);
 }
 
-wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records) {
-  const wm_sighting &s = event.as.sighting;
+// A marker whose place is known is a landmark: its place in the sensor's frame gives bearing and range. A second pose
+// that the corners fit is turned about the same place.
+wm_status landmark_ekf::fuse_marker(const wm_event &event, record_list records) {
+  const wm_marker &m = event.as.marker;
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const double range_m = std::sqrt(square(m.p_m[0]) + square(m.p_m[1]));
+  const wm_sighting s = {m.sensor, m.id, atan2(m.p_m[1], m.p_m[0]), range_m, kNone, m.along_sigma_m, kNone, kNone};
+  return fuse_sighting(event, s, records);
+}
+
+wm_status landmark_ekf::fuse_sighting(const wm_event &event, const wm_sighting &s, record_list records) {
   const bool has_bearing = !std::isnan(s.bearing_rad);
   wm_innovation record = record_of(event, has_bearing ? WM_RESIDUAL_BEARING : WM_RESIDUAL_RANGE);
   record.sensor = s.sensor;
@@ -68,7 +79,7 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   filter_.move_to(event.t_ns);
 
   sighting_context at;
-  const wm_verdict verdict = associate(event, &at);
+  const wm_verdict verdict = associate(s, &at);
   if (verdict != WM_FUSED) return reject(records, record, verdict);
   record.landmark_id = setup_->landmarks[at.landmark].id;
   if (params_.recover) buffer_observation(observation_of(at, event.t_ns));
@@ -102,8 +113,7 @@ wm_status landmark_ekf::fuse_sighting(const wm_event &event, record_list records
   return WM_OK;
 }
 
-wm_verdict landmark_ekf::associate(const wm_event &event, sighting_context *out) {
-  const wm_sighting &s = event.as.sighting;
+wm_verdict landmark_ekf::associate(const wm_sighting &s, sighting_context *out) {
   const mounted_sensor &sensor = sensor_[s.sensor];
   out->s = &s;
   out->reading = read_sighting(s, sensor, sightings());

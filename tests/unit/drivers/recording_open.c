@@ -8,6 +8,7 @@
 
 #include "folder.h"
 #include "unity.h"
+#include "waymark/can.h"
 #include "waymark/recording.h"
 
 static wm_recording *recording;
@@ -288,6 +289,24 @@ static void gnss_over_can(void) {
   TEST_ASSERT_EQUAL(WM_END, gnss->ops->next(gnss, &event, &err));
 }
 
+// A fix without an altitude: the last altitude is not of this position.
+static void gnss_altitude_over_can(void) {
+  const double origin[3] = {52.5, 13.4, 30};
+  wm_can_gnss gnss;
+  wm_can_gnss_init(&gnss, origin);
+  for (int valid = 1; valid >= 0; valid--) {
+    const wm_quantities values = {.count = 4,
+                                  .id = {WM_CAN_ALTITUDE_VALID, WM_CAN_ALTITUDE, WM_CAN_LATITUDE, WM_CAN_LONGITUDE},
+                                  .value = {valid, 35.0, 52.5 * M_PI / 180, 13.4 * M_PI / 180}};
+    wm_position p;
+    TEST_ASSERT_EQUAL(1, wm_can_gnss_take(&gnss, &values, &p));
+    TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, p.p_m[0]);
+    if (valid) TEST_ASSERT_DOUBLE_WITHIN(1e-9, 5, p.p_m[2]);
+    TEST_ASSERT_EQUAL(valid, !isnan(p.p_m[2]));
+    TEST_ASSERT_EQUAL(valid, !isnan(p.sigma_z_m));
+  }
+}
+
 static void too_many_sensors(void) {
   char text[8192] = "t_ns,sensor,id,bearing_rad,range_m\n";
   for (int i = 0; i < 33; i++) sprintf(text + strlen(text), "%d,s%d,1,0,1\n", i, i);
@@ -307,6 +326,7 @@ int main(void) {
   RUN_TEST(unlisted_streams);
   RUN_TEST(can_and_its_binding);
   RUN_TEST(gnss_over_can);
+  RUN_TEST(gnss_altitude_over_can);
   RUN_TEST(too_many_sensors);
   return UNITY_END();
 }
