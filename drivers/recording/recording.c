@@ -110,6 +110,16 @@ static wm_status read_start(wm_recording *self, wm_error *err) {
   return status;
 }
 
+// A replay of a run's log has no recording.yaml: the kind of the rows must be in the configuration.
+static void refuse_motion_kind(wm_recording *self) {
+  const wm_yaml_node root = wm_yaml_root(self->about), kind = wm_yaml_get(&root, "vehicle.motion_kind");
+  if (!wm_yaml_there(&kind)) return;
+  warn_line(&self->warn,
+            "%s:%d: vehicle.motion_kind: is not read; whether the rows of motion.csv are commands or measured is found "
+            "from them, unless motion.twist in the configuration states it",
+            wm_yaml_file(&root), wm_yaml_line(&kind));
+}
+
 static wm_status read_about(wm_recording *self, wm_error *err) {
   char path[WM_PATH_MAX];
   wm_status status = path_of(self, "recording.yaml", path, err);
@@ -296,6 +306,7 @@ wm_status wm_recording_open(const char *dir, const wm_recording_overrides *overr
   wm_status status = read_about(self, err);
   if (status == WM_OK) status = wm_site_open(self->dir, &self->overrides, warn, context, &self->site, err);
   if (status == WM_OK) status = read_start(self, err);
+  if (status == WM_OK) refuse_motion_kind(self);
   if (status == WM_OK) status = add_sources(self, err);
   if (status != WM_OK) {
     wm_recording_close(self);

@@ -314,6 +314,15 @@ static void too_many_sensors(void) {
   refused("sightings.csv:34: more than 32 different sensors");
 }
 
+static void motion_kind_is_refused_by_name(void) {
+  open_it();
+  TEST_ASSERT_NULL(strstr(warnings, "motion_kind"));
+  folder_write("recording.yaml", ABOUT "vehicle:\n  motion_kind: commands, not encoders\n");
+  open_it();
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(warnings, "recording.yaml:6: vehicle.motion_kind: is not read"), warnings);
+  TEST_ASSERT_NOT_NULL(strstr(warnings, "motion.twist"));
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(bare);
@@ -328,5 +337,6 @@ int main(void) {
   RUN_TEST(gnss_over_can);
   RUN_TEST(gnss_altitude_over_can);
   RUN_TEST(too_many_sensors);
+  RUN_TEST(motion_kind_is_refused_by_name);
   return UNITY_END();
 }
