@@ -231,20 +231,11 @@ def main():
     if not cases:
         print(f"skipped: no recording {options.only.replace(',', ' or ')} in {options.data_dir}")
         return 77
-    if not options.json:
-        print(f"{'recording, estimator':36} {'falsified':22} {'rmse m':>8} {'ratio':>6} {'NEES':>5}  states")
-    results = []
-    for case in cases:
-        with tempfile.TemporaryDirectory() as scratch:
-            for row in judge(options, case, pathlib.Path(scratch)):
-                results.append(row)
-                if not options.json:
-                    print(printed(row), flush=True)
+    head = f"{'recording, estimator':36} {'falsified':22} {'rmse m':>8} {'ratio':>6} {'NEES':>5}  states"
+    results = replays.table(options, head, cases, judge, printed)
     judged = [r["good"] for r in results if r["good"] is not None]
     missed = judged.count(False)
-    if options.json:
-        print(json.dumps(results, indent=1))
-    else:
+    if not options.json:
         print(f"{len(judged)} falsified replays, {missed} beyond {RATIO_MOST} times the undisturbed one")
     return 1 if missed else 0
 

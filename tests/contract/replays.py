@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tables of replays have in common: programs, tables of numbers, changed copies of recordings, command lines."""
 import argparse
+import json
 import pathlib
 import re
 import subprocess
+import tempfile
 
 WRONG_M = 0.5
 WRONG_SIGMA = 3.5
@@ -166,6 +168,22 @@ def parser(about, only):
     out.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a key of the plain configurations")
     out.add_argument("--json", action="store_true", help="one object a row instead of the table")
     return out
+
+
+def table(options, head, cases, judge, printed):
+    """All rows of judge(options, case, scratch) for each case, with a scratch folder of its own: printed one by one, or as JSON at the end."""
+    if not options.json:
+        print(head)
+    results = []
+    for case in cases:
+        with tempfile.TemporaryDirectory() as scratch:
+            for row in judge(options, case, pathlib.Path(scratch)):
+                results.append(row)
+                if not options.json:
+                    print(printed(row), flush=True)
+    if options.json:
+        print(json.dumps(results, indent=1))
+    return results
 
 
 def is_chosen(options, title):

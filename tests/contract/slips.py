@@ -6,12 +6,10 @@ of the recording, in bursts. Each disturbed replay is compared with the undistur
 are not there. Those whose source gives covariances are replayed with them.
 
     slips.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--seed N] [--set KEY=VALUE] [--json]"""
-import json
 import math
 import pathlib
 import random
 import sys
-import tempfile
 
 import covariances
 import defaults
@@ -191,18 +189,9 @@ def main():
         print(f"{options.data_dir}: no recordings here")
         return 77
     names = [n for n in RECORDINGS if (options.data_dir / n).is_dir() and replays.is_chosen(options, n)]
+    head = f"{'recording and disturbance':38} {'se2 m':>8} {'NEES':>5} {'map m':>8} {'moved':>5} {'wrong':>6} {'found s':>8} {'right':>6} {'map x':>6}"
+    results = replays.table(options, head, names, judge, printed)
     if not options.json:
-        print(f"{'recording and disturbance':38} {'se2 m':>8} {'NEES':>5} {'map m':>8} {'moved':>5} {'wrong':>6} {'found s':>8} {'right':>6} {'map x':>6}")
-    results = []
-    for name in names:
-        with tempfile.TemporaryDirectory() as scratch:
-            for row in judge(options, name, pathlib.Path(scratch)):
-                results.append(row)
-                if not options.json:
-                    print(printed(row), flush=True)
-    if options.json:
-        print(json.dumps(results, indent=1))
-    else:
         for what in ("slip", "misread"):
             judged = [r["good"] for r in results if what in r["case"]]
             print(f"{what}: {sum(judged)} of {len(judged)} good")

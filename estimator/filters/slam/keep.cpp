@@ -40,6 +40,21 @@ struct kept_landmark {
 };
 static_assert(sizeof(kept_landmark) == 64, "no padding");
 
+// The fields that a landmark_note and a kept_landmark have in common, but the identity.
+template <class from_t, class to_t>
+void copy_common(const from_t &from, to_t &to) {
+  to.z_m = from.z_m;
+  std::memcpy(to.mean_m, from.mean_m, sizeof to.mean_m);
+  to.means = from.means;
+  to.surveyed = from.surveyed;
+  to.tilt_sensor = from.tilt_sensor;
+  to.seen = from.seen;
+  to.revisited = from.revisited;
+  to.level = from.level;
+  to.may_be_misread = from.may_be_misread;
+  to.viewed_twice = from.viewed_twice;
+}
+
 // Places in an image, in bytes from its beginning.
 struct kept_layout {
   size_t states, means, covariance, bytes;
@@ -150,18 +165,9 @@ size_t slam::keep(void *out, size_t capacity) const {
   for (int i = 0; i < joint_.landmarks(); i++) {
     const landmark_note &n = note(i);
     kept_landmark one{};
-    one.z_m = n.z_m;
-    std::memcpy(one.mean_m, n.mean_m, sizeof one.mean_m);
-    one.means = n.means;
+    copy_common(n, one);
     one.id = n.id;
-    one.surveyed = n.surveyed;
-    one.tilt_sensor = n.tilt_sensor;
-    one.seen = n.seen;
     one.is_kept = is_confirmed(n) && !is_member(n);
-    one.revisited = n.revisited;
-    one.level = n.level;
-    one.may_be_misread = n.may_be_misread;
-    one.viewed_twice = n.viewed_twice;
     to.put(&one, sizeof one);
   }
   to.put(joint_.values(), robot);
@@ -234,16 +240,7 @@ void slam::take_kept_landmark(const void *image, int from) {
   }
   landmark_note &n = note(landmark);
   n = note_of(rejoins_ ? kLargestId - landmark : l.id, -1, WM_TIME_NONE);
-  n.z_m = l.z_m;
-  std::memcpy(n.mean_m, l.mean_m, sizeof n.mean_m);
-  n.means = l.means;
-  n.surveyed = l.surveyed;
-  n.tilt_sensor = l.tilt_sensor;
-  n.seen = l.seen;
-  n.revisited = l.revisited;
-  n.level = l.level;
-  n.may_be_misread = l.may_be_misread;
-  n.viewed_twice = l.viewed_twice;
+  copy_common(l, n);
 }
 
 // The start's sigmas are what the robot may have been moved by. Its pose keeps the covariance with the map.

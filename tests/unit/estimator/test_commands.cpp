@@ -1,42 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Twists that are commands: response, onset, gentle turns, what a change leaves unsure.
-#include "events.hpp"
-#include "math/arc.hpp"
-#include "motion/front_end.hpp"
-#include "unity.h"
+#include "motion_fixture.hpp"
 
 namespace {
 
-wm_motion_params params;
-wm_wheels wheels;
-wm::motion_front_end front;
-wm_motion_calibration calibration;
-wm_pose2 pose;
-double way_var, turn_var;
-
-void advance(double t_s) {
-  front.advance(make::at(t_s), calibration,
-                [](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &n) {
-                  const wm::arc a = wm::make_arc(t.v * s.dt_s, t.w * s.dt_s);
-                  pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
-                  way_var += n.distance_m2;
-                  turn_var += n.rotation_rad2;
-                });
-}
-
-void feed(const wm_event &e) {
-  TEST_ASSERT_EQUAL(WM_OK, front.check(e));
-  front.feed(e);
-  advance(1e-9 * (double)e.t_ns);
-}
-
 // Commands: y' = (c - y) / response, however the time is cut.
 void start_commands(double response_s, double delay_sigma_s) {
-  wheels = make::no_wheels();
-  wm_params_defaults(&wm_motion_params_table, &params);
-  calibration = wm::kNeutralCalibration;
-  pose = {};
-  way_var = turn_var = 0;
+  start(make::no_wheels());
   params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
   params.noise_hold_mps2 = params.noise_hold_radps2 = 0;
   params.twist = WM_TWIST_COMMANDS;
