@@ -13,12 +13,12 @@
 #include "jpeg.h"
 #include "pixels.h"
 
-#define BUFFERS 4
-#define LOOK_EVERY_NS (500 * WM_NS_PER_MS)
-#define STALL_NS WM_NS_PER_S           // without a buffer, or ten periods where those are longer
-#define RESTART_NS (3 * WM_NS_PER_S)   // of stalling: the stream is restarted
-#define FROZEN_NS WM_NS_PER_S          // of an unchanged picture
-#define EXPOSURE_EVERY_NS WM_NS_PER_S  // automatic exposure changes slowly
+#define BUFFERS 4                           // of the driver's ring: one filled, one ready, two in transfer
+#define LOOK_EVERY_NS (500 * WM_NS_PER_MS)  // search for an absent camera: opening nodes is slow
+#define STALL_NS WM_NS_PER_S                // without a buffer, or ten periods where those are longer
+#define RESTART_NS (3 * WM_NS_PER_S)        // of stalling: the stream is restarted
+#define FROZEN_NS WM_NS_PER_S               // of an unchanged picture
+#define EXPOSURE_EVERY_NS WM_NS_PER_S       // automatic exposure changes slowly
 
 struct wm_camera_device {
   wm_frame_source base;

@@ -8,7 +8,7 @@
 
 #include "waymark/time.h"
 
-#define CAMERA_BUFFERS_MAX 8
+#define CAMERA_BUFFERS_MAX 8  // twice the requested number, for drivers that give more
 
 // Identity of a camera, which may come back under another number.
 typedef struct camera_identity {

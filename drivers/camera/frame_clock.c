@@ -4,7 +4,7 @@
 #define OLDEST_NS (2 * WM_NS_PER_S)                 // longer than a picture waits in a driver
 #define DOUBTS 3                                    // contradicting stamps in a row that change the assumed clock
 #define DIRECT_UNCERTAINTY_NS (500 * WM_NS_PER_US)  // interrupt of the frame's end to the stamp
-#define GUESSED_UNCERTAINTY_NS (50 * WM_NS_PER_MS)
+#define GUESSED_UNCERTAINTY_NS (50 * WM_NS_PER_MS)  // exposure and transfer, without a stamp
 
 static int can_be_ours(wm_time_ns stamp_ns, wm_time_ns arrival_ns) {
   return stamp_ns > 0 && stamp_ns <= arrival_ns && stamp_ns > arrival_ns - OLDEST_NS;

@@ -16,7 +16,7 @@
 
 #include "camera_io.h"
 
-#define NODES_MAX 64
+#define NODES_MAX 64  // of /dev/videoN that are searched
 
 typedef struct v4l2_camera {
   int fd;

@@ -9,7 +9,7 @@
 #include "can_clock.h"
 #include "waymark/devices.h"
 
-#define IDS_MAX 4096
+#define IDS_MAX 4096                        // above all 2048 standard ids and any vehicle's extended ones
 #define LOOK_EVERY_NS (500 * WM_NS_PER_MS)  // for an absent interface, or another one by the same name
 
 typedef struct can_device {

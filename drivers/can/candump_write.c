@@ -4,7 +4,7 @@
 
 #include "waymark/can.h"
 
-#define ERROR_FLAG 0x20000000u
+#define ERROR_FLAG 0x20000000u  // CAN_ERR_FLAG of linux/can.h
 
 size_t wm_candump_write(const wm_can_frame *frame, char *out, size_t capacity) {
   uint64_t us = (frame->t_ns < 0 ? 0 - (uint64_t)frame->t_ns : (uint64_t)frame->t_ns) / 1000;

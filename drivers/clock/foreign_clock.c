@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "foreign_clock.h"
 
-#define DRIFT_PER_S (100 * WM_NS_PER_US)  // two crystals of 50 ppm each
-#define LEAP_NS (200 * WM_NS_PER_MS)      // more than any delay: the clock was set, or the device restarted
-#define LATE_IN_A_ROW 8                   // a leap backwards looks like a delay at first
-#define LEAST_UNCERTAINTY_NS (50 * WM_NS_PER_US)
+#define DRIFT_PER_S (100 * WM_NS_PER_US)          // two crystals of 50 ppm each
+#define LEAP_NS (200 * WM_NS_PER_MS)              // more than any delay: the clock was set, or the device restarted
+#define LATE_IN_A_ROW 8                           // a leap backwards looks like a delay at first
+#define LEAST_UNCERTAINTY_NS (50 * WM_NS_PER_US)  // interrupt latency of the smallest delays; not swept
 
 static void restart(foreign_clock *self, wm_time_ns offset_ns, wm_time_ns seen_ns) {
   self->restarts += (uint64_t)self->is_set;

@@ -5,8 +5,8 @@
 
 #include <stdint.h>
 
-#define ARUCO_CODES_MAX 1000
-#define ARUCO_ORIGINAL_CODES 1024
+#define ARUCO_CODES_MAX 1000       // of the largest predefined dictionaries
+#define ARUCO_ORIGINAL_CODES 1024  // 10 bits of identity
 
 // OpenCV's DICT_4X4_1000, ... DICT_7X7_1000; the smaller dictionaries are the first 50, 100, 250 of these.
 extern const uint64_t aruco_codes[4][ARUCO_CODES_MAX];

@@ -8,10 +8,10 @@
 #include "waymark/cascade_file.h"
 #include "waymark/text.h"
 
-#define DEPTH_MAX 16
-#define NAME_MAX_BYTES 32
-#define ITEMS_MAX 1000000u
-#define NUMBERS_MAX 4096
+#define DEPTH_MAX 16        // of elements; OpenCV's files are less deep
+#define NAME_MAX_BYTES 32   // of an element
+#define ITEMS_MAX 1000000u  // nodes, leaves or rectangles: bounds the memory of a malformed file
+#define NUMBERS_MAX 4096    // of one element
 
 typedef struct slice {
   const char *at;

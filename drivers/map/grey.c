@@ -6,7 +6,7 @@
 #include "waymark/map.h"
 #include "waymark/text.h"
 
-#define FILE_BYTES_MAX ((size_t)1 << 30)
+#define FILE_BYTES_MAX ((size_t)1 << 30)  // above the largest map that is read (400 million pixels)
 
 static wm_status check_size(uint64_t width, uint64_t height, const char *path, wm_error *err) {
   if (width == 0 || height == 0) return wm_fail(err, WM_BAD_DATA, "%s: a picture without pixels", path);

@@ -7,8 +7,8 @@
 #include "waymark/map.h"
 #include "waymark/recording.h"
 
-#define APPEARANCES_MAX 10000
-#define SIDE_MAX_PX 8192u
+#define APPEARANCES_MAX 10000  // bounds the memory of a malformed file
+#define SIDE_MAX_PX 8192u      // of an appearance's picture
 
 enum { ID, PICTURE, WIDTH, HEIGHT, YAW };
 static const csv_format kAppearances = {{{"id", CSV_WHOLE, CSV_NEEDED, 0, 2147483647.0},

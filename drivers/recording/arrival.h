@@ -22,7 +22,7 @@ static inline wm_time_ns arrival_order_next(arrival_order *self, wm_time_ns arri
 
 // A corrupt stamp far ahead would make all later data late. It is recognized by the next datum, which goes back by more
 // than any lateness to about the earlier data. (If the later datum were the corrupt one, it would go back further.)
-#define ARRIVAL_LEAP_NS (10 * WM_NS_PER_S)
+#define ARRIVAL_LEAP_NS (10 * WM_NS_PER_S)  // above any lateness, below gaps between recordings
 static inline int arrival_order_leaps(const arrival_order *self, wm_time_ns arrival_ns, wm_time_ns next_ns) {
   return arrival_ns - next_ns > ARRIVAL_LEAP_NS && (!self->started || next_ns >= self->newest_ns - ARRIVAL_LEAP_NS);
 }

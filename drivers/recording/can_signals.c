@@ -7,7 +7,7 @@
 #include "calibration.h"
 #include "waymark/text.h"
 
-#define BINDINGS_MAX 256
+#define BINDINGS_MAX 256  // lines of can-signals.yaml
 
 static wm_status needed(const wm_yaml_node *item, const char *key, char *out, size_t capacity, wm_error *err) {
   wm_yaml_node node = wm_yaml_get(item, key);

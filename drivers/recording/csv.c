@@ -8,7 +8,7 @@
 
 #include "waymark/text.h"
 
-#define TIME_LIMIT INT64_C(4000000000000000000)
+#define TIME_LIMIT INT64_C(4000000000000000000)  // ns; differences of two stamps fit into 64 bits
 
 static csv_field trimmed(const char *text, size_t length) {
   while (length > 0 && (*text == ' ' || *text == '\t')) text++, length--;

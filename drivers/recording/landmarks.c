@@ -6,7 +6,7 @@
 #include "calibration.h"
 #include "csv.h"
 
-#define LANDMARKS_MAX 1000000
+#define LANDMARKS_MAX 1000000  // bounds the memory of a malformed file
 
 enum { ID, X, Y, Z, SIGMA, YAW, COV_XX, COV_XY, COV_YY, COV_TT };
 static const csv_format kLandmarks = {{{"id", CSV_WHOLE, CSV_NEEDED, 0, 2147483647.0},

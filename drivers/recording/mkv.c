@@ -23,8 +23,8 @@ enum {
   ID_HEIGHT = 0xBA,
   ID_COLOUR_SPACE = 0x2EB524
 };
-#define UNKNOWN_SIZE UINT64_MAX
-#define TYPE_VIDEO 1
+#define UNKNOWN_SIZE UINT64_MAX  // RFC 8794, section 6.2: all bits of a size set
+#define TYPE_VIDEO 1             // RFC 9559: TrackType
 
 typedef struct element {
   uint32_t id;

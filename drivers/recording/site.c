@@ -14,7 +14,7 @@
 #include "waymark/text.h"
 #include "waymark/yaml.h"
 
-#define CALIBRATION_BYTES_MAX (1u << 20)
+#define CALIBRATION_BYTES_MAX (1u << 20)  // usual files are some kB
 
 struct wm_site {
   char dir[WM_PATH_MAX];  // "": no folder

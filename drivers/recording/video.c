@@ -15,8 +15,8 @@
 #include "decoded.h"
 #include "jpeg.h"
 
-#define PICTURE_SIDE_MAX 16384
-#define INTERVALS 9  // the usual period is their median
+#define PICTURE_SIDE_MAX 16384  // pixels
+#define INTERVALS 9             // the usual period is their median
 
 enum { FRAME, T, EXPOSURE, ARRIVAL };
 static const csv_format kFormat = {{{"frame", CSV_WHOLE, CSV_NEEDED, 0, 2147483647.0},

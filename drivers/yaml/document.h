@@ -5,10 +5,10 @@
 
 #include "waymark/yaml.h"
 
-#define WM_YAML_BYTES_MAX (16u << 20)
-#define WM_YAML_NODES_MAX 1000000
-#define WM_YAML_DEPTH_MAX 64
-#define WM_YAML_ANCHORS_MAX 1000  // each alias searches them
+#define WM_YAML_BYTES_MAX (16u << 20)  // usual files are some kB
+#define WM_YAML_NODES_MAX 1000000      // with aliases expanded: bounds memory and time
+#define WM_YAML_DEPTH_MAX 64           // bounds the recursion
+#define WM_YAML_ANCHORS_MAX 1000       // each alias searches them
 
 typedef enum yaml_kind { YAML_KIND_NULL, YAML_KIND_SCALAR, YAML_KIND_LIST, YAML_KIND_MAP } yaml_kind;
 

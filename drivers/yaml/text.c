@@ -10,8 +10,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#define NUMBER_MAX 63
-#define WORD_MAX 63
+#define NUMBER_MAX 63  // letters; a double needs 24
+#define WORD_MAX 63    // letters that are compared
 
 static int is_digit(char c) { return c >= '0' && c <= '9'; }
 

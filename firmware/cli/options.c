@@ -8,7 +8,7 @@
 
 #include "waymark/text.h"
 
-#define OPTIONS_MAX 16
+#define OPTIONS_MAX 16  // of a command
 
 static const option *find(const option *options, size_t count, const char *name, size_t length) {
   for (size_t i = 0; i < count; i++)

@@ -30,7 +30,7 @@ static const char kHelp[] =
     "  waymark watch\n"
     "  waymark watch --web 8080 --map map/map.yaml\n";
 
-#define SHOW_EVERY_NS (500 * WM_NS_PER_MS)
+#define SHOW_EVERY_NS (500 * WM_NS_PER_MS)  // refresh of the terminal
 
 static atomic_int stop;
 

@@ -14,7 +14,7 @@
 #include "waymark/text.h"
 #include "waymark/yaml.h"
 
-#define CONFIG_BYTES_MAX (1u << 20)
+#define CONFIG_BYTES_MAX (1u << 20)  // usual files are some kB
 
 static wm_status check_format(const wm_yaml_node *root, wm_error *err) {
   char format[64];

@@ -76,9 +76,9 @@ typedef struct wm_runtime_params {
 } wm_runtime_params;
 extern const wm_param_table wm_runtime_params_table;
 
-#define WM_CONFIG_WARNINGS_MAX 4096
-#define WM_VISION_MAX 8
-#define WM_CONFIG_CASCADES_MAX 8
+#define WM_CONFIG_WARNINGS_MAX 4096  // bytes
+#define WM_VISION_MAX 8              // detectors
+#define WM_CONFIG_CASCADES_MAX 8     // classes of a cascade detector
 
 // A detector under `vision:`.
 typedef struct wm_vision_config {

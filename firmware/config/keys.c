@@ -8,8 +8,8 @@
 
 #include "waymark/text.h"
 
-#define KEY_MAX 96
-#define NO_LIKENESS 100
+#define KEY_MAX 96       // bytes of a dotted key
+#define NO_LIKENESS 100  // above any distance of two keys
 
 const config_key kConfigKeys[] = {
     {"format", "text", "needed", "`waymark-config/1`."},

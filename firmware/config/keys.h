@@ -28,14 +28,14 @@ typedef struct config_section {
   const wm_param_table *table;
 } config_section;
 
-#define CONFIG_SECTIONS_MAX 32
+#define CONFIG_SECTIONS_MAX 32  // tables: runtime, motion, sightings, estimators, detectors
 // All tables: the runtime's, motion's, each registered estimator's and detector's. Returns how many there are.
 size_t config_sections(config_section out[CONFIG_SECTIONS_MAX]);
 
 // "FILE:LINE: KEY: unknown key" with the nearest known key. WM_BAD_CONFIG.
 wm_status config_unknown(const wm_yaml_node *value, int line, wm_error *err);
 
-#define CONFIG_PARAMS_MAX 128
+#define CONFIG_PARAMS_MAX 128  // parameters of a table
 
 // A table's struct while it is filled.
 typedef struct config_filling {

@@ -6,8 +6,8 @@
 
 #define SMOOTH 0.2         // of a second's step
 #define LEAST_STEP_M 0.05  // a rate per metre is not observable from less
-#define FARTHEST_M 1e5
-#define STANDING_MPS 0.01
+#define FARTHEST_M 1e5     // beyond it the forecast is infinite
+#define STANDING_MPS 0.01  // below it there is no time to a distance
 
 void wm_budget_init(wm_budget *self, double limit_m) {
   memset(self, 0, sizeof *self);

@@ -6,7 +6,7 @@
 
 #include "rt/clock.h"
 
-#define PARTICLES_EVERY_NS WM_NS_PER_S
+#define PARTICLES_EVERY_NS WM_NS_PER_S  // for pictures of the cloud in the report
 #define Q_BIT(q) (UINT32_C(1) << (q))
 #define TICKS (Q_BIT(WM_Q_WHEEL_TICKS_LEFT) | Q_BIT(WM_Q_WHEEL_TICKS_RIGHT))
 #define SPEEDS                                                                                                    \

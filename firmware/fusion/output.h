@@ -22,7 +22,7 @@ typedef enum wm_output_kind {
 } wm_output_kind;
 
 // A cloud of particles, truncated to the size of a record of points.
-#define WM_PARTICLES_MAX 240
+#define WM_PARTICLES_MAX 240  // fits into a record of points
 typedef struct wm_particle_set {
   wm_time_ns t_ns;
   uint32_t count, total;
@@ -30,7 +30,7 @@ typedef struct wm_particle_set {
 } wm_particle_set;
 
 // Other poses that the estimator considers, truncated to the size of a record of points.
-#define WM_HYPOTHESES_MAX 100
+#define WM_HYPOTHESES_MAX 100  // fits into a record of points
 typedef struct wm_hypothesis_set {
   wm_time_ns t_ns;
   uint64_t count;

@@ -21,7 +21,7 @@
 #include "rt/histogram.h"
 #include "rt/realtime.h"
 
-#define WM_PIPELINE_NEEDS 3
+#define WM_PIPELINE_NEEDS 3  // merge, estimator, odometry
 
 typedef struct wm_pipeline {
   const wm_assembly *assembly;

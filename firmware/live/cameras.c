@@ -12,7 +12,7 @@
 #include "sources/frame_hub.h"
 #include "waymark/devices.h"
 
-#define AFTER_ERROR_NS (100 * WM_NS_PER_MS)
+#define AFTER_ERROR_NS (100 * WM_NS_PER_MS)  // a source that only fails must not spin
 
 typedef struct cameras cameras;
 

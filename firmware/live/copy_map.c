@@ -13,9 +13,9 @@
 #include "waymark/text.h"
 #include "waymark/yaml.h"
 
-#define YAML_BYTES_MAX (1u << 20)
+#define YAML_BYTES_MAX (1u << 20)  // usual files are below a kB
 #define PATH_BYTES (2 * WM_PATH_MAX)
-#define PICTURES_MAX 3
+#define PICTURES_MAX 3  // image, layers.edges, layers.drivable
 
 typedef struct picture {
   char named[WM_PATH_MAX];  // as in the YAML

@@ -10,7 +10,7 @@
 #include "rt/memory.h"
 #include "waymark/keeper.h"
 
-#define FLUSH_EVERY_NS WM_NS_PER_S
+#define FLUSH_EVERY_NS WM_NS_PER_S  // a power cut loses the last second at most
 
 static void keep_pose(live *run, const wm_published *published) {
   live_disk *self = &run->disk;

@@ -7,7 +7,7 @@
 #include "live/threads.h"
 #include "rt/memory.h"
 
-#define HEALTH_EVERY_NS WM_NS_PER_S
+#define HEALTH_EVERY_NS WM_NS_PER_S  // rate of the HEALTH message
 
 // ── its output goes into rings ────────────────────────────────────────────────────────────────────────────────────
 

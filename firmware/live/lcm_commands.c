@@ -10,7 +10,7 @@
 #include "rt/clock.h"
 #include "waymark/lcm_messages.h"
 
-#define WAITING_MAX 16
+#define WAITING_MAX 16  // commands between two calls; further ones are dropped
 #define LATENESS_MS 20  // from a message's arrival until it is in the merge
 
 typedef struct lcm_commands {

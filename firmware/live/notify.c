@@ -12,7 +12,7 @@
 
 #include "rt/clock.h"
 
-#define READY_WITHOUT_POSE_NS (10 * WM_NS_PER_S)
+#define READY_WITHOUT_POSE_NS (10 * WM_NS_PER_S)  // a start without input must not be taken for a failed one
 
 static void send_text(const notify *self, const char *text) {
   if (self->socket >= 0) (void)send(self->socket, text, strlen(text), MSG_NOSIGNAL | MSG_DONTWAIT);

@@ -8,7 +8,7 @@
 
 #include "waymark/time.h"
 
-#define NOTIFY_STATUS_BYTES 160
+#define NOTIFY_STATUS_BYTES 160  // state and the names of silent inputs
 
 typedef struct notify {
   int socket;  // -1: no service manager

@@ -9,7 +9,7 @@
 #include "live/threads.h"
 #include "rt/memory.h"
 
-#define LANDMARKS_EVERY_NS (5 * WM_NS_PER_S)
+#define LANDMARKS_EVERY_NS (5 * WM_NS_PER_S)  // for viewers that join later
 
 void live_say_later(void *context, const char *line) {
   live *run = context;

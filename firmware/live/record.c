@@ -20,9 +20,9 @@
 #include "waymark/text.h"
 #include "waymark/yaml.h"
 
-#define LOOK_EVERY_MS 100
-#define SYNC_EVERY_NS WM_NS_PER_S
-#define FILE_BYTES_MAX (16u << 20)
+#define LOOK_EVERY_MS 100           // for the end of the recording and the disk's free space
+#define SYNC_EVERY_NS WM_NS_PER_S   // a power cut loses the last second at most
+#define FILE_BYTES_MAX (16u << 20)  // of a configuration, DBC or calibration
 // A disk that blocks for a quarter of a second at 30 Hz loses no picture.
 static const wm_frame_wishes kEveryPicture = {.waiting_max = 8, .wait_ms = WM_DEVICE_WAIT_MS, .wants_raw = 1};
 

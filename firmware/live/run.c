@@ -17,7 +17,7 @@
 #include "waymark/keeper.h"
 
 #define BEFORE_FIRST_NS (100 * WM_NS_PER_MS)  // time for the threads to get ready
-#define LOOK_EVERY_NS (20 * WM_NS_PER_MS)
+#define LOOK_EVERY_NS (20 * WM_NS_PER_MS)     // main thread: stop, reload, end of the recording
 
 void live_say(live *self, const char *format, ...) {
   if (!self->options->say) return;

@@ -28,7 +28,7 @@ typedef struct thread_spec {
 } thread_spec;
 
 // The rest of a stack is address space for libraries and for sanitizers, which take most of a megabyte.
-#define THREAD_TOUCHED_BYTES ((size_t)256 << 10)
+#define THREAD_TOUCHED_BYTES ((size_t)256 << 10)  // of a stack; deeper pages are faulted in at their first use
 
 extern const thread_spec kThreads[THREAD_ROLES];
 

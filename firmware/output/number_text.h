@@ -9,7 +9,7 @@
 extern "C" {
 #endif
 
-#define WM_NUMBER_MAX 32
+#define WM_NUMBER_MAX 32  // bytes; the longest double has 24
 
 // The shortest text that reads back to the same bits. Returns its length; not terminated. About 0.1 us, no allocation.
 size_t wm_number_exact(double value, char out[WM_NUMBER_MAX]);

@@ -15,7 +15,7 @@
 #include "waymark/keeper.h"
 
 #define MAGIC "WMMAP 1\n"
-#define HEAD_BYTES 44
+#define HEAD_BYTES 44  // magic 8, hashes 16, UTC 8, bytes 8, CRC 4
 
 // ── what it belongs to ──────────────────────────────────────────────────────────────────────────────────────────────
 

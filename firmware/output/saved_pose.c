@@ -11,10 +11,10 @@
 #include "waymark/yaml.h"
 
 // A doubtful pose is saved with its covariance; an older one would be as wrong with a smaller covariance.
-#define SIGMA_XY_MAX_M 50.0
-#define SIGMA_HEADING_MAX_RAD 1.5
-#define GOES_ON_S 2.0
-#define DRIVES_S 10.0
+#define SIGMA_XY_MAX_M 50.0        // a less certain pose is worse than a search
+#define SIGMA_HEADING_MAX_RAD 1.5  // likewise
+#define GOES_ON_S 2.0              // motion at the last speed that is assumed after the save
+#define DRIVES_S 10.0              // age up to which the robot may still drive
 
 // ── writing ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 

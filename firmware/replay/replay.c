@@ -15,8 +15,8 @@
 #include "rt/memory.h"
 #include "waymark/yaml.h"
 
-#define STACK_BYTES ((size_t)256 << 10)
-#define PROGRESS_EVERY_NS (200 * WM_NS_PER_MS)
+#define STACK_BYTES ((size_t)256 << 10)         // prefaulted, as of a run's threads
+#define PROGRESS_EVERY_NS (200 * WM_NS_PER_MS)  // of the progress callback
 
 typedef struct replay {
   wm_assembly assembly;

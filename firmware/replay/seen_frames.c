@@ -10,8 +10,8 @@
 #include "waymark/codec.h"
 
 #define SAME_TIME_NS (20 * WM_NS_PER_MS)  // jitter of playing a recording, and of stamps
-#define VOTES_MIN 20
-#define ALIKE_MAX 4  // more equal data (standing still) carry no information about the offset
+#define VOTES_MIN 20                      // fewer equal data may agree by chance
+#define ALIKE_MAX 4                       // more equal data (standing still) carry no information about the offset
 
 // A growing list of pairs: hash of the content (or an arrival), and stamp.
 typedef struct said {

@@ -9,8 +9,8 @@
 
 #include "waymark/status.h"
 
-#define WM_ARENA_PARTS_MAX 96
-#define WM_ARENA_ALIGN 64
+#define WM_ARENA_PARTS_MAX 96  // rings of 32 sources, two parts of each detector, and the rest
+#define WM_ARENA_ALIGN 64      // a cache line
 
 typedef struct wm_arena_part {
   char name[40];

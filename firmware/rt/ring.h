@@ -11,7 +11,7 @@
 
 #include "rt/realtime.h"
 
-#define WM_CACHE_LINE 64
+#define WM_CACHE_LINE 64  // bytes on x86-64 and most ARM processors
 
 typedef struct wm_ring {
   // Constant after init.

@@ -12,8 +12,8 @@
 
 #include "waymark/frame_source.h"
 
-#define FRAME_HUB_SUBSCRIBERS_MAX 16
-#define FRAME_HUB_WAITING_MAX 16  // largest waiting_max of a subscriber
+#define FRAME_HUB_SUBSCRIBERS_MAX 16  // 8 detectors, black box, recorder, live view
+#define FRAME_HUB_WAITING_MAX 16      // largest waiting_max of a subscriber
 
 typedef struct frame_hub frame_hub;
 

@@ -22,7 +22,7 @@
 #include "waymark/recording.h"
 #include "waymark/source.h"
 
-#define WM_VISION_SOURCES_MAX 8
+#define WM_VISION_SOURCES_MAX 8  // pairs of detector and camera
 #define WM_VISION_NEEDS (2 * WM_VISION_SOURCES_MAX)
 
 typedef struct wm_vision wm_vision;

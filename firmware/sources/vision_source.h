@@ -11,9 +11,9 @@
 #include "waymark/detector.h"
 #include "waymark/frame_source.h"
 
-#define PICTURES_MAX 2
+#define PICTURES_MAX 2                        // a stereo pair
 #define PAIR_TOLERANCE_NS (2 * WM_NS_PER_MS)  // pictures of a pair are triggered together
-#define PREFETCH_EVENTS 8
+#define PREFETCH_EVENTS 8                     // some pictures ahead of the replay; not swept
 
 typedef struct vision_source vision_source;
 

@@ -14,8 +14,8 @@
 extern "C" {
 #endif
 
-#define WM_CAN_DATA_MAX 64
-#define WM_CAN_IFACE_MAX 16
+#define WM_CAN_DATA_MAX 64   // bytes of a CAN FD frame
+#define WM_CAN_IFACE_MAX 16  // IFNAMSIZ
 
 typedef struct wm_can_frame {
   wm_time_ns t_ns;
@@ -79,8 +79,8 @@ void wm_can_gnss_init(wm_can_gnss *self, const double origin[3]);
 int wm_can_gnss_take(wm_can_gnss *self, const wm_quantities *values, wm_position *out);
 
 // The line of can-signals.yaml that binds signals to one quantity.
-#define WM_CAN_SUM_MAX 4
-#define WM_CAN_VALUES_MAX 32
+#define WM_CAN_SUM_MAX 4      // signals of a sum: one for each wheel
+#define WM_CAN_VALUES_MAX 32  // gears in a table
 typedef struct wm_can_binding {
   int quantity;                     // wm_quantity or WM_CAN_LATITUDE ...
   char message[64];                 // name in the DBC, short or long

@@ -9,7 +9,7 @@
 extern "C" {
 #endif
 
-#define WM_CASCADE_BYTES_MAX (16u << 20)
+#define WM_CASCADE_BYTES_MAX (16u << 20)  // usual files are some hundred kB to some MB
 
 // Reads a cascade in the format of opencv_traincascade (or `waymark map train-cascade`); `height_m` is left 0. Without
 // OpenCV: the format is small, and its library would be 230 MB on a robot. WM_BAD_CONFIG with file and line for other

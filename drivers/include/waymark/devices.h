@@ -34,7 +34,7 @@ void wm_can_listener_close(wm_can_listener *self);  // NULL is fine
 
 typedef enum wm_stamp_point { WM_STAMP_AUTO, WM_STAMP_START, WM_STAMP_END } wm_stamp_point;
 
-#define WM_CAMERA_CONTROLS_MAX 16
+#define WM_CAMERA_CONTROLS_MAX 16  // of a camera in the configuration
 typedef struct wm_camera_device_config {
   char name[WM_NAME_MAX];  // of the camera in calibration.yaml, which gives its size
   char device[128];        // /dev/video0, /dev/v4l/by-id/...
@@ -99,8 +99,8 @@ const wm_camera_counts *wm_camera_device_counted(const wm_camera_device *self);
 wm_frame_source *wm_camera_device_frames(wm_camera_device *self);
 void wm_camera_device_close(wm_camera_device *self);  // NULL is fine
 
-#define WM_CAN_DEVICES_MAX 4
-#define WM_CAMERA_DEVICES_MAX 8
+#define WM_CAN_DEVICES_MAX 4     // buses of a robot
+#define WM_CAMERA_DEVICES_MAX 8  // cameras of a robot
 typedef struct wm_devices_config {
   wm_can_device_config can[WM_CAN_DEVICES_MAX];
   size_t can_count;

@@ -14,8 +14,8 @@
 extern "C" {
 #endif
 
-#define WM_PATH_MAX 512
-#define WM_SENSORS_MAX 32
+#define WM_PATH_MAX 512    // bytes of a path with its terminator
+#define WM_SENSORS_MAX 32  // of a calibration, cameras included
 
 // Files in place of the folder's own; "": the folder's.
 typedef struct wm_recording_overrides {

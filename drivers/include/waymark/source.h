@@ -14,8 +14,8 @@
 extern "C" {
 #endif
 
-#define WM_SOURCE_NAME_MAX 48
-#define WM_SOURCES_MAX 32
+#define WM_SOURCE_NAME_MAX 48  // bytes, "sightings:" and a sensor's name
+#define WM_SOURCES_MAX 32      // of a run
 
 // Counts of a source: every datum that doesn't become an event is in one of these.
 typedef struct wm_source_counts {

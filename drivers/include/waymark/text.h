@@ -34,7 +34,7 @@ const char *wm_word_nearest(const char *word, const char *const *known);
 // Writes the slice for a message: at most `capacity` bytes with the terminator, control characters and broken UTF-8 as
 // '?', cut with "..." where it is longer. Returns `out`.
 const char *wm_show_text(const char *text, size_t length, char *out, size_t capacity);
-#define WM_SHOW_TEXT_MAX 64
+#define WM_SHOW_TEXT_MAX 64  // bytes of a quoted value in a message
 
 // Reads a file of at most `max_bytes` whole; *out is terminated, and the caller frees it. WM_NOT_FOUND, WM_IO, WM_FULL
 // with the path and the system's reason.

@@ -4,7 +4,7 @@
 
 #include "cli/check/check.h"
 
-#define LANDMARKS_NEAR_M 0.002
+#define LANDMARKS_NEAR_M 0.002  // below the accuracy of any survey
 
 static void start_among_landmarks(const wm_setup *setup, findings *out) {
   double nearest_m = HUGE_VAL;

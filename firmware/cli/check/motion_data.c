@@ -7,10 +7,10 @@
 #include "cli/check/check.h"
 
 #define ABOUT "can"
-#define FASTEST_MPS 70.0
-#define FASTEST_TURN_RADPS 6.0
-#define PAIRS_MIN 100
-#define TURN_RMS_MIN 0.02  // rad/s: a drive straight ahead has no information
+#define FASTEST_MPS 70.0        // 250 km/h
+#define FASTEST_TURN_RADPS 6.0  // about a turn a second
+#define PAIRS_MIN 100           // a correlation of fewer pairs is too uncertain
+#define TURN_RMS_MIN 0.02       // rad/s: a drive straight ahead has no information
 
 void motion_data_init(motion_data *self, const wm_wheels *wheels) {
   memset(self, 0, sizeof *self);

@@ -40,8 +40,8 @@ static int number_of(const char *root, const char *interface, const char *what, 
   return got;
 }
 
-#define ARPHRD_OF_CAN 280
-#define IS_UP 1
+#define ARPHRD_OF_CAN 280  // ARPHRD_CAN of linux/if_arp.h
+#define IS_UP 1            // IFF_UP of linux/if.h
 
 static void can_interface(const char *root, const char *interface, findings *out) {
   char about[32], mend[160];

@@ -17,7 +17,7 @@ typedef struct finding {
   char mend[240];  // "" where nothing is to do
 } finding;
 
-#define FINDINGS_MAX 64
+#define FINDINGS_MAX 64  // further ones are dropped
 typedef struct findings {
   finding at[FINDINGS_MAX];
   size_t count;

@@ -8,7 +8,7 @@
 #include "cli/doctor/doctor.h"
 #include "rt/clock.h"
 
-#define PERIOD_NS WM_NS_PER_MS
+#define PERIOD_NS WM_NS_PER_MS        // of the wake-ups: more samples than at the rate of a run
 #define GOOD_NS (500 * WM_NS_PER_US)  // a tenth of a loop of 200 Hz
 #define BAD_NS (5 * WM_NS_PER_MS)     // a whole one
 
