@@ -254,7 +254,8 @@ static wm_status read_signal(reader *r) {
   return skip_line(r);
 }
 
-// ── what is said elsewhere about messages and signals ───────────────────────────────────────────────────────────────
+// ── attributes of messages and signals in other sections
+// ───────────────────────────────────────────────────────────────
 
 static dbc_message *find_message(const reader *r, uint64_t id) {
   return wm_dbc_find(r->dbc, dbc_key((uint32_t)(id & ~kExtendedFlag), (id & kExtendedFlag) != 0));

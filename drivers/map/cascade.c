@@ -318,7 +318,7 @@ static wm_status check_whole(reader *r) {
   if (c->leaf_count != c->node_count + c->tree_count) return fail(r, "a tree has no leafValues");
   for (size_t i = 0; i < c->node_count; i++)
     if (c->nodes[i].feature >= c->feature_count)
-      return wm_fail(r->err, WM_BAD_CONFIG, "%s: a node asks for feature %u of %zu: is the file cut?", r->path,
+      return wm_fail(r->err, WM_BAD_CONFIG, "%s: a node uses feature %u of %zu: is the file truncated?", r->path,
                      (unsigned)c->nodes[i].feature, c->feature_count);
   return WM_OK;
 }

@@ -11,7 +11,7 @@
 static const char kHelp[] =
     "usage: waymark doctor [CONFIG] [options]\n"
     "\n"
-    "Says what is wrong with this computer, and how to mend it: kernel, real-time rights, clocks, governors,\n"
+    "Finds what is wrong with this computer, and how to mend it: kernel, real-time rights, clocks, governors,\n"
     "temperature, LCM's way; with a configuration also its CAN interfaces and cameras. Measures for 5 s how late a\n"
     "thread wakes. Changes nothing. Exit code 1 where something is bad.\n"
     "\n"

@@ -14,7 +14,7 @@ static const char kHelp[] =
     "Writes the data of the robot's devices into a recording: all CAN frames, cameras' pictures (MJPEG as it is, "
     "others "
     "as\n"
-    "uncompressed grey), calibration, DBC and configuration. It is whole at every moment, also after a power cut. "
+    "uncompressed grey), calibration, DBC and configuration. It is valid at every moment, also after a power cut. "
     "Ends\n"
     "after --duration, by Ctrl-C (SIGTERM), or when its room is used up.\n"
     "\n"

@@ -22,7 +22,7 @@ static const char kHelp[] =
     "with --out, into files and an event log. The sources are the configuration's devices or, with --recording, a\n"
     "recording's, played at real speed. Ends with the recording, after --duration, or by Ctrl-C (SIGTERM), and writes\n"
     "everything then. On devices SIGHUP reads the configuration again: a good one is taken, from the present pose and\n"
-    "into FOLDER.2 ...; a wrong one is reported, and the run goes on.\n"
+    "into FOLDER.2 ...; a wrong one is reported, and the run continues.\n"
     "\n"
     "  --config FILE          which estimator, and its parameters\n"
     "  --recording RECORDING  play this recording instead of devices\n"

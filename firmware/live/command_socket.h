@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Commands from programs of this computer alone: a local datagram socket (a file, whose permissions say who may send).
-// Each datagram is a set_pose_t or a reset_t as lcm-gen's code encodes it.
+// Commands from programs of this computer alone: a local datagram socket (a file, whose permissions restrict the
+// senders). Each datagram is a set_pose_t or a reset_t as lcm-gen's code encodes it.
 #ifndef WAYMARK_LIVE_COMMAND_SOCKET_H
 #define WAYMARK_LIVE_COMMAND_SOCKET_H
 

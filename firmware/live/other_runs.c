@@ -85,7 +85,7 @@ void other_runs_close(other_runs *self) {
   self->fd = -1;
 }
 
-// ── who is there ────────────────────────────────────────────────────────────────────────────────────────────────────
+// ── other runs ────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static void tell(const other_runs *self, const other_run *run, const char *what) {
   char line[300];

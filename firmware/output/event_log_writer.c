@@ -112,6 +112,7 @@ wm_status wm_log_close(wm_log_writer *self, wm_error *err) {
   wm_log_flush(self);
   if (fclose(self->file) != 0 && !self->failed) self->failed = errno ? errno : EIO;
   self->file = NULL;
-  if (self->failed) return wm_fail(err, WM_IO, "events.wmlog: could not be written whole: %s", strerror(self->failed));
+  if (self->failed)
+    return wm_fail(err, WM_IO, "events.wmlog: could not be written completely: %s", strerror(self->failed));
   return WM_OK;
 }

@@ -52,7 +52,8 @@ static FILE *open_json(const char *dir, const char *name, char *path, size_t cap
 
 static wm_status close_json(FILE *f, const char *path, wm_error *err) {
   int failed = ferror(f);
-  if (fclose(f) != 0 || failed) return wm_fail(err, WM_IO, "%s: could not be written whole: %s", path, strerror(errno));
+  if (fclose(f) != 0 || failed)
+    return wm_fail(err, WM_IO, "%s: could not be written completely: %s", path, strerror(errno));
   return WM_OK;
 }
 

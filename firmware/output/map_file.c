@@ -59,7 +59,7 @@ wm_status wm_write_map(const char *dir, const wm_estimator *estimator, const voi
     }
     int failed = ferror(file);
     if (fclose(file) != 0 || failed)
-      status = wm_fail(err, WM_IO, "%s: could not be written whole: %s", path, strerror(errno));
+      status = wm_fail(err, WM_IO, "%s: could not be written completely: %s", path, strerror(errno));
   }
   free(entries);
   free(landmarks);

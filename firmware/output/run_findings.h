@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a person should know after a run.
+// Findings of a run, for its user.
 #ifndef WAYMARK_OUTPUT_RUN_FINDINGS_H
 #define WAYMARK_OUTPUT_RUN_FINDINGS_H
 

@@ -398,7 +398,7 @@ wm_status wm_run_folder_close(wm_run_folder *self, wm_error *err) {
     if (!t->file) continue;
     if (fclose(t->file) != 0 && !t->failed) t->failed = errno;
     if (t->failed && status == WM_OK)
-      status = wm_fail(err, WM_IO, "%s: could not be written whole: %s", t->path, strerror(t->failed));
+      status = wm_fail(err, WM_IO, "%s: could not be written completely: %s", t->path, strerror(t->failed));
   }
   free(self);
   return status;

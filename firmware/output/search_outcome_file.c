@@ -33,6 +33,7 @@ wm_status wm_write_search_outcomes(const char *dir, wm_vision *vision, wm_error 
     for (size_t k = 0; k < count; k++) put_row(f, wm_vision_source(vision, i)->name, &rows[k]);
   }
   int failed = ferror(f);
-  if (fclose(f) != 0 || failed) return wm_fail(err, WM_IO, "%s: could not be written whole: %s", path, strerror(errno));
+  if (fclose(f) != 0 || failed)
+    return wm_fail(err, WM_IO, "%s: could not be written completely: %s", path, strerror(errno));
   return WM_OK;
 }

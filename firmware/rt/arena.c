@@ -25,8 +25,8 @@ wm_status wm_arena_open(wm_arena *self, size_t bytes, wm_error *err) {
 
 wm_status wm_arena_take(wm_arena *self, const char *name, size_t bytes, void **out, wm_error *err) {
   if (self->sealed)
-    return wm_fail(err, WM_FULL, "memory: '%s' asks for %zu bytes after the start; all memory is taken before", name,
-                   bytes);
+    return wm_fail(err, WM_FULL, "memory: '%s' needs %zu bytes after the start, but all memory is allocated before",
+                   name, bytes);
   size_t need = round_up(bytes, WM_ARENA_ALIGN);
   if (need < bytes || need > self->bytes - self->used)
     return wm_fail(err, WM_FULL, "memory: '%s' needs %zu bytes and %zu of %zu are left; %zu would suffice", name, bytes,

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Makes the manual pages and the shells' completions from what the programs say of themselves (--help).
+"""Makes the manual pages and the shells' completions from the programs' --help.
 help.py check|write BIN: `check` prints what differs and fails; `write` brings the files beside this one up to date. They are
-kept as files because a package for another architecture can't ask its programs."""
+kept as files because a package for another architecture can't run its programs."""
 import difflib
 import pathlib
 import re
@@ -107,7 +107,7 @@ def page(name, about, sections):
 
 def main_page(top, commands):
     description = ["Takes what wheels say over CAN and what cameras and other sensors see, and publishes poses over LCM.",
-                   "Each command tells its own story by", ".Nm", r".Ar command Fl \-help ."]
+                   "Each command has a help text:", ".Nm", r".Ar command Fl \-help ."]
     parts = []
     for name, said in top.options:
         if name in commands:

@@ -116,7 +116,7 @@ static void sees_the_floor(const wm_camera *c, findings *out) {
   double f[2], centre[2];
   if (c->mounting.xyz_m[2] <= 0.02) {
     find(out, FINDING_BAD, ABOUT, "xyz_m's third number is the height above the floor",
-         "cameras.%s.mounting.xyz_m: the camera is at or under the floor (z %g m), on which edges are looked for",
+         "cameras.%s.mounting.xyz_m: the camera is at or under the floor (z %g m), on which edges are detected",
          c->name, c->mounting.xyz_m[2]);
     return;
   }

@@ -119,7 +119,7 @@ static void print_left(const wm_health *h, FILE *to) {
                                     : fprintf(to, ", %.0f s at this speed\n", h->reckoning_left_s));
 }
 
-// Aliased poses are no fault, but the user who has just placed the robot needs to know of them.
+// Aliased poses are no fault, but matter to the user who has just placed the robot.
 static void print_aliased(const wm_health *h, FILE *to) {
   const wm_counter *aliased = wm_health_counter(h, WM_COUNTER_ALIASED_POSES);
   if (aliased && aliased->count > 0)

@@ -32,7 +32,7 @@ static void after_the_seal_nothing_is_given(void) {
   wm_arena_need needs[] = {{"a", 100, &a}};
   TEST_ASSERT_EQUAL(WM_OK, wm_arena_fill(&arena, needs, 1, 0, &err));
   TEST_ASSERT_EQUAL(WM_FULL, wm_arena_take(&arena, "late", 8, &a, &err));
-  TEST_ASSERT_NOT_NULL(strstr(err.text, "'late' asks for 8 bytes after the start"));
+  TEST_ASSERT_NOT_NULL(strstr(err.text, "'late' needs 8 bytes after the start"));
   wm_arena_close(&arena);
 }
 

@@ -25,7 +25,7 @@ _waymark() {
   esac
   [ -n "$words" ] || case "$command" in
     "run") words='--config --recording --out --record --out-max-mb --duration --speed --seed --resume --landmarks --map --calibration' ;;
-    "replay") words='--config --out --seed --landmarks --calibration --map --frames-of --from --until --lost --reference' ;;
+    "replay") words='--config --out --seed --landmarks --calibration --map --frames-of --timing-of --from --until --lost --reference' ;;
     "record") words='--config --out --duration --max-mb --free-mb' ;;
     "watch") words='--url --prefix --duration --web --map --bind' ;;
     "check") words='--landmarks --calibration --map --json' ;;
