@@ -31,6 +31,10 @@ function(wm_install_compressed file name where component)
   install(FILES ${made} DESTINATION ${CMAKE_INSTALL_DATADIR}/${where} COMPONENT ${component})
 endfunction()
 wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark.1 waymark.1 man/man1 runtime)
+if(TARGET waymark-web) # a robot's page comes from the robot
+  install(TARGETS waymark-web DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
+  wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-web.1 waymark-web.1 man/man1 runtime)
+endif()
 
 # ── the desk's ───────────────────────────────────────────────────────────────────────────────────────────────────────
 foreach(tool calibrate detect diff eval import map reference report simulate)

@@ -8,10 +8,8 @@
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "cli/watch/watch.h"
-#include "cli/watch/web.h"
 #include "live/lcm_connect.h"
 #include "rt/clock.h"
-#include "waymark/map.h"
 
 static const char kHelp[] =
     "usage: waymark watch [options]\n"
@@ -22,13 +20,11 @@ static const char kHelp[] =
     "  --url URL      LCM's (default: LCM_DEFAULT_URL, else this computer's)\n"
     "  --prefix TEXT  of the channels (default WAYMARK_)\n"
     "  --duration S   seconds, then stop\n"
-    "  --web PORT     instead a page for a browser: http://localhost:PORT, with the drive on the map\n"
-    "  --map FILE     with --web: the map.yaml to draw\n"
-    "  --bind ADDRESS with --web: 127.0.0.1 is this computer alone (default); 0.0.0.0 is everybody\n"
     "\n"
     "example:\n"
     "  waymark watch\n"
-    "  waymark watch --web 8080 --map map/map.yaml\n";
+    "\n"
+    "For a browser, with the map and live pictures: `waymark web CONFIG`.\n";
 
 #define SHOW_EVERY_NS (500 * WM_NS_PER_MS)  // refresh of the terminal
 
@@ -56,28 +52,6 @@ static void on_innovation(const lcm_recv_buf_t *message, const char *channel, vo
 
 static watch seen;
 
-// Messages first, then browsers, with a short wait each.
-static wm_status serve(lcm_t *lcm, const char *address, uint64_t port, const char *map_path, double duration_s,
-                       wm_error *err) {
-  web page;
-  wm_map *map = NULL;
-  wm_status status = map_path ? wm_map_load(map_path, print_note, NULL, &map, err) : WM_OK;
-  if (status == WM_OK) status = web_open(&page, address, (int)port, map ? wm_map_raster(map) : NULL, err);
-  if (status == WM_OK) {
-    (void)printf("http://%s:%d\n", strcmp(address, "127.0.0.1") == 0 ? "localhost" : address, (int)port);
-    (void)fflush(stdout);
-    wm_time_ns end_ns = duration_s > 0 ? wm_monotonic_ns() + wm_ns_from_seconds(duration_s) : INT64_MAX;
-    while (!atomic_load(&stop) && wm_monotonic_ns() < end_ns) {
-      while (lcm_handle_timeout(lcm, 0) > 0) {
-      }
-      web_serve(&page, &seen, 10);
-    }
-    web_close(&page);
-  }
-  wm_map_free(map);
-  return status;
-}
-
 static void show(lcm_t *lcm, double duration_s) {
   int is_terminal = isatty(STDOUT_FILENO);
   wm_time_ns begin_ns = wm_monotonic_ns(), next_ns = begin_ns;
@@ -93,14 +67,13 @@ static void show(lcm_t *lcm, double duration_s) {
 }
 
 int command_watch(int argc, char *const *argv) {
-  const char *url = "", *prefix = "WAYMARK_", *map = NULL, *address = "127.0.0.1", *why;
+  const char *url = "", *prefix = "WAYMARK_", *why;
   double duration_s = 0;
-  uint64_t port = 0;
   int help = 0;
+  const char *web = NULL;
   const option options[] = {
-      {"--url", OPTION_TEXT, &url},   {"--prefix", OPTION_TEXT, &prefix}, {"--duration", OPTION_F64, &duration_s},
-      {"--web", OPTION_U64, &port},   {"--map", OPTION_TEXT, &map},       {"--bind", OPTION_TEXT, &address},
-      {"--help", OPTION_FLAG, &help}, {"-h", OPTION_FLAG, &help}};
+      {"--url", OPTION_TEXT, &url}, {"--prefix", OPTION_TEXT, &prefix}, {"--duration", OPTION_F64, &duration_s},
+      {"--web", OPTION_TEXT, &web}, {"--help", OPTION_FLAG, &help},     {"-h", OPTION_FLAG, &help}};
   wm_error err = {0};
   size_t words;
   char channel[96];
@@ -110,8 +83,9 @@ int command_watch(int argc, char *const *argv) {
     (void)fputs(kHelp, stdout);
     return EXIT_DONE;
   }
-  if (port > 65535) {
-    (void)wm_fail(&err, WM_BAD_USAGE, "--web: a port from 1 to 65535 is needed");
+  if (web) {
+    (void)wm_fail(&err, WM_BAD_USAGE,
+                  "watch has no page any more: `waymark web CONFIG --listen %s` is a program of its own", web);
     return complain(&err);
   }
   lcm_t *lcm = lcm_connect(lcm_connect_url(url), &why);
@@ -130,11 +104,7 @@ int command_watch(int argc, char *const *argv) {
   struct sigaction action = {.sa_handler = on_signal};
   (void)sigaction(SIGINT, &action, NULL);
   (void)sigaction(SIGTERM, &action, NULL);
-  wm_status status = WM_OK;
-  if (port > 0)
-    status = serve(lcm, address, port, map, duration_s, &err);
-  else
-    show(lcm, duration_s);
+  show(lcm, duration_s);
   lcm_destroy(lcm);
-  return status == WM_OK ? EXIT_DONE : complain(&err);
+  return EXIT_DONE;
 }

@@ -175,6 +175,8 @@ static wm_status read_texts(const wm_yaml_node *root, wm_config *out, wm_error *
   if (wm_yaml_there(&saved)) status = config_path(&saved, out->path, out->saved_pose, err);
   wm_yaml_node map = wm_yaml_get(root, "start.saved_map");
   if (status == WM_OK && wm_yaml_there(&map)) status = config_path(&map, out->path, out->saved_map, err);
+  wm_yaml_node pictures = wm_yaml_get(root, "publish.picture_socket");
+  if (status == WM_OK && wm_yaml_there(&pictures)) status = config_path(&pictures, out->path, out->picture_socket, err);
   wm_yaml_node box = wm_yaml_get(root, "black_box.folder");
   if (status == WM_OK && wm_yaml_there(&box)) status = config_path(&box, out->path, out->black_box, err);
   wm_yaml_node commands = wm_yaml_get(root, "commands.socket");

@@ -108,12 +108,13 @@ typedef struct wm_config {
   wm_start initial_pose;
   wm_source_config sources[WM_SOURCES_MAX];
   size_t source_count;
-  char lcm_url[128];             // publish.lcm_url; "" : LCM_DEFAULT_URL or LCM's own default
-  char saved_pose[WM_PATH_MAX];  // start.saved_pose; "": none
-  char saved_map[WM_PATH_MAX];   // start.saved_map; "": none
-  char black_box[WM_PATH_MAX];   // black_box.folder; "": none
-  char commands[WM_PATH_MAX];    // commands.socket; "": none
-  char channel_prefix[48];       // publish.channel_prefix, "WAYMARK_"
+  char lcm_url[128];                 // publish.lcm_url; "" : LCM_DEFAULT_URL or LCM's own default
+  char saved_pose[WM_PATH_MAX];      // start.saved_pose; "": none
+  char saved_map[WM_PATH_MAX];       // start.saved_map; "": none
+  char black_box[WM_PATH_MAX];       // black_box.folder; "": none
+  char commands[WM_PATH_MAX];        // commands.socket; "": none
+  char picture_socket[WM_PATH_MAX];  // publish.picture_socket; "": none
+  char channel_prefix[48];           // publish.channel_prefix, "WAYMARK_"
   // Renamed or removed keys, and keys that the estimator does not take: a line each, "FILE:LINE: KEY: what to do", with
   // its line feed; "": none.
   char warnings[WM_CONFIG_WARNINGS_MAX];

@@ -42,6 +42,9 @@ const config_key kConfigKeys[] = {
     {"black_box.folder", "path", "none",
      "Folder, on devices, for event logs of the last seconds. They are kept when the robot gets lost or a run was "
      "killed, the newest 20 times."},
+    {"publish.picture_socket", "path", "none",
+     "Local socket over which `waymark web` gets pictures with what the detectors found, twice a second while a person "
+     "looks (docs/live.md). Its owner and group may read it."},
     {"publish.lcm_url", "text", "LCM's own", "LCM provider, e.g. `udpm://239.255.76.67:7667?ttl=0`."},
     {"publish.channel_prefix", "text", "WAYMARK_", "What each channel's name begins with."},
     {"commands.socket", "path", "none",

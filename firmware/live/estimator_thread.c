@@ -42,6 +42,7 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
   // Records without room are counted by the ring.
   if (kind == WM_OUTPUT_PUBLISHED || kind == WM_OUTPUT_INNOVATION)
     (void)push(&self->to_publish, (uint64_t)kind, record, bytes);
+  views_put(&self->views, kind, record, bytes);
   (void)push(&self->to_disk, (uint64_t)kind, record, bytes);
 }
 
@@ -138,6 +139,7 @@ static void loop(live *run) {
     publish(run, now_ns);
     report_health(run, now_ns);
     keep_map(run, now_ns);
+    views_take_map(&self->views, &self->pipeline.fuser, now_ns);
     self->loops++;
     wm_time_ns end_ns = wm_monotonic_ns();
     wm_histogram_add(&self->cycle_ns, end_ns - begin_ns);

@@ -89,6 +89,17 @@ void lcm_sink_landmarks(lcm_sink *self, wm_time_ns t_ns) {
             wm_lcm_landmarks(setup->landmarks, setup->landmark_count, first, t_ns, self->bytes, sizeof self->bytes));
 }
 
+void lcm_sink_places(lcm_sink *self, const char *what, const wm_place *places, size_t count, size_t total,
+                     wm_time_ns t_ns) {
+  publish(self, what, wm_lcm_places(places, count, total, t_ns, self->bytes, sizeof self->bytes));
+}
+
+void lcm_sink_map(lcm_sink *self, const wm_landmark *landmarks, const double (*covariance)[4], size_t count,
+                  wm_time_ns t_ns) {
+  for (size_t first = 0; first < count; first += WM_LCM_LANDMARKS_MAX)
+    publish(self, "MAP", wm_lcm_map(landmarks, covariance, count, first, t_ns, self->bytes, sizeof self->bytes));
+}
+
 static void send_group(lcm_sink *self) {
   if (self->group_total == 0) return;
   const char *sensor = wm_assembly_sensor_name(self->assembly, self->group[0].as.sighting.sensor);

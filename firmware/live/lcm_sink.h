@@ -10,6 +10,7 @@
 #include "output/run_findings.h"
 #include "waymark/health.h"
 #include "waymark/lcm_messages.h"
+#include "waymark/lcm_views.h"
 
 typedef struct lcm_sink {
   int is_on;
@@ -37,6 +38,11 @@ void lcm_sink_health(lcm_sink *self, const wm_health *health);
 // Collects sightings and sends them at the next stamp or sensor; other events are not sent.
 void lcm_sink_event(lcm_sink *self, const wm_event *event);
 void lcm_sink_landmarks(lcm_sink *self, wm_time_ns t_ns);
+// For viewers: places on the channel `what`, and the robot's own map.
+void lcm_sink_places(lcm_sink *self, const char *what, const wm_place *places, size_t count, size_t total,
+                     wm_time_ns t_ns);
+void lcm_sink_map(lcm_sink *self, const wm_landmark *landmarks, const double (*covariance)[4], size_t count,
+                  wm_time_ns t_ns);
 // Tries to connect again where needed. Called often.
 void lcm_sink_tick(lcm_sink *self, wm_time_ns monotonic_ns);
 void lcm_sink_close(lcm_sink *self);

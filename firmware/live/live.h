@@ -14,8 +14,10 @@
 #include "live/lcm_sink.h"
 #include "live/notify.h"
 #include "live/other_runs.h"
+#include "live/picture_server.h"
 #include "live/run.h"
 #include "live/run_clock.h"
+#include "live/views.h"
 #include "output/black_box.h"
 #include "output/run_folder.h"
 #include "output/saved_map.h"
@@ -59,6 +61,7 @@ typedef struct live_estimator {
   wm_ring to_publish, to_disk, healths, maps;
   void *to_publish_memory, *to_disk_memory, *healths_memory;
   void *maps_memory;  // NULL: no map is saved
+  views views;        // rings of their own
   wm_time_ns loop_ns, publish_ns, next_publish_ns, next_health_ns, next_map_ns;
   uint64_t loops, deadlines_missed;
   uint64_t events_lost;  // not marked in the log yet
@@ -110,9 +113,10 @@ struct live {
   live_estimator estimator;
   live_publish publish;
   live_disk disk;
-  wm_saved_map map;       // of an earlier run; no image: none
-  atomic_int stop;        // ends the sources' threads
-  atomic_int restarting;  // a reload: STOPPING=1 is not sent
+  picture_server *pictures;  // NULL: none is wanted
+  wm_saved_map map;          // of an earlier run; no image: none
+  atomic_int stop;           // ends the sources' threads
+  atomic_int restarting;     // a reload: STOPPING=1 is not sent
 };
 
 // One record in a ring of outputs. A slot of `to_disk` has the size that the run's sources require (wm_output_bytes),

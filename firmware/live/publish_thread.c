@@ -150,6 +150,7 @@ void *publish_thread(void *argument) {
     last = atomic_load_explicit(&run->estimator.done, memory_order_acquire);  // before the rings are emptied
     take_outputs(run);
     take_healths(run);
+    views_send(&run->estimator.views, &self->lcm);
     wm_time_ns now_ns = wm_monotonic_ns();
     lcm_sink_tick(&self->lcm, now_ns);
     other_runs_tick(&self->others, now_ns);

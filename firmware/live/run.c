@@ -31,7 +31,7 @@ void live_say(live *self, const char *format, ...) {
 
 // ── memory ──────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-#define NEEDS_MAX (WM_PIPELINE_NEEDS + 6 + WM_SOURCES_MAX + WM_VISION_NEEDS)
+#define NEEDS_MAX (WM_PIPELINE_NEEDS + 6 + VIEWS_NEEDS + WM_SOURCES_MAX + WM_VISION_NEEDS)
 
 static size_t record_bytes(const live *self) { return OUTPUT_RECORD_HEAD + wm_output_bytes(self->assembly.kinds); }
 
@@ -61,6 +61,7 @@ static size_t list_needs(live *self, wm_arena_need needs[NEEDS_MAX]) {
   needs[n++] = (wm_arena_need){"lines ring", wm_ring_bytes(LINE_RING_SLOTS, LINE_BYTES), &self->publish.lines_memory};
   if (self->disk.keeps_map)
     needs[n++] = (wm_arena_need){"map ring", wm_ring_bytes(1, map_slot_bytes(self)), &e->maps_memory};
+  n += views_needs(&e->views, self->config->estimator, self->config->runtime.publish_lcm, needs + n);
   for (size_t i = 0; i < self->assembly.source_count; i++) {
     size_t slot_bytes = wm_merge_slot_bytes(self->assembly.sources[i].kinds);
     needs[n++] = (wm_arena_need){self->assembly.sources[i].name, wm_ring_bytes(slots, slot_bytes),
@@ -80,6 +81,7 @@ static wm_status take_memory(live *self, wm_error *err) {
   wm_ring_init(&e->to_publish, e->to_publish_memory, PUBLISH_RING_SLOTS, PUBLISH_RECORD_BYTES);
   wm_ring_init(&e->healths, e->healths_memory, HEALTH_RING_SLOTS, sizeof(health_record));
   if (e->maps_memory) wm_ring_init(&e->maps, e->maps_memory, 1, map_slot_bytes(self));
+  views_init(&e->views);
   wm_ring_init(&self->publish.lines, self->publish.lines_memory, LINE_RING_SLOTS, LINE_BYTES);
   for (size_t i = 0; i < self->assembly.source_count; i++)
     wm_ring_init(&self->sources[i].ring, self->sources[i].ring_memory,
@@ -424,6 +426,13 @@ static wm_status first_source_error(const live *self, wm_error *err) {
   return WM_OK;
 }
 
+// A run without them localizes as well.
+static void start_pictures(live *self) {
+  wm_error why;
+  if (picture_server_start(self->config, self->assembly.vision, &self->pictures, &why) != WM_OK)
+    live_say(self, "pictures: %s. Localizing goes on", why.text);
+}
+
 static wm_status run(live *self, wm_recording *recording, wm_live_report *report, wm_error *err) {
   threads_of_libraries();
   wm_status status = prepare(self, recording, err);
@@ -437,7 +446,11 @@ static wm_status run(live *self, wm_recording *recording, wm_live_report *report
   start_clock(self);
   thread_list threads = {0};
   status = start_threads(self, &threads, report, err);
-  if (status == WM_OK) wait_for_end(self, report);
+  if (status == WM_OK) {
+    start_pictures(self);
+    wait_for_end(self, report);
+    picture_server_close(self->pictures);
+  }
   join_threads(self, &threads);
   if (status == WM_OK) save_last_map(self);
   notify_close(&self->publish.notify);

@@ -18,6 +18,7 @@ const thread_spec kThreads[THREAD_ROLES] = {
   [THREAD_ESTIMATOR] = {"wm-estimate", 1,      (size_t)2 << 20, 8192,       0                }, // allocate, lock, make a system call but its sleep
   [THREAD_PUBLISH]   = {"wm-publish",  0,      (size_t)2 << 20, 0,          1 * WM_NS_PER_MS }, // touch a file, wait for a disk or a terminal
   [THREAD_DISK]      = {"wm-disk",     0,      (size_t)2 << 20, 0,          5 * WM_NS_PER_MS },  // delay any other thread
+  [THREAD_PICTURES]  = {"wm-pictures", 0,      (size_t)2 << 20, 0,          0                },  // delay a detector
 };
 // clang-format on
 

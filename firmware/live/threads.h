@@ -16,6 +16,7 @@ typedef enum thread_role {
   THREAD_ESTIMATOR,
   THREAD_PUBLISH,
   THREAD_DISK,
+  THREAD_PICTURES,
   THREAD_ROLES
 } thread_role;
 

@@ -75,6 +75,7 @@ static wm_status add(wm_vision *self, const wm_config *config, const wm_vision_c
   if (self->count == WM_VISION_SOURCES_MAX)
     return wm_fail(err, WM_FULL, "%s: vision: more than %d detectors and cameras", config->path, WM_VISION_SOURCES_MAX);
   vision_source *s = &self->sources[self->count++];
+  onlooker_open(&s->shown);
   s->detector = wanted->detector;
   s->params = wanted->params;
   s->newest_ns = s->busy_until_ns = WM_TIME_NONE;
@@ -182,6 +183,7 @@ void wm_vision_close(wm_vision *self) {
       if (pictures) pictures->ops->close(pictures);
     }
     search_outcomes_close(&self->sources[i].outcomes);
+    onlooker_close(&self->sources[i].shown);
     free(self->sources[i].only);
   }
   free(self);
@@ -241,6 +243,12 @@ void wm_vision_set_prediction(wm_vision *self, const wm_estimate *newest) {
 size_t wm_vision_looks(const wm_vision *self, size_t i, const wm_landmark_looks **rows) {
   *rows = self->sources[i].outcomes.rows;
   return self->sources[i].outcomes.count;
+}
+
+onlooker *wm_vision_onlooker(wm_vision *self, size_t i, const wm_camera **camera) {
+  vision_source *s = &self->sources[i];
+  *camera = &s->view.rig->cameras[s->cameras[0]];
+  return &s->shown;
 }
 
 const wm_histogram *wm_vision_look_ns(const wm_vision *self, size_t i) { return &self->sources[i].look_ns; }

@@ -72,6 +72,11 @@ typedef struct wm_landmark_looks {
 // run is over.
 size_t wm_vision_looks(const wm_vision *self, size_t i, const wm_landmark_looks **rows);
 
+// Where the newest picture of source i and what was found in it can be asked for, and the camera that took it. Any time
+// while it is open.
+typedef struct onlooker onlooker;
+onlooker *wm_vision_onlooker(wm_vision *self, size_t i, const wm_camera **camera);
+
 // Time of decoding and detecting of a picture of source i together. Valid as below.
 const wm_histogram *wm_vision_look_ns(const wm_vision *self, size_t i);
 // Times of decoding and of detecting, of all sources together. Valid after the threads have ended or the run is over.

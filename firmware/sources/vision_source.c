@@ -155,6 +155,7 @@ static wm_status look(vision_source *self, wm_error *err) {
     event->t_ns = frames[0].t_ns;
     event->as.looked.sensor = self->sensor;
   }
+  onlooker_show(&self->shown, &frames[0], self->events, self->event_count);
   for (size_t i = 0; i < self->event_count; i++) {
     if (self->events[i].kind == WM_EVENT_MARKER) self->events[i].as.marker.sensor = self->sensor;
     if (self->events[i].kind == WM_EVENT_SIGHTING) self->events[i].as.sighting.sensor = self->sensor;

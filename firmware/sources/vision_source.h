@@ -6,6 +6,7 @@
 #include <pthread.h>
 
 #include "sources/newest_pose.h"
+#include "sources/onlooker.h"
 #include "sources/search_outcomes.h"
 #include "sources/vision.h"
 #include "waymark/detector.h"
@@ -57,6 +58,7 @@ struct vision_source {
   int looks_at_arrival;      // recorded: detection at the picture's arrival (wm_vision_look_at_arrival)
   int announced;             // with it: the next picture's arrival was handed out
   vision_prefetch prefetch;
+  onlooker shown;
 };
 
 // The next event, on the calling thread.

@@ -6,7 +6,7 @@ without them, or without the right to a network namespace, the test is skipped (
 In a network of its own with nothing but a loopback:
   1. a run is recorded by lcm-logger; the binding reads the log with code that lcm-gen made; poses, health, innovations,
      observations and landmarks decode, and poses agree with published.csv;
-  2. the page of `waymark watch --web` has its state, and nothing for another site;
+  2. the page of `waymark web` has its state, and nothing for another site;
   3. without a route for multicast the run says so once, goes on, and writes the same number of poses; a route that
      appears later is found.
 """
@@ -150,26 +150,34 @@ def check_commands(work):
 
 
 def check_web(work):
-    """The page of `waymark watch --web` while it drives: it needs nothing from elsewhere, and answers to this computer alone."""
-    watch = subprocess.Popen([WAYMARK, "watch", "--url", URL, "--web", "18080"], stdout=subprocess.PIPE, text=True)
-    assert watch.stdout.readline().startswith("http://localhost:18080")
+    """The page of `waymark web` while it drives: it needs nothing from elsewhere, and answers to this computer alone."""
+    program = WAYMARK.with_name("waymark-web")
+    if not program.exists():
+        print("waymark-web is not built here")
+        return
+    web = subprocess.Popen([program, "--url", URL, "--listen", "0"], stdout=subprocess.PIPE, text=True)
+    here = web.stdout.readline().strip()
+    assert here.startswith("http://localhost:"), here
+    port = here.rpartition(":")[2]
     process = run(work / "recording", work / "config.yaml", work / "watched")
-    get = lambda path, host="localhost:18080": urllib.request.urlopen(
-        urllib.request.Request("http://127.0.0.1:18080" + path, headers={"Host": host}), timeout=5).read().decode()
+    get = lambda path, host="localhost:" + port: urllib.request.urlopen(
+        urllib.request.Request(f"http://127.0.0.1:{port}{path}", headers={"Host": host}), timeout=5).read().decode()
     time.sleep(2.5)
     state = json.loads(get("/state.json"))
     assert state["state"] == "tracking" and abs(state["pose"]["x_m"]) < 5, state
-    assert [s["name"] for s in state["sources"]] == ["motion", "sightings:eye", "commands"], state
-    assert "<canvas" in get("/") and "http:" not in get("/")
-    for path, host in (("/state.json", "evil.example:18080"), ("/nothing", "localhost")):
+    assert [s["name"] for s in state["health"]["sources"]] == ["motion", "sightings:eye", "commands"], state
+    assert [l[:3] for l in state["landmarks"]["list"]] == [[0, 5, 0], [1, 0, 5], [2, -5, 0], [3, 0, -5]], state["landmarks"]
+    assert len(state["rays"]) == 4 and {ray[4] for ray in state["rays"]} == {"fused"}, state["rays"]
+    assert "<canvas" in get("/") and "http:" not in get("/") and "https:" not in get("/page.js")
+    for path, host in (("/state.json", "evil.example:" + port), ("/nothing", "localhost"), ("/../etc/passwd", "localhost")):
         try:
             get(path, host)
             assert False, f"{path} for {host} is answered"
         except urllib.error.HTTPError as e:
             assert e.code in (403, 404)
     finish(process)
-    watch.send_signal(signal.SIGTERM)
-    assert watch.wait(timeout=10) == 0
+    web.send_signal(signal.SIGTERM)
+    assert web.wait(timeout=10) == 0
     print("the page says", state["state"], "and", state["consistency"])
 
 

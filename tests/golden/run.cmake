@@ -8,6 +8,8 @@ wm_script_test(run_service COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/service.sh)
 wm_script_test(run_service_net COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/service_net.py LABELS release-only)
 wm_script_test(run_doctor COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/doctor.sh $<TARGET_FILE:waymark> ${CMAKE_SOURCE_DIR}/config/etc)
 wm_script_test(run_command_line COMMAND bash ${CMAKE_CURRENT_SOURCE_DIR}/cli.sh)
+wm_script_test(web_page COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/web_page.py LABELS release-only)
+wm_script_test(web_clients COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/web_clients.py LABELS release-only)
 wm_script_test(run_lcm_tools COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/lcm_tools.py LABELS release-only)
 wm_script_test(run_two_runs COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/two_runs.py LABELS release-only)
 wm_script_test(run_realtime_calls COMMAND python3 ${CMAKE_CURRENT_SOURCE_DIR}/realtime_calls.py ${CMAKE_BINARY_DIR} ${CMAKE_OBJDUMP}

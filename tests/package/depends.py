@@ -41,8 +41,9 @@ def main():
         print("skipped: there is no dpkg-shlibdeps")
         return 77
     offences = 0
-    tools = sorted(p for p in (BUILD / "bin").glob("waymark-*") if "montecarlo" not in p.name)
-    for component, programs in (("RUNTIME", [BUILD / "bin/waymark"]), ("TOOLS", tools)):
+    page = BUILD / "bin/waymark-web"
+    tools = sorted(p for p in (BUILD / "bin").glob("waymark-*") if "montecarlo" not in p.name and p != page)
+    for component, programs in (("RUNTIME", [BUILD / "bin/waymark", *([page] if page.exists() else [])]), ("TOOLS", tools)):
         says, needs = declared(component), needed(programs)
         says.pop("waymark", None)
         for package, version in needs.items():

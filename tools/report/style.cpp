@@ -125,6 +125,8 @@ details:not([open])>*{display:none}@page{margin:16mm}}
 
 }  // namespace
 
+std::string page_colours() { return kColours; }
+
 std::string page_style() { return std::string(kColours) + kPicture + kPage; }
 
 std::string picture_style_alone() { return std::string(kColours) + kPicture + ".paper{fill:var(--paper)}"; }

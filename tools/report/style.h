@@ -8,6 +8,8 @@
 namespace wm::tools {
 
 std::string page_style();
+// The colours alone, as variables: for a page of another kind in the same look.
+std::string page_colours();
 // For a picture that is a file of its own.
 std::string picture_style_alone();
 

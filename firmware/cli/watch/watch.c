@@ -15,8 +15,10 @@ void watch_pose(watch *self, const void *message, size_t length, wm_time_ns now_
     return;
   }
   if (self->has_pose && now_ns > self->pose_at_ns) {
-    double rate_hz = 1e9 / (double)(now_ns - self->pose_at_ns);
-    self->rate_hz = self->rate_hz > 0 ? self->rate_hz + 0.05 * (rate_hz - self->rate_hz) : rate_hz;
+    // The mean of the intervals: poses that arrive together make no higher rate.
+    double interval_s = (double)(now_ns - self->pose_at_ns) * 1e-9;
+    double mean_s = self->rate_hz > 0 ? 1 / self->rate_hz : interval_s;
+    self->rate_hz = 1 / (mean_s + 0.05 * (interval_s - mean_s));
   }
   self->has_pose = 1;
   self->pose_at_ns = now_ns;

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "cli/watch/watch.h"
-#include "cli/watch/web.h"
 #include "unity.h"
 #include "waymark/lcm_messages.h"
 
@@ -147,30 +146,6 @@ static void innovations_give_a_verdict(void) {
   TEST_ASSERT_EQUAL_STRING("observations are further off than the covariance allows", watch_consistency(&seen));
 }
 
-static char answer[32768];
-
-static void the_page_is_told_what_is_seen(void) {
-  const web page = {.listening = -1};
-  (void)snprintf(health.sources[1].name, WM_HEALTH_NAME_MAX, "a\"<b");
-  (void)state_of_health();
-  pose.now.pose_map_base.q_xyzw[3] = 1;
-  pose.now.pose_map_base.p_m[0] = 12.5;
-  watch_pose(&seen, bytes, wm_lcm_pose(&pose, 0, bytes, sizeof bytes), 10 * WM_NS_PER_S);
-  TEST_ASSERT_GREATER_THAN(100, web_answer(&page, &seen, 10 * WM_NS_PER_S, "/state.json", answer, sizeof answer));
-  const char *const said[] = {"\"state\": \"tracking\"", "\"x_m\": 12.5",   "\"left_m\": 41.6",
-                              "\"left_s\": null",        "\"rejected\": 7", "\"name\": \"ab\""};
-  for (size_t i = 0; i < sizeof said / sizeof said[0]; i++)
-    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(answer, said[i]), answer);
-  TEST_ASSERT_EQUAL(0, web_answer(&page, &seen, 0, "/map.json", answer, sizeof answer));
-  TEST_ASSERT_EQUAL(0, web_answer(&page, &seen, 0, "/etc/passwd", answer, sizeof answer));
-}
-
-static void the_page_needs_nothing_from_elsewhere(void) {
-  TEST_ASSERT_NULL(strstr(kWebPage, "http:"));
-  TEST_ASSERT_NULL(strstr(kWebPage, "https:"));
-  TEST_ASSERT_NULL(strstr(kWebPage, "src="));
-}
-
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(the_state_says_what_is_wrong);
@@ -178,7 +153,5 @@ int main(void) {
   RUN_TEST(the_view_has_pose_sources_and_what_is_left);
   RUN_TEST(landmarks_that_are_not_found_have_a_reason);
   RUN_TEST(innovations_give_a_verdict);
-  RUN_TEST(the_page_is_told_what_is_seen);
-  RUN_TEST(the_page_needs_nothing_from_elsewhere);
   return UNITY_END();
 }

@@ -4,7 +4,7 @@ _waymark() {
   local word=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]:-} words= more=
   COMPREPLY=()
   if [ "$COMP_CWORD" -eq 1 ]; then
-    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps calibrate detect diff eval import map reference report simulate --help --version' -- "$word")
+    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps calibrate detect diff eval import map reference report simulate web --help --version' -- "$word")
     return
   fi
   case $command in
@@ -27,7 +27,7 @@ _waymark() {
     "run") words='--config --recording --out --record --out-max-mb --duration --speed --seed --resume --landmarks --map --calibration' ;;
     "replay") words='--config --out --seed --landmarks --calibration --map --frames-of --timing-of --from --until --lost --reference' ;;
     "record") words='--config --out --duration --max-mb --free-mb' ;;
-    "watch") words='--url --prefix --duration --web --map --bind' ;;
+    "watch") words='--url --prefix --duration' ;;
     "check") words='--landmarks --calibration --map --json' ;;
     "doctor") words='--json --seconds' ;;
     "stamps") words='' ;;
@@ -40,6 +40,7 @@ _waymark() {
     "reference") words='--help --map --range --particles --passes --seed' ;;
     "report") words='--help --out --svg' ;;
     "simulate") words='--help --out --seed --landmarks --laps --duration --no-video --frame --png --camera --contact-sheet --perfect' ;;
+    "web") words='--help --recording --map --listen --url --prefix --pictures --duration' ;;
   esac
   if [[ $word == -* ]]; then
     mapfile -t COMPREPLY < <(compgen -W "$words --help" -- "$word")

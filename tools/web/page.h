@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page's files by their names: page.html, page.css, page.js (tools/web/page).
+#pragma once
+
+#include <map>
+#include <string>
+
+namespace wm::tools {
+
+extern const std::map<std::string, std::string> kPageFiles;
+
+}  // namespace wm::tools
