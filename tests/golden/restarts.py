@@ -145,7 +145,7 @@ def inside(kills):
             wrong.append(run["wrong_until_s"])
             kept = check_files(work)
         # The box of one that is killed begins with the map that it took up, and gives its poses.
-        run = one_run(work, subscriber, run["killed_at_s"] + 0.5, 4.0, [*command, "--out", work / "killed"])
+        run = one_run(work, subscriber, run["killed_at_s"] + 0.5, 6.0, [*command, "--out", work / "killed"])
         # One that ends in order has a log, which gives the same poses without the file of the map.
         write_rest(work / "rest", run["killed_at_s"] + 0.5, 3)
         (work / "out").mkdir()
@@ -158,7 +158,8 @@ def inside(kills):
         subprocess.run([lcm_tools.WAYMARK, "replay", died, "--out", work / "out/box"], check=True, capture_output=True)
         rows = [(folder / "trajectory.csv").read_text().splitlines()[:-1] for folder in (work / "killed", work / "out/box")]
         both = min(len(r) for r in rows)
-        assert both > 100 and rows[0][:both] == rows[1][:both], f"the black box's replay differs from the run ({both} rows)"
+        assert both > 50, f"{both} poses in the run and in the replay of its black box"
+        assert rows[0][:both] == rows[1][:both], "the black box's replay differs from the run"
         print(f"the black box of a killed run gives its {both} poses bit by bit")
         end = run["poses"][-1]
         print(f"{kills} kills: a pose after {sorted(first)[len(first) // 2]:.2f} s (median), {max(first):.2f} s (most); right for good "
