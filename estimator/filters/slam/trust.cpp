@@ -193,9 +193,11 @@ void slam::find_double(int landmark) {
   landmark_note &own = note(landmark);
   own.is_double = false;
   if (!own.may_be_misread) return;
-  for (int i = 0; i < joint_.landmarks() && !own.is_double; i++)
-    own.is_double =
-        i != landmark && note(i).seen > own.seen && own.apart_from != note(i).id && stands_with(landmark, i);
+  for (int i = 0; i < joint_.landmarks() && !own.is_double; i++) {
+    const landmark_note &other = note(i);
+    const bool is_likelier = other.seen > own.seen || (other.seen == own.seen && other.last_ns > own.last_ns);
+    own.is_double = i != landmark && is_likelier && own.apart_from != other.id && stands_with(landmark, i);
+  }
 }
 
 }  // namespace wm

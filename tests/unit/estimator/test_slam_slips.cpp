@@ -143,6 +143,21 @@ void test_a_burst_of_an_unknown_identity_is_no_landmark(void) {
   TEST_ASSERT_EQUAL(kCount, found);
 }
 
+// GIVEN a landmark whose identity is misread from its first sighting on, and read right as often afterwards THEN the
+// one seen last is the landmark: the other would keep its own landmark away, wherever that stands.
+void test_of_two_identities_seen_alike_at_one_place_the_last_one_is_right(void) {
+  begin();
+  while (!is_in_view(3)) go(0.2, 0);
+  go(1.2, kCount, 0.0, 3, 99);
+  TEST_ASSERT_TRUE(is_on_map(99));
+  go(1.2, kCount, 0.0, 3, 13);
+  TEST_ASSERT_EQUAL(12, fused);
+  while (!is_in_view(8)) go(0.2, 0);
+  go(0.6, kCount, 0.0, 8, 18);
+  TEST_ASSERT_TRUE(is_on_map(13));
+  TEST_ASSERT_FALSE(is_on_map(99));
+}
+
 // GIVEN an unknown identity that a standing robot reads many times THEN it is no landmark until it is seen from a
 // second place: what is misread once is misread again while nothing moves.
 void test_a_burst_from_one_view_is_no_landmark(void) {
@@ -196,6 +211,7 @@ int main() {
   RUN_TEST(test_a_slip_is_found_by_few_looks);
   RUN_TEST(test_a_slip_is_found_with_one_landmark_in_view);
   RUN_TEST(test_a_burst_of_an_unknown_identity_is_no_landmark);
+  RUN_TEST(test_of_two_identities_seen_alike_at_one_place_the_last_one_is_right);
   RUN_TEST(test_a_burst_from_one_view_is_no_landmark);
   RUN_TEST(test_a_landmark_expected_behind_the_camera_contradicts);
   return UNITY_END();
