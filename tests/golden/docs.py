@@ -5,7 +5,7 @@ docs.py check|write BUILD. `check` prints what differs and fails; `write` brings
 docs.py references checks alone, that
 - each reference cited as [Author2015] stands once in docs/references.md;
 - what docs/glossary.md, docs/design.md and docs/runtime.md name in code is there;
-- docs/runtime.md names all files of the robot's rooms that have atomics or locks;
+- docs/runtime.md names all files of the robot's rooms that have atomics, locks or shared memory;
 - docs/live.md's table of faults names tests that there are;
 - docs/images/threads.svg is what its script draws."""
 import collections
@@ -166,7 +166,7 @@ def fault_tests():
     return faults if len(rows) > 20 else 1
 
 
-SHARED = re.compile(r"_Atomic|\batomic_u?int (?!\*)|pthread_(mutex|cond)_t|std::(mutex|atomic|condition_variable)")
+SHARED = re.compile(r"_Atomic|MAP_SHARED|\batomic_u?int (?!\*)|pthread_(mutex|cond)_t|std::(mutex|atomic|condition_variable)")
 
 
 def shared():
