@@ -48,10 +48,11 @@ double student_weight(double squared, double variance) { return 5.0 / (4.0 + squ
 // Weight of a point by the probability p that it is on its nearest edge of the map: its residual's density N(0,
 // variance) against that of unmapped edges, as in probabilistic data association [BarShalom2001]. There the event of
 // each scan is independent, but an unmapped edge is seen again in the next scans; p^2 gives doubtful edges less effect.
-// Of p, p^2 and p^4 in flats full of boxes p doubles the error of p^2; in long dark corridors p^4 gets lost.
-double mapped_weight(double residual_m, double variance, double unmapped_per_m) {
+// Of p, p^2 and p^4 in flats full of boxes p doubles the error of p^2; in long dark corridors p^4 gets lost. The first
+// pass takes p: residuals that the prediction's error shares shrink together, and the second pass decides by p^2.
+double probability_mapped(double residual_m, double variance, double unmapped_per_m) {
   const double density = exp(-0.5 * square(residual_m) / variance) / std::sqrt(kTwoPi * variance);
-  return square(density / (density + unmapped_per_m));
+  return density / (density + unmapped_per_m);
 }
 
 // H P H' of a point, whose row has an entry 1 for its wall besides.
@@ -218,7 +219,8 @@ int edge_mcl::wall_of(const alignment &a, int guess, matched_point *p) const {
 }
 
 // Normal equations of a scan at an alignment. `open`: a point's place is as uncertain as this prior leaves it, too;
-// null: by its own error alone. `mapped`: each point's mapped_weight(), which the first pass sets.
+// null: by its own error alone. `mapped`: each point's weight by probability_mapped(), which the first passes
+// set.
 void edge_mcl::linearize(const wm_points &points, const alignment &a, double gate_m, const prediction *open,
                          descent_pass pass, double mapped[WM_POINTS_MAX], normal_equations *out) const {
   *out = normal_equations{};
@@ -239,7 +241,8 @@ void edge_mcl::linearize(const wm_points &points, const alignment &a, double gat
     const double open2 = open ? variance_of(open->covariance, row, wall) : 0.0;
     if (open && square(p.line.distance_m) > square(gate) + square(kOpenSigmas) * open2) continue;
     const double variance = p.sigma2 + open2;
-    if (pass == descent_pass::kFirst) mapped[i] = mapped_weight(p.residual_m, variance, unmapped_per_m_);
+    if (open) mapped[i] = probability_mapped(p.residual_m, variance, unmapped_per_m_);
+    if (open && pass != descent_pass::kFirst) mapped[i] = square(mapped[i]);
     const double weight = mapped[i] * student_weight(square(p.residual_m), variance) / (variance * correlated);
     const point_vector weighted = weight * row;
     out->gradient.head<kAlignPoint>() += p.residual_m * weighted;
