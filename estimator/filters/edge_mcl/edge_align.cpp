@@ -77,7 +77,7 @@ edge_mcl::alignment edge_mcl::alignment_of(int camera) const {
     for (int k = 0; k <= kCameraTime; k++) a.state[kAlignCamera + k] = slots_.at(camera, k);
   a.state[kAlignEdge] = edge_state_;
   for (int k = 0; wall_state_ >= 0 && k < wall_list::kCapacity; k++)
-    if (walls_.used(k)) a.state[kAlignWall + k] = wall_state_ + k;
+    if (walls_.used(k)) a.state[kAlignWall + k] = (int)wall_state_ + k;
   for (int k = 0; k < kAlignStates; k++)
     if (a.state[k] >= 0) a.value[k] = filter_.value(a.state[k]);
   return a;
@@ -427,14 +427,14 @@ void edge_mcl::update_walls(const wm_points &points, int camera) {
       walls_.add(p.line, p.x_m, p.y_m);
   const uint32_t changed = walls_.replace();
   for (int k = 0; k < wall_list::kCapacity; k++)
-    if (changed & 1u << k) filter_.forget(wall_state_ + k, 0.0, square(params_.wall_sigma_m));
+    if (changed & 1u << k) filter_.forget((int)wall_state_ + k, 0.0, square(params_.wall_sigma_m));
 }
 
 void edge_mcl::forget_walls() {
   walls_.clear();
   walls_m_ = -kWallsEvery_m;
   for (int k = 0; wall_state_ >= 0 && k < wall_list::kCapacity; k++)
-    filter_.forget(wall_state_ + k, 0.0, square(params_.wall_sigma_m));
+    filter_.forget((int)wall_state_ + k, 0.0, square(params_.wall_sigma_m));
 }
 
 // Iterated extended Kalman filter in information form (B. M. Bell, F. W. Cathey, "The iterated Kalman filter update as

@@ -142,11 +142,12 @@ class edge_mcl {
   hypotheses others_;
   fit_evidence fit_;
   odometry_check odometry_;
+  wall_list walls_;
   floor_camera camera_[kCamerasMax];
   int camera_count_;
   state_slots<kCamerasMax, kCameraTime + 1> slots_;
-  wall_list walls_;
-  int edge_state_, wall_state_;           // wall_state_: the first of them; -1: off
+  int edge_state_;
+  int64_t wall_state_;                    // the first of them, -1: off; 64 bits: no padding
   rollback<kMaxEdgeStates, 2> rollback_;  // calibration while the scans fitted: being lost is noticed within 2 s
   lifecycle life_;
   wm_pose2 scan_odom_;  // odometry at the last scan
