@@ -533,6 +533,4 @@ void wm_video_close(wm_video *self) {
   free(self);
 }
 
-uint32_t wm_video_width(const wm_video *self) { return self->width_px; }
-uint32_t wm_video_height(const wm_video *self) { return self->height_px; }
 const wm_video_counts *wm_video_counted(const wm_video *self) { return &self->counts; }

@@ -55,9 +55,6 @@ void wm_video_close(wm_video *self);  // NULL is fine
 // that needs it does. Before their first picture; more readers may join. Frames and other counts are unchanged.
 wm_status wm_video_share(wm_video *self, wm_video *with, wm_error *err);
 
-uint32_t wm_video_width(const wm_video *self);
-uint32_t wm_video_height(const wm_video *self);
-
 // Stamps and number of the next picture, not decoded: grey is NULL. WM_OK, WM_END, WM_IO. A few system calls.
 wm_status wm_video_peek(wm_video *self, wm_frame *out, wm_error *err);
 // The next picture that can be decoded. The pixels stay until the next call with this video. WM_OK, WM_END, WM_IO.

@@ -157,7 +157,9 @@ static void a_folder_of_files(void) {
   numbered_rows(4);
   camera.width_px = camera.height_px = 0;  // the first picture says it
   open_it();
-  TEST_ASSERT_EQUAL(W, wm_video_width(video));
+  wm_frame first;
+  TEST_ASSERT_EQUAL(WM_OK, wm_video_peek(video, &first, NULL));
+  TEST_ASSERT_EQUAL(W, first.width_px);
   expect_frame(0, 0);
   expect_frame(1, 10);
   expect_frame(3, 30);
