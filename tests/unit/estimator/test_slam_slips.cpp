@@ -177,8 +177,8 @@ void test_a_burst_from_one_view_is_no_landmark(void) {
 void test_a_landmark_expected_behind_the_camera_contradicts(void) {
   sensor.range_is_depth = 1;
   begin();
-  const int last = kCount - 1;
-  const double wrong[2] = {-place[last][0], -place[last][1]};
+  const int behind = kCount - 1;
+  const double wrong[2] = {-place[behind][0], -place[behind][1]};
   const auto bearing_to = [](const double at[2]) {
     return wm::wrap(wm::atan2(at[1] - truth.y_m, at[0] - truth.x_m) - truth.heading_rad);
   };
@@ -193,12 +193,12 @@ void test_a_landmark_expected_behind_the_camera_contradicts(void) {
   int misread = 0;
   for (double t = 0.0; t < 80.0; t += 0.2) {
     go(0.2, 0);
-    for (int i = 0; i < last; i++) look(i, place[i]);
+    for (int i = 0; i < behind; i++) look(i, place[i]);
     if (misread < 12 && std::fabs(bearing_to(wrong)) < 1.0) {
-      look(last, wrong);
+      look(behind, wrong);
       misread++;
     }
-    if (misread == 12 && std::fabs(bearing_to(wrong)) > 1.7) look(last, place[last]);
+    if (misread == 12 && std::fabs(bearing_to(wrong)) > 1.7) look(behind, place[behind]);
   }
   size_t found;
   TEST_ASSERT_LESS_THAN_DOUBLE(0.15, worst_landmark(&found));
