@@ -26,7 +26,8 @@ static const wm_param kParams[] = {
         "Sigma of a position's time-correlated error on each axis, m (reflections, atmosphere). 0: none. Below 0: that "
         "multiple of the position's sigma."),
     F64("correlated.gnss_tau_s", gnss_correlated_tau_s, 20, 0.1, 1e6,
-        "Time constant of that error, s. Flat from 20 to 60."),
+        "Time constant of that error, s. Among houses 10 to 20 s, under an open sky minutes. With 20 and 60 two "
+        "recordings have 9.6 and 20.1 m, 0.37 and 0.28 m."),
     F64("dead_reckoning_after_s", dead_reckoning_after_s, 2, 0, 3600,
         "Time without a fused observation after which the state is dead reckoning, s."),
     BOOL("recover.on", recover, 1, "Relocalize when the observations show that the pose is wrong."),
