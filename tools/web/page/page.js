@@ -6,6 +6,7 @@
 const $ = id => document.getElementById(id);
 const TWO_SIGMA = Math.sqrt(5.991);  // an ellipse that holds 95 of 100
 const ASK_MS = 100, PICTURE_MS = 250, LEAST_VIEW_M = 8;
+const NUMBERS = 1e6;  // a larger one is a filter's own, and no name for a person
 const BLUE_DOTS = '#1fa2ff', YELLOW = '#ffd23d', HIT = '#35e0a8';
 
 // What is shown.
@@ -323,7 +324,7 @@ function draw_landmarks() {
     pen.strokeStyle = own ? colour : colours.card;
     pen.lineWidth = own ? 2 : 1.5;
     pen.stroke();
-    if (id >= 0 && fits && names++ < 200) label(String(id), u + 9, v - 8, 'left', colour);
+    if (id >= 0 && id < NUMBERS && fits && names++ < 200) label(String(id), u + 9, v - 8, 'left', colour);
   }
 }
 function draw_rays() {
@@ -639,7 +640,7 @@ function rings(c, list, colour, unit) {
     c.beginPath();
     c.arc(x, y, 8 * unit, 0, 7);
     c.stroke();
-    if (id >= 0) { c.fillStyle = '#000a'; c.fillText(id, x + 11.7 * unit, y + 4.7 * unit); c.fillStyle = '#ffe98a'; c.fillText(id, x + 11 * unit, y + 4 * unit); }
+    if (id >= 0 && id < NUMBERS && list.length < 60) { c.fillStyle = '#000a'; c.fillText(id, x + 11.7 * unit, y + 4.7 * unit); c.fillStyle = '#ffe98a'; c.fillText(id, x + 11 * unit, y + 4 * unit); }
   }
 }
 async function show_picture(p) {
@@ -695,6 +696,7 @@ async function look() {
       if (answer.status === 200) {
         const next = await answer.json();
         card.hidden = !next.jpeg && !drawn.pictures && !/^\//.test(next.why || '');
+        glass.hidden = !next.jpeg && !drawn.pictures;
         if (next.jpeg) { picture = next; show_sources(next); await show_picture(next); }
         else if (next.why) $('picture-note').textContent = next.why;
       }
