@@ -3,11 +3,11 @@
 """Hardware in the loop: the same daemon and configuration as on a robot, in a guest with Debian's PREEMPT_RT kernel and a
 real (emulated) CAN controller, under qemu's instruction clock, fed from a recording at its own times.
 
-usage: hil.py [--arch arm64|armhf --package DEB] WORK WAYMARK WAYMARK_SIMULATE [PART ...]
+usage: hil.py [--arch arm64|armhf] [--package DEB] WORK WAYMARK WAYMARK_SIMULATE [PART ...]
 
-WORK keeps the guest's image from run to run; WAYMARK is this computer's; parts: can, camera, libcamera, landmarks, edges; all of
-them where none is named. Without --arch the guest runs WAYMARK itself; else the package, which it installs. armhf is arm64's
-kernel with armhf's programs.
+WORK keeps the guest's image from run to run; WAYMARK is this computer's; parts: can, camera, libcamera, landmarks, edges, walls,
+service, power; all of them but power where none is named. Without --arch the guest runs WAYMARK itself, under systemd the package; else the package in all parts.
+The service and power parts run the package under systemd; without one they are left out. armhf is arm64's kernel with armhf's programs.
 
 Judged on the host: the guest's own checks; the log of its run gives its poses bit by bit; its poses are those of a replay
 of the same frames."""
@@ -15,23 +15,28 @@ import argparse
 import csv
 import math
 import pathlib
+import random
 import shutil
 import subprocess
 import sys
+import time
 
 import drives
 import edges
 import landmarks
+import service
 import vimc
+import walls
 from published import ABSENT, DOWN, MOTION_STALE, STALLED, WORKS, Published
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 CAN = ["-object", "can-bus,id=cb0", "-device", "kvaser_pci,canbus=cb0", "-device", "kvaser_pci,canbus=cb0"]
 # Instruction clocks: 250 million a second, idle time is the host's; 500 million, idle time is skipped, so that who sleeps
-# wakes in time whatever else the host does.
-SLOW, FAST = "shift=2,sleep=on", "shift=1,sleep=off"
+# wakes in time whatever else the host does; as that, but idle time is the host's, as a disk is waited for.
+SLOW, FAST, SYSTEM = "shift=2,sleep=on", "shift=1,sleep=off", "shift=1,sleep=on"
 POSITION_M, HEADING_DEG = 0.02, 0.2
+GUEST_S = 1800  # on this computer's clock
 PLAYER_M, PLAYER_DEG, PLAYER_MS = 0.1, 0.5, 100
 
 
@@ -44,21 +49,36 @@ MACHINES = {
 }
 
 
-def boot(work, machine, script, *devices, clock="shift=2,sleep=on"):
-    """Runs guest/SCRIPT by this clock; everything that it prints is shown and kept. Judged by its last word, not by qemu's."""
-    log, image = work / f"{script}.log", work / "image"
-    command = ["timeout", "-k", "5", "1200", *machine["qemu"], "-accel", "tcg,thread=single", "-smp", "1",
-               "-icount", clock, "-m", "1024", "-no-reboot",
-               "-kernel", image / "vmlinuz", "-initrd", image / "init.cpio.gz",
-               "-append", f"console={machine['console']} quiet panic=-1 hil={script}",
-               "-drive", f"file={image}/root.ext4,if=virtio,format=raw,readonly=on",
-               "-virtfs", f"local,path={work}/share,mount_tag=host,security_model=none,id=host",
-               "-display", "none", "-monitor", "none", "-serial", "stdio", "-nic", "none", *devices]
+def command_of(work, machine, script, devices, clock, init):
+    image = work / "image"
+    return [str(word) for word in (
+        *machine["qemu"], "-accel", "tcg,thread=single", "-smp", "1",
+        "-icount", clock, "-m", "1024", "-no-reboot",
+        "-kernel", image / "vmlinuz", "-initrd", image / "init.cpio.gz",
+        "-append", f"console={machine['console']} quiet panic=-1 hil={script} {init}",
+        "-drive", f"file={image}/root.ext4,if=virtio,format=raw,readonly=on",
+        "-virtfs", f"local,path={work}/share,mount_tag=host,security_model=none,id=host",
+        "-display", "none", "-monitor", "none", "-serial", "stdio", "-nic", "none", *devices)]
+
+
+def boot(work, machine, script, *devices, clock=SLOW, init=""):
+    """Runs guest/SCRIPT by this clock; everything that it prints is shown and kept. Judged by its last word, not by qemu's. After the
+    word NO MORE POWER the guest is killed at a random moment, as a cut of the power would: what it has given to its disk is there."""
+    log = work / f"{script}.log"
     with open(log, "w") as out:
-        subprocess.run([str(c) for c in command], stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)
+        guest = subprocess.Popen(command_of(work, machine, script, devices, clock, init), stdin=subprocess.DEVNULL, stdout=out, stderr=subprocess.STDOUT)
+    end_s, has_power = time.monotonic() + GUEST_S, True
+    while guest.poll() is None:
+        has_power = "NO MORE POWER" not in log.read_text(errors="replace")
+        if not has_power:
+            time.sleep(random.uniform(0, 3))
+        if not has_power or time.monotonic() > end_s:
+            guest.kill()
+            guest.wait()
+        time.sleep(0.5)
     text = log.read_text(errors="replace")
     print(text)
-    return "GUEST-RC 0" in text
+    return "GUEST-RC 0" in text or not has_power
 
 
 def poses(path):
@@ -226,28 +246,35 @@ def judge_can(work, waymark):
     return failures + judge_bus(out)
 
 
-def scenario_edges(work, simulate):
-    edges.prepare(work, ROOT, HERE, simulate)
+# Of each part: scripts in the guest, what it is prepared and judged by, devices, clock, how the guest is begun.
+DISK = ["-drive", "file={work}/power.ext4,if=virtio,format=raw"]
+OF_ROOT = lambda prepare: lambda work, simulate: prepare(work, ROOT, HERE, simulate)
+AT_ROOT = lambda judge: lambda work, waymark: judge(work, waymark, ROOT)
+PARTS = {
+    "can": [("can", scenario_can, judge_can, CAN, SLOW, "")],
+    "camera": [("camera", scenario_camera, judge_camera, DISK, SLOW, "")],
+    "libcamera": [("libcamera", lambda work, _: vimc.prepare(work), lambda work, _: vimc.judge(work), [], SLOW, "")],
+    "landmarks": [("landmarks", OF_ROOT(landmarks.prepare), AT_ROOT(landmarks.judge), CAN, FAST, "")],
+    "edges": [("edges", OF_ROOT(edges.prepare), AT_ROOT(edges.judge), CAN, FAST, "")],
+    "walls": [("walls", OF_ROOT(walls.prepare), AT_ROOT(walls.judge), CAN, FAST, "")],
+    "service": [("service", OF_ROOT(service.prepare_service), service.judge_service, CAN, FAST, "systemd")],
+    "power": [("kills", OF_ROOT(service.prepare_kills), service.judge_kills, CAN, SYSTEM, "systemd")],
+}
+UNDER_SYSTEMD = ("service", "power")
 
 
-def judge_edges(work, waymark):
-    return edges.judge(work, waymark, ROOT)
-
-
-def scenario_landmarks(work, simulate):
-    landmarks.prepare(work, ROOT, HERE, simulate)
-
-
-def judge_landmarks(work, waymark):
-    return landmarks.judge(work, waymark, ROOT)
-
-
-def scenario_libcamera(work, _):
-    vimc.prepare(work)
-
-
-def judge_libcamera(work, _):
-    return vimc.judge(work)
+def run_part(work, machine, waymark, simulate, steps):
+    """Its failures; a step that fails in the guest is the last."""
+    failures = []
+    for name, prepare, judge, devices, clock, init in steps:
+        more = prepare(work, simulate) or []
+        begun_s = time.monotonic()
+        devices = [word.format(work=work) for word in devices] + more
+        if not boot(work, machine, f"{name}.sh", *devices, clock=clock, init=init):
+            return failures + [f"the guest's own checks failed ({name}.sh)"]
+        print(f"{name}: {time.monotonic() - begun_s:.0f} s in the guest")
+        failures += judge(work, waymark)
+    return failures
 
 
 def arguments():
@@ -273,23 +300,20 @@ def main():
     shutil.rmtree(work / "share", ignore_errors=True)
     (work / "share/out").mkdir(parents=True)
     shutil.copytree(HERE / "guest", work / "share/guest")
-    shutil.copy(*((args.package, work / "share/waymark.deb") if args.package else (waymark, work / "share/waymark")))
+    if args.package:
+        shutil.copy(args.package, work / "share/waymark.deb")
+    if args.arch == "amd64":
+        shutil.copy(waymark, work / "share/waymark")
     drives.COMPILER = machine["cc"]
-    disk = ["-drive", f"file={work}/power.ext4,if=virtio,format=raw"]
     failures = []
-    for name, prepare, judge, devices, clock in (("can", scenario_can, judge_can, CAN, SLOW),
-                                                 ("camera", scenario_camera, judge_camera, disk, SLOW),
-                                                 ("libcamera", scenario_libcamera, judge_libcamera, [], SLOW),
-                                                 ("landmarks", scenario_landmarks, judge_landmarks, CAN, FAST),
-                                                 ("edges", scenario_edges, judge_edges, CAN, FAST)):
-        if args.parts and name not in args.parts:
-            continue
-        if name == "libcamera" and (args.package or b"libcamera.so" not in waymark.read_bytes()):
+    for name in args.parts or [part for part in PARTS if part != "power"]:
+        if name == "libcamera" and (args.arch != "amd64" or b"libcamera.so" not in waymark.read_bytes()):
             print("libcamera: waymark is built without it: skipped")
             continue
-        prepare(work, simulate)
-        good = boot(work, machine, f"{name}.sh", *devices, clock=clock)
-        failures += judge(work, waymark) if good else [f"the guest's own checks failed ({name}.sh)"]
+        if name in UNDER_SYSTEMD and (args.arch != "amd64" or not args.package):
+            print(f"{name}: without a package of this computer's kind: skipped")
+            continue
+        failures += run_part(work, machine, waymark, simulate, PARTS[name])
     for failure in failures:
         print("FAIL:", failure)
     print("hil:", "failed" if failures else "good")

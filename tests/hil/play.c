@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// play TIMELINE PICTURES CAN DEVICE WIDTH HEIGHT DELAY: a recording's CAN frames, pictures and sightings, each at its
-// own time, by one clock, which neither canplayer nor a camera's steady rate can do. A line of TIMELINE is "NANOSECONDS
-// c ID HEXDATA", "NANOSECONDS p OFFSET BYTES" (of PICTURES, an MJPEG picture) or "NANOSECONDS l STAMP OFFSET BYTES" (of
-// PICTURES, an observations_t for LCM, which is stamped anew), rising. The formats are set at once (DEVICE "-": there
-// are no pictures); the first line is due after DELAY seconds. Says at the end how late it was at most.
+// play TIMELINE PICTURES CAN DEVICE WIDTH HEIGHT DELAY [FROM UNTIL]: a recording's CAN frames, pictures and sightings,
+// each at its own time, by one clock, which neither canplayer nor a camera's steady rate can do. A line of TIMELINE is
+// "NANOSECONDS c ID HEXDATA", "NANOSECONDS p OFFSET BYTES" (of PICTURES, an MJPEG picture) or "NANOSECONDS l STAMP
+// OFFSET BYTES" (of PICTURES, an observations_t for LCM, which is stamped anew), "NANOSECONDS x" (the device is closed)
+// or "NANOSECONDS o" (it is opened again as soon as it is there), rising; lines before FROM and from UNTIL on are left
+// out. The formats are set at once (DEVICE "-": there are no pictures); the first line is due after DELAY seconds.
+// Prints how far CLOCK_MONOTONIC is ahead of the timeline, and at the end how late it was at most.
 #include <arpa/inet.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <linux/can.h>
 #include <linux/can/raw.h>
 #include <linux/videodev2.h>
@@ -45,6 +48,7 @@ static int parse(const char *line, item *out) {
   unsigned id = 0;
   memset(out, 0, sizeof *out);
   if (sscanf(line, "%lld %c%n", &out->t_ns, &out->kind, &used) != 2) return 0;
+  if (out->kind == 'x' || out->kind == 'o') return 1;
   if (out->kind == 'l') return sscanf(line + used, "%lld %zu %zu", &out->stamp_ns, &out->offset, &out->bytes) == 3;
   if (out->kind == 'p') return sscanf(line + used, "%zu %zu", &out->offset, &out->bytes) == 2;
   if (sscanf(line + used, "%x %16s", &id, data) < 1) return 0;
@@ -102,7 +106,7 @@ static long long now_ns(void) {
 }
 
 int main(int argc, char **argv) {
-  if (argc != 8) return 2;
+  if (argc != 8 && argc != 10) return 2;
   size_t text_length = 0, pictures_length = 0, count = 0;
   char *text = read_file(argv[1], &text_length), *pictures = read_file(argv[2], &pictures_length);
   item *items = calloc(text_length / 4 + 1, sizeof *items);
@@ -113,8 +117,12 @@ int main(int argc, char **argv) {
     perror("play");
     return 1;
   }
-  for (char *rest = text, *line; (line = strsep(&rest, "\n"));) count += (size_t)parse(line, &items[count]);
+  const long long from_ns = argc == 10 ? atoll(argv[8]) : LLONG_MIN, until_ns = argc == 10 ? atoll(argv[9]) : LLONG_MAX;
+  for (char *rest = text, *line; (line = strsep(&rest, "\n"));)
+    count += parse(line, &items[count]) && items[count].t_ns >= from_ns && items[count].t_ns < until_ns;
   long long begin_ns = now_ns() + (long long)(atof(argv[7]) * 1e9), worst_ns = 0, failed = 0;
+  printf("ahead %lld ns\n", begin_ns - items[0].t_ns);
+  (void)fflush(stdout);
   for (size_t i = 0; i < count; i++) {
     const item *it = &items[i];
     long long due_ns = begin_ns + it->t_ns - items[0].t_ns;
@@ -123,6 +131,12 @@ int main(int argc, char **argv) {
     long long late_ns = now_ns() - due_ns;
     if (late_ns > worst_ns) worst_ns = late_ns;
     if (it->kind == 'c') failed += write(can, &it->frame, sizeof it->frame) != sizeof it->frame;
+    if (it->kind == 'x') (void)close(video);
+    if (it->kind == 'x' || it->kind == 'o') video = -1;
+    for (int tries = 0; it->kind == 'o' && video == -1 && tries < 100; tries++) {
+      (void)usleep(10000);
+      video = open_video(argv[4], (unsigned)atoi(argv[5]), (unsigned)atoi(argv[6]));
+    }
     if (it->kind == 'p' && it->offset + it->bytes <= pictures_length)
       failed += write(video, pictures + it->offset, it->bytes) != (ssize_t)it->bytes;
     if (it->kind == 'l' && it->offset + it->bytes <= pictures_length)

@@ -25,9 +25,10 @@ its_apt() { if [ "$machine" = amd64 ]; then "$@"; else env APT_CONFIG="$apt_conf
 kernel=$(its_apt apt-cache depends "linux-image-rt-$machine" | awk '/Depends: linux-image-/{sub("linux-image-", "", $2); print $2; exit}')
 [ -n "$kernel" ] || { echo "apt knows no linux-image-rt-$machine (apt-get update?)"; exit 1; }
 cd "$folder"
-if [ "$(cat kernel 2>/dev/null)" = "$kernel" ] && [ -f init.cpio.gz ]; then exit 0; fi
+made_of="$kernel $(cat "$here/prepare.sh" "$here/initramfs.sh" | sha256sum)"
+if [ "$(cat made_of 2>/dev/null)" = "$made_of" ] && [ -f init.cpio.gz ]; then exit 0; fi
 echo "preparing a guest with $kernel in $folder"
-rm -rf debs files root v4l2loopback vimc kernel root.ext4 init.cpio.gz
+rm -rf debs files root v4l2loopback vimc made_of root.ext4 init.cpio.gz
 
 version=$(echo "$kernel" | cut -d. -f1,2)
 mkdir debs files
@@ -42,6 +43,8 @@ for deb in debs/*.deb; do dpkg -x "$deb" files; done
 cp "files/boot/vmlinuz-$kernel" vmlinuz
 
 include=iproute2,kmod,can-utils,v4l-utils,liblcm1,procps,udev,liblcm-bin,libyaml-0-2,libturbojpeg0,libpng16-16,libapriltag3,busybox-static
+# What the package's service runs under, and its dynamic user.
+include=$include,systemd,libnss-systemd,init-system-helpers
 if [ "$arch" = amd64 ]; then
   mmdebstrap --quiet --variant=minbase --include="$include,libcamera0.0.3,libcamera-ipa" bookworm root
 else
@@ -74,4 +77,4 @@ fi
 mke2fs -q -F -t ext4 -d root -O ^has_journal root.ext4 1500M
 bash "$here/initramfs.sh" root "$kernel" root/bin/busybox "$PWD/init.cpio.gz"
 rm -rf root debs files v4l2loopback vimc
-echo "$kernel" >kernel
+echo "$made_of" >made_of
