@@ -159,7 +159,7 @@ def fault_tests():
     faults, rows = 0, re.findall(r"(?m)^\| [^|]+ \|[^|]*\|[^|]*\|[^|]*\| ([^|]+) \|$", (ROOT / "docs/live.md").read_text().split("## Latency")[0])
     for name in (name.split(" (")[0] for row in rows for name in row.split(", ") if name not in ("test", "---")):
         kind, _, what = name.partition(" ")
-        found = {"faults": f'"{what}"' in drives, "hil": f"judge_{what}(" in parts}.get(kind, re.search(rf"\b{kind.removeprefix('test_estimator_')}\b", made))
+        found = {"faults": f'"{what}"' in drives, "hil": f'"{what}": [' in parts}.get(kind, re.search(rf"\b{kind.removeprefix('test_estimator_')}\b", made))
         if not found:
             faults += 1
             print(f"docs/live.md: there is no test {name}")
