@@ -101,6 +101,16 @@ static wm_status fail_missing(const csv_reader *self, int column, wm_error *err)
   return csv_fail(self, err, WM_BAD_CONFIG, text);
 }
 
+// The missing column of which this is the name without its unit ("bearing" of "bearing_rad"), or NULL.
+static const char *begins_missing(const csv_reader *self, const char *shown) {
+  const size_t length = strlen(shown);
+  for (int i = 0; length > 0 && self->format->columns[i].name; i++)
+    if (self->place[i] < 0 && strncmp(self->format->columns[i].name, shown, length) == 0 &&
+        self->format->columns[i].name[length] == '_')
+      return self->format->columns[i].name;
+  return NULL;
+}
+
 // An unused column: an error where its name is near a missing one, else a warning.
 static wm_status check_unknown(const csv_reader *self, csv_field field, wm_warn_fn warn, void *context, wm_error *err) {
   char shown[WM_SHOW_TEXT_MAX], text[256];
@@ -112,7 +122,9 @@ static wm_status check_unknown(const csv_reader *self, csv_field field, wm_warn_
     return csv_fail(self, err, WM_BAD_CONFIG, text);
   }
   if (warn) {
-    snprintf(text, sizeof text, "%s:1: unknown column '%s', ignored", self->lines.path, shown);
+    const char *meant = begins_missing(self, shown);
+    snprintf(text, sizeof text, "%s:1: unknown column '%s', ignored%s%s%s", self->lines.path, shown,
+             meant ? "; did you mean '" : "", meant ? meant : "", meant ? "'?" : "");
     warn(context, text);
   }
   return WM_OK;

@@ -82,6 +82,15 @@ static wm_status find_map(wm_site *self, wm_error *err) {
   return status;
 }
 
+static void warn_unknown_sensor(wm_site *self, const char *path, const char *name) {
+  const char *known[WM_SENSORS_MAX + 1] = {NULL}, *nearest;
+  for (size_t i = 0; i < self->calibration.sensor_count; i++) known[i] = self->calibration.sensors[i].name;
+  nearest = wm_word_nearest(name, known);
+  warn_line(&self->warn,
+            "%s: the sensor '%s' is not in calibration.yaml%s%s%s; it is taken to sit at base_link, sigmas unknown",
+            path, name, nearest ? "; did you mean '" : "", nearest ? nearest : "", nearest ? "'?" : "");
+}
+
 // Index of the sensor; one that `sensors` of calibration.yaml lacks is added at the camera of its name, or at
 // base_link.
 wm_status wm_site_sensor(wm_site *self, const char *path, const char *name, uint16_t *out, wm_error *err) {
@@ -99,9 +108,7 @@ wm_status wm_site_sensor(wm_site *self, const char *path, const char *name, uint
   if (mounting)
     sensor->mounting = *mounting;
   else
-    warn_line(&self->warn,
-              "%s: the sensor '%s' is not in calibration.yaml; it is taken to sit at base_link, sigmas unknown", path,
-              name);
+    warn_unknown_sensor(self, path, name);
   *out = (uint16_t)known->sensor_count++;
   return WM_OK;
 }

@@ -7,26 +7,33 @@
 #include <string.h>
 
 #include "cli/check/check.h"
+#include "cli/check/trials.h"
 #include "cli/commands.h"
 #include "cli/options.h"
 #include "fusion/assembly.h"
 #include "fusion/pipeline.h"
 #include "live/robot.h"
 #include "rt/arena.h"
+#include "rt/clock.h"
 
 static const char kHelp[] =
     "usage: waymark check CONFIG [RECORDING] [options]\n"
     "\n"
-    "Says what can be known before driving: whether the configuration is right and can be meant; with a recording,\n"
-    "whether calibration, map, landmarks and CAN binding are those of a robot, and whether its data agree with them.\n"
-    "Without one, the same for the robot's devices, if it has any. Then the facts, and a line for each finding with "
-    "its\n"
-    "mend. Exit code 2 where something must be mended first.\n"
+    "Checks a configuration before driving: its keys and files; without a recording, the robot's devices. With a\n"
+    "recording it drives the recording as a replay does and judges the fit: shares of updates that were refused and "
+    "of\n"
+    "time lost, size of the innovations, calibration, time spans of the sources, units, landmarks. Where the "
+    "observations\n"
+    "contradict the poses it tries the usual mistakes (signs, units, axes, mountings, clocks, identities, wheels) and\n"
+    "names the one that explains them. Prints the facts, then a line for each finding with its mend. Exit code 2 "
+    "where\n"
+    "something must be mended first.\n"
     "\n"
     "  --landmarks FILE    instead of the recording's map\n"
     "  --calibration FILE  instead of the recording's\n"
     "  --map FILE          a map.yaml instead of the recording's\n"
     "  --json              the findings, for programs\n"
+    "  --quick             without the trials of the usual mistakes\n"
     "\n"
     "example:\n"
     "  waymark check config/starry-night-plan.yaml RECORDING\n";
@@ -77,6 +84,10 @@ static void print_quantities(uint32_t quantities) {
 }
 
 static void print_source(const wm_assembled_source *s, const source_facts *facts) {
+  if (s->source->is_live) {
+    fact("source       %-20s a device (`waymark doctor` finds out whether it is there)\n", s->name);
+    return;
+  }
   double seconds = facts->events > 1 ? wm_seconds_between(facts->first_ns, facts->last_ns) : 0;
   fact("source       %-20s %8" PRIu64 " data", s->name, facts->events);
   if (seconds > 0) fact(", %.1f a second", (double)(facts->events - 1) / seconds);
@@ -84,67 +95,173 @@ static void print_source(const wm_assembled_source *s, const source_facts *facts
   fact("\n");
 }
 
-// Takes the memory of a replay, because detectors need theirs while their sources are read, and returns its size.
+// A name that is nearly a known one is a mistake; other notes may be intended.
+static void take_note(void *context, const char *text) {
+  const int is_mistake = strstr(text, "did you mean") != NULL;
+  find(context, is_mistake ? FINDING_BAD : FINDING_NOTE, "files",
+       is_mistake ? "write the name that is meant" : "mend it there, or leave it if it is meant so", "%s", text);
+}
+
+// ── a recording, driven ─────────────────────────────────────────────────────────────────────────────────────────────
+
+typedef struct checked {
+  wm_recording *recording;
+  findings *found;
+  const char *dir;
+  int is_quick;  // without trials
+  wm_time_ns begin_ns;
+  source_data sources;
+  source_seen seen[WM_SOURCES_MAX];
+  drive_evidence evidence;
+} checked;
+
+static void print_setup(const wm_assembly *assembly, wm_recording *recording) {
+  fact("recording    %s", wm_recording_name(recording));
+  if (isfinite(wm_recording_duration_s(recording))) fact(", %.1f s", wm_recording_duration_s(recording));
+  fact("\nsetup        %zu sensors, %zu landmarks\n", assembly->setup.sensor_count, assembly->setup.landmark_count);
+  print_map(assembly->setup.map, assembly->map_path);
+  print_start(&assembly->setup.start);
+}
+
+static void check_setup(const wm_assembly *assembly, wm_recording *recording, wm_status status, findings *found) {
+  print_setup(assembly, recording);
+  check_calibration(assembly, found);
+  check_landmarks(&assembly->setup, found);
+  check_map(assembly, found);
+  for (size_t i = 0; i < assembly->unused_count; i++) fact("not used     %s\n", assembly->unused[i]);
+  if (status != WM_OK) return;
+  print_quantities(wm_recording_quantities(recording));
+  print_driving(&assembly->driving);
+}
+
+static void assembled(void *context, const wm_assembly *assembly, wm_status status) {
+  checked *self = context;
+  check_setup(assembly, self->recording, status, self->found);
+  source_data_init(&self->sources, assembly);
+}
+
+static void print_memory(void *context, const wm_arena_need *needs, size_t count) {
+  (void)context;
+  fact("memory       %.2f MB:", (double)wm_arena_sum(needs, count) * 1e-6);
+  for (size_t i = 0; i < count; i++) fact(" %s %.3f", needs[i].name, (double)needs[i].bytes * 1e-6);
+  fact("\n");
+}
+
+static void arrived(void *context, const wm_event *event) {
+  checked *self = context;
+  source_data_take(&self->sources, event);
+  source_seen_take(&self->seen[event->source], event);
+}
+
+static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
+  (void)bytes;
+  evidence_put(&((checked *)context)->evidence, kind, record);
+}
+
+// The messages that the drive would have sent with a pose all the time.
+static uint64_t messages_due(const wm_config *config, const wm_run_report *report) {
+  return (uint64_t)(report->recorded_s * config->runtime.publish_rate_hz);
+}
+
+// The usual mistakes, one after the other, undone: which of them explains the observations?
+static void try_suspects(checked *self, const wm_assembly *assembly, double recorded_s) {
+  suspect list[SUSPECTS_MAX], found[TRIALS_FOUND_MAX];
+  trial_result before, after;
+  const double drive_s = wm_seconds_between(self->begin_ns, wm_monotonic_ns());
+  progress_line progress;
+  progress_begin(&progress);
+  const trials_plan plan = {.config = assembly->config,
+                            .dir = self->dir,
+                            .suspects = list,
+                            .count = suspects_list(assembly, self->seen, list),
+                            .drive_s = drive_s,
+                            .recorded_s = recorded_s,
+                            .progress = progress_show,
+                            .progress_context = &progress};
+  const size_t count = trials_run(&plan, found, &before, &after);
+  progress_end(&progress);
+  fact("trials       %zu of the usual mistakes undone, one at a time: %s\n", plan.count - 1,
+       count > 0 ? "found what explains the observations" : "none of them explains the observations");
+  for (size_t i = 0; i < count; i++) {
+    char what[160], fix[240];
+    suspect_text(&found[i], assembly, what, sizeof what, fix, sizeof fix);
+    find(self->found, FINDING_BAD, "cause", fix, "%s: with that undone %.0f %% of the updates fit, now %.0f %%", what,
+         100 * after.explained, 100 * before.explained);
+  }
+}
+
+static void ended(void *context, const wm_assembly *assembly, const wm_run_report *report) {
+  checked *self = context;
+  source_data_judge(&self->sources, wm_recording_quantities(self->recording), self->found);
+  for (size_t i = 0; i < assembly->source_count; i++) print_source(&assembly->sources[i], &self->sources.facts[i]);
+  const uint64_t due = messages_due(assembly->config, report);
+  fact("drive        %.1f s: tracking %.1f %%, dead reckoning %.1f %%, lost %.1f %%, no pose %.1f %%\n",
+       report->recorded_s, 100 * evidence_share(&self->evidence, WM_STATE_TRACKING, due),
+       100 * evidence_share(&self->evidence, WM_STATE_DEAD_RECKONING, due),
+       100 * evidence_share(&self->evidence, WM_STATE_LOST, due),
+       100 * evidence_share(&self->evidence, WM_STATE_SEARCHING, due));
+  const size_t bad = findings_of(self->found, FINDING_BAD);
+  evidence_judge(&self->evidence, assembly, &report->health, due, self->found);
+  if (findings_of(self->found, FINDING_BAD) > bad && !self->is_quick) try_suspects(self, assembly, report->recorded_s);
+}
+
+static void check_recording(const wm_config *config, const char *dir, int is_quick, findings *found) {
+  static checked self;
+  static wm_run_report report;
+  wm_error err = {0};
+  self.found = found;
+  self.dir = dir;
+  self.is_quick = is_quick;
+  self.begin_ns = wm_monotonic_ns();
+  wm_status status = wm_recording_open(dir, &config->overrides, take_note, found, &self.recording, &err);
+  if (status != WM_OK) {
+    find_error(found, "recording", &err);
+    return;
+  }
+  progress_line progress;
+  progress_begin(&progress);
+  const wm_replay_watch watch = {
+      .context = &self, .assembled = assembled, .memory = print_memory, .arrived = arrived, .put = put, .ended = ended};
+  const wm_replay_options options = {
+      .watch = &watch, .seed = 1, .progress = progress_show, .progress_context = &progress};
+  status = wm_replay_recording(config, self.recording, &options, &report, &err);
+  progress_end(&progress);
+  if (status != WM_OK) find_error(found, "setup", &err);
+  wm_recording_close(self.recording);
+}
+
+// ── a robot's own devices ───────────────────────────────────────────────────────────────────────────────────────────
+
+// How much memory a run takes, and takes it: detectors need theirs to start.
 static wm_status take_memory(wm_assembly *assembly, wm_arena *arena, wm_error *err) {
   static wm_pipeline pipeline;
   wm_arena_need needs[WM_PIPELINE_NEEDS + WM_VISION_NEEDS];
   wm_pipeline_needs(&pipeline, assembly, needs);
   size_t count = WM_PIPELINE_NEEDS + wm_vision_needs(assembly->vision, needs + WM_PIPELINE_NEEDS);
-  fact("memory       %.2f MB:", (double)wm_arena_sum(needs, count) * 1e-6);
-  for (size_t i = 0; i < count; i++) fact(" %s %.3f", needs[i].name, (double)needs[i].bytes * 1e-6);
-  fact("\n");
+  print_memory(NULL, needs, count);
   wm_status status = wm_arena_fill(arena, needs, count, 0, err);
   return status == WM_OK ? wm_vision_start(assembly->vision, err) : status;
 }
 
-static void take_note(void *context, const char *text) {
-  find(context, FINDING_NOTE, "files", "mend it there, or leave it if it is meant so", "%s", text);
-}
-
-static void check_sources(const wm_assembly *assembly, uint32_t bound, findings *found) {
-  for (size_t i = 0; i < assembly->source_count; i++) {
-    const wm_assembled_source *s = &assembly->sources[i];
-    source_facts facts;
-    if (s->source->is_live) {
-      fact("source       %-20s a device (`waymark doctor` finds out whether it is there)\n", s->name);
-      continue;
-    }
-    check_source(assembly, s, bound, &facts, found);
-    print_source(s, &facts);
-  }
-}
-
-// With a recording's folder, or with the robot's own devices (NULL).
-static void check_recording(const wm_config *config, const char *dir, findings *found) {
+static void check_devices(const wm_config *config, findings *found) {
+  static wm_assembly assembly;
+  static const source_facts kNone;
   wm_error err = {0};
   wm_recording *recording;
-  wm_status status = dir ? wm_recording_open(dir, &config->overrides, take_note, found, &recording, &err)
-                         : wm_robot_open(config, take_note, found, &recording, &err);
+  wm_status status = wm_robot_open(config, take_note, found, &recording, &err);
   if (status != WM_OK) {
-    find_error(found, dir ? "recording" : "devices", &err);
+    find_error(found, "devices", &err);
     return;
   }
-  static wm_assembly assembly;
   wm_arena arena = {0};
   status = wm_assemble(config, recording, 1, &assembly, &err);
-  const wm_setup *setup = &assembly.setup;
-  fact("recording    %s", wm_recording_name(recording));
-  if (isfinite(wm_recording_duration_s(recording))) fact(", %.1f s", wm_recording_duration_s(recording));
-  fact("\nsetup        %zu sensors, %zu landmarks\n", setup->sensor_count, setup->landmark_count);
-  print_map(setup->map, assembly.map_path);
-  print_start(&setup->start);
-  check_calibration(&assembly, found);
-  check_landmarks(setup, found);
-  check_map(&assembly, found);
-  if (status == WM_OK) {
-    print_quantities(wm_recording_quantities(recording));
-    print_driving(&assembly.driving);
-    status = take_memory(&assembly, &arena, &err);
-  }
-  if (status == WM_OK) check_sources(&assembly, wm_recording_quantities(recording), found);
-  if (status == WM_OK && !dir) check_computer(config, arena.bytes, found);
-  for (size_t i = 0; i < assembly.unused_count; i++) fact("not used     %s\n", assembly.unused[i]);
-  if (status != WM_OK) find_error(found, "setup", &err);
+  check_setup(&assembly, recording, status, found);
+  if (status == WM_OK) status = take_memory(&assembly, &arena, &err);
+  for (size_t i = 0; status == WM_OK && i < assembly.source_count; i++) print_source(&assembly.sources[i], &kNone);
+  if (status == WM_OK)
+    check_computer(config, arena.bytes, found);
+  else
+    find_error(found, "setup", &err);
   wm_assembly_close(&assembly);
   wm_arena_close(&arena);
   wm_recording_close(recording);
@@ -165,11 +282,12 @@ static int tell(const findings *found) {
 
 int command_check(int argc, char *const *argv) {
   const char *words[2], *landmarks = NULL, *calibration = NULL, *map = NULL;
-  int help = 0, as_json = 0;
+  int help = 0, as_json = 0, is_quick = 0;
   const option options[] = {{"--landmarks", OPTION_TEXT, &landmarks},
                             {"--calibration", OPTION_TEXT, &calibration},
                             {"--map", OPTION_TEXT, &map},
                             {"--json", OPTION_FLAG, &as_json},
+                            {"--quick", OPTION_FLAG, &is_quick},
                             {"--help", OPTION_FLAG, &help},
                             {"-h", OPTION_FLAG, &help}};
   static findings found;
@@ -200,8 +318,10 @@ int command_check(int argc, char *const *argv) {
     return complain(&err);
   }
   check_config(&config, &found);
-  if (count > 1 || config.devices.can_count + config.devices.camera_count > 0)
-    check_recording(&config, count > 1 ? words[1] : NULL, &found);
+  if (count > 1)
+    check_recording(&config, words[1], is_quick, &found);
+  else if (config.devices.can_count + config.devices.camera_count > 0)
+    check_devices(&config, &found);
   wm_config_free(&config);
   return tell(&found);
 }

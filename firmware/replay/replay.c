@@ -23,8 +23,9 @@ typedef struct replay {
   wm_arena arena;
   wm_pipeline pipeline;
   wm_source_reader *readers;
-  wm_run_folder *folder;
-  wm_output output;
+  wm_run_folder *folder;  // NULL where nothing is written
+  wm_output output, file;
+  wm_replay_watch watch;
   wm_time_ns first_ns, now_ns;          // the run's clock is that of the arrivals
   wm_time_ns publish_ns, next_tick_ns;  // period and next due message
   int64_t allocations, page_faults;     // before the start; after it: since
@@ -39,6 +40,7 @@ static wm_status take_memory(replay *self, wm_error *err) {
   needs[count++] =
       (wm_arena_need){"readers", self->assembly.source_count * sizeof(wm_source_reader), (void **)&self->readers};
   count += wm_vision_needs(self->assembly.vision, needs + count);
+  if (self->watch.memory) self->watch.memory(self->watch.context, needs, count);
   return wm_arena_fill(&self->arena, needs, count, 0, err);
 }
 
@@ -126,7 +128,10 @@ static wm_status play(replay *self, const wm_replay_options *options, double dur
     publish_until(self, arrival_ns);
     self->now_ns = arrival_ns;
     wm_pipeline_advance(&self->pipeline, arrival_ns);
-    if (reader->next.kind != WM_EVENT_NONE) wm_pipeline_arrive(&self->pipeline, &reader->next);
+    if (reader->next.kind != WM_EVENT_NONE) {
+      if (self->watch.arrived) self->watch.arrived(self->watch.context, &reader->next);
+      wm_pipeline_arrive(&self->pipeline, &reader->next);
+    }
     wm_status status = wm_source_reader_advance(reader, err);
     if (status != WM_OK) return status;
     if (options->progress && ++events % 256 == 0 && wm_monotonic_ns() - told_ns > PROGRESS_EVERY_NS) {
@@ -139,9 +144,17 @@ static wm_status play(replay *self, const wm_replay_options *options, double dur
   return WM_OK;
 }
 
+// ── outputs ─────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
+  replay *self = context;
+  if (self->file.put) self->file.put(self->file.context, kind, record, bytes);
+  if (self->watch.put) self->watch.put(self->watch.context, kind, record, bytes);
+}
+
 // ── what is left to write ───────────────────────────────────────────────────────────────────────────────────────────
 
-static wm_status write_summary(replay *self, wm_run_report *report, wm_error *err) {
+static void summarize(replay *self, wm_run_report *report) {
   wm_pipeline_health(&self->pipeline, self->now_ns, &report->health);
   wm_source_readers_health(self->readers, self->assembly.source_count, &report->health);
   report->poses = self->pipeline.fuser.poses;
@@ -150,7 +163,9 @@ static wm_status write_summary(replay *self, wm_run_report *report, wm_error *er
   report->memory_bytes = self->arena.bytes;
   report->allocations_after_start = self->allocations;
   report->page_faults_after_start = self->page_faults;
+}
 
+static wm_status write_summary(replay *self, const wm_run_report *report, wm_error *err) {
   const wm_timing_stage stages[] = {{"arrive", &self->pipeline.arrive_ns},
                                     {"predict", &self->pipeline.fuser.predict_ns},
                                     {"correct", &self->pipeline.fuser.correct_ns},
@@ -169,7 +184,11 @@ static wm_status write_summary(replay *self, wm_run_report *report, wm_error *er
 
 static wm_status run(replay *self, const wm_config *config, wm_recording *recording, const wm_replay_options *options,
                      wm_run_report *report, wm_error *err) {
+  if (options->watch) self->watch = *options->watch;
+  const wm_event_change change = {self->watch.change, self->watch.context};
   wm_status status = wm_assemble(config, recording, options->seed, &self->assembly, err);
+  if (status == WM_OK && self->watch.prepare) self->watch.prepare(self->watch.context, &self->assembly);
+  if (self->watch.assembled) self->watch.assembled(self->watch.context, &self->assembly, status);
   for (size_t i = 0; status == WM_OK && i < self->assembly.source_count; i++) {
     if (options->from_s > 0.0)
       self->assembly.sources[i].from_s = fmax(self->assembly.sources[i].from_s, options->from_s);
@@ -180,20 +199,26 @@ static wm_status run(replay *self, const wm_config *config, wm_recording *record
   if (status == WM_OK && options->frames_of)
     status = seen_frames_apply(options->frames_of, recording, &self->assembly, &report->log_ahead_ns, err);
   if (status == WM_OK && options->timing_of) status = take_times_of(options->timing_of, self->assembly.vision, err);
-  if (status == WM_OK) status = wm_run_folder_open(options->out_dir, &self->assembly, &self->folder, err);
+  if (status == WM_OK && options->out_dir)
+    status = wm_run_folder_open(options->out_dir, &self->assembly, &self->folder, err);
   if (status != WM_OK) return status;
-  self->output = wm_run_folder_output(self->folder);
+  if (self->folder) self->file = wm_run_folder_output(self->folder);
+  self->output = (wm_output){put, self};
   self->publish_ns = wm_ns_from_seconds(1.0 / config->runtime.publish_rate_hz);
   status = wm_pipeline_start(&self->pipeline, self->output, err);
   if (status == WM_OK) status = wm_vision_start(self->assembly.vision, err);
   if (status == WM_OK) status = wm_vision_start_prefetch(self->assembly.vision, err);
-  if (status == WM_OK) status = wm_source_readers_open(&self->assembly, self->readers, 0, &self->first_ns, err);
+  if (status == WM_OK)
+    status = wm_source_readers_open(&self->assembly, self->readers, &change, 0, &self->first_ns, err);
   if (status != WM_OK) return status;
 
   begin_steady(self);
   status = play(self, options, wm_recording_duration_s(recording), err);
   end_steady(self);
-  return status == WM_OK ? write_summary(self, report, err) : status;
+  if (status != WM_OK) return status;
+  summarize(self, report);
+  if (self->watch.ended) self->watch.ended(self->watch.context, &self->assembly, report);
+  return self->folder ? write_summary(self, report, err) : WM_OK;
 }
 
 wm_status wm_replay_recording(const wm_config *config, wm_recording *recording, const wm_replay_options *options,

@@ -7,6 +7,8 @@
 #include <stdint.h>
 
 #include "config/config.h"
+#include "fusion/assembly.h"
+#include "fusion/output.h"
 #include "output/event_log.h"
 #include "waymark/health.h"
 #include "waymark/recording.h"
@@ -14,17 +16,6 @@
 
 // Progress: `done` of 1, or NaN where the length is unknown. A few times a second at most.
 typedef void (*wm_progress_fn)(void *context, double done);
-
-typedef struct wm_replay_options {
-  const char *out_dir;
-  uint64_t seed;
-  wm_progress_fn progress;  // may be NULL
-  void *progress_context;
-  const wm_raster *map;    // event log only: the map with the hash in its head; NULL where it has none
-  const char *frames_of;   // recording only: event log of a run of it, whose pictures alone are processed
-  const char *timing_of;   // recording only: folder of a run, whose times of detection are taken
-  double from_s, until_s;  // recording only: interval in s from its first stamp; until_s 0: to its end
-} wm_replay_options;
 
 typedef struct wm_run_report {
   wm_health health;
@@ -37,6 +28,33 @@ typedef struct wm_run_report {
   wm_time_ns log_ahead_ns;  // frames_of only: the log's clock minus the recording's
   int log_was_cut;          // event log only: it ends within a record or without its end record
 } wm_run_report;
+
+// A reader of a replay beside its files. Each function may be NULL.
+typedef struct wm_replay_watch {
+  void *context;
+  // For trials: alters the parts before anything is made of them, and each event as it is read.
+  void (*prepare)(void *context, wm_assembly *assembly);
+  void (*change)(void *context, wm_event *event);
+  // Configuration and recording are put together, or failed to be (`status`; the parts until there are filled).
+  void (*assembled)(void *context, const wm_assembly *assembly, wm_status status);
+  void (*memory)(void *context, const wm_arena_need *needs, size_t count);  // taken, before the first event
+  void (*arrived)(void *context, const wm_event *event);                    // in the order of arrival
+  void (*put)(void *context, wm_output_kind kind, const void *record, size_t bytes);
+  // After the last event; sources are still open.
+  void (*ended)(void *context, const wm_assembly *assembly, const wm_run_report *report);
+} wm_replay_watch;
+
+typedef struct wm_replay_options {
+  const char *out_dir;           // NULL: no files (recording only)
+  const wm_replay_watch *watch;  // recording only; may be NULL
+  uint64_t seed;
+  wm_progress_fn progress;  // may be NULL
+  void *progress_context;
+  const wm_raster *map;    // event log only: the map with the hash in its head; NULL where it has none
+  const char *frames_of;   // recording only: event log of a run of it, whose pictures alone are processed
+  const char *timing_of;   // recording only: folder of a run, whose times of detection are taken
+  double from_s, until_s;  // recording only: this part of it, s from its first stamp; until_s 0: to its end
+} wm_replay_options;
 
 wm_status wm_replay_recording(const wm_config *config, wm_recording *recording, const wm_replay_options *options,
                               wm_run_report *report, wm_error *err);

@@ -70,12 +70,12 @@ def mahalanobis2(d, p):
     return total
 
 
-def confidently_wrong(run, recording):
-    """Share of the truth's time with state tracking while the position is off by more than WRONG_M and WRONG_SIGMA."""
+def errors(run, recording):
+    """(t_s, tracking, error in m, error in sigma) at each stamp of the truth at which the run has a pose."""
     trajectory, truth = rows(run / "trajectory.csv"), rows(recording / "truth.csv")
-    axes = "xyz" if "cov_zz" in trajectory[0] else "xy"
+    axes = "xyz" if trajectory and "cov_zz" in trajectory[0] else "xy"
     place = [f"{a}_m" for a in axes]
-    at, wrong, total, last = 0, 0, 0, None
+    at = 0
     for row in truth:
         t = int(row["t_ns"])
         while at + 1 < len(trajectory) and int(trajectory[at + 1]["t_ns"]) <= t:
@@ -86,10 +86,17 @@ def confidently_wrong(run, recording):
         share = (t - int(a["t_ns"])) / (int(b["t_ns"]) - int(a["t_ns"]))
         d = [float(row[k]) - float(a[k]) - share * (float(b[k]) - float(a[k])) for k in place]
         p = [[float(a["cov_" + min(i, j) + max(i, j)]) for j in axes] for i in axes]
-        bad = a["state"] == "tracking" and sum(x * x for x in d) > WRONG_M ** 2 and mahalanobis2(d, p) > WRONG_SIGMA ** 2
+        yield t * 1e-9, a["state"] == "tracking", sum(x * x for x in d) ** 0.5, mahalanobis2(d, p) ** 0.5
+
+
+def confidently_wrong(run, recording):
+    """Share of the truth's time with state tracking while the position is off by more than WRONG_M and WRONG_SIGMA."""
+    wrong, total, last = 0, 0, None
+    for t_s, tracking, error_m, sigmas in errors(run, recording):
         if last is not None:
-            wrong, total = wrong + bad * (t - last), total + t - last
-        last = t
+            wrong += (tracking and error_m > WRONG_M and sigmas > WRONG_SIGMA) * (t_s - last)
+            total += t_s - last
+        last = t_s
     return wrong / total if total else None
 
 

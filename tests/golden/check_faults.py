@@ -91,11 +91,24 @@ def can_log(seconds=8, scale=1.0, turn=1.0, speed=1.0, short=False):
     return "\n".join(lines) + "\n"
 
 
+def pose(t_s, step_s=0.001):
+    """Where the drive of can_log is."""
+    x = y = heading = 0.0
+    for k in range(round(t_s / step_s)):
+        middle = heading + 0.25 * step_s * math.sin(k * step_s)
+        x, y = x + step_s * math.cos(middle), y + step_s * math.sin(middle)
+        heading += 0.5 * step_s * math.sin((k + 0.5) * step_s)
+    return x, y, heading
+
+
 def sightings(ids=(1, 2, 3), late_ms=50):
     rows = ["t_ns,sensor,id,bearing_rad,range_m,arrival_ns"]
     for i in range(60):
-        t = i * 100_000_000
-        rows.append(f"{t},laser,{ids[i % len(ids)]},0.1,4.0,{t + late_ms * 1_000_000}")
+        t, place = i * 100_000_000, ((5, 0), (0, 5), (-5, 0))[i % 3]
+        x, y, heading = pose(t * 1e-9)
+        dx, dy = place[0] - x - 0.1 * math.cos(heading), place[1] - y - 0.1 * math.sin(heading)
+        bearing = math.remainder(math.atan2(dy, dx) - heading, 2 * math.pi)
+        rows.append(f"{t},laser,{ids[i % len(ids)]},{bearing:.5f},{math.hypot(dx, dy):.4f},{t + late_ms * 1_000_000}")
     return "\n".join(rows) + "\n"
 
 

@@ -50,7 +50,9 @@ void drive(const std::string &config_path, const char *out) {
   TEST_ASSERT_EQUAL_MESSAGE(
       WM_OK, wm_recording_open((folder + "/recording").c_str(), nullptr, nullptr, nullptr, &recording, &err), err.text);
   const std::string out_dir = folder + "/" + out;
-  const wm_replay_options options = {out_dir.c_str(), 1, nullptr, nullptr, nullptr, nullptr, 0, 0};
+  wm_replay_options options = {};
+  options.out_dir = out_dir.c_str();
+  options.seed = 1;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_replay_recording(&config, recording, &options, &report, &err), err.text);
   wm_recording_close(recording);
   wm_config_free(&config);

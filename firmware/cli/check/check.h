@@ -7,6 +7,7 @@
 
 #include "cli/doctor/findings.h"
 #include "fusion/assembly.h"
+#include "fusion/output.h"
 
 // ── parts ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
@@ -48,6 +49,7 @@ void motion_data_take(motion_data *self, const wm_event *event);
 // `bound`: bit per wm_quantity of the binding.
 void motion_data_judge(const motion_data *self, uint32_t bound, findings *out);
 
+// What went by of one source.
 typedef struct source_facts {
   uint64_t events;
   wm_time_ns first_ns, last_ns;
@@ -56,8 +58,49 @@ typedef struct source_facts {
   uint64_t sightings, unknown_landmarks, bare_ranges;  // bare_ranges: without a bearing
 } source_facts;
 
-// Reads the source to its end and checks its data. An unreadable source is a finding, too.
-void check_source(const wm_assembly *assembly, const wm_assembled_source *source, uint32_t bound, source_facts *facts,
-                  findings *out);
+typedef struct source_data {
+  const wm_assembly *assembly;
+  source_facts facts[WM_SOURCES_MAX];
+  motion_data motion;
+} source_data;
+
+void source_data_init(source_data *self, const wm_assembly *assembly);
+// An event that arrived.
+void source_data_take(source_data *self, const wm_event *event);
+// After the last event: each source's counts, and the sources against each other. `bound` as above.
+void source_data_judge(source_data *self, uint32_t bound, findings *out);
+
+// ── a drive ─────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+// How well the observations of a drive agree with its poses.
+typedef struct residual_evidence {
+  uint64_t fused, refused;  // updates; refused: by the gate, or because the pose was being searched for
+  double sum, squares;      // of the fused innovations over their sigma
+} residual_evidence;
+
+#define EVIDENCE_LANDMARKS_MAX 256
+typedef struct landmark_evidence {
+  int32_t id;
+  uint64_t fused, refused, unknown;  // unknown: the map doesn't have it
+} landmark_evidence;
+
+typedef struct drive_evidence {
+  residual_evidence residuals[WM_SOURCES_MAX][WM_RESIDUAL_COUNT];
+  landmark_evidence landmarks[EVIDENCE_LANDMARKS_MAX];
+  size_t landmark_count;
+  uint64_t states[4], published;  // messages by wm_state
+  double log_likelihood;          // of all updates, nats; a refused one counts as an outlier of any value
+  uint64_t updates, fused;
+} drive_evidence;
+
+// A record of the pipeline's output.
+void evidence_put(drive_evidence *self, wm_output_kind kind, const void *record);
+// Share of the messages' times with this state; without a pose counts as searching. `total`: messages that were due.
+double evidence_share(const drive_evidence *self, wm_state state, uint64_t total);
+// Mean log likelihood of an update, nats: the larger the better the observations fit.
+double evidence_score(const drive_evidence *self);
+// `health` as the drive ended.
+void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health, uint64_t total,
+                    findings *out);
 
 #endif

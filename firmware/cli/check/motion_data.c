@@ -117,6 +117,21 @@ static void ranges(const motion_data *self, findings *out) {
          self->most[q] * 1e3, w->actuator_m[0] * 1e3, w->actuator_m[w->steering_table_count - 1] * 1e3);
 }
 
+// A gyro and two wheels measure the same turn: their ratio is that of the track, or of a wheel's scale.
+static void track(const motion_data *self, findings *out) {
+  const agreement *a = &self->turn_ticks;
+  if (a->count < PAIRS_MIN || sqrt(a->aa / (double)a->count) < TURN_RMS_MIN || a->bb <= 0) return;
+  const double ratio = a->ab / a->bb;
+  if (a->ab / sqrt(a->aa * a->bb) < 0.5 || (ratio > 1 / 1.5 && ratio < 1.5)) return;
+  char mend[160];
+  (void)snprintf(mend, sizeof mend,
+                 "measure it again (`wheels: {track_m: %.3g}` would agree), or look at the gyro's unit",
+                 self->wheels->track_m / ratio);
+  find(out, FINDING_BAD, "calibration", mend,
+       "yaw_rate is %.2f times the turn rate by the wheels' ticks with wheels.track_m %.3g", ratio,
+       self->wheels->track_m);
+}
+
 static void turns(const agreement *a, const char *other, findings *out) {
   if (a->count < PAIRS_MIN || sqrt(a->aa / (double)a->count) < TURN_RMS_MIN || a->bb <= 0) return;
   if (a->ab / sqrt(a->aa * a->bb) < -0.5)
@@ -131,6 +146,7 @@ void motion_data_judge(const motion_data *self, uint32_t bound, findings *out) {
       find(out, FINDING_BAD, ABOUT, "look at message and bus in can-signals.yaml, and at what candump receives",
            "%s is bound, but no frame with a value of it came", wm_quantity_name(q));
   ranges(self, out);
+  track(self, out);
   turns(&self->turn_wheels, "the difference of the wheels' speeds", out);
   turns(&self->turn_ticks, "the difference of the wheels' ticks", out);
   turns(&self->turn_steering, "the steering", out);

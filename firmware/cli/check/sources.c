@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks a source's data to their end.
+// The data of each source, and of the sources beside each other.
 #include <inttypes.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "cli/check/check.h"
@@ -31,12 +32,15 @@ static uint64_t of_hundred(uint64_t part, uint64_t whole) { return whole > 0 ? p
 
 static void counted(const wm_assembled_source *s, const source_facts *facts, findings *out) {
   const wm_source_counts *c = &s->source->counts;
-  uint64_t all = facts->events + c->malformed;
-  if (c->first_problem[0])
-    find(out, of_hundred(c->malformed, all) >= 5 ? FINDING_BAD : FINDING_NOTE, s->name,
-         s->source->is_motion ? "the DBC and what is on the bus are not the same; or the file is damaged"
-                              : "the file is damaged, or its columns differ from its first line",
-         "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, c->malformed, of_hundred(c->malformed, all));
+  const uint64_t skipped = c->malformed + c->not_finite, all = facts->events + skipped;
+  if (c->first_problem[0]) {
+    const int is_angle = strstr(c->first_problem, "_rad: ") && c->not_finite > c->malformed;
+    find(out, of_hundred(skipped, all) >= 5 ? FINDING_BAD : FINDING_NOTE, s->name,
+         is_angle               ? "are the angles in degrees? The column is in radians: multiply by 0.0174533 (pi/180)"
+         : s->source->is_motion ? "the DBC and what is on the bus are not the same; or the file is damaged"
+                                : "the file is damaged, or its columns differ from its first line",
+         "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, skipped, of_hundred(skipped, all));
+  }
   if (of_hundred(c->lost, facts->events + c->lost) >= 1)
     find(out, FINDING_NOTE, s->name, "a bus or a recorder that is too slow: look at its load and at `waymark doctor`",
          "%" PRIu64 " of 100 are missing by the sender's count or stamps",
@@ -57,6 +61,9 @@ static wm_time_ns look_ns(const wm_assembly *assembly, const wm_source *source) 
   return 0;
 }
 
+// No sensor and no network is so late; rows in disorder are.
+#define IMPLAUSIBLE_LATENESS_NS (30 * WM_NS_PER_S)
+
 static void judge(const wm_assembly *assembly, const wm_assembled_source *s, const source_facts *facts, findings *out) {
   if (facts->events == 0) {
     const char *why = s->source->counts.first_problem;
@@ -65,7 +72,10 @@ static void judge(const wm_assembly *assembly, const wm_assembled_source *s, con
     return;
   }
   counted(s, facts, out);
-  if (facts->latest_ns > s->merge.lateness_max_ns) {
+  if (facts->latest_ns > IMPLAUSIBLE_LATENESS_NS) {
+    find(out, FINDING_BAD, s->name, "sort the rows by t_ns; or correct arrival_ns, which has to be of the same clock",
+         "rows come as much as %.1f s behind younger ones", (double)facts->latest_ns * 1e-9);
+  } else if (facts->latest_ns > s->merge.lateness_max_ns) {
     char mend[120], with_look[80] = "";
     if (facts->look_ns > 0)
       (void)snprintf(with_look, sizeof with_look, " with the %.0f ms that detection takes on this computer",
@@ -89,22 +99,72 @@ static void judge(const wm_assembly *assembly, const wm_assembled_source *s, con
          of_hundred(facts->unknown_landmarks, facts->sightings));
 }
 
-void check_source(const wm_assembly *assembly, const wm_assembled_source *source, uint32_t bound, source_facts *facts,
-                  findings *out) {
-  static wm_event event;
-  static motion_data motion;
-  wm_error err = {0};
-  wm_status status;
-  *facts = (source_facts){.first_ns = WM_TIME_NONE, .last_ns = WM_TIME_NONE, .latest_ns = INT64_MIN};
-  motion_data_init(&motion, &assembly->setup.wheels);
-  while ((status = source->source->ops->next(source->source, &event, &err)) == WM_OK) {
-    if (event.kind == WM_EVENT_NONE) continue;  // a picture's arrival
-    take(facts, &assembly->setup, &event);
-    motion_data_take(&motion, &event);
+// ── sources beside each other ───────────────────────────────────────────────────────────────────────────────────────
+
+// Share of the shorter span that both have in common; both of the same unit.
+static double overlap(double a0, double a1, double b0, double b1) {
+  const double both = fmin(a1, b1) - fmax(a0, b0), shorter = fmin(a1 - a0, b1 - b0);
+  return both <= 0 ? 0 : shorter > 0 ? both / shorter : 1;
+}
+
+// A source whose time span has little in common with that of the motion has stamps of another clock or unit.
+#define OVERLAP_MIN 0.5
+
+static void spans(const source_data *self, size_t i, const source_facts *motion, findings *out) {
+  static const struct {
+    double factor;
+    const char *unit;
+  } kUnits[] = {{1e3, "us"}, {1e6, "ms"}, {1e9, "s"}};
+  const source_facts *f = &self->facts[i];
+  const char *name = self->assembly->sources[i].name;
+  const double m0 = (double)motion->first_ns, m1 = (double)motion->last_ns;
+  const double t0 = (double)f->first_ns, t1 = (double)f->last_ns;
+  if (overlap(t0, t1, m0, m1) >= OVERLAP_MIN) return;
+  for (size_t k = 0; k < sizeof kUnits / sizeof kUnits[0]; k++)
+    if (overlap(t0 * kUnits[k].factor, t1 * kUnits[k].factor, m0, m1) >= OVERLAP_MIN) {
+      char mend[160];
+      (void)snprintf(mend, sizeof mend, "multiply its t_ns (and arrival_ns) by %.0f: they are in %s", kUnits[k].factor,
+                     kUnits[k].unit);
+      find(out, FINDING_BAD, name, mend, "its stamps overlap those of the motion only if they are read as %s",
+           kUnits[k].unit);
+      return;
+    }
+  find(out, FINDING_BAD, name, "all stamps must be of one clock: add the clocks' difference to t_ns and arrival_ns",
+       "its stamps and those of the motion don't overlap: it begins %.3f s after the motion and lasts %.1f s, the "
+       "motion lasts %.1f s",
+       (t0 - m0) * 1e-9, (t1 - t0) * 1e-9, (m1 - m0) * 1e-9);
+}
+
+static int is_motion(const wm_assembled_source *s) { return (s->kinds & WM_MOTION_EVENTS) != 0; }
+
+// ── interface ───────────────────────────────────────────────────────────────────────────────────────────────────────
+
+void source_data_init(source_data *self, const wm_assembly *assembly) {
+  self->assembly = assembly;
+  for (size_t i = 0; i < WM_SOURCES_MAX; i++)
+    self->facts[i] = (source_facts){.first_ns = WM_TIME_NONE, .last_ns = WM_TIME_NONE, .latest_ns = INT64_MIN};
+  motion_data_init(&self->motion, &assembly->setup.wheels);
+}
+
+void source_data_take(source_data *self, const wm_event *event) {
+  take(&self->facts[event->source], &self->assembly->setup, event);
+  motion_data_take(&self->motion, event);
+}
+
+void source_data_judge(source_data *self, uint32_t bound, findings *out) {
+  const source_facts *motion = NULL;
+  uint32_t kinds = 0;
+  for (size_t i = 0; i < self->assembly->source_count; i++) {
+    const wm_assembled_source *s = &self->assembly->sources[i];
+    source_facts *facts = &self->facts[i];
+    if (s->source->is_live) continue;
+    facts->look_ns = look_ns(self->assembly, s->source);
+    if (facts->events > 0) facts->latest_ns += facts->look_ns;
+    judge(self->assembly, s, facts, out);
+    kinds |= s->kinds;
+    if (is_motion(s) && facts->events > 1 && !motion) motion = facts;
   }
-  facts->look_ns = look_ns(assembly, source->source);
-  if (facts->events > 0) facts->latest_ns += facts->look_ns;
-  if (status != WM_END && status != WM_AGAIN) find_error(out, source->name, &err);
-  judge(assembly, source, facts, out);
-  if (source->kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES)) motion_data_judge(&motion, bound, out);
+  for (size_t i = 0; motion && i < self->assembly->source_count; i++)
+    if (self->facts[i].events > 1 && !is_motion(&self->assembly->sources[i])) spans(self, i, motion, out);
+  if (kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES)) motion_data_judge(&self->motion, bound, out);
 }

@@ -1,0 +1,214 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Typical mistakes of a first drive, one at a time, in the files of small_robot.py and of recordings of others: `check`
+has to name each with its fix, and no replay may follow a pose that its sensors contradict.
+
+    mistakes.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--json]
+
+A row a mistake: verdict of `check`, whether its findings contain the fix, and of a replay the largest error while the
+state is tracking and the longest time for which the error is above 0.5 m and above 3.5 sigma while it is."""
+import json
+import math
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+import replays
+import small_robot
+
+LONGEST_WRONG_S = 3.0
+
+
+def text(old, new):
+    def change(whole):
+        assert old in whole, f"'{old}' is not there"
+        return whole.replace(old, new)
+    return change
+
+
+def each(**columns):
+    """Change of a table: a function of the number for each named column; an empty field stays."""
+    def change(row):
+        for name, function in columns.items():
+            if row.get(name):
+                value = function(float(row[name]))
+                row[name] = str(value) if isinstance(value, (int, str)) else f"{value:.6f}"
+    return replays.each_row(change)
+
+
+def renamed(column, name):
+    return lambda whole: whole.replace(column, name, 1)
+
+
+def without(column):
+    def change(whole):
+        table = [line.split(",") for line in whole.splitlines()]
+        at = table[0].index(column)
+        return "\n".join(",".join(f for i, f in enumerate(line) if i != at) for line in table) + "\n"
+    return change
+
+
+def stamps(function):
+    return replays.each_row(lambda row: row.update({n: str(function(int(row[n]))) for n in ("t_ns", "arrival_ns") if row.get(n)}))
+
+
+def swapped(a, b):
+    def change(row):
+        row[a], row[b] = row[b], row[a]
+    return replays.each_row(change)
+
+
+def unsorted(whole):
+    head, *lines = whole.splitlines()
+    return "\n".join([head, *lines[len(lines) // 2:], *lines[:len(lines) // 2]]) + "\n"
+
+
+def sensor_rows(change):
+    return {"sightings.csv": change}
+
+
+def mounting(rpy=None, xyz=None):
+    def change(whole):
+        if rpy:
+            whole = re.sub(r"rpy_deg: \[[^\]]*\]", f"rpy_deg: {rpy}", whole)
+        return re.sub(r"xyz_m: \[[^\]]*\]", f"xyz_m: {xyz}", whole) if xyz else whole
+    return {"calibration.yaml": change}
+
+
+def wheels(key, value):
+    return {"calibration.yaml": lambda whole: re.sub(rf"{key}: [0-9.]+", f"{key}: {value}", whole)}
+
+
+# name, changes, what a finding has to contain (regular expression), verdict of check (bad; any where the filter finds the
+# value itself, and a good one is right)
+SIGHTINGS = [
+    ("bearings in degrees", sensor_rows(each(bearing_rad=math.degrees)), r"deg", "bad"),
+    ("bearing positive to the right", sensor_rows(each(bearing_rad=lambda b: -b)), r"bearing.*(right|left|sign)|mirror", "bad"),
+    ("range in mm", sensor_rows(each(range_m=lambda r: 1e3 * r)), r"range.*\bmm\b", "bad"),
+    ("range in cm", sensor_rows(each(range_m=lambda r: 1e2 * r)), r"range.*\bcm\b", "bad"),
+    ("range in feet", sensor_rows(each(range_m=lambda r: r / 0.3048)), r"range.*(feet|foot|0\.30)", "bad"),
+    ("sightings' stamps in ms", sensor_rows(stamps(lambda t: t // 10**6)), r"\bms\b", "bad"),
+    ("sightings' stamps in us", sensor_rows(stamps(lambda t: t // 10**3)), r"(\bus\b|µs|microsecond)", "bad"),
+    ("sightings' stamps since boot", sensor_rows(stamps(lambda t: t - 1_699_998_000 * 10**9)), r"overlap", "bad"),
+    ("sightings 2 s late", sensor_rows(stamps(lambda t: t + 2 * 10**9)), r"(time_offset|clock|stamps).*-?(2\.0|1\.9)", "bad"),
+    ("sightings 2 s early", sensor_rows(stamps(lambda t: t - 2 * 10**9)), r"(time_offset|clock|stamps).*-?(2\.0|1\.9)", "bad"),
+    ("sightings 0.3 s late", sensor_rows(stamps(lambda t: t + 3 * 10**8)), r"(time_offset|clock|stamps).*0\.(29|3)", "bad"),
+    ("identities off by one", sensor_rows(each(id=lambda i: int(i) + 1)), r"id.*(-1|\+1|by one|by 1)", "bad"),
+    ("identities off by 100", sensor_rows(each(id=lambda i: int(i) + 100)), r"id.*(-100|by 100)", "bad"),
+    ("identities reversed", sensor_rows(each(id=lambda i: 13 - int(i))), r"permut|1 ?-> ?12", "bad"),
+    ("two identities swapped", sensor_rows(each(id=lambda i: {3: 7, 7: 3}.get(int(i), int(i)))), r"\b3\b.*\b7\b|\b7\b.*\b3\b", "any"),
+    ("a landmark that is not on the map", {"landmarks.csv": lambda w: "".join(l + "\n" for l in w.splitlines() if l[:2] != "5,")},
+     r"\b5\b", "any"),
+    ("map's x and y swapped", {"landmarks.csv": swapped("x_m", "y_m")}, r"map.*(x and y|swap|mirror)", "bad"),
+    ("map's x mirrored", {"landmarks.csv": each(x_m=lambda x: -x)}, r"map.*(x and y|swap|mirror)", "bad"),
+    ("map in mm", {"landmarks.csv": each(x_m=lambda x: 1e3 * x, y_m=lambda y: 1e3 * y)}, r"\bmm\b", "bad"),
+    ("map in cm", {"landmarks.csv": each(x_m=lambda x: 1e2 * x, y_m=lambda y: 1e2 * y)}, r"\bcm\b", "bad"),
+    ("mounted by 180 degrees", mounting(rpy="[0, 0, 180]"), r"rpy_deg: \[0, 0, (0|360|1|2|3|4|-?[0-4])", "bad"),
+    ("mounted by 90 degrees", mounting(rpy="[0, 0, 90]"), r"rpy_deg: \[0, 0, -?[0-4]", "bad"),
+    ("mounted by -90 degrees", mounting(rpy="[0, 0, -90]"), r"rpy_deg: \[0, 0, -?[0-4]", "bad"),
+    ("mounting in cm", mounting(xyz="[10, 0, 20]"), r"xyz_m", "bad"),
+    ("sensor's name misspelt", sensor_rows(lambda w: w.replace(",front,", ",frnt,")), r"did you mean .?front", "bad"),
+    ("column bearing for bearing_rad", sensor_rows(renamed("bearing_rad", "bearing")), r"did you mean .?bearing_rad", "bad"),
+    ("column sensor is missing", sensor_rows(without("sensor")), r"sensor", "bad"),
+    ("rows not in order", sensor_rows(unsorted), r"order|sort", "bad"),
+]
+ROBOT = [
+    ("gyro in degrees", {"vehicle.dbc": text("(0.0002,0) [-6.5|6.5]", "(0.0114592,0) [-372|372]")}, r"unit: deg/s", "bad"),
+    ("gyro's sign", {"can-signals.yaml": text("signal: GYRO_Z", "signal: GYRO_Z, scale: -1")}, r"yaw_rate.*scale: -1|scale: -1.*yaw_rate|positive to the left", "bad"),
+    ("wheels swapped", {"can-signals.yaml": lambda w: w.replace("TICKS_LEFT", "T").replace("TICKS_RIGHT", "TICKS_LEFT").replace(": T}", ": TICKS_RIGHT}")},
+     r"left and right|swap", "bad"),
+    ("one wheel counts backwards", {"can-signals.yaml": text("signal: TICKS_RIGHT", "signal: TICKS_RIGHT, scale: -1")}, r"ticks_right.*scale: -1|scale: -1.*ticks_right", "bad"),
+    ("both wheels count backwards", {"can-signals.yaml": lambda w: w.replace("signal: TICKS_LEFT", "signal: TICKS_LEFT, scale: -1").replace("signal: TICKS_RIGHT", "signal: TICKS_RIGHT, scale: -1")},
+     r"scale: -1", "bad"),
+    ("DBC's byte order", {"vehicle.dbc": lambda w: w.replace("0|32@1-", "7|32@0-").replace("32|32@1-", "39|32@0-")}, r"byte order|endian|@1", "bad"),
+    ("signal's name misspelt", {"can-signals.yaml": text("TICKS_LEFT", "TICK_LEFT")}, r"did you mean .?TICKS_LEFT", "bad"),
+    ("message's number", {"vehicle.dbc": text("BO_ 256", "BO_ 266")}, r"no frame", "bad"),
+    ("track ten times", wheels("track_m", 3.0), r"track_m: 0\.(2[89]|3)", "bad"),
+    ("track twice", wheels("track_m", 0.6), r"track_m: 0\.(2[89]|3)", "bad"),
+    ("track in cm", wheels("track_m", 30), r"track_m", "bad"),
+    ("diameter for radius", wheels("radius_m", 0.1), r"radius_m: 0\.0(49|5)", "bad"),
+    ("a quarter of the ticks", wheels("ticks_per_turn", 256), r"ticks_per_turn: 10[0-4]\d|ticks_per_turn: 1024", "bad"),
+    ("radius in mm", wheels("radius_m", 50), r"radius_m", "bad"),
+    ("start turned by 90 degrees", {"recording.yaml": lambda w: re.sub(r"heading_rad: ([0-9.]+)", lambda m: f"heading_rad: {float(m[1]) + math.pi / 2}", w)},
+     r"start|initial_pose", "any"),
+    ("start's heading in degrees", {"recording.yaml": lambda w: re.sub(r"heading_rad: ([0-9.]+)", "heading_rad: 57.6", w)}, r"heading", "bad"),
+    ("CAN's stamps since boot", {"can.log": lambda w: re.sub(r"^\((\d+)", lambda m: f"({int(m[1]) - 1_699_998_000}", w, flags=re.M)}, r"overlap", "bad"),
+]
+
+
+def found(check, pattern):
+    lines = [f["text"] + " " + f["mend" if "mend" in f else "fix"] for f in check["findings"]] if check else []
+    return any(re.search(pattern, line, re.I | re.S) for line in lines)
+
+
+def run_check(options, config, recording):
+    done = subprocess.run([options.bin_dir / "waymark", "check", config, recording, "--json"], capture_output=True, text=True)
+    try:
+        return json.loads(done.stdout)
+    except json.JSONDecodeError:
+        return {"good": False, "findings": [{"text": done.stderr, "mend": ""}]}
+
+
+def longest_wrong_s(run, truth):
+    """Longest time with state tracking while the error is above 0.5 m and 3.5 sigma; stamps at the truth's."""
+    longest = begun = 0.0
+    for t_s, tracking, error_m, sigmas in replays.errors(run, truth):
+        if not (tracking and error_m > replays.WRONG_M and sigmas > replays.WRONG_SIGMA):
+            begun = t_s
+        longest = max(longest, t_s - begun)
+    return longest
+
+
+def judge(options, base, config, mistake, scratch):
+    name, changes, pattern, verdict = mistake
+    recording, run = scratch / "rec", scratch / "run"
+    replays.copy_changed(base, recording, changes)
+    check = run_check(options, config, recording)
+    row = {"mistake": name, "check": "good" if check["good"] else "bad", "named": found(check, pattern),
+           "right": (verdict == "any" or not check["good"]) and (verdict == "any" and check["good"] or found(check, pattern))}
+    try:
+        replays.command(options.bin_dir / "waymark", "replay", recording, "--config", config, "--out", run)
+        row["wrong_s"] = longest_wrong_s(run, base)
+        row["state"] = states(run)
+    except replays.Refused:
+        row["wrong_s"], row["state"] = 0.0, "refused"
+    return row
+
+
+def states(run):
+    rows = replays.rows(run / "trajectory.csv")
+    share = {}
+    for r in rows:
+        share[r["state"]] = share.get(r["state"], 0) + 1
+    return " ".join(f"{k} {100 * v / len(rows):.0f}%" for k, v in sorted(share.items(), key=lambda x: -x[1])) or "no pose"
+
+
+def main():
+    options = replays.parser(__doc__, "rows whose title contains one of the words").parse_args()
+    rows = []
+    with tempfile.TemporaryDirectory() as scratch:
+        scratch = pathlib.Path(scratch)
+        base = scratch / "small-robot"
+        small_robot.write(base)
+        config = options.source_dir / "config" / "robot.yaml"
+        for mistake in [("no mistake", {}, "", "any"), *SIGHTINGS, *ROBOT]:
+            if not replays.is_chosen(options, mistake[0]):
+                continue
+            with tempfile.TemporaryDirectory() as folder:
+                row = judge(options, base, config, mistake, pathlib.Path(folder))
+            rows.append(row)
+            if options.json:
+                print(json.dumps(row), flush=True)
+            else:
+                print(f"{row['mistake']:36} check {row['check']:4} {'named' if row['named'] else '-':5} "
+                      f"wrong {row['wrong_s']:6.1f} s  {row['state']}", flush=True)
+    missed = [r["mistake"] for r in rows if not r["right"]]
+    wrong = [r["mistake"] for r in rows if r["wrong_s"] > LONGEST_WRONG_S]
+    print(f"{len(rows)} rows, {len(missed)} not named, {len(wrong)} confidently wrong", file=sys.stderr)
+    return 1 if missed or wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
