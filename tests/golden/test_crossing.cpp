@@ -33,7 +33,7 @@ Scenario scenario;
 Recording made;
 wm_run_report report;
 
-constexpr double kGoldenX = 29.100575593, kGoldenY = 31.081884550, kGoldenHeading = 1.571769767;
+constexpr double kGoldenX = 29.100666971, kGoldenY = 31.081914698, kGoldenHeading = 1.571746215;
 constexpr uint64_t kGoldenLeft = 590, kGoldenRight = 332;
 
 std::string root() { return std::getenv("WM_SOURCE_DIR"); }
