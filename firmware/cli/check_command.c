@@ -182,12 +182,15 @@ static void try_suspects(checked *self, const wm_assembly *assembly, double reco
   progress_end(&progress);
   fact("trials       %zu of the usual mistakes undone, one at a time: %s\n", plan.count - 1,
        count > 0 ? "found what explains the observations" : "none of them explains the observations");
+  const size_t consequences = self->found->count;
   for (size_t i = 0; i < count; i++) {
     char what[160], fix[240];
     suspect_text(&found[i], assembly, what, sizeof what, fix, sizeof fix);
-    find(self->found, FINDING_BAD, "cause", fix, "%s: with that undone %.0f %% of the updates fit, now %.0f %%", what,
-         100 * after.explained, 100 * before.explained);
+    find(self->found, FINDING_BAD, "cause", fix,
+         "%s: with that undone %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely", what,
+         100 * after.explained, 100 * before.explained, exp(after.score - before.score));
   }
+  findings_to_front(self->found, consequences);
 }
 
 static void ended(void *context, const wm_assembly *assembly, const wm_run_report *report) {

@@ -3,10 +3,11 @@
 """Typical mistakes of a first drive, one at a time, in the files of small_robot.py and of recordings of others: `check`
 has to name each with its fix, and no replay may follow a pose that its sensors contradict.
 
-    mistakes.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--json]
+    mistakes.py BIN_DIR SOURCE_DIR DATA_DIR [--only WORD[,WORD]] [--named] [--json]
 
 A row a mistake: verdict of `check`, whether its findings contain the fix, and of a replay the largest error while the
-state is tracking and the longest time for which the error is above 0.5 m and above 3.5 sigma while it is."""
+state is tracking and the longest time for which the error is above 0.5 m and above 3.5 sigma while it is. --named leaves
+the replays out."""
 import json
 import math
 import pathlib
@@ -168,6 +169,8 @@ def judge(options, base, config, mistake, scratch):
     check = run_check(options, config, recording)
     row = {"mistake": name, "check": "good" if check["good"] else "bad", "named": found(check, pattern),
            "right": (verdict == "any" or not check["good"]) and (verdict == "any" and check["good"] or found(check, pattern))}
+    if options.named:
+        return row | {"wrong_s": 0.0, "state": "not replayed"}
     try:
         replays.command(options.bin_dir / "waymark", "replay", recording, "--config", config, "--out", run)
         row["wrong_s"] = longest_wrong_s(run, base)
@@ -186,7 +189,9 @@ def states(run):
 
 
 def main():
-    options = replays.parser(__doc__, "rows whose title contains one of the words").parse_args()
+    parser = replays.parser(__doc__, "rows whose title contains one of the words")
+    parser.add_argument("--named", action="store_true", help="of check alone, without replays")
+    options = parser.parse_args()
     rows = []
     with tempfile.TemporaryDirectory() as scratch:
         scratch = pathlib.Path(scratch)

@@ -14,7 +14,7 @@
 #define BUDGET_S 40.0
 #define PART_MIN_S 30.0
 // A change explains the observations if each update gains so much of log likelihood, nats, and most updates are fused.
-#define GAIN_MIN 0.3
+#define GAIN_MIN 0.1
 #define EXPLAINED_MIN 0.85
 #define FINALISTS 8
 

@@ -35,6 +35,14 @@ size_t findings_of(const findings *self, finding_level level) {
   return count;
 }
 
+void findings_to_front(findings *self, size_t from) {
+  for (size_t i = from, to = 0; i < self->count; i++, to++) {
+    const finding moved = self->at[i];
+    memmove(&self->at[to + 1], &self->at[to], (i - to) * sizeof self->at[0]);
+    self->at[to] = moved;
+  }
+}
+
 static const char *const kLevels[] = {"good", "note", "bad"};
 
 void findings_print(const findings *self, FILE *to) {

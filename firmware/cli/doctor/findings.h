@@ -30,6 +30,8 @@ void find(findings *out, finding_level level, const char *about, const char *men
 void find_error(findings *out, const char *about, const wm_error *err);
 // Number of findings of this level.
 size_t findings_of(const findings *self, finding_level level);
+// Moves the findings from place `from` on to the front: causes stand before their consequences.
+void findings_to_front(findings *self, size_t from);
 
 // A line each: "LEVEL ABOUT TEXT; mend: MEND".
 void findings_print(const findings *self, FILE *to);
