@@ -110,8 +110,8 @@ int find(const char *id, std::shared_ptr<lc::Camera> *out) {
     if (failed) return failed;
     manager = made.release();
     // After its first start: at the exit this comes before the end of what libcamera keeps for itself.
-    static const int is_registered = std::atexit(stop_manager);
-    (void)is_registered;
+    static const int manager_ends_at_exit = std::atexit(stop_manager);
+    (void)manager_ends_at_exit;
   }
   *out = manager->get(id);
   if (*out) manager_users++;

@@ -38,47 +38,16 @@ static presence presence_of(const wm_can_decoder *self, const bound_signal *s, c
   return signal_bytes(&s->bits) > length ? TOO_SHORT : PRESENT;
 }
 
-// So much faster than ever before a wheel may have turned while its counter was silent for longer than the other limit,
-// from which on a speed is overdue (estimator/motion/history.hpp).
-#define FASTER_THAN_EVER 2.0
-#define SILENT_NS (250 * WM_NS_PER_MS)
-// Counts that come in a burst give no rate: the shortest usual period of wheels' messages.
-#define RATE_OVER_NS_MIN (5 * WM_NS_PER_MS)
-// Ticks. Farther than any wheel turns: the motion's plausibility checks reject the step as a restart of the counter.
-#define BEGAN_ANEW ((int64_t)1 << 44)
-
-// Whether the counter may have moved by half of its range or more during a silence: the direction is then unknown.
-static int may_have_wrapped(const bound_signal *s, wm_time_ns t_ns) {
-  const wm_time_ns silent_ns = t_ns - s->last_ns;
-  const double half_way = ldexp(0.5, (int)s->bits.length);
-  return silent_ns > SILENT_NS && FASTER_THAN_EVER * s->most_per_s * (double)silent_ns * 1e-9 >= half_way;
-}
-
-// Two in a row: a damaged frame is no speed.
-static void note_rate(bound_signal *s, int64_t step, wm_time_ns t_ns) {
-  const wm_time_ns over_ns = t_ns - s->last_ns;
-  if (over_ns < RATE_OVER_NS_MIN || over_ns > SILENT_NS) return;
-  const double per_s = fabs((double)step) / ((double)over_ns * 1e-9);
-  const double both_per_s = fmin(per_s, s->last_per_s);
-  s->last_per_s = per_s;
-  if (both_per_s > s->most_per_s) s->most_per_s = both_per_s;
-}
-
 // A tick counter continues from its last value by the shorter way round, so that it may run backwards.
-static double unwrap(bound_signal *s, uint64_t raw, wm_time_ns t_ns) {
-  if (s->has_last && may_have_wrapped(s, t_ns)) {
-    s->unwrapped += BEGAN_ANEW;
-  } else if (s->has_last) {
-    const uint64_t step = (raw - s->last) & (UINT64_MAX >> (64u - s->bits.length));
-    const int64_t moved = sign_extend(step, s->bits.length);
-    s->unwrapped = (int64_t)((uint64_t)s->unwrapped + (uint64_t)moved);
-    note_rate(s, moved, t_ns);
+static double unwrap(bound_signal *s, uint64_t raw) {
+  if (s->has_last) {
+    uint64_t step = (raw - s->last) & (UINT64_MAX >> (64u - s->bits.length));
+    s->unwrapped = (int64_t)((uint64_t)s->unwrapped + (uint64_t)sign_extend(step, s->bits.length));
   } else {
     s->unwrapped = s->bits.kind == SIGNAL_SIGNED ? sign_extend(raw, s->bits.length) : (int64_t)raw;
     s->has_last = 1;
   }
   s->last = raw;
-  s->last_ns = t_ns;
   return (double)s->unwrapped;
 }
 
@@ -109,14 +78,13 @@ static int gear_value(const bound_quantity *q, double number, double *out) {
 }
 
 // Sum of the signals in SI. 0 where the value is marked as not available.
-static int quantity_value(const bound_quantity *q, bound_signal *signals, const payload *data, wm_time_ns t_ns,
-                          double *out) {
+static int quantity_value(const bound_quantity *q, bound_signal *signals, const payload *data, double *out) {
   int is_ticks = q->quantity == WM_Q_WHEEL_TICKS_LEFT || q->quantity == WM_Q_WHEEL_TICKS_RIGHT;
   double sum = 0.0;
   for (uint32_t i = 0; i < q->signal_count; i++) {
     bound_signal *s = &signals[i];
     uint64_t raw = signal_raw(&s->bits, data);
-    double number = is_ticks ? unwrap(s, raw, t_ns) : signal_number(&s->bits, raw);
+    double number = is_ticks ? unwrap(s, raw) : signal_number(&s->bits, raw);
     if (says_no_value(s, raw)) return 0;
     if (q->quantity != WM_Q_GEAR) {
       sum += (number * s->factor + s->offset) * s->si;
@@ -167,7 +135,7 @@ static wm_status decode_message(wm_can_decoder *self, bound_message *m, const wm
   for (uint32_t i = 0; i < m->quantity_count; i++) {
     if (there[i] == ABSENT || out->count == WM_QUANTITIES_MAX) continue;
     double value = 0.0;
-    if (!quantity_value(&quantities[i], &self->signals[quantities[i].first_signal], data, frame->t_ns, &value)) {
+    if (!quantity_value(&quantities[i], &self->signals[quantities[i].first_signal], data, &value)) {
       refused++;
       continue;
     }

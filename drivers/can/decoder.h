@@ -21,11 +21,9 @@ typedef struct bound_signal {
   uint32_t first_selector, selector_count;
   uint32_t no_value_count;  // raw values for "not available"
   uint64_t no_value[NO_VALUE_MAX];
-  int has_last;  // ticks only, as what follows
+  int has_last;  // ticks only
   uint64_t last;
   int64_t unwrapped;
-  wm_time_ns last_ns;
-  double last_per_s, most_per_s;  // rate of the last step; the fastest of two in a row
 } bound_signal;
 
 typedef struct bound_quantity {

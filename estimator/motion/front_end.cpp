@@ -363,10 +363,11 @@ void motion_front_end::note_samples(motion_input *input) {
   const bool fresh[2] = {known && speed && !ticks_drive(),
                          known && (twist || stamp_ns_[WM_Q_YAW_RATE] == input->t_ns) && model_ != WM_MOTION_ACKERMANN};
   const bool follows = !history_.empty() && history_.newest().model == model_ && !history_.is_overdue(input->t_ns);
+  if (!follows) sampled_ns_[0] = sampled_ns_[1] = WM_TIME_NONE;  // both: the first one after a gap may be the other one
   for (int k = 0; k < 2; k++) {
     if (!fresh[k]) continue;
     const double changed = k ? input->b - history_.newest().b : input->a - history_.newest().a;
-    if (follows && sampled_ns_[k] != WM_TIME_NONE)
+    if (sampled_ns_[k] != WM_TIME_NONE)
       input->sampling[k] = static_cast<float>(square(changed * wm_seconds_between(sampled_ns_[k], input->t_ns)) / 12.0);
     sampled_ns_[k] = input->t_ns;
   }

@@ -151,6 +151,9 @@ void motion_front_end::count_noise(double *speed_mps, double *turn_rate_radps) c
   if (model_ == WM_MOTION_TICKS) *turn_rate_radps = wheel_mps * std::sqrt(2.0) / wheels_.track_m;
 }
 
+// Periods. Stamps of sightings lie at most so far ahead of the counts while these come; not swept.
+constexpr double kCarriedPeriods = 4.0;
+
 // Of the newest count, carried on by the speed, which is its difference to the one before: e1 + u (e1 - e0) after u
 // periods. The error does not grow with the way: the next count replaces it. Before the newest count: that of a count.
 void motion_front_end::count_variances(wm_time_ns t_ns, double *way_m2, double *turn_rad2) const {
@@ -159,7 +162,9 @@ void motion_front_end::count_variances(wm_time_ns t_ns, double *way_m2, double *
   *way_m2 = *turn_rad2 = 0.0;
   if (!(speed_mps > 0.0) || wheel_[0].t_ns == WM_TIME_NONE) return;
   const double period_s = wheel_[0].period_s, since = wm_seconds_between(wheel_[0].t_ns, t_ns) / period_s;
-  const double u = since < 0.0 ? 0.0 : since;
+  // Counts that are missing for longer are a silence, whose noise is the motion's own
+  // (planar_motion::add_overdue_noise).
+  const double u = since < 0.0 ? 0.0 : since > kCarriedPeriods ? kCarriedPeriods : since;
   const double share = 0.5 * (square(1.0 + u) + square(u));
   *way_m2 = share * square(speed_mps * period_s);
   *turn_rad2 = share * square(turn_rate_radps * period_s);

@@ -87,8 +87,8 @@ mkdir "$work/lost"
 cp "$work/rec/motion.csv" "$work/lost"
 printf 'format: waymark-recording/1\nname: lost\nstreams: [motion.csv, video/front.avi]\n' >"$work/lost/recording.yaml"
 expect 0 "no pose was ever found" replay "$work/lost" --config "$work/good.yaml" --out "$work/nopose"
-expect 0 "'video/front.avi' is not in the folder; nothing here reads it" check "$work/good.yaml" "$work/lost"
-expect 0 "recording    lost" check "$work/good.yaml" "$work/lost"
+expect 2 "'video/front.avi' is not in the folder; nothing here reads it" check "$work/good.yaml" "$work/lost"
+expect 2 "recording    lost" check "$work/good.yaml" "$work/lost"
 "$waymark" check "$work/good.yaml" "$work/lost" 2>&1 | grep -q "nan" && { echo "check prints nan"; failures=$((failures + 1)); }
 for table in trajectory published; do
   grep -q "^t_ns,.*state" "$work/nopose/$table.csv" || { echo "$table.csv has no head"; failures=$((failures + 1)); }

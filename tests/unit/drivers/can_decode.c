@@ -207,30 +207,6 @@ static void ticks_grow_without_end(void) {
   close_it(&f);
 }
 
-// 16 bits, 20 ticks in 20 ms: half way round in 32.8 s, at twice the speed in 16.4 s.
-static double ticks_after_silence(double silence_s, unsigned step) {
-  char text[32];
-  double last = 0;
-  open_one(&f, "BO_ 257 W: 2 X\n SG_ T : 0|16@1+ (1,0) [0|0] \"\" X\n", binding(WM_Q_WHEEL_TICKS_LEFT, "W", "T"));
-  for (unsigned i = 0; i <= 100; i++) {
-    (void)snprintf(text, sizeof text, "c 101#%02X%02X", i * 20 & 0xFF, i * 20 >> 8);
-    TEST_ASSERT_EQUAL(WM_OK, feed_at(&f, 0.02 * i, text));
-    last = f.got.value[0];
-  }
-  const unsigned raw = (2000 + step) & 0xFFFF;
-  (void)snprintf(text, sizeof text, "c 101#%02X%02X", raw & 0xFF, raw >> 8);
-  TEST_ASSERT_EQUAL(WM_OK, feed_at(&f, 2.0 + silence_s, text));
-  close_it(&f);
-  return f.got.value[0] - last;
-}
-
-// How often it went round in a long silence nobody knows: the count begins anew, as after the controller's restart.
-static void a_count_that_may_have_wrapped_in_a_silence_begins_anew(void) {
-  TEST_ASSERT_EQUAL_DOUBLE(16000, ticks_after_silence(16, 16000));
-  TEST_ASSERT_TRUE(ticks_after_silence(17, 17000) > 1e12);
-  TEST_ASSERT_TRUE(ticks_after_silence(66, 66000) > 1e12);  // 464 by the shorter way round
-}
-
 // ── counters ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static void open_counted(const char *counter) {
@@ -399,7 +375,6 @@ int main(void) {
   RUN_TEST(only_when_the_multiplexer_fits);
   RUN_TEST(multiplexers_above_each_other);
   RUN_TEST(ticks_wrap);
-  RUN_TEST(a_count_that_may_have_wrapped_in_a_silence_begins_anew);
   RUN_TEST(ticks_grow_without_end);
   RUN_TEST(lost_by_the_counter);
   RUN_TEST(late_by_the_counter);
