@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The newest picture of a detector with what it found, for a person who looks on. The detector's thread copies one
+// The newest picture of a detector with what it found, for viewers. The detector's thread copies one
 // where it was asked for, and never waits; the reader's thread asks, and takes it.
 #ifndef WAYMARK_SOURCES_ONLOOKER_H
 #define WAYMARK_SOURCES_ONLOOKER_H
@@ -17,14 +17,14 @@ struct onlooker {
   atomic_int wanted;     // a picture is asked for
   int is_filled;
   size_t capacity, bytes;
-  uint8_t *message;  // head, events, pixels; NULL while nobody looks
+  uint8_t *message;  // head, events, pixels; NULL without a viewer
   uint64_t copied;   // pictures, since the start
 };
 
 void onlooker_open(onlooker *self);
 void onlooker_close(onlooker *self);
 
-// The detector's thread, after each picture. Nothing is done where nobody asked.
+// The detector's thread, after each picture. Does nothing without a request.
 void onlooker_show(onlooker *self, const wm_frame *frame, const wm_event *events, size_t count);
 
 // The reader's thread. Asks for the next picture of width x height; allocates with the first. 0: no memory.
@@ -33,7 +33,7 @@ int onlooker_ask(onlooker *self, uint32_t width_px, uint32_t height_px);
 // for onlooker_bytes.
 size_t onlooker_take(onlooker *self, uint8_t *out, size_t capacity);
 size_t onlooker_bytes(uint32_t width_px, uint32_t height_px);
-// Nobody looks any more: gives the memory back.
+// The last viewer has gone: frees the memory.
 void onlooker_rest(onlooker *self);
 
 #endif

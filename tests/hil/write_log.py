@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The log that qemu's blklogwrites keeps of a disk's writes, in their order, and the disks that a cut of the power may leave.
 
-A disk with a cache may lose all that it has not been told to keep, in any order: each write before the last completed flush is
-there, of later ones any part. Source of the format: the kernel's Documentation/admin-guide/device-mapper/log-writes.rst."""
+A disk with a cache may lose unflushed writes in any order. Each write before the last completed flush is there; of later ones, any
+part. Source of the format: the kernel's Documentation/admin-guide/device-mapper/log-writes.rst."""
 import pathlib
 import re
 import struct

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A run as its messages tell it, kept for browsers: all state that the page shows, as JSON. Not a number and infinity
+// State of a run for browsers, from its LCM messages: all that the page shows, as JSON. Not a number and infinity
 // become null; names from messages are made valid UTF-8, and the page shows them as text alone.
 #pragma once
 

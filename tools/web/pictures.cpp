@@ -14,7 +14,7 @@
 namespace wm::tools {
 namespace {
 
-constexpr int kWait_ms = 200;  // how soon it notices that nobody looks any more
+constexpr int kWait_ms = 200;  // time until the end of the last viewer is noticed
 constexpr std::chrono::seconds kTryAgain{1};
 constexpr std::chrono::milliseconds kPoseComes{1000};  // how long a picture waits for the pose of its stamp
 

@@ -14,7 +14,7 @@ typedef struct finding {
   finding_level level;
   char about[32];  // "kernel", "can can0", "calibration"
   char text[WM_ERROR_TEXT_MAX];
-  char mend[240];  // "" where nothing is to do
+  char mend[240];  // "": no action needed
 } finding;
 
 #define FINDINGS_MAX 64  // further ones are dropped

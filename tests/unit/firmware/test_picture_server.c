@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pictures for who looks on: nothing is copied while nobody asks, readers get what a detector found, and one that does
-// not read holds up neither the detector nor another reader.
+// Pictures for viewers. Without a request nothing is copied. Readers get a detector's result. A reader that stops
+// reading blocks neither the detector nor another reader.
 #include <errno.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -229,7 +229,7 @@ static void the_socket_is_for_owner_and_group(void) {
   (void)close(dead);
   TEST_ASSERT_EQUAL(WM_OK, picture_server_start(&config, a_vision(), &server, &err));
   (void)close(new_reader());
-  // A file of another kind is nobody's to remove.
+  // A file of another kind is not removed.
   picture_server_close(server);
   FILE *file = fopen(config.picture_socket, "w");
   TEST_ASSERT_NOT_NULL(file);

@@ -196,7 +196,7 @@ static void two_buses_are_recorded_and_read_again(void) {
     TEST_ASSERT_DOUBLE_WITHIN(1e-9, expected[i], event.as.quantities.value[0]);
     TEST_ASSERT_EQUAL(WM_END, sources[i]->ops->next(sources[i], &event, &err));
   }
-  TEST_ASSERT_EQUAL_UINT64(1, sources[0]->counts.ignored);  // nobody's
+  TEST_ASSERT_EQUAL_UINT64(1, sources[0]->counts.ignored);  // of no source
   TEST_ASSERT_EQUAL_UINT64(0, sources[1]->counts.ignored);
   wm_recording_close(recording);
 }

@@ -320,7 +320,7 @@ std::string answer_of(uint16_t port, const std::string &request) {
   return text;
 }
 
-// Who drips bytes is answered by nobody, and sent away when the patience is over; others are answered meanwhile.
+// A client that sends single bytes is disconnected after the timeout; others are answered meanwhile.
 void a_slow_client_is_sent_away() {
   WebServer server(
       {"127.0.0.1", 0},
