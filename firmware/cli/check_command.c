@@ -25,9 +25,9 @@ static const char kHelp[] =
     "time lost, size of the innovations, calibration, time spans of the sources, units, landmarks. Where the "
     "observations\n"
     "contradict the poses it tries the usual mistakes (signs, units, axes, mountings, clocks, identities, wheels) and\n"
-    "names the one that explains them. Prints the facts, then a line for each finding with its mend. Exit code 2 "
+    "names the one that explains them. Prints the facts, then a line for each finding with its fix. Exit code 2 "
     "where\n"
-    "something must be mended first.\n"
+    "something has to be corrected first.\n"
     "\n"
     "  --landmarks FILE    instead of the recording's map\n"
     "  --calibration FILE  instead of the recording's\n"
@@ -98,15 +98,15 @@ static void print_source(const wm_assembled_source *s, const source_facts *facts
 // A name that is nearly a known one is a mistake; other notes may be intended.
 static void take_note(void *context, const char *text) {
   const int is_mistake = strstr(text, "did you mean") != NULL;
-  find(context, is_mistake ? FINDING_BAD : FINDING_NOTE, "files",
-       is_mistake ? "write the name that is meant" : "mend it there, or leave it if it is meant so", "%s", text);
+  wm_find(context, is_mistake ? WM_FOUND_MISSPELT_NAME : WM_FOUND_FILE_NOTE,
+          is_mistake ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "files", NULL, "%s", text);
 }
 
 // ── a recording, driven ─────────────────────────────────────────────────────────────────────────────────────────────
 
 typedef struct checked {
   wm_recording *recording;
-  findings *found;
+  wm_findings *found;
   const char *dir;
   int is_quick;  // without trials
   wm_time_ns begin_ns;
@@ -123,7 +123,7 @@ static void print_setup(const wm_assembly *assembly, wm_recording *recording) {
   print_start(&assembly->setup.start);
 }
 
-static void check_setup(const wm_assembly *assembly, wm_recording *recording, wm_status status, findings *found) {
+static void check_setup(const wm_assembly *assembly, wm_recording *recording, wm_status status, wm_findings *found) {
   print_setup(assembly, recording);
   check_calibration(assembly, found);
   check_landmarks(&assembly->setup, found);
@@ -186,11 +186,12 @@ static void try_suspects(checked *self, const wm_assembly *assembly, double reco
   for (size_t i = 0; i < count; i++) {
     char what[160], fix[240];
     suspect_text(&found[i], assembly, what, sizeof what, fix, sizeof fix);
-    find(self->found, FINDING_BAD, "cause", fix,
-         "%s: with that undone %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely", what,
-         100 * after.explained, 100 * before.explained, exp(after.score - before.score));
+    wm_find(self->found, WM_FOUND_LIKELY_CAUSE, WM_SEVERITY_BAD, "cause", fix,
+            "%s: with that undone %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely", what,
+            100 * after.explained, 100 * before.explained, exp(after.score - before.score))
+        ->size = after.explained;
   }
-  findings_to_front(self->found, consequences);
+  wm_findings_to_front(self->found, consequences);
 }
 
 static void ended(void *context, const wm_assembly *assembly, const wm_run_report *report) {
@@ -203,12 +204,14 @@ static void ended(void *context, const wm_assembly *assembly, const wm_run_repor
        100 * evidence_share(&self->evidence, WM_STATE_DEAD_RECKONING, due),
        100 * evidence_share(&self->evidence, WM_STATE_LOST, due),
        100 * evidence_share(&self->evidence, WM_STATE_SEARCHING, due));
-  const size_t bad = findings_of(self->found, FINDING_BAD);
+  const size_t bad = wm_findings_of(self->found, WM_SEVERITY_BAD);
   evidence_judge(&self->evidence, assembly, &report->health, due, self->found);
-  if (findings_of(self->found, FINDING_BAD) > bad && !self->is_quick) try_suspects(self, assembly, report->recorded_s);
+  wm_health_map_findings(&report->health, self->found);
+  if (wm_findings_of(self->found, WM_SEVERITY_BAD) > bad && !self->is_quick)
+    try_suspects(self, assembly, report->recorded_s);
 }
 
-static void check_recording(const wm_config *config, const char *dir, int is_quick, findings *found) {
+static void check_recording(const wm_config *config, const char *dir, int is_quick, wm_findings *found) {
   static checked self;
   static wm_run_report report;
   wm_error err = {0};
@@ -218,7 +221,7 @@ static void check_recording(const wm_config *config, const char *dir, int is_qui
   self.begin_ns = wm_monotonic_ns();
   wm_status status = wm_recording_open(dir, &config->overrides, take_note, found, &self.recording, &err);
   if (status != WM_OK) {
-    find_error(found, "recording", &err);
+    wm_find_error(found, "recording", &err);
     return;
   }
   progress_line progress;
@@ -229,7 +232,7 @@ static void check_recording(const wm_config *config, const char *dir, int is_qui
       .watch = &watch, .seed = 1, .progress = progress_show, .progress_context = &progress};
   status = wm_replay_recording(config, self.recording, &options, &report, &err);
   progress_end(&progress);
-  if (status != WM_OK) find_error(found, "setup", &err);
+  if (status != WM_OK) wm_find_error(found, "setup", &err);
   wm_recording_close(self.recording);
 }
 
@@ -246,14 +249,14 @@ static wm_status take_memory(wm_assembly *assembly, wm_arena *arena, wm_error *e
   return status == WM_OK ? wm_vision_start(assembly->vision, err) : status;
 }
 
-static void check_devices(const wm_config *config, findings *found) {
+static void check_devices(const wm_config *config, wm_findings *found) {
   static wm_assembly assembly;
   static const source_facts kNone;
   wm_error err = {0};
   wm_recording *recording;
   wm_status status = wm_robot_open(config, take_note, found, &recording, &err);
   if (status != WM_OK) {
-    find_error(found, "devices", &err);
+    wm_find_error(found, "devices", &err);
     return;
   }
   wm_arena arena = {0};
@@ -264,20 +267,20 @@ static void check_devices(const wm_config *config, findings *found) {
   if (status == WM_OK)
     check_computer(config, arena.bytes, found);
   else
-    find_error(found, "setup", &err);
+    wm_find_error(found, "setup", &err);
   wm_assembly_close(&assembly);
   wm_arena_close(&arena);
   wm_recording_close(recording);
 }
 
-static int tell(const findings *found) {
-  int is_good = findings_of(found, FINDING_BAD) == 0;
+static int tell(const wm_findings *found) {
+  int is_good = wm_findings_of(found, WM_SEVERITY_BAD) == 0;
   if (tells_facts) {
-    findings_print(found, stdout);
+    wm_findings_print(found, stdout);
     if (is_good) (void)puts("good");
   } else {
     (void)printf("{\n  \"good\": %s,\n  \"findings\": ", is_good ? "true" : "false");
-    findings_json(found, stdout);
+    wm_findings_json(found, stdout);
     (void)fputs("\n}\n", stdout);
   }
   return is_good ? EXIT_DONE : EXIT_USAGE;  // every finding is to be resolved before driving
@@ -293,7 +296,7 @@ int command_check(int argc, char *const *argv) {
                             {"--quick", OPTION_FLAG, &is_quick},
                             {"--help", OPTION_FLAG, &help},
                             {"-h", OPTION_FLAG, &help}};
-  static findings found;
+  static wm_findings found;
   wm_error err = {0};
   size_t count;
   if (options_parse(argc, argv, options, sizeof options / sizeof options[0], words, 2, &count, &err) != WM_OK)
@@ -309,7 +312,7 @@ int command_check(int argc, char *const *argv) {
   tells_facts = !as_json;
   wm_config config;
   if (wm_config_load(words[0], &config, &err) != WM_OK) {
-    find_error(&found, "config", &err);
+    wm_find_error(&found, "config", &err);
     return tell(&found);
   }
   fact("config       %s: estimator %s (%s)\n", words[0], config.estimator->name, config.estimator->about);

@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 #include "cli/commands.h"
-#include "output/run_findings.h"
+#include "findings/findings.h"
 #include "rt/clock.h"
 
 int exit_code(wm_status status) {
@@ -79,11 +79,7 @@ void print_report(const wm_run_report *r, const char *name, const char *out_dir,
     (void)printf("  %-32s %10.3g\n", "lost_probability", r->health.lost_probability);
   (void)printf("  %s at the end; written to %s\n", wm_state_name(r->health.state), out_dir);
   (void)fflush(stdout);
-  if (r->poses == 0)
-    print_note(NULL,
-               "no pose was ever found: give x_m, y_m and heading_rad as vehicle.initial_pose in recording.yaml or as "
-               "initial_pose in the configuration");
-  (void)wm_findings(&r->health, print_note, NULL);
+  wm_findings_print(&r->findings, stderr);
 }
 
 // ── progress ────────────────────────────────────────────────────────────────────────────────────────────────────────

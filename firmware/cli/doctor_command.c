@@ -21,9 +21,9 @@ static const char kHelp[] =
     "example:\n"
     "  waymark doctor /etc/waymark/robot.yaml\n";
 
-static void print_json(const findings *found, const wm_histogram *wake_ns) {
+static void print_json(const wm_findings *found, const wm_histogram *wake_ns) {
   (void)fputs("{\n  \"findings\": ", stdout);
-  findings_json(found, stdout);
+  wm_findings_json(found, stdout);
   (void)printf(",\n  \"wake_ms\": {\"p50\": %.6f, \"p99\": %.6f, \"p999\": %.6f, \"max\": %.6f, \"count\": %llu}\n}\n",
                (double)wm_histogram_quantile(wake_ns, 0.5) * 1e-6, (double)wm_histogram_quantile(wake_ns, 0.99) * 1e-6,
                (double)wm_histogram_quantile(wake_ns, 0.999) * 1e-6, (double)wake_ns->max_ns * 1e-6,
@@ -31,7 +31,7 @@ static void print_json(const findings *found, const wm_histogram *wake_ns) {
 }
 
 static int look(const wm_config *config, double seconds, int as_json) {
-  static findings found;
+  static wm_findings found;
   static wm_histogram wake_ns;
   int is_realtime, priority = config ? config->runtime.realtime_priority : 80;
   doctor_kernel("", &found);
@@ -49,9 +49,9 @@ static int look(const wm_config *config, double seconds, int as_json) {
   if (as_json) {
     print_json(&found, &wake_ns);
   } else {
-    findings_print(&found, stdout);
+    wm_findings_print(&found, stdout);
   }
-  return findings_of(&found, FINDING_BAD) > 0 ? EXIT_WORK_FAILED : EXIT_DONE;
+  return wm_findings_of(&found, WM_SEVERITY_BAD) > 0 ? EXIT_WORK_FAILED : EXIT_DONE;
 }
 
 int command_doctor(int argc, char *const *argv) {

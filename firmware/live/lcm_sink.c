@@ -36,7 +36,7 @@ static void try_open(lcm_sink *self) {
 }
 
 void lcm_sink_open(lcm_sink *self, int is_on, const char *url, const char *prefix, const wm_assembly *assembly,
-                   wm_finding_fn say, void *say_context, lcm_t *lent) {
+                   wm_line_fn say, void *say_context, lcm_t *lent) {
   memset(self, 0, sizeof *self);
   (void)snprintf(self->url, sizeof self->url, "%s", lcm_connect_url(url));
   (void)snprintf(self->prefix, sizeof self->prefix, "%s", prefix);

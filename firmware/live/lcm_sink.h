@@ -6,8 +6,8 @@
 
 #include <lcm/lcm.h>
 
+#include "findings/findings.h"
 #include "fusion/assembly.h"
-#include "output/run_findings.h"
 #include "waymark/health.h"
 #include "waymark/lcm_messages.h"
 #include "waymark/lcm_views.h"
@@ -18,7 +18,7 @@ typedef struct lcm_sink {
   lcm_t *lent;  // the caller's connection (a test's memq), never destroyed here
   char url[128], prefix[48];
   const wm_assembly *assembly;
-  wm_finding_fn say;
+  wm_line_fn say;
   void *say_context;
   int said_trouble;
   wm_time_ns next_try_ns;
@@ -31,7 +31,7 @@ typedef struct lcm_sink {
 
 // `url` "" is LCM_DEFAULT_URL or LCM's own default. `lent` may be NULL.
 void lcm_sink_open(lcm_sink *self, int is_on, const char *url, const char *prefix, const wm_assembly *assembly,
-                   wm_finding_fn say, void *say_context, lcm_t *lent);
+                   wm_line_fn say, void *say_context, lcm_t *lent);
 void lcm_sink_pose(lcm_sink *self, const wm_published *published, wm_time_ns sent_ns);
 void lcm_sink_innovation(lcm_sink *self, const wm_innovation *innovation);
 void lcm_sink_health(lcm_sink *self, const wm_health *health);

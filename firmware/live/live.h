@@ -84,6 +84,8 @@ typedef struct live_publish {
   // As last reported, so that only changes are reported.
   uint8_t said_stale[WM_SOURCES_MAX];
   uint32_t said_motion_health;
+  wm_findings found;  // of the newest health
+  wm_said said;
   atomic_int done;
 } live_publish;
 
@@ -158,7 +160,7 @@ void *disk_thread(void *live_pointer);
 
 // A line for standard error or the service's log. May block: not on the estimator's or the publish thread.
 void live_say(live *self, const char *format, ...) __attribute__((format(printf, 2, 3)));
-// The same from the publish thread; the disk thread prints it. `line` as wm_finding_fn, `context` is the run.
+// The same from the publish thread; the disk thread prints it. `line` as wm_line_fn, `context` is the run.
 void live_say_later(void *context, const char *line);
 
 #endif

@@ -68,7 +68,7 @@ static void try_open(other_runs *self) {
   self->fd = -1;
 }
 
-void other_runs_open(other_runs *self, int is_on, const char *url, const char *prefix, wm_finding_fn say,
+void other_runs_open(other_runs *self, int is_on, const char *url, const char *prefix, wm_line_fn say,
                      void *say_context) {
   memset(self, 0, sizeof *self);
   self->fd = -1;

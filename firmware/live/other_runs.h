@@ -5,7 +5,7 @@
 #ifndef WAYMARK_LIVE_OTHER_RUNS_H
 #define WAYMARK_LIVE_OTHER_RUNS_H
 
-#include "output/run_findings.h"
+#include "findings/findings.h"
 #include "waymark/health.h"
 #include "waymark/lcm_messages.h"
 
@@ -27,14 +27,14 @@ typedef struct other_runs {
   wm_time_ns next_ns;
   other_run known[OTHER_RUNS_MAX];
   uint32_t total;
-  wm_finding_fn say;
+  wm_line_fn say;
   void *say_context;
   uint8_t packet[WM_LCM_MESSAGE_MAX + 128];
   wm_health heard;
 } other_runs;
 
 // `url` as publish.lcm_url has it. Only UDP multicast, LCM's usual way, is listened to.
-void other_runs_open(other_runs *self, int is_on, const char *url, const char *prefix, wm_finding_fn say,
+void other_runs_open(other_runs *self, int is_on, const char *url, const char *prefix, wm_line_fn say,
                      void *say_context);
 // Takes what came. Called often.
 void other_runs_tick(other_runs *self, wm_time_ns monotonic_ns);

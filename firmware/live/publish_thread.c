@@ -108,6 +108,22 @@ static void say_changes(live *run, const wm_health *health) {
   self->said_motion_health = health->motion_health;
 }
 
+// What is wrong and what to do, each at most once in ten minutes; without what say_changes reports each time.
+static void say_findings(live *run, const wm_health *health) {
+  live_publish *self = &run->publish;
+  self->found.count = self->found.dropped = 0;
+  wm_health_findings(health, &self->found);
+  size_t kept = 0;
+  for (size_t i = 0; i < self->found.count; i++) {
+    const wm_finding_id id = self->found.at[i].id;
+    if (id == WM_FOUND_SOURCE_SILENT || id == WM_FOUND_NO_DATA || id == WM_FOUND_MOTION_SENSOR) continue;
+    if (kept != i) self->found.at[kept] = self->found.at[i];
+    kept++;
+  }
+  self->found.count = kept;
+  wm_said_take(&self->said, &self->found, health->t_ns, live_say_later, run);
+}
+
 // For `systemctl status`: the state, and the silent inputs.
 static void describe(const wm_health *health, char out[NOTIFY_STATUS_BYTES]) {
   int used = snprintf(out, NOTIFY_STATUS_BYTES, "%s", wm_state_name(health->state));
@@ -138,6 +154,7 @@ static void take_healths(live *run) {
     notify_status(&self->notify, status);
     if (merge_keeps_up(run, record)) notify_alive(&self->notify, health.loops);
     say_changes(run, &health);
+    say_findings(run, &health);
   }
 }
 

@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #include "config/config.h"
-#include "output/run_findings.h"
+#include "findings/findings.h"
 #include "waymark/status.h"
 
 typedef struct wm_record_options {
@@ -19,7 +19,7 @@ typedef struct wm_record_options {
   uint64_t bytes_max;       // of the whole recording; 0: no limit
   uint64_t bytes_free_min;  // free space to be left on the disk
   atomic_int *stop;
-  wm_finding_fn say;
+  wm_line_fn say;
   void *say_context;
 } wm_record_options;
 

@@ -391,8 +391,11 @@ static void fill_report(live *self, wm_live_report *report) {
   report->age_p99_ns = wm_histogram_quantile(&e->age_ns, 0.99);
 }
 
-static wm_status write_summary(live *self, const wm_live_report *report, wm_error *err) {
-  if (!self->disk.folder) return WM_OK;
+static wm_status write_summary(live *self, wm_live_report *report, wm_error *err) {
+  if (!self->disk.folder) {
+    wm_health_findings(&report->run.health, &report->run.findings);
+    return WM_OK;
+  }
   const live_estimator *e = &self->estimator;
   const wm_timing_stage stages[] = {{"wake", &e->wake_ns},
                                     {"loop", &e->cycle_ns},
@@ -411,7 +414,7 @@ static wm_status write_summary(live *self, const wm_live_report *report, wm_erro
                             .deadlines_missed = report->deadlines_missed,
                             .deadlines_total = report->deadlines_total,
                             .memory_bytes = self->arena.bytes};
-  wm_status status = wm_run_folder_health(self->disk.folder, &report->run.health, err);
+  wm_status status = wm_run_folder_health(self->disk.folder, &report->run.health, &report->run.findings, err);
   const wm_fuser *fuser = &e->pipeline.fuser;
   if (status == WM_OK) status = wm_run_folder_map(self->disk.folder, fuser->estimator, fuser->state, err);
   return status == WM_OK ? wm_run_folder_timing(self->disk.folder, &timing, err) : status;

@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #include "config/config.h"
-#include "output/run_findings.h"
+#include "findings/findings.h"
 #include "replay/replay.h"
 #include "waymark/recording.h"
 #include "waymark/status.h"
@@ -29,7 +29,7 @@ typedef struct wm_run_options {
   void *reload_context;
   const wm_start *start;  // NULL: the saved pose, or the configuration's
   // Receives notes for a person or a log, a line each; from any of the run's normal threads.
-  wm_finding_fn say;
+  wm_line_fn say;
   void *say_context;
 } wm_run_options;
 

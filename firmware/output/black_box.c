@@ -156,7 +156,7 @@ static void begin_log(black_box *self, const wm_estimate *pose, wm_time_ns now_n
 }
 
 void black_box_open(black_box *self, const char *folder, double keep_s, double pictures_hz, const wm_assembly *assembly,
-                    wm_finding_fn tell, void *say_context) {
+                    wm_line_fn tell, void *say_context) {
   memset(self, 0, sizeof *self);
   self->say = tell;
   self->say_context = say_context;

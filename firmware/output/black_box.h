@@ -7,10 +7,10 @@
 #ifndef WAYMARK_OUTPUT_BLACK_BOX_H
 #define WAYMARK_OUTPUT_BLACK_BOX_H
 
+#include "findings/findings.h"
 #include "fusion/assembly.h"
 #include "output/black_box_video.h"
 #include "output/event_log.h"
-#include "output/run_findings.h"
 
 #define BLACK_BOX_KEPT_MAX 20  // losses and deaths; the oldest are removed
 
@@ -26,14 +26,14 @@ typedef struct black_box {
   wm_time_ns rotate_ns;     // end of the present log; WM_TIME_NONE: no pose since the start or a loss
   wm_time_ns kept_from_ns;  // when a pending loss is kept; WM_TIME_NONE: none pending
   black_box_video pictures;
-  wm_finding_fn say;
+  wm_line_fn say;
   void *say_context;
 } black_box;
 
 // Keeps the logs of a run that was killed. An empty `folder` switches the black box off. A write error is reported
 // once, and the run continues. `assembly` outlives it.
 void black_box_open(black_box *self, const char *folder, double keep_s, double pictures_hz, const wm_assembly *assembly,
-                    wm_finding_fn say, void *say_context);
+                    wm_line_fn say, void *say_context);
 void black_box_event(black_box *self, const wm_event *event);
 // The newest map (waymark/keeper.h), of which it makes a copy. May allocate.
 void black_box_map(black_box *self, const void *image, size_t bytes);

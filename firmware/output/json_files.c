@@ -167,7 +167,8 @@ static void put_counters(FILE *f, const wm_health *h) {
   (void)fputs(h->counter_count ? "\n  },\n" : "},\n", f);
 }
 
-wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, const wm_health *h, wm_error *err) {
+wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, const wm_health *h,
+                               const wm_findings *found, wm_error *err) {
   char path[WM_PATH_MAX + 32];
   FILE *f = open_json(dir, "health.json", path, sizeof path, err);
   if (!f) return WM_IO;
@@ -207,7 +208,9 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
     put_source(f, &h->sources[i]);
     (void)fputs(i + 1 < h->source_count ? ",\n" : "\n", f);
   }
-  (void)fputs("  }\n}\n", f);
+  (void)fputs("  },\n  \"findings\": ", f);
+  wm_findings_json(found, f);
+  (void)fputs("\n}\n", f);
   return close_json(f, path, err);
 }
 

@@ -5,7 +5,8 @@
 
 #include "output/run_folder.h"
 
-wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, const wm_health *health, wm_error *err);
+wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, const wm_health *health,
+                               const wm_findings *found, wm_error *err);
 wm_status wm_write_map(const char *dir, const wm_estimator *estimator, const void *state, wm_error *err);
 wm_status wm_write_timing_json(const char *dir, const wm_timing *timing, wm_error *err);
 

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include "output/csv_row.h"
+#include "output/drive_evidence.h"
 #include "output/event_log.h"
 #include "output/json_files.h"
 #include "output/new_file.h"
@@ -34,6 +35,7 @@ struct wm_run_folder {
   uint64_t bytes_max;     // 0: no limit
   wm_assembly continued;  // of the run, with the start of a log that begins later
   wm_estimate newest;     // published; WM_TIME_NONE: none
+  drive_evidence evidence;
 };
 
 static const char kAxes[6][3] = {"x", "y", "z", "rx", "ry", "rz"};
@@ -217,6 +219,7 @@ static void hypotheses(wm_run_folder *self, const wm_hypothesis_set *set) {
 static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
   (void)bytes;
   wm_run_folder *self = context;
+  evidence_put(&self->evidence, kind, record);
   switch (kind) {
     case WM_OUTPUT_EVENT: wm_log_write_event(&self->log, record); break;
     case WM_OUTPUT_POSE: fused_pose(self, record); break;
@@ -375,9 +378,12 @@ wm_status wm_run_folder_flush(wm_run_folder *self, wm_error *err) {
   return keep_limit(self, err);
 }
 
-wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_error *err) {
+wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_findings *found, wm_error *err) {
+  const uint64_t due = evidence_due(&self->evidence, self->assembly->config->runtime.publish_rate_hz);
+  evidence_judge(&self->evidence, self->assembly, health, due, found);
+  wm_health_findings(health, found);
   wm_status status = wm_write_search_outcomes(self->dir, self->assembly->vision, err);
-  return status == WM_OK ? wm_write_health_json(self->dir, self->assembly, health, err) : status;
+  return status == WM_OK ? wm_write_health_json(self->dir, self->assembly, health, found, err) : status;
 }
 
 wm_status wm_run_folder_timing(wm_run_folder *self, const wm_timing *timing, wm_error *err) {

@@ -7,6 +7,7 @@
 
 #include <stdint.h>
 
+#include "findings/findings.h"
 #include "fusion/assembly.h"
 #include "fusion/output.h"
 #include "rt/histogram.h"
@@ -45,8 +46,9 @@ typedef struct wm_timing {
   size_t memory_bytes;
 } wm_timing;
 
-// health.json; looked-for.csv where a detector of known landmarks ran.
-wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_error *err);
+// health.json with the findings of the run, which `found` takes as well; looked-for.csv where a detector of known
+// landmarks ran.
+wm_status wm_run_folder_health(wm_run_folder *self, const wm_health *health, wm_findings *found, wm_error *err);
 wm_status wm_run_folder_timing(wm_run_folder *self, const wm_timing *timing, wm_error *err);
 // map-estimate.csv: the estimated landmarks; no file without any.
 wm_status wm_run_folder_map(wm_run_folder *self, const wm_estimator *estimator, const void *state, wm_error *err);

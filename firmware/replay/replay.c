@@ -165,7 +165,7 @@ static void summarize(replay *self, wm_run_report *report) {
   report->page_faults_after_start = self->page_faults;
 }
 
-static wm_status write_summary(replay *self, const wm_run_report *report, wm_error *err) {
+static wm_status write_summary(replay *self, wm_run_report *report, wm_error *err) {
   const wm_timing_stage stages[] = {{"arrive", &self->pipeline.arrive_ns},
                                     {"predict", &self->pipeline.fuser.predict_ns},
                                     {"correct", &self->pipeline.fuser.correct_ns},
@@ -176,7 +176,7 @@ static wm_status write_summary(replay *self, const wm_run_report *report, wm_err
                             .allocations_after_start = self->allocations,
                             .page_faults_after_start = self->page_faults,
                             .memory_bytes = self->arena.bytes};
-  wm_status status = wm_run_folder_health(self->folder, &report->health, err);
+  wm_status status = wm_run_folder_health(self->folder, &report->health, &report->findings, err);
   const wm_fuser *fuser = &self->pipeline.fuser;
   if (status == WM_OK) status = wm_run_folder_map(self->folder, fuser->estimator, fuser->state, err);
   return status == WM_OK ? wm_run_folder_timing(self->folder, &timing, err) : status;

@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "config/config.h"
+#include "findings/findings.h"
 #include "fusion/assembly.h"
 #include "fusion/output.h"
 #include "output/event_log.h"
@@ -19,7 +20,8 @@ typedef void (*wm_progress_fn)(void *context, double done);
 
 typedef struct wm_run_report {
   wm_health health;
-  uint64_t poses;  // fused, written to the trajectory
+  wm_findings findings;  // where files are written, and of a live run
+  uint64_t poses;        // fused, written to the trajectory
   uint64_t events;
   double recorded_s;  // from the first stamp to the last arrival
   size_t memory_bytes;

@@ -140,7 +140,7 @@ ROBOT = [
 
 
 def found(check, pattern):
-    lines = [f["text"] + " " + f["mend" if "mend" in f else "fix"] for f in check["findings"]] if check else []
+    lines = [f["text"] + " " + f["fix"] for f in check["findings"]] if check else []
     return any(re.search(pattern, line, re.I | re.S) for line in lines)
 
 
@@ -149,7 +149,7 @@ def run_check(options, config, recording):
     try:
         return json.loads(done.stdout)
     except json.JSONDecodeError:
-        return {"good": False, "findings": [{"text": done.stderr, "mend": ""}]}
+        return {"good": False, "findings": [{"text": done.stderr, "fix": ""}]}
 
 
 def longest_wrong_s(run, truth):

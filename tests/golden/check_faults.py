@@ -228,12 +228,12 @@ def main():
                 new = GOOD[file].replace(old, new)
             lay_out(folder, {file: new})
             found = check(folder / config, folder / "rec")
-            mine = [f for f in found if words in f["text"] + "; " + f["mend"]]
-            said = "".join(f"\n    {f['level']}: {f['text']}; mend: {f['mend']}" for f in found)
+            mine = [f for f in found if words in f["text"] + "; " + f["fix"]]
+            said = "".join(f"\n    {f['severity']}: {f['text']}; fix: {f['fix']}" for f in found)
             print(f"{'good' if mine else 'BAD '}  {name}{said}")
             if not mine:
                 failures.append(f"{name}: not found")
-            failures.extend(f"{name}: no mend: {f['text']}" for f in found if not f["mend"])
+            failures.extend(f"{name}: no fix: {f['text']}" for f in found if not f["fix"])
     print(f"{len(FAULTS)} faults planted")
     print("\n".join(failures) or "good")
     sys.exit(bool(failures))

@@ -31,7 +31,7 @@ says bad priority ""
 says bad memory.lock ""
 says bad can.can7 "no interface"
 says bad camera.front "No such file"
-[ "$(grep -c '^bad' said.txt)" = "$(grep -c '^bad.*; mend: ' said.txt)" ] || { echo "a finding without a mend"; cat said.txt; failures=$((failures + 1)); }
+[ "$(grep -c '^bad' said.txt)" = "$(grep -c '^bad.*; fix: ' said.txt)" ] || { echo "a finding without a fix"; cat said.txt; failures=$((failures + 1)); }
 
 sed -i '/^devices/,$d' robot.yaml
 unshare -n bash -c 'ip link set lo up; ip route add 224.0.0.0/4 dev lo; ./waymark doctor robot.yaml --seconds 0.2' >said.txt

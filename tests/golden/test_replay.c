@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "findings/findings.h"
 #include "output/event_log.h"
-#include "output/run_findings.h"
 #include "small_recording.h"
 #include "unity.h"
 
@@ -94,21 +94,18 @@ static void a_single_frame_150_ms_late_changes_nothing(void) { compare_late(one_
 static void frames_that_are_all_250_ms_late_change_nothing(void) { compare_late(all_250, kConfig300); }
 static void a_single_frame_250_ms_late_changes_nothing(void) { compare_late(one_in_nine_250, kConfig300); }
 
-static char finding[512];
-static void keep_finding(void *context, const char *line) {
-  (void)context;
-  if (strstr(line, "lateness_max_ms")) (void)snprintf(finding, sizeof finding, "%s", line);
-}
-
 static void what_is_too_late_is_counted_and_the_number_that_is_told_would_do(void) {
   small_recording_write("rec", &(small_recording){.seconds = 10, .late_ns = all_200});
   replay_into("rec", kConfig, "run", &report);
   const wm_source_health *eye = source("sightings:eye");
   TEST_ASSERT_GREATER_THAN(100, eye->received);
   TEST_ASSERT_EQUAL_UINT64(eye->received, eye->late);
-  TEST_ASSERT_GREATER_THAN(0, wm_findings(&report.health, keep_finding, NULL));
-  const char *number = strstr(finding, "`lateness_max_ms: ");
-  TEST_ASSERT_NOT_NULL_MESSAGE(number, finding);
+  TEST_ASSERT_TRUE(wm_findings_has(&report.findings, WM_FOUND_DATA_LATE, "sightings:eye"));
+  const char *number = NULL;
+  for (size_t i = 0; i < report.findings.count; i++)
+    if (report.findings.at[i].id == WM_FOUND_DATA_LATE)
+      number = strstr(report.findings.at[i].fix, "`lateness_max_ms: ");
+  TEST_ASSERT_NOT_NULL(number);
   char config[256];
   (void)snprintf(config, sizeof config, "%ssources:\n  - {name: sightings, lateness_max_ms: %d}\n", kConfig,
                  atoi(number + strlen("`lateness_max_ms: ")));
@@ -116,19 +113,19 @@ static void what_is_too_late_is_counted_and_the_number_that_is_told_would_do(voi
   TEST_ASSERT_EQUAL_UINT64(0, source("sightings:eye")->late);
 }
 
-static void keep_any(void *context, const char *line) {
-  (void)context;
-  (void)snprintf(finding, sizeof finding, "%s", line);
-}
-
 static void landmarks_that_moved_are_told(void) {
   static const wm_health health = {.counter_count = 2,
                                    .counters = {{.kind = WM_COUNTER_LANDMARKS_MOVED, .landmark_id = 7, .count = 2},
                                                 {.kind = WM_COUNTER_IDENTITIES_AMBIGUOUS, .landmark_id = -1}}};
-  TEST_ASSERT_EQUAL(1, wm_findings(&health, keep_any, NULL));
+  static wm_findings found;
+  char line[400];
+  wm_health_findings(&health, &found);
+  TEST_ASSERT_EQUAL(1, found.count);
+  (void)wm_finding_line(&found.at[0], line, sizeof line);
   TEST_ASSERT_EQUAL_STRING(
-      "map: 2 times a landmark was elsewhere than before; `waymark map survey RUN` lists them; the last one is 7",
-      finding);
+      "map: 2 times a landmark was elsewhere than before; the last one is 7; fix: `waymark map survey RUN --poses RUN` "
+      "lists what moved [landmark-moved]",
+      line);
 }
 
 // ── silence ─────────────────────────────────────────────────────────────────────────────────────────────────────────

@@ -5,7 +5,7 @@
 #include <cmath>
 
 extern "C" {
-#include "output/run_findings.h"
+#include "findings/findings.h"
 }
 
 namespace wm::tools {
@@ -65,8 +65,6 @@ Json source_json(const wm_source_health &s) {
           {"malformed", s.malformed + s.not_finite},
           {"looks", looks}};
 }
-
-void add_line(void *lines, const char *line) { static_cast<Json *>(lines)->push_back(line); }
 
 }  // namespace
 
@@ -223,7 +221,15 @@ Json Live::health_json() const {
     calibration.push_back({{"name", h.calibration[i].name},
                            {"value", number(h.calibration[i].value)},
                            {"sigma", number(h.calibration[i].sigma)}});
-  (void)wm_findings(&h, add_line, &findings);
+  for (size_t i = 0; i < seen_.found.count; i++) {
+    const wm_finding &f = seen_.found.at[i];
+    findings.push_back({{"id", kFindingKinds[f.id].identifier},
+                        {"severity", wm_severity_name(f.severity)},
+                        {"about", f.about},
+                        {"text", f.text},
+                        {"cause", kFindingKinds[f.id].cause},
+                        {"fix", f.fix}});
+  }
   return {{"lost_probability", number(h.lost_probability)},
           {"left_m", number(h.reckoning_left_m)},
           {"left_s", number(h.reckoning_left_s)},

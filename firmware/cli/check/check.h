@@ -5,21 +5,21 @@
 #ifndef WAYMARK_CLI_CHECK_CHECK_H
 #define WAYMARK_CLI_CHECK_CHECK_H
 
-#include "cli/doctor/findings.h"
+#include "findings/findings.h"
 #include "fusion/assembly.h"
-#include "fusion/output.h"
+#include "output/drive_evidence.h"
 
 // ── parts ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 // Allowed but implausible values: rates, LCM's URL, the folders of saved files.
-void check_config(const wm_config *config, findings *out);
+void check_config(const wm_config *config, wm_findings *out);
 // Wheels, cameras, sensors, stereo pair: wrong units, sizes of pictures, signs.
-void check_calibration(const wm_assembly *assembly, findings *out);
-void check_landmarks(const wm_setup *setup, findings *out);
+void check_calibration(const wm_assembly *assembly, wm_findings *out);
+void check_landmarks(const wm_setup *setup, wm_findings *out);
 // A raster map and the start on it.
-void check_map(const wm_assembly *assembly, findings *out);
+void check_map(const wm_assembly *assembly, wm_findings *out);
 // Whether this computer allows the memory and the priority of a run on devices.
-void check_computer(const wm_config *config, size_t memory_bytes, findings *out);
+void check_computer(const wm_config *config, size_t memory_bytes, wm_findings *out);
 
 // ── a recording's data ──────────────────────────────────────────────────────────────────────────────────────────────
 
@@ -47,7 +47,7 @@ typedef struct motion_data {
 void motion_data_init(motion_data *self, const wm_wheels *wheels);
 void motion_data_take(motion_data *self, const wm_event *event);
 // `bound`: bit per wm_quantity of the binding.
-void motion_data_judge(const motion_data *self, uint32_t bound, findings *out);
+void motion_data_judge(const motion_data *self, uint32_t bound, wm_findings *out);
 
 // What went by of one source.
 typedef struct source_facts {
@@ -68,39 +68,6 @@ void source_data_init(source_data *self, const wm_assembly *assembly);
 // An event that arrived.
 void source_data_take(source_data *self, const wm_event *event);
 // After the last event: each source's counts, and the sources against each other. `bound` as above.
-void source_data_judge(source_data *self, uint32_t bound, findings *out);
-
-// ── a drive ─────────────────────────────────────────────────────────────────────────────────────────────────────────
-
-// How well the observations of a drive agree with its poses.
-typedef struct residual_evidence {
-  uint64_t fused, refused;  // updates; refused: by the gate, or because the pose was being searched for
-  double sum, squares;      // of the fused innovations over their sigma
-} residual_evidence;
-
-#define EVIDENCE_LANDMARKS_MAX 256
-typedef struct landmark_evidence {
-  int32_t id;
-  uint64_t fused, refused, unknown;  // unknown: the map doesn't have it
-} landmark_evidence;
-
-typedef struct drive_evidence {
-  residual_evidence residuals[WM_SOURCES_MAX][WM_RESIDUAL_COUNT];
-  landmark_evidence landmarks[EVIDENCE_LANDMARKS_MAX];
-  size_t landmark_count;
-  uint64_t states[4], published;  // messages by wm_state
-  double log_likelihood;          // of all updates, nats; a refused one counts as an outlier of any value
-  uint64_t updates, fused;
-} drive_evidence;
-
-// A record of the pipeline's output.
-void evidence_put(drive_evidence *self, wm_output_kind kind, const void *record);
-// Share of the messages' times with this state; without a pose counts as searching. `total`: messages that were due.
-double evidence_share(const drive_evidence *self, wm_state state, uint64_t total);
-// Mean log likelihood of an update, nats: the larger the better the observations fit.
-double evidence_score(const drive_evidence *self);
-// `health` as the drive ended.
-void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health, uint64_t total,
-                    findings *out);
+void source_data_judge(source_data *self, uint32_t bound, wm_findings *out);
 
 #endif

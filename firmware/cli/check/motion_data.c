@@ -87,11 +87,11 @@ void motion_data_take(motion_data *self, const wm_event *event) {
 
 // ── findings ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
-static void ranges(const motion_data *self, findings *out) {
+static void ranges(const motion_data *self, wm_findings *out) {
   static const struct {
     wm_quantity first, last;
     double most;
-    const char *unit, *mend;
+    const char *unit, *fix;
   } kLimits[] = {
       {WM_Q_WHEEL_SPEED_FRONT_LEFT, WM_Q_VEHICLE_SPEED, FASTEST_MPS, "m/s", "is its unit km/h? Write `unit: km/h`"},
       {WM_Q_YAW_RATE, WM_Q_YAW_RATE, FASTEST_TURN_RADPS, "rad/s", "is its unit deg/s? Write `unit: deg/s`"},
@@ -102,23 +102,25 @@ static void ranges(const motion_data *self, findings *out) {
     for (unsigned q = kLimits[i].first; q <= kLimits[i].last; q++) {
       double most = fmax(fabs(self->least[q]), fabs(self->most[q]));
       if (self->count[q] > 0 && most > kLimits[i].most)
-        find(out, FINDING_BAD, ABOUT, kLimits[i].mend, "%s: as much as %.4g %s", wm_quantity_name(q), most,
-             kLimits[i].unit);
+        wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, ABOUT, kLimits[i].fix, "%s: as much as %.4g %s",
+                wm_quantity_name(q), most, kLimits[i].unit);
     }
   if (self->fastest_mps > FASTEST_MPS)
-    find(out, FINDING_BAD, ABOUT, "look at wheels.ticks_per_turn and radius_m, and at the signal's bits and sign",
-         "the wheels' ticks would be %.0f m/s", self->fastest_mps);
+    wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, ABOUT,
+            "look at wheels.ticks_per_turn and radius_m, and at the signal's bits and sign",
+            "the wheels' ticks would be %.0f m/s", self->fastest_mps);
   const wm_wheels *w = self->wheels;
   unsigned q = WM_Q_STEERING_ACTUATOR;
   if (self->count[q] > 0 && w->steering_table_count > 0 &&
       (self->least[q] < w->actuator_m[0] - 0.02 || self->most[q] > w->actuator_m[w->steering_table_count - 1] + 0.02))
-    find(out, FINDING_BAD, ABOUT, "look at the signal's unit and offset, or measure the table's ends",
-         "steering_actuator: %.1f to %.1f mm, but wheels.steering_table is of %.1f to %.1f", self->least[q] * 1e3,
-         self->most[q] * 1e3, w->actuator_m[0] * 1e3, w->actuator_m[w->steering_table_count - 1] * 1e3);
+    wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, ABOUT,
+            "look at the signal's unit and offset, or measure the table's ends",
+            "steering_actuator: %.1f to %.1f mm, but wheels.steering_table is of %.1f to %.1f", self->least[q] * 1e3,
+            self->most[q] * 1e3, w->actuator_m[0] * 1e3, w->actuator_m[w->steering_table_count - 1] * 1e3);
 }
 
 // A gyro and two wheels measure the same turn: their ratio is that of the track, or of a wheel's scale.
-static void track(const motion_data *self, findings *out) {
+static void track(const motion_data *self, wm_findings *out) {
   const agreement *a = &self->turn_ticks;
   if (a->count < PAIRS_MIN || sqrt(a->aa / (double)a->count) < TURN_RMS_MIN || a->bb <= 0) return;
   const double ratio = a->ab / a->bb;
@@ -127,24 +129,25 @@ static void track(const motion_data *self, findings *out) {
   (void)snprintf(mend, sizeof mend,
                  "measure it again (`wheels: {track_m: %.3g}` would agree), or look at the gyro's unit",
                  self->wheels->track_m / ratio);
-  find(out, FINDING_BAD, "calibration", mend,
-       "yaw_rate is %.2f times the turn rate by the wheels' ticks with wheels.track_m %.3g", ratio,
-       self->wheels->track_m);
+  wm_find(out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, "calibration", mend,
+          "yaw_rate is %.2f times the turn rate by the wheels' ticks with wheels.track_m %.3g", ratio,
+          self->wheels->track_m);
 }
 
-static void turns(const agreement *a, const char *other, findings *out) {
+static void turns(const agreement *a, const char *other, wm_findings *out) {
   if (a->count < PAIRS_MIN || sqrt(a->aa / (double)a->count) < TURN_RMS_MIN || a->bb <= 0) return;
   if (a->ab / sqrt(a->aa * a->bb) < -0.5)
-    find(out, FINDING_BAD, ABOUT,
-         "`scale: -1` at the one that is not positive to the left; or left and right are swapped",
-         "yaw_rate turns left where %s turns right (correlation %.2f)", other, a->ab / sqrt(a->aa * a->bb));
+    wm_find(out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, ABOUT,
+            "`scale: -1` at the one that is not positive to the left; or left and right are swapped",
+            "yaw_rate turns left where %s turns right (correlation %.2f)", other, a->ab / sqrt(a->aa * a->bb));
 }
 
-void motion_data_judge(const motion_data *self, uint32_t bound, findings *out) {
+void motion_data_judge(const motion_data *self, uint32_t bound, wm_findings *out) {
   for (unsigned q = 0; q < WM_Q_COUNT; q++)
     if (((bound >> q) & 1u) && self->count[q] == 0)
-      find(out, FINDING_BAD, ABOUT, "look at message and bus in can-signals.yaml, and at what candump receives",
-           "%s is bound, but no frame with a value of it came", wm_quantity_name(q));
+      wm_find(out, WM_FOUND_NO_DATA, WM_SEVERITY_BAD, ABOUT,
+              "look at message and bus in can-signals.yaml, and at what candump receives",
+              "%s is bound, but no frame with a value of it came", wm_quantity_name(q));
   ranges(self, out);
   track(self, out);
   turns(&self->turn_wheels, "the difference of the wheels' speeds", out);
@@ -153,7 +156,7 @@ void motion_data_judge(const motion_data *self, uint32_t bound, findings *out) {
   const agreement *s = &self->speed_wheels;
   double ratio = s->bb > 0 ? s->ab / s->bb : 1;
   if (s->count >= PAIRS_MIN && s->bb / (double)s->count > 0.01 && (ratio < 0.6 || ratio > 1.6))
-    find(out, FINDING_BAD, ABOUT,
-         "one of them has another unit than its binding states (km/h is 3.6 times m/s): write `unit:`",
-         "vehicle_speed is %.2f times the wheels' speeds", ratio);
+    wm_find(out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, ABOUT,
+            "one of them has another unit than its binding states (km/h is 3.6 times m/s): write `unit:`",
+            "vehicle_speed is %.2f times the wheels' speeds", ratio);
 }

@@ -30,27 +30,30 @@ static void take(source_facts *facts, const wm_setup *setup, const wm_event *eve
 
 static uint64_t of_hundred(uint64_t part, uint64_t whole) { return whole > 0 ? part * 100 / whole : 0; }
 
-static void counted(const wm_assembled_source *s, const source_facts *facts, findings *out) {
+static void counted(const wm_assembled_source *s, const source_facts *facts, wm_findings *out) {
   const wm_source_counts *c = &s->source->counts;
   const uint64_t skipped = c->malformed + c->not_finite, all = facts->events + skipped;
   if (c->first_problem[0]) {
     const int is_angle = strstr(c->first_problem, "_rad: ") && c->not_finite > c->malformed;
-    find(out, of_hundred(skipped, all) >= 5 ? FINDING_BAD : FINDING_NOTE, s->name,
-         is_angle               ? "are the angles in degrees? The column is in radians: multiply by 0.0174533 (pi/180)"
-         : s->source->is_motion ? "the DBC and what is on the bus are not the same; or the file is damaged"
-                                : "the file is damaged, or its columns differ from its first line",
-         "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, skipped, of_hundred(skipped, all));
+    wm_find(out, WM_FOUND_ROWS_SKIPPED, of_hundred(skipped, all) >= 5 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, s->name,
+            is_angle ? "are the angles in degrees? The column is in radians: multiply by 0.0174533 (pi/180)"
+            : s->source->is_motion ? "the DBC and what is on the bus are not the same; or the file is damaged"
+                                   : "the file is damaged, or its columns differ from its first line",
+            "%s (%" PRIu64 " like it, %" PRIu64 " of 100)", c->first_problem, skipped, of_hundred(skipped, all));
   }
   if (of_hundred(c->lost, facts->events + c->lost) >= 1)
-    find(out, FINDING_NOTE, s->name, "a bus or a recorder that is too slow: look at its load and at `waymark doctor`",
-         "%" PRIu64 " of 100 are missing by the sender's count or stamps",
-         of_hundred(c->lost, facts->events + c->lost));
+    wm_find(out, WM_FOUND_DATA_MISSING, WM_SEVERITY_NOTE, s->name,
+            "a bus or a recorder that is too slow: look at its load and at `waymark doctor`",
+            "%" PRIu64 " of 100 are missing by the sender's count or stamps",
+            of_hundred(c->lost, facts->events + c->lost));
   if (of_hundred(c->frozen, all) >= 1)
-    find(out, FINDING_NOTE, s->name, "the sender is stuck: its values are not used while it is",
-         "%" PRIu64 " of 100 equal the one before, which noise makes impossible", of_hundred(c->frozen, all));
+    wm_find(out, WM_FOUND_VALUES_FROZEN, WM_SEVERITY_NOTE, s->name,
+            "the sender is stuck: its values are not used while it is",
+            "%" PRIu64 " of 100 equal the one before, which noise makes impossible", of_hundred(c->frozen, all));
   if (of_hundred(c->out_of_order, all) >= 1)
-    find(out, FINDING_NOTE, s->name, "the recorder's clock was set, or two recordings were put together",
-         "%" PRIu64 " of 100 are older than the one before", of_hundred(c->out_of_order, all));
+    wm_find(out, WM_FOUND_ROWS_DISORDERED, WM_SEVERITY_NOTE, s->name,
+            "the recorder's clock was set, or two recordings were put together",
+            "%" PRIu64 " of 100 are older than the one before", of_hundred(c->out_of_order, all));
 }
 
 // Adds the time of detection to the lateness of a picture: its observations arrive when they are ready.
@@ -64,17 +67,19 @@ static wm_time_ns look_ns(const wm_assembly *assembly, const wm_source *source) 
 // No sensor and no network is so late; rows in disorder are.
 #define IMPLAUSIBLE_LATENESS_NS (30 * WM_NS_PER_S)
 
-static void judge(const wm_assembly *assembly, const wm_assembled_source *s, const source_facts *facts, findings *out) {
+static void judge(const wm_assembly *assembly, const wm_assembled_source *s, const source_facts *facts,
+                  wm_findings *out) {
   if (facts->events == 0) {
     const char *why = s->source->counts.first_problem;
-    find(out, FINDING_BAD, s->name, "record again, or leave it out (`use: false`)", "holds no datum%s%s",
-         why[0] ? ": " : "", why);
+    wm_find(out, WM_FOUND_NO_DATA, WM_SEVERITY_BAD, s->name, "record again, or leave it out (`use: false`)",
+            "holds no datum%s%s", why[0] ? ": " : "", why);
     return;
   }
   counted(s, facts, out);
   if (facts->latest_ns > IMPLAUSIBLE_LATENESS_NS) {
-    find(out, FINDING_BAD, s->name, "sort the rows by t_ns; or correct arrival_ns, which has to be of the same clock",
-         "rows come as much as %.1f s behind younger ones", (double)facts->latest_ns * 1e-9);
+    wm_find(out, WM_FOUND_ROWS_DISORDERED, WM_SEVERITY_BAD, s->name,
+            "sort the rows by t_ns; or correct arrival_ns, which has to be of the same clock",
+            "rows come as much as %.1f s behind younger ones", (double)facts->latest_ns * 1e-9);
   } else if (facts->latest_ns > s->merge.lateness_max_ns) {
     char mend[120], with_look[80] = "";
     if (facts->look_ns > 0)
@@ -82,21 +87,23 @@ static void judge(const wm_assembly *assembly, const wm_assembled_source *s, con
                      (double)facts->look_ns * 1e-6);
     (void)snprintf(mend, sizeof mend, "sources: [{name: %.40s, lateness_max_ms: %.0f}]", s->name,
                    ceil((double)facts->latest_ns * 1e-7) * 10);
-    find(out, FINDING_NOTE, s->name, mend, "as much as %.0f ms late%s, more than its lateness_max_ms (%.0f)",
-         (double)facts->latest_ns * 1e-6, with_look, (double)s->merge.lateness_max_ns * 1e-6);
+    wm_find(out, WM_FOUND_DATA_LATE, WM_SEVERITY_NOTE, s->name, mend,
+            "as much as %.0f ms late%s, more than its lateness_max_ms (%.0f)", (double)facts->latest_ns * 1e-6,
+            with_look, (double)s->merge.lateness_max_ns * 1e-6);
   }
   if (facts->bare_ranges > 0 && strcmp(assembly->config->estimator->name, "slam") == 0)
-    find(out, FINDING_NOTE, s->name,
-         "drive curves within reach of each: a straight way leaves a landmark and its mirror image open",
-         "%" PRIu64
-         " of 100 sightings are ranges without a bearing: such a landmark begins as a circle and joins the "
-         "map once its place is decided",
-         of_hundred(facts->bare_ranges, facts->sightings));
+    wm_find(out, WM_FOUND_BARE_RANGES, WM_SEVERITY_NOTE, s->name,
+            "drive curves within reach of each: a straight way leaves a landmark and its mirror image open",
+            "%" PRIu64
+            " of 100 sightings are ranges without a bearing: such a landmark begins as a circle and joins the "
+            "map once its place is decided",
+            of_hundred(facts->bare_ranges, facts->sightings));
   int needs_landmarks = assembly->setup.landmark_count > 0;
   if (needs_landmarks && of_hundred(facts->unknown_landmarks, facts->sightings) > 50)
-    find(out, FINDING_BAD, s->name, "are they the landmarks of this place, by these ids?",
-         "%" PRIu64 " of 100 sightings are of ids that landmarks.csv doesn't have",
-         of_hundred(facts->unknown_landmarks, facts->sightings));
+    wm_find(out, WM_FOUND_IDENTITIES_UNKNOWN, WM_SEVERITY_BAD, s->name,
+            "are they the landmarks of this place, by these ids?",
+            "%" PRIu64 " of 100 sightings are of ids that landmarks.csv doesn't have",
+            of_hundred(facts->unknown_landmarks, facts->sightings));
 }
 
 // ── sources beside each other ───────────────────────────────────────────────────────────────────────────────────────
@@ -110,7 +117,7 @@ static double overlap(double a0, double a1, double b0, double b1) {
 // A source whose time span has little in common with that of the motion has stamps of another clock or unit.
 #define OVERLAP_MIN 0.5
 
-static void spans(const source_data *self, size_t i, const source_facts *motion, findings *out) {
+static void spans(const source_data *self, size_t i, const source_facts *motion, wm_findings *out) {
   static const struct {
     double factor;
     const char *unit;
@@ -125,14 +132,15 @@ static void spans(const source_data *self, size_t i, const source_facts *motion,
       char mend[160];
       (void)snprintf(mend, sizeof mend, "multiply its t_ns (and arrival_ns) by %.0f: they are in %s", kUnits[k].factor,
                      kUnits[k].unit);
-      find(out, FINDING_BAD, name, mend, "its stamps overlap those of the motion only if they are read as %s",
-           kUnits[k].unit);
+      wm_find(out, WM_FOUND_CLOCKS_APART, WM_SEVERITY_BAD, name, mend,
+              "its stamps overlap those of the motion only if they are read as %s", kUnits[k].unit);
       return;
     }
-  find(out, FINDING_BAD, name, "all stamps must be of one clock: add the clocks' difference to t_ns and arrival_ns",
-       "its stamps and those of the motion don't overlap: it begins %.3f s after the motion and lasts %.1f s, the "
-       "motion lasts %.1f s",
-       (t0 - m0) * 1e-9, (t1 - t0) * 1e-9, (m1 - m0) * 1e-9);
+  wm_find(out, WM_FOUND_CLOCKS_APART, WM_SEVERITY_BAD, name,
+          "all stamps must be of one clock: add the clocks' difference to t_ns and arrival_ns",
+          "its stamps and those of the motion don't overlap: it begins %.3f s after the motion and lasts %.1f s, the "
+          "motion lasts %.1f s",
+          (t0 - m0) * 1e-9, (t1 - t0) * 1e-9, (m1 - m0) * 1e-9);
 }
 
 static int is_motion(const wm_assembled_source *s) { return (s->kinds & WM_MOTION_EVENTS) != 0; }
@@ -151,7 +159,7 @@ void source_data_take(source_data *self, const wm_event *event) {
   motion_data_take(&self->motion, event);
 }
 
-void source_data_judge(source_data *self, uint32_t bound, findings *out) {
+void source_data_judge(source_data *self, uint32_t bound, wm_findings *out) {
   const source_facts *motion = NULL;
   uint32_t kinds = 0;
   for (size_t i = 0; i < self->assembly->source_count; i++) {

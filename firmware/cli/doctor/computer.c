@@ -25,50 +25,53 @@ static int line_of(const char *root, const char *path, char *out, size_t capacit
   return got;
 }
 
-void doctor_kernel(const char *root, findings *out) {
+void doctor_kernel(const char *root, wm_findings *out) {
   char text[256];
   struct utsname name;
   (void)uname(&name);
   if (line_of(root, "/sys/kernel/realtime", text, sizeof text) && strcmp(text, "1") == 0) {
-    find(out, FINDING_GOOD, "kernel", "", "%s, PREEMPT_RT", name.release);
+    wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_GOOD, "kernel", "", "%s, PREEMPT_RT", name.release);
   } else {
-    find(out, FINDING_NOTE, "kernel",
-         "install a PREEMPT_RT kernel (Debian: linux-image-rt-amd64, linux-image-rt-arm64)",
-         "%s is not PREEMPT_RT: a wake-up may take milliseconds under load", name.release);
+    wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_NOTE, "kernel",
+            "install a PREEMPT_RT kernel (Debian: linux-image-rt-amd64, linux-image-rt-arm64)",
+            "%s is not PREEMPT_RT: a wake-up may take milliseconds under load", name.release);
   }
   if (line_of(root, "/proc/sys/kernel/sched_rt_runtime_us", text, sizeof text)) {
     long us = strtol(text, NULL, 10);
     if (us < 0)
-      find(out, FINDING_NOTE, "throttling", "sysctl kernel.sched_rt_runtime_us=950000",
-           "real-time throttling is off: a real-time thread that runs away takes the computer with it");
+      wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_NOTE, "throttling",
+              "sysctl kernel.sched_rt_runtime_us=950000",
+              "real-time throttling is off: a real-time thread that runs away takes the computer with it");
     else
-      find(out, FINDING_GOOD, "throttling", "", "real-time threads may take %ld %% of a second", us / 10000);
+      wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_GOOD, "throttling", "",
+              "real-time threads may take %ld %% of a second", us / 10000);
   }
   if (line_of(root, "/sys/devices/system/cpu/isolated", text, sizeof text) && text[0])
-    find(out, FINDING_GOOD, "isolation", "", "CPUs kept free of other work: %s (realtime.cpu takes one)", text);
+    wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_GOOD, "isolation", "",
+            "CPUs kept free of other work: %s (realtime.cpu takes one)", text);
 }
 
-void doctor_clocks(const char *root, findings *out) {
+void doctor_clocks(const char *root, wm_findings *out) {
   char text[256];
   if (line_of(root, "/sys/devices/system/clocksource/clocksource0/current_clocksource", text, sizeof text)) {
     int is_slow = strcmp(text, "hpet") == 0 || strcmp(text, "acpi_pm") == 0 || strcmp(text, "jiffies") == 0;
     if (is_slow)
-      find(out, FINDING_BAD, "clock",
-           "see `dmesg | grep -i clocksource`; a firmware update, or tsc=reliable where it is",
-           "the clock source is %s: each look at the clock costs a microsecond or more", text);
+      wm_find(out, WM_FOUND_COMPUTER_CLOCK, WM_SEVERITY_BAD, "clock",
+              "see `dmesg | grep -i clocksource`; a firmware update, or tsc=reliable where it is",
+              "the clock source is %s: each look at the clock costs a microsecond or more", text);
     else
-      find(out, FINDING_GOOD, "clock", "", "the clock source is %s", text);
+      wm_find(out, WM_FOUND_COMPUTER_CLOCK, WM_SEVERITY_GOOD, "clock", "", "the clock source is %s", text);
   }
   struct timex state = {0};
   if (adjtimex(&state) == TIME_ERROR || (state.status & STA_UNSYNC))
-    find(out, FINDING_NOTE, "time of day", "timedatectl set-ntp true",
-         "UTC is not synchronised: poses are right on the monotonic clock, utc_offset_ns is not");
+    wm_find(out, WM_FOUND_COMPUTER_CLOCK, WM_SEVERITY_NOTE, "time of day", "timedatectl set-ntp true",
+            "UTC is not synchronised: poses are right on the monotonic clock, utc_offset_ns is not");
   else
-    find(out, FINDING_GOOD, "time of day", "", "UTC is synchronised, to %.1f ms at most",
-         (double)state.maxerror * 1e-3);
+    wm_find(out, WM_FOUND_COMPUTER_CLOCK, WM_SEVERITY_GOOD, "time of day", "",
+            "UTC is synchronised, to %.1f ms at most", (double)state.maxerror * 1e-3);
 }
 
-static void governors(const char *root, findings *out) {
+static void governors(const char *root, wm_findings *out) {
   int seen = 0, slow = 0;
   char governor[64], other[64] = "";
   for (int cpu = 0; cpu < 256; cpu++) {
@@ -81,14 +84,14 @@ static void governors(const char *root, findings *out) {
     (void)snprintf(other, sizeof other, "%s", governor);
   }
   if (slow > 0)
-    find(out, FINDING_BAD, "governor",
-         "for g in /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor; do echo performance > $g; done",
-         "%d of %d CPUs have the governor %s: they are slow when work comes", slow, seen, other);
+    wm_find(out, WM_FOUND_COMPUTER_SLOW, WM_SEVERITY_BAD, "governor",
+            "for g in /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor; do echo performance > $g; done",
+            "%d of %d CPUs have the governor %s: they are slow when work comes", slow, seen, other);
   else if (seen > 0)
-    find(out, FINDING_GOOD, "governor", "", "performance on all %d CPUs", seen);
+    wm_find(out, WM_FOUND_COMPUTER_SLOW, WM_SEVERITY_GOOD, "governor", "", "performance on all %d CPUs", seen);
 }
 
-static void temperatures(const char *root, findings *out) {
+static void temperatures(const char *root, wm_findings *out) {
   double hottest_c = -300;
   char text[64], path[96];
   for (int zone = 0; zone < 64; zone++) {
@@ -98,13 +101,13 @@ static void temperatures(const char *root, findings *out) {
     if (c > hottest_c && c < 200) hottest_c = c;
   }
   if (hottest_c > 80)
-    find(out, FINDING_BAD, "temperature", "better cooling, or less work",
-         "%.0f degrees C: most boards slow down at 80 to 85", hottest_c);
+    wm_find(out, WM_FOUND_COMPUTER_SLOW, WM_SEVERITY_BAD, "temperature", "better cooling, or less work",
+            "%.0f degrees C: most boards slow down at 80 to 85", hottest_c);
   else if (hottest_c > -300)
-    find(out, FINDING_GOOD, "temperature", "", "%.0f degrees C", hottest_c);
+    wm_find(out, WM_FOUND_COMPUTER_SLOW, WM_SEVERITY_GOOD, "temperature", "", "%.0f degrees C", hottest_c);
 }
 
-void doctor_power(const char *root, findings *out) {
+void doctor_power(const char *root, wm_findings *out) {
   governors(root, out);
   temperatures(root, out);
 }
@@ -119,19 +122,21 @@ static int may_be_realtime(void) {
   return 1;
 }
 
-void doctor_limits(findings *out) {
+void doctor_limits(wm_findings *out) {
   if (may_be_realtime())
-    find(out, FINDING_GOOD, "priority", "", "real-time priority 80 is allowed");
+    wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_GOOD, "priority", "", "real-time priority 80 is allowed");
   else
-    find(out, FINDING_BAD, "priority",
-         "LimitRTPRIO=90 in the systemd unit (config/waymark.service has it), or `* - rtprio 90` in "
-         "/etc/security/limits.conf",
-         "this user may not have real-time priority 80");
+    wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_BAD, "priority",
+            "LimitRTPRIO=90 in the systemd unit (config/waymark.service has it), or `* - rtprio 90` in "
+            "/etc/security/limits.conf",
+            "this user may not have real-time priority 80");
   struct rlimit memory = {0};
   (void)getrlimit(RLIMIT_MEMLOCK, &memory);
   if (geteuid() == 0 || memory.rlim_cur == RLIM_INFINITY || memory.rlim_cur >= ((rlim_t)256 << 20))
-    find(out, FINDING_GOOD, "memory lock", "", "memory may be locked");
+    wm_find(out, WM_FOUND_COMPUTER_MEMORY, WM_SEVERITY_GOOD, "memory lock", "", "memory may be locked");
   else
-    find(out, FINDING_BAD, "memory lock", "LimitMEMLOCK=infinity in the systemd unit (config/waymark.service has it)",
-         "only %llu kB may be locked: page faults may stop the estimator", (unsigned long long)(memory.rlim_cur >> 10));
+    wm_find(out, WM_FOUND_COMPUTER_MEMORY, WM_SEVERITY_BAD, "memory lock",
+            "LimitMEMLOCK=infinity in the systemd unit (config/waymark.service has it)",
+            "only %llu kB may be locked: page faults may stop the estimator",
+            (unsigned long long)(memory.rlim_cur >> 10));
 }

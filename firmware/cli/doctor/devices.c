@@ -11,21 +11,22 @@
 #include "cli/doctor/doctor.h"
 #include "live/lcm_connect.h"
 
-void doctor_lcm(const char *url, findings *out) {
+void doctor_lcm(const char *url, wm_findings *out) {
   const char *why;
   lcm_t *lcm = lcm_connect(url, &why);
   if (!lcm) {
-    find(out, FINDING_BAD, "lcm", "ip route add 224.0.0.0/4 dev lo", "no way out on %.80s: %s", url, why);
+    wm_find(out, WM_FOUND_LCM_ROUTE, WM_SEVERITY_BAD, "lcm", "ip route add 224.0.0.0/4 dev lo",
+            "no way out on %.80s: %s", url, why);
     return;
   }
   lcm_destroy(lcm);
   const char *ttl = strstr(url, "ttl=");
   if (strncmp(url, "udpm://", 7) == 0 && ttl && strtol(ttl + 4, NULL, 10) > 0)
-    find(out, FINDING_NOTE, "lcm",
-         "publish: {lcm_url: \"udpm://239.255.76.67:7667?ttl=0\"} keeps messages on this computer",
-         "%.80s: poses go out into the network, and commands may come from it", url);
+    wm_find(out, WM_FOUND_LCM_ROUTE, WM_SEVERITY_NOTE, "lcm",
+            "publish: {lcm_url: \"udpm://239.255.76.67:7667?ttl=0\"} keeps messages on this computer",
+            "%.80s: poses go out into the network, and commands may come from it", url);
   else
-    find(out, FINDING_GOOD, "lcm", "", "messages find their way on %.80s", url);
+    wm_find(out, WM_FOUND_LCM_ROUTE, WM_SEVERITY_GOOD, "lcm", "", "messages find their way on %.80s", url);
 }
 
 // 1: a number was found.
@@ -43,63 +44,68 @@ static int number_of(const char *root, const char *interface, const char *what, 
 #define ARPHRD_OF_CAN 280  // ARPHRD_CAN of linux/if_arp.h
 #define IS_UP 1            // IFF_UP of linux/if.h
 
-static void can_interface(const char *root, const char *interface, findings *out) {
+static void can_interface(const char *root, const char *interface, wm_findings *out) {
   char about[32], mend[160];
   long type = 0, flags = 0, errors = 0, overruns = 0;
   (void)snprintf(about, sizeof about, "can %s", interface);
   if (!number_of(root, interface, "type", &type)) {
-    find(out, FINDING_BAD, about, "plug the adapter in; `lsusb`, `dmesg | grep -i can`",
-         "there is no interface of this name");
+    wm_find(out, WM_FOUND_CAN_INTERFACE, WM_SEVERITY_BAD, about, "plug the adapter in; `lsusb`, `dmesg | grep -i can`",
+            "there is no interface of this name");
     return;
   }
   if (type != ARPHRD_OF_CAN) {
-    find(out, FINDING_BAD, about, "`ip -br link show type can` lists CAN interfaces", "is no CAN interface");
+    wm_find(out, WM_FOUND_CAN_INTERFACE, WM_SEVERITY_BAD, about, "`ip -br link show type can` lists CAN interfaces",
+            "is no CAN interface");
     return;
   }
   (void)number_of(root, interface, "flags", &flags);
   if (!(flags & IS_UP)) {
     (void)snprintf(mend, sizeof mend, "ip link set %s up type can bitrate 500000 restart-ms 100", interface);
-    find(out, FINDING_BAD, about, mend, "is down");
+    wm_find(out, WM_FOUND_CAN_INTERFACE, WM_SEVERITY_BAD, about, mend, "is down");
     return;
   }
   (void)number_of(root, interface, "statistics/rx_errors", &errors);
   (void)number_of(root, interface, "statistics/rx_over_errors", &overruns);
   if (overruns > 0)
-    find(out, FINDING_BAD, about, "raise the priority of its interrupt thread above other work (chrt -f -p 60 PID)",
-         "its controller lost %ld frames because they were not read in time", overruns);
+    wm_find(out, WM_FOUND_CAN_INTERFACE, WM_SEVERITY_BAD, about,
+            "raise the priority of its interrupt thread above other work (chrt -f -p 60 PID)",
+            "its controller lost %ld frames because they were not read in time", overruns);
   else if (errors > 0)
-    find(out, FINDING_NOTE, about, "look at wiring, termination (60 ohms) and bit rate: `ip -d -s link show`",
-         "is up, with %ld receive errors since then", errors);
+    wm_find(out, WM_FOUND_CAN_INTERFACE, WM_SEVERITY_NOTE, about,
+            "look at wiring, termination (60 ohms) and bit rate: `ip -d -s link show`",
+            "is up, with %ld receive errors since then", errors);
   else
-    find(out, FINDING_GOOD, about, "", "is up, without errors");
+    wm_find(out, WM_FOUND_CAN_INTERFACE, WM_SEVERITY_GOOD, about, "", "is up, without errors");
 }
 
 // The kernel's size of a queued frame of eight bytes, and the rate of such frames on a full bus of 500 kbit/s.
 #define FRAME_QUEUE_BYTES 768
 #define FRAMES_PER_S 4000
 
-void doctor_can_queue(int wanted, int granted, findings *out) {
+void doctor_can_queue(int wanted, int granted, wm_findings *out) {
   char mend[120];
   const double queue_ms =
       2e3 * granted / FRAME_QUEUE_BYTES / FRAMES_PER_S;  // the kernel reports half of the bytes that it reserves
   if (granted >= wanted) {
-    find(out, FINDING_GOOD, "can queue", "", "a socket holds %.0f ms of a full bus", queue_ms);
+    wm_find(out, WM_FOUND_CAN_INTERFACE, WM_SEVERITY_GOOD, "can queue", "", "a socket holds %.0f ms of a full bus",
+            queue_ms);
     return;
   }
   (void)snprintf(mend, sizeof mend, "sysctl -w net.core.rmem_max=%d, and the same in /etc/sysctl.d/waymark.conf",
                  wanted);
-  find(out, FINDING_NOTE, "can queue", mend,
-       "a socket holds %.0f ms of a full bus (%d kB of the %d that are asked for): frames are lost when a thread waits "
-       "longer",
-       queue_ms, granted / 1024, wanted / 1024);
+  wm_find(
+      out, WM_FOUND_CAN_INTERFACE, WM_SEVERITY_NOTE, "can queue", mend,
+      "a socket holds %.0f ms of a full bus (%d kB of the %d that are asked for): frames are lost when a thread waits "
+      "longer",
+      queue_ms, granted / 1024, wanted / 1024);
 }
 
-void doctor_can(const char *root, const wm_config *config, findings *out) {
+void doctor_can(const char *root, const wm_config *config, wm_findings *out) {
   for (size_t i = 0; config && i < config->devices.can_count; i++)
     can_interface(root, config->devices.can[i].interface, out);
 }
 
-static void camera(const wm_camera_device_config *c, findings *out) {
+static void camera(const wm_camera_device_config *c, wm_findings *out) {
   char about[32];
   (void)snprintf(about, sizeof about, "camera %.20s", c->name);
   if (!c->device[0]) return;  // by card and bus, or libcamera: only a run searches for it
@@ -108,16 +114,18 @@ static void camera(const wm_camera_device_config *c, findings *out) {
     struct stat is;
     int is_device = fstat(fd, &is) == 0 && S_ISCHR(is.st_mode);
     (void)close(fd);
-    find(out, is_device ? FINDING_GOOD : FINDING_BAD, about, is_device ? "" : "`v4l2-ctl --list-devices` lists cameras",
-         is_device ? "%.100s is there" : "%.100s is no device", c->device);
+    wm_find(out, WM_FOUND_CAMERA_DEVICE, is_device ? WM_SEVERITY_GOOD : WM_SEVERITY_BAD, about,
+            is_device ? "" : "`v4l2-ctl --list-devices` lists cameras",
+            is_device ? "%.100s is there" : "%.100s is no device", c->device);
   } else if (errno == EACCES) {
-    find(out, FINDING_BAD, about, "SupplementaryGroups=video in the unit, or usermod -aG video USER",
-         "%.100s: no permission", c->device);
+    wm_find(out, WM_FOUND_CAMERA_DEVICE, WM_SEVERITY_BAD, about,
+            "SupplementaryGroups=video in the unit, or usermod -aG video USER", "%.100s: no permission", c->device);
   } else {
-    find(out, FINDING_BAD, about, "`v4l2-ctl --list-devices` lists cameras", "%.100s: %s", c->device, strerror(errno));
+    wm_find(out, WM_FOUND_CAMERA_DEVICE, WM_SEVERITY_BAD, about, "`v4l2-ctl --list-devices` lists cameras",
+            "%.100s: %s", c->device, strerror(errno));
   }
 }
 
-void doctor_cameras(const wm_config *config, findings *out) {
+void doctor_cameras(const wm_config *config, wm_findings *out) {
   for (size_t i = 0; config && i < config->devices.camera_count; i++) camera(&config->devices.cameras[i], out);
 }

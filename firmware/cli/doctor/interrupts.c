@@ -40,7 +40,7 @@ static int is_of_can(const wm_config *config, const char *name) {
   return 0;
 }
 
-void doctor_interrupts(const char *root, const wm_config *config, long cpus, findings *out) {
+void doctor_interrupts(const char *root, const wm_config *config, long cpus, wm_findings *out) {
   char path[600], name[32], mend[160];
   (void)snprintf(path, sizeof path, "%s/proc", root);
   DIR *processes = config ? opendir(path) : NULL;
@@ -53,12 +53,13 @@ void doctor_interrupts(const char *root, const wm_config *config, long cpus, fin
                    entry->d_name, priority);
     if (priority < 0) continue;
     if (priority > own)
-      find(out, FINDING_GOOD, "interrupts", "", "%s at priority %d is above the estimator (%d)", name, priority, own);
+      wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_GOOD, "interrupts", "",
+              "%s at priority %d is above the estimator (%d)", name, priority, own);
     else
-      find(out, cpus == 1 ? FINDING_BAD : FINDING_NOTE, "interrupts", mend,
-           "%s at priority %d is not above the estimator (%d): %s", name, priority, own,
-           cpus == 1 ? "with one processor, a cycle that takes long costs frames"
-                     : "where both are on one processor, a cycle that takes long costs frames");
+      wm_find(out, WM_FOUND_COMPUTER_REALTIME, cpus == 1 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "interrupts", mend,
+              "%s at priority %d is not above the estimator (%d): %s", name, priority, own,
+              cpus == 1 ? "with one processor, a cycle that takes long costs frames"
+                        : "where both are on one processor, a cycle that takes long costs frames");
   }
   (void)closedir(processes);
 }

@@ -48,15 +48,15 @@ void doctor_latency(double seconds, int priority, wm_histogram *wake_ns, int *is
   (void)pthread_join(thread, NULL);
 }
 
-void doctor_judge_latency(const wm_histogram *wake_ns, int is_realtime, findings *out) {
+void doctor_judge_latency(const wm_histogram *wake_ns, int is_realtime, wm_findings *out) {
   if (wake_ns->count == 0) return;
-  finding_level level = wake_ns->max_ns > BAD_NS    ? FINDING_BAD
-                        : wake_ns->max_ns > GOOD_NS ? FINDING_NOTE
-                                                    : FINDING_GOOD;
-  find(out, level, "latency",
-       level == FINDING_GOOD ? "" : "see kernel, governor and priority above; then what else runs (`top -H`)",
-       "a %s thread wakes late by %.3f ms (p50), %.3f (p99), %.3f (p99.9), %.3f at most, of %llu",
-       is_realtime ? "real-time" : "normal", (double)wm_histogram_quantile(wake_ns, 0.5) * 1e-6,
-       (double)wm_histogram_quantile(wake_ns, 0.99) * 1e-6, (double)wm_histogram_quantile(wake_ns, 0.999) * 1e-6,
-       (double)wake_ns->max_ns * 1e-6, (unsigned long long)wake_ns->count);
+  wm_severity level = wake_ns->max_ns > BAD_NS    ? WM_SEVERITY_BAD
+                      : wake_ns->max_ns > GOOD_NS ? WM_SEVERITY_NOTE
+                                                  : WM_SEVERITY_GOOD;
+  wm_find(out, WM_FOUND_COMPUTER_REALTIME, level, "latency",
+          level == WM_SEVERITY_GOOD ? "" : "see kernel, governor and priority above; then what else runs (`top -H`)",
+          "a %s thread wakes late by %.3f ms (p50), %.3f (p99), %.3f (p99.9), %.3f at most, of %llu",
+          is_realtime ? "real-time" : "normal", (double)wm_histogram_quantile(wake_ns, 0.5) * 1e-6,
+          (double)wm_histogram_quantile(wake_ns, 0.99) * 1e-6, (double)wm_histogram_quantile(wake_ns, 0.999) * 1e-6,
+          (double)wake_ns->max_ns * 1e-6, (unsigned long long)wake_ns->count);
 }

@@ -29,6 +29,8 @@ void watch_health(watch *self, const void *message, size_t length, wm_time_ns no
     self->not_understood++;
     return;
   }
+  self->found.count = self->found.dropped = 0;
+  wm_health_findings(&self->health, &self->found);
   self->has_health = 1;
   self->health_at_ns = now_ns;
 }
@@ -145,6 +147,8 @@ void watch_print(const watch *self, wm_time_ns now_ns, FILE *to) {
     (void)fprintf(to, "deadlines  %" PRIu64 " of %" PRIu64 " missed\nsources\n", self->health.deadlines_missed,
                   self->health.loops + self->health.deadlines_missed);
     for (uint32_t i = 0; i < self->health.source_count; i++) print_source(&self->health.sources[i], to);
+    if (self->found.count > 0) (void)fputs("findings\n", to);
+    wm_findings_print(&self->found, to);
   }
   if (self->not_understood > 0)
     (void)fprintf(to, "%" PRIu64 " messages are of another version of waymark\n", self->not_understood);

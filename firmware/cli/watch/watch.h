@@ -5,12 +5,14 @@
 
 #include <stdio.h>
 
+#include "findings/findings.h"
 #include "waymark/health.h"
 #include "waymark/pose.h"
 
 typedef struct watch {
   wm_published pose;
   wm_health health;
+  wm_findings found;  // of that health
   int has_pose, has_health;
   wm_time_ns pose_at_ns, health_at_ns;  // arrival, on this computer's clock
   double rate_hz;                       // of poses, smoothed

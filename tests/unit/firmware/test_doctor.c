@@ -9,7 +9,7 @@
 #include "unity.h"
 
 static char root[64];
-static findings found;
+static wm_findings found;
 
 void setUp(void) {
   memset(&found, 0, sizeof found);
@@ -33,7 +33,7 @@ static void put(const char *path, const char *text) {
   (void)fclose(f);
 }
 
-static const finding *about(const char *what) {
+static const wm_finding *about(const char *what) {
   for (size_t i = 0; i < found.count; i++)
     if (strcmp(found.at[i].about, what) == 0) return &found.at[i];
   TEST_FAIL_MESSAGE(what);
@@ -41,11 +41,11 @@ static const finding *about(const char *what) {
 }
 
 // Everything that isn't good says what to do.
-static void expect(const char *what, finding_level level, const char *text) {
-  const finding *f = about(what);
-  TEST_ASSERT_EQUAL_MESSAGE(level, f->level, f->text);
+static void expect(const char *what, wm_severity level, const char *text) {
+  const wm_finding *f = about(what);
+  TEST_ASSERT_EQUAL_MESSAGE(level, f->severity, f->text);
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(f->text, text), f->text);
-  TEST_ASSERT_EQUAL_MESSAGE(level == FINDING_GOOD, f->mend[0] == '\0', f->mend);
+  TEST_ASSERT_EQUAL_MESSAGE(level == WM_SEVERITY_GOOD, f->fix[0] == '\0', f->fix);
 }
 
 static void a_good_computer_is_found_good(void) {
@@ -57,11 +57,11 @@ static void a_good_computer_is_found_good(void) {
   doctor_kernel(root, &found);
   doctor_clocks(root, &found);
   doctor_power(root, &found);
-  expect("kernel", FINDING_GOOD, "PREEMPT_RT");
-  expect("throttling", FINDING_GOOD, "95 %");
-  expect("clock", FINDING_GOOD, "tsc");
-  expect("governor", FINDING_GOOD, "performance");
-  expect("temperature", FINDING_GOOD, "45 degrees");
+  expect("kernel", WM_SEVERITY_GOOD, "PREEMPT_RT");
+  expect("throttling", WM_SEVERITY_GOOD, "95 %");
+  expect("clock", WM_SEVERITY_GOOD, "tsc");
+  expect("governor", WM_SEVERITY_GOOD, "performance");
+  expect("temperature", WM_SEVERITY_GOOD, "45 degrees");
 }
 
 static void what_is_broken_is_found(void) {
@@ -74,11 +74,11 @@ static void what_is_broken_is_found(void) {
   doctor_kernel(root, &found);
   doctor_clocks(root, &found);
   doctor_power(root, &found);
-  expect("kernel", FINDING_NOTE, "is not PREEMPT_RT");
-  expect("throttling", FINDING_NOTE, "is off");
-  expect("clock", FINDING_BAD, "hpet");
-  expect("governor", FINDING_BAD, "1 of 2 CPUs have the governor powersave");
-  expect("temperature", FINDING_BAD, "91 degrees");
+  expect("kernel", WM_SEVERITY_NOTE, "is not PREEMPT_RT");
+  expect("throttling", WM_SEVERITY_NOTE, "is off");
+  expect("clock", WM_SEVERITY_BAD, "hpet");
+  expect("governor", WM_SEVERITY_BAD, "1 of 2 CPUs have the governor powersave");
+  expect("temperature", WM_SEVERITY_BAD, "91 degrees");
 }
 
 static void can_interfaces_are_looked_at(void) {
@@ -94,10 +94,10 @@ static void can_interfaces_are_looked_at(void) {
   put("/sys/class/net/can1/flags", "0x40c0\n");
   put("/sys/class/net/eth0/type", "1\n");
   doctor_can(root, &config, &found);
-  expect("can can0", FINDING_BAD, "lost 7 frames");
-  expect("can can1", FINDING_BAD, "is down");
-  expect("can can2", FINDING_BAD, "no interface");
-  expect("can eth0", FINDING_BAD, "is no CAN interface");
+  expect("can can0", WM_SEVERITY_BAD, "lost 7 frames");
+  expect("can can1", WM_SEVERITY_BAD, "is down");
+  expect("can can2", WM_SEVERITY_BAD, "no interface");
+  expect("can eth0", WM_SEVERITY_BAD, "is no CAN interface");
 }
 
 static void interrupts_below_the_estimator_are_found(void) {
@@ -111,14 +111,14 @@ static void interrupts_below_the_estimator_are_found(void) {
       "0 0 0 2147483647 0 0 0 0 17 0 50 1 0 0 0 0 0 0 0 0 0 0 0\n");
   config.runtime.realtime_priority = 80;
   doctor_interrupts(root, &config, 1, &found);
-  expect("interrupts", FINDING_BAD, "irq/23-can0 at priority 50 is not above the estimator (80)");
+  expect("interrupts", WM_SEVERITY_BAD, "irq/23-can0 at priority 50 is not above the estimator (80)");
   memset(&found, 0, sizeof found);
   doctor_interrupts(root, &config, 4, &found);
-  expect("interrupts", FINDING_NOTE, "where both are on one processor");
+  expect("interrupts", WM_SEVERITY_NOTE, "where both are on one processor");
   memset(&found, 0, sizeof found);
   config.runtime.realtime_priority = 40;
   doctor_interrupts(root, &config, 1, &found);
-  expect("interrupts", FINDING_GOOD, "is above");
+  expect("interrupts", WM_SEVERITY_GOOD, "is above");
 }
 
 static void cameras_are_looked_at(void) {
@@ -129,15 +129,16 @@ static void cameras_are_looked_at(void) {
   (void)snprintf(config.devices.cameras[1].name, WM_NAME_MAX, "rear");
   (void)snprintf(config.devices.cameras[1].device, sizeof config.devices.cameras[1].device, "/dev/null");
   doctor_cameras(&config, &found);
-  expect("camera front", FINDING_BAD, "No such file");
-  expect("camera rear", FINDING_GOOD, "/dev/null is there");
+  expect("camera front", WM_SEVERITY_BAD, "No such file");
+  expect("camera rear", WM_SEVERITY_GOOD, "/dev/null is there");
 }
 
 static void no_way_for_messages_is_found(void) {
   doctor_lcm("udpm://239.255.76.67:7667?ttl=1", &found);
-  const finding *f = about("lcm");
-  TEST_ASSERT_TRUE(f->level == FINDING_NOTE || f->level == FINDING_BAD);  // without a network it is the latter
-  TEST_ASSERT_TRUE(f->mend[0] != '\0');
+  const wm_finding *f = about("lcm");
+  TEST_ASSERT_TRUE(f->severity == WM_SEVERITY_NOTE ||
+                   f->severity == WM_SEVERITY_BAD);  // without a network it is the latter
+  TEST_ASSERT_TRUE(f->fix[0] != '\0');
 }
 
 static void latency_is_measured(void) {
@@ -153,16 +154,16 @@ static void latency_is_measured(void) {
   memset(&found, 0, sizeof found);
   wm_histogram_add(&wake_ns, 20 * WM_NS_PER_MS);
   doctor_judge_latency(&wake_ns, 1, &found);
-  expect("latency", FINDING_BAD, "a real-time thread");
+  expect("latency", WM_SEVERITY_BAD, "a real-time thread");
 }
 
 static void a_short_can_queue_is_found(void) {
   doctor_can_queue(1 << 20, 212992, &found);
-  expect("can queue", FINDING_NOTE, "holds 139 ms of a full bus (208 kB of the 1024 that are asked for)");
-  TEST_ASSERT_NOT_NULL(strstr(about("can queue")->mend, "net.core.rmem_max=1048576"));
+  expect("can queue", WM_SEVERITY_NOTE, "holds 139 ms of a full bus (208 kB of the 1024 that are asked for)");
+  TEST_ASSERT_NOT_NULL(strstr(about("can queue")->fix, "net.core.rmem_max=1048576"));
   memset(&found, 0, sizeof found);
   doctor_can_queue(1 << 20, 1 << 20, &found);
-  expect("can queue", FINDING_GOOD, "holds 683 ms");
+  expect("can queue", WM_SEVERITY_GOOD, "holds 683 ms");
 }
 
 int main(void) {

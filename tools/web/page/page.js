@@ -571,7 +571,13 @@ function show_health() {
   for (const c of h.calibration) more.push(row([[c.name, 'name'], [fixed(c.value, 5)], [c.sigma === null ? '' : '\u00b1 ' + c.sigma.toPrecision(2)]]));
   $('more').replaceChildren(...more);
   $('more').closest('details').hidden = more.length === 0;
-  $('findings').replaceChildren(...h.findings.map(f => element('li', f)));
+  $('findings').replaceChildren(...h.findings.map(f => {
+    const line = element('li', '', f.severity);
+    line.append(element('b', f.about), ' ' + f.text);
+    if (f.fix) line.append(element('p', f.fix));
+    line.append(element('code', f.id));
+    return line;
+  }));
   $('findings-card').hidden = h.findings.length === 0;
 }
 function show_foot() {

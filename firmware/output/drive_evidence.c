@@ -1,0 +1,308 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether the observations of a drive agree with its poses. Limits: on 29 drives with good configurations (real and
+// simulated, docs/estimators.md) at most 14 % of the updates are refused where the map is known, the mean square of the
+// innovations over their sigma is at most 1.34, and the pose is lost for at most 0.5 % of the time.
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "output/drive_evidence.h"
+
+#define OBSERVATIONS_MIN 20
+#define REFUSED_NOTE 0.07
+#define REFUSED_BAD 0.20
+#define LOST_BAD 0.05
+#define SQUARES_BAD 3.0  // mean square of innovations over their sigma; 1 is expected, correlated errors make it less
+#define FACTOR_BAD 3.0   // of a sensor's stated sigma
+// Mean of the innovations over their sigma. Errors that last are correlated, so a tenth of a sigma is usual.
+#define BIAS_NOTE 0.5
+// Ranges of radio and ultrasound are some per cent long; a tape measure and a map are not off by 2 %.
+#define RANGE_RATIO_NOTE 0.02
+#define RANGE_MIN_M 0.5       // of a ratio: below, a range is mostly noise and mounting
+#define RANGE_RATIO_MAX 0.25  // of a ratio: beyond, it is an outlier
+#define START_S 15.0          // a new pose this soon after the start contradicts the start
+// Of a start: what a tape measure and a look along the robot's side give.
+#define START_JUMP_M 0.5
+#define START_JUMP_RAD 0.35
+
+static landmark_evidence *landmark(drive_evidence *self, int32_t id) {
+  for (size_t i = 0; i < self->landmark_count; i++)
+    if (self->landmarks[i].id == id) return &self->landmarks[i];
+  if (self->landmark_count == EVIDENCE_LANDMARKS_MAX) return NULL;
+  landmark_evidence *new = &self->landmarks[self->landmark_count++];
+  *new = (landmark_evidence){.id = id};
+  return new;
+}
+
+// Log density of an outlier, which has any value: over a turn, over 50 m, over a picture of 1000 px, over half a turn.
+static double outlier(unsigned residual) {
+  static const double kLog[WM_RESIDUAL_COUNT] = {
+      [WM_RESIDUAL_BEARING] = -1.84, [WM_RESIDUAL_RANGE] = -3.91,    [WM_RESIDUAL_X] = -3.91,
+      [WM_RESIDUAL_Y] = -3.91,       [WM_RESIDUAL_Z] = -3.91,        [WM_RESIDUAL_HEADING] = -1.84,
+      [WM_RESIDUAL_PIXEL] = -6.91,   [WM_RESIDUAL_ELEVATION] = -1.14};
+  return kLog[residual];
+}
+
+static void take_ratio(residual_evidence *r, const wm_innovation *in) {
+  if (in->residual != WM_RESIDUAL_RANGE || !(in->expected > RANGE_MIN_M)) return;
+  if (in->verdict != WM_FUSED && in->verdict != WM_REJECTED_GATE) return;
+  const double ratio = in->observed / in->expected - 1;
+  if (!(fabs(ratio) < RANGE_RATIO_MAX)) return;
+  r->ratio += ratio;
+  r->ratio_squares += ratio * ratio;
+  r->ratios++;
+}
+
+static void take(drive_evidence *self, const wm_innovation *in) {
+  double log_likelihood = outlier(in->residual);
+  self->updates += in->residual != WM_RESIDUAL_STANDSTILL;
+  residual_evidence *r = &self->residuals[in->source][in->residual];
+  landmark_evidence *l = in->landmark_id >= 0 ? landmark(self, in->landmark_id) : NULL;
+  take_ratio(r, in);
+  if (in->verdict == WM_FUSED) {
+    double difference = in->observed - in->expected;
+    if (in->residual == WM_RESIDUAL_BEARING || in->residual == WM_RESIDUAL_HEADING)
+      difference = remainder(difference, 2 * M_PI);
+    const double scaled = in->variance > 0 ? difference / sqrt(in->variance) : 0;
+    r->fused++;
+    r->sum += scaled;
+    r->squares += scaled * scaled;
+    if (in->variance > 0 && in->residual != WM_RESIDUAL_STANDSTILL) {
+      log_likelihood = fmax(log_likelihood, -0.5 * scaled * scaled - 0.5 * log(2 * M_PI * in->variance));
+      self->fused++;
+    }
+    if (l) l->fused++;
+  } else if (in->verdict == WM_REJECTED_GATE || in->verdict == WM_REJECTED_SEARCHING) {
+    r->refused++;
+    if (l) l->refused++;
+  } else if (in->verdict == WM_REJECTED_UNKNOWN_ID && l) {
+    l->unknown++;
+  }
+  self->log_likelihood += log_likelihood;
+}
+
+double evidence_score(const drive_evidence *self) {
+  return self->updates > 0 ? self->log_likelihood / (double)self->updates : -(double)INFINITY;
+}
+
+static void take_event(drive_evidence *self, const wm_event *event) {
+  if (!self->has_events) self->first_ns = event->t_ns;
+  self->has_events = 1;
+  self->last_ns = event->t_ns;
+}
+
+static void take_published(drive_evidence *self, const wm_published *p) {
+  if (p->now.state < EVIDENCE_STATES) self->states[p->now.state]++;
+  if (self->published++ == 0) self->begun = *p;
+  const double after_s = wm_seconds_between(self->begun.now.t_ns, p->now.t_ns);
+  if (self->start_moved_s > 0 || after_s > START_S || p->now.resets == self->begun.now.resets) return;
+  self->start_moved_s = after_s;
+  self->start_moved_m = p->last_jump_m;
+  self->start_turned_rad = p->last_jump_rad;
+}
+
+void evidence_put(drive_evidence *self, wm_output_kind kind, const void *record) {
+  if (kind == WM_OUTPUT_INNOVATION) take(self, record);
+  if (kind == WM_OUTPUT_PUBLISHED) take_published(self, record);
+  if (kind == WM_OUTPUT_EVENT) take_event(self, record);
+  self->poses += kind == WM_OUTPUT_POSE;
+}
+
+uint64_t evidence_due(const drive_evidence *self, double publish_rate_hz) {
+  return self->has_events ? (uint64_t)(wm_seconds_between(self->first_ns, self->last_ns) * publish_rate_hz) : 0;
+}
+
+double evidence_share(const drive_evidence *self, wm_state state, uint64_t total) {
+  uint64_t count = self->states[state];
+  if (state == WM_STATE_SEARCHING && total > self->published) count += total - self->published;
+  return total > 0 ? (double)count / (double)total : 0;
+}
+
+// ── findings ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static void refused(const drive_evidence *self, const wm_assembly *assembly, size_t i, wm_findings *out) {
+  uint64_t fused = 0, refused = 0, worst = 0;
+  double squares = 0;
+  for (size_t k = 0; k < WM_RESIDUAL_COUNT; k++) {
+    const residual_evidence *r = &self->residuals[i][k];
+    fused += r->fused;
+    refused += r->refused;
+    if (r->fused >= OBSERVATIONS_MIN && r->squares / (double)r->fused > squares) {
+      squares = r->squares / (double)r->fused;
+      worst = k;
+    }
+  }
+  const char *name = wm_assembly_source_name(assembly, i);
+  const double share = fused + refused > 0 ? (double)refused / (double)(fused + refused) : 0;
+  if (fused + refused >= OBSERVATIONS_MIN && share > REFUSED_NOTE)
+    wm_find(out, WM_FOUND_OBSERVATIONS_REFUSED, share > REFUSED_BAD ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, name, NULL,
+            "%.0f of 100 of its updates contradict the pose and are refused", 100 * share)
+        ->size = share;
+  if (squares > SQUARES_BAD)
+    wm_find(out, WM_FOUND_NOISE_TOO_SMALL, WM_SEVERITY_BAD, name, NULL,
+            "its innovations (%s) are %.1f times as large as stated", wm_residual_name((unsigned)worst), sqrt(squares))
+        ->size = sqrt(squares);
+}
+
+// Innovations with a mean: a scale or an offset that no state takes up.
+static void biased(const drive_evidence *self, const wm_assembly *assembly, size_t i, int is_lost, wm_findings *out) {
+  const residual_evidence *ranges = &self->residuals[i][WM_RESIDUAL_RANGE];
+  const double ratio = ranges->ratios > 0 ? ranges->ratio / (double)ranges->ratios : 0;
+  const char *name = wm_assembly_source_name(assembly, i);
+  if (is_lost) return;  // the poses are wrong as well
+  for (unsigned k = 0; k < WM_RESIDUAL_COUNT; k++) {
+    const residual_evidence *r = &self->residuals[i][k];
+    const double mean = r->fused >= 5 * OBSERVATIONS_MIN ? r->sum / (double)r->fused : 0;
+    if (k == WM_RESIDUAL_STANDSTILL || fabs(mean) < BIAS_NOTE) continue;
+    if (k == WM_RESIDUAL_RANGE && fabs(ratio) > RANGE_RATIO_NOTE) continue;  // the finding below
+    wm_find(out, WM_FOUND_OBSERVATIONS_BIASED, WM_SEVERITY_NOTE, name, NULL,
+            "its innovations (%s) have a mean of %.1f sigma: what is observed is too %s", wm_residual_name(k), mean,
+            mean > 0 ? "large" : "small")
+        ->size = mean;
+  }
+  // A scale is common to all ranges: most of the deviation is the mean's.
+  if (ranges->ratios < 5 * OBSERVATIONS_MIN || fabs(ratio) < RANGE_RATIO_NOTE ||
+      ratio * ratio * (double)ranges->ratios < 0.5 * ranges->ratio_squares)
+    return;
+  char fix[WM_FINDING_FIX_MAX];
+  (void)snprintf(fix, sizeof fix,
+                 "multiply range_m by %.3f, or let the scale be estimated (sightings: {states: {range_scale_sigma: "
+                 "0.1}}); is the map in the right unit?",
+                 1 / (1 + ratio));
+  wm_find(out, WM_FOUND_OBSERVATIONS_BIASED, WM_SEVERITY_NOTE, name, fix,
+          "its ranges are %.1f %% %s than the map has them, on average", 100 * fabs(ratio),
+          ratio > 0 ? "longer" : "shorter")
+      ->size = ratio;
+}
+
+// A parameter of the estimator; NaN where it has none of this name.
+static double parameter(const wm_config *config, const char *key) {
+  const wm_param_table *table = &config->estimator->params;
+  for (size_t i = 0; i < table->count; i++)
+    if (strcmp(table->params[i].key, key) == 0 && table->params[i].type == WM_PARAM_F64) {
+      double value;
+      memcpy(&value, (const char *)config->estimator_params + table->params[i].offset, sizeof value);
+      return value;
+    }
+  return (double)NAN;
+}
+
+static void not_found(const wm_assembly *assembly, double share, wm_findings *out) {
+  const double limit_m = parameter(assembly->config, "recover.sigma_xy_m");
+  char fix[WM_FINDING_FIX_MAX];
+  // A limit in metres is not reached where the positions or ranges have a larger sigma.
+  const int is_limited =
+      limit_m > 0 && (assembly->kinds & (WM_EVENT_BIT(WM_EVENT_POSITION) | WM_EVENT_BIT(WM_EVENT_SIGHTING)));
+  if (is_limited)
+    (void)snprintf(fix, sizeof fix,
+                   "leave %s.recover.sigma_xy_m out (it is %g m: a pose with a larger sigma is not accepted), or give "
+                   "vehicle.initial_pose in recording.yaml",
+                   assembly->config->estimator->name, limit_m);
+  wm_find(out, WM_FOUND_POSE_NOT_FOUND, WM_SEVERITY_BAD, "drive", is_limited ? fix : NULL,
+          share < 1 ? "no pose is found for %.0f %% of the drive" : "no pose was ever found (%.0f %% of the drive)",
+          100 * share)
+      ->size = share;
+}
+
+static void states(const drive_evidence *self, const wm_assembly *assembly, uint64_t total, wm_findings *out) {
+  if (self->published == 0 && self->poses > 0) return;  // a log: it holds no messages
+  const double lost = evidence_share(self, WM_STATE_LOST, total);
+  const double searching = evidence_share(self, WM_STATE_SEARCHING, total);
+  if (lost > LOST_BAD)
+    wm_find(out, WM_FOUND_POSE_LOST, WM_SEVERITY_BAD, "drive", NULL,
+            "the pose is lost for %.0f %% of the drive: what is observed contradicts it", 100 * lost)
+        ->size = lost;
+  if (searching > 0.5) not_found(assembly, searching, out);
+}
+
+static void start(const drive_evidence *self, const wm_assembly *assembly, wm_findings *out) {
+  const wm_start *given = &assembly->setup.start;
+  if (isnan(given->p_m[0]) || isnan(given->heading_rad) || !(self->start_moved_s > 0)) return;
+  if (self->start_moved_m < START_JUMP_M && self->start_turned_rad < START_JUMP_RAD) return;
+  wm_find(
+      out, WM_FOUND_START_CONTRADICTED, WM_SEVERITY_NOTE, "start", NULL,
+      "initial_pose is contradicted: after %.1f s the pose was found %.2f m from where it was, turned by %.0f degrees",
+      self->start_moved_s, self->start_moved_m, self->start_turned_rad * 180 / M_PI)
+      ->size = self->start_moved_m;
+}
+
+// Landmarks of which most sightings are refused while most of the others fit.
+static void landmarks(const drive_evidence *self, wm_findings *out) {
+  uint64_t fused = 0, contradict = 0;
+  for (size_t i = 0; i < self->landmark_count; i++) {
+    fused += self->landmarks[i].fused;
+    contradict += self->landmarks[i].refused;
+  }
+  if ((double)contradict > REFUSED_BAD * (double)(fused + contradict)) return;  // then it isn't one landmark
+  for (size_t i = 0; i < self->landmark_count; i++) {
+    const landmark_evidence *l = &self->landmarks[i];
+    const uint64_t all = l->fused + l->refused;
+    if (all >= OBSERVATIONS_MIN && (double)l->refused > 0.5 * (double)all)
+      wm_find(out, WM_FOUND_LANDMARK_CONTRADICTED, WM_SEVERITY_NOTE, "landmarks", NULL,
+              "landmark %" PRId32 ": %" PRIu64 " of %" PRIu64 " updates contradict the pose", l->id, l->refused, all)
+          ->size = (double)l->refused / (double)all;
+  }
+}
+
+// Landmarks that are seen, but are not on the map, in one line.
+static void unknown(const drive_evidence *self, wm_findings *out) {
+  char ids[160];
+  size_t used = 0, count = 0;
+  for (size_t i = 0; i < self->landmark_count; i++) {
+    if (self->landmarks[i].unknown < OBSERVATIONS_MIN) continue;
+    count++;
+    const int n = snprintf(ids + used, sizeof ids - used, "%s%" PRId32, used ? ", " : "", self->landmarks[i].id);
+    if (n > 0 && used + (size_t)n < sizeof ids) used += (size_t)n;
+  }
+  if (count > 0)
+    wm_find(out, WM_FOUND_LANDMARK_NOT_ON_MAP, WM_SEVERITY_NOTE, "landmarks",
+            "add them to landmarks.csv, leave them if they are not of this place, or map them (estimator: slam)",
+            "%zu landmarks are seen that are not on the map: %.*s", count, (int)used, ids)
+        ->size = (double)count;
+}
+
+// A state of calibration that ended where no tape measure and no data sheet would put it.
+static void calibration(const wm_health *health, wm_findings *out) {
+  static const struct {
+    const char *ending;
+    double expected, least, most;  // a note beyond
+    double bad_least, bad_most;
+    const char *fix;
+  } kLimits[] = {
+      // A scale of ranges has no tyre and no temperature: beyond 3 % a unit, a map or a marker's size is off.
+      {"range_scale", 1, 0.97, 1.03, 1 / 1.8, 1.8,
+       "ranges are too long (above 1) or too short: divide range_m by this"},
+      // Tyres, ranges and gyros are off by some per cent; beyond a factor of 1.8 it is another radius, track or unit.
+      {"_scale", 1, 1 / 1.2, 1.2, 1 / 1.8, 1.8, "multiply the value that it scales by this factor"},
+      {"noise.", 1, 0, FACTOR_BAD, 0, FACTOR_BAD, "the stated sigma is too small, or what is observed does not fit"},
+      // A tenth of a second is more than cameras and lasers need; 0.17 rad of yaw are seen with the naked eye.
+      {".time_offset_s", 0, -0.1, 0.1, -0.25, 0.25, "correct the stamps of this sensor by this time"},
+      {".yaw_rad", 0, -0.17, 0.17, -0.8, 0.8, "turn the sensor's mounting (rpy_deg, the last number) by this angle"},
+  };
+  for (uint32_t i = 0; i < health->calibration_count; i++) {
+    const wm_calibration_value *c = &health->calibration[i];
+    for (size_t k = 0; k < sizeof kLimits / sizeof kLimits[0]; k++) {
+      if (!strstr(c->name, kLimits[k].ending) || (c->value >= kLimits[k].least && c->value <= kLimits[k].most))
+        continue;
+      if (fabs(c->value - kLimits[k].expected) < 3 * c->sigma) continue;
+      const int is_bad = c->value < kLimits[k].bad_least || c->value > kLimits[k].bad_most;
+      wm_find(out, WM_FOUND_CALIBRATION_OFF, is_bad ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "calibration", kLimits[k].fix,
+              "%s is %.4g +- %.2g at the end; %g was expected", c->name, c->value, c->sigma, kLimits[k].expected)
+          ->size = c->value;
+      break;
+    }
+  }
+}
+
+void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health, uint64_t total,
+                    wm_findings *out) {
+  for (size_t i = 0; i < assembly->source_count; i++) refused(self, assembly, i, out);
+  const int is_lost = evidence_share(self, WM_STATE_LOST, total) > LOST_BAD;
+  for (size_t i = 0; i < assembly->source_count; i++) biased(self, assembly, i, is_lost, out);
+  states(self, assembly, total, out);
+  start(self, assembly, out);
+  landmarks(self, out);
+  unknown(self, out);
+  calibration(health, out);
+}
