@@ -38,15 +38,71 @@ static presence presence_of(const wm_can_decoder *self, const bound_signal *s, c
   return signal_bytes(&s->bits) > length ? TOO_SHORT : PRESENT;
 }
 
-// A tick counter continues from its last value by the shorter way round, so that it may run backwards.
-static double unwrap(bound_signal *s, uint64_t raw) {
+// A counter is silent for longer than this and so many of its periods, as a speed is overdue
+// (estimator/motion/history.hpp).
+#define SILENT_NS (250 * WM_NS_PER_MS)
+#define SILENT_PERIODS 3
+// A rate is that of so long: jitter of stamps and bursts of an adapter average out.
+#define RATE_OVER_NS (100 * WM_NS_PER_MS)
+// In a silence a wheel may turn so much faster than ever before, and against its faster direction at least with this
+// share of that. Margins for drives of which little was seen; not swept.
+#define FASTER_THAN_EVER 1.5
+#define OTHER_DIRECTION 0.5
+// A change below this share of a cycle, faster than ever: the next possible one would be 15 times as fast.
+#define CLEARLY_SHORTER (1.0 / 16.0)
+// Bits. Longer counters do not wrap while a robot runs, and doubles hold their differences.
+#define WRAPPING_BITS_MOST 48u
+
+// The fastest of two rates in a row: one alone may be a damaged frame's.
+static void note_rate(tick_rates *r, int64_t step, wm_time_ns t_ns) {
+  r->ticks += step;
+  const wm_time_ns over_ns = t_ns - r->since_ns;
+  if (over_ns < RATE_OVER_NS) return;
+  const double rate = (double)r->ticks / ((double)over_ns * 1e-9);
+  r->up = fmax(r->up, fmin(rate, r->before));
+  r->down = fmax(r->down, fmin(-rate, -r->before));
+  r->before = rate;
+  r->since_ns = t_ns;
+  r->ticks = 0;
+}
+
+// Of a counter that was silent, `step` by the shorter way round: adds the cycles with which it is within the rates that
+// the robot may have had. 0 where more numbers of cycles are possible, or none.
+static int resolve_cycles(const bound_signal *s, wm_time_ns silent_ns, int64_t *step) {
+  if (s->bits.length > WRAPPING_BITS_MOST) return 1;
+  const tick_rates *r = &s->rates;
+  const double cycle = ldexp(1.0, (int)s->bits.length), silent_s = (double)silent_ns * 1e-9, by = (double)*step;
+  const double up = FASTER_THAN_EVER * fmax(r->up, OTHER_DIRECTION * r->down) * silent_s + 1.0;
+  const double down = FASTER_THAN_EVER * fmax(r->down, OTHER_DIRECTION * r->up) * silent_s + 1.0;
+  const double fewest = ceil((-down - by) / cycle), most = floor((up - by) / cycle);
+  if (fewest > most) return fabs(by) < CLEARLY_SHORTER * cycle;
+  *step += (int64_t)(fewest * cycle);
+  return fewest == most;
+}
+
+// A tick counter continues from its last value by the shorter way round, so that it may run backwards. After a silence
+// it may have gone further: *doubt where its difference is unknown.
+static double unwrap(bound_signal *s, uint64_t raw, wm_time_ns t_ns, uint8_t *doubt) {
+  tick_rates *r = &s->rates;
   if (s->has_last) {
-    uint64_t step = (raw - s->last) & (UINT64_MAX >> (64u - s->bits.length));
-    s->unwrapped = (int64_t)((uint64_t)s->unwrapped + (uint64_t)sign_extend(step, s->bits.length));
+    int64_t step = sign_extend((raw - s->last) & (UINT64_MAX >> (64u - s->bits.length)), s->bits.length);
+    const wm_time_ns since_ns = t_ns - r->last_ns;
+    const int is_silent = r->period_ns > 0 && since_ns > SILENT_NS && since_ns > SILENT_PERIODS * r->period_ns;
+    if (is_silent) {
+      if (!resolve_cycles(s, since_ns, &step)) *doubt |= WM_DOUBT_COUNTS_WRAPPED;
+      r->since_ns = t_ns;
+      r->ticks = 0;
+    } else {
+      note_rate(r, step, t_ns);
+      r->period_ns = since_ns;
+    }
+    s->unwrapped = (int64_t)((uint64_t)s->unwrapped + (uint64_t)step);
   } else {
     s->unwrapped = s->bits.kind == SIGNAL_SIGNED ? sign_extend(raw, s->bits.length) : (int64_t)raw;
     s->has_last = 1;
+    r->since_ns = t_ns;
   }
+  r->last_ns = t_ns;
   s->last = raw;
   return (double)s->unwrapped;
 }
@@ -78,13 +134,14 @@ static int gear_value(const bound_quantity *q, double number, double *out) {
 }
 
 // Sum of the signals in SI. 0 where the value is marked as not available.
-static int quantity_value(const bound_quantity *q, bound_signal *signals, const payload *data, double *out) {
+static int quantity_value(const bound_quantity *q, bound_signal *signals, const payload *data, wm_time_ns t_ns,
+                          uint8_t *doubt, double *out) {
   int is_ticks = q->quantity == WM_Q_WHEEL_TICKS_LEFT || q->quantity == WM_Q_WHEEL_TICKS_RIGHT;
   double sum = 0.0;
   for (uint32_t i = 0; i < q->signal_count; i++) {
     bound_signal *s = &signals[i];
     uint64_t raw = signal_raw(&s->bits, data);
-    double number = is_ticks ? unwrap(s, raw) : signal_number(&s->bits, raw);
+    double number = is_ticks ? unwrap(s, raw, t_ns, doubt) : signal_number(&s->bits, raw);
     if (says_no_value(s, raw)) return 0;
     if (q->quantity != WM_Q_GEAR) {
       sum += (number * s->factor + s->offset) * s->si;
@@ -135,7 +192,8 @@ static wm_status decode_message(wm_can_decoder *self, bound_message *m, const wm
   for (uint32_t i = 0; i < m->quantity_count; i++) {
     if (there[i] == ABSENT || out->count == WM_QUANTITIES_MAX) continue;
     double value = 0.0;
-    if (!quantity_value(&quantities[i], &self->signals[quantities[i].first_signal], data, &value)) {
+    bound_signal *signals = &self->signals[quantities[i].first_signal];
+    if (!quantity_value(&quantities[i], signals, data, frame->t_ns, &out->doubt, &value)) {
       refused++;
       continue;
     }

@@ -15,15 +15,25 @@ typedef struct bound_selector {
   uint32_t first_range, range_count;
 } bound_selector;
 
+// Rates of a tick counter, ticks per s.
+typedef struct tick_rates {
+  wm_time_ns last_ns, period_ns;  // of the newest count; between the two before, 0: unknown
+  wm_time_ns since_ns;            // a rate is that of the ticks since then
+  int64_t ticks;
+  double before;    // the rate before
+  double up, down;  // the fastest rates so far in either direction, 0 or above
+} tick_rates;
+
 typedef struct bound_signal {
   signal_bits bits;
   double factor, offset, si;  // (number * factor + offset) * si
   uint32_t first_selector, selector_count;
   uint32_t no_value_count;  // raw values for "not available"
   uint64_t no_value[NO_VALUE_MAX];
-  int has_last;  // ticks only
+  int has_last;  // ticks only, as the rest
   uint64_t last;
   int64_t unwrapped;
+  tick_rates rates;
 } bound_signal;
 
 typedef struct bound_quantity {

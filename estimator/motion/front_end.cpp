@@ -56,7 +56,8 @@ void motion_front_end::init(const wm_motion_params *params, const wm_wheels *whe
   commands_ = are_commands(*params) || params->twist == WM_TWIST_COMMANDS ? kStated : 0;
   if (params->model == WM_MOTION_CONSTANT_VELOCITY) model_ = WM_MOTION_CONSTANT_VELOCITY;
   hold_max_ns_ = wm_ns_from_seconds(params->hold_max_s);
-  now_ns_ = newest_ns_ = fed_ns_ = still_since_ns_ = yaw_same_since_ns_ = WM_TIME_NONE;
+  position_m2_ = std::numeric_limits<double>::infinity();
+  now_ns_ = newest_ns_ = fed_ns_ = wrapped_ns_ = still_since_ns_ = yaw_same_since_ns_ = WM_TIME_NONE;
   refused_since_ns_ = last_refusal_ns_ = WM_TIME_NONE;
   for (wm_time_ns &stamp : stamp_ns_) stamp = WM_TIME_NONE;
   for (wm_time_ns &stamp : message_ns_) stamp = WM_TIME_NONE;
@@ -163,25 +164,27 @@ void motion_front_end::take_quantities(const wm_event &event) {
   const wm_quantities &q = event.as.quantities;
   const bool frozen = (q.doubt & WM_DOUBT_FROZEN_COUNTER) != 0;
   health_ = frozen ? health_ | WM_MOTION_HEALTH_COUNTER_FROZEN : health_ & ~WM_MOTION_HEALTH_COUNTER_FROZEN;
+  const bool wrapped = (q.doubt & WM_DOUBT_COUNTS_WRAPPED) != 0 && !frozen;
+  if (wrapped) take_wrapped(q, event.t_ns);
   const bool refused = frozen || !is_plausible(q, event.t_ns);
   uint32_t fresh = 0;
   for (int i = 0; i < q.count; i++) {
     const int id = q.id[i];
     fresh |= quantity_bit(id);
     if (refused) continue;  // the value before still holds; its noise grows
-    if (is_count(id)) take_count(id, event.t_ns, q.value[i]);
+    if (is_count(id) && !wrapped) take_count(id, event.t_ns, q.value[i]);
     value_[id] = q.value[i];
     stamp_ns_[id] = event.t_ns;
   }
   choose_model(WM_EVENT_BIT(WM_EVENT_QUANTITIES));
   if ((fresh & kCounts) && !refused) watch_encoders();
   if (model_ != WM_MOTION_TICKS) {
-    push_quantities(event.t_ns, fresh, frozen, refused);
+    push_quantities(event.t_ns, fresh, frozen, refused || wrapped);
     return;
   }
   double v = 0.0;
   if ((fresh & quantity_bit(WM_Q_YAW_RATE)) && !refused && read_speed(&v)) watch_yaw_rate(event.t_ns, v, true);
-  if (fresh & kCounts) push_ticks(event.t_ns, frozen, refused);
+  if (fresh & kCounts) push_ticks(event.t_ns, frozen, refused || wrapped);
 }
 
 // `fresh`: the quantities of this message, a bit each.
@@ -329,7 +332,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   note_samples(&input);
   input.standing = still_since_ns_ != WM_TIME_NONE && !doubtful && !input.refused &&
                    wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
-  if (ticks_drive()) {
+  if (ticks_drive() && !counts_wrapped()) {
     // The segment that ends here gets the counted distance; from here on the last speed holds.
     const double dt = wm_seconds_between(now_ns_, t_ns);
     const bool counted = wheel_[0].t_ns == t_ns || wheel_[1].t_ns == t_ns;

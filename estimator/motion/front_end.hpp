@@ -45,6 +45,7 @@ class motion_front_end {
            visit(segment, twist, n);
          });
     now_ns_ = to_ns;
+    if (wrapped_ns_ == to_ns) drop_wrapped_distance();
   }
 
   // The same for any interval, past or future; the state stays.
@@ -57,7 +58,8 @@ class motion_front_end {
       if (segment.input.model == WM_MOTION_CONSTANT_VELOCITY) static_cast<planar_twist &>(twist) = velocity_;
       motion_noise noise = noise_of(segment.input, twist, segment.dt_s, *params_, wheels_, calibration,
                                     stated_noise_now(), noise_factors_);
-      add_overdue_noise(segment, *params_, ticks_drive() && segment.has_next, &noise);
+      add_overdue_noise(segment, *params_, ticks_drive() && segment.has_next && !segment.input.uncounted, position_m2_,
+                        &noise);
       add_refused_noise(segment, *params_, &noise);
       if (segment.input.command) add_change_noise(segment, *params_, &noise);
       if (segment.held_s == 0.0) add_sampling_noise(segment.input, &noise);
@@ -80,6 +82,9 @@ class motion_front_end {
   // The velocity of WM_MOTION_CONSTANT_VELOCITY, on the map's axes: the estimator's states.
   void set_velocity(const planar_twist &velocity) { velocity_ = velocity; }
   const planar_twist &velocity() const { return velocity_; }
+  // The position's present variance, by which corrections bound the noise of a motion that is unknown; before the
+  // first call it grows without them.
+  void set_position_variance(double variance_m2) { position_m2_ = variance_m2; }
   void set_noise_factors(const noise_factors &factors) { noise_factors_ = factors; }
   wm_time_ns now_ns() const { return now_ns_; }
   wm_time_ns newest_ns() const { return newest_ns_; }  // newest event that the model uses
@@ -103,7 +108,11 @@ class motion_front_end {
   // Variances of the way and of the rotation at `t_ns` by the steps of the newest counts; 0 where no counts drive.
   void count_variances(wm_time_ns t_ns, double *way_m2, double *turn_rad2) const;
   // The last event counted a wheel, and the distance is the counted one.
-  bool counted() const { return ticks_drive() && (wheel_[0].t_ns == fed_ns_ || wheel_[1].t_ns == fed_ns_); }
+  bool counted() const {
+    return ticks_drive() && !counts_wrapped() && (wheel_[0].t_ns == fed_ns_ || wheel_[1].t_ns == fed_ns_);
+  }
+  // The last event had counts whose differences to those before are unknown.
+  bool counts_wrapped() const { return wrapped_ns_ != WM_TIME_NONE && wrapped_ns_ == fed_ns_; }
   // True once after the speed's source changed to another sensor, with another scale.
   bool speed_source_changed();
   // The yaw rate of the last event at standstill, which is the gyro's bias. False: none.
@@ -145,6 +154,8 @@ class motion_front_end {
   void note_samples(motion_input *input);
   void note_integrated(const motion_segment &segment);
   void drop_silent_distance(wm_time_ns t_ns, double dt_s);
+  void take_wrapped(const wm_quantities &q, wm_time_ns t_ns);
+  void drop_wrapped_distance();
   bool counts_ticks() const;                               // both wheels, and a tick's length is known
   bool ticks_drive() const;                                // the distance comes from ticks
   double mean_of_wheels(double left, double right) const;  // a dead encoder's wheel rolls like the other one
@@ -156,9 +167,11 @@ class motion_front_end {
   const wm_motion_params *params_;
   wm_wheels wheels_;
   wm_time_ns hold_max_ns_;
-  wm_time_ns now_ns_;     // integrated until here; WM_TIME_NONE before the start
-  wm_time_ns newest_ns_;  // newest event that the model uses
-  wm_time_ns fed_ns_;     // newest event of motion
+  wm_time_ns now_ns_;      // integrated until here; WM_TIME_NONE before the start
+  wm_time_ns newest_ns_;   // newest event that the model uses
+  wm_time_ns fed_ns_;      // newest event of motion
+  wm_time_ns wrapped_ns_;  // newest counts that may have wrapped in a silence
+  double position_m2_;     // variance of the position, of all axes together
   motion_history history_;
   double value_[WM_Q_COUNT];
   wm_time_ns stamp_ns_[WM_Q_COUNT], message_ns_[WM_Q_COUNT];  // newest accepted value; newest message

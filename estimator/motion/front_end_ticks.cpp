@@ -117,7 +117,7 @@ void motion_front_end::push_ticks(wm_time_ns t_ns, bool doubtful, bool miscounte
   done.a = done_mps[0];
   done.b = done_mps[1];
   done.counted = wheel_[0].t_ns == t_ns && wheel_[1].t_ns == t_ns && !miscounted;
-  if (dt > 0.0) history_.push(done);
+  if (dt > 0.0 && !counts_wrapped()) history_.push(done);
   history_.push(next);
   newest_ns_ = t_ns;
 }
@@ -132,6 +132,29 @@ void motion_front_end::drop_silent_distance(wm_time_ns t_ns, double dt_s) {
     wheel.integrated_m = wheel.position_m - wheel.speed_mps * dt_s;
     observed_without_ &= (uint8_t) ~(1 << side);
   }
+}
+
+// How far the wheels turned in a silence is unknown: the speeds before hold, then the motion is unknown, and the
+// covariance has it. The counts go on from here.
+void motion_front_end::take_wrapped(const wm_quantities &q, wm_time_ns t_ns) {
+  wrapped_ns_ = t_ns;
+  observed_without_ = 3;
+  for (int i = 0; i < q.count; i++) {
+    const int side = q.id[i];
+    if (!is_count(side)) continue;
+    check_[side] = {};
+    if (wheel_[side].t_ns == WM_TIME_NONE)
+      wheel_[side].restart(t_ns, q.value[i]);
+    else
+      wheel_[side].go_on_from(t_ns, q.value[i]);
+    observed_without_ &= (uint8_t) ~(1 << side);
+  }
+  history_.uncount_newest();
+}
+
+void motion_front_end::drop_wrapped_distance() {
+  for (tick_wheel &wheel : wheel_)
+    if (wheel.t_ns == wrapped_ns_) wheel.integrated_m = wheel.position_m;
 }
 
 // The wheels drive singly from here on: what is left of their mean distance is left of each.

@@ -206,6 +206,7 @@ wm_status wm_odometry_feed(wm_odometry *self, const wm_event *event) {
                       [&head](const wm::motion_segment &piece, const wm::motion_twist &twist,
                               const wm::motion_noise &noise) { carry_point(head, piece.dt_s, twist, noise); });
   head.t_ns = event->t_ns;
+  if (self->front.counts_wrapped()) self->points_before_gap = 0;
   if (self->points_before_gap > 0 && self->front.counted()) {
     // The counted distance is spread over the gap: a pose fused within it moves by the rest.
     if (self->count - self->points_before_gap < wm_odometry::kPoints) self->count = self->points_before_gap;

@@ -223,7 +223,8 @@ void turn_to_axes(const planar_twist &twist, motion_noise *noise) {
   noise->distance_lateral = (along - across) * forwards * left;
 }
 
-void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p, bool is_counted, motion_noise *noise) {
+void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p, bool is_counted, double position_m2,
+                       motion_noise *noise) {
   if (segment.input.model >= WM_MOTION_INCREMENTS && segment.input.counted) return;
   if (segment.input.stale) {
     // It may have gone on all the while in any direction, as it last did or as it may have begun to since.
@@ -231,8 +232,10 @@ void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p,
     const double last_mps = segment.input.model == WM_MOTION_TICKS && right > left ? right : left;
     const double begun_mps = 0.5 * p.noise_hold_mps2 * p.hold_max_s;
     const double speed_mps = last_mps > begun_mps ? last_mps : begun_mps;
-    const double unknown_to_s = segment.unknown_s + segment.dt_s;
-    const double gone_m2 = square(speed_mps) * (square(unknown_to_s) - square(segment.unknown_s));
+    // The time in which such a motion makes the present variance: less than the whole after a correction.
+    const double grown_s = speed_mps > 0.0 ? std::sqrt(position_m2) / speed_mps : segment.unknown_s;
+    const double from_s = least(segment.unknown_s, grown_s), to_s = from_s + segment.dt_s;
+    const double gone_m2 = square(speed_mps) * (square(to_s) - square(from_s));
     noise->distance_m2 += gone_m2;
     noise->lateral_m2 += gone_m2;
     return;

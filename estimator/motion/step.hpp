@@ -90,9 +90,10 @@ void turn_to_axes(const planar_twist &twist, motion_noise *noise);
 
 // Noise of a held input once the next one is overdue: the robot may have accelerated at noise.hold_mps2 and
 // noise.hold_radps2 since, sigma = a t^2 / 2; after hold_max_s the turn is unknown. `is_counted`: counts have come
-// since, which give the distance, those of both wheels the rotation, too.
+// since, which give the distance, those of both wheels the rotation, too. `position_m2`: the variance that the position
+// has at the beginning. Where observations have corrected it the unknown motion begins at them, not at the silence.
 void add_overdue_noise(const motion_segment &segment, const wm_motion_params &params, bool is_counted,
-                       motion_noise *noise);
+                       double position_m2, motion_noise *noise);
 
 // A sampled speed or turn rate holds until the next sample. A change by c between two samples, dt apart, happened at
 // any time between them: the distance or angle is evenly distributed over c dt, variance (c dt)^2 / 12. Its mean, c dt

@@ -21,6 +21,15 @@ struct tick_wheel {
   bool is_signed;   // the counter was seen to go down
   bool is_new_run;  // the next count goes on from elsewhere: the counter began anew
 
+  // The counter moved by an unknown number of ticks: goes on with the speed before.
+  void go_on_from(wm_time_ns t, double count) {
+    t_ns = t;
+    ticks = count;
+    before_ns = WM_TIME_NONE;
+    still_m = 0.0;
+    is_new_run = false;
+  }
+
   void restart(wm_time_ns t, double count) {
     t_ns = t;
     ticks = count;

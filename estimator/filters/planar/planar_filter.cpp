@@ -75,6 +75,7 @@ void planar_filter::begin_lag() {
 }
 
 void planar_filter::move_to(wm_time_ns t_ns) {
+  front_.set_position_variance(variance(kX) + variance(kY));
   advance(
       t_ns,
       [this](const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {

@@ -45,6 +45,7 @@ void wheel_heading::update(planar_filter &filter, const motion_front_end &front)
     running_ = false;
     return;
   }
+  if (front.counts_wrapped()) running_ = false;
   double distance_m[2];
   if (!front.wheel_distances(distance_m)) return;
   if (running_) {

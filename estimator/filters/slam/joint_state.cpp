@@ -109,6 +109,7 @@ void joint_state::move(const wm_event &motion) {
 
 void joint_state::move_to(wm_time_ns t_ns) {
   const wm_time_ns before_ns = now_ns();
+  front_.set_position_variance(variance(kX) + variance(kY));
   advance(
       t_ns,
       [this](const motion_segment &piece, const motion_twist &twist, const motion_noise &noise) {

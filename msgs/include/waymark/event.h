@@ -59,9 +59,9 @@ typedef enum wm_quantity {
 
 #define WM_QUANTITIES_MAX 8
 #define WM_POINTS_MAX 512
-
 // Bits of wm_quantities.doubt: the values are not reliable, and are no evidence of standstill.
 #define WM_DOUBT_FROZEN_COUNTER (1u << 0)  // the message's counter stands still: the sender is stuck
+#define WM_DOUBT_COUNTS_WRAPPED (1u << 1)  // ticks: how often the counter wrapped in a silence is unknown
 
 typedef struct wm_quantities {
   uint8_t count;

@@ -207,6 +207,42 @@ static void ticks_grow_without_end(void) {
   close_it(&f);
 }
 
+// 16 bits, after 10 s at `per_s` a silence, then a frame that is `moved` ticks on. How far the value moved; NaN:
+// unknown.
+static double moved_in_silence(int per_s, double silence_s, long moved) {
+  char text[32];
+  double last = 0;
+  open_one(&f, "BO_ 257 W: 2 X\n SG_ T : 0|16@1+ (1,0) [0|0] \"\" X\n", binding(WM_Q_WHEEL_TICKS_LEFT, "W", "T"));
+  for (int i = 0; i <= 500; i++) {
+    const unsigned raw = (unsigned)(i * per_s / 50) & 0xFFFF;
+    (void)snprintf(text, sizeof text, "c 101#%02X%02X", raw & 0xFF, raw >> 8);
+    TEST_ASSERT_EQUAL(WM_OK, feed_at(&f, 0.02 * i, text));
+    TEST_ASSERT_EQUAL(0, f.got.doubt);
+    last = f.got.value[0];
+  }
+  const unsigned raw = (unsigned)(10L * per_s + moved) & 0xFFFF;
+  (void)snprintf(text, sizeof text, "c 101#%02X%02X", raw & 0xFF, raw >> 8);
+  TEST_ASSERT_EQUAL(WM_OK, feed_at(&f, 10.0 + silence_s, text));
+  close_it(&f);
+  return f.got.doubt & WM_DOUBT_COUNTS_WRAPPED ? (double)NAN : f.got.value[0] - last;
+}
+
+// At 1500 ticks a second half a cycle takes 22 s. Backwards a robot drives slower, so that 30 s are one number of
+// cycles; in 60 s more are possible. A robot that stood may have driven at any speed.
+static void ticks_after_a_silence(void) {
+  TEST_ASSERT_EQUAL_DOUBLE(200, moved_in_silence(1500, 0.2, 200));
+  TEST_ASSERT_EQUAL_DOUBLE(22000, moved_in_silence(1500, 20, 22000));
+  TEST_ASSERT_EQUAL_DOUBLE(35000, moved_in_silence(1500, 25, 35000));  // beyond half a cycle
+  TEST_ASSERT_EQUAL_DOUBLE(-15000, moved_in_silence(1500, 20, -15000));
+  TEST_ASSERT_EQUAL_DOUBLE(-35000, moved_in_silence(-1500, 25, -35000));
+  TEST_ASSERT_TRUE(isnan(moved_in_silence(1500, 60, 89000)));
+  TEST_ASSERT_TRUE(isnan(moved_in_silence(1500, 60, 464)));
+  TEST_ASSERT_EQUAL_DOUBLE(0, moved_in_silence(0, 60, 0));
+  TEST_ASSERT_EQUAL_DOUBLE(3000, moved_in_silence(0, 60, 3000));  // the other way round is 20 times as far
+  TEST_ASSERT_TRUE(isnan(moved_in_silence(0, 60, 9000)));
+  TEST_ASSERT_EQUAL_DOUBLE(500, moved_in_silence(100, 3, 500));
+}
+
 // ── counters ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 static void open_counted(const char *counter) {
@@ -375,6 +411,7 @@ int main(void) {
   RUN_TEST(only_when_the_multiplexer_fits);
   RUN_TEST(multiplexers_above_each_other);
   RUN_TEST(ticks_wrap);
+  RUN_TEST(ticks_after_a_silence);
   RUN_TEST(ticks_grow_without_end);
   RUN_TEST(lost_by_the_counter);
   RUN_TEST(late_by_the_counter);

@@ -45,13 +45,15 @@ static inline void close_it(fixture *f) {
 }
 
 // `text` as in candump: "can0 123#0102".
-static inline wm_status feed(fixture *f, const char *text) {
+static inline wm_status feed_at(fixture *f, double t_s, const char *text) {
   char line[256];
   wm_can_frame frame;
-  (void)snprintf(line, sizeof line, "(1.0) %s", text);
+  (void)snprintf(line, sizeof line, "(%.6f) %s", t_s, text);
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_candump_parse(line, strlen(line), &frame, &f->err), f->err.text);
   return wm_can_decode(f->decoder, &frame, &f->got, &f->counts, &f->err);
 }
+
+static inline wm_status feed(fixture *f, const char *text) { return feed_at(f, 1.0, text); }
 
 // The only value of a frame that has to give one.
 static inline double value_of(fixture *f, const char *text) {

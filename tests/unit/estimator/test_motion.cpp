@@ -255,6 +255,56 @@ void test_counts_after_a_silence(void) {
       }
 }
 
+// Counts that may have wrapped in a silence of 10 s: the robot may be anywhere that it could have driven to. What
+// follows counts as ever, and nothing of the silence comes with it.
+void test_counts_that_may_have_wrapped(void) {
+  for (int model : {WM_MOTION_TICKS, WM_MOTION_SPEED_YAW_RATE})
+    for (int looked = 0; looked < 2; looked++) {
+      start(make::two_wheels(), model);
+      const auto gyro = [](double t_s) { feed(make::quantities(t_s, {{WM_Q_YAW_RATE, 0.0}})); };
+      const double counts = 0.02 / kTick;  // of 20 ms at 1 m/s
+      for (int i = 0; i <= 50; i++) {
+        gyro(0.02 * i);
+        ticks(0.02 * i, counts * i, counts * i);
+      }
+      if (looked) advance(10.97);
+      wm_event e = make::quantities(11.0, {{WM_Q_WHEEL_TICKS_LEFT, 1234.0}, {WM_Q_WHEEL_TICKS_RIGHT, 9876.0}});
+      e.as.quantities.doubt = WM_DOUBT_COUNTS_WRAPPED;
+      feed(e);
+      TEST_ASSERT_FALSE(front.counted());
+      TEST_ASSERT_DOUBLE_WITHIN(0.05, 3.0, pose.x_m);  // held for 2 s, then it stands
+      TEST_ASSERT_GREATER_THAN_DOUBLE(8.0 * 8.0, way_var);
+      TEST_ASSERT_GREATER_THAN_DOUBLE(8.0 * 8.0, side_var);
+      TEST_ASSERT_GREATER_THAN_DOUBLE(1.2, turn_var);
+      const double x_m = pose.x_m, heading_rad = pose.heading_rad, before_m2 = way_var;
+      for (int i = 1; i <= 50; i++) {
+        ticks(11.0 + 0.02 * i, 1234.0 + counts * i, 9876.0 + counts * i);
+        gyro(11.0 + 0.02 * i);
+      }
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9, x_m + 1.0, pose.x_m);
+      TEST_ASSERT_DOUBLE_WITHIN(1e-9, heading_rad, pose.heading_rad);
+      TEST_ASSERT_LESS_THAN_DOUBLE(0.1, way_var - before_m2);
+      TEST_ASSERT_EQUAL_UINT32(0, front.health());
+    }
+}
+
+// Of a bus that is silent for a minute: a correction ends what may have been driven until then.
+void test_an_unknown_motion_begins_at_the_last_correction(void) {
+  start(make::car());
+  params.noise_speed_mps = params.noise_speed_rel = 0;
+  for (int i = 0; i <= 10; i++) feed(make::quantities(0.1 * i, {{WM_Q_VEHICLE_SPEED, 1.5}, {WM_Q_YAW_RATE, 0.0}}));
+  advance(3.0);
+  for (int i = 1; i <= 60; i++) {  // as a filter that is not corrected
+    front.set_position_variance(way_var + side_var);
+    advance(3.0 + i);
+  }
+  TEST_ASSERT_DOUBLE_WITHIN(20.0, 90.0 * 90.0, way_var);
+  front.set_position_variance(0.01 * 0.01);
+  const double before_m2 = way_var;
+  advance(63.25);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.375 * 0.375, way_var - before_m2);
+}
+
 void test_ackermann_by_table_ratio_and_road_wheel(void) {
   start(make::car());
   feed(make::quantities(0, {{WM_Q_VEHICLE_SPEED, 2.0}, {WM_Q_STEERING_WHEEL, 3.0}}));
@@ -471,6 +521,8 @@ int main(void) {
   RUN_TEST(test_a_held_speed_is_doubted_more_and_more);
   RUN_TEST(test_a_change_between_samples_is_noise_of_its_moment);
   RUN_TEST(test_counts_after_a_silence);
+  RUN_TEST(test_counts_that_may_have_wrapped);
+  RUN_TEST(test_an_unknown_motion_begins_at_the_last_correction);
   RUN_TEST(test_standing_still_shows_the_gyros_bias_and_holds_the_heading);
   RUN_TEST(test_commands_are_obeyed_late);
   RUN_TEST(test_a_dead_encoder_is_noticed_and_not_taken_for_a_turn);
