@@ -153,6 +153,14 @@ void wm_assembly_close(wm_assembly *self) {
   self->vision = NULL;
 }
 
+uint64_t wm_assembly_observers(const wm_assembly *self) {
+  const uint32_t observed = self->config->estimator->takes & ~(uint32_t)WM_MOTION_EVENTS;
+  uint64_t bits = 0;
+  for (size_t i = 0; i < self->source_count && i < 64; i++)
+    if (self->sources[i].kinds & observed) bits |= UINT64_C(1) << i;
+  return bits;
+}
+
 const char *wm_assembly_source_name(const wm_assembly *self, size_t source) {
   return source < self->source_count ? self->sources[source].name : "?";
 }

@@ -50,6 +50,16 @@ void wm_fuser_init(wm_fuser *self, const wm_estimator *estimator, void *state, w
   self->last_row_ns = WM_TIME_NONE;
   self->until_ns = WM_TIME_NONE;
   self->particles_ns = WM_TIME_NONE;
+  wm_fuser_watch(self, &(wm_setup){0}, 0);
+}
+
+void wm_fuser_watch(wm_fuser *self, const wm_setup *setup, uint64_t observers) {
+  wm_monitor_init(&self->monitor, setup, observers);
+}
+
+void wm_fuser_estimate(const wm_fuser *self, wm_estimate *out) {
+  self->estimator->estimate(self->state, out);
+  wm_monitor_judge(&self->monitor, out);
 }
 
 static uint32_t at_most(size_t count, uint32_t most) { return count < most ? (uint32_t)count : most; }
@@ -57,9 +67,11 @@ static uint32_t at_most(size_t count, uint32_t most) { return count < most ? (ui
 void wm_fuser_health(const wm_fuser *self, wm_health *out) {
   const wm_estimator *e = self->estimator;
   wm_estimate estimate;
-  e->estimate(self->state, &estimate);
+  wm_fuser_estimate(self, &estimate);
   out->fused_until_ns = self->until_ns;
   out->state = estimate.state;
+  out->cause = estimate.cause;
+  out->cause_source = estimate.cause_source;
   out->lost_probability = estimate.lost_probability;
   out->resets = estimate.resets;
   if (e->motion_health) out->motion_health = e->motion_health(self->state);
@@ -80,7 +92,7 @@ int wm_estimate_has_pose(const wm_estimate *e) {
 
 static void write_row(wm_fuser *self) {
   wm_estimate estimate;
-  self->estimator->estimate(self->state, &estimate);
+  wm_fuser_estimate(self, &estimate);
   self->row_ns = WM_TIME_NONE;
   if (!wm_estimate_has_pose(&estimate) || estimate.t_ns <= self->last_row_ns) return;
   self->last_row_ns = estimate.t_ns;
@@ -88,10 +100,19 @@ static void write_row(wm_fuser *self) {
   self->output.put(self->output.context, WM_OUTPUT_POSE, &estimate, sizeof estimate);
 }
 
+// The monitor gets each event that the estimator took, with its records.
+static void monitor(wm_fuser *self, const wm_event *event, const wm_innovation *records, size_t count) {
+  if (!wm_monitor_take(&self->monitor, event, records, count)) return;
+  wm_estimate estimate;
+  self->estimator->estimate(self->state, &estimate);
+  wm_monitor_step(&self->monitor, &estimate);
+}
+
 static wm_status predict(wm_fuser *self, const wm_event *event) {
   wm_time_ns begin_ns = wm_monotonic_ns();
   wm_status status = self->estimator->predict(self->state, event);
   wm_histogram_add(&self->predict_ns, wm_monotonic_ns() - begin_ns);
+  if (status == WM_OK) monitor(self, event, NULL, 0);
   return status;
 }
 
@@ -102,6 +123,7 @@ static wm_status correct(wm_fuser *self, const wm_event *event) {
   wm_status status = self->estimator->correct(self->state, event, out, WM_INNOVATIONS_PER_EVENT_MAX, &count);
   wm_histogram_add(&self->correct_ns, wm_monotonic_ns() - begin_ns);
   if (status != WM_OK && count == 0) return status;
+  monitor(self, event, out, count);
 
   wm_fuser_counts *counts = &self->counts[event->source];
   int any_fused = count == 0;  // SET_POSE, RESET, LOOKED: taken, without an innovation

@@ -14,6 +14,7 @@
 #include "waymark/estimator.h"
 #include "waymark/event.h"
 #include "waymark/health.h"
+#include "waymark/monitor.h"
 #include "waymark/source.h"
 
 // Which motion events make a row of the trajectory: ticks, else yaw rate, else speed, else twists.
@@ -37,6 +38,7 @@ typedef struct wm_fuser {
   void *state;
   wm_driving driving;
   wm_output output;
+  wm_monitor monitor;
   wm_time_ns row_ns;       // stamp whose pose is written at the next later event; WM_TIME_NONE: none
   wm_time_ns last_row_ns;  // of the pose written last
   wm_time_ns until_ns;     // stamp of the newest event that the estimator took
@@ -51,6 +53,10 @@ typedef struct wm_fuser {
 
 // `state` is initialised by estimator->init.
 void wm_fuser_init(wm_fuser *self, const wm_estimator *estimator, void *state, wm_driving driving, wm_output output);
+// Sources by index that may give observations, and the map that they observe. After wm_fuser_init, before events.
+void wm_fuser_watch(wm_fuser *self, const wm_setup *setup, uint64_t observers);
+// The present estimate, with the monitor's doubts.
+WM_REALTIME void wm_fuser_estimate(const wm_fuser *self, wm_estimate *out);
 // The next event in the order of the merge; event->source < WM_SOURCES_MAX.
 WM_REALTIME void wm_fuser_feed(wm_fuser *self, const wm_event *event);
 // After the last event: writes the pose of the pending row.

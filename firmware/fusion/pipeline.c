@@ -46,6 +46,7 @@ wm_status wm_pipeline_start(wm_pipeline *self, wm_output output, wm_error *err) 
     return wm_fail(err, status, "%s: motion: odometry can't start: %s", config->path, wm_status_text(status));
 
   wm_fuser_init(&self->fuser, config->estimator, self->state_memory, assembly->driving, output);
+  wm_fuser_watch(&self->fuser, &assembly->setup, wm_assembly_observers(assembly));
   wm_predictor_params params = {.jump_m = config->runtime.publish_jump_m,
                                 .jump_rad = config->runtime.publish_jump_deg * M_PI / 180,
                                 .motion_stale_ns = ns_from_ms(config->runtime.publish_motion_stale_ms),
@@ -62,7 +63,7 @@ void wm_pipeline_take_kept(wm_pipeline *self, const void *image, size_t bytes) {
 
 size_t wm_pipeline_keep(const wm_pipeline *self, void *out, size_t capacity) {
   const wm_keeper *keeper = wm_keeper_of(self->fuser.estimator);
-  return keeper ? keeper->keep(self->fuser.state, out, capacity) : 0;
+  return keeper && !wm_monitor_doubts(&self->fuser.monitor) ? keeper->keep(self->fuser.state, out, capacity) : 0;
 }
 
 void wm_pipeline_arrive(wm_pipeline *self, const wm_event *event) {
@@ -77,7 +78,7 @@ void wm_pipeline_arrive(wm_pipeline *self, const wm_event *event) {
 static void tell_predictor(wm_pipeline *self) {
   wm_estimate fused;
   wm_motion_calibration calibration;
-  self->fuser.estimator->estimate(self->fuser.state, &fused);
+  wm_fuser_estimate(&self->fuser, &fused);
   self->fuser.estimator->motion(self->fuser.state, &calibration);
   wm_predictor_fused(&self->predictor, &fused, &calibration);
 }
@@ -146,7 +147,7 @@ static void reckoning_left(wm_pipeline *self, const wm_estimate *fused, wm_healt
 void wm_pipeline_health(wm_pipeline *self, wm_time_ns now_ns, wm_health *out) {
   memset(out, 0, sizeof *out);
   wm_estimate estimate;
-  self->fuser.estimator->estimate(self->fuser.state, &estimate);
+  wm_fuser_estimate(&self->fuser, &estimate);
   out->t_ns = now_ns;
   wm_fuser_health(&self->fuser, out);
   out->jumps = self->predictor.jumps;

@@ -93,7 +93,7 @@ static void take_event(drive_evidence *self, const wm_event *event) {
 }
 
 static void take_published(drive_evidence *self, const wm_published *p) {
-  if (p->now.state < EVIDENCE_STATES) self->states[p->now.state]++;
+  if (p->now.state < WM_STATE_COUNT) self->states[p->now.state]++;
   if (self->published++ == 0) self->begun = *p;
   const double after_s = wm_seconds_between(self->begun.now.t_ns, p->now.t_ns);
   if (self->start_moved_s > 0 || after_s > START_S || p->now.resets == self->begun.now.resets) return;

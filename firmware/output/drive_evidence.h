@@ -22,13 +22,12 @@ typedef struct landmark_evidence {
   uint64_t fused, refused, unknown;  // unknown: the map doesn't have it
 } landmark_evidence;
 
-#define EVIDENCE_STATES 8  // no fewer than states in wm_state
 typedef struct drive_evidence {
   residual_evidence residuals[WM_SOURCES_MAX][WM_RESIDUAL_COUNT];
   landmark_evidence landmarks[EVIDENCE_LANDMARKS_MAX];
   size_t landmark_count;
-  uint64_t states[EVIDENCE_STATES], published;  // messages by wm_state
-  double log_likelihood;                        // of all updates, nats; a refused one counts as an outlier of any value
+  uint64_t states[WM_STATE_COUNT], published;  // messages by wm_state
+  double log_likelihood;                       // of all updates, nats; a refused one counts as an outlier of any value
   uint64_t updates, fused;
   uint64_t poses;                // fused
   wm_time_ns first_ns, last_ns;  // stamps of the events

@@ -178,6 +178,8 @@ wm_status wm_write_health_json(const char *dir, const wm_assembly *assembly, con
   string(f, assembly->config->estimator->name);
   (void)fputs(",\n  \"state\": ", f);
   string(f, wm_state_name(h->state));
+  (void)fputs(",\n  \"cause\": ", f);
+  string(f, wm_cause_name(h->cause));
   (void)fputs(",\n  \"lost_probability\": ", f);
   number(f, h->lost_probability);
   (void)fputs(",\n  \"t_ns\": ", f);

@@ -110,7 +110,7 @@ static void published_head(wm_run_folder *self, int dof) {
   wm_row *head = begin(self);
   wm_row_text(head, "t_ns,made_ns,fused_until_ns,");
   pose_head(head, dof);
-  wm_row_text(head, ",odom_x_m,odom_y_m,odom_heading_rad,resets,lost_probability");
+  wm_row_text(head, ",odom_x_m,odom_y_m,odom_heading_rad,resets,lost_probability,cause");
   end(self, PUBLISHED);
   self->published_has_head = 1;
 }
@@ -155,6 +155,8 @@ static void published(wm_run_folder *self, const wm_published *p) {
   wm_row_int(line, p->jumps);
   wm_row_char(line, ',');
   wm_row_short(line, p->now.lost_probability);
+  wm_row_char(line, ',');
+  wm_row_text(line, wm_cause_name(p->now.cause));
   end(self, PUBLISHED);
 }
 

@@ -93,6 +93,7 @@ static wm_status start(log_replay *self, const wm_replay_options *options, wm_er
   if (status != WM_OK) return status;
   wm_fuser_init(&self->fuser, config->estimator, self->state, self->assembly.driving,
                 wm_run_folder_output(self->folder));
+  wm_fuser_watch(&self->fuser, &self->assembly.setup, wm_assembly_observers(&self->assembly));
   return WM_OK;
 }
 

@@ -70,6 +70,8 @@ wm_status wm_published_decode(const void *data, size_t size, wm_published *out, 
   out->last_jump_m = wm_get_f64(&r);
   out->last_jump_rad = wm_get_f64(&r);
   out->status_flags = wm_get_u32(&r);
+  out->now.cause = (uint8_t)WM_PUB_CAUSE(out->status_flags);
+  out->now.cause_source = -1;
   out->deadlines_missed = wm_get_u32(&r);
   out->utc_offset_ns = wm_get_i64(&r);
   out->utc_uncertainty_ns = wm_get_i64(&r);

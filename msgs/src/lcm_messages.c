@@ -20,7 +20,11 @@ _Static_assert(sizeof(((waymark_health_t *)0)->calibration) / sizeof(waymark_cal
                "a place each");
 _Static_assert(sizeof(((waymark_health_t *)0)->counters) / sizeof(waymark_counter_t) == WM_HEALTH_COUNTERS_MAX,
                "a place each");
-_Static_assert(WAYMARK_POSE_T_STATUS_JUMPED == WM_PUB_JUMPED, "the messages' numbers are the structs' numbers");
+_Static_assert(WAYMARK_POSE_T_STATUS_JUMPED == WM_PUB_JUMPED &&
+                   WAYMARK_POSE_T_STATUS_CAUSE_SHIFT == WM_PUB_CAUSE_SHIFT &&
+                   WAYMARK_POSE_T_STATE_DEGRADED == WM_STATE_DEGRADED &&
+                   WAYMARK_POSE_T_CAUSE_OFF_MAP == WM_CAUSE_OFF_MAP,
+               "the messages' numbers are the structs' numbers");
 
 static size_t written(int bytes) { return bytes > 0 ? (size_t)bytes : 0; }
 static int room(size_t capacity) { return capacity > INT32_MAX ? INT32_MAX : (int)capacity; }
@@ -96,6 +100,8 @@ size_t wm_lcm_health(const wm_health *h, void *out, size_t capacity) {
       .t_ns = h->t_ns,
       .fused_until_ns = h->fused_until_ns,
       .state = (int8_t)h->state,
+      .cause = (int8_t)h->cause,
+      .cause_source = h->cause_source,
       .lost_probability = h->lost_probability,
       .resets = (int32_t)h->resets,
       .jumps = (int32_t)h->jumps,

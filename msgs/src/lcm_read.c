@@ -43,6 +43,8 @@ const char *wm_lcm_read_pose(const void *message, size_t length, wm_published *o
   e->resets = (uint32_t)m.resets;
   e->dof = (uint8_t)m.dof;
   e->state = (uint8_t)m.state;
+  e->cause = (uint8_t)WM_PUB_CAUSE(out->status_flags);
+  e->cause_source = -1;
   e->lost_probability = m.lost_probability;
   return NULL;
 }
@@ -84,6 +86,8 @@ const char *wm_lcm_read_health(const void *message, size_t length, wm_health *ou
   out->t_ns = m.t_ns;
   out->fused_until_ns = m.fused_until_ns;
   out->state = (uint8_t)m.state;
+  out->cause = (uint8_t)m.cause;
+  out->cause_source = m.cause_source;
   out->lost_probability = m.lost_probability;
   out->resets = (uint32_t)m.resets;
   out->jumps = (uint32_t)m.jumps;

@@ -16,7 +16,9 @@ static const char *const kQuantities[] = {"wheel_ticks_left",       "wheel_ticks
                                           "vehicle_speed",          "yaw_rate",
                                           "steering_wheel",         "road_wheel",
                                           "steering_actuator",      "gear"};
-static const char *const kStates[] = {"searching", "tracking", "dead_reckoning", "lost"};
+static const char *const kStates[] = {"searching", "tracking", "dead_reckoning", "lost", "degraded"};
+static const char *const kCauses[] = {"",           "contradicted",       "refused", "inconsistent", "biased",
+                                      "lost_again", "unknown_identities", "silent",  "off_map"};
 static const char *const kResiduals[] = {"bearing", "range",      "x",     "y",        "z",
                                          "heading", "standstill", "pixel", "elevation"};
 static const char *const kVerdicts[] = {"fused",      "gate",     "unknown_id", "no_association", "out_of_range",
@@ -34,6 +36,8 @@ static const char *const kLooks[] = {"found",        "not_in_view", "faces_away"
 #define COUNT(a) (sizeof(a) / sizeof((a)[0]))
 _Static_assert(COUNT(kKinds) == WM_EVENT_KIND_COUNT, "a name for each kind");
 _Static_assert(COUNT(kQuantities) == WM_Q_COUNT, "a name for each quantity");
+_Static_assert(COUNT(kStates) == WM_STATE_COUNT, "a name for each state");
+_Static_assert(COUNT(kCauses) == WM_CAUSE_COUNT, "a name for each cause");
 _Static_assert(COUNT(kResiduals) == WM_RESIDUAL_COUNT, "a name for each residual");
 _Static_assert(COUNT(kVerdicts) == WM_VERDICT_COUNT, "a name for each verdict");
 _Static_assert(COUNT(kCounters) == WM_COUNTER_KIND_COUNT, "a name for each counter");
@@ -43,6 +47,7 @@ _Static_assert(COUNT(kLooks) == WM_LOOK_COUNT, "a name for each look");
 const char *wm_event_kind_name(unsigned kind) { return kind < COUNT(kKinds) ? kKinds[kind] : "?"; }
 const char *wm_quantity_name(unsigned q) { return q < COUNT(kQuantities) ? kQuantities[q] : "?"; }
 const char *wm_state_name(unsigned state) { return state < COUNT(kStates) ? kStates[state] : "?"; }
+const char *wm_cause_name(unsigned cause) { return cause < COUNT(kCauses) ? kCauses[cause] : "?"; }
 const char *wm_residual_name(unsigned r) { return r < COUNT(kResiduals) ? kResiduals[r] : "?"; }
 const char *wm_verdict_name(unsigned v) { return v < COUNT(kVerdicts) ? kVerdicts[v] : "?"; }
 const char *wm_counter_name(unsigned kind) { return kind < COUNT(kCounters) ? kCounters[kind] : "?"; }

@@ -59,7 +59,7 @@ PoseColumns find_columns(const Csv &csv) {
 int read_state(const Csv &csv, size_t row, Column column) {
   if (!column) return -1;
   const std::string_view text = csv.text(row, *column);
-  for (unsigned state = WM_STATE_SEARCHING; state <= WM_STATE_LOST; ++state)
+  for (unsigned state = WM_STATE_SEARCHING; state < WM_STATE_COUNT; ++state)
     if (text == wm_state_name(state)) return static_cast<int>(state);
   int state = -1;
   const auto [end, problem] = std::from_chars(text.data(), text.data() + text.size(), state);

@@ -263,11 +263,12 @@ std::string source_section(const ReportData &data) {
 std::string state_section(const ReportData &data) {
   const auto &poses = data.trajectory.poses;
   if (poses.front().state < 0) return "";
-  static constexpr std::array<const char *, 4> kWords{"searching: no pose known yet",
-                                                      "tracking: what it saw fitted and was used",
-                                                      "dead reckoning: nothing to see, it went by its motion alone",
-                                                      "lost: what it saw contradicted its pose, being mended"};
-  std::array<double, 4> spent{};
+  static constexpr std::array<const char *, WM_STATE_COUNT> kWords{
+      "searching: no pose known yet", "tracking: what it saw fitted and was used",
+      "dead reckoning: nothing to see, it went by its motion alone",
+      "lost: what it saw contradicted its pose, being mended",
+      "degraded: what it saw contradicted its pose or did not support it"};
+  std::array<double, WM_STATE_COUNT> spent{};
   std::string strip;
   for (size_t begin = 0; begin < poses.size();) {
     size_t end = begin + 1;
@@ -275,7 +276,7 @@ std::string state_section(const ReportData &data) {
     const double from = data.seconds(poses[begin].t_ns);
     const double to = data.seconds(poses[std::min(end, poses.size() - 1)].t_ns);
     const int state = poses[begin].state;
-    if (state >= 0 && state < 4) {
+    if (state >= 0 && state < WM_STATE_COUNT) {
       spent[static_cast<size_t>(state)] += to - from;
       strip += "<span class=\"" + std::string(wm_state_name(static_cast<unsigned>(state))) +
                "\" style=\"flex:" + fixed(to - from, 3) + " 0 0\" title=\"" +

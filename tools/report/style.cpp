@@ -94,7 +94,8 @@ figure{margin:0}
 .pair{display:grid;grid-template-columns:minmax(0,3fr) minmax(0,1fr);gap:0 8px}
 .strip{display:flex;height:26px;border-radius:6px;overflow:hidden;border:1px solid var(--rule);margin-left:52px}
 .strip span{display:block;min-width:1px}
-.searching{background:var(--pale)}.tracking{background:var(--green)}.dead_reckoning{background:var(--amber)}.lost{background:var(--orange)}
+.searching{background:var(--pale)}.tracking{background:var(--green)}.dead_reckoning{background:var(--amber)}.lost{background:var(--orange)}.degraded{background:var(--orange)}
+.degraded{background-image:repeating-linear-gradient(90deg,#0003 0 2px,#0000 2px 6px)}
 .dead_reckoning{background-image:repeating-linear-gradient(45deg,#0003 0 3px,#0000 3px 7px)}
 .lost{background-image:repeating-linear-gradient(-45deg,#0004 0 4px,#0000 4px 8px)}
 .key{display:inline-block;width:16px;height:16px;border-radius:4px;flex:none}

@@ -39,7 +39,11 @@ wm_estimator estimator_of(const char *name, const char *about, uint32_t takes, w
     *count = 0;
     return static_cast<filter *>(state)->correct(*event, record_list{out, capacity, count});
   };
-  e.estimate = [](const void *state, wm_estimate *out) { static_cast<const filter *>(state)->estimate(out); };
+  e.estimate = [](const void *state, wm_estimate *out) {
+    static_cast<const filter *>(state)->estimate(out);
+    out->cause = out->state == WM_STATE_LOST ? WM_CAUSE_CONTRADICTED : WM_CAUSE_NONE;
+    out->cause_source = -1;
+  };
   e.motion = [](const void *state, wm_motion_calibration *out) {
     *out = static_cast<const filter *>(state)->motion_calibration();
   };

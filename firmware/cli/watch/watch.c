@@ -62,6 +62,24 @@ static void add(char *why, size_t why_bytes, const char *name, const char *what)
   (void)snprintf(why + used, why_bytes - used, "%s%s %s", used ? ", " : "", name, what);
 }
 
+// Why the pose is doubtful, with the source.
+static void add_cause(const wm_health *h, char *why, size_t why_bytes) {
+  static const char *const kText[WM_CAUSE_COUNT] = {"",
+                                                    "contradict the pose",
+                                                    "is refused",
+                                                    "has too large innovations",
+                                                    "has biased innovations",
+                                                    "contradicts found poses",
+                                                    "has unknown identities",
+                                                    "is silent",
+                                                    "does not reach the pose"};
+  const int i = h->cause_source;
+  const char *name = i >= 0 && (uint32_t)i < h->source_count ? h->sources[i].name
+                     : h->cause == WM_CAUSE_OFF_MAP          ? "the map"
+                                                             : "observations";
+  if (h->cause < WM_CAUSE_COUNT) add(why, why_bytes, name, kText[h->cause]);
+}
+
 // Every source with a fault.
 static void list_troubles(const wm_health *h, char *why, size_t why_bytes) {
   for (uint32_t i = 0; i < h->source_count; i++) {
@@ -71,6 +89,7 @@ static void list_troubles(const wm_health *h, char *why, size_t why_bytes) {
     else if (s->stale)
       add(why, why_bytes, s->name, s->received ? "silent" : "never spoke");
   }
+  if (h->cause) add_cause(h, why, why_bytes);
   if (h->motion_health) add(why, why_bytes, "motion sensor", "broken");
   if (h->other_runs > 0) add(why, why_bytes, "another run", "on the same channels");
 }
@@ -82,6 +101,7 @@ const char *watch_state(const watch *self, wm_time_ns now_ns, char *why, size_t 
   switch (self->health.state) {
     case WM_STATE_SEARCHING: return why[0] ? "waiting for sensors" : "searching";
     case WM_STATE_LOST: return "lost";
+    case WM_STATE_DEGRADED: return "degraded";
     case WM_STATE_TRACKING: return why[0] ? "degraded" : "tracking";
     default: return why[0] ? "degraded" : "dead reckoning";
   }

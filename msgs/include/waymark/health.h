@@ -62,6 +62,8 @@ typedef struct wm_health {
   wm_time_ns t_ns;            // on the run's clock
   wm_time_ns fused_until_ns;  // WM_TIME_NONE before the first
   uint8_t state;              // wm_state
+  uint8_t cause;              // wm_cause
+  int8_t cause_source;        // index into sources; -1: none
   double lost_probability;    // wm_estimate's
   uint32_t resets, jumps;
   uint32_t motion_health;  // bits of WM_MOTION_HEALTH_*

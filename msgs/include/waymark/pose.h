@@ -16,10 +16,28 @@ typedef enum wm_state {
   WM_STATE_SEARCHING = 0,       // no pose known yet
   WM_STATE_TRACKING = 1,        // observations are being fused and fit
   WM_STATE_DEAD_RECKONING = 2,  // no observation fused for a while; the covariance grows
-  WM_STATE_LOST = 3             // observations contradict the pose; relocalization is under way
+  WM_STATE_LOST = 3,            // observations contradict the pose; relocalization is under way
+  WM_STATE_DEGRADED = 4,        // recent observations contradict the pose or do not support it: wm_cause
+  WM_STATE_COUNT
 } wm_state;
 
+// Why a state is not TRACKING, or is doubtful. The numbers and names are stable: messages and tables have them.
+typedef enum wm_cause {
+  WM_CAUSE_NONE = 0,
+  WM_CAUSE_CONTRADICTED,  // the estimator's own evidence contradicts the pose
+  WM_CAUSE_REFUSED,       // the gates refuse most updates of a source
+  WM_CAUSE_INCONSISTENT,  // fused innovations of a source are larger than their variance
+  WM_CAUSE_BIASED,        // fused innovations of a source have a mean
+  WM_CAUSE_LOST_AGAIN,    // a found pose was lost again soon; the next one is on probation
+  WM_CAUSE_UNKNOWN,       // identities of a source's observations are not in the map
+  WM_CAUSE_SILENT,        // a source gives no observations any more
+  WM_CAUSE_OFF_MAP,       // the pose is outside of the map
+  WM_CAUSE_COUNT
+} wm_cause;
+
 const char *wm_state_name(unsigned state);
+// "refused", "inconsistent" ...; "" for none, "?" beyond.
+const char *wm_cause_name(unsigned cause);
 
 // An estimate of base_link in map. Covariance 6x6 row by row in (x, y, z, rx, ry, rz): position in map axes, rotation
 // as a vector in the body's axes (R_true = R_est Exp(r)). A planar estimator fills x, y and rz and leaves the rest 0.
@@ -28,11 +46,13 @@ typedef struct wm_estimate {
   wm_pose3 pose_map_base;
   double heading_rad;
   double covariance[36];
-  double v_mps[3];    // body axes
-  double w_radps[3];  // body axes
-  uint32_t resets;    // times that the pose was set anew: start, set_pose, recovery
-  uint8_t dof;        // 3 or 6
-  uint8_t state;      // wm_state
+  double v_mps[3];      // body axes
+  double w_radps[3];    // body axes
+  uint32_t resets;      // times that the pose was set anew: start, set_pose, recovery
+  uint8_t dof;          // 3 or 6
+  uint8_t state;        // wm_state
+  uint8_t cause;        // wm_cause
+  int8_t cause_source;  // index into the run's sources; -1: none
   // Probability that the robot is not where this pose is: 1 while searching, NaN: not estimated.
   double lost_probability;
 } wm_estimate;
@@ -103,6 +123,8 @@ typedef struct wm_published {
 #define WM_PUB_MOTION_STALE (1u << 0)  // no fresh motion: the pose is extrapolated on old speeds
 #define WM_PUB_FUSION_STALE (1u << 1)  // nothing fused for longer than the horizon
 #define WM_PUB_JUMPED (1u << 2)        // map against odom moved since the last message
+#define WM_PUB_CAUSE_SHIFT 8           // bits 8 to 15: now.cause
+#define WM_PUB_CAUSE(flags) (((flags) >> WM_PUB_CAUSE_SHIFT) & 255u)
 
 // A calibration state for health and report.
 typedef struct wm_calibration_value {

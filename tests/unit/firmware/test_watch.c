@@ -62,6 +62,8 @@ static void a_message_is_read_as_it_was_sent(void) {
   (void)snprintf(health.calibration[0].name, sizeof health.calibration[0].name, "laser.yaw_rad");
   health.calibration[0].value = 0.25;
   health.lost_probability = 0.125;
+  health.cause = WM_CAUSE_REFUSED;
+  health.cause_source = 1;
   health.counter_count = 1;
   health.counters[0] = (wm_counter){WM_COUNTER_LANDMARKS_MOVED, 7, 3};
   size_t length = wm_lcm_health(&health, bytes, sizeof bytes);
@@ -71,7 +73,9 @@ static void a_message_is_read_as_it_was_sent(void) {
   pose.now.lost_probability = 0.5;
   pose.now.covariance[7] = 0.5;
   pose.now.v_mps[0] = 1.5;
-  pose.status_flags = WM_PUB_JUMPED;
+  pose.now.cause = WM_CAUSE_BIASED;
+  pose.now.cause_source = -1;  // health has it
+  pose.status_flags = WM_PUB_JUMPED | WM_CAUSE_BIASED << WM_PUB_CAUSE_SHIFT;
   length = wm_lcm_pose(&pose, 0, bytes, sizeof bytes);
   TEST_ASSERT_NULL(wm_lcm_read_pose(bytes, length, &read_pose));
   TEST_ASSERT_EQUAL_MEMORY(&pose, &read_pose, sizeof pose);

@@ -142,9 +142,12 @@ static void every_value_of_an_enum_has_its_constant(void) {
     has_constant("innovation_t.lcm", "RESIDUAL_", wm_residual_name(i), i);
   for (unsigned i = 0; i < WM_VERDICT_COUNT; i++)
     has_constant("innovation_t.lcm", i == WM_FUSED ? "" : "REJECTED_", wm_verdict_name(i), i);
-  for (unsigned i = 0; i <= WM_STATE_LOST; i++) has_constant("pose_t.lcm", "STATE_", wm_state_name(i), i);
+  for (unsigned i = 0; i < WM_STATE_COUNT; i++) has_constant("pose_t.lcm", "STATE_", wm_state_name(i), i);
+  for (unsigned i = WM_CAUSE_CONTRADICTED; i < WM_CAUSE_COUNT; i++)
+    has_constant("pose_t.lcm", "CAUSE_", wm_cause_name(i), i);
   for (unsigned i = 0; i < WM_COUNTER_KIND_COUNT; i++) has_constant("counter_t.lcm", "", wm_counter_name(i), i);
-  TEST_ASSERT_EQUAL_STRING("?", wm_state_name(WM_STATE_LOST + 1));
+  TEST_ASSERT_EQUAL_STRING("?", wm_state_name(WM_STATE_COUNT));
+  TEST_ASSERT_EQUAL_STRING("?", wm_cause_name(WM_CAUSE_COUNT));
 }
 
 static void an_innovation_arrives(void) {

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+// Monitor of the innovations: whether the observations of a run agree with its poses. It is one for all estimators: it
+// takes the records of their updates (wm_innovation), of each source over a sliding window, and corrects state, cause,
+// covariance and probability of being lost of their estimates. Constant memory and cost; the same events give the same
+// bits. The estimator's own state is not changed.
+#ifndef WAYMARK_MONITOR_H
+#define WAYMARK_MONITOR_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "waymark/estimator.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define WM_MONITOR_SOURCES 32  // more are not monitored
+#define WM_MONITOR_SLOTS 40    // of a source: more than the longest window has
+#define WM_MONITOR_KINDS 3     // kinds of residuals of a source; further ones are not monitored
+
+// Observations of a source so near in time that they share their errors.
+typedef struct wm_monitor_slot {
+  wm_time_ns begin_ns, newest_ns;
+  uint32_t stamps;                   // different ones
+  uint32_t observations;             // fused, refused by a gate, or of an unknown identity
+  double refused, unknown;           // of these
+  double sum[WM_MONITOR_KINDS];      // of the fused innovations over their sigma
+  double squares;                    // likewise, of all kinds
+  uint32_t fused[WM_MONITOR_KINDS];  // scalar innovations
+  uint32_t scalars;                  // of all kinds
+} wm_monitor_slot;
+
+// What the windows show of a source.
+typedef struct wm_monitor_source {
+  wm_monitor_slot slots[WM_MONITOR_SLOTS];  // a ring; `opened` counts them
+  uint64_t opened;
+  wm_time_ns newest_ns;  // of its observations; WM_TIME_NONE: none yet
+  double slot_s;         // length of its slots
+  uint32_t kinds;        // of residuals that were seen, at most WM_MONITOR_KINDS
+  uint8_t residual[WM_MONITOR_KINDS];
+  uint8_t cause;  // wm_cause at the last step
+} wm_monitor_source;
+
+typedef struct wm_monitor {
+  wm_monitor_source sources[WM_MONITOR_SOURCES];
+  uint64_t observers;          // bit for each source that may give observations
+  double spread_m2;            // variance of a place anywhere on the map, each axis
+  double low_m[2], high_m[2];  // the map, else the way so far
+  double doubt_s;              // time of contradiction that fitting observations have not made up for
+  double fitted_s;             // time of fitting observations since the pose was set or found
+  double since_found_s;        // since a search found a pose
+  wm_time_ns stepped_ns, next_ns;
+  uint32_t resets;
+  int32_t cause, source;        // of the present doubt; source -1: none
+  int32_t found, is_map_known;  // found: a search found a pose before
+  int32_t is_unsupported, is_outside;
+  int32_t was_lost, silent;  // by the estimator; silent: source, -1: none
+} wm_monitor;
+
+// `observers`: bit for each of the run's sources that may give observations. The setup is not kept.
+void wm_monitor_init(wm_monitor *self, const wm_setup *setup, uint64_t observers);
+// After each event that the estimator was given: the records of its update. True: a step is due.
+int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation *records, size_t count);
+// With the estimator's own estimate, a few times a second of the events' time.
+void wm_monitor_step(wm_monitor *self, const wm_estimate *estimate);
+// State, cause, covariance and probability of being lost, as the monitor finds them. Without doubt nothing changes.
+void wm_monitor_judge(const wm_monitor *self, wm_estimate *estimate);
+// Whether the pose is in doubt.
+int wm_monitor_doubts(const wm_monitor *self);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
