@@ -73,10 +73,10 @@ static void add_cause(const wm_health *h, char *why, size_t why_bytes) {
                                                     "has unknown identities",
                                                     "is silent",
                                                     "does not reach the pose"};
-  const int i = h->cause_source;
-  const char *name = i >= 0 && (uint32_t)i < h->source_count ? h->sources[i].name
-                     : h->cause == WM_CAUSE_OFF_MAP          ? "the map"
-                                                             : "observations";
+  const uint32_t i = (uint32_t)h->cause_source;  // -1 becomes a number beyond all sources
+  const char *name = i < h->source_count            ? h->sources[i].name
+                     : h->cause == WM_CAUSE_OFF_MAP ? "the map"
+                                                    : "observations";
   if (h->cause < WM_CAUSE_COUNT) add(why, why_bytes, name, kText[h->cause]);
 }
 
