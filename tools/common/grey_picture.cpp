@@ -107,10 +107,7 @@ GreyPicture load_picture(const fs::path &file) {
   return out;
 }
 
-void each_picture(const fs::path &from, const std::string &camera, int every,
-                  const std::function<bool(const std::string &, const GreyPicture &)> &look) {
-  if (!fs::exists(from)) throw Failure(from.string() + ": there is no such file or folder", kUsage);
-  if (fs::is_directory(from) && fs::is_directory(from / "video")) return each_frame(from, camera, every, look);
+std::vector<fs::path> picture_files(const fs::path &from) {
   std::vector<fs::path> files;
   if (fs::is_directory(from)) {
     for (const auto &entry : fs::directory_iterator(from))
@@ -124,6 +121,14 @@ void each_picture(const fs::path &from, const std::string &camera, int every,
                   kUsage);
   }
   if (files.empty()) throw Failure(from.string() + ": has no pictures in it (.jpg, .png, .pgm)", kUsage);
+  return files;
+}
+
+void each_picture(const fs::path &from, const std::string &camera, int every,
+                  const std::function<bool(const std::string &, const GreyPicture &)> &look) {
+  if (!fs::exists(from)) throw Failure(from.string() + ": there is no such file or folder", kUsage);
+  if (fs::is_directory(from) && fs::is_directory(from / "video")) return each_frame(from, camera, every, look);
+  const std::vector<fs::path> files = picture_files(from);
   for (size_t i = 0; i < files.size(); i += static_cast<size_t>(every))
     if (!look(files[i].filename().string(), load_picture(files[i]))) return;
 }

@@ -23,6 +23,9 @@ struct GreyPicture {
 // A JPEG, PNG or PGM by what its bytes say. Throws Failure.
 GreyPicture load_picture(const std::filesystem::path &file);
 
+// The pictures of a folder in the order of their names, or the one picture itself. Throws Failure: none there.
+std::vector<std::filesystem::path> picture_files(const std::filesystem::path &from);
+
 // Calls `look(name, picture)` for each picture of `from` until it returns false: a folder of pictures in the order of
 // their names, one picture, or a recording's folder (with `camera`, "" for the only one). `every` above 1 passes over
 // the others. Throws Failure: nothing there, or what is there can't be read.

@@ -1,125 +1,100 @@
 // SPDX-License-Identifier: Apache-2.0
-// `waymark detect`: what the detector of edges sees in a recording's pictures, for `waymark eval --detector edges`.
+// `waymark detect`: what a detector finds in pictures, drawn and as a table, without a filter.
+#include <unistd.h>
 #include <CLI/CLI.hpp>
+#include <cinttypes>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
-#include <iostream>
-#include <memory>
 
 #include "common/failure.h"
-#include "config/config.h"
-#include "detect/polylines.h"
-#include "waymark/recording.h"
-#include "waymark/video.h"
+#include "common/program.h"
+#include "detect/detect.h"
 
 namespace {
 
-namespace fs = std::filesystem;
-using wm::tools::Failure;
+using namespace wm::tools;
 
-struct Arguments {
-  std::string recording, config, out;
-  int every = 1;
-};
+constexpr uint64_t kShownEvery = 10;  // pictures, of the progress line
+constexpr size_t kIdsShown = 12;
 
-struct Freer {
-  void operator()(void *p) const { std::free(p); }
-};
-
-void detect_camera(const Arguments &a, const wm_vision_config &vision, const wm_rig &rig, int32_t index) {
-  const wm_camera &camera = rig.cameras[index];
-  const wm_view view = {&rig, &index, nullptr, 0, nullptr, 0, nullptr, 0};
-  wm_error err;
-  const char *why = nullptr;
-  wm::mounted_camera mounted;
-  const size_t bytes = vision.detector->state_bytes(vision.params, &view, &why);
-  if (bytes == 0 || wm::mounted_camera_init(&mounted, camera))
-    throw Failure(std::string(camera.name) + ": " + (why ? why : "this camera can't be used"));
-  const std::unique_ptr<void, Freer> state(std::aligned_alloc(64, (bytes + 63) / 64 * 64));
-  if (!state || vision.detector->init(state.get(), vision.params, &view) != WM_OK)
-    throw Failure(std::string(camera.name) + ": the detector can't start");
-  wm_video *opened = nullptr;
-  if (wm_video_open(a.recording.c_str(), &camera, index, nullptr, nullptr, &opened, &err) != WM_OK)
-    throw Failure(err.text);
-  const std::unique_ptr<wm_video, decltype(&wm_video_close)> video(opened, wm_video_close);
-  const fs::path file = fs::path(a.out) / "detections" / (std::string(camera.name) + "-edges.csv");
-  fs::create_directories(file.parent_path());
-  std::ofstream csv(file);
-  csv << "frame,polyline,u_px,v_px\n" << std::fixed;
-  csv.precision(3);
-  const auto events = std::make_unique<wm_event[]>(2);
-  wm_frame frame;
-  size_t frames = 0;
-  while (wm_video_peek(video.get(), &frame, &err) == WM_OK) {
-    if (frame.number % static_cast<uint64_t>(a.every) != 0) {
-      if (wm_video_skip(video.get(), &err) != WM_OK) break;
-      continue;
-    }
-    if (wm_video_next(video.get(), &frame, &err) != WM_OK) break;
-    size_t count = 0, line = 0;
-    if (vision.detector->detect(state.get(), &frame, nullptr, events.get(), 2, &count) != WM_OK) continue;
-    frames++;
-    if (count > 0)
-      for (const auto &points : wm::tools::join_points(events[0].as.points, mounted)) {
-        for (const wm::pixel &p : points) csv << frame.number << ',' << line << ',' << p.u << ',' << p.v << '\n';
-        line++;
-      }
-    if (line == 0) csv << frame.number << ",,,\n";
-  }
-  if (!csv.flush()) throw Failure(file.string() + ": can't be written");
-  std::cout << file.string() << ": " << frames << " pictures\n";
+void parse(CLI::App *app, DetectWish *a) {
+  app->description("Shows what a detector finds in pictures, without a filter: drawn into the pictures, and as a CSV.");
+  app->add_option("FROM", a->input.from,
+                  "a recording (all of its cameras), a folder of pictures (PNG, JPEG, PGM), one picture, or a video")
+      ->required();
+  app->add_option("--detector", a->detector, "this detector, by its defaults")->check(CLI::IsMember(detector_names()));
+  app->add_option("--set", a->sets,
+                  "KEY=VALUE: a parameter of --detector (docs/config.md), as often as needed; family=all "
+                  "tries every family of square markers");
+  app->add_option("--config", a->config, "instead of --detector: all detectors of a configuration's `vision:`")
+      ->excludes("--detector")
+      ->excludes("--set");
+  app->add_option("--out", a->out, "folder: detections/CAMERA-DETECTOR.csv and drawn/ are written there")->required();
+  app->add_option("--draw", a->draw,
+                  "the pictures with what was found: avi, jpg, png, none; auto: avi, and jpg of a "
+                  "folder of pictures")
+      ->check(CLI::IsMember({"auto", "avi", "jpg", "png", "none"}))
+      ->capture_default_str();
+  app->add_option("--rate", a->rate_hz, "pictures a second of the AVI")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  app->add_option("--camera", a->input.camera, "this camera of the recording or calibration; else all");
+  app->add_option("--calibration", a->input.calibration,
+                  "the cameras' calibration.yaml, where FROM is no recording, or instead of the recording's");
+  app->add_option("--landmarks", a->input.landmarks, "landmarks.csv of a map with pictures of landmarks");
+  app->add_option("--poses", a->poses,
+                  "a run, or a recording with truth: its poses guide the detector of known landmarks; without, it "
+                  "searches");
+  app->add_option("--every", a->every, "only each N-th picture")->check(CLI::Range(1, 1000000));
+  app->footer(
+      "examples:\n"
+      "  waymark detect photos/ --detector apriltag --out out/seen\n"
+      "  waymark detect REC --detector apriltag --set family=tag36h11 --set size_m=0.16 --out out/seen\n"
+      "  waymark detect REC --detector lines --camera ceiling --out out/seen --every 5\n"
+      "  waymark detect REC --config config/corridor.yaml --out out/detected --every 10\n"
+      "docs/detect.md explains what is drawn, and the columns. Exit code: 0 done, 1 the work failed, 2 usage.");
 }
 
-void detect(const Arguments &a) {
-  wm_error err;
-  wm_config config;
-  if (wm_config_load(a.config.c_str(), &config, &err) != WM_OK) throw Failure(err.text);
-  std::fputs(config.warnings, stderr);
-  const std::unique_ptr<wm_config, decltype(&wm_config_free)> config_closer(&config, wm_config_free);
-  wm_recording *opened = nullptr;
-  if (wm_recording_open(a.recording.c_str(), &config.overrides, nullptr, nullptr, &opened, &err) != WM_OK)
-    throw Failure(err.text);
-  const std::unique_ptr<wm_recording, decltype(&wm_recording_close)> recording(opened, wm_recording_close);
-  const wm_rig &rig = *wm_site_rig(wm_recording_site(recording.get()));
-  size_t done = 0;
-  for (size_t i = 0; i < config.vision_count; i++) {
-    if (!(config.vision[i].detector->gives & WM_EVENT_BIT(WM_EVENT_POINTS))) continue;
-    for (uint32_t c = 0; c < rig.camera_count; c++) {
-      if (!wm_video_there(a.recording.c_str(), rig.cameras[c].name)) continue;
-      detect_camera(a, config.vision[i], rig, static_cast<int32_t>(c));
-      done++;
-    }
-  }
-  if (done == 0)
-    throw Failure(a.config + ": vision: no detector of edges, or no pictures in " + a.recording +
-                  "; `vision: {edges: {}}` names one");
+std::string ids_text(const std::vector<int64_t> &ids) {
+  if (ids.empty()) return "";
+  std::string text = ", " + std::to_string(ids.size()) + (ids.size() == 1 ? " identity (" : " identities (");
+  for (size_t i = 0; i < ids.size() && i < kIdsShown; i++) text += (i > 0 ? ", " : "") + std::to_string(ids[i]);
+  return text + (ids.size() > kIdsShown ? " ...)" : ")");
+}
+
+void print(const Detected &d) {
+  std::printf("%s %s: in %" PRIu64 " of %" PRIu64 " pictures, %" PRIu64 " detections%s; %.1f ms a picture\n",
+              d.camera.c_str(), d.detector.c_str(), d.with_something, d.pictures, d.detections, ids_text(d.ids).c_str(),
+              d.ms);
+  if (d.refused > 0)
+    std::printf("  %" PRIu64 " pictures have another size than the camera's calibration and were not looked at\n",
+                d.refused);
+  std::printf("  %s\n", d.csv.c_str());
+  if (!d.drawn.empty()) std::printf("  %s\n", d.drawn.c_str());
+}
+
+int run(const DetectWish &wish) {
+  if (wish.config.empty() && wish.detector.empty())
+    throw Failure("what to look for? --detector NAME, or --config FILE with `vision:`", kUsage);
+  const bool is_terminal = isatty(STDERR_FILENO) != 0;
+  const auto found = detect(wish, [&](const std::string &source, uint64_t pictures) {
+    if (is_terminal && pictures % kShownEvery == 0)
+      std::fprintf(stderr, "\r\033[K%s: %" PRIu64 " pictures", source.c_str(), pictures);
+  });
+  if (is_terminal) std::fputs("\r\033[K", stderr);
+  for (const Detected &d : found) print(d);
+  if (found.size() > 1 && wish.config.empty() && wish.detector == "apriltag" && found[0].camera == found[1].camera)
+    std::puts(
+        "Families that share codes (aruco_5x5_50 is a part of aruco_5x5_100) and short codes read by chance are in "
+        "this list, too: set the smallest family that has all of your markers.");
+  if (found.empty()) std::puts("nothing found: no family of square markers is in these pictures");
+  return kDone;
 }
 
 }  // namespace
 
 int main(int argc, char **argv) {
-  CLI::App app("Writes what the detector of edges sees in a recording's pictures, for `waymark eval --detector edges`.",
-               "waymark detect");
-  Arguments a;
-  app.add_option("recording", a.recording, "folder of the recording")->required();
-  app.add_option("--config", a.config, "configuration with `vision: {edges: ...}`")->required();
-  app.add_option("--out", a.out, "folder: detections/CAMERA-edges.csv is written there")->required();
-  app.add_option("--every", a.every, "only each N-th picture")->check(CLI::Range(1, 1000000));
-  app.footer(
-      "example: waymark detect REC --config config/corridor.yaml --out out/detected --every 10\n"
-      "Exit code: 0 done, 1 the work failed, 2 usage.");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError &e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
-    detect(a);
-  } catch (const std::exception &e) {
-    std::cerr << "waymark: " << e.what() << '\n';
-    return 1;
-  }
-  return 0;
+  DetectWish wish;
+  CLI::App app("", "waymark detect");
+  parse(&app, &wish);
+  return run_program(app, argc, argv, [&] { return run(wish); });
 }

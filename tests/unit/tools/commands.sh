@@ -106,6 +106,33 @@ expect 0 'good' "$bin/waymark-map" check "$dir/map/map.yaml" --draw "$dir/drawn.
 expect 0 'in 1 areas' "$bin/waymark-map" make "$dir/map/map.yaml" --out "$dir/map3"
 expect 2 'nowhere' "$bin/waymark-map" check "$dir/nowhere.yaml"
 
+# Detectors on pictures: a marker's code (ArUco 4x4, identity 0) in a folder, drawn and as rows.
+mkdir "$dir/photos" "$dir/junk"
+{ printf 'P5 320 240 255\n'; python3 -c '
+import sys
+code = ["1011", "0101", "0011", "0010"]
+def grey(x, y):
+    column, row = (x - 100) // 20, (y - 60) // 20
+    if not (0 <= column < 6 and 0 <= row < 6): return 230
+    return 230 if 1 <= column <= 4 and 1 <= row <= 4 and code[row - 1][column - 1] == "1" else 20
+sys.stdout.buffer.write(bytes(grey(x, y) for y in range(240) for x in range(320)))'; } >"$dir/photos/marker.pgm"
+cp "$dir/blank.pgm" "$dir/photos/small.pgm"
+expect 0 'waymark detect photos/' "$bin/waymark-detect" --help
+expect 2 'what to look for?' "$bin/waymark-detect" "$dir/photos" --out "$dir/found"
+expect 2 'no such file' "$bin/waymark-detect" "$dir/nowhere" --detector apriltag --out "$dir/found"
+expect 2 'has no pictures in it' "$bin/waymark-detect" "$dir/junk" --detector apriltag --out "$dir/found"
+expect 2 "is not KEY=VALUE" "$bin/waymark-detect" "$dir/photos" --detector apriltag --set family --out "$dir/found"
+expect 2 "aruco_4x4_50" "$bin/waymark-detect" "$dir/photos" --detector apriltag --set family=aruco4 --out "$dir/found"
+expect 2 'has no pictures' "$bin/waymark-detect" "$dir/photos" --detector apriltag --camera front --out "$dir/found"
+expect 2 '--calibration' "$bin/waymark-detect" "$dir/photos" --detector edges --out "$dir/found"
+expect 2 'needs a recording with a pair' "$bin/waymark-detect" "$dir/photos" --detector stereo --out "$dir/found"
+expect 0 'camera apriltag: in 1 of 2 pictures, 1 detections, 1 identity (0)' "$bin/waymark-detect" "$dir/photos" --detector apriltag --set family=aruco_4x4_50 --draw png --out "$dir/found"
+expect 0 '1 pictures have another size' "$bin/waymark-detect" "$dir/photos" --detector apriltag --set family=aruco_4x4_50 --out "$dir/found"
+expect 0 'apriltag-aruco_4x4_50: in 1 of 2' "$bin/waymark-detect" "$dir/photos" --detector apriltag --out "$dir/families"
+grep -q '^0,marker,0,0,.*,159.5..,119.5..$' "$dir/found/detections/camera-apriltag.csv" || { echo "FAIL: the marker's row"; cat "$dir/found/detections/camera-apriltag.csv"; failures=$((failures + 1)); }
+[ -s "$dir/found/drawn/camera-apriltag/marker.png" ] || { echo "FAIL: no drawn marker.png"; failures=$((failures + 1)); }
+[ ! -e "$dir/families/drawn/camera-apriltag-tag36h11" ] || { echo "FAIL: drawings of a family that is not there"; failures=$((failures + 1)); }
+
 # The reference trajectory.
 expect 0 'waymark replay recordings/corridor' "$bin/waymark-reference" --help
 expect 2 'map.yaml' "$bin/waymark-reference" "$dir/run" "$dir/empty"

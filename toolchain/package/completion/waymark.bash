@@ -32,7 +32,7 @@ _waymark() {
     "doctor") words='--json --seconds' ;;
     "stamps") words='' ;;
     "calibrate") words='--help --name --model --size --lens --out --camera --chessboard --aprilgrid --tag --gap --every --most --picture --config --run --map' ;;
-    "detect") words='--help --config --out --every' ;;
+    "detect") words='--help --detector --config --set --out --draw --rate --camera --calibration --landmarks --poses --every' ;;
     "diff") words='--help' ;;
     "eval") words='--help --json --published --reference --align --against --from --to --detector --camera --sizes --size-min --view' ;;
     "import") words='--help --out --camera --stamps --begin-ns --quality' ;;
