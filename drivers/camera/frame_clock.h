@@ -5,7 +5,7 @@
 #ifndef WM_CAMERA_FRAME_CLOCK_H
 #define WM_CAMERA_FRAME_CLOCK_H
 
-#include "foreign_clock.h"
+#include "waymark/foreign_clock.h"
 #include "waymark/time.h"
 
 typedef enum stamp_point { STAMP_END, STAMP_START } stamp_point;  // of the exposure of the picture

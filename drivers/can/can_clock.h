@@ -5,7 +5,7 @@
 #define WM_CAN_CLOCK_H
 
 #include "can_io.h"
-#include "foreign_clock.h"
+#include "waymark/foreign_clock.h"
 
 typedef struct can_clock {
   foreign_clock adapter;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "foreign_clock.h"
+#include "waymark/foreign_clock.h"
 
 #define DRIFT_PER_S (100 * WM_NS_PER_US)          // two crystals of 50 ppm each
 #define LEAP_NS (200 * WM_NS_PER_MS)              // more than any delay: the clock was set, or the device restarted

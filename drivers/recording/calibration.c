@@ -277,15 +277,22 @@ static wm_status read_gnss(const wm_yaml_node *gnss, const warner *warn, double 
   return wm_yaml_there(&node) ? list_in(&node, 3, 3, -1e4, 1e4, origin, NULL, err) : WM_OK;
 }
 
+static wm_status read_imu(const wm_yaml_node *imu, const warner *warn, wm_mounting *out, wm_error *err) {
+  static const char *const kKeys[] = {"mounting", NULL};
+  TRY(calibration_keys(imu, kKeys, warn, err));
+  return wm_yaml_there(imu) ? calibration_mounting(imu, NULL, warn, out, err) : WM_OK;
+}
+
 wm_status calibration_read(const wm_yaml *doc, const warner *warn, calibration *out, wm_error *err) {
-  static const char *const kKeys[] = {"cameras", "sensors", "stereo", "wheels", "markers", "motion6", "gnss", NULL};
+  static const char *const kKeys[] = {"cameras", "sensors", "stereo", "wheels", "markers",
+                                      "motion6", "gnss",    "imu",    NULL};
   calibration_init(out);
   wm_yaml_node root = wm_yaml_root(doc);
   TRY(calibration_keys(&root, kKeys, warn, err));
   wm_yaml_node cameras = wm_yaml_get(&root, "cameras"), sensors = wm_yaml_get(&root, "sensors"),
                stereo = wm_yaml_get(&root, "stereo"), wheels = wm_yaml_get(&root, "wheels"),
                markers = wm_yaml_get(&root, "markers"), motion6 = wm_yaml_get(&root, "motion6"),
-               gnss = wm_yaml_get(&root, "gnss");
+               gnss = wm_yaml_get(&root, "gnss"), imu = wm_yaml_get(&root, "imu");
   TRY(read_cameras(&cameras, warn, out, err));
   TRY(read_sensors(&sensors, warn, out, err));
   TRY(read_wheels(&wheels, warn, &out->wheels, err));
@@ -293,5 +300,6 @@ wm_status calibration_read(const wm_yaml *doc, const warner *warn, calibration *
   TRY(read_markers(&markers, warn, &out->rig, err));
   if (out->rig.marker_family[0]) add_marker_cameras(out);
   TRY(read_motion6(&motion6, warn, &out->rig, err));
+  TRY(read_imu(&imu, warn, &out->imu, err));
   return read_gnss(&gnss, warn, out->gnss_origin, err);
 }

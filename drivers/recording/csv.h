@@ -6,7 +6,7 @@
 
 #include "lines.h"
 
-#define CSV_COLUMNS_MAX 16  // of a format
+#define CSV_COLUMNS_MAX 18  // of a format
 #define CSV_FIELDS_MAX 64   // of a file
 
 typedef enum csv_type {

@@ -62,10 +62,10 @@ static wm_status check_format(const wm_yaml_node *root, wm_error *err) {
 }
 
 static int is_read(const char *file) {
-  static const char *const kRead[] = {"can.log",       "vehicle.dbc",        "can-signals.yaml", "motion.csv",
-                                      "motion6.csv",   "increments.csv",     "points.csv",       "sightings.csv",
-                                      "markers.csv",   "marker-corners.csv", "stereo.csv",       "gnss.csv",
-                                      "landmarks.csv", "calibration.yaml"};
+  static const char *const kRead[] = {"can.log",     "vehicle.dbc",    "can-signals.yaml",   "motion.csv",
+                                      "motion6.csv", "increments.csv", "points.csv",         "sightings.csv",
+                                      "imu.csv",     "markers.csv",    "marker-corners.csv", "stereo.csv",
+                                      "gnss.csv",    "landmarks.csv",  "calibration.yaml"};
   for (size_t i = 0; i < sizeof kRead / sizeof kRead[0]; i++)
     if (strcmp(file, kRead[i]) == 0) return 1;
   return 0;
@@ -175,10 +175,13 @@ static wm_status add_stream(wm_recording *self, const stream_kind *kind, wm_erro
   char path[WM_PATH_MAX];
   int there;
   wm_source *source;
-  wm_status status = find_stream(self, stream_file(kind), path, &there, err);
+  wm_status status = find_stream(self, kind->file, path, &there, err);
   if (status != WM_OK || !there) return status;
   status = stream_open(path, kind, NULL, 0, NULL, 0, NULL, self->warn.fn, self->warn.context, &source, err);
-  return status == WM_OK ? add_source(self, source, err) : status;
+  if (status != WM_OK) return status;
+  if (kind == &kStreamImu) stream_set_imu(source, wm_site_imu(self->site));
+  self->quantities |= kind->quantities;
+  return add_source(self, source, err);
 }
 
 static wm_status make_corner_reader(wm_recording *self, const char *path, const char *name, wm_corner_reader **out,
@@ -195,7 +198,7 @@ static wm_status make_corner_reader(wm_recording *self, const char *path, const 
 static wm_status add_sensor_streams(wm_recording *self, const stream_kind *kind, sensor_names *names, wm_error *err) {
   char path[WM_PATH_MAX];
   int there;
-  wm_status status = find_stream(self, stream_file(kind), path, &there, err);
+  wm_status status = find_stream(self, kind->file, path, &there, err);
   if (status != WM_OK || !there) return status;
   status = stream_find_sensors(path, kind, names, err);
   for (size_t i = 0; status == WM_OK && i < names->count; i++) {
@@ -260,7 +263,7 @@ static wm_status add_can(wm_recording *self, wm_error *err) {
   status = find_buses(self, &buses, err);
   const stream_kind *const others[] = {&kStreamMotion, &kStreamMotion6, &kStreamIncrements};
   for (size_t i = 0; status == WM_OK && !have_motion && i < sizeof others / sizeof others[0]; i++)
-    status = choose(self, "", stream_file(others[i]), motion, &have_motion, err);
+    status = choose(self, "", others[i]->file, motion, &have_motion, err);
   if (status != WM_OK) return status;
   const char *missing = missing_of(self, &buses);
   if (missing && !have_motion)
@@ -281,6 +284,7 @@ static wm_status add_sources(wm_recording *self, wm_error *err) {
   if (status == WM_OK) status = add_stream(self, &kStreamMotion, err);
   if (status == WM_OK) status = add_stream(self, &kStreamMotion6, err);
   if (status == WM_OK) status = add_stream(self, &kStreamIncrements, err);
+  if (status == WM_OK) status = add_stream(self, &kStreamImu, err);
   if (status == WM_OK) status = add_sensor_streams(self, &kStreamSightings, &self->sighting_sensors, err);
   if (status == WM_OK) status = add_sensor_streams(self, &kStreamMarkers, &self->marker_sensors, err);
   if (status == WM_OK) status = add_sensor_streams(self, &kStreamCorners, &self->corner_sensors, err);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "streams.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,41 +8,14 @@
 
 #include "arrival.h"
 
-// Limits of plausible values: wide enough for all vehicles, tight enough for corrupt data.
-#define SPEED -1000.0, 1000.0
-#define RATE -1000.0, 1000.0
-#define ANGLE -6.2832, 6.2832
-#define RANGE DBL_MIN, 1e5
-#define PLACE -1e8, 1e8
-#define SIGMA DBL_MIN, 1e6
-#define PIXEL -1e5, 1e5
-#define VARIANCE 0.0, 1e12
-#define COVARIANCE -1e12, 1e12
-#define ANY_ID 0.0, 2147483647.0
-#define ID_OR_UNKNOWN -1.0, 2147483647.0
-
-// The first columns of every stream.
-enum { T, ARRIVAL, FIRST };
-#define STAMPS \
-  {"t_ns", CSV_TIME, CSV_NEEDED, 0, 0}, { "arrival_ns", CSV_TIME, CSV_OPTIONAL, 0, 0 }
-
 typedef struct stream stream;
-
-struct stream_kind {
-  const char *file;
-  const char *name;
-  wm_event_kind event;
-  csv_format format;
-  // Fills the event's body from a row. NULL, or the reason why the row has no event.
-  const char *(*fill)(const stream *self, const csv_row *row, wm_event *out);
-};
 
 struct stream {
   wm_source base;
   const stream_kind *kind;
   csv_reader csv;
   char sensor[WM_NAME_MAX];
-  uint16_t sensor_index;
+  fill_context context;
   const sensor_names *names;
   int takes_broken;
   arrival_order order;
@@ -53,242 +25,11 @@ struct stream {
   int row_waits;   // points: `row` belongs to the next stamp
   csv_row before;  // base.sample_at_next: the row whose values get the next stamp
   int has_before;
-  const wm_corner_reader *corners;  // of kStreamCorners
 };
 
-static const char *fill_motion(const stream *self, const csv_row *row, wm_event *out) {
-  (void)self;
-  out->as.twist2 = (wm_twist2){row->number[FIRST], row->number[FIRST + 1]};
-  return NULL;
+void stream_set_imu(wm_source *source, const wm_mounting *imu) {
+  fill_context_imu(&((stream *)(void *)source)->context, imu);
 }
-
-static const char *fill_motion6(const stream *self, const csv_row *row, wm_event *out) {
-  (void)self;
-  for (int i = 0; i < 3; i++) {
-    out->as.twist6.v_mps[i] = row->number[FIRST + i];
-    out->as.twist6.w_radps[i] = row->number[FIRST + 3 + i];
-  }
-  return NULL;
-}
-
-// Number of empty fields from `first` on.
-static int count_empty(const csv_row *row, int first, int count) {
-  int empty = 0;
-  for (int i = 0; i < count; i++) empty += isnan(row->number[first + i]);
-  return empty;
-}
-
-static const char *fill_increment(const stream *self, const csv_row *row, wm_event *out) {
-  (void)self;
-  const double *n = &row->number[FIRST + 1];
-  const int empty = count_empty(row, FIRST + 4, 6);
-  if (row->whole[FIRST] >= row->whole[T]) return "from_ns is not before t_ns";
-  if (empty != 0 && empty != 6) return "a part of the covariance is empty";
-  out->as.increment = (wm_increment){.from_ns = row->whole[FIRST], .dx_m = n[0], .dy_m = n[1], .dheading_rad = n[2]};
-  memcpy(out->as.increment.covariance, &n[3], sizeof out->as.increment.covariance);
-  return NULL;
-}
-
-// Into (-pi, pi]; the argument is at most one turn beyond.
-static double wrapped(double angle_rad) {
-  if (angle_rad > M_PI) return angle_rad - 2.0 * M_PI;
-  if (angle_rad <= -M_PI) return angle_rad + 2.0 * M_PI;
-  return angle_rad;
-}
-
-// Sigmas of bearing and range from the covariance of the position in the sensor's frame; their correlation is dropped.
-static const char *polar_sigmas(const csv_row *row, wm_sighting *s) {
-  const double *cov = &row->number[FIRST + 6];
-  const int empty = count_empty(row, FIRST + 6, 3);
-  if (empty == 3) return NULL;
-  if (empty > 0) return "a part of the covariance is empty";
-  if (isnan(s->bearing_rad) || isnan(s->range_m)) return "a covariance needs both bearing_rad and range_m";
-  if (!(cov[0] * cov[2] > cov[1] * cov[1])) return "the covariance is not positive definite";
-  const double x = cos(s->bearing_rad), y = sin(s->bearing_rad);
-  const double along = x * x * cov[0] + 2.0 * x * y * cov[1] + y * y * cov[2];
-  const double across = y * y * cov[0] - 2.0 * x * y * cov[1] + x * x * cov[2];
-  if (isnan(s->bearing_sigma_rad)) s->bearing_sigma_rad = sqrt(across) / s->range_m;
-  if (isnan(s->range_sigma_m)) s->range_sigma_m = sqrt(along);
-  return NULL;
-}
-
-static const char *fill_sighting(const stream *self, const csv_row *row, wm_event *out) {
-  const double *n = &row->number[FIRST];
-  double bearing_rad = n[2], range_m = n[3];
-  if (isnan(bearing_rad) && isnan(range_m)) return "bearing_rad and range_m are both empty";
-  if (isnan(n[9]) != isnan(n[10])) return "one of elevation_rad and elevation_sigma_rad is empty";
-  int64_t id = row->whole[FIRST + 1];
-  out->as.sighting = (wm_sighting){.sensor = self->sensor_index,
-                                   .landmark_id = id == WM_TIME_NONE ? -1 : (int32_t)id,
-                                   .bearing_rad = wrapped(bearing_rad),
-                                   .range_m = range_m,
-                                   .bearing_sigma_rad = n[4],
-                                   .range_sigma_m = n[5],
-                                   .elevation_rad = n[9],
-                                   .elevation_sigma_rad = n[10]};
-  return polar_sigmas(row, &out->as.sighting);
-}
-
-static const char *fill_marker(const stream *self, const csv_row *row, wm_event *out) {
-  const double *p = &row->number[FIRST + 2];
-  out->as.marker = (wm_marker){.sensor = self->sensor_index,
-                               .id = (int32_t)row->whole[FIRST + 1],
-                               .p_m = {p[0], p[1], p[2]},
-                               .yaw_rad = wrapped(p[3]),
-                               .along_sigma_m = (double)NAN,
-                               .yaw_sigma_rad = (double)NAN,
-                               .bloom_px = (double)NAN};
-  return NULL;
-}
-
-static const char *fill_corners(const stream *self, const csv_row *row, wm_event *out) {
-  double px[4][2];
-  memcpy(px, &row->number[FIRST + 2], sizeof px);
-  out->as.marker = (wm_marker){.sensor = self->sensor_index, .id = (int32_t)row->whole[FIRST + 1]};
-  return wm_corner_reader_pose(self->corners, px, row->number[FIRST + 10], &out->as.marker);
-}
-
-static const char *fill_stereo(const stream *self, const csv_row *row, wm_event *out) {
-  (void)self;
-  const double *px = &row->number[FIRST + 1];
-  if (isnan(px[0]) != isnan(px[1]) || isnan(px[2]) != isnan(px[3])) return "one of u and v is empty";
-  if (isnan(px[0]) && isnan(px[2])) return "no camera sees the point";
-  out->as.stereo = (wm_stereo){.id = (int32_t)row->whole[FIRST], .left_px = {px[0], px[1]}, .right_px = {px[2], px[3]}};
-  return NULL;
-}
-
-static const char *fill_gnss(const stream *self, const csv_row *row, wm_event *out) {
-  (void)self;
-  const double *n = &row->number[FIRST];
-  out->as.position = (wm_position){.p_m = {n[0], n[1], n[2]}, .sigma_xy_m = n[3], .sigma_z_m = n[4]};
-  return NULL;
-}
-
-static const char *fill_point(const stream *self, const csv_row *row, wm_event *out) {
-  (void)self;
-  wm_points *points = &out->as.points;
-  if (points->count >= WM_POINTS_MAX) {
-    points->dropped++;
-    return NULL;
-  }
-  points->camera = -1;
-  points->normal_rad[points->count] = points->sigma_m[points->count] = NAN;
-  points->x_m[points->count] = (float)row->number[FIRST];
-  points->y_m[points->count++] = (float)row->number[FIRST + 1];
-  return NULL;
-}
-
-const stream_kind kStreamMotion = {
-    "motion.csv",
-    "motion",
-    WM_EVENT_TWIST2,
-    {{STAMPS, {"v_mps", CSV_NUMBER, CSV_NEEDED, SPEED}, {"w_radps", CSV_NUMBER, CSV_NEEDED, RATE}}},
-    fill_motion};
-
-const stream_kind kStreamMotion6 = {"motion6.csv",
-                                    "motion6",
-                                    WM_EVENT_TWIST6,
-                                    {{STAMPS,
-                                      {"vx_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
-                                      {"vy_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
-                                      {"vz_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
-                                      {"wx_radps", CSV_NUMBER, CSV_NEEDED, RATE},
-                                      {"wy_radps", CSV_NUMBER, CSV_NEEDED, RATE},
-                                      {"wz_radps", CSV_NUMBER, CSV_NEEDED, RATE}}},
-                                    fill_motion6};
-
-const stream_kind kStreamSightings = {"sightings.csv",
-                                      "sightings",
-                                      WM_EVENT_SIGHTING,
-                                      {{STAMPS,
-                                        {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
-                                        {"id", CSV_WHOLE, CSV_MAY_EMPTY, ID_OR_UNKNOWN},
-                                        {"bearing_rad", CSV_NUMBER, CSV_ONE_OF, ANGLE},
-                                        {"range_m", CSV_NUMBER, CSV_ONE_OF, RANGE},
-                                        {"bearing_sigma_rad", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
-                                        {"range_sigma_m", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
-                                        {"cov_xx_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
-                                        {"cov_xy_m2", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
-                                        {"cov_yy_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
-                                        {"elevation_rad", CSV_NUMBER, CSV_OPTIONAL, ANGLE},
-                                        {"elevation_sigma_rad", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
-                                      fill_sighting};
-
-const stream_kind kStreamIncrements = {"increments.csv",
-                                       "increments",
-                                       WM_EVENT_INCREMENT,
-                                       {{STAMPS,
-                                         {"from_ns", CSV_TIME, CSV_NEEDED, 0, 0},
-                                         {"dx_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                         {"dy_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                         {"dheading_rad", CSV_NUMBER, CSV_NEEDED, ANGLE},
-                                         {"cov_xx", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
-                                         {"cov_xy", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
-                                         {"cov_yy", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
-                                         {"cov_xt", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
-                                         {"cov_yt", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
-                                         {"cov_tt", CSV_NUMBER, CSV_OPTIONAL, VARIANCE}}},
-                                       fill_increment};
-
-const stream_kind kStreamMarkers = {"markers.csv",
-                                    "markers",
-                                    WM_EVENT_MARKER,
-                                    {{STAMPS,
-                                      {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
-                                      {"id", CSV_WHOLE, CSV_NEEDED, ANY_ID},
-                                      {"x_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                      {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                      {"z_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                      {"yaw_rad", CSV_NUMBER, CSV_NEEDED, ANGLE}}},
-                                    fill_marker};
-
-const stream_kind kStreamCorners = {"marker-corners.csv",
-                                    "corners",
-                                    WM_EVENT_MARKER,
-                                    {{STAMPS,
-                                      {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
-                                      {"id", CSV_WHOLE, CSV_NEEDED, ANY_ID},
-                                      {"u0_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"v0_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"u1_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"v1_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"u2_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"v2_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"u3_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"v3_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"sigma_px", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
-                                    fill_corners};
-
-const stream_kind kStreamStereo = {"stereo.csv",
-                                   "stereo",
-                                   WM_EVENT_STEREO,
-                                   {{STAMPS,
-                                     {"id", CSV_WHOLE, CSV_NEEDED, ID_OR_UNKNOWN},
-                                     {"ul_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
-                                     {"vl_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
-                                     {"ur_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
-                                     {"vr_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL}}},
-                                   fill_stereo};
-
-const stream_kind kStreamPoints = {
-    "points.csv",
-    "points",
-    WM_EVENT_POINTS,
-    {{STAMPS, {"x_m", CSV_NUMBER, CSV_NEEDED, PLACE}, {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE}}},
-    fill_point};
-
-const stream_kind kStreamGnss = {"gnss.csv",
-                                 "gnss",
-                                 WM_EVENT_POSITION,
-                                 {{STAMPS,
-                                   {"x_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                   {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                   {"z_m", CSV_NUMBER, CSV_OPTIONAL, PLACE},
-                                   {"sigma_xy_m", CSV_NUMBER, CSV_NEEDED, SIGMA},
-                                   {"sigma_z_m", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
-                                 fill_gnss};
-
-const char *stream_file(const stream_kind *kind) { return kind->file; }
 
 static int is_name(csv_field field, const char *name) {
   return strlen(name) == field.length && memcmp(name, field.text, field.length) == 0;
@@ -418,7 +159,7 @@ static wm_status next_single(wm_source *base, wm_event *out, wm_error *err) {
     const csv_row *values = values_row(self, &before);
     if (!values) continue;
     begin_event(self, out);
-    const char *problem = self->kind->fill(self, values, out);
+    const char *problem = self->kind->fill(&self->context, values, out);
     if (!problem) {
       hand_out(self, arrival_of(&self->row), out);
       return WM_OK;
@@ -436,7 +177,7 @@ static wm_status next_points(wm_source *base, wm_event *out, wm_error *err) {
   begin_event(self, out);
   wm_time_ns arrival_ns = arrival_of(&self->row);
   for (;;) {
-    (void)self->kind->fill(self, &self->row, out);
+    (void)self->kind->fill(&self->context, &self->row, out);
     if (arrival_of(&self->row) > arrival_ns) arrival_ns = arrival_of(&self->row);
     status = next_row(self, err);
     if (status != WM_OK && status != WM_END) return status;
@@ -469,14 +210,14 @@ wm_status stream_open(const char *path, const stream_kind *kind, const char *sen
   self->base.ops = kind->event == WM_EVENT_POINTS ? &kPoints : &kSingle;
   self->base.is_motion = (WM_MOTION_EVENTS >> kind->event) & 1u;
   self->base.kinds = WM_EVENT_BIT(kind->event);
+  if (kind->also && self->csv.place[kind->also_with] >= 0) self->base.kinds |= WM_EVENT_BIT(kind->also);
   self->base.in_order = self->csv.place[ARRIVAL] < 0;
   snprintf(self->base.name, sizeof self->base.name, "%s%s%s", kind->name, sensor ? ":" : "", sensor ? sensor : "");
   snprintf(self->sensor, sizeof self->sensor, "%s", sensor ? sensor : "");
   self->kind = kind;
-  self->sensor_index = sensor_index;
+  self->context = (fill_context){.sensor_index = sensor_index, .corners = corners};
   self->names = others;
   self->takes_broken = takes_broken;
-  self->corners = corners;
   *out = &self->base;
   return WM_OK;
 }

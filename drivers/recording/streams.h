@@ -3,17 +3,8 @@
 #ifndef WM_RECORDING_STREAMS_H
 #define WM_RECORDING_STREAMS_H
 
-#include "csv.h"
-#include "waymark/marker_corners.h"
+#include "stream_kinds.h"
 #include "waymark/source.h"
-
-typedef struct stream_kind stream_kind;
-
-// In the order of the format's table of files.
-extern const stream_kind kStreamMotion, kStreamMotion6, kStreamIncrements, kStreamSightings, kStreamMarkers,
-    kStreamCorners, kStreamStereo, kStreamPoints, kStreamGnss;
-
-const char *stream_file(const stream_kind *kind);  // "motion.csv"
 
 // Names of the sensors in a file of sightings or markers.
 typedef struct sensor_names {
@@ -31,5 +22,7 @@ wm_status stream_find_sensors(const char *path, const stream_kind *kind, sensor_
 wm_status stream_open(const char *path, const stream_kind *kind, const char *sensor, uint16_t sensor_index,
                       const sensor_names *others, int takes_broken, const wm_corner_reader *corners, wm_warn_fn warn,
                       void *context, wm_source **out, wm_error *err);
+// How the IMU of a source of kStreamImu is mounted.
+void stream_set_imu(wm_source *source, const wm_mounting *imu);
 
 #endif

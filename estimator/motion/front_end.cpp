@@ -62,7 +62,7 @@ void motion_front_end::init(const wm_motion_params *params, const wm_wheels *whe
   for (wm_time_ns &stamp : stamp_ns_) stamp = WM_TIME_NONE;
   for (wm_time_ns &stamp : message_ns_) stamp = WM_TIME_NONE;
   for (tick_wheel &wheel : wheel_) wheel.t_ns = WM_TIME_NONE;
-  increment_ns_ = twist_ns_ = sampled_ns_[0] = sampled_ns_[1] = WM_TIME_NONE;
+  increment_ns_ = twist_ns_ = twist_sample_ns_ = sampled_ns_[0] = sampled_ns_[1] = WM_TIME_NONE;
   noise_factors_ = {1.0, 1.0};
   for (int i = 0; i < 3; i++) {
     off_plane_since_ns_[i] = WM_TIME_NONE;
@@ -119,11 +119,17 @@ void motion_front_end::take_twist(const wm_event &event) {
   const double w = commands_ ? driven_rate(*params_, v, rate) : rate;
   const double u = planar ? 0.0 : event.as.twist6.v_mps[1];
   if (!planar) watch_plane(event.t_ns, event.as.twist6);
+  twist_sample_ns_ = event.t_ns;
   choose_model(WM_EVENT_BIT(event.kind));
   twists_.note(v, rate,
                std::fabs(v) > params_->standstill_speed_mps || std::fabs(rate) > params_->standstill_yaw_rate_radps);
   if (params_->twist == WM_TWIST_AUTO)
     commands_ = (uint8_t)((commands_ & ~kDetected) | (twists_.kind() == kKindCommands ? kDetected : 0));
+  if (model_ == WM_MOTION_SPEED_YAW_RATE && speed_source_ == kOfTwist) {
+    take_twist_beside_gyro(event.t_ns, {v, u, rate});
+    return;
+  }
+  twist_ = {v, u, rate};
   if (model_ != WM_MOTION_TWIST) return;
   twists_in_space_ = !planar;
   if (twist_ns_ != WM_TIME_NONE && event.t_ns > twist_ns_ && !is_overdue(event.t_ns)) {
@@ -149,6 +155,29 @@ void motion_front_end::take_twist(const wm_event &event) {
     push_input(event.t_ns, v, w, false, false, u);
   else
     push_input(event.t_ns, held.a, held.b, true, false, held.side_mps);
+}
+
+// The speeds of a twist and the turn rate of a gyro, as of a car's speed and yaw rate.
+void motion_front_end::take_twist_beside_gyro(wm_time_ns t_ns, const planar_twist &sample) {
+  const bool v_plausible = is_plausible_level(kTwistSpeed, t_ns, sample.v);
+  const bool plausible = is_plausible_level(kTwistSide, t_ns, sample.u) && v_plausible;
+  note_plausibility(t_ns, quantity_bit(kTwistSpeed) | quantity_bit(kTwistSide), plausible);
+  if (plausible) twist_ = sample;
+  watch_standstill(t_ns, plausible && is_still(twist_.v));
+  push_input(t_ns, twist_.v, value_[WM_Q_YAW_RATE], (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK) != 0, !plausible,
+             twist_.u);
+}
+
+// Only beside a gyro: a twist alone has a model of its own. A command is obeyed later and in part.
+bool motion_front_end::twist_gives_speed() const {
+  return seen(WM_Q_YAW_RATE) && !commands_ && twist_sample_ns_ != WM_TIME_NONE &&
+         now_ns_ - twist_sample_ns_ <= hold_max_ns_;
+}
+
+// The newest speed is below the threshold; of a twist also its turn rate, as it may turn on the spot.
+bool motion_front_end::is_still(double speed_mps) const {
+  if (speed_source_ != kOfTwist) return std::fabs(speed_mps) < params_->standstill_speed_mps;
+  return speed_of(twist_) < params_->standstill_speed_mps && std::fabs(twist_.w) < params_->standstill_yaw_rate_radps;
 }
 
 // Holds for good: the states move the velocity.
@@ -191,16 +220,18 @@ void motion_front_end::take_quantities(const wm_event &event) {
 void motion_front_end::push_quantities(wm_time_ns t_ns, uint32_t fresh, bool frozen, bool refused) {
   double v = 0.0;
   if (!read_speed(&v)) return;
-  const bool still = watch_standstill(t_ns, std::fabs(v) < params_->standstill_speed_mps && !refused);
+  const bool still = watch_standstill(t_ns, is_still(v) && !refused);
   const bool speed = (fresh & (kSpeeds | kCounts)) != 0, rate = (fresh & quantity_bit(WM_Q_YAW_RATE)) != 0;
   if (model_ == WM_MOTION_SPEED_YAW_RATE && (speed || rate)) {
     watch_yaw_rate(t_ns, v, rate && !refused);
     yaw_fresh_ = rate && !refused && still;
     const bool unsure = frozen || silent(WM_Q_YAW_RATE, t_ns) || (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK);
-    push_input(t_ns, v, value_[WM_Q_YAW_RATE], unsure, refused);
+    push_input(t_ns, v, value_[WM_Q_YAW_RATE], unsure, refused, speed_source_ == kOfTwist ? twist_.u : 0.0);
   } else if (model_ == WM_MOTION_ACKERMANN && (speed || (fresh & kSteering))) {
     double angle = 0.0;
     if (read_road_wheel(&angle)) push_input(t_ns, v, angle, frozen, refused);
+  } else if (model_ == WM_MOTION_TWIST && speed_source_ == kOfTwist) {
+    watch_yaw_rate(t_ns, v, rate && !refused);  // stuck until now: does it move again?
   }
 }
 
@@ -209,9 +240,7 @@ void motion_front_end::choose_model(uint32_t kinds) {
   double ignored;
   const bool speed = read_speed(&ignored);
   const bool ticks = counts_ticks() && finite(wheels_.track_m);
-  // A gyro that fell silent or stuck yields to the wheels' difference, until it is back.
-  const bool gyro = seen(WM_Q_YAW_RATE) &&
-                    !(ticks && (silent(WM_Q_YAW_RATE, now_ns_) || (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK)));
+  const bool gyro = gyro_is_alive(ticks), has_other = ticks || speed_source_ == kOfTwist;
   const bool possible[] = {false,
                            ticks,
                            speed && gyro,
@@ -227,8 +256,19 @@ void motion_front_end::choose_model(uint32_t kinds) {
   for (uint8_t model : kPreferred) {
     if (possible[model] && model_ == WM_MOTION_SPEED_YAW_RATE && model == WM_MOTION_TICKS) leave_gyro();
     if (possible[model]) model_ = model;
-    if (model_ == model && (possible[model] || model != WM_MOTION_SPEED_YAW_RATE || !ticks)) return;
+    if (model_ == model && (possible[model] || model != WM_MOTION_SPEED_YAW_RATE || !has_other)) return;
   }
+}
+
+// A gyro that fell silent or stuck yields to the wheels' difference, or to the twist's turn rate, until it is back.
+bool motion_front_end::gyro_is_alive(bool ticks) const {
+  if (!seen(WM_Q_YAW_RATE)) return false;
+  const bool stuck = (health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK) != 0;
+  if (ticks) return !silent(WM_Q_YAW_RATE, now_ns_) && !stuck;
+  if (speed_source_ != kOfTwist) return true;
+  const double period_s = period_s_[WM_Q_YAW_RATE] * motion_history::kOverduePeriods;
+  const double overdue_s = period_s > motion_history::kOverdueS ? period_s : motion_history::kOverdueS;
+  return wm_seconds_between(stamp_ns_[WM_Q_YAW_RATE], now_ns_) <= overdue_s && !stuck;
 }
 
 motion_kind motion_front_end::kind() const {
@@ -269,13 +309,16 @@ bool motion_front_end::read_speed(double *speed_mps) {
     source = kVehicleSpeed;
   } else if (mean_of(WM_Q_WHEEL_SPEED_FRONT_LEFT, WM_Q_WHEEL_SPEED_FRONT_RIGHT, &speed)) {
     source = kFrontWheels;
+  } else if (twist_gives_speed()) {
+    speed = twist_.v;
+    source = kOfTwist;
   }
   if (source == kNone) return false;
   if (source != speed_source_) {
     speed_source_changed_ |= speed_source_ != kNone;
     speed_source_ = source;
   }
-  if (source != kTicksMean) {
+  if (source != kTicksMean && source != kOfTwist) {
     speed_is_signed_ |= speed < kSignedBelow_mps;
     speed = by_gear(speed, speed_is_signed_);
   }
@@ -327,6 +370,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.command = model_ == WM_MOTION_TWIST && commands_ != 0;
   if (input.command) begin_response(*params_, history_.empty() ? nullptr : &history_.newest(), &input);
   input.kind = kind();
+  input.beside_gyro = model_ == WM_MOTION_TWIST && speed_source_ == kOfTwist;
   input.doubtful = doubtful;
   mark_refused(&input);
   note_samples(&input);
@@ -360,7 +404,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
 // samples. After a gap add_overdue_noise() has the error.
 void motion_front_end::note_samples(motion_input *input) {
   const bool twist = model_ == WM_MOTION_TWIST, known = !input->doubtful && !input->refused && !input->command;
-  bool speed = twist;
+  bool speed = twist || (speed_source_ == kOfTwist && twist_sample_ns_ == input->t_ns);
   for (int id = WM_Q_WHEEL_SPEED_FRONT_LEFT; id <= WM_Q_VEHICLE_SPEED && !speed; id++)
     speed = (kSpeeds & quantity_bit(id)) && stamp_ns_[id] == input->t_ns;
   const bool fresh[2] = {known && speed && !ticks_drive(),
@@ -403,8 +447,9 @@ void motion_front_end::watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fr
   if (!fresh) return;
   double other = 0.0;
   const bool compare = read_other_turn_rate(speed_mps, &other);
+  const bool drives = speed_source_ == kOfTwist ? !is_still(speed_mps) : std::fabs(speed_mps) >= kDriving_mps;
   const double yaw = value_[WM_Q_YAW_RATE];
-  if (yaw != yaw_last_ || std::fabs(speed_mps) < kDriving_mps || yaw_same_since_ns_ == WM_TIME_NONE) {
+  if (yaw != yaw_last_ || !drives || yaw_same_since_ns_ == WM_TIME_NONE) {
     yaw_last_ = yaw;
     yaw_same_since_ns_ = t_ns;
     yaw_other_min_ = yaw_other_max_ = other;
@@ -419,6 +464,10 @@ void motion_front_end::watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fr
 }
 
 bool motion_front_end::read_other_turn_rate(double speed_mps, double *rate_radps) const {
+  if (speed_source_ == kOfTwist) {
+    *rate_radps = twist_.w;
+    return true;
+  }
   double angle;
   if (finite(wheels_.wheelbase_m) && read_road_wheel(&angle)) {
     *rate_radps = speed_mps * tan(angle) / wheels_.wheelbase_m;

@@ -63,7 +63,8 @@ class motion_front_end {
       add_refused_noise(segment, *params_, &noise);
       if (segment.input.command) add_change_noise(segment, *params_, &noise);
       if (segment.held_s == 0.0) add_sampling_noise(segment.input, &noise);
-      if (twist.u != 0.0 && segment.input.model == WM_MOTION_TWIST) turn_to_axes(twist, &noise);
+      if (twist.u != 0.0 && (segment.input.model == WM_MOTION_TWIST || segment.input.model == WM_MOTION_SPEED_YAW_RATE))
+        turn_to_axes(twist, &noise);
       visit(segment, twist, noise);
     });
   }
@@ -121,10 +122,11 @@ class motion_front_end {
  private:
   enum { kTwistSpeed = WM_Q_COUNT, kTwistRate, kTwistSide, kSlots };  // of check_: a slot for each quantity and these
   enum : uint8_t { kStated = 1, kDetected = 2, kTaken = 4 };          // of commands_
-  enum speed_source : uint8_t { kNone, kFrontWheels, kVehicleSpeed, kTicksMean, kRearWheels };
+  enum speed_source : uint8_t { kNone, kFrontWheels, kVehicleSpeed, kTicksMean, kRearWheels, kOfTwist };
 
   void take_quantities(const wm_event &event);
   void take_twist(const wm_event &event);
+  void take_twist_beside_gyro(wm_time_ns t_ns, const planar_twist &sample);
   void take_increment(const wm_event &event);
   wm_status check_increment(const wm_event &event) const;
   stated_noise stated_noise_now() const;
@@ -141,6 +143,9 @@ class motion_front_end {
   void take_count(int side, wm_time_ns t_ns, double count);
   void choose_model(uint32_t kinds);
   void watch_encoders();
+  bool twist_gives_speed() const;
+  bool gyro_is_alive(bool ticks) const;
+  bool is_still(double speed_mps) const;
   void watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fresh);
   bool watch_standstill(wm_time_ns t_ns, bool still);
   bool read_speed(double *speed_mps);
@@ -189,8 +194,10 @@ class motion_front_end {
   double stated_v_mps_[3], stated_w_radps_[3];  // sigmas of a twist in space; NaN: not stated
   double twist_period_s_;                       // usual time between two twists; 0: unknown
   wm_time_ns twist_ns_;
-  wm_time_ns sampled_ns_[2];   // newest sample of the speed and of the turn rate that the model uses
-  wm_time_ns still_since_ns_;  // speed below the threshold since; WM_TIME_NONE while moving
+  planar_twist twist_;          // the newest plausible one
+  wm_time_ns twist_sample_ns_;  // stamp of the newest twist, whatever model drives
+  wm_time_ns sampled_ns_[2];    // newest sample of the speed and of the turn rate that the model uses
+  wm_time_ns still_since_ns_;   // speed below the threshold since; WM_TIME_NONE while moving
   wm_time_ns yaw_same_since_ns_;
   double yaw_last_;
   double yaw_other_min_, yaw_other_max_;  // range of the turn rate by other sensors meanwhile

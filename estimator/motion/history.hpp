@@ -26,19 +26,21 @@ struct motion_input {
   double side_mps;  // to the left; of twists in space and increments
   // Of increments: variance per s of distance, of sideways and of rotation, and their covariances; NaN: not given.
   float increment_noise[6];
-  float sampling[2];   // variances of distance and rotation by the changes since the samples before
-  float period_s;      // between increments; 0: that between the inputs
-  float response[2];   // of commands: speed and turn rate of the drive at t_ns (commands.hpp)
-  uint32_t uncounted;  // no count gives the distance until the next input's t_ns
-  uint8_t model;       // wm_motion_model; AUTO: nothing known yet
-  uint8_t standing;    // the robot is known to stand
-  uint8_t doubtful;    // of a frozen counter, a dead encoder
-  uint8_t stale;       // set by walk(): held for longer than hold_max
-  uint8_t counted;     // by the counts or the increment at its end: true until then, however long
-  uint8_t command;     // a twist that is a command
-  uint8_t kind;        // motion_kind
-  uint8_t refused;     // kRefusedSpeed, kRefusedTurn: samples of it are refused, and this is the last plausible one
-  double refused_s;    // at t_ns: for how long
+  float sampling[2];    // variances of distance and rotation by the changes since the samples before
+  float period_s;       // between increments; 0: that between the inputs
+  float response[2];    // of commands: speed and turn rate of the drive at t_ns (commands.hpp)
+  uint8_t beside_gyro;  // a twist whose turn rate stands in for a gyro's
+  uint8_t uncounted;    // no count gives the distance until the next input's t_ns
+  uint8_t unused[2];
+  uint8_t model;     // wm_motion_model; AUTO: nothing known yet
+  uint8_t standing;  // the robot is known to stand
+  uint8_t doubtful;  // of a frozen counter, a dead encoder
+  uint8_t stale;     // set by walk(): held for longer than hold_max
+  uint8_t counted;   // by the counts or the increment at its end: true until then, however long
+  uint8_t command;   // a twist that is a command
+  uint8_t kind;      // motion_kind
+  uint8_t refused;   // kRefusedSpeed, kRefusedTurn: samples of it are refused, and this is the last plausible one
+  double refused_s;  // at t_ns: for how long
 };
 
 // Of commands (commands.hpp): rises of the speed and of the turn rate per s, and by how much a drive by radius turns

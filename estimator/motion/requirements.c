@@ -22,7 +22,8 @@ static const char *ticks_lack(const wm_wheels *wheels, uint32_t quantities) {
   return isfinite(wheels->track_m) ? NULL : "wheels.track_m in calibration.yaml";
 }
 
-static const char *speed_lacks(const wm_wheels *wheels, uint32_t quantities) {
+static const char *speed_lacks(const wm_wheels *wheels, uint32_t kinds, uint32_t quantities) {
+  if ((kinds & WM_TWIST_EVENTS) && (quantities & BIT(WM_Q_YAW_RATE))) return NULL;
   if ((quantities & SPEEDS) || counts_ticks(wheels, quantities)) return NULL;
   if ((quantities & BOTH_TICKS) == BOTH_TICKS) return "wheels.radius_m and wheels.ticks_per_turn in calibration.yaml";
   return "a speed over CAN (wheel_speed_..., vehicle_speed or both wheels' ticks)";
@@ -43,10 +44,10 @@ static const char *model_lacks(int model, const wm_wheels *wheels, uint32_t kind
   switch (model) {
     case WM_MOTION_TICKS: return ticks_lack(wheels, quantities);
     case WM_MOTION_SPEED_YAW_RATE:
-      lacks = speed_lacks(wheels, quantities);
+      lacks = speed_lacks(wheels, kinds, quantities);
       return lacks || quantities & BIT(WM_Q_YAW_RATE) ? lacks : "yaw_rate over CAN";
     case WM_MOTION_ACKERMANN:
-      lacks = speed_lacks(wheels, quantities);
+      lacks = speed_lacks(wheels, kinds, quantities);
       return lacks ? lacks : steering_lacks(wheels, quantities);
     case WM_MOTION_INCREMENTS: return kinds & WM_EVENT_BIT(WM_EVENT_INCREMENT) ? NULL : "increments.csv";
     case WM_MOTION_CONSTANT_VELOCITY: return NULL;

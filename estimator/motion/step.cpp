@@ -34,13 +34,24 @@ motion_twist from_wheels(double left, double right, const wm_motion_calibration 
   return t;
 }
 
-motion_twist from_speed_and_rate(double speed, double rate, const wm_motion_calibration &c) {
+motion_twist from_speed_and_rate(double speed, double side, double rate, const wm_motion_calibration &c) {
   motion_twist t{};
   t.v = c.value[kSpeedScale] * speed;
+  t.u = c.value[kSpeedScale] * side;
   t.w = c.value[kYawRateScale] * (rate - c.value[kYawRateBias]);
-  t.add(kSpeedScale, speed, 0.0);
+  t.add(kSpeedScale, speed, 0.0, side);
   t.add(kYawRateScale, 0.0, rate - c.value[kYawRateBias]);
   t.add(kYawRateBias, 0.0, -c.value[kYawRateScale]);
+  return t;
+}
+
+// A twist while the gyro is silent: the states of the turn rate are the gyro's, and this rate is the wheels'.
+motion_twist without_gyro(const motion_input &input, const wm_motion_calibration &c) {
+  motion_twist t{};
+  t.v = c.value[kSpeedScale] * input.a;
+  t.u = c.value[kSpeedScale] * input.side_mps;
+  t.w = input.b;
+  t.add(kSpeedScale, input.a, 0.0, input.side_mps);
   return t;
 }
 
@@ -91,9 +102,10 @@ motion_twist twist_of(const motion_input &input, const wm_motion_calibration &c,
   if (input.standing || input.stale) return motion_twist{};
   switch (input.model) {
     case WM_MOTION_TICKS: return from_wheels(input.a, input.b, c, wheels.track_m);
-    case WM_MOTION_SPEED_YAW_RATE: return from_speed_and_rate(input.a, input.b, c);
+    case WM_MOTION_SPEED_YAW_RATE: return from_speed_and_rate(input.a, input.side_mps, input.b, c);
     case WM_MOTION_ACKERMANN: return from_steering(input.a, input.b, c, wheels);
     case WM_MOTION_TWIST:
+      if (input.beside_gyro) return without_gyro(input, c);
       return input.command ? twist_of_command({input.a, input.side_mps, input.b}, drive, c, wheels.track_m)
                            : twist_of_sample(input.a, input.side_mps, input.b, c, wheels.track_m);
     case WM_MOTION_INCREMENTS:

@@ -326,7 +326,7 @@ int command_check(int argc, char *const *argv) {
   check_config(&config, &found);
   if (count > 1)
     check_recording(&config, words[1], is_quick, &found);
-  else if (config.devices.can_count + config.devices.camera_count > 0)
+  else if (config.devices.can_count + config.devices.lcm_count + config.devices.camera_count > 0)
     check_devices(&config, &found);
   wm_config_free(&config);
   return tell(&found);

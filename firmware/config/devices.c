@@ -2,8 +2,11 @@
 // `devices:` of a configuration.
 #include "config/devices.h"
 
+#include <ctype.h>
 #include <stdio.h>
 #include <string.h>
+
+#include "waymark/streams.h"
 
 wm_status config_path(const wm_yaml_node *node, const char *config_path, char out[WM_PATH_MAX], wm_error *err) {
   char name[WM_PATH_MAX];
@@ -149,6 +152,31 @@ static wm_status read_camera(const wm_yaml_node *item, wm_config *config, wm_err
   return status;
 }
 
+static wm_status read_lcm(const wm_yaml_node *item, wm_config *config, wm_error *err) {
+  static const char *const kKeys[] = {"stream", "channel", "clock", "rate_max_hz", NULL};
+  static const char *const kClocks[] = {"here", "sender", NULL};  // wm_lcm_clock
+  wm_lcm_device_config *out = &config->devices.lcm[config->devices.lcm_count];
+  int32_t stream = -1;
+  *out = (wm_lcm_device_config){.line = wm_yaml_line(item), .rate_max_hz = 1000};
+  if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {stream: motion, ...} is needed");
+  wm_status status = wm_yaml_check_keys(item, kKeys, WM_YAML_STRICT, NULL, err);
+  if (status == WM_OK) status = choice(item, "stream", wm_stream_names, &stream, err);
+  if (status != WM_OK) return status;
+  if (stream < 0) return wm_yaml_fail(item, err, "stream: is missing, e.g. {stream: motion}");
+  const char *name = wm_stream_names[stream];
+  for (size_t i = 0; i < config->devices.lcm_count; i++)
+    if (strcmp(config->devices.lcm[i].stream, name) == 0)
+      return wm_yaml_fail(item, err, "the stream '%s' stands there twice (first in line %d)", name,
+                          config->devices.lcm[i].line);
+  snprintf(out->stream, sizeof out->stream, "%s", name);
+  for (size_t i = 0; out->stream[i]; i++) out->channel[i] = (char)toupper((unsigned char)out->stream[i]);
+  status = text(item, "channel", out->channel, sizeof out->channel, err);
+  if (status == WM_OK) status = choice(item, "clock", kClocks, &out->clock, err);
+  if (status == WM_OK) status = number(item, "rate_max_hz", 10000, &out->rate_max_hz, err);
+  config->devices.lcm_count++;
+  return status;
+}
+
 static wm_status read_list(const wm_yaml_node *list, size_t max, const char *what,
                            wm_status (*read)(const wm_yaml_node *, wm_config *, wm_error *), wm_config *config,
                            wm_error *err) {
@@ -164,15 +192,16 @@ static wm_status read_list(const wm_yaml_node *list, size_t max, const char *wha
 }
 
 wm_status config_read_devices(const wm_yaml_node *root, wm_config *out, wm_error *err) {
-  static const char *const kKeys[] = {"can", "cameras", "sightings", NULL};
+  static const char *const kKeys[] = {"can", "cameras", "lcm", "sightings", NULL};
   static const char *const kSightings[] = {"none", "lcm", NULL};
   wm_yaml_node devices = wm_yaml_get(root, "devices"), can = wm_yaml_get(root, "devices.can"),
-               cameras = wm_yaml_get(root, "devices.cameras");
+               cameras = wm_yaml_get(root, "devices.cameras"), lcm = wm_yaml_get(root, "devices.lcm");
   if (!wm_yaml_there(&devices)) return WM_OK;
   wm_status status = wm_yaml_check_keys(&devices, kKeys, WM_YAML_STRICT, NULL, err);
   if (status == WM_OK) status = read_list(&can, WM_CAN_DEVICES_MAX, "{interface: NAME, ...}", read_can, out, err);
   if (status == WM_OK)
     status = read_list(&cameras, WM_CAMERA_DEVICES_MAX, "{name: CAMERA, device: PATH, ...}", read_camera, out, err);
+  if (status == WM_OK) status = read_list(&lcm, WM_LCM_DEVICES_MAX, "{stream: NAME, ...}", read_lcm, out, err);
   if (status == WM_OK) status = choice(&devices, "sightings", kSightings, &out->devices.sightings_by_lcm, err);
   return status;
 }

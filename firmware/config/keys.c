@@ -20,7 +20,7 @@ const config_key kConfigKeys[] = {
     {"dbc", "file", "the recording's", "DBC file to take instead of the recording's vehicle.dbc."},
     {"can_signals", "file", "the recording's", "can-signals.yaml to take instead of the recording's."},
     {"devices", "map", "none",
-     "The robot's own devices, for `waymark run` without a recording: `can`, `cameras` (see below), and "
+     "The robot's own devices, for `waymark run` without a recording: `can`, `cameras`, `lcm` (see below), and "
      "`sightings: lcm` where another program sends sightings of landmarks (docs/live.md)."},
     {"map", "file", "the recording's map/map.yaml", "Raster map (a map.yaml) to take instead of the recording's."},
     {"initial_pose", "map", "the recording's",
@@ -55,7 +55,7 @@ const config_key kConfigKeys[] = {
 
 const config_key kConfigSourceKeys[] = {
     {"name", "text", "needed",
-     "`can`, `motion`, `motion6`, `increments`, `sightings`, `markers`, `stereo`, `points` or `gnss`; "
+     "`can`, `motion`, `motion6`, `increments`, `imu`, `sightings`, `markers`, `stereo`, `points` or `gnss`; "
      "`sightings:SENSOR` for one "
      "sensor; a detector under `vision`, or `DETECTOR:CAMERA`."},
     {"use", "true or false", "true", "false: the source is not opened."},
@@ -79,6 +79,18 @@ const config_key kConfigCanDeviceKeys[] = {
     {"interface", "text", "needed", "SocketCAN's name of it, e.g. `can0`. It needn't be there yet."},
     {"dbc", "file", "`dbc` at the top", "DBC file of this bus."},
     {"can_signals", "file", "`can_signals` at the top", "Which signals of this bus are which quantities."},
+    {NULL, NULL, NULL, NULL},
+};
+
+const config_key kConfigLcmDeviceKeys[] = {
+    {"stream", "`motion`, `imu`", "needed",
+     "The stream of a recording that another program sends over LCM: motion.csv as motion_t, imu.csv as imu_t "
+     "(motion-sources.md)."},
+    {"channel", "text", "the stream's name in capitals", "LCM channel, behind publish.channel_prefix."},
+    {"clock", "`here`, `sender`", "here",
+     "Whose clock `t_ns` is of. here: CLOCK_MONOTONIC of this computer. sender: a monotonic clock of the sender's own, "
+     "followed by the smallest delay."},
+    {"rate_max_hz", "number from 0 to 10000", "1000", "Messages beyond this rate are dropped."},
     {NULL, NULL, NULL, NULL},
 };
 

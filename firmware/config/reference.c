@@ -90,6 +90,8 @@ void wm_config_reference(FILE *to) {
   print_keys(to, kConfigSourceKeys);
   fprintf(to, "\n## Each entry of `devices.can`\n\n");
   print_keys(to, kConfigCanDeviceKeys);
+  fprintf(to, "\n## Each entry of `devices.lcm`\n\n");
+  print_keys(to, kConfigLcmDeviceKeys);
   fprintf(to, "\n## Each entry of `devices.cameras`\n\n");
   print_keys(to, kConfigCameraDeviceKeys);
   fprintf(to, "\n## `merge`, `publish`, `commands`, `realtime`, `start`, `black_box`\n\n");

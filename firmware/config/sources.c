@@ -8,7 +8,7 @@
 #include "config/sources.h"
 #include "waymark/text.h"
 
-static const char *const kNames[] = {"can",     "motion", "motion6", "increments", "sightings",
+static const char *const kNames[] = {"can",     "motion", "motion6", "increments", "imu", "sightings",
                                      "markers", "stereo", "points",  "gnss",       NULL};
 
 static wm_source_config defaults(const wm_config *config) {

@@ -24,6 +24,8 @@ wm_driving wm_driving_choose(uint32_t kinds, uint32_t quantities) {
   if (!(kinds & WM_MOTION_EVENTS)) return (wm_driving){.kinds = kinds};
   if (kinds & WM_EVENT_BIT(WM_EVENT_INCREMENT))
     return (wm_driving){.kinds = WM_EVENT_BIT(WM_EVENT_INCREMENT), .quantities = 0};
+  // Beside twists a gyro alone is no drive of its own: its speed is theirs.
+  if ((kinds & WM_TWIST_EVENTS) && !(quantities & (TICKS | SPEEDS))) return (wm_driving){.kinds = WM_TWIST_EVENTS};
   static const uint32_t kPreferred[] = {TICKS, Q_BIT(WM_Q_YAW_RATE), SPEEDS};
   if (kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES))
     for (size_t i = 0; i < sizeof kPreferred / sizeof kPreferred[0]; i++)

@@ -13,8 +13,10 @@
 #include <unistd.h>
 
 #include "live/copy_map.h"
+#include "live/lcm_stream.h"
 #include "live/robot.h"
 #include "output/avi_writer.h"
+#include "output/csv_row.h"
 #include "output/new_file.h"
 #include "rt/clock.h"
 #include "waymark/text.h"
@@ -35,6 +37,7 @@ typedef struct stream {
   int started;
   wm_can_listener *can;
   wm_frame_source *camera;
+  wm_source *lcm;
   char name[WM_NAME_MAX];
   FILE *data, *stamps;
   char data_path[WM_PATH_MAX + 80], stamps_path[WM_PATH_MAX + 80];
@@ -46,11 +49,11 @@ struct recorder {
   const wm_config *config;
   const wm_record_options *options;
   wm_recording *robot;
-  stream streams[WM_CAN_DEVICES_MAX + WM_CAMERA_DEVICES_MAX];
+  stream streams[WM_CAN_DEVICES_MAX + WM_LCM_DEVICES_MAX + WM_CAMERA_DEVICES_MAX];
   size_t stream_count;
   FILE *can_log;  // of all interfaces, in the order of arrival: a line is one fwrite, which locks the file
   atomic_int stop;
-  _Atomic uint64_t bytes, frames, pictures, lost;
+  _Atomic uint64_t bytes, frames, rows, pictures, lost;
   _Atomic int failed;  // errno of the first write error
   char failed_path[WM_PATH_MAX + 80];
 };
@@ -79,6 +82,37 @@ static void take_frame(stream *self, const wm_can_frame *frame) {
   if (written != length) fail(all, self->data_path, errno);
   atomic_fetch_add(&all->bytes, length);
   atomic_fetch_add(&all->frames, 1);
+}
+
+static void write_row(stream *self, wm_row *line) {
+  wm_row_char(line, '\n');
+  if (fwrite(line->bytes, 1, line->length, self->data) != line->length) fail(self->all, self->data_path, errno);
+  atomic_fetch_add(&self->all->bytes, line->length);
+}
+
+// The columns of the recording's stream, all of them.
+static void begin_table(stream *self) {
+  wm_row line = {.length = 0};
+  wm_row_text(&line, "t_ns,arrival_ns");
+  for (size_t i = 0; wm_stream_number(lcm_stream_of(self->lcm), i); i++) {
+    wm_row_char(&line, ',');
+    wm_row_text(&line, wm_stream_number(lcm_stream_of(self->lcm), i));
+  }
+  write_row(self, &line);
+}
+
+static void take_row(stream *self) {
+  const wm_stream_row *row = lcm_stream_row(self->lcm);
+  wm_row line = {.length = 0};
+  wm_row_int(&line, row->t_ns);
+  wm_row_char(&line, ',');
+  wm_row_int(&line, row->arrival_ns);
+  for (size_t i = 0; wm_stream_number(lcm_stream_of(self->lcm), i); i++) {
+    wm_row_char(&line, ',');
+    wm_row_exact(&line, row->number[i]);
+  }
+  write_row(self, &line);
+  atomic_fetch_add(&self->all->rows, 1);
 }
 
 static int begin_video(stream *self, const wm_camera_raw *raw, const wm_frame *frame) {
@@ -122,6 +156,10 @@ static void *record_stream(void *argument) {
       if (wm_can_listener_next(self->can, &frame, &err) == WM_OK) take_frame(self, &frame);
       counts = *wm_can_listener_counted(self->can);
       counts.lost = counts.malformed = 0;  // absent signals are no loss of the recording
+    } else if (self->lcm) {
+      wm_event event;
+      if (self->lcm->ops->next(self->lcm, &event, &err) == WM_OK) take_row(self);
+      counts = self->lcm->counts;
     } else {
       wm_frame frame;
       if (self->camera->ops->next(self->camera, &frame, &err) == WM_OK) take_picture(self, &frame);
@@ -281,6 +319,26 @@ static wm_status open_can(recorder *self, wm_error *err) {
   return WM_OK;
 }
 
+static wm_status open_lcm(recorder *self, wm_error *err) {
+  const wm_config *config = self->config;
+  const wm_mounting *imu = wm_site_imu(wm_recording_site(self->robot));
+  for (size_t i = 0; i < config->devices.lcm_count; i++) {
+    const wm_lcm_device_config *device = &config->devices.lcm[i];
+    stream *s = &self->streams[self->stream_count];
+    s->all = self;
+    (void)snprintf(s->name, sizeof s->name, "%s", device->stream);
+    wm_status status = lcm_stream_open(device, config->lcm_url, config->channel_prefix, imu, NULL, &s->lcm, err);
+    if (status != WM_OK) return status;
+    self->stream_count++;
+    (void)snprintf(s->data_path, sizeof s->data_path, "%s/%s", self->options->out_dir,
+                   wm_stream_file(lcm_stream_of(s->lcm)));
+    s->data = new_file(s->data_path);
+    if (!s->data) return wm_fail(err, WM_IO, "%s: can't be written: %s", s->data_path, strerror(errno));
+    begin_table(s);
+  }
+  return WM_OK;
+}
+
 static wm_status open_cameras(recorder *self, wm_error *err) {
   const wm_devices_config *devices = &self->config->devices;
   char folder[WM_PATH_MAX + 8];
@@ -358,6 +416,7 @@ static void close_all(recorder *self) {
     stream *s = &self->streams[i];
     wm_can_listener_close(s->can);
     if (s->camera) s->camera->ops->close(s->camera);
+    if (s->lcm) s->lcm->ops->close(s->lcm);
     if (s->data && fclose(s->data) != 0) fail(self, s->data_path, errno);
     if (s->stamps && fclose(s->stamps) != 0) fail(self, s->stamps_path, errno);
   }
@@ -368,7 +427,7 @@ static void close_all(recorder *self) {
 wm_status wm_record(const wm_config *config, const wm_record_options *options, wm_record_report *report,
                     wm_error *err) {
   memset(report, 0, sizeof *report);
-  if (config->devices.can_count + config->devices.camera_count == 0)
+  if (config->devices.can_count + config->devices.lcm_count + config->devices.camera_count == 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s: devices: is missing: there is nothing to record", config->path);
   recorder *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "no memory to record");
@@ -380,6 +439,7 @@ wm_status wm_record(const wm_config *config, const wm_record_options *options, w
   if (status == WM_OK) status = make_folder(options->out_dir, err);
   if (status == WM_OK) status = write_about(self, err);
   if (status == WM_OK) status = open_can(self, err);
+  if (status == WM_OK) status = open_lcm(self, err);
   if (status == WM_OK) status = open_cameras(self, err);
   for (size_t i = 0; status == WM_OK && i < self->stream_count; i++) {
     int failed = pthread_create(&self->streams[i].thread, NULL, record_stream, &self->streams[i]);
@@ -390,6 +450,7 @@ wm_status wm_record(const wm_config *config, const wm_record_options *options, w
   if (status == WM_OK) wait_for_end(self, report);
   close_all(self);
   report->frames = self->frames;
+  report->rows = self->rows;
   report->pictures = self->pictures;
   report->bytes = self->bytes;
   report->lost = self->lost;

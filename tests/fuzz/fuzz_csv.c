@@ -13,9 +13,11 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-static const stream_kind *const kKinds[] = {&kStreamMotion,  &kStreamMotion6,    &kStreamSightings,
-                                            &kStreamMarkers, &kStreamStereo,     &kStreamPoints,
-                                            &kStreamGnss,    &kStreamIncrements, &kStreamCorners};
+static const stream_kind *const kKinds[] = {&kStreamMotion,  &kStreamMotion6, &kStreamSightings, &kStreamMarkers,
+                                            &kStreamStereo,  &kStreamPoints,  &kStreamGnss,      &kStreamIncrements,
+                                            &kStreamCorners, &kStreamImu};
+
+#define LANDMARKS 9  // by the first byte: landmarks.csv, then can-signals.yaml, then further streams
 
 static void check(int good) {
   if (!good) abort();
@@ -29,6 +31,7 @@ static void drain(wm_source *source) {
     check(event.arrival_ns >= newest_ns && event.seq == events++);
     check(source->kinds & WM_EVENT_BIT(event.kind));
     if (event.kind == WM_EVENT_TWIST2) check(isfinite(event.as.twist2.v_mps) && isfinite(event.as.twist2.w_radps));
+    if (event.kind == WM_EVENT_QUANTITIES) check(isfinite(event.as.quantities.value[0]));
     if (event.kind == WM_EVENT_SIGHTING)
       check(isfinite(event.as.sighting.bearing_rad) || isfinite(event.as.sighting.range_m));
     if (event.kind == WM_EVENT_INCREMENT) {
@@ -92,13 +95,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
   char path[64];
   snprintf(path, sizeof path, "/proc/self/fd/%d", fd);
   check(fd >= 0 && write(fd, data + 1, size - 1) == (ssize_t)(size - 1));
-  size_t streams = sizeof kKinds / sizeof *kKinds, kind = data[0] % (streams + 2);
-  if (kind < streams)
+  const size_t streams = sizeof kKinds / sizeof *kKinds, kind = data[0] % (streams + 2);
+  if (kind < LANDMARKS)
     read_as(path, kKinds[kind]);
-  else if (kind == streams)
+  else if (kind == LANDMARKS)
     read_landmarks(path);
-  else
+  else if (kind == LANDMARKS + 1)
     read_can_signals(path);
+  else
+    read_as(path, kKinds[kind - 2]);
   close(fd);
   return 0;
 }

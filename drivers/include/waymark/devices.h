@@ -99,13 +99,30 @@ const wm_camera_counts *wm_camera_device_counted(const wm_camera_device *self);
 wm_frame_source *wm_camera_device_frames(wm_camera_device *self);
 void wm_camera_device_close(wm_camera_device *self);  // NULL is fine
 
+// Whose clock the stamps of a stream over LCM are of.
+typedef enum wm_lcm_clock {
+  WM_LCM_CLOCK_HERE,   // this computer's CLOCK_MONOTONIC
+  WM_LCM_CLOCK_SENDER  // a monotonic clock of the sender's own, followed by the smallest delay
+} wm_lcm_clock;
+
+typedef struct wm_lcm_device_config {
+  char stream[16];     // "motion": the file of the recording format without its ending
+  char channel[48];    // without the prefix; "MOTION" by default
+  int32_t clock;       // wm_lcm_clock
+  double rate_max_hz;  // more messages than these are not read
+  int line;
+} wm_lcm_device_config;
+
 #define WM_CAN_DEVICES_MAX 4     // buses of a robot
+#define WM_LCM_DEVICES_MAX 8     // streams over LCM
 #define WM_CAMERA_DEVICES_MAX 8  // cameras of a robot
 typedef struct wm_devices_config {
   wm_can_device_config can[WM_CAN_DEVICES_MAX];
   size_t can_count;
   wm_camera_device_config cameras[WM_CAMERA_DEVICES_MAX];
   size_t camera_count;
+  wm_lcm_device_config lcm[WM_LCM_DEVICES_MAX];
+  size_t lcm_count;
   int32_t sightings_by_lcm;  // another program on the robot sends them
 } wm_devices_config;
 

@@ -16,13 +16,16 @@ static void messages(const wm_config *config, wm_findings *out) {
             "a higher realtime.loop_hz, or a lower publish.rate_hz",
             "publish.rate_hz %g is more than realtime.loop_hz %d: poses would go out at %d Hz", p->publish_rate_hz,
             (int)p->realtime_loop_hz, (int)p->realtime_loop_hz);
-  if (p->commands_lcm || config->devices.sightings_by_lcm)
+  const wm_devices_config *devices = &config->devices;
+  if (p->commands_lcm || devices->sightings_by_lcm || devices->lcm_count > 0)
     wm_find(
         out, WM_FOUND_OPEN_NETWORK, WM_SEVERITY_NOTE, "commands",
         "commands.socket, which programs of this computer reach alone, or a firewall rule for LCM's port",
         "%s taken over LCM: any program that reaches its UDP port (7667 by default), on this computer or on a network "
         "that it is in, can move the pose",
-        p->commands_lcm ? "commands are" : "sightings are");
+        p->commands_lcm             ? "commands are"
+        : devices->sightings_by_lcm ? "sightings are"
+                                    : "motion or observations are");
   if (!url[0]) return;
   int known = 0;
   for (size_t i = 0; i < sizeof kWays / sizeof kWays[0]; i++) known |= strncmp(url, kWays[i], strlen(kWays[i])) == 0;

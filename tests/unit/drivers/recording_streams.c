@@ -74,6 +74,32 @@ static void motion_exact(void) {
   TEST_ASSERT_EQUAL(2, motion->counts.received);
 }
 
+static void motion_sideways(void) {
+  folder_write("motion.csv", "t_ns,v_mps,vy_mps,w_radps\n1,0.5,0.25,-0.125\n2,0.5,,-0.125\n");
+  wm_source *motion = source("motion");
+  TEST_ASSERT_EQUAL_HEX32(WM_EVENT_BIT(WM_EVENT_TWIST2) | WM_EVENT_BIT(WM_EVENT_TWIST6), motion->kinds);
+  wm_event event = next(motion);
+  TEST_ASSERT_EQUAL(WM_EVENT_TWIST6, event.kind);
+  TEST_ASSERT_TRUE(event.as.twist6.v_mps[0] == 0.5 && event.as.twist6.v_mps[1] == 0.25);
+  TEST_ASSERT_TRUE(event.as.twist6.v_mps[2] == 0 && event.as.twist6.w_radps[2] == -0.125);
+  TEST_ASSERT_EQUAL(WM_EVENT_TWIST2, next(motion).kind);
+  at_end(motion);
+}
+
+// The turn rate about base_link's z axis, by the mounting: here the IMU's x axis points up.
+static void imu_by_its_mounting(void) {
+  folder_write("calibration.yaml", "imu: {mounting: {rpy_deg: [0, -90, 0]}}\n");
+  folder_write("imu.csv", "t_ns,wx_radps,wy_radps,wz_radps,temperature_c\n1,0.5,0.25,0.125,21\n2,0.5,2e9,0,\n");
+  wm_source *imu = source("imu");
+  wm_event event = next(imu);
+  TEST_ASSERT_EQUAL(WM_EVENT_QUANTITIES, event.kind);
+  TEST_ASSERT_EQUAL(WM_Q_YAW_RATE, event.as.quantities.id[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, 0.5, event.as.quantities.value[0]);
+  TEST_ASSERT_TRUE(imu->is_motion && wm_recording_quantities(recording) == 1u << WM_Q_YAW_RATE);
+  at_end(imu);
+  TEST_ASSERT_EQUAL(1, imu->counts.not_finite);
+}
+
 // The same data, written in the ways that the format allows.
 static void spellings(void) {
   static const char *const kFiles[] = {
@@ -378,6 +404,8 @@ static void corners_need_a_camera(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(motion_exact);
+  RUN_TEST(motion_sideways);
+  RUN_TEST(imu_by_its_mounting);
   RUN_TEST(spellings);
   RUN_TEST(broken_rows);
   RUN_TEST(zero_bytes);

@@ -2,8 +2,8 @@
 // Maps a device's clock (a CAN adapter's, a camera's) to the monotonic clock from its stamps and their arrivals. A
 // delay is never negative, so the smallest recent delay gives the best offset; it is relaxed by the drift that two
 // crystals may have. E. Olson, A Passive Solution to the Sensor Synchronization Problem, IROS 2010, section III.
-#ifndef WM_CLOCK_FOREIGN_CLOCK_H
-#define WM_CLOCK_FOREIGN_CLOCK_H
+#ifndef WAYMARK_FOREIGN_CLOCK_H
+#define WAYMARK_FOREIGN_CLOCK_H
 
 #include "waymark/time.h"
 

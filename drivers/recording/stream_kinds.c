@@ -1,0 +1,349 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "stream_kinds.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "waymark/streams.h"
+
+// Limits of plausible values: wide enough for all vehicles, tight enough for corrupt data.
+#define SPEED -1000.0, 1000.0
+#define RATE -1000.0, 1000.0
+#define ACCELERATION -10000.0, 10000.0
+#define TEMPERATURE -273.15, 1000.0
+#define ANGLE -6.2832, 6.2832
+#define RANGE DBL_MIN, 1e5
+#define PLACE -1e8, 1e8
+#define SIGMA DBL_MIN, 1e6
+#define PIXEL -1e5, 1e5
+#define VARIANCE 0.0, 1e12
+#define COVARIANCE -1e12, 1e12
+#define ANY_ID 0.0, 2147483647.0
+#define ID_OR_UNKNOWN -1.0, 2147483647.0
+
+#define STAMPS \
+  {"t_ns", CSV_TIME, CSV_NEEDED, 0, 0}, { "arrival_ns", CSV_TIME, CSV_OPTIONAL, 0, 0 }
+
+static const char *fill_motion(const fill_context *self, const csv_row *row, wm_event *out) {
+  (void)self;
+  const double v_mps = row->number[FIRST], vy_mps = row->number[FIRST + 1], w_radps = row->number[FIRST + 2];
+  if (isnan(vy_mps)) {
+    out->as.twist2 = (wm_twist2){v_mps, w_radps};
+    return NULL;
+  }
+  out->kind = WM_EVENT_TWIST6;
+  out->as.twist6 = (wm_twist6){.v_mps = {v_mps, vy_mps, 0.0}, .w_radps = {0.0, 0.0, w_radps}};
+  return NULL;
+}
+
+static const char *fill_motion6(const fill_context *self, const csv_row *row, wm_event *out) {
+  (void)self;
+  for (int i = 0; i < 3; i++) {
+    out->as.twist6.v_mps[i] = row->number[FIRST + i];
+    out->as.twist6.w_radps[i] = row->number[FIRST + 3 + i];
+  }
+  return NULL;
+}
+
+// Number of empty fields from `first` on.
+static int count_empty(const csv_row *row, int first, int count) {
+  int empty = 0;
+  for (int i = 0; i < count; i++) empty += isnan(row->number[first + i]);
+  return empty;
+}
+
+static const char *fill_increment(const fill_context *self, const csv_row *row, wm_event *out) {
+  (void)self;
+  const double *n = &row->number[FIRST + 1];
+  const int empty = count_empty(row, FIRST + 4, 6);
+  if (row->whole[FIRST] >= row->whole[T]) return "from_ns is not before t_ns";
+  if (empty != 0 && empty != 6) return "a part of the covariance is empty";
+  out->as.increment = (wm_increment){.from_ns = row->whole[FIRST], .dx_m = n[0], .dy_m = n[1], .dheading_rad = n[2]};
+  memcpy(out->as.increment.covariance, &n[3], sizeof out->as.increment.covariance);
+  return NULL;
+}
+
+// Into (-pi, pi]; the argument is at most one turn beyond.
+static double wrapped(double angle_rad) {
+  if (angle_rad > M_PI) return angle_rad - 2.0 * M_PI;
+  if (angle_rad <= -M_PI) return angle_rad + 2.0 * M_PI;
+  return angle_rad;
+}
+
+// Sigmas of bearing and range from the covariance of the position in the sensor's frame; their correlation is dropped.
+static const char *polar_sigmas(const csv_row *row, wm_sighting *s) {
+  const double *cov = &row->number[FIRST + 6];
+  const int empty = count_empty(row, FIRST + 6, 3);
+  if (empty == 3) return NULL;
+  if (empty > 0) return "a part of the covariance is empty";
+  if (isnan(s->bearing_rad) || isnan(s->range_m)) return "a covariance needs both bearing_rad and range_m";
+  if (!(cov[0] * cov[2] > cov[1] * cov[1])) return "the covariance is not positive definite";
+  const double x = cos(s->bearing_rad), y = sin(s->bearing_rad);
+  const double along = x * x * cov[0] + 2.0 * x * y * cov[1] + y * y * cov[2];
+  const double across = y * y * cov[0] - 2.0 * x * y * cov[1] + x * x * cov[2];
+  if (isnan(s->bearing_sigma_rad)) s->bearing_sigma_rad = sqrt(across) / s->range_m;
+  if (isnan(s->range_sigma_m)) s->range_sigma_m = sqrt(along);
+  return NULL;
+}
+
+static const char *fill_sighting(const fill_context *self, const csv_row *row, wm_event *out) {
+  const double *n = &row->number[FIRST];
+  double bearing_rad = n[2], range_m = n[3];
+  if (isnan(bearing_rad) && isnan(range_m)) return "bearing_rad and range_m are both empty";
+  if (isnan(n[9]) != isnan(n[10])) return "one of elevation_rad and elevation_sigma_rad is empty";
+  int64_t id = row->whole[FIRST + 1];
+  out->as.sighting = (wm_sighting){.sensor = self->sensor_index,
+                                   .landmark_id = id == WM_TIME_NONE ? -1 : (int32_t)id,
+                                   .bearing_rad = wrapped(bearing_rad),
+                                   .range_m = range_m,
+                                   .bearing_sigma_rad = n[4],
+                                   .range_sigma_m = n[5],
+                                   .elevation_rad = n[9],
+                                   .elevation_sigma_rad = n[10]};
+  return polar_sigmas(row, &out->as.sighting);
+}
+
+static const char *fill_marker(const fill_context *self, const csv_row *row, wm_event *out) {
+  const double *p = &row->number[FIRST + 2];
+  out->as.marker = (wm_marker){.sensor = self->sensor_index,
+                               .id = (int32_t)row->whole[FIRST + 1],
+                               .p_m = {p[0], p[1], p[2]},
+                               .yaw_rad = wrapped(p[3]),
+                               .along_sigma_m = (double)NAN,
+                               .yaw_sigma_rad = (double)NAN,
+                               .bloom_px = (double)NAN};
+  return NULL;
+}
+
+static const char *fill_corners(const fill_context *self, const csv_row *row, wm_event *out) {
+  double px[4][2];
+  memcpy(px, &row->number[FIRST + 2], sizeof px);
+  out->as.marker = (wm_marker){.sensor = self->sensor_index, .id = (int32_t)row->whole[FIRST + 1]};
+  return wm_corner_reader_pose(self->corners, px, row->number[FIRST + 10], &out->as.marker);
+}
+
+static const char *fill_stereo(const fill_context *self, const csv_row *row, wm_event *out) {
+  (void)self;
+  const double *px = &row->number[FIRST + 1];
+  if (isnan(px[0]) != isnan(px[1]) || isnan(px[2]) != isnan(px[3])) return "one of u and v is empty";
+  if (isnan(px[0]) && isnan(px[2])) return "no camera sees the point";
+  out->as.stereo = (wm_stereo){.id = (int32_t)row->whole[FIRST], .left_px = {px[0], px[1]}, .right_px = {px[2], px[3]}};
+  return NULL;
+}
+
+static const char *fill_gnss(const fill_context *self, const csv_row *row, wm_event *out) {
+  (void)self;
+  const double *n = &row->number[FIRST];
+  out->as.position = (wm_position){.p_m = {n[0], n[1], n[2]}, .sigma_xy_m = n[3], .sigma_z_m = n[4]};
+  return NULL;
+}
+
+static const char *fill_point(const fill_context *self, const csv_row *row, wm_event *out) {
+  (void)self;
+  wm_points *points = &out->as.points;
+  if (points->count >= WM_POINTS_MAX) {
+    points->dropped++;
+    return NULL;
+  }
+  points->camera = -1;
+  points->normal_rad[points->count] = points->sigma_m[points->count] = NAN;
+  points->x_m[points->count] = (float)row->number[FIRST];
+  points->y_m[points->count++] = (float)row->number[FIRST + 1];
+  return NULL;
+}
+
+static const char *fill_imu(const fill_context *self, const csv_row *row, wm_event *out) {
+  const double *w = &row->number[FIRST], *up = self->imu_up;
+  out->as.quantities = (wm_quantities){.count = 1, .id = {WM_Q_YAW_RATE}};
+  out->as.quantities.value[0] = up[0] * w[0] + up[1] * w[1] + up[2] * w[2];
+  return NULL;
+}
+
+const stream_kind kStreamMotion = {"motion.csv",
+                                   "motion",
+                                   WM_EVENT_TWIST2,
+                                   {{STAMPS,
+                                     {"v_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
+                                     {"vy_mps", CSV_NUMBER, CSV_OPTIONAL, SPEED},
+                                     {"w_radps", CSV_NUMBER, CSV_NEEDED, RATE}}},
+                                   .fill = fill_motion,
+                                   .also = WM_EVENT_TWIST6,
+                                   .also_with = FIRST + 1};
+
+const stream_kind kStreamMotion6 = {"motion6.csv",
+                                    "motion6",
+                                    WM_EVENT_TWIST6,
+                                    {{STAMPS,
+                                      {"vx_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
+                                      {"vy_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
+                                      {"vz_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
+                                      {"wx_radps", CSV_NUMBER, CSV_NEEDED, RATE},
+                                      {"wy_radps", CSV_NUMBER, CSV_NEEDED, RATE},
+                                      {"wz_radps", CSV_NUMBER, CSV_NEEDED, RATE}}},
+                                    .fill = fill_motion6};
+
+const stream_kind kStreamImu = {"imu.csv",
+                                "imu",
+                                WM_EVENT_QUANTITIES,
+                                {{STAMPS,
+                                  {"wx_radps", CSV_NUMBER, CSV_NEEDED, RATE},
+                                  {"wy_radps", CSV_NUMBER, CSV_NEEDED, RATE},
+                                  {"wz_radps", CSV_NUMBER, CSV_NEEDED, RATE},
+                                  {"ax_mps2", CSV_NUMBER, CSV_OPTIONAL, ACCELERATION},
+                                  {"ay_mps2", CSV_NUMBER, CSV_OPTIONAL, ACCELERATION},
+                                  {"az_mps2", CSV_NUMBER, CSV_OPTIONAL, ACCELERATION},
+                                  {"sigma_wx_radps", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
+                                  {"sigma_wy_radps", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
+                                  {"sigma_wz_radps", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
+                                  {"sigma_ax_mps2", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
+                                  {"sigma_ay_mps2", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
+                                  {"sigma_az_mps2", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
+                                  {"temperature_c", CSV_NUMBER, CSV_OPTIONAL, TEMPERATURE}}},
+                                .fill = fill_imu,
+                                .quantities = UINT32_C(1) << WM_Q_YAW_RATE};
+
+const stream_kind kStreamSightings = {"sightings.csv",
+                                      "sightings",
+                                      WM_EVENT_SIGHTING,
+                                      {{STAMPS,
+                                        {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
+                                        {"id", CSV_WHOLE, CSV_MAY_EMPTY, ID_OR_UNKNOWN},
+                                        {"bearing_rad", CSV_NUMBER, CSV_ONE_OF, ANGLE},
+                                        {"range_m", CSV_NUMBER, CSV_ONE_OF, RANGE},
+                                        {"bearing_sigma_rad", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
+                                        {"range_sigma_m", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
+                                        {"cov_xx_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
+                                        {"cov_xy_m2", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
+                                        {"cov_yy_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
+                                        {"elevation_rad", CSV_NUMBER, CSV_OPTIONAL, ANGLE},
+                                        {"elevation_sigma_rad", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
+                                      .fill = fill_sighting};
+
+const stream_kind kStreamIncrements = {"increments.csv",
+                                       "increments",
+                                       WM_EVENT_INCREMENT,
+                                       {{STAMPS,
+                                         {"from_ns", CSV_TIME, CSV_NEEDED, 0, 0},
+                                         {"dx_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                         {"dy_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                         {"dheading_rad", CSV_NUMBER, CSV_NEEDED, ANGLE},
+                                         {"cov_xx", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
+                                         {"cov_xy", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
+                                         {"cov_yy", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
+                                         {"cov_xt", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
+                                         {"cov_yt", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
+                                         {"cov_tt", CSV_NUMBER, CSV_OPTIONAL, VARIANCE}}},
+                                       .fill = fill_increment};
+
+const stream_kind kStreamMarkers = {"markers.csv",
+                                    "markers",
+                                    WM_EVENT_MARKER,
+                                    {{STAMPS,
+                                      {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
+                                      {"id", CSV_WHOLE, CSV_NEEDED, ANY_ID},
+                                      {"x_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                      {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                      {"z_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                      {"yaw_rad", CSV_NUMBER, CSV_NEEDED, ANGLE}}},
+                                    .fill = fill_marker};
+
+const stream_kind kStreamCorners = {"marker-corners.csv",
+                                    "corners",
+                                    WM_EVENT_MARKER,
+                                    {{STAMPS,
+                                      {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
+                                      {"id", CSV_WHOLE, CSV_NEEDED, ANY_ID},
+                                      {"u0_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"v0_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"u1_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"v1_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"u2_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"v2_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"u3_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"v3_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
+                                      {"sigma_px", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
+                                    .fill = fill_corners};
+
+const stream_kind kStreamStereo = {"stereo.csv",
+                                   "stereo",
+                                   WM_EVENT_STEREO,
+                                   {{STAMPS,
+                                     {"id", CSV_WHOLE, CSV_NEEDED, ID_OR_UNKNOWN},
+                                     {"ul_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
+                                     {"vl_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
+                                     {"ur_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL},
+                                     {"vr_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL}}},
+                                   .fill = fill_stereo};
+
+const stream_kind kStreamPoints = {
+    "points.csv",
+    "points",
+    WM_EVENT_POINTS,
+    {{STAMPS, {"x_m", CSV_NUMBER, CSV_NEEDED, PLACE}, {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE}}},
+    .fill = fill_point};
+
+const stream_kind kStreamGnss = {"gnss.csv",
+                                 "gnss",
+                                 WM_EVENT_POSITION,
+                                 {{STAMPS,
+                                   {"x_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                   {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE},
+                                   {"z_m", CSV_NUMBER, CSV_OPTIONAL, PLACE},
+                                   {"sigma_xy_m", CSV_NUMBER, CSV_NEEDED, SIGMA},
+                                   {"sigma_z_m", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
+                                 .fill = fill_gnss};
+
+void fill_context_imu(fill_context *self, const wm_mounting *imu) {
+  const double *rpy = imu->rpy_rad;
+  self->imu_up[0] = -sin(rpy[1]);
+  self->imu_up[1] = cos(rpy[1]) * sin(rpy[0]);
+  self->imu_up[2] = cos(rpy[1]) * cos(rpy[0]);
+}
+
+// ── rows from elsewhere ─────────────────────────────────────────────────────────────────────────────────────────────
+
+static const stream_kind *const kFromElsewhere[] = {&kStreamMotion, &kStreamImu};
+const char *const wm_stream_names[] = {"motion", "imu", NULL};
+
+const wm_stream *wm_stream_find(const char *name) {
+  for (size_t i = 0; i < sizeof kFromElsewhere / sizeof kFromElsewhere[0]; i++)
+    if (strcmp(kFromElsewhere[i]->name, name) == 0) return kFromElsewhere[i];
+  return NULL;
+}
+
+const char *wm_stream_name(const wm_stream *self) { return self->name; }
+const char *wm_stream_file(const wm_stream *self) { return self->file; }
+uint32_t wm_stream_quantities(const wm_stream *self) { return self->quantities; }
+
+uint32_t wm_stream_kinds(const wm_stream *self) {
+  return WM_EVENT_BIT(self->event) | (self->also ? WM_EVENT_BIT(self->also) : 0);
+}
+
+const char *wm_stream_number(const wm_stream *self, size_t index) {
+  const size_t column = FIRST + index;
+  return column < CSV_COLUMNS_MAX ? self->format.columns[column].name : NULL;
+}
+
+wm_status wm_stream_event(const wm_stream *self, const wm_stream_row *row, const wm_mounting *imu, wm_event *out,
+                          wm_error *err) {
+  csv_row values;
+  fill_context context = {0};
+  fill_context_imu(&context, imu);
+  for (size_t i = 0; wm_stream_number(self, i); i++) {
+    const csv_column *column = &self->format.columns[FIRST + i];
+    const double value = values.number[FIRST + i] = row->number[i];
+    if (isnan(value) && column->need < CSV_NEEDED) continue;
+    if (!isfinite(value)) return wm_fail(err, WM_NOT_FINITE, "%s is not a finite number", column->name);
+    if (!(value >= column->min && value <= column->max))
+      return wm_fail(err, WM_NOT_FINITE, "%s: %.10g is outside of what can be (%s%.10g to %.10g)", column->name, value,
+                     column->min == DBL_MIN ? "above " : "", column->min == DBL_MIN ? 0.0 : column->min, column->max);
+  }
+  memset(out, 0, WM_EVENT_SMALL_BYTES);
+  out->t_ns = row->t_ns;
+  out->arrival_ns = row->arrival_ns;
+  out->kind = (uint8_t)self->event;
+  const char *problem = self->fill(&context, &values, out);
+  return problem ? wm_fail(err, WM_BAD_DATA, "%s", problem) : WM_OK;
+}

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/lcm_streams.h"
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#include "waymark_imu_t.h"
+#include "waymark_motion_t.h"
+
+typedef union any_message {
+  waymark_motion_t motion;
+  waymark_imu_t imu;
+} any_message;
+
+// A message is its stamp, then the numbers of the stream's columns in their order.
+typedef struct stream_type {
+  const char *stream, *type, *not_it;
+  size_t bytes;             // of the message in memory
+  uint32_t zero_is_absent;  // a bit for each number that senders leave 0 where they don't have it
+  int (*decode)(const void *from, int length, any_message *to);
+  int (*encode)(void *to, int length, const any_message *from);
+} stream_type;
+
+#define FUNCTIONS(name)                                                                                      \
+  static int decode_##name(const void *from, int length, any_message *to) {                                  \
+    return waymark_##name##_t_decode(from, 0, length, &to->name);                                            \
+  }                                                                                                          \
+  static int encode_##name(void *to, int length, const any_message *from) {                                  \
+    return waymark_##name##_t_encode(to, 0, length, &from->name);                                            \
+  }                                                                                                          \
+  _Static_assert(offsetof(waymark_##name##_t, t_ns) == 0 &&                                                  \
+                     sizeof(waymark_##name##_t) <= sizeof(int64_t) + WM_STREAM_NUMBERS_MAX * sizeof(double), \
+                 "a stamp, and numbers behind it")
+#define TYPE(name, zero_is_absent)                                                                                     \
+  {                                                                                                                    \
+#name, #name "_t", "is no " #name "_t of this version", sizeof(waymark_##name##_t), zero_is_absent, decode_##name, \
+        encode_##name                                                                                                  \
+  }
+
+FUNCTIONS(motion);
+FUNCTIONS(imu);
+
+#define IMU_SIGMAS (UINT32_C(0x3f) << 6)
+
+static const stream_type kTypes[] = {TYPE(motion, 0), TYPE(imu, IMU_SIGMAS)};
+
+static const stream_type *find(const char *stream) {
+  for (size_t i = 0; i < sizeof kTypes / sizeof kTypes[0]; i++)
+    if (strcmp(kTypes[i].stream, stream) == 0) return &kTypes[i];
+  return NULL;
+}
+
+static int room(size_t length) { return length > INT32_MAX ? INT32_MAX : (int)length; }
+
+const char *wm_lcm_stream_type(const char *stream) {
+  const stream_type *type = find(stream);
+  return type ? type->type : NULL;
+}
+
+const char *wm_lcm_read_row(const char *stream, const void *message, size_t length, wm_stream_row *out) {
+  any_message m;
+  const stream_type *type = find(stream);
+  if (!type || type->decode(message, room(length), &m) < 0) return type ? type->not_it : "is of no stream";
+  const size_t bytes = type->bytes - sizeof(int64_t);
+  memset(out, 0, sizeof *out);
+  memcpy(&out->t_ns, &m, sizeof(int64_t));
+  memcpy(out->number, (const char *)&m + sizeof(int64_t), bytes);
+  for (size_t i = 0; i < bytes / sizeof(double); i++)
+    if ((type->zero_is_absent >> i & 1u) && out->number[i] == 0.0) out->number[i] = (double)NAN;
+  return NULL;
+}
+
+size_t wm_lcm_row(const char *stream, const wm_stream_row *row, void *out, size_t capacity) {
+  any_message m;
+  const stream_type *type = find(stream);
+  if (!type) return 0;
+  memcpy(&m, &row->t_ns, sizeof(int64_t));
+  memcpy((char *)&m + sizeof(int64_t), row->number, type->bytes - sizeof(int64_t));
+  const int bytes = type->encode(out, room(capacity), &m);
+  return bytes > 0 ? (size_t)bytes : 0;
+}

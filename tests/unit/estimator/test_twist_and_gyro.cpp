@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// A twist's speeds with a gyro's turn rate: of any drive, sideways, too; a gyro that is silent or stuck; standstill.
+#include <cmath>
+
+#include "events.hpp"
+#include "math/arc.hpp"
+#include "motion/front_end.hpp"
+#include "motion/motion_params.h"
+#include "unity.h"
+
+namespace {
+
+wm_motion_params params;
+wm::motion_front_end front;
+wm_motion_calibration calibration;
+wm_pose2 pose;
+
+void begin(int twist = WM_TWIST_MEASURED) {
+  wm_params_defaults(&wm_motion_params_table, &params);
+  params.twist = twist;
+  calibration = wm::kNeutralCalibration;
+  pose = {};
+  const wm_wheels none = make::no_wheels();
+  front.init(&params, &none);
+}
+
+void feed(const wm_event &e) {
+  TEST_ASSERT_EQUAL(WM_OK, front.check(e));
+  front.feed(e);
+  front.advance(e.t_ns, calibration,
+                [](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &) {
+                  const wm::arc a = wm::make_arc(t.v * s.dt_s, t.u * s.dt_s, t.w * s.dt_s);
+                  pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
+                });
+}
+
+wm_event gyro(double t_s, double w) { return make::quantities(t_s, {{WM_Q_YAW_RATE, w}}); }
+
+// Twists at 50 Hz and a gyro at 100 Hz with a little noise, as sensors have it.
+template <class Rate>
+void drive(double from_s, double to_s, double v, double u, double w, Rate gyro_rate) {
+  for (int i = 0; i < static_cast<int>(std::lround((to_s - from_s) * 100)); i++) {
+    const double t = from_s + 0.01 * i, rate = gyro_rate(i);
+    if (std::isfinite(rate)) feed(gyro(t, rate));
+    if (i % 2 == 0) feed(make::twist6(t, v, u, w));
+  }
+}
+
+double noise(int i) { return i % 2 ? 1e-6 : -1e-6; }
+constexpr double kNone = NAN;
+
+void test_the_turn_is_the_gyros_and_the_way_the_twists(void) {
+  begin();
+  drive(0, 2, 0.0, 0.5, 0.1, [](int i) { return 0.25 + noise(i); });
+  TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
+  TEST_ASSERT_EQUAL(wm::kKindGyro, front.kind());
+  const double turned = 0.25 * 1.99;
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, turned, pose.heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, -2.0 * (1.0 - std::cos(turned)), pose.x_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, 2.0 * std::sin(turned), pose.y_m);
+}
+
+void test_a_twist_alone_is_as_ever(void) {
+  begin();
+  drive(0, 1, 0.5, 0.0, 0.1, [](int) { return kNone; });
+  TEST_ASSERT_EQUAL(WM_MOTION_TWIST, front.model());
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.1 * 0.98, pose.heading_rad);
+}
+
+// The learnt bias is the gyro's: the twist's turn rate has none.
+void test_a_silent_gyro_is_replaced_and_taken_up_again(void) {
+  begin();
+  calibration.value[WM_YAW_RATE_BIAS] = 0.05;
+  drive(0, 1, 0.5, 0.0, 0.1, [](int i) { return 0.25 + noise(i); });
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.2 * 0.99, pose.heading_rad);
+  drive(1, 2, 0.5, 0.0, 0.1, [](int) { return kNone; });
+  TEST_ASSERT_EQUAL(WM_MOTION_TWIST, front.model());
+  const double before = pose.heading_rad;
+  drive(2, 3, 0.5, 0.0, 0.1, [](int) { return kNone; });
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.1, pose.heading_rad - before);
+  drive(3, 3.1, 0.5, 0.0, 0.1, [](int i) { return 0.25 + noise(i); });
+  TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
+}
+
+void test_a_stuck_gyro_is_replaced(void) {
+  begin();
+  drive(0, 1, 0.3, 0.0, 0.0, [](int i) { return noise(i); });
+  drive(1, 5, 0.3, 0.0, 0.2, [](int) { return 0.01; });  // the robot turns, the gyro's number stands
+  TEST_ASSERT_TRUE(front.health() & WM_MOTION_HEALTH_YAW_RATE_STUCK);
+  TEST_ASSERT_EQUAL(WM_MOTION_TWIST, front.model());
+  drive(5, 5.1, 0.3, 0.0, 0.2, [](int i) { return 0.2 + noise(i); });
+  TEST_ASSERT_FALSE(front.health() & WM_MOTION_HEALTH_YAW_RATE_STUCK);
+  TEST_ASSERT_EQUAL(WM_MOTION_SPEED_YAW_RATE, front.model());
+}
+
+void test_a_turn_on_the_spot_is_no_standstill(void) {
+  double rate = 0;
+  begin();
+  drive(0, 2, 0.0, 0.0, 0.3, [](int i) { return 0.3 + noise(i); });
+  TEST_ASSERT_FALSE(front.standstill_yaw_rate(&rate));
+  TEST_ASSERT_DOUBLE_WITHIN(1e-4, 0.3 * 1.99, pose.heading_rad);
+  drive(2, 3, 0.0, 0.0, 0.0, [](int i) { return 0.02 + noise(i); });
+  feed(gyro(3, 0.02));
+  TEST_ASSERT_TRUE(front.standstill_yaw_rate(&rate));
+  TEST_ASSERT_EQUAL_DOUBLE(0.02, rate);
+}
+
+void test_commands_keep_their_own_turn_rate(void) {
+  begin(WM_TWIST_COMMANDS);
+  drive(0, 1, 0.5, 0.0, 0.1, [](int i) { return 0.25 + noise(i); });
+  TEST_ASSERT_EQUAL(WM_MOTION_TWIST, front.model());
+}
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(test_the_turn_is_the_gyros_and_the_way_the_twists);
+  RUN_TEST(test_a_twist_alone_is_as_ever);
+  RUN_TEST(test_a_silent_gyro_is_replaced_and_taken_up_again);
+  RUN_TEST(test_a_stuck_gyro_is_replaced);
+  RUN_TEST(test_a_turn_on_the_spot_is_no_standstill);
+  RUN_TEST(test_commands_keep_their_own_turn_rate);
+  return UNITY_END();
+}

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+// Streams over LCM: their events, and what a sender does to them: absent, silent, late, doubled, NaN, another clock,
+// too fast, back again.
+#include <math.h>
+#include <string.h>
+
+#include "live/lcm_stream.h"
+#include "rt/clock.h"
+#include "unity.h"
+#include "waymark/lcm_streams.h"
+
+#define MS WM_NS_PER_MS
+
+static lcm_t *lcm;
+static wm_source *source;
+static wm_event event;
+static wm_error err;
+
+void setUp(void) {}
+
+void tearDown(void) {
+  if (source) source->ops->close(source);
+  if (lcm) lcm_destroy(lcm);
+  source = NULL;
+  lcm = NULL;
+}
+
+static void begin(wm_lcm_device_config config) {
+  const wm_mounting upside_down = {.rpy_rad = {M_PI, 0, 0.5}};
+  if (config.rate_max_hz == 0) config.rate_max_hz = 1000;
+  lcm = lcm_create("memq://");
+  TEST_ASSERT_EQUAL(WM_OK, lcm_stream_open(&config, "memq://", "T_", &upside_down, lcm, &source, &err));
+}
+
+static void begin_motion(void) { begin((wm_lcm_device_config){.stream = "motion", .channel = "MOTION"}); }
+
+static void send(const char *stream, const char *channel, wm_stream_row row) {
+  uint8_t bytes[256];
+  const size_t length = wm_lcm_row(stream, &row, bytes, sizeof bytes);
+  TEST_ASSERT_GREATER_THAN(0, length);
+  lcm_publish(lcm, channel, bytes, (unsigned)length);
+}
+
+static void send_motion(wm_time_ns t_ns, double v, double vy, double w) {
+  send("motion", "T_MOTION", (wm_stream_row){.t_ns = t_ns, .number = {v, vy, w}});
+}
+
+static wm_status next(void) { return source->ops->next(source, &event, &err); }
+
+static void assert_refused(const char *why) {
+  TEST_ASSERT_EQUAL(WM_AGAIN, next());
+  TEST_ASSERT_EQUAL_UINT64(1, source->counts.malformed + source->counts.not_finite);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source->counts.first_problem, why), source->counts.first_problem);
+}
+
+static void a_twist_is_an_event_of_motion(void) {
+  begin_motion();
+  TEST_ASSERT_TRUE(source->is_motion && source->is_live);
+  const wm_time_ns now_ns = wm_monotonic_ns();
+  send_motion(now_ns - 5 * MS, 0.5, 0.25, -0.125);
+  TEST_ASSERT_EQUAL(WM_OK, next());
+  TEST_ASSERT_EQUAL(WM_EVENT_TWIST6, event.kind);
+  TEST_ASSERT_EQUAL_INT64(now_ns - 5 * MS, event.t_ns);
+  TEST_ASSERT_TRUE(event.arrival_ns >= now_ns && event.arrival_ns <= wm_monotonic_ns());
+  TEST_ASSERT_EQUAL_DOUBLE(0.25, event.as.twist6.v_mps[1]);
+  TEST_ASSERT_EQUAL_DOUBLE(-0.125, event.as.twist6.w_radps[2]);
+  TEST_ASSERT_EQUAL_UINT32(0, event.seq);
+  send_motion(now_ns, 0.5, (double)NAN, -0.125);
+  TEST_ASSERT_EQUAL(WM_OK, next());
+  TEST_ASSERT_EQUAL(WM_EVENT_TWIST2, event.kind);
+  TEST_ASSERT_EQUAL_DOUBLE(0.5, event.as.twist2.v_mps);
+  TEST_ASSERT_EQUAL_UINT32(1, event.seq);
+  TEST_ASSERT_EQUAL_INT64(now_ns, lcm_stream_row(source)->t_ns);
+  TEST_ASSERT_EQUAL_UINT64(2, source->counts.received);
+}
+
+static void a_gyro_is_a_turn_rate_by_its_mounting(void) {
+  begin((wm_lcm_device_config){.stream = "imu", .channel = "GYRO"});
+  wm_stream_row row = {.t_ns = wm_monotonic_ns(), .number = {0.5, -0.25, -0.125, 0, 0, -9.8}};
+  send("imu", "T_GYRO", row);
+  TEST_ASSERT_EQUAL(WM_OK, next());
+  TEST_ASSERT_EQUAL(WM_EVENT_QUANTITIES, event.kind);
+  TEST_ASSERT_EQUAL(1, event.as.quantities.count);
+  TEST_ASSERT_EQUAL(WM_Q_YAW_RATE, event.as.quantities.id[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.125, event.as.quantities.value[0]);
+  TEST_ASSERT_TRUE(isnan(lcm_stream_row(source)->number[6]));  // a sigma of 0 is not given
+  row.t_ns = wm_monotonic_ns();
+  row.number[6] = -1;
+  send("imu", "T_GYRO", row);
+  assert_refused("T_GYRO: sigma_wx_radps: -1 is outside of what can be");
+}
+
+static void an_absent_sender_is_said(void) {
+  begin_motion();
+  TEST_ASSERT_EQUAL(WM_AGAIN, next());
+  TEST_ASSERT_EQUAL(WM_DEVICE_ABSENT, source->counts.device);
+  TEST_ASSERT_NOT_NULL(strstr(source->counts.device_note, "no usable motion_t on T_MOTION yet"));
+}
+
+static void a_silent_sender_is_said_and_its_return(void) {
+  begin_motion();
+  send_motion(wm_monotonic_ns(), 1, 0, 0);
+  TEST_ASSERT_EQUAL(WM_OK, next());
+  TEST_ASSERT_EQUAL(WM_DEVICE_WORKS, source->counts.device);
+  const wm_time_ns until_ns = wm_monotonic_ns() + 10 * WM_NS_PER_S;
+  while (source->counts.device == WM_DEVICE_WORKS && wm_monotonic_ns() < until_ns) TEST_ASSERT_EQUAL(WM_AGAIN, next());
+  TEST_ASSERT_EQUAL(WM_DEVICE_STALLED, source->counts.device);
+  send_motion(wm_monotonic_ns(), 1, 0, 0);
+  TEST_ASSERT_EQUAL(WM_OK, next());
+  TEST_ASSERT_EQUAL(WM_DEVICE_WORKS, source->counts.device);
+  TEST_ASSERT_EQUAL_STRING("motion_t comes on T_MOTION", source->counts.device_note);
+}
+
+static void the_same_and_older_stamps_are_counted(void) {
+  begin_motion();
+  const wm_time_ns t_ns = wm_monotonic_ns();
+  const wm_time_ns stamps[] = {t_ns, t_ns, t_ns - 300 * MS};
+  for (size_t i = 0; i < 3; i++) {
+    send_motion(stamps[i], 1, 0, 0);
+    TEST_ASSERT_EQUAL(i == 0 ? WM_OK : WM_AGAIN, next());
+  }
+  TEST_ASSERT_EQUAL_UINT64(1, source->counts.frozen);
+  TEST_ASSERT_EQUAL_UINT64(1, source->counts.out_of_order);
+}
+
+static void numbers_that_cannot_be_are_refused(void) {
+  const struct {
+    double number[3];
+    const char *why;
+  } wrong[] = {{{NAN, 0, 0}, "v_mps is not a finite number"},
+               {{0, 0, INFINITY}, "w_radps is not a finite number"},
+               {{0, 2000, 0}, "vy_mps: 2000 is outside of what can be (-1000 to 1000)"}};
+  for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+    begin_motion();
+    send_motion(wm_monotonic_ns(), wrong[i].number[0], wrong[i].number[1], wrong[i].number[2]);
+    assert_refused(wrong[i].why);
+    TEST_ASSERT_EQUAL_UINT64(1, source->counts.not_finite);
+    TEST_ASSERT_EQUAL(WM_DEVICE_ABSENT, source->counts.device);  // nothing usable
+    tearDown();
+  }
+}
+
+static void rubbish_and_other_types_are_refused(void) {
+  begin_motion();
+  lcm_publish(lcm, "T_MOTION", "rubbish", 7);
+  assert_refused("T_MOTION: is no motion_t of this version");
+  send("imu", "T_MOTION", (wm_stream_row){.t_ns = 1});
+  TEST_ASSERT_EQUAL(WM_AGAIN, next());
+  TEST_ASSERT_EQUAL_UINT64(2, source->counts.malformed);
+}
+
+static void stamps_of_another_clock_are_refused(void) {
+  static const struct {
+    wm_time_ns off_ns;
+    const char *why;
+  } kOff[] = {{1700000000 * WM_NS_PER_S, "1.7e+09 s ahead of this computer's CLOCK_MONOTONIC"},
+              {20 * MS, "0.02 s ahead of"},
+              {-11 * WM_NS_PER_S, "11 s behind"}};
+  for (size_t i = 0; i < sizeof kOff / sizeof kOff[0]; i++) {
+    begin_motion();
+    send_motion(wm_monotonic_ns() + kOff[i].off_ns, 1, 0, 0);
+    assert_refused(kOff[i].why);
+    tearDown();
+  }
+  begin_motion();
+  send_motion(0, 1, 0, 0);
+  assert_refused("t_ns is not above 0");
+}
+
+static void a_senders_clock_is_followed(void) {
+  begin((wm_lcm_device_config){.stream = "motion", .channel = "MOTION", .clock = WM_LCM_CLOCK_SENDER});
+  const wm_time_ns ahead_ns = 1000 * WM_NS_PER_S;
+  for (int i = 0; i < 20; i++) {
+    const wm_time_ns sent_ns = wm_monotonic_ns(), leap_ns = i < 10 ? 0 : -500 * WM_NS_PER_S;
+    send_motion(sent_ns + ahead_ns + leap_ns, 1, 0, 0);
+    const wm_status status = next();
+    if (i >= 10 && status == WM_AGAIN) continue;  // a step back of the clock looks like a delay at first
+    TEST_ASSERT_EQUAL(WM_OK, status);
+    TEST_ASSERT_TRUE(event.t_ns <= event.arrival_ns && event.t_ns >= sent_ns - MS);
+    TEST_ASSERT_TRUE(source->counts.stamp_uncertainty_ns >= 2 * MS);
+  }
+  TEST_ASSERT_GREATER_OR_EQUAL_UINT64(12, source->counts.received);
+}
+
+static void a_flood_is_bounded(void) {
+  begin((wm_lcm_device_config){.stream = "motion", .channel = "MOTION", .rate_max_hz = 2});
+  const wm_time_ns t_ns = wm_monotonic_ns() - WM_NS_PER_S;
+  for (int i = 0; i < 20; i++) {
+    send_motion(t_ns + i, 1, 0, 0);
+    (void)next();
+  }
+  TEST_ASSERT_GREATER_OR_EQUAL_UINT64(15, source->counts.overflows);
+  TEST_ASSERT_EQUAL_UINT64(20, source->counts.overflows + source->counts.received);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(a_twist_is_an_event_of_motion);
+  RUN_TEST(a_gyro_is_a_turn_rate_by_its_mounting);
+  RUN_TEST(an_absent_sender_is_said);
+  RUN_TEST(a_silent_sender_is_said_and_its_return);
+  RUN_TEST(the_same_and_older_stamps_are_counted);
+  RUN_TEST(numbers_that_cannot_be_are_refused);
+  RUN_TEST(rubbish_and_other_types_are_refused);
+  RUN_TEST(stamps_of_another_clock_are_refused);
+  RUN_TEST(a_senders_clock_is_followed);
+  RUN_TEST(a_flood_is_bounded);
+  return UNITY_END();
+}
