@@ -7,9 +7,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "waymark/foreign_clock.h"
 #include "live/lcm_subscriber.h"
 #include "rt/clock.h"
+#include "waymark/foreign_clock.h"
 #include "waymark/lcm_streams.h"
 
 // Without a message for so long the sender is silent: longer than the period of the slowest (GNSS, 1 s).
