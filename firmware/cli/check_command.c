@@ -98,8 +98,11 @@ static void print_source(const wm_assembled_source *s, const source_facts *facts
 // A name that is nearly a known one is a mistake; other notes may be intended.
 static void take_note(void *context, const char *text) {
   const int is_mistake = strstr(text, "did you mean") != NULL;
-  wm_find(context, is_mistake ? WM_FOUND_MISSPELT_NAME : WM_FOUND_FILE_NOTE,
-          is_mistake ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "files", NULL, "%s", text);
+  const wm_finding_id id = strstr(text, "is not in calibration.yaml")                   ? WM_FOUND_SENSOR_UNKNOWN
+                           : is_mistake                                                 ? WM_FOUND_MISSPELT_NAME
+                           : strstr(text, "unknown column") || strstr(text, "reads it") ? WM_FOUND_DATA_UNUSED
+                                                                                        : WM_FOUND_FILE_NOTE;
+  wm_find(context, id, is_mistake ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "files", NULL, "%s", text);
 }
 
 // ── a recording, driven ─────────────────────────────────────────────────────────────────────────────────────────────
@@ -128,7 +131,6 @@ static void check_setup(const wm_assembly *assembly, wm_recording *recording, wm
   check_calibration(assembly, found);
   check_landmarks(&assembly->setup, found);
   check_map(assembly, found);
-  for (size_t i = 0; i < assembly->unused_count; i++) fact("not used     %s\n", assembly->unused[i]);
   if (status != WM_OK) return;
   print_quantities(wm_recording_quantities(recording));
   print_driving(&assembly->driving);
@@ -194,6 +196,20 @@ static void try_suspects(checked *self, const wm_assembly *assembly, double reco
   wm_findings_to_front(self->found, consequences);
 }
 
+// How well each source's updates agree with the poses.
+static void print_fit(const wm_assembly *assembly, const drive_evidence *evidence) {
+  for (size_t i = 0; i < assembly->source_count; i++)
+    for (unsigned k = 0; k < WM_RESIDUAL_COUNT; k++) {
+      const residual_evidence *r = &evidence->residuals[i][k];
+      const double all = (double)(r->fused + r->refused), n = (double)r->fused;
+      if (all < 1 || k == WM_RESIDUAL_STANDSTILL) continue;
+      fact("fit          %-20s %-9s %5.1f %% of %.0f refused", wm_assembly_source_name(assembly, i),
+           wm_residual_name(k), 100 * (double)r->refused / all, all);
+      if (n > 0) fact("; innovations %.2f of their sigma, mean %+.2f", sqrt(r->squares / n), r->sum / n);
+      fact("\n");
+    }
+}
+
 static void ended(void *context, const wm_assembly *assembly, const wm_run_report *report) {
   checked *self = context;
   source_data_judge(&self->sources, wm_recording_quantities(self->recording), self->found);
@@ -207,6 +223,8 @@ static void ended(void *context, const wm_assembly *assembly, const wm_run_repor
   const size_t bad = wm_findings_of(self->found, WM_SEVERITY_BAD);
   evidence_judge(&self->evidence, assembly, &report->health, due, self->found);
   wm_health_map_findings(&report->health, self->found);
+  check_unused(&self->evidence, assembly, &report->health, wm_recording_quantities(self->recording), self->found);
+  print_fit(assembly, &self->evidence);
   if (wm_findings_of(self->found, WM_SEVERITY_BAD) > bad && !self->is_quick)
     try_suspects(self, assembly, report->recorded_s);
 }

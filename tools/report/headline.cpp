@@ -42,21 +42,41 @@ std::string honesty(double inside, double nees_per_dof) {
          " of the time.";
 }
 
+// Share of the time in this state.
+double share_in(const ReportData &data, wm_state state) {
+  const auto &poses = data.trajectory.poses;
+  double spent_s = 0;
+  for (size_t i = 1; i < poses.size(); ++i)
+    if (poses[i - 1].state == state) spent_s += data.seconds(poses[i].t_ns) - data.seconds(poses[i - 1].t_ns);
+  return spent_s / std::max(data.end_s(), 1e-9);
+}
+
 std::string losing(const ReportData &data) {
-  const double count = figure(data, "lost_count");
-  if (!(count > 0)) return " It was never LOST.";
-  return " It was LOST " + strong(times_text(static_cast<int64_t>(count))) + ", for " +
-         duration_text(figure(data, "lost_s")) + " in all.";
+  if (data.trajectory.poses.front().state < 0) return "";  // a trajectory without states
+  const double lost = share_in(data, WM_STATE_LOST), count = figure(data, "lost_count");
+  if (!(lost > 0)) return count > 0 ? " It was LOST for a moment." : " It was never LOST.";
+  return " It was LOST for " + strong(percent_text(lost)) + " of the time" +
+         (count > 0 ? ", " + times_text(static_cast<int64_t>(count)) : "") + ".";
+}
+
+// Share of the updates that the gates refused, where it is more than the outliers of a good run.
+std::string refusing(const ReportData &data) {
+  constexpr double kUsual = 0.03;
+  size_t updates = 0, refused = 0;
+  for (const Innovation &innovation : data.innovations) {
+    const bool is_refused = innovation.verdict == wm_verdict_name(WM_REJECTED_GATE) ||
+                            innovation.verdict == wm_verdict_name(WM_REJECTED_SEARCHING);
+    updates += innovation.fused() || is_refused;
+    refused += is_refused;
+  }
+  const double share = updates > 0 ? static_cast<double>(refused) / static_cast<double>(updates) : 0;
+  if (share < kUsual) return "";
+  return " " + strong(percent_text(share)) + " of what it saw contradicted its pose and was refused.";
 }
 
 // How much of the time it went by its motion alone, where that is worth a word.
 std::string blindness(const ReportData &data) {
-  const auto &poses = data.trajectory.poses;
-  double blind_s = 0;
-  for (size_t i = 1; i < poses.size(); ++i)
-    if (poses[i - 1].state == WM_STATE_DEAD_RECKONING)
-      blind_s += data.seconds(poses[i].t_ns) - data.seconds(poses[i - 1].t_ns);
-  const double share = blind_s / std::max(data.end_s(), 1e-9);
+  const double share = share_in(data, WM_STATE_DEAD_RECKONING);
   if (share < 0.05) return "";
   return " For " + strong(percent_text(share)) + " of the time it had no observation: dead reckoning.";
 }
@@ -83,7 +103,7 @@ std::string with_truth(const ReportData &data) {
   const std::string turn_words = data.trajectory.planar ? "heading" : "orientation";
   if (std::isfinite(turned)) text += ", and its " + turn_words + " was off by " + strong(angle_text(turned));
   text += "." + honesty(figure(data, "nees_inside_95"), figure(data, "nees_mean") / figure(data, "anees_dof")) +
-          losing(data);
+          losing(data) + refusing(data);
 
   std::vector<Tile> all{{length_text(rmse), "position error, root mean square"},
                         {length_text(figure(data, "position_p95_m")), "95 of 100 moments are better than this"},
@@ -110,7 +130,7 @@ std::string without_truth(const ReportData &data) {
     text += " By its own covariance, the typical error of the position was " +
             strong(length_text(percentile(radii, 50))) + " and at worst to " + strong(length_text(max_abs(radii))) +
             ", with 95&nbsp;% confidence.";
-  text += blindness(data) + " There is no truth to compare it with.";
+  text += blindness(data) + losing(data) + refusing(data) + " There is no truth to compare it with.";
   std::vector<Tile> all{{length_text(way), "driven, by its estimate"},
                         {duration_text(data.end_s()), "from the first pose to the last"}};
   if (known) {

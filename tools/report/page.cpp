@@ -74,9 +74,11 @@ std::string map_section(const ReportData &data) {
   if (picture.ellipse_scale > 0)
     marks.emplace_back(
         "<ellipse class=\"ellipse\" cx=\"14\" rx=\"13\" ry=\"7\"/>",
-        "its 95 % region" + (picture.ellipse_scale > 1
-                                 ? ", <b>&nbsp;drawn " + fixed(picture.ellipse_scale, 0) + " times larger</b>"
-                                 : std::string()));
+        "its 95 % region" +
+            (picture.ellipse_scale > 1 ? ", <b>&nbsp;drawn " + fixed(picture.ellipse_scale, 0) + " times larger</b>"
+                                       : std::string()) +
+            (picture.ellipses_left_out > 0 ? ", " + std::to_string(picture.ellipses_left_out) + " too large to draw"
+                                           : std::string()));
   if (!data.landmarks.empty())
     marks.emplace_back("<path class=\"landmark\" d=\"M14-7l7 7l-7 7l-7-7Z\"/>", "landmark, with its number");
   if (!data.estimated_landmarks.empty())
@@ -114,7 +116,7 @@ std::string report_page(const ReportData &data) {
          "<title>" +
          escape(data.name) + " – Waymark</title><style>" + page_style() +
          "</style></head>\n<body data-from=\"0\" data-to=\"" + fixed(data.end_s(), 3) + "\"><main>\n" +
-         headline_section(data) + map_section(data) + frames_section(data) +
+         headline_section(data) + findings_section(data) + map_section(data) + frames_section(data) +
          (data.truth ? error_section(data) : uncertainty_section(data)) + consistency_section(data) +
          state_section(data) + innovation_section(data) + looked_for_section(data) + source_section(data) +
          calibration_section(data) + timing_section(data) + figures_section(data) +

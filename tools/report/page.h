@@ -14,6 +14,7 @@ std::string report_page(const ReportData &data);
 // Its parts, each "" where the run has nothing to say of it. Each figure comes with a sentence that says how to read
 // it.
 std::string headline_section(const ReportData &data);
+std::string findings_section(const ReportData &data);
 std::string map_section(const ReportData &data);
 std::string frames_section(const ReportData &data);       // with pictures
 std::string error_section(const ReportData &data);        // with truth

@@ -92,12 +92,20 @@ std::string dots(const std::vector<Eigen::Vector2d> &positions, double apart, co
   return d;
 }
 
+// Longest half axis of an ellipse, of the view's shorter side: larger ones cover what they are about.
+constexpr double kEllipseMost = 0.35;
+// Ellipses cover at most this share of the view together: beyond it the track and the axes are unreadable.
+constexpr double kEllipsesCover = 0.6;
+
+// "" where it is too large for the view. Adds its area to *area.
 std::string ellipse(const Eigen::Vector2d &middle, const Eigen::Matrix2d &covariance, double times,
-                    const Canvas &canvas, const char *css) {
+                    const Canvas &canvas, const char *css, double *area) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance);
   if (!covariance.allFinite() || axes.info() != Eigen::Success) return "";
   const double reach = std::sqrt(chi2_quantile(0.95, 2)) * times * canvas.scale();
   const Eigen::Vector2d radii = axes.eigenvalues().cwiseMax(0).cwiseSqrt() * reach;
+  if (radii[1] > kEllipseMost * std::min(kWidth, canvas.inner())) return "";
+  *area += M_PI * radii[0] * radii[1];
   const Eigen::Vector2d longest = axes.eigenvectors().col(1);
   return "<ellipse class=\"" + std::string(css) + "\" rx=\"" + fixed(radii[1], 1) + "\" ry=\"" + fixed(radii[0], 1) +
          "\" transform=\"translate(" + canvas.at(middle) + ") rotate(" +
@@ -117,6 +125,31 @@ double ellipse_scale(const std::vector<Pose> &poses, const std::vector<size_t> &
   for (const double times : {1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0})
     if (median * times >= 7) return times;
   return 100;
+}
+
+// The smallest first, until they would cover too much of the view.
+std::string track_ellipses(const std::vector<Pose> &poses, const std::vector<size_t> &at, const Canvas &canvas,
+                           Picture *picture) {
+  std::vector<std::pair<double, std::string>> drawn;
+  for (const size_t i : at) {
+    double area = 0;
+    const auto &P = poses[i].covariance;
+    std::string one =
+        ellipse(poses[i].p_m.head<2>(), P.topLeftCorner<2, 2>(), picture->ellipse_scale, canvas, "ellipse", &area);
+    if (!one.empty()) drawn.emplace_back(area, std::move(one));
+  }
+  std::stable_sort(drawn.begin(), drawn.end(), [](const auto &a, const auto &b) { return a.first < b.first; });
+  std::string out;
+  double covered = 0;
+  size_t count = 0;
+  for (const auto &[area, one] : drawn) {
+    covered += area;
+    if (covered > kEllipsesCover * kWidth * canvas.inner()) break;
+    out += one;
+    ++count;
+  }
+  picture->ellipses_left_out = at.size() - count;
+  return out;
 }
 
 std::string sight_lines(const ReportData &data, const Canvas &canvas) {
@@ -199,8 +232,9 @@ std::string landmark_marks(const ReportData &data, const Canvas &canvas) {
     }
   }
   std::string out;
+  double area = 0;
   for (const Landmark &landmark : data.estimated_landmarks) {
-    out += ellipse(landmark.p_m.head<2>(), landmark.covariance_xy, 1, canvas, "guess");
+    out += ellipse(landmark.p_m.head<2>(), landmark.covariance_xy, 1, canvas, "guess", &area);
     out += "<path class=\"guess\" d=\"M" + canvas.at(landmark.p_m.head<2>()) + "m-6 0h12m-6-6v12\"/>";
   }
   if (!marks.empty()) out += "<path class=\"landmark\" d=\"" + marks + "\"/><g class=\"ids\">" + text + "</g>";
@@ -277,9 +311,7 @@ Picture draw_picture(const ReportData &data, bool standalone) {
   if (data.trajectory.has_covariance) {
     const auto instants = spread_along(poses, kEllipses);
     picture.ellipse_scale = ellipse_scale(poses, instants, canvas);
-    for (const size_t i : instants)
-      ellipses += ellipse(poses[i].p_m.head<2>(), poses[i].covariance.topLeftCorner<2, 2>(), picture.ellipse_scale,
-                          canvas, "ellipse");
+    ellipses = track_ellipses(poses, instants, canvas, &picture);
   }
   const std::string sights = sight_lines(data, canvas);
   picture.sight_lines = !sights.empty();

@@ -10,7 +10,8 @@ namespace wm::tools {
 
 struct Picture {
   std::string svg;
-  double ellipse_scale = 0;  // how many times larger than they are the 95 % ellipses are drawn; 0 where none are
+  double ellipse_scale = 0;      // how many times larger than they are the 95 % ellipses are drawn; 0 where none are
+  size_t ellipses_left_out = 0;  // larger than the view, or more than it has room for
   bool sight_lines = false;
   double scale = 1;                  // units of the picture a metre
   Eigen::Vector2d left_top_m{0, 0};  // what lies at the picture's origin

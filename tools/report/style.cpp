@@ -100,6 +100,10 @@ figure{margin:0}
 .lost{background-image:repeating-linear-gradient(-45deg,#0004 0 4px,#0000 4px 8px)}
 .key{display:inline-block;width:16px;height:16px;border-radius:4px;flex:none}
 .wide{overflow-x:auto}
+.findings{list-style:none;padding:0;margin:12px 0}
+.findings li{border-left:4px solid var(--amber);padding:2px 0 4px 14px;margin:0 0 18px;overflow-wrap:anywhere}
+.findings li.bad{border-color:var(--orange)}.findings p{margin:4px 0 0}.findings p:first-of-type{color:var(--soft)}
+.findings code{font-size:13px;color:var(--soft)}
 table{border-collapse:collapse;font-size:14px;width:100%;margin:4px 0 8px}
 th{font-weight:500;color:var(--soft);text-align:right;padding:6px 0 6px 16px;border-bottom:1px solid var(--rule);vertical-align:bottom}
 td{text-align:right;padding:7px 0 7px 16px;border-bottom:1px solid var(--grid);vertical-align:top;white-space:nowrap}

@@ -29,6 +29,10 @@ typedef struct agreement {
   uint64_t count;
 } agreement;
 
+void agreement_add(agreement *self, double a, double b);
+// 0 without data.
+double agreement_correlation(const agreement *self);
+
 // What was seen of the motion over CAN.
 typedef struct motion_data {
   const wm_wheels *wheels;
@@ -42,6 +46,8 @@ typedef struct motion_data {
   agreement turn_ticks;   // and of the ticks
   agreement turn_steering;
   agreement speed_wheels;  // vehicle's speed against the wheels'
+  double speed_by_ticks;   // m/s, NaN: not known
+  agreement speed_ticks;   // a speed over CAN against that of the ticks
 } motion_data;
 
 void motion_data_init(motion_data *self, const wm_wheels *wheels);
@@ -49,10 +55,28 @@ void motion_data_take(motion_data *self, const wm_event *event);
 // `bound`: bit per wm_quantity of the binding.
 void motion_data_judge(const motion_data *self, uint32_t bound, wm_findings *out);
 
+// Positions against the motion between them, and against headings.
+typedef struct course_data {
+  double speed_mps, turn_radps, heading_rad;  // newest; NaN: none
+  wm_time_ns motion_ns;                       // until which the motion is summed up
+  double way_m, turn_rad;                     // since the last position taken
+  wm_time_ns from_ns;                         // of that position
+  double from_m[2];
+  double last_course_rad, last_turn_rad, last_way_m;  // of the step before
+  agreement way, turn;                                // of the positions against the motion's
+  double heading_less[2], heading_plus[2];  // sums of cos and sin of the heading less and plus the way's direction
+  uint64_t headings;
+} course_data;
+
+void course_data_init(course_data *self);
+void course_data_take(course_data *self, const wm_event *event);
+void course_data_judge(const course_data *self, wm_findings *out);
+
 // What went by of one source.
 typedef struct source_facts {
   uint64_t events;
   wm_time_ns first_ns, last_ns;
+  uint64_t stamps;                                     // that differ from the one before
   wm_time_ns latest_ns;                                // largest lateness, with look_ns
   wm_time_ns look_ns;                                  // time of detection on this computer; 0 for other sources
   uint64_t sightings, unknown_landmarks, bare_ranges;  // bare_ranges: without a bearing
@@ -62,6 +86,7 @@ typedef struct source_data {
   const wm_assembly *assembly;
   source_facts facts[WM_SOURCES_MAX];
   motion_data motion;
+  course_data course;
 } source_data;
 
 void source_data_init(source_data *self, const wm_assembly *assembly);
@@ -69,5 +94,9 @@ void source_data_init(source_data *self, const wm_assembly *assembly);
 void source_data_take(source_data *self, const wm_event *event);
 // After the last event: each source's counts, and the sources against each other. `bound` as above.
 void source_data_judge(source_data *self, uint32_t bound, wm_findings *out);
+
+// What the recording has and the run does not use, after a drive.
+void check_unused(const drive_evidence *evidence, const wm_assembly *assembly, const wm_health *health, uint32_t bound,
+                  wm_findings *out);
 
 #endif

@@ -16,16 +16,21 @@ void motion_data_init(motion_data *self, const wm_wheels *wheels) {
   memset(self, 0, sizeof *self);
   self->wheels = wheels;
   self->ticks_ns = WM_TIME_NONE;
-  self->turn_by_ticks = (double)NAN;
+  self->turn_by_ticks = self->speed_by_ticks = (double)NAN;
   for (unsigned q = 0; q < WM_Q_COUNT; q++) self->last[q] = (double)NAN;
 }
 
-static void agree(agreement *self, double a, double b) {
+void agreement_add(agreement *self, double a, double b) {
   if (isnan(a) || isnan(b)) return;
   self->aa += a * a;
   self->bb += b * b;
   self->ab += a * b;
   self->count++;
+}
+
+double agreement_correlation(const agreement *self) {
+  const double size = sqrt(self->aa * self->bb);
+  return size > 0 ? self->ab / size : 0;
 }
 
 static void take_ticks(motion_data *self, wm_time_ns t_ns) {
@@ -38,6 +43,7 @@ static void take_ticks(motion_data *self, wm_time_ns t_ns) {
     double l = (left - self->ticks[0]) * m / dt_s, r = (right - self->ticks[1]) * m / dt_s;
     self->fastest_mps = fmax(self->fastest_mps, fmax(fabs(l), fabs(r)));
     self->turn_by_ticks = (r - l) / self->wheels->track_m;
+    self->speed_by_ticks = (l + r) / 2;
   }
   self->ticks_ns = t_ns;
   self->ticks[0] = left;
@@ -57,9 +63,9 @@ static void take_turn(motion_data *self) {
   double speed = isnan(left) || isnan(right) ? self->last[WM_Q_VEHICLE_SPEED] : (left + right) / 2;
   double sign = speed < 0 ? 1 : direction(self);
   double steering = isnan(self->last[WM_Q_ROAD_WHEEL]) ? self->last[WM_Q_STEERING_WHEEL] : self->last[WM_Q_ROAD_WHEEL];
-  agree(&self->turn_wheels, gyro, sign * (right - left));
-  agree(&self->turn_ticks, gyro, self->turn_by_ticks);
-  agree(&self->turn_steering, gyro, sign * speed * steering);
+  agreement_add(&self->turn_wheels, gyro, sign * (right - left));
+  agreement_add(&self->turn_ticks, gyro, self->turn_by_ticks);
+  agreement_add(&self->turn_steering, gyro, sign * speed * steering);
 }
 
 void motion_data_take(motion_data *self, const wm_event *event) {
@@ -80,9 +86,10 @@ void motion_data_take(motion_data *self, const wm_event *event) {
   }
   if (has_ticks) take_ticks(self, event->t_ns);
   if (has_turn) take_turn(self);
+  if (has_speed) agreement_add(&self->speed_ticks, fabs(self->last[WM_Q_VEHICLE_SPEED]), fabs(self->speed_by_ticks));
   if (has_speed)
-    agree(&self->speed_wheels, fabs(self->last[WM_Q_VEHICLE_SPEED]),
-          (fabs(wheel_speed(self, 0)) + fabs(wheel_speed(self, 1))) / 2);
+    agreement_add(&self->speed_wheels, fabs(self->last[WM_Q_VEHICLE_SPEED]),
+                  (fabs(wheel_speed(self, 0)) + fabs(wheel_speed(self, 1))) / 2);
 }
 
 // ── findings ───────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -124,7 +131,7 @@ static void track(const motion_data *self, wm_findings *out) {
   const agreement *a = &self->turn_ticks;
   if (a->count < PAIRS_MIN || sqrt(a->aa / (double)a->count) < TURN_RMS_MIN || a->bb <= 0) return;
   const double ratio = a->ab / a->bb;
-  if (a->ab / sqrt(a->aa * a->bb) < 0.5 || (ratio > 1 / 1.5 && ratio < 1.5)) return;
+  if (agreement_correlation(a) < 0.5 || (ratio > 1 / 1.5 && ratio < 1.5)) return;
   char mend[160];
   (void)snprintf(mend, sizeof mend,
                  "measure it again (`wheels: {track_m: %.3g}` would agree), or look at the gyro's unit",
@@ -136,10 +143,24 @@ static void track(const motion_data *self, wm_findings *out) {
 
 static void turns(const agreement *a, const char *other, wm_findings *out) {
   if (a->count < PAIRS_MIN || sqrt(a->aa / (double)a->count) < TURN_RMS_MIN || a->bb <= 0) return;
-  if (a->ab / sqrt(a->aa * a->bb) < -0.5)
+  if (agreement_correlation(a) < -0.5)
     wm_find(out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, ABOUT,
             "`scale: -1` at the one that is not positive to the left; or left and right are swapped",
-            "yaw_rate turns left where %s turns right (correlation %.2f)", other, a->ab / sqrt(a->aa * a->bb));
+            "yaw_rate turns left where %s turns right (correlation %.2f)", other, agreement_correlation(a));
+}
+
+static void speeds(const motion_data *self, wm_findings *out) {
+  const agreement *s = &self->speed_ticks;
+  const double ratio = s->bb > 0 ? s->ab / s->bb : 1;
+  if (s->count < PAIRS_MIN || s->bb / (double)s->count < 0.01 || (ratio > 1 / 1.5 && ratio < 1.5)) return;
+  char fix[WM_FINDING_FIX_MAX];
+  (void)snprintf(fix, sizeof fix,
+                 "one of them is wrong: the speed's unit, or the wheels' (`radius_m: %.4g` or `ticks_per_turn: %.6g` "
+                 "would agree)",
+                 self->wheels->radius_m * ratio, self->wheels->ticks_per_turn / ratio);
+  wm_find(out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, ABOUT, fix,
+          "vehicle_speed is %.2f times the speed by the wheels' ticks", ratio)
+      ->size = ratio;
 }
 
 void motion_data_judge(const motion_data *self, uint32_t bound, wm_findings *out) {
@@ -153,6 +174,7 @@ void motion_data_judge(const motion_data *self, uint32_t bound, wm_findings *out
   turns(&self->turn_wheels, "the difference of the wheels' speeds", out);
   turns(&self->turn_ticks, "the difference of the wheels' ticks", out);
   turns(&self->turn_steering, "the steering", out);
+  speeds(self, out);
   const agreement *s = &self->speed_wheels;
   double ratio = s->bb > 0 ? s->ab / s->bb : 1;
   if (s->count >= PAIRS_MIN && s->bb / (double)s->count > 0.01 && (ratio < 0.6 || ratio > 1.6))

@@ -15,6 +15,7 @@ static int is_landmark(const wm_setup *setup, int32_t id) {
 
 static void take(source_facts *facts, const wm_setup *setup, const wm_event *event) {
   if (facts->events++ == 0) facts->first_ns = event->t_ns;
+  facts->stamps += facts->last_ns != event->t_ns;
   facts->last_ns = event->t_ns;
   wm_time_ns late_ns;
   if (!__builtin_sub_overflow(event->arrival_ns, event->t_ns, &late_ns) && late_ns > facts->latest_ns)
@@ -56,6 +57,24 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, wm_
             "%" PRIu64 " of 100 are older than the one before", of_hundred(c->out_of_order, all));
 }
 
+// Of distinct stamps. The fastest sensor of a robot, a gyro, gives 8000 samples a second.
+#define RATE_MAX_HZ 20000.0
+
+static void rate(const wm_assembled_source *s, const source_facts *facts, wm_findings *out) {
+  const double seconds = wm_seconds_between(facts->first_ns, facts->last_ns);
+  if (facts->events < 20 || facts->stamps < 2 || seconds <= 0) {
+    if (facts->events >= 20 && s->source->is_motion)
+      wm_find(out, WM_FOUND_RATE_IMPLAUSIBLE, WM_SEVERITY_BAD, s->name, NULL,
+              "all of its %" PRIu64 " data have the same stamp", facts->events);
+    return;
+  }
+  const double hz = (double)(facts->stamps - 1) / seconds;
+  if (hz > RATE_MAX_HZ)
+    wm_find(out, WM_FOUND_RATE_IMPLAUSIBLE, WM_SEVERITY_BAD, s->name, NULL,
+            "%.0f data a second: are its stamps in us, ms or s? t_ns is in nanoseconds", hz)
+        ->size = hz;
+}
+
 // Adds the time of detection to the lateness of a picture: its observations arrive when they are ready.
 static wm_time_ns look_ns(const wm_assembly *assembly, const wm_source *source) {
   for (size_t i = 0; i < wm_vision_count(assembly->vision); i++)
@@ -76,6 +95,7 @@ static void judge(const wm_assembly *assembly, const wm_assembled_source *s, con
     return;
   }
   counted(s, facts, out);
+  rate(s, facts, out);
   if (facts->latest_ns > IMPLAUSIBLE_LATENESS_NS) {
     wm_find(out, WM_FOUND_ROWS_DISORDERED, WM_SEVERITY_BAD, s->name,
             "sort the rows by t_ns; or correct arrival_ns, which has to be of the same clock",
@@ -152,11 +172,13 @@ void source_data_init(source_data *self, const wm_assembly *assembly) {
   for (size_t i = 0; i < WM_SOURCES_MAX; i++)
     self->facts[i] = (source_facts){.first_ns = WM_TIME_NONE, .last_ns = WM_TIME_NONE, .latest_ns = INT64_MIN};
   motion_data_init(&self->motion, &assembly->setup.wheels);
+  course_data_init(&self->course);
 }
 
 void source_data_take(source_data *self, const wm_event *event) {
   take(&self->facts[event->source], &self->assembly->setup, event);
   motion_data_take(&self->motion, event);
+  course_data_take(&self->course, event);
 }
 
 void source_data_judge(source_data *self, uint32_t bound, wm_findings *out) {
@@ -174,5 +196,6 @@ void source_data_judge(source_data *self, uint32_t bound, wm_findings *out) {
   }
   for (size_t i = 0; motion && i < self->assembly->source_count; i++)
     if (self->facts[i].events > 1 && !is_motion(&self->assembly->sources[i])) spans(self, i, motion, out);
+  course_data_judge(&self->course, out);
   if (kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES)) motion_data_judge(&self->motion, bound, out);
 }

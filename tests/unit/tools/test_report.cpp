@@ -144,7 +144,7 @@ void test_page_says_what_happened() {
   make(run, recording);
   const std::string page = report_page(load_report_data(run.path(), recording.path()));
   for (const char *words :
-       {"a &lt;made&gt; drive", "<em>10.0\u202fm</em>", "<em>5.0\u202fcm</em>", "It was never LOST", "Errors",
+       {"a &lt;made&gt; drive", "<em>10.0\u202fm</em>", "<em>5.0\u202fcm</em>", "It was LOST for <em>4", "Errors",
         "Bearing of sightings by eye", "1 too far from what was expected", "eye: yaw", "<b>4.601</b> ± 0.040",
         "2 of 500", "left wheel’s encoder stood still", "gnss had fallen silent", "slowest 31 µs",
         "lost: what it saw contradicted its pose, being mended (40"})

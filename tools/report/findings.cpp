@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is probably wrong: the findings of the run, the gravest first, each with its cause and what to do.
+#include "report/page.h"
+#include "report/words.h"
+
+namespace wm::tools {
+namespace {
+
+using Json = nlohmann::json;
+
+std::string word(const Json &finding, const char *key) {
+  return finding.contains(key) && finding[key].is_string() ? finding[key].get<std::string>() : std::string();
+}
+
+std::string item(const Json &finding) {
+  const std::string fix = word(finding, "fix"), cause = word(finding, "cause");
+  return "<li class=\"" + escape(word(finding, "severity")) + "\"><b>" + escape(plain(word(finding, "about"))) +
+         "</b> " + escape(word(finding, "text")) + "." +
+         (cause.empty() ? "" : "<p>Usual cause: " + escape(cause) + ".</p>") +
+         (fix.empty() ? "" : "<p><em>What to do:</em> " + escape(fix) + ".</p>") + "<code>" +
+         escape(word(finding, "link")) + "</code></li>";
+}
+
+}  // namespace
+
+std::string findings_section(const ReportData &data) {
+  if (!data.health.is_object() || !data.health.contains("findings") || !data.health["findings"].is_array()) return "";
+  std::string bad, notes;
+  for (const Json &finding : data.health["findings"]) {
+    if (!finding.is_object()) continue;
+    (word(finding, "severity") == "bad" ? bad : notes) += item(finding);
+  }
+  if (bad.empty() && notes.empty()) return "";
+  return section(bad.empty() ? "Notes" : "What is probably wrong",
+                 bad.empty() ? "Nothing of this has to be wrong; look whether it is intended."
+                             : "What contradicts a good run, the gravest first. <code>waymark check CONFIG "
+                               "RECORDING</code> tries the usual mistakes and proposes the line to write.",
+                 "<ul class=\"findings\">" + bad + notes + "</ul>");
+}
+
+}  // namespace wm::tools
