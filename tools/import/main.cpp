@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// `waymark import`: a video of any kind becomes one that a recording holds and the robot reads.
+// `waymark import`: a video of any kind becomes one that a recording holds and the robot reads. Bags are read by the
+// Python package's waymark-import-bag.
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 
 #include "common/failure.h"
 #include "common/program.h"
@@ -25,9 +29,27 @@ int run(const wm::tools::ImportWish &wish) {
   return wm::tools::kDone;
 }
 
+// A bag of ROS or an MCAP file: a folder with rosbag2's metadata, or a file by its ending.
+bool is_bag(const std::filesystem::path &path) {
+  const std::string ending = path.extension().string();
+  std::error_code ignored;
+  return ending == ".mcap" || ending == ".bag" || ending == ".db3" ||
+         std::filesystem::is_regular_file(path / "metadata.yaml", ignored);
+}
+
+int run_bag_import(char **argv) {
+  (void)execvp("waymark-import-bag", argv);
+  (void)std::fprintf(stderr,
+                     "waymark import: bags are read by the Python package, and there is no program waymark-import-bag; "
+                     "`pip install ./tools/python` installs it (docs/stack.md)\n");
+  return wm::tools::kFailed;
+}
+
 }  // namespace
 
 int main(int argc, char **argv) {
+  for (int i = 1; i < argc; i++)
+    if (is_bag(argv[i])) return run_bag_import(argv);
   wm::tools::ImportWish wish;
   CLI::App app(
       "Makes a video of any kind (H.264 and others, by libav) into what a recording holds: MJPEG in AVI, with its "
@@ -44,6 +66,7 @@ int main(int argc, char **argv) {
   app.add_option("--quality", wish.quality, "of the JPEGs")->check(CLI::Range(1, 100))->capture_default_str();
   app.footer(
       "Pictures become grey, which is what the robot reads.\n"
+      "A ROS bag or an MCAP file becomes a whole recording (docs/stack.md): waymark import BAG --out FOLDER\n"
       "Exit code: 0 done, 1 the work failed, 2 usage.\n"
       "Example: waymark import phone.mp4 --camera front --out recordings/drive");
   return wm::tools::run_program(app, argc, argv, [&] { return run(wish); });

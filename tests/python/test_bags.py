@@ -1,0 +1,173 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""`waymark import`: bags that other software wrote, and files of `waymark export`, as recordings.
+
+    test_bags.py BIN_DIR"""
+
+import contextlib
+import io
+import random
+import subprocess
+import unittest
+
+import numpy as np
+from common import BIN, Drive
+from PIL import Image
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+import waymark
+from waymark.bag.command import main as import_main
+from waymark.export import export
+from waymark.geometry import OPTICAL, from_rpy
+from waymark.ros import Messages
+
+START_NS = 1_700_000_000_000_000_000
+
+
+def imported(*arguments):
+    """Exit code and what was printed."""
+    out, errors = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(errors):
+        code = import_main([str(argument) for argument in arguments])
+    return code, out.getvalue() + errors.getvalue()
+
+
+def robot_bag(folder, plugin, twist=True):
+    """A bag as a robot with ROS 2 records it: odometry, camera, GNSS, tags, CAN, mountings, and what nobody takes."""
+    m = Messages()
+    with Writer(folder, version=9, storage_plugin=plugin) as bag:
+        topics = {}
+
+        def put(topic, kind, t_ns, message):
+            name = m.type(kind)
+            if topic not in topics:
+                topics[topic] = bag.add_connection(topic, name, typestore=m.store)
+            bag.write(topics[topic], t_ns + 3_000_000, m.store.serialize_cdr(message, name))
+
+        body = np.eye(4)
+        body[:3, :3], body[:3, 3] = from_rpy(0, 0.2, 0.5) @ OPTICAL, (0.3, 0.1, 0.4)
+        turned = np.eye(4)
+        turned[:3, :3] = from_rpy(np.pi, 0, 0)
+        put("/tf_static", "TFMessage", START_NS, m.make("TFMessage", transforms=[
+            m.transform(0, "base_link", "front_optical", body), m.transform(0, "base_link", "imu", turned)]))
+        for i in range(50):
+            t_ns, header = START_NS + i * 20_000_000, m.header(START_NS + i * 20_000_000, "front_optical")
+            speed = m.make("TwistWithCovariance")
+            if twist:
+                speed.twist.linear.x, speed.twist.angular.z = 0.5, 0.1 + i / 1000
+            place = m.make("PoseWithCovariance", pose=m.pose((0.01 * i, 0, 0), (0, 0, 0, 1)))
+            put("/odom", "Odometry", t_ns, m.make("Odometry", header=m.header(t_ns, "odom"), pose=place, twist=speed))
+            grey = np.full((48, 64, 3), (5 * i, 40, 40), dtype=np.uint8)
+            put("/front/image_raw", "sensor_msgs/Image", t_ns, m.make(
+                "sensor_msgs/Image", header=header, height=48, width=64, encoding="rgb8", step=192, data=grey.ravel()))
+            put("/front/camera_info", "CameraInfo", t_ns, m.make(
+                "CameraInfo", header=header, width=64, height=48, distortion_model="plumb_bob", d=np.array([0.1, 0, 0, 0, 0]),
+                k=np.array([50.0, 0, 32, 0, 51, 24, 0, 0, 1])))
+            put("/fix", "NavSatFix", t_ns, m.make("NavSatFix", header=header, latitude=48.0 + i * 1e-6, longitude=11.0 + i * 1e-6,
+                                                  altitude=500.0, position_covariance_type=2,
+                                                  position_covariance=np.diag([4.0, 4, 9]).ravel()))
+            corner = [m.make("apriltag_msgs/Point", x=float(x), y=float(y)) for x, y in ((1, 4), (3, 4), (3, 2), (1, 2))]
+            tag = m.make("AprilTagDetection", family="tag36h11", id=7, corners=corner, homography=np.zeros(9))
+            put("/front/detections", "AprilTagDetectionArray", t_ns, m.make("AprilTagDetectionArray", header=header, detections=[tag]))
+            put("/can0/frames", "can_msgs/Frame", t_ns, m.make("can_msgs/Frame", header=header, id=0x123, dlc=2,
+                                                               data=np.array([1, 2, 0, 0, 0, 0, 0, 0], dtype=np.uint8)))
+            put("/imu", "Imu", t_ns, m.make(
+                "Imu", header=m.header(t_ns, "imu"), angular_velocity=m.make("Vector3", z=-0.1),
+                angular_velocity_covariance=np.diag([1e-4, 1e-4, 1e-4]).ravel(), linear_acceleration_covariance=np.full(9, -1.0)))
+            put("/scan", "LaserScan", t_ns, m.make("LaserScan", header=header))
+            put("/vicon", "PoseStamped", t_ns, m.make("PoseStamped", header=header, pose=m.pose((1, 2, 0), (0, 0, 0, 1))))
+    return folder
+
+
+class Robots(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.drive = Drive()
+        cls.addClassCleanup(cls.drive.close)
+        cls.bags = {name: robot_bag(cls.drive.folder / name, plugin)
+                    for name, plugin in (("mcap", StoragePlugin.MCAP), ("sqlite", StoragePlugin.SQLITE3))}
+
+    def out(self, name):
+        return self.drive.folder / f"{self.id()}-{name}"
+
+    def test_all_that_a_recording_has_a_place_for_is_taken(self):
+        for name, bag in self.bags.items():
+            code, text = imported(bag, "--out", self.out(name), "--truth", "/vicon")
+            self.assertEqual(code, 0, text)
+            recording = waymark.Recording(self.out(name))
+            motion, gnss, corners = (recording.table(f"{kind}.csv") for kind in ("motion", "gnss", "marker-corners"))
+            np.testing.assert_allclose(motion["w_radps"], 0.1 + np.arange(50) / 1000)
+            self.assertEqual(motion["t_ns"][1] - START_NS, 20_000_000)
+            self.assertEqual((motion["arrival_ns"] - motion["t_ns"]).tolist(), [3_000_000] * 50)
+            # One degree of latitude is 111 195 m at 48 degrees, one of longitude 74 626 m (WGS84, at 500 m).
+            self.assertAlmostEqual(gnss["y_m"][-1], 49e-6 * 111_203.5, delta=5e-4)
+            self.assertAlmostEqual(gnss["x_m"][-1], 49e-6 * 74_634.6, delta=5e-4)
+            self.assertEqual((gnss["sigma_xy_m"][0], gnss["sigma_z_m"][0]), (2, 3))
+            # Upper left first: the tag's upper left corner is the detector's last.
+            self.assertEqual([corners[f"{a}{k}_px"][0] for k in range(4) for a in "uv"], [1, 2, 3, 2, 3, 4, 1, 4])
+            camera = recording.calibration["cameras"]["front"]
+            self.assertEqual(camera["intrinsics"], [50, 51, 32, 24])
+            np.testing.assert_allclose(camera["mounting"]["rpy_deg"], np.degrees([0, 0.2, 0.5]), atol=1e-6)
+            np.testing.assert_allclose(camera["mounting"]["xyz_m"], [0.3, 0.1, 0.4])
+            frames = list(recording.frames("front"))
+            self.assertEqual(len(frames), 50)
+            grey = np.asarray(Image.open(io.BytesIO(frames[40].jpeg)))
+            self.assertAlmostEqual(float(grey.mean()), 0.299 * 200 + 0.701 * 40, delta=1.5)
+            self.assertEqual([frame.data for frame in recording.can()], [b"\x01\x02"] * 50)
+            imu = recording.table("imu.csv")
+            self.assertEqual(list(imu), ["t_ns", "wx_radps", "wy_radps", "wz_radps", "sigma_wx_radps", "sigma_wy_radps",
+                                         "sigma_wz_radps", "arrival_ns"])
+            self.assertEqual((imu["wz_radps"][0], imu["sigma_wz_radps"][0]), (-0.1, 0.01))
+            self.assertEqual(abs(recording.calibration["imu"]["mounting"]["rpy_deg"][0]), 180)
+            self.assertEqual(len(recording.table("truth.csv")["t_ns"]), 50)
+            self.assertIn("not taken: /scan", text)
+
+    def test_the_same_bag_makes_the_same_bytes(self):
+        for name in "ab":
+            self.assertEqual(imported(self.bags["mcap"], "--out", self.out(name))[0], 0)
+        done = subprocess.run(["diff", "-r", "-x", "recording.yaml", self.out("a"), self.out("b")], capture_output=True, check=False)
+        self.assertEqual((done.returncode, done.stdout), (0, b""))
+
+    def test_odometry_without_a_twist_becomes_increments(self):
+        bag = robot_bag(self.drive.folder / "still", StoragePlugin.MCAP, twist=False)
+        code, text = imported(bag, "--out", self.out("a"))
+        self.assertEqual(code, 0, text)
+        np.testing.assert_allclose(waymark.Recording(self.out("a")).table("increments.csv")["dx_m"], 0.01, atol=1e-12)
+        self.assertIn("increments.csv", text)
+
+    def test_a_topic_that_is_not_there_is_named(self):
+        code, text = imported(self.bags["mcap"], "--out", self.out("a"), "--motion", "/odometry")
+        self.assertEqual(code, 1)
+        self.assertIn("/odom", text)
+        self.assertFalse(self.out("a").exists())
+
+    def test_broken_bags_are_errors(self):
+        (whole,) = self.bags["mcap"].glob("*.mcap")
+        data, chance = whole.read_bytes(), random.Random(2)
+        for case in range(30):
+            broken = bytearray(data[: chance.randrange(len(data))] if case % 2 else data)
+            for _ in range(5 * (1 - case % 2)):
+                broken[chance.randrange(len(broken))] ^= 1 << chance.randrange(8)
+            path = self.drive.folder / "broken.mcap"
+            path.write_bytes(bytes(broken))
+            code, text = imported(path, "--out", self.out(f"broken-{case}"))
+            self.assertIn(code, (0, 1))
+            self.assertTrue(code == 0 or "waymark import: " in text, text)
+
+
+class OwnExports(unittest.TestCase):
+    def test_a_recording_of_an_export_gives_the_same_poses(self):
+        drive = Drive()
+        self.addCleanup(drive.close)
+        export(waymark.Run(drive.run), drive.folder / "run.mcap", waymark.Recording(drive.recording), pictures=True, can=True)
+        code, text = imported(drive.folder / "run.mcap", "--out", drive.folder / "again")
+        self.assertEqual(code, 0, text)
+        drive.replay(drive.folder / "again", drive.folder / "run-again")
+        self.assertEqual((drive.run / "trajectory.csv").read_bytes(), (drive.folder / "run-again/trajectory.csv").read_bytes())
+        done = subprocess.run([BIN / "waymark", "check", drive.folder / "robot.yaml", drive.folder / "again", "--quick"],
+                              capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

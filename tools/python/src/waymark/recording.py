@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings: folders with the data of a robot's sensors (docs/recording-format.md)."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from .avi import AviWriter, read_jpegs
+from .tables import Table, read_table, write_table
+
+FORMAT = "waymark-recording/1"
+STREAMS = ("motion.csv", "motion6.csv", "increments.csv", "imu.csv", "sightings.csv", "markers.csv", "marker-corners.csv",
+           "stereo.csv", "points.csv", "gnss.csv")
+"""Streams of sensors that are tables, in the order of the format's table."""
+
+_CAN_LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-Fa-f]+)#(#[0-9A-Fa-f])?(R\d?|[0-9A-Fa-f]*)(?: [RT])?\s*$")
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A picture of a camera: its stamp, its arrival at the computer (None: at once), and its JPEG."""
+
+    t_ns: int
+    arrival_ns: int | None
+    jpeg: bytes
+
+
+@dataclass(frozen=True)
+class CanFrame:
+    """A CAN frame. `flags` is None for a classic frame, else the FD frame's nibble of flags."""
+
+    t_ns: int
+    interface: str
+    id: int
+    extended: bool
+    data: bytes
+    flags: int | None = None
+    remote: bool = False
+
+
+def _read_yaml(path: Path) -> dict:
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except yaml.YAMLError as error:
+        raise ValueError(f"{path}: {error}") from None
+    if not isinstance(content, dict):
+        raise ValueError(f"{path}: this is no mapping of keys")
+    return content
+
+
+class Recording:
+    """A recording's folder, read as it is asked for."""
+
+    def __init__(self, path: str | Path):
+        self.path = Path(path)
+        if not (self.path / "recording.yaml").is_file():
+            raise FileNotFoundError(f"{path}: there is no recording.yaml in it: is it a recording's folder?")
+        self.meta = _read_yaml(self.path / "recording.yaml")
+        if self.meta.get("format") != FORMAT:
+            raise ValueError(f"{path}/recording.yaml: its format is '{self.meta.get('format')}', not {FORMAT}")
+
+    @property
+    def calibration(self) -> dict:
+        """calibration.yaml; empty without one."""
+        path = self.path / "calibration.yaml"
+        return _read_yaml(path) if path.is_file() else {}
+
+    def streams(self) -> list[str]:
+        """Names of the tables of sensors that are there."""
+        return [name for name in STREAMS if (self.path / name).is_file()]
+
+    def table(self, name: str) -> Table:
+        """A table by its file's name: "sightings.csv", "truth.csv", "landmarks.csv" ..."""
+        return read_table(self.path / name)
+
+    def cameras(self) -> list[str]:
+        """Names of the cameras that have a video (AVI)."""
+        return sorted(path.stem for path in self.path.glob("video/*.avi") if path.with_suffix(".csv").is_file())
+
+    def frames(self, camera: str) -> Iterator[Frame]:
+        """A camera's pictures in their order."""
+        rows = self.table(f"video/{camera}.csv")
+        arrivals = rows.get("arrival_ns")
+        for i, jpeg in enumerate(read_jpegs(self.path / "video" / f"{camera}.avi")):
+            if i >= len(rows["t_ns"]):
+                return
+            yield Frame(int(rows["t_ns"][i]), None if arrivals is None else int(arrivals[i]), jpeg)
+
+    def can(self) -> Iterator[CanFrame]:
+        """The frames of can.log."""
+        path = self.path / "can.log"
+        if not path.is_file():
+            return
+        with path.open(encoding="ascii", errors="replace") as file:
+            for number, line in enumerate(file, start=1):
+                if not line.strip():
+                    continue
+                match = _CAN_LINE.match(line)
+                if not match:
+                    raise ValueError(f"{path}:{number}: this is no line of `candump -l`")
+                seconds, micros, interface, identifier, flags, data = match.groups()
+                remote = data.startswith("R")
+                yield CanFrame(int(seconds) * 10**9 + int(micros) * 1000, interface, int(identifier, 16),
+                               len(identifier) > 3, b"" if remote else bytes.fromhex(data),
+                               int(flags[1], 16) if flags else None, remote)
+
+
+def can_line(frame: CanFrame) -> str:
+    """A frame as `candump -l` writes it."""
+    identifier = f"{frame.id:08X}" if frame.extended else f"{frame.id:03X}"
+    data = "R" if frame.remote else frame.data.hex().upper()
+    flags = "" if frame.flags is None else f"#{frame.flags:X}"
+    return f"({frame.t_ns // 10**9}.{frame.t_ns // 1000 % 10**6:06d}) {frame.interface} {identifier}#{flags}{data}\n"
+
+
+def jpeg_size(jpeg: bytes) -> tuple[int, int]:
+    """Width and height of a JPEG, by its start of frame."""
+    at = 2
+    while at + 9 <= len(jpeg) and jpeg[at] == 0xFF:
+        marker = jpeg[at + 1]
+        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
+            return int.from_bytes(jpeg[at + 7 : at + 9], "big"), int.from_bytes(jpeg[at + 5 : at + 7], "big")
+        at += 2 + int.from_bytes(jpeg[at + 2 : at + 4], "big")
+    raise ValueError("a picture is no JPEG")
+
+
+class RecordingWriter:
+    """Writes a recording. Use it with `with`: its end writes recording.yaml, and an exception leaves none."""
+
+    def __init__(self, path: str | Path, name: str | None = None, about: str = ""):
+        self.path = Path(path)
+        if self.path.exists() and any(self.path.iterdir()):
+            raise FileExistsError(f"{path}: the folder is not empty")
+        self.path.mkdir(parents=True, exist_ok=True)
+        self.meta: dict = {"format": FORMAT, "name": name or self.path.resolve().name}
+        if about:
+            self.meta["about"] = about
+        self.calibration: dict = {}
+        self._streams: list[str] = []
+        self._times: list[int] = []
+        self._videos: dict[str, tuple[AviWriter, list[tuple[int, int | None]], tuple[int, int]]] = {}
+        self._can = None
+
+    def table(self, name: str, table: Table) -> None:
+        """Writes a stream or another table of the format, sorted by arrival (else by stamp) as the format wants it."""
+        key = table.get("arrival_ns", table.get("t_ns"))
+        if key is not None:
+            order = np.argsort(key, kind="stable")
+            table = {column: np.asarray(values)[order] for column, values in table.items()}
+            self._times += [int(table["t_ns"].min()), int(table["t_ns"].max())] if len(order) else []
+        path = self.path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_table(path, table)
+        self._streams.append(name)
+
+    def file(self, name: str, data: bytes) -> None:
+        """Writes another file below the folder."""
+        path = (self.path / name).resolve()
+        if not path.is_relative_to(self.path.resolve()):
+            raise ValueError(f"'{name}' is a name outside of the recording")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
+
+    def frame(self, camera: str, frame: Frame, rate_hz: float = 30.0) -> None:
+        """Appends a picture to a camera's video; all have one size."""
+        size = jpeg_size(frame.jpeg)
+        if camera not in self._videos:
+            (self.path / "video").mkdir(exist_ok=True)
+            self._videos[camera] = (AviWriter(self.path / "video" / f"{camera}.avi", *size, rate_hz), [], size)
+        writer, rows, first = self._videos[camera]
+        if size != first:
+            raise ValueError(f"camera {camera}: a picture of {size[0]} x {size[1]} follows one of {first[0]} x {first[1]}")
+        writer.write(frame.jpeg)
+        rows.append((frame.t_ns, frame.arrival_ns))
+
+    def cameras(self) -> list[str]:
+        """Names of the cameras that have pictures so far."""
+        return sorted(self._videos)
+
+    def can(self, frame: CanFrame) -> None:
+        """Appends a CAN frame to can.log."""
+        if self._can is None:
+            self._can = (self.path / "can.log").open("w", encoding="ascii")
+            self._streams.append("can.log")
+        self._can.write(can_line(frame))
+        self._times.append(frame.t_ns)
+
+    def close(self) -> None:
+        """Completes videos and can.log and writes calibration.yaml and recording.yaml."""
+        for camera, (writer, rows, _) in sorted(self._videos.items()):
+            writer.close()
+            self._streams += [f"video/{camera}.avi", f"video/{camera}.csv"]
+            self._times += [rows[0][0], rows[-1][0]]
+            if (self.path / "video" / f"{camera}.csv").exists():
+                continue  # written as a file, with columns of its own
+            table: Table = {"frame": np.arange(len(rows)), "t_ns": np.array([t for t, _ in rows], dtype=np.int64)}
+            if any(arrival is not None for _, arrival in rows):
+                table["arrival_ns"] = np.array([t if a is None else a for t, a in rows], dtype=np.int64)
+            write_table(self.path / "video" / f"{camera}.csv", table)
+        if self._can is not None:
+            self._can.close()
+        if self.calibration:
+            self.file("calibration.yaml", yaml.safe_dump(self.calibration, sort_keys=False).encode())
+        if (self.path / "calibration.yaml").exists():
+            self._streams.append("calibration.yaml")
+        if self._times:
+            self.meta.setdefault("duration_s", (max(self._times) - min(self._times)) / 1e9)
+        listed = [name for name in self.meta.get("streams", []) if (self.path / name).is_file()]
+        self.meta["streams"] = listed + [name for name in sorted(set(self._streams)) if name not in listed]
+        self.file("recording.yaml", yaml.safe_dump(self.meta, sort_keys=False).encode())
+
+    def __enter__(self) -> "RecordingWriter":
+        return self
+
+    def __exit__(self, kind, value, trace) -> None:
+        if kind is None:
+            self.close()
+            return
+        for writer, _, _ in self._videos.values():
+            writer.close()
+        if self._can is not None:
+            self._can.close()
