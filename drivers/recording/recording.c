@@ -62,12 +62,12 @@ static wm_status check_format(const wm_yaml_node *root, wm_error *err) {
 }
 
 static int is_read(const char *file) {
-  static const char *const kRead[] = {"can.log",     "vehicle.dbc",    "can-signals.yaml",   "motion.csv",
-                                      "motion6.csv", "increments.csv", "points.csv",         "sightings.csv",
-                                      "imu.csv",     "markers.csv",    "marker-corners.csv", "stereo.csv",
-                                      "gnss.csv",    "landmarks.csv",  "calibration.yaml"};
-  for (size_t i = 0; i < sizeof kRead / sizeof kRead[0]; i++)
-    if (strcmp(file, kRead[i]) == 0) return 1;
+  static const char *const kOthers[] = {"can.log",       "vehicle.dbc",      "can-signals.yaml",
+                                        "landmarks.csv", "calibration.yaml", NULL};
+  for (size_t i = 0; kOthers[i]; i++)
+    if (strcmp(file, kOthers[i]) == 0) return 1;
+  for (size_t i = 0; kStreams[i]; i++)
+    if (strcmp(file, kStreams[i]->file) == 0) return 1;
   return 0;
 }
 
@@ -281,16 +281,10 @@ static wm_status add_can(wm_recording *self, wm_error *err) {
 
 static wm_status add_sources(wm_recording *self, wm_error *err) {
   wm_status status = add_can(self, err);
-  if (status == WM_OK) status = add_stream(self, &kStreamMotion, err);
-  if (status == WM_OK) status = add_stream(self, &kStreamMotion6, err);
-  if (status == WM_OK) status = add_stream(self, &kStreamIncrements, err);
-  if (status == WM_OK) status = add_stream(self, &kStreamImu, err);
-  if (status == WM_OK) status = add_sensor_streams(self, &kStreamSightings, &self->sighting_sensors, err);
-  if (status == WM_OK) status = add_sensor_streams(self, &kStreamMarkers, &self->marker_sensors, err);
-  if (status == WM_OK) status = add_sensor_streams(self, &kStreamCorners, &self->corner_sensors, err);
-  if (status == WM_OK) status = add_stream(self, &kStreamStereo, err);
-  if (status == WM_OK) status = add_stream(self, &kStreamPoints, err);
-  if (status == WM_OK) status = add_stream(self, &kStreamGnss, err);
+  sensor_names *names[] = {&self->sighting_sensors, &self->marker_sensors, &self->corner_sensors};
+  for (size_t i = 0, with_sensors = 0; status == WM_OK && kStreams[i]; i++)
+    status = kStreams[i]->has_sensors ? add_sensor_streams(self, kStreams[i], names[with_sensors++], err)
+                                      : add_stream(self, kStreams[i], err);
   return status;
 }
 

@@ -154,6 +154,42 @@ static const char *fill_point(const fill_context *self, const csv_row *row, wm_e
   return NULL;
 }
 
+// Two quantities of one message.
+static const char *fill_two(const csv_row *row, wm_quantity first, wm_quantity second, wm_event *out) {
+  out->as.quantities = (wm_quantities){.count = 2, .id = {(uint8_t)first, (uint8_t)second}};
+  memcpy(out->as.quantities.value, &row->number[FIRST], 2 * sizeof(double));
+  return NULL;
+}
+
+static const char *fill_ticks(const fill_context *self, const csv_row *row, wm_event *out) {
+  (void)self;
+  return fill_two(row, WM_Q_WHEEL_TICKS_LEFT, WM_Q_WHEEL_TICKS_RIGHT, out);
+}
+
+static const char *fill_speeds(const fill_context *self, const csv_row *row, wm_event *out) {
+  (void)self;
+  return fill_two(row, WM_Q_WHEEL_SPEED_REAR_LEFT, WM_Q_WHEEL_SPEED_REAR_RIGHT, out);
+}
+
+static const char *fill_steering(const fill_context *self, const csv_row *row, wm_event *out) {
+  (void)self;
+  return fill_two(row, WM_Q_VEHICLE_SPEED, WM_Q_ROAD_WHEEL, out);
+}
+
+static const char *fill_heading(const fill_context *self, const csv_row *row, wm_event *out) {
+  (void)self;
+  out->as.heading = (wm_heading){.heading_rad = wrapped(row->number[FIRST]), .sigma_rad = row->number[FIRST + 1]};
+  return NULL;
+}
+
+static const char *fill_depth(const fill_context *self, const csv_row *row, wm_event *out) {
+  (void)self;
+  out->as.position = (wm_position){.p_m = {(double)NAN, (double)NAN, -row->number[FIRST]},
+                                   .sigma_xy_m = (double)NAN,
+                                   .sigma_z_m = row->number[FIRST + 1]};
+  return NULL;
+}
+
 static const char *fill_imu(const fill_context *self, const csv_row *row, wm_event *out) {
   const double *w = &row->number[FIRST], *up = self->imu_up;
   out->as.quantities = (wm_quantities){.count = 1, .id = {WM_Q_YAW_RATE}};
@@ -184,6 +220,45 @@ const stream_kind kStreamMotion6 = {"motion6.csv",
                                       {"wz_radps", CSV_NUMBER, CSV_NEEDED, RATE}}},
                                     .fill = fill_motion6};
 
+#define TICKS -1e15, 1e15     // doubles still count singly there
+#define ROAD_WHEEL -1.5, 1.5  // its tangent is finite; no wheel is turned across
+#define BIT(quantity) (UINT32_C(1) << (quantity))
+
+static const stream_kind kStreamTicks = {
+    "ticks.csv",         "ticks",
+    WM_EVENT_QUANTITIES, {{STAMPS, {"left", CSV_NUMBER, CSV_NEEDED, TICKS}, {"right", CSV_NUMBER, CSV_NEEDED, TICKS}}},
+    .fill = fill_ticks,  .quantities = BIT(WM_Q_WHEEL_TICKS_LEFT) | BIT(WM_Q_WHEEL_TICKS_RIGHT)};
+
+static const stream_kind kStreamSpeeds = {
+    "speeds.csv",
+    "speeds",
+    WM_EVENT_QUANTITIES,
+    {{STAMPS, {"left_mps", CSV_NUMBER, CSV_NEEDED, SPEED}, {"right_mps", CSV_NUMBER, CSV_NEEDED, SPEED}}},
+    .fill = fill_speeds,
+    .quantities = BIT(WM_Q_WHEEL_SPEED_REAR_LEFT) | BIT(WM_Q_WHEEL_SPEED_REAR_RIGHT)};
+
+static const stream_kind kStreamSteering = {
+    "steering.csv",
+    "steering",
+    WM_EVENT_QUANTITIES,
+    {{STAMPS, {"v_mps", CSV_NUMBER, CSV_NEEDED, SPEED}, {"road_wheel_rad", CSV_NUMBER, CSV_NEEDED, ROAD_WHEEL}}},
+    .fill = fill_steering,
+    .quantities = BIT(WM_Q_VEHICLE_SPEED) | BIT(WM_Q_ROAD_WHEEL)};
+
+static const stream_kind kStreamHeading = {
+    "heading.csv",
+    "heading",
+    WM_EVENT_HEADING,
+    {{STAMPS, {"heading_rad", CSV_NUMBER, CSV_NEEDED, ANGLE}, {"sigma_rad", CSV_NUMBER, CSV_NEEDED, SIGMA}}},
+    .fill = fill_heading};
+
+static const stream_kind kStreamDepth = {
+    "depth.csv",
+    "depth",
+    WM_EVENT_POSITION,
+    {{STAMPS, {"depth_m", CSV_NUMBER, CSV_NEEDED, PLACE}, {"sigma_m", CSV_NUMBER, CSV_NEEDED, SIGMA}}},
+    .fill = fill_depth};
+
 const stream_kind kStreamImu = {"imu.csv",
                                 "imu",
                                 WM_EVENT_QUANTITIES,
@@ -202,7 +277,7 @@ const stream_kind kStreamImu = {"imu.csv",
                                   {"sigma_az_mps2", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
                                   {"temperature_c", CSV_NUMBER, CSV_OPTIONAL, TEMPERATURE}}},
                                 .fill = fill_imu,
-                                .quantities = UINT32_C(1) << WM_Q_YAW_RATE};
+                                .quantities = BIT(WM_Q_YAW_RATE)};
 
 const stream_kind kStreamSightings = {"sightings.csv",
                                       "sightings",
@@ -219,7 +294,8 @@ const stream_kind kStreamSightings = {"sightings.csv",
                                         {"cov_yy_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
                                         {"elevation_rad", CSV_NUMBER, CSV_OPTIONAL, ANGLE},
                                         {"elevation_sigma_rad", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
-                                      .fill = fill_sighting};
+                                      .fill = fill_sighting,
+                                      .has_sensors = 1};
 
 const stream_kind kStreamIncrements = {"increments.csv",
                                        "increments",
@@ -247,7 +323,8 @@ const stream_kind kStreamMarkers = {"markers.csv",
                                       {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE},
                                       {"z_m", CSV_NUMBER, CSV_NEEDED, PLACE},
                                       {"yaw_rad", CSV_NUMBER, CSV_NEEDED, ANGLE}}},
-                                    .fill = fill_marker};
+                                    .fill = fill_marker,
+                                    .has_sensors = 1};
 
 const stream_kind kStreamCorners = {"marker-corners.csv",
                                     "corners",
@@ -264,7 +341,8 @@ const stream_kind kStreamCorners = {"marker-corners.csv",
                                       {"u3_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
                                       {"v3_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
                                       {"sigma_px", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
-                                    .fill = fill_corners};
+                                    .fill = fill_corners,
+                                    .has_sensors = 1};
 
 const stream_kind kStreamStereo = {"stereo.csv",
                                    "stereo",
@@ -304,12 +382,23 @@ void fill_context_imu(fill_context *self, const wm_mounting *imu) {
 
 // ── rows from elsewhere ─────────────────────────────────────────────────────────────────────────────────────────────
 
-static const stream_kind *const kFromElsewhere[] = {&kStreamMotion, &kStreamImu};
-const char *const wm_stream_names[] = {"motion", "imu", NULL};
+const stream_kind *const kStreams[] = {&kStreamMotion, &kStreamMotion6,   &kStreamIncrements, &kStreamTicks,
+                                       &kStreamSpeeds, &kStreamSteering,  &kStreamImu,        &kStreamHeading,
+                                       &kStreamDepth,  &kStreamSightings, &kStreamMarkers,    &kStreamCorners,
+                                       &kStreamStereo, &kStreamPoints,    &kStreamGnss,       NULL};
+
+// Names for a configuration; the corners of markers have those of the markers.
+const char *const wm_source_names[] = {"can",      "motion", "motion6", "increments", "ticks",     "speeds",
+                                       "steering", "imu",    "heading", "depth",      "sightings", "markers",
+                                       "stereo",   "points", "gnss",    NULL};
+const char *const wm_stream_names[] = {"motion", "motion6", "ticks", "speeds", "steering",
+                                       "imu",    "heading", "depth", "gnss",   NULL};
 
 const wm_stream *wm_stream_find(const char *name) {
-  for (size_t i = 0; i < sizeof kFromElsewhere / sizeof kFromElsewhere[0]; i++)
-    if (strcmp(kFromElsewhere[i]->name, name) == 0) return kFromElsewhere[i];
+  for (size_t i = 0; wm_stream_names[i]; i++)
+    if (strcmp(wm_stream_names[i], name) == 0)
+      for (size_t k = 0; kStreams[k]; k++)
+        if (strcmp(kStreams[k]->name, name) == 0) return kStreams[k];
   return NULL;
 }
 

@@ -31,10 +31,13 @@ typedef struct stream_kind {
   wm_event_kind also;  // instead of `event`, of rows that have a value in the column `also_with`; 0: none
   int also_with;
   uint32_t quantities;  // bit per wm_quantity
+  int has_sensors;      // rows of several sensors
 } stream_kind;
 
-// In the order of the format's table of files.
 extern const stream_kind kStreamMotion, kStreamMotion6, kStreamIncrements, kStreamImu, kStreamSightings, kStreamMarkers,
     kStreamCorners, kStreamStereo, kStreamPoints, kStreamGnss;
+
+// All, in the order of the format's table of files; ends with NULL.
+extern const stream_kind *const kStreams[];
 
 #endif

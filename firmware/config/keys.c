@@ -55,7 +55,8 @@ const config_key kConfigKeys[] = {
 
 const config_key kConfigSourceKeys[] = {
     {"name", "text", "needed",
-     "`can`, `motion`, `motion6`, `increments`, `imu`, `sightings`, `markers`, `stereo`, `points` or `gnss`; "
+     "`can`, `motion`, `motion6`, `increments`, `ticks`, `speeds`, `steering`, `imu`, `heading`, `depth`, "
+     "`sightings`, `markers`, `stereo`, `points` or `gnss`; "
      "`sightings:SENSOR` for one "
      "sensor; a detector under `vision`, or `DETECTOR:CAMERA`."},
     {"use", "true or false", "true", "false: the source is not opened."},
@@ -83,8 +84,8 @@ const config_key kConfigCanDeviceKeys[] = {
 };
 
 const config_key kConfigLcmDeviceKeys[] = {
-    {"stream", "`motion`, `imu`", "needed",
-     "The stream of a recording that another program sends over LCM: motion.csv as motion_t, imu.csv as imu_t "
+    {"stream", "`motion`, `motion6`, `ticks`, `speeds`, `steering`, `imu`, `heading`, `depth`, `gnss`", "needed",
+     "The stream of a recording that another program sends over LCM: motion.csv as motion_t, imu.csv as imu_t ... "
      "(motion-sources.md)."},
     {"channel", "text", "the stream's name in capitals", "LCM channel, behind publish.channel_prefix."},
     {"clock", "`here`, `sender`", "here",

@@ -6,10 +6,8 @@
 
 #include "config/detectors.h"
 #include "config/sources.h"
+#include "waymark/streams.h"
 #include "waymark/text.h"
-
-static const char *const kNames[] = {"can",     "motion", "motion6", "increments", "imu", "sightings",
-                                     "markers", "stereo", "points",  "gnss",       NULL};
 
 static wm_source_config defaults(const wm_config *config) {
   return (wm_source_config){
@@ -27,7 +25,7 @@ static wm_status read_name(const wm_yaml_node *item, const wm_config *config, wm
   // With a sensor's name after the colon, the part before it is checked; the message shows the whole.
   int is_detector = config_detector_find(base) != NULL;  // DETECTOR, or DETECTOR:CAMERA
   if (!is_detector && strcmp(base, out->name) == 0) {
-    status = wm_yaml_choice(&name, kNames, &kind, err);
+    status = wm_yaml_choice(&name, wm_source_names, &kind, err);
     if (status != WM_OK) return status;
   } else if (!is_detector && strcmp(base, "sightings") != 0 && strcmp(base, "markers") != 0 &&
              strcmp(base, "can") != 0) {

@@ -5,12 +5,26 @@
 #include <stdint.h>
 #include <string.h>
 
+#include "waymark_depth_t.h"
+#include "waymark_gnss_t.h"
+#include "waymark_heading_t.h"
 #include "waymark_imu_t.h"
+#include "waymark_motion6_t.h"
 #include "waymark_motion_t.h"
+#include "waymark_speeds_t.h"
+#include "waymark_steering_t.h"
+#include "waymark_ticks_t.h"
 
 typedef union any_message {
   waymark_motion_t motion;
+  waymark_motion6_t motion6;
+  waymark_ticks_t ticks;
+  waymark_speeds_t speeds;
+  waymark_steering_t steering;
   waymark_imu_t imu;
+  waymark_heading_t heading;
+  waymark_depth_t depth;
+  waymark_gnss_t gnss;
 } any_message;
 
 // A message is its stamp, then the numbers of the stream's columns in their order.
@@ -39,11 +53,22 @@ typedef struct stream_type {
   }
 
 FUNCTIONS(motion);
+FUNCTIONS(motion6);
+FUNCTIONS(ticks);
+FUNCTIONS(speeds);
+FUNCTIONS(steering);
 FUNCTIONS(imu);
+FUNCTIONS(heading);
+FUNCTIONS(depth);
+FUNCTIONS(gnss);
 
+#define NONE UINT32_C(0)
 #define IMU_SIGMAS (UINT32_C(0x3f) << 6)
+#define GNSS_SIGMA_Z (UINT32_C(1) << 4)
 
-static const stream_type kTypes[] = {TYPE(motion, 0), TYPE(imu, IMU_SIGMAS)};
+static const stream_type kTypes[] = {TYPE(motion, NONE),  TYPE(motion6, NONE),  TYPE(ticks, NONE),
+                                     TYPE(speeds, NONE),  TYPE(steering, NONE), TYPE(imu, IMU_SIGMAS),
+                                     TYPE(heading, NONE), TYPE(depth, NONE),    TYPE(gnss, GNSS_SIGMA_Z)};
 
 static const stream_type *find(const char *stream) {
   for (size_t i = 0; i < sizeof kTypes / sizeof kTypes[0]; i++)

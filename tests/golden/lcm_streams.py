@@ -5,6 +5,7 @@ lcm_tools.py needs.
 
 The robot drives sideways on a circle. Its wheels' turn rate is wrong by a fifth, its gyro is right; the gyro's process has a
 clock of its own. Checked: the pose, health, the log's replay with the same bits, the recording's replay, and its live play.
+Then another one with counts of its wheels, a compass and positions, for landmark_ekf.
 """
 import csv
 import json
@@ -52,6 +53,66 @@ def publish():
         time.sleep(max(0, begin + k * 0.01 - time.monotonic()))
 
 
+WHEELS = (
+    "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
+    "calibration: calibration.yaml\nrealtime: {lock_memory: false}\n"
+    "devices: {lcm: [{stream: ticks}, {stream: heading}, {stream: gnss}]}\n")
+
+
+def publish_wheels():
+    """Straight on, from (10, 5) to the north at 0.5 m/s, with wheels of 0.1 m and 1000 ticks a turn."""
+    import lcm
+    import waymark
+
+    node = lcm.LCM(lcm_tools.URL)
+    begin = time.monotonic()
+    for k in range(SECONDS * 50):
+        now_ns = time.clock_gettime_ns(time.CLOCK_MONOTONIC)
+        way_m = 0.5 * (now_ns * 1e-9 - begin)
+        for kind, numbers in ((waymark.ticks_t, {"left": way_m / (0.2 * math.pi) * 1000, "right": way_m / (0.2 * math.pi) * 1000}),
+                              (waymark.heading_t, {"heading_rad": math.pi / 2, "sigma_rad": 0.01}),
+                              (waymark.gnss_t, {"position_m": [10, 5 + way_m, float("nan")], "sigma_xy_m": 0.1})):
+            if kind is not waymark.ticks_t and k % 10:
+                continue
+            message = kind()
+            message.t_ns = now_ns
+            for name, value in numbers.items():
+                setattr(message, name, value)
+            node.publish("WAYMARK_" + kind.__name__[:-2].upper(), message.encode())
+        time.sleep(max(0, begin + (k + 1) * 0.02 - time.monotonic()))
+
+
+def check_wheels(work):
+    (work / "calibration.yaml").write_text("wheels: {radius_m: 0.1, ticks_per_turn: 1000, track_m: 0.5}\n")
+    (work / "wheels.yaml").write_text(WHEELS)
+    run = start(work, "wheels", SECONDS + 2)
+    subprocess.run([sys.executable, __file__, "publish_wheels"], env={"PYTHONPATH": str(work)}, check=True)
+    lcm_tools.finish(run)
+    replay_both(work, "wheels")
+    for what in ("wheels", "wheels-replayed"):
+        row = rows(work / what / "trajectory.csv")[-1]
+        off = [abs(float(row["x_m"]) - 10), abs(float(row["y_m"]) - 5 - 0.5 * SECONDS)]
+        print(what, row["x_m"], row["y_m"], math.degrees(heading_of(row)))
+        assert off[0] < 0.1 and off[1] < 0.1 and abs(heading_of(row) - math.pi / 2) < 0.02, row
+    for name in ("ticks", "heading", "gnss"):
+        assert len(rows(work / f"wheels-rec/{name}.csv")) >= SECONDS * 4, name
+
+
+def start(work, name, seconds):
+    """A run on the devices, which also records them."""
+    run = subprocess.Popen([lcm_tools.WAYMARK, "run", "--config", work / f"{name}.yaml", "--out", work / name, "--record",
+                            work / f"{name}-rec", "--duration", str(seconds)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    time.sleep(0.7)
+    return run
+
+
+def replay_both(work, name):
+    """The log gives the same bits; and the recording is replayed."""
+    waymark("replay", work / name / "events.wmlog", "--out", work / f"{name}-again")
+    assert (work / f"{name}-again/trajectory.csv").read_bytes() == (work / name / "trajectory.csv").read_bytes()
+    waymark("replay", work / f"{name}-rec", "--config", work / f"{name}-rec/config.yaml", "--out", work / f"{name}-replayed")
+
+
 def rows(path):
     with open(path, newline="") as f:
         return list(csv.DictReader(f))
@@ -81,39 +142,41 @@ def waymark(*words):
     return done.stdout + done.stderr
 
 
+def check_twist(work):
+    (work / "twist.yaml").write_text(CONFIG)
+    (work / "calibration.yaml").write_text("imu: {mounting: {rpy_deg: [180, 0, 30]}}\n")
+    run = start(work, "twist", SECONDS + 4)
+    subprocess.run([sys.executable, __file__, "publish"], env={"PYTHONPATH": str(work)}, check=True)
+    out, err = lcm_tools.finish(run)
+    assert "no usable motion_t on WAYMARK_MOTION yet" in err, err
+    assert "imu_t comes on WAYMARK_GYRO" in err and "no usable imu_t on WAYMARK_GYRO any more" in err, err
+    check_pose(rows(work / "twist/trajectory.csv"), "run")
+    sources = json.loads((work / "twist/health.json").read_text())["sources"]
+    assert sources["motion"]["fused"] == sources["motion"]["received"] >= SECONDS * 40, sources
+    assert sources["imu"]["stamp_uncertainty_ms"] > 2 and sources["imu"]["device"] == "stalled", sources
+    replay_both(work, "twist")
+    check_pose(rows(work / "twist-replayed/trajectory.csv"), "recording")
+    recording = work / "twist-rec"
+    waymark("run", "--recording", recording, "--config", recording / "config.yaml", "--out", work / "played", "--speed", "4")
+    check_pose(rows(work / "played/trajectory.csv"), "played")
+    assert "\ngood" in waymark("check", recording / "config.yaml", recording, "--quick")
+
+
 def inside():
     work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-streams-"))
     try:
         subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
         subprocess.run(lcm_tools.ROUTE, check=True)
         subprocess.run(["lcm-gen", "-p", "--ppath", work, *sorted((lcm_tools.ROOT / "msgs/lcm").glob("*.lcm"))], check=True)
-        (work / "config.yaml").write_text(CONFIG)
-        (work / "calibration.yaml").write_text("imu: {mounting: {rpy_deg: [180, 0, 30]}}\n")
-        run = subprocess.Popen([lcm_tools.WAYMARK, "run", "--config", work / "config.yaml", "--out", work / "run",
-                                "--record", work / "rec", "--duration", str(SECONDS + 4)], stdout=subprocess.PIPE,
-                               stderr=subprocess.PIPE, text=True)
-        time.sleep(0.7)
-        subprocess.run([sys.executable, __file__, "publish"], env={"PYTHONPATH": str(work)}, check=True)
-        out, err = lcm_tools.finish(run)
-        assert "no usable motion_t on WAYMARK_MOTION yet" in err, err
-        assert "imu_t comes on WAYMARK_GYRO" in err and "no usable imu_t on WAYMARK_GYRO any more" in err, err
-        check_pose(rows(work / "run/trajectory.csv"), "run")
-        health = json.loads((work / "run/health.json").read_text())
-        print({name: health["sources"][name] for name in ("motion", "imu")} if isinstance(health["sources"], dict) else out)
-        waymark("replay", work / "run/events.wmlog", "--out", work / "again")
-        assert (work / "again/trajectory.csv").read_bytes() == (work / "run/trajectory.csv").read_bytes()
-        waymark("replay", work / "rec", "--config", work / "rec/config.yaml", "--out", work / "replayed")
-        check_pose(rows(work / "replayed/trajectory.csv"), "recording")
-        waymark("run", "--recording", work / "rec", "--config", work / "rec/config.yaml", "--out", work / "played", "--speed", "4")
-        check_pose(rows(work / "played/trajectory.csv"), "played")
-        print(waymark("check", work / "rec/config.yaml", work / "rec", "--quick"))
+        check_twist(work)
+        check_wheels(work)
     finally:
         shutil.rmtree(work)
 
 
 def main():
     if len(sys.argv) > 1:
-        return {"inside": inside, "publish": publish}[sys.argv[1]]()
+        return {"inside": inside, "publish": publish, "publish_wheels": publish_wheels}[sys.argv[1]]()
     return subprocess.run(["unshare", "-n", lcm_tools.need_network(), __file__, "inside"]).returncode
 
 

@@ -17,7 +17,9 @@ extern "C" {
 
 typedef struct stream_kind wm_stream;
 
-// Streams that may come from elsewhere: "motion", "imu"; ends with NULL.
+// Sources of a recording, by the names that a configuration has for them; ends with NULL.
+extern const char *const wm_source_names[];
+// The streams that may come from elsewhere; ends with NULL.
 extern const char *const wm_stream_names[];
 // NULL where it is none of these.
 const wm_stream *wm_stream_find(const char *name);

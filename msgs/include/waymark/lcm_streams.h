@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// LCM messages that are rows of a recording's streams: motion_t of motion.csv, imu_t of imu.csv.
+// LCM messages that are rows of a recording's streams: motion_t of motion.csv, imu_t of imu.csv ...
 #ifndef WAYMARK_LCM_STREAMS_H
 #define WAYMARK_LCM_STREAMS_H
 

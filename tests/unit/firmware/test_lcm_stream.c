@@ -2,6 +2,7 @@
 // Streams over LCM: their events, and what a sender does to them: absent, silent, late, doubled, NaN, another clock,
 // too fast, back again.
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "live/lcm_stream.h"
@@ -88,6 +89,55 @@ static void a_gyro_is_a_turn_rate_by_its_mounting(void) {
   row.number[6] = -1;
   send("imu", "T_GYRO", row);
   assert_refused("T_GYRO: sigma_wx_radps: -1 is outside of what can be");
+}
+
+// Rows of the other streams.
+static void begin_row(const char *stream, const double number[6]) {
+  wm_lcm_device_config config = {.channel = "IT"};
+  (void)snprintf(config.stream, sizeof config.stream, "%s", stream);
+  begin(config);
+  wm_stream_row row = {.t_ns = wm_monotonic_ns()};
+  memcpy(row.number, number, 6 * sizeof number[0]);
+  send(stream, "T_IT", row);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, next(), source->counts.first_problem);
+  TEST_ASSERT_TRUE(source->kinds & WM_EVENT_BIT(event.kind));
+}
+
+static void a_twist_in_six_degrees(void) {
+  begin_row("motion6", (const double[6]){1, 2, 3, 4, 5, 6});
+  TEST_ASSERT_EQUAL(WM_EVENT_TWIST6, event.kind);
+  TEST_ASSERT_EQUAL_DOUBLE(3, event.as.twist6.v_mps[2]);
+  TEST_ASSERT_EQUAL_DOUBLE(6, event.as.twist6.w_radps[2]);
+}
+
+static void wheels_and_steering_are_quantities(void) {
+  static const struct {
+    const char *stream;
+    wm_quantity first, second;
+  } kEach[] = {{"ticks", WM_Q_WHEEL_TICKS_LEFT, WM_Q_WHEEL_TICKS_RIGHT},
+               {"speeds", WM_Q_WHEEL_SPEED_REAR_LEFT, WM_Q_WHEEL_SPEED_REAR_RIGHT},
+               {"steering", WM_Q_VEHICLE_SPEED, WM_Q_ROAD_WHEEL}};
+  for (size_t i = 0; i < sizeof kEach / sizeof kEach[0]; i++) {
+    begin_row(kEach[i].stream, (const double[6]){0.5, -0.25});
+    const wm_quantities *q = &event.as.quantities;
+    TEST_ASSERT_TRUE(source->is_motion && event.kind == WM_EVENT_QUANTITIES && q->count == 2);
+    TEST_ASSERT_TRUE(q->id[0] == kEach[i].first && q->id[1] == kEach[i].second);
+    TEST_ASSERT_TRUE(q->value[0] == 0.5 && q->value[1] == -0.25);
+    tearDown();
+  }
+}
+
+static void headings_depths_and_positions_are_observations(void) {
+  begin_row("heading", (const double[6]){3.5, 0.01});
+  TEST_ASSERT_FALSE(source->is_motion);
+  TEST_ASSERT_EQUAL_DOUBLE(3.5 - 2 * M_PI, event.as.heading.heading_rad);
+  tearDown();
+  begin_row("depth", (const double[6]){12.5, 0.125});
+  const wm_position *p = &event.as.position;
+  TEST_ASSERT_TRUE(isnan(p->p_m[0]) && p->p_m[2] == -12.5 && p->sigma_z_m == 0.125);
+  tearDown();
+  begin_row("gnss", (const double[6]){1, 2, NAN, 0.5, 0});
+  TEST_ASSERT_TRUE(p->p_m[1] == 2 && isnan(p->p_m[2]) && p->sigma_xy_m == 0.5 && isnan(p->sigma_z_m));
 }
 
 static void an_absent_sender_is_said(void) {
@@ -197,6 +247,9 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(a_twist_is_an_event_of_motion);
   RUN_TEST(a_gyro_is_a_turn_rate_by_its_mounting);
+  RUN_TEST(a_twist_in_six_degrees);
+  RUN_TEST(wheels_and_steering_are_quantities);
+  RUN_TEST(headings_depths_and_positions_are_observations);
   RUN_TEST(an_absent_sender_is_said);
   RUN_TEST(a_silent_sender_is_said_and_its_return);
   RUN_TEST(the_same_and_older_stamps_are_counted);
