@@ -193,11 +193,44 @@ csv_field csv_name(const csv_reader *self) {
   return (csv_field){"", 0};
 }
 
+#define STAMP_DIGITS_MAX 24  // of a stamp without its sign; 64 bits have 19
+
+// "1700000000.0" and "1.7e+18", as programs write whole numbers that they hold as floating point, exactly: by their
+// digits. WM_TEXT_NOT_A_NUMBER where there is a fraction.
+static wm_text_number whole_of_decimal(csv_field field, int64_t *out) {
+  char digits[STAMP_DIGITS_MAX + 2];
+  double value;
+  int64_t exponent = 0, behind_point = 0;
+  size_t used = 0, i = 0;
+  int has_point = 0;
+  if (wm_text_to_f64(field.text, field.length, &value) != WM_TEXT_OK) return WM_TEXT_NOT_A_NUMBER;
+  for (; i < field.length && field.text[i] != 'e' && field.text[i] != 'E'; i++) {
+    if (field.text[i] == '.') {
+      has_point = 1;
+      continue;
+    }
+    if (used == STAMP_DIGITS_MAX) return WM_TEXT_NOT_A_NUMBER;
+    digits[used++] = field.text[i];
+    behind_point += has_point;
+  }
+  i += i + 1 < field.length && field.text[i + 1] == '+';
+  if (i < field.length && wm_text_to_i64(field.text + i + 1, field.length - i - 1, &exponent) != WM_TEXT_OK)
+    return WM_TEXT_NOT_A_NUMBER;
+  for (; behind_point > exponent && used > 1; behind_point--)
+    if (digits[--used] != '0') return WM_TEXT_NOT_A_NUMBER;
+  for (; behind_point < exponent; exponent--) {
+    if (used == STAMP_DIGITS_MAX) return WM_TEXT_TOO_LARGE;
+    digits[used++] = '0';
+  }
+  return behind_point == exponent ? wm_text_to_i64(digits, used, out) : WM_TEXT_NOT_A_NUMBER;
+}
+
 static wm_status read_whole(const csv_reader *self, size_t column, csv_field field, int64_t *out, wm_error *err) {
   const csv_column *c = &self->format->columns[column];
   int64_t min = c->type == CSV_TIME ? -TIME_LIMIT : (int64_t)c->min,
           max = c->type == CSV_TIME ? TIME_LIMIT : (int64_t)c->max;
   wm_text_number kind = wm_text_to_i64(field.text, field.length, out);
+  if (kind == WM_TEXT_NOT_A_NUMBER) kind = whole_of_decimal(field, out);
   if (kind == WM_TEXT_NOT_A_NUMBER) return fail_field(self, err, WM_BAD_DATA, column, field, "is not a whole number");
   if (kind == WM_TEXT_OK && *out >= min && *out <= max) return WM_OK;
   return fail_range(self, err, column, field, (double)min, (double)max);

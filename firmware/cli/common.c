@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <errno.h>
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -33,17 +35,54 @@ wm_status override_path(char out[WM_PATH_MAX], const char *path, wm_error *err) 
   return WM_OK;
 }
 
-wm_status check_out_dir(const char *out_dir, const char *input, wm_error *err) {
+// Refuses a folder with the log of a run of another recording. A log that can't be read is no reason.
+static wm_status check_same_recording(const char *out_dir, const char *log_path, const char *name, wm_error *err) {
+  wm_log_reader *log;
+  if (wm_log_open(log_path, &log, NULL) != WM_OK) return WM_OK;
+  const wm_log_head *head = wm_log_reader_head(log);
+  wm_status status = WM_OK;
+  if (strcmp(head->recording, name) != 0)
+    status = wm_fail(err, WM_BAD_USAGE,
+                     "--out: %s holds a run of '%s', this is '%s'; choose another folder, or write over it: --force",
+                     out_dir, head->recording, name);
+  wm_log_reader_close(log);
+  return status;
+}
+
+wm_status check_out_dir(const char *out_dir, const char *input, const char *name, int force, wm_error *err) {
   char path[WM_PATH_MAX + 32];
   struct stat inside, read;
   (void)snprintf(path, sizeof path, "%s/recording.yaml", out_dir);
   if (stat(path, &inside) == 0)
     return wm_fail(err, WM_BAD_USAGE, "--out: %s is a recording; a run is written to a folder of its own", out_dir);
   (void)snprintf(path, sizeof path, "%s/events.wmlog", out_dir);
-  if (stat(path, &inside) == 0 && stat(input, &read) == 0 && inside.st_ino == read.st_ino &&
-      inside.st_dev == read.st_dev)
+  if (stat(path, &inside) != 0) return WM_OK;
+  if (stat(input, &read) == 0 && inside.st_ino == read.st_ino && inside.st_dev == read.st_dev)
     return wm_fail(err, WM_BAD_USAGE, "--out: %s holds the log that is to be replayed; choose another folder", out_dir);
-  return WM_OK;
+  return name && !force ? check_same_recording(out_dir, path, name, err) : WM_OK;
+}
+
+#define ASIDE_MAX 9999  // runs put aside beside a folder
+
+wm_status put_run_aside(const char *out_dir, wm_error *err) {
+  char path[WM_PATH_MAX + 48], note[2 * WM_PATH_MAX + 96];
+  struct stat there;
+  (void)snprintf(path, sizeof path, "%s/events.wmlog", out_dir);
+  if (stat(path, &there) != 0) return WM_OK;
+  size_t length = strlen(out_dir);
+  while (length > 1 && out_dir[length - 1] == '/') length--;
+  for (int i = 1; i <= ASIDE_MAX; i++) {
+    (void)snprintf(path, sizeof path, "%.*s.before-%d", (int)length, out_dir, i);
+    if (stat(path, &there) == 0) continue;
+    if (rename(out_dir, path) != 0)
+      return wm_fail(err, WM_IO, "--out: %s holds a run that can't be put aside as %s: %s; --force writes over it",
+                     out_dir, path, strerror(errno));
+    (void)snprintf(note, sizeof note, "%s: the run in it is %s now (--force writes over it)", out_dir, path);
+    print_note(NULL, note);
+    return WM_OK;
+  }
+  return wm_fail(err, WM_BAD_USAGE, "--out: %s: %d runs were put aside already; choose another folder", out_dir,
+                 ASIDE_MAX);
 }
 
 static void print_source(const wm_source_health *s) {
@@ -102,17 +141,37 @@ void progress_end(progress_line *self) {
   if (self->shown) (void)fputs("\r\033[K", stderr);
 }
 
+// The program beside this one; "" where this one's place is not known.
+static void path_beside(const char *command, char *out, size_t capacity) {
+  char self[WM_PATH_MAX];
+  ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
+  out[0] = '\0';
+  if (length <= 0) return;
+  self[length] = '\0';
+  char *slash = strrchr(self, '/');
+  if (slash) *slash = '\0';
+  (void)snprintf(out, capacity, "%s/waymark-%s", self, command);
+}
+
+int desk_command_is_there(const char *command) {
+  char path[WM_PATH_MAX + 80];
+  path_beside(command, path, sizeof path);
+  if (path[0] && access(path, X_OK) == 0) return 1;
+  const char *folders = getenv("PATH");
+  while (folders && *folders) {
+    size_t length = strcspn(folders, ":");
+    (void)snprintf(path, sizeof path, "%.*s/waymark-%s", (int)(length < WM_PATH_MAX ? length : 0), folders, command);
+    if (length > 0 && access(path, X_OK) == 0) return 1;
+    folders += length + (folders[length] == ':');
+  }
+  return 0;
+}
+
 void run_desk_command(const char *command, char *const *argv) {
   if (strchr(command, '/')) return;
-  char self[WM_PATH_MAX], path[WM_PATH_MAX + 80];
-  ssize_t length = readlink("/proc/self/exe", self, sizeof self - 1);
-  if (length > 0) {
-    self[length] = '\0';
-    char *slash = strrchr(self, '/');
-    if (slash) *slash = '\0';
-    (void)snprintf(path, sizeof path, "%s/waymark-%s", self, command);
-    (void)execv(path, argv);
-  }
+  char path[WM_PATH_MAX + 80];
+  path_beside(command, path, sizeof path);
+  if (path[0]) (void)execv(path, argv);
   (void)snprintf(path, sizeof path, "waymark-%s", command);
   (void)execvp(path, argv);
 }

@@ -23,12 +23,31 @@ static const char kHelp[] =
     "  stamps    switch the clocks of CAN adapters on, before a run\n"
     "  help      this text; `waymark COMMAND --help` has the options\n"
     "\n"
-    "The desk's commands (waymark eval, report, simulate ...) are programs named waymark-COMMAND beside this one.\n"
+    "at the desk (programs named waymark-COMMAND, beside this one or in PATH):\n";
+
+static const char kHelpEnd[] =
     "\n"
     "exit code: 0 done, 1 the work failed, 2 usage or configuration\n"
     "\n"
     "example:\n"
-    "  waymark replay RECORDING --config config/starry-night-plan.yaml --out out/run\n";
+    "  waymark replay first-drive --config config/robot.yaml --out out/run\n";
+
+// Programs of their own, with the package of each.
+static const struct {
+  const char *name, *about, *package;
+} kDesk[] = {
+    {"calibrate", "find a camera's lens and mounting; read calibrations of other programs", "waymark-tools"},
+    {"detect", "run a detector on pictures: what it finds, drawn and as a table", "waymark-tools"},
+    {"diff", "compare two runs: what changed, and where it began", "waymark-tools"},
+    {"eval", "measure a run against truth, GNSS or labels", "waymark-tools"},
+    {"import", "make a video of any kind part of a recording", "waymark-tools"},
+    {"map", "make, check and survey maps; print markers", "waymark-tools"},
+    {"reference", "smooth a run into a reference trajectory", "waymark-tools"},
+    {"report", "show a run as one page", "waymark-tools"},
+    {"simulate", "make a recording of a drive with known truth", "waymark-tools"},
+    {"web", "show a run as it goes, as a page for a browser", "waymark"},
+};
+#define DESK (sizeof kDesk / sizeof kDesk[0])
 
 static const struct {
   const char *name;
@@ -38,15 +57,48 @@ static const struct {
                  {"stamps", command_stamps}};
 #define COMMANDS (sizeof kCommands / sizeof kCommands[0])
 
+static void print_help(FILE *to) {
+  (void)fputs(kHelp, to);
+  for (size_t i = 0; i < DESK; i++) {
+    char missing[48] = "";
+    if (!desk_command_is_there(kDesk[i].name))
+      (void)snprintf(missing, sizeof missing, " (not installed; package %s)", kDesk[i].package);
+    (void)fprintf(to, "  %-9s %s%s\n", kDesk[i].name, kDesk[i].about, missing);
+  }
+  (void)fputs(kHelpEnd, to);
+}
+
+// No such command, and no such program.
+static int unknown(const char *command) {
+  const char *names[COMMANDS + DESK + 2] = {"help"};
+  for (size_t i = 0; i < COMMANDS; i++) names[1 + i] = kCommands[i].name;
+  for (size_t i = 0; i < DESK; i++) {
+    names[1 + COMMANDS + i] = kDesk[i].name;
+    if (strcmp(command, kDesk[i].name) != 0) continue;
+    (void)fprintf(stderr,
+                  "waymark: '%s' needs the program waymark-%s, which is not installed here; package %s has it\n",
+                  command, command, kDesk[i].package);
+    return EXIT_USAGE;
+  }
+  const char *nearest = wm_word_nearest(command, names);
+  if (nearest)
+    (void)fprintf(stderr, "waymark: '%s' is no command; did you mean '%s'? (waymark help lists them)\n", command,
+                  nearest);
+  else
+    (void)fprintf(stderr, "waymark: '%s' is no command, and there is no program waymark-%s (waymark help lists them)\n",
+                  command, command);
+  return EXIT_USAGE;
+}
+
 int main(int argc, char **argv) {
   if (wm_camera_is_process(argc, argv)) return EXIT_DONE;
   const char *command = argc > 1 ? argv[1] : NULL;
   if (!command) {
-    (void)fputs(kHelp, stderr);
+    print_help(stderr);
     return EXIT_USAGE;
   }
   if (strcmp(command, "help") == 0 || strcmp(command, "--help") == 0 || strcmp(command, "-h") == 0) {
-    (void)fputs(kHelp, stdout);
+    print_help(stdout);
     return EXIT_DONE;
   }
   if (strcmp(command, "--version") == 0) {
@@ -57,16 +109,5 @@ int main(int argc, char **argv) {
     if (strcmp(command, kCommands[i].name) == 0) return kCommands[i].run(argc - 2, argv + 2);
 
   run_desk_command(command, argv + 1);
-  static const char *const kNames[] = {"run",  "replay",    "record", "watch",    "check", "doctor",
-                                       "help", "eval",      "report", "simulate", "diff",  "calibrate",
-                                       "map",  "reference", "stamps", NULL};
-  const char *nearest = wm_word_nearest(command, kNames);
-  if (nearest && strcmp(nearest, command) != 0) {
-    (void)fprintf(stderr, "waymark: '%s' is no command; did you mean '%s'? (waymark help lists them)\n", command,
-                  nearest);
-  } else {
-    (void)fprintf(stderr, "waymark: '%s' is no command, and there is no program waymark-%s (waymark help lists them)\n",
-                  command, command);
-  }
-  return EXIT_USAGE;
+  return unknown(command);
 }

@@ -37,7 +37,7 @@ static wm_status set(const option *o, const char *value, wm_error *err) {
     case OPTION_U64: {
       unsigned long long v = strtoull(value, &rest, 10);
       if (*value < '0' || *value > '9' || *rest || errno)
-        return wm_fail(err, WM_BAD_USAGE, "%s: '%s' is no whole number from 0 to 18446744073709551615", o->name, value);
+        return wm_fail(err, WM_BAD_USAGE, "%s: '%s' is no whole number from 0 on, or too large", o->name, value);
       *(uint64_t *)o->out = v;
       return WM_OK;
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <inttypes.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +19,7 @@ static const char kHelp[] =
     "\n"
     "Localizes from a recording (docs/recording-format.md), or makes the trajectory of a run again, bit by bit, from "
     "its\n"
-    "event log, which needs no recording.\n"
+    "event log, which needs no recording. Ctrl-C ends it in order: the folder holds the run until then (exit code 1).\n"
     "\n"
     "  --config FILE       which estimator, and its parameters; of an event log: another one than its own\n"
     "  --out FOLDER        where trajectory, published poses, event log, health and timing are written\n"
@@ -33,20 +34,42 @@ static const char kHelp[] =
     "                      none, or `sources: [{name: DETECTOR, ready_after_ms: 40}]`\n"
     "  --from S, --until S only this part of the recording, s from its first stamp\n"
     "  --lost              begin without a start pose, even if the recording has one\n"
+    "  --force             write over a run of another recording that is in FOLDER\n"
     "  --reference         also reference.csv: all of the drive looked at as a whole (edges on a raster map; at a "
     "desk)\n"
     "\n"
     "example:\n"
-    "  waymark replay RECORDING --config config/starry-night-plan.yaml --out out/run\n"
+    "  waymark replay first-drive --config config/robot.yaml --out out/run\n"
     "  waymark replay out/run/events.wmlog --out out/again\n";
 
 typedef struct arguments {
   const char *config, *out, *landmarks, *calibration, *map, *frames_of, *timing_of;
   uint64_t seed;
   double from_s, until_s;
-  int lost, reference;
+  int lost, reference, force;
   const char *what;
 } arguments;
+
+static volatile sig_atomic_t stop_asked;
+
+static void on_signal(int number) {
+  (void)number;
+  stop_asked = 1;
+}
+
+// The second one ends the program at once.
+static void catch_signals(void) {
+  struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESTART | (int)SA_RESETHAND};
+  (void)sigaction(SIGINT, &action, NULL);
+  (void)sigaction(SIGTERM, &action, NULL);
+}
+
+static int finished(const wm_run_report *report, const char *out_dir) {
+  if (!report->was_stopped) return EXIT_DONE;
+  (void)fprintf(stderr, "note: stopped %.1f s after its begin; %s holds the run until then\n", report->recorded_s,
+                out_dir);
+  return EXIT_WORK_FAILED;
+}
 
 static int replay_recording(const arguments *args) {
   wm_error err = {0};
@@ -65,6 +88,8 @@ static int replay_recording(const arguments *args) {
   if (status == WM_OK) status = override_path(config.overrides.calibration, args->calibration, &err);
   if (status == WM_OK) status = override_path(config.overrides.map, args->map, &err);
   if (status == WM_OK) status = wm_recording_open(args->what, &config.overrides, print_note, NULL, &recording, &err);
+  if (status == WM_OK) status = check_out_dir(args->out, args->what, wm_recording_name(recording), args->force, &err);
+  int code = EXIT_DONE;
   if (status == WM_OK) {
     progress_line progress;
     progress_begin(&progress);
@@ -74,6 +99,7 @@ static int replay_recording(const arguments *args) {
                                        .progress_context = &progress,
                                        .frames_of = args->frames_of,
                                        .timing_of = args->timing_of,
+                                       .stop = &stop_asked,
                                        .from_s = args->from_s,
                                        .until_s = args->until_s};
     static wm_run_report report;
@@ -85,10 +111,11 @@ static int replay_recording(const arguments *args) {
     if (status == WM_OK && args->frames_of)
       (void)printf("  %s: its clock is %" PRId64 " ns ahead of the recording's\n", args->frames_of,
                    report.log_ahead_ns);
+    if (status == WM_OK) code = finished(&report, args->out);
   }
   wm_recording_close(recording);
   wm_config_free(&config);
-  return status == WM_OK ? EXIT_DONE : complain(&err);
+  return status == WM_OK ? code : complain(&err);
 }
 
 // A log's poses belong to its map: another map is refused.
@@ -125,6 +152,8 @@ static int replay_log(const arguments *args) {
   if (wm_log_open(args->what, &log, &err) != WM_OK) return complain(&err);
   const wm_log_head *head = wm_log_reader_head(log);
   wm_status status = check_map(args->landmarks, head, args->what, &err);
+  if (status == WM_OK) status = check_out_dir(args->out, args->what, head->recording, args->force, &err);
+  int code = EXIT_DONE;
   wm_map *map = NULL;
   if (status == WM_OK) status = load_map(args->map, head, &map, &err);
   wm_config config;
@@ -139,7 +168,8 @@ static int replay_log(const arguments *args) {
       (void)fprintf(stderr, "note: %s was written by waymark %s; this is %s: the last bits may differ\n", args->what,
                     head->program, WM_VERSION);
     wm_time_ns begin_ns = wm_monotonic_ns();
-    const wm_replay_options options = {.out_dir = args->out, .map = map ? wm_map_raster(map) : NULL};
+    const wm_replay_options options = {
+        .out_dir = args->out, .map = map ? wm_map_raster(map) : NULL, .stop = &stop_asked};
     static wm_run_report report;
     status = wm_replay_log(&config, log, &options, &report, &err);
     if (report.log_was_cut)
@@ -149,11 +179,12 @@ static int replay_log(const arguments *args) {
                     args->what, report.events_missing);
     if (status == WM_OK)
       print_report(&report, head->recording, args->out, wm_seconds_between(begin_ns, wm_monotonic_ns()));
+    if (status == WM_OK) code = finished(&report, args->out);
   }
   wm_config_free(&config);
   wm_map_free(map);
   wm_log_reader_close(log);
-  return status == WM_OK ? EXIT_DONE : complain(&err);
+  return status == WM_OK ? code : complain(&err);
 }
 
 // waymark-reference continues after the replay.
@@ -190,6 +221,7 @@ int command_replay(int argc, char *const *argv) {
                             {"--from", OPTION_F64, &args.from_s},
                             {"--until", OPTION_F64, &args.until_s},
                             {"--lost", OPTION_FLAG, &args.lost},
+                            {"--force", OPTION_FLAG, &args.force},
                             {"--reference", OPTION_FLAG, &args.reference},
                             {"--help", OPTION_FLAG, &help},
                             {"-h", OPTION_FLAG, &help}};
@@ -207,7 +239,8 @@ int command_replay(int argc, char *const *argv) {
                   kHelp);
     return EXIT_USAGE;
   }
-  if (check_out_dir(args.out, args.what, &err) != WM_OK) return complain(&err);
+  catch_signals();
+  if (check_out_dir(args.out, args.what, NULL, 0, &err) != WM_OK) return complain(&err);
   if (is_run_folder(args.what)) {
     (void)fprintf(stderr, "waymark: %s is a run, not a recording; did you mean its log, %s/events.wmlog?\n", args.what,
                   args.what);

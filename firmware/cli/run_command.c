@@ -28,7 +28,12 @@ static const char kHelp[] =
     "  --recording RECORDING  play this recording instead of devices\n"
     "  --out FOLDER           trajectory, published poses, event log, health and timing\n"
     "  --record NEW           records the devices meanwhile, into a new folder, as `waymark record` does\n"
-    "  --out-max-mb N         tables and log below so much: at half of it they are put aside as trajectory.1.csv ...\n"
+    "                         devices: a run that is there already is put aside as FOLDER.before-1 ...; --recording: "
+    "it\n"
+    "                         is written over, if it is of the same recording\n"
+    "  --force                write over what is there\n"
+    "  --out-max-mb N         tables and log below so much: at half of it they are put aside as trajectory.1.csv ...,\n"
+    "                         and a run that is there already is written over\n"
     "  --duration S           seconds, then stop\n"
     "  --speed X              times real speed (default 1)\n"
     "  --seed N               of random numbers (default 1)\n"
@@ -40,11 +45,11 @@ static const char kHelp[] =
     "\n"
     "example:\n"
     "  waymark run --config /etc/waymark/robot.yaml\n"
-    "  waymark run --config config/starry-night-plan.yaml --recording RECORDING --out out/run --duration 60\n";
+    "  waymark run --config config/robot.yaml --recording first-drive --out out/run --duration 60\n";
 
 typedef struct arguments {
   const char *config, *recording, *record, *landmarks, *calibration, *map;
-  int resumes;
+  int resumes, force;
   wm_run_options run;
 } arguments;
 
@@ -221,7 +226,12 @@ static int run(const arguments *args) {
   options.reload_context = &reload;
   options.reload_asked = args->recording ? NULL : &reload_asked;
   catch_signals();
-  wm_status status = run_once(&now, args->record, &options, &report, &err);
+  const int puts_aside = !args->recording && !args->force && args->run.out_max_mb <= 0;
+  wm_status status = WM_OK;
+  if (args->recording && args->run.out_dir)
+    status = check_out_dir(args->run.out_dir, args->recording, wm_recording_name(now.recording), args->force, &err);
+  if (puts_aside && options.out_dir) status = put_run_aside(options.out_dir, &err);
+  if (status == WM_OK) status = run_once(&now, args->record, &options, &report, &err);
   for (int part = 2; status == WM_OK && report.wants_restart; part++) {
     close_all(&now);
     now = reload.next;
@@ -233,8 +243,9 @@ static int run(const arguments *args) {
     // A log and a recording hold one configuration each.
     (void)snprintf(out_dir, sizeof out_dir, "%s.%d", args->run.out_dir ? args->run.out_dir : "", part);
     if (args->run.out_dir) options.out_dir = out_dir;
+    if (puts_aside && options.out_dir) status = put_run_aside(options.out_dir, &err);
     (void)snprintf(record_dir, sizeof record_dir, "%s.%d", args->record ? args->record : "", part);
-    status = run_once(&now, args->record ? record_dir : NULL, &options, &report, &err);
+    if (status == WM_OK) status = run_once(&now, args->record ? record_dir : NULL, &options, &report, &err);
   }
   close_all(&now);
   return status == WM_OK ? EXIT_DONE : complain(&err);
@@ -260,6 +271,7 @@ int command_run(int argc, char *const *argv) {
                             {"--speed", OPTION_F64, &args.run.speed},
                             {"--seed", OPTION_U64, &args.run.seed},
                             {"--resume", OPTION_FLAG, &args.resumes},
+                            {"--force", OPTION_FLAG, &args.force},
                             {"--landmarks", OPTION_TEXT, &args.landmarks},
                             {"--calibration", OPTION_TEXT, &args.calibration},
                             {"--map", OPTION_TEXT, &args.map},
@@ -282,7 +294,7 @@ int command_run(int argc, char *const *argv) {
     return complain(&err);
   }
   if (args.record && check_new_recording(args.record, args.recording, &err) != WM_OK) return complain(&err);
-  if (args.run.out_dir && check_out_dir(args.run.out_dir, args.recording ? args.recording : "", &err) != WM_OK)
+  if (args.run.out_dir && check_out_dir(args.run.out_dir, args.recording ? args.recording : "", NULL, 0, &err) != WM_OK)
     return complain(&err);
   return run(&args);
 }

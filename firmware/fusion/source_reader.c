@@ -62,6 +62,16 @@ wm_status wm_source_reader_advance(wm_source_reader *self, wm_error *err) {
   return status == WM_OK ? skip_outside(self, err) : status;
 }
 
+// With the first problem of the first source that has one.
+static wm_status fail_empty(const wm_source_reader *readers, const wm_assembly *assembly, wm_error *err) {
+  wm_source_counts counts = {0};
+  for (size_t i = 0; i < assembly->source_count && !counts.first_problem[0]; i++)
+    wm_source_reader_counts(&readers[i], &counts);
+  return wm_fail(err, WM_BAD_DATA, "'%s' is empty: none of its %zu sources holds a datum that can be used%s%s",
+                 assembly->recording, assembly->source_count, counts.first_problem[0] ? "; the first problem: " : "",
+                 counts.first_problem);
+}
+
 wm_status wm_source_readers_open(const wm_assembly *assembly, wm_source_reader *readers, const wm_event_change *change,
                                  wm_time_ns now_ns, wm_time_ns *first_ns, wm_error *err) {
   int recorded = 0;
@@ -81,9 +91,7 @@ wm_status wm_source_readers_open(const wm_assembly *assembly, wm_source_reader *
     if (reader->has_next && reader->next.t_ns < *first_ns) *first_ns = reader->next.t_ns;
   }
   if (!recorded) *first_ns = now_ns;
-  if (*first_ns == INT64_MAX)
-    return wm_fail(err, WM_BAD_DATA, "'%s' is empty: none of its %zu sources holds a datum that can be used",
-                   assembly->recording, assembly->source_count);
+  if (*first_ns == INT64_MAX) return fail_empty(readers, assembly, err);
   for (size_t i = 0; i < assembly->source_count; i++) {
     readers[i].from_ns = limit(*first_ns, assembly->sources[i].from_s, INT64_MIN);
     readers[i].until_ns = limit(*first_ns, assembly->sources[i].until_s, INT64_MAX);

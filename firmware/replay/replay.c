@@ -116,12 +116,17 @@ static wm_time_ns first_tick(wm_time_ns now_ns, wm_time_ns period_ns) {
 // A longer silence of all sources (recordings joined together, a corrupt stamp) is skipped, not played tick by tick.
 #define LONGEST_SILENCE_NS (600 * WM_NS_PER_S)
 
-static wm_status play(replay *self, const wm_replay_options *options, double duration_s, wm_error *err) {
+static wm_status play(replay *self, const wm_replay_options *options, double duration_s, int *was_stopped,
+                      wm_error *err) {
   size_t count = self->assembly.source_count;
   wm_time_ns told_ns = wm_monotonic_ns();
   uint64_t events = 0;
   self->now_ns = WM_TIME_NONE;
   for (wm_source_reader *reader; (reader = wm_source_readers_earliest(self->readers, count)) != NULL;) {
+    if (options->stop && *options->stop) {
+      *was_stopped = 1;
+      break;
+    }
     wm_time_ns arrival_ns = reader->next.arrival_ns;
     if (self->now_ns == WM_TIME_NONE || arrival_ns / 2 - self->now_ns / 2 > LONGEST_SILENCE_NS / 2)
       self->next_tick_ns = first_tick(arrival_ns, self->publish_ns);
@@ -213,7 +218,7 @@ static wm_status run(replay *self, const wm_config *config, wm_recording *record
   if (status != WM_OK) return status;
 
   begin_steady(self);
-  status = play(self, options, wm_recording_duration_s(recording), err);
+  status = play(self, options, wm_recording_duration_s(recording), &report->was_stopped, err);
   end_steady(self);
   if (status != WM_OK) return status;
   summarize(self, report);

@@ -4,6 +4,7 @@
 #ifndef WAYMARK_REPLAY_REPLAY_H
 #define WAYMARK_REPLAY_REPLAY_H
 
+#include <signal.h>
 #include <stdint.h>
 
 #include "config/config.h"
@@ -29,6 +30,7 @@ typedef struct wm_run_report {
   uint64_t events_missing;  // event log only: lost by the run that wrote it
   wm_time_ns log_ahead_ns;  // frames_of only: the log's clock minus the recording's
   int log_was_cut;          // event log only: it ends within a record or without its end record
+  int was_stopped;          // by options->stop, before the end
 } wm_run_report;
 
 // A reader of a replay beside its files. Each function may be NULL.
@@ -52,9 +54,11 @@ typedef struct wm_replay_options {
   uint64_t seed;
   wm_progress_fn progress;  // may be NULL
   void *progress_context;
-  const wm_raster *map;    // event log only: the map with the hash in its head; NULL where it has none
-  const char *frames_of;   // recording only: event log of a run of it, whose pictures alone are processed
-  const char *timing_of;   // recording only: folder of a run, whose times of detection are taken
+  const wm_raster *map;   // event log only: the map with the hash in its head; NULL where it has none
+  const char *frames_of;  // recording only: event log of a run of it, whose pictures alone are processed
+  const char *timing_of;  // recording only: folder of a run, whose times of detection are taken
+  // Not 0 (by a signal handler): the replay ends after the present event, and all files are written. May be NULL.
+  const volatile sig_atomic_t *stop;
   double from_s, until_s;  // recording only: this part of it, s from its first stamp; until_s 0: to its end
 } wm_replay_options;
 

@@ -97,17 +97,19 @@ static wm_status start(log_replay *self, const wm_replay_options *options, wm_er
   return WM_OK;
 }
 
-static wm_status play(log_replay *self, wm_log_reader *log, wm_run_report *report, wm_error *err) {
+static wm_status play(log_replay *self, wm_log_reader *log, const wm_replay_options *options, wm_run_report *report,
+                      wm_error *err) {
   wm_event event;
-  wm_status status;
-  while ((status = wm_log_next(log, &event, &report->events_missing, &report->log_was_cut, err)) == WM_OK) {
+  wm_status status = WM_END;
+  while (!(report->was_stopped = options->stop && *options->stop) &&
+         (status = wm_log_next(log, &event, &report->events_missing, &report->log_was_cut, err)) == WM_OK) {
     if (self->fuser.events == 0) self->first_ns = event.t_ns;
     self->last_ns = event.t_ns;
     self->received[event.source]++;
     wm_fuser_feed(&self->fuser, &event);
   }
   wm_fuser_finish(&self->fuser);
-  return status == WM_END ? WM_OK : status;
+  return status == WM_END || report->was_stopped ? WM_OK : status;
 }
 
 static void fill_health(const log_replay *self, wm_health *out) {
@@ -149,7 +151,7 @@ static wm_status run(log_replay *self, wm_log_reader *log, const wm_replay_optio
   if (status != WM_OK) return status;
   wm_prefault_program();
   int64_t allocations = wm_allocations_of_this_thread(), page_faults = wm_page_faults_of_this_thread();
-  status = play(self, log, report, err);
+  status = play(self, log, options, report, err);
   report->page_faults_after_start = wm_page_faults_of_this_thread() - page_faults;
   report->allocations_after_start = allocations < 0 ? -1 : wm_allocations_of_this_thread() - allocations;
   wm_error summary_error;

@@ -33,7 +33,9 @@ expect 2 "usage: waymark COMMAND"
 expect 0 "usage: waymark COMMAND" help
 expect 0 "example:" --help
 expect 0 "waymark " --version
+expect 0 "  eval      measure a run against truth" help
 expect 2 "did you mean 'replay'" repaly
+expect 2 "did you mean 'detect'" detct
 expect 2 "'dance' is no command" dance
 for command in run replay check doctor record watch stamps; do expect 0 "example:" "$command" --help; done
 
@@ -49,7 +51,15 @@ expect 1 "nosuch" replay "$work/nosuch" --config "$work/good.yaml" --out "$work/
 expect 2 "no motion" replay "$work/nomotion" --config "$work/good.yaml" --out "$work/out"
 expect 1 "there is a file of this name" replay "$work/rec" --config "$work/good.yaml" --out "$work/good.yaml"
 expect 0 "20 poses" replay "$work/rec" --config "$work/good.yaml" --out "$work/deep/er/out"
+expect 0 "20 poses" replay "$work/rec" --config "$work/good.yaml" --out "$work/deep/er/out"
 expect 0 "20 poses" replay "$work/deep/er/out/events.wmlog" --out "$work/again"
+# A run of another recording is not written over unasked.
+cp -r "$work/rec" "$work/bent"
+sed -i 's/straight/bent/' "$work/bent/recording.yaml"
+expect 2 "holds a run of 'straight', this is 'bent'" replay "$work/bent" --config "$work/good.yaml" --out "$work/again"
+expect 2 "holds a run of 'straight', this is 'bent'" run --recording "$work/bent" --config "$work/good.yaml" --out "$work/again"
+expect 0 "20 poses" replay "$work/bent" --config "$work/good.yaml" --out "$work/again" --force
+expect 0 "20 poses" replay "$work/deep/er/out/events.wmlog" --out "$work/again" --force
 "$waymark" replay "$work/deep/er/out/events.wmlog" --out "$work/again" 2>&1 | grep "no pose was" && { echo "a log's replay says that it found no pose"; failures=$((failures + 1)); }
 expect 2 "another one needs the recording" replay "$work/deep/er/out/events.wmlog" --out "$work/again" --calibration x
 expect 1 "not an event log" replay "$work/good.yaml" --out "$work/again"
@@ -76,6 +86,11 @@ expect 0 "20 data, 10.0 a second" check "$work/good.yaml" "$work/rec"
 expect 0 "x 1.000 m, y 2.000 m" check "$work/good.yaml" "$work/rec"
 expect 2 "did you mean 'odometry'" check "$work/bad.yaml" "$work/rec"
 expect 2 "no motion" check "$work/good.yaml" "$work/nomotion"
+
+# Where nothing can be read, why.
+cp -r "$work/rec" "$work/halves"
+sed -i 's/^\([0-9]*\),/\1.5,/' "$work/halves/motion.csv"
+expect 1 "motion.csv:2: t_ns: '0.5' is not a whole number" replay "$work/halves" --config "$work/good.yaml" --out "$work/out"
 
 # A model whose input the recording doesn't have is refused, not silently left without motion.
 sed 's/^estimator.*/&\nmotion: {model: speed_yaw_rate}/' "$work/good.yaml" >"$work/model.yaml"
@@ -108,6 +123,8 @@ printf '#!/bin/sh\necho "hello $1"\nexit 7\n' >"$work/bin/waymark-greet"
 chmod +x "$work/bin/waymark-greet"
 waymark=$work/bin/waymark
 expect 7 "hello you" greet you
+PATH=/usr/bin:/bin expect 0 "measure a run against truth, GNSS or labels (not installed; package waymark-tools)" help
+PATH=/usr/bin:/bin expect 2 "which is not installed here; package waymark-tools has it" eval run rec
 
 # Ctrl-C ends a run in order: the log is closed and everything is there.
 waymark=$WM_BIN_DIR/waymark
@@ -119,6 +136,22 @@ wait $pid || { echo "SIGINT: exit code $?"; cat "$work/said"; failures=$((failur
 [ -s "$work/stopped/health.json" ] && [ -s "$work/stopped/timing.json" ] || { echo "SIGINT: files are missing"; failures=$((failures + 1)); }
 expect 0 "poses" replay "$work/stopped/events.wmlog" --out "$work/again"
 "$waymark" replay "$work/stopped/events.wmlog" --out "$work/again" 2>&1 | grep -q "no regular end" && { echo "SIGINT: the log was not closed"; failures=$((failures + 1)); }
+
+# Ctrl-C of a replay leaves a run that reads as one: all files, a closed log.
+awk 'BEGIN { print "t_ns,v_mps,w_radps"; for (i = 0; i < 600000; i++) printf "%d000000,0.5,0\n", i * 10 }' >"$work/long.csv"
+cp -r "$work/rec" "$work/long"
+mv "$work/long.csv" "$work/long/motion.csv"
+sed -i 's/straight/long/; /duration_s/d' "$work/long/recording.yaml"
+"$waymark" replay "$work/long" --config "$work/good.yaml" --out "$work/broken" >"$work/said" 2>&1 &
+pid=$!
+while [ ! -s "$work/broken/trajectory.csv" ] && kill -0 $pid 2>/dev/null; do sleep 0.05; done
+kill -INT $pid
+wait $pid
+code=$?
+[ $code -eq 1 ] && grep -q "holds the run until then" "$work/said" || { echo "Ctrl-C of a replay: exit code $code"; cat "$work/said"; failures=$((failures + 1)); }
+[ -s "$work/broken/health.json" ] && [ -s "$work/broken/timing.json" ] || { echo "Ctrl-C of a replay: files are missing"; failures=$((failures + 1)); }
+expect 0 "poses" replay "$work/broken/events.wmlog" --out "$work/broken2"
+"$waymark" replay "$work/broken/events.wmlog" --out "$work/broken2" 2>&1 | grep -q "no regular end" && { echo "Ctrl-C of a replay: the log was not closed"; failures=$((failures + 1)); }
 
 [ $failures -eq 0 ] && echo "good"
 exit $((failures > 0))

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -22,10 +23,15 @@ constexpr size_t kCountersAtMost = 40;
 constexpr size_t kFieldsAtMost = 3;
 
 std::string seconds_text(int64_t t_ns) {
-  char text[48];
-  std::snprintf(text, sizeof text, "t = %.9g s (t_ns %lld)", static_cast<double>(t_ns) * 1e-9,
-                static_cast<long long>(t_ns));
-  return text;
+  constexpr int64_t kSecond_ns = 1'000'000'000;
+  const int64_t seconds = t_ns / kSecond_ns, rest = t_ns % kSecond_ns;
+  char text[64];
+  std::snprintf(text, sizeof text, "%s%lld.%09lld", t_ns < 0 && seconds == 0 ? "-" : "",
+                static_cast<long long>(seconds), std::abs(static_cast<long long>(rest)));
+  std::string shown = text;
+  shown.erase(shown.find_last_not_of('0') + 1);
+  if (shown.back() == '.') shown.pop_back();
+  return "t = " + shown + " s (t_ns " + std::to_string(t_ns) + ")";
 }
 
 std::string read_bytes(const fs::path &file) {

@@ -23,10 +23,10 @@ void parse(CLI::App *app, Arguments *a) {
   app->description("Shows a run as one self-contained page: where, how far off, how sure, and why.");
   app->add_option("RUN", a->run, "folder that a run wrote")->required();
   app->add_option("REC", a->recording, "folder of the recording, for truth, landmarks and map");
-  app->add_option("--out", a->out, "the page to write (HTML)");
+  app->add_option("--out", a->out, "the page to write (HTML); without it and --svg: RUN/report.html");
   app->add_option("--svg", a->svg, "the picture of the trajectory alone, as an SVG file");
   app->footer(
-      "example: waymark report runs/plan recordings/plan --out plan.html\n"
+      "example: waymark report runs/plan recordings/plan\n"
       "docs/report.md shows one. Exit code: 0 done, 1 it could not be made, 2 usage.");
 }
 
@@ -44,11 +44,12 @@ int main(int argc, char **argv) {
   CLI::App app("", "waymark report");
   parse(&app, &arguments);
   return run_program(app, argc, argv, [&] {
-    if (arguments.out.empty() && arguments.svg.empty())
-      throw Failure("where to? --out FILE.html, or --svg FILE.svg, or both", kUsage);
+    const bool is_default = arguments.out.empty() && arguments.svg.empty();
+    if (is_default) arguments.out = std::filesystem::path(arguments.run) / "report.html";
     const ReportData data = load_report_data(arguments.run, arguments.recording);
     if (!arguments.out.empty()) write(arguments.out, report_page(data));
     if (!arguments.svg.empty()) write(arguments.svg, draw_picture(data, true).svg);
+    if (is_default) std::puts(arguments.out.c_str());
     return kDone;
   });
 }

@@ -146,6 +146,20 @@ static void broken_rows(void) {
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(motion->counts.first_problem, tail), motion->counts.first_problem);
 }
 
+// Stamps that a program held as floating point: whole ones are taken by their digits, exactly.
+static void float_stamps(void) {
+  folder_write("motion.csv",
+               "t_ns,v_mps,w_radps\n-5.0,1,0\n1.0,1,0\n2e0,1,0\n30e-1,1,0\n1.5,1,0\n1.7000000001e1,1,0\n"
+               "1700000000123456789.000,1,0\n1.700000000123456790e+18,1,0\n1.7e+25,1,0\n1e-400000,1,0\n");
+  wm_source *motion = source("motion");
+  static const int64_t kStamps[] = {-5, 1, 2, 3, INT64_C(1700000000123456789), INT64_C(1700000000123456790)};
+  for (size_t i = 0; i < sizeof kStamps / sizeof kStamps[0]; i++)
+    TEST_ASSERT_EQUAL_INT64(kStamps[i], next(motion).t_ns);
+  at_end(motion);
+  TEST_ASSERT_EQUAL(3, motion->counts.malformed);
+  TEST_ASSERT_EQUAL(1, motion->counts.not_finite);
+}
+
 static void zero_bytes(void) {
   static const char kText[] = "t_ns,v_mps,w_radps\n1,1,1\n2,\0,1\n\0\0\0\n3,1,1\n";
   folder_write_bytes("motion.csv", kText, sizeof kText - 1);
@@ -408,6 +422,7 @@ int main(void) {
   RUN_TEST(imu_by_its_mounting);
   RUN_TEST(spellings);
   RUN_TEST(broken_rows);
+  RUN_TEST(float_stamps);
   RUN_TEST(zero_bytes);
   RUN_TEST(long_file);
   RUN_TEST(order_of_arrival);

@@ -46,8 +46,8 @@ static void mistakes_are_told(void) {
   refuse("--out: its value is missing", PARSE("--out"));
   refuse("--out: is empty", PARSE("--out="));
   refuse("--help: takes no value", PARSE("--help=1"));
-  refuse("--seed: '-1' is no whole number from 0 to 18446744073709551615", PARSE("--seed", "-1"));
-  refuse("--seed: '18446744073709551616' is no whole number from 0 to 18446744073709551615",
+  refuse("--seed: '-1' is no whole number from 0 on, or too large", PARSE("--seed", "-1"));
+  refuse("--seed: '18446744073709551616' is no whole number from 0 on, or too large",
          PARSE("--seed", "18446744073709551616"));
   refuse("--speed: '0' is no number above 0", PARSE("--speed", "0"));
   refuse("--speed: 'fast' is no number above 0", PARSE("--speed", "fast"));

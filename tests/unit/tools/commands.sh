@@ -155,7 +155,8 @@ sys.exit("missing: " + " ".join(missing) if missing else 0)'; then
   failures=$((failures + 1))
 fi
 
-expect 2 'where to?' "$bin/waymark-report" "$dir/run" "$dir/rec"
+expect 0 "$dir/run/report.html" "$bin/waymark-report" "$dir/run" "$dir/rec"
+[ -s "$dir/run/report.html" ] || { echo "FAIL: no report.html"; failures=$((failures + 1)); }
 expect 0 '' "$bin/waymark-report" "$dir/run" "$dir/rec" --out "$dir/page.html" --svg "$dir/picture.svg"
 expect 1 "can't be written" "$bin/waymark-report" "$dir/run" --out "$dir/nowhere/page.html"
 if ! python3 -c '
@@ -182,6 +183,10 @@ expect 0 'The two runs are the same' "$bin/waymark-diff" "$dir/run" "$dir/run"
 cp -r "$dir/run" "$dir/other"
 sed -i '5s/0.1,/0.2,/' "$dir/other/trajectory.csv"
 expect 1 'first at row 4, t = 0.3 s' "$bin/waymark-diff" "$dir/run" "$dir/other"
+# Stamps since 1970 are not cut.
+cp -r "$dir/run" "$dir/epoch" && sed -i 's/^\([0-9]00000000\),/1700000000\1,/' "$dir/epoch/trajectory.csv"
+cp -r "$dir/epoch" "$dir/epoch2" && sed -i '5s/0.1,/0.2,/' "$dir/epoch2/trajectory.csv"
+expect 1 'first at row 4, t = 1700000000.3 s' "$bin/waymark-diff" "$dir/epoch" "$dir/epoch2"
 expect 2 "is no run's folder" "$bin/waymark-diff" "$dir/run" "$dir/empty"
 
 [ "$failures" -eq 0 ] && echo "all as expected"

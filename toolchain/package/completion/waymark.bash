@@ -24,8 +24,8 @@ _waymark() {
     "map train-cascade") words='--help --size --out --rows --margin --size-min --stages --pictures --seed' ;;
   esac
   [ -n "$words" ] || case "$command" in
-    "run") words='--config --recording --out --record --out-max-mb --duration --speed --seed --resume --landmarks --map --calibration' ;;
-    "replay") words='--config --out --seed --landmarks --calibration --map --frames-of --timing-of --from --until --lost --reference' ;;
+    "run") words='--config --recording --out --record --force --out-max-mb --duration --speed --seed --resume --landmarks --map --calibration' ;;
+    "replay") words='--config --out --seed --landmarks --calibration --map --frames-of --timing-of --from --until --lost --force --reference' ;;
     "record") words='--config --out --duration --max-mb --free-mb' ;;
     "watch") words='--url --prefix --duration' ;;
     "check") words='--landmarks --calibration --map --json --quick' ;;
