@@ -27,12 +27,11 @@ int complain(const wm_error *err);
 void print_note(void *context, const char *text);
 // `--landmarks` and `--calibration` replace the configuration's files.
 wm_status override_path(char out[WM_PATH_MAX], const char *path, wm_error *err);
-// Refuses an output folder whose files would overwrite the input: a recording, or the log that is replayed. Unless
-// `force`, also one that holds a run of another recording than `name` (NULL: any will do).
-wm_status check_out_dir(const char *out_dir, const char *input, const char *name, int force, wm_error *err);
-// A run that is in `out_dir` is put aside as OUT.before-1, -2 ...: what devices gave does not come again. Prints a
-// note.
-wm_status put_run_aside(const char *out_dir, wm_error *err);
+// Refuses an output folder whose files would overwrite the input: a recording, or the log that is replayed.
+wm_status check_out_dir(const char *out_dir, const char *input, wm_error *err);
+// A run of another recording than `recording` in `out_dir` is renamed to OUT.before-1, -2 ..., with a note. NULL: any
+// run, since what devices gave does not come again.
+wm_status put_run_aside(const char *out_dir, const char *recording, wm_error *err);
 // Prints counts and state of a run on standard output.
 void print_report(const wm_run_report *report, const char *name, const char *out_dir, double took_s);
 

@@ -35,49 +35,45 @@ wm_status override_path(char out[WM_PATH_MAX], const char *path, wm_error *err) 
   return WM_OK;
 }
 
-// Refuses a folder with the log of a run of another recording. A log that can't be read is no reason.
-static wm_status check_same_recording(const char *out_dir, const char *log_path, const char *name, wm_error *err) {
-  wm_log_reader *log;
-  if (wm_log_open(log_path, &log, NULL) != WM_OK) return WM_OK;
-  const wm_log_head *head = wm_log_reader_head(log);
-  wm_status status = WM_OK;
-  if (strcmp(head->recording, name) != 0)
-    status = wm_fail(err, WM_BAD_USAGE,
-                     "--out: %s holds a run of '%s', this is '%s'; choose another folder, or write over it: --force",
-                     out_dir, head->recording, name);
-  wm_log_reader_close(log);
-  return status;
-}
-
-wm_status check_out_dir(const char *out_dir, const char *input, const char *name, int force, wm_error *err) {
+wm_status check_out_dir(const char *out_dir, const char *input, wm_error *err) {
   char path[WM_PATH_MAX + 32];
   struct stat inside, read;
   (void)snprintf(path, sizeof path, "%s/recording.yaml", out_dir);
   if (stat(path, &inside) == 0)
     return wm_fail(err, WM_BAD_USAGE, "--out: %s is a recording; a run is written to a folder of its own", out_dir);
   (void)snprintf(path, sizeof path, "%s/events.wmlog", out_dir);
-  if (stat(path, &inside) != 0) return WM_OK;
-  if (stat(input, &read) == 0 && inside.st_ino == read.st_ino && inside.st_dev == read.st_dev)
+  if (stat(path, &inside) == 0 && stat(input, &read) == 0 && inside.st_ino == read.st_ino &&
+      inside.st_dev == read.st_dev)
     return wm_fail(err, WM_BAD_USAGE, "--out: %s holds the log that is to be replayed; choose another folder", out_dir);
-  return name && !force ? check_same_recording(out_dir, path, name, err) : WM_OK;
+  return WM_OK;
+}
+
+// Whether the log is of a run of `recording`. One that can't be read is taken for that.
+static int is_log_of(const char *path, const char *recording) {
+  wm_log_reader *log;
+  if (wm_log_open(path, &log, NULL) != WM_OK) return 1;
+  const int is_same = strcmp(wm_log_reader_head(log)->recording, recording) == 0;
+  wm_log_reader_close(log);
+  return is_same;
 }
 
 #define ASIDE_MAX 9999  // runs put aside beside a folder
 
-wm_status put_run_aside(const char *out_dir, wm_error *err) {
+wm_status put_run_aside(const char *out_dir, const char *recording, wm_error *err) {
   char path[WM_PATH_MAX + 48], note[2 * WM_PATH_MAX + 96];
   struct stat there;
   (void)snprintf(path, sizeof path, "%s/events.wmlog", out_dir);
-  if (stat(path, &there) != 0) return WM_OK;
+  if (stat(path, &there) != 0 || (recording && is_log_of(path, recording))) return WM_OK;
   size_t length = strlen(out_dir);
   while (length > 1 && out_dir[length - 1] == '/') length--;
   for (int i = 1; i <= ASIDE_MAX; i++) {
     (void)snprintf(path, sizeof path, "%.*s.before-%d", (int)length, out_dir, i);
     if (stat(path, &there) == 0) continue;
     if (rename(out_dir, path) != 0)
-      return wm_fail(err, WM_IO, "--out: %s holds a run that can't be put aside as %s: %s; --force writes over it",
-                     out_dir, path, strerror(errno));
-    (void)snprintf(note, sizeof note, "%s: the run in it is %s now (--force writes over it)", out_dir, path);
+      return wm_fail(err, WM_IO,
+                     "--out: %s holds another run, which can't be put aside as %s: %s; --force writes over it", out_dir,
+                     path, strerror(errno));
+    (void)snprintf(note, sizeof note, "%s held another run, which is %s now (--force writes over it)", out_dir, path);
     print_note(NULL, note);
     return WM_OK;
   }

@@ -34,7 +34,7 @@ static const char kHelp[] =
     "                      none, or `sources: [{name: DETECTOR, ready_after_ms: 40}]`\n"
     "  --from S, --until S only this part of the recording, s from its first stamp\n"
     "  --lost              begin without a start pose, even if the recording has one\n"
-    "  --force             write over a run of another recording that is in FOLDER\n"
+    "  --force             write over a run of another recording in FOLDER; else it is put aside (FOLDER.before-1)\n"
     "  --reference         also reference.csv: all of the drive looked at as a whole (edges on a raster map; at a "
     "desk)\n"
     "\n"
@@ -88,7 +88,7 @@ static int replay_recording(const arguments *args) {
   if (status == WM_OK) status = override_path(config.overrides.calibration, args->calibration, &err);
   if (status == WM_OK) status = override_path(config.overrides.map, args->map, &err);
   if (status == WM_OK) status = wm_recording_open(args->what, &config.overrides, print_note, NULL, &recording, &err);
-  if (status == WM_OK) status = check_out_dir(args->out, args->what, wm_recording_name(recording), args->force, &err);
+  if (status == WM_OK && !args->force) status = put_run_aside(args->out, wm_recording_name(recording), &err);
   int code = EXIT_DONE;
   if (status == WM_OK) {
     progress_line progress;
@@ -152,7 +152,7 @@ static int replay_log(const arguments *args) {
   if (wm_log_open(args->what, &log, &err) != WM_OK) return complain(&err);
   const wm_log_head *head = wm_log_reader_head(log);
   wm_status status = check_map(args->landmarks, head, args->what, &err);
-  if (status == WM_OK) status = check_out_dir(args->out, args->what, head->recording, args->force, &err);
+  if (status == WM_OK && !args->force) status = put_run_aside(args->out, head->recording, &err);
   int code = EXIT_DONE;
   wm_map *map = NULL;
   if (status == WM_OK) status = load_map(args->map, head, &map, &err);
@@ -240,7 +240,7 @@ int command_replay(int argc, char *const *argv) {
     return EXIT_USAGE;
   }
   catch_signals();
-  if (check_out_dir(args.out, args.what, NULL, 0, &err) != WM_OK) return complain(&err);
+  if (check_out_dir(args.out, args.what, &err) != WM_OK) return complain(&err);
   if (is_run_folder(args.what)) {
     (void)fprintf(stderr, "waymark: %s is a run, not a recording; did you mean its log, %s/events.wmlog?\n", args.what,
                   args.what);

@@ -28,9 +28,8 @@ static const char kHelp[] =
     "  --recording RECORDING  play this recording instead of devices\n"
     "  --out FOLDER           trajectory, published poses, event log, health and timing\n"
     "  --record NEW           records the devices meanwhile, into a new folder, as `waymark record` does\n"
-    "                         devices: a run that is there already is put aside as FOLDER.before-1 ...; --recording: "
-    "it\n"
-    "                         is written over, if it is of the same recording\n"
+    "                         a run that is there is put aside as FOLDER.before-1 ... (one of the same recording is\n"
+    "                         written over)\n"
     "  --force                write over what is there\n"
     "  --out-max-mb N         tables and log below so much: at half of it they are put aside as trajectory.1.csv ...,\n"
     "                         and a run that is there already is written over\n"
@@ -226,11 +225,10 @@ static int run(const arguments *args) {
   options.reload_context = &reload;
   options.reload_asked = args->recording ? NULL : &reload_asked;
   catch_signals();
-  const int puts_aside = !args->recording && !args->force && args->run.out_max_mb <= 0;
+  const int puts_aside = !args->force && args->run.out_max_mb <= 0 && args->run.out_dir;
   wm_status status = WM_OK;
-  if (args->recording && args->run.out_dir)
-    status = check_out_dir(args->run.out_dir, args->recording, wm_recording_name(now.recording), args->force, &err);
-  if (puts_aside && options.out_dir) status = put_run_aside(options.out_dir, &err);
+  if (puts_aside)
+    status = put_run_aside(options.out_dir, args->recording ? wm_recording_name(now.recording) : NULL, &err);
   if (status == WM_OK) status = run_once(&now, args->record, &options, &report, &err);
   for (int part = 2; status == WM_OK && report.wants_restart; part++) {
     close_all(&now);
@@ -243,7 +241,7 @@ static int run(const arguments *args) {
     // A log and a recording hold one configuration each.
     (void)snprintf(out_dir, sizeof out_dir, "%s.%d", args->run.out_dir ? args->run.out_dir : "", part);
     if (args->run.out_dir) options.out_dir = out_dir;
-    if (puts_aside && options.out_dir) status = put_run_aside(options.out_dir, &err);
+    if (puts_aside) status = put_run_aside(options.out_dir, NULL, &err);
     (void)snprintf(record_dir, sizeof record_dir, "%s.%d", args->record ? args->record : "", part);
     if (status == WM_OK) status = run_once(&now, args->record ? record_dir : NULL, &options, &report, &err);
   }
@@ -294,7 +292,7 @@ int command_run(int argc, char *const *argv) {
     return complain(&err);
   }
   if (args.record && check_new_recording(args.record, args.recording, &err) != WM_OK) return complain(&err);
-  if (args.run.out_dir && check_out_dir(args.run.out_dir, args.recording ? args.recording : "", NULL, 0, &err) != WM_OK)
+  if (args.run.out_dir && check_out_dir(args.run.out_dir, args.recording ? args.recording : "", &err) != WM_OK)
     return complain(&err);
   return run(&args);
 }

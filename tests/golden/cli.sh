@@ -56,9 +56,11 @@ expect 0 "20 poses" replay "$work/deep/er/out/events.wmlog" --out "$work/again"
 # A run of another recording is not written over unasked.
 cp -r "$work/rec" "$work/bent"
 sed -i 's/straight/bent/' "$work/bent/recording.yaml"
-expect 2 "holds a run of 'straight', this is 'bent'" replay "$work/bent" --config "$work/good.yaml" --out "$work/again"
-expect 2 "holds a run of 'straight', this is 'bent'" run --recording "$work/bent" --config "$work/good.yaml" --out "$work/again"
+expect 0 "held another run, which is $work/again.before-1 now" replay "$work/bent" --config "$work/good.yaml" --out "$work/again"
+expect 0 "held another run, which is $work/again.before-2 now" run --recording "$work/rec" --config "$work/good.yaml" --out "$work/again/"
+cmp -s "$work/again.before-1/events.wmlog" "$work/again.before-2/events.wmlog" && { echo "a run put aside was written over"; failures=$((failures + 1)); }
 expect 0 "20 poses" replay "$work/bent" --config "$work/good.yaml" --out "$work/again" --force
+[ ! -e "$work/again.before-3" ] || { echo "--force puts a run aside"; failures=$((failures + 1)); }
 expect 0 "20 poses" replay "$work/deep/er/out/events.wmlog" --out "$work/again" --force
 "$waymark" replay "$work/deep/er/out/events.wmlog" --out "$work/again" 2>&1 | grep "no pose was" && { echo "a log's replay says that it found no pose"; failures=$((failures + 1)); }
 expect 2 "another one needs the recording" replay "$work/deep/er/out/events.wmlog" --out "$work/again" --calibration x
