@@ -180,7 +180,7 @@ static wm_status add_stream(wm_recording *self, const stream_kind *kind, wm_erro
   status = stream_open(path, kind, NULL, 0, NULL, 0, NULL, self->warn.fn, self->warn.context, &source, err);
   if (status != WM_OK) return status;
   if (kind == &kStreamImu) stream_set_imu(source, wm_site_imu(self->site));
-  self->quantities |= kind->quantities;
+  self->quantities |= source->quantities = kind->quantities;
   return add_source(self, source, err);
 }
 
@@ -251,6 +251,7 @@ static wm_status add_bus(wm_recording *self, const char *log, const can_buses *b
   uint32_t quantities = 0;
   wm_status status = can_stream_open(log, buses, bus, part, wm_site_gnss_origin(self->site), &source, &quantities, err);
   self->quantities |= quantities;
+  if (status == WM_OK && source) source->quantities = quantities;
   return status == WM_OK && source ? add_source(self, source, err) : status;
 }
 
@@ -329,7 +330,7 @@ wm_status wm_recording_of_site(const char *name, wm_site *site, wm_recording **o
 }
 
 wm_status wm_recording_add_device(wm_recording *self, wm_source *device, uint32_t quantities, wm_error *err) {
-  self->quantities |= quantities;
+  self->quantities |= device->quantities = quantities;
   return add_source(self, device, err);
 }
 

@@ -9,6 +9,7 @@
 static wm_time_ns ns_from_ms(double ms) { return wm_ns_from_seconds(ms * 1e-3); }
 
 static void leave_out(wm_assembly *self, const char *name, const char *why) {
+  if (self->unused_count == sizeof self->unused / sizeof self->unused[0]) return;
   char *line = self->unused[self->unused_count++];
   (void)snprintf(line, sizeof self->unused[0], "%s: %s", name, why);
 }
@@ -49,6 +50,22 @@ static void add_source(wm_assembly *self, wm_source *source) {
                                .lateness_max_ns = lateness_ns < horizon_ns ? lateness_ns : horizon_ns,
                                .period_ns = ns_from_ms(wanted.period_ms)};
   self->kinds |= source->kinds;
+}
+
+// Two sensors of one quantity would be taken for one, with one bias: a stream of its own is taken instead of CAN.
+static void choose_quantities(wm_assembly *self) {
+  for (size_t i = 0; i < self->source_count; i++)
+    for (size_t k = i + 1; k < self->source_count; k++) {
+      wm_assembled_source *less = &self->sources[i];
+      const wm_assembled_source *taken = &self->sources[k];
+      const uint32_t both = less->source->quantities & taken->source->quantities & ~less->drops;
+      if (both == 0 || strncmp(taken->name, "can", 3) == 0) continue;
+      char why[60];
+      (void)snprintf(why, sizeof why, "%s is taken from %.16s", wm_quantity_name((unsigned)__builtin_ctz(both)),
+                     taken->name);
+      less->drops |= both;
+      leave_out(self, less->name, why);
+    }
 }
 
 static wm_status check_estimator(const wm_assembly *self, wm_error *err) {
@@ -132,6 +149,7 @@ wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t
   size_t count;
   wm_source *const *sources = wm_recording_sources(recording, &count);
   for (size_t i = 0; i < count && i < WM_SOURCES_MAX; i++) add_source(out, sources[i]);
+  choose_quantities(out);
   status = add_vision(out, recording, err);
   if (status != WM_OK) return status;
   setup->sensors =

@@ -20,6 +20,7 @@ typedef struct wm_assembled_source {
   char name[WM_SOURCE_NAME_MAX];
   wm_source *source;  // NULL where only the table is known (event log)
   uint32_t kinds;
+  uint32_t drops;  // bit per wm_quantity that is another source's
   wm_merge_source merge;
   double from_s, until_s;
 } wm_assembled_source;

@@ -11,8 +11,26 @@ static wm_time_ns limit(wm_time_ns first_ns, double seconds, wm_time_ns none) {
   return t_ns;
 }
 
+// 1: nothing of it is left.
+static int drop_quantities(wm_event *event, uint32_t drops) {
+  wm_quantities *q = &event->as.quantities;
+  if (drops == 0 || event->kind != WM_EVENT_QUANTITIES) return 0;
+  uint8_t left = 0;
+  for (uint8_t i = 0; i < q->count; i++) {
+    if (drops >> q->id[i] & 1u) continue;
+    q->id[left] = q->id[i];
+    q->value[left++] = q->value[i];
+  }
+  q->count = left;
+  return left == 0;
+}
+
 static wm_status read_one(wm_source_reader *self, wm_error *err) {
   wm_status status = self->source->ops->next(self->source, &self->next, err);
+  while (status == WM_OK && drop_quantities(&self->next, self->drops)) {
+    self->source->counts.ignored++;
+    status = self->source->ops->next(self->source, &self->next, err);
+  }
   self->has_next = status == WM_OK;
   self->next.source = self->index;
   if (self->has_next && self->change.change) self->change.change(self->change.context, &self->next);
@@ -82,6 +100,7 @@ wm_status wm_source_readers_open(const wm_assembly *assembly, wm_source_reader *
     if (change) reader->change = *change;
     reader->source = assembly->sources[i].source;
     reader->index = (uint16_t)i;
+    reader->drops = assembly->sources[i].drops;
     reader->source->from_ns = INT64_MIN;
     reader->source->until_ns = INT64_MAX;
     if (reader->source->is_live) continue;

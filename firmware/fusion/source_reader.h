@@ -21,6 +21,7 @@ typedef struct wm_source_reader {
   wm_source *source;
   wm_event_change change;  // .change NULL: none
   uint16_t index;          // in the run's table
+  uint32_t drops;          // bit per wm_quantity that is another source's
   wm_time_ns from_ns, until_ns;
   // events outside of from_s and until_s (ignored), and the source's counts while they were read
   wm_source_counts outside;

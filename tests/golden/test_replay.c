@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recording in, files out: the same bytes every time, whatever arrives late, and an account of every datum.
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -219,6 +220,66 @@ static void a_source_that_is_not_used_does_not_hold_time_back(void) {
   TEST_ASSERT_EQUAL_UINT64(100, report.poses);
 }
 
+static FILE *create(const char *file) {
+  FILE *f = fopen(in_folder(file), "w");
+  TEST_ASSERT_NOT_NULL(f);
+  return f;
+}
+
+static double last_heading_rad(const char *run) {
+  char path[64];
+  size_t length;
+  double q[8];
+  (void)snprintf(path, sizeof path, "%s/trajectory.csv", run);
+  char *text = read_all(in_folder(path), &length);
+  const char *row = text + length - 1;
+  while (row > text && row[-1] != '\n') row--;
+  for (int i = 0; i < 8; i++) {
+    char *end;
+    q[i] = strtod(row, &end);
+    row = end + 1;
+  }
+  free(text);
+  return 2 * atan2(q[6], q[7]);
+}
+
+// CAN turns at 0.5 rad/s, the IMU at 0.1: mixed, the two would be one gyro.
+static void a_streams_turn_rate_is_taken_instead_of_cans(void) {
+  small_recording_write("rec", &(small_recording){.seconds = 1});
+  TEST_ASSERT_EQUAL(0, remove(in_folder("rec/motion.csv")) | remove(in_folder("rec/sightings.csv")));
+  FILE *f = create("rec/recording.yaml");
+  fputs("format: waymark-recording/1\nvehicle: {initial_pose: {x_m: 0, y_m: 0, heading_rad: 0}}\n", f);
+  fclose(f);
+  f = create("rec/vehicle.dbc");
+  fputs(
+      "VERSION \"\"\nBU_: CAR\nBO_ 256 MOTION: 4 CAR\n SG_ SPEED : 0|16@1- (0.01,0) [-300|300] \"m/s\" CAR\n"
+      " SG_ YAW : 16|16@1- (0.001,0) [-30|30] \"rad/s\" CAR\n",
+      f);
+  fclose(f);
+  f = create("rec/can-signals.yaml");
+  fputs("- {quantity: vehicle_speed, message: MOTION, signal: SPEED}\n", f);
+  fputs("- {quantity: yaw_rate, message: MOTION, signal: YAW}\n", f);
+  fclose(f);
+  f = create("rec/can.log");
+  FILE *imu = create("rec/imu.csv");
+  fputs("t_ns,wx_radps,wy_radps,wz_radps\n", imu);
+  for (int i = 0; i <= 200; i++) {
+    fprintf(f, "(%d.%06d) can0 100#6400F401\n", i / 50, i % 50 * 20000);
+    fprintf(imu, "%lld,0,0,0.1\n", i * 20000000LL);
+  }
+  fclose(f);
+  fclose(imu);
+  replay_into("rec", "format: waymark-config/1\nestimator: odometry\n", "stream", &report);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.4, last_heading_rad("stream"));
+  size_t length;
+  char *health = read_all(in_folder("stream/health.json"), &length);
+  TEST_ASSERT_NOT_NULL(strstr(health, "can: yaw_rate is taken from imu"));
+  free(health);
+  replay_into("rec", "format: waymark-config/1\nestimator: odometry\nsources: [{name: imu, use: false}]\n", "can",
+              &report);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 2.0, last_heading_rad("can"));
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(the_same_replay_twice_gives_the_same_bytes);
@@ -235,5 +296,6 @@ int main(void) {
   RUN_TEST(every_datum_is_accounted_for);
   RUN_TEST(from_and_until_take_a_part_of_a_source);
   RUN_TEST(a_source_that_is_not_used_does_not_hold_time_back);
+  RUN_TEST(a_streams_turn_rate_is_taken_instead_of_cans);
   return UNITY_END();
 }
