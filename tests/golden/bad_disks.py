@@ -62,9 +62,7 @@ def inside(library):
     try:
         subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
         subprocess.run(lcm_tools.ROUTE, check=True)
-        subprocess.run(["lcm-gen", "-p", "--ppath", work / "types", *sorted((lcm_tools.ROOT / "msgs/lcm").glob("*.lcm"))], check=True)
-        sys.path.insert(0, str(work / "types"))
-        import waymark
+        waymark = lcm_tools.python_types(work)
         restarts.write_rest(work / "rest", 0.0, DRIVE_S)
         subscriber = restarts.Subscriber(waymark)
         subscriber.start()

@@ -76,14 +76,18 @@ def published(out):
         return {int(row["t_ns"]): row for row in csv.DictReader(f)}
 
 
-def check_logger(work):
-    import lcm
-
+def python_types(work):
+    """The module of the message types, made by lcm-gen as a user makes it, in work/types."""
     types = work / "types"
     subprocess.run(["lcm-gen", "-p", "--ppath", types, *sorted((ROOT / "msgs/lcm").glob("*.lcm"))], check=True)
     sys.path.insert(0, str(types))
     import waymark
+    return waymark
 
+
+def check_logger(work):
+    import lcm
+    waymark = python_types(work)
     log = work / "lcm.log"
     logger = subprocess.Popen(["lcm-logger", "-q", "-f", f"--lcm-url={URL}", log])
     try:

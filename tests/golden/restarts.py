@@ -122,10 +122,7 @@ def inside(kills):
     try:
         subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
         subprocess.run(lcm_tools.ROUTE, check=True)
-        types = work / "types"
-        subprocess.run(["lcm-gen", "-p", "--ppath", types, *sorted((lcm_tools.ROOT / "msgs/lcm").glob("*.lcm"))], check=True)
-        sys.path.insert(0, str(types))
-        import waymark
+        waymark = lcm_tools.python_types(work)
         (work / "config.yaml").write_text(
             "format: waymark-config/1\nestimator: slam\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
             "realtime: {lock_memory: false}\n"

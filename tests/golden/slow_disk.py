@@ -57,10 +57,7 @@ def inside(library):
     try:
         subprocess.run(["ip", "link", "set", "lo", "up"], check=True)
         subprocess.run(lcm_tools.ROUTE, check=True)
-        types = work / "types"
-        subprocess.run(["lcm-gen", "-p", "--ppath", types, *sorted((lcm_tools.ROOT / "msgs/lcm").glob("*.lcm"))], check=True)
-        sys.path.insert(0, str(types))
-        import waymark
+        waymark = lcm_tools.python_types(work)
         recording = work / "recording"
         lcm_tools.write_recording(recording, DRIVE_S)
         with open(recording / "sightings.csv", "a") as f:  # sightings go on without motion

@@ -72,10 +72,7 @@ def last_x_m(work, name):
 
 
 def set_pose(work, x_m):
-    types = work / "types"
-    subprocess.run(["lcm-gen", "-p", "--ppath", types, *sorted((lcm_tools.ROOT / "msgs/lcm").glob("*.lcm"))], check=True)
-    sys.path.insert(0, str(types))
-    import waymark
+    waymark = lcm_tools.python_types(work)
     told = waymark.set_pose_t()
     told.position_m, told.orientation_xyzw = [x_m, 0, 0], [0, 0, 0, 1]
     told.sigma_xy_m, told.sigma_heading_rad = 0.1, 0.1

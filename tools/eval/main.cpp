@@ -12,6 +12,7 @@
 #include "eval/detector.h"
 #include "eval/detector_command.h"
 #include "eval/figures.h"
+#include "eval/gnss_delay.h"
 #include "eval/landmark_detector.h"
 #include "eval/lines.h"
 #include "eval/print.h"
@@ -26,7 +27,7 @@ struct Arguments {
   std::vector<double> view_m;
   double size_min_px = 8;
   std::vector<double> sizes_m;
-  bool json = false, published = false, reference = false;
+  bool json = false, published = false, reference = false, takes_out_delay = false;
   CompareOptions compare;
 };
 
@@ -43,6 +44,8 @@ void parse(CLI::App *app, Arguments *a) {
   app->add_option("--against", a->against, "truth, or positions only against gnss.csv")
       ->check(CLI::IsMember({"truth", "gnss"}))
       ->capture_default_str();
+  app->add_flag("--take-out-delay", a->takes_out_delay,
+                "--against gnss: find how late the receiver's positions are, print it and take it out");
   app->add_option("--from", a->compare.from_s, "judge from this many seconds after the run's first pose");
   app->add_option("--to", a->compare.to_s, "judge up to this many seconds after the run's first pose");
   app->add_option("--detector", a->detector,
@@ -64,6 +67,7 @@ void parse(CLI::App *app, Arguments *a) {
   app->footer(
       "examples:\n"
       "  waymark eval runs/plan recordings/plan --from 60 --json\n"
+      "  waymark eval runs/car recordings/car --against gnss --take-out-delay\n"
       "  waymark eval runs/corridor recordings/corridor --detector edges --view 1.3,6,-3,3\n"
       "docs/eval.md defines each figure. Exit code: 0 done, 1 nothing to judge, 2 usage.");
 }
@@ -92,8 +96,19 @@ Figures evaluate(const Arguments &a) {
   options.against_gnss = gnss;
   if (!gnss) options.truth_offset_m = load_truth_offset(recording);
 
-  const Comparison comparison = compare(trajectory, gnss ? load_gnss(recording) : load_truth(recording), options);
+  std::vector<Pose> places = gnss ? load_gnss(recording) : load_truth(recording);
+  std::optional<GnssDelay> delay;
+  if (a.takes_out_delay) {
+    delay = find_gnss_delay(trajectory, places, options);
+    places = without_delay(places, delay->delay_s);
+  }
+  const Comparison comparison = compare(trajectory, places, options);
   Figures figures = pose_figures(comparison, trajectory.has_covariance, gnss);
+  if (delay) {
+    figures["gnss_delay_s"] = delay->delay_s;
+    figures["gnss_delay_rms_before_m"] = delay->rms_before_m;
+    figures["gnss_delay_rms_m"] = delay->rms_m;
+  }
   if (fs::exists(recording / "sightings.csv") && fs::exists(recording / "landmarks.csv"))
     add_sighting_figures(comparison, load_sightings(recording), load_landmarks(recording / "landmarks.csv"), &figures);
   if (fs::exists(run / "map-estimate.csv") && fs::exists(true_landmarks(recording)))
@@ -112,6 +127,8 @@ int main(int argc, char **argv) {
   return run_program(app, argc, argv, [&] {
     if (arguments.compare.from_s && arguments.compare.to_s && *arguments.compare.from_s >= *arguments.compare.to_s)
       throw Failure("--from must be before --to", kUsage);
+    if (arguments.takes_out_delay && arguments.against != "gnss")
+      throw Failure("--take-out-delay: is of a receiver; it needs --against gnss", kUsage);
     if (!arguments.detector.empty()) {
       const DetectorArguments detector{arguments.run, arguments.recording, arguments.camera, arguments.view_m};
       const bool lines = arguments.detector == "lines", landmarks = arguments.detector == "landmarks";

@@ -54,6 +54,10 @@ std::string figures_table(const Figures &f, const std::string &title, const std:
     out += "  its own word on its error (NEES): inside the 95 % region at " + percent(f, "nees_inside_95") +
            " of the stamps, mean " + cell(f, "nees_mean", 2) + " (" + cell(f, "anees_dof", 0) +
            " expected); longest beyond 3.5 sigma " + cell(f, "beyond_3_5_sigma_longest_s", 1, " s") + "\n";
+  if (f.contains("gnss_delay_s"))
+    out += "  the receiver's positions are late by " + cell(f, "gnss_delay_s", 2, " s") +
+           ", which is taken out here: rms of the nearest 80 % " + cell(f, "gnss_delay_rms_before_m", 3, " m") +
+           " with, " + cell(f, "gnss_delay_rms_m", 3, " m") + " without\n";
   if (f["position_rmse_landmark_seen_m"].is_number())
     out += "  position rms where a landmark was seen within 2 s: " + cell(f, "position_rmse_landmark_seen_m", 4, " m") +
            "\n";

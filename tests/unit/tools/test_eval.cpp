@@ -4,6 +4,7 @@
 #include "common/statistics.h"
 #include "eval/compare.h"
 #include "eval/figures.h"
+#include "eval/gnss_delay.h"
 #include "made.h"
 #include "unity.h"
 
@@ -409,6 +410,40 @@ std::string sent(int64_t t_ms, double age_ms, double x, double odom_x, int reset
          made::pose(x, 0, 0) + format(",1,0,1,0,0,1,tracking,%g,0,0,%d\n", odom_x, resets);
 }
 
+// A speed that changes, so that a delay is no shift; a fifth of the positions is far off.
+void test_the_delay_of_a_receiver() {
+  Trajectory run;
+  std::vector<Pose> gnss;
+  const auto x_at = [](double t) { return 5 * t + 4 * std::sin(0.7 * t); };
+  for (int i = 0; i <= 1000; ++i) {
+    Pose p;
+    p.t_ns = i * INT64_C(20'000'000);
+    p.p_m.x() = x_at(0.02 * i);
+    run.poses.push_back(p);
+    if (i % 20 != 0 || i < 100) continue;
+    p.oriented = false;
+    p.p_m = {x_at(0.02 * i - 0.37), i % 100 == 0 ? 30.0 : 0.0, 0};
+    gnss.push_back(p);
+  }
+  CompareOptions options;
+  options.against_gnss = true;
+  const GnssDelay found = find_gnss_delay(run, gnss, options);
+  TEST_ASSERT_DOUBLE_WITHIN(0.0051, 0.37, found.delay_s);
+  TEST_ASSERT_TRUE(found.rms_before_m > 1 && found.rms_m < 0.05);
+  const Comparison after = compare(run, without_delay(gnss, found.delay_s), options);
+  TEST_ASSERT_DOUBLE_WITHIN(0.05, 0, after.samples[1].error_m.x());
+  for (Pose &p : run.poses) p.p_m.setZero();
+  for (Pose &p : gnss) p.p_m = {1, 0, 0};
+  std::string why;
+  try {
+    (void)find_gnss_delay(run, gnss, options);
+  } catch (const Failure &failure) {
+    why = failure.what();
+  }
+  TEST_ASSERT_EQUAL_STRING("--take-out-delay: the robot hardly moves: the receiver's delay is not observable",
+                           why.c_str());
+}
+
 void test_published() {
   made::Folder run;
   // 1 m/s at 50 Hz. At 200 ms map jumps by 0.5 m and says so; at 300 ms by 0.3 m and doesn't.
@@ -484,6 +519,7 @@ int main() {
   RUN_TEST(test_statistics);
   RUN_TEST(test_errors_say_where);
   RUN_TEST(test_tum_serves_where_there_is_no_csv);
+  RUN_TEST(test_the_delay_of_a_receiver);
   RUN_TEST(test_published);
   RUN_TEST(test_sightings_of_known_landmarks);
   return UNITY_END();

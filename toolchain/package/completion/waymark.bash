@@ -34,7 +34,7 @@ _waymark() {
     "calibrate") words='--help --name --model --size --lens --out --camera --chessboard --aprilgrid --tag --gap --every --most --picture --config --run --map' ;;
     "detect") words='--help --detector --config --set --out --draw --rate --camera --calibration --landmarks --poses --every' ;;
     "diff") words='--help' ;;
-    "eval") words='--help --json --published --reference --align --against --from --to --detector --camera --sizes --size-min --view' ;;
+    "eval") words='--help --json --published --reference --align --against --take-out-delay --from --to --detector --camera --sizes --size-min --view' ;;
     "import") words='--help --out --camera --stamps --begin-ns --quality' ;;
     "map") words='--help --resolution --origin --inside --walls-below --negate --fine --speck --clearance --out --recording --draw --poses --json --id --picture --at --sigma --size --yaw --from --corners --calibration --camera --pose --sigma-deg --mounting-deg --family --ids --paper --rows --margin --size-min --stages --pictures --seed' ;;
     "reference") words='--help --map --range --particles --passes --seed' ;;
