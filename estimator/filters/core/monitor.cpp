@@ -7,7 +7,6 @@
 
 #include <cmath>
 #include <cstring>
-#include <limits>
 
 #include "math/elementary.hpp"
 
@@ -38,9 +37,10 @@ constexpr double kSilent_s = 2.0;     // an observing source without data for so
 constexpr double kStep_s = 0.3;       // between two steps: that of the slots
 constexpr double kLongStep_s = 1.0;   // longer ones count as this
 constexpr double kFoundWrong = 0.08;  // probability that a contradicted or a found pose is wrong (recovery.hpp: -2.5)
-// A pose that a search found is on probation for this doubt if the one before was lost within kAgain_s, or if no pose
-// fitted for kProven_s yet.
-constexpr double kProbation_s = 3.0, kAgain_s = 60.0, kProven_s = 5.0;
+// A pose that a search found is on probation until it has fitted for kProbation_s, if the one found before was lost
+// within kAgain_s, or if the one before did not fit for kProven_s more than it was contradicted. Each further one of
+// these is on probation for as much longer. What fitted more than kLongAgo_s ago does not count.
+constexpr double kProbation_s = 3.0, kAgain_s = 60.0, kProven_s = 5.0, kLongAgo_s = 60.0;
 constexpr double kAround_m = 5.0;   // sigma of a lost robot's distance from the map (landmark_ekf.cpp)
 constexpr double kOutside_m = 5.0;  // beyond the map's border and three sigma
 constexpr double kNear = 9.0;       // three sigma, squared
@@ -139,13 +139,12 @@ void add_slot(const slot &s, window *w) {
   }
 }
 
-// The last `slots` ones that are complete.
+// The last `slots` ones, of which the newest may still be open.
 window window_of(const source &s, int slots, wm_time_ns t_ns) {
   window w{};
   const int kept = s.opened < WM_MONITOR_SLOTS ? static_cast<int>(s.opened) : WM_MONITOR_SLOTS;
-  const int first = kept > 0 && wm_seconds_between(slot_at(s, 0).begin_ns, t_ns) < s.slot_s ? 1 : 0;
   const double reach_s = kSparse * slots * s.slot_s;
-  for (int age = first; age < kept && w.slots < slots; age++) {
+  for (int age = 0; age < kept && w.slots < slots; age++) {
     if (wm_seconds_between(slot_at(s, age).begin_ns, t_ns) > reach_s) break;
     add_slot(slot_at(s, age), &w);
   }
@@ -223,7 +222,7 @@ void clear(wm_monitor *self) {
   self->doubt_s = self->fitted_s = self->since_found_s = 0.0;
   self->cause = WM_CAUSE_NONE;
   self->source = self->silent = -1;
-  self->found = self->is_unsupported = self->is_outside = self->was_lost = 0;
+  self->found = self->is_unsupported = self->is_outside = self->was_lost = self->is_probation = 0;
   self->stepped_ns = WM_TIME_NONE;  // the next step takes the number of resets as it is
 }
 
@@ -241,11 +240,14 @@ void widen_box(wm_monitor *self, double x_m, double y_m) {
 void take_found(wm_monitor *self) {
   clear_windows(self);
   if (!self->was_lost) return;
-  const bool again = self->found && self->since_found_s < kAgain_s;
-  self->doubt_s = again || self->fitted_s < kProven_s ? kProbation_s : 0.0;
+  const bool again = self->found > 0 && self->since_found_s < kAgain_s;
+  self->is_probation = again || self->fitted_s < kProven_s;
+  if (!self->is_probation) self->found = 0;
+  const double probation_s = kProbation_s * larger(self->found, 1.0);
+  self->doubt_s = !self->is_probation ? 0.0 : probation_s < kLostAfter_s ? probation_s : kLostAfter_s;
   self->cause = self->doubt_s > 0.0 ? WM_CAUSE_LOST_AGAIN : WM_CAUSE_NONE;
   self->source = -1;
-  self->found = 1;
+  self->found++;
   self->since_found_s = self->fitted_s = 0.0;
 }
 
@@ -259,15 +261,14 @@ bool is_outside(const wm_monitor &self, const wm_estimate &e) {
   return false;
 }
 
-// The observing source that is silent for longest; one that never gave anything counts as longest.
+// The observing source that is silent for longest, since its last datum or since the start.
 int32_t silent_source(const wm_monitor &self, wm_time_ns t_ns) {
   int32_t longest = -1;
   double most_s = kSilent_s;
   for (int32_t i = 0; i < WM_MONITOR_SOURCES; i++) {
     if ((self.observers >> i & 1u) == 0) continue;
     const wm_time_ns newest = self.sources[i].newest_ns;
-    const double silent_s =
-        newest == WM_TIME_NONE ? std::numeric_limits<double>::infinity() : wm_seconds_between(newest, t_ns);
+    const double silent_s = wm_seconds_between(newest == WM_TIME_NONE ? self.begun_ns : newest, t_ns);
     if (silent_s <= most_s) continue;
     most_s = silent_s;
     longest = i;
@@ -300,14 +301,16 @@ bool test_sources(wm_monitor *self, wm_time_ns t_ns, bool *fits) {
 
 void count_doubt(wm_monitor *self, bool contradicts, bool fits, double dt_s) {
   if (contradicts) {
+    self->is_probation = 0;
+    self->fitted_s = larger(self->fitted_s - dt_s, 0.0);
     // Where another source fits, either may be wrong: degraded, not lost.
     const double most_s = fits ? kLostAfter_s : kMostDoubt_s;
     if (self->doubt_s < most_s) self->doubt_s = self->doubt_s + dt_s < most_s ? self->doubt_s + dt_s : most_s;
     return;
   }
   if (!fits) return;
-  self->fitted_s += dt_s;
-  self->doubt_s = larger(self->doubt_s - kFitRate * dt_s, 0.0);
+  self->fitted_s = self->fitted_s < kLongAgo_s ? self->fitted_s + dt_s : kLongAgo_s;
+  self->doubt_s = larger(self->doubt_s - (self->is_probation ? 1.0 : kFitRate) * dt_s, 0.0);
 }
 
 }  // namespace
@@ -316,7 +319,7 @@ void count_doubt(wm_monitor *self, bool contradicts, bool fits, double dt_s) {
 void wm_monitor_init(wm_monitor *self, const wm_setup *setup, uint64_t observers) {
   std::memset(self, 0, sizeof *self);
   self->observers = observers;
-  self->next_ns = WM_TIME_NONE;
+  self->begun_ns = self->next_ns = WM_TIME_NONE;
   for (wm_monitor_source &s : self->sources) s.newest_ns = WM_TIME_NONE;
   for (int k = 0; k < 2; k++) self->low_m[k] = self->high_m[k] = NAN;
   if (setup->map) {
@@ -344,6 +347,7 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
     s->newest_ns = event->t_ns;
     wm::add_observation(s, *event, records, count);
   }
+  if (self->begun_ns == WM_TIME_NONE) self->begun_ns = event->t_ns;
   if (self->next_ns != WM_TIME_NONE && event->t_ns < self->next_ns) return 0;
   self->next_ns = event->t_ns + wm_ns_from_seconds(wm::kStep_s);
   return 1;
@@ -368,7 +372,8 @@ void wm_monitor_step(wm_monitor *self, const wm_estimate *e) {
   bool fits;
   const bool contradicts = wm::test_sources(self, e->t_ns, &fits);
   wm::count_doubt(self, contradicts, fits && !self->was_lost, dt_s);
-  if (e->state != WM_STATE_DEAD_RECKONING) self->is_unsupported = 0;
+  // Without a map every identity is unknown; that is a matter of the configuration.
+  if (e->state != WM_STATE_DEAD_RECKONING || !self->is_map_known) self->is_unsupported = 0;
   self->silent = e->state == WM_STATE_DEAD_RECKONING ? wm::silent_source(*self, e->t_ns) : -1;
   self->is_outside = wm::is_outside(*self, *e);
 }

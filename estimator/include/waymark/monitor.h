@@ -50,12 +50,13 @@ typedef struct wm_monitor {
   double doubt_s;              // time of contradiction that fitting observations have not made up for
   double fitted_s;             // time of fitting observations since the pose was set or found
   double since_found_s;        // since a search found a pose
-  wm_time_ns stepped_ns, next_ns;
+  wm_time_ns begun_ns, stepped_ns, next_ns;
   uint32_t resets;
   int32_t cause, source;        // of the present doubt; source -1: none
-  int32_t found, is_map_known;  // found: a search found a pose before
+  int32_t found, is_map_known;  // found: poses that a search found, one soon after the other
   int32_t is_unsupported, is_outside;
-  int32_t was_lost, silent;  // by the estimator; silent: source, -1: none
+  int32_t was_lost, silent;        // by the estimator; silent: source, -1: none
+  int32_t is_probation, reserved;  // of a found pose, until it fits
 } wm_monitor;
 
 // `observers`: bit for each of the run's sources that may give observations. The setup is not kept.
