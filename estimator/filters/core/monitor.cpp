@@ -139,12 +139,13 @@ void add_slot(const slot &s, window *w) {
   }
 }
 
-// The last `slots` ones, of which the newest may still be open.
+// The last `slots` ones that are complete.
 window window_of(const source &s, int slots, wm_time_ns t_ns) {
   window w{};
   const int kept = s.opened < WM_MONITOR_SLOTS ? static_cast<int>(s.opened) : WM_MONITOR_SLOTS;
+  const int first = kept > 0 && wm_seconds_between(slot_at(s, 0).begin_ns, t_ns) < s.slot_s ? 1 : 0;
   const double reach_s = kSparse * slots * s.slot_s;
-  for (int age = 0; age < kept && w.slots < slots; age++) {
+  for (int age = first; age < kept && w.slots < slots; age++) {
     if (wm_seconds_between(slot_at(s, age).begin_ns, t_ns) > reach_s) break;
     add_slot(slot_at(s, age), &w);
   }
@@ -206,7 +207,7 @@ verdict_of_source test(const source &s, wm_time_ns t_ns) {
     if (w.slots > 0 && out.cause == WM_CAUSE_NONE) out.cause = cause_of(w);
     out.is_unknown = out.is_unknown || (w.filled == 0 && is_too_large_a_share(w.unknown, w.slots, kUnknownShare));
   }
-  out.fits = out.cause == WM_CAUSE_NONE && w.filled > 0;
+  out.fits = out.cause == WM_CAUSE_NONE && (w.filled > 0 || slot_at(s, 0).scalars > 0);
   return out;
 }
 
@@ -313,6 +314,16 @@ void count_doubt(wm_monitor *self, bool contradicts, bool fits, double dt_s) {
   self->doubt_s = larger(self->doubt_s - (self->is_probation ? 1.0 : kFitRate) * dt_s, 0.0);
 }
 
+// The covariance of the mixture of this pose and one anywhere on the map; a filter that has widened its own keeps it.
+void widen(const wm_monitor &self, double wrong, wm_estimate *e) {
+  constexpr int kAxes[] = {0, 1, 5};
+  for (const int axis : kAxes) {
+    const double more = wrong * (axis == 5 ? square(kPi) / 3.0 : self.spread_m2);
+    double &variance = e->covariance[wm_cov_index(axis, axis)];
+    if (variance < more) variance += more;
+  }
+}
+
 }  // namespace
 }  // namespace wm
 
@@ -384,22 +395,22 @@ int wm_monitor_doubts(const wm_monitor *self) {
 
 void wm_monitor_judge(const wm_monitor *self, wm_estimate *e) {
   if (e->state == WM_STATE_SEARCHING) return;
-  if (!wm_monitor_doubts(self)) {
-    if (e->state != WM_STATE_DEAD_RECKONING || self->silent < 0) return;
+  const bool doubts = wm_monitor_doubts(self) != 0;
+  if (doubts) {
+    const bool is_known_why = self->doubt_s > 0.0 || self->is_unsupported;
+    e->cause = static_cast<uint8_t>(is_known_why ? self->cause : WM_CAUSE_OFF_MAP);
+    e->cause_source = static_cast<int8_t>(is_known_why ? self->source : -1);
+  } else if (e->state == WM_STATE_DEAD_RECKONING && self->silent >= 0) {
     e->cause = WM_CAUSE_SILENT;
     e->cause_source = static_cast<int8_t>(self->silent);
-    return;
   }
-  const bool is_known_why = self->doubt_s > 0.0 || self->is_unsupported;
-  e->cause = static_cast<uint8_t>(is_known_why ? self->cause : WM_CAUSE_OFF_MAP);
-  e->cause_source = static_cast<int8_t>(is_known_why ? self->source : -1);
-  if (e->state == WM_STATE_LOST) return;
-  e->state = self->doubt_s > wm::kLostAfter_s ? WM_STATE_LOST : WM_STATE_DEGRADED;
-  // The mixture of this pose and one anywhere on the map.
-  const double lasting = self->doubt_s < wm::kLostAfter_s ? self->doubt_s / wm::kLostAfter_s : 1.0;
-  const double wrong = wm::kFoundWrong + (1.0 - wm::kFoundWrong) * wm::square(lasting);
-  e->covariance[wm_cov_index(0, 0)] += wrong * self->spread_m2;
-  e->covariance[wm_cov_index(1, 1)] += wrong * self->spread_m2;
-  e->covariance[wm_cov_index(5, 5)] += wrong * wm::square(wm::kPi) / 3.0;
-  if (!(e->lost_probability > wrong)) e->lost_probability = wrong;
+  if (e->state == WM_STATE_LOST) {
+    wm::widen(*self, wm::finite(e->lost_probability) ? e->lost_probability : 0.5, e);
+  } else if (doubts) {
+    e->state = self->doubt_s > wm::kLostAfter_s ? WM_STATE_LOST : WM_STATE_DEGRADED;
+    const double lasting = self->doubt_s < wm::kLostAfter_s ? self->doubt_s / wm::kLostAfter_s : 1.0;
+    const double wrong = wm::kFoundWrong + (1.0 - wm::kFoundWrong) * wm::square(lasting);
+    wm::widen(*self, wrong, e);
+    if (!(e->lost_probability > wrong)) e->lost_probability = wrong;
+  }
 }

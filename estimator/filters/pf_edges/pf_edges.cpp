@@ -20,6 +20,9 @@ constexpr double kUnknownSigma_m = 0.03;  // of a point whose detector gives non
 constexpr int kPointsMin = 5;             // of a scan: fewer leave a pose open
 // The published mean is that of particles about the heaviest one. Half a corridor's width, 20 degrees; not swept.
 constexpr double kCluster_m = 0.5, kCluster_rad = 0.35;
+// Share of a scan that the best particle leaves unexplained, from which on it contradicts all particles: more than half
+// of what is seen. Furniture and people are less.
+constexpr double kContradicted = 0.5;
 constexpr double kFoundShare = 0.9;  // of the weight in that cluster, from which on a search has ended; not swept
 constexpr double kCovarianceMin[3] = {1.6e-5, 1.6e-5, 1e-6};  // a pixel of 1.3 cm / sqrt(12), 1 mrad; squared
 
@@ -120,12 +123,14 @@ wm_status pf_edges::take_points(const wm_event &event, record_list records) {
 
   propagate();
   const bool fused = weigh(event.as.points);
+  const bool contradicts = fused && unexplained() > kContradicted;
   if (fused) resample();
 
   if (fused) life_.fused(event.t_ns);
   if (life_.searching() && particles_.main_cluster(kCluster_m, kCluster_rad).share > kFoundShare) life_.fits_again();
   wm_innovation record = record_of(event, WM_RESIDUAL_RANGE);
-  record.verdict = fused ? (uint8_t)WM_FUSED : (uint8_t)WM_REJECTED_SINGULAR;
+  // A scan that no particle explains has moved the weights nevertheless; its record tells the monitor.
+  record.verdict = !fused ? (uint8_t)WM_REJECTED_SINGULAR : contradicts ? (uint8_t)WM_REJECTED_GATE : (uint8_t)WM_FUSED;
   records.add(record);
   return WM_OK;
 }
@@ -154,6 +159,19 @@ bool pf_edges::weigh(const wm_points &points) {
   select_points(points);
   return scan_.count >= kPointsMin &&
          particles_.weigh(map_, field_, scan_, table_, params_.exponent, params_.weight == PF_EDGES_SUM);
+}
+
+// Share of the scan that the best particle leaves unexplained: its mean score, from that of points on edges (0) to that
+// of points far from any (1).
+double pf_edges::unexplained() const {
+  int best = 0;
+  for (int i = 1; i < particles_.count(); i++)
+    if (particles_.weight(i) > particles_.weight(best)) best = i;
+  const sin_cos h = sincos(particles_.heading(best));
+  const double scored =
+      kScoreUnit * score(map_, scan_, table_, particles_.x(best), particles_.y(best), h.cos, h.sin) / scan_.count;
+  const double none = kScoreUnit * table_.value[0][edge_map::kFar], all = kScoreUnit * table_.value[0][0];
+  return (all - scored) / (all - none);
 }
 
 void pf_edges::resample() {

@@ -39,6 +39,7 @@ class pf_edges {
   wm_status take_points(const wm_event &event, record_list records);
   void propagate();
   bool weigh(const wm_points &points);
+  double unexplained() const;
   void resample();
   void select_points(const wm_points &points);
 

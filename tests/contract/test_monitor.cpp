@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+// The life cycle of each estimator with the monitor of innovations (waymark/monitor.h), as a run has it: observations
+// that contradict the pose make it degraded and then lost, with a cause; good ones do neither.
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "drives.hpp"
+#include "parameter_sweep.hpp"
+#include "unity.h"
+#include "waymark/monitor.h"
+
+namespace {
+
+constexpr double kContradicted_s = 20.0, kEnd_s = 50.0;
+constexpr double kDegradedWithin_s = 6.0, kLostWithin_s = 25.0;
+
+struct free_memory {
+  void operator()(void *p) const { std::free(p); }
+};
+
+struct seen {
+  double doubted_s = INFINITY, lost_s = INFINITY;  // the first time
+  double confident_s = 0.0;                        // tracking, since the observations contradict
+  bool has_cause = true;
+  uint8_t cause = WM_CAUSE_NONE;  // at the first doubt
+  double sigma_m = 0.0;           // at the end
+};
+
+// Observations of a world that is turned and scaled against the map, differently each second.
+void contradict(wm_event *e) {
+  const double second = std::floor(wm_seconds_between(0, e->t_ns));
+  const double turn = 0.9 + 0.4 * std::sin(7.0 * second), scale = 1.5 + 0.2 * std::sin(3.0 * second);
+  if (e->kind == WM_EVENT_SIGHTING) {
+    e->as.sighting.bearing_rad = -e->as.sighting.bearing_rad + turn;
+    e->as.sighting.range_m *= scale;
+  } else if (e->kind == WM_EVENT_POINTS) {
+    wm_points &p = e->as.points;
+    for (uint32_t i = 0; i < p.count; i++) {
+      const double x = scale * static_cast<double>(p.x_m[i]), y = -scale * static_cast<double>(p.y_m[i]);
+      p.x_m[i] = static_cast<float>(std::cos(turn) * x - std::sin(turn) * y);
+      p.y_m[i] = static_cast<float>(std::sin(turn) * x + std::cos(turn) * y);
+      p.normal_rad[i] = NAN;
+    }
+  } else if (e->kind == WM_EVENT_STEREO) {
+    for (double *px : {e->as.stereo.left_px, e->as.stereo.right_px}) px[1] += 60.0 * std::sin(second + e->as.stereo.id);
+  }
+}
+
+void note(const wm_estimate &e, double t_s, double dt_s, seen *out) {
+  if (e.state == WM_STATE_DEGRADED || e.state == WM_STATE_LOST) {
+    if (t_s < out->doubted_s) {
+      out->doubted_s = t_s;
+      out->cause = e.cause;
+    }
+    out->has_cause = out->has_cause && e.cause != WM_CAUSE_NONE;
+  }
+  if (e.state == WM_STATE_LOST && t_s < out->lost_s) out->lost_s = t_s;
+  if (e.state == WM_STATE_TRACKING && t_s > kContradicted_s) out->confident_s += dt_s;
+  out->sigma_m = std::sqrt(e.covariance[0]);
+}
+
+seen drive(const char *name, drives::scene &scene, const std::vector<parameters::setting> &settings, bool is_good) {
+  const wm_estimator &of = *wm_estimator_find(name);
+  const parameters::values params(of.params, settings), motion(wm_motion_params_table, {}),
+      sightings(wm_sighting_params_table, {});
+  const wm_setup &setup = scene.setup(static_cast<const wm_motion_params *>(static_cast<const void *>(motion.data())),
+                                      reinterpret_cast<const wm_sighting_params *>(sightings.data()));
+  const char *why = "";
+  const size_t bytes = of.state_bytes(params.data(), &setup, &why);
+  TEST_ASSERT_GREATER_THAN_MESSAGE(0, bytes, why);
+  const std::unique_ptr<void, free_memory> state(std::aligned_alloc(64, (bytes + 63) / 64 * 64));
+  TEST_ASSERT_EQUAL(WM_OK, of.init(state.get(), params.data(), &setup));
+  static wm_monitor monitor;
+  wm_monitor_init(&monitor, &setup, 1);
+  seen out;
+  double last_s = 0.0;
+  for (wm_event e : scene.events()) {
+    const double t_s = wm_seconds_between(0, e.t_ns);
+    if (!is_good && t_s > kContradicted_s) contradict(&e);
+    wm_innovation records[WM_INNOVATIONS_PER_EVENT_MAX];
+    size_t count = 0;
+    const bool is_motion = wm_event_is_motion(&e) != 0;
+    if (!is_motion && !(of.takes & WM_EVENT_BIT(e.kind))) continue;
+    const wm_status status = is_motion ? of.predict(state.get(), &e)
+                                       : of.correct(state.get(), &e, records, WM_INNOVATIONS_PER_EVENT_MAX, &count);
+    if (status != WM_OK && count == 0) continue;
+    wm_estimate estimate;
+    of.estimate(state.get(), &estimate);
+    if (wm_monitor_take(&monitor, &e, records, count)) wm_monitor_step(&monitor, &estimate);
+    wm_monitor_judge(&monitor, &estimate);
+    note(estimate, t_s, t_s - last_s, &out);
+    last_s = t_s;
+  }
+  return out;
+}
+
+void check(const char *name, drives::scene &scene, const std::vector<parameters::setting> &settings = {}) {
+  const seen good = drive(name, scene, settings, true), bad = drive(name, scene, settings, false);
+  char text[300];
+  (void)snprintf(text, sizeof text,
+                 "%s: good doubted %.1f; bad doubted %.1f lost %.1f cause %s confident %.1f s sigma %.2f m", name,
+                 good.doubted_s, bad.doubted_s, bad.lost_s, wm_cause_name(bad.cause), bad.confident_s, bad.sigma_m);
+  TEST_ASSERT_TRUE_MESSAGE(std::isinf(good.doubted_s), text);
+  TEST_ASSERT_TRUE_MESSAGE(bad.doubted_s < kContradicted_s + kDegradedWithin_s, text);
+  TEST_ASSERT_TRUE_MESSAGE(bad.lost_s < kContradicted_s + kLostWithin_s, text);
+  TEST_ASSERT_TRUE_MESSAGE(bad.confident_s < kDegradedWithin_s && bad.has_cause, text);
+  TEST_ASSERT_TRUE_MESSAGE(bad.sigma_m > good.sigma_m && bad.sigma_m > 0.5, text);
+}
+
+using drives::motion;
+constexpr unsigned kSightings = drives::kBearings | drives::kRanges;
+
+void landmark_ekf_is_degraded_then_lost(void) {
+  drives::scene scene(motion::ticks_and_gyro, kSightings, 0, kEnd_s);
+  check("landmark_ekf", scene);
+}
+void slam_is_degraded_then_lost(void) {
+  drives::scene scene(motion::ticks_and_gyro, kSightings, drives::kNoMap, kEnd_s);
+  check("slam", scene);
+}
+void edge_mcl_is_degraded_then_lost(void) {
+  drives::scene scene(motion::ticks_and_gyro, drives::kPoints, 0, kEnd_s);
+  check("edge_mcl", scene);
+}
+void pf_edges_is_degraded_then_lost(void) {
+  drives::scene scene(motion::ticks_and_gyro, drives::kPoints, 0, kEnd_s);
+  check("pf_edges", scene, {{"particles", 500}});
+}
+void stereo_ekf_is_degraded_then_lost(void) {
+  drives::dive scene(0, kEnd_s);
+  check("stereo_ekf", scene);
+}
+
+}  // namespace
+
+void setUp(void) {}
+void tearDown(void) {}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(landmark_ekf_is_degraded_then_lost);
+  RUN_TEST(slam_is_degraded_then_lost);
+  RUN_TEST(edge_mcl_is_degraded_then_lost);
+  RUN_TEST(pf_edges_is_degraded_then_lost);
+  RUN_TEST(stereo_ekf_is_degraded_then_lost);
+  return UNITY_END();
+}
