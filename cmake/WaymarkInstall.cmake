@@ -31,8 +31,12 @@ function(wm_install_compressed file name where component)
   install(FILES ${made} DESTINATION ${CMAKE_INSTALL_DATADIR}/${where} COMPONENT ${component})
 endfunction()
 wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark.1 waymark.1 man/man1 runtime)
+if(TARGET waymark-camera)
+  install(TARGETS waymark-camera DESTINATION lib/waymark COMPONENT runtime)
+endif()
 if(TARGET waymark-web) # a robot's page comes from the robot
   install(TARGETS waymark-web DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT runtime)
+  install(FILES config/waymark-web.service DESTINATION lib/systemd/system COMPONENT runtime)
   wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-web.1 waymark-web.1 man/man1 runtime)
 endif()
 

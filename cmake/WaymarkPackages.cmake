@@ -59,7 +59,7 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/conffi
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME waymark-tools)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
-set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${cameras}${simulator}${videos}")
+set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${simulator}${videos}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "desk tools for a robot that knows where it is
 Simulates drives, judges runs against truth, draws reports, calibrates
 cameras, makes maps: waymark eval, report, simulate, diff, calibrate, map.")

@@ -450,25 +450,19 @@ wm_status camera_device_make(const wm_camera_device_config *config, const wm_cam
   return WM_OK;
 }
 
+int wm_camera_has_libcamera(void) {
 #ifdef WM_WITH_LIBCAMERA
-static const camera_io *const kByLibcamera = &kLibcamera;
-#else
-static const camera_io *const kByLibcamera = NULL;
-#endif
-
-int wm_camera_has_libcamera(void) { return kByLibcamera != NULL; }
-
-int wm_camera_is_process(int argc, char *const *argv) {
-  if (!kByLibcamera || argc != 2 || strcmp(argv[1], CAMERA_PROCESS) != 0) return 0;
-  camera_process_serve(kByLibcamera);
   return 1;
+#else
+  return 0;
+#endif
 }
 
 wm_status wm_camera_device_open(const wm_camera_device_config *config, const wm_camera *camera, int32_t index,
                                 wm_warn_fn warn, void *context, wm_camera_device **out, wm_error *err) {
   *out = NULL;
   const camera_io *io = config->libcamera[0] ? &kCameraProcess : &kV4l2;
-  if (config->libcamera[0] && !kByLibcamera)
+  if (config->libcamera[0] && !wm_camera_has_libcamera())
     return wm_fail(err, WM_BAD_CONFIG, "camera %s: " WM_WITHOUT_LIBCAMERA, config->name);
   return camera_device_make(config, camera, index, warn, context, io, NULL, out, err);
 }

@@ -56,6 +56,6 @@ typedef struct camera_io {
 } camera_io;
 
 extern const camera_io kV4l2;
-extern const camera_io kLibcamera;  // with WM_WITH_LIBCAMERA only
+extern const camera_io kLibcamera;  // of the program waymark-camera
 
 #endif

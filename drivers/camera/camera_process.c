@@ -7,6 +7,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <spawn.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
@@ -118,14 +119,32 @@ static int ask(camera_process *self, message *m, int within_ms) {
   return -ENODEV;
 }
 
-static int spawn(camera_process *self, int its_socket) {
+// Of this program's folder: bin/waymark and lib/waymark/waymark-camera are installed, and built, side by side.
+static int path_of_program(char out[PATH_MAX]) {
+  static const char kBesideBin[] = "/../lib/waymark/waymark-camera";
+  const ssize_t length = readlink("/proc/self/exe", out, PATH_MAX - 1);
+  if (length <= 0) return -errno;
+  out[length] = '\0';
+  char *end = strrchr(out, '/');
+  if (!end || (size_t)(end - out) + sizeof kBesideBin > PATH_MAX) return -ENAMETOOLONG;
+  memcpy(end, kBesideBin, sizeof kBesideBin);
+  return 0;
+}
+
+static int spawn(camera_process *self, const char *program, int its_socket) {
   posix_spawn_file_actions_t files;
-  char program[] = "waymark", argument[] = CAMERA_PROCESS;
-  char *const arguments[] = {program, argument, NULL};
+  char path[PATH_MAX], argument[] = CAMERA_PROCESS;
+  char *const arguments[] = {path, argument, NULL};
+  if (program) {
+    (void)snprintf(path, sizeof path, "%s", program);
+  } else {
+    const int unknown = path_of_program(path);
+    if (unknown) return unknown;
+  }
   if (posix_spawn_file_actions_init(&files) != 0) return -ENOMEM;
   int failed = posix_spawn_file_actions_adddup2(&files, its_socket, SOCKET);
   if (!failed) failed = posix_spawn_file_actions_adddup2(&files, self->memory, PICTURES);
-  if (!failed) failed = posix_spawn(&self->pid, "/proc/self/exe", &files, NULL, arguments, environ);
+  if (!failed) failed = posix_spawn(&self->pid, path, &files, NULL, arguments, environ);
   (void)posix_spawn_file_actions_destroy(&files);
   return -failed;
 }
@@ -137,13 +156,13 @@ static int above(int fd) {
   return moved;
 }
 
-static int begin(camera_process *self) {
+static int begin(camera_process *self, const char *program) {
   int ends[2] = {-1, -1};
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) return -errno;
   self->socket = ends[0];
   const int its_socket = above(ends[1]);
   self->memory = above(memfd_create("waymark-pictures", MFD_CLOEXEC));
-  int failed = its_socket < 0 || self->memory < 0 ? -EMFILE : spawn(self, its_socket);
+  int failed = its_socket < 0 || self->memory < 0 ? -EMFILE : spawn(self, program, its_socket);
   if (its_socket >= 0) (void)close(its_socket);
   return failed;
 }
@@ -167,12 +186,11 @@ static void close_camera(void *camera) {
 }
 
 static int open_camera(void *context, camera_identity *wanted, void **camera) {
-  (void)context;
   camera_process *self = calloc(1, sizeof *self);
   if (!self) return -ENOMEM;
   self->socket = self->memory = -1;
   message m = {.what = OPEN, .identity = *wanted};
-  int failed = begin(self);
+  int failed = begin(self, context);
   if (!failed) failed = ask(self, &m, START_MS);
   if (failed) {
     close_camera(self);

@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include "cli/commands.h"
-#include "waymark/devices.h"
 #include "waymark/text.h"
 
 static const char kHelp[] =
@@ -91,7 +90,6 @@ static int unknown(const char *command) {
 }
 
 int main(int argc, char **argv) {
-  if (wm_camera_is_process(argc, argv)) return EXIT_DONE;
   const char *command = argc > 1 ? argv[1] : NULL;
   if (!command) {
     print_help(stderr);

@@ -16,7 +16,7 @@
 #include "rt/memory.h"
 #include "waymark/keeper.h"
 
-#define BEFORE_FIRST_NS (100 * WM_NS_PER_MS)  // time for the threads to get ready
+#define BEFORE_FIRST_NS (100 * WM_NS_PER_MS)  // of a recording: time for the threads to get ready; devices are there
 #define LOOK_EVERY_NS (20 * WM_NS_PER_MS)     // main thread: stop, reload, end of the recording
 
 void live_say(live *self, const char *format, ...) {
@@ -239,7 +239,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
 
 static void start_clock(live *self) {
   const wm_source_reader *first = wm_source_readers_earliest(self->readers, self->assembly.source_count);
-  wm_time_ns begin_ns = wm_monotonic_ns() + BEFORE_FIRST_NS;
+  wm_time_ns begin_ns = wm_monotonic_ns() + (first ? BEFORE_FIRST_NS : 0);
   self->clock = (run_clock){begin_ns, first ? first->next.arrival_ns : begin_ns, self->options->speed};
   self->estimator.next_publish_ns = self->clock.run_ns;
   self->estimator.next_health_ns = self->clock.run_ns;

@@ -10,6 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "output/replace_file.h"
 #include "output/saved_pose.h"
 
 #define NAME_MAX_BYTES (WM_PATH_MAX + 40)
@@ -101,26 +102,16 @@ static void keep(black_box *self, const char *what) {
     path_of(self, kParts[i], from);
     (void)snprintf(name, sizeof name, "%s-%04u-%s", what, number, kParts[i]);
     path_of(self, name, to);
-    if (rename(from, to) != 0 && errno != ENOENT) unwritable(self, strerror(errno));
+    const int failed = rename_through(from, to);
+    if (failed && failed != ENOENT) unwritable(self, strerror(failed));
   }
   int failed = black_box_video_keep(self->folder, what, number);
   if (failed) unwritable(self, strerror(failed));
   say(self, "kept as ", to);
 }
 
-// A log without its end record is of a run that was killed.
-static int has_died(const char *path) {
-  wm_log_reader *log;
-  static wm_event event;
-  uint64_t missing = 0;
-  int cut = 0;
-  if (access(path, F_OK) != 0) return 0;
-  if (wm_log_open(path, &log, NULL) != WM_OK) return 1;
-  while (wm_log_next(log, &event, &missing, &cut, NULL) == WM_OK) {
-  }
-  wm_log_reader_close(log);
-  return cut;
-}
+// A log without its end record is of a run that was killed. Not read as a whole: that would delay the start.
+static int has_died(const char *path) { return access(path, F_OK) == 0 && !wm_log_is_closed(path); }
 
 // ── writing ─────────────────────────────────────────────────────────────────────────────────────────────────────────
 

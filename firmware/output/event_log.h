@@ -92,6 +92,8 @@ typedef struct wm_log_head {
   } sources[WM_SOURCES_MAX];
 } wm_log_head;
 
+// Whether the file has the end record of a run that ended regularly, by its last bytes alone.
+int wm_log_is_closed(const char *path);
 // Reads the head. WM_BAD_DATA with file and position where it is no event log, or damaged. Allocates.
 wm_status wm_log_open(const char *path, wm_log_reader **out, wm_error *err);
 // The same from an open file, of which it takes ownership.

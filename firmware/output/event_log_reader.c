@@ -45,6 +45,18 @@ static wm_status reserve(wm_log_reader *self, size_t bytes, wm_error *err) {
   return WM_OK;
 }
 
+int wm_log_is_closed(const char *path) {
+  uint8_t bytes[4 + 4 + 1 + 8];  // length, checksum, tag, count
+  FILE *file = fopen(path, "rbe");
+  if (!file) return 0;
+  const int is_read =
+      fseek(file, -(long)sizeof bytes, SEEK_END) == 0 && fread(bytes, 1, sizeof bytes, file) == sizeof bytes;
+  (void)fclose(file);
+  wm_reader r = wm_reader_of(bytes, sizeof bytes);
+  const uint32_t length = wm_get_u32(&r), crc = wm_get_u32(&r);
+  return is_read && length == sizeof bytes - 8 && bytes[8] == WM_LOG_CLOSED && crc32_of(0, bytes + 8, length) == crc;
+}
+
 // WM_END at the end of the file, *cut where that is within a record.
 static wm_status read_record(wm_log_reader *self, record *out, int *cut, wm_error *err) {
   uint8_t head[8];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <errno.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "output/crc32.h"
 #include "output/event_log.h"
@@ -110,6 +111,8 @@ wm_status wm_log_close(wm_log_writer *self, wm_error *err) {
   if (!self->file) return WM_OK;
   write_u64(self, WM_LOG_CLOSED, self->events);
   wm_log_flush(self);
+  // To the disk. What is no file (a pipe) has none.
+  if (!self->failed && fdatasync(fileno(self->file)) != 0 && errno != EINVAL) self->failed = errno;
   if (fclose(self->file) != 0 && !self->failed) self->failed = errno ? errno : EIO;
   self->file = NULL;
   if (self->failed)

@@ -29,7 +29,7 @@ static int write_through(int fd, const file_part *parts, size_t count) {
   return failed;
 }
 
-static int rename_through(const char *from, const char *to) {
+int rename_through(const char *from, const char *to) {
   char folder[WM_PATH_MAX];
   if (rename(from, to) != 0) return errno;
   (void)snprintf(folder, sizeof folder, "%s", to);

@@ -16,4 +16,7 @@ typedef struct file_part {
 // seconds: not on the real-time thread. WM_IO with the reason; the old file is then unchanged.
 wm_status replace_file(const char *path, const file_part *parts, size_t count, wm_error *err);
 
+// Renames and syncs the folder, so that a power cut does not take the new name back. 0 or an errno.
+int rename_through(const char *from, const char *to);
+
 #endif

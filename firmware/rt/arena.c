@@ -12,7 +12,7 @@ static size_t round_up(size_t bytes, size_t to) { return (bytes + to - 1) / to *
 wm_status wm_arena_open(wm_arena *self, size_t bytes, wm_error *err) {
   memset(self, 0, sizeof *self);
   size_t size = round_up(bytes ? bytes : 1, (size_t)sysconf(_SC_PAGESIZE));
-  void *base = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  void *base = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
   if (base == MAP_FAILED)
     return wm_fail(err, WM_IO,
                    "memory: %zu bytes are needed and the system refused: %s; smaller queues and rings "
@@ -46,7 +46,7 @@ void wm_arena_seal(wm_arena *self, int lock) {
   memset(self->base + self->used, 0, self->bytes - self->used);
   volatile uint8_t *byte = self->base;
   size_t page = (size_t)sysconf(_SC_PAGESIZE);
-  for (size_t i = 0; i < self->bytes; i += page) byte[i] = byte[i];  // a write makes each page present
+  for (size_t i = 0; i < self->bytes; i += page) byte[i] = byte[i];  // present even where MAP_POPULATE found no memory
   if (lock) self->locked = mlock(self->base, self->bytes) == 0;
   self->sealed = 1;
 }

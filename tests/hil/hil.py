@@ -289,7 +289,7 @@ def arguments():
 def main():
     args = arguments()
     work, waymark, simulate = (path.resolve() for path in args.paths)
-    machine = MACHINES[args.arch]
+    machine, camera = MACHINES[args.arch], waymark.parent.parent / "lib/waymark/waymark-camera"
     if args.arch != "amd64":
         work = work / args.arch
     for program in (machine["qemu"][0], "mmdebstrap", machine["cc"]):
@@ -304,10 +304,12 @@ def main():
         shutil.copy(args.package, work / "share/waymark.deb")
     if args.arch == "amd64":
         shutil.copy(waymark, work / "share/waymark")
+        if camera.exists():
+            shutil.copy(camera, work / "share/waymark-camera")
     drives.COMPILER = machine["cc"]
     failures = []
     for name in args.parts or [part for part in PARTS if part != "power"]:
-        if name == "libcamera" and (args.arch != "amd64" or b"libcamera.so" not in waymark.read_bytes()):
+        if name == "libcamera" and (args.arch != "amd64" or not camera.exists()):
             print("libcamera: waymark is built without it: skipped")
             continue
         if name in UNDER_SYSTEMD and (args.arch != "amd64" or not args.package):

@@ -41,9 +41,9 @@ def main():
         print("skipped: there is no dpkg-shlibdeps")
         return 77
     offences = 0
-    page = BUILD / "bin/waymark-web"
+    page, camera = BUILD / "bin/waymark-web", BUILD / "lib/waymark/waymark-camera"
     tools = sorted(p for p in (BUILD / "bin").glob("waymark-*") if "montecarlo" not in p.name and p != page)
-    for component, programs in (("RUNTIME", [BUILD / "bin/waymark", *([page] if page.exists() else [])]), ("TOOLS", tools)):
+    for component, programs in (("RUNTIME", [BUILD / "bin/waymark", *(p for p in (page, camera) if p.exists())]), ("TOOLS", tools)):
         says, needs = declared(component), needed(programs)
         says.pop("waymark", None)
         for package, version in needs.items():

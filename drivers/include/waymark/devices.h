@@ -77,10 +77,6 @@ extern const char *const wm_camera_formats[];
 
 // Whether this build has libcamera; without it a configuration that names such a camera is refused.
 int wm_camera_has_libcamera(void);
-
-// A camera by libcamera runs in a process of its own, which is this program with one argument: to be asked before any
-// other argument is looked at. 1: this is such a process, and it has done its work.
-int wm_camera_is_process(int argc, char *const *argv);
 #define WM_WITHOUT_LIBCAMERA \
   "this waymark is built without libcamera; build it where libcamera-dev is installed, or name the camera by device:"
 

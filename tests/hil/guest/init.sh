@@ -39,5 +39,10 @@ ip link set lo up
 ip route add 224.0.0.0/4 dev lo
 /lib/systemd/systemd-udevd --daemon 2>/dev/null
 # The program alone, or the package as on a robot; into memory, as all that is written here.
-if [ -e /host/waymark ]; then cp /host/waymark /usr/bin/; else dpkg -i /host/waymark.deb; fi
+if [ -e /host/waymark ]; then
+  cp /host/waymark /usr/bin/
+  [ ! -e /host/waymark-camera ] || install -D /host/waymark-camera /usr/lib/waymark/waymark-camera
+else
+  dpkg -i /host/waymark.deb
+fi
 run_and_stop
