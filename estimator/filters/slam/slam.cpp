@@ -14,6 +14,9 @@ namespace {
 constexpr double kOwnFrame_m = 1e-3, kOwnFrame_rad = 1e-3;  // sigmas of a start that defines the map's frame
 constexpr double kStart_m = 0.05, kStart_rad = 0.05;        // of a start without sigmas, as in landmark_ekf
 constexpr double kSurveyed_m = 1e-4, kSurveyed_rad = 0.01;  // no map is better; headings come without a sigma
+// Growth of the heading's variance in one step, a silence of all sources: with a sigma of 1 rad the sine of an error
+// differs from it by 16 %. Not swept.
+constexpr double kUnknownHeading_rad2 = 1.0;
 
 const char *const kReads[] = {
     "!motion.states.wheel_difference", "!motion.noise.adapt", "motion.", "!sightings.use.elevation",
@@ -301,7 +304,10 @@ wm_status slam::predict(const wm_event &motion) {
   const wm_status status = joint_.check_motion(motion);
   if (status != WM_OK) return status;
   const bool had_scale = joint_.has_way_scale();
+  const double heading_rad2 = joint_.variance(kHeading);
   joint_.move(motion);
+  // Beyond that a correction's linearization is wrong: the pose is to be found in the map.
+  if (params_.recover && life_.tracking() && joint_.variance(kHeading) > heading_rad2 + kUnknownHeading_rad2) lose();
   if (joint_.has_way_scale() != had_scale) follow_scale();
   return status;
 }
