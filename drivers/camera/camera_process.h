@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Cameras in a process of their own, one each: a library that ends its process where a camera is unplugged (libcamera
-// does) ends no more than that. Its program is ../lib/waymark/waymark-camera beside this one's folder, or the context of
-// `open`, and has one argument. Calls and their results go through a socket, pictures through shared memory.
+// does) ends no more than that. Its program is ../lib/waymark/waymark-camera beside this one's folder, or the context
+// of `open`, and has one argument. Calls and their results go through a socket, pictures through shared memory.
 #ifndef WM_CAMERA_PROCESS_H
 #define WM_CAMERA_PROCESS_H
 
