@@ -215,11 +215,14 @@ static void ended(void *context, const wm_assembly *assembly, const wm_run_repor
   source_data_judge(&self->sources, wm_recording_quantities(self->recording), self->found);
   for (size_t i = 0; i < assembly->source_count; i++) print_source(&assembly->sources[i], &self->sources.facts[i]);
   const uint64_t due = messages_due(assembly->config, report);
-  fact("drive        %.1f s: tracking %.1f %%, dead reckoning %.1f %%, lost %.1f %%, no pose %.1f %%\n",
-       report->recorded_s, 100 * evidence_share(&self->evidence, WM_STATE_TRACKING, due),
-       100 * evidence_share(&self->evidence, WM_STATE_DEAD_RECKONING, due),
-       100 * evidence_share(&self->evidence, WM_STATE_LOST, due),
-       100 * evidence_share(&self->evidence, WM_STATE_SEARCHING, due));
+  fact(
+      "drive        %.1f s: tracking %.1f %%, degraded %.1f %%, dead reckoning %.1f %%, lost %.1f %%, no pose %.1f "
+      "%%\n",
+      report->recorded_s, 100 * evidence_share(&self->evidence, WM_STATE_TRACKING, due),
+      100 * evidence_share(&self->evidence, WM_STATE_DEGRADED, due),
+      100 * evidence_share(&self->evidence, WM_STATE_DEAD_RECKONING, due),
+      100 * evidence_share(&self->evidence, WM_STATE_LOST, due),
+      100 * evidence_share(&self->evidence, WM_STATE_SEARCHING, due));
   const size_t bad = wm_findings_of(self->found, WM_SEVERITY_BAD);
   evidence_judge(&self->evidence, assembly, &report->health, due, self->found);
   wm_health_map_findings(&report->health, self->found);

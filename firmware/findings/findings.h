@@ -51,6 +51,7 @@ typedef enum wm_finding_id {
   WM_FOUND_OBSERVATIONS_BIASED,
   WM_FOUND_NOISE_TOO_SMALL,
   WM_FOUND_POSE_LOST,
+  WM_FOUND_POSE_DOUBTFUL,
   WM_FOUND_POSE_NOT_FOUND,
   WM_FOUND_START_CONTRADICTED,
   WM_FOUND_LANDMARK_CONTRADICTED,
@@ -136,6 +137,8 @@ void wm_findings_each(const wm_findings *self, wm_line_fn say, void *context);
 // devices, refused observations, maps.
 void wm_health_findings(const wm_health *health, wm_findings *out);
 
+// What a cause of a doubtful pose says of its source: "has biased innovations"; "" for none.
+const char *wm_cause_text(unsigned cause);
 // Of these, the ones about the map: landmarks that moved, identities that stand for two, capacity.
 void wm_health_map_findings(const wm_health *health, wm_findings *out);
 

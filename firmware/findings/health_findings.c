@@ -108,6 +108,30 @@ static void about_motion(uint32_t bits, wm_findings *out) {
 }
 
 // Landmarks at other places than in the map, or without capacity in the map.
+const char *wm_cause_text(unsigned cause) {
+  static const char *const kTexts[WM_CAUSE_COUNT] = {"",
+                                                     "contradicts the pose",
+                                                     "is refused",
+                                                     "has innovations that are larger than stated",
+                                                     "has biased innovations",
+                                                     "contradicts poses soon after they are found",
+                                                     "has unknown identities",
+                                                     "is silent",
+                                                     "does not reach the pose"};
+  return cause < WM_CAUSE_COUNT ? kTexts[cause] : "";
+}
+
+static void about_state(const wm_health *h, wm_findings *out) {
+  if ((h->state != WM_STATE_DEGRADED && h->state != WM_STATE_LOST) || h->cause == WM_CAUSE_NONE) return;
+  const int has_source = h->cause_source >= 0 && (uint32_t)h->cause_source < h->source_count;
+  const char *name = has_source                     ? h->sources[h->cause_source].name
+                     : h->cause == WM_CAUSE_OFF_MAP ? "map"
+                                                    : "observations";
+  if (wm_findings_has(out, WM_FOUND_POSE_DOUBTFUL, name)) return;
+  wm_find(out, WM_FOUND_POSE_DOUBTFUL, WM_SEVERITY_BAD, name, NULL, "%s: the pose is %s now", wm_cause_text(h->cause),
+          wm_state_name(h->state));
+}
+
 void wm_health_map_findings(const wm_health *health, wm_findings *out) {
   static const struct {
     wm_counter_kind kind;
@@ -153,6 +177,7 @@ void wm_health_findings(const wm_health *health, wm_findings *out) {
     about_silence(s, out);
     about_device(s, out);
   }
+  about_state(health, out);
   about_motion(health->motion_health, out);
   wm_health_map_findings(health, out);
   about_program(health, out);

@@ -71,6 +71,8 @@ const wm_finding_kind kFindingKinds[WM_FOUND_COUNT] = {
                                   "raise the sensor's sigma if it is as noisy; else look at clock, mounting and map"},
     [WM_FOUND_POSE_LOST] = {"pose-lost", "what is observed contradicted the pose for seconds",
                             "see the findings about the sources and the calibration: they name the likely causes"},
+    [WM_FOUND_POSE_DOUBTFUL] = {"pose-doubtful", "innovations over seconds contradict the pose, or do not support it",
+                                "see the other findings; `waymark check CONFIG RECORDING` tries the usual causes"},
     [WM_FOUND_POSE_NOT_FOUND] = {"pose-not-found", "no start is given, and what is observed does not decide it",
                                  "give x_m, y_m and heading_rad as vehicle.initial_pose in recording.yaml or as "
                                  "initial_pose in the configuration"},

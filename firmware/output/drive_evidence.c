@@ -14,7 +14,10 @@
 #define REFUSED_BAD 0.20
 #define LOST_BAD 0.05
 #define SQUARES_BAD 3.0  // mean square of innovations over their sigma; 1 is expected, correlated errors make it less
-#define FACTOR_BAD 3.0   // of a sensor's stated sigma
+#define DEGRADED_NOTE 0.01  // good drives are degraded for less
+#define DEGRADED_BAD 0.10
+#define BIASED_LOST_MAX 0.3  // share of the time lost beyond which a bias may come from wrong poses
+#define FACTOR_BAD 3.0       // of a sensor's stated sigma
 // Mean of the innovations over their sigma. Errors that last are correlated, so a tenth of a sigma is usual.
 #define BIAS_NOTE 0.5
 // Ranges of radio and ultrasound are some per cent long; a tape measure and a map are not off by 2 %.
@@ -94,6 +97,9 @@ static void take_event(drive_evidence *self, const wm_event *event) {
 
 static void take_published(drive_evidence *self, const wm_published *p) {
   if (p->now.state < WM_STATE_COUNT) self->states[p->now.state]++;
+  const int has_source = p->now.cause_source >= 0 && p->now.cause_source < WM_SOURCES_MAX;
+  if (p->now.state == WM_STATE_DEGRADED && p->now.cause < WM_CAUSE_COUNT)
+    self->causes[has_source ? p->now.cause_source : WM_SOURCES_MAX][p->now.cause]++;
   if (self->published++ == 0) self->begun = *p;
   const double after_s = wm_seconds_between(self->begun.now.t_ns, p->now.t_ns);
   if (self->start_moved_s > 0 || after_s > START_S || p->now.resets == self->begun.now.resets) return;
@@ -205,6 +211,23 @@ static void not_found(const wm_assembly *assembly, double share, wm_findings *ou
       ->size = share;
 }
 
+// The most frequent cause of a degraded state, with its source.
+static void doubtful(const drive_evidence *self, const wm_assembly *assembly, uint64_t total, wm_findings *out) {
+  const double share = evidence_share(self, WM_STATE_DEGRADED, total);
+  size_t source = WM_SOURCES_MAX, cause = 0;
+  for (size_t i = 0; i <= WM_SOURCES_MAX; i++)
+    for (size_t k = 1; k < WM_CAUSE_COUNT; k++)
+      if (self->causes[i][k] > self->causes[source][cause]) {
+        source = i;
+        cause = k;
+      }
+  if (share < DEGRADED_NOTE) return;
+  wm_find(out, WM_FOUND_POSE_DOUBTFUL, share > DEGRADED_BAD ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE,
+          source < assembly->source_count ? assembly->sources[source].name : "observations", NULL,
+          "%s: the pose is degraded for %.0f %% of the drive", wm_cause_text((unsigned)cause), 100 * share)
+      ->size = share;
+}
+
 static void states(const drive_evidence *self, const wm_assembly *assembly, uint64_t total, wm_findings *out) {
   if (self->published == 0 && self->poses > 0) return;  // a log: it holds no messages
   const double lost = evidence_share(self, WM_STATE_LOST, total);
@@ -213,6 +236,7 @@ static void states(const drive_evidence *self, const wm_assembly *assembly, uint
     wm_find(out, WM_FOUND_POSE_LOST, WM_SEVERITY_BAD, "drive", NULL,
             "the pose is lost for %.0f %% of the drive: what is observed contradicts it", 100 * lost)
         ->size = lost;
+  doubtful(self, assembly, total, out);
   if (searching > 0.5) not_found(assembly, searching, out);
 }
 
@@ -298,7 +322,7 @@ static void calibration(const wm_health *health, wm_findings *out) {
 void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health, uint64_t total,
                     wm_findings *out) {
   for (size_t i = 0; i < assembly->source_count; i++) refused(self, assembly, i, out);
-  const int is_lost = evidence_share(self, WM_STATE_LOST, total) > LOST_BAD;
+  const int is_lost = evidence_share(self, WM_STATE_LOST, total) > BIASED_LOST_MAX;
   for (size_t i = 0; i < assembly->source_count; i++) biased(self, assembly, i, is_lost, out);
   states(self, assembly, total, out);
   start(self, assembly, out);

@@ -29,8 +29,9 @@ typedef struct drive_evidence {
   uint64_t states[WM_STATE_COUNT], published;  // messages by wm_state
   double log_likelihood;                       // of all updates, nats; a refused one counts as an outlier of any value
   uint64_t updates, fused;
-  uint64_t poses;                // fused
-  wm_time_ns first_ns, last_ns;  // stamps of the events
+  uint64_t causes[WM_SOURCES_MAX + 1][WM_CAUSE_COUNT];  // of the doubtful messages; the last row: without a source
+  uint64_t poses;                                       // fused
+  wm_time_ns first_ns, last_ns;                         // stamps of the events
   int has_events;
   wm_published begun;  // the first message
   // The first new pose soon after the start: how far from the one before; 0 s: there was none.

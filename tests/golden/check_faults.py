@@ -135,7 +135,15 @@ GOOD = {
     "rec/video/front.avi": avi(), "rec/video/front.csv": "frame,t_ns,exposure_ns\n" + "".join(f"{i},{i * 10**8},0\n" for i in range(4)),
 }
 
+# Findings that these faults make.
+MADE = {
+    "bare-ranges", "camera-implausible", "data-late", "data-unused", "file-note", "folder-not-writable", "gear-implausible",
+    "identities-unknown", "landmarks-at-one-place", "length-implausible", "map-implausible", "map-not-kept", "no-data",
+    "noise-implausible", "open-network", "publish-settings", "refused-input", "rows-skipped", "sensors-disagree",
+    "start-off-map", "stereo-implausible", "value-implausible"}
 # (name, configuration, file, what is there, what is planted (whole files: None first), words of the finding)
+BARE = [",".join([*l.split(",")[:3], "" if i else "bearing_rad", *l.split(",")[4:]]) for i, l in enumerate(GOOD["rec/sightings.csv"].splitlines())]
+GOOD["slam.yaml"] = CONFIG.replace("landmark_ekf", "slam")
 C, E, CAL = "config.yaml", "edges.yaml", "rec/calibration.yaml"
 FAULTS = [
     ("key misspelt", C, C, "rate_hz", "rat_hz", "did you mean 'publish.rate_hz'"),
@@ -187,6 +195,10 @@ FAULTS = [
     ("km/h taken as m/s", C, "rec/vehicle.dbc", "Left : 0|16@1- (0.001,0)", "Left : 0|16@1- (0.1,0)", "wheel_speed_rear_left: as much as"),
     ("deg/s taken as rad/s", C, "rec/can.log", None, can_log(turn=57.3), "yaw_rate: as much as"),
     ("gyro the wrong way round", C, "rec/can.log", None, can_log(turn=-1), "yaw_rate turns left where"),
+    ("column of another program", C, "rec/landmarks.csv", None, "\n".join(l + (",colour", ",red")[i > 0] for i, l in enumerate(LANDMARKS.splitlines())) + "\n", "unknown column"),
+    ("map that nobody makes", C, C, "initial_pose", "start: {saved_map: map.bin, saved_pose: pose.yaml}\ninitial_pose", "makes no map to keep"),
+    ("ranges without bearings", "slam.yaml", "rec/sightings.csv", None, "".join(l + "\n" for l in BARE), "ranges without a bearing"),
+    ("stream of nobody", C, "rec/recording.yaml", "name: rec", "name: rec\ninitial_pose: {x_m: 0}", "belongs under vehicle"),
     ("speeds of two units", C, "rec/can.log", None, can_log(speed=3.6), "vehicle_speed is 3.6"),
 ]
 
@@ -208,7 +220,7 @@ def check(*words):
 
 
 def main():
-    failures = []
+    failures, made = [], set()
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)
         for config in (C, E):
@@ -231,12 +243,15 @@ def main():
             lay_out(folder, {file: new})
             found = check(folder / config, folder / "rec")
             mine = [f for f in found if words in f["text"] + "; " + f["fix"]]
+            made |= {f["id"] for f in mine}
             said = "".join(f"\n    {f['severity']}: {f['text']}; fix: {f['fix']}" for f in found)
             print(f"{'good' if mine else 'BAD '}  {name}{said}")
             if not mine:
                 failures.append(f"{name}: not found")
             failures.extend(f"{name}: no fix: {f['text']}" for f in found if not f["fix"])
     print(f"{len(FAULTS)} faults planted")
+    if made != MADE:
+        failures.append(f"MADE is not what is made: {sorted(made ^ MADE)}")
     print("\n".join(failures) or "good")
     sys.exit(bool(failures))
 

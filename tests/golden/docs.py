@@ -7,6 +7,7 @@ docs.py references checks alone, that
 - what docs/glossary.md, docs/design.md and docs/runtime.md name in code is there;
 - docs/runtime.md names all files of the robot's rooms that have atomics, locks or shared memory;
 - docs/live.md's table of faults names tests that there are;
+- docs/troubleshooting.md has a section for each finding, and no other;
 - docs/images/threads.svg is what its script draws."""
 import collections
 import difflib
@@ -191,9 +192,20 @@ def drawing():
     return 1
 
 
+def findings():
+    """Prints findings of the table without a section in docs/troubleshooting.md, and the reverse; returns how many."""
+    kinds = set(re.findall(r'\[WM_FOUND_[A-Z_]+\]\s*=\s*\{\s*"([a-z-]+)"', (ROOT / "firmware/findings/kinds.c").read_text()))
+    page = (ROOT / "docs/troubleshooting.md").read_text()
+    sections, links = set(re.findall(r"(?m)^### (.+)$", page)), set(re.findall(r"\(#([a-z-]+)\)", page))
+    faults = sorted(kinds ^ sections) + sorted(links - kinds)
+    for name in faults:
+        print(f"docs/troubleshooting.md: {name}: {'no section' if name in kinds else 'no such finding in firmware/findings/kinds.c'}")
+    return len(faults) if kinds else 1
+
+
 def checked():
     """How many faults the checks find that need no built program."""
-    return references() + glossary() + walks() + named_files() + shared() + fault_tests() + drawing()
+    return references() + glossary() + walks() + named_files() + shared() + fault_tests() + findings() + drawing()
 
 
 def main():

@@ -64,20 +64,11 @@ static void add(char *why, size_t why_bytes, const char *name, const char *what)
 
 // Why the pose is doubtful, with the source.
 static void add_cause(const wm_health *h, char *why, size_t why_bytes) {
-  static const char *const kText[WM_CAUSE_COUNT] = {"",
-                                                    "contradict the pose",
-                                                    "is refused",
-                                                    "has too large innovations",
-                                                    "has biased innovations",
-                                                    "contradicts found poses",
-                                                    "has unknown identities",
-                                                    "is silent",
-                                                    "does not reach the pose"};
   const uint32_t i = (uint32_t)h->cause_source;  // -1 becomes a number beyond all sources
   const char *name = i < h->source_count            ? h->sources[i].name
                      : h->cause == WM_CAUSE_OFF_MAP ? "the map"
                                                     : "observations";
-  if (h->cause < WM_CAUSE_COUNT) add(why, why_bytes, name, kText[h->cause]);
+  add(why, why_bytes, name, wm_cause_text(h->cause));
 }
 
 // Every source with a fault.

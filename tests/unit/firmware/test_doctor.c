@@ -40,10 +40,32 @@ static const wm_finding *about(const char *what) {
   return NULL;
 }
 
+static wm_finding_id id_of(const char *what) {
+  static const struct {
+    const char *begins;
+    wm_finding_id id;
+  } kIds[] = {{"kernel", WM_FOUND_COMPUTER_REALTIME},
+              {"throttling", WM_FOUND_COMPUTER_REALTIME},
+              {"interrupts", WM_FOUND_COMPUTER_REALTIME},
+              {"latency", WM_FOUND_COMPUTER_REALTIME},
+              {"clock", WM_FOUND_COMPUTER_CLOCK},
+              {"governor", WM_FOUND_COMPUTER_SLOW},
+              {"temperature", WM_FOUND_COMPUTER_SLOW},
+              {"memory lock", WM_FOUND_COMPUTER_MEMORY},
+              {"can ", WM_FOUND_CAN_INTERFACE},
+              {"camera ", WM_FOUND_CAMERA_DEVICE},
+              {"lcm", WM_FOUND_LCM_ROUTE}};
+  for (size_t i = 0; i < sizeof kIds / sizeof kIds[0]; i++)
+    if (strncmp(what, kIds[i].begins, strlen(kIds[i].begins)) == 0) return kIds[i].id;
+  TEST_FAIL_MESSAGE(what);
+  return WM_FOUND_COUNT;
+}
+
 // Everything that isn't good says what to do.
 static void expect(const char *what, wm_severity level, const char *text) {
   const wm_finding *f = about(what);
   TEST_ASSERT_EQUAL_MESSAGE(level, f->severity, f->text);
+  TEST_ASSERT_EQUAL_MESSAGE(id_of(what), f->id, f->text);
   TEST_ASSERT_NOT_NULL_MESSAGE(strstr(f->text, text), f->text);
   TEST_ASSERT_EQUAL_MESSAGE(level == WM_SEVERITY_GOOD, f->fix[0] == '\0', f->fix);
 }
@@ -136,6 +158,7 @@ static void cameras_are_looked_at(void) {
 static void no_way_for_messages_is_found(void) {
   doctor_lcm("udpm://239.255.76.67:7667?ttl=1", &found);
   const wm_finding *f = about("lcm");
+  TEST_ASSERT_EQUAL(WM_FOUND_LCM_ROUTE, f->id);
   TEST_ASSERT_TRUE(f->severity == WM_SEVERITY_NOTE ||
                    f->severity == WM_SEVERITY_BAD);  // without a network it is the latter
   TEST_ASSERT_TRUE(f->fix[0] != '\0');

@@ -1,0 +1,112 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Each finding of the table (firmware/findings/kinds.c) has a test that makes it, and drives that do not.
+
+    findings.py BIN_DIR SOURCE_DIR
+
+Mistakes in the files of small_robot.py make the findings of a drive; those of devices, runs and computers are made in
+the C tests, those of calibrations and maps in check_faults.py. The robot without a mistake makes none."""
+import json
+import math
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+
+import replays
+import small_robot
+
+small_robot.DURATION_S = 40.0  # long enough to be lost, short enough for a table of drives
+
+
+def each(**columns):
+    def change(row):
+        for name, function in columns.items():
+            row[name] = str(function(float(row[name])))
+    return replays.each_row(change)
+
+
+def text(old, new):
+    def change(whole):
+        assert old in whole, old
+        return whole.replace(old, new)
+    return change
+
+
+CONFIG = (pathlib.Path(sys.argv[2]) / "config/robot.yaml").read_text() if len(sys.argv) > 2 else ""
+ODOMETRY = "format: waymark-config/1\nestimator: odometry\n"
+TICKS = CONFIG.replace("\nmotion:\n", "\nmotion:\n  model: ticks\n")
+NO_START = {"recording.yaml": lambda w: re.sub(r"vehicle:\n.*\n", "", w)}
+
+# finding, changes of files, configuration, further options
+MADE = [
+    ("likely-cause", {"calibration.yaml": text("rpy_deg: [0, 0, 0]", "rpy_deg: [0, 0, 180]")}, CONFIG, []),
+    ("observations-refused", {"calibration.yaml": text("rpy_deg: [0, 0, 0]", "rpy_deg: [0, 0, 180]")}, CONFIG, ["--quick"]),
+    ("pose-lost", {"sightings.csv": each(bearing_rad=lambda b: -b)}, CONFIG, ["--quick"]),
+    ("pose-not-found", NO_START, ODOMETRY, ["--quick"]),
+    ("calibration-off", {"sightings.csv": each(range_m=lambda r: 1.07 * r)}, CONFIG, ["--quick"]),
+    ("start-contradicted", {"recording.yaml": lambda w: re.sub(r"heading_rad: ([0-9.]+)", "heading_rad: 2.6", w)}, CONFIG, ["--quick"]),
+    ("landmark-not-on-map", {"landmarks.csv": lambda w: "".join(l + "\n" for l in w.splitlines() if l[:2] != "5,")}, CONFIG, ["--quick"]),
+    ("landmark-contradicted", {"landmarks.csv": lambda w: re.sub(r"(?m)^5,([-0-9.]+)", lambda m: f"5,{float(m[1]) + 1.5}", w)}, CONFIG, ["--quick"]),
+    ("identities-unknown", {"sightings.csv": each(id=lambda i: int(i) + 100)}, CONFIG, ["--quick"]),
+    ("rows-skipped", {"sightings.csv": each(bearing_rad=math.degrees)}, CONFIG, ["--quick"]),
+    ("clocks-apart", {"sightings.csv": replays.each_row(lambda r: r.update({n: str(int(r[n]) - 10**18) for n in ("t_ns", "arrival_ns")}))}, CONFIG, ["--quick"]),
+    ("rate-implausible", {"can.log": lambda w: re.sub(r"^\((\d+\.\d+)\)", lambda m: f"({1.7e9 + (float(m[1]) - 1.7e9) * 1e-4:.6f})", w, flags=re.M)}, CONFIG, ["--quick"]),
+    ("rows-disordered", {"sightings.csv": lambda w: "\n".join([w.splitlines()[0], *reversed(w.splitlines()[1:])]) + "\n"}, CONFIG, ["--quick"]),
+    ("sensor-unknown", {"sightings.csv": text(",front,", ",frnt,")}, CONFIG, ["--quick"]),
+    ("misspelt-name", {"sightings.csv": lambda w: w.replace("bearing_rad", "bearing", 1)}, CONFIG, ["--quick"]),
+    ("data-unused", {}, TICKS, ["--quick"]),
+    ("sensors-disagree", {"can-signals.yaml": text("signal: GYRO_Z", "signal: GYRO_Z, scale: -1")}, CONFIG, ["--quick"]),
+]
+
+
+def check(bin_dir, config, recording, options):
+    done = subprocess.run([bin_dir / "waymark", "check", config, recording, "--json", *options], capture_output=True, text=True)
+    try:
+        return json.loads(done.stdout)["findings"]
+    except json.JSONDecodeError:
+        sys.exit(f"check {config} {recording}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+
+
+def covered_elsewhere(root):
+    """Identifiers that other tests name, by their C constant or, in check_faults.py, as text."""
+    kinds = dict(re.findall(r'\[WM_FOUND_([A-Z_]+)\]\s*=\s*\{\s*"([a-z-]+)"', (root / "firmware/findings/kinds.c").read_text()))
+    named = set()
+    for path in ("tests/unit/firmware/test_findings.c", "tests/unit/firmware/test_doctor.c"):
+        named |= {kinds[name] for name in re.findall(r"WM_FOUND_([A-Z_]+)", (root / path).read_text()) if name in kinds}
+    faults = (root / "tests/golden/check_faults.py").read_text()
+    named |= {i for i in kinds.values() if f'"{i}"' in faults}
+    return set(kinds.values()), named
+
+
+def main():
+    bin_dir, root = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
+    failures = []
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = pathlib.Path(temporary)
+        small_robot.write(folder / "good")
+        config = folder / "config.yaml"
+        for made_by in ([], ["--quick"]):
+            config.write_text(CONFIG)
+            failures += [f"the good robot: {f['id']}: {f['text']}" for f in check(bin_dir, config, folder / "good", made_by)]
+        for identifier, changes, configuration, options in MADE:
+            recording = folder / identifier
+            recording.mkdir()
+            for file in (folder / "good").iterdir():
+                content = file.read_text()
+                (recording / file.name).write_text(changes[file.name](content) if file.name in changes else content)
+            config.write_text(configuration)
+            found = check(bin_dir, config, recording, options)
+            mine = [f for f in found if f["id"] == identifier]
+            print(f"{'good' if mine else 'BAD '} {identifier}: {mine[0]['text'] if mine else [f['id'] for f in found]}")
+            if not mine:
+                failures.append(f"{identifier} is not made")
+            failures += [f"{f['id']}: no link or cause" for f in found if f["link"].split("#")[1] != f["id"] or not f["cause"]]
+    every, elsewhere = covered_elsewhere(root)
+    failures += [f"{i}: no test makes it" for i in sorted(every - elsewhere - {row[0] for row in MADE})]
+    print("\n".join(failures) or "good")
+    sys.exit(bool(failures))
+
+
+main()

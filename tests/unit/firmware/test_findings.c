@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: Apache-2.0
+// Findings that a health or the records of a drive make, a row each: what is broken, and the finding that follows.
+// A health in order makes none.
+#include <math.h>
+#include <string.h>
+
+#include "output/drive_evidence.h"
+#include "unity.h"
+
+static wm_health health;
+static wm_findings found;
+static wm_said said;
+static char log_text[4000];
+
+void setUp(void) {
+  memset(&health, 0, sizeof health);
+  memset(&found, 0, sizeof found);
+  memset(&said, 0, sizeof said);
+  log_text[0] = '\0';
+  health.state = WM_STATE_TRACKING;
+  health.source_count = 1;
+  health.loops = 10000;
+  wm_source_health *s = &health.sources[0];
+  (void)snprintf(s->name, sizeof s->name, "eye");
+  s->device = WM_DEVICE_WORKS;
+  s->received = s->fused = 1000;
+  s->lateness_max_ns = 200 * WM_NS_PER_MS;
+  s->lateness_p99_ns = 20 * WM_NS_PER_MS;
+  s->lateness_worst_ns = 30 * WM_NS_PER_MS;
+}
+void tearDown(void) {}
+
+#define EYE (&health.sources[0])
+static void late(void) { EYE->late = 5; }
+static void lost(void) { EYE->lost = 5; }
+static void overflown(void) { EYE->overflows = 5; }
+static void malformed(void) { EYE->malformed = 5; }
+static void out_of_order(void) { EYE->out_of_order = 5; }
+static void from_the_future(void) { EYE->future = 5; }
+static void frozen(void) { EYE->frozen = 5; }
+static void silent(void) { EYE->stale = 1; }
+static void never_there(void) {
+  EYE->stale = 1;
+  EYE->received = EYE->fused = 0;
+}
+static void unplugged(void) { EYE->device = WM_DEVICE_ABSENT; }
+static void refused(void) {
+  EYE->fused = 500;
+  EYE->rejected[WM_REJECTED_GATE] = 500;
+}
+static void unknown(void) {
+  EYE->fused = 0;
+  EYE->rejected[WM_REJECTED_UNKNOWN_ID] = 1000;
+}
+static void doubtful(void) {
+  health.state = WM_STATE_DEGRADED;
+  health.cause = WM_CAUSE_BIASED;
+}
+static void dead_encoder(void) { health.motion_health = 1; }
+static void counter(wm_counter_kind kind) {
+  health.counter_count = 1;
+  health.counters[0] = (wm_counter){.kind = kind, .landmark_id = 7, .count = 3};
+}
+static void moved(void) { counter(WM_COUNTER_LANDMARKS_MOVED); }
+static void ambiguous(void) { counter(WM_COUNTER_IDENTITIES_AMBIGUOUS); }
+static void full(void) { counter(WM_COUNTER_MAP_FULL); }
+static void two_runs(void) { health.other_runs_total = 1; }
+static void slow_disk(void) { health.outputs_lost = 12; }
+static void slow_computer(void) { health.deadlines_missed = 500; }
+
+static const struct {
+  void (*breaks)(void);
+  wm_finding_id id;
+  const char *about;
+} kBroken[] = {{late, WM_FOUND_DATA_LATE, "eye"},
+               {lost, WM_FOUND_DATA_MISSING, "eye"},
+               {overflown, WM_FOUND_DATA_MISSING, "eye"},
+               {malformed, WM_FOUND_ROWS_SKIPPED, "eye"},
+               {out_of_order, WM_FOUND_ROWS_DISORDERED, "eye"},
+               {from_the_future, WM_FOUND_CLOCKS_APART, "eye"},
+               {frozen, WM_FOUND_VALUES_FROZEN, "eye"},
+               {silent, WM_FOUND_SOURCE_SILENT, "eye"},
+               {never_there, WM_FOUND_NO_DATA, "eye"},
+               {unplugged, WM_FOUND_DEVICE_TROUBLE, "eye"},
+               {refused, WM_FOUND_OBSERVATIONS_REFUSED, "eye"},
+               {unknown, WM_FOUND_IDENTITIES_UNKNOWN, "eye"},
+               {doubtful, WM_FOUND_POSE_DOUBTFUL, "eye"},
+               {dead_encoder, WM_FOUND_MOTION_SENSOR, "motion"},
+               {moved, WM_FOUND_LANDMARK_MOVED, "map"},
+               {ambiguous, WM_FOUND_IDENTITIES_AMBIGUOUS, "map"},
+               {full, WM_FOUND_CAPACITY_REACHED, "map"},
+               {two_runs, WM_FOUND_OTHER_RUN, "messages"},
+               {slow_disk, WM_FOUND_OUTPUTS_LOST, "outputs"},
+               {slow_computer, WM_FOUND_DEADLINES_MISSED, "computer"}};
+
+static void a_health_in_order_makes_no_finding(void) {
+  wm_health_findings(&health, &found);
+  TEST_ASSERT_EQUAL_MESSAGE(0, found.count, found.at[0].text);
+}
+
+static void each_broken_health_makes_its_finding_alone(void) {
+  for (size_t i = 0; i < sizeof kBroken / sizeof kBroken[0]; i++) {
+    setUp();
+    kBroken[i].breaks();
+    wm_health_findings(&health, &found);
+    const char *name = kFindingKinds[kBroken[i].id].identifier;
+    TEST_ASSERT_TRUE_MESSAGE(wm_findings_has(&found, kBroken[i].id, kBroken[i].about), name);
+    TEST_ASSERT_EQUAL_MESSAGE(1, found.count, name);
+    TEST_ASSERT_TRUE_MESSAGE(found.at[0].fix[0] != '\0', name);
+  }
+}
+
+// A thousand updates of a range of 10 m, each this many of its sigmas (0.1 m) off and the mean of them, too.
+static void drive_with_mean(double sigmas, double mean_sigmas, wm_verdict verdict) {
+  static drive_evidence evidence;
+  static wm_config config;
+  static wm_assembly assembly;
+  memset(&evidence, 0, sizeof evidence);
+  assembly.config = &config;
+  assembly.source_count = 1;
+  assembly.setup.start.p_m[0] = (double)NAN;
+  (void)snprintf(assembly.sources[0].name, sizeof assembly.sources[0].name, "eye");
+  for (int i = 0; i < 1000; i++) {
+    const wm_innovation in = {.residual = WM_RESIDUAL_RANGE,
+                              .expected = 10,
+                              .landmark_id = -1,
+                              .observed = 10 + ((i % 2 ? 1 : -1) * sigmas + mean_sigmas) * 0.1,
+                              .variance = 0.01,
+                              .verdict = (uint8_t)verdict};
+    evidence_put(&evidence, WM_OUTPUT_INNOVATION, &in);
+  }
+  evidence_judge(&evidence, &assembly, &health, 0, &found);
+}
+
+static void drive_with(double sigmas, wm_verdict verdict) { drive_with_mean(sigmas, 0, verdict); }
+
+static void innovations_with_a_mean_are_found(void) {
+  drive_with_mean(0.8, 0.2, WM_FUSED);
+  TEST_ASSERT_EQUAL(0, found.count);
+  drive_with_mean(0.8, 0.9, WM_FUSED);
+  TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_OBSERVATIONS_BIASED, "eye"));
+  TEST_ASSERT_NOT_NULL(strstr(found.at[0].text, "is too large"));
+}
+
+// Ranges that are 7 % too long, whether they were fused or refused.
+static void ranges_that_are_too_long_are_found_with_their_factor(void) {
+  drive_with_mean(0.5, 7, WM_REJECTED_GATE);
+  TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_OBSERVATIONS_BIASED, "eye"));
+  TEST_ASSERT_EQUAL_STRING("its ranges are 7.0 % longer than the map has them, on average",
+                           found.at[found.count - 1].text);
+  TEST_ASSERT_NOT_NULL(strstr(found.at[found.count - 1].fix, "multiply range_m by 0.935"));
+}
+
+static void innovations_of_their_sigma_are_good_and_larger_ones_are_found(void) {
+  drive_with(1, WM_FUSED);
+  TEST_ASSERT_EQUAL(0, found.count);
+  drive_with(2.5, WM_FUSED);
+  TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_NOISE_TOO_SMALL, "eye"));
+  TEST_ASSERT_EQUAL_DOUBLE(2.5, round(found.at[0].size * 1e6) / 1e6);
+}
+
+static void a_finding_of_the_drive_is_not_repeated_by_the_health(void) {
+  drive_with(5, WM_REJECTED_GATE);
+  TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_OBSERVATIONS_REFUSED, "eye"));
+  refused();
+  wm_health_findings(&health, &found);
+  size_t refusals = 0;
+  for (size_t i = 0; i < found.count; i++) refusals += found.at[i].id == WM_FOUND_OBSERVATIONS_REFUSED;
+  TEST_ASSERT_EQUAL(1, refusals);
+}
+
+static void write_log(void *context, const char *line) {
+  (void)context;
+  (void)strncat(log_text, line, sizeof log_text - strlen(log_text) - 1);
+}
+
+static void a_log_has_each_finding_once_in_ten_minutes(void) {
+  moved();
+  wm_health_findings(&health, &found);
+  for (int s = 0; s < 599; s++) wm_said_take(&said, &found, s * WM_NS_PER_S, write_log, NULL);
+  TEST_ASSERT_EQUAL_STRING(
+      "map: 3 times a landmark was elsewhere than before; the last one is 7; fix: `waymark map survey RUN --poses RUN` "
+      "lists what moved [landmark-moved]",
+      log_text);
+  log_text[0] = '\0';
+  wm_said_take(&said, &found, 600 * WM_NS_PER_S, write_log, NULL);
+  TEST_ASSERT_TRUE(log_text[0] != '\0');
+}
+
+static void a_full_list_counts_what_it_drops(void) {
+  for (int i = 0; i < WM_FINDINGS_MAX + 3; i++)
+    wm_find(&found, WM_FOUND_FILE_NOTE, WM_SEVERITY_NOTE, "files", NULL, "%d", i)->size = i;
+  TEST_ASSERT_EQUAL(WM_FINDINGS_MAX, found.count);
+  TEST_ASSERT_EQUAL(3, found.dropped);
+  TEST_ASSERT_EQUAL_STRING("63", found.at[63].text);
+}
+
+static void every_kind_has_its_words(void) {
+  for (size_t i = 0; i < WM_FOUND_COUNT; i++) {
+    const wm_finding_kind *kind = &kFindingKinds[i];
+    TEST_ASSERT_TRUE(kind->identifier && kind->identifier[0] && kind->cause[0] && kind->fix[0]);
+    TEST_ASSERT_TRUE_MESSAGE(strlen(kind->fix) < WM_FINDING_FIX_MAX, kind->identifier);
+    for (size_t k = 0; k < i; k++) TEST_ASSERT_TRUE(strcmp(kind->identifier, kFindingKinds[k].identifier) != 0);
+  }
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(a_health_in_order_makes_no_finding);
+  RUN_TEST(each_broken_health_makes_its_finding_alone);
+  RUN_TEST(innovations_with_a_mean_are_found);
+  RUN_TEST(ranges_that_are_too_long_are_found_with_their_factor);
+  RUN_TEST(innovations_of_their_sigma_are_good_and_larger_ones_are_found);
+  RUN_TEST(a_finding_of_the_drive_is_not_repeated_by_the_health);
+  RUN_TEST(a_log_has_each_finding_once_in_ten_minutes);
+  RUN_TEST(a_full_list_counts_what_it_drops);
+  RUN_TEST(every_kind_has_its_words);
+  return UNITY_END();
+}
