@@ -20,12 +20,6 @@ set(CMAKE_CXX_FLAGS_RELWITHDEBINFO "-O2 -g1 -DNDEBUG")
 set(CMAKE_C_FLAGS_SANITIZED "-O1 -g1 -DNDEBUG -w")
 set(CMAKE_CXX_FLAGS_SANITIZED "-O1 -g1 -DNDEBUG -w")
 
-# Files that read a command line: the library for it is a header of many templates, which nobody waits for and which
-# the undefined-behaviour sanitizer would make five times larger.
-function(wm_command_lines)
-  set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS "-O1;-fno-sanitize=undefined")
-endfunction()
-
 add_library(wm_rules INTERFACE)
 target_compile_options(wm_rules INTERFACE
   ${WM_WARNINGS}

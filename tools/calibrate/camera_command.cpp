@@ -150,7 +150,7 @@ int run(const Arguments &a) {
 
 }  // namespace
 
-std::function<int()> camera_command(CLI::App &app) {
+std::function<int()> camera_command(wm::cli::App &app) {
   auto a = std::make_shared<Arguments>();
   app.description(
       "Finds a camera's model from pictures of a chessboard or an AprilGrid; lenses over 180 degrees, too.");
@@ -160,19 +160,19 @@ std::function<int()> camera_command(CLI::App &app) {
   app.add_option("--aprilgrid", a->aprilgrid,
                  "COLUMNSxROWS of tags (tag36h11, counted as Kalibr does) in place of a chessboard");
   app.add_option("--tag", a->tag_m, "AprilGrid: edge of a tag's black square, m")
-      ->check(CLI::PositiveNumber)
+      ->check(wm::cli::positive())
       ->capture_default_str();
   app.add_option("--gap", a->gap, "AprilGrid: between two tags, in edges of a tag (Kalibr's tagSpacing)")
-      ->check(CLI::PositiveNumber)
+      ->check(wm::cli::positive())
       ->capture_default_str();
   app.add_option("--model", a->model, "the camera's model; auto: what fits best")
-      ->check(CLI::IsMember({"auto", "equidistant", "double-sphere", "pinhole-radtan", "omni"}))
+      ->check(wm::cli::one_of({"auto", "equidistant", "double-sphere", "pinhole-radtan", "omni"}))
       ->capture_default_str();
   app.add_option("--every", a->every, "of a video, look at every n-th picture")
-      ->check(CLI::PositiveNumber)
+      ->check(wm::cli::positive())
       ->capture_default_str();
   app.add_option("--most", a->most, "use so many pictures at most, evenly chosen")
-      ->check(CLI::Range(3, 1000))
+      ->check(wm::cli::range(3, 1000))
       ->capture_default_str();
   app.add_option("--name", a->name, "the camera's name in calibration.yaml")->capture_default_str();
   app.add_option("--picture", a->picture, "a PNG to draw: where corners were, how far off, what is not covered");

@@ -2,14 +2,15 @@
 // The subcommands of `waymark calibrate`: each adds its options to the command line and returns what to run.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
+
+#include "common/options.h"
 
 namespace wm::calibrate {
 
 // The returned function throws tools::Failure; its value is the exit code.
-std::function<int()> import_command(CLI::App &app);
-std::function<int()> camera_command(CLI::App &app);
-std::function<int()> mounting_command(CLI::App &app);
+std::function<int()> import_command(wm::cli::App &app);
+std::function<int()> camera_command(wm::cli::App &app);
+std::function<int()> mounting_command(wm::cli::App &app);
 
 }  // namespace wm::calibrate

@@ -106,7 +106,7 @@ int run(const Arguments &a) {
 
 }  // namespace
 
-std::function<int()> import_command(CLI::App &app) {
+std::function<int()> import_command(wm::cli::App &app) {
   auto a = std::make_shared<Arguments>();
   app.description("Turns a camera calibration of OpenCV, Kalibr, ROS or OCamCalib into entries of calibration.yaml.");
   app.add_option("FILE", a->file,
@@ -114,11 +114,11 @@ std::function<int()> import_command(CLI::App &app) {
       ->required();
   app.add_option("--name", a->name, "the camera's name; default: the file's, else 'camera'");
   app.add_option("--model", a->model, "fit to this model; auto: the file's where we have it, else the best of ours")
-      ->check(CLI::IsMember({"auto", "equidistant", "double-sphere", "pinhole-radtan", "omni"}))
+      ->check(wm::cli::one_of({"auto", "equidistant", "double-sphere", "pinhole-radtan", "omni"}))
       ->capture_default_str();
   app.add_option("--size", a->size, "WIDTHxHEIGHT of the pictures, where the file doesn't have it");
   app.add_option("--lens", a->lens, "OpenCV's four coefficients are of a plain lens or of a fisheye")
-      ->check(CLI::IsMember({"plain", "fisheye"}));
+      ->check(wm::cli::one_of({"plain", "fisheye"}));
   app.add_option("--out", a->out, "a new file to write; default: the screen");
   app.footer(
       "examples:\n"

@@ -219,7 +219,7 @@ int run(const Arguments &a) {
 
 }  // namespace
 
-std::function<int()> mounting_command(CLI::App &app) {
+std::function<int()> mounting_command(wm::cli::App &app) {
   const auto a = std::make_shared<Arguments>();
   app.add_option("REC", a->recording, "recording of a drive, with video, motion and a map")->required();
   app.add_option("--config", a->config, "configuration to localize with, such as config/corridor.yaml");

@@ -2,6 +2,7 @@
 #include "common/json_file.h"
 
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "common/failure.h"
 

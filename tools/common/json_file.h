@@ -3,7 +3,7 @@
 #define WAYMARK_TOOLS_JSON_FILE_H
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 namespace wm::tools {
 

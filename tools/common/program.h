@@ -2,24 +2,23 @@
 // main() of a desk command: arguments, work, exit code.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 
 #include "common/failure.h"
+#include "common/options.h"
 #include "waymark/status.h"
 
 namespace wm::tools {
 
 // Parses the arguments and runs `work`. Returns its exit code, or that of its failure, after printing what is wrong.
 template <typename Work>
-int run_program(CLI::App &app, int argc, char **argv, const Work &work) {
+int run_program(cli::App &app, int argc, char **argv, const Work &work) {
+  int exit_code = kDone;
+  if (!app.parse(argc, argv, &exit_code)) return exit_code;
   try {
-    app.parse(argc, argv);
     return work();
-  } catch (const CLI::ParseError &problem) {
-    return app.exit(problem) == 0 ? kDone : kUsage;
   } catch (const std::exception &problem) {
-    std::fprintf(stderr, "%s: %s\n", app.get_name().c_str(), problem.what());
+    std::fprintf(stderr, "%s: %s\n", app.name().c_str(), problem.what());
     const auto *failure = dynamic_cast<const Failure *>(&problem);
     return failure != nullptr ? failure->exit_code : kFailed;
   }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `waymark detect`: what a detector finds in pictures, drawn and as a table, without a filter.
 #include <unistd.h>
-#include <CLI/CLI.hpp>
 #include <cinttypes>
 #include <cstdio>
 
@@ -16,12 +15,13 @@ using namespace wm::tools;
 constexpr uint64_t kShownEvery = 10;  // pictures, of the progress line
 constexpr size_t kIdsShown = 12;
 
-void parse(CLI::App *app, DetectWish *a) {
+void parse(wm::cli::App *app, DetectWish *a) {
   app->description("Shows what a detector finds in pictures, without a filter: drawn into the pictures, and as a CSV.");
   app->add_option("FROM", a->input.from,
                   "a recording (all of its cameras), a folder of pictures (PNG, JPEG, PGM), one picture, or a video")
       ->required();
-  app->add_option("--detector", a->detector, "this detector, by its defaults")->check(CLI::IsMember(detector_names()));
+  app->add_option("--detector", a->detector, "this detector, by its defaults")
+      ->check(wm::cli::one_of(detector_names()));
   app->add_option("--set", a->sets,
                   "KEY=VALUE: a parameter of --detector (docs/config.md), as often as needed; family=all "
                   "tries every family of square markers");
@@ -32,10 +32,10 @@ void parse(CLI::App *app, DetectWish *a) {
   app->add_option("--draw", a->draw,
                   "the pictures with what was found: avi, jpg, png, none; auto: avi, and jpg of a "
                   "folder of pictures")
-      ->check(CLI::IsMember({"auto", "avi", "jpg", "png", "none"}))
+      ->check(wm::cli::one_of({"auto", "avi", "jpg", "png", "none"}))
       ->capture_default_str();
   app->add_option("--rate", a->rate_hz, "pictures a second of the AVI")
-      ->check(CLI::Range(0.1, 1000.0))
+      ->check(wm::cli::range(0.1, 1000.0))
       ->capture_default_str();
   app->add_option("--camera", a->input.camera, "this camera of the recording or calibration; else all");
   app->add_option("--calibration", a->input.calibration,
@@ -44,7 +44,7 @@ void parse(CLI::App *app, DetectWish *a) {
   app->add_option("--poses", a->poses,
                   "a run, or a recording with truth: its poses guide the detector of known landmarks; without, it "
                   "searches");
-  app->add_option("--every", a->every, "only each N-th picture")->check(CLI::Range(1, 1000000));
+  app->add_option("--every", a->every, "only each N-th picture")->check(wm::cli::range(1, 1000000));
   app->footer(
       "examples:\n"
       "  waymark detect photos/ --detector apriltag --out out/seen\n"
@@ -94,7 +94,7 @@ int run(const DetectWish &wish) {
 
 int main(int argc, char **argv) {
   DetectWish wish;
-  CLI::App app("", "waymark detect");
+  wm::cli::App app("", "waymark detect");
   parse(&app, &wish);
   return run_program(app, argc, argv, [&] { return run(wish); });
 }

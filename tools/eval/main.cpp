@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // waymark eval: a run's poses against truth, or its detections against labels.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
 #include "common/failure.h"
 #include "common/program.h"
@@ -31,7 +31,7 @@ struct Arguments {
   CompareOptions compare;
 };
 
-void parse(CLI::App *app, Arguments *a) {
+void parse(wm::cli::App *app, Arguments *a) {
   app->description("Holds the poses of a run against the truth of its recording.");
   app->add_option("RUN", a->run, "folder that a run wrote")->required();
   app->add_option("REC", a->recording, "folder of the recording, with truth.csv")->required();
@@ -39,10 +39,10 @@ void parse(CLI::App *app, Arguments *a) {
   app->add_flag("--published", a->published, "judge published.csv, what was sent, instead of the fused poses");
   app->add_flag("--reference", a->reference, "judge reference.csv, the smoothed trajectory")->excludes("--published");
   app->add_option("--align", a->align, "move the run onto truth first")
-      ->check(CLI::IsMember({"none", "se2", "sim2", "se3"}))
+      ->check(wm::cli::one_of({"none", "se2", "sim2", "se3"}))
       ->capture_default_str();
   app->add_option("--against", a->against, "truth, or positions only against gnss.csv")
-      ->check(CLI::IsMember({"truth", "gnss"}))
+      ->check(wm::cli::one_of({"truth", "gnss"}))
       ->capture_default_str();
   app->add_flag("--take-out-delay", a->takes_out_delay,
                 "--against gnss: find how late the receiver's positions are, print it and take it out");
@@ -50,14 +50,14 @@ void parse(CLI::App *app, Arguments *a) {
   app->add_option("--to", a->compare.to_s, "judge up to this many seconds after the run's first pose");
   app->add_option("--detector", a->detector,
                   "judge what a detector saw (RUN/detections, RUN/events.wmlog) by the recording's labels")
-      ->check(CLI::IsMember({"edges", "landmarks", "lines"}));
+      ->check(wm::cli::one_of({"edges", "landmarks", "lines"}));
   app->add_option("--camera", a->camera, "--detector: of this camera; edges and lines need it where there are several");
   app->add_option("--sizes", a->sizes_m,
                   "--detector landmarks: recall is of those of these sizes, WIDTH,HEIGHT[,WIDTH,HEIGHT ...], m")
       ->delimiter(',');
   app->add_option("--size-min", a->size_min_px,
                   "--detector landmarks: recall is of those whose shorter side has so many pixels")
-      ->check(CLI::Range(1.0, 1000.0))
+      ->check(wm::cli::range(1.0, 1000.0))
       ->capture_default_str();
   app->add_option("--view", a->view_m,
                   "--detector: the floor that it looks at, x from, x to, y from, y to in base_link, m: true edges "
@@ -122,7 +122,7 @@ Figures evaluate(const Arguments &a) {
 
 int main(int argc, char **argv) {
   Arguments arguments;
-  CLI::App app("", "waymark eval");
+  wm::cli::App app("", "waymark eval");
   parse(&app, &arguments);
   return run_program(app, argc, argv, [&] {
     if (arguments.compare.from_s && arguments.compare.to_s && *arguments.compare.from_s >= *arguments.compare.to_s)

@@ -2,6 +2,7 @@
 // What a listener of the published poses can notice: how old they are, whether they come in order, whether they jump.
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
 #include "common/statistics.h"
 #include "eval/figures.h"

@@ -3,7 +3,6 @@
 // Python package's waymark-import-bag.
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 
@@ -51,7 +50,7 @@ int main(int argc, char **argv) {
   for (int i = 1; i < argc; i++)
     if (is_bag(argv[i])) return run_bag_import(argv);
   wm::tools::ImportWish wish;
-  CLI::App app(
+  wm::cli::App app(
       "Makes a video of any kind (H.264 and others, by libav) into what a recording holds: MJPEG in AVI, with its "
       "stamps.",
       "waymark import");
@@ -63,7 +62,7 @@ int main(int argc, char **argv) {
       "CSV of stamps, a row each picture, kept as it is; else the one beside the video, else the container's");
   app.add_option("--begin-ns", wish.begin_ns, "stamp of the first picture, where they are the container's, ns")
       ->capture_default_str();
-  app.add_option("--quality", wish.quality, "of the JPEGs")->check(CLI::Range(1, 100))->capture_default_str();
+  app.add_option("--quality", wish.quality, "of the JPEGs")->check(wm::cli::range(1, 100))->capture_default_str();
   app.footer(
       "Pictures become grey, which is what the robot reads.\n"
       "A ROS bag or an MCAP file becomes a whole recording (docs/stack.md): waymark import BAG --out FOLDER\n"

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // waymark map: raster maps made and checked, maps of landmarks surveyed.
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 
 #include "common/failure.h"
 #include "common/program.h"
@@ -43,7 +43,7 @@ struct SurveyArguments {
   bool json = false;
 };
 
-void parse_survey(CLI::App &app, SurveyArguments &a) {
+void parse_survey(wm::cli::App &app, SurveyArguments &a) {
   app.description("How well each landmark of a run's map fits, and which ones moved, stand twice or are misread.");
   app.add_option("RUN", a.run, "the folder that `waymark replay` or `waymark run` wrote")->required();
   app.add_option(
@@ -61,29 +61,29 @@ void parse_survey(CLI::App &app, SurveyArguments &a) {
       "Exit code: 0 good, 1 something was found or can't be read.");
 }
 
-void parse_make(CLI::App &app, Make &a) {
+void parse_make(wm::cli::App &app, Make &a) {
   app.description("Makes the layers edges and drivable from a floor plan, or from a ROS occupancy map.");
   app.add_option("PLAN", a.plan,
                  "a picture with dark walls on a light floor (PNG, PGM, JPEG), or ROS map_server's map.yaml")
       ->required();
   app.add_option("--resolution", a.resolution_m, "m of a pixel of the picture; a map.yaml has its own")
-      ->check(CLI::Range(1e-4, 1.0));
+      ->check(wm::cli::range(1e-4, 1.0));
   app.add_option("--origin", a.origin, "X,Y[,YAW_DEG]: where the lower left corner of the picture lies in the map")
       ->delimiter(',')
       ->expected(2, 3);
   app.add_option("--inside", a.inside, "X,Y in the map: only floor connected with it is drivable; may be given again");
   app.add_option("--walls-below", a.walls_below, "grey value, 1 to 255: darker is wall")
-      ->check(CLI::Range(1, 255))
+      ->check(wm::cli::range(1, 255))
       ->capture_default_str();
   app.add_flag("--negate", a.negate, "walls are light on a dark floor");
   app.add_option("--fine", a.layers.resolution_m, "largest pixel of the layers, m")
-      ->check(CLI::Range(0.002, 1.0))
+      ->check(wm::cli::range(0.002, 1.0))
       ->capture_default_str();
   app.add_option("--speck", a.layers.speck_m, "walls that fit into a square of this edge, m, are dirt")
-      ->check(CLI::Range(0.0, 10.0))
+      ->check(wm::cli::range(0.0, 10.0))
       ->capture_default_str();
   app.add_option("--clearance", a.layers.clearance_m, "drivable ends so far from walls, m")
-      ->check(CLI::Range(0.0, 5.0))
+      ->check(wm::cli::range(0.0, 5.0))
       ->capture_default_str();
   app.add_option("--out", a.out, "the folder to write: map.yaml, edges.png, drivable.png, picture.png")
       ->capture_default_str();
@@ -95,7 +95,7 @@ void parse_make(CLI::App &app, Make &a) {
       "picture.png is what came out, with a line every 5 m: look at it. docs/edges.md goes through it.");
 }
 
-void parse_check(CLI::App &app, Check &a) {
+void parse_check(wm::cli::App &app, Check &a) {
   app.description("Says what a raster map is like, and what is wrong with it.");
   app.add_option("MAP", a.map, "a map.yaml")->required();
   app.add_option("--recording", a.recording, "also check whether its start pose is on the map");
@@ -110,7 +110,7 @@ struct PrintMarkers {
   std::string ids, out = "markers.pdf";
 };
 
-void parse_print(CLI::App &app, PrintMarkers &a) {
+void parse_print(wm::cli::App &app, PrintMarkers &a) {
   app.description("Writes coded markers as pages to print at true scale (PDF), with cut marks and a ruler.");
   app.add_option("--family", a.sheet.family, "mr, or a family of vision.apriltag.family: tag36h11, aruco_4x4_50 ...")
       ->capture_default_str();
@@ -119,7 +119,7 @@ void parse_print(CLI::App &app, PrintMarkers &a) {
                  "m; mr: largest width of the black; others: edge of the black square (tagCircle, tagCustom, "
                  "tagStandard: of the "
                  "white one in its ring). It is markers.size_m of calibration.yaml")
-      ->check(CLI::Range(0.005, 2.0))
+      ->check(wm::cli::range(0.005, 2.0))
       ->capture_default_str();
   app.add_option("--paper", a.sheet.paper, "a4, a3 or letter")->capture_default_str();
   app.add_option("--out", a.out, "the file to write")->capture_default_str();
@@ -130,21 +130,21 @@ void parse_print(CLI::App &app, PrintMarkers &a) {
       "Print at 100 %, measure the ruler, leave the white rim. More: docs/markers.md.");
 }
 
-void parse_add(CLI::App &app, AddLandmark &a) {
+void parse_add(wm::cli::App &app, AddLandmark &a) {
   app.description("Teaches a map how a landmark (a sign, a house number, a window) looks, from a picture of it.");
   app.add_option("MAP", a.map, "the folder with landmarks.csv, or that file; made where missing")->required();
-  app.add_option("--id", a.id, "the landmark's")->required()->check(CLI::Range(0, 2147483647));
+  app.add_option("--id", a.id, "the landmark's")->required()->check(wm::cli::range(0, 2147483647));
   app.add_option("--picture", a.picture, "JPEG, PNG or PGM")->required();
   app.add_option("--at", a.at_m, "X,Y,Z of its middle in the map, m; needed where landmarks.csv hasn't got it")
       ->delimiter(',')
       ->expected(3);
   app.add_option("--sigma", a.sigma_m, "m: how well that place is known, each axis")
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(wm::cli::range(0.0, 100.0))
       ->capture_default_str();
   app.add_option("--size", a.size_m, "WIDTH,HEIGHT, m; by the angles where --from and --calibration are given")
       ->delimiter(',')
       ->expected(2)
-      ->check(CLI::Range(0.01, 100.0));
+      ->check(wm::cli::range(0.01, 100.0));
   app.add_option("--yaw", a.yaw_deg, "degrees in the map, from its left to its right edge as a reader sees it");
   app.add_option("--from", a.from_m,
                  "X,Y,Z of who took the picture: the landmark faces that place unless --yaw is given")
@@ -175,7 +175,7 @@ int add(const AddLandmark &a) {
   return kDone;
 }
 
-void parse_look(CLI::App &app, LookAtPicture &a) {
+void parse_look(wm::cli::App &app, LookAtPicture &a) {
   app.description("Looks for a map's landmarks in one picture, as a run would, and prints the outcome of each.");
   app.add_option("MAP", a.map, "the folder with landmarks.csv and landmarks/, or the landmarks.csv")->required();
   app.add_option("--picture", a.picture, "JPEG, PNG or PGM")->required();
@@ -186,14 +186,14 @@ void parse_look(CLI::App &app, LookAtPicture &a) {
       ->delimiter(',')
       ->expected(3);
   app.add_option("--sigma", a.sigma_m, "m: how well that place is known")
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(wm::cli::range(0.0, 100.0))
       ->capture_default_str();
   app.add_option("--sigma-deg", a.sigma_deg, "degrees: and that heading")
-      ->check(CLI::Range(0.0, 90.0))
+      ->check(wm::cli::range(0.0, 90.0))
       ->capture_default_str();
   app.add_option("--mounting-deg", a.mounting_deg,
                  "degrees: how far the camera may be turned against its calibration (else as a run has it)")
-      ->check(CLI::Range(0.0, 5.0));
+      ->check(wm::cli::range(0.0, 5.0));
   app.add_option("--draw", a.draw, "the picture with what was found (PNG or .jpg)");
   app.footer(
       "example: waymark map look map --picture left.png --calibration calibration.yaml --camera left --pose 3,0.5,10 "
@@ -201,25 +201,25 @@ void parse_look(CLI::App &app, LookAtPicture &a) {
       "Exit code: 0 something was found, 1 nothing was, 2 usage.");
 }
 
-void parse_train(CLI::App &app, TrainCascade &a) {
+void parse_train(wm::cli::App &app, TrainCascade &a) {
   app.description("Trains a cascade (LBP, OpenCV's format) for the detector `cascade` from labelled recordings.");
   app.add_option("RECORDING", a.recordings, "recordings with video, truth.csv and labels/landmarks.csv")->required();
   app.add_option("--size", a.size_m, "WIDTH,HEIGHT, m: the class is the landmarks of this size")
       ->delimiter(',')
       ->expected(2)
-      ->check(CLI::Range(0.01, 100.0))
+      ->check(wm::cli::range(0.01, 100.0))
       ->required();
   app.add_option("--out", a.out, "the file to write (.xml)")->required();
-  app.add_option("--rows", a.rows_px, "px: height of a window")->check(CLI::Range(12, 60))->capture_default_str();
+  app.add_option("--rows", a.rows_px, "px: height of a window")->check(wm::cli::range(12, 60))->capture_default_str();
   app.add_option("--margin", a.margin, "share of the landmark's size that a window shows on each side of it")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(wm::cli::range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--size-min", a.size_min_px, "px: the smallest window, as size_min_px of the detector")
-      ->check(CLI::Range(4.0, 200.0))
+      ->check(wm::cli::range(4.0, 200.0))
       ->capture_default_str();
-  app.add_option("--stages", a.stages, "at most")->check(CLI::Range(1, 60))->capture_default_str();
+  app.add_option("--stages", a.stages, "at most")->check(wm::cli::range(1, 60))->capture_default_str();
   app.add_option("--pictures", a.pictures, "about so many of all that there are")
-      ->check(CLI::Range(10, 20000))
+      ->check(wm::cli::range(10, 20000))
       ->capture_default_str();
   app.add_option("--seed", a.seed, "of the choice of windows")->capture_default_str();
   app.footer(
@@ -333,30 +333,30 @@ int survey(const SurveyArguments &a) {
 }  // namespace
 
 int main(int argc, char **argv) {
-  CLI::App app("Maps: raster maps made from plans and checked, landmarks surveyed, coded markers printed.",
-               "waymark map");
+  wm::cli::App app("Maps: raster maps made from plans and checked, landmarks surveyed, coded markers printed.",
+                   "waymark map");
   app.require_subcommand(1);
   app.footer("example: waymark map make plan.png --resolution 0.02\nwaymark map SUBCOMMAND --help has more.");
   Make make_arguments;
   Check check_arguments;
   SurveyArguments survey_arguments;
-  CLI::App *make_app = app.add_subcommand("make", "layers from a floor plan or an occupancy map");
-  CLI::App *check_app = app.add_subcommand("check", "what a map is like, and what is wrong with it");
-  CLI::App *survey_app =
+  wm::cli::App *make_app = app.add_subcommand("make", "layers from a floor plan or an occupancy map");
+  wm::cli::App *check_app = app.add_subcommand("check", "what a map is like, and what is wrong with it");
+  wm::cli::App *survey_app =
       app.add_subcommand("survey", "how well the landmarks of a run fit, and what is odd about them");
   parse_survey(*survey_app, survey_arguments);
   AddLandmark add_arguments;
   add_arguments.yaw_deg = std::nan("");
-  CLI::App *add_app = app.add_subcommand("add-landmark", "how a landmark looks, learnt from a picture");
+  wm::cli::App *add_app = app.add_subcommand("add-landmark", "how a landmark looks, learnt from a picture");
   parse_add(*add_app, add_arguments);
   LookAtPicture look_arguments;
-  CLI::App *look_app = app.add_subcommand("look", "where the landmarks are in a picture");
+  wm::cli::App *look_app = app.add_subcommand("look", "where the landmarks are in a picture");
   parse_look(*look_app, look_arguments);
   PrintMarkers print_arguments;
-  CLI::App *print_app = app.add_subcommand("print-markers", "sheets of coded markers at true scale");
+  wm::cli::App *print_app = app.add_subcommand("print-markers", "sheets of coded markers at true scale");
   parse_print(*print_app, print_arguments);
   TrainCascade train_arguments;
-  CLI::App *train_app =
+  wm::cli::App *train_app =
       app.add_subcommand("train-cascade", "a cascade for a class of landmarks, from labelled pictures");
   parse_train(*train_app, train_arguments);
   parse_make(*make_app, make_arguments);

@@ -6,6 +6,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <map>
+#include <nlohmann/json.hpp>
 
 #include "common/csv.h"
 #include "common/json_file.h"

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // waymark-montecarlo-bound SCENARIO RUN RECORDING: the Cramér-Rao bound of a rendered drive past known landmarks, with
 // the bearings that the run's detector found in its pictures.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -134,7 +133,7 @@ int run(const std::string &scenario_file, const std::string &run_folder, const s
 
 int main(int argc, char **argv) {
   std::string scenario, run_folder, recording;
-  CLI::App app(
+  wm::cli::App app(
       "The error that no estimator can go below on a rendered drive past known landmarks, with the bearings (and their "
       "sigmas) that a run's detector found in its pictures, and errors as large as in the scenario.",
       "waymark-montecarlo-bound");

@@ -3,7 +3,6 @@
 // detector already, as they were, set down elsewhere, begun anywhere. tools/montecarlo/pictures.py makes the drives.
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -174,7 +173,7 @@ int run(const Arguments &a) {
 
 int main(int argc, char **argv) {
   Arguments a;
-  CLI::App app(
+  wm::cli::App app(
       "Edge localization over many drives from their event logs: tracking, set down elsewhere while driving, started "
       "anywhere, set down where it looks the same.",
       "waymark-montecarlo-edges");
@@ -182,9 +181,9 @@ int main(int argc, char **argv) {
   app.add_option("--config", a.config, "configuration of the estimator")->required();
   app.add_option("--trials", a.kinds, "which: normal, kidnap, start, alike")
       ->delimiter(',')
-      ->check(CLI::IsMember({"normal", "kidnap", "start", "alike"}));
-  app.add_option("--drives", a.drives, "at most so many drives")->check(CLI::Range(1, 100000));
-  app.add_option("--each", a.each, "trials a drive, of kidnap and start")->check(CLI::Range(1, 100));
+      ->check(wm::cli::one_of({"normal", "kidnap", "start", "alike"}));
+  app.add_option("--drives", a.drives, "at most so many drives")->check(wm::cli::range(1, 100000));
+  app.add_option("--each", a.each, "trials a drive, of kidnap and start")->check(wm::cli::range(1, 100));
   app.add_option("--seed", a.seed, "of the filter")->capture_default_str();
   app.add_option("--scans", a.scans, "writes what was judged, a row each 0.1 s, here (CSV)");
   app.add_option("--diagram", a.diagram, "writes the reliability diagram of the probability of being lost here (SVG)");

@@ -3,7 +3,6 @@
 // are and with what may befall them.
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cinttypes>
 #include <cmath>
@@ -180,7 +179,7 @@ int run(const Arguments &a) {
 
 int main(int argc, char **argv) {
   Arguments a;
-  CLI::App app(
+  wm::cli::App app(
       "An estimator by known landmarks over many simulated drives, features only: as driven, started without a pose, "
       "carried off, with false detections, wrong identities, moved landmarks, and few of them.",
       "waymark-montecarlo-landmarks");
@@ -188,8 +187,8 @@ int main(int argc, char **argv) {
   for (const LandmarkTrial &o : landmark_trials()) names.emplace_back(o.name);
   app.add_option("SCENARIO", a.scenario, "scenario file (YAML)")->required();
   app.add_option("--config", a.config, "configuration of the estimator")->required();
-  app.add_option("--trials", a.kinds, "which; all if not given")->delimiter(',')->check(CLI::IsMember(names));
-  app.add_option("--drives", a.drives, "number of seeds")->check(CLI::Range(1, 100000))->capture_default_str();
+  app.add_option("--trials", a.kinds, "which; all if not given")->delimiter(',')->check(wm::cli::one_of(names));
+  app.add_option("--drives", a.drives, "number of seeds")->check(wm::cli::range(1, 100000))->capture_default_str();
   app.add_option("--first-seed", a.first, "the first one's seed")->capture_default_str();
   app.add_option("--looks", a.csv, "writes what was judged, a row each 0.1 s, here (CSV)");
   app.add_option("--diagram", a.diagram, "writes the reliability diagram of the probability of being lost here (SVG)");

@@ -2,7 +2,6 @@
 // waymark-montecarlo SCENARIO --config F: consistency and efficiency of an estimator over many seeds.
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cinttypes>
 #include <cstdio>
@@ -79,16 +78,16 @@ struct Arguments {
   std::vector<size_t> landmarks = {0, 1, 2, 3};
 };
 
-void parse(CLI::App *app, Arguments *a) {
+void parse(wm::cli::App *app, Arguments *a) {
   app->description(
       "Runs an estimator over many simulated drives and prints, beside each figure, the Cramer-Rao bound.\n"
       "Efficiency is the bound divided by the figure; 1 is the best possible.");
   app->add_option("SCENARIO", a->scenario, "scenario file (YAML)")->required();
   app->add_option("--config", a->config, "configuration of the estimator")->required();
-  app->add_option("--seeds", a->seeds, "number of drives")->check(CLI::Range(1, 1000000))->capture_default_str();
+  app->add_option("--seeds", a->seeds, "number of drives")->check(wm::cli::range(1, 1000000))->capture_default_str();
   app->add_option("--first-seed", a->first, "the first one's seed")->capture_default_str();
   app->add_option("--landmarks", a->landmarks, "how many of the scenario's landmarks, a list")->delimiter(',');
-  app->add_option("--laps", a->laps, "instead of the route's laps")->check(CLI::Range(1, 1000));
+  app->add_option("--laps", a->laps, "instead of the route's laps")->check(wm::cli::range(1, 1000));
   app->add_option("--settled", a->six.settled_s, "six degrees of freedom: figures from so many seconds on")
       ->capture_default_str();
   app->add_option("--until", a->six.until_s, "six degrees of freedom: ... to so many");
@@ -186,7 +185,7 @@ wm_status load_and_run(const Arguments &a, wm_error *err) {
 }  // namespace
 
 int main(int argc, char **argv) {
-  CLI::App app("", "waymark-montecarlo");
+  wm::cli::App app("", "waymark-montecarlo");
   Arguments arguments;
   parse(&app, &arguments);
   return wm::tools::run_program(app, argc, argv, [&arguments] {

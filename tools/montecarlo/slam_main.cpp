@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // waymark-montecarlo-slam SCENARIO --config F: SLAM over many simulated drives, undisturbed, kidnapped, pushed, and
 // started without a pose on a finished map.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cinttypes>
 #include <cmath>
@@ -99,15 +98,15 @@ int run(const Arguments &a) {
 
 int main(int argc, char **argv) {
   Arguments a;
-  CLI::App app(
+  wm::cli::App app(
       "SLAM over many simulated drives, features only: undisturbed, kidnapped, pushed, started without a pose.",
       "waymark-montecarlo-slam");
   std::vector<std::string> names;
   for (const SlamTrial &t : slam_trials()) names.emplace_back(t.name);
   app.add_option("SCENARIO", a.scenario, "scenario file (YAML)")->required();
   app.add_option("--config", a.config, "configuration of the estimator")->required();
-  app.add_option("--trials", a.kinds, "which; all if not given")->delimiter(',')->check(CLI::IsMember(names));
-  app.add_option("--drives", a.drives, "number of seeds")->check(CLI::Range(1, 100000))->capture_default_str();
+  app.add_option("--trials", a.kinds, "which; all if not given")->delimiter(',')->check(wm::cli::one_of(names));
+  app.add_option("--drives", a.drives, "number of seeds")->check(wm::cli::range(1, 100000))->capture_default_str();
   app.add_option("--first-seed", a.first, "the first one's seed")->capture_default_str();
   app.add_flag("--renumber", a.renumber, "identities are a tracker's numbers: new after 1 s out of sight");
   app.add_flag("--each", a.each, "prints each drive");

@@ -2,7 +2,6 @@
 // waymark reference: the reference trajectory of a run over a raster map; also by `waymark replay --reference`.
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -110,7 +109,7 @@ int run(const Arguments &a) {
 
 int main(int argc, char **argv) {
   Arguments a;
-  CLI::App app(
+  wm::cli::App app(
       "The reference trajectory of a run over a raster map: all of the drive looked at as a whole, by a particle "
       "filter that keeps its ancestry (Abramov et al. 2019). Truth is not used.",
       "waymark reference");
@@ -118,11 +117,11 @@ int main(int argc, char **argv) {
   app.add_option("REC", a.recording, "folder of its recording, with the map")->required();
   app.add_option("--map", a.map, "a map.yaml instead of the recording's");
   app.add_option("--range", a.reach_m, "points farther from the camera than this, m, are left out")
-      ->check(CLI::Range(0.5, 50.0))
+      ->check(wm::cli::range(0.5, 50.0))
       ->capture_default_str();
-  app.add_option("--particles", a.smoother.particles)->check(CLI::Range(50, 20000))->capture_default_str();
+  app.add_option("--particles", a.smoother.particles)->check(wm::cli::range(50, 20000))->capture_default_str();
   app.add_option("--passes", a.smoother.passes_max, "at most so many")
-      ->check(CLI::Range(1, 100))
+      ->check(wm::cli::range(1, 100))
       ->capture_default_str();
   app.add_option("--seed", a.smoother.seed)->capture_default_str();
   app.footer(

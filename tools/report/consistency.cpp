@@ -6,6 +6,7 @@
 #include "common/statistics.h"
 #include "report/axes.h"
 #include "report/page.h"
+#include "report/report_json.h"
 #include "report/words.h"
 
 namespace wm::tools {
@@ -51,10 +52,10 @@ std::string consistency_section(const ReportData &data) {
   for (double tick = std::pow(10, std::ceil(std::log10(low))); tick <= high; tick *= 10)
     ticks.emplace_back(tick, tick < 1 ? fixed(tick, 1) : fixed(tick, 0));
   const double inside =
-      data.figures["nees_inside_95"].is_number() ? data.figures["nees_inside_95"].get<double>() : kNan;
+      data.json->figures["nees_inside_95"].is_number() ? data.json->figures["nees_inside_95"].get<double>() : kNan;
   const std::string figures =
       "inside of the bound " + percent_text(inside) + " of the time (95 % is ideal) · mean " +
-      fixed(data.figures["nees_mean"].is_number() ? data.figures["nees_mean"].get<double>() : kNan, 2);
+      fixed(data.json->figures["nees_mean"].is_number() ? data.json->figures["nees_mean"].get<double>() : kNan, 2);
   return section(
       "Consistency (NEES)",
       "NEES compares each error with the uncertainty that was stated for it, all of x, y and heading at once: " +

@@ -9,6 +9,7 @@
 #include "common/json_file.h"
 #include "common/yaml.h"
 #include "report/edges.h"
+#include "report/report_json.h"
 
 namespace wm::tools {
 namespace {
@@ -80,7 +81,7 @@ std::map<std::string, Pose> load_mountings(const fs::path &recording) {
   return out;
 }
 
-void load_recording(const fs::path &recording, ReportData *out) {
+void load_recording(const fs::path &recording, ReportData *out, Figures *figures) {
   if (!fs::is_directory(recording))
     throw Failure(recording.string() + ": is no folder; REC is a recording's folder", kUsage);
   const Yaml about(recording / "recording.yaml");
@@ -96,10 +97,9 @@ void load_recording(const fs::path &recording, ReportData *out) {
   CompareOptions options;
   options.truth_offset_m = load_truth_offset(recording);
   out->truth = compare(out->trajectory, load_truth(recording), options);
-  out->figures = pose_figures(*out->truth, out->trajectory.has_covariance, false);
+  *figures = pose_figures(*out->truth, out->trajectory.has_covariance, false);
   if (!out->estimated_landmarks.empty() && !out->landmarks.empty())
-    add_landmark_figures(out->estimated_landmarks, out->landmarks, *out->truth, has_identities(recording),
-                         &out->figures);
+    add_landmark_figures(out->estimated_landmarks, out->landmarks, *out->truth, has_identities(recording), figures);
 }
 
 }  // namespace
@@ -116,16 +116,18 @@ ReportData load_report_data(const fs::path &run, const fs::path &recording) {
   out.name = fs::weakly_canonical(run).filename().string();
   out.innovations = load_innovations(run / "innovations.csv");
   out.looked_for = load_looked_for(run / "looked-for.csv");
-  out.health = load_json(run / "health.json");
-  out.timing = load_json(run / "timing.json");
+  const auto json = std::make_shared<ReportJson>();
+  json->health = load_json(run / "health.json");
+  json->timing = load_json(run / "timing.json");
   if (fs::exists(run / "map-estimate.csv")) out.estimated_landmarks = load_landmarks(run / "map-estimate.csv");
   if (!recording.empty()) {
-    load_recording(recording, &out);
+    load_recording(recording, &out, &json->figures);
     out.frames = load_frames(recording, &out, 4);
     mark_sightings(recording, out, &out.frames);
     load_edges(run, recording, &out);
     mark_lines(run, recording, &out);
   }
+  out.json = json;
   return out;
 }
 

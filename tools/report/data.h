@@ -5,14 +5,13 @@
 #include <array>
 #include <filesystem>
 #include <map>
-#include <nlohmann/json.hpp>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/recording_folder.h"
 #include "eval/compare.h"
-#include "eval/figures.h"
 #include "report/frames.h"
 #include "waymark/look.h"
 
@@ -47,16 +46,17 @@ struct Raster {
   Eigen::Vector3d origin;  // outer corner of the lower left pixel: x, y, yaw
 };
 
+struct ReportJson;  // report/report_json.h
+
 struct ReportData {
   std::string name;   // the recording's, or the run folder's
   std::string about;  // what the recording says of itself; may be empty
   Trajectory trajectory;
   int64_t start_ns;  // first pose
   std::optional<Comparison> truth;
-  Figures figures;  // null without truth
+  std::shared_ptr<const ReportJson> json;  // never null
   std::vector<Innovation> innovations;
   std::vector<LandmarkLooks> looked_for;
-  nlohmann::json health, timing;  // null where not there
   std::vector<Landmark> landmarks, estimated_landmarks;
   std::vector<Pose> gnss;
   std::vector<Sighting> sightings;

@@ -157,9 +157,8 @@ std::string uncertainty_section(const ReportData &data) {
   std::vector<double> heading;
   const double reach = std::sqrt(chi2_quantile(0.95, 2));
   for (const Pose &pose : data.trajectory.poses) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(pose.covariance.topLeftCorner<2, 2>());
     t.push_back(data.seconds(pose.t_ns));
-    radius.push_back(reach * std::sqrt(std::max(0.0, axes.eigenvalues()[1])));
+    radius.push_back(std::max(0.0, reach * ellipse_of(pose.covariance.topLeftCorner<2, 2>()).longer_m));
     heading.push_back(1.96 * std::sqrt(std::max(0.0, pose.covariance(5, 5))) * kDegrees);
   }
   const auto draw = [&](const std::string &what, std::vector<double> v, const Unit &unit, bool last) {

@@ -5,6 +5,7 @@
 
 #include "common/statistics.h"
 #include "report/page.h"
+#include "report/report_json.h"
 #include "report/words.h"
 #include "waymark/pose.h"
 
@@ -22,7 +23,8 @@ std::string tiles(const std::vector<Tile> &all) {
 }
 
 double figure(const ReportData &data, const char *key) {
-  return data.figures.contains(key) && data.figures[key].is_number() ? data.figures[key].get<double>() : kNan;
+  return data.json->figures.contains(key) && data.json->figures[key].is_number() ? data.json->figures[key].get<double>()
+                                                                                 : kNan;
 }
 
 std::string strong(const std::string &text) { return "<em>" + text + "</em>"; }
@@ -86,9 +88,8 @@ std::vector<double> stated_radii(const Trajectory &trajectory) {
   std::vector<double> out;
   const double reach = std::sqrt(chi2_quantile(0.95, 2));
   for (const Pose &pose : trajectory.poses) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(pose.covariance.topLeftCorner<2, 2>());
-    const double largest = axes.eigenvalues()[1];
-    if (std::isfinite(largest) && largest >= 0) out.push_back(reach * std::sqrt(largest));
+    const double longer_m = ellipse_of(pose.covariance.topLeftCorner<2, 2>()).longer_m;
+    if (std::isfinite(longer_m)) out.push_back(reach * longer_m);
   }
   return out;
 }

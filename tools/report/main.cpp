@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // waymark report: a run as one page.
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
@@ -19,7 +18,7 @@ struct Arguments {
   std::string run, recording, out, svg;
 };
 
-void parse(CLI::App *app, Arguments *a) {
+void parse(wm::cli::App *app, Arguments *a) {
   app->description("Shows a run as one self-contained page: where, how far off, how sure, and why.");
   app->add_option("RUN", a->run, "folder that a run wrote")->required();
   app->add_option("REC", a->recording, "folder of the recording, for truth, landmarks and map");
@@ -41,7 +40,7 @@ void write(const std::string &path, const std::string &text) {
 
 int main(int argc, char **argv) {
   Arguments arguments;
-  CLI::App app("", "waymark report");
+  wm::cli::App app("", "waymark report");
   parse(&app, &arguments);
   return run_program(app, argc, argv, [&] {
     const bool is_default = arguments.out.empty() && arguments.svg.empty();

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "report/picture.h"
+#include "report/report_json.h"
 #include "report/script.h"
 #include "report/side_views.h"
 #include "report/style.h"
@@ -101,9 +102,9 @@ std::string map_section(const ReportData &data) {
 }
 
 std::string figures_section(const ReportData &data) {
-  if (!data.figures.is_object()) return "";
+  if (!data.json->figures.is_object()) return "";
   std::string rows;
-  for (const auto &[key, value] : data.figures.items()) rows += figure_row(key, value);
+  for (const auto &[key, value] : data.json->figures.items()) rows += figure_row(key, value);
   return "<details><summary>All figures, by their names in <code>waymark eval --json</code></summary><div "
          "class=\"wide\"><table>" +
          rows + "</table></div></details>\n";

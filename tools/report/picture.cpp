@@ -100,16 +100,15 @@ constexpr double kEllipsesCover = 0.6;
 // "" where it is too large for the view. Adds its area to *area.
 std::string ellipse(const Eigen::Vector2d &middle, const Eigen::Matrix2d &covariance, double times,
                     const Canvas &canvas, const char *css, double *area) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance);
-  if (!covariance.allFinite() || axes.info() != Eigen::Success) return "";
+  if (!covariance.allFinite()) return "";
   const double reach = std::sqrt(chi2_quantile(0.95, 2)) * times * canvas.scale();
-  const Eigen::Vector2d radii = axes.eigenvalues().cwiseMax(0).cwiseSqrt() * reach;
+  const Ellipse axes = ellipse_of(covariance);
+  const double radii[2] = {axes.shorter_m * reach, axes.longer_m * reach};
   if (radii[1] > kEllipseMost * std::min(kWidth, canvas.inner())) return "";
   *area += M_PI * radii[0] * radii[1];
-  const Eigen::Vector2d longest = axes.eigenvectors().col(1);
   return "<ellipse class=\"" + std::string(css) + "\" rx=\"" + fixed(radii[1], 1) + "\" ry=\"" + fixed(radii[0], 1) +
-         "\" transform=\"translate(" + canvas.at(middle) + ") rotate(" +
-         fixed(-std::atan2(longest.y(), longest.x()) * 180 / M_PI, 1) + ")\"/>";
+         "\" transform=\"translate(" + canvas.at(middle) + ") rotate(" + fixed(-axes.longer_rad * 180 / M_PI, 1) +
+         ")\"/>";
 }
 
 // Ellipses that would be too small to see are drawn larger, by a round number that the legend tells.

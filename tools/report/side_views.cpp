@@ -67,14 +67,12 @@ std::string ellipse(const Pose &pose, const Side &side, double times) {
   const int at[2] = {side.axis, kHeight};
   for (int i = 0; i < 2; i++)
     for (int j = 0; j < 2; j++) covariance(i, j) = pose.covariance(at[i], at[j]);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(covariance);
-  if (!covariance.allFinite() || axes.info() != Eigen::Success) return "";
+  if (!covariance.allFinite()) return "";
   const double reach = std::sqrt(chi2_quantile(0.95, 2)) * times * side.scale;
-  const Eigen::Vector2d radii = axes.eigenvalues().cwiseMax(0).cwiseSqrt() * reach,
-                        longest = axes.eigenvectors().col(1);
-  return "<ellipse class=\"ellipse\" rx=\"" + fixed(radii[1], 1) + "\" ry=\"" + fixed(radii[0], 1) +
-         "\" transform=\"translate(" + side.at(pose.p_m) + ") rotate(" +
-         fixed(-std::atan2(longest.y(), longest.x()) * 180 / M_PI, 1) + ")\"/>";
+  const Ellipse axes = ellipse_of(covariance);
+  return "<ellipse class=\"ellipse\" rx=\"" + fixed(axes.longer_m * reach, 1) + "\" ry=\"" +
+         fixed(axes.shorter_m * reach, 1) + "\" transform=\"translate(" + side.at(pose.p_m) + ") rotate(" +
+         fixed(-axes.longer_rad * 180 / M_PI, 1) + ")\"/>";
 }
 
 std::string grid(const Side &side, const char *name) {

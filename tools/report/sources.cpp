@@ -6,6 +6,7 @@
 
 #include "common/statistics.h"
 #include "report/page.h"
+#include "report/report_json.h"
 #include "report/words.h"
 #include "waymark/pose.h"
 
@@ -220,12 +221,14 @@ int decimals_for(double sigma) {
 }  // namespace
 
 std::string source_section(const ReportData &data) {
-  if (!data.health.is_object() || !data.health.contains("sources") || !data.health["sources"].is_object()) return "";
+  if (!data.json->health.is_object() || !data.json->health.contains("sources") ||
+      !data.json->health["sources"].is_object())
+    return "";
   std::string rows;
   bool has_lateness = false;
-  for (const auto &[name, source] : data.health["sources"].items())
+  for (const auto &[name, source] : data.json->health["sources"].items())
     has_lateness = has_lateness || source.contains("lateness_p99_ms");
-  for (const auto &[name, source] : data.health["sources"].items()) {
+  for (const auto &[name, source] : data.json->health["sources"].items()) {
     const int64_t fused = counted(source, "fused");
     const int64_t refused = counted(source, "rejected");
     const int64_t late = counted(source, "late");
@@ -254,7 +257,7 @@ std::string source_section(const ReportData &data) {
       "th><th>dropped</th><th>lost</th>"
       "<th>unreadable</th>" +
           std::string(has_lateness ? "<th>lateness, 99&nbsp;%</th>" : "") +
-          "<th class=\"words\">refused because</th></tr>" + rows + "</table></div>" + complaints(data.health) +
+          "<th class=\"words\">refused because</th></tr>" + rows + "</table></div>" + complaints(data.json->health) +
           legend({{"<i class=\"key\" style=\"background:var(--blue)\"></i>", "used"},
                   {"<i class=\"key\" style=\"background:var(--orange)\"></i>", "refused"},
                   {"<i class=\"key\" style=\"background:var(--amber)\"></i>", "late, dropped, lost or unreadable"}}));
@@ -296,7 +299,7 @@ std::string state_section(const ReportData &data) {
 
 std::string calibration_section(const ReportData &data) {
   std::string rows;
-  for (const CalibrationState &state : calibration_of(data.health)) {
+  for (const CalibrationState &state : calibration_of(data.json->health)) {
     const Meaning m = meaning_of(state.name);
     const double value = state.value * m.factor + m.offset;
     const bool known = !(state.sigma > 0);  // without a sigma
@@ -306,7 +309,7 @@ std::string calibration_section(const ReportData &data) {
             (known ? "" : " ± " + fixed(state.sigma * m.factor, decimals)) + "\u202f" + m.unit +
             "</td><td class=\"words\">" + m.words + "</td></tr>";
   }
-  rows += counter_rows(data.health);
+  rows += counter_rows(data.json->health);
   if (rows.empty()) return "";
   return section(
       "Calibration states and counters",

@@ -6,6 +6,7 @@
 #include "common/statistics.h"
 #include "report/axes.h"
 #include "report/page.h"
+#include "report/report_json.h"
 #include "report/words.h"
 
 namespace wm::tools {
@@ -92,8 +93,8 @@ void draw_percentiles(const Json &stage, double low, Panel *box) {
 }  // namespace
 
 std::string timing_section(const ReportData &data) {
-  if (!data.timing.is_object()) return "";
-  const auto stages = stages_of(data.timing);
+  if (!data.json->timing.is_object()) return "";
+  const auto stages = stages_of(data.json->timing);
   const Range range = stages.empty() ? Range{1, 10} : decades(stages);
   std::vector<std::pair<double, std::string>> ticks;
   for (double tick = range.low; tick <= range.high * 1.001; tick *= 10)
@@ -134,14 +135,14 @@ std::string timing_section(const ReportData &data) {
         "</figure>";
   std::string rows;
   const auto row = [&](const char *key, const char *words) {
-    if (const double v = value_of(data.timing, key); std::isfinite(v))
+    if (const double v = value_of(data.json->timing, key); std::isfinite(v))
       rows += "<tr><td>" + std::string(words) + "</td>" + (v > 0 ? "<td class=\"some\">" : "<td>") +
               count_text(static_cast<int64_t>(v)) + "</td></tr>";
   };
   row("allocations_after_start", "memory allocations on the estimator’s thread after the start");
   row("page_faults_after_start", "page faults on the estimator’s thread after the start");
-  if (const double total = value_of(data.timing, "deadlines_total"); total > 0) {
-    const double missed = value_of(data.timing, "deadlines_missed");
+  if (const double total = value_of(data.json->timing, "deadlines_total"); total > 0) {
+    const double missed = value_of(data.json->timing, "deadlines_missed");
     rows += "<tr><td>deadlines missed</td>" + std::string(missed > 0 ? "<td class=\"some\">" : "<td>") +
             count_text(static_cast<int64_t>(missed)) + " of " + count_text(static_cast<int64_t>(total)) + "</td></tr>";
   }

@@ -2,7 +2,6 @@
 // waymark simulate SCENARIO --out DIR: a world, a robot and its errors become a recording with truth.
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cinttypes>
 #include <cstdio>
@@ -28,15 +27,15 @@ struct Arguments {
   std::string png, sheet, camera;
 };
 
-void parse(CLI::App *app, Arguments *a) {
+void parse(wm::cli::App *app, Arguments *a) {
   app->description(
       "Makes a recording of a simulated drive, with truth.\nThe same scenario, seed and options give the same bytes.");
   app->add_option("SCENARIO", a->scenario, "scenario file (YAML)")->required();
   app->add_option("--out", a->out, "folder of the recording, made if it isn't there");
   app->add_option("--seed", a->seed, "instead of the scenario's seed");
   app->add_option("--landmarks", a->landmarks, "only the scenario's first N landmarks");
-  app->add_option("--laps", a->laps, "instead of the route's laps")->check(CLI::Range(1, 1000));
-  app->add_option("--duration", a->duration_s, "end the recording after S seconds")->check(CLI::PositiveNumber);
+  app->add_option("--laps", a->laps, "instead of the route's laps")->check(wm::cli::range(1, 1000));
+  app->add_option("--duration", a->duration_s, "end the recording after S seconds")->check(wm::cli::positive());
   app->add_flag("--no-video", a->no_video,
                 "worlds with pictures: all but the pictures and their labels; what `sensors` find in them instead");
   auto *frame = app->add_option("--frame", a->frame_s, "one picture, taken T seconds after the start; no recording");
@@ -148,7 +147,7 @@ wm_status simulate(const Arguments &a, wm_error *err) {
 }  // namespace
 
 int main(int argc, char **argv) {
-  CLI::App app("", "waymark simulate");
+  wm::cli::App app("", "waymark simulate");
   Arguments arguments;
   parse(&app, &arguments);
   return tools::run_program(app, argc, argv, [&arguments] {

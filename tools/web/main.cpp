@@ -138,8 +138,9 @@ int show(const Wishes &wishes) {
 int main(int argc, char **argv) {
   using namespace wm::tools;
   Wishes wishes;
-  CLI::App app("Shows a run as it goes on a page for browsers: map, path, landmarks, sightings, live pictures, health.",
-               "waymark web");
+  wm::cli::App app(
+      "Shows a run as it goes on a page for browsers: map, path, landmarks, sightings, live pictures, health.",
+      "waymark web");
   app.add_option("CONFIG", wishes.config, "the run's configuration: map, calibration, channels, picture socket");
   app.add_option("--recording", wishes.recording, "the recording that the run plays, which has map and calibration");
   app.add_option("--map", wishes.map, "the map.yaml to draw, instead of theirs");
@@ -150,7 +151,7 @@ int main(int argc, char **argv) {
   app.add_option("--url", wishes.url, "LCM's, instead of the configuration's");
   app.add_option("--prefix", wishes.prefix, "of the channels, instead of the configuration's (WAYMARK_)");
   app.add_option("--pictures", wishes.pictures, "the run's picture socket, instead of the configuration's");
-  app.add_option("--duration", wishes.duration_s, "seconds, then stop")->check(CLI::NonNegativeNumber);
+  app.add_option("--duration", wishes.duration_s, "seconds, then stop")->check(wm::cli::not_negative());
   app.footer(
       "examples:\n"
       "  waymark web /etc/waymark/robot.yaml\n"

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The detector's metric on made polylines whose figures are known, and a zigzag over the whole picture: it touches
 // every region of precision, so it wins by the paper's counting, and must lose by length.
+#include <nlohmann/json.hpp>
+
 #include "common/failure.h"
 #include "eval/detector.h"
 #include "made.h"

@@ -2,6 +2,7 @@
 // Upright lines against labels: what is found, right, false; how far off, and by how much all are turned.
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "eval/lines.h"
 

@@ -3,6 +3,7 @@
 #include "map/survey.h"
 
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "made.h"
 #include "unity.h"

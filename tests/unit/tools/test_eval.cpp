@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The figures of `waymark eval` on small made drives whose errors are known exactly.
+#include <nlohmann/json.hpp>
+
 #include "common/failure.h"
 #include "common/statistics.h"
 #include "eval/compare.h"
@@ -47,6 +49,17 @@ void straight(const made::Folder &run, const made::Folder &recording, double hea
   }
   recording.write("truth.csv", truth);
   run.write("trajectory.csv", poses);
+}
+
+// Half axes 0.3 and 0.1 m, the longer one turned by 30 degrees.
+void test_an_ellipse_has_its_axes_and_direction() {
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(kPi / 6).toRotationMatrix();
+  const Eigen::Matrix2d covariance = turn * Eigen::Vector2d(0.09, 0.01).asDiagonal() * turn.transpose();
+  const Ellipse is = ellipse_of(covariance);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.3, is.longer_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.1, is.shorter_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, kPi / 6, is.longer_rad);
+  TEST_ASSERT_TRUE(std::isnan(ellipse_of(covariance * kNan).longer_m));
 }
 
 void test_constant_offset_to_the_left() {
@@ -500,6 +513,7 @@ void test_sightings_of_known_landmarks() {
 
 int main() {
   UNITY_BEGIN();
+  RUN_TEST(test_an_ellipse_has_its_axes_and_direction);
   RUN_TEST(test_constant_offset_to_the_left);
   RUN_TEST(test_behind_and_turned_across_pi);
   RUN_TEST(test_nees_uses_the_whole_covariance);
