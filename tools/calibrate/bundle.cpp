@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibrate/bundle.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "calibrate/fit.h"
+#include "common/linear.h"
 
 namespace wm::calibrate {
 namespace {
@@ -75,7 +76,7 @@ void refine_pose(const Camera &camera, View &view) {
     N.diagonal() *= 1 + lambda;
     N.diagonal().array() += 1e-12;
     View next = view;
-    next.T_camera_board = moved(view.T_camera_board, -N.ldlt().solve(g));
+    next.T_camera_board = moved(view.T_camera_board, -tools::solve_symmetric(N, g));
     const double then = cost(camera, next, true);
     lambda = then < now ? lambda / 5 : lambda * 10;
     if (!(then < now)) continue;
@@ -108,8 +109,7 @@ bool find_pose(const Camera &camera, View &view) {
     pairs.emplace_back(d, p);
   }
   if (pairs.size() < 6) return false;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 9, 9>> solver(N);
-  const Eigen::Matrix<double, 9, 1> h = solver.eigenvectors().col(0);
+  const Eigen::Matrix<double, 9, 1> h = tools::smallest_eigenvector(N);
   Eigen::Matrix3d H;
   for (int c = 0; c < 3; c++) H.col(c) = h.segment<3>(3 * c);
   double ahead = 0;
@@ -121,8 +121,8 @@ bool find_pose(const Camera &camera, View &view) {
   R.col(0) = H.col(0) * scale;
   R.col(1) = H.col(1) * scale;
   R.col(2) = R.col(0).cross(R.col(1));
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(R, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  view.T_camera_board.linear() = svd.matrixU() * svd.matrixV().transpose();
+  const tools::Svd3 svd = tools::svd_of(R);
+  view.T_camera_board.linear() = svd.U * svd.V.transpose();
   if (view.T_camera_board.linear().determinant() < 0) return false;
   view.T_camera_board.translation() =
       H.col(2) * scale * size - view.T_camera_board.linear() * Vec3(middle.x(), middle.y(), 0);
@@ -173,14 +173,14 @@ class Normal {
       A.diagonal() *= 1 + lambda;
       C.diagonal() *= 1 + lambda;
       C.diagonal().array() += 1e-12;
-      const Eigen::Matrix<double, 6, 6> inverse = C.inverse();
+      const Eigen::Matrix<double, 6, 6> inverse = tools::inverse_of_six(C);
       reduced_ += A - B * inverse * B.transpose();
       right_ += a - B * inverse * c;
       parts_.push_back({B, inverse, c});
     }
   }
 
-  [[nodiscard]] Eigen::VectorXd camera_step() const { return -reduced_.ldlt().solve(right_); }
+  [[nodiscard]] Eigen::VectorXd camera_step() const { return -tools::solve_symmetric(reduced_, right_); }
   [[nodiscard]] Vec6 pose_step(size_t view, const Eigen::VectorXd &camera) const {
     return -parts_[view].inverse * (parts_[view].right + parts_[view].cross.transpose() * camera);
   }
@@ -257,8 +257,7 @@ void finish(Calibration &c) {
   const Normal normal(c.camera, c.views, false, 0);
   const double unknowns = static_cast<double>(normal.information().rows()) + 6.0 * static_cast<double>(c.views.size());
   const double variance = sum / std::max(1.0, 2.0 * static_cast<double>(c.corners) - unknowns);
-  c.covariance = variance * normal.information().ldlt().solve(
-                                Eigen::MatrixXd::Identity(normal.information().rows(), normal.information().rows()));
+  c.covariance = variance * tools::inverse_symmetric(normal.information());
 }
 
 // Poses of all views by a guessed focal length; the sum of what is left, large where a view has none.

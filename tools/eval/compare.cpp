@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "common/failure.h"
+#include "common/linear.h"
 #include "common/statistics.h"
 
 namespace wm::tools {
@@ -110,10 +111,10 @@ Similarity align(const std::vector<Eigen::Vector3d> &from, const std::vector<Eig
     const double angle = std::atan2(moment(1, 0) - moment(0, 1), moment(0, 0) + moment(1, 1));
     out.R = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   } else {
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moment, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    const Svd3 svd = svd_of(moment);
     Eigen::Matrix3d S = Eigen::Matrix3d::Identity();
-    if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) S(2, 2) = -1;  // no mirror
-    out.R = svd.matrixU() * S * svd.matrixV().transpose();
+    if ((svd.U * svd.V.transpose()).determinant() < 0) S(2, 2) = -1;  // no mirror
+    out.R = svd.U * S * svd.V.transpose();
   }
   if (kind == Alignment::kSim2) {
     out.scale = (out.R * a).cwiseProduct(b).sum() / a.squaredNorm();
