@@ -3,6 +3,7 @@
 #include <set>
 
 #include "report/page.h"
+#include "report/report_json.h"
 #include "report/words.h"
 
 namespace wm::tools {
@@ -43,10 +44,16 @@ std::string item(const Json &finding, std::set<std::string> *seen) {
 }  // namespace
 
 std::string findings_section(const ReportData &data) {
-  if (!data.health.is_object() || !data.health.contains("findings") || !data.health["findings"].is_array()) return "";
+  if (!data.json->health.is_object() || !data.json->health.contains("findings") ||
+      !data.json->health["findings"].is_array())
+    return "";
   std::string bad, notes;
+<<<<<<< HEAD
   std::set<std::string> seen;
   for (const Json &finding : data.health["findings"]) {
+=======
+  for (const Json &finding : data.json->health["findings"]) {
+>>>>>>> d6be5b60 (docs: times of builds and of the gate)
     if (!finding.is_object()) continue;
     (word(finding, "severity") == "bad" ? bad : notes) += item(finding, &seen);
   }
