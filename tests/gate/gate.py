@@ -149,7 +149,8 @@ def skipped_tests(folder):
     for case in xml.etree.ElementTree.parse(folder / "tests.xml").getroot().iter("testcase"):
         lines = [line.strip() for line in (case.findtext("system-out") or "").splitlines() if line.strip()]
         if case.find("skipped") is not None and case.get("status") != "disabled":
-            out.append((case.get("name"), lines[-1] if lines else "gives no reason"))
+            reason = re.sub(r"^skipped[^:]*: ", "", lines[-1]) if lines else "no reason given"
+            out.append((case.get("name"), reason))
         out += [(case.get("name"), line.split(":", 2)[2]) for line in lines if re.search(r":IGNORE\b", line)]
     return out
 
