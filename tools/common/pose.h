@@ -35,7 +35,8 @@ Eigen::Vector3d rotation_vector(const Eigen::Quaterniond &q);
 // strictly in t_ns.
 std::optional<Pose> pose_at(const std::vector<Pose> &poses, int64_t t_ns, int64_t max_gap_ns);
 
-// Half axes of a position's ellipse of one sigma, and the direction of the longer one. Variances below 0 count as 0; NaN stays.
+// Half axes of a position's ellipse of one sigma, and the direction of the longer one. Variances below 0 count as 0;
+// NaN stays.
 struct Ellipse {
   double shorter_m, longer_m, longer_rad;
 };
