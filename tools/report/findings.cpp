@@ -48,12 +48,8 @@ std::string findings_section(const ReportData &data) {
       !data.json->health["findings"].is_array())
     return "";
   std::string bad, notes;
-<<<<<<< HEAD
   std::set<std::string> seen;
-  for (const Json &finding : data.health["findings"]) {
-=======
   for (const Json &finding : data.json->health["findings"]) {
->>>>>>> d6be5b60 (docs: times of builds and of the gate)
     if (!finding.is_object()) continue;
     (word(finding, "severity") == "bad" ? bad : notes) += item(finding, &seen);
   }
