@@ -174,10 +174,12 @@ wm_status check_clear(const World &world, wm_error *err) {
     if (way_m >= 0 && std::fabs(at.way_m - way_m) < 0.05) continue;
     way_m = at.way_m;
     if (clearance_m(mapped, world.footprint, at.x_m, at.y_m, at.heading_rad) > 0) continue;
-    return wm_fail(
-        err, WM_BAD_CONFIG,
-        "route: %.1f s after the start, at (%.2f, %.2f), the robot (%.2f m wide) is inside of a wall or touches it",
-        t_s, at.x_m, at.y_m, 2 * world.footprint.half_width_m);
+    return wm_fail(err, WM_BAD_CONFIG,
+                   "route: %.1f s after the start, at (%.2f, %.2f), the robot (%.2f m wide, from %.2f m before "
+                   "base_link to %.2f m "
+                   "behind it; `body` of `robot` sets these) is inside of a wall or touches it",
+                   t_s, at.x_m, at.y_m, 2 * world.footprint.half_width_m, world.footprint.front_m,
+                   -world.footprint.back_m);
   }
   return WM_OK;
 }
@@ -193,9 +195,11 @@ wm_status prepare(const Scenario &scenario, uint64_t seed, Film &out, wm_error *
   request.markers = scenario.world.markers;
   request.seed = seed;
   if (!scenario.route.legs.empty()) request.route = scenario.route;
+  request.footprint = scenario.robot.body;
   if (!scenario.world.plan.empty()) {
     request.plan.emplace();
-    if (const wm_status s = load_building(scenario.world.plan, scenario.world.ceiling_m, *request.plan, err);
+    if (const wm_status s = load_building(scenario.world.plan, scenario.world.ceiling_m, scenario.world.resolution_m,
+                                          *request.plan, err);
         s != WM_OK)
       return s;
   }

@@ -13,8 +13,8 @@ namespace wm::sim {
 namespace {
 
 void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
-  static const char *const known[] = {"landmarks", "kind", "variant",   "markers_on_walls", "scatter",
-                                      "map",       "plan", "ceiling_m", "markers",          nullptr};
+  static const char *const known[] = {"landmarks", "kind",      "variant",      "markers_on_walls", "scatter", "map",
+                                      "plan",      "ceiling_m", "resolution_m", "markers",          nullptr};
   static const char *const maps[] = {"all", "listed", "none", nullptr};
   static const char *const kinds[] = {"features", "crossing", "corridor", "office", "hall", "seabed", nullptr};
   static const char *const variants[] = {"easy", "hard", nullptr};
@@ -31,6 +31,7 @@ void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
   if (kind > 0) out.world.kind = kinds[kind];
   r.text(world, "plan", out.world.plan);
   r.number(world, "ceiling_m", 0.5, 50, 1, out.world.ceiling_m);
+  r.number(world, "resolution_m", 1e-4, 10, 1, out.world.resolution_m);
   const bool building = out.world.kind == "corridor" || out.world.kind == "office" || out.world.kind == "hall";
   if (r.ok() && !out.world.plan.empty() && !building)
     return r.fail(r.child(world, "plan", false), "only corridor, office and hall have a plan");
@@ -101,9 +102,21 @@ void read_actuators(Reader &r, const wm_yaml_node &map, Robot &out) {
   r.number(map, "turn_scale", 0.1, 10, 1, a.turn_scale);
 }
 
+// How far the robot's body reaches from base_link.
+void read_body(Reader &r, const wm_yaml_node &map, Robot &out) {
+  static const char *const known[] = {"front_m", "back_m", "width_m", nullptr};
+  if (!r.ok() || !wm_yaml_there(&map)) return;
+  r.keys(map, known);
+  double front_m = 0, back_m = 0, width_m = 0;
+  r.number(map, "front_m", 0, 10, 1, front_m, true);
+  r.number(map, "back_m", 0, 10, 1, back_m, true);
+  r.number(map, "width_m", 0.05, 10, 1, width_m, true);
+  if (r.ok()) out.body = Footprint{front_m, -back_m, 0.5 * width_m};
+}
+
 void read_robot(Reader &r, const wm_yaml_node &map, bool steered, Robot &out) {
-  static const char *const known[] = {"wheel_radius_m", "ticks_per_turn", "track_m",  "wheelbase_m",
-                                      "steering_table", "wheels_send",    "commands", nullptr};
+  static const char *const known[] = {"wheel_radius_m", "ticks_per_turn", "track_m", "wheelbase_m", "steering_table",
+                                      "wheels_send",    "commands",       "body",    nullptr};
   static const char *const sends[] = {"ticks", "speeds", nullptr};
   r.keys(map, known);
   const wm_yaml_node table = r.child(map, "steering_table", false);
@@ -123,6 +136,7 @@ void read_robot(Reader &r, const wm_yaml_node &map, bool steered, Robot &out) {
   r.word(map, "wheels_send", sends, speeds);
   out.sends_speeds = speeds == 1;
   read_actuators(r, r.child(map, "commands", false), out);
+  read_body(r, r.child(map, "body", false), out);
 
   static const char *const known_table[] = {"actuator_mm", "road_wheel_deg", nullptr};
   if (!r.ok() || !wm_yaml_there(&table)) return;

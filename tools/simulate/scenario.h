@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "simulate/worlds/path6.h"
+#include "simulate/worlds/plan.h"
 #include "waymark/estimator.h"
 #include "waymark/status.h"
 
@@ -51,6 +52,7 @@ struct Robot {
   bool differential = false;  // two driven wheels, no steering
   bool commanded = false;     // motion.csv has commands; nothing measures the motion
   Actuators actuators;
+  std::optional<Footprint> body;  // corridor, office, hall; else the world's usual one
 };
 
 // Landmarks that the seed draws, in a world of features alone.
@@ -84,8 +86,9 @@ struct WorldKind {
   bool hard = false;
   bool markers_on_walls = false;    // office
   Markers markers = Markers::tags;  // office
-  std::string plan;        // corridor, office, hall: the file of a building of one's own; empty: drawn by the seed
-  double ceiling_m = 2.6;  // of a ROS map
+  std::string plan;         // corridor, office, hall: the file of a building of one's own; empty: drawn by the seed
+  double ceiling_m = 2.6;   // of a ROS map or a picture
+  double resolution_m = 0;  // of a plan that is a picture: metres of a pixel
   bool pictured() const { return !kind.empty(); }
 };
 

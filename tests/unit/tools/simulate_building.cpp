@@ -21,10 +21,10 @@ namespace {
 
 std::string worlds() { return std::string(std::getenv("WM_SOURCE_DIR")) + "/config/worlds/"; }
 
-Plan building(const std::string &file) {
+Plan building(const std::string &file, double resolution_m = 0) {
   Plan plan;
   wm_error err{};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_building(worlds() + file, 2.5, plan, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_building(worlds() + file, 2.5, resolution_m, plan, &err), err.text);
   return plan;
 }
 
@@ -41,6 +41,33 @@ void test_plan_and_map_of_a_flat_agree() {
     }
   TEST_ASSERT_TRUE(asked > 500);
   TEST_ASSERT_TRUE(drawn.faces.size() > 20 && mapped.faces.size() > 10);
+}
+
+// Its picture alone, with the map's resolution; the map's origin is 0, 0.
+void test_a_picture_is_a_plan() {
+  const Plan mapped = building("plans/map.yaml"), drawn = building("plans/flat.pgm", 0.05);
+  TEST_ASSERT_EQUAL(mapped.faces.size(), drawn.faces.size());
+  const Rectangle a = mapped.bounds(), b = drawn.bounds();
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, a.x1_m - a.x0_m, b.x1_m - b.x0_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, a.y1_m - a.y0_m, b.y1_m - b.y0_m);
+}
+
+// A route that is too narrow for the world's robot is driven by a smaller one.
+void test_the_size_of_the_body() {
+  const made::Folder folder;
+  folder.write("room.yaml", "format: waymark-plan/1\noutside: solid\nrooms: [[[0, 0], [6, 0], [6, 4], [0, 4]]]\n");
+  folder.write("x.yaml",
+               "format: waymark-scenario/1\nname: x\nworld: {kind: corridor, plan: room.yaml}\nrobot: {wheel_radius_m: "
+               "0.05, ticks_per_turn: 100, track_m: 0.3, wheelbase_m: 0.3, body: {front_m: 0.2, back_m: 0.15, width_m: "
+               "0.35}}\nroute: {start: {x_m: 1, y_m: 2}, points: [[5.5, 2]]}\n");
+  Scenario scenario;
+  Film film;
+  wm_error err{};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, load_scenario((folder.path() / "x.yaml").string(), scenario, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, prepare(scenario, 1, film, &err), err.text);
+  TEST_ASSERT_EQUAL_DOUBLE(0.2, film.world->footprint.front_m);
+  TEST_ASSERT_EQUAL_DOUBLE(-0.15, film.world->footprint.back_m);
+  TEST_ASSERT_EQUAL_DOUBLE(0.175, film.world->footprint.half_width_m);
 }
 
 void test_shipped_scenarios_with_a_building_can_be_driven() {
@@ -89,11 +116,14 @@ void test_mistakes_are_told() {
   refuse("kind: crossing, plan: room.yaml", along, "x.yaml:3: world.plan: only corridor, office and hall have a plan");
   refuse("kind: corridor, plan: empty.yaml", along,
          "empty.yaml:1: neither a plan (`format: waymark-plan/1`) nor a ROS map (`image: FILE`)");
+  refuse("kind: corridor, plan: white.pgm", along,
+         "world.plan: white.pgm is a picture: `resolution_m`, metres of a pixel, is needed beside it");
   refuse("kind: corridor, plan: unscaled.yaml", along, "unscaled.yaml:1: `resolution`, metres of a pixel, is missing");
   refuse("kind: corridor, plan: white.yaml", along,
          "white.pgm: no pixel is occupied (darker than grey 90); is `negate` right?");
   refuse("kind: corridor, plan: room.yaml", "route: {start: {x_m: 1, y_m: 2}, points: [[5.5, 2]]}\n",
-         "route: 10.3 s after the start, at (4.90, 2.00), the robot (0.70 m wide) is inside of a wall or touches it");
+         "route: 10.3 s after the start, at (4.90, 2.00), the robot (0.70 m wide, from 1.10 m before "
+         "base_link to 0.20 m behind it; `body` of `robot` sets these) is inside of a wall or touches it");
   refuse("kind: corridor, plan: room.yaml", "route: {start: {x_m: 1, y_m: 2}, points: [[1.5, 2], [1.5, 3.5]]}\n",
          "x.yaml:5: route.points: route: point 1: its turn needs 0.56 m more of the straight before it");
 }
@@ -106,6 +136,8 @@ void tearDown(void) {}
 int main() {
   UNITY_BEGIN();
   RUN_TEST(test_plan_and_map_of_a_flat_agree);
+  RUN_TEST(test_a_picture_is_a_plan);
+  RUN_TEST(test_the_size_of_the_body);
   RUN_TEST(test_shipped_scenarios_with_a_building_can_be_driven);
   RUN_TEST(test_mistakes_are_told);
   return UNITY_END();

@@ -38,9 +38,7 @@ wm_status read_ros(const wm_yaml_node &root, RosMap &out, wm_error *err) {
   return status;
 }
 
-wm_status from_ros(const wm_yaml_node &root, const std::string &path, double ceiling_m, Plan &out, wm_error *err) {
-  RosMap map;
-  if (const wm_status s = read_ros(root, map, err); s != WM_OK) return s;
+wm_status from_map(const RosMap &map, const std::string &path, double ceiling_m, Plan &out, wm_error *err) {
   const std::filesystem::path image = map.image;
   GreyImage grey;
   const std::string file = (image.is_absolute() ? image : std::filesystem::path(path).parent_path() / image).string();
@@ -64,15 +62,34 @@ wm_status from_ros(const wm_yaml_node &root, const std::string &path, double cei
   return WM_OK;
 }
 
+bool is_picture(const std::string &path) {
+  const std::string ending = std::filesystem::path(path).extension().string();
+  return ending == ".png" || ending == ".PNG" || ending == ".pgm" || ending == ".PGM";
+}
+
 }  // namespace
 
-wm_status load_building(const std::string &path, double ceiling_m, Plan &out, wm_error *err) {
+wm_status load_building(const std::string &path, double ceiling_m, double resolution_m, Plan &out, wm_error *err) {
+  if (is_picture(path)) {
+    if (!(resolution_m > 0))
+      return wm_fail(err, WM_BAD_CONFIG,
+                     "world.plan: %s is a picture: `resolution_m`, metres of a pixel, is needed beside it",
+                     path.c_str());
+    RosMap map;
+    map.image = std::filesystem::absolute(path).string();
+    map.resolution_m = resolution_m;
+    return from_map(map, path, ceiling_m, out, err);
+  }
   wm_yaml *doc = nullptr;
   if (const wm_status s = wm_yaml_load(path.c_str(), &doc, err); s != WM_OK) return s;
   const std::unique_ptr<wm_yaml, decltype(&wm_yaml_free)> owner(doc, wm_yaml_free);
   const wm_yaml_node root = wm_yaml_root(doc), image = wm_yaml_get(&root, "image"),
                      format = wm_yaml_get(&root, "format");
-  if (wm_yaml_there(&image)) return from_ros(root, path, ceiling_m, out, err);
+  if (wm_yaml_there(&image)) {
+    RosMap map;
+    const wm_status s = read_ros(root, map, err);
+    return s == WM_OK ? from_map(map, path, ceiling_m, out, err) : s;
+  }
   if (!wm_yaml_there(&format))
     return wm_yaml_fail(&root, err, "neither a plan (`format: waymark-plan/1`) nor a ROS map (`image: FILE`)");
   return load_plan(path, out, err);

@@ -68,7 +68,7 @@ wm_status make_corridor(const WorldRequest &request, World &world, wm_error *err
   CorridorDrawing drawn = draw_corridor(request.seed, request.hard);
   world.vehicle = Vehicle::car;
   world.wheelbase_m = 1.0;
-  world.footprint = {1.1, -0.2, 0.35};
+  world.footprint = request.footprint.value_or(Footprint{1.1, -0.2, 0.35});
   if (request.route) {
     world.route = *request.route;
   } else if (const wm_status status = route_through(drawn.start, drawn.way, {}, world.route, err); status != WM_OK) {

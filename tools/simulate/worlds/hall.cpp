@@ -88,7 +88,7 @@ wm_status make_hall(const WorldRequest &request, World &world, wm_error *err) {
   RoomDrawing drawn;
   if (const wm_status status = draw_hall(request.seed, drawn, err); status != WM_OK) return status;
   world.vehicle = Vehicle::differential;
-  world.footprint = {0.28, -0.28, 0.25};
+  world.footprint = request.footprint.value_or(Footprint{0.28, -0.28, 0.25});
   world.plan = request.plan ? *request.plan : drawn.plan;
   world.route = request.route ? *request.route : drawn.route;
   lines_of_plan(world.plan, world);

@@ -225,7 +225,7 @@ wm_status make_office(const WorldRequest &request, World &world, wm_error *err) 
   RoomDrawing drawn;
   if (const wm_status status = draw_office(request.seed, drawn, err); status != WM_OK) return status;
   world.vehicle = Vehicle::differential;
-  world.footprint = {0.25, -0.25, 0.23};
+  world.footprint = request.footprint.value_or(Footprint{0.25, -0.25, 0.23});
   world.route = request.route ? *request.route : drawn.route;
   world.plan = request.plan ? *request.plan : drawn.plan;
   world.plan.ceiling_m = kOfficeCeiling_m;

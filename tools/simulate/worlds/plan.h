@@ -107,7 +107,8 @@ wm_status parse_plan(const std::string &text, const std::string &path, Plan &out
 
 // Either of a polyline plan and a ROS map's YAML, whose walls are `ceiling_m` high (a plan says so itself). Relative
 // files are beside the YAML. WM_BAD_CONFIG for a map without walls or with more than 20000.
-wm_status load_building(const std::string &path, double ceiling_m, Plan &out, wm_error *err);
+// A picture (PNG, PGM) needs `resolution_m`, metres of a pixel; a plan and a ROS map have their own (0).
+wm_status load_building(const std::string &path, double ceiling_m, double resolution_m, Plan &out, wm_error *err);
 
 // Outlines of what is occupied in a ROS map's image (8-bit grey, row 0 at the top); unknown counts as free where it
 // touches nothing. Staircases of slanted walls become straight within 0.7 pixels.

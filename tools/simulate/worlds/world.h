@@ -27,6 +27,7 @@ struct WorldRequest {
   Markers markers = Markers::tags;  // office
   std::optional<Plan> plan;    // corridor, office, hall: this building instead of a drawn one; then give `route`, too
   std::optional<Route> route;  // instead of the drawn one (not for seabed); clutter and people keep out of its way
+  std::optional<Footprint> footprint;  // corridor, office, hall: the robot's body instead of the world's usual one
 };
 
 struct WorldCamera {
