@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 
-#include "signal.h"
+#include "can_signal.h"
 
 enum {
   COUNTER_PROOF = 4,   // steps by one, in a row, before a signal counts as a counter

@@ -3,7 +3,7 @@
 #ifndef WM_CAN_DBC_H
 #define WM_CAN_DBC_H
 
-#include "signal.h"
+#include "can_signal.h"
 #include "text.h"
 #include "waymark/can.h"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Extraction of signals: by hand, and against a bit-by-bit twin for every start and length in both byte orders.
-#include "signal.h"
+#include "can_signal.h"
 #include "unity.h"
 
 void setUp(void) {}
