@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "cli/check/changed_copy.h"
 #include "cli/check/check.h"
 #include "cli/check/trials.h"
 #include "cli/commands.h"
@@ -34,9 +35,11 @@ static const char kHelp[] =
     "  --map FILE          a map.yaml instead of the recording's\n"
     "  --json              the findings, for programs\n"
     "  --quick             without the trials of the usual mistakes\n"
+    "  --apply FOLDER      a corrected copy of the recording, if the trials find a cause; the original stays\n"
     "\n"
     "example:\n"
-    "  waymark check config/starry-night-plan.yaml RECORDING\n";
+    "  waymark check config/starry-night-plan.yaml RECORDING\n"
+    "  waymark check config/robot.yaml first-drive --apply first-drive-corrected\n";
 
 // Printed beside the findings; not with --json.
 static int tells_facts = 1;
@@ -111,10 +114,12 @@ typedef struct checked {
   wm_recording *recording;
   wm_findings *found;
   const char *dir;
-  int is_quick;  // without trials
+  int is_quick;          // without trials
+  const char *apply_to;  // folder of a corrected copy; NULL: none
   wm_time_ns begin_ns;
   source_data sources;
   source_seen seen[WM_SOURCES_MAX];
+  given_ids ids;
   drive_evidence evidence;
 } checked;
 
@@ -153,6 +158,7 @@ static void arrived(void *context, const wm_event *event) {
   checked *self = context;
   source_data_take(&self->sources, event);
   source_seen_take(&self->seen[event->source], event);
+  given_ids_take(&self->ids, event);
 }
 
 static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
@@ -165,34 +171,60 @@ static uint64_t messages_due(const wm_config *config, const wm_run_report *repor
   return (uint64_t)(report->recorded_s * config->runtime.publish_rate_hz);
 }
 
+// Writes the corrected copy and says where.
+static void apply(checked *self, const trials_plan *plan, const suspect *of, size_t count) {
+  file_edit edits[TRIAL_EDITS_MAX];
+  wm_error err = {0};
+  changed_copy copy = {.dir = self->dir};
+  const size_t edit_count = trials_edits(plan, of, count, edits);
+  (void)snprintf(copy.out, sizeof copy.out, "%s", self->apply_to);
+  if (changed_copy_make(&copy, &plan->config->overrides, edits, edit_count, "waymark check --apply", &err) != WM_OK)
+    wm_find_error(self->found, "apply", &err);
+  else
+    fact("applied      %s: the recording with %zu changes; all other files are links\n", self->apply_to, edit_count);
+}
+
 // The usual mistakes, one after the other, undone: which of them explains the observations?
 static void try_suspects(checked *self, const wm_assembly *assembly, double recorded_s) {
-  suspect list[SUSPECTS_MAX], found[TRIALS_FOUND_MAX];
+  static suspect list[SUSPECTS_MAX];
+  static suspect_files files;
+  static id_table table;
+  suspect found[TRIALS_FOUND_MAX + 1];
   trial_result before, after;
   const double drive_s = wm_seconds_between(self->begin_ns, wm_monotonic_ns());
   progress_line progress;
   progress_begin(&progress);
+  suspect_files_read(&files, assembly->config, self->dir);
   const trials_plan plan = {.config = assembly->config,
+                            .assembly = assembly,
                             .dir = self->dir,
+                            .files = &files,
                             .suspects = list,
-                            .count = suspects_list(assembly, self->seen, list),
+                            .count = suspects_list(assembly, &files, self->seen, list),
+                            .ids = &self->ids,
                             .drive_s = drive_s,
                             .recorded_s = recorded_s,
                             .progress = progress_show,
                             .progress_context = &progress};
-  const size_t count = trials_run(&plan, found, &before, &after);
+  const size_t count = trials_run(&plan, found, &table, &before, &after);
   progress_end(&progress);
-  fact("trials       %zu of the usual mistakes undone, one at a time: %s\n", plan.count - 1,
+  fact("trials       %zu of the usual mistakes undone: %s\n", plan.count - 1,
        count > 0 ? "found what explains the observations" : "none of them explains the observations");
   const size_t consequences = self->found->count;
   for (size_t i = 0; i < count; i++) {
-    char what[160], fix[240];
-    suspect_text(&found[i], assembly, what, sizeof what, fix, sizeof fix);
+    char what[200], fix[WM_FINDING_FIX_MAX];
+    file_edit edits[TRIAL_EDITS_MAX];
+    suspect_text(&found[i], assembly, &files, what, sizeof what);
+    changed_lines(self->dir, &assembly->config->overrides, edits, trials_edits(&plan, &found[i], 1, edits), fix,
+                  sizeof fix);
     wm_find(self->found, WM_FOUND_LIKELY_CAUSE, WM_SEVERITY_BAD, "cause", fix,
-            "%s: with that undone %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely", what,
-            100 * after.explained, 100 * before.explained, exp(after.score - before.score))
+            before.is_valid
+                ? "%s: with that undone %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely"
+                : "%s: with that undone %.0f %% of the updates fit (now there is none)",
+            what, 100 * after.explained, 100 * before.explained, exp(fmin(20, after.score - before.score)))
         ->size = after.explained;
   }
+  if (count > 0 && self->apply_to) apply(self, &plan, found, count);
   wm_findings_to_front(self->found, consequences);
 }
 
@@ -212,6 +244,7 @@ static void print_fit(const wm_assembly *assembly, const drive_evidence *evidenc
 
 static void ended(void *context, const wm_assembly *assembly, const wm_run_report *report) {
   checked *self = context;
+  const size_t bad = wm_findings_of(self->found, WM_SEVERITY_BAD);
   source_data_judge(&self->sources, wm_recording_quantities(self->recording), self->found);
   for (size_t i = 0; i < assembly->source_count; i++) print_source(&assembly->sources[i], &self->sources.facts[i]);
   const uint64_t due = messages_due(assembly->config, report);
@@ -223,7 +256,6 @@ static void ended(void *context, const wm_assembly *assembly, const wm_run_repor
       100 * evidence_share(&self->evidence, WM_STATE_DEAD_RECKONING, due),
       100 * evidence_share(&self->evidence, WM_STATE_LOST, due),
       100 * evidence_share(&self->evidence, WM_STATE_SEARCHING, due));
-  const size_t bad = wm_findings_of(self->found, WM_SEVERITY_BAD);
   evidence_judge(&self->evidence, assembly, &report->health, due, self->found);
   wm_health_map_findings(&report->health, self->found);
   check_unused(&self->evidence, assembly, &report->health, wm_recording_quantities(self->recording), self->found);
@@ -232,13 +264,15 @@ static void ended(void *context, const wm_assembly *assembly, const wm_run_repor
     try_suspects(self, assembly, report->recorded_s);
 }
 
-static void check_recording(const wm_config *config, const char *dir, int is_quick, wm_findings *found) {
+static void check_recording(const wm_config *config, const char *dir, int is_quick, const char *apply_to,
+                            wm_findings *found) {
   static checked self;
   static wm_run_report report;
   wm_error err = {0};
   self.found = found;
   self.dir = dir;
   self.is_quick = is_quick;
+  self.apply_to = apply_to;
   self.begin_ns = wm_monotonic_ns();
   wm_status status = wm_recording_open(dir, &config->overrides, take_note, found, &self.recording, &err);
   if (status != WM_OK) {
@@ -255,6 +289,7 @@ static void check_recording(const wm_config *config, const char *dir, int is_qui
   progress_end(&progress);
   if (status != WM_OK) wm_find_error(found, "setup", &err);
   wm_recording_close(self.recording);
+  given_ids_free(&self.ids);
 }
 
 // ── a robot's own devices ───────────────────────────────────────────────────────────────────────────────────────────
@@ -308,13 +343,14 @@ static int tell(const wm_findings *found) {
 }
 
 int command_check(int argc, char *const *argv) {
-  const char *words[2], *landmarks = NULL, *calibration = NULL, *map = NULL;
+  const char *words[2], *landmarks = NULL, *calibration = NULL, *map = NULL, *apply_to = NULL;
   int help = 0, as_json = 0, is_quick = 0;
   const option options[] = {{"--landmarks", OPTION_TEXT, &landmarks},
                             {"--calibration", OPTION_TEXT, &calibration},
                             {"--map", OPTION_TEXT, &map},
                             {"--json", OPTION_FLAG, &as_json},
                             {"--quick", OPTION_FLAG, &is_quick},
+                            {"--apply", OPTION_TEXT, &apply_to},
                             {"--help", OPTION_FLAG, &help},
                             {"-h", OPTION_FLAG, &help}};
   static wm_findings found;
@@ -346,7 +382,7 @@ int command_check(int argc, char *const *argv) {
   }
   check_config(&config, &found);
   if (count > 1)
-    check_recording(&config, words[1], is_quick, &found);
+    check_recording(&config, words[1], is_quick, apply_to, &found);
   else if (config.devices.can_count + config.devices.lcm_count + config.devices.camera_count > 0)
     check_devices(&config, &found);
   wm_config_free(&config);

@@ -33,7 +33,6 @@ static wm_status read_one(wm_source_reader *self, wm_error *err) {
   }
   self->has_next = status == WM_OK;
   self->next.source = self->index;
-  if (self->has_next && self->change.change) self->change.change(self->change.context, &self->next);
   return status == WM_END || status == WM_AGAIN ? WM_OK : status;
 }
 
@@ -90,14 +89,13 @@ static wm_status fail_empty(const wm_source_reader *readers, const wm_assembly *
                  counts.first_problem);
 }
 
-wm_status wm_source_readers_open(const wm_assembly *assembly, wm_source_reader *readers, const wm_event_change *change,
-                                 wm_time_ns now_ns, wm_time_ns *first_ns, wm_error *err) {
+wm_status wm_source_readers_open(const wm_assembly *assembly, wm_source_reader *readers, wm_time_ns now_ns,
+                                 wm_time_ns *first_ns, wm_error *err) {
   int recorded = 0;
   *first_ns = INT64_MAX;
   for (size_t i = 0; i < assembly->source_count; i++) {
     wm_source_reader *reader = &readers[i];
     memset(reader, 0, sizeof *reader);
-    if (change) reader->change = *change;
     reader->source = assembly->sources[i].source;
     reader->index = (uint16_t)i;
     reader->drops = assembly->sources[i].drops;

@@ -11,17 +11,10 @@
 #include "waymark/source.h"
 #include "waymark/status.h"
 
-// Alters an event as it is read (a trial of another sign, unit or clock); `source` of the event is set.
-typedef struct wm_event_change {
-  void (*change)(void *context, wm_event *event);
-  void *context;
-} wm_event_change;
-
 typedef struct wm_source_reader {
   wm_source *source;
-  wm_event_change change;  // .change NULL: none
-  uint16_t index;          // in the run's table
-  uint32_t drops;          // bit per wm_quantity that is another source's
+  uint16_t index;  // in the run's table
+  uint32_t drops;  // bit per wm_quantity that is another source's
   wm_time_ns from_ns, until_ns;
   // events outside of from_s and until_s (ignored), and the source's counts while they were read
   wm_source_counts outside;
@@ -30,10 +23,10 @@ typedef struct wm_source_reader {
 } wm_source_reader;
 
 // Reads the first event of each recorded source and takes the earliest stamp as the run's beginning (*first_ns); with
-// devices alone it is `now_ns`. `readers` has room for assembly->source_count; `change` may be NULL. WM_BAD_DATA where
+// devices alone it is `now_ns`. `readers` has room for assembly->source_count. WM_BAD_DATA where
 // all sources are empty.
-wm_status wm_source_readers_open(const wm_assembly *assembly, wm_source_reader *readers, const wm_event_change *change,
-                                 wm_time_ns now_ns, wm_time_ns *first_ns, wm_error *err);
+wm_status wm_source_readers_open(const wm_assembly *assembly, wm_source_reader *readers, wm_time_ns now_ns,
+                                 wm_time_ns *first_ns, wm_error *err);
 // The next event into self->next, or self->has_next becomes 0. Fails only where the source can't be read any further. A
 // device waits for up to WM_DEVICE_WAIT_MS.
 wm_status wm_source_reader_advance(wm_source_reader *self, wm_error *err);

@@ -209,7 +209,7 @@ static wm_status prepare(live *self, wm_recording *recording, wm_error *err) {
   if (status == WM_OK) status = wm_vision_start(self->assembly.vision, err);
   wm_vision_look_at_arrival(self->assembly.vision);
   if (status == WM_OK)
-    status = wm_source_readers_open(&self->assembly, self->readers, NULL, wm_monotonic_ns(), &first_ns, err);
+    status = wm_source_readers_open(&self->assembly, self->readers, wm_monotonic_ns(), &first_ns, err);
   if (status == WM_OK && self->options->out_dir)
     status = wm_run_folder_open(self->options->out_dir, &self->assembly, &self->disk.folder, err);
   if (status != WM_OK) return status;

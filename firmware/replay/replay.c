@@ -190,9 +190,7 @@ static wm_status write_summary(replay *self, wm_run_report *report, wm_error *er
 static wm_status run(replay *self, const wm_config *config, wm_recording *recording, const wm_replay_options *options,
                      wm_run_report *report, wm_error *err) {
   if (options->watch) self->watch = *options->watch;
-  const wm_event_change change = {self->watch.change, self->watch.context};
   wm_status status = wm_assemble(config, recording, options->seed, &self->assembly, err);
-  if (status == WM_OK && self->watch.prepare) self->watch.prepare(self->watch.context, &self->assembly);
   if (self->watch.assembled) self->watch.assembled(self->watch.context, &self->assembly, status);
   for (size_t i = 0; status == WM_OK && i < self->assembly.source_count; i++) {
     if (options->from_s > 0.0)
@@ -214,7 +212,7 @@ static wm_status run(replay *self, const wm_config *config, wm_recording *record
   if (status == WM_OK) status = wm_vision_start(self->assembly.vision, err);
   if (status == WM_OK) status = wm_vision_start_prefetch(self->assembly.vision, err);
   if (status == WM_OK)
-    status = wm_source_readers_open(&self->assembly, self->readers, &change, 0, &self->first_ns, err);
+    status = wm_source_readers_open(&self->assembly, self->readers, 0, &self->first_ns, err);
   if (status != WM_OK) return status;
 
   begin_steady(self);

@@ -36,9 +36,6 @@ typedef struct wm_run_report {
 // A reader of a replay beside its files. Each function may be NULL.
 typedef struct wm_replay_watch {
   void *context;
-  // For trials: alters the parts before anything is made of them, and each event as it is read.
-  void (*prepare)(void *context, wm_assembly *assembly);
-  void (*change)(void *context, wm_event *event);
   // Configuration and recording are put together, or failed to be (`status`; the parts until there are filled).
   void (*assembled)(void *context, const wm_assembly *assembly, wm_status status);
   void (*memory)(void *context, const wm_arena_need *needs, size_t count);  // taken, before the first event

@@ -141,13 +141,58 @@ ROBOT = [
 ]
 
 
+PERMUTED = {1: 4, 2: 9, 3: 1, 4: 12, 5: 2, 6: 11, 7: 3, 8: 10, 9: 5, 10: 8, 11: 7, 12: 6}
+# Two at once, and others beyond the review's.
+OTHERS = [
+    ("identities permuted", sensor_rows(each(id=lambda i: PERMUTED[int(i)])), r"4 -> 1\b", "bad"),
+    ("map's y mirrored", {"landmarks.csv": each(y_m=lambda y: -y)}, r"map.*(mirror|swap)", "bad"),
+    ("map in feet", {"landmarks.csv": each(x_m=lambda x: x / 0.3048, y_m=lambda y: y / 0.3048)}, r"feet", "bad"),
+    ("gyro's DBC in deg/s", {"vehicle.dbc": text('"rad/s"', '"deg/s"')}, r"rad/s|57\.2|scale: 57", "any"),
+    ("gyro unsigned", {"vehicle.dbc": text("0|16@1- ", "0|16@1+ ")}, r"sign|@1-", "bad"),
+    ("sensor 0.3 m off", mounting(xyz="[0.4, 0, 0.2]"), r"xyz_m: \[0\.(0|1|2)", "any"),
+    ("sensor to the left", mounting(xyz="[0.1, 0.4, 0.2]"), r"xyz_m: \[0\.\d+, -?0(\.0|,)", "any"),
+    ("range in mm, bearing to the right", sensor_rows(each(bearing_rad=lambda b: -b, range_m=lambda r: 1e3 * r)), r"range.*\bmm\b", "bad"),
+    ("identities off by one, mounted by 180 degrees", {**sensor_rows(each(id=lambda i: int(i) + 1)), **mounting(rpy="[0, 0, 180]")}, r"off by 1\b", "bad"),
+    ("sightings 1 s late, map's y mirrored", {**sensor_rows(stamps(lambda t: t + 10**9)), "landmarks.csv": each(y_m=lambda y: -y)}, r"mirror", "bad"),
+]
+MRCLAM = [
+    ("bearing to the right", sensor_rows(each(bearing_rad=lambda b: -b)), r"bearing.*right|mirror", "bad"),
+    ("range in mm", sensor_rows(each(range_m=lambda r: 1e3 * r)), r"range.*\bmm\b", "bad"),
+    ("sightings 2 s late", sensor_rows(replays.shifted(2)), r"(clock|stamps).*(2\.0|1\.[89])", "bad"),
+    ("identities off by one", sensor_rows(each(id=lambda i: int(i) + 1)), r"id.*(by 1\b|-> )", "bad"),
+    ("identities off by 100", sensor_rows(each(id=lambda i: int(i) + 100)), r"by 100\b", "bad"),
+    ("identities reversed", sensor_rows(each(id=lambda i: 26 - int(i))), r"permut", "bad"),
+    ("map's x and y swapped", {"landmarks.csv": swapped("x_m", "y_m")}, r"map.*(x and y|swap|mirror)", "bad"),
+    ("map's y mirrored", {"landmarks.csv": each(y_m=lambda y: -y)}, r"map.*mirror", "bad"),
+    ("map in mm", {"landmarks.csv": each(x_m=lambda x: 1e3 * x, y_m=lambda y: 1e3 * y)}, r"\bmm\b", "bad"),
+    ("mounted by 180 degrees", mounting(rpy="[0, 0, 180]"), r"rpy_deg: \[0, 0, -?([0-9]|35\d)(\.|\])", "bad"),
+    ("mounted by 90 degrees", mounting(rpy="[0, 0, 90]"), r"rpy_deg: \[0, 0, -?[0-9](\.|\])", "bad"),
+    ("turn rate in degrees", {"motion.csv": each(w_radps=math.degrees)}, r"deg", "bad"),
+    ("turn rate to the right", {"motion.csv": each(w_radps=lambda w: -w)}, r"turn rate.*right", "bad"),
+    ("speed in km/h", {"motion.csv": each(v_mps=lambda v: 3.6 * v)}, r"speed.*km/h|v_mps times 0\.27", "bad"),
+    ("speed to the rear", {"motion.csv": each(v_mps=lambda v: -v)}, r"speed.*(rear|sign)", "bad"),
+    ("speed in mm/s", {"motion.csv": each(v_mps=lambda v: 1e3 * v)}, r"mm", "bad"),
+]
+SMARTLOC = [
+    ("positions' x and y swapped", {"gnss.csv": swapped("x_m", "y_m")}, r"x .*and y .*swapped", "bad"),
+    ("positions' x mirrored", {"gnss.csv": each(x_m=lambda x: -x)}, r"x of gnss|x_m times -1", "bad"),
+    ("positions 5 s late", {"gnss.csv": replays.shifted(5)}, r"stamps of gnss are [45]", "bad"),
+    ("turn rate in degrees", {"motion.csv": each(w_radps=math.degrees)}, r"deg", "bad"),
+    ("turn rate to the right", {"motion.csv": each(w_radps=lambda w: -w)}, r"turn rate.*right", "bad"),
+    ("speed in km/h", {"motion.csv": each(v_mps=lambda v: 3.6 * v)}, r"speed.*km/h|v_mps times 0\.27", "bad"),
+]
+# Recordings of others with the configuration that suits them.
+SHARED = [("mrclam-d6-t1", "mrclam.yaml", MRCLAM), ("starry-night-plan-a", "starry-night-plan.yaml", MRCLAM),
+          ("smartloc-potsdamer-a", "smartloc.yaml", SMARTLOC)]
+
+
 def found(check, pattern):
     lines = [f["text"] + " " + f["fix"] for f in check["findings"]] if check else []
     return any(re.search(pattern, line, re.I | re.S) for line in lines)
 
 
-def run_check(options, config, recording):
-    done = subprocess.run([options.bin_dir / "waymark", "check", config, recording, "--json"], capture_output=True, text=True)
+def run_check(options, config, recording, corrected):
+    done = subprocess.run([options.bin_dir / "waymark", "check", config, recording, "--json", "--apply", corrected], capture_output=True, text=True)
     try:
         return json.loads(done.stdout)
     except json.JSONDecodeError:
@@ -168,9 +213,12 @@ def judge(options, base, config, mistake, scratch):
     name, changes, pattern, verdict = mistake
     recording, run = scratch / "rec", scratch / "run"
     replays.copy_changed(base, recording, changes)
-    check = {"good": False, "findings": []} if options.followed else run_check(options, config, recording)
+    corrected = scratch / "corrected"
+    check = {"good": False, "findings": []} if options.followed else run_check(options, config, recording, corrected)
     row = {"mistake": name, "check": "good" if check["good"] else "bad", "named": found(check, pattern),
-           "right": (verdict == "any" or not check["good"]) and (verdict == "any" and check["good"] or found(check, pattern))}
+           "right": (verdict == "any" or not check["good"]) and (verdict == "any" and check["good"] or found(check, pattern)),
+           "fixed": is_corrected(options, config, corrected),
+           "causes": [f["text"] + " | " + f["fix"] for f in check["findings"] if f["about"] == "cause"]}
     if options.named:
         return row | {"wrong_s": 0.0, "state": "not replayed"}
     try:
@@ -190,6 +238,22 @@ def states(run):
     return " ".join(f"{k} {100 * v / len(rows):.0f}%" for k, v in sorted(share.items(), key=lambda x: -x[1])) or "no pose"
 
 
+def show(options, row):
+    if options.json:
+        print(json.dumps(row), flush=True)
+    else:
+        print(f"{row['mistake']:48} check {row['check']:4} {'named' if row['named'] else '-':5} fixed {row['fixed']:4} "
+              f"wrong {row['wrong_s']:6.1f} s  {row['state']}", flush=True)
+
+
+def is_corrected(options, config, corrected):
+    """Whether check calls the corrected copy good."""
+    if not corrected.is_dir():
+        return "-"
+    done = subprocess.run([options.bin_dir / "waymark", "check", config, corrected, "--quick"], capture_output=True, text=True)
+    return "good" if done.returncode == 0 else "bad"
+
+
 def main():
     parser = replays.parser(__doc__, "rows whose title contains one of the words")
     parser.add_argument("--named", action="store_true", help="of check alone, without replays")
@@ -197,21 +261,22 @@ def main():
     options = parser.parse_args()
     rows = []
     with tempfile.TemporaryDirectory() as scratch:
-        scratch = pathlib.Path(scratch)
-        base = scratch / "small-robot"
+        base = pathlib.Path(scratch) / "small-robot"
         small_robot.write(base)
-        config = options.source_dir / "config" / "robot.yaml"
-        for mistake in [("no mistake", {}, "", "any"), *SIGHTINGS, *ROBOT]:
-            if not replays.is_chosen(options, mistake[0]):
+        sets = [(base, "robot.yaml", [("no mistake", {}, "", "any"), *SIGHTINGS, *ROBOT, *([] if options.followed else OTHERS)])]
+        for name, config, list_of in [] if options.followed else SHARED:
+            if (options.data_dir / name).is_dir():
+                sets.append((options.data_dir / name, config, list_of))
+            else:
+                print(f"skipped: {options.data_dir / name} is not there", file=sys.stderr)
+        for recording, config, mistake in [(r, c, m) for r, c, list_of in sets for m in list_of]:
+            title = mistake[0] if recording == base else f"{recording.name}: {mistake[0]}"
+            if not replays.is_chosen(options, title):
                 continue
             with tempfile.TemporaryDirectory() as folder:
-                row = judge(options, base, config, mistake, pathlib.Path(folder))
-            rows.append(row)
-            if options.json:
-                print(json.dumps(row), flush=True)
-            else:
-                print(f"{row['mistake']:36} check {row['check']:4} {'named' if row['named'] else '-':5} "
-                      f"wrong {row['wrong_s']:6.1f} s  {row['state']}", flush=True)
+                row = judge(options, recording, options.source_dir / "config" / config, mistake, pathlib.Path(folder))
+            rows.append(row | {"mistake": title})
+            show(options, rows[-1])
     missed = [] if options.followed else [r["mistake"] for r in rows if not r["right"]]
     wrong = [r["mistake"] for r in rows if r["wrong_s"] > LONGER_WRONG_S.get(r["mistake"], LONGEST_WRONG_S)]
     wrong += [r["mistake"] for r in rows if r["mistake"] == "no mistake" and ("degraded" in r["state"] or "lost" in r["state"])]

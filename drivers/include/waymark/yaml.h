@@ -70,6 +70,11 @@ typedef struct wm_yaml_change {
 } wm_yaml_change;
 // Writes the document with changes: the same values, without comments. WM_IO.
 wm_status wm_yaml_write(const wm_yaml *doc, const wm_yaml_change *changes, size_t count, FILE *to, wm_error *err);
+// `text` with the value at `path` ("wheels.radius_m", "[2].scale") replaced by `value` (YAML in one line); all other
+// characters stay. Missing keys are added to the deepest map of the path that is there. `comment` ("": none) ends the
+// changed line. The caller frees *out. WM_BAD_CONFIG where there is no such map.
+wm_status wm_yaml_edit(const char *text, size_t length, const char *path, const char *value, const char *comment,
+                       char **out, size_t *out_length, wm_error *err);
 
 #ifdef __cplusplus
 }

@@ -29,6 +29,13 @@ static void take(source_facts *facts, const wm_setup *setup, const wm_event *eve
   facts->unknown_landmarks += !is_landmark(setup, id);
 }
 
+static void take_range(source_facts *facts, const wm_setup *setup, const wm_event *event) {
+  if (event->kind != WM_EVENT_SIGHTING || event->as.sighting.sensor >= setup->sensor_count) return;
+  const double range_m = event->as.sighting.range_m;
+  facts->ranges += !isnan(range_m);
+  facts->far_ranges += range_m > setup->sensors[event->as.sighting.sensor].max_range_m;
+}
+
 static uint64_t of_hundred(uint64_t part, uint64_t whole) { return whole > 0 ? part * 100 / whole : 0; }
 
 static void counted(const wm_assembled_source *s, const source_facts *facts, wm_findings *out) {
@@ -118,6 +125,12 @@ static void judge(const wm_assembly *assembly, const wm_assembled_source *s, con
             " of 100 sightings are ranges without a bearing: such a landmark begins as a circle and joins the "
             "map once its place is decided",
             of_hundred(facts->bare_ranges, facts->sightings));
+  if (of_hundred(facts->far_ranges, facts->ranges) > 50)
+    wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, s->name,
+            "are they in mm or cm? range_m is in metres; or correct the sensor's max_range_m in calibration.yaml",
+            "%" PRIu64 " of 100 ranges are beyond the sensor's max_range_m and not used",
+            of_hundred(facts->far_ranges, facts->ranges))
+        ->size = (double)facts->far_ranges / (double)facts->ranges;
   int needs_landmarks = assembly->setup.landmark_count > 0;
   if (needs_landmarks && of_hundred(facts->unknown_landmarks, facts->sightings) > 50)
     wm_find(out, WM_FOUND_IDENTITIES_UNKNOWN, WM_SEVERITY_BAD, s->name,
@@ -177,6 +190,7 @@ void source_data_init(source_data *self, const wm_assembly *assembly) {
 
 void source_data_take(source_data *self, const wm_event *event) {
   take(&self->facts[event->source], &self->assembly->setup, event);
+  take_range(&self->facts[event->source], &self->assembly->setup, event);
   motion_data_take(&self->motion, event);
   course_data_take(&self->course, event);
 }

@@ -3,8 +3,9 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
+
+#include "waymark/yaml.h"
 
 #define DEG (M_PI / 180)
 
@@ -16,10 +17,19 @@ static void take_identity(source_seen *self, int32_t id, uint16_t sensor) {
   if (self->most_id < self->least_id) self->least_id = self->most_id = id;
   if (id < self->least_id) self->least_id = id;
   if (id > self->most_id) self->most_id = id;
+  if (id < 256) self->ids[id / 64] |= UINT64_C(1) << (id % 64);
 }
 
 void source_seen_take(source_seen *self, const wm_event *event) {
-  if (self->kinds == 0) self->most_id = -1, self->least_id = 0;
+  if (self->kinds == 0) {
+    self->most_id = -1;
+    self->least_id = 0;
+    self->first_ns = event->t_ns;
+    self->last_ns = event->t_ns;
+  }
+  // No sensor is 30 s late; rows in disorder are.
+  self->is_disordered |= event->arrival_ns / 2 - event->t_ns / 2 > 15 * WM_NS_PER_S;
+  self->last_ns = event->t_ns > self->last_ns ? event->t_ns : self->last_ns;
   self->kinds |= WM_EVENT_BIT(event->kind);
   if (event->kind == WM_EVENT_SIGHTING) {
     take_identity(self, event->as.sighting.landmark_id, event->as.sighting.sensor);
@@ -32,6 +42,34 @@ void source_seen_take(source_seen *self, const wm_event *event) {
   }
 }
 
+static void read_binding(const wm_yaml_node *item, binding_seen *out) {
+  char quantity[64] = "";
+  wm_yaml_node node = wm_yaml_get(item, "quantity");
+  (void)wm_yaml_string(&node, quantity, sizeof quantity, NULL);
+  out->quantity = wm_quantity_find(quantity);
+  node = wm_yaml_get(item, "message");
+  (void)wm_yaml_string(&node, out->message, sizeof out->message, NULL);
+  node = wm_yaml_get(item, "signal");
+  if (wm_yaml_is_scalar(&node)) (void)wm_yaml_string(&node, out->signal, sizeof out->signal, NULL);
+  node = wm_yaml_get(item, "scale");
+  if (!wm_yaml_there(&node) || wm_yaml_f64(&node, -1e9, 1e9, &out->scale, NULL) != WM_OK) out->scale = 1;
+}
+
+void suspect_files_read(suspect_files *self, const wm_config *config, const char *dir) {
+  char path[WM_PATH_MAX];
+  wm_yaml *doc;
+  memset(self, 0, sizeof *self);
+  const char *named = config->overrides.can_signals;
+  (void)snprintf(path, sizeof path, "%s%s", named[0] ? named : dir, named[0] ? "" : "/can-signals.yaml");
+  if (wm_yaml_load(path, &doc, NULL) != WM_OK) return;
+  const wm_yaml_node root = wm_yaml_root(doc);
+  for (size_t i = 0; i < wm_yaml_count(&root) && i < BINDINGS_SEEN_MAX; i++) {
+    const wm_yaml_node item = wm_yaml_item(&root, i);
+    read_binding(&item, &self->bindings[self->binding_count++]);
+  }
+  wm_yaml_free(doc);
+}
+
 // ── the list ────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 typedef struct list {
@@ -39,12 +77,15 @@ typedef struct list {
   size_t count;
 } list;
 
-static void add(list *out, suspect_kind kind, size_t source, size_t sensor, double value) {
-  if (out->count < SUSPECTS_MAX) out->at[out->count++] = (suspect){kind, (uint16_t)source, (uint16_t)sensor, value};
+static suspect *add(list *out, suspect_kind kind, size_t source, size_t sensor, double value) {
+  static suspect spare;
+  suspect *one = out->count < SUSPECTS_MAX ? &out->at[out->count++] : &spare;
+  *one = (suspect){.kind = kind, .source = (uint16_t)source, .sensor = (uint16_t)sensor, .value = value};
+  return one;
 }
 
 static void add_values(list *out, suspect_kind kind, size_t source, size_t sensor, const double *values, size_t count) {
-  for (size_t i = 0; i < count; i++) add(out, kind, source, sensor, values[i]);
+  for (size_t i = 0; i < count; i++) (void)add(out, kind, source, sensor, values[i]);
 }
 
 #define VALUES(...) (const double[]){__VA_ARGS__}, sizeof((const double[]){__VA_ARGS__}) / sizeof(double)
@@ -52,295 +93,230 @@ static void add_values(list *out, suspect_kind kind, size_t source, size_t senso
 // mm, cm, inch, foot, dm, and metres that were taken for mm.
 #define LENGTHS VALUES(0.001, 0.01, 0.0254, 0.3048, 0.1, 1000)
 
-static void add_identities(list *out, const wm_assembly *assembly, const source_seen *seen, size_t source) {
-  const wm_setup *setup = &assembly->setup;
-  if (seen->most_id < seen->least_id) return;
-  add_values(out, SUSPECT_IDENTITY, source, 0, VALUES(-1, 1));
-  if (setup->landmark_count == 0) return;
-  int32_t least = INT32_MAX;
-  for (size_t i = 0; i < setup->landmark_count; i++)
-    if (setup->landmarks[i].id < least) least = setup->landmarks[i].id;
-  const double shift = (double)least - seen->least_id;
-  if (fabs(shift) > 1) add(out, SUSPECT_IDENTITY, source, 0, shift);
-  if (seen->kinds & WM_EVENT_BIT(WM_EVENT_SIGHTING)) add(out, SUSPECT_NO_IDENTITY, source, 0, 0);
+static int is_seen(const source_seen *seen, int64_t id) {
+  return id >= 0 && id < 256 && ((seen->ids[id / 64] >> (id % 64)) & 1u);
 }
 
-static void add_observations(list *out, const wm_assembly *assembly, const source_seen *seen, size_t source) {
+// How many landmarks were seen if `shift` is added to the identities that were given.
+static int matches(const wm_setup *setup, const source_seen *seen, int64_t shift) {
+  int count = 0;
+  for (size_t i = 0; i < setup->landmark_count; i++) count += is_seen(seen, setup->landmarks[i].id - shift);
+  return count;
+}
+
+// Shifts that give the most known landmarks, and those from the lowest and the highest identity of both.
+static void add_shifts(list *out, const wm_setup *setup, const source_seen *seen, size_t source, size_t sensor) {
+  int64_t least = INT32_MAX, most = 0, done[8] = {0};
+  size_t count = 0;
+  for (size_t i = 0; i < setup->landmark_count; i++) {
+    least = setup->landmarks[i].id < least ? setup->landmarks[i].id : least;
+    most = setup->landmarks[i].id > most ? setup->landmarks[i].id : most;
+  }
+  const int64_t ends[] = {-1, 1, least - seen->least_id, most - seen->most_id};
+  for (size_t i = 0; i < sizeof ends / sizeof ends[0]; i++) {
+    int is_new = ends[i] != 0;
+    for (size_t k = 0; k < count; k++) is_new &= done[k] != ends[i];
+    if (!is_new) continue;
+    done[count++] = ends[i];
+    (void)add(out, SUSPECT_IDENTITY, source, sensor, (double)ends[i]);
+  }
+  for (int rounds = 0; rounds < 4 && seen->most_id < 256; rounds++) {
+    int64_t best = 0;
+    int best_count = 0;
+    for (int64_t shift = least - seen->most_id; shift <= most - seen->least_id; shift++) {
+      int is_new = shift != 0;
+      for (size_t k = 0; k < count; k++) is_new &= done[k] != shift;
+      const int n = is_new ? matches(setup, seen, shift) : 0;
+      if (n > best_count) {
+        best_count = n;
+        best = shift;
+      }
+    }
+    if (best_count == 0) break;
+    done[count++] = best;
+    (void)add(out, SUSPECT_IDENTITY, source, sensor, (double)best);
+  }
+}
+
+static void add_mounting(list *out, const wm_sensor *sensor, size_t source, size_t s, int is_picture) {
+  const double *p = sensor->mounting.xyz_m, *rpy = sensor->mounting.rpy_rad;
+  add_values(out, SUSPECT_MOUNTING_YAW, source, s, VALUES(M_PI, M_PI / 2, -M_PI / 2, M_PI / 4, -M_PI / 4));
+  if (fabs(rpy[2]) > 0.02) (void)add(out, SUSPECT_MOUNTING_YAW, source, s, -2 * rpy[2]);
+  if (fabs(rpy[1]) > 0.02) (void)add(out, SUSPECT_MOUNTING_PITCH, source, s, -2 * rpy[1]);
+  if (is_picture || fabs(rpy[0]) > 0.02) (void)add(out, SUSPECT_MOUNTING_ROLL, source, s, M_PI);
+  const double largest_deg = fmax(fabs(rpy[0]), fmax(fabs(rpy[1]), fabs(rpy[2]))) / DEG;
+  if (largest_deg > 0.02 && largest_deg < 2 * M_PI) (void)add(out, SUSPECT_MOUNTING_RAD, source, s, 1 / DEG);
+  if (hypot(p[0], p[1]) > 0.5) add_values(out, SUSPECT_MOUNTING_FACTOR, source, s, VALUES(0.01, 0.001));
+  add_values(out, SUSPECT_MOUNTING_X, source, s, VALUES(-0.3, 0.3));
+  add_values(out, SUSPECT_MOUNTING_Y, source, s, VALUES(-0.3, 0.3));
+  if (fabs(p[0]) > 0.05) (void)add(out, SUSPECT_MOUNTING_X, source, s, -2 * p[0]);
+  if (fabs(p[1]) > 0.05) (void)add(out, SUSPECT_MOUNTING_Y, source, s, -2 * p[1]);
+}
+
+// s from the source's first stamp to the motion's, where their spans have nothing in common.
+static double gap_s(const source_seen *self, const source_seen *motion) {
+  if (!motion || (self->first_ns <= motion->last_ns && self->last_ns >= motion->first_ns)) return 0;
+  return (double)motion->first_ns * 1e-9 - (double)self->first_ns * 1e-9;
+}
+
+static void add_clocks(list *out, const source_seen *seen, const source_seen *motion, size_t source) {
+  if (seen->is_disordered) (void)add(out, SUSPECT_DISORDER, source, 0, 0);
+  const double apart_s = gap_s(seen, motion);
+  if (apart_s != 0) {
+    add_values(out, SUSPECT_TIME_FACTOR, source, 0, VALUES(1e3, 1e6, 1e9));
+    (void)add(out, SUSPECT_TIME, source, 0, apart_s);
+    (void)add(out, SUSPECT_TIME, source, 0, rint(apart_s));
+    return;
+  }
+  // The last ones: leap seconds of GPS, of TAI.
   add_values(out, SUSPECT_TIME, source, 0,
-             VALUES(-0.1, 0.1, -0.2, 0.2, -0.35, 0.35, -0.5, 0.5, -0.75, 0.75, -1, 1, -1.5, 1.5, -2, 2, -3, 3, -5, 5));
-  if (seen->kinds & WM_EVENT_BIT(WM_EVENT_POSITION)) add(out, SUSPECT_POSITION_SWAP, source, 0, 0);
-  if (seen->kinds & WM_EVENT_BIT(WM_EVENT_SIGHTING)) add(out, SUSPECT_BEARING_SIGN, source, 0, 0);
-  if (seen->has_range) add_values(out, SUSPECT_RANGE_FACTOR, source, 0, LENGTHS);
-  add_identities(out, assembly, seen, source);
-  for (size_t s = 0; s < assembly->setup.sensor_count && s < 64; s++) {
+             VALUES(-0.1, 0.1, -0.2, 0.2, -0.35, 0.35, -0.5, 0.5, -0.75, 0.75, -1, 1, -1.5, 1.5, -2, 2, -3, 3, -5, 5,
+                    -10, 10, -18, 18, -37, 37));
+}
+
+static void add_observations(list *out, const wm_assembly *assembly, const source_seen *seen, const source_seen *motion,
+                             size_t source) {
+  const wm_setup *setup = &assembly->setup;
+  const int is_sighting = (seen->kinds & WM_EVENT_BIT(WM_EVENT_SIGHTING)) != 0;
+  const int is_picture = assembly->sources[source].source && !strchr("gsmpi", assembly->sources[source].name[0]);
+  add_clocks(out, seen, motion, source);
+  if (seen->kinds & WM_EVENT_BIT(WM_EVENT_POSITION)) {
+    (void)add(out, SUSPECT_POSITION_SWAP, source, 0, 0);
+    add_values(out, SUSPECT_POSITION_X, source, 0, VALUES(-1));
+    add_values(out, SUSPECT_POSITION_Y, source, 0, VALUES(-1));
+  }
+  for (size_t s = 0; s < setup->sensor_count && s < 64; s++) {
+    const wm_sensor *sensor = &setup->sensors[s];
     if (!((seen->sensors >> s) & 1u)) continue;
-    add_values(out, SUSPECT_MOUNTING_YAW, source, s, VALUES(M_PI, M_PI / 2, -M_PI / 2));
-    const double *p = assembly->setup.sensors[s].mounting.xyz_m;
-    if (hypot(p[0], p[1]) > 0.5) add_values(out, SUSPECT_MOUNTING_FACTOR, source, s, VALUES(0.01, 0.001));
+    if (is_sighting) add_values(out, SUSPECT_BEARING_FACTOR, source, s, VALUES(-1, DEG, -DEG, 1 / DEG));
+    if (seen->has_range) add_values(out, SUSPECT_RANGE_FACTOR, source, s, LENGTHS);
+    if (seen->has_range) (void)add(out, SUSPECT_RANGE_IS, source, s, !sensor->range_is_depth);
+    if (seen->most_id >= seen->least_id && setup->landmark_count > 0) {
+      add_shifts(out, setup, seen, source, s);
+      if (is_sighting) (void)add(out, SUSPECT_NO_IDENTITY, source, s, 0);
+    }
+    add_mounting(out, sensor, source, s, is_picture);
+    if (is_picture) add_values(out, SUSPECT_FOCAL_FACTOR, source, s, VALUES(0.5, 2));
   }
 }
 
-static void add_motion(list *out, const source_seen *seen, size_t source) {
-  const uint32_t ticks = (1u << WM_Q_WHEEL_TICKS_LEFT) | (1u << WM_Q_WHEEL_TICKS_RIGHT);
-  if ((seen->quantities & ticks) == ticks) {
-    add(out, SUSPECT_TICKS_SWAP, source, 0, 0);
-    add(out, SUSPECT_TICKS_LEFT_SIGN, source, 0, 0);
-    add(out, SUSPECT_TICKS_RIGHT_SIGN, source, 0, 0);
-    add(out, SUSPECT_TICKS_SIGN, source, 0, 0);
-    add_values(out, SUSPECT_RADIUS_FACTOR, source, 0, VALUES(0.5, 2, 0.25, 4, 0.1, 10, 0.001));
-  }
-  if ((seen->quantities & (1u << WM_Q_YAW_RATE)) || (seen->kinds & WM_TWIST_EVENTS))
-    add_values(out, SUSPECT_YAW_RATE_FACTOR, source, 0, VALUES(-1, DEG, 1 / DEG));
-  if (seen->kinds & WM_TWIST_EVENTS) add_values(out, SUSPECT_SPEED_FACTOR, source, 0, VALUES(-1, 0.001, 1 / 3.6, 3.6));
+static int binding_of(const suspect_files *files, wm_quantity quantity) {
+  for (size_t i = 0; i < files->binding_count; i++)
+    if (files->bindings[i].quantity == (int)quantity) return (int)i;
+  return -1;
 }
 
-size_t suspects_list(const wm_assembly *assembly, const source_seen *seen, suspect *out) {
+static void add_quantity(list *out, const suspect_files *files, size_t source, wm_quantity quantity, wm_quantity other,
+                         const double *values, size_t count) {
+  const int item = binding_of(files, quantity), second = binding_of(files, other);
+  for (size_t i = 0; item >= 0 && i < count; i++) {
+    const int is_pair = other != quantity && second >= 0;
+    suspect *one = add(out, is_pair ? SUSPECT_QUANTITY_FACTORS : SUSPECT_QUANTITY_FACTOR, source, 0, values[i]);
+    one->item = (int16_t)item;
+    one->other = (int16_t)second;
+  }
+}
+
+static void add_layout(list *out, size_t source, int item, signal_layout layout, double factor, int shift) {
+  suspect *one = add(out, SUSPECT_SIGNAL, source, 0, factor);
+  one->item = (int16_t)item;
+  one->layout = (uint16_t)layout;
+  one->shift = (int16_t)shift;
+}
+
+static int is_first_of_message(const suspect_files *files, int item) {
+  for (int i = 0; i < item; i++)
+    if (strcmp(files->bindings[i].message, files->bindings[item].message) == 0) return 0;
+  return 1;
+}
+
+// The byte order is that of a message's signals, and of all messages of a maker.
+static void add_signals(list *out, const suspect_files *files, size_t source) {
+  // All messages last: of two changes with the same effect the first is named.
+  for (int i = 0; i <= (int)files->binding_count; i++) {
+    const int item = i < (int)files->binding_count ? i : -1;
+    if (item < 0 || is_first_of_message(files, item)) {
+      add_layout(out, source, item, LAYOUT_ORDER, 1, 0);
+      add_layout(out, source, item, LAYOUT_ORDER_START, 1, 0);
+      add_layout(out, source, item, LAYOUT_SIGN, 1, 0);
+    }
+    if (item < 0 || files->bindings[item].quantity < 0 || files->bindings[item].quantity == WM_Q_GEAR) continue;
+    add_layout(out, source, item, LAYOUT_SAME, 0.1, 0);
+    add_layout(out, source, item, LAYOUT_SAME, 10, 0);
+    add_layout(out, source, item, LAYOUT_SAME, 1, 8);
+    add_layout(out, source, item, LAYOUT_SAME, 1, -8);
+  }
+}
+
+static void add_can(list *out, const wm_assembly *assembly, const suspect_files *files, const source_seen *seen,
+                    size_t source) {
+  const wm_wheels *w = &assembly->setup.wheels;
+  const wm_quantity left = WM_Q_WHEEL_TICKS_LEFT, right = WM_Q_WHEEL_TICKS_RIGHT;
+  if (binding_of(files, left) >= 0 && binding_of(files, right) >= 0) {
+    (void)add(out, SUSPECT_TICKS_SWAP, source, 0, 0);
+    add_quantity(out, files, source, left, left, VALUES(-1));
+    add_quantity(out, files, source, right, right, VALUES(-1));
+    add_quantity(out, files, source, left, right, VALUES(-1));
+    add_values(out, SUSPECT_RADIUS_FACTOR, source, 0, VALUES(0.5, 2, 0.1, 10, 0.001, 0.01, 0.0254));
+    add_values(out, SUSPECT_TICKS_FACTOR, source, 0, VALUES(4, 0.25, 2, 0.5, 10, 0.1));
+    if (isfinite(w->track_m)) add_values(out, SUSPECT_TRACK_FACTOR, source, 0, VALUES(0.5, 2, 0.1, 10, 0.01, 0.001));
+  }
+  add_quantity(out, files, source, WM_Q_YAW_RATE, WM_Q_YAW_RATE, VALUES(-1, DEG, 1 / DEG, -DEG, 0.1, 10));
+  add_quantity(out, files, source, WM_Q_VEHICLE_SPEED, WM_Q_VEHICLE_SPEED, VALUES(-1, 1 / 3.6, 3.6, 0.44704, 0.1, 10));
+  for (unsigned q = WM_Q_WHEEL_SPEED_FRONT_LEFT; q <= WM_Q_WHEEL_SPEED_REAR_RIGHT; q += 2)
+    add_quantity(out, files, source, (wm_quantity)q, (wm_quantity)(q + 1), VALUES(-1, 1 / 3.6, 3.6, 0.44704));
+  for (unsigned q = WM_Q_STEERING_WHEEL; q <= WM_Q_ROAD_WHEEL; q++)
+    add_quantity(out, files, source, (wm_quantity)q, (wm_quantity)q, VALUES(-1, DEG, 1 / DEG));
+  if (seen->quantities & ((1u << WM_Q_STEERING_WHEEL) | (1u << WM_Q_ROAD_WHEEL))) {
+    add_values(out, SUSPECT_WHEELBASE_FACTOR, source, 0, VALUES(0.001, 0.01, 0.5, 2));
+    if (isfinite(w->steering_ratio)) add_values(out, SUSPECT_STEERING_FACTOR, source, 0, VALUES(0.5, 2, 0.1, 10));
+  }
+  add_signals(out, files, source);
+}
+
+static void add_motion(list *out, const wm_assembly *assembly, const suspect_files *files, const source_seen *seen,
+                       size_t source) {
+  if (seen->is_disordered) (void)add(out, SUSPECT_DISORDER, source, 0, 0);
+  if (seen->kinds & WM_EVENT_BIT(WM_EVENT_QUANTITIES)) add_can(out, assembly, files, seen, source);
+  if (!(seen->kinds & WM_TWIST_EVENTS)) return;
+  add_values(out, SUSPECT_YAW_RATE_FACTOR, source, 0, VALUES(-1, DEG, 1 / DEG, -DEG));
+  add_values(out, SUSPECT_SPEED_FACTOR, source, 0, VALUES(-1, 0.001, 0.01, 1 / 3.6, 3.6, 0.44704, 2, 0.5));
+  if (seen->kinds & WM_EVENT_BIT(WM_EVENT_TWIST2)) (void)add(out, SUSPECT_TWIST_SWAP, source, 0, 0);
+  if (seen->kinds & WM_EVENT_BIT(WM_EVENT_TWIST6)) (void)add(out, SUSPECT_SIDEWAYS_FACTOR, source, 0, -1);
+}
+
+static void add_setup(list *out, const wm_setup *setup, uint32_t kinds) {
+  if (setup->landmark_count > 0) {
+    (void)add(out, SUSPECT_MAP_SWAP, 0, 0, 0);
+    (void)add(out, SUSPECT_MAP_MIRROR_X, 0, 0, 0);
+    (void)add(out, SUSPECT_MAP_MIRROR_Y, 0, 0, 0);
+    (void)add(out, SUSPECT_MAP_TURN, 0, 0, M_PI);
+    add_values(out, SUSPECT_MAP_FACTOR, 0, 0, LENGTHS);
+  }
+  // The white frame taken for the edge or the reverse (8 of 10 cells), half and twice, units.
+  if (kinds & WM_EVENT_BIT(WM_EVENT_MARKER))
+    add_values(out, SUSPECT_TAG_FACTOR, 0, 0, VALUES(0.8, 1.25, 0.5, 2, 0.1, 10, 0.001, 0.01, 0.0254));
+  if (kinds & WM_EVENT_BIT(WM_EVENT_POINTS) && setup->map)
+    add_values(out, SUSPECT_PLAN_FACTOR, 0, 0, VALUES(0.5, 2, 0.1, 10, 0.0254));
+  if (kinds & WM_EVENT_BIT(WM_EVENT_STEREO)) add_values(out, SUSPECT_BASELINE_FACTOR, 0, 0, VALUES(0.5, 2, 0.1, 0.001));
+}
+
+size_t suspects_list(const wm_assembly *assembly, const suspect_files *files, const source_seen *seen,
+                     suspect out[SUSPECTS_MAX]) {
   list all = {out, 0};
-  add(&all, SUSPECT_NONE, 0, 0, 0);
+  const source_seen *motion = NULL;
+  uint32_t kinds = 0;
+  (void)add(&all, SUSPECT_NONE, 0, 0, 0);
+  for (size_t i = 0; i < assembly->source_count; i++) {
+    kinds |= seen[i].kinds;
+    if ((seen[i].kinds & WM_MOTION_EVENTS) && !motion) motion = &seen[i];
+  }
   for (size_t i = 0; i < assembly->source_count; i++) {
     if (seen[i].kinds & WM_MOTION_EVENTS)
-      add_motion(&all, &seen[i], i);
+      add_motion(&all, assembly, files, &seen[i], i);
     else if (seen[i].kinds)
-      add_observations(&all, assembly, &seen[i], i);
+      add_observations(&all, assembly, &seen[i], motion, i);
   }
-  if (assembly->setup.landmark_count > 0) {
-    add(&all, SUSPECT_MAP_SWAP, 0, 0, 0);
-    add(&all, SUSPECT_MAP_MIRROR_X, 0, 0, 0);
-    add(&all, SUSPECT_MAP_MIRROR_Y, 0, 0, 0);
-    add_values(&all, SUSPECT_MAP_FACTOR, 0, 0, LENGTHS);
-  }
+  add_setup(&all, &assembly->setup, kinds);
   return all.count;
-}
-
-// ── a trial's changes ───────────────────────────────────────────────────────────────────────────────────────────────
-
-static void change_quantity(wm_event *event, wm_quantity q, double factor) {
-  wm_quantities *all = &event->as.quantities;
-  for (size_t i = 0; event->kind == WM_EVENT_QUANTITIES && i < all->count; i++)
-    if (all->id[i] == q) all->value[i] *= factor;
-}
-
-static void swap_ticks(wm_event *event) {
-  wm_quantities *all = &event->as.quantities;
-  for (size_t i = 0; event->kind == WM_EVENT_QUANTITIES && i < all->count; i++)
-    if (all->id[i] <= WM_Q_WHEEL_TICKS_RIGHT) all->id[i] = WM_Q_WHEEL_TICKS_RIGHT - all->id[i];
-}
-
-static void change_twist(wm_event *event, double v_factor, double w_factor) {
-  if (event->kind == WM_EVENT_TWIST2) {
-    event->as.twist2.v_mps *= v_factor;
-    event->as.twist2.w_radps *= w_factor;
-  } else if (event->kind == WM_EVENT_TWIST6) {
-    for (int k = 0; k < 3; k++) {
-      event->as.twist6.v_mps[k] *= v_factor;
-      event->as.twist6.w_radps[k] *= w_factor;
-    }
-  }
-}
-
-static void swap(double *a, double *b) {
-  const double c = *a;
-  *a = *b;
-  *b = c;
-}
-
-static void change_sighting(const suspect *s, wm_event *event) {
-  int32_t *id = event->kind == WM_EVENT_SIGHTING ? &event->as.sighting.landmark_id
-                : event->kind == WM_EVENT_MARKER ? &event->as.marker.id
-                                                 : NULL;
-  if (s->kind == SUSPECT_IDENTITY && id && *id >= 0) *id += (int32_t)s->value;
-  if (event->kind != WM_EVENT_SIGHTING) return;
-  if (s->kind == SUSPECT_BEARING_SIGN) event->as.sighting.bearing_rad *= -1;
-  if (s->kind == SUSPECT_RANGE_FACTOR) event->as.sighting.range_m *= s->value;
-  if (s->kind == SUSPECT_NO_IDENTITY) event->as.sighting.landmark_id = -1;
-}
-
-static void change(const suspect *s, wm_event *event) {
-  if (event->source != s->source) return;
-  switch (s->kind) {
-    case SUSPECT_TIME:
-      event->t_ns += wm_ns_from_seconds(s->value);
-      event->arrival_ns += wm_ns_from_seconds(s->value);
-      break;
-    case SUSPECT_BEARING_SIGN:
-    case SUSPECT_RANGE_FACTOR:
-    case SUSPECT_IDENTITY:
-    case SUSPECT_NO_IDENTITY: change_sighting(s, event); break;
-    case SUSPECT_POSITION_SWAP:
-      if (event->kind == WM_EVENT_POSITION) swap(&event->as.position.p_m[0], &event->as.position.p_m[1]);
-      break;
-    case SUSPECT_TICKS_SWAP: swap_ticks(event); break;
-    case SUSPECT_TICKS_LEFT_SIGN: change_quantity(event, WM_Q_WHEEL_TICKS_LEFT, -1); break;
-    case SUSPECT_TICKS_RIGHT_SIGN: change_quantity(event, WM_Q_WHEEL_TICKS_RIGHT, -1); break;
-    case SUSPECT_TICKS_SIGN:
-      change_quantity(event, WM_Q_WHEEL_TICKS_LEFT, -1);
-      change_quantity(event, WM_Q_WHEEL_TICKS_RIGHT, -1);
-      break;
-    case SUSPECT_YAW_RATE_FACTOR:
-      change_quantity(event, WM_Q_YAW_RATE, s->value);
-      change_twist(event, 1, s->value);
-      break;
-    case SUSPECT_SPEED_FACTOR: change_twist(event, s->value, 1); break;
-    default: break;
-  }
-}
-
-void suspects_change(const suspects_applied *self, wm_event *event) {
-  for (size_t i = 0; i < self->count; i++) change(&self->of[i], event);
-}
-
-static void change_landmark(const suspect *s, wm_landmark *l) {
-  switch (s->kind) {
-    case SUSPECT_MAP_SWAP:
-      swap(&l->p_m[0], &l->p_m[1]);
-      l->yaw_rad = M_PI / 2 - l->yaw_rad;
-      break;
-    case SUSPECT_MAP_MIRROR_X:
-      l->p_m[0] *= -1;
-      l->yaw_rad = M_PI - l->yaw_rad;
-      break;
-    case SUSPECT_MAP_MIRROR_Y:
-      l->p_m[1] *= -1;
-      l->yaw_rad *= -1;
-      break;
-    case SUSPECT_MAP_FACTOR:
-      for (int k = 0; k < 2; k++) l->p_m[k] *= s->value;
-      break;
-    default: break;
-  }
-}
-
-static void change_sensor(const suspect *s, wm_sensor *sensor) {
-  wm_mounting *m = &sensor->mounting;
-  if (s->kind == SUSPECT_MOUNTING_YAW) m->rpy_rad[2] = remainder(m->rpy_rad[2] + s->value, 2 * M_PI);
-  for (int k = 0; s->kind == SUSPECT_MOUNTING_FACTOR && k < 3; k++) m->xyz_m[k] *= s->value;
-}
-
-void suspects_prepare(suspects_applied *self, wm_assembly *assembly) {
-  wm_setup *setup = &assembly->setup;
-  const size_t landmarks = setup->landmark_count * sizeof *self->landmarks;
-  const size_t sensors = setup->sensor_count * sizeof *self->sensors;
-  self->landmarks = landmarks ? malloc(landmarks) : NULL;
-  self->sensors = sensors ? malloc(sensors) : NULL;
-  if (self->landmarks) setup->landmarks = memcpy(self->landmarks, setup->landmarks, landmarks);
-  if (self->sensors) setup->sensors = memcpy(self->sensors, setup->sensors, sensors);
-  for (size_t i = 0; i < self->count; i++) {
-    const suspect *s = &self->of[i];
-    if (s->kind == SUSPECT_RADIUS_FACTOR) setup->wheels.radius_m *= s->value;
-    for (size_t k = 0; self->landmarks && k < setup->landmark_count; k++) change_landmark(s, &self->landmarks[k]);
-    if (self->sensors && s->sensor < setup->sensor_count) change_sensor(s, &self->sensors[s->sensor]);
-  }
-}
-
-void suspects_release(suspects_applied *self) {
-  free(self->landmarks);
-  free(self->sensors);
-  self->landmarks = NULL;
-  self->sensors = NULL;
-}
-
-// ── texts ───────────────────────────────────────────────────────────────────────────────────────────────────────────
-
-static const char *length_name(double factor) {
-  static const struct {
-    double factor;
-    const char *name;
-  } kNames[] = {{0.001, "mm"}, {0.01, "cm"}, {0.0254, "inches"}, {0.3048, "feet"}, {0.1, "dm"}, {1000, "km"}};
-  for (size_t i = 0; i < sizeof kNames / sizeof kNames[0]; i++)
-    if (kNames[i].factor == factor) return kNames[i].name;
-  return "another unit";
-}
-
-void suspect_text(const suspect *s, const wm_assembly *assembly, char *what, size_t what_capacity, char *fix,
-                  size_t fix_capacity) {
-  const wm_setup *setup = &assembly->setup;
-  const char *name = s->source < assembly->source_count ? assembly->sources[s->source].name : "?";
-  const wm_sensor *sensor = s->sensor < setup->sensor_count ? &setup->sensors[s->sensor] : NULL;
-  const wm_mounting *m = sensor ? &sensor->mounting : NULL;
-  const char *length = length_name(s->value);
-#define WHAT(...) (void)snprintf(what, what_capacity, __VA_ARGS__)
-#define FIX(...) (void)snprintf(fix, fix_capacity, __VA_ARGS__)
-  switch (s->kind) {
-    case SUSPECT_TIME:
-      WHAT("the stamps of %s are %.2f s too %s", name, fabs(s->value), s->value < 0 ? "late" : "early");
-      FIX("its clock is off: add %.2f s (%.0f ns) to its t_ns and arrival_ns", s->value, s->value * 1e9);
-      break;
-    case SUSPECT_BEARING_SIGN:
-      WHAT("the bearings of %s are positive to the right", name);
-      FIX("write bearing_rad = -bearing_rad: bearings are positive to the left of the sensor's x axis");
-      break;
-    case SUSPECT_RANGE_FACTOR:
-      WHAT("the ranges of %s are in %s", name, length);
-      FIX("multiply range_m by %g", s->value);
-      break;
-    case SUSPECT_IDENTITY:
-      WHAT("the ids of %s are off by %g", name, -s->value);
-      FIX("add %+.0f to each id of its rows, or subtract it from those of landmarks.csv", s->value);
-      break;
-    case SUSPECT_POSITION_SWAP:
-      WHAT("x and y of %s are swapped", name);
-      FIX("swap the columns x_m and y_m: x is east, y is north");
-      break;
-    case SUSPECT_MAP_SWAP:
-      WHAT("x and y of the map are swapped");
-      FIX("swap the columns x_m and y_m of landmarks.csv");
-      break;
-    case SUSPECT_MAP_MIRROR_X:
-    case SUSPECT_MAP_MIRROR_Y:
-      WHAT("the map is mirrored in %c", s->kind == SUSPECT_MAP_MIRROR_X ? 'x' : 'y');
-      FIX("change the sign of %c_m in landmarks.csv: x, y and z make a right-handed frame",
-          s->kind == SUSPECT_MAP_MIRROR_X ? 'x' : 'y');
-      break;
-    case SUSPECT_MAP_FACTOR:
-      WHAT("the map is in %s", length);
-      FIX("multiply x_m, y_m and z_m of landmarks.csv by %g", s->value);
-      break;
-    case SUSPECT_MOUNTING_YAW:
-      if (!m) break;
-      WHAT("the mounting of %s is turned by %.0f degrees", sensor->name, s->value / DEG);
-      FIX("calibration.yaml, sensors.%s.mounting: rpy_deg: [%.6g, %.6g, %.6g]", sensor->name, m->rpy_rad[0] / DEG,
-          m->rpy_rad[1] / DEG, remainder(m->rpy_rad[2] + s->value, 2 * M_PI) / DEG + 0.0);
-      break;
-    case SUSPECT_MOUNTING_FACTOR:
-      if (!m) break;
-      WHAT("the mounting of %s is in %s", sensor->name, length);
-      FIX("calibration.yaml, sensors.%s.mounting: xyz_m: [%.6g, %.6g, %.6g]", sensor->name, m->xyz_m[0] * s->value,
-          m->xyz_m[1] * s->value, m->xyz_m[2] * s->value);
-      break;
-    case SUSPECT_TICKS_SWAP:
-      WHAT("the wheels' ticks are swapped");
-      FIX("can-signals.yaml: swap the signals of wheel_ticks_left and wheel_ticks_right");
-      break;
-    case SUSPECT_TICKS_LEFT_SIGN:
-    case SUSPECT_TICKS_RIGHT_SIGN:
-      WHAT("wheel_ticks_%s counts backwards", s->kind == SUSPECT_TICKS_LEFT_SIGN ? "left" : "right");
-      FIX("can-signals.yaml, wheel_ticks_%s: scale: -1", s->kind == SUSPECT_TICKS_LEFT_SIGN ? "left" : "right");
-      break;
-    case SUSPECT_TICKS_SIGN:
-      WHAT("both wheels' ticks count backwards");
-      FIX("can-signals.yaml, wheel_ticks_left and wheel_ticks_right: scale: -1");
-      break;
-    case SUSPECT_RADIUS_FACTOR:
-      WHAT("the wheels' ticks are %g times the way", 1 / s->value);
-      FIX("calibration.yaml, wheels: radius_m: %.4g (a diameter or another unit?) or ticks_per_turn: %.6g",
-          setup->wheels.radius_m * s->value, setup->wheels.ticks_per_turn / s->value);
-      break;
-    case SUSPECT_YAW_RATE_FACTOR:
-      WHAT("the turn rate of %s is %s", name,
-           s->value < 0   ? "positive to the right"
-           : s->value < 1 ? "in deg/s"
-                          : "in rad/s");
-      FIX(s->value < 0
-              ? "`scale: -1` for yaw_rate in can-signals.yaml, or w_radps = -w_radps: it is positive to the left"
-          : s->value < 1 ? "`unit: deg/s` for yaw_rate in can-signals.yaml, or multiply w_radps by 0.0174533"
-                         : "`unit: rad/s` for yaw_rate in can-signals.yaml, or multiply w_radps by 57.2958");
-      break;
-    case SUSPECT_SPEED_FACTOR:
-      WHAT("the speed of %s is %g times the way's", name, 1 / s->value);
-      FIX("multiply v_mps by %.6g: another unit, or backwards?", s->value);
-      break;
-    default: break;
-  }
-#undef WHAT
-#undef FIX
 }

@@ -1,67 +1,105 @@
 // SPDX-License-Identifier: Apache-2.0
-// The usual mistakes of a first drive, each as a change of the recording that would undo it: signs and units of angles
-// and ranges, axes of the map, mountings, clocks, identities, wheels. A trial drives the changed recording.
+// The usual mistakes of a first drive, each as a change of the recording's files that would undo it: signs and units of
+// angles, ranges and speeds, axes of map and positions, mountings, clocks, identities, wheels, signals, cameras.
 #ifndef WAYMARK_CLI_CHECK_SUSPECTS_H
 #define WAYMARK_CLI_CHECK_SUSPECTS_H
 
+#include "cli/check/edits.h"
 #include "fusion/assembly.h"
 #include "waymark/event.h"
 
 typedef enum suspect_kind {
-  SUSPECT_NONE = 0,       // nothing is changed
-  SUSPECT_TIME,           // value: s added to the stamps of the source
-  SUSPECT_BEARING_SIGN,   // of the source's sightings
-  SUSPECT_RANGE_FACTOR,   // value, of the source's sightings
-  SUSPECT_IDENTITY,       // value: added to each identity of the source
-  SUSPECT_NO_IDENTITY,    // of the source's sightings: associated by their place, for the table of identities
-  SUSPECT_POSITION_SWAP,  // x and y of positions
-  SUSPECT_MAP_SWAP,       // x and y of the landmarks
+  SUSPECT_NONE = 0,        // nothing is changed
+  SUSPECT_TIME,            // value: s added to the stamps of the source
+  SUSPECT_TIME_FACTOR,     // value, of the stamps of the source
+  SUSPECT_DISORDER,        // rows that are not in the order of their stamps
+  SUSPECT_BEARING_FACTOR,  // value, of the sensor's bearings: -1, or another unit
+  SUSPECT_RANGE_FACTOR,    // value, of the sensor's ranges
+  SUSPECT_RANGE_IS,        // value 1: depth along the sensor's axis, 0: distance
+  SUSPECT_IDENTITY,        // value: added to each identity of the sensor
+  SUSPECT_IDENTITY_TABLE,  // by `ids`
+  SUSPECT_NO_IDENTITY,     // all unknown: sightings are associated by their place, for the table
+  SUSPECT_POSITION_SWAP,   // x and y of positions
+  SUSPECT_POSITION_X,      // value: factor
+  SUSPECT_POSITION_Y,
+  SUSPECT_MAP_SWAP,  // x and y of the landmarks
   SUSPECT_MAP_MIRROR_X,
   SUSPECT_MAP_MIRROR_Y,
+  SUSPECT_MAP_TURN,         // value: rad, half a turn
   SUSPECT_MAP_FACTOR,       // value
   SUSPECT_MOUNTING_YAW,     // value: rad added to the yaw of the sensor
+  SUSPECT_MOUNTING_PITCH,   // value: rad added to its pitch
+  SUSPECT_MOUNTING_ROLL,    // value: rad added to its roll
+  SUSPECT_MOUNTING_RAD,     // angles that were written in radians
   SUSPECT_MOUNTING_FACTOR,  // value: of the sensor's place
+  SUSPECT_MOUNTING_X,       // value: m added to the sensor's x
+  SUSPECT_MOUNTING_Y,
   SUSPECT_TICKS_SWAP,
-  SUSPECT_TICKS_LEFT_SIGN,
-  SUSPECT_TICKS_RIGHT_SIGN,
-  SUSPECT_TICKS_SIGN,
-  SUSPECT_RADIUS_FACTOR,    // value, of the wheels
-  SUSPECT_YAW_RATE_FACTOR,  // value, of CAN's yaw rate or of the twist's turn rate
-  SUSPECT_SPEED_FACTOR      // value, of the twist's speed
+  SUSPECT_QUANTITY_FACTOR,   // value, of the bound quantity `item`: -1, or another unit
+  SUSPECT_QUANTITY_FACTORS,  // value, of the bound quantities `item` and `other`
+  SUSPECT_SIGNAL,            // factor `value`, `shift`: of the signal of binding `item`; `layout`: of its
+                             // message's signals; item -1: of all messages
+  SUSPECT_RADIUS_FACTOR,     // value, of the wheels
+  SUSPECT_TICKS_FACTOR,
+  SUSPECT_TRACK_FACTOR,
+  SUSPECT_WHEELBASE_FACTOR,
+  SUSPECT_STEERING_FACTOR,
+  SUSPECT_YAW_RATE_FACTOR,  // value, of the twist's turn rate
+  SUSPECT_SPEED_FACTOR,     // value, of the twist's speed
+  SUSPECT_SIDEWAYS_FACTOR,  // value, of the twist's sideways velocity
+  SUSPECT_TWIST_SWAP,       // speed and turn rate
+  SUSPECT_TAG_FACTOR,       // value, of the markers' size
+  SUSPECT_FOCAL_FACTOR,     // value, of the camera's intrinsics
+  SUSPECT_PLAN_FACTOR,      // value, of the floor plan's resolution
+  SUSPECT_BASELINE_FACTOR   // value, of the stereo pair's baseline
 } suspect_kind;
 
 typedef struct suspect {
   suspect_kind kind;
   uint16_t source, sensor;
   double value;
+  int16_t item, other, shift;  // shift: bits
+  uint16_t layout;             // signal_layout
+  const id_table *ids;
 } suspect;
 
-#define SUSPECTS_MAX 128
+#define SUSPECTS_MAX 400
+#define BINDINGS_SEEN_MAX 24
 
-// All that this assembly has something of, the unchanged one first. `seen`: kinds of events (bits) of each source, and
-// the least and the largest identity that it gave.
+// What a drive was seen to have, for the choice of the suspects.
 typedef struct source_seen {
   uint32_t kinds, quantities;  // bits
   uint64_t sensors;            // bits, of sightings and markers
-  int has_range;
+  int has_range, is_disordered;
   int32_t least_id, most_id;  // of sightings and markers; most < least: none
+  uint64_t ids[4];            // bits of the identities 0 to 255
+  wm_time_ns first_ns, last_ns;
 } source_seen;
 void source_seen_take(source_seen *self, const wm_event *event);
-size_t suspects_list(const wm_assembly *assembly, const source_seen *seen, suspect *out);
 
-// Changes of one trial: `count` suspects at once.
-typedef struct suspects_applied {
-  const suspect *of;
-  size_t count;
-  wm_landmark *landmarks;  // changed copies; freed by suspects_release
-  wm_sensor *sensors;
-} suspects_applied;
-void suspects_change(const suspects_applied *self, wm_event *event);
-void suspects_prepare(suspects_applied *self, wm_assembly *assembly);
-void suspects_release(suspects_applied *self);
+// Bindings of can-signals.yaml, as they are written.
+typedef struct binding_seen {
+  int quantity;
+  char message[64], signal[64];
+  double scale;
+} binding_seen;
+typedef struct suspect_files {
+  binding_seen bindings[BINDINGS_SEEN_MAX];
+  size_t binding_count;
+} suspect_files;
+// `dir`: the recording's. Files that are not there are left out.
+void suspect_files_read(suspect_files *self, const wm_config *config, const char *dir);
 
-// What it is ("its bearings are positive to the right") and what to write where.
-void suspect_text(const suspect *self, const wm_assembly *assembly, char *what, size_t what_capacity, char *fix,
-                  size_t fix_capacity);
+// All that this assembly has something of, the unchanged one first. `seen`: by source.
+size_t suspects_list(const wm_assembly *assembly, const suspect_files *files, const source_seen *seen,
+                     suspect out[SUSPECTS_MAX]);
+
+// The changes of the files that undo it; 0 where it can't be undone by any.
+#define SUSPECT_EDITS_MAX 8
+size_t suspect_edits(const suspect *self, const wm_assembly *assembly, const suspect_files *files,
+                     file_edit out[SUSPECT_EDITS_MAX]);
+// What it is: "the bearings of front are positive to the right".
+void suspect_text(const suspect *self, const wm_assembly *assembly, const suspect_files *files, char *what,
+                  size_t capacity);
 
 #endif

@@ -2,75 +2,146 @@
 #include "cli/check/trials.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "rt/clock.h"
+#include "cli/check/changed_copy.h"
+#include "output/drive_evidence.h"
 #include "waymark/recording.h"
 
 // All trials together take about so long: of longer recordings a part is driven.
 #define BUDGET_S 40.0
-#define PART_MIN_S 30.0
+#define PART_MIN_S 10.0
+#define PART_MAX_S 60.0
 // A change explains the observations if each update gains so much of log likelihood, nats, and most updates are fused.
 #define GAIN_MIN 0.1
 #define EXPLAINED_MIN 0.85
+#define EXPLAINED_ALL 0.97  // then nothing is left to explain
 #define FINALISTS 8
+#define FIRSTS 4  // changes of which each is tried together with all others where none helps alone
+// A drive that drops half of the observations is no better for it.
+#define UPDATES_MIN 0.5
+// nats an update, for each state of calibration beyond these limits: more than GAIN_MIN, less than wrong poses cost.
+#define CALIBRATION_COST 0.2
+#define SCALE_MAX 1.5
+#define OFFSET_MAX_S 0.25
+#define YAW_MAX_RAD 0.5
 
 // ── one trial, in a process of its own ──────────────────────────────────────────────────────────────────────────────
 
 typedef struct trial {
-  suspects_applied applied;
   drive_evidence evidence;
+  id_votes votes;
 } trial;
 
-static void prepare(void *context, wm_assembly *assembly) { suspects_prepare(&((trial *)context)->applied, assembly); }
-static void change(void *context, wm_event *event) { suspects_change(&((trial *)context)->applied, event); }
+typedef struct trial_message {
+  trial_result result;
+  id_table table;
+} trial_message;
+
+static void arrived(void *context, const wm_event *event) { id_votes_arrived(&((trial *)context)->votes, event); }
+
 static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
+  trial *self = context;
   (void)bytes;
-  evidence_put(&((trial *)context)->evidence, kind, record);
+  evidence_put(&self->evidence, kind, record);
+  if (kind == WM_OUTPUT_INNOVATION && self->votes.given) id_votes_take(&self->votes, record);
 }
 
-static trial_result drive(const trials_plan *plan, double until_s, const suspect *changes, size_t count) {
+static double calibration_cost(const wm_health *health) {
+  int count = 0;
+  for (uint32_t i = 0; i < health->calibration_count; i++) {
+    const wm_calibration_value *c = &health->calibration[i];
+    if (strstr(c->name, "_scale"))
+      count += c->value < 1 / SCALE_MAX || c->value > SCALE_MAX;
+    else if (strstr(c->name, ".time_offset_s"))
+      count += fabs(c->value) > OFFSET_MAX_S;
+    else if (strstr(c->name, ".yaw_rad"))
+      count += fabs(c->value) > YAW_MAX_RAD;
+  }
+  return CALIBRATION_COST * count;
+}
+
+size_t trials_edits(const trials_plan *plan, const suspect *of, size_t count, file_edit out[TRIAL_EDITS_MAX]) {
+  size_t used = 0;
+  for (size_t i = 0; i < count; i++) {
+    if (of[i].kind == SUSPECT_NONE) continue;
+    const size_t n = suspect_edits(&of[i], plan->assembly, plan->files, out + used);
+    if (n == 0) return 0;
+    used += n;
+  }
+  return used;
+}
+
+static wm_status open_changed(const trials_plan *plan, const file_edit *edits, size_t count, const char *folder,
+                              wm_recording **out, wm_error *err) {
+  if (count == 0) return wm_recording_open(plan->dir, &plan->config->overrides, NULL, NULL, out, err);
+  changed_copy copy = {.dir = plan->dir};
+  (void)snprintf(copy.out, sizeof copy.out, "%s", folder);
+  wm_status status = changed_copy_make(&copy, &plan->config->overrides, edits, count, "", err);
+  return status == WM_OK ? wm_recording_open(copy.out, &copy.overrides, NULL, NULL, out, err) : status;
+}
+
+static trial_message drive(const trials_plan *plan, const char *folder, double until_s, const suspect *changes,
+                           size_t count) {
   static trial self;
   static wm_run_report report;
-  self.applied = (suspects_applied){.of = changes, .count = count};
+  trial_message none = {0}, done = {0};
+  file_edit edits[TRIAL_EDITS_MAX];
   wm_recording *recording = NULL;
   wm_error err = {0};
-  if (wm_recording_open(plan->dir, &plan->config->overrides, NULL, NULL, &recording, &err) != WM_OK)
-    return (trial_result){0};
-  const wm_replay_watch watch = {.context = &self, .prepare = prepare, .change = change, .put = put};
+  const size_t edit_count = trials_edits(plan, changes, count, edits);
+  if (edit_count == 0 && changes[count - 1].kind != SUSPECT_NONE) return none;
+  if (open_changed(plan, edits, edit_count, folder, &recording, &err) != WM_OK) return none;
+  if (changes[count - 1].kind == SUSPECT_NO_IDENTITY) self.votes.given = plan->ids;
+  const wm_replay_watch watch = {.context = &self, .arrived = self.votes.given ? arrived : NULL, .put = put};
   const wm_replay_options options = {.watch = &watch, .seed = 1, .until_s = until_s};
   const wm_status status = wm_replay_recording(plan->config, recording, &options, &report, &err);
   wm_recording_close(recording);
-  suspects_release(&self.applied);
-  if (status != WM_OK || self.evidence.updates == 0) return (trial_result){0};
-  return (trial_result){1, evidence_score(&self.evidence), (double)self.evidence.fused / (double)self.evidence.updates};
+  if (status != WM_OK || self.evidence.updates == 0) return none;
+  done.result = (trial_result){.is_valid = 1,
+                               .updates = self.evidence.updates,
+                               .score = evidence_score(&self.evidence) - calibration_cost(&report.health),
+                               .explained = (double)self.evidence.fused / (double)self.evidence.updates};
+  if (self.votes.given) id_votes_table(&self.votes, &done.table);
+  return done;
 }
 
 // ── many ────────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 typedef struct pool {
   const trials_plan *plan;
+  char folder[64];  // of the copies
   double until_s;
   const suspect *fixed;  // changes of all trials
   size_t fixed_count;
   size_t done, total;  // for the progress
+  size_t started;
+  id_table *table;  // of the trial without identities
 } pool;
 
 // Starts the trial; returns the end to read its result from, or -1.
-static int start(const pool *self, const suspect *one) {
+static int start(pool *self, const suspect *one) {
   int ends[2];
   if (pipe(ends) != 0) return -1;
+  char folder[96];
+  (void)snprintf(folder, sizeof folder, "%s/%zu", self->folder, self->started++);
   const pid_t pid = fork();
   if (pid == 0) {
-    suspect changes[TRIALS_FOUND_MAX + 1];
-    memcpy(changes, self->fixed, self->fixed_count * sizeof *changes);
+    suspect changes[TRIALS_FOUND_MAX + 2];
+    if (self->fixed_count > 0) memcpy(changes, self->fixed, self->fixed_count * sizeof *changes);
     changes[self->fixed_count] = *one;
     (void)close(ends[0]);
-    const trial_result result = drive(self->plan, self->until_s, changes, self->fixed_count + 1);
-    _exit(write(ends[1], &result, sizeof result) == sizeof result ? 0 : 1);
+    // A change may make a drive endless.
+    (void)alarm((unsigned)(10 + 4 * self->plan->drive_s));
+    const trial_message message = drive(self->plan, folder, self->until_s, changes, self->fixed_count + 1);
+    changed_copy made = {.dir = self->plan->dir};
+    (void)snprintf(made.out, sizeof made.out, "%s", folder);
+    changed_copy_remove(&made);
+    _exit(write(ends[1], &message, sizeof message) == sizeof message ? 0 : 1);
   }
   (void)close(ends[1]);
   if (pid > 0) return ends[0];
@@ -78,13 +149,13 @@ static int start(const pool *self, const suspect *one) {
   return -1;
 }
 
-static trial_result finish(int end) {
-  trial_result result = {0};
-  if (end < 0) return result;
-  if (read(end, &result, sizeof result) != sizeof result) result = (trial_result){0};
+static trial_message finish(int end) {
+  trial_message message = {0};
+  if (end < 0) return message;
+  if (read(end, &message, sizeof message) != sizeof message) message = (trial_message){0};
   (void)close(end);
   (void)wait(NULL);
-  return result;
+  return message;
 }
 
 static void run_all(pool *self, const suspect *of, size_t count, trial_result *results) {
@@ -96,12 +167,16 @@ static void run_all(pool *self, const suspect *of, size_t count, trial_result *r
       ends[started] = start(self, &of[started]);
       started++;
     }
-    results[read] = finish(ends[read]);
+    const trial_message message = finish(ends[read]);
+    results[read] = message.result;
+    if (of[read].kind == SUSPECT_NO_IDENTITY) *self->table = message.table;
+    self->done++;
     if (self->plan->progress)
-      self->plan->progress(self->plan->progress_context, (double)++self->done / (double)self->total);
+      self->plan->progress(self->plan->progress_context, fmin(1, (double)self->done / (double)self->total));
   }
 }
 
+// The first with the best score; an invalid one only where all are.
 static size_t best_of(const trial_result *results, size_t count) {
   size_t best = 0;
   for (size_t i = 1; i < count; i++)
@@ -109,15 +184,21 @@ static size_t best_of(const trial_result *results, size_t count) {
   return best;
 }
 
-// A clock's offset between the steps of the list: thrice to a third of the step.
-static void refine_time(pool *self, suspect *one, trial_result *result) {
-  double step_s = fmax(0.05, 0.25 * fabs(one->value));
-  for (int round = 0; round < 3; round++, step_s /= 3) {
-    const suspect near[] = {{one->kind, one->source, one->sensor, one->value - step_s},
-                            {one->kind, one->source, one->sensor, one->value + step_s},
-                            {one->kind, one->source, one->sensor, one->value - step_s / 2},
-                            {one->kind, one->source, one->sensor, one->value + step_s / 2}};
+static double refine_step(const suspect *one) {
+  if (one->kind == SUSPECT_TIME) return fmin(1, fmax(0.05, 0.25 * fabs(one->value)));
+  if (one->kind == SUSPECT_MOUNTING_YAW) return 0.3;
+  if (one->kind == SUSPECT_MOUNTING_X || one->kind == SUSPECT_MOUNTING_Y) return 0.15;
+  return 0;
+}
+
+// A value between the steps of the list, by ever smaller steps to both sides.
+static void refine(pool *self, suspect *one, trial_result *result) {
+  double step = refine_step(one);
+  for (int round = 0; round < 4 && step > 0; round++, step /= 3) {
+    suspect near[4] = {*one, *one, *one, *one};
+    const double sides[4] = {-step, step, -step / 2, step / 2};
     trial_result results[4];
+    for (int i = 0; i < 4; i++) near[i].value += sides[i];
     run_all(self, near, 4, results);
     const size_t best = best_of(results, 4);
     if (!results[best].is_valid || results[best].score <= result->score) continue;
@@ -126,49 +207,126 @@ static void refine_time(pool *self, suspect *one, trial_result *result) {
   }
 }
 
+typedef struct race_result {
+  suspect finalists[FINALISTS];  // the unchanged one first
+  trial_result results[FINALISTS];
+  size_t count, best;
+} race_result;
+
 // In two rounds: all of them over a part of the recording, then the best and the unchanged one over all of it.
-static size_t race(pool *self, double part_s, double whole_s, suspect *best, trial_result *unchanged,
-                   trial_result *result) {
-  trial_result results[SUSPECTS_MAX];
-  suspect finalists[FINALISTS];
-  size_t count = 1;
+static void race(pool *self, double part_s, double whole_s, int is_part_alone, race_result *out) {
+  static trial_result results[SUSPECTS_MAX];
+  const trials_plan *plan = self->plan;
+  suspect by_table = {0};
+  int is_apart = 0;  // clocks: then the parts of two drives are not of the same time
+  out->count = 1;
   self->until_s = part_s;
-  run_all(self, self->plan->suspects, self->plan->count, results);
-  finalists[0] = self->plan->suspects[0];
-  for (results[0].is_valid = 0; count < FINALISTS; count++) {
-    const size_t i = best_of(results, self->plan->count);
+  self->table->count = 0;
+  run_all(self, plan->suspects, plan->count, results);
+  for (size_t i = 0; i < plan->count; i++) is_apart |= plan->suspects[i].kind == SUSPECT_TIME_FACTOR;
+  const uint64_t enough = is_apart ? 1 : (uint64_t)(UPDATES_MIN * (double)results[0].updates);
+  out->finalists[0] = plan->suspects[0];
+  out->results[0] = results[0];
+  results[0].is_valid = 0;
+  for (size_t i = 1; i < plan->count; i++) {
+    const int is_no_identity = plan->suspects[i].kind == SUSPECT_NO_IDENTITY;
+    results[i].is_valid &= results[i].updates >= enough && !is_no_identity;
+    if (!is_no_identity || is_part_alone) continue;
+    // The table needs each landmark: over all of the recording.
+    trial_result unused;
+    self->until_s = whole_s;
+    run_all(self, &plan->suspects[i], 1, &unused);
+    self->until_s = part_s;
+    if (self->table->count == 0) continue;
+    by_table = plan->suspects[i];
+    by_table.kind = SUSPECT_IDENTITY_TABLE;
+    by_table.ids = self->table;
+  }
+  const size_t places = by_table.kind == SUSPECT_NONE ? FINALISTS : FINALISTS - 1;
+  for (; out->count < places; out->count++) {
+    const size_t i = best_of(results, plan->count);
     if (!results[i].is_valid) break;
-    finalists[count] = self->plan->suspects[i];
+    out->finalists[out->count] = plan->suspects[i];
+    out->results[out->count] = results[i];
     results[i].is_valid = 0;
   }
+  if (by_table.kind != SUSPECT_NONE) out->finalists[out->count++] = by_table;  // last: a plain shift stands before it
   self->until_s = whole_s;
-  run_all(self, finalists, count, results);
-  const size_t i = best_of(results, count);
-  *unchanged = results[0];
-  *result = results[i];
-  *best = finalists[i];
-  return i;
+  if (!is_part_alone) run_all(self, out->finalists, out->count, out->results);
+  out->best = best_of(out->results, out->count);
 }
 
-size_t trials_run(const trials_plan *plan, suspect found[TRIALS_FOUND_MAX], trial_result *before, trial_result *after) {
-  const long processors = sysconf(_SC_NPROCESSORS_ONLN);
-  const double all_s = plan->drive_s * (double)plan->count / (double)(processors > 0 ? processors : 1);
-  pool self = {.plan = plan, .fixed = found, .total = plan->count + FINALISTS};
-  const double share = fmin(1, BUDGET_S / all_s);
-  const double part_s = fmax(PART_MIN_S, 0.25 * share * plan->recorded_s);
-  const double whole_s = share < 1 ? fmax(PART_MIN_S, share * plan->recorded_s) : 0;
-  *before = *after = (trial_result){0};
-  while (self.fixed_count < TRIALS_FOUND_MAX) {
-    self.done = 0;
-    suspect *one = &found[self.fixed_count];
-    trial_result unchanged, result;
-    const size_t best = race(&self, part_s, whole_s, one, &unchanged, &result);
-    if (self.fixed_count == 0) *before = *after = unchanged;
-    if (best == 0 || result.score < after->score + GAIN_MIN) break;
-    *after = result;
-    if (one->kind == SUSPECT_TIME) refine_time(&self, one, after);
-    self.fixed_count++;
-    if (after->explained > 0.97) break;  // nothing is left to explain
+// Two mistakes of which neither helps alone: each of the best first ones together with all.
+static int race_pairs(pool *self, double part_s, double whole_s, const race_result *alone, suspect *found,
+                      trial_result *result) {
+  suspect pairs[FIRSTS][2];
+  trial_result results[FIRSTS];
+  static race_result second;
+  size_t count = 0;
+  const suspect *const fixed = self->fixed;
+  for (size_t i = 1; i < alone->count && count < FIRSTS; i++) {
+    pairs[count][0] = alone->finalists[i];
+    if (pairs[count][0].kind == SUSPECT_IDENTITY_TABLE) continue;
+    self->fixed = pairs[count];
+    self->fixed_count = 1;
+    race(self, part_s, whole_s, 1, &second);
+    pairs[count][1] = second.finalists[second.best];
+    count++;
   }
+  for (size_t i = 0; i < count; i++) {
+    self->fixed = pairs[i];
+    self->fixed_count = 1;
+    run_all(self, &pairs[i][1], 1, &results[i]);
+  }
+  self->fixed = fixed;
+  self->fixed_count = 0;
+  const size_t best = count > 0 ? best_of(results, count) : 0;
+  if (count == 0 || !results[best].is_valid || results[best].score < alone->results[0].score + GAIN_MIN) return 0;
+  memcpy(found, pairs[best], sizeof pairs[best]);
+  *result = results[best];
+  return pairs[best][1].kind == SUSPECT_NONE ? 1 : 2;
+}
+
+static void search(pool *self, double part_s, double whole_s, suspect *found, trial_result *before,
+                   trial_result *after) {
+  static race_result round;
+  while (self->fixed_count < TRIALS_FOUND_MAX) {
+    suspect *one = &found[self->fixed_count];
+    self->done = 0;
+    race(self, part_s, whole_s, 0, &round);
+    if (self->fixed_count == 0) *before = *after = round.results[0];
+    const trial_result *best = &round.results[round.best];
+    if (round.best == 0 || !best->is_valid || (after->is_valid && best->score < after->score + GAIN_MIN)) {
+      if (self->fixed_count > 0 || after->explained >= EXPLAINED_MIN) break;
+      self->total = FIRSTS * self->plan->count;
+      self->done = 0;
+      self->fixed_count = (size_t)race_pairs(self, part_s, whole_s, &round, found, after);
+      break;
+    }
+    *after = *best;
+    *one = round.finalists[round.best];
+    refine(self, one, after);
+    self->fixed_count++;
+    if (after->explained > EXPLAINED_ALL || one->kind == SUSPECT_IDENTITY_TABLE) break;
+  }
+}
+
+size_t trials_run(const trials_plan *plan, suspect found[TRIALS_FOUND_MAX], id_table *table, trial_result *before,
+                  trial_result *after) {
+  const long processors = sysconf(_SC_NPROCESSORS_ONLN);
+  const double at_once = (double)(processors > 0 ? processors : 1);
+  const double all_s = plan->drive_s * (double)plan->count / at_once;
+  const double last_s = plan->drive_s * FINALISTS / at_once;
+  pool self = {.plan = plan, .fixed = found, .total = plan->count + FINALISTS, .table = table};
+  const double part_s = fmin(PART_MAX_S, fmax(PART_MIN_S, plan->recorded_s * fmin(1, BUDGET_S / 2 / all_s)));
+  const double whole_s = last_s > BUDGET_S / 2 ? fmax(PART_MIN_S, plan->recorded_s * BUDGET_S / 2 / last_s) : 0;
+  const char *temporary = getenv("TMPDIR");
+  *before = *after = (trial_result){0};
+  (void)snprintf(self.folder, sizeof self.folder, "%.40s/waymark-check-XXXXXX", temporary ? temporary : "/tmp");
+  if (!mkdtemp(self.folder)) return 0;
+  search(&self, part_s, whole_s, found, before, after);
+  changed_copy folder = {.dir = plan->dir};
+  (void)snprintf(folder.out, sizeof folder.out, "%s", self.folder);
+  changed_copy_remove(&folder);
   return after->explained >= EXPLAINED_MIN ? self.fixed_count : 0;
 }

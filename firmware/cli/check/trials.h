@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// Drives a recording again with each of the usual mistakes undone, in processes of their own, as many at once as there
-// are processors, and names the change that explains the observations.
+// Drives changed copies of a recording, each with one of the usual mistakes undone, in processes of their own, as many
+// at once as there are processors, and names the change that explains the observations.
 #ifndef WAYMARK_CLI_CHECK_TRIALS_H
 #define WAYMARK_CLI_CHECK_TRIALS_H
 
 #include "cli/check/check.h"
+#include "cli/check/identities.h"
 #include "cli/check/suspects.h"
 #include "replay/replay.h"
 
 typedef struct trials_plan {
   const wm_config *config;
-  const char *dir;          // the recording's
+  const wm_assembly *assembly;
+  const char *dir;  // the recording's
+  const suspect_files *files;
   const suspect *suspects;  // the unchanged one first
   size_t count;
+  const given_ids *ids;
   double drive_s, recorded_s;  // what one drive of the whole recording took, and how long the recording is
   wm_progress_fn progress;     // may be NULL
   void *progress_context;
@@ -20,13 +24,19 @@ typedef struct trials_plan {
 
 typedef struct trial_result {
   int is_valid;
-  double score;      // evidence_score
+  uint64_t updates;
+  double score;      // evidence_score, less for each state of calibration that no measurement would be so far off
   double explained;  // share of the updates that were fused
 } trial_result;
 
 // The changes that make the observations fit, the most important first; 0 where none does. *before, *after: without and
-// with all of them.
-#define TRIALS_FOUND_MAX 2
-size_t trials_run(const trials_plan *plan, suspect found[TRIALS_FOUND_MAX], trial_result *before, trial_result *after);
+// with all of them. `table`: of identities, for a change by it.
+#define TRIALS_FOUND_MAX 3
+size_t trials_run(const trials_plan *plan, suspect found[TRIALS_FOUND_MAX], id_table *table, trial_result *before,
+                  trial_result *after);
+
+// All files' changes of these suspects. Returns how many; 0 where one of them can't be undone by any.
+#define TRIAL_EDITS_MAX (TRIALS_FOUND_MAX * SUSPECT_EDITS_MAX + SUSPECT_EDITS_MAX)
+size_t trials_edits(const trials_plan *plan, const suspect *of, size_t count, file_edit out[TRIAL_EDITS_MAX]);
 
 #endif

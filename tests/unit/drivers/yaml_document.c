@@ -205,6 +205,30 @@ static void empty_documents(void) {
   TEST_ASSERT_EQUAL(0, wm_yaml_count(&root));
 }
 
+static void edited(const char *text, const char *path, const char *value, const char *comment, const char *expected) {
+  char *out;
+  size_t length;
+  TEST_ASSERT_EQUAL(WM_OK, wm_yaml_edit(text, strlen(text), path, value, comment, &out, &length, &err));
+  TEST_ASSERT_EQUAL(strlen(expected), length);
+  TEST_ASSERT_EQUAL_STRING_LEN(expected, out, length);
+  free(out);
+}
+
+static void is_edited_in_place(void) {
+  edited("# é\na: {b: [1, 2], c: x}  # ok\nd: 1\n", "a.b", "[3, 4]", "was 1",
+         "# é\na: {b: [3, 4], c: x}  # ok  # was 1\nd: 1\n");
+  edited("- {q: a}\n- q: b\n  s: c\n", "[1].s", "d", "", "- {q: a}\n- q: b\n  s: d\n");
+  edited("- {q: a}\n- q: b\n", "[0].scale", "-1", "", "- {scale: -1, q: a}\n- q: b\n");
+  edited("- {q: a}\n- q: b\n", "[1].scale", "-1", "", "- {q: a}\n- scale: -1\n  q: b\n");
+  edited("s:\n  front:\n    x: 1\n", "s.front.mounting.rpy", "[0, 0, 1]", "",
+         "s:\n  front:\n    mounting: {rpy: [0, 0, 1]}\n    x: 1\n");
+  edited("a:\n  - 1\n  - 2\nb: 3\n", "a", "[4, 5]", "", "a:\n  [4, 5]\nb: 3\n");
+  char *out;
+  size_t length;
+  TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_yaml_edit("a: 1\n", 5, "a.b", "2", "", &out, &length, &err));
+  TEST_ASSERT_NULL(out);
+}
+
 static void missing_file(void) {
   TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_yaml_load("no/such.yaml", &doc, &err));
   TEST_ASSERT_EQUAL_STRING("no/such.yaml: there is no such file", err.text);
@@ -214,6 +238,7 @@ int main(void) {
   UNITY_BEGIN();
   RUN_TEST(walks);
   RUN_TEST(is_written_again_with_changes);
+  RUN_TEST(is_edited_in_place);
   RUN_TEST(typed_reads);
   RUN_TEST(unknown_keys);
   RUN_TEST(bad_documents);

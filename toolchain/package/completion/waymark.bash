@@ -28,7 +28,7 @@ _waymark() {
     "replay") words='--config --out --seed --landmarks --calibration --map --frames-of --timing-of --from --until --lost --force --reference' ;;
     "record") words='--config --out --duration --max-mb --free-mb' ;;
     "watch") words='--url --prefix --duration' ;;
-    "check") words='--landmarks --calibration --map --json --quick' ;;
+    "check") words='--landmarks --calibration --map --json --quick --apply' ;;
     "doctor") words='--json --seconds' ;;
     "stamps") words='' ;;
     "calibrate") words='--help --name --model --size --lens --out --camera --chessboard --aprilgrid --tag --gap --every --most --picture --config --run --map' ;;

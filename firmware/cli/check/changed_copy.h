@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// A recording's folder with changes: links to the unchanged files and new texts of the others. The original stays as
+// it is.
+#ifndef WAYMARK_CLI_CHECK_CHANGED_COPY_H
+#define WAYMARK_CLI_CHECK_CHANGED_COPY_H
+
+#include "cli/check/edits.h"
+#include "waymark/site.h"
+
+typedef struct changed_copy {
+  const char *dir;                   // of the recording
+  wm_recording_overrides overrides;  // the copy's files in place of those that were overridden and are changed
+  char out[WM_PATH_MAX];             // the copy
+} changed_copy;
+
+// Makes the folder `out`, which must not be there. `comment` as in edit_text; with one, changed tables are listed in
+// comments of recording.yaml.
+wm_status changed_copy_make(changed_copy *self, const wm_recording_overrides *overrides, const file_edit *edits,
+                            size_t count, const char *comment, wm_error *err);
+// Removes a copy that changed_copy_make made.
+void changed_copy_remove(const changed_copy *self);
+
+// "FILE:LINE: `TEXT`" of the first line that each edit changes, with words for a table's other rows.
+void changed_lines(const char *dir, const wm_recording_overrides *overrides, const file_edit *edits, size_t count,
+                   char *out, size_t capacity);
+
+#endif
