@@ -41,7 +41,7 @@ if(TARGET waymark-web) # a robot's page comes from the robot
 endif()
 
 # ── the desk's ───────────────────────────────────────────────────────────────────────────────────────────────────────
-foreach(tool calibrate detect diff eval import map reference report simulate)
+foreach(tool calibrate detect diff eval import map reference report simulate suggest)
   if(TARGET waymark-${tool}) # not everything is there for every architecture
     install(TARGETS waymark-${tool} DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT tools)
     wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-${tool}.1 waymark-${tool}.1 man/man1 tools)

@@ -44,6 +44,7 @@ static const struct {
     {"reference", "smooth a run into a reference trajectory", "waymark-tools"},
     {"report", "show a run as one page", "waymark-tools"},
     {"simulate", "make a recording of a drive with known truth", "waymark-tools"},
+    {"suggest", "find noises and priors that fit a run better", "waymark-tools"},
     {"web", "show a run as it goes, as a page for a browser", "waymark"},
 };
 #define DESK (sizeof kDesk / sizeof kDesk[0])

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "output/drive_evidence.h"
+#include "output/likelihood.h"
 
 #define OBSERVATIONS_MIN 20
 #define REFUSED_NOTE 0.07
@@ -38,15 +39,6 @@ static landmark_evidence *landmark(drive_evidence *self, int32_t id) {
   return new;
 }
 
-// Log density of an outlier, which has any value: over a turn, over 50 m, over a picture of 1000 px, over half a turn.
-static double outlier(unsigned residual) {
-  static const double kLog[WM_RESIDUAL_COUNT] = {
-      [WM_RESIDUAL_BEARING] = -1.84, [WM_RESIDUAL_RANGE] = -3.91,    [WM_RESIDUAL_X] = -3.91,
-      [WM_RESIDUAL_Y] = -3.91,       [WM_RESIDUAL_Z] = -3.91,        [WM_RESIDUAL_HEADING] = -1.84,
-      [WM_RESIDUAL_PIXEL] = -6.91,   [WM_RESIDUAL_ELEVATION] = -1.14};
-  return kLog[residual];
-}
-
 static void take_ratio(residual_evidence *r, const wm_innovation *in) {
   if (in->residual != WM_RESIDUAL_RANGE || !(in->expected > RANGE_MIN_M)) return;
   if (in->verdict != WM_FUSED && in->verdict != WM_REJECTED_GATE) return;
@@ -58,21 +50,18 @@ static void take_ratio(residual_evidence *r, const wm_innovation *in) {
 }
 
 static void take(drive_evidence *self, const wm_innovation *in) {
-  double log_likelihood = outlier(in->residual);
+  double log_likelihood = wm_outlier_log_density(in->residual);
   self->updates += in->residual != WM_RESIDUAL_STANDSTILL;
   residual_evidence *r = &self->residuals[in->source][in->residual];
   landmark_evidence *l = in->landmark_id >= 0 ? landmark(self, in->landmark_id) : NULL;
   take_ratio(r, in);
   if (in->verdict == WM_FUSED) {
-    double difference = in->observed - in->expected;
-    if (in->residual == WM_RESIDUAL_BEARING || in->residual == WM_RESIDUAL_HEADING)
-      difference = remainder(difference, 2 * M_PI);
-    const double scaled = in->variance > 0 ? difference / sqrt(in->variance) : 0;
+    const double scaled = in->variance > 0 ? wm_innovation_difference(in) / sqrt(in->variance) : 0;
     r->fused++;
     r->sum += scaled;
     r->squares += scaled * scaled;
     if (in->variance > 0 && in->residual != WM_RESIDUAL_STANDSTILL) {
-      log_likelihood = fmax(log_likelihood, -0.5 * scaled * scaled - 0.5 * log(2 * M_PI * in->variance));
+      log_likelihood = fmax(log_likelihood, wm_innovation_log_density(in));
       self->fused++;
     }
     if (l) l->fused++;

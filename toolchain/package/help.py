@@ -10,7 +10,7 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-TOOLS = ["calibrate", "detect", "diff", "eval", "import", "map", "reference", "report", "simulate", "web"]
+TOOLS = ["calibrate", "detect", "diff", "eval", "import", "map", "reference", "report", "simulate", "suggest", "web"]
 PATHS = {"FILE", "FOLDER", "CONFIG", "RECORDING", "RUN", "REC", "OTHER", "LOG", "SCENARIO"}
 
 

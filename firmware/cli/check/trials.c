@@ -5,11 +5,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "cli/check/changed_copy.h"
 #include "output/drive_evidence.h"
+#include "rt/forked.h"
 #include "waymark/recording.h"
 
 // All trials together take about so long: of longer recordings a part is driven.
@@ -118,61 +118,42 @@ typedef struct pool {
   double until_s;
   const suspect *fixed;  // changes of all trials
   size_t fixed_count;
+  const suspect *of;   // one a trial, beside these
   size_t done, total;  // for the progress
   size_t started;
   id_table *table;  // of the trial without identities
 } pool;
 
-// Starts the trial; returns the end to read its result from, or -1.
-static int start(pool *self, const suspect *one) {
-  int ends[2];
-  if (pipe(ends) != 0) return -1;
+static void job(void *context, size_t index, void *result) {
+  const pool *self = context;
   char folder[96];
-  (void)snprintf(folder, sizeof folder, "%s/%zu", self->folder, self->started++);
-  const pid_t pid = fork();
-  if (pid == 0) {
-    suspect changes[TRIALS_FOUND_MAX + 2];
-    if (self->fixed_count > 0) memcpy(changes, self->fixed, self->fixed_count * sizeof *changes);
-    changes[self->fixed_count] = *one;
-    (void)close(ends[0]);
-    // A change may make a drive endless.
-    (void)alarm((unsigned)(10 + 4 * self->plan->drive_s));
-    const trial_message message = drive(self->plan, folder, self->until_s, changes, self->fixed_count + 1);
-    changed_copy made = {.dir = self->plan->dir};
-    (void)snprintf(made.out, sizeof made.out, "%s", folder);
-    changed_copy_remove(&made);
-    _exit(write(ends[1], &message, sizeof message) == sizeof message ? 0 : 1);
-  }
-  (void)close(ends[1]);
-  if (pid > 0) return ends[0];
-  (void)close(ends[0]);
-  return -1;
+  (void)snprintf(folder, sizeof folder, "%s/%zu", self->folder, self->started + index);
+  suspect changes[TRIALS_FOUND_MAX + 2];
+  if (self->fixed_count > 0) memcpy(changes, self->fixed, self->fixed_count * sizeof *changes);
+  changes[self->fixed_count] = self->of[index];
+  // A change may make a drive endless.
+  (void)alarm((unsigned)(10 + 4 * self->plan->drive_s));
+  *(trial_message *)result = drive(self->plan, folder, self->until_s, changes, self->fixed_count + 1);
+  changed_copy made = {.dir = self->plan->dir};
+  (void)snprintf(made.out, sizeof made.out, "%s", folder);
+  changed_copy_remove(&made);
 }
 
-static trial_message finish(int end) {
-  trial_message message = {0};
-  if (end < 0) return message;
-  if (read(end, &message, sizeof message) != sizeof message) message = (trial_message){0};
-  (void)close(end);
-  (void)wait(NULL);
-  return message;
+static void one_done(void *context) {
+  pool *self = context;
+  self->done++;
+  if (self->plan->progress)
+    self->plan->progress(self->plan->progress_context, fmin(1, (double)self->done / (double)self->total));
 }
 
 static void run_all(pool *self, const suspect *of, size_t count, trial_result *results) {
-  const long processors = sysconf(_SC_NPROCESSORS_ONLN);
-  const size_t at_once = processors > 1 ? (size_t)processors : 1;
-  int ends[SUSPECTS_MAX];
-  for (size_t started = 0, read = 0; read < count; read++) {
-    while (started < count && started < read + at_once) {
-      ends[started] = start(self, &of[started]);
-      started++;
-    }
-    const trial_message message = finish(ends[read]);
-    results[read] = message.result;
-    if (of[read].kind == SUSPECT_NO_IDENTITY) *self->table = message.table;
-    self->done++;
-    if (self->plan->progress)
-      self->plan->progress(self->plan->progress_context, fmin(1, (double)self->done / (double)self->total));
+  static trial_message messages[SUSPECTS_MAX];
+  self->of = of;
+  wm_forked_run(&(wm_forked){self, job, sizeof *messages, one_done}, count, messages);
+  self->started += count;
+  for (size_t i = 0; i < count; i++) {
+    results[i] = messages[i].result;
+    if (of[i].kind == SUSPECT_NO_IDENTITY) *self->table = messages[i].table;
   }
 }
 

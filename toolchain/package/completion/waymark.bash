@@ -4,7 +4,7 @@ _waymark() {
   local word=${COMP_WORDS[COMP_CWORD]} command=${COMP_WORDS[1]:-} words= more=
   COMPREPLY=()
   if [ "$COMP_CWORD" -eq 1 ]; then
-    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps calibrate detect diff eval import map reference report simulate web --help --version' -- "$word")
+    mapfile -t COMPREPLY < <(compgen -W 'run replay record watch check doctor stamps calibrate detect diff eval import map reference report simulate suggest web --help --version' -- "$word")
     return
   fi
   case $command in
@@ -40,6 +40,7 @@ _waymark() {
     "reference") words='--help --map --range --particles --passes --seed' ;;
     "report") words='--help --out --svg' ;;
     "simulate") words='--help --out --seed --landmarks --laps --duration --no-video --frame --png --camera --contact-sheet --perfect' ;;
+    "suggest") words='--help --out --against --only --from --to --minutes --json' ;;
     "web") words='--help --recording --map --listen --url --prefix --pictures --duration' ;;
   esac
   if [[ $word == -* ]]; then
