@@ -207,9 +207,9 @@ int main(int argc, char **argv) {
   app.add_option("--against", a.against, "no search: measure this configuration against CONFIG or RUN's");
   app.add_option("--only", a.only, "search parameters that begin so alone, as sightings.noise,motion.states")
       ->delimiter(',');
-  app.add_option("--from", a.from_s, "score from here on, s from the first stamp")->check(wm::cli::range(0.0, 1e9));
+  app.add_option("--from", a.from_s, "score from here on, s from the first stamp")->check(wm::cli::not_negative());
   app.add_option("--to", a.to_s, "only until here, s from the first stamp; 0: to the end")
-      ->check(wm::cli::range(0.0, 1e9));
+      ->check(wm::cli::not_negative());
   app.add_option("--minutes", a.minutes, "the search ends after this time; then its result depends on the computer")
       ->check(wm::cli::range(0.1, 10000.0))
       ->capture_default_str();
