@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""What `./dev test` has to lint and to run under sanitizers, and what its tests skipped (docs/decisions/0NN-gate.md).
+"""What `./dev test` has to lint and to run under sanitizers, and what its tests skipped (docs/decisions/006-gate.md).
 
     gate.py base                    the commit that changes are counted from; nothing where everything counts
     gate.py lint BUILD BASE         sources to lint, one a line; without BASE all
