@@ -43,7 +43,7 @@ def refused(what, texts, *command):
 
 def poses(file):
     with open(file, encoding="utf8") as f:
-        rows = [{k: v if k == "state" else float(v) for k, v in row.items() if k not in ("made_ns", "fused_until_ns")}
+        rows = [{k: v if k == "state" else float(v) for k, v in row.items() if k not in ("made_ns", "fused_until_ns", "cause")}
                 for row in csv.DictReader(f)]
     for row in rows:
         expect(all(math.isfinite(v) for k, v in row.items() if k != "state"), f"{file}: not a number: {row}")

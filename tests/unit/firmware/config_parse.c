@@ -323,7 +323,7 @@ static void wrong_sources(void) {
           "lateness_max_ms to at most 100, or horizon_ms to 150");
   refused(HEAD "sources: [{name: gpss}]\n",
           "dir/x.yaml:3: sources[0].name: 'gpss' is unknown; did you mean 'gnss'? (one of: can, motion, motion6, "
-          "increments, sightings, markers, stereo, points, gnss)");
+          "increments, ticks, speeds, steering, imu, heading, depth, sightings, markers, stereo, points, gnss)");
   refused(HEAD "sources:\n- {name: gnss}\n- {name: gnss}\n",
           "dir/x.yaml:5: sources[1].name: 'gnss' stands there twice (first in line 4)");
   refused(
