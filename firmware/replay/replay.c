@@ -211,8 +211,7 @@ static wm_status run(replay *self, const wm_config *config, wm_recording *record
   status = wm_pipeline_start(&self->pipeline, self->output, err);
   if (status == WM_OK) status = wm_vision_start(self->assembly.vision, err);
   if (status == WM_OK) status = wm_vision_start_prefetch(self->assembly.vision, err);
-  if (status == WM_OK)
-    status = wm_source_readers_open(&self->assembly, self->readers, 0, &self->first_ns, err);
+  if (status == WM_OK) status = wm_source_readers_open(&self->assembly, self->readers, 0, &self->first_ns, err);
   if (status != WM_OK) return status;
 
   begin_steady(self);
