@@ -121,48 +121,31 @@ bool trace::step() {
   return !differs_;
 }
 
-std::vector<std::string> sweep(const owner &of, const std::vector<std::string> &known) {
+std::vector<std::string> sweep(const owner &of) {
   const wm_param_table &table = of.table;
-  const char *owner = of.name;
   std::vector<recorded_stage> recorded;
   for (const stage &s : of.stages) {
     recorded.push_back({&s, trace(), false});
     recorded.back().ran = s.run(values(table, s.settings), &recorded.back().output);
-    if (!recorded.back().ran) std::printf("%s: stage \"%s\" is refused\n", owner, s.name.c_str());
+    if (!recorded.back().ran) std::printf("%s: stage \"%s\" is refused\n", of.name, s.name.c_str());
   }
   std::vector<std::string> wrong;
-  const bool tells = std::getenv("WM_PARAMETERS_TELL") != nullptr;
+  const bool prints_all = std::getenv("WM_PARAMETERS_PRINT") != nullptr;
   for (size_t i = 0; i < table.count; i++) {
-    const std::string name = std::string(owner) + "." + table.params[i].key;
-    const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
-    if (is_known && !tells) continue;
+    const std::string name = std::string(of.name) + "." + table.params[i].key;
     const bool is_read = !of.reads || of.reads(table.params[i]);
     const std::string where = effect(table, table.params[i], recorded, is_read ? kAllValues : 2, is_read);
-    if (tells)
+    if (prints_all)
       std::printf("%6.2f %-50s %s\n", 1.0 * clock() / CLOCKS_PER_SEC, name.c_str(),
                   where.empty() ? "NOTHING" : where.c_str());
-    if (!is_read && !where.empty()) wrong.push_back(name + " is not said to be read, but changes: " + where);
-    if (!is_read) continue;
-    if (where.empty() && is_known) std::printf("%s changes nothing, as is known\n", name.c_str());
-    if (where.empty() && !is_known)
+    if (!is_read && !where.empty())
+      wrong.push_back(name + " is not among the keys that are read, but changes: " + where);
+    if (is_read && where.empty())
       wrong.push_back(name + ": no scenario's output changes when it is moved, and no value is refused");
-    if (!where.empty() && is_known)
-      std::printf("%s has an effect now: take it off the list of exceptions\n", name.c_str());
-  }
-  return wrong;
-}
-
-int report(const std::vector<owner> &owners, const std::vector<std::string> &known, const char *only) {
-  std::vector<std::string> wrong;
-  size_t count = 0;
-  for (const owner &o : owners) {
-    if (only && std::strcmp(only, o.name) != 0) continue;
-    for (std::string &text : sweep(o, known)) wrong.push_back(std::move(text));
-    count += o.table.count;
   }
   for (const std::string &text : wrong) std::printf("%s\n", text.c_str());
-  std::printf("%zu parameters, %zu wrong\n", count, wrong.size());
-  return wrong.empty() && count > 0 ? 0 : 1;
+  std::printf("%s: %zu parameters, %zu wrong\n", of.name, table.count, wrong.size());
+  return wrong;
 }
 
 }  // namespace parameters

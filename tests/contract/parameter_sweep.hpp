@@ -68,10 +68,7 @@ struct owner {
   std::function<bool(const wm_param &)> reads = nullptr;
 };
 
-// What is wrong, a text for each parameter; those in `known` ("owner.key") may be without effect.
-std::vector<std::string> sweep(const owner &of, const std::vector<std::string> &known);
-
-// Runs the sweeps of all owners; the program's exit code. `only`: an owner, or nullptr.
-int report(const std::vector<owner> &owners, const std::vector<std::string> &known, const char *only);
+// Moves every parameter of a table on its stages. Returns a text for each that is wrong, and prints them.
+std::vector<std::string> sweep(const owner &of);
 
 }  // namespace parameters

@@ -7,6 +7,7 @@
 
 #include "parameter_sweep.hpp"
 #include "pictures.hpp"
+#include "unity.h"
 
 namespace {
 
@@ -14,8 +15,6 @@ using parameters::setting;
 using parameters::trace;
 using parameters::values;
 using pictures::film;
-
-const std::vector<std::string> kKnown = {};
 
 void add_event(const wm_event &e, trace *out) {
   out->add(static_cast<double>(e.t_ns));
@@ -90,6 +89,14 @@ const scenario kScenarios[] = {
     {"cascade", "street", known_street, {}},
 };
 
+const parameters::owner *owner_under_test = nullptr;
+
+void every_parameter_has_an_effect() {
+  const std::vector<std::string> wrong = parameters::sweep(*owner_under_test);
+  TEST_ASSERT_GREATER_THAN(0, owner_under_test->table.count);
+  TEST_ASSERT_EQUAL_STRING("", wrong.empty() ? "" : wrong.front().c_str());
+}
+
 }  // namespace
 
 void setUp() {}
@@ -112,5 +119,11 @@ int main(int argc, char **argv) {
     }
     owners.push_back(std::move(owner));
   }
-  return parameters::report(owners, kKnown, argc > 1 ? argv[1] : nullptr);
+  UNITY_BEGIN();
+  for (const parameters::owner &of : owners) {
+    if (argc > 1 && std::strcmp(argv[1], of.name) != 0) continue;
+    owner_under_test = &of;
+    UnityDefaultTestRun(every_parameter_has_an_effect, of.name, __LINE__);
+  }
+  return UNITY_END();
 }

@@ -14,6 +14,7 @@
 
 #include "drives.hpp"
 #include "parameter_sweep.hpp"
+#include "unity.h"
 
 namespace {
 
@@ -22,9 +23,6 @@ using parameters::setting;
 using parameters::stage;
 using parameters::trace;
 using parameters::values;
-
-// No parameter may be without effect.
-const std::vector<std::string> kKnown = {};
 
 struct freed {
   void operator()(void *memory) const { std::free(memory); }
@@ -405,6 +403,14 @@ std::vector<stage> stages_of(const wm_estimator &of, const whole_table &tables,
   return out;
 }
 
+const parameters::owner *owner_under_test = nullptr;
+
+void every_parameter_has_an_effect() {
+  const std::vector<std::string> wrong = parameters::sweep(*owner_under_test);
+  TEST_ASSERT_GREATER_THAN(0, owner_under_test->table.count);
+  TEST_ASSERT_EQUAL_STRING("", wrong.empty() ? "" : wrong.front().c_str());
+}
+
 }  // namespace
 
 void setUp() {}
@@ -426,5 +432,11 @@ int main(int argc, char **argv) {
     };
     owners.push_back({of.name, tables.back().table(), stages_of(of, tables.back(), &scenes), reads});
   }
-  return parameters::report(owners, kKnown, argc > 1 ? argv[1] : nullptr);
+  UNITY_BEGIN();
+  for (const parameters::owner &of : owners) {
+    if (argc > 1 && std::strcmp(argv[1], of.name) != 0) continue;
+    owner_under_test = &of;
+    UnityDefaultTestRun(every_parameter_has_an_effect, of.name, __LINE__);
+  }
+  return UNITY_END();
 }

@@ -8,7 +8,7 @@
                                     of the tests with LABEL, or with - of all but those labelled slow or release-only
     gate.py skips RUN ...           the tests that were skipped, from tests.xml of each RUN's folder; fails where one
                                     needs a thing that WAYMARK_REQUIRE names
-    gate.py passed                  after `./dev test --all`: this commit is the base from now on (tests/gate/base)
+    gate.py passed                  after a run that checked everything: this commit is the base from now on (tests/gate/base)
 
 A source counts as changed where it, or a file that it includes, differs from BASE or is not committed. BUILD is a release
 build that is up to date: its compiler wrote down what each object includes."""
@@ -45,7 +45,7 @@ def is_ancestor(commit):
 
 
 def base():
-    """WAYMARK_BASE; or where this branch left the main one; or the commit that last passed everything."""
+    """WAYMARK_BASE; or where this branch left the main one; or the commit that last passed with everything checked."""
     if "WAYMARK_BASE" in os.environ:
         return git("rev-parse", "--verify", "-q", os.environ["WAYMARK_BASE"] + "^{commit}") if os.environ["WAYMARK_BASE"] else ""
     fork = git("merge-base", "HEAD", "origin/main")

@@ -46,7 +46,7 @@ struct Freer {
 
 // ── which detectors ─────────────────────────────────────────────────────────────────────────────────────────────────
 
-// A detector with parameters; `family` tells those of several families apart.
+// A detector with parameters. `family` is the marker family in the name of its output, where several are tried.
 struct Wanted {
   Config config;
   const wm_vision_config *vision;

@@ -129,7 +129,7 @@ wm_status pf_edges::take_points(const wm_event &event, record_list records) {
   if (fused) life_.fused(event.t_ns);
   if (life_.searching() && particles_.main_cluster(kCluster_m, kCluster_rad).share > kFoundShare) life_.fits_again();
   wm_innovation record = record_of(event, WM_RESIDUAL_RANGE);
-  // A scan that no particle explains has moved the weights nevertheless; its record tells the monitor.
+  // A scan that no particle explains has moved the weights nevertheless; the monitor reads its record.
   record.verdict = !fused ? (uint8_t)WM_REJECTED_SINGULAR : contradicts ? (uint8_t)WM_REJECTED_GATE : (uint8_t)WM_FUSED;
   records.add(record);
   return WM_OK;
