@@ -67,9 +67,7 @@ def inside():
             assert last_x(text) is not None and abs(last_x(text) - 100) < 5, f"{name} did not hear the run that set_pose.py moved"
         assert [last_x(text) for text in heard].count(last_x(heard[0])) == 2, "Python and C heard different poses"
     finally:
-        for process in started:
-            if process.poll() is None:
-                process.kill()
+        lcm_tools.end_all(started)
         shutil.rmtree(work)
 
 

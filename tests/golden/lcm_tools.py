@@ -36,6 +36,13 @@ def skip(why):
     sys.exit(SKIPPED)
 
 
+def end_all(processes):
+    """Kills those that still run."""
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+
+
 def write_recording(folder, seconds):
     """A robot on a circle among four landmarks."""
     folder.mkdir()

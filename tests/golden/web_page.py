@@ -14,7 +14,7 @@ import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import browser  # noqa: E402
-from lcm_tools import ROOT, ROUTE, URL, WAYMARK, skip  # noqa: E402
+from lcm_tools import ROOT, ROUTE, URL, WAYMARK, end_all, skip  # noqa: E402
 
 SECONDS = 40
 
@@ -73,9 +73,7 @@ def inside(pictures):
         web.send_signal(signal.SIGTERM)
         print(drawn, web.communicate(timeout=20)[0].strip())
     finally:
-        for process in started:
-            if process.poll() is None:
-                process.kill()
+        end_all(started)
         shutil.rmtree(work)
 
 

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "calibrate/commands.h"
@@ -17,6 +18,7 @@
 #include "common/event_log.h"
 #include "common/failure.h"
 #include "common/run_folder.h"
+#include "common/scratch_folder.h"
 #include "waymark/map.h"
 #include "waymark/motion.h"
 extern "C" {
@@ -51,42 +53,24 @@ constexpr Kind kKinds[kMountingErrors] = {
     {"speed scale", "%", "a longer way", 100, 0.5, false},
     {"yaw rate bias", "mrad/s", "a longer drive", 1e3, 1, false}};
 
-// `waymark replay` of the recording into a folder of its own, which is removed with this.
-class Replayed {
- public:
-  Replayed(const Arguments &a) {
-    std::string name = (fs::temp_directory_path() / "waymark-mounting-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw Failure(name + ": can't be made");
-    folder_ = name;
-    const std::string program = (fs::read_symlink("/proc/self/exe").parent_path() / "waymark").string();
-    const pid_t child = fork();
-    if (child == 0) {
-      if (std::freopen("/dev/null", "w", stdout) == nullptr) _exit(127);
-      if (a.map.empty())
-        execl(program.c_str(), "waymark", "replay", a.recording.c_str(), "--config", a.config.c_str(), "--out",
-              name.c_str(), static_cast<char *>(nullptr));
-      else
-        execl(program.c_str(), "waymark", "replay", a.recording.c_str(), "--config", a.config.c_str(), "--out",
-              name.c_str(), "--map", a.map.c_str(), static_cast<char *>(nullptr));
-      _exit(127);
-    }
-    int status = 0;
-    if (child < 0 || waitpid(child, &status, 0) != child || !WIFEXITED(status) || WEXITSTATUS(status) != 0) {
-      fs::remove_all(folder_);
-      throw Failure("waymark replay " + a.recording + " failed; its messages are above");
-    }
+// `waymark replay` of the recording into `folder`.
+void replay(const Arguments &a, const std::string &folder) {
+  const std::string program = (fs::read_symlink("/proc/self/exe").parent_path() / "waymark").string();
+  const pid_t child = fork();
+  if (child == 0) {
+    if (std::freopen("/dev/null", "w", stdout) == nullptr) _exit(127);
+    if (a.map.empty())
+      execl(program.c_str(), "waymark", "replay", a.recording.c_str(), "--config", a.config.c_str(), "--out",
+            folder.c_str(), static_cast<char *>(nullptr));
+    else
+      execl(program.c_str(), "waymark", "replay", a.recording.c_str(), "--config", a.config.c_str(), "--out",
+            folder.c_str(), "--map", a.map.c_str(), static_cast<char *>(nullptr));
+    _exit(127);
   }
-  ~Replayed() {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-  Replayed(const Replayed &) = delete;
-  Replayed &operator=(const Replayed &) = delete;
-  [[nodiscard]] const fs::path &folder() const { return folder_; }
-
- private:
-  fs::path folder_;
-};
+  int status = 0;
+  if (child < 0 || waitpid(child, &status, 0) != child || !WIFEXITED(status) || WEXITSTATUS(status) != 0)
+    throw Failure("waymark replay " + a.recording + " failed; its messages are above");
+}
 
 int choose_camera(const Arguments &a, const wm_rig &rig) {
   if (rig.camera_count == 0) throw Failure(a.recording + ": calibration.yaml has no camera", tools::kUsage);
@@ -198,12 +182,12 @@ int report(const Mounting &found, const wm_camera &camera) {
 }
 
 int run(const Arguments &a) {
-  std::unique_ptr<Replayed> replayed;
+  std::optional<tools::ScratchFolder> replayed;
   if (a.run.empty()) {
     if (a.config.empty()) throw Failure("give --config FILE, or --run FOLDER of a replay", tools::kUsage);
-    replayed = std::make_unique<Replayed>(a);
+    replay(a, replayed.emplace("waymark-mounting").path());
   }
-  const fs::path folder = replayed ? replayed->folder() : fs::path(a.run);
+  const fs::path folder = replayed ? replayed->path() : fs::path(a.run);
   wm_error error{};
   tools::EventLog log(folder);
   const fs::path map_file = a.map.empty() ? fs::path(a.recording) / "map/map.yaml" : fs::path(a.map);

@@ -11,6 +11,7 @@
 
 #include "common/failure.h"
 #include "common/program.h"
+#include "common/scratch_folder.h"
 #include "suggest/configuration.h"
 #include "suggest/print.h"
 #include "suggest/search.h"
@@ -25,6 +26,7 @@ namespace {
 using namespace wm::suggest;
 using wm::tools::Failure;
 using wm::tools::need_ok;
+using wm::tools::ScratchFolder;
 namespace fs = std::filesystem;
 
 struct Arguments {
@@ -56,26 +58,6 @@ class Progress {
   std::chrono::steady_clock::time_point begin_;
 };
 
-// A folder that is gone afterwards.
-class Scratch {
- public:
-  Scratch() {
-    std::string name = (fs::temp_directory_path() / "waymark-suggest-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) throw Failure(name + ": the folder can't be made");
-    path_ = name;
-  }
-  ~Scratch() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  Scratch(const Scratch &) = delete;
-  Scratch &operator=(const Scratch &) = delete;
-  [[nodiscard]] const fs::path &path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
 struct Config {
   Config() = default;
   ~Config() { wm_config_free(&of); }
@@ -99,7 +81,7 @@ void replay(const wm_config &config, const std::string &recording, const fs::pat
 }
 
 // The run's events, and its configuration; the recording's are made first.
-fs::path run_of(const Arguments &a, const Scratch &scratch, Config &config, Progress &progress) {
+fs::path run_of(const Arguments &a, const ScratchFolder &scratch, Config &config, Progress &progress) {
   wm_error error{};
   if (!a.second.empty()) {
     need_ok(wm_config_load(a.first.c_str(), &config.of, &error), error);
@@ -165,7 +147,7 @@ std::vector<Parameter> chosen(std::vector<Parameter> all, const std::vector<std:
 int run(const Arguments &a) {
   wm::tools::need_finite("--from, --to, --minutes", {a.from_s, a.to_s, a.minutes});
   Progress progress(!a.as_json);
-  const Scratch scratch;
+  const ScratchFolder scratch("waymark-suggest");
   Config config;
   const fs::path folder = run_of(a, scratch, config, progress);
   const std::vector<Parameter> parameters = chosen(parameters_of(config.of), a.only);
