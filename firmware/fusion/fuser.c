@@ -106,8 +106,13 @@ static void write_row(wm_fuser *self) {
 static void monitor(wm_fuser *self, const wm_event *event, const wm_innovation *records, size_t count) {
   if (!wm_monitor_take(&self->monitor, event, records, count)) return;
   wm_estimate estimate;
+  wm_calibration_value values[WM_HEALTH_CALIBRATION_MAX];
+  size_t known = 0;
   self->estimator->estimate(self->state, &estimate);
-  wm_monitor_step(&self->monitor, &estimate);
+  if (self->estimator->calibration)
+    known = at_most(self->estimator->calibration(self->state, values, WM_HEALTH_CALIBRATION_MAX),
+                    WM_HEALTH_CALIBRATION_MAX);
+  wm_monitor_step(&self->monitor, &estimate, values, known);
 }
 
 static wm_status predict(wm_fuser *self, const wm_event *event) {

@@ -10,6 +10,7 @@
 #include "drives.hpp"
 #include "parameter_sweep.hpp"
 #include "unity.h"
+#include "waymark/health.h"
 #include "waymark/monitor.h"
 
 namespace {
@@ -89,7 +90,10 @@ seen drive(const char *name, drives::scene &scene, const std::vector<parameters:
     if (status != WM_OK && count == 0) continue;
     wm_estimate estimate;
     of.estimate(state.get(), &estimate);
-    if (wm_monitor_take(&monitor, &e, records, count)) wm_monitor_step(&monitor, &estimate);
+    wm_calibration_value values[WM_HEALTH_CALIBRATION_MAX];
+    const size_t listed = of.calibration ? of.calibration(state.get(), values, WM_HEALTH_CALIBRATION_MAX) : 0;
+    const size_t known = listed < WM_HEALTH_CALIBRATION_MAX ? listed : WM_HEALTH_CALIBRATION_MAX;
+    if (wm_monitor_take(&monitor, &e, records, count)) wm_monitor_step(&monitor, &estimate, values, known);
     wm_monitor_judge(&monitor, &estimate);
     note(estimate, t_s, t_s - last_s, &out);
     last_s = t_s;

@@ -7,11 +7,10 @@
 namespace wm {
 namespace {
 
-// Log of the largest factor of a variance, 16: sigmas stated four times too small. Its inverse is the least one of
-// positions: receivers state sigmas that are four times too large, too. Others are at least 1. A motion's noise that
-// is too large costs little, whereas calibration states absorb what the innovations lack: lowered, it gave a NEES
-// inside 95 % of 0.91 instead of 1.00 (mrclam-d6-r4). White noise of sightings is small beside their time-correlated
-// errors.
+// Log of kMostFactor. Its inverse is the least one of positions: receivers state sigmas that are four times too large,
+// too. Others are at least 1. A motion's noise that is too large costs little, whereas calibration states absorb what
+// the innovations lack: lowered, it gave a NEES inside 95 % of 0.91 instead of 1.00 (mrclam-d6-r4). White noise of
+// sightings is small beside their time-correlated errors.
 constexpr double kLogMost = 2.772588722239781;
 // Time constant of a factor, s. With 300 the prior pulls more: NEES inside 95 % 0.83 instead of 0.88 in the unit test.
 constexpr double kTau_s = 1000.0, kForgetEvery_s = 1.0;

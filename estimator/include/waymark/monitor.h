@@ -55,16 +55,19 @@ typedef struct wm_monitor {
   int32_t cause, source;        // of the present doubt; source -1: none
   int32_t found, is_map_known;  // found: poses that a search found, one soon after the other
   int32_t is_unsupported, is_outside;
-  int32_t was_lost, silent;        // by the estimator; silent: source, -1: none
-  int32_t is_probation, reserved;  // of a found pose, until it fits
+  int32_t was_lost, silent;   // by the estimator; silent: source, -1: none
+  int32_t is_probation;       // of a found pose, until it fits
+  int32_t is_noise_at_limit;  // an adapted noise
 } wm_monitor;
 
 // `observers`: bit for each of the run's sources that may give observations. The setup is not kept.
 void wm_monitor_init(wm_monitor *self, const wm_setup *setup, uint64_t observers);
 // After each event that the estimator was given: the records of its update. True: a step is due.
 int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation *records, size_t count);
-// With the estimator's own estimate, a few times a second of the events' time.
-void wm_monitor_step(wm_monitor *self, const wm_estimate *estimate);
+// With the estimator's own estimate, a few times a second of the events' time. `calibration`: its values, of which the
+// adapted noises are tested.
+void wm_monitor_step(wm_monitor *self, const wm_estimate *estimate, const wm_calibration_value *calibration,
+                     size_t count);
 // State, cause, covariance and probability of being lost, as the monitor finds them. Without doubt nothing changes.
 void wm_monitor_judge(const wm_monitor *self, wm_estimate *estimate);
 // Whether the pose is in doubt.
