@@ -50,13 +50,16 @@ endforeach()
 install(DIRECTORY config/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark-tools/examples COMPONENT tools)
 
 # ── for who writes programs ──────────────────────────────────────────────────────────────────────────────────────────
-# libwaymark: what is said, read and written over LCM, in C. libwaymark-estimator: the filters and our detectors.
+# libwaymark.so: the runtime. libwaymark-messages: LCM messages, in C. libwaymark-estimator: the filters and our detectors.
 add_library(wm_public STATIC $<TARGET_OBJECTS:wm_msgs> $<TARGET_OBJECTS:wm_lcm_messages> $<TARGET_OBJECTS:wm_lcm_types>)
 add_library(wm_public_estimator STATIC $<TARGET_OBJECTS:wm_estimator>)
-set_target_properties(wm_public PROPERTIES OUTPUT_NAME waymark LINKER_LANGUAGE C)
+set_target_properties(wm_public PROPERTIES OUTPUT_NAME waymark-messages LINKER_LANGUAGE C)
 set_target_properties(wm_public_estimator PROPERTIES OUTPUT_NAME waymark-estimator LINKER_LANGUAGE CXX)
 install(TARGETS wm_public wm_public_estimator DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
-install(DIRECTORY msgs/include/waymark estimator/include/waymark DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev)
+install(DIRECTORY msgs/include/waymark estimator/include/waymark firmware/library/include/waymark DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev)
+if(TARGET wm_shared)
+  install(TARGETS wm_shared LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev)
+endif()
 install(DIRECTORY ${CMAKE_BINARY_DIR}/msgs/lcm/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/waymark/lcm COMPONENT dev
   FILES_MATCHING PATTERN "*.h")
 install(DIRECTORY msgs/lcm DESTINATION ${CMAKE_INSTALL_DATADIR}/waymark COMPONENT dev)
@@ -66,13 +69,17 @@ configure_package_config_file(cmake/waymarkConfig.cmake.in ${CMAKE_BINARY_DIR}/w
 write_basic_package_version_file(${CMAKE_BINARY_DIR}/waymarkConfigVersion.cmake COMPATIBILITY SameMinorVersion)
 install(FILES ${CMAKE_BINARY_DIR}/waymarkConfig.cmake ${CMAKE_BINARY_DIR}/waymarkConfigVersion.cmake
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/waymark COMPONENT dev)
-foreach(name waymark waymark-estimator)
+foreach(name waymark waymark-estimator waymark-session)
   configure_file(cmake/${name}.pc.in ${CMAKE_BINARY_DIR}/${name}.pc @ONLY)
   install(FILES ${CMAKE_BINARY_DIR}/${name}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT dev)
 endforeach()
 
 # ── what each package says of itself ─────────────────────────────────────────────────────────────────────────────────
-foreach(pair runtime:waymark tools:waymark-tools dev:libwaymark-dev)
+set(packages runtime:waymark tools:waymark-tools dev:libwaymark-dev)
+if(TARGET wm_shared)
+  list(APPEND packages library:libwaymark0)
+endif()
+foreach(pair ${packages})
   string(REPLACE ":" ";" pair ${pair})
   list(GET pair 0 component)
   list(GET pair 1 package)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Debian packages by CPack: waymark (the robot's), waymark-tools (the desk's), libwaymark-dev. docs/boards.md.
+# Debian packages by CPack: waymark (the robot's), waymark-tools (the desk's), libwaymark0, libwaymark-dev. docs/boards.md.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME waymark)
 set(CPACK_PACKAGE_VENDOR Waymark)
@@ -68,9 +68,25 @@ set(CPACK_DEBIAN_DEV_PACKAGE_NAME libwaymark-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "liblcm-dev (>= 1.3.1)")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "poses of a robot for other programs
-Headers and static libraries: libwaymark reads and writes the messages that
-waymark sends over LCM, libwaymark-estimator has its filters and detectors.
-For find_package(waymark) and pkg-config.")
+Headers and libraries: libwaymark localizes in a program of its own,
+libwaymark-messages reads and writes the messages that waymark sends over
+LCM, libwaymark-estimator has its filters and detectors. For
+find_package(waymark) and pkg-config.")
+
+if(TARGET wm_shared)
+  list(APPEND CPACK_COMPONENTS_ALL library)
+  string(APPEND CPACK_DEBIAN_DEV_PACKAGE_DEPENDS ", libwaymark0 (= ${PROJECT_VERSION}-1)")
+  set(CPACK_DEBIAN_LIBRARY_PACKAGE_NAME libwaymark0)
+  set(CPACK_DEBIAN_LIBRARY_PACKAGE_SECTION libs)
+  set(CPACK_DEBIAN_LIBRARY_PACKAGE_DEPENDS "${base}, ${pictures}")
+  set(CPACK_DEBIAN_LIBRARY_DESCRIPTION "localization of a robot in a program of its own
+The runtime of waymark as a shared library with a stable C interface: a
+program pushes odometry, CAN frames, observations and pictures, and takes
+poses. The same poses, to the bit, as of the program waymark.")
+  file(WRITE ${CMAKE_BINARY_DIR}/debian/triggers "activate-noawait ldconfig\n")
+  file(WRITE ${CMAKE_BINARY_DIR}/debian/shlibs "libwaymark 0 libwaymark0 (>= ${PROJECT_VERSION})\n")
+  set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/triggers ${CMAKE_BINARY_DIR}/debian/shlibs)
+endif()
 
 # /usr is the prefix; what is below /usr/etc for CMake is in /etc for Debian.
 set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_SOURCE_DIR}/cmake/etc_outside_usr.cmake)

@@ -123,19 +123,12 @@ static int take_frame(can_device *self, const wm_can_frame *frame, wm_time_ns ar
   wm_source_counts *counts = &self->base.counts;
   wm_error why = {0};
   if (frame->is_error) return 0;
-  wm_quantities values;
-  memset(out, 0, WM_EVENT_SMALL_BYTES);
-  wm_status status = wm_can_decode(self->decoder, frame, &values, counts, &why);
+  const wm_can_part part = self->base.is_motion ? WM_CAN_MOTION : WM_CAN_GNSS;
+  wm_status status = wm_can_event(self->decoder, part, &self->gnss, frame, out, counts, &why);
   if (status == WM_BAD_DATA && !counts->first_problem[0])
     (void)snprintf(counts->first_problem, sizeof counts->first_problem, "%.255s", why.text);
-  if (status != WM_OK) return 0;  // counted by the decoder
-  out->kind = self->base.is_motion ? WM_EVENT_QUANTITIES : WM_EVENT_POSITION;
-  if (self->base.is_motion)
-    out->as.quantities = values;
-  else if (!wm_can_gnss_take(&self->gnss, &values, &out->as.position))
-    return 0;
+  if (status != WM_OK) return 0;
   out->source = self->base.index;
-  out->t_ns = frame->t_ns;
   out->arrival_ns = arrival_ns;
   out->seq = self->seq++;
   counts->received++;

@@ -59,3 +59,16 @@ int wm_can_gnss_take(wm_can_gnss *self, const wm_quantities *values, wm_position
   out->sigma_z_m = isnan(altitude_m) ? (double)NAN : value[Z] > 0.0 ? value[Z] : 2.0 * out->sigma_xy_m;
   return 1;
 }
+
+wm_status wm_can_event(wm_can_decoder *self, wm_can_part part, wm_can_gnss *gnss, const wm_can_frame *frame,
+                       wm_event *out, wm_source_counts *counts, wm_error *err) {
+  wm_quantities values;
+  memset(out, 0, WM_EVENT_SMALL_BYTES);
+  wm_status status = wm_can_decode(self, frame, &values, counts, err);
+  if (status != WM_OK) return status;  // counted by the decoder
+  out->kind = part == WM_CAN_GNSS ? WM_EVENT_POSITION : WM_EVENT_QUANTITIES;
+  out->t_ns = frame->t_ns;
+  if (part == WM_CAN_GNSS) return wm_can_gnss_take(gnss, &values, &out->as.position) ? WM_OK : WM_AGAIN;
+  out->as.quantities = values;
+  return WM_OK;
+}

@@ -87,20 +87,12 @@ static wm_status next_event(wm_source *base, wm_event *out, wm_error *err) {
     wm_status status = next_frame(self, err);
     if (status != WM_OK) return status;
     const wm_can_frame *frame = &self->frame.can;
-    wm_quantities values;
-    memset(out, 0, WM_EVENT_SMALL_BYTES);
-    status = wm_can_decode(self->decoder, frame, &values, &base->counts, &why);
-    if (status != WM_OK) {  // counted by the decoder
+    status = wm_can_event(self->decoder, self->part, &self->gnss, frame, out, &base->counts, &why);
+    if (status != WM_OK) {
       if (why.text[0]) keep_problem(self, self->frame.line, why.text);
       continue;
     }
-    out->kind = self->part == WM_CAN_GNSS ? WM_EVENT_POSITION : WM_EVENT_QUANTITIES;
-    if (self->part == WM_CAN_MOTION)
-      out->as.quantities = values;
-    else if (!wm_can_gnss_take(&self->gnss, &values, &out->as.position))
-      continue;
     out->source = base->index;
-    out->t_ns = frame->t_ns;
     out->arrival_ns = arrival_order_next(&self->order, frame->t_ns, &base->counts);
     out->seq = self->seq++;
     base->counts.received++;

@@ -46,8 +46,8 @@ typedef struct wm_replay_watch {
 } wm_replay_watch;
 
 typedef struct wm_replay_options {
-  const char *out_dir;           // NULL: no files (recording only)
-  const wm_replay_watch *watch;  // recording only; may be NULL
+  const char *out_dir;           // NULL: no files
+  const wm_replay_watch *watch;  // may be NULL; of an event log `put` alone is called
   uint64_t seed;
   wm_progress_fn progress;  // may be NULL
   void *progress_context;

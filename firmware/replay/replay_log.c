@@ -17,7 +17,9 @@ typedef struct log_replay {
   wm_arena arena;
   void *state;
   wm_fuser fuser;
-  wm_run_folder *folder;
+  wm_run_folder *folder;  // NULL where nothing is written
+  wm_output file;
+  wm_replay_watch watch;
   uint64_t received[WM_SOURCES_MAX];
   wm_time_ns first_ns, last_ns;
 } log_replay;
@@ -74,6 +76,12 @@ static wm_status take_kept(log_replay *self, wm_error *err) {
   return WM_OK;
 }
 
+static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
+  log_replay *self = context;
+  if (self->file.put) self->file.put(self->file.context, kind, record, bytes);
+  if (self->watch.put) self->watch.put(self->watch.context, kind, record, bytes);
+}
+
 static wm_status start(log_replay *self, const wm_replay_options *options, wm_error *err) {
   const wm_config *config = self->assembly.config;
   const char *why = NULL;
@@ -89,10 +97,11 @@ static wm_status start(log_replay *self, const wm_replay_options *options, wm_er
     return wm_fail(err, status, "estimator '%s' can't start: %s", config->estimator->name, wm_status_text(status));
   status = take_kept(self, err);
   if (status != WM_OK) return status;
-  status = wm_run_folder_open(options->out_dir, &self->assembly, &self->folder, err);
+  if (options->out_dir) status = wm_run_folder_open(options->out_dir, &self->assembly, &self->folder, err);
   if (status != WM_OK) return status;
-  wm_fuser_init(&self->fuser, config->estimator, self->state, self->assembly.driving,
-                wm_run_folder_output(self->folder));
+  if (self->folder) self->file = wm_run_folder_output(self->folder);
+  if (options->watch) self->watch = *options->watch;
+  wm_fuser_init(&self->fuser, config->estimator, self->state, self->assembly.driving, (wm_output){put, self});
   wm_fuser_watch(&self->fuser, &self->assembly.setup, wm_assembly_observers(&self->assembly));
   return WM_OK;
 }
@@ -134,6 +143,7 @@ static wm_status write_summary(log_replay *self, wm_run_report *report, wm_error
   report->events = self->fuser.events;
   report->recorded_s = wm_seconds_between(self->first_ns, self->last_ns);
   report->memory_bytes = self->arena.bytes;
+  if (!self->folder) return WM_OK;
   const wm_timing_stage stages[] = {{"predict", &self->fuser.predict_ns}, {"correct", &self->fuser.correct_ns}};
   const wm_timing timing = {.stages = stages,
                             .stage_count = 2,

@@ -43,7 +43,9 @@ def main():
     offences = 0
     page, camera = BUILD / "bin/waymark-web", BUILD / "lib/waymark/waymark-camera"
     tools = sorted(p for p in (BUILD / "bin").glob("waymark-*") if "montecarlo" not in p.name and p != page)
-    for component, programs in (("RUNTIME", [BUILD / "bin/waymark", *(p for p in (page, camera) if p.exists())]), ("TOOLS", tools)):
+    library = BUILD / "lib/libwaymark.so.0"
+    for component, programs in (("RUNTIME", [BUILD / "bin/waymark", *(p for p in (page, camera) if p.exists())]), ("TOOLS", tools),
+                                *([("LIBRARY", [library])] if library.exists() else [])):
         says, needs = declared(component), needed(programs)
         says.pop("waymark", None)
         for package, version in needs.items():

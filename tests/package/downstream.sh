@@ -14,7 +14,7 @@ trap 'rm -r "$dir"' EXIT
 ip link set lo up
 ip route add 224.0.0.0/4 dev lo
 
-for component in runtime dev; do
+for component in runtime library dev; do
   DESTDIR=$dir/root cmake --install "$build" --prefix /usr --component "$component" >>"$dir/install.log" || { cat "$dir/install.log"; exit 1; }
 done
 usr=$dir/root/usr
@@ -33,6 +33,11 @@ cc -Wall -Wextra -Werror -o "$dir/hear" "$here/downstream/hear.c" $(pkg-config -
 # shellcheck disable=SC2046
 c++ -Wall -Wextra -Werror -o "$dir/filters" "$here/downstream/filters.cpp" $(pkg-config --cflags --libs --static waymark-estimator)
 "$dir/filters" | grep -q '^slam: '
+# shellcheck disable=SC2046
+cc -Wall -Wextra -Werror -o "$dir/robot" "$here/downstream/robot.c" $(pkg-config --cflags --libs waymark-session)
+for robot in "$dir/robot" "$dir/cmake/robot"; do
+  { LD_LIBRARY_PATH=$PKG_CONFIG_PATH/.. "$robot" 2>&1 || true; } | grep -q '^usage: robot'
+done
 
 # Headers stand on their own, in C and in C++.
 for header in "$usr"/include/waymark/*.h; do

@@ -120,6 +120,10 @@ void wm_can_decoder_free(wm_can_decoder *self);  // NULL is fine
 // unbound id and 55 ns for a frame of four signals. One thread at a time.
 wm_status wm_can_decode(wm_can_decoder *self, const wm_can_frame *frame, wm_quantities *out, wm_source_counts *counts,
                         wm_error *err);
+// A decoded frame as an event of its source: quantities, or the position that is complete with it (`gnss` is of that
+// part). Sets *out but for source, arrival and seq. Statuses as above; WM_AGAIN also without a position.
+wm_status wm_can_event(wm_can_decoder *self, wm_can_part part, wm_can_gnss *gnss, const wm_can_frame *frame,
+                       wm_event *out, wm_source_counts *counts, wm_error *err);
 // CAN ids for kernel filters; returns how many there are.
 size_t wm_can_decoder_ids(const wm_can_decoder *self, uint32_t *ids, uint8_t *is_extended, size_t capacity);
 // Quantities that this decoder can give: bit per wm_quantity.

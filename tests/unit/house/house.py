@@ -18,7 +18,7 @@ MAY_USE = {
 }
 
 # Inside firmware/, bottom up: a folder includes its own headers and those of the folders before it, as "folder/header.h".
-FIRMWARE_FOLDERS = ["rt", "findings", "config", "sources", "fusion", "output", "replay", "live", "cli"]
+FIRMWARE_FOLDERS = ["rt", "findings", "config", "sources", "fusion", "output", "replay", "library", "live", "cli"]
 
 # Headers that would give the estimator a clock, a file, a thread, a heap or a terminal.
 ESTIMATOR_NEVER = re.compile(

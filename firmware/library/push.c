@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+// Data into a session, poses out of it: the calls of a run's cycle, driven by the caller's clock.
+#include <math.h>
+#include <string.h>
+
+#include "library/session.h"
+
+#define FARTHEST_NS (INT64_MAX / 4)  // stamps beyond it would overflow in differences
+
+static wm_status check_started(const waymark_session *self, const char *function, wm_error *err) {
+  if (self->has_started) return WM_OK;
+  return wm_fail(err, WM_BAD_USAGE, "%s: waymark_start has to be called before", function);
+}
+
+static wm_status check_time(const char *name, wm_time_ns t_ns, wm_error *err) {
+  if (t_ns >= -FARTHEST_NS && t_ns <= FARTHEST_NS) return WM_OK;
+  return wm_fail(err, WM_OUT_OF_RANGE, "%s: %lld ns is no time", name, (long long)t_ns);
+}
+
+// A detector waits for pictures as a device's source for data: with is_live the readers do not read ahead.
+static void set_live(waymark_session *self, uint8_t is_live) {
+  for (size_t i = 0; i < wm_vision_count(self->assembly.vision); i++)
+    wm_vision_source(self->assembly.vision, i)->is_live = is_live;
+}
+
+// With the first datum: from_s and until_s of the configuration count from its stamp.
+static wm_status open_readers(waymark_session *self, wm_time_ns first_ns, wm_error *err) {
+  if (self->has_data) return WM_OK;
+  set_live(self, 1);
+  wm_status status = wm_source_readers_open(&self->assembly, self->readers, first_ns, &first_ns, err);
+  set_live(self, 0);
+  self->has_data = status == WM_OK;
+  return status;
+}
+
+static void advance(waymark_session *self, wm_time_ns now_ns) {
+  if (self->now_ns == WM_TIME_NONE || now_ns > self->now_ns) self->now_ns = now_ns;
+  wm_pipeline_advance(&self->pipeline, self->now_ns);
+}
+
+// Hands on all that the source has now.
+static wm_status read_source(waymark_session *self, const wm_source *source, wm_error *err) {
+  for (size_t i = 0; i < self->assembly.source_count; i++) {
+    wm_source_reader *reader = &self->readers[i];
+    if (reader->source != source) continue;
+    for (;;) {
+      wm_status status = wm_source_reader_advance(reader, err);
+      if (status != WM_OK || !reader->has_next) return status;
+      advance(self, reader->next.arrival_ns);
+      if (reader->next.kind != WM_EVENT_NONE) wm_pipeline_arrive(&self->pipeline, &reader->next);
+    }
+  }
+  return WM_OK;  // the estimator does not take it
+}
+
+static wm_time_ns arrival_of(const waymark_session *self, wm_time_ns t_ns, wm_time_ns arrival_ns) {
+  if (arrival_ns != WM_TIME_NONE) return arrival_ns;
+  return self->now_ns != WM_TIME_NONE && self->now_ns > t_ns ? self->now_ns : t_ns;
+}
+
+static wm_status check_times(wm_time_ns t_ns, wm_time_ns arrival_ns, wm_error *err) {
+  wm_status status = check_time("t_ns", t_ns, err);
+  return status == WM_OK && arrival_ns != WM_TIME_NONE ? check_time("arrival_ns", arrival_ns, err) : status;
+}
+
+// source->event is filled but for its arrival.
+static wm_status deliver(waymark_session *self, pushed_source *source, wm_time_ns arrival_ns, wm_error *err) {
+  wm_status status = open_readers(self, source->event.t_ns, err);
+  if (status != WM_OK) return status;
+  source->event.arrival_ns = arrival_of(self, source->event.t_ns, arrival_ns);
+  source->has_event = 1;
+  status = read_source(self, &source->base, err);
+  source->has_event = 0;
+  return status;
+}
+
+static wm_status find_source(waymark_session *self, const char *function, uint32_t source, pushed_source **out,
+                             wm_error *err) {
+  wm_status status = check_started(self, function, err);
+  if (status != WM_OK) return status;
+  if (source >= self->source_count)
+    return wm_fail(err, WM_NOT_FOUND, "%s: %u is no source of this session, which has %zu", function, source,
+                   self->source_count);
+  *out = self->sources[source];
+  return WM_OK;
+}
+
+wm_status waymark_push_row(waymark_session *self, uint32_t source, wm_time_ns t_ns, wm_time_ns arrival_ns,
+                           const double *numbers, size_t count, wm_error *err) {
+  pushed_source *to;
+  wm_status status = find_source(self, "waymark_push_row", source, &to, err);
+  if (status == WM_OK) status = check_times(t_ns, arrival_ns, err);
+  if (status != WM_OK) return status;
+  if (!to->stream)
+    return wm_fail(err, WM_BAD_USAGE, "%s: takes events (waymark_push_event) or frames, no rows", to->base.name);
+  wm_stream_row row = {.t_ns = t_ns, .arrival_ns = t_ns};
+  size_t columns = 0;
+  while (columns < WM_STREAM_NUMBERS_MAX && wm_stream_number(to->stream, columns)) columns++;
+  if (count > columns)
+    return wm_fail(err, WM_BAD_USAGE, "%s: %zu numbers; its table has %zu columns behind the stamps", to->base.name,
+                   count, columns);
+  for (size_t i = 0; i < WM_STREAM_NUMBERS_MAX; i++) row.number[i] = i < count ? numbers[i] : (double)NAN;
+  status = wm_stream_event(to->stream, &row, wm_site_imu(wm_recording_site(self->robot)), &to->event, err);
+  if (status == WM_OK) return deliver(self, to, arrival_ns, err);
+  wm_source_counts *counts = &to->base.counts;
+  if (status == WM_NOT_FINITE)
+    counts->not_finite++;
+  else
+    counts->malformed++;
+  return wm_fail_in(err, "%s", to->base.name);
+}
+
+static void set_sensor(wm_event *event, uint16_t sensor) {
+  if (sensor == NO_SENSOR) return;
+  if (event->kind == WM_EVENT_SIGHTING) event->as.sighting.sensor = sensor;
+  if (event->kind == WM_EVENT_MARKER) event->as.marker.sensor = sensor;
+  if (event->kind == WM_EVENT_LOOKED) event->as.looked.sensor = sensor;
+}
+
+wm_status waymark_push_event(waymark_session *self, uint32_t source, const wm_event *event, size_t bytes,
+                             wm_error *err) {
+  pushed_source *to;
+  wm_status status = find_source(self, "waymark_push_event", source, &to, err);
+  if (status == WM_OK) status = library_check_size("waymark_push_event", event, bytes, sizeof *event, err);
+  if (status == WM_OK) status = check_times(event->t_ns, event->arrival_ns, err);
+  if (status != WM_OK) return status;
+  memcpy(&to->event, event, wm_event_bytes(event));
+  set_sensor(&to->event, to->sensor);
+  status = pushed_source_check(to, &to->event, self->assembly.setup.sensor_count, err);
+  return status == WM_OK ? deliver(self, to, event->arrival_ns, err) : status;
+}
+
+wm_status waymark_push_can(waymark_session *self, wm_time_ns t_ns, const char *interface, uint32_t id, int is_extended,
+                           const void *data, size_t length, wm_error *err) {
+  wm_status status = check_started(self, "waymark_push_can", err);
+  if (status == WM_OK) status = check_time("t_ns", t_ns, err);
+  if (status != WM_OK) return status;
+  if (length > WM_CAN_DATA_MAX || id > (is_extended ? 0x1FFFFFFFu : 0x7FFu))
+    return wm_fail(err, WM_BAD_DATA, "%s: a frame of id %x and %zu bytes can't be", interface, id, length);
+  wm_can_frame frame = {
+      .t_ns = t_ns, .id = id, .is_extended = is_extended != 0, .is_fd = length > 8, .length = (uint8_t)length};
+  if (length > 0) memcpy(frame.data, data, length);
+  for (size_t i = 0; i < self->source_count; i++) {
+    pushed_source *to = self->sources[i];
+    if (!to->decoder || (to->interface[0] && strcmp(to->interface, interface) != 0)) continue;
+    status = wm_can_event(to->decoder, to->part, &to->gnss, &frame, &to->event, &to->base.counts, err);
+    if (status == WM_OK) status = deliver(self, to, WM_TIME_NONE, err);
+    if (status != WM_OK && status != WM_AGAIN && status != WM_BAD_DATA) return status;
+  }
+  return WM_OK;
+}
+
+wm_status waymark_push_picture(waymark_session *self, const char *camera, const wm_frame *frame, size_t bytes,
+                               wm_error *err) {
+  wm_status status = check_started(self, "waymark_push_picture", err);
+  if (status == WM_OK) status = library_check_size("waymark_push_picture", frame, bytes, sizeof *frame, err);
+  if (status == WM_OK) status = check_times(frame->t_ns, frame->arrival_ns, err);
+  if (status != WM_OK) return status;
+  const wm_rig *rig = wm_site_rig(wm_recording_site(self->robot));
+  const int index = wm_rig_find_camera(rig, camera);
+  if (index < 0) return wm_fail(err, WM_NOT_FOUND, "'%.40s' is no camera of calibration.yaml", camera);
+  const wm_camera *is = &rig->cameras[index];
+  if (!frame->grey || frame->width_px != is->width_px || frame->height_px != is->height_px ||
+      frame->stride_bytes < frame->width_px)
+    return wm_fail(err, WM_BAD_DATA, "%s: a picture of %u x %u, rows of %u bytes; calibration.yaml has %u x %u", camera,
+                   frame->width_px, frame->height_px, frame->stride_bytes, is->width_px, is->height_px);
+  status = open_readers(self, frame->t_ns, err);
+  if (status != WM_OK) return status;
+  wm_frame taken = *frame;
+  taken.arrival_ns = arrival_of(self, frame->t_ns, frame->arrival_ns);
+  pushed_pictures_put(self->pictures, index, &taken);
+  for (size_t i = 0; status == WM_OK && i < wm_vision_count(self->assembly.vision); i++)
+    status = read_source(self, wm_vision_source(self->assembly.vision, i), err);
+  return status;
+}
+
+wm_status waymark_advance(waymark_session *self, wm_time_ns now_ns, wm_error *err) {
+  wm_status status = check_started(self, "waymark_advance", err);
+  if (status == WM_OK) status = check_time("now_ns", now_ns, err);
+  if (status == WM_OK) advance(self, now_ns);
+  return status;
+}
+
+wm_status waymark_pose(waymark_session *self, wm_time_ns now_ns, wm_published *out, size_t bytes, wm_error *err) {
+  wm_status status = library_check_size("waymark_pose", out, bytes, sizeof *out, err);
+  if (status == WM_OK) status = waymark_advance(self, now_ns, err);
+  if (status != WM_OK) return status;
+  wm_estimate expected;
+  const int there_is_one = wm_pipeline_publish(&self->pipeline, now_ns, out);
+  if (there_is_one) {
+    out->made_ns = now_ns;
+    self->pipeline.output.put(self->pipeline.output.context, WM_OUTPUT_PUBLISHED, out, sizeof *out);
+  }
+  if (wm_pipeline_expect(&self->pipeline, now_ns, &expected))
+    wm_vision_set_prediction(self->assembly.vision, &expected);
+  return there_is_one ? WM_OK : WM_AGAIN;
+}
+
+wm_status waymark_health(waymark_session *self, wm_health *out, size_t bytes, wm_error *err) {
+  wm_status status = check_started(self, "waymark_health", err);
+  if (status == WM_OK) status = library_check_size("waymark_health", out, bytes, sizeof *out, err);
+  if (status != WM_OK) return status;
+  memset(out, 0, sizeof *out);
+  wm_pipeline_health(&self->pipeline, self->now_ns, out);
+  if (self->has_data) wm_source_readers_health(self->readers, self->assembly.source_count, out);
+  return WM_OK;
+}
+
+const char *waymark_source_name(const waymark_session *self, uint32_t source) {
+  return source < self->assembly.source_count ? self->assembly.sources[source].name : "";
+}

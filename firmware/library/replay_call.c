@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// A replay as one call.
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+
+#include "library/changed_config.h"
+#include "library/session.h"
+#include "replay/replay.h"
+#include "waymark/map.h"
+
+static void put(void *context, wm_output_kind kind, const void *record, size_t bytes) {
+  const waymark_replay_options *options = context;
+  const waymark_record known = library_record(kind);
+  if (known) options->take(options->context, known, record, bytes);
+}
+
+static void show(void *context, double done) {
+  const waymark_replay_options *options = context;
+  options->progress(options->context, done);
+}
+
+static wm_replay_watch watch_of(waymark_replay_options *options) {
+  return (wm_replay_watch){.context = options, .put = options->take ? put : NULL};
+}
+
+static wm_status override(char out[WM_PATH_MAX], const char *path, wm_error *err) {
+  const size_t length = path ? strlen(path) : 0;
+  if (length >= WM_PATH_MAX) return wm_fail(err, WM_BAD_USAGE, "'%.60s...': the path is too long", path);
+  if (path) memcpy(out, path, length + 1);
+  return WM_OK;
+}
+
+static wm_status replay_recording(waymark_replay_options *options, wm_config *config, wm_run_report *report,
+                                  wm_error *err) {
+  wm_recording *recording = NULL;
+  wm_recording_overrides *files = &config->overrides;
+  if (options->lost) {
+    config->has_initial_pose = 1;
+    wm_start_init(&config->initial_pose);
+  }
+  wm_status status = override(files->landmarks, options->landmarks, err);
+  if (status == WM_OK) status = override(files->calibration, options->calibration, err);
+  if (status == WM_OK) status = override(files->map, options->map, err);
+  if (status == WM_OK)
+    status = wm_recording_open(options->input, files, options->note, options->context, &recording, err);
+  if (status != WM_OK) return status;
+  const wm_replay_watch watch = watch_of(options);
+  const wm_replay_options how = {.out_dir = options->out,
+                                 .watch = &watch,
+                                 .seed = options->seed,
+                                 .progress = options->progress ? show : NULL,
+                                 .progress_context = options,
+                                 .from_s = options->from_s,
+                                 .until_s = options->until_s};
+  status = wm_replay_recording(config, recording, &how, report, err);
+  wm_recording_close(recording);
+  return status;
+}
+
+static wm_status replay_log(waymark_replay_options *options, wm_log_reader *log, wm_run_report *report, wm_error *err) {
+  const wm_log_head *head = wm_log_reader_head(log);
+  wm_config config;
+  wm_status status =
+      options->config
+          ? changed_config_load(options->config, options->changes, options->note, options->context, &config, err)
+          : changed_config_parse(head->config_text, head->config_length, head->config_path, options->changes,
+                                 wm_config_parse_logged, options->note, options->context, &config, err);
+  if (status != WM_OK) return status;
+  wm_map *map = NULL;
+  if (head->map_hash)
+    status = wm_map_load(options->map ? options->map : head->map_path, options->note, options->context, &map, err);
+  if (status == WM_OK) {
+    const wm_replay_watch watch = watch_of(options);
+    const wm_replay_options how = {.out_dir = options->out, .watch = &watch, .map = map ? wm_map_raster(map) : NULL};
+    status = wm_replay_log(&config, log, &how, report, err);
+  }
+  wm_map_free(map);
+  wm_config_free(&config);
+  return status;
+}
+
+static wm_status replay_input(waymark_replay_options *options, wm_run_report *report, wm_error *err) {
+  struct stat there;
+  if (stat(options->input, &there) == 0 && !S_ISDIR(there.st_mode)) {
+    wm_log_reader *log;
+    if (options->landmarks || options->calibration || options->lost || options->from_s > 0 || options->until_s > 0)
+      return wm_fail(err, WM_BAD_USAGE,
+                     "%s: an event log has landmarks, calibration and start of its own and is replayed whole; others "
+                     "need the recording",
+                     options->input);
+    wm_status status = wm_log_open(options->input, &log, err);
+    if (status != WM_OK) return status;
+    status = replay_log(options, log, report, err);
+    wm_log_reader_close(log);
+    return status;
+  }
+  if (!options->config)
+    return wm_fail(err, WM_BAD_USAGE, "%s: the replay of a recording needs a configuration", options->input);
+  wm_config config;
+  wm_status status =
+      changed_config_load(options->config, options->changes, options->note, options->context, &config, err);
+  if (status != WM_OK) return status;
+  status = replay_recording(options, &config, report, err);
+  wm_config_free(&config);
+  return status;
+}
+
+wm_status waymark_replay(const waymark_replay_options *options, waymark_report *out, size_t bytes, wm_error *err) {
+  waymark_replay_options taken;
+  wm_status status =
+      library_take_options("waymark_replay", options, options ? options->bytes : 0, &taken, sizeof taken, err);
+  if (status == WM_OK) status = library_check_size("waymark_replay", out, bytes, sizeof *out, err);
+  if (status != WM_OK) return status;
+  if (!taken.input)
+    return wm_fail(err, WM_BAD_USAGE, "waymark_replay: options.input: a recording or an event log is missing");
+  if (!(isfinite(taken.from_s) && isfinite(taken.until_s)))
+    return wm_fail(err, WM_NOT_FINITE, "waymark_replay: from_s and until_s are seconds");
+  wm_run_report *report = calloc(1, sizeof *report);
+  if (!report) return wm_fail(err, WM_IO, "no memory for a replay");
+  status = replay_input(&taken, report, err);
+  if (status == WM_OK)
+    *out = (waymark_report){.poses = report->poses,
+                            .events = report->events,
+                            .recorded_s = report->recorded_s,
+                            .events_missing = report->events_missing,
+                            .log_was_cut = report->log_was_cut};
+  free(report);
+  return status;
+}

@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The example of docs/library.md, a robot's own program with its own loop: compiled against libwaymark.so, given the rows of a
+recording in the order of their arrival, its poses are those of `waymark replay`, digit by digit.
+
+    robot.py BUILD [CC]          Skipped (77) where there is no libwaymark.so (sanitizers)."""
+import csv
+import pathlib
+import shlex
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests/contract"))
+import small_robot  # noqa: E402
+
+BUILD = pathlib.Path(sys.argv[1]).resolve()
+CC = shlex.split(sys.argv[2]) if len(sys.argv) > 2 else ["cc"]
+EXAMPLE = ROOT / "tests/package/downstream/robot.c"
+
+
+def rows(path):
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def with_twists(folder):
+    """The small robot with the twists of its true way instead of its CAN bus."""
+    small_robot.write(folder)
+    for name in ("can.log", "vehicle.dbc", "can-signals.yaml"):
+        (folder / name).unlink()
+    about = folder / "recording.yaml"
+    about.write_text(about.read_text().replace("can.log, vehicle.dbc, can-signals.yaml", "motion.csv"))
+    path = small_robot.drive()
+    lines = ["t_ns,v_mps,w_radps"]
+    for t, *_, w in path[::4]:
+        v, _ = small_robot._twist(t)
+        lines.append(f"{small_robot.START_NS + round(t * 1e9)},{v:.6f},{w:.6f}")
+    (folder / "motion.csv").write_text("\n".join(lines) + "\n")
+
+
+def in_order(folder):
+    """All rows as lines for the program, by their arrival; odometry first, as a replay has it."""
+    data = [(int(r["t_ns"]), 0, f"moved {r['t_ns']} {r['v_mps']} {r['w_radps']}") for r in rows(folder / "motion.csv")]
+    data += [(int(r["arrival_ns"]), 1, f"saw {r['t_ns']} {r['arrival_ns']} {r['id']} {r['bearing_rad']} {r['range_m']}")
+             for r in rows(folder / "sightings.csv")]
+    return "\n".join(line for *_, line in sorted(data, key=lambda row: row[:2])) + "\n"
+
+
+def main():
+    library = BUILD / "lib/libwaymark.so"
+    if not library.exists():
+        print("skipped: this build has no libwaymark.so")
+        return 77
+    text = (ROOT / "docs/library.md").read_text()
+    assert EXAMPLE.read_text() in text, "docs/library.md does not have tests/package/downstream/robot.c word by word"
+    with tempfile.TemporaryDirectory(prefix="waymark-library-") as name:
+        work = pathlib.Path(name)
+        includes = [f"-I{ROOT / room}" for room in ("msgs/include", "firmware/library/include")]
+        subprocess.run([*CC, "-std=c17", "-Wall", "-Wextra", "-Werror", *includes, EXAMPLE, library, f"-Wl,-rpath,{library.parent}", "-o",
+                        work / "robot"], check=True)
+        with_twists(work / "recording")
+        config = work / "robot.yaml"
+        config.write_text("format: waymark-config/1\nestimator: landmark_ekf\n")
+        subprocess.run([BUILD / "bin/waymark", "replay", work / "recording", "--config", config, "--out", work / "run"], check=True,
+                       stdout=subprocess.DEVNULL)
+        done = subprocess.run([work / "robot", config, work / "recording"], input=in_order(work / "recording"), capture_output=True,
+                              text=True, check=True)
+        usage = subprocess.run([work / "robot"], capture_output=True, text=True, check=False)
+        wanted = rows(work / "run/trajectory.csv")
+    assert usage.returncode == 2 and "usage" in usage.stderr, usage
+    assert not done.stderr, done.stderr
+    got = [line.split() for line in done.stdout.splitlines()]
+    assert len(got) == len(wanted) > 5000, (len(got), len(wanted))
+    for mine, row in zip(got, wanted):
+        theirs = [float(row[name]) for name in ("x_m", "y_m", "cov_xx")]
+        assert mine[0] == row["t_ns"] and [float(value) for value in mine[1:]] == theirs, (mine, row)
+    print(f"{len(got)} poses of the program are those of the replay, bit by bit")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
