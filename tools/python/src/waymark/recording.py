@@ -13,8 +13,8 @@ from .avi import AviWriter, read_jpegs
 from .tables import Table, read_table, write_table
 
 FORMAT = "waymark-recording/1"
-STREAMS = ("motion.csv", "motion6.csv", "increments.csv", "imu.csv", "sightings.csv", "markers.csv", "marker-corners.csv",
-           "stereo.csv", "points.csv", "gnss.csv")
+STREAMS = ("motion.csv", "motion6.csv", "increments.csv", "ticks.csv", "speeds.csv", "steering.csv", "imu.csv", "heading.csv",
+           "depth.csv", "sightings.csv", "markers.csv", "marker-corners.csv", "stereo.csv", "points.csv", "gnss.csv")
 """Streams of sensors that are tables, in the order of the format's table."""
 
 _CAN_LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-Fa-f]+)#(#[0-9A-Fa-f])?(R\d?|[0-9A-Fa-f]*)(?: [RT])?\s*$")

@@ -8,8 +8,8 @@ import numpy as np
 
 from .tables import Table, read_table
 
-_SPACE = [(i, j) for i in range(6) for j in range(i, 6)]
-_PLANE = [(0, 0), (0, 1), (1, 1), (0, 5), (1, 5), (5, 5)]
+SPACE = [(i, j) for i in range(6) for j in range(i, 6)]
+PLANE = [(0, 0), (0, 1), (1, 1), (0, 5), (1, 5), (5, 5)]
 
 
 class Run:
@@ -57,9 +57,9 @@ def covariance(poses: Table) -> np.ndarray:
     out = np.zeros((len(poses["t_ns"]), 6, 6))
     if "cov_xrx" in poses:
         names = ("x", "y", "z", "rx", "ry", "rz")
-        for i, j in _SPACE:
+        for i, j in SPACE:
             out[:, i, j] = out[:, j, i] = poses[f"cov_{names[i]}{names[j]}"]
     else:
-        for (i, j), name in zip(_PLANE, ("xx", "xy", "yy", "xt", "yt", "tt")):
+        for (i, j), name in zip(PLANE, ("xx", "xy", "yy", "xt", "yt", "tt")):
             out[:, i, j] = out[:, j, i] = poses[f"cov_{name}"]
     return out

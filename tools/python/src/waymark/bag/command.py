@@ -41,13 +41,19 @@ def _choose(into: Collection, kind: str, wanted: str | None, option: str) -> str
     return max(sorted(topics), key=lambda topic: len(topics[topic])) if topics else None
 
 
+def _choose_one(into: Collection, kind: str, wanted: str | None, option: str, what: str) -> str | None:
+    """The chosen topic of a kind of which a recording has one; the others are refused."""
+    topic = _choose(into, kind, wanted, option)
+    for other in into.rows.get(kind, {}):
+        if other != topic:
+            into.refuse(other, f"{what} {topic}; {option} {other} takes this one")
+    return topic
+
+
 def _write_motion(into: Collection, given: argparse.Namespace) -> None:
-    topic = _choose(into, "motion", given.motion, "--motion")
+    topic = _choose_one(into, "motion", given.motion, "--motion", "motion comes from")
     if not topic:
         return
-    for other in into.rows["motion"]:
-        if other != topic:
-            into.refuse(other, f"motion comes from {topic}; --motion {other} takes this one")
     written = tables.motion(into.rows["motion"][topic])
     if written:
         into.writer.table(*written)
@@ -59,12 +65,9 @@ def _write_motion(into: Collection, given: argparse.Namespace) -> None:
 
 
 def _write_imu(into: Collection, given: argparse.Namespace) -> None:
-    topic = _choose(into, "imu", given.imu, "--imu")
+    topic = _choose_one(into, "imu", given.imu, "--imu", "the IMU is")
     if not topic:
         return
-    for other in into.rows["imu"]:
-        if other != topic:
-            into.refuse(other, f"the IMU is {topic}; --imu {other} takes this one")
     into.writer.table("imu.csv", tables.imu(into.rows["imu"][topic]))
     place = tables.mounting(into, into.frame_ids_imu[topic], given.base, optical=False)
     if place:
