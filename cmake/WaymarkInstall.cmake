@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# What `cmake --install` puts where, in the three components that become packages: runtime, tools, dev.
+# What `cmake --install` puts where, in the components that become packages: runtime, tools, dev, ros2.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 # Libraries of several architectures side by side, also under /usr/local.
@@ -49,6 +49,13 @@ foreach(tool calibrate detect diff eval import map reference report simulate sug
 endforeach()
 install(DIRECTORY config/worlds DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/waymark-tools/examples COMPONENT tools)
 
+# ── the bridge to ROS 2, where it is built ───────────────────────────────────────────────────────────────────────────
+if(TARGET waymark-ros2)
+  install(TARGETS waymark-ros2 DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT ros2)
+  install(FILES config/waymark-ros2.service DESTINATION lib/systemd/system COMPONENT ros2)
+  wm_install_compressed(${WM_PACKAGE_DIR}/man/waymark-ros2.1 waymark-ros2.1 man/man1 ros2)
+endif()
+
 # ── for who writes programs ──────────────────────────────────────────────────────────────────────────────────────────
 # libwaymark.so: the runtime. libwaymark-messages: LCM messages, in C. libwaymark-estimator: the filters and our detectors.
 add_library(wm_public STATIC $<TARGET_OBJECTS:wm_msgs> $<TARGET_OBJECTS:wm_lcm_messages> $<TARGET_OBJECTS:wm_lcm_types>)
@@ -78,6 +85,9 @@ endforeach()
 set(packages runtime:waymark tools:waymark-tools dev:libwaymark-dev)
 if(TARGET wm_shared)
   list(APPEND packages library:libwaymark0)
+endif()
+if(TARGET waymark-ros2)
+  list(APPEND packages ros2:waymark-ros2)
 endif()
 foreach(pair ${packages})
   string(REPLACE ":" ";" pair ${pair})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Debian packages by CPack: waymark (the robot's), waymark-tools (the desk's), libwaymark0, libwaymark-dev. docs/boards.md.
+# Debian packages by CPack: waymark (the robot's), waymark-tools (the desk's), libwaymark0, libwaymark-dev, waymark-ros2. docs/boards.md.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME waymark)
 set(CPACK_PACKAGE_VENDOR Waymark)
@@ -8,6 +8,9 @@ set(CPACK_PACKAGE_CONTACT "Waymark maintainers <maintainers@waymark.example>" CA
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_NAME} built using CMake")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_COMPONENTS_ALL runtime tools dev)
+if(TARGET waymark-ros2)
+  list(APPEND CPACK_COMPONENTS_ALL ros2)
+endif()
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ
@@ -87,6 +90,16 @@ poses. The same poses, to the bit, as of the program waymark.")
   file(WRITE ${CMAKE_BINARY_DIR}/debian/shlibs "libwaymark 0 libwaymark0 (>= ${PROJECT_VERSION})\n")
   set(CPACK_DEBIAN_LIBRARY_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/triggers ${CMAKE_BINARY_DIR}/debian/shlibs)
 endif()
+
+set(CPACK_DEBIAN_ROS2_PACKAGE_NAME waymark-ros2)
+set(CPACK_DEBIAN_ROS2_PACKAGE_SECTION misc)
+set(CPACK_DEBIAN_ROS2_PACKAGE_DEPENDS "${base}, liblcm1 (>= 1.3.1), libddsc0debian (>= 0.10.2)")
+set(CPACK_DEBIAN_ROS2_DESCRIPTION "poses of a robot for ROS 2
+A bridge between the messages of a waymark run and ROS 2, by Cyclone DDS: /tf,
+/waymark/pose, /waymark/odom and /diagnostics; /initialpose, /odom, /imu/data
+and /fix for the run. It needs no ROS. The service is installed, not started.")
+set(CPACK_DEBIAN_ROS2_PACKAGE_CONTROL_EXTRA ${WM_PACKAGE_DIR}/ros2/postinst ${WM_PACKAGE_DIR}/ros2/prerm
+  ${WM_PACKAGE_DIR}/ros2/postrm)
 
 # /usr is the prefix; what is below /usr/etc for CMake is in /etc for Debian.
 set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_SOURCE_DIR}/cmake/etc_outside_usr.cmake)

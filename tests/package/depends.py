@@ -42,10 +42,11 @@ def main():
         return 77
     offences = 0
     page, camera = BUILD / "bin/waymark-web", BUILD / "lib/waymark/waymark-camera"
-    tools = sorted(p for p in (BUILD / "bin").glob("waymark-*") if "montecarlo" not in p.name and p != page)
-    library = BUILD / "lib/libwaymark.so.0"
-    for component, programs in (("RUNTIME", [BUILD / "bin/waymark", *(p for p in (page, camera) if p.exists())]), ("TOOLS", tools),
-                                *([("LIBRARY", [library])] if library.exists() else [])):
+    bridge, library = BUILD / "bin/waymark-ros2", BUILD / "lib/libwaymark.so.0"
+    tools = sorted(p for p in (BUILD / "bin").glob("waymark-*") if "montecarlo" not in p.name and p not in (page, bridge))
+    components = [("RUNTIME", [BUILD / "bin/waymark", *(p for p in (page, camera) if p.exists())]), ("TOOLS", tools)]
+    components += [(name, [program]) for name, program in (("ROS2", bridge), ("LIBRARY", library)) if program.exists()]
+    for component, programs in components:
         says, needs = declared(component), needed(programs)
         says.pop("waymark", None)
         for package, version in needs.items():

@@ -28,7 +28,7 @@ fi
 if command -v mandoc >/dev/null; then
   said=$(mandoc -T lint -W error toolchain/package/man/*.1) || fail "manual pages: $said"
 fi
-for script in toolchain/package/{postinst,prerm,postrm}; do
+for script in toolchain/package/{,ros2/}{postinst,prerm,postrm}; do
   sh -n "$script" || fail "$script"
 done
 exit $((failures > 0))

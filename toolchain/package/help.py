@@ -11,6 +11,7 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
 TOOLS = ["calibrate", "detect", "diff", "eval", "import", "map", "reference", "report", "simulate", "suggest", "web"]
+OPTIONAL = ["ros2"]  # not built everywhere: a manual page, no completion of its options
 PATHS = {"FILE", "FOLDER", "CONFIG", "RECORDING", "RUN", "REC", "OTHER", "LOG", "SCENARIO"}
 
 
@@ -119,7 +120,7 @@ def main_page(top, commands):
     service = ["The package's service is not switched on by being installed: first the configuration has to be the robot's.",
                ".Bd -literal -offset indent", "waymark check /etc/waymark/robot.yaml",
                "waymark doctor /etc/waymark/robot.yaml", r"systemctl enable \-\-now waymark", ".Ed"]
-    also = [", ".join(f".Xr waymark\\-{tool} 1" for tool in TOOLS).replace(", .Xr", " ,\n.Xr")]
+    also = [", ".join(f".Xr waymark\\-{tool} 1" for tool in sorted(TOOLS + OPTIONAL)).replace(", .Xr", " ,\n.Xr")]
     return page("waymark", "tells a robot where it is",
                 [("SYNOPSIS", [".Nm", ".Ar command", ".Op Ar options"]), ("DESCRIPTION", description), ("COMMANDS", parts),
                  ("SERVICE", service), ("FILES", files),
@@ -194,6 +195,9 @@ def files(bin_):
         for name, sub in below.items():
             options[tool, name] = list(sub.flags())
         options[(tool,)] = [*help_.flags(), *(flag for sub in below.values() for flag in sub.flags())]
+    for tool in OPTIONAL:
+        if (bin_ / f"waymark-{tool}").exists():
+            out[f"waymark-{tool}.1"] = tool_page(tool, ask(bin_ / f"waymark-{tool}"), {})
     return {**{f"man/{name}": text for name, text in out.items()},
             "completion/waymark.bash": bash(words, options), "completion/_waymark": zsh(words, options)}
 

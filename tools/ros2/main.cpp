@@ -105,7 +105,9 @@ int run(Options options) {
   (void)std::fflush(stdout);
   const auto begin = Clock::now();
   while (stop_asked == 0) {
-    if (lcm_handle_timeout(lcm.get(), 100) < 0) throw Failure("LCM: " + std::string(url) + " can't be read any more");
+    // A signal interrupts it, too.
+    if (lcm_handle_timeout(lcm.get(), 100) < 0 && stop_asked == 0)
+      throw Failure("LCM: " + std::string(url) + " can't be read any more");
     bridge.look();
     if (options.duration_s > 0 && std::chrono::duration<double>(Clock::now() - begin).count() > options.duration_s)
       break;
