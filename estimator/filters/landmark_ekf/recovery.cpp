@@ -24,7 +24,8 @@ constexpr double kVague_rad = 0.5, kVaguePlace = 0.5, kVagueFor_s = 5.0;
 // Largest sigma of a found place: where only bearings find it, and the least limit by accurate ranges. Not swept; 0.3 m
 // with bearings loses crossing-laps.
 constexpr double kFoundByBearings_m = 1.0, kFoundLeast_m = 0.3;
-constexpr double kLeastDepth = 0.1;  // floor of the cosine between a depth's axis and the bearing
+constexpr double kLeastDepth = 0.1;      // floor of the cosine between a depth's axis and the bearing
+constexpr double kLeastOnFloor_m = 0.1;  // floor of a horizontal range; bearings of nearer landmarks are not usable
 
 }  // namespace
 
@@ -70,16 +71,24 @@ observation landmark_ekf::observation_of(const sighting_context &at, wm_time_ns 
   }
   const double along =
       at.reading.range && sensor.range_is_depth && !std::isnan(s.bearing_rad) ? cos(s.bearing_rad) : 1.0;
-  seen.range_m = (s.range_m - errors[kRangeBias]) / errors[kRangeScale] / (along > kLeastDepth ? along : kLeastDepth);
+  const double slant_m =
+      (s.range_m - errors[kRangeBias]) / errors[kRangeScale] / (along > kLeastDepth ? along : kLeastDepth);
+  // The search is planar: the range on the floor, by the landmark's height over the sensor.
+  const double height_m = finite(target.p_m[2]) ? target.p_m[2] - sensor.z_m : 0.0;
+  const double left_m2 = square(slant_m) - square(height_m), least_m2 = square(kLeastOnFloor_m);
+  const double floor_m = std::sqrt(left_m2 > least_m2 ? left_m2 : least_m2);
+  seen.range_m = height_m == 0.0 ? slant_m : floor_m;
   seen.sigma_angle_rad =
       std::sqrt(square(at.reading.bearing_sigma_rad) +
                 square(correlated_bearing(sightings(), at.reading.bearing_sigma_rad)) + square(scale_sigma * kHalfPi));
   seen.sigma_place_m = std::sqrt(square(map_sigma(at.landmark)) + square(sigma[WM_SENSOR_ROW_kMountX]) +
                                  square(tilt_sigma * (target.p_m[2] - sensor.z_m)));
-  seen.sigma_length_m =
-      std::sqrt(square(at.reading.range_sigma_m) + square(correlated_range(sightings(), at.reading.range_sigma_m)) +
-                square(map_sigma(at.landmark)) +
-                square((sightings().range_sigma_rel + sightings().correlated_range_rel) * seen.range_m));
+  const double by_slant = height_m == 0.0 ? 1.0 : slant_m / floor_m;  // derivative of the range on the floor
+  seen.sigma_length_m = std::sqrt(
+      square(by_slant) *
+          (square(at.reading.range_sigma_m) + square(correlated_range(sightings(), at.reading.range_sigma_m)) +
+           square((sightings().range_sigma_rel + sightings().correlated_range_rel) * slant_m)) +
+      square(map_sigma(at.landmark)));
   return seen;
 }
 

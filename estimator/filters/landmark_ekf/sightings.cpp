@@ -39,6 +39,12 @@ curvature curvature_of(const expected_sighting &e, double xx, double xy, double 
           0.5 * (square(by_along) + square(by_across))};
 }
 
+// From a sensor's axes to levelled axes along its yaw.
+void to_level(const mounted_sensor &sensor, const double p_m[3], double level_m[3]) {
+  for (int i = 0; i < 3; i++)
+    level_m[i] = sensor.axis[0][i] * p_m[0] + sensor.axis[1][i] * p_m[1] + sensor.axis[2][i] * p_m[2];
+}
+
 double at_least(double value, double floor) { return value > floor ? value : floor; }
 
 }  // namespace
@@ -56,13 +62,18 @@ double landmark_ekf::map_sigma(int landmark) const {
   return at_least(setup_->landmarks[landmark].sigma_m, sightings().map_sigma_min_m);
 }
 
-// A marker whose place is known is a landmark: its place in the sensor's frame gives bearing and range. A second pose
-// that the corners fit is turned about the same place.
+// A marker whose place is known is a landmark: its place in the sensor's frame gives bearing and range, of a steep
+// sensor about the vertical. The range is along the line of sight where the map has the marker's height, else on the
+// floor, as expect() has it. A second pose that the corners fit is turned about the same place.
 wm_status landmark_ekf::fuse_marker(const wm_event &event, record_list records) {
   const wm_marker &m = event.as.marker;
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  const double range_m = std::sqrt(square(m.p_m[0]) + square(m.p_m[1]));
-  const wm_sighting s = {m.sensor, m.id, atan2(m.p_m[1], m.p_m[0]), range_m, kNone, m.along_sigma_m, kNone, kNone};
+  double v[3] = {m.p_m[0], m.p_m[1], m.p_m[2]};
+  if (m.sensor < setup_->sensor_count && sensor_[m.sensor].is_steep) to_level(sensor_[m.sensor], m.p_m, v);
+  const int landmark = index_.find(setup_->landmarks, m.id);
+  const bool has_height = landmark >= 0 && finite(setup_->landmarks[landmark].p_m[2]);
+  const double range_m = std::sqrt(square(v[0]) + square(v[1]) + (has_height ? square(v[2]) : 0.0));
+  const wm_sighting s = {m.sensor, m.id, atan2(v[1], v[0]), range_m, kNone, m.along_sigma_m, kNone, kNone};
   return fuse_sighting(event, s, records);
 }
 
