@@ -20,7 +20,18 @@ constexpr double kNisMost = 6.6, kMost = 3.0;
 constexpr double kLeastVariance = 1e-9;  // of a row's information on the factors; less is not used
 constexpr int kNewtonSteps = 4;
 
+// As list() names the factors.
+const char *const kNames[noise_adaption::kFactors] = {"noise.way_factor", "noise.turn_factor", "noise.bearing_factor",
+                                                      "noise.range_factor", "noise.place_factor"};
+
 }  // namespace
+
+bool noise_adaption::is_at_limit(const wm_calibration_value &v) {
+  if (v.value <= 0.99 * kMostFactor) return false;
+  for (const char *name : kNames)
+    if (std::strcmp(v.name, name) == 0) return true;
+  return false;
+}
 
 void noise_adaption::init(double log_sigma) {
   std::memset(static_cast<void *>(this), 0, sizeof *this);
@@ -46,8 +57,6 @@ void noise_adaption::restart(bool and_factors) {
 }
 
 void noise_adaption::list(calibration_list *out) const {
-  static const char *const kNames[kFactors] = {"noise.way_factor", "noise.turn_factor", "noise.bearing_factor",
-                                               "noise.range_factor", "noise.place_factor"};
   for (int k = 0; k < kFactors && is_on(); k++)
     if (is_used(k)) out->add(kNames[k], scale(k), scale(k) * std::sqrt(covariance_[k][k]));
 }

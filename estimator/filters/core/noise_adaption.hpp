@@ -23,9 +23,7 @@ class noise_adaption {
   static constexpr int kPose = 3, kBlock = 5;  // x, y, heading; a position's time-correlated error on each axis
   static constexpr double kMostFactor = 16.0;  // of a variance: sigmas stated four times too small
   // Whether a value of list() is a factor at its limit, which is forgotten by 1 % in 4 s.
-  static bool is_at_limit(const wm_calibration_value &v) {
-    return std::strncmp(v.name, "noise.", 6) == 0 && v.value > 0.99 * kMostFactor;
-  }
+  static bool is_at_limit(const wm_calibration_value &v);
 
   // A row of an innovation. `by`: derivatives by the block's states. `gain`: their rows of the Kalman gain that the
   // update applies. `variance`: of the innovation; `own`: the share of it that `kind` scales.
