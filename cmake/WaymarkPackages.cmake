@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# Debian packages by CPack: waymark (the robot's), waymark-tools (the desk's), libwaymark0, libwaymark-dev, waymark-ros2. docs/boards.md.
+# Debian packages by CPack: waymark (the robot's), waymark-tools (the desk's), waymark-fleet, libwaymark0, libwaymark-dev, waymark-ros2. docs/boards.md.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME waymark)
 set(CPACK_PACKAGE_VENDOR Waymark)
@@ -7,7 +7,7 @@ set(CPACK_PACKAGE_CONTACT "Waymark maintainers <maintainers@waymark.example>" CA
 # CPack 3.25 puts one summary before each package's own description, unless it is this one.
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${PROJECT_NAME} built using CMake")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
-set(CPACK_COMPONENTS_ALL runtime tools dev)
+set(CPACK_COMPONENTS_ALL runtime tools fleet dev)
 if(TARGET waymark-ros2)
   list(APPEND CPACK_COMPONENTS_ALL ros2)
 endif()
@@ -42,6 +42,11 @@ if(TARGET waymark-import)
   set(videos ", libavcodec59 (>= 7:5.1), libavformat59 (>= 7:5.1), libavutil57 (>= 7:5.1), libswscale6 (>= 7:5.1)")
 endif()
 
+set(urdf "")
+if(TINYXML2_LIBRARY AND TINYXML2_HEADER)
+  set(urdf ", libtinyxml2-9 (>= 9.0.0+dfsg)")
+endif()
+
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME waymark)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_SECTION misc)
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_DEPENDS "${base}, ${pictures}, liblcm1 (>= 1.3.1)${cameras}${page}")
@@ -62,10 +67,21 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_CONTROL_EXTRA ${CMAKE_BINARY_DIR}/debian/conffi
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME waymark-tools)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION misc)
-set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${simulator}${videos}")
+set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "waymark (= ${PROJECT_VERSION}-1), ${base}, ${pictures}${simulator}${videos}${urdf}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "desk tools for a robot that knows where it is
 Simulates drives, judges runs against truth, draws reports, calibrates
-cameras, makes maps: waymark eval, report, simulate, diff, calibrate, map.")
+cameras, makes maps, writes the configuration of a new robot: waymark eval,
+report, simulate, diff, calibrate, map, init.")
+
+set(CPACK_DEBIAN_FLEET_PACKAGE_NAME waymark-fleet)
+set(CPACK_DEBIAN_FLEET_PACKAGE_ARCHITECTURE all)
+set(CPACK_DEBIAN_FLEET_PACKAGE_SECTION misc)
+set(CPACK_DEBIAN_FLEET_PACKAGE_DEPENDS "waymark-tools (= ${PROJECT_VERSION}-1), python3 (>= 3.11), python3-yaml")
+set(CPACK_DEBIAN_FLEET_PACKAGE_SUGGESTS "snakemake")
+set(CPACK_DEBIAN_FLEET_DESCRIPTION "many drives of robots at once
+Replays and judges all recordings of a fleet on every core or on a cluster,
+compares what a change did to them, and lists what black boxes hold: waymark
+batch, compare, mine.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libwaymark-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)

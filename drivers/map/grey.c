@@ -121,6 +121,20 @@ wm_status wm_grey_decode(const void *data, size_t size, const char *path, wm_gre
   return status;
 }
 
+wm_status wm_grey_encode(const wm_grey *grey, const char *path, void **out, size_t *size, wm_error *err) {
+  png_image png = {
+      .version = PNG_IMAGE_VERSION, .width = grey->width_px, .height = grey->height_px, .format = PNG_FORMAT_GRAY};
+  png_alloc_size_t needed = PNG_IMAGE_PNG_SIZE_MAX(png);
+  *out = malloc(needed);
+  if (!*out || !png_image_write_to_memory(&png, *out, &needed, 0, grey->pixels, 0, NULL)) {
+    free(*out);
+    *out = NULL;
+    return wm_fail(err, WM_IO, "%s: can't be written as a PNG: %s", path, png.message);
+  }
+  *size = needed;
+  return WM_OK;
+}
+
 wm_status wm_grey_load(const char *path, wm_grey *out, wm_error *err) {
   char *bytes;
   size_t size;

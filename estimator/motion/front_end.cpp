@@ -367,6 +367,7 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.b = b;
   input.side_mps = side_mps;
   input.model = model_;
+  input.holonomic = drives_sideways();
   input.command = model_ == WM_MOTION_TWIST && commands_ != 0;
   if (input.command) begin_response(*params_, history_.empty() ? nullptr : &history_.newest(), &input);
   input.kind = kind();
@@ -414,8 +415,10 @@ void motion_front_end::note_samples(motion_input *input) {
   for (int k = 0; k < 2; k++) {
     if (!fresh[k]) continue;
     const double changed = k ? input->b - history_.newest().b : input->a - history_.newest().a;
+    const double aside = k || !input->holonomic ? 0.0 : input->side_mps - history_.newest().side_mps;
     if (sampled_ns_[k] != WM_TIME_NONE)
-      input->sampling[k] = static_cast<float>(square(changed * wm_seconds_between(sampled_ns_[k], input->t_ns)) / 12.0);
+      input->sampling[k] = static_cast<float>((square(changed) + square(aside)) *
+                                              square(wm_seconds_between(sampled_ns_[k], input->t_ns)) / 12.0);
     sampled_ns_[k] = input->t_ns;
   }
 }

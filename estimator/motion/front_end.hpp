@@ -63,8 +63,9 @@ class motion_front_end {
       add_refused_noise(segment, *params_, &noise);
       if (segment.input.command) add_change_noise(segment, *params_, &noise);
       if (segment.held_s == 0.0) add_sampling_noise(segment.input, &noise);
-      if (twist.u != 0.0 && (segment.input.model == WM_MOTION_TWIST || segment.input.model == WM_MOTION_SPEED_YAW_RATE))
-        turn_to_axes(twist, &noise);
+      const bool is_twist = segment.input.model == WM_MOTION_TWIST || segment.input.model == WM_MOTION_SPEED_YAW_RATE;
+      if (segment.input.side_mps != 0.0 && is_twist && !has_own_axes(segment.input)) turn_to_axes(twist, &noise);
+      add_center_noise(calibration, &noise);
       visit(segment, twist, noise);
     });
   }
@@ -127,6 +128,9 @@ class motion_front_end {
   void take_quantities(const wm_event &event);
   void take_twist(const wm_event &event);
   void take_twist_beside_gyro(wm_time_ns t_ns, const planar_twist &sample);
+  bool drives_sideways() const {
+    return params_->states.drive == WM_DRIVE_HOLONOMIC && (model_ == WM_MOTION_TWIST || speed_source_ == kOfTwist);
+  }
   void take_increment(const wm_event &event);
   wm_status check_increment(const wm_event &event) const;
   stated_noise stated_noise_now() const;

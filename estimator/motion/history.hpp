@@ -31,7 +31,8 @@ struct motion_input {
   float response[2];    // of commands: speed and turn rate of the drive at t_ns (commands.hpp)
   uint8_t beside_gyro;  // a twist whose turn rate stands in for a gyro's
   uint8_t uncounted;    // no count gives the distance until the next input's t_ns
-  uint8_t unused[2];
+  uint8_t holonomic;    // of a twist: the drive moves sideways
+  uint8_t unused;
   uint8_t model;     // wm_motion_model; AUTO: nothing known yet
   uint8_t standing;  // the robot is known to stand
   uint8_t doubtful;  // of a frozen counter, a dead encoder

@@ -7,17 +7,24 @@ namespace wm {
 namespace {
 
 constexpr uint32_t bit(int index) { return UINT32_C(1) << index; }
-constexpr uint32_t kRates = bit(kSpeedScale) | bit(kYawRateScale) | bit(kYawRateBias);
+constexpr uint32_t kRates = bit(kSpeedScale) | bit(kYawRateScale) | bit(kYawRateBias) | bit(kRotationCenter);
+constexpr uint32_t kTwistRates = kRates | bit(kSideScale);
+
+// Effective track over the distance of the wheels of skid steer [Mandow2007]: above 1, as wheels slip in turns. A prior
+// for wheels and tracks on hard and soft floors. Not swept.
+constexpr double kSkidTrack = 1.5, kSkidTrackSigma = 0.25;
+// A twist of such a base is by an effective track already, but of another floor.
+constexpr double kSkidRateSigma = 0.2;
 
 // The terms that have an effect, by motion_kind. A twist's wheel scales would only repeat its speed's and rate's.
 constexpr uint32_t kTerms[] = {
     0,
-    bit(kLeftScale) | bit(kRightScale) | bit(kTrackScale),
-    kRates | bit(kTrackScale),  // the track: of the wheels' difference as a second source of the heading
+    bit(kLeftScale) | bit(kRightScale) | bit(kTrackScale) | bit(kRotationCenter),
+    kTwistRates | bit(kTrackScale),  // the track: of the wheels' difference as a second source of the heading
     bit(kSpeedScale) | bit(kSteeringOffset),
-    kRates,
-    kRates,
-    kRates | bit(kLag) | bit(kTurnSlowdown) | bit(kSpeedOnset) | bit(kTurnOnset) | bit(kGentleTurns),
+    kTwistRates,
+    kTwistRates,
+    kTwistRates | bit(kLag) | bit(kTurnSlowdown) | bit(kSpeedOnset) | bit(kTurnOnset) | bit(kGentleTurns),
     0,
 };
 
@@ -48,7 +55,23 @@ bool is_state(double sigma, int term, motion_kind kind) {
   return sigma > 0.0 || (sigma < 0.0 && (kTerms[kind] & bit(term)));
 }
 
-bool may_be_state(double sigma, int term, int model) {
+double start_sigma(const wm_motion_states &states, int term) {
+  const double sigma = states.sigma[term];
+  const bool skids = sigma < 0.0 && states.drive == WM_DRIVE_SKID_STEER;
+  if (skids && term == kTrackScale) return kSkidTrackSigma;
+  if (skids && term == kYawRateScale) return kSkidRateSigma;
+  return sigma < 0.0 ? -sigma : sigma;
+}
+
+double start_value(const wm_motion_states &states, int term) {
+  const bool skids = states.sigma[term] < 0.0 && term == kTrackScale && states.drive == WM_DRIVE_SKID_STEER;
+  return skids ? kSkidTrack : kNeutralCalibration.value[term];
+}
+
+bool may_be_state(const wm_motion_states &states, int term, int model) {
+  const double sigma = states.sigma[term];
+  if (sigma < 0.0 && term == kSideScale && states.drive != WM_DRIVE_HOLONOMIC) return false;
+  if (sigma < 0.0 && term == kRotationCenter && states.drive != WM_DRIVE_SKID_STEER) return false;
   static constexpr motion_kind kMost[] = {kKindUnknown,  kKindTicks,    kKindGyro,   kKindSteering,
                                           kKindCommands, kKindMeasured, kKindUnknown};
   return model == WM_MOTION_AUTO ? sigma != 0.0 : is_state(sigma, term, kMost[model]);

@@ -19,13 +19,14 @@ enum motion_kind : uint8_t {
   kKindCalibrated  // increments with covariances: who states these has calibrated the source
 };
 
-// The sigma at the start of a state whose parameter is below 0: its size.
-inline double start_sigma(double parameter) { return parameter < 0.0 ? -parameter : parameter; }
+// Sigma and value of a term's state at the start, by its parameter and the drive.
+double start_sigma(const wm_motion_states &states, int term);
+double start_value(const wm_motion_states &states, int term);
 
 // Whether a term of the calibration is a state: always, where its sigma is above 0; by the kind, where it is below.
 bool is_state(double sigma, int term, motion_kind kind);
-// Whether it may become one with this model (wm_motion_model).
-bool may_be_state(double sigma, int term, int model);
+// Whether it may become one with this model (wm_motion_model) and this drive.
+bool may_be_state(const wm_motion_states &states, int term, int model);
 
 // Relative noise of the speed, and noise of the turn rate; parameters below 0 by the kind.
 struct rate_noise {

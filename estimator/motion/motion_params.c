@@ -9,6 +9,8 @@ static const char *const kModels[] = {"auto",  "ticks",      "speed_yaw_rate",  
                                       "twist", "increments", "constant_velocity", NULL};
 static const char *const kTwists[] = {"auto", "measured", "commands", NULL};
 
+static const char *const kDrives[] = {"rolling", "holonomic", "skid_steer", NULL};
+
 // A calibration state of the motion sensors: the sigma at its start, and its random walk.
 #define STATE(term, name, unit, initial, walk_initial, about)                   \
   F64("states." name "_sigma" unit, states.sigma[term], initial, -1, 1, about), \
@@ -23,6 +25,12 @@ static const wm_param kParams[] = {
     ENUM("twist", twist, WM_TWIST_AUTO, WM_TWIST_COMMANDS, kTwists,
          "Whether the rows of motion.csv are commands or measured. auto: commands, where rows "
          "repeat the one before."),
+    ENUM("drive", states.drive, WM_DRIVE_ROLLING, WM_DRIVE_SKID_STEER, kDrives,
+         "What the base can do. rolling: wheels that roll forwards; a measured sideways speed is used with the noise "
+         "of the "
+         "speed. holonomic: it drives sideways, too (mecanum, swerve, legs), with a scale and noise of its own for "
+         "that. "
+         "skid_steer: wheels or tracks that slip in turns; its centre of rotation and its effective track are states."),
     F64("noise.speed_mps", noise_speed_mps, 0.02, 0, 10,
         "White noise of the speed, m/s per sqrt(s): slip and play at walking pace."),
     F64("noise.speed_rel", noise_speed_rel, -1, -1, 2,
@@ -38,6 +46,12 @@ static const wm_param kParams[] = {
         "White noise of the turn rate in rad/s per m/s of speed, per sqrt(s): castors, ruts, a wheel that slips."),
     F64("noise.side_rel", noise_side_rel, 0.01, 0, 2,
         "White noise of the sideways speed relative to the speed, per sqrt(s): lateral slip."),
+    F64("noise.sideways_mps", noise_sideways_mps, 0.02, 0, 10,
+        "White noise of the sideways speed of a holonomic drive, m/s per sqrt(s), as speed_mps."),
+    // Twice that of the speed forwards: on rollers a part of the wheels' grip is lost, and the share changes with load
+    // and floor.
+    F64("noise.sideways_rel", noise_sideways_rel, 0.06, 0, 2,
+        "White noise of the sideways speed of a holonomic drive relative to it, per sqrt(s)."),
     F64("noise.rest_factor", noise_rest_factor, 0.22, 0, 1,
         "Factor of the constant noises while speed and turn rate are zero: a robot at rest stays."),
     F64("noise.ticks_per_sqrt_m", noise_ticks_per_sqrt_m, 0.005, 0, 1,
@@ -101,7 +115,8 @@ static const wm_param kParams[] = {
     // 0.98 with 0.03, 0.04 and 0.05; landmark_ekf is flat from 0.03 to 0.1.
     STATE(WM_YAW_RATE_SCALE, "yaw_rate_scale", "", -0.04, 0,
           "Start sigma of the turn rate's scale about 1." BY_KIND
-          "where the turn rate is measured or commanded; a gyro's at most 0.015."),
+          "where the turn rate is measured or commanded; a gyro's at most 0.015; a twist's with motion.drive "
+          "skid_steer 0.2."),
     STATE(WM_YAW_RATE_BIAS, "yaw_rate_bias", "_radps", -0.02, 0.0001,
           "Start sigma of the turn rate's bias, rad/s (a cheap gyro: 0.02)." BY_KIND
           "where the turn rate is measured or commanded."),
@@ -111,7 +126,7 @@ static const wm_param kParams[] = {
           "Start sigma of the right wheel's scale about 1, for ticks." BY_KIND "where ticks drive."),
     STATE(WM_TRACK_SCALE, "track_scale", "", -0.02, 0,
           "Start sigma of the track's scale about 1, for ticks." BY_KIND
-          "where ticks drive, or are a second source of the heading."),
+          "where ticks drive, or are a second source of the heading; with motion.drive skid_steer 0.25 about 1.5."),
     STATE(WM_STEERING_OFFSET, "steering_offset", "_rad", -0.02, 0,
           "Start sigma of the road wheel's zero, rad, for speed and steering." BY_KIND "where steering drives."),
     STATE(WM_LAG, "lag", "_s", -0.2, 0,
@@ -131,6 +146,14 @@ static const wm_param kParams[] = {
           "Start sigma of the share by which turns gentler than a radius of 2 m are driven with that radius, as drives "
           "by speed and radius do (iRobot Create). Only with commands.radius_max_m 0." BY_KIND
           "where twists are commands."),
+    STATE(WM_SIDE_SCALE, "side_scale", "", -0.05, 0,
+          "Start sigma of the scale of the sideways speed about 1, besides the speed's (rollers slip)." BY_KIND
+          "where a holonomic drive measures or obeys a sideways speed."),
+    // Half of the wheelbase of a small robot: where the load lies is not known [Mandow2007].
+    STATE(
+        WM_ROTATION_CENTER, "rotation_center", "_m", -0.15, 0.0005,
+        "Start sigma of the centre of rotation's place ahead of base_link, m: a turn moves base_link sideways." BY_KIND
+        "with motion.drive skid_steer."),
     F64("states.wheel_difference_sigma", states.wheel_difference_sigma, 0.0141, 0, 1,
         "With speed by ticks and the heading by a yaw rate: start sigma of the relative difference of the wheels' "
         "radii. The ticks then measure the heading, too, which bounds the random walk of the gyro's noise. 0: off. Two "

@@ -34,12 +34,18 @@ motion_twist from_wheels(double left, double right, const wm_motion_calibration 
   return t;
 }
 
+// v = s_v v_m, u = s_v s_u u_m with their derivatives; `w_by`: of the turn rate by the speed's scale.
+void add_scales(double speed, double side, double w_by, const wm_motion_calibration &c, motion_twist *t) {
+  t->v = c.value[kSpeedScale] * speed;
+  t->u = c.value[kSpeedScale] * c.value[kSideScale] * side;
+  t->add(kSpeedScale, speed, w_by, c.value[kSideScale] * side);
+  if (side != 0.0) t->add(kSideScale, 0.0, 0.0, c.value[kSpeedScale] * side);
+}
+
 motion_twist from_speed_and_rate(double speed, double side, double rate, const wm_motion_calibration &c) {
   motion_twist t{};
-  t.v = c.value[kSpeedScale] * speed;
-  t.u = c.value[kSpeedScale] * side;
   t.w = c.value[kYawRateScale] * (rate - c.value[kYawRateBias]);
-  t.add(kSpeedScale, speed, 0.0, side);
+  add_scales(speed, side, 0.0, c, &t);
   t.add(kYawRateScale, 0.0, rate - c.value[kYawRateBias]);
   t.add(kYawRateBias, 0.0, -c.value[kYawRateScale]);
   return t;
@@ -48,10 +54,8 @@ motion_twist from_speed_and_rate(double speed, double side, double rate, const w
 // A twist while the gyro is silent: the states of the turn rate are the gyro's, and this rate is the wheels'.
 motion_twist without_gyro(const motion_input &input, const wm_motion_calibration &c) {
   motion_twist t{};
-  t.v = c.value[kSpeedScale] * input.a;
-  t.u = c.value[kSpeedScale] * input.side_mps;
   t.w = input.b;
-  t.add(kSpeedScale, input.a, 0.0, input.side_mps);
+  add_scales(input.a, input.side_mps, 0.0, c, &t);
   return t;
 }
 
@@ -88,18 +92,28 @@ motion_twist twist_of_sample(double speed, double side, double rate, const wm_mo
     t.v_by[i] *= c.value[kSpeedScale];
     t.w_by[i] *= c.value[kYawRateScale];
   }
-  t.v = c.value[kSpeedScale] * v;
-  t.u = c.value[kSpeedScale] * side;
   t.w = c.value[kYawRateScale] * (w - c.value[kYawRateBias]);
-  t.add(kSpeedScale, v, 0.0, side);
+  add_scales(v, side, 0.0, c, &t);
   t.add(kYawRateScale, 0.0, w - c.value[kYawRateBias]);
   t.add(kYawRateBias, 0.0, -c.value[kYawRateScale]);
   return t;
 }
 
-motion_twist twist_of(const motion_input &input, const wm_motion_calibration &c, const wm_wheels &wheels,
-                      const drive_terms &drive) {
-  if (input.standing || input.stale) return motion_twist{};
+namespace {
+
+// u = -x w [Mandow2007]: skid steer turns about a centre that is x ahead of base_link.
+motion_twist about_center(motion_twist t, const wm_motion_calibration &c) {
+  const double x = c.value[kRotationCenter];
+  if (x != 0.0) {
+    for (int i = 0; i < t.count; i++) t.u_by[i] -= x * t.w_by[i];
+    t.u -= x * t.w;
+  }
+  if (t.w != 0.0) t.add(kRotationCenter, 0.0, 0.0, -t.w);
+  return t;
+}
+
+motion_twist twist_of_moving(const motion_input &input, const wm_motion_calibration &c, const wm_wheels &wheels,
+                             const drive_terms &drive) {
   switch (input.model) {
     case WM_MOTION_TICKS: return from_wheels(input.a, input.b, c, wheels.track_m);
     case WM_MOTION_SPEED_YAW_RATE: return from_speed_and_rate(input.a, input.side_mps, input.b, c);
@@ -112,6 +126,14 @@ motion_twist twist_of(const motion_input &input, const wm_motion_calibration &c,
       return twist_of_sample(input.a, input.side_mps, input.b, c, std::numeric_limits<double>::quiet_NaN());
     default: return motion_twist{};
   }
+}
+
+}  // namespace
+
+motion_twist twist_of(const motion_input &input, const wm_motion_calibration &c, const wm_wheels &wheels,
+                      const drive_terms &drive) {
+  if (input.standing || input.stale) return motion_twist{};
+  return about_center(twist_of_moving(input, c, wheels, drive), c);
 }
 
 namespace {
@@ -162,6 +184,13 @@ motion_noise noise_of_rates(const motion_input &input, const motion_twist &twist
   n.rotation_rad2 =
       (rate2 * rate_factor + square(white.yaw_rate_rel * twist.w) + square(p.noise_yaw_rate_per_mps * speed)) * dt_s;
   if (states) n.lateral_m2 = stated.lateral_m2 * speed_factor * dt_s;
+  if (has_own_axes(input)) {
+    const double side2 = states ? stated.lateral_m2 : square(p.noise_sideways_mps);
+    n.distance_m2 =
+        (speed2 * speed_factor + square(white.speed_rel * twist.v) + square(p.noise_side_rel * twist.u)) * dt_s;
+    n.lateral_m2 =
+        (side2 * speed_factor + square(p.noise_sideways_rel * twist.u) + square(p.noise_side_rel * twist.v)) * dt_s;
+  }
   if (input.model != WM_MOTION_ACKERMANN || unknown) return n;
   const double tangent = std::fabs(twist.v) > 1e-9 ? twist.w * wheels.wheelbase_m / twist.v : 0.0;
   const double curvature = tangent / wheels.wheelbase_m;
@@ -215,7 +244,7 @@ motion_noise noise_of(const motion_input &input, const motion_twist &twist, doub
                        ? noise_of_ticks(input, dt_s, p, wheels, c)
                        : noise_of_rates(input, twist, dt_s, p, wheels, stated, unknown);
   // Sideways, by the speed; by the distance where a count's stamp is nanoseconds behind another event's.
-  const double speed_mps = speed_of(twist);
+  const double speed_mps = has_own_axes(input) ? 0.0 : speed_of(twist);
   n.lateral_m2 += speed_mps > kCatchUp_mps ? square(p.noise_side_rel) * kCatchUp_mps * speed_mps * dt_s
                                            : square(p.noise_side_rel * speed_mps) * dt_s;
   if (unknown)
@@ -257,7 +286,9 @@ void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p,
   // Variances that add up to the square of the whole, however the time is cut.
   const double held_from_s = least(from_s, p.hold_max_s), held_to_s = least(to_s, p.hold_max_s);
   const double grown_s4 = square(square(held_to_s)) - square(square(held_from_s));
-  if (!is_counted) noise->distance_m2 += square(0.5 * p.noise_hold_mps2) * grown_s4;
+  const double held_m2 = square(0.5 * p.noise_hold_mps2) * grown_s4;
+  if (!is_counted) noise->distance_m2 += held_m2;
+  if (has_own_axes(segment.input)) noise->lateral_m2 += held_m2;
   if (is_counted && segment.input.model == WM_MOTION_TICKS) return;
   const double rotation_rad2 = square(0.5 * p.noise_hold_radps2) * grown_s4 +
                                square(kUnknownRate_radps) * (to_s - from_s - (held_to_s - held_from_s));
@@ -272,6 +303,15 @@ void add_overdue_noise(const motion_segment &segment, const wm_motion_params &p,
 void add_sampling_noise(const motion_input &input, motion_noise *noise) {
   noise->distance_m2 += static_cast<double>(input.sampling[0]);
   noise->rotation_rad2 += static_cast<double>(input.sampling[1]);
+  if (has_own_axes(input)) noise->lateral_m2 += static_cast<double>(input.sampling[0]);
+}
+
+void add_center_noise(const wm_motion_calibration &calibration, motion_noise *noise) {
+  const double x = calibration.value[kRotationCenter];
+  if (x == 0.0) return;
+  noise->lateral_m2 += x * x * noise->rotation_rad2 - 2.0 * x * noise->lateral_rotation;
+  noise->distance_lateral -= x * noise->distance_rotation;
+  noise->lateral_rotation -= x * noise->rotation_rad2;
 }
 
 void add_refused_noise(const motion_segment &segment, const wm_motion_params &p, motion_noise *noise) {

@@ -24,6 +24,8 @@ enum calibration_index {
   kSpeedOnset = WM_SPEED_ONSET,
   kTurnOnset = WM_TURN_ONSET,
   kGentleTurns = WM_GENTLE_TURNS,
+  kSideScale = WM_SIDE_SCALE,
+  kRotationCenter = WM_ROTATION_CENTER,
   kCalibrationCount = WM_MOTION_TERMS
 };
 
@@ -35,14 +37,14 @@ inline constexpr int kMotionStates = kVelocityX + kVelocityStates;
 constexpr int count_velocity_states(int model) { return model == WM_MOTION_CONSTANT_VELOCITY ? kVelocityStates : 0; }
 
 inline constexpr wm_motion_calibration kNeutralCalibration = {
-    {1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}};
+    {1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0}};
 
 inline double speed_of(const planar_twist &t) { return t.u == 0.0 ? std::fabs(t.v) : std::sqrt(t.v * t.v + t.u * t.u); }
 
 // The twist and its derivatives by the calibration; only the first `count` entries of `index`, `v_by`, `u_by`, `w_by`
 // are set. The lag is not among them: it moves the ends of the interval.
 struct motion_twist : planar_twist {
-  static constexpr int kMax = 11;  // capacity; a model has fewer terms
+  static constexpr int kMax = 13;  // capacity; a model has fewer terms
   int count;
   int index[kMax];
   double v_by[kMax], u_by[kMax], w_by[kMax];
@@ -80,10 +82,16 @@ struct stated_noise {
   double distance_m2, lateral_m2, rotation_rad2;
 };
 
-// Distance and sideways are along and across the way until turn_to_axes().
+// Distance and sideways are along and across the way until turn_to_axes(), but on base_link's axes where
+// has_own_axes().
 motion_noise noise_of(const motion_input &input, const motion_twist &twist, double dt_s, const wm_motion_params &params,
                       const wm_wheels &wheels, const wm_motion_calibration &calibration, const stated_noise &stated,
                       const noise_factors &factors);
+
+// Whether forwards and sideways have noises of their own: a holonomic drive's measured twist.
+inline bool has_own_axes(const motion_input &input) {
+  return input.holonomic && !(input.stale || input.doubtful || input.refused);
+}
 
 // From along and across the way to base_link's axes, for a robot that moves sideways.
 void turn_to_axes(const planar_twist &twist, motion_noise *noise);
@@ -94,6 +102,9 @@ void turn_to_axes(const planar_twist &twist, motion_noise *noise);
 // has at the beginning. Where observations have corrected it the unknown motion begins at them, not at the silence.
 void add_overdue_noise(const motion_segment &segment, const wm_motion_params &params, bool is_counted,
                        double position_m2, motion_noise *noise);
+
+// The noise of a turn about a centre that is ahead of base_link or behind: a part of the rotation's is sideways, too.
+void add_center_noise(const wm_motion_calibration &calibration, motion_noise *noise);
 
 // A sampled speed or turn rate holds until the next sample. A change by c between two samples, dt apart, happened at
 // any time between them: the distance or angle is evenly distributed over c dt, variance (c dt)^2 / 12. Its mean, c dt

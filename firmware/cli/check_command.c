@@ -35,7 +35,8 @@ static const char kHelp[] =
     "  --map FILE          a map.yaml instead of the recording's\n"
     "  --json              the findings, for programs\n"
     "  --quick             without the trials of the usual mistakes\n"
-    "  --apply FOLDER      a corrected copy of the recording, if the trials find a cause; the original stays\n"
+    "  --apply FOLDER      a corrected copy of the recording, and of the configuration where that has the mistake,\n"
+    "                      if the trials find a cause; the originals stay\n"
     "\n"
     "example:\n"
     "  waymark check config/starry-night-plan.yaml RECORDING\n"
@@ -116,7 +117,7 @@ typedef struct checked {
   const char *dir;
   int is_quick;          // without trials
   const char *apply_to;  // folder of a corrected copy; NULL: none
-  wm_time_ns begin_ns;
+  clock_t begin;
   source_data sources;
   source_seen seen[WM_SOURCES_MAX];
   given_ids ids;
@@ -171,17 +172,24 @@ static uint64_t messages_due(const wm_config *config, const wm_run_report *repor
   return (uint64_t)(report->recorded_s * config->runtime.publish_rate_hz);
 }
 
-// Writes the corrected copy and says where.
+// Writes the corrected copy and prints its path.
 static void apply(checked *self, const trials_plan *plan, const suspect *of, size_t count) {
   file_edit edits[TRIAL_EDITS_MAX];
   wm_error err = {0};
   changed_copy copy = {.dir = self->dir};
+  char config[WM_PATH_MAX];
   const size_t edit_count = trials_edits(plan, of, count, edits);
   (void)snprintf(copy.out, sizeof copy.out, "%s", self->apply_to);
-  if (changed_copy_make(&copy, &plan->config->overrides, edits, edit_count, "waymark check --apply", &err) != WM_OK)
+  wm_status status =
+      changed_copy_make(&copy, &plan->config->overrides, edits, edit_count, "waymark check --apply", &err);
+  if (status == WM_OK)
+    status = changed_copy_config(&copy, plan->config, edits, edit_count, "waymark check --apply", config, &err);
+  if (status != WM_OK) {
     wm_find_error(self->found, "apply", &err);
-  else
-    fact("applied      %s: the recording with %zu changes; all other files are links\n", self->apply_to, edit_count);
+    return;
+  }
+  fact("applied      %s: the recording with %zu changes; all other files are links\n", self->apply_to, edit_count);
+  if (config[0]) fact("applied      %s: the configuration for it\n", config);
 }
 
 // The usual mistakes, one after the other, undone: which of them explains the observations?
@@ -191,7 +199,7 @@ static void try_suspects(checked *self, const wm_assembly *assembly, double reco
   static id_table table;
   suspect found[TRIALS_FOUND_MAX + 1];
   trial_result before, after;
-  const double drive_s = wm_seconds_between(self->begin_ns, wm_monotonic_ns());
+  const double drive_s = (double)(clock() - self->begin) / CLOCKS_PER_SEC;
   progress_line progress;
   progress_begin(&progress);
   suspect_files_read(&files, assembly->config, self->dir);
@@ -273,7 +281,7 @@ static void check_recording(const wm_config *config, const char *dir, int is_qui
   self.dir = dir;
   self.is_quick = is_quick;
   self.apply_to = apply_to;
-  self.begin_ns = wm_monotonic_ns();
+  self.begin = clock();
   wm_status status = wm_recording_open(dir, &config->overrides, take_note, found, &self.recording, &err);
   if (status != WM_OK) {
     wm_find_error(found, "recording", &err);
@@ -383,7 +391,7 @@ int command_check(int argc, char *const *argv) {
   check_config(&config, &found);
   if (count > 1)
     check_recording(&config, words[1], is_quick, apply_to, &found);
-  else if (config.devices.can_count + config.devices.lcm_count + config.devices.camera_count > 0)
+  else if (wm_devices_count(&config.devices) > 0)
     check_devices(&config, &found);
   wm_config_free(&config);
   return tell(&found);

@@ -8,11 +8,14 @@
 #include "cli/options.h"
 #include "live/lcm_connect.h"
 
+#define RECEIVER_S 3.0  // GNSS receivers report once a second or more often
+
 static const char kHelp[] =
     "usage: waymark doctor [CONFIG] [options]\n"
     "\n"
     "Finds what is wrong with this computer, and how to mend it: kernel, real-time rights, clocks, governors,\n"
-    "temperature, LCM's way; with a configuration also its CAN interfaces and cameras. Measures for 5 s how late a\n"
+    "temperature, LCM's way; with a configuration also its CAN interfaces, cameras,\n"
+    "IMU and GNSS receiver. Measures for 5 s how late a\n"
     "thread wakes. Changes nothing. Exit code 1 where something is bad.\n"
     "\n"
     "  --json       for programs\n"
@@ -44,6 +47,8 @@ static int look(const wm_config *config, double seconds, int as_json) {
   if (config && config->devices.can_count > 0 && granted > 0) doctor_can_queue(wanted, granted, &found);
   doctor_interrupts("", config, sysconf(_SC_NPROCESSORS_ONLN), &found);
   doctor_cameras(config, &found);
+  doctor_imu("", config, &found);
+  doctor_gnss(config, RECEIVER_S, &found);
   doctor_latency(seconds, priority, &wake_ns, &is_realtime);
   doctor_judge_latency(&wake_ns, is_realtime, &found);
   if (as_json) {

@@ -35,12 +35,16 @@ static const char kHelpEnd[] =
 static const struct {
   const char *name, *about, *package;
 } kDesk[] = {
+    {"batch", "replay and judge many recordings on all cores", "waymark-fleet"},
     {"calibrate", "find a camera's lens and mounting; read calibrations of other programs", "waymark-tools"},
+    {"compare", "what a change did to all drives of a batch", "waymark-fleet"},
     {"detect", "run a detector on pictures: what it finds, drawn and as a table", "waymark-tools"},
     {"diff", "compare two runs: what changed, and where it began", "waymark-tools"},
     {"eval", "measure a run against truth, GNSS or labels", "waymark-tools"},
     {"import", "make a video of any kind part of a recording", "waymark-tools"},
+    {"init", "make the configuration of a new robot from what it has", "waymark-tools"},
     {"map", "make, check and survey maps; print markers", "waymark-tools"},
+    {"mine", "what black boxes hold, by place and by cause", "waymark-fleet"},
     {"reference", "smooth a run into a reference trajectory", "waymark-tools"},
     {"report", "show a run as one page", "waymark-tools"},
     {"ros2", "give a run's poses to ROS 2, and its data to the run", "waymark-ros2"},

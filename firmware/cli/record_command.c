@@ -11,9 +11,10 @@
 static const char kHelp[] =
     "usage: waymark record --config FILE --out RECORDING [options]\n"
     "\n"
-    "Writes the data of the robot's devices into a recording: all CAN frames, streams over LCM, cameras' pictures\n"
-    "(MJPEG as it is, others as uncompressed grey), calibration, DBC and configuration. It is valid at every moment,\n"
-    "also after a power cut. Ends after --duration, by Ctrl-C (SIGTERM), or when its room is used up.\n"
+    "Writes the data of the robot's devices into a recording: all CAN frames, streams and sightings over LCM, rows\n"
+    "of an IMU and a GNSS receiver, cameras' pictures (MJPEG as it is, others as uncompressed grey), calibration, DBC\n"
+    "and configuration. It is valid at every moment, also after a power cut. Ends after --duration, by Ctrl-C "
+    "(SIGTERM), or when its room is used up.\n"
     "\n"
     "  --config FILE    its `devices:`\n"
     "  --out RECORDING  a new folder\n"
@@ -74,8 +75,7 @@ int command_record(int argc, char *const *argv) {
   wm_record_report report;
   wm_status status = wm_record(&config, &record, &report, &err);
   wm_config_free(&config);
-  (void)printf("%s: %" PRIu64 " CAN frames, %" PRIu64 " messages over LCM, %" PRIu64 " pictures, %.1f MB; %" PRIu64
-               " lost\n",
+  (void)printf("%s: %" PRIu64 " CAN frames, %" PRIu64 " rows, %" PRIu64 " pictures, %.1f MB; %" PRIu64 " lost\n",
                record.out_dir, report.frames, report.rows, report.pictures, (double)report.bytes * 1e-6, report.lost);
   return status == WM_OK ? EXIT_DONE : complain(&err);
 }

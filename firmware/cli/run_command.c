@@ -185,8 +185,7 @@ static wm_status recorder_end(recorder *self, wm_error *err) {
   atomic_store(&self->stop, 1);
   if (!self->is_started) return self->status;
   (void)pthread_join(self->thread, NULL);
-  (void)printf("%s: %" PRIu64 " CAN frames, %" PRIu64 " messages over LCM, %" PRIu64 " pictures, %.1f MB; %" PRIu64
-               " lost\n",
+  (void)printf("%s: %" PRIu64 " CAN frames, %" PRIu64 " rows, %" PRIu64 " pictures, %.1f MB; %" PRIu64 " lost\n",
                self->options.out_dir, self->report.frames, self->report.rows, self->report.pictures,
                (double)self->report.bytes * 1e-6, self->report.lost);
   if (self->status != WM_OK) *err = self->error;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Switches the hardware clocks of CAN adapters on. It needs a right that a run does not have.
+// Switches the hardware clocks of CAN adapters on, and sets up the buffer of an IMU. It needs rights that a run does
+// not have.
 #include <errno.h>
 #include <linux/net_tstamp.h>
 #include <linux/sockios.h>
@@ -18,8 +19,9 @@ static const char kHelp[] =
     "\n"
     "Asks each CAN adapter of the configuration's `devices:` to stamp frames by its own clock. Before a run, with the\n"
     "right to it (CAP_NET_ADMIN): in a systemd unit `ExecStartPre=+/usr/bin/waymark stamps /etc/waymark/robot.yaml`.\n"
-    "An adapter without a clock is no error: the kernel's stamps are taken then. Exit code 1 where the right is "
-    "missing.\n"
+    "An adapter without a clock is no error: the kernel's stamps are taken then. Of `devices: {iio}` the buffer is set "
+    "up\n"
+    "and started (as root). Exit code 1 where the right is missing, or where the IMU can't be set up.\n"
     "\n"
     "example:\n"
     "  waymark stamps /etc/waymark/robot.yaml\n";
@@ -45,6 +47,17 @@ static int say(const char *interface, int reason) {
     (void)printf("%s: has no clock that can be switched on (%s); stamps by the kernel\n", interface, strerror(reason));
   }
   return reason == EPERM;
+}
+
+// 1: an error for the user.
+static int prepare_imu(const wm_iio_device_config *imu) {
+  char text[160];
+  int is_there;
+  if (!imu->device[0]) return 0;
+  const char *why = wm_iio_prepare(imu, "", &is_there, text, sizeof text);
+  if (!why) (void)printf("%s: its buffer runs\n", imu->device);
+  if (why) (void)fprintf(stderr, "waymark: %s: %s\n", imu->device, why);
+  return why && is_there;
 }
 
 int command_stamps(int argc, char *const *argv) {
@@ -75,6 +88,7 @@ int command_stamps(int argc, char *const *argv) {
     failed |= say(interface, fd < 0 ? errno : switch_on(fd, interface));
   }
   if (fd >= 0) (void)close(fd);
+  failed |= prepare_imu(&config.devices.iio);
   wm_config_free(&config);
   return failed ? EXIT_WORK_FAILED : EXIT_DONE;
 }

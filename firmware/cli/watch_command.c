@@ -20,9 +20,12 @@ static const char kHelp[] =
     "  --url URL      LCM's (default: LCM_DEFAULT_URL, else this computer's)\n"
     "  --prefix TEXT  of the channels (default WAYMARK_)\n"
     "  --duration S   seconds, then stop\n"
+    "  --foxglove [ADDRESS:]PORT\n"
+    "                 for Foxglove instead of a terminal, by the Python package (--foxglove --help: its options)\n"
     "\n"
-    "example:\n"
+    "examples:\n"
     "  waymark watch\n"
+    "  waymark watch --foxglove 8765 --config /etc/waymark/robot.yaml\n"
     "\n"
     "For a browser, with the map and live pictures: `waymark web CONFIG`.\n";
 
@@ -66,6 +69,22 @@ static void show(lcm_t *lcm, double duration_s) {
   }
 }
 
+// With --foxglove, the Python package's program takes all options. Returns where it is not asked for, or not installed.
+static void run_foxglove(int argc, char *const *argv, wm_error *err) {
+  char *words[32] = {"waymark-foxglove"};
+  int asked = 0;
+  for (int i = 0; i < argc; i++) {
+    asked = asked || strncmp(argv[i], "--foxglove", 10) == 0;
+    if (i + 2 < (int)(sizeof words / sizeof words[0])) words[i + 1] = argv[i];
+  }
+  if (!asked) return;
+  run_desk_command("foxglove", words);
+  (void)wm_fail(
+      err, WM_BAD_USAGE,
+      "--foxglove needs the program waymark-foxglove of the Python package: pip install './tools/python[live]' "
+      "(docs/stack.md)");
+}
+
 int command_watch(int argc, char *const *argv) {
   const char *url = "", *prefix = "WAYMARK_", *why;
   double duration_s = 0;
@@ -77,6 +96,8 @@ int command_watch(int argc, char *const *argv) {
   wm_error err = {0};
   size_t words;
   char channel[96];
+  run_foxglove(argc, argv, &err);
+  if (err.text[0]) return complain(&err);
   if (options_parse(argc, argv, options, sizeof options / sizeof options[0], NULL, 0, &words, &err) != WM_OK)
     return complain(&err);
   if (help) {

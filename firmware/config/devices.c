@@ -3,6 +3,7 @@
 #include "config/devices.h"
 
 #include <ctype.h>
+#include <float.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -61,6 +62,11 @@ static wm_status text(const wm_yaml_node *item, const char *key, char *out, size
 static wm_status number(const wm_yaml_node *item, const char *key, double max, double *out, wm_error *err) {
   wm_yaml_node node = wm_yaml_get(item, key);
   return wm_yaml_there(&node) ? wm_yaml_f64(&node, 0, max, out, err) : WM_OK;
+}
+
+static wm_status above_0(const wm_yaml_node *item, const char *key, double max, double *out, wm_error *err) {
+  wm_yaml_node node = wm_yaml_get(item, key);
+  return wm_yaml_there(&node) ? wm_yaml_f64(&node, DBL_MIN, max, out, err) : WM_OK;
 }
 
 static wm_status choice(const wm_yaml_node *item, const char *key, const char *const *names, int32_t *out,
@@ -152,6 +158,18 @@ static wm_status read_camera(const wm_yaml_node *item, wm_config *config, wm_err
   return status;
 }
 
+// A stream has one device.
+static wm_status stream_is_new(const wm_yaml_node *item, const wm_config *config, const char *stream, wm_error *err) {
+  const wm_devices_config *devices = &config->devices;
+  int line = 0;
+  for (size_t i = 0; i < devices->lcm_count; i++)
+    if (strcmp(devices->lcm[i].stream, stream) == 0) line = devices->lcm[i].line;
+  for (size_t i = 0; i < devices->gpsd_count; i++)
+    if (strcmp(wm_gpsd_stream(&devices->gpsd[i]), stream) == 0) line = devices->gpsd[i].line;
+  return line == 0 ? WM_OK
+                   : wm_yaml_fail(item, err, "the stream '%s' stands there twice (first in line %d)", stream, line);
+}
+
 static wm_status read_lcm(const wm_yaml_node *item, wm_config *config, wm_error *err) {
   static const char *const kKeys[] = {"stream", "channel", "clock", "rate_max_hz", NULL};
   static const char *const kClocks[] = {"here", "sender", NULL};  // wm_lcm_clock
@@ -164,10 +182,8 @@ static wm_status read_lcm(const wm_yaml_node *item, wm_config *config, wm_error 
   if (status != WM_OK) return status;
   if (stream < 0) return wm_yaml_fail(item, err, "stream: is missing, e.g. {stream: motion}");
   const char *name = wm_stream_names[stream];
-  for (size_t i = 0; i < config->devices.lcm_count; i++)
-    if (strcmp(config->devices.lcm[i].stream, name) == 0)
-      return wm_yaml_fail(item, err, "the stream '%s' stands there twice (first in line %d)", name,
-                          config->devices.lcm[i].line);
+  status = stream_is_new(item, config, name, err);
+  if (status != WM_OK) return status;
   snprintf(out->stream, sizeof out->stream, "%s", name);
   for (size_t i = 0; out->stream[i]; i++) out->channel[i] = (char)toupper((unsigned char)out->stream[i]);
   status = text(item, "channel", out->channel, sizeof out->channel, err);
@@ -175,6 +191,53 @@ static wm_status read_lcm(const wm_yaml_node *item, wm_config *config, wm_error 
   if (status == WM_OK) status = number(item, "rate_max_hz", 10000, &out->rate_max_hz, err);
   config->devices.lcm_count++;
   return status;
+}
+
+static wm_status read_gpsd(const wm_yaml_node *item, wm_config *config, wm_error *err) {
+  static const char *const kKeys[] = {"take",       "host",           "port",           "device",    "clock",
+                                      "latency_ms", "accuracy_scale", "course_min_mps", "sigma_deg", NULL};
+  static const char *const kTake[] = {"position", "course", "antennas", NULL};  // wm_gpsd_from
+  static const char *const kClocks[] = {"receiver", "utc", NULL};               // wm_gpsd_clock
+  wm_gpsd_device_config *out = &config->devices.gpsd[config->devices.gpsd_count];
+  int64_t port = 2947;  // gpsd's, by IANA
+  // A velocity of 1 m/s has a direction to 6 degrees where its error is 0.1 m/s; antennas 1 m apart reach 0.2 degrees.
+  *out = (wm_gpsd_device_config){
+      .line = wm_yaml_line(item), .host = "localhost", .accuracy_scale = 1, .course_min_mps = 1, .sigma_deg = 1};
+  if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {take: position, ...} is needed");
+  wm_status status = wm_yaml_check_keys(item, kKeys, WM_YAML_STRICT, NULL, err);
+  if (status == WM_OK) status = choice(item, "take", kTake, &out->from, err);
+  if (status == WM_OK) status = text(item, "host", out->host, sizeof out->host, err);
+  wm_yaml_node node = wm_yaml_get(item, "port");
+  if (status == WM_OK && wm_yaml_there(&node)) status = wm_yaml_i64(&node, 1, 65535, &port, err);
+  out->port = (int32_t)port;
+  if (status == WM_OK) status = text(item, "device", out->device, sizeof out->device, err);
+  node = wm_yaml_get(item, "device");
+  if (status == WM_OK && strpbrk(out->device, "\"\\"))
+    status = wm_yaml_fail(&node, err, "no path has a quote or a backslash");
+  if (status == WM_OK) status = choice(item, "clock", kClocks, &out->clock, err);
+  if (status == WM_OK) status = number(item, "latency_ms", 5000, &out->latency_ms, err);
+  if (status == WM_OK) status = above_0(item, "accuracy_scale", 100, &out->accuracy_scale, err);
+  if (status == WM_OK) status = above_0(item, "course_min_mps", 100, &out->course_min_mps, err);
+  if (status == WM_OK) status = above_0(item, "sigma_deg", 90, &out->sigma_deg, err);
+  if (status == WM_OK) status = stream_is_new(item, config, wm_gpsd_stream(out), err);
+  config->devices.gpsd_count++;
+  return status;
+}
+
+static wm_status read_iio(const wm_yaml_node *item, wm_config *config, wm_error *err) {
+  static const char *const kKeys[] = {"device", "trigger", "rate_hz", NULL};
+  wm_iio_device_config *out = &config->devices.iio;
+  if (!wm_yaml_there(item)) return WM_OK;
+  out->line = wm_yaml_line(item);
+  if (!wm_yaml_is_map(item)) return wm_yaml_fail(item, err, "a map {device: NAME, ...} is needed");
+  wm_status status = wm_yaml_check_keys(item, kKeys, WM_YAML_STRICT, NULL, err);
+  if (status == WM_OK) status = text(item, "device", out->device, sizeof out->device, err);
+  if (status == WM_OK && !out->device[0])
+    return wm_yaml_fail(item, err,
+                        "device: is missing: a name as `cat /sys/bus/iio/devices/*/name` prints them, e.g. bmi160");
+  if (status == WM_OK) status = text(item, "trigger", out->trigger, sizeof out->trigger, err);
+  if (status == WM_OK) status = number(item, "rate_hz", 10000, &out->rate_hz, err);
+  return status == WM_OK ? stream_is_new(item, config, "imu", err) : status;
 }
 
 static wm_status read_list(const wm_yaml_node *list, size_t max, const char *what,
@@ -192,16 +255,19 @@ static wm_status read_list(const wm_yaml_node *list, size_t max, const char *wha
 }
 
 wm_status config_read_devices(const wm_yaml_node *root, wm_config *out, wm_error *err) {
-  static const char *const kKeys[] = {"can", "cameras", "lcm", "sightings", NULL};
+  static const char *const kKeys[] = {"can", "cameras", "lcm", "gpsd", "iio", "sightings", NULL};
   static const char *const kSightings[] = {"none", "lcm", NULL};
   wm_yaml_node devices = wm_yaml_get(root, "devices"), can = wm_yaml_get(root, "devices.can"),
-               cameras = wm_yaml_get(root, "devices.cameras"), lcm = wm_yaml_get(root, "devices.lcm");
+               cameras = wm_yaml_get(root, "devices.cameras"), lcm = wm_yaml_get(root, "devices.lcm"),
+               gpsd = wm_yaml_get(root, "devices.gpsd"), iio = wm_yaml_get(root, "devices.iio");
   if (!wm_yaml_there(&devices)) return WM_OK;
   wm_status status = wm_yaml_check_keys(&devices, kKeys, WM_YAML_STRICT, NULL, err);
   if (status == WM_OK) status = read_list(&can, WM_CAN_DEVICES_MAX, "{interface: NAME, ...}", read_can, out, err);
   if (status == WM_OK)
     status = read_list(&cameras, WM_CAMERA_DEVICES_MAX, "{name: CAMERA, device: PATH, ...}", read_camera, out, err);
   if (status == WM_OK) status = read_list(&lcm, WM_LCM_DEVICES_MAX, "{stream: NAME, ...}", read_lcm, out, err);
+  if (status == WM_OK) status = read_list(&gpsd, WM_GPSD_DEVICES_MAX, "{take: position, ...}", read_gpsd, out, err);
+  if (status == WM_OK) status = read_iio(&iio, out, err);
   if (status == WM_OK) status = choice(&devices, "sightings", kSightings, &out->devices.sightings_by_lcm, err);
   return status;
 }

@@ -95,6 +95,36 @@ const config_key kConfigLcmDeviceKeys[] = {
     {NULL, NULL, NULL, NULL},
 };
 
+const config_key kConfigGpsdDeviceKeys[] = {
+    {"take", "`position`, `course`, `antennas`", "position",
+     "position: the stream gnss, in metres about `gnss: {origin}` of calibration.yaml. course: the stream heading by "
+     "the "
+     "velocity's direction, for a robot that only drives forwards. antennas: the stream heading, of a receiver with "
+     "two antennas."},
+    {"host", "text", "localhost", "Computer on which gpsd runs."},
+    {"port", "whole number from 1 to 65535", "2947", "Its port."},
+    {"device", "path", "any", "Of several receivers this one, as gpsd names it, e.g. `/dev/ttyACM0`."},
+    {"clock", "`receiver`, `utc`", "receiver",
+     "receiver: the receiver's UTC is followed by the smallest delay. utc: this computer's wall clock is set (chrony "
+     "with "
+     "the receiver's pulse, NTP), and a delay of the receiver does no harm."},
+    {"latency_ms", "number from 0 to 5000", "0",
+     "ms. Least time from the measurement to its arrival, by the receiver's data sheet and its line: 20 to 200."},
+    {"accuracy_scale", "number above 0 to 100", "1",
+     "Sigmas in gpsd's accuracies (epx, epy, eph, epv, epd), whose confidence depends on the receiver."},
+    {"course_min_mps", "number above 0 to 100", "1", "m/s. `take: course`: slower, the velocity's direction is noise."},
+    {"sigma_deg", "number above 0 to 90", "1", "deg. `take: antennas`: sigma of the heading."},
+    {NULL, NULL, NULL, NULL},
+};
+
+const config_key kConfigIioDeviceKeys[] = {
+    {"device", "text", "needed",
+     "Name of the IMU, as `cat /sys/bus/iio/devices/*/name` prints it. It needn't be there yet."},
+    {"trigger", "text", "its own", "Name of the trigger that samples it, e.g. of an iio-trig-hrtimer."},
+    {"rate_hz", "number from 0 to 10000", "the driver's", "Sampling rate, one that the driver has."},
+    {NULL, NULL, NULL, NULL},
+};
+
 const config_key kConfigCameraDeviceKeys[] = {
     {"name", "text", "needed", "The camera's name in calibration.yaml, which has its size."},
     {"device", "path", "by card and bus",

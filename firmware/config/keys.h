@@ -19,6 +19,8 @@ extern const config_key kConfigKeys[];
 extern const config_key kConfigSourceKeys[];
 extern const config_key kConfigCanDeviceKeys[];
 extern const config_key kConfigLcmDeviceKeys[];
+extern const config_key kConfigGpsdDeviceKeys[];
+extern const config_key kConfigIioDeviceKeys[];
 extern const config_key kConfigCameraDeviceKeys[];
 
 // A table and where it stands in the file: `prefix` is "" for the runtime's, else "motion.", "ESTIMATOR."

@@ -92,6 +92,10 @@ void wm_config_reference(FILE *to) {
   print_keys(to, kConfigCanDeviceKeys);
   fprintf(to, "\n## Each entry of `devices.lcm`\n\n");
   print_keys(to, kConfigLcmDeviceKeys);
+  fprintf(to, "\n## Each entry of `devices.gpsd`\n\n");
+  print_keys(to, kConfigGpsdDeviceKeys);
+  fprintf(to, "\n## `devices.iio`\n\n");
+  print_keys(to, kConfigIioDeviceKeys);
   fprintf(to, "\n## Each entry of `devices.cameras`\n\n");
   print_keys(to, kConfigCameraDeviceKeys);
   fprintf(to, "\n## `merge`, `publish`, `commands`, `realtime`, `start`, `black_box`\n\n");

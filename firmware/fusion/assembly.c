@@ -88,21 +88,12 @@ static wm_status check_motion(const wm_assembly *self, uint32_t quantities, wm_e
 }
 
 wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err) {
-  if (self->kinds & WM_MOTION_EVENTS) return WM_OK;
-  const wm_param_table *table = &wm_motion_params_table;
-  for (size_t i = 0; i < table->count; i++) {
-    const wm_param *row = &table->params[i];
-    int32_t model;
-    if (strcmp(row->key, "model") != 0) continue;
-    memcpy(&model, (const char *)self->config->motion + row->offset, sizeof model);
-    if (model != WM_MOTION_AUTO) return WM_OK;  // check_motion() reports missing data
-    self->own_motion = malloc(table->bytes);
-    if (!self->own_motion) return wm_fail(err, WM_IO, "no memory for the parameters of the motion");
-    memcpy(self->own_motion, self->config->motion, table->bytes);
-    model = (int32_t)row->max;  // constant_velocity, the last of the choices
-    memcpy((char *)self->own_motion + row->offset, &model, sizeof model);
-    self->setup.motion = self->own_motion;
-  }
+  const size_t bytes = wm_motion_params_table.bytes;
+  self->own_motion = malloc(bytes);
+  if (!self->own_motion) return wm_fail(err, WM_IO, "no memory for the parameters of the motion");
+  memcpy(self->own_motion, self->config->motion, bytes);
+  wm_motion_choose(self->own_motion, self->kinds);
+  self->setup.motion = self->own_motion;
   return WM_OK;
 }
 

@@ -28,7 +28,7 @@ typedef struct wm_assembled_source {
 typedef struct wm_assembly {
   const wm_config *config;
   wm_setup setup;
-  wm_motion_params *own_motion;  // a copy with motion.model set, where there is no motion data; else NULL
+  wm_motion_params *own_motion;  // a copy with what the sources settle (wm_motion_choose)
   wm_driving driving;
   uint32_t kinds;  // of all used sources
   wm_assembled_source sources[WM_SOURCES_MAX];
@@ -48,8 +48,7 @@ typedef struct wm_assembly {
 // configuration that no recording has, an estimator that can't work with this setup. wm_assembly_close is also due
 // after a failure.
 wm_status wm_assemble(const wm_config *config, wm_recording *recording, uint64_t seed, wm_assembly *out, wm_error *err);
-// motion.model `auto` becomes `constant_velocity` where no source gives motion. WM_BAD_CONFIG where the configuration
-// has another one.
+// Parameters of the motion by the sources (wm_motion_choose).
 wm_status wm_assembly_choose_motion(wm_assembly *self, wm_error *err);
 // Closes the pictures. Before the recording and the run's memory are closed.
 void wm_assembly_close(wm_assembly *self);

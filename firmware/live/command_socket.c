@@ -38,7 +38,7 @@ static wm_status next_command(wm_source *base, wm_event *out, wm_error *err) {
   const char *why = wm_lcm_read_set_pose(datagram, (size_t)bytes, out);
   if (why && !wm_lcm_read_reset(datagram, (size_t)bytes, out)) why = NULL;
   if (why) {
-    lcm_subscriber_refuse(&base->counts, self->at.sun_path, why);
+    wm_source_refuse(&base->counts, self->at.sun_path, why);
     return WM_AGAIN;
   }
   out->arrival_ns = wm_monotonic_ns();

@@ -23,7 +23,7 @@ typedef struct lcm_commands {
 
 static void take(lcm_commands *self, const char *channel, const char *why, wm_event *event) {
   if (why) {
-    lcm_subscriber_refuse(&self->base.counts, channel, why);
+    wm_source_refuse(&self->base.counts, channel, why);
     return;
   }
   if (self->waiting_count == WAITING_MAX) {

@@ -29,7 +29,7 @@ static void on_sightings(const lcm_recv_buf_t *message, const char *channel, voi
       wm_lcm_read_sightings(message->data, message->data_size, name, &self->t_ns, self->said, &self->said_count);
   if (why) {
     self->said_count = 0;
-    lcm_subscriber_refuse(&self->base.counts, channel, why);
+    wm_source_refuse(&self->base.counts, channel, why);
     return;
   }
   uint16_t sensor = 0;
@@ -37,7 +37,7 @@ static void on_sightings(const lcm_recv_buf_t *message, const char *channel, voi
   if (sensor == self->sensor_count) {
     (void)snprintf(text, sizeof text, "'%.40s' is no sensor of calibration.yaml", name);
     self->said_count = 0;
-    lcm_subscriber_refuse(&self->base.counts, channel, text);
+    wm_source_refuse(&self->base.counts, channel, text);
     return;
   }
   for (size_t i = 0; i < self->said_count; i++) self->said[i].sensor = sensor;

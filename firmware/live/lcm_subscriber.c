@@ -45,12 +45,6 @@ void lcm_subscriber_wait(lcm_subscriber *self, wm_source_counts *counts) {
   if (!self->lcm || lcm_handle_timeout(self->lcm, WM_DEVICE_WAIT_MS) < 0) sleep_ms(WM_DEVICE_WAIT_MS);
 }
 
-void lcm_subscriber_refuse(wm_source_counts *counts, const char *channel, const char *why) {
-  counts->malformed++;
-  if (!counts->first_problem[0])
-    (void)snprintf(counts->first_problem, sizeof counts->first_problem, "%s: %s", channel, why);
-}
-
 void lcm_subscriber_close(lcm_subscriber *self) {
   if (self->lcm && !self->lent) lcm_destroy(self->lcm);
 }

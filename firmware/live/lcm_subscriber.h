@@ -21,8 +21,6 @@ void lcm_subscriber_add(lcm_subscriber *self, const char *channel, lcm_msg_handl
 // Waits for up to WM_DEVICE_WAIT_MS for one message and calls its handler. Losses and the state of the connection go
 // into *counts.
 void lcm_subscriber_wait(lcm_subscriber *self, wm_source_counts *counts);
-// Counts an unusable message; the first one is reported.
-void lcm_subscriber_refuse(wm_source_counts *counts, const char *channel, const char *why);
 void lcm_subscriber_close(lcm_subscriber *self);
 
 #endif

@@ -39,8 +39,10 @@ typedef struct live_source {
   _Atomic uint64_t lost, malformed, not_finite, out_of_order, ignored, frozen, overflows, bus_errors;
   _Atomic uint64_t looks[WM_LOOK_COUNT];
   _Atomic int64_t stamp_uncertainty_ns;
-  atomic_uint device;   // wm_device_state
-  uint8_t said_device;  // of the source's thread
+  atomic_uint device;  // wm_device_state
+  // Last reported; of the source's thread.
+  uint8_t said_device;
+  uint32_t said_news;
 } live_source;
 
 // A health record, and the merge's watermark for the watchdog.

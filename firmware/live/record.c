@@ -3,6 +3,7 @@
 
 #include <errno.h>
 #include <inttypes.h>
+#include <math.h>
 #include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,8 +14,9 @@
 #include <unistd.h>
 
 #include "live/copy_map.h"
-#include "live/lcm_stream.h"
+#include "live/lcm_sightings.h"
 #include "live/robot.h"
+#include "live/row_source.h"
 #include "output/avi_writer.h"
 #include "output/csv_row.h"
 #include "output/new_file.h"
@@ -23,6 +25,7 @@
 #include "waymark/yaml.h"
 
 #define LOOK_EVERY_MS 100           // for the end of the recording and the disk's free space
+#define COPIES_EVERY_MS 10          // an IMU of 1 kHz fills 10 of the 256 places
 #define SYNC_EVERY_NS WM_NS_PER_S   // a power cut loses the last second at most
 #define FILE_BYTES_MAX (16u << 20)  // of a configuration, DBC or calibration
 // A disk that blocks for a quarter of a second at 30 Hz loses no picture.
@@ -37,19 +40,22 @@ typedef struct stream {
   int started;
   wm_can_listener *can;
   wm_frame_source *camera;
-  wm_source *lcm;
+  wm_source *rows;    // a device that gives rows
+  wm_source *shared;  // such a device that only the run may read
+  wm_source *sightings;
   char name[WM_NAME_MAX];
   FILE *data, *stamps;
   char data_path[WM_PATH_MAX + 80], stamps_path[WM_PATH_MAX + 80];
   uint64_t pictures;
   uint8_t said_device;
+  uint32_t said_news;
 } stream;
 
 struct recorder {
   const wm_config *config;
   const wm_record_options *options;
   wm_recording *robot;
-  stream streams[WM_CAN_DEVICES_MAX + WM_LCM_DEVICES_MAX + WM_CAMERA_DEVICES_MAX];
+  stream streams[WM_CAN_DEVICES_MAX + WM_ROW_DEVICES_MAX + 1 + WM_CAMERA_DEVICES_MAX];
   size_t stream_count;
   FILE *can_log;  // of all interfaces, in the order of arrival: a line is one fwrite, which locks the file
   atomic_int stop;
@@ -91,28 +97,68 @@ static void write_row(stream *self, wm_row *line) {
 }
 
 // The columns of the recording's stream, all of them.
-static void begin_table(stream *self) {
+static void begin_table(stream *self, const wm_stream *kind) {
   wm_row line = {.length = 0};
   wm_row_text(&line, "t_ns,arrival_ns");
-  for (size_t i = 0; wm_stream_number(lcm_stream_of(self->lcm), i); i++) {
+  for (size_t i = 0; wm_stream_number(kind, i); i++) {
     wm_row_char(&line, ',');
-    wm_row_text(&line, wm_stream_number(lcm_stream_of(self->lcm), i));
+    wm_row_text(&line, wm_stream_number(kind, i));
   }
   write_row(self, &line);
 }
 
-static void take_row(stream *self) {
-  const wm_stream_row *row = lcm_stream_row(self->lcm);
-  wm_row line = {.length = 0};
-  wm_row_int(&line, row->t_ns);
-  wm_row_char(&line, ',');
-  wm_row_int(&line, row->arrival_ns);
-  for (size_t i = 0; wm_stream_number(lcm_stream_of(self->lcm), i); i++) {
+static void begin_row(wm_row *line, wm_time_ns t_ns, wm_time_ns arrival_ns) {
+  *line = (wm_row){.length = 0};
+  wm_row_int(line, t_ns);
+  wm_row_char(line, ',');
+  wm_row_int(line, arrival_ns);
+}
+
+static void end_row(stream *self, wm_row *line) {
+  write_row(self, line);
+  atomic_fetch_add(&self->all->rows, 1);
+}
+
+static void take_row(stream *self, const wm_stream *kind, const wm_stream_row *row) {
+  wm_row line;
+  begin_row(&line, row->t_ns, row->arrival_ns);
+  for (size_t i = 0; wm_stream_number(kind, i); i++) {
     wm_row_char(&line, ',');
     wm_row_exact(&line, row->number[i]);
   }
-  write_row(self, &line);
-  atomic_fetch_add(&self->all->rows, 1);
+  end_row(self, &line);
+}
+
+static const char kSightingColumns[] =
+    "t_ns,arrival_ns,sensor,id,bearing_rad,range_m,bearing_sigma_rad,range_sigma_m,elevation_rad,elevation_sigma_rad";
+
+static void take_sighting(stream *self, const wm_event *event) {
+  size_t count;
+  const wm_sensor *sensors = wm_site_sensors(wm_recording_site(self->all->robot), &count);
+  const wm_sighting *s = &event->as.sighting;
+  // A row has both or none: senders before NaN meant absent give 0 without a sigma.
+  const double elevation_rad = isnan(s->elevation_sigma_rad) ? (double)NAN : s->elevation_rad;
+  const double numbers[] = {s->bearing_rad,   s->range_m,    s->bearing_sigma_rad,
+                            s->range_sigma_m, elevation_rad, s->elevation_sigma_rad};
+  wm_row line;
+  begin_row(&line, event->t_ns, event->arrival_ns);
+  wm_row_char(&line, ',');
+  wm_row_text(&line, sensors[s->sensor].name);
+  wm_row_char(&line, ',');
+  wm_row_int(&line, s->landmark_id);
+  for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+    wm_row_char(&line, ',');
+    wm_row_exact(&line, numbers[i]);
+  }
+  end_row(self, &line);
+}
+
+// Rows that the run reads: the recorder takes copies of them.
+static void take_copies(stream *self, wm_source_counts *counts) {
+  const struct timespec pause = {.tv_nsec = (long)COPIES_EVERY_MS * 1000000};
+  wm_stream_row row;
+  while (row_source_copy(self->shared, &row, &counts->overflows)) take_row(self, row_source_stream(self->shared), &row);
+  (void)nanosleep(&pause, NULL);
 }
 
 static int begin_video(stream *self, const wm_camera_raw *raw, const wm_frame *frame) {
@@ -140,31 +186,43 @@ static void take_picture(stream *self, const wm_frame *frame) {
 }
 
 static void say_device(stream *self, const wm_source_counts *counts) {
-  if (counts->device == self->said_device) return;
+  if (counts->device == self->said_device && counts->news == self->said_news) return;
   self->said_device = counts->device;
+  self->said_news = counts->news;
   say(self->all, self->name, counts->device_note);
+}
+
+// Waits for the next datum of the device, writes it, and fills its counts.
+static void record_next(stream *self, wm_source_counts *counts) {
+  wm_error err;
+  wm_event event;
+  if (self->can) {
+    wm_can_frame frame;
+    if (wm_can_listener_next(self->can, &frame, &err) == WM_OK) take_frame(self, &frame);
+    *counts = *wm_can_listener_counted(self->can);
+    counts->lost = counts->malformed = 0;  // absent signals are no loss of the recording
+  } else if (self->shared) {
+    take_copies(self, counts);
+  } else if (self->rows) {
+    if (self->rows->ops->next(self->rows, &event, &err) == WM_OK)
+      take_row(self, row_source_stream(self->rows), row_source_row(self->rows));
+    *counts = self->rows->counts;
+  } else if (self->sightings) {
+    if (self->sightings->ops->next(self->sightings, &event, &err) == WM_OK) take_sighting(self, &event);
+    *counts = self->sightings->counts;
+  } else {
+    wm_frame frame;
+    if (self->camera->ops->next(self->camera, &frame, &err) == WM_OK) take_picture(self, &frame);
+    self->camera->ops->counts(self->camera, counts);
+  }
 }
 
 static void *record_stream(void *argument) {
   stream *self = argument;
-  wm_error err;
   uint64_t lost = 0;
+  wm_source_counts counts = {0};
   while (!atomic_load(&self->all->stop)) {
-    wm_source_counts counts;
-    if (self->can) {
-      wm_can_frame frame;
-      if (wm_can_listener_next(self->can, &frame, &err) == WM_OK) take_frame(self, &frame);
-      counts = *wm_can_listener_counted(self->can);
-      counts.lost = counts.malformed = 0;  // absent signals are no loss of the recording
-    } else if (self->lcm) {
-      wm_event event;
-      if (self->lcm->ops->next(self->lcm, &event, &err) == WM_OK) take_row(self);
-      counts = self->lcm->counts;
-    } else {
-      wm_frame frame;
-      if (self->camera->ops->next(self->camera, &frame, &err) == WM_OK) take_picture(self, &frame);
-      self->camera->ops->counts(self->camera, &counts);
-    }
+    record_next(self, &counts);
     say_device(self, &counts);
     uint64_t lost_now = counts.lost + counts.overflows + counts.malformed;
     atomic_fetch_add(&self->all->lost, lost_now - lost);
@@ -319,23 +377,55 @@ static wm_status open_can(recorder *self, wm_error *err) {
   return WM_OK;
 }
 
-static wm_status open_lcm(recorder *self, wm_error *err) {
-  const wm_config *config = self->config;
-  const wm_mounting *imu = wm_site_imu(wm_recording_site(self->robot));
-  for (size_t i = 0; i < config->devices.lcm_count; i++) {
-    const wm_lcm_device_config *device = &config->devices.lcm[i];
-    stream *s = &self->streams[self->stream_count];
+static wm_status open_table(stream *self, const char *name, const char *file, wm_error *err) {
+  (void)snprintf(self->name, sizeof self->name, "%s", name);
+  (void)snprintf(self->data_path, sizeof self->data_path, "%s/%s", self->all->options->out_dir, file);
+  self->data = new_file(self->data_path);
+  return self->data ? WM_OK : wm_fail(err, WM_IO, "%s: can't be written: %s", self->data_path, strerror(errno));
+}
+
+// The run's source of this stream, where only one program may read its device.
+static wm_source *run_reads(recorder *self, const wm_source *mine) {
+  size_t count;
+  if (!self->options->robot || !row_source_is_exclusive(mine)) return NULL;
+  wm_source *const *sources = wm_recording_sources(self->robot, &count);
+  for (size_t i = 0; i < count; i++)
+    if (row_source_stream(sources[i]) == row_source_stream(mine)) return sources[i];
+  return NULL;
+}
+
+static wm_status open_rows(recorder *self, wm_error *err) {
+  wm_source *sources[WM_ROW_DEVICES_MAX];
+  size_t count;
+  wm_status status = row_sources_open(self->config, wm_recording_site(self->robot), sources, &count, err);
+  for (size_t i = 0; i < count; i++) {
+    stream *s = &self->streams[self->stream_count++];
+    const wm_stream *kind = row_source_stream(sources[i]);
     s->all = self;
-    (void)snprintf(s->name, sizeof s->name, "%s", device->stream);
-    wm_status status = lcm_stream_open(device, config->lcm_url, config->channel_prefix, imu, NULL, &s->lcm, err);
-    if (status != WM_OK) return status;
-    self->stream_count++;
-    (void)snprintf(s->data_path, sizeof s->data_path, "%s/%s", self->options->out_dir,
-                   wm_stream_file(lcm_stream_of(s->lcm)));
-    s->data = new_file(s->data_path);
-    if (!s->data) return wm_fail(err, WM_IO, "%s: can't be written: %s", s->data_path, strerror(errno));
-    begin_table(s);
+    s->rows = sources[i];
+    s->shared = run_reads(self, sources[i]);
+    if (status == WM_OK) status = open_table(s, wm_stream_name(kind), wm_stream_file(kind), err);
+    if (status == WM_OK) begin_table(s, kind);
   }
+  return status;
+}
+
+static wm_status open_sightings(recorder *self, wm_error *err) {
+  const wm_config *config = self->config;
+  if (!config->devices.sightings_by_lcm) return WM_OK;
+  size_t sensor_count;
+  const wm_sensor *sensors = wm_site_sensors(wm_recording_site(self->robot), &sensor_count);
+  stream *s = &self->streams[self->stream_count];
+  s->all = self;
+  wm_status status =
+      lcm_sightings_open(config->lcm_url, config->channel_prefix, sensors, sensor_count, NULL, &s->sightings, err);
+  if (status != WM_OK) return status;
+  self->stream_count++;
+  status = open_table(s, "sightings", "sightings.csv", err);
+  if (status != WM_OK) return status;
+  wm_row line = {.length = 0};
+  wm_row_text(&line, kSightingColumns);
+  write_row(s, &line);
   return WM_OK;
 }
 
@@ -416,7 +506,8 @@ static void close_all(recorder *self) {
     stream *s = &self->streams[i];
     wm_can_listener_close(s->can);
     if (s->camera) s->camera->ops->close(s->camera);
-    if (s->lcm) s->lcm->ops->close(s->lcm);
+    if (s->rows) s->rows->ops->close(s->rows);
+    if (s->sightings) s->sightings->ops->close(s->sightings);
     if (s->data && fclose(s->data) != 0) fail(self, s->data_path, errno);
     if (s->stamps && fclose(s->stamps) != 0) fail(self, s->stamps_path, errno);
   }
@@ -427,7 +518,7 @@ static void close_all(recorder *self) {
 wm_status wm_record(const wm_config *config, const wm_record_options *options, wm_record_report *report,
                     wm_error *err) {
   memset(report, 0, sizeof *report);
-  if (config->devices.can_count + config->devices.lcm_count + config->devices.camera_count == 0)
+  if (wm_devices_count(&config->devices) == 0)
     return wm_fail(err, WM_BAD_CONFIG, "%s: devices: is missing: there is nothing to record", config->path);
   recorder *self = calloc(1, sizeof *self);
   if (!self) return wm_fail(err, WM_IO, "no memory to record");
@@ -439,7 +530,8 @@ wm_status wm_record(const wm_config *config, const wm_record_options *options, w
   if (status == WM_OK) status = make_folder(options->out_dir, err);
   if (status == WM_OK) status = write_about(self, err);
   if (status == WM_OK) status = open_can(self, err);
-  if (status == WM_OK) status = open_lcm(self, err);
+  if (status == WM_OK) status = open_rows(self, err);
+  if (status == WM_OK) status = open_sightings(self, err);
   if (status == WM_OK) status = open_cameras(self, err);
   for (size_t i = 0; status == WM_OK && i < self->stream_count; i++) {
     int failed = pthread_create(&self->streams[i].thread, NULL, record_stream, &self->streams[i]);

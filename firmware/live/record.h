@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Records a robot's devices (docs/recording-format.md): all CAN frames as candump text, streams over LCM as
-// their tables, the cameras' pictures in their format (MJPEG unchanged, others as uncompressed grey), the
-// configuration's files. All files are appended to: after a
-// power cut the files are a valid recording.
+// Records a robot's devices (docs/recording-format.md): all CAN frames as candump text, streams (over LCM, of an IMU,
+// of a GNSS receiver) and sightings as their tables, the cameras' pictures in their format (MJPEG unchanged, others as
+// uncompressed grey), the configuration's files. All files are appended to: after a power cut the files are a valid
+// recording.
 #ifndef WAYMARK_LIVE_RECORD_H
 #define WAYMARK_LIVE_RECORD_H
 
@@ -26,7 +26,7 @@ typedef struct wm_record_options {
 
 typedef struct wm_record_report {
   uint64_t frames, pictures, bytes;
-  uint64_t rows;  // messages over LCM
+  uint64_t rows;  // of tables: messages over LCM, an IMU, a GNSS receiver
   uint64_t lost;  // CAN frames and pictures lost by the kernel or a camera
   int is_full;    // ended because of bytes_max or bytes_free_min
 } wm_record_report;

@@ -5,7 +5,7 @@
 #include <string.h>
 
 #include "live/cameras.h"
-#include "live/lcm_stream.h"
+#include "live/row_source.h"
 
 // The source of one interface; with several interfaces its name ends with theirs: "can:can1".
 static wm_status add_interface(const wm_can_device_config *device, int is_one, wm_can_part part, wm_recording *robot,
@@ -31,15 +31,15 @@ static wm_status add_can(const wm_config *config, wm_recording *robot, wm_error 
   return status;
 }
 
-static wm_status add_lcm(const wm_config *config, wm_recording *robot, wm_error *err) {
-  const wm_devices_config *devices = &config->devices;
-  wm_status status = WM_OK;
-  for (size_t i = 0; status == WM_OK && i < devices->lcm_count; i++) {
-    wm_source *source;
-    status = lcm_stream_open(&devices->lcm[i], config->lcm_url, config->channel_prefix,
-                             wm_site_imu(wm_recording_site(robot)), NULL, &source, err);
-    if (status == WM_OK)
-      status = wm_recording_add_device(robot, source, wm_stream_quantities(lcm_stream_of(source)), err);
+static wm_status add_rows(const wm_config *config, wm_recording *robot, wm_error *err) {
+  wm_source *sources[WM_ROW_DEVICES_MAX];
+  size_t count;
+  wm_status status = row_sources_open(config, wm_recording_site(robot), sources, &count, err);
+  for (size_t i = 0; i < count; i++) {  // added one after the other: each is the recording's, or closed
+    if (status != WM_OK)
+      sources[i]->ops->close(sources[i]);
+    else
+      status = wm_recording_add_device(robot, sources[i], wm_stream_quantities(row_source_stream(sources[i])), err);
   }
   return status;
 }
@@ -81,8 +81,7 @@ wm_status wm_robot_open_site(const wm_config *config, wm_warn_fn warn, void *con
 
 wm_status wm_robot_open(const wm_config *config, wm_warn_fn warn, void *context, wm_recording **out, wm_error *err) {
   *out = NULL;
-  const wm_devices_config *devices = &config->devices;
-  if (devices->can_count + devices->lcm_count + devices->camera_count == 0 && !devices->sightings_by_lcm)
+  if (wm_devices_count(&config->devices) == 0)
     return wm_fail(err, WM_BAD_CONFIG,
                    "%s: devices: is missing, and no recording is given: name the robot's devices (devices: {can: "
                    "[{interface: can0}]}, or {lcm: [{stream: motion}]}) or --recording",
@@ -93,7 +92,7 @@ wm_status wm_robot_open(const wm_config *config, wm_warn_fn warn, void *context,
   if (config->devices.camera_count > 0 && config->vision_count == 0 && warn)
     warn(context, "devices.cameras: their pictures are not used: `vision:` names no detector");
   status = add_can(config, robot, err);
-  if (status == WM_OK) status = add_lcm(config, robot, err);
+  if (status == WM_OK) status = add_rows(config, robot, err);
   if (status != WM_OK) {
     wm_recording_close(robot);
     return status;

@@ -57,8 +57,9 @@ static void play_recording(live_source *self) {
 
 static void say_device(live_source *self) {
   const wm_source_counts *counts = &self->reader->source->counts;
-  if (counts->device == self->said_device) return;
+  if (counts->device == self->said_device && counts->news == self->said_news) return;
   self->said_device = counts->device;
+  self->said_news = counts->news;
   if (counts->device_note[0]) live_say(self->run, "%s: %s", self->reader->source->name, counts->device_note);
 }
 

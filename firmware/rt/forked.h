@@ -15,7 +15,7 @@ typedef struct wm_forked {
   // In the process of the job: fills `result`, which holds zeros.
   void (*job)(void *context, size_t index, void *result);
   size_t result_bytes;
-  void (*done)(void *context);  // in this process, after each job in their order; may be NULL
+  void (*done)(void *context);  // in this process, after each job; may be NULL
 } wm_forked;
 
 // Runs jobs 0 to count - 1. `results` has count * result_bytes bytes; those of a failed job hold zeros.

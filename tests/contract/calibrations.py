@@ -5,7 +5,7 @@ ticks a turn, with and without a gyro, and for commands of four drives. Each dri
 default's own priors (PRIORS), so that a state has an RMS of 1 whether the drive observes it or not. Printed: the error
 over its sigma as RMS, the share beyond four sigma, and the median sigma over the prior's (1: not observed). A table, not a gate.
 
-    calibrations.py BIN_DIR SOURCE_DIR [--drives N] [--set KEY=VALUE] [--only WORD[,WORD]] [--json]
+    calibrations.py BIN_DIR SOURCE_DIR [--estimator NAME] [--drives N] [--set KEY=VALUE] [--only WORD[,WORD]] [--json]
 
 example: calibrations.py build/bin . --drives 25 --only gyro --set sightings.correlated.slots=0"""
 import argparse
@@ -126,6 +126,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bin", type=pathlib.Path)
     parser.add_argument("source", type=pathlib.Path)
+    parser.add_argument("--estimator", default="landmark_ekf", help="landmark_ekf, or slam (without the map)")
     parser.add_argument("--drives", type=int, default=25, help="of each kind (25)")
     parser.add_argument("--only", default="", metavar="WORD[,WORD]", help="kinds whose title contains one of these words")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a key beside `estimator:`")
@@ -139,7 +140,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         folder = pathlib.Path(folder)
         args.config = folder / "plain.yaml"
-        args.config.write_text(plain(Case("", "landmark_ekf", ()), args.set))
+        args.config.write_text(plain(Case("", args.estimator, ()), args.set))
         for title, kind in kinds.items():
             if words and not any(w in title for w in words):
                 continue

@@ -9,7 +9,7 @@
 namespace drives {
 namespace {
 
-constexpr double kStep_s = 0.01, kTrack_m = 0.5, kWheelbase_m = 1.2, kEyeUp_m = 0.8, kLookEvery_s = 0.2;
+constexpr double kStep_s = 0.01, kTrack_m = 0.5, kWheelbase_m = 1.2, kEyeUp_m = 0.8;
 constexpr double kCentre_m[2] = {6.0, 5.0};  // of the circle that the robot drives, and of the room
 constexpr double kDowncast_rad = 0.4, kCameraUp_m = 0.5, kCameraAhead_m = 0.5;
 
@@ -170,6 +170,10 @@ void scene::add_motion(motion by, double t_s, bool glitch) {
     const truth &later = at(t_s + 0.05);
     wm_twist2 &twist = add(WM_EVENT_TWIST2, t_s)->as.twist2;
     twist = {1.02 * later.v_mps, 1.01 * later.w_radps};
+    return;
+  }
+  if (by == motion::sideways) {
+    add(WM_EVENT_TWIST6, t_s)->as.twist6 = {{v, 0.05 * std::sin(t_s), 0.0}, {0.0, 0.0, w}};
     return;
   }
   wm_quantities &q = add(WM_EVENT_QUANTITIES, t_s)->as.quantities;

@@ -9,7 +9,7 @@
 
 namespace drives {
 
-enum class motion { twist, ticks, ticks_and_gyro, speed_and_gyro, steering };
+enum class motion { twist, ticks, ticks_and_gyro, speed_and_gyro, steering, sideways };
 
 // What the robot's sensors give.
 enum sees : unsigned {

@@ -73,8 +73,9 @@ def covered_elsewhere(root):
     """Identifiers that other tests name, by their C constant or, in check_faults.py, as text."""
     kinds = dict(re.findall(r'\[WM_FOUND_([A-Z_]+)\]\s*=\s*\{\s*"([a-z-]+)"', (root / "firmware/findings/kinds.c").read_text()))
     named = set()
-    for path in ("tests/unit/firmware/test_findings.c", "tests/unit/firmware/test_doctor.c"):
-        named |= {kinds[name] for name in re.findall(r"WM_FOUND_([A-Z_]+)", (root / path).read_text()) if name in kinds}
+    for test in ("findings", "doctor", "gpsd", "iio"):
+        text = (root / f"tests/unit/firmware/test_{test}.c").read_text()
+        named |= {kinds[name] for name in re.findall(r"WM_FOUND_([A-Z_]+)", text) if name in kinds}
     faults = (root / "tests/golden/check_faults.py").read_text()
     named |= {i for i in kinds.values() if f'"{i}"' in faults}
     return set(kinds.values()), named

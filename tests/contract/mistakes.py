@@ -12,9 +12,11 @@ import json
 import math
 import pathlib
 import re
+import struct
 import subprocess
 import sys
 import tempfile
+import zlib
 
 import replays
 import small_robot
@@ -64,6 +66,43 @@ def swapped(a, b):
 def unsorted(whole):
     head, *lines = whole.splitlines()
     return "\n".join([head, *lines[len(lines) // 2:], *lines[:len(lines) // 2]]) + "\n"
+
+
+def swap_words(whole, a, b):
+    return whole.replace(a, "\0").replace(b, a).replace("\0", b)
+
+
+def png_rows(data):
+    """Rows of a picture of 8-bit grey that is not interlaced, of filter types 0 to 4 (PNG 1.2, section 6)."""
+    width, height, depth, colour, *_, interlace = struct.unpack(">IIBBBBB", data[16:29])
+    assert (depth, colour, interlace) == (8, 0, 0), "another kind of PNG"
+    packed, at = b"", 8
+    while at < len(data):
+        size = int.from_bytes(data[at:at + 4], "big")
+        packed += data[at + 8:at + 8 + size] if data[at + 4:at + 8] == b"IDAT" else b""
+        at += 12 + size
+    raw, rows = zlib.decompress(packed), [bytes(width)]
+    for y in range(height):
+        kind, line, above = raw[y * (width + 1)], bytearray(raw[y * (width + 1) + 1:(y + 1) * (width + 1)]), rows[-1]
+        for x in range(width) if kind else ():
+            left, up, corner = line[x - 1] if x else 0, above[x], above[x - 1] if x else 0
+            paeth = min((left, up, corner), key=lambda v: abs(left + up - corner - v))
+            line[x] = line[x] + (0, left, up, (left + up) // 2, paeth)[kind] & 255
+        rows.append(bytes(line))
+    return rows[1:]
+
+
+def mirrored(is_upside_down):
+    """Change of a PNG: top and bottom swapped, or left and right. The result is a PGM, which is read under any name."""
+    def change(data):
+        rows = png_rows(data)
+        rows = rows[::-1] if is_upside_down else [row[::-1] for row in rows]
+        return b"P5 %d %d 255\n" % (len(rows[0]), len(rows)) + b"".join(rows)
+    return change
+
+
+def resolution(factor):
+    return lambda whole: re.sub(r"resolution: ([0-9.]+)", lambda m: f"resolution: {factor * float(m[1])}", whole)
 
 
 def sensor_rows(change):
@@ -179,8 +218,39 @@ SMARTLOC = [
     ("turn rate to the right", {"motion.csv": each(w_radps=lambda w: -w)}, r"turn rate.*right", "bad"),
     ("speed in km/h", {"motion.csv": each(v_mps=lambda v: 3.6 * v)}, r"speed.*km/h|v_mps times 0\.27", "bad"),
 ]
+# Coded markers on a ceiling, seen by a camera that looks up; no map.
+OFFICE = [
+    ("another family of markers", {"calibration.yaml": text("tag36h11", "tag25h9")}, r"family.*tag36h11", "bad"),
+    ("markers with their white frame", {"calibration.yaml": text("size_m: 0.198", "size_m: 0.2475")}, r"size_m: 0\.(198|2)|range_scale", "any"),
+    ("markers' size in cm", {"calibration.yaml": text("size_m: 0.198", "size_m: 1.98")}, r"size_m: 0\.(198|2)", "bad"),
+    ("camera looks down", {"calibration.yaml": text("[0.0, -90.0, 0.0]", "[0.0, 90.0, 0.0]")}, r"rpy_deg: \[0, -90, 0|pitch", "bad"),
+    ("diameter for radius", wheels("radius_m", 0.2), r"radius_m: 0\.(09|1)|left_scale|size_m", "bad"),
+    ("wheels swapped", {"can-signals.yaml": lambda w: swap_words(w, "TICKS_LEFT", "TICKS_RIGHT")}, r"left and right|swap", "bad"),
+]
+# Edges of a floor plan.
+CORRIDOR = [
+    ("plan mirrored, left and right", {"map/edges.png": mirrored(False), "map/drivable.png": mirrored(False)}, r"plan is mirrored", "bad"),
+    ("plan mirrored, top and bottom", {"map/edges.png": mirrored(True), "map/drivable.png": mirrored(True)}, r"plan is mirrored", "bad"),
+    ("plan's resolution halved", {"map/map.yaml": resolution(0.5)}, r"resolution", "bad"),
+]
+STEREO = [
+    ("left and right swapped", {"stereo.csv": replays.each_row(lambda r: r.update(ul_px=r["ur_px"], vl_px=r["vr_px"], ur_px=r["ul_px"], vr_px=r["vl_px"]))}, r"left and right|swap", "bad"),
+    ("baseline doubled", {"calibration.yaml": lambda w: re.sub(r"baseline_m: ([0-9.]+)", lambda m: f"baseline_m: {2 * float(m[1])}", w)}, r"baseline", "bad"),
+    ("baseline in mm", {"calibration.yaml": lambda w: re.sub(r"baseline_m: ([0-9.]+)", lambda m: f"baseline_m: {100 * float(m[1])}", w)}, r"baseline", "bad"),
+]
+# Ranges of radios.
+PLAZA = [
+    ("range in cm", sensor_rows(each(range_m=lambda r: 1e2 * r)), r"range.*\bcm\b", "bad"),
+    ("range in feet", sensor_rows(each(range_m=lambda r: r / 0.3048)), r"feet|range_scale", "bad"),
+    ("ranges 5 s late", sensor_rows(replays.shifted(5)), r"(clock|stamps).*(5\.|4\.)", "bad"),
+    ("map's x and y swapped", {"landmarks.csv": swapped("x_m", "y_m")}, r"map.*(x and y|swap|mirror)", "bad"),
+    ("map's y mirrored", {"landmarks.csv": each(y_m=lambda y: -y)}, r"map.*mirror", "bad"),
+    ("turn rate to the right", {"motion.csv": each(w_radps=lambda w: -w)}, r"turn rate.*right", "bad"),
+]
 # Recordings of others with the configuration that suits them.
-SHARED = [("mrclam-d6-t1", "mrclam.yaml", MRCLAM), ("starry-night-plan-a", "starry-night-plan.yaml", MRCLAM),
+SHARED = [("plaza-1", "robot.yaml", PLAZA), ("office-a", "office.yaml", OFFICE), ("corridor-a", "corridor.yaml", CORRIDOR),
+          ("starry-night-stereo-a", "starry-night-stereo.yaml", STEREO),
+          ("mrclam-d6-t1", "mrclam.yaml", MRCLAM), ("starry-night-plan-a", "starry-night-plan.yaml", MRCLAM),
           ("smartloc-potsdamer-a", "smartloc.yaml", SMARTLOC)]
 
 
@@ -194,7 +264,7 @@ def run_check(options, config, recording, corrected):
     try:
         return json.loads(done.stdout)
     except json.JSONDecodeError:
-        return {"good": False, "findings": [{"text": done.stderr, "fix": ""}]}
+        return {"good": False, "findings": [{"about": "", "text": done.stderr, "fix": ""}]}
 
 
 def longest_wrong_s(run, truth):
@@ -248,7 +318,8 @@ def is_corrected(options, config, corrected):
     """Whether check calls the corrected copy good."""
     if not corrected.is_dir():
         return "-"
-    done = subprocess.run([options.bin_dir / "waymark", "check", config, corrected, "--quick"], capture_output=True, text=True)
+    changed = corrected / config.name
+    done = subprocess.run([options.bin_dir / "waymark", "check", changed if changed.is_file() else config, corrected, "--quick"], capture_output=True, text=True)
     return "good" if done.returncode == 0 else "bad"
 
 

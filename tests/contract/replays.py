@@ -111,7 +111,7 @@ def copy_changed(recording, out, changes):
             copy_changed(file, out / file.name, inner)
         elif file.name not in changes:
             (out / file.name).symlink_to(file.resolve())
-        elif file.suffix == ".avi":
+        elif file.suffix in (".avi", ".png"):
             (out / file.name).write_bytes(changes[file.name](file.read_bytes()))
         else:
             before = file.read_text()

@@ -55,7 +55,8 @@ counted, reported and skipped, and the drive goes on. `rec` is the recording's f
 
 """
 
-ERRORS_PARTS = [("wm_errors_config", "Configuration, recording, calibration"), ("wm_errors_can", "CAN: candump, DBC, binding")]
+ERRORS_PARTS = [("wm_errors_config", "Configuration, recording, calibration"), ("wm_errors_can", "CAN: candump, DBC, binding"),
+                ("wm_errors_init", "Files of other programs, read by `waymark init`")]
 
 
 def run(program, *args):

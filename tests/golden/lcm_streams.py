@@ -56,7 +56,7 @@ def publish():
 WHEELS = (
     "format: waymark-config/1\nestimator: landmark_ekf\npublish: {lcm_url: '" + lcm_tools.URL + "'}\n"
     "calibration: calibration.yaml\nrealtime: {lock_memory: false}\n"
-    "devices: {lcm: [{stream: ticks}, {stream: heading}, {stream: gnss}]}\n")
+    "landmarks: landmarks.csv\ndevices: {lcm: [{stream: ticks}, {stream: heading}, {stream: gnss}], sightings: lcm}\n")
 
 
 def publish_wheels():
@@ -79,11 +79,18 @@ def publish_wheels():
             for name, value in numbers.items():
                 setattr(message, name, value)
             node.publish("WAYMARK_" + kind.__name__[:-2].upper(), message.encode())
+        if k % 10 == 0:  # a landmark straight ahead, by a sender that leaves elevations 0
+            seen = waymark.observations_t()
+            seen.t_ns, seen.count, seen.sensor = now_ns, 1, b"eye".ljust(32, b"\0")
+            seen.landmark_id[0], seen.bearing_rad[0], seen.range_m[0] = 1, 0, math.nan
+            node.publish("WAYMARK_SIGHTINGS", seen.encode())
         time.sleep(max(0, begin + (k + 1) * 0.02 - time.monotonic()))
 
 
 def check_wheels(work):
-    (work / "calibration.yaml").write_text("wheels: {radius_m: 0.1, ticks_per_turn: 1000, track_m: 0.5}\n")
+    (work / "calibration.yaml").write_text("wheels: {radius_m: 0.1, ticks_per_turn: 1000, track_m: 0.5}\n"
+                                           "sensors: {eye: {mounting: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}, bearing_sigma_rad: 0.01}}\n")
+    (work / "landmarks.csv").write_text("id,x_m,y_m,z_m,sigma_m\n1,10,105,0,0.01\n")
     (work / "wheels.yaml").write_text(WHEELS)
     run = start(work, "wheels", SECONDS + 2)
     subprocess.run([sys.executable, __file__, "publish_wheels"], env={"PYTHONPATH": str(work)}, check=True)
@@ -94,7 +101,9 @@ def check_wheels(work):
         off = [abs(float(row["x_m"]) - 10), abs(float(row["y_m"]) - 5 - 0.5 * SECONDS)]
         print(what, row["x_m"], row["y_m"], math.degrees(heading_of(row)))
         assert off[0] < 0.1 and off[1] < 0.1 and abs(heading_of(row) - math.pi / 2) < 0.02, row
-    for name in ("ticks", "heading", "gnss"):
+    seen = json.loads((work / "wheels-replayed/health.json").read_text())["sources"]["sightings:eye"]
+    assert seen["fused"] >= SECONDS * 4 and seen["malformed"] == 0, seen
+    for name in ("ticks", "heading", "gnss", "sightings"):
         assert len(rows(work / f"wheels-rec/{name}.csv")) >= SECONDS * 4, name
 
 

@@ -6,6 +6,7 @@
 
 import contextlib
 import io
+import os
 import random
 import subprocess
 import unittest
@@ -22,6 +23,7 @@ from waymark.geometry import OPTICAL, from_rpy
 from waymark.ros import Messages
 
 START_NS = 1_700_000_000_000_000_000
+MUTATIONS = int(os.environ.get("WAYMARK_MUTATIONS", "30"))
 
 
 def imported(*arguments):
@@ -144,7 +146,7 @@ class Robots(unittest.TestCase):
     def test_broken_bags_are_errors(self):
         (whole,) = self.bags["mcap"].glob("*.mcap")
         data, chance = whole.read_bytes(), random.Random(2)
-        for case in range(30):
+        for case in range(MUTATIONS):
             broken = bytearray(data[: chance.randrange(len(data))] if case % 2 else data)
             for _ in range(5 * (1 - case % 2)):
                 broken[chance.randrange(len(broken))] ^= 1 << chance.randrange(8)

@@ -10,9 +10,9 @@ import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-TOOLS = ["calibrate", "detect", "diff", "eval", "import", "map", "reference", "report", "simulate", "suggest", "web"]
+TOOLS = ["batch", "calibrate", "compare", "detect", "diff", "eval", "import", "init", "map", "mine", "reference", "report", "simulate", "suggest", "web"]
 OPTIONAL = ["ros2"]  # not built everywhere: a manual page, no completion of its options
-PATHS = {"FILE", "FOLDER", "CONFIG", "RECORDING", "RUN", "REC", "OTHER", "LOG", "SCENARIO"}
+PATHS = {"BOX", "PLAN", "BEFORE", "AFTER", "FILE", "FOLDER", "CONFIG", "RECORDING", "RUN", "REC", "OTHER", "LOG", "SCENARIO"}
 
 
 class Help:
@@ -35,7 +35,7 @@ class Help:
                 after = line.split(":", 1)[1].strip()
                 if after:
                     self.examples.append(after)
-            elif low in ("positionals:", "options:", "subcommands:"):
+            elif low in ("positionals:", "positional arguments:", "options:", "subcommands:"):
                 part = {"p": self.terms, "o": self.options, "s": self.subcommands}[low[0]]
             elif part is self.examples and line and not line.startswith("  "):
                 part = self.rest

@@ -22,14 +22,23 @@ std::string list(const std::vector<double> &values) {
   return out + "]";
 }
 
-// Roll, pitch and yaw in degrees of Rz(yaw) Ry(pitch) Rx(roll).
-std::vector<double> rpy_deg(const Eigen::Matrix3d &R) {
-  constexpr double kDeg = 180 / render::kPi;
-  return {std::atan2(R(2, 1), R(2, 2)) * kDeg, -std::asin(std::clamp(R(2, 0), -1.0, 1.0)) * kDeg,
-          std::atan2(R(1, 0), R(0, 0)) * kDeg};
-}
-
 }  // namespace
+
+std::string mounting_yaml(const render::Pose &pose) {
+  constexpr double kDeg = 180 / render::kPi;
+  constexpr double kRounded = 1e-9;       // m and degrees
+  constexpr double kUpright = 1 - 1e-12;  // of sin(pitch): roll and yaw are about one axis, and roll is taken as 0
+  const Eigen::Matrix3d R = pose.linear();
+  const render::Vec3 p = pose.translation();
+  const double sine = std::clamp(-R(2, 0), -1.0, 1.0);
+  const bool upright = std::abs(sine) > kUpright;
+  std::vector<double> xyz{p.x(), p.y(), p.z()};
+  std::vector<double> rpy{upright ? 0 : std::atan2(R(2, 1), R(2, 2)) * kDeg, std::asin(sine) * kDeg,
+                          (upright ? std::atan2(-R(0, 1), R(1, 1)) : std::atan2(R(1, 0), R(0, 0))) * kDeg};
+  for (std::vector<double> *values : {&xyz, &rpy})
+    for (double &v : *values) v = std::round(v / kRounded) * kRounded + 0.0;  // no -0
+  return "{xyz_m: " + list(xyz) + ", rpy_deg: " + list(rpy) + "}";
+}
 
 std::string calibration_yaml(const std::vector<Entry> &entries) {
   std::string out = "cameras:\n";
@@ -41,9 +50,7 @@ std::string calibration_yaml(const std::vector<Entry> &entries) {
            "\n";
     if (!c.distortion.empty()) out += "    distortion: " + list(c.distortion) + "\n";
     if (entry.mounted) {
-      const render::Vec3 p = c.T_base_camera.translation();
-      out += "    mounting: {xyz_m: " + list({p.x(), p.y(), p.z()}) +
-             ", rpy_deg: " + list(rpy_deg(c.T_base_camera.linear())) + "}\n";
+      out += "    mounting: " + mounting_yaml(c.T_base_camera) + "\n";
     } else {
       out +=
           "    mounting: {xyz_m: [0, 0, 0], rpy_deg: [0, 0, 0]}  # to be measured: x ahead, y left, z up from the "

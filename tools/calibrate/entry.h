@@ -17,6 +17,8 @@ struct Entry {
   std::string remark;  // "" or one line
   bool mounted = false;
 };
+// "{xyz_m: [...], rpy_deg: [...]}" of a body frame in base_link: Rz(yaw) Ry(pitch) Rx(roll).
+std::string mounting_yaml(const render::Pose &pose);
 std::string calibration_yaml(const std::vector<Entry> &entries);
 
 // Writes `text` into a new file; "" or "-": to the screen. Throws tools::Failure where a file of that name is there.

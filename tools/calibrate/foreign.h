@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "calibrate/entry.h"
 #include "calibrate/flat_file.h"
 #include "simulate/render/camera.h"
 
@@ -36,6 +37,11 @@ struct ImportHints {
 // Recognises OpenCV's FileStorage (YAML, XML), Kalibr's camchain, ROS camera_info and OCamCalib's text, and reads all
 // cameras in it. Throws tools::Failure with file, line and key, and with what to do.
 std::vector<ForeignCamera> read_foreign(const std::filesystem::path &file, const ImportHints &hints);
+
+// As an entry named `name`, without a mounting: the same model where we have it (`model` "auto" or its name), else the
+// best fit of `model` ("auto": of ours). How far it is off goes to standard error. `file`: for messages.
+Entry import_camera(const ForeignCamera &camera, const std::string &name, const std::string &model,
+                    const std::string &file);
 
 // ── the formats ──
 std::vector<ForeignCamera> read_opencv(const FlatFile &file, const ImportHints &hints);

@@ -51,6 +51,7 @@ done
 step "report and picture"
 quietly "$waymark" report "$out/run-cameras" "$out/recording" --out "$out/report.html"
 quietly python3 tools/demo/picture.py "$out" "$out/demo.svg"
+quietly python3 tools/demo/moving.py "$out" "$out/moving.svg"
 
 step "$drives drives each, with other wheels, biases, maps and noise"
 statistics=$(build/bin/waymark-montecarlo "$scenario" --config "$config" --seeds "$drives" | sed -n '3,/^$/p')

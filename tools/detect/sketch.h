@@ -15,7 +15,7 @@
 
 namespace wm::tools {
 
-// A camera's picture with what its model says about rays and pixels.
+// A camera's picture, with its model's rays and pixels.
 class Sketch {
  public:
   // Throws Failure: a camera that no picture can be drawn with. `marker_m`: edge of markers, for their rings.

@@ -9,6 +9,7 @@
 #include "report/data.h"
 #include "report/page.h"
 #include "report/picture.h"
+#include "report/style.h"
 
 namespace {
 
@@ -16,14 +17,16 @@ using namespace wm::tools;
 
 struct Arguments {
   std::string run, recording, out, svg;
+  bool style = false;
 };
 
 void parse(wm::cli::App *app, Arguments *a) {
   app->description("Shows a run as one self-contained page: where, how far off, how sure, and why.");
-  app->add_option("RUN", a->run, "folder that a run wrote")->required();
+  app->add_option("RUN", a->run, "folder that a run wrote");
   app->add_option("REC", a->recording, "folder of the recording, for truth, landmarks and map");
   app->add_option("--out", a->out, "the page to write (HTML); without it and --svg: RUN/report.html");
   app->add_option("--svg", a->svg, "the picture of the trajectory alone, as an SVG file");
+  app->add_flag("--style", a->style, "print the page's style sheet, for pages of other programs");
   app->footer(
       "example: waymark report runs/plan recordings/plan\n"
       "docs/report.md shows one. Exit code: 0 done, 1 it could not be made, 2 usage.");
@@ -43,6 +46,11 @@ int main(int argc, char **argv) {
   wm::cli::App app("", "waymark report");
   parse(&app, &arguments);
   return run_program(app, argc, argv, [&] {
+    if (arguments.style) {
+      std::puts(page_style().c_str());
+      return kDone;
+    }
+    if (arguments.run.empty()) throw Failure("RUN is required", kUsage);
     const bool is_default = arguments.out.empty() && arguments.svg.empty();
     if (is_default) arguments.out = std::filesystem::path(arguments.run) / "report.html";
     const ReportData data = load_report_data(arguments.run, arguments.recording);

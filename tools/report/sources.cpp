@@ -103,6 +103,8 @@ Meaning meaning_of(const std::string &name) {
   if (what == "left_scale") return {100, -100, "%", "the left wheel rolls this much farther a turn than stated"};
   if (what == "right_scale") return {100, -100, "%", "the right wheel rolls this much farther a turn than stated"};
   if (what == "track_scale") return {100, -100, "%", "the wheels act as if this much farther apart than stated"};
+  if (what == "side_scale") return {100, -100, "%", "true sideways speed above the measured one, besides the speed's"};
+  if (what == "rotation_center_m") return {100, 0, "cm", "the robot turns about a centre so far ahead of base_link"};
   if (what == "steering_offset_rad") return {degrees, 0, "°", "the wheels' direction to the left at steering 0"};
   if (what == "bloom_px" || what == "edge_shift_px")  // its name before
     return {1, 0, "px", "bright areas are wider by this in the pictures of " + sensor};

@@ -9,6 +9,7 @@
 #include "waymark/frame.h"
 #include "waymark/frame_source.h"
 #include "waymark/recording.h"
+#include "waymark/row_device.h"
 #include "waymark/source.h"
 #include "waymark/status.h"
 
@@ -109,6 +110,46 @@ typedef struct wm_lcm_device_config {
   int line;
 } wm_lcm_device_config;
 
+// An IMU of Linux IIO, captured by its buffer.
+typedef struct wm_iio_device_config {
+  char device[64];   // `name` of the device in sysfs, or "iio:device0"; "": none
+  char trigger[64];  // `name` of its trigger; "": its own
+  double rate_hz;    // 0: the driver's
+  int line;
+} wm_iio_device_config;
+
+// What a run takes from gpsd.
+typedef enum wm_gpsd_from {
+  WM_GPSD_POSITION,  // stream gnss
+  WM_GPSD_COURSE,    // stream heading: the direction of the velocity, of a robot that drives forwards
+  WM_GPSD_ANTENNAS   // stream heading: of a receiver with two antennas
+} wm_gpsd_from;
+
+typedef enum wm_gpsd_clock {
+  WM_GPSD_CLOCK_RECEIVER,  // the receiver's UTC is followed as any clock, by the smallest delay
+  WM_GPSD_CLOCK_UTC        // this computer's wall clock is set to UTC
+} wm_gpsd_clock;
+
+typedef struct wm_gpsd_device_config {
+  int32_t from;     // wm_gpsd_from
+  char host[64];    // "localhost"
+  int32_t port;     // 2947
+  char device[64];  // of several receivers this one: "/dev/ttyACM0"; "": any
+  int32_t clock;    // wm_gpsd_clock
+  double latency_ms;
+  double accuracy_scale;  // sigmas in gpsd's accuracies
+  double course_min_mps;  // slower the course is noise
+  double sigma_deg;       // of a heading by antennas
+  int line;
+} wm_gpsd_device_config;
+
+// The stream that it gives: "gnss" or "heading".
+static inline const char *wm_gpsd_stream(const wm_gpsd_device_config *self) {
+  return self->from == WM_GPSD_POSITION ? "gnss" : "heading";
+}
+
+#define WM_GPSD_DEVICES_MAX 2  // position and heading
+#define WM_ROW_DEVICES_MAX (WM_LCM_DEVICES_MAX + WM_GPSD_DEVICES_MAX + 1)
 #define WM_CAN_DEVICES_MAX 4     // buses of a robot
 #define WM_LCM_DEVICES_MAX 8     // streams over LCM
 #define WM_CAMERA_DEVICES_MAX 8  // cameras of a robot
@@ -119,14 +160,40 @@ typedef struct wm_devices_config {
   size_t camera_count;
   wm_lcm_device_config lcm[WM_LCM_DEVICES_MAX];
   size_t lcm_count;
+  wm_gpsd_device_config gpsd[WM_GPSD_DEVICES_MAX];
+  size_t gpsd_count;
+  wm_iio_device_config iio;
   int32_t sightings_by_lcm;  // another program on the robot sends them
 } wm_devices_config;
+
+// Devices that give rows of a stream: at most WM_ROW_DEVICES_MAX.
+static inline size_t wm_devices_rows(const wm_devices_config *self) {
+  return self->lcm_count + self->gpsd_count + (self->iio.device[0] != '\0');
+}
+// Devices that can be recorded or localized by.
+static inline size_t wm_devices_count(const wm_devices_config *self) {
+  return self->can_count + self->camera_count + wm_devices_rows(self) + (self->sightings_by_lcm != 0);
+}
 
 // A SocketCAN interface: quantities by its DBC and binding, filtered by the kernel to the bound ids. *quantities: bit
 // per wm_quantity that it can give. The GNSS part gives positions about the origin. *out is NULL without bindings of
 // that part. WM_BAD_CONFIG for a wrong DBC or binding.
 wm_status wm_can_device_open(const wm_can_device_config *config, wm_can_part part, const double gnss_origin[3],
                              wm_source **out, uint32_t *quantities, wm_error *err);
+
+// An IMU of Linux IIO as rows of `imu`: its buffer is set up where it is not yet, which needs the right to write to
+// sysfs. `root` stands before each path ("" on a real computer; a test has its own tree). Allocates.
+wm_status wm_iio_open(const wm_iio_device_config *config, const char *root, wm_row_device **out, wm_error *err);
+// Sets the buffer up and starts it. NULL, or in `text` the fault with its remedy. *is_there: a device of that name.
+const char *wm_iio_prepare(const wm_iio_device_config *config, const char *root, int *is_there, char *text,
+                           size_t room);
+// The same without a change: what is missing. *is_ready: it may be read at once.
+const char *wm_iio_inspect(const wm_iio_device_config *config, const char *root, int *is_there, int *is_ready,
+                           char *text, size_t room);
+
+// A receiver by gpsd as rows of `gnss` or `heading`, in metres east and north of `origin` (degrees, degrees, metres
+// above the ellipsoid). WM_BAD_CONFIG without one. Allocates.
+wm_status wm_gpsd_open(const wm_gpsd_device_config *config, const double origin[3], wm_row_device **out, wm_error *err);
 
 #ifdef __cplusplus
 }

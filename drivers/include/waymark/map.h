@@ -42,6 +42,8 @@ typedef struct wm_grey {
 // other, broken or truncated files; WM_OUT_OF_RANGE beyond the limits above.
 wm_status wm_grey_load(const char *path, wm_grey *out, wm_error *err);
 wm_status wm_grey_decode(const void *bytes, size_t size, const char *path, wm_grey *out, wm_error *err);
+// The bytes of a PNG; the caller frees *out. WM_IO without memory.
+wm_status wm_grey_encode(const wm_grey *grey, const char *path, void **out, size_t *size, wm_error *err);
 
 #ifdef __cplusplus
 }

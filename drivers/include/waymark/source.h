@@ -32,6 +32,7 @@ typedef struct wm_source_counts {
   // Devices: wm_device_state with a note for the user, and the uncertainty of stamps.
   uint8_t device;
   char device_note[160];
+  uint32_t news;  // changes that are reported without a change of the device's state: another type of fix
   wm_time_ns stamp_uncertainty_ns;
   uint64_t looks[WM_LOOK_COUNT];  // of a detector of known landmarks: search outcomes over all pictures
 } wm_source_counts;
@@ -68,6 +69,9 @@ struct wm_source {
   // `now_ns`, on the clock of the arrivals, are skipped and counted (overflows).
   void (*skip_to)(wm_source *self, wm_time_ns now_ns);
 };
+
+// Counts an unusable datum; the first one's reason is kept.
+void wm_source_refuse(wm_source_counts *counts, const char *where, const char *why);
 
 #ifdef __cplusplus
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // YAML with line numbers, for configuration and calibration: a document read whole (libyaml), typed getters with file,
-// line and key in their errors, and a check for unknown keys with "did you mean". At start only; allocates.
+// line and key in their errors, and a check for unknown keys with "did you mean". Not for a real-time thread:
+// allocates.
 #ifndef WAYMARK_YAML_H
 #define WAYMARK_YAML_H
 

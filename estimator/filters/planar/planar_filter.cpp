@@ -3,13 +3,14 @@
 
 #include <cstring>
 
+#include "filters/planar/past_pose.hpp"
 #include "math/covariance.hpp"
 
 namespace wm {
 
 int planar_filter::count_motion_states(const wm_motion_states &states, int model) {
   int count = count_velocity_states(model);
-  for (int i = 0; i < kCalibrationCount; i++) count += may_be_state(states.sigma[i], i, model);
+  for (int i = 0; i < kCalibrationCount; i++) count += may_be_state(states, i, model);
   return count + wheel_heading::count_states(states);
 }
 
@@ -27,8 +28,8 @@ void planar_filter::init(const wm_setup &setup, const wm_motion_states &motion, 
   add_state(finite(setup.start.p_m[1]) ? setup.start.p_m[1] : 0.0, sigma_xy);
   add_state(finite(setup.start.heading_rad) ? wrap(setup.start.heading_rad) : 0.0, sigma_heading);
   for (int i = 0; i < kCalibrationCount; i++) {
-    const bool on = may_be_state(motion.sigma[i], i, setup.motion->model);
-    set_motion_state(motion, i, on ? add_state(calibration_.value[i], start_sigma(motion.sigma[i])) : -1);
+    const bool on = may_be_state(motion, i, setup.motion->model);
+    set_motion_state(motion, i, on ? add_state(calibration_.value[i], start_sigma(motion, i)) : -1);
   }
   if (count_velocity_states(setup.motion->model) > 0) {
     set_velocity_states(n_);
@@ -63,13 +64,11 @@ void planar_filter::move(const wm_event &motion) {
 
 // The lag has become a state while the robot moves. The pose has been ahead by the lag since the robot stood.
 void planar_filter::begin_lag() {
-  const double heading = x()[kHeading];
-  const sin_cos h = sincos(heading);
-  const planar_twist &t = twist();
-  const double ahead[kPoseStates] = {t.v * h.cos - t.u * h.sin, t.v * h.sin + t.u * h.cos, t.w};
+  double behind[kPoseStates];
+  put_age(twist(), sincos(x()[kHeading]), behind);
   for (int i = 0; i < kPoseStates; i++) {
     planar_row by;
-    by.add(motion_state_[kLag], -ahead[i]);
+    by.add(motion_state_[kLag], behind[i]);
     carry_state(i, by, 0.0, 0.0);
   }
 }

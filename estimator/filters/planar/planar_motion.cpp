@@ -15,7 +15,7 @@ constexpr double kSteady_s = 0.1;
 
 void planar_motion::init_motion(const wm_setup &setup) {
   front_.init(setup.motion, &setup.wheels, setup.rig);
-  calibration_ = kNeutralCalibration;
+  for (int i = 0; i < kCalibrationCount; i++) calibration_.value[i] = start_value(setup.motion->states, i);
   for (int &state : motion_state_) state = -1;
   for (int &state : own_state_) state = -1;
   kind_ = kKindUnknown;
@@ -35,7 +35,7 @@ void planar_motion::set_sensor_state(int state, double walk, double low, double 
 
 void planar_motion::set_motion_state(const wm_motion_states &states, int i, int state) {
   walk_[i] = square(states.walk[i]);
-  start_variance_[i] = square(states.sigma[i]);
+  start_variance_[i] = square(start_sigma(states, i));
   own_state_[i] = state;
   by_kind_[i] = states.sigma[i] < 0.0;
   motion_state_[i] = by_kind_[i] ? -1 : state;

@@ -148,7 +148,7 @@ class planar_motion {
   void list_motion_states_of(const Filter &filter, calibration_list *out) const {
     for (int i = 0; i < kMotionStates; i++)
       if (const int state = motion_state_[i]; state >= 0)
-        out->add(kMotionStateNames[i], filter.value(state), std::sqrt(filter.variance(state)));
+        out->add(motion_state_name(i), filter.value(state), std::sqrt(filter.variance(state)));
   }
 
   motion_front_end front_;

@@ -9,37 +9,39 @@ namespace {
 
 // A robot that turns faster spins: no landmark is identified then.
 constexpr double kTurnMost_radps = 10.0;
-// Limits of the calibration's terms, by calibration_index: beyond, the model is wrong, or the lag exceeds the history.
-constexpr double
-    kLowest[kMotionStates] = {0.3,
-                              0.3,
-                              -1.0,
-                              0.3,
-                              0.3,
-                              0.3,
-                              -0.5,
-                              0.0,
-                              -1.0,
-                              -1.0,
-                              -1.0,
-                              -1.0,
-                              -kSpeedMost_mps,
-                              -kSpeedMost_mps,
-                              -kTurnMost_radps},
-    kHighest[kMotionStates] = {
-        3.0, 3.0, 1.0, 3.0, 3.0, 3.0, 0.5, 0.8, 1.0, 1.0, 1.0, 2.0, kSpeedMost_mps, kSpeedMost_mps, kTurnMost_radps};
+// Names of the motion's states, and limits beyond which the model is wrong, or the lag exceeds the history; by
+// calibration_index and those behind.
+constexpr struct {
+  const char *name;
+  double lowest, highest;
+} kRows[kMotionStates] = {
+    {"motion.speed_scale", 0.3, 3.0},
+    {"motion.yaw_rate_scale", 0.3, 3.0},
+    {"motion.yaw_rate_bias_radps", -1.0, 1.0},
+    {"motion.left_scale", 0.3, 3.0},
+    {"motion.right_scale", 0.3, 3.0},
+    {"motion.track_scale", 0.3, 3.0},
+    {"motion.steering_offset_rad", -0.5, 0.5},
+    {"motion.lag_s", 0.0, 0.8},
+    {"motion.turn_slowdown_mps", -1.0, 1.0},
+    {"motion.speed_onset_s", -1.0, 1.0},
+    {"motion.turn_onset_s", -1.0, 1.0},
+    {"motion.gentle_turns", -1.0, 2.0},
+    {"motion.side_scale", 0.3, 3.0},
+    {"motion.rotation_center_m", -5.0, 5.0},
+    {"motion.velocity_x_mps", -kSpeedMost_mps, kSpeedMost_mps},
+    {"motion.velocity_y_mps", -kSpeedMost_mps, kSpeedMost_mps},
+    {"motion.turn_rate_radps", -kTurnMost_radps, kTurnMost_radps},
+};
 
 }  // namespace
 
-const char *const kMotionStateNames[kMotionStates] = {
-    "motion.speed_scale",       "motion.yaw_rate_scale", "motion.yaw_rate_bias_radps", "motion.left_scale",
-    "motion.right_scale",       "motion.track_scale",    "motion.steering_offset_rad", "motion.lag_s",
-    "motion.turn_slowdown_mps", "motion.speed_onset_s",  "motion.turn_onset_s",        "motion.gentle_turns",
-    "motion.velocity_x_mps",    "motion.velocity_y_mps", "motion.turn_rate_radps"};
+const char *motion_state_name(int calibration_index) { return kRows[calibration_index].name; }
 
 double motion_state_within_limits(int calibration_index, double value) {
-  if (value < kLowest[calibration_index]) return kLowest[calibration_index];
-  return value > kHighest[calibration_index] ? kHighest[calibration_index] : value;
+  const auto &row = kRows[calibration_index];
+  if (value < row.lowest) return row.lowest;
+  return value > row.highest ? row.highest : value;
 }
 
 namespace {

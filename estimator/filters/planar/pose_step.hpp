@@ -14,7 +14,7 @@ enum pose_state { kX = 0, kY = 1, kHeading = 2 };
 inline constexpr int kPoseStates = 3;  // x, y, heading
 
 struct pose_step {
-  static constexpr int kMaxColumns = 13;  // the heading, and the calibration's twelve terms; a model has fewer
+  static constexpr int kMaxColumns = 15;  // the heading, and the calibration's fourteen terms; a model has fewer
   double x_m, y_m, turn_rad;              // motion of the pose, in map
   wm_pose2 body;                          // the same in base_link at the segment's beginning
   // F is the identity but for the pose's rows, which have by[k][row] besides in column[k].
@@ -29,8 +29,8 @@ struct pose_step {
 pose_step make_pose_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
                          double heading_rad, const planar_twist &before, const int motion_state[kMotionStates]);
 
-// Names of the motion's states, by calibration_index and those behind.
-extern const char *const kMotionStateNames[kMotionStates];
+// Name of a state of the motion, by calibration_index and those behind.
+const char *motion_state_name(int calibration_index);
 // The value cut to the state's limits. Beyond them the model is wrong; a scale of 0 or a lag beyond the history would
 // break the filter.
 double motion_state_within_limits(int calibration_index, double value);

@@ -3,6 +3,7 @@
 
 #include <cstring>
 
+#include "filters/planar/past_pose.hpp"
 #include "math/arc.hpp"
 #include "math/cholesky.hpp"
 #include "math/elementary.hpp"
@@ -44,7 +45,7 @@ namespace {
 
 bool is_wheel(int i) { return i == kLeftScale || i == kRightScale; }
 bool is_on(const wm_motion_states &states, int model, const joint_state::wheel_slip &slip, int i) {
-  return may_be_state(states.sigma[i], i, model) || (is_wheel(i) && slip.sigma > 0.0);
+  return may_be_state(states, i, model) || (is_wheel(i) && slip.sigma > 0.0);
 }
 
 }  // namespace
@@ -60,7 +61,7 @@ void joint_state::set_motion_states(const wm_motion_states &states, int model, c
   for (int i = 0; i < kCalibrationCount; i++) {
     const bool on = is_on(states, model, slip, i);
     set_motion_state(states, i, on ? first++ : -1);
-    if (on) forget(own_state_[i], kNeutralCalibration.value[i], start_variance_[i]);
+    if (on) forget(own_state_[i], calibration_.value[i], start_variance_[i]);
   }
   if (count_velocity_states(model) > 0) set_velocity_states(first);
   for (int k = 0; k < count_velocity_states(model); k++) forget(first++, 0.0, square(velocity_sigma(k)));
@@ -87,8 +88,9 @@ void joint_state::take_kept(const double scale_origin_m[2]) {
   take_calibration(x());
 }
 
-void joint_state::move(const wm_event &motion) {
+bool joint_state::move(const wm_event &motion) {
   const int32_t kind = kind_;
+  const int had_lag = motion_state_[kLag];
   if (const int state = feed(motion); state >= 0) {
     forget(state, 1.0, start_variance_[kSpeedScale]);
     anchor_scale_again();
@@ -96,6 +98,10 @@ void joint_state::move(const wm_event &motion) {
   if (kind_ != kind) take_calibration(x());  // values that a kept map brought along
   limit_gyro_scale(this);
   move_to(motion.t_ns);
+  const int lag = motion_state_[kLag];
+  // The lag of a kept map has a smaller variance: it stays, with its covariances.
+  const bool lag_begins = had_lag < 0 && lag >= 0 && p().at(lag, lag) >= start_variance_[kLag];
+  if (lag_begins) begin_lag();
   double innovation, variance;
   if (standstill_bias(&innovation, &variance)) {
     joint_row row;
@@ -105,6 +111,20 @@ void joint_state::move(const wm_event &motion) {
     prepare(&row, &innovation, &variance, 1, &block);
     (void)fuse(block, &none, scope::all);  // one row with noise of its own: it can't fail
   }
+  return lag_begins;
+}
+
+void joint_state::begin_lag() {
+  double behind[kPoseStates];
+  put_age(twist(), sincos(value(kHeading)), behind);
+  joint_row rows[kPoseStates];
+  const double noise[kPoseStates][3] = {};
+  const double values[kPoseStates] = {value(kX), value(kY), value(kHeading)};
+  for (int i = 0; i < kPoseStates; i++) {
+    rows[i].add(i, 1.0);
+    rows[i].add(motion_state_[kLag], behind[i]);
+  }
+  assign(kX, kPoseStates, rows, noise, values);
 }
 
 void joint_state::move_to(wm_time_ns t_ns) {
@@ -387,6 +407,20 @@ void joint_state::keep_places(int own, double *change) {
   vectors::set_scaled(gain(2), gain(1), 0.5, even(n_));
 }
 
+// A motion state that `change` moves beyond its limit stays there, and the others go along by the covariance that the
+// correction leaves: P - W W', W the gains.
+void joint_state::keep_limits(int rows, double *change) {
+  double after[kMaxRobot], back;
+  for (int j = kPoseStates; j < layout_.first_clone; j++) after[j] = value(j) + change[j];
+  const int state = beyond_limit(after, &back);
+  if (state < 0) return;
+  const half_covariance cov = p();
+  double *left = column(1 + kRows);
+  for (int j = 0; j < even(n_); j++) left[j] = j < n_ ? cov.at(state, j) : 0.0;
+  for (int k = 0; k < rows; k++) vectors::add_scaled(left, gain(k), -gain(k)[state], even(n_));
+  if (left[state] > 0.0) vectors::add_scaled(change, left, back / left[state], even(n_));
+}
+
 bool joint_state::fuse(innovation_block &block, const double *added_noise, scope which, int own) {
   const int rows = block.rows;
   if (!(block.determinant > 0.0)) return false;
@@ -410,6 +444,7 @@ bool joint_state::fuse(innovation_block &block, const double *added_noise, scope
   for (int k = 1; k < rows; k++) vectors::add_scaled(r, gain(k), y[k], even(n_));
   const bool keeps = which == scope::directions;
   if (keeps) keep_places(own, r);
+  if (which == scope::all) keep_limits(rows, r);
   if (which != scope::all && !keeps) {
     fuse_part(which == scope::pose ? (int)kPoseStates : layout_.robot_states, rows, r);
     return true;

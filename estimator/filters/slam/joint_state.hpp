@@ -79,7 +79,8 @@ class joint_state : public planar_motion {
   bool has_way_scale() const;
 
   // ---- time and motion ----
-  void move(const wm_event &motion);
+  // True: the lag has become a state.
+  bool move(const wm_event &motion);
   void move_to(wm_time_ns t_ns);
   void list_motion_states(calibration_list *list) const;
   void estimate(wm_estimate *out) const;
@@ -166,7 +167,10 @@ class joint_state : public planar_motion {
   double *gain(int k) { return column(1 + k); }
 
   void propagate(const motion_segment &piece, const motion_twist &twist, const motion_noise &noise);
+  // The robot moves. The pose has been ahead by the lag since the robot stood.
+  void begin_lag();
   void keep_places(int own, double *change);
+  void keep_limits(int rows, double *change);
   void move_mean(const double *change, double *e);
   void move_place(int state, const double *change, const sin_cos &turn, const double way[2], double *e);
   void fuse_part(int states, int rows, const double *change);

@@ -305,7 +305,7 @@ wm_status slam::predict(const wm_event &motion) {
   if (status != WM_OK) return status;
   const bool had_scale = joint_.has_way_scale();
   const double heading_rad2 = joint_.variance(kHeading);
-  joint_.move(motion);
+  if (joint_.move(motion)) slots_.begin_lag(*setup_, &joint_);
   // Beyond that a correction's linearization is wrong: the pose is to be found in the map.
   if (params_.recover && life_.tracking() && joint_.variance(kHeading) > heading_rad2 + kUnknownHeading_rad2) lose();
   if (joint_.has_way_scale() != had_scale) follow_scale();

@@ -79,6 +79,7 @@ wm_stereo_ekf_params usable(const wm_stereo_ekf_params &params, const stereo_rig
 
 // The velocities' noise is its own; twists' own states carry their errors.
 const char *const kReads[] = {"!motion.twist",
+                              "!motion.drive",
                               "!motion.noise.",
                               "!motion.states.",
                               "!motion.commands.",

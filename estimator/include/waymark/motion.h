@@ -40,6 +40,9 @@ const char *wm_motion_params_clash(const wm_motion_params *params, const char **
 const char *wm_motion_lacks(const wm_motion_params *params, const wm_wheels *wheels, uint32_t kinds,
                             uint32_t quantities);
 
+// motion.model `auto` becomes `constant_velocity` where no source (`kinds`) gives motion.
+void wm_motion_choose(wm_motion_params *params, uint32_t kinds);
+
 // Health of the motion sensors, bits of motion_health. None of these is standstill or a straight drive.
 #define WM_MOTION_HEALTH_ENCODER_LEFT_DEAD (1u << 0)
 #define WM_MOTION_HEALTH_ENCODER_RIGHT_DEAD (1u << 1)
@@ -62,6 +65,8 @@ typedef enum wm_motion_term {
   WM_SPEED_ONSET,      // s by which a rise of the commanded speed comes later than a fall: the rise times this is lost
   WM_TURN_ONSET,       // the same of the turn rate
   WM_GENTLE_TURNS,     // share by which gentle turns are driven with the largest radius of a drive by radius
+  WM_SIDE_SCALE,       // of the sideways speed, besides the speed's
+  WM_ROTATION_CENTER,  // m, x of the centre of rotation in base_link: sideways speed = -x * turn rate
   WM_MOTION_TERMS
 } wm_motion_term;
 

@@ -3,6 +3,7 @@
 
 #include <dirent.h>
 #include <errno.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,16 +11,25 @@
 #include <unistd.h>
 
 #include "waymark/text.h"
+#include "waymark/yaml.h"
 
 #define FILE_BYTES_MAX ((size_t)512 << 20)
 
+// Files of a recording that a configuration may name in their place.
+#define NAMED_COUNT 5
+static const struct {
+  const char *file, *key;
+  size_t offset;
+} kNamed[NAMED_COUNT] = {{"calibration.yaml", "calibration", offsetof(wm_recording_overrides, calibration)},
+                         {"landmarks.csv", "landmarks", offsetof(wm_recording_overrides, landmarks)},
+                         {"vehicle.dbc", "dbc", offsetof(wm_recording_overrides, dbc)},
+                         {"can-signals.yaml", "can_signals", offsetof(wm_recording_overrides, can_signals)},
+                         {"map/map.yaml", "map", offsetof(wm_recording_overrides, map)}};
+
 static char *overridden(wm_recording_overrides *all, const char *file) {
-  return strcmp(file, "calibration.yaml") == 0   ? all->calibration
-         : strcmp(file, "landmarks.csv") == 0    ? all->landmarks
-         : strcmp(file, "vehicle.dbc") == 0      ? all->dbc
-         : strcmp(file, "can-signals.yaml") == 0 ? all->can_signals
-         : strcmp(file, "map/map.yaml") == 0     ? all->map
-                                                 : NULL;
+  for (size_t i = 0; i < NAMED_COUNT; i++)
+    if (strcmp(file, kNamed[i].file) == 0) return (char *)all + kNamed[i].offset;
+  return NULL;
 }
 
 static wm_status path_in(const char *dir, const char *file, char out[WM_PATH_MAX], wm_error *err) {
@@ -27,24 +37,24 @@ static wm_status path_in(const char *dir, const char *file, char out[WM_PATH_MAX
   return wm_fail(err, WM_BAD_USAGE, "%s/%s: the path is longer than %d bytes", dir, file, WM_PATH_MAX - 1);
 }
 
-static wm_status read_original(const char *dir, const wm_recording_overrides *overrides, const char *file, char **text,
-                               size_t *length, wm_error *err) {
+static wm_status read_original(const char *dir, const wm_recording_overrides *overrides, const file_edit *edit,
+                               char **text, size_t *length, wm_error *err) {
   char path[WM_PATH_MAX];
   wm_recording_overrides all = *overrides;
-  const char *named = overridden(&all, file);
+  const char *file = edit->file, *named = edit->is_config ? file : overridden(&all, file);
   if (named && named[0]) return wm_text_read_file(named, FILE_BYTES_MAX, text, length, err);
   wm_status status = path_in(dir, file, path, err);
   return status == WM_OK ? wm_text_read_file(path, FILE_BYTES_MAX, text, length, err) : status;
 }
 
-// The file with all of its edits.
-static wm_status edited(const changed_copy *self, const wm_recording_overrides *overrides, const char *file,
+// The file of the edit `of`, with all of its edits.
+static wm_status edited(const char *dir, const wm_recording_overrides *overrides, const file_edit *of,
                         const file_edit *edits, size_t count, const char *comment, char **text, size_t *length,
                         wm_error *err) {
-  wm_status status = read_original(self->dir, overrides, file, text, length, err);
+  wm_status status = read_original(dir, overrides, of, text, length, err);
   for (size_t i = 0; status == WM_OK && i < count; i++) {
     char *fresh;
-    if (strcmp(edits[i].file, file) != 0) continue;
+    if (strcmp(edits[i].file, of->file) != 0) continue;
     status = edit_text(&edits[i], *text, *length, comment, &fresh, length, err);
     if (status == WM_NOT_FOUND && edits[i].is_optional) {
       status = WM_OK;
@@ -146,8 +156,9 @@ wm_status changed_copy_make(changed_copy *self, const wm_recording_overrides *ov
   for (size_t i = 0; status == WM_OK && i < count; i++) {
     char path[WM_PATH_MAX], *text = NULL;
     size_t length;
-    if (is_edited(edits, i, edits[i].file)) continue;  // written with all of its edits
-    status = edited(self, overrides, edits[i].file, edits, count, comment, &text, &length, err);
+    // Written with all of its edits, or by changed_config.
+    if (edits[i].is_config || is_edited(edits, i, edits[i].file)) continue;
+    status = edited(self->dir, overrides, &edits[i], edits, count, comment, &text, &length, err);
     if (status != WM_OK) break;
     status = path_in(self->out, edits[i].file, path, err);
     if (status == WM_OK) status = write_text(path, text, length, err);
@@ -157,6 +168,53 @@ wm_status changed_copy_make(changed_copy *self, const wm_recording_overrides *ov
   }
   if (status == WM_OK && comment[0]) status = note_tables(self, original, edits, count, comment, err);
   free(original);
+  return status;
+}
+
+wm_status changed_config(const file_edit *edits, size_t count, const char *comment, char **text, size_t *length,
+                         wm_error *err) {
+  static const wm_recording_overrides kNone;
+  for (size_t i = 0; i < count; i++)
+    if (edits[i].is_config) return edited("", &kNone, &edits[i], edits, count, comment, text, length, err);
+  *text = NULL;
+  return WM_OK;
+}
+
+// The files that the configuration names, by paths that hold in another folder.
+static wm_status name_files(const wm_recording_overrides *files, char **text, size_t *length, wm_error *err) {
+  wm_status status = WM_OK;
+  for (size_t i = 0; status == WM_OK && i < NAMED_COUNT; i++) {
+    const char *named = (const char *)files + kNamed[i].offset;
+    char *real = named[0] ? realpath(named, NULL) : NULL, *fresh, quoted[WM_PATH_MAX + 2];
+    if (!real) continue;
+    (void)snprintf(quoted, sizeof quoted, "\"%s\"", real);
+    free(real);
+    status = wm_yaml_edit(*text, *length, kNamed[i].key, quoted, "", &fresh, length, err);
+    if (status != WM_OK) break;
+    free(*text);
+    *text = fresh;
+  }
+  return status;
+}
+
+wm_status changed_copy_config(const changed_copy *self, const wm_config *config, const file_edit *edits, size_t count,
+                              const char *comment, char written[WM_PATH_MAX], wm_error *err) {
+  char *text;
+  size_t length;
+  const char *slash = strrchr(config->path, '/');
+  written[0] = '\0';
+  wm_status status = changed_config(edits, count, comment, &text, &length, err);
+  int is_renamed = 0;
+  for (size_t i = 0; i < NAMED_COUNT; i++)
+    is_renamed |= strcmp((const char *)&self->overrides + kNamed[i].offset,
+                         (const char *)&config->overrides + kNamed[i].offset) != 0;
+  if (status == WM_OK && !text && is_renamed)
+    status = wm_text_read_file(config->path, FILE_BYTES_MAX, &text, &length, err);
+  if (status != WM_OK || !text) return status;
+  status = name_files(&self->overrides, &text, &length, err);
+  if (status == WM_OK) status = path_in(self->out, slash ? slash + 1 : config->path, written, err);
+  if (status == WM_OK) status = write_text(written, text, length, err);
+  free(text);
   return status;
 }
 
@@ -205,7 +263,8 @@ static int write_change(const file_edit *edit, const char *before, const char *a
   if (edit->kind == EDIT_VALUE)
     return snprintf(out, capacity, "%s%s:%d: `%s: %s`", comma, edit->file, line, dot ? dot + 1 : edit->name,
                     edit->text);
-  if (edit->kind == EDIT_IDS) return snprintf(out, capacity, "%s%s: %s", comma, edit->file, words);
+  if (edit->kind == EDIT_IDS || edit->kind == EDIT_MIRROR)
+    return snprintf(out, capacity, "%s%s: %s", comma, edit->file, words);
   return snprintf(out, capacity, "%s%s:%d: %s%s`%.*s`%s", comma, edit->file, line, words, words[0] ? ": " : "",
                   shown < LINE_SHOWN_MAX ? shown : LINE_SHOWN_MAX, at, words[0] ? " and so each row" : "");
 }
@@ -217,7 +276,7 @@ void changed_lines(const char *dir, const wm_recording_overrides *overrides, con
   for (size_t i = 0; i < count && used < capacity; i++) {
     char *before, *after;
     size_t length;
-    if (edits[i].is_optional || read_original(dir, overrides, edits[i].file, &before, &length, NULL) != WM_OK) continue;
+    if (edits[i].is_optional || read_original(dir, overrides, &edits[i], &before, &length, NULL) != WM_OK) continue;
     if (edit_text(&edits[i], before, length, "", &after, &length, NULL) == WM_OK) {
       char *ended = realloc(after, length + 1);
       if (ended) {

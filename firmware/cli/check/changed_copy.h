@@ -5,6 +5,7 @@
 #define WAYMARK_CLI_CHECK_CHANGED_COPY_H
 
 #include "cli/check/edits.h"
+#include "config/config.h"
 #include "waymark/site.h"
 
 typedef struct changed_copy {
@@ -13,10 +14,18 @@ typedef struct changed_copy {
   char out[WM_PATH_MAX];             // the copy
 } changed_copy;
 
-// Makes the folder `out`, which must not be there. `comment` as in edit_text; with one, changed tables are listed in
+// Makes the folder `out`, which must not be there. Edits of the configuration
+// are left out. `comment` as in edit_text; with one, changed tables are listed in
 // comments of recording.yaml.
 wm_status changed_copy_make(changed_copy *self, const wm_recording_overrides *overrides, const file_edit *edits,
                             size_t count, const char *comment, wm_error *err);
+// The configuration's text with its edits; NULL where it has none. The caller frees it.
+wm_status changed_config(const file_edit *edits, size_t count, const char *comment, char **text, size_t *length,
+                         wm_error *err);
+// Writes the configuration with its edits into the copy, where it has any or names a file that the copy has changed;
+// the files that it names have absolute paths there. `written`: its path, "" if none.
+wm_status changed_copy_config(const changed_copy *self, const wm_config *config, const file_edit *edits, size_t count,
+                              const char *comment, char written[WM_PATH_MAX], wm_error *err);
 // Removes a copy that changed_copy_make made.
 void changed_copy_remove(const changed_copy *self);
 

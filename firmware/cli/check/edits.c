@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "waymark/map.h"
 #include "waymark/text.h"
 #include "waymark/yaml.h"
 
@@ -206,6 +207,27 @@ static wm_status edit_signal(const file_edit *edit, const char *text, size_t len
   return WM_OK;
 }
 
+// ── pictures ────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static wm_status edit_picture(const file_edit *edit, const char *bytes, size_t length, char **out, size_t *out_length,
+                              wm_error *err) {
+  wm_grey picture;
+  wm_status status = wm_grey_decode(bytes, length, edit->file, &picture, err);
+  if (status != WM_OK) return status;
+  const size_t width = picture.width_px, height = picture.height_px, count = width * height;
+  for (size_t i = 0; i < count; i++) {
+    const size_t row = i / width, column = i % width;
+    const size_t other = edit->factor < 0 ? (height - 1 - row) * width + column : row * width + width - 1 - column;
+    if (other <= i) continue;
+    const uint8_t kept = picture.pixels[i];
+    picture.pixels[i] = picture.pixels[other];
+    picture.pixels[other] = kept;
+  }
+  status = wm_grey_encode(&picture, edit->file, (void **)out, out_length, err);
+  free(picture.pixels);
+  return status;
+}
+
 // ── interface ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
 wm_status edit_text(const file_edit *edit, const char *text, size_t length, const char *comment, char **out,
@@ -214,6 +236,7 @@ wm_status edit_text(const file_edit *edit, const char *text, size_t length, cons
   if (edit->kind == EDIT_VALUE)
     return wm_yaml_edit(text, length, edit->name, edit->text, comment, out, out_length, err);
   if (edit->kind == EDIT_SIGNAL) return edit_signal(edit, text, length, comment, out, out_length, err);
+  if (edit->kind == EDIT_MIRROR) return edit_picture(edit, text, length, out, out_length, err);
   return edit_table(edit, (slice){text, length}, out, out_length, err);
 }
 
@@ -228,6 +251,9 @@ void edit_words(const file_edit *edit, char *out, size_t capacity) {
   switch (edit->kind) {
     case EDIT_SWAP: (void)snprintf(out, capacity, "swap the columns %s and %s", name, edit->text); return;
     case EDIT_SORT: (void)snprintf(out, capacity, "sort the rows by %s", name); return;
+    case EDIT_MIRROR:
+      (void)snprintf(out, capacity, "mirror the picture (%s)", edit->factor < 0 ? "top and bottom" : "left and right");
+      return;
     case EDIT_IDS:
       if (is_reversed) used += (size_t)snprintf(out, capacity, "id = %" PRId32 " - id: ", ids->from[0] + ids->to[0]);
       for (size_t i = 0; i < ids->count && used + 24 < capacity; i++)

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Changes of the text of a recording's files: a column of a table, a value of a YAML file, a signal of a DBC file. A
-// trial reads files with such changes, a fix states them, and a corrected copy has them.
+// Changes of a recording's files and of the configuration: a column of a table, a value of a YAML file, a signal of a
+// DBC file, a mirrored picture. A trial reads files with such changes, a fix states them, and a corrected copy has
+// them.
 #ifndef WAYMARK_CLI_CHECK_EDITS_H
 #define WAYMARK_CLI_CHECK_EDITS_H
 
 #include <stddef.h>
 #include <stdint.h>
 
+#include "waymark/site.h"
 #include "waymark/status.h"
 
 typedef enum file_edit_kind {
@@ -15,7 +17,8 @@ typedef enum file_edit_kind {
   EDIT_IDS,     // by `ids`
   EDIT_SORT,    // rows by the column `name`
   EDIT_VALUE,   // of YAML: `text` at the path `name`
-  EDIT_SIGNAL   // of the DBC's signal `name`: by `layout`, `factor` of its scale, `offset` of its first bit
+  EDIT_SIGNAL,  // of the DBC's signal `name`: by `layout`, `factor` of its scale, `offset` of its first bit
+  EDIT_MIRROR   // of a picture: left and right swapped; `factor` -1: top and bottom
 } file_edit_kind;
 
 typedef enum signal_layout {
@@ -33,7 +36,8 @@ typedef struct id_table {
 
 typedef struct file_edit {
   file_edit_kind kind;
-  char file[64];  // in the recording's folder: "sightings.csv"
+  char file[WM_PATH_MAX];  // in the recording's folder: "sightings.csv"
+  int is_config;           // the file is the configuration, by its own path
   char name[96];
   char text[96];
   char only[64];  // rows of this sensor, signals of this message; "": of all

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "waymark/yaml.h"
+#include "waymark/detectors.h"
 
 #define DEG (M_PI / 180)
 
@@ -40,34 +40,6 @@ void source_seen_take(source_seen *self, const wm_event *event) {
     for (size_t i = 0; i < event->as.quantities.count; i++)
       self->quantities |= UINT32_C(1) << event->as.quantities.id[i];
   }
-}
-
-static void read_binding(const wm_yaml_node *item, binding_seen *out) {
-  char quantity[64] = "";
-  wm_yaml_node node = wm_yaml_get(item, "quantity");
-  (void)wm_yaml_string(&node, quantity, sizeof quantity, NULL);
-  out->quantity = wm_quantity_find(quantity);
-  node = wm_yaml_get(item, "message");
-  (void)wm_yaml_string(&node, out->message, sizeof out->message, NULL);
-  node = wm_yaml_get(item, "signal");
-  if (wm_yaml_is_scalar(&node)) (void)wm_yaml_string(&node, out->signal, sizeof out->signal, NULL);
-  node = wm_yaml_get(item, "scale");
-  if (!wm_yaml_there(&node) || wm_yaml_f64(&node, -1e9, 1e9, &out->scale, NULL) != WM_OK) out->scale = 1;
-}
-
-void suspect_files_read(suspect_files *self, const wm_config *config, const char *dir) {
-  char path[WM_PATH_MAX];
-  wm_yaml *doc;
-  memset(self, 0, sizeof *self);
-  const char *named = config->overrides.can_signals;
-  (void)snprintf(path, sizeof path, "%s%s", named[0] ? named : dir, named[0] ? "" : "/can-signals.yaml");
-  if (wm_yaml_load(path, &doc, NULL) != WM_OK) return;
-  const wm_yaml_node root = wm_yaml_root(doc);
-  for (size_t i = 0; i < wm_yaml_count(&root) && i < BINDINGS_SEEN_MAX; i++) {
-    const wm_yaml_node item = wm_yaml_item(&root, i);
-    read_binding(&item, &self->bindings[self->binding_count++]);
-  }
-  wm_yaml_free(doc);
 }
 
 // ── the list ────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -285,6 +257,34 @@ static void add_motion(list *out, const wm_assembly *assembly, const suspect_fil
   if (seen->kinds & WM_EVENT_BIT(WM_EVENT_TWIST6)) (void)add(out, SUSPECT_SIDEWAYS_FACTOR, source, 0, -1);
 }
 
+// A detector of square markers that saw none.
+static int is_blind_to_tags(const wm_assembly *assembly, const source_seen *seen) {
+  int is_blind = 0;
+  for (size_t i = 0; i < assembly->source_count; i++) {
+    if (strncmp(assembly->sources[i].name, "apriltag:", 9) != 0) continue;
+    if (seen[i].kinds) return 0;
+    is_blind = 1;
+  }
+  return is_blind;
+}
+
+static void add_files(list *out, const suspect_files *files) {
+  int latitude = -1, longitude = -1;
+  for (size_t i = 0; i < files->setting_count; i++) {
+    suspect *one = add(out, SUSPECT_SETTING, 0, 0, files->settings[i].usual);
+    one->item = (int16_t)i;
+  }
+  for (size_t i = 0; i < files->binding_count; i++) {
+    if (strcmp(files->bindings[i].quantity_name, "gnss_latitude") == 0) latitude = (int)i;
+    if (strcmp(files->bindings[i].quantity_name, "gnss_longitude") == 0) longitude = (int)i;
+  }
+  if (latitude < 0 || longitude < 0) return;
+  if (isfinite(files->origin[0])) (void)add(out, SUSPECT_ORIGIN_SWAP, 0, 0, 0);
+  suspect *both = add(out, SUSPECT_LATITUDE_SWAP, 0, 0, 0);
+  both->item = (int16_t)latitude;
+  both->other = (int16_t)longitude;
+}
+
 static void add_setup(list *out, const wm_setup *setup, uint32_t kinds) {
   if (setup->landmark_count > 0) {
     (void)add(out, SUSPECT_MAP_SWAP, 0, 0, 0);
@@ -298,7 +298,8 @@ static void add_setup(list *out, const wm_setup *setup, uint32_t kinds) {
     add_values(out, SUSPECT_TAG_FACTOR, 0, 0, VALUES(0.8, 1.25, 0.5, 2, 0.1, 10, 0.001, 0.01, 0.0254));
   if (kinds & WM_EVENT_BIT(WM_EVENT_POINTS) && setup->map)
     add_values(out, SUSPECT_PLAN_FACTOR, 0, 0, VALUES(0.5, 2, 0.1, 10, 0.0254));
-  if (kinds & WM_EVENT_BIT(WM_EVENT_STEREO)) add_values(out, SUSPECT_BASELINE_FACTOR, 0, 0, VALUES(0.5, 2, 0.1, 0.001));
+  if (!(kinds & WM_EVENT_BIT(WM_EVENT_STEREO))) return;
+  add_values(out, SUSPECT_BASELINE_FACTOR, 0, 0, VALUES(0.5, 2, 0.1, 0.001));
 }
 
 size_t suspects_list(const wm_assembly *assembly, const suspect_files *files, const source_seen *seen,
@@ -307,16 +308,30 @@ size_t suspects_list(const wm_assembly *assembly, const suspect_files *files, co
   const source_seen *motion = NULL;
   uint32_t kinds = 0;
   (void)add(&all, SUSPECT_NONE, 0, 0, 0);
+  for (int i = 1; is_blind_to_tags(assembly, seen) && wm_marker_family_names[i]; i++)
+    (void)add(&all, SUSPECT_TAG_FAMILY, 0, 0, i);
   for (size_t i = 0; i < assembly->source_count; i++) {
     kinds |= seen[i].kinds;
     if ((seen[i].kinds & WM_MOTION_EVENTS) && !motion) motion = &seen[i];
   }
   for (size_t i = 0; i < assembly->source_count; i++) {
+    if (seen[i].kinds & WM_EVENT_BIT(WM_EVENT_STEREO)) (void)add(&all, SUSPECT_STEREO_SWAP, i, 0, 0);
     if (seen[i].kinds & WM_MOTION_EVENTS)
       add_motion(&all, assembly, files, &seen[i], i);
     else if (seen[i].kinds)
       add_observations(&all, assembly, &seen[i], motion, i);
   }
   add_setup(&all, &assembly->setup, kinds);
+  add_files(&all, files);
+  if ((kinds & WM_EVENT_BIT(WM_EVENT_POINTS)) && files->plan_picture_count > 0)
+    add_values(&all, SUSPECT_PLAN_MIRROR, 0, 0, VALUES(1, -1));
   return all.count;
+}
+
+const char *suspect_source(const suspect *self, const wm_assembly *assembly) {
+  return self->source < assembly->source_count ? assembly->sources[self->source].name : "?";
+}
+
+const wm_sensor *suspect_sensor(const suspect *self, const wm_assembly *assembly) {
+  return self->sensor < assembly->setup.sensor_count ? &assembly->setup.sensors[self->sensor] : NULL;
 }

@@ -51,7 +51,13 @@ typedef enum suspect_kind {
   SUSPECT_TAG_FACTOR,       // value, of the markers' size
   SUSPECT_FOCAL_FACTOR,     // value, of the camera's intrinsics
   SUSPECT_PLAN_FACTOR,      // value, of the floor plan's resolution
-  SUSPECT_BASELINE_FACTOR   // value, of the stereo pair's baseline
+  SUSPECT_BASELINE_FACTOR,  // value, of the stereo pair's baseline
+  SUSPECT_STEREO_SWAP,      // left and right of the pair
+  SUSPECT_PLAN_MIRROR,      // value 1: left and right, -1: top and bottom of the floor plan's pictures
+  SUSPECT_TAG_FAMILY,       // value: of wm_marker_family_names
+  SUSPECT_ORIGIN_SWAP,      // latitude and longitude of the map's origin
+  SUSPECT_LATITUDE_SWAP,    // the bindings of latitude and longitude
+  SUSPECT_SETTING           // item: of the configuration's settings, which gets its default
 } suspect_kind;
 
 typedef struct suspect {
@@ -63,8 +69,15 @@ typedef struct suspect {
   const id_table *ids;
 } suspect;
 
+// Those of a sensor's mounting, and of the landmarks.
+static inline int suspect_is_mounting(suspect_kind kind) {
+  return kind >= SUSPECT_MOUNTING_YAW && kind <= SUSPECT_MOUNTING_Y;
+}
+static inline int suspect_is_map(suspect_kind kind) { return kind >= SUSPECT_MAP_SWAP && kind <= SUSPECT_MAP_FACTOR; }
+
 #define SUSPECTS_MAX 400
 #define BINDINGS_SEEN_MAX 24
+#define SETTINGS_SEEN_MAX 24
 
 // What a drive was seen to have, for the choice of the suspects.
 typedef struct source_seen {
@@ -79,13 +92,27 @@ void source_seen_take(source_seen *self, const wm_event *event);
 
 // Bindings of can-signals.yaml, as they are written.
 typedef struct binding_seen {
-  int quantity;
-  char message[64], signal[64];
+  int quantity;  // wm_quantity; -1: none
+  char quantity_name[64], message[64], signal[64];
   double scale;
 } binding_seen;
+// A number of the configuration, ten times as large or small as its default.
+typedef struct setting_seen {
+  char path[96];  // "sightings.noise.bearing_default_rad"
+  double value, usual;
+} setting_seen;
 typedef struct suspect_files {
   binding_seen bindings[BINDINGS_SEEN_MAX];
   size_t binding_count;
+  const wm_config *config;
+  setting_seen settings[SETTINGS_SEEN_MAX];
+  size_t setting_count;
+  char plan_pictures[3][WM_NAME_MAX + 8];  // of the recording's own map/map.yaml: "map/edges.png"
+  size_t plan_picture_count;
+  double origin[3];  // calibration.yaml: gnss.origin; NaN: none
+  // Of the configuration's detector of square markers, in place of those of calibration.yaml; 0: not given.
+  double tag_size_m;
+  int tag_family;
 } suspect_files;
 // `dir`: the recording's. Files that are not there are left out.
 void suspect_files_read(suspect_files *self, const wm_config *config, const char *dir);
@@ -98,6 +125,9 @@ size_t suspects_list(const wm_assembly *assembly, const suspect_files *files, co
 #define SUSPECT_EDITS_MAX 8
 size_t suspect_edits(const suspect *self, const wm_assembly *assembly, const suspect_files *files,
                      file_edit out[SUSPECT_EDITS_MAX]);
+// Of what it is.
+const char *suspect_source(const suspect *self, const wm_assembly *assembly);
+const wm_sensor *suspect_sensor(const suspect *self, const wm_assembly *assembly);
 // What it is: "the bearings of front are positive to the right".
 void suspect_text(const suspect *self, const wm_assembly *assembly, const suspect_files *files, char *what,
                   size_t capacity);

@@ -5,6 +5,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include "cli/check/changed_copy.h"
@@ -12,16 +14,25 @@
 #include "rt/forked.h"
 #include "waymark/recording.h"
 
-// All trials together take about so long: of longer recordings a part is driven.
-#define BUDGET_S 40.0
+// After this time no further round is begun. It is counted in the processors' time, which other programs on the same
+// computer do not lengthen. A round's first and second pass and all pairs may take these shares of what is left of it:
+// of longer recordings a part is driven.
+#define BUDGET_S 50.0
+#define FIRST_SHARE 0.4
+#define SECOND_SHARE 0.3
+#define LONGEST_SHARE 0.6  // of a first pass that takes longer than expected
+#define PAIRS_SHARE 0.8
+#define LEAST_S 3.0
 #define PART_MIN_S 10.0
 #define PART_MAX_S 60.0
+#define PART_STEP_S 5.0  // parts are multiples of it: the same for drives that took nearly the same time
 // A change explains the observations if each update gains so much of log likelihood, nats, and most updates are fused.
 #define GAIN_MIN 0.1
 #define EXPLAINED_MIN 0.85
 #define EXPLAINED_ALL 0.97  // then nothing is left to explain
 #define FINALISTS 8
-#define FIRSTS 4  // changes of which each is tried together with all others where none helps alone
+#define FIRSTS 4           // changes of which each is tried together with all others where none helps alone
+#define YAW_GAIN_MIN 0.02  // nats an update; below, the round value is kept: the filter's own state takes the rest
 // A drive that drops half of the observations is no better for it.
 #define UPDATES_MIN 0.5
 // nats an update, for each state of calibration beyond these limits: more than GAIN_MIN, less than wrong poses cost.
@@ -85,6 +96,19 @@ static wm_status open_changed(const trials_plan *plan, const file_edit *edits, s
   return status == WM_OK ? wm_recording_open(copy.out, &copy.overrides, NULL, NULL, out, err) : status;
 }
 
+// The plan's configuration, or one with the edits.
+static const wm_config *config_of(const trials_plan *plan, const file_edit *edits, size_t count, wm_config *changed,
+                                  wm_error *err) {
+  char *text;
+  size_t length;
+  if (changed_config(edits, count, "", &text, &length, err) != WM_OK) return NULL;
+  if (!text) return plan->config;
+  const wm_status status = wm_config_parse(text, length, plan->config->path, changed, err);
+  changed->overrides = plan->config->overrides;
+  free(text);
+  return status == WM_OK ? changed : NULL;
+}
+
 static trial_message drive(const trials_plan *plan, const char *folder, double until_s, const suspect *changes,
                            size_t count) {
   static trial self;
@@ -95,11 +119,13 @@ static trial_message drive(const trials_plan *plan, const char *folder, double u
   wm_error err = {0};
   const size_t edit_count = trials_edits(plan, changes, count, edits);
   if (edit_count == 0 && changes[count - 1].kind != SUSPECT_NONE) return none;
-  if (open_changed(plan, edits, edit_count, folder, &recording, &err) != WM_OK) return none;
+  static wm_config changed;
+  const wm_config *config = config_of(plan, edits, edit_count, &changed, &err);
+  if (!config || open_changed(plan, edits, edit_count, folder, &recording, &err) != WM_OK) return none;
   if (changes[count - 1].kind == SUSPECT_NO_IDENTITY) self.votes.given = plan->ids;
   const wm_replay_watch watch = {.context = &self, .arrived = self.votes.given ? arrived : NULL, .put = put};
   const wm_replay_options options = {.watch = &watch, .seed = 1, .until_s = until_s};
-  const wm_status status = wm_replay_recording(plan->config, recording, &options, &report, &err);
+  const wm_status status = wm_replay_recording(config, recording, &options, &report, &err);
   wm_recording_close(recording);
   if (status != WM_OK || self.evidence.updates == 0) return none;
   done.result = (trial_result){.is_valid = 1,
@@ -121,8 +147,35 @@ typedef struct pool {
   const suspect *of;   // one a trial, beside these
   size_t done, total;  // for the progress
   size_t started;
-  id_table *table;  // of the trial without identities
+  id_table *table;     // of the trial without identities
+  double begin_s;      // of spent_s
+  double at_once;      // processes
+  double used_s;       // of the budget, when the last trial ended
+  double pass_left_s;  // of left_s where a pass ends: trials of it that have not begun are left out
 } pool;
+
+// Processor time of all trials that have ended, s.
+static double spent_s(void) {
+  struct rusage all;
+  if (getrusage(RUSAGE_CHILDREN, &all) != 0) return 0;
+  return (double)(all.ru_utime.tv_sec + all.ru_stime.tv_sec) +
+         1e-6 * (double)(all.ru_utime.tv_usec + all.ru_stime.tv_usec);
+}
+
+static double left_s(const pool *self) { return BUDGET_S - self->used_s; }
+
+// Ends this process after so much processor time.
+static void limit_s(double most_s) {
+  const struct itimerval limit = {.it_value = {.tv_sec = (time_t)ceil(most_s)}};
+  (void)setitimer(ITIMER_PROF, &limit, NULL);
+}
+
+// Of the recording, s: what `count` drives take in `most_s`.
+static double part_of(const pool *self, size_t count, double most_s) {
+  const double all_s = self->plan->drive_s * (double)count / self->at_once;
+  if (all_s <= most_s) return fmax(PART_MIN_S, self->plan->recorded_s);
+  return fmax(PART_MIN_S, PART_STEP_S * floor(self->plan->recorded_s * most_s / all_s / PART_STEP_S));
+}
 
 static void job(void *context, size_t index, void *result) {
   const pool *self = context;
@@ -132,7 +185,8 @@ static void job(void *context, size_t index, void *result) {
   if (self->fixed_count > 0) memcpy(changes, self->fixed, self->fixed_count * sizeof *changes);
   changes[self->fixed_count] = self->of[index];
   // A change may make a drive endless.
-  (void)alarm((unsigned)(10 + 4 * self->plan->drive_s));
+  if (left_s(self) < self->pass_left_s) return;
+  limit_s(fmax(LEAST_S, fmin(10 + 4 * self->plan->drive_s, self->at_once * left_s(self))));
   *(trial_message *)result = drive(self->plan, folder, self->until_s, changes, self->fixed_count + 1);
   changed_copy made = {.dir = self->plan->dir};
   (void)snprintf(made.out, sizeof made.out, "%s", folder);
@@ -141,6 +195,7 @@ static void job(void *context, size_t index, void *result) {
 
 static void one_done(void *context) {
   pool *self = context;
+  self->used_s = (spent_s() - self->begin_s) / self->at_once;
   self->done++;
   if (self->plan->progress)
     self->plan->progress(self->plan->progress_context, fmin(1, (double)self->done / (double)self->total));
@@ -174,8 +229,10 @@ static double refine_step(const suspect *one) {
 
 // A value between the steps of the list, by ever smaller steps to both sides.
 static void refine(pool *self, suspect *one, trial_result *result) {
+  const suspect begun = *one;
+  const trial_result at_first = *result;
   double step = refine_step(one);
-  for (int round = 0; round < 4 && step > 0; round++, step /= 3) {
+  for (int round = 0; round < 4 && step > 0 && left_s(self) > LEAST_S; round++, step /= 3) {
     suspect near[4] = {*one, *one, *one, *one};
     const double sides[4] = {-step, step, -step / 2, step / 2};
     trial_result results[4];
@@ -186,6 +243,9 @@ static void refine(pool *self, suspect *one, trial_result *result) {
     *one = near[best];
     *result = results[best];
   }
+  if (begun.kind != SUSPECT_MOUNTING_YAW || result->score >= at_first.score + YAW_GAIN_MIN) return;
+  *one = begun;
+  *result = at_first;
 }
 
 typedef struct race_result {
@@ -194,8 +254,9 @@ typedef struct race_result {
   size_t count, best;
 } race_result;
 
-// In two rounds: all of them over a part of the recording, then the best and the unchanged one over all of it.
-static void race(pool *self, double part_s, double whole_s, int is_part_alone, race_result *out) {
+// In two passes: all of them over a part of the recording, in at most `most_s`, then the best and the unchanged one
+// over `whole_s` of it; 0: one pass.
+static void race(pool *self, double most_s, double part_s, double whole_s, race_result *out) {
   static trial_result results[SUSPECTS_MAX];
   const trials_plan *plan = self->plan;
   suspect by_table = {0};
@@ -203,7 +264,9 @@ static void race(pool *self, double part_s, double whole_s, int is_part_alone, r
   out->count = 1;
   self->until_s = part_s;
   self->table->count = 0;
+  self->pass_left_s = left_s(self) - most_s;
   run_all(self, plan->suspects, plan->count, results);
+  self->pass_left_s = 0;
   for (size_t i = 0; i < plan->count; i++) is_apart |= plan->suspects[i].kind == SUSPECT_TIME_FACTOR;
   const uint64_t enough = is_apart ? 1 : (uint64_t)(UPDATES_MIN * (double)results[0].updates);
   out->finalists[0] = plan->suspects[0];
@@ -212,7 +275,7 @@ static void race(pool *self, double part_s, double whole_s, int is_part_alone, r
   for (size_t i = 1; i < plan->count; i++) {
     const int is_no_identity = plan->suspects[i].kind == SUSPECT_NO_IDENTITY;
     results[i].is_valid &= results[i].updates >= enough && !is_no_identity;
-    if (!is_no_identity || is_part_alone) continue;
+    if (!is_no_identity || whole_s <= 0) continue;
     // The table needs each landmark: over all of the recording.
     trial_result unused;
     self->until_s = whole_s;
@@ -233,27 +296,29 @@ static void race(pool *self, double part_s, double whole_s, int is_part_alone, r
   }
   if (by_table.kind != SUSPECT_NONE) out->finalists[out->count++] = by_table;  // last: a plain shift stands before it
   self->until_s = whole_s;
-  if (!is_part_alone) run_all(self, out->finalists, out->count, out->results);
+  if (whole_s > 0) run_all(self, out->finalists, out->count, out->results);
   out->best = best_of(out->results, out->count);
 }
 
 // Two mistakes of which neither helps alone: each of the best first ones together with all.
-static int race_pairs(pool *self, double part_s, double whole_s, const race_result *alone, suspect *found,
-                      trial_result *result) {
+static int race_pairs(pool *self, const race_result *alone, suspect *found, trial_result *result) {
   suspect pairs[FIRSTS][2];
   trial_result results[FIRSTS];
   static race_result second;
   size_t count = 0;
   const suspect *const fixed = self->fixed;
-  for (size_t i = 1; i < alone->count && count < FIRSTS; i++) {
+  const double pairs_s = left_s(self);
+  const double part_s = fmin(PART_MAX_S, part_of(self, FIRSTS * self->plan->count, PAIRS_SHARE * pairs_s));
+  for (size_t i = 1; i < alone->count && count < FIRSTS && left_s(self) > LEAST_S; i++) {
     pairs[count][0] = alone->finalists[i];
     if (pairs[count][0].kind == SUSPECT_IDENTITY_TABLE) continue;
     self->fixed = pairs[count];
     self->fixed_count = 1;
-    race(self, part_s, whole_s, 1, &second);
+    race(self, PAIRS_SHARE / FIRSTS * pairs_s, part_s, 0, &second);
     pairs[count][1] = second.finalists[second.best];
     count++;
   }
+  self->until_s = part_of(self, FIRSTS, SECOND_SHARE * BUDGET_S);
   for (size_t i = 0; i < count; i++) {
     self->fixed = pairs[i];
     self->fixed_count = 1;
@@ -268,20 +333,21 @@ static int race_pairs(pool *self, double part_s, double whole_s, const race_resu
   return pairs[best][1].kind == SUSPECT_NONE ? 1 : 2;
 }
 
-static void search(pool *self, double part_s, double whole_s, suspect *found, trial_result *before,
-                   trial_result *after) {
+static void search(pool *self, suspect *found, trial_result *before, trial_result *after) {
   static race_result round;
-  while (self->fixed_count < TRIALS_FOUND_MAX) {
+  while (self->fixed_count < TRIALS_FOUND_MAX && left_s(self) > LEAST_S) {
     suspect *one = &found[self->fixed_count];
     self->done = 0;
-    race(self, part_s, whole_s, 0, &round);
+    race(self, LONGEST_SHARE * left_s(self),
+         fmin(PART_MAX_S, part_of(self, self->plan->count, FIRST_SHARE * left_s(self))),
+         part_of(self, FINALISTS, SECOND_SHARE * left_s(self)), &round);
     if (self->fixed_count == 0) *before = *after = round.results[0];
     const trial_result *best = &round.results[round.best];
     if (round.best == 0 || !best->is_valid || (after->is_valid && best->score < after->score + GAIN_MIN)) {
       if (self->fixed_count > 0 || after->explained >= EXPLAINED_MIN) break;
       self->total = FIRSTS * self->plan->count;
       self->done = 0;
-      self->fixed_count = (size_t)race_pairs(self, part_s, whole_s, &round, found, after);
+      self->fixed_count = (size_t)race_pairs(self, &round, found, after);
       break;
     }
     *after = *best;
@@ -295,17 +361,17 @@ static void search(pool *self, double part_s, double whole_s, suspect *found, tr
 size_t trials_run(const trials_plan *plan, suspect found[TRIALS_FOUND_MAX], id_table *table, trial_result *before,
                   trial_result *after) {
   const long processors = sysconf(_SC_NPROCESSORS_ONLN);
-  const double at_once = (double)(processors > 0 ? processors : 1);
-  const double all_s = plan->drive_s * (double)plan->count / at_once;
-  const double last_s = plan->drive_s * FINALISTS / at_once;
-  pool self = {.plan = plan, .fixed = found, .total = plan->count + FINALISTS, .table = table};
-  const double part_s = fmin(PART_MAX_S, fmax(PART_MIN_S, plan->recorded_s * fmin(1, BUDGET_S / 2 / all_s)));
-  const double whole_s = last_s > BUDGET_S / 2 ? fmax(PART_MIN_S, plan->recorded_s * BUDGET_S / 2 / last_s) : 0;
+  pool self = {.plan = plan,
+               .fixed = found,
+               .total = plan->count + FINALISTS,
+               .table = table,
+               .begin_s = spent_s(),
+               .at_once = (double)(processors > 0 ? processors : 1)};
   const char *temporary = getenv("TMPDIR");
   *before = *after = (trial_result){0};
   (void)snprintf(self.folder, sizeof self.folder, "%.40s/waymark-check-XXXXXX", temporary ? temporary : "/tmp");
   if (!mkdtemp(self.folder)) return 0;
-  search(&self, part_s, whole_s, found, before, after);
+  search(&self, found, before, after);
   changed_copy folder = {.dir = plan->dir};
   (void)snprintf(folder.out, sizeof folder.out, "%s", self.folder);
   changed_copy_remove(&folder);

@@ -17,7 +17,7 @@ typedef struct trials_plan {
   const suspect *suspects;  // the unchanged one first
   size_t count;
   const given_ids *ids;
-  double drive_s, recorded_s;  // what one drive of the whole recording took, and how long the recording is
+  double drive_s, recorded_s;  // processor time of one drive of the whole recording, and the recording's length
   wm_progress_fn progress;     // may be NULL
   void *progress_context;
 } trials_plan;

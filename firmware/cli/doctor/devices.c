@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// LCM, CAN, cameras.
+// LCM, CAN, cameras, IMU, GNSS.
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -10,6 +10,7 @@
 
 #include "cli/doctor/doctor.h"
 #include "live/lcm_connect.h"
+#include "rt/clock.h"
 
 void doctor_lcm(const char *url, wm_findings *out) {
   const char *why;
@@ -128,4 +129,46 @@ static void camera(const wm_camera_device_config *c, wm_findings *out) {
 
 void doctor_cameras(const wm_config *config, wm_findings *out) {
   for (size_t i = 0; config && i < config->devices.camera_count; i++) camera(&config->devices.cameras[i], out);
+}
+
+void doctor_imu(const char *root, const wm_config *config, wm_findings *out) {
+  char text[160];
+  int is_there, is_ready;
+  if (!config || !config->devices.iio.device[0]) return;
+  const wm_iio_device_config *device = &config->devices.iio;
+  const char *why = wm_iio_inspect(device, root, &is_there, &is_ready, text, sizeof text);
+  if (why)
+    wm_find(out, WM_FOUND_IMU_DEVICE, WM_SEVERITY_BAD, "imu", NULL, "%s", why);
+  else if (is_ready)
+    wm_find(out, WM_FOUND_IMU_DEVICE, WM_SEVERITY_GOOD, "imu", "", "the buffer of %s runs", device->device);
+  else
+    wm_find(out, WM_FOUND_IMU_DEVICE, WM_SEVERITY_NOTE, "imu",
+            "ExecStartPre=+/usr/bin/waymark stamps CONFIG in the unit, or a run with the right to write to /sys",
+            "%s is there, and its buffer is not set up yet", device->device);
+}
+
+static void receiver(const wm_gpsd_device_config *config, double seconds, wm_findings *out) {
+  const double anywhere[3] = {0};
+  wm_row_device *device;
+  wm_stream_row row;
+  wm_source_counts counts = {0};
+  char text[160];
+  wm_error err;
+  if (wm_gpsd_open(config, anywhere, &device, &err) != WM_OK) {
+    wm_find_error(out, "gnss", &err);
+    return;
+  }
+  int has_come = 0;
+  const wm_time_ns until_ns = wm_monotonic_ns() + wm_ns_from_seconds(seconds);
+  while (!has_come && wm_monotonic_ns() < until_ns) has_come = device->ops->next(device, &row, &counts) == WM_OK;
+  unsigned state = counts.device;
+  if (state == WM_DEVICE_WORKS && !has_come) state = WM_DEVICE_STALLED;
+  (void)device->ops->note(device, state, has_come, text, sizeof text);
+  wm_find(out, WM_FOUND_GNSS_RECEIVER, has_come ? WM_SEVERITY_GOOD : WM_SEVERITY_BAD, wm_gpsd_stream(config),
+          has_come ? "" : NULL, "%s", text);
+  device->ops->close(device);
+}
+
+void doctor_gnss(const wm_config *config, double seconds, wm_findings *out) {
+  for (size_t i = 0; config && i < config->devices.gpsd_count; i++) receiver(&config->devices.gpsd[i], seconds, out);
 }

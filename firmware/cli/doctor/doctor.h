@@ -19,6 +19,10 @@ void doctor_can_queue(int wanted, int granted, wm_findings *out);
 // The priority of the CAN interfaces' interrupt threads against the estimator's; no finding without such threads.
 void doctor_interrupts(const char *root, const wm_config *config, long cpus, wm_findings *out);
 void doctor_cameras(const wm_config *config, wm_findings *out);
+// The IMU of Linux IIO: whether its buffer runs or can be set up.
+void doctor_imu(const char *root, const wm_config *config, wm_findings *out);
+// Listens to gpsd for a report, for `seconds` at most.
+void doctor_gnss(const wm_config *config, double seconds, wm_findings *out);
 // Wakes 1000 times a second for `seconds` at the priority of a run. *is_realtime: it had that priority.
 void doctor_latency(double seconds, int priority, wm_histogram *wake_ns, int *is_realtime);
 void doctor_judge_latency(const wm_histogram *wake_ns, int is_realtime, wm_findings *out);

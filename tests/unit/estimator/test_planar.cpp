@@ -84,7 +84,7 @@ wm_pose2 drive(const double x0[3], const wm_motion_calibration &c, const wm_whee
     const wm_event e = make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i));
     front.feed(e);
     front.advance(e.t_ns, c, [&](const wm::motion_segment &s, const wm::motion_twist &t, const wm::motion_noise &) {
-      const wm::arc a = wm::make_arc(t.v * s.dt_s, t.w * s.dt_s);
+      const wm::arc a = wm::make_arc(t.v * s.dt_s, t.u * s.dt_s, t.w * s.dt_s);
       pose = wm::compose(pose, {a.x_m, a.y_m, a.turn_rad});
     });
   }
@@ -99,7 +99,7 @@ void test_prediction_carries_the_right_derivatives(void) {
   make_setup(wheels);
   params.noise_speed_mps = params.noise_speed_rel = params.noise_yaw_rate_radps = params.noise_yaw_rate_rel = 0;
   params.noise_side_rel = 0;
-  const double sigma[] = {0.1, 0.1, 0.02, 0.05, 0.05, 0.05, 0, 0.1, 0.05, 0.1, 0.05, 0.3};
+  const double sigma[] = {0.1, 0.1, 0.02, 0.05, 0.05, 0.05, 0, 0.1, 0.05, 0.1, 0.05, 0.3, 0, 0.1};
   std::memcpy(states.sigma, sigma, sizeof sigma);
   filter->init(setup, states, wm::kPoseStates + wm::planar_filter::count_motion_states(states));
   for (int i = 0; i <= 20; i++) filter->move(make::twist(0.1 * i, 1.0 + 0.3 * sin(i), 0.5 * cos(0.7 * i)));
@@ -124,7 +124,7 @@ void test_prediction_carries_the_right_derivatives(void) {
     TEST_ASSERT_DOUBLE_WITHIN(tolerance, want[2], filter->covariance(2, column));
     checked++;
   }
-  TEST_ASSERT_EQUAL(11, checked);
+  TEST_ASSERT_EQUAL(12, checked);
 }
 
 void test_josephs_form_is_the_plain_one_at_the_best_gain(void) {

@@ -22,6 +22,7 @@ wm::planar_filter_of<16> filter;
 
 void begin(const wm_rig *known = nullptr, double speed_scale_sigma = 0.0) {
   make::exact_motion(&params);
+  params.states.drive = WM_DRIVE_ROLLING;
   wm_motion_states states{};
   states.sigma[WM_SPEED_SCALE] = speed_scale_sigma;
   setup = {};

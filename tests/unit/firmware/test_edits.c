@@ -6,6 +6,7 @@
 #include "cli/check/edits.h"
 #include "cli/check/identities.h"
 #include "unity.h"
+#include "waymark/map.h"
 
 void setUp(void) {}
 void tearDown(void) {}
@@ -55,6 +56,29 @@ static void signals(void) {
          "BO_ 1 A: 8 X\n SG_ S : 8|16@1+ (10,0) [0|0] \"\" Y\nBO_ 2 B: 8 X\n SG_ S : 7|16@0+ (0.5,1) [0|0] \"\" Y\n");
 }
 
+static void is_mirrored(double factor, const uint8_t expected[6]) {
+  uint8_t pixels[6] = {1, 2, 3, 4, 5, 6};
+  const wm_grey before = {.width_px = 3, .height_px = 2, .pixels = pixels};
+  const file_edit edit = {.kind = EDIT_MIRROR, .file = "map/edges.png", .factor = factor};
+  void *png;
+  char *out;
+  size_t length;
+  wm_grey after;
+  TEST_ASSERT_EQUAL(WM_OK, wm_grey_encode(&before, edit.file, &png, &length, &err));
+  TEST_ASSERT_EQUAL(WM_OK, edit_text(&edit, png, length, "", &out, &length, &err));
+  TEST_ASSERT_EQUAL(WM_OK, wm_grey_decode(out, length, edit.file, &after, &err));
+  TEST_ASSERT_EQUAL(3, after.width_px);
+  TEST_ASSERT_EQUAL_UINT8_ARRAY(expected, after.pixels, 6);
+  free(after.pixels);
+  free(out);
+  free(png);
+}
+
+static void pictures(void) {
+  is_mirrored(1, (const uint8_t[]){3, 2, 1, 6, 5, 4});
+  is_mirrored(-1, (const uint8_t[]){4, 5, 6, 1, 2, 3});
+}
+
 // Three identities, each seen eight times; the third has no landmark that most of its sightings fit.
 static void identities_by_place(void) {
   static given_ids given;
@@ -89,6 +113,7 @@ int main(void) {
   RUN_TEST(columns);
   RUN_TEST(columns_that_are_missing);
   RUN_TEST(signals);
+  RUN_TEST(pictures);
   RUN_TEST(identities_by_place);
   return UNITY_END();
 }

@@ -5,7 +5,8 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "live/lcm_stream.h"
+#include "live/lcm_device.h"
+#include "live/row_source.h"
 #include "rt/clock.h"
 #include "unity.h"
 #include "waymark/lcm_streams.h"
@@ -30,7 +31,9 @@ static void begin(wm_lcm_device_config config) {
   const wm_mounting upside_down = {.rpy_rad = {M_PI, 0, 0.5}};
   if (config.rate_max_hz == 0) config.rate_max_hz = 1000;
   lcm = lcm_create("memq://");
-  TEST_ASSERT_EQUAL(WM_OK, lcm_stream_open(&config, "memq://", "T_", &upside_down, lcm, &source, &err));
+  wm_row_device *device;
+  TEST_ASSERT_EQUAL(WM_OK, lcm_device_open(&config, "memq://", "T_", lcm, &device, &err));
+  TEST_ASSERT_EQUAL(WM_OK, row_source_open(device, &upside_down, &source, &err));
 }
 
 static void begin_motion(void) { begin((wm_lcm_device_config){.stream = "motion", .channel = "MOTION"}); }
@@ -71,7 +74,7 @@ static void a_twist_is_an_event_of_motion(void) {
   TEST_ASSERT_EQUAL(WM_EVENT_TWIST2, event.kind);
   TEST_ASSERT_EQUAL_DOUBLE(0.5, event.as.twist2.v_mps);
   TEST_ASSERT_EQUAL_UINT32(1, event.seq);
-  TEST_ASSERT_EQUAL_INT64(now_ns, lcm_stream_row(source)->t_ns);
+  TEST_ASSERT_EQUAL_INT64(now_ns, row_source_row(source)->t_ns);
   TEST_ASSERT_EQUAL_UINT64(2, source->counts.received);
 }
 
@@ -84,7 +87,7 @@ static void a_gyro_is_a_turn_rate_by_its_mounting(void) {
   TEST_ASSERT_EQUAL(1, event.as.quantities.count);
   TEST_ASSERT_EQUAL(WM_Q_YAW_RATE, event.as.quantities.id[0]);
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.125, event.as.quantities.value[0]);
-  TEST_ASSERT_TRUE(isnan(lcm_stream_row(source)->number[6]));  // a sigma of 0 is not given
+  TEST_ASSERT_TRUE(isnan(row_source_row(source)->number[6]));  // a sigma of 0 is not given
   row.t_ns = wm_monotonic_ns();
   row.number[6] = -1;
   send("imu", "T_GYRO", row);

@@ -70,6 +70,14 @@ const error_case kErrorCases[] = {
      "speeds, steering, imu, heading, depth, gnss)"},
     {CONFIG, "Stream over LCM twice", FILE_, "devices:\n  lcm:\n    - {stream: imu}\n    - {stream: imu}\n",
      "config/robot.yaml:6: devices.lcm[1]: the stream 'imu' stands there twice (first in line 5)"},
+    {CONFIG, "Stream of gpsd and of LCM", FILE_, "devices:\n  lcm: [{stream: gnss}]\n  gpsd: [{latency_ms: 80}]\n",
+     "config/robot.yaml:5: devices.gpsd[0]: the stream 'gnss' stands there twice (first in line 4)"},
+    {CONFIG, "Report that gpsd does not give", FILE_, "devices: {gpsd: [{take: positions}]}\n",
+     "config/robot.yaml:3: devices.gpsd[0].take: 'positions' is unknown; did you mean 'position'? (one of: position, "
+     "course, antennas)"},
+    {CONFIG, "IMU without its name", FILE_, "devices: {iio: {rate_hz: 200}}\n",
+     "config/robot.yaml:3: devices.iio: device: is missing: a name as `cat /sys/bus/iio/devices/*/name` prints them, "
+     "e.g. bmi160"},
     {CONFIG, "Unknown source", FILE_, "sources: [{name: gpss}]\n",
      "config/robot.yaml:3: sources[0].name: 'gpss' is unknown; did you mean 'gnss'? (one of: can, motion, motion6, "
      "increments, ticks, speeds, steering, imu, heading, depth, sightings, markers, stereo, points, gnss)"},

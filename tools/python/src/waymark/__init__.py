@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Waymark in Python: recordings and runs as arrays.
 
+Example::
+
     import waymark
     run = waymark.Run("out/run")
     print(run.trajectory["x_m"].mean(), run.health["state"])
     again = waymark.replay("out/run/events.wmlog", changes={"sightings.noise.bearing_factor": 2})
+    for message in waymark.Live():
+        print(message.kind, message.data.t_ns)
 """
 
 from typing import TYPE_CHECKING, Any
@@ -16,15 +20,25 @@ from .tables import Table, read_table, write_table
 
 
 if TYPE_CHECKING:
+    from .live import Live
     from .native import WaymarkError
     from .replaying import Estimate, EventLog, replay
 
-__all__ = ["CanFrame", "Estimate", "EventLog", "Frame", "Recording", "RecordingWriter", "Run", "Table", "WaymarkError", "covariance",
+__all__ = ["CanFrame", "Estimate", "EventLog", "Frame", "Live", "Recording", "RecordingWriter", "Run", "Table", "WaymarkError", "covariance",
            "eval", "read_table", "replay", "write_table"]
 
 
 def __getattr__(name: str) -> Any:
-    """What needs libwaymark.so is loaded when it is asked for: tables, recordings and runs need none."""
+    """What needs libwaymark.so or LCM is loaded when it is asked for: tables, recordings and runs need neither."""
+    if name.endswith("_t") and not name.startswith("_"):
+        from . import lcm_types
+
+        if name in lcm_types.load():
+            return lcm_types.load()[name]
+    if name == "Live":
+        from .live import Live
+
+        return Live
     if name in ("Estimate", "EventLog", "replay"):
         from . import replaying
 

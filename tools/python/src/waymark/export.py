@@ -41,7 +41,7 @@ def export(run: Run, out: str | Path, recording: Recording | None = None, pictur
             file.write(item)
             if progress and count % 1000 == 0:
                 progress(count)
-        file.write(diagnostics(messages, run, file.newest_ns))
+        file.write(diagnostics(messages, run.health, file.newest_ns))
 
 
 def main(argv: list[str] | None = None) -> int:

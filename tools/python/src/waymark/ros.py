@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """ROS 2 messages by rosbags, without ROS: its own types, those of Foxglove's annotations, and Waymark's."""
 
+from typing import Any
+
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -56,6 +58,14 @@ class Messages:
             self._names[f"{package.split('/')[0]}/{short}"] = name
         for name in ("std_msgs/msg/Header", "geometry_msgs/msg/Point", "geometry_msgs/msg/Pose", "nav_msgs/msg/Path"):
             self._names[name.rpartition("/")[2]] = name
+
+    def definition(self, kind: str) -> bytes:
+        """The definition of a type and of all that it is made of, as MCAP's "ros2msg" has it."""
+        return self.store.generate_msgdef(kind, ros_version=2)[0].encode()
+
+    def encode(self, message: Any, kind: str) -> bytes:
+        """A message as CDR."""
+        return bytes(self.store.serialize_cdr(message, kind))
 
     def type(self, name: str) -> str:
         """The whole name of a type."""

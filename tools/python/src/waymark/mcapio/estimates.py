@@ -52,7 +52,7 @@ def path(messages: Messages, t_ns: int, stamps: np.ndarray, where: np.ndarray, t
     return messages.make("Path", header=messages.header(t_ns, "map"), poses=poses)
 
 
-def _poses(messages: Messages, topic: str, table: Table, log_ns: np.ndarray) -> Iterator[Item]:
+def poses(messages: Messages, topic: str, table: Table, log_ns: np.ndarray) -> Iterator[Item]:
     where, turns = positions(table), quaternions(table)
     errors = ros_covariance(covariance(table), turns)
     for i, t_ns in enumerate(table["t_ns"]):
@@ -61,7 +61,7 @@ def _poses(messages: Messages, topic: str, table: Table, log_ns: np.ndarray) -> 
                    messages.make("PoseWithCovarianceStamped", header=messages.header(t_ns, "map"), pose=estimate))
 
 
-def _frames(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[Item]:
+def frames(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[Item]:
     """map -> odom and odom -> base_link (REP 105): odom never jumps, map -> odom takes the corrections."""
     where, turns = positions(table), quaternions(table)
     for i, t_ns in enumerate(table["t_ns"]):
@@ -72,23 +72,30 @@ def _frames(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[It
         yield Item(log_ns[i], "/tf", "tf2_msgs/msg/TFMessage", messages.make("TFMessage", transforms=transforms))
 
 
+def odometry(messages: Messages, log_ns: int, t_ns: int, place: tuple, linear, angular) -> Item:
+    """Odometry: x, y, heading of base_link in odom (m, rad), and its twist in base_link (m/s, rad/s)."""
+    twist = messages.make("TwistWithCovariance")
+    twist.twist.linear = messages.make("Vector3", **dict(zip("xyz", map(float, linear))))
+    twist.twist.angular = messages.make("Vector3", **dict(zip("xyz", map(float, angular))))
+    return Item(log_ns, "/waymark/odom", "nav_msgs/msg/Odometry", messages.make(
+        "Odometry", header=messages.header(t_ns, "odom"), child_frame_id="base_link",
+        pose=messages.make("PoseWithCovariance", pose=messages.pose_of(planar(*place))), twist=twist))
+
+
 def _odometry(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[Item]:
-    """Odometry with the twist of the last step in base_link."""
+    """Odometry with the twist of the last step."""
     x, y, heading, t = table["odom_x_m"], table["odom_y_m"], table["odom_heading_rad"], table["t_ns"]
     for i, t_ns in enumerate(t):
-        twist = messages.make("TwistWithCovariance")
+        linear, angular = np.zeros(3), np.zeros(3)
         if i and t[i] > t[i - 1]:
             dt, c, s = (t[i] - t[i - 1]) / 1e9, np.cos(heading[i]), np.sin(heading[i])
             dx, dy = x[i] - x[i - 1], y[i] - y[i - 1]
-            twist.twist.linear.x, twist.twist.linear.y = float(c * dx + s * dy) / dt, float(c * dy - s * dx) / dt
-            twist.twist.angular.z = float(np.remainder(heading[i] - heading[i - 1] + np.pi, 2 * np.pi) - np.pi) / dt
-        place = messages.pose_of(planar(x[i], y[i], heading[i]))
-        yield Item(log_ns[i], "/waymark/odom", "nav_msgs/msg/Odometry", messages.make(
-            "Odometry", header=messages.header(t_ns, "odom"), child_frame_id="base_link",
-            pose=messages.make("PoseWithCovariance", pose=place), twist=twist))
+            linear[:2] = (c * dx + s * dy) / dt, (c * dy - s * dx) / dt
+            angular[2] = (np.remainder(heading[i] - heading[i - 1] + np.pi, 2 * np.pi) - np.pi) / dt
+        yield odometry(messages, log_ns[i], t_ns, (x[i], y[i], heading[i]), linear, angular)
 
 
-def _status(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[Item]:
+def status(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[Item]:
     errors = covariance(table)
     for i, t_ns in enumerate(table["t_ns"]):
         state = str(table["state"][i])
@@ -111,8 +118,8 @@ def _paths(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[Ite
                    path(messages, table["t_ns"][i], table["t_ns"][: i + 1], where[: i + 1], turns[: i + 1]))
 
 
-def _innovations(messages: Messages, run: Run) -> Iterator[Item]:
-    table = run.innovations
+def innovations(messages: Messages, table: Table) -> Iterator[Item]:
+    """A table of innovations, a topic a source and residual."""
     for i in np.argsort(table["t_ns"], kind="stable"):
         source, residual = topic_name(str(table["source"][i])), str(table["residual"][i])
         difference, variance = table["observed"][i] - table["expected"][i], table["variance"][i]
@@ -133,8 +140,8 @@ def _groups(table: Table) -> Iterator[tuple[int, np.ndarray]]:
         yield int(t_ns), rows
 
 
-def _particles(messages: Messages, run: Run) -> Iterator[Item]:
-    table = run.table("particles.csv")
+def particles(messages: Messages, table: Table) -> Iterator[Item]:
+    """A table of particles, a message a stamp."""
     for t_ns, rows in _groups(table):
         poses = [messages.pose_of(planar(table["x_m"][i], table["y_m"][i], table["heading_rad"][i])) for i in rows]
         yield Item(t_ns, "/waymark/particles", "geometry_msgs/msg/PoseArray",
@@ -150,8 +157,8 @@ def ellipse(messages: Messages, name: str, number: int, t_ns: int, centre, cov: 
                          scale=messages.make("Vector3", x=float(sizes[1]), y=float(sizes[0]), z=0.02), color=colour)
 
 
-def _hypotheses(messages: Messages, run: Run) -> Iterator[Item]:
-    table = run.table("hypotheses.csv")
+def hypotheses(messages: Messages, table: Table) -> Iterator[Item]:
+    """A table of hypotheses as ellipses, a message a stamp."""
     for t_ns, rows in _groups(table):
         markers = [messages.make("Marker", header=messages.header(t_ns, "map"), action=3)]  # delete those before
         for number, i in enumerate(rows):
@@ -166,28 +173,28 @@ def _hypotheses(messages: Messages, run: Run) -> Iterator[Item]:
 def estimate_streams(messages: Messages, run: Run) -> list[Iterator[Item]]:
     """All that the run estimated, a stream a topic, each in order of its times."""
     fused = run.trajectory
-    streams = [_poses(messages, "/waymark/fused_pose", fused, fused["t_ns"])]
+    streams = [poses(messages, "/waymark/fused_pose", fused, fused["t_ns"])]
     if run.has("published.csv"):
         table = run.published
         order = np.argsort(made := table.get("made_ns", table.get("sent_ns", table["t_ns"])), kind="stable")
         table, made = {name: column[order] for name, column in table.items()}, made[order]
-        streams += [_poses(messages, "/waymark/pose", table, made), _paths(messages, table, made)]
+        streams += [poses(messages, "/waymark/pose", table, made), _paths(messages, table, made)]
         if "state" in table:
-            streams.append(_status(messages, table, made))
+            streams.append(status(messages, table, made))
         if "odom_x_m" in table:
-            streams += [_frames(messages, table, made), _odometry(messages, table, made)]
-    for name, make in (("innovations.csv", _innovations), ("particles.csv", _particles), ("hypotheses.csv", _hypotheses)):
+            streams += [frames(messages, table, made), _odometry(messages, table, made)]
+    for name, make in (("innovations.csv", innovations), ("particles.csv", particles), ("hypotheses.csv", hypotheses)):
         if run.has(name):
-            streams.append(make(messages, run))
+            streams.append(make(messages, run.table(name)))
     return streams
 
 
 _LEVEL = {"tracking": 0, "dead_reckoning": 1, "degraded": 1}
 
 
-def diagnostics(messages: Messages, run: Run, t_ns: int) -> Item:
-    """Health at the end of the run: one status for the pose and one a source, with all figures as key and value."""
-    health, statuses = run.health, []
+def diagnostics(messages: Messages, health: dict, t_ns: int) -> Item:
+    """Health (of health.json): one status for the pose and one a source, with all figures as key and value."""
+    statuses = []
 
     def status(name: str, level: int, text: str, values: dict):
         pairs = [messages.make("KeyValue", key=str(key), value=str(value)) for key, value in values.items()]

@@ -2,6 +2,7 @@
 """Map, landmarks, mountings and truth as messages."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import yaml
@@ -27,8 +28,9 @@ def mounting_matrix(mounting: dict) -> np.ndarray:
     return out
 
 
-def _mountings(messages: Messages, recording: Recording, t_ns: int) -> Iterator[Item]:
-    calibration, transforms = recording.calibration, []
+def mountings(messages: Messages, calibration: dict, t_ns: int) -> Iterator[Item]:
+    """Where the sensors and cameras of a calibration sit, as static transforms."""
+    transforms = []
     for kind in ("sensors", "cameras"):
         for name, sensor in (calibration.get(kind) or {}).items():
             matrix = mounting_matrix(sensor.get("mounting") or {})
@@ -41,7 +43,8 @@ def _mountings(messages: Messages, recording: Recording, t_ns: int) -> Iterator[
         yield Item(t_ns, "/tf_static", "tf2_msgs/msg/TFMessage", messages.make("TFMessage", transforms=transforms))
 
 
-def _landmarks(messages: Messages, topic: str, table: Table, t_ns: int, colour) -> Iterator[Item]:
+def landmarks(messages: Messages, topic: str, table: Table, t_ns: int, colour) -> Iterator[Item]:
+    """Landmarks as balls with their identities, and the ellipses of those that have a covariance."""
     markers = []
     for i, where in enumerate(positions(table)):
         name = str(int(table["id"][i]))
@@ -58,11 +61,10 @@ def _landmarks(messages: Messages, topic: str, table: Table, t_ns: int, colour) 
     yield Item(t_ns, topic, "visualization_msgs/msg/MarkerArray", messages.make("MarkerArray", markers=markers))
 
 
-def _grid(messages: Messages, recording: Recording, t_ns: int) -> Iterator[Item]:
-    """The floor plan as an occupancy grid: black is occupied, white is free, grey is unknown, as map_server has it."""
-    folder = recording.path / "map"
-    about = yaml.safe_load((folder / "map.yaml").read_text(encoding="utf-8"))
-    image = folder / about["image"]
+def grid(messages: Messages, file: Path, t_ns: int) -> Iterator[Item]:
+    """The floor plan of a map.yaml as an occupancy grid: black is occupied, white is free, grey is unknown, as map_server has it."""
+    about = yaml.safe_load(file.read_text(encoding="utf-8"))
+    image = file.parent / about["image"]
     if not image.is_file():
         return
     with Image.open(image) as picture:
@@ -96,16 +98,16 @@ def place_streams(messages: Messages, run: Run, recording: Recording | None) -> 
     first, last = (int(stamps.min()), int(stamps.max())) if len(stamps) else (0, 0)
     if run.has("map-estimate.csv"):
         blue = messages.colour(0.2, 0.6, 0.9)
-        streams.append(_landmarks(messages, "/waymark/landmarks", run.table("map-estimate.csv"), last, blue))
+        streams.append(landmarks(messages, "/waymark/landmarks", run.table("map-estimate.csv"), last, blue))
     if not recording:
         return streams
-    streams.append(_mountings(messages, recording, first))
+    streams.append(mountings(messages, recording.calibration, first))
     for name, topic in (("landmarks.csv", "/landmarks"), ("truth-landmarks.csv", "/truth/landmarks")):
         if (recording.path / name).is_file():
             green = messages.colour(0.2, 0.7, 0.3)
-            streams.append(_landmarks(messages, topic, recording.table(name), first, green))
+            streams.append(landmarks(messages, topic, recording.table(name), first, green))
     if (recording.path / "map" / "map.yaml").is_file():
-        streams.append(_grid(messages, recording, first))
+        streams.append(grid(messages, recording.path / "map/map.yaml", first))
     if (recording.path / "truth.csv").is_file():
         table = recording.table("truth.csv")
         streams += [_truth(messages, table), _truth_path(messages, table, first)]

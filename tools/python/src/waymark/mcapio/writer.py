@@ -40,7 +40,7 @@ class McapFile:
         self._file = Path(path).open("wb")
         self._writer = Writer(self._file, chunk_size=1 << 18, compression=CompressionType.ZSTD)
         self._writer.start(profile="ros2", library="waymark")
-        self._store = messages.store
+        self._messages = messages
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._sequences: dict[str, int] = {}
@@ -48,8 +48,7 @@ class McapFile:
 
     def _schema(self, kind: str) -> int:
         if kind not in self._schemas:
-            definition, _ = self._store.generate_msgdef(kind, ros_version=2)
-            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", definition.encode())
+            self._schemas[kind] = self._writer.register_schema(kind, "ros2msg", self._messages.definition(kind))
         return self._schemas[kind]
 
     def write(self, item: Item) -> None:
@@ -60,7 +59,7 @@ class McapFile:
                 item.topic, "cdr", self._schema(item.type), {"offered_qos_profiles": qos, **item.metadata})
         log_ns = max(int(item.log_ns), 0)
         self._sequences[item.topic] = self._sequences.get(item.topic, 0) + 1
-        self._writer.add_message(self._channels[item.topic], log_ns, bytes(self._store.serialize_cdr(item.message, item.type)),
+        self._writer.add_message(self._channels[item.topic], log_ns, self._messages.encode(item.message, item.type),
                                  log_ns, self._sequences[item.topic])
         self.newest_ns = max(self.newest_ns, log_ns)
 

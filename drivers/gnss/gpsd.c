@@ -1,0 +1,331 @@
+// SPDX-License-Identifier: Apache-2.0
+// Positions and headings of a receiver by gpsd's socket.
+#include <errno.h>
+#include <math.h>
+#include <netdb.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "gpsd_report.h"
+#include "local_frame.h"
+#include "waymark/devices.h"
+#include "waymark/foreign_clock.h"
+
+#define TRY_AGAIN_NS (500 * WM_NS_PER_MS)
+// Without a byte for so long the connection is made anew: a computer that was switched off closes none.
+#define DEAD_NS (10 * WM_NS_PER_S)
+// gpsd's longest line is 10240 bytes (GPS_JSON_RESPONSE_MAX of gps_json.h).
+#define LINE_BYTES_MAX 16384
+// UTC of a receiver on a computer whose own clock is set by it, or by a time server: farther off, one of them is wrong.
+#define AHEAD_MAX_NS (10 * WM_NS_PER_MS)
+#define BEHIND_MAX_NS (10 * WM_NS_PER_S)
+// Delay of a receiver beyond the smallest seen and beyond latency_ms: 20 to 100 ms by data sheets and baud rate.
+#define DELAY_UNCERTAINTY_NS (50 * WM_NS_PER_MS)
+// Sigma of an axis without a stated accuracy, by the fix: usual figures of data sheets.
+#define SIGMA_RTK_FIXED_M 0.05
+#define SIGMA_RTK_FLOAT_M 0.5
+#define SIGMA_DGPS_M 2.0
+#define SIGMA_PLAIN_M 5.0
+#define UP_SIGMAS 2.0                    // the altitude's sigma in horizontal ones, by the satellites' geometry
+#define DEVIATIONS_NS (3 * WM_NS_PER_S)  // receivers send theirs with each position, or once a second
+#define VELOCITY_SIGMA_MPS 0.1           // of a receiver's speed over ground, by data sheets
+#define DEGREE (M_PI / 180.0)
+
+typedef struct gpsd {
+  wm_row_device base;
+  wm_gpsd_device_config config;
+  double origin[3];
+  int fd, is_connected;
+  wm_time_ns next_try_ns, read_ns;  // the next connection; the last byte
+  char line[LINE_BYTES_MAX];
+  size_t used, taken;  // bytes in `line`, and those of them that are read
+  int skips;           // the rest of a line that is too long
+  foreign_clock receiver;
+  int fix;                             // gpsd_fix; -1: none
+  wm_time_ns deviations_ns;            // when the receiver's own sigmas came; WM_TIME_NONE: none
+  double deviation_m, deviation_up_m;  // of an axis, and of the altitude
+  char gone[100];                      // why there is no fix
+} gpsd;
+
+static wm_time_ns clock_ns(clockid_t clock) {
+  struct timespec now;
+  (void)clock_gettime(clock, &now);
+  return (wm_time_ns)now.tv_sec * WM_NS_PER_S + now.tv_nsec;
+}
+
+static void disconnect(gpsd *self) {
+  if (self->fd >= 0) (void)close(self->fd);
+  self->fd = -1;
+  self->is_connected = self->skips = 0;
+  self->used = self->taken = 0;
+  self->fix = -1;
+  self->gone[0] = '\0';
+}
+
+// ── connection ──────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static void begin(gpsd *self, wm_time_ns now_ns) {
+  char port[12];
+  struct addrinfo *found = NULL;
+  const struct addrinfo wanted = {.ai_family = AF_INET, .ai_socktype = SOCK_STREAM};
+  self->next_try_ns = now_ns + TRY_AGAIN_NS;
+  self->read_ns = now_ns;
+  (void)snprintf(port, sizeof port, "%d", (int)self->config.port);
+  if (getaddrinfo(self->config.host, port, &wanted, &found) != 0) return;
+  self->fd = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  if (self->fd >= 0 && connect(self->fd, found->ai_addr, found->ai_addrlen) != 0 && errno != EINPROGRESS)
+    disconnect(self);
+  freeaddrinfo(found);
+}
+
+// Asks for reports, once connected.
+static void greet(gpsd *self) {
+  char text[160], device[80] = "";
+  int problem = 0;
+  socklen_t length = sizeof problem;
+  if (getsockopt(self->fd, SOL_SOCKET, SO_ERROR, &problem, &length) != 0 || problem != 0) {
+    disconnect(self);
+    return;
+  }
+  if (self->config.device[0]) (void)snprintf(device, sizeof device, ",\"device\":\"%s\"", self->config.device);
+  const int bytes = snprintf(text, sizeof text, "?WATCH={\"enable\":true,\"json\":true%s};\n", device);
+  if (send(self->fd, text, (size_t)bytes, MSG_NOSIGNAL) != bytes) {
+    disconnect(self);
+    return;
+  }
+  self->is_connected = 1;
+}
+
+static void read_more(gpsd *self, wm_time_ns now_ns) {
+  memmove(self->line, self->line + self->taken, self->used - self->taken);
+  self->used -= self->taken;
+  self->taken = 0;
+  if (self->used == sizeof self->line) {
+    self->skips = 1;
+    self->used = 0;
+  }
+  const ssize_t got = recv(self->fd, self->line + self->used, sizeof self->line - self->used, 0);
+  if (got > 0) {
+    self->used += (size_t)got;
+    self->read_ns = now_ns;
+  } else if (got == 0 || (errno != EAGAIN && errno != EINTR)) {
+    disconnect(self);
+  }
+}
+
+static void wait_for_bytes(gpsd *self) {
+  wm_time_ns now_ns = clock_ns(CLOCK_MONOTONIC);
+  if (self->fd >= 0 && now_ns - self->read_ns > DEAD_NS) disconnect(self);
+  if (self->fd < 0 && now_ns >= self->next_try_ns) begin(self, now_ns);
+  struct pollfd ready = {.fd = self->fd, .events = self->is_connected ? POLLIN : POLLOUT};
+  if (poll(&ready, 1, WM_DEVICE_WAIT_MS) <= 0 || self->fd < 0) return;  // without a socket it only waits
+  if (self->is_connected)
+    read_more(self, clock_ns(CLOCK_MONOTONIC));
+  else
+    greet(self);
+}
+
+// The next whole line; NULL: none yet.
+static const char *next_line(gpsd *self, size_t *length, wm_source_counts *counts) {
+  for (;;) {
+    const char *begin = self->line + self->taken;
+    const char *end = memchr(begin, '\n', self->used - self->taken);
+    if (!end) return NULL;
+    *length = (size_t)(end - begin);
+    self->taken += *length + 1;
+    if (!self->skips) return begin;
+    self->skips = 0;
+    wm_source_refuse(counts, self->base.where, "a line is longer than any of gpsd's");
+  }
+}
+
+// ── reports ─────────────────────────────────────────────────────────────────────────────────────────────────────────
+
+static void set_fix(gpsd *self, int fix, const char *why, wm_source_counts *counts) {
+  if (fix != self->fix) {
+    counts->news++;
+    self->deviations_ns = WM_TIME_NONE;
+  }
+  self->fix = fix;
+  (void)snprintf(self->gone, sizeof self->gone, "%s", why);
+}
+
+// The row's stamp. NULL, or the fault.
+static const char *stamp(gpsd *self, wm_time_ns utc_ns, wm_stream_row *out, wm_source_counts *counts) {
+  const wm_time_ns latency_ns = (wm_time_ns)(self->config.latency_ms * 1e6);
+  counts->stamp_uncertainty_ns = DELAY_UNCERTAINTY_NS;
+  out->t_ns = out->arrival_ns - latency_ns;
+  if (utc_ns == WM_TIME_NONE) return NULL;
+  if (self->config.clock == WM_GPSD_CLOCK_RECEIVER) {
+    out->t_ns = foreign_clock_map(&self->receiver, utc_ns, out->arrival_ns, latency_ns);
+    counts->stamp_uncertainty_ns += foreign_clock_uncertainty(&self->receiver);
+    return NULL;
+  }
+  const wm_time_ns now_utc_ns = clock_ns(CLOCK_REALTIME);
+  if (utc_ns > now_utc_ns + AHEAD_MAX_NS || utc_ns < now_utc_ns - BEHIND_MAX_NS)
+    return "the receiver's UTC and this computer's clock are apart: set the clock (chrony), or `clock: receiver`";
+  out->t_ns = utc_ns - (now_utc_ns - clock_ns(CLOCK_MONOTONIC));
+  counts->stamp_uncertainty_ns = AHEAD_MAX_NS;
+  return NULL;
+}
+
+// Standard deviations of the receiver's own (NMEA GST), of the same type of fix; gpsd's estimates come from the
+// satellites' geometry alone.
+static int has_deviations(const gpsd *self, wm_time_ns now_ns) {
+  return self->deviations_ns != WM_TIME_NONE && now_ns - self->deviations_ns < DEVIATIONS_NS;
+}
+
+static double sigma_of(const gpsd *self, const gpsd_report *report, wm_time_ns now_ns) {
+  if (has_deviations(self, now_ns)) return self->deviation_m;
+  if (report->east_m > 0.0 && report->north_m > 0.0) return hypot(report->east_m, report->north_m) / M_SQRT2;
+  if (report->across_m > 0.0) return report->across_m;
+  if (report->status == GPSD_FIX_RTK_FIXED) return SIGMA_RTK_FIXED_M;
+  if (report->status == GPSD_FIX_RTK_FLOAT) return SIGMA_RTK_FLOAT_M;
+  return report->status == GPSD_FIX_DGPS ? SIGMA_DGPS_M : SIGMA_PLAIN_M;
+}
+
+// Its altitude where the report has none: that of the origin, and the row's is empty.
+static void position(const gpsd *self, const gpsd_report *report, wm_stream_row *out) {
+  const int has_altitude = report->mode >= 3.0 && isfinite(report->ellipsoid_m);
+  const double place[3] = {report->latitude_deg, report->longitude_deg,
+                           has_altitude ? report->ellipsoid_m : self->origin[2]};
+  local_frame(self->origin, place, out->number);
+  const double sigma_m = self->config.accuracy_scale * sigma_of(self, report, out->arrival_ns);
+  const double stated_m = has_deviations(self, out->arrival_ns) ? self->deviation_up_m : report->up_m;
+  const double up_m = stated_m > 0.0 ? self->config.accuracy_scale * stated_m : UP_SIGMAS * sigma_m;
+  if (!has_altitude) out->number[2] = (double)NAN;
+  out->number[3] = sigma_m;
+  out->number[4] = has_altitude ? up_m : (double)NAN;
+}
+
+// A heading in the map, whose x axis points east.
+static int course(const gpsd *self, const gpsd_report *report, wm_stream_row *out) {
+  if (!(report->speed_mps >= self->config.course_min_mps) || isnan(report->track_deg)) return 0;
+  const double sigma_rad =
+      report->track_error_deg > 0.0 ? report->track_error_deg * DEGREE : atan2(VELOCITY_SIGMA_MPS, report->speed_mps);
+  out->number[0] = M_PI_2 - report->track_deg * DEGREE;
+  out->number[1] = self->config.accuracy_scale * sigma_rad;
+  return 1;
+}
+
+static int by_antennas(const gpsd *self, const gpsd_report *report, wm_stream_row *out) {
+  if (isnan(report->heading_deg)) return 0;
+  out->number[0] = M_PI_2 - report->heading_deg * DEGREE;
+  out->number[1] = self->config.sigma_deg * DEGREE;
+  return 1;
+}
+
+static int has_place(const gpsd_report *report) {
+  if (!(report->mode >= 2.0)) return 0;
+  if (!(fabs(report->latitude_deg) < 90.0) || !(fabs(report->longitude_deg) <= 180.0)) return 0;
+  return report->latitude_deg != 0.0 || report->longitude_deg != 0.0;  // what a receiver without a fix may give
+}
+
+static void take_deviations(gpsd *self, const gpsd_report *report) {
+  const double sigma_m = hypot(report->latitude_deg, report->longitude_deg) / M_SQRT2;
+  if (!(sigma_m > 0.0)) return;
+  self->deviation_m = sigma_m;
+  self->deviation_up_m = report->alt_m;
+  self->deviations_ns = self->read_ns;
+}
+
+// 1: the row has its numbers.
+static int take(gpsd *self, const gpsd_report *report, wm_stream_row *out, wm_source_counts *counts) {
+  if (report->kind == GPSD_ERROR) {
+    set_fix(self, -1, report->message[0] ? report->message : "it reports an error", counts);
+    return 0;
+  }
+  if (report->kind == GPSD_DEVICE && report->activated == 0.0) {
+    set_fix(self, -1, "its receiver was unplugged", counts);
+    return 0;
+  }
+  if (report->kind == GPSD_GST) take_deviations(self, report);
+  if (report->kind == GPSD_ATT && self->config.from == WM_GPSD_ANTENNAS) {
+    const int is_there = by_antennas(self, report, out);
+    set_fix(self, is_there ? GPSD_FIX_UNKNOWN : -1, "its receiver gives no heading", counts);
+    return is_there;
+  }
+  if (report->kind != GPSD_TPV || self->config.from == WM_GPSD_ANTENNAS) return 0;
+  if (!has_place(report)) {
+    set_fix(self, -1, "its receiver has no fix: too few satellites are seen", counts);
+    counts->ignored++;
+    return 0;
+  }
+  set_fix(self, report->status >= 0.0 && report->status < GPSD_FIX_COUNT ? (int)report->status : GPSD_FIX_UNKNOWN, "",
+          counts);
+  if (self->config.from == WM_GPSD_COURSE) return course(self, report, out);
+  position(self, report, out);
+  return 1;
+}
+
+static wm_status next_row(wm_row_device *base, wm_stream_row *out, wm_source_counts *counts) {
+  gpsd *self = (gpsd *)base;
+  gpsd_report report;
+  size_t length;
+  wm_status status = WM_AGAIN;
+  const char *line = next_line(self, &length, counts);
+  if (!line) {
+    wait_for_bytes(self);
+    line = next_line(self, &length, counts);
+  }
+  while (line && status == WM_AGAIN) {
+    const char *why = gpsd_report_read(line, length, &report);
+    out->arrival_ns = self->read_ns;
+    if (!why && take(self, &report, out, counts)) {
+      why = stamp(self, report.time_ns, out, counts);
+      if (!why) status = WM_OK;
+    }
+    if (why) wm_source_refuse(counts, base->where, why);
+    if (status == WM_AGAIN) line = next_line(self, &length, counts);
+  }
+  counts->device = !self->is_connected ? WM_DEVICE_ABSENT : self->gone[0] ? WM_DEVICE_DOWN : WM_DEVICE_WORKS;
+  return status;
+}
+
+static unsigned note(const wm_row_device *base, unsigned state, int has_come, char *text, size_t room) {
+  const gpsd *self = (const gpsd *)base;
+  if (state == WM_DEVICE_ABSENT)
+    (void)snprintf(text, room, "no gpsd answers at %s: does it run? (systemctl status gpsd)", base->where);
+  else if (state == WM_DEVICE_DOWN)
+    (void)snprintf(text, room, "gpsd at %s: %s", base->where, self->gone);
+  else if (state == WM_DEVICE_STALLED)
+    (void)snprintf(text, room, "gpsd at %s gives no %s: is its receiver plugged in? (`gpspipe -w` shows reports)",
+                   base->where, base->stream);
+  else if (has_come && self->fix >= 0)
+    (void)snprintf(text, room, "gpsd at %s: %s", base->where, gpsd_fix_name(self->fix));
+  else
+    (void)snprintf(text, room, "connected to gpsd at %s", base->where);
+  return state;
+}
+
+static void close_gpsd(wm_row_device *base) {
+  disconnect((gpsd *)base);
+  free(base);
+}
+
+static const wm_row_device_ops kGpsd = {next_row, note, close_gpsd};
+
+wm_status wm_gpsd_open(const wm_gpsd_device_config *config, const double origin[3], wm_row_device **out,
+                       wm_error *err) {
+  *out = NULL;
+  if (config->from == WM_GPSD_POSITION && isnan(origin[0] + origin[1] + origin[2]))
+    return wm_fail(err, WM_BAD_CONFIG,
+                   "devices.gpsd: calibration.yaml has no `gnss: {origin: [LATITUDE, LONGITUDE, ALTITUDE]}` (degrees, "
+                   "metres above the ellipsoid): the place of the map's zero is needed");
+  gpsd *self = calloc(1, sizeof *self);
+  if (!self) return wm_fail(err, WM_IO, "no memory for gpsd's reports");
+  self->config = *config;
+  memcpy(self->origin, origin, sizeof self->origin);
+  self->fd = self->fix = -1;
+  self->deviations_ns = WM_TIME_NONE;
+  self->base.ops = &kGpsd;
+  (void)snprintf(self->base.stream, sizeof self->base.stream, "%s", wm_gpsd_stream(config));
+  (void)snprintf(self->base.where, sizeof self->base.where, "%.50s:%d", config->host, (int)config->port);
+  *out = &self->base;
+  return WM_OK;
+}

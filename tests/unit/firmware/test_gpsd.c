@@ -1,0 +1,372 @@
+// SPDX-License-Identifier: Apache-2.0
+// A receiver by gpsd, of which the test is the server: positions and headings, absent, silent, without a fix, another
+// fix, doubled, late, NaN, another clock, unplugged, back again.
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "cli/doctor/doctor.h"
+#include "live/row_source.h"
+#include "rt/clock.h"
+#include "unity.h"
+
+#define MS WM_NS_PER_MS
+#define ORIGIN_DEG 48.0, 11.0
+
+static int server, client;
+static wm_gpsd_device_config config;
+static wm_source *source;
+static wm_event event;
+static wm_error err;
+
+static void listen_again(void) {
+  struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons((uint16_t)config.port)};
+  at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  const int yes = 1;
+  socklen_t length = sizeof at;
+  server = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0);
+  TEST_ASSERT_EQUAL(0, setsockopt(server, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes));
+  TEST_ASSERT_EQUAL(0, bind(server, (struct sockaddr *)&at, sizeof at));
+  TEST_ASSERT_EQUAL(0, listen(server, 2));
+  TEST_ASSERT_EQUAL(0, getsockname(server, (struct sockaddr *)&at, &length));
+  config.port = ntohs(at.sin_port);
+}
+
+static void hang_up(void) {
+  if (client >= 0) (void)close(client);
+  if (server >= 0) (void)close(server);
+  server = client = -1;
+}
+
+void setUp(void) {
+  config = (wm_gpsd_device_config){
+      .host = "127.0.0.1", .accuracy_scale = 1, .course_min_mps = 1, .sigma_deg = 1, .device = "/dev/ttyACM0"};
+  server = client = -1;
+  listen_again();
+}
+
+void tearDown(void) {
+  if (source) source->ops->close(source);
+  source = NULL;
+  hang_up();
+}
+
+static wm_status next(void) { return source->ops->next(source, &event, &err); }
+
+// Until the run has connected and asked.
+static void welcome(void) {
+  const wm_time_ns until_ns = wm_monotonic_ns() + 10 * WM_NS_PER_S;
+  char asked[200] = "";
+  while (client < 0 && wm_monotonic_ns() < until_ns) {
+    (void)next();
+    client = accept(server, NULL, NULL);
+  }
+  TEST_ASSERT_GREATER_OR_EQUAL(0, client);
+  TEST_ASSERT_EQUAL(WM_AGAIN, next());
+  TEST_ASSERT_GREATER_THAN(0, recv(client, asked, sizeof asked - 1, 0));
+  TEST_ASSERT_EQUAL_STRING("?WATCH={\"enable\":true,\"json\":true,\"device\":\"/dev/ttyACM0\"};\n", asked);
+}
+
+static void begin(void) {
+  static const double kOrigin[3] = {ORIGIN_DEG, 500};
+  const wm_mounting none = {0};
+  wm_row_device *device;
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_gpsd_open(&config, kOrigin, &device, &err), err.text);
+  TEST_ASSERT_EQUAL(WM_OK, row_source_open(device, &none, &source, &err));
+}
+
+static void begin_connected(void) {
+  begin();
+  welcome();
+}
+
+static void say(const char *text) {
+  TEST_ASSERT_EQUAL((int)strlen(text), send(client, text, strlen(text), MSG_NOSIGNAL));
+}
+
+static wm_time_ns utc_ns(void) {
+  struct timespec now;
+  (void)clock_gettime(CLOCK_REALTIME, &now);
+  return (wm_time_ns)now.tv_sec * WM_NS_PER_S + now.tv_nsec;
+}
+
+// A report of position at that time, with further members.
+static void report(wm_time_ns t_ns, const char *members) {
+  (void)usleep(2000);  // gpsd writes milliseconds: the next report has another stamp
+  char text[600], stamp[40];
+  const time_t seconds = (time_t)(t_ns / WM_NS_PER_S);
+  struct tm calendar;
+  (void)strftime(stamp, sizeof stamp, "%Y-%m-%dT%H:%M:%S", gmtime_r(&seconds, &calendar));
+  (void)snprintf(text, sizeof text, "{\"class\":\"TPV\",\"device\":\"/dev/ttyACM0\",\"time\":\"%s.%03dZ\",%s}\r\n",
+                 stamp, (int)(t_ns / MS % 1000), members);
+  say(text);
+}
+
+#define PLACE "\"lat\":48.0001,\"lon\":11.0,\"altHAE\":501.5,\"epx\":0.3,\"epy\":0.4,\"epv\":0.7"
+#define FIX "\"mode\":3,\"status\":1," PLACE
+
+static void expect(wm_status status) {
+  const wm_status got = next();
+  TEST_ASSERT_EQUAL_MESSAGE(status, got, source->counts.first_problem);
+}
+
+static void expect_state(unsigned state, const char *note) {
+  TEST_ASSERT_EQUAL_MESSAGE(state, source->counts.device, source->counts.device_note);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(source->counts.device_note, note), source->counts.device_note);
+}
+
+static void wait_for(unsigned state) {
+  const wm_time_ns until_ns = wm_monotonic_ns() + 10 * WM_NS_PER_S;
+  while (source->counts.device != state && wm_monotonic_ns() < until_ns) (void)next();
+  TEST_ASSERT_EQUAL_MESSAGE(state, source->counts.device, source->counts.device_note);
+}
+
+static void a_position_is_in_the_map(void) {
+  begin_connected();
+  say("{\"class\":\"VERSION\",\"release\":\"3.22\"}\r\n{\"class\":\"DEVICES\",\"devices\":[{\"class\":\"DEVICE\"}]}"
+      "\r\n");
+  report(utc_ns(), FIX);
+  expect(WM_OK);
+  TEST_ASSERT_EQUAL(WM_EVENT_POSITION, event.kind);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-6, 0, event.as.position.p_m[0]);
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 11.12, event.as.position.p_m[1]);
+  TEST_ASSERT_DOUBLE_WITHIN(0.001, 1.5, event.as.position.p_m[2]);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.5 / sqrt(2), event.as.position.sigma_xy_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-9, 0.7, event.as.position.sigma_z_m);
+  TEST_ASSERT_INT64_WITHIN(100 * MS, wm_monotonic_ns(), event.t_ns);
+  expect_state(WM_DEVICE_WORKS, "fix without corrections");
+}
+
+static void sigmas_follow_the_fix(void) {
+  static const struct {
+    const char *members;
+    double sigma_m;
+  } kFixes[] = {{"\"mode\":3,\"status\":1,\"lat\":48,\"lon\":11", 5},
+                {"\"mode\":3,\"status\":2,\"lat\":48,\"lon\":11", 2},
+                {"\"mode\":3,\"status\":4,\"lat\":48,\"lon\":11", 0.5},
+                {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11", 0.05},
+                {"\"mode\":3,\"status\":3,\"lat\":48,\"lon\":11,\"eph\":0.02", 0.02}};
+  config.accuracy_scale = 2;
+  begin_connected();
+  for (size_t i = 0; i < sizeof kFixes / sizeof kFixes[0]; i++) {
+    report(utc_ns(), kFixes[i].members);
+    expect(WM_OK);
+    TEST_ASSERT_DOUBLE_WITHIN(1e-12, 2 * kFixes[i].sigma_m, event.as.position.sigma_xy_m);
+    TEST_ASSERT_TRUE(isnan(event.as.position.p_m[2]) && isnan(event.as.position.sigma_z_m));
+  }
+  TEST_ASSERT_EQUAL_UINT32(4, source->counts.news);  // each type once
+  expect_state(WM_DEVICE_WORKS, "RTK fixed");
+}
+
+static void deviations(const char *lat_m) {
+  char text[200];
+  (void)snprintf(text, sizeof text, "{\"class\":\"GST\",\"lat\":%s,\"lon\":%s,\"alt\":0.03}\r\n", lat_m, lat_m);
+  say(text);
+}
+
+// The receiver's own sigmas, and not beyond a change of the fix: the first position without corrections leaps.
+static void a_receivers_deviations_are_of_its_fix(void) {
+  begin_connected();
+  report(utc_ns(), "\"mode\":3,\"status\":3," PLACE);
+  expect(WM_OK);
+  deviations("0.02");
+  report(utc_ns(), "\"mode\":3,\"status\":3," PLACE);
+  expect(WM_OK);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.02, event.as.position.sigma_xy_m);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0.03, event.as.position.sigma_z_m);
+  report(utc_ns(), "\"mode\":3,\"status\":1,\"lat\":48,\"lon\":11");
+  expect(WM_OK);
+  TEST_ASSERT_EQUAL_DOUBLE(5, event.as.position.sigma_xy_m);
+}
+
+static void a_course_is_a_heading(void) {
+  config.from = WM_GPSD_COURSE;
+  begin_connected();
+  report(utc_ns(), FIX ",\"speed\":0.5,\"track\":90");  // too slow
+  expect(WM_AGAIN);
+  report(utc_ns(), FIX ",\"speed\":2,\"track\":90");
+  expect(WM_OK);
+  TEST_ASSERT_EQUAL(WM_EVENT_HEADING, event.kind);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 0, event.as.heading.heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-3, 0.05, event.as.heading.sigma_rad);
+  report(utc_ns() + MS, FIX ",\"speed\":2,\"track\":350,\"epd\":5");
+  expect(WM_OK);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 100 * M_PI / 180, event.as.heading.heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, 5 * M_PI / 180, event.as.heading.sigma_rad);
+}
+
+static void antennas_give_a_heading(void) {
+  config.from = WM_GPSD_ANTENNAS;
+  begin_connected();
+  report(utc_ns(), FIX ",\"speed\":2,\"track\":90");
+  expect(WM_AGAIN);
+  say("{\"class\":\"ATT\",\"heading\":180.0}\r\n");
+  expect(WM_OK);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, -M_PI_2, event.as.heading.heading_rad);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-12, M_PI / 180, event.as.heading.sigma_rad);
+}
+
+static void without_a_fix_nothing_is_fused(void) {
+  static const char *const kNone[] = {"\"mode\":1",
+                                      ("\"mode\":0," PLACE),
+                                      "\"mode\":3,\"lat\":0.0,\"lon\":0.0",
+                                      "\"mode\":2,\"lat\":nan,\"lon\":nan",
+                                      "\"mode\":3,\"lat\":91,\"lon\":0",
+                                      "\"mode\":3,\"lat\":1e400,\"lon\":0"};
+  begin_connected();
+  for (size_t i = 0; i < sizeof kNone / sizeof kNone[0]; i++) {
+    report(utc_ns(), FIX);
+    expect(WM_OK);
+    report(utc_ns(), kNone[i]);
+    expect(WM_AGAIN);
+    expect_state(WM_DEVICE_DOWN, "no fix");
+  }
+  TEST_ASSERT_EQUAL_UINT64(6, source->counts.ignored);
+}
+
+static void rubbish_is_counted(void) {
+  begin_connected();
+  say("$GPGGA,1,2,3\r\n{\"class\":\"TPV\",\r\n");
+  char flood[1000];
+  memset(flood, 'x', sizeof flood - 1);
+  flood[sizeof flood - 1] = '\0';
+  for (int i = 0; i < 40; i++) {
+    say(flood);
+    expect(WM_AGAIN);
+  }
+  say("\r\n");
+  report(utc_ns(), FIX);
+  for (int i = 0; i < 10 && next() != WM_OK; i++) {
+  }
+  TEST_ASSERT_EQUAL_UINT64(1, source->counts.received);
+  TEST_ASSERT_EQUAL_UINT64(3, source->counts.malformed);
+  TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "is no object of JSON"));
+}
+
+static void an_accuracy_that_cannot_be_is_refused(void) {
+  begin_connected();
+  report(utc_ns(), "\"mode\":3,\"lat\":48,\"lon\":11,\"eph\":1e9");
+  expect(WM_AGAIN);
+  TEST_ASSERT_EQUAL_UINT64(1, source->counts.not_finite);
+}
+
+static void doubled_and_older_reports_are_counted(void) {
+  begin_connected();
+  const wm_time_ns t_ns = utc_ns();
+  report(t_ns, FIX);
+  report(t_ns, FIX);
+  report(t_ns - 150 * MS, FIX);
+  expect(WM_OK);
+  expect(WM_AGAIN);
+  expect(WM_AGAIN);
+  TEST_ASSERT_EQUAL_UINT64(1, source->counts.frozen);
+  TEST_ASSERT_EQUAL_UINT64(1, source->counts.out_of_order);
+}
+
+// A clock of the receiver that is 19.6 years off (its week number has overflown) and leaps.
+static void a_receivers_clock_is_followed(void) {
+  config.latency_ms = 80;
+  begin_connected();
+  const wm_time_ns off_ns = -INT64_C(1024) * 7 * 86400 * WM_NS_PER_S;
+  for (int i = 0; i < 20; i++) {
+    report(utc_ns() + off_ns + (i < 10 ? 0 : -30 * WM_NS_PER_S), FIX);
+    const wm_status status = next();
+    if (i < 10) TEST_ASSERT_EQUAL(WM_OK, status);
+    if (status == WM_OK) TEST_ASSERT_INT64_WITHIN(70 * MS, wm_monotonic_ns() - 80 * MS, event.t_ns);
+  }
+  TEST_ASSERT_GREATER_OR_EQUAL_UINT64(12, source->counts.received);
+  TEST_ASSERT_GREATER_OR_EQUAL_INT64(50 * MS, source->counts.stamp_uncertainty_ns);
+}
+
+static void by_utc_the_clocks_must_agree(void) {
+  config.clock = WM_GPSD_CLOCK_UTC;
+  begin_connected();
+  report(utc_ns() - 300 * MS, FIX);  // late, and fused at its stamp
+  expect(WM_OK);
+  TEST_ASSERT_INT64_WITHIN(100 * MS, wm_monotonic_ns() - 300 * MS, event.t_ns);
+  report(utc_ns() + 2000 * MS, FIX);
+  expect(WM_AGAIN);
+  report(utc_ns() - 20000 * MS, FIX);
+  expect(WM_AGAIN);
+  TEST_ASSERT_EQUAL_UINT64(2, source->counts.malformed);
+  TEST_ASSERT_NOT_NULL(strstr(source->counts.first_problem, "this computer's clock are apart"));
+}
+
+static void absent_and_back(void) {
+  hang_up();
+  begin();
+  expect(WM_AGAIN);
+  expect(WM_AGAIN);
+  expect_state(WM_DEVICE_ABSENT, "no gpsd answers at 127.0.0.1:");
+  listen_again();
+  welcome();
+  report(utc_ns(), FIX);
+  expect(WM_OK);
+  hang_up();
+  wait_for(WM_DEVICE_ABSENT);
+  listen_again();
+  welcome();
+  report(utc_ns(), FIX);
+  expect(WM_OK);
+  expect_state(WM_DEVICE_WORKS, "fix");
+}
+
+static void unplugged_silent_and_back(void) {
+  begin_connected();
+  report(utc_ns(), FIX);
+  expect(WM_OK);
+  wait_for(WM_DEVICE_STALLED);
+  expect_state(WM_DEVICE_STALLED, "is its receiver plugged in?");
+  say("{\"class\":\"DEVICE\",\"path\":\"/dev/ttyACM0\",\"activated\":0}\r\n");
+  expect(WM_AGAIN);
+  expect_state(WM_DEVICE_DOWN, "its receiver was unplugged");
+  report(utc_ns(), FIX);
+  expect(WM_OK);
+  expect_state(WM_DEVICE_WORKS, "fix");
+  say("{\"class\":\"ERROR\",\"message\":\"no such device\"}\r\n");
+  expect(WM_AGAIN);
+  expect_state(WM_DEVICE_DOWN, "no such device");
+}
+
+static void the_maps_origin_is_needed(void) {
+  static const double kNone[3] = {NAN, NAN, NAN};
+  wm_row_device *device;
+  TEST_ASSERT_EQUAL(WM_BAD_CONFIG, wm_gpsd_open(&config, kNone, &device, &err));
+  TEST_ASSERT_NOT_NULL(strstr(err.text, "calibration.yaml has no `gnss: {origin:"));
+}
+
+static void the_doctor_finds_it_absent(void) {
+  static wm_findings found;
+  wm_config whole = {.devices = {.gpsd = {config}, .gpsd_count = 1}};
+  hang_up();
+  doctor_gnss(&whole, 0.2, &found);
+  TEST_ASSERT_EQUAL(1, found.count);
+  TEST_ASSERT_EQUAL(WM_FOUND_GNSS_RECEIVER, found.at[0].id);
+  TEST_ASSERT_EQUAL(WM_SEVERITY_BAD, found.at[0].severity);
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(found.at[0].text, "no gpsd answers"), found.at[0].text);
+}
+
+int main(void) {
+  UNITY_BEGIN();
+  RUN_TEST(a_position_is_in_the_map);
+  RUN_TEST(sigmas_follow_the_fix);
+  RUN_TEST(a_receivers_deviations_are_of_its_fix);
+  RUN_TEST(a_course_is_a_heading);
+  RUN_TEST(antennas_give_a_heading);
+  RUN_TEST(without_a_fix_nothing_is_fused);
+  RUN_TEST(rubbish_is_counted);
+  RUN_TEST(an_accuracy_that_cannot_be_is_refused);
+  RUN_TEST(doubled_and_older_reports_are_counted);
+  RUN_TEST(a_receivers_clock_is_followed);
+  RUN_TEST(by_utc_the_clocks_must_agree);
+  RUN_TEST(absent_and_back);
+  RUN_TEST(unplugged_silent_and_back);
+  RUN_TEST(the_maps_origin_is_needed);
+  RUN_TEST(the_doctor_finds_it_absent);
+  return UNITY_END();
+}

@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "init/urdf.h"
+
+#include "common/failure.h"
+#include "init/proposals.h"
+#include "init/text_file.h"
+#include "simulate/render/camera.h"
+
+#ifdef WM_HAS_TINYXML2
+#include <tinyxml2.h>
+
+#include <charconv>
+#include <cmath>
+#include <set>
+#endif
+
+namespace wm::init {
+
+std::string Urdf::link_of(const std::string &name) const {
+  for (const char *end : {"", "_optical_frame", "_optical", "_link", "_frame"})
+    if (links.contains(name + end)) return name + end;
+  return "";
+}
+
+render::Pose Urdf::body(const std::string &link) const {
+  const render::Pose &pose = links.at(link);
+  return link.find("optical") == std::string::npos ? pose : pose * render::T_body_optical().inverse();
+}
+
+#ifdef WM_HAS_TINYXML2
+namespace {
+
+using tinyxml2::XMLElement;
+
+constexpr double kFarthest_m = 1000;  // of a part from its parent: beyond it the number is no length in m
+
+struct Joint {
+  std::string name, parent, child;
+  bool is_wheel = false;
+  render::Pose place;  // of the child in the parent
+  int line = 0;
+};
+
+class Reader {
+ public:
+  explicit Reader(std::string path) : path_(std::move(path)) {}
+
+  Urdf read(const std::string &text) {
+    tinyxml2::XMLDocument doc;
+    if (doc.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
+      throw tools::Failure(path_ + ":" + std::to_string(doc.ErrorLineNum()) + ": not valid XML (" + doc.ErrorName() +
+                           ")");
+    const XMLElement *robot = doc.RootElement();
+    if (robot == nullptr || std::string(robot->Name()) != "robot")
+      fail(robot, "a URDF begins with <robot>; of a xacro file `xacro FILE > robot.urdf` makes one");
+    for (const XMLElement *e = robot->FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
+      const std::string kind = e->Name();
+      if (kind == "link") add_link(e);
+      if (kind == "joint") add_joint(e);
+      if (kind.starts_with("xacro:")) fail(e, "<" + kind + "> is xacro: `xacro FILE > robot.urdf` makes a URDF of it");
+    }
+    if (radius_.empty()) fail(robot, "has no <link>");
+    return made();
+  }
+
+ private:
+  [[noreturn]] void fail(const XMLElement *e, const std::string &text) const {
+    throw tools::Failure(path_ + ":" + (e != nullptr ? std::to_string(e->GetLineNum()) : "1") + ": " + text);
+  }
+
+  std::string need(const XMLElement *e, const char *attribute) const {
+    const char *value = e->Attribute(attribute);
+    if (value == nullptr || *value == '\0')
+      fail(e, std::string("<") + e->Name() + ">: " + attribute + "=\"...\" is missing");
+    return value;
+  }
+
+  double number(const XMLElement *e, const std::string &word, const char *attribute) const {
+    double value = 0;
+    const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (problem != std::errc{} || end != word.data() + word.size() || !std::isfinite(value) ||
+        std::abs(value) > kFarthest_m)
+      fail(e, std::string("<") + e->Name() + "> " + attribute + ": '" + word + "' is not a number from -1000 to 1000");
+    return value;
+  }
+
+  render::Vec3 three(const XMLElement *e, const char *attribute) const {
+    render::Vec3 out = render::Vec3::Zero();
+    const char *value = e != nullptr ? e->Attribute(attribute) : nullptr;
+    if (value == nullptr) return out;
+    const std::vector<std::string> words = split(value);
+    if (words.size() != 3)
+      fail(e,
+           std::string("<origin> ") + attribute + ": has " + std::to_string(words.size()) + " numbers; 3 are needed");
+    for (int i = 0; i < 3; i++) out[i] = number(e, words[static_cast<size_t>(i)], attribute);
+    return out;
+  }
+
+  render::Pose origin(const XMLElement *of) const {
+    const XMLElement *e = of->FirstChildElement("origin");
+    const render::Vec3 rpy = three(e, "rpy");
+    render::Pose out = render::Pose::Identity();
+    out.translation() = three(e, "xyz");
+    out.linear() =
+        (Eigen::AngleAxisd(rpy.z(), render::Vec3::UnitZ()) * Eigen::AngleAxisd(rpy.y(), render::Vec3::UnitY()) *
+         Eigen::AngleAxisd(rpy.x(), render::Vec3::UnitX()))
+            .toRotationMatrix();
+    return out;
+  }
+
+  void add_link(const XMLElement *e) {
+    const std::string name = need(e, "name");
+    if (radius_.contains(name)) fail(e, "<link name=\"" + name + "\"> is defined twice");
+    double radius = 0;
+    for (const char *part : {"collision", "visual"})
+      for (const XMLElement *p = e->FirstChildElement(part); p != nullptr && radius == 0;
+           p = p->NextSiblingElement(part)) {
+        const XMLElement *geometry = p->FirstChildElement("geometry");
+        if (geometry == nullptr) continue;
+        for (const char *shape : {"cylinder", "sphere"})
+          if (const XMLElement *s = geometry->FirstChildElement(shape); s != nullptr)
+            radius = number(s, need(s, "radius"), "radius");
+      }
+    radius_[name] = radius;
+  }
+
+  void add_joint(const XMLElement *e) {
+    Joint out;
+    out.name = need(e, "name");
+    out.line = e->GetLineNum();
+    const std::string type = need(e, "type");
+    const XMLElement *parent = e->FirstChildElement("parent"), *child = e->FirstChildElement("child");
+    if (parent == nullptr || child == nullptr)
+      fail(e, "<joint name=\"" + out.name + "\">: <parent> and <child> are needed");
+    out.parent = need(parent, "link");
+    out.child = need(child, "link");
+    out.place = origin(e);
+    const auto named = [](const std::string &name) { return name.find("wheel") != std::string::npos; };
+    out.is_wheel =
+        type == "continuous" && (named(out.child) || named(out.name)) && out.child.find("caster") == std::string::npos;
+    if (!of_child_.emplace(out.child, out).second)
+      fail(e, "<joint name=\"" + out.name + "\">: link " + out.child + " has a parent already; a URDF is a tree");
+  }
+
+  // From the link up to the root; throws where the chain is a ring or leads to no link.
+  render::Pose in_root(const std::string &link, std::string &root) const {
+    render::Pose out = render::Pose::Identity();
+    std::set<std::string> seen;
+    root = link;
+    for (auto j = of_child_.find(root); j != of_child_.end(); j = of_child_.find(root)) {
+      const auto at = path_ + ":" + std::to_string(j->second.line) + ": <joint name=\"" + j->second.name + "\">: ";
+      if (!seen.insert(root).second) throw tools::Failure(at + "link " + root + " is its own ancestor");
+      if (!radius_.contains(j->second.parent)) throw tools::Failure(at + "there is no link " + j->second.parent);
+      out = j->second.place * out;
+      root = j->second.parent;
+    }
+    return out;
+  }
+
+  [[nodiscard]] Urdf made() const {
+    Urdf out;
+    std::map<std::string, render::Pose> of_root;
+    std::string first_root;
+    for (const auto &[name, radius] : radius_) {
+      std::string root;
+      of_root[name] = in_root(name, root);
+      if (first_root.empty()) first_root = root;
+    }
+    out.base = radius_.contains("base_footprint") ? "base_footprint"
+               : radius_.contains("base_link")    ? "base_link"
+                                                  : first_root;
+    const render::Pose to_base = of_root.at(out.base).inverse();
+    std::string base_root;
+    (void)in_root(out.base, base_root);
+    for (const auto &[name, pose] : of_root) {
+      std::string root;
+      (void)in_root(name, root);
+      if (root == base_root) out.links[name] = to_base * pose;
+    }
+    for (const auto &[child, joint] : of_child_)
+      if (joint.is_wheel && out.links.contains(child))
+        out.wheels.push_back({child, out.links.at(child).translation(), radius_.at(child)});
+    return out;
+  }
+
+  std::string path_;
+  std::map<std::string, double> radius_;  // of each link, 0: unknown
+  std::map<std::string, Joint> of_child_;
+};
+
+}  // namespace
+
+bool can_read_urdf() { return true; }
+Urdf parse_urdf(const std::string &text, const std::string &path) { return Reader(path).read(text); }
+
+#else
+
+bool can_read_urdf() { return false; }
+Urdf parse_urdf(const std::string & /*text*/, const std::string &path) {
+  throw tools::Failure(path + ": this build reads no URDF (libtinyxml2-dev was not there); give --mounting instead");
+}
+
+#endif
+
+Urdf read_urdf(const std::filesystem::path &path) { return parse_urdf(read_text(path), path.string()); }
+
+}  // namespace wm::init

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A live run's messages: `for message in waymark.Live(): ...`"""
+
+import os
+import re
+import struct
+import time
+from collections import Counter, deque
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from .lcm_types import load
+
+THIS_COMPUTER = "udpm://239.255.76.67:7667?ttl=0"
+KINDS = {"POSE": "pose_t", "HEALTH": "health_t", "INNOVATION": "innovation_t", "OBSERVATIONS": "observations_t",
+         "LANDMARKS": "landmarks_t", "MAP": "map_t", "PARTICLES": "places_t", "HYPOTHESES": "places_t"}
+"""Channels of a run behind the prefix, and their types (docs/lcm.md)."""
+
+
+class Message(NamedTuple):
+    """A message of a run: its channel without the prefix ("POSE"), the decoded message, and when it came (monotonic, ns)."""
+
+    kind: str
+    data: Any
+    arrival_ns: int
+
+
+class Live:
+    """Subscribes to a run on this computer or the network. One thread. ConnectionError where LCM has no way in.
+
+    `url` is LCM's (default: LCM_DEFAULT_URL, else this computer's), `prefix` the channels' (publish.channel_prefix).
+    `malformed` counts messages that could not be decoded, by channel.
+    """
+
+    def __init__(self, url: str = "", prefix: str = "WAYMARK_", kinds: tuple[str, ...] = tuple(KINDS)):
+        import lcm
+
+        types, self._prefix = load(), prefix
+        self._types = {kind: types[KINDS[kind]] for kind in kinds}
+        self._waiting: deque[Message] = deque()
+        self.malformed: Counter[str] = Counter()
+        url = url or os.environ.get("LCM_DEFAULT_URL") or THIS_COMPUTER
+        try:
+            self._lcm = lcm.LCM(url)
+            for kind in kinds:
+                self._lcm.subscribe(re.escape(prefix) + kind, self._take)
+        except RuntimeError as error:
+            raise ConnectionError(f"LCM: no connection on {url}: {error} "
+                                  "(`ip route add 224.0.0.0/4 dev lo` makes a route on this computer)") from None
+
+    def _take(self, channel: str, data: bytes) -> None:
+        kind = channel.removeprefix(self._prefix)
+        try:
+            self._waiting.append(Message(kind, self._types[kind].decode(data), time.monotonic_ns()))
+        except (ValueError, struct.error, IndexError):
+            self.malformed[channel] += 1
+
+    def next(self, timeout_s: float) -> Message | None:
+        """The next message; None where none came in time."""
+        end = time.monotonic() + timeout_s
+        while not self._waiting:
+            left_s = end - time.monotonic()
+            if left_s < 0:
+                return None
+            self._lcm.handle_timeout(max(round(1000 * left_s), 1))
+        return self._waiting.popleft()
+
+    def __iter__(self) -> Iterator[Message]:
+        """Messages without an end."""
+        while True:
+            message = self.next(1.0)
+            if message:
+                yield message
