@@ -139,7 +139,7 @@ void wm_findings_each(const wm_findings *self, wm_line_fn say, void *context);
 // devices, refused observations, maps.
 void wm_health_findings(const wm_health *health, wm_findings *out);
 
-// What a cause of a doubtful pose says of its source: "has biased innovations"; "" for none.
+// What is wrong with the source behind a doubtful pose: "has biased innovations"; "" for none.
 const char *wm_cause_text(unsigned cause);
 // Of these, the ones about the map: landmarks that moved, identities that stand for two, capacity.
 void wm_health_map_findings(const wm_health *health, wm_findings *out);

@@ -16,7 +16,7 @@ namespace {
 constexpr double kSearchGain = 5e-4;
 // A change pays where it gains so much on blocks that the search has not seen, and so many standard errors.
 constexpr double kChoiceGain = 1e-3, kChoiceSigmas = 1.5;
-// All changes together: below one per cent of likelihood nobody sees a difference.
+// All changes together: a difference below one per cent of the likelihood is too small to matter.
 constexpr double kPromiseGain = 0.01, kPromiseSigmas = 2;
 // Innovations may grow by so much at most, after gaps and before: they measure the error of the position. Less is noise
 // of some hundred updates.
