@@ -29,11 +29,13 @@ inline void set_scaled(double *out, const double *row, double factor, int stride
   for (int j = 0; j < stride / 2; j++) o[j] = f * r[j];
 }
 
-// P += k b' + b k'. Symmetric to the last bit where P was: both triangles add the same two products.
+// P += k b' + b k'. Symmetric to the last bit where P was: both triangles add the same two products. Rows that get nothing are
+// skipped: half of a filter's states or more are slots that no landmark holds, or that the observation tells nothing of.
 inline void add_symmetric_outer(double *p, const double *k, const double *b, int n, int stride) {
   const pair *kv = reinterpret_cast<const pair *>(k);
   const pair *bv = reinterpret_cast<const pair *>(b);
   for (int i = 0; i < n; i++) {
+    if (k[i] == 0.0 && b[i] == 0.0) continue;
     pair *row = reinterpret_cast<pair *>(p + i * stride);
     const pair ki = {k[i], k[i]};
     const pair bi = {b[i], b[i]};
@@ -54,8 +56,10 @@ inline void set_scaled(double *out, const double *row, double factor, int stride
 }
 
 inline void add_symmetric_outer(double *p, const double *k, const double *b, int n, int stride) {
-  for (int i = 0; i < n; i++)
+  for (int i = 0; i < n; i++) {
+    if (k[i] == 0.0 && b[i] == 0.0) continue;
     for (int j = 0; j < stride; j++) p[i * stride + j] += k[i] * b[j] + b[i] * k[j];
+  }
 }
 
 }  // namespace scalar
