@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "waymark/event_fields.h"
 #include "waymark/streams.h"
 
 // Limits of plausible values: wide enough for all vehicles, tight enough for corrupt data.
@@ -14,7 +15,6 @@
 #define ACCELERATION -10000.0, 10000.0
 #define TEMPERATURE -273.15, 1000.0
 #define ANGLE -6.2832, 6.2832
-#define RANGE DBL_MIN, 1e5
 #define PLACE -1e8, 1e8
 #define SIGMA DBL_MIN, 1e6
 #define PIXEL -1e5, 1e5
@@ -73,9 +73,9 @@ static double wrapped(double angle_rad) {
 }
 
 // Sigmas of bearing and range from the covariance of the position in the sensor's frame; their correlation is dropped.
-static const char *polar_sigmas(const csv_row *row, wm_sighting *s) {
-  const double *cov = &row->number[FIRST + 6];
-  const int empty = count_empty(row, FIRST + 6, 3);
+static const char *polar_sigmas(const csv_row *row, int first, wm_sighting *s) {
+  const double *cov = &row->number[first];
+  const int empty = count_empty(row, first, 3);
   if (empty == 3) return NULL;
   if (empty > 0) return "a part of the covariance is empty";
   if (isnan(s->bearing_rad) || isnan(s->range_m)) return "a covariance needs both bearing_rad and range_m";
@@ -88,21 +88,26 @@ static const char *polar_sigmas(const csv_row *row, wm_sighting *s) {
   return NULL;
 }
 
+// The columns behind a sighting's sensor and identity: its numbers (event_fields.h), then a covariance.
+#define SIGHTING_COLUMN(member, need, least, most, limits, since, zero_until, message) \
+  {#member, CSV_NUMBER, CSV_##need, least, most},
+#define SIGHTING_OFFSET(member, need, least, most, limits, since, zero_until, message) offsetof(wm_sighting, member),
+
 static const char *fill_sighting(const fill_context *self, const csv_row *row, wm_event *out) {
-  const double *n = &row->number[FIRST];
-  double bearing_rad = n[2], range_m = n[3];
-  if (isnan(bearing_rad) && isnan(range_m)) return "bearing_rad and range_m are both empty";
-  if (isnan(n[9]) != isnan(n[10])) return "one of elevation_rad and elevation_sigma_rad is empty";
-  int64_t id = row->whole[FIRST + 1];
-  out->as.sighting = (wm_sighting){.sensor = self->sensor_index,
-                                   .landmark_id = id == WM_TIME_NONE ? -1 : (int32_t)id,
-                                   .bearing_rad = wrapped(bearing_rad),
-                                   .range_m = range_m,
-                                   .bearing_sigma_rad = n[4],
-                                   .range_sigma_m = n[5],
-                                   .elevation_rad = n[9],
-                                   .elevation_sigma_rad = n[10]};
-  return polar_sigmas(row, &out->as.sighting);
+  static const size_t kOffsets[] = {WM_SIGHTING_NUMBERS(SIGHTING_OFFSET)};
+  enum { kNumbers = sizeof kOffsets / sizeof kOffsets[0] };
+  const int64_t id = row->whole[FIRST + 1];
+  const double *n = &row->number[FIRST + 2];
+  wm_sighting *s = &out->as.sighting;
+  *s = wm_sighting_without_numbers();
+  s->sensor = self->sensor_index;
+  if (id != WM_TIME_NONE) s->landmark_id = (int32_t)id;
+  for (size_t i = 0; i < kNumbers; i++) memcpy((char *)s + kOffsets[i], &n[i], sizeof n[i]);
+  if (isnan(s->bearing_rad) && isnan(s->range_m)) return "bearing_rad and range_m are both empty";
+  if (isnan(s->elevation_rad) != isnan(s->elevation_sigma_rad))
+    return "one of elevation_rad and elevation_sigma_rad is empty";
+  s->bearing_rad = wrapped(s->bearing_rad);
+  return polar_sigmas(row, FIRST + 2 + kNumbers, s);
 }
 
 static const char *fill_marker(const fill_context *self, const csv_row *row, wm_event *out) {
@@ -279,23 +284,18 @@ const stream_kind kStreamImu = {"imu.csv",
                                 .fill = fill_imu,
                                 .quantities = BIT(WM_Q_YAW_RATE)};
 
-const stream_kind kStreamSightings = {"sightings.csv",
-                                      "sightings",
-                                      WM_EVENT_SIGHTING,
-                                      {{STAMPS,
-                                        {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
-                                        {"id", CSV_WHOLE, CSV_MAY_EMPTY, ID_OR_UNKNOWN},
-                                        {"bearing_rad", CSV_NUMBER, CSV_ONE_OF, ANGLE},
-                                        {"range_m", CSV_NUMBER, CSV_ONE_OF, RANGE},
-                                        {"bearing_sigma_rad", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
-                                        {"range_sigma_m", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
-                                        {"cov_xx_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
-                                        {"cov_xy_m2", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
-                                        {"cov_yy_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
-                                        {"elevation_rad", CSV_NUMBER, CSV_OPTIONAL, ANGLE},
-                                        {"elevation_sigma_rad", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
-                                      .fill = fill_sighting,
-                                      .has_sensors = 1};
+const stream_kind kStreamSightings = {
+    "sightings.csv",
+    "sightings",
+    WM_EVENT_SIGHTING,
+    {{STAMPS,
+      {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
+      {"id", CSV_WHOLE, CSV_MAY_EMPTY, ID_OR_UNKNOWN},
+      WM_SIGHTING_NUMBERS(SIGHTING_COLUMN){"cov_xx_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
+      {"cov_xy_m2", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
+      {"cov_yy_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE}}},
+    .fill = fill_sighting,
+    .has_sensors = 1};
 
 const stream_kind kStreamIncrements = {"increments.csv",
                                        "increments",

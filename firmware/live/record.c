@@ -21,6 +21,7 @@
 #include "output/csv_row.h"
 #include "output/new_file.h"
 #include "rt/clock.h"
+#include "waymark/event_fields.h"
 #include "waymark/text.h"
 #include "waymark/yaml.h"
 
@@ -129,26 +130,44 @@ static void take_row(stream *self, const wm_stream *kind, const wm_stream_row *r
   end_row(self, &line);
 }
 
-static const char kSightingColumns[] =
-    "t_ns,arrival_ns,sensor,id,bearing_rad,range_m,bearing_sigma_rad,range_sigma_m,elevation_rad,elevation_sigma_rad";
+// Number `index` of a sighting, or NULL behind the last.
+static const wm_event_field *sighting_number(size_t index) {
+  size_t count;
+  const wm_event_field *fields = wm_event_fields(WM_EVENT_SIGHTING, &count);
+  for (size_t i = 0; i < count; i++)
+    if (fields[i].type == WM_FIELD_F64 && index-- == 0) return &fields[i];
+  return NULL;
+}
 
-static void take_sighting(stream *self, const wm_event *event) {
+static void begin_sightings(stream *self) {
+  const wm_event_field *field;
+  wm_row line = {.length = 0};
+  wm_row_text(&line, "t_ns,arrival_ns,sensor,id");
+  for (size_t i = 0; (field = sighting_number(i)); i++) {
+    wm_row_char(&line, ',');
+    wm_row_text(&line, field->name);
+  }
+  write_row(self, &line);
+}
+
+static void take_sighting(stream *self, wm_event *event) {
   size_t count;
   const wm_sensor *sensors = wm_site_sensors(wm_recording_site(self->all->robot), &count);
-  const wm_sighting *s = &event->as.sighting;
+  const wm_event_field *field;
+  wm_sighting *s = &event->as.sighting;
   // A row has both or none: senders before NaN meant absent give 0 without a sigma.
-  const double elevation_rad = isnan(s->elevation_sigma_rad) ? (double)NAN : s->elevation_rad;
-  const double numbers[] = {s->bearing_rad,   s->range_m,    s->bearing_sigma_rad,
-                            s->range_sigma_m, elevation_rad, s->elevation_sigma_rad};
+  if (isnan(s->elevation_sigma_rad)) s->elevation_rad = (double)NAN;
   wm_row line;
   begin_row(&line, event->t_ns, event->arrival_ns);
   wm_row_char(&line, ',');
   wm_row_text(&line, sensors[s->sensor].name);
   wm_row_char(&line, ',');
   wm_row_int(&line, s->landmark_id);
-  for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; i++) {
+  for (size_t i = 0; (field = sighting_number(i)); i++) {
+    double value;
+    memcpy(&value, (const char *)event + field->offset, sizeof value);
     wm_row_char(&line, ',');
-    wm_row_exact(&line, numbers[i]);
+    wm_row_exact(&line, value);
   }
   end_row(self, &line);
 }
@@ -423,9 +442,7 @@ static wm_status open_sightings(recorder *self, wm_error *err) {
   self->stream_count++;
   status = open_table(s, "sightings", "sightings.csv", err);
   if (status != WM_OK) return status;
-  wm_row line = {.length = 0};
-  wm_row_text(&line, kSightingColumns);
-  write_row(s, &line);
+  begin_sightings(s);
   return WM_OK;
 }
 

@@ -3,11 +3,10 @@
 
 #include "waymark/bytes.h"
 #include "waymark/codec.h"
+#include "waymark/event_fields.h"
 
 #define EVENT_VERSION 5
-// Older versions, which are read, too. Up to version 4, zeros stand for some absent numbers.
-#define WITHOUT_ELEVATION 3
-#define ZERO_IS_ABSENT 4
+#define EVENT_VERSION_OLDEST 3  // that is read
 
 static void put_quantities(wm_writer *w, const wm_quantities *q) {
   size_t count = q->count < WM_QUANTITIES_MAX ? q->count : WM_QUANTITIES_MAX;
@@ -18,30 +17,6 @@ static void put_quantities(wm_writer *w, const wm_quantities *q) {
     wm_put_u8(w, q->id[i]);
     wm_put_f64(w, q->value[i]);
   }
-}
-
-static void put_sighting(wm_writer *w, const wm_sighting *s) {
-  wm_put_u16(w, s->sensor);
-  wm_put_i32(w, s->landmark_id);
-  wm_put_f64(w, s->bearing_rad);
-  wm_put_f64(w, s->range_m);
-  wm_put_f64(w, s->bearing_sigma_rad);
-  wm_put_f64(w, s->range_sigma_m);
-  wm_put_f64(w, s->elevation_rad);
-  wm_put_f64(w, s->elevation_sigma_rad);
-}
-
-static void put_marker(wm_writer *w, const wm_marker *m) {
-  wm_put_u16(w, m->sensor);
-  wm_put_u16(w, m->poses);
-  wm_put_i32(w, m->id);
-  wm_put_f64s(w, m->p_m, 3);
-  wm_put_f64(w, m->yaw_rad);
-  wm_put_f64s(w, m->other_p_m, 3);
-  wm_put_f64(w, m->other_yaw_rad);
-  wm_put_f64(w, m->along_sigma_m);
-  wm_put_f64(w, m->yaw_sigma_rad);
-  wm_put_f64(w, m->bloom_px);
 }
 
 static void put_points(wm_writer *w, const wm_points *p) {
@@ -57,52 +32,22 @@ static void put_points(wm_writer *w, const wm_points *p) {
   }
 }
 
-static void put_payload(wm_writer *w, const wm_event *e) {
-  switch ((wm_event_kind)e->kind) {
-    case WM_EVENT_QUANTITIES: put_quantities(w, &e->as.quantities); break;
-    case WM_EVENT_TWIST2:
-      wm_put_f64(w, e->as.twist2.v_mps);
-      wm_put_f64(w, e->as.twist2.w_radps);
-      break;
-    case WM_EVENT_TWIST6:
-      wm_put_f64s(w, e->as.twist6.v_mps, 3);
-      wm_put_f64s(w, e->as.twist6.w_radps, 3);
-      break;
-    case WM_EVENT_INCREMENT:
-      wm_put_i64(w, e->as.increment.from_ns);
-      wm_put_f64(w, e->as.increment.dx_m);
-      wm_put_f64(w, e->as.increment.dy_m);
-      wm_put_f64(w, e->as.increment.dheading_rad);
-      wm_put_f64s(w, e->as.increment.covariance, 6);
-      break;
-    case WM_EVENT_SIGHTING: put_sighting(w, &e->as.sighting); break;
-    case WM_EVENT_POSITION:
-      wm_put_f64s(w, e->as.position.p_m, 3);
-      wm_put_f64(w, e->as.position.sigma_xy_m);
-      wm_put_f64(w, e->as.position.sigma_z_m);
-      break;
-    case WM_EVENT_HEADING:
-      wm_put_f64(w, e->as.heading.heading_rad);
-      wm_put_f64(w, e->as.heading.sigma_rad);
-      break;
-    case WM_EVENT_MARKER: put_marker(w, &e->as.marker); break;
-    case WM_EVENT_STEREO:
-      wm_put_i32(w, e->as.stereo.id);
-      wm_put_f64s(w, e->as.stereo.left_px, 2);
-      wm_put_f64s(w, e->as.stereo.right_px, 2);
-      break;
-    case WM_EVENT_POINTS: put_points(w, &e->as.points); break;
-    case WM_EVENT_LOOKED: wm_put_u16(w, e->as.looked.sensor); break;
-    case WM_EVENT_SET_POSE:
-      wm_put_f64s(w, e->as.set_pose.pose_map_base.p_m, 3);
-      wm_put_f64s(w, e->as.set_pose.pose_map_base.q_xyzw, 4);
-      wm_put_f64(w, e->as.set_pose.sigma_xy_m);
-      wm_put_f64(w, e->as.set_pose.sigma_heading_rad);
-      break;
-    case WM_EVENT_NONE:
-    case WM_EVENT_RESET:
-    case WM_EVENT_KIND_COUNT: break;
+static void put_field(wm_writer *w, const wm_event *e, const wm_event_field *field) {
+  const void *at = (const char *)e + field->offset;
+  switch ((wm_field_type)field->type) {
+    case WM_FIELD_F64: wm_put_f64s(w, at, field->count); break;
+    case WM_FIELD_I64: wm_put_i64(w, *(const int64_t *)at); break;
+    case WM_FIELD_I32: wm_put_i32(w, *(const int32_t *)at); break;
+    case WM_FIELD_U16: wm_put_u16(w, *(const uint16_t *)at); break;
   }
+}
+
+static void put_payload(wm_writer *w, const wm_event *e) {
+  size_t count;
+  const wm_event_field *fields = wm_event_fields(e->kind, &count);
+  if (e->kind == WM_EVENT_QUANTITIES) put_quantities(w, &e->as.quantities);
+  if (e->kind == WM_EVENT_POINTS) put_points(w, &e->as.points);
+  for (size_t i = 0; i < count; i++) put_field(w, e, &fields[i]);
 }
 
 size_t wm_event_encode(const wm_event *event, void *out, size_t capacity) {
@@ -129,37 +74,6 @@ static void get_quantities(wm_reader *r, wm_quantities *q) {
   }
 }
 
-// A number that zero stood for where it was absent, in versions up to ZERO_IS_ABSENT.
-static double get_optional(wm_reader *r, unsigned version) {
-  const double value = wm_get_f64(r);
-  return version <= ZERO_IS_ABSENT && value == 0.0 ? (double)NAN : value;
-}
-
-static void get_sighting(wm_reader *r, unsigned version, wm_sighting *s) {
-  const int has_elevation = version > WITHOUT_ELEVATION;
-  s->sensor = wm_get_u16(r);
-  s->landmark_id = wm_get_i32(r);
-  s->bearing_rad = wm_get_f64(r);
-  s->range_m = wm_get_f64(r);
-  s->bearing_sigma_rad = wm_get_f64(r);
-  s->range_sigma_m = wm_get_f64(r);
-  s->elevation_rad = has_elevation ? wm_get_f64(r) : (double)NAN;
-  s->elevation_sigma_rad = has_elevation ? get_optional(r, version) : (double)NAN;
-}
-
-static void get_marker(wm_reader *r, unsigned version, wm_marker *m) {
-  m->sensor = wm_get_u16(r);
-  m->poses = wm_get_u16(r);
-  m->id = wm_get_i32(r);
-  wm_get_f64s(r, m->p_m, 3);
-  m->yaw_rad = wm_get_f64(r);
-  wm_get_f64s(r, m->other_p_m, 3);
-  m->other_yaw_rad = wm_get_f64(r);
-  m->along_sigma_m = get_optional(r, version);
-  m->yaw_sigma_rad = get_optional(r, version);
-  m->bloom_px = get_optional(r, version);
-}
-
 static void get_points(wm_reader *r, wm_points *p) {
   p->count = wm_get_u32(r);
   p->dropped = wm_get_u32(r);
@@ -173,59 +87,36 @@ static void get_points(wm_reader *r, wm_points *p) {
   }
 }
 
-static void get_payload(wm_reader *r, unsigned version, wm_event *e) {
-  switch ((wm_event_kind)e->kind) {
-    case WM_EVENT_QUANTITIES: get_quantities(r, &e->as.quantities); break;
-    case WM_EVENT_TWIST2:
-      e->as.twist2.v_mps = wm_get_f64(r);
-      e->as.twist2.w_radps = wm_get_f64(r);
-      break;
-    case WM_EVENT_TWIST6:
-      wm_get_f64s(r, e->as.twist6.v_mps, 3);
-      wm_get_f64s(r, e->as.twist6.w_radps, 3);
-      break;
-    case WM_EVENT_INCREMENT:
-      e->as.increment.from_ns = wm_get_i64(r);
-      e->as.increment.dx_m = wm_get_f64(r);
-      e->as.increment.dy_m = wm_get_f64(r);
-      e->as.increment.dheading_rad = wm_get_f64(r);
-      wm_get_f64s(r, e->as.increment.covariance, 6);
-      break;
-    case WM_EVENT_SIGHTING: get_sighting(r, version, &e->as.sighting); break;
-    case WM_EVENT_POSITION:
-      wm_get_f64s(r, e->as.position.p_m, 3);
-      e->as.position.sigma_xy_m = wm_get_f64(r);
-      e->as.position.sigma_z_m = wm_get_f64(r);
-      break;
-    case WM_EVENT_HEADING:
-      e->as.heading.heading_rad = wm_get_f64(r);
-      e->as.heading.sigma_rad = wm_get_f64(r);
-      break;
-    case WM_EVENT_MARKER: get_marker(r, version, &e->as.marker); break;
-    case WM_EVENT_STEREO:
-      e->as.stereo.id = wm_get_i32(r);
-      wm_get_f64s(r, e->as.stereo.left_px, 2);
-      wm_get_f64s(r, e->as.stereo.right_px, 2);
-      break;
-    case WM_EVENT_POINTS: get_points(r, &e->as.points); break;
-    case WM_EVENT_LOOKED: e->as.looked.sensor = wm_get_u16(r); break;
-    case WM_EVENT_SET_POSE:
-      wm_get_f64s(r, e->as.set_pose.pose_map_base.p_m, 3);
-      wm_get_f64s(r, e->as.set_pose.pose_map_base.q_xyzw, 4);
-      e->as.set_pose.sigma_xy_m = wm_get_f64(r);
-      e->as.set_pose.sigma_heading_rad = wm_get_f64(r);
-      break;
-    case WM_EVENT_NONE:
-    case WM_EVENT_RESET:
-    case WM_EVENT_KIND_COUNT: break;
+static void get_numbers(wm_reader *r, unsigned version, const wm_event_field *field, double *out) {
+  for (size_t i = 0; i < field->count; i++) {
+    out[i] = version < field->since ? (double)NAN : wm_get_f64(r);
+    if (version <= field->zero_until && out[i] == 0.0) out[i] = (double)NAN;
   }
+}
+
+static void get_field(wm_reader *r, unsigned version, const wm_event_field *field, wm_event *e) {
+  void *at = (char *)e + field->offset;
+  switch ((wm_field_type)field->type) {
+    case WM_FIELD_F64: get_numbers(r, version, field, at); break;
+    case WM_FIELD_I64: *(int64_t *)at = wm_get_i64(r); break;
+    case WM_FIELD_I32: *(int32_t *)at = wm_get_i32(r); break;
+    case WM_FIELD_U16: *(uint16_t *)at = wm_get_u16(r); break;
+  }
+}
+
+static void get_payload(wm_reader *r, unsigned version, wm_event *e) {
+  size_t count;
+  const wm_event_field *fields = wm_event_fields(e->kind, &count);
+  if (e->kind == WM_EVENT_QUANTITIES) get_quantities(r, &e->as.quantities);
+  if (e->kind == WM_EVENT_POINTS) get_points(r, &e->as.points);
+  for (size_t i = 0; i < count; i++) get_field(r, version, &fields[i], e);
 }
 
 wm_status wm_event_decode(const void *data, size_t size, wm_event *out, size_t *used) {
   memset(out, 0, WM_EVENT_SMALL_BYTES);
   wm_reader r = wm_reader_of(data, size);
   const unsigned version = wm_get_u8(&r);
-  if (version < WITHOUT_ELEVATION || version > EVENT_VERSION) r.bad = 1;
+  if (version < EVENT_VERSION_OLDEST || version > EVENT_VERSION) r.bad = 1;
   out->kind = wm_get_u8(&r);
   if (out->kind == WM_EVENT_NONE || out->kind >= WM_EVENT_KIND_COUNT) r.bad = 1;
   out->source = wm_get_u16(&r);

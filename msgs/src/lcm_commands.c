@@ -3,12 +3,10 @@
 #include <math.h>
 #include <string.h>
 
+#include "lcm_bytes.h"
 #include "waymark/lcm_messages.h"
-#include "waymark_observations_t.h"
 #include "waymark_reset_t.h"
 #include "waymark_set_pose_t.h"
-
-static int room(size_t length) { return length > INT32_MAX ? INT32_MAX : (int)length; }
 
 static void begin(wm_event *out, unsigned kind, wm_time_ns t_ns) {
   memset(out, 0, WM_EVENT_SMALL_BYTES);
@@ -45,46 +43,6 @@ const char *wm_lcm_read_reset(const void *message, size_t length, wm_event *out)
   waymark_reset_t m;
   if (waymark_reset_t_decode(message, 0, room(length), &m) < 0) return "is no reset_t of this version";
   begin(out, WM_EVENT_RESET, m.t_ns);
-  return NULL;
-}
-
-// NULL, or what is wrong with it.
-static const char *read_sighting(const waymark_observations_t *m, int i, wm_sighting *out) {
-  double bearing_rad = m->bearing_rad[i], range_m = m->range_m[i];
-  if (isnan(bearing_rad) && isnan(range_m)) return "one of bearing_rad and range_m is needed";
-  if (!isnan(bearing_rad) && !(fabs(bearing_rad) <= 2 * M_PI)) return "bearing_rad is more than a turn";
-  if (!isnan(range_m) && !(range_m > 0 && range_m <= 1e5)) return "range_m has to be above 0, and not above 100000";
-  if (m->landmark_id[i] < -1) return "landmark_id is below -1";
-  double elevation_rad = m->elevation_rad[i], elevation_sigma_rad = m->elevation_sigma_rad[i];
-  if (!isnan(elevation_rad) && !(fabs(elevation_rad) <= 0.5 * M_PI)) return "elevation_rad is beyond the vertical";
-  if (!isnan(elevation_sigma_rad) && !(elevation_sigma_rad >= 0 && elevation_sigma_rad < 10))
-    return "elevation_sigma_rad is below 0 or not below 10";  // 0: senders before NaN meant absent
-  *out = (wm_sighting){.landmark_id = m->landmark_id[i],
-                       .bearing_rad = isnan(bearing_rad) ? bearing_rad : remainder(bearing_rad, 2 * M_PI),
-                       .range_m = range_m,
-                       .bearing_sigma_rad = (double)NAN,
-                       .range_sigma_m = (double)NAN,
-                       .elevation_rad = elevation_rad,
-                       .elevation_sigma_rad = elevation_sigma_rad != 0 ? elevation_sigma_rad : (double)NAN};
-  return NULL;
-}
-
-const char *wm_lcm_read_sightings(const void *message, size_t length, char *sensor, wm_time_ns *t_ns, wm_sighting *out,
-                                  size_t *count) {
-  waymark_observations_t m;
-  *count = 0;
-  if (waymark_observations_t_decode(message, 0, room(length), &m) < 0) return "is no observations_t of this version";
-  if (m.t_ns <= 0) return "t_ns is not above 0: when was it seen, on the robot's monotonic clock?";
-  if (m.count < 0 || m.count > WM_LCM_OBSERVATIONS_MAX) return "count is not in 0 to 64";
-  _Static_assert(sizeof m.sensor >= WM_NAME_MAX, "a name fits");
-  memcpy(sensor, m.sensor, WM_NAME_MAX);
-  sensor[WM_NAME_MAX - 1] = '\0';
-  *t_ns = m.t_ns;
-  for (int i = 0; i < m.count; i++) {
-    const char *why = read_sighting(&m, i, &out[i]);
-    if (why) return why;
-  }
-  *count = (size_t)m.count;
   return NULL;
 }
 

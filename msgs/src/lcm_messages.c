@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/lcm_messages.h"
+#include "lcm_bytes.h"
 
 #include <string.h>
 
+#include "lcm_bytes.h"
 #include "waymark_health_t.h"
 #include "waymark_innovation_t.h"
 #include "waymark_landmarks_t.h"
-#include "waymark_observations_t.h"
 #include "waymark_pose_t.h"
 
 _Static_assert(sizeof(((waymark_source_health_t *)0)->rejected) / sizeof(int64_t) == WM_VERDICT_COUNT,
@@ -25,15 +26,6 @@ _Static_assert(WAYMARK_POSE_T_STATUS_JUMPED == WM_PUB_JUMPED &&
                    WAYMARK_POSE_T_STATE_DEGRADED == WM_STATE_DEGRADED &&
                    WAYMARK_POSE_T_CAUSE_OFF_MAP == WM_CAUSE_OFF_MAP,
                "the messages' numbers are the structs' numbers");
-
-static size_t written(int bytes) { return bytes > 0 ? (size_t)bytes : 0; }
-static int room(size_t capacity) { return capacity > INT32_MAX ? INT32_MAX : (int)capacity; }
-
-static void put_name(uint8_t *out, size_t capacity, const char *name) {
-  size_t length = strnlen(name, capacity - 1);
-  memset(out, 0, capacity);
-  memcpy(out, name, length);
-}
 
 size_t wm_lcm_pose(const wm_published *p, wm_time_ns sent_ns, void *out, size_t capacity) {
   const wm_estimate *e = &p->now;
@@ -154,24 +146,6 @@ size_t wm_lcm_innovation(const wm_innovation *i, void *out, size_t capacity) {
       .gate = i->gate,
   };
   return written(waymark_innovation_t_encode(out, 0, room(capacity), &m));
-}
-
-size_t wm_lcm_observations(const char *sensor_name, const wm_event *sightings, size_t count, void *out,
-                           size_t capacity) {
-  if (count == 0) return 0;
-  waymark_observations_t m = {.t_ns = sightings[0].t_ns, .arrival_ns = sightings[0].arrival_ns};
-  put_name(m.sensor, sizeof m.sensor, sensor_name);
-  m.count = (int32_t)(count < WM_LCM_OBSERVATIONS_MAX ? count : WM_LCM_OBSERVATIONS_MAX);
-  m.dropped = (int32_t)(count - (size_t)m.count);
-  for (int32_t i = 0; i < m.count; i++) {
-    const wm_sighting *s = &sightings[i].as.sighting;
-    m.landmark_id[i] = s->landmark_id;
-    m.bearing_rad[i] = s->bearing_rad;
-    m.range_m[i] = s->range_m;
-    m.elevation_rad[i] = s->elevation_rad;
-    m.elevation_sigma_rad[i] = s->elevation_sigma_rad;
-  }
-  return written(waymark_observations_t_encode(out, 0, room(capacity), &m));
 }
 
 size_t wm_lcm_landmarks(const wm_landmark *landmarks, size_t total, size_t first, wm_time_ns t_ns, void *out,

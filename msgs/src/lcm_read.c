@@ -2,12 +2,11 @@
 // Messages of a run, read again.
 #include <string.h>
 
+#include "lcm_bytes.h"
 #include "waymark/lcm_messages.h"
 #include "waymark_health_t.h"
 #include "waymark_innovation_t.h"
 #include "waymark_pose_t.h"
-
-static int room(size_t length) { return length > INT32_MAX ? INT32_MAX : (int)length; }
 
 // Names come from any sender and go to a terminal: control characters (C0, DEL, and C1 in UTF-8) become '?'.
 static void take_name(char *out, size_t capacity, const uint8_t *name, size_t length) {

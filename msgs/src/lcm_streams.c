@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/lcm_streams.h"
+#include "lcm_bytes.h"
 
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
 
+#include "lcm_bytes.h"
 #include "waymark_depth_t.h"
 #include "waymark_gnss_t.h"
 #include "waymark_heading_t.h"
@@ -75,8 +77,6 @@ static const stream_type *find(const char *stream) {
     if (strcmp(kTypes[i].stream, stream) == 0) return &kTypes[i];
   return NULL;
 }
-
-static int room(size_t length) { return length > INT32_MAX ? INT32_MAX : (int)length; }
 
 const char *wm_lcm_stream_type(const char *stream) {
   const stream_type *type = find(stream);

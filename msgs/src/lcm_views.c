@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/lcm_views.h"
+#include "lcm_bytes.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "lcm_bytes.h"
 #include "waymark/lcm_messages.h"
 #include "waymark_landmarks_t.h"
 #include "waymark_map_t.h"
 #include "waymark_places_t.h"
-
-static size_t written(int bytes) { return bytes > 0 ? (size_t)bytes : 0; }
-static int room(size_t length) { return length > INT32_MAX ? INT32_MAX : (int)length; }
 
 size_t wm_lcm_places(const wm_place *places, size_t count, size_t total, wm_time_ns t_ns, void *out, size_t capacity) {
   static _Thread_local waymark_places_t m;  // large

@@ -2,7 +2,6 @@
 // A tracker's line may go over to another edge. Where the pose is uncertain, as between two pictures of wheels that
 // slip, the first bearing of a picture passes any gate and turns the robot; then all others are rejected. So it waits
 // until another one of the picture agrees with it: a joint compatibility test of pairs [Neira2001].
-#include <limits>
 
 #include "filters/slam/slam.hpp"
 
@@ -55,19 +54,15 @@ bool slam::waits_for_another(const context &at, const line_bearing &seen, const 
 // Those that waited go through the gates that the newest one has narrowed.
 void slam::take_waiting(const context &newest) {
   if (!first_.settled) return;
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const int count = first_.count;
   first_.count = 0;
   for (int i = 0; i < count; i++) {
     const first_bearings::one &one = first_.waiting[i];
-    const wm_sighting s{.sensor = static_cast<uint16_t>(one.sensor),
-                        .landmark_id = one.id,
-                        .bearing_rad = one.bearing_rad,
-                        .range_m = kNone,
-                        .bearing_sigma_rad = one.given_sigma_rad,
-                        .range_sigma_m = kNone,
-                        .elevation_rad = kNone,
-                        .elevation_sigma_rad = kNone};
+    wm_sighting s = wm_sighting_without_numbers();
+    s.sensor = static_cast<uint16_t>(one.sensor);
+    s.landmark_id = one.id;
+    s.bearing_rad = one.bearing_rad;
+    s.bearing_sigma_rad = one.given_sigma_rad;
     context at = newest;
     at.sensor = one.sensor;
     at.id = at.record.landmark_id = one.id;

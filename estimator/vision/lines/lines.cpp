@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstring>
 #include <initializer_list>
-#include <limits>
 
 #include "memory/layout.hpp"
 #include "sensors/mounting.hpp"
@@ -101,15 +100,10 @@ void emit(const lines_state &self, const line_track &track, wm_time_ns t_ns, wm_
   std::memset(static_cast<void *>(out), 0, WM_EVENT_SMALL_BYTES);
   out->t_ns = t_ns;
   out->kind = WM_EVENT_SIGHTING;
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-  out->as.sighting = {.sensor = 0,
-                      .landmark_id = track.id,
-                      .bearing_rad = bearing_of(self, edge.azimuth_rad),
-                      .range_m = kNan,
-                      .bearing_sigma_rad = edge.sigma_rad,
-                      .range_sigma_m = kNan,
-                      .elevation_rad = kNan,
-                      .elevation_sigma_rad = kNan};
+  out->as.sighting = wm_sighting_without_numbers();
+  out->as.sighting.landmark_id = track.id;
+  out->as.sighting.bearing_rad = bearing_of(self, edge.azimuth_rad);
+  out->as.sighting.bearing_sigma_rad = edge.sigma_rad;
 }
 
 wm_status detect(void *memory, const wm_frame *frames, const wm_estimate *, wm_event *out, size_t capacity,

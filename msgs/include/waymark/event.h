@@ -8,6 +8,7 @@
 #ifndef WAYMARK_EVENT_H
 #define WAYMARK_EVENT_H
 
+#include <math.h>
 #include <stddef.h>
 #include <stdint.h>
 
@@ -179,6 +180,14 @@ typedef struct wm_event {
 
 // Bytes of `event` in use: copy this many, from a ring or to one. Constant cost. Any thread.
 size_t wm_event_bytes(const wm_event *event);
+
+// A sighting whose numbers are all absent, for a sensor to fill in: what it doesn't measure stays absent. Index 0,
+// identity -1.
+static inline wm_sighting wm_sighting_without_numbers(void) {
+  const double absent = (double)NAN;
+  wm_sighting s = {0, -1, absent, absent, absent, absent, absent, absent};
+  return s;
+}
 
 // True if a sighting has an elevation and its sigma. Their values are not checked.
 static inline int wm_sighting_has_elevation(const wm_sighting *s) {

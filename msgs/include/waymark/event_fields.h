@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// What each kind of event holds, a row a field, in the order of the event log. From these rows follow the codec
+// (codec_event.c), the columns of sightings in a recording (stream_kinds.c, record.c) and their numbers over LCM
+// (lcm_sightings.c). A new field is a member in event.h and a row here. Quantities and points have as many entries as
+// they count; the codec writes them out.
+#ifndef WAYMARK_EVENT_FIELDS_H
+#define WAYMARK_EVENT_FIELDS_H
+
+#include <float.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "waymark/event.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+// Numbers of a sighting.
+// NUMBER(member, need, least, most, limits in words, codec version it came with, last version whose 0 means absent,
+// message) need: ONE_OF (a row has at least one of those) or OPTIONAL; message: IN_MESSAGE or NOT_IN_MESSAGE
+// (observations_t.lcm).
+#define WM_SIGHTING_NUMBERS(NUMBER)                                                                         \
+  NUMBER(bearing_rad, ONE_OF, -6.2832, 6.2832, "within a turn of 0", 0, 0, IN_MESSAGE)                      \
+  NUMBER(range_m, ONE_OF, DBL_MIN, 1e5, "above 0, and not above 100000", 0, 0, IN_MESSAGE)                  \
+  NUMBER(bearing_sigma_rad, OPTIONAL, DBL_MIN, 1e6, "above 0, and not above 1000000", 0, 0, NOT_IN_MESSAGE) \
+  NUMBER(range_sigma_m, OPTIONAL, DBL_MIN, 1e6, "above 0, and not above 1000000", 0, 0, NOT_IN_MESSAGE)     \
+  NUMBER(elevation_rad, OPTIONAL, -1.5708, 1.5708, "not beyond the vertical", 4, 0, IN_MESSAGE)             \
+  NUMBER(elevation_sigma_rad, OPTIONAL, DBL_MIN, 1e6, "above 0, and not above 1000000", 4, 4, IN_MESSAGE)
+
+typedef enum wm_field_type { WM_FIELD_F64, WM_FIELD_I64, WM_FIELD_I32, WM_FIELD_U16 } wm_field_type;
+
+typedef struct wm_event_field {
+  const char *name;    // as the member's
+  uint16_t offset;     // in wm_event
+  uint8_t type;        // wm_field_type
+  uint8_t count;       // elements
+  uint8_t since;       // codec version it came with; older logs have none, and NaN is read. 0: always there
+  uint8_t zero_until;  // last codec version in which 0 stands for absent; 0: none
+} wm_event_field;
+
+// Fields of a kind, in the order of the event log. None: the kind holds nothing, or as many entries as it counts. Any
+// thread.
+const wm_event_field *wm_event_fields(unsigned kind, size_t *count);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the readers and writers of LCM messages share: generated functions count bytes by int.
+#ifndef WM_MSGS_LCM_BYTES_H
+#define WM_MSGS_LCM_BYTES_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+static inline int room(size_t length) { return length > INT32_MAX ? INT32_MAX : (int)length; }
+static inline size_t written(int bytes) { return bytes > 0 ? (size_t)bytes : 0; }
+
+// A name, cut where it has to be, padded with zeros.
+static inline void put_name(uint8_t *out, size_t capacity, const char *name) {
+  const size_t length = strnlen(name, capacity - 1);
+  memset(out, 0, capacity);
+  memcpy(out, name, length);
+}
+
+#endif
