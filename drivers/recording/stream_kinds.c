@@ -26,6 +26,13 @@
 #define STAMPS \
   {"t_ns", CSV_TIME, CSV_NEEDED, 0, 0}, { "arrival_ns", CSV_TIME, CSV_OPTIONAL, 0, 0 }
 
+#define SENSED \
+  STAMPS, { "sensor", CSV_NAME, CSV_NEEDED, 0, 0 }
+#define NEEDED(name, limits) \
+  { name, CSV_NUMBER, CSV_NEEDED, limits }
+#define OPTIONAL(name, limits) \
+  { name, CSV_NUMBER, CSV_OPTIONAL, limits }
+
 static const char *fill_motion(const fill_context *self, const csv_row *row, wm_event *out) {
   (void)self;
   const double v_mps = row->number[FIRST], vy_mps = row->number[FIRST + 1], w_radps = row->number[FIRST + 2];
@@ -202,27 +209,17 @@ static const char *fill_imu(const fill_context *self, const csv_row *row, wm_eve
   return NULL;
 }
 
-const stream_kind kStreamMotion = {"motion.csv",
-                                   "motion",
-                                   WM_EVENT_TWIST2,
-                                   {{STAMPS,
-                                     {"v_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
-                                     {"vy_mps", CSV_NUMBER, CSV_OPTIONAL, SPEED},
-                                     {"w_radps", CSV_NUMBER, CSV_NEEDED, RATE}}},
-                                   .fill = fill_motion,
-                                   .also = WM_EVENT_TWIST6,
-                                   .also_with = FIRST + 1};
+const stream_kind kStreamMotion = {
+    "motion.csv",          "motion",
+    WM_EVENT_TWIST2,       {{STAMPS, NEEDED("v_mps", SPEED), OPTIONAL("vy_mps", SPEED), NEEDED("w_radps", RATE)}},
+    .fill = fill_motion,   .also = WM_EVENT_TWIST6,
+    .also_with = FIRST + 1};
 
 const stream_kind kStreamMotion6 = {"motion6.csv",
                                     "motion6",
                                     WM_EVENT_TWIST6,
-                                    {{STAMPS,
-                                      {"vx_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
-                                      {"vy_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
-                                      {"vz_mps", CSV_NUMBER, CSV_NEEDED, SPEED},
-                                      {"wx_radps", CSV_NUMBER, CSV_NEEDED, RATE},
-                                      {"wy_radps", CSV_NUMBER, CSV_NEEDED, RATE},
-                                      {"wz_radps", CSV_NUMBER, CSV_NEEDED, RATE}}},
+                                    {{STAMPS, NEEDED("vx_mps", SPEED), NEEDED("vy_mps", SPEED), NEEDED("vz_mps", SPEED),
+                                      NEEDED("wx_radps", RATE), NEEDED("wy_radps", RATE), NEEDED("wz_radps", RATE)}},
                                     .fill = fill_motion6};
 
 #define TICKS -1e15, 1e15     // doubles still count singly there
@@ -231,116 +228,96 @@ const stream_kind kStreamMotion6 = {"motion6.csv",
 
 static const stream_kind kStreamTicks = {
     "ticks.csv",         "ticks",
-    WM_EVENT_QUANTITIES, {{STAMPS, {"left", CSV_NUMBER, CSV_NEEDED, TICKS}, {"right", CSV_NUMBER, CSV_NEEDED, TICKS}}},
+    WM_EVENT_QUANTITIES, {{STAMPS, NEEDED("left", TICKS), NEEDED("right", TICKS)}},
     .fill = fill_ticks,  .quantities = BIT(WM_Q_WHEEL_TICKS_LEFT) | BIT(WM_Q_WHEEL_TICKS_RIGHT)};
 
 static const stream_kind kStreamSpeeds = {
-    "speeds.csv",
-    "speeds",
-    WM_EVENT_QUANTITIES,
-    {{STAMPS, {"left_mps", CSV_NUMBER, CSV_NEEDED, SPEED}, {"right_mps", CSV_NUMBER, CSV_NEEDED, SPEED}}},
-    .fill = fill_speeds,
-    .quantities = BIT(WM_Q_WHEEL_SPEED_REAR_LEFT) | BIT(WM_Q_WHEEL_SPEED_REAR_RIGHT)};
+    "speeds.csv",        "speeds",
+    WM_EVENT_QUANTITIES, {{STAMPS, NEEDED("left_mps", SPEED), NEEDED("right_mps", SPEED)}},
+    .fill = fill_speeds, .quantities = BIT(WM_Q_WHEEL_SPEED_REAR_LEFT) | BIT(WM_Q_WHEEL_SPEED_REAR_RIGHT)};
 
 static const stream_kind kStreamSteering = {
-    "steering.csv",
-    "steering",
+    "steering.csv",        "steering",
+    WM_EVENT_QUANTITIES,   {{STAMPS, NEEDED("v_mps", SPEED), NEEDED("road_wheel_rad", ROAD_WHEEL)}},
+    .fill = fill_steering, .quantities = BIT(WM_Q_VEHICLE_SPEED) | BIT(WM_Q_ROAD_WHEEL)};
+
+static const stream_kind kStreamHeading = {"heading.csv",
+                                           "heading",
+                                           WM_EVENT_HEADING,
+                                           {{STAMPS, NEEDED("heading_rad", ANGLE), NEEDED("sigma_rad", SIGMA)}},
+                                           .fill = fill_heading};
+
+static const stream_kind kStreamDepth = {"depth.csv",
+                                         "depth",
+                                         WM_EVENT_POSITION,
+                                         {{STAMPS, NEEDED("depth_m", PLACE), NEEDED("sigma_m", SIGMA)}},
+                                         .fill = fill_depth};
+
+const stream_kind kStreamImu = {
+    "imu.csv",
+    "imu",
     WM_EVENT_QUANTITIES,
-    {{STAMPS, {"v_mps", CSV_NUMBER, CSV_NEEDED, SPEED}, {"road_wheel_rad", CSV_NUMBER, CSV_NEEDED, ROAD_WHEEL}}},
-    .fill = fill_steering,
-    .quantities = BIT(WM_Q_VEHICLE_SPEED) | BIT(WM_Q_ROAD_WHEEL)};
+    {{STAMPS, NEEDED("wx_radps", RATE), NEEDED("wy_radps", RATE), NEEDED("wz_radps", RATE),
+      OPTIONAL("ax_mps2", ACCELERATION), OPTIONAL("ay_mps2", ACCELERATION), OPTIONAL("az_mps2", ACCELERATION),
+      OPTIONAL("sigma_wx_radps", SIGMA), OPTIONAL("sigma_wy_radps", SIGMA), OPTIONAL("sigma_wz_radps", SIGMA),
+      OPTIONAL("sigma_ax_mps2", SIGMA), OPTIONAL("sigma_ay_mps2", SIGMA), OPTIONAL("sigma_az_mps2", SIGMA),
+      OPTIONAL("temperature_c", TEMPERATURE)}},
+    .fill = fill_imu,
+    .quantities = BIT(WM_Q_YAW_RATE)};
 
-static const stream_kind kStreamHeading = {
-    "heading.csv",
-    "heading",
-    WM_EVENT_HEADING,
-    {{STAMPS, {"heading_rad", CSV_NUMBER, CSV_NEEDED, ANGLE}, {"sigma_rad", CSV_NUMBER, CSV_NEEDED, SIGMA}}},
-    .fill = fill_heading};
-
-static const stream_kind kStreamDepth = {
-    "depth.csv",
-    "depth",
-    WM_EVENT_POSITION,
-    {{STAMPS, {"depth_m", CSV_NUMBER, CSV_NEEDED, PLACE}, {"sigma_m", CSV_NUMBER, CSV_NEEDED, SIGMA}}},
-    .fill = fill_depth};
-
-const stream_kind kStreamImu = {"imu.csv",
-                                "imu",
-                                WM_EVENT_QUANTITIES,
-                                {{STAMPS,
-                                  {"wx_radps", CSV_NUMBER, CSV_NEEDED, RATE},
-                                  {"wy_radps", CSV_NUMBER, CSV_NEEDED, RATE},
-                                  {"wz_radps", CSV_NUMBER, CSV_NEEDED, RATE},
-                                  {"ax_mps2", CSV_NUMBER, CSV_OPTIONAL, ACCELERATION},
-                                  {"ay_mps2", CSV_NUMBER, CSV_OPTIONAL, ACCELERATION},
-                                  {"az_mps2", CSV_NUMBER, CSV_OPTIONAL, ACCELERATION},
-                                  {"sigma_wx_radps", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
-                                  {"sigma_wy_radps", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
-                                  {"sigma_wz_radps", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
-                                  {"sigma_ax_mps2", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
-                                  {"sigma_ay_mps2", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
-                                  {"sigma_az_mps2", CSV_NUMBER, CSV_OPTIONAL, SIGMA},
-                                  {"temperature_c", CSV_NUMBER, CSV_OPTIONAL, TEMPERATURE}}},
-                                .fill = fill_imu,
-                                .quantities = BIT(WM_Q_YAW_RATE)};
-
-const stream_kind kStreamSightings = {
-    "sightings.csv",
-    "sightings",
-    WM_EVENT_SIGHTING,
-    {{STAMPS,
-      {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
-      {"id", CSV_WHOLE, CSV_MAY_EMPTY, ID_OR_UNKNOWN},
-      WM_SIGHTING_NUMBERS(SIGHTING_COLUMN){"cov_xx_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
-      {"cov_xy_m2", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
-      {"cov_yy_m2", CSV_NUMBER, CSV_OPTIONAL, VARIANCE}}},
-    .fill = fill_sighting,
-    .has_sensors = 1};
+const stream_kind kStreamSightings = {"sightings.csv",
+                                      "sightings",
+                                      WM_EVENT_SIGHTING,
+                                      {{SENSED,
+                                        {"id", CSV_WHOLE, CSV_MAY_EMPTY, ID_OR_UNKNOWN},
+                                        WM_SIGHTING_NUMBERS(SIGHTING_COLUMN) OPTIONAL("cov_xx_m2", VARIANCE),
+                                        OPTIONAL("cov_xy_m2", COVARIANCE),
+                                        OPTIONAL("cov_yy_m2", VARIANCE)}},
+                                      .fill = fill_sighting,
+                                      .has_sensors = 1};
 
 const stream_kind kStreamIncrements = {"increments.csv",
                                        "increments",
                                        WM_EVENT_INCREMENT,
                                        {{STAMPS,
                                          {"from_ns", CSV_TIME, CSV_NEEDED, 0, 0},
-                                         {"dx_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                         {"dy_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                         {"dheading_rad", CSV_NUMBER, CSV_NEEDED, ANGLE},
-                                         {"cov_xx", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
-                                         {"cov_xy", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
-                                         {"cov_yy", CSV_NUMBER, CSV_OPTIONAL, VARIANCE},
-                                         {"cov_xt", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
-                                         {"cov_yt", CSV_NUMBER, CSV_OPTIONAL, COVARIANCE},
-                                         {"cov_tt", CSV_NUMBER, CSV_OPTIONAL, VARIANCE}}},
+                                         NEEDED("dx_m", PLACE),
+                                         NEEDED("dy_m", PLACE),
+                                         NEEDED("dheading_rad", ANGLE),
+                                         OPTIONAL("cov_xx", VARIANCE),
+                                         OPTIONAL("cov_xy", COVARIANCE),
+                                         OPTIONAL("cov_yy", VARIANCE),
+                                         OPTIONAL("cov_xt", COVARIANCE),
+                                         OPTIONAL("cov_yt", COVARIANCE),
+                                         OPTIONAL("cov_tt", VARIANCE)}},
                                        .fill = fill_increment};
 
 const stream_kind kStreamMarkers = {"markers.csv",
                                     "markers",
                                     WM_EVENT_MARKER,
-                                    {{STAMPS,
-                                      {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
+                                    {{SENSED,
                                       {"id", CSV_WHOLE, CSV_NEEDED, ANY_ID},
-                                      {"x_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                      {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                      {"z_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                      {"yaw_rad", CSV_NUMBER, CSV_NEEDED, ANGLE}}},
+                                      NEEDED("x_m", PLACE),
+                                      NEEDED("y_m", PLACE),
+                                      NEEDED("z_m", PLACE),
+                                      NEEDED("yaw_rad", ANGLE)}},
                                     .fill = fill_marker,
                                     .has_sensors = 1};
 
 const stream_kind kStreamCorners = {"marker-corners.csv",
                                     "corners",
                                     WM_EVENT_MARKER,
-                                    {{STAMPS,
-                                      {"sensor", CSV_NAME, CSV_NEEDED, 0, 0},
+                                    {{SENSED,
                                       {"id", CSV_WHOLE, CSV_NEEDED, ANY_ID},
-                                      {"u0_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"v0_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"u1_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"v1_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"u2_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"v2_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"u3_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"v3_px", CSV_NUMBER, CSV_NEEDED, PIXEL},
-                                      {"sigma_px", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
+                                      NEEDED("u0_px", PIXEL),
+                                      NEEDED("v0_px", PIXEL),
+                                      NEEDED("u1_px", PIXEL),
+                                      NEEDED("v1_px", PIXEL),
+                                      NEEDED("u2_px", PIXEL),
+                                      NEEDED("v2_px", PIXEL),
+                                      NEEDED("u3_px", PIXEL),
+                                      NEEDED("v3_px", PIXEL),
+                                      OPTIONAL("sigma_px", SIGMA)}},
                                     .fill = fill_corners,
                                     .has_sensors = 1};
 
@@ -355,22 +332,17 @@ const stream_kind kStreamStereo = {"stereo.csv",
                                      {"vr_px", CSV_NUMBER, CSV_MAY_EMPTY, PIXEL}}},
                                    .fill = fill_stereo};
 
-const stream_kind kStreamPoints = {
-    "points.csv",
-    "points",
-    WM_EVENT_POINTS,
-    {{STAMPS, {"x_m", CSV_NUMBER, CSV_NEEDED, PLACE}, {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE}}},
-    .fill = fill_point};
+const stream_kind kStreamPoints = {"points.csv",
+                                   "points",
+                                   WM_EVENT_POINTS,
+                                   {{STAMPS, NEEDED("x_m", PLACE), NEEDED("y_m", PLACE)}},
+                                   .fill = fill_point};
 
 const stream_kind kStreamGnss = {"gnss.csv",
                                  "gnss",
                                  WM_EVENT_POSITION,
-                                 {{STAMPS,
-                                   {"x_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                   {"y_m", CSV_NUMBER, CSV_NEEDED, PLACE},
-                                   {"z_m", CSV_NUMBER, CSV_OPTIONAL, PLACE},
-                                   {"sigma_xy_m", CSV_NUMBER, CSV_NEEDED, SIGMA},
-                                   {"sigma_z_m", CSV_NUMBER, CSV_OPTIONAL, SIGMA}}},
+                                 {{STAMPS, NEEDED("x_m", PLACE), NEEDED("y_m", PLACE), OPTIONAL("z_m", PLACE),
+                                   NEEDED("sigma_xy_m", SIGMA), OPTIONAL("sigma_z_m", SIGMA)}},
                                  .fill = fill_gnss};
 
 void fill_context_imu(fill_context *self, const wm_mounting *imu) {

@@ -18,11 +18,12 @@ constexpr double kRoadWheelMost_rad = 1.5;  // tan is finite; no wheel is turned
 
 // Sensors without a sign give zero errors of either; the largest seen is 0.05 m/s. Not swept.
 constexpr double kSignedBelow_mps = -0.1;
-// A stuck yaw rate: the same bits for so long while driving, or sooner while another sensor measures a turn. A gyro's
-// noise never repeats for seconds. Not swept.
-constexpr double kYawStuckAlone_s = 30.0, kYawStuckAgainst_s = 3.0;
-constexpr double kYawStuckTurn_radps = 0.1;
-constexpr double kDriving_mps = 0.5;
+// A stuck yaw rate: the same bits for so long and over so long a way, or sooner while another sensor measures a turn
+// that differs from it. A gyro's noise never repeats for seconds. Not swept.
+constexpr double kYawStuckAlone_s = 30.0, kYawStuckAlone_m = 15.0, kYawStuckAgainst_s = 3.0;
+// What the other sensor's errors make of a turn: a part of it (track, slip), an offset of the steering angle, and a
+// rest.
+constexpr double kYawStuckTurn_rad = 0.3, kOtherTurnScale = 0.2, kOtherSteeringOffset_rad = 0.02;
 
 // The best first: increments have a covariance of their own; a gyro's turn is better than the wheels' difference, which
 // is then its second source (wheel_heading); steering knows less of the turn than the rear wheels' ticks.
@@ -57,8 +58,8 @@ void motion_front_end::init(const wm_motion_params *params, const wm_wheels *whe
   if (params->model == WM_MOTION_CONSTANT_VELOCITY) model_ = WM_MOTION_CONSTANT_VELOCITY;
   hold_max_ns_ = wm_ns_from_seconds(params->hold_max_s);
   position_m2_ = std::numeric_limits<double>::infinity();
-  now_ns_ = newest_ns_ = fed_ns_ = wrapped_ns_ = still_since_ns_ = yaw_same_since_ns_ = WM_TIME_NONE;
-  refused_since_ns_ = last_refusal_ns_ = WM_TIME_NONE;
+  now_ns_ = newest_ns_ = fed_ns_ = wrapped_ns_ = still_since_ns_ = WM_TIME_NONE;
+  refused_since_ns_ = last_refusal_ns_ = yaw_watch_.since_ns = yaw_watch_.moved_ns = WM_TIME_NONE;
   for (wm_time_ns &stamp : stamp_ns_) stamp = WM_TIME_NONE;
   for (wm_time_ns &stamp : message_ns_) stamp = WM_TIME_NONE;
   for (tick_wheel &wheel : wheel_) wheel.t_ns = WM_TIME_NONE;
@@ -445,25 +446,34 @@ motion_twist motion_front_end::twist_at(wm_time_ns t_ns, const wm_motion_calibra
   return out;
 }
 
-// The same bits for long while driving: a gyro's noise never stands still. Sooner where steering or wheels see a turn.
+// The same bits for long while the robot moves: a gyro's noise never stands still. Sooner where steering or wheels
+// state another turn than these bits, however slow the robot is.
 void motion_front_end::watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fresh) {
   if (!fresh) return;
+  yaw_watch &w = yaw_watch_;
   double other = 0.0;
   const bool compare = read_other_turn_rate(speed_mps, &other);
-  const bool drives = speed_source_ == kOfTwist ? !is_still(speed_mps) : std::fabs(speed_mps) >= kDriving_mps;
+  const bool turns = compare && std::fabs(other) >= params_->standstill_yaw_rate_radps;
+  if (!is_still(speed_mps) || turns) w.moved_ns = t_ns;
+  const bool moves = w.moved_ns != WM_TIME_NONE && wm_seconds_between(w.moved_ns, t_ns) < params_->standstill_after_s;
   const double yaw = value_[WM_Q_YAW_RATE];
-  if (yaw != yaw_last_ || !drives || yaw_same_since_ns_ == WM_TIME_NONE) {
-    yaw_last_ = yaw;
-    yaw_same_since_ns_ = t_ns;
-    yaw_other_min_ = yaw_other_max_ = other;
+  if (yaw != w.rate_radps || !moves || w.since_ns == WM_TIME_NONE) {
+    w = {yaw, t_ns, t_ns, w.moved_ns, 0.0, 0.0, 0.0};
     health_ &= ~WM_MOTION_HEALTH_YAW_RATE_STUCK;
     return;
   }
-  if (other < yaw_other_min_) yaw_other_min_ = other;
-  if (other > yaw_other_max_) yaw_other_max_ = other;
-  const double same_s = wm_seconds_between(yaw_same_since_ns_, t_ns);
-  const bool turned = compare && yaw_other_max_ - yaw_other_min_ > kYawStuckTurn_radps;
-  if (same_s > kYawStuckAlone_s || (turned && same_s > kYawStuckAgainst_s)) health_ |= WM_MOTION_HEALTH_YAW_RATE_STUCK;
+  const double dt = wm_seconds_between(w.until_ns, t_ns), way = std::fabs(speed_mps) * dt;
+  w.until_ns = t_ns;
+  w.way_m += way;
+  if (compare) {
+    w.apart_rad += (other - yaw) * dt;
+    w.allowed_rad += kOtherTurnScale * std::fabs(other) * dt;
+    if (finite(wheels_.wheelbase_m)) w.allowed_rad += kOtherSteeringOffset_rad * way / wheels_.wheelbase_m;
+  }
+  const double same_s = wm_seconds_between(w.since_ns, t_ns);
+  const bool alone = same_s > kYawStuckAlone_s && w.way_m > kYawStuckAlone_m;
+  const bool against = same_s > kYawStuckAgainst_s && std::fabs(w.apart_rad) > kYawStuckTurn_rad + w.allowed_rad;
+  if (alone || against) health_ |= WM_MOTION_HEALTH_YAW_RATE_STUCK;
 }
 
 bool motion_front_end::read_other_turn_rate(double speed_mps, double *rate_radps) const {

@@ -202,9 +202,14 @@ class motion_front_end {
   wm_time_ns twist_sample_ns_;  // stamp of the newest twist, whatever model drives
   wm_time_ns sampled_ns_[2];    // newest sample of the speed and of the turn rate that the model uses
   wm_time_ns still_since_ns_;   // speed below the threshold since; WM_TIME_NONE while moving
-  wm_time_ns yaw_same_since_ns_;
-  double yaw_last_;
-  double yaw_other_min_, yaw_other_max_;  // range of the turn rate by other sensors meanwhile
+  // While the gyro's value has the same bits.
+  struct yaw_watch {
+    double rate_radps;              // this value
+    wm_time_ns since_ns, until_ns;  // WM_TIME_NONE: none yet
+    wm_time_ns moved_ns;            // the newest sample at which the robot moved
+    double way_m;
+    double apart_rad, allowed_rad;  // the turn by the other sensor less the gyro's; what its errors explain of it
+  } yaw_watch_;
   uint64_t outliers_;
   uint32_t health_;
   uint8_t model_;

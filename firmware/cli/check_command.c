@@ -8,6 +8,7 @@
 
 #include "cli/check/changed_copy.h"
 #include "cli/check/check.h"
+#include "cli/check/facts.h"
 #include "cli/check/trials.h"
 #include "cli/commands.h"
 #include "cli/options.h"
@@ -33,7 +34,7 @@ static const char kHelp[] =
     "  --landmarks FILE    instead of the recording's map\n"
     "  --calibration FILE  instead of the recording's\n"
     "  --map FILE          a map.yaml instead of the recording's\n"
-    "  --json              the findings, for programs\n"
+    "  --json              facts and findings, for programs\n"
     "  --quick             without the trials of the usual mistakes\n"
     "  --apply FOLDER      a corrected copy of the recording, and of the configuration where that has the mistake,\n"
     "                      if the trials find a cause; the originals stay\n"
@@ -87,18 +88,6 @@ static void print_quantities(uint32_t quantities) {
   fact("\n");
 }
 
-static void print_source(const wm_assembled_source *s, const source_facts *facts) {
-  if (s->source->is_live) {
-    fact("source       %-20s a device (`waymark doctor` finds out whether it is there)\n", s->name);
-    return;
-  }
-  double seconds = facts->events > 1 ? wm_seconds_between(facts->first_ns, facts->last_ns) : 0;
-  fact("source       %-20s %8" PRIu64 " data", s->name, facts->events);
-  if (seconds > 0) fact(", %.1f a second", (double)(facts->events - 1) / seconds);
-  if (facts->events > 0) fact(", at most %.0f ms late", fmax(0, (double)facts->latest_ns * 1e-6));
-  fact("\n");
-}
-
 // A name that is nearly a known one is a mistake; other notes may be intended.
 static void take_note(void *context, const char *text) {
   const int is_mistake = strstr(text, "did you mean") != NULL;
@@ -107,6 +96,16 @@ static void take_note(void *context, const char *text) {
                            : strstr(text, "unknown column") || strstr(text, "reads it") ? WM_FOUND_DATA_UNUSED
                                                                                         : WM_FOUND_FILE_NOTE;
   wm_find(context, id, is_mistake ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "files", NULL, "%s", text);
+}
+
+// With --json: the facts as an object, printed at the end; NULL: none.
+static char *json_facts;
+static void keep_facts(const drive_facts *facts) {
+  size_t bytes;
+  FILE *to = open_memstream(&json_facts, &bytes);
+  if (!to) return;
+  facts_json(facts, to);
+  (void)fclose(to);
 }
 
 // ── a recording, driven ─────────────────────────────────────────────────────────────────────────────────────────────
@@ -192,13 +191,25 @@ static void apply(checked *self, const trials_plan *plan, const suspect *of, siz
   if (config[0]) fact("applied      %s: the configuration for it\n", config);
 }
 
+// A finding with what a suspect is, the rest of the sentence, and the lines that undo it.
+__attribute__((format(printf, 5, 6))) static void name_cause(checked *self, const trials_plan *plan, const suspect *one,
+                                                             wm_severity severity, const char *format, ...) {
+  char what[200], more[200], fix[WM_FINDING_FIX_MAX];
+  file_edit edits[TRIAL_EDITS_MAX];
+  va_list arguments;
+  suspect_text(one, plan->assembly, plan->files, what, sizeof what);
+  va_start(arguments, format);
+  (void)vsnprintf(more, sizeof more, format, arguments);
+  va_end(arguments);
+  changed_lines(self->dir, &plan->config->overrides, edits, trials_edits(plan, one, 1, edits), fix, sizeof fix);
+  wm_find(self->found, WM_FOUND_LIKELY_CAUSE, severity, "cause", fix, "%s%s", what, more);
+}
+
 // The usual mistakes, one after the other, undone: which of them explains the observations?
 static void try_suspects(checked *self, const wm_assembly *assembly, double recorded_s) {
   static suspect list[SUSPECTS_MAX];
   static suspect_files files;
-  static id_table table;
-  suspect found[TRIALS_FOUND_MAX + 1];
-  trial_result before, after;
+  static trials_found found;
   const double drive_s = (double)(clock() - self->begin) / CLOCKS_PER_SEC;
   progress_line progress;
   progress_begin(&progress);
@@ -214,60 +225,41 @@ static void try_suspects(checked *self, const wm_assembly *assembly, double reco
                             .recorded_s = recorded_s,
                             .progress = progress_show,
                             .progress_context = &progress};
-  const size_t count = trials_run(&plan, found, &table, &before, &after);
+  trials_run(&plan, &found);
   progress_end(&progress);
   fact("trials       %zu of the usual mistakes undone: %s\n", plan.count - 1,
-       count > 0 ? "found what explains the observations" : "none of them explains the observations");
+       found.count > 0 ? "found what explains the observations" : "none of them explains the observations");
   const size_t consequences = self->found->count;
-  for (size_t i = 0; i < count; i++) {
-    char what[200], fix[WM_FINDING_FIX_MAX];
-    file_edit edits[TRIAL_EDITS_MAX];
-    suspect_text(&found[i], assembly, &files, what, sizeof what);
-    changed_lines(self->dir, &assembly->config->overrides, edits, trials_edits(&plan, &found[i], 1, edits), fix,
-                  sizeof fix);
-    wm_find(self->found, WM_FOUND_LIKELY_CAUSE, WM_SEVERITY_BAD, "cause", fix,
-            before.is_valid
-                ? "%s: with that undone %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely"
-                : "%s: with that undone %.0f %% of the updates fit (now there is none)",
-            what, 100 * after.explained, 100 * before.explained, exp(fmin(20, after.score - before.score)))
-        ->size = after.explained;
+  const double before = 100 * found.before.explained, after = 100 * found.after.explained;
+  for (size_t i = 0; i < found.count; i++) {
+    if (found.before.is_valid)
+      name_cause(self, &plan, &found.at[i], WM_SEVERITY_BAD,
+                 ": with that undone %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely", after,
+                 before, exp(fmin(20, found.after.score - found.before.score)));
+    else
+      name_cause(self, &plan, &found.at[i], WM_SEVERITY_BAD,
+                 ": with that undone %.0f %% of the updates fit (now there is none)", after);
   }
-  if (count > 0 && self->apply_to) apply(self, &plan, found, count);
+  for (size_t i = 0; i < found.equal_count; i++)
+    name_cause(self, &plan, &found.equal[i], WM_SEVERITY_NOTE,
+               ": in place of the cause above this explains the observations as well; look which of them is true");
+  if (found.count > 0 && self->apply_to) apply(self, &plan, found.at, found.count);
   wm_findings_to_front(self->found, consequences);
-}
-
-// How well each source's updates agree with the poses.
-static void print_fit(const wm_assembly *assembly, const drive_evidence *evidence) {
-  for (size_t i = 0; i < assembly->source_count; i++)
-    for (unsigned k = 0; k < WM_RESIDUAL_COUNT; k++) {
-      const residual_evidence *r = &evidence->residuals[i][k];
-      const double all = (double)(r->fused + r->refused), n = (double)r->fused;
-      if (all < 1 || k == WM_RESIDUAL_STANDSTILL) continue;
-      fact("fit          %-20s %-9s %5.1f %% of %.0f refused", wm_assembly_source_name(assembly, i),
-           wm_residual_name(k), 100 * (double)r->refused / all, all);
-      if (n > 0) fact("; innovations %.2f of their sigma, mean %+.2f", sqrt(r->squares / n), r->sum / n);
-      fact("\n");
-    }
 }
 
 static void ended(void *context, const wm_assembly *assembly, const wm_run_report *report) {
   checked *self = context;
   const size_t bad = wm_findings_of(self->found, WM_SEVERITY_BAD);
   source_data_judge(&self->sources, wm_recording_quantities(self->recording), self->found);
-  for (size_t i = 0; i < assembly->source_count; i++) print_source(&assembly->sources[i], &self->sources.facts[i]);
   const uint64_t due = messages_due(assembly->config, report);
-  fact(
-      "drive        %.1f s: tracking %.1f %%, degraded %.1f %%, dead reckoning %.1f %%, lost %.1f %%, no pose %.1f "
-      "%%\n",
-      report->recorded_s, 100 * evidence_share(&self->evidence, WM_STATE_TRACKING, due),
-      100 * evidence_share(&self->evidence, WM_STATE_DEGRADED, due),
-      100 * evidence_share(&self->evidence, WM_STATE_DEAD_RECKONING, due),
-      100 * evidence_share(&self->evidence, WM_STATE_LOST, due),
-      100 * evidence_share(&self->evidence, WM_STATE_SEARCHING, due));
+  const drive_facts facts = {assembly, self->sources.facts, &self->evidence, report->recorded_s, due};
+  if (tells_facts)
+    facts_print(&facts, stdout);
+  else
+    keep_facts(&facts);
   evidence_judge(&self->evidence, assembly, &report->health, due, self->found);
   wm_health_map_findings(&report->health, self->found);
   check_unused(&self->evidence, assembly, &report->health, wm_recording_quantities(self->recording), self->found);
-  print_fit(assembly, &self->evidence);
   if (wm_findings_of(self->found, WM_SEVERITY_BAD) > bad && !self->is_quick)
     try_suspects(self, assembly, report->recorded_s);
 }
@@ -327,7 +319,8 @@ static void check_devices(const wm_config *config, wm_findings *found) {
   status = wm_assemble(config, recording, 1, &assembly, &err);
   check_setup(&assembly, recording, status, found);
   if (status == WM_OK) status = take_memory(&assembly, &arena, &err);
-  for (size_t i = 0; status == WM_OK && i < assembly.source_count; i++) print_source(&assembly.sources[i], &kNone);
+  for (size_t i = 0; status == WM_OK && tells_facts && i < assembly.source_count; i++)
+    facts_print_source(&assembly.sources[i], &kNone, stdout);
   if (status == WM_OK)
     check_computer(config, arena.bytes, found);
   else
@@ -343,7 +336,10 @@ static int tell(const wm_findings *found) {
     wm_findings_print(found, stdout);
     if (is_good) (void)puts("good");
   } else {
-    (void)printf("{\n  \"good\": %s,\n  \"findings\": ", is_good ? "true" : "false");
+    (void)printf("{\n  \"good\": %s,\n  \"facts\": %s,\n  \"findings\": ", is_good ? "true" : "false",
+                 json_facts ? json_facts : "null");
+    free(json_facts);
+    json_facts = NULL;
     wm_findings_json(found, stdout);
     (void)fputs("\n}\n", stdout);
   }

@@ -88,7 +88,7 @@ void wm_findings_each(const wm_findings *self, wm_line_fn say, void *context) {
 
 // ── JSON ────────────────────────────────────────────────────────────────────────────────────────────────────────────
 
-static void json_string(FILE *to, const char *key, const char *text) {
+void wm_json_string(FILE *to, const char *key, const char *text) {
   (void)fprintf(to, "\"%s\": \"", key);
   for (; *text; text++) {
     const unsigned char c = (unsigned char)*text;
@@ -115,7 +115,7 @@ void wm_findings_json(const wm_findings *self, FILE *to) {
     } texts[] = {{"about", f->about}, {"text", f->text}, {"cause", kind->cause}, {"fix", f->fix}};
     for (size_t k = 0; k < sizeof texts / sizeof texts[0]; k++) {
       (void)fputs(", ", to);
-      json_string(to, texts[k].key, texts[k].value);
+      wm_json_string(to, texts[k].key, texts[k].value);
     }
     (void)fprintf(to, ", \"link\": \"" WM_FINDINGS_PAGE "#%s\"}", kind->identifier);
   }

@@ -128,6 +128,8 @@ int wm_finding_line(const wm_finding *self, char *out, size_t capacity);
 void wm_findings_print(const wm_findings *self, FILE *to);
 // The list in brackets: id, severity, size, about, text, cause, fix, link.
 void wm_findings_json(const wm_findings *self, FILE *to);
+// `"key": "text"`, with what JSON needs escaped.
+void wm_json_string(FILE *to, const char *key, const char *text);
 #define WM_FINDINGS_PAGE "docs/troubleshooting.md"
 
 // Receives a line of text without its end: notes for a person or a log.

@@ -24,6 +24,7 @@ typedef struct row_source {
   unsigned state;       // the device's own
   wm_time_ns last_ns;   // stamp of the last event; WM_TIME_NONE before the first
   wm_time_ns heard_ns;  // when the last usable row came, or the device was found
+  wm_time_ns taken_ns;  // arrival of the last event
   uint32_t seq;
   atomic_int wants_copies;
   wm_ring copies;
@@ -37,8 +38,10 @@ static const wm_source_ops kRows;
 static int take(row_source *self, wm_event *out) {
   wm_source_counts *counts = &self->base.counts;
   wm_error err;
-  if (self->last_ns != WM_TIME_NONE && self->row.t_ns <= self->last_ns) {  // the same again, or overtaken
-    *(self->row.t_ns == self->last_ns ? &counts->frozen : &counts->out_of_order) += 1;
+  if (self->last_ns != WM_TIME_NONE && self->row.t_ns <= self->last_ns) {
+    // Some senders report a measurement several times. A stamp that stands still longer than a period is stuck.
+    const int stuck = self->row.arrival_ns - self->taken_ns > SILENT_NS;
+    *(self->row.t_ns < self->last_ns ? &counts->out_of_order : stuck ? &counts->frozen : &counts->ignored) += 1;
     return 0;
   }
   const wm_status status = wm_stream_event(self->stream, &self->row, &self->imu, out, &err);
@@ -48,6 +51,7 @@ static int take(row_source *self, wm_event *out) {
     return 0;
   }
   self->last_ns = self->row.t_ns;
+  self->taken_ns = self->row.arrival_ns;
   self->heard_ns = wm_monotonic_ns();
   self->has_come = 1;
   return 1;
@@ -159,7 +163,7 @@ wm_status row_sources_open(const wm_config *config, const wm_site *site, wm_sour
   }
   while (status != WM_OK && *count > 0) {
     --*count;
-    out[*count]->ops->close(out[*count]);
+    if (out[*count]) out[*count]->ops->close(out[*count]);
   }
   return status;
 }

@@ -17,6 +17,8 @@
 #define SQUARES_BAD 3.0  // mean square of innovations over their sigma; 1 is expected, correlated errors make it less
 #define DEGRADED_NOTE 0.01  // good drives are degraded for less
 #define DEGRADED_BAD 0.10
+#define UNSUPPORTED_MIN 100  // observations or pictures: with fewer the robot may have seen nothing yet
+#define UNSUPPORTED_BAD 0.5  // share of the time in dead reckoning, where no observation was ever fused
 #define BIASED_LOST_MAX 0.3  // share of the time lost beyond which a bias may come from wrong poses
 #define FACTOR_BAD 3.0       // of a sensor's stated sigma
 // Mean of the innovations over their sigma. Errors that last are correlated, so a tenth of a sigma is usual.
@@ -87,8 +89,9 @@ static void take_event(drive_evidence *self, const wm_event *event) {
 static void take_published(drive_evidence *self, const wm_published *p) {
   if (p->now.state < WM_STATE_COUNT) self->states[p->now.state]++;
   const int has_source = p->now.cause_source >= 0 && p->now.cause_source < WM_SOURCES_MAX;
-  if (p->now.state == WM_STATE_DEGRADED && p->now.cause < WM_CAUSE_COUNT)
-    self->causes[has_source ? p->now.cause_source : WM_SOURCES_MAX][p->now.cause]++;
+  const int is_lost = p->now.state == WM_STATE_LOST;
+  if ((p->now.state == WM_STATE_DEGRADED || is_lost) && p->now.cause < WM_CAUSE_COUNT)
+    self->causes[is_lost][has_source ? p->now.cause_source : WM_SOURCES_MAX][p->now.cause]++;
   if (self->published++ == 0) self->begun = *p;
   const double after_s = wm_seconds_between(self->begun.now.t_ns, p->now.t_ns);
   if (self->start_moved_s > 0 || after_s > START_S || p->now.resets == self->begun.now.resets) return;
@@ -171,16 +174,19 @@ static void biased(const drive_evidence *self, const wm_assembly *assembly, size
       ->size = ratio;
 }
 
-// A parameter of the estimator; NaN where it has none of this name.
-static double parameter(const wm_config *config, const char *key) {
-  const wm_param_table *table = &config->estimator->params;
+// A number of a table of parameters; NaN where it has none of this name.
+static double number_of(const wm_param_table *table, const void *params, const char *key) {
   for (size_t i = 0; i < table->count; i++)
     if (strcmp(table->params[i].key, key) == 0 && table->params[i].type == WM_PARAM_F64) {
       double value;
-      memcpy(&value, (const char *)config->estimator_params + table->params[i].offset, sizeof value);
+      memcpy(&value, (const char *)params + table->params[i].offset, sizeof value);
       return value;
     }
   return (double)NAN;
+}
+
+static double parameter(const wm_config *config, const char *key) {
+  return number_of(&config->estimator->params, config->estimator_params, key);
 }
 
 static void not_found(const wm_assembly *assembly, double share, wm_findings *out) {
@@ -200,32 +206,62 @@ static void not_found(const wm_assembly *assembly, double share, wm_findings *ou
       ->size = share;
 }
 
-// The most frequent cause of a degraded state, with its source.
-static void doubtful(const drive_evidence *self, const wm_assembly *assembly, uint64_t total, wm_findings *out) {
-  const double share = evidence_share(self, WM_STATE_DEGRADED, total);
+// The most frequent cause of a degraded or lost state: its text, and the source or `otherwise`.
+static const char *cause_of(const drive_evidence *self, const wm_assembly *assembly, int is_lost, const char *otherwise,
+                            const char **about) {
   size_t source = WM_SOURCES_MAX, cause = 0;
   for (size_t i = 0; i <= WM_SOURCES_MAX; i++)
     for (size_t k = 1; k < WM_CAUSE_COUNT; k++)
-      if (self->causes[i][k] > self->causes[source][cause]) {
+      if (self->causes[is_lost][i][k] > self->causes[is_lost][source][cause]) {
         source = i;
         cause = k;
       }
+  *about = source < assembly->source_count ? assembly->sources[source].name
+           : cause == WM_CAUSE_OFF_MAP     ? "map"
+                                           : otherwise;
+  return wm_cause_text((unsigned)cause);
+}
+
+static void doubtful(const drive_evidence *self, const wm_assembly *assembly, uint64_t total, wm_findings *out) {
+  const double share = evidence_share(self, WM_STATE_DEGRADED, total);
   if (share < DEGRADED_NOTE) return;
-  wm_find(out, WM_FOUND_POSE_DOUBTFUL, share > DEGRADED_BAD ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE,
-          source < assembly->source_count ? assembly->sources[source].name : "observations", NULL,
-          "%s: the pose is degraded for %.0f %% of the drive", wm_cause_text((unsigned)cause), 100 * share)
+  const char *about, *cause = cause_of(self, assembly, 0, "observations", &about);
+  wm_find(out, WM_FOUND_POSE_DOUBTFUL, share > DEGRADED_BAD ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, about, NULL,
+          "%s: the pose is degraded for %.0f %% of the drive", cause, 100 * share)
       ->size = share;
 }
 
-static void states(const drive_evidence *self, const wm_assembly *assembly, uint64_t total, wm_findings *out) {
+static void is_lost(const drive_evidence *self, const wm_assembly *assembly, double share, wm_findings *out) {
+  const char *about, *cause = cause_of(self, assembly, 1, "what is observed", &about);
+  wm_find(out, WM_FOUND_POSE_LOST, WM_SEVERITY_BAD, "drive", NULL, "the pose is lost for %.0f %% of the drive: %s %s",
+          100 * share, about, cause[0] ? cause : "contradicts it")
+      ->size = share;
+}
+
+// Observations come, and none reaches the pose: it is the motion's sum, whose error grows without a bound.
+static void unsupported(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health,
+                        uint64_t total, wm_findings *out) {
+  const double share = evidence_share(self, WM_STATE_DEAD_RECKONING, total);
+  if (share < UNSUPPORTED_BAD || self->fused > 0) return;
+  const uint64_t observers = wm_assembly_observers(assembly);
+  uint64_t received = 0;
+  for (uint32_t i = 0; i < health->source_count && i < 64; i++)
+    if ((observers >> i) & 1u) received += health->sources[i].received;
+  if (received < UNSUPPORTED_MIN) return;
+  wm_find(out, WM_FOUND_POSE_DOUBTFUL, WM_SEVERITY_BAD, "observations",
+          "is the map given, are the sensors' names, the markers' family and the identities those of this place?",
+          "none of them reaches the pose, which is dead reckoning for %.0f %% of the drive", 100 * share)
+      ->size = share;
+}
+
+static void states(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health, uint64_t total,
+                   wm_findings *out) {
   if (self->published == 0 && self->poses > 0) return;  // a log: it holds no messages
   const double lost = evidence_share(self, WM_STATE_LOST, total);
   const double searching = evidence_share(self, WM_STATE_SEARCHING, total);
-  if (lost > LOST_BAD)
-    wm_find(out, WM_FOUND_POSE_LOST, WM_SEVERITY_BAD, "drive", NULL,
-            "the pose is lost for %.0f %% of the drive: what is observed contradicts it", 100 * lost)
-        ->size = lost;
+  if (lost > LOST_BAD) is_lost(self, assembly, lost, out);
   doubtful(self, assembly, total, out);
+  unsupported(self, assembly, health, total, out);
   if (searching > 0.5) not_found(assembly, searching, out);
 }
 
@@ -275,8 +311,38 @@ static void unknown(const drive_evidence *self, wm_findings *out) {
         ->size = (double)count;
 }
 
+// A map that was asked for by name, and that the estimator is configured not to read.
+static void map_unused(const wm_assembly *assembly, wm_findings *out) {
+  const wm_config *config = assembly->config;
+  if (!config->overrides.landmarks[0] || !config->estimator) return;
+  const wm_param_table *table = &config->estimator->params;
+  for (size_t i = 0; i < table->count; i++) {
+    int32_t use;
+    if (strcmp(table->params[i].key, "landmarks.map") != 0) continue;
+    memcpy(&use, (const char *)config->estimator_params + table->params[i].offset, sizeof use);
+    if (use == 0)  // none
+      wm_find(
+          out, WM_FOUND_DATA_UNUSED, WM_SEVERITY_NOTE, "landmarks",
+          "`slam: {landmarks: {map: extend}}` begins with it, `frozen` locates on it alone; or leave `landmarks` out",
+          "is not used: slam.landmarks.map is none, so that the run makes a map of its own");
+  }
+}
+
+int evidence_scale_contradicts(const wm_assembly *assembly, const wm_calibration_value *c) {
+  const char *name = strrchr(c->name, '.');  // "motion.left_scale", "front.range_scale"
+  const size_t length = name ? strlen(name) : 0;
+  if (length < 6 || strcmp(name + length - 6, "_scale") != 0) return 0;
+  char key[96];
+  (void)snprintf(key, sizeof key, "states%.60s_sigma", name);
+  const int is_motion = strncmp(c->name, "motion.", 7) == 0;
+  const double sigma = is_motion ? number_of(&wm_motion_params_table, assembly->setup.motion, key)
+                                 : number_of(&wm_sighting_params_table, assembly->setup.sightings, key);
+  const double off = fabs(c->value - 1);
+  return sigma > 0 && off > 5 * fmax(sigma, c->sigma) && (c->value > 1.2 || c->value < 1 / 1.2);
+}
+
 // A state of calibration that ended where no tape measure and no data sheet would put it.
-static void calibration(const wm_health *health, wm_findings *out) {
+static void calibration(const wm_assembly *assembly, const wm_health *health, wm_findings *out) {
   static const struct {
     const char *ending;
     double expected, least, most;  // a note beyond
@@ -299,7 +365,8 @@ static void calibration(const wm_health *health, wm_findings *out) {
       if (!strstr(c->name, kLimits[k].ending) || (c->value >= kLimits[k].least && c->value <= kLimits[k].most))
         continue;
       if (fabs(c->value - kLimits[k].expected) < 3 * c->sigma) continue;
-      const int is_bad = c->value < kLimits[k].bad_least || c->value > kLimits[k].bad_most;
+      const int is_bad =
+          c->value < kLimits[k].bad_least || c->value > kLimits[k].bad_most || evidence_scale_contradicts(assembly, c);
       wm_find(out, WM_FOUND_CALIBRATION_OFF, is_bad ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "calibration", kLimits[k].fix,
               "%s is %.4g +- %.2g at the end; %g was expected", c->name, c->value, c->sigma, kLimits[k].expected)
           ->size = c->value;
@@ -313,9 +380,10 @@ void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, con
   for (size_t i = 0; i < assembly->source_count; i++) refused(self, assembly, i, out);
   const int is_lost = evidence_share(self, WM_STATE_LOST, total) > BIASED_LOST_MAX;
   for (size_t i = 0; i < assembly->source_count; i++) biased(self, assembly, i, is_lost, out);
-  states(self, assembly, total, out);
+  states(self, assembly, health, total, out);
   start(self, assembly, out);
   landmarks(self, out);
   unknown(self, out);
-  calibration(health, out);
+  calibration(assembly, health, out);
+  map_unused(assembly, out);
 }

@@ -29,9 +29,10 @@ typedef struct drive_evidence {
   uint64_t states[WM_STATE_COUNT], published;  // messages by wm_state
   double log_likelihood;                       // of all updates, nats; a refused one counts as an outlier of any value
   uint64_t updates, fused;
-  uint64_t causes[WM_SOURCES_MAX + 1][WM_CAUSE_COUNT];  // of the doubtful messages; the last row: without a source
-  uint64_t poses;                                       // fused
-  wm_time_ns first_ns, last_ns;                         // stamps of the events
+  // Of the degraded and of the lost messages; the last row: without a source.
+  uint64_t causes[2][WM_SOURCES_MAX + 1][WM_CAUSE_COUNT];
+  uint64_t poses;                // fused
+  wm_time_ns first_ns, last_ns;  // stamps of the events
   int has_events;
   wm_published begun;  // the first message
   // The first new pose soon after the start: how far from the one before; 0 s: there was none.
@@ -46,6 +47,9 @@ uint64_t evidence_due(const drive_evidence *self, double publish_rate_hz);
 double evidence_share(const drive_evidence *self, wm_state state, uint64_t total);
 // Mean log likelihood of an update, nats: the larger the better the observations fit.
 double evidence_score(const drive_evidence *self);
+// Whether a scale of wheels, gyro or ranges ended where the calibration cannot be: off by more than a fifth, and by
+// more than five times the sigma that the configuration states for it.
+int evidence_scale_contradicts(const wm_assembly *assembly, const wm_calibration_value *value);
 // `health` as the drive ended.
 void evidence_judge(const drive_evidence *self, const wm_assembly *assembly, const wm_health *health, uint64_t total,
                     wm_findings *out);

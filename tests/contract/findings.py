@@ -64,7 +64,10 @@ MADE = [
 def check(bin_dir, config, recording, options):
     done = subprocess.run([bin_dir / "waymark", "check", config, recording, "--json", *options], capture_output=True, text=True)
     try:
-        return json.loads(done.stdout)["findings"]
+        report = json.loads(done.stdout)
+        assert report["facts"]["duration_s"] > 0.9 * small_robot.DURATION_S and report["facts"]["sources"], report["facts"]
+        assert abs(sum(report["facts"]["states"].values()) - 1) < 0.02, report["facts"]["states"]
+        return report["findings"]
     except json.JSONDecodeError:
         sys.exit(f"check {config} {recording}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
 

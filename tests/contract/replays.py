@@ -166,10 +166,10 @@ def replaced(pattern, change, text):
 
 # Command lines
 
-def parser(about, only):
-    """BIN_DIR SOURCE_DIR DATA_DIR [--only WORDS] [--set KEY=VALUE] [--json]"""
+def parser(about, only, has_data=True):
+    """BIN_DIR SOURCE_DIR [DATA_DIR] [--only WORDS] [--set KEY=VALUE] [--json]"""
     out = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name in ("bin_dir", "source_dir", "data_dir"):
+    for name in ("bin_dir", "source_dir", "data_dir")[:2 + has_data]:
         out.add_argument(name, type=lambda p: pathlib.Path(p).resolve())
     out.add_argument("--only", default="", metavar="WORD[,WORD]", help=only)
     out.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="a key of the plain configurations")

@@ -138,6 +138,91 @@ void stereo_ekf_is_degraded_then_lost(void) {
   check("stereo_ekf", scene);
 }
 
+// ── causes, one at a time, by the monitor alone ─────────────────────────────────────────────────────────────────────
+
+// Seconds of an estimator that gives this estimate and refuses or fuses ten sightings a second.
+struct lone {
+  wm_monitor monitor;
+  wm_setup setup{};
+  wm_landmark landmark{};
+  wm_raster map{};
+  wm_estimate estimate{};
+  wm_time_ns now_ns = 0;
+
+  explicit lone(bool has_landmarks, bool has_map = false) {
+    setup.landmarks = &landmark;
+    setup.landmark_count = has_landmarks;
+    map.width_px = map.height_px = 100;
+    map.resolution_m = 0.1;
+    if (has_map) setup.map = &map;
+    wm_monitor_init(&monitor, &setup, 1);
+    estimate.state = WM_STATE_TRACKING;
+    estimate.lost_probability = NAN;
+    for (int axis : {0, 1, 5}) estimate.covariance[wm_cov_index(axis, axis)] = 0.01;
+  }
+  wm_estimate drive(double seconds, wm_verdict verdict) {
+    wm_estimate out = estimate;
+    for (const wm_time_ns until_ns = now_ns + wm_ns_from_seconds(seconds); now_ns < until_ns;
+         now_ns += 100 * WM_NS_PER_MS) {
+      wm_event e{};
+      e.kind = WM_EVENT_SIGHTING;
+      e.t_ns = now_ns;
+      wm_innovation record{};
+      record.residual = WM_RESIDUAL_RANGE;
+      record.verdict = static_cast<uint8_t>(verdict);
+      record.observed = now_ns / (100 * WM_NS_PER_MS) % 2 ? 0.08 : -0.08;
+      record.variance = 0.01;
+      out = estimate;
+      out.t_ns = now_ns;
+      if (wm_monitor_take(&monitor, &e, &record, 1)) wm_monitor_step(&monitor, &out, nullptr, 0);
+      wm_monitor_judge(&monitor, &out);
+    }
+    return out;
+  }
+};
+
+void a_pose_off_the_map_is_degraded(void) {
+  lone robot(false, true);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, robot.drive(3, WM_FUSED).state);
+  robot.estimate.pose_map_base.p_m[0] = 20.0;  // the map ends at 10 m
+  const wm_estimate off = robot.drive(3, WM_FUSED);
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, off.state);
+  TEST_ASSERT_EQUAL(WM_CAUSE_OFF_MAP, off.cause);
+  TEST_ASSERT_EQUAL(-1, off.cause_source);
+  robot.estimate.covariance[0] = 25.0;  // it may be on it
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, robot.drive(3, WM_FUSED).state);
+}
+
+void identities_that_the_map_lacks_are_doubt(void) {
+  lone robot(true);
+  robot.estimate.state = WM_STATE_DEAD_RECKONING;
+  const wm_estimate unknown = robot.drive(12, WM_REJECTED_UNKNOWN_ID);
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, unknown.state);
+  TEST_ASSERT_EQUAL(WM_CAUSE_UNKNOWN, unknown.cause);
+  TEST_ASSERT_EQUAL(0, unknown.cause_source);
+  lone known(true), mapless(false);
+  TEST_ASSERT_EQUAL(WM_CAUSE_NONE, known.drive(12, WM_FUSED).cause);
+  mapless.estimate.state = WM_STATE_DEAD_RECKONING;
+  TEST_ASSERT_EQUAL(WM_STATE_DEAD_RECKONING, mapless.drive(12, WM_REJECTED_UNKNOWN_ID).state);
+}
+
+// A search finds a pose for a robot that was lost before it had ever fitted, and for one that had driven well for long.
+void a_found_pose_is_on_probation_unless_the_one_before_was_proven(void) {
+  lone robot(true), proven(true);
+  (void)proven.drive(20, WM_FUSED);
+  for (lone *one : {&robot, &proven}) {
+    one->estimate.state = WM_STATE_LOST;
+    (void)one->drive(1, WM_REJECTED_GATE);
+    one->estimate.state = WM_STATE_TRACKING;
+    one->estimate.resets++;
+  }
+  const wm_estimate found = robot.drive(1, WM_FUSED);
+  TEST_ASSERT_EQUAL(WM_STATE_DEGRADED, found.state);
+  TEST_ASSERT_EQUAL(WM_CAUSE_LOST_AGAIN, found.cause);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, robot.drive(6, WM_FUSED).state);
+  TEST_ASSERT_EQUAL(WM_STATE_TRACKING, proven.drive(1, WM_FUSED).state);
+}
+
 }  // namespace
 
 void setUp(void) {}
@@ -150,5 +235,8 @@ int main(void) {
   RUN_TEST(edge_mcl_is_degraded_then_lost);
   RUN_TEST(pf_edges_is_degraded_then_lost);
   RUN_TEST(stereo_ekf_is_degraded_then_lost);
+  RUN_TEST(a_pose_off_the_map_is_degraded);
+  RUN_TEST(identities_that_the_map_lacks_are_doubt);
+  RUN_TEST(a_found_pose_is_on_probation_unless_the_one_before_was_proven);
   return UNITY_END();
 }

@@ -183,23 +183,39 @@ State Drive::at(double t_s) const {
   return s;
 }
 
+double Drive::path_m(double t_s, double *speed_mps) const {
+  const double t = std::clamp(t_s, 0.0, planned_s_);
+  *speed_mps = 0;
+  if (ramps_.empty()) {
+    double sum = 0;
+    for (size_t i = 1; i < samples_.size() && step_s_ * static_cast<double>(i) <= t; i++)
+      sum += std::fabs(samples_[i].way_m - samples_[i - 1].way_m);
+    return sum;
+  }
+  auto ramp = std::upper_bound(ramps_.begin(), ramps_.end(), t, [](double v, const Ramp &r) { return v < r.start_s; });
+  ramp = ramp == ramps_.begin() ? ramp : ramp - 1;
+  const double u = std::clamp((t - ramp->start_s) / ramp->duration_s, 0.0, 1.0), dv = ramp->v1 - ramp->v0;
+  *speed_mps = t_s < 0 || t_s > planned_s_ ? 0 : ramp->v0 + dv * (3 * u * u - 2 * u * u * u);
+  return ramp->start_m + ramp->duration_s * (ramp->v0 * u + dv * (u * u * u - 0.5 * u * u * u * u));
+}
+
+double Drive::length_m() const {
+  double ignored;
+  if (duration_s_ >= planned_s_) return length_m_;
+  if (carry_forward_s_ <= 0 || duration_s_ < carry_at_s_) return path_m(duration_s_, &ignored);
+  return path_m(duration_s_ + carry_forward_s_, &ignored) - path_m(carry_at_s_ + carry_forward_s_, &ignored) +
+         path_m(carry_at_s_, &ignored);
+}
+
 State Drive::driven(double t_s) const {
   if (!samples_.empty()) return between_samples(t_s);
-  const double t = std::clamp(t_s, 0.0, planned_s_);
-  double path_m = 0, speed = 0;
-  if (!ramps_.empty()) {
-    auto ramp =
-        std::upper_bound(ramps_.begin(), ramps_.end(), t, [](double v, const Ramp &r) { return v < r.start_s; });
-    ramp = ramp == ramps_.begin() ? ramp : ramp - 1;
-    const double u = std::clamp((t - ramp->start_s) / ramp->duration_s, 0.0, 1.0), dv = ramp->v1 - ramp->v0;
-    path_m = ramp->start_m + ramp->duration_s * (ramp->v0 * u + dv * (u * u * u - 0.5 * u * u * u * u));
-    speed = t_s < 0 || t_s > planned_s_ ? 0 : ramp->v0 + dv * (3 * u * u - 2 * u * u * u);
-  }
+  double speed;
+  const double path = path_m(t_s, &speed);
   if (pieces_.empty()) return start_;
   auto piece =
-      std::upper_bound(pieces_.begin(), pieces_.end(), path_m, [](double v, const Piece &p) { return v < p.start_m; });
+      std::upper_bound(pieces_.begin(), pieces_.end(), path, [](double v, const Piece &p) { return v < p.start_m; });
   piece = piece == pieces_.begin() ? piece : piece - 1;
-  const double along = std::clamp(path_m - piece->start_m, 0.0, piece->length_m);
+  const double along = std::clamp(path - piece->start_m, 0.0, piece->length_m);
   State s{};
   end_of(*piece, along, s.x_m, s.y_m, s.heading_rad);
   s.way_m = piece->way_m + piece->sign * along;

@@ -30,7 +30,7 @@ class Drive {
 
   double duration_s() const { return duration_s_; }
   double whole_s() const { return planned_s_ - carry_forward_s_; }  // as planned, whether it was cut or not
-  double length_m() const { return length_m_; }                     // driven, forwards and backwards
+  double length_m() const;  // driven until duration_s(), forwards and backwards; not what it was carried
   // Ends the drive there, where it is longer.
   void cut(double duration_s);
   // At `at_s` the vehicle is put where it would be `forward_s` later, and drives on from there. WM_BAD_CONFIG when the
@@ -55,6 +55,8 @@ class Drive {
   void add_path(double length_m, int sign, double curvature0, double curvature1);
   void add_ramp(double duration_s, double v0, double v1);
   State driven(double t_s) const;
+  // Path until that time, forwards and backwards; of a planned drive also its speed along it.
+  double path_m(double t_s, double *speed_mps) const;
   State between_samples(double t_s) const;
   static void end_of(const Piece &piece, double along_m, double &x, double &y, double &heading);
 

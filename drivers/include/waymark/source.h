@@ -24,8 +24,8 @@ typedef struct wm_source_counts {
   uint64_t malformed;       // rows, lines or frames that could not be read
   uint64_t not_finite;      // values that were NaN, infinite or impossible
   uint64_t out_of_order;    // older than the one before it where the format requires order
-  uint64_t ignored;         // well-formed, but without a binding (other CAN frames)
-  uint64_t frozen;          // frames whose counter stood still
+  uint64_t ignored;         // well-formed, but without a binding (other CAN frames), or a repeated report
+  uint64_t frozen;          // of a sender whose counter or stamp stood still
   uint64_t bus_errors;      // CAN error frames: faults of the bus, reported by the controller
   uint64_t overflows;       // dropped by the kernel or the controller because they were not read in time
   char first_problem[256];  // text of the first malformed one, with file and line; "" where none

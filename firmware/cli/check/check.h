@@ -30,6 +30,8 @@ typedef struct agreement {
 } agreement;
 
 void agreement_add(agreement *self, double a, double b);
+// Of a over b, if it is beyond `limit` or its inverse whichever of both is the noisy one; else 1.
+double agreement_ratio(const agreement *self, double limit);
 // 0 without data.
 double agreement_correlation(const agreement *self);
 

@@ -33,6 +33,13 @@ double agreement_correlation(const agreement *self) {
   return size > 0 ? self->ab / size : 0;
 }
 
+double agreement_ratio(const agreement *self, double limit) {
+  if (!(self->ab > 0) || !(self->bb > 0)) return 1;
+  // Noise of b makes ab/bb smaller than the true ratio, noise of a makes aa/ab larger: it is in between.
+  const double least = self->ab / self->bb, most = self->aa / self->ab;
+  return least > limit || most < 1 / limit ? sqrt(least * most) : 1;
+}
+
 static void take_ticks(motion_data *self, wm_time_ns t_ns) {
   double left = self->last[WM_Q_WHEEL_TICKS_LEFT], right = self->last[WM_Q_WHEEL_TICKS_RIGHT];
   if (isnan(left) || isnan(right)) return;
@@ -130,8 +137,8 @@ static void ranges(const motion_data *self, wm_findings *out) {
 static void track(const motion_data *self, wm_findings *out) {
   const agreement *a = &self->turn_ticks;
   if (a->count < PAIRS_MIN || sqrt(a->aa / (double)a->count) < TURN_RMS_MIN || a->bb <= 0) return;
-  const double ratio = a->ab / a->bb;
-  if (agreement_correlation(a) < 0.5 || (ratio > 1 / 1.5 && ratio < 1.5)) return;
+  const double ratio = agreement_ratio(a, 1.5);
+  if (agreement_correlation(a) < 0.5 || ratio == 1) return;
   char mend[160];
   (void)snprintf(mend, sizeof mend,
                  "measure it again (`wheels: {track_m: %.3g}` would agree), or look at the gyro's unit",
@@ -151,8 +158,8 @@ static void turns(const agreement *a, const char *other, wm_findings *out) {
 
 static void speeds(const motion_data *self, wm_findings *out) {
   const agreement *s = &self->speed_ticks;
-  const double ratio = s->bb > 0 ? s->ab / s->bb : 1;
-  if (s->count < PAIRS_MIN || s->bb / (double)s->count < 0.01 || (ratio > 1 / 1.5 && ratio < 1.5)) return;
+  const double ratio = agreement_ratio(s, 1.5);
+  if (s->count < PAIRS_MIN || s->bb / (double)s->count < 0.01 || ratio == 1) return;
   char fix[WM_FINDING_FIX_MAX];
   (void)snprintf(fix, sizeof fix,
                  "one of them is wrong: the speed's unit, or the wheels' (`radius_m: %.4g` or `ticks_per_turn: %.6g` "
@@ -176,8 +183,8 @@ void motion_data_judge(const motion_data *self, uint32_t bound, wm_findings *out
   turns(&self->turn_steering, "the steering", out);
   speeds(self, out);
   const agreement *s = &self->speed_wheels;
-  double ratio = s->bb > 0 ? s->ab / s->bb : 1;
-  if (s->count >= PAIRS_MIN && s->bb / (double)s->count > 0.01 && (ratio < 0.6 || ratio > 1.6))
+  const double ratio = agreement_ratio(s, 1.6);
+  if (s->count >= PAIRS_MIN && s->bb / (double)s->count > 0.01 && ratio != 1)
     wm_find(out, WM_FOUND_SENSORS_DISAGREE, WM_SEVERITY_BAD, ABOUT,
             "one of them has another unit than its binding states (km/h is 3.6 times m/s): write `unit:`",
             "vehicle_speed is %.2f times the wheels' speeds", ratio);

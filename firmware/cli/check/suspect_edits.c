@@ -186,9 +186,28 @@ static void add_twist(filling *out, const suspect *s) {
   }
 }
 
-static void add_motion(filling *out, const suspect *s) {
+// The number of calibration.yaml that a suspect multiplies; 0: it is of another kind.
+static int add_wheels(filling *out, const suspect *s) {
   const wm_wheels *w = &out->assembly->setup.wheels;
-  static const char kFile[] = "calibration.yaml";
+  const struct {
+    suspect_kind kind;
+    const char *path;
+    double value;
+  } kNumbers[] = {{SUSPECT_RADIUS_FACTOR, "wheels.radius_m", w->radius_m},
+                  {SUSPECT_TICKS_FACTOR, "wheels.ticks_per_turn", w->ticks_per_turn},
+                  {SUSPECT_TRACK_FACTOR, "wheels.track_m", w->track_m},
+                  {SUSPECT_WHEELBASE_FACTOR, "wheels.wheelbase_m", w->wheelbase_m},
+                  {SUSPECT_STEERING_FACTOR, "wheels.steering_ratio", w->steering_ratio}};
+  for (size_t i = 0; i < sizeof kNumbers / sizeof kNumbers[0]; i++)
+    if (kNumbers[i].kind == s->kind) {
+      add_value(out, "calibration.yaml", kNumbers[i].path, "%.9g", kNumbers[i].value * s->value);
+      return 1;
+    }
+  return 0;
+}
+
+static void add_motion(filling *out, const suspect *s) {
+  if (add_wheels(out, s)) return;
   switch (s->kind) {
     case SUSPECT_TICKS_SWAP: swap_ticks(out); break;
     case SUSPECT_QUANTITY_FACTOR: add_scale(out, s->item, s->value); break;
@@ -202,17 +221,6 @@ static void add_motion(filling *out, const suspect *s) {
             (s->layout != LAYOUT_SAME &&
              strcmp(out->files->bindings[i].message, out->files->bindings[s->item].message) == 0))
           add_signal(out, s, i);
-      break;
-    case SUSPECT_RADIUS_FACTOR: add_value(out, kFile, "wheels.radius_m", "%.6g", w->radius_m * s->value); break;
-    case SUSPECT_TICKS_FACTOR:
-      add_value(out, kFile, "wheels.ticks_per_turn", "%.9g", w->ticks_per_turn * s->value);
-      break;
-    case SUSPECT_TRACK_FACTOR: add_value(out, kFile, "wheels.track_m", "%.6g", w->track_m * s->value); break;
-    case SUSPECT_WHEELBASE_FACTOR:
-      add_value(out, kFile, "wheels.wheelbase_m", "%.6g", w->wheelbase_m * s->value);
-      break;
-    case SUSPECT_STEERING_FACTOR:
-      add_value(out, kFile, "wheels.steering_ratio", "%.6g", w->steering_ratio * s->value);
       break;
     default: add_twist(out, s); break;
   }

@@ -262,7 +262,7 @@ static int is_blind_to_tags(const wm_assembly *assembly, const source_seen *seen
   int is_blind = 0;
   for (size_t i = 0; i < assembly->source_count; i++) {
     if (strncmp(assembly->sources[i].name, "apriltag:", 9) != 0) continue;
-    if (seen[i].kinds) return 0;
+    if (seen[i].kinds & WM_EVENT_BIT(WM_EVENT_MARKER)) return 0;
     is_blind = 1;
   }
   return is_blind;
@@ -314,6 +314,10 @@ size_t suspects_list(const wm_assembly *assembly, const suspect_files *files, co
     kinds |= seen[i].kinds;
     if ((seen[i].kinds & WM_MOTION_EVENTS) && !motion) motion = &seen[i];
   }
+  if ((kinds & WM_EVENT_BIT(WM_EVENT_POINTS)) && files->plan_picture_count > 0)
+    add_values(&all, SUSPECT_PLAN_MIRROR, 0, 0, VALUES(1, -1));
+  // First what the setup has few of: where the time ends, the last of the list are not tried.
+  add_setup(&all, &assembly->setup, kinds);
   for (size_t i = 0; i < assembly->source_count; i++) {
     if (seen[i].kinds & WM_EVENT_BIT(WM_EVENT_STEREO)) (void)add(&all, SUSPECT_STEREO_SWAP, i, 0, 0);
     if (seen[i].kinds & WM_MOTION_EVENTS)
@@ -321,10 +325,7 @@ size_t suspects_list(const wm_assembly *assembly, const suspect_files *files, co
     else if (seen[i].kinds)
       add_observations(&all, assembly, &seen[i], motion, i);
   }
-  add_setup(&all, &assembly->setup, kinds);
   add_files(&all, files);
-  if ((kinds & WM_EVENT_BIT(WM_EVENT_POINTS)) && files->plan_picture_count > 0)
-    add_values(&all, SUSPECT_PLAN_MIRROR, 0, 0, VALUES(1, -1));
   return all.count;
 }
 

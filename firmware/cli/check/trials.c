@@ -29,6 +29,7 @@
 // A change explains the observations if each update gains so much of log likelihood, nats, and most updates are fused.
 #define GAIN_MIN 0.1
 #define EXPLAINED_MIN 0.85
+#define EQUAL_MOST 0.01     // nats an update: the drives of two changes with the same effect differ by less
 #define EXPLAINED_ALL 0.97  // then nothing is left to explain
 #define FINALISTS 8
 #define FIRSTS 4           // changes of which each is tried together with all others where none helps alone
@@ -62,12 +63,12 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
   if (kind == WM_OUTPUT_INNOVATION && self->votes.given) id_votes_take(&self->votes, record);
 }
 
-static double calibration_cost(const wm_health *health) {
+static double calibration_cost(const wm_assembly *assembly, const wm_health *health) {
   int count = 0;
   for (uint32_t i = 0; i < health->calibration_count; i++) {
     const wm_calibration_value *c = &health->calibration[i];
     if (strstr(c->name, "_scale"))
-      count += c->value < 1 / SCALE_MAX || c->value > SCALE_MAX;
+      count += c->value < 1 / SCALE_MAX || c->value > SCALE_MAX || evidence_scale_contradicts(assembly, c);
     else if (strstr(c->name, ".time_offset_s"))
       count += fabs(c->value) > OFFSET_MAX_S;
     else if (strstr(c->name, ".yaw_rad"))
@@ -128,10 +129,11 @@ static trial_message drive(const trials_plan *plan, const char *folder, double u
   const wm_status status = wm_replay_recording(config, recording, &options, &report, &err);
   wm_recording_close(recording);
   if (status != WM_OK || self.evidence.updates == 0) return none;
-  done.result = (trial_result){.is_valid = 1,
-                               .updates = self.evidence.updates,
-                               .score = evidence_score(&self.evidence) - calibration_cost(&report.health),
-                               .explained = (double)self.evidence.fused / (double)self.evidence.updates};
+  done.result =
+      (trial_result){.is_valid = 1,
+                     .updates = self.evidence.updates,
+                     .score = evidence_score(&self.evidence) - calibration_cost(plan->assembly, &report.health),
+                     .explained = (double)self.evidence.fused / (double)self.evidence.updates};
   if (self.votes.given) id_votes_table(&self.votes, &done.table);
   return done;
 }
@@ -333,47 +335,62 @@ static int race_pairs(pool *self, const race_result *alone, suspect *found, tria
   return pairs[best][1].kind == SUSPECT_NONE ? 1 : 2;
 }
 
-static void search(pool *self, suspect *found, trial_result *before, trial_result *after) {
+// Changes of another kind with the same effect as the best one: the recording cannot tell which of them is right.
+static void take_equals(const race_result *round, trials_found *out) {
+  const trial_result *best = &round->results[round->best];
+  for (size_t i = 1; i < round->count && out->equal_count < TRIALS_EQUAL_MAX; i++) {
+    const trial_result *r = &round->results[i];
+    const suspect *one = &round->finalists[i];  // a table of identities is also any shift of them
+    const int is_other =
+        i != round->best && one->kind != round->finalists[round->best].kind && one->kind != SUSPECT_IDENTITY_TABLE;
+    if (is_other && r->is_valid && r->explained >= EXPLAINED_MIN && r->score > best->score - EQUAL_MOST)
+      out->equal[out->equal_count++] = round->finalists[i];
+  }
+}
+
+static void search(pool *self, trials_found *out) {
+  trial_result *after = &out->after;
   static race_result round;
   while (self->fixed_count < TRIALS_FOUND_MAX && left_s(self) > LEAST_S) {
-    suspect *one = &found[self->fixed_count];
+    suspect *one = &out->at[self->fixed_count];
     self->done = 0;
     race(self, LONGEST_SHARE * left_s(self),
          fmin(PART_MAX_S, part_of(self, self->plan->count, FIRST_SHARE * left_s(self))),
          part_of(self, FINALISTS, SECOND_SHARE * left_s(self)), &round);
-    if (self->fixed_count == 0) *before = *after = round.results[0];
+    if (self->fixed_count == 0) out->before = *after = round.results[0];
     const trial_result *best = &round.results[round.best];
     if (round.best == 0 || !best->is_valid || (after->is_valid && best->score < after->score + GAIN_MIN)) {
       if (self->fixed_count > 0 || after->explained >= EXPLAINED_MIN) break;
       self->total = FIRSTS * self->plan->count;
       self->done = 0;
-      self->fixed_count = (size_t)race_pairs(self, &round, found, after);
+      self->fixed_count = (size_t)race_pairs(self, &round, out->at, after);
       break;
     }
     *after = *best;
     *one = round.finalists[round.best];
+    if (self->fixed_count == 0) take_equals(&round, out);
     refine(self, one, after);
     self->fixed_count++;
     if (after->explained > EXPLAINED_ALL || one->kind == SUSPECT_IDENTITY_TABLE) break;
   }
 }
 
-size_t trials_run(const trials_plan *plan, suspect found[TRIALS_FOUND_MAX], id_table *table, trial_result *before,
-                  trial_result *after) {
+void trials_run(const trials_plan *plan, trials_found *out) {
   const long processors = sysconf(_SC_NPROCESSORS_ONLN);
+  *out = (trials_found){0};
   pool self = {.plan = plan,
-               .fixed = found,
+               .fixed = out->at,
                .total = plan->count + FINALISTS,
-               .table = table,
+               .table = &out->table,
                .begin_s = spent_s(),
                .at_once = (double)(processors > 0 ? processors : 1)};
   const char *temporary = getenv("TMPDIR");
-  *before = *after = (trial_result){0};
   (void)snprintf(self.folder, sizeof self.folder, "%.40s/waymark-check-XXXXXX", temporary ? temporary : "/tmp");
-  if (!mkdtemp(self.folder)) return 0;
-  search(&self, found, before, after);
+  if (!mkdtemp(self.folder)) return;
+  search(&self, out);
   changed_copy folder = {.dir = plan->dir};
   (void)snprintf(folder.out, sizeof folder.out, "%s", self.folder);
   changed_copy_remove(&folder);
-  return after->explained >= EXPLAINED_MIN ? self.fixed_count : 0;
+  if (out->after.explained >= EXPLAINED_MIN) out->count = self.fixed_count;
+  if (out->count != 1) out->equal_count = 0;  // one of several causes: each of them was tried with the others
 }

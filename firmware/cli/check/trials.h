@@ -29,11 +29,18 @@ typedef struct trial_result {
   double explained;  // share of the updates that were fused
 } trial_result;
 
-// The changes that make the observations fit, the most important first; 0 where none does. *before, *after: without and
-// with all of them. `table`: of identities, for a change by it.
 #define TRIALS_FOUND_MAX 3
-size_t trials_run(const trials_plan *plan, suspect found[TRIALS_FOUND_MAX], id_table *table, trial_result *before,
-                  trial_result *after);
+#define TRIALS_EQUAL_MAX 3
+typedef struct trials_found {
+  suspect at[TRIALS_FOUND_MAX + 1];  // the most important first
+  size_t count;
+  suspect equal[TRIALS_EQUAL_MAX];  // other changes in place of the first: the observations fit as well with each
+  size_t equal_count;
+  id_table table;              // of identities, for a change by it
+  trial_result before, after;  // without and with all of `at`
+} trials_found;
+// The changes that make the observations fit; none where none does.
+void trials_run(const trials_plan *plan, trials_found *out);
 
 // All files' changes of these suspects. Returns how many; 0 where one of them can't be undone by any.
 #define TRIAL_EDITS_MAX (TRIALS_FOUND_MAX * SUSPECT_EDITS_MAX + SUSPECT_EDITS_MAX)

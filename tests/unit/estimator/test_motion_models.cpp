@@ -127,6 +127,33 @@ void test_a_stuck_gyro_yields_to_the_ticks(void) {
   }
 }
 
+// Seconds of a robot whose wheels give this speed and turn rate, and whose gyro gives this number; true: found stuck.
+bool is_found_stuck(double seconds, double speed_mps, double turn_radps, double gyro_radps) {
+  drive d;
+  for (; d.steps < 50 * seconds; d.steps++) {
+    d.left += 0.02 * (speed_mps - 0.5 * turn_radps * d.wheels.track_m) / kTick;
+    d.right += 0.02 * (speed_mps + 0.5 * turn_radps * d.wheels.track_m) / kTick;
+    // Counts are whole: a slow wheel stands still in most of the periods.
+    d.feed(make::quantities(
+        0.02 * d.steps, {{WM_Q_WHEEL_TICKS_LEFT, std::floor(d.left)}, {WM_Q_WHEEL_TICKS_RIGHT, std::floor(d.right)}}));
+    d.feed(make::quantities(0.02 * d.steps + 0.005, {{WM_Q_YAW_RATE, gyro_radps}}));
+  }
+  return (d.front.health() & WM_MOTION_HEALTH_YAW_RATE_STUCK) != 0;
+}
+
+void test_a_slow_robots_stuck_gyro_is_found(void) {
+  TEST_ASSERT_TRUE(is_found_stuck(5, 0.1, 0.2, 0.01));
+  TEST_ASSERT_TRUE(is_found_stuck(5, 0.0, 0.2, 0.01));   // turns on the spot
+  TEST_ASSERT_TRUE(is_found_stuck(200, 0.1, 0.0, 0.0));  // straight on for 15 m
+}
+
+// A coarse gyro may repeat its number while that is right, and while the robot stands.
+void test_repeated_numbers_that_are_right_are_no_fault(void) {
+  TEST_ASSERT_FALSE(is_found_stuck(20, 0.1, 0.2, 0.21));
+  TEST_ASSERT_FALSE(is_found_stuck(100, 0.1, 0.0, 0.0));
+  TEST_ASSERT_FALSE(is_found_stuck(120, 0.0, 0.0, 0.02));
+}
+
 }  // namespace
 
 void setUp(void) {}
@@ -138,5 +165,7 @@ int main(void) {
   RUN_TEST(test_ticks_and_a_gyro_are_both_used);
   RUN_TEST(test_a_silent_gyro_yields_to_the_ticks);
   RUN_TEST(test_a_stuck_gyro_yields_to_the_ticks);
+  RUN_TEST(test_a_slow_robots_stuck_gyro_is_found);
+  RUN_TEST(test_repeated_numbers_that_are_right_are_no_fault);
   return UNITY_END();
 }

@@ -2,6 +2,7 @@
 // Findings that a health or the records of a drive make, a row each: what is broken, and the finding that follows.
 // A health in order makes none.
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "output/drive_evidence.h"
@@ -159,6 +160,104 @@ static void innovations_of_their_sigma_are_good_and_larger_ones_are_found(void) 
   TEST_ASSERT_EQUAL_DOUBLE(2.5, round(found.at[0].size * 1e6) / 1e6);
 }
 
+// A hundred messages of a drive in this state and for this reason.
+static void drive_in(wm_state state, wm_cause cause, int source, uint64_t fused) {
+  static drive_evidence evidence;
+  static wm_config config;
+  static wm_assembly assembly;
+  static const wm_estimator kSeeing = {.takes = WM_EVENT_BIT(WM_EVENT_SIGHTING)};
+  wm_published message = {.now = {.state = (uint8_t)state, .cause = (uint8_t)cause, .cause_source = (int8_t)source}};
+  memset(&evidence, 0, sizeof evidence);
+  memset(&found, 0, sizeof found);
+  config.estimator = &kSeeing;
+  assembly.config = &config;
+  assembly.source_count = 1;
+  assembly.sources[0].kinds = WM_EVENT_BIT(WM_EVENT_SIGHTING);
+  assembly.setup.start.p_m[0] = (double)NAN;
+  (void)snprintf(assembly.sources[0].name, sizeof assembly.sources[0].name, "eye");
+  evidence.fused = fused;
+  for (int i = 0; i < 100; i++) evidence_put(&evidence, WM_OUTPUT_PUBLISHED, &message);
+  evidence_judge(&evidence, &assembly, &health, 100, &found);
+}
+
+static void the_cause_of_a_lost_or_degraded_drive_is_named(void) {
+  static const struct {
+    wm_state state;
+    wm_cause cause;
+    int source;
+    wm_finding_id id;
+    const char *about, *text;
+  } kDrives[] = {
+      {WM_STATE_LOST, WM_CAUSE_REFUSED, 0, WM_FOUND_POSE_LOST, "drive", "eye is refused"},
+      {WM_STATE_LOST, WM_CAUSE_CONTRADICTED, -1, WM_FOUND_POSE_LOST, "drive", "what is observed contradicts the pose"},
+      {WM_STATE_DEGRADED, WM_CAUSE_BIASED, 0, WM_FOUND_POSE_DOUBTFUL, "eye", "has biased innovations"},
+      {WM_STATE_DEGRADED, WM_CAUSE_OFF_MAP, -1, WM_FOUND_POSE_DOUBTFUL, "map", "does not reach the pose"},
+      {WM_STATE_DEGRADED, WM_CAUSE_UNKNOWN, 0, WM_FOUND_POSE_DOUBTFUL, "eye", "has unknown identities"},
+      {WM_STATE_DEGRADED, WM_CAUSE_LOST_AGAIN, -1, WM_FOUND_POSE_DOUBTFUL, "observations",
+       "contradicts poses soon after they are found"}};
+  for (size_t i = 0; i < sizeof kDrives / sizeof kDrives[0]; i++) {
+    drive_in(kDrives[i].state, kDrives[i].cause, kDrives[i].source, 1000);
+    TEST_ASSERT_EQUAL(1, found.count);
+    TEST_ASSERT_TRUE(wm_findings_has(&found, kDrives[i].id, kDrives[i].about));
+    TEST_ASSERT_NOT_NULL_MESSAGE(strstr(found.at[0].text, kDrives[i].text), found.at[0].text);
+  }
+  drive_in(WM_STATE_TRACKING, WM_CAUSE_NONE, -1, 1000);
+  TEST_ASSERT_EQUAL(0, found.count);
+}
+
+// A camera that never sees a marker, and one that saw some.
+static void a_drive_that_no_observation_reaches_is_not_good(void) {
+  drive_in(WM_STATE_DEAD_RECKONING, WM_CAUSE_NONE, -1, 0);
+  TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_POSE_DOUBTFUL, "observations"));
+  TEST_ASSERT_EQUAL(WM_SEVERITY_BAD, found.at[0].severity);
+  drive_in(WM_STATE_DEAD_RECKONING, WM_CAUSE_NONE, -1, 30);
+  TEST_ASSERT_EQUAL(0, found.count);
+}
+
+// Against the sigma that the configuration states for it.
+static void a_scale_far_from_its_stated_one_contradicts(void) {
+  void *motion = malloc(wm_motion_params_table.bytes);
+  const wm_assembly assembly = {.setup.motion = motion};
+  TEST_ASSERT_NOT_NULL(motion);
+  wm_calibration_value scale = {.name = "motion.left_scale", .value = 1.25, .sigma = 0.003};
+  wm_params_defaults(&wm_motion_params_table, motion);
+  for (size_t i = 0; i < wm_motion_params_table.count; i++)
+    if (strcmp(wm_motion_params_table.params[i].key, "states.left_scale_sigma") == 0)
+      *(double *)((char *)motion + wm_motion_params_table.params[i].offset) = 0.02;
+  TEST_ASSERT_TRUE(evidence_scale_contradicts(&assembly, &scale));
+  scale.value = 1.15;  // as far as tyres may be off
+  TEST_ASSERT_FALSE(evidence_scale_contradicts(&assembly, &scale));
+  scale.value = 1.25;
+  scale.sigma = 0.1;  // not observed
+  TEST_ASSERT_FALSE(evidence_scale_contradicts(&assembly, &scale));
+  free(motion);
+}
+
+// A map that the configuration names and does not use, one that it uses, and a recording's own.
+static void a_map_that_is_named_and_not_read_is_found(void) {
+  static const char *const kUses[] = {"none", "extend", NULL};
+  static const wm_param kMap = {.key = "landmarks.map", .type = WM_PARAM_ENUM, .names = kUses};
+  static const wm_estimator kMapping = {.name = "slam", .params = {&kMap, 1, sizeof(int32_t), NULL}};
+  static drive_evidence evidence;
+  static wm_config config;
+  const struct {
+    const char *named;
+    int32_t use;
+    size_t findings;
+  } kCases[] = {{"hall.csv", 0, 1}, {"hall.csv", 1, 0}, {"", 0, 0}};
+  for (size_t i = 0; i < sizeof kCases / sizeof kCases[0]; i++) {
+    int32_t use = kCases[i].use;
+    wm_assembly assembly = {.config = &config, .setup.start.p_m[0] = (double)NAN};
+    memset(&found, 0, sizeof found);
+    config.estimator = &kMapping;
+    config.estimator_params = &use;
+    (void)snprintf(config.overrides.landmarks, sizeof config.overrides.landmarks, "%s", kCases[i].named);
+    evidence_judge(&evidence, &assembly, &health, 0, &found);
+    TEST_ASSERT_EQUAL(kCases[i].findings, found.count);
+    TEST_ASSERT_EQUAL(kCases[i].findings, wm_findings_has(&found, WM_FOUND_DATA_UNUSED, "landmarks"));
+  }
+}
+
 static void a_finding_of_the_drive_is_not_repeated_by_the_health(void) {
   drive_with(5, WM_REJECTED_GATE);
   TEST_ASSERT_TRUE(wm_findings_has(&found, WM_FOUND_OBSERVATIONS_REFUSED, "eye"));
@@ -211,6 +310,10 @@ int main(void) {
   RUN_TEST(innovations_with_a_mean_are_found);
   RUN_TEST(ranges_that_are_too_long_are_found_with_their_factor);
   RUN_TEST(innovations_of_their_sigma_are_good_and_larger_ones_are_found);
+  RUN_TEST(the_cause_of_a_lost_or_degraded_drive_is_named);
+  RUN_TEST(a_drive_that_no_observation_reaches_is_not_good);
+  RUN_TEST(a_scale_far_from_its_stated_one_contradicts);
+  RUN_TEST(a_map_that_is_named_and_not_read_is_found);
   RUN_TEST(a_finding_of_the_drive_is_not_repeated_by_the_health);
   RUN_TEST(a_log_has_each_finding_once_in_ten_minutes);
   RUN_TEST(a_full_list_counts_what_it_drops);

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The usual mistakes that check tries: which are listed for a recording and its configuration, their changes of files,
 // their words.
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "../drivers/folder.h"
 #include "cli/check/changed_copy.h"
+#include "cli/check/check.h"
 #include "cli/check/suspects.h"
 #include "unity.h"
 #include "waymark/text.h"
@@ -162,6 +164,23 @@ static void corrected_configuration(void) {
   changed_copy_remove(&copy);
 }
 
+// Turn rates of a gyro and of wheels, `ratio` apart, with noise of the wheels' alone.
+static double ratio_found(double ratio, double noise) {
+  agreement both = {0};
+  for (int i = 0; i < 2000; i++) {
+    const double turn = sin(0.01 * i), error = noise * (i % 2 ? 1 : -1);
+    agreement_add(&both, ratio * turn, turn + error);
+  }
+  return agreement_ratio(&both, 1.5);
+}
+
+static void noise_of_a_sensor_is_no_ratio(void) {
+  TEST_ASSERT_EQUAL_DOUBLE(1, ratio_found(1, 0));
+  TEST_ASSERT_EQUAL_DOUBLE(1, ratio_found(1, 0.8));  // makes ab / bb 0.44
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.5, ratio_found(0.5, 0));
+  TEST_ASSERT_DOUBLE_WITHIN(0.1, 2.0, ratio_found(2, 0.2));
+}
+
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(settings_of_the_configuration);
@@ -170,5 +189,6 @@ int main(void) {
   RUN_TEST(sides_of_a_pair);
   RUN_TEST(mirrored_plan);
   RUN_TEST(corrected_configuration);
+  RUN_TEST(noise_of_a_sensor_is_no_ratio);
   return UNITY_END();
 }

@@ -130,6 +130,24 @@ void test_four_equal_corners_return_to_the_start_lap_after_lap() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-9, 4 * kPi, end.heading_rad);
 }
 
+// The way that was driven, whether the end is cut off or a part of it is skipped by carrying the vehicle.
+void test_the_length_is_that_of_the_part_that_is_driven() {
+  const auto way = [](const Drive &drive) {
+    const double h = 0.001;
+    double sum = 0;
+    for (double t = 0.5 * h; t < drive.duration_s(); t += h) sum += h * std::fabs(drive.at(t).speed_mps);
+    return sum;
+  };
+  Drive cut = planned(mixed_route()), carried = planned(mixed_route());
+  const double whole = cut.length_m();
+  cut.cut(0.4 * cut.duration_s());
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, way(cut), cut.length_m());
+  TEST_ASSERT_TRUE(cut.length_m() < 0.7 * whole);
+  wm_error err;
+  TEST_ASSERT_EQUAL(WM_OK, carried.carry(0.3 * carried.duration_s(), 0.2 * carried.duration_s(), &err));
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, way(carried), carried.length_m());
+}
+
 void test_a_turn_without_room_for_its_ease_is_refused() {
   Route route;
   route.legs = {straight(5, 1), turn(30, 4, 3, 1)};
@@ -149,6 +167,7 @@ int main() {
   RUN_TEST(test_speed_and_acceleration_keep_their_limits);
   RUN_TEST(test_turns_turn_as_they_say_forwards_and_backwards);
   RUN_TEST(test_four_equal_corners_return_to_the_start_lap_after_lap);
+  RUN_TEST(test_the_length_is_that_of_the_part_that_is_driven);
   RUN_TEST(test_a_turn_without_room_for_its_ease_is_refused);
   return UNITY_END();
 }
