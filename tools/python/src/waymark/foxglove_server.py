@@ -6,10 +6,13 @@ import queue
 import shutil
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import foxglove
 import yaml
+from foxglove.websocket import ServerListener
 
 from .lcm_types import load
 from .live import Live
@@ -29,7 +32,7 @@ In Foxglove: Open connection, ws://localhost:8765; then import the layout that i
 password: without an address, this computer alone can connect. Exit code: 0 done, 1 the work failed, 2 usage."""
 
 
-class FoxgloveServer(foxglove.ServerListener):
+class FoxgloveServer(ServerListener):
     """Sends items to all viewers. What changes seldom is sent again to each one that subscribes later."""
 
     def __init__(self, messages: Messages, host: str, port: int):
@@ -47,7 +50,7 @@ class FoxgloveServer(foxglove.ServerListener):
         """The port that it listens on."""
         return int(self._server.port)
 
-    def on_subscribe(self, client, channel) -> None:
+    def on_subscribe(self, client: Any, channel: Any) -> None:
         """Of the server's thread."""
         self._subscribed.put(channel.topic)
 
@@ -104,7 +107,7 @@ class Site:
         if map_file:
             self.files["map"] = Path(map_file)
 
-    def items(self, messages: Messages, t_ns: int):
+    def items(self, messages: Messages, t_ns: int) -> Iterator[Item]:
         """Mountings, map and landmarks."""
         if "calibration" in self.files:
             calibration = yaml.safe_load(self.files["calibration"].read_text(encoding="utf-8")) or {}

@@ -4,7 +4,9 @@
 import argparse
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
@@ -82,8 +84,8 @@ def _write_positions(into: Collection, given: argparse.Namespace) -> None:
         table, origin = tables.gnss(into.rows["fixes"][topic], given.origin)
         into.writer.table("gnss.csv", table)
         into.writer.calibration["gnss"] = {"origin": origin}
-    if given.truth:
-        into.writer.table("truth.csv", tables.truth(into.rows["poses"][_choose(into, "poses", given.truth, "--truth")]))
+    if topic := given.truth and _choose(into, "poses", given.truth, "--truth"):
+        into.writer.table("truth.csv", tables.truth(into.rows["poses"][topic]))
     for topic in into.rows.get("poses", {}):
         if topic != given.truth and topic not in into.rows.get("motion", {}):
             into.refuse(topic, f"poses are an answer, not a sensor; --truth {topic} takes them as truth.csv")
@@ -112,9 +114,9 @@ def _is_ours(connection: Connection) -> bool:
     return connection.topic.startswith("/recording/") and connection.msgtype.startswith("waymark_msgs/msg/")
 
 
-def _read(bag: AnyReader, into: Collection, progress) -> dict[str, list]:
+def _read(bag: AnyReader, into: Collection, progress: Callable[[int, int], None] | None) -> dict[str, list[Any]]:
     """Takes every message that has a taker; rows of our own tables by their file."""
-    own: dict[str, list] = {}
+    own: dict[str, list[Any]] = {}
     taken = [c for c in bag.connections if c.msgtype in TAKERS or c.topic.endswith("tf_static") or _is_ours(c)]
     total = sum(connection.msgcount for connection in taken)
     for count, (connection, log_ns, raw) in enumerate(bag.messages(taken)):
@@ -133,7 +135,7 @@ def _read(bag: AnyReader, into: Collection, progress) -> dict[str, list]:
     return own
 
 
-def import_bag(path: Path, out: Path, given: argparse.Namespace, progress=None) -> Collection:
+def import_bag(path: Path, out: Path, given: argparse.Namespace, progress: Callable[..., None] | None = None) -> Collection:
     """Writes the recording of a bag; what was found stands in the collection."""
     with AnyReader([path], default_typestore=typestore()) as bag, RecordingWriter(out) as writer:
         into = Collection(writer)
