@@ -168,7 +168,7 @@ def check_poses(work, given):
     told["pose"]["covariance"][0] = told["pose"]["covariance"][7] = 0.25
     told["pose"]["covariance"][35] = 0.07
     send_fast(given.probe, "/initialpose", kind, told)
-    lcm_tools.finish(run)
+    lcm_tools.finish(run, given.seconds + 60)
     time.sleep(1)
     bridge.send_signal(signal.SIGTERM)
     out, err = bridge.communicate(timeout=10)
