@@ -11,6 +11,7 @@ from ..tables import Array
 
 _PICTURE_PARTS = {"camera_info", "compressed", "image", "image_raw", "image_rect", "image_mono", "image_color", "raw", "detections",
                   "tag_detections", "apriltag", "camera"}
+_OTHER_CLOCK_NS = 60_000_000_000  # nobody waits for a datum for a minute
 
 
 def stamp_ns(message: Any, log_ns: int) -> int:
@@ -37,6 +38,13 @@ class Collection:
     def row(self, kind: str, topic: str, values: tuple[Any, ...]) -> None:
         """Adds a row of numbers."""
         self.rows.setdefault(kind, {}).setdefault(topic, []).append(values)
+
+    def arrival_ns(self, topic: str, t_ns: int, log_ns: int) -> int:
+        """When a datum came: at its log, or at once where the log's clock can't be that of the stamps (simulated time, a robot's own)."""
+        if abs(log_ns - t_ns) <= _OTHER_CLOCK_NS:
+            return max(log_ns, t_ns)
+        self.note(topic, "its stamps are of another clock than the bag's (simulated time?): no arrivals")
+        return t_ns
 
     def note(self, topic: str, text: str) -> None:
         """What a user should know of a topic that is taken; the first note of a topic stays."""

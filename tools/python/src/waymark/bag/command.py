@@ -120,13 +120,19 @@ def _read(bag: AnyReader, into: Collection, progress: Callable[[int, int], None]
     taken = [c for c in bag.connections if c.msgtype in TAKERS or c.topic.endswith("tf_static") or _is_ours(c)]
     total = sum(connection.msgcount for connection in taken)
     for count, (connection, log_ns, raw) in enumerate(bag.messages(taken)):
-        message = bag.deserialize(raw, connection.msgtype)
-        if _is_ours(connection):
-            own.setdefault(connection.topic, []).append(message)
-        elif connection.topic.endswith("tf_static"):
-            tf_static(into, connection.topic, message, log_ns)
-        else:
-            TAKERS[connection.msgtype](into, connection.topic, message, log_ns)
+        try:
+            message = bag.deserialize(raw, connection.msgtype)
+            if _is_ours(connection):
+                own.setdefault(connection.topic, []).append(message)
+            elif connection.topic.endswith("tf_static"):
+                tf_static(into, connection.topic, message, log_ns)
+            else:
+                TAKERS[connection.msgtype](into, connection.topic, message, log_ns)
+        except OSError:
+            raise
+        except Exception as error:  # what the decoder raises on bytes that don't fit the type is its own matter
+            raise ImportFailure(f"{connection.topic}: the message of {log_ns} ns ({len(raw)} bytes) is no {connection.msgtype}: "
+                                f"{error or type(error).__name__}") from error
         if progress and count % 500 == 0:
             progress(count, total)
     for connection in bag.connections:
@@ -158,6 +164,12 @@ def import_bag(path: Path, out: Path, given: argparse.Namespace, progress: Calla
     return into
 
 
+def _has_end(path: Path) -> bool:
+    with path.open("rb") as file:
+        file.seek(max(path.stat().st_size - 8, 0))
+        return file.read() == b"\x89MCAP0\r\n"
+
+
 def main(argv: list[str] | None = None) -> int:
     """The command line."""
     parser = argparse.ArgumentParser(prog="waymark import", description="Makes a recording of an MCAP file or a ROS bag.",
@@ -180,7 +192,9 @@ def main(argv: list[str] | None = None) -> int:
         into = import_bag(given.bag, given.out, given, progress)
     except Exception as error:  # the readers of bags raise whatever a broken file leads to
         shutil.rmtree(given.out, ignore_errors=True)
-        print(f"waymark import: {given.bag}: {error or type(error).__name__}", file=sys.stderr)
+        cut = given.bag.suffix == ".mcap" and given.bag.is_file() and not _has_end(given.bag)
+        hint = "; the file has no end, as of a recorder that was killed: `mcap recover` (of MCAP's makers) completes it" if cut else ""
+        print(f"waymark import: {given.bag}: {error or type(error).__name__}{hint}", file=sys.stderr)
         return 1
     if progress:
         print("\r\033[K", end="", file=sys.stderr)

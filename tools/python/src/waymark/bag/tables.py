@@ -75,7 +75,7 @@ def imu(rows: list[tuple[Any, ...]]) -> Table:
 def tags(rows: list[tuple[Any, ...]], camera: str) -> Table:
     """Corners of tags of one camera."""
     names = ["t_ns", "id", *(f"{axis}{k}_px" for k in range(4) for axis in "uv"), "arrival_ns"]
-    table = _table(names, rows)
+    table = _without_arrival(_table(names, rows))
     return {"t_ns": table.pop("t_ns"), "sensor": np.full(len(rows), camera), **table}
 
 

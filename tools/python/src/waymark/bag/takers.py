@@ -19,7 +19,7 @@ _COLOUR = {"rgb8": (3, (0, 1, 2)), "bgr8": (3, (2, 1, 0)), "rgba8": (4, (0, 1, 2
 def _frame(into: Collection, topic: str, message: Any, log_ns: int, jpeg: bytes) -> None:
     t_ns = stamp_ns(message, log_ns)
     into.frame_ids.setdefault(into.camera(topic), message.header.frame_id)
-    into.writer.frame(into.camera(topic), Frame(t_ns, max(log_ns, t_ns), jpeg))
+    into.writer.frame(into.camera(topic), Frame(t_ns, into.arrival_ns(topic, t_ns, log_ns), jpeg))
 
 
 def compressed_image(into: Collection, topic: str, message: Any, log_ns: int) -> None:
@@ -73,7 +73,7 @@ def camera_info(into: Collection, topic: str, message: Any, _log_ns: int) -> Non
 
 
 def _twist(into: Collection, topic: str, t_ns: int, log_ns: int, linear: Any, angular: Any) -> None:
-    into.row("motion", topic, (t_ns, linear.x, linear.y, linear.z, angular.x, angular.y, angular.z, max(log_ns, t_ns)))
+    into.row("motion", topic, (t_ns, linear.x, linear.y, linear.z, angular.x, angular.y, angular.z, into.arrival_ns(topic, t_ns, log_ns)))
 
 
 def odometry(into: Collection, topic: str, message: Any, log_ns: int) -> None:
@@ -113,7 +113,7 @@ def imu(into: Collection, topic: str, message: Any, log_ns: int) -> None:
         values += [getattr(vector, axis) if known else np.nan for axis in "xyz"]
         variances = covariance.reshape(3, 3).diagonal()
         sigmas += [float(np.sqrt(value)) if value > 0 else np.nan for value in variances]
-    into.row("imu", topic, (t_ns, *values, *sigmas, max(log_ns, t_ns)))
+    into.row("imu", topic, (t_ns, *values, *sigmas, into.arrival_ns(topic, t_ns, log_ns)))
     into.frame_ids_imu.setdefault(topic, message.header.frame_id)
 
 
@@ -123,7 +123,7 @@ def fix(into: Collection, topic: str, message: Any, log_ns: int) -> None:
         return
     variance = message.position_covariance.reshape(3, 3).diagonal() if message.position_covariance_type else np.full(3, np.nan)
     t_ns = stamp_ns(message, log_ns)
-    into.row("fixes", topic, (t_ns, message.latitude, message.longitude, message.altitude, *variance, max(log_ns, t_ns)))
+    into.row("fixes", topic, (t_ns, message.latitude, message.longitude, message.altitude, *variance, into.arrival_ns(topic, t_ns, log_ns)))
 
 
 def tf_static(into: Collection, _topic: str, message: Any, _log_ns: int) -> None:
@@ -140,7 +140,7 @@ def april_tags(into: Collection, topic: str, message: Any, log_ns: int) -> None:
     into.frame_ids.setdefault(into.camera(topic), message.header.frame_id)
     for tag in message.detections:
         corners = [value for k in (3, 2, 1, 0) for value in (tag.corners[k].x, tag.corners[k].y)]
-        into.row("tags", topic, (t_ns, int(tag.id), *corners, max(log_ns, t_ns)))
+        into.row("tags", topic, (t_ns, int(tag.id), *corners, into.arrival_ns(topic, t_ns, log_ns)))
         into.families.add(tag.family)
 
 
