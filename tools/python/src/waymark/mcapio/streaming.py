@@ -22,6 +22,8 @@ TOPICS = {"/tf": "tf2_msgs/msg/TFMessage", "/tf_static": "tf2_msgs/msg/TFMessage
           "/waymark/landmarks": "visualization_msgs/msg/MarkerArray", "/landmarks": "visualization_msgs/msg/MarkerArray",
           "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
 """Topics of each run; those of sources and cameras come with their first message."""
+SIGHTINGS = ["t_ns", "sensor", "id", "bearing_rad", "range_m"]
+"""Columns of /recording/sightings."""
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
@@ -155,7 +157,7 @@ class LiveItems:
         table: Table = {"t_ns": np.full(n, t_ns), "sensor": np.array([_name(message.sensor)] * n),
                         "id": np.array(message.landmark_id[:n]), "bearing_rad": np.array(message.bearing_rad[:n]),
                         "range_m": np.array(message.range_m[:n])}
-        kind = streams.register(self._messages, "sightings.csv", list(table))
+        kind = streams.register(self._messages, "sightings.csv", SIGHTINGS)
         for i in range(n):
             yield Item(self.newest_ns, "/recording/sightings", kind,
                        streams.row(self._messages, kind, table, i, estimates.topic_name(_name(message.sensor))))
