@@ -72,8 +72,8 @@ def run(recording, config, out):
                             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-def finish(process):
-    out, err = process.communicate(timeout=60)
+def finish(process, timeout_s=60):
+    out, err = process.communicate(timeout=timeout_s)
     assert process.returncode == 0, f"waymark run: exit code {process.returncode}\n{out}{err}"
     return out, err
 

@@ -7,14 +7,19 @@
 import contextlib
 import io
 import os
+import pathlib
 import random
+import shutil
 import subprocess
+import tempfile
 import unittest
 
 import numpy as np
 from common import BIN, Drive
+from mcap.writer import Writer as McapWriter
 from PIL import Image
 from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import get_types_from_msg
 
 import waymark
 from waymark.bag.command import main as import_main
@@ -34,7 +39,7 @@ def imported(*arguments):
     return code, out.getvalue() + errors.getvalue()
 
 
-def robot_bag(folder, plugin, twist=True):
+def robot_bag(folder, plugin, twist=True, late_ns=3_000_000):
     """A bag as a robot with ROS 2 records it: odometry, camera, GNSS, tags, CAN, mountings, and what nobody takes."""
     m = Messages()
     with Writer(folder, version=9, storage_plugin=plugin) as bag:
@@ -44,7 +49,7 @@ def robot_bag(folder, plugin, twist=True):
             name = m.type(kind)
             if topic not in topics:
                 topics[topic] = bag.add_connection(topic, name, typestore=m.store)
-            bag.write(topics[topic], t_ns + 3_000_000, m.store.serialize_cdr(message, name))
+            bag.write(topics[topic], t_ns + late_ns, m.store.serialize_cdr(message, name))
 
         body = np.eye(4)
         body[:3, :3], body[:3, 3] = from_rpy(0, 0.2, 0.5) @ OPTICAL, (0.3, 0.1, 0.4)
@@ -137,6 +142,16 @@ class Robots(unittest.TestCase):
         np.testing.assert_allclose(waymark.Recording(self.out("a")).table("increments.csv")["dx_m"], 0.01, atol=1e-12)
         self.assertIn("increments.csv", text)
 
+    def test_stamps_of_a_simulator_s_clock_have_no_arrivals(self):
+        bag = robot_bag(self.drive.folder / "simulated", StoragePlugin.MCAP, late_ns=10**15)
+        code, text = imported(bag, "--out", self.out("a"))
+        self.assertEqual(code, 0, text)
+        recording = waymark.Recording(self.out("a"))
+        for table in ("motion.csv", "gnss.csv", "imu.csv", "marker-corners.csv"):
+            self.assertNotIn("arrival_ns", recording.table(table), table)
+        self.assertEqual({frame.arrival_ns for frame in recording.frames("front")} - {frame.t_ns for frame in recording.frames("front")}, set())
+        self.assertIn("note: /odom: its stamps are of another clock", text)
+
     def test_a_topic_that_is_not_there_is_named(self):
         code, text = imported(self.bags["mcap"], "--out", self.out("a"), "--motion", "/odometry")
         self.assertEqual(code, 1)
@@ -155,6 +170,60 @@ class Robots(unittest.TestCase):
             code, text = imported(path, "--out", self.out(f"broken-{case}"))
             self.assertIn(code, (0, 1))
             self.assertTrue(code == 0 or "waymark import: " in text, text)
+
+
+class Hostile(unittest.TestCase):
+    """Bags whose container is whole and whose messages are not what they say."""
+
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="waymark-hostile-"))
+        self.addCleanup(shutil.rmtree, self.folder)
+
+    def import_one(self, topic, kind, definition, data):
+        """What `waymark import` says to a bag with this one message."""
+        bag = self.folder / "bag.mcap"
+        with bag.open("wb") as file:
+            writer = McapWriter(file)
+            writer.start(profile="ros2", library="test")
+            schema = writer.register_schema(kind, "ros2msg", definition)
+            writer.add_message(writer.register_channel(topic, "cdr", schema), START_NS, data, START_NS)
+            writer.finish()
+        code, text = imported(bag, "--out", self.folder / "out")
+        self.assertEqual((code, (self.folder / "out").exists()), (1, False), text)
+        return text
+
+    def test_another_type_by_the_same_name_is_named(self):
+        m = Messages()
+        m.store.register(get_types_from_msg("std_msgs/Header header\nfloat64 speed\n", "nav_msgs2/msg/Odometry"))
+        data = m.encode(m.make("nav_msgs2/msg/Odometry", header=m.header(START_NS, "odom"), speed=1.0), "nav_msgs2/msg/Odometry")
+        definition = m.definition("nav_msgs2/msg/Odometry").replace(b"nav_msgs2", b"nav_msgs")
+        text = self.import_one("/odom", "nav_msgs/msg/Odometry", definition, data)
+        self.assertIn("/odom", text)
+        self.assertIn("nav_msgs/msg/Odometry", text)
+
+    def test_a_definition_that_is_none(self):
+        self.assertIn("waymark import: ", self.import_one("/odom", "nav_msgs/msg/Odometry", b"float63 x[[[\n", b"\0\1\0\0"))
+
+    def test_sizes_that_the_bytes_don_t_have(self):
+        m = Messages()
+        picture = m.make("sensor_msgs/Image", header=m.header(START_NS, "front"), height=48, width=64, encoding="mono8", step=64,
+                         data=np.zeros(48 * 64, dtype=np.uint8))
+        whole, kind = m.encode(picture, "sensor_msgs/msg/Image"), "sensor_msgs/msg/Image"
+        length = whole.index((48 * 64).to_bytes(4, "little"))
+        huge_data = whole[:length] + b"\xff\xff\xff\xff" + whole[length + 4:]
+        picture.height = 4_000_000_000
+        for data in (huge_data, m.encode(picture, kind), whole[:60], b""):
+            text = self.import_one("/front/image_raw", kind, m.definition(kind), data)
+            self.assertIn("/front/image_raw", text)
+
+    def test_a_file_without_an_end_is_said_to_be_one(self):
+        bag = robot_bag(self.folder / "whole", StoragePlugin.MCAP)
+        (whole,) = bag.glob("*.mcap")
+        cut = self.folder / "cut.mcap"
+        cut.write_bytes(whole.read_bytes()[:-100])
+        code, text = imported(cut, "--out", self.folder / "out")
+        self.assertEqual(code, 1)
+        self.assertIn("mcap recover", text)
 
 
 class OwnExports(unittest.TestCase):

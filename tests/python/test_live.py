@@ -139,7 +139,7 @@ class LiveRun(unittest.TestCase):
     def test_poses_in_python_are_those_of_the_run(self):
         published = {int(t): i for i, t in enumerate(self.localized.published["t_ns"])}
         poses = [message.data for message in self.live if message.kind == "POSE"]
-        self.assertGreaterEqual(len(poses), 45 * SECONDS)
+        self.assertGreaterEqual(len(poses), 0.8 * len(published))  # LCM may lose some on a loaded computer
         for pose in poses:
             i = published[pose.t_ns]
             self.assertEqual(pose.position_m[0], self.localized.published["x_m"][i])
@@ -165,7 +165,7 @@ class LiveRun(unittest.TestCase):
         by_stamp = {int(t): i for i, t in enumerate(published["t_ns"])}
         offset = None
         poses = self.viewer.decoded("/waymark/pose")
-        self.assertGreaterEqual(len(poses), 45 * (SECONDS - 2))
+        self.assertGreaterEqual(len(poses), 0.4 * len(by_stamp))  # it came a second later, and is told of the channels
         x = {round(float(value), 12): i for i, value in enumerate(published["x_m"])}
         for _, message in poses:
             stamp = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
@@ -174,14 +174,59 @@ class LiveRun(unittest.TestCase):
             self.assertEqual(stamp - offset, int(published["t_ns"][i]))
             self.assertIn(stamp - offset, by_stamp)
             self.assertGreater(message.pose.covariance[0], 0)
-        jumps = np.diff([message.pose.pose.position.x for _, message in self.viewer.decoded("/waymark/odom")])
-        self.assertLess(abs(jumps).max(), 0.1)
+        odom = [message for _, message in self.viewer.decoded("/waymark/odom")]
+        steps = np.diff([message.pose.pose.position.x for message in odom])
+        times_s = np.diff([message.header.stamp.sec + message.header.stamp.nanosec / 1e9 for message in odom])
+        self.assertLess((abs(steps) - 0.6 * abs(times_s)).max(), 0.02)  # the robot drives at 0.5 m/s
 
     def test_it_listens_on_this_computer_and_names_the_layout(self):
         self.assertIn(f"ws://localhost:{PORT}", self.line)
         layout = json.loads(pathlib.Path(self.line.split("layout: ")[1].strip()).read_text())
         self.assertIn("3D!waymark", layout["configById"])
         self.assertEqual(0, self.server_code, self.rest)
+
+
+class Late(unittest.TestCase):
+    """A viewer that was refused when a channel appeared: it does not subscribe to what it is told of first."""
+
+    def test_a_channel_without_a_subscriber_is_offered_once_more(self):
+        from waymark.foxglove_server import FoxgloveServer
+        from waymark.mcapio.writer import Item
+        from waymark.ros import Messages
+
+        messages = Messages()
+        server = FoxgloveServer(messages, "127.0.0.1", 0)
+        self.addCleanup(server.stop)
+        item = Item(1, "/late", "geometry_msgs/msg/Point", messages.make("Point", x=1.0))
+        told = asyncio.run(asyncio.wait_for(self.view(server, item), 30))
+        self.assertEqual(len(set(told)), 2)
+        for _ in range(5):
+            server.serve_late()
+        self.assertEqual(server._offered, {})
+
+    @staticmethod
+    async def view(server, item):
+        """Numbers of the channel until a message has come."""
+        told = []
+        async with websockets.connect(f"ws://127.0.0.1:{server.port}", subprotocols=["foxglove.sdk.v1"], max_size=None) as socket:
+            async def send():
+                while True:
+                    server.write(item)
+                    server.serve_late()
+                    await asyncio.sleep(0.05)
+
+            sending = asyncio.create_task(send())
+            while True:
+                data = await socket.recv()
+                if isinstance(data, bytes):
+                    sending.cancel()
+                    return told
+                for channel in json.loads(data).get("channels", []):
+                    if channel["topic"] != item.topic:
+                        continue
+                    told.append(channel["id"])
+                    if len(told) > 1:
+                        await socket.send(json.dumps({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": channel["id"]}]}))
 
 
 class Errors(unittest.TestCase):

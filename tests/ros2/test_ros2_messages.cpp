@@ -33,6 +33,15 @@ void test_covariances_turn_into_the_axes_of_the_map() {
   TEST_ASSERT_DOUBLE_WITHIN(1e-12, 9, out[wm_cov_index(5, 5)]);
 }
 
+void test_a_pose_has_the_quaternion_of_the_run() {
+  wm_published published{};
+  published.now.pose_map_base.q_xyzw[2] = std::sin(-1.25);  // a heading of -2.5 rad
+  published.now.pose_map_base.q_xyzw[3] = std::cos(-1.25);
+  const PoseStamped out = pose_message(published, 1, Frames());
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, std::sin(-1.25), out.pose.pose.orientation.z);
+  TEST_ASSERT_DOUBLE_WITHIN(1e-15, std::cos(-1.25), out.pose.pose.orientation.w);
+}
+
 void test_a_track_has_the_poses_between_its_stamps_and_none_outside() {
   Track track;
   Eigen::Isometry3d a = Eigen::Isometry3d::Identity(), b = a;
@@ -154,6 +163,7 @@ void test_bridges_that_are_in_each_other_s_way() {
 int main() {
   UNITY_BEGIN();
   RUN_TEST(test_covariances_turn_into_the_axes_of_the_map);
+  RUN_TEST(test_a_pose_has_the_quaternion_of_the_run);
   RUN_TEST(test_a_track_has_the_poses_between_its_stamps_and_none_outside);
   RUN_TEST(test_odom_in_map_takes_the_corrections);
   RUN_TEST(test_a_pose_to_set_needs_the_frame_of_the_map_and_numbers);

@@ -56,7 +56,10 @@ std::array<double, 36> ros_covariance(const wm_estimate &estimate) {
 }
 
 PoseStamped pose_message(const wm_published &published, int64_t utc_ns, const Frames &frames) {
-  PoseStamped out{header(frames.map, utc_ns), {pose(base_in_map(published)), {}}};
+  const auto &[p, q] = published.now.pose_map_base;
+  // Of the two quaternions of a rotation, the run's.
+  const Quaternion turn = quaternion(Eigen::Quaterniond(q[3], q[0], q[1], q[2]).normalized());
+  PoseStamped out{header(frames.map, utc_ns), {{{p[0], p[1], p[2]}, turn}, {}}};
   const std::array<double, 36> covariance = ros_covariance(published.now);
   std::copy(covariance.begin(), covariance.end(), out.pose.covariance);
   return out;

@@ -268,6 +268,7 @@ bool is_outside(const wm_monitor &self, const wm_estimate &e) {
 int32_t silent_source(const wm_monitor &self, wm_time_ns t_ns) {
   int32_t longest = -1;
   double most_s = kSilent_s;
+  if (t_ns == WM_TIME_NONE) return longest;  // the estimate has no time yet
   for (int32_t i = 0; i < WM_MONITOR_SOURCES; i++) {
     if ((self.observers >> i & 1u) == 0) continue;
     const wm_time_ns newest = self.sources[i].newest_ns;

@@ -14,18 +14,19 @@ Example::
 from typing import TYPE_CHECKING, Any
 
 from .evaluation import eval
+from .maps import FloorPlan, read_floor_plan, read_landmarks, write_floor_plan, write_landmarks
 from .recording import CanFrame, Frame, Recording, RecordingWriter
 from .run import Run, covariance
-from .tables import Table, read_table, write_table
-
+from .tables import Array, Table, read_table, write_table
 
 if TYPE_CHECKING:
     from .live import Live
     from .native import WaymarkError
     from .replaying import Estimate, EventLog, replay
 
-__all__ = ["CanFrame", "Estimate", "EventLog", "Frame", "Live", "Recording", "RecordingWriter", "Run", "Table", "WaymarkError", "covariance",
-           "eval", "read_table", "replay", "write_table"]
+__all__ = ["Array", "CanFrame", "Estimate", "EventLog", "FloorPlan", "Frame", "Live", "Recording", "RecordingWriter", "Run", "Table",
+           "WaymarkError", "covariance", "eval", "read_floor_plan", "read_landmarks", "read_table", "replay",
+           "write_floor_plan", "write_landmarks", "write_table"]
 
 
 def __getattr__(name: str) -> Any:

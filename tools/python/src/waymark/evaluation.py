@@ -19,4 +19,5 @@ def eval(run: str | Path, recording: str | Path, *arguments: str) -> dict[str, A
     done = subprocess.run([program, str(run), str(recording), "--json", *arguments], capture_output=True, text=True, check=False)
     if done.returncode:
         raise ValueError(done.stderr.strip())
-    return json.loads(done.stdout)
+    figures: dict[str, Any] = json.loads(done.stdout)
+    return figures

@@ -5,7 +5,7 @@ import argparse
 import heapq
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from .mcapio.estimates import diagnostics, estimate_streams
@@ -25,7 +25,7 @@ The file opens in Foxglove, Rerun, PlotJuggler and `ros2 bag play`; `waymark imp
 
 
 def export(run: Run, out: str | Path, recording: Recording | None = None, pictures: bool = False, can: bool = False,
-           progress=None) -> None:
+           progress: Callable[..., None] | None = None) -> None:
     """Writes a run as MCAP. With `recording`: truth, map, mountings and the streams of its sensors, too.
 
     `pictures` and `can` add those of the recording. `progress`, if given, is called with the number of messages.

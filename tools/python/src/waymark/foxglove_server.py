@@ -6,20 +6,25 @@ import queue
 import shutil
 import sys
 import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import foxglove
 import yaml
+from foxglove.websocket import ServerListener
 
 from .lcm_types import load
 from .live import Live
 from .live_pictures import WebPictures, picture_items
-from .mcapio import place
-from .mcapio.streaming import TOPICS, LiveItems
+from .mcapio import place, streams
+from .mcapio.estimates import topic_name
+from .mcapio.streaming import SIGHTINGS, TOPICS, LiveItems
 from .mcapio.writer import LATCHED_TOPICS, Item
 from .ros import Messages
 from .tables import read_table
 
+_OFFER_AGAIN_S = 1.0  # a viewer subscribes within milliseconds
 LAYOUT = Path(__file__).with_name("foxglove-layout.json")
 _EXAMPLES = """examples:
   waymark watch --foxglove 8765 --config /etc/waymark/robot.yaml
@@ -29,25 +34,30 @@ In Foxglove: Open connection, ws://localhost:8765; then import the layout that i
 password: without an address, this computer alone can connect. Exit code: 0 done, 1 the work failed, 2 usage."""
 
 
-class FoxgloveServer(foxglove.ServerListener):
+class FoxgloveServer(ServerListener):
     """Sends items to all viewers. What changes seldom is sent again to each one that subscribes later."""
 
-    def __init__(self, messages: Messages, host: str, port: int):
+    def __init__(self, messages: Messages, host: str, port: int, topics: dict[str, str] | None = None):
+        """`topics` are offered from the start, with their types."""
         self._messages, self._context = messages, foxglove.Context()
         self._channels: dict[str, foxglove.Channel] = {}
         self._latched: dict[str, Item] = {}
         self._subscribed: queue.SimpleQueue[str] = queue.SimpleQueue()
-        # Before the server: a viewer that subscribes in the instant in which a channel appears is refused by it.
-        for topic, kind in TOPICS.items():
+        self._offered: dict[str, tuple[float, Item]] = {}
+        self._has_started = False
+        # Before the server: foxglove-sdk 0.30 tells viewers of a channel before it knows the channel itself, and refuses one that
+        # subscribes in that instant (1 of 300 on one computer).
+        for topic, kind in (TOPICS | (topics or {})).items():
             self._channel(topic, kind)
         self._server = foxglove.start_server(name="waymark", host=host, port=port, context=self._context, server_listener=self)
+        self._has_started = True
 
     @property
     def port(self) -> int:
         """The port that it listens on."""
         return int(self._server.port)
 
-    def on_subscribe(self, client, channel) -> None:
+    def on_subscribe(self, client: Any, channel: Any) -> None:
         """Of the server's thread."""
         self._subscribed.put(channel.topic)
 
@@ -60,6 +70,8 @@ class FoxgloveServer(foxglove.ServerListener):
 
     def write(self, item: Item) -> None:
         """Sends an item to those who subscribed to its topic; without a subscriber nothing is encoded."""
+        if self._has_started and item.topic not in self._channels:
+            self._offered[item.topic] = time.monotonic() + _OFFER_AGAIN_S, item
         channel = self._channel(item.topic, item.type, item.metadata)
         if item.topic in LATCHED_TOPICS or item.topic == "/waymark/landmarks":
             self._latched[item.topic] = item
@@ -72,7 +84,17 @@ class FoxgloveServer(foxglove.ServerListener):
         return not channels or any(channel.has_sinks() for channel in channels)
 
     def serve_late(self) -> None:
-        """Sends what changes seldom to those who subscribed since the last call."""
+        """Sends what changes seldom to those who subscribed since the last call.
+
+        A channel that appeared later than the server and found no subscriber is offered once more: one may have been refused.
+        """
+        for topic, (due_s, item) in list(self._offered.items()):
+            if time.monotonic() < due_s:
+                continue
+            del self._offered[topic]
+            if not self._channels[topic].has_sinks():
+                self._channels.pop(topic).close()
+                self._channel(topic, item.type, item.metadata)
         topics = set()
         while not self._subscribed.empty():
             topics.add(self._subscribed.get())
@@ -104,7 +126,18 @@ class Site:
         if map_file:
             self.files["map"] = Path(map_file)
 
-    def items(self, messages: Messages, t_ns: int):
+    def topics(self, messages: Messages) -> dict[str, str]:
+        """Topics, with their types, that follow from the files: pictures of the cameras, and what their sensors see."""
+        out = {"/recording/sightings": streams.register(messages, "sightings.csv", SIGHTINGS)}
+        calibration = yaml.safe_load(self.files["calibration"].read_text(encoding="utf-8")) if "calibration" in self.files else None
+        cameras = calibration.get("cameras") if isinstance(calibration, dict) and self.has_pictures else None
+        for name in cameras or {}:
+            topic = f"/camera/{topic_name(str(name))}"
+            out[f"{topic}/image/compressed"] = "sensor_msgs/msg/CompressedImage"
+            out[f"{topic}/annotations"] = "foxglove_msgs/msg/ImageAnnotations"
+        return out
+
+    def items(self, messages: Messages, t_ns: int) -> Iterator[Item]:
         """Mountings, map and landmarks."""
         if "calibration" in self.files:
             calibration = yaml.safe_load(self.files["calibration"].read_text(encoding="utf-8")) or {}
@@ -173,7 +206,8 @@ def main(argv: list[str] | None = None) -> int:
     try:
         site, messages = Site(given.config, given.recording, given.map), Messages()
         live = Live(given.url or site.url, given.prefix or site.prefix)
-        server = FoxgloveServer(messages, *given.foxglove)
+        host, port = given.foxglove
+        server = FoxgloveServer(messages, host, port, site.topics(messages))
         if site.has_pictures:
             pictures = _pictures(given, server)
     except (OSError, ValueError, RuntimeError, yaml.YAMLError) as error:

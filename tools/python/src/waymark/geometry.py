@@ -2,17 +2,20 @@
 """Rigid motions: quaternions are x, y, z, w; a pose is a 4x4 matrix that takes the child's coordinates to the parent's."""
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from .tables import Array
 
 
-def rotation(xyzw) -> np.ndarray:
+def rotation(xyzw: ArrayLike) -> Array:
     """Rotation matrix of a quaternion of any length but 0."""
-    x, y, z, w = np.asarray(xyzw, dtype=float) / np.linalg.norm(xyzw)
+    x, y, z, w = np.asarray(xyzw, dtype=float) / np.linalg.norm(np.asarray(xyzw, dtype=float))
     return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
 
 
-def quaternion(matrix: np.ndarray) -> np.ndarray:
+def quaternion(matrix: Array) -> Array:
     """Quaternion x, y, z, w of a rotation matrix, w >= 0: the eigenvector of Bar-Itzhack's matrix for the largest eigenvalue."""
     m = np.asarray(matrix, dtype=float)
     k = np.array([[m[0, 0] - m[1, 1] - m[2, 2], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]],
@@ -23,7 +26,7 @@ def quaternion(matrix: np.ndarray) -> np.ndarray:
     return q if q[3] >= 0 else -q
 
 
-def from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
+def from_rpy(roll: float, pitch: float, yaw: float) -> Array:
     """Rz(yaw) Ry(pitch) Rx(roll), as a mounting's `rpy` is defined; radians."""
     cr, sr, cp, sp, cy, sy = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch), np.cos(yaw), np.sin(yaw)
     return np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
@@ -31,7 +34,7 @@ def from_rpy(roll: float, pitch: float, yaw: float) -> np.ndarray:
                      [-sp, cp * sr, cp * cr]])
 
 
-def to_rpy(matrix: np.ndarray) -> tuple[float, float, float]:
+def to_rpy(matrix: Array) -> tuple[float, float, float]:
     """Roll, pitch and yaw of a rotation matrix, rad; at a pitch of +-90 degrees the roll is 0."""
     m = np.asarray(matrix, dtype=float)
     if abs(m[2, 0]) > 1 - 1e-12:
@@ -39,14 +42,14 @@ def to_rpy(matrix: np.ndarray) -> tuple[float, float, float]:
     return (float(np.arctan2(m[2, 1], m[2, 2])), float(-np.arcsin(m[2, 0])), float(np.arctan2(m[1, 0], m[0, 0])))
 
 
-def pose(position, xyzw) -> np.ndarray:
+def pose(position: ArrayLike, xyzw: ArrayLike) -> Array:
     """The 4x4 matrix of a position and a quaternion."""
     out = np.eye(4)
     out[:3, :3], out[:3, 3] = rotation(xyzw), position
     return out
 
 
-def planar(x: float, y: float, heading: float) -> np.ndarray:
+def planar(x: float, y: float, heading: float) -> Array:
     """The 4x4 matrix of a pose in the plane."""
     out = np.eye(4)
     c, s = np.cos(heading), np.sin(heading)

@@ -36,7 +36,7 @@ class Live:
         import lcm
 
         types, self._prefix = load(), prefix
-        self._types = {kind: types[KINDS[kind]] for kind in kinds}
+        self._types: dict[str, Any] = {kind: types[KINDS[kind]] for kind in kinds}
         self._waiting: deque[Message] = deque()
         self.malformed: Counter[str] = Counter()
         url = url or os.environ.get("LCM_DEFAULT_URL") or THIS_COMPUTER

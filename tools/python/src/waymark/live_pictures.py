@@ -10,6 +10,7 @@ import threading
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -23,7 +24,7 @@ _FOUND, _EXPECTED = (0.1, 0.9, 0.3), (0.2, 0.6, 0.9)
 _POINTS, _LINE = 1, 3  # foxglove_msgs/PointsAnnotation
 
 
-def picture_items(messages: Messages, answer: dict, offset_ns: int) -> Iterator[Item]:
+def picture_items(messages: Messages, answer: dict[str, Any], offset_ns: int) -> Iterator[Item]:
     """Items of a picture.json: the picture, and annotations of what was found (green) and what the map predicts (blue)."""
     jpeg, t_ns = base64.b64decode(answer["jpeg"]), int(answer["t_ns"]) + offset_ns
     topic = f"/camera/{topic_name(answer['camera'] or answer['name'])}"
@@ -34,10 +35,10 @@ def picture_items(messages: Messages, answer: dict, offset_ns: int) -> Iterator[
         scale = image.width / max(int(answer["width"]), 1)  # the answer is in pixels of the camera
     stamp, points, texts = messages.time(t_ns), [], []
 
-    def point(uv):
+    def point(uv: Any) -> Any:
         return messages.make("foxglove_msgs/Point2", x=float(uv[0]) * scale, y=float(uv[1]) * scale)
 
-    def add(pixels: list, kind: int, colour) -> None:
+    def add(pixels: list[Any], kind: int, colour: Any) -> None:
         if pixels:
             points.append(messages.make("PointsAnnotation", timestamp=stamp, type=kind, points=[point(uv) for uv in pixels],
                                         outline_color=colour, thickness=2.0))
@@ -60,17 +61,18 @@ class WebPictures:
 
     def __init__(self, program: list[str], is_watched: Callable[[], bool]):
         """Starts `program` (waymark-web with its arguments); ValueError with its reason where it ends at once."""
-        self.answers: queue.Queue[dict] = queue.Queue(maxsize=4)
+        self.answers: queue.Queue[dict[str, Any]] = queue.Queue(maxsize=4)
         self._is_watched, self._stop = is_watched, threading.Event()
         self._web = subprocess.Popen([*program, "--listen", "127.0.0.1:0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                                      text=True)
+        assert self._web.stdout
         self._url = self._web.stdout.readline().strip()
         if not self._url.startswith("http"):
             raise ValueError(self._web.communicate()[1].strip() or "waymark-web ended without a reason")
         self._thread = threading.Thread(target=self._work, name="pictures")
         self._thread.start()
 
-    def _ask(self, source: int, number: int) -> dict | None:
+    def _ask(self, source: int, number: int) -> dict[str, Any] | None:
         with urllib.request.urlopen(f"{self._url}/picture.json?source={source}&number={number}", timeout=2) as answer:
             return json.loads(answer.read()) if answer.status == 200 else None
 

@@ -11,8 +11,9 @@ import cffi
 import numpy as np
 
 from . import declarations
+from .tables import Array
 
-ffi = cffi.FFI()
+ffi: Any = cffi.FFI()
 ffi.cdef(declarations.text())
 
 _INSIDE = Path(__file__).with_name("native")
@@ -53,10 +54,11 @@ def check(call: Callable[..., Any], *arguments: Any, also: tuple[int, ...] = ())
 
 def text(characters: Any) -> str:
     """A C string."""
-    return ffi.string(characters).decode("utf-8", "replace")
+    words: str = ffi.string(characters).decode("utf-8", "replace")
+    return words
 
 
-def names(kind: str) -> np.ndarray:
+def names(kind: str) -> Array:
     """Words of the numbers of an enum: "STATE", "CAUSE", "RESIDUAL", "VERDICT" or "EVENT"."""
     count = getattr(library(), f"WM_{kind}_KIND_COUNT" if kind == "EVENT" else f"WM_{kind}_COUNT")
     which = getattr(library(), f"WAYMARK_NAMES_{kind}")
@@ -64,7 +66,7 @@ def names(kind: str) -> np.ndarray:
 
 
 @cache
-def dtype(name: str) -> np.dtype:
+def dtype(name: str) -> np.dtype[Any]:
     """A struct of the library as numpy's type."""
     return _dtype(ffi.typeof(name))
 
@@ -73,7 +75,7 @@ _BASIC = {"int64_t": "i8", "uint64_t": "u8", "int32_t": "i4", "uint32_t": "u4", 
           "int8_t": "i1", "double": "f8", "float": "f4", "char": "S1"}
 
 
-def _dtype(kind: Any) -> np.dtype:
+def _dtype(kind: Any) -> np.dtype[Any]:
     if kind.kind == "array":
         item = _dtype(kind.item)
         return np.dtype(f"S{kind.length}") if item == np.dtype("S1") else np.dtype((item, (kind.length,)))

@@ -1,22 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings: folders with the data of a robot's sensors (docs/recording-format.md)."""
 
+import io
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, TextIO
 
 import numpy as np
 import yaml
+from PIL import Image
 
 from .avi import AviWriter, read_jpegs
-from .tables import Table, read_table, write_table
+from .maps import FloorPlan, read_floor_plan, read_landmarks, write_floor_plan, write_landmarks
+from .tables import Array, Table, read_table, write_table
 
 FORMAT = "waymark-recording/1"
 STREAMS = ("motion.csv", "motion6.csv", "increments.csv", "ticks.csv", "speeds.csv", "steering.csv", "imu.csv", "heading.csv",
            "depth.csv", "sightings.csv", "markers.csv", "marker-corners.csv", "stereo.csv", "points.csv", "gnss.csv")
 """Streams of sensors that are tables, in the order of the format's table."""
 
+_JPEG_QUALITY = 95  # the error of a pixel stays below a grey level's noise
 _CAN_LINE = re.compile(r"\((\d+)\.(\d{6})\) (\S+) ([0-9A-Fa-f]+)#(#[0-9A-Fa-f])?(R\d?|[0-9A-Fa-f]*)(?: [RT])?\s*$")
 
 
@@ -42,7 +47,7 @@ class CanFrame:
     remote: bool = False
 
 
-def _read_yaml(path: Path) -> dict:
+def _read_yaml(path: Path) -> dict[str, Any]:
     try:
         content = yaml.safe_load(path.read_text(encoding="utf-8"))
     except yaml.YAMLError as error:
@@ -64,7 +69,7 @@ class Recording:
             raise ValueError(f"{path}/recording.yaml: its format is '{self.meta.get('format')}', not {FORMAT}")
 
     @property
-    def calibration(self) -> dict:
+    def calibration(self) -> dict[str, Any]:
         """calibration.yaml; empty without one."""
         path = self.path / "calibration.yaml"
         return _read_yaml(path) if path.is_file() else {}
@@ -89,6 +94,14 @@ class Recording:
             if i >= len(rows["t_ns"]):
                 return
             yield Frame(int(rows["t_ns"][i]), None if arrivals is None else int(arrivals[i]), jpeg)
+
+    def landmarks(self) -> Table:
+        """The map of landmarks, landmarks.csv: id, x_m, y_m, z_m, sigma_m (m, map)."""
+        return read_landmarks(self.path / "landmarks.csv")
+
+    def floor_plan(self) -> FloorPlan:
+        """The raster map, map/map.yaml."""
+        return read_floor_plan(self.path)
 
     def can(self) -> Iterator[CanFrame]:
         """The frames of can.log."""
@@ -128,6 +141,16 @@ def jpeg_size(jpeg: bytes) -> tuple[int, int]:
     raise ValueError("a picture is no JPEG")
 
 
+def jpeg_of(picture: Array) -> bytes:
+    """A picture as JPEG: uint8, (rows, columns) of grey levels or (rows, columns, 3) of red, green and blue."""
+    grey = np.ascontiguousarray(picture)
+    if grey.dtype != np.uint8 or grey.ndim not in (2, 3) or grey.shape[2:] not in ((), (3,)) or not grey.size:
+        raise ValueError(f"a picture is uint8 of (rows, columns) or (rows, columns, 3); this one is {grey.dtype} of {grey.shape}")
+    out = io.BytesIO()
+    Image.fromarray(grey).save(out, "JPEG", quality=_JPEG_QUALITY)
+    return out.getvalue()
+
+
 class RecordingWriter:
     """Writes a recording. Use it with `with`: its end writes recording.yaml, and an exception leaves none."""
 
@@ -136,14 +159,14 @@ class RecordingWriter:
         if self.path.exists() and any(self.path.iterdir()):
             raise FileExistsError(f"{path}: the folder is not empty")
         self.path.mkdir(parents=True, exist_ok=True)
-        self.meta: dict = {"format": FORMAT, "name": name or self.path.resolve().name}
+        self.meta: dict[str, Any] = {"format": FORMAT, "name": name or self.path.resolve().name}
         if about:
             self.meta["about"] = about
-        self.calibration: dict = {}
+        self.calibration: dict[str, Any] = {}
         self._streams: list[str] = []
         self._times: list[int] = []
         self._videos: dict[str, tuple[AviWriter, list[tuple[int, int | None]], tuple[int, int]]] = {}
-        self._can = None
+        self._can: TextIO | None = None
 
     def table(self, name: str, table: Table) -> None:
         """Writes a stream or another table of the format, sorted by arrival (else by stamp) as the format wants it."""
@@ -164,6 +187,20 @@ class RecordingWriter:
             raise ValueError(f"'{name}' is a name outside of the recording")
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
+
+    def landmarks(self, table: Table) -> None:
+        """Writes landmarks.csv: id, x_m, y_m, and where they are known z_m, sigma_m, yaw_rad and a covariance (map, m)."""
+        write_landmarks(self.path / "landmarks.csv", table)
+        self._streams.append("landmarks.csv")
+
+    def floor_plan(self, plan: FloorPlan) -> None:
+        """Writes map/map.yaml and its pictures."""
+        write_floor_plan(self.path, plan)
+        self._streams.append("map/map.yaml")
+
+    def picture(self, camera: str, t_ns: int, picture: Array, arrival_ns: int | None = None, rate_hz: float = 30.0) -> None:
+        """Appends a picture given as array: uint8, (rows, columns) of grey levels, or (rows, columns, 3) of colours."""
+        self.frame(camera, Frame(t_ns, arrival_ns, jpeg_of(picture)), rate_hz)
 
     def frame(self, camera: str, frame: Frame, rate_hz: float = 30.0) -> None:
         """Appends a picture to a camera's video; all have one size."""
@@ -216,7 +253,7 @@ class RecordingWriter:
     def __enter__(self) -> "RecordingWriter":
         return self
 
-    def __exit__(self, kind, value, trace) -> None:
+    def __exit__(self, kind: object, value: object, trace: object) -> None:
         if kind is None:
             self.close()
             return

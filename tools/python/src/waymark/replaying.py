@@ -10,8 +10,7 @@ import numpy as np
 
 from .native import check, dtype, ffi, library, names, text
 from .run import PLANE, SPACE
-from .tables import Table
-
+from .tables import Array, Table
 
 
 @dataclass(frozen=True)
@@ -24,7 +23,7 @@ class Estimate:
     report: dict[str, float]
 
 
-def _poses(estimates: np.ndarray) -> Table:
+def _poses(estimates: Array) -> Table:
     at = estimates["pose_map_base"]
     out: Table = {"t_ns": estimates["t_ns"], "x_m": at["p_m"][:, 0], "y_m": at["p_m"][:, 1], "z_m": at["p_m"][:, 2]}
     out |= {f"q{axis}": at["q_xyzw"][:, i] for i, axis in enumerate("xyzw")}
@@ -37,7 +36,7 @@ def _poses(estimates: np.ndarray) -> Table:
     return out | {"state": names("STATE")[estimates["state"]]}
 
 
-def _published(rows: np.ndarray) -> Table:
+def _published(rows: Array) -> Table:
     poses = _poses(rows["now"])
     odom = rows["pose_odom_base"]
     return {"t_ns": poses.pop("t_ns"), "made_ns": rows["made_ns"], "fused_until_ns": rows["fused_until_ns"], **poses,
@@ -45,7 +44,7 @@ def _published(rows: np.ndarray) -> Table:
             "lost_probability": rows["now"]["lost_probability"], "cause": names("CAUSE")[rows["now"]["cause"]]}
 
 
-def _innovations(rows: np.ndarray) -> Table:
+def _innovations(rows: Array) -> Table:
     return {"t_ns": rows["t_ns"], "source": rows["source"], "landmark": rows["landmark_id"].astype(np.int64),
             "residual": names("RESIDUAL")[rows["residual"]],
             **{name: rows[name] for name in ("observed", "expected", "variance", "nis", "gate")},
@@ -70,17 +69,14 @@ def replay(input: str | Path, config: str | Path | None = None, *, changes: Mapp
     def keep(error: Any, value: BaseException, trace: Any) -> None:
         failed.append(value)
 
-    @ffi.callback("void(void *, waymark_record, const void *, size_t)", onerror=keep)
     def take(_: Any, kind: int, record: Any, size: int) -> None:
         if kind in records:
             records[kind] += ffi.buffer(record, size)
 
-    @ffi.callback("void(void *, const char *)", onerror=keep)
     def say(_: Any, line: Any) -> None:
         if note:
             note(text(line))
 
-    @ffi.callback("void(void *, double)", onerror=keep)
     def show(_: Any, done: float) -> None:
         if progress:
             progress(done)
@@ -91,9 +87,11 @@ def replay(input: str | Path, config: str | Path | None = None, *, changes: Mapp
     lines = None if changes is None else "\n".join(f"{key}: {value}" for key, value in changes.items())
     texts = {"input": path(input), "config": path(config), "changes": path(lines), "out": path(out), "landmarks": path(landmarks),
              "calibration": path(calibration), "map": path(map)}
+    calls = {"take": ffi.callback("void(void *, waymark_record, const void *, size_t)", take, onerror=keep),
+             "note": ffi.callback("void(void *, const char *)", say, onerror=keep),
+             "progress": ffi.callback("void(void *, double)", show, onerror=keep)}  # referenced until the call has returned
     options = ffi.new("waymark_replay_options *", {"bytes": ffi.sizeof("waymark_replay_options"), **texts, "seed": seed,
-                                                   "from_s": from_s, "until_s": until_s, "lost": lost, "take": take, "note": say,
-                                                   "progress": show})
+                                                   "from_s": from_s, "until_s": until_s, "lost": lost, **calls})
     report = ffi.new("waymark_report *")
     check(library().waymark_replay, options, report, ffi.sizeof("waymark_report"))
     if failed:
@@ -101,6 +99,12 @@ def replay(input: str | Path, config: str | Path | None = None, *, changes: Mapp
     arrays = {kind: np.frombuffer(bytes(data), dtype(_KINDS[kind])) for kind, data in records.items()}
     return Estimate(_poses(arrays[2]), _published(arrays[4]), _innovations(arrays[3]),
                     {name: getattr(report, name) for name in ("poses", "events", "recorded_s", "events_missing", "log_was_cut")})
+
+
+def _offset(kind: np.dtype[Any], field: str) -> int:
+    """Bytes before a field of a struct."""
+    assert kind.fields is not None
+    return int(kind.fields[field][1])
 
 
 class EventLog:
@@ -128,7 +132,8 @@ class EventLog:
 
     @staticmethod
     def _read(log: Any) -> tuple[int, dict[str, bytearray]]:
-        event, missing, raw = ffi.new("wm_event *"), ffi.new("uint64_t *"), {}
+        event, missing = ffi.new("wm_event *"), ffi.new("uint64_t *")
+        raw: dict[str, bytearray] = {}
         kinds = names("EVENT").tolist()
         end, small, points = library().WM_END, ffi.offsetof("wm_event", "as") + 96, kinds.index("points")
         while check(library().waymark_log_next, log, event, ffi.sizeof("wm_event"), missing, also=(end,)) != end:
@@ -140,16 +145,17 @@ class EventLog:
         """Kinds of its events: "quantities", "sighting", "points" ..."""
         return sorted(self._raw)
 
-    def events(self, kind: str) -> np.ndarray:
+    def events(self, kind: str) -> Array:
         """The events of a kind in their order, with fields t_ns, arrival_ns, seq, source and those of the kind's struct."""
         whole = dtype("wm_event")
         data = bytes(self._raw.get(kind, b""))
         if kind not in (whole["as"].names or ()):
             raise ValueError(f"'{kind}' is no kind of events with values; this log has {', '.join(self.kinds())}")
-        body, offset = whole["as"][kind], whole.fields["as"][1]
+        body, offset = whole["as"][kind], _offset(whole, "as")
         size = whole.itemsize if kind == "points" else offset + 96
         heads = ("t_ns", "arrival_ns", "seq", "source")
-        return np.frombuffer(data, np.dtype({
+        layout: Any = {
             "names": [*heads, *(body.names or ())], "itemsize": size,
             "formats": [*(whole[name] for name in heads), *(body[name] for name in body.names or ())],
-            "offsets": [*(whole.fields[name][1] for name in heads), *(offset + body.fields[name][1] for name in body.names or ())]}))
+            "offsets": [*(_offset(whole, name) for name in heads), *(offset + _offset(body, name) for name in body.names or ())]}
+        return np.frombuffer(data, np.dtype(layout))

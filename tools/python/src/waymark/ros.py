@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """ROS 2 messages by rosbags, without ROS: its own types, those of Foxglove's annotations, and Waymark's."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from .geometry import quaternion
+from .tables import Array
 
 _OTHERS = {
     # Numbers for plots; `state` and `verdict` are words for tools that show them.
@@ -37,7 +40,7 @@ _OTHERS = {
 }
 
 
-def typestore():
+def typestore() -> Typestore:
     """ROS 2's common types (Humble) and the others above."""
     store = get_typestore(Stores.ROS2_HUMBLE)
     for name, definition in _OTHERS.items():
@@ -48,10 +51,10 @@ def typestore():
 class Messages:
     """Makes messages by short names: `make("Header", stamp=..., frame_id=...)`; fields that are not given are zero."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.store = typestore()
-        self._kinds = {}
-        self._names = {}
+        self._kinds: dict[str, tuple[Any, list[tuple[str, Callable[[], Any]]]]] = {}
+        self._names: dict[str, str] = {}
         for name in self.store.types:
             package, _, short = name.rpartition("/")
             self._names.setdefault(short, name)
@@ -61,7 +64,7 @@ class Messages:
 
     def definition(self, kind: str) -> bytes:
         """The definition of a type and of all that it is made of, as MCAP's "ros2msg" has it."""
-        return self.store.generate_msgdef(kind, ros_version=2)[0].encode()
+        return str(self.store.generate_msgdef(kind, ros_version=2)[0]).encode()
 
     def encode(self, message: Any, kind: str) -> bytes:
         """A message as CDR."""
@@ -71,7 +74,7 @@ class Messages:
         """The whole name of a type."""
         return name if name in self.store.types else self._names[name]
 
-    def make(self, name: str, /, **fields):
+    def make(self, name: str, /, **fields: Any) -> Any:
         """A message of a type, complete with zeros."""
         kind, zeros = self._kinds.get(name) or self._kind(name)
         for field, zero in zeros:
@@ -79,13 +82,13 @@ class Messages:
                 fields[field] = zero()
         return kind(**fields)
 
-    def _kind(self, name: str):
+    def _kind(self, name: str) -> tuple[Any, list[tuple[str, Callable[[], Any]]]]:
         kind = self.store.types[self.type(name)]
         fields = self.store.get_msgdef(kind.__msgtype__).fields
         self._kinds[name] = kind, [(field, self._zero(description)) for field, description in fields]
         return self._kinds[name]
 
-    def _zero(self, description):
+    def _zero(self, description: Any) -> Callable[[], Any]:
         """A function that makes a field's zero."""
         node, what = description
         if node.name == "BASE":
@@ -100,29 +103,29 @@ class Messages:
         zero = self._zero((inner, kind))
         return lambda: [zero() for _ in range(fixed)]
 
-    def time(self, t_ns: int):
+    def time(self, t_ns: int) -> Any:
         """A stamp. Stamps before 0 don't exist in ROS and become 0."""
         t_ns = max(int(t_ns), 0)
         return self.make("builtin_interfaces/Time", sec=t_ns // 10**9, nanosec=t_ns % 10**9)
 
-    def header(self, t_ns: int, frame: str):
+    def header(self, t_ns: int, frame: str) -> Any:
         """A header with stamp and frame."""
         return self.make("Header", stamp=self.time(t_ns), frame_id=frame)
 
-    def point(self, xyz):
+    def point(self, xyz: Any) -> Any:
         """A point in metres."""
         return self.make("Point", x=float(xyz[0]), y=float(xyz[1]), z=float(xyz[2]))
 
-    def pose(self, position, xyzw):
+    def pose(self, position: Any, xyzw: Any) -> Any:
         """A pose: position in metres and quaternion."""
         x, y, z, w = map(float, xyzw)
         return self.make("Pose", position=self.point(position), orientation=self.make("Quaternion", x=x, y=y, z=z, w=w))
 
-    def pose_of(self, matrix):
+    def pose_of(self, matrix: Array) -> Any:
         """A pose by its 4x4 matrix."""
         return self.pose(matrix[:3, 3], quaternion(matrix[:3, :3]))
 
-    def transform(self, t_ns: int, parent: str, child: str, matrix):
+    def transform(self, t_ns: int, parent: str, child: str, matrix: Array) -> Any:
         """A stamped transform by its 4x4 matrix."""
         x, y, z = map(float, matrix[:3, 3])
         qx, qy, qz, qw = map(float, quaternion(matrix[:3, :3]))
@@ -130,6 +133,6 @@ class Messages:
         return self.make("TransformStamped", header=self.header(t_ns, parent), child_frame_id=child,
                          transform=self.make("geometry_msgs/Transform", translation=vector, rotation=turn))
 
-    def colour(self, r: float, g: float, b: float, a: float = 1.0):
+    def colour(self, r: float, g: float, b: float, a: float = 1.0) -> Any:
         """A colour of a marker, 0 to 1."""
         return self.make("std_msgs/ColorRGBA", r=r, g=g, b=b, a=a)

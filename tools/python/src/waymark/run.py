@@ -3,10 +3,12 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from .tables import Table, read_table
+from .maps import read_landmarks
+from .tables import Array, Table, read_table
 
 SPACE = [(i, j) for i in range(6) for j in range(i, 6)]
 PLANE = [(0, 0), (0, 1), (1, 1), (0, 5), (1, 5), (5, 5)]
@@ -44,12 +46,17 @@ class Run:
         return self.table("innovations.csv")
 
     @property
-    def health(self) -> dict:
+    def map(self) -> Table:
+        """The landmarks that the run mapped (`slam`), with covariances; FileNotFoundError where it made no map."""
+        return read_landmarks(self.path / "map-estimate.csv")
+
+    @property
+    def health(self) -> dict[str, Any]:
         """Health at the end of the run."""
         return json.loads((self.path / "health.json").read_text(encoding="utf-8")) if self.has("health.json") else {}
 
 
-def covariance(poses: Table) -> np.ndarray:
+def covariance(poses: Table) -> Array:
     """Covariances of a table of poses, (n, 6, 6), in x, y, z (map axes, m2) and the rotation vector in body axes (rad2).
 
     Of a pose in the plane, the rows and columns of z, roll and pitch are 0.

@@ -3,10 +3,14 @@
 
 import csv
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-Table = dict[str, np.ndarray]
+Array: TypeAlias = NDArray[Any]
+"""An array of numpy; docstrings name shape and unit."""
+Table: TypeAlias = dict[str, Array]
 """Columns by name, all of one length: int64 (stamps, identities), float64 (NaN: empty) or str."""
 
 _WORDS = {"sensor", "source", "state", "verdict", "residual", "picture", "cause"}
@@ -25,7 +29,7 @@ def is_text(column: str) -> bool:
     return column in _WORDS
 
 
-def _column(name: str, fields: list[str], path: Path) -> np.ndarray:
+def _column(name: str, fields: list[str], path: Path) -> Array:
     if is_text(name):
         return np.array(fields, dtype=str)
     try:
@@ -60,7 +64,7 @@ def read_table(path: str | Path) -> Table:
     return {name: _column(name, column, path) for name, column in zip(names, fields)}
 
 
-def field_text(value) -> str:
+def field_text(value: Any) -> str:
     """A value as CSV has it: the shortest text that reads back as the same number; empty for an absent one."""
     if isinstance(value, (str, np.str_)):
         return str(value)

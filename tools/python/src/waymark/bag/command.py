@@ -4,7 +4,9 @@
 import argparse
 import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import Connection
@@ -82,8 +84,8 @@ def _write_positions(into: Collection, given: argparse.Namespace) -> None:
         table, origin = tables.gnss(into.rows["fixes"][topic], given.origin)
         into.writer.table("gnss.csv", table)
         into.writer.calibration["gnss"] = {"origin": origin}
-    if given.truth:
-        into.writer.table("truth.csv", tables.truth(into.rows["poses"][_choose(into, "poses", given.truth, "--truth")]))
+    if topic := given.truth and _choose(into, "poses", given.truth, "--truth"):
+        into.writer.table("truth.csv", tables.truth(into.rows["poses"][topic]))
     for topic in into.rows.get("poses", {}):
         if topic != given.truth and topic not in into.rows.get("motion", {}):
             into.refuse(topic, f"poses are an answer, not a sensor; --truth {topic} takes them as truth.csv")
@@ -112,19 +114,25 @@ def _is_ours(connection: Connection) -> bool:
     return connection.topic.startswith("/recording/") and connection.msgtype.startswith("waymark_msgs/msg/")
 
 
-def _read(bag: AnyReader, into: Collection, progress) -> dict[str, list]:
+def _read(bag: AnyReader, into: Collection, progress: Callable[[int, int], None] | None) -> dict[str, list[Any]]:
     """Takes every message that has a taker; rows of our own tables by their file."""
-    own: dict[str, list] = {}
+    own: dict[str, list[Any]] = {}
     taken = [c for c in bag.connections if c.msgtype in TAKERS or c.topic.endswith("tf_static") or _is_ours(c)]
     total = sum(connection.msgcount for connection in taken)
     for count, (connection, log_ns, raw) in enumerate(bag.messages(taken)):
-        message = bag.deserialize(raw, connection.msgtype)
-        if _is_ours(connection):
-            own.setdefault(connection.topic, []).append(message)
-        elif connection.topic.endswith("tf_static"):
-            tf_static(into, connection.topic, message, log_ns)
-        else:
-            TAKERS[connection.msgtype](into, connection.topic, message, log_ns)
+        try:
+            message = bag.deserialize(raw, connection.msgtype)
+            if _is_ours(connection):
+                own.setdefault(connection.topic, []).append(message)
+            elif connection.topic.endswith("tf_static"):
+                tf_static(into, connection.topic, message, log_ns)
+            else:
+                TAKERS[connection.msgtype](into, connection.topic, message, log_ns)
+        except OSError:
+            raise
+        except Exception as error:  # what the decoder raises on bytes that don't fit the type is its own matter
+            raise ImportFailure(f"{connection.topic}: the message of {log_ns} ns ({len(raw)} bytes) is no {connection.msgtype}: "
+                                f"{error or type(error).__name__}") from error
         if progress and count % 500 == 0:
             progress(count, total)
     for connection in bag.connections:
@@ -133,7 +141,7 @@ def _read(bag: AnyReader, into: Collection, progress) -> dict[str, list]:
     return own
 
 
-def import_bag(path: Path, out: Path, given: argparse.Namespace, progress=None) -> Collection:
+def import_bag(path: Path, out: Path, given: argparse.Namespace, progress: Callable[..., None] | None = None) -> Collection:
     """Writes the recording of a bag; what was found stands in the collection."""
     with AnyReader([path], default_typestore=typestore()) as bag, RecordingWriter(out) as writer:
         into = Collection(writer)
@@ -154,6 +162,12 @@ def import_bag(path: Path, out: Path, given: argparse.Namespace, progress=None) 
             _write_positions(into, given)
             _write_cameras(into, given.base)
     return into
+
+
+def _has_end(path: Path) -> bool:
+    with path.open("rb") as file:
+        file.seek(max(path.stat().st_size - 8, 0))
+        return file.read() == b"\x89MCAP0\r\n"
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -178,7 +192,9 @@ def main(argv: list[str] | None = None) -> int:
         into = import_bag(given.bag, given.out, given, progress)
     except Exception as error:  # the readers of bags raise whatever a broken file leads to
         shutil.rmtree(given.out, ignore_errors=True)
-        print(f"waymark import: {given.bag}: {error or type(error).__name__}", file=sys.stderr)
+        cut = given.bag.suffix == ".mcap" and given.bag.is_file() and not _has_end(given.bag)
+        hint = "; the file has no end, as of a recorder that was killed: `mcap recover` (of MCAP's makers) completes it" if cut else ""
+        print(f"waymark import: {given.bag}: {error or type(error).__name__}{hint}", file=sys.stderr)
         return 1
     if progress:
         print("\r\033[K", end="", file=sys.stderr)

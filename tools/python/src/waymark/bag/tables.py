@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rows taken out of a bag as a recording's tables."""
 
+from typing import Any
+
 import numpy as np
 
 from ..geometry import OPTICAL, to_rpy
@@ -11,7 +13,7 @@ from .collection import Collection
 _A_M, _E2 = 6378137.0, 6.69437999014e-3
 
 
-def _table(names: list[str], rows: list[tuple]) -> Table:
+def _table(names: list[str], rows: list[tuple[Any, ...]]) -> Table:
     columns = list(zip(*rows))
     return {name: np.array(column, dtype=np.int64 if name.endswith("_ns") or name == "id" else np.float64)
             for name, column in zip(names, columns)}
@@ -24,7 +26,7 @@ def _without_arrival(table: Table) -> Table:
     return table
 
 
-def motion(rows: list[tuple]) -> tuple[str, Table] | None:
+def motion(rows: list[tuple[Any, ...]]) -> tuple[str, Table] | None:
     """motion.csv, or motion6.csv where the robot moves sideways, vertically or leans. None: nothing but zeros."""
     table = _table(["t_ns", "vx_mps", "vy_mps", "vz_mps", "wx_radps", "wy_radps", "wz_radps", "arrival_ns"], rows)
     if not any(table[name].any() for name in list(table)[1:7]):
@@ -35,7 +37,7 @@ def motion(rows: list[tuple]) -> tuple[str, Table] | None:
     return "motion.csv", _without_arrival(plain)
 
 
-def increments(rows: list[tuple]) -> Table:
+def increments(rows: list[tuple[Any, ...]]) -> Table:
     """Differences of consecutive poses in the plane: of odometry without a twist."""
     t, x, y, _, qx, qy, qz, qw = (np.array(column) for column in zip(*sorted(rows)))
     heading = np.arctan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
@@ -46,7 +48,7 @@ def increments(rows: list[tuple]) -> Table:
             "dy_m": (c * dy - s * dx)[keep], "dheading_rad": turn[keep]}
 
 
-def gnss(rows: list[tuple], origin: list[float] | None) -> tuple[Table, list[float]]:
+def gnss(rows: list[tuple[Any, ...]], origin: list[float] | None) -> tuple[Table, list[float]]:
     """Fixes in east, north and up of an origin (default: the first fix), by the ellipsoid's radii of curvature there.
 
     The same formula as for GNSS over CAN. Without a stated accuracy sigma is 5 m, and twice that upwards.
@@ -63,26 +65,26 @@ def gnss(rows: list[tuple], origin: list[float] | None) -> tuple[Table, list[flo
     return _without_arrival(table), origin
 
 
-def imu(rows: list[tuple]) -> Table:
+def imu(rows: list[tuple[Any, ...]]) -> Table:
     """imu.csv without the columns of which nothing is known."""
     values = [f"{kind}{axis}_{unit}" for kind, unit in (("w", "radps"), ("a", "mps2")) for axis in "xyz"]
     table = _without_arrival(_table(["t_ns", *values, *(f"sigma_{name}" for name in values), "arrival_ns"], rows))
     return {name: column for name, column in table.items() if name in ("t_ns", *values[:3]) or not np.isnan(column).all()}
 
 
-def tags(rows: list[tuple], camera: str) -> Table:
+def tags(rows: list[tuple[Any, ...]], camera: str) -> Table:
     """Corners of tags of one camera."""
     names = ["t_ns", "id", *(f"{axis}{k}_px" for k in range(4) for axis in "uv"), "arrival_ns"]
-    table = _table(names, rows)
+    table = _without_arrival(_table(names, rows))
     return {"t_ns": table.pop("t_ns"), "sensor": np.full(len(rows), camera), **table}
 
 
-def truth(rows: list[tuple]) -> Table:
+def truth(rows: list[tuple[Any, ...]]) -> Table:
     """Poses as truth.csv."""
     return _table(["t_ns", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"], rows)
 
 
-def mounting(into: Collection, frame: str, base: str, optical: bool) -> dict | None:
+def mounting(into: Collection, frame: str, base: str, optical: bool) -> dict[str, Any] | None:
     """A sensor's mounting by the bag's static transforms; `optical`: its frame has z along the view."""
     matrix = into.transform(frame, base)
     if matrix is None:

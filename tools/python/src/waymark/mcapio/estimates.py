@@ -3,13 +3,14 @@
 
 import re
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from ..geometry import planar, pose, rotation
 from ..ros import Messages
 from ..run import Run, covariance
-from ..tables import Table
+from ..tables import Array, Table
 from .writer import Item
 
 PATH_POINTS = 500  # of a path: enough for a screen's width; a path a message must not grow with the drive
@@ -21,19 +22,19 @@ def topic_name(text: str) -> str:
     return re.sub(r"[^A-Za-z0-9_/]", "_", text).strip("_") or "unnamed"
 
 
-def positions(table: Table) -> np.ndarray:
+def positions(table: Table) -> Array:
     """Positions of a table of poses, (n, 3)."""
     return np.column_stack([table["x_m"], table["y_m"], table.get("z_m", np.zeros(len(table["x_m"])))])
 
 
-def quaternions(table: Table) -> np.ndarray:
+def quaternions(table: Table) -> Array:
     """Orientations of a table of poses, (n, 4); without them, no rotation."""
     if "qx" not in table:
         return np.tile([0.0, 0.0, 0.0, 1.0], (len(table["x_m"]), 1))
     return np.column_stack([table[name] for name in ("qx", "qy", "qz", "qw")])
 
 
-def ros_covariance(covariances: np.ndarray, xyzw: np.ndarray) -> np.ndarray:
+def ros_covariance(covariances: Array, xyzw: Array) -> Array:
     """Covariances (n, 6, 6) with the rotation about the map's axes, as ROS has them, in place of the body's."""
     out = covariances.copy()
     for i, q in enumerate(xyzw):
@@ -44,7 +45,7 @@ def ros_covariance(covariances: np.ndarray, xyzw: np.ndarray) -> np.ndarray:
     return out
 
 
-def path(messages: Messages, t_ns: int, stamps: np.ndarray, where: np.ndarray, turns: np.ndarray):
+def path(messages: Messages, t_ns: int, stamps: Array, where: Array, turns: Array) -> Any:
     """A nav_msgs/Path of at most PATH_POINTS poses, spread evenly."""
     chosen = np.unique(np.linspace(0, len(stamps) - 1, min(PATH_POINTS, len(stamps))).astype(int))
     poses = [messages.make("PoseStamped", header=messages.header(stamps[i], "map"), pose=messages.pose(where[i], turns[i]))
@@ -52,7 +53,7 @@ def path(messages: Messages, t_ns: int, stamps: np.ndarray, where: np.ndarray, t
     return messages.make("Path", header=messages.header(t_ns, "map"), poses=poses)
 
 
-def poses(messages: Messages, topic: str, table: Table, log_ns: np.ndarray) -> Iterator[Item]:
+def poses(messages: Messages, topic: str, table: Table, log_ns: Array) -> Iterator[Item]:
     where, turns = positions(table), quaternions(table)
     errors = ros_covariance(covariance(table), turns)
     for i, t_ns in enumerate(table["t_ns"]):
@@ -61,7 +62,7 @@ def poses(messages: Messages, topic: str, table: Table, log_ns: np.ndarray) -> I
                    messages.make("PoseWithCovarianceStamped", header=messages.header(t_ns, "map"), pose=estimate))
 
 
-def frames(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[Item]:
+def frames(messages: Messages, table: Table, log_ns: Array) -> Iterator[Item]:
     """map -> odom and odom -> base_link (REP 105): odom never jumps, map -> odom takes the corrections."""
     where, turns = positions(table), quaternions(table)
     for i, t_ns in enumerate(table["t_ns"]):
@@ -72,7 +73,7 @@ def frames(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[Ite
         yield Item(log_ns[i], "/tf", "tf2_msgs/msg/TFMessage", messages.make("TFMessage", transforms=transforms))
 
 
-def odometry(messages: Messages, log_ns: int, t_ns: int, place: tuple, linear, angular) -> Item:
+def odometry(messages: Messages, log_ns: int, t_ns: int, place: tuple[float, float, float], linear: Any, angular: Any) -> Item:
     """Odometry: x, y, heading of base_link in odom (m, rad), and its twist in base_link (m/s, rad/s)."""
     twist = messages.make("TwistWithCovariance")
     twist.twist.linear = messages.make("Vector3", **dict(zip("xyz", map(float, linear))))
@@ -82,7 +83,7 @@ def odometry(messages: Messages, log_ns: int, t_ns: int, place: tuple, linear, a
         pose=messages.make("PoseWithCovariance", pose=messages.pose_of(planar(*place))), twist=twist))
 
 
-def _odometry(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[Item]:
+def _odometry(messages: Messages, table: Table, log_ns: Array) -> Iterator[Item]:
     """Odometry with the twist of the last step."""
     x, y, heading, t = table["odom_x_m"], table["odom_y_m"], table["odom_heading_rad"], table["t_ns"]
     for i, t_ns in enumerate(t):
@@ -95,7 +96,7 @@ def _odometry(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[
         yield odometry(messages, log_ns[i], t_ns, (x[i], y[i], heading[i]), linear, angular)
 
 
-def status(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[Item]:
+def status(messages: Messages, table: Table, log_ns: Array) -> Iterator[Item]:
     errors = covariance(table)
     for i, t_ns in enumerate(table["t_ns"]):
         state = str(table["state"][i])
@@ -108,7 +109,7 @@ def status(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[Ite
             resets=int(table["resets"][i]) if "resets" in table else 0))
 
 
-def _paths(messages: Messages, table: Table, log_ns: np.ndarray) -> Iterator[Item]:
+def _paths(messages: Messages, table: Table, log_ns: Array) -> Iterator[Item]:
     where, turns, next_ns = positions(table), quaternions(table), log_ns[0] if len(log_ns) else 0
     for i, now in enumerate(log_ns):
         if now < next_ns and i + 1 < len(log_ns):
@@ -134,7 +135,7 @@ def innovations(messages: Messages, table: Table) -> Iterator[Item]:
             gate=float(table["gate"][i]), fused=str(table["verdict"][i]) == "fused", verdict=str(table["verdict"][i])))
 
 
-def _groups(table: Table) -> Iterator[tuple[int, np.ndarray]]:
+def _groups(table: Table) -> Iterator[tuple[int, Array]]:
     stamps, begins = np.unique(table["t_ns"], return_index=True)
     for t_ns, rows in zip(stamps, np.split(np.arange(len(table["t_ns"])), begins[1:])):
         yield int(t_ns), rows
@@ -148,7 +149,7 @@ def particles(messages: Messages, table: Table) -> Iterator[Item]:
                    messages.make("PoseArray", header=messages.header(t_ns, "map"), poses=poses))
 
 
-def ellipse(messages: Messages, name: str, number: int, t_ns: int, centre, cov: np.ndarray, colour):
+def ellipse(messages: Messages, name: str, number: int, t_ns: int, centre: Any, cov: Array, colour: Any) -> Any:
     """A flat marker of a 2-sigma ellipse in the plane of the map."""
     values, vectors = np.linalg.eigh(cov)
     angle, sizes = np.arctan2(vectors[1, 1], vectors[0, 1]), 4 * np.sqrt(np.maximum(values, 1e-8))
@@ -192,11 +193,11 @@ def estimate_streams(messages: Messages, run: Run) -> list[Iterator[Item]]:
 _LEVEL = {"tracking": 0, "dead_reckoning": 1, "degraded": 1}
 
 
-def diagnostics(messages: Messages, health: dict, t_ns: int) -> Item:
+def diagnostics(messages: Messages, health: dict[str, Any], t_ns: int) -> Item:
     """Health (of health.json): one status for the pose and one a source, with all figures as key and value."""
     statuses = []
 
-    def status(name: str, level: int, text: str, values: dict):
+    def status(name: str, level: int, text: str, values: dict[str, Any]) -> None:
         pairs = [messages.make("KeyValue", key=str(key), value=str(value)) for key, value in values.items()]
         statuses.append(messages.make("DiagnosticStatus", name=name, level=level, message=text, hardware_id="waymark", values=pairs))
 

@@ -3,23 +3,23 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-import yaml
-from PIL import Image
 
 from ..geometry import OPTICAL, from_rpy
+from ..maps import read_floor_plan
 from ..recording import Recording
 from ..ros import Messages
 from ..run import Run
-from ..tables import Table
+from ..tables import Array, Table
 from .estimates import ellipse, path, positions, quaternions, topic_name
 from .writer import Item
 
 LANDMARK_M = 0.15  # diameter of a landmark's ball: seen from across a room, and no wider than a usual one
 
 
-def mounting_matrix(mounting: dict) -> np.ndarray:
+def mounting_matrix(mounting: dict[str, Any]) -> Array:
     """A mounting's 4x4 matrix: the sensor's body frame in base_link."""
     out = np.eye(4)
     out[:3, 3] = mounting.get("xyz_m", (0, 0, 0))
@@ -28,7 +28,7 @@ def mounting_matrix(mounting: dict) -> np.ndarray:
     return out
 
 
-def mountings(messages: Messages, calibration: dict, t_ns: int) -> Iterator[Item]:
+def mountings(messages: Messages, calibration: dict[str, Any], t_ns: int) -> Iterator[Item]:
     """Where the sensors and cameras of a calibration sit, as static transforms."""
     transforms = []
     for kind in ("sensors", "cameras"):
@@ -43,7 +43,7 @@ def mountings(messages: Messages, calibration: dict, t_ns: int) -> Iterator[Item
         yield Item(t_ns, "/tf_static", "tf2_msgs/msg/TFMessage", messages.make("TFMessage", transforms=transforms))
 
 
-def landmarks(messages: Messages, topic: str, table: Table, t_ns: int, colour) -> Iterator[Item]:
+def landmarks(messages: Messages, topic: str, table: Table, t_ns: int, colour: Any) -> Iterator[Item]:
     """Landmarks as balls with their identities, and the ellipses of those that have a covariance."""
     markers = []
     for i, where in enumerate(positions(table)):
@@ -63,21 +63,14 @@ def landmarks(messages: Messages, topic: str, table: Table, t_ns: int, colour) -
 
 def grid(messages: Messages, file: Path, t_ns: int) -> Iterator[Item]:
     """The floor plan of a map.yaml as an occupancy grid: black is occupied, white is free, grey is unknown, as map_server has it."""
-    about = yaml.safe_load(file.read_text(encoding="utf-8"))
-    image = file.parent / about["image"]
-    if not image.is_file():
+    plan = read_floor_plan(file)
+    if plan.cells is None:
         return
-    with Image.open(image) as picture:
-        grey = np.asarray(picture.convert("L")) / 255.0
-    dark = grey if about.get("negate") else 1.0 - grey
-    cells = np.full(dark.shape, -1, dtype=np.int8)
-    cells[dark > about.get("occupied_thresh", 0.65)] = 100
-    cells[dark < about.get("free_thresh", 0.196)] = 0
-    x, y, heading = (*about.get("origin", (0, 0, 0)), 0.0)[:3]
-    info = messages.make("MapMetaData", resolution=float(about["resolution"]), width=dark.shape[1], height=dark.shape[0],
+    x, y, heading = plan.origin
+    info = messages.make("MapMetaData", resolution=plan.resolution_m, width=plan.shape[1], height=plan.shape[0],
                          origin=messages.pose((x, y, 0), (0, 0, np.sin(heading / 2), np.cos(heading / 2))))
     yield Item(t_ns, "/map", "nav_msgs/msg/OccupancyGrid", messages.make(
-        "OccupancyGrid", header=messages.header(t_ns, "map"), info=info, data=np.ascontiguousarray(cells[::-1]).ravel()))
+        "OccupancyGrid", header=messages.header(t_ns, "map"), info=info, data=np.ascontiguousarray(plan.cells).ravel()))
 
 
 def _truth(messages: Messages, table: Table) -> Iterator[Item]:

@@ -2,6 +2,7 @@
 """A recording's streams as messages: tables, pictures with what was detected in them, CAN frames."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ LENSES = {"pinhole-radtan": "plumb_bob", "equidistant": "equidistant"}
 """Our models of lenses that ROS has, by its name."""
 
 
-def camera_info(messages: Messages, name: str, camera: dict, t_ns: int):
+def camera_info(messages: Messages, name: str, camera: dict[str, Any], t_ns: int) -> Any:
     """A camera's calibration; None where ROS has no such model."""
     model = LENSES.get(camera.get("model", ""))
     if not model:
@@ -56,7 +57,7 @@ def _edges(messages: Messages, recording: Recording, camera: str, edges: Table) 
         if frame >= len(rows["t_ns"]):
             continue
         t_ns = int(rows["t_ns"][frame])
-        lines: dict[int, list] = {}
+        lines: dict[int, list[Any]] = {}
         for i in found:
             if np.isfinite(edges["u_px"][i]):
                 point = messages.make("foxglove_msgs/Point2", x=float(edges["u_px"][i]), y=float(edges["v_px"][i]))

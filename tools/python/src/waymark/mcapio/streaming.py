@@ -9,7 +9,7 @@ import numpy as np
 
 from ..ros import Messages
 from ..run import SPACE
-from ..tables import Table
+from ..tables import Array, Table
 from . import estimates, place, streams
 from .writer import Item
 
@@ -22,6 +22,8 @@ TOPICS = {"/tf": "tf2_msgs/msg/TFMessage", "/tf_static": "tf2_msgs/msg/TFMessage
           "/waymark/landmarks": "visualization_msgs/msg/MarkerArray", "/landmarks": "visualization_msgs/msg/MarkerArray",
           "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
 """Topics of each run; those of sources and cameras come with their first message."""
+SIGHTINGS = ["t_ns", "sensor", "id", "bearing_rad", "range_m"]
+"""Columns of /recording/sightings."""
 _AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
@@ -35,7 +37,7 @@ def _words(kind: type, prefix: str) -> dict[int, str]:
             if name.startswith(prefix) and isinstance(value, int)}
 
 
-def health_of(message: Any, states: dict[int, str], counters: dict[int, str], verdicts: list[str]) -> dict:
+def health_of(message: Any, states: dict[int, str], counters: dict[int, str], verdicts: list[str]) -> dict[str, Any]:
     """A health_t as health.json has it."""
     plain = {name: getattr(message, name) for name in message.__slots__
              if isinstance(getattr(message, name), (int, float)) and not name.endswith("_count")}
@@ -52,8 +54,9 @@ def health_of(message: Any, states: dict[int, str], counters: dict[int, str], ve
 class _Pages:
     """Parts of what one message has no room for, until all of one stamp are there."""
 
-    def __init__(self):
-        self._t_ns, self._parts, self._count = None, [], 0
+    def __init__(self) -> None:
+        self._t_ns, self._count = -1, 0
+        self._parts: list[Any] = []
 
     def add(self, message: Any) -> list[Any] | None:
         """All parts of the stamp once they are complete."""
@@ -67,7 +70,7 @@ class _Pages:
         return parts
 
 
-def _column(parts: list[Any], name: str) -> np.ndarray:
+def _column(parts: list[Any], name: str) -> Array:
     return np.concatenate([np.asarray(getattr(part, name)[: part.count], dtype=float) for part in parts])
 
 
@@ -83,7 +86,7 @@ class LiveItems:
         self._counters = {value: name.lower() for name, value in vars(counter).items() if name.isupper()}
         self._sources: list[str] = []
         self._pages = {kind: _Pages() for kind in ("LANDMARKS", "MAP", "PARTICLES", "HYPOTHESES")}
-        self._way: deque[tuple] = deque()
+        self._way: deque[tuple[Any, ...]] = deque()
         self._next_path_ns = 0
         self.offset_ns = 0
         self.newest_ns = 0
@@ -154,7 +157,7 @@ class LiveItems:
         table: Table = {"t_ns": np.full(n, t_ns), "sensor": np.array([_name(message.sensor)] * n),
                         "id": np.array(message.landmark_id[:n]), "bearing_rad": np.array(message.bearing_rad[:n]),
                         "range_m": np.array(message.range_m[:n])}
-        kind = streams.register(self._messages, "sightings.csv", list(table))
+        kind = streams.register(self._messages, "sightings.csv", SIGHTINGS)
         for i in range(n):
             yield Item(self.newest_ns, "/recording/sightings", kind,
                        streams.row(self._messages, kind, table, i, estimates.topic_name(_name(message.sensor))))

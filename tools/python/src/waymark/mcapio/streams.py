@@ -5,6 +5,8 @@ The type's name follows from the file's ("sightings.csv" is waymark_msgs/msg/Sig
 name and its columns. Numbers go through without a loss, so that the table can be made again.
 """
 
+from typing import Any
+
 import numpy as np
 from rosbags.typesys import get_types_from_msg
 
@@ -32,13 +34,13 @@ def register(messages: Messages, file: str, columns: list[str]) -> str:
     return name
 
 
-def row(messages: Messages, kind: str, table: Table, i: int, frame: str):
+def row(messages: Messages, kind: str, table: Table, i: int, frame: str) -> Any:
     """A row as a message."""
     values = {name.lower(): column[i].item() for name, column in table.items()}
     return messages.make(kind, header=messages.header(table["t_ns"][i], frame), **values)
 
 
-def rows_to_table(rows: list, columns: list[str]) -> Table:
+def rows_to_table(rows: list[Any], columns: list[str]) -> Table:
     """Messages of one channel as the table that they were made of."""
     out: Table = {}
     for name in columns:

@@ -73,8 +73,8 @@ class McapFile:
     def __enter__(self) -> "McapFile":
         return self
 
-    def __exit__(self, *_) -> None:
-        self._writer.finish()
+    def __exit__(self, *_: object) -> None:
+        self._writer.finish()  # type: ignore[no-untyped-call]
         self._file.close()
 
 
