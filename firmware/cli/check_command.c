@@ -39,7 +39,7 @@ static const char kHelp[] =
     "                      if the trials find a cause; the originals stay\n"
     "\n"
     "example:\n"
-    "  waymark check config/starry-night-plan.yaml RECORDING\n"
+    "  waymark check config/datasets/starry-night-plan.yaml RECORDING\n"
     "  waymark check config/robot.yaml first-drive --apply first-drive-corrected\n";
 
 // Printed beside the findings; not with --json.

@@ -231,7 +231,7 @@ def main():
                 failures.append(f"the good robot, {config}: {f['text']}")
         for f in check(folder / "robot.yaml"):
             failures.append(f"the good robot's devices: {f['text']}")
-        for config in sorted((ROOT / "config").glob("*.yaml")):
+        for config in sorted([*(ROOT / "config").glob("*.yaml"), *(ROOT / "config/datasets").glob("*.yaml")]):
             for f in check(config):
                 failures.append(f"{config.name}: {f['text']}")
         for name, config, file, old, new, words in FAULTS:

@@ -12,7 +12,7 @@ import tempfile
 
 from judged import ROOT, check, failures, run
 
-CONFIG = ROOT / "config/crossing-cameras.yaml"
+CONFIG = ROOT / "config/datasets/crossing-cameras.yaml"
 WORLD = ROOT / "config/worlds/crossing-drawn.yaml"
 
 
