@@ -216,7 +216,7 @@ static void try_suspects(checked *self, const wm_assembly *assembly, double reco
                             .progress_context = &progress};
   const size_t count = trials_run(&plan, found, &table, &before, &after);
   progress_end(&progress);
-  fact("trials       %zu of the usual mistakes undone: %s\n", plan.count - 1,
+  fact("trials       %zu usual mistakes tried: %s\n", plan.count - 1,
        count > 0 ? "found what explains the observations" : "none of them explains the observations");
   const size_t consequences = self->found->count;
   for (size_t i = 0; i < count; i++) {
@@ -227,8 +227,8 @@ static void try_suspects(checked *self, const wm_assembly *assembly, double reco
                   sizeof fix);
     wm_find(self->found, WM_FOUND_LIKELY_CAUSE, WM_SEVERITY_BAD, "cause", fix,
             before.is_valid
-                ? "%s: with that undone %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely"
-                : "%s: with that undone %.0f %% of the updates fit (now there is none)",
+                ? "%s: corrected in a trial, %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely"
+                : "%s: corrected in a trial, %.0f %% of the updates fit (now there is none)",
             what, 100 * after.explained, 100 * before.explained, exp(fmin(20, after.score - before.score)))
         ->size = after.explained;
   }

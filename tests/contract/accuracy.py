@@ -133,7 +133,7 @@ def slam():
     results = [run(DATA / f"mrclam-d6-r{i}", "mrclam-slam", "--align", "se2") for i in range(1, 6)]
     bar("mrclam-slam: mean position RMSE, aligned", sum(r["position_rmse_m"] for r in results) / 5, most=0.17)
     bar("mrclam-slam: mean landmark RMSE, aligned with the poses", sum(r["landmark_rmse_m"] for r in results) / 5, most=0.14)
-    bar("mrclam-slam: mean landmark RMSE, map laid over the true one", sum(r["landmark_rmse_own_fit_m"] for r in results) / 5, most=0.05)
+    bar("mrclam-slam: mean landmark RMSE, map aligned to the true one", sum(r["landmark_rmse_own_fit_m"] for r in results) / 5, most=0.05)
     for i, r in enumerate(results, 1):
         bar(f"mrclam-slam, robot {i}: NEES inside 95 %", r["nees_inside_95"], least=0.90)
         bar(f"mrclam-slam, robot {i}: landmarks found", r["landmarks_found"], least=14)

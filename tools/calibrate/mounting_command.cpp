@@ -166,8 +166,8 @@ int report(const Mounting &found, const wm_camera &camera) {
   const bool fits = found.explained > 0.5 && found.moved < 0.5;
   if (!fits)
     std::printf("\nnot to be used: %s\n", found.explained > 0.5
-                                              ? "it does not settle; is the map's scale right?"
-                                              : "the map does not explain what is seen; was the pose lost?");
+                                              ? "the estimate does not converge; check the map's resolution"
+                                              : "the edges in the pictures do not fit the map; was the pose lost?");
   else if (all_known)
     std::printf("\ngood. For calibration.yaml, %s:\n", camera.name);
   else
