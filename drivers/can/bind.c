@@ -252,7 +252,7 @@ static wm_status bind_gear(maker *m, bound_quantity *q) {
   for (uint32_t i = 0; i < b->gear_count; i++) {
     for (uint32_t k = 0; k < i; k++)
       if (b->gear[k].raw == b->gear[i].raw)
-        return refuse(m, "values: %g stands twice; each raw value is one gear", b->gear[i].raw);
+        return refuse(m, "values: %g appears twice; each raw value is one gear", b->gear[i].raw);
     q->gear[i].raw = b->gear[i].raw;
     q->gear[i].direction = b->gear[i].direction;
   }

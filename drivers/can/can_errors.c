@@ -22,7 +22,7 @@ void can_error_take(const wm_can_frame *frame, const char *interface, wm_source_
   } else if (frame->id & CAN_ERR_RESTARTED) {
     set(counts, interface, WM_DEVICE_WORKS, "is on the bus again");
   } else if (controller & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) {
-    set(counts, interface, WM_DEVICE_PASSIVE, "sees many errors on the bus (error-passive): wiring or bit rate");
+    set(counts, interface, WM_DEVICE_PASSIVE, "reports many bus errors (error-passive); check wiring and bit rate");
   } else if ((controller & CAN_ERR_CRTL_ACTIVE) && counts->device == WM_DEVICE_PASSIVE) {
     set(counts, interface, WM_DEVICE_WORKS, "works without errors again");
   }

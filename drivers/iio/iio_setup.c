@@ -206,7 +206,7 @@ static const char *read_matrix(const iio_setup *setup, const char *kind, double 
     if (!attribute(setup->folder, name, value)) continue;
     const char *why = iio_matrix_read(value, out);
     if (!why) return NULL;
-    (void)snprintf(text, room, "%s: %s %s (%.60s): mend the device tree", setup->name, name, why, value);
+    (void)snprintf(text, room, "%s: %s %s (%.60s); correct the device tree", setup->name, name, why, value);
     return text;
   }
   return NULL;

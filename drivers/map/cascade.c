@@ -67,8 +67,8 @@ static wm_status numbers_of(reader *r, slice text) {
     if (r->number_count == NUMBERS_MAX) return fail(r, "more numbers than a cascade has in one place");
     if (wm_text_to_f64(text.at + from, length, &r->numbers[r->number_count++]) != WM_TEXT_OK) {
       char shown[WM_SHOW_TEXT_MAX];
-      return wm_fail(r->err, WM_BAD_CONFIG, "%s:%ld: %s: '%s' is no number", r->path, r->line, r->names[r->depth - 1],
-                     wm_show_text(text.at + from, i - from, shown, sizeof shown));
+      return wm_fail(r->err, WM_BAD_CONFIG, "%s:%ld: %s: '%s' is not a number", r->path, r->line,
+                     r->names[r->depth - 1], wm_show_text(text.at + from, i - from, shown, sizeof shown));
     }
   }
   return WM_OK;

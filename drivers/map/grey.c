@@ -77,7 +77,7 @@ static wm_status read_pgm(const uint8_t *bytes, size_t size, const char *path, w
     uint32_t value = 0;
     if (plain) {
       if (!next_number(&t, white, &value))
-        return wm_fail(err, WM_BAD_DATA, "%s: pixel %zu of the PGM is no number up to %u", path, i, white);
+        return wm_fail(err, WM_BAD_DATA, "%s: pixel %zu of the PGM is not a number up to %u", path, i, white);
     } else {
       value = depth == 1 ? bytes[t.at + i] : (uint32_t)bytes[t.at + 2 * i] << 8 | bytes[t.at + 2 * i + 1];
       if (value > white) value = white;

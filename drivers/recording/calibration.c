@@ -57,7 +57,7 @@ wm_status calibration_angle(const wm_yaml_node *map, const char *name, double mi
   snprintf(key, sizeof key, "%s_rad", name);
   wm_yaml_node radians = wm_yaml_get(map, key);
   if (wm_yaml_there(&degrees) && wm_yaml_there(&radians))
-    return wm_yaml_fail(&degrees, err, "%s_rad stands there, too; give one of them", name);
+    return wm_yaml_fail(&degrees, err, "%s_rad is given, too; give one of them", name);
   if (wm_yaml_there(&radians)) return wm_yaml_f64(&radians, min_rad, max_rad, out_rad, err);
   if (!wm_yaml_there(&degrees)) return WM_OK;
   double value;
@@ -102,7 +102,7 @@ wm_status calibration_mounting(const wm_yaml_node *parent, const wm_mounting *ot
                rad = wm_yaml_get(&mounting, "rpy_rad");
   if (wm_yaml_there(&xyz)) TRY(list_in(&xyz, 3, 3, -1000, 1000, out->xyz_m, NULL, err));
   if (wm_yaml_there(&deg) && wm_yaml_there(&rad))
-    return wm_yaml_fail(&rad, err, "rpy_deg stands there, too; give one of them");
+    return wm_yaml_fail(&rad, err, "rpy_deg is given, too; give one of them");
   if (wm_yaml_there(&rad)) TRY(list_in(&rad, 3, 3, -2 * M_PI, 2 * M_PI, out->rpy_rad, NULL, err));
   if (wm_yaml_there(&deg)) {
     TRY(list_in(&deg, 3, 3, -360, 360, out->rpy_rad, NULL, err));

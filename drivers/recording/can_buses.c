@@ -29,7 +29,7 @@ wm_status can_buses_read(const wm_yaml_node *list, const char *dir, can_buses *o
     wm_status status = wm_yaml_string(&interface, bus->interface, sizeof bus->interface, err);
     for (size_t k = 0; status == WM_OK && k < i; k++)
       if (strcmp(out->bus[k].interface, bus->interface) == 0)
-        return wm_yaml_fail(&interface, err, "'%s' stands there twice", bus->interface);
+        return wm_yaml_fail(&interface, err, "'%s' appears twice", bus->interface);
     if (status == WM_OK) status = read_file(&item, "dbc", "vehicle.dbc", dir, bus->dbc, err);
     if (status == WM_OK) status = read_file(&item, "signals", "can-signals.yaml", dir, bus->signals, err);
     if (status != WM_OK) return status;

@@ -54,7 +54,7 @@ static wm_status add_gear(const wm_yaml_node *raw, double direction, wm_can_bind
   wm_status status = wm_yaml_f64(raw, -DBL_MAX, DBL_MAX, &value, err);
   if (status != WM_OK) return status;
   for (uint32_t i = 0; i < out->gear_count; i++)
-    if (out->gear[i].raw == value) return wm_yaml_fail(raw, err, "the value %.10g stands there twice", value);
+    if (out->gear[i].raw == value) return wm_yaml_fail(raw, err, "the value %.10g appears twice", value);
   if (out->gear_count == WM_CAN_VALUES_MAX) return wm_yaml_fail(raw, err, "more than %d values", WM_CAN_VALUES_MAX);
   out->gear[out->gear_count].raw = value;
   out->gear[out->gear_count++].direction = direction;

@@ -145,7 +145,7 @@ static wm_status read_header(csv_reader *self, wm_warn_fn warn, void *context, w
     int column = find_column(self->format, self->fields[f]);
     if (column < 0) continue;
     if (self->place[column] >= 0) {
-      snprintf(text, sizeof text, "the column '%s' stands there twice", columns[column].name);
+      snprintf(text, sizeof text, "the column '%s' appears twice", columns[column].name);
       return csv_fail(self, err, WM_BAD_CONFIG, text);
     }
     self->place[column] = (int)f;

@@ -36,7 +36,7 @@ static wm_status check_twice(const char *path, landmark_line *lines, size_t coun
   for (size_t i = 1; i < count; i++)
     if (lines[i].id == lines[i - 1].id)
       return wm_fail(err, WM_BAD_CONFIG,
-                     "%s:%ld: id: %d stands there twice (first in line %ld); each landmark needs its own", path,
+                     "%s:%ld: id: %d appears twice (first in line %ld); each landmark needs its own", path,
                      lines[i].line, lines[i].id, lines[i - 1].line);
   return WM_OK;
 }

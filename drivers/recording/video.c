@@ -244,7 +244,7 @@ static wm_status locate(wm_video *self, wm_error *err) {
     if (status != WM_OK) continue;
     wm_time_ns t_ns = self->row.whole[T], exposure_ns = self->row.whole[EXPOSURE];
     if (t_ns == self->last_ns) {
-      count(self, &self->counts.duplicated, "%s:%ld: t_ns: stands there twice", self->csv.lines.path, self->row.line);
+      count(self, &self->counts.duplicated, "%s:%ld: t_ns: appears twice", self->csv.lines.path, self->row.line);
       continue;
     }
     count_gap(self, t_ns);

@@ -141,7 +141,7 @@ static int compare_keys(const void *a, const void *b, void *context) {
 static int fail_twice(builder *b, int first, int second) {
   char shown[WM_SHOW_TEXT_MAX], what[160];
   wm_show_text(yaml_text(b->doc, first), b->doc->nodes[first].count, shown, sizeof shown);
-  snprintf(what, sizeof what, "%s: the key stands here twice (first in line %d)", shown, b->doc->nodes[first].line);
+  snprintf(what, sizeof what, "%s: the key appears twice (first in line %d)", shown, b->doc->nodes[first].line);
   return fail_at(b, (size_t)b->doc->nodes[second].line, what);
 }
 

@@ -40,7 +40,7 @@ static const char kHelp[] =
     "                      if the trials find a cause; the originals stay\n"
     "\n"
     "example:\n"
-    "  waymark check config/starry-night-plan.yaml RECORDING\n"
+    "  waymark check config/datasets/starry-night-plan.yaml RECORDING\n"
     "  waymark check config/robot.yaml first-drive --apply first-drive-corrected\n";
 
 // Printed beside the findings; not with --json.
@@ -227,18 +227,18 @@ static void try_suspects(checked *self, const wm_assembly *assembly, double reco
                             .progress_context = &progress};
   trials_run(&plan, &found);
   progress_end(&progress);
-  fact("trials       %zu of the usual mistakes undone: %s\n", plan.count - 1,
+  fact("trials       %zu usual mistakes tried: %s\n", plan.count - 1,
        found.count > 0 ? "found what explains the observations" : "none of them explains the observations");
   const size_t consequences = self->found->count;
   const double before = 100 * found.before.explained, after = 100 * found.after.explained;
   for (size_t i = 0; i < found.count; i++) {
     if (found.before.is_valid)
       name_cause(self, &plan, &found.at[i], WM_SEVERITY_BAD,
-                 ": with that undone %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely", after,
+                 ": corrected in a trial, %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely", after,
                  before, exp(fmin(20, found.after.score - found.before.score)));
     else
       name_cause(self, &plan, &found.at[i], WM_SEVERITY_BAD,
-                 ": with that undone %.0f %% of the updates fit (now there is none)", after);
+                 ": corrected in a trial, %.0f %% of the updates fit (now there is none)", after);
   }
   for (size_t i = 0; i < found.equal_count; i++)
     name_cause(self, &plan, &found.equal[i], WM_SEVERITY_NOTE,

@@ -44,7 +44,7 @@ wm_status check_out_dir(const char *out_dir, const char *input, wm_error *err) {
   (void)snprintf(path, sizeof path, "%s/events.wmlog", out_dir);
   if (stat(path, &inside) == 0 && stat(input, &read) == 0 && inside.st_ino == read.st_ino &&
       inside.st_dev == read.st_dev)
-    return wm_fail(err, WM_BAD_USAGE, "--out: %s holds the log that is to be replayed; choose another folder", out_dir);
+    return wm_fail(err, WM_BAD_USAGE, "--out: %s has the log that is replayed; choose another folder", out_dir);
   return WM_OK;
 }
 
@@ -70,14 +70,14 @@ wm_status put_run_aside(const char *out_dir, const char *recording, wm_error *er
     (void)snprintf(path, sizeof path, "%.*s.before-%d", (int)length, out_dir, i);
     if (stat(path, &there) == 0) continue;
     if (rename(out_dir, path) != 0)
-      return wm_fail(err, WM_IO,
-                     "--out: %s holds another run, which can't be put aside as %s: %s; --force writes over it", out_dir,
-                     path, strerror(errno));
-    (void)snprintf(note, sizeof note, "%s held another run, which is %s now (--force writes over it)", out_dir, path);
+      return wm_fail(err, WM_IO, "--out: %s has another run, which can't be renamed to %s: %s; --force overwrites it",
+                     out_dir, path, strerror(errno));
+    (void)snprintf(note, sizeof note, "%s had another run, which was renamed to %s (--force overwrites it)", out_dir,
+                   path);
     print_note(NULL, note);
     return WM_OK;
   }
-  return wm_fail(err, WM_BAD_USAGE, "--out: %s: %d runs were put aside already; choose another folder", out_dir,
+  return wm_fail(err, WM_BAD_USAGE, "--out: %s: %d runs were renamed already; choose another folder", out_dir,
                  ASIDE_MAX);
 }
 

@@ -13,8 +13,8 @@
 static const char kHelp[] =
     "usage: waymark doctor [CONFIG] [options]\n"
     "\n"
-    "Finds what is wrong with this computer, and how to mend it: kernel, real-time rights, clocks, governors,\n"
-    "temperature, LCM's way; with a configuration also its CAN interfaces, cameras,\n"
+    "Checks this computer and states how to correct what it finds: kernel, real-time rights, clocks, governors,\n"
+    "temperature, LCM's route; with a configuration also its CAN interfaces, cameras,\n"
     "IMU and GNSS receiver. Measures for 5 s how late a\n"
     "thread wakes. Changes nothing. Exit code 1 where something is bad.\n"
     "\n"

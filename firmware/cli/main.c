@@ -39,7 +39,7 @@ static const struct {
     {"calibrate", "find a camera's lens and mounting; read calibrations of other programs", "waymark-tools"},
     {"compare", "what a change did to all drives of a batch", "waymark-fleet"},
     {"detect", "run a detector on pictures: what it finds, drawn and as a table", "waymark-tools"},
-    {"diff", "compare two runs: what changed, and where it began", "waymark-tools"},
+    {"diff", "compare two runs: what differs, and where the difference begins", "waymark-tools"},
     {"eval", "measure a run against truth, GNSS or labels", "waymark-tools"},
     {"import", "make a video of any kind part of a recording", "waymark-tools"},
     {"init", "make the configuration of a new robot from what it has", "waymark-tools"},
@@ -87,10 +87,11 @@ static int unknown(const char *command) {
   }
   const char *nearest = wm_word_nearest(command, names);
   if (nearest)
-    (void)fprintf(stderr, "waymark: '%s' is no command; did you mean '%s'? (waymark help lists them)\n", command,
+    (void)fprintf(stderr, "waymark: '%s' is not a command; did you mean '%s'? (waymark help lists them)\n", command,
                   nearest);
   else
-    (void)fprintf(stderr, "waymark: '%s' is no command, and there is no program waymark-%s (waymark help lists them)\n",
+    (void)fprintf(stderr,
+                  "waymark: '%s' is not a command, and there is no program waymark-%s (waymark help lists them)\n",
                   command, command);
   return EXIT_USAGE;
 }

@@ -37,14 +37,14 @@ static wm_status set(const option *o, const char *value, wm_error *err) {
     case OPTION_U64: {
       unsigned long long v = strtoull(value, &rest, 10);
       if (*value < '0' || *value > '9' || *rest || errno)
-        return wm_fail(err, WM_BAD_USAGE, "%s: '%s' is no whole number from 0 on, or too large", o->name, value);
+        return wm_fail(err, WM_BAD_USAGE, "%s: '%s' is not a whole number from 0 on, or is too large", o->name, value);
       *(uint64_t *)o->out = v;
       return WM_OK;
     }
     case OPTION_F64: {
       double v = strtod(value, &rest);
       if (!*value || *rest || !isfinite(v) || v <= 0)
-        return wm_fail(err, WM_BAD_USAGE, "%s: '%s' is no number above 0", o->name, value);
+        return wm_fail(err, WM_BAD_USAGE, "%s: '%s' is not a number above 0", o->name, value);
       *(double *)o->out = v;
       return WM_OK;
     }
@@ -60,7 +60,7 @@ wm_status options_parse(int argc, char *const *argv, const option *options, size
   for (int i = 0; i < argc; i++) {
     const char *word = argv[i];
     if (only_words || word[0] != '-' || word[1] == '\0') {
-      if (*word_count == capacity) return wm_fail(err, WM_BAD_USAGE, "'%s': one word too many", word);
+      if (*word_count == capacity) return wm_fail(err, WM_BAD_USAGE, "unexpected argument '%s'", word);
       words[(*word_count)++] = word;
       continue;
     }

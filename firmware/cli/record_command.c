@@ -58,7 +58,7 @@ int command_record(int argc, char *const *argv) {
     return EXIT_USAGE;
   }
   if (stat(record.out_dir, &there) == 0) {
-    (void)wm_fail(&err, WM_BAD_USAGE, "--out: %s is there already; a recording is never written over", record.out_dir);
+    (void)wm_fail(&err, WM_BAD_USAGE, "--out: %s exists already; a recording is never overwritten", record.out_dir);
     return complain(&err);
   }
   record.bytes_max = (max_mb < UINT64_MAX / 1000000 ? max_mb : UINT64_MAX / 1000000) * 1000000;

@@ -19,7 +19,7 @@ static const char kHelp[] =
     "\n"
     "Localizes from a recording (docs/recording-format.md), or makes the trajectory of a run again, bit by bit, from "
     "its\n"
-    "event log, which needs no recording. Ctrl-C ends it in order: the folder holds the run until then (exit code 1).\n"
+    "event log, which needs no recording. Ctrl-C stops it; the folder then has the run up to there (exit code 1).\n"
     "\n"
     "  --config FILE       which estimator, and its parameters; of an event log: another one than its own\n"
     "  --out FOLDER        where trajectory, published poses, event log, health and timing are written\n"
@@ -66,7 +66,7 @@ static void catch_signals(void) {
 
 static int finished(const wm_run_report *report, const char *out_dir) {
   if (!report->was_stopped) return EXIT_DONE;
-  (void)fprintf(stderr, "note: stopped %.1f s after its begin; %s holds the run until then\n", report->recorded_s,
+  (void)fprintf(stderr, "note: stopped at %.1f s of the recording; %s has the run up to there\n", report->recorded_s,
                 out_dir);
   return EXIT_WORK_FAILED;
 }
@@ -173,9 +173,9 @@ static int replay_log(const arguments *args) {
     static wm_run_report report;
     status = wm_replay_log(&config, log, &options, &report, &err);
     if (report.log_was_cut)
-      (void)fprintf(stderr, "note: %s has no regular end (power cut?): it holds the events until then\n", args->what);
+      (void)fprintf(stderr, "note: %s has no regular end (power cut?); it has the events up to there\n", args->what);
     if (report.events_missing > 0)
-      (void)fprintf(stderr, "note: %s lacks %" PRIu64 " events: poses after them are not those of the run\n",
+      (void)fprintf(stderr, "note: %s lacks %" PRIu64 " events: poses after them differ from those of the run\n",
                     args->what, report.events_missing);
     if (status == WM_OK)
       print_report(&report, head->recording, args->out, wm_seconds_between(begin_ns, wm_monotonic_ns()));

@@ -252,7 +252,7 @@ static wm_status check_new_recording(const char *folder, const char *played, wm_
   struct stat there;
   if (played) return wm_fail(err, WM_BAD_USAGE, "--record: records devices; with --recording there are none");
   if (stat(folder, &there) == 0)
-    return wm_fail(err, WM_BAD_USAGE, "--record: %s is there already; a recording is never written over", folder);
+    return wm_fail(err, WM_BAD_USAGE, "--record: %s exists already; a recording is never overwritten", folder);
   return WM_OK;
 }
 

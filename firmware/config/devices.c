@@ -44,7 +44,7 @@ static wm_status read_can(const wm_yaml_node *item, wm_config *config, wm_error 
   if (status != WM_OK) return status;
   for (size_t i = 0; i < config->devices.can_count; i++)
     if (strcmp(config->devices.can[i].interface, out->interface) == 0)
-      return wm_yaml_fail(&interface, err, "'%s' stands there twice (first in line %d)", out->interface,
+      return wm_yaml_fail(&interface, err, "'%s' appears twice (first in line %d)", out->interface,
                           config->devices.can[i].line);
   status = file_of(item, "dbc", config->overrides.dbc, config, out->dbc, err);
   if (status == WM_OK)
@@ -101,14 +101,12 @@ static wm_status camera_is_new(const wm_yaml_node *item, const wm_config *config
   for (size_t i = 0; i < config->devices.camera_count; i++) {
     const wm_camera_device_config *other = &config->devices.cameras[i];
     if (strcmp(other->name, camera->name) == 0)
-      return wm_yaml_fail(item, err, "the camera '%s' stands there twice (first in line %d)", camera->name,
-                          other->line);
+      return wm_yaml_fail(item, err, "the camera '%s' appears twice (first in line %d)", camera->name, other->line);
     if (camera->libcamera[0] && strcmp(other->libcamera, camera->libcamera) == 0)
-      return wm_yaml_fail(item, err, "libcamera's '%s' stands there twice (first in line %d)", camera->libcamera,
+      return wm_yaml_fail(item, err, "libcamera's '%s' appears twice (first in line %d)", camera->libcamera,
                           other->line);
     if (camera->device[0] && strcmp(other->device, camera->device) == 0)
-      return wm_yaml_fail(item, err, "the device '%s' stands there twice (first in line %d)", camera->device,
-                          other->line);
+      return wm_yaml_fail(item, err, "the device '%s' appears twice (first in line %d)", camera->device, other->line);
   }
   return WM_OK;
 }
@@ -166,8 +164,7 @@ static wm_status stream_is_new(const wm_yaml_node *item, const wm_config *config
     if (strcmp(devices->lcm[i].stream, stream) == 0) line = devices->lcm[i].line;
   for (size_t i = 0; i < devices->gpsd_count; i++)
     if (strcmp(wm_gpsd_stream(&devices->gpsd[i]), stream) == 0) line = devices->gpsd[i].line;
-  return line == 0 ? WM_OK
-                   : wm_yaml_fail(item, err, "the stream '%s' stands there twice (first in line %d)", stream, line);
+  return line == 0 ? WM_OK : wm_yaml_fail(item, err, "the stream '%s' appears twice (first in line %d)", stream, line);
 }
 
 static wm_status read_lcm(const wm_yaml_node *item, wm_config *config, wm_error *err) {

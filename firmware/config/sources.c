@@ -35,7 +35,7 @@ static wm_status read_name(const wm_yaml_node *item, const wm_config *config, wm
   }
   for (size_t i = 0; i < config->source_count; i++)
     if (strcmp(config->sources[i].name, out->name) == 0)
-      return wm_yaml_fail(&name, err, "'%s' stands there twice (first in line %d)", out->name, config->sources[i].line);
+      return wm_yaml_fail(&name, err, "'%s' appears twice (first in line %d)", out->name, config->sources[i].line);
   return WM_OK;
 }
 

@@ -83,7 +83,7 @@ static wm_status listen_on(command_socket *self, wm_error *err) {
     self->fd = fd;
     if (chmod(self->at.sun_path, 0660) == 0) return WM_OK;
   }
-  status = wm_fail(err, WM_IO, "commands.socket: %s can't be made: %s", self->at.sun_path, strerror(errno));
+  status = wm_fail(err, WM_IO, "commands.socket: %s cannot be created: %s", self->at.sun_path, strerror(errno));
   if (fd >= 0 && self->fd < 0) (void)close(fd);
   return status;
 }

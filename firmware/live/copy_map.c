@@ -97,7 +97,8 @@ wm_status copy_map(const char *map_yaml, const char *out_dir, wm_error *err) {
   wm_status status = find_pictures(map_yaml, pictures, &count, err);
   if (status != WM_OK) return status;
   (void)snprintf(to, sizeof to, "%s/map", out_dir);
-  if (mkdir(to, 0777) != 0 && errno != EEXIST) return wm_fail(err, WM_IO, "%s: can't be made: %s", to, strerror(errno));
+  if (mkdir(to, 0777) != 0 && errno != EEXIST)
+    return wm_fail(err, WM_IO, "%s: can't be created: %s", to, strerror(errno));
   const char *slash = strrchr(map_yaml, '/');
   int folder = slash ? (int)(slash - map_yaml) + 1 : 0;
   for (size_t i = 0; i < count && status == WM_OK; i++) {

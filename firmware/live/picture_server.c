@@ -252,7 +252,7 @@ static wm_status listen_at(picture_server *self, wm_error *err) {
   self->listening = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (self->listening < 0 || bind(self->listening, (const struct sockaddr *)&at, sizeof at) != 0 ||
       chmod(self->path, S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP) != 0 || listen(self->listening, READERS_MAX) != 0)
-    return wm_fail(err, WM_IO, "%s: the picture socket can't be made: %s", self->path, strerror(errno));
+    return wm_fail(err, WM_IO, "%s: the picture socket cannot be created: %s", self->path, strerror(errno));
   return WM_OK;
 }
 

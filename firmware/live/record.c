@@ -374,7 +374,7 @@ static wm_status write_about(recorder *self, wm_error *err) {
 
 static wm_status make_folder(const char *path, wm_error *err) {
   if (mkdir(path, 0777) == 0 || errno == EEXIST) return WM_OK;
-  return wm_fail(err, WM_IO, "%s: can't be made: %s", path, strerror(errno));
+  return wm_fail(err, WM_IO, "%s: can't be created: %s", path, strerror(errno));
 }
 
 static wm_status open_can(recorder *self, wm_error *err) {

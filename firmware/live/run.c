@@ -433,7 +433,7 @@ static wm_status first_source_error(const live *self, wm_error *err) {
 static void start_pictures(live *self) {
   wm_error why;
   if (picture_server_start(self->config, self->assembly.vision, &self->pictures, &why) != WM_OK)
-    live_say(self, "pictures: %s. Localizing goes on", why.text);
+    live_say(self, "pictures: %s. Localization continues", why.text);
 }
 
 static wm_status run(live *self, wm_recording *recording, wm_live_report *report, wm_error *err) {

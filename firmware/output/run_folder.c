@@ -255,7 +255,7 @@ static wm_status make_dir(const char *dir, wm_error *err) {
   }
   struct stat there;
   if (mkdir(path, 0777) != 0 && errno != EEXIST)
-    return wm_fail(err, WM_IO, "%s: the folder can't be made: %s", dir, strerror(errno));
+    return wm_fail(err, WM_IO, "%s: the folder cannot be created: %s", dir, strerror(errno));
   if (stat(path, &there) != 0 || !S_ISDIR(there.st_mode))
     return wm_fail(err, WM_IO, "%s: there is a file of this name; choose another --out", dir);
   return WM_OK;

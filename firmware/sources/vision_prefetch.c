@@ -35,7 +35,7 @@ static void *work(void *argument) {
 wm_status vision_prefetch_start(vision_source *self, wm_error *err) {
   vision_prefetch *a = &self->prefetch;
   if (pthread_mutex_init(&a->lock, NULL) != 0 || pthread_cond_init(&a->changed, NULL) != 0)
-    return wm_fail(err, WM_IO, "%s: a lock can't be made", self->base.name);
+    return wm_fail(err, WM_IO, "%s: a lock cannot be created", self->base.name);
   if (pthread_create(&a->thread, NULL, work, self) != 0)
     return wm_fail(err, WM_IO, "%s: a thread can't be started", self->base.name);
   char name[16];

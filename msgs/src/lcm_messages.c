@@ -4,7 +4,6 @@
 
 #include <string.h>
 
-#include "lcm_bytes.h"
 #include "waymark_health_t.h"
 #include "waymark_innovation_t.h"
 #include "waymark_landmarks_t.h"

@@ -6,7 +6,6 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "lcm_bytes.h"
 #include "waymark_depth_t.h"
 #include "waymark_gnss_t.h"
 #include "waymark_heading_t.h"

@@ -5,7 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "lcm_bytes.h"
 #include "waymark/lcm_messages.h"
 #include "waymark_landmarks_t.h"
 #include "waymark_map_t.h"

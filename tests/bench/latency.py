@@ -35,9 +35,9 @@ def make_recordings(work):
     (work / "corridor.yaml").write_text(world)
     made = {}
     for name, world, config, observed in (
-            ("edge_mcl, 640 x 360 at 5 Hz", work / "corridor.yaml", "corridor.yaml", "video/front.csv"),
+            ("edge_mcl, 640 x 360 at 5 Hz", work / "corridor.yaml", "datasets/corridor.yaml", "video/front.csv"),
             ("slam, its map and pose saved", ROOT / "config/worlds/crossing.yaml", "etc/robot.yaml", "sightings.csv"),
-            ("landmark_ekf, two cameras' sightings at 10 Hz", ROOT / "config/worlds/crossing.yaml", "crossing-points.yaml", "sightings.csv")):
+            ("landmark_ekf, two cameras' sightings at 10 Hz", ROOT / "config/worlds/crossing.yaml", "datasets/crossing-points.yaml", "sightings.csv")):
         recording = work / pathlib.Path(config).stem
         subprocess.run([BUILD / "bin/waymark-simulate", world, "--out", recording, "--duration", str(SECONDS)], check=True,
                        stdout=subprocess.DEVNULL)

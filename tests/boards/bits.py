@@ -104,9 +104,13 @@ def recording_of(name, builds, data, made, work):
     return made[name]
 
 
+def shipped(config):
+    return ROOT / "config" / ("robot.yaml" if config == "robot" else f"datasets/{config}.yaml")
+
+
 def replay_all(case, builds, recording, work):
     config, _, (begin, end), *options = case
-    options += ["--config", ROOT / f"config/{config}.yaml", "--until", end, *(["--from", begin] if begin else [])]
+    options += ["--config", shipped(config), "--until", end, *(["--from", begin] if begin else [])]
     raw, logged, seconds = [], [], []
     for i, build in enumerate(builds):
         out, again = work / f"raw-{i}", work / f"log-{i}"

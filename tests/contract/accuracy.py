@@ -43,7 +43,7 @@ def longest_beyond(trajectory, truth, sigmas):
 def config_path(config, folder):
     """A shipped configuration, or one with the estimator alone: "slam:"."""
     if not config.endswith(":"):
-        return SOURCE / "config" / f"{config}.yaml"
+        return SOURCE / "config/datasets" / f"{config}.yaml"
     path = pathlib.Path(folder) / "plain.yaml"
     path.write_text(f"format: waymark-config/1\nestimator: {config[:-1]}\n")
     return path
@@ -133,7 +133,7 @@ def slam():
     results = [run(DATA / f"mrclam-d6-r{i}", "mrclam-slam", "--align", "se2") for i in range(1, 6)]
     bar("mrclam-slam: mean position RMSE, aligned", sum(r["position_rmse_m"] for r in results) / 5, most=0.17)
     bar("mrclam-slam: mean landmark RMSE, aligned with the poses", sum(r["landmark_rmse_m"] for r in results) / 5, most=0.14)
-    bar("mrclam-slam: mean landmark RMSE, map laid over the true one", sum(r["landmark_rmse_own_fit_m"] for r in results) / 5, most=0.05)
+    bar("mrclam-slam: mean landmark RMSE, map aligned to the true one", sum(r["landmark_rmse_own_fit_m"] for r in results) / 5, most=0.05)
     for i, r in enumerate(results, 1):
         bar(f"mrclam-slam, robot {i}: NEES inside 95 %", r["nees_inside_95"], least=0.90)
         bar(f"mrclam-slam, robot {i}: landmarks found", r["landmarks_found"], least=14)
@@ -199,8 +199,8 @@ def lost_on_a_map():
     recording, begin_s = DATA / "office-a", 41
     with tempfile.TemporaryDirectory() as out:
         lap, rest = pathlib.Path(out) / "lap", pathlib.Path(out) / "rest"
-        for command in (["replay", recording, "--config", SOURCE / "config" / "office.yaml", "--until", begin_s, "--out", lap],
-                        ["replay", recording, "--config", SOURCE / "config" / "office-frozen.yaml", "--landmarks", lap / "map-estimate.csv",
+        for command in (["replay", recording, "--config", SOURCE / "config/datasets" / "office.yaml", "--until", begin_s, "--out", lap],
+                        ["replay", recording, "--config", SOURCE / "config/datasets" / "office-frozen.yaml", "--landmarks", lap / "map-estimate.csv",
                          "--from", begin_s, "--lost", "--out", rest]):
             subprocess.run([str(c) for c in [BIN / "waymark", *command]], check=True, capture_output=True)
         figures = [json.loads(subprocess.run([str(BIN / "waymark-eval"), str(rest), str(recording), "--json", "--from", start],
@@ -234,7 +234,7 @@ def office():
 def detected(recording, config, detector):
     """What the run's detector saw against the recording's labels."""
     with tempfile.TemporaryDirectory() as out:
-        for command in ([BIN / "waymark", "replay", recording, "--config", SOURCE / "config" / f"{config}.yaml", "--out", out],
+        for command in ([BIN / "waymark", "replay", recording, "--config", SOURCE / "config/datasets" / f"{config}.yaml", "--out", out],
                         [BIN / "waymark-eval", out, recording, "--json", "--detector", detector]):
             done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
             if done.returncode != 0:

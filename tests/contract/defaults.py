@@ -205,7 +205,7 @@ def judge(bin_dir, source, data, case, settings, scratch):
     refused = {}
 
     def run(name, text=None):
-        config = source / "config" / f"{name}.yaml"
+        config = source / "config" / ("robot.yaml" if name == "robot" else f"datasets/{name}.yaml")
         if text is not None:
             config = folder / "config.yaml"
             config.write_text(text)

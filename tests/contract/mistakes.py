@@ -248,10 +248,10 @@ PLAZA = [
     ("turn rate to the right", {"motion.csv": each(w_radps=lambda w: -w)}, r"turn rate.*right", "bad"),
 ]
 # Recordings of others with the configuration that suits them.
-SHARED = [("plaza-1", "robot.yaml", PLAZA), ("office-a", "office.yaml", OFFICE), ("corridor-a", "corridor.yaml", CORRIDOR),
-          ("starry-night-stereo-a", "starry-night-stereo.yaml", STEREO),
-          ("mrclam-d6-t1", "mrclam.yaml", MRCLAM), ("starry-night-plan-a", "starry-night-plan.yaml", MRCLAM),
-          ("smartloc-potsdamer-a", "smartloc.yaml", SMARTLOC)]
+SHARED = [("plaza-1", "robot.yaml", PLAZA), ("office-a", "datasets/office.yaml", OFFICE), ("corridor-a", "datasets/corridor.yaml", CORRIDOR),
+          ("starry-night-stereo-a", "datasets/starry-night-stereo.yaml", STEREO),
+          ("mrclam-d6-t1", "datasets/mrclam.yaml", MRCLAM), ("starry-night-plan-a", "datasets/starry-night-plan.yaml", MRCLAM),
+          ("smartloc-potsdamer-a", "datasets/smartloc.yaml", SMARTLOC)]
 
 
 def found(check, pattern):

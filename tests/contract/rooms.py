@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Edges on the floor in small plans: unmapped furniture, thin walls, few long walls, turns on the spot. Renders many
 seeds of each world (each with another floor, light, clutter and sensors' errors), keeps what the detector saw, and judges
-`config/corridor.yaml` and `estimator: edge_mcl` alone. Exit code 1 where a drive misses a bar, 77 without a simulator.
+`config/datasets/corridor.yaml` and `estimator: edge_mcl` alone. Exit code 1 where a drive misses a bar, 77 without a simulator.
 
     rooms.py BIN_DIR SOURCE_DIR [DATA_DIR] [--only WORD[,WORD]] [--seeds N] [--cache FOLDER] [--config FILE] [--json]
 
@@ -46,7 +46,7 @@ def log_of(a, name, world, seed):
         for left in (part, run, folder):
             shutil.rmtree(left, ignore_errors=True)
         call(a.bin / "waymark-simulate", world, "--seed", seed, "--out", part)
-        call(a.bin / "waymark", "replay", part, "--config", a.source / "config/corridor.yaml", "--out", run)
+        call(a.bin / "waymark", "replay", part, "--config", a.source / "config/datasets/corridor.yaml", "--out", run)
         for gone in (part / "video", part / "labels"):
             shutil.rmtree(gone)
         shutil.move(run / "events.wmlog", part / "events.wmlog")
@@ -137,7 +137,7 @@ def main():
         print(f"{'world':16} {'config':10} drives  RMS worst / median m  largest m  lost  NEES inside  wrong  missed")
     for name, world, usual in worlds(a):
         folders = [log_of(a, name, world, seed) for seed in range(1, (a.seeds or usual) + 1)]
-        for config in [a.config] if a.config else [a.source / "config/corridor.yaml", alone]:
+        for config in [a.config] if a.config else [a.source / "config/datasets/corridor.yaml", alone]:
             drives = [judge(a, folder, config) for folder in folders]
             bad = [f.name for f, d in zip(folders, drives) if d["rms_m"] > RMS_MOST_M or d["wrong"] > 0]
             missed += len(bad)

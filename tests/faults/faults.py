@@ -89,7 +89,7 @@ class Drive:
             "crossing": ("crossing-points.yaml", "devices: {can: [{interface: can0}], sightings: lcm}\nlandmarks: landmarks.csv\n"),
             "walls": ("office-walls.yaml", camera_)}[world]
         self.config = (
-            drives.with_realtime((ROOT / "config" / own).read_text(), "lock_memory: false") + f"\ninitial_pose: {drives.start_of(recording)}\n"
+            drives.with_realtime((ROOT / "config/datasets" / own).read_text(), "lock_memory: false") + f"\ninitial_pose: {drives.start_of(recording)}\n"
             "calibration: calibration.yaml\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\n" + devices +
             f"publish: {{lcm_url: '{drives.URL}'}}\ncommands: {{lcm: true}}\n"
             "start: {saved_pose: pose.yaml, save_every_s: 0.5}\n")
@@ -348,7 +348,7 @@ def box(work):
 
 
 def readers(work):
-    """One camera, four readers: two detectors (config/office-walls.yaml), the black box and a recording, whose replay gives the
+    """One camera, four readers: two detectors (config/datasets/office-walls.yaml), the black box and a recording, whose replay gives the
     poses of the run. Two CAN interfaces: the wheels on one, the gyro on the other."""
     drive, until_s = Drive(work, "walls", "readers", []), WALLS_S - 3
     signals = re.split(r"(?m)^(?=- )", (drive.folder / "can-signals.yaml").read_text())

@@ -153,14 +153,14 @@ FAULTS = [
     ("lateness above the horizon", C, C, "200", "900", "is above merge.horizon_ms"),
     ("file that isn't there", C, C, "initial_pose", "landmarks: hall.csv\ninitial_pose", "cannot be read"),
     ("publishes faster than it thinks", C, C, "rate_hz: 50", "rate_hz: 400", "poses would go out at 200 Hz"),
-    ("way of messages that isn't any", C, C, "rate_hz: 50", "lcm_url: 'udp://x'", "is no provider of LCM"),
+    ("way of messages that isn't any", C, C, "rate_hz: 50", "lcm_url: 'udp://x'", "is not a provider of LCM"),
     ("poses leave the computer", C, C, "rate_hz: 50", "lcm_url: 'udpm://239.255.76.67:7667?ttl=1'", "out into the network"),
     ("nowhere to save the pose", C, C, "initial_pose", "start: {saved_pose: /nonexistent/pose.yaml}\ninitial_pose", "no pose would be kept"),
     ("nowhere for the black box", C, C, "initial_pose", "black_box: {folder: /nonexistent/box}\ninitial_pose", "nothing would be kept"),
     ("stream that isn't there", C, "rec/recording.yaml", "sightings.csv", "gnss.csv", "is not in the folder"),
     ("recording of another format", C, "rec/recording.yaml", "recording/1", "recording/7", "is not a format"),
-    ("wheel in mm", C, CAL, "radius_m: 0.1", "radius_m: 9.9", "wheels.radius_m: 9.9 m is nothing"),
-    ("track in cm", C, CAL, "track_m: 0.5", "track_m: 50", "wheels.track_m: 50 m is nothing"),
+    ("wheel in mm", C, CAL, "radius_m: 0.1", "radius_m: 9.9", "wheels.radius_m: 9.9 m is outside"),
+    ("track in cm", C, CAL, "track_m: 0.5", "track_m: 50", "wheels.track_m: 50 m is outside"),
     ("ticks of the motor", C, CAL, "ticks_per_turn: 1000", "ticks_per_turn: 1", "a tick would be 0.628 m"),
     ("focal length of another size", C, CAL, "[30, 30, 32, 24]", "[600, 600, 32, 24]", "degrees wide"),
     ("pixels that aren't square", C, CAL, "[50, 50, 32, 24]", "[50, 90, 32, 24]", "fx 50 and fy 90"),
@@ -173,9 +173,9 @@ FAULTS = [
     ("range that ends at once", C, CAL, "max_range_m: 20", "max_range_m: 0.02", "nothing would be taken"),
     ("baseline that isn't the mountings'", C, CAL, "baseline_m: 0.2", "baseline_m: 0.12", "are 0.2000 m apart"),
     ("left and right swapped", C, CAL, "left: front, right: other", "left: other, right: front", "is to the left of other"),
-    ("marker in mm", C, CAL, "size_m: 0.15", "size_m: 9.5", "9.5 m is no marker"),
+    ("marker in mm", C, CAL, "size_m: 0.15", "size_m: 9.5", "9.5 m is not a plausible"),
     ("camera under the floor", E, CAL, "[0.3, 0.1, 0.5]", "[0.3, 0.1, -0.5]", "at or under the floor"),
-    ("camera that looks up", E, CAL, "[0.3, 0.1, 0.5], rpy_deg: [0, 30, 0]", "[0.3, 0.1, 0.5], rpy_deg: [0, -88, 0]", "never sees the floor"),
+    ("camera that looks up", E, CAL, "[0.3, 0.1, 0.5], rpy_deg: [0, 30, 0]", "[0.3, 0.1, 0.5], rpy_deg: [0, -88, 0]", "never in view"),
     ("picture of another size", E, "rec/video/front.avi", None, avi(32, 24), "has 768 bytes, the camera 64 x 48"),
     ("two landmarks at one place", C, "rec/landmarks.csv", "3,-5,0", "3,5,0", "1 and 3 are at the same place"),
     ("landmarks in mm", C, "rec/landmarks.csv", None, "id,x_m,y_m,z_m,sigma_m\n1,5000,0,0,0\n2,0,5000,0,0\n3,-5000,0,0,0\n", "from the nearest landmark"),
@@ -187,13 +187,13 @@ FAULTS = [
     ("start beside the map", E, "rec/map/map.yaml", "[-5, -5, 0]", "[50, -5, 0]", "is not on the map"),
     ("start in a wall", E, E, "x_m: 0", "x_m: -4.9", "is not free space"),
     ("map without an edge", E, "rec/map/edges.pgm", None, pgm(lambda c, r: 0), "there is no edge in it"),
-    ("edges black on white", E, "rec/map/edges.pgm", None, pgm(lambda c, r: 0 if c % 40 == 0 else 255), "of it would be edges"),
-    ("nothing drivable", E, "rec/map/drivable.pgm", None, pgm(lambda c, r: 0), "nothing of it is drivable"),
+    ("edges black on white", E, "rec/map/edges.pgm", None, pgm(lambda c, r: 0 if c % 40 == 0 else 255), "of its pixels are edges"),
+    ("nothing drivable", E, "rec/map/drivable.pgm", None, pgm(lambda c, r: 0), "no pixel is drivable"),
     ("message misspelt", C, "rec/can-signals.yaml", "message: Turn", "message: Trun", "did you mean Turn"),
     ("message that never comes", C, "rec/can-signals.yaml", "message: Speeds, signal: Speed}", "message: Other, signal: Thing}", "vehicle_speed is bound, but no frame"),
     ("signals of a longer message", C, "rec/can.log", None, can_log(short=True), "of 100)"),
-    ("km/h taken as m/s", C, "rec/vehicle.dbc", "Left : 0|16@1- (0.001,0)", "Left : 0|16@1- (0.1,0)", "wheel_speed_rear_left: as much as"),
-    ("deg/s taken as rad/s", C, "rec/can.log", None, can_log(turn=57.3), "yaw_rate: as much as"),
+    ("km/h taken as m/s", C, "rec/vehicle.dbc", "Left : 0|16@1- (0.001,0)", "Left : 0|16@1- (0.1,0)", "wheel_speed_rear_left: the largest value is"),
+    ("deg/s taken as rad/s", C, "rec/can.log", None, can_log(turn=57.3), "yaw_rate: the largest value is"),
     ("gyro the wrong way round", C, "rec/can.log", None, can_log(turn=-1), "yaw_rate turns left where"),
     ("column of another program", C, "rec/landmarks.csv", None, "\n".join(l + (",colour", ",red")[i > 0] for i, l in enumerate(LANDMARKS.splitlines())) + "\n", "unknown column"),
     ("map that nobody makes", C, C, "initial_pose", "start: {saved_map: map.bin, saved_pose: pose.yaml}\ninitial_pose", "makes no map to keep"),
@@ -231,7 +231,7 @@ def main():
                 failures.append(f"the good robot, {config}: {f['text']}")
         for f in check(folder / "robot.yaml"):
             failures.append(f"the good robot's devices: {f['text']}")
-        for config in sorted((ROOT / "config").glob("*.yaml")):
+        for config in sorted([*(ROOT / "config").glob("*.yaml"), *(ROOT / "config/datasets").glob("*.yaml")]):
             for f in check(config):
                 failures.append(f"{config.name}: {f['text']}")
         for name, config, file, old, new, words in FAULTS:

@@ -36,11 +36,11 @@ expect 0 "waymark " --version
 expect 0 "  eval      measure a run against truth" help
 expect 2 "did you mean 'replay'" repaly
 expect 2 "did you mean 'detect'" detct
-expect 2 "'dance' is no command" dance
+expect 2 "'dance' is not a command" dance
 for command in run replay check doctor record watch stamps; do expect 0 "example" "$command" --help; done
 
 expect 2 "--record: records devices" run --config "$work/good.yaml" --recording "$work/rec" --record "$work/new"
-expect 2 "is there already; a recording is never written over" run --config "$work/good.yaml" --record "$work/rec"
+expect 2 "exists already; a recording is never overwritten" run --config "$work/good.yaml" --record "$work/rec"
 expect 2 "replay needs a recording" replay
 expect 2 "replay needs --out" replay "$work/rec"
 expect 2 "needs --config" replay "$work/rec" --out "$work/out"
@@ -56,8 +56,8 @@ expect 0 "20 poses" replay "$work/deep/er/out/events.wmlog" --out "$work/again"
 # A run of another recording is not written over unasked.
 cp -r "$work/rec" "$work/bent"
 sed -i 's/straight/bent/' "$work/bent/recording.yaml"
-expect 0 "held another run, which is $work/again.before-1 now" replay "$work/bent" --config "$work/good.yaml" --out "$work/again"
-expect 0 "held another run, which is $work/again.before-2 now" run --recording "$work/rec" --config "$work/good.yaml" --out "$work/again/"
+expect 0 "had another run, which was renamed to $work/again.before-1" replay "$work/bent" --config "$work/good.yaml" --out "$work/again"
+expect 0 "had another run, which was renamed to $work/again.before-2" run --recording "$work/rec" --config "$work/good.yaml" --out "$work/again/"
 cmp -s "$work/again.before-1/events.wmlog" "$work/again.before-2/events.wmlog" && { echo "a run put aside was written over"; failures=$((failures + 1)); }
 expect 0 "20 poses" replay "$work/bent" --config "$work/good.yaml" --out "$work/again" --force
 [ ! -e "$work/again.before-3" ] || { echo "--force puts a run aside"; failures=$((failures + 1)); }
@@ -65,7 +65,7 @@ expect 0 "20 poses" replay "$work/deep/er/out/events.wmlog" --out "$work/again" 
 "$waymark" replay "$work/deep/er/out/events.wmlog" --out "$work/again" 2>&1 | grep "no pose was" && { echo "a log's replay says that it found no pose"; failures=$((failures + 1)); }
 expect 2 "another one needs the recording" replay "$work/deep/er/out/events.wmlog" --out "$work/again" --calibration x
 expect 1 "not an event log" replay "$work/good.yaml" --out "$work/again"
-expect 2 "holds the log that is to be replayed" replay "$work/deep/er/out/events.wmlog" --out "$work/deep/er/out"
+expect 2 "has the log that is replayed" replay "$work/deep/er/out/events.wmlog" --out "$work/deep/er/out"
 expect 2 "is a recording" replay "$work/rec" --config "$work/good.yaml" --out "$work/rec"
 expect 2 "did you mean its log" replay "$work/deep/er/out" --config "$work/good.yaml" --out "$work/again"
 expect 2 "is a recording" run --recording "$work/rec" --config "$work/good.yaml" --out "$work/rec"
@@ -114,7 +114,7 @@ done
 expect 2 "run needs --config" run
 expect 2 "devices: is missing, and no recording is given" run --config "$work/good.yaml"
 expect 2 "devices run at real speed" run --config "$work/good.yaml" --speed 2
-expect 2 "'0' is no number above 0" run --config "$work/good.yaml" --recording "$work/rec" --duration 0
+expect 2 "'0' is not a number above 0" run --config "$work/good.yaml" --recording "$work/rec" --duration 0
 expect 0 "20 poses" run --config "$work/good.yaml" --recording "$work/rec" --out "$work/live"
 cmp -s "$work/deep/er/out/trajectory.csv" "$work/live/trajectory.csv" || { echo "run and replay differ"; failures=$((failures + 1)); }
 
@@ -150,7 +150,7 @@ while [ ! -s "$work/broken/trajectory.csv" ] && kill -0 $pid 2>/dev/null; do sle
 kill -INT $pid
 wait $pid
 code=$?
-[ $code -eq 1 ] && grep -q "holds the run until then" "$work/said" || { echo "Ctrl-C of a replay: exit code $code"; cat "$work/said"; failures=$((failures + 1)); }
+[ $code -eq 1 ] && grep -q "has the run up to there" "$work/said" || { echo "Ctrl-C of a replay: exit code $code"; cat "$work/said"; failures=$((failures + 1)); }
 [ -s "$work/broken/health.json" ] && [ -s "$work/broken/timing.json" ] || { echo "Ctrl-C of a replay: files are missing"; failures=$((failures + 1)); }
 expect 0 "poses" replay "$work/broken/events.wmlog" --out "$work/broken2"
 "$waymark" replay "$work/broken/events.wmlog" --out "$work/broken2" 2>&1 | grep -q "no regular end" && { echo "Ctrl-C of a replay: the log was not closed"; failures=$((failures + 1)); }

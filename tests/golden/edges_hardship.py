@@ -32,7 +32,7 @@ def run(*command):
 
 
 def replay(recording, out, *more):
-    return run(BIN / "waymark", "replay", recording, "--config", SOURCE / "config/corridor.yaml", "--out", out, *more)
+    return run(BIN / "waymark", "replay", recording, "--config", SOURCE / "config/datasets/corridor.yaml", "--out", out, *more)
 
 
 def refused(what, texts, *command):
@@ -150,7 +150,7 @@ def start_outside(recording, folder):
 
 
 def bad_maps(recording, folder):
-    check = lambda rec: (BIN / "waymark", "replay", rec, "--config", SOURCE / "config/corridor.yaml", "--out",
+    check = lambda rec: (BIN / "waymark", "replay", rec, "--config", SOURCE / "config/datasets/corridor.yaml", "--out",
                          folder / "none")
     bad = copy_of(recording, folder / "bad")
     yaml = bad / "map/map.yaml"

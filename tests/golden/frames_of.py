@@ -14,7 +14,7 @@ import tempfile
 
 from judged import ROOT, check, failures, run
 
-CONFIG = ROOT / "config/corridor.yaml"
+CONFIG = ROOT / "config/datasets/corridor.yaml"
 
 
 def simulate(folder, seed, seconds):

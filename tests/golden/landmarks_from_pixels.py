@@ -15,7 +15,7 @@ from judged import ROOT, check, failures, run
 sys.path.insert(0, str(ROOT / "tools/montecarlo"))
 import carried_off
 
-CONFIG = ROOT / "config/crossing.yaml"
+CONFIG = ROOT / "config/datasets/crossing.yaml"
 RATE_HZ = 4
 
 

@@ -54,7 +54,7 @@ def judge(out, truth, begin_ns):
 
 def world(name, folder):
     rec, lap, frozen = folder / "rec", folder / "lap", folder / "frozen.yaml"
-    config = ROOT / f"config/{name}.yaml"
+    config = ROOT / f"config/datasets/{name}.yaml"
     run("waymark-simulate", ROOT / f"config/worlds/{name}.yaml", "--duration", DRIVE_S, "--out", rec)
     run("waymark", "replay", rec, "--config", config, "--until", LAP_S, "--out", lap)
     frozen.write_text(config.read_text().replace("slam:\n", "slam:\n  landmarks: {map: frozen}\n", 1))

@@ -86,7 +86,7 @@ def counters(value, path=""):
 
 
 def output_of(folder, config, world, seconds):
-    out = [f"config/{config}.yaml on config/worlds/{world}.yaml, {seconds} s"]
+    out = [f"config/datasets/{config}.yaml on config/worlds/{world}.yaml, {seconds} s"]
     for name in ("trajectory.csv", "published.csv", "map-estimate.csv"):
         if (folder / name).exists():
             out += trajectory_text(folder / name)
@@ -103,7 +103,7 @@ def make(binaries, folder):
         recording = folder / f"{world}-{seconds}"
         if not recording.exists():
             run(binaries / "waymark-simulate", ROOT / f"config/worlds/{world}.yaml", "--duration", seconds, "--out", recording)
-        run(binaries / "waymark", "replay", recording, "--config", ROOT / f"config/{config}.yaml", "--out", folder / config)
+        run(binaries / "waymark", "replay", recording, "--config", ROOT / f"config/datasets/{config}.yaml", "--out", folder / config)
         out[f"{config}.txt"] = output_of(folder / config, config, world, seconds)
         shutil.rmtree(folder / config)
     return out

@@ -72,7 +72,7 @@ def make_late(recording, stream, out):
 
 
 def replay(work, config, name, stream):
-    recording, config = DATA / name, ROOT / f"config/{config}.yaml"
+    recording, config = DATA / name, ROOT / f"config/datasets/{config}.yaml"
     print(name)
     for out in ("one", "two"):
         waymark("replay", recording, "--config", config, "--out", work / out)
@@ -91,7 +91,7 @@ def replay(work, config, name, stream):
 def live(work, config, name):
     recording = DATA / name
     print(f"{name}, live")
-    print("  " + waymark("run", "--recording", recording, "--config", ROOT / f"config/{config}.yaml", "--out",
+    print("  " + waymark("run", "--recording", recording, "--config", ROOT / f"config/datasets/{config}.yaml", "--out",
                          work / "live", "--duration", 60).strip().splitlines()[-1].strip())
     steady(work / "live", "run")
     waymark("replay", work / "live/events.wmlog", "--out", work / "live-log")

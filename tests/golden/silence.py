@@ -13,7 +13,7 @@ import tempfile
 
 from judged import ROOT, check, failures, run
 
-CONFIG = ROOT / "config/crossing-points.yaml"
+CONFIG = ROOT / "config/datasets/crossing-points.yaml"
 WORLD = ROOT / "config/worlds/crossing-laps.yaml"
 SILENCES_S = (3, 6, 20)
 BEGINS_S = (12, 25, 38, 50, 62, 75)  # turns, straights and a stop
@@ -81,7 +81,7 @@ def judge(trajectory, truth, begin_ns, end_ns):
 
 
 def office_config(to):
-    text = (ROOT / "config/office-walls.yaml").read_text()
+    text = (ROOT / "config/datasets/office-walls.yaml").read_text()
     for old, new in OFFICE_CHANGES:
         assert text.count(old) == 1, old
         text = text.replace(old, new)

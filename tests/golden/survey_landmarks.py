@@ -12,7 +12,7 @@ import tempfile
 
 from judged import ROOT, check, failures, run
 
-CONFIG = ROOT / "config/crossing-cameras.yaml"
+CONFIG = ROOT / "config/datasets/crossing-cameras.yaml"
 WORLD = ROOT / "config/worlds/crossing-drawn.yaml"
 
 
@@ -89,7 +89,7 @@ def odd_ones(folder):
     rewrite_sightings(doubled, lambda row: row.update(id=ids[0]) if row["id"] == ids[1] else None)
     table = surveyed(folder, doubled, "doubled-run")
     words = [line for line in findings(table) if line.startswith(f"landmark {ids[0]} ")]
-    check(any("stands twice" in line or "moved" in line for line in words), f"two of one identity: {words}")
+    check(any("duplicate" in line or "moved" in line for line in words), f"two of one identity: {words}")
     wrong = folder / "wrong-map"
     shutil.copytree(drive, wrong)
     rows = (wrong / "landmarks.csv").read_text().splitlines()

@@ -37,7 +37,7 @@ constexpr double kGoldenX = 29.100666971, kGoldenY = 31.081914698, kGoldenHeadin
 constexpr uint64_t kGoldenLeft = 590, kGoldenRight = 332;
 
 std::string root() { return std::getenv("WM_SOURCE_DIR"); }
-std::string shipped() { return root() + "/config/crossing-points.yaml"; }
+std::string shipped() { return root() + "/config/datasets/crossing-points.yaml"; }
 
 // Simulates seed 1 of the scenario as it is now with three landmarks, writes it, replays it into folder/OUT.
 void drive(const std::string &config_path, const char *out) {

@@ -25,7 +25,7 @@ def prepare(work):
     (work / "world.yaml").write_text(world)
     subprocess.run([WAYMARK.with_name("waymark-simulate"), work / "world.yaml", "--out", work / "recording", "--duration", str(SECONDS)], check=True,
                    stdout=subprocess.DEVNULL)
-    (work / "robot.yaml").write_text((ROOT / "config/corridor.yaml").read_text().replace("realtime: {", "realtime: {lock_memory: false, ")
+    (work / "robot.yaml").write_text((ROOT / "config/datasets/corridor.yaml").read_text().replace("realtime: {", "realtime: {lock_memory: false, ")
                                      + f"\npublish: {{lcm_url: '{URL}', picture_socket: pictures}}\n")
 
 

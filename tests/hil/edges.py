@@ -40,7 +40,7 @@ def prepare(work, root, here, simulate):
     shutil.copytree(recording / "map", scenario / "map")
     (scenario / "robot.yaml").write_text(
         # One processor: above the interrupts' threads (50), an estimator that takes 20 ms would cost CAN frames.
-        drives.with_realtime((root / "config/corridor.yaml").read_text(), "priority: 40") + f"\ninitial_pose: {drives.start_of(recording)}\n"
+        drives.with_realtime((root / "config/datasets/corridor.yaml").read_text(), "priority: 40") + f"\ninitial_pose: {drives.start_of(recording)}\n"
         "calibration: calibration.yaml\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\nmap: map/map.yaml\n"
         f"publish: {{lcm_url: '{drives.URL}'}}\n"
         "devices:\n  can: [{interface: can0}]\n"
@@ -50,4 +50,4 @@ def prepare(work, root, here, simulate):
 def judge(work, waymark, root):
     recording = work / "edges-recording"
     # The map was in the guest's memory; here it is the recording's.
-    return drives.judge("edges", work, waymark, recording, root / "config/corridor.yaml", SECONDS, "--map", recording / "map/map.yaml")
+    return drives.judge("edges", work, waymark, recording, root / "config/datasets/corridor.yaml", SECONDS, "--map", recording / "map/map.yaml")

@@ -104,7 +104,7 @@ def scenario_can(work, simulate):
         shutil.copy(recording / name, scenario)
     start = next(line for line in (recording / "recording.yaml").read_text().splitlines() if "initial_pose:" in line)
     # The configuration of the same drive at the desk, on CAN alone, and the robot's own files and devices.
-    config = (ROOT / "config/crossing-points.yaml").read_text().replace("lateness_max_ms: 300}", "use: false}")
+    config = (ROOT / "config/datasets/crossing-points.yaml").read_text().replace("lateness_max_ms: 300}", "use: false}")
     (work / "can.yaml").write_text(config)
     (scenario / "robot.yaml").write_text(
         config + f"\n{start.strip()}\n"

@@ -38,7 +38,7 @@ def prepare(work, root, here, simulate):
     for name in ("vehicle.dbc", "can-signals.yaml", "calibration.yaml", "landmarks.csv"):
         shutil.copy(recording / name, scenario)
     (scenario / "robot.yaml").write_text(
-        (root / "config/crossing-points.yaml").read_text() + f"\ninitial_pose: {drives.start_of(recording)}\n"
+        (root / "config/datasets/crossing-points.yaml").read_text() + f"\ninitial_pose: {drives.start_of(recording)}\n"
         "calibration: calibration.yaml\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\nlandmarks: landmarks.csv\n"
         f"publish: {{lcm_url: '{drives.URL}'}}\nrealtime: {{priority: 40}}\n"
         "devices: {can: [{interface: can0}], sightings: lcm}\n")
@@ -46,4 +46,4 @@ def prepare(work, root, here, simulate):
 
 def judge(work, waymark, root):
     seconds = float((work / "share/landmarks/duration").read_text())
-    return drives.judge("landmarks", work, waymark, work / "landmarks-recording", root / "config/crossing-points.yaml", seconds)
+    return drives.judge("landmarks", work, waymark, work / "landmarks-recording", root / "config/datasets/crossing-points.yaml", seconds)

@@ -59,7 +59,7 @@ def scenario_of(name, work, root, here, simulate):
         shutil.copy(recording / file, folder)
     (folder / "robot.yaml").write_text(
         # One processor: as in the other parts. The rest is as a robot has it.
-        drives.with_realtime((root / "config/office-walls.yaml").read_text(), "priority: 40") +
+        drives.with_realtime((root / "config/datasets/office-walls.yaml").read_text(), "priority: 40") +
         f"\ninitial_pose: {drives.start_of(recording)}\n"
         "calibration: calibration.yaml\ndbc: vehicle.dbc\ncan_signals: can-signals.yaml\n"
         "devices:\n  can: [{interface: can0}]\n"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""config/office-walls.yaml on a device: two detectors, the black box and a recording read one camera. The run's poses are those of
+"""config/datasets/office-walls.yaml on a device: two detectors, the black box and a recording read one camera. The run's poses are those of
 the replay of that recording; the processor's time is compared with that of each detector's run alone."""
 import csv
 import subprocess

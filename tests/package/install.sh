@@ -60,8 +60,8 @@ mkdir -p "$roots/$arch.recordings"
 build/bin/waymark simulate config/worlds/crossing.yaml --no-video --out "$roots/$arch.recordings/crossing" >/dev/null 2>&1 ||
   build/bin/waymark simulate config/worlds/crossing.yaml --out "$roots/$arch.recordings/crossing" >/dev/null
 cp -r "$roots/$arch.recordings/crossing" "$root/trial/crossing"
-inside waymark replay /trial/crossing --config /usr/share/doc/waymark/examples/crossing-points.yaml --out /trial/run | tail -3
-build/bin/waymark replay "$roots/$arch.recordings/crossing" --config "$root/usr/share/doc/waymark/examples/crossing-points.yaml" --out "$roots/$arch.recordings/run" >/dev/null
+inside waymark replay /trial/crossing --config /usr/share/doc/waymark/examples/datasets/crossing-points.yaml --out /trial/run | tail -3
+build/bin/waymark replay "$roots/$arch.recordings/crossing" --config "$root/usr/share/doc/waymark/examples/datasets/crossing-points.yaml" --out "$roots/$arch.recordings/run" >/dev/null
 cmp "$root/trial/run/trajectory.csv" "$roots/$arch.recordings/run/trajectory.csv" || fail "its trajectory is not this computer's"
 echo "the same $(wc -c <"$root/trial/run/trajectory.csv") bytes of trajectory as on this computer"
 

@@ -75,7 +75,7 @@ def main():
         assert stripped.stat().st_size <= 3 * MB
         measure("landmark_ekf", *landmarks(work), work, 64 * MB)
         if (DATA / "corridor-a").exists():
-            measure("edge_mcl", ROOT / "config/corridor.yaml", DATA / "corridor-a", work, 128 * MB)
+            measure("edge_mcl", ROOT / "config/datasets/corridor.yaml", DATA / "corridor-a", work, 128 * MB)
         else:
             print("edge_mcl: no corridor-a in WM_DATA_DIR: not measured")
     return 0

@@ -112,7 +112,7 @@ void say_parameters(const Calibration &c) {
 
 int run(const Arguments &a) {
   if (!a.chessboard.empty() && !a.aprilgrid.empty())
-    throw tools::Failure("--chessboard and --aprilgrid: one of them", tools::kUsage);
+    throw tools::Failure("give either --chessboard or --aprilgrid", tools::kUsage);
   const Board board = board_of(a);
   const Seen seen = look(a, board);
   std::fprintf(stderr, "%zu pictures, a board in %zu of them\n", seen.pictures, seen.views.size());
@@ -123,7 +123,8 @@ int run(const Arguments &a) {
         "Tags need --aprilgrid COLUMNSxROWS");
   const std::optional<Calibration> first = calibrate_camera(seen.views, seen.picture.width, seen.picture.height);
   if (!first)
-    throw tools::Failure("no lens makes sense of these boards; is --chessboard (inner corners) right, the board flat?");
+    throw tools::Failure(
+        "no camera model fits these boards; check that --chessboard counts inner corners and that the board is flat");
   for (const std::string &name : first->dropped_views) std::fprintf(stderr, "  left out: %s\n", name.c_str());
 
   const Calibration calibration = best(a, *first);
@@ -133,7 +134,7 @@ int run(const Arguments &a) {
   std::fprintf(
       stderr,
       "  the board was in %.0f %% of the picture, out to %.0f degrees from the axis (the picture goes to %.0f)\n"
-      "  where a ray lands is known to %.2f px in the mean, %.2f px at worst\n",
+      "  uncertainty of the projection: %.2f px in the mean, %.2f px at worst\n",
       100 * coverage.covered, coverage.widest_rad * kDeg, coverage.picture_rad * kDeg, coverage.sigma_mean_px,
       coverage.sigma_worst_px);
   const std::vector<std::string> wrong = complaints(calibration, coverage);
@@ -153,7 +154,7 @@ int run(const Arguments &a) {
 std::function<int()> camera_command(wm::cli::App &app) {
   auto a = std::make_shared<Arguments>();
   app.description(
-      "Finds a camera's model from pictures of a chessboard or an AprilGrid; lenses over 180 degrees, too.");
+      "Finds estimates a camera's model from pictures of a chessboard or an AprilGrid; lenses over 180 degrees, too.");
   app.add_option("FROM", a->from, "a folder of pictures (JPEG, PNG, PGM), or a recording's folder")->required();
   app.add_option("--camera", a->camera, "of a recording: this camera; needed where it has several");
   app.add_option("--chessboard", a->chessboard, "COLUMNSxROWS of inner corners: larger lattices are no board");

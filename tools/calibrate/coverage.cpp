@@ -93,7 +93,7 @@ std::vector<std::string> complaints(const Calibration &c, const Coverage &covera
     say("the boards differ by %.0f degrees of tilt at most; tilt it by 30 to 45 degrees both ways",
         coverage.tilt_rad * 180 / render::kPi);
   if (coverage.sigma_worst_px > 1)
-    say("where a ray lands is known to %.1f px only at the worst place; more pictures there", coverage.sigma_worst_px);
+    say("the projection is uncertain by %.1f px at the worst place; take more pictures there", coverage.sigma_worst_px);
   return out;
 }
 

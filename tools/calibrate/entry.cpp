@@ -66,7 +66,7 @@ void write_new(const std::string &path, const std::string &text) {
     return;
   }
   if (std::filesystem::exists(path))
-    throw tools::Failure(path + ": is there already and is not written over; name another file", tools::kUsage);
+    throw tools::Failure(path + ": exists already and is not overwritten; name another file", tools::kUsage);
   std::ofstream file(path);
   file << text;
   file.close();

@@ -46,11 +46,12 @@ std::function<int()> import_command(wm::cli::App &app) {
                  "YAML or XML of OpenCV, Kalibr's camchain, ROS camera_info, OCamCalib's calib_results.txt")
       ->required();
   app.add_option("--name", a->name, "the camera's name; default: the file's, else 'camera'");
-  app.add_option("--model", a->model, "fit to this model; auto: the file's where we have it, else the best of ours")
+  app.add_option("--model", a->model,
+                 "fit this model; auto: the file's model if it is supported, else the one that fits best")
       ->check(wm::cli::one_of({"auto", "equidistant", "double-sphere", "pinhole-radtan", "omni"}))
       ->capture_default_str();
   app.add_option("--size", a->size, "WIDTHxHEIGHT of the pictures, where the file doesn't have it");
-  app.add_option("--lens", a->lens, "OpenCV's four coefficients are of a plain lens or of a fisheye")
+  app.add_option("--lens", a->lens, "whether OpenCV's four coefficients are of a plain lens or of a fisheye")
       ->check(wm::cli::one_of({"plain", "fisheye"}));
   app.add_option("--out", a->out, "a new file to write; default: the screen");
   app.footer(

@@ -27,7 +27,7 @@ std::vector<ForeignCamera> read_foreign(const std::filesystem::path &path, const
                    flat.first({"camera_matrix.data", "K", "k"}) != nullptr;
   if (ros) return read_ros(flat, hints);
   if (flat.has("cameras"))
-    throw tools::Failure(path.string() + ": is a calibration.yaml of ours already; nothing to import");
+    throw tools::Failure(path.string() + ": is a calibration.yaml already; there is nothing to import");
   return read_opencv(flat, hints);
 }
 

@@ -69,7 +69,7 @@ Entry import_camera(const ForeignCamera &camera, const std::string &name, const 
     out.remark = remark;
     std::fprintf(stderr, "  verdict: %s\n",
                  fit.failed > 0           ? "the model can't show all of the picture; what lies there must not be used"
-                 : fit.max_px <= kGood_px ? "good: the models agree to well within what a detector sees"
+                 : fit.max_px <= kGood_px ? "good: the models agree within a detector's precision"
                  : fit.max_px <= kUsable_px
                      ? "usable; the rim is off, see above"
                      : "poor: the models disagree; calibrate anew with waymark calibrate camera");

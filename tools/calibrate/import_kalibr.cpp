@@ -76,8 +76,8 @@ std::vector<ForeignCamera> read_kalibr(const FlatFile &file, const ImportHints &
                    (file.has(cam + ".distortion_model") ? file.text(cam + ".distortion_model") : "none");
     if (file.has(cam + ".T_cam_imu") || file.has(cam + ".T_cn_cnm1"))
       camera.notes.push_back(
-          "where the cameras sit to each other (T_cn_cnm1, T_cam_imu) is left out: mountings here "
-          "are in base_link");
+          "the cameras' poses to each other and to the IMU (T_cn_cnm1, T_cam_imu) are left out: a mounting here is in "
+          "base_link");
     if (file.has(cam + ".timeshift_cam_imu"))
       camera.notes.push_back("timeshift_cam_imu is left out: stamps are the recording's");
     out.push_back(camera);

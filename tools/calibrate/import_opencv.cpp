@@ -54,8 +54,8 @@ bool is_fisheye(const FlatFile &file, const ImportHints &hints, const std::strin
     if (model.find(name) != std::string::npos) return true;
   if (coefficients == 4 && model.empty())
     file.fail(key,
-              "four coefficients are k1 k2 p1 p2 of a plain lens or k1 k2 k3 k4 of a fisheye, and the file "
-              "the file doesn't state which; give --lens plain (cv2.calibrateCamera) or --lens fisheye (cv2.fisheye)");
+              "four coefficients are k1 k2 p1 p2 of a plain lens or k1 k2 k3 k4 of a fisheye, and the file doesn't "
+              "state which; give --lens plain (cv2.calibrateCamera) or --lens fisheye (cv2.fisheye)");
   return false;
 }
 

@@ -261,7 +261,7 @@ class Problem {
 Mounting find_mounting(const std::vector<MountingScan> &scans, const wm_raster &map, const wm_camera &camera) {
   if (scans.size() < 50)
     throw tools::Failure(std::to_string(scans.size()) +
-                         " pictures with edges: too few, drive for half a minute at least");
+                         " pictures with edges: too few; drive for at least half a minute");
   Problem problem(scans, map, camera);
   int rounds = 0;
   double moved = 1e9;

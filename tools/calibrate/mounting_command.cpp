@@ -166,8 +166,8 @@ int report(const Mounting &found, const wm_camera &camera) {
   const bool fits = found.explained > 0.5 && found.moved < 0.5;
   if (!fits)
     std::printf("\nnot to be used: %s\n", found.explained > 0.5
-                                              ? "it does not settle; is the map's scale right?"
-                                              : "the map does not explain what is seen; was the pose lost?");
+                                              ? "the estimate does not converge; check the map's resolution"
+                                              : "the edges in the pictures do not fit the map; was the pose lost?");
   else if (all_known)
     std::printf("\ngood. For calibration.yaml, %s:\n", camera.name);
   else
@@ -206,12 +206,12 @@ int run(const Arguments &a) {
 std::function<int()> mounting_command(wm::cli::App &app) {
   const auto a = std::make_shared<Arguments>();
   app.add_option("REC", a->recording, "recording of a drive, with video, motion and a map")->required();
-  app.add_option("--config", a->config, "configuration to localize with, such as config/corridor.yaml");
+  app.add_option("--config", a->config, "configuration to localize with, such as config/datasets/corridor.yaml");
   app.add_option("--run", a->run, "a replay of it that there is already, instead of --config");
   app.add_option("--camera", a->camera, "which, where there are several");
   app.add_option("--map", a->map, "a map.yaml instead of the recording's");
   app.footer(
-      "example: waymark calibrate mounting recordings/drive --config config/corridor.yaml\n"
+      "example: waymark calibrate mounting recordings/drive --config config/datasets/corridor.yaml\n"
       "The drive should have turns, straight ways forwards and back, and edges on both sides. Exit code: 0 good, 1 "
       "not\n"
       "known well enough or failed, 2 usage.");

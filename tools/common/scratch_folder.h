@@ -15,7 +15,7 @@ class ScratchFolder {
  public:
   explicit ScratchFolder(const std::string &name) {
     std::string path = (std::filesystem::temp_directory_path() / (name + "-XXXXXX")).string();
-    if (mkdtemp(path.data()) == nullptr) throw Failure(path + ": the folder can't be made");
+    if (mkdtemp(path.data()) == nullptr) throw Failure(path + ": the folder cannot be created");
     path_ = path;
   }
   ~ScratchFolder() {

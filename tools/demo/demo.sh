@@ -11,9 +11,9 @@ export LC_ALL=C
 waymark=build/bin/waymark
 out=${1:-build/demo}
 world=config/worlds/crossing-demo.yaml
-world_config=config/crossing-cameras.yaml
+world_config=config/datasets/crossing-cameras.yaml
 scenario=config/worlds/crossing.yaml
-config=config/crossing-points.yaml
+config=config/datasets/crossing-points.yaml
 drives=40
 
 step() { printf '\033[1m== %s\033[0m\n' "$*"; }
@@ -36,7 +36,7 @@ step "a drive in a rendered world: build it, take the pictures, localize, judge"
 quietly "$waymark" simulate "$world" --duration 20 --out "$out/recording"
 for run in cameras odometry; do
   config_of_run=$world_config
-  [ $run = cameras ] || config_of_run=config/crossing-odometry.yaml
+  [ $run = cameras ] || config_of_run=config/datasets/crossing-odometry.yaml
   quietly "$waymark" replay "$out/recording" --config "$config_of_run" --out "$out/run-$run"
   "$waymark" eval "$out/run-$run" "$out/recording" --json >"$out/eval-$run.json"
 done

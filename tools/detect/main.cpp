@@ -50,7 +50,7 @@ void parse(wm::cli::App *app, DetectWish *a) {
       "  waymark detect photos/ --detector apriltag --out out/seen\n"
       "  waymark detect REC --detector apriltag --set family=tag36h11 --set size_m=0.16 --out out/seen\n"
       "  waymark detect REC --detector lines --camera ceiling --out out/seen --every 5\n"
-      "  waymark detect REC --config config/corridor.yaml --out out/detected --every 10\n"
+      "  waymark detect REC --config config/datasets/corridor.yaml --out out/detected --every 10\n"
       "docs/detect.md explains what is drawn, and the columns. Exit code: 0 done, 1 the work failed, 2 usage.");
 }
 

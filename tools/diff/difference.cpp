@@ -99,7 +99,7 @@ std::string largest_pose_difference(const Csv &a, const Csv &b) {
     if (apart > position_m) position_m = apart, position_at = at_a;
     if (turned > turned_rad) turned_rad = turned, turned_at = at_a;
   }
-  if (position_m < 0) return "no stamp is in both";
+  if (position_m < 0) return "the runs have no stamp in common";
   char text[200];
   std::snprintf(text, sizeof text, "largest: position %.3g m at %.3f s, rotation %.3g deg at %.3f s", position_m,
                 static_cast<double>(position_at) * 1e-9, std::max(0.0, turned_rad) * 180 / M_PI,
@@ -111,7 +111,7 @@ Difference compare_csv(const std::string &name, const fs::path &file_a, const fs
   Difference out{name, false, {}, std::nullopt, ""};
   const Csv a = Csv::load(file_a);
   const Csv b = Csv::load(file_b);
-  if (a.columns() != b.columns()) out.says.emplace_back("the columns are not the same");
+  if (a.columns() != b.columns()) out.says.emplace_back("the columns differ");
   if (a.rows() != b.rows())
     out.says.push_back(std::to_string(a.rows()) + " rows -> " + std::to_string(b.rows()) + " rows");
   const size_t both = std::min(a.rows(), b.rows());
@@ -196,7 +196,8 @@ Difference compare_json(const std::string &name, const fs::path &file_a, const f
 std::vector<Difference> differences(const fs::path &a, const fs::path &b) {
   for (const fs::path &run : {a, b})
     if (!fs::is_directory(run) || (!fs::exists(run / "trajectory.csv") && !fs::exists(run / "trajectory.tum")))
-      throw Failure(run.string() + ": is no run's folder (trajectory.csv or trajectory.tum is in one)", kUsage);
+      throw Failure(run.string() + ": is not the folder of a run; it has neither trajectory.csv nor trajectory.tum",
+                    kUsage);
   std::vector<Difference> out;
   for (const std::string name : {"trajectory.csv", "trajectory.tum", "published.csv", "innovations.csv",
                                  "map-estimate.csv", "reference.csv", "events.wmlog", "particles.bin", "health.json"}) {
@@ -235,7 +236,7 @@ std::string difference_text(const std::vector<Difference> &all, const std::strin
   }
   if (same) return text + "\nThe two runs are the same.\n";
   if (earliest != nullptr)
-    text += "\nIt began at " + seconds_text(*earliest->began_ns) + " in " + earliest->file +
+    text += "\nThe first difference is at " + seconds_text(*earliest->began_ns) + " in " + earliest->file +
             (earliest->began_with.empty() ? "" : ": " + earliest->began_with) + "\n";
   return text;
 }

@@ -12,7 +12,7 @@ int main(int argc, char **argv) {
   using namespace wm::tools;
   std::string first;
   std::string second;
-  wm::cli::App app("Says what changed between two runs, and where it began.", "waymark diff");
+  wm::cli::App app("Compares two runs: what differs, and where the difference begins.", "waymark diff");
   app.add_option("RUN", first, "folder of a run")->required();
   app.add_option("OTHER", second, "folder of another run")->required();
   app.footer(

@@ -118,7 +118,7 @@ Similarity align(const std::vector<Eigen::Vector3d> &from, const std::vector<Eig
   }
   if (kind == Alignment::kSim2) {
     out.scale = (out.R * a).cwiseProduct(b).sum() / a.squaredNorm();
-    if (!(out.scale > 0)) throw Failure("--align sim2: the run runs against truth: no positive scale fits");
+    if (!(out.scale > 0)) throw Failure("--align sim2: the run's path is opposite to truth; no positive scale fits");
   }
   out.t = b_mean - out.scale * (out.R * a_mean);
   if (planar) out.t.z() = 0;

@@ -50,7 +50,7 @@ Figures evaluate_detector(const DetectorArguments &a) {
   const fs::path detections = run / "detections" / (camera.name + "-edges.csv");
   FramePolylines truth = load_polylines(labels);
   if (!fs::exists(detections) && !fs::exists(run / "events.wmlog"))
-    throw Failure(detections.string() + ": is not there, nor an events.wmlog: this run saw no edges");
+    throw Failure(detections.string() + ": is not there, nor an events.wmlog: this run detected no edges");
   const FramePolylines detected =
       fs::exists(detections)
           ? load_polylines(detections)
@@ -86,7 +86,7 @@ Figures evaluate_lines(const DetectorArguments &a) {
     const auto stamp = stamps.find(entry.first);
     return stamp == stamps.end() || !seen.contains(stamp->second);
   });
-  if (truth.empty()) throw Failure(run.string() + ": the run looked at no labelled picture");
+  if (truth.empty()) throw Failure(run.string() + ": the run processed no labelled picture");
   mark_contrast(recording, own, static_cast<int32_t>(&camera - cameras.data()), stamps, &truth);
   std::vector<LinePicture> pictures;
   for (const auto &[frame, lines] : truth) pictures.push_back({lines, seen.at(stamps.at(frame))});

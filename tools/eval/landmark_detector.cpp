@@ -263,7 +263,7 @@ Figures evaluate_landmarks(const DetectorArguments &a, double size_min_px, const
   for (size_t i = 0; i < cameras.size(); i++)
     if (a.camera.empty() || a.camera == cameras[i].name)
       judge_camera(run, recording, i, cameras[i], size_min_px, sizes_m, &n);
-  if (n.pictures == 0) throw Failure(run.string() + ": the run saw no landmark in a labelled picture");
+  if (n.pictures == 0) throw Failure(run.string() + ": the run detected no landmark in a labelled picture");
   Figures f;
   f["within_deg"] = kWithin_rad * 180 / M_PI;
   f["size_min_px"] = size_min_px;

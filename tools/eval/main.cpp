@@ -32,7 +32,7 @@ struct Arguments {
 };
 
 void parse(wm::cli::App *app, Arguments *a) {
-  app->description("Holds the poses of a run against the truth of its recording.");
+  app->description("Compares the poses of a run with the truth of its recording.");
   app->add_option("RUN", a->run, "folder that a run wrote")->required();
   app->add_option("REC", a->recording, "folder of the recording, with truth.csv")->required();
   app->add_flag("--json", a->json, "one JSON object; null where a figure is not defined");
@@ -59,9 +59,10 @@ void parse(wm::cli::App *app, Arguments *a) {
                   "--detector landmarks: recall is of those whose shorter side has so many pixels")
       ->check(wm::cli::range(1.0, 1000.0))
       ->capture_default_str();
-  app->add_option("--view", a->view_m,
-                  "--detector: the floor that it looks at, x from, x to, y from, y to in base_link, m: true edges "
-                  "outside are left out")
+  app->add_option(
+         "--view", a->view_m,
+         "--detector: the part of the floor that is judged, x from, x to, y from, y to in base_link, m: true edges "
+         "outside are left out")
       ->delimiter(',')
       ->expected(4);
   app->footer(
@@ -128,7 +129,7 @@ int main(int argc, char **argv) {
     if (arguments.compare.from_s && arguments.compare.to_s && *arguments.compare.from_s >= *arguments.compare.to_s)
       throw Failure("--from must be before --to", kUsage);
     if (arguments.takes_out_delay && arguments.against != "gnss")
-      throw Failure("--take-out-delay: is of a receiver; it needs --against gnss", kUsage);
+      throw Failure("--take-out-delay: needs --against gnss; it is the receiver's delay", kUsage);
     if (!arguments.detector.empty()) {
       const DetectorArguments detector{arguments.run, arguments.recording, arguments.camera, arguments.view_m};
       const bool lines = arguments.detector == "lines", landmarks = arguments.detector == "landmarks";

@@ -52,9 +52,9 @@ std::string figures_table(const Figures &f, const std::string &title, const std:
   out += "\n  end error " + cell(f, "position_end_percent", 3, " %") + " of the way; lost " + cell(f, "lost_count", 0) +
          " times, " + cell(f, "lost_s", 1, " s") + "\n";
   if (f["anees_dof"].is_number())
-    out += "  its own word on its error (NEES): inside the 95 % region at " + percent(f, "nees_inside_95") +
-           " of the stamps, mean " + cell(f, "nees_mean", 2) + " (" + cell(f, "anees_dof", 0) +
-           " expected); longest beyond 3.5 sigma " + cell(f, "beyond_3_5_sigma_longest_s", 1, " s") + "\n";
+    out += "  consistency (NEES): inside the 95 % region at " + percent(f, "nees_inside_95") + " of the stamps, mean " +
+           cell(f, "nees_mean", 2) + " (" + cell(f, "anees_dof", 0) + " expected); longest beyond 3.5 sigma " +
+           cell(f, "beyond_3_5_sigma_longest_s", 1, " s") + "\n";
   if (f.contains("gnss_delay_s"))
     out += "  the receiver's positions are late by " + cell(f, "gnss_delay_s", 2, " s") +
            ", which is taken out here: rms of the nearest 80 % " + cell(f, "gnss_delay_rms_before_m", 3, " m") +
@@ -66,7 +66,7 @@ std::string figures_table(const Figures &f, const std::string &title, const std:
     out += "  landmarks: " + cell(f, "landmarks_found", 0) + " of " + cell(f, "landmarks_total", 0) +
            " found (matched by " + f["landmarks_matched_by"].get<std::string>() + "), rms " +
            cell(f, "landmark_rmse_m", 3, " m") + ", largest " + cell(f, "landmark_max_m", 3, " m") +
-           ", map laid over the true one " + cell(f, "landmark_rmse_own_fit_m", 3, " m") + ", heading " +
+           ", map aligned to the true one " + cell(f, "landmark_rmse_own_fit_m", 3, " m") + ", heading " +
            cell(f, "landmark_heading_rmse_deg", 2, " deg") + "\n";
   if (f.contains("published"))
     out += "  published: " + cell(f, "published", 0) + " poses, t_ns " +

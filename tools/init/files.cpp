@@ -217,9 +217,9 @@ void write_files(const std::string &folder, const std::vector<File> &files, bool
   const fs::path to = folder;
   for (const File &file : files) {
     if (!force && fs::exists(to / file.name))
-      throw tools::Failure((to / file.name).string() +
-                               ": is there already and is not written over; name another folder, or give --force",
-                           tools::kUsage);
+      throw tools::Failure(
+          (to / file.name).string() + ": exists already and is not overwritten; name another folder, or give --force",
+          tools::kUsage);
     if (!file.from.empty() && !fs::is_regular_file(file.from))
       throw tools::Failure(file.from + ": cannot be read", tools::kUsage);
   }

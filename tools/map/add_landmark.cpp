@@ -54,7 +54,7 @@ Matrix3d square_to_rays(const Vector3d rays[4]) {
   const Vector3d scale = sides.inverse() * rays[0];  // rays[0] = s1 rays[1] - s2 rays[2] + s3 rays[3]
   if (!(scale.minCoeff() > 0))
     throw Failure(
-        "--corners: they are no convex quadrilateral in the order upper left, upper right, lower right, lower left",
+        "--corners: are not a convex quadrilateral in the order upper left, upper right, lower right, lower left",
         kUsage);
   Matrix3d out;
   out << scale[0] * rays[1] - rays[0], scale[2] * rays[3] - rays[0], rays[0];
@@ -152,7 +152,7 @@ AddedLandmark add_landmark(const AddLandmark &a) {
   const Vector3d at = a.at_m.empty() ? *known : vector_of(a.at_m);
   if (known && (*known - at).norm() > 1e-3)
     throw Failure(out.landmarks.string() + ": landmark " + std::to_string(a.id) +
-                      " stands there with another place; leave --at out to add one more picture of it",
+                      " is on the map at another place; leave --at out to add one more picture of it",
                   kUsage);
 
   const GreyPicture picture = load_picture(a.picture);
@@ -200,7 +200,7 @@ AddedLandmark add_landmark(const AddLandmark &a) {
   out.width_px = static_cast<int>(std::lround(shrink * wide));
   out.height_px = static_cast<int>(std::lround(shrink * high));
   if (std::min(out.width_px, out.height_px) < kSideMin_px)
-    throw Failure("--corners: less than " + std::to_string(kSideMin_px) + " pixels a side teach nothing", kUsage);
+    throw Failure("--corners: less than " + std::to_string(kSideMin_px) + " pixels a side are too few", kUsage);
   const render::Picture8 look = cut_out(picture, optics, square, out.width_px, out.height_px);
   double sum = 0, squares = 0;
   for (const uint8_t v : look.bytes) sum += v, squares += static_cast<double>(v) * v;

@@ -9,7 +9,8 @@
 namespace wm::tools {
 
 struct AddLandmark {
-  std::filesystem::path map;  // the folder with landmarks.csv and landmarks/, made where missing; or the landmarks.csv
+  std::filesystem::path
+      map;  // the folder with landmarks.csv and landmarks/, created if it is missing; or the landmarks.csv
   int id = -1;
   std::string picture;         // JPEG, PNG or PGM
   std::vector<double> at_m;    // x, y, z of its middle; empty: as landmarks.csv has it already

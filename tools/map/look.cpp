@@ -94,7 +94,7 @@ int look_at_picture(const LookAtPicture &a) {
   const wm_rig &rig = *wm_site_rig(map.get());
   int32_t index = 0;
   if (rig.camera_count != 1 || !a.camera.empty()) index = wm_rig_find_camera(&rig, a.camera.c_str());
-  if (index < 0) throw Failure(a.calibration + ": --camera: '" + a.camera + "' is none of its cameras", kUsage);
+  if (index < 0) throw Failure(a.calibration + ": --camera: '" + a.camera + "' is not one of its cameras", kUsage);
   wm_view view{};
   view.rig = &rig;
   view.cameras = &index;
@@ -131,7 +131,7 @@ int look_at_picture(const LookAtPicture &a) {
     throw Failure(a.picture + ": has another size than the camera of " + a.calibration, kUsage);
   std::vector<wm_looked_for> looks(view.appearance_count);
   looks.resize(std::min(looks.size(), detector->looked_for(state.get(), looks.data(), looks.size())));
-  std::printf("landmark  what became of it   expected px        found px           likeness\n");
+  std::printf("landmark  outcome             expected px        found px           likeness\n");
   for (const wm_looked_for &l : looks)
     std::printf("%8d  %-18s %8.2f %8.2f  %8.2f %8.2f  %6.3f\n", l.landmark_id, wm_look_name(l.look), l.expected_px[0],
                 l.expected_px[1], l.found_px[0], l.found_px[1], l.likeness);

@@ -44,12 +44,12 @@ struct SurveyArguments {
 };
 
 void parse_survey(wm::cli::App &app, SurveyArguments &a) {
-  app.description("How well each landmark of a run's map fits, and which ones moved, stand twice or are misread.");
+  app.description(
+      "Reports how well each landmark of a run's map fits, and which ones moved, are duplicates or are misread.");
   app.add_option("RUN", a.run, "the folder that `waymark replay` or `waymark run` wrote")->required();
-  app.add_option(
-      "--poses", a.poses,
-      "makes the map: a recording (its truth.csv) or another run (its trajectory.csv) that says where the robot "
-      "was; landmarks are where the run's bearings meet");
+  app.add_option("--poses", a.poses,
+                 "makes the map: a recording (its truth.csv) or another run (its trajectory.csv) with the robot's "
+                 "poses; landmarks are where the run's bearings meet");
   app.add_option("--out", a.out, "with --poses: folder for landmarks.csv and, where the recording has it, landmarks/");
   app.add_flag("--json", a.json, "one object instead of a table");
   app.footer(
@@ -96,7 +96,7 @@ void parse_make(wm::cli::App &app, Make &a) {
 }
 
 void parse_check(wm::cli::App &app, Check &a) {
-  app.description("Says what a raster map is like, and what is wrong with it.");
+  app.description("Describes a raster map and reports its errors.");
   app.add_option("MAP", a.map, "a map.yaml")->required();
   app.add_option("--recording", a.recording, "also check whether its start pose is on the map");
   app.add_option("--draw", a.draw, "a PNG to draw");
@@ -131,8 +131,9 @@ void parse_print(wm::cli::App &app, PrintMarkers &a) {
 }
 
 void parse_add(wm::cli::App &app, AddLandmark &a) {
-  app.description("Teaches a map how a landmark (a sign, a house number, a window) looks, from a picture of it.");
-  app.add_option("MAP", a.map, "the folder with landmarks.csv, or that file; made where missing")->required();
+  app.description(
+      "Adds the appearance of a landmark (a sign, a house number, a window) to a map, from a picture of it.");
+  app.add_option("MAP", a.map, "the folder with landmarks.csv, or that file; created if it is missing")->required();
   app.add_option("--id", a.id, "the landmark's")->required()->check(wm::cli::range(0, 2147483647));
   app.add_option("--picture", a.picture, "JPEG, PNG or PGM")->required();
   app.add_option("--at", a.at_m, "X,Y,Z of its middle in the map, m; needed where landmarks.csv hasn't got it")
@@ -170,8 +171,8 @@ int add(const AddLandmark &a) {
   const AddedLandmark made = add_landmark(a);
   std::printf("%s: %d x %d px of %.3f x %.3f m, contrast %.0f grey levels%s\n  %s and %s know landmark %d\n",
               made.picture.c_str(), made.width_px, made.height_px, made.width_m, made.height_m, made.spread_grey,
-              made.spread_grey < 12 ? ": LITTLE, it can hardly be distinguished from a wall" : "",
-              made.landmarks.c_str(), made.appearances.c_str(), a.id);
+              made.spread_grey < 12 ? ": TOO LOW to distinguish it from a wall" : "", made.landmarks.c_str(),
+              made.appearances.c_str(), a.id);
   return kDone;
 }
 
@@ -273,7 +274,7 @@ int make(Make &a) {
   }
   const fs::path folder = a.out;
   if (fs::exists(folder / "map.yaml"))
-    throw Failure((folder / "map.yaml").string() + ": is there already and is not written over; name another --out",
+    throw Failure((folder / "map.yaml").string() + ": exists already and is not overwritten; name another --out",
                   kUsage);
   const Plan plan = read_plan(a);
   const Layers layers = make_layers(plan, a.layers);
@@ -340,24 +341,24 @@ int main(int argc, char **argv) {
   Make make_arguments;
   Check check_arguments;
   SurveyArguments survey_arguments;
-  wm::cli::App *make_app = app.add_subcommand("make", "layers from a floor plan or an occupancy map");
-  wm::cli::App *check_app = app.add_subcommand("check", "what a map is like, and what is wrong with it");
-  wm::cli::App *survey_app =
-      app.add_subcommand("survey", "how well the landmarks of a run fit, and what is odd about them");
+  wm::cli::App *make_app = app.add_subcommand("make", "makes a raster map from a floor plan or an occupancy map");
+  wm::cli::App *check_app = app.add_subcommand("check", "describes a raster map and reports its errors");
+  wm::cli::App *survey_app = app.add_subcommand(
+      "survey", "reports how well the landmarks of a run fit, and which moved, are duplicates or are misread");
   parse_survey(*survey_app, survey_arguments);
   AddLandmark add_arguments;
   add_arguments.yaw_deg = std::nan("");
-  wm::cli::App *add_app = app.add_subcommand("add-landmark", "how a landmark looks, learnt from a picture");
+  wm::cli::App *add_app = app.add_subcommand("add-landmark", "adds a landmark's appearance from a picture");
   parse_add(*add_app, add_arguments);
   LookAtPicture look_arguments;
-  wm::cli::App *look_app = app.add_subcommand("look", "where the landmarks are in a picture");
+  wm::cli::App *look_app = app.add_subcommand("look", "looks for the landmarks in a picture");
   parse_look(*look_app, look_arguments);
   PrintMarkers print_arguments;
-  wm::cli::App *print_app = app.add_subcommand("print-markers", "sheets of coded markers at true scale");
+  wm::cli::App *print_app = app.add_subcommand("print-markers", "prints coded markers at true scale");
   parse_print(*print_app, print_arguments);
   TrainCascade train_arguments;
   wm::cli::App *train_app =
-      app.add_subcommand("train-cascade", "a cascade for a class of landmarks, from labelled pictures");
+      app.add_subcommand("train-cascade", "trains a detector for a class of landmarks from labelled pictures");
   parse_train(*train_app, train_arguments);
   parse_make(*make_app, make_arguments);
   parse_check(*check_app, check_arguments);

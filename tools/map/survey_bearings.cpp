@@ -119,8 +119,9 @@ void judge(const Drive &drive, size_t landmark, const std::vector<SurveyedPlace>
                                    seconds(drive, after ? *first : fitting.front().t_ns), after ? "to" : "from",
                                    other.p_m.x(), other.p_m.y()));
     else
-      out->findings.push_back(said("stands twice: %zu sightings are of one %.2f m away, at (%.2f, %.2f)",
-                                   there_ns.size(), away, other.p_m.x(), other.p_m.y()));
+      out->findings.push_back(
+          said("has a duplicate: %zu sightings are of another landmark %.2f m away, at (%.2f, %.2f)", there_ns.size(),
+               away, other.p_m.x(), other.p_m.y()));
   } else if (strays.size() >= 3 &&
              static_cast<double>(strays.size()) > kOftenMisread * static_cast<double>(strays.size() + fitting.size())) {
     out->findings.push_back(said("%zu of %zu sightings fit no place: its identity is misread, or others are read as it",
@@ -175,8 +176,7 @@ void write_map(const SurveyDrive &drive, const Drive &taken, const std::vector<S
 Survey survey_drive(const SurveyDrive &drive) {
   if (!drive.out.empty() && fs::exists(drive.out / "landmarks.csv"))
     throw Failure(
-        (drive.out / "landmarks.csv").string() + ": is there already and is not written over; name another --out",
-        kUsage);
+        (drive.out / "landmarks.csv").string() + ": exists already and is not overwritten; name another --out", kUsage);
   Drive taken = load_drive(drive.run, load_poses(drive.poses));
   if (taken.bearings.empty())
     throw Failure((drive.run / "events.wmlog").string() +

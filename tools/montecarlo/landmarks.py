@@ -8,7 +8,7 @@ Renders what the cache lacks, runs the filter from the pictures (and by dead rec
 
 Beside each figure stands the Cramer-Rao bound of these drives, with the bearings and sigmas that the detector found.
 
-example: tools/montecarlo/landmarks.py config/worlds/crossing-easy.yaml --config config/crossing.yaml --cache out/easy --seeds 1-10
+example: tools/montecarlo/landmarks.py config/worlds/crossing-easy.yaml --config config/datasets/crossing.yaml --cache out/easy --seeds 1-10
 24 s at 5 Hz are 240 pictures: some 30 s of processor to render, 8 MB to keep. What is there already is taken as it is. With --rows
 what each drive gave is kept, too: stopped, it goes on where it was."""
 import argparse
@@ -270,8 +270,8 @@ def seeds_of(text):
 def main():
     p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     p.add_argument("scenario", type=pathlib.Path)
-    p.add_argument("--config", type=pathlib.Path, default=ROOT / "config/crossing.yaml")
-    p.add_argument("--baseline", type=pathlib.Path, default=ROOT / "config/crossing-odometry.yaml")
+    p.add_argument("--config", type=pathlib.Path, default=ROOT / "config/datasets/crossing.yaml")
+    p.add_argument("--baseline", type=pathlib.Path, default=ROOT / "config/datasets/crossing-odometry.yaml")
     p.add_argument("--cache", type=pathlib.Path, required=True, help="folder of the recordings")
     p.add_argument("--seeds", type=seeds_of, default=range(1, 11), help="FIRST-LAST")
     p.add_argument("--duration", type=float, default=24)

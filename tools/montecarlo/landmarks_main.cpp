@@ -193,7 +193,8 @@ int main(int argc, char **argv) {
   app.add_option("--looks", a.csv, "writes what was judged, a row each 0.1 s, here (CSV)");
   app.add_option("--diagram", a.diagram, "writes the reliability diagram of the probability of being lost here (SVG)");
   app.footer(
-      "example: waymark-montecarlo-landmarks config/worlds/crossing-easy.yaml --config config/crossing-cameras.yaml\n"
+      "example: waymark-montecarlo-landmarks config/worlds/crossing-easy.yaml --config "
+      "config/datasets/crossing-cameras.yaml\n"
       "docs/consistency.md defines each figure. Exit code: 0 done, 1 failed, 2 usage or configuration.");
   return wm::tools::run_program(app, argc, argv, [&] { return run(a); });
 }

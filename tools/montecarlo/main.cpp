@@ -98,7 +98,8 @@ void parse(wm::cli::App *app, Arguments *a) {
                   "six degrees of freedom: only so many points of each pair of pictures");
   app->add_option("--csv", a->csv, "writes the figures of each step of 0.1 s here");
   app->footer(
-      "example: waymark-montecarlo config/worlds/crossing.yaml --config config/crossing-points.yaml --seeds 200\n"
+      "example: waymark-montecarlo config/worlds/crossing.yaml --config config/datasets/crossing-points.yaml --seeds "
+      "200\n"
       "docs/consistency.md defines each figure. Exit code: 0 done, 1 failed, 2 usage or configuration.");
 }
 

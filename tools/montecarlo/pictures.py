@@ -6,7 +6,7 @@ all: as driven, set down elsewhere, started anywhere, set down where it looks th
 
     pictures.py SCENARIO --config FILE --cache FOLDER [--drives N] [--duration S] [--size WxH] [--rate HZ] [-- OPTION ...]
 
-example: tools/montecarlo/pictures.py config/worlds/corridor-hard.yaml --config config/corridor.yaml --cache out/drives --drives 100
+example: tools/montecarlo/pictures.py config/worlds/corridor-hard.yaml --config config/datasets/corridor.yaml --cache out/drives --drives 100
 A drive of 120 s takes about 20 s of processor to render at 640x360 and 5 Hz, one ray a pixel, and 4.5 MB to keep. Drives
 that are in the cache are reused: stop it and go on at will; another detector wants another cache. Options behind --
 go to waymark-montecarlo-edges (--trials kidnap, --diagram lost.svg, --scans scans.csv, --quiet ...)."""

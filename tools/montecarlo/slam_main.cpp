@@ -111,7 +111,7 @@ int main(int argc, char **argv) {
   app.add_flag("--renumber", a.renumber, "identities are a tracker's numbers: new after 1 s out of sight");
   app.add_flag("--each", a.each, "prints each drive");
   app.footer(
-      "example: waymark-montecarlo-slam config/worlds/loops-markers.yaml --config config/loops-markers.yaml\n"
+      "example: waymark-montecarlo-slam config/worlds/loops-markers.yaml --config config/datasets/loops-markers.yaml\n"
       "docs/consistency.md defines each figure. Exit code: 0 done, 1 failed, 2 usage or configuration.");
   return wm::tools::run_program(app, argc, argv, [&] { return run(a); });
 }

@@ -126,7 +126,7 @@ int main(int argc, char **argv) {
   app.add_option("--seed", a.smoother.seed)->capture_default_str();
   app.footer(
       "examples:\n"
-      "  waymark replay recordings/corridor --config config/corridor.yaml --out runs/corridor --reference\n"
+      "  waymark replay recordings/corridor --config config/datasets/corridor.yaml --out runs/corridor --reference\n"
       "  waymark reference runs/corridor recordings/corridor\n"
       "  waymark eval runs/corridor recordings/corridor --reference\n"
       "The mounting and the stamps are taken as calibration.yaml states them.");

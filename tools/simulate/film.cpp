@@ -195,7 +195,7 @@ class Reel {
 wm_status make_folder(const std::string &path, wm_error *err) {
   std::error_code problem;
   std::filesystem::create_directories(path, problem);
-  return problem ? wm_fail(err, WM_IO, "%s: can't make this folder: %s", path.c_str(), problem.message().c_str())
+  return problem ? wm_fail(err, WM_IO, "%s: cannot create this folder: %s", path.c_str(), problem.message().c_str())
                  : WM_OK;
 }
 

@@ -77,7 +77,7 @@ wm_status write_appearances(const Film &film, const std::string &dir, wm_error *
   const std::string folder = dir + "/landmarks";
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
-  if (failed) return wm_fail(err, WM_IO, "%s: can't make this folder: %s", folder.c_str(), failed.message().c_str());
+  if (failed) return wm_fail(err, WM_IO, "%s: cannot create this folder: %s", folder.c_str(), failed.message().c_str());
   std::string rows = "id,picture,width_m,height_m,yaw_rad\n";
   for (const World::Panel &panel : film.world->panels) {
     const Photo photo = straight_ahead(panel);

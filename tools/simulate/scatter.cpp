@@ -102,7 +102,8 @@ wm_status before_the_pair(const Scenario &sc, const Recording &r, std::vector<wm
         out.pop_back();
     }
     if (there < s.per_view)
-      return wm_fail(err, WM_BAD_CONFIG, "world.scatter: ahead_m is out of the stereo pair's sight; see its range_m");
+      return wm_fail(err, WM_BAD_CONFIG,
+                     "world.scatter: ahead_m is outside the stereo pair's field of view or beyond its range_m");
   }
   // Each is seen from elsewhere, too: by now there are more. Some go, so that the mean is right.
   double sum = 0, views = 0;

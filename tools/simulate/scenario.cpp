@@ -41,7 +41,7 @@ void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
   }
   const wm_yaml_node list = r.child(world, "landmarks", false);
   if (r.ok() && kind > 0 && wm_yaml_there(&list))
-    return r.fail(list, "a world of this kind draws its own landmarks; leave the key out");
+    return r.fail(list, "a world of this kind has its own landmarks; leave the key out");
   std::set<int32_t> ids;
   for (size_t i = 0, n = r.list(list); i < n && r.ok(); i++) {
     static const char *const known_item[] = {"id", "what", "xyz_m", nullptr};
@@ -59,7 +59,7 @@ void read_world(Reader &r, const wm_yaml_node &world, Scenario &out) {
   }
   const wm_yaml_node scatter = r.child(world, "scatter", false), map = r.child(world, "map", false);
   if (r.ok() && kind > 0 && wm_yaml_there(&scatter))
-    return r.fail(scatter, "a world of this kind draws its own landmarks; leave the key out");
+    return r.fail(scatter, "a world of this kind has its own landmarks; leave the key out");
   if (r.ok() && kind > 0 && wm_yaml_there(&map))
     return r.fail(map, "a world of this kind has its own map; leave the key out");
   read_scatter(r, scatter, out);
@@ -85,7 +85,7 @@ void read_actuators(Reader &r, const wm_yaml_node &map, Robot &out) {
   if (!r.ok() || !wm_yaml_there(&map)) return;
   r.keys(map, known);
   if (r.ok() && !out.differential)
-    return r.fail(map, "commands are obeyed by two driven wheels; leave wheelbase_m and steering_table out");
+    return r.fail(map, "`commands` is for a robot with two driven wheels; leave wheelbase_m and steering_table out");
   Actuators &a = out.actuators;
   out.commanded = true;
   r.number(map, "control_hz", 1, 1000, 1, a.control_hz);
@@ -221,7 +221,7 @@ void read_leg(Reader &r, const wm_yaml_node &map, Leg &out) {
   if (r.ok() && wm_yaml_there(&backwards)) r.take(wm_yaml_bool(&backwards, &flag, r.error()));
   if (!r.ok()) return;
   out.reverse = flag != 0;
-  if (turns && out.turn_rad == 0) r.fail(map, "turn_deg 0 is no turn; use straight_m");
+  if (turns && out.turn_rad == 0) r.fail(map, "turn_deg is 0; for a straight leg use straight_m");
 }
 
 // A route through points: straight lines, cut at the corners by turns.
@@ -280,7 +280,7 @@ void read_route(Reader &r, const wm_yaml_node &map, Route &out) {
   if (r.ok() && wm_yaml_there(&points)) return read_way(r, map, out);
   for (const char *key : {"speed_mps", "turn_speed_mps", "radius_m", "stand_s"})
     if (const wm_yaml_node node = r.child(map, key, false); r.ok() && wm_yaml_there(&node))
-      return r.fail(node, "belongs to `points`; of legs each has its own");
+      return r.fail(node, "belongs to `points`; each of the `legs` has its own");
   const wm_yaml_node legs = r.child(map, "legs", true);
   r.keys(start, known_start);
   r.number(start, "x_m", -kFar_m, kFar_m, 1, out.x_m, true);
@@ -478,15 +478,16 @@ void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
   const bool pictured = out.world.pictured();
   const wm_yaml_node path = r.child(root, "path", false);
   if (r.ok() && pictured && wm_yaml_there(&path))
-    r.fail(path, "a world of this kind draws its way by itself; leave the key out");
+    r.fail(path, "a world of this kind has its own route; leave the key out");
   read_path(r, path, out);
   const bool six = out.world.kind == "seabed" || out.swims();
   const wm_yaml_node robot = r.child(root, "robot", !six), cameras = r.child(root, "cameras", false),
                      route = r.child(root, "route", !pictured && !six), pictures = r.child(root, "pictures", false);
   if (r.ok() && six && wm_yaml_there(&robot)) r.fail(robot, "this vehicle has no wheels; leave the key out");
-  if (r.ok() && six && wm_yaml_there(&route)) r.fail(route, "this vehicle swims; it has a `path`, and no route");
+  if (r.ok() && six && wm_yaml_there(&route))
+    r.fail(route, "an underwater vehicle moves along `path`; leave `route` out");
   if (r.ok() && out.swims() && wm_yaml_there(&cameras))
-    r.fail(cameras, "this vehicle's eyes are a sensor of kind stereo");
+    r.fail(cameras, "this vehicle has a sensor of kind stereo in place of `cameras`; leave the key out");
   if (r.ok() && !pictured && wm_yaml_there(&pictures))
     r.fail(pictures, "there are pictures only in a world that has a `kind`");
   const bool steered = out.world.kind == "crossing" || out.world.kind == "corridor";
@@ -498,7 +499,7 @@ void read_scenario(Reader &r, const wm_yaml_node &root, Scenario &out) {
   read_sensors(r, r.child(root, "sensors", false), out);
   if (r.ok() && wm_yaml_there(&route)) read_route(r, route, out.route);
   if (r.ok() && !out.world.plan.empty() && out.route.legs.empty())
-    r.fail(r.child(root, "world", true), "a plan of one's own needs a `route` through it");
+    r.fail(r.child(root, "world", true), "a world with a `plan` needs a `route` through it");
   read_pictures(r, pictures, out.pictures);
   read_bus(r, r.child(root, "bus", false), out.bus);
   read_errors(r, r.child(root, "errors", false), out.errors);

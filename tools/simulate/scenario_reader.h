@@ -92,7 +92,7 @@ class Reader {
   // The items of a list.
   size_t list(const wm_yaml_node &node) {
     if (!ok() || !wm_yaml_there(&node)) return 0;
-    if (!wm_yaml_is_list(&node)) fail(node, "a list is wanted here");
+    if (!wm_yaml_is_list(&node)) fail(node, "a list is needed here");
     return ok() ? wm_yaml_count(&node) : 0;
   }
   void fail(const wm_yaml_node &node, const char *what) {

@@ -188,7 +188,7 @@ void read_scatter(Reader &r, const wm_yaml_node &map, Scenario &out) {
   r.range(map, "height_m", -1000, 1000, s.height_m);
   r.number(map, "apart_m", 0, 1000, 1, s.apart_m);
   r.range(map, "ahead_m", 0.1, 1000, s.ahead_m);
-  if (r.ok() && (count > 0) == (per_view > 0)) r.fail(map, "`count` or `per_view` is wanted, one of them");
+  if (r.ok() && (count > 0) == (per_view > 0)) r.fail(map, "`count` or `per_view` is needed, one of them");
   for (const wm_landmark &l : out.landmarks)
     if (r.ok() && l.id >= s.first_id)
       return r.fail(map, "first_id must be above the ids of `landmarks`, so that no id is there twice");
@@ -202,7 +202,7 @@ void read_path(Reader &r, const wm_yaml_node &map, Scenario &out) {
   r.keys(map, known);
   const wm_yaml_node knots = r.child(map, "knots", false), rounds = r.child(map, "rounds", false);
   if (r.ok() && wm_yaml_there(&knots) == wm_yaml_there(&rounds))
-    return r.fail(map, "`knots` or `rounds` is wanted, one of them");
+    return r.fail(map, "`knots` or `rounds` is needed, one of them");
   if (r.ok() && wm_yaml_there(&rounds)) {
     r.keys(rounds, known_rounds);
     r.number(rounds, "duration_s", 1, 1e5, 1, out.rounds.duration_s, true);

@@ -300,7 +300,7 @@ wm_status write_text(const std::string &text, const std::string &path, wm_error 
 wm_status write_sensors(const Scenario &sc, const Recording &r, const std::string &dir, wm_error *err) {
   std::error_code made;
   std::filesystem::create_directories(dir, made);
-  if (made) return wm_fail(err, WM_IO, "%s: can't make this folder: %s", dir.c_str(), made.message().c_str());
+  if (made) return wm_fail(err, WM_IO, "%s: cannot create this folder: %s", dir.c_str(), made.message().c_str());
   const auto in = [&](const char *name) { return dir + "/" + name; };
   std::filesystem::remove(in("recording.yaml"), made);  // until the new one is whole, there is none
   const bool six = !r.motion6.empty();

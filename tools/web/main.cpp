@@ -155,7 +155,7 @@ int main(int argc, char **argv) {
   app.footer(
       "examples:\n"
       "  waymark web /etc/waymark/robot.yaml\n"
-      "  waymark web config/corridor.yaml --recording REC --listen 0.0.0.0:8080\n"
+      "  waymark web config/datasets/corridor.yaml --recording REC --listen 0.0.0.0:8080\n"
       "  ssh -L 8080:localhost:8080 robot waymark web /etc/waymark/robot.yaml");
   struct sigaction action {};
   action.sa_handler = on_signal;

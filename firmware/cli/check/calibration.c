@@ -17,7 +17,7 @@ static int is_outside(double value, double least, double most) {
 static void length_of(const char *key, double value_m, double least_m, double most_m, wm_findings *out) {
   if (is_outside(value_m, least_m, most_m))
     wm_find(out, WM_FOUND_LENGTH_IMPLAUSIBLE, WM_SEVERITY_BAD, ABOUT, "metres are meant: was it measured in mm or cm?",
-            "wheels.%s: %g m is nothing that a vehicle has (%g to %g)", key, value_m, least_m, most_m);
+            "wheels.%s: %g m is outside the range of vehicles (%g to %g m)", key, value_m, least_m, most_m);
 }
 
 static void wheels(const wm_wheels *w, wm_findings *out) {
@@ -33,7 +33,7 @@ static void wheels(const wm_wheels *w, wm_findings *out) {
   if (is_outside(w->steering_ratio, 1, 60))
     wm_find(out, WM_FOUND_GEAR_IMPLAUSIBLE, WM_SEVERITY_BAD, ABOUT,
             "turns of the steering wheel for one of the road wheel: 12 to 20 in cars",
-            "wheels.steering_ratio: %g is no steering gear", w->steering_ratio);
+            "wheels.steering_ratio: %g is not the ratio of a steering gear", w->steering_ratio);
 }
 
 // ── cameras ─────────────────────────────────────────────────────────────────────────────────────────────────────────
@@ -133,7 +133,8 @@ static void sees_the_floor(const wm_camera *c, wm_findings *out) {
   if (down_rad + half_rad < 0)
     wm_find(out, WM_FOUND_CAMERA_IMPLAUSIBLE, WM_SEVERITY_BAD, ABOUT,
             "a positive pitch (rpy's second number) looks down",
-            "cameras.%s.mounting: it looks up by %.0f degrees and never sees the floor", c->name, -down_rad / kDegree);
+            "cameras.%s.mounting: the camera points up by %.0f degrees; the floor is never in view", c->name,
+            -down_rad / kDegree);
 }
 
 // ── sensors and pairs ───────────────────────────────────────────────────────────────────────────────────────────────
@@ -178,8 +179,8 @@ static void stereo(const wm_rig *rig, wm_findings *out) {
                  sin(a[2]) * sin(a[1]) * sin(a[0]) + cos(a[2]) * cos(a[0]), cos(a[1]) * sin(a[0])};
   if (y[0] * d[0] + y[1] * d[1] + y[2] * d[2] > 0.2 * far_m)
     wm_find(out, WM_FOUND_STEREO_IMPLAUSIBLE, WM_SEVERITY_BAD, ABOUT,
-            "swap stereo.left and stereo.right, or mend the mountings",
-            "stereo: by its mounting %s, the right camera, is to the left of %s", r->name, l->name);
+            "swap stereo.left and stereo.right, or correct the mountings",
+            "stereo: by the mountings the right camera, %s, is to the left of %s", r->name, l->name);
 }
 
 void check_calibration(const wm_assembly *assembly, wm_findings *out) {
@@ -201,5 +202,5 @@ void check_calibration(const wm_assembly *assembly, wm_findings *out) {
   stereo(rig, out);
   if (rig->marker_size_m > 2)
     wm_find(out, WM_FOUND_LENGTH_IMPLAUSIBLE, WM_SEVERITY_BAD, ABOUT, "metres are meant: was it measured in mm or cm?",
-            "markers.size_m: %g m is no marker's black square", rig->marker_size_m);
+            "markers.size_m: %g m is not a plausible edge of a marker's black square", rig->marker_size_m);
 }

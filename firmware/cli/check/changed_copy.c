@@ -109,10 +109,10 @@ static wm_status link_entries(const changed_copy *self, const char *original, co
     if (!inner[0] && is_within(edits, count, name)) {
       char folder[304];
       (void)snprintf(folder, sizeof folder, "%s/", name);
-      if (mkdir(to, 0777) != 0) status = wm_fail(err, WM_IO, "%s: can't be made: %s", to, strerror(errno));
+      if (mkdir(to, 0777) != 0) status = wm_fail(err, WM_IO, "%s: can't be created: %s", to, strerror(errno));
       if (status == WM_OK) status = link_entries(self, original, folder, edits, count, err);
     } else if (symlink(real, to) != 0) {
-      status = wm_fail(err, WM_IO, "%s: can't be made: %s", to, strerror(errno));
+      status = wm_fail(err, WM_IO, "%s: can't be created: %s", to, strerror(errno));
     }
   }
   (void)closedir(all);
@@ -151,7 +151,7 @@ wm_status changed_copy_make(changed_copy *self, const wm_recording_overrides *ov
   if (!original) return wm_fail(err, WM_NOT_FOUND, "%s: there is no such folder", self->dir);
   self->overrides = *overrides;
   wm_status status =
-      mkdir(self->out, 0777) == 0 ? WM_OK : wm_fail(err, WM_IO, "%s: can't be made: %s", self->out, strerror(errno));
+      mkdir(self->out, 0777) == 0 ? WM_OK : wm_fail(err, WM_IO, "%s: can't be created: %s", self->out, strerror(errno));
   if (status == WM_OK) status = link_entries(self, original, "", edits, count, err);
   for (size_t i = 0; status == WM_OK && i < count; i++) {
     char path[WM_PATH_MAX], *text = NULL;

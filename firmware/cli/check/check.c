@@ -33,7 +33,7 @@ static void messages(const wm_config *config, wm_findings *out) {
   if (!known)
     wm_find(out, WM_FOUND_PUBLISH_SETTINGS, WM_SEVERITY_BAD, "publish",
             "udpm://239.255.76.67:7667?ttl=0 keeps messages on this computer",
-            "publish.lcm_url: '%s' is no provider of LCM (udpm, tcpq, memq, file)", url);
+            "publish.lcm_url: '%s' is not a provider of LCM (udpm, tcpq, memq, file)", url);
   else if (ttl && strtol(ttl + 4, NULL, 10) > 0)
     wm_find(out, WM_FOUND_OPEN_NETWORK, WM_SEVERITY_NOTE, "publish", "ttl=0 keeps messages on this computer",
             "publish.lcm_url: poses go out into the network (%s)", url);

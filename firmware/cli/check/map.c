@@ -58,13 +58,13 @@ static void start_on_map(const wm_raster *map, const wm_start *start, wm_finding
   if (isnan(start->p_m[0]) || isnan(start->p_m[1])) return;
   if (!pixel_of(map, start->p_m, &column, &row))
     wm_find(out, WM_FOUND_START_OFF_MAP, WM_SEVERITY_BAD, "start",
-            "mend the start (metres in map), or the map's origin: [x, y, yaw] of its lower left",
+            "correct initial_pose (metres in the map) or the map's origin: [x, y, yaw] of its lower left corner",
             "(%.2f, %.2f) is not on the map, which begins at (%.2f, %.2f) and has %.1f x %.1f m", start->p_m[0],
             start->p_m[1], map->origin_x_m, map->origin_y_m, map->width_px * map->resolution_m,
             map->height_px * map->resolution_m);
   else if (map->drivable && !map->drivable[(size_t)row * map->width_px + column])
     wm_find(out, WM_FOUND_START_OFF_MAP, WM_SEVERITY_BAD, "start",
-            "mend the start, the map's origin, or layers.drivable (white is drivable)",
+            "correct initial_pose, the map's origin, or layers.drivable (white is drivable)",
             "(%.2f, %.2f) is not free space in the map", start->p_m[0], start->p_m[1]);
 }
 
@@ -82,12 +82,11 @@ void check_map(const wm_assembly *assembly, wm_findings *out) {
     wm_find(out, WM_FOUND_MAP_IMPLAUSIBLE, WM_SEVERITY_BAD, "map", "edges are white (128 and more) on black",
             "%s: layers.edges: there is no edge in it", assembly->map_path);
   else if (edges > 0.4)
-    wm_find(out, WM_FOUND_MAP_IMPLAUSIBLE, WM_SEVERITY_BAD, "map",
-            "edges are white on black: turn the picture's grey round", "%s: layers.edges: %.0f %% of it would be edges",
-            assembly->map_path, edges * 100);
+    wm_find(out, WM_FOUND_MAP_IMPLAUSIBLE, WM_SEVERITY_BAD, "map", "edges are white on black: invert the picture",
+            "%s: layers.edges: %.0f %% of its pixels are edges", assembly->map_path, edges * 100);
   if (map->drivable && share(map, map->drivable) <= 0)
     wm_find(out, WM_FOUND_MAP_IMPLAUSIBLE, WM_SEVERITY_BAD, "map",
-            "drivable is white; with `image` alone look at negate and free_thresh", "%s: nothing of it is drivable",
+            "drivable is white; with `image` alone look at negate and free_thresh", "%s: no pixel is drivable",
             assembly->map_path);
   else
     start_on_map(map, &assembly->setup.start, out);

@@ -116,8 +116,8 @@ static void ranges(const motion_data *self, wm_findings *out) {
     for (unsigned q = kLimits[i].first; q <= kLimits[i].last; q++) {
       double most = fmax(fabs(self->least[q]), fabs(self->most[q]));
       if (self->count[q] > 0 && most > kLimits[i].most)
-        wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, ABOUT, kLimits[i].fix, "%s: as much as %.4g %s",
-                wm_quantity_name(q), most, kLimits[i].unit);
+        wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, ABOUT, kLimits[i].fix,
+                "%s: the largest value is %.4g %s", wm_quantity_name(q), most, kLimits[i].unit);
     }
   if (self->fastest_mps > FASTEST_MPS)
     wm_find(out, WM_FOUND_VALUE_IMPLAUSIBLE, WM_SEVERITY_BAD, ABOUT,

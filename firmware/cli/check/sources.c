@@ -56,7 +56,7 @@ static void counted(const wm_assembled_source *s, const source_facts *facts, wm_
             of_hundred(c->lost, facts->events + c->lost));
   if (of_hundred(c->frozen, all) >= 1)
     wm_find(out, WM_FOUND_VALUES_FROZEN, WM_SEVERITY_NOTE, s->name,
-            "the sender is stuck: its values are not used while it is",
+            "the sender is stuck: its values are not used meanwhile",
             "%" PRIu64 " of 100 equal the one before, which noise makes impossible", of_hundred(c->frozen, all));
   if (of_hundred(c->out_of_order, all) >= 1)
     wm_find(out, WM_FOUND_ROWS_DISORDERED, WM_SEVERITY_NOTE, s->name,
@@ -106,7 +106,7 @@ static void judge(const wm_assembly *assembly, const wm_assembled_source *s, con
   if (facts->latest_ns > IMPLAUSIBLE_LATENESS_NS) {
     wm_find(out, WM_FOUND_ROWS_DISORDERED, WM_SEVERITY_BAD, s->name,
             "sort the rows by t_ns; or correct arrival_ns, which has to be of the same clock",
-            "rows come as much as %.1f s behind younger ones", (double)facts->latest_ns * 1e-9);
+            "rows arrive up to %.1f s after newer ones", (double)facts->latest_ns * 1e-9);
   } else if (facts->latest_ns > s->merge.lateness_max_ns) {
     char mend[120], with_look[80] = "";
     if (facts->look_ns > 0)

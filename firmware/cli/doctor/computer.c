@@ -41,7 +41,7 @@ void doctor_kernel(const char *root, wm_findings *out) {
     if (us < 0)
       wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_NOTE, "throttling",
               "sysctl kernel.sched_rt_runtime_us=950000",
-              "real-time throttling is off: a real-time thread that runs away takes the computer with it");
+              "real-time throttling is off: a real-time thread in an endless loop blocks the computer");
     else
       wm_find(out, WM_FOUND_COMPUTER_REALTIME, WM_SEVERITY_GOOD, "throttling", "",
               "real-time threads may take %ld %% of a second", us / 10000);
@@ -58,14 +58,14 @@ void doctor_clocks(const char *root, wm_findings *out) {
     if (is_slow)
       wm_find(out, WM_FOUND_COMPUTER_CLOCK, WM_SEVERITY_BAD, "clock",
               "see `dmesg | grep -i clocksource`; a firmware update, or tsc=reliable where it is",
-              "the clock source is %s: each look at the clock costs a microsecond or more", text);
+              "the clock source is %s: each reading of the clock takes 1 us or more", text);
     else
       wm_find(out, WM_FOUND_COMPUTER_CLOCK, WM_SEVERITY_GOOD, "clock", "", "the clock source is %s", text);
   }
   struct timex state = {0};
   if (adjtimex(&state) == TIME_ERROR || (state.status & STA_UNSYNC))
     wm_find(out, WM_FOUND_COMPUTER_CLOCK, WM_SEVERITY_NOTE, "time of day", "timedatectl set-ntp true",
-            "UTC is not synchronised: poses are right on the monotonic clock, utc_offset_ns is not");
+            "UTC is not synchronised: stamps of the monotonic clock are right, utc_offset_ns is not");
   else
     wm_find(out, WM_FOUND_COMPUTER_CLOCK, WM_SEVERITY_GOOD, "time of day", "",
             "UTC is synchronised, to %.1f ms at most", (double)state.maxerror * 1e-3);
@@ -86,7 +86,7 @@ static void governors(const char *root, wm_findings *out) {
   if (slow > 0)
     wm_find(out, WM_FOUND_COMPUTER_SLOW, WM_SEVERITY_BAD, "governor",
             "for g in /sys/devices/system/cpu/cpu*/cpufreq/scaling_governor; do echo performance > $g; done",
-            "%d of %d CPUs have the governor %s: they are slow when work comes", slow, seen, other);
+            "%d of %d CPUs have the governor %s: their frequency rises only after load begins", slow, seen, other);
   else if (seen > 0)
     wm_find(out, WM_FOUND_COMPUTER_SLOW, WM_SEVERITY_GOOD, "governor", "", "performance on all %d CPUs", seen);
 }
@@ -102,7 +102,7 @@ static void temperatures(const char *root, wm_findings *out) {
   }
   if (hottest_c > 80)
     wm_find(out, WM_FOUND_COMPUTER_SLOW, WM_SEVERITY_BAD, "temperature", "better cooling, or less work",
-            "%.0f degrees C: most boards slow down at 80 to 85", hottest_c);
+            "%.0f degrees C: most boards reduce their frequency at 80 to 85", hottest_c);
   else if (hottest_c > -300)
     wm_find(out, WM_FOUND_COMPUTER_SLOW, WM_SEVERITY_GOOD, "temperature", "", "%.0f degrees C", hottest_c);
 }

@@ -17,7 +17,7 @@ void doctor_lcm(const char *url, wm_findings *out) {
   lcm_t *lcm = lcm_connect(url, &why);
   if (!lcm) {
     wm_find(out, WM_FOUND_LCM_ROUTE, WM_SEVERITY_BAD, "lcm", "ip route add 224.0.0.0/4 dev lo",
-            "no way out on %.80s: %s", url, why);
+            "no route for LCM's %.80s: %s", url, why);
     return;
   }
   lcm_destroy(lcm);
@@ -27,7 +27,7 @@ void doctor_lcm(const char *url, wm_findings *out) {
             "publish: {lcm_url: \"udpm://239.255.76.67:7667?ttl=0\"} keeps messages on this computer",
             "%.80s: poses go out into the network, and commands may come from it", url);
   else
-    wm_find(out, WM_FOUND_LCM_ROUTE, WM_SEVERITY_GOOD, "lcm", "", "messages find their way on %.80s", url);
+    wm_find(out, WM_FOUND_LCM_ROUTE, WM_SEVERITY_GOOD, "lcm", "", "messages can be sent on %.80s", url);
 }
 
 // 1: a number was found.
@@ -74,7 +74,7 @@ static void can_interface(const char *root, const char *interface, wm_findings *
   else if (errors > 0)
     wm_find(out, WM_FOUND_CAN_INTERFACE, WM_SEVERITY_NOTE, about,
             "look at wiring, termination (60 ohms) and bit rate: `ip -d -s link show`",
-            "is up, with %ld receive errors since then", errors);
+            "is up, with %ld receive errors since it came up", errors);
   else
     wm_find(out, WM_FOUND_CAN_INTERFACE, WM_SEVERITY_GOOD, about, "", "is up, without errors");
 }
@@ -117,7 +117,7 @@ static void camera(const wm_camera_device_config *c, wm_findings *out) {
     (void)close(fd);
     wm_find(out, WM_FOUND_CAMERA_DEVICE, is_device ? WM_SEVERITY_GOOD : WM_SEVERITY_BAD, about,
             is_device ? "" : "`v4l2-ctl --list-devices` lists cameras",
-            is_device ? "%.100s is there" : "%.100s is no device", c->device);
+            is_device ? "%.100s is present" : "%.100s is not a device", c->device);
   } else if (errno == EACCES) {
     wm_find(out, WM_FOUND_CAMERA_DEVICE, WM_SEVERITY_BAD, about,
             "SupplementaryGroups=video in the unit, or usermod -aG video USER", "%.100s: no permission", c->device);
@@ -144,7 +144,7 @@ void doctor_imu(const char *root, const wm_config *config, wm_findings *out) {
   else
     wm_find(out, WM_FOUND_IMU_DEVICE, WM_SEVERITY_NOTE, "imu",
             "ExecStartPre=+/usr/bin/waymark stamps CONFIG in the unit, or a run with the right to write to /sys",
-            "%s is there, and its buffer is not set up yet", device->device);
+            "%s is present, but its buffer is not set up", device->device);
 }
 
 static void receiver(const wm_gpsd_device_config *config, double seconds, wm_findings *out) {

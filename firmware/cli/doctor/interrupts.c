@@ -58,8 +58,8 @@ void doctor_interrupts(const char *root, const wm_config *config, long cpus, wm_
     else
       wm_find(out, WM_FOUND_COMPUTER_REALTIME, cpus == 1 ? WM_SEVERITY_BAD : WM_SEVERITY_NOTE, "interrupts", mend,
               "%s at priority %d is not above the estimator (%d): %s", name, priority, own,
-              cpus == 1 ? "with one processor, a cycle that takes long costs frames"
-                        : "where both are on one processor, a cycle that takes long costs frames");
+              cpus == 1 ? "with one processor, a long cycle loses frames"
+                        : "where both are on one processor, a long cycle loses frames");
   }
   (void)closedir(processes);
 }

@@ -83,7 +83,7 @@ static void mistakes(void) {
   refused(GOOD, "<height>12", "<height>-3", "height: one number from 3 to 200");
   refused(GOOD, "<height>12", "<height>12.5", "whole pixels");
   refused(GOOD, "0 3 3 3", "0 4 3 3", "outside of the window");
-  refused(GOOD, "0 3 3 3", "0 3 3 nan", "'nan' is no number");
+  refused(GOOD, "0 3 3 3", "0 3 3 nan", "'nan' is not a number");
   refused(GOOD, "0 -1 0 1", "0 -1 7 1", "feature 7 of 1");
   refused(GOOD, "0 -1 0 1", "0 -2 0 1", "a later one of its tree");
   refused(GOOD, "0 -1 0 1", "0 -1 1", "has 11 numbers");

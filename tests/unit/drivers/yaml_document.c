@@ -153,7 +153,7 @@ static void unknown_keys(void) {
 }
 
 static void bad_documents(void) {
-  refused("a: 1\nb: 2\na: 3\n", "x.yaml:3: a: the key stands here twice (first in line 1)");
+  refused("a: 1\nb: 2\na: 3\n", "x.yaml:3: a: the key appears twice (first in line 1)");
   refused("a: [1, 2\nb: 3\n",
           "x.yaml:2: not valid YAML: did not find expected ',' or ']', while parsing a flow sequence that begins in "
           "line 1");

@@ -228,7 +228,7 @@ static void devices(void) {
           "dir/x.yaml:3: devices.cameras[0].format: 'H264' is unknown; one of these is needed: GREY, YUYV, UYVY, NV12, "
           "Y10, Y16, MJPG, RGB3, BGR3");
   refused(HEAD "devices: {cameras: [{name: a, device: b}, {name: c, device: b}]}\n",
-          "dir/x.yaml:3: devices.cameras[1]: the device 'b' stands there twice (first in line 3)");
+          "dir/x.yaml:3: devices.cameras[1]: the device 'b' appears twice (first in line 3)");
   refused(HEAD "devices:\n  can:\n    - {interfce: can0}\n",
           "dir/x.yaml:5: devices.can[0].interfce: unknown key; did you mean 'interface'?");
   refused(HEAD "devices:\n  can:\n    - {interface: can0, dbc: a}\n",
@@ -238,7 +238,7 @@ static void devices(void) {
   refused(HEAD
           "devices:\n  can:\n    - {interface: can0, dbc: a, can_signals: b}\n"
           "    - {interface: can0, dbc: a, can_signals: b}\n",
-          "dir/x.yaml:6: devices.can[1].interface: 'can0' stands there twice (first in line 5)");
+          "dir/x.yaml:6: devices.can[1].interface: 'can0' appears twice (first in line 5)");
 }
 
 static void cameras_of_libcamera(void) {
@@ -247,7 +247,7 @@ static void cameras_of_libcamera(void) {
     TEST_ASSERT_EQUAL_STRING("platform/vimc.0 Sensor B", config.devices.cameras[0].libcamera);
     TEST_ASSERT_EQUAL_STRING("", config.devices.cameras[0].device);
     refused(HEAD "devices: {cameras: [{name: a, libcamera: b}, {name: c, libcamera: b}]}\n",
-            "dir/x.yaml:3: devices.cameras[1]: libcamera's 'b' stands there twice (first in line 3)");
+            "dir/x.yaml:3: devices.cameras[1]: libcamera's 'b' appears twice (first in line 3)");
   } else {
     refused(HEAD "devices: {cameras: [{name: front, libcamera: b}]}\n",
             "dir/x.yaml:3: devices.cameras[0].libcamera: " WM_WITHOUT_LIBCAMERA);
@@ -325,7 +325,7 @@ static void wrong_sources(void) {
           "dir/x.yaml:3: sources[0].name: 'gpss' is unknown; did you mean 'gnss'? (one of: can, motion, motion6, "
           "increments, ticks, speeds, steering, imu, heading, depth, sightings, markers, stereo, points, gnss)");
   refused(HEAD "sources:\n- {name: gnss}\n- {name: gnss}\n",
-          "dir/x.yaml:5: sources[1].name: 'gnss' stands there twice (first in line 4)");
+          "dir/x.yaml:5: sources[1].name: 'gnss' appears twice (first in line 4)");
   refused(
       HEAD "sources: [{name: gnss, sample_at: next_stamp}]\n",
       "dir/x.yaml:3: sources[0].sample_at: only `motion` and `motion6` have rows whose values can get the next row's "

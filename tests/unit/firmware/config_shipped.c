@@ -10,9 +10,9 @@
 void setUp(void) {}
 void tearDown(void) {}
 
-static void each_is_read(void) {
-  DIR *dir = opendir("config");
-  TEST_ASSERT_NOT_NULL(dir);
+static void each_of(const char *folder) {
+  DIR *dir = opendir(folder);
+  TEST_ASSERT_NOT_NULL_MESSAGE(dir, folder);
   int read = 0;
   for (struct dirent *entry; (entry = readdir(dir));) {
     const char *end = strrchr(entry->d_name, '.');
@@ -20,7 +20,7 @@ static void each_is_read(void) {
     wm_config config;
     wm_error err = {0};
     if (!end || strcmp(end, ".yaml") != 0) continue;
-    snprintf(path, sizeof path, "config/%s", entry->d_name);
+    snprintf(path, sizeof path, "%s/%s", folder, entry->d_name);
     TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_load(path, &config, &err), err.text);
     TEST_ASSERT_EQUAL_STRING("", config.warnings);
     wm_config_free(&config);
@@ -28,6 +28,11 @@ static void each_is_read(void) {
   }
   closedir(dir);
   TEST_ASSERT_GREATER_THAN(0, read);
+}
+
+static void each_is_read(void) {
+  each_of("config");
+  each_of("config/datasets");
 }
 
 static int is_param(const wm_param_table *table, const char *key) {

@@ -152,7 +152,7 @@ static void cameras_are_looked_at(void) {
   (void)snprintf(config.devices.cameras[1].device, sizeof config.devices.cameras[1].device, "/dev/null");
   doctor_cameras(&config, &found);
   expect("camera front", WM_SEVERITY_BAD, "No such file");
-  expect("camera rear", WM_SEVERITY_GOOD, "/dev/null is there");
+  expect("camera rear", WM_SEVERITY_GOOD, "/dev/null is present");
 }
 
 static void no_way_for_messages_is_found(void) {

@@ -46,13 +46,13 @@ static void mistakes_are_told(void) {
   refuse("--out: its value is missing", PARSE("--out"));
   refuse("--out: is empty", PARSE("--out="));
   refuse("--help: takes no value", PARSE("--help=1"));
-  refuse("--seed: '-1' is no whole number from 0 on, or too large", PARSE("--seed", "-1"));
-  refuse("--seed: '18446744073709551616' is no whole number from 0 on, or too large",
+  refuse("--seed: '-1' is not a whole number from 0 on, or is too large", PARSE("--seed", "-1"));
+  refuse("--seed: '18446744073709551616' is not a whole number from 0 on, or is too large",
          PARSE("--seed", "18446744073709551616"));
-  refuse("--speed: '0' is no number above 0", PARSE("--speed", "0"));
-  refuse("--speed: 'fast' is no number above 0", PARSE("--speed", "fast"));
-  refuse("--speed: 'nan' is no number above 0", PARSE("--speed", "nan"));
-  refuse("'c': one word too many", PARSE("a", "b", "c"));
+  refuse("--speed: '0' is not a number above 0", PARSE("--speed", "0"));
+  refuse("--speed: 'fast' is not a number above 0", PARSE("--speed", "fast"));
+  refuse("--speed: 'nan' is not a number above 0", PARSE("--speed", "nan"));
+  refuse("unexpected argument 'c'", PARSE("a", "b", "c"));
 }
 
 int main(void) {

@@ -188,7 +188,7 @@ void test_ocamcalib() {
 
 void test_what_is_no_calibration() {
   refused("no camera matrix", "a: 1\n");
-  refused("calibration.yaml of ours already", "cameras:\n  front: {model: equidistant}\n");
+  refused("is a calibration.yaml already", "cameras:\n  front: {model: equidistant}\n");
   refused("give --size WIDTHxHEIGHT", "K: [500, 0, 320, 0, 500, 240, 0, 0, 1]\n");
   refused("KEY: VALUE lines are needed", "[1, 2]\n");
 }

@@ -54,7 +54,7 @@ mkdir -p "$dir/rec/labels" "$dir/run/detections"
 printf 'frame,polyline,u_px,v_px\n0,0,400,500\n0,0,800,500\n' >"$dir/rec/labels/edges.csv"
 expect 1 'has no cameras' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges
 printf 'cameras:\n  front: {model: equidistant, size: [1280, 720], intrinsics: [520, 520, 640, 360], distortion: [0, 0, 0, 0], mounting: {xyz_m: [1, 0, 0.4], rpy_deg: [0, 22, 0]}}\n' >"$dir/rec/calibration.yaml"
-expect 1 'this run saw no edges' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges
+expect 1 'this run detected no edges' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges
 printf 'frame,polyline,u_px,v_px\n0,0,400,505\n0,0,600,505\n' >"$dir/run/detections/front-edges.csv"
 expect 0 '"length_precision": 1.0' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges --json
 expect 0 '"left_out_of_view": 1' "$bin/waymark-eval" "$dir/run" "$dir/rec" --detector edges --json --view 3,6,-3,3
@@ -75,7 +75,7 @@ expect 2 'A subcommand is required' "$bin/waymark-calibrate"
 expect 0 'model: double-sphere' "$bin/waymark-calibrate" import "$dir/camchain.yaml"
 expect 0 'intrinsics: [-0.2, 0.59, 290, 291, 370, 240]' "$bin/waymark-calibrate" import "$dir/camchain.yaml"
 expect 0 'px in the mean, at most' "$bin/waymark-calibrate" import "$dir/camchain.yaml" --model equidistant --name front --out "$dir/rec/imported.yaml"
-expect 2 'not written over' "$bin/waymark-calibrate" import "$dir/camchain.yaml" --out "$dir/rec/imported.yaml"
+expect 2 'not overwritten' "$bin/waymark-calibrate" import "$dir/camchain.yaml" --out "$dir/rec/imported.yaml"
 expect 2 'cannot be read' "$bin/waymark-calibrate" import "$dir/nowhere.yaml"
 expect 2 'is a folder' "$bin/waymark-calibrate" import "$dir/rec"
 expect 2 'is not WIDTHxHEIGHT' "$bin/waymark-calibrate" import "$dir/camchain.yaml" --size big
@@ -88,7 +88,7 @@ printf 'P5 64 48 255\n%3072s' '' >"$dir/blank.pgm"
 expect 1 'a board was found in 0 of 1 pictures' "$bin/waymark-calibrate" camera "$dir/blank.pgm" --chessboard 9x6
 # What was imported is what eval reads.
 cp "$dir/rec/imported.yaml" "$dir/rec/calibration.yaml"
-expect 1 'this run saw no edges' "$bin/waymark-eval" "$dir/empty" "$dir/rec" --detector edges
+expect 1 'this run detected no edges' "$bin/waymark-eval" "$dir/empty" "$dir/rec" --detector edges
 
 # Maps.
 { printf 'P5 80 60 255\n'; python3 -c '
@@ -100,7 +100,7 @@ expect 2 '--resolution is needed' "$bin/waymark-map" make "$dir/plan.pgm" --out 
 expect 2 'there is no such file' "$bin/waymark-map" make "$dir/nowhere.png" --resolution 0.05
 expect 2 'not X,Y' "$bin/waymark-map" make "$dir/plan.pgm" --resolution 0.05 --inside here
 expect 0 'in 1 areas' "$bin/waymark-map" make "$dir/plan.pgm" --resolution 0.05 --origin=-1,-1 --out "$dir/map"
-expect 2 'not written over' "$bin/waymark-map" make "$dir/plan.pgm" --resolution 0.05 --out "$dir/map"
+expect 2 'not overwritten' "$bin/waymark-map" make "$dir/plan.pgm" --resolution 0.05 --out "$dir/map"
 expect 1 'no wall in the plan' "$bin/waymark-map" make "$dir/blank.pgm" --walls-below 1 --resolution 0.05 --out "$dir/map2"
 expect 0 'good' "$bin/waymark-map" check "$dir/map/map.yaml" --draw "$dir/drawn.png"
 expect 0 'in 1 areas' "$bin/waymark-map" make "$dir/map/map.yaml" --out "$dir/map3"
@@ -192,7 +192,7 @@ expect 1 'first at row 4, t = 0.3 s' "$bin/waymark-diff" "$dir/run" "$dir/other"
 cp -r "$dir/run" "$dir/epoch" && sed -i 's/^\([0-9]00000000\),/1700000000\1,/' "$dir/epoch/trajectory.csv"
 cp -r "$dir/epoch" "$dir/epoch2" && sed -i '5s/0.1,/0.2,/' "$dir/epoch2/trajectory.csv"
 expect 1 'first at row 4, t = 1700000000.3 s' "$bin/waymark-diff" "$dir/epoch" "$dir/epoch2"
-expect 2 "is no run's folder" "$bin/waymark-diff" "$dir/run" "$dir/empty"
+expect 2 "is not the folder of a run" "$bin/waymark-diff" "$dir/run" "$dir/empty"
 
 [ "$failures" -eq 0 ] && echo "all as expected"
 exit $((failures > 0))

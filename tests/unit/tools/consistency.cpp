@@ -32,7 +32,8 @@ Statistics drives(const char *world, const char *config_name, size_t landmarks) 
   sim::Scenario scenario;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, sim::load_scenario(root + "/config/worlds/" + world, scenario, &err), err.text);
   wm_config config{};
-  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_load((root + "/config/" + config_name).c_str(), &config, &err), err.text);
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_load((root + "/config/datasets/" + config_name).c_str(), &config, &err),
+                            err.text);
   Statistics s;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, montecarlo::run(scenario, config, landmarks, 1, seeds, nullptr, s, &err), err.text);
   wm_config_free(&config);

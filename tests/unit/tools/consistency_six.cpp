@@ -36,7 +36,7 @@ sim::Scenario world(const char *name) {
 Statistics6 drives(const sim::Scenario &scenario, const Options6 &options) {
   wm_error err{};
   wm_config config{};
-  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/seabed-points.yaml";
+  const std::string path = std::string(std::getenv("WM_SOURCE_DIR")) + "/config/datasets/seabed-points.yaml";
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_load(path.c_str(), &config, &err), err.text);
   Statistics6 s;
   TEST_ASSERT_EQUAL_MESSAGE(WM_OK, montecarlo::run_six(scenario, config, options, nullptr, s, &err), err.text);

@@ -95,7 +95,7 @@ int main() {
   const std::string root = std::getenv("WM_SOURCE_DIR");
   wm_error err{};
   if (wm::sim::load_scenario(root + "/config/worlds/crossing-drawn.yaml", scenario, &err) != WM_OK ||
-      wm_config_load((root + "/config/crossing-cameras.yaml").c_str(), &config, &err) != WM_OK) {
+      wm_config_load((root + "/config/datasets/crossing-cameras.yaml").c_str(), &config, &err) != WM_OK) {
     std::fprintf(stderr, "%s\n", err.text);
     return 1;
   }

@@ -112,7 +112,7 @@ void refuse(const std::string &world, const std::string &route, const char *want
 
 void test_mistakes_are_told() {
   const std::string along = "route: {start: {x_m: 1, y_m: 2}, points: [[4, 2]]}\n";
-  refuse("kind: corridor, plan: room.yaml", "", "x.yaml:3: world: a plan of one's own needs a `route` through it");
+  refuse("kind: corridor, plan: room.yaml", "", "x.yaml:3: world: a world with a `plan` needs a `route` through it");
   refuse("kind: crossing, plan: room.yaml", along, "x.yaml:3: world.plan: only corridor, office and hall have a plan");
   refuse("kind: corridor, plan: empty.yaml", along,
          "empty.yaml:1: neither a plan (`format: waymark-plan/1`) nor a ROS map (`image: FILE`)");

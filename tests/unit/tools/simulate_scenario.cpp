@@ -87,7 +87,7 @@ void test_each_mistake_is_refused_with_file_line_and_key() {
       {"[-34, -24,", "[-34,", {"crossing.yaml:", "steering_table", "same number"}},
       {"{stand_s: 4}", "{stand_s: 4, turn_deg: 5}", {"crossing.yaml:", "legs", "one of"}},
       {"radius_m: 7, ", "", {"crossing.yaml:", "legs", "radius_m"}},
-      {"turn_deg: 90", "turn_deg: 0", {"crossing.yaml:", "legs", "no turn"}},
+      {"turn_deg: 90", "turn_deg: 0", {"crossing.yaml:", "legs", "straight_m"}},
       {"straight_m: 20, speed_mps: 3", "straight_m: 20", {"crossing.yaml:", "legs", "speed_mps"}},
       {"laps: 1", "laps: 0", {"crossing.yaml:", "laps", ""}},
       {"outlier_percent: 5", "outlier_percent: 500", {"crossing.yaml:", "outlier_percent", "500"}},

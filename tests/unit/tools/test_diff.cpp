@@ -55,7 +55,7 @@ void test_where_it_began() {
        {"first at row 43, t = 4.2 s (t_ns 4200000000): y_m 0 -> 0.25", "59 of 101 rows differ",
         "largest: position 0.25 m at 4.200 s, rotation 0 deg", "verdict fused -> gate", "sources.s.fused 3 -> 2",
         "sources.s.rejected.gate 0 -> 1",
-        "It began at t = 4.1 s (t_ns 4100000000) in innovations.csv: source s, sensor eye, landmark 7"})
+        "The first difference is at t = 4.1 s (t_ns 4100000000) in innovations.csv: source s, sensor eye, landmark 7"})
     TEST_ASSERT_TRUE_MESSAGE(has(text, said), (std::string(said) + "\n not in\n" + text).c_str());
 }
 

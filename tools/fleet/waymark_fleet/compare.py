@@ -53,7 +53,7 @@ def began(diff, one, two):
     if not (one / "trajectory.csv").is_file() or not (two / "trajectory.csv").is_file():
         return "the plan's `keep` leaves the runs out"
     done = subprocess.run([*diff, one, two], capture_output=True, text=True, check=False)
-    found = re.search(r"^It began at t = \S+ s \(t_ns (\d+)\) in (.*)", done.stdout, re.MULTILINE)
+    found = re.search(r"^The first difference is at t = \S+ s \(t_ns (\d+)\) in (.*)", done.stdout, re.MULTILINE)
     if found:
         with (one / "trajectory.csv").open() as file:
             begun_ns = int([next(file), next(file)][1].split(",")[0])

@@ -140,14 +140,14 @@ class Reader {
   void each(const wm_yaml_node &map, const char *key, const Do &act) {
     const wm_yaml_node list = wm_yaml_get(&map, key);
     if (!ok() || !wm_yaml_there(&list)) return;
-    if (!wm_yaml_is_list(&list)) return take(wm_yaml_fail(&list, err_, "a list is wanted here"));
+    if (!wm_yaml_is_list(&list)) return take(wm_yaml_fail(&list, err_, "a list is needed here"));
     for (size_t i = 0; i < wm_yaml_count(&list) && ok(); i++) act(wm_yaml_item(&list, i));
   }
   std::vector<Point> points(const wm_yaml_node &list, size_t least) {
     std::vector<Point> out;
     if (!ok()) return out;
     if (!wm_yaml_is_list(&list) || wm_yaml_count(&list) < least) {
-      take(wm_yaml_fail(&list, err_, "a list of at least %zu points [x, y] in metres is wanted here", least));
+      take(wm_yaml_fail(&list, err_, "a list of at least %zu points [x, y] in metres is needed here", least));
       return out;
     }
     for (size_t i = 0; i < wm_yaml_count(&list) && ok(); i++) {
@@ -158,7 +158,7 @@ class Reader {
       if (!ok()) break;
       const bool same = !out.empty() && out.back().x_m == xy[0] && out.back().y_m == xy[1];
       if (same || std::fabs(xy[0]) > kFar_m || std::fabs(xy[1]) > kFar_m)
-        take(wm_yaml_fail(&item, err_, "a point within %g m that differs from the one before is wanted here", kFar_m));
+        take(wm_yaml_fail(&item, err_, "a point within %g m that differs from the one before is needed here", kFar_m));
       out.push_back({xy[0], xy[1]});
     }
     return out;

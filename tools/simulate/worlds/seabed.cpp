@@ -140,7 +140,7 @@ WorldCamera stereo_camera(const char *name, double y) {
 wm_status make_seabed(const WorldRequest &request, World &world, wm_error *err) {
   if (request.route || request.plan)
     return wm_fail(err, WM_BAD_CONFIG,
-                   "world: seabed has neither a plan nor legs; its vehicle swims a path of its own");
+                   "world: seabed has neither a plan nor legs; its vehicle moves along its own path");
   world.about = "Underwater vehicle over a rocky bed, stereo pair that looks ahead and down, haze and particles.";
   world.vehicle = Vehicle::six;
   const Bed bed(request.seed);

@@ -43,7 +43,7 @@ wm_status route_through(Point start, const std::vector<Waypoint> &points, const 
   out.x_m = start.x_m;
   out.y_m = start.y_m;
   out.acceleration_mps2 = rules.acceleration_mps2;
-  if (points.empty()) return wm_fail(err, WM_BAD_CONFIG, "route: at least one point is wanted");
+  if (points.empty()) return wm_fail(err, WM_BAD_CONFIG, "route: at least one point is needed");
   const auto from = [&](size_t i) { return i == 0 ? start : points[i - 1].p; };
   const Heading first = between(start, points[0].p);
   out.heading_rad = wm::wrap(first.travel_rad + (points[0].reverse ? kPi : 0));

@@ -15,12 +15,12 @@ std::unique_ptr<World> make_world(const WorldRequest &request, wm_error *err) {
   size_t which = 0;
   while (kWorldNames[which] != nullptr && request.name != kWorldNames[which]) which++;
   if (kWorldNames[which] == nullptr) {
-    (void)wm_fail(err, WM_BAD_CONFIG, "world: `%s` is none; there are crossing, corridor, office, hall and seabed",
+    (void)wm_fail(err, WM_BAD_CONFIG, "world: `%s` is unknown; one of: crossing, corridor, office, hall, seabed",
                   request.name.c_str());
     return nullptr;
   }
   if (request.plan && !request.route) {
-    (void)wm_fail(err, WM_BAD_CONFIG, "world: a plan of one's own needs a route through it");
+    (void)wm_fail(err, WM_BAD_CONFIG, "world: a world with a `plan` needs a `route` through it");
     return nullptr;
   }
   auto world = std::make_unique<World>();

@@ -16,7 +16,7 @@ const error_case kErrorCases[] = {
      "config/robot.yaml:3: landmark_efk: unknown key; did you mean 'landmark_ekf'?"},
     {CONFIG, "Parameter in the wrong place", FILE_, "horizon_ms: 500\n",
      "config/robot.yaml:3: horizon_ms: unknown key; did you mean 'merge.horizon_ms'?"},
-    {CONFIG, "Key that nobody knows", FILE_, "colour: red\n",
+    {CONFIG, "Unknown key", FILE_, "colour: red\n",
      "config/robot.yaml:3: colour: unknown key; known here: format, estimator, sources, calibration, landmarks, dbc, "
      "can_signals, devices, map, initial_pose, vision, start, black_box, publish, commands, merge, realtime, motion, "
      "sightings, landmark_ekf, edge_mcl, pf_edges, slam, "
@@ -69,9 +69,9 @@ const error_case kErrorCases[] = {
      "ticks, "
      "speeds, steering, imu, heading, depth, gnss)"},
     {CONFIG, "Stream over LCM twice", FILE_, "devices:\n  lcm:\n    - {stream: imu}\n    - {stream: imu}\n",
-     "config/robot.yaml:6: devices.lcm[1]: the stream 'imu' stands there twice (first in line 5)"},
+     "config/robot.yaml:6: devices.lcm[1]: the stream 'imu' appears twice (first in line 5)"},
     {CONFIG, "Stream of gpsd and of LCM", FILE_, "devices:\n  lcm: [{stream: gnss}]\n  gpsd: [{latency_ms: 80}]\n",
-     "config/robot.yaml:5: devices.gpsd[0]: the stream 'gnss' stands there twice (first in line 4)"},
+     "config/robot.yaml:5: devices.gpsd[0]: the stream 'gnss' appears twice (first in line 4)"},
     {CONFIG, "Report that gpsd does not give", FILE_, "devices: {gpsd: [{take: positions}]}\n",
      "config/robot.yaml:3: devices.gpsd[0].take: 'positions' is unknown; did you mean 'position'? (one of: position, "
      "course, antennas)"},
@@ -82,7 +82,7 @@ const error_case kErrorCases[] = {
      "config/robot.yaml:3: sources[0].name: 'gpss' is unknown; did you mean 'gnss'? (one of: can, motion, motion6, "
      "increments, ticks, speeds, steering, imu, heading, depth, sightings, markers, stereo, points, gnss)"},
     {CONFIG, "Source twice", FILE_, "sources:\n  - name: gnss\n  - name: gnss\n",
-     "config/robot.yaml:5: sources[1].name: 'gnss' stands there twice (first in line 4)"},
+     "config/robot.yaml:5: sources[1].name: 'gnss' appears twice (first in line 4)"},
     {CONFIG, "Until before from", FILE_, "sources: [{name: gnss, from_s: 30, until_s: 25}]\n",
      "config/robot.yaml:3: sources[0].until_s: 25 is not after from_s (30): nothing would be taken"},
     {CONFIG, "File that is not there", FILE_, "landmarks: hall.csv\n",
@@ -91,9 +91,9 @@ const error_case kErrorCases[] = {
      "config/robot.yaml:3: initial_pose.yaw_rad: unknown key; known are: t_ns, x_m, y_m, z_m, heading_rad, "
      "heading_deg, qx, qy, qz, qw, sigma_xy_m, sigma_heading_rad, sigma_heading_deg"},
     {CONFIG, "Heading given twice", FILE_, "initial_pose: {heading_rad: 0, heading_deg: 0}\n",
-     "config/robot.yaml:3: initial_pose.heading_deg: heading_rad stands there, too; give one of them"},
+     "config/robot.yaml:3: initial_pose.heading_deg: heading_rad is given, too; give one of them"},
     {CONFIG, "Key twice", FILE_, "merge: {horizon_ms: 300}\nmerge: {horizon_ms: 400}\n",
-     "config/robot.yaml:4: merge: the key stands here twice (first in line 3)"},
+     "config/robot.yaml:4: merge: the key appears twice (first in line 3)"},
     {CONFIG, "Tab as indentation", FILE_, "merge:\n\thorizon_ms: 300\n",
      "config/robot.yaml:4: not valid YAML: found character that cannot start any token, while scanning for the next "
      "token"},
@@ -116,7 +116,7 @@ const error_case kErrorCases[] = {
     {REC, "Stream that is not there", "recording.yaml",
      "format: waymark-recording/1\nstreams: [motion.csv, gnss.csv]\n",
      "rec/recording.yaml:2: streams[1]: 'gnss.csv' is not in the folder; put it there or take it off the list"},
-    {REC, "Start pose that is no number", "recording.yaml",
+    {REC, "Start pose that is not a number", "recording.yaml",
      "format: waymark-recording/1\nvehicle:\n  initial_pose: {x_m: 1, y_m: two}\n",
      "rec/recording.yaml:3: vehicle.initial_pose.y_m: 'two' is not a number; a number from -100000000 to 100000000 is "
      "needed"},
@@ -151,7 +151,7 @@ const error_case kErrorCases[] = {
      "rec/calibration.yaml:2: sensors.laser.mounting.xyz_m: has 2 values; a list of 3 numbers is needed"},
     {REC, "Degrees and radians", "calibration.yaml",
      "sensors:\n  laser: {mounting: {rpy_deg: [0, 0, 5], rpy_rad: [0, 0, 0.1]}}\n",
-     "rec/calibration.yaml:2: sensors.laser.mounting.rpy_rad: rpy_deg stands there, too; give one of them"},
+     "rec/calibration.yaml:2: sensors.laser.mounting.rpy_rad: rpy_deg is given, too; give one of them"},
     {REC, "Range that is neither", "calibration.yaml", "sensors:\n  laser: {range_is: dept}\n",
      "rec/calibration.yaml:2: sensors.laser.range_is: 'dept' is unknown; did you mean 'depth'? (one of: distance, "
      "depth)"},
@@ -176,7 +176,7 @@ const error_case kErrorCases[] = {
 
     // landmarks.csv and the headers of streams.
     {REC, "Landmark twice", "landmarks.csv", "id,x_m,y_m,z_m,sigma_m\n7,1,2,0,0.01\n7,3,4,0,0.01\n",
-     "rec/landmarks.csv:3: id: 7 stands there twice (first in line 2); each landmark needs its own"},
+     "rec/landmarks.csv:3: id: 7 appears twice (first in line 2); each landmark needs its own"},
     {REC, "Landmark that is not finite", "landmarks.csv", "id,x_m,y_m,z_m,sigma_m\n7,1,nan,0,0.01\n",
      "rec/landmarks.csv:2: y_m: 'nan' is not a finite number"},
     {REC, "Landmark with a negative sigma", "landmarks.csv", "id,x_m,y_m,z_m,sigma_m\n7,1,2,0,-0.01\n",
@@ -190,7 +190,7 @@ const error_case kErrorCases[] = {
      "rec/motion.csv:1: the column 't_ns' is missing (commas part the fields); needed in the header, in any order: "
      "t_ns,v_mps,w_radps"},
     {REC, "Column twice", "motion.csv", "t_ns,v_mps,v_mps,w_radps\n0,0,0,0\n",
-     "rec/motion.csv:1: the column 'v_mps' stands there twice"},
+     "rec/motion.csv:1: the column 'v_mps' appears twice"},
     {REC, "Empty stream", "motion.csv", "", "rec/motion.csv:1: no header line; needed: t_ns,v_mps,w_radps"},
 
     // can-signals.yaml, as far as it is YAML; what doesn't fit the DBC is among the CAN cases.
@@ -221,7 +221,7 @@ const error_case kErrorCases[] = {
      "rec/motion.csv:2: t_ns: '0.5' is not a whole number; the row is skipped"},
     {ROW, "Stamp that leaps", "motion.csv", "t_ns,v_mps,w_radps\n0,1,0\n900000000000000,1,0\n100000000,1,0\n",
      "rec/motion.csv:3: t_ns: lies 900000 s after the next row's; the row is skipped"},
-    {ROW, "Value that is no number", "motion.csv", "t_ns,v_mps,w_radps\n0,fast,0\n",
+    {ROW, "Value that is not a number", "motion.csv", "t_ns,v_mps,w_radps\n0,fast,0\n",
      "rec/motion.csv:2: v_mps: 'fast' is not a number; the row is skipped"},
     {ROW, "Value that is not finite", "motion.csv", "t_ns,v_mps,w_radps\n0,inf,0\n",
      "rec/motion.csv:2: v_mps: 'inf' is not a finite number; the row is skipped"},

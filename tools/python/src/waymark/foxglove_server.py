@@ -28,7 +28,7 @@ _OFFER_AGAIN_S = 1.0  # a viewer subscribes within milliseconds
 LAYOUT = Path(__file__).with_name("foxglove-layout.json")
 _EXAMPLES = """examples:
   waymark watch --foxglove 8765 --config /etc/waymark/robot.yaml
-  waymark watch --foxglove 0.0.0.0:8765 --config config/corridor.yaml --recording recordings/drive
+  waymark watch --foxglove 0.0.0.0:8765 --config config/datasets/corridor.yaml --recording recordings/drive
 
 In Foxglove: Open connection, ws://localhost:8765; then import the layout that is printed at the start. A connection has no
 password: without an address, this computer alone can connect. Exit code: 0 done, 1 the work failed, 2 usage."""
