@@ -234,15 +234,15 @@ static void try_suspects(checked *self, const wm_assembly *assembly, double reco
   for (size_t i = 0; i < found.count; i++) {
     if (found.before.is_valid)
       name_cause(self, &plan, &found.at[i], WM_SEVERITY_BAD,
-                 ": corrected in a trial, %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely", after,
-                 before, exp(fmin(20, found.after.score - found.before.score)));
+                 ": corrected in a trial, %.0f %% of the updates fit (now %.0f %%), and each is %.1f times as likely",
+                 after, before, exp(fmin(20, found.after.score - found.before.score)));
     else
       name_cause(self, &plan, &found.at[i], WM_SEVERITY_BAD,
                  ": corrected in a trial, %.0f %% of the updates fit (now there is none)", after);
   }
   for (size_t i = 0; i < found.equal_count; i++)
     name_cause(self, &plan, &found.equal[i], WM_SEVERITY_NOTE,
-               ": in place of the cause above this explains the observations as well; look which of them is true");
+               ": explains the observations as well as the cause above; find out which of the two is true");
   if (found.count > 0 && self->apply_to) apply(self, &plan, found.at, found.count);
   wm_findings_to_front(self->found, consequences);
 }

@@ -248,14 +248,28 @@ wm_status wm_config_parse_logged(const char *text, size_t length, const char *pa
   return parse(text, length, path, 0, out, err);
 }
 
+// Configurations of data sets lay beside those of robots up to version 0.1. If there is no file at `path`, but one of
+// this name in the folder datasets/ beside it, its path is written into `moved`, and true is returned.
+static int has_moved(const char *path, char moved[WM_PATH_MAX]) {
+  const char *slash = strrchr(path, '/');
+  const size_t folder = slash ? (size_t)(slash - path) + 1 : 0;
+  const int length = snprintf(moved, WM_PATH_MAX, "%.*sdatasets/%s", (int)folder, path, path + folder);
+  return length > 0 && length < WM_PATH_MAX && access(path, F_OK) != 0 && access(moved, R_OK) == 0;
+}
+
 wm_status wm_config_load(const char *path, wm_config *out, wm_error *err) {
-  char *text;
+  char *text, moved[WM_PATH_MAX];
   size_t length;
   memset(out, 0, sizeof *out);
-  wm_status status = wm_text_read_file(path, CONFIG_BYTES_MAX, &text, &length, err);
+  const int from_elsewhere = has_moved(path, moved);
+  const char *file = from_elsewhere ? moved : path;
+  wm_status status = wm_text_read_file(file, CONFIG_BYTES_MAX, &text, &length, err);
   if (status != WM_OK) return status;
-  status = wm_config_parse(text, length, path, out, err);
+  status = wm_config_parse(text, length, file, out, err);
   free(text);
+  const size_t used = strlen(out->warnings);
+  if (from_elsewhere)
+    (void)snprintf(out->warnings + used, sizeof out->warnings - used, "%s: has moved to %s, write that\n", path, moved);
   return status;
 }
 

@@ -19,8 +19,9 @@ import replays
 
 # World, configuration. The faults that a world plants (a robot that is carried off) are true alarms: none of these has one.
 WORLDS = [("crossing", "robot"), ("crossing-easy", "robot"), ("crossing-hard", "robot"), ("crossing-laps", "robot"),
-          ("loops-landmarks", "loops-landmarks"), ("loops-lines", "loops-lines"), ("loops-markers", "loops-markers"),
-          ("loops-commands", "robot"), ("seabed-acoustic", "seabed-points"), ("seabed-points", "seabed-points")]
+          ("loops-landmarks", "datasets/loops-landmarks"), ("loops-lines", "datasets/loops-lines"), ("loops-markers", "datasets/loops-markers"),
+          ("loops-commands", "robot"), ("seabed-acoustic", "datasets/seabed-points"),
+          ("seabed-points", "datasets/seabed-points")]
 DEGRADED_MOST = 0.01
 RIGHT_M, RIGHT_SIGMA = 0.5, 3.5  # a pose that is nearer to the truth than both is right
 

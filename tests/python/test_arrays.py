@@ -65,7 +65,7 @@ class FloorPlans(Folder):
         shutil.rmtree(self.folder / "b/map")
         waymark.write_floor_plan(self.folder / "b", first)
         for name in "ab":
-            subprocess.run([BIN / "waymark", "replay", self.folder / name, "--config", ROOT / "config/corridor.yaml", "--out",
+            subprocess.run([BIN / "waymark", "replay", self.folder / name, "--config", ROOT / "config/datasets/corridor.yaml", "--out",
                             self.folder / f"run-{name}"], check=True, capture_output=True)
         self.assertEqual(*((self.folder / f"run-{name}/trajectory.csv").read_bytes() for name in "ab"))
 

@@ -35,6 +35,17 @@ static void each_is_read(void) {
   each_of("config/datasets");
 }
 
+static void a_moved_one_is_read_where_it_is_and_said(void) {
+  wm_config config;
+  wm_error err = {0};
+  TEST_ASSERT_EQUAL_MESSAGE(WM_OK, wm_config_load("config/office-frozen.yaml", &config, &err), err.text);
+  TEST_ASSERT_EQUAL_STRING("config/office-frozen.yaml: has moved to config/datasets/office-frozen.yaml, write that\n",
+                           config.warnings);
+  wm_config_free(&config);
+  TEST_ASSERT_EQUAL(WM_NOT_FOUND, wm_config_load("config/no-such.yaml", &config, &err));
+  TEST_ASSERT_NOT_NULL_MESSAGE(strstr(err.text, "config/no-such.yaml"), err.text);
+}
+
 static int is_param(const wm_param_table *table, const char *key) {
   for (size_t i = 0; i < table->count; i++)
     if (strcmp(table->params[i].key, key) == 0) return 1;
@@ -83,6 +94,7 @@ static void old_keys_lead_to_parameters(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(each_is_read);
+  RUN_TEST(a_moved_one_is_read_where_it_is_and_said);
   RUN_TEST(old_keys_lead_to_parameters);
   return UNITY_END();
 }
