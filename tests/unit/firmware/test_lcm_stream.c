@@ -172,8 +172,22 @@ static void the_same_and_older_stamps_are_counted(void) {
     send_motion(stamps[i], 1, 0, 0);
     TEST_ASSERT_EQUAL(i == 0 ? WM_OK : WM_AGAIN, next());
   }
-  TEST_ASSERT_EQUAL_UINT64(1, source->counts.frozen);
+  TEST_ASSERT_EQUAL_UINT64(1, source->counts.ignored);
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.out_of_order);
+}
+
+// A measurement that is sent again is ignored; a stamp that stands still for longer than a period of silence is frozen.
+static void a_stamp_that_stands_still_is_frozen(void) {
+  begin_motion();
+  const wm_time_ns t_ns = wm_monotonic_ns(), until_ns = t_ns + 10 * WM_NS_PER_S;
+  send_motion(t_ns, 1, 0, 0);
+  TEST_ASSERT_EQUAL(WM_OK, next());
+  while (source->counts.frozen == 0 && wm_monotonic_ns() < until_ns) {
+    send_motion(t_ns, 1, 0, 0);
+    TEST_ASSERT_EQUAL(WM_AGAIN, next());
+    if (source->counts.frozen > 0) TEST_ASSERT_TRUE(wm_monotonic_ns() - t_ns > 2 * WM_NS_PER_S);
+  }
+  TEST_ASSERT_GREATER_THAN_UINT64(0, source->counts.frozen);
 }
 
 static void numbers_that_cannot_be_are_refused(void) {
@@ -256,6 +270,7 @@ int main(void) {
   RUN_TEST(an_absent_sender_is_said);
   RUN_TEST(a_silent_sender_is_said_and_its_return);
   RUN_TEST(the_same_and_older_stamps_are_counted);
+  RUN_TEST(a_stamp_that_stands_still_is_frozen);
   RUN_TEST(numbers_that_cannot_be_are_refused);
   RUN_TEST(rubbish_and_other_types_are_refused);
   RUN_TEST(stamps_of_another_clock_are_refused);
