@@ -263,7 +263,7 @@ static void doubled_and_older_samples_are_counted(void) {
   const wm_time_ns stamps[] = {t_ns, t_ns, t_ns - 10 * MS, t_ns + MS};
   for (int i = 0; i < 4; i++) sample(stamps[i], 0, i, 0);
   for (int i = 0; i < 4; i++) TEST_ASSERT_EQUAL(i == 0 || i == 3 ? WM_OK : WM_AGAIN, next());
-  TEST_ASSERT_EQUAL_UINT64(1, source->counts.frozen);
+  TEST_ASSERT_EQUAL_UINT64(1, source->counts.ignored);
   TEST_ASSERT_EQUAL_UINT64(1, source->counts.out_of_order);
 }
 
