@@ -245,7 +245,10 @@ wm_status wm_config_parse(const char *text, size_t length, const char *path, wm_
 }
 
 wm_status wm_config_parse_logged(const char *text, size_t length, const char *path, wm_config *out, wm_error *err) {
-  return parse(text, length, path, 0, out, err);
+  const wm_status status = parse(text, length, path, 0, out, err);
+  if (status == WM_OK || !err) return status;
+  const wm_error inside = *err;
+  return wm_fail(err, status, "the event log's copy of %s", inside.text);
 }
 
 // Configurations of data sets lay beside those of robots up to version 0.1. If there is no file at `path`, but one of

@@ -83,7 +83,7 @@ void wm_forked_run(const wm_forked *work, size_t count, void *results) {
   if (at_once > AT_ONCE_MAX) at_once = AT_ONCE_MAX;
   running jobs[AT_ONCE_MAX];
   char *at = results;
-  memset(at, 0, count * work->result_bytes);
+  if (count > 0) memset(at, 0, count * work->result_bytes);  // without jobs `results` may be NULL
   for (size_t started = 0, ended = 0; ended < count; ended++) {
     for (; started < count && running_count < at_once; started++)
       jobs[running_count++] = start(work, started, at + started * work->result_bytes);

@@ -92,6 +92,8 @@ int64_t Csv::integer(size_t row, size_t column) const {
   const auto [end, problem] = std::from_chars(field.data(), field.data() + field.size(), value);
   if (field.empty() || problem != std::errc() || end != field.data() + field.size())
     throw Failure(where(row, column) + ": '" + std::string(field) + "' is not a whole number of 64 bits");
+  if (value < -kIntegerLimit || value > kIntegerLimit)
+    throw Failure(where(row, column) + ": '" + std::string(field) + "' is out of range: at most 4e18 is possible");
   return value;
 }
 

@@ -30,7 +30,9 @@ class Csv {
   // NaN where the field is empty (or the column is not there). Throws Failure where the text is not a number.
   [[nodiscard]] double number(size_t row, size_t column) const;
   [[nodiscard]] double number(size_t row, std::optional<size_t> column) const;
-  // Throws Failure where the field is empty or not a whole number of 64 bits.
+  // As in recordings: the difference of two stamps in ns fits into 64 bits.
+  static constexpr int64_t kIntegerLimit = 4'000'000'000'000'000'000;
+  // Throws Failure where the field is empty, not a whole number of 64 bits, or beyond kIntegerLimit.
   [[nodiscard]] int64_t integer(size_t row, size_t column) const;
   // "FILE:LINE: COLUMN" of a cell, for messages.
   [[nodiscard]] std::string where(size_t row, size_t column) const;

@@ -18,6 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kGuessedView_rad = 60 * M_PI / 180;  // of a lens without calibration: a usual one
+constexpr uint32_t kPictureLeast_px = 16;             // as the detectors need
 constexpr int64_t kFrame_ns = 1'000'000'000 / 30;     // between pictures without stamps
 
 void copy(const std::string &text, char *out, size_t capacity) {
@@ -170,6 +171,9 @@ void Input::take_calibration(const InputWish &wish) {
   rig_.camera_count = 1;
   wm_frame first{};
   if (!open(0, 1)->next(&first)) throw Failure(wish.from + ": has no pictures that can be read");
+  if (first.width_px < kPictureLeast_px || first.height_px < kPictureLeast_px)
+    throw Failure(wish.from + ": pictures of " + std::to_string(first.width_px) + " x " +
+                  std::to_string(first.height_px) + " px are too small; 16 x 16 are needed");
   rig_.cameras[0] = guessed_camera(first.width_px, first.height_px);
 }
 

@@ -264,6 +264,14 @@ Plan read_plan(const Make &a) {
   return plan;
 }
 
+Layers layers_of(const Plan &plan, const Make &a) {
+  try {
+    return make_layers(plan, a.layers);
+  } catch (const Failure &failure) {
+    throw Failure(a.plan + ": " + failure.what(), failure.exit_code);
+  }
+}
+
 int make(Make &a) {
   for (const std::string &text : a.inside) {
     double x = 0, y = 0;
@@ -277,7 +285,7 @@ int make(Make &a) {
     throw Failure((folder / "map.yaml").string() + ": exists already and is not overwritten; name another --out",
                   kUsage);
   const Plan plan = read_plan(a);
-  const Layers layers = make_layers(plan, a.layers);
+  const Layers layers = layers_of(plan, a);
   std::error_code problem;
   fs::create_directories(folder, problem);
   if (problem) throw Failure(folder.string() + ": " + problem.message());

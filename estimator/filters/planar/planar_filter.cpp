@@ -1,12 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "filters/planar/planar_filter.hpp"
 
+#include <cmath>
 #include <cstring>
 
 #include "filters/planar/past_pose.hpp"
 #include "math/covariance.hpp"
 
 namespace wm {
+namespace {
+
+constexpr double kVastVariance = 1e8;      // m2: sigma of 10 km and more, as after months without data; not swept
+constexpr double kLeastRemainder = 1e-12;  // share of such a variance that one update leaves; eps of double is 2e-16
+
+}  // namespace
 
 int planar_filter::count_motion_states(const wm_motion_states &states, int model) {
   int count = count_velocity_states(model);
@@ -148,8 +155,12 @@ double planar_filter::innovation_left(const planar_row &second, double innovatio
   return innovation - cross / (first.variance + first_noise) * first_innovation;
 }
 
-bool planar_filter::update(const projection &projected, double innovation, double noise, int kept_from, int kept_to,
-                           const noise_adaption::source &source) {
+bool planar_filter::update(const projection &projected, double innovation, double stated_noise, int kept_from,
+                           int kept_to, const noise_adaption::source &source) {
+  // Rounding could leave a variance of 0 or below where one update narrows a vast one by more than this; the next
+  // update goes on.
+  const bool vast = projected.variance > kVastVariance;
+  const double noise = vast ? std::fmax(stated_noise, kLeastRemainder * projected.variance) : stated_noise;
   const double s = projected.variance + noise;
   if (!(s > 0.0) || !finite(s) || !finite(innovation)) return false;
   const double inverse = 1.0 / s;

@@ -262,6 +262,22 @@ void test_the_estimate_of_a_drive_has_its_twist(void) {
   }
 }
 
+// After months without data: 5.9e15 m2, then positions of 0.1 m sigma on each axis.
+void test_an_update_of_a_vast_variance_leaves_some(void) {
+  make_busy_filter();
+  filter->inflate_pose(5.9e15, 0.0);
+  for (int round = 0; round < 3; round++)
+    for (int axis = 0; axis < 2; axis++) {
+      wm::planar_row row;
+      row.add(axis, 1.0);
+      wm::projection projected;
+      filter->project(row, &projected);
+      TEST_ASSERT_TRUE(filter->update(projected, 0.0, 0.01));
+      TEST_ASSERT_GREATER_THAN_DOUBLE(0.0, filter->covariance(axis, axis));
+    }
+  TEST_ASSERT_DOUBLE_WITHIN(0.01, 0.01, filter->covariance(0, 0));
+}
+
 }  // namespace
 
 void setUp(void) {
@@ -280,5 +296,6 @@ int main(void) {
   RUN_TEST(test_standing_still_teaches_the_gyros_bias);
   RUN_TEST(test_the_estimate_of_a_drive_has_its_twist);
   RUN_TEST(test_fading_and_forgetting_keep_the_rest);
+  RUN_TEST(test_an_update_of_a_vast_variance_leaves_some);
   return UNITY_END();
 }

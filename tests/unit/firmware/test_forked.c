@@ -41,6 +41,11 @@ static void results_at_the_places_of_their_jobs(void) {
   TEST_ASSERT_EQUAL(JOBS, done_count);
 }
 
+static void no_jobs_need_no_results(void) {
+  wm_forked_run(&(wm_forked){NULL, square, sizeof(uint64_t), one_done}, 0, NULL);
+  TEST_ASSERT_EQUAL(0, done_count);
+}
+
 // The first job ends after the last one.
 static void wait_for_last(void *context, size_t index, void *result) {
   (void)context;
@@ -61,6 +66,7 @@ static void a_long_job_holds_no_other_back(void) {
 int main(void) {
   UNITY_BEGIN();
   RUN_TEST(results_at_the_places_of_their_jobs);
+  RUN_TEST(no_jobs_need_no_results);
   RUN_TEST(a_long_job_holds_no_other_back);
   return UNITY_END();
 }
