@@ -29,8 +29,9 @@ inline void set_scaled(double *out, const double *row, double factor, int stride
   for (int j = 0; j < stride / 2; j++) o[j] = f * r[j];
 }
 
-// P += k b' + b k'. Symmetric to the last bit where P was: both triangles add the same two products. Rows that get nothing are
-// skipped: half of a filter's states or more are slots that no landmark holds, or that the observation tells nothing of.
+// P += k b' + b k'. Symmetric to the last bit where P was: both triangles add the same two products. Rows that get
+// nothing are skipped: half of a filter's states or more are slots that no landmark holds, or that the observation
+// tells nothing of.
 inline void add_symmetric_outer(double *p, const double *k, const double *b, int n, int stride) {
   const pair *kv = reinterpret_cast<const pair *>(k);
   const pair *bv = reinterpret_cast<const pair *>(b);

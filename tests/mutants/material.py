@@ -133,7 +133,7 @@ def make(binaries, folder, rendered):
         place = folder / name
         place.mkdir(parents=True)
         run(binaries / "waymark-simulate", ROOT / f"config/worlds/{world}.yaml", "--duration", seconds, "--out", place / "rec", *more)
-        text = (ROOT / f"config/{config}.yaml").read_text()
+        text = (ROOT / f"config/datasets/{config}.yaml").read_text()
         if more:  # no pictures: nothing to detect in them
             text = re.sub(r"^vision:\n(?:[ #].*\n|\n)*", "", text, flags=re.MULTILINE)
         (place / "robot.yaml").write_text("publish: {lcm: false}\n" + text if "publish:" not in text else text)
