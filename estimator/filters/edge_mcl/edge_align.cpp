@@ -320,7 +320,8 @@ void edge_mcl::find_minima(const wm_points &points, const prediction &prior, min
   const double sigma = std::sqrt(half + spread), angle = 0.5 * atan2(2.0 * xy, xx - yy);
   const sin_cos axis = sincos(angle);
   double step = kStartStep_m;
-  int sides = (int)std::fmin(kStartSigmas * sigma / step, kStartsMax + 1.0);
+  const double wanted = kStartSigmas * sigma / step;
+  int sides = wanted < kStartsMax + 1.0 ? (int)wanted : kStartsMax + 1;
   if (sides > kStartsMax) {
     sides = kStartsMax;
     step = kStartSigmas * sigma / sides;

@@ -159,8 +159,8 @@ bool planar_filter::update(const projection &projected, double innovation, doubl
                            int kept_to, const noise_adaption::source &source) {
   // Rounding could leave a variance of 0 or below where one update narrows a vast one by more than this; the next
   // update goes on.
-  const bool vast = projected.variance > kVastVariance;
-  const double noise = vast ? std::fmax(stated_noise, kLeastRemainder * projected.variance) : stated_noise;
+  const double least = projected.variance > kVastVariance ? kLeastRemainder * projected.variance : 0.0;
+  const double noise = stated_noise < least ? least : stated_noise;
   const double s = projected.variance + noise;
   if (!(s > 0.0) || !finite(s) || !finite(innovation)) return false;
   const double inverse = 1.0 / s;
