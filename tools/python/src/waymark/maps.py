@@ -4,6 +4,8 @@
 Frames and units are those of recordings (docs/recording-format.md). All functions may be called in any thread.
 """
 
+from __future__ import annotations
+
 import json
 from dataclasses import dataclass
 from pathlib import Path
