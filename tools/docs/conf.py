@@ -29,6 +29,10 @@ html_theme = "furo"
 html_title = f"Waymark {release}"
 html_static_path = [str(HERE / "static")]
 html_css_files = ["waymark.css"]
+html_favicon = str(HERE / "static/favicon.svg")
+html_search_scorer = str(HERE / "static/scorer.js")
+html_show_sourcelink = False
+html_copy_source = False
 html_theme_options = {"light_css_variables": {"color-brand-primary": "#1d5fa8", "color-brand-content": "#1d5fa8"},
                       "dark_css_variables": {"color-brand-primary": "#7fb2ea", "color-brand-content": "#7fb2ea"}}
 copybutton_exclude = ".linenos, .gp, .go"
