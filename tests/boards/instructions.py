@@ -19,7 +19,7 @@ from builds import ROOT, Build
 
 # What, how often more, what it is.
 WORKS = [
-    ("landmark_step", 200, "landmark update: a twist and a bearing, pose and 6 calibration states"),
+    ("landmark_step", 200, "landmark update: a twist and a bearing, pose and default calibration states"),
     ("landmark_start", 400, "the same in the first 10 s, while a stated start is weighed"),
     ("particle_step_200", 10, "particle update: move, weigh 180 points, resample; 200 particles"),
     ("particle_step_2000", 2, "the same, 2000 particles"),

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """The README's figures of accuracy, measured: figures.py BIN DATA replays the five localization drives of MRCLAM (recordings
-mrclam-d6-r1 to r5 in DATA), with known landmarks and with the map built on the way. Also the instructions of a landmark update, as
-tests/bench/instructions.txt records them. Fails where the README states another figure. Skipped (77) without the recordings."""
+mrclam-d6-r1 to r5 in DATA), with known landmarks and with the map built on the way. Also the instructions of a landmark update, within
+5 % of what tests/bench/instructions.txt records (of one step there, of the mean here). Fails where the README states another figure. Skipped (77) without the recordings."""
 import json
 import pathlib
 import re
@@ -44,14 +44,12 @@ def measured(programs, data):
         known = [evaluated(programs, r, "mrclam", folder / r.name) for r in recordings]
         lost = [was_lost(folder / r.name) for r in recordings]
         built = [evaluated(programs, r, "mrclam-slam", folder / f"{r.name}-slam", "--align", "se2") for r in recordings]
-    counts = dict(line.split() for line in (ROOT / "tests/bench/instructions.txt").read_text().splitlines())
     return {
         "RMSE, known landmarks": f"{mean([e['position_rmse_m'] for e in known]):.3f} m RMSE",
         "RMSE, map built": f"{mean([e['position_rmse_m'] for e in built]):.3f} m;",
         "error of the landmarks": f"within {mean([e['landmark_rmse_own_fit_m'] for e in built]):.3f} m",
         "lost drives": f"{sum(lost)} of 5;",
         "longest time beyond the covariance": f"{max(e['beyond_3_5_sigma_longest_s'] for e in known):.1f} s beyond",
-        "instructions": f"{round(int(counts['landmark_step']), -3):,} instructions",
     }
 
 
@@ -68,6 +66,10 @@ def main():
         is_there = text in readme
         faults += not is_there
         print(f"{what}: {text}{'' if is_there else '   THE README STATES ANOTHER FIGURE'}")
+    recorded = int(re.search(r"^landmark_step (\d+)", (ROOT / "tests/bench/instructions.txt").read_text(), re.MULTILINE)[1])
+    stated = int(re.search(r"([\d,]+) instructions on x86-64", readme)[1].replace(",", ""))
+    faults += abs(stated - recorded) > 0.05 * recorded
+    print(f"instructions of a landmark update: {stated} stated, {recorded} recorded")
     sys.exit(1 if faults else 0)
 
 
