@@ -45,9 +45,19 @@ def ros_covariance(covariances: Array, xyzw: Array) -> Array:
     return out
 
 
+def _spread(count: int) -> Array:
+    """At most PATH_POINTS numbers of rows, spread evenly."""
+    return np.unique(np.linspace(0, count - 1, min(PATH_POINTS, count)).astype(int))
+
+
+def points(messages: Messages, topic: str, t_ns: int, where: Array, **columns: Array) -> Item:
+    """Points in the map as a cloud: for viewers that draw no paths, pose arrays or markers (Rerun)."""
+    return Item(t_ns, topic + "/points", "sensor_msgs/msg/PointCloud2", messages.cloud(t_ns, "map", where, **columns))
+
+
 def path(messages: Messages, t_ns: int, stamps: Array, where: Array, turns: Array) -> Any:
     """A nav_msgs/Path of at most PATH_POINTS poses, spread evenly."""
-    chosen = np.unique(np.linspace(0, len(stamps) - 1, min(PATH_POINTS, len(stamps))).astype(int))
+    chosen = _spread(len(stamps))
     poses = [messages.make("PoseStamped", header=messages.header(stamps[i], "map"), pose=messages.pose(where[i], turns[i]))
              for i in chosen]
     return messages.make("Path", header=messages.header(t_ns, "map"), poses=poses)
@@ -117,6 +127,7 @@ def _paths(messages: Messages, table: Table, log_ns: Array) -> Iterator[Item]:
         next_ns = now + PATH_EVERY_NS
         yield Item(now, "/waymark/path", "nav_msgs/msg/Path",
                    path(messages, table["t_ns"][i], table["t_ns"][: i + 1], where[: i + 1], turns[: i + 1]))
+        yield points(messages, "/waymark/path", now, where[_spread(i + 1)])
 
 
 def innovations(messages: Messages, table: Table) -> Iterator[Item]:
@@ -147,6 +158,8 @@ def particles(messages: Messages, table: Table) -> Iterator[Item]:
         poses = [messages.pose_of(planar(table["x_m"][i], table["y_m"][i], table["heading_rad"][i])) for i in rows]
         yield Item(t_ns, "/waymark/particles", "geometry_msgs/msg/PoseArray",
                    messages.make("PoseArray", header=messages.header(t_ns, "map"), poses=poses))
+        where = np.column_stack([table["x_m"][rows], table["y_m"][rows], np.zeros(len(rows))])
+        yield points(messages, "/waymark/particles", t_ns, where, heading=table["heading_rad"][rows], weight=table["weight"][rows])
 
 
 def ellipse(messages: Messages, name: str, number: int, t_ns: int, centre: Any, cov: Array, colour: Any) -> Any:
