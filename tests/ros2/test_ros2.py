@@ -29,6 +29,8 @@ SKIPPED = 77
 DOMAIN = "42"
 OUT = {"/tf": ("tf2_msgs/msg/TFMessage", "stream"), "/waymark/pose": ("geometry_msgs/msg/PoseWithCovarianceStamped", "latched"),
        "/waymark/odom": ("nav_msgs/msg/Odometry", "stream"), "/diagnostics": ("diagnostic_msgs/msg/DiagnosticArray", "stream")}
+IN = {"/initialpose": "geometry_msgs/msg/PoseWithCovarianceStamped", "/odom": "nav_msgs/msg/Odometry", "/imu/data": "sensor_msgs/msg/Imu",
+      "/fix": "sensor_msgs/msg/NavSatFix"}
 TOLERANCE = 1e-12  # of a number that went through other formulas than the judge's
 
 
@@ -214,6 +216,16 @@ def send_fast(probe, topic, kind, message):
     assert done.returncode == 0, done.stderr
 
 
+def check_types():
+    """Type names and hashes as nodes of ROS 2 look for them, of all that the bridge sends and takes."""
+    done = subprocess.run([sys.executable, HERE / "cyclone_probe.py", "endpoints", DOMAIN], capture_output=True, text=True, timeout=30)
+    found, store = json.loads(done.stdout), get_typestore(Stores.ROS2_JAZZY)
+    for topic, kind in {**{topic: kind for topic, (kind, _) in OUT.items()}, **IN}.items():
+        expected = [dds_name(kind), f"typehash={store.hash_rihs01(kind)};"]
+        assert found.get("rt" + topic) == expected, f"{topic}: {found.get('rt' + topic)}, not {expected}"
+    print("type names and hashes of", len(OUT) + len(IN), "topics are those of ROS 2")
+
+
 def check_second(given):
     """Another bridge on the same channels and topics, wrong addresses and domains: an error that names the reason."""
     def fails(code, text, *options, **environment):
@@ -267,9 +279,11 @@ def check_sources(work, given):
     bridge = subprocess.Popen([given.bin / "waymark-ros2", "--domain", DOMAIN, "--url", lcm_tools.URL, "--odom", "/odom", "--imu",
                                "/imu/data", "--fix", "/fix"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert "/odom /imu/data /fix" in bridge.stdout.readline()
-    kinds = {"/odom": "nav_msgs/msg/Odometry", "/imu/data": "sensor_msgs/msg/Imu", "/fix": "sensor_msgs/msg/NavSatFix"}
+    check_types()
     senders = {}
-    for topic, kind in kinds.items():
+    for topic, kind in IN.items():
+        if topic == "/initialpose":
+            continue
         fast = topic == "/imu/data"
         command = [given.probe, "send", DOMAIN, topic, dds_name(kind), "1000"] if fast else [
             sys.executable, HERE / "cyclone_probe.py", "send", DOMAIN, topic, kind, "1000"]
@@ -300,10 +314,11 @@ def check_sources(work, given):
 
 
 def inside(given):
-    global cyclone_probe, lcm_tools, np
+    global cyclone_probe, get_typestore, lcm_tools, np, Stores
     import cyclone_probe
     import lcm_tools
     import numpy as np
+    from rosbags.typesys import Stores, get_typestore
     work = pathlib.Path(tempfile.mkdtemp(prefix="waymark-ros2-"))
     try:
         subprocess.run(["ip", "link", "set", "lo", "up", "multicast", "on"], check=True)

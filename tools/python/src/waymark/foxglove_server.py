@@ -20,7 +20,7 @@ from .live_pictures import WebPictures, picture_items
 from .mcapio import place, streams
 from .mcapio.estimates import topic_name
 from .mcapio.streaming import SIGHTINGS, TOPICS, LiveItems
-from .mcapio.writer import LATCHED_TOPICS, Item
+from .mcapio.writer import Item, is_latched
 from .ros import Messages
 from .tables import read_table
 
@@ -73,7 +73,7 @@ class FoxgloveServer(ServerListener):
         if self._has_started and item.topic not in self._channels:
             self._offered[item.topic] = time.monotonic() + _OFFER_AGAIN_S, item
         channel = self._channel(item.topic, item.type, item.metadata)
-        if item.topic in LATCHED_TOPICS or item.topic == "/waymark/landmarks":
+        if is_latched(item.topic):
             self._latched[item.topic] = item
         if channel.has_sinks():
             channel.log(self._messages.encode(item.message, item.type), log_time=max(int(item.log_ns), 0))

@@ -82,8 +82,7 @@ def _truth(messages: Messages, table: Table) -> Iterator[Item]:
 
 
 def _truth_path(messages: Messages, table: Table, t_ns: int) -> Iterator[Item]:
-    yield Item(t_ns, "/truth/path", "nav_msgs/msg/Path",
-               path(messages, t_ns, table["t_ns"], positions(table), quaternions(table)))
+    yield from path(messages, "/truth/path", t_ns, t_ns, (table["t_ns"], positions(table), quaternions(table)))
 
 
 def place_streams(messages: Messages, run: Run, recording: Recording | None) -> list[Iterator[Item]]:
