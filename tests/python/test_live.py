@@ -53,7 +53,8 @@ SECONDS = 6
 PORT = 8765
 CONFIG = "format: waymark-config/1\nestimator: landmark_ekf\npublish: {rate_hz: 50}\n"
 STEADY = {"/tf", "/waymark/pose", "/waymark/odom", "/waymark/status", "/waymark/innovations/sightings_eye/bearing",
-          "/waymark/innovations/sightings_eye/range", "/recording/sightings", "/diagnostics", "/waymark/path", "/landmarks"}
+          "/waymark/innovations/sightings_eye/range", "/recording/sightings", "/diagnostics", "/waymark/path", "/waymark/path/points",
+          "/landmarks", "/landmarks/points"}
 
 
 def setUpModule():
@@ -155,8 +156,8 @@ class LiveRun(unittest.TestCase):
     def test_a_viewer_gets_every_topic(self):
         self.assertLessEqual(STEADY, set(self.viewer.messages))
         self.assertIn("/tf_static", self.viewer.messages)
-        self.assertLessEqual(set(self.viewer.schemas), STEADY | {"/tf_static", "/map", "/waymark/particles", "/waymark/hypotheses",
-                                                                 "/waymark/landmarks"})
+        others = {topic + end for topic in ("/waymark/particles", "/waymark/hypotheses", "/waymark/landmarks") for end in ("", "/points")}
+        self.assertLessEqual(set(self.viewer.schemas), STEADY | {"/tf_static", "/map"} | others)
         for topic in self.viewer.messages:
             self.assertTrue(self.viewer.decoded(topic), topic)
 
