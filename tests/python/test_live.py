@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 import unittest
+from socket import create_server
 
 INSIDE = "WAYMARK_TEST_INSIDE"
 
@@ -241,6 +242,10 @@ class Errors(unittest.TestCase):
         self.assertEqual((2, True), (code, "neither PORT nor ADDRESS:PORT" in text))
         code, text = self.watch("--foxglove", "0", "--config", "/nowhere/robot.yaml")
         self.assertEqual((1, True), (code, "/nowhere/robot.yaml" in text))
+        with create_server(("127.0.0.1", 0)) as taken:
+            port = taken.getsockname()[1]
+            code, text = self.watch("--foxglove", str(port))
+            self.assertEqual((1, True), (code, f"127.0.0.1:{port} can't be listened on: Address already in use" in text), text)
         code, text = self.watch("--foxglove", "0", "--url", "udpx://nothing")
         self.assertEqual((1, True), (code, "no connection on udpx://nothing" in text), text)
 

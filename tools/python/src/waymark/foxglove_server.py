@@ -49,7 +49,11 @@ class FoxgloveServer(ServerListener):
         # subscribes in that instant (1 of 300 on one computer).
         for topic, kind in (TOPICS | (topics or {})).items():
             self._channel(topic, kind)
-        self._server = foxglove.start_server(name="waymark", host=host, port=port, context=self._context, server_listener=self)
+        try:
+            self._server = foxglove.start_server(name="waymark", host=host, port=port, context=self._context, server_listener=self)
+        except RuntimeError as error:
+            reason = str(error).rpartition("bind port: ")[2]
+            raise OSError(f"{host}:{port} can't be listened on: {reason}; --foxglove takes another port or address of this computer") from error
         self._has_started = True
 
     @property
