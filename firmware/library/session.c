@@ -10,17 +10,27 @@
 #include "library/changed_config.h"
 #include "waymark/yaml.h"
 
+enum { OPTIONS_MAX_BYTES = 4096 };  // more than options ever have; less than what an unset `bytes` usually is
+
 const char *waymark_version(void) { return WM_VERSION; }
 
 // ── sizes ───────────────────────────────────────────────────────────────────────────────────────────────────────────
 
 wm_status library_take_options(const char *function, const void *given, size_t bytes, void *out, size_t full_bytes,
                                wm_error *err) {
-  if (!given || bytes < sizeof bytes || bytes > full_bytes)
+  if (!given || bytes < sizeof bytes || bytes > OPTIONS_MAX_BYTES)
     return wm_fail(err, WM_BAD_USAGE, "%s: its options have %zu bytes, this library's %zu: set `bytes` to their sizeof",
                    function, given ? bytes : 0, full_bytes);
+  for (size_t i = full_bytes; i < bytes;
+       i++)  // of a program with a newer header: fine while it doesn't use the new part
+    if (((const unsigned char *)given)[i] != 0)
+      return wm_fail(
+          err, WM_BAD_USAGE,
+          "%s: its options have %zu bytes and use what this library (%s) lacks, at byte %zu: install the version "
+          "of the program's headers",
+          function, bytes, WM_VERSION, i);
   memset(out, 0, full_bytes);
-  memcpy(out, given, bytes);
+  memcpy(out, given, bytes < full_bytes ? bytes : full_bytes);
   return WM_OK;
 }
 

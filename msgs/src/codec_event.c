@@ -5,9 +5,6 @@
 #include "waymark/codec.h"
 #include "waymark/event_fields.h"
 
-#define EVENT_VERSION 5
-#define EVENT_VERSION_OLDEST 3  // that is read
-
 static void put_quantities(wm_writer *w, const wm_quantities *q) {
   size_t count = q->count < WM_QUANTITIES_MAX ? q->count : WM_QUANTITIES_MAX;
   wm_put_u8(w, (uint8_t)count);
@@ -52,7 +49,7 @@ static void put_payload(wm_writer *w, const wm_event *e) {
 
 size_t wm_event_encode(const wm_event *event, void *out, size_t capacity) {
   wm_writer w = wm_writer_of(out, capacity);
-  wm_put_u8(&w, EVENT_VERSION);
+  wm_put_u8(&w, WM_EVENT_VERSION);
   wm_put_u8(&w, event->kind);
   wm_put_u16(&w, event->source);
   wm_put_u32(&w, event->seq);
@@ -116,7 +113,7 @@ wm_status wm_event_decode(const void *data, size_t size, wm_event *out, size_t *
   memset(out, 0, WM_EVENT_SMALL_BYTES);
   wm_reader r = wm_reader_of(data, size);
   const unsigned version = wm_get_u8(&r);
-  if (version < EVENT_VERSION_OLDEST || version > EVENT_VERSION) r.bad = 1;
+  if (version < WM_EVENT_VERSION_OLDEST || version > WM_EVENT_VERSION) r.bad = 1;
   out->kind = wm_get_u8(&r);
   if (out->kind == WM_EVENT_NONE || out->kind >= WM_EVENT_KIND_COUNT) r.bad = 1;
   out->source = wm_get_u16(&r);

@@ -35,21 +35,27 @@ static const wm_event_field kSetPose[] = {FIELDS(set_pose, pose_map_base.p_m, F6
                                           FIELDS(set_pose, pose_map_base.q_xyzw, F64, 4),
                                           FIELD(set_pose, sigma_xy_m, F64), FIELD(set_pose, sigma_heading_rad, F64)};
 
-#define KIND(rows) \
-  { rows, sizeof(rows) / sizeof((rows)[0]) }
+#define HOLDS(rows) rows, sizeof(rows) / sizeof((rows)[0])
+#define HOLDS_NO_FIELDS NULL, 0
 
 static const struct {
+  const char *name;
   const wm_event_field *rows;
   size_t count;
-} kKinds[WM_EVENT_KIND_COUNT] = {
-    [WM_EVENT_TWIST2] = KIND(kTwist2),       [WM_EVENT_TWIST6] = KIND(kTwist6),
-    [WM_EVENT_INCREMENT] = KIND(kIncrement), [WM_EVENT_SIGHTING] = KIND(kSighting),
-    [WM_EVENT_POSITION] = KIND(kPosition),   [WM_EVENT_HEADING] = KIND(kHeading),
-    [WM_EVENT_MARKER] = KIND(kMarker),       [WM_EVENT_STEREO] = KIND(kStereo),
-    [WM_EVENT_LOOKED] = KIND(kLooked),       [WM_EVENT_SET_POSE] = KIND(kSetPose),
+} kKinds[] = {
+    [WM_EVENT_NONE] = {"none", HOLDS_NO_FIELDS},          [WM_EVENT_QUANTITIES] = {"quantities", HOLDS_NO_FIELDS},
+    [WM_EVENT_TWIST2] = {"twist2", HOLDS(kTwist2)},       [WM_EVENT_TWIST6] = {"twist6", HOLDS(kTwist6)},
+    [WM_EVENT_SIGHTING] = {"sighting", HOLDS(kSighting)}, [WM_EVENT_POSITION] = {"position", HOLDS(kPosition)},
+    [WM_EVENT_HEADING] = {"heading", HOLDS(kHeading)},    [WM_EVENT_MARKER] = {"marker", HOLDS(kMarker)},
+    [WM_EVENT_STEREO] = {"stereo", HOLDS(kStereo)},       [WM_EVENT_POINTS] = {"points", HOLDS_NO_FIELDS},
+    [WM_EVENT_LOOKED] = {"looked", HOLDS(kLooked)},       [WM_EVENT_SET_POSE] = {"set_pose", HOLDS(kSetPose)},
+    [WM_EVENT_RESET] = {"reset", HOLDS_NO_FIELDS},        [WM_EVENT_INCREMENT] = {"increment", HOLDS(kIncrement)},
 };
+_Static_assert(sizeof kKinds / sizeof kKinds[0] == WM_EVENT_KIND_COUNT, "a row for each kind");
 
 const wm_event_field *wm_event_fields(unsigned kind, size_t *count) {
   *count = kind < WM_EVENT_KIND_COUNT ? kKinds[kind].count : 0;
   return *count > 0 ? kKinds[kind].rows : NULL;
 }
+
+const char *wm_event_kind_name(unsigned kind) { return kind < WM_EVENT_KIND_COUNT ? kKinds[kind].name : "?"; }

@@ -6,33 +6,17 @@
 #include <stdint.h>
 #include <string.h>
 
-#include "waymark_depth_t.h"
-#include "waymark_gnss_t.h"
-#include "waymark_heading_t.h"
-#include "waymark_imu_t.h"
-#include "waymark_motion6_t.h"
-#include "waymark_motion_t.h"
-#include "waymark_speeds_t.h"
-#include "waymark_steering_t.h"
-#include "waymark_ticks_t.h"
+#include "stream_types.h"
 
+#define MEMBER(name) waymark_##name##_t name;
 typedef union any_message {
-  waymark_motion_t motion;
-  waymark_motion6_t motion6;
-  waymark_ticks_t ticks;
-  waymark_speeds_t speeds;
-  waymark_steering_t steering;
-  waymark_imu_t imu;
-  waymark_heading_t heading;
-  waymark_depth_t depth;
-  waymark_gnss_t gnss;
+  WM_STREAM_TYPES(MEMBER)
 } any_message;
 
 // A message is its stamp, then the numbers of the stream's columns in their order.
 typedef struct stream_type {
   const char *stream, *type, *not_it;
-  size_t bytes;             // of the message in memory
-  uint32_t zero_is_absent;  // a bit for each number that senders leave 0 where they don't have it
+  size_t bytes;  // of the message in memory
   int (*decode)(const void *from, int length, any_message *to);
   int (*encode)(void *to, int length, const any_message *from);
 } stream_type;
@@ -46,30 +30,25 @@ typedef struct stream_type {
   }                                                                                                          \
   _Static_assert(offsetof(waymark_##name##_t, t_ns) == 0 &&                                                  \
                      sizeof(waymark_##name##_t) <= sizeof(int64_t) + WM_STREAM_NUMBERS_MAX * sizeof(double), \
-                 "a stamp, and numbers behind it")
-#define TYPE(name, zero_is_absent)                                                                                     \
-  {                                                                                                                    \
-#name, #name "_t", "is no " #name "_t of this version", sizeof(waymark_##name##_t), zero_is_absent, decode_##name, \
-        encode_##name                                                                                                  \
-  }
+                 "a stamp, and numbers behind it");
+#define TYPE(name) \
+  {#name, #name "_t", "is no " #name "_t of this version", sizeof(waymark_##name##_t), decode_##name, encode_##name},
 
-FUNCTIONS(motion);
-FUNCTIONS(motion6);
-FUNCTIONS(ticks);
-FUNCTIONS(speeds);
-FUNCTIONS(steering);
-FUNCTIONS(imu);
-FUNCTIONS(heading);
-FUNCTIONS(depth);
-FUNCTIONS(gnss);
+WM_STREAM_TYPES(FUNCTIONS)
 
-#define NONE UINT32_C(0)
-#define IMU_SIGMAS (UINT32_C(0x3f) << 6)
-#define GNSS_SIGMA_Z (UINT32_C(1) << 4)
+static const stream_type kTypes[] = {WM_STREAM_TYPES(TYPE)};
 
-static const stream_type kTypes[] = {TYPE(motion, NONE),  TYPE(motion6, NONE),  TYPE(ticks, NONE),
-                                     TYPE(speeds, NONE),  TYPE(steering, NONE), TYPE(imu, IMU_SIGMAS),
-                                     TYPE(heading, NONE), TYPE(depth, NONE),    TYPE(gnss, GNSS_SIGMA_Z)};
+// A bit for each number that senders from before NaN meant absent leave 0 where they don't have it.
+static const struct {
+  const char *stream;
+  uint32_t numbers;
+} kZeroIsAbsent[] = {{"imu", UINT32_C(0x3f) << 6}, {"gnss", UINT32_C(1) << 4}};  // sigmas; sigma of the altitude
+
+static uint32_t zero_is_absent(const stream_type *type) {
+  for (size_t i = 0; i < sizeof kZeroIsAbsent / sizeof kZeroIsAbsent[0]; i++)
+    if (strcmp(kZeroIsAbsent[i].stream, type->stream) == 0) return kZeroIsAbsent[i].numbers;
+  return 0;
+}
 
 static const stream_type *find(const char *stream) {
   for (size_t i = 0; i < sizeof kTypes / sizeof kTypes[0]; i++)
@@ -91,7 +70,7 @@ const char *wm_lcm_read_row(const char *stream, const void *message, size_t leng
   memcpy(&out->t_ns, &m, sizeof(int64_t));
   memcpy(out->number, (const char *)&m + sizeof(int64_t), bytes);
   for (size_t i = 0; i < bytes / sizeof(double); i++)
-    if ((type->zero_is_absent >> i & 1u) && out->number[i] == 0.0) out->number[i] = (double)NAN;
+    if ((zero_is_absent(type) >> i & 1u) && out->number[i] == 0.0) out->number[i] = (double)NAN;
   return NULL;
 }
 

@@ -8,8 +8,6 @@
 #include "waymark/look.h"
 #include "waymark/pose.h"
 
-static const char *const kKinds[] = {"none",   "quantities", "twist2", "twist6", "sighting", "position", "heading",
-                                     "marker", "stereo",     "points", "looked", "set_pose", "reset",    "increment"};
 static const char *const kQuantities[] = {"wheel_ticks_left",       "wheel_ticks_right",
                                           "wheel_speed_front_left", "wheel_speed_front_right",
                                           "wheel_speed_rear_left",  "wheel_speed_rear_right",
@@ -34,7 +32,6 @@ static const char *const kLooks[] = {"found",        "not_in_view", "faces_away"
                                      "low_contrast", "blurred",     "unlike",     "ambiguous"};
 
 #define COUNT(a) (sizeof(a) / sizeof((a)[0]))
-_Static_assert(COUNT(kKinds) == WM_EVENT_KIND_COUNT, "a name for each kind");
 _Static_assert(COUNT(kQuantities) == WM_Q_COUNT, "a name for each quantity");
 _Static_assert(COUNT(kStates) == WM_STATE_COUNT, "a name for each state");
 _Static_assert(COUNT(kCauses) == WM_CAUSE_COUNT, "a name for each cause");
@@ -44,7 +41,6 @@ _Static_assert(COUNT(kCounters) == WM_COUNTER_KIND_COUNT, "a name for each count
 _Static_assert(COUNT(kDeviceStates) == WM_DEVICE_STATE_COUNT, "a name for each device state");
 _Static_assert(COUNT(kLooks) == WM_LOOK_COUNT, "a name for each look");
 
-const char *wm_event_kind_name(unsigned kind) { return kind < COUNT(kKinds) ? kKinds[kind] : "?"; }
 const char *wm_quantity_name(unsigned q) { return q < COUNT(kQuantities) ? kQuantities[q] : "?"; }
 const char *wm_state_name(unsigned state) { return state < COUNT(kStates) ? kStates[state] : "?"; }
 const char *wm_cause_name(unsigned cause) { return cause < COUNT(kCauses) ? kCauses[cause] : "?"; }

@@ -1,12 +1,14 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """The example of docs/library.md, a robot's own program with its own loop: compiled against libwaymark.so, given the rows of a
-recording in the order of their arrival, its poses are those of `waymark replay`, digit by digit.
+recording in the order of their arrival, its poses are those of `waymark replay`, digit by digit. The header compiles without a
+warning in each C and C++ that programs of users are in.
 
     robot.py BUILD [CC]          Skipped (77) where there is no libwaymark.so (sanitizers)."""
 import csv
 import pathlib
 import shlex
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -48,11 +50,22 @@ def in_order(folder):
     return "\n".join(line for *_, line in sorted(data, key=lambda row: row[:2])) + "\n"
 
 
+def header_compiles():
+    """The header alone, by gcc and by clang where it is there, with all warnings."""
+    includes = [f"-I{ROOT / room}" for room in ("msgs/include", "firmware/library/include")]
+    for compiler, language, standards in (("gcc", "c", ("c99", "c11", "c17", "gnu17", "c2x")), ("g++", "c++", ("c++11", "c++17", "c++20")),
+                                          ("clang", "c", ("c99", "c17")), ("clang++", "c++", ("c++11", "c++20"))):
+        for standard in standards if shutil.which(compiler) else ():
+            subprocess.run([compiler, "-x", language, f"-std={standard}", "-Wall", "-Wextra", "-Wpedantic", "-Werror", *includes, "-fsyntax-only",
+                            "-"], input="#include <waymark/waymark.h>\n", text=True, check=True)
+
+
 def main():
     library = BUILD / "lib/libwaymark.so"
     if not library.exists():
         print("skipped: this build has no libwaymark.so")
         return 77
+    header_compiles()
     text = (ROOT / "docs/library.md").read_text()
     assert EXAMPLE.read_text() in text, "docs/library.md does not have tests/package/downstream/robot.c word by word"
     with tempfile.TemporaryDirectory(prefix="waymark-library-") as name:

@@ -16,6 +16,7 @@ import sys
 import tempfile
 import time
 import unittest
+from socket import create_server
 
 INSIDE = "WAYMARK_TEST_INSIDE"
 
@@ -53,7 +54,8 @@ SECONDS = 6
 PORT = 8765
 CONFIG = "format: waymark-config/1\nestimator: landmark_ekf\npublish: {rate_hz: 50}\n"
 STEADY = {"/tf", "/waymark/pose", "/waymark/odom", "/waymark/status", "/waymark/innovations/sightings_eye/bearing",
-          "/waymark/innovations/sightings_eye/range", "/recording/sightings", "/diagnostics", "/waymark/path", "/landmarks"}
+          "/waymark/innovations/sightings_eye/range", "/recording/sightings", "/diagnostics", "/waymark/path", "/waymark/path/points",
+          "/landmarks", "/landmarks/points"}
 
 
 def setUpModule():
@@ -155,8 +157,8 @@ class LiveRun(unittest.TestCase):
     def test_a_viewer_gets_every_topic(self):
         self.assertLessEqual(STEADY, set(self.viewer.messages))
         self.assertIn("/tf_static", self.viewer.messages)
-        self.assertLessEqual(set(self.viewer.schemas), STEADY | {"/tf_static", "/map", "/waymark/particles", "/waymark/hypotheses",
-                                                                 "/waymark/landmarks"})
+        others = {topic + end for topic in ("/waymark/particles", "/waymark/hypotheses", "/waymark/landmarks") for end in ("", "/points")}
+        self.assertLessEqual(set(self.viewer.schemas), STEADY | {"/tf_static", "/map"} | others)
         for topic in self.viewer.messages:
             self.assertTrue(self.viewer.decoded(topic), topic)
 
@@ -240,6 +242,10 @@ class Errors(unittest.TestCase):
         self.assertEqual((2, True), (code, "neither PORT nor ADDRESS:PORT" in text))
         code, text = self.watch("--foxglove", "0", "--config", "/nowhere/robot.yaml")
         self.assertEqual((1, True), (code, "/nowhere/robot.yaml" in text))
+        with create_server(("127.0.0.1", 0)) as taken:
+            port = taken.getsockname()[1]
+            code, text = self.watch("--foxglove", str(port))
+            self.assertEqual((1, True), (code, f"127.0.0.1:{port} can't be listened on: Address already in use" in text), text)
         code, text = self.watch("--foxglove", "0", "--url", "udpx://nothing")
         self.assertEqual((1, True), (code, "no connection on udpx://nothing" in text), text)
 

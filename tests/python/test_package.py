@@ -22,7 +22,10 @@ import waymark
 from waymark.export import export
 from waymark.export import main as export_main
 from waymark.geometry import from_rpy, pose, quaternion, rotation, to_rpy
+from waymark.mcapio.estimates import hypotheses, particles
 from waymark.recording import can_line
+from waymark.ros import Messages
+
 
 class Tables(unittest.TestCase):
     def setUp(self):
@@ -60,6 +63,14 @@ class Geometry(unittest.TestCase):
             np.testing.assert_allclose(rotation(quaternion(from_rpy(*rpy))), from_rpy(*rpy), atol=1e-12)
         np.testing.assert_allclose(from_rpy(0, 0, np.pi / 2) @ [1, 0, 0], [0, 1, 0], atol=1e-15)
         np.testing.assert_allclose(from_rpy(0, np.pi / 2, 0) @ [1, 0, 0], [0, 0, -1], atol=1e-15)
+
+
+def points_of(cloud):
+    """Columns of a PointCloud2 by its fields' names, offsets and types."""
+    kinds = {7: "<f4", 8: "<f8"}
+    form = np.dtype({"names": [f.name for f in cloud.fields], "formats": [kinds[f.datatype] for f in cloud.fields],
+                     "offsets": [f.offset for f in cloud.fields], "itemsize": cloud.point_step})
+    return np.frombuffer(cloud.data.tobytes(), dtype=form)
 
 
 def jpeg(grey, size=(64, 48)):
@@ -160,6 +171,22 @@ class Export(unittest.TestCase):
             self.assertTrue(last is None or np.linalg.norm(place - last) < 0.1)
             last = place
 
+    def test_points_are_those_of_paths_and_landmarks(self):
+        for topic, places in (("/waymark/path", lambda m: [pose.pose.position for pose in m.poses]),
+                              ("/truth/path", lambda m: [pose.pose.position for pose in m.poses]),
+                              ("/landmarks", lambda m: [marker.pose.position for marker in m.markers if marker.ns == "landmarks"])):
+            drawn, clouds = self.messages(topic), self.messages(topic + "/points")
+            self.assertEqual(len(drawn), len(clouds), topic)
+            self.assertTrue(drawn, topic)
+            for message, cloud in zip(drawn, clouds, strict=True):
+                self.assertEqual([cloud.header.frame_id, cloud.height, cloud.point_step * cloud.width],
+                                 ["map", 1, len(cloud.data)])
+                table = points_of(cloud)
+                np.testing.assert_allclose(np.column_stack([table["x"], table["y"], table["z"]]),
+                                           [(p.x, p.y, p.z) for p in places(message)], rtol=1e-6, atol=1e-6)
+        names = [marker.text for marker in self.messages("/landmarks")[0].markers if marker.text]
+        self.assertEqual([str(int(n)) for n in points_of(self.messages("/landmarks/points")[0])["id"]], names)
+
     def test_command_line(self):
         out = self.drive.folder / "b.mcap"
         self.assertEqual(export_main([str(self.drive.run), "--mcap", str(out)]), 0)
@@ -167,6 +194,21 @@ class Export(unittest.TestCase):
             export_main([str(self.drive.run), "--mcap", str(out)])
         self.assertEqual(export_main([str(self.drive.recording), "--mcap", str(self.drive.folder / "c.mcap")]), 1)
         self.assertFalse((self.drive.folder / "c.mcap").exists())
+
+
+class Particles(unittest.TestCase):
+    def test_points_of_a_cloud_and_of_hypotheses_a_stamp(self):
+        chance, n = np.random.default_rng(1), 7
+        table = {"t_ns": np.array([5, 5, 5, 9, 9, 9, 9]), **{name: chance.uniform(-2, 2, n) for name in (
+            "x_m", "y_m", "heading_rad", "weight", "cov_xx", "cov_xy", "cov_yy")}}
+        for make, topic, columns in ((particles, "/waymark/particles", ["heading", "weight"]), (hypotheses, "/waymark/hypotheses", ["weight"])):
+            items = [item for item in make(Messages(), table) if item.topic == topic + "/points"]
+            self.assertEqual([item.log_ns for item in items], [5, 9])
+            for item, rows in zip(items, (slice(0, 3), slice(3, 7)), strict=True):
+                points = points_of(item.message)
+                self.assertEqual(list(points.dtype.names), ["x", "y", "z", *columns])
+                for name, column in (("x", "x_m"), ("y", "y_m"), ("weight", "weight")):
+                    np.testing.assert_array_equal(points[name], table[column][rows].astype(np.float32))
 
 
 class CandumpLines(unittest.TestCase):

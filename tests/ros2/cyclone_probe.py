@@ -4,13 +4,17 @@
 
     cyclone_probe.py listen DOMAIN OUT TOPIC TYPE QUALITY [TOPIC TYPE QUALITY ...]
         until its standard input ends; OUT: pickled (arrival on the monotonic clock in ns, topic, message as dict)
-    cyclone_probe.py send DOMAIN TOPIC TYPE RATE_HZ < pickled messages as dicts"""
+    cyclone_probe.py send DOMAIN TOPIC TYPE RATE_HZ < pickled messages as dicts
+    cyclone_probe.py endpoints DOMAIN
+        {topic: [type in DDS, user data]} of the writers and readers that are there after 2 s, as JSON"""
 
+import json
 import pickle
 import select
 import sys
 import time
 
+from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription
 from cyclonedds.core import Policy, Qos
 from cyclonedds.domain import DomainParticipant
 from cyclonedds.idl import make_idl_struct, types
@@ -114,9 +118,19 @@ def send(participant, topic, kind, rate_hz):
     time.sleep(0.3)
 
 
+def endpoints(participant):
+    readers = [BuiltinDataReader(participant, kind) for kind in (BuiltinTopicDcpsPublication, BuiltinTopicDcpsSubscription)]
+    time.sleep(2)
+    found = [endpoint for reader in readers for endpoint in reader.take(1000) if endpoint.sample_info.valid_data]
+    print(json.dumps({endpoint.topic_name: [endpoint.type_name, bytes(endpoint.qos[Policy.Userdata].data or b"").decode()]
+                      for endpoint in found if Policy.Userdata in endpoint.qos}))
+
+
 if __name__ == "__main__":
     how, domain, *rest = sys.argv[1:]
     if how == "listen":
         listen(DomainParticipant(int(domain)), rest[0], rest[1:])
+    elif how == "endpoints":
+        endpoints(DomainParticipant(int(domain)))
     else:
         send(DomainParticipant(int(domain)), rest[0], rest[1], float(rest[2]))

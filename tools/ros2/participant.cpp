@@ -23,8 +23,26 @@ dds_entity_t need(dds_entity_t entity, const std::string &what) {
   return entity;
 }
 
-Qos quality_of(Quality quality) {
+// SHA-256 of a type's canonical description (REP 2016), the same from Iron to Lyrical; tests/ros2 compares them with
+// those of rosbags. Nodes read them in the user data of writers and readers, and warn of each one that has none.
+constexpr std::array<std::pair<const char *, const char *>, 6> kHashes{{
+    {"geometry_msgs::msg::dds_::PoseWithCovarianceStamped_",
+     "26432f9803e43727d3c8f668d1fdb3c630f548af631e2f4e31382371bfea3b6e"},
+    {"tf2_msgs::msg::dds_::TFMessage_", "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"},
+    {"nav_msgs::msg::dds_::Odometry_", "3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0"},
+    {"diagnostic_msgs::msg::dds_::DiagnosticArray_",
+     "5a8a36efb05fb25070fa0fb3810290c0e6cd4862b54a8fb975a1ee8dc55a333e"},
+    {"sensor_msgs::msg::dds_::Imu_", "7d9a00ff131080897a5ec7e26e315954b8eae3353c3f995c55faf71574000b5b"},
+    {"sensor_msgs::msg::dds_::NavSatFix_", "62223ab3fe210a15976021da7afddc9e200dc9ec75231c1b6a557fc598a65404"},
+}};
+
+Qos quality_of(Quality quality, const dds_topic_descriptor_t &type) {
   Qos qos(dds_create_qos(), dds_delete_qos);
+  for (const auto &[name, hash] : kHashes) {
+    if (strcmp(name, type.m_typename) != 0) continue;
+    const std::string about = "typehash=RIHS01_" + std::string(hash) + ";";
+    dds_qset_userdata(qos.get(), about.data(), about.size());
+  }
   dds_qset_reliability(qos.get(), quality == Quality::kSensor ? DDS_RELIABILITY_BEST_EFFORT : DDS_RELIABILITY_RELIABLE,
                        kBlocked_ns);
   dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, kDepth);
@@ -82,11 +100,11 @@ dds_entity_t Participant::topic(const std::string &name, const dds_topic_descrip
 }
 
 dds_entity_t Participant::writer(const std::string &name, const dds_topic_descriptor_t &type, Quality quality) {
-  return need(dds_create_writer(participant_, topic(name, type), quality_of(quality).get(), nullptr), name);
+  return need(dds_create_writer(participant_, topic(name, type), quality_of(quality, type).get(), nullptr), name);
 }
 
 dds_entity_t Participant::reader(const std::string &name, const dds_topic_descriptor_t &type, Quality quality) {
-  return need(dds_create_reader(participant_, topic(name, type), quality_of(quality).get(), nullptr), name);
+  return need(dds_create_reader(participant_, topic(name, type), quality_of(quality, type).get(), nullptr), name);
 }
 
 std::vector<Peer> Participant::others() const {

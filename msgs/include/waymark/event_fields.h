@@ -16,6 +16,9 @@
 extern "C" {
 #endif
 
+#define WM_EVENT_VERSION 5         // of the codec; the next one where a field comes
+#define WM_EVENT_VERSION_OLDEST 3  // that is read
+
 // Numbers of a sighting.
 // NUMBER(member, need, least, most, limits in words, codec version it came with, last version whose 0 means absent,
 // message) need: ONE_OF (a row has at least one of those) or OPTIONAL; message: IN_MESSAGE or NOT_IN_MESSAGE

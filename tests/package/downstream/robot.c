@@ -27,10 +27,7 @@ int main(int argc, char **argv) {
   while (fgets(line, sizeof line, stdin)) {  // the robot's own loop
     long long t_ns, arrival_ns;
     double row[3] = {0, NAN, 0};  // v_mps, vy_mps, w_radps
-    wm_event seen = {
-        .kind = WM_EVENT_SIGHTING,
-        .as.sighting = {
-            .bearing_sigma_rad = NAN, .range_sigma_m = NAN, .elevation_rad = NAN, .elevation_sigma_rad = NAN}};
+    wm_event seen = {.kind = WM_EVENT_SIGHTING, .as.sighting = wm_sighting_without_numbers()};
     wm_sighting *s = &seen.as.sighting;
     wm_status status = WM_OK;
     if (sscanf(line, "moved %lld %lf %lf", &t_ns, &row[0], &row[2]) == 3)

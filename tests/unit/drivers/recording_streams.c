@@ -7,6 +7,7 @@
 
 #include "folder.h"
 #include "unity.h"
+#include "waymark/event_fields.h"
 #include "waymark/recording.h"
 
 static wm_recording *recording;
@@ -279,6 +280,25 @@ static void sightings_by_sensor(void) {
   TEST_ASSERT_NULL(strstr(warnings, "'front'"));
 }
 
+// By the table: each number has a column of its name, which takes its limits.
+static void each_number_of_a_sighting_has_a_column(void) {
+  char header[1000] = "t_ns,sensor,id", row[1000] = "1,eye,7";
+  wm_sighting given = wm_sighting_without_numbers();
+  double step = 0;
+  folder_write("calibration.yaml", "sensors:\n  eye: {bearing_sigma_rad: 0.01}\n");
+#define ADD(member, need, least, most, limits, since, zero_until, message) \
+  given.member = 0.5 * (fmax(least, -1) + fmin(most, 2)) + (step += 0.01); \
+  strcat(header, "," #member);                                             \
+  (void)snprintf(row + strlen(row), sizeof row - strlen(row), ",%.17g", given.member);
+  WM_SIGHTING_NUMBERS(ADD)
+  (void)snprintf(header + strlen(header), sizeof header - strlen(header), "\n%s\n", row);
+  folder_write("sightings.csv", header);
+  const wm_sighting s = next(source("sightings:eye")).as.sighting;
+#define COMPARE(member, need, least, most, limits, since, zero_until, message) \
+  TEST_ASSERT_EQUAL_DOUBLE_MESSAGE(given.member, s.member, #member);
+  WM_SIGHTING_NUMBERS(COMPARE)
+}
+
 // Sigmas of a row, its covariance on axes turned by the bearing, and what is not whole.
 static void sightings_with_their_own_noise(void) {
   folder_write("calibration.yaml", "sensors:\n  eye: {bearing_sigma_rad: 0.01}\n");
@@ -429,6 +449,7 @@ int main(void) {
   RUN_TEST(values_of_the_row_before);
   RUN_TEST(leaping_stamps);
   RUN_TEST(sightings_by_sensor);
+  RUN_TEST(each_number_of_a_sighting_has_a_column);
   RUN_TEST(sightings_with_their_own_noise);
   RUN_TEST(increments_with_and_without_covariance);
   RUN_TEST(points_by_stamp);

@@ -377,11 +377,20 @@ static void test_pictures_give_the_replay_s_bits(void) {
 static void test_sizes_are_checked(void) {
   taken into;
   waymark_session *session;
-  waymark_options options = {.bytes = sizeof options + 8, .config = config};
-  TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_open(&options, &session, &err));
+  struct {
+    waymark_options options;
+    uint64_t further;  // of a program with a newer header
+  } newer = {{.bytes = sizeof newer, .config = config, .site = dir}, 1};
+  TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_open(&newer.options, &session, &err));
   TEST_ASSERT_NULL(session);
+  TEST_ASSERT_NOT_NULL(strstr(err.text, "lacks"));
+  newer.further = 0;
+  ok(waymark_open(&newer.options, &session, &err));
+  ok(waymark_close(session, &err));
+  newer.options.bytes = SIZE_MAX;
+  TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_open(&newer.options, &session, &err));
   TEST_ASSERT_EQUAL(WM_BAD_USAGE, waymark_open(NULL, &session, &err));
-  options.bytes = offsetof(waymark_options, take);  // of a program with an older header
+  waymark_options options = {.bytes = offsetof(waymark_options, take), .config = config};  // with an older header
   options.site = dir;
   ok(waymark_open(&options, &session, &err));
   ok(waymark_close(session, &err));

@@ -6,6 +6,7 @@
 #include "unity.h"
 #include "waymark/bytes.h"
 #include "waymark/codec.h"
+#include "waymark/event_fields.h"
 
 void setUp(void) {}
 void tearDown(void) {}
@@ -20,6 +21,23 @@ static uint64_t random_bits(void) {
 }
 static double random_f64(void) { return ((double)(random_bits() >> 11) * 0x1p-53 - 0.5) * 1e3; }
 
+// Any number, also those that a wrong type or sign would lose.
+static void fill_field(wm_event *e, const wm_event_field *field) {
+  static const double kSpecial[] = {NAN, INFINITY, -0.0, 1e-300};
+  char *at = (char *)e + field->offset;
+  for (unsigned i = 0; i < field->count; i++) {
+    const uint64_t bits = random_bits();
+    const double number = bits % 8 < 4 ? kSpecial[bits % 4] : random_f64();
+    const int32_t edges[] = {INT32_MIN, -1, INT32_MAX, (int32_t)bits};
+    switch ((wm_field_type)field->type) {
+      case WM_FIELD_F64: memcpy(at + i * sizeof number, &number, sizeof number); break;
+      case WM_FIELD_I64: memcpy(at + i * sizeof bits, &bits, sizeof bits); break;
+      case WM_FIELD_I32: memcpy(at, &edges[bits % 4], sizeof edges[0]); break;
+      case WM_FIELD_U16: memcpy(at, &bits, sizeof(uint16_t)); break;
+    }
+  }
+}
+
 static void fill(wm_event *e, unsigned kind) {
   memset(e, 0, sizeof *e);
   e->kind = (uint8_t)kind;
@@ -27,64 +45,67 @@ static void fill(wm_event *e, unsigned kind) {
   e->arrival_ns = (wm_time_ns)random_bits();
   e->seq = (uint32_t)random_bits();
   e->source = (uint16_t)random_bits();
-  switch ((wm_event_kind)kind) {
-    case WM_EVENT_QUANTITIES:
-      e->as.quantities.count = (uint8_t)(random_bits() % (WM_QUANTITIES_MAX + 1));
-      e->as.quantities.doubt = WM_DOUBT_FROZEN_COUNTER;
-      e->as.quantities.lost_before = 65535;
-      for (int i = 0; i < e->as.quantities.count; i++) {
-        e->as.quantities.id[i] = (uint8_t)(random_bits() % WM_Q_COUNT);
-        e->as.quantities.value[i] = random_f64();
-      }
-      break;
-    case WM_EVENT_TWIST2: e->as.twist2 = (wm_twist2){random_f64(), -0.0}; break;
-    case WM_EVENT_TWIST6:
-      for (int i = 0; i < 3; i++) {
-        e->as.twist6.v_mps[i] = random_f64();
-        e->as.twist6.w_radps[i] = random_f64();
-      }
-      break;
-    case WM_EVENT_INCREMENT:
-      e->as.increment = (wm_increment){
-          INT64_MIN, random_f64(), random_f64(), -0.0, {random_f64(), NAN, random_f64(), 1, 2, random_f64()}};
-      break;
-    case WM_EVENT_SIGHTING:
-      e->as.sighting = (wm_sighting){65535, -1, random_f64(), NAN, NAN, random_f64(), random_f64(), 0.25};
-      break;
-    case WM_EVENT_POSITION: e->as.position = (wm_position){{random_f64(), random_f64(), NAN}, 1e-300, INFINITY}; break;
-    case WM_EVENT_HEADING: e->as.heading = (wm_heading){random_f64(), random_f64()}; break;
-    case WM_EVENT_MARKER:
-      e->as.marker = (wm_marker){3,
-                                 2,
-                                 INT32_MIN,
-                                 {1, 2, random_f64()},
-                                 random_f64(),
-                                 {random_f64(), 4, 5},
-                                 random_f64(),
-                                 random_f64(),
-                                 random_f64(),
-                                 random_f64()};
-      break;
-    case WM_EVENT_STEREO: e->as.stereo = (wm_stereo){INT32_MAX, {random_f64(), 2}, {NAN, NAN}}; break;
-    case WM_EVENT_POINTS:
-      e->as.points.count = (uint32_t)(random_bits() % (WM_POINTS_MAX + 1));
-      e->as.points.dropped = 7;
-      e->as.points.camera = -1;
-      for (uint32_t i = 0; i < e->as.points.count; i++) {
-        e->as.points.x_m[i] = (float)random_f64();
-        e->as.points.y_m[i] = (float)random_f64();
-        e->as.points.normal_rad[i] = (float)random_f64();
-        e->as.points.sigma_m[i] = (float)random_f64();
-      }
-      break;
-    case WM_EVENT_LOOKED: e->as.looked.sensor = 9; break;
-    case WM_EVENT_SET_POSE:
-      e->as.set_pose = (wm_set_pose){{{1, 2, 3}, {0, 0, random_f64(), 1}}, random_f64(), random_f64()};
-      break;
-    case WM_EVENT_NONE:
-    case WM_EVENT_RESET:
-    case WM_EVENT_KIND_COUNT: break;
+  size_t count;
+  const wm_event_field *fields = wm_event_fields(kind, &count);
+  for (size_t i = 0; i < count; i++) fill_field(e, &fields[i]);
+  if (kind == WM_EVENT_QUANTITIES) {
+    e->as.quantities.count = (uint8_t)(random_bits() % (WM_QUANTITIES_MAX + 1));
+    e->as.quantities.doubt = WM_DOUBT_FROZEN_COUNTER;
+    e->as.quantities.lost_before = 65535;
+    for (int i = 0; i < e->as.quantities.count; i++) {
+      e->as.quantities.id[i] = (uint8_t)(random_bits() % WM_Q_COUNT);
+      e->as.quantities.value[i] = random_f64();
+    }
   }
+  if (kind == WM_EVENT_POINTS) {
+    e->as.points.count = (uint32_t)(random_bits() % (WM_POINTS_MAX + 1));
+    e->as.points.dropped = 7;
+    e->as.points.camera = -1;
+    for (uint32_t i = 0; i < e->as.points.count; i++) {
+      e->as.points.x_m[i] = (float)random_f64();
+      e->as.points.y_m[i] = (float)random_f64();
+      e->as.points.normal_rad[i] = (float)random_f64();
+      e->as.points.sigma_m[i] = (float)random_f64();
+    }
+  }
+}
+
+// A member that has no row would be lost in the event log: bytes without a field are padding.
+static void fields_cover_their_structs(void) {
+  const wm_event *none = NULL;
+  const size_t sizes[WM_EVENT_KIND_COUNT] = {
+      [WM_EVENT_TWIST2] = sizeof none->as.twist2,       [WM_EVENT_TWIST6] = sizeof none->as.twist6,
+      [WM_EVENT_INCREMENT] = sizeof none->as.increment, [WM_EVENT_SIGHTING] = sizeof none->as.sighting,
+      [WM_EVENT_POSITION] = sizeof none->as.position,   [WM_EVENT_HEADING] = sizeof none->as.heading,
+      [WM_EVENT_MARKER] = sizeof none->as.marker,       [WM_EVENT_STEREO] = sizeof none->as.stereo,
+      [WM_EVENT_LOOKED] = sizeof none->as.looked,       [WM_EVENT_SET_POSE] = sizeof none->as.set_pose};
+  static const size_t kBytes[] = {
+      [WM_FIELD_F64] = sizeof(double), [WM_FIELD_I64] = 8, [WM_FIELD_I32] = 4, [WM_FIELD_U16] = 2};
+  for (unsigned kind = 1; kind < WM_EVENT_KIND_COUNT; kind++) {
+    size_t count, covered = 0, widest = 1;
+    const wm_event_field *fields = wm_event_fields(kind, &count);
+    TEST_ASSERT_TRUE_MESSAGE((count > 0) == (sizes[kind] > 0), wm_event_kind_name(kind));
+    for (size_t i = 0; i < count; i++) {
+      covered += kBytes[fields[i].type] * fields[i].count;
+      if (kBytes[fields[i].type] > widest) widest = kBytes[fields[i].type];
+      TEST_ASSERT_LESS_OR_EQUAL_MESSAGE(WM_EVENT_VERSION, fields[i].since, fields[i].name);
+    }
+    const size_t with_padding = (covered + widest - 1) / widest * widest;
+    TEST_ASSERT_EQUAL_MESSAGE(sizes[kind], with_padding, wm_event_kind_name(kind));
+  }
+}
+
+static void a_sighting_without_numbers_has_none(void) {
+  wm_event event = {.as.sighting = wm_sighting_without_numbers()};
+  size_t count;
+  const wm_event_field *fields = wm_event_fields(WM_EVENT_SIGHTING, &count);
+  for (size_t i = 0; i < count; i++) {
+    double number;
+    if (fields[i].type != WM_FIELD_F64) continue;
+    memcpy(&number, (const char *)&event + fields[i].offset, sizeof number);
+    TEST_ASSERT_TRUE_MESSAGE(isnan(number), fields[i].name);
+  }
+  TEST_ASSERT_EQUAL(-1, event.as.sighting.landmark_id);
 }
 
 static void every_event_comes_back_as_it_was(void) {
@@ -124,7 +145,7 @@ static void noise_never_gives_an_event_with_indices_out_of_bounds(void) {
   for (int round = 0; round < 20000; round++) {
     uint8_t bytes[128];
     for (size_t i = 0; i < sizeof bytes; i++) bytes[i] = (uint8_t)random_bits();
-    bytes[0] = (uint8_t)(3 + random_bits() % 3);
+    bytes[0] = (uint8_t)(WM_EVENT_VERSION_OLDEST + random_bits() % (WM_EVENT_VERSION - WM_EVENT_VERSION_OLDEST + 1));
     bytes[1] = (uint8_t)(random_bits() % (WM_EVENT_KIND_COUNT + 2));
     if (round % 2) bytes[24] = (uint8_t)(random_bits() % 10);  // a count that may be good
     wm_event out;
@@ -157,8 +178,12 @@ static void a_version_without_elevation_is_read(void) {
   uint8_t bytes[WM_EVENT_ENCODED_MAX];
   size_t length = wm_event_encode(&in, bytes, sizeof bytes), used;
   bytes[0] = 3;
-  TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length - 16, &out, &used));
-  TEST_ASSERT_EQUAL(length - 16, used);
+  size_t count, later = 0;  // bytes of numbers that came after version 3
+  const wm_event_field *fields = wm_event_fields(WM_EVENT_SIGHTING, &count);
+  for (size_t i = 0; i < count; i++) later += fields[i].since > 3 ? sizeof(double) : 0;
+  TEST_ASSERT_GREATER_OR_EQUAL(16, later);
+  TEST_ASSERT_EQUAL(WM_OK, wm_event_decode(bytes, length - later, &out, &used));
+  TEST_ASSERT_EQUAL(length - later, used);
   TEST_ASSERT_EQUAL_DOUBLE(in.as.sighting.bearing_rad, out.as.sighting.bearing_rad);
   TEST_ASSERT_FALSE(wm_sighting_has_elevation(&out.as.sighting));
   bytes[0] = 2;
@@ -355,6 +380,8 @@ static void the_hash_of_a_map_sees_every_number_and_the_order(void) {
 
 int main(void) {
   UNITY_BEGIN();
+  RUN_TEST(fields_cover_their_structs);
+  RUN_TEST(a_sighting_without_numbers_has_none);
   RUN_TEST(every_event_comes_back_as_it_was);
   RUN_TEST(a_cut_event_is_refused_at_every_length);
   RUN_TEST(noise_never_gives_an_event_with_indices_out_of_bounds);

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "unity.h"
+#include "waymark/event_fields.h"
 #include "waymark/lcm_messages.h"
 #include "waymark_health_t.h"
 #include "waymark_innovation_t.h"
@@ -121,6 +122,27 @@ static void a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation(void) {
   TEST_ASSERT_TRUE(wm_sighting_has_elevation(&read[1]));
 }
 
+// By the table: what travels arrives, the rest is absent.
+static void each_number_of_a_sighting_arrives(void) {
+  wm_event sent = {.t_ns = 1, .kind = WM_EVENT_SIGHTING, .as.sighting = {.landmark_id = 7}};
+  wm_sighting *given = &sent.as.sighting, read[WM_LCM_OBSERVATIONS_MAX];
+  double step = 0;
+#define SET(member, need, least, most, limits, since, zero_until, message) \
+  given->member = 0.5 * (fmax(least, -1) + fmin(most, 2)) + (step += 0.01);
+  WM_SIGHTING_NUMBERS(SET)
+  const size_t length = wm_lcm_observations("front", &sent, 1, bytes, sizeof bytes);
+  char sensor[WM_NAME_MAX];
+  wm_time_ns t_ns;
+  size_t count;
+  TEST_ASSERT_NULL(wm_lcm_read_sightings(bytes, length, sensor, &t_ns, read, &count));
+  TEST_ASSERT_EQUAL(1, count);
+  TEST_ASSERT_EQUAL(7, read[0].landmark_id);
+#define IN_MESSAGE(member) TEST_ASSERT_EQUAL_DOUBLE_MESSAGE(given->member, read[0].member, #member);
+#define NOT_IN_MESSAGE(member) TEST_ASSERT_TRUE_MESSAGE(isnan(read[0].member), #member);
+#define COMPARE(member, need, least, most, limits, since, zero_until, message) message(member)
+  WM_SIGHTING_NUMBERS(COMPARE)
+}
+
 // ── constants ───────────────────────────────────────────────────────────────────────────────────────────────────────
 
 // Whether a constant of this value stands in msgs/lcm/FILE: PREFIX and the name in upper case.
@@ -202,6 +224,7 @@ int main(void) {
   RUN_TEST(health_arrives_with_its_sources);
   RUN_TEST(the_largest_health_fits);
   RUN_TEST(names_from_a_stranger_cannot_write_to_a_terminal);
+  RUN_TEST(each_number_of_a_sighting_arrives);
   RUN_TEST(a_sighting_with_an_elevation_sigma_of_zero_has_no_elevation);
   RUN_TEST(every_value_of_an_enum_has_its_constant);
   RUN_TEST(an_innovation_arrives);

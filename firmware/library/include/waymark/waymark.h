@@ -12,19 +12,35 @@
 // text. A refused call changes nothing. The library ends no program and prints nothing.
 //
 // Sizes: a struct is passed with its size (`bytes`, sizeof of the caller's struct). Options may be shorter than the
-// library's, of a program compiled with an older header; results have exactly the library's size, else WM_BAD_USAGE.
+// library's, of a program compiled with an older header, or longer, of a newer header, where the part beyond is zero.
+// Results and events have exactly the library's size, else WM_BAD_USAGE. wm_error never changes under one SONAME.
+//
+// A newer library may use further kinds of records, states, verdicts and names: a program leaves unknown ones out.
 #ifndef WAYMARK_WAYMARK_H
 #define WAYMARK_WAYMARK_H
 
 #include <stddef.h>
 #include <stdint.h>
 
+// wm_status has an attribute that C before C23 and C++ before C++17 know as an extension: no warning of -Wpedantic.
+#if defined(__clang__)
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wc++17-extensions"
+#elif defined(__GNUC__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpedantic"
+#endif
 #include <waymark/event.h>
 #include <waymark/frame.h>
 #include <waymark/health.h>
 #include <waymark/pose.h>
 #include <waymark/status.h>
 #include <waymark/time.h>
+#if defined(__clang__)
+#pragma clang diagnostic pop
+#elif defined(__GNUC__)
+#pragma GCC diagnostic pop
+#endif
 
 #ifdef __cplusplus
 extern "C" {

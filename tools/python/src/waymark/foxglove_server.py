@@ -20,7 +20,7 @@ from .live_pictures import WebPictures, picture_items
 from .mcapio import place, streams
 from .mcapio.estimates import topic_name
 from .mcapio.streaming import SIGHTINGS, TOPICS, LiveItems
-from .mcapio.writer import LATCHED_TOPICS, Item
+from .mcapio.writer import Item, is_latched
 from .ros import Messages
 from .tables import read_table
 
@@ -49,7 +49,11 @@ class FoxgloveServer(ServerListener):
         # subscribes in that instant (1 of 300 on one computer).
         for topic, kind in (TOPICS | (topics or {})).items():
             self._channel(topic, kind)
-        self._server = foxglove.start_server(name="waymark", host=host, port=port, context=self._context, server_listener=self)
+        try:
+            self._server = foxglove.start_server(name="waymark", host=host, port=port, context=self._context, server_listener=self)
+        except RuntimeError as error:
+            reason = str(error).rpartition("bind port: ")[2]
+            raise OSError(f"{host}:{port} can't be listened on: {reason}; --foxglove takes another port or address of this computer") from error
         self._has_started = True
 
     @property
@@ -73,7 +77,7 @@ class FoxgloveServer(ServerListener):
         if self._has_started and item.topic not in self._channels:
             self._offered[item.topic] = time.monotonic() + _OFFER_AGAIN_S, item
         channel = self._channel(item.topic, item.type, item.metadata)
-        if item.topic in LATCHED_TOPICS or item.topic == "/waymark/landmarks":
+        if is_latched(item.topic):
             self._latched[item.topic] = item
         if channel.has_sinks():
             channel.log(self._messages.encode(item.message, item.type), log_time=max(int(item.log_ns), 0))

@@ -133,6 +133,14 @@ class Messages:
         return self.make("TransformStamped", header=self.header(t_ns, parent), child_frame_id=child,
                          transform=self.make("geometry_msgs/Transform", translation=vector, rotation=turn))
 
+    def cloud(self, t_ns: int, frame: str, xyz: Array, **columns: Array) -> Any:
+        """A PointCloud2 of points (n, 3) in metres, with further columns (n,) by name, all as float32."""
+        names = ["x", "y", "z", *columns]
+        values = np.column_stack([np.reshape(xyz, (-1, 3)), *columns.values()]).astype("<f4")
+        fields = [self.make("PointField", name=name, offset=4 * i, datatype=7, count=1) for i, name in enumerate(names)]
+        return self.make("PointCloud2", header=self.header(t_ns, frame), height=1, width=len(values), fields=fields,
+                         point_step=4 * len(names), row_step=values.nbytes, data=values.view(np.uint8).ravel(), is_dense=True)
+
     def colour(self, r: float, g: float, b: float, a: float = 1.0) -> Any:
         """A colour of a marker, 0 to 1."""
         return self.make("std_msgs/ColorRGBA", r=r, g=g, b=b, a=a)

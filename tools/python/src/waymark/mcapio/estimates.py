@@ -45,12 +45,20 @@ def ros_covariance(covariances: Array, xyzw: Array) -> Array:
     return out
 
 
-def path(messages: Messages, t_ns: int, stamps: Array, where: Array, turns: Array) -> Any:
-    """A nav_msgs/Path of at most PATH_POINTS poses, spread evenly."""
-    chosen = np.unique(np.linspace(0, len(stamps) - 1, min(PATH_POINTS, len(stamps))).astype(int))
+def points(messages: Messages, topic: str, log_ns: int, where: Array, **columns: Array) -> Item:
+    """Points in the map as a cloud, on the topic's name and "/points": for viewers that draw no paths, pose arrays or markers."""
+    return Item(log_ns, topic + "/points", "sensor_msgs/msg/PointCloud2", messages.cloud(log_ns, "map", where, **columns))
+
+
+def path(messages: Messages, topic: str, log_ns: int, t_ns: int, table: tuple[Array, Array, Array]) -> Iterator[Item]:
+    """A way as nav_msgs/Path and as points: at most PATH_POINTS of the poses, spread evenly. `table`: stamps, positions, turns."""
+    count = len(table[0])
+    chosen = np.unique(np.linspace(0, count - 1, min(PATH_POINTS, count)).astype(int))
+    stamps, where, turns = (column[chosen] for column in table)
     poses = [messages.make("PoseStamped", header=messages.header(stamps[i], "map"), pose=messages.pose(where[i], turns[i]))
-             for i in chosen]
-    return messages.make("Path", header=messages.header(t_ns, "map"), poses=poses)
+             for i in range(len(stamps))]
+    yield Item(log_ns, topic, "nav_msgs/msg/Path", messages.make("Path", header=messages.header(t_ns, "map"), poses=poses))
+    yield points(messages, topic, log_ns, where)
 
 
 def poses(messages: Messages, topic: str, table: Table, log_ns: Array) -> Iterator[Item]:
@@ -115,8 +123,7 @@ def _paths(messages: Messages, table: Table, log_ns: Array) -> Iterator[Item]:
         if now < next_ns and i + 1 < len(log_ns):
             continue
         next_ns = now + PATH_EVERY_NS
-        yield Item(now, "/waymark/path", "nav_msgs/msg/Path",
-                   path(messages, table["t_ns"][i], table["t_ns"][: i + 1], where[: i + 1], turns[: i + 1]))
+        yield from path(messages, "/waymark/path", now, table["t_ns"][i], (table["t_ns"][: i + 1], where[: i + 1], turns[: i + 1]))
 
 
 def innovations(messages: Messages, table: Table) -> Iterator[Item]:
@@ -147,6 +154,8 @@ def particles(messages: Messages, table: Table) -> Iterator[Item]:
         poses = [messages.pose_of(planar(table["x_m"][i], table["y_m"][i], table["heading_rad"][i])) for i in rows]
         yield Item(t_ns, "/waymark/particles", "geometry_msgs/msg/PoseArray",
                    messages.make("PoseArray", header=messages.header(t_ns, "map"), poses=poses))
+        yield points(messages, "/waymark/particles", t_ns, positions(table)[rows], heading=table["heading_rad"][rows],
+                     weight=table["weight"][rows])
 
 
 def ellipse(messages: Messages, name: str, number: int, t_ns: int, centre: Any, cov: Array, colour: Any) -> Any:
@@ -169,6 +178,7 @@ def hypotheses(messages: Messages, table: Table) -> Iterator[Item]:
             markers.append(ellipse(messages, "hypotheses", number, t_ns, (table["x_m"][i], table["y_m"][i]), cov, colour))
         yield Item(t_ns, "/waymark/hypotheses", "visualization_msgs/msg/MarkerArray",
                    messages.make("MarkerArray", markers=markers))
+        yield points(messages, "/waymark/hypotheses", t_ns, positions(table)[rows], weight=table["weight"][rows])
 
 
 def estimate_streams(messages: Messages, run: Run) -> list[Iterator[Item]]:

@@ -13,7 +13,7 @@ from ..recording import Recording
 from ..ros import Messages
 from ..run import Run
 from ..tables import Array, Table
-from .estimates import ellipse, path, positions, quaternions, topic_name
+from .estimates import ellipse, path, points, positions, quaternions, topic_name
 from .writer import Item
 
 LANDMARK_M = 0.15  # diameter of a landmark's ball: seen from across a room, and no wider than a usual one
@@ -59,6 +59,7 @@ def landmarks(messages: Messages, topic: str, table: Table, t_ns: int, colour: A
             cov = np.array([[table["cov_xx"][i], table["cov_xy"][i]], [table["cov_xy"][i], table["cov_yy"][i]]])
             markers.append(ellipse(messages, "two sigma", i, t_ns, where, cov, messages.colour(0.2, 0.6, 0.9, 0.3)))
     yield Item(t_ns, topic, "visualization_msgs/msg/MarkerArray", messages.make("MarkerArray", markers=markers))
+    yield points(messages, topic, t_ns, positions(table), id=table["id"])
 
 
 def grid(messages: Messages, file: Path, t_ns: int) -> Iterator[Item]:
@@ -81,8 +82,7 @@ def _truth(messages: Messages, table: Table) -> Iterator[Item]:
 
 
 def _truth_path(messages: Messages, table: Table, t_ns: int) -> Iterator[Item]:
-    yield Item(t_ns, "/truth/path", "nav_msgs/msg/Path",
-               path(messages, t_ns, table["t_ns"], positions(table), quaternions(table)))
+    yield from path(messages, "/truth/path", t_ns, t_ns, (table["t_ns"], positions(table), quaternions(table)))
 
 
 def place_streams(messages: Messages, run: Run, recording: Recording | None) -> list[Iterator[Item]]:

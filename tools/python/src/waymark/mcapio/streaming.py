@@ -20,6 +20,8 @@ TOPICS = {"/tf": "tf2_msgs/msg/TFMessage", "/tf_static": "tf2_msgs/msg/TFMessage
           "/waymark/path": "nav_msgs/msg/Path", "/waymark/status": "waymark_msgs/msg/Status",
           "/waymark/particles": "geometry_msgs/msg/PoseArray", "/waymark/hypotheses": "visualization_msgs/msg/MarkerArray",
           "/waymark/landmarks": "visualization_msgs/msg/MarkerArray", "/landmarks": "visualization_msgs/msg/MarkerArray",
+          **{f"{topic}/points": "sensor_msgs/msg/PointCloud2"
+             for topic in ("/waymark/path", "/waymark/particles", "/waymark/hypotheses", "/waymark/landmarks", "/landmarks")},
           "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray"}
 """Topics of each run; those of sources and cameras come with their first message."""
 SIGHTINGS = ["t_ns", "sensor", "id", "bearing_rad", "range_m"]
@@ -134,8 +136,7 @@ class LiveItems:
             return
         self._next_path_ns = t_ns + estimates.PATH_EVERY_NS
         stamps, where, turns = (np.array(column) for column in zip(*self._way))
-        yield Item(self.newest_ns, "/waymark/path", "nav_msgs/msg/Path",
-                   estimates.path(self._messages, t_ns, stamps, where, turns))
+        yield from estimates.path(self._messages, "/waymark/path", self.newest_ns, t_ns, (stamps, where, turns))
 
     def _health(self, message: Any) -> Iterator[Item]:
         self._sources = [_name(source.name) for source in message.sources[: message.source_count]]

@@ -20,7 +20,12 @@ _LATCHED = """- history: 1
   liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
   avoid_ros_namespace_conventions: false
 """
-LATCHED_TOPICS = frozenset({"/tf_static", "/map", "/landmarks", "/truth/path", "/truth/landmarks"})
+_LATCHED_TOPICS = frozenset({"/tf_static", "/map", "/landmarks", "/waymark/landmarks", "/truth/path", "/truth/landmarks"})
+
+
+def is_latched(topic: str) -> bool:
+    """Whether a topic changes seldom, so that a viewer that joins late needs its last message."""
+    return topic.removesuffix("/points") in _LATCHED_TOPICS
 
 
 class Item(NamedTuple):
@@ -54,7 +59,7 @@ class McapFile:
     def write(self, item: Item) -> None:
         """Appends a message; its channel and schema are registered at their first use."""
         if item.topic not in self._channels:
-            qos = _LATCHED if item.topic in LATCHED_TOPICS else ""
+            qos = _LATCHED if is_latched(item.topic) else ""
             self._channels[item.topic] = self._writer.register_channel(
                 item.topic, "cdr", self._schema(item.type), {"offered_qos_profiles": qos, **item.metadata})
         log_ns = max(int(item.log_ns), 0)
