@@ -164,7 +164,7 @@ bool fits_board(const std::map<Place, size_t> &lattice, int columns, int rows) {
 
 }  // namespace
 
-std::vector<BoardCorner> find_chessboard(const GreyPicture &picture, int columns, int rows) {
+std::vector<BoardCorner> grow_chessboard(const GreyPicture &picture, int columns, int rows) {
   const std::vector<CornerCandidate> saddles = find_saddles(picture);
   Grower grower(picture, saddles);
   std::map<Place, size_t> best;
@@ -182,6 +182,22 @@ std::vector<BoardCorner> find_chessboard(const GreyPicture &picture, int columns
   out.reserve(best.size());
   for (const auto &[place, index] : best) out.push_back({saddles[index].pixel, Vec2(place.first, place.second)});
   return out;
+}
+
+LatticeSize lattice_size(const std::vector<BoardCorner> &corners) {
+  if (corners.empty()) return {};
+  Vec2 low = corners[0].board, high = low;
+  for (const BoardCorner &corner : corners) low = low.cwiseMin(corner.board), high = high.cwiseMax(corner.board);
+  return {static_cast<int>(high.x() - low.x()) + 1, static_cast<int>(high.y() - low.y()) + 1};
+}
+
+std::vector<BoardCorner> find_chessboard(const GreyPicture &picture, int columns, int rows) {
+  std::vector<BoardCorner> found = grow_chessboard(picture, columns, rows);
+  const auto all = static_cast<size_t>(std::max(0, columns * rows));
+  if (found.size() >= std::max<size_t>(all, 12)) return found;
+  std::vector<BoardCorner> other =
+      all > 0 ? find_whole_chessboard(picture, columns, rows) : find_any_chessboard(picture);
+  return other.size() > found.size() ? other : found;
 }
 
 }  // namespace wm::calibrate
