@@ -63,7 +63,8 @@ bool find_pose(const Camera &camera, View &view) {
 
 // All views as a bundle of one camera, a shot each.
 Bundle bundle_of(const Calibration &c) {
-  Bundle out{.cameras = {c.camera}, .T_camera_rig = {Pose::Identity()}, .T_rig_board = {}, .sightings = {}, .measured = {}};
+  Bundle out{
+      .cameras = {c.camera}, .T_camera_rig = {Pose::Identity()}, .T_rig_board = {}, .sightings = {}, .measured = {}};
   for (size_t i = 0; i < c.views.size(); i++) {
     out.T_rig_board.push_back(c.views[i].T_camera_board);
     out.sightings.push_back({0, i, c.views[i].corners});

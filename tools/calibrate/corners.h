@@ -37,17 +37,21 @@ bool refine_corner(const tools::GreyPicture &picture, int half_window, Vec2 &cor
 // white on the other, the next one where the lattice's last steps say. Empty where there is none of at least 3 x 3 and
 // 12 corners. `columns` x `rows` inner corners: a larger lattice than the board is no board; 0: not known.
 std::vector<BoardCorner> grow_chessboard(const tools::GreyPicture &picture, int columns, int rows);
-// By OpenCV: a board of this size of which all is seen, and a board of any size (of 4 x 4 or more; takes a second).
+// By OpenCV: a board of this size of which all is seen.
 std::vector<BoardCorner> find_whole_chessboard(const tools::GreyPicture &picture, int columns, int rows);
-std::vector<BoardCorner> find_any_chessboard(const tools::GreyPicture &picture);
+// Smoother by a Gaussian: the rims that a camera's sharpening leaves are gone.
+tools::GreyPicture smoothed(const tools::GreyPicture &picture, double sigma_px);
 
-// The chessboard of a picture: by our lattice; where that has not all of the board, by OpenCV, if that has more.
+// The chessboard of a picture: by our lattice; where that has not all of the board, by OpenCV, if that has more; where
+// there is still none, by our lattice in the smoothed picture.
 std::vector<BoardCorner> find_chessboard(const tools::GreyPicture &picture, int columns, int rows);
 // Columns and rows that a lattice spans.
 struct LatticeSize {
   int columns = 0, rows = 0;
 };
 LatticeSize lattice_size(const std::vector<BoardCorner> &corners);
+// Without lines that have less than half of the corners of the fullest: strays at the board's rim.
+LatticeSize full_size(const std::vector<BoardCorner> &corners);
 
 // ── ChArUco: a chessboard with a marker in each white square ──
 struct SeenMarker {

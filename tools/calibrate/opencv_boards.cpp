@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Boards by OpenCV: chessboards where our lattice of saddles is not whole, and the markers of ChArUco boards. All corners
-// get their fraction of a pixel from refine_corner.
+// Boards by OpenCV: chessboards where our lattice of saddles is not whole, and the markers of ChArUco boards. All
+// corners get their fraction of a pixel from refine_corner.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wdeprecated-enum-enum-conversion"  // OpenCV 4.6 in C++20
 #include <opencv2/aruco.hpp>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
 #pragma GCC diagnostic pop
 
 #include <algorithm>
@@ -87,14 +88,11 @@ std::vector<BoardCorner> find_whole_chessboard(const GreyPicture &picture, int c
   return lattice_of(picture, corners, columns);
 }
 
-std::vector<BoardCorner> find_any_chessboard(const GreyPicture &picture) {
-  std::vector<cv::Point2f> corners;
-  cv::Mat meta;
-  if (!cv::findChessboardCornersSB(mat_of(picture), {4, 4}, corners,
-                                   cv::CALIB_CB_LARGER | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY, meta) ||
-      meta.cols < 1)
-    return {};
-  return lattice_of(picture, corners, meta.cols);
+GreyPicture smoothed(const GreyPicture &picture, double sigma_px) {
+  GreyPicture out = picture;
+  cv::Mat to(out.height, out.width, CV_8UC1, out.pixels.data());
+  cv::GaussianBlur(mat_of(picture), to, {0, 0}, sigma_px);
+  return out;
 }
 
 std::vector<std::string> dictionary_names() {
@@ -179,7 +177,8 @@ std::vector<BoardCorner> charuco_corners(const GreyPicture &picture, const std::
       const Vec2 rough = pixel;
       // The markers begin an eighth of a square from the corner: the window must not reach them.
       const int window = std::clamp(static_cast<int>(edge_px / 8), 2, 4);
-      if (refine_corner(picture, window, pixel) && (pixel - rough).norm() < 0.2 * edge_px) out.push_back({pixel, corner});
+      if (refine_corner(picture, window, pixel) && (pixel - rough).norm() < 0.2 * edge_px)
+        out.push_back({pixel, corner});
     }
   return out;
 }

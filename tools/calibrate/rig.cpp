@@ -85,7 +85,8 @@ class Assembly {
     bundle_.T_camera_rig.assign(cameras.size(), Pose::Identity());
   }
 
-  // All views of the first camera: a shot each, turned so that a board on the floor has the camera nearest to base_link.
+  // All views of the first camera: a shot each, turned so that a board on the floor has the camera nearest to
+  // base_link.
   void add_first(const std::vector<size_t> &shots, const std::vector<FloorBoard> &floor) {
     for (size_t i = 0; i < cameras_[0].views.size(); i++) {
       const View &view = cameras_[0].views[i];
@@ -206,7 +207,8 @@ Rig solve_rig(const std::vector<Calibration> &cameras, const std::vector<std::ve
                            " pictures; three are the least, ten are good");
   }
   if (!solve(bundle, true) || !solve(bundle, false))
-    throw tools::Failure("the cameras and boards do not fit together: are the pictures of both cameras of the same instants?");
+    throw tools::Failure(
+        "the cameras and boards do not fit together: are the pictures of both cameras of the same instants?");
   const double variance = write_back(bundle, out);
   if (cameras.size() > 1) out.T_first_second = bundle.T_camera_rig[1].inverse();
   if (!floor.empty()) out.T_base_first = bundle.T_base_rig;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Two cameras that are fixed to each other, and where the first sits on the robot: in one problem with the lenses and the
-// poses of the boards.
+// Two cameras that are fixed to each other, and where the first sits on the robot: in one problem with the lenses and
+// the poses of the boards.
 #pragma once
 
 #include <optional>
@@ -13,11 +13,11 @@ namespace wm::calibrate {
 
 // How the corners of a board are counted.
 struct BoardShape {
-  int columns = 0, rows = 0;    // of a chessboard: inner corners
-  double unit_m = 0;            // what BoardCorner::board is in
-  bool numbered = false;        // corners have identities (ChArUco, AprilGrid)
-  bool faces_viewer = false;    // the board's z axis points at the viewer (AprilGrid), else away
-  Vec2 middle = Vec2::Zero();   // of the whole board, in its unit
+  int columns = 0, rows = 0;   // of a chessboard: inner corners
+  double unit_m = 0;           // what BoardCorner::board is in
+  bool numbered = false;       // corners have identities (ChArUco, AprilGrid)
+  bool faces_viewer = false;   // the board's z axis points at the viewer (AprilGrid), else away
+  Vec2 middle = Vec2::Zero();  // of the whole board, in its unit
 };
 
 // A board that lay flat on the floor: its middle and the direction of its columns, measured in base_link.

@@ -3,6 +3,7 @@
 
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
+#include <glog/logging.h>
 
 #include <algorithm>
 #include <cmath>
@@ -172,10 +173,9 @@ class Problem {
             robust ? new ceres::HuberLoss(kHuber_px) : nullptr, lens_[s.camera].data(), rig_[s.camera].data(),
             shots_[s.shot].data());
     for (const MeasuredBoard &m : bundle.measured)
-      problem_.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<MeasuredCost, 6, kPose, kPose>(
-              new MeasuredCost{m, bundle.T_base_rig, bundle.T_rig_board[m.shot]}),
-          nullptr, base_.data(), shots_[m.shot].data());
+      problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<MeasuredCost, 6, kPose, kPose>(
+                                    new MeasuredCost{m, bundle.T_base_rig, bundle.T_rig_board[m.shot]}),
+                                nullptr, base_.data(), shots_[m.shot].data());
     if (problem_.HasParameterBlock(rig_[0].data())) problem_.SetParameterBlockConstant(rig_[0].data());
   }
 
@@ -205,6 +205,7 @@ class Problem {
     if (!bundle_.measured.empty()) blocks.push_back(base_.data());
     Eigen::Index n = 0;
     for (const double *block : blocks) n += problem_.ParameterBlockSize(block);
+    FLAGS_minloglevel = google::GLOG_FATAL;  // what is not determined is told by the result
     ceres::Covariance::Options o;
     o.num_threads = 1;
     ceres::Covariance of(o);
@@ -244,9 +245,8 @@ double solve_pose(const Camera &camera, const std::vector<BoardCorner> &corners,
   double rig[kPose] = {}, shot[kPose] = {};
   ceres::Problem problem;
   for (const BoardCorner &corner : corners)
-    problem.AddResidualBlock(
-        corner_cost(camera, corner, Pose::Identity(), T_camera_board),
-        new ceres::HuberLoss(kHuber_px), lens.data(), rig, shot);
+    problem.AddResidualBlock(corner_cost(camera, corner, Pose::Identity(), T_camera_board),
+                             new ceres::HuberLoss(kHuber_px), lens.data(), rig, shot);
   problem.SetParameterBlockConstant(lens.data());
   problem.SetParameterBlockConstant(rig);
   ceres::Solver::Options o = options(20, 1e-4);
