@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "calibrate/fit.h"
+#include "calibrate/solver.h"
 #include "common/linear.h"
 
 namespace wm::calibrate {
@@ -15,78 +16,8 @@ namespace {
 using render::Camera;
 using render::Model;
 using render::Pose;
-using Vec6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr double kNoPixel_px = 100;  // what a corner counts that the camera can't show
-constexpr double kHuber_px = 1.5;
 constexpr double kPoseGood_px = 8;  // with the guessed focal length
-
-Vec2 miss(const Camera &camera, const Pose &T, const BoardCorner &corner) {
-  Vec2 pixel(0, 0);
-  const Vec3 point = T * Vec3(corner.board.x(), corner.board.y(), 0);
-  return render::project(camera, point, pixel) ? Vec2(pixel - corner.pixel) : Vec2(kNoPixel_px, kNoPixel_px);
-}
-
-Pose moved(const Pose &T, const Vec6 &step) {
-  Pose out = T;
-  const double angle = step.head<3>().norm();
-  if (angle > 0) out.linear() = Eigen::AngleAxisd(angle, step.head<3>() / angle).toRotationMatrix() * T.linear();
-  out.translation() += step.tail<3>();
-  return out;
-}
-
-double weight(double r, bool robust) { return robust && r > kHuber_px ? kHuber_px / r : 1.0; }
-double cost_of(double r, bool robust) { return robust && r > kHuber_px ? kHuber_px * (2 * r - kHuber_px) : r * r; }
-
-double cost(const Camera &camera, const View &view, bool robust) {
-  double sum = 0;
-  for (const BoardCorner &corner : view.corners)
-    sum += cost_of(miss(camera, view.T_camera_board, corner).norm(), robust);
-  return sum;
-}
-
-double cost(const Camera &camera, const std::vector<View> &views, bool robust) {
-  double sum = 0;
-  for (const View &view : views) sum += cost(camera, view, robust);
-  return sum;
-}
-
-Eigen::Matrix<double, 2, 6> by_pose(const Camera &camera, const Pose &T, const BoardCorner &corner) {
-  Eigen::Matrix<double, 2, 6> J;
-  for (int k = 0; k < 6; k++) {
-    Vec6 step = Vec6::Zero();
-    step[k] = 1e-6 * (k < 3 ? 1 : std::max(1e-3, T.translation().norm()));
-    J.col(k) = (miss(camera, moved(T, step), corner) - miss(camera, moved(T, -step), corner)) / (2 * step[k]);
-  }
-  return J;
-}
-
-void refine_pose(const Camera &camera, View &view) {
-  double lambda = 1e-3, now = cost(camera, view, true);
-  for (int iteration = 0; iteration < 20; iteration++) {
-    Eigen::Matrix<double, 6, 6> N = Eigen::Matrix<double, 6, 6>::Zero();
-    Vec6 g = Vec6::Zero();
-    for (const BoardCorner &corner : view.corners) {
-      const Vec2 r = miss(camera, view.T_camera_board, corner);
-      const auto J = by_pose(camera, view.T_camera_board, corner);
-      const double w = weight(r.norm(), true);
-      N += w * J.transpose() * J;
-      g += w * J.transpose() * r;
-    }
-    N.diagonal() *= 1 + lambda;
-    N.diagonal().array() += 1e-12;
-    View next = view;
-    next.T_camera_board = moved(view.T_camera_board, -tools::solve_symmetric(N, g));
-    const double then = cost(camera, next, true);
-    lambda = then < now ? lambda / 5 : lambda * 10;
-    if (!(then < now)) continue;
-    const bool done = now - then < 1e-4 * now;
-    view = std::move(next);
-    now = then;
-    if (done) break;
-  }
-  view.rms_px = std::sqrt(now / static_cast<double>(view.corners.size()));
-}
 
 // The pose of a plane from rays: d x (H p) = 0 for H = [r1 r2 t], the smallest eigenvector of the normal matrix; then
 // refined in pixels.
@@ -126,98 +57,26 @@ bool find_pose(const Camera &camera, View &view) {
   if (view.T_camera_board.linear().determinant() < 0) return false;
   view.T_camera_board.translation() =
       H.col(2) * scale * size - view.T_camera_board.linear() * Vec3(middle.x(), middle.y(), 0);
-  refine_pose(camera, view);
+  view.rms_px = solve_pose(camera, view.corners, view.T_camera_board);
   return true;
 }
 
-// Normal equations of all, the poses eliminated (Schur): solves for the camera's step and gives back the poses'.
-class Normal {
- public:
-  Normal(const Camera &camera, const std::vector<View> &views, bool robust, double lambda) {
-    const Eigen::VectorXd at = parameters(camera);
-    const Eigen::Index n = at.size();
-    reduced_ = Eigen::MatrixXd::Zero(n, n);
-    right_ = Eigen::VectorXd::Zero(n);
-    std::vector<Camera> up(static_cast<size_t>(n), camera), down(static_cast<size_t>(n), camera);
-    Eigen::VectorXd steps(n);
-    for (Eigen::Index k = 0; k < n; k++) {
-      steps[k] = 1e-6 * std::max(1.0, std::fabs(at[k]));
-      Eigen::VectorXd v = at;
-      v[k] += steps[k];
-      set_parameters(v, up[static_cast<size_t>(k)]);
-      v[k] -= 2 * steps[k];
-      set_parameters(v, down[static_cast<size_t>(k)]);
-    }
-    Eigen::MatrixXd J(2, n);
-    for (const View &view : views) {
-      Eigen::MatrixXd A = Eigen::MatrixXd::Zero(n, n), B = Eigen::MatrixXd::Zero(n, 6);
-      Eigen::Matrix<double, 6, 6> C = Eigen::Matrix<double, 6, 6>::Zero();
-      Eigen::VectorXd a = Eigen::VectorXd::Zero(n);
-      Vec6 c = Vec6::Zero();
-      for (const BoardCorner &corner : view.corners) {
-        const Vec2 r = miss(camera, view.T_camera_board, corner);
-        for (Eigen::Index k = 0; k < n; k++)
-          J.col(k) = (miss(up[static_cast<size_t>(k)], view.T_camera_board, corner) -
-                      miss(down[static_cast<size_t>(k)], view.T_camera_board, corner)) /
-                     (2 * steps[k]);
-        const auto P = by_pose(camera, view.T_camera_board, corner);
-        if (!(J.cwiseAbs().maxCoeff() < 1e7) || !(P.cwiseAbs().maxCoeff() < 1e7))
-          continue;  // at the rim of what the camera shows
-        const double w = weight(r.norm(), robust);
-        A += w * J.transpose() * J;
-        B += w * J.transpose() * P;
-        C += w * P.transpose() * P;
-        a += w * J.transpose() * r;
-        c += w * P.transpose() * r;
-      }
-      A.diagonal() *= 1 + lambda;
-      C.diagonal() *= 1 + lambda;
-      C.diagonal().array() += 1e-12;
-      const Eigen::Matrix<double, 6, 6> inverse = tools::inverse_of_six(C);
-      reduced_ += A - B * inverse * B.transpose();
-      right_ += a - B * inverse * c;
-      parts_.push_back({B, inverse, c});
-    }
+// All views as a bundle of one camera, a shot each.
+Bundle bundle_of(const Calibration &c) {
+  Bundle out{
+      .cameras = {c.camera}, .T_camera_rig = {Pose::Identity()}, .T_rig_board = {}, .sightings = {}, .measured = {}};
+  for (size_t i = 0; i < c.views.size(); i++) {
+    out.T_rig_board.push_back(c.views[i].T_camera_board);
+    out.sightings.push_back({0, i, c.views[i].corners});
   }
+  return out;
+}
 
-  [[nodiscard]] Eigen::VectorXd camera_step() const { return -tools::solve_symmetric(reduced_, right_); }
-  [[nodiscard]] Vec6 pose_step(size_t view, const Eigen::VectorXd &camera) const {
-    return -parts_[view].inverse * (parts_[view].right + parts_[view].cross.transpose() * camera);
-  }
-  [[nodiscard]] Eigen::MatrixXd information() const { return reduced_; }
-
- private:
-  struct Part {
-    Eigen::MatrixXd cross;
-    Eigen::Matrix<double, 6, 6> inverse;
-    Vec6 right;
-  };
-  Eigen::MatrixXd reduced_;
-  Eigen::VectorXd right_;
-  std::vector<Part> parts_;
-};
-
-void refine_all(Camera &camera, std::vector<View> &views, bool robust) {
-  double lambda = 1e-3, now = cost(camera, views, robust);
-  for (int iteration = 0; iteration < 60 && lambda < 1e10; iteration++) {
-    const Normal normal(camera, views, robust, lambda);
-    const Eigen::VectorXd step = normal.camera_step();
-    Camera next = camera;
-    set_parameters(parameters(camera) + step, next);
-    std::vector<View> moved_views = views;
-    for (size_t i = 0; i < views.size(); i++)
-      moved_views[i].T_camera_board = moved(views[i].T_camera_board, normal.pose_step(i, step));
-    std::string error;
-    const double then =
-        render::camera_valid(next, error) ? cost(next, moved_views, robust) : std::numeric_limits<double>::infinity();
-    lambda = then < now ? lambda / 5 : lambda * 6;
-    if (!(then < now)) continue;
-    const bool done = now - then < 1e-9 * now;
-    camera = next;
-    views = std::move(moved_views);
-    now = then;
-    if (done) break;
-  }
+void refine_all(Calibration &c, bool robust) {
+  Bundle bundle = bundle_of(c);
+  if (!solve(bundle, robust)) return;
+  c.camera = bundle.cameras[0];
+  for (size_t i = 0; i < c.views.size(); i++) c.views[i].T_camera_board = bundle.T_rig_board[i];
 }
 
 void drop_outliers(Calibration &c) {
@@ -242,22 +101,26 @@ void drop_outliers(Calibration &c) {
 }
 
 void finish(Calibration &c) {
-  refine_all(c.camera, c.views, true);
+  refine_all(c, true);
   drop_outliers(c);
-  refine_all(c.camera, c.views, false);
+  refine_all(c, false);
   double sum = 0;
   c.corners = 0;
   for (View &view : c.views) {
-    const double here = cost(c.camera, view, false);
+    double here = 0;
+    for (const BoardCorner &corner : view.corners) here += miss(c.camera, view.T_camera_board, corner).squaredNorm();
     view.rms_px = std::sqrt(here / static_cast<double>(view.corners.size()));
     sum += here;
     c.corners += view.corners.size();
   }
   c.rms_px = std::sqrt(sum / static_cast<double>(std::max<size_t>(1, c.corners)));
-  const Normal normal(c.camera, c.views, false, 0);
-  const double unknowns = static_cast<double>(normal.information().rows()) + 6.0 * static_cast<double>(c.views.size());
+  const Eigen::Index n = parameters(c.camera).size();
+  const double unknowns = static_cast<double>(n) + 6.0 * static_cast<double>(c.views.size());
   const double variance = sum / std::max(1.0, 2.0 * static_cast<double>(c.corners) - unknowns);
-  c.covariance = variance * tools::inverse_symmetric(normal.information());
+  const std::optional<Eigen::MatrixXd> unit = covariance(bundle_of(c));
+  constexpr double kUnknown = 1e6;  // a variance: nothing is known of a parameter
+  c.determined = unit.has_value();
+  c.covariance = unit ? Eigen::MatrixXd(variance * *unit) : Eigen::MatrixXd(kUnknown * Eigen::MatrixXd::Identity(n, n));
 }
 
 // Poses of all views by a guessed focal length; the sum of what is left, large where a view has none.
@@ -320,6 +183,13 @@ std::optional<Calibration> with_model(const Calibration &from, Model model) {
   if (out.camera.intrinsics.empty()) return {};
   finish(out);
   return out.views.size() < 3 ? std::nullopt : std::optional<Calibration>(out);
+}
+
+double find_board(const Camera &camera, const std::vector<BoardCorner> &corners, Pose &T_camera_board) {
+  View view{.name = "", .corners = corners};
+  if (!find_pose(camera, view)) return kNoPixel_px;
+  T_camera_board = view.T_camera_board;
+  return view.rms_px;
 }
 
 double pixel_sigma(const Calibration &calibration, const Vec2 &pixel) {

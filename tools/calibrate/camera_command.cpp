@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // waymark calibrate camera: pictures of a board into a camera's entry.
-#include <unistd.h>
-
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
+#include "calibrate/board_pictures.h"
 #include "calibrate/bundle.h"
 #include "calibrate/commands.h"
 #include "calibrate/corners.h"
 #include "calibrate/coverage.h"
 #include "calibrate/entry.h"
 #include "calibrate/fit.h"
+#include "calibrate/rig.h"
 #include "common/failure.h"
 
 namespace wm::calibrate {
@@ -20,53 +21,43 @@ namespace {
 using render::Model;
 
 struct Arguments {
-  std::string from, camera, name = "camera", model = "auto", chessboard, aprilgrid, out, picture;
-  double tag_m = 0.088, gap = 0.3;
+  std::string from, camera, name = "camera", model = "auto", chessboard, aprilgrid, charuco, dictionary = "5x5", out,
+                            picture;
+  std::string second, second_name;
+  std::vector<std::string> floor;
+  double tag_m = 0.088, gap = 0.3, square_m = 0;
   int every = 1, most = 60;
 };
 
-struct Board {
-  int columns = 0, rows = 0;
-  bool tags = false;
-};
-
 Board board_of(const Arguments &a) {
-  Board out{0, 0, !a.aprilgrid.empty()};
-  const std::string &text = out.tags ? a.aprilgrid : a.chessboard;
+  Board out;
+  if (!a.aprilgrid.empty()) out.kind = BoardKind::aprilgrid;
+  if (!a.charuco.empty()) out.kind = BoardKind::charuco;
+  out.tag_m = a.tag_m, out.gap = a.gap, out.dictionary = a.dictionary, out.square_m = a.square_m;
+  const std::string &text = a.aprilgrid + a.charuco + a.chessboard;
   char rest = 0;
   if (text.empty()) return out;
-  if (std::sscanf(text.c_str(), "%dx%d%c", &out.columns, &out.rows, &rest) != 2 || out.columns < 1 || out.rows < 1)
+  if (std::sscanf(text.c_str(), "%dx%d%c", &out.columns, &out.rows, &rest) != 2 || out.columns < 1 || out.rows < 1 ||
+      out.columns > 100 || out.rows > 100)
     throw tools::Failure("'" + text + "' is not COLUMNSxROWS, as in 9x6", tools::kUsage);
   return out;
 }
 
-struct Seen {
-  std::vector<View> views;
-  tools::GreyPicture picture;  // the first of them
-  size_t pictures = 0;
-};
-
-// Boards in all pictures; where there are too many, evenly thinned to the most.
-Seen look(const Arguments &a, const Board &board) {
-  Seen out;
-  tools::each_picture(a.from, a.camera, a.every, [&](const std::string &name, const tools::GreyPicture &picture) {
-    if (out.pictures++ > 0 && (picture.width != out.picture.width || picture.height != out.picture.height))
-      throw tools::Failure(name + ": is " + std::to_string(picture.width) + " x " + std::to_string(picture.height) +
-                           ", the pictures before are " + std::to_string(out.picture.width) + " x " +
-                           std::to_string(out.picture.height));
-    View view{name, board.tags ? find_aprilgrid(picture, board.columns, board.rows, a.tag_m, a.tag_m * a.gap)
-                               : find_chessboard(picture, board.columns, board.rows)};
-    if (out.pictures == 1) out.picture = picture;
-    if (view.corners.size() >= 12) out.views.push_back(std::move(view));
-    if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r%zu pictures, a board in %zu ", out.pictures, out.views.size());
-    return true;
-  });
-  if (isatty(STDERR_FILENO)) std::fputc('\n', stderr);
-  const auto most = static_cast<size_t>(a.most);
-  if (out.views.size() > most) {
-    std::vector<View> kept;
-    for (size_t i = 0; i < most; i++) kept.push_back(std::move(out.views[i * out.views.size() / most]));
-    out.views = std::move(kept);
+// "PICTURE,X,Y,YAW": m and degrees.
+std::vector<FloorBoard> floor_of(const Arguments &a) {
+  std::vector<FloorBoard> out;
+  for (const std::string &text : a.floor) {
+    const size_t comma = text.find(',');
+    FloorBoard board{text.substr(0, comma)};
+    double yaw_deg = 0;
+    char rest = 0;
+    if (comma == std::string::npos ||
+        std::sscanf(text.c_str() + comma, ",%lf,%lf,%lf%c", &board.x_m, &board.y_m, &yaw_deg, &rest) != 3 ||
+        !std::isfinite(board.x_m + board.y_m + yaw_deg))
+      throw tools::Failure("--floor: '" + text + "' is not PICTURE,X,Y,YAW, as in board01.jpg,1.20,0.00,90",
+                           tools::kUsage);
+    board.yaw_rad = yaw_deg * render::kPi / 180;
+    out.push_back(board);
   }
   return out;
 }
@@ -110,42 +101,107 @@ void say_parameters(const Calibration &c) {
                  std::sqrt(std::max(0.0, c.covariance(i, i))));
 }
 
-int run(const Arguments &a) {
-  if (!a.chessboard.empty() && !a.aprilgrid.empty())
-    throw tools::Failure("give either --chessboard or --aprilgrid", tools::kUsage);
-  const Board board = board_of(a);
-  const Seen seen = look(a, board);
-  std::fprintf(stderr, "%zu pictures, a board in %zu of them\n", seen.pictures, seen.views.size());
-  if (seen.views.size() < 3)
-    throw tools::Failure(
-        "a board was found in " + std::to_string(seen.views.size()) + " of " + std::to_string(seen.pictures) +
-        " pictures; three are the least. Is all of a square larger than 10 px, sharp, and without glare? "
-        "Tags need --aprilgrid COLUMNSxROWS");
+// One camera: its model, and what it rests on.
+Calibration calibrate(const Arguments &a, const std::string &name, const BoardPictures &seen) {
+  std::fprintf(stderr, "%s: %zu pictures, a board in %zu of them\n", name.c_str(), seen.pictures, seen.boards);
+  for (const std::string &note : seen.notes) std::fprintf(stderr, "  note: %s\n", note.c_str());
   const std::optional<Calibration> first = calibrate_camera(seen.views, seen.picture.width, seen.picture.height);
   if (!first)
     throw tools::Failure(
         "no camera model fits these boards; check that --chessboard counts inner corners and that the board is flat");
-  for (const std::string &name : first->dropped_views) std::fprintf(stderr, "  left out: %s\n", name.c_str());
-
-  const Calibration calibration = best(a, *first);
-  const Coverage coverage = coverage_of(calibration);
+  for (const std::string &left_out : first->dropped_views) std::fprintf(stderr, "  left out: %s\n", left_out.c_str());
+  const Calibration out = best(a, *first);
+  say_parameters(out);
+  const Coverage coverage = coverage_of(out);
   constexpr double kDeg = 180 / render::kPi;
-  say_parameters(calibration);
   std::fprintf(
       stderr,
       "  the board was in %.0f %% of the picture, out to %.0f degrees from the axis (the picture goes to %.0f)\n"
       "  uncertainty of the projection: %.2f px in the mean, %.2f px at worst\n",
       100 * coverage.covered, coverage.widest_rad * kDeg, coverage.picture_rad * kDeg, coverage.sigma_mean_px,
       coverage.sigma_worst_px);
-  const std::vector<std::string> wrong = complaints(calibration, coverage);
+  const std::vector<std::string> wrong = complaints(out, coverage);
   std::fprintf(stderr, "verdict: %s\n", wrong.empty() ? "good" : "not yet good");
   for (const std::string &text : wrong) std::fprintf(stderr, "  %s\n", text.c_str());
+  return out;
+}
 
-  if (!a.picture.empty()) draw_coverage(calibration, seen.picture, a.picture);
-  char remark[160];
-  std::snprintf(remark, sizeof remark, "waymark calibrate camera: %.3f px rms, %zu pictures, %zu corners",
-                calibration.rms_px, calibration.views.size(), calibration.corners);
-  write_new(a.out, calibration_yaml({{a.name, calibration.camera, remark, false}}));
+std::vector<size_t> shots_of(const Calibration &c, const BoardPictures &seen) {
+  std::vector<size_t> out;
+  for (const View &view : c.views)
+    for (size_t i = 0; i < seen.views.size(); i++)
+      if (seen.views[i].name == view.name) out.push_back(seen.shots[i]);
+  return out;
+}
+
+Entry entry_of(const std::string &name, const Calibration &c, const std::string &more) {
+  char remark[200];
+  std::snprintf(remark, sizeof remark, "waymark calibrate camera: %.3f px rms, %zu pictures, %zu corners%s", c.rms_px,
+                c.views.size(), c.corners, more.c_str());
+  return {name, c.camera, remark, false};
+}
+
+// Pair and floor: the poses of the cameras, by one more solution of everything at once.
+void mount(const Arguments &a, const Board &board, const std::vector<BoardPictures> &seen, std::vector<Entry> &entries,
+           std::vector<Calibration> calibrations) {
+  constexpr double kDeg = 180 / render::kPi;
+  std::vector<std::vector<size_t>> shots;
+  for (size_t i = 0; i < seen.size(); i++) shots.push_back(shots_of(calibrations[i], seen[i]));
+  const Rig rig = solve_rig(calibrations, shots, shape_of(board), floor_of(a));
+  const render::Pose body = render::T_body_optical();
+  const render::Pose first = rig.T_base_first ? *rig.T_base_first * body.inverse() : render::Pose::Identity();
+  std::fprintf(stderr, "together: %.3f px rms\n", rig.rms_px);
+  for (size_t i = 0; i < entries.size(); i++) entries[i].camera = rig.cameras[i].camera;
+  if (rig.T_base_first) {
+    entries[0].mounted = true;
+    std::fprintf(stderr, "  %s in base_link: %s +- %.4f m, %.3f degrees\n", entries[0].name.c_str(),
+                 mounting_yaml(first).c_str(), rig.base_sigma_m, rig.base_sigma_rad * kDeg);
+  }
+  entries[0].camera.T_base_camera = first;
+  if (entries.size() < 2) return;
+  entries[1].mounted = true;
+  entries[1].camera.T_base_camera = first * body * rig.T_first_second * body.inverse();
+  std::fprintf(stderr, "  %s as seen from %s (x ahead, y left, z up): %s +- %.5f m, %.4f degrees, by %zu pictures\n",
+               entries[1].name.c_str(), entries[0].name.c_str(),
+               mounting_yaml(body * rig.T_first_second * body.inverse()).c_str(), rig.pair_sigma_m,
+               rig.pair_sigma_rad * kDeg, rig.shared);
+  if (!rig.T_base_first) entries[1].remark += "; its mounting is relative to " + entries[0].name;
+}
+
+int run(const Arguments &a) {
+  if (!a.chessboard.empty() + !a.aprilgrid.empty() + !a.charuco.empty() > 1)
+    throw tools::Failure("give one of --chessboard, --aprilgrid and --charuco", tools::kUsage);
+  const bool placed = !a.second.empty() || !a.floor.empty();
+  Board board = board_of(a);
+  floor_of(a);
+  if (placed && board.kind != BoardKind::aprilgrid && !(a.square_m > 0))
+    throw tools::Failure("--second and --floor need --square: the edge of a square, m", tools::kUsage);
+  if (placed && board.kind == BoardKind::chessboard && board.columns == 0)
+    throw tools::Failure("--second and --floor need --chessboard COLUMNSxROWS", tools::kUsage);
+  std::vector<BoardPictures> seen{look_for_boards(a.from, a.camera, a.every, board)};
+  std::vector<std::string> names{a.name};
+  const auto most = static_cast<size_t>(a.most);
+  if (a.second.empty()) {
+    thin(seen[0], most);
+  } else {
+    const bool recording = std::filesystem::is_directory(std::filesystem::path(a.from) / "video");
+    seen.push_back(recording ? look_for_boards(a.from, a.second, a.every, board)
+                             : look_for_boards(a.second, "", a.every, board));
+    if (seen[0].pictures != seen[1].pictures)
+      throw tools::Failure("the first camera has " + std::to_string(seen[0].pictures) + " pictures, the second " +
+                           std::to_string(seen[1].pictures) + ": a pair has as many, of the same instants");
+    thin_pair(seen[0], seen[1], most);
+    names.push_back(a.second_name.empty() ? a.name + "-second" : a.second_name);
+  }
+  std::vector<Calibration> calibrations;
+  std::vector<Entry> entries;
+  for (size_t i = 0; i < seen.size(); i++) {
+    calibrations.push_back(calibrate(a, names[i], seen[i]));
+    entries.push_back(entry_of(names[i], calibrations[i], ""));
+  }
+  if (!a.picture.empty()) draw_coverage(calibrations[0], seen[0].picture, a.picture);
+  if (placed) mount(a, board, seen, entries, calibrations);
+  write_new(a.out, calibration_yaml(entries));
   return tools::kDone;
 }
 
@@ -154,12 +210,29 @@ int run(const Arguments &a) {
 std::function<int()> camera_command(wm::cli::App &app) {
   auto a = std::make_shared<Arguments>();
   app.description(
-      "Finds estimates a camera's model from pictures of a chessboard or an AprilGrid; lenses over 180 degrees, too.");
+      "Estimates a camera's model from pictures of a board; lenses over 180 degrees, too. With --second a pair of\n"
+      "cameras, with --floor also where they sit on the robot.");
   app.add_option("FROM", a->from, "a folder of pictures (JPEG, PNG, PGM), or a recording's folder")->required();
   app.add_option("--camera", a->camera, "of a recording: this camera; needed where it has several");
   app.add_option("--chessboard", a->chessboard, "COLUMNSxROWS of inner corners: larger lattices are no board");
   app.add_option("--aprilgrid", a->aprilgrid,
                  "COLUMNSxROWS of tags (tag36h11, counted as Kalibr does) in place of a chessboard");
+  app.add_option("--charuco", a->charuco, "COLUMNSxROWS of squares of a ChArUco board in place of a chessboard");
+  app.add_option("--dictionary", a->dictionary, "ChArUco: of the markers, as OpenCV has them")
+      ->check(wm::cli::one_of(dictionary_names()))
+      ->capture_default_str();
+  app.add_option("--square", a->square_m,
+                 "edge of a square of a chessboard or ChArUco board, m; for --second and --floor")
+      ->check(wm::cli::positive());
+  app.add_option("--second", a->second,
+                 "a pair: the second camera's pictures of the same instants, in the order of their names; of a "
+                 "recording, its name");
+  app.add_option("--second-name", a->second_name,
+                 "its name in calibration.yaml; default: that of --name and '-second'");
+  app.add_option("--floor", a->floor,
+                 "PICTURE,X,Y,YAW: in this picture the board lies on the floor, its middle at X, Y (m, base_link), its "
+                 "columns' count running along YAW (degrees); more than one is better")
+      ->expected(1, 20);
   app.add_option("--tag", a->tag_m, "AprilGrid: edge of a tag's black square, m")
       ->check(wm::cli::positive())
       ->capture_default_str();
@@ -183,6 +256,10 @@ std::function<int()> camera_command(wm::cli::App &app) {
       "  waymark calibrate camera pictures/ --chessboard 9x6 --picture coverage.png --out calibration.yaml\n"
       "  waymark calibrate camera recordings/board --camera front --every 10 --name front\n"
       "  waymark calibrate camera pictures/ --aprilgrid 6x6 --tag 0.088 --gap 0.3\n"
+      "  waymark calibrate camera left/ --second right/ --chessboard 9x6 --square 0.025 --name left --second-name "
+      "right\n"
+      "  waymark calibrate camera pictures/ --charuco 12x8 --dictionary 5x5 --square 0.03 --floor "
+      "p07.jpg,1.20,0.00,90\n"
       "A chessboard that is partly out of the picture counts with what is seen. The board's size doesn't matter.\n"
       "How to take the pictures: docs/edges.md.");
   return [a] { return run(*a); };

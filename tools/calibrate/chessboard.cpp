@@ -164,7 +164,7 @@ bool fits_board(const std::map<Place, size_t> &lattice, int columns, int rows) {
 
 }  // namespace
 
-std::vector<BoardCorner> find_chessboard(const GreyPicture &picture, int columns, int rows) {
+std::vector<BoardCorner> grow_chessboard(const GreyPicture &picture, int columns, int rows) {
   const std::vector<CornerCandidate> saddles = find_saddles(picture);
   Grower grower(picture, saddles);
   std::map<Place, size_t> best;
@@ -182,6 +182,67 @@ std::vector<BoardCorner> find_chessboard(const GreyPicture &picture, int columns
   out.reserve(best.size());
   for (const auto &[place, index] : best) out.push_back({saddles[index].pixel, Vec2(place.first, place.second)});
   return out;
+}
+
+LatticeSize lattice_size(const std::vector<BoardCorner> &corners) {
+  if (corners.empty()) return {};
+  Vec2 low = corners[0].board, high = low;
+  for (const BoardCorner &corner : corners) low = low.cwiseMin(corner.board), high = high.cwiseMax(corner.board);
+  return {static_cast<int>(high.x() - low.x()) + 1, static_cast<int>(high.y() - low.y()) + 1};
+}
+
+LatticeSize full_size(const std::vector<BoardCorner> &corners) {
+  int lines[2] = {};
+  for (const int side : {0, 1}) {
+    std::map<long, size_t> count;
+    size_t most = 0;
+    for (const BoardCorner &corner : corners) most = std::max(most, ++count[std::lround(corner.board[side])]);
+    for (const auto &[line, n] : count) lines[side] += 2 * n >= most ? 1 : 0;
+  }
+  return {lines[0], lines[1]};
+}
+
+namespace {
+
+constexpr double kSharpened_px = 1.5;  // smoothing that takes the rims of a camera's sharpening away
+constexpr int kWindowFirst_px = 4;     // half of the window that found them
+constexpr double kWindow = 0.2;        // of the spacing: the next corner's edges stay outside
+constexpr double kWindowMax_px = 8;
+
+// Every corner once more, with a window that the squares around it allow: the larger, the less noise.
+void refine_by_spacing(const GreyPicture &picture, std::vector<BoardCorner> &corners) {
+  const std::vector<BoardCorner> before = corners;
+  for (BoardCorner &corner : corners) {
+    double spacing = 1e9;
+    for (const BoardCorner &other : before)
+      if (std::fabs((other.board - corner.board).norm() - 1) < 1e-6)
+        spacing = std::min(spacing, (other.pixel - corner.pixel).norm());
+    const int window = static_cast<int>(std::min(kWindow * spacing, kWindowMax_px));
+    Vec2 pixel = corner.pixel;
+    if (window > kWindowFirst_px && spacing < 1e8 && refine_corner(picture, window, pixel) &&
+        (pixel - corner.pixel).norm() < 1.5)
+      corner.pixel = pixel;
+  }
+}
+
+}  // namespace
+
+std::vector<BoardCorner> find_chessboard(const GreyPicture &picture, int columns, int rows) {
+  std::vector<BoardCorner> found = grow_chessboard(picture, columns, rows);
+  const auto all = static_cast<size_t>(std::max(0, columns * rows));
+  if (all > 0 && found.size() < all) {
+    std::vector<BoardCorner> whole = find_whole_chessboard(picture, columns, rows);
+    if (whole.size() > found.size()) found = std::move(whole);
+  }
+  if (found.empty()) {
+    found = grow_chessboard(smoothed(picture, kSharpened_px), columns, rows);
+    for (BoardCorner &corner : found) {
+      Vec2 pixel = corner.pixel;
+      if (refine_corner(picture, kWindowFirst_px, pixel) && (pixel - corner.pixel).norm() < 1.5) corner.pixel = pixel;
+    }
+  }
+  refine_by_spacing(picture, found);
+  return found;
 }
 
 }  // namespace wm::calibrate

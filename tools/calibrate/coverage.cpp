@@ -83,6 +83,8 @@ std::vector<std::string> complaints(const Calibration &c, const Coverage &covera
   };
   if (c.views.size() < 8)
     say("only %.0f pictures of the board count; 15 to 40 are good", static_cast<double>(c.views.size()));
+  if (!c.determined)
+    out.emplace_back("these pictures do not determine all of the camera's parameters; take tilted and off-centre ones");
   if (c.rms_px > 0.7)
     say("the corners are off by %.2f px: a bent board, blurred pictures or another lens model (--model)", c.rms_px);
   if (coverage.covered < 0.7)
