@@ -8,7 +8,9 @@
 #include <cmath>
 #include <cstring>
 
+#include "filters/core/course_test.hpp"
 #include "filters/core/noise_adaption.hpp"
+#include "filters/core/turn_check.hpp"
 #include "math/elementary.hpp"
 
 namespace wm {
@@ -292,6 +294,16 @@ bool test_noises(wm_monitor *self, const wm_calibration_value *values, size_t co
   return true;
 }
 
+// The sign or the unit of the measured turn, by the innovations or by positions.
+bool test_turn(wm_monitor *self, const wm_calibration_value *values, size_t count) {
+  bool contradicts = course_contradicts(self->course);
+  for (size_t i = 0; i < count; i++) contradicts = contradicts || turn_check::contradicts(values[i]);
+  if (!contradicts) return false;
+  self->cause = WM_CAUSE_TURN;
+  self->source = -1;
+  return true;
+}
+
 // The sources' tests. Returns whether one contradicts; *fits: one fits.
 bool test_sources(wm_monitor *self, wm_time_ns t_ns, bool *fits) {
   bool contradicts = false;
@@ -362,6 +374,7 @@ void wm_monitor_init(wm_monitor *self, const wm_setup *setup, uint64_t observers
       wm::widen_box(self, setup->landmarks[i].p_m[0], setup->landmarks[i].p_m[1]);
     self->is_map_known = setup->landmark_count > 0;
   }
+  wm::course_begin(&self->course);
   wm::clear(self);
 }
 
@@ -372,6 +385,7 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
     wm_monitor_source *s = &self->sources[event->source];
     s->newest_ns = event->t_ns;
     wm::add_observation(s, *event, records, count);
+    if (event->kind == WM_EVENT_POSITION) wm::course_take(&self->course, event->t_ns, event->as.position);
   }
   if (self->begun_ns == WM_TIME_NONE) self->begun_ns = event->t_ns;
   if (self->next_ns != WM_TIME_NONE && event->t_ns < self->next_ns) return 0;
@@ -380,6 +394,7 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
 }
 
 void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibration_value *calibration, size_t count) {
+  wm::course_move(&self->course, *e);
   const bool is_first = self->stepped_ns == WM_TIME_NONE;
   double dt_s = is_first ? 0.0 : wm_seconds_between(self->stepped_ns, e->t_ns);
   if (!(dt_s < wm::kLongStep_s)) dt_s = wm::kLongStep_s;
@@ -397,7 +412,8 @@ void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibratio
   if (!self->is_map_known) wm::widen_box(self, e->pose_map_base.p_m[0], e->pose_map_base.p_m[1]);
   bool fits;
   const bool is_noisy = wm::test_noises(self, calibration, count);
-  const bool contradicts = wm::test_sources(self, e->t_ns, &fits) || is_noisy;
+  const bool is_turned = wm::test_turn(self, calibration, count);
+  const bool contradicts = wm::test_sources(self, e->t_ns, &fits) || is_noisy || is_turned;
   wm::count_doubt(self, contradicts, fits && !self->was_lost, dt_s);
   // Without a map every identity is unknown; that is a matter of the configuration.
   if (e->state != WM_STATE_DEAD_RECKONING || !self->is_map_known) self->is_unsupported = 0;
