@@ -72,6 +72,7 @@ typedef struct wm_monitor {
   double doubt_s;              // time of contradiction that fitting observations have not made up for
   double fitted_s;             // time of fitting observations since the pose was set or found
   double since_found_s;        // since a search found a pose
+  double contradicted_s;       // lost or contradicted, less a share of the time without doubt
   wm_time_ns begun_ns, stepped_ns, next_ns;
   uint32_t resets;
   int32_t cause, source;        // of the present doubt; source -1: none
