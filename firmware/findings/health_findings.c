@@ -117,7 +117,8 @@ const char *wm_cause_text(unsigned cause) {
                                                      "contradicts poses soon after they are found",
                                                      "has unknown identities",
                                                      "is silent",
-                                                     "does not reach the pose"};
+                                                     "does not reach the pose",
+                                                     "turn to the other side than the motion, or by a fraction of it"};
   return cause < WM_CAUSE_COUNT ? kTexts[cause] : "";
 }
 

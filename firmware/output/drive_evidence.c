@@ -52,7 +52,7 @@ static void take_ratio(residual_evidence *r, const wm_innovation *in) {
 }
 
 static void take(drive_evidence *self, const wm_innovation *in) {
-  double log_likelihood = wm_outlier_log_density(in->residual);
+  double log_likelihood = wm_outlier_log_density(in->residual, in->variance);
   self->updates += in->residual != WM_RESIDUAL_STANDSTILL;
   residual_evidence *r = &self->residuals[in->source][in->residual];
   landmark_evidence *l = in->landmark_id >= 0 ? landmark(self, in->landmark_id) : NULL;

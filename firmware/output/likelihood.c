@@ -3,12 +3,16 @@
 
 #include <math.h>
 
-double wm_outlier_log_density(unsigned residual) {
+#define OUTLIER_SIGMAS 20.0  // an outlier of a length has any value within ten sigma to both sides, at least
+
+double wm_outlier_log_density(unsigned residual, double variance) {
   static const double kLog[WM_RESIDUAL_COUNT] = {
       [WM_RESIDUAL_BEARING] = -1.84, [WM_RESIDUAL_RANGE] = -3.91,    [WM_RESIDUAL_X] = -3.91,
       [WM_RESIDUAL_Y] = -3.91,       [WM_RESIDUAL_Z] = -3.91,        [WM_RESIDUAL_HEADING] = -1.84,
       [WM_RESIDUAL_PIXEL] = -6.91,   [WM_RESIDUAL_ELEVATION] = -1.14};
-  return kLog[residual];
+  const int is_length = residual == WM_RESIDUAL_RANGE || residual == WM_RESIDUAL_X || residual == WM_RESIDUAL_Y ||
+                        residual == WM_RESIDUAL_Z;
+  return is_length && variance > 0 ? fmin(kLog[residual], -log(OUTLIER_SIGMAS * sqrt(variance))) : kLog[residual];
 }
 
 double wm_innovation_difference(const wm_innovation *in) {

@@ -9,8 +9,9 @@
 extern "C" {
 #endif
 
-// Log density of an outlier, which has any value: over a turn, over 50 m, over a picture of 1000 px, over half a turn.
-double wm_outlier_log_density(unsigned residual);
+// Log density of an outlier, which has any value: over a turn, over 50 m, over a picture of 1000 px, over half a turn;
+// of a length over 20 sigma, where that is more. `variance`: of the innovation; 0: not known.
+double wm_outlier_log_density(unsigned residual, double variance);
 // Observed minus expected; angles within half a turn.
 double wm_innovation_difference(const wm_innovation *innovation);
 // Log density of a Gaussian with the innovation's variance (> 0).

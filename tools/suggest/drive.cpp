@@ -32,7 +32,7 @@ bool is_counted(const wm_innovation &in) {
 }
 
 double log_density(const wm_innovation &in) {
-  const double outlier = std::log(kOutlier) + wm_outlier_log_density(in.residual);
+  const double outlier = std::log(kOutlier) + wm_outlier_log_density(in.residual, in.variance);
   const double good = std::log1p(-kOutlier) + wm_innovation_log_density(&in);
   const double most = std::max(outlier, good);
   return most + std::log(std::exp(outlier - most) + std::exp(good - most));
@@ -305,7 +305,7 @@ Score Drive::score(bool with_halves) const {
       if (due == 0) continue;
       of.count += due;
       of.log_sum += count[r] > due ? log_sum[r] * due / count[r]
-                                   : log_sum[r] + (due - count[r]) * (std::log(kOutlier) + wm_outlier_log_density(r));
+                                   : log_sum[r] + (due - count[r]) * (std::log(kOutlier) + wm_outlier_log_density(r, 0.0));
     }
   });
   out.states = std::min(out.states, pass.calibration(out.end));

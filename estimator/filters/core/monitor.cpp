@@ -8,7 +8,9 @@
 #include <cmath>
 #include <cstring>
 
+#include "filters/core/course_test.hpp"
 #include "filters/core/noise_adaption.hpp"
+#include "filters/core/turn_check.hpp"
 #include "math/elementary.hpp"
 
 namespace wm {
@@ -33,6 +35,10 @@ constexpr double kStated = 1.5;        // innovations' variance over the stated 
 // Doubt. It needs 10 s of contradiction for LOST; fitting observations take it back at a third of that rate, since a
 // wrong pose fits by chance in between. It stays below 30 s, so that a pose that fits again is back within a minute.
 constexpr double kLostAfter_s = 10.0, kFitRate = 1.0 / 3.0, kMostDoubt_s = 30.0;
+// A run that was contradicted for long has a fault that no search finds, such as a mirrored map, and fits by chance now
+// and then. Beyond kExcused_s each further kSuspect_s of contradiction count as much as all fitting ones: they weigh
+// less by that. Half of the time is doubt of a pose that is found then. Ten times as long without doubt makes up for it.
+constexpr double kExcused_s = 10.0, kSuspect_s = 10.0, kMostContradicted_s = 600.0, kForgiveRate = 0.1;
 constexpr double kFresh_s = 1.0;      // observations within this time are present ones
 constexpr double kSilent_s = 2.0;     // an observing source without data for so long is silent
 constexpr double kStep_s = 0.3;       // between two steps: that of the slots
@@ -196,8 +202,9 @@ struct verdict_of_source {
   bool is_unknown, fits;
 };
 
-// `fits`: enough observations of late, and no test fails.
-verdict_of_source test(const source &s, wm_time_ns t_ns) {
+// `fits`: enough observations of late, and no test fails. Of a run that was contradicted for long, no more may be
+// refused than in a good one; the test alone would need many more to fail.
+verdict_of_source test(const source &s, wm_time_ns t_ns, bool is_suspect) {
   verdict_of_source out{WM_CAUSE_NONE, false, false};
   if (s.opened == 0) return out;
   const double age_s = wm_seconds_between(slot_at(s, 0).newest_ns, t_ns);
@@ -208,7 +215,8 @@ verdict_of_source test(const source &s, wm_time_ns t_ns) {
     if (w.slots > 0 && out.cause == WM_CAUSE_NONE) out.cause = cause_of(w);
     out.is_unknown = out.is_unknown || (w.filled == 0 && is_too_large_a_share(w.unknown, w.slots, kUnknownShare));
   }
-  out.fits = out.cause == WM_CAUSE_NONE && (w.filled > 0 || slot_at(s, 0).scalars > 0);
+  out.fits = out.cause == WM_CAUSE_NONE && (w.filled > 0 || slot_at(s, 0).scalars > 0) &&
+             !(is_suspect && w.refused > kFalseShare * w.gated);
   return out;
 }
 
@@ -222,7 +230,7 @@ void clear_windows(wm_monitor *self) {
 void clear(wm_monitor *self) {
   clear_windows(self);
   self->is_noise_at_limit = 0;
-  self->doubt_s = self->fitted_s = self->since_found_s = 0.0;
+  self->doubt_s = self->fitted_s = self->since_found_s = self->contradicted_s = 0.0;
   self->cause = WM_CAUSE_NONE;
   self->source = self->silent = -1;
   self->found = self->is_unsupported = self->is_outside = self->was_lost = self->is_probation = 0;
@@ -244,9 +252,9 @@ void take_found(wm_monitor *self) {
   clear_windows(self);
   if (!self->was_lost) return;
   const bool again = self->found > 0 && self->since_found_s < kAgain_s;
-  self->is_probation = again || self->fitted_s < kProven_s;
+  self->is_probation = again || self->fitted_s < kProven_s || self->contradicted_s > kExcused_s;
   if (!self->is_probation) self->found = 0;
-  const double probation_s = kProbation_s * larger(self->found, 1.0);
+  const double probation_s = kProbation_s * larger(self->found, 1.0) + 0.5 * self->contradicted_s;
   self->doubt_s = !self->is_probation ? 0.0 : probation_s < kLostAfter_s ? probation_s : kLostAfter_s;
   self->cause = self->doubt_s > 0.0 ? WM_CAUSE_LOST_AGAIN : WM_CAUSE_NONE;
   self->source = -1;
@@ -292,6 +300,16 @@ bool test_noises(wm_monitor *self, const wm_calibration_value *values, size_t co
   return true;
 }
 
+// The sign or the unit of the measured turn, by the innovations or by positions.
+bool test_turn(wm_monitor *self, const wm_calibration_value *values, size_t count) {
+  bool contradicts = course_contradicts(self->course);
+  for (size_t i = 0; i < count; i++) contradicts = contradicts || turn_check::contradicts(values[i]);
+  if (!contradicts) return false;
+  self->cause = WM_CAUSE_TURN;
+  self->source = -1;
+  return true;
+}
+
 // The sources' tests. Returns whether one contradicts; *fits: one fits.
 bool test_sources(wm_monitor *self, wm_time_ns t_ns, bool *fits) {
   bool contradicts = false;
@@ -299,7 +317,7 @@ bool test_sources(wm_monitor *self, wm_time_ns t_ns, bool *fits) {
   self->is_unsupported = 0;
   for (int32_t i = 0; i < WM_MONITOR_SOURCES; i++) {
     source &s = self->sources[i];
-    const verdict_of_source v = test(s, t_ns);
+    const verdict_of_source v = test(s, t_ns, self->contradicted_s > kExcused_s);
     s.cause = static_cast<uint8_t>(v.cause);
     *fits = *fits || v.fits;
     if (v.cause != WM_CAUSE_NONE && !contradicts) {
@@ -315,6 +333,12 @@ bool test_sources(wm_monitor *self, wm_time_ns t_ns, bool *fits) {
   return contradicts;
 }
 
+void count_contradicted(wm_monitor *self, bool contradicts, bool fits, double dt_s) {
+  double &sum = self->contradicted_s;
+  if (contradicts || self->was_lost) sum = sum + dt_s < kMostContradicted_s ? sum + dt_s : kMostContradicted_s;
+  if (fits && !contradicts && self->doubt_s <= 0.0) sum = larger(sum - kForgiveRate * dt_s, 0.0);
+}
+
 void count_doubt(wm_monitor *self, bool contradicts, bool fits, double dt_s) {
   if (contradicts) {
     self->is_probation = 0;
@@ -325,8 +349,9 @@ void count_doubt(wm_monitor *self, bool contradicts, bool fits, double dt_s) {
     return;
   }
   if (!fits) return;
+  const double weight = 1.0 / (1.0 + larger(self->contradicted_s - kExcused_s, 0.0) / kSuspect_s);
   self->fitted_s = self->fitted_s < kLongAgo_s ? self->fitted_s + dt_s : kLongAgo_s;
-  self->doubt_s = larger(self->doubt_s - (self->is_probation ? 1.0 : kFitRate) * dt_s, 0.0);
+  self->doubt_s = larger(self->doubt_s - (self->is_probation ? 1.0 : kFitRate) * weight * dt_s, 0.0);
 }
 
 // The covariance of the mixture of this pose and one anywhere on the map; a filter that has widened its own keeps it.
@@ -362,6 +387,7 @@ void wm_monitor_init(wm_monitor *self, const wm_setup *setup, uint64_t observers
       wm::widen_box(self, setup->landmarks[i].p_m[0], setup->landmarks[i].p_m[1]);
     self->is_map_known = setup->landmark_count > 0;
   }
+  wm::course_begin(&self->course);
   wm::clear(self);
 }
 
@@ -372,6 +398,7 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
     wm_monitor_source *s = &self->sources[event->source];
     s->newest_ns = event->t_ns;
     wm::add_observation(s, *event, records, count);
+    if (event->kind == WM_EVENT_POSITION) wm::course_take(&self->course, event->t_ns, event->as.position);
   }
   if (self->begun_ns == WM_TIME_NONE) self->begun_ns = event->t_ns;
   if (self->next_ns != WM_TIME_NONE && event->t_ns < self->next_ns) return 0;
@@ -380,6 +407,7 @@ int wm_monitor_take(wm_monitor *self, const wm_event *event, const wm_innovation
 }
 
 void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibration_value *calibration, size_t count) {
+  wm::course_move(&self->course, *e);
   const bool is_first = self->stepped_ns == WM_TIME_NONE;
   double dt_s = is_first ? 0.0 : wm_seconds_between(self->stepped_ns, e->t_ns);
   if (!(dt_s < wm::kLongStep_s)) dt_s = wm::kLongStep_s;
@@ -397,7 +425,9 @@ void wm_monitor_step(wm_monitor *self, const wm_estimate *e, const wm_calibratio
   if (!self->is_map_known) wm::widen_box(self, e->pose_map_base.p_m[0], e->pose_map_base.p_m[1]);
   bool fits;
   const bool is_noisy = wm::test_noises(self, calibration, count);
-  const bool contradicts = wm::test_sources(self, e->t_ns, &fits) || is_noisy;
+  const bool is_turned = wm::test_turn(self, calibration, count);
+  const bool contradicts = wm::test_sources(self, e->t_ns, &fits) || is_noisy || is_turned;
+  wm::count_contradicted(self, contradicts, fits && !self->was_lost, dt_s);
   wm::count_doubt(self, contradicts, fits && !self->was_lost, dt_s);
   // Without a map every identity is unknown; that is a matter of the configuration.
   if (e->state != WM_STATE_DEAD_RECKONING || !self->is_map_known) self->is_unsupported = 0;

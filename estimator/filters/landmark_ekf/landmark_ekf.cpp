@@ -222,6 +222,7 @@ size_t landmark_ekf::list_calibration(wm_calibration_value *out, size_t capacity
   if (gnss_time_state_ >= 0)
     list.add("gnss", "time_offset_s", filter_.value(gnss_time_state_), std::sqrt(filter_.variance(gnss_time_state_)));
   filter_.noise().list(&list);
+  filter_.turn_test().list(&list);
   return list.count();
 }
 

@@ -34,6 +34,7 @@ void landmark_ekf::decay_gnss_error(wm_time_ns t_ns, double stated_m) {
   const double factor = left * sigma_m / before_m, added = variance * (1.0 - square(left));
   for (int k = 0; k < 2; k++) filter_.fade(gnss_error_state_ + k, factor, added);
   noise.fade_correlated(factor, added);
+  filter_.turn_test().fade_correlated(factor);
 }
 
 wm_status landmark_ekf::fuse_position(const wm_event &event, record_list records) {

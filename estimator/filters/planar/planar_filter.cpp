@@ -172,6 +172,7 @@ bool planar_filter::update(const projection &projected, double innovation, doubl
   for (int i = 0; i < kPoseStates; i++) adapted.gain[i] = k[i];
   for (int i = 0; correlated_ >= 0 && i < 2; i++) adapted.gain[kPoseStates + i] = k[correlated_ + i];
   noise_.update(adapted);
+  turn_test_.update(adapted);
   // K b' + b K' with b = s/2 K - g is Joseph's form for one row.
   vectors::set_scaled(b, k, 0.5 * s, stride_);
   vectors::add_scaled(b, projected.gain, -1.0, stride_);
@@ -226,6 +227,7 @@ void planar_filter::set_pose(const wm_pose2 &pose, const double covariance[3][3]
   for (int i = 0; i < 3; i++)
     for (int j = 0; j < 3; j++) p()[i * stride_ + j] = i <= j ? covariance[i][j] : covariance[j][i];
   noise_.restart(false);
+  turn_test_.restart();
   wheels_.restart();
 }
 

@@ -25,6 +25,7 @@ void planar_motion::init_motion(const wm_setup &setup) {
   twist_ = {};
   for (steady_rate &rate : steady_) rate.restart(0.0);
   noise_.init(0.0);
+  turn_test_.init();
   heading_rad_ = 0.0;
   sensor_states_ = 0;
 }
@@ -93,6 +94,7 @@ wm_pose2 planar_motion::path(wm_time_ns from_ns, wm_time_ns to_ns, motion_twist 
 void planar_motion::take_step(const motion_segment &segment, const motion_twist &twist, const motion_noise &noise,
                               const pose_step &step) {
   noise_.move(step.x_m, step.y_m, noise.adapted_distance_m2, noise.adapted_lateral_m2, noise.adapted_rotation_rad2);
+  if (!has_velocity()) turn_test_.move(step.x_m, step.y_m, step.turn_rad);
   odom_ = compose(odom_, step.body);
   travelled_m_ += speed_of(twist) * segment.dt_s;
   turned_rad_ += std::fabs(step.turn_rad);

@@ -8,6 +8,7 @@
 
 #include "filters/core/calibration_list.hpp"
 #include "filters/core/noise_adaption.hpp"
+#include "filters/core/turn_check.hpp"
 #include "filters/planar/pose_step.hpp"
 #include "math/elementary.hpp"
 #include "motion/event_time.hpp"
@@ -66,6 +67,8 @@ class planar_motion {
   double turned_rad() const { return turned_rad_; }
   noise_adaption &noise() { return noise_; }
   const noise_adaption &noise() const { return noise_; }
+  turn_check &turn_test() { return turn_test_; }
+  const turn_check &turn_test() const { return turn_test_; }
   int motion_state(int calibration_index) const { return motion_state_[calibration_index]; }  // -1: off
 
  protected:
@@ -170,6 +173,7 @@ class planar_motion {
   planar_twist twist_;     // of the last segment
   steady_rate steady_[2];  // of its v and w
   noise_adaption noise_;
+  turn_check turn_test_;
   double heading_rad_;  // only where has_velocity()
 };
 

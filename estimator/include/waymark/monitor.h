@@ -42,14 +42,37 @@ typedef struct wm_monitor_source {
   uint8_t cause;  // wm_cause at the last step
 } wm_monitor_source;
 
+#define WM_MONITOR_COURSE_SLOTS 33
+
+// Positions near in time, and the mean of the dead reckoning at their stamps.
+typedef struct wm_monitor_course_slot {
+  wm_time_ns begin_ns;
+  double count, variance;  // sum of the stated ones, m2, both axes
+  double place_m[2];       // sums
+  double way_m[2];         // sums of the dead reckoning
+} wm_monitor_course_slot;
+
+// Positions against the motion between them.
+typedef struct wm_monitor_course {
+  wm_monitor_course_slot slots[WM_MONITOR_COURSE_SLOTS];  // a ring; `opened` counts them
+  uint64_t opened;
+  double way_m[2], heading_rad;  // dead reckoning until `until_ns`
+  double v_mps[2], w_radps;      // from there on
+  wm_time_ns until_ns;
+  double impossible_s;  // time of turns that no vehicle can drive, less that of others
+  int32_t is_mirrored, is_impossible;
+} wm_monitor_course;
+
 typedef struct wm_monitor {
   wm_monitor_source sources[WM_MONITOR_SOURCES];
   uint64_t observers;          // bit for each source that may give observations
+  wm_monitor_course course;
   double spread_m2;            // variance of a place anywhere on the map, each axis
   double low_m[2], high_m[2];  // the map, else the way so far
   double doubt_s;              // time of contradiction that fitting observations have not made up for
   double fitted_s;             // time of fitting observations since the pose was set or found
   double since_found_s;        // since a search found a pose
+  double contradicted_s;       // lost or contradicted, less a share of the time without doubt
   wm_time_ns begun_ns, stepped_ns, next_ns;
   uint32_t resets;
   int32_t cause, source;        // of the present doubt; source -1: none

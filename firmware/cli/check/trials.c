@@ -38,6 +38,8 @@
 #define UPDATES_MIN 0.5
 // nats an update, for each state of calibration beyond these limits: more than GAIN_MIN, less than wrong poses cost.
 #define CALIBRATION_COST 0.2
+#define DOUBT_COST 0.2  // likewise, of a drive that is degraded or lost from its beginning to its end
+#define CALIBRATION_SIGMAS 3.0
 #define SCALE_MAX 1.5
 #define OFFSET_MAX_S 0.25
 #define YAW_MAX_RAD 0.5
@@ -63,11 +65,14 @@ static void put(void *context, wm_output_kind kind, const void *record, size_t b
   if (kind == WM_OUTPUT_INNOVATION && self->votes.given) id_votes_take(&self->votes, record);
 }
 
+// States that ended beyond these limits, and by more than their own sigma explains.
 static double calibration_cost(const wm_assembly *assembly, const wm_health *health) {
   int count = 0;
   for (uint32_t i = 0; i < health->calibration_count; i++) {
     const wm_calibration_value *c = &health->calibration[i];
-    if (strstr(c->name, "_scale"))
+    const int is_scale = strstr(c->name, "_scale") != NULL;
+    if (fabs(c->value - is_scale) < CALIBRATION_SIGMAS * c->sigma) continue;
+    if (is_scale)
       count += c->value < 1 / SCALE_MAX || c->value > SCALE_MAX || evidence_scale_contradicts(assembly, c);
     else if (strstr(c->name, ".time_offset_s"))
       count += fabs(c->value) > OFFSET_MAX_S;
@@ -75,6 +80,12 @@ static double calibration_cost(const wm_assembly *assembly, const wm_health *hea
       count += fabs(c->value) > YAW_MAX_RAD;
   }
   return CALIBRATION_COST * count;
+}
+
+// What the monitor finds, as the turn's sign, costs no likelihood: time-correlated errors and noise take it up.
+static double doubt_cost(const drive_evidence *self) {
+  const uint64_t doubted = self->states[WM_STATE_DEGRADED] + self->states[WM_STATE_LOST];
+  return self->published > 0 ? DOUBT_COST * (double)doubted / (double)self->published : 0;
 }
 
 size_t trials_edits(const trials_plan *plan, const suspect *of, size_t count, file_edit out[TRIAL_EDITS_MAX]) {
@@ -132,7 +143,8 @@ static trial_message drive(const trials_plan *plan, const char *folder, double u
   done.result =
       (trial_result){.is_valid = 1,
                      .updates = self.evidence.updates,
-                     .score = evidence_score(&self.evidence) - calibration_cost(plan->assembly, &report.health),
+                     .score = evidence_score(&self.evidence) - calibration_cost(plan->assembly, &report.health) -
+                              doubt_cost(&self.evidence),
                      .explained = (double)self.evidence.fused / (double)self.evidence.updates};
   if (self.votes.given) id_votes_table(&self.votes, &done.table);
   return done;

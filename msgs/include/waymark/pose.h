@@ -32,6 +32,7 @@ typedef enum wm_cause {
   WM_CAUSE_UNKNOWN,       // identities of a source's observations are not in the map
   WM_CAUSE_SILENT,        // a source gives no observations any more
   WM_CAUSE_OFF_MAP,       // the pose is outside of the map
+  WM_CAUSE_TURN,          // the measured turn has another sign or unit than the observations show
   WM_CAUSE_COUNT
 } wm_cause;
 

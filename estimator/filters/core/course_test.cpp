@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: Apache-2.0
+// The dead reckoning of a window is laid over the positions by the best turn and shift [Umeyama1991], as it is, and with
+// the turn's sign changed. With an unknown variance the log likelihood ratio of both is half the number of coordinates
+// times the logarithm of the ratio of the sums of squares. The stated variances are added to both sums: below them a
+// difference has no meaning. Neither the pose nor its heading are needed, so that a start that is wrong does not matter.
+#include "filters/core/course_test.hpp"
+
+#include <cmath>
+
+#include "math/elementary.hpp"
+
+namespace wm {
+namespace {
+
+constexpr double kSlot_s = 5.0;          // as the monitor's for positions: multipath passes
+constexpr int kWindows[] = {6, 16, 33};  // slots: 30, 80 and 165 s
+constexpr double kSparse = 3.0;          // a window reaches back at most so many times its length
+constexpr double kAlarm_log = 9.21;      // -log(1e-4)
+constexpr double kGap_s = 1.5;           // without motion for longer, dead reckoning begins anew
+// Tyres reach 10 m/s2. Beyond this for 2 s more than not, turn rate or speed has another unit.
+constexpr double kMostAcross_mps2 = 15.0, kImpossible_s = 2.0, kRemembered_s = 10.0;
+
+using course = wm_monitor_course;
+using slot = wm_monitor_course_slot;
+
+// The slot `age` before the newest one.
+const slot &slot_at(const course &self, int age) {
+  return self.slots[(self.opened - 1 - static_cast<uint64_t>(age)) % WM_MONITOR_COURSE_SLOTS];
+}
+
+struct plane {
+  double x, y;
+};
+
+plane mean_of(const double sum[2], double count) { return {sum[0] / count, sum[1] / count}; }
+
+// Sum of squares of what a turn and a shift of the way, or of its mirror image (side -1), leave of the first `n` slots.
+double left_over(const course &self, int n, double side) {
+  plane place{}, way{};
+  for (int i = 0; i < n; i++) {
+    const slot &s = slot_at(self, i);
+    const plane p = mean_of(s.place_m, s.count), w = mean_of(s.way_m, s.count);
+    place = {place.x + p.x / n, place.y + p.y / n};
+    way = {way.x + w.x / n, way.y + w.y / n};
+  }
+  double squares = 0.0, along = 0.0, across = 0.0;
+  for (int i = 0; i < n; i++) {
+    const slot &s = slot_at(self, i);
+    const plane p = mean_of(s.place_m, s.count), w = mean_of(s.way_m, s.count);
+    const plane a = {p.x - place.x, p.y - place.y}, b = {w.x - way.x, side * (w.y - way.y)};
+    squares += square(a.x) + square(a.y) + square(b.x) + square(b.y);
+    along += a.x * b.x + a.y * b.y;
+    across += a.y * b.x - a.x * b.y;
+  }
+  const double sum = squares - 2.0 * std::sqrt(square(along) + square(across));
+  return sum > 0.0 ? sum : 0.0;
+}
+
+// How many of the newest slots a window of `slots` has.
+int slots_of(const course &self, int slots) {
+  const double reach_s = kSparse * slots * kSlot_s;
+  int n = 0;
+  while (n < slots && static_cast<uint64_t>(n) < self.opened &&
+         wm_seconds_between(slot_at(self, n).begin_ns, slot_at(self, 0).begin_ns) < reach_s)
+    n++;
+  return n;
+}
+
+bool is_mirrored(const course &self) {
+  for (const int slots : kWindows) {
+    const int n = slots_of(self, slots);
+    if (n < kWindows[0]) return false;
+    double stated = 0.0;
+    for (int i = 0; i < n; i++) {
+      const slot &s = slot_at(self, i);
+      stated += s.variance / s.count;
+    }
+    const double as_is = left_over(self, n, 1.0) + stated, mirrored = left_over(self, n, -1.0) + stated;
+    if (mirrored > 0.0 && as_is > mirrored && n * log(as_is / mirrored) > kAlarm_log) return true;
+  }
+  return false;
+}
+
+// The dead reckoning after `dt_s` more.
+plane way_after(const course &self, double dt_s) {
+  const sin_cos middle = sincos(self.heading_rad + 0.5 * self.w_radps * dt_s);
+  const double x_m = self.v_mps[0] * dt_s, y_m = self.v_mps[1] * dt_s;
+  return {self.way_m[0] + middle.cos * x_m - middle.sin * y_m, self.way_m[1] + middle.sin * x_m + middle.cos * y_m};
+}
+
+void note_turn(course *self, double across_mps2, double dt_s) {
+  const double more_s = std::fabs(across_mps2) > kMostAcross_mps2 ? dt_s : -dt_s;
+  const double sum = self->impossible_s + more_s;
+  self->impossible_s = sum < 0.0 ? 0.0 : sum > kRemembered_s ? kRemembered_s : sum;
+  self->is_impossible = self->impossible_s > kImpossible_s;
+}
+
+}  // namespace
+
+void course_begin(course *self) {
+  *self = {};
+  self->until_ns = WM_TIME_NONE;
+}
+
+void course_move(course *self, const wm_estimate &e) {
+  if (e.t_ns == WM_TIME_NONE) return;
+  const double dt_s = self->until_ns == WM_TIME_NONE ? -1.0 : wm_seconds_between(self->until_ns, e.t_ns);
+  if (dt_s == 0.0) return;
+  if (dt_s > 0.0 && dt_s < kGap_s) {
+    const plane to = way_after(*self, dt_s);
+    self->way_m[0] = to.x;
+    self->way_m[1] = to.y;
+    self->heading_rad = wrap(self->heading_rad + self->w_radps * dt_s);
+    note_turn(self, self->v_mps[0] * self->w_radps, dt_s);
+  } else {
+    self->opened = 0;
+    self->is_mirrored = 0;
+  }
+  self->until_ns = e.t_ns;
+  self->v_mps[0] = finite(e.v_mps[0]) ? e.v_mps[0] : 0.0;
+  self->v_mps[1] = finite(e.v_mps[1]) ? e.v_mps[1] : 0.0;
+  self->w_radps = finite(e.w_radps[2]) ? e.w_radps[2] : 0.0;
+}
+
+void course_take(course *self, wm_time_ns t_ns, const wm_position &position) {
+  const double ahead_s = self->until_ns == WM_TIME_NONE ? kGap_s : wm_seconds_between(self->until_ns, t_ns);
+  const double sigma_m = position.sigma_xy_m;
+  if (!(std::fabs(ahead_s) < kGap_s) || !finite(position.p_m[0]) || !finite(position.p_m[1]) || !finite(sigma_m)) return;
+  if (self->opened == 0 || wm_seconds_between(slot_at(*self, 0).begin_ns, t_ns) >= kSlot_s) {
+    if (self->opened > 0) self->is_mirrored = is_mirrored(*self);
+    slot *next = &self->slots[self->opened++ % WM_MONITOR_COURSE_SLOTS];
+    *next = {};
+    next->begin_ns = t_ns;
+  }
+  slot *now = &self->slots[(self->opened - 1) % WM_MONITOR_COURSE_SLOTS];
+  now->count += 1.0;
+  now->variance += 2.0 * square(sigma_m);
+  const plane way = way_after(*self, ahead_s);
+  now->way_m[0] += way.x;
+  now->way_m[1] += way.y;
+  for (int k = 0; k < 2; k++) now->place_m[k] += position.p_m[k];
+}
+
+bool course_contradicts(const course &self) { return self.is_mirrored || self.is_impossible; }
+
+}  // namespace wm
