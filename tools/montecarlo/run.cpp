@@ -7,6 +7,7 @@
 #include "montecarlo/montecarlo.h"
 #include "montecarlo/simulated.h"
 #include "simulate/angle.h"
+#include "simulate/measured.h"
 #include "simulate/simulate.h"
 
 namespace wm::montecarlo {
@@ -62,6 +63,7 @@ void run_one(const std::vector<SmallEvent> &events, const sim::Recording &record
 wm_status prepare(const sim::Scenario &scenario, size_t landmarks, uint64_t seeds, Statistics &out, wm_error *err) {
   sim::Drive drive;
   if (const wm_status s = sim::Drive::plan(scenario.route, drive, err); s != WM_OK) return s;
+  drive = sim::on_base(scenario.motion, 0, drive);
   std::vector<double> times;
   for (int k = 1; k * kStep_s < drive.duration_s(); k++) times.push_back(k * kStep_s);
   const std::vector<Bound> bounds = bound(scenario, drive, landmarks, times);

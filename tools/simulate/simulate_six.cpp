@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "math/elementary.hpp"
+#include "simulate/measured.h"
 #include "simulate/motion.h"
 #include "simulate/random.h"
 #include "simulate/simulate.h"
@@ -76,6 +77,7 @@ void simulate_six(const Scenario &sc, uint64_t seed, const Path6 &path, Recordin
   out.duration_s = sc.duration_s > 0 ? std::min(sc.duration_s, path.duration_s()) : path.duration_s();
   const Random random(seed);
   send_motion(sc, random, out);
+  if (sc.motion.imu_hz > 0) measure_imu(sc, random, out);
   for (uint64_t k = 0; static_cast<double>(k) / kTruth_hz <= out.duration_s; k++) {
     const double t_s = static_cast<double>(k) / kTruth_hz;
     const State6 s = path.at(t_s);
