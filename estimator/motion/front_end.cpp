@@ -13,8 +13,9 @@ namespace {
 // Beyond these, as beyond kSpeedMost_mps and kRateMost_radps, a value is a decoding fault.
 constexpr double kSteeringMost_rad = 200.0;  // of a steering wheel: 32 turns
 constexpr double kActuatorMost_m = 10.0;
-constexpr double kTicksMost = 1e15;         // doubles still count singly there
-constexpr double kRoadWheelMost_rad = 1.5;  // tan is finite; no wheel is turned across
+constexpr double kAccelerationMost_mps2 = 2000.0;  // 200 g: the largest range of accelerometers of vehicles
+constexpr double kTicksMost = 1e15;                // doubles still count singly there
+constexpr double kRoadWheelMost_rad = 1.5;         // tan is finite; no wheel is turned across
 
 // Sensors without a sign give zero errors of either; the largest seen is 0.05 m/s. Not swept.
 constexpr double kSignedBelow_mps = -0.1;
@@ -34,7 +35,12 @@ double limit_of(int quantity) {
   switch (quantity) {
     case WM_Q_WHEEL_TICKS_LEFT:
     case WM_Q_WHEEL_TICKS_RIGHT: return kTicksMost;
+    case WM_Q_ROLL_RATE:
+    case WM_Q_PITCH_RATE:
     case WM_Q_YAW_RATE: return kRateMost_radps;
+    case WM_Q_ACCELERATION_X:
+    case WM_Q_ACCELERATION_Y:
+    case WM_Q_ACCELERATION_Z: return kAccelerationMost_mps2;
     case WM_Q_STEERING_WHEEL:
     case WM_Q_ROAD_WHEEL: return kSteeringMost_rad;
     case WM_Q_STEERING_ACTUATOR: return kActuatorMost_m;

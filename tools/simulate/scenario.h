@@ -56,7 +56,9 @@ struct Motion {
   // White noise of the twist per sqrt(s): constant, and relative to the component.
   double speed_noise_mps = 0, side_noise_mps = 0, turn_noise_radps = 0;
   double speed_noise = 0, side_noise = 0, turn_noise = 0;
-  double imu_hz = 0;  // above 0: imu.csv
+  double log_hz = 50;     // six degrees of freedom: rows of motion6.csv
+  bool log_rates = true;  // ... with rates of its own; else they are 0 there
+  double imu_hz = 0;      // above 0: imu.csv
   // Accelerometer: noise of a sample; a constant error of each axis; an even shaking; bumps of that size, so many per s
   double accelerometer_noise_mps2 = 0, accelerometer_bias_mps2 = 0, vibration_mps2 = 0, bump_mps2 = 0, bumps_hz = 0;
   bool is_there() const { return base != Base::rolling || twist_hz > 0 || imu_hz > 0; }

@@ -6,9 +6,14 @@ namespace wm::sim {
 namespace {
 
 void read_twist(Reader &r, const wm_yaml_node &map, Motion &out) {
-  static const char *const known[] = {"rate_hz",          "speed_noise_mps",    "speed_noise_percent",
-                                      "side_noise_mps",   "side_noise_percent", "turn_noise_mradps",
-                                      "turn_noise_percent", nullptr};
+  static const char *const known[] = {"rate_hz",
+                                      "speed_noise_mps",
+                                      "speed_noise_percent",
+                                      "side_noise_mps",
+                                      "side_noise_percent",
+                                      "turn_noise_mradps",
+                                      "turn_noise_percent",
+                                      nullptr};
   if (!r.ok() || !wm_yaml_there(&map)) return;
   r.keys(map, known);
   r.number(map, "rate_hz", 1, 1000, 1, out.twist_hz, true);
@@ -21,9 +26,9 @@ void read_twist(Reader &r, const wm_yaml_node &map, Motion &out) {
 }
 
 void read_imu(Reader &r, const wm_yaml_node &map, Motion &out) {
-  static const char *const known[] = {"rate_hz",        "accelerometer_noise_mps2", "accelerometer_bias_mps2",
-                                      "vibration_mps2", "bump_mps2",                "bumps_hz",
-                                      nullptr};
+  static const char *const known[] = {
+      "rate_hz", "accelerometer_noise_mps2", "accelerometer_bias_mps2", "vibration_mps2", "bump_mps2", "bumps_hz",
+      nullptr};
   if (!r.ok() || !wm_yaml_there(&map)) return;
   r.keys(map, known);
   r.number(map, "rate_hz", 1, 2000, 1, out.imu_hz, true);
@@ -37,7 +42,8 @@ void read_imu(Reader &r, const wm_yaml_node &map, Motion &out) {
 }  // namespace
 
 void read_motion(Reader &r, const wm_yaml_node &map, Scenario &out) {
-  static const char *const known[] = {"base", "crab_deg", "crab_m", "track_scale", "twist", "imu", nullptr};
+  static const char *const known[] = {"base",      "crab_deg", "crab_m", "track_scale", "log_hz",
+                                      "log_rates", "twist",    "imu",    nullptr};
   static const char *const bases[] = {"rolling", "holonomic", "skid_steer", nullptr};
   if (!r.ok() || !wm_yaml_there(&map)) return;
   r.keys(map, known);
@@ -48,6 +54,8 @@ void read_motion(Reader &r, const wm_yaml_node &map, Scenario &out) {
   r.number(map, "crab_deg", 0, 180, kDeg, m.crab_rad);
   r.number(map, "crab_m", 0.5, 1000, 1, m.crab_m);
   r.number(map, "track_scale", 0.5, 5, 1, m.track_scale);
+  r.number(map, "log_hz", 0.5, 1000, 1, m.log_hz);
+  r.flag(map, "log_rates", m.log_rates);
   const wm_yaml_node twist = r.child(map, "twist", false), imu = r.child(map, "imu", false);
   read_twist(r, twist, m);
   read_imu(r, imu, m);
