@@ -13,7 +13,10 @@ inline constexpr double kGravity_mps2 = 9.80665;
 
 class gravity_window {
  public:
-  void init(double sigma_mps2) { *this = {{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, kNoTurn, 0, 0, 0, sigma_mps2}; }
+  void init(double sigma_mps2) {
+    sigma_mps2_ = sigma_mps2;
+    count_ = 0;
+  }
 
   // Takes one sample, with the velocity and the rates that hold until it (m/s, rad/s, body axes). `v_var`: variances
   // of the velocity; nullptr: it is not measured. True once a second: *out is g towards the zenith, in body axes at
@@ -21,12 +24,15 @@ class gravity_window {
   bool add(wm_time_ns t_ns, const vec3 &force, const vec3 &v, const vec3 &w, const vec3 *v_var, vec3 *out,
            double variance[3]);
 
-  // All in axes of the body at the window's beginning.
-  vec3 sum, squares, v_begin;
-  quat turn;
-  wm_time_ns begin_ns, last_ns;
-  int64_t count;  // 0: no window is open
-  double sigma_mps2;
+ private:
+  void begin(wm_time_ns t_ns, const vec3 &force, const vec3 &v);
+
+  double sigma_mps2_;
+  int64_t count_;  // 0: no window is open
+  wm_time_ns begin_ns_, last_ns_;
+  // In axes of the body at the window's beginning.
+  vec3 sum_, squares_, v_begin_;
+  quat turn_;
 };
 
 }  // namespace wm
