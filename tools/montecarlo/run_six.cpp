@@ -67,10 +67,9 @@ std::vector<wm_event> events_of(const sim::Recording &recording) {
   for (const sim::ImuRow &row : recording.imu) {
     wm_quantities &q = add(row, WM_EVENT_QUANTITIES, 0).as.quantities;
     q.count = 6;
-    for (uint8_t i = 0; i < 6; i++) {
-      q.id[i] = kImu[i];
-      q.value[i] = i < 3 ? row.w_radps[i] : row.a_mps2[i - 3];
-    }
+    std::copy(kImu, kImu + 6, q.id);
+    std::copy(row.w_radps, row.w_radps + 3, q.value);
+    std::copy(row.a_mps2, row.a_mps2 + 3, q.value + 3);
   }
   for (const sim::Sighting &s : recording.sightings)
     add(s, WM_EVENT_SIGHTING, 1).as.sighting = {s.sensor, s.id, s.bearing_rad, s.range_m, NAN, NAN, NAN, NAN};

@@ -41,7 +41,7 @@ struct vehicle : scene {
       const double t = 0.01 * step_;
       if (step_ % 10 == 0) take(velocity_log(t, v, log_rates));
       const vec3 w = rates(step_);
-      if (finite(w.x)) take(imu(t, w, force(step_)));
+      if (std::isfinite(w.x)) take(imu(t, w, force(step_)));
     }
   }
   void take(const wm_event &e) { TEST_ASSERT_EQUAL(WM_OK, ekf->predict(state, &e)); }
