@@ -419,6 +419,7 @@ void motion_front_end::note_samples(motion_input *input) {
                          known && (twist || stamp_ns_[WM_Q_YAW_RATE] == input->t_ns) && model_ != WM_MOTION_ACKERMANN};
   const bool follows = !history_.empty() && history_.newest().model == model_ && !history_.is_overdue(input->t_ns);
   if (!follows) sampled_ns_[0] = sampled_ns_[1] = WM_TIME_NONE;  // both: the first one after a gap may be the other one
+  if (input->holonomic && twist && fresh[0]) return note_holonomic(input);
   for (int k = 0; k < 2; k++) {
     if (!fresh[k]) continue;
     const double changed = k ? input->b - history_.newest().b : input->a - history_.newest().a;
@@ -426,7 +427,35 @@ void motion_front_end::note_samples(motion_input *input) {
     if (sampled_ns_[k] != WM_TIME_NONE)
       input->sampling[k] = static_cast<float>((square(changed) + square(aside)) *
                                               square(wm_seconds_between(sampled_ns_[k], input->t_ns)) / 12.0);
+    if (k == 0) input->side_sampling = input->sampling[0];
     sampled_ns_[k] = input->t_ns;
+  }
+}
+
+// Twists of a holonomic drive: each axis on its own, and of a change only what the samples' own noise does not explain,
+// two of which are in it. The mean of the squares over some samples, since one alone says little.
+void motion_front_end::note_holonomic(motion_input *input) {
+  const double dt_s = sampled_ns_[0] == WM_TIME_NONE ? 0.0 : wm_seconds_between(sampled_ns_[0], input->t_ns);
+  sampled_ns_[0] = sampled_ns_[1] = input->t_ns;
+  if (!(dt_s > 0.0)) {
+    for (double &mean : change2_) mean = 0.0;
+    return;
+  }
+  const motion_input &before = history_.newest();
+  const planar_twist now = {input->a, input->side_mps, input->b};
+  const double changed[3] = {now.v - before.a, now.u - before.side_mps, now.w - before.b};
+  const stated_noise stated = stated_noise_now();
+  const rate_noise white = rate_noise_of(*params_, kind());
+  const double own[3] = {(finite(stated.distance_m2) ? stated.distance_m2 : square(params_->noise_speed_mps)) +
+                             square(white.speed_rel * now.v),
+                         (finite(stated.lateral_m2) ? stated.lateral_m2 : square(params_->noise_sideways_mps)) +
+                             square(params_->noise_sideways_rel * now.u),
+                         (finite(stated.rotation_rad2) ? stated.rotation_rad2 : square(white.yaw_rate_radps)) +
+                             square(white.yaw_rate_rel * now.w)};
+  for (int k = 0; k < 3; k++) {
+    change2_[k] += kPeriodGain * (square(changed[k]) - 2.0 * own[k] / dt_s - change2_[k]);
+    const double real2 = change2_[k] > 0.0 ? change2_[k] : 0.0;
+    (k == 1 ? input->side_sampling : input->sampling[k / 2]) = static_cast<float>(real2 * square(dt_s) / 12.0);
   }
 }
 
