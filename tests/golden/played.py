@@ -22,10 +22,10 @@ import tempfile
 import time
 
 SKIPPED = 77
-# recording, estimator by its defaults, times real speed, largest distance from the replay in m
-CASES = [("mecanum-1", "odometry", 4, 1e-6), ("kitti-0926-0001", "stereo_ekf", 1, 1e-6)]
-MORE = [("dlr-a", "slam", 8, 1e-6), ("kitti-0926-0095", "stereo_ekf", 1, 1e-6), ("kitti-0930-0020", "stereo_ekf", 1, 1e-6),
-        ("canedge-1", "landmark_ekf", 8, 1e-6)]
+# recording, estimator by its defaults, times real speed
+CASES = [("mecanum-1", "odometry", 2), ("kitti-0926-0001", "stereo_ekf", 1)]
+MORE = [("dlr-a", "slam", 4), ("kitti-0926-0095", "stereo_ekf", 1), ("kitti-0930-0020", "stereo_ekf", 1), ("canedge-1", "landmark_ekf", 4)]
+# The largest distance from the replay, m: stamps are of another clock
 OVER_LCM = [("mecanum-1", "odometry", 0.02), ("dlr-a", "slam", 0.02)]
 
 
@@ -80,14 +80,23 @@ def truth_of(recording):
     return places(path) if path.exists() else []
 
 
-def play(waymark, recording, estimator, speed, most_m, work):
+def dropped(run):
+    """Data that a run dropped since they came late: a computer that does much else wakes the sources late."""
+    sources = json.loads((run / "health.json").read_text())["sources"]
+    return sum(s.get("late", 0) + s.get("dropped", 0) for s in sources.values())
+
+
+def play(waymark, recording, estimator, speed, work):
+    """True: the same rows. None: data came late on this computer, and were dropped as they must be."""
     file = config(work, estimator, "publish: {lcm: false}\n")
     command(waymark, "replay", recording, "--config", file, "--out", work / "replayed")
     command(waymark, "run", "--recording", recording, "--config", file, "--out", work / "played", "--speed", speed)
     replayed, live = places(work / "replayed/trajectory.csv"), places(work / "played/trajectory.csv")
     off_m, share = apart(live, replayed)
-    table(recording.name, f"run at {speed} x", replayed, live, truth_of(recording), f"apart {off_m:.2e} m in {100 * share:.1f} % of the rows")
-    assert off_m <= most_m and share > 0.99 and len(live) > 0.99 * len(replayed), (recording.name, off_m, share)
+    late = dropped(work / "played")
+    table(recording.name, f"run at {speed} x", replayed, live, truth_of(recording),
+          f"apart {off_m:.2e} m, {len(live)} of {len(replayed)} rows, {late} data late")
+    return None if late else off_m == 0 and share == 1 and len(live) == len(replayed)
 
 
 def pose_of(recording):
@@ -192,9 +201,14 @@ def main():
     if args.inside:
         lcm_inside(args)
         return 0
-    for name, estimator, speed, most_m in CASES + (MORE if args.all else []):
+    failed = []
+    for name, estimator, speed in CASES + (MORE if args.all else []):
         with tempfile.TemporaryDirectory(prefix="waymark-played-") as folder:
-            play(args.bin / "waymark", args.data / name, estimator, speed, most_m, pathlib.Path(folder))
+            if play(args.bin / "waymark", args.data / name, estimator, speed, pathlib.Path(folder)) is False:
+                failed.append(name)
+    if failed:
+        print("FAIL: other poses than the replay's, though no datum came late:", ", ".join(failed))
+        return 1
     if args.lcm:
         import lcm_tools
 
