@@ -382,6 +382,8 @@ void motion_front_end::push_input(wm_time_ns t_ns, double a, double b, bool doub
   input.doubtful = doubtful;
   mark_refused(&input);
   note_samples(&input);
+  input.sampling[1] += static_cast<float>(missed_turn_rad2_);
+  missed_turn_rad2_ = 0.0;
   input.standing = still_since_ns_ != WM_TIME_NONE && !doubtful && !input.refused &&
                    wm_seconds_between(still_since_ns_, t_ns) >= params_->standstill_after_s;
   if (ticks_drive() && !counts_wrapped()) {
@@ -492,9 +494,10 @@ void motion_front_end::watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fr
   if (!is_still(speed_mps) || turns) w.moved_ns = t_ns;
   const bool moves = w.moved_ns != WM_TIME_NONE && wm_seconds_between(w.moved_ns, t_ns) < params_->standstill_after_s;
   const double yaw = value_[WM_Q_YAW_RATE];
-  if (yaw != w.rate_radps || !moves || w.since_ns == WM_TIME_NONE) {
+  const bool changed = yaw != w.rate_radps || w.since_ns == WM_TIME_NONE;
+  if (changed || !moves) {
     w = {yaw, t_ns, t_ns, w.moved_ns, 0.0, 0.0, 0.0};
-    health_ &= ~WM_MOTION_HEALTH_YAW_RATE_STUCK;
+    if (changed) health_ &= ~WM_MOTION_HEALTH_YAW_RATE_STUCK;  // a stop alone shows nothing of it
     return;
   }
   const double dt = wm_seconds_between(w.until_ns, t_ns), way = std::fabs(speed_mps) * dt;
@@ -508,7 +511,10 @@ void motion_front_end::watch_yaw_rate(wm_time_ns t_ns, double speed_mps, bool fr
   const double same_s = wm_seconds_between(w.since_ns, t_ns);
   const bool alone = same_s > kYawStuckAlone_s && w.way_m > kYawStuckAlone_m;
   const bool against = same_s > kYawStuckAgainst_s && std::fabs(w.apart_rad) > kYawStuckTurn_rad + w.allowed_rad;
-  if (alone || against) health_ |= WM_MOTION_HEALTH_YAW_RATE_STUCK;
+  if (!alone && !against) return;
+  // Until it was found, the heading has missed the turn that the other sensor measured.
+  if (!(health_ & WM_MOTION_HEALTH_YAW_RATE_STUCK)) missed_turn_rad2_ = square(w.apart_rad);
+  health_ |= WM_MOTION_HEALTH_YAW_RATE_STUCK;
 }
 
 bool motion_front_end::read_other_turn_rate(double speed_mps, double *rate_radps) const {

@@ -212,6 +212,7 @@ class motion_front_end {
     double way_m;
     double apart_rad, allowed_rad;  // the turn by the other sensor less the gyro's; what its errors explain of it
   } yaw_watch_;
+  double missed_turn_rad2_;  // variance of the heading for the next input: what a stuck gyro has missed
   uint64_t outliers_;
   uint32_t health_;
   uint8_t model_;
